@@ -1,0 +1,2 @@
+//! Paints a surface end to end.
+fn main() {}

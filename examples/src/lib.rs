@@ -1,0 +1,1 @@
+//! The adapters between the PaintCopter crates, and what the binaries share.

@@ -1,0 +1,1 @@
+//! Trajectories, their file formats and their evaluation: the ground on which visual-inertial odometry is judged.
