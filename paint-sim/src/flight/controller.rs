@@ -17,11 +17,11 @@ pub trait Controller {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct ControllerSettings {
-    /// Acceleration per position error, 1/s^2. Default 9.
+    /// Acceleration per position error, 1/s^2. Default 16.
     pub position: f64,
-    /// Acceleration per velocity error, 1/s. Default 5.2.
+    /// Acceleration per velocity error, 1/s. Default 8.
     pub velocity: f64,
-    /// How fast roll and pitch shall approach their targets, 1/s: the known lag is inverted down to this one. Default 14.
+    /// How fast roll and pitch shall approach their targets, 1/s: the known lag is inverted down to this one. Default 16.
     pub attitude: f64,
     /// Yaw rate per heading error, 1/s. Default 3.
     pub heading: f64,
@@ -31,7 +31,7 @@ pub struct ControllerSettings {
 
 impl Default for ControllerSettings {
     fn default() -> Self {
-        Self { position: 9.0, velocity: 5.2, attitude: 14.0, heading: 3.0, jerk_window: 0.1 }
+        Self { position: 16.0, velocity: 8.0, attitude: 16.0, heading: 3.0, jerk_window: 0.1 }
     }
 }
 

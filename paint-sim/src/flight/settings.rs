@@ -97,7 +97,7 @@ impl Localisation {
         }
     }
 
-    /// Localisation by vision whose position error is 7 cm RMS over the three axes together (Paper II's figure).
+    /// Localisation by vision whose position error is 7 cm RMS over the three axes together (Paper II, Section 7.1).
     pub fn slam_7cm() -> Self {
         Self {
             position_noise: 0.003,

@@ -2,7 +2,7 @@
 
 use super::log::FlightSample;
 
-/// Errors over the samples with an open valve (Paper II, Section 7, measures the same quantities), and extremes over
+/// Errors over the samples with an open valve (Paper II, Section 7.2, measures the same quantities), and extremes over
 /// all samples. Zero where there is no sample to measure.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -16,7 +16,10 @@ use crate::Error;
 /// triangles share.
 #[derive(Debug, Clone)]
 pub struct TriangleSurface {
+    /// Corners of the triangles that have an area; the leaves of the tree count these.
     corners: Vec<[Vector3<f64>; 3]>,
+    /// Index of the face of each of them.
+    faces: Vec<u32>,
     tree: Bvh,
 }
 
@@ -35,48 +38,30 @@ impl TriangleSurface {
         if let Some(index) = positions.iter().position(|p| p.iter().any(|v| !v.is_finite())) {
             return Err(Error::NotFinite { what: "position", index });
         }
-        let mut corners = Vec::with_capacity(faces.len());
+        let mut surface = Self { corners: Vec::new(), faces: Vec::new(), tree: Bvh::new() };
         for (face, vertices) in faces.iter().enumerate() {
             let mut triangle = [Vector3::zeros(); 3];
             for (corner, &vertex) in triangle.iter_mut().zip(vertices) {
-                let position = positions.get(vertex as usize).ok_or(Error::VertexIndex {
-                    face,
-                    vertex,
-                    vertices: positions.len(),
-                })?;
-                *corner = Vector3::from(position.map(f64::from));
+                let missing = Error::VertexIndex { face, vertex, vertices: positions.len() };
+                *corner = Vector3::from(positions.get(vertex as usize).ok_or(missing)?.map(f64::from));
             }
-            corners.push(triangle);
+            if scaled_normal(&triangle).norm_squared() > 0.0 {
+                surface.corners.push(triangle);
+                surface.faces.push(face as u32);
+            }
         }
-        // Rounding in the box test must never cost a hit that the triangle test would find.
-        let largest = corners.iter().flatten().map(nalgebra::Matrix::amax).fold(0.0, f64::max);
-        let margin = largest * 1e-12;
-        let solid = |t: &[Vector3<f64>; 3]| (t[1] - t[0]).cross(&(t[2] - t[0])).norm_squared() > 0.0;
-        let boxes = corners.iter().enumerate().filter(|(_, t)| solid(t)).map(|(i, t)| {
-            let low = t[0].inf(&t[1]).inf(&t[2]).add_scalar(-margin);
-            let high = t[0].sup(&t[1]).sup(&t[2]).add_scalar(margin);
-            (i, Aabb::new(vector(&low), vector(&high)))
-        });
-        let tree = Bvh::from_iter(BvhBuildStrategy::Binned, boxes);
-        if tree.is_empty() {
+        if surface.corners.is_empty() {
             return Err(Error::NoArea { faces: faces.len() });
         }
-        Ok(Self { corners, tree })
-    }
-
-    /// Number of triangles, those of zero area included.
-    pub fn len(&self) -> usize {
-        self.corners.len()
-    }
-
-    /// Whether there is no triangle; never true for a surface that `new` returned.
-    pub fn is_empty(&self) -> bool {
-        self.corners.is_empty()
-    }
-
-    /// The three corners of a triangle, or `None` where there is no such face.
-    pub fn triangle(&self, face: u32) -> Option<[Point3<f64>; 3]> {
-        self.corners.get(face as usize).map(|t| t.map(Point3::from))
+        // Rounding in the box test must never cost a hit that the triangle test would find.
+        let margin = surface.corners.iter().flatten().map(nalgebra::Matrix::amax).fold(0.0, f64::max) * 1e-12;
+        let bounds = |[a, b, c]: &[Vector3<f64>; 3]| {
+            let (low, high) = (a.inf(b).inf(c).add_scalar(-margin), a.sup(b).sup(c).add_scalar(margin));
+            Aabb::new(vector(&low), vector(&high))
+        };
+        let boxes: Vec<Aabb> = surface.corners.iter().map(bounds).collect();
+        surface.tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
+        Ok(surface)
     }
 }
 
@@ -84,13 +69,13 @@ impl Surface for TriangleSurface {
     fn cast(&self, origin: &Point3<f64>, direction: &Vector3<f64>, max: f64) -> Option<Hit> {
         let ray = Ray::new(vector(&origin.coords), vector(direction));
         let sheared = ShearedRay::new(origin, direction)?;
-        let (face, (distance, barycentric)) = self.tree.find_best(
+        let (leaf, (distance, barycentric)) = self.tree.find_best(
             max,
             |node, best| node.cast_ray(&ray, best),
-            |face, best| sheared.meet(&self.corners[face as usize], best),
+            |leaf, best| sheared.meet(&self.corners[leaf as usize], best),
         )?;
-        let [a, b, c] = &self.corners[face as usize];
-        Some(Hit { distance, face, barycentric, normal: (b - a).cross(&(c - a)).normalize() })
+        let normal = scaled_normal(&self.corners[leaf as usize]).normalize();
+        Some(Hit { distance, face: self.faces[leaf as usize], barycentric, normal })
     }
 
     fn occluded(&self, origin: &Point3<f64>, direction: &Vector3<f64>, max: f64) -> bool {
@@ -100,7 +85,7 @@ impl Surface for TriangleSurface {
         let any = self.tree.find_best(
             max,
             |node, best| if best > 0.0 { node.cast_ray(&ray, max) } else { f64::MAX },
-            |face, _| sheared.meet(&self.corners[face as usize], max).map(|_| 0.0),
+            |leaf, _| sheared.meet(&self.corners[leaf as usize], max).map(|_| 0.0),
         );
         any.is_some()
     }
@@ -110,14 +95,19 @@ impl Surface for TriangleSurface {
         let closest = self.tree.find_best(
             max,
             |node, _| node.aabb().distance_to_local_point(query, true),
-            |face, _| {
-                let [a, b, c] = &self.corners[face as usize];
+            |leaf, _| {
+                let [a, b, c] = &self.corners[leaf as usize];
                 let triangle = Triangle::new(vector(a), vector(b), vector(c));
                 Some((triangle.project_local_point(query, true).point - query).length())
             },
         );
         closest.map_or(max, |(_, distance)| distance.min(max))
     }
+}
+
+/// Normal of the triangle, twice its area long.
+fn scaled_normal([a, b, c]: &[Vector3<f64>; 3]) -> Vector3<f64> {
+    (b - a).cross(&(c - a))
 }
 
 fn vector(v: &Vector3<f64>) -> Vector {
