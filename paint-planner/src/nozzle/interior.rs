@@ -9,7 +9,9 @@ const MAX_STEPS: usize = 60;
 /// Complementarity at which a solution counts as found; positions are in metres and weights of order one.
 const MU: f64 = 1e-14;
 const PRIMAL: f64 = 1e-10;
-const DUAL: f64 = 1e-10;
+const DUAL: f64 = 1e-9;
+/// First complementarity as a share of the steepest slope: a start near the scale of the answer saves half the steps.
+const FIRST: f64 = 1e-3;
 
 /// How the solve went.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,9 +40,11 @@ struct Active {
 pub(crate) fn solve(program: &Program, x: &mut [Vector5<f64>]) -> Option<Outcome> {
     let count = x.len();
     let per_state = program.walls + program.caps;
-    let mut rows = start(program, x);
     let mut system = program.hessian.clone();
     let (mut dual, mut step) = (vec![Vector5::zeros(); count], vec![Vector5::zeros(); count]);
+    program.slope(x, &mut dual);
+    let steepest = dual.iter().fold(0.0_f64, |most, d| most.max(d.amax()));
+    let mut rows = start(program, x, (FIRST * steepest).max(1e-9));
     for steps in 0..MAX_STEPS {
         let (mut primal, mut gap, mut products) = (0.0_f64, 0.0, 0.0);
         program.slope(x, &mut dual);
@@ -91,7 +95,7 @@ pub(crate) fn solve(program: &Program, x: &mut [Vector5<f64>]) -> Option<Outcome
     None
 }
 
-fn start(program: &Program, x: &[Vector5<f64>]) -> Vec<Active> {
+fn start(program: &Program, x: &[Vector5<f64>], mu: f64) -> Vec<Active> {
     let per_state = program.walls + program.caps;
     let mut rows = Vec::with_capacity(program.rows.len());
     for (i, chunk) in program.rows.chunks_exact(per_state).enumerate() {
@@ -100,8 +104,8 @@ fn start(program: &Program, x: &[Vector5<f64>]) -> Vec<Active> {
             let soft = k >= program.walls;
             let room = row.b - row.a.dot(&views[usize::from(soft)]);
             let s = room.max(1e-3);
-            let z = if soft { (1e-5 / s).min(0.5 * program.penalty) } else { 1e-5 / s };
-            let e = if soft { 1e-5 / (program.penalty - z) } else { 0.0 };
+            let z = if soft { (mu / s).min(0.5 * program.penalty) } else { mu / s };
+            let e = if soft { mu / (program.penalty - z) } else { 0.0 };
             rows.push(Active { row: *row, s, z, e, ds: 0.0, dz: 0.0, de: 0.0, residual: 0.0 });
         }
     }
