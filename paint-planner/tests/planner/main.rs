@@ -2,4 +2,3 @@
 
 mod plans;
 mod walls;
-mod scratch;

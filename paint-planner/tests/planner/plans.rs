@@ -63,17 +63,6 @@ fn rough_rock_with_overhangs_is_served_where_the_joints_allow() {
     let settings = Settings::default();
     let plan = optimal(&targets, &wall, &settings).unwrap();
     assert_sound(&plan, &targets, &settings);
-    eprintln!(
-        "{} of {} {} {} T {} dev {} clear {} way {}",
-        plan.report.served,
-        targets.len(),
-        plan.report.normal_deviation_mean,
-        plan.report.normal_deviation_max,
-        plan.trajectory.duration(),
-        plan.report.path_deviation,
-        plan.report.clearance,
-        plan.waypoints.len()
-    );
     let limit = (44.0 + 25.0 - 1.0_f64).to_radians();
     let mut steep = 0;
     for (target, reachable) in targets.iter().zip(&plan.reachable) {
