@@ -152,13 +152,18 @@ fn assemble(program: &Program, rows: &mut [Active], system: &mut BlockTridiagona
         let (hard, soft) = chunk.split_at_mut(program.walls);
         for r in hard {
             r.prepare(false, program.penalty);
-            walls.ger(r.stiffness, &r.row.a, &r.row.a, 1.0);
+            let a = &r.row.a;
+            let scaled = a * r.stiffness;
+            walls += Matrix3::from_columns(&[scaled * a.x, scaled * a.y, scaled * a.z]);
         }
         for r in soft {
             r.prepare(true, program.penalty);
-            let a = r.row.a.xy();
-            caps.ger(r.stiffness, &a, &a, 1.0);
+            let a = &r.row.a;
+            caps[(0, 0)] += a.x * a.x * r.stiffness;
+            caps[(1, 0)] += a.x * a.y * r.stiffness;
+            caps[(1, 1)] += a.y * a.y * r.stiffness;
         }
+        caps[(0, 1)] = caps[(1, 0)];
         let lens = &program.lens[i];
         let mut block = program.hessian.diagonal[i] + lens.transpose() * (caps * lens);
         let mut corner = block.fixed_view_mut::<3, 3>(0, 0);

@@ -50,7 +50,9 @@ fn by_clarabel(program: &Program) -> Vec<f64> {
     let (mut ri, mut ci, mut values) = (vec![], vec![], vec![]);
     let mut upper = |r: usize, c: usize, v: f64| {
         if r <= c {
-            (ri.push(r), ci.push(c), values.push(v));
+            ri.push(r);
+            ci.push(c);
+            values.push(v);
         }
     };
     for i in 0..count {
@@ -74,15 +76,21 @@ fn by_clarabel(program: &Program) -> Vec<f64> {
             line.fixed_rows_mut::<3>(0).copy_from(&row.a);
         } else {
             line = program.lens[i].tr_mul(&row.a.xy());
-            (ri.push(j), ci.push(states + caps * i + k - walls), values.push(-1.0));
+            ri.push(j);
+            ci.push(states + caps * i + k - walls);
+            values.push(-1.0);
         }
         for r in 0..5 {
-            (ri.push(j), ci.push(5 * i + r), values.push(line[r]));
+            ri.push(j);
+            ci.push(5 * i + r);
+            values.push(line[r]);
         }
         b.push(row.b);
     }
     for e in states..variables {
-        (ri.push(b.len()), ci.push(e), values.push(-1.0));
+        ri.push(b.len());
+        ci.push(e);
+        values.push(-1.0);
         b.push(0.0);
     }
     let a = CscMatrix::new_from_triplets(b.len(), variables, ri, ci, values);
