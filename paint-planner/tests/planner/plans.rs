@@ -3,8 +3,8 @@
 use crate::walls::{Arm, Wall};
 use paint_planner::nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use paint_planner::{
-    Error, Mode, NozzleState, OptimalPlanner, Plan, Planner, Settings, SmoothingPlanner, Target, TimingPolicy, Tool,
-    VehicleState, normal_deviation,
+    Error, Hit, Mode, NozzleState, OptimalPlanner, Plan, Planner, Settings, SmoothingPlanner, Surface, Target,
+    TimingPolicy, Tool, VehicleState, normal_deviation,
 };
 
 fn optimal(targets: &[Target], wall: &Wall, settings: &Settings) -> Result<Plan, Error> {
@@ -148,6 +148,40 @@ fn strokes_apart_are_joined_by_clear_flights() {
     let halfway = plan.setpoint(0.5 * (plan.target_time[19] + plan.target_time[20]));
     assert!(halfway.transit && halfway.flow == 0.0);
     assert_eq!(plan.flow[19], 0.0);
+}
+
+#[test]
+fn starting_at_the_first_waypoint_changes_nothing() {
+    let wall = Wall::bumpy(0.1);
+    let targets = wall.rows(1.0, 1, 0.2);
+    let plan = optimal(&targets, &wall, &Settings::default()).unwrap();
+    let settings = Settings { start: Some(plan.vehicle[0]), finish: Some(plan.vehicle[40]), ..Settings::default() };
+    let again = optimal(&targets, &wall, &settings).unwrap();
+    assert_sound(&again, &targets, &settings);
+    assert!((again.trajectory.duration() / plan.trajectory.duration() - 1.0).abs() < 0.05);
+}
+
+#[test]
+fn a_stroke_without_a_way_to_it_is_dropped() {
+    // An infinite second wall between the first two strokes.
+    struct Cut(Wall);
+    impl Surface for Cut {
+        fn cast(&self, o: &Point3<f64>, d: &UnitVector3<f64>, max: f64) -> Option<Hit> {
+            self.0.cast(o, d, max)
+        }
+        fn distance(&self, p: &Point3<f64>, max: f64) -> f64 {
+            self.0.distance(p, max).min((p.y - 10.0).abs())
+        }
+    }
+    let wall = Cut(Wall::flat());
+    let stroke = |y: f64| (0..20).map(move |i| Wall::flat().target(y + 0.02 * f64::from(i), 1.5, 1e-6));
+    let targets: Vec<Target> = stroke(5.0).chain(stroke(15.0)).chain(stroke(6.0)).collect();
+    let settings = Settings::default();
+    let plan = OptimalPlanner::default().plan(&targets, &wall, &Arm::default(), &settings).unwrap();
+    assert_sound(&plan, &targets, &settings);
+    for (i, reachable) in plan.reachable.iter().enumerate() {
+        assert_eq!(*reachable, !(20..40).contains(&i));
+    }
 }
 
 #[test]
