@@ -17,7 +17,16 @@ impl<const N: usize> BlockTridiagonal<N> {
         for i in 0..self.diagonal.len() {
             if i > 0 {
                 let below = self.lower[i - 1];
-                self.diagonal[i] -= below * below.transpose();
+                let diagonal = &mut self.diagonal[i];
+                // Only the lower triangle is read.
+                for c in 0..N {
+                    for k in 0..N {
+                        let factor = below[(c, k)];
+                        for r in c..N {
+                            diagonal[(r, c)] -= below[(r, k)] * factor;
+                        }
+                    }
+                }
             }
             if !cholesky(&mut self.diagonal[i]) {
                 return false;

@@ -38,7 +38,8 @@ pub enum Error {
         /// Number of targets given.
         count: usize,
     },
-    /// Two stretches cannot be joined by straight, retracted or climbing flight.
+    /// No stroke, or not the finish pose, can be reached by straight, retracted or climbing flight. (Single strokes that
+    /// cannot are marked as not reachable instead.)
     #[error("no collision-free way from {from} to {to}: split the path there, or lower the clearance")]
     NoBridge {
         /// Where the stretch before ends ("start pose" or a target index).

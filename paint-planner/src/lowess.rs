@@ -76,3 +76,77 @@ fn reweight<const K: usize>(y: &[[f64; K]], smooth: &[[f64; K]], robust: &mut [f
     }
     true
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn agrees_with_statsmodels() {
+        // statsmodels.nonparametric.lowess(y, x, frac=0.5, it=0 and it=2, delta=0) for y = sin(2 x), y[7] += 1.
+        let x: Vec<f64> = (0..STEPS).map(|i| 0.1 * i as f64).collect();
+        let mut y: Vec<[f64; 1]> = x.iter().map(|x| [(2.0 * x).sin()]).collect();
+        y[7][0] += 1.0;
+        for (passes, expected) in [(0, PLAIN), (2, ROBUST)] {
+            let settings = LowessSettings { span: 1.0, passes };
+            for (value, expected) in lowess(&x, &y, &settings).iter().zip(expected) {
+                assert!((value[0] - expected).abs() < 1e-9, "{} {expected}", value[0]);
+            }
+        }
+    }
+
+    #[test]
+    fn lines_pass_unchanged() {
+        let x: Vec<f64> = (0..30).map(|i| f64::from(i).powf(1.2)).collect();
+        let y: Vec<[f64; 2]> = x.iter().map(|x| [2.0 * x - 1.0, -0.5 * x]).collect();
+        for (a, b) in lowess(&x, &y, &LowessSettings { span: 12.0, passes: 2 }).iter().zip(&y) {
+            assert!((a[0] - b[0]).abs() < 1e-9 && (a[1] - b[1]).abs() < 1e-9);
+        }
+    }
+
+    const STEPS: usize = 20;
+    const PLAIN: [f64; STEPS] = [
+        0.0002520307215375262,
+        0.1831853007288079,
+        0.36855606650347944,
+        0.5575831892740364,
+        0.7501397521651643,
+        0.923937136660803,
+        1.0351119716949453,
+        1.0888783045221802,
+        1.0978956361948937,
+        1.0470014790823978,
+        0.9285785855280452,
+        0.771697336452416,
+        0.6279463531685356,
+        0.47923738230192486,
+        0.3114227293239484,
+        0.13119263487907784,
+        -0.05655766978422805,
+        -0.24469987928805542,
+        -0.43340879524718157,
+        -0.6223616305859324,
+    ];
+    const ROBUST: [f64; STEPS] = [
+        0.029225954653935633,
+        0.19936243119078026,
+        0.3673533779033807,
+        0.5326905171561279,
+        0.6907651465638732,
+        0.7848951966006072,
+        0.8332171118997348,
+        0.8727549753535617,
+        0.8993958095508573,
+        0.9164738092368446,
+        0.874786928321176,
+        0.7649058623181391,
+        0.6300258452972455,
+        0.47841067042037766,
+        0.3112006657886348,
+        0.13137232738312427,
+        -0.05649310672025264,
+        -0.244753160015329,
+        -0.4335547927824074,
+        -0.6225746145762199,
+    ];
+}

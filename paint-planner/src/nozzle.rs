@@ -55,3 +55,6 @@ pub(crate) fn optimise(
 fn solve(program: &Program, x: &mut [nalgebra::Vector5<f64>]) -> Result<interior::Outcome, Error> {
     interior::solve(program, x).ok_or(Error::Numerical { stage: "the nozzle program" })
 }
+
+#[cfg(test)]
+mod tests;

@@ -27,27 +27,48 @@ pub(crate) struct Stop {
 
 /// Chains the vehicle states of all targets. `joined[i]`: states i and i+1 follow each other without a flight. With no
 /// checker the flights are straight and unchecked.
+///
+/// A stroke that no flight leads to is dropped from `vehicle`; an error means that none is left, or that the finish pose
+/// cannot be reached.
 pub(crate) fn build(
-    vehicle: &[Option<VehicleState>],
+    vehicle: &mut [Option<VehicleState>],
     joined: &[bool],
     mut checker: Option<&mut Checker<'_>>,
     settings: &Settings,
 ) -> Result<Vec<Stop>, Error> {
     let mut route: Vec<Stop> = Vec::with_capacity(vehicle.len());
     let mut name = String::from("the start pose");
+    let mut refused = None;
     if let Some(state) = settings.start {
         route.push(Stop { state, target: None, rest: true });
     }
-    for (i, state) in vehicle.iter().enumerate() {
-        let Some(state) = *state else { continue };
+    // Whether the state before belongs to a stroke on the route, and whether it belongs to one that was dropped.
+    let (mut flying, mut dropping) = (false, false);
+    for i in 0..vehicle.len() {
+        let follows = i > 0 && joined[i - 1];
+        let Some(state) = vehicle[i] else {
+            (flying, dropping) = (false, false);
+            continue;
+        };
         let mut rest = false;
-        let flown = i == 0 || vehicle[i - 1].is_none() || !joined[i - 1];
-        if let Some(last) = route.last().copied().filter(|_| flown) {
+        dropping &= follows;
+        if let Some(last) = route.last().copied().filter(|_| !(dropping || flying && follows)) {
             let to = format!("target {i}");
-            rest = fly(&mut route, &last.state, &state, checker.as_deref_mut(), settings, (&name, &to))?;
+            match fly(&mut route, &last.state, &state, checker.as_deref_mut(), settings, (&name, &to)) {
+                Ok(halts) => rest = halts,
+                Err(error) => (refused, dropping) = (Some(error), true),
+            }
+        }
+        flying = !dropping;
+        if dropping {
+            vehicle[i] = None;
+            continue;
         }
         push(&mut route, state, Some(i), rest);
         name = format!("target {i}");
+    }
+    if let Some(error) = refused.filter(|_| route.iter().all(|stop| stop.target.is_none())) {
+        return Err(error);
     }
     if let (Some(state), Some(last)) = (settings.finish, route.last().copied()) {
         fly(&mut route, &last.state, &state, checker, settings, (&name, "the finish pose"))?;

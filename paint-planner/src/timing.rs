@@ -75,7 +75,9 @@ pub(crate) fn schedule(
         knots.extend(missed);
         knots.sort_unstable();
     }
-    best.ok_or(Error::Numerical { stage: "the time allocation" })
+    let mut timed = best.ok_or(Error::Numerical { stage: "the time allocation" })?;
+    timed.stretch *= profile.factor;
+    Ok(timed)
 }
 
 fn stretched(trajectory: Trajectory, mut times: Vec<f64>, most: Extrema, deviation: f64, mut k: f64) -> Timed {

@@ -7,9 +7,11 @@ use nalgebra::{Matrix2, Matrix3, Vector2, Vector3, Vector5};
 
 const MAX_STEPS: usize = 60;
 /// Complementarity at which a solution counts as found; positions are in metres and weights of order one.
-const MU: f64 = 1e-14;
+const MU: f64 = 1e-13;
 const PRIMAL: f64 = 1e-10;
-const DUAL: f64 = 1e-10;
+const DUAL: f64 = 1e-9;
+/// First complementarity as a share of the steepest slope: a start near the scale of the answer saves half the steps.
+const FIRST: f64 = 1e-3;
 
 /// How the solve went.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,7 +22,7 @@ pub(crate) struct Outcome {
 }
 
 /// A row with its slack `s`, multiplier `z` and relaxation `e`: `a.q - e + s = b`, `s z -> 0`, `e (penalty - z) -> 0`.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Active {
     row: Row,
     s: f64,
@@ -31,6 +33,13 @@ struct Active {
     de: f64,
     /// `a.q - e + s - b` at the present point.
     residual: f64,
+    /// `1 / z` and, for soft rows, `1 / (penalty - z)`, else 0: divisions are what a step spends its time on.
+    inverse_z: f64,
+    inverse_v: f64,
+    /// Curvature that the row adds along its normal.
+    stiffness: f64,
+    /// What the complementarity targets add to the residual.
+    shift: f64,
 }
 
 /// Minimises the program starting from `x`, which should satisfy the walls strictly. `None` when the factorisation
@@ -38,9 +47,11 @@ struct Active {
 pub(crate) fn solve(program: &Program, x: &mut [Vector5<f64>]) -> Option<Outcome> {
     let count = x.len();
     let per_state = program.walls + program.caps;
-    let mut rows = start(program, x);
     let mut system = program.hessian.clone();
     let (mut dual, mut step) = (vec![Vector5::zeros(); count], vec![Vector5::zeros(); count]);
+    program.slope(x, &mut dual);
+    let steepest = dual.iter().fold(0.0_f64, |most, d| most.max(d.amax()));
+    let mut rows = start(program, x, (FIRST * steepest).max(1e-9));
     for steps in 0..MAX_STEPS {
         let (mut primal, mut gap, mut products) = (0.0_f64, 0.0, 0.0);
         program.slope(x, &mut dual);
@@ -59,10 +70,10 @@ pub(crate) fn solve(program: &Program, x: &mut [Vector5<f64>]) -> Option<Outcome
         }
         let mu = gap / products.max(1.0);
         let dual_error = dual.iter().fold(0.0_f64, |worst, d| worst.max(d.amax()));
-        if mu <= MU && primal <= PRIMAL && dual_error <= DUAL {
+        if mu <= MU && primal <= PRIMAL && dual_error <= DUAL * (1.0 + steepest) {
             return Some(Outcome { steps, slack: rows.iter().fold(0.0, |worst, r| worst.max(r.e)) });
         }
-        assemble(program, &rows, &mut system);
+        assemble(program, &mut rows, &mut system);
         if !system.factor() {
             return None;
         }
@@ -91,7 +102,7 @@ pub(crate) fn solve(program: &Program, x: &mut [Vector5<f64>]) -> Option<Outcome
     None
 }
 
-fn start(program: &Program, x: &[Vector5<f64>]) -> Vec<Active> {
+fn start(program: &Program, x: &[Vector5<f64>], mu: f64) -> Vec<Active> {
     let per_state = program.walls + program.caps;
     let mut rows = Vec::with_capacity(program.rows.len());
     for (i, chunk) in program.rows.chunks_exact(per_state).enumerate() {
@@ -100,9 +111,9 @@ fn start(program: &Program, x: &[Vector5<f64>]) -> Vec<Active> {
             let soft = k >= program.walls;
             let room = row.b - row.a.dot(&views[usize::from(soft)]);
             let s = room.max(1e-3);
-            let z = if soft { (1e-5 / s).min(0.5 * program.penalty) } else { 1e-5 / s };
-            let e = if soft { 1e-5 / (program.penalty - z) } else { 0.0 };
-            rows.push(Active { row: *row, s, z, e, ds: 0.0, dz: 0.0, de: 0.0, residual: 0.0 });
+            let z = if soft { (mu / s).min(0.5 * program.penalty) } else { mu / s };
+            let e = if soft { mu / (program.penalty - z) } else { 0.0 };
+            rows.push(Active { row: *row, s, z, e, ..Active::default() });
         }
     }
     rows
@@ -118,10 +129,11 @@ fn spread(program: &Program, i: usize, pulls: &[Vector3<f64>; 2]) -> Vector5<f64
 }
 
 impl Active {
-    /// Curvature that the row adds along its normal.
-    fn stiffness(&self, soft: bool, penalty: f64) -> f64 {
-        let give = if soft { self.e / (penalty - self.z) } else { 0.0 };
-        1.0 / (self.s / self.z + give)
+    /// Quantities that stay the same for both directions of one step.
+    fn prepare(&mut self, soft: bool, penalty: f64) {
+        self.inverse_z = 1.0 / self.z;
+        self.inverse_v = if soft { 1.0 / (penalty - self.z) } else { 0.0 };
+        self.stiffness = 1.0 / (self.s * self.inverse_z + self.e * self.inverse_v);
     }
 
     /// Right-hand sides of `s z = target` and `e (penalty - z) = target`, second-order terms included on request.
@@ -132,19 +144,26 @@ impl Active {
 }
 
 /// `H + sum of stiffness a a'`.
-fn assemble(program: &Program, rows: &[Active], system: &mut BlockTridiagonal<5>) {
+fn assemble(program: &Program, rows: &mut [Active], system: &mut BlockTridiagonal<5>) {
     system.lower.copy_from_slice(&program.hessian.lower);
-    for (i, chunk) in rows.chunks_exact(program.walls + program.caps).enumerate() {
+    for (i, chunk) in rows.chunks_exact_mut(program.walls + program.caps).enumerate() {
         let mut walls = Matrix3::zeros();
         let mut caps = Matrix2::zeros();
-        let (hard, soft) = chunk.split_at(program.walls);
+        let (hard, soft) = chunk.split_at_mut(program.walls);
         for r in hard {
-            walls.ger(r.stiffness(false, program.penalty), &r.row.a, &r.row.a, 1.0);
+            r.prepare(false, program.penalty);
+            let a = &r.row.a;
+            let scaled = a * r.stiffness;
+            walls += Matrix3::from_columns(&[scaled * a.x, scaled * a.y, scaled * a.z]);
         }
         for r in soft {
-            let a = r.row.a.xy();
-            caps.ger(r.stiffness(true, program.penalty), &a, &a, 1.0);
+            r.prepare(true, program.penalty);
+            let a = &r.row.a;
+            caps[(0, 0)] += a.x * a.x * r.stiffness;
+            caps[(1, 0)] += a.x * a.y * r.stiffness;
+            caps[(1, 1)] += a.y * a.y * r.stiffness;
         }
+        caps[(0, 1)] = caps[(1, 0)];
         let lens = &program.lens[i];
         let mut block = program.hessian.diagonal[i] + lens.transpose() * (caps * lens);
         let mut corner = block.fixed_view_mut::<3, 3>(0, 0);
@@ -164,13 +183,12 @@ fn direction(
     second: bool,
 ) {
     let (per_state, penalty) = (program.walls + program.caps, program.penalty);
-    for (i, chunk) in rows.chunks_exact(per_state).enumerate() {
+    for (i, chunk) in rows.chunks_exact_mut(per_state).enumerate() {
         let mut pulls = [Vector3::zeros(); 2];
-        for (k, r) in chunk.iter().enumerate() {
-            let soft = k >= program.walls;
+        for (k, r) in chunk.iter_mut().enumerate() {
             let (rs, re) = r.complementarity(penalty, target, second);
-            let give = if soft { re / (penalty - r.z) } else { 0.0 };
-            pulls[usize::from(soft)] += r.row.a * (r.stiffness(soft, penalty) * (r.residual + rs / r.z - give));
+            r.shift = rs * r.inverse_z - re * r.inverse_v;
+            pulls[usize::from(k >= program.walls)] += r.row.a * (r.stiffness * (r.residual + r.shift));
         }
         step[i] = -dual[i] - spread(program, i, &pulls);
     }
@@ -178,13 +196,11 @@ fn direction(
     for (i, chunk) in rows.chunks_exact_mut(per_state).enumerate() {
         let views = program.views(i, &step[i]);
         for (k, r) in chunk.iter_mut().enumerate() {
-            let soft = k >= program.walls;
             let (rs, re) = r.complementarity(penalty, target, second);
-            let give = if soft { re / (penalty - r.z) } else { 0.0 };
-            let moved = r.row.a.dot(&views[usize::from(soft)]);
-            r.dz = r.stiffness(soft, penalty) * (moved + r.residual + rs / r.z - give);
-            r.ds = (rs - r.s * r.dz) / r.z;
-            r.de = if soft { (re + r.e * r.dz) / (penalty - r.z) } else { 0.0 };
+            let moved = r.row.a.dot(&views[usize::from(k >= program.walls)]);
+            r.dz = r.stiffness * (moved + r.residual + r.shift);
+            r.ds = (rs - r.s * r.dz) * r.inverse_z;
+            r.de = (re + r.e * r.dz) * r.inverse_v;
         }
     }
 }

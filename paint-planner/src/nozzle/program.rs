@@ -4,7 +4,7 @@ use crate::block::BlockTridiagonal;
 use nalgebra::{Matrix2x5, Matrix5, Vector2, Vector3, Vector5};
 
 /// One inequality `a . q <= b`, where q is the position (wall) or the lens coordinate (cap) of a state.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Row {
     pub(crate) a: Vector3<f64>,
     pub(crate) b: f64,

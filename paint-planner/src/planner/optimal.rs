@@ -44,12 +44,12 @@ impl Planner for OptimalPlanner {
         let mut nozzles = optimise(targets, &starts, &linked, self.mode, &settings.nozzle)?;
         drop_hidden(targets, &mut nozzles, surface);
         let mut checker = Checker::new(surface, tool);
-        let headings =
+        let mut headings =
             heading::choose(&nozzles.states, &linked, tool, &mut checker, settings.clearance, &settings.heading);
         if headings.vehicle.iter().all(Option::is_none) {
             return Err(Error::NothingReachable { count: targets.len() });
         }
-        let route = route::build(&headings.vehicle, &headings.joined, Some(&mut checker), settings)?;
+        let route = route::build(&mut headings.vehicle, &headings.joined, Some(&mut checker), settings)?;
         let draft = Draft { nozzles, vehicle: headings.vehicle, heading_cost: headings.cost, route };
         let plan = finish(&draft, targets, &mut checker, settings, false)?;
         if plan.report.clearance >= 0.0 {

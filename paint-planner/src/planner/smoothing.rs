@@ -35,7 +35,7 @@ impl Planner for SmoothingPlanner {
         check(targets)?;
         let linked = links(targets, settings.break_length);
         let nozzles = smooth(targets, &linked, settings);
-        let vehicle: Vec<Option<VehicleState>> = nozzles
+        let mut vehicle: Vec<Option<VehicleState>> = nozzles
             .iter()
             .map(|nozzle| {
                 let heading = nozzle.direction.y.atan2(nozzle.direction.x);
@@ -45,7 +45,7 @@ impl Planner for SmoothingPlanner {
         if vehicle.iter().all(Option::is_none) {
             return Err(Error::NothingReachable { count: targets.len() });
         }
-        let route = route::build(&vehicle, &linked, None, settings)?;
+        let route = route::build(&mut vehicle, &linked, None, settings)?;
         let states = nozzles.into_iter().zip(&vehicle).map(|(n, v)| v.map(|_| n)).collect();
         let nozzles = Nozzles { states, rounds: 0, steps: 0, slack: 0.0 };
         let draft = Draft { nozzles, vehicle, heading_cost: 0.0, route };

@@ -25,29 +25,50 @@ pub(crate) struct Profile {
     least: Vec<f64>,
     /// Greatest speed in a stop by curvature, m/s; 0 where the vehicle halts.
     cap: Vec<f64>,
+    /// Edges whose time is given by stamps and may only be stretched all together, except for starting and halting.
+    stamped: Vec<bool>,
+    /// The factor by which the stamps are stretched already.
+    pub(crate) factor: f64,
 }
 
 impl Profile {
     pub(crate) fn new(route: &[Stop], targets: &[Target], settings: &TimingSettings) -> Self {
-        let mut profile = Self { way: vec![], turn: vec![], least: vec![], cap: vec![] };
+        let mut profile = Self { way: vec![], turn: vec![], least: vec![], cap: vec![], stamped: vec![], factor: 1.0 };
+        let mut stamps = Vec::with_capacity(route.len());
         for pair in route.windows(2) {
             let way = (pair[1].state.position - pair[0].state.position).norm();
             let turn = (pair[1].state.heading - pair[0].state.heading).abs();
+            let (length, dose) = stroke(pair, targets);
             let vehicle = (way / settings.max_speed).max(turn / settings.max_heading_rate);
-            profile.least.push(vehicle.max(stroke_time(pair, targets, settings)).max(SHORTEST));
+            let stamp = stamp(pair, targets, settings);
+            let spot = match settings.policy {
+                TimingPolicy::Uniform { speed } => length / speed,
+                TimingPolicy::GradientPreserving => 0.0,
+            };
+            let least = vehicle.max(spot).max(length * dose / settings.max_flow).max(SHORTEST);
+            // Thesis, section 7.5: the factor of the segment that needs most is the factor of all.
+            profile.factor = profile.factor.max(stamp.map_or(1.0, |stamp| least / stamp));
+            profile.least.push(least);
             profile.way.push(way);
             profile.turn.push(turn);
+            profile.stamped.push(stamp.is_some());
+            stamps.push(stamp);
         }
-        let curved = matches!(settings.policy, TimingPolicy::Uniform { .. });
+        for (least, stamp) in profile.least.iter_mut().zip(&stamps) {
+            *least = stamp.map_or(*least, |stamp| stamp * profile.factor);
+        }
         profile.cap = (0..route.len())
-            .map(|i| if route[i].rest || i == 0 || i + 1 == route.len() { 0.0 } else { f64::INFINITY })
+            .map(|i| {
+                if route[i].rest || i == 0 || i + 1 == route.len() {
+                    0.0
+                } else if profile.stamped[i - 1] && profile.stamped[i] {
+                    f64::INFINITY
+                } else {
+                    let bend = curvature(route, i, settings.knot_spacing);
+                    (NORMAL * settings.max_acceleration / bend.max(1e-9)).sqrt()
+                }
+            })
             .collect();
-        if curved {
-            for i in 1..route.len() - 1 {
-                let bend = curvature(route, i, settings.knot_spacing);
-                profile.cap[i] = profile.cap[i].min((NORMAL * settings.max_acceleration / bend.max(1e-9)).sqrt());
-            }
-        }
         profile
     }
 
@@ -63,27 +84,57 @@ impl Profile {
                 (self.cap[i] / drag).min(before).min(after)
             })
             .collect();
-        let gain = 2.0 * TANGENTIAL * settings.max_acceleration;
-        for i in 0..edges {
-            speed[i + 1] = speed[i + 1].min((speed[i] * speed[i] + gain * self.way[i]).sqrt());
-        }
-        for i in (0..edges).rev() {
-            speed[i] = speed[i].min((speed[i + 1] * speed[i + 1] + gain * self.way[i]).sqrt());
-        }
+        let mut lowered: Vec<bool> = self.cap.iter().map(|cap| *cap == 0.0).collect();
+        self.pass(0..edges, 0, &mut speed, &mut lowered, settings);
+        self.pass((0..edges).rev(), 1, &mut speed, &mut lowered, settings);
         (0..edges)
             .map(|i| {
+                let least = self.least[i] * slow[i];
+                if self.stamped[i] && !lowered[i] && !lowered[i + 1] {
+                    return least;
+                }
                 let sum = speed[i] + speed[i + 1];
-                let moving = if sum > 1e-6 {
-                    2.0 * self.way[i] / sum
-                } else {
-                    // From halt to halt: the closed form of the minimum-snap polynomial.
-                    let reach = (PEAK_SPEED * self.way[i] / settings.max_speed)
-                        .max(PEAK_SPEED * self.turn[i] / settings.max_heading_rate);
-                    1.001 * reach.max((PEAK_ACCELERATION * self.way[i] / settings.max_acceleration).sqrt())
-                };
-                moving.max(self.least[i] * slow[i])
+                let moving = if sum > 1e-6 { 2.0 * self.way[i] / sum } else { self.halt_to_halt(i, settings) };
+                moving.max(least)
             })
             .collect()
+    }
+
+    /// Limits speeds by what can be gained since the stop before, in the order of `edges`; `from` is 0 when edges are
+    /// entered at their first stop. On stamped edges only until the speed they ask for is reached.
+    fn pass(
+        &self,
+        edges: impl Iterator<Item = usize>,
+        from: usize,
+        speed: &mut [f64],
+        lowered: &mut [bool],
+        settings: &TimingSettings,
+    ) {
+        let gain = 2.0 * TANGENTIAL * settings.max_acceleration;
+        let mut ramp = true;
+        for i in edges {
+            let (enter, leave) = (i + from, i + 1 - from);
+            ramp |= self.cap[enter] == 0.0 || !self.stamped[i];
+            if !ramp {
+                continue;
+            }
+            let reach = (speed[enter] * speed[enter] + gain * self.way[i]).sqrt();
+            if reach < speed[leave] {
+                speed[leave] = reach;
+                lowered[leave] = true;
+            } else if self.stamped[i] {
+                ramp = false;
+            }
+        }
+    }
+
+    /// Time of an edge between two halts: the closed form of the minimum-snap polynomial.
+    fn halt_to_halt(&self, i: usize, settings: &TimingSettings) -> f64 {
+        let by_speed = PEAK_SPEED * self.way[i] / settings.max_speed;
+        let by_turn = PEAK_SPEED * self.turn[i] / settings.max_heading_rate;
+        let by_acceleration = (PEAK_ACCELERATION * self.way[i] / settings.max_acceleration).sqrt();
+        // The certificate may exceed the closed form in the last digits.
+        1.001 * by_speed.max(by_turn).max(by_acceleration)
     }
 }
 
@@ -95,18 +146,14 @@ pub(crate) fn stroke(pair: &[Stop], targets: &[Target]) -> (f64, f64) {
     }
 }
 
-/// Least time of an edge by what happens on the surface.
-fn stroke_time(pair: &[Stop], targets: &[Target], settings: &TimingSettings) -> f64 {
-    let (length, dose) = stroke(pair, targets);
-    let by_flow = length * dose / settings.max_flow;
-    let by_policy = match (settings.policy, pair[0].target, pair[1].target) {
-        (TimingPolicy::Uniform { speed }, ..) => length / speed,
+/// Time the person took for this edge, s, where that is to be preserved.
+fn stamp(pair: &[Stop], targets: &[Target], settings: &TimingSettings) -> Option<f64> {
+    match (settings.policy, pair[0].target, pair[1].target) {
         (TimingPolicy::GradientPreserving, Some(a), Some(b)) if b == a + 1 => {
-            targets[b].time.zip(targets[a].time).map_or(0.0, |(after, before)| after - before)
+            targets[b].time.zip(targets[a].time).map(|(after, before)| after - before)
         }
-        (TimingPolicy::GradientPreserving, ..) => 0.0,
-    };
-    by_flow.max(by_policy)
+        _ => None,
+    }
 }
 
 /// Curvature of the route at a stop, 1/m, seen over about `scale` metres so that the noise of close waypoints does not
