@@ -163,7 +163,7 @@ fn texel_share(cone: &Cone, texel: &Texel) -> f64 {
 
 /// The `i`-th Gauss point along a row of pieces of length one.
 fn gauss_point(i: u32) -> f64 {
-    f64::from(i / 2) + if i % 2 == 0 { 0.5 - GAUSS } else { 0.5 + GAUSS }
+    f64::from(i / 2) + if i.is_multiple_of(2) { 0.5 - GAUSS } else { 0.5 + GAUSS }
 }
 
 /// Two unit vectors that make a right-handed frame with the normal, continuous except where the normal is -z
