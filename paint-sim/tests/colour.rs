@@ -49,7 +49,7 @@ fn ciede2000_of_the_published_pairs() {
             assert!((value - expected).abs() < 5.1e-5, "{first:?} {second:?}: {value} instead of {expected}");
         }
     }
-    // More digits from an independent implementation (colour-science 0.4.7).
+    // More digits from an independent implementation.
     for ([l1, a1, b1, l2, a2, b2, _], exact) in
         [(SHARMA[0], 2.0424596801565764), (SHARMA[16], 27.14923130074626), (SHARMA[24], 1.2644200135991903)]
     {
@@ -67,7 +67,7 @@ fn the_white_of_the_bands() {
     assert_eq!(white.rgb, [255; 3]);
 }
 
-/// What a stack of paints must look like: computed with numpy from the pigments' formulas.
+/// What a stack of paints must look like: computed in Python from the pigments' formulas and the textbook form.
 struct Look {
     xyz: [f64; 3],
     lab: [f64; 3],

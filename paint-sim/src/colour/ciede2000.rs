@@ -1,7 +1,7 @@
 //! The colour difference CIEDE2000.
 
 /// CIEDE2000 between two CIELAB colours (CIE 142-2001, in the formulation of Sharma, Wu and Dalal 2005), with all
-/// parametric factors one.
+/// parametric factors one. Both colours are finite numbers.
 pub fn ciede2000(lab1: [f64; 3], lab2: [f64; 3]) -> f64 {
     let [l1, a1, b1] = lab1;
     let [l2, a2, b2] = lab2;

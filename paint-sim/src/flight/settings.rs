@@ -10,7 +10,7 @@ use crate::error::{check_not_negative, check_positive, check_range};
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct Airframe {
-    /// Mass with payload, kg. Default 4.2 (Paper II, Section 3.1).
+    /// Mass with arm and spray gun, kg. Default 4.2 (ours; Paper II names the airframe, a DJI Matrice 100, but no mass).
     pub mass: f64,
     /// Gain from the roll command to roll. Default 1.017 (the small multirotor published with the ETH model predictive controller).
     pub roll_gain: f64,

@@ -3,8 +3,8 @@
 use nalgebra::{Point3, Vector3};
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vector;
-use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
-use parry3d_f64::query::{PointQuery, Ray};
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode, TraversalAction};
+use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::Triangle;
 
 use super::{Hit, Surface};
@@ -67,27 +67,27 @@ impl TriangleSurface {
 
 impl Surface for TriangleSurface {
     fn cast(&self, origin: &Point3<f64>, direction: &Vector3<f64>, max: f64) -> Option<Hit> {
-        let ray = Ray::new(vector(&origin.coords), vector(direction));
-        let sheared = ShearedRay::new(origin, direction)?;
+        let ray = ShearedRay::new(origin, direction)?;
         let (leaf, (distance, barycentric)) = self.tree.find_best(
             max,
-            |node, best| node.cast_ray(&ray, best),
-            |leaf, best| sheared.meet(&self.corners[leaf as usize], best),
+            |node, best| ray.enter(node, best).unwrap_or(f64::MAX),
+            |leaf, best| ray.meet(&self.corners[leaf as usize], best),
         )?;
         let normal = scaled_normal(&self.corners[leaf as usize]).normalize();
         Some(Hit { distance, face: self.faces[leaf as usize], barycentric, normal })
     }
 
     fn occluded(&self, origin: &Point3<f64>, direction: &Vector3<f64>, max: f64) -> bool {
-        let ray = Ray::new(vector(&origin.coords), vector(direction));
-        let Some(sheared) = ShearedRay::new(origin, direction) else { return false };
-        // A cost of zero for any hit leaves nothing to improve, so the search ends with the first one.
-        let any = self.tree.find_best(
-            max,
-            |node, best| if best > 0.0 { node.cast_ray(&ray, max) } else { f64::MAX },
-            |leaf, _| sheared.meet(&self.corners[leaf as usize], max).map(|_| 0.0),
-        );
-        any.is_some()
+        let Some(ray) = ShearedRay::new(origin, direction) else { return false };
+        let mut found = false;
+        self.tree.traverse(|node| {
+            if ray.enter(node, max).is_none() {
+                return TraversalAction::Prune;
+            }
+            found = node.leaf_data().is_some_and(|leaf| ray.meet(&self.corners[leaf as usize], max).is_some());
+            if found { TraversalAction::EarlyExit } else { TraversalAction::Continue }
+        });
+        found
     }
 
     fn distance(&self, point: &Point3<f64>, max: f64) -> f64 {
@@ -119,6 +119,8 @@ struct ShearedRay {
     origin: Vector3<f64>,
     axes: [usize; 3],
     shear: Vector3<f64>,
+    /// One over the direction; huge instead of infinite, since zero times it must stay a number.
+    inverse: Vector3<f64>,
 }
 
 impl ShearedRay {
@@ -130,7 +132,21 @@ impl ShearedRay {
         }
         let axes = [(main + 1) % 3, (main + 2) % 3, main];
         let shear = Vector3::new(direction[axes[0]] / along, direction[axes[1]] / along, 1.0 / along);
-        Some(Self { origin: origin.coords, axes, shear })
+        let inverse = direction.map(|d| 1.0 / if d.abs() > 1e-300 { d } else { 1e-300 });
+        Some(Self { origin: origin.coords, axes, shear, inverse })
+    }
+
+    /// Distance at which the ray enters a box, where it does so before `max`.
+    fn enter(&self, node: &BvhNode, max: f64) -> Option<f64> {
+        let (low, high) = (node.mins(), node.maxs());
+        let between = |low: f64, high: f64, i: usize| {
+            let (a, b) = ((low - self.origin[i]) * self.inverse[i], (high - self.origin[i]) * self.inverse[i]);
+            (a.min(b), a.max(b))
+        };
+        let (x, y, z) = (between(low.x, high.x, 0), between(low.y, high.y, 1), between(low.z, high.z, 2));
+        let first = x.0.max(y.0).max(z.0).max(0.0);
+        let last = x.1.min(y.1).min(z.1).min(max);
+        (first <= last).then_some(first)
     }
 
     /// Distance and barycentric weights of the second and third corner, where the ray meets the triangle before `max`.
