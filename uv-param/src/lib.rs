@@ -27,6 +27,7 @@
 //! | equation | item |
 //! |---|---|
 //! | Liu et al. 2008, local/global ARAP | [`unwrap`], [`Method::Arap`] |
+//! | Smith and Schaefer 2015, symmetric Dirichlet energy | [`Method::SymmetricDirichlet`] |
 //! | Tutte 1963, convex combination start | [`unwrap`] |
 //! | thesis 8.3.1, box of smallest area by rotating calipers | [`min_area_rectangle`], [`Chart::new`] |
 //! | thesis 8.3.1, 1 px = 1.25 cm texture | [`TexelMap`], [`Texture`] |
@@ -42,6 +43,7 @@ mod layout;
 mod linear;
 mod quality;
 mod spray_pose;
+mod symmetric_dirichlet;
 mod texel;
 mod texture;
 mod triangle;

@@ -10,6 +10,10 @@ use clip::Polygon;
 /// Largest number of texels of one map (a 16k square).
 const MOST: usize = 1 << 28;
 
+/// A chart that reaches past the last texel by less than this fraction of a texel gets no other one: it belongs to the
+/// last, and a wall of 2 m has 160 texels of 1.25 cm even if its width was computed as 2 m plus rounding.
+const ROUNDING: f64 = 1e-9;
+
 /// One texel per `texel_m` x `texel_m` of the chart, row-major, row 0 at the TOP (largest v). The chart's lower left
 /// corner is the lower left corner of the lower left texel.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,7 +42,8 @@ impl TexelMap {
         if !(texel_m.is_finite() && texel_m > 0.0) {
             return Err(Error::Setting { name: "texel_m", value: texel_m, must_be: "positive" });
         }
-        let (columns, rows) = ((chart.width() / texel_m).ceil().max(1.0), (chart.height() / texel_m).ceil().max(1.0));
+        let count = |length: f64| (length / texel_m - ROUNDING).ceil().max(1.0);
+        let (columns, rows) = (count(chart.width()), count(chart.height()));
         if columns * rows > MOST as f64 {
             return Err(Error::TooManyTexels { texel_m, width: columns, height: rows, limit: MOST });
         }
@@ -91,9 +96,9 @@ impl TexelMap {
         let last_column = high(0).min(self.width - 1);
         let triangle = Polygon::triangle(corners);
         for level in low(1)..=high(1).min(self.height - 1) {
-            let strip = triangle.between(1, level as f64, level as f64 + 1.0);
+            let strip = triangle.between(1, level as f64, end(level, self.height));
             for column in low(0)..=last_column {
-                let piece = strip.between(0, column as f64, column as f64 + 1.0);
+                let piece = strip.between(0, column as f64, end(column, self.width));
                 let size = piece.area();
                 if size == 0.0 {
                     continue;
@@ -118,6 +123,11 @@ impl TexelMap {
             }
         }
     }
+}
+
+/// Upper bound of a row or column, in texels.
+fn end(index: usize, count: usize) -> f64 {
+    if index + 1 == count { f64::INFINITY } else { (index + 1) as f64 }
 }
 
 /// Weights of a point of the triangle, with what rounding pushed outside put back.

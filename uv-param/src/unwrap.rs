@@ -5,6 +5,7 @@ use crate::chart::Chart;
 use crate::disk::Disk;
 use crate::error::Error;
 use crate::layout::Laplacian;
+use crate::symmetric_dirichlet::symmetric_dirichlet;
 use crate::triangle::{self, Frame};
 
 /// Which energy shapes the chart.
@@ -81,7 +82,12 @@ pub fn unwrap(disk: &Disk, settings: &Settings, mut progress: impl FnMut(Progres
     let mut uv = start.clone();
     let mut iterations = 0;
     if settings.method != Method::SymmetricDirichlet {
-        iterations = arap(disk, &frames, &mut laplacian, &mut uv, settings, progress)?;
+        iterations += arap(disk, &frames, &mut laplacian, &mut uv, settings, progress)?;
+    }
+    let flipped = settings.method == Method::Auto && triangle::flips(&uv, &disk.faces) > 0;
+    if flipped || settings.method == Method::SymmetricDirichlet {
+        uv = start;
+        iterations += symmetric_dirichlet(disk, &frames, &mut uv, settings, progress)?;
     }
     Chart::new(disk.clone(), uv, iterations, settings.up)
 }

@@ -58,17 +58,16 @@ pub struct Findings {
 /// holes); see [`Error`] for the way out of each.
 pub fn largest_disk(positions: &[[f32; 3]], faces: &[[u32; 3]]) -> Result<(Disk, Findings), Error> {
     let positions: Vec<[f64; 3]> = positions.iter().map(|p| p.map(f64::from)).collect();
-    largest_disk_with(&positions, faces, &Repair::default())
+    largest_disk_with(&positions, faces, Repair::default())
 }
 
 /// As [`largest_disk`], with f64 positions and a choice of repairs.
 pub fn largest_disk_with(
     positions: &[[f64; 3]],
     faces: &[[u32; 3]],
-    repair: &Repair,
+    repair: Repair,
 ) -> Result<(Disk, Findings), Error> {
-    let mut findings = Findings::default();
-    findings.unreferenced_vertices = check(positions, faces)?;
+    let mut findings = Findings { unreferenced_vertices: check(positions, faces)?, ..Findings::default() };
     let mut soup: Vec<[u32; 3]> = faces.to_vec();
     if repair.weld {
         findings.welded_vertices = weld(positions, &mut soup);
@@ -228,11 +227,11 @@ fn orient(
     reversed[0] = Some(false);
     let mut queue = vec![0usize];
     while let Some(f) = queue.pop() {
-        for h in 3 * f..3 * f + 3 {
-            if twins[h] == BORDER {
+        for (h, &twin) in twins.iter().enumerate().skip(3 * f).take(3) {
+            if twin == BORDER {
                 continue;
             }
-            let other = twins[h] as usize;
+            let other = twin as usize;
             let same_direction = half_edge(faces, h).0 == half_edge(faces, other).0;
             let wanted = reversed[f].map(|r| r ^ same_direction);
             let g = other / 3;
@@ -252,7 +251,9 @@ fn orient(
         .map(|(face, &r)| triangle::cross(face.map(|v| positions[v as usize])).norm() * if r { -1.0 } else { 1.0 })
         .sum();
     if signed < 0.0 {
-        reversed.iter_mut().for_each(|r| *r = !*r);
+        for r in &mut reversed {
+            *r = !*r;
+        }
     }
     let moved = |h: u32| if reversed[h as usize / 3] { h / 3 * 3 + 2 - h % 3 } else { h };
     let mut moved_twins = vec![BORDER; twins.len()];
@@ -270,7 +271,7 @@ fn separate_fans(
     faces: &mut [[u32; 3]],
     twins: &[u32],
     vertices: usize,
-    repair: &Repair,
+    repair: Repair,
     findings: &mut Findings,
 ) -> Result<Vec<u32>, Error> {
     let next = |h: usize| h / 3 * 3 + (h + 1) % 3;
