@@ -35,27 +35,9 @@ pub(crate) fn symmetric_dirichlet(
     let area: f64 = frames.iter().map(|f| f.area).sum();
     let mut system = Newton::new(disk)?;
     let mut last = energy(disk, frames, uv);
-    let mut trial = uv.clone();
     for iteration in 1..=settings.iterations {
         let step = system.step(disk, frames, uv)?;
-        let slope = step.slope;
-        let mut length = SAFE * first_collapse(disk, uv, &step.direction);
-        length = length.min(1.0);
-        let next = loop {
-            for ((to, from), d) in trial.iter_mut().zip(uv.iter()).zip(step.direction.chunks_exact(2)) {
-                *to = [from[0] + length * d[0], from[1] + length * d[1]];
-            }
-            let next = energy(disk, frames, &trial);
-            // The energy is evaluated in floating point; only the exact predicate promises that nothing flipped.
-            if next <= last + ARMIJO * length * slope && flips(&trial, &disk.faces) == 0 {
-                break next;
-            }
-            length *= 0.5;
-            if length < SHORTEST {
-                return Ok(iteration - 1);
-            }
-        };
-        std::mem::swap(uv, &mut trial);
+        let Some(next) = line_search(disk, frames, uv, &step, last) else { return Ok(iteration - 1) };
         // Over 4, so that an isometry reads 1; progress is measured against what is above it.
         let (before, now) = (last / area / 4.0, next / area / 4.0);
         last = next;
@@ -65,6 +47,43 @@ pub(crate) fn symmetric_dirichlet(
         }
     }
     Ok(settings.iterations)
+}
+
+/// Moves `uv` along a step that lowers the energy enough and flips nothing; returns the new energy, or `None` where rounding
+/// leaves no such step.
+fn line_search(disk: &Disk, frames: &[Frame], uv: &mut Vec<[f64; 2]>, step: &Step, last: f64) -> Option<f64> {
+    let limit = SAFE * first_collapse(disk, uv, &step.direction);
+    let moved = |length: f64| -> Vec<[f64; 2]> {
+        let along = |(at, d): (&[f64; 2], &[f64])| [at[0] + length * d[0], at[1] + length * d[1]];
+        uv.iter().zip(step.direction.chunks_exact(2)).map(along).collect()
+    };
+    // The energy is evaluated in floating point; only the exact predicate promises that nothing flipped.
+    let lowers = |trial: &[[f64; 2]], length: f64| {
+        let next = energy(disk, frames, trial);
+        (next <= last + ARMIJO * length * step.slope && flips(trial, &disk.faces) == 0).then_some(next)
+    };
+    let mut length = limit.min(1.0);
+    let (mut best, mut next) = loop {
+        let trial = moved(length);
+        if let Some(next) = lowers(&trial, length) {
+            break (trial, next);
+        }
+        length *= 0.5;
+        if length < SHORTEST {
+            return None;
+        }
+    };
+    // Near a collapse Newton is too timid: on 1 / s^2 it grows s by a third only. Go on while that pays.
+    while 2.0 * length <= limit {
+        length *= 2.0;
+        let trial = moved(length);
+        match lowers(&trial, length) {
+            Some(longer) if longer < next => (best, next) = (trial, longer),
+            _ => break,
+        }
+    }
+    *uv = best;
+    Some(next)
 }
 
 /// `sum A W`.

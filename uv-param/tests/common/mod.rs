@@ -1,19 +1,19 @@
 //! Small mesh readers and makers for the tests.
-#![allow(dead_code)]
+#![allow(dead_code, unreachable_pub, clippy::unwrap_used)]
 
 use std::path::PathBuf;
 
 /// Vertices and triangles.
 pub type Mesh = (Vec<[f64; 3]>, Vec<[u32; 3]>);
 
-/// A mesh of the data folder (PAINTCOPTER_DATA, default beside the workspace); `None`, said on stderr, if it is absent.
+/// A mesh of the data folder (`PAINTCOPTER_DATA`, default beside the workspace); `None`, said on stderr, if it is absent.
 pub fn data_mesh(name: &str) -> Option<Mesh> {
     let path = data_root().join("meshes").join(name);
     let Ok(text) = std::fs::read_to_string(&path) else {
         eprintln!("SKIPPED: {} is absent; set PAINTCOPTER_DATA", path.display());
         return None;
     };
-    Some(if name.ends_with(".off") { read_off(&text) } else { read_obj(&text) })
+    Some(if text.starts_with("OFF") { read_off(&text) } else { read_obj(&text) })
 }
 
 fn data_root() -> PathBuf {
