@@ -1,1 +1,61 @@
-//! Metric parametrization of triangle meshes: ARAP charts, texture extraction, and the map between texel and surface.
+//! Metric parametrization of triangle meshes: a scanned surface is laid out in the plane so that lengths stay true, cut into
+//! texels, textured, and every point of the plane knows its place on the surface and the pose of a spray gun that paints it
+//! (thesis, chapter 8). The layout minimises the as-rigid-as-possible energy
+//!
+//! `E(u, R) = sum_t A_t |J_t(u) - R_t|^2`
+//!
+//! over the uv points `u` and one rotation `R_t` per triangle, where `J_t` is the 2x2 map from the triangle's own plane to the
+//! chart; where that energy folds triangles over, the symmetric Dirichlet energy takes its place, which cannot.
+//!
+//! ```
+//! use uv_param::{Settings, Spray, TexelMap, largest_disk, nozzle_command, unwrap};
+//!
+//! // A 2 m x 1 m wall with a right-angled fold, z up.
+//! let positions = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 0., 1.], [1., 0., 1.], [1., 1., 1.]];
+//! let faces = [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]];
+//! let (disk, _left_out) = largest_disk(&positions, &faces)?;
+//! let settings = Settings { up: Some([0.0, 0.0, 1.0]), ..Settings::default() };
+//! let chart = unwrap(&disk, &settings, |_progress| ())?;
+//! assert!((chart.width() - 2.0).abs() < 1e-9 && (chart.height() - 1.0).abs() < 1e-9);
+//! let texels = TexelMap::new(&chart, 0.0125)?;
+//! assert_eq!((texels.width, texels.height), (160, 80));
+//! let nozzle = nozzle_command(&chart, [0.5, 0.25], &Spray::default())?;
+//! assert!((nozzle.point.z - 0.25).abs() < 1e-9);
+//! # Ok::<(), uv_param::Error>(())
+//! ```
+//!
+//! | equation | item |
+//! |---|---|
+//! | Liu et al. 2008, local/global ARAP | [`unwrap`], [`Method::Arap`] |
+//! | Smith and Schaefer 2015, symmetric Dirichlet energy | [`Method::SymmetricDirichlet`] |
+//! | Tutte 1963, convex combination start | [`unwrap`] |
+//! | thesis 8.3.1, box of smallest area by rotating calipers | [`min_area_rectangle`], [`Chart::new`] |
+//! | thesis 8.3.1, 1 px = 1.25 cm texture | [`TexelMap`], [`Texture`] |
+//! | thesis Eq. (8.1), `p_3D = sum b_i V_i` | [`Chart::locate`], [`Chart::point`] |
+//! | thesis Eq. (8.1), `n`, `w_dir`, `w_pos` | [`nozzle_command`] |
+
+mod arap;
+mod calipers;
+mod chart;
+mod disk;
+mod error;
+mod layout;
+mod linear;
+mod quality;
+mod spray_pose;
+mod symmetric_dirichlet;
+mod texel;
+mod texture;
+mod triangle;
+mod unwrap;
+
+pub use calipers::{Rectangle, convex_hull, min_area_rectangle};
+pub use chart::{Chart, SurfacePoint};
+pub use disk::{Disk, Findings, Repair, largest_disk, largest_disk_with};
+pub use error::Error;
+pub use nalgebra;
+pub use quality::Quality;
+pub use spray_pose::{NormalMode, NozzleCommand, Spray, nozzle_command};
+pub use texel::TexelMap;
+pub use texture::{Texture, linear_from_srgb, luminance};
+pub use unwrap::{Method, Progress, Settings, Stage, unwrap};

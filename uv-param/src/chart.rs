@@ -1,0 +1,128 @@
+//! A surface laid out in the plane in metres, and the way back.
+
+mod locate;
+mod normals;
+mod placement;
+
+use nalgebra::{Point3, Unit, Vector3};
+
+use crate::disk::Disk;
+use crate::error::Error;
+use crate::quality::Quality;
+use crate::triangle::Frame;
+use locate::Grid;
+pub(crate) use locate::inside;
+
+/// A point of the surface: a face of the disk and the weights of its corners (non-negative, sum 1).
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+pub struct SurfacePoint {
+    /// Face of the [`Disk`].
+    pub face: u32,
+    /// Weights of corners 0, 1, 2.
+    pub barycentric: [f64; 3],
+}
+
+/// The layout of a [`Disk`]: one uv point in metres per vertex, `0 <= u <= width`, `0 <= v <= height`, `width >=
+/// height`. Not mirrored: seen from the side the normals point to, u runs right and v runs up.
+#[derive(Debug, Clone)]
+pub struct Chart {
+    disk: Disk,
+    uv: Vec<[f64; 2]>,
+    width: f64,
+    height: f64,
+    quality: Quality,
+    vertex_normals: Vec<Vector3<f64>>,
+    grid: Grid,
+}
+
+impl Chart {
+    /// A chart from a layout of your own (metres, one point per disk vertex): it is turned into its smallest box, long
+    /// side horizontal, and judged. `up` as in [`crate::Settings::up`]; `iterations` is only reported.
+    ///
+    /// # Errors
+    /// [`Error::Length`], [`Error::NonFiniteValue`], or [`Error::FlatPoints`] for a layout on one line.
+    pub fn new(disk: Disk, mut uv: Vec<[f64; 2]>, iterations: usize, up: Option<[f64; 3]>) -> Result<Self, Error> {
+        if uv.len() != disk.positions.len() {
+            return Err(Error::Length { what: "uv", expected: disk.positions.len(), found: uv.len() });
+        }
+        let [width, height] = placement::place(&disk, &mut uv, up)?;
+        let quality = Quality::judge(&disk, &uv, iterations);
+        let vertex_normals = normals::vertex_normals(&disk);
+        let grid = Grid::new(&uv, &disk.faces, [width, height]);
+        Ok(Self { disk, uv, width, height, quality, vertex_normals, grid })
+    }
+
+    /// The surface.
+    pub fn disk(&self) -> &Disk {
+        &self.disk
+    }
+
+    /// Layout, one point per disk vertex, metres.
+    pub fn uv(&self) -> &[[f64; 2]] {
+        &self.uv
+    }
+
+    /// Long side of the box, metres.
+    pub fn width(&self) -> f64 {
+        self.width
+    }
+
+    /// Short side of the box, metres.
+    pub fn height(&self) -> f64 {
+        self.height
+    }
+
+    /// How true the chart is.
+    pub fn quality(&self) -> &Quality {
+        &self.quality
+    }
+
+    /// The surface point at `uv` (metres); on a common edge the face with the lower index. `None` outside the chart and
+    /// for coordinates that are not finite.
+    pub fn locate(&self, uv: [f64; 2]) -> Option<SurfacePoint> {
+        self.grid.locate(&self.uv, &self.disk.faces, uv)
+    }
+
+    /// Place of a surface point in the chart, metres.
+    pub fn uv_of(&self, at: SurfacePoint) -> [f64; 2] {
+        let corners = self.disk.faces[at.face as usize].map(|v| self.uv[v as usize]);
+        let mix = |k: usize| at.barycentric.iter().zip(corners).map(|(b, corner)| b * corner[k]).sum();
+        [mix(0), mix(1)]
+    }
+
+    /// Position of a surface point in the frame of the mesh, metres (thesis Eq. (8.1), first line).
+    pub fn point(&self, at: SurfacePoint) -> Point3<f64> {
+        let corners = self.disk.corners(at.face as usize).map(Vector3::from);
+        Point3::from(at.barycentric.iter().zip(corners).map(|(b, corner)| *b * corner).sum::<Vector3<f64>>())
+    }
+
+    /// Unit normal of a face.
+    pub fn face_normal(&self, face: u32) -> Unit<Vector3<f64>> {
+        Unit::new_normalize(self.disk.face_cross(face as usize))
+    }
+
+    /// Unit normal that changes continuously over the surface: vertex normals weighted by corner angle, interpolated.
+    pub fn smooth_normal(&self, at: SurfacePoint) -> Unit<Vector3<f64>> {
+        let corners = self.disk.faces[at.face as usize].map(|v| self.vertex_normals[v as usize]);
+        let mean: Vector3<f64> = at.barycentric.iter().zip(corners).map(|(b, n)| *b * n).sum();
+        Unit::try_new(mean, f64::EPSILON).unwrap_or_else(|| self.face_normal(at.face))
+    }
+
+    /// Unit normal averaged over the disc of `radius` metres around `at` in the chart: what a spray footprint sees of a
+    /// rough surface. Parts of the disc outside the chart do not count.
+    pub fn footprint_normal(&self, at: SurfacePoint, radius: f64) -> Unit<Vector3<f64>> {
+        let centre = self.uv_of(at);
+        let mean: Vector3<f64> = normals::disc(radius)
+            .filter_map(|[u, v]| self.locate([centre[0] + u, centre[1] + v]))
+            .map(|sample| self.face_normal(sample.face).into_inner())
+            .sum();
+        Unit::try_new(mean, f64::EPSILON).unwrap_or_else(|| self.smooth_normal(at))
+    }
+
+    /// Signed singular values `[s1, s2]` of the map from a face to the chart (1 = true length); negative `s2` = flipped.
+    pub fn stretch(&self, face: u32) -> [f64; 2] {
+        let corners = self.disk.faces[face as usize].map(|v| self.uv[v as usize]);
+        Frame::new(self.disk.corners(face as usize)).jacobian(corners).stretch()
+    }
+}

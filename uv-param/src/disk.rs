@@ -1,0 +1,111 @@
+//! The checked input: one orientable, manifold, genus-0 surface with a boundary.
+
+mod adjacency;
+mod repair;
+
+pub use repair::{Findings, Repair, largest_disk, largest_disk_with};
+
+/// Marks a half-edge without a face on its other side.
+pub(crate) const BORDER: u32 = u32::MAX;
+
+/// A triangle mesh that can be laid out in the plane: connected, manifold, consistently oriented, genus 0, at least one
+/// boundary loop, no degenerate face. Made by [`largest_disk`]; vertices keep their order and are never moved or merged
+/// (unless [`Repair::weld`] asks).
+///
+/// Half-edge `3 f + k` runs from corner `k` of face `f` to corner `(k + 1) % 3`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Disk {
+    pub(crate) positions: Vec<[f64; 3]>,
+    pub(crate) faces: Vec<[u32; 3]>,
+    pub(crate) vertex_source: Vec<u32>,
+    pub(crate) face_source: Vec<u32>,
+    pub(crate) reversed: Vec<bool>,
+    pub(crate) twins: Vec<u32>,
+    pub(crate) loops: Vec<Vec<u32>>,
+    pub(crate) source_vertices: usize,
+    pub(crate) source_faces: usize,
+}
+
+impl Disk {
+    /// Vertex positions in the frame and unit (metres) of the input.
+    pub fn positions(&self) -> &[[f64; 3]] {
+        &self.positions
+    }
+
+    /// Corner indices into [`Self::positions`], counter-clockwise seen from the side the normals point to.
+    pub fn faces(&self) -> &[[u32; 3]] {
+        &self.faces
+    }
+
+    /// Input vertex of each disk vertex.
+    pub fn vertex_source(&self) -> &[u32] {
+        &self.vertex_source
+    }
+
+    /// Input face of each disk face.
+    pub fn face_source(&self) -> &[u32] {
+        &self.face_source
+    }
+
+    /// Which corner (0, 1, 2) of the input face corner `k` of disk face `face` was: they differ where the winding of
+    /// the input was reversed.
+    pub fn source_corner(&self, face: usize, k: usize) -> usize {
+        if self.reversed[face] { [0, 2, 1][k] } else { k }
+    }
+
+    /// Boundary loops as vertex indices in the direction of their faces; the longest (in metres) first.
+    pub fn boundary_loops(&self) -> &[Vec<u32>] {
+        &self.loops
+    }
+
+    /// The half-edge on the other side of half-edge `h`, `None` on the boundary.
+    pub fn twin(&self, h: usize) -> Option<usize> {
+        (self.twins[h] != BORDER).then(|| self.twins[h] as usize)
+    }
+
+    /// Number of vertices of the mesh this disk was taken from.
+    pub fn source_vertex_count(&self) -> usize {
+        self.source_vertices
+    }
+
+    /// Number of faces of the mesh this disk was taken from.
+    pub fn source_face_count(&self) -> usize {
+        self.source_faces
+    }
+
+    /// Surface area in m^2.
+    pub fn area(&self) -> f64 {
+        (0..self.faces.len()).map(|f| self.face_area(f)).sum()
+    }
+
+    /// Area of one face in m^2.
+    pub fn face_area(&self, face: usize) -> f64 {
+        0.5 * self.face_cross(face).norm()
+    }
+
+    /// Cross product of the first two edges of a face: twice its area along its normal.
+    pub(crate) fn face_cross(&self, face: usize) -> nalgebra::Vector3<f64> {
+        crate::triangle::cross(self.corners(face))
+    }
+
+    pub(crate) fn corners(&self, face: usize) -> [[f64; 3]; 3] {
+        self.faces[face].map(|v| self.positions[v as usize])
+    }
+
+    /// Turns the surface inside out: every normal points to the other side (and the layout is mirrored).
+    pub fn reverse(&mut self) {
+        for (f, face) in self.faces.iter_mut().enumerate() {
+            face.swap(1, 2);
+            self.reversed[f] = !self.reversed[f];
+        }
+        // Half-edge k of a reversed face runs along the old half-edge [2, 1, 0][k].
+        let moved = |h: u32| h / 3 * 3 + (2 - h % 3);
+        let old = self.twins.clone();
+        for (h, &twin) in old.iter().enumerate() {
+            self.twins[moved(h as u32) as usize] = if twin == BORDER { BORDER } else { moved(twin) };
+        }
+        for vertices in &mut self.loops {
+            vertices.reverse();
+        }
+    }
+}

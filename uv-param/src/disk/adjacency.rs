@@ -1,0 +1,83 @@
+//! Who shares an edge with whom.
+
+use super::BORDER;
+
+/// Undirected edges of a triangle list with the half-edges along each, in a fixed order.
+pub(super) struct EdgeTable {
+    /// Half-edges, grouped by undirected edge.
+    half_edges: Vec<u32>,
+    /// Start of each group; one more than there are edges.
+    starts: Vec<u32>,
+}
+
+impl EdgeTable {
+    pub(super) fn new(vertices: usize, faces: &[[u32; 3]]) -> Self {
+        // Counting sort by the smaller end, then a tiny sort inside each bucket: linear for meshes.
+        let mut bucket = vec![0u32; vertices + 1];
+        let ends = |h: usize| {
+            let (a, b) = half_edge(faces, h);
+            (a.min(b), a.max(b))
+        };
+        for h in 0..3 * faces.len() {
+            bucket[ends(h).0 as usize + 1] += 1;
+        }
+        for v in 0..vertices {
+            bucket[v + 1] += bucket[v];
+        }
+        let mut cursor = bucket.clone();
+        let mut half_edges = vec![0u32; 3 * faces.len()];
+        for h in 0..3 * faces.len() {
+            let slot = &mut cursor[ends(h).0 as usize];
+            half_edges[*slot as usize] = h as u32;
+            *slot += 1;
+        }
+        let mut starts = Vec::with_capacity(2 * faces.len());
+        for v in 0..vertices {
+            let (from, to) = (bucket[v] as usize, bucket[v + 1] as usize);
+            half_edges[from..to].sort_unstable_by_key(|&h| (ends(h as usize).1, h));
+            for i in from..to {
+                if i == from || ends(half_edges[i] as usize).1 != ends(half_edges[i - 1] as usize).1 {
+                    starts.push(i as u32);
+                }
+            }
+        }
+        starts.push(half_edges.len() as u32);
+        Self { half_edges, starts }
+    }
+
+    /// The half-edges along each undirected edge.
+    pub(super) fn groups(&self) -> impl Iterator<Item = &[u32]> {
+        self.starts.windows(2).map(|w| &self.half_edges[w[0] as usize..w[1] as usize])
+    }
+}
+
+/// Start and end vertex of half-edge `h`.
+pub(super) fn half_edge(faces: &[[u32; 3]], h: usize) -> (u32, u32) {
+    let face = faces[h / 3];
+    (face[h % 3], face[(h + 1) % 3])
+}
+
+/// Boundary loops of a vertex-manifold, oriented mesh, in the direction of the faces, each from its smallest vertex.
+pub(super) fn boundary_loops(vertices: usize, faces: &[[u32; 3]], twins: &[u32]) -> Vec<Vec<u32>> {
+    let mut next = vec![BORDER; vertices];
+    for (h, &twin) in twins.iter().enumerate() {
+        if twin == BORDER {
+            let (a, b) = half_edge(faces, h);
+            next[a as usize] = b;
+        }
+    }
+    let mut loops = Vec::new();
+    for start in 0..vertices {
+        if next[start] == BORDER {
+            continue;
+        }
+        let mut around = Vec::new();
+        let mut v = start;
+        while next[v] != BORDER {
+            around.push(v as u32);
+            v = std::mem::replace(&mut next[v], BORDER) as usize;
+        }
+        loops.push(around);
+    }
+    loops
+}

@@ -1,0 +1,341 @@
+//! From a triangle soup to a [`Disk`], with an account of what was left out.
+
+use super::adjacency::{EdgeTable, boundary_loops, half_edge};
+use super::{BORDER, Disk};
+use crate::error::Error;
+use crate::triangle;
+
+/// A face whose height is below this fraction of its longest edge has no measurable shape: it is the relative rounding
+/// of the f32 coordinates that meshes are stored in (ours).
+const FLAT: f64 = 1e-7;
+
+/// Half-edges are counted in 32 bits.
+const MOST: usize = (u32::MAX / 6) as usize;
+
+/// What [`largest_disk_with`] may change in the mesh.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
+pub struct Repair {
+    /// Merge vertices at exactly the same position. Files often split vertices along texture seams or store three
+    /// vertices per face; without welding such a mesh falls apart. Off by default (ours).
+    pub weld: bool,
+    /// Give each fan of faces around a non-manifold vertex a vertex of its own; the surface itself does not change. Off
+    /// by default (ours).
+    pub split_vertices: bool,
+}
+
+/// What [`largest_disk`] found and left out.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+pub struct Findings {
+    /// Edge-connected parts of the mesh (after dropping degenerate faces).
+    pub components: usize,
+    /// Faces of the parts that were not kept.
+    pub faces_in_other_components: usize,
+    /// Area of the parts that were not kept, m^2.
+    pub area_in_other_components_m2: f64,
+    /// Vertices that no face uses.
+    pub unreferenced_vertices: usize,
+    /// Faces with a repeated corner or without area.
+    pub degenerate_faces_dropped: usize,
+    /// Faces with the same three corners as an earlier one.
+    pub duplicate_faces_dropped: usize,
+    /// Vertices merged into another at the same position.
+    pub welded_vertices: usize,
+    /// Vertices added to separate the fans of non-manifold vertices.
+    pub split_vertices: usize,
+    /// Faces whose winding disagreed with the rest and was reversed.
+    pub reversed_faces: usize,
+    /// Boundary loops of the disk.
+    pub boundary_loops: usize,
+}
+
+/// The part of a mesh with the largest area as a [`Disk`]: unreferenced vertices, repeated and zero-area faces are
+/// dropped, inconsistent winding is made to agree with the larger side. Positions in metres.
+///
+/// # Errors
+/// Names the vertex, edge or face when the mesh is empty, not finite, or the kept part is not a disk (possibly with
+/// holes); see [`Error`] for the way out of each.
+pub fn largest_disk(positions: &[[f32; 3]], faces: &[[u32; 3]]) -> Result<(Disk, Findings), Error> {
+    let positions: Vec<[f64; 3]> = positions.iter().map(|p| p.map(f64::from)).collect();
+    largest_disk_with(&positions, faces, Repair::default())
+}
+
+/// As [`largest_disk`], with f64 positions and a choice of repairs.
+pub fn largest_disk_with(
+    positions: &[[f64; 3]],
+    faces: &[[u32; 3]],
+    repair: Repair,
+) -> Result<(Disk, Findings), Error> {
+    let mut findings = Findings { unreferenced_vertices: check(positions, faces)?, ..Findings::default() };
+    let mut soup: Vec<[u32; 3]> = faces.to_vec();
+    if repair.weld {
+        findings.welded_vertices = weld(positions, &mut soup);
+    }
+    let mut kept = without_degenerate(positions, &soup, &mut findings);
+    if kept.is_empty() {
+        return Err(Error::ZeroArea);
+    }
+    kept = largest_component(positions, &soup, &kept, &mut findings);
+    let mut oriented: Vec<[u32; 3]> = kept.iter().map(|&f| soup[f as usize]).collect();
+    let table = EdgeTable::new(positions.len(), &oriented);
+    let (mut twins, reversed) = orient(positions, &mut oriented, &table, &kept)?;
+    findings.reversed_faces = reversed.iter().filter(|&&r| r).count();
+    let vertex_source = separate_fans(&mut oriented, &twins, positions.len(), repair, &mut findings)?;
+
+    let mut loops = boundary_loops(vertex_source.len(), &oriented, &twins);
+    findings.boundary_loops = loops.len();
+    check_topology(vertex_source.len(), &twins, loops.len())?;
+    let positions_kept: Vec<[f64; 3]> = vertex_source.iter().map(|&v| positions[v as usize]).collect();
+    loops.sort_by(|a, b| loop_length(&positions_kept, b).total_cmp(&loop_length(&positions_kept, a)));
+    twins.shrink_to_fit();
+    let disk = Disk {
+        positions: positions_kept,
+        faces: oriented,
+        vertex_source,
+        face_source: kept,
+        reversed,
+        twins,
+        loops,
+        source_vertices: positions.len(),
+        source_faces: faces.len(),
+    };
+    Ok((disk, findings))
+}
+
+/// Refuses what no later step could name; returns the number of unreferenced vertices.
+fn check(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Result<usize, Error> {
+    if positions.is_empty() || faces.is_empty() {
+        return Err(Error::Empty);
+    }
+    let count = positions.len().max(faces.len());
+    if count > MOST {
+        return Err(Error::TooLarge { count, limit: MOST });
+    }
+    let mut used = vec![false; positions.len()];
+    for (face, corners) in faces.iter().enumerate() {
+        for &index in corners {
+            let slot = used.get_mut(index as usize);
+            *slot.ok_or(Error::IndexOutOfRange { face, index, vertices: positions.len() })? = true;
+        }
+    }
+    for (vertex, position) in positions.iter().enumerate() {
+        if used[vertex] && !position.iter().all(|x| x.is_finite()) {
+            return Err(Error::NonFinite { vertex });
+        }
+    }
+    Ok(used.iter().filter(|&&u| !u).count())
+}
+
+/// Points the faces to the first vertex at each position; returns how many vertices lost their faces.
+fn weld(positions: &[[f64; 3]], faces: &mut [[u32; 3]]) -> usize {
+    // Adding 0.0 makes -0.0 and 0.0 the same bits.
+    let key = |v: u32| positions[v as usize].map(|x| (x + 0.0).to_bits());
+    let mut order: Vec<u32> = faces.iter().flatten().copied().collect();
+    order.sort_unstable();
+    order.dedup();
+    order.sort_by_key(|&v| (key(v), v));
+    let mut first: Vec<u32> = (0..positions.len() as u32).collect();
+    let mut merged = 0;
+    for pair in order.windows(2) {
+        if key(pair[0]) == key(pair[1]) {
+            first[pair[1] as usize] = first[pair[0] as usize];
+            merged += 1;
+        }
+    }
+    for corner in faces.iter_mut().flatten() {
+        *corner = first[*corner as usize];
+    }
+    merged
+}
+
+/// Indices of the faces that have a shape and are not repeated.
+fn without_degenerate(positions: &[[f64; 3]], faces: &[[u32; 3]], findings: &mut Findings) -> Vec<u32> {
+    let has_shape = |f: &u32| {
+        let corners = faces[*f as usize];
+        triangle::has_shape(corners.map(|v| positions[v as usize]), FLAT)
+    };
+    let mut kept: Vec<u32> = (0..faces.len() as u32).filter(has_shape).collect();
+    findings.degenerate_faces_dropped = faces.len() - kept.len();
+
+    let sorted = |f: u32| {
+        let mut corners = faces[f as usize];
+        corners.sort_unstable();
+        corners
+    };
+    let shaped = kept.len();
+    kept.sort_by_cached_key(|&f| (sorted(f), f));
+    kept.dedup_by(|a, b| sorted(*a) == sorted(*b));
+    kept.sort_unstable();
+    findings.duplicate_faces_dropped = shaped - kept.len();
+    kept
+}
+
+/// Faces of the edge-connected part with the largest area.
+fn largest_component(positions: &[[f64; 3]], faces: &[[u32; 3]], kept: &[u32], findings: &mut Findings) -> Vec<u32> {
+    let list: Vec<[u32; 3]> = kept.iter().map(|&f| faces[f as usize]).collect();
+    let mut parent: Vec<u32> = (0..list.len() as u32).collect();
+    for group in EdgeTable::new(positions.len(), &list).groups() {
+        for &h in &group[1..] {
+            let (a, b) = (root(&mut parent, group[0] / 3), root(&mut parent, h / 3));
+            parent[a.max(b) as usize] = a.min(b);
+        }
+    }
+    let mut areas = vec![0.0; list.len()];
+    for (f, corners) in list.iter().enumerate() {
+        let area = 0.5 * triangle::cross(corners.map(|v| positions[v as usize])).norm();
+        areas[root(&mut parent, f as u32) as usize] += area;
+    }
+    // Roots are the smallest faces of their parts, so the first of equal areas is the part that comes first.
+    let largest = (0..list.len()).fold(0, |best, f| if areas[f] > areas[best] { f } else { best });
+    findings.components = areas.iter().filter(|&&a| a > 0.0).count();
+    findings.area_in_other_components_m2 =
+        areas.iter().enumerate().filter(|&(f, _)| f != largest).map(|(_, area)| area).sum();
+    let chosen: Vec<u32> =
+        (0..list.len()).filter(|&f| root(&mut parent, f as u32) as usize == largest).map(|f| kept[f]).collect();
+    findings.faces_in_other_components = kept.len() - chosen.len();
+    chosen
+}
+
+fn root(parent: &mut [u32], mut f: u32) -> u32 {
+    while parent[f as usize] != f {
+        parent[f as usize] = parent[parent[f as usize] as usize];
+        f = parent[f as usize];
+    }
+    f
+}
+
+/// Makes the winding consistent and pairs the half-edges: (twins, reversed).
+fn orient(
+    positions: &[[f64; 3]],
+    faces: &mut [[u32; 3]],
+    table: &EdgeTable,
+    source: &[u32],
+) -> Result<(Vec<u32>, Vec<bool>), Error> {
+    let mut twins = vec![BORDER; 3 * faces.len()];
+    for group in table.groups() {
+        if let &[h, g] = group {
+            twins[h as usize] = g;
+            twins[g as usize] = h;
+        } else if group.len() > 2 {
+            let (a, b) = half_edge(faces, group[0] as usize);
+            return Err(Error::NonManifoldEdge { a, b, faces: group.len() });
+        }
+    }
+    // Two neighbours agree when they run along their common edge in opposite directions.
+    let mut reversed: Vec<Option<bool>> = vec![None; faces.len()];
+    reversed[0] = Some(false);
+    let mut queue = vec![0usize];
+    while let Some(f) = queue.pop() {
+        for (h, &twin) in twins.iter().enumerate().skip(3 * f).take(3) {
+            if twin == BORDER {
+                continue;
+            }
+            let other = twin as usize;
+            let same_direction = half_edge(faces, h).0 == half_edge(faces, other).0;
+            let wanted = reversed[f].map(|r| r ^ same_direction);
+            let g = other / 3;
+            if reversed[g].is_none() {
+                reversed[g] = wanted;
+                queue.push(g);
+            } else if reversed[g] != wanted {
+                return Err(Error::NotOrientable { face: source[g] });
+            }
+        }
+    }
+    let mut reversed: Vec<bool> = reversed.into_iter().map(|r| r == Some(true)).collect();
+    // The side with more area is right.
+    let signed: f64 = faces
+        .iter()
+        .zip(&reversed)
+        .map(|(face, &r)| triangle::cross(face.map(|v| positions[v as usize])).norm() * if r { -1.0 } else { 1.0 })
+        .sum();
+    if signed < 0.0 {
+        for r in &mut reversed {
+            *r = !*r;
+        }
+    }
+    let moved = |h: u32| if reversed[h as usize / 3] { h / 3 * 3 + 2 - h % 3 } else { h };
+    let mut moved_twins = vec![BORDER; twins.len()];
+    for (h, &twin) in twins.iter().enumerate() {
+        moved_twins[moved(h as u32) as usize] = if twin == BORDER { BORDER } else { moved(twin) };
+    }
+    for (face, _) in faces.iter_mut().zip(&reversed).filter(|(_, r)| **r) {
+        face.swap(1, 2);
+    }
+    Ok((moved_twins, reversed))
+}
+
+/// Renumbers the corners so that each fan of faces has one vertex; returns the source vertex of each new one.
+fn separate_fans(
+    faces: &mut [[u32; 3]],
+    twins: &[u32],
+    vertices: usize,
+    repair: Repair,
+    findings: &mut Findings,
+) -> Result<Vec<u32>, Error> {
+    let next = |h: usize| h / 3 * 3 + (h + 1) % 3;
+    let previous = |h: usize| h / 3 * 3 + (h + 2) % 3;
+    let corners = 3 * faces.len();
+    let mut fan_of_corner = vec![BORDER; corners];
+    let mut fan_source: Vec<u32> = Vec::with_capacity(vertices);
+    let mut seen = vec![false; vertices];
+    for start in 0..corners {
+        if fan_of_corner[start] != BORDER {
+            continue;
+        }
+        let source = faces[start / 3][start % 3];
+        if std::mem::replace(&mut seen[source as usize], true) {
+            if !repair.split_vertices {
+                return Err(Error::NonManifoldVertex { vertex: source });
+            }
+            findings.split_vertices += 1;
+        }
+        let fan = fan_source.len() as u32;
+        fan_source.push(source);
+        // One way around until the boundary or the start, then the other way.
+        let mut corner = start;
+        loop {
+            fan_of_corner[corner] = fan;
+            let twin = twins[previous(corner)];
+            if twin == BORDER || twin as usize == start {
+                break;
+            }
+            corner = twin as usize;
+        }
+        let mut corner = start;
+        while twins[corner] != BORDER && fan_of_corner[next(twins[corner] as usize)] == BORDER {
+            corner = next(twins[corner] as usize);
+            fan_of_corner[corner] = fan;
+        }
+    }
+    let mut order: Vec<u32> = (0..fan_source.len() as u32).collect();
+    order.sort_by_key(|&fan| (fan_source[fan as usize], fan));
+    let mut rank = vec![0u32; order.len()];
+    for (new, &fan) in order.iter().enumerate() {
+        rank[fan as usize] = new as u32;
+    }
+    for (corner, &fan) in fan_of_corner.iter().enumerate() {
+        faces[corner / 3][corner % 3] = rank[fan as usize];
+    }
+    Ok(order.iter().map(|&fan| fan_source[fan as usize]).collect())
+}
+
+/// Euler: V - E + F = 2 - 2 genus - loops.
+fn check_topology(vertices: usize, twins: &[u32], loops: usize) -> Result<(), Error> {
+    let faces = twins.len() / 3;
+    let border = twins.iter().filter(|&&t| t == BORDER).count();
+    let edges = usize::midpoint(twins.len(), border);
+    let genus = (2 + edges - vertices - faces - loops) / 2;
+    match (genus, loops) {
+        (genus, 0) => Err(Error::Closed { genus }),
+        (0, _) => Ok(()),
+        (genus, boundary_loops) => Err(Error::HigherGenus { genus, boundary_loops }),
+    }
+}
+
+fn loop_length(positions: &[[f64; 3]], vertices: &[u32]) -> f64 {
+    let at = |v: u32| nalgebra::Vector3::from(positions[v as usize]);
+    let next = vertices.iter().cycle().skip(1);
+    vertices.iter().zip(next).map(|(&a, &b)| (at(a) - at(b)).norm()).sum()
+}

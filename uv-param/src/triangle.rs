@@ -1,0 +1,108 @@
+//! One triangle: its shape in space, and the linear map from it to the plane.
+
+use nalgebra::Vector3;
+
+/// Twice the area along the normal.
+pub(crate) fn cross(corners: [[f64; 3]; 3]) -> Vector3<f64> {
+    let [p0, p1, p2] = corners.map(Vector3::from);
+    (p1 - p0).cross(&(p2 - p0))
+}
+
+/// Whether the height of the triangle exceeds `flat` times its longest edge.
+pub(crate) fn has_shape(corners: [[f64; 3]; 3], flat: f64) -> bool {
+    let [p0, p1, p2] = corners.map(Vector3::from);
+    let longest = (p1 - p0).norm_squared().max((p2 - p1).norm_squared()).max((p0 - p2).norm_squared());
+    cross(corners).norm() > flat * longest
+}
+
+/// A triangle laid isometrically into the plane: corner 0 at the origin, corner 1 on the positive x axis. Kept as the
+/// gradients `g[k]` (1/m) of the hat functions, so that the Jacobian of a layout is `sum_k uv[k] g[k]^T`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Frame {
+    pub(crate) g: [[f64; 2]; 3],
+    pub(crate) area: f64,
+}
+
+impl Frame {
+    pub(crate) fn new(corners: [[f64; 3]; 3]) -> Self {
+        let [p0, p1, p2] = corners.map(Vector3::from);
+        let (e1, e2) = (p1 - p0, p2 - p0);
+        let length = e1.norm();
+        let foot = e1.dot(&e2) / length;
+        let height = e1.cross(&e2).norm() / length;
+        let g1 = [1.0 / length, -foot / (length * height)];
+        let g2 = [0.0, 1.0 / height];
+        Self { g: [[-g1[0], -g1[1] - g2[1]], g1, g2], area: 0.5 * length * height }
+    }
+
+    /// Jacobian of the layout that puts the corners at `uv`.
+    pub(crate) fn jacobian(&self, uv: [[f64; 2]; 3]) -> Jacobian {
+        let q1 = [uv[1][0] - uv[0][0], uv[1][1] - uv[0][1]];
+        let q2 = [uv[2][0] - uv[0][0], uv[2][1] - uv[0][1]];
+        let [_, g1, g2] = self.g;
+        Jacobian {
+            a: q1[0] * g1[0],
+            b: q1[0] * g1[1] + q2[0] * g2[1],
+            c: q1[1] * g1[0],
+            d: q1[1] * g1[1] + q2[1] * g2[1],
+        }
+    }
+}
+
+/// The 2x2 map `[a b; c d]` from a triangle's own plane to the chart.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Jacobian {
+    pub(crate) a: f64,
+    pub(crate) b: f64,
+    pub(crate) c: f64,
+    pub(crate) d: f64,
+}
+
+impl Jacobian {
+    pub(crate) fn det(&self) -> f64 {
+        self.a * self.d - self.b * self.c
+    }
+
+    /// Signed singular values, `s1 >= |s2|`; `s2` has the sign of the determinant.
+    pub(crate) fn stretch(&self) -> [f64; 2] {
+        let sum = (self.a + self.d).hypot(self.c - self.b);
+        let difference = (self.a - self.d).hypot(self.c + self.b);
+        let s1 = 0.5 * (sum + difference);
+        // det / s1 keeps the digits of a small s2, which the difference would lose.
+        [s1, if s1 > 0.0 { self.det() / s1 } else { 0.0 }]
+    }
+
+    /// Cosine and sine of the nearest rotation; `None` when every rotation is equally near.
+    pub(crate) fn nearest_rotation(&self) -> Option<[f64; 2]> {
+        let (p, q) = (self.a + self.d, self.c - self.b);
+        let length = p.hypot(q);
+        (length > 0.0).then(|| [p / length, q / length])
+    }
+
+    /// `|J - R|^2 = (s1 - 1)^2 + (s2 - 1)^2` for the nearest rotation R.
+    pub(crate) fn rigidity(&self) -> f64 {
+        let [p, q] = self.nearest_rotation().unwrap_or([1.0, 0.0]);
+        (self.a - p).powi(2) + (self.b + q).powi(2) + (self.c - q).powi(2) + (self.d - p).powi(2)
+    }
+
+    /// `W = |J|^2 (1 + 1 / det^2) = s1^2 + s2^2 + s1^-2 + s2^-2`, infinite where the triangle is not positive.
+    pub(crate) fn symmetric_dirichlet(&self) -> f64 {
+        let det = self.det();
+        if det <= 0.0 {
+            return f64::INFINITY;
+        }
+        let square = self.a * self.a + self.b * self.b + self.c * self.c + self.d * self.d;
+        square * (1.0 + 1.0 / (det * det))
+    }
+}
+
+/// Exact sign of the orientation of a triangle in the plane: positive when counter-clockwise.
+pub(crate) fn orientation(uv: [[f64; 2]; 3]) -> f64 {
+    let [a, b, c] = uv.map(|[x, y]| robust::Coord { x, y });
+    robust::orient2d(a, b, c)
+}
+
+/// Number of triangles that are not strictly counter-clockwise, by the exact predicate.
+pub(crate) fn flips(uv: &[[f64; 2]], faces: &[[u32; 3]]) -> usize {
+    faces.iter().filter(|face| orientation(face.map(|v| uv[v as usize])) <= 0.0).count()
+}
