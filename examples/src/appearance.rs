@@ -39,10 +39,10 @@ pub enum AppearanceError {
 
 impl Appearance {
     /// Charcoal paint (ours: strong, almost flat absorption, little scattering) on sandstone (ours: reflectance rising from
-    /// 0.30 in the blue to 0.62 in the red).
+    /// 0.38 in the blue to 0.74 in the red).
     pub fn charcoal_on_sandstone() -> Result<Self, AppearanceError> {
         let band = |f: &dyn Fn(f64) -> f64| -> Spectrum { std::array::from_fn(|k| f(wavelength(k))) };
-        let wall = Substrate::new(band(&|l| 0.30 + 0.32 / (1.0 + (-(l - 530.0) / 45.0).exp())))?;
+        let wall = Substrate::new(band(&|l| 0.38 + 0.36 / (1.0 + (-(l - 530.0) / 45.0).exp())))?;
         let paint = Paint::new(&band(&|l| 1.5 - 0.0002 * (l - 380.0)), &[0.08; BANDS], UNIT_THICKNESS)?;
         let at = |depth: f64| paint.over(depth * UNIT_THICKNESS, &wall);
 

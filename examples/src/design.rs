@@ -122,18 +122,19 @@ impl Design {
 
 /// Strata: a base coat that breathes, bands that dip and pinch, and a dark foot that fades upwards.
 fn strata(seed: u64, x: f64, y: f64, u: f64, v: f64) -> f64 {
-    let base = 0.22 + 0.16 * fbm(seed ^ 0xBA5E, x / 1.1, y / 1.1, 3);
+    let base = 0.06 + 0.22 * fbm(seed ^ 0xBA5E, x / 1.1, y / 1.1, 3);
     // Bands follow a dipping coordinate that folds gently along the wall.
     let fold = 0.16 * (value_noise(seed ^ 0xF01D, x / 0.9, y / 1.6) - 0.5) + 0.05 * (x / 0.7).sin();
     let depth = y + 0.12 * x + fold;
     let band = |period: f64, salt: u64| {
         let phase = depth / period + value_noise(seed ^ salt, x / 1.3, 0.5);
-        let wave = 0.5 + 0.5 * (std::f64::consts::TAU * phase).sin();
+        // Zero at whole phases, where the strength below changes from one band to the next.
+        let wave = 0.5 - 0.5 * (std::f64::consts::TAU * phase).cos();
         wave * wave * value_noise(seed ^ salt ^ 0xC0DE, x / 0.8, phase.floor())
     };
-    let striations = 0.42 * band(0.46, 0x11) + 0.20 * band(0.21, 0x22);
+    let striations = 0.85 * band(0.46, 0x11) + 0.45 * band(0.19, 0x22);
     let foot = 0.22 * smoothstep((v - 0.55) / 0.45) * (0.6 + 0.4 * u);
-    (base + striations + foot - 0.08).clamp(0.0, DARKEST)
+    (base + striations + foot).clamp(0.0, DARKEST)
 }
 
 fn smoothstep(t: f64) -> f64 {

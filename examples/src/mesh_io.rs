@@ -90,7 +90,8 @@ pub fn read_mesh(path: &Path) -> Result<TriangleMesh, MeshError> {
         _ => return Err(MeshError::UnknownExtension { path: path.into() }),
     };
     let bytes = std::fs::read(path).map_err(|source| MeshError::Unreadable { path: path.into(), source })?;
-    let mesh = parse(&bytes).map_err(|Fault { place, what }| MeshError::Malformed { path: path.into(), place, what })?;
+    let mesh =
+        parse(&bytes).map_err(|Fault { place, what }| MeshError::Malformed { path: path.into(), place, what })?;
     if mesh.faces.is_empty() {
         return Err(MeshError::Empty { path: path.into(), vertices: mesh.positions.len() });
     }

@@ -153,7 +153,10 @@ mod tests {
     fn bad_scales_and_meshes_are_refused() {
         let mesh = || square([[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
         for scale in [-1.0, 0.0, f64::NAN] {
-            assert!(matches!(place(&mut mesh(), Placing { scale: Some(scale), up: UpAxis::Z }), Err(PlacingError::Scale(_))));
+            assert!(matches!(
+                place(&mut mesh(), Placing { scale: Some(scale), up: UpAxis::Z }),
+                Err(PlacingError::Scale(_))
+            ));
         }
         let mut bad = mesh();
         bad.positions[2][1] = f32::NAN;

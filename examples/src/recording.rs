@@ -131,7 +131,8 @@ impl Recorder {
         message.encode(&mut data).map_err(failed)?;
         let log_time = (time.max(0.0) * 1e9).round() as u64;
         self.sequence += 1;
-        let header = mcap::records::MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time: log_time };
+        let header =
+            mcap::records::MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time: log_time };
         self.writer.write_to_known_channel(&header, &data).map_err(failed)
     }
 }
@@ -262,7 +263,8 @@ mod tests {
             assert!(schema.starts_with("foxglove."), "{schema}");
             *count.entry(message.channel.topic.clone()).or_insert(0) += 1;
         }
-        let expected = [("/joint_states", 5), ("/log", 2), ("/spray", 6), ("/surface", 1), ("/tf", 5), ("/vehicle/pose", 5)];
+        let expected =
+            [("/joint_states", 5), ("/log", 2), ("/spray", 6), ("/surface", 1), ("/tf", 5), ("/vehicle/pose", 5)];
         assert_eq!(count, expected.map(|(t, n)| (t.to_string(), n)).into());
     }
 }

@@ -122,7 +122,8 @@ impl Report {
     /// The rows of the table: figure, value, floor, what the papers report, whether the floor holds.
     fn rows(&self) -> Vec<(&'static str, String, String, &'static str, bool)> {
         let cm = |m: f64| format!("{:.2} cm", 100.0 * m);
-        let at_most = |name, value: f64, limit: f64, paper| (name, cm(value), format!("≤ {}", cm(limit)), paper, value <= limit);
+        let at_most =
+            |name, value: f64, limit: f64, paper| (name, cm(value), format!("≤ {}", cm(limit)), paper, value <= limit);
         let smoothing_ratio = self.smoothing_normal_deviation_mean_m / self.normal_deviation_mean_m;
         let locked_ratio = self.ptu_locked_hit_error_rms_m / self.hit_error_rms_m;
         let ssim_ratio = self.ssim_painted / self.ssim_canvas;
@@ -187,7 +188,8 @@ impl Report {
     pub fn summary(&self) -> String {
         let mut text = String::new();
         for (figure, value, floor, _, holds) in self.rows() {
-            let _ = writeln!(text, "  {figure:44} {value:>24}   {floor:34}{}", if holds { "" } else { "  NOT REACHED" });
+            let _ =
+                writeln!(text, "  {figure:44} {value:>24}   {floor:34}{}", if holds { "" } else { "  NOT REACHED" });
         }
         text
     }
@@ -219,7 +221,8 @@ impl Report {
         }
         text.push_str("| figure | this run | asked for | papers | |\n|---|---|---|---|---|\n");
         for (figure, value, floor, paper, holds) in self.rows() {
-            let _ = writeln!(text, "| {figure} | {value} | {floor} | {paper} | {} |", if holds { "yes" } else { "**no**" });
+            let _ =
+                writeln!(text, "| {figure} | {value} | {floor} | {paper} | {} |", if holds { "yes" } else { "**no**" });
         }
         let _ = writeln!(
             text,

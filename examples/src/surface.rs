@@ -40,7 +40,7 @@ impl PaintSurface {
     pub fn new(mesh: &TriangleMesh, texel: f64, progress: &dyn Fn(f64)) -> Result<Self, SurfaceError> {
         let positions: Vec<[f64; 3]> = mesh.positions.iter().map(|p| p.map(f64::from)).collect();
         let repair = uv_param::Repair { weld: true, split_vertices: true };
-        let (disk, findings) = uv_param::largest_disk_with(&positions, &mesh.faces, &repair)?;
+        let (disk, findings) = uv_param::largest_disk_with(&positions, &mesh.faces, repair)?;
         let settings = Settings { up: Some([0.0, 0.0, 1.0]), ..Settings::default() };
         let chart = uv_param::unwrap(&disk, &settings, |p| {
             progress(p.iteration as f64 / settings.iterations as f64);
@@ -79,7 +79,9 @@ impl PaintSurface {
                 self.texels.at(x, y).is_some_and(|point| {
                     let [s1, s2] = self.chart.stretch(point.face);
                     let even = s1 < MOST_STRETCH && s2 > 1.0 / MOST_STRETCH;
-                    even && !steep(&self.chart.smooth_normal(point))
+                    // A texel at the rim may hold a sliver of surface beside its centre.
+                    let centred = self.chart.locate(self.texels.uv_of_texel(x, y)).is_some();
+                    centred && even && !steep(&self.chart.smooth_normal(point))
                 })
             })
             .collect()
@@ -112,9 +114,12 @@ impl PaintSurface {
 
     /// Mean normal over the chart: the side from which a picture of it is taken. Short for surfaces that close in.
     pub fn facing(&self) -> Vector3<f64> {
-        let normals = self.disk().faces().iter().enumerate().map(|(face, _)| {
-            self.chart.face_normal(face as u32).into_inner() * self.disk().face_area(face)
-        });
+        let normals = self
+            .disk()
+            .faces()
+            .iter()
+            .enumerate()
+            .map(|(face, _)| self.chart.face_normal(face as u32).into_inner() * self.disk().face_area(face));
         normals.sum::<Vector3<f64>>() / self.disk().area()
     }
 

@@ -39,17 +39,31 @@ pub fn route(surface: &PaintSurface, strokes: &[Stroke], kernel: &SprayKernel, a
                 continue;
             }
             let dose = volume(spray) / length;
-            // Neighbouring sprays share a border; after a gap the stroke goes on with the valve shut.
-            let joined = k > 0 && (spray.x - stroke.sprays[k - 1].x).abs() < 1.5 * along as f64;
+            // Neighbouring sprays share a border; across a gap the stroke goes on with the valve shut.
             match route.targets.last_mut() {
-                Some(last) if joined && (last.point - start.point).norm() < 1e-3 => last.dose = dose,
-                _ => route.targets.push(Target { dose, ..start }),
+                Some(last) if (last.point - start.point).norm() < 1e-3 => last.dose = dose,
+                _ => {
+                    if k > 0 {
+                        let before = &stroke.sprays[k - 1];
+                        bridge(surface, before.x + half, spray.x - half, spray.y, along as f64, &mut route.targets);
+                    }
+                    route.targets.push(Target { dose, ..start });
+                }
             }
             route.targets.push(end);
         }
         route.strokes += usize::from(route.targets.len() > before);
     }
     route
+}
+
+/// Targets with the valve shut between two places of a row, no farther apart than the others: a planner weighs steps.
+fn bridge(surface: &PaintSurface, from: f64, to: f64, y: f64, along: f64, targets: &mut Vec<Target>) {
+    let steps = ((to - from).abs() / along).ceil() as usize;
+    for k in 1..steps {
+        let x = from + (to - from) * k as f64 / steps as f64;
+        targets.extend(surface.lift(x, y).map(|(point, normal)| Target { point, normal, dose: 0.0, time: None }));
+    }
 }
 
 /// The target `offset` pixels along the row from a spray; drawn back towards the spray where the surface ends before it.

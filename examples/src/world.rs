@@ -37,11 +37,11 @@ pub fn rock_wall(seed: u64) -> TriangleMesh {
     for row in 0..=rows {
         for column in 0..=columns {
             let bulge = (relief[row * (columns + 1) + column] - middle) * scale;
-            // Scanned meshes are not grids: interior vertices are shifted by up to a fifth of the spacing.
+            // Scanned meshes are not grids: interior vertices are shifted by up to an eighth of the spacing.
             let inside = row > 0 && row < rows && column > 0 && column < columns;
             let shift = |salt: u64| {
                 let noise = value_noise(seed ^ salt, column as f64, row as f64) - 0.5;
-                if inside { 0.4 * SPACING * noise } else { 0.0 }
+                if inside { 0.25 * SPACING * noise } else { 0.0 }
             };
             let y = 0.5 * WIDTH - column as f64 * SPACING + shift(0x5157);
             let z = CENTRE - 0.5 * HEIGHT + row as f64 * SPACING + shift(0xA3C1);

@@ -71,7 +71,8 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), AnyError> {
     let folder = &arguments.out;
-    std::fs::create_dir_all(folder).map_err(|e| format!("{}: cannot be created ({e}): choose another --out", folder.display()))?;
+    std::fs::create_dir_all(folder)
+        .map_err(|e| format!("{}: cannot be created ({e}): choose another --out", folder.display()))?;
     let mut settings = MissionSettings { seed: arguments.seed, ..MissionSettings::default() };
     if let Some(threads) = arguments.threads {
         settings.threads = threads.clamp(1, 1024);
@@ -106,16 +107,27 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
 fn load(path: &Path, arguments: &Arguments) -> Result<TriangleMesh, AnyError> {
     let mut mesh = read_mesh(path)?;
     if arguments.texture.is_some() && mesh.uv.is_none() {
-        return Err(format!("{}: has no texture coordinates for --texture; leave it out or use --design", path.display()).into());
+        return Err(format!(
+            "{}: has no texture coordinates for --texture; leave it out or use --design",
+            path.display()
+        )
+        .into());
     }
     let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
     let up = match arguments.up {
         Some(Up::X) => UpAxis::X,
         Some(Up::Z) => UpAxis::Z,
         Some(Up::Y) => UpAxis::Y,
-        None => if is_obj { UpAxis::Y } else { UpAxis::Z },
+        None => {
+            if is_obj {
+                UpAxis::Y
+            } else {
+                UpAxis::Z
+            }
+        }
     };
-    let placed = place(&mut mesh, Placing { scale: arguments.scale, up }).map_err(|e| format!("{}: {e}", path.display()))?;
+    let placed =
+        place(&mut mesh, Placing { scale: arguments.scale, up }).map_err(|e| format!("{}: {e}", path.display()))?;
     let hung = if placed.hung { ", hung like a wall" } else { "" };
     eprintln!("{}: {} faces, scale {:.4}{hung}", path.display(), mesh.faces.len(), placed.scale);
     Ok(mesh)

@@ -13,7 +13,10 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
 
     let (k, header) = lines.next().ok_or_else(end)?;
     let Some(counts) = header.strip_prefix("COFF").or_else(|| header.strip_prefix("OFF")) else {
-        return Err(Fault::at_line(k, format!("expected OFF, found \"{}\"", header.chars().take(20).collect::<String>())));
+        return Err(Fault::at_line(
+            k,
+            format!("expected OFF, found \"{}\"", header.chars().take(20).collect::<String>()),
+        ));
     };
     let (k, counts) = if counts.trim().is_empty() { lines.next().ok_or_else(end)? } else { (k, counts.trim()) };
     let mut words = counts.split_whitespace();

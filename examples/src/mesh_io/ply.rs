@@ -78,12 +78,7 @@ fn index_list(property: &Property) -> Option<Vec<u32>> {
 }
 
 /// Writes a binary little-endian PLY with one sRGB colour per vertex.
-pub fn write_ply(
-    path: &Path,
-    positions: &[[f32; 3]],
-    faces: &[[u32; 3]],
-    colours: &[[u8; 3]],
-) -> io::Result<()> {
+pub fn write_ply(path: &Path, positions: &[[f32; 3]], faces: &[[u32; 3]], colours: &[[u8; 3]]) -> io::Result<()> {
     let mut out = io::BufWriter::new(std::fs::File::create(path)?);
     write!(
         out,

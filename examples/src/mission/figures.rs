@@ -12,8 +12,8 @@ use super::{LayerFlight, Mission, MissionError};
 use crate::appearance::{DENSITY, UNIT_THICKNESS};
 use crate::report::Report;
 
-/// Samples between two looks for collisions in a flight: 50 ms.
-const COLLISION_STRIDE: usize = 5;
+/// Samples between two looks for collisions in a flight: 40 ms, 2 cm at full speed.
+const COLLISION_STRIDE: usize = 2;
 /// Step of the dense check of the planned limits, seconds; the certificates do not depend on it.
 const LIMIT_STEP: f64 = 0.02;
 
@@ -158,9 +158,9 @@ impl Mission {
             spheres.clear();
             let joints = Joints { pan: sample.pan_tilt[0], tilt: sample.pan_tilt[1] };
             self.robot.spheres_at(&sample.world_from_body, joints, &mut spheres);
-            spheres.iter().any(|(centre, radius)| {
-                paint_sim::Surface::distance(&self.surface.world, centre, *radius) < *radius
-            })
+            spheres
+                .iter()
+                .any(|(centre, radius)| paint_sim::Surface::distance(&self.surface.world, centre, *radius) < *radius)
         };
         log.samples.iter().step_by(COLLISION_STRIDE).filter(touches).count()
     }
@@ -179,12 +179,13 @@ impl Mission {
         let ptu = &self.settings.ptu;
         // The servo's steps do not divide the limits: allow one half step.
         let margin = 0.5 * self.settings.servo.resolution;
-        let inside = |angle: f64, range: ptu_kinematics::Range| {
-            angle >= range.min - margin && angle <= range.max + margin
-        };
-        let joints = f.flight.samples.iter().filter(|s| {
-            !inside(s.pan_tilt[0], ptu.pan_limits) || !inside(s.pan_tilt[1], ptu.tilt_limits)
-        });
+        let inside =
+            |angle: f64, range: ptu_kinematics::Range| angle >= range.min - margin && angle <= range.max + margin;
+        let joints = f
+            .flight
+            .samples
+            .iter()
+            .filter(|s| !inside(s.pan_tilt[0], ptu.pan_limits) || !inside(s.pan_tilt[1], ptu.tilt_limits));
         planned + joints.count()
     }
 }

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
-use paint_sim::{Camera, Frame, Hit, Lights, render};
 use paint_sim::flight::FlightSample;
+use paint_sim::{Camera, Frame, Hit, Lights, render};
 
 use super::figures::nozzle_pose;
 use super::{Mission, MissionError};
@@ -39,7 +39,10 @@ impl Mission {
         self.save_views(folder)?;
         stage.share(0.8);
         self.save_angles(&folder.join("angles.png"))?;
-        self.save_mcap(folder, &ColouredMesh { positions: &positions, faces: self.surface.disk().faces(), colours: &colours })?;
+        self.save_mcap(
+            folder,
+            &ColouredMesh { positions: &positions, faces: self.surface.disk().faces(), colours: &colours },
+        )?;
         stage.done(&folder.display().to_string());
         let report = self.report()?;
         report.save(folder)?;
@@ -50,9 +53,8 @@ impl Mission {
         let (width, height) = (self.wanted.width(), self.wanted.height());
         let painted = self.painted_depth();
         let picture = |depth: &dyn Fn(usize) -> f64| {
-            let pixels = (0..width * height).map(|k| {
-                if self.coverage.data()[k] > 0.0 { self.appearance.srgb(depth(k)) } else { BESIDE }
-            });
+            let pixels = (0..width * height)
+                .map(|k| if self.coverage.data()[k] > 0.0 { self.appearance.srgb(depth(k)) } else { BESIDE });
             let picture = Rgb::from_pixels(width, height, pixels);
             picture.enlarged((1400 / width as u32).clamp(1, 8))
         };
@@ -83,7 +85,7 @@ impl Mission {
         let away = -(camera.world_from_camera.rotation * Vector3::z());
         let side = Vector3::z().cross(&away);
         let lights = Lights {
-            towards_sun: UnitVector3::new_normalize(away + 0.9 * Vector3::z() + 0.8 * side),
+            towards_sun: UnitVector3::new_normalize(away + 0.75 * Vector3::z() + 0.35 * side),
             sun: [0.95, 0.9, 0.8],
             ambient: [0.28, 0.30, 0.34],
             ..Lights::default()
@@ -128,15 +130,15 @@ impl Mission {
     /// A camera that has the whole surface and the flight in view: from its mean side, or from where the robot flies.
     fn camera(&self) -> Result<Camera, MissionError> {
         let points = || self.surface.disk().positions().iter().map(|p| Vector3::from(*p));
-        let (low, high) = points()
-            .fold((Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)), |(l, h), p| (l.inf(&p), h.sup(&p)));
+        let (low, high) =
+            points().fold((Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)), |(l, h), p| (l.inf(&p), h.sup(&p)));
         let centre = (low + high) / 2.0;
         let facing = self.surface.facing();
         let flat = Vector3::new(facing.x, facing.y, 0.0);
         let front: Vector3<f64> = flat.try_normalize(0.1).unwrap_or(-Vector3::x());
         let side: Vector3<f64> = Vector3::z().cross(&front);
         let direction = (front + side * 0.45 + Vector3::z() * 0.28).normalize();
-        let distance = 1.05 * (high - low).norm() + 0.8;
+        let distance = 0.9 * (high - low).norm() + 0.8;
         let up = Vector3::z();
         Ok(Camera::looking_at(&Point3::from(centre + direction * distance), &Point3::from(centre), &up, 0.9, VIEW)?)
     }

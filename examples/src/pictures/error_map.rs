@@ -10,12 +10,7 @@ const CEILING: f64 = 20.0;
 
 /// Saves a map of CIEDE2000 differences over the texture, axes in metres, with its colour bar. `difference` holds one
 /// value per texel, row 0 at the top; `None` where there is no surface.
-pub fn save_error_map(
-    path: &Path,
-    width: usize,
-    difference: &[Option<f64>],
-    texel: f64,
-) -> Result<(), PictureError> {
+pub fn save_error_map(path: &Path, width: usize, difference: &[Option<f64>], texel: f64) -> Result<(), PictureError> {
     let height = difference.len() / width.max(1);
     let zoom = (1200.0 / width as f64).min(900.0 / height as f64);
     let (map_width, map_height) = ((width as f64 * zoom) as u32, (height as f64 * zoom) as u32);
