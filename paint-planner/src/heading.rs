@@ -21,13 +21,14 @@ pub(crate) struct Headings {
     pub(crate) cost: f64,
 }
 
-/// Chooses headings for `nozzles` (in path order). `linked[i]`: i and i+1 belong to one stroke.
+/// Chooses headings for `nozzles` (in path order), each keeping its own `clearance` from the surface. `linked[i]`: i and i+1
+/// belong to one stroke.
 pub(crate) fn choose(
     nozzles: &[Option<NozzleState>],
     linked: &[bool],
     tool: &dyn Tool,
     checker: &mut Checker<'_>,
-    clearance: f64,
+    clearance: &[f64],
     settings: &HeadingSettings,
 ) -> Headings {
     let table = Table::build(nozzles, tool, checker, clearance, settings.bins);
@@ -37,7 +38,7 @@ pub(crate) fn choose(
     for run in path.runs() {
         let on_grid: Vec<f64> = run.clone().map(|i| table.heading(path.bins[i].unwrap_or(0))).collect();
         let states: Vec<NozzleState> = run.clone().filter_map(|i| nozzles[i]).collect();
-        let polished = polish(&states, &on_grid, tool, checker, clearance, settings);
+        let polished = polish(&states, &on_grid, tool, checker, &clearance[run.clone()], settings);
         for (i, state) in run.clone().zip(polished) {
             vehicle[i] = state;
         }
@@ -52,7 +53,7 @@ fn polish(
     on_grid: &[f64],
     tool: &dyn Tool,
     checker: &mut Checker<'_>,
-    clearance: f64,
+    clearance: &[f64],
     settings: &HeadingSettings,
 ) -> Vec<Option<VehicleState>> {
     let grid = smooth::unwrap(on_grid);
@@ -66,7 +67,8 @@ fn polish(
         let vehicles: Vec<Option<VehicleState>> = states
             .iter()
             .zip(&headings)
-            .map(|(nozzle, &heading)| {
+            .zip(clearance)
+            .map(|((nozzle, &heading), &clearance)| {
                 tool.vehicle(nozzle, heading).filter(|v| checker.clear(v, clearance, &mut memory))
             })
             .collect();

@@ -25,12 +25,12 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    /// Asks the tool for every pair. Neighbouring states of one bin share their distance queries.
+    /// Asks the tool for every pair; state `i` has to keep `clearance[i]` from the surface, m. Neighbouring states of one bin share their distance queries.
     pub(crate) fn build(
         nozzles: &[Option<NozzleState>],
         tool: &dyn Tool,
         checker: &mut Checker<'_>,
-        clearance: f64,
+        clearance: &[f64],
         bins: usize,
     ) -> Self {
         let first = nozzles.iter().flatten().next();
@@ -41,7 +41,7 @@ impl Table {
             let mut memory = Memory::default();
             for (i, nozzle) in nozzles.iter().enumerate() {
                 let Some(vehicle) = nozzle.as_ref().and_then(|nozzle| tool.vehicle(nozzle, heading)) else { continue };
-                if checker.clear(&vehicle, clearance, &mut memory) {
+                if checker.clear(&vehicle, clearance[i], &mut memory) {
                     table.nodes[i * bins + bin] = Some(Node { position: vehicle.position, pan: vehicle.pan });
                 }
             }

@@ -24,14 +24,24 @@ pub(super) struct Draft {
     pub(super) route: Vec<Stop>,
 }
 
-/// Times the route and gathers the plan. `dense` binds the trajectory to every waypoint.
+/// Where the trajectory overlaps the surface: between two waypoints.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Touch {
+    /// Index of the waypoint before.
+    pub(super) waypoint: usize,
+    /// How deep, m.
+    pub(super) depth: f64,
+}
+
+/// Times the route and gathers the plan, with the places where it overlaps the surface. `dense` binds the trajectory to
+/// every waypoint.
 pub(super) fn finish(
     draft: &Draft,
     targets: &[Target],
     checker: &mut Checker<'_>,
     settings: &Settings,
     dense: bool,
-) -> Result<Plan, Error> {
+) -> Result<(Plan, Vec<Touch>), Error> {
     check_stamps(targets, &settings.timing.policy)?;
     let mut route = draft.route.clone();
     if let [only] = route[..] {
@@ -64,8 +74,9 @@ pub(super) fn finish(
         .zip(targets)
         .map(|(state, target)| state.unwrap_or_else(|| ideal(target)))
         .collect();
-    let report = report(draft, targets, &nozzle, &timed, least_clearance(&timed, &waypoints, checker));
-    Ok(Plan {
+    let (clearance, touches) = least_clearance(&timed, &waypoints, checker);
+    let report = report(draft, targets, &nozzle, &timed, clearance);
+    let plan = Plan {
         nozzle,
         vehicle: fill(&draft.vehicle, &waypoints),
         target_time: target_times(targets.len(), &waypoints),
@@ -75,7 +86,8 @@ pub(super) fn finish(
         waypoints,
         report,
         points: Plan::points_of(targets),
-    })
+    };
+    Ok((plan, touches))
 }
 
 /// Gradient-preserving timing needs increasing time stamps.
@@ -117,23 +129,31 @@ fn report(draft: &Draft, targets: &[Target], nozzle: &[NozzleState], timed: &Tim
     }
 }
 
-/// Flies the trajectory with the planned joints and measures the distance to the surface.
-fn least_clearance(timed: &Timed, waypoints: &[Waypoint], checker: &mut Checker<'_>) -> f64 {
+/// Flies the trajectory with the planned joints and measures the distance to the surface: the least of all, and where it
+/// falls below zero.
+fn least_clearance(timed: &Timed, waypoints: &[Waypoint], checker: &mut Checker<'_>) -> (f64, Vec<Touch>) {
     let mut memory = Memory::default();
     let mut least = FAR;
-    for pair in waypoints.windows(2) {
+    let mut touches = Vec::new();
+    for (waypoint, pair) in waypoints.windows(2).enumerate() {
         let (from, to) = (&pair[0].state, &pair[1].state);
         let turn = (to.heading - from.heading).abs() + (to.pan - from.pan).abs() + (to.tilt - from.tilt).abs();
         let looks = (((to.position - from.position).norm() + turn) / LOOK).ceil().clamp(1.0, 1e4) as usize;
+        let mut here = FAR;
         for k in 0..=looks {
             let share = k as f64 / looks as f64;
             let sample = timed.trajectory.sample(pair[0].time + (pair[1].time - pair[0].time) * share);
             let joints = between(from, to, share);
             let state = VehicleState { position: sample.position, heading: sample.heading, ..joints };
-            least = checker.clearance(&state, least, &mut memory);
+            // Only what is nearer than the least so far matters, and every overlap.
+            here = here.min(checker.clearance(&state, least.max(0.0), &mut memory));
         }
+        if here < 0.0 {
+            touches.push(Touch { waypoint, depth: -here });
+        }
+        least = least.min(here);
     }
-    least
+    (least, touches)
 }
 
 /// Vehicle states of targets not served: the one before, at the beginning the one after.

@@ -1,7 +1,7 @@
 //! The optimal planner: nozzle program, heading search, minimum snap (VR paper, section IV).
 
 use super::Planner;
-use super::finish::{Draft, finish};
+use super::finish::{Draft, Touch, finish};
 use crate::clearance::Checker;
 use crate::error::Error;
 use crate::nozzle::{Mode, Nozzles, optimise, starts};
@@ -44,22 +44,55 @@ impl Planner for OptimalPlanner {
         let mut nozzles = optimise(targets, &starts, &linked, self.mode, &settings.nozzle)?;
         drop_hidden(targets, &mut nozzles, surface);
         let mut checker = Checker::new(surface, tool);
-        let mut headings =
-            heading::choose(&nozzles.states, &linked, tool, &mut checker, settings.clearance, &settings.heading);
-        if headings.vehicle.iter().all(Option::is_none) {
-            return Err(Error::NothingReachable { count: targets.len() });
+        let mut clearance = vec![settings.clearance; targets.len()];
+        let mut attempt = 0;
+        loop {
+            let mut headings =
+                heading::choose(&nozzles.states, &linked, tool, &mut checker, &clearance, &settings.heading);
+            if headings.vehicle.iter().all(Option::is_none) {
+                return Err(Error::NothingReachable { count: targets.len() });
+            }
+            let route = route::build(&mut headings.vehicle, &headings.joined, Some(&mut checker), settings)?;
+            let draft =
+                Draft { nozzles: nozzles.clone(), vehicle: headings.vehicle, heading_cost: headings.cost, route };
+            // A curve that cuts a corner its waypoints keep clear of is bound to every one of them.
+            let (mut plan, mut touches) = finish(&draft, targets, &mut checker, settings, attempt > 0)?;
+            if attempt == 0 && !touches.is_empty() {
+                (plan, touches) = finish(&draft, targets, &mut checker, settings, true)?;
+            }
+            if touches.is_empty() {
+                return Ok(plan);
+            }
+            attempt += 1;
+            if attempt == ATTEMPTS {
+                return Err(Error::Collision { clearance: plan.report.clearance });
+            }
+            for touch in touches {
+                keep_off(&plan, &touch, &mut clearance, &mut nozzles);
+            }
         }
-        let route = route::build(&mut headings.vehicle, &headings.joined, Some(&mut checker), settings)?;
-        let draft = Draft { nozzles, vehicle: headings.vehicle, heading_cost: headings.cost, route };
-        let plan = finish(&draft, targets, &mut checker, settings, false)?;
-        if plan.report.clearance >= 0.0 {
-            return Ok(plan);
-        }
-        // The curve cut a corner that its waypoints keep clear of: bind it to every one of them.
-        let plan = finish(&draft, targets, &mut checker, settings, true)?;
-        match plan.report.clearance {
-            clearance if clearance < 0.0 => Err(Error::Collision { clearance }),
-            _ => Ok(plan),
+    }
+}
+
+/// Plans made before a collision is final.
+const ATTEMPTS: usize = 8;
+/// Targets on either side of a touch that are kept farther off.
+const REACH: usize = 2;
+/// Clearance beyond which a target that still causes touches is given up, m.
+const GIVE_UP: f64 = 0.2;
+
+/// Asks for more clearance about a touch; targets that have had their chances, and those at the ends of a flight that
+/// touches, are given up.
+fn keep_off(plan: &Plan, touch: &Touch, clearance: &mut [f64], nozzles: &mut Nozzles) {
+    let before = plan.waypoints[..=touch.waypoint].iter().rev().find_map(|w| w.target);
+    let after = plan.waypoints[touch.waypoint + 1..].iter().find_map(|w| w.target);
+    let on_stroke = matches!((before, after), (Some(a), Some(b)) if b <= a + 1);
+    for target in before.into_iter().chain(after) {
+        for near in target.saturating_sub(REACH)..(target + REACH + 1).min(clearance.len()) {
+            clearance[near] += touch.depth + 0.02;
+            if !on_stroke || clearance[near] > GIVE_UP {
+                nozzles.states[near] = None;
+            }
         }
     }
 }

@@ -49,7 +49,7 @@ impl Planner for SmoothingPlanner {
         let states = nozzles.into_iter().zip(&vehicle).map(|(n, v)| v.map(|_| n)).collect();
         let nozzles = Nozzles { states, rounds: 0, steps: 0, slack: 0.0 };
         let draft = Draft { nozzles, vehicle, heading_cost: 0.0, route };
-        finish(&draft, targets, &mut Checker::new(surface, tool), settings, false)
+        Ok(finish(&draft, targets, &mut Checker::new(surface, tool), settings, false)?.0)
     }
 }
 
