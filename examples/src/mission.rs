@@ -138,6 +138,9 @@ pub enum MissionError {
     },
 }
 
+/// Motion of the nozzle that one shot stands for, metres: a third of the spot's deviation.
+const SHOT_STEP: f64 = 0.008;
+
 /// A mission is given up when more of the wanted paint than this is out of reach.
 const MOST_OUT_OF_REACH: f64 = 0.9;
 
@@ -239,7 +242,7 @@ impl Mission {
         let stage = Stage::start("spray");
         let (texels, pixels) = surface.film_texels();
         let mut film = Film::new(texels)?;
-        let shots: Vec<_> = flights.iter().flat_map(|f| f.flight.shots()).collect();
+        let shots: Vec<_> = flights.iter().flat_map(|f| f.flight.shots(SHOT_STEP)).collect();
         film.deposit(&shots, &spray(&settings), &surface.world, settings.threads, &mut |done, total| {
             stage.share(done as f64 / total as f64);
         })?;
@@ -358,8 +361,6 @@ fn fly_three(
     let usual = FlightSettings {
         tether: Some(hose(plan)),
         seed: settings.seed.wrapping_mul(0x9E37_79B9).wrapping_add(layer),
-        // 8 mm between shots at full speed: a third of the spot's deviation.
-        log_rate: 50,
         ..FlightSettings::default()
     };
     let variants = [

@@ -65,6 +65,6 @@ pub use error::Error;
 pub use film::{Books, Film, Texel};
 pub use flight::{FlightLog, FlightSettings, FlightStatistics, PanTilt, Reference, ReferenceState, fly};
 pub use paint::{Paint, Substrate};
-pub use render::{Camera, Frame, Lights, render};
+pub use render::{Camera, Frame, Lights, Look, render};
 pub use spray::{Shot, SprayModel};
 pub use surface::{Hit, Surface, TriangleSurface};

@@ -99,6 +99,16 @@ impl Default for Lights {
     }
 }
 
+/// What a point of the surface looks like.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Look {
+    /// Albedo, linear RGB.
+    pub albedo: [f32; 3],
+    /// Unit normal for the light, either side: the hit's own for facets, an interpolated one for a smooth look. Shadows and
+    /// [`Frame::normals`] follow the geometry.
+    pub normal: Vector3<f64>,
+}
+
 /// What a camera sees, row by row from the top left.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
@@ -116,7 +126,7 @@ pub struct Frame {
     pub normals: Vec<[f32; 3]>,
 }
 
-/// Renders `surface`; `shade` gives the linear RGB albedo of a hit, surfaces are matt and two-sided.
+/// Renders `surface`; `shade` gives the look of a hit, surfaces are matt and two-sided.
 ///
 /// Each pixel's colour is the mean of `supersampling`^2 rays on a regular grid, each with a shadow ray towards the sun;
 /// depth, face and normal belong to the pixel's centre. The picture does not depend on `threads`.
@@ -126,7 +136,7 @@ pub struct Frame {
 pub fn render(
     surface: &dyn Surface,
     camera: &Camera,
-    shade: &(dyn Fn(&Hit) -> [f32; 3] + Sync),
+    shade: &(dyn Fn(&Hit) -> Look + Sync),
     lights: &Lights,
     supersampling: u32,
     threads: usize,
@@ -183,7 +193,7 @@ struct Row<'a> {
 struct View<'a> {
     surface: &'a dyn Surface,
     camera: &'a Camera,
-    shade: &'a (dyn Fn(&Hit) -> [f32; 3] + Sync),
+    shade: &'a (dyn Fn(&Hit) -> Look + Sync),
     lights: &'a Lights,
     supersampling: u32,
 }
@@ -224,10 +234,11 @@ impl View<'_> {
 
     fn light(&self, hit: Option<&Hit>, direction: &Vector3<f64>) -> [f32; 3] {
         let Some(hit) = hit else { return self.lights.background };
-        let albedo = (self.shade)(hit);
+        let Look { albedo, normal: shading } = (self.shade)(hit);
         let normal = facing(hit, direction);
         let towards_sun = self.lights.towards_sun.as_ref();
-        let mut cosine = normal.dot(towards_sun).max(0.0) as f32;
+        let lit_side = if shading.dot(&normal) < 0.0 { -shading } else { shading };
+        let mut cosine = lit_side.dot(towards_sun).max(0.0) as f32;
         if cosine > 0.0 {
             let eye = self.camera.world_from_camera.translation.vector;
             // Off the surface by more than the rounding of the hit, or it would shade itself.

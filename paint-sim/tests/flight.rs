@@ -3,7 +3,7 @@
 
 use nalgebra::{Point3, Vector3};
 use paint_sim::flight::*;
-use paint_sim::{Error, FlightSettings, TriangleSurface, fly};
+use paint_sim::{Error, FlightSettings, Shot, TriangleSurface, fly};
 
 /// A wall in the plane x = 0, painted from -x.
 fn wall() -> TriangleSurface {
@@ -130,12 +130,27 @@ fn the_same_seed_is_the_same_flight() {
 #[test]
 fn the_log_holds_the_sprayed_volume() {
     let log = fly(&Still(still()), &mut arm(), &wall(), &FlightSettings::default()).unwrap();
-    let volume: f64 = log.shots().iter().map(|shot| shot.volume).sum();
+    let volume: f64 = log.shots(0.0).iter().map(|shot| shot.volume).sum();
     assert!((volume - 5e-7 * 0.01 * 201.0).abs() < 1e-18);
     // A valve that is not led opens later by its dead time; nothing is sprayed before the reference begins.
     let valve = Valve { dead_time: 0.3, lead: 0.0 };
     let late = fly(&Still(still()), &mut arm(), &wall(), &FlightSettings { valve, ..FlightSettings::default() });
     assert_eq!(late.unwrap().samples.iter().position(|s| s.flow > 0.0), Some(30));
+}
+
+#[test]
+fn shots_of_a_longer_step_carry_the_same_paint() {
+    let log = fly(&Ellipse { duration: 5.0 }, &mut arm(), &wall(), &outdoors(3)).unwrap();
+    let (each, merged) = (log.shots(0.0), log.shots(0.01));
+    assert_eq!(each.len(), log.samples.iter().filter(|s| s.flow > 0.0).count());
+    assert!(merged.len() * 2 < each.len() && !merged.is_empty());
+    let total = |shots: &[Shot]| shots.iter().map(|s| s.volume).sum::<f64>();
+    assert!((total(&each) / total(&merged) - 1.0).abs() < 1e-12);
+    let mean = |shots: &[Shot]| shots.iter().map(|s| s.origin.coords * s.volume).sum::<Vector3<f64>>() / total(shots);
+    assert!((mean(&each) - mean(&merged)).norm() < 1e-12);
+    for pair in merged.windows(2) {
+        assert!((pair[1].origin - pair[0].origin).norm() < 0.03, "no gaps");
+    }
 }
 
 #[test]

@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
+use paint_planner::normal_deviation;
 use paint_sim::flight::FlightSample;
-use paint_sim::{Camera, Frame, Hit, Lights, render};
+use paint_sim::{Camera, Frame, Hit, Lights, Look, render};
+use uv_param::SurfacePoint;
 
 use super::figures::nozzle_pose;
 use super::{Mission, MissionError};
@@ -12,12 +14,13 @@ use crate::mesh_io::write_ply;
 use crate::pictures::{Panel, Polyline, Rgb, Scene, save_curves, save_error_map, save_scene};
 use crate::progress::Stage;
 use crate::recording::{ColouredMesh, Moment, save_recording};
-use paint_planner::normal_deviation;
 
 /// Width and height of the rendered views, pixels.
 const VIEW: (u32, u32) = (1500, 940);
 /// Colour beside the surface in the texture pictures.
 const BESIDE: [u8; 3] = [255, 255, 255];
+/// Share of the view that the surface fills.
+const FILL: f64 = 0.86;
 /// Seconds between two moments of the recording.
 const RECORDING_STEP: f64 = 0.1;
 /// Points in a curve: more than the picture has columns shows nothing more.
@@ -81,7 +84,7 @@ impl Mission {
     fn save_views(&self, folder: &Path) -> Result<(), MissionError> {
         let camera = self.camera()?;
         let painted = self.painted_depth();
-        let shade = |hit: &Hit| self.albedo(&painted, hit);
+        let shade = |hit: &Hit| self.look(&painted, hit);
         let away = -(camera.world_from_camera.rotation * Vector3::z());
         let side = Vector3::z().cross(&away);
         let lights = Lights {
@@ -113,9 +116,11 @@ impl Mission {
         Ok(())
     }
 
-    /// Linear colour of a point of the world: painted on the disk, grey elsewhere.
-    fn albedo(&self, painted: &paint_net::Image, hit: &Hit) -> [f32; 3] {
-        let Some(face) = self.surface.disk().faces().get(hit.face as usize) else { return [0.4; 3] };
+    /// Look of a point of the world: painted and smooth on the disk, grey elsewhere.
+    fn look(&self, painted: &paint_net::Image, hit: &Hit) -> Look {
+        let Some(face) = self.surface.disk().faces().get(hit.face as usize) else {
+            return Look { albedo: [0.4; 3], normal: hit.normal };
+        };
         let uv = self.surface.chart.uv();
         let [a, b] = hit.barycentric;
         let mix = |k: usize| {
@@ -124,7 +129,9 @@ impl Mission {
         let texel = self.settings.texel;
         let x = mix(0) / texel - 0.5;
         let y = (painted.height() as f64 * texel - mix(1)) / texel - 0.5;
-        self.appearance.linear(bilinear(painted, x, y)).map(|c| c as f32)
+        let albedo = self.appearance.linear(bilinear(painted, x, y)).map(|c| c as f32);
+        let at = SurfacePoint { face: hit.face, barycentric: [1.0 - a - b, a, b] };
+        Look { albedo, normal: self.surface.chart.smooth_normal(at).into_inner() }
     }
 
     /// A camera that has the whole surface and the flight in view: from its mean side, or from where the robot flies.
@@ -138,9 +145,27 @@ impl Mission {
         let front: Vector3<f64> = flat.try_normalize(0.1).unwrap_or(-Vector3::x());
         let side: Vector3<f64> = Vector3::z().cross(&front);
         let direction = (front + side * 0.45 + Vector3::z() * 0.28).normalize();
-        let distance = 0.9 * (high - low).norm() + 0.8;
         let up = Vector3::z();
-        Ok(Camera::looking_at(&Point3::from(centre + direction * distance), &Point3::from(centre), &up, 0.9, VIEW)?)
+        // Step back until everything fits, then look at the middle of what is seen.
+        let (mut target, mut distance) = (centre, 0.8 * (high - low).norm());
+        for _ in 0..40 {
+            let eye = Point3::from(target + direction * distance);
+            let camera = Camera::looking_at(&eye, &Point3::from(target), &up, 0.8, VIEW)?;
+            let seen =
+                points().map(|p| camera.world_from_camera.inverse_transform_point(&Point3::from(p.map(f64::from))));
+            let (mut left, mut right, mut top, mut bottom) = (f64::MAX, f64::MIN, f64::MAX, f64::MIN);
+            for p in seen {
+                let (u, v) = (p.x / p.z.max(0.1), p.y / p.z.max(0.1));
+                (left, right) = (left.min(u), right.max(u));
+                (top, bottom) = (top.min(v), bottom.max(v));
+            }
+            let (half_width, half_height) = (camera.cx / camera.fx, camera.cy / camera.fy);
+            let fill = ((right - left) / (2.0 * half_width)).max((bottom - top) / (2.0 * half_height));
+            let shift = Vector3::new(0.5 * (left + right), 0.5 * (top + bottom), 0.0) * distance;
+            target += camera.world_from_camera.rotation * shift;
+            distance *= 1.0 + 0.7 * (fill / FILL - 1.0).clamp(-0.5, 0.5);
+        }
+        Ok(Camera::looking_at(&Point3::from(target + direction * distance), &Point3::from(target), &up, 0.8, VIEW)?)
     }
 
     fn save_angles(&self, path: &Path) -> Result<(), MissionError> {

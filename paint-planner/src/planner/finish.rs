@@ -24,16 +24,16 @@ pub(super) struct Draft {
     pub(super) route: Vec<Stop>,
 }
 
-/// Where the trajectory overlaps the surface: between two waypoints.
+/// Where the trajectory comes nearer to the surface than half the clearance its waypoints keep: between two waypoints.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Touch {
     /// Index of the waypoint before.
     pub(super) waypoint: usize,
-    /// How deep, m.
-    pub(super) depth: f64,
+    /// How much clearance is missing, m.
+    pub(super) missing: f64,
 }
 
-/// Times the route and gathers the plan, with the places where it overlaps the surface. `dense` binds the trajectory to
+/// Times the route and gathers the plan, with the places where it comes too near the surface. `dense` binds the trajectory to
 /// every waypoint.
 pub(super) fn finish(
     draft: &Draft,
@@ -74,7 +74,7 @@ pub(super) fn finish(
         .zip(targets)
         .map(|(state, target)| state.unwrap_or_else(|| ideal(target)))
         .collect();
-    let (clearance, touches) = least_clearance(&timed, &waypoints, checker);
+    let (clearance, touches) = least_clearance(&timed, &waypoints, checker, 0.5 * settings.clearance);
     let report = report(draft, targets, &nozzle, &timed, clearance);
     let plan = Plan {
         nozzle,
@@ -130,8 +130,8 @@ fn report(draft: &Draft, targets: &[Target], nozzle: &[NozzleState], timed: &Tim
 }
 
 /// Flies the trajectory with the planned joints and measures the distance to the surface: the least of all, and where it
-/// falls below zero.
-fn least_clearance(timed: &Timed, waypoints: &[Waypoint], checker: &mut Checker<'_>) -> (f64, Vec<Touch>) {
+/// falls below `wanted`.
+fn least_clearance(timed: &Timed, waypoints: &[Waypoint], checker: &mut Checker<'_>, wanted: f64) -> (f64, Vec<Touch>) {
     let mut memory = Memory::default();
     let mut least = FAR;
     let mut touches = Vec::new();
@@ -145,11 +145,11 @@ fn least_clearance(timed: &Timed, waypoints: &[Waypoint], checker: &mut Checker<
             let sample = timed.trajectory.sample(pair[0].time + (pair[1].time - pair[0].time) * share);
             let joints = between(from, to, share);
             let state = VehicleState { position: sample.position, heading: sample.heading, ..joints };
-            // Only what is nearer than the least so far matters, and every overlap.
-            here = here.min(checker.clearance(&state, least.max(0.0), &mut memory));
+            // Only what is nearer than the least so far matters, and every touch.
+            here = here.min(checker.clearance(&state, least.max(wanted), &mut memory));
         }
-        if here < 0.0 {
-            touches.push(Touch { waypoint, depth: -here });
+        if here < wanted {
+            touches.push(Touch { waypoint, missing: wanted - here });
         }
         least = least.min(here);
     }

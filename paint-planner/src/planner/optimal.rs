@@ -65,7 +65,11 @@ impl Planner for OptimalPlanner {
             }
             attempt += 1;
             if attempt == ATTEMPTS {
-                return Err(Error::Collision { clearance: plan.report.clearance });
+                return if plan.report.clearance > 0.0 {
+                    Ok(plan)
+                } else {
+                    Err(Error::Collision { clearance: plan.report.clearance })
+                };
             }
             for touch in touches {
                 keep_off(&plan, &touch, &mut clearance, &mut nozzles);
@@ -89,7 +93,7 @@ fn keep_off(plan: &Plan, touch: &Touch, clearance: &mut [f64], nozzles: &mut Noz
     let on_stroke = matches!((before, after), (Some(a), Some(b)) if b <= a + 1);
     for target in before.into_iter().chain(after) {
         for near in target.saturating_sub(REACH)..(target + REACH + 1).min(clearance.len()) {
-            clearance[near] += touch.depth + 0.02;
+            clearance[near] += touch.missing + 0.02;
             if !on_stroke || clearance[near] > GIVE_UP {
                 nozzles.states[near] = None;
             }

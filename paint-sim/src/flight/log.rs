@@ -53,14 +53,55 @@ pub struct FlightLog {
 }
 
 impl FlightLog {
-    /// The paint that left the nozzle: one shot per sample with an open valve.
-    pub fn shots(&self) -> Vec<Shot> {
-        let open = self.samples.iter().filter(|sample| sample.flow > 0.0);
-        open.map(|s| Shot { origin: s.nozzle, axis: s.axis, volume: s.flow * self.interval }).collect()
+    /// The paint that left the nozzle: one shot for every `step` metres that the aim or the nozzle has moved with the valve
+    /// open, from the mean pose of its samples weighted by their flow. A step well below the size of the spot changes nothing
+    /// that can be seen; zero gives one shot per sample.
+    pub fn shots(&self, step: f64) -> Vec<Shot> {
+        let mut shots = Vec::new();
+        let mut gathered = Gathered::default();
+        for sample in &self.samples {
+            let moved = gathered.first.is_some_and(|first| {
+                let turned = (sample.axis.into_inner() - first.axis.into_inner()).norm() * sample.wanted_distance;
+                (sample.nozzle - first.nozzle).norm() + turned >= step
+            });
+            if moved || sample.flow <= 0.0 {
+                shots.extend(gathered.shot());
+                gathered = Gathered::default();
+            }
+            if sample.flow > 0.0 {
+                gathered.add(sample, sample.flow * self.interval);
+            }
+        }
+        shots.extend(gathered.shot());
+        shots
     }
 
     /// How well the flight followed its reference.
     pub fn statistics(&self) -> FlightStatistics {
         FlightStatistics::of(&self.samples)
+    }
+}
+
+/// Samples on their way to become one shot.
+#[derive(Default)]
+struct Gathered<'a> {
+    first: Option<&'a FlightSample>,
+    volume: f64,
+    nozzle: Vector3<f64>,
+    axis: Vector3<f64>,
+}
+
+impl<'a> Gathered<'a> {
+    fn add(&mut self, sample: &'a FlightSample, volume: f64) {
+        self.first.get_or_insert(sample);
+        self.volume += volume;
+        self.nozzle += volume * sample.nozzle.coords;
+        self.axis += volume * sample.axis.into_inner();
+    }
+
+    fn shot(&self) -> Option<Shot> {
+        let first = self.first?;
+        let axis = UnitVector3::try_new(self.axis, 1e-300).unwrap_or(first.axis);
+        Some(Shot { origin: Point3::from(self.nozzle / self.volume), axis, volume: self.volume })
     }
 }
