@@ -3,6 +3,7 @@
 mod figures;
 mod gallery;
 
+use std::fmt::Write as _;
 use std::time::Instant;
 
 use nalgebra::{Point3, Vector3};
@@ -286,10 +287,8 @@ fn describe(surface: &PaintSurface) -> String {
         quality.symmetric_dirichlet
     );
     if f.components > 1 {
-        text += &format!(
-            "; the largest of {} parts, {:.2} m² in the others stay bare",
-            f.components, f.area_in_other_components_m2
-        );
+        let rest = f.area_in_other_components_m2;
+        let _ = write!(text, "; the largest of {} parts, {rest:.2} m² in the others stay bare", f.components);
     }
     text
 }

@@ -11,7 +11,7 @@ use plotters::style::{FontStyle, register_font};
 
 pub use curves::{Panel, save_curves};
 pub use error_map::save_error_map;
-pub use scene::{Polyline, Scene, save_scene};
+pub use scene::{Polyline, Projection, Scene, save_scene};
 
 /// What is wrong with drawing or saving a picture.
 #[derive(Debug, thiserror::Error)]
@@ -47,6 +47,7 @@ impl Rgb {
     }
 
     /// The same picture with every pixel as a block of `factor` by `factor`.
+    #[must_use]
     pub fn enlarged(&self, factor: u32) -> Self {
         let (width, height) = (self.width * factor, self.height * factor);
         let mut data = Vec::with_capacity((width * height * 3) as usize);

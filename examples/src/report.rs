@@ -214,7 +214,7 @@ impl Report {
             ("wanted.png", "Wanted"),
             ("painted.png", "Painted"),
             ("error.png", "Difference"),
-            ("path.png", "Flown path: vehicle orange, nozzle blue"),
+            ("path.png", "Flown path of the base coat: vehicle orange, nozzle blue"),
             ("angles.png", "Pan, tilt, distance and normal deviation over time"),
         ] {
             let _ = writeln!(text, "**{caption}**\n\n![{caption}]({file})\n");

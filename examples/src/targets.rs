@@ -66,9 +66,9 @@ fn bridge(surface: &PaintSurface, from: f64, to: f64, y: f64, along: f64, target
     }
 }
 
-/// The target `offset` pixels along the row from a spray; drawn back towards the spray where the surface ends before it.
+/// The target `offset` pixels along the row from a spray; drawn back to the spray where the surface ends before it.
 fn border(surface: &PaintSurface, spray: &Spray, offset: f64) -> Option<Target> {
-    [1.0, 0.75, 0.5, 0.25].iter().find_map(|share| {
+    [1.0, 0.75, 0.5, 0.25, 0.0].iter().find_map(|share| {
         let (point, normal) = surface.lift(spray.x + share * offset, spray.y)?;
         Some(Target { point, normal, dose: 0.0, time: None })
     })

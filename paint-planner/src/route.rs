@@ -103,27 +103,36 @@ fn fly(
         divide(route, from, to, settings.timing.knot_spacing);
         return Ok(false);
     }
-    let back =
-        |state: &VehicleState, way: f64| VehicleState { position: state.position - state.forward() * way, ..*state };
-    for retreat in RETREATS {
-        let corners = [*from, back(from, retreat), back(to, retreat), *to];
-        if clear(checker, &corners, settings.clearance) {
-            halt(route, &corners);
-            return Ok(true);
-        }
-    }
-    let top = from.position.z.max(to.position.z);
-    for retreat in RETREATS {
-        for climb in CLIMBS {
-            let over = |state: &VehicleState| {
-                let mut high = back(state, retreat);
-                high.position.z = top + climb;
-                high
-            };
-            let corners = [*from, back(from, retreat), over(from), over(to), back(to, retreat), *to];
+    // Backwards from the surface: against the spray; or against the heading, along which the body came in.
+    let retreats: [fn(&VehicleState) -> Vector3<f64>; 2] = [VehicleState::spray_azimuth, VehicleState::forward];
+    let back = |state: &VehicleState, forward: fn(&VehicleState) -> Vector3<f64>, way: f64| VehicleState {
+        position: state.position - forward(state) * way,
+        ..*state
+    };
+    for way in RETREATS {
+        for forward in retreats {
+            let corners = [*from, back(from, forward, way), back(to, forward, way), *to];
             if clear(checker, &corners, settings.clearance) {
                 halt(route, &corners);
                 return Ok(true);
+            }
+        }
+    }
+    let top = from.position.z.max(to.position.z);
+    for way in RETREATS {
+        for climb in CLIMBS {
+            for forward in retreats {
+                let over = |state: &VehicleState| {
+                    let mut high = back(state, forward, way);
+                    high.position.z = top + climb;
+                    high
+                };
+                let (out, home) = (back(from, forward, way), back(to, forward, way));
+                let corners = [*from, out, over(from), over(to), home, *to];
+                if clear(checker, &corners, settings.clearance) {
+                    halt(route, &corners);
+                    return Ok(true);
+                }
             }
         }
     }

@@ -45,6 +45,12 @@ impl VehicleState {
     pub(crate) fn forward(&self) -> Vector3<f64> {
         Vector3::new(self.heading.cos(), self.heading.sin(), 0.0)
     }
+
+    /// Unit vector along the spray, made horizontal.
+    pub(crate) fn spray_azimuth(&self) -> Vector3<f64> {
+        let azimuth = self.heading + self.pan;
+        Vector3::new(azimuth.cos(), azimuth.sin(), 0.0)
+    }
 }
 
 /// The vehicle with arm, pan-tilt unit and gun.

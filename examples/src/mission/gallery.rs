@@ -82,9 +82,34 @@ impl Mission {
     }
 
     fn save_views(&self, folder: &Path) -> Result<(), MissionError> {
-        let camera = self.camera()?;
         let painted = self.painted_depth();
-        let shade = |hit: &Hit| self.look(&painted, hit);
+        let corners: Vec<Point3<f64>> = self.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
+        let frame = self.view(&self.camera(&corners)?, &painted)?;
+        picture_of(&frame).save(&folder.join("painted_view.png"))?;
+
+        // The base coat alone: all layers on top of each other hide the surface and one another.
+        let Some(base) = self.flights.first() else { return Ok(()) };
+        let path = |of: &dyn Fn(&FlightSample) -> Point3<f64>| -> Vec<Point3<f64>> {
+            base.flight.samples.iter().step_by(10).map(of).collect()
+        };
+        let vehicle = path(&|s| s.world_from_body.translation.vector.into());
+        let camera = self.camera(&[corners, vehicle.clone()].concat())?;
+        let frame = self.view(&camera, &painted)?;
+        let project = |p: &Point3<f64>| {
+            let c = camera.world_from_camera.inverse_transform_point(p);
+            (c.z > 0.05).then(|| (camera.fx * c.x / c.z + camera.cx, camera.fy * c.y / c.z + camera.cy, c.z))
+        };
+        let lines = [
+            Polyline { points: path(&|s| s.nozzle), colour: [0, 90, 200], radius: 0.5 },
+            Polyline { points: vehicle, colour: [230, 110, 20], radius: 0.7 },
+        ];
+        let scene = Scene { picture: picture_of(&frame), depth: &frame.depth, project: &project };
+        save_scene(&folder.join("path.png"), scene, &lines)?;
+        Ok(())
+    }
+
+    /// The painted surface in the light of a sun behind the camera's shoulder.
+    fn view(&self, camera: &Camera, painted: &paint_net::Image) -> Result<Frame, MissionError> {
         let away = -(camera.world_from_camera.rotation * Vector3::z());
         let side = Vector3::z().cross(&away);
         let lights = Lights {
@@ -93,27 +118,8 @@ impl Mission {
             ambient: [0.28, 0.30, 0.34],
             ..Lights::default()
         };
-        let frame = render(&self.surface.world, &camera, &shade, &lights, 2, self.settings.threads)?;
-        picture_of(&frame).save(&folder.join("painted_view.png"))?;
-
-        let centre = camera.world_from_camera;
-        let project = |p: &Point3<f64>| {
-            let c = centre.inverse_transform_point(p);
-            (c.z > 0.05).then(|| (camera.fx * c.x / c.z + camera.cx, camera.fy * c.y / c.z + camera.cy, c.z))
-        };
-        let samples = || self.flights.iter().flat_map(|f| f.flight.samples.iter());
-        let line = |of: &dyn Fn(&FlightSample) -> Point3<f64>, colour: [u8; 3], radius: f64| Polyline {
-            points: samples().step_by(10).map(of).collect(),
-            colour,
-            radius,
-        };
-        let lines = [
-            line(&|s| s.nozzle, [0, 90, 200], 0.4),
-            line(&|s| s.world_from_body.translation.vector.into(), [230, 110, 20], 0.6),
-        ];
-        let scene = Scene { picture: picture_of(&frame), depth: &frame.depth, project: &project };
-        save_scene(&folder.join("path.png"), scene, &lines)?;
-        Ok(())
+        let shade = |hit: &Hit| self.look(painted, hit);
+        Ok(render(&self.surface.world, camera, &shade, &lights, 2, self.settings.threads)?)
     }
 
     /// Look of a point of the world: painted and smooth on the disk, grey elsewhere.
@@ -134,11 +140,11 @@ impl Mission {
         Look { albedo, normal: self.surface.chart.smooth_normal(at).into_inner() }
     }
 
-    /// A camera that has the whole surface and the flight in view: from its mean side, or from where the robot flies.
-    fn camera(&self) -> Result<Camera, MissionError> {
-        let points = || self.surface.disk().positions().iter().map(|p| Vector3::from(*p));
-        let (low, high) =
-            points().fold((Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)), |(l, h), p| (l.inf(&p), h.sup(&p)));
+    /// A camera on the surface's mean side that has all the points in view.
+    fn camera(&self, points: &[Point3<f64>]) -> Result<Camera, MissionError> {
+        let (low, high) = points.iter().fold((Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)), |(l, h), p| {
+            (l.inf(&p.coords), h.sup(&p.coords))
+        });
         let centre = (low + high) / 2.0;
         let facing = self.surface.facing();
         let flat = Vector3::new(facing.x, facing.y, 0.0);
@@ -151,8 +157,7 @@ impl Mission {
         for _ in 0..40 {
             let eye = Point3::from(target + direction * distance);
             let camera = Camera::looking_at(&eye, &Point3::from(target), &up, 0.8, VIEW)?;
-            let seen =
-                points().map(|p| camera.world_from_camera.inverse_transform_point(&Point3::from(p.map(f64::from))));
+            let seen = points.iter().map(|p| camera.world_from_camera.inverse_transform_point(p));
             let (mut left, mut right, mut top, mut bottom) = (f64::MAX, f64::MIN, f64::MAX, f64::MIN);
             for p in seen {
                 let (u, v) = (p.x / p.z.max(0.1), p.y / p.z.max(0.1));

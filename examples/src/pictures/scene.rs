@@ -10,9 +10,12 @@ pub struct Scene<'a> {
     pub picture: Rgb,
     /// Depth along the optical axis per pixel in metres, 0 where nothing was hit.
     pub depth: &'a [f32],
-    /// Pixel coordinates and depth of a world point; `None` behind the camera.
-    pub project: &'a dyn Fn(&Point3<f64>) -> Option<(f64, f64, f64)>,
+    /// Where a world point comes to lie.
+    pub project: &'a Projection<'a>,
 }
+
+/// Pixel coordinates and depth of a world point; `None` behind the camera.
+pub type Projection<'a> = dyn Fn(&Point3<f64>) -> Option<(f64, f64, f64)> + 'a;
 
 /// A path in the world.
 pub struct Polyline {
