@@ -1,7 +1,9 @@
 //! The text formats trajectories come in. Readers take the whole text, writers return it; files are the caller's.
 //!
 //! All readers skip a byte order mark, blank lines and lines that start with `#`, and accept CRLF line ends. Everything
-//! else that is not exactly what the format says is refused with the number of the line.
+//! else that is not exactly what the format says is refused with the number of the line, with one exception: a pose that
+//! repeats the stamp of the pose before is dropped, because public files hold such (the ground truth of TUM fr2/desk has
+//! one among 20,957). Stamps that go back are refused.
 
 pub mod euroc;
 pub mod kitti;
@@ -9,7 +11,8 @@ pub mod tum;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-use crate::{Error, Trajectory};
+use crate::stamp::scaled_integer;
+use crate::{Error, Stamp, Trajectory};
 
 /// Quaternions are printed with few digits in some files; more than this off unit length is another column.
 const QUATERNION_NORM_TOLERANCE: f64 = 0.01;
@@ -35,9 +38,13 @@ impl Line<'_> {
         Error::Line { format: self.format, line: self.number, what }
     }
 
-    /// Appends a pose and names this line if the trajectory refuses it.
-    fn push(&self, trajectory: &mut Trajectory, nanos: i64, pose: Isometry3<f64>) -> Result<(), Error> {
-        trajectory.push(crate::Stamp::from_nanos(nanos), pose).map_err(|error| self.error(error.to_string()))
+    /// Appends a pose, unless it repeats the stamp before: then it is dropped and the answer is `false`.
+    fn push(&self, trajectory: &mut Trajectory, stamp: Stamp, pose: Isometry3<f64>) -> Result<bool, Error> {
+        if trajectory.stamps().last() == Some(&stamp) {
+            return Ok(false);
+        }
+        trajectory.push(stamp, pose).map_err(|error| self.error(error.to_string()))?;
+        Ok(true)
     }
 
     fn number(&self, column: usize, field: &str) -> Result<f64, Error> {
@@ -47,8 +54,10 @@ impl Line<'_> {
         }
     }
 
-    fn stamp(&self, field: &str, power: i32) -> Result<i64, Error> {
-        crate::stamp::scaled_integer(field, power)
+    /// The first column, in units of `10^power` nanoseconds.
+    fn stamp(&self, field: &str, power: i32) -> Result<Stamp, Error> {
+        scaled_integer(field, power)
+            .map(Stamp::from_nanos)
             .ok_or_else(|| self.error(format!("column 1 is `{field}`, not a time that fits 64-bit nanoseconds")))
     }
 

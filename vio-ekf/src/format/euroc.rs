@@ -46,7 +46,9 @@ pub fn read(text: &str) -> Result<States, Error> {
             v[column] = line.number(column, field)?;
         }
         let pose = line.pose([v[1], v[2], v[3]], v[4], [v[5], v[6], v[7]])?;
-        line.push(&mut states.trajectory, line.stamp(fields[0], 0)?, pose)?;
+        if !line.push(&mut states.trajectory, line.stamp(fields[0], 0)?, pose)? {
+            continue;
+        }
         if columns >= 11 {
             states.velocities_in_world.push(Vector3::new(v[8], v[9], v[10]));
         }
