@@ -3,6 +3,9 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use crate::trajectory::check_poses;
 use crate::{Error, Stamp, Trajectory, so3};
 
+/// Six days at 50 ms: more is a mistaken unit, and would exhaust the memory.
+const MAX_SAMPLED_KNOTS: f64 = 1e7;
+
 /// A smooth motion with exact derivatives: a uniform cumulative cubic B-spline on `SO(3) × R³`.
 ///
 /// With `B_i(u)` the cumulative basis on a segment, `u ∈ [0, 1]`, and `d_i = Log(R_{i−1}ᵀ R_i)`,
@@ -48,9 +51,11 @@ impl Spline {
             return Err(Error::TooFew { what: "knots of a cubic spline", got: knots.len(), need: 4 });
         }
         check_poses("knot", &knots)?;
-        let last = i128::from(first_knot.nanos()) + knots.len() as i128 * i128::from(interval_ns);
-        if last > i128::from(i64::MAX) {
-            return Err(Error::InvalidStamp { text: (last as f64 / 1e9).to_string() });
+        // Neither the duration nor the last knot's time may overflow: `sample` then needs no checks.
+        let duration = knots.len() as i128 * i128::from(interval_ns);
+        let last = i128::from(first_knot.nanos()) + duration;
+        if last.max(duration) > i128::from(i64::MAX) {
+            return Err(Error::InvalidStamp { text: (last.max(duration) as f64 / 1e9).to_string() });
         }
         Ok(Self { first_knot, interval_ns, knots })
     }
@@ -63,6 +68,10 @@ impl Spline {
             return Err(Error::InvalidSetting { name: "interval_ns", value: interval_ns as f64, rule });
         }
         let (first, last) = trajectory.span().ok_or(Error::TooFew { what: "poses of a spline", got: 0, need: 1 })?;
+        if last.secs_since(first) * 1e9 / interval_ns as f64 > MAX_SAMPLED_KNOTS {
+            let rule = "must leave at most ten million knots";
+            return Err(Error::InvalidSetting { name: "interval_ns", value: interval_ns as f64, rule });
+        }
         let stamps = std::iter::successors(Some(first.nanos()), |nanos| nanos.checked_add(interval_ns))
             .take_while(|&nanos| nanos <= last.nanos());
         let knots = stamps.map(|nanos| trajectory.pose_at(Stamp::from_nanos(nanos))).collect::<Result<_, _>>()?;

@@ -54,6 +54,10 @@ pub fn mean_band(dof: usize, runs: usize, confidence: f64) -> Result<(f64, f64),
     if runs == 0 {
         return Err(Error::TooFew { what: "runs to average", got: 0, need: 1 });
     }
+    if !(confidence > 0.0 && confidence < 1.0) {
+        let rule = "must be between 0 and 1, both excluded";
+        return Err(Error::InvalidSetting { name: "confidence", value: confidence, rule });
+    }
     let (tail, total) = ((1.0 - confidence) / 2.0, dof.saturating_mul(runs));
     Ok((quantile(tail, total)? / runs as f64, quantile(1.0 - tail, total)? / runs as f64))
 }

@@ -19,9 +19,9 @@ pub struct Stats {
 }
 
 impl Stats {
-    /// Of finite values; `None` if there are none.
+    /// Of finite values; `None` if there are none, or one is not finite.
     pub fn of(values: &[f64]) -> Option<Self> {
-        if values.is_empty() {
+        if values.is_empty() || values.iter().any(|v| !v.is_finite()) {
             return None;
         }
         let mut sorted = values.to_vec();
