@@ -1,5 +1,7 @@
 //! Agreement with `evo` 1.38.1, the evaluation tool in common use. Its figures stand in `evo_*.txt` beside this file.
 
+#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
+
 mod support;
 
 use nalgebra::Isometry3;

@@ -174,7 +174,7 @@ fn damaged_text_is_an_error_or_a_trajectory_but_never_a_panic() {
     let (mut accepted, mut refused) = (0, 0);
     for _ in 0..20_000 {
         let mut text = valid[(rng.bits() % 3) as usize].to_owned();
-        for _ in 0..1 + rng.bits() % 3 {
+        for _ in 0..=rng.bits() % 3 {
             let mut at = (rng.bits() % (text.len() as u64 + 1)) as usize;
             while !text.is_char_boundary(at) {
                 at -= 1;
@@ -190,9 +190,9 @@ fn damaged_text_is_an_error_or_a_trajectory_but_never_a_panic() {
         let poses = results.iter().flatten().flat_map(Trajectory::poses).copied();
         let poses: Vec<Isometry3<f64>> = poses.chain(kitti::read(&text).into_iter().flatten()).collect();
         if poses.is_empty() {
-            refused += 1
+            refused += 1;
         } else {
-            accepted += 1
+            accepted += 1;
         }
         for pose in poses {
             assert!(pose.translation.vector.iter().all(|v| v.is_finite()), "{text}");

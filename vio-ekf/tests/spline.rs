@@ -1,5 +1,7 @@
 //! The B-spline against published digits and against differences of itself.
 
+#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
+
 mod support;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};

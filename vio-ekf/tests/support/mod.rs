@@ -1,6 +1,7 @@
 //! Recorded trajectories for tests. They may not be redistributed, so they are looked for and may be absent.
 
 #![allow(dead_code, reason = "every test file uses its own part of this")]
+#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
 
 use std::path::PathBuf;
 use std::process::Command;
