@@ -147,7 +147,7 @@ fn segments_are_those_of_a_full_search() {
         let poses: Vec<_> = (0..60)
             .map(|_| {
                 // Standstill now and then: many poses share one path length.
-                if rng.bits() % 3 > 0 {
+                if !rng.bits().is_multiple_of(3) {
                     position += rng.vector() * 0.3;
                 }
                 Isometry3::translation(position.x, position.y, position.z)
