@@ -1,1 +1,65 @@
 //! Trajectories, their file formats and their evaluation: the ground on which visual-inertial odometry is judged.
+//!
+//! The crate holds poses over time with exact nanosecond stamps, reads and writes them as TUM, EuRoC and KITTI text,
+//! and measures how well one trajectory agrees with another: pairing in time, alignment, absolute and relative errors,
+//! consistency of covariances. A B-spline gives smooth motion with exact rates and accelerations, which is what ideal
+//! inertial sensors read. The estimator itself is not part of the crate yet.
+//!
+//! ```text
+//! ATE² = mean |g_i − (s R e_i + t)|²          E_ij = (G_i⁻¹ G_j)⁻¹ (E_i⁻¹ E_j)          NEES = eᵀ P⁻¹ e
+//! ```
+//!
+//! ```
+//! use vio_ekf::{Alignment, EvaluationSettings, evaluate, tum};
+//!
+//! let reference = tum::read("0.0 0 0 0 0 0 0 1\n0.1 1 0 0 0 0 0 1\n0.2 1 1 0 0 0 0 1\n0.3 1 1 1 0 0 0 1\n")?;
+//! // The same path seen from a frame that is shifted and turned by a quarter about the vertical.
+//! let estimate = tum::read("0.0 5 0 0 0 0 0.7071 0.7071\n0.1 5 1 0 0 0 0.7071 0.7071\n\
+//!                           0.2 4 1 0 0 0 0.7071 0.7071\n0.3 4 1 1 0 0 0.7071 0.7071\n")?;
+//! let report = evaluate(&reference, &estimate, &EvaluationSettings::default())?;
+//! assert!(report.ate.position.rmse < 1e-12 && report.ate.orientation.max < 1e-7);
+//!
+//! let raw = EvaluationSettings { alignment: Alignment::None, ..Default::default() };
+//! assert!(evaluate(&reference, &estimate, &raw)?.ate.position.rmse > 3.0);
+//! # Ok::<(), vio_ekf::Error>(())
+//! ```
+//!
+//! | what | source | item |
+//! |---|---|---|
+//! | one-call evaluation | ours | [`evaluate`] |
+//! | least-squares alignment | Umeyama 1991, Eqs. (40)-(42); Horn 1987 | [`align`] |
+//! | alignment of position and yaw | closed form, ours; Zhang and Scaramuzza 2018 for the choice of mode | [`Alignment::PosYaw`] |
+//! | absolute trajectory error | Sturm et al. 2012, section VI | [`ate`] |
+//! | relative pose error | Sturm et al. 2012, section VI; Geiger et al. 2012 for path lengths | [`rpe`] |
+//! | normalised estimation error squared | Bar-Shalom, Li, Kirubarajan 2001, section 5.4 | [`nees`], [`chi2`] |
+//! | cumulative B-spline and its derivatives | Sommer et al. 2020 | [`Spline`] |
+//! | exponentials and Jacobians | Barfoot 2017, chapter 7 | [`so3`], [`se3`] |
+//!
+//! The thesis prints no equations for these; its odometry is judged by trajectory error (Paper I, section 4.2).
+//!
+//! Frames: poses are `world_from_body`, world `z` up where [`Alignment::PosYaw`] or gravity is meant. Metres, radians,
+//! nanoseconds. Quaternions are Hamilton's; TUM files put the scalar last, EuRoC files first.
+
+mod error;
+mod eval;
+mod format;
+mod lie;
+mod spline;
+mod stamp;
+mod trajectory;
+
+pub use error::Error;
+pub use eval::align::{Alignment, align, apply};
+pub use eval::associate::{Association, PosePairs, associate};
+pub use eval::ate::{Ate, ate};
+pub use eval::chi2;
+pub use eval::nees::{Nees, PoseCovariance, nees};
+pub use eval::rpe::{PairsFrom, Rpe, RpeSettings, Span, Tolerance, rpe};
+pub use eval::stats::Stats;
+pub use eval::{Evaluation, EvaluationSettings, Segment, evaluate};
+pub use format::{euroc, kitti, tum};
+pub use lie::{se3, so3};
+pub use nalgebra;
+pub use spline::{Motion, Spline};
+pub use stamp::Stamp;
+pub use trajectory::{Trajectory, interpolate, path_lengths};

@@ -1,0 +1,122 @@
+use crate::Stamp;
+
+/// What can go wrong; every variant names the input and the way out.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A line of a trajectory file cannot be read.
+    #[error("{format}, line {line}: {what}")]
+    Line {
+        /// `"TUM"`, `"EuRoC"` or `"KITTI"`.
+        format: &'static str,
+        /// Line of the text, counted from 1.
+        line: usize,
+        /// What is wrong and what is expected.
+        what: String,
+    },
+    /// A text is no decimal number of seconds that fits 64-bit nanoseconds.
+    #[error("`{text}` is not a time in seconds between -9.2e9 and 9.2e9: check the first column")]
+    InvalidStamp {
+        /// The text, or the number, as given.
+        text: String,
+    },
+    /// Stamps do not strictly increase.
+    #[error("stamp {index} ({stamp} s) is not after its predecessor ({previous} s): sort the poses, drop duplicates")]
+    NotIncreasing {
+        /// Index of the later pose.
+        index: usize,
+        /// The stamp before it.
+        previous: Stamp,
+        /// Its stamp.
+        stamp: Stamp,
+    },
+    /// An input holds NaN, infinity, or numbers so large that their squares overflow.
+    #[error("{what} {index} is not finite, or too large to be squared: check the source of this number")]
+    NonFinite {
+        /// Which input.
+        what: &'static str,
+        /// Index in that input.
+        index: usize,
+    },
+    /// Two inputs that belong together have different lengths.
+    #[error("{left} holds {left_len} items, {right} {right_len}: give one for each")]
+    LengthMismatch {
+        /// Name of the first input.
+        left: &'static str,
+        /// Its length.
+        left_len: usize,
+        /// Name of the second input.
+        right: &'static str,
+        /// Its length.
+        right_len: usize,
+    },
+    /// Fewer items than the operation needs.
+    #[error("{what}: {got} given, at least {need} needed")]
+    TooFew {
+        /// What there is too little of.
+        what: &'static str,
+        /// How many were given.
+        got: usize,
+        /// How many are needed.
+        need: usize,
+    },
+    /// A setting is outside its meaningful range.
+    #[error("setting `{name}` is {value}, but {rule}")]
+    InvalidSetting {
+        /// Name of the field or argument.
+        name: &'static str,
+        /// The value given.
+        value: f64,
+        /// What it must satisfy.
+        rule: &'static str,
+    },
+    /// No pose of one trajectory is near enough in time to one of the other.
+    #[error(
+        "no stamps within {max_difference_s} s: reference spans {reference_first}..{reference_last} s, estimate \
+         {estimate_first}..{estimate_last} s; check clocks and units, or allow a larger difference"
+    )]
+    NoMatches {
+        /// The largest difference allowed, in seconds.
+        max_difference_s: f64,
+        /// First stamp of the reference.
+        reference_first: Stamp,
+        /// Last stamp of the reference.
+        reference_last: Stamp,
+        /// First stamp of the estimate.
+        estimate_first: Stamp,
+        /// Last stamp of the estimate.
+        estimate_last: Stamp,
+    },
+    /// The positions do not determine the alignment.
+    #[error("{mode} alignment is not determined by these positions ({why}): use a mode with fewer degrees of freedom")]
+    Degenerate {
+        /// The alignment mode.
+        mode: &'static str,
+        /// What the positions lack.
+        why: &'static str,
+    },
+    /// No two poses are the requested span apart.
+    #[error("no pair of poses is {span} apart: choose a shorter span or a wider tolerance")]
+    NoPairs {
+        /// The span asked for, with its unit.
+        span: String,
+    },
+    /// A time outside the interval that is defined.
+    #[error("{stamp} s is outside {first}..{last} s: ask for a time inside")]
+    OutOfRange {
+        /// The time asked for.
+        stamp: Stamp,
+        /// Start of the defined interval.
+        first: Stamp,
+        /// End of the defined interval, included.
+        last: Stamp,
+    },
+    /// A covariance is not symmetric positive definite.
+    #[error("{what} covariance {index} is not symmetric positive definite: check the filter, or its export")]
+    NotPositiveDefinite {
+        /// `"position"` or `"attitude"`.
+        what: &'static str,
+        /// Index in the input.
+        index: usize,
+    },
+}
