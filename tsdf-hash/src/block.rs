@@ -63,7 +63,7 @@ mod tests {
     #[test]
     fn the_sums_cannot_overflow_before_their_counters() {
         assert!(i64::from(ONE) * i64::from(u16::MAX) <= i64::from(i32::MAX));
-        assert!(u32::from(MAX_COLOURS) * 63 <= u32::from(u16::MAX));
+        assert!(MAX_COLOURS.checked_mul(63).is_some());
         assert_eq!(size_of::<Block>(), 14 * VOXELS);
     }
 }

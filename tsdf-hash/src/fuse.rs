@@ -11,13 +11,19 @@ use crate::view::{ColourView, Intrinsics};
 /// Colours are taken this close to the surface, in voxels (ours).
 const COLOUR_REACH: f32 = 1.5;
 /// `1.5 2^23`: adding it rounds a float to an integer, to even at a tie, and leaves the integer in the low bits.
-const ROUNDER: f32 = 12_582_912.0;
+pub(crate) const ROUNDER: f32 = 12_582_912.0;
 
 /// Whether a frame is put in or taken out.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Sign {
     Plus,
     Minus,
+}
+
+impl Sign {
+    pub(crate) fn opposite(self) -> Self {
+        if self == Self::Plus { Self::Minus } else { Self::Plus }
+    }
 }
 
 /// What an update did.
@@ -38,6 +44,8 @@ pub(crate) struct Frame<'a> {
     offset: Vector3<f64>,
     voxel_size: f64,
     truncation: f32,
+    /// Steps of the stored distance per metre.
+    per_metre: f32,
     colour_reach: f32,
 }
 
@@ -59,6 +67,7 @@ impl<'a> Frame<'a> {
             offset: pixels_from_camera * camera_from_world.translation.vector,
             voxel_size: settings.voxel_size,
             truncation: settings.truncation() as f32,
+            per_metre: (f64::from(ONE) / settings.truncation()) as f32,
             colour_reach: COLOUR_REACH * settings.voxel_size as f32,
         }
     }
@@ -84,13 +93,22 @@ impl<'a> Frame<'a> {
                 let row = start + sy * y as f32 + sz * z as f32;
                 let pixels = self.project(&row, &sx);
                 for x in 0..SIDE {
-                    let omega = self.surface.inverse_depth[pixels.index[x]];
+                    let pixel = pixels.index[x] as usize;
+                    let omega = self.surface.inverse_depth[pixel];
                     // |D - z| <= μ with D = 1/ω; an ω of 0 fails.
                     let depth = pixels.depth[x];
                     if (1.0 - depth * omega).abs() <= self.truncation * omega {
                         let voxel = x + SIDE * (y + SIDE * z);
-                        let offset = [pixels.du[x], pixels.dv[x]];
-                        tally.fault |= self.observe::<PLUS>(block, voxel, pixels.index[x], omega, depth, offset);
+                        let plane = &self.surface.planes[pixel];
+                        // The plane's inverse depth at the voxel's own pixel coordinates: free of the rounding.
+                        let at_voxel = omega + plane.slope[0] * pixels.du[x] + plane.slope[1] * pixels.dv[x];
+                        let distance = plane.offset * (1.0 - depth * at_voxel);
+                        tally.fault |= self.observe::<PLUS>(block, voxel, distance, plane.weight);
+                        if distance.abs() < self.colour_reach
+                            && let Some(rgb) = self.colour.as_ref().and_then(|c| c.at(pixels.u[x], pixels.v[x]))
+                        {
+                            tally.fault |= observe_colour::<PLUS>(&mut block.colour[voxel], rgb);
+                        }
                         tally.voxels += 1;
                     }
                 }
@@ -103,49 +121,35 @@ impl<'a> Frame<'a> {
     #[inline(always)]
     #[expect(clippy::needless_bitwise_bool, reason = "without branches the row is projected in vector registers")]
     fn project(&self, row: &Vector3<f32>, step: &Vector3<f32>) -> Pixels {
-        let outside = self.surface.planes.len();
+        let outside = self.surface.planes.len() as u32;
         let (right, bottom) = ((self.surface.width - 1) as f32, (self.surface.height - 1) as f32);
         let width = self.surface.width as i32;
-        let mut out = Pixels { index: [0; SIDE], depth: [0.0; SIDE], du: [0.0; SIDE], dv: [0.0; SIDE] };
+        let mut out = Pixels { index: [0; SIDE], depth: LANES, u: LANES, v: LANES, du: LANES, dv: LANES };
         for x in 0..SIDE {
-            let z = row.z + step.z * x as f32;
+            let along = x as f32;
+            let z = row.z + step.z * along;
             let inverse = 1.0 / z;
-            let u = (row.x + step.x * x as f32) * inverse;
-            let v = (row.y + step.y * x as f32) * inverse;
-            let (ru, rv) = (u + ROUNDER, v + ROUNDER);
-            let (cu, cv) = (ru - ROUNDER, rv - ROUNDER);
-            let inside = (z > 0.0) & (cu >= 0.0) & (cu <= right) & (cv >= 0.0) & (cv <= bottom);
-            let [iu, iv] = [ru, rv].map(|r| r.to_bits().wrapping_sub(ROUNDER.to_bits()).cast_signed());
-            let index = iv.wrapping_mul(width).wrapping_add(iu);
-            out.index[x] = if inside { index as usize } else { outside };
+            let u = (row.x + step.x * along) * inverse;
+            let v = (row.y + step.y * along) * inverse;
             out.depth[x] = z;
-            out.du[x] = u - cu;
-            out.dv[x] = v - cv;
+            out.u[x] = (u + ROUNDER) - ROUNDER;
+            out.v[x] = (v + ROUNDER) - ROUNDER;
+            out.du[x] = u - out.u[x];
+            out.dv[x] = v - out.v[x];
+            let inside = (z > 0.0) & (out.u[x] >= 0.0) & (out.u[x] <= right) & (out.v[x] >= 0.0) & (out.v[x] <= bottom);
+            let index = rounded(v).wrapping_mul(width).wrapping_add(rounded(u)).cast_unsigned();
+            out.index[x] = if inside { index } else { outside };
         }
         out
     }
 
-    /// One observation of one voxel; returns whether a counter ran over or under.
+    /// Adds a distance, metres, to a voxel or takes it out; returns whether a counter ran over or under.
     #[inline(always)]
-    fn observe<const PLUS: bool>(
-        &self,
-        block: &mut Block,
-        voxel: usize,
-        pixel: usize,
-        omega: f32,
-        depth: f32,
-        offset: [f32; 2],
-    ) -> bool {
-        let plane = &self.surface.planes[pixel];
-        // Distance from the plane n · x = 1, along its normal: the inverse depth of the plane at the voxel's own pixel
-        // coordinates makes it free of the half pixel that rounding leaves.
-        let at_voxel = omega + plane.slope[0] * offset[0] + plane.slope[1] * offset[1];
-        let distance = plane.offset * (1.0 - depth * at_voxel);
-        let q = (distance / self.truncation * ONE as f32).clamp(-ONE as f32, ONE as f32);
-        let q = (q + ROUNDER).to_bits().wrapping_sub(ROUNDER.to_bits()).cast_signed();
-        let weight = plane.weight as u16;
+    fn observe<const PLUS: bool>(&self, block: &mut Block, voxel: usize, distance: f32, weight: f32) -> bool {
+        let q = (distance * self.per_metre).clamp(-ONE as f32, ONE as f32);
+        let (q, weight) = (rounded(q), weight as u16);
         let (sum, total) = (&mut block.distance[voxel], &mut block.weight[voxel]);
-        let mut fault = if PLUS {
+        if PLUS {
             *sum = sum.wrapping_add(q * i32::from(weight));
             let (next, over) = total.overflowing_add(weight);
             *total = next;
@@ -156,14 +160,14 @@ impl<'a> Frame<'a> {
             *total = next;
             // No sum of observations can leave this range: what was taken out was not in.
             under || i64::from(*sum).abs() > i64::from(next) * i64::from(ONE)
-        };
-        if distance.abs() < self.colour_reach
-            && let Some(rgb) = self.colour.as_ref().and_then(|source| source.at(pixel, self.surface.width))
-        {
-            fault |= observe_colour::<PLUS>(&mut block.colour[voxel], rgb);
         }
-        fault
     }
+}
+
+/// The nearest integer, to even at a tie, of a float below `2^22` in magnitude.
+#[inline(always)]
+fn rounded(x: f32) -> i32 {
+    (x + ROUNDER).to_bits().wrapping_sub(ROUNDER.to_bits()).cast_signed()
 }
 
 #[inline(always)]
@@ -177,10 +181,15 @@ fn observe_colour<const PLUS: bool>(sums: &mut [u16; 4], rgb: [u16; 3]) -> bool 
     fault || sums[3] > MAX_COLOURS
 }
 
+const LANES: [f32; SIDE] = [0.0; SIDE];
+
 /// A row of projected voxels.
 struct Pixels {
-    index: [usize; SIDE],
+    index: [u32; SIDE],
     depth: [f32; SIDE],
+    /// The pixel.
+    u: [f32; SIDE],
+    v: [f32; SIDE],
     /// From the pixel's centre to the voxel's projection.
     du: [f32; SIDE],
     dv: [f32; SIDE],
@@ -203,8 +212,8 @@ impl<'a> ColourSource<'a> {
     }
 
     /// Six-bit colour of a depth pixel; `None` outside the colour image.
-    fn at(&self, pixel: usize, depth_width: usize) -> Option<[u16; 3]> {
-        let (u, v) = ((pixel % depth_width) as f32, (pixel / depth_width) as f32);
+    #[inline(always)]
+    fn at(&self, u: f32, v: f32) -> Option<[u16; 3]> {
         let [cu, cv] = [u * self.scale[0] + self.shift[0] + 0.5, v * self.scale[1] + self.shift[1] + 0.5];
         let inside = cu >= 0.0 && cv >= 0.0 && cu < self.view.width as f32 && cv < self.view.height as f32;
         let start = 3 * (cv as usize * self.view.width + cu as usize);

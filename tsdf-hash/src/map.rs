@@ -103,43 +103,28 @@ impl Map {
                 None => absent.push(key),
             }
         }
-        let threads = self.settings.threads;
-        // Blocks that do not exist come first: whether they fit is known before anything has changed.
-        let added = match sign {
-            Sign::Plus => new_blocks(&frame, &mut absent, self.store.room(), threads).ok_or(()),
-            Sign::Minus => Ok(Vec::new()),
+        let outcome = change(&frame, sign, &mut absent, &mut present, self.store.room(), self.settings.threads);
+        let touched = present.iter().filter(|(_, _, tally)| tally.voxels > 0);
+        let emptied: Vec<Key> = touched.clone().filter(|(_, block, _)| block.is_empty()).map(|work| work.0).collect();
+        let mut report = FrameReport {
+            valid_pixels: self.surface.valid,
+            fused_pixels: self.surface.fused,
+            voxels: touched.clone().map(|(_, _, tally)| tally.voxels).sum(),
+            blocks: touched.count(),
+            blocks_added: 0,
+            blocks_removed: emptied.len(),
         };
-        let stranger = if sign == Sign::Minus { first_touched(&frame, &mut absent, threads) } else { None };
-        let mut fault = stranger;
-        if added.is_ok() && fault.is_none() {
-            update(&frame, sign, &mut present, threads);
-            fault = present.iter().find(|(_, _, tally)| tally.fault).map(|&(key, _, _)| key);
-            if fault.is_some() {
-                // Wrapping sums form a group: the opposite update restores every bit.
-                update(&frame, if sign == Sign::Plus { Sign::Minus } else { Sign::Plus }, &mut present, threads);
-            }
-        }
-        let (valid_pixels, fused_pixels) = (self.surface.valid, self.surface.fused);
-        let mut report =
-            FrameReport { valid_pixels, fused_pixels, voxels: 0, blocks: 0, blocks_added: 0, blocks_removed: 0 };
-        let mut emptied = Vec::new();
-        for (key, block, tally) in present {
-            report.voxels += tally.voxels;
-            report.blocks += usize::from(tally.voxels > 0);
-            if sign == Sign::Minus && fault.is_none() && tally.voxels > 0 && block.is_empty() {
-                emptied.push(key);
-            }
+        for (key, block, _) in present {
             self.store.put(key, block);
         }
-        let Ok(added) = added else { return Err(self.store.out_of_budget()) };
-        if let Some(key) = fault {
-            let block = key.block();
-            return Err(if sign == Sign::Plus { Error::Saturated { block } } else { Error::NotIntegrated { block } });
-        }
+        let added = outcome.map_err(|refusal| match (refusal, sign) {
+            (Refusal::NoRoom, _) => self.store.out_of_budget(),
+            (Refusal::Fault(key), Sign::Plus) => Error::Saturated { block: key.block() },
+            (Refusal::Fault(key), Sign::Minus) => Error::NotIntegrated { block: key.block() },
+        })?;
         report.voxels += added.iter().map(|(_, _, tally)| tally.voxels).sum::<usize>();
         report.blocks += added.len();
         report.blocks_added = added.len();
-        report.blocks_removed = emptied.len();
         self.store.add(added.into_iter().map(|(key, block, _)| (key, block)).collect());
         for key in emptied {
             self.store.remove(key);
@@ -199,6 +184,40 @@ impl Map {
 }
 
 type Work = (Key, Box<Block>, Tally);
+
+/// Why a frame cannot be applied.
+enum Refusal {
+    NoRoom,
+    Fault(Key),
+}
+
+/// Applies a frame to the blocks that exist and returns those it adds; after a refusal the blocks are as they were.
+fn change(
+    frame: &Frame,
+    sign: Sign,
+    absent: &mut [Key],
+    present: &mut [Work],
+    room: usize,
+    threads: usize,
+) -> Result<Vec<Work>, Refusal> {
+    // Blocks that do not exist come first: whether they fit is known before anything has changed.
+    let added = match sign {
+        Sign::Plus => new_blocks(frame, absent, room, threads).ok_or(Refusal::NoRoom)?,
+        Sign::Minus => match first_touched(frame, absent, threads) {
+            Some(key) => return Err(Refusal::Fault(key)),
+            None => Vec::new(),
+        },
+    };
+    update(frame, sign, present, threads);
+    match present.iter().find(|(_, _, tally)| tally.fault).map(|&(key, _, _)| key) {
+        None => Ok(added),
+        Some(key) => {
+            // Wrapping sums form a group: the opposite update restores every bit.
+            update(frame, sign.opposite(), present, threads);
+            Err(Refusal::Fault(key))
+        }
+    }
+}
 
 fn update(frame: &Frame, sign: Sign, work: &mut [Work], threads: usize) {
     in_chunks(work, threads, |chunk| {

@@ -3,17 +3,18 @@
 //! For a plane, inverse depth is a linear function of the pixel: `ω(u, v) = ω₀ + a (u - u₀) + b (v - v₀)`, whatever its
 //! slope. So slopes come from linear filters, and a depth edge is where second differences of `ω` exceed the noise.
 
+mod window;
+
 use nalgebra::Isometry3;
+use window::{HALO, Padded, WindowFit};
 
 use crate::block::MAX_WEIGHT;
+use crate::fuse::ROUNDER;
+use crate::key::Key;
 use crate::parallel::in_chunks;
-use crate::view::{DepthData, DepthView, Intrinsics};
+use crate::view::{DepthView, Intrinsics};
 use crate::{Error, Settings, candidates};
 
-/// Half the window of the slope filter: 7 x 7 pixels (ours; the normal's error at 2 m is then about 6 degrees).
-const RADIUS: usize = 3;
-/// Pixels of context on each side of a band: the window, and one for the edge test.
-const HALO: usize = RADIUS + 1;
 /// Steeper views of a surface are left to other frames (ours: 84 degrees between ray and normal).
 const LEAST_COSINE: f32 = 0.1;
 
@@ -40,8 +41,8 @@ pub(crate) struct Surface {
     pub(crate) valid: usize,
     /// Those of them that are fused.
     pub(crate) fused: usize,
-    /// Words of the blocks that may hold a voxel within `μ` of a fused pixel, ascending.
-    pub(crate) keys: Vec<crate::key::Key>,
+    /// The blocks that may hold a voxel within `μ` of a fused pixel, ascending.
+    pub(crate) keys: Vec<Key>,
 }
 
 /// Rows `first..` of the output, as many as the slices hold.
@@ -104,182 +105,119 @@ impl Band<'_> {
         let smooth = raw.without_edges(&noise);
         let fit = WindowFit::new(&smooth, rows);
         let (mut valid, mut fused) = (0, 0);
-        for row in 0..rows {
-            for u in 0..width {
-                let at = row * width + u;
-                let centre = raw.at(row, u);
-                valid += usize::from(!centre.is_nan());
-                self.inverse_depth[at] = 0.0;
-                if smooth.at(row, u).is_nan() {
-                    continue;
-                }
-                let slope = fit.slope(at, centre, &noise).unwrap_or_else(|| raw.central_slope(row, u));
-                if let Some(plane) = plane(&depth.intrinsics, u, self.first + row, centre, slope, &noise) {
-                    self.inverse_depth[at] = centre;
-                    self.planes[at] = plane;
-                    fused += 1;
-                }
-            }
+        for (row, (inverse_depth, planes)) in
+            self.inverse_depth.chunks_exact_mut(width).zip(self.planes.chunks_exact_mut(width)).enumerate()
+        {
+            let lines = Lines {
+                around: [0, 1, 2].map(|k| raw.line(row + HALO - 1 + k, HALO - 1, width + 2)),
+                smooth: smooth.line(row + HALO, HALO, width),
+                fit: [0, 1, 2].map(|k| &fit.sums[k][row * width..(row + 1) * width]),
+            };
+            let lens = Lens::new(&depth.intrinsics, self.first + row);
+            let counts = lines.planes(&lens, &noise, inverse_depth, planes);
+            valid += counts[0] as usize;
+            fused += counts[1] as usize;
         }
         (valid, fused)
     }
 }
 
-/// The plane through the pixel's own depth with the slopes of its neighbourhood; `None` where it is seen too steeply.
-fn plane(k: &Intrinsics, u: usize, v: usize, omega: f32, slope: [f32; 2], noise: &Noise) -> Option<Plane> {
-    let (du, dv) = ((u as f64 - k.cx) as f32, (v as f64 - k.cy) as f32);
-    // With x = z (du / fx, dv / fy, 1), the plane is n · x = 1.
-    let n = [k.fx as f32 * slope[0], k.fy as f32 * slope[1], omega - slope[0] * du - slope[1] * dv];
-    let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
-    let ray = [du / k.fx as f32, dv / k.fy as f32];
-    let cosine = omega / (length * (ray[0] * ray[0] + ray[1] * ray[1] + 1.0).sqrt());
-    if cosine.is_nan() || cosine < LEAST_COSINE {
-        return None;
+/// What one row of planes is made from.
+struct Lines<'a> {
+    /// The row above, the row itself and the row below, with one pixel more on each side.
+    around: [&'a [f32]; 3],
+    /// The row with NaN at edges.
+    smooth: &'a [f32],
+    fit: [&'a [f32]; 3],
+}
+
+impl Lines<'_> {
+    /// Returns the numbers of valid and of fused pixels.
+    fn planes(&self, lens: &Lens, noise: &Noise, inverse_depth: &mut [f32], planes: &mut [Plane]) -> [u32; 2] {
+        // Slices of known length spare the loop its bounds checks.
+        let width = inverse_depth.len();
+        let [above, here, below] = self.around.map(|line| &line[..width + 2]);
+        let (smooth, planes) = (&self.smooth[..width], &mut planes[..width]);
+        let [fit_u, fit_v, fit_mean] = self.fit.map(|line| &line[..width]);
+        let (lens, noise) = (*lens, *noise);
+        let mut counts = [0, 0];
+        for u in 0..width {
+            let omega = here[u + 1];
+            let sigma = noise.sigma_inverse(omega);
+            // A gap or an edge in the window makes the mean NaN; far from the pixel's value, the window is not plane.
+            let plane = (fit_mean[u] * WindowFit::PER_PIXEL - omega).abs() <= 3.0 * sigma;
+            let wide = [fit_u[u] * WindowFit::PER_SPREAD, fit_v[u] * WindowFit::PER_SPREAD];
+            let narrow = [0.5 * (here[u + 2] - here[u]), 0.5 * (below[u + 1] - above[u + 1])];
+            let slope = [if plane { wide[0] } else { narrow[0] }, if plane { wide[1] } else { narrow[1] }];
+            let (offset, cosine) = lens.plane(u as i32 as f32, omega, slope);
+            let ratio = noise.base * omega * omega / sigma;
+            let weight = (MAX_WEIGHT * ratio * ratio * cosine).clamp(1.0, MAX_WEIGHT);
+            // A NaN fails both comparisons.
+            let facing = if cosine >= LEAST_COSINE { smooth[u] } else { 0.0 };
+            let fused = if facing > 0.0 { facing } else { 0.0 };
+            inverse_depth[u] = fused;
+            planes[u] = Plane { slope, offset, weight: (weight + ROUNDER) - ROUNDER };
+            counts[0] += u32::from(omega > 0.0);
+            counts[1] += u32::from(fused > 0.0);
+        }
+        counts
     }
-    let ratio = noise.least / noise.sigma(1.0 / omega);
-    let weight = (MAX_WEIGHT * ratio * ratio * cosine).round().clamp(1.0, MAX_WEIGHT);
-    Some(Plane { slope, offset: 1.0 / length, weight })
+}
+
+/// The camera, seen from one row of its image.
+#[derive(Clone, Copy)]
+struct Lens {
+    focal: [f32; 2],
+    inverse_focal: f32,
+    cx: f32,
+    /// Row of the pixel from the principal point, in pixels, and squared in focal lengths.
+    dv: f32,
+    ray: f32,
+}
+
+impl Lens {
+    fn new(k: &Intrinsics, v: usize) -> Self {
+        let dv = v as f64 - k.cy;
+        Self {
+            focal: [k.fx as f32, k.fy as f32],
+            inverse_focal: (1.0 / k.fx) as f32,
+            cx: k.cx as f32,
+            dv: dv as f32,
+            ray: ((dv / k.fy) * (dv / k.fy) + 1.0) as f32,
+        }
+    }
+
+    /// The plane through the pixel's own depth with the slopes of its neighbourhood: its distance from the camera and
+    /// the cosine between its normal and the ray.
+    #[inline(always)]
+    fn plane(&self, u: f32, omega: f32, slope: [f32; 2]) -> (f32, f32) {
+        let du = u - self.cx;
+        // With x = z (du / fx, dv / fy, 1), the plane is n · x = 1.
+        let n = [self.focal[0] * slope[0], self.focal[1] * slope[1], omega - slope[0] * du - slope[1] * self.dv];
+        let squared = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+        let ray = du * self.inverse_focal;
+        (1.0 / squared.sqrt(), omega / (squared * (ray * ray + self.ray)).sqrt())
+    }
 }
 
 /// The noise model in the working precision.
+#[derive(Clone, Copy)]
 struct Noise {
     base: f32,
     quadratic: f32,
     nearest: f32,
-    least: f32,
 }
 
 impl Noise {
     fn new(settings: &Settings) -> Self {
         let n = &settings.noise;
-        let base = n.base as f32;
-        Self { base, quadratic: n.quadratic as f32, nearest: n.nearest as f32, least: base }
+        Self { base: n.base as f32, quadratic: n.quadratic as f32, nearest: n.nearest as f32 }
     }
 
-    fn sigma(&self, z: f32) -> f32 {
-        self.base + self.quadratic * (z - self.nearest) * (z - self.nearest)
-    }
-
-    /// Standard deviation of the inverse depth, 1/m.
+    /// Standard deviation of the inverse depth, `σ(1/ω) ω²`, 1/m.
+    #[inline(always)]
     fn sigma_inverse(&self, omega: f32) -> f32 {
-        self.sigma(1.0 / omega) * omega * omega
-    }
-}
-
-/// Inverse depth of a band and `HALO` pixels around it, NaN where there is none: arithmetic then spreads the gaps.
-struct Padded {
-    stride: usize,
-    values: Vec<f32>,
-}
-
-impl Padded {
-    fn read(depth: &DepthView, settings: &Settings, first: usize, rows: usize) -> Self {
-        let stride = depth.width + 2 * HALO;
-        let mut values = vec![f32::NAN; stride * (rows + 2 * HALO)];
-        let (near, far) = (settings.min_depth as f32, settings.max_depth as f32);
-        let invert = |z: f32| if z >= near && z <= far { 1.0 / z } else { f32::NAN };
-        for (k, out) in values.chunks_exact_mut(stride).enumerate() {
-            let Some(v) = (first + k).checked_sub(HALO).filter(|&v| v < depth.height) else { continue };
-            let (row, out) = (v * depth.width..(v + 1) * depth.width, &mut out[HALO..HALO + depth.width]);
-            match depth.data {
-                DepthData::U16 { data, scale } => {
-                    let metres = (1.0 / scale) as f32;
-                    for (out, &d) in out.iter_mut().zip(&data[row]) {
-                        *out = if d == u16::MAX { f32::NAN } else { invert(f32::from(d) * metres) };
-                    }
-                }
-                DepthData::F32 { data } => {
-                    for (out, &z) in out.iter_mut().zip(&data[row]) {
-                        *out = invert(z);
-                    }
-                }
-            }
-        }
-        Self { stride, values }
-    }
-
-    fn at(&self, row: usize, u: usize) -> f32 {
-        self.values[(row + HALO) * self.stride + u + HALO]
-    }
-
-    /// A copy with NaN where the 3x3 patch has a gap or jumps by more than three standard deviations of its noise.
-    fn without_edges(&self, noise: &Noise) -> Self {
-        let s = self.stride;
-        let mut values = vec![f32::NAN; self.values.len()];
-        let inner = s + 1..self.values.len() - s - 1;
-        // The second difference of three independent values has √6 times the noise of one.
-        let limit = 3.0 * 6.0_f32.sqrt();
-        for at in inner {
-            let w = &self.values[at - s - 1..at + s + 2];
-            let twice = 2.0 * w[s + 1];
-            let allowed = limit * noise.sigma_inverse(w[s + 1]);
-            let small = |step: usize| (w[s + 1 - step] + w[s + 1 + step] - twice).abs() <= allowed;
-            if small(1) & small(s) & small(s + 1) & small(s - 1) {
-                values[at] = w[s + 1];
-            }
-        }
-        Self { stride: s, values }
-    }
-
-    /// Slopes by central differences.
-    fn central_slope(&self, row: usize, u: usize) -> [f32; 2] {
-        let at = (row + HALO) * self.stride + u + HALO;
-        let w = &self.values;
-        [0.5 * (w[at + 1] - w[at - 1]), 0.5 * (w[at + self.stride] - w[at - self.stride])]
-    }
-}
-
-/// Least-squares slopes and mean of the inverse depth over the window around each pixel.
-struct WindowFit {
-    /// `Σ i ω`, `Σ j ω` and `Σ ω` over the window, row-major.
-    sums: [Vec<f32>; 3],
-}
-
-impl WindowFit {
-    const SIDE: usize = 2 * RADIUS + 1;
-    /// `Σ i²` over the window.
-    const SPREAD: f32 = (Self::SIDE * RADIUS * (RADIUS + 1) * Self::SIDE) as f32 / 3.0;
-
-    fn new(smooth: &Padded, rows: usize) -> Self {
-        let width = smooth.stride - 2 * HALO;
-        let tap = |k: usize| k as f32 - RADIUS as f32;
-        let mut along = [vec![0.0; width], vec![0.0; width]];
-        let mut sums = [(); 3].map(|()| vec![0.0; width * rows]);
-        for line in 0..rows + 2 * RADIUS {
-            let source = &smooth.values[(line + HALO - RADIUS) * smooth.stride..][..smooth.stride];
-            let [total, moment] = &mut along;
-            total.fill(0.0);
-            moment.fill(0.0);
-            for k in 0..Self::SIDE {
-                let shifted = &source[HALO - RADIUS + k..];
-                for ((t, m), &w) in total.iter_mut().zip(moment.iter_mut()).zip(shifted) {
-                    *t += w;
-                    *m += tap(k) * w;
-                }
-            }
-            for k in 0..Self::SIDE {
-                let Some(row) = (line + k).checked_sub(2 * RADIUS).filter(|&row| row < rows) else { continue };
-                // This line is the one `RADIUS - k` below the centre.
-                let j = -tap(k);
-                let [si, sj, s] = &mut sums;
-                let out = row * width..(row + 1) * width;
-                for ((((si, sj), s), &t), &m) in
-                    si[out.clone()].iter_mut().zip(&mut sj[out.clone()]).zip(&mut s[out]).zip(&*total).zip(&*moment)
-                {
-                    *si += m;
-                    *sj += j * t;
-                    *s += t;
-                }
-            }
-        }
-        Self { sums }
-    }
-
-    /// `None` where the window has a gap or an edge, or is visibly not plane.
-    fn slope(&self, at: usize, centre: f32, noise: &Noise) -> Option<[f32; 2]> {
-        let [si, sj, s] = [0, 1, 2].map(|k: usize| self.sums[k][at]);
-        let mean = s / (Self::SIDE * Self::SIDE) as f32;
-        let plane = (mean - centre).abs() <= 3.0 * noise.sigma_inverse(centre);
-        plane.then(|| [si / Self::SPREAD, sj / Self::SPREAD])
+        let beyond = 1.0 - self.nearest * omega;
+        self.base * omega * omega + self.quadratic * beyond * beyond
     }
 }

@@ -146,4 +146,35 @@ mod tests {
             assert!((b - a).cross(&(c - a)).dot(&(a - solid)) > 0.0);
         }
     }
+
+    /// The rule itself, on random corners: the surface around any set of solid voxels is closed and oriented.
+    #[test]
+    fn random_solids_have_closed_surfaces() {
+        const SIDE: usize = 9;
+        let cases = Cases::new();
+        for seed in 0..20_u64 {
+            // Solid with a probability of a half inside, free at the border.
+            let solid = |p: [usize; 3]| {
+                let inside = p.iter().all(|&c| c > 0 && c < SIDE);
+                let word = (p[0] + 16 * (p[1] + 16 * p[2])) as u64;
+                inside && crate::key::mix(seed * 65536 + word + 1) & 1 == 1
+            };
+            let mut half_edges = std::collections::BTreeMap::new();
+            for cell in 0..SIDE * SIDE * SIDE {
+                let cell = [cell % SIDE, cell / SIDE % SIDE, cell / (SIDE * SIDE)];
+                let corner = |c: usize| [0, 1, 2].map(|k| cell[k] + (c >> k & 1));
+                let case = (0..8).fold(0, |case, c| case | u8::from(solid(corner(c))) << c);
+                for triangle in cases.triangles(case) {
+                    let name = triangle.map(|edge| (corner(edge.corner), edge.axis));
+                    for k in 0..3 {
+                        *half_edges.entry((name[k], name[(k + 1) % 3])).or_insert(0) += 1;
+                    }
+                }
+            }
+            assert!(half_edges.len() > 1000);
+            for (&(a, b), &count) in &half_edges {
+                assert_eq!((count, half_edges.get(&(b, a))), (1, Some(&1)));
+            }
+        }
+    }
 }
