@@ -133,3 +133,41 @@ impl Search<'_> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, Vector3};
+
+    use crate::block::Block;
+    use crate::fuse::{Frame, Sign};
+    use crate::key::Key;
+    use crate::surface::Surface;
+    use crate::{DepthData, DepthView, Intrinsics, Settings};
+
+    /// Brute force: the frame is applied to every block of a large box around the scene.
+    #[test]
+    fn no_touched_block_is_missed() {
+        // A ramp with a step, seen from oblique poses by cameras of either handedness.
+        let data: Vec<f32> =
+            (0..80 * 60).map(|k| 0.9 + 0.004 * (k % 80) as f32 + if k / 80 > 30 { 0.35 } else { 0.0 }).collect();
+        for (threads, fx, fy) in [(1, 70.0, 70.0), (2, 60.0, -75.0), (3, -65.0, 80.0)] {
+            let settings = Settings { voxel_size: 0.01, threads, ..Settings::default() };
+            let intrinsics = Intrinsics { fx, fy, cx: 38.3, cy: 31.7 };
+            let view = DepthView { width: 80, height: 60, data: DepthData::F32 { data: &data }, intrinsics };
+            let pose = Isometry3::new(Vector3::new(0.05, -0.02, -1.0), Vector3::new(0.3, -0.4, 0.2 * fx / 60.0));
+            let mut surface = Surface::default();
+            surface.read(&view, &pose, &settings).unwrap();
+            let frame = Frame::new(&surface, &intrinsics, None, &pose, &settings);
+            let (mut touched, mut blank) = (0, Block::ZERO);
+            for n in 0..48_i32.pow(3) {
+                let key = Key::new([n % 48 - 24, n / 48 % 48 - 24, n / 2304 - 24]).unwrap();
+                if frame.apply(Sign::Plus, key, &mut blank).voxels > 0 {
+                    touched += 1;
+                    assert!(surface.keys.binary_search(&key).is_ok(), "{:?} was missed", key.block());
+                }
+            }
+            // Enough blocks, and a search that is not just everything.
+            assert!(touched > 100 && surface.keys.len() < 3 * touched, "{touched} of {}", surface.keys.len());
+        }
+    }
+}

@@ -133,7 +133,7 @@ impl Map {
     }
 
     /// Bytes of the blocks and of the table that finds them: what [`Settings::max_bytes`] caps. The working memory of a
-    /// call (about 60 bytes per pixel) and the meshes handed out are not in it.
+    /// call (about 40 bytes per pixel) and the meshes handed out are not in it.
     pub fn bytes(&self) -> usize {
         self.store.bytes()
     }
