@@ -2,6 +2,7 @@
 
 mod figures;
 mod gallery;
+mod inspect;
 
 use std::fmt::Write as _;
 use std::time::Instant;
@@ -120,6 +121,12 @@ pub enum MissionError {
         /// Share out of reach.
         percent: f64,
     },
+    /// The map of the painted surface.
+    #[error("scan: {0}")]
+    Scan(#[from] tsdf_hash::Error),
+    /// The trajectories of the flight.
+    #[error("trajectories: {0}")]
+    Trajectory(#[from] vio_ekf::Error),
     /// A picture.
     #[error(transparent)]
     Picture(#[from] PictureError),
@@ -176,6 +183,8 @@ pub struct Mission {
     /// Pixel of every texel of the film.
     pixels: Vec<usize>,
     planning: f64,
+    /// Paint of layers that no pose of the robot can spray at all, m³.
+    abandoned: f64,
     started: Instant,
 }
 
@@ -216,23 +225,34 @@ impl Mission {
                 routes.push(route);
             }
         }
-        let mut plans = Vec::with_capacity(routes.len());
+        let mut plans: Vec<(Route, Plan, Plan)> = Vec::with_capacity(routes.len());
         let mut home: Option<VehicleState> = None;
-        for (k, route) in routes.iter().enumerate() {
-            stage.share(k as f64 / routes.len() as f64);
+        let count = routes.len();
+        let mut abandoned = 0.0;
+        for (k, route) in routes.into_iter().enumerate() {
+            stage.share(k as f64 / count as f64);
             let planner = paint_planner::Settings { start: home, ..settings.planner.clone() };
             let clock = Instant::now();
-            let plan = OptimalPlanner::default().plan(&route.targets, &Wall(&surface.world), &robot, &planner)?;
+            let plan = match OptimalPlanner::default().plan(&route.targets, &Wall(&surface.world), &robot, &planner) {
+                Err(paint_planner::Error::NothingReachable { .. }) => {
+                    abandoned += route.paint() + route.lost;
+                    continue;
+                }
+                plan => plan?,
+            };
             planning += clock.elapsed().as_secs_f64();
             home = plan.waypoints.last().map(|w| w.state);
             let smoothing = SmoothingPlanner.plan(&route.targets, &Wall(&surface.world), &robot, &settings.planner)?;
-            plans.push((plan, smoothing));
+            plans.push((route, plan, smoothing));
         }
-        let metres: f64 = plans.iter().map(|(p, _)| figures::path_length(p)).sum();
+        if plans.is_empty() {
+            return Err(MissionError::OutOfReach { percent: 100.0 });
+        }
+        let metres: f64 = plans.iter().map(|(_, plan, _)| figures::path_length(plan)).sum();
         stage.done(&format!("{metres:.0} m of path, {:.1} ms per metre", 1e3 * planning / metres));
 
         let stage = Stage::start("fly");
-        for (k, (route, (plan, smoothing))) in routes.into_iter().zip(plans).enumerate() {
+        for (k, (route, plan, smoothing)) in plans.into_iter().enumerate() {
             stage.share(k as f64 / layers.len() as f64);
             let [flight, slam, locked] = fly_three(&plan, &surface, &robot, &settings, k as u64)?;
             flights.push(LayerFlight { route, plan, smoothing, flight, slam, locked });
@@ -266,6 +286,7 @@ impl Mission {
             film,
             pixels,
             planning,
+            abandoned,
             started,
         };
         let share = mission.share_out_of_reach();

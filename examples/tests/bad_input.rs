@@ -88,7 +88,7 @@ fn a_surface_that_no_gun_reaches_is_refused() {
     let s = Scratch::new("flat");
     let text = "OFF\n6 4 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 -0.05\n0 1 -0.05\n3 0 1 2\n3 0 2 3\n3 1 4 5\n3 1 5 2\n";
     let sheet = s.file("sheet.off", text);
-    refused(&s, &["--mesh", &sheet], &["sheet.off", "looks up or down"]);
+    refused(&s, &["--mesh", &sheet], &["sheet.off", "cannot be sprayed"]);
 }
 
 #[test]
