@@ -27,6 +27,7 @@
 //! | equation | item |
 //! |---|---|
 //! | Liu et al. 2008, local/global ARAP | [`unwrap`], [`Method::Arap`] |
+//! | Peng et al. 2018, Anderson acceleration of the iteration | [`Method::Arap`] |
 //! | Smith and Schaefer 2015, symmetric Dirichlet energy | [`Method::SymmetricDirichlet`] |
 //! | Tutte 1963, convex combination start | [`unwrap`] |
 //! | thesis 8.3.1, box of smallest area by rotating calipers | [`min_area_rectangle`], [`Chart::new`] |
