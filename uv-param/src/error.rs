@@ -7,8 +7,8 @@ pub enum Error {
     /// No vertices or no faces were given.
     #[error("the mesh has no faces; give at least one triangle")]
     Empty,
-    /// A vertex that some face uses is not finite.
-    #[error("vertex {vertex} has a NaN or infinite coordinate; remove it and the faces that use it")]
+    /// A vertex that some face uses is not finite, or so far away (1e40) that areas would not be.
+    #[error("vertex {vertex} has a NaN, infinite or absurdly large coordinate; remove it and the faces that use it")]
     NonFinite {
         /// Index of the vertex.
         vertex: usize,

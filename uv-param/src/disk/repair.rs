@@ -9,6 +9,9 @@ use crate::triangle;
 /// of the f32 coordinates that meshes are stored in (ours).
 const FLAT: f64 = 1e-7;
 
+/// Beyond this products of lengths overflow; every f32 is below it.
+const LARGEST: f64 = 1e40;
+
 /// Half-edges are counted in 32 bits.
 const MOST: usize = (u32::MAX / 6) as usize;
 
@@ -120,7 +123,7 @@ fn check(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Result<usize, Error> {
         }
     }
     for (vertex, position) in positions.iter().enumerate() {
-        if used[vertex] && !position.iter().all(|x| x.is_finite()) {
+        if used[vertex] && !position.iter().all(|x| x.abs() <= LARGEST) {
             return Err(Error::NonFinite { vertex });
         }
     }
