@@ -1,1 +1,16 @@
-//! The adapters between the PaintCopter crates, and what the binaries share.
+//! What the binaries share: the adapters between the PaintCopter crates, the built-in world, files in and out, pictures, and the
+//! mission that runs them all.
+
+pub mod adapters;
+pub mod appearance;
+pub mod design;
+pub mod mesh_io;
+pub mod mission;
+pub mod pictures;
+pub mod placing;
+pub mod progress;
+pub mod recording;
+pub mod report;
+pub mod surface;
+pub mod targets;
+pub mod world;

@@ -1,1 +1,70 @@
 //! Spray deposit with exact books, Kubelka-Munk appearance, a renderer, and the closed-loop flight that paints.
+//!
+//! A [`Film`] collects the paint of [`Shot`]s on texels in whole femtolitres; a [`Paint`] turns its thickness into a
+//! spectrum and a colour; [`render()`] shows the result to any camera; [`fly`] simulates the vehicle, wind, hose, pan-tilt
+//! unit and controller whose nozzle fires the shots. Everything is deterministic: same input and seed, same bytes, for
+//! any number of threads. Lengths are metres, angles radians, volumes cubic metres; the world's z axis points up, bodies
+//! have x forward, y left, z up, cameras x right, y down, z forward.
+//!
+//! The paint of a shot of volume `V` at a surface point `r` metres from the nozzle and `z` along its axis, seen under the
+//! slope `s` and the incidence `i`, with `t = tan(sigma)`, is, per area,
+//!
+//! ```text
+//! D = V eta exp(-|s|^2 / 2 t^2) / (2 pi t^2) * r cos(i) / z^3 * visibility
+//! ```
+//!
+//! ```
+//! use paint_sim::nalgebra::{Point3, Vector3};
+//! use paint_sim::{Film, Paint, Shot, SprayModel, Substrate, Texel, TriangleSurface};
+//!
+//! # fn main() -> Result<(), paint_sim::Error> {
+//! // A wall in the plane x = 0, a square centimetre of texels on it, one shot of 2 mm^3 from 10 cm.
+//! let corners = [[0.0, -1.0, -1.0], [0.0, 1.0, -1.0], [0.0, 0.0, 1.0]];
+//! let wall = TriangleSurface::new(&corners, &[[0, 2, 1]])?;
+//! let texel = |i: i32| Texel { point: Point3::new(0.0, f64::from(i) * 1e-3, 0.0), normal: -Vector3::x_axis(), area: 1e-6 };
+//! let mut film = Film::new((-50..=50).map(texel).collect())?;
+//! let shot = Shot { origin: Point3::new(-0.1, 0.0, 0.0), axis: Vector3::x_axis(), volume: 2e-9 };
+//! let books = film.deposit(&[shot], &SprayModel::default(), &wall, 1, &mut |_, _| {})?;
+//! assert!(books.balanced());
+//! let coat = Paint::yellow(50e-6)?.over(film.thickness(50), &Substrate::grey(0.3)?)?;
+//! println!("{:?}", coat.srgb().rgb);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! | source | equation | item |
+//! |---|---|---|
+//! | VR paper, Section IV (form ours) | conical Gaussian spray, per area and volume | [`SprayModel::density`] |
+//! | handheld paper, Section V (ours) | paint per texel, exact books | [`Film::deposit`], [`Books`] |
+//! | Kubelka 1948 | film of finite thickness on a ground | [`km::reflectance`] |
+//! | Kubelka-Munk 1931 | opaque film, Riccati equation | [`km::opaque_reflectance`], [`km::gradient`] |
+//! | Kubelka 1954 | layers on layers | [`km::Layer::over`] |
+//! | Duncan 1940 | wet mixture `K = sum c K`, `S = sum c S` | [`Paint::mix`] |
+//! | Saunderson 1942 | the air above the paint | [`km::saunderson`] |
+//! | CIE 015, IEC 61966-2-1 | XYZ, CIELAB, sRGB of 36 bands | [`colour`] |
+//! | Sharma, Wu, Dalal 2005 | colour difference CIEDE2000 | [`ciede2000`] |
+//! | Paper II, Section 5.2 (roll and pitch), drag ours | first-order attitude, rotor drag | [`flight::Vehicle::step`] |
+//! | catenary (textbook) | hose force | [`flight::Tether::force`] |
+//! | Paper II, Section 7.2 | hit error, distance error, angle errors | [`FlightStatistics`] |
+
+pub mod colour;
+mod error;
+pub mod film;
+pub mod flight;
+pub mod km;
+pub mod paint;
+pub mod render;
+mod rng;
+pub mod spray;
+pub mod surface;
+
+pub use nalgebra;
+
+pub use colour::ciede2000;
+pub use error::Error;
+pub use film::{Books, Film, Texel};
+pub use flight::{FlightLog, FlightSettings, FlightStatistics, PanTilt, Reference, ReferenceState, fly};
+pub use paint::{Paint, Substrate};
+pub use render::{Camera, Frame, Lights, render};
+pub use spray::{Shot, SprayModel};
+pub use surface::{Hit, Surface, TriangleSurface};

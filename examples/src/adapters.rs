@@ -1,0 +1,163 @@
+//! The lines that join the crates: each library says by a small trait what it needs from the world, and here another library
+//! gives it.
+
+use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
+use paint_planner::{NozzleState, Plan, Tool, VehicleState};
+use paint_sim::{PanTilt, Reference, ReferenceState, TriangleSurface};
+use ptu_kinematics::{Hover, Joints, Ptu, Servo};
+
+/// The simulator's mesh as the planner's surface.
+pub struct Wall<'a>(pub &'a TriangleSurface);
+
+impl paint_planner::Surface for Wall<'_> {
+    fn cast(
+        &self,
+        origin: &Point3<f64>,
+        direction: &UnitVector3<f64>,
+        max_distance: f64,
+    ) -> Option<paint_planner::Hit> {
+        let hit = paint_sim::Surface::cast(self.0, origin, direction, max_distance)?;
+        let point = origin + direction.into_inner() * hit.distance;
+        Some(paint_planner::Hit { point, normal: UnitVector3::new_unchecked(hit.normal), distance: hit.distance })
+    }
+
+    fn distance(&self, point: &Point3<f64>, max: f64) -> f64 {
+        paint_sim::Surface::distance(self.0, point, max)
+    }
+}
+
+/// The kinematic chain, with the room it takes, as the planner's tool.
+pub struct Robot {
+    /// The chain.
+    pub ptu: Ptu,
+    /// Radius of the sphere about the body that holds the rotors, metres.
+    pub body_radius: f64,
+    /// Radius of the arm and the gun, metres.
+    pub arm_radius: f64,
+}
+
+impl Robot {
+    /// The chain with its published limits, a body of 35 cm radius and an arm 5 cm thick (ours).
+    pub fn new(ptu: Ptu) -> Self {
+        Self { ptu, body_radius: 0.35, arm_radius: 0.025 }
+    }
+
+    /// Spheres that cover the robot in any pose of the body: rotors, arm, gun without its last centimetres.
+    pub fn spheres_at(&self, world_from_body: &Isometry3<f64>, joints: Joints, out: &mut Vec<(Point3<f64>, f64)>) {
+        let body = Point3::from(world_from_body.translation.vector);
+        let settings = self.ptu.settings();
+        let shoulder = world_from_body * Point3::from(settings.body_from_pan_axis);
+        let nozzle = self.ptu.forward(world_from_body, joints);
+        // The sphere at the tip ends where the paint begins.
+        let gun = nozzle.tip - nozzle.direction.into_inner() * self.arm_radius;
+        out.push((body, self.body_radius));
+        for share in [0.75, 1.0] {
+            out.push((body + (shoulder - body) * share, self.arm_radius));
+        }
+        for share in [0.33, 0.67, 1.0] {
+            out.push((shoulder + (gun - shoulder) * share, self.arm_radius));
+        }
+    }
+}
+
+impl Tool for Robot {
+    fn vehicle(&self, nozzle: &NozzleState, heading: f64) -> Option<VehicleState> {
+        let hover = self.ptu.inverse(&nozzle.position, &nozzle.direction, heading).ok()?;
+        let Joints { pan, tilt } = hover.joints;
+        Some(VehicleState { position: hover.position, heading, pan, tilt })
+    }
+
+    fn spheres(&self, vehicle: &VehicleState, out: &mut Vec<(Point3<f64>, f64)>) {
+        let joints = Joints { pan: vehicle.pan, tilt: vehicle.tilt };
+        let hover = Hover { position: vehicle.position, heading: vehicle.heading, joints };
+        self.spheres_at(&hover.world_from_body(), joints, out);
+    }
+}
+
+/// The kinematic chain on two servos as the simulator's pan-tilt unit.
+pub struct ServoGun {
+    ptu: Ptu,
+    servos: [Servo; 2],
+}
+
+impl ServoGun {
+    /// Both servos at rest at zero.
+    pub fn new(ptu: Ptu, servo: ptu_kinematics::ServoSettings) -> Result<Self, ptu_kinematics::Error> {
+        let servo = Servo::new(servo, 0.0)?;
+        Ok(Self { ptu, servos: [servo.clone(), servo] })
+    }
+}
+
+impl PanTilt for ServoGun {
+    fn command(&self, world_from_body: &Isometry3<f64>, aim: &Point3<f64>) -> [f64; 2] {
+        match self.ptu.aim(world_from_body, aim) {
+            Ok(aim) => [aim.joints.pan, aim.joints.tilt],
+            // A target inside the gun itself: stay where we are until the body has moved off.
+            Err(_) => [self.servos[0].angle(), self.servos[1].angle()],
+        }
+    }
+
+    fn reset(&mut self, angles: [f64; 2]) {
+        for (servo, angle) in self.servos.iter_mut().zip(angles) {
+            if let Ok(at_rest) = Servo::new(*servo.settings(), angle) {
+                *servo = at_rest;
+            }
+        }
+    }
+
+    fn step(&mut self, command: [f64; 2], dt: f64) -> [f64; 2] {
+        [self.servos[0].step(command[0], dt), self.servos[1].step(command[1], dt)]
+    }
+
+    fn nozzle(&self, world_from_body: &Isometry3<f64>, [pan, tilt]: [f64; 2]) -> (Point3<f64>, UnitVector3<f64>) {
+        let nozzle = self.ptu.forward(world_from_body, Joints { pan, tilt });
+        (nozzle.tip, nozzle.direction)
+    }
+
+    fn delay(&self) -> f64 {
+        self.servos[0].delay()
+    }
+}
+
+/// A plan as the simulator's reference.
+pub struct PlannedFlight<'a> {
+    /// The plan.
+    pub plan: &'a Plan,
+    /// The chain it was made for.
+    pub ptu: &'a Ptu,
+    /// Distance at which the gun points at nothing in particular on flights between strokes, metres.
+    pub stand_off: f64,
+}
+
+impl Reference for PlannedFlight<'_> {
+    fn duration(&self) -> f64 {
+        self.plan.trajectory.duration()
+    }
+
+    fn at(&self, t: f64) -> ReferenceState {
+        let duration = self.duration();
+        let setpoint = self.plan.setpoint(t);
+        let sample = setpoint.sample;
+        let inside = (0.0..=duration).contains(&t);
+        let still = |v: Vector3<f64>| if inside { v } else { Vector3::zeros() };
+        let aim = if setpoint.transit {
+            // Between strokes the planned joint angles are held: aim at the point ahead of the nozzle they give.
+            let joints = Joints { pan: setpoint.pan, tilt: setpoint.tilt };
+            let hover = Hover { position: sample.position, heading: sample.heading, joints };
+            let nozzle = self.ptu.forward(&hover.world_from_body(), joints);
+            nozzle.tip + nozzle.direction.into_inner() * self.stand_off
+        } else {
+            setpoint.aim
+        };
+        ReferenceState {
+            position: sample.position,
+            velocity: still(sample.velocity),
+            acceleration: still(sample.acceleration),
+            heading: sample.heading,
+            heading_rate: if inside { sample.heading_rate } else { 0.0 },
+            aim: Some(aim),
+            nozzle_distance: (setpoint.aim - setpoint.nozzle.position).norm(),
+            flow: if inside { setpoint.flow } else { 0.0 },
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! The wanted picture, as ink in `[0, 1]`: 0 is bare wall, 1 the darkest the paint can be.
+
+use std::path::{Path, PathBuf};
+
+use paint_net::Image;
+use paint_net::procedural::{fbm, value_noise};
+use uv_param::{Texture, luminance};
+
+use crate::mesh_io::TriangleMesh;
+use crate::surface::PaintSurface;
+
+/// Largest ink asked for by the built-in designs: full black would need endless paint.
+const DARKEST: f64 = 0.85;
+
+/// What to paint.
+#[derive(Debug, Clone)]
+pub enum Design {
+    /// Base coat, striations and soft gradients, as the strata of a rock (built-in, seeded).
+    Strata {
+        /// Which one.
+        seed: u64,
+    },
+    /// Eleven vertical stripes of rising darkness.
+    Stripes,
+    /// From bare wall on the left to dark on the right, with a ripple.
+    Gradient,
+    /// A picture, stretched over the surface's box; dark means paint.
+    Picture(Picture),
+    /// A picture on the mesh's own texture coordinates; dark means paint.
+    Texture(Picture),
+    /// The colours of the mesh's vertices; dark means paint.
+    VertexColours,
+}
+
+/// A grey picture in memory.
+#[derive(Debug, Clone)]
+pub struct Picture {
+    grey: image::ImageBuffer<image::Luma<f32>, Vec<f32>>,
+}
+
+/// What is wrong with a design.
+#[derive(Debug, thiserror::Error)]
+pub enum DesignError {
+    /// Neither a built-in name nor a readable picture.
+    #[error("design \"{name}\": {why}; give stripes, gradient or a PNG or JPEG file")]
+    Unusable {
+        /// What was given.
+        name: String,
+        /// Why it cannot be used.
+        why: String,
+    },
+    /// The mesh lacks what the design lies on.
+    #[error("the mesh has no {0}: use --design instead")]
+    Missing(&'static str),
+    /// The mesh's texture cannot be read.
+    #[error("texture of the mesh: {0}")]
+    Texture(#[from] uv_param::Error),
+    /// The picture plane has no pixels.
+    #[error("picture plane: {0}")]
+    Plane(#[from] paint_net::Error),
+}
+
+impl Design {
+    /// From the command line: a built-in name or a file.
+    pub fn from_name(name: &str, seed: u64) -> Result<Self, DesignError> {
+        match name {
+            "strata" => Ok(Self::Strata { seed }),
+            "stripes" => Ok(Self::Stripes),
+            "gradient" => Ok(Self::Gradient),
+            file => Picture::open(Path::new(file)).map(Self::Picture),
+        }
+    }
+
+    /// Ink wanted on every texel of a surface made from `mesh`.
+    pub fn on_surface(&self, surface: &PaintSurface, mesh: &TriangleMesh) -> Result<Image, DesignError> {
+        let (width, height) = (surface.width(), surface.height());
+        let texture = match self {
+            Self::Texture(picture) => {
+                let uv = mesh.uv.as_ref().ok_or(DesignError::Missing("texture coordinates"))?;
+                let corners: Vec<[[f32; 2]; 3]> =
+                    uv.faces.iter().map(|f| f.map(|i| uv.coordinates[i as usize])).collect();
+                // The top row of an image is v = 1; textures repeat outside [0, 1].
+                let grey = |uv: [f64; 2]| [picture.sample(uv[0].rem_euclid(1.0), 1.0 - uv[1].rem_euclid(1.0))];
+                Texture::from_image(&surface.texels, surface.disk(), &corners, grey)?
+            }
+            Self::VertexColours => {
+                let colours = mesh.colours.as_ref().ok_or(DesignError::Missing("vertex colours"))?;
+                let grey: Vec<[f32; 1]> = colours.iter().map(|&c| [luminance(c)]).collect();
+                Texture::from_vertices(&surface.texels, surface.disk(), &grey)?
+            }
+            _ => {
+                let texel = surface.texels.texel_m;
+                let extent = (width as f64 * texel, height as f64 * texel);
+                return Ok(Image::from_fn(width, height, |x, y| {
+                    self.ink((x as f64 + 0.5) * texel, (y as f64 + 0.5) * texel, extent)
+                }));
+            }
+        };
+        let ink = texture.texels.iter().map(|t| DARKEST * (1.0 - f64::from(t[0])).clamp(0.0, 1.0)).collect();
+        Ok(Image::new(width, height, ink)?)
+    }
+
+    /// Ink wanted at `(x, y)` metres from the top-left corner of a surface of the given width and height; none for designs
+    /// that lie on the mesh itself.
+    fn ink(&self, x: f64, y: f64, (width, height): (f64, f64)) -> f64 {
+        let (u, v) = (x / width, y / height);
+        match self {
+            Self::Strata { seed } => strata(*seed, x, y, u, v),
+            Self::Stripes => {
+                let stripe = (u * 11.0).floor().clamp(0.0, 10.0);
+                if stripe % 2.0 == 0.0 { DARKEST * (0.25 + 0.75 * stripe / 10.0) } else { 0.05 }
+            }
+            Self::Gradient => {
+                let ripple = 0.06 * (std::f64::consts::TAU * v * 3.0).sin() * (std::f64::consts::PI * u).sin();
+                (DARKEST * u + ripple).clamp(0.0, DARKEST)
+            }
+            Self::Picture(picture) => DARKEST * f64::from(1.0 - picture.sample(u, v)),
+            Self::Texture(_) | Self::VertexColours => 0.0,
+        }
+    }
+}
+
+/// Strata: a base coat that breathes, bands that dip and pinch, and a dark foot that fades upwards.
+fn strata(seed: u64, x: f64, y: f64, u: f64, v: f64) -> f64 {
+    let base = 0.06 + 0.22 * fbm(seed ^ 0xBA5E, x / 1.1, y / 1.1, 3);
+    // Bands follow a dipping coordinate that folds gently along the wall.
+    let fold = 0.16 * (value_noise(seed ^ 0xF01D, x / 0.9, y / 1.6) - 0.5) + 0.05 * (x / 0.7).sin();
+    let depth = y + 0.12 * x + fold;
+    let band = |period: f64, salt: u64| {
+        let phase = depth / period + value_noise(seed ^ salt, x / 1.3, 0.5);
+        // Zero at whole phases, where the strength below changes from one band to the next.
+        let wave = 0.5 - 0.5 * (std::f64::consts::TAU * phase).cos();
+        wave * wave * value_noise(seed ^ salt ^ 0xC0DE, x / 0.8, phase.floor())
+    };
+    let striations = 0.85 * band(0.46, 0x11) + 0.45 * band(0.19, 0x22);
+    let foot = 0.22 * smoothstep((v - 0.55) / 0.45) * (0.6 + 0.4 * u);
+    (base + striations + foot).clamp(0.0, DARKEST)
+}
+
+fn smoothstep(t: f64) -> f64 {
+    let t = t.clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+impl Picture {
+    /// Reads a PNG or JPEG; colours become grey by their Rec. 709 weights, transparency shows white.
+    pub fn open(path: &Path) -> Result<Self, DesignError> {
+        let name = PathBuf::from(path).display().to_string();
+        let unusable = |why: String| DesignError::Unusable { name: name.clone(), why };
+        let picture = image::open(path).map_err(|e| unusable(format!("cannot be read as a picture ({e})")))?;
+        if picture.width() < 2 || picture.height() < 2 {
+            return Err(unusable(format!("is only {} x {} pixels", picture.width(), picture.height())));
+        }
+        let rgba = picture.to_rgba32f();
+        let grey = image::ImageBuffer::from_fn(rgba.width(), rgba.height(), |x, y| {
+            let [r, g, b, a] = rgba.get_pixel(x, y).0;
+            image::Luma([1.0 - a * (1.0 - (0.2126 * r + 0.7152 * g + 0.0722 * b))])
+        });
+        Ok(Self { grey })
+    }
+
+    /// Bilinear grey value at `(u, v)` in `[0, 1]`, v down; clamped to the border.
+    pub fn sample(&self, u: f64, v: f64) -> f32 {
+        let (w, h) = (self.grey.width(), self.grey.height());
+        let x = (u * f64::from(w) - 0.5).clamp(0.0, f64::from(w - 1));
+        let y = (v * f64::from(h) - 0.5).clamp(0.0, f64::from(h - 1));
+        let (x0, y0) = ((x as u32).min(w - 2), (y as u32).min(h - 2));
+        let (fx, fy) = ((x - f64::from(x0)) as f32, (y - f64::from(y0)) as f32);
+        let at = |dx: u32, dy: u32| self.grey.get_pixel(x0 + dx, y0 + dy).0[0];
+        let row = |dy: u32| at(0, dy) * (1.0 - fx) + at(1, dy) * fx;
+        row(0) * (1.0 - fy) + row(1) * fy
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ink_stays_between_bare_and_darkest() {
+        for design in [Design::Strata { seed: 3 }, Design::Stripes, Design::Gradient] {
+            for k in 0..2000 {
+                let (x, y) = (f64::from(k % 50) * 0.1, f64::from(k / 50) * 0.05);
+                let ink = design.ink(x, y, (5.0, 2.0));
+                assert!((0.0..=DARKEST).contains(&ink), "{design:?} at {x}, {y}: {ink}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_picture_is_dark_where_it_is_dark() {
+        let grey = image::ImageBuffer::from_fn(4, 2, |x, _| image::Luma([x as f32 / 3.0]));
+        let design = Design::Picture(Picture { grey });
+        assert!((design.ink(0.0, 0.5, (1.0, 1.0)) - DARKEST).abs() < 1e-6);
+        assert!(design.ink(1.0, 0.5, (1.0, 1.0)).abs() < 1e-6);
+        assert!((design.ink(0.5, 0.5, (1.0, 1.0)) - 0.5 * DARKEST).abs() < 1e-6);
+    }
+
+    #[test]
+    fn an_unknown_name_says_what_is_allowed() {
+        let message = Design::from_name("zebra", 1).unwrap_err().to_string();
+        assert!(message.contains("zebra") && message.contains("stripes"), "{message}");
+    }
+}

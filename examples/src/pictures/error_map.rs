@@ -1,0 +1,68 @@
+use std::path::Path;
+
+use plotters::prelude::*;
+use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
+
+use super::{PictureError, draw};
+
+/// Colour differences above this share one colour: 20 is a plainly different colour.
+const CEILING: f64 = 20.0;
+
+/// Saves a map of CIEDE2000 differences over the texture, axes in metres, with its colour bar. `difference` holds one
+/// value per texel, row 0 at the top; `None` where there is no surface.
+pub fn save_error_map(path: &Path, width: usize, difference: &[Option<f64>], texel: f64) -> Result<(), PictureError> {
+    let height = difference.len() / width.max(1);
+    let zoom = (1200.0 / width as f64).min(900.0 / height as f64);
+    let (map_width, map_height) = ((width as f64 * zoom) as u32, (height as f64 * zoom) as u32);
+    let picture = draw(map_width + 260, map_height + 130, |area| {
+        let (left, right) = area.split_horizontally(map_width + 120);
+        let mut chart = ChartBuilder::on(&left)
+            .caption("Colour difference, painted against wanted", ("sans-serif", 28))
+            .margin(10)
+            .x_label_area_size(50)
+            .y_label_area_size(70)
+            .build_cartesian_2d(0.0..width as f64 * texel, 0.0..height as f64 * texel)?;
+        chart
+            .configure_mesh()
+            .disable_mesh()
+            .x_desc("along the surface, m")
+            .y_desc("up the surface, m")
+            .label_style(("sans-serif", 18))
+            .axis_desc_style(("sans-serif", 20))
+            .draw()?;
+        let plot = chart.plotting_area();
+        let (columns, rows) = plot.get_pixel_range();
+        for py in rows.clone() {
+            for px in columns.clone() {
+                let column = (px - columns.start) as usize * width / (columns.end - columns.start) as usize;
+                let row = (py - rows.start) as usize * height / (rows.end - rows.start) as usize;
+                if let Some(value) = difference.get(row * width + column).copied().flatten() {
+                    left.draw_pixel((px, py - left.get_base_pixel().1), &colour(value / CEILING))?;
+                }
+            }
+        }
+        let mut bar = ChartBuilder::on(&right)
+            .margin(10)
+            .margin_top(60)
+            .margin_bottom(58)
+            .y_label_area_size(70)
+            .build_cartesian_2d(0.0..1.0, 0.0..CEILING)?;
+        bar.configure_mesh()
+            .disable_mesh()
+            .disable_x_axis()
+            .y_desc("CIEDE2000 (20 and above share a colour)")
+            .label_style(("sans-serif", 18))
+            .axis_desc_style(("sans-serif", 20))
+            .draw()?;
+        bar.draw_series((0..200).map(|k| {
+            let (low, high) = (f64::from(k) / 200.0, f64::from(k + 1) / 200.0);
+            Rectangle::new([(0.0, low * CEILING), (1.0, high * CEILING)], colour(low).filled())
+        }))?;
+        Ok(())
+    })?;
+    picture.save(path)
+}
+
+fn colour(share: f64) -> RGBColor {
+    ViridisRGB.get_color(share.clamp(0.0, 1.0) as f32)
+}

@@ -1,0 +1,165 @@
+//! A mesh from a file stands somewhere, in some unit, lying or upright: brings it in front of the robot.
+
+use nalgebra::{Rotation3, Vector3};
+
+use crate::mesh_io::TriangleMesh;
+
+/// Height of the lowest vertex above the ground after placing, metres: room for the robot below its gun.
+const CLEAR_OF_GROUND: f64 = 1.5;
+/// A mesh whose normals agree more than this (mean normal, 1 = a plane) is a relief and is hung like a wall.
+const RELIEF: f64 = 0.5;
+
+/// Which axis of the file points up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum UpAxis {
+    /// x up.
+    X,
+    /// y up, as most OBJ files have it.
+    Y,
+    /// z up.
+    Z,
+}
+
+/// How to place a mesh.
+#[derive(Debug, Clone, Copy)]
+pub struct Placing {
+    /// Scale; `None` makes the longest side of the bounding box 3 m.
+    pub scale: Option<f64>,
+    /// The file's up axis.
+    pub up: UpAxis,
+}
+
+/// Longest side when no scale is given, metres.
+const LONGEST_SIDE: f64 = 3.0;
+
+/// What is wrong with a mesh before placing.
+#[derive(Debug, thiserror::Error)]
+pub enum PlacingError {
+    /// A vertex is NaN or infinite.
+    #[error("vertex {0} is not finite: repair the mesh")]
+    NotFinite(usize),
+    /// All vertices are at one place.
+    #[error("the mesh has no extent: all its vertices are at one point")]
+    NoExtent,
+    /// The scale is not a positive number.
+    #[error("--scale {0}: a scale must be positive and finite")]
+    Scale(f64),
+}
+
+/// What was done to the mesh.
+#[derive(Debug, Clone, Copy)]
+pub struct Placed {
+    /// Scale used.
+    pub scale: f64,
+    /// Whether a lying relief was turned upright.
+    pub hung: bool,
+}
+
+/// Scales the mesh, turns its up axis to z, hangs reliefs like a wall that looks along -x, and puts it over the origin clear
+/// of the ground.
+pub fn place(mesh: &mut TriangleMesh, placing: Placing) -> Result<Placed, PlacingError> {
+    if let Some(k) = mesh.positions.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
+        return Err(PlacingError::NotFinite(k));
+    }
+    let (low, high) = bounds(mesh);
+    let longest = (high - low).max();
+    if longest.is_nan() || longest <= 0.0 {
+        return Err(PlacingError::NoExtent);
+    }
+    let scale = placing.scale.unwrap_or(LONGEST_SIDE / longest);
+    if !(scale.is_finite() && scale > 0.0) {
+        return Err(PlacingError::Scale(scale));
+    }
+    let upright = match placing.up {
+        UpAxis::X => Rotation3::from_axis_angle(&Vector3::y_axis(), -std::f64::consts::FRAC_PI_2),
+        UpAxis::Y => Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2),
+        UpAxis::Z => Rotation3::identity(),
+    };
+    let facing = upright * mean_normal(mesh);
+    let hung = facing.norm() > RELIEF;
+    let turn = if hung { hang(&facing) * upright } else { upright };
+    let middle = (low + high) / 2.0;
+    transform(mesh, |p| turn * (p - middle) * scale);
+    let lift = CLEAR_OF_GROUND - bounds(mesh).0.z;
+    transform(mesh, |p| p + Vector3::new(0.0, 0.0, lift));
+    Ok(Placed { scale, hung })
+}
+
+/// The rotation that makes a relief look along -x: about z alone if it already stands, else tipped up first.
+fn hang(facing: &Vector3<f64>) -> Rotation3<f64> {
+    let flat = Vector3::new(facing.x, facing.y, 0.0);
+    let tip = if flat.norm() > 0.7 * facing.norm() {
+        Rotation3::identity()
+    } else {
+        Rotation3::rotation_between(facing, &-Vector3::x()).unwrap_or_else(Rotation3::identity)
+    };
+    let tipped = tip * facing;
+    let about_z = std::f64::consts::PI - tipped.y.atan2(tipped.x);
+    Rotation3::from_axis_angle(&Vector3::z_axis(), about_z) * tip
+}
+
+/// Sum of the area vectors over the sum of their lengths: length 1 for a plane, 0 for a closed surface.
+fn mean_normal(mesh: &TriangleMesh) -> Vector3<f64> {
+    let (mut sum, mut total) = (Vector3::zeros(), 0.0);
+    for face in &mesh.faces {
+        let [a, b, c] = face.map(|i| Vector3::from(mesh.positions[i as usize].map(f64::from)));
+        let area = (b - a).cross(&(c - a));
+        sum += area;
+        total += area.norm();
+    }
+    if total > 0.0 { sum / total } else { sum }
+}
+
+fn bounds(mesh: &TriangleMesh) -> (Vector3<f64>, Vector3<f64>) {
+    let points = mesh.positions.iter().map(|p| Vector3::from(p.map(f64::from)));
+    points.fold((Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)), |(l, h), p| (l.inf(&p), h.sup(&p)))
+}
+
+fn transform(mesh: &mut TriangleMesh, f: impl Fn(Vector3<f64>) -> Vector3<f64>) {
+    for position in &mut mesh.positions {
+        *position = f(Vector3::from(position.map(f64::from))).map(|c| c as f32).into();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square(corners: [[f32; 3]; 4]) -> TriangleMesh {
+        TriangleMesh { positions: corners.to_vec(), faces: vec![[0, 1, 2], [0, 2, 3]], ..TriangleMesh::default() }
+    }
+
+    #[test]
+    fn a_lying_terrain_is_hung_to_face_the_robot() {
+        // y up, lying in xz: the normal is +y.
+        let mut mesh = square([[0.0, 0.0, 0.0], [0.0, 0.0, 10.0], [20.0, 0.0, 10.0], [20.0, 0.0, 0.0]]);
+        let placed = place(&mut mesh, Placing { scale: None, up: UpAxis::Y }).unwrap();
+        assert!(placed.hung && (placed.scale - 0.15).abs() < 1e-12);
+        let normal = mean_normal(&mesh);
+        assert!((normal + Vector3::x()).norm() < 1e-6, "{normal}");
+        assert!((bounds(&mesh).0.z - CLEAR_OF_GROUND).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_standing_wall_only_turns_about_z() {
+        let mut mesh = square([[0.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 2.0, 1.0], [0.0, 0.0, 1.0]]);
+        place(&mut mesh, Placing { scale: Some(1.0), up: UpAxis::Z }).unwrap();
+        let (low, high) = bounds(&mesh);
+        assert!((mean_normal(&mesh) + Vector3::x()).norm() < 1e-6);
+        assert!((high.z - low.z - 1.0).abs() < 1e-5 && (high.y - low.y - 2.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn bad_scales_and_meshes_are_refused() {
+        let mesh = || square([[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
+        for scale in [-1.0, 0.0, f64::NAN] {
+            assert!(matches!(
+                place(&mut mesh(), Placing { scale: Some(scale), up: UpAxis::Z }),
+                Err(PlacingError::Scale(_))
+            ));
+        }
+        let mut bad = mesh();
+        bad.positions[2][1] = f32::NAN;
+        assert!(matches!(place(&mut bad, Placing { scale: None, up: UpAxis::Z }), Err(PlacingError::NotFinite(2))));
+    }
+}

@@ -1,0 +1,47 @@
+//! Progress of the long stages: bars on a terminal, one plain line per stage otherwise.
+
+use std::io::IsTerminal;
+use std::time::Instant;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// One stage under way.
+pub struct Stage {
+    name: String,
+    bar: Option<ProgressBar>,
+    started: Instant,
+}
+
+impl Stage {
+    /// Announces a stage.
+    pub fn start(name: &str) -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let bar = ProgressBar::new(1000);
+            if let Ok(style) = ProgressStyle::with_template("{msg:28} [{bar:40}] {percent:>3} % {elapsed:>4}") {
+                bar.set_style(style.progress_chars("=> "));
+            }
+            bar.set_message(name.to_string());
+            bar
+        });
+        Self { name: name.to_string(), bar, started: Instant::now() }
+    }
+
+    /// Moves the bar to a share in `[0, 1]`.
+    pub fn share(&self, share: f64) {
+        if let Some(bar) = &self.bar {
+            bar.set_position((1000.0 * share.clamp(0.0, 1.0)) as u64);
+        }
+    }
+
+    /// Ends the stage with what it found.
+    pub fn done(self, result: &str) {
+        let line = format!("{:28} {result} ({:.1} s)", self.name, self.started.elapsed().as_secs_f64());
+        match self.bar {
+            Some(bar) => {
+                bar.finish_and_clear();
+                bar.suspend(|| eprintln!("{line}"));
+            }
+            None => eprintln!("{line}"),
+        }
+    }
+}

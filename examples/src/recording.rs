@@ -1,0 +1,270 @@
+//! The mission as an MCAP file with Foxglove's well-known schemas: opens in Foxglove and Rerun as it is.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+use foxglove::Encode;
+use foxglove::messages::{
+    Color, CubePrimitive, FrameTransform, FrameTransforms, JointState, JointStates, LinePrimitive, Log, Pose,
+    PoseInFrame, Quaternion, SceneEntity, SceneUpdate, Timestamp, TriangleListPrimitive, Vector3 as FoxgloveVector3,
+    line_primitive, log,
+};
+use nalgebra::{Isometry3, Point3};
+
+/// The robot at one moment of the flight.
+#[derive(Debug, Clone, Copy)]
+pub struct Moment {
+    /// Seconds since take-off.
+    pub time: f64,
+    /// Pose of the body.
+    pub world_from_body: Isometry3<f64>,
+    /// Pose of the nozzle: x along the spray.
+    pub world_from_nozzle: Isometry3<f64>,
+    /// Pan and tilt, radians.
+    pub joints: [f64; 2],
+    /// Where the spray axis meets the surface.
+    pub hit: Option<Point3<f64>>,
+    /// Paint flow, m³/s.
+    pub flow: f64,
+}
+
+/// A mesh with one sRGB colour per vertex.
+pub struct ColouredMesh<'a> {
+    /// Vertices, metres.
+    pub positions: &'a [[f32; 3]],
+    /// Triangles.
+    pub faces: &'a [[u32; 3]],
+    /// Colours.
+    pub colours: &'a [[u8; 3]],
+}
+
+/// What is wrong with writing a recording.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingError {
+    /// The file could not be created.
+    #[error("{path}: cannot be written ({source}): check that the folder exists and is writable")]
+    Unwritable {
+        /// The file.
+        path: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Encoding or writing a message failed.
+    #[error("the recording could not be written: {0}")]
+    Encoding(String),
+}
+
+/// Writes the recording: the mesh and the log once, everything else once per moment.
+pub fn save_recording(
+    path: &Path,
+    mesh: &ColouredMesh,
+    moments: &[Moment],
+    remarks: &[(f64, String)],
+) -> Result<(), RecordingError> {
+    let file =
+        File::create(path).map_err(|source| RecordingError::Unwritable { path: path.display().to_string(), source })?;
+    let options = mcap::WriteOptions::new().compression(None).library("paintcopter");
+    let mut recorder = Recorder { writer: options.create(BufWriter::new(file)).map_err(failed)?, sequence: 0 };
+    let transforms = recorder.channel::<FrameTransforms>("/tf")?;
+    let pose = recorder.channel::<PoseInFrame>("/vehicle/pose")?;
+    let joints = recorder.channel::<JointStates>("/joint_states")?;
+    let surface = recorder.channel::<SceneUpdate>("/surface")?;
+    let spray = recorder.channel::<SceneUpdate>("/spray")?;
+    let text = recorder.channel::<Log>("/log")?;
+
+    let start = moments.first().map_or(0.0, |m| m.time);
+    recorder.write(surface, start, &mesh_scene(mesh))?;
+    recorder.write(spray, start, &robot_scene())?;
+    let mut remarks = remarks.iter().peekable();
+    for moment in moments {
+        while let Some((time, message)) = remarks.next_if(|(time, _)| *time <= moment.time) {
+            recorder.write(text, *time, &remark(*time, message))?;
+        }
+        let stamp = Some(Timestamp::saturating_from_epoch_secs_f64(moment.time));
+        let in_world = |child: &str, pose: &Isometry3<f64>| FrameTransform {
+            timestamp: stamp,
+            parent_frame_id: "world".into(),
+            child_frame_id: child.into(),
+            translation: Some(vector(pose)),
+            rotation: Some(quaternion(pose)),
+        };
+        let frames = vec![in_world("body", &moment.world_from_body), in_world("nozzle", &moment.world_from_nozzle)];
+        recorder.write(transforms, moment.time, &FrameTransforms { transforms: frames })?;
+        let body = Some(Pose {
+            position: Some(vector(&moment.world_from_body)),
+            orientation: Some(quaternion(&moment.world_from_body)),
+        });
+        recorder.write(pose, moment.time, &PoseInFrame { timestamp: stamp, frame_id: "world".into(), pose: body })?;
+        let joint = |name: &str, position: f64| JointState {
+            name: name.into(),
+            position: Some(position),
+            velocity: None,
+            acceleration: None,
+            effort: None,
+        };
+        let states = vec![joint("pan", moment.joints[0]), joint("tilt", moment.joints[1])];
+        recorder.write(joints, moment.time, &JointStates { timestamp: stamp, joints: states })?;
+        recorder.write(spray, moment.time, &spray_scene(moment))?;
+    }
+    recorder.writer.finish().map_err(failed)?;
+    Ok(())
+}
+
+struct Recorder {
+    writer: mcap::Writer<BufWriter<File>>,
+    sequence: u32,
+}
+
+impl Recorder {
+    fn channel<T: Encode>(&mut self, topic: &str) -> Result<u16, RecordingError> {
+        let schema = match T::get_schema() {
+            Some(s) => self.writer.add_schema(&s.name, &s.encoding, &s.data).map_err(failed)?,
+            None => 0,
+        };
+        self.writer.add_channel(schema, topic, &T::get_message_encoding(), &BTreeMap::new()).map_err(failed)
+    }
+
+    fn write<T: Encode>(&mut self, channel_id: u16, time: f64, message: &T) -> Result<(), RecordingError> {
+        let mut data = Vec::with_capacity(message.encoded_len().unwrap_or(256));
+        message.encode(&mut data).map_err(failed)?;
+        let log_time = (time.max(0.0) * 1e9).round() as u64;
+        self.sequence += 1;
+        let header =
+            mcap::records::MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time: log_time };
+        self.writer.write_to_known_channel(&header, &data).map_err(failed)
+    }
+}
+
+fn failed(error: impl std::fmt::Display) -> RecordingError {
+    RecordingError::Encoding(error.to_string())
+}
+
+fn vector(pose: &Isometry3<f64>) -> FoxgloveVector3 {
+    let t = pose.translation.vector;
+    FoxgloveVector3 { x: t.x, y: t.y, z: t.z }
+}
+
+fn quaternion(pose: &Isometry3<f64>) -> Quaternion {
+    let q = pose.rotation.quaternion();
+    Quaternion { x: q.i, y: q.j, z: q.k, w: q.w }
+}
+
+fn point(p: impl Into<[f64; 3]>) -> foxglove::messages::Point3 {
+    let [x, y, z] = p.into();
+    foxglove::messages::Point3 { x, y, z }
+}
+
+fn rgb([r, g, b]: [u8; 3]) -> Color {
+    Color { r: f64::from(r) / 255.0, g: f64::from(g) / 255.0, b: f64::from(b) / 255.0, a: 1.0 }
+}
+
+fn scene(entities: Vec<SceneEntity>) -> SceneUpdate {
+    SceneUpdate { deletions: Vec::new(), entities }
+}
+
+fn mesh_scene(mesh: &ColouredMesh) -> SceneUpdate {
+    let triangles = TriangleListPrimitive {
+        pose: None,
+        points: mesh.positions.iter().map(|p| point(p.map(f64::from))).collect(),
+        color: None,
+        colors: mesh.colours.iter().map(|&c| rgb(c)).collect(),
+        indices: mesh.faces.iter().flatten().copied().collect(),
+    };
+    scene(vec![SceneEntity {
+        frame_id: "world".into(),
+        id: "surface".into(),
+        triangles: vec![triangles],
+        ..SceneEntity::default()
+    }])
+}
+
+/// A box for the body that moves with its frame.
+fn robot_scene() -> SceneUpdate {
+    let body = CubePrimitive {
+        pose: None,
+        size: Some(FoxgloveVector3 { x: 0.5, y: 0.5, z: 0.12 }),
+        color: Some(rgb([230, 120, 30])),
+    };
+    scene(vec![SceneEntity {
+        frame_id: "body".into(),
+        id: "robot".into(),
+        frame_locked: true,
+        cubes: vec![body],
+        ..SceneEntity::default()
+    }])
+}
+
+/// The arm from body to nozzle, and the spray ray: blue while the valve is open.
+fn spray_scene(moment: &Moment) -> SceneUpdate {
+    let tip = Point3::from(moment.world_from_nozzle.translation.vector);
+    let end = moment.hit.unwrap_or(tip);
+    let body = Point3::from(moment.world_from_body.translation.vector);
+    let line = |a: Point3<f64>, b: Point3<f64>, thickness: f64, colour: [u8; 3]| LinePrimitive {
+        r#type: line_primitive::Type::LineStrip as i32,
+        pose: None,
+        thickness,
+        scale_invariant: false,
+        points: vec![point(a), point(b)],
+        color: Some(rgb(colour)),
+        colors: Vec::new(),
+        indices: Vec::new(),
+    };
+    let ray = if moment.flow > 0.0 { [30, 90, 220] } else { [170, 170, 170] };
+    scene(vec![SceneEntity {
+        timestamp: Some(Timestamp::saturating_from_epoch_secs_f64(moment.time)),
+        frame_id: "world".into(),
+        id: "spray".into(),
+        lines: vec![line(body, tip, 0.03, [60, 60, 60]), line(tip, end, 0.01, ray)],
+        ..SceneEntity::default()
+    }])
+}
+
+fn remark(time: f64, message: &str) -> Log {
+    Log {
+        timestamp: Some(Timestamp::saturating_from_epoch_secs_f64(time)),
+        level: log::Level::Info as i32,
+        message: message.into(),
+        name: "paintcopter".into(),
+        file: String::new(),
+        line: 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_recording_reads_back() {
+        let path = std::env::temp_dir().join(format!("paintcopter-recording-{}.mcap", std::process::id()));
+        let moment = |time: f64| Moment {
+            time,
+            world_from_body: Isometry3::translation(1.0, 2.0, 3.0),
+            world_from_nozzle: Isometry3::translation(1.5, 2.0, 3.0),
+            joints: [0.1, -0.2],
+            hit: Some(Point3::new(1.6, 2.0, 3.0)),
+            flow: 1e-7,
+        };
+        let mesh = ColouredMesh {
+            positions: &[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            faces: &[[0, 1, 2]],
+            colours: &[[255, 0, 0]; 3],
+        };
+        let moments: Vec<Moment> = (0..5).map(|k| moment(f64::from(k) * 0.5)).collect();
+        save_recording(&path, &mesh, &moments, &[(0.0, "take-off".into()), (1.0, "layer 1".into())]).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        let mut count = BTreeMap::new();
+        for message in mcap::MessageStream::new(&bytes).unwrap() {
+            let message = message.unwrap();
+            let schema = message.channel.schema.as_ref().unwrap().name.clone();
+            assert!(schema.starts_with("foxglove."), "{schema}");
+            *count.entry(message.channel.topic.clone()).or_insert(0) += 1;
+        }
+        let expected =
+            [("/joint_states", 5), ("/log", 2), ("/spray", 6), ("/surface", 1), ("/tf", 5), ("/vehicle/pose", 5)];
+        assert_eq!(count, expected.map(|(t, n)| (t.to_string(), n)).into());
+    }
+}

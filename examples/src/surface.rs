@@ -1,0 +1,144 @@
+//! A mesh made ready for painting: unwrapped, cut into texels, searchable for rays.
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+use paint_net::Image;
+use paint_sim::{Texel, TriangleSurface};
+use uv_param::{Chart, Disk, Findings, NormalMode, Settings, Spray, TexelMap};
+
+use crate::mesh_io::TriangleMesh;
+
+/// A chart is stretched too much to paint where a length changes by more than this factor: spots would be ellipses.
+const MOST_STRETCH: f64 = 1.6;
+/// Radius over which the normal is averaged for the robot, metres: the footprint of a spray (Paper IV, section 3.3).
+const FOOTPRINT: f64 = 0.05;
+
+/// A surface with its texture plane.
+pub struct PaintSurface {
+    /// The part of the mesh that is painted, laid out in the plane.
+    pub chart: Chart,
+    /// Texel to surface.
+    pub texels: TexelMap,
+    /// Everything there is to hit: the disk's faces first, in their order, then the rest of the mesh.
+    pub world: TriangleSurface,
+    /// What was left out of the disk.
+    pub findings: Findings,
+}
+
+/// What is wrong with a mesh as a surface to paint.
+#[derive(Debug, thiserror::Error)]
+pub enum SurfaceError {
+    /// It cannot be unwrapped.
+    #[error(transparent)]
+    Unwrap(#[from] uv_param::Error),
+    /// It cannot be hit.
+    #[error(transparent)]
+    World(#[from] paint_sim::Error),
+}
+
+impl PaintSurface {
+    /// Unwraps the largest part of a mesh (metres, z up) into texels of `texel` metres. `progress` is told the share done.
+    pub fn new(mesh: &TriangleMesh, texel: f64, progress: &dyn Fn(f64)) -> Result<Self, SurfaceError> {
+        let positions: Vec<[f64; 3]> = mesh.positions.iter().map(|p| p.map(f64::from)).collect();
+        let repair = uv_param::Repair { weld: true, split_vertices: true };
+        let (disk, findings) = uv_param::largest_disk_with(&positions, &mesh.faces, repair)?;
+        let settings = Settings { up: Some([0.0, 0.0, 1.0]), ..Settings::default() };
+        let chart = uv_param::unwrap(&disk, &settings, |p| {
+            progress(p.iteration as f64 / settings.iterations as f64);
+        })?;
+        let texels = TexelMap::new(&chart, texel)?;
+        let world = world(&disk, mesh)?;
+        Ok(Self { chart, texels, world, findings })
+    }
+
+    /// The part of the mesh that is painted.
+    pub fn disk(&self) -> &Disk {
+        self.chart.disk()
+    }
+
+    /// Pixels across.
+    pub fn width(&self) -> usize {
+        self.texels.width
+    }
+
+    /// Pixels down.
+    pub fn height(&self) -> usize {
+        self.texels.height
+    }
+
+    /// 1 on texels of the surface, 0 beside it.
+    pub fn coverage(&self) -> Image {
+        Image::from_fn(self.width(), self.height(), |x, y| f64::from(u8::from(self.texels.at(x, y).is_some())))
+    }
+
+    /// Whether the nozzle can do what the picture plane says: on the surface, not stretched beyond use, and tilted no more
+    /// than `steepest` radians from what a level gun sees.
+    pub fn paintable(&self, steepest: f64) -> Vec<bool> {
+        let steep = |normal: &UnitVector3<f64>| normal.z.abs() > steepest.sin();
+        self.pixels()
+            .map(|(x, y)| {
+                self.texels.at(x, y).is_some_and(|point| {
+                    let [s1, s2] = self.chart.stretch(point.face);
+                    let even = s1 < MOST_STRETCH && s2 > 1.0 / MOST_STRETCH;
+                    // A texel at the rim may hold a sliver of surface beside its centre.
+                    let centred = self.chart.locate(self.texels.uv_of_texel(x, y)).is_some();
+                    centred && even && !steep(&self.chart.smooth_normal(point))
+                })
+            })
+            .collect()
+    }
+
+    /// The texels that lie on the surface, with the pixel of each.
+    pub fn film_texels(&self) -> (Vec<Texel>, Vec<usize>) {
+        let mut texels = Vec::new();
+        let mut pixels = Vec::new();
+        for (x, y) in self.pixels() {
+            let area = self.texels.area_m2[y * self.width() + x];
+            if let Some(point) = self.texels.at(x, y).filter(|_| area > 0.0) {
+                let normal = self.chart.face_normal(point.face);
+                texels.push(Texel { point: self.chart.point(point), normal, area });
+                pixels.push(y * self.width() + x);
+            }
+        }
+        (texels, pixels)
+    }
+
+    /// The point of the surface under a place of the picture (pixels, fractions allowed), and the normal a spray there
+    /// should follow (thesis Eq. (8.1) with the footprint's normal); `None` beside the surface.
+    pub fn lift(&self, x: f64, y: f64) -> Option<(Point3<f64>, UnitVector3<f64>)> {
+        let texel = self.texels.texel_m;
+        let uv = [(x + 0.5) * texel, (self.height() as f64 - y - 0.5) * texel];
+        let spray = Spray { normal: NormalMode::Footprint { radius: FOOTPRINT }, ..Spray::default() };
+        let command = uv_param::nozzle_command(&self.chart, uv, &spray).ok()?;
+        Some((command.point, -command.direction))
+    }
+
+    /// Mean normal over the chart: the side from which a picture of it is taken. Short for surfaces that close in.
+    pub fn facing(&self) -> Vector3<f64> {
+        let normals = self
+            .disk()
+            .faces()
+            .iter()
+            .enumerate()
+            .map(|(face, _)| self.chart.face_normal(face as u32).into_inner() * self.disk().face_area(face));
+        normals.sum::<Vector3<f64>>() / self.disk().area()
+    }
+
+    fn pixels(&self) -> impl Iterator<Item = (usize, usize)> {
+        let width = self.width();
+        (0..width * self.height()).map(move |k| (k % width, k / width))
+    }
+}
+
+/// The disk's faces, then the faces that are not in it.
+fn world(disk: &Disk, mesh: &TriangleMesh) -> Result<TriangleSurface, SurfaceError> {
+    let mut positions: Vec<[f32; 3]> = disk.positions().iter().map(|p| p.map(|c| c as f32)).collect();
+    let mut faces = disk.faces().to_vec();
+    let offset = positions.len() as u32;
+    let mut in_disk = vec![false; mesh.faces.len()];
+    for &source in disk.face_source() {
+        in_disk[source as usize] = true;
+    }
+    positions.extend_from_slice(&mesh.positions);
+    faces.extend(mesh.faces.iter().zip(in_disk).filter(|(_, inside)| !inside).map(|(f, _)| f.map(|i| i + offset)));
+    Ok(TriangleSurface::new(&positions, &faces)?)
+}

@@ -1,0 +1,70 @@
+//! What can be wrong with an input, and what to do about it.
+
+use thiserror::Error;
+
+/// Everything the planners and the trajectory can refuse.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A path needs at least two targets.
+    #[error("a path of {count} targets cannot be flown: give at least two")]
+    TooFewTargets {
+        /// Number of targets given.
+        count: usize,
+    },
+    /// A field of one target is unusable.
+    #[error("target {index}: {what}")]
+    Target {
+        /// Index of the target.
+        index: usize,
+        /// What is wrong and what is asked for.
+        what: &'static str,
+    },
+    /// A setting is out of its range.
+    #[error("setting `{name}` = {value} must be {requirement}")]
+    Setting {
+        /// Path of the field inside [`Settings`](crate::Settings).
+        name: &'static str,
+        /// The value found.
+        value: f64,
+        /// The range it has to be in.
+        requirement: &'static str,
+    },
+    /// No target can be served by this tool on this surface.
+    #[error(
+        "none of the {count} targets is reachable: check the direction of the normals, the joint limits and the clearance"
+    )]
+    NothingReachable {
+        /// Number of targets given.
+        count: usize,
+    },
+    /// No stroke, or not the finish pose, can be reached by straight, retracted or climbing flight. (Single strokes that
+    /// cannot are marked as not reachable instead.)
+    #[error("no collision-free way from {from} to {to}: split the path there, or lower the clearance")]
+    NoBridge {
+        /// Where the stretch before ends ("start pose" or a target index).
+        from: String,
+        /// Where the stretch after begins ("finish pose" or a target index).
+        to: String,
+    },
+    /// The final trajectory touches the surface although its waypoints do not.
+    #[error("the trajectory comes to {clearance:.3} m from the surface: raise `clearance` or lower `timing.tolerance`")]
+    Collision {
+        /// Distance between the collision body and the surface, m (negative: overlap).
+        clearance: f64,
+    },
+    /// Knots and durations given to [`Trajectory`](crate::Trajectory) do not describe a curve.
+    #[error("trajectory knot {index}: {what}")]
+    Knot {
+        /// Index of the knot or segment.
+        index: usize,
+        /// What is wrong.
+        what: &'static str,
+    },
+    /// A linear system lost positive definiteness; the input is scaled beyond f64.
+    #[error("{stage} became numerically singular: check units (metres, seconds) and weights")]
+    Numerical {
+        /// The computation that failed.
+        stage: &'static str,
+    },
+}

@@ -1,0 +1,201 @@
+//! Shortest path through (state x heading bin): the global optimum of VR paper, Eq. (7), on the grid.
+
+use super::table::{Node, Table};
+use crate::settings::HeadingSettings;
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+/// Keeps the quotient of Eq. (7) finite where the body stands still, m^2.
+const STILL: f64 = 1e-6;
+const NO_PARENT: u32 = u32::MAX;
+
+/// The best bins and where the vehicle has to be carried over a break.
+pub(crate) struct Path {
+    /// Bin per state; `None` where no heading is possible.
+    pub(crate) bins: Vec<Option<usize>>,
+    /// `joined[i]`: the search went from state i to i+1 inside the window.
+    pub(crate) joined: Vec<bool>,
+    pub(crate) cost: f64,
+}
+
+impl Path {
+    /// Maximal ranges of states joined to each other.
+    pub(crate) fn runs(&self) -> Vec<Range<usize>> {
+        let mut runs: Vec<Range<usize>> = Vec::new();
+        for i in 0..self.bins.len() {
+            if self.bins[i].is_none() {
+                continue;
+            }
+            match runs.last_mut() {
+                Some(run) if run.end == i && self.joined[i - 1] => run.end = i + 1,
+                _ => runs.push(i..i + 1),
+            }
+        }
+        runs
+    }
+}
+
+/// Cost of one edge, Eq. (7) with the squared distance the text asks for: `dpsi^2 / D^2 + c_e D^2`.
+fn edge(from: &Node, to: &Node, turn: f64, ce: f64) -> f64 {
+    let way = (to.position - from.position).norm_squared();
+    turn * turn / (way + STILL) + ce * way
+}
+
+/// Viterbi over the table. Equal costs go to the lowest bin. Where no bin of a layer can be reached inside the window,
+/// or the strokes are not linked, any bin may follow any other: the flight between is planned separately.
+pub(crate) fn search(table: &Table, linked: &[bool], settings: &HeadingSettings) -> Path {
+    let bins = table.bins;
+    let window = settings.window.min(bins / 2 - 1) as isize;
+    let mut parents = vec![NO_PARENT; table.nodes.len()];
+    let mut joined = vec![false; table.len().saturating_sub(1)];
+    let mut best = vec![f64::INFINITY; bins];
+    let mut previous: Option<usize> = None;
+    for i in 0..table.len() {
+        let layer = table.layer(i);
+        if layer.iter().all(Option::is_none) {
+            continue;
+        }
+        let mut next = vec![0.0; bins];
+        if let Some(before) = previous {
+            let parent = &mut parents[i * bins..(i + 1) * bins];
+            let old = table.layer(before);
+            next.fill(f64::INFINITY);
+            if before + 1 == i && linked[before] {
+                relax((old, &best), (layer, &mut next), parent, window, settings.ce);
+                joined[before] = next.iter().any(|cost| cost.is_finite());
+            }
+            if next.iter().all(|cost| cost.is_infinite()) {
+                relax((old, &best), (layer, &mut next), parent, (bins / 2) as isize, settings.ce);
+            }
+        }
+        for (cost, node) in next.iter_mut().zip(layer) {
+            *cost += node.map_or(f64::INFINITY, |node| settings.pan * node.pan * node.pan);
+        }
+        best = next;
+        previous = Some(i);
+    }
+    trace(table, &parents, joined, &best, previous)
+}
+
+/// Cheapest ways from one layer to the next over turns of at most `reach` bins.
+fn relax(
+    (old, best): (&[Option<Node>], &[f64]),
+    (layer, next): (&[Option<Node>], &mut [f64]),
+    parent: &mut [u32],
+    reach: isize,
+    ce: f64,
+) {
+    for (bin, node) in layer.iter().enumerate() {
+        let Some(node) = node else { continue };
+        for (from, turn) in candidates(bin, layer.len(), reach) {
+            let Some(start) = old[from].as_ref().filter(|_| best[from].is_finite()) else { continue };
+            let cost = best[from] + edge(start, node, turn, ce);
+            if cost < next[bin] || (cost == next[bin] && (from as u32) < parent[bin]) {
+                next[bin] = cost;
+                parent[bin] = from as u32;
+            }
+        }
+    }
+}
+
+/// Bins within `reach` of `bin`, with the turn from them to it, in rad.
+fn candidates(bin: usize, bins: usize, reach: isize) -> impl Iterator<Item = (usize, f64)> {
+    (-reach..=reach).map(move |shift| {
+        let from = (bin as isize + shift).rem_euclid(bins as isize) as usize;
+        (from, -(shift as f64) * TAU / bins as f64)
+    })
+}
+
+fn trace(table: &Table, parents: &[u32], joined: Vec<bool>, best: &[f64], last: Option<usize>) -> Path {
+    let mut path = Path { bins: vec![None; table.len()], joined, cost: 0.0 };
+    let Some(last) = last else { return path };
+    let mut bin = 0;
+    for (candidate, cost) in best.iter().enumerate() {
+        if *cost < best[bin] {
+            bin = candidate;
+        }
+    }
+    path.cost = best[bin];
+    for i in (0..=last).rev() {
+        if table.layer(i).iter().all(Option::is_none) {
+            continue;
+        }
+        path.bins[i] = Some(bin);
+        match parents[i * table.bins + bin] {
+            NO_PARENT => break,
+            parent => bin = parent as usize,
+        }
+    }
+    path
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point3;
+
+    /// Every path through a small random table, by counting in base `bins`.
+    fn brute_force(table: &Table, settings: &HeadingSettings) -> f64 {
+        let (bins, layers) = (table.bins, table.len());
+        let mut least = f64::INFINITY;
+        'paths: for code in 0..bins.pow(layers as u32) {
+            let choice: Vec<usize> = (0..layers).map(|i| code / bins.pow(i as u32) % bins).collect();
+            let mut cost = 0.0;
+            for i in 0..layers {
+                let Some(node) = table.layer(i)[choice[i]] else { continue 'paths };
+                cost += settings.pan * node.pan * node.pan;
+                if i == 0 {
+                    continue;
+                }
+                let Some(before) = table.layer(i - 1)[choice[i - 1]] else { continue 'paths };
+                let shift = (choice[i] + bins - choice[i - 1]) % bins;
+                let turns = shift.min(bins - shift);
+                if turns > settings.window {
+                    continue 'paths;
+                }
+                cost += edge(&before, &node, turns as f64 * TAU / bins as f64, settings.ce);
+            }
+            least = least.min(cost);
+        }
+        least
+    }
+
+    #[test]
+    fn the_search_equals_brute_force() {
+        let mut state = 7_u64;
+        let mut random = move || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 33) as f64 / f64::from(1_u32 << 31)
+        };
+        let settings = HeadingSettings { window: 1, ..HeadingSettings::default() };
+        let mut solvable = 0;
+        for _ in 0..60 {
+            let (bins, layers) = (6, 5);
+            let nodes = (0..bins * layers)
+                .map(|_| {
+                    let position = Point3::new(random(), random(), random()) * 0.05;
+                    (random() < 0.7).then(|| Node { position, pan: random() - 0.5 })
+                })
+                .collect();
+            let table = Table::from_nodes(bins, nodes);
+            let expected = brute_force(&table, &settings);
+            let path = search(&table, &[true; 4], &settings);
+            if expected.is_finite() {
+                solvable += 1;
+                assert!((path.cost - expected).abs() < 1e-9 * expected);
+                assert_eq!(path.runs(), vec![0..layers]);
+            } else {
+                assert_ne!(path.runs(), vec![0..layers]);
+            }
+        }
+        assert!(solvable > 20);
+    }
+
+    #[test]
+    fn ties_go_to_the_lowest_bin() {
+        let node = Node { position: Point3::origin(), pan: 0.0 };
+        let table = Table::from_nodes(4, vec![Some(node); 12]);
+        let path = search(&table, &[true; 2], &HeadingSettings::default());
+        assert_eq!(path.bins, vec![Some(0); 3]);
+    }
+}

@@ -1,0 +1,197 @@
+//! The interior-point method against Clarabel, and stage 1 against a known optimum.
+
+use super::program::Program;
+use super::{Mode, interior, optimise, starts};
+use crate::settings::NozzleSettings;
+use crate::target::{Target, normal_deviation};
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT};
+use nalgebra::{Matrix2x5, Matrix5, Point3, UnitVector3, Vector2, Vector3, Vector5};
+
+/// Uniform numbers in [-1, 1).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / f64::from(1_u32 << 26) / f64::from(1_u32 << 26) - 1.0
+    }
+}
+
+/// A random strictly convex program whose walls admit the origin and whose caps, partly, do not.
+fn random_program(count: usize, random: &mut Random) -> Program {
+    let mut program = Program::new(count, 4, 3, 0.3);
+    for i in 0..count {
+        let root = Matrix5::from_fn(|_, _| random.next());
+        program.hessian.diagonal[i] = root * root.transpose() + Matrix5::identity() * 4.0;
+        if i + 1 < count {
+            program.hessian.lower[i] = Matrix5::from_fn(|_, _| 0.3 * random.next());
+        }
+        program.gradient[i] = Vector5::from_fn(|_, _| 3.0 * random.next());
+        program.lens[i] = Matrix2x5::from_fn(|_, _| random.next());
+        for _ in 0..4 {
+            program.push_wall(Vector3::from_fn(|_, _| random.next()), 0.05 + 0.2 * random.next().abs());
+        }
+        for _ in 0..3 {
+            program.push_cap(Vector2::new(random.next(), random.next()), 0.2 * random.next());
+        }
+    }
+    program
+}
+
+/// Clarabel's answer to the same program: variables x, then one relaxation per cap.
+fn by_clarabel(program: &Program) -> Vec<f64> {
+    let (count, walls, caps) = (program.gradient.len(), program.walls, program.caps);
+    let (states, per_state) = (5 * count, walls + caps);
+    let variables = states + caps * count;
+    let (mut ri, mut ci, mut values) = (vec![], vec![], vec![]);
+    let mut upper = |r: usize, c: usize, v: f64| {
+        if r <= c {
+            ri.push(r);
+            ci.push(c);
+            values.push(v);
+        }
+    };
+    for i in 0..count {
+        for r in 0..5 {
+            for c in 0..5 {
+                upper(5 * i + r, 5 * i + c, program.hessian.diagonal[i][(r, c)]);
+                if i + 1 < count {
+                    upper(5 * i + c, 5 * i + 5 + r, program.hessian.lower[i][(r, c)]);
+                }
+            }
+        }
+    }
+    let p = CscMatrix::new_from_triplets(variables, variables, ri, ci, values);
+    let mut q: Vec<f64> = program.gradient.iter().flat_map(|g| g.iter().copied()).collect();
+    q.resize(variables, program.penalty);
+    let (mut ri, mut ci, mut values, mut b) = (vec![], vec![], vec![], vec![]);
+    for (j, row) in program.rows.iter().enumerate() {
+        let (i, k) = (j / per_state, j % per_state);
+        let mut line = Vector5::zeros();
+        if k < walls {
+            line.fixed_rows_mut::<3>(0).copy_from(&row.a);
+        } else {
+            line = program.lens[i].tr_mul(&row.a.xy());
+            ri.push(j);
+            ci.push(states + caps * i + k - walls);
+            values.push(-1.0);
+        }
+        for r in 0..5 {
+            ri.push(j);
+            ci.push(5 * i + r);
+            values.push(line[r]);
+        }
+        b.push(row.b);
+    }
+    for e in states..variables {
+        ri.push(b.len());
+        ci.push(e);
+        values.push(-1.0);
+        b.push(0.0);
+    }
+    let a = CscMatrix::new_from_triplets(b.len(), variables, ri, ci, values);
+    let cones = [NonnegativeConeT(b.len())];
+    let settings = DefaultSettings {
+        verbose: false,
+        tol_gap_abs: 1e-13,
+        tol_gap_rel: 1e-13,
+        tol_feas: 1e-12,
+        max_iter: 200,
+        ..DefaultSettings::default()
+    };
+    let mut solver = DefaultSolver::new(&p, &q, &a, &b, &cones, settings).unwrap();
+    solver.solve();
+    solver.solution.x[..states].to_vec()
+}
+
+#[test]
+fn the_interior_point_method_agrees_with_clarabel() {
+    let mut random = Random(11);
+    let mut relaxed = 0;
+    for round in 0..20 {
+        let count = 1 + 3 * round;
+        let program = random_program(count, &mut random);
+        let mut x = vec![Vector5::zeros(); count];
+        let outcome = interior::solve(&program, &mut x).unwrap();
+        relaxed += usize::from(outcome.slack > 1e-3);
+        for (k, expected) in by_clarabel(&program).into_iter().enumerate() {
+            assert!((x[k / 5][k % 5] - expected).abs() < 1e-6, "round {round}");
+        }
+    }
+    assert!(relaxed > 10);
+}
+
+/// The wall x = 0 seen from smaller x; `normal_z` tilts the normal in the xz plane.
+fn target(z: f64, normal_z: f64) -> Target {
+    let normal = Vector3::new(-(1.0 - normal_z * normal_z).sqrt(), 0.0, normal_z);
+    Target { point: Point3::new(0.0, 0.0, z), normal: UnitVector3::new_normalize(normal), dose: 0.0, time: None }
+}
+
+#[test]
+fn three_targets_of_known_optimum() {
+    // Solved by hand for c_a = 1, c_d = 4 and a fixed distance of 0.1 m; all other terms switched off.
+    let targets = [target(0.0, 0.0), target(0.01, 0.6), target(0.02, 0.0)];
+    let settings = NozzleSettings {
+        min: 0.1 - 1e-7,
+        max: 0.1 + 1e-7,
+        ca: 1.0,
+        cb: 0.0,
+        cc: 1e-9,
+        cd: 4.0,
+        distance: 0.0,
+        rounds: 12,
+        ..NozzleSettings::default()
+    };
+    let starts = starts(&targets, &settings);
+    let result = optimise(&targets, &starts, &[true; 2], Mode::Repaired, &settings).unwrap();
+    let expected = [[-0.1, 0.0, 0.0111922], [-0.0905293, 0.0, 0.0559610], [-0.1, 0.0, 0.0271922]];
+    let deviations = [0.011192, 0.017549, 0.007192];
+    for i in 0..3 {
+        let p = result.states[i].unwrap().position;
+        assert!((p - Point3::from(expected[i])).norm() < 1e-6);
+        assert!((normal_deviation(&targets[i], &p) - deviations[i]).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn the_answer_is_a_minimum_of_the_cost_as_written() {
+    let mut random = Random(5);
+    let targets: Vec<Target> = (0..12).map(|i| target(0.025 * f64::from(i), 0.2 * random.next())).collect();
+    let settings = NozzleSettings { cb: 0.0, cc: 1e-9, rounds: 10, ..NozzleSettings::default() };
+    let starts = starts(&targets, &settings);
+    let result = optimise(&targets, &starts, &[true; 11], Mode::Repaired, &settings).unwrap();
+    let p: Vec<Point3<f64>> = result.states.iter().map(|s| s.unwrap().position).collect();
+    let cost = |p: &[Point3<f64>]| {
+        let smooth: f64 = p.windows(2).map(|pair| settings.ca * (pair[1] - pair[0]).norm_squared()).sum();
+        let local = |(t, p): (&Target, &Point3<f64>)| {
+            let height = t.normal.dot(&(p - t.point));
+            settings.cd * normal_deviation(t, p).powi(2) + settings.distance * (height - settings.stand_off).powi(2)
+        };
+        smooth + targets.iter().zip(p).map(local).sum::<f64>()
+    };
+    for i in 0..12 {
+        for direction in [Vector3::x(), Vector3::y(), Vector3::z()] {
+            for step in [-1e-4, 1e-4] {
+                let mut moved = p.clone();
+                moved[i] += direction * step;
+                assert!(cost(&moved) > cost(&p));
+            }
+        }
+    }
+}
+
+#[test]
+fn cut_links_leave_the_strokes_alone() {
+    let targets: Vec<Target> = (0..6).map(|i| target(if i < 3 { 0.02 } else { 1.0 } * f64::from(i), 0.1)).collect();
+    let settings = NozzleSettings::default();
+    let linked = [true, true, false, true, true];
+    let whole = optimise(&targets, &starts(&targets, &settings), &linked, Mode::Repaired, &settings).unwrap();
+    let part = optimise(&targets[..3], &starts(&targets[..3], &settings), &[true; 2], Mode::Repaired, &settings);
+    for (a, b) in whole.states[..3].iter().zip(part.unwrap().states) {
+        assert!((a.unwrap().position - b.unwrap().position).norm() < 1e-6);
+    }
+}

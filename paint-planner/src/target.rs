@@ -1,0 +1,64 @@
+//! What is to be painted, and the gun that paints it.
+
+use crate::error::Error;
+use nalgebra::{Point3, UnitVector3};
+
+/// One point of a stroke on the surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Target {
+    /// The point in the world, m.
+    pub point: Point3<f64>,
+    /// Outward surface normal at the point, world frame.
+    pub normal: UnitVector3<f64>,
+    /// Paint wanted per metre of stroke from here to the next target, m^3/m; 0 means valve shut.
+    pub dose: f64,
+    /// Time stamp of the person who drew the stroke, s; needed by
+    /// [`TimingPolicy::GradientPreserving`](crate::TimingPolicy::GradientPreserving) only.
+    pub time: Option<f64>,
+}
+
+/// Where the nozzle is and where it sprays.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct NozzleState {
+    /// Tip of the nozzle in the world, m.
+    pub position: Point3<f64>,
+    /// Spray axis in the world, from the nozzle to the surface.
+    pub direction: UnitVector3<f64>,
+}
+
+/// Distance of the nozzle from the normal line of the target, `|n x (p - t)|`, m (VR paper, section V).
+///
+/// ```
+/// # use paint_planner::{Target, normal_deviation, nalgebra::{Point3, Vector3}};
+/// let target = Target { point: Point3::origin(), normal: Vector3::z_axis(), dose: 0.0, time: None };
+/// assert_eq!(normal_deviation(&target, &Point3::new(0.03, 0.04, 0.1)), 0.05);
+/// ```
+pub fn normal_deviation(target: &Target, nozzle_position: &Point3<f64>) -> f64 {
+    target.normal.cross(&(nozzle_position - target.point)).norm()
+}
+
+/// Refuses paths that no planner can read.
+pub(crate) fn check(targets: &[Target]) -> Result<(), Error> {
+    if targets.len() < 2 {
+        return Err(Error::TooFewTargets { count: targets.len() });
+    }
+    for (index, target) in targets.iter().enumerate() {
+        let refuse = |what| Err(Error::Target { index, what });
+        if !target.point.iter().all(|c| c.is_finite() && c.abs() < 1e6) {
+            return refuse("the point must be finite and within 1000 km of the origin");
+        }
+        let excess = (target.normal.norm() - 1.0).abs();
+        if excess.is_nan() || excess > 1e-6 {
+            return refuse("the normal must have unit length");
+        }
+        if !(target.dose >= 0.0 && target.dose.is_finite()) {
+            return refuse("the dose must be finite and not negative");
+        }
+        if target.time.is_some_and(|time| !time.is_finite()) {
+            return refuse("the time stamp must be finite");
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,4 @@
+//! Whole plans on analytic worlds.
+
+mod plans;
+mod walls;

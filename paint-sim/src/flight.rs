@@ -1,0 +1,213 @@
+//! The flight that paints: vehicle, wind, hose, pan-tilt unit and controller in a closed loop at 1 kHz.
+
+use nalgebra::{Isometry3, Vector3};
+
+use crate::Error;
+use crate::surface::Surface;
+
+mod controller;
+mod estimator;
+mod log;
+mod noise;
+mod ptu;
+mod reference;
+mod servo;
+mod settings;
+mod statistics;
+mod tether;
+mod vehicle;
+
+pub use controller::{CascadedController, Controller, ControllerSettings};
+pub use estimator::{Estimate, Estimator, ObserverSettings};
+pub use log::{FlightLog, FlightSample};
+pub use ptu::{PanTilt, StraightPanTilt};
+pub use reference::{Reference, ReferenceState};
+pub use servo::{Servo, ServoSettings};
+pub use settings::{Airframe, FlightSettings, Localisation, Valve, Wind};
+pub use statistics::FlightStatistics;
+pub use tether::{Catenary, Tether};
+pub use vehicle::{Command, GRAVITY, Vehicle};
+
+use noise::{Air, PoseSensor};
+
+/// Steps of the physics per second.
+const RATE: u32 = 1000;
+const STEP: f64 = 1.0 / RATE as f64;
+/// Steps of the physics per step of localisation, controller and pan-tilt command.
+const CONTROL_STEPS: i64 = 10;
+const CONTROL_STEP: f64 = CONTROL_STEPS as f64 * STEP;
+/// The spray is followed this far, m.
+const SPRAY_REACH: f64 = 10.0;
+/// A vehicle farther than this from its reference is lost, m.
+const LOST: f64 = 20.0;
+/// Longest flight, s: a reference that asks for more has a wrong unit.
+const LONGEST: f64 = 86_400.0;
+
+/// Flies `reference` with the built-in observer and controller, see [`fly_with`].
+///
+/// # Errors
+/// As [`fly_with`].
+pub fn fly(
+    reference: &dyn Reference,
+    ptu: &mut dyn PanTilt,
+    surface: &dyn Surface,
+    settings: &FlightSettings,
+) -> Result<FlightLog, Error> {
+    let mut controller = CascadedController::new(settings.airframe, ControllerSettings::default());
+    fly_with(reference, &mut controller, ptu, surface, settings)
+}
+
+/// Flies `reference`: the truth moves at 1 kHz; localisation, observer, controller and the aim of the pan-tilt unit at
+/// 100 Hz. Controller and pan-tilt unit see the reported pose, never the truth.
+///
+/// The vehicle starts at rest at the reference's first position and hovers there for `settings.settle` seconds. The
+/// pan-tilt unit is commanded for the pose and the aim that are expected when the command takes effect.
+///
+/// # Errors
+/// Settings out of range, values that are not finite from the reference, the controller or the pan-tilt unit, a hose
+/// that is too short, or a vehicle more than 20 m away from its reference.
+pub fn fly_with(
+    reference: &dyn Reference,
+    controller: &mut dyn Controller,
+    ptu: &mut dyn PanTilt,
+    surface: &dyn Surface,
+    settings: &FlightSettings,
+) -> Result<FlightLog, Error> {
+    settings.check()?;
+    let duration = reference.duration();
+    crate::error::check_range("duration of the reference", duration, 0.0, LONGEST, "between 0 and a day")?;
+    crate::error::check_range("delay of the pan-tilt unit", ptu.delay(), 0.0, 1.0, "between 0 and 1 s")?;
+    let hover = Hover { reference };
+    let start = checked(reference, 0.0)?;
+
+    let mut vehicle = Vehicle::at_rest(start.position, start.heading);
+    let mut air = Air::new(&settings.wind, STEP, settings.seed);
+    let mut sensor = PoseSensor::new(settings.localisation, CONTROL_STEP, settings.seed);
+    let mut estimator = Estimator::new(settings.airframe, ObserverSettings::default(), &sensor.measure(&vehicle));
+    let mut command = Command { thrust: settings.airframe.mass * GRAVITY, ..Command::default() };
+    let mut hose = Vector3::zeros();
+    let mut aim = [0.0; 2];
+    let mut pan_tilt = [0.0; 2];
+    ptu.reset(aim);
+
+    let log_steps = i64::from(RATE / settings.log_rate);
+    let first = -(settings.settle / CONTROL_STEP).round() as i64 * CONTROL_STEPS;
+    // A hair of tolerance, or rounding would drop the last sample of a duration such as 0.3 s.
+    let last = (duration / STEP + 1e-6).floor() as i64;
+    let interval = log_steps as f64 * STEP;
+    let mut samples = Vec::with_capacity((last / log_steps + 1) as usize);
+    for step in first..=last {
+        let time = step as f64 * STEP;
+        if step % CONTROL_STEPS == 0 {
+            let wanted = checked(&hover, time)?;
+            let distance = (vehicle.position - wanted.position).norm();
+            if distance.is_nan() || distance > LOST {
+                return Err(Error::Diverged { time, distance });
+            }
+            if step > first {
+                estimator.update(&sensor.measure(&vehicle), CONTROL_STEP);
+            }
+            command = controller.command(time, estimator.estimate(), &hover);
+            if ![command.roll, command.pitch, command.yaw_rate, command.thrust].iter().all(|v| v.is_finite()) {
+                return Err(Error::BadCallback { who: "the controller", time });
+            }
+            estimator.set_command(command);
+            if let Some(tether) = &settings.tether {
+                hose = tether.force(&vehicle.position)?;
+            }
+            // A command holds for one control step, so on average it acts half a step later still.
+            let ahead = ptu.delay() + 0.5 * CONTROL_STEP;
+            let target = checked(&hover, time + ahead)?.aim.filter(|_| !settings.ptu_locked);
+            aim = target.map_or([0.0; 2], |point| ptu.command(&estimator.predict(ahead), &point));
+        }
+        if step >= 0 && step % log_steps == 0 {
+            let scene = Scene { reference, ptu, surface, settings };
+            samples.push(scene.sample(time, &vehicle, pan_tilt, estimator.estimate())?);
+        }
+        vehicle.step(&settings.airframe, &command, &air.step(), &hose, STEP);
+        pan_tilt = ptu.step(aim, STEP);
+        if !pan_tilt.iter().all(|v| v.is_finite()) {
+            return Err(Error::BadCallback { who: "the pan-tilt unit", time });
+        }
+    }
+    Ok(FlightLog { samples, interval })
+}
+
+/// The reference, standing still at its first state before time zero.
+struct Hover<'a> {
+    reference: &'a dyn Reference,
+}
+
+impl Reference for Hover<'_> {
+    fn duration(&self) -> f64 {
+        self.reference.duration()
+    }
+
+    fn at(&self, t: f64) -> ReferenceState {
+        let state = self.reference.at(t.max(0.0));
+        if t >= 0.0 {
+            return state;
+        }
+        let zero = Vector3::zeros();
+        ReferenceState { velocity: zero, acceleration: zero, heading_rate: 0.0, flow: 0.0, ..state }
+    }
+}
+
+fn checked(reference: &dyn Reference, time: f64) -> Result<ReferenceState, Error> {
+    let state = reference.at(time);
+    if state.is_finite() { Ok(state) } else { Err(Error::BadCallback { who: "the reference", time }) }
+}
+
+/// What a sample of the log is measured against.
+struct Scene<'a> {
+    reference: &'a dyn Reference,
+    ptu: &'a dyn PanTilt,
+    surface: &'a dyn Surface,
+    settings: &'a FlightSettings,
+}
+
+impl Scene<'_> {
+    fn sample(
+        &self,
+        time: f64,
+        vehicle: &Vehicle,
+        pan_tilt: [f64; 2],
+        estimate: &Estimate,
+    ) -> Result<FlightSample, Error> {
+        let wanted = checked(self.reference, time)?;
+        let world_from_body: Isometry3<f64> = vehicle.world_from_body();
+        let (nozzle, axis) = self.ptu.nozzle(&world_from_body, pan_tilt);
+        if !nozzle.iter().chain(axis.iter()).all(|v| v.is_finite()) {
+            return Err(Error::BadCallback { who: "the pan-tilt unit", time });
+        }
+        let distance = self.surface.cast(&nozzle, &axis, SPRAY_REACH).map(|hit| hit.distance);
+        Ok(FlightSample {
+            time,
+            world_from_body,
+            velocity: vehicle.velocity,
+            acceleration: vehicle.acceleration,
+            attitude: vehicle.attitude,
+            estimated_position: estimate.position,
+            reference_position: wanted.position,
+            pan_tilt,
+            desired_pan_tilt: wanted.aim.map_or(pan_tilt, |aim| self.ptu.command(&world_from_body, &aim)),
+            nozzle,
+            axis,
+            aim: wanted.aim,
+            hit: distance.map(|d| nozzle + axis.as_ref() * d),
+            distance: distance.unwrap_or(f64::INFINITY),
+            wanted_distance: wanted.nozzle_distance,
+            flow: self.flow(time)?,
+        })
+    }
+
+    /// The valve follows the reference later by its dead time, for which its commands are given early.
+    fn flow(&self, time: f64) -> Result<f64, Error> {
+        let commanded = time - self.settings.valve.dead_time + self.settings.valve.lead;
+        if (0.0..=self.reference.duration()).contains(&commanded) {
+            Ok(checked(self.reference, commanded)?.flow.max(0.0))
+        } else {
+            Ok(0.0)
+        }
+    }
+}

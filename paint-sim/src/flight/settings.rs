@@ -1,0 +1,218 @@
+//! The flight's settings. No constant of the real vehicle's attitude loop, wind or hose is printed in the papers.
+
+use nalgebra::Vector3;
+
+use super::tether::Tether;
+use crate::Error;
+use crate::error::{check_not_negative, check_positive, check_range};
+
+/// Mass and responses of the vehicle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
+pub struct Airframe {
+    /// Mass with arm and spray gun, kg. Default 4.2 (ours; Paper II names the airframe, a DJI Matrice 100, but no mass).
+    pub mass: f64,
+    /// Gain from the roll command to roll. Default 1.017 (the small multirotor published with the ETH model predictive controller).
+    pub roll_gain: f64,
+    /// Time constant of roll, s. Default 0.1847 (same source).
+    pub roll_lag: f64,
+    /// Gain from the pitch command to pitch. Default 0.789 (same source).
+    pub pitch_gain: f64,
+    /// Time constant of pitch, s. Default 0.175 (same source).
+    pub pitch_lag: f64,
+    /// Time constant of the yaw rate, s. Default 0.15 (ours).
+    pub yaw_lag: f64,
+    /// Linear drag per mass along the body's axes, 1/s. Default 0.3, 0.3, 0.1 (ours).
+    pub drag: [f64; 3],
+    /// Largest commanded roll or pitch, rad. Default 25 degrees (same source as the gains).
+    pub tilt_limit: f64,
+}
+
+impl Default for Airframe {
+    fn default() -> Self {
+        Self {
+            mass: 4.2,
+            roll_gain: 1.017,
+            roll_lag: 0.1847,
+            pitch_gain: 0.789,
+            pitch_lag: 0.175,
+            yaw_lag: 0.15,
+            drag: [0.3, 0.3, 0.1],
+            tilt_limit: 25.0_f64.to_radians(),
+        }
+    }
+}
+
+/// Wind as a mean and gusts; each axis of the gusts is an Ornstein-Uhlenbeck process.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
+pub struct Wind {
+    /// Mean velocity of the air in the world, m/s. Default 2 along x (ours).
+    pub mean: Vector3<f64>,
+    /// Standard deviation of the gusts per axis, m/s. Default 0.5 (ours).
+    pub gust_sigma: f64,
+    /// Time constant of the gusts, s. Default 1.5 (ours).
+    pub gust_time: f64,
+}
+
+impl Default for Wind {
+    fn default() -> Self {
+        Self { mean: Vector3::new(2.0, 0.0, 0.0), gust_sigma: 0.5, gust_time: 1.5 }
+    }
+}
+
+impl Wind {
+    /// Air at rest.
+    pub fn calm() -> Self {
+        Self { mean: Vector3::zeros(), gust_sigma: 0.0, gust_time: 1.0 }
+    }
+}
+
+/// The error of the pose that the controller is given: a slow Ornstein-Uhlenbeck drift plus white noise at 100 Hz, each
+/// axis by itself. All presets are ours.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+pub struct Localisation {
+    /// White noise of the position, m.
+    pub position_noise: f64,
+    /// Slow error of the position, m.
+    pub position_drift: f64,
+    /// White noise of roll, pitch and yaw, rad.
+    pub attitude_noise: f64,
+    /// Slow error of roll, pitch and yaw, rad.
+    pub attitude_drift: f64,
+    /// Time constant of the slow errors, s.
+    pub drift_time: f64,
+}
+
+impl Localisation {
+    /// Motion capture: 0.5 mm and 0.05 degrees of noise, 1 mm and 0.1 degrees of slow error.
+    pub fn mocap() -> Self {
+        Self {
+            position_noise: 5e-4,
+            position_drift: 1e-3,
+            attitude_noise: 0.05_f64.to_radians(),
+            attitude_drift: 0.1_f64.to_radians(),
+            drift_time: 10.0,
+        }
+    }
+
+    /// Localisation by vision whose position error is 7 cm RMS over the three axes together (Paper II, Section 7.1).
+    pub fn slam_7cm() -> Self {
+        Self {
+            position_noise: 0.003,
+            position_drift: 0.0403,
+            attitude_noise: 0.1_f64.to_radians(),
+            attitude_drift: 0.4_f64.to_radians(),
+            drift_time: 10.0,
+        }
+    }
+
+    /// The truth.
+    pub fn perfect() -> Self {
+        Self { position_noise: 0.0, position_drift: 0.0, attitude_noise: 0.0, attitude_drift: 0.0, drift_time: 1.0 }
+    }
+}
+
+impl Default for Localisation {
+    fn default() -> Self {
+        Self::mocap()
+    }
+}
+
+/// The delay between a valve command and the paint, and how early the command is given.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
+pub struct Valve {
+    /// Time from the command to the paint, s. Default 50 ms (ours).
+    pub dead_time: f64,
+    /// How much earlier than the reference says the command is given, s. Default 50 ms: the dead time is known.
+    pub lead: f64,
+}
+
+impl Default for Valve {
+    fn default() -> Self {
+        Self { dead_time: 0.05, lead: 0.05 }
+    }
+}
+
+/// Everything about a simulated flight but its reference and its pan-tilt unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
+pub struct FlightSettings {
+    /// The vehicle.
+    pub airframe: Airframe,
+    /// The air.
+    pub wind: Wind,
+    /// The hose; `None` for a free flight (default).
+    pub tether: Option<Tether>,
+    /// The error of the pose estimate. Default [`Localisation::mocap`].
+    pub localisation: Localisation,
+    /// The valve.
+    pub valve: Valve,
+    /// Keeps pan and tilt at zero. Default false.
+    pub ptu_locked: bool,
+    /// Hover at the start before the reference begins, s; the observer learns wind and hose. Default 5 (ours).
+    pub settle: f64,
+    /// Samples per second of the log; a divisor of 1000. Default 100 Hz.
+    pub log_rate: u32,
+    /// Seed of wind and localisation error.
+    pub seed: u64,
+}
+
+impl Default for FlightSettings {
+    fn default() -> Self {
+        Self {
+            airframe: Airframe::default(),
+            wind: Wind::default(),
+            tether: None,
+            localisation: Localisation::default(),
+            valve: Valve::default(),
+            ptu_locked: false,
+            settle: 5.0,
+            log_rate: 100,
+            seed: 0,
+        }
+    }
+}
+
+impl FlightSettings {
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let Airframe { mass, roll_gain, roll_lag, pitch_gain, pitch_lag, yaw_lag, drag, tilt_limit } = self.airframe;
+        for (what, value) in [
+            ("airframe.mass", mass),
+            ("airframe.roll_gain", roll_gain),
+            ("airframe.roll_lag", roll_lag),
+            ("airframe.pitch_gain", pitch_gain),
+            ("airframe.pitch_lag", pitch_lag),
+            ("airframe.yaw_lag", yaw_lag),
+            ("wind.gust_time", self.wind.gust_time),
+            ("localisation.drift_time", self.localisation.drift_time),
+        ] {
+            check_positive(what, value)?;
+        }
+        for (what, value) in [
+            ("airframe.drag", drag[0]),
+            ("airframe.drag", drag[1]),
+            ("airframe.drag", drag[2]),
+            ("wind.gust_sigma", self.wind.gust_sigma),
+            ("localisation.position_noise", self.localisation.position_noise),
+            ("localisation.position_drift", self.localisation.position_drift),
+            ("localisation.attitude_noise", self.localisation.attitude_noise),
+            ("localisation.attitude_drift", self.localisation.attitude_drift),
+            ("valve.dead_time", self.valve.dead_time),
+            ("valve.lead", self.valve.lead),
+        ] {
+            check_not_negative(what, value)?;
+        }
+        check_range("airframe.tilt_limit", tilt_limit, 0.01, 1.2, "between 0.01 and 1.2 rad")?;
+        check_range("wind.mean", self.wind.mean.amax(), 0.0, 100.0, "below 100 m/s")?;
+        check_range("settle", self.settle, 0.0, 3600.0, "between 0 and an hour")?;
+        let divides = self.log_rate > 0 && 1000 % self.log_rate == 0;
+        if divides {
+            self.tether.as_ref().map_or(Ok(()), Tether::check)
+        } else {
+            Err(Error::OutOfRange { what: "log_rate", value: f64::from(self.log_rate), allowed: "a divisor of 1000" })
+        }
+    }
+}

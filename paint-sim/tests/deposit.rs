@@ -1,0 +1,233 @@
+//! Spray on texels: closed forms, books, shadows, threads.
+#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+use paint_sim::spray::QUANTUM;
+use paint_sim::{Books, Error, Film, Shot, SprayModel, Texel, TriangleSurface};
+
+fn unit(x: f64, y: f64, z: f64) -> UnitVector3<f64> {
+    UnitVector3::new_normalize(Vector3::new(x, y, z))
+}
+
+/// Two triangles in z = `height`, `size` metres to each side of the axis, cut off at x = `from`.
+fn plate(height: f32, from: f32, size: f32) -> ([[f32; 3]; 4], [[u32; 3]; 2]) {
+    ([[from, -size, height], [size, -size, height], [size, size, height], [from, size, height]], [[0, 1, 2], [0, 2, 3]])
+}
+
+/// A surface that is never in the way.
+fn far_plate() -> TriangleSurface {
+    let (positions, faces) = plate(-50.0, -1.0, 1.0);
+    TriangleSurface::new(&positions, &faces).unwrap()
+}
+
+/// Square texels of side `step` on the plane through (0, 0, d), tilted by `tilt` about y, as seen from a nozzle at the
+/// origin that sprays along z.
+fn tilted_plane(tilt: f64, d: f64, step: f64, half: f64) -> Vec<Texel> {
+    let (s, c) = tilt.sin_cos();
+    let n = (half / step) as i32;
+    let place = |i: i32, j: i32| {
+        let (u, v) = (f64::from(i) * step, f64::from(j) * step);
+        Texel { point: Point3::new(u * c, v, d + u * s), normal: unit(s, 0.0, -c), area: step * step }
+    };
+    (-n..=n).flat_map(|i| (-n..=n).map(move |j| place(i, j))).collect()
+}
+
+fn shot(x: f64, y: f64, volume: f64) -> Shot {
+    Shot { origin: Point3::new(x, y, 0.0), axis: unit(0.0, 0.0, 1.0), volume }
+}
+
+fn spray(film: &mut Film, shots: &[Shot], model: &SprayModel, surface: &TriangleSurface, threads: usize) -> Books {
+    film.deposit(shots, model, surface, threads, &mut |_, _| {}).unwrap()
+}
+
+/// A whole Gaussian: the cut leaves 2e-22 of it.
+fn uncut() -> SprayModel {
+    SprayModel { cut: 10.0, ..SprayModel::default() }
+}
+
+#[test]
+fn density_on_tilted_planes() {
+    // Sigma 8 degrees, 10 cm, unit volume: values by an independent evaluation, checked there by Monte Carlo.
+    let expected =
+        [(0.0, [805.78, 587.21, 559.63]), (30.0, [697.82, 479.14, 616.58]), (60.0, [402.89, 282.11, 499.87])];
+    for (degrees, values) in expected {
+        let (s, c) = f64::to_radians(degrees).sin_cos();
+        for ((u, v), value) in [(0.0, 0.0), (0.01, 0.005), (-0.012, 0.0)].into_iter().zip(values) {
+            let point = Point3::new(u * c, v, 0.1 + u * s);
+            let density = uncut().density(&Point3::origin(), &unit(0.0, 0.0, 1.0), &point, &unit(s, 0.0, -c));
+            assert!((density / value - 1.0).abs() < 1.3e-5, "{degrees} {u}: {density} instead of {value}");
+        }
+    }
+}
+
+#[test]
+fn all_paint_lands_on_a_plane_whatever_its_tilt() {
+    // A cone wider than 1.8 sigmas would not be closed by the plane of 75 degrees.
+    for (degrees, cut, step) in [(0.0, 3.0, 3e-3), (30.0, 3.0, 3e-3), (60.0, 3.0, 3e-3), (75.0_f64, 1.5, 1e-3)] {
+        let model = SprayModel { cut, range: 5.0, ..SprayModel::default() };
+        let mut texels = tilted_plane(degrees.to_radians(), 0.1, step, 0.4);
+        texels.retain(|texel| texel.point.y.abs() < 0.17);
+        let mut film = Film::new(texels).unwrap();
+        let books = spray(&mut film, &[shot(0.0, 0.0, 1e-9)], &model, &far_plate(), 1);
+        let share = books.deposited as f64 / books.emitted as f64;
+        assert!((share - 1.0).abs() < 1e-3, "{degrees}: {share}");
+        assert!(books.balanced() && books.emitted == 1_000_000_000);
+        assert_eq!(film.volumes().iter().sum::<u64>(), books.deposited);
+    }
+}
+
+#[test]
+fn a_straight_pass_leaves_the_line_dose() {
+    // 0.1 m/s over 0.4 m at 10 cm: dose(y) = Q/(v d t sqrt(2 pi)) exp(-y^2/(2 d^2 t^2)); the centre gets 283.862 Q.
+    let (speed, flow, spacing) = (0.1, 1e-6, 1e-3);
+    let shots: Vec<Shot> = (-200..=200).map(|i| shot(f64::from(i) * spacing, 0.0, flow * spacing / speed)).collect();
+    let offsets = [0.0, 0.01, 0.02, 0.03];
+    let texel = |&y: &f64| Texel { point: Point3::new(0.0, y, 0.1), normal: unit(0.0, 0.0, -1.0), area: 1e-8 };
+    let mut film = Film::new(offsets.iter().map(texel).collect()).unwrap();
+    let books = spray(&mut film, &shots, &uncut(), &far_plate(), 2);
+    assert!(books.balanced());
+    let deviation = 0.1 * 8.0_f64.to_radians().tan();
+    for (i, y) in offsets.iter().enumerate() {
+        let dose = 283.862 * flow * (-0.5 * (y / deviation).powi(2)).exp();
+        // The texels are tiny, so whole femtolitres matter a little.
+        assert!((film.thickness(i) / dose - 1.0).abs() < 2e-4, "{y}: {} instead of {dose}", film.thickness(i));
+    }
+}
+
+#[test]
+fn coarse_texels_are_integrated() {
+    // One square of 4 cm at 10 cm catches erf(0.02 / (sqrt(2) 0.1 tan 8 deg))^2 of the paint (erf from Python's math).
+    let texel = Texel { point: Point3::new(0.0, 0.0, 0.1), normal: unit(0.0, 0.0, -1.0), area: 0.04 * 0.04 };
+    let mut film = Film::new(vec![texel]).unwrap();
+    let books = spray(&mut film, &[shot(0.0, 0.0, 1e-9)], &uncut(), &far_plate(), 1);
+    let share = books.deposited as f64 / books.emitted as f64;
+    assert!((share / ERF_SQUARED - 1.0).abs() < 2e-3, "{share}");
+}
+const ERF_SQUARED: f64 = 0.7145072034719534;
+
+#[test]
+fn the_tree_misses_no_texel() {
+    let mut state = 11_u64;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let texels: Vec<Texel> = (0..3000)
+        .map(|_| Texel {
+            point: Point3::new(uniform() - 0.5, uniform() - 0.5, uniform() - 0.5),
+            normal: unit(uniform() - 0.5, uniform() - 0.5, uniform() - 0.5),
+            area: 1e-6,
+        })
+        .collect();
+    let model = SprayModel { range: 0.5, ..SprayModel::default() };
+    for _ in 0..40 {
+        let shot = Shot {
+            origin: Point3::new(uniform() - 0.5, uniform() - 0.5, uniform() - 0.5),
+            axis: unit(uniform() - 0.5, uniform() - 0.5, uniform() - 0.5),
+            volume: 1e-9,
+        };
+        let mut film = Film::new(texels.clone()).unwrap();
+        spray(&mut film, &[shot], &model, &far_plate(), 1);
+        for (texel, &volume) in texels.iter().zip(film.volumes()) {
+            // Texels right before the nozzle are subdivided, where the plain density is no oracle.
+            if (texel.point - shot.origin).dot(&shot.axis) > 0.1 {
+                let density = model.density(&shot.origin, &shot.axis, &texel.point, &texel.normal);
+                assert!((density * texel.area * 1e9 - volume as f64).abs() <= 1.0, "{density} {volume}");
+            }
+        }
+    }
+}
+
+#[test]
+fn shadows_and_backs_get_nothing() {
+    // A plate at half the height covers x > 0; its own top is not painted (no texels there).
+    let (positions, faces) = plate(0.05, 0.0, 1.0);
+    let surface = TriangleSurface::new(&positions, &faces).unwrap();
+    let mut film = Film::new(tilted_plane(0.0, 0.1, 2e-3, 0.05)).unwrap();
+    let mut back = film.layer();
+    let books = spray(&mut film, &[shot(0.0, 0.0, 1e-9)], &SprayModel::default(), &surface, 1);
+    for (texel, &volume) in film.texels().iter().zip(film.volumes()) {
+        if texel.point.x > 1e-9 {
+            assert_eq!(volume, 0, "{}", texel.point);
+        } else if texel.point.x < -1e-9 && texel.point.coords.xy().norm() < 0.04 {
+            assert!(volume > 0, "{}", texel.point);
+        }
+    }
+    assert!(books.balanced() && books.overspray > 0);
+    let from_behind = Shot { origin: Point3::new(0.0, 0.0, 0.2), axis: unit(0.0, 0.0, -1.0), volume: 1e-9 };
+    assert_eq!(spray(&mut back, &[from_behind], &SprayModel::default(), &far_plate(), 1).deposited, 0);
+}
+
+#[test]
+fn the_same_bytes_for_any_number_of_threads() {
+    let (positions, faces) = plate(0.05, 0.0, 1.0);
+    let surface = TriangleSurface::new(&positions, &faces).unwrap();
+    let shots: Vec<Shot> = (0..3000).map(|i| shot(0.05 * (f64::from(i) * 0.01).sin(), 0.0, 5.4321e-12)).collect();
+    let blank = Film::new(tilted_plane(0.3, 0.1, 2e-3, 0.06)).unwrap();
+    let results: Vec<(Vec<u64>, Books)> = [1, 2, 3, 7]
+        .map(|threads| {
+            let mut film = blank.layer();
+            let mut calls = Vec::new();
+            film.deposit(&shots, &SprayModel::default(), &surface, threads, &mut |done, all| calls.push((done, all)))
+                .unwrap();
+            assert_eq!(calls, [(1024, 3000), (2048, 3000), (3000, 3000)]);
+            (film.volumes().to_vec(), film.books())
+        })
+        .to_vec();
+    assert!(results.windows(2).all(|pair| pair[0] == pair[1]));
+    let (volumes, books) = &results[0];
+    assert!(books.balanced() && books.deposited > 0);
+    assert_eq!(volumes.iter().sum::<u64>(), books.deposited);
+    assert_eq!(books.emitted, 3000 * 5_432_100);
+}
+
+#[test]
+fn texels_cannot_claim_more_than_was_sprayed() {
+    // Every texel twice: the sum claims 200 %.
+    let mut texels = tilted_plane(0.0, 0.1, 1e-3, 0.06);
+    texels.extend(texels.clone());
+    let mut film = Film::new(texels).unwrap();
+    let model = SprayModel { efficiency: 0.6, ..SprayModel::default() };
+    let books = spray(&mut film, &[shot(0.0, 0.0, 1e-9)], &model, &far_plate(), 1);
+    assert_eq!(books, Books { emitted: 1_000_000_000, deposited: 600_000_000, overspray: 400_000_000 });
+}
+
+#[test]
+fn thickness_is_volume_over_area() {
+    let texel = Texel { point: Point3::new(0.0, 0.0, 0.1), normal: unit(0.0, 0.0, -1.0), area: 1e-6 };
+    let mut film = Film::new(vec![texel]).unwrap();
+    spray(&mut film, &[shot(0.0, 0.0, 1e-9)], &SprayModel::default(), &far_plate(), 1);
+    assert_eq!(film.thickness(0), film.volumes()[0] as f64 * QUANTUM / 1e-6);
+    assert_eq!(film.thickness(1), 0.0);
+    assert_eq!(film.layer().books(), Books::default());
+}
+
+#[test]
+fn bad_input_is_named_and_leaves_the_film_alone() {
+    assert!(matches!(Film::new(vec![]), Err(Error::Empty { what: "texels" })));
+    let mut texels = tilted_plane(0.0, 0.1, 0.01, 0.02);
+    texels[3].point.x = f64::NAN;
+    assert!(matches!(Film::new(texels.clone()), Err(Error::NotFinite { index: 3, .. })));
+    texels[3].point.x = 0.0;
+    texels[3].area = 0.0;
+    assert!(matches!(Film::new(texels.clone()), Err(Error::OutOfRange { what: "texel area", .. })));
+    texels[3].area = 1e-4;
+    let mut film = Film::new(texels).unwrap();
+    let mut attempt = |shots: &[Shot], model: &SprayModel, threads| {
+        let result = film.deposit(shots, model, &far_plate(), threads, &mut |_, _| {});
+        assert_eq!(film.books(), Books::default());
+        result.unwrap_err()
+    };
+    let (good, model) = (shot(0.0, 0.0, 1e-9), SprayModel::default());
+    let mut bad = good;
+    bad.origin.y = f64::INFINITY;
+    assert!(matches!(attempt(&[good, bad], &model, 1), Error::NotFinite { index: 1, .. }));
+    let mut bad = good;
+    bad.axis = UnitVector3::new_unchecked(Vector3::new(0.0, 0.0, 2.0));
+    assert!(matches!(attempt(&[bad], &model, 1), Error::OutOfRange { .. }));
+    assert!(matches!(attempt(&[shot(0.0, 0.0, -1.0)], &model, 1), Error::OutOfRange { .. }));
+    assert!(matches!(attempt(&[shot(0.0, 0.0, 10.0), shot(0.0, 0.0, 10.0)], &model, 1), Error::BooksOverflow));
+    assert!(matches!(attempt(&[good], &model, 0), Error::OutOfRange { what: "threads", .. }));
+    let wide = SprayModel { sigma: 2.0, ..model };
+    assert!(matches!(attempt(&[good], &wide, 1), Error::OutOfRange { what: "spray.sigma", .. }));
+}
