@@ -72,6 +72,14 @@ pub enum Error {
         /// Number of boundary loops.
         boundary_loops: usize,
     },
+    /// A path along which the surface cannot be cut.
+    #[error("the surface cannot be cut along this path: {problem} (path[{index}])")]
+    Cut {
+        /// Index into the path.
+        index: usize,
+        /// What is wrong there and what would be right.
+        problem: &'static str,
+    },
     /// The flip-free minimiser needs an injective start, and rounding destroyed it.
     #[error("{faces} triangles collapse in the start layout (a long tube?); cut the surface open along the tube")]
     CollapsedStart {

@@ -38,6 +38,8 @@
 mod arap;
 mod calipers;
 mod chart;
+mod clip;
+mod cut;
 mod disk;
 mod error;
 mod layout;
@@ -52,6 +54,7 @@ mod unwrap;
 
 pub use calipers::{Rectangle, convex_hull, min_area_rectangle};
 pub use chart::{Chart, SurfacePoint};
+pub use cut::{CutSettings, unwrap_with_cuts};
 pub use disk::{Disk, Findings, Repair, largest_disk, largest_disk_with};
 pub use error::Error;
 pub use nalgebra;
