@@ -27,6 +27,7 @@
 //! | equation | item |
 //! |---|---|
 //! | Liu et al. 2008, local/global ARAP | [`unwrap`], [`Method::Arap`] |
+//! | Peng et al. 2018, Anderson acceleration of the iteration | [`Method::Arap`] |
 //! | Smith and Schaefer 2015, symmetric Dirichlet energy | [`Method::SymmetricDirichlet`] |
 //! | Tutte 1963, convex combination start | [`unwrap`] |
 //! | thesis 8.3.1, box of smallest area by rotating calipers | [`min_area_rectangle`], [`Chart::new`] |
@@ -37,6 +38,8 @@
 mod arap;
 mod calipers;
 mod chart;
+mod clip;
+mod cut;
 mod disk;
 mod error;
 mod layout;
@@ -51,6 +54,7 @@ mod unwrap;
 
 pub use calipers::{Rectangle, convex_hull, min_area_rectangle};
 pub use chart::{Chart, SurfacePoint};
+pub use cut::{CutSettings, unwrap_with_cuts};
 pub use disk::{Disk, Findings, Repair, largest_disk, largest_disk_with};
 pub use error::Error;
 pub use nalgebra;
