@@ -45,7 +45,7 @@ impl Padded {
         &self.values[line * self.stride + column..][..length]
     }
 
-    /// A copy with NaN where the 3x3 patch has a gap, or bends or jumps by more than three standard deviations of its
+    /// A copy with NaN where the 3x3 patch has a gap, or bends or jumps by more than four standard deviations of its
     /// noise.
     pub(super) fn without_edges(&self, noise: &Noise) -> Self {
         let s = self.stride;
@@ -65,13 +65,14 @@ fn smooth_line(around: [&[f32]; 3], noise: Noise, out: &mut [f32]) {
         let omega = here[u + 1];
         let second = |a: f32, b: f32| (a + b - 2.0 * omega) * (a + b - 2.0 * omega);
         // One second difference has six times the variance of a pixel. Along an edge of the surface at least two of the
-        // four are large. A sum, because it keeps a NaN.
+        // four are large. A sum, because it keeps a NaN. Three standard deviations would flag one pixel in a hundred of
+        // a noisy plane, and so spoil half of the windows.
         let bend = second(here[u], here[u + 2])
             + second(above[u + 1], below[u + 1])
             + second(above[u], below[u + 2])
             + second(above[u + 2], below[u]);
         let sigma = noise.sigma_inverse(omega);
-        out[u] = if bend <= 2.0 * 6.0 * 9.0 * sigma * sigma { omega } else { f32::NAN };
+        out[u] = if bend <= 2.0 * 6.0 * 16.0 * sigma * sigma { omega } else { f32::NAN };
     }
 }
 
