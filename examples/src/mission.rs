@@ -146,8 +146,13 @@ pub enum MissionError {
     },
 }
 
-/// Motion of the nozzle that one shot stands for, metres: a third of the spot's deviation.
-const SHOT_STEP: f64 = 0.008;
+/// Motion of the nozzle that one shot stands for, metres: widens the spot by less than a percent.
+const SHOT_STEP: f64 = 0.01;
+
+/// Where the cone of the spray ends, in deviations: all but 0.2 % of the paint lies inside.
+const SPRAY_CUT: f64 = 3.5;
+/// Paint that has met nothing after this way is overspray, metres: what lies behind the edge of a surface stays clean.
+const SPRAY_RANGE: f64 = 0.35;
 
 /// A mission is given up when more of the wanted paint than this is out of reach.
 const MOST_OUT_OF_REACH: f64 = 0.9;
@@ -316,13 +321,13 @@ fn describe(surface: &PaintSurface) -> String {
 
 /// The footprint of the nozzle in texels, with all of its tails.
 fn kernel(settings: &MissionSettings) -> Result<SprayKernel, paint_net::Error> {
-    SprayKernel::new(settings.spot / settings.texel, 4.0)
+    SprayKernel::new(settings.spot / settings.texel, SPRAY_CUT)
 }
 
 /// The same nozzle in the simulation.
 fn spray(settings: &MissionSettings) -> SprayModel {
     let sigma = (settings.spot / settings.planner.nozzle.stand_off).atan();
-    SprayModel { sigma, cut: 4.0, ..SprayModel::default() }
+    SprayModel { sigma, cut: SPRAY_CUT, range: SPRAY_RANGE, ..SprayModel::default() }
 }
 
 /// Layers of sprays for the wanted picture.
