@@ -1,9 +1,13 @@
 //! What a run found: `report.json` for programs, `report.md` for people.
 
+mod check;
+
 use std::fmt::Write as _;
 use std::path::Path;
 
 use serde::Serialize;
+
+pub use check::{Check, Must, Unit};
 
 /// The figures of one mission. Flat, SI units in the names; every number is finite.
 #[derive(Debug, Clone, Serialize)]
@@ -92,6 +96,9 @@ pub struct Report {
     pub peak_rss_bytes: u64,
 }
 
+/// The papers give no such figure.
+const NOT_REPORTED: &str = "-";
+
 /// What is wrong with a report.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
@@ -123,77 +130,93 @@ impl Report {
         write(&folder.join("report.md"), &self.markdown())
     }
 
-    /// The rows of the table: figure, value, floor, what the papers report, whether the floor holds.
-    fn rows(&self) -> Vec<(&'static str, String, String, &'static str, bool)> {
-        let cm = |m: f64| format!("{:.2} cm", 100.0 * m);
-        let at_most =
-            |name, value: f64, limit: f64, paper| (name, cm(value), format!("≤ {}", cm(limit)), paper, value <= limit);
-        let smoothing_ratio = self.smoothing_normal_deviation_mean_m / self.normal_deviation_mean_m;
-        let locked_ratio = self.ptu_locked_hit_error_rms_m / self.hit_error_rms_m;
-        let ssim_ratio = self.ssim_painted / self.ssim_canvas;
-        let percent = 100.0 * self.unreachable_normal_share;
+    /// Every figure that is asked for, with what is asked of it: the one place where the floors stand.
+    pub fn checks(&self) -> Vec<Check> {
+        use Must::{AtLeast, AtMost, Open};
+        use Unit::{Centimetres, Count, Decibels, Index, Milliseconds, Percent, Ratio, Relative};
+        let check = |figure, value: f64, unit, must, papers| Check { figure, value, unit, must, papers, detail: None };
+        let beside = |check: Check, unit: Unit, value: f64| Check { detail: Some(unit.show(value)), ..check };
+        let smoothing = self.smoothing_normal_deviation_mean_m;
+        let locked = self.ptu_locked_hit_error_rms_m;
         vec![
-            at_most("Nozzle off the normal, mean", self.normal_deviation_mean_m, 0.004, "0.4 cm"),
-            at_most("Nozzle off the normal, largest", self.normal_deviation_max_m, 0.02, "2 cm"),
-            (
-                "Smoothing planner, mean, ratio to ours",
-                format!("{} ({smoothing_ratio:.1}x)", cm(self.smoothing_normal_deviation_mean_m)),
-                "≥ 5x".into(),
-                "4.5 cm",
-                smoothing_ratio >= 5.0,
+            check("Nozzle off the normal, mean", self.normal_deviation_mean_m, Centimetres, AtMost(0.004), "0.4 cm"),
+            check("Nozzle off the normal, largest", self.normal_deviation_max_m, Centimetres, AtMost(0.02), "2 cm"),
+            beside(
+                check(
+                    "Smoothing planner off the normal, ratio to ours",
+                    smoothing / self.normal_deviation_mean_m,
+                    Ratio,
+                    AtLeast(5.0),
+                    "4.5 cm",
+                ),
+                Centimetres,
+                smoothing,
             ),
-            ("Targets whose normal is out of reach", format!("{percent:.1} %"), "≤ 10 %".into(), "-", percent <= 10.0),
-            at_most("Hit error in flight, RMS", self.hit_error_rms_m, 0.015, "2.12 cm"),
-            at_most("Hit error in flight, 95 %", self.hit_error_p95_m, 0.03, "4 cm"),
-            ("Hit error with 7 cm SLAM, RMS", cm(self.hit_error_rms_slam_m), "-".into(), "-", true),
-            at_most("Nozzle distance, standard deviation", self.nozzle_distance_std_m, 0.015, "1.88 cm"),
-            (
-                "Hit error, pan-tilt unit locked",
-                format!("{} ({locked_ratio:.1}x)", cm(self.ptu_locked_hit_error_rms_m)),
-                "≥ 3x".into(),
-                "about 4x",
-                locked_ratio >= 3.0,
+            check(
+                "Targets whose normal is out of reach",
+                self.unreachable_normal_share,
+                Percent,
+                AtMost(0.1),
+                NOT_REPORTED,
             ),
-            (
-                "Planning per metre of path",
-                format!("{:.2} ms", 1e3 * self.planning_s_per_m),
-                "≤ 100 ms".into(),
-                "356 ms",
-                self.planning_s_per_m <= 0.1,
+            check("Hit error in flight, RMS", self.hit_error_rms_m, Centimetres, AtMost(0.015), "2.12 cm"),
+            check("Hit error in flight, 95 %", self.hit_error_p95_m, Centimetres, AtMost(0.03), "4 cm"),
+            check("Hit error with 7 cm SLAM, RMS", self.hit_error_rms_slam_m, Centimetres, Open, NOT_REPORTED),
+            check(
+                "Nozzle distance, standard deviation",
+                self.nozzle_distance_std_m,
+                Centimetres,
+                AtMost(0.015),
+                "1.88 cm",
             ),
-            (
-                "Paint books, relative",
-                format!("{:.1e}", self.mass_balance_relative),
-                "≤ 1e-12".into(),
-                "-",
-                self.mass_balance_relative <= 1e-12,
+            beside(
+                check(
+                    "Hit error with pan-tilt unit locked, ratio",
+                    locked / self.hit_error_rms_m,
+                    Ratio,
+                    AtLeast(3.0),
+                    "about 4x",
+                ),
+                Centimetres,
+                locked,
             ),
-            (
-                "Canvas against wanted, PSNR",
-                format!("{:.2} dB", self.psnr_canvas_db),
-                format!("≥ {:.2} dB (Gaussian-filtered)", self.psnr_ideal_db),
-                "the ideal",
-                self.psnr_canvas_db >= self.psnr_ideal_db,
+            check("Planning per metre of path", self.planning_s_per_m, Milliseconds, AtMost(0.1), "356 ms"),
+            check("Paint books, relative", self.mass_balance_relative, Relative, AtMost(1e-12), NOT_REPORTED),
+            beside(
+                check(
+                    "Canvas over the Gaussian-filtered ideal, PSNR",
+                    self.psnr_canvas_db - self.psnr_ideal_db,
+                    Decibels,
+                    AtLeast(0.0),
+                    "the ideal",
+                ),
+                Decibels,
+                self.psnr_canvas_db,
             ),
-            (
-                "Painted against wanted, SSIM over the canvas'",
-                format!("{:.3} ({ssim_ratio:.2}x)", self.ssim_painted),
-                "≥ 0.90x".into(),
-                "-",
-                ssim_ratio >= 0.9,
+            beside(
+                check(
+                    "Painted over canvas, SSIM against wanted",
+                    self.ssim_painted / self.ssim_canvas,
+                    Ratio,
+                    AtLeast(0.9),
+                    NOT_REPORTED,
+                ),
+                Index,
+                self.ssim_painted,
             ),
-            ("Mean colour difference, CIEDE2000", format!("{:.2}", self.ciede2000_mean), "-".into(), "-", true),
-            ("Collisions", self.collisions.to_string(), "0".into(), "-", self.collisions == 0),
-            ("Limit violations", self.limit_violations.to_string(), "0".into(), "-", self.limit_violations == 0),
+            check("Mean colour difference, CIEDE2000", self.ciede2000_mean, Index, Open, NOT_REPORTED),
+            check("Collisions", self.collisions as f64, Count, AtMost(0.0), NOT_REPORTED),
+            check("Limit violations", self.limit_violations as f64, Count, AtMost(0.0), NOT_REPORTED),
         ]
     }
 
     /// The main figures on a few lines.
     pub fn summary(&self) -> String {
         let mut text = String::new();
-        for (figure, value, floor, _, holds) in self.rows() {
-            let _ =
-                writeln!(text, "  {figure:44} {value:>24}   {floor:34}{}", if holds { "" } else { "  NOT REACHED" });
+        for check in self.checks() {
+            let verdict = if check.holds() { "" } else { "  NOT REACHED" };
+            let (figure, value, must) = (check.figure, check.value_text(), check.must_text());
+            let _ = writeln!(text, "  {figure:48} {value:>20}   {must:12}{verdict}");
         }
         text
     }
@@ -224,9 +247,10 @@ impl Report {
             let _ = writeln!(text, "**{caption}**\n\n![{caption}]({file})\n");
         }
         text.push_str("| figure | this run | asked for | papers | |\n|---|---|---|---|---|\n");
-        for (figure, value, floor, paper, holds) in self.rows() {
-            let _ =
-                writeln!(text, "| {figure} | {value} | {floor} | {paper} | {} |", if holds { "yes" } else { "**no**" });
+        for check in self.checks() {
+            let verdict = if check.holds() { "yes" } else { "**no**" };
+            let (figure, value, must) = (check.figure, check.value_text(), check.must_text());
+            let _ = writeln!(text, "| {figure} | {value} | {must} | {} | {verdict} |", check.papers);
         }
         let _ = writeln!(
             text,

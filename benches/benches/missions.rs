@@ -1,0 +1,121 @@
+//! Paints the built-in rock once per seed and holds every figure of the report against what is asked of it.
+//!
+//! `cargo bench -p paintcopter-benches --bench missions -- --seeds 1..10`
+
+use std::ops::RangeInclusive;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Parser;
+use paintcopter_examples::design::Design;
+use paintcopter_examples::mission::{Mission, MissionError, MissionSettings};
+use paintcopter_examples::report::Check;
+use paintcopter_examples::world::rock_wall;
+
+/// Most missions of one run: more is a slip of the keyboard.
+const MOST_SEEDS: u64 = 1000;
+
+/// Runs the main job on the built-in rock for every seed and prints one table of its figures; fails if one of them is not
+/// what is asked for.
+#[derive(Parser)]
+struct Arguments {
+    /// Seeds, first and last included: A..B, or one alone
+    #[arg(long, default_value = "1..10", value_parser = seeds)]
+    seeds: RangeInclusive<u64>,
+    /// Worker threads of a mission [default: all cores]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// What `cargo bench` says; without it nothing is run
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
+fn seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
+    let (first, last) = text.split_once("..").unwrap_or((text, text));
+    let number = |text: &str| text.parse::<u64>().map_err(|_| format!("\"{text}\" is not a seed; give A..B"));
+    let (first, last) = (number(first)?, number(last)?);
+    match last.checked_sub(first) {
+        Some(more) if more < MOST_SEEDS => Ok(first..=last),
+        Some(_) => Err(format!("at most {MOST_SEEDS} seeds")),
+        None => Err("the first seed must not be larger than the last".into()),
+    }
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    if !arguments.bench {
+        // `cargo test --all-targets` starts benches as well.
+        eprintln!("missions: skipped; run `cargo bench -p paintcopter-benches --bench missions`");
+        return ExitCode::SUCCESS;
+    }
+    let mut missions = Vec::new();
+    for seed in arguments.seeds {
+        let clock = Instant::now();
+        match checks(seed, arguments.threads) {
+            Ok(checks) => missions.push((seed, checks)),
+            Err(error) => {
+                eprintln!("missions: seed {seed}: {error}");
+                return ExitCode::FAILURE;
+            }
+        }
+        eprintln!("seed {seed}: {:.0} s", clock.elapsed().as_secs_f64());
+    }
+    print!("{}", table(&missions));
+    let missed = missions.iter().flat_map(|(_, checks)| checks).filter(|c| !c.holds()).count();
+    if missed > 0 {
+        eprintln!("missions: {missed} figures are not what is asked for");
+        return ExitCode::FAILURE;
+    }
+    ExitCode::SUCCESS
+}
+
+fn checks(seed: u64, threads: Option<u16>) -> Result<Vec<Check>, MissionError> {
+    let mut settings = MissionSettings { seed, ..MissionSettings::default() };
+    if let Some(threads) = threads {
+        settings.threads = threads.into();
+    }
+    let mission = Mission::run("Rock wall", &rock_wall(seed), &Design::Strata { seed }, settings)?;
+    Ok(mission.report()?.checks())
+}
+
+/// One row per figure, one column per seed.
+fn table(missions: &[(u64, Vec<Check>)]) -> String {
+    let seeds = missions.iter().map(|(seed, _)| format!("seed {seed}"));
+    let head = ["figure".into(), "asked for".into()].into_iter().chain(seeds).chain(["worst".into(), "holds".into()]);
+    let mut rows = vec![head.collect::<Vec<String>>()];
+    let count = missions.first().map_or(0, |(_, checks)| checks.len());
+    for k in 0..count {
+        let column: Vec<&Check> = missions.iter().map(|(_, checks)| &checks[k]).collect();
+        let show = |check: &Check| check.unit.show(check.value);
+        // A NaN has no margin: it is worse than everything.
+        let margin = |check: &Check| if check.holds() { check.margin() } else { check.margin().min(0.0) };
+        let worst = column.iter().copied().min_by(|a, b| margin(a).total_cmp(&margin(b)));
+        let mut row = vec![column[0].figure.to_string(), column[0].must_text()];
+        row.extend(column.iter().map(|c| show(c)));
+        row.push(worst.filter(|c| c.margin() != f64::INFINITY).map_or("-".into(), show));
+        row.push(if column.iter().all(|c| c.holds()) { "yes".into() } else { "NO".into() });
+        rows.push(row);
+    }
+    aligned(&rows)
+}
+
+/// The rows as a Markdown table with columns of even width, the first row as its head.
+fn aligned(rows: &[Vec<String>]) -> String {
+    let columns = rows.first().map_or(0, Vec::len);
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let mut text = String::new();
+    for (k, row) in rows.iter().enumerate() {
+        for (cell, &width) in row.iter().zip(&widths) {
+            text += &format!("| {cell:width$} ");
+        }
+        text += "|\n";
+        if k == 0 {
+            for width in &widths {
+                text += &format!("|{}", "-".repeat(width + 2));
+            }
+            text += "|\n";
+        }
+    }
+    text
+}

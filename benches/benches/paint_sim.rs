@@ -1,0 +1,149 @@
+//! The simulator: paint films, colours, spray, flight and pictures, on the rock and with the main job's settings.
+
+use std::error::Error;
+use std::hint::black_box;
+
+use criterion::measurement::WallTime;
+use criterion::{BenchmarkGroup, Criterion, Throughput};
+use nalgebra::{Point3, Vector3};
+use paint_planner::{OptimalPlanner, Planner};
+use paint_sim::colour::{BANDS, Spectrum, spectrum_srgb8};
+use paint_sim::{
+    Camera, Film, FlightSettings, Hit, Lights, Look, Paint, Reference, ReferenceState, Shot, SprayModel, Substrate,
+    ciede2000, fly, km, render,
+};
+use paintcopter_benches::{Rng, criterion, rock};
+use paintcopter_examples::adapters::{PlannedFlight, Robot, ServoGun, Wall};
+use paintcopter_examples::mission::MissionSettings;
+use paintcopter_examples::surface::PaintSurface;
+use ptu_kinematics::Ptu;
+
+type AnyError = Box<dyn Error>;
+type Group<'a> = BenchmarkGroup<'a, WallTime>;
+
+/// Films of single precision.
+const FILMS: usize = 1_000_000;
+/// Films of double precision, and colours.
+const FEWER: usize = 100_000;
+const SHOTS: usize = 1000;
+/// Seconds flown.
+const FLOWN: f64 = 10.0;
+
+fn main() -> Result<(), AnyError> {
+    let surface = rock::rock()?;
+    let mut criterion: Criterion = criterion();
+    let mut group = criterion.benchmark_group("paint-sim");
+    films(&mut group)?;
+    colours(&mut group);
+    deposit(&mut group, &surface)?;
+    flight(&mut group, &surface)?;
+    picture(&mut group, &surface)?;
+    group.finish();
+    criterion.final_summary();
+    Ok(())
+}
+
+/// Kubelka-Munk over 36 bands, films of 0 to 60 µm.
+fn films(group: &mut Group) -> Result<(), AnyError> {
+    let paint = Paint::yellow(20e-6)?;
+    let ground = Substrate::grey(0.5)?;
+    let mut rng = Rng(2);
+    let thickness: Vec<f64> = (0..FILMS).map(|_| rng.between(0.0, 60e-6)).collect();
+
+    let narrow = |spectrum: &Spectrum| spectrum.map(|v| v as f32);
+    let (k, s, below) = (narrow(paint.absorption()), narrow(paint.scattering()), narrow(ground.reflectance()));
+    let mut reflectance = vec![[0.0_f32; BANDS]; FILMS];
+    group.throughput(Throughput::Elements((FILMS * BANDS) as u64));
+    group.bench_function("Kubelka-Munk f32, 1e6 films x 36 bands", |b| {
+        b.iter(|| {
+            for (film, &depth) in reflectance.iter_mut().zip(&thickness) {
+                *film = std::array::from_fn(|j| km::reflectance_f32(k[j], s[j], depth as f32, below[j]));
+            }
+            black_box(&mut reflectance);
+        });
+    });
+    group.throughput(Throughput::Elements((FEWER * BANDS) as u64));
+    group.bench_function("Kubelka-Munk f64, 1e5 films x 36 bands", |b| {
+        let film = |depth: &f64| paint.over(*depth, &ground).map_or(f64::NAN, |film| film.reflectance()[BANDS / 2]);
+        b.iter(|| thickness[..FEWER].iter().map(film).sum::<f64>());
+    });
+    group.throughput(Throughput::Elements(FEWER as u64));
+    let spectra: Vec<Spectrum> =
+        thickness[..FEWER].iter().filter_map(|d| paint.over(*d, &ground).ok()).map(|f| *f.reflectance()).collect();
+    group.bench_function("spectrum to sRGB", |b| {
+        b.iter(|| spectra.iter().map(|s| u32::from(spectrum_srgb8(s).rgb[0])).sum::<u32>());
+    });
+    Ok(())
+}
+
+fn colours(group: &mut Group) {
+    let mut rng = Rng(4);
+    let mut lab = || [rng.between(0.0, 100.0), rng.between(-80.0, 80.0), rng.between(-80.0, 80.0)];
+    let pairs: Vec<[[f64; 3]; 2]> = (0..FEWER).map(|_| [lab(), lab()]).collect();
+    group.throughput(Throughput::Elements(FEWER as u64));
+    group.bench_function("CIEDE2000", |b| b.iter(|| pairs.iter().map(|[x, y]| ciede2000(*x, *y)).sum::<f64>()));
+}
+
+fn deposit(group: &mut Group, surface: &PaintSurface) -> Result<(), AnyError> {
+    let settings = MissionSettings::default();
+    let stand_off = settings.planner.nozzle.stand_off;
+    let shot = |t: &paint_planner::Target| Shot {
+        origin: t.point + t.normal.into_inner() * stand_off,
+        axis: -t.normal,
+        volume: t.dose * 0.025,
+    };
+    let shots: Vec<Shot> = rock::stroke(surface, SHOTS).iter().map(shot).collect();
+    let spray = SprayModel { sigma: (settings.spot / stand_off).atan(), cut: 4.0, ..SprayModel::default() };
+    let mut film = Film::new(surface.film_texels().0)?;
+    film.deposit(&shots, &spray, &surface.world, 1, &mut |_, _| ())?;
+    group.throughput(Throughput::Elements(shots.len() as u64));
+    group.bench_function(format!("deposit on {} texels", film.texels().len()), |b| {
+        b.iter(|| film.deposit(&shots, &spray, &surface.world, 1, &mut |_, _| ()));
+    });
+    Ok(())
+}
+
+/// The first seconds of a reference.
+struct Beginning<'a>(PlannedFlight<'a>);
+
+impl Reference for Beginning<'_> {
+    fn duration(&self) -> f64 {
+        FLOWN
+    }
+
+    fn at(&self, t: f64) -> ReferenceState {
+        self.0.at(t)
+    }
+}
+
+/// Ten seconds along a stroke, after two of hover: physics at 1 kHz, control and aim at 100 Hz.
+fn flight(group: &mut Group, surface: &PaintSurface) -> Result<(), AnyError> {
+    let settings = MissionSettings::default();
+    let robot = Robot::new(Ptu::new(settings.ptu)?);
+    let targets = rock::stroke(surface, 300);
+    let plan = OptimalPlanner::default().plan(&targets, &Wall(&surface.world), &robot, &settings.planner)?;
+    let stand_off = settings.planner.nozzle.stand_off;
+    let reference = Beginning(PlannedFlight { plan: &plan, ptu: &robot.ptu, stand_off });
+    let mut gun = ServoGun::new(robot.ptu.clone(), settings.servo)?;
+    let usual = FlightSettings::default();
+    fly(&reference, &mut gun, &surface.world, &usual)?;
+    group.throughput(Throughput::Elements(FLOWN as u64));
+    group.bench_function("closed-loop flight of 10 s", |b| {
+        b.iter(|| fly(&reference, &mut gun, &surface.world, &usual));
+    });
+    Ok(())
+}
+
+fn picture(group: &mut Group, surface: &PaintSurface) -> Result<(), AnyError> {
+    let size = (640, 480);
+    let (eye, middle) = (Point3::new(-5.0, 0.5, 2.6), Point3::new(0.0, 0.0, 2.6));
+    let camera = Camera::looking_at(&eye, &middle, &Vector3::z(), 1.0, size)?;
+    let shade = |hit: &Hit| Look { albedo: [0.5; 3], normal: hit.normal };
+    let lights = Lights::default();
+    render(&surface.world, &camera, &shade, &lights, 1, 1)?;
+    group.throughput(Throughput::Elements(u64::from(size.0 * size.1)));
+    group.bench_function("render 640 x 480 with shadows, one thread", |b| {
+        b.iter(|| render(&surface.world, &camera, &shade, &lights, 1, 1));
+    });
+    Ok(())
+}
