@@ -17,7 +17,9 @@ const ROUNDS: usize = 3;
 const TRIAL: usize = 4;
 /// Newton iterations from one cut to the next (ours).
 const SETTLE: usize = 10;
-/// Tolerance of both: the next cut moves everything again (ours).
+/// Newton iterations of a layout from the start (ours).
+const FRESH: usize = 30;
+/// Tolerance of all three: the next cut moves everything again (ours).
 const ROUGH: f64 = 1e-3;
 /// A cut must take away at least this fraction of the cost (ours).
 const GAIN: f64 = 0.01;
@@ -70,10 +72,8 @@ pub fn unwrap_with_cuts(
     let mut best = Opened::start(disk, &settings, cuts, progress)?;
     while best.unfit(cuts) > cuts.share && best.chart.disk().cuts() < cuts.max_cuts {
         let Some(next) = best.best_cut()? else { break };
-        let next = next.relaxed(&rough(SETTLE), &mut |_| ())?;
-        if next.cost() > (1.0 - GAIN) * best.cost() {
-            break;
-        }
+        let settled = next.relaxed(&rough(SETTLE), &mut |_| ());
+        let Some(next) = best.better(settled)? else { break };
         best = next;
         best.report(progress);
     }
@@ -147,26 +147,43 @@ impl Opened {
         area / disk.area() + self.chart.quality().overlap_share
     }
 
-    /// Of the cuts to the worst places the one that lowers the cost most; if none pays, of those to the next places.
+    /// The cut to a large hole if it pays, because no number of other cuts does what joining it does; else of the cuts to the
+    /// worst places the one that lowers the cost most; if none pays, of those to the next places.
     fn best_cut(&self) -> Result<Option<Self>, Error> {
         let paths = Paths::new(self.chart.disk());
+        if let Some(hole) = tips::hole(self.chart.disk(), &paths) {
+            let joined = self.better(self.joined(&paths.from(hole)))?;
+            if joined.is_some() {
+                return Ok(joined);
+            }
+        }
         for tips in tips::tips(&self.chart, &paths, ROUNDS * CANDIDATES).chunks(CANDIDATES) {
             let mut best: Option<Self> = None;
             for &tip in tips {
-                let trial = match self.cut(&paths.from(tip))?.relaxed(&rough(TRIAL), &mut |_| ()) {
-                    // A cut that cannot be laid out is no candidate.
-                    Err(Error::Singular) => continue,
-                    trial => trial?,
-                };
-                if trial.cost() < best.as_ref().map_or(self.cost() * (1.0 - GAIN), Self::cost) {
-                    best = Some(trial);
-                }
+                let trial = self.cut(&paths.from(tip))?.relaxed(&rough(TRIAL), &mut |_| ());
+                let trial = self.better(trial)?;
+                best = trial.filter(|trial| best.as_ref().is_none_or(|best| trial.cost() < best.cost())).or(best);
             }
             if best.is_some() {
                 return Ok(best);
             }
         }
         Ok(None)
+    }
+
+    /// A trial that pays. One that drowns in rounding does not.
+    fn better(&self, trial: Result<Self, Error>) -> Result<Option<Self>, Error> {
+        match trial {
+            Err(Error::Singular | Error::CollapsedStart { .. }) => Ok(None),
+            trial => trial.map(|trial| (trial.cost() <= (1.0 - GAIN) * self.cost()).then_some(trial)),
+        }
+    }
+
+    /// Cut to a hole and laid out from the start: a ring that overlaps itself is wound up, and unwinds only slowly.
+    fn joined(&self, path: &[u32]) -> Result<Self, Error> {
+        let disk = self.chart.disk().cut(path)?;
+        let layout = lay_out(&disk, &rough(FRESH), &mut |_| ())?;
+        Self::new(disk, layout)
     }
 
     /// Cut along a path, both sides of the seam still where they were.

@@ -87,6 +87,19 @@ impl Disk {
         seams.map(|h| self.edge(h).norm()).fold(0.0, |sum, length| sum + length)
     }
 
+    /// Length of a closed line of vertices, metres.
+    pub(crate) fn loop_length(&self, vertices: &[u32]) -> f64 {
+        let at = |v: u32| nalgebra::Vector3::from(self.positions[v as usize]);
+        let next = vertices.iter().cycle().skip(1);
+        vertices.iter().zip(next).map(|(&a, &b)| (at(a) - at(b)).norm()).sum()
+    }
+
+    fn sort_loops(&mut self) {
+        let mut loops = std::mem::take(&mut self.loops);
+        loops.sort_by(|a, b| self.loop_length(b).total_cmp(&self.loop_length(a)));
+        self.loops = loops;
+    }
+
     /// From the start to the end of half-edge `h`.
     pub(crate) fn edge(&self, h: usize) -> nalgebra::Vector3<f64> {
         let corners = self.corners(h / 3).map(nalgebra::Vector3::from);

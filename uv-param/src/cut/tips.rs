@@ -1,5 +1,7 @@
 //! Where a seam should reach: the tops of the distortion.
 
+use std::f64::consts::TAU;
+
 use nalgebra::Vector3;
 
 use super::paths::Paths;
@@ -12,8 +14,18 @@ const BLUR: f64 = 0.03;
 const SHORTEST: f64 = 0.04;
 /// Least distance between two tips, in the same unit (ours).
 const SPACING: f64 = 0.16;
+/// Shortest rim of a hole that is worth joining to the outer boundary for its own sake, in the same unit (ours).
+const HOLE: f64 = 0.3;
 /// Most rounds of averaging, for very fine meshes.
 const ROUNDS: f64 = 100.0;
+
+/// A vertex on the rim of the longest hole, if that is neither small nor near the outer boundary.
+pub(super) fn hole(disk: &Disk, paths: &Paths) -> Option<u32> {
+    let unit = disk.area().sqrt();
+    let rim = disk.loops.get(1)?;
+    let long = disk.loop_length(rim) >= HOLE * unit;
+    (long && paths.distance[rim[0] as usize] >= SHORTEST * unit).then(|| rim[0])
+}
 
 /// The `count` vertices with the most distortion around them, far from the outer boundary and from each other, worst first.
 /// The way out counts too: a long cut frees more of the surface than a short one.
@@ -35,7 +47,38 @@ pub(super) fn tips(chart: &Chart, paths: &Paths, count: usize) -> Vec<u32> {
             tips.push(v);
         }
     }
+    sharpen(disk, &mut tips, BLUR * unit + mean_edge(disk), |v| inner(&v));
     tips
+}
+
+/// Moves every tip to the sharpest point within `radius`; those on the rim of a hole stay, they open it.
+fn sharpen(disk: &Disk, tips: &mut [u32], radius: f64, allowed: impl Fn(u32) -> bool) {
+    let deficits = angle_deficits(disk);
+    let at = |v: u32| Vector3::from(disk.positions[v as usize]);
+    for tip in tips {
+        if disk.loops.iter().flatten().any(|v| v == tip) {
+            continue;
+        }
+        let near = (0..disk.positions.len() as u32).filter(|&v| allowed(v) && (at(*tip) - at(v)).norm() <= radius);
+        *tip = near.max_by(|&a, &b| deficits[a as usize].total_cmp(&deficits[b as usize])).unwrap_or(*tip);
+    }
+}
+
+/// What is missing to a full turn around every inner vertex; 0 on the boundary. A cut frees most where it ends in a point:
+/// beyond the apex of a cone there is nothing left to flatten.
+fn angle_deficits(disk: &Disk) -> Vec<f64> {
+    let mut deficits = vec![TAU; disk.positions.len()];
+    for (f, face) in disk.faces.iter().enumerate() {
+        let doubled_area = disk.face_cross(f).norm();
+        for (k, &v) in face.iter().enumerate() {
+            let (out, back) = (disk.edge(3 * f + k), -disk.edge(3 * f + (k + 2) % 3));
+            deficits[v as usize] -= doubled_area.atan2(out.dot(&back));
+        }
+    }
+    for &v in disk.loops.iter().flatten() {
+        deficits[v as usize] = 0.0;
+    }
+    deficits
 }
 
 /// Mean of `ln max(s1, 1 / s2)` around every vertex, weighted by area.

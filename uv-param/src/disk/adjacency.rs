@@ -114,10 +114,3 @@ pub(super) fn fans(faces: &[[u32; 3]], twins: &[u32]) -> (Vec<u32>, Vec<u32>) {
     }
     (fan_of_corner, vertex_of_fan)
 }
-
-/// Length of a closed line of vertices.
-pub(super) fn loop_length(positions: &[[f64; 3]], vertices: &[u32]) -> f64 {
-    let at = |v: u32| nalgebra::Vector3::from(positions[v as usize]);
-    let next = vertices.iter().cycle().skip(1);
-    vertices.iter().zip(next).map(|(&a, &b)| (at(a) - at(b)).norm()).sum()
-}

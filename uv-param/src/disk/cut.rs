@@ -1,6 +1,6 @@
 //! Opening a disk along its edges.
 
-use super::adjacency::{boundary_loops, fans, half_edge, loop_length};
+use super::adjacency::{boundary_loops, fans, half_edge};
 use super::{BORDER, Disk};
 use crate::error::Error;
 
@@ -33,7 +33,7 @@ impl Disk {
             disk.faces[corner / 3][corner % 3] = name_of_fan[fan as usize];
         }
         disk.loops = boundary_loops(disk.positions.len(), &disk.faces, &disk.twins);
-        disk.loops.sort_by(|a, b| loop_length(&disk.positions, b).total_cmp(&loop_length(&disk.positions, a)));
+        disk.sort_loops();
         disk.cuts += 1;
         disk.check_whole(path)?;
         Ok(disk)

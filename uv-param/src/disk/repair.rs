@@ -1,6 +1,6 @@
 //! From a triangle soup to a [`Disk`], with an account of what was left out.
 
-use super::adjacency::{EdgeTable, boundary_loops, fans, half_edge, loop_length};
+use super::adjacency::{EdgeTable, boundary_loops, fans, half_edge};
 use super::{BORDER, Disk};
 use crate::error::Error;
 use crate::triangle;
@@ -86,13 +86,12 @@ pub fn largest_disk_with(
     findings.reversed_faces = reversed.iter().filter(|&&r| r).count();
     let vertex_source = separate_fans(&mut oriented, &twins, positions.len(), repair, &mut findings)?;
 
-    let mut loops = boundary_loops(vertex_source.len(), &oriented, &twins);
+    let loops = boundary_loops(vertex_source.len(), &oriented, &twins);
     findings.boundary_loops = loops.len();
     check_topology(vertex_source.len(), &twins, loops.len())?;
     let positions_kept: Vec<[f64; 3]> = vertex_source.iter().map(|&v| positions[v as usize]).collect();
-    loops.sort_by(|a, b| loop_length(&positions_kept, b).total_cmp(&loop_length(&positions_kept, a)));
     twins.shrink_to_fit();
-    let disk = Disk {
+    let mut disk = Disk {
         positions: positions_kept,
         faces: oriented,
         vertex_source,
@@ -106,6 +105,7 @@ pub fn largest_disk_with(
         source_vertices: positions.len(),
         source_faces: faces.len(),
     };
+    disk.sort_loops();
     Ok((disk, findings))
 }
 
