@@ -42,7 +42,7 @@ pub struct Picture {
 #[derive(Debug, thiserror::Error)]
 pub enum DesignError {
     /// Neither a built-in name nor a readable picture.
-    #[error("design \"{name}\": {why}; give stripes, gradient or a PNG or JPEG file")]
+    #[error("design \"{name}\": {why}; give strata, stripes, gradient, colours or a PNG or JPEG file")]
     Unusable {
         /// What was given.
         name: String,
@@ -67,6 +67,7 @@ impl Design {
             "strata" => Ok(Self::Strata { seed }),
             "stripes" => Ok(Self::Stripes),
             "gradient" => Ok(Self::Gradient),
+            "colours" => Ok(Self::VertexColours),
             file => Picture::open(Path::new(file)).map(Self::Picture),
         }
     }

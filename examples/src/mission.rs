@@ -2,6 +2,7 @@
 
 mod figures;
 mod gallery;
+mod inspect;
 
 use std::fmt::Write as _;
 use std::time::Instant;
@@ -120,6 +121,12 @@ pub enum MissionError {
         /// Share out of reach.
         percent: f64,
     },
+    /// The map of the painted surface.
+    #[error("scan: {0}")]
+    Scan(#[from] tsdf_hash::Error),
+    /// The trajectories of the flight.
+    #[error("trajectories: {0}")]
+    Trajectory(#[from] vio_ekf::Error),
     /// A picture.
     #[error(transparent)]
     Picture(#[from] PictureError),
@@ -139,8 +146,13 @@ pub enum MissionError {
     },
 }
 
-/// Motion of the nozzle that one shot stands for, metres: a third of the spot's deviation.
-const SHOT_STEP: f64 = 0.008;
+/// Motion of the nozzle that one shot stands for, metres: widens the spot by less than a percent.
+const SHOT_STEP: f64 = 0.01;
+
+/// Where the cone of the spray ends, in deviations: all but 0.2 % of the paint lies inside.
+const SPRAY_CUT: f64 = 3.5;
+/// Paint that has met nothing after this way is overspray, metres: what lies behind the edge of a surface stays clean.
+const SPRAY_RANGE: f64 = 0.35;
 
 /// A mission is given up when more of the wanted paint than this is out of reach.
 const MOST_OUT_OF_REACH: f64 = 0.9;
@@ -176,6 +188,8 @@ pub struct Mission {
     /// Pixel of every texel of the film.
     pixels: Vec<usize>,
     planning: f64,
+    /// Paint of layers that no pose of the robot can spray at all, m³.
+    abandoned: f64,
     started: Instant,
 }
 
@@ -216,23 +230,34 @@ impl Mission {
                 routes.push(route);
             }
         }
-        let mut plans = Vec::with_capacity(routes.len());
+        let mut plans: Vec<(Route, Plan, Plan)> = Vec::with_capacity(routes.len());
         let mut home: Option<VehicleState> = None;
-        for (k, route) in routes.iter().enumerate() {
-            stage.share(k as f64 / routes.len() as f64);
+        let count = routes.len();
+        let mut abandoned = 0.0;
+        for (k, route) in routes.into_iter().enumerate() {
+            stage.share(k as f64 / count as f64);
             let planner = paint_planner::Settings { start: home, ..settings.planner.clone() };
             let clock = Instant::now();
-            let plan = OptimalPlanner::default().plan(&route.targets, &Wall(&surface.world), &robot, &planner)?;
+            let plan = match OptimalPlanner::default().plan(&route.targets, &Wall(&surface.world), &robot, &planner) {
+                Err(paint_planner::Error::NothingReachable { .. }) => {
+                    abandoned += route.paint() + route.lost;
+                    continue;
+                }
+                plan => plan?,
+            };
             planning += clock.elapsed().as_secs_f64();
             home = plan.waypoints.last().map(|w| w.state);
             let smoothing = SmoothingPlanner.plan(&route.targets, &Wall(&surface.world), &robot, &settings.planner)?;
-            plans.push((plan, smoothing));
+            plans.push((route, plan, smoothing));
         }
-        let metres: f64 = plans.iter().map(|(p, _)| figures::path_length(p)).sum();
+        if plans.is_empty() {
+            return Err(MissionError::OutOfReach { percent: 100.0 });
+        }
+        let metres: f64 = plans.iter().map(|(_, plan, _)| figures::path_length(plan)).sum();
         stage.done(&format!("{metres:.0} m of path, {:.1} ms per metre", 1e3 * planning / metres));
 
         let stage = Stage::start("fly");
-        for (k, (route, (plan, smoothing))) in routes.into_iter().zip(plans).enumerate() {
+        for (k, (route, plan, smoothing)) in plans.into_iter().enumerate() {
             stage.share(k as f64 / layers.len() as f64);
             let [flight, slam, locked] = fly_three(&plan, &surface, &robot, &settings, k as u64)?;
             flights.push(LayerFlight { route, plan, smoothing, flight, slam, locked });
@@ -266,6 +291,7 @@ impl Mission {
             film,
             pixels,
             planning,
+            abandoned,
             started,
         };
         let share = mission.share_out_of_reach();
@@ -295,13 +321,13 @@ fn describe(surface: &PaintSurface) -> String {
 
 /// The footprint of the nozzle in texels, with all of its tails.
 fn kernel(settings: &MissionSettings) -> Result<SprayKernel, paint_net::Error> {
-    SprayKernel::new(settings.spot / settings.texel, 4.0)
+    SprayKernel::new(settings.spot / settings.texel, SPRAY_CUT)
 }
 
 /// The same nozzle in the simulation.
 fn spray(settings: &MissionSettings) -> SprayModel {
     let sigma = (settings.spot / settings.planner.nozzle.stand_off).atan();
-    SprayModel { sigma, cut: 4.0, ..SprayModel::default() }
+    SprayModel { sigma, cut: SPRAY_CUT, range: SPRAY_RANGE, ..SprayModel::default() }
 }
 
 /// Layers of sprays for the wanted picture.

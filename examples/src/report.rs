@@ -82,6 +82,10 @@ pub struct Report {
     pub collisions: usize,
     /// Moments at which the plan exceeds a limit of velocity, acceleration or joint angle.
     pub limit_violations: usize,
+    /// Mean distance between the mesh that a depth camera maps after painting and the true surface.
+    pub scan_error_mean_m: f64,
+    /// Position error of the drifting localisation after rigid alignment, root mean square (ATE).
+    pub slam_ate_rms_m: f64,
     /// Layers of paint.
     pub layers: usize,
     /// Strokes over all layers.
@@ -252,7 +256,8 @@ impl Report {
             text,
             "\nThe figures asked for are for the built-in rock; on other surfaces they are for orientation. All of them, in SI \
              units, are in [report.json](report.json). The recording [mission.mcap](mission.mcap) opens in Foxglove and \
-             Rerun, the painted mesh [surface.ply](surface.ply) in any mesh viewer."
+             Rerun, the painted mesh [surface.ply](surface.ply) and the \
+             depth camera's map of it [scan.ply](scan.ply) in any mesh viewer."
         );
         text
     }

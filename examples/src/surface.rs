@@ -3,7 +3,7 @@
 use nalgebra::{Point3, UnitVector3, Vector3};
 use paint_net::Image;
 use paint_sim::{Texel, TriangleSurface};
-use uv_param::{Chart, Disk, Findings, NormalMode, Settings, Spray, TexelMap};
+use uv_param::{Chart, CutSettings, Disk, Findings, NormalMode, Settings, Spray, TexelMap};
 
 use crate::mesh_io::TriangleMesh;
 
@@ -42,7 +42,8 @@ impl PaintSurface {
         let repair = uv_param::Repair { weld: true, split_vertices: true };
         let (disk, findings) = uv_param::largest_disk_with(&positions, &mesh.faces, repair)?;
         let settings = Settings { up: Some([0.0, 0.0, 1.0]), ..Settings::default() };
-        let chart = uv_param::unwrap(&disk, &settings, |p| {
+        let cuts = CutSettings { max_stretch: MOST_STRETCH, ..CutSettings::default() };
+        let chart = uv_param::unwrap_with_cuts(&disk, &settings, &cuts, |p| {
             progress(p.iteration as f64 / settings.iterations as f64);
         })?;
         let texels = TexelMap::new(&chart, texel)?;

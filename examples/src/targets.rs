@@ -16,6 +16,13 @@ pub struct Route {
     pub lost: f64,
 }
 
+impl Route {
+    /// Paint that the targets ask for, m³.
+    pub fn paint(&self) -> f64 {
+        self.targets.windows(2).map(|pair| pair[0].dose * (pair[1].point - pair[0].point).norm()).sum()
+    }
+}
+
 /// Lays strokes onto the surface. A spray of depth `v` stands for the paint of one cell of its row, `along` pixels long: the
 /// targets are the borders of the cells, and the dose between them is the spray's volume `v · mass · texel² · unit` over the
 /// length on the surface.

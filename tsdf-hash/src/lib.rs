@@ -1,1 +1,64 @@
 //! Dense mapping: a voxel-hashed truncated signed distance field with exactly reversible fusion, and its mesh.
+//!
+//! Depth images with known poses are fused into blocks of 8³ voxels, allocated only near surfaces and found through a
+//! hash table. A voxel keeps sums of integers instead of a running average,
+//!
+//! ```text
+//! S = Σ w q,    W = Σ w,    q = round(32767 clamp(d / μ, −1, 1)),    distance = μ S / (32767 W)
+//! ```
+//!
+//! where `d` is the distance of the voxel from the plane seen at its pixel and `w` an integer in `1..=15`. Both depend on
+//! the frame and its pose only, so the order of the frames and the number of threads leave no trace, and any frame can be
+//! taken out again, to the bit: when poses are corrected, the map follows.
+//!
+//! ```
+//! use nalgebra::{Isometry3, Point3};
+//! use tsdf_hash::{DepthData, DepthView, Intrinsics, Map, Settings};
+//!
+//! // A wall one metre in front of the camera, which looks along z.
+//! let depth = vec![1000_u16; 160 * 120];
+//! let intrinsics = Intrinsics { fx: 130.0, fy: 130.0, cx: 79.5, cy: 59.5 };
+//! let view = DepthView { width: 160, height: 120, data: DepthData::U16 { data: &depth, scale: 1000.0 }, intrinsics };
+//! let mut map = Map::new(Settings::default())?;
+//! map.integrate(&view, None, &Isometry3::identity())?;
+//! let distance = map.distance(&Point3::new(0.0, 0.0, 0.98)).ok_or("unseen")?;
+//! assert!((distance - 0.02).abs() < 1e-5);
+//! assert!(map.mesh().positions.iter().all(|p| (p[2] - 1.0).abs() < 1e-5));
+//! map.deintegrate(&view, None, &Isometry3::identity())?;
+//! assert_eq!(map.blocks(), 0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! | what | where it comes from | item |
+//! |---|---|---|
+//! | voxel hashing, a budget of memory | thesis Paper I, section 4.3 | [`Map`], [`Settings::max_bytes`] |
+//! | fusion of depth and colour | thesis Paper I, section 4.3, step (b); sums instead of averages: ours | [`Map::integrate`] |
+//! | fusion undone | ours | [`Map::deintegrate`] |
+//! | noise and weights | Nguyen, Izadi, Lovell 2012; `w = 15 (σ₀/σ(z))² cos θ`: ours | [`NoiseModel`] |
+//! | mesh | thesis Paper I, section 4.6, by marching cubes; case table derived: ours | [`Map::mesh`], [`write_ply`] |
+//! | distance queries | thesis, outlook | [`Map::distance`] |
+//!
+//! Frames: the camera's z looks forward, `x` to the right and `y` down in its image; the world is the caller's. Distances
+//! are positive on the camera's side of a surface. Metres. Tracking, ray casting and the move of blocks out of memory are
+//! not part of this crate yet.
+
+mod block;
+mod candidates;
+mod error;
+mod fuse;
+mod key;
+mod map;
+mod mesh;
+mod parallel;
+mod settings;
+mod store;
+mod surface;
+mod table;
+mod view;
+
+pub use error::Error;
+pub use map::{FrameReport, Map};
+pub use mesh::{Mesh, write_ply};
+pub use nalgebra;
+pub use settings::{NoiseModel, Settings};
+pub use view::{ColourView, DepthData, DepthView, Intrinsics};

@@ -1,10 +1,16 @@
-//! As-rigid-as-possible layout by alternating a local and a global step (Liu et al. 2008).
+//! As-rigid-as-possible layout by alternating a local and a global step (Liu et al. 2008), accelerated.
+
+mod anderson;
 
 use crate::disk::Disk;
 use crate::error::Error;
 use crate::layout::Laplacian;
 use crate::triangle::Frame;
 use crate::unwrap::{Progress, Settings, Stage};
+use anderson::Anderson;
+
+/// Energies per area below this are rounding.
+const ISOMETRY: f64 = 1e-28;
 
 /// Improves `uv` until the energy `sum A |J - R|^2` stops falling; returns the number of iterations.
 pub(crate) fn arap(
@@ -15,39 +21,62 @@ pub(crate) fn arap(
     settings: &Settings,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<usize, Error> {
-    let pinned = disk.loops[0][0];
-    laplacian.factorize_cotangent(disk, frames, pinned)?;
+    let pinned = disk.loops[0][0] as usize;
+    laplacian.factorize_cotangent(disk, frames, pinned as u32)?;
     let area: f64 = frames.iter().map(|f| f.area).sum();
     let size = laplacian.size();
     let mut rotations = vec![[1.0, 0.0]; frames.len()];
     let mut right = vec![0.0; 2 * size];
+    let mut anderson = Anderson::new();
+    // All u, then all v; the places of hole centres stay zero.
+    let mut x = vec![0.0; 2 * size];
+    for (v, at) in uv.iter().enumerate() {
+        (x[v], x[size + v]) = (at[0], at[1]);
+    }
+    let mut plain = x.clone();
     let mut last = f64::INFINITY;
+    let mut slow = 0;
+    let mut iterations = settings.iterations;
     for iteration in 1..=settings.iterations {
-        right.fill(0.0);
-        let energy = local_step(disk, frames, uv, &mut rotations, &mut right) / area;
+        let mut energy = local_step(disk, frames, &x, &mut rotations, &mut right) / area;
+        if energy > last {
+            // The extrapolation went too far; the plain step never does.
+            anderson.reset();
+            x.copy_from_slice(&plain);
+            energy = local_step(disk, frames, &x, &mut rotations, &mut right) / area;
+        }
         progress(Progress { stage: Stage::Arap, iteration, energy });
-        if last.is_finite() && last - energy <= settings.tolerance * last {
-            return Ok(iteration - 1);
+        // Accelerated steps are uneven: one that gains little says nothing yet.
+        let gains = last.is_infinite() || last - energy > settings.tolerance * last;
+        slow = if gains { 0 } else { slow + 1 };
+        if slow == 2 || energy < ISOMETRY {
+            iterations = iteration - 1;
+            break;
         }
         last = energy;
         // Global step: L u = sum_t A_t R_t g, with the pin at the origin.
-        right[pinned as usize] = 0.0;
-        right[size + pinned as usize] = 0.0;
+        right[pinned] = 0.0;
+        right[size + pinned] = 0.0;
         laplacian.solve(&mut right);
-        for (v, at) in uv.iter_mut().enumerate() {
-            *at = [right[v], right[size + v]];
-        }
+        plain.copy_from_slice(&right);
+        x = anderson.next(&x, &plain);
     }
-    Ok(settings.iterations)
+    // The last extrapolation has not been judged; the plain step it came from is never worse than its start.
+    let best = if iterations == settings.iterations { &plain } else { &x };
+    for (v, at) in uv.iter_mut().enumerate() {
+        *at = [best[v], best[size + v]];
+    }
+    Ok(iterations)
 }
 
-/// Nearest rotation of every face, its share of the right-hand side, and the energy of `uv`.
-fn local_step(disk: &Disk, frames: &[Frame], uv: &[[f64; 2]], rotations: &mut [[f64; 2]], right: &mut [f64]) -> f64 {
+/// Nearest rotation of every face, the right-hand side they make, and the energy of `x` (all u, then all v).
+fn local_step(disk: &Disk, frames: &[Frame], x: &[f64], rotations: &mut [[f64; 2]], right: &mut [f64]) -> f64 {
     let size = right.len() / 2;
+    right.fill(0.0);
     let (right_u, right_v) = right.split_at_mut(size);
     let mut energy = 0.0;
     for ((face, frame), rotation) in disk.faces.iter().zip(frames).zip(rotations) {
-        let jacobian = frame.jacobian(face.map(|v| uv[v as usize]));
+        let jacobian = frame.jacobian(face.map(|v| [x[v as usize], x[size + v as usize]]));
         // A face that has shrunk to a point keeps its last rotation.
         *rotation = jacobian.nearest_rotation().unwrap_or(*rotation);
         let [cos, sin] = *rotation;

@@ -47,15 +47,19 @@ impl Chart {
             return Err(Error::Length { what: "uv", expected: disk.positions.len(), found: uv.len() });
         }
         let [width, height] = placement::place(&disk, &mut uv, up)?;
-        let quality = Quality::judge(&disk, &uv, iterations);
-        let vertex_normals = normals::vertex_normals(&disk);
         let grid = Grid::new(&uv, &disk.faces, [width, height]);
+        let quality = Quality::judge(&disk, &uv, grid.overlap(&uv, &disk.faces), iterations);
+        let vertex_normals = normals::vertex_normals(&disk);
         Ok(Self { disk, uv, width, height, quality, vertex_normals, grid })
     }
 
     /// The surface.
     pub fn disk(&self) -> &Disk {
         &self.disk
+    }
+
+    pub(crate) fn into_disk(self) -> Disk {
+        self.disk
     }
 
     /// Layout, one point per disk vertex, metres.

@@ -1,6 +1,7 @@
 //! The checked input: one orientable, manifold, genus-0 surface with a boundary.
 
 mod adjacency;
+mod cut;
 mod repair;
 
 pub use repair::{Findings, Repair, largest_disk, largest_disk_with};
@@ -20,7 +21,13 @@ pub struct Disk {
     pub(crate) vertex_source: Vec<u32>,
     pub(crate) face_source: Vec<u32>,
     pub(crate) reversed: Vec<bool>,
+    /// Neighbours in the chart: seams count as border.
     pub(crate) twins: Vec<u32>,
+    /// Neighbours on the surface, whether cut apart or not.
+    glued: Vec<u32>,
+    /// The vertices that cuts added, at the end of the list: the vertex that each was split from.
+    copies: Vec<u32>,
+    cuts: usize,
     pub(crate) loops: Vec<Vec<u32>>,
     pub(crate) source_vertices: usize,
     pub(crate) source_faces: usize,
@@ -63,6 +70,59 @@ impl Disk {
         (self.twins[h] != BORDER).then(|| self.twins[h] as usize)
     }
 
+    /// The half-edge that touches half-edge `h` across a seam: neighbours on the surface that [`Self::cut`] took apart in
+    /// the chart. `None` inside and on the boundary of the surface itself.
+    pub fn across_seam(&self, h: usize) -> Option<usize> {
+        (self.twins[h] == BORDER && self.glued[h] != BORDER).then(|| self.glued[h] as usize)
+    }
+
+    /// Number of cuts made.
+    pub fn cuts(&self) -> usize {
+        self.cuts
+    }
+
+    /// Length of all seams on the surface, metres; each is counted once.
+    pub fn seam_length(&self) -> f64 {
+        let seams = (0..self.twins.len()).filter(|&h| self.across_seam(h).is_some_and(|other| h < other));
+        seams.map(|h| self.edge(h).norm()).fold(0.0, |sum, length| sum + length)
+    }
+
+    /// Length of a closed line of vertices, metres.
+    pub(crate) fn loop_length(&self, vertices: &[u32]) -> f64 {
+        let at = |v: u32| nalgebra::Vector3::from(self.positions[v as usize]);
+        let next = vertices.iter().cycle().skip(1);
+        vertices.iter().zip(next).map(|(&a, &b)| (at(a) - at(b)).norm()).sum()
+    }
+
+    fn sort_loops(&mut self) {
+        let mut loops = std::mem::take(&mut self.loops);
+        loops.sort_by(|a, b| self.loop_length(b).total_cmp(&self.loop_length(a)));
+        self.loops = loops;
+    }
+
+    /// From the start to the end of half-edge `h`.
+    pub(crate) fn edge(&self, h: usize) -> nalgebra::Vector3<f64> {
+        let corners = self.corners(h / 3).map(nalgebra::Vector3::from);
+        corners[(h + 1) % 3] - corners[h % 3]
+    }
+
+    /// For every vertex after the first `count` the vertex that it was split from by the cut that added it.
+    pub(crate) fn copied_after(&self, count: usize) -> &[u32] {
+        &self.copies[count - self.uncut_vertex_count()..]
+    }
+
+    /// One name for all copies of a vertex on the two sides of seams.
+    pub(crate) fn uncut_vertex(&self, mut v: u32) -> u32 {
+        while let Some(copy) = (v as usize).checked_sub(self.uncut_vertex_count()) {
+            v = self.copies[copy];
+        }
+        v
+    }
+
+    fn uncut_vertex_count(&self) -> usize {
+        self.positions.len() - self.copies.len()
+    }
+
     /// Number of vertices of the mesh this disk was taken from.
     pub fn source_vertex_count(&self) -> usize {
         self.source_vertices
@@ -100,9 +160,11 @@ impl Disk {
         }
         // Half-edge k of a reversed face runs along the old half-edge [2, 1, 0][k].
         let moved = |h: u32| h / 3 * 3 + (2 - h % 3);
-        let old = self.twins.clone();
-        for (h, &twin) in old.iter().enumerate() {
-            self.twins[moved(h as u32) as usize] = if twin == BORDER { BORDER } else { moved(twin) };
+        for twins in [&mut self.twins, &mut self.glued] {
+            let old = twins.clone();
+            for (h, &twin) in old.iter().enumerate() {
+                twins[moved(h as u32) as usize] = if twin == BORDER { BORDER } else { moved(twin) };
+            }
         }
         for vertices in &mut self.loops {
             vertices.reverse();

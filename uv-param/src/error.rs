@@ -7,8 +7,8 @@ pub enum Error {
     /// No vertices or no faces were given.
     #[error("the mesh has no faces; give at least one triangle")]
     Empty,
-    /// A vertex that some face uses is not finite.
-    #[error("vertex {vertex} has a NaN or infinite coordinate; remove it and the faces that use it")]
+    /// A vertex that some face uses is not finite, or so far away (1e40) that areas would not be.
+    #[error("vertex {vertex} has a NaN, infinite or absurdly large coordinate; remove it and the faces that use it")]
     NonFinite {
         /// Index of the vertex.
         vertex: usize,
@@ -71,6 +71,14 @@ pub enum Error {
         genus: usize,
         /// Number of boundary loops.
         boundary_loops: usize,
+    },
+    /// A path along which the surface cannot be cut.
+    #[error("the surface cannot be cut along this path: {problem} (path[{index}])")]
+    Cut {
+        /// Index into the path.
+        index: usize,
+        /// What is wrong there and what would be right.
+        problem: &'static str,
     },
     /// The flip-free minimiser needs an injective start, and rounding destroyed it.
     #[error("{faces} triangles collapse in the start layout (a long tube?); cut the surface open along the tube")]

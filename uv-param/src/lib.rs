@@ -5,7 +5,8 @@
 //! `E(u, R) = sum_t A_t |J_t(u) - R_t|^2`
 //!
 //! over the uv points `u` and one rotation `R_t` per triangle, where `J_t` is the 2x2 map from the triangle's own plane to the
-//! chart; where that energy folds triangles over, the symmetric Dirichlet energy takes its place, which cannot.
+//! chart; where that energy folds triangles over, the symmetric Dirichlet energy takes its place, which cannot. Surfaces too
+//! far from flat for one piece, such as busts, are cut open where the distortion is high ([`unwrap_with_cuts`]).
 //!
 //! ```
 //! use uv_param::{Settings, Spray, TexelMap, largest_disk, nozzle_command, unwrap};
@@ -27,7 +28,9 @@
 //! | equation | item |
 //! |---|---|
 //! | Liu et al. 2008, local/global ARAP | [`unwrap`], [`Method::Arap`] |
+//! | Peng et al. 2018, Anderson acceleration of the iteration | [`Method::Arap`] |
 //! | Smith and Schaefer 2015, symmetric Dirichlet energy | [`Method::SymmetricDirichlet`] |
+//! | thesis 8, "cuts along high distortion areas"; Gu et al. 2002, cut to the worst distortion | [`unwrap_with_cuts`], [`Disk::cut`] |
 //! | Tutte 1963, convex combination start | [`unwrap`] |
 //! | thesis 8.3.1, box of smallest area by rotating calipers | [`min_area_rectangle`], [`Chart::new`] |
 //! | thesis 8.3.1, 1 px = 1.25 cm texture | [`TexelMap`], [`Texture`] |
@@ -37,6 +40,8 @@
 mod arap;
 mod calipers;
 mod chart;
+mod clip;
+mod cut;
 mod disk;
 mod error;
 mod layout;
@@ -51,6 +56,7 @@ mod unwrap;
 
 pub use calipers::{Rectangle, convex_hull, min_area_rectangle};
 pub use chart::{Chart, SurfacePoint};
+pub use cut::{CutSettings, unwrap_with_cuts};
 pub use disk::{Disk, Findings, Repair, largest_disk, largest_disk_with};
 pub use error::Error;
 pub use nalgebra;

@@ -23,6 +23,14 @@ pub struct Quality {
     pub length_err_mean: f64,
     /// 99th percentile of the same, weighted by area.
     pub length_err_p99: f64,
+    /// Area of the chart that lies on other parts of the chart, as a fraction of the whole: the common areas of all pairs
+    /// of faces, exact up to rounding. What lies there twice cannot be told apart in a picture; 0 = none. Flipped faces do
+    /// not count.
+    pub overlap_share: f64,
+    /// Number of cuts the surface was opened by.
+    pub cuts: usize,
+    /// Length of the seams they left, on the surface, metres; both sides count once.
+    pub seam_length_m: f64,
     /// Area of the surface, m^2.
     pub area_m2: f64,
     /// Iterations of the minimisers.
@@ -30,8 +38,8 @@ pub struct Quality {
 }
 
 impl Quality {
-    pub(crate) fn judge(disk: &Disk, uv: &[[f64; 2]], iterations: usize) -> Self {
-        let (mut area, mut arap, mut dirichlet, mut error) = (0.0, 0.0, 0.0, 0.0);
+    pub(crate) fn judge(disk: &Disk, uv: &[[f64; 2]], overlap: f64, iterations: usize) -> Self {
+        let (mut area, mut flat_area, mut arap, mut dirichlet, mut error) = (0.0, 0.0, 0.0, 0.0, 0.0);
         let mut stretches = Vec::with_capacity(disk.faces.len());
         let mut errors = Vec::with_capacity(disk.faces.len());
         for (f, face) in disk.faces.iter().enumerate() {
@@ -40,6 +48,7 @@ impl Quality {
             let [s1, s2] = jacobian.stretch();
             let length_error = (s1 - 1.0).abs().max((s2.abs() - 1.0).abs());
             area += frame.area;
+            flat_area += frame.area * jacobian.det().max(0.0);
             arap += frame.area * jacobian.rigidity();
             dirichlet += frame.area * jacobian.symmetric_dirichlet() / 4.0;
             error += frame.area * length_error;
@@ -59,6 +68,9 @@ impl Quality {
             stretch_max: stretches[stretches.len() - 1],
             length_err_mean: error / area,
             length_err_p99: weighted_percentile(&errors, 0.99 * area),
+            overlap_share: if flat_area > 0.0 { overlap / flat_area } else { 0.0 },
+            cuts: disk.cuts(),
+            seam_length_m: disk.seam_length(),
             area_m2: area,
             iterations,
         }

@@ -3,6 +3,8 @@
 //! `W = s1^2 + s2^2 + s1^-2 + s2^-2` is infinite for a triangle without area, so a layout that starts without flips and never
 //! steps past the first collapse keeps none.
 
+mod local;
+
 use faer::sparse::linalg::SupernodalThreshold;
 
 use crate::disk::Disk;
@@ -10,6 +12,7 @@ use crate::error::Error;
 use crate::linear::Spd;
 use crate::triangle::{Frame, Jacobian, flips};
 use crate::unwrap::{Progress, Settings, Stage};
+use local::Local;
 
 /// Fraction of the step to the first collapse that is tried (ours).
 const SAFE: f64 = 0.9;
@@ -210,63 +213,5 @@ impl Newton {
         self.spd.solve(&mut direction);
         let slope = gradient.iter().zip(&direction).map(|(g, d)| g * d).sum();
         Ok(Step { direction, slope })
-    }
-}
-
-/// Derivatives of `A W` of one triangle. In the bases of the singular vectors (`J = U diag(s) V^T`) the Hessian is diagonal in
-/// four modes: the two stretches, the flip and the twist; only the twist can be negative.
-struct Local {
-    /// Cosine and sine of U.
-    turn: [f64; 2],
-    /// Gradients of the hat functions in V's basis.
-    hats: [[f64; 2]; 3],
-    /// `A dW/ds`.
-    slope: [f64; 2],
-    /// `A d^2W/ds^2`.
-    stretch: [f64; 2],
-    /// Half the sum and half the difference of the flip and twist curvatures, times A.
-    mixed: [f64; 2],
-}
-
-impl Local {
-    fn new(frame: &Frame, j: Jacobian) -> Self {
-        let [s1, s2] = j.stretch();
-        let sum = (j.c - j.b).atan2(j.a + j.d);
-        let difference = (j.c + j.b).atan2(j.a - j.d);
-        let (sin_u, cos_u) = (0.5 * (sum + difference)).sin_cos();
-        let (sin_v, cos_v) = (0.5 * (sum - difference)).sin_cos();
-        let hats = frame.g.map(|g| [cos_v * g[0] - sin_v * g[1], sin_v * g[0] + cos_v * g[1]]);
-        let cube = (s1 * s2).powi(3);
-        let flip = 2.0 + 2.0 * (s1 * s1 + s1 * s2 + s2 * s2) / cube;
-        let twist = (2.0 - 2.0 * (s1 * s1 - s1 * s2 + s2 * s2) / cube).max(0.0);
-        Self {
-            turn: [cos_u, sin_u],
-            hats,
-            slope: [s1, s2].map(|s| frame.area * 2.0 * (s - 1.0 / (s * s * s))),
-            stretch: [s1, s2].map(|s| frame.area * (2.0 + 6.0 / (s * s * s * s))),
-            mixed: [0.5 * frame.area * (flip + twist), 0.5 * frame.area * (flip - twist)],
-        }
-    }
-
-    /// Derivative by the uv of corner `k`.
-    fn gradient(&self, k: usize) -> [f64; 2] {
-        let [cos, sin] = self.turn;
-        let [x, y] = [self.slope[0] * self.hats[k][0], self.slope[1] * self.hats[k][1]];
-        [cos * x - sin * y, sin * x + cos * y]
-    }
-
-    /// Second derivative by the uv of corner `k` (rows) and corner `l` (columns).
-    fn block(&self, k: usize, l: usize) -> [[f64; 2]; 2] {
-        let (hk, hl) = (self.hats[k], self.hats[l]);
-        let [even, odd] = self.mixed;
-        let xx = self.stretch[0] * hk[0] * hl[0] + even * hk[1] * hl[1];
-        let yy = self.stretch[1] * hk[1] * hl[1] + even * hk[0] * hl[0];
-        let xy = odd * hk[1] * hl[0];
-        let yx = odd * hk[0] * hl[1];
-        // U K U^T.
-        let [c, s] = self.turn;
-        let [left_x, left_y] = [[c * xx - s * yx, c * xy - s * yy], [s * xx + c * yx, s * xy + c * yy]];
-        let back = |row: [f64; 2]| [row[0] * c - row[1] * s, row[0] * s + row[1] * c];
-        [back(left_x), back(left_y)]
     }
 }

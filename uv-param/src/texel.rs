@@ -1,11 +1,9 @@
 //! The chart cut into square texels: which piece of the surface each one is.
 
-mod clip;
-
 use crate::chart::{Chart, SurfacePoint, inside};
+use crate::clip::Polygon;
 use crate::error::Error;
 use crate::triangle::orientation;
-use clip::Polygon;
 
 /// Largest number of texels of one map (a 16k square).
 const MOST: usize = 1 << 28;

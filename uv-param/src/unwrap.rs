@@ -49,6 +49,8 @@ pub enum Stage {
     Start,
     /// Local/global iterations.
     Arap,
+    /// A cut was made by [`crate::unwrap_with_cuts`]; the iteration is the number of cuts so far.
+    Cut,
     /// Newton iterations on the symmetric Dirichlet energy.
     SymmetricDirichlet,
 }
@@ -72,27 +74,54 @@ pub struct Progress {
 /// layout drowns in rounding.
 pub fn unwrap(disk: &Disk, settings: &Settings, mut progress: impl FnMut(Progress)) -> Result<Chart, Error> {
     check(settings)?;
-    let progress: &mut dyn FnMut(Progress) = &mut progress;
+    let layout = lay_out(disk, settings, &mut progress)?;
+    Chart::new(disk.clone(), layout.uv, layout.iterations, settings.up)
+}
+
+/// A layout as the minimisers leave it. A chart's uv is turned into its box, and rounding while turning may flip a needle;
+/// what is to be improved further starts from here.
+#[derive(Debug, Clone)]
+pub(crate) struct Layout {
+    pub(crate) uv: Vec<[f64; 2]>,
+    pub(crate) iterations: usize,
+}
+
+/// Start and minimisers, as `settings` ask for.
+pub(crate) fn lay_out(disk: &Disk, settings: &Settings, progress: &mut dyn FnMut(Progress)) -> Result<Layout, Error> {
     let unit = disk.area().sqrt();
-    let frames: Vec<Frame> = (0..disk.faces.len()).map(|f| Frame::new(disk.corners(f))).collect();
+    let frames = frames(disk);
     let mut laplacian = Laplacian::new(disk)?;
     let start = metric(laplacian.tutte(disk)?, disk, unit);
     progress(Progress { stage: Stage::Start, iteration: 1, energy: 0.0 });
 
-    let mut uv = start.clone();
-    let mut iterations = 0;
+    let mut layout = Layout { uv: start.clone(), iterations: 0 };
     if settings.method != Method::SymmetricDirichlet {
-        iterations += arap(disk, &frames, &mut laplacian, &mut uv, settings, progress)?;
+        layout.iterations += arap(disk, &frames, &mut laplacian, &mut layout.uv, settings, progress)?;
     }
-    let flipped = settings.method == Method::Auto && triangle::flips(&uv, &disk.faces) > 0;
+    let flipped = settings.method == Method::Auto && triangle::flips(&layout.uv, &disk.faces) > 0;
     if flipped || settings.method == Method::SymmetricDirichlet {
-        uv = start;
-        iterations += symmetric_dirichlet(disk, &frames, &mut uv, settings, progress)?;
+        layout.uv = start;
+        layout.iterations += symmetric_dirichlet(disk, &frames, &mut layout.uv, settings, progress)?;
     }
-    Chart::new(disk.clone(), uv, iterations, settings.up)
+    Ok(layout)
 }
 
-fn check(settings: &Settings) -> Result<(), Error> {
+/// Goes on from a layout without flips, flip-free.
+pub(crate) fn relax(
+    disk: &Disk,
+    layout: &mut Layout,
+    settings: &Settings,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<(), Error> {
+    layout.iterations += symmetric_dirichlet(disk, &frames(disk), &mut layout.uv, settings, progress)?;
+    Ok(())
+}
+
+fn frames(disk: &Disk) -> Vec<Frame> {
+    (0..disk.faces.len()).map(|f| Frame::new(disk.corners(f))).collect()
+}
+
+pub(crate) fn check(settings: &Settings) -> Result<(), Error> {
     let up_is_direction = |up: [f64; 3]| up.iter().all(|x| x.is_finite()) && up.iter().any(|&x| x != 0.0);
     if settings.iterations == 0 {
         return Err(Error::Setting { name: "iterations", value: 0.0, must_be: "at least 1" });

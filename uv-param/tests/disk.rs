@@ -22,6 +22,9 @@ fn bad_numbers_are_named() {
     let mut broken = SQUARE;
     broken[3][1] = f32::NAN;
     assert_eq!(refusal(&broken, &HALVES), Error::NonFinite { vertex: 3 });
+    let far = [[1e200, 0.0, 0.0], [0.0, 1e200, 0.0], [0.0; 3]];
+    let refused = largest_disk_with(&far, &[[0, 1, 2]], Repair::default()).unwrap_err();
+    assert_eq!(refused, Error::NonFinite { vertex: 0 });
     // A NaN that no face uses is dropped with its vertex.
     assert!(largest_disk(&broken, &HALVES[..1]).is_ok());
     assert_eq!(refusal(&[[0.0; 3], [1.0; 3], [2.0; 3]], &[[0, 1, 2], [0, 0, 1]]), Error::ZeroArea);

@@ -89,7 +89,7 @@ fn the_unit_of_length_does_not_matter() {
     for method in [Method::Arap, Method::SymmetricDirichlet] {
         let settings = Settings { method, ..Settings::default() };
         let reference = lay_out(&bumps(1.0), &settings);
-        for scale in [1000.0, 0.001] {
+        for scale in [1000.0, 0.001, 1e25, 1e-25] {
             let chart = lay_out(&bumps(scale), &settings);
             for (a, b) in reference.uv().iter().flatten().zip(chart.uv().iter().flatten()) {
                 assert!((a - b / scale).abs() < 1e-9 * reference.width());

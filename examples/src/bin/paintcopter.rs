@@ -29,7 +29,8 @@ struct Arguments {
     /// Axis of the mesh file that points up [default: y for OBJ, z otherwise]
     #[arg(long, requires = "mesh")]
     up: Option<Up>,
-    /// What to paint: strata, stripes, gradient, or a PNG or JPEG file
+    /// What to paint: strata, stripes, gradient, colours (of the mesh's vertices), or a PNG or JPEG file
+    /// [default: strata on the rock wall, stripes on a mesh]
     #[arg(long)]
     design: Option<String>,
     /// Who decides the sprays

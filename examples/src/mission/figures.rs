@@ -25,8 +25,8 @@ pub(super) fn path_length(plan: &Plan) -> f64 {
 }
 
 impl Mission {
-    /// All figures.
-    pub fn report(&self) -> Result<Report, MissionError> {
+    /// All figures; those of the inspection are given.
+    pub(super) fn report(&self, scan_error: f64, slam_ate: f64) -> Result<Report, MissionError> {
         let quality = self.surface.chart.quality();
         let deviations = self.normal_deviations();
         let flown = statistics(&self.flights, |f| &f.flight);
@@ -80,6 +80,8 @@ impl Mission {
             ciede2000_mean: mean(self.colour_difference().into_iter().flatten()),
             collisions: self.flights.iter().map(|f| self.collisions(&f.flight)).sum(),
             limit_violations: self.flights.iter().map(|f| self.limit_violations(f)).sum(),
+            scan_error_mean_m: scan_error,
+            slam_ate_rms_m: slam_ate,
             layers: self.layers.len(),
             strokes: self.flights.iter().map(|f| f.route.strokes).sum(),
             wall_s: self.started.elapsed().as_secs_f64(),
@@ -112,13 +114,10 @@ impl Mission {
 
     /// Share of the decided paint that was not planned: no surface below the spray, or no pose of the robot.
     pub(super) fn share_out_of_reach(&self) -> f64 {
-        let (mut planned, mut wanted) = (0.0, 0.0);
+        let (mut planned, mut wanted) = (0.0, self.abandoned);
         for f in &self.flights {
-            wanted += f.route.lost;
-            for (k, pair) in f.route.targets.windows(2).enumerate() {
-                wanted += pair[0].dose * (pair[1].point - pair[0].point).norm();
-                planned += f.plan.volume(k);
-            }
+            wanted += f.route.lost + f.route.paint();
+            planned += (0..f.route.targets.len()).map(|k| f.plan.volume(k)).sum::<f64>();
         }
         if wanted > 0.0 { (1.0 - planned / wanted).max(0.0) } else { 0.0 }
     }

@@ -47,7 +47,15 @@ impl Mission {
             &ColouredMesh { positions: &positions, faces: self.surface.disk().faces(), colours: &colours },
         )?;
         stage.done(&folder.display().to_string());
-        let report = self.report()?;
+
+        let stage = Stage::start("scan");
+        let scan = self.scan()?;
+        write_ply(&folder.join("scan.ply"), &scan.mesh.positions, &scan.mesh.faces, &scan.mesh.colours).map_err(
+            |source| MissionError::Unwritable { path: folder.join("scan.ply").display().to_string(), source },
+        )?;
+        let ate = self.save_trajectories(folder)?;
+        stage.done(&format!("{} faces, {:.2} mm off the surface", scan.mesh.faces.len(), 1e3 * scan.error_mean));
+        let report = self.report(scan.error_mean, ate)?;
         report.save(folder)?;
         Ok(report)
     }
@@ -123,7 +131,7 @@ impl Mission {
     }
 
     /// Look of a point of the world: painted and smooth on the disk, grey elsewhere.
-    fn look(&self, painted: &paint_net::Image, hit: &Hit) -> Look {
+    pub(super) fn look(&self, painted: &paint_net::Image, hit: &Hit) -> Look {
         let Some(face) = self.surface.disk().faces().get(hit.face as usize) else {
             return Look { albedo: [0.4; 3], normal: hit.normal };
         };

@@ -1,6 +1,7 @@
 //! Which face covers a point of the chart: a uniform grid of candidate lists, decided by the exact predicate.
 
 use super::SurfacePoint;
+use crate::clip::Polygon;
 use crate::triangle::orientation;
 
 /// Faces by grid cell, in compressed rows.
@@ -44,10 +45,8 @@ impl Grid {
     }
 
     fn cell_box(&self, corners: [[f64; 2]; 3]) -> [u32; 4] {
-        let low = |k: usize| corners[0][k].min(corners[1][k]).min(corners[2][k]);
-        let high = |k: usize| corners[0][k].max(corners[1][k]).max(corners[2][k]);
-        let [left, bottom] = self.cell([low(0), low(1)]);
-        let [right, top] = self.cell([high(0), high(1)]);
+        let [left, bottom] = self.cell([low(corners, 0), low(corners, 1)]);
+        let [right, top] = self.cell([high(corners, 0), high(corners, 1)]);
         [left as u32, bottom as u32, right as u32, top as u32]
     }
 
@@ -55,6 +54,30 @@ impl Grid {
     fn cell(&self, at: [f64; 2]) -> [usize; 2] {
         let index = |x: f64, count: usize| ((x * self.cells_per_metre) as usize).min(count - 1);
         [index(at[0], self.columns), index(at[1], self.rows)]
+    }
+
+    /// Sum of the areas that pairs of faces without a common edge share: 0 for a chart that does not overlap itself.
+    pub(super) fn overlap(&self, uv: &[[f64; 2]], faces: &[[u32; 3]]) -> f64 {
+        let corners = |f: u32| faces[f as usize].map(|v| uv[v as usize]);
+        let mut sum = 0.0;
+        for cell in 0..self.columns * self.rows {
+            let here = &self.faces[self.starts[cell] as usize..self.starts[cell + 1] as usize];
+            for (i, &f) in here.iter().enumerate() {
+                for &g in &here[i + 1..] {
+                    let (a, b) = (corners(f), corners(g));
+                    let edge_in_common = faces[f as usize].iter().filter(|v| faces[g as usize].contains(v)).count() > 1;
+                    // A pair may meet in many cells; the one that holds the lower left corner of both boxes speaks.
+                    let speaks = || {
+                        let low = |k: usize| low(a, k).max(low(b, k));
+                        self.cell([low(0), low(1)]) == [cell % self.columns, cell / self.columns]
+                    };
+                    if !edge_in_common && meet(a, b) && speaks() {
+                        sum += common_area(a, b);
+                    }
+                }
+            }
+        }
+        sum
     }
 
     pub(super) fn locate(&self, uv: &[[f64; 2]], faces: &[[u32; 3]], at: [f64; 2]) -> Option<SurfacePoint> {
@@ -72,6 +95,27 @@ impl Grid {
 
 fn cells_of([left, bottom, right, top]: [u32; 4], columns: usize) -> impl Iterator<Item = usize> {
     (bottom..=top).flat_map(move |row| (left..=right).map(move |column| row as usize * columns + column as usize))
+}
+
+fn low([a, b, c]: [[f64; 2]; 3], k: usize) -> f64 {
+    a[k].min(b[k]).min(c[k])
+}
+
+fn high([a, b, c]: [[f64; 2]; 3], k: usize) -> f64 {
+    a[k].max(b[k]).max(c[k])
+}
+
+/// Whether two counter-clockwise triangles share more than a boundary point: no side of one has the other beyond it.
+fn meet(a: [[f64; 2]; 3], b: [[f64; 2]; 3]) -> bool {
+    let apart = |a: [[f64; 2]; 3], b: [[f64; 2]; 3]| {
+        (0..3).any(|k| b.iter().all(|&p| orientation([a[k], a[(k + 1) % 3], p]) <= 0.0))
+    };
+    (0..2).all(|k| low(a, k) < high(b, k) && low(b, k) < high(a, k)) && !apart(a, b) && !apart(b, a)
+}
+
+/// Area that two counter-clockwise triangles share.
+fn common_area(a: [[f64; 2]; 3], [p, q, r]: [[f64; 2]; 3]) -> f64 {
+    Polygon::triangle(a).left_of(p, q).left_of(q, r).left_of(r, p).area()
 }
 
 /// Weights of `at` in a counter-clockwise triangle, `None` outside. The signs are exact, so that neighbouring triangles

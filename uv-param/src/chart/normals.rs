@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use crate::disk::Disk;
 
 /// Unit normals per vertex: face normals weighted by the angle of the face at the vertex, which does not depend on how
-/// the surface is cut into triangles.
+/// the surface is cut into triangles. Both sides of a seam share theirs: the surface goes on there.
 pub(super) fn vertex_normals(disk: &Disk) -> Vec<Vector3<f64>> {
     let mut normals = vec![Vector3::zeros(); disk.positions.len()];
     for (f, face) in disk.faces.iter().enumerate() {
@@ -16,11 +16,14 @@ pub(super) fn vertex_normals(disk: &Disk) -> Vec<Vector3<f64>> {
         for k in 0..3 {
             let (a, b) = (corners[(k + 1) % 3] - corners[k], corners[(k + 2) % 3] - corners[k]);
             let angle = a.cross(&b).norm().atan2(a.dot(&b));
-            normals[face[k] as usize] += angle * normal;
+            normals[disk.uncut_vertex(face[k]) as usize] += angle * normal;
         }
     }
     for normal in &mut normals {
         *normal = normal.try_normalize(f64::EPSILON).unwrap_or_default();
+    }
+    for v in 0..normals.len() {
+        normals[v] = normals[disk.uncut_vertex(v as u32) as usize];
     }
     normals
 }

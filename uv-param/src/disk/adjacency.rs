@@ -81,3 +81,36 @@ pub(super) fn boundary_loops(vertices: usize, faces: &[[u32; 3]], twins: &[u32])
     }
     loops
 }
+
+/// The fans of faces around the vertices: the fan of every corner, and the vertex of every fan, fans in the order of their
+/// first corners. A vertex of a manifold has one fan.
+pub(super) fn fans(faces: &[[u32; 3]], twins: &[u32]) -> (Vec<u32>, Vec<u32>) {
+    let next = |h: usize| h / 3 * 3 + (h + 1) % 3;
+    let previous = |h: usize| h / 3 * 3 + (h + 2) % 3;
+    let corners = 3 * faces.len();
+    let mut fan_of_corner = vec![BORDER; corners];
+    let mut vertex_of_fan = Vec::new();
+    for start in 0..corners {
+        if fan_of_corner[start] != BORDER {
+            continue;
+        }
+        let fan = vertex_of_fan.len() as u32;
+        vertex_of_fan.push(faces[start / 3][start % 3]);
+        // One way around until the boundary or the start, then the other way.
+        let mut corner = start;
+        loop {
+            fan_of_corner[corner] = fan;
+            let twin = twins[previous(corner)];
+            if twin == BORDER || twin as usize == start {
+                break;
+            }
+            corner = twin as usize;
+        }
+        let mut corner = start;
+        while twins[corner] != BORDER && fan_of_corner[next(twins[corner] as usize)] == BORDER {
+            corner = next(twins[corner] as usize);
+            fan_of_corner[corner] = fan;
+        }
+    }
+    (fan_of_corner, vertex_of_fan)
+}

@@ -1,6 +1,6 @@
 //! From a triangle soup to a [`Disk`], with an account of what was left out.
 
-use super::adjacency::{EdgeTable, boundary_loops, half_edge};
+use super::adjacency::{EdgeTable, boundary_loops, fans, half_edge};
 use super::{BORDER, Disk};
 use crate::error::Error;
 use crate::triangle;
@@ -8,6 +8,9 @@ use crate::triangle;
 /// A face whose height is below this fraction of its longest edge has no measurable shape: it is the relative rounding
 /// of the f32 coordinates that meshes are stored in (ours).
 const FLAT: f64 = 1e-7;
+
+/// Beyond this products of lengths overflow; every f32 is below it.
+const LARGEST: f64 = 1e40;
 
 /// Half-edges are counted in 32 bits.
 const MOST: usize = (u32::MAX / 6) as usize;
@@ -83,23 +86,26 @@ pub fn largest_disk_with(
     findings.reversed_faces = reversed.iter().filter(|&&r| r).count();
     let vertex_source = separate_fans(&mut oriented, &twins, positions.len(), repair, &mut findings)?;
 
-    let mut loops = boundary_loops(vertex_source.len(), &oriented, &twins);
+    let loops = boundary_loops(vertex_source.len(), &oriented, &twins);
     findings.boundary_loops = loops.len();
     check_topology(vertex_source.len(), &twins, loops.len())?;
     let positions_kept: Vec<[f64; 3]> = vertex_source.iter().map(|&v| positions[v as usize]).collect();
-    loops.sort_by(|a, b| loop_length(&positions_kept, b).total_cmp(&loop_length(&positions_kept, a)));
     twins.shrink_to_fit();
-    let disk = Disk {
+    let mut disk = Disk {
         positions: positions_kept,
         faces: oriented,
         vertex_source,
         face_source: kept,
         reversed,
+        glued: twins.clone(),
         twins,
+        copies: Vec::new(),
+        cuts: 0,
         loops,
         source_vertices: positions.len(),
         source_faces: faces.len(),
     };
+    disk.sort_loops();
     Ok((disk, findings))
 }
 
@@ -120,7 +126,7 @@ fn check(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Result<usize, Error> {
         }
     }
     for (vertex, position) in positions.iter().enumerate() {
-        if used[vertex] && !position.iter().all(|x| x.is_finite()) {
+        if used[vertex] && !position.iter().all(|x| x.abs() <= LARGEST) {
             return Err(Error::NonFinite { vertex });
         }
     }
@@ -274,39 +280,14 @@ fn separate_fans(
     repair: Repair,
     findings: &mut Findings,
 ) -> Result<Vec<u32>, Error> {
-    let next = |h: usize| h / 3 * 3 + (h + 1) % 3;
-    let previous = |h: usize| h / 3 * 3 + (h + 2) % 3;
-    let corners = 3 * faces.len();
-    let mut fan_of_corner = vec![BORDER; corners];
-    let mut fan_source: Vec<u32> = Vec::with_capacity(vertices);
+    let (fan_of_corner, fan_source) = fans(faces, twins);
     let mut seen = vec![false; vertices];
-    for start in 0..corners {
-        if fan_of_corner[start] != BORDER {
-            continue;
-        }
-        let source = faces[start / 3][start % 3];
-        if std::mem::replace(&mut seen[source as usize], true) {
+    for &vertex in &fan_source {
+        if std::mem::replace(&mut seen[vertex as usize], true) {
             if !repair.split_vertices {
-                return Err(Error::NonManifoldVertex { vertex: source });
+                return Err(Error::NonManifoldVertex { vertex });
             }
             findings.split_vertices += 1;
-        }
-        let fan = fan_source.len() as u32;
-        fan_source.push(source);
-        // One way around until the boundary or the start, then the other way.
-        let mut corner = start;
-        loop {
-            fan_of_corner[corner] = fan;
-            let twin = twins[previous(corner)];
-            if twin == BORDER || twin as usize == start {
-                break;
-            }
-            corner = twin as usize;
-        }
-        let mut corner = start;
-        while twins[corner] != BORDER && fan_of_corner[next(twins[corner] as usize)] == BORDER {
-            corner = next(twins[corner] as usize);
-            fan_of_corner[corner] = fan;
         }
     }
     let mut order: Vec<u32> = (0..fan_source.len() as u32).collect();
@@ -332,10 +313,4 @@ fn check_topology(vertices: usize, twins: &[u32], loops: usize) -> Result<(), Er
         (0, _) => Ok(()),
         (genus, boundary_loops) => Err(Error::HigherGenus { genus, boundary_loops }),
     }
-}
-
-fn loop_length(positions: &[[f64; 3]], vertices: &[u32]) -> f64 {
-    let at = |v: u32| nalgebra::Vector3::from(positions[v as usize]);
-    let next = vertices.iter().cycle().skip(1);
-    vertices.iter().zip(next).map(|(&a, &b)| (at(a) - at(b)).norm()).sum()
 }

@@ -1,30 +1,43 @@
-//! Convex polygons cut by axis-parallel strips.
+//! Convex polygons cut by straight lines.
 
 /// A triangle cut by at most four lines has at most seven corners.
 const MOST: usize = 8;
 
 /// A convex polygon on the stack.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Polygon {
+pub(crate) struct Polygon {
     corners: [[f64; 2]; MOST],
     count: usize,
 }
 
 impl Polygon {
-    pub(super) fn triangle([a, b, c]: [[f64; 2]; 3]) -> Self {
+    pub(crate) fn triangle([a, b, c]: [[f64; 2]; 3]) -> Self {
         let mut corners = [[0.0; 2]; MOST];
         corners[..3].copy_from_slice(&[a, b, c]);
         Self { corners, count: 3 }
     }
 
     /// The part with `low <= coordinate k <= high`.
-    pub(super) fn between(&self, k: usize, low: f64, high: f64) -> Self {
+    pub(crate) fn between(&self, k: usize, low: f64, high: f64) -> Self {
         self.half(k, low, 1.0).half(k, high, -1.0)
     }
 
     /// The part with `sign * (coordinate k - bound) >= 0`.
     fn half(&self, k: usize, bound: f64, sign: f64) -> Self {
-        let depth = |p: &[f64; 2]| sign * (p[k] - bound);
+        let on_the_line = |mut crossing: [f64; 2]| {
+            crossing[k] = bound;
+            crossing
+        };
+        self.positive(|p| sign * (p[k] - bound), on_the_line)
+    }
+
+    /// The part to the left of the line from `a` to `b`.
+    pub(crate) fn left_of(&self, a: [f64; 2], b: [f64; 2]) -> Self {
+        self.positive(|p| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]), |crossing| crossing)
+    }
+
+    /// The part where `depth`, linear in the point, is not negative; `polish` may move a crossing onto the line.
+    fn positive(&self, depth: impl Fn(&[f64; 2]) -> f64, polish: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
         let corners = &self.corners[..self.count];
         if corners.iter().all(|p| depth(p) >= 0.0) {
             return *self;
@@ -38,9 +51,7 @@ impl Polygon {
             }
             if (from < 0.0 && to > 0.0) || (from > 0.0 && to < 0.0) {
                 let t = from / (from - to);
-                let mut crossing = [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])];
-                crossing[k] = bound;
-                out.push(crossing);
+                out.push(polish([p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])]));
             }
         }
         out
@@ -55,7 +66,7 @@ impl Polygon {
     }
 
     /// Area, regardless of the orientation.
-    pub(super) fn area(&self) -> f64 {
+    pub(crate) fn area(&self) -> f64 {
         let base = self.corners[0];
         let fan = self.corners[..self.count].windows(2).skip(1);
         let doubled: f64 = fan
@@ -68,7 +79,7 @@ impl Polygon {
     }
 
     /// Mean of the corners: a point inside.
-    pub(super) fn middle(&self) -> [f64; 2] {
+    pub(crate) fn middle(&self) -> [f64; 2] {
         let corners = &self.corners[..self.count];
         let mean = |k: usize| corners.iter().map(|p| p[k]).sum::<f64>() / self.count as f64;
         [mean(0), mean(1)]

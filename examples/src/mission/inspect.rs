@@ -1,0 +1,133 @@
+//! After the paint: a look at the wall with a depth camera, and the flight as trajectories.
+
+use std::path::Path;
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use paint_sim::{Camera, Frame, Hit, Lights, Look, Surface, render};
+use tsdf_hash::{ColourView, DepthData, DepthView, Intrinsics, Map, Mesh};
+use vio_ekf::{Alignment, Stamp, Trajectory};
+
+use super::{Mission, MissionError};
+
+/// Size of the depth camera's images, pixels.
+const IMAGE: (u32, u32) = (320, 240);
+/// Horizontal opening angle of the depth camera, radians: a common structured-light camera's 58 degrees.
+const OPENING: f64 = 1.02;
+/// Distance of the camera from the surface's box, metres.
+const DISTANCE: f64 = 1.6;
+/// Edge of a voxel of the map, metres.
+const VOXEL: f64 = 0.015;
+/// Views of a surface that faces one side: columns and rows of the grid of viewpoints.
+const GRID: (usize, usize) = (5, 3);
+/// Views around a surface that closes in, at each of two heights.
+const RING: usize = 12;
+
+/// What the depth camera made of the painted surface.
+pub(super) struct Scan {
+    /// The mesh of the map, with the colours seen.
+    pub(super) mesh: Mesh,
+    /// Mean distance of its vertices from the true surface, metres.
+    pub(super) error_mean: f64,
+}
+
+impl Mission {
+    /// Looks at the painted surface from all sides that have paint, and fuses what it sees.
+    pub(super) fn scan(&self) -> Result<Scan, MissionError> {
+        let painted = self.painted_depth();
+        // Even light from everywhere: the colours of the map are the surface's own.
+        let lights = Lights { sun: [0.0; 3], ambient: [1.0; 3], ..Lights::default() };
+        let shade = |hit: &Hit| -> Look { self.look(&painted, hit) };
+        let threads = self.settings.threads;
+        let settings = tsdf_hash::Settings { voxel_size: VOXEL, threads, ..tsdf_hash::Settings::default() };
+        let mut map = Map::new(settings)?;
+        for camera in self.viewpoints()? {
+            let frame = render(&self.surface.world, &camera, &shade, &lights, 1, threads)?;
+            if frame.depth.iter().any(|&depth| depth > 0.0) {
+                fuse(&mut map, &camera, &frame)?;
+            }
+        }
+        let mesh = map.mesh();
+        let world = &self.surface.world;
+        let off = |p: &[f32; 3]| world.distance(&Point3::from(p.map(f64::from)), 1.0);
+        let error_mean = mesh.positions.iter().map(off).sum::<f64>() / mesh.positions.len().max(1) as f64;
+        Ok(Scan { mesh, error_mean })
+    }
+
+    /// A grid of viewpoints before a surface that faces one side, two rings around one that does not.
+    fn viewpoints(&self) -> Result<Vec<Camera>, MissionError> {
+        let positions = self.surface.disk().positions();
+        let (low, high) = positions
+            .iter()
+            .map(|p| Vector3::from(*p))
+            .fold((Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)), |(l, h), p| (l.inf(&p), h.sup(&p)));
+        let centre = (low + high) / 2.0;
+        let up = Vector3::z();
+        let look = |eye: Vector3<f64>, target: Vector3<f64>| {
+            Camera::looking_at(&Point3::from(eye), &Point3::from(target), &up, OPENING, IMAGE)
+        };
+        let facing = self.surface.facing();
+        let flat = Vector3::new(facing.x, facing.y, 0.0);
+        let mut cameras = Vec::new();
+        if let Some(front) = flat.try_normalize(0.5) {
+            let side: Vector3<f64> = up.cross(&front);
+            let share = |k: usize, n: usize| (k as f64 + 0.5) / n as f64 - 0.5;
+            let width = side.abs().dot(&(high - low));
+            let depth = 0.5 * front.abs().dot(&(high - low));
+            for row in 0..GRID.1 {
+                for column in 0..GRID.0 {
+                    let along = side * (share(column, GRID.0) * width) + up * (share(row, GRID.1) * (high.z - low.z));
+                    let target = centre + along;
+                    cameras.push(look(target + front * (depth + DISTANCE), target)?);
+                }
+            }
+        } else {
+            let radius = 0.5 * (high - low).xy().norm() + DISTANCE;
+            for height in [0.3, 0.8] {
+                for k in 0..RING {
+                    let (sin, cos) = (std::f64::consts::TAU * k as f64 / RING as f64).sin_cos();
+                    let target = Vector3::new(centre.x, centre.y, low.z + height * (high.z - low.z));
+                    cameras.push(look(target + Vector3::new(cos, sin, 0.1) * radius, target)?);
+                }
+            }
+        }
+        Ok(cameras)
+    }
+
+    /// The flights as TUM files: what was flown, and what the drifting localisation took it for. Returns the root mean square
+    /// of the position error after rigid alignment, the ATE by which odometry is judged, metres.
+    pub(super) fn save_trajectories(&self, folder: &Path) -> Result<f64, MissionError> {
+        let mut flown = Trajectory::default();
+        let mut believed = Trajectory::default();
+        let mut start = 0.0;
+        for f in &self.flights {
+            // One pose in ten: 10 Hz.
+            for sample in f.slam.samples.iter().step_by(10) {
+                let stamp = Stamp::from_secs(start + sample.time)?;
+                if flown.stamps().last().is_some_and(|&last| last >= stamp) {
+                    continue;
+                }
+                flown.push(stamp, sample.world_from_body)?;
+                let rotation = sample.world_from_body.rotation;
+                believed.push(stamp, Isometry3::from_parts(sample.estimated_position.into(), rotation))?;
+            }
+            start += f.plan.trajectory.duration();
+        }
+        for (name, trajectory) in [("flight_true.tum", &flown), ("flight_slam.tum", &believed)] {
+            let path = folder.join(name);
+            std::fs::write(&path, vio_ekf::tum::write(trajectory))
+                .map_err(|source| MissionError::Unwritable { path: path.display().to_string(), source })?;
+        }
+        Ok(vio_ekf::ate(flown.poses(), believed.poses(), Alignment::Se3)?.position.rmse)
+    }
+}
+
+/// Puts one rendered frame into the map.
+fn fuse(map: &mut Map, camera: &Camera, frame: &Frame) -> Result<(), MissionError> {
+    let (width, height) = (frame.width as usize, frame.height as usize);
+    let intrinsics = Intrinsics { fx: camera.fx, fy: camera.fy, cx: camera.cx, cy: camera.cy };
+    let rgb8: Vec<u8> = frame.colour.iter().flatten().copied().collect();
+    let depth = DepthView { width, height, data: DepthData::F32 { data: &frame.depth }, intrinsics };
+    let colour = ColourView { width, height, rgb8: &rgb8, intrinsics };
+    map.integrate(&depth, Some(&colour), &camera.world_from_camera)?;
+    Ok(())
+}

@@ -1,0 +1,69 @@
+//! Eight voxels cubed, 14 bytes each.
+
+use crate::key::mix;
+
+/// Voxels along the edge of a block.
+pub(crate) const SIDE: usize = 8;
+/// Voxels of a block.
+pub(crate) const VOXELS: usize = SIDE * SIDE * SIDE;
+/// The normalised distance 1 as an integer: `65535 * 32767 < 2^31`, so a sum can never overflow before its weight does.
+pub(crate) const ONE: i32 = 32767;
+/// Largest weight of one observation.
+pub(crate) const MAX_WEIGHT: f32 = 15.0;
+/// Coloured frames that fit one voxel: `1040 * 63 < 2^16`.
+pub(crate) const MAX_COLOURS: u16 = 1040;
+
+/// Sums over observations, never averages: adding and subtracting commute, so the order of the frames does not matter
+/// and any of them can be taken out again. Voxel `(x, y, z)` of the block is entry `x + 8 (y + 8 z)`.
+#[derive(Clone, PartialEq, Eq)]
+pub(crate) struct Block {
+    /// `S = Σ w q`, with `q = round(32767 sdf / μ)`.
+    pub(crate) distance: [i32; VOXELS],
+    /// `W = Σ w`, with `w` in `1..=15`.
+    pub(crate) weight: [u16; VOXELS],
+    /// Sums of R, G, B in six bits, and the number of coloured observations.
+    pub(crate) colour: [[u16; 4]; VOXELS],
+}
+
+impl Block {
+    pub(crate) const ZERO: Self = Self { distance: [0; VOXELS], weight: [0; VOXELS], colour: [[0; 4]; VOXELS] };
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.weight.iter().fold(0, |all, w| all | w) == 0
+    }
+
+    /// Mean normalised distance of a voxel, `-1..=1`; `None` where nothing was observed.
+    pub(crate) fn mean(&self, voxel: usize) -> Option<f32> {
+        let weight = self.weight[voxel];
+        (weight > 0).then(|| self.distance[voxel] as f32 / (f32::from(weight) * ONE as f32))
+    }
+
+    /// Mean colour of a voxel, R G B in `0..=255`; `None` where none was observed.
+    pub(crate) fn mean_colour(&self, voxel: usize) -> Option<[f32; 3]> {
+        let [r, g, b, n] = self.colour[voxel].map(f32::from);
+        (n > 0.0).then(|| [r, g, b].map(|sum| sum * (255.0 / 63.0) / n))
+    }
+
+    /// Folds all voxels into `seed`.
+    pub(crate) fn hash(&self, seed: u64) -> u64 {
+        let mut h = seed;
+        for voxel in 0..VOXELS {
+            let [r, g, b, n] = self.colour[voxel].map(u64::from);
+            let distance = u64::from(self.distance[voxel].cast_unsigned());
+            h = mix(h ^ (distance << 16 | u64::from(self.weight[voxel]))).wrapping_add(r | g << 16 | b << 32 | n << 48);
+        }
+        mix(h)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Block, MAX_COLOURS, ONE, VOXELS};
+
+    #[test]
+    fn the_sums_cannot_overflow_before_their_counters() {
+        assert!(i64::from(ONE) * i64::from(u16::MAX) <= i64::from(i32::MAX));
+        assert!(MAX_COLOURS.checked_mul(63).is_some());
+        assert_eq!(size_of::<Block>(), 14 * VOXELS);
+    }
+}

@@ -1,0 +1,173 @@
+//! Which blocks may hold a voxel within `μ` of a measured depth.
+//!
+//! A superset is enough: fusion tests every voxel itself, so what is found here changes the time and never the map.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use crate::key::{Key, mix};
+use crate::view::DepthView;
+use crate::{Error, Settings};
+
+/// Edge of the pixel squares that are looked at together.
+pub(crate) const TILE: usize = 8;
+/// Keys remembered, to drop most repetitions before sorting.
+const RECENT: usize = 4096;
+
+/// Keys of the blocks near the pixels of some rows, in no order, with repetitions.
+pub(crate) fn near(
+    first_row: usize,
+    inverse_depth: &[f32],
+    depth: &DepthView,
+    world_from_camera: &Isometry3<f64>,
+    settings: &Settings,
+) -> Result<Vec<Key>, Error> {
+    let width = depth.width;
+    let rows = inverse_depth.len() / width;
+    let mut search = Search {
+        first_row,
+        inverse_depth,
+        depth,
+        origin: world_from_camera.translation.vector / settings.block_size(),
+        rotation: world_from_camera.rotation.to_rotation_matrix().into_inner() / settings.block_size(),
+        // A little more than μ: the voxels are projected in single precision.
+        reach: settings.truncation() * 1.001 + 1e-4 * settings.voxel_size,
+        block: settings.block_size(),
+        recent: vec![Key(u64::MAX); RECENT],
+        keys: Vec::new(),
+    };
+    for v in (0..rows).step_by(TILE) {
+        for u in (0..width).step_by(TILE) {
+            search.square(u, v, TILE, rows)?;
+        }
+    }
+    Ok(search.keys)
+}
+
+struct Search<'a> {
+    first_row: usize,
+    inverse_depth: &'a [f32],
+    depth: &'a DepthView<'a>,
+    /// Camera in the world, in blocks.
+    origin: Vector3<f64>,
+    /// Blocks in the world from metres in the camera.
+    rotation: nalgebra::Matrix3<f64>,
+    reach: f64,
+    block: f64,
+    recent: Vec<Key>,
+    keys: Vec<Key>,
+}
+
+impl Search<'_> {
+    fn square(&mut self, u: usize, v: usize, side: usize, rows: usize) -> Result<(), Error> {
+        let width = self.depth.width;
+        let (right, below) = ((u + side).min(width), (v + side).min(rows));
+        if u >= right || v >= below {
+            return Ok(());
+        }
+        let (mut low, mut high) = (f32::INFINITY, 0.0_f32);
+        for row in v..below {
+            for &omega in &self.inverse_depth[row * width + u..row * width + right] {
+                if omega > 0.0 {
+                    (low, high) = (low.min(omega), high.max(omega));
+                }
+            }
+        }
+        if high == 0.0 {
+            return Ok(());
+        }
+        let (near, far) = (1.0 / f64::from(high), 1.0 / f64::from(low));
+        if far - near > self.block && side > 1 {
+            let half = side / 2;
+            for (du, dv) in [(0, 0), (half, 0), (0, half), (half, half)] {
+                self.square(u + du, v + dv, half, rows.min(v + side))?;
+            }
+            return Ok(());
+        }
+        self.frustum([u, right], [v + self.first_row, below + self.first_row], near, far)
+    }
+
+    /// Blocks that the bounding boxes of the frustum's slices touch.
+    fn frustum(&mut self, u: [usize; 2], v: [usize; 2], near: f64, far: f64) -> Result<(), Error> {
+        let k = &self.depth.intrinsics;
+        let mut rays = [Vector3::zeros(); 4];
+        for (n, ray) in rays.iter_mut().enumerate() {
+            // Pixels reach half a pixel around their centres; a little more for the rounding.
+            let edge =
+                |range: [usize; 2], upper: usize| range[upper] as f64 - 0.5 + if upper == 0 { -0.01 } else { 0.01 };
+            let pixel = [edge(u, n & 1), edge(v, n >> 1)];
+            *ray = self.rotation * Vector3::new((pixel[0] - k.cx) / k.fx, (pixel[1] - k.cy) / k.fy, 1.0);
+        }
+        let (near, far) = ((near - self.reach).max(0.0), far + self.reach);
+        let slices = ((far - near) / self.block).ceil();
+        let step = (far - near) / slices;
+        for slice in 0..slices as usize {
+            let z = near + slice as f64 * step;
+            let corners = rays.iter().flat_map(|ray| [self.origin + ray * z, self.origin + ray * (z + step)]);
+            let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+            for corner in corners {
+                (low, high) = (low.inf(&corner), high.sup(&corner));
+            }
+            self.cover(&low.into(), &high.into())?;
+        }
+        Ok(())
+    }
+
+    fn cover(&mut self, low: &Point3<f64>, high: &Point3<f64>) -> Result<(), Error> {
+        let [low, high] = [low, high].map(|p| p.coords.map(f64::floor));
+        if low.iter().chain(high.iter()).any(|c| c.abs() > f64::from(1 << 20)) {
+            return Err(Error::OutOfRange);
+        }
+        let [low, high] = [low, high].map(|p| p.map(|c| c as i32));
+        for x in low.x..=high.x {
+            for y in low.y..=high.y {
+                for z in low.z..=high.z {
+                    let key = Key::new([x, y, z]).ok_or(Error::OutOfRange)?;
+                    let recent = &mut self.recent[mix(key.0) as usize % RECENT];
+                    if *recent != key {
+                        *recent = key;
+                        self.keys.push(key);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, Vector3};
+
+    use crate::block::Block;
+    use crate::fuse::{Frame, Sign};
+    use crate::key::Key;
+    use crate::surface::Surface;
+    use crate::{DepthData, DepthView, Intrinsics, Settings};
+
+    /// Brute force: the frame is applied to every block of a large box around the scene.
+    #[test]
+    fn no_touched_block_is_missed() {
+        // A ramp with a step, seen from oblique poses by cameras of either handedness.
+        let data: Vec<f32> =
+            (0..80 * 60).map(|k| 0.9 + 0.004 * (k % 80) as f32 + if k / 80 > 30 { 0.35 } else { 0.0 }).collect();
+        for (threads, fx, fy) in [(1, 70.0, 70.0), (2, 60.0, -75.0), (3, -65.0, 80.0)] {
+            let settings = Settings { voxel_size: 0.01, threads, ..Settings::default() };
+            let intrinsics = Intrinsics { fx, fy, cx: 38.3, cy: 31.7 };
+            let view = DepthView { width: 80, height: 60, data: DepthData::F32 { data: &data }, intrinsics };
+            let pose = Isometry3::new(Vector3::new(0.05, -0.02, -1.0), Vector3::new(0.3, -0.4, 0.2 * fx / 60.0));
+            let mut surface = Surface::default();
+            surface.read(&view, &pose, &settings).unwrap();
+            let frame = Frame::new(&surface, &intrinsics, None, &pose, &settings);
+            let (mut touched, mut blank) = (0, Block::ZERO);
+            for n in 0..48_i32.pow(3) {
+                let key = Key::new([n % 48 - 24, n / 48 % 48 - 24, n / 2304 - 24]).unwrap();
+                if frame.apply(Sign::Plus, key, &mut blank).voxels > 0 {
+                    touched += 1;
+                    assert!(surface.keys.binary_search(&key).is_ok(), "{:?} was missed", key.block());
+                }
+            }
+            // Enough blocks, and a search that is not just everything.
+            assert!(touched > 100 && surface.keys.len() < 3 * touched, "{touched} of {}", surface.keys.len());
+        }
+    }
+}

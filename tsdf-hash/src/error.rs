@@ -1,0 +1,94 @@
+//! What can be wrong with an input.
+
+/// Everything this crate can refuse. Nothing of the map has changed when an error is returned.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A field of [`Settings`](crate::Settings) is out of its range.
+    #[error("settings: {name} = {value} is refused: it must be {requirement}")]
+    InvalidSetting {
+        /// The field.
+        name: &'static str,
+        /// What it held.
+        value: f64,
+        /// What it must hold.
+        requirement: &'static str,
+    },
+    /// An image has no pixels, or more than 16384 in one direction.
+    #[error("the {image} image is {width} x {height} pixels: both sides must lie in 1..=16384")]
+    InvalidSize {
+        /// `"depth"` or `"colour"`.
+        image: &'static str,
+        /// Its width in pixels.
+        width: usize,
+        /// Its height in pixels.
+        height: usize,
+    },
+    /// A pixel slice does not fit its width and height.
+    #[error("the {image} image holds {found} values where its width and height ask for {expected}")]
+    WrongLength {
+        /// `"depth"` or `"colour"`.
+        image: &'static str,
+        /// Values asked for by width and height.
+        expected: usize,
+        /// Values in the slice.
+        found: usize,
+    },
+    /// Intrinsics that are not finite, or a focal length of zero.
+    #[error("the {image} intrinsics have {name} = {value}: focal lengths must be finite and not zero, centres finite")]
+    InvalidIntrinsics {
+        /// `"depth"` or `"colour"`.
+        image: &'static str,
+        /// The field.
+        name: &'static str,
+        /// What it held.
+        value: f64,
+    },
+    /// A depth scale that is not finite and positive.
+    #[error("depth scale = {scale} units per metre: give a finite, positive one (1000 for millimetres)")]
+    InvalidScale {
+        /// The scale as given.
+        scale: f64,
+    },
+    /// A pose with a non-finite entry or a quaternion that is not of unit length.
+    #[error("world_from_camera is not a rigid motion: {what}")]
+    InvalidPose {
+        /// What is wrong with it.
+        what: &'static str,
+    },
+    /// No pixel of the image can be fused.
+    #[error(
+        "nothing to fuse: {valid} pixels lie inside min_depth..max_depth and none of them on a smooth 3x3 patch; \
+         check the depth scale, the range, or skip the frame"
+    )]
+    NoDepth {
+        /// Pixels with a depth inside the range.
+        valid: usize,
+    },
+    /// A surface point so far from the origin that its block cannot be named.
+    #[error("the frame reaches blocks beyond ±2^20 of the origin: check world_from_camera, or shift the world")]
+    OutOfRange,
+    /// The frame needs more memory than `max_bytes` allows.
+    #[error("the frame does not fit: the map holds {used} of {max_bytes} bytes; raise max_bytes or enlarge voxel_size")]
+    OutOfBudget {
+        /// Bytes the map holds, [`Map::bytes`](crate::Map::bytes).
+        used: usize,
+        /// The cap, [`Settings::max_bytes`](crate::Settings::max_bytes).
+        max_bytes: usize,
+    },
+    /// A voxel has taken all the observations its counters can hold without losing exactness.
+    #[error("block {block:?} is saturated (weight 65535 or 1040 coloured frames): fuse fewer frames of this place")]
+    Saturated {
+        /// Block coordinates (one of those that are full).
+        block: [i32; 3],
+    },
+    /// The frame to take out was never put in, or not with this pose, colour or these settings.
+    #[error("block {block:?} does not contain this frame: de-integrate with exactly what was integrated")]
+    NotIntegrated {
+        /// Block coordinates (one of those that do not contain it).
+        block: [i32; 3],
+    },
+    /// Writing a mesh failed.
+    #[error("writing the mesh failed")]
+    Write(#[from] std::io::Error),
+}

@@ -1,0 +1,86 @@
+//! How fine, how far, how much memory.
+
+use crate::Error;
+use crate::block::SIDE;
+
+/// Axial noise of a depth camera: `σ(z) = base + quadratic (z − nearest)²`, metres.
+///
+/// It sets the weight of an observation and what counts as a depth edge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
+pub struct NoiseModel {
+    /// Standard deviation at `nearest`, metres (Nguyen, Izadi, Lovell 2012: 0.0012).
+    pub base: f64,
+    /// Growth, per metre (same source: 0.0019).
+    pub quadratic: f64,
+    /// Depth at which the noise is least, metres (same source: 0.4).
+    pub nearest: f64,
+}
+
+impl Default for NoiseModel {
+    fn default() -> Self {
+        Self { base: 0.0012, quadratic: 0.0019, nearest: 0.4 }
+    }
+}
+
+/// Settings of a [`Map`](crate::Map). They cannot change while it lives: exact de-integration depends on them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
+pub struct Settings {
+    /// Edge of a voxel, metres (thesis Paper I, section 6: 0.01).
+    pub voxel_size: f64,
+    /// Truncation distance `μ` in voxels (not printed; the usual 4).
+    pub truncation_voxels: f64,
+    /// Nearest depth that is fused, metres (ours: 0.2).
+    pub min_depth: f64,
+    /// Farthest depth that is fused, metres (ours: 6; the noise of a structured-light camera reaches 6 cm there).
+    pub max_depth: f64,
+    /// Hard cap on the bytes of blocks and hash table (ours: 512 MiB; thesis Paper I, section 6.1, runs in 300-600 MB).
+    pub max_bytes: usize,
+    /// Threads used inside one call; 1 spawns none. Results do not depend on it.
+    pub threads: usize,
+    /// Noise of the depth camera.
+    pub noise: NoiseModel,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            voxel_size: 0.01,
+            truncation_voxels: 4.0,
+            min_depth: 0.2,
+            max_depth: 6.0,
+            max_bytes: 512 << 20,
+            threads: 1,
+            noise: NoiseModel::default(),
+        }
+    }
+}
+
+impl Settings {
+    /// Truncation distance `μ`, metres.
+    pub fn truncation(&self) -> f64 {
+        self.truncation_voxels * self.voxel_size
+    }
+
+    /// Edge of a block, metres.
+    pub(crate) fn block_size(&self) -> f64 {
+        self.voxel_size * SIDE as f64
+    }
+
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let within = |name, value: f64, lo: f64, hi: f64, requirement| {
+            // A comparison that a NaN fails.
+            if value >= lo && value <= hi { Ok(()) } else { Err(Error::InvalidSetting { name, value, requirement }) }
+        };
+        within("voxel_size", self.voxel_size, 1e-4, 10.0, "1e-4..=10 metres")?;
+        within("truncation_voxels", self.truncation_voxels, 1.0, 64.0, "1..=64 voxels")?;
+        within("min_depth", self.min_depth, 1e-3, 1e3, "0.001..=1000 metres")?;
+        within("max_depth", self.max_depth, 1e-3, 1e3, "0.001..=1000 metres")?;
+        within("max_depth", self.max_depth - self.min_depth, 1e-6, 1e3, "larger than min_depth")?;
+        within("threads", self.threads as f64, 1.0, 1024.0, "1..=1024")?;
+        within("noise.base", self.noise.base, 1e-9, 10.0, "1e-9..=10 metres")?;
+        within("noise.quadratic", self.noise.quadratic, 0.0, 10.0, "0..=10 per metre")?;
+        within("noise.nearest", self.noise.nearest, 0.0, 1e3, "0..=1000 metres")
+    }
+}

@@ -1,0 +1,10 @@
+//! What the crate promises, against closed forms and recorded images.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
+
+mod accuracy;
+mod errors;
+mod recorded;
+mod reversible;
+mod scene;
+mod topology;
