@@ -1,14 +1,17 @@
-//! Paints the built-in rock once per seed and holds every figure of the report against what is asked of it.
+//! Paints the built-in rock once per seed and holds every figure of the report against what is asked of it. Each mission
+//! leaves its report and pictures in a folder of its own.
 //!
 //! `cargo bench -p paintcopter-benches --bench missions -- --seeds 1..10`
 
+use std::error::Error;
 use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Parser;
 use paintcopter_examples::design::Design;
-use paintcopter_examples::mission::{Mission, MissionError, MissionSettings};
+use paintcopter_examples::mission::{Mission, MissionSettings};
 use paintcopter_examples::report::Check;
 use paintcopter_examples::world::rock_wall;
 
@@ -25,6 +28,9 @@ struct Arguments {
     /// Worker threads of a mission [default: all cores]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// Folder for the results, one folder per seed in it
+    #[arg(long, value_name = "DIR", default_value = concat!(env!("CARGO_TARGET_TMPDIR"), "/missions"))]
+    out: PathBuf,
     /// What `cargo bench` says; without it nothing is run
     #[arg(long, hide = true)]
     bench: bool,
@@ -51,7 +57,7 @@ fn main() -> ExitCode {
     let mut missions = Vec::new();
     for seed in arguments.seeds {
         let clock = Instant::now();
-        match checks(seed, arguments.threads) {
+        match checks(seed, arguments.threads, &arguments.out.join(format!("seed-{seed}"))) {
             Ok(checks) => missions.push((seed, checks)),
             Err(error) => {
                 eprintln!("missions: seed {seed}: {error}");
@@ -69,13 +75,14 @@ fn main() -> ExitCode {
     ExitCode::SUCCESS
 }
 
-fn checks(seed: u64, threads: Option<u16>) -> Result<Vec<Check>, MissionError> {
+fn checks(seed: u64, threads: Option<u16>, folder: &Path) -> Result<Vec<Check>, Box<dyn Error>> {
     let mut settings = MissionSettings { seed, ..MissionSettings::default() };
     if let Some(threads) = threads {
         settings.threads = threads.into();
     }
+    std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}; choose another --out", folder.display()))?;
     let mission = Mission::run("Rock wall", &rock_wall(seed), &Design::Strata { seed }, settings)?;
-    Ok(mission.report()?.checks())
+    Ok(mission.save(folder)?.checks())
 }
 
 /// One row per figure, one column per seed.

@@ -1,7 +1,9 @@
 //! What the benches share: scenes of the size of the built-in world, seeded and built in memory, and criterion's settings.
 
+pub mod cpu;
 pub mod motion;
 pub mod rock;
+pub mod room;
 
 use std::time::Duration;
 

@@ -1,0 +1,163 @@
+//! Prints for our libraries the figures that `peers/*.py` print for others: one JSON object per line, same names.
+
+use std::error::Error;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use paint_net::procedural::Texture;
+use paint_net::{Deconvolution, Limits, MatchingPursuit, Painter, Saturation, SprayKernel, Task, metrics};
+use paintcopter_benches::cpu::{clock_name, median_seconds};
+use paintcopter_examples::mesh_io::read_mesh;
+use paintcopter_examples::world::rock_wall;
+use serde_json::json;
+use uv_param::{Chart, Method, Settings, largest_disk, unwrap};
+
+type AnyError = Box<dyn Error>;
+
+/// Prints for the PaintCopter libraries what peers/*.py print for others, one JSON object per line.
+#[derive(Parser)]
+struct Arguments {
+    #[command(subcommand)]
+    job: Job,
+}
+
+#[derive(Subcommand)]
+enum Job {
+    /// Writes the built-in rock wall, so that peers can work on it
+    Rock {
+        /// OBJ file to write
+        file: PathBuf,
+        /// Which wall
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+    },
+    /// Unwraps the largest disk of a mesh, as `uv_peers.py disk` does
+    Uv {
+        /// OBJ, PLY or OFF
+        mesh: PathBuf,
+        /// Runs of which the median is printed
+        #[arg(long, default_value_t = 3)]
+        runs: usize,
+        /// Folder for OBJ files with texture coordinates, for `uv_judge.py`
+        #[arg(long, value_name = "DIR")]
+        save: Option<PathBuf>,
+    },
+    /// Paints the procedural pictures, as `paint_baselines.py painters --set procedural` does
+    Paint {
+        /// Side of the pictures, pixels
+        #[arg(long, default_value_t = 128, value_parser = clap::value_parser!(u16).range(16..=2048))]
+        size: u16,
+        /// Runs of which the median is printed
+        #[arg(long, default_value_t = 3)]
+        runs: usize,
+    },
+}
+
+fn main() -> ExitCode {
+    let done = match Arguments::parse().job {
+        Job::Rock { file, seed } => rock(&file, seed),
+        Job::Uv { mesh, runs, save } => uv(&mesh, runs, save.as_deref()),
+        Job::Paint { size, runs } => paint(size.into(), runs),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("ours: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn rock(file: &Path, seed: u64) -> Result<(), AnyError> {
+    let mesh = rock_wall(seed);
+    let mut text = String::new();
+    for [x, y, z] in &mesh.positions {
+        writeln!(text, "v {x} {y} {z}")?;
+    }
+    for face in &mesh.faces {
+        let [a, b, c] = face.map(|i| i + 1);
+        writeln!(text, "f {a} {b} {c}")?;
+    }
+    write(file, &text)
+}
+
+fn uv(path: &Path, runs: usize, save: Option<&Path>) -> Result<(), AnyError> {
+    let mesh = read_mesh(path)?;
+    let (disk, _) = largest_disk(&mesh.positions, &mesh.faces)?;
+    let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    println!(
+        "{}",
+        json!({ "mesh": name, "fig": "mesh", "vertices": disk.positions().len(), "faces": disk.faces().len() })
+    );
+    for (fig, method) in
+        [("auto", Method::Auto), ("arap", Method::Arap), ("symmetric_dirichlet", Method::SymmetricDirichlet)]
+    {
+        let settings = Settings { method, ..Settings::default() };
+        let chart = unwrap(&disk, &settings, |_| ())?;
+        let seconds = median_seconds(runs, || drop(unwrap(&disk, &settings, |_| ())));
+        let q = chart.quality();
+        println!(
+            "{}",
+            json!({
+                "mesh": name, "clock": clock_name(), "fig": format!("uv-param_{fig}"), "s": seconds, "runs": runs.max(1),
+                "iters": q.iterations, "arap": q.arap, "sd": q.symmetric_dirichlet, "flips": q.flips,
+                "p99_stretch": q.stretch_p99, "max_stretch": q.stretch_max,
+            })
+        );
+        if let Some(folder) = save {
+            std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+            let stem = path.file_stem().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+            write(&folder.join(format!("{stem}_uv-param_{fig}.obj")), &textured(&chart)?)?;
+        }
+    }
+    Ok(())
+}
+
+/// A chart as an OBJ with texture coordinates in metres.
+fn textured(chart: &Chart) -> Result<String, std::fmt::Error> {
+    let mut text = String::new();
+    for [x, y, z] in chart.disk().positions() {
+        writeln!(text, "v {x} {y} {z}")?;
+    }
+    for [u, v] in chart.uv() {
+        writeln!(text, "vt {u} {v}")?;
+    }
+    for face in chart.disk().faces() {
+        let [a, b, c] = face.map(|i| i + 1);
+        writeln!(text, "f {a}/{a} {b}/{b} {c}/{c}")?;
+    }
+    Ok(text)
+}
+
+fn paint(size: usize, runs: usize) -> Result<(), AnyError> {
+    // The peers' nozzle and pictures: σ = 2 px cut at 4 px, seed 1000.
+    let kernel = SprayKernel::new(2.0, 2.0)?;
+    let painters: [&dyn Painter; 2] = [&Deconvolution::default(), &MatchingPursuit::default()];
+    for texture in Texture::ALL {
+        let wanted = texture.image(1000, size);
+        let task = Task::on_bare_wall(&wanted);
+        for painter in painters {
+            let run = || painter.paint(&task, &kernel, &Saturation::Tanh, &Limits::default(), &mut |_| ());
+            let painting = run()?;
+            let seconds = median_seconds(runs, || drop(run()));
+            println!(
+                "{}",
+                json!({
+                    "image": format!("proc-{texture:?}").to_lowercase(), "method": format!("paint-net_{}", painter.name()),
+                    "clock": clock_name(), "cpu_s": seconds, "sprays": painting.sprays.len(),
+                    "psnr": metrics::psnr(&painting.ink, &wanted, None)?,
+                    "ssim": metrics::ssim(&painting.ink, &wanted, None)?,
+                    "ssim_g": metrics::ssim_gaussian(&painting.ink, &wanted, None)?,
+                    "bce": metrics::binary_cross_entropy(&painting.ink, &wanted)?,
+                })
+            );
+        }
+    }
+    Ok(())
+}
+
+fn write(path: &Path, text: &str) -> Result<(), AnyError> {
+    std::fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()).into())
+}

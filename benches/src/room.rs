@@ -1,0 +1,84 @@
+//! A furnished room seen by a depth camera: the stream `loop` that `peers/synth_rgbd.py` writes, without its colours.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use tsdf_hash::{DepthData, DepthView, Intrinsics};
+
+/// Columns and rows of an image.
+const SIZE: (usize, usize) = (640, 480);
+const INTRINSICS: Intrinsics = Intrinsics { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5 };
+/// Depth values per metre.
+const SCALE: f64 = 1000.0;
+
+/// Corners of the room, metres.
+const LOW: [f64; 3] = [-3.0, -2.0, 0.0];
+const HIGH: [f64; 3] = [3.0, 2.0, 3.0];
+/// Centre and radius, metres.
+const SPHERES: [[f64; 4]; 4] =
+    [[2.1, 1.1, 0.5, 0.5], [-2.2, 1.2, 0.35, 0.35], [-2.3, -1.2, 1.4, 0.4], [0.3, 1.55, 1.8, 0.3]];
+/// Lowest and highest corner, metres.
+const BOXES: [[f64; 6]; 4] = [
+    [1.6, -2.0, 0.0, 2.8, -1.3, 0.75],
+    [-3.0, -0.4, 0.0, -2.5, 0.5, 1.9],
+    [-0.6, -1.7, 0.0, 0.2, -1.2, 0.45],
+    [2.6, -0.3, 0.9, 2.9, 0.5, 1.3],
+];
+
+/// A depth image and where it was taken.
+pub struct Shot {
+    /// Millimetres along the optical axis, row by row.
+    depth: Vec<u16>,
+    /// Pose of the camera.
+    pub world_from_camera: Isometry3<f64>,
+}
+
+impl Shot {
+    /// Image `k` of `n` on the way around the room.
+    pub fn take(k: usize, n: usize) -> Self {
+        let world_from_camera = pose(k, n);
+        let origin = Point3::from(world_from_camera.translation.vector);
+        let (width, height) = SIZE;
+        let ray = |pixel: usize| {
+            let x = ((pixel % width) as f64 - INTRINSICS.cx) / INTRINSICS.fx;
+            let y = ((pixel / width) as f64 - INTRINSICS.cy) / INTRINSICS.fy;
+            world_from_camera.rotation * Vector3::new(x, y, 1.0)
+        };
+        let depth = (0..width * height).map(|pixel| (SCALE * first_hit(&origin, &ray(pixel))).round() as u16).collect();
+        Self { depth, world_from_camera }
+    }
+
+    /// The image as the map reads it.
+    pub fn view(&self) -> DepthView<'_> {
+        let data = DepthData::U16 { data: &self.depth, scale: SCALE };
+        DepthView { width: SIZE.0, height: SIZE.1, data, intrinsics: INTRINSICS }
+    }
+}
+
+/// On an ellipse, looking outwards.
+fn pose(k: usize, n: usize) -> Isometry3<f64> {
+    let angle = std::f64::consts::TAU * k as f64 / n as f64;
+    let centre = Vector3::new(0.9 * angle.cos(), 0.5 * angle.sin(), 1.3 + 0.25 * (2.0 * angle).sin());
+    let pitch = (-12.0 + 18.0 * (3.0 * angle).sin()).to_radians();
+    let forward = Vector3::new(angle.cos() * pitch.cos(), angle.sin() * pitch.cos(), pitch.sin());
+    let right = forward.cross(&Vector3::z()).normalize();
+    let axes = Matrix3::from_columns(&[right, forward.cross(&right), forward]);
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
+    Isometry3::from_parts(Translation3::from(centre), rotation)
+}
+
+/// The `t` at which `o + t d` first meets a surface.
+fn first_hit(o: &Point3<f64>, d: &Vector3<f64>) -> f64 {
+    let slab = |k: usize, bound: f64| (bound - o[k]) / d[k];
+    let wall = (0..3).map(|k| slab(k, if d[k] > 0.0 { HIGH[k] } else { LOW[k] })).fold(f64::INFINITY, f64::min);
+    let boxes = BOXES.iter().filter_map(|b| {
+        let near = (0..3).map(|k| slab(k, b[k]).min(slab(k, b[k + 3]))).fold(f64::NEG_INFINITY, f64::max);
+        let far = (0..3).map(|k| slab(k, b[k]).max(slab(k, b[k + 3]))).fold(f64::INFINITY, f64::min);
+        (near < far && near > 1e-6).then_some(near)
+    });
+    let spheres = SPHERES.iter().filter_map(|s| {
+        let to = o - Point3::new(s[0], s[1], s[2]);
+        let (a, b, c) = (d.norm_squared(), to.dot(d), to.norm_squared() - s[3] * s[3]);
+        let root = b * b - a * c;
+        (root > 0.0).then(|| (-b - root.sqrt()) / a).filter(|t| *t > 1e-6)
+    });
+    boxes.chain(spheres).fold(wall, f64::min)
+}
