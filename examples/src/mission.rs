@@ -4,6 +4,8 @@ mod figures;
 mod gallery;
 mod inspect;
 
+pub use inspect::Inspection;
+
 use std::fmt::Write as _;
 use std::time::Instant;
 

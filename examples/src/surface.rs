@@ -44,7 +44,8 @@ impl PaintSurface {
         let settings = Settings { up: Some([0.0, 0.0, 1.0]), ..Settings::default() };
         let cuts = CutSettings { max_stretch: MOST_STRETCH, ..CutSettings::default() };
         let chart = uv_param::unwrap_with_cuts(&disk, &settings, &cuts, |p| {
-            progress(p.iteration as f64 / settings.iterations as f64);
+            let share = p.iteration as f64 / settings.iterations as f64;
+            progress(if p.stage == uv_param::Stage::Cut { 0.0 } else { share });
         })?;
         let texels = TexelMap::new(&chart, texel)?;
         let world = world(&disk, mesh)?;

@@ -72,8 +72,6 @@ pub fn unwrap_with_cuts(
     let mut best = Opened::start(disk, &settings, cuts, progress)?;
     while best.unfit(cuts) > cuts.share && best.chart.disk().cuts() < cuts.max_cuts {
         let Some(next) = best.best_cut()? else { break };
-        let settled = next.relaxed(&rough(SETTLE), &mut |_| ());
-        let Some(next) = best.better(settled)? else { break };
         best = next;
         best.report(progress);
     }
@@ -148,7 +146,7 @@ impl Opened {
     }
 
     /// The cut to a large hole if it pays, because no number of other cuts does what joining it does; else of the cuts to the
-    /// worst places the one that lowers the cost most; if none pays, of those to the next places.
+    /// worst places the one that lowers the cost most; if none pays in the end, of those to the next places.
     fn best_cut(&self) -> Result<Option<Self>, Error> {
         let paths = Paths::new(self.chart.disk());
         if let Some(hole) = tips::hole(self.chart.disk(), &paths) {
@@ -164,8 +162,11 @@ impl Opened {
                 let trial = self.better(trial)?;
                 best = trial.filter(|trial| best.as_ref().is_none_or(|best| trial.cost() < best.cost())).or(best);
             }
-            if best.is_some() {
-                return Ok(best);
+            if let Some(best) = best {
+                let settled = self.better(best.relaxed(&rough(SETTLE), &mut |_| ()))?;
+                if settled.is_some() {
+                    return Ok(settled);
+                }
             }
         }
         Ok(None)

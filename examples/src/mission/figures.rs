@@ -8,6 +8,7 @@ use paint_sim::flight::{FlightSample, FlightStatistics};
 use paint_sim::spray::QUANTUM;
 use ptu_kinematics::Joints;
 
+use super::inspect::Inspection;
 use super::{LayerFlight, Mission, MissionError};
 use crate::appearance::{DENSITY, UNIT_THICKNESS};
 use crate::report::Report;
@@ -25,8 +26,8 @@ pub(super) fn path_length(plan: &Plan) -> f64 {
 }
 
 impl Mission {
-    /// All figures; those of the inspection are given.
-    pub(super) fn report(&self, scan_error: f64, slam_ate: f64) -> Result<Report, MissionError> {
+    /// All figures, with those of the inspection.
+    pub fn report(&self, inspection: &Inspection) -> Result<Report, MissionError> {
         let quality = self.surface.chart.quality();
         let deviations = self.normal_deviations();
         let flown = statistics(&self.flights, |f| &f.flight);
@@ -80,8 +81,8 @@ impl Mission {
             ciede2000_mean: mean(self.colour_difference().into_iter().flatten()),
             collisions: self.flights.iter().map(|f| self.collisions(&f.flight)).sum(),
             limit_violations: self.flights.iter().map(|f| self.limit_violations(f)).sum(),
-            scan_error_mean_m: scan_error,
-            slam_ate_rms_m: slam_ate,
+            scan_error_mean_m: inspection.mesh_error,
+            slam_ate_rms_m: inspection.slam_ate,
             layers: self.layers.len(),
             strokes: self.flights.iter().map(|f| f.route.strokes).sum(),
             wall_s: self.started.elapsed().as_secs_f64(),

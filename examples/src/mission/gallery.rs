@@ -49,13 +49,17 @@ impl Mission {
         stage.done(&folder.display().to_string());
 
         let stage = Stage::start("scan");
-        let scan = self.scan()?;
-        write_ply(&folder.join("scan.ply"), &scan.mesh.positions, &scan.mesh.faces, &scan.mesh.colours).map_err(
-            |source| MissionError::Unwritable { path: folder.join("scan.ply").display().to_string(), source },
-        )?;
-        let ate = self.save_trajectories(folder)?;
-        stage.done(&format!("{} faces, {:.2} mm off the surface", scan.mesh.faces.len(), 1e3 * scan.error_mean));
-        let report = self.report(scan.error_mean, ate)?;
+        let found = self.inspect()?;
+        let unwritable = |path: &Path, source| MissionError::Unwritable { path: path.display().to_string(), source };
+        let ply = folder.join("scan.ply");
+        write_ply(&ply, &found.mesh.positions, &found.mesh.faces, &found.mesh.colours)
+            .map_err(|source| unwritable(&ply, source))?;
+        for (name, trajectory) in [("flight_true.tum", &found.flown), ("flight_slam.tum", &found.believed)] {
+            let path = folder.join(name);
+            std::fs::write(&path, vio_ekf::tum::write(trajectory)).map_err(|source| unwritable(&path, source))?;
+        }
+        stage.done(&format!("{} faces, {:.2} mm off the surface", found.mesh.faces.len(), 1e3 * found.mesh_error));
+        let report = self.report(&found)?;
         report.save(folder)?;
         Ok(report)
     }

@@ -1,7 +1,5 @@
 //! After the paint: a look at the wall with a depth camera, and the flight as trajectories.
 
-use std::path::Path;
-
 use nalgebra::{Isometry3, Point3, Vector3};
 use paint_sim::{Camera, Frame, Hit, Lights, Look, Surface, render};
 use tsdf_hash::{ColourView, DepthData, DepthView, Intrinsics, Map, Mesh};
@@ -19,20 +17,39 @@ const DISTANCE: f64 = 1.6;
 const VOXEL: f64 = 0.015;
 /// Views of a surface that faces one side: columns and rows of the grid of viewpoints.
 const GRID: (usize, usize) = (5, 3);
+/// Time between two poses of a trajectory file, seconds.
+const POSE_STEP: f64 = 0.1;
 /// Views around a surface that closes in, at each of two heights.
 const RING: usize = 12;
 
-/// What the depth camera made of the painted surface.
-pub(super) struct Scan {
-    /// The mesh of the map, with the colours seen.
-    pub(super) mesh: Mesh,
-    /// Mean distance of its vertices from the true surface, metres.
-    pub(super) error_mean: f64,
+/// A second look at a mission by other means.
+pub struct Inspection {
+    /// The painted surface as a depth camera maps it, with the colours seen.
+    pub mesh: Mesh,
+    /// Mean distance of the map's vertices from the true surface, metres.
+    pub mesh_error: f64,
+    /// The flight under the drifting localisation: what was flown.
+    pub flown: Trajectory,
+    /// What the localisation took it for.
+    pub believed: Trajectory,
+    /// Root mean square position error between the two after rigid alignment, the ATE by which odometry is judged, metres.
+    pub slam_ate: f64,
 }
 
 impl Mission {
+    /// Maps the painted surface with a simulated depth camera, and judges the localisation of the flight.
+    pub fn inspect(&self) -> Result<Inspection, MissionError> {
+        let mesh = self.scan()?;
+        let world = &self.surface.world;
+        let off = |p: &[f32; 3]| world.distance(&Point3::from(p.map(f64::from)), 1.0);
+        let mesh_error = mesh.positions.iter().map(off).sum::<f64>() / mesh.positions.len().max(1) as f64;
+        let (flown, believed) = self.trajectories()?;
+        let slam_ate = vio_ekf::ate(flown.poses(), believed.poses(), Alignment::Se3)?.position.rmse;
+        Ok(Inspection { mesh, mesh_error, flown, believed, slam_ate })
+    }
+
     /// Looks at the painted surface from all sides that have paint, and fuses what it sees.
-    pub(super) fn scan(&self) -> Result<Scan, MissionError> {
+    fn scan(&self) -> Result<Mesh, MissionError> {
         let painted = self.painted_depth();
         // Even light from everywhere: the colours of the map are the surface's own.
         let lights = Lights { sun: [0.0; 3], ambient: [1.0; 3], ..Lights::default() };
@@ -46,11 +63,7 @@ impl Mission {
                 fuse(&mut map, &camera, &frame)?;
             }
         }
-        let mesh = map.mesh();
-        let world = &self.surface.world;
-        let off = |p: &[f32; 3]| world.distance(&Point3::from(p.map(f64::from)), 1.0);
-        let error_mean = mesh.positions.iter().map(off).sum::<f64>() / mesh.positions.len().max(1) as f64;
-        Ok(Scan { mesh, error_mean })
+        Ok(map.mesh())
     }
 
     /// A grid of viewpoints before a surface that faces one side, two rings around one that does not.
@@ -93,15 +106,14 @@ impl Mission {
         Ok(cameras)
     }
 
-    /// The flights as TUM files: what was flown, and what the drifting localisation took it for. Returns the root mean square
-    /// of the position error after rigid alignment, the ATE by which odometry is judged, metres.
-    pub(super) fn save_trajectories(&self, folder: &Path) -> Result<f64, MissionError> {
+    /// The flights one after the other at 10 Hz: as flown, and as the drifting localisation saw them.
+    fn trajectories(&self) -> Result<(Trajectory, Trajectory), MissionError> {
         let mut flown = Trajectory::default();
         let mut believed = Trajectory::default();
         let mut start = 0.0;
         for f in &self.flights {
-            // One pose in ten: 10 Hz.
-            for sample in f.slam.samples.iter().step_by(10) {
+            let stride = (POSE_STEP / f.slam.interval).round().max(1.0) as usize;
+            for sample in f.slam.samples.iter().step_by(stride) {
                 let stamp = Stamp::from_secs(start + sample.time)?;
                 if flown.stamps().last().is_some_and(|&last| last >= stamp) {
                     continue;
@@ -112,12 +124,7 @@ impl Mission {
             }
             start += f.plan.trajectory.duration();
         }
-        for (name, trajectory) in [("flight_true.tum", &flown), ("flight_slam.tum", &believed)] {
-            let path = folder.join(name);
-            std::fs::write(&path, vio_ekf::tum::write(trajectory))
-                .map_err(|source| MissionError::Unwritable { path: path.display().to_string(), source })?;
-        }
-        Ok(vio_ekf::ate(flown.poses(), believed.poses(), Alignment::Se3)?.position.rmse)
+        Ok((flown, believed))
     }
 }
 
