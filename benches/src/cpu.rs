@@ -15,17 +15,27 @@ pub fn clock_name() -> &'static str {
     if thread_seconds().is_some() { "cpu" } else { "wall" }
 }
 
+/// Shortest time worth reading: the system counts a running thread's time in steps of milliseconds.
+const LEAST: f64 = 0.2;
+
 /// Median over `runs` (at least one) of the seconds that `job` takes on this thread, its result included but not used.
+/// Short jobs are repeated within a run.
 pub fn median_seconds<T>(runs: usize, mut job: impl FnMut() -> T) -> f64 {
-    let mut one = || {
+    let mut repeated = |times: u32| {
         let (wall, cpu) = (Instant::now(), thread_seconds());
-        black_box(job());
+        for _ in 0..times {
+            black_box(job());
+        }
         match (cpu, thread_seconds()) {
             (Some(before), Some(after)) => after - before,
             _ => wall.elapsed().as_secs_f64(),
         }
     };
-    let mut seconds: Vec<f64> = (0..runs.max(1)).map(|_| one()).collect();
+    let mut times = 1;
+    while repeated(times) < LEAST && times < 1 << 20 {
+        times *= 2;
+    }
+    let mut seconds: Vec<f64> = (0..runs.max(1)).map(|_| repeated(times) / f64::from(times)).collect();
     seconds.sort_unstable_by(f64::total_cmp);
     seconds[seconds.len() / 2]
 }
