@@ -9,9 +9,10 @@ use nalgebra::{Point3, Vector3};
 use paint_planner::{OptimalPlanner, Planner};
 use paint_sim::colour::{BANDS, Spectrum, spectrum_srgb8};
 use paint_sim::{
-    Camera, Film, FlightSettings, Hit, Lights, Look, Paint, Reference, ReferenceState, Shot, SprayModel, Substrate,
-    ciede2000, fly, km, render,
+    Camera, Film, FlightSettings, Hit, Lights, Look, Reference, ReferenceState, Shot, SprayModel, ciede2000, fly,
+    render,
 };
+use paintcopter_benches::films::Films;
 use paintcopter_benches::{Rng, criterion, rock};
 use paintcopter_examples::adapters::{PlannedFlight, Robot, ServoGun, Wall};
 use paintcopter_examples::mission::MissionSettings;
@@ -43,35 +44,18 @@ fn main() -> Result<(), AnyError> {
     Ok(())
 }
 
-/// Kubelka-Munk over 36 bands, films of 0 to 60 µm.
+/// Kubelka-Munk over 36 bands, and what the eye makes of it.
 fn films(group: &mut Group) -> Result<(), AnyError> {
-    let paint = Paint::yellow(20e-6)?;
-    let ground = Substrate::grey(0.5)?;
-    let mut rng = Rng(2);
-    let thickness: Vec<f64> = (0..FILMS).map(|_| rng.between(0.0, 60e-6)).collect();
-
-    let narrow = |spectrum: &Spectrum| spectrum.map(|v| v as f32);
-    let (k, s, below) = (narrow(paint.absorption()), narrow(paint.scattering()), narrow(ground.reflectance()));
-    let mut reflectance = vec![[0.0_f32; BANDS]; FILMS];
+    let films = Films::new(FILMS)?;
+    let mut narrow = vec![[0.0_f32; BANDS]; FILMS];
     group.throughput(Throughput::Elements((FILMS * BANDS) as u64));
-    group.bench_function("Kubelka-Munk f32, 1e6 films x 36 bands", |b| {
-        b.iter(|| {
-            for (film, &depth) in reflectance.iter_mut().zip(&thickness) {
-                *film = std::array::from_fn(|j| km::reflectance_f32(k[j], s[j], depth as f32, below[j]));
-            }
-            black_box(&mut reflectance);
-        });
-    });
+    group.bench_function("Kubelka-Munk f32, 1e6 films x 36 bands", |b| b.iter(|| films.narrow(black_box(&mut narrow))));
+    let mut wide: Vec<Spectrum> = vec![[0.0; BANDS]; FEWER];
     group.throughput(Throughput::Elements((FEWER * BANDS) as u64));
-    group.bench_function("Kubelka-Munk f64, 1e5 films x 36 bands", |b| {
-        let film = |depth: &f64| paint.over(*depth, &ground).map_or(f64::NAN, |film| film.reflectance()[BANDS / 2]);
-        b.iter(|| thickness[..FEWER].iter().map(film).sum::<f64>());
-    });
+    group.bench_function("Kubelka-Munk f64, 1e5 films x 36 bands", |b| b.iter(|| films.wide(black_box(&mut wide))));
     group.throughput(Throughput::Elements(FEWER as u64));
-    let spectra: Vec<Spectrum> =
-        thickness[..FEWER].iter().filter_map(|d| paint.over(*d, &ground).ok()).map(|f| *f.reflectance()).collect();
     group.bench_function("spectrum to sRGB", |b| {
-        b.iter(|| spectra.iter().map(|s| u32::from(spectrum_srgb8(s).rgb[0])).sum::<u32>());
+        b.iter(|| wide.iter().map(|s| u32::from(spectrum_srgb8(s).rgb[0])).sum::<u32>());
     });
     Ok(())
 }

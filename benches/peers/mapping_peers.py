@@ -396,7 +396,8 @@ def slam(s):
 
 
 def relocalise(s):
-    """Map = all frames at 2 cm; each query = one frame, downsampled to 5 cm for FPFH + FGR, then point-to-plane ICP at full map resolution."""
+    """Map = all frames at 2 cm; each query = one frame, downsampled to 5 cm for FPFH + FGR, then point-to-plane ICP at
+    full map resolution."""
     reg = o3d.pipelines.registration
     search = o3d.geometry.KDTreeSearchParamHybrid
     K = o3d.camera.PinholeCameraIntrinsic(640, 480, s.K[0, 0], s.K[1, 1], s.K[0, 2], s.K[1, 2])

@@ -207,7 +207,8 @@ def solve(y, stride, iters=200, convex=False):
 
 
 def layers(y, mode="relative", count=5):
-    """thesis 3.2/3.3: base level = 20th percentile of the ink, then steps of 50/255; eroded 3x3, smoothed with sigma = R/2, accumulated"""
+    """thesis 3.2/3.3: base level = 20th percentile of the ink, then steps of 50/255; eroded 3x3, smoothed with sigma =
+    R/2, accumulated"""
     lv = [0.0, np.percentile(y, 20)]
     while len(lv) < count and lv[-1] + 50 / 255 < y.max():
         lv.append(lv[-1] + 50 / 255)
@@ -219,7 +220,8 @@ def layers(y, mode="relative", count=5):
 
 
 def greedy(y, k, backfit=0):
-    """one spray at a time on r = y - tanh c linearised at c: cell maximising (G^T(wr))^2/(G2^T w^2), w = 1 - tanh(c)^2, closed-form volume"""
+    """one spray at a time on r = y - tanh c linearised at c: cell maximising (G^T(wr))^2/(G2^T w^2), w = 1 -
+    tanh(c)^2, closed-form volume"""
     c, rec, stamp = np.zeros_like(y), [], np.outer(K1, K1)
     n, m = y.shape
     for _ in range(k):
@@ -366,7 +368,8 @@ def envelope(x, L):
 
 
 def run_slew(a):
-    """boustrophedon over the grid, |v_k - v_(k-1)| <= limit * vmax by a quadratic penalty, continuation rho = .1 .. 1000; psnr_exact after envelope()"""
+    """boustrophedon over the grid, |v_k - v_(k-1)| <= limit * vmax by a quadratic penalty, continuation rho = .1 ..
+    1000; psnr_exact after envelope()"""
     for name, y in pictures(a):
         for st in (2, 4):
             o, n = (st - 1) // 2, len(range((st - 1) // 2, y.shape[0], st))
@@ -411,7 +414,8 @@ def run_slew(a):
 
 
 def run_noise(a):
-    """20 % volume noise and 0.5 px jitter per spray, raster on grid 2; closed: the rest re-solved (30 iterations) from the seen canvas every 8 rows"""
+    """20 % volume noise and 0.5 px jitter per spray, raster on grid 2; closed: the rest re-solved (30 iterations) from
+    the seen canvas every 8 rows"""
     for name, y in pictures(a):
         for closed in (False, True):
             rng, c, t0 = np.random.default_rng(a.seed), np.zeros_like(y), time.process_time()
@@ -446,7 +450,8 @@ def run_noise(a):
 
 
 def run_colour(a):
-    """sRGB I_c = exp(-sum_p A_cp (G v_p)), A = -ln(masstone), v >= 0, joint L-BFGS-B, 150 iterations, one plane per paint, grid 1"""
+    """sRGB I_c = exp(-sum_p A_cp (G v_p)), A = -ln(masstone), v >= 0, joint L-BFGS-B, 150 iterations, one plane per
+    paint, grid 1"""
     from skimage import color, data, io, transform
 
     n, cmy = a.size, [[0.04, 0.52, 0.75], [0.75, 0.04, 0.35], [0.92, 0.85, 0.05]]
@@ -566,7 +571,8 @@ def run_check(a):
 
 # ---------------------------------------------------------------- torch
 def run_conv(a):
-    """K feedback passes; each adds volume on the stride-2 grid from (y, residual, G^T(r(1-o^2)), state). Tested on the pictures, whole, no tiling."""
+    """K feedback passes; each adds volume on the stride-2 grid from (y, residual, G^T(r(1-o^2)), state). Tested on the
+    pictures, whole, no tiling."""
     import torch
     import torch.nn as nn
     import torch.nn.functional as F
@@ -674,7 +680,8 @@ def run_conv(a):
 
 
 def run_replica(a):
-    """one training step of the thesis' network, MNIST row of Table 8.1 (28x28, T 64, z 100, LSTM 256, READ 3x3, radius 3), batch 100, random binary target"""
+    """one training step of the thesis' network, MNIST row of Table 8.1 (28x28, T 64, z 100, LSTM 256, READ 3x3, radius
+    3), batch 100, random binary target"""
     import torch
     import torch.nn as nn
     import torch.nn.functional as F

@@ -118,7 +118,8 @@ def colour(p, ident):
 
 
 def pose(th):
-    """Camera on the ellipse 0.9 x 0.5 m, height 1.3 + 0.25 sin 2th, looking outward, pitch -12 + 18 sin 3th deg. (R, c) of scene_from_camera."""
+    """Camera on the ellipse 0.9 x 0.5 m, height 1.3 + 0.25 sin 2th, looking outward, pitch -12 + 18 sin 3th deg. (R,
+    c) of scene_from_camera."""
     c = np.array([0.9 * math.cos(th), 0.5 * math.sin(th), 1.30 + 0.25 * math.sin(2 * th)])
     pit = math.radians(-12 + 18 * math.sin(3 * th))
     f = np.array([math.cos(th) * math.cos(pit), math.sin(th) * math.cos(pit), math.sin(pit)])

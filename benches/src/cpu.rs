@@ -1,5 +1,6 @@
 //! Time as the processor spends it: on a machine that others use as well, wall time says little.
 
+use std::hint::black_box;
 use std::time::Instant;
 
 /// Seconds that this thread has computed, where the system tells; `None` elsewhere.
@@ -14,11 +15,11 @@ pub fn clock_name() -> &'static str {
     if thread_seconds().is_some() { "cpu" } else { "wall" }
 }
 
-/// Median over `runs` (at least one) of the seconds that `job` takes on this thread.
-pub fn median_seconds(runs: usize, mut job: impl FnMut()) -> f64 {
+/// Median over `runs` (at least one) of the seconds that `job` takes on this thread, its result included but not used.
+pub fn median_seconds<T>(runs: usize, mut job: impl FnMut() -> T) -> f64 {
     let mut one = || {
         let (wall, cpu) = (Instant::now(), thread_seconds());
-        job();
+        black_box(job());
         match (cpu, thread_seconds()) {
             (Some(before), Some(after)) => after - before,
             _ => wall.elapsed().as_secs_f64(),

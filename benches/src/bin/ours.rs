@@ -2,17 +2,22 @@
 
 use std::error::Error;
 use std::fmt::Write as _;
+use std::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use paint_net::procedural::Texture;
 use paint_net::{Deconvolution, Limits, MatchingPursuit, Painter, Saturation, SprayKernel, Task, metrics};
+use paint_sim::ciede2000;
+use paint_sim::colour::BANDS;
 use paintcopter_benches::cpu::{clock_name, median_seconds};
+use paintcopter_benches::{Rng, films, motion};
 use paintcopter_examples::mesh_io::read_mesh;
 use paintcopter_examples::world::rock_wall;
 use serde_json::json;
 use uv_param::{Chart, Method, Settings, largest_disk, unwrap};
+use vio_ekf::{Alignment, Association, Trajectory, ate, tum};
 
 type AnyError = Box<dyn Error>;
 
@@ -53,6 +58,30 @@ enum Job {
         #[arg(long, default_value_t = 3)]
         runs: usize,
     },
+    /// Films and colours, as `sim_peers.py` computes
+    Sim {
+        /// Films, and colours
+        #[arg(long, default_value_t = 1_000_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+        count: u32,
+        /// Runs of which the median is printed
+        #[arg(long, default_value_t = 5)]
+        runs: usize,
+    },
+    /// Writes two trajectories of 10,000 poses as TUM text, for `ate` and `trajectory_peers.py`
+    Pair {
+        /// Folder to write into
+        folder: PathBuf,
+    },
+    /// Judges a TUM trajectory by another, as `trajectory_peers.py` does
+    Ate {
+        /// TUM text
+        reference: PathBuf,
+        /// TUM text
+        estimate: PathBuf,
+        /// Runs of which the median is printed
+        #[arg(long, default_value_t = 5)]
+        runs: usize,
+    },
 }
 
 fn main() -> ExitCode {
@@ -60,6 +89,9 @@ fn main() -> ExitCode {
         Job::Rock { file, seed } => rock(&file, seed),
         Job::Uv { mesh, runs, save } => uv(&mesh, runs, save.as_deref()),
         Job::Paint { size, runs } => paint(size.into(), runs),
+        Job::Sim { count, runs } => sim(count as usize, runs),
+        Job::Pair { folder } => pair(&folder),
+        Job::Ate { reference, estimate, runs } => judge(&reference, &estimate, runs),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -96,7 +128,7 @@ fn uv(path: &Path, runs: usize, save: Option<&Path>) -> Result<(), AnyError> {
     {
         let settings = Settings { method, ..Settings::default() };
         let chart = unwrap(&disk, &settings, |_| ())?;
-        let seconds = median_seconds(runs, || drop(unwrap(&disk, &settings, |_| ())));
+        let seconds = median_seconds(runs, || unwrap(&disk, &settings, |_| ()));
         let q = chart.quality();
         println!(
             "{}",
@@ -141,7 +173,7 @@ fn paint(size: usize, runs: usize) -> Result<(), AnyError> {
         for painter in painters {
             let run = || painter.paint(&task, &kernel, &Saturation::Tanh, &Limits::default(), &mut |_| ());
             let painting = run()?;
-            let seconds = median_seconds(runs, || drop(run()));
+            let seconds = median_seconds(runs, run);
             println!(
                 "{}",
                 json!({
@@ -154,6 +186,61 @@ fn paint(size: usize, runs: usize) -> Result<(), AnyError> {
                 })
             );
         }
+    }
+    Ok(())
+}
+
+fn sim(count: usize, runs: usize) -> Result<(), AnyError> {
+    let print = |fig: &str, seconds: f64| {
+        let (runs, cpu_ms) = (runs.max(1), 1e3 * seconds);
+        let clock = clock_name();
+        println!(
+            "{}",
+            json!({ "fig": fig, "peer": "paint-sim", "clock": clock, "count": count, "runs": runs, "cpu_ms": cpu_ms })
+        );
+    };
+    let films = films::Films::new(count)?;
+    let mut narrow = vec![[0.0; BANDS]; count];
+    print("km_f32_x36", median_seconds(runs, || films.narrow(black_box(&mut narrow))));
+    let mut wide = vec![[0.0; BANDS]; count];
+    print("km_f64_x36", median_seconds(runs, || films.wide(black_box(&mut wide))));
+
+    let mut rng = Rng(4);
+    let mut lab = || [rng.between(0.0, 100.0), rng.between(-80.0, 80.0), rng.between(-80.0, 80.0)];
+    let pairs: Vec<[[f64; 3]; 2]> = (0..count).map(|_| [lab(), lab()]).collect();
+    let difference = || pairs.iter().map(|[one, other]| ciede2000(*one, *other)).sum::<f64>();
+    print("de00", median_seconds(runs, difference));
+    Ok(())
+}
+
+fn pair(folder: &Path) -> Result<(), AnyError> {
+    std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let (reference, estimate) = motion::pair(10_000)?;
+    write(&folder.join("reference.txt"), &tum::write(&reference))?;
+    write(&folder.join("estimate.txt"), &tum::write(&estimate))
+}
+
+fn judge(reference: &Path, estimate: &Path, runs: usize) -> Result<(), AnyError> {
+    let read = |path: &Path| -> Result<Trajectory, AnyError> {
+        let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        tum::read(&text).map_err(|e| format!("{}: {e}", path.display()).into())
+    };
+    let (reference, estimate) = (read(reference)?, read(estimate)?);
+    let run = |mode| {
+        let pairs = Association::default().pair_up(&reference, &estimate)?;
+        Ok::<_, vio_ekf::Error>((pairs.stamps.len(), ate(&pairs.reference, &pairs.estimate, mode)?))
+    };
+    for (name, mode) in [("none", Alignment::None), ("se3", Alignment::Se3), ("sim3", Alignment::Sim3)] {
+        let (pairs, error) = run(mode)?;
+        let cpu_ms = 1e3 * median_seconds(runs, || run(mode));
+        let (rmse_m, rmse_deg) = (error.position.rmse, error.orientation.rmse.to_degrees());
+        println!(
+            "{}",
+            json!({
+                "fig": format!("ate_{name}"), "peer": "vio-ekf", "pairs": pairs, "rmse_m": rmse_m, "rmse_deg": rmse_deg,
+                "clock": clock_name(), "cpu_ms": cpu_ms,
+            })
+        );
     }
     Ok(())
 }
