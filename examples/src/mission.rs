@@ -151,6 +151,8 @@ pub enum MissionError {
 /// Motion of the nozzle that one shot stands for, metres: widens the spot by less than a percent.
 const SHOT_STEP: f64 = 0.01;
 
+/// Weight of texels out of reach against those in reach.
+const BARE_WEIGHT: f64 = 0.02;
 /// Where the cone of the spray ends, in deviations: all but 0.2 % of the paint lies inside.
 const SPRAY_CUT: f64 = 3.5;
 /// Paint that has met nothing after this way is overspray, metres: what lies behind the edge of a surface stays clean.
@@ -350,7 +352,12 @@ fn decide(
             "the surface looks up or down everywhere, or its chart is stretched too far",
         ));
     }
-    let task = Task { reference: wanted, canvas: None, weight: Some(coverage), paintable: Some(&paintable) };
+    // What nobody can spray must not pull paint from its neighbours; a little weight keeps overspray off it.
+    let weight = Image::from_fn(coverage.width(), coverage.height(), |x, y| {
+        let share = if paintable[y * coverage.width() + x] { 1.0 } else { BARE_WEIGHT };
+        share * coverage.at(x, y)
+    });
+    let task = Task { reference: wanted, canvas: None, weight: Some(&weight), paintable: Some(&paintable) };
     let kernel = kernel(settings)?;
     let mut progress = |share: f64| stage.share(share);
     let (ink, limits) = (appearance.ink(), &settings.limits);
