@@ -1,0 +1,68 @@
+//! What to spray: the wanted picture into layers.
+
+use paint_net::{Deconvolution, Image, Layered, Limits, MatchingPursuit, Painter, Painting, SprayKernel, Task};
+
+use super::{MissionError, MissionSettings, PainterChoice};
+use crate::appearance::Appearance;
+use crate::progress::Stage;
+use crate::surface::PaintSurface;
+
+/// Weight of texels out of reach against those in reach.
+const BARE_WEIGHT: f64 = 0.02;
+/// Where the cone of the spray ends, in deviations: all but 0.2 % of the paint lies inside.
+pub(super) const SPRAY_CUT: f64 = 3.5;
+
+/// The footprint of the nozzle in texels, with all of its tails.
+pub(super) fn kernel(settings: &MissionSettings) -> Result<SprayKernel, paint_net::Error> {
+    SprayKernel::new(settings.spot / settings.texel, SPRAY_CUT)
+}
+
+/// Layers of sprays for the wanted picture.
+pub(super) fn decide(
+    surface: &PaintSurface,
+    wanted: &Image,
+    coverage: &Image,
+    appearance: &Appearance,
+    settings: &MissionSettings,
+) -> Result<Vec<Painting>, MissionError> {
+    let stage = Stage::start("decide");
+    let tilt = settings.ptu.tilt_limits.min.abs().min(settings.ptu.tilt_limits.max);
+    // The planner may lean the spray by its incidence angle to reach what the tilt servo alone cannot.
+    let paintable =
+        surface.paintable((tilt + 0.8 * settings.planner.nozzle.incidence).min(std::f64::consts::FRAC_PI_2));
+    if !paintable.contains(&true) {
+        return Err(MissionError::NothingToPaint(
+            "the surface looks up or down everywhere, or its chart is stretched too far",
+        ));
+    }
+    // What nobody can spray must not pull paint from its neighbours; a little weight keeps overspray off it.
+    let weight = Image::from_fn(coverage.width(), coverage.height(), |x, y| {
+        let share = if paintable[y * coverage.width() + x] { 1.0 } else { BARE_WEIGHT };
+        share * coverage.at(x, y)
+    });
+    let task = Task { reference: wanted, canvas: None, weight: Some(&weight), paintable: Some(&paintable) };
+    let kernel = kernel(settings)?;
+    let mut progress = |share: f64| stage.share(share);
+    let (ink, limits) = (appearance.ink(), &settings.limits);
+    let layers = match settings.painter {
+        PainterChoice::Deconvolution => layered(Deconvolution::default(), &task, &kernel, ink, limits, &mut progress),
+        PainterChoice::Pursuit => layered(MatchingPursuit::default(), &task, &kernel, ink, limits, &mut progress),
+    }?;
+    let sprays: usize = layers.iter().map(|l| l.sprays.len()).sum();
+    if sprays == 0 {
+        return Err(MissionError::NothingToPaint("no place of it is darker than the bare wall"));
+    }
+    stage.done(&format!("{} layers, {sprays} sprays", layers.len()));
+    Ok(layers)
+}
+
+fn layered<P: Painter>(
+    painter: P,
+    task: &Task,
+    kernel: &SprayKernel,
+    ink: &paint_net::Saturation,
+    limits: &Limits,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Vec<Painting>, paint_net::Error> {
+    Layered::new(painter).paint_layers(task, kernel, ink, limits, progress)
+}

@@ -1,0 +1,115 @@
+//! Flying it, and what the paint does meanwhile.
+
+use nalgebra::{Point3, Vector3};
+use paint_planner::Plan;
+use paint_sim::flight::{Localisation, Tether};
+use paint_sim::{Film, FlightLog, FlightSettings, SprayModel};
+
+use super::decide::SPRAY_CUT;
+use super::plan::Planned;
+use super::{LayerFlight, MissionError, MissionSettings};
+use crate::adapters::{PlannedFlight, Robot, ServoGun};
+use crate::progress::Stage;
+use crate::surface::PaintSurface;
+
+/// Motion of the nozzle that one shot stands for, metres: widens the spot by less than a percent.
+const SHOT_STEP: f64 = 0.01;
+
+/// Paint that has met nothing after this way is overspray, metres: what lies behind the edge of a surface stays clean.
+const SPRAY_RANGE: f64 = 0.35;
+
+/// Flies every layer three times.
+pub(super) fn fly(
+    planned: Planned,
+    surface: &PaintSurface,
+    robot: &Robot,
+    settings: &MissionSettings,
+) -> Result<Vec<LayerFlight>, MissionError> {
+    let stage = Stage::start("fly");
+    let count = planned.layers.len();
+    let mut flights = Vec::with_capacity(count);
+    for (k, (route, plan, smoothing)) in planned.layers.into_iter().enumerate() {
+        stage.share(k as f64 / count as f64);
+        let [flight, slam, locked] = fly_three(&plan, surface, robot, settings, k as u64)?;
+        flights.push(LayerFlight { route, plan, smoothing, flight, slam, locked });
+    }
+    let seconds: f64 = flights.iter().map(|f| f.plan.trajectory.duration()).sum();
+    stage.done(&format!("{:.0} min in the air, three times", seconds / 60.0));
+    Ok(flights)
+}
+
+/// Puts the paint of the flights with motion capture onto the texels; returns the film and the pixel of each of its texels.
+pub(super) fn spray(
+    flights: &[LayerFlight],
+    surface: &PaintSurface,
+    settings: &MissionSettings,
+) -> Result<(Film, Vec<usize>), MissionError> {
+    let stage = Stage::start("spray");
+    let (texels, pixels) = surface.film_texels();
+    let mut film = Film::new(texels)?;
+    let shots: Vec<_> = flights.iter().flat_map(|f| f.flight.shots(SHOT_STEP)).collect();
+    film.deposit(&shots, &spray_model(settings), &surface.world, settings.threads, &mut |done, total| {
+        stage.share(done as f64 / total as f64);
+    })?;
+    let books = film.books();
+    let share = 100.0 * books.deposited as f64 / books.emitted.max(1) as f64;
+    stage.done(&format!("{share:.1} % of the paint on the surface"));
+    Ok((film, pixels))
+}
+
+/// The painter's nozzle in the simulation.
+fn spray_model(settings: &MissionSettings) -> SprayModel {
+    let sigma = (settings.spot / settings.planner.nozzle.stand_off).atan();
+    SprayModel { sigma, cut: SPRAY_CUT, range: SPRAY_RANGE, ..SprayModel::default() }
+}
+
+/// The same plan with motion capture, with a drifting localisation, and with the pan-tilt unit locked.
+fn fly_three(
+    plan: &Plan,
+    surface: &PaintSurface,
+    robot: &Robot,
+    settings: &MissionSettings,
+    layer: u64,
+) -> Result<[FlightLog; 3], MissionError> {
+    let usual = FlightSettings {
+        tether: Some(hose(plan)),
+        seed: settings.seed.wrapping_mul(0x9E37_79B9).wrapping_add(layer),
+        ..FlightSettings::default()
+    };
+    let variants = [
+        usual,
+        FlightSettings { localisation: Localisation::slam_7cm(), ..usual },
+        FlightSettings { ptu_locked: true, ..usual },
+    ];
+    let one = |flight: &FlightSettings| -> Result<FlightLog, MissionError> {
+        let reference = PlannedFlight { plan, ptu: &robot.ptu, stand_off: settings.planner.nozzle.stand_off };
+        let mut gun = ServoGun::new(robot.ptu.clone(), settings.servo)?;
+        Ok(paint_sim::fly(&reference, &mut gun, &surface.world, flight)?)
+    };
+    if settings.threads < 2 {
+        let [a, b, c] = variants.map(|v| one(&v));
+        return Ok([a?, b?, c?]);
+    }
+    std::thread::scope(|scope| {
+        let handles = variants.each_ref().map(|v| scope.spawn(|| one(v)));
+        let [a, b, c] = handles.map(|h| h.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+        Ok([a?, b?, c?])
+    })
+}
+
+/// The paint hose: from the ground behind the middle of the flight, long enough for all of it.
+fn hose(plan: &Plan) -> Tether {
+    let positions = || plan.waypoints.iter().map(|w| w.state.position);
+    let count = plan.waypoints.len() as f64;
+    let middle: Vector3<f64> = positions().map(|p| p.coords).sum::<Vector3<f64>>() / count;
+    let back: Vector3<f64> = plan
+        .waypoints
+        .iter()
+        .map(|w| Vector3::new(w.state.heading.cos(), w.state.heading.sin(), 0.0))
+        .sum::<Vector3<f64>>()
+        / count;
+    let base = Point3::new(middle.x - back.x, middle.y - back.y, 0.0);
+    let farthest = positions().map(|p| (p - base).norm()).fold(0.0, f64::max);
+    // A tenth of slack, and a metre for wind and overshoot.
+    Tether { base, length: 1.1 * farthest + 1.0, line_density: 0.12, base_on_floor: true }
+}

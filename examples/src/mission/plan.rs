@@ -1,0 +1,65 @@
+//! How to fly it: strokes onto the surface, nozzle and vehicle along them.
+
+use std::time::Instant;
+
+use paint_net::{Painting, StrokeSettings, boustrophedon};
+use paint_planner::{Error, OptimalPlanner, Plan, Planner, Settings, SmoothingPlanner};
+
+use super::decide::kernel;
+use super::figures::path_length;
+use super::{MissionError, MissionSettings};
+use crate::adapters::{Robot, Wall};
+use crate::progress::Stage;
+use crate::surface::PaintSurface;
+use crate::targets::{Route, route};
+
+/// The layers as flights that have not been flown.
+pub(super) struct Planned {
+    /// Targets, plan, and the baseline's plan on the same targets.
+    pub(super) layers: Vec<(Route, Plan, Plan)>,
+    /// Time the optimal planner took, seconds on one core.
+    pub(super) seconds: f64,
+    /// Paint of layers that no pose of the robot can spray at all, m³.
+    pub(super) abandoned: f64,
+}
+
+/// Plans every layer; each flight begins where the one before ends.
+pub(super) fn plan(
+    layers: &[Painting],
+    surface: &PaintSurface,
+    robot: &Robot,
+    settings: &MissionSettings,
+) -> Result<Planned, MissionError> {
+    let stage = Stage::start("plan");
+    let kernel = kernel(settings)?;
+    let wall = Wall(&surface.world);
+    let mut planned = Planned { layers: Vec::with_capacity(layers.len()), seconds: 0.0, abandoned: 0.0 };
+    for (k, layer) in layers.iter().enumerate() {
+        stage.share(k as f64 / layers.len() as f64);
+        let strokes = boustrophedon(&layer.sprays, &StrokeSettings::default())?;
+        let route = route(surface, &strokes, &kernel, settings.limits.along);
+        if route.targets.len() < 2 {
+            planned.abandoned += route.lost;
+            continue;
+        }
+        let start = planned.layers.last().and_then(|(_, plan, _)| plan.waypoints.last()).map(|w| w.state);
+        let here = Settings { start, ..settings.planner.clone() };
+        let clock = Instant::now();
+        let plan = match OptimalPlanner::default().plan(&route.targets, &wall, robot, &here) {
+            Err(Error::NothingReachable { .. }) => {
+                planned.abandoned += route.paint() + route.lost;
+                continue;
+            }
+            plan => plan?,
+        };
+        planned.seconds += clock.elapsed().as_secs_f64();
+        let smoothing = SmoothingPlanner.plan(&route.targets, &wall, robot, &settings.planner)?;
+        planned.layers.push((route, plan, smoothing));
+    }
+    if planned.layers.is_empty() {
+        return Err(MissionError::OutOfReach { percent: 100.0 });
+    }
+    let metres: f64 = planned.layers.iter().map(|(_, plan, _)| path_length(plan)).sum();
+    stage.done(&format!("{metres:.0} m of path, {:.1} ms per metre", 1e3 * planned.seconds / metres));
+    Ok(planned)
+}
