@@ -80,7 +80,7 @@ fn damaged_files_are_errors_and_never_a_panic() {
             if k < whole.len() {
                 bytes.truncate(k);
             } else {
-                for _ in 0..1 + random(3) {
+                for _ in 0..=random(3) {
                     let at = random(bytes.len());
                     bytes[at] = random(256) as u8;
                 }
