@@ -35,3 +35,24 @@ pub fn pair(count: usize) -> Result<(Trajectory, Trajectory), Error> {
     }
     Ok((truth, estimate))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use vio_ekf::{Alignment, ate};
+
+    /// Root mean squares by evo 1.38.1 (`peers/trajectory_peers.py`) on the files that `ours pair` writes.
+    #[test]
+    fn evo_finds_the_same_errors() {
+        let (truth, estimate) = pair(10_000).unwrap();
+        for (mode, metres, degrees) in [
+            (Alignment::None, 4.06178421668066, 45.83644639073955),
+            (Alignment::Se3, 0.041316376080295425, 0.2926500466261237),
+            (Alignment::Sim3, 0.0412902897268599, 0.2926500466261237),
+        ] {
+            let error = ate(truth.poses(), estimate.poses(), mode).unwrap();
+            assert!((error.position.rmse - metres).abs() < 1e-6, "{mode:?}: {}", error.position.rmse);
+            assert!((error.orientation.rmse.to_degrees() - degrees).abs() < 1e-6);
+        }
+    }
+}

@@ -38,3 +38,24 @@ pub fn stroke(surface: &PaintSurface, count: usize) -> Vec<Target> {
     };
     places.filter_map(target).take(count).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use paint_planner::Settings;
+
+    #[test]
+    fn the_stroke_is_one_and_lies_on_the_wall() {
+        let surface = rock().unwrap();
+        let targets = stroke(&surface, 1000);
+        assert_eq!(targets.len(), 1000);
+        for pair in targets.windows(2) {
+            let step = (pair[1].point - pair[0].point).norm();
+            assert!(step > 0.02 && step < Settings::default().break_length, "{step}");
+        }
+        for target in &targets {
+            assert!(paint_sim::Surface::distance(&surface.world, &target.point, 1.0) < 1e-6);
+            assert!(target.normal.x < 0.0, "towards the robot");
+        }
+    }
+}

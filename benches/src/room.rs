@@ -82,3 +82,26 @@ fn first_hit(o: &Point3<f64>, d: &Vector3<f64>) -> f64 {
     });
     boxes.chain(spheres).fold(wall, f64::min)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Millimetres at some pixels and the sum over all, from the files of `synth_rgbd.py loop --preset loop`.
+    #[test]
+    fn is_the_stream_of_the_peers() {
+        let images = [
+            (0, [(0, 0, 1957), (320, 240, 1738), (639, 479, 1987), (100, 400, 2296), (560, 60, 2001)], 626_864_312),
+            (7, [(0, 0, 1504), (320, 240, 2494), (639, 479, 2001), (100, 400, 1685), (560, 60, 2247)], 661_483_120),
+        ];
+        for (k, pixels, sum) in images {
+            let shot = Shot::take(k, 60);
+            for (u, v, expected) in pixels {
+                assert_eq!(shot.depth[v * SIZE.0 + u], expected, "image {k}, pixel {u}, {v}");
+            }
+            // Another libm may round a handful of pixels the other way.
+            let found: i64 = shot.depth.iter().copied().map(i64::from).sum();
+            assert!((found - sum).abs() < 10, "image {k}: {found}");
+        }
+    }
+}
