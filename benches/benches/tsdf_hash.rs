@@ -30,7 +30,7 @@ fn main() -> Result<(), Error> {
         let mut fused = map(&shots, settings)?;
         let name = format!("at {} cm", 100.0 * voxel_size);
         group.throughput(Throughput::Elements(shots.len() as u64));
-        group.bench_function(format!("fusion {name}, per image"), |b| b.iter(|| map(&shots, settings)));
+        group.bench_function(format!("fusion of {} images {name}", shots.len()), |b| b.iter(|| map(&shots, settings)));
         group.throughput(Throughput::Elements(2));
         let shot = &shots[0];
         group.bench_function(format!("one image out and in again {name}"), |b| {
