@@ -46,6 +46,8 @@ mod block;
 mod candidates;
 mod error;
 mod fuse;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod key;
 mod map;
 mod mesh;
@@ -57,6 +59,8 @@ mod table;
 mod view;
 
 pub use error::Error;
+#[cfg(feature = "gpu")]
+pub use gpu::GpuOptions;
 pub use map::{FrameReport, Map};
 pub use mesh::{Mesh, write_ply};
 pub use nalgebra;
