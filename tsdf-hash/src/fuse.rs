@@ -37,16 +37,16 @@ pub(crate) struct Tally {
 
 /// A frame, ready to be applied to any block.
 pub(crate) struct Frame<'a> {
-    surface: &'a Surface,
-    colour: Option<ColourSource<'a>>,
+    pub(crate) surface: &'a Surface,
+    pub(crate) colour: Option<ColourSource<'a>>,
     /// `(u z, v z, z)` from a point in the world.
     projection: Matrix3<f64>,
     offset: Vector3<f64>,
     voxel_size: f64,
-    truncation: f32,
+    pub(crate) truncation: f32,
     /// Steps of the stored distance per metre.
-    per_metre: f32,
-    colour_reach: f32,
+    pub(crate) per_metre: f32,
+    pub(crate) colour_reach: f32,
 }
 
 impl<'a> Frame<'a> {
@@ -80,12 +80,20 @@ impl<'a> Frame<'a> {
         }
     }
 
-    fn update<const PLUS: bool>(&self, key: Key, block: &mut Block) -> Tally {
-        let h = self.voxel_size;
-        let centre = |c: i32| (f64::from(c) * SIDE as f64 + 0.5) * h;
+    /// `(u z, v z, z)` of the first voxel of a block.
+    pub(crate) fn start(&self, key: Key) -> Vector3<f32> {
+        let centre = |c: i32| (f64::from(c) * SIDE as f64 + 0.5) * self.voxel_size;
         let [x, y, z] = key.block().map(centre);
-        let start = (self.projection * Vector3::new(x, y, z) + self.offset).cast::<f32>();
-        let step = (self.projection * h).cast::<f32>();
+        (self.projection * Vector3::new(x, y, z) + self.offset).cast()
+    }
+
+    /// Its change from a voxel to the next, a column for each axis.
+    pub(crate) fn step(&self) -> Matrix3<f32> {
+        (self.projection * self.voxel_size).cast()
+    }
+
+    fn update<const PLUS: bool>(&self, key: Key, block: &mut Block) -> Tally {
+        let (start, step) = (self.start(key), self.step());
         let [sx, sy, sz] = [0, 1, 2].map(|axis| step.column(axis).into_owned());
         let mut tally = Tally::default();
         for z in 0..SIDE {
@@ -196,11 +204,11 @@ struct Pixels {
 }
 
 /// The colour image, seen through the pixels of the depth image.
-struct ColourSource<'a> {
-    view: &'a ColourView<'a>,
+pub(crate) struct ColourSource<'a> {
+    pub(crate) view: &'a ColourView<'a>,
     /// Colour column = `scale u + shift`, likewise the row.
-    scale: [f32; 2],
-    shift: [f32; 2],
+    pub(crate) scale: [f32; 2],
+    pub(crate) shift: [f32; 2],
 }
 
 impl<'a> ColourSource<'a> {

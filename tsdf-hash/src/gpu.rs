@@ -1,10 +1,29 @@
-//! The map on a GPU.
+//! The map on a GPU: the same bytes as [`Map`](crate::Map) makes on the processor.
+//!
+//! The processor reads the depth image and finds the blocks near it; the device holds the blocks, counts what a frame
+//! touches and updates them. Every operation of the update is done as IEEE 754 says, whatever the device's compiler would
+//! like to do (`exact.wgsl`), and a device is asked whether it does before it is used (`probe.rs`).
 
 mod device;
+mod fuse;
+mod pool;
 mod probe;
+mod stream;
+
+use nalgebra::Isometry3;
+
+use crate::fuse::{Frame, Sign};
+use crate::key::{Key, mix};
+use crate::surface::Surface;
+use crate::view::{ColourView, DepthView, check_pose};
+use crate::{Error, FrameReport, Settings};
+use device::Device;
+use fuse::{Fuser, Mode, Pass, Tally, fresh};
+use pool::Pool;
+use stream::Stream;
 
 /// Which adapter to use, and how.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GpuOptions {
     /// Part of the adapter's name; empty for the best one (discrete before integrated).
     pub adapter: String,
@@ -18,6 +37,210 @@ pub struct GpuOptions {
 impl Default for GpuOptions {
     fn default() -> Self {
         Self { adapter: String::new(), software: false, max_buffer_bytes: usize::MAX }
+    }
+}
+
+/// A map whose blocks lie on a GPU. It equals, to the bit, a [`Map`](crate::Map) that was given the same frames.
+///
+/// [`Settings::max_bytes`] caps the blocks on the device and their index on the processor; buffers for one frame (20 bytes
+/// per pixel, the colour image) and for blocks on their way (3.5 MiB) come on top.
+pub struct GpuMap {
+    settings: Settings,
+    device: Device,
+    pool: Pool,
+    fuser: Fuser,
+    stream: Stream,
+    surface: Surface,
+}
+
+impl GpuMap {
+    /// An empty map.
+    ///
+    /// # Errors
+    /// [`Error::InvalidSetting`]; [`Error::NoAdapter`] where there is no GPU; [`Error::Device`] if it does not compute as
+    /// IEEE 754 says or refuses its buffers.
+    pub fn new(settings: Settings, options: &GpuOptions) -> Result<Self, Error> {
+        settings.check()?;
+        let device = Device::open(options)?;
+        probe::check(&device)?;
+        let pool = Pool::new(&device, settings.max_bytes)?;
+        let (fuser, stream) = (Fuser::new(&device)?, Stream::new(&device)?);
+        Ok(Self { settings, device, pool, fuser, stream, surface: Surface::default() })
+    }
+
+    /// The settings given to [`new`](Self::new).
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Name, interface and driver of the device.
+    pub fn adapter(&self) -> &str {
+        &self.device.name
+    }
+
+    /// As [`Map::integrate`](crate::Map::integrate).
+    ///
+    /// # Errors
+    /// The same, and [`Error::Device`]: the map is then as it was, unless the device is lost, which every later call
+    /// reports too.
+    pub fn integrate(
+        &mut self,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        world_from_camera: &Isometry3<f64>,
+    ) -> Result<FrameReport, Error> {
+        self.apply(Sign::Plus, depth, colour, world_from_camera)
+    }
+
+    /// As [`Map::deintegrate`](crate::Map::deintegrate).
+    ///
+    /// # Errors
+    /// As [`integrate`](Self::integrate), and [`Error::NotIntegrated`].
+    pub fn deintegrate(
+        &mut self,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        world_from_camera: &Isometry3<f64>,
+    ) -> Result<FrameReport, Error> {
+        self.apply(Sign::Minus, depth, colour, world_from_camera)
+    }
+
+    fn apply(
+        &mut self,
+        sign: Sign,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        world_from_camera: &Isometry3<f64>,
+    ) -> Result<FrameReport, Error> {
+        depth.check()?;
+        if let Some(colour) = colour {
+            colour.check()?;
+        }
+        check_pose(world_from_camera)?;
+        self.surface.read(depth, world_from_camera, &self.settings)?;
+        let frame = Frame::new(&self.surface, &depth.intrinsics, colour, world_from_camera, &self.settings);
+        let split = Split::new(&self.pool, &self.surface.keys);
+        self.fuser.load(&self.device, &frame)?;
+        // One submission counts in the blocks that do not exist and changes those that do: waiting costs more than undoing.
+        let (absent, present) = (split.count(), split.update(mode(sign)));
+        let passes: Vec<Pass> = std::iter::once(absent).chain(present).collect();
+        let tallies = self.fuser.run(&self.device, &self.pool, &frame, &passes)?;
+        let needed: Vec<(Key, Tally)> =
+            split.absent.iter().zip(&tallies).map(|(work, tally)| (work.0, *tally)).filter(|w| w.1.voxels() > 0).collect();
+        let changed: Vec<(Key, Tally)> = split
+            .present
+            .iter()
+            .flatten()
+            .zip(&tallies[split.absent.len()..])
+            .map(|(work, tally)| (work.0, *tally))
+            .filter(|work| work.1.voxels() > 0)
+            .collect();
+        if let Err(refusal) = admit(&mut self.pool, &self.device, sign, &needed, &changed) {
+            // Wrapping sums form a group: the opposite update restores every bit.
+            let passes: Vec<Pass> = split.update(mode(sign.opposite())).collect();
+            self.fuser.run(&self.device, &self.pool, &frame, &passes)?;
+            return Err(refusal);
+        }
+        let added = Split::added(&mut self.pool, &needed);
+        let passes: Vec<Pass> = added.update(Mode::Plus).collect();
+        self.fuser.run(&self.device, &self.pool, &frame, &passes)?;
+        let emptied: Vec<Key> = changed.iter().filter(|work| !work.1.observed()).map(|work| work.0).collect();
+        for &key in &emptied {
+            self.pool.remove(key);
+        }
+        Ok(FrameReport {
+            valid_pixels: self.surface.valid,
+            fused_pixels: self.surface.fused,
+            voxels: needed.iter().chain(&changed).map(|work| work.1.voxels()).sum(),
+            blocks: needed.len() + changed.len(),
+            blocks_added: needed.len(),
+            blocks_removed: emptied.len(),
+        })
+    }
+
+    /// Bytes of the blocks' pages on the device and of their index on the processor: what [`Settings::max_bytes`] caps.
+    pub fn bytes(&self) -> usize {
+        self.pool.bytes()
+    }
+
+    /// Number of blocks, 7168 bytes each.
+    pub fn blocks(&self) -> usize {
+        self.pool.len()
+    }
+
+    /// As [`Map::hash`](crate::Map::hash), of blocks that come back for it in batches.
+    ///
+    /// # Errors
+    /// [`Error::Device`].
+    pub fn hash(&self) -> Result<u64, Error> {
+        let mut hash = 0;
+        self.stream.download(&self.device, &self.pool, &self.pool.sorted_keys(), |key, block| {
+            hash = block.hash(mix(hash ^ key.0));
+        })?;
+        Ok(hash)
+    }
+}
+
+fn mode(sign: Sign) -> Mode {
+    if sign == Sign::Plus { Mode::Plus } else { Mode::Minus }
+}
+
+/// Whether a frame may stay that needs some new blocks and has changed others; if so, there is memory for the new ones.
+fn admit(
+    pool: &mut Pool,
+    device: &Device,
+    sign: Sign,
+    needed: &[(Key, Tally)],
+    changed: &[(Key, Tally)],
+) -> Result<(), Error> {
+    match (sign, needed.first()) {
+        (Sign::Minus, Some((key, _))) => return Err(Error::NotIntegrated { block: key.block() }),
+        (Sign::Plus, _) if needed.len() > pool.room() => return Err(pool.out_of_budget()),
+        _ => {}
+    }
+    // The pages mix the keys, and the first of them is named.
+    match changed.iter().filter(|work| work.1.fault()).map(|work| work.0).min() {
+        Some(key) if sign == Sign::Plus => Err(Error::Saturated { block: key.block() }),
+        Some(key) => Err(Error::NotIntegrated { block: key.block() }),
+        None => pool.reserve(device, needed.len()),
+    }
+}
+
+/// Blocks of a frame, with their slots.
+struct Split {
+    absent: Vec<(Key, u32)>,
+    /// By page.
+    present: Vec<Vec<(Key, u32)>>,
+}
+
+impl Split {
+    fn new(pool: &Pool, keys: &[Key]) -> Self {
+        let mut split = Self { absent: Vec::new(), present: vec![Vec::new(); pool.pages.len()] };
+        for &key in keys {
+            match pool.get(key) {
+                Some(place) => split.present[place.page].push((key, place.slot)),
+                None => split.absent.push((key, fresh(0))),
+            }
+        }
+        split
+    }
+
+    /// Blocks that get slots now.
+    fn added(pool: &mut Pool, keys: &[(Key, Tally)]) -> Self {
+        let mut split = Self { absent: Vec::new(), present: vec![Vec::new(); pool.pages.len()] };
+        for &(key, _) in keys {
+            let place = pool.insert(key);
+            split.present[place.page].push((key, fresh(place.slot)));
+        }
+        split
+    }
+
+    fn count(&self) -> Pass<'_> {
+        Pass { mode: Mode::Count, page: 0, blocks: &self.absent }
+    }
+
+    fn update(&self, mode: Mode) -> impl Iterator<Item = Pass<'_>> {
+        self.present.iter().enumerate().map(move |(page, blocks)| Pass { mode, page, blocks })
     }
 }
 

@@ -60,7 +60,7 @@ mod view;
 
 pub use error::Error;
 #[cfg(feature = "gpu")]
-pub use gpu::GpuOptions;
+pub use gpu::{GpuMap, GpuOptions};
 pub use map::{FrameReport, Map};
 pub use mesh::{Mesh, write_ply};
 pub use nalgebra;

@@ -2,7 +2,7 @@
 
 use std::future::Future;
 use std::pin::pin;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::task::{Context, Poll, Waker};
 
 use wgpu::{Buffer, BufferUsages, ComputePipeline};
@@ -27,6 +27,8 @@ pub(crate) struct Device {
     pub(crate) bindings: usize,
     /// The first fault that no call has reported yet.
     fault: Arc<Mutex<Option<String>>>,
+    /// Why the device, and with it the map, is gone.
+    lost: Arc<OnceLock<String>>,
 }
 
 impl Device {
@@ -52,19 +54,25 @@ impl Device {
         let (device, queue) = ready(adapter.request_device(&descriptor))
             .map_err(|error| Error::NoAdapter { reason: format!("{name} cannot be opened: {error}") })?;
         let fault: Arc<Mutex<Option<String>>> = Arc::default();
-        let record = |fault: &Arc<Mutex<Option<String>>>, what: String| {
-            fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(what);
-        };
         let seen = Arc::clone(&fault);
-        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| record(&seen, error.to_string())));
-        let seen = Arc::clone(&fault);
-        device.set_device_lost_callback(move |reason, what| record(&seen, format!("device lost ({reason:?}): {what}")));
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            seen.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error.to_string());
+        }));
+        let lost: Arc<OnceLock<String>> = Arc::default();
+        let seen = Arc::clone(&lost);
+        device.set_device_lost_callback(move |reason, what| {
+            // The first reason stays.
+            seen.get_or_init(|| format!("it is lost ({reason:?}): {what}"));
+        });
         let binding_bytes = binding_bytes.min(options.max_buffer_bytes);
-        Ok(Self { device, queue, name, binding_bytes, bindings: bindings as usize, fault })
+        Ok(Self { device, queue, name, binding_bytes, bindings: bindings as usize, fault, lost })
     }
 
-    /// The fault that came up since the last call, if any.
+    /// The fault that came up since the last call, if any; once the device is lost, always that.
     pub(crate) fn check(&self) -> Result<(), Error> {
+        if let Some(what) = self.lost.get() {
+            return Err(Error::Device { what: what.clone() });
+        }
         match self.fault.lock().unwrap_or_else(PoisonError::into_inner).take() {
             Some(what) => Err(Error::Device { what }),
             None => Ok(()),
@@ -131,11 +139,34 @@ impl Device {
     /// Hands words over; they arrive before the next submission runs.
     pub(crate) fn write(&self, buffer: &Buffer, offset: usize, words: impl ExactSizeIterator<Item = u32>) -> Result<(), Error> {
         let Some(bytes) = wgpu::BufferSize::new(4 * words.len() as u64) else { return Ok(()) };
-        match self.queue.write_buffer_with(buffer, offset as u64, bytes) {
-            Some(mut view) => view.slice(..).into_chunks::<4>().0.write_iter(words.map(u32::to_ne_bytes)),
-            None => self.check().and(Err(Error::Device { what: "a write was refused".into() }))?,
-        }
+        let Some(mut view) = self.queue.write_buffer_with(buffer, offset as u64, bytes) else { return self.refused() };
+        view.slice(..).into_chunks::<4>().0.write_iter(words.map(u32::to_ne_bytes));
         Ok(())
+    }
+
+    /// As [`write`](Self::write), words in groups.
+    pub(crate) fn write_groups(
+        &self,
+        buffer: &Buffer,
+        offset: usize,
+        groups: impl ExactSizeIterator<Item = [u32; 4]>,
+    ) -> Result<(), Error> {
+        let Some(bytes) = wgpu::BufferSize::new(16 * groups.len() as u64) else { return Ok(()) };
+        let Some(mut view) = self.queue.write_buffer_with(buffer, offset as u64, bytes) else { return self.refused() };
+        let bytes_of = |words: [u32; 4]| {
+            let [a, b, c, d] = words.map(u32::to_ne_bytes);
+            [a, b, c, d]
+        };
+        view.slice(..).into_chunks::<4>().0.into_chunks::<4>().0.write_iter(groups.map(bytes_of));
+        Ok(())
+    }
+
+    fn refused(&self) -> Result<(), Error> {
+        self.check().and_then(|()| Err(Error::Device { what: "a write was refused".into() }))
+    }
+
+    pub(crate) fn commands(&self) -> wgpu::CommandEncoder {
+        self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
     }
 
     /// Runs what was recorded, waits for it, and calls `read` with the first `bytes` of `staging`.
@@ -147,13 +178,23 @@ impl Device {
         read: impl FnOnce(&[[u8; 4]]) -> R,
     ) -> Result<R, Error> {
         self.queue.submit([commands.finish()]);
+        self.wait_and_read(staging, bytes, read).inspect_err(|error| {
+            // What ran and what did not is unknown: nothing on the device can be trusted any more.
+            self.lost.get_or_init(|| error.to_string());
+        })
+    }
+
+    fn wait_and_read<R>(&self, staging: &Buffer, bytes: usize, read: impl FnOnce(&[[u8; 4]]) -> R) -> Result<R, Error> {
+        let failed = |what: String| Error::Device { what };
+        if bytes == 0 {
+            return self.check().map(|()| read(&[]));
+        }
         let slice = staging.slice(..bytes as u64);
         // Whether mapping failed is seen by the view below.
         slice.map_async(wgpu::MapMode::Read, |_| {});
-        let lost = |what: String| Error::Device { what };
-        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| lost(error.to_string()))?;
+        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| failed(error.to_string()))?;
         self.check()?;
-        let view = slice.get_mapped_range().map_err(|error| lost(error.to_string()))?;
+        let view = slice.get_mapped_range().map_err(|error| failed(error.to_string()))?;
         let result = read(view.as_chunks().0);
         drop(view);
         staging.unmap();

@@ -63,7 +63,7 @@ fn ask(device: &Device, pairs: &[[f32; 2]]) -> Result<Vec<[u32; RESULTS]>, Error
     device.write(&uniform, 0, [pairs.len() as u32, 0, 0, 0].into_iter())?;
     let words: Vec<u32> = pairs.as_flattened().iter().map(|x| x.to_bits()).collect();
     device.write(&input, 0, words.into_iter())?;
-    let mut commands = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let mut commands = device.commands();
     {
         let mut pass = commands.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
         pass.set_pipeline(&program.pipeline);

@@ -4,6 +4,8 @@
 
 mod accuracy;
 mod errors;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod recorded;
 mod reversible;
 mod scene;

@@ -1,0 +1,179 @@
+//! A frame applied to blocks on the device: what is uploaded, run and read back.
+
+use wgpu::{Buffer, BufferUsages};
+
+use super::device::{Device, Program};
+use super::pool::Pool;
+use crate::Error;
+use crate::fuse::Frame;
+use crate::key::Key;
+
+const SOURCE: &str = concat!(include_str!("exact.wgsl"), include_str!("fuse.wgsl"));
+/// Bytes of the program's `Frame`, and of the windows at which it is seen.
+const FRAME_BYTES: usize = 112;
+const WINDOW: usize = 256;
+/// Passes that one submission can hold: one that counts and one for each page.
+const MOST_PASSES: usize = 5;
+/// Workgroups along one side of a dispatch.
+const MOST_GROUPS: usize = 65535;
+/// Marks a slot that holds something else yet.
+const FRESH: u32 = 1 << 31;
+
+/// What a pass does; the values are the program's.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Mode {
+    /// Counts the voxels that a frame would touch in blocks that do not exist.
+    Count = 0,
+    Plus = 1,
+    Minus = 2,
+}
+
+/// What a frame did to a block.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Tally(u32);
+
+impl Tally {
+    /// Voxels touched.
+    pub(super) fn voxels(self) -> usize {
+        (self.0 & 0xffff) as usize
+    }
+
+    /// A counter ran over or under; the opposite update restores the block exactly.
+    pub(super) fn fault(self) -> bool {
+        self.0 & 1 << 16 != 0
+    }
+
+    /// Some voxel has a weight.
+    pub(super) fn observed(self) -> bool {
+        self.0 & 1 << 17 != 0
+    }
+}
+
+/// The program and its buffers, which grow with the images and the number of blocks.
+pub(super) struct Fuser {
+    program: Program,
+    uniform: Buffer,
+    pixels: Buffer,
+    blocks: Buffer,
+    tallies: Buffer,
+    staging: Buffer,
+}
+
+/// Blocks of one page, or of none.
+pub(super) struct Pass<'a> {
+    pub(super) mode: Mode,
+    pub(super) page: usize,
+    /// Blocks of this pass, with their slots in the page.
+    pub(super) blocks: &'a [(Key, u32)],
+}
+
+impl Fuser {
+    pub(super) fn new(device: &Device) -> Result<Self, Error> {
+        let storage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
+        Ok(Self {
+            program: device.program("fuse", SOURCE, &[false, false, true, true])?,
+            uniform: device.buffer("frame", MOST_PASSES * WINDOW, BufferUsages::UNIFORM | BufferUsages::COPY_DST)?,
+            pixels: device.buffer("pixels", 16, storage)?,
+            blocks: device.buffer("block list", 16, storage)?,
+            tallies: device.buffer("tallies", 16, storage | BufferUsages::COPY_SRC)?,
+            staging: device.buffer("tallies on their way", 16, BufferUsages::MAP_READ | BufferUsages::COPY_DST)?,
+        })
+    }
+
+    /// Uploads what a frame is made of, for all passes until the next frame.
+    pub(super) fn load(&mut self, device: &Device, frame: &Frame) -> Result<(), Error> {
+        let surface = frame.surface;
+        let pixels = surface.planes.len();
+        let colours = frame.colour.as_ref().map_or(&[][..], |colour| colour.view.rgb8);
+        grow(device, &mut self.pixels, 4 * (5 * pixels + colours.len().div_ceil(4)))?;
+        let inverse_depth = surface.inverse_depth[..pixels].iter().map(|omega| omega.to_bits());
+        device.write(&self.pixels, 0, inverse_depth)?;
+        device.write_groups(&self.pixels, 4 * pixels, surface.planes.iter().map(|plane| {
+            [plane.slope[0], plane.slope[1], plane.offset, plane.weight].map(f32::to_bits)
+        }))?;
+        let (whole, rest) = colours.as_chunks();
+        device.write(&self.pixels, 20 * pixels, whole.iter().map(|&bytes| u32::from_le_bytes(bytes)))?;
+        let mut last = [0; 4];
+        last[..rest.len()].copy_from_slice(rest);
+        let tail = if rest.is_empty() { &[][..] } else { &[u32::from_le_bytes(last)] };
+        device.write(&self.pixels, 20 * pixels + 4 * whole.len(), tail.iter().copied())
+    }
+
+    /// Runs the passes in one submission and returns the tallies of their blocks, pass by pass.
+    pub(super) fn run(
+        &mut self,
+        device: &Device,
+        pool: &Pool,
+        frame: &Frame,
+        passes: &[Pass],
+    ) -> Result<Vec<Tally>, Error> {
+        let total = passes.iter().map(|pass| pass.blocks.len()).sum::<usize>();
+        grow(device, &mut self.blocks, 16 * total)?;
+        grow(device, &mut self.tallies, 4 * total)?;
+        grow(device, &mut self.staging, 4 * total)?;
+        let mut commands = device.commands();
+        let mut first = 0;
+        for (k, pass) in passes.iter().enumerate() {
+            if pass.blocks.is_empty() {
+                continue;
+            }
+            device.write_groups(&self.blocks, 16 * first, pass.blocks.iter().map(|&(key, slot)| {
+                let start = frame.start(key);
+                [start.x.to_bits(), start.y.to_bits(), start.z.to_bits(), slot]
+            }))?;
+            let words = uniform(frame, pass.mode, first, pass.blocks.len());
+            device.write(&self.uniform, k * WINDOW, words.into_iter())?;
+            let storage = [&self.blocks, &self.pixels, &self.tallies, &pool.pages[pass.page]];
+            let group = device.bind(&self.program, FRAME_BYTES, &self.uniform, &storage);
+            let mut compute = commands.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            compute.set_pipeline(&self.program.pipeline);
+            compute.set_bind_group(0, &group, &[(k * WINDOW) as u32]);
+            let across = pass.blocks.len().min(MOST_GROUPS);
+            compute.dispatch_workgroups(across as u32, pass.blocks.len().div_ceil(across) as u32, 1);
+            first += pass.blocks.len();
+        }
+        let bytes = 4 * total;
+        commands.copy_buffer_to_buffer(&self.tallies, 0, &self.staging, 0, bytes as u64);
+        device.run_and_read(commands, &self.staging, bytes, |words| {
+            words.iter().map(|&word| Tally(u32::from_ne_bytes(word))).collect()
+        })
+    }
+}
+
+/// The slot of a block that is new there.
+pub(super) fn fresh(slot: u32) -> u32 {
+    slot | FRESH
+}
+
+/// The program's `Frame`.
+fn uniform(frame: &Frame, mode: Mode, first: usize, count: usize) -> [u32; FRAME_BYTES / 4] {
+    let mut words = [0; FRAME_BYTES / 4];
+    let step = frame.step();
+    for axis in 0..3 {
+        for k in 0..3 {
+            words[4 * axis + k] = step[(k, axis)].to_bits();
+        }
+    }
+    let surface = frame.surface;
+    words[12..14].copy_from_slice(&[surface.width as u32, surface.height as u32]);
+    if let Some(colour) = &frame.colour {
+        words[14..16].copy_from_slice(&[colour.view.width as u32, colour.view.height as u32]);
+        words[16..18].copy_from_slice(&colour.scale.map(f32::to_bits));
+        words[18..20].copy_from_slice(&colour.shift.map(f32::to_bits));
+        words[23] = 5 * surface.planes.len() as u32;
+    }
+    words[20..23].copy_from_slice(&[frame.truncation, frame.per_metre, frame.colour_reach].map(f32::to_bits));
+    words[24..27].copy_from_slice(&[mode as u32, first as u32, count as u32]);
+    words
+}
+
+/// Replaces a buffer by a larger one where it is too small; what it held is lost.
+fn grow(device: &Device, buffer: &mut Buffer, bytes: usize) -> Result<(), Error> {
+    if bytes as u64 > buffer.size() {
+        let usage = buffer.usage();
+        let larger = bytes.next_power_of_two();
+        let limit = if usage.contains(BufferUsages::STORAGE) { device.binding_bytes.max(bytes) } else { larger };
+        *buffer = device.buffer("frame", larger.min(limit), usage)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,232 @@
+// The update of blocks by a frame, voxel by voxel as fuse.rs does it. One workgroup per block, two neighbouring voxels per
+// invocation: those whose weights share a word. No two invocations write the same word, so no order can show.
+
+struct Frame {
+    // Change of (u z, v z, z) from a voxel to the next along x, y and z.
+    step: array<vec4<f32>, 3>,
+    size: vec2<u32>,
+    colour_size: vec2<u32>,
+    colour_scale: vec2<f32>,
+    colour_shift: vec2<f32>,
+    truncation: f32,
+    per_metre: f32,
+    colour_reach: f32,
+    // Words of the frame before its colours; 0 without colours.
+    colour_start: u32,
+    // One of the modes below.
+    mode: u32,
+    // The blocks of this pass among all.
+    first: u32,
+    count: u32,
+    unknown_zero: u32,
+}
+
+// Nothing is written but the tally.
+const COUNT: u32 = 0u;
+const PLUS: u32 = 1u;
+const MINUS: u32 = 2u;
+
+const BLOCK_WORDS: u32 = 1792u;
+const WEIGHTS: u32 = 512u;
+const COLOURS: u32 = 768u;
+const ONE: i32 = 32767;
+const MAX_COLOURS: u32 = 1040u;
+
+// The slot's bit for a block whose memory holds something else yet.
+const FRESH: u32 = 0x80000000u;
+// Of a tally; its low bits count voxels.
+const FAULT: u32 = 0x10000u;
+const OBSERVED: u32 = 0x20000u;
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+// Projection of the block's first voxel, and its slot.
+@group(0) @binding(1) var<storage, read> blocks: array<vec4<u32>>;
+// Inverse depths, then planes of four words, then colours of three bytes.
+@group(0) @binding(2) var<storage, read> pixels: array<u32>;
+@group(0) @binding(3) var<storage, read_write> tallies: array<u32>;
+@group(0) @binding(4) var<storage, read_write> pool: array<u32>;
+
+var<workgroup> tally: atomic<u32>;
+
+struct Voxel {
+    distance: i32,
+    weight: u32,
+    colour: vec2<u32>,
+    // Of the tally.
+    mark: u32,
+}
+
+fn number(at: u32) -> f32 {
+    return bitcast<f32>(pixels[at]);
+}
+
+// The six-bit sums of the colour at a depth pixel, and a count of one; zero outside the colour image.
+fn colour_at(u: f32, v: f32) -> vec4<u32> {
+    let cu = plus(plus(times(u, frame.colour_scale.x), frame.colour_shift.x), 0.5);
+    let cv = plus(plus(times(v, frame.colour_scale.y), frame.colour_shift.y), 0.5);
+    let inside = cu >= 0.0 && cv >= 0.0 && cu < f32(frame.colour_size.x) && cv < f32(frame.colour_size.y);
+    if !inside {
+        return vec4(0u);
+    }
+    let start = 3u * (u32(cv) * frame.colour_size.x + u32(cu));
+    var rgb: array<u32, 3>;
+    for (var k = 0u; k < 3u; k++) {
+        let byte = start + k;
+        let word = pixels[frame.colour_start + byte / 4u];
+        rgb[k] = (((word >> (8u * (byte % 4u))) & 255u) * 63u + 127u) / 255u;
+    }
+    return vec4(rgb[0], rgb[1], rgb[2], 1u);
+}
+
+fn observe(old: Voxel, distance: f32, weight: u32) -> Voxel {
+    var voxel = old;
+    let q = i32(nearest(clamp(times(distance, frame.per_metre), f32(-ONE), f32(ONE))));
+    let change = q * i32(weight);
+    if frame.mode == MINUS {
+        voxel.distance -= change;
+        voxel.weight = (voxel.weight - weight) & 0xffffu;
+        // No sum of observations can leave this range: what was taken out was not in.
+        if old.weight < weight || magnitude(voxel.distance) > voxel.weight * u32(ONE) {
+            voxel.mark |= FAULT;
+        }
+    } else {
+        voxel.distance += change;
+        voxel.weight = (voxel.weight + weight) & 0xffffu;
+        if voxel.weight < weight {
+            voxel.mark |= FAULT;
+        }
+    }
+    return voxel;
+}
+
+fn magnitude(x: i32) -> u32 {
+    return select(bitcast<u32>(x), 0u - bitcast<u32>(x), x < 0);
+}
+
+fn observe_colour(old: Voxel, change: vec4<u32>) -> Voxel {
+    var voxel = old;
+    let sums = vec4(old.colour.x & 0xffffu, old.colour.x >> 16u, old.colour.y & 0xffffu, old.colour.y >> 16u);
+    var next: vec4<u32>;
+    var wrapped: bool;
+    if frame.mode == MINUS {
+        next = (sums - change) & vec4(0xffffu);
+        wrapped = any(sums < change);
+    } else {
+        next = (sums + change) & vec4(0xffffu);
+        wrapped = any(next < change);
+    }
+    if wrapped || next.w > MAX_COLOURS {
+        voxel.mark |= FAULT;
+    }
+    voxel.colour = vec2(next.x | (next.y << 16u), next.z | (next.w << 16u));
+    return voxel;
+}
+
+// What the frame makes of a voxel that projects to (u z, v z, z).
+fn update(old: Voxel, projected: vec3<f32>) -> Voxel {
+    let depth = projected.z;
+    if !(depth > 0.0) {
+        return old;
+    }
+    let inverse = quotient(1.0, depth);
+    let u = times(projected.x, inverse);
+    let v = times(projected.y, inverse);
+    let pixel_u = nearest(u);
+    let pixel_v = nearest(v);
+    let right = f32(frame.size.x - 1u);
+    let bottom = f32(frame.size.y - 1u);
+    let inside = pixel_u >= 0.0 && pixel_u <= right && pixel_v >= 0.0 && pixel_v <= bottom;
+    if !inside {
+        return old;
+    }
+    let pixel = u32(pixel_v) * frame.size.x + u32(pixel_u);
+    let omega = number(pixel);
+    // |D - z| <= μ with D = 1/ω; an ω of 0 fails.
+    if !(abs(minus(1.0, times(depth, omega))) <= times(frame.truncation, omega)) {
+        return old;
+    }
+    let plane = frame.size.x * frame.size.y + 4u * pixel;
+    let along_u = times(number(plane), minus(u, pixel_u));
+    let along_v = times(number(plane + 1u), minus(v, pixel_v));
+    let at_voxel = plus(plus(omega, along_u), along_v);
+    let distance = times(number(plane + 2u), minus(1.0, times(depth, at_voxel)));
+    var voxel = observe(old, distance, u32(number(plane + 3u)));
+    voxel.mark += 1u;
+    if frame.colour_start > 0u && abs(distance) < frame.colour_reach {
+        let change = colour_at(pixel_u, pixel_v);
+        if change.w > 0u {
+            voxel = observe_colour(voxel, change);
+        }
+    }
+    return voxel;
+}
+
+@compute @workgroup_size(256)
+fn fuse(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) pair: u32,
+) {
+    unknown_zero = frame.unknown_zero;
+    let at = group.x + groups.x * group.y;
+    if at >= frame.count {
+        return;
+    }
+    let block = blocks[frame.first + at];
+    let start = (block.w & ~FRESH) * BLOCK_WORDS;
+    let fresh = (block.w & FRESH) != 0u;
+    let x = f32(2u * pair % 8u);
+    let y = f32(pair / 4u % 8u);
+    let z = f32(pair / 32u);
+    var row: array<f32, 3>;
+    for (var k = 0u; k < 3u; k++) {
+        row[k] = plus(plus(bitcast<f32>(block[k]), times(frame.step[1][k], y)), times(frame.step[2][k], z));
+    }
+    let weights = start + WEIGHTS + pair;
+    var packed_weights = 0u;
+    var mark = 0u;
+    for (var k = 0u; k < 2u; k++) {
+        let voxel_at = 2u * pair + k;
+        let colours = start + COLOURS + 2u * voxel_at;
+        var old = Voxel(0, 0u, vec2(0u), 0u);
+        if !fresh {
+            old = Voxel(
+                bitcast<i32>(pool[start + voxel_at]),
+                (pool[weights] >> (16u * k)) & 0xffffu,
+                vec2(pool[colours], pool[colours + 1u]),
+                0u,
+            );
+        }
+        let along = x + f32(k);
+        let projected = vec3(
+            plus(row[0], times(frame.step[0].x, along)),
+            plus(row[1], times(frame.step[0].y, along)),
+            plus(row[2], times(frame.step[0].z, along)),
+        );
+        let voxel = update(old, projected);
+        if frame.mode != COUNT && (fresh || (voxel.mark & 0xffffu) > 0u) {
+            pool[start + voxel_at] = bitcast<u32>(voxel.distance);
+            pool[colours] = voxel.colour.x;
+            pool[colours + 1u] = voxel.colour.y;
+        }
+        packed_weights |= voxel.weight << (16u * k);
+        mark = ((mark & 0xffffu) + (voxel.mark & 0xffffu)) | ((mark | voxel.mark) & FAULT);
+    }
+    if packed_weights > 0u {
+        mark |= OBSERVED;
+    }
+    if frame.mode != COUNT && (fresh || (mark & 0xffffu) > 0u) {
+        pool[weights] = packed_weights;
+    }
+    // Counts add and flags unite: the order of the invocations does not show.
+    if (mark & 0xffffu) > 0u {
+        atomicAdd(&tally, mark & 0xffffu);
+    }
+    if (mark >> 16u) > 0u {
+        atomicOr(&tally, mark & 0xffff0000u);
+    }
+    workgroupBarrier();
+    if pair == 0u {
+        tallies[frame.first + at] = atomicLoad(&tally);
+    }
+}

@@ -1,0 +1,165 @@
+//! The map on a GPU is the map on the processor, to the bit. Skipped where there is no adapter, unless
+//! `PAINTCOPTER_REQUIRE_GPU=1` demands one.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use tsdf_hash::{ColourView, Error, GpuMap, GpuOptions, Map, Settings};
+
+use crate::scene::{Shot, look_at, room};
+
+fn options() -> GpuOptions {
+    GpuOptions { software: true, ..GpuOptions::default() }
+}
+
+/// `None`, said aloud, where no adapter is there and none is demanded.
+fn open(settings: Settings, options: &GpuOptions) -> Option<GpuMap> {
+    match GpuMap::new(settings, options) {
+        Ok(map) => Some(map),
+        Err(error @ Error::NoAdapter { .. }) if std::env::var_os("PAINTCOPTER_REQUIRE_GPU").is_none_or(|v| v != "1") => {
+            eprintln!("skipped: {error}");
+            None
+        }
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// A shot with colours of its own, of half the size.
+struct Frame {
+    shot: Shot,
+    rgb8: Vec<u8>,
+}
+
+impl Frame {
+    fn tour(n: usize, shrink: usize) -> Vec<Self> {
+        let moved = Isometry3::new(Vector3::new(3.7, -2.1, 1.3), Vector3::new(0.1, 0.05, -0.4));
+        let colours = |k: usize, pixels: usize| (0..3 * pixels).map(|n| (n * 31 + k * 77 + n / 97) as u8).collect();
+        let frame = |(k, shot): (usize, Shot)| Self { rgb8: colours(k, shot.width * shot.height / 4), shot };
+        room::tour(n, shrink, &moved).into_iter().enumerate().map(frame).collect()
+    }
+
+    fn colour(&self) -> ColourView<'_> {
+        let (mut intrinsics, s) = (self.shot.intrinsics, 0.5);
+        (intrinsics.fx, intrinsics.fy) = (s * intrinsics.fx, s * intrinsics.fy);
+        (intrinsics.cx, intrinsics.cy) = (s * intrinsics.cx - 0.25, s * intrinsics.cy - 0.25);
+        ColourView { width: self.shot.width / 2, height: self.shot.height / 2, rgb8: &self.rgb8, intrinsics }
+    }
+}
+
+fn settings() -> Settings {
+    Settings { voxel_size: 0.03, max_bytes: 32 << 20, ..Settings::default() }
+}
+
+#[test]
+fn the_gpu_makes_the_bytes_of_the_processor() {
+    let Some(mut gpu) = open(settings(), &options()) else { return };
+    // Pages of 3 MiB: the blocks of a frame lie on several.
+    let paged = GpuOptions { max_buffer_bytes: 3 << 20, ..options() };
+    let mut small = open(Settings { max_bytes: 13 << 20, ..settings() }, &paged).unwrap();
+    let mut map = Map::new(settings()).unwrap();
+    let frames = Frame::tour(7, 4);
+    let mut hashes = vec![map.hash()];
+    for frame in &frames {
+        let (view, pose) = (frame.shot.view(), frame.shot.world_from_camera);
+        let report = map.integrate(&view, Some(&frame.colour()), &pose).unwrap();
+        assert_eq!(gpu.integrate(&view, Some(&frame.colour()), &pose).unwrap(), report);
+        assert_eq!(small.integrate(&view, Some(&frame.colour()), &pose).unwrap(), report);
+        hashes.push(map.hash());
+        assert_eq!((gpu.hash().unwrap(), gpu.blocks()), (map.hash(), map.blocks()));
+        assert_eq!(small.hash().unwrap(), map.hash());
+    }
+    // Out again, from the last to the first: each map of the way back is one of the way there.
+    for (frame, hash) in frames.iter().zip(&hashes).rev() {
+        let (view, pose) = (frame.shot.view(), frame.shot.world_from_camera);
+        let report = map.deintegrate(&view, Some(&frame.colour()), &pose).unwrap();
+        assert_eq!(gpu.deintegrate(&view, Some(&frame.colour()), &pose).unwrap(), report);
+        assert_eq!(gpu.hash().unwrap(), *hash);
+    }
+    assert_eq!(gpu.blocks(), 0);
+    // In another order, into slots that other blocks have left.
+    for k in [3, 0, 6, 2, 5, 1, 4] {
+        let frame = &frames[k];
+        gpu.integrate(&frame.shot.view(), Some(&frame.colour()), &frame.shot.world_from_camera).unwrap();
+    }
+    assert_eq!(Some(&gpu.hash().unwrap()), hashes.last());
+}
+
+#[test]
+fn a_full_image_agrees() {
+    let settings = Settings { voxel_size: 0.01, max_bytes: 128 << 20, ..Settings::default() };
+    let Some(mut gpu) = open(settings, &options()) else { return };
+    let mut map = Map::new(settings).unwrap();
+    let frame = &Frame::tour(1, 1)[0];
+    let (view, pose) = (frame.shot.view(), frame.shot.world_from_camera);
+    let report = map.integrate(&view, Some(&frame.colour()), &pose).unwrap();
+    assert!(report.blocks > 1000);
+    assert_eq!(gpu.integrate(&view, Some(&frame.colour()), &pose).unwrap(), report);
+    assert_eq!(gpu.hash().unwrap(), map.hash());
+}
+
+fn wall() -> Shot {
+    let pose = look_at(Point3::origin(), Point3::new(1.0, 0.1, 0.05));
+    Shot::take((64, 48), [60.0; 2], pose, |o, d| Some((1.2 - o.x) / d.x))
+}
+
+#[test]
+fn refused_frames_leave_no_trace() {
+    let shot = wall();
+    let (view, pose) = (shot.view(), shot.world_from_camera);
+    let settings = Settings { voxel_size: 0.04, max_bytes: 1 << 20, ..Settings::default() };
+    let Some(mut gpu) = open(settings, &options()) else { return };
+    let mut map = Map::new(settings).unwrap();
+    let rgb8 = vec![255; 3 * 3072];
+    let colour = ColourView { width: 64, height: 48, rgb8: &rgb8, intrinsics: shot.intrinsics };
+    // 1040 coloured frames fill a voxel.
+    for _ in 0..1040 {
+        gpu.integrate(&view, Some(&colour), &pose).unwrap();
+        map.integrate(&view, Some(&colour), &pose).unwrap();
+    }
+    let full = map.hash();
+    assert_eq!(gpu.hash().unwrap(), full);
+    let (ours, expected) =
+        (gpu.integrate(&view, Some(&colour), &pose), map.integrate(&view, Some(&colour), &pose).unwrap_err());
+    let (Err(Error::Saturated { block }), Error::Saturated { block: first }) = (ours, expected) else { panic!() };
+    assert_eq!((block, gpu.hash().unwrap()), (first, full));
+    // Strangers: one that reaches blocks which are not there, and one that does not.
+    let moved = Isometry3::translation(0.0, 0.0, 0.3) * pose;
+    assert!(matches!(gpu.deintegrate(&view, None, &moved), Err(Error::NotIntegrated { .. })));
+    assert_eq!(gpu.hash().unwrap(), full);
+    let near = Isometry3::translation(0.0, 0.02, 0.0) * pose;
+    let other = gpu.deintegrate(&view, Some(&ColourView { rgb8: &[9; 3 * 3072], ..colour }), &near);
+    assert!(matches!(other, Err(Error::NotIntegrated { .. })));
+    assert_eq!(gpu.hash().unwrap(), full);
+    for _ in 0..1040 {
+        gpu.deintegrate(&view, Some(&colour), &pose).unwrap();
+    }
+    assert_eq!((gpu.hash().unwrap(), gpu.blocks()), (Map::new(settings).unwrap().hash(), 0));
+}
+
+#[test]
+fn the_cap_holds_on_the_device() {
+    let shot = wall();
+    let settings = Settings { voxel_size: 0.02, max_bytes: 1 << 19, ..Settings::default() };
+    let Some(mut gpu) = open(settings, &options()) else { return };
+    let mut refused = 0;
+    for k in 0..12 {
+        let turned = Isometry3::rotation(Vector3::z() * (0.3 * f64::from(k))) * shot.world_from_camera;
+        let before = (gpu.hash().unwrap(), gpu.blocks());
+        if let Err(error) = gpu.integrate(&shot.view(), None, &turned) {
+            assert!(matches!(error, Error::OutOfBudget { max_bytes: 0x80000, .. }));
+            assert_eq!((gpu.hash().unwrap(), gpu.blocks()), before);
+            refused += 1;
+        }
+        assert!(gpu.bytes() <= 1 << 19);
+    }
+    assert!((1..12).contains(&refused));
+    let Err(Error::InvalidSetting { name, .. }) = GpuMap::new(Settings { max_bytes: 1000, ..settings }, &options()) else {
+        panic!("1000 bytes were accepted")
+    };
+    assert_eq!(name, "max_bytes");
+}
+
+#[test]
+fn an_adapter_that_is_not_there_is_an_error() {
+    let nowhere = GpuOptions { adapter: "no such adapter".into(), ..options() };
+    let Err(Error::NoAdapter { reason }) = GpuMap::new(settings(), &nowhere) else { panic!("it was found") };
+    assert!(!reason.is_empty());
+}
