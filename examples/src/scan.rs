@@ -2,7 +2,12 @@
 
 mod decode;
 mod layouts;
+mod report;
+mod run;
 mod sequence;
+mod views;
 
 pub use decode::{Colour, Images};
+pub use report::ScanReport;
+pub use run::{Scan, ScanError, ScanSettings};
 pub use sequence::{FrameFiles, Sequence, SequenceError};

@@ -6,6 +6,7 @@ use image::{DynamicImage, ImageReader};
 use tsdf_hash::{ColourView, DepthData, DepthView, Intrinsics};
 
 use super::{FrameFiles, SequenceError};
+use crate::pictures::Rgb;
 
 /// The images of a frame in memory.
 pub struct Images {
@@ -42,6 +43,36 @@ impl Images {
             None => None,
         };
         Ok(Self { width: depth.width() as usize, height: depth.height() as usize, depth: depth.into_raw(), colour })
+    }
+
+    /// Pixels per row of the depth image.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows of the depth image.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// The colour image at the size of the depth image; where there is none, the depth in grey, near bright.
+    pub fn picture(&self) -> Rgb {
+        let pixels = (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y)));
+        let nearest = self.depth.iter().filter(|d| **d > 0).min().map_or(1.0, |d| f64::from(*d));
+        Rgb::from_pixels(
+            self.width,
+            self.height,
+            pixels.map(|(x, y)| match &self.colour {
+                Some(c) => {
+                    let at = 3 * ((y * c.height / self.height) * c.width + x * c.width / self.width);
+                    [c.rgb8[at], c.rgb8[at + 1], c.rgb8[at + 2]]
+                }
+                None => match self.depth[y * self.width + x] {
+                    0 | u16::MAX => [0; 3],
+                    d => [(255.0 * nearest / f64::from(d)) as u8; 3],
+                },
+            }),
+        )
     }
 
     /// The depth image with its camera.
