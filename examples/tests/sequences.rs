@@ -115,12 +115,18 @@ fn run(folder: &Path, threads: usize) -> Scan {
 
 #[test]
 fn three_layouts_give_the_same_wall() {
-    let layouts: [(&str, fn(&Scratch)); 3] = [("7-Scenes", seven_scenes), ("TUM", tum), ("Redwood", redwood)];
+    type Layout = (&'static str, fn(&Scratch));
+    let layouts: [Layout; 3] = [("7-Scenes", seven_scenes), ("TUM", tum), ("Redwood", redwood)];
     for (layout, write) in layouts {
         let s = Scratch::new(layout);
         write(&s);
+        let sequence = Sequence::open(&s.0).unwrap();
+        assert_eq!(sequence.layout, layout);
+        for (frame, expected) in sequence.frames.iter().zip(poses()) {
+            let error = frame.world_from_camera.unwrap().inverse() * expected;
+            assert!(error.translation.vector.norm() + error.rotation.angle() < 1e-9, "{layout}: {error}");
+        }
         let scan = run(&s.0, 1);
-        assert_eq!(Sequence::open(&s.0).unwrap().layout, layout);
         assert_eq!((scan.fused.len(), scan.skipped.len()), (3, 0), "{layout}");
         assert!(scan.mesh.faces.len() > 1000, "{layout}: {} faces", scan.mesh.faces.len());
         for (position, colour) in scan.mesh.positions.iter().zip(&scan.mesh.colours) {
