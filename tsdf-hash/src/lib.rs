@@ -61,4 +61,4 @@ pub use map::{FrameReport, Map};
 pub use mesh::{Mesh, write_ply};
 pub use nalgebra;
 pub use settings::{NoiseModel, Settings};
-pub use view::{ColourView, DepthData, DepthView, Intrinsics};
+pub use view::{ColourData, ColourView, DepthData, DepthView, Intrinsics};
