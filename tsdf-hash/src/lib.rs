@@ -44,6 +44,7 @@
 
 mod block;
 mod candidates;
+mod cast;
 mod error;
 mod fuse;
 mod key;
@@ -56,6 +57,7 @@ mod surface;
 mod table;
 mod view;
 
+pub use cast::{CastSettings, View};
 pub use error::Error;
 pub use map::{FrameReport, Map};
 pub use mesh::{Mesh, write_ply};

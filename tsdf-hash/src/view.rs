@@ -74,7 +74,7 @@ pub struct ColourView<'a> {
 }
 
 impl Intrinsics {
-    fn check(&self, image: &'static str) -> Result<(), Error> {
+    pub(crate) fn check(&self, image: &'static str) -> Result<(), Error> {
         for (name, value, is_focal) in
             [("fx", self.fx, true), ("fy", self.fy, true), ("cx", self.cx, false), ("cy", self.cy, false)]
         {
@@ -113,11 +113,16 @@ impl ColourView<'_> {
     }
 }
 
-fn check_size(image: &'static str, width: usize, height: usize, channels: usize, found: usize) -> Result<(), Error> {
+pub(crate) fn check_sides(image: &'static str, width: usize, height: usize) -> Result<(), Error> {
     let sides = 1..=16384;
     if !sides.contains(&width) || !sides.contains(&height) {
         return Err(Error::InvalidSize { image, width, height });
     }
+    Ok(())
+}
+
+fn check_size(image: &'static str, width: usize, height: usize, channels: usize, found: usize) -> Result<(), Error> {
+    check_sides(image, width, height)?;
     let expected = width * height * channels;
     if found == expected { Ok(()) } else { Err(Error::WrongLength { image, expected, found }) }
 }
