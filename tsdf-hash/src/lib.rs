@@ -44,6 +44,7 @@
 
 mod block;
 mod candidates;
+mod cast;
 mod error;
 mod fuse;
 #[cfg(feature = "gpu")]
@@ -58,6 +59,7 @@ mod surface;
 mod table;
 mod view;
 
+pub use cast::{CastSettings, View};
 pub use error::Error;
 #[cfg(feature = "gpu")]
 pub use gpu::{GpuMap, GpuOptions};
@@ -65,4 +67,4 @@ pub use map::{FrameReport, Map};
 pub use mesh::{Mesh, write_ply};
 pub use nalgebra;
 pub use settings::{NoiseModel, Settings};
-pub use view::{ColourView, DepthData, DepthView, Intrinsics};
+pub use view::{ColourData, ColourView, DepthData, DepthView, Intrinsics};

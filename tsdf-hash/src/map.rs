@@ -114,8 +114,11 @@ impl Map {
             blocks_added: 0,
             blocks_removed: emptied.len(),
         };
-        for (key, block, _) in present {
+        for (key, block, tally) in present {
             self.store.put(key, block);
+            if tally.voxels > 0 {
+                self.store.touch(key);
+            }
         }
         let added = outcome.map_err(|refusal| match (refusal, sign) {
             (Refusal::NoRoom, _) => self.store.out_of_budget(),

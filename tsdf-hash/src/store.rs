@@ -9,19 +9,22 @@ use crate::table::Table;
 const STEP: usize = 1024;
 /// The mesh names vertices by 32 bits, 1536 at most in a block.
 const MOST_BLOCKS: usize = 1 << 21;
-const SLOT_BYTES: usize = size_of::<Key>() + size_of::<Option<Box<Block>>>();
+const SLOT_BYTES: usize = size_of::<Key>() + size_of::<Option<Box<Block>>>() + size_of::<u64>();
 
 /// Blocks in dense slots, found through a hash table. A block is `None` only while a frame works on it.
 pub(crate) struct Store {
     table: Table,
     keys: Vec<Key>,
     blocks: Vec<Option<Box<Block>>>,
+    /// When a block last changed, on a clock that never stands still: equal stamps mean equal blocks.
+    stamps: Vec<u64>,
+    clock: u64,
     max_bytes: usize,
 }
 
 impl Store {
     pub(crate) fn new(max_bytes: usize) -> Result<Self, Error> {
-        let store = Self { table: Table::new(), keys: Vec::new(), blocks: Vec::new(), max_bytes };
+        let store = Self { table: Table::new(), keys: Vec::new(), blocks: Vec::new(), stamps: Vec::new(), clock: 0, max_bytes };
         let least = store.bytes_with(1);
         if least > max_bytes {
             let requirement = "large enough for one block: 32768 bytes do";
@@ -98,13 +101,34 @@ impl Store {
         if slots > self.keys.capacity() {
             self.keys.reserve_exact(slots - self.keys.len());
             self.blocks.reserve_exact(slots - self.blocks.len());
+            self.stamps.reserve_exact(slots - self.stamps.len());
         }
         self.table.reserve(len);
         for (key, block) in added {
             self.table.set(key, self.keys.len() as u32);
             self.keys.push(key);
             self.blocks.push(Some(block));
+            self.clock += 1;
+            self.stamps.push(self.clock);
         }
+    }
+
+    /// Notes that a block has changed.
+    pub(crate) fn touch(&mut self, key: Key) {
+        if let Some(slot) = self.table.get(key) {
+            self.clock += 1;
+            self.stamps[slot] = self.clock;
+        }
+    }
+
+    /// A number that changes whenever the block does; no two blocks of a store ever share one.
+    pub(crate) fn stamp(&self, slot: usize) -> u64 {
+        self.stamps[slot]
+    }
+
+    /// The keys in the order of their slots.
+    pub(crate) fn keys(&self) -> &[Key] {
+        &self.keys
     }
 
     pub(crate) fn remove(&mut self, key: Key) {
@@ -112,6 +136,7 @@ impl Store {
         self.table.remove(key);
         self.keys.swap_remove(slot);
         self.blocks.swap_remove(slot);
+        self.stamps.swap_remove(slot);
         if let Some(&moved) = self.keys.get(slot) {
             self.table.set(moved, slot as u32);
         }

@@ -7,6 +7,8 @@ use super::pool::Pool;
 use crate::Error;
 use crate::fuse::Frame;
 use crate::key::Key;
+use crate::surface::Plane;
+use crate::view::ColourData;
 
 const SOURCE: &str = concat!(include_str!("exact.wgsl"), include_str!("fuse.wgsl"));
 /// Bytes of the program's `Frame`, and of the windows at which it is seen.
@@ -82,21 +84,31 @@ impl Fuser {
 
     /// Uploads what a frame is made of, for all passes until the next frame.
     pub(super) fn load(&mut self, device: &Device, frame: &Frame) -> Result<(), Error> {
-        let surface = frame.surface;
-        let pixels = surface.planes.len();
-        let colours = frame.colour.as_ref().map_or(&[][..], |colour| colour.view.rgb8);
-        grow(device, &mut self.pixels, 4 * (5 * pixels + colours.len().div_ceil(4)))?;
-        let inverse_depth = surface.inverse_depth[..pixels].iter().map(|omega| omega.to_bits());
-        device.write(&self.pixels, 0, inverse_depth)?;
-        device.write_groups(&self.pixels, 4 * pixels, surface.planes.iter().map(|plane| {
-            [plane.slope[0], plane.slope[1], plane.offset, plane.weight].map(f32::to_bits)
-        }))?;
-        let (whole, rest) = colours.as_chunks();
-        device.write(&self.pixels, 20 * pixels, whole.iter().map(|&bytes| u32::from_le_bytes(bytes)))?;
-        let mut last = [0; 4];
-        last[..rest.len()].copy_from_slice(rest);
-        let tail = if rest.is_empty() { &[][..] } else { &[u32::from_le_bytes(last)] };
-        device.write(&self.pixels, 20 * pixels + 4 * whole.len(), tail.iter().copied())
+        let planes = &frame.surface.planes;
+        let colours = frame.colour.as_ref().map_or(ColourData::Rgb8(&[]), |colour| colour.view.data);
+        let words = match colours {
+            ColourData::Rgb8(data) => data.len().div_ceil(4),
+            ColourData::Rgb16(data) => data.len().div_ceil(2),
+        };
+        grow(device, &mut self.pixels, 16 * planes.len() + 4 * words)?;
+        // A pixel that is not fused may hold NaN, which a program may take for anything.
+        let fused = |plane: &Plane| if plane.scaled_omega > 0.0 { *plane } else { Plane::NONE };
+        let plane_words = |plane: &Plane| {
+            let Plane { offset, scaled_omega, scaled_slope } = fused(plane);
+            [offset, scaled_omega, scaled_slope[0], scaled_slope[1]].map(f32::to_bits)
+        };
+        device.write_groups(&self.pixels, 0, planes.iter().map(plane_words))?;
+        let start = 16 * planes.len();
+        match colours {
+            ColourData::Rgb8(data) => {
+                let word = |bytes: &[u8]| bytes.iter().rev().fold(0, |word, &byte| word << 8 | u32::from(byte));
+                device.write(&self.pixels, start, data.chunks(4).map(word))
+            }
+            ColourData::Rgb16(data) => {
+                let word = |pair: &[u16]| pair.iter().rev().fold(0, |word, &value| word << 16 | u32::from(value));
+                device.write(&self.pixels, start, data.chunks(2).map(word))
+            }
+        }
     }
 
     /// Runs the passes in one submission and returns the tallies of their blocks, pass by pass.
@@ -160,9 +172,10 @@ fn uniform(frame: &Frame, mode: Mode, first: usize, count: usize) -> [u32; FRAME
         words[14..16].copy_from_slice(&[colour.view.width as u32, colour.view.height as u32]);
         words[16..18].copy_from_slice(&colour.scale.map(f32::to_bits));
         words[18..20].copy_from_slice(&colour.shift.map(f32::to_bits));
-        words[23] = 5 * surface.planes.len() as u32;
+        words[22] = 4 * surface.planes.len() as u32;
+        words[23] = if matches!(colour.view.data, ColourData::Rgb8(_)) { 1 } else { 2 };
     }
-    words[20..23].copy_from_slice(&[frame.truncation, frame.per_metre, frame.colour_reach].map(f32::to_bits));
+    words[20..22].copy_from_slice(&[frame.truncation, frame.colour_reach].map(f32::to_bits));
     words[24..27].copy_from_slice(&[mode as u32, first as u32, count as u32]);
     words
 }

@@ -9,10 +9,11 @@ struct Frame {
     colour_scale: vec2<f32>,
     colour_shift: vec2<f32>,
     truncation: f32,
-    per_metre: f32,
     colour_reach: f32,
     // Words of the frame before its colours; 0 without colours.
     colour_start: u32,
+    // Of a channel.
+    colour_bytes: u32,
     // One of the modes below.
     mode: u32,
     // The blocks of this pass among all.
@@ -41,7 +42,7 @@ const OBSERVED: u32 = 0x20000u;
 @group(0) @binding(0) var<uniform> frame: Frame;
 // Projection of the block's first voxel, and its slot.
 @group(0) @binding(1) var<storage, read> blocks: array<vec4<u32>>;
-// Inverse depths, then planes of four words, then colours of three bytes.
+// Planes of four words, then colours.
 @group(0) @binding(2) var<storage, read> pixels: array<u32>;
 @group(0) @binding(3) var<storage, read_write> tallies: array<u32>;
 @group(0) @binding(4) var<storage, read_write> pool: array<u32>;
@@ -56,31 +57,31 @@ struct Voxel {
     mark: u32,
 }
 
-fn number(at: u32) -> f32 {
-    return bitcast<f32>(pixels[at]);
+// A colour channel in six bits.
+fn channel(at: u32) -> u32 {
+    if frame.colour_bytes == 1u {
+        let word = pixels[frame.colour_start + at / 4u];
+        return (((word >> (8u * (at % 4u))) & 255u) * 63u + 127u) / 255u;
+    }
+    let word = pixels[frame.colour_start + at / 2u];
+    return (((word >> (16u * (at % 2u))) & 65535u) * 63u + 32767u) / 65535u;
 }
 
-// The six-bit sums of the colour at a depth pixel, and a count of one; zero outside the colour image.
+// The colour of the pixel nearest to a projection and a count of one; zero outside the colour image.
 fn colour_at(u: f32, v: f32) -> vec4<u32> {
-    let cu = plus(plus(times(u, frame.colour_scale.x), frame.colour_shift.x), 0.5);
-    let cv = plus(plus(times(v, frame.colour_scale.y), frame.colour_shift.y), 0.5);
-    let inside = cu >= 0.0 && cv >= 0.0 && cu < f32(frame.colour_size.x) && cv < f32(frame.colour_size.y);
+    let i = nearest(plus(times(u, frame.colour_scale.x), frame.colour_shift.x));
+    let j = nearest(plus(times(v, frame.colour_scale.y), frame.colour_shift.y));
+    let inside = i >= 0.0 && j >= 0.0 && i < f32(frame.colour_size.x) && j < f32(frame.colour_size.y);
     if !inside {
         return vec4(0u);
     }
-    let start = 3u * (u32(cv) * frame.colour_size.x + u32(cu));
-    var rgb: array<u32, 3>;
-    for (var k = 0u; k < 3u; k++) {
-        let byte = start + k;
-        let word = pixels[frame.colour_start + byte / 4u];
-        rgb[k] = (((word >> (8u * (byte % 4u))) & 255u) * 63u + 127u) / 255u;
-    }
-    return vec4(rgb[0], rgb[1], rgb[2], 1u);
+    let start = 3u * (u32(j) * frame.colour_size.x + u32(i));
+    return vec4(channel(start), channel(start + 1u), channel(start + 2u), 1u);
 }
 
 fn observe(old: Voxel, distance: f32, weight: u32) -> Voxel {
     var voxel = old;
-    let q = i32(nearest(clamp(times(distance, frame.per_metre), f32(-ONE), f32(ONE))));
+    let q = i32(nearest(clamp(distance, f32(-ONE), f32(ONE))));
     let change = q * i32(weight);
     if frame.mode == MINUS {
         voxel.distance -= change;
@@ -139,21 +140,20 @@ fn update(old: Voxel, projected: vec3<f32>) -> Voxel {
     if !inside {
         return old;
     }
-    let pixel = u32(pixel_v) * frame.size.x + u32(pixel_u);
-    let omega = number(pixel);
-    // |D - z| <= μ with D = 1/ω; an ω of 0 fails.
-    if !(abs(minus(1.0, times(depth, omega))) <= times(frame.truncation, omega)) {
+    let pixel = 4u * (u32(pixel_v) * frame.size.x + u32(pixel_u));
+    let offset = bitcast<f32>(pixels[pixel]);
+    let omega = bitcast<f32>(pixels[pixel + 1u]);
+    let own = times(depth, omega);
+    if !(omega > 0.0 && abs(minus(offset, own)) <= times(frame.truncation, omega)) {
         return old;
     }
-    let plane = frame.size.x * frame.size.y + 4u * pixel;
-    let along_u = times(number(plane), minus(u, pixel_u));
-    let along_v = times(number(plane + 1u), minus(v, pixel_v));
-    let at_voxel = plus(plus(omega, along_u), along_v);
-    let distance = times(number(plane + 2u), minus(1.0, times(depth, at_voxel)));
-    var voxel = observe(old, distance, u32(number(plane + 3u)));
+    let along_u = times(bitcast<f32>(pixels[pixel + 2u]), minus(u, pixel_u));
+    let along_v = times(bitcast<f32>(pixels[pixel + 3u]), minus(v, pixel_v));
+    let distance = minus(offset, times(depth, plus(omega, plus(along_u, along_v))));
+    var voxel = observe(old, distance, pixels[pixel + 3u] & 15u);
     voxel.mark += 1u;
     if frame.colour_start > 0u && abs(distance) < frame.colour_reach {
-        let change = colour_at(pixel_u, pixel_v);
+        let change = colour_at(u, v);
         if change.w > 0u {
             voxel = observe_colour(voxel, change);
         }

@@ -2,7 +2,7 @@
 //! `PAINTCOPTER_REQUIRE_GPU=1` demands one.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use tsdf_hash::{ColourView, Error, GpuMap, GpuOptions, Map, Settings};
+use tsdf_hash::{ColourData, ColourView, Error, GpuMap, GpuOptions, Map, Settings};
 
 use crate::scene::{Shot, look_at, room};
 
@@ -37,10 +37,11 @@ impl Frame {
     }
 
     fn colour(&self) -> ColourView<'_> {
+        let data = ColourData::Rgb8(&self.rgb8);
         let (mut intrinsics, s) = (self.shot.intrinsics, 0.5);
         (intrinsics.fx, intrinsics.fy) = (s * intrinsics.fx, s * intrinsics.fy);
         (intrinsics.cx, intrinsics.cy) = (s * intrinsics.cx - 0.25, s * intrinsics.cy - 0.25);
-        ColourView { width: self.shot.width / 2, height: self.shot.height / 2, rgb8: &self.rgb8, intrinsics }
+        ColourView { width: self.shot.width / 2, height: self.shot.height / 2, data, intrinsics }
     }
 }
 
@@ -108,7 +109,7 @@ fn refused_frames_leave_no_trace() {
     let Some(mut gpu) = open(settings, &options()) else { return };
     let mut map = Map::new(settings).unwrap();
     let rgb8 = vec![255; 3 * 3072];
-    let colour = ColourView { width: 64, height: 48, rgb8: &rgb8, intrinsics: shot.intrinsics };
+    let colour = ColourView { width: 64, height: 48, data: ColourData::Rgb8(&rgb8), intrinsics: shot.intrinsics };
     // 1040 coloured frames fill a voxel.
     for _ in 0..1040 {
         gpu.integrate(&view, Some(&colour), &pose).unwrap();
@@ -125,7 +126,7 @@ fn refused_frames_leave_no_trace() {
     assert!(matches!(gpu.deintegrate(&view, None, &moved), Err(Error::NotIntegrated { .. })));
     assert_eq!(gpu.hash().unwrap(), full);
     let near = Isometry3::translation(0.0, 0.02, 0.0) * pose;
-    let other = gpu.deintegrate(&view, Some(&ColourView { rgb8: &[9; 3 * 3072], ..colour }), &near);
+    let other = gpu.deintegrate(&view, Some(&ColourView { data: ColourData::Rgb16(&[999; 3 * 3072]), ..colour }), &near);
     assert!(matches!(other, Err(Error::NotIntegrated { .. })));
     assert_eq!(gpu.hash().unwrap(), full);
     for _ in 0..1040 {
