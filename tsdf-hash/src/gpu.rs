@@ -4,22 +4,27 @@
 //! touches and updates them. Every operation of the update is done as IEEE 754 says, whatever the device's compiler would
 //! like to do (`exact.wgsl`), and a device is asked whether it does before it is used (`probe.rs`).
 
+mod cast;
 mod device;
 mod fuse;
 mod pool;
 mod probe;
+mod scratch;
 mod stream;
 
 use nalgebra::Isometry3;
 
+use crate::cast::camera::Camera;
 use crate::fuse::{Frame, Sign};
 use crate::key::{Key, mix};
 use crate::surface::Surface;
-use crate::view::{ColourView, DepthView, check_pose};
-use crate::{Error, FrameReport, Settings};
+use crate::view::{ColourView, DepthView, Intrinsics, check_pose, check_sides};
+use crate::{CastSettings, Error, FrameReport, Settings, View};
+use cast::Caster;
 use device::Device;
 use fuse::{Fuser, Mode, Pass, Tally, fresh};
 use pool::Pool;
+use scratch::{Scratch, spread};
 use stream::Stream;
 
 /// Which adapter to use, and how.
@@ -49,6 +54,7 @@ pub struct GpuMap {
     device: Device,
     pool: Pool,
     fuser: Fuser,
+    caster: Caster,
     stream: Stream,
     surface: Surface,
 }
@@ -64,8 +70,8 @@ impl GpuMap {
         let device = Device::open(options)?;
         probe::check(&device)?;
         let pool = Pool::new(&device, settings.max_bytes)?;
-        let (fuser, stream) = (Fuser::new(&device)?, Stream::new(&device)?);
-        Ok(Self { settings, device, pool, fuser, stream, surface: Surface::default() })
+        let (fuser, caster, stream) = (Fuser::new(&device)?, Caster::new(&device)?, Stream::new(&device)?);
+        Ok(Self { settings, device, pool, fuser, caster, stream, surface: Surface::default() })
     }
 
     /// The settings given to [`new`](Self::new).
@@ -156,6 +162,29 @@ impl GpuMap {
             blocks_added: needed.len(),
             blocks_removed: emptied.len(),
         })
+    }
+
+    /// As [`Map::ray_cast`](crate::Map::ray_cast); its `threads` do not matter here.
+    ///
+    /// # Errors
+    /// The same, and [`Error::Device`].
+    pub fn ray_cast(
+        &mut self,
+        intrinsics: &Intrinsics,
+        width: usize,
+        height: usize,
+        world_from_camera: &Isometry3<f64>,
+        settings: &CastSettings,
+    ) -> Result<View, Error> {
+        settings.check()?;
+        check_sides("view", width, height)?;
+        intrinsics.check("view")?;
+        check_pose(world_from_camera)?;
+        let camera = Camera::new(intrinsics, (width, height), world_from_camera, &self.settings, settings)?;
+        let mut view = View::new();
+        view.resize(intrinsics, (width, height), world_from_camera);
+        self.caster.fill(&self.device, &self.pool, &camera, settings.colour, &mut view)?;
+        Ok(view)
     }
 
     /// Bytes of the blocks' pages on the device and of their index on the processor: what [`Settings::max_bytes`] caps.

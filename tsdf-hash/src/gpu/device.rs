@@ -136,6 +136,21 @@ impl Device {
         self.device.create_bind_group(&descriptor)
     }
 
+    /// Records a run of a program that sees its uniform from `window` on.
+    pub(crate) fn dispatch(
+        &self,
+        commands: &mut wgpu::CommandEncoder,
+        program: &Program,
+        group: &wgpu::BindGroup,
+        window: usize,
+        groups: [u32; 2],
+    ) {
+        let mut pass = commands.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        pass.set_pipeline(&program.pipeline);
+        pass.set_bind_group(0, group, &[window as u32]);
+        pass.dispatch_workgroups(groups[0], groups[1], 1);
+    }
+
     /// Hands words over; they arrive before the next submission runs.
     pub(crate) fn write(&self, buffer: &Buffer, offset: usize, words: impl ExactSizeIterator<Item = u32>) -> Result<(), Error> {
         let Some(bytes) = wgpu::BufferSize::new(4 * words.len() as u64) else { return Ok(()) };

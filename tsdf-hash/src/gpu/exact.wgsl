@@ -65,6 +65,15 @@ fn quotient(a: f32, b: f32) -> f32 {
     return bitcast<f32>((((wa >> 23u) - (wb >> 23u) + 126u - less) << 23u) + q);
 }
 
+// a / b for any finite a that is zero or normal, likewise any b but zero.
+fn divide(a: f32, b: f32) -> f32 {
+    if a == 0.0 {
+        return 0.0;
+    }
+    let sign = (bitcast<u32>(a) ^ bitcast<u32>(b)) & 0x80000000u;
+    return bitcast<f32>(bitcast<u32>(quotient(abs(a), abs(b))) | sign);
+}
+
 // The root of a positive normal number, likewise: floor(sqrt(2^s m)) with the exponent that is left over even.
 fn root(x: f32) -> f32 {
     let word = bitcast<u32>(x);

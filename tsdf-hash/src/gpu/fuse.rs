@@ -4,6 +4,7 @@ use wgpu::{Buffer, BufferUsages};
 
 use super::device::{Device, Program};
 use super::pool::Pool;
+use super::{Scratch, spread};
 use crate::Error;
 use crate::fuse::Frame;
 use crate::key::Key;
@@ -16,8 +17,6 @@ const FRAME_BYTES: usize = 112;
 const WINDOW: usize = 256;
 /// Passes that one submission can hold: one that counts and one for each page.
 const MOST_PASSES: usize = 5;
-/// Workgroups along one side of a dispatch.
-const MOST_GROUPS: usize = 65535;
 /// Marks a slot that holds something else yet.
 const FRESH: u32 = 1 << 31;
 
@@ -55,10 +54,10 @@ impl Tally {
 pub(super) struct Fuser {
     program: Program,
     uniform: Buffer,
-    pixels: Buffer,
-    blocks: Buffer,
-    tallies: Buffer,
-    staging: Buffer,
+    pixels: Scratch,
+    blocks: Scratch,
+    tallies: Scratch,
+    staging: Scratch,
 }
 
 /// Blocks of one page, or of none.
@@ -75,10 +74,10 @@ impl Fuser {
         Ok(Self {
             program: device.program("fuse", SOURCE, &[false, false, true, true])?,
             uniform: device.buffer("frame", MOST_PASSES * WINDOW, BufferUsages::UNIFORM | BufferUsages::COPY_DST)?,
-            pixels: device.buffer("pixels", 16, storage)?,
-            blocks: device.buffer("block list", 16, storage)?,
-            tallies: device.buffer("tallies", 16, storage | BufferUsages::COPY_SRC)?,
-            staging: device.buffer("tallies on their way", 16, BufferUsages::MAP_READ | BufferUsages::COPY_DST)?,
+            pixels: Scratch::new("pixels", storage),
+            blocks: Scratch::new("block list", storage),
+            tallies: Scratch::new("tallies", storage | BufferUsages::COPY_SRC),
+            staging: Scratch::new("tallies on their way", BufferUsages::MAP_READ | BufferUsages::COPY_DST),
         })
     }
 
@@ -90,23 +89,23 @@ impl Fuser {
             ColourData::Rgb8(data) => data.len().div_ceil(4),
             ColourData::Rgb16(data) => data.len().div_ceil(2),
         };
-        grow(device, &mut self.pixels, 16 * planes.len() + 4 * words)?;
+        let pixels = self.pixels.of(device, 16 * planes.len() + 4 * words)?;
         // A pixel that is not fused may hold NaN, which a program may take for anything.
         let fused = |plane: &Plane| if plane.scaled_omega > 0.0 { *plane } else { Plane::NONE };
         let plane_words = |plane: &Plane| {
             let Plane { offset, scaled_omega, scaled_slope } = fused(plane);
             [offset, scaled_omega, scaled_slope[0], scaled_slope[1]].map(f32::to_bits)
         };
-        device.write_groups(&self.pixels, 0, planes.iter().map(plane_words))?;
+        device.write_groups(pixels, 0, planes.iter().map(plane_words))?;
         let start = 16 * planes.len();
         match colours {
             ColourData::Rgb8(data) => {
                 let word = |bytes: &[u8]| bytes.iter().rev().fold(0, |word, &byte| word << 8 | u32::from(byte));
-                device.write(&self.pixels, start, data.chunks(4).map(word))
+                device.write(pixels, start, data.chunks(4).map(word))
             }
             ColourData::Rgb16(data) => {
                 let word = |pair: &[u16]| pair.iter().rev().fold(0, |word, &value| word << 16 | u32::from(value));
-                device.write(&self.pixels, start, data.chunks(2).map(word))
+                device.write(pixels, start, data.chunks(2).map(word))
             }
         }
     }
@@ -120,33 +119,30 @@ impl Fuser {
         passes: &[Pass],
     ) -> Result<Vec<Tally>, Error> {
         let total = passes.iter().map(|pass| pass.blocks.len()).sum::<usize>();
-        grow(device, &mut self.blocks, 16 * total)?;
-        grow(device, &mut self.tallies, 4 * total)?;
-        grow(device, &mut self.staging, 4 * total)?;
+        let blocks = self.blocks.of(device, 16 * total)?;
+        let tallies = self.tallies.of(device, 4 * total)?;
+        let staging = self.staging.of(device, 4 * total)?;
+        let pixels = self.pixels.of(device, 0)?;
         let mut commands = device.commands();
         let mut first = 0;
         for (k, pass) in passes.iter().enumerate() {
             if pass.blocks.is_empty() {
                 continue;
             }
-            device.write_groups(&self.blocks, 16 * first, pass.blocks.iter().map(|&(key, slot)| {
+            device.write_groups(blocks, 16 * first, pass.blocks.iter().map(|&(key, slot)| {
                 let start = frame.start(key);
                 [start.x.to_bits(), start.y.to_bits(), start.z.to_bits(), slot]
             }))?;
             let words = uniform(frame, pass.mode, first, pass.blocks.len());
             device.write(&self.uniform, k * WINDOW, words.into_iter())?;
-            let storage = [&self.blocks, &self.pixels, &self.tallies, &pool.pages[pass.page]];
+            let storage = [blocks, pixels, tallies, &pool.pages[pass.page]];
             let group = device.bind(&self.program, FRAME_BYTES, &self.uniform, &storage);
-            let mut compute = commands.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            compute.set_pipeline(&self.program.pipeline);
-            compute.set_bind_group(0, &group, &[(k * WINDOW) as u32]);
-            let across = pass.blocks.len().min(MOST_GROUPS);
-            compute.dispatch_workgroups(across as u32, pass.blocks.len().div_ceil(across) as u32, 1);
+            device.dispatch(&mut commands, &self.program, &group, k * WINDOW, spread(pass.blocks.len()));
             first += pass.blocks.len();
         }
         let bytes = 4 * total;
-        commands.copy_buffer_to_buffer(&self.tallies, 0, &self.staging, 0, bytes as u64);
-        device.run_and_read(commands, &self.staging, bytes, |words| {
+        commands.copy_buffer_to_buffer(tallies, 0, staging, 0, bytes as u64);
+        device.run_and_read(commands, staging, bytes, |words| {
             words.iter().map(|&word| Tally(u32::from_ne_bytes(word))).collect()
         })
     }
@@ -178,15 +174,4 @@ fn uniform(frame: &Frame, mode: Mode, first: usize, count: usize) -> [u32; FRAME
     words[20..22].copy_from_slice(&[frame.truncation, frame.colour_reach].map(f32::to_bits));
     words[24..27].copy_from_slice(&[mode as u32, first as u32, count as u32]);
     words
-}
-
-/// Replaces a buffer by a larger one where it is too small; what it held is lost.
-fn grow(device: &Device, buffer: &mut Buffer, bytes: usize) -> Result<(), Error> {
-    if bytes as u64 > buffer.size() {
-        let usage = buffer.usage();
-        let larger = bytes.next_power_of_two();
-        let limit = if usage.contains(BufferUsages::STORAGE) { device.binding_bytes.max(bytes) } else { larger };
-        *buffer = device.buffer("frame", larger.min(limit), usage)?;
-    }
-    Ok(())
 }

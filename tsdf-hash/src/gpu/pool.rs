@@ -10,7 +10,7 @@ use crate::table::Table;
 
 pub(super) const BLOCK_BYTES: usize = size_of::<Block>();
 /// More pages would not fit one program beside its other buffers.
-const MOST_PAGES: usize = 4;
+pub(super) const MOST_PAGES: usize = 4;
 /// Storage buffers of a program beside the pages.
 pub(super) const OTHER_BINDINGS: usize = 2;
 /// The mesh names vertices by 32 bits, 1536 at most in a block.
@@ -127,9 +127,14 @@ impl Pool {
         }
     }
 
+    /// All keys, in the order of their slots.
+    pub(super) fn keys(&self) -> impl Iterator<Item = Key> {
+        self.keys.iter().copied().filter(|&key| key != VACANT)
+    }
+
     /// All keys, ascending.
     pub(super) fn sorted_keys(&self) -> Vec<Key> {
-        let mut keys: Vec<Key> = self.keys.iter().copied().filter(|&key| key != VACANT).collect();
+        let mut keys: Vec<Key> = self.keys().collect();
         keys.sort_unstable();
         keys
     }

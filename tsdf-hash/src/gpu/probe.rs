@@ -49,7 +49,7 @@ fn processor([a, b]: [f32; 2]) -> [f32; RESULTS] {
     let scaled = a * 7.0;
     let integers = [a.to_bits().cast_signed(), b.to_bits().cast_signed().wrapping_neg()].map(|i| i as f32);
     let sum = (a * b + b) - b * b;
-    [sum, scaled - ((scaled + ROUNDER) - ROUNDER), a / b, a.sqrt(), integers[0], integers[1], 1.0 / b, b.sqrt()]
+    [sum, scaled - ((scaled + ROUNDER) - ROUNDER), a / b, a.sqrt(), integers[0], integers[1], -1.0 / b, b.sqrt()]
 }
 
 /// The words that the device computes for each pair.
@@ -91,7 +91,7 @@ mod tests {
             let mut pairs: Vec<_> = (0..1 << 17).map(|n| pair(n + 1_000_000 * (batch + 1))).collect();
             pairs[0] = [4.0, 16.0];
             let found = ask(&device, &pairs).unwrap();
-            assert_eq!([2, 3, 6, 7].map(|k| f32::from_bits(found[0][k])), [0.25, 2.0, 0.0625, 4.0]);
+            assert_eq!([2, 3, 6, 7].map(|k| f32::from_bits(found[0][k])), [0.25, 2.0, -0.0625, 4.0]);
             for (pair, found) in pairs.iter().zip(found) {
                 assert_eq!(found.map(f32::from_bits), processor(*pair), "{pair:?}");
             }

@@ -15,5 +15,5 @@ fn probe(@builtin(global_invocation_id) id: vec3<u32>) {
     let sum = minus(plus(times(a, b), b), times(b, b));
     let rounded = minus(times(a, 7.0), nearest(times(a, 7.0)));
     results[2u * id.x] = vec4(sum, rounded, quotient(a, b), root(a));
-    results[2u * id.x + 1u] = vec4(from_integer(bitcast<i32>(a)), from_integer(-bitcast<i32>(b)), quotient(1.0, b), root(b));
+    results[2u * id.x + 1u] = vec4(from_integer(bitcast<i32>(a)), from_integer(-bitcast<i32>(b)), divide(-1.0, b), root(b));
 }

@@ -2,7 +2,7 @@
 //! `PAINTCOPTER_REQUIRE_GPU=1` demands one.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use tsdf_hash::{ColourData, ColourView, Error, GpuMap, GpuOptions, Map, Settings};
+use tsdf_hash::{CastSettings, ColourData, ColourView, Error, GpuMap, GpuOptions, Map, Settings};
 
 use crate::scene::{Shot, look_at, room};
 
@@ -94,6 +94,42 @@ fn a_full_image_agrees() {
     assert!(report.blocks > 1000);
     assert_eq!(gpu.integrate(&view, Some(&frame.colour()), &pose).unwrap(), report);
     assert_eq!(gpu.hash().unwrap(), map.hash());
+}
+
+#[test]
+fn the_same_rays_hit_the_same_surface() {
+    let paged = GpuOptions { max_buffer_bytes: 8 << 20, ..options() };
+    let settings = Settings { voxel_size: 0.02, max_bytes: 31 << 20, ..Settings::default() };
+    let Some(mut gpu) = open(settings, &paged) else { return };
+    let mut map = Map::new(settings).unwrap();
+    let frames = Frame::tour(8, 4);
+    let look = |gpu: &mut GpuMap, map: &Map, pose: &Isometry3<f64>, colour| {
+        let cast = CastSettings { colour, ..CastSettings::default() };
+        let k = frames[0].shot.intrinsics;
+        let (expected, found) =
+            (map.ray_cast(&k, 161, 117, pose, &cast).unwrap(), gpu.ray_cast(&k, 161, 117, pose, &cast).unwrap());
+        assert_eq!((found.width, found.height, found.world_from_camera), (161, 117, *pose));
+        assert_eq!(found.depth, expected.depth);
+        assert_eq!(found.normals, expected.normals);
+        assert_eq!(found.colours, expected.colours);
+        assert_eq!(found.weights, expected.weights);
+        expected.hits()
+    };
+    assert_eq!(look(&mut gpu, &map, &Isometry3::identity(), true), 0);
+    for frame in &frames {
+        let (view, pose) = (frame.shot.view(), frame.shot.world_from_camera);
+        // Half of the images without colours.
+        let colour = Some(frame.colour()).filter(|_| pose.translation.x > 3.5);
+        map.integrate(&view, colour.as_ref(), &pose).unwrap();
+        gpu.integrate(&view, colour.as_ref(), &pose).unwrap();
+    }
+    assert_eq!(gpu.hash().unwrap(), map.hash());
+    for (k, frame) in frames.iter().enumerate() {
+        // From where the image was taken, and from elsewhere.
+        let aside = Isometry3::new(Vector3::new(0.1, -0.2, 0.15), Vector3::new(0.3, 0.2, -0.1));
+        assert!(look(&mut gpu, &map, &frame.shot.world_from_camera, k % 2 == 0) > 15_000);
+        assert!(look(&mut gpu, &map, &(frame.shot.world_from_camera * aside), k % 2 == 1) > 5_000);
+    }
 }
 
 fn wall() -> Shot {
