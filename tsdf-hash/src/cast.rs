@@ -124,7 +124,12 @@ impl View {
         self.depth.iter().filter(|z| **z > 0.0).count()
     }
 
-    pub(crate) fn resize(&mut self, camera: &Intrinsics, (width, height): (usize, usize), world_from_camera: &Isometry3<f64>) {
+    pub(crate) fn resize(
+        &mut self,
+        camera: &Intrinsics,
+        (width, height): (usize, usize),
+        world_from_camera: &Isometry3<f64>,
+    ) {
         (self.width, self.height) = (width, height);
         self.intrinsics = Some(*camera);
         self.world_from_camera = *world_from_camera;
@@ -184,7 +189,13 @@ impl Map {
         let mut bands: Vec<Band> = (view.depth.chunks_mut(chunk).zip(view.normals.chunks_mut(chunk)))
             .zip(view.colours.chunks_mut(chunk).zip(view.weights.chunks_mut(chunk)))
             .enumerate()
-            .map(|(k, ((depth, normals), (colours, weights)))| Band { first: k * rows, depth, normals, colours, weights })
+            .map(|(k, ((depth, normals), (colours, weights)))| Band {
+                first: k * rows,
+                depth,
+                normals,
+                colours,
+                weights,
+            })
             .collect();
         in_chunks(&mut bands, settings.threads, |bands| {
             for band in bands {

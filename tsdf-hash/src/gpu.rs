@@ -1,4 +1,4 @@
-//! The map on a GPU: the same bytes as [`Map`](crate::Map) makes on the processor.
+//! The map on a GPU: the same bytes as [`Map`] makes on the processor.
 //!
 //! The processor reads the depth image and finds the blocks near it; the device holds the blocks, counts what a frame
 //! touches and updates them. Every operation of the update is done as IEEE 754 says, whatever the device's compiler would
@@ -19,7 +19,7 @@ use crate::fuse::{Frame, Sign};
 use crate::key::{Key, mix};
 use crate::surface::Surface;
 use crate::view::{ColourView, DepthView, Intrinsics, check_pose, check_sides};
-use crate::{CastSettings, Error, FrameReport, Settings, View};
+use crate::{CastSettings, Error, FrameReport, Map, Settings, View};
 use cast::Caster;
 use device::Device;
 use fuse::{Fuser, Mode, Pass, Tally, fresh};
@@ -32,7 +32,7 @@ use stream::Stream;
 pub struct GpuOptions {
     /// Part of the adapter's name; empty for the best one (discrete before integrated).
     pub adapter: String,
-    /// Whether an adapter may be a program on the processor, such as Mesa's lavapipe: slower than [`Map`](crate::Map), and
+    /// Whether an adapter may be a program on the processor, such as Mesa's lavapipe: slower than [`Map`], and
     /// meant for tests.
     pub software: bool,
     /// The largest single buffer, bytes; the adapter's own limit holds in any case (ours: none).
@@ -45,7 +45,7 @@ impl Default for GpuOptions {
     }
 }
 
-/// A map whose blocks lie on a GPU. It equals, to the bit, a [`Map`](crate::Map) that was given the same frames.
+/// A map whose blocks lie on a GPU. It equals, to the bit, a [`Map`] that was given the same frames.
 ///
 /// [`Settings::max_bytes`] caps the blocks on the device and their index on the processor; buffers for one frame (20 bytes
 /// per pixel, the colour image) and for blocks on their way (3.5 MiB) come on top.
@@ -84,7 +84,39 @@ impl GpuMap {
         &self.device.name
     }
 
-    /// As [`Map::integrate`](crate::Map::integrate).
+    /// A map that goes on from `map`, with its settings.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), and [`Error::OutOfBudget`].
+    pub fn from_map(map: &Map, options: &GpuOptions) -> Result<Self, Error> {
+        let mut gpu = Self::new(*map.settings(), options)?;
+        let store = map.store();
+        let keys = store.sorted_keys();
+        if keys.len() > gpu.pool.room() {
+            return Err(gpu.pool.out_of_budget());
+        }
+        let blocks = keys.iter().filter_map(|&key| Some((key, store.get(key)?)));
+        stream::upload(&gpu.device, &mut gpu.pool, keys.len(), blocks)?;
+        Ok(gpu)
+    }
+
+    /// A copy on the processor under a cap of `max_bytes`, to mesh, to query or to store.
+    ///
+    /// # Errors
+    /// [`Error::InvalidSetting`], [`Error::OutOfBudget`], [`Error::Device`].
+    pub fn to_map(&self, max_bytes: usize) -> Result<Map, Error> {
+        let mut map = Map::new(Settings { max_bytes, ..self.settings })?;
+        let keys = self.pool.sorted_keys();
+        if keys.len() > map.store().room() {
+            return Err(map.store().out_of_budget());
+        }
+        self.stream.download(&self.device, &self.pool, &keys, |key, block| {
+            map.store_mut().add(vec![(key, Box::new(block.clone()))]);
+        })?;
+        Ok(map)
+    }
+
+    /// As [`Map::integrate`].
     ///
     /// # Errors
     /// The same, and [`Error::Device`]: the map is then as it was, unless the device is lost, which every later call
@@ -98,7 +130,7 @@ impl GpuMap {
         self.apply(Sign::Plus, depth, colour, world_from_camera)
     }
 
-    /// As [`Map::deintegrate`](crate::Map::deintegrate).
+    /// As [`Map::deintegrate`].
     ///
     /// # Errors
     /// As [`integrate`](Self::integrate), and [`Error::NotIntegrated`].
@@ -131,25 +163,20 @@ impl GpuMap {
         let (absent, present) = (split.count(), split.update(mode(sign)));
         let passes: Vec<Pass> = std::iter::once(absent).chain(present).collect();
         let tallies = self.fuser.run(&self.device, &self.pool, &frame, &passes)?;
-        let needed: Vec<(Key, Tally)> =
-            split.absent.iter().zip(&tallies).map(|(work, tally)| (work.0, *tally)).filter(|w| w.1.voxels() > 0).collect();
-        let changed: Vec<(Key, Tally)> = split
-            .present
-            .iter()
-            .flatten()
-            .zip(&tallies[split.absent.len()..])
-            .map(|(work, tally)| (work.0, *tally))
-            .filter(|work| work.1.voxels() > 0)
-            .collect();
+        let (counted, updated) = tallies.split_at(split.absent.len());
+        let needed = touched(split.absent.iter(), counted);
+        let changed = touched(split.present.iter().flatten(), updated);
         if let Err(refusal) = admit(&mut self.pool, &self.device, sign, &needed, &changed) {
             // Wrapping sums form a group: the opposite update restores every bit.
             let passes: Vec<Pass> = split.update(mode(sign.opposite())).collect();
-            self.fuser.run(&self.device, &self.pool, &frame, &passes)?;
+            let undone = self.fuser.submit(&self.device, &self.pool, &frame, &passes);
+            undone.map_err(|error| self.device.lose(error))?;
             return Err(refusal);
         }
         let added = Split::added(&mut self.pool, &needed);
         let passes: Vec<Pass> = added.update(Mode::Plus).collect();
-        self.fuser.run(&self.device, &self.pool, &frame, &passes)?;
+        let done = self.fuser.submit(&self.device, &self.pool, &frame, &passes);
+        done.map_err(|error| self.device.lose(error))?;
         let emptied: Vec<Key> = changed.iter().filter(|work| !work.1.observed()).map(|work| work.0).collect();
         for &key in &emptied {
             self.pool.remove(key);
@@ -164,7 +191,7 @@ impl GpuMap {
         })
     }
 
-    /// As [`Map::ray_cast`](crate::Map::ray_cast); its `threads` do not matter here.
+    /// As [`Map::ray_cast`]; its `threads` do not matter here.
     ///
     /// # Errors
     /// The same, and [`Error::Device`].
@@ -197,7 +224,7 @@ impl GpuMap {
         self.pool.len()
     }
 
-    /// As [`Map::hash`](crate::Map::hash), of blocks that come back for it in batches.
+    /// As [`Map::hash`], of blocks that come back for it in batches.
     ///
     /// # Errors
     /// [`Error::Device`].
@@ -212,6 +239,11 @@ impl GpuMap {
 
 fn mode(sign: Sign) -> Mode {
     if sign == Sign::Plus { Mode::Plus } else { Mode::Minus }
+}
+
+/// The blocks that a frame has touched, or would.
+fn touched<'a>(blocks: impl Iterator<Item = &'a (Key, u32)>, tallies: &[Tally]) -> Vec<(Key, Tally)> {
+    blocks.zip(tallies).map(|((key, _), tally)| (*key, *tally)).filter(|(_, tally)| tally.voxels() > 0).collect()
 }
 
 /// Whether a frame may stay that needs some new blocks and has changed others; if so, there is memory for the new ones.

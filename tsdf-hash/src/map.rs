@@ -184,6 +184,11 @@ impl Map {
     pub(crate) fn store(&self) -> &Store {
         &self.store
     }
+
+    #[cfg(feature = "gpu")]
+    pub(crate) fn store_mut(&mut self) -> &mut Store {
+        &mut self.store
+    }
 }
 
 type Work = (Key, Box<Block>, Tally);

@@ -208,7 +208,9 @@ fn page_word(pages: usize) -> String {
         source += &format!("@group(0) @binding({binding}) var<storage, read> page_{page}: array<u32>;\n");
         cases += &format!("        case {page}u: {{ return page_{page}[at]; }}\n");
     }
-    source + "fn page_word(page: u32, at: u32) -> u32 {\n    switch page {\n" + &cases
+    source
+        + "fn page_word(page: u32, at: u32) -> u32 {\n    switch page {\n"
+        + &cases
         + "        default: { return 0u; }\n    }\n}\n"
 }
 

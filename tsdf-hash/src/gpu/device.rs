@@ -107,8 +107,10 @@ impl Device {
             })
             .collect();
         let label = Some(entry);
-        let layout = self.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries: &entries });
-        let descriptor = wgpu::PipelineLayoutDescriptor { label, bind_group_layouts: &[Some(&layout)], immediate_size: 0 };
+        let layout =
+            self.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries: &entries });
+        let descriptor =
+            wgpu::PipelineLayoutDescriptor { label, bind_group_layouts: &[Some(&layout)], immediate_size: 0 };
         let pipeline_layout = self.device.create_pipeline_layout(&descriptor);
         let source = wgpu::ShaderSource::Wgsl(source.into());
         let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor { label, source });
@@ -124,7 +126,13 @@ impl Device {
     }
 
     /// Binds a uniform, seen through windows of `window` bytes, and storage buffers to a program.
-    pub(crate) fn bind(&self, program: &Program, window: usize, uniform: &Buffer, storage: &[&Buffer]) -> wgpu::BindGroup {
+    pub(crate) fn bind(
+        &self,
+        program: &Program,
+        window: usize,
+        uniform: &Buffer,
+        storage: &[&Buffer],
+    ) -> wgpu::BindGroup {
         let window = wgpu::BufferBinding { buffer: uniform, offset: 0, size: wgpu::BufferSize::new(window as u64) };
         let resources = storage.iter().map(|buffer| buffer.as_entire_binding());
         let entries: Vec<_> = std::iter::once(wgpu::BindingResource::Buffer(window))
@@ -152,7 +160,12 @@ impl Device {
     }
 
     /// Hands words over; they arrive before the next submission runs.
-    pub(crate) fn write(&self, buffer: &Buffer, offset: usize, words: impl ExactSizeIterator<Item = u32>) -> Result<(), Error> {
+    pub(crate) fn write(
+        &self,
+        buffer: &Buffer,
+        offset: usize,
+        words: impl ExactSizeIterator<Item = u32>,
+    ) -> Result<(), Error> {
         let Some(bytes) = wgpu::BufferSize::new(4 * words.len() as u64) else { return Ok(()) };
         let Some(mut view) = self.queue.write_buffer_with(buffer, offset as u64, bytes) else { return self.refused() };
         view.slice(..).into_chunks::<4>().0.write_iter(words.map(u32::to_ne_bytes));
@@ -193,10 +206,13 @@ impl Device {
         read: impl FnOnce(&[[u8; 4]]) -> R,
     ) -> Result<R, Error> {
         self.queue.submit([commands.finish()]);
-        self.wait_and_read(staging, bytes, read).inspect_err(|error| {
-            // What ran and what did not is unknown: nothing on the device can be trusted any more.
-            self.lost.get_or_init(|| error.to_string());
-        })
+        self.wait_and_read(staging, bytes, read).map_err(|error| self.lose(error))
+    }
+
+    /// Gives the device up: what ran and what did not is unknown, so nothing on it can be trusted any more.
+    pub(crate) fn lose(&self, error: Error) -> Error {
+        self.lost.get_or_init(|| format!("the map on it is lost since: {error}"));
+        error
     }
 
     fn wait_and_read<R>(&self, staging: &Buffer, bytes: usize, read: impl FnOnce(&[[u8; 4]]) -> R) -> Result<R, Error> {

@@ -118,10 +118,35 @@ impl Fuser {
         frame: &Frame,
         passes: &[Pass],
     ) -> Result<Vec<Tally>, Error> {
-        let total = passes.iter().map(|pass| pass.blocks.len()).sum::<usize>();
+        let mut commands = self.record(device, pool, frame, passes)?;
+        let bytes = 4 * total(passes);
+        let staging = self.staging.of(device, bytes)?;
+        commands.copy_buffer_to_buffer(self.tallies.of(device, bytes)?, 0, staging, 0, bytes as u64);
+        device.run_and_read(commands, staging, bytes, |words| {
+            words.iter().map(|&word| Tally(u32::from_ne_bytes(word))).collect()
+        })
+    }
+
+    /// Hands the passes over without waiting for them.
+    pub(super) fn submit(&mut self, device: &Device, pool: &Pool, frame: &Frame, passes: &[Pass]) -> Result<(), Error> {
+        if total(passes) == 0 {
+            return Ok(());
+        }
+        let commands = self.record(device, pool, frame, passes)?;
+        device.queue.submit([commands.finish()]);
+        device.check()
+    }
+
+    fn record(
+        &mut self,
+        device: &Device,
+        pool: &Pool,
+        frame: &Frame,
+        passes: &[Pass],
+    ) -> Result<wgpu::CommandEncoder, Error> {
+        let total = total(passes);
         let blocks = self.blocks.of(device, 16 * total)?;
         let tallies = self.tallies.of(device, 4 * total)?;
-        let staging = self.staging.of(device, 4 * total)?;
         let pixels = self.pixels.of(device, 0)?;
         let mut commands = device.commands();
         let mut first = 0;
@@ -129,10 +154,14 @@ impl Fuser {
             if pass.blocks.is_empty() {
                 continue;
             }
-            device.write_groups(blocks, 16 * first, pass.blocks.iter().map(|&(key, slot)| {
-                let start = frame.start(key);
-                [start.x.to_bits(), start.y.to_bits(), start.z.to_bits(), slot]
-            }))?;
+            device.write_groups(
+                blocks,
+                16 * first,
+                pass.blocks.iter().map(|&(key, slot)| {
+                    let start = frame.start(key);
+                    [start.x.to_bits(), start.y.to_bits(), start.z.to_bits(), slot]
+                }),
+            )?;
             let words = uniform(frame, pass.mode, first, pass.blocks.len());
             device.write(&self.uniform, k * WINDOW, words.into_iter())?;
             let storage = [blocks, pixels, tallies, &pool.pages[pass.page]];
@@ -140,12 +169,12 @@ impl Fuser {
             device.dispatch(&mut commands, &self.program, &group, k * WINDOW, spread(pass.blocks.len()));
             first += pass.blocks.len();
         }
-        let bytes = 4 * total;
-        commands.copy_buffer_to_buffer(tallies, 0, staging, 0, bytes as u64);
-        device.run_and_read(commands, staging, bytes, |words| {
-            words.iter().map(|&word| Tally(u32::from_ne_bytes(word))).collect()
-        })
+        Ok(commands)
     }
+}
+
+fn total(passes: &[Pass]) -> usize {
+    passes.iter().map(|pass| pass.blocks.len()).sum()
 }
 
 /// The slot of a block that is new there.

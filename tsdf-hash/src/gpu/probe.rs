@@ -20,7 +20,8 @@ pub(super) fn check(device: &Device) -> Result<(), Error> {
         let expected = processor(*pair);
         if found != expected.map(f32::to_bits) {
             let found = found.map(f32::from_bits);
-            let what = format!("{} computes {found:?} from {pair:?}, where IEEE 754 asks for {expected:?}", device.name);
+            let what =
+                format!("{} computes {found:?} from {pair:?}, where IEEE 754 asks for {expected:?}", device.name);
             return Err(Error::Device { what });
         }
     }

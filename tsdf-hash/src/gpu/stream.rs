@@ -48,20 +48,21 @@ impl Stream {
         }
         Ok(())
     }
+}
 
-    /// Stores blocks under keys that are new; the caller has seen that there is room.
-    pub(super) fn upload<'a>(
-        device: &Device,
-        pool: &mut Pool,
-        blocks: impl ExactSizeIterator<Item = (Key, &'a Block)>,
-    ) -> Result<(), Error> {
-        pool.reserve(device, blocks.len())?;
-        for (key, block) in blocks {
-            let place = pool.insert(key);
-            device.write(&pool.pages[place.page], place.offset(), pack(block).into_iter())?;
-        }
-        Ok(())
+/// Stores `count` blocks under keys that are new; the caller has seen that there is room. The driver stages them.
+pub(super) fn upload<'a>(
+    device: &Device,
+    pool: &mut Pool,
+    count: usize,
+    blocks: impl Iterator<Item = (Key, &'a Block)>,
+) -> Result<(), Error> {
+    pool.reserve(device, count)?;
+    for (key, block) in blocks {
+        let place = pool.insert(key);
+        device.write(&pool.pages[place.page], place.offset(), pack(block).into_iter())?;
     }
+    Ok(())
 }
 
 /// The words of a block as the programs see it: distances, weights two to a word, colours.
