@@ -22,8 +22,7 @@ const CAST: &str = include_str!("cast.wgsl");
 const REQUEST_BYTES: usize = 16;
 const VIEW_BYTES: usize = 80;
 const WINDOW: usize = 256;
-/// Words of a place in the scene, and of a pixel.
-const PLACE_WORDS: usize = 10;
+/// Words of a pixel.
 const PIXEL_WORDS: usize = 6;
 /// Bytes of a block with its border, unpacked.
 const FIELD_BYTES: usize = 12 * ALL;
@@ -139,7 +138,7 @@ impl Caster {
         let pages = (0..pages).map(|page| pool.pages.get(page).unwrap_or(&pool.pages[0]));
         let storage: Vec<&Buffer> = [blocks, pass.fields].into_iter().chain(pages).collect();
         let group = device.bind(program, REQUEST_BYTES, &self.uniform, &storage);
-        device.dispatch(commands, program, &group, window, spread(keys.len()));
+        program.dispatch(commands, &group, window, spread(keys.len()));
         Ok(())
     }
 
@@ -168,7 +167,6 @@ impl Caster {
             scene.extend(place.low.map(f32::to_bits));
             scene.extend(place.high.map(f32::to_bits));
         }
-        debug_assert_eq!(scene.len(), at_places + PLACE_WORDS * places.len());
         let at_starts = scene.len();
         scene.extend(&self.tiles.starts);
         let at_lists = scene.len();
@@ -185,12 +183,13 @@ impl Caster {
         let pixels = self.pixels.of(device, 4 * PIXEL_WORDS * width * height)?;
         let group = device.bind(&self.cast, VIEW_BYTES, &self.uniform, &[buffer, fields, pixels]);
         let groups = [width.div_ceil(8) as u32, height.div_ceil(8) as u32];
-        device.dispatch(commands, &self.cast, &group, 2 * WINDOW, groups);
+        self.cast.dispatch(commands, &group, 2 * WINDOW, groups);
         Ok(())
     }
 }
 
 /// What to do with blocks.
+#[derive(Clone, Copy)]
 struct Pass<'a> {
     /// What is written.
     fields: &'a Buffer,
@@ -201,17 +200,11 @@ struct Pass<'a> {
 
 /// The function of the programs that reads a page.
 fn page_word(pages: usize) -> String {
-    let mut source = String::new();
-    let mut cases = String::new();
-    for page in 0..pages {
-        let binding = page + 3;
-        source += &format!("@group(0) @binding({binding}) var<storage, read> page_{page}: array<u32>;\n");
-        cases += &format!("        case {page}u: {{ return page_{page}[at]; }}\n");
-    }
-    source
-        + "fn page_word(page: u32, at: u32) -> u32 {\n    switch page {\n"
-        + &cases
-        + "        default: { return 0u; }\n    }\n}\n"
+    let binding = |page| format!("@group(0) @binding({}) var<storage, read> page_{page}: array<u32>;\n", page + 3);
+    let case = |page| format!("case {page}u: {{ return page_{page}[at]; }}\n");
+    let bindings: String = (0..pages).map(binding).collect();
+    let cases: String = (0..pages).map(case).collect();
+    bindings + "fn page_word(page: u32, at: u32) -> u32 {\nswitch page {\n" + &cases + "default: { return 0u; }\n}\n}\n"
 }
 
 fn read_pixels(words: &[[u8; 4]], view: &mut View) {

@@ -17,7 +17,7 @@ const MOST_BINDINGS: u32 = 8;
 
 /// An open device.
 pub(crate) struct Device {
-    pub(crate) device: wgpu::Device,
+    handle: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     /// Name, driver and backend.
     pub(crate) name: String,
@@ -65,7 +65,7 @@ impl Device {
             seen.get_or_init(|| format!("it is lost ({reason:?}): {what}"));
         });
         let binding_bytes = binding_bytes.min(options.max_buffer_bytes);
-        Ok(Self { device, queue, name, binding_bytes, bindings: bindings as usize, fault, lost })
+        Ok(Self { handle: device, queue, name, binding_bytes, bindings: bindings as usize, fault, lost })
     }
 
     /// The fault that came up since the last call, if any; once the device is lost, always that.
@@ -86,7 +86,7 @@ impl Device {
         }
         let size = bytes as u64;
         let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
-        let buffer = self.device.create_buffer(&descriptor);
+        let buffer = self.handle.create_buffer(&descriptor);
         self.check().map(|()| buffer)
     }
 
@@ -108,13 +108,13 @@ impl Device {
             .collect();
         let label = Some(entry);
         let layout =
-            self.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries: &entries });
+            self.handle.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries: &entries });
         let descriptor =
             wgpu::PipelineLayoutDescriptor { label, bind_group_layouts: &[Some(&layout)], immediate_size: 0 };
-        let pipeline_layout = self.device.create_pipeline_layout(&descriptor);
+        let pipeline_layout = self.handle.create_pipeline_layout(&descriptor);
         let source = wgpu::ShaderSource::Wgsl(source.into());
-        let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor { label, source });
-        let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        let module = self.handle.create_shader_module(wgpu::ShaderModuleDescriptor { label, source });
+        let pipeline = self.handle.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label,
             layout: Some(&pipeline_layout),
             module: &module,
@@ -141,22 +141,7 @@ impl Device {
             .map(|(binding, resource)| wgpu::BindGroupEntry { binding: binding as u32, resource })
             .collect();
         let descriptor = wgpu::BindGroupDescriptor { label: None, layout: &program.layout, entries: &entries };
-        self.device.create_bind_group(&descriptor)
-    }
-
-    /// Records a run of a program that sees its uniform from `window` on.
-    pub(crate) fn dispatch(
-        &self,
-        commands: &mut wgpu::CommandEncoder,
-        program: &Program,
-        group: &wgpu::BindGroup,
-        window: usize,
-        groups: [u32; 2],
-    ) {
-        let mut pass = commands.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        pass.set_pipeline(&program.pipeline);
-        pass.set_bind_group(0, group, &[window as u32]);
-        pass.dispatch_workgroups(groups[0], groups[1], 1);
+        self.handle.create_bind_group(&descriptor)
     }
 
     /// Hands words over; they arrive before the next submission runs.
@@ -194,7 +179,7 @@ impl Device {
     }
 
     pub(crate) fn commands(&self) -> wgpu::CommandEncoder {
-        self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
+        self.handle.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
     }
 
     /// Runs what was recorded, waits for it, and calls `read` with the first `bytes` of `staging`.
@@ -223,7 +208,7 @@ impl Device {
         let slice = staging.slice(..bytes as u64);
         // Whether mapping failed is seen by the view below.
         slice.map_async(wgpu::MapMode::Read, |_| {});
-        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| failed(error.to_string()))?;
+        self.handle.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| failed(error.to_string()))?;
         self.check()?;
         let view = slice.get_mapped_range().map_err(|error| failed(error.to_string()))?;
         let result = read(view.as_chunks().0);
@@ -235,8 +220,24 @@ impl Device {
 
 /// A compute pipeline and what it binds.
 pub(crate) struct Program {
-    pub(crate) pipeline: ComputePipeline,
+    pipeline: ComputePipeline,
     layout: wgpu::BindGroupLayout,
+}
+
+impl Program {
+    /// Records a run that sees the uniform from `window` on.
+    pub(crate) fn dispatch(
+        &self,
+        commands: &mut wgpu::CommandEncoder,
+        group: &wgpu::BindGroup,
+        window: usize,
+        groups: [u32; 2],
+    ) {
+        let mut pass = commands.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, group, &[window as u32]);
+        pass.dispatch_workgroups(groups[0], groups[1], 1);
+    }
 }
 
 /// The first adapter that fits, discrete ones before integrated ones.

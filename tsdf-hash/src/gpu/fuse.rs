@@ -166,7 +166,7 @@ impl Fuser {
             device.write(&self.uniform, k * WINDOW, words.into_iter())?;
             let storage = [blocks, pixels, tallies, &pool.pages[pass.page]];
             let group = device.bind(&self.program, FRAME_BYTES, &self.uniform, &storage);
-            device.dispatch(&mut commands, &self.program, &group, k * WINDOW, spread(pass.blocks.len()));
+            self.program.dispatch(&mut commands, &group, k * WINDOW, spread(pass.blocks.len()));
             first += pass.blocks.len();
         }
         Ok(commands)

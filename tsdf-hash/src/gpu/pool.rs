@@ -105,16 +105,9 @@ impl Pool {
 
     /// Gives a new key a slot, whose memory holds anything; the caller has [reserved](Self::reserve) it.
     pub(super) fn insert(&mut self, key: Key) -> Place {
-        let slot = match self.free.pop() {
-            Some(slot) => {
-                self.keys[slot as usize] = key;
-                slot
-            }
-            None => {
-                self.keys.push(key);
-                self.keys.len() as u32 - 1
-            }
-        };
+        let slot = self.free.pop().unwrap_or(self.keys.len() as u32);
+        self.keys.resize(self.keys.len().max(slot as usize + 1), VACANT);
+        self.keys[slot as usize] = key;
         self.table.set(key, slot);
         self.place(slot as usize)
     }

@@ -33,7 +33,7 @@ fn pair(n: u64) -> [f32; 2] {
     let word = mix(n + 1);
     let float = |word: u64| {
         let mantissa = match word >> 32 & 3 {
-            _ if n % 4 != 0 => word,
+            _ if !n.is_multiple_of(4) => word,
             0 => word & 7,
             1 => !(word & 7),
             2 => 1 << (word % 23),
@@ -65,12 +65,8 @@ fn ask(device: &Device, pairs: &[[f32; 2]]) -> Result<Vec<[u32; RESULTS]>, Error
     let words: Vec<u32> = pairs.as_flattened().iter().map(|x| x.to_bits()).collect();
     device.write(&input, 0, words.into_iter())?;
     let mut commands = device.commands();
-    {
-        let mut pass = commands.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        pass.set_pipeline(&program.pipeline);
-        pass.set_bind_group(0, &device.bind(&program, 16, &uniform, &[&input, &output]), &[0]);
-        pass.dispatch_workgroups(pairs.len().div_ceil(64) as u32, 1, 1);
-    }
+    let group = device.bind(&program, 16, &uniform, &[&input, &output]);
+    program.dispatch(&mut commands, &group, 0, [pairs.len().div_ceil(64) as u32, 1]);
     commands.copy_buffer_to_buffer(&output, 0, &staging, 0, bytes as u64);
     device.run_and_read(commands, &staging, bytes, |words| {
         words.as_chunks().0.iter().map(|result| result.map(u32::from_ne_bytes)).collect()

@@ -22,14 +22,15 @@ impl Scratch {
 
     /// The buffer, with `bytes` at least; a larger one, whose contents are nothing, takes its place where it must.
     pub(super) fn of(&mut self, device: &Device, bytes: usize) -> Result<&Buffer, Error> {
-        let buffer = match self.buffer.take().filter(|buffer| buffer.size() >= bytes as u64) {
-            Some(buffer) => buffer,
-            None => {
+        let fitting = self.buffer.take().filter(|buffer| buffer.size() >= bytes as u64);
+        let buffer = fitting.map_or_else(
+            || {
                 // Room for a little more, within what the device can bind.
                 let roomy = bytes.next_power_of_two().clamp(256, device.binding_bytes.max(256));
-                device.buffer(self.label, roomy.max(bytes), self.usage)?
-            }
-        };
+                device.buffer(self.label, roomy.max(bytes), self.usage)
+            },
+            Ok,
+        )?;
         Ok(self.buffer.insert(buffer))
     }
 }
