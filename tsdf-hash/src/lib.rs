@@ -45,20 +45,24 @@
 mod block;
 mod candidates;
 mod error;
+mod file;
 mod fuse;
 mod key;
 mod map;
 mod mesh;
 mod parallel;
 mod settings;
+mod slots;
 mod store;
 mod surface;
 mod table;
+mod tiers;
 mod view;
 
 pub use error::Error;
-pub use map::{FrameReport, Map};
+pub use map::{FrameReport, Map, Memory};
 pub use mesh::{Mesh, write_ply};
 pub use nalgebra;
-pub use settings::{NoiseModel, Settings};
+pub use settings::{NoiseModel, Settings, Tiers};
+pub use tiers::{Arrivals, MergeAtOnce, Revisit, Verdict};
 pub use view::{ColourView, DepthData, DepthView, Intrinsics};

@@ -7,4 +7,5 @@ mod errors;
 mod recorded;
 mod reversible;
 mod scene;
+mod tiers;
 mod topology;
