@@ -60,8 +60,8 @@ pub(crate) struct Cold {
     /// The block that went to disk last: the next one in the order of the keys follows it.
     hand: Key,
     staged: Vec<Staged>,
-    /// The first so many of them are on disk.
-    staged_on_disk: usize,
+    /// How many of them lie in RAM and on disk.
+    pending: [usize; 2],
     buffer: Vec<u8>,
 }
 
@@ -76,7 +76,7 @@ impl Cold {
             max_bytes,
             hand: Key(0),
             staged: Vec::new(),
-            staged_on_disk: 0,
+            pending: [0; 2],
             buffer: Vec::new(),
         }
     }
@@ -158,26 +158,26 @@ impl Cold {
     /// The same, but only when [`commit`](Self::commit) is called.
     pub(crate) fn stage(&mut self, key: Key, block: &Block, stamp: Stamp) -> Result<(), Error> {
         let (place, label) = self.merged(key, block, stamp)?;
-        self.staged.push((key, place, label));
+        self.push(key, place, label);
         Ok(())
     }
 
     /// Stages a block in the place of the copy that is here.
     pub(crate) fn stage_instead(&mut self, key: Key, block: &Block, stamp: Stamp) -> Result<(), Error> {
         let place = if block.is_empty() { Place::Gone } else { self.place(block)? };
-        self.staged.push((key, place, label_of(block, stamp)));
+        self.push(key, place, label_of(block, stamp));
         Ok(())
     }
 
     pub(crate) fn commit(&mut self) {
-        self.staged_on_disk = 0;
+        self.pending = [0; 2];
         for staged in std::mem::take(&mut self.staged) {
             self.install(staged);
         }
     }
 
     pub(crate) fn abort(&mut self) {
-        self.staged_on_disk = 0;
+        self.pending = [0; 2];
         for (_, place, _) in std::mem::take(&mut self.staged) {
             self.release(&place);
         }
@@ -237,8 +237,8 @@ impl Cold {
 
     /// Bytes in use when so many are added to the blocks in RAM and to the others.
     fn need(&self, host: usize, far: usize) -> usize {
-        let host = self.host.len() + host + self.staged.len() - self.staged_on_disk;
-        let far = self.far.len() + far + self.staged_on_disk;
+        let host = self.host.len() + self.pending[0] + host;
+        let far = self.far.len() + self.pending[1] + far;
         index_bytes::<(Box<[u8]>, Label)>(host) + index_bytes::<Far>(far) + self.packed + WORK_BYTES
     }
 
@@ -257,15 +257,25 @@ impl Cold {
 
     /// The same for a block that is staged.
     fn spill_staged(&mut self) -> Result<bool, Error> {
-        let Some((_, place, _)) = self.staged.get_mut(self.staged_on_disk) else { return Ok(false) };
-        self.staged_on_disk += 1;
-        if let Place::Host(bytes) = place {
-            let len = bytes.len() as u16;
-            let Some(at) = write(&mut self.swap, bytes)? else { return Ok(false) };
-            self.packed -= usize::from(len);
-            *place = Place::Swap { at, len };
-        }
+        let in_ram = self.staged.iter_mut().find_map(|(_, place, _)| match place {
+            Place::Host(bytes) => Some((bytes.len(), write(&mut self.swap, bytes), place)),
+            _ => None,
+        });
+        let Some((len, written, place)) = in_ram else { return Ok(false) };
+        let Some(at) = written? else { return Ok(false) };
+        *place = Place::Swap { at, len: len as u16 };
+        self.packed -= len;
+        self.pending = [self.pending[0] - 1, self.pending[1] + 1];
         Ok(true)
+    }
+
+    fn push(&mut self, key: Key, place: Place, label: Label) {
+        match place {
+            Place::Host(_) => self.pending[0] += 1,
+            Place::Swap { .. } => self.pending[1] += 1,
+            Place::Gone => {}
+        }
+        self.staged.push((key, place, label));
     }
 
     fn install(&mut self, (key, place, label): Staged) {

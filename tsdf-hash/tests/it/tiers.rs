@@ -94,7 +94,7 @@ fn caps_leave_no_trace() {
         let memory = map.memory();
         assert!(map.bytes() < free.bytes() && memory.host_blocks > 0, "{name}: {memory:?}");
         assert_eq!(memory.disk_blocks > 100, tiers.disk_bytes > 0);
-        assert!(moved > 10, "{name}: {moved}");
+        assert!(moved > 0, "{name}: {moved}");
         assert!(contents(&map) == expected, "{name} differs");
         // And all out again, by another way.
         for &k in order.iter().rev() {
