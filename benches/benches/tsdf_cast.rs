@@ -32,9 +32,16 @@ fn main() -> Result<(), Error> {
                 }
             }
         }
-        println!("{voxel_size}: error {:.4} mm, fill {:.5}, beyond 2/10/50/200 mm {far:?} of {hits}, {} blocks", 1e3 * sum / hits as f64, f64::from(hits) / f64::from(seen), map.blocks());
+        println!(
+            "{voxel_size}: error {:.4} mm, fill {:.5}, beyond 2/10/50/200 mm {far:?} of {hits}, {} blocks",
+            1e3 * sum / hits as f64,
+            f64::from(hits) / f64::from(seen),
+            map.blocks()
+        );
         let shot = &shots[7];
-        let t = median_seconds(5, || map.ray_cast_into(&Shot::INTRINSICS, 640, 480, &shot.world_from_camera, &settings, &mut view));
+        let t = median_seconds(5, || {
+            map.ray_cast_into(&Shot::INTRINSICS, 640, 480, &shot.world_from_camera, &settings, &mut view)
+        });
         println!("cast {:.2} ms", 1e3 * t);
     }
     Ok(())

@@ -184,7 +184,13 @@ impl Map {
         let mut bands: Vec<Band> = (view.depth.chunks_mut(chunk).zip(view.normals.chunks_mut(chunk)))
             .zip(view.colours.chunks_mut(chunk).zip(view.weights.chunks_mut(chunk)))
             .enumerate()
-            .map(|(k, ((depth, normals), (colours, weights)))| Band { first: k * rows, depth, normals, colours, weights })
+            .map(|(k, ((depth, normals), (colours, weights)))| Band {
+                first: k * rows,
+                depth,
+                normals,
+                colours,
+                weights,
+            })
             .collect();
         in_chunks(&mut bands, settings.threads, |bands| {
             for band in bands {

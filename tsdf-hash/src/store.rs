@@ -24,7 +24,8 @@ pub(crate) struct Store {
 
 impl Store {
     pub(crate) fn new(max_bytes: usize) -> Result<Self, Error> {
-        let store = Self { table: Table::new(), keys: Vec::new(), blocks: Vec::new(), stamps: Vec::new(), clock: 0, max_bytes };
+        let store =
+            Self { table: Table::new(), keys: Vec::new(), blocks: Vec::new(), stamps: Vec::new(), clock: 0, max_bytes };
         let least = store.bytes_with(1);
         if least > max_bytes {
             let requirement = "large enough for one block: 32768 bytes do";

@@ -107,8 +107,11 @@ mod tests {
             let cell = Cell::at(p);
             let (value, gradient) = cell.value_and_gradient(&field);
             let [x, y, z] = p;
-            let expected = [0.5 * (2.0 - 0.25 * y) * (0.5 + z), -0.25 * (1.0 + 0.5 * x) * (0.5 + z),
-                (1.0 + 0.5 * x) * (2.0 - 0.25 * y)];
+            let expected = [
+                0.5 * (2.0 - 0.25 * y) * (0.5 + z),
+                -0.25 * (1.0 + 0.5 * x) * (0.5 + z),
+                (1.0 + 0.5 * x) * (2.0 - 0.25 * y),
+            ];
             assert!((value - f(p)).abs() < 1e-4 && (cell.value(&field) - f(p)).abs() < 1e-4, "{p:?}");
             assert!((0..3).all(|k| (gradient[k] - expected[k]).abs() < 1e-4), "{p:?}: {gradient:?}");
         }
