@@ -1,41 +1,28 @@
 //! Time as the processor spends it: on a machine that others use as well, wall time says little.
 
 use std::hint::black_box;
-use std::time::Instant;
+use std::time::Duration;
 
-/// Seconds that this thread has computed, where the system tells; `None` elsewhere.
-fn thread_seconds() -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    let nanoseconds: f64 = text.split_whitespace().next()?.parse().ok()?;
-    (nanoseconds > 0.0).then_some(nanoseconds * 1e-9)
-}
+use cpu_time::ThreadTime;
 
-/// Name of the clock that [`median_seconds`] reads.
-pub fn clock_name() -> &'static str {
-    if thread_seconds().is_some() { "cpu" } else { "wall" }
-}
-
-/// Shortest time worth reading: the system counts a running thread's time in steps of milliseconds.
-const LEAST: f64 = 0.2;
+/// Shortest time worth reading.
+const LEAST: Duration = Duration::from_millis(100);
 
 /// Median over `runs` (at least one) of the seconds that `job` takes on this thread, its result included but not used.
 /// Short jobs are repeated within a run.
 pub fn median_seconds<T>(runs: usize, mut job: impl FnMut() -> T) -> f64 {
     let mut repeated = |times: u32| {
-        let (wall, cpu) = (Instant::now(), thread_seconds());
+        let start = ThreadTime::now();
         for _ in 0..times {
             black_box(job());
         }
-        match (cpu, thread_seconds()) {
-            (Some(before), Some(after)) => after - before,
-            _ => wall.elapsed().as_secs_f64(),
-        }
+        start.elapsed()
     };
     let mut times = 1;
     while repeated(times) < LEAST && times < 1 << 20 {
         times *= 2;
     }
-    let mut seconds: Vec<f64> = (0..runs.max(1)).map(|_| repeated(times) / f64::from(times)).collect();
+    let mut seconds: Vec<f64> = (0..runs.max(1)).map(|_| repeated(times).as_secs_f64() / f64::from(times)).collect();
     seconds.sort_unstable_by(f64::total_cmp);
     seconds[seconds.len() / 2]
 }

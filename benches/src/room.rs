@@ -36,14 +36,19 @@ impl Shot {
     pub fn take(k: usize, n: usize) -> Self {
         let world_from_camera = pose(k, n);
         let origin = Point3::from(world_from_camera.translation.vector);
-        let (width, height) = SIZE;
-        let ray = |pixel: usize| {
-            let x = ((pixel % width) as f64 - INTRINSICS.cx) / INTRINSICS.fx;
-            let y = ((pixel / width) as f64 - INTRINSICS.cy) / INTRINSICS.fy;
-            world_from_camera.rotation * Vector3::new(x, y, 1.0)
-        };
-        let depth = (0..width * height).map(|pixel| (SCALE * first_hit(&origin, &ray(pixel))).round() as u16).collect();
+        let depth = (0..SIZE.0 * SIZE.1)
+            .map(|pixel| (SCALE * first_hit(&origin, &ray(&world_from_camera, pixel))).round() as u16)
+            .collect();
         Self { depth, world_from_camera }
+    }
+
+    /// The camera.
+    pub const INTRINSICS: Intrinsics = INTRINSICS;
+
+    /// Depth of every pixel without the rounding to millimetres, metres.
+    pub fn exact_depth(&self) -> Vec<f64> {
+        let origin = Point3::from(self.world_from_camera.translation.vector);
+        (0..SIZE.0 * SIZE.1).map(|pixel| first_hit(&origin, &ray(&self.world_from_camera, pixel))).collect()
     }
 
     /// The image as the map reads it.
@@ -51,6 +56,13 @@ impl Shot {
         let data = DepthData::U16 { data: &self.depth, scale: SCALE };
         DepthView { width: SIZE.0, height: SIZE.1, data, intrinsics: INTRINSICS }
     }
+}
+
+/// Direction of a pixel in the world, of length one along the optical axis.
+fn ray(world_from_camera: &Isometry3<f64>, pixel: usize) -> Vector3<f64> {
+    let x = ((pixel % SIZE.0) as f64 - INTRINSICS.cx) / INTRINSICS.fx;
+    let y = ((pixel / SIZE.0) as f64 - INTRINSICS.cy) / INTRINSICS.fy;
+    world_from_camera.rotation * Vector3::new(x, y, 1.0)
 }
 
 /// On an ellipse, looking outwards.

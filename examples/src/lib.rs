@@ -11,6 +11,7 @@ pub mod placing;
 pub mod progress;
 pub mod recording;
 pub mod report;
+pub mod scan;
 pub mod surface;
 pub mod targets;
 pub mod world;

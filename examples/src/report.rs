@@ -121,12 +121,7 @@ pub enum ReportError {
 impl Report {
     /// Writes `report.json` and `report.md` into a folder. Refuses figures that are not finite.
     pub fn save(&self, folder: &Path) -> Result<(), ReportError> {
-        let figures = serde_json::to_value(self)?;
-        // serde_json writes NaN and infinity as null.
-        if let Some((name, _)) = figures.as_object().and_then(|o| o.iter().find(|(_, v)| v.is_null())) {
-            return Err(ReportError::NotFinite(name.clone()));
-        }
-        write(&folder.join("report.json"), &(serde_json::to_string_pretty(self)? + "\n"))?;
+        save_figures(self, folder)?;
         write(&folder.join("report.md"), &self.markdown())
     }
 
@@ -261,6 +256,26 @@ impl Report {
         );
         text
     }
+}
+
+/// Writes flat figures as `report.json` into a folder.
+///
+/// # Errors
+/// [`ReportError::NotFinite`] names the figure that is NaN or infinite.
+pub fn save_figures<T: Serialize>(figures: &T, folder: &Path) -> Result<(), ReportError> {
+    let value = serde_json::to_value(figures)?;
+    // serde_json writes NaN and infinity as null.
+    if let Some((name, _)) = value.as_object().and_then(|o| o.iter().find(|(_, v)| v.is_null())) {
+        return Err(ReportError::NotFinite(name.clone()));
+    }
+    write(&folder.join("report.json"), &(serde_json::to_string_pretty(figures)? + "\n"))
+}
+
+/// Largest resident memory of this process so far, bytes; 0 where the system does not tell.
+pub fn peak_resident_bytes() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:")).unwrap_or("");
+    line.split_whitespace().next().and_then(|kb| kb.parse::<u64>().ok()).unwrap_or(0) * 1024
 }
 
 fn write(path: &Path, text: &str) -> Result<(), ReportError> {

@@ -5,6 +5,7 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::key::{Key, mix};
+use crate::surface::Plane;
 use crate::view::DepthView;
 use crate::{Error, Settings};
 
@@ -13,19 +14,45 @@ pub(crate) const TILE: usize = 8;
 /// Keys remembered, to drop most repetitions before sorting.
 const RECENT: usize = 4096;
 
+/// The range of fused depths in a square of pixels.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tile {
+    /// Least depth, metres.
+    pub(crate) near: f32,
+    /// Largest depth, metres; below `near` in a square without fused pixels.
+    pub(crate) far: f32,
+}
+
+impl Tile {
+    pub(crate) const EMPTY: Self = Self { near: f32::INFINITY, far: 0.0 };
+
+    /// From the least and largest inverse depths of some columns; infinite and 0 in a column without fused pixels.
+    pub(crate) fn of(low: &[f32], high: &[f32]) -> Self {
+        let low = low.iter().fold(f32::INFINITY, |a, &b| a.min(b));
+        let high = high.iter().fold(0.0, |a: f32, &b| a.max(b));
+        if high > 0.0 { Self { near: 1.0 / high, far: 1.0 / low } } else { Self::EMPTY }
+    }
+
+    /// The range of both.
+    pub(crate) fn with(self, other: Self) -> Self {
+        Self { near: self.near.min(other.near), far: self.far.max(other.far) }
+    }
+}
+
 /// Keys of the blocks near the pixels of some rows, in no order, with repetitions.
 pub(crate) fn near(
     first_row: usize,
-    inverse_depth: &[f32],
+    planes: &[Plane],
+    tiles: &[Tile],
     depth: &DepthView,
     world_from_camera: &Isometry3<f64>,
     settings: &Settings,
 ) -> Result<Vec<Key>, Error> {
     let width = depth.width;
-    let rows = inverse_depth.len() / width;
+    let rows = planes.len() / width;
     let mut search = Search {
         first_row,
-        inverse_depth,
+        planes,
         depth,
         origin: world_from_camera.translation.vector / settings.block_size(),
         rotation: world_from_camera.rotation.to_rotation_matrix().into_inner() / settings.block_size(),
@@ -35,17 +62,16 @@ pub(crate) fn near(
         recent: vec![Key(u64::MAX); RECENT],
         keys: Vec::new(),
     };
-    for v in (0..rows).step_by(TILE) {
-        for u in (0..width).step_by(TILE) {
-            search.square(u, v, TILE, rows)?;
-        }
+    let across = width.div_ceil(TILE);
+    for (k, &tile) in tiles.iter().enumerate() {
+        search.square([k % across * TILE, k / across * TILE], TILE, rows, tile)?;
     }
     Ok(search.keys)
 }
 
 struct Search<'a> {
     first_row: usize,
-    inverse_depth: &'a [f32],
+    planes: &'a [Plane],
     depth: &'a DepthView<'a>,
     /// Camera in the world, in blocks.
     origin: Vector3<f64>,
@@ -58,32 +84,29 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    fn square(&mut self, u: usize, v: usize, side: usize, rows: usize) -> Result<(), Error> {
-        let width = self.depth.width;
-        let (right, below) = ((u + side).min(width), (v + side).min(rows));
-        if u >= right || v >= below {
+    /// Looks at a square whose range of depths is known.
+    fn square(&mut self, [u, v]: [usize; 2], side: usize, rows: usize, range: Tile) -> Result<(), Error> {
+        if range.far < range.near {
             return Ok(());
         }
-        let (mut low, mut high) = (f32::INFINITY, 0.0_f32);
-        for row in v..below {
-            for &omega in &self.inverse_depth[row * width + u..row * width + right] {
-                if omega > 0.0 {
-                    (low, high) = (low.min(omega), high.max(omega));
-                }
-            }
-        }
-        if high == 0.0 {
-            return Ok(());
-        }
-        let (near, far) = (1.0 / f64::from(high), 1.0 / f64::from(low));
+        let (right, below) = ((u + side).min(self.depth.width), (v + side).min(rows));
+        let (near, far) = (f64::from(range.near), f64::from(range.far));
         if far - near > self.block && side > 1 {
             let half = side / 2;
-            for (du, dv) in [(0, 0), (half, 0), (0, half), (half, half)] {
-                self.square(u + du, v + dv, half, rows.min(v + side))?;
+            for corner in [[u, v], [u + half, v], [u, v + half], [u + half, v + half]] {
+                let range = self.range(corner, [(corner[0] + half).min(right), (corner[1] + half).min(below)]);
+                self.square(corner, half, rows, range)?;
             }
             return Ok(());
         }
         self.frustum([u, right], [v + self.first_row, below + self.first_row], near, far)
+    }
+
+    fn range(&self, from: [usize; 2], to: [usize; 2]) -> Tile {
+        let width = self.depth.width;
+        let pixels = (from[1]..to[1]).flat_map(|v| self.planes.get(v * width + from[0]..v * width + to[0])).flatten();
+        let depths = pixels.filter_map(Plane::omega).map(|omega| 1.0 / omega);
+        depths.fold(Tile::EMPTY, |range, z| range.with(Tile { near: z, far: z }))
     }
 
     /// Blocks that the bounding boxes of the frustum's slices touch.

@@ -4,12 +4,13 @@ use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use crate::Settings;
 use crate::block::{Block, MAX_COLOURS, ONE, SIDE};
+use crate::candidates::{TILE, Tile};
 use crate::key::Key;
-use crate::surface::Surface;
-use crate::view::{ColourView, Intrinsics};
+use crate::surface::{Plane, Surface};
+use crate::view::{ColourData, ColourView, Intrinsics};
 
 /// Colours are taken this close to the surface, in voxels (ours).
-const COLOUR_REACH: f32 = 1.5;
+const COLOUR_REACH: f64 = 1.5;
 /// `1.5 2^23`: adding it rounds a float to an integer, to even at a tie, and leaves the integer in the low bits.
 pub(crate) const ROUNDER: f32 = 12_582_912.0;
 
@@ -44,8 +45,7 @@ pub(crate) struct Frame<'a> {
     offset: Vector3<f64>,
     voxel_size: f64,
     truncation: f32,
-    /// Steps of the stored distance per metre.
-    per_metre: f32,
+    /// In steps of the stored distance.
     colour_reach: f32,
 }
 
@@ -67,8 +67,7 @@ impl<'a> Frame<'a> {
             offset: pixels_from_camera * camera_from_world.translation.vector,
             voxel_size: settings.voxel_size,
             truncation: settings.truncation() as f32,
-            per_metre: (f64::from(ONE) / settings.truncation()) as f32,
-            colour_reach: COLOUR_REACH * settings.voxel_size as f32,
+            colour_reach: (f64::from(ONE) * COLOUR_REACH / settings.truncation_voxels) as f32,
         }
     }
 
@@ -80,6 +79,27 @@ impl<'a> Frame<'a> {
         }
     }
 
+    /// In single precision, every operation rounded once to the nearest, none fused or reordered:
+    ///
+    /// ```text
+    /// per frame      step_x, step_y, step_z                          the change of (u z, v z, z) from voxel to voxel
+    /// per block      start                                           (u z, v z, z) of voxel (0, 0, 0)
+    /// per voxel      p = ((start + step_y y) + step_z z) + step_x x
+    ///                r = 1 / p.z;  u = p.x r;  v = p.y r             correctly rounded division
+    ///                i = round(u);  j = round(v)                     to even at a tie
+    ///                p.z > 0, 0 <= i <= width - 1, 0 <= j <= height - 1, or the voxel is not touched
+    ///                plane = planes[i + width j]
+    ///                own = p.z scaled_omega
+    ///                |offset - own| <= μ scaled_omega, or the voxel is not touched
+    ///                du = u - i;  dv = v - j
+    ///                q = offset - p.z (scaled_omega + (slope_u du + slope_v dv))
+    ///                coloured = |q| < reach
+    ///                q = round(min(max(q, -32767), 32767))
+    ///                w = the last four bits of slope_v
+    ///                S += w q;  W += w                               in integers
+    /// ```
+    ///
+    /// `start` and the steps are computed in double precision and rounded once.
     fn update<const PLUS: bool>(&self, key: Key, block: &mut Block) -> Tally {
         let h = self.voxel_size;
         let centre = |c: i32| (f64::from(c) * SIDE as f64 + 0.5) * h;
@@ -87,81 +107,126 @@ impl<'a> Frame<'a> {
         let start = (self.projection * Vector3::new(x, y, z) + self.offset).cast::<f32>();
         let step = (self.projection * h).cast::<f32>();
         let [sx, sy, sz] = [0, 1, 2].map(|axis| step.column(axis).into_owned());
-        let mut tally = Tally::default();
+        let Some(range) = self.range(&start, &[sx, sy, sz]) else { return Tally::default() };
+        let mut work = Work::default();
         for z in 0..SIDE {
             for y in 0..SIDE {
-                let row = start + sy * y as f32 + sz * z as f32;
-                let pixels = self.project(&row, &sx);
-                for x in 0..SIDE {
-                    let pixel = pixels.index[x] as usize;
-                    let omega = self.surface.inverse_depth[pixel];
-                    // |D - z| <= μ with D = 1/ω; an ω of 0 fails.
-                    let depth = pixels.depth[x];
-                    if (1.0 - depth * omega).abs() <= self.truncation * omega {
-                        let voxel = x + SIDE * (y + SIDE * z);
-                        let plane = &self.surface.planes[pixel];
-                        // The plane's inverse depth at the voxel's own pixel coordinates: free of the rounding.
-                        let at_voxel = omega + plane.slope[0] * pixels.du[x] + plane.slope[1] * pixels.dv[x];
-                        let distance = plane.offset * (1.0 - depth * at_voxel);
-                        tally.fault |= self.observe::<PLUS>(block, voxel, distance, plane.weight);
-                        if distance.abs() < self.colour_reach
-                            && let Some(rgb) = self.colour.as_ref().and_then(|c| c.at(pixels.u[x], pixels.v[x]))
-                        {
-                            tally.fault |= observe_colour::<PLUS>(&mut block.colour[voxel], rgb);
-                        }
-                        tally.voxels += 1;
+                let row = (start + sy * y as f32) + sz * z as f32;
+                for x in [0, LANES] {
+                    // Depth is monotonic along the lanes, rounding included.
+                    let [first, last] = [x, x + LANES - 1].map(|x| row.z + sx.z * x as f32);
+                    let missed = (first < range.near && last < range.near) || (first > range.far && last > range.far);
+                    if !missed {
+                        let lanes = Lanes::project(self.surface, &row, &sx, x);
+                        self.observe::<PLUS>(block, (x + SIDE * (y + SIDE * z)) / LANES, &lanes, &mut work);
                     }
                 }
             }
         }
-        tally
+        work.tally()
     }
 
-    /// Projects a row of voxels; those outside the image get the extra entry, which is never fused.
-    #[inline(always)]
-    #[expect(clippy::needless_bitwise_bool, reason = "without branches the row is projected in vector registers")]
-    fn project(&self, row: &Vector3<f32>, step: &Vector3<f32>) -> Pixels {
-        let outside = self.surface.planes.len() as u32;
-        let (right, bottom) = ((self.surface.width - 1) as f32, (self.surface.height - 1) as f32);
-        let width = self.surface.width as i32;
-        let mut out = Pixels { index: [0; SIDE], depth: LANES, u: LANES, v: LANES, du: LANES, dv: LANES };
-        for x in 0..SIDE {
-            let along = x as f32;
-            let z = row.z + step.z * along;
-            let inverse = 1.0 / z;
-            let u = (row.x + step.x * along) * inverse;
-            let v = (row.y + step.y * along) * inverse;
-            out.depth[x] = z;
-            out.u[x] = (u + ROUNDER) - ROUNDER;
-            out.v[x] = (v + ROUNDER) - ROUNDER;
-            out.du[x] = u - out.u[x];
-            out.dv[x] = v - out.v[x];
-            let inside = (z > 0.0) & (out.u[x] >= 0.0) & (out.u[x] <= right) & (out.v[x] >= 0.0) & (out.v[x] <= bottom);
-            let index = rounded(v).wrapping_mul(width).wrapping_add(rounded(u)).cast_unsigned();
-            out.index[x] = if inside { index } else { outside };
+    /// Depths outside of which no voxel of a block is touched, from the squares of pixels that it projects to; `None` if
+    /// none can be.
+    fn range(&self, start: &Vector3<f32>, steps: &[Vector3<f32>; 3]) -> Option<Tile> {
+        let all = Tile { near: 0.0, far: f32::INFINITY };
+        let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+        for corner in 0..8 {
+            let at = |axis: usize| steps[axis] * if corner >> axis & 1 == 1 { (SIDE - 1) as f32 } else { 0.0 };
+            let p = start + at(0) + at(1) + at(2);
+            if p.z <= 1e-3 * self.truncation {
+                return Some(all);
+            }
+            for k in 0..2 {
+                let pixel = p[k] / p.z;
+                low[k] = low[k].min(pixel);
+                high[k] = high[k].max(pixel);
+            }
         }
-        out
+        let tiles = [self.surface.width, self.surface.height];
+        let mut ranges = [(0, 0); 2];
+        for k in 0..2 {
+            // One pixel more on each side, for the rounding.
+            let last = (tiles[k] - 1) as f32;
+            if low[k] > last + 1.0 || high[k] < -1.0 {
+                return None;
+            }
+            ranges[k] = ((low[k] - 1.0).max(0.0) as usize / TILE, (high[k] + 1.0).min(last) as usize / TILE);
+        }
+        let across = self.surface.width.div_ceil(TILE);
+        let [columns, lines] = ranges;
+        let mut range = Tile::EMPTY;
+        for line in lines.0..=lines.1 {
+            for tile in &self.surface.tiles[line * across + columns.0..=line * across + columns.1] {
+                range = range.with(*tile);
+            }
+        }
+        // A little more than μ, for the rounding.
+        let reach = 1.001 * self.truncation + 1e-5 * range.far;
+        (range.near <= range.far).then_some(Tile { near: range.near - reach, far: range.far + reach })
     }
 
-    /// Adds a distance, metres, to a voxel or takes it out; returns whether a counter ran over or under.
+    /// Updates the voxels `LANES unit..`.
     #[inline(always)]
-    fn observe<const PLUS: bool>(&self, block: &mut Block, voxel: usize, distance: f32, weight: f32) -> bool {
-        let q = (distance * self.per_metre).clamp(-ONE as f32, ONE as f32);
-        let (q, weight) = (rounded(q), weight as u16);
-        let (sum, total) = (&mut block.distance[voxel], &mut block.weight[voxel]);
-        if PLUS {
-            *sum = sum.wrapping_add(q * i32::from(weight));
-            let (next, over) = total.overflowing_add(weight);
-            *total = next;
-            over
-        } else {
-            *sum = sum.wrapping_sub(q * i32::from(weight));
-            let (next, under) = total.overflowing_sub(weight);
-            *total = next;
-            // No sum of observations can leave this range: what was taken out was not in.
-            under || i64::from(*sum).abs() > i64::from(next) * i64::from(ONE)
+    fn observe<const PLUS: bool>(&self, block: &mut Block, unit: usize, lanes: &Lanes, work: &mut Work) {
+        let planes = lanes.index.map(|index| self.surface.planes.get(index as usize).copied().unwrap_or(Plane::NONE));
+        let offset = planes.map(|plane| plane.offset);
+        let omega = planes.map(|plane| plane.scaled_omega);
+        let slope_u = planes.map(|plane| plane.scaled_slope[0]);
+        let slope_v = planes.map(|plane| plane.scaled_slope[1]);
+        let mut touched = [0; LANES];
+        for x in 0..LANES {
+            // A NaN fails, and so does an omega of 0.
+            touched[x] = mask((offset[x] - lanes.depth[x] * omega[x]).abs() <= self.truncation * omega[x]);
+        }
+        if touched == [0; LANES] {
+            return;
+        }
+        let sums = &mut block.distance.as_chunks_mut::<LANES>().0[unit];
+        let totals = &mut block.weight.as_chunks_mut::<LANES>().0[unit];
+        let mut coloured = [0; LANES];
+        for x in 0..LANES {
+            let at_voxel = omega[x] + (slope_u[x] * lanes.du[x] + slope_v[x] * lanes.dv[x]);
+            let q = offset[x] - lanes.depth[x] * at_voxel;
+            coloured[x] = mask(q.abs() < self.colour_reach) & touched[x];
+            let q = if q > -LIMIT { q } else { -LIMIT };
+            let q = if q < LIMIT { q } else { LIMIT };
+            let weight = slope_v[x].to_bits().cast_signed() & 15 & touched[x];
+            // An integer below 2^19, so the product is exact.
+            let product = rounded(((q + ROUNDER) - ROUNDER) * weight as f32) & touched[x];
+            let (sum, total) = if PLUS {
+                (sums[x].wrapping_add(product), i32::from(totals[x]) + weight)
+            } else {
+                (sums[x].wrapping_sub(product), i32::from(totals[x]) - weight)
+            };
+            sums[x] = sum;
+            totals[x] = total as u16;
+            work.faults[x] |= total >> 16;
+            if !PLUS {
+                // No sum of observations can leave `-32767 W..=32767 W`: what was taken out was not in.
+                let most = (total << 15).wrapping_sub(total);
+                work.faults[x] |= most.wrapping_sub(sum.wrapping_abs()) >> 31 & touched[x];
+            }
+            work.touched[x] -= touched[x];
+        }
+        if let Some(colour) = self.colour.as_ref().filter(|_| coloured != [0; LANES]) {
+            for x in (0..LANES).filter(|&x| coloured[x] != 0) {
+                if let Some(rgb) = colour.at(lanes.u[x], lanes.v[x]) {
+                    work.colour_fault |= observe_colour::<PLUS>(&mut block.colour[LANES * unit + x], rgb);
+                }
+            }
         }
     }
+}
+
+/// Neighbours along x that are updated together: a vector register.
+const LANES: usize = 4;
+const LIMIT: f32 = ONE as f32;
+
+/// All ones, or zero.
+#[inline(always)]
+fn mask(condition: bool) -> i32 {
+    -i32::from(condition)
 }
 
 /// The nearest integer, to even at a tie, of a float below `2^22` in magnitude.
@@ -181,21 +246,61 @@ fn observe_colour<const PLUS: bool>(sums: &mut [u16; 4], rgb: [u16; 3]) -> bool 
     fault || sums[3] > MAX_COLOURS
 }
 
-const LANES: [f32; SIDE] = [0.0; SIDE];
-
-/// A row of projected voxels.
-struct Pixels {
-    index: [u32; SIDE],
-    depth: [f32; SIDE],
-    /// The pixel.
-    u: [f32; SIDE],
-    v: [f32; SIDE],
-    /// From the pixel's centre to the voxel's projection.
-    du: [f32; SIDE],
-    dv: [f32; SIDE],
+/// What the update of a block counts, per lane.
+#[derive(Default)]
+struct Work {
+    touched: [i32; LANES],
+    /// Not zero after a counter ran over or under.
+    faults: [i32; LANES],
+    colour_fault: bool,
 }
 
-/// The colour image, seen through the pixels of the depth image.
+impl Work {
+    fn tally(&self) -> Tally {
+        let voxels = self.touched.iter().sum::<i32>().unsigned_abs() as usize;
+        Tally { voxels, fault: self.colour_fault || self.faults != [0; LANES] }
+    }
+}
+
+/// Projected voxels.
+struct Lanes {
+    /// Of the pixel; `u32::MAX` outside the image.
+    index: [u32; LANES],
+    depth: [f32; LANES],
+    /// The projection, pixels.
+    u: [f32; LANES],
+    v: [f32; LANES],
+    /// From the pixel's centre to the projection.
+    du: [f32; LANES],
+    dv: [f32; LANES],
+}
+
+impl Lanes {
+    /// Projects the voxels `first..` of a row.
+    #[inline(always)]
+    #[expect(clippy::needless_bitwise_bool, reason = "without branches the lanes stay in vector registers")]
+    fn project(surface: &Surface, row: &Vector3<f32>, step: &Vector3<f32>, first: usize) -> Self {
+        let (right, bottom) = ((surface.width - 1) as f32, (surface.height - 1) as f32);
+        let width = surface.width as f32;
+        let zero = [0.0; LANES];
+        let mut out = Self { index: [0; LANES], depth: zero, u: zero, v: zero, du: zero, dv: zero };
+        for x in 0..LANES {
+            let along = (first + x) as f32;
+            let z = row.z + step.z * along;
+            let inverse = 1.0 / z;
+            let u = (row.x + step.x * along) * inverse;
+            let v = (row.y + step.y * along) * inverse;
+            let (i, j) = ((u + ROUNDER) - ROUNDER, (v + ROUNDER) - ROUNDER);
+            (out.depth[x], out.u[x], out.v[x], out.du[x], out.dv[x]) = (z, u, v, u - i, v - j);
+            let inside = (z > 0.0) & (i >= 0.0) & (i <= right) & (j >= 0.0) & (j <= bottom);
+            let index = rounded(v).wrapping_mul(width as i32).wrapping_add(rounded(u));
+            out.index[x] = (index | !mask(inside)).cast_unsigned();
+        }
+        out
+    }
+}
+
+/// The colour image, seen from the depth image.
 struct ColourSource<'a> {
     view: &'a ColourView<'a>,
     /// Colour column = `scale u + shift`, likewise the row.
@@ -211,13 +316,25 @@ impl<'a> ColourSource<'a> {
         Self { view, scale: scale.map(|s| s as f32), shift: shift.map(|s| s as f32) }
     }
 
-    /// Six-bit colour of a depth pixel; `None` outside the colour image.
+    /// Six-bit colour of the pixel nearest to a projection; `None` outside the colour image.
     #[inline(always)]
     fn at(&self, u: f32, v: f32) -> Option<[u16; 3]> {
-        let [cu, cv] = [u * self.scale[0] + self.shift[0] + 0.5, v * self.scale[1] + self.shift[1] + 0.5];
-        let inside = cu >= 0.0 && cv >= 0.0 && cu < self.view.width as f32 && cv < self.view.height as f32;
-        let start = 3 * (cv as usize * self.view.width + cu as usize);
-        let rgb = self.view.rgb8.get(start..start + 3).filter(|_| inside)?;
-        Some([rgb[0], rgb[1], rgb[2]].map(|c| (u16::from(c) * 63 + 127) / 255))
+        let [i, j] =
+            [u * self.scale[0] + self.shift[0], v * self.scale[1] + self.shift[1]].map(|x| (x + ROUNDER) - ROUNDER);
+        let (width, height) = (self.view.width, self.view.height);
+        if !(i >= 0.0 && i < width as f32 && j >= 0.0 && j < height as f32) {
+            return None;
+        }
+        let start = 3 * (j as usize * width + i as usize);
+        match self.view.data {
+            ColourData::Rgb8(data) => {
+                let rgb = data.get(start..start + 3)?;
+                Some([rgb[0], rgb[1], rgb[2]].map(|c| (u16::from(c) * 63 + 127) / 255))
+            }
+            ColourData::Rgb16(data) => {
+                let rgb = data.get(start..start + 3)?;
+                Some([rgb[0], rgb[1], rgb[2]].map(|c| ((u32::from(c) * 63 + 32767) / 65535) as u16))
+            }
+        }
     }
 }

@@ -44,6 +44,7 @@
 
 mod block;
 mod candidates;
+mod cast;
 mod error;
 mod file;
 mod fuse;
@@ -59,10 +60,11 @@ mod table;
 mod tiers;
 mod view;
 
+pub use cast::{CastSettings, View};
 pub use error::Error;
 pub use map::{FrameReport, Map, Memory};
 pub use mesh::{Mesh, write_ply};
 pub use nalgebra;
 pub use settings::{NoiseModel, Settings, Tiers};
 pub use tiers::{Arrivals, MergeAtOnce, Revisit, Verdict};
-pub use view::{ColourView, DepthData, DepthView, Intrinsics};
+pub use view::{ColourData, ColourView, DepthData, DepthView, Intrinsics};

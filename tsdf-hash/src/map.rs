@@ -268,8 +268,8 @@ impl Map {
         let mut whole = Self::new(settings)?;
         for key in self.copies.sorted_keys() {
             let mut sum = Box::new(Block::ZERO);
-            let stamp = self.copies.total(key, &mut sum)?;
-            whole.copies.active.insert(key, sum, stamp);
+            let seen = self.copies.total(key, &mut sum)?;
+            whole.copies.active.insert(key, sum, seen);
         }
         Ok(whole)
     }

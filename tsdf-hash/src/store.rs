@@ -10,7 +10,7 @@ const MOST_BLOCKS: usize = 1 << 21;
 
 /// When a block was seen, and how often. No part of the exact state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Stamp {
+pub(crate) struct Seen {
     /// Time of the last frame that updated it, seconds.
     pub(crate) last: f64,
     /// Frames that updated it.
@@ -21,12 +21,15 @@ pub(crate) struct Stamp {
 
 struct Slot {
     block: Option<Box<Block>>,
-    stamp: Stamp,
+    seen: Seen,
+    /// When the block last changed, on a clock that never stands still: equal stamps mean equal blocks.
+    stamp: u64,
 }
 
 /// Blocks in dense slots, found through a hash table. A block is `None` only while a frame works on it.
 pub(crate) struct Store {
     slots: Slots<Slot>,
+    clock: u64,
     max_bytes: usize,
     /// Blocks of the budget that are kept free, for work.
     spare: usize,
@@ -37,7 +40,7 @@ pub(crate) struct Store {
 impl Store {
     pub(crate) fn new(max_bytes: usize) -> Result<Self, Error> {
         let most = max_bytes / size_of::<Block>();
-        let store = Self { slots: Slots::new(), max_bytes, spare: (most / 16).clamp(3, 256), set_aside: 0 };
+        let store = Self { slots: Slots::new(), clock: 0, max_bytes, spare: (most / 16).clamp(3, 256), set_aside: 0 };
         if store.room() == 0 {
             let requirement = "large enough for one block and three to work with: 65536 bytes do";
             return Err(Error::InvalidSetting { name: "max_bytes", value: max_bytes as f64, requirement });
@@ -90,13 +93,26 @@ impl Store {
         self.slots.values()[slot].block.as_deref()
     }
 
-    pub(crate) fn stamp(&self, key: Key) -> Option<Stamp> {
-        self.slots.get(key).map(|slot| slot.stamp)
+    pub(crate) fn seen(&self, key: Key) -> Option<Seen> {
+        self.slots.get(key).map(|slot| slot.seen)
     }
 
-    pub(crate) fn get_mut(&mut self, key: Key) -> Option<(&mut Block, &mut Stamp)> {
+    /// A block to be changed.
+    pub(crate) fn get_mut(&mut self, key: Key) -> Option<(&mut Block, &mut Seen)> {
         let slot = self.slots.get_mut(key)?;
-        slot.block.as_deref_mut().map(|block| (block, &mut slot.stamp))
+        self.clock += 1;
+        slot.stamp = self.clock;
+        slot.block.as_deref_mut().map(|block| (block, &mut slot.seen))
+    }
+
+    /// A number that changes whenever the block does; no two blocks of a store ever share one.
+    pub(crate) fn stamp(&self, slot: usize) -> u64 {
+        self.slots.values()[slot].stamp
+    }
+
+    /// The keys in the order of their slots.
+    pub(crate) fn keys(&self) -> &[Key] {
+        self.slots.keys()
     }
 
     /// Takes a block out of its slot, to be worked on; [`put`](Self::put) returns it.
@@ -108,23 +124,28 @@ impl Store {
         self.slots.values_mut()[slot].block = Some(block);
     }
 
-    pub(crate) fn stamp_mut(&mut self, slot: usize) -> &mut Stamp {
-        &mut self.slots.values_mut()[slot].stamp
+    /// Notes that a block has changed.
+    pub(crate) fn touch(&mut self, slot: usize, call: u32) {
+        self.clock += 1;
+        let slot = &mut self.slots.values_mut()[slot];
+        slot.stamp = self.clock;
+        slot.seen.call = call;
     }
 
     /// Adds a block under a new key; the caller has seen that there is [`room`](Self::room).
-    pub(crate) fn insert(&mut self, key: Key, block: Box<Block>, stamp: Stamp) {
-        self.slots.insert(key, Slot { block: Some(block), stamp });
+    pub(crate) fn insert(&mut self, key: Key, block: Box<Block>, seen: Seen) {
+        self.clock += 1;
+        self.slots.insert(key, Slot { block: Some(block), seen, stamp: self.clock });
     }
 
-    pub(crate) fn remove(&mut self, key: Key) -> Option<(Box<Block>, Stamp)> {
+    pub(crate) fn remove(&mut self, key: Key) -> Option<(Box<Block>, Seen)> {
         let slot = self.slots.remove(key)?;
-        slot.block.map(|block| (block, slot.stamp))
+        slot.block.map(|block| (block, slot.seen))
     }
 
-    /// Keys and stamps in the order of the slots.
-    pub(crate) fn stamps(&self) -> impl Iterator<Item = (Key, Stamp)> + '_ {
-        self.slots.keys().iter().zip(self.slots.values()).map(|(&key, slot)| (key, slot.stamp))
+    /// Keys and sightings in the order of the slots.
+    pub(crate) fn sightings(&self) -> impl Iterator<Item = (Key, Seen)> + '_ {
+        self.slots.keys().iter().zip(self.slots.values()).map(|(&key, slot)| (key, slot.seen))
     }
 
     /// All keys, ascending.

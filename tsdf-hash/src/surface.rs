@@ -6,27 +6,42 @@
 mod window;
 
 use nalgebra::Isometry3;
-use window::{HALO, Padded, WindowFit};
+use window::{Fit, Row, Windows};
 
-use crate::block::MAX_WEIGHT;
+use crate::block::{MAX_WEIGHT, ONE};
+use crate::candidates::{self, TILE, Tile};
 use crate::fuse::ROUNDER;
 use crate::key::Key;
 use crate::parallel::in_chunks;
 use crate::view::{DepthView, Intrinsics};
-use crate::{Error, Settings, candidates};
+use crate::{Error, Settings};
 
 /// Steeper views of a surface are left to other frames (ours: 84 degrees between ray and normal).
 const LEAST_COSINE: f32 = 0.1;
+/// A window whose rim is this many standard deviations off its middle is not plane (ours).
+const MOST_BEND: f32 = 2.5;
 
-/// The plane seen at a pixel.
-#[derive(Clone, Copy, Default)]
+/// The plane seen at a pixel: a voxel at depth `z`, `(du, dv)` pixels beside the pixel's centre, is
+/// `offset - z (scaled_omega + scaled_slope · (du, dv))` steps of the stored distance in front of it.
+#[derive(Clone, Copy)]
 pub(crate) struct Plane {
-    /// Slopes of the inverse depth, per pixel and metre.
-    pub(crate) slope: [f32; 2],
-    /// Length of the plane's normal in the form `n · x = 1`, inverted: the distance of the camera from the plane, metres.
+    /// Distance of the camera from the plane, in steps of the stored distance (`μ / 32767`).
     pub(crate) offset: f32,
-    /// Weight of the observation, an integer in `1..=15`.
-    pub(crate) weight: f32,
+    /// Inverse depth at the pixel's centre times the offset; 0 if the pixel is not fused.
+    pub(crate) scaled_omega: f32,
+    /// Slopes of the inverse depth per pixel, times the offset. The weight of the observation, an integer in `1..=15`,
+    /// sits in the last four bits of the second one, where it is a relative error below `2e-6`.
+    pub(crate) scaled_slope: [f32; 2],
+}
+
+impl Plane {
+    /// Of a pixel that is not fused.
+    pub(crate) const NONE: Self = Self { offset: 1.0, scaled_omega: 0.0, scaled_slope: [0.0; 2] };
+
+    /// Inverse depth at the pixel's centre, 1/m; `None` if it is not fused.
+    pub(crate) fn omega(&self) -> Option<f32> {
+        (self.scaled_omega > 0.0).then(|| self.scaled_omega / self.offset)
+    }
 }
 
 /// All pixels of a frame, with the blocks near them.
@@ -34,9 +49,10 @@ pub(crate) struct Plane {
 pub(crate) struct Surface {
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// Inverse depth of the pixels to fuse, 1/m, row-major; 0 for the others and in one extra entry at the end.
-    pub(crate) inverse_depth: Vec<f32>,
+    /// Row-major.
     pub(crate) planes: Vec<Plane>,
+    /// The fused depths in squares of [`TILE`] pixels, row-major.
+    pub(crate) tiles: Vec<Tile>,
     /// Pixels with a depth in the range.
     pub(crate) valid: usize,
     /// Those of them that are fused.
@@ -48,8 +64,8 @@ pub(crate) struct Surface {
 /// Rows `first..` of the output, as many as the slices hold.
 struct Band<'a> {
     first: usize,
-    inverse_depth: &'a mut [f32],
     planes: &'a mut [Plane],
+    tiles: &'a mut [Tile],
 }
 
 impl Surface {
@@ -62,22 +78,21 @@ impl Surface {
     ) -> Result<(), Error> {
         let (width, height) = (depth.width, depth.height);
         (self.width, self.height) = (width, height);
-        self.inverse_depth.resize(width * height + 1, 0.0);
-        self.inverse_depth[width * height] = 0.0;
-        self.planes.resize(width * height, Plane::default());
-        // Whole tiles of the candidate search, so that each band can look for its own blocks.
-        let rows = height.div_ceil(settings.threads).next_multiple_of(candidates::TILE);
-        let inverse_depth = self.inverse_depth[..width * height].chunks_mut(rows * width);
-        let mut bands: Vec<Band> = inverse_depth
-            .zip(self.planes.chunks_mut(rows * width))
+        self.planes.resize(width * height, Plane::NONE);
+        self.tiles.resize(width.div_ceil(TILE) * height.div_ceil(TILE), Tile::EMPTY);
+        // Whole tiles, so that each band can look for its own blocks.
+        let lines = height.div_ceil(TILE).div_ceil(settings.threads);
+        let planes = self.planes.chunks_mut(lines * TILE * width);
+        let mut bands: Vec<Band> = planes
+            .zip(self.tiles.chunks_mut(lines * width.div_ceil(TILE)))
             .enumerate()
-            .map(|(k, (inverse_depth, planes))| Band { first: k * rows, inverse_depth, planes })
+            .map(|(k, (planes, tiles))| Band { first: k * lines * TILE, planes, tiles })
             .collect();
         let found = in_chunks(&mut bands, settings.threads, |bands| {
             let mut all = (0, 0, Ok(Vec::new()));
             for band in bands {
-                let (valid, fused) = band.fill(depth, settings);
-                let keys = candidates::near(band.first, band.inverse_depth, depth, world_from_camera, settings);
+                let [valid, fused] = band.fill(depth, settings);
+                let keys = candidates::near(band.first, band.planes, band.tiles, depth, world_from_camera, settings);
                 all = (all.0 + valid, all.1 + fused, keys);
             }
             all
@@ -97,71 +112,67 @@ impl Surface {
 
 impl Band<'_> {
     /// Returns how many pixels of the band have a depth in the range and how many of them are fused.
-    fn fill(&mut self, depth: &DepthView, settings: &Settings) -> (usize, usize) {
+    fn fill(&mut self, depth: &DepthView, settings: &Settings) -> [usize; 2] {
         let width = depth.width;
-        let rows = self.inverse_depth.len() / width;
         let noise = Noise::new(settings);
-        let raw = Padded::read(depth, settings, self.first, rows);
-        let smooth = raw.without_edges(&noise);
-        let fit = WindowFit::new(&smooth, rows);
-        let (mut valid, mut fused) = (0, 0);
-        for (row, (inverse_depth, planes)) in
-            self.inverse_depth.chunks_exact_mut(width).zip(self.planes.chunks_exact_mut(width)).enumerate()
-        {
-            let lines = Lines {
-                around: [0, 1, 2].map(|k| raw.line(row + HALO - 1 + k, HALO - 1, width + 2)),
-                smooth: smooth.line(row + HALO, HALO, width),
-                fit: [0, 1, 2].map(|k| &fit.sums[k][row * width..(row + 1) * width]),
-            };
-            let lens = Lens::new(&depth.intrinsics, self.first + row);
-            let counts = lines.planes(&lens, &noise, inverse_depth, planes);
-            valid += counts[0] as usize;
-            fused += counts[1] as usize;
+        let per_metre = (f64::from(ONE) / settings.truncation()) as f32;
+        let mut windows = Windows::new(depth, settings, self.first);
+        let (mut low, mut high) = (vec![0.0; width], vec![0.0; width]);
+        let mut all = [0, 0];
+        let lines = self.planes.chunks_mut(TILE * width).zip(self.tiles.chunks_mut(width.div_ceil(TILE)));
+        for (line, (planes, tiles)) in lines.enumerate() {
+            low.fill(f32::INFINITY);
+            high.fill(0.0);
+            for (row, planes) in planes.chunks_exact_mut(width).enumerate() {
+                let row = line * TILE + row;
+                let lens = Lens::new(&depth.intrinsics, self.first + row, per_metre);
+                let [valid, fused] = read_row(&windows.row(row), &lens, noise, planes, &mut low, &mut high);
+                all = [all[0] + valid as usize, all[1] + fused as usize];
+            }
+            for (tile, (low, high)) in tiles.iter_mut().zip(low.chunks(TILE).zip(high.chunks(TILE))) {
+                *tile = Tile::of(low, high);
+            }
         }
-        (valid, fused)
+        all
     }
 }
 
-/// What one row of planes is made from.
-struct Lines<'a> {
-    /// The row above, the row itself and the row below, with one pixel more on each side.
-    around: [&'a [f32]; 3],
-    /// The row with NaN at edges.
-    smooth: &'a [f32],
-    fit: [&'a [f32]; 3],
-}
-
-impl Lines<'_> {
-    /// Returns the numbers of valid and of fused pixels.
-    fn planes(&self, lens: &Lens, noise: &Noise, inverse_depth: &mut [f32], planes: &mut [Plane]) -> [u32; 2] {
-        // Slices of known length spare the loop its bounds checks.
-        let width = inverse_depth.len();
-        let [above, here, below] = self.around.map(|line| &line[..width + 2]);
-        let (smooth, planes) = (&self.smooth[..width], &mut planes[..width]);
-        let [fit_u, fit_v, fit_mean] = self.fit.map(|line| &line[..width]);
-        let (lens, noise) = (*lens, *noise);
-        let mut counts = [0, 0];
-        for u in 0..width {
-            let omega = here[u + 1];
-            let sigma = noise.sigma_inverse(omega);
-            // A gap or an edge in the window makes the mean NaN; far from the pixel's value, the window is not plane.
-            let plane = (fit_mean[u] * WindowFit::PER_PIXEL - omega).abs() <= 3.0 * sigma;
-            let wide = [fit_u[u] * WindowFit::PER_SPREAD, fit_v[u] * WindowFit::PER_SPREAD];
-            let narrow = [0.5 * (here[u + 2] - here[u]), 0.5 * (below[u + 1] - above[u + 1])];
-            let slope = [if plane { wide[0] } else { narrow[0] }, if plane { wide[1] } else { narrow[1] }];
-            let (offset, cosine) = lens.plane(u as i32 as f32, omega, slope);
-            let ratio = noise.base * omega * omega / sigma;
-            let weight = (MAX_WEIGHT * ratio * ratio * cosine).clamp(1.0, MAX_WEIGHT);
-            // A NaN fails both comparisons.
-            let facing = if cosine >= LEAST_COSINE { smooth[u] } else { 0.0 };
-            let fused = if facing > 0.0 { facing } else { 0.0 };
-            inverse_depth[u] = fused;
-            planes[u] = Plane { slope, offset, weight: (weight + ROUNDER) - ROUNDER };
-            counts[0] += u32::from(omega > 0.0);
-            counts[1] += u32::from(fused > 0.0);
-        }
-        counts
+/// Fills a row of planes and widens the ranges of the inverse depth of its columns; returns the numbers of valid and of
+/// fused pixels.
+fn read_row(row: &Row, lens: &Lens, noise: Noise, planes: &mut [Plane], low: &mut [f32], high: &mut [f32]) -> [u32; 2] {
+    let width = planes.len();
+    let (row, lens) = (row.of_width(width), *lens);
+    let [above, here, below] = row.around;
+    let (low, high) = (&mut low[..width], &mut high[..width]);
+    let mut counts = [0, 0];
+    let most_bend = MOST_BEND * MOST_BEND * Fit::BEND_VARIANCE;
+    for u in 0..width {
+        let own = here[u + 1];
+        let sigma = noise.sigma_inverse(own);
+        let fit = row.fit(u);
+        // A NaN fails.
+        let is_plane = fit.bend * fit.bend <= most_bend * sigma * sigma;
+        let narrow = [0.5 * (here[u + 2] - here[u]), 0.5 * (below[u + 1] - above[u + 1])];
+        let omega = if is_plane { fit.mean } else { row.smooth[u] };
+        let slope = [0, 1].map(|k| if is_plane { fit.slope[k] } else { narrow[k] });
+        let (offset, cosine) = lens.plane(u as i32 as f32, omega, slope);
+        let ratio = noise.base * omega * omega / noise.sigma_inverse(omega);
+        let weight = MAX_WEIGHT * ratio * ratio * cosine;
+        let weight = if weight > 1.0 { weight } else { 1.0 };
+        let weight = if weight < MAX_WEIGHT { weight } else { MAX_WEIGHT };
+        // A NaN fails both comparisons.
+        let omega = if cosine >= LEAST_COSINE { omega } else { 0.0 };
+        let omega = if omega > 0.0 { omega } else { 0.0 };
+        let last = (offset * slope[1]).to_bits() & !15 | (weight + ROUNDER).to_bits() & 15;
+        planes[u] =
+            Plane { offset, scaled_omega: offset * omega, scaled_slope: [offset * slope[0], f32::from_bits(last)] };
+        let floor = if omega > 0.0 { omega } else { f32::INFINITY };
+        low[u] = if floor < low[u] { floor } else { low[u] };
+        high[u] = if omega > high[u] { omega } else { high[u] };
+        counts[0] += u32::from(own > 0.0);
+        counts[1] += u32::from(omega > 0.0);
     }
+    counts
 }
 
 /// The camera, seen from one row of its image.
@@ -169,6 +180,8 @@ impl Lines<'_> {
 struct Lens {
     focal: [f32; 2],
     inverse_focal: f32,
+    /// Steps of the stored distance per metre.
+    per_metre: f32,
     cx: f32,
     /// Row of the pixel from the principal point, in pixels, and squared in focal lengths.
     dv: f32,
@@ -176,19 +189,20 @@ struct Lens {
 }
 
 impl Lens {
-    fn new(k: &Intrinsics, v: usize) -> Self {
+    fn new(k: &Intrinsics, v: usize, per_metre: f32) -> Self {
         let dv = v as f64 - k.cy;
         Self {
             focal: [k.fx as f32, k.fy as f32],
             inverse_focal: (1.0 / k.fx) as f32,
+            per_metre,
             cx: k.cx as f32,
             dv: dv as f32,
             ray: ((dv / k.fy) * (dv / k.fy) + 1.0) as f32,
         }
     }
 
-    /// The plane through the pixel's own depth with the slopes of its neighbourhood: its distance from the camera and
-    /// the cosine between its normal and the ray.
+    /// The plane with this inverse depth and these slopes at a pixel: its distance from the camera in steps of the
+    /// stored distance, and the cosine between its normal and the ray.
     #[inline(always)]
     fn plane(&self, u: f32, omega: f32, slope: [f32; 2]) -> (f32, f32) {
         let du = u - self.cx;
@@ -196,7 +210,7 @@ impl Lens {
         let n = [self.focal[0] * slope[0], self.focal[1] * slope[1], omega - slope[0] * du - slope[1] * self.dv];
         let squared = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
         let ray = du * self.inverse_focal;
-        (1.0 / squared.sqrt(), omega / (squared * (ray * ray + self.ray)).sqrt())
+        (self.per_metre / squared.sqrt(), omega / (squared * (ray * ray + self.ray)).sqrt())
     }
 }
 

@@ -23,12 +23,12 @@ use crate::error::Error;
 use crate::key::{Key, mix};
 use crate::settings::Tiers as Limits;
 use crate::slots::Slots;
-use crate::store::{Stamp, Store};
+use crate::store::{Seen, Store};
 
 /// A block that has come back and waits to be merged.
 pub(crate) struct Held {
     block: Box<Block>,
-    stamp: Stamp,
+    seen: Seen,
     /// When it came.
     since: f64,
 }
@@ -83,18 +83,18 @@ impl Copies {
     }
 
     /// The sum of all copies of a block, and what is known of it.
-    pub(crate) fn total(&self, key: Key, sum: &mut Block) -> Result<Stamp, Error> {
+    pub(crate) fn total(&self, key: Key, sum: &mut Block) -> Result<Seen, Error> {
         *sum = Block::ZERO;
-        let mut stamp = self.cold.add_to(key, sum)?.map(Label::stamp).unwrap_or_default();
+        let mut seen = self.cold.add_to(key, sum)?.map(Label::seen).unwrap_or_default();
         if let Some(held) = self.held.get(key) {
             sum.add(&held.block);
-            stamp = stamp.with(held.stamp);
+            seen = seen.with(held.seen);
         }
-        if let Some((block, newer)) = self.active.get(key).zip(self.active.stamp(key)) {
+        if let Some((block, newer)) = self.active.get(key).zip(self.active.seen(key)) {
             sum.add(block);
-            stamp = stamp.with(newer);
+            seen = seen.with(newer);
         }
-        Ok(stamp)
+        Ok(seen)
     }
 
     /// A hash of the sums of all copies, in the order of the keys.
@@ -130,7 +130,7 @@ impl Copies {
     }
 }
 
-impl Stamp {
+impl Seen {
     /// Of the sum of two copies.
     pub(crate) fn with(self, other: Self) -> Self {
         let newer = if other.last > self.last { other } else { self };

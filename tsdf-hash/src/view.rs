@@ -51,6 +51,15 @@ pub struct DepthView<'a> {
     pub intrinsics: Intrinsics,
 }
 
+/// Colour pixels, row-major, R G B.
+#[derive(Clone, Copy, Debug)]
+pub enum ColourData<'a> {
+    /// `3 * width * height` bytes.
+    Rgb8(&'a [u8]),
+    /// `3 * width * height` values over the whole range `0..=65535`.
+    Rgb16(&'a [u16]),
+}
+
 /// A colour image taken from the optical centre of the depth image (registered); size and intrinsics may differ.
 #[derive(Clone, Copy, Debug)]
 pub struct ColourView<'a> {
@@ -58,14 +67,14 @@ pub struct ColourView<'a> {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// `3 * width * height` bytes, row-major, R G B.
-    pub rgb8: &'a [u8],
+    /// The pixels.
+    pub data: ColourData<'a>,
     /// The camera.
     pub intrinsics: Intrinsics,
 }
 
 impl Intrinsics {
-    fn check(&self, image: &'static str) -> Result<(), Error> {
+    pub(crate) fn check(&self, image: &'static str) -> Result<(), Error> {
         for (name, value, is_focal) in
             [("fx", self.fx, true), ("fy", self.fy, true), ("cx", self.cx, false), ("cy", self.cy, false)]
         {
@@ -95,16 +104,25 @@ impl DepthView<'_> {
 
 impl ColourView<'_> {
     pub(crate) fn check(&self) -> Result<(), Error> {
-        check_size("colour", self.width, self.height, 3, self.rgb8.len())?;
+        let found = match self.data {
+            ColourData::Rgb8(data) => data.len(),
+            ColourData::Rgb16(data) => data.len(),
+        };
+        check_size("colour", self.width, self.height, 3, found)?;
         self.intrinsics.check("colour")
     }
 }
 
-fn check_size(image: &'static str, width: usize, height: usize, channels: usize, found: usize) -> Result<(), Error> {
+pub(crate) fn check_sides(image: &'static str, width: usize, height: usize) -> Result<(), Error> {
     let sides = 1..=16384;
     if !sides.contains(&width) || !sides.contains(&height) {
         return Err(Error::InvalidSize { image, width, height });
     }
+    Ok(())
+}
+
+fn check_size(image: &'static str, width: usize, height: usize, channels: usize, found: usize) -> Result<(), Error> {
+    check_sides(image, width, height)?;
     let expected = width * height * channels;
     if found == expected { Ok(()) } else { Err(Error::WrongLength { image, expected, found }) }
 }

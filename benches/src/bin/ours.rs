@@ -11,7 +11,7 @@ use paint_net::procedural::Texture;
 use paint_net::{Deconvolution, Limits, MatchingPursuit, Painter, Saturation, SprayKernel, Task, metrics};
 use paint_sim::ciede2000;
 use paint_sim::colour::BANDS;
-use paintcopter_benches::cpu::{clock_name, median_seconds};
+use paintcopter_benches::cpu::median_seconds;
 use paintcopter_benches::{Rng, films, motion};
 use paintcopter_examples::mesh_io::read_mesh;
 use paintcopter_examples::world::rock_wall;
@@ -133,7 +133,7 @@ fn uv(path: &Path, runs: usize, save: Option<&Path>) -> Result<(), AnyError> {
         println!(
             "{}",
             json!({
-                "mesh": name, "clock": clock_name(), "fig": format!("uv-param_{fig}"), "s": seconds, "runs": runs.max(1),
+                "mesh": name, "fig": format!("uv-param_{fig}"), "s": seconds, "runs": runs.max(1),
                 "iters": q.iterations, "arap": q.arap, "sd": q.symmetric_dirichlet, "flips": q.flips,
                 "p99_stretch": q.stretch_p99, "max_stretch": q.stretch_max,
             })
@@ -178,7 +178,7 @@ fn paint(size: usize, runs: usize) -> Result<(), AnyError> {
                 "{}",
                 json!({
                     "image": format!("proc-{texture:?}").to_lowercase(), "method": format!("paint-net_{}", painter.name()),
-                    "clock": clock_name(), "cpu_s": seconds, "sprays": painting.sprays.len(),
+                    "cpu_s": seconds, "sprays": painting.sprays.len(),
                     "psnr": metrics::psnr(&painting.ink, &wanted, None)?,
                     "ssim": metrics::ssim(&painting.ink, &wanted, None)?,
                     "ssim_g": metrics::ssim_gaussian(&painting.ink, &wanted, None)?,
@@ -193,11 +193,7 @@ fn paint(size: usize, runs: usize) -> Result<(), AnyError> {
 fn sim(count: usize, runs: usize) -> Result<(), AnyError> {
     let print = |fig: &str, seconds: f64| {
         let (runs, cpu_ms) = (runs.max(1), 1e3 * seconds);
-        let clock = clock_name();
-        println!(
-            "{}",
-            json!({ "fig": fig, "peer": "paint-sim", "clock": clock, "count": count, "runs": runs, "cpu_ms": cpu_ms })
-        );
+        println!("{}", json!({ "fig": fig, "peer": "paint-sim", "count": count, "runs": runs, "cpu_ms": cpu_ms }));
     };
     let films = films::Films::new(count)?;
     let mut narrow = vec![[0.0; BANDS]; count];
@@ -238,7 +234,7 @@ fn judge(reference: &Path, estimate: &Path, runs: usize) -> Result<(), AnyError>
             "{}",
             json!({
                 "fig": format!("ate_{name}"), "peer": "vio-ekf", "pairs": pairs, "rmse_m": rmse_m, "rmse_deg": rmse_deg,
-                "clock": clock_name(), "cpu_ms": cpu_ms,
+                "cpu_ms": cpu_ms,
             })
         );
     }

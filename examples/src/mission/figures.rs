@@ -11,7 +11,7 @@ use ptu_kinematics::Joints;
 use super::inspect::Inspection;
 use super::{LayerFlight, Mission, MissionError};
 use crate::appearance::{DENSITY, UNIT_THICKNESS};
-use crate::report::Report;
+use crate::report::{Report, peak_resident_bytes};
 
 /// Samples between two looks for collisions in a flight: 50 ms, 2.5 cm at full speed.
 const COLLISION_STRIDE: usize = 5;
@@ -206,13 +206,6 @@ fn statistics(flights: &[LayerFlight], of: impl Fn(&LayerFlight) -> &FlightLog) 
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
     if count > 0.0 { sum / count } else { 0.0 }
-}
-
-/// Largest resident memory of this process so far; 0 where the system does not tell.
-fn peak_resident_bytes() -> u64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:")).unwrap_or("");
-    line.split_whitespace().next().and_then(|kb| kb.parse::<u64>().ok()).unwrap_or(0) * 1024
 }
 
 /// The pose of the nozzle at a sample: x along the spray.

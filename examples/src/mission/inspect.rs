@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use paint_sim::{Camera, Frame, Hit, Lights, Look, Surface, render};
-use tsdf_hash::{ColourView, DepthData, DepthView, Intrinsics, Map, Mesh};
+use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics, Map, Mesh};
 use vio_ekf::{Alignment, Stamp, Trajectory};
 
 use super::{Mission, MissionError};
@@ -134,7 +134,7 @@ fn fuse(map: &mut Map, camera: &Camera, frame: &Frame) -> Result<(), MissionErro
     let intrinsics = Intrinsics { fx: camera.fx, fy: camera.fy, cx: camera.cx, cy: camera.cy };
     let rgb8: Vec<u8> = frame.colour.iter().flatten().copied().collect();
     let depth = DepthView { width, height, data: DepthData::F32 { data: &frame.depth }, intrinsics };
-    let colour = ColourView { width, height, rgb8: &rgb8, intrinsics };
+    let colour = ColourView { width, height, data: ColourData::Rgb8(&rgb8), intrinsics };
     map.integrate(&depth, Some(&colour), &camera.world_from_camera)?;
     Ok(())
 }

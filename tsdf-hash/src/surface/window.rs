@@ -1,63 +1,163 @@
-//! Inverse depth around a band of rows: its edges, and its slopes over a window.
+//! Inverse depth around a row: its edges, and its slopes and mean over a window.
+//!
+//! Rows pass through rings of a few lines, so that the whole pipeline stays in the cache. All of it is plain `+ - * /` in
+//! a fixed order.
 
 use super::Noise;
 use crate::Settings;
 use crate::view::{DepthData, DepthView};
 
-/// Half the window of the slope filter: 7 x 7 pixels (ours; the normal's error at 2 m is then about 6 degrees).
+/// Half the window of the fit: 7 x 7 pixels (ours; the noise of a pixel of a plane shrinks to a seventh, and the error
+/// of a normal at 2 m is about 6 degrees).
 const RADIUS: usize = 3;
-/// Pixels of context on each side of a band: the window, and one for the edge test.
-pub(super) const HALO: usize = RADIUS + 1;
-/// Inverse depth of a band and `HALO` pixels around it, NaN where there is none: arithmetic then spreads the gaps.
-pub(super) struct Padded {
+/// Pixels of context on each side of a row: the window, and one for the edge test.
+const HALO: usize = RADIUS + 1;
+/// Lines in a ring: from the first line of a window to the one that its last edge test needs.
+const RING: usize = 2 * HALO;
+/// Values in the window.
+const COUNT: f32 = 49.0;
+/// `Σ i²` over the window.
+const SPREAD: f32 = 196.0;
+
+/// The last lines of something.
+struct Ring {
     stride: usize,
     values: Vec<f32>,
 }
 
-impl Padded {
-    pub(super) fn read(depth: &DepthView, settings: &Settings, first: usize, rows: usize) -> Self {
-        let stride = depth.width + 2 * HALO;
-        let mut values = vec![f32::NAN; stride * (rows + 2 * HALO)];
-        let (near, far) = (settings.min_depth as f32, settings.max_depth as f32);
-        let invert = |z: f32| if z >= near && z <= far { 1.0 / z } else { f32::NAN };
-        for (k, out) in values.chunks_exact_mut(stride).enumerate() {
-            let Some(v) = (first + k).checked_sub(HALO).filter(|&v| v < depth.height) else { continue };
-            let (row, out) = (v * depth.width..(v + 1) * depth.width, &mut out[HALO..HALO + depth.width]);
-            match depth.data {
-                DepthData::U16 { data, scale } => {
-                    let metres = (1.0 / scale) as f32;
-                    for (out, &d) in out.iter_mut().zip(&data[row]) {
-                        *out = if d == u16::MAX { f32::NAN } else { invert(f32::from(d) * metres) };
-                    }
-                }
-                DepthData::F32 { data } => {
-                    for (out, &z) in out.iter_mut().zip(&data[row]) {
-                        *out = invert(z);
-                    }
-                }
-            }
-        }
-        Self { stride, values }
+impl Ring {
+    fn new(stride: usize) -> Self {
+        Self { stride, values: vec![f32::NAN; stride * RING] }
     }
 
-    /// `length` values of a line, from a column on; both count from the corner of the halo.
-    pub(super) fn line(&self, line: usize, column: usize, length: usize) -> &[f32] {
-        &self.values[line * self.stride + column..][..length]
+    fn line(&self, k: usize) -> &[f32] {
+        &self.values[k % RING * self.stride..][..self.stride]
     }
 
-    /// A copy with NaN where the 3x3 patch has a gap, or bends or jumps by more than four standard deviations of its
-    /// noise.
-    pub(super) fn without_edges(&self, noise: &Noise) -> Self {
-        let s = self.stride;
-        let mut values = vec![f32::NAN; self.values.len()];
-        for (k, out) in values.chunks_exact_mut(s).enumerate().skip(1).take(self.values.len() / s - 2) {
-            let around = [k - 1, k, k + 1].map(|k| self.line(k, 0, s));
-            smooth_line(around, *noise, &mut out[1..s - 1]);
-        }
-        Self { stride: s, values }
+    /// Seven lines from `k` on.
+    fn seven(&self, k: usize) -> [&[f32]; 7] {
+        [0, 1, 2, 3, 4, 5, 6].map(|j| self.line(k + j))
+    }
+
+    fn line_mut(&mut self, k: usize) -> &mut [f32] {
+        &mut self.values[k % RING * self.stride..][..self.stride]
     }
 }
 
+/// Fits around the rows of a band, one row after the other. Line `k` is image row `first + k - HALO`.
+pub(super) struct Windows<'a> {
+    depth: &'a DepthView<'a>,
+    first: usize,
+    near: f32,
+    far: f32,
+    noise: Noise,
+    /// Inverse depth with `HALO` pixels on each side, NaN where there is none: arithmetic then spreads the gaps.
+    raw: Ring,
+    /// The same with NaN at edges.
+    smooth: Ring,
+    /// Along the line, over the window: sum, first moment, second difference.
+    total: Ring,
+    moment: Ring,
+    bend: Ring,
+}
+
+/// A row and its fits; slices of the image's width.
+pub(super) struct Row<'a> {
+    /// Inverse depth of the row above, of the row and of the row below, with one pixel more on each side.
+    pub(super) around: [&'a [f32]; 3],
+    /// The row with NaN at edges.
+    pub(super) smooth: &'a [f32],
+    total: [&'a [f32]; 7],
+    moment: [&'a [f32]; 7],
+    bend: [&'a [f32]; 7],
+}
+
+/// What fits the inverse depth over the window around a pixel; NaN if the window has a gap or an edge.
+#[derive(Clone, Copy)]
+pub(super) struct Fit {
+    pub(super) mean: f32,
+    /// Slopes per pixel.
+    pub(super) slope: [f32; 2],
+    /// How far the rim of the window is from its middle, along both axes together; 0 for a plane.
+    pub(super) bend: f32,
+}
+
+impl Fit {
+    /// Variance of the bend, for noise of unit variance.
+    pub(super) const BEND_VARIANCE: f32 = 1.0 / 6.0;
+}
+
+impl<'a> Windows<'a> {
+    pub(super) fn new(depth: &'a DepthView<'a>, settings: &Settings, first: usize) -> Self {
+        let (width, padded) = (depth.width, depth.width + 2 * HALO);
+        let mut windows = Self {
+            depth,
+            first,
+            near: settings.min_depth as f32,
+            far: settings.max_depth as f32,
+            noise: Noise::new(settings),
+            raw: Ring::new(padded),
+            smooth: Ring::new(padded),
+            total: Ring::new(width),
+            moment: Ring::new(width),
+            bend: Ring::new(width),
+        };
+        (0..RING).for_each(|k| windows.push(k));
+        windows
+    }
+
+    /// The row `row` of the band; they are asked for in order.
+    pub(super) fn row(&mut self, row: usize) -> Row<'_> {
+        self.push(row + RING);
+        let width = self.depth.width;
+        Row {
+            around: [HALO - 1, HALO, HALO + 1].map(|k| &self.raw.line(row + k)[HALO - 1..][..width + 2]),
+            smooth: &self.smooth.line(row + HALO)[HALO..][..width],
+            total: self.total.seven(row + 1),
+            moment: self.moment.seven(row + 1),
+            bend: self.bend.seven(row + 1),
+        }
+    }
+
+    /// Reads line `k` and finishes the line before it.
+    fn push(&mut self, k: usize) {
+        self.read(k);
+        if k < 2 {
+            return;
+        }
+        let width = self.depth.width;
+        let around = [k - 2, k - 1, k].map(|k| self.raw.line(k));
+        smooth_line(around, self.noise, &mut self.smooth.line_mut(k - 1)[1..][..width + 2 * RADIUS]);
+        let source = &self.smooth.line(k - 1)[1..][..width + 2 * RADIUS];
+        sum_line(source, self.total.line_mut(k - 1), self.moment.line_mut(k - 1), self.bend.line_mut(k - 1));
+    }
+
+    fn read(&mut self, k: usize) {
+        let width = self.depth.width;
+        let (near, far) = (self.near, self.far);
+        let out = &mut self.raw.line_mut(k)[HALO..][..width];
+        let Some(v) = (self.first + k).checked_sub(HALO).filter(|&v| v < self.depth.height) else {
+            return out.fill(f32::NAN);
+        };
+        let invert = |z: f32| if z >= near && z <= far { 1.0 / z } else { f32::NAN };
+        match self.depth.data {
+            DepthData::U16 { data, scale } => {
+                let metres = (1.0 / scale) as f32;
+                for (out, &d) in out.iter_mut().zip(&data[v * width..][..width]) {
+                    *out = if d == u16::MAX { f32::NAN } else { invert(f32::from(d) * metres) };
+                }
+            }
+            DepthData::F32 { data } => {
+                for (out, &z) in out.iter_mut().zip(&data[v * width..][..width]) {
+                    *out = invert(z);
+                }
+            }
+        }
+    }
+}
+
+/// A copy of a line with NaN where the 3x3 patch has a gap, or bends or jumps by more than four standard deviations of
+/// its noise.
 fn smooth_line(around: [&[f32]; 3], noise: Noise, out: &mut [f32]) {
     let width = out.len();
     let [above, here, below] = around.map(|line| &line[..width + 2]);
@@ -76,48 +176,48 @@ fn smooth_line(around: [&[f32]; 3], noise: Noise, out: &mut [f32]) {
     }
 }
 
-/// Least-squares slopes and mean of the inverse depth over the window around each pixel.
-pub(super) struct WindowFit {
-    /// `Σ i ω`, `Σ j ω` and `Σ ω` over the window, row-major.
-    pub(super) sums: [Vec<f32>; 3],
-}
-
-impl WindowFit {
-    const SIDE: usize = 2 * RADIUS + 1;
-    /// One over the number of pixels in the window.
-    pub(super) const PER_PIXEL: f32 = 1.0 / (Self::SIDE * Self::SIDE) as f32;
-    /// One over `Σ i²` over the window.
-    pub(super) const PER_SPREAD: f32 = 3.0 / (Self::SIDE * RADIUS * (RADIUS + 1) * Self::SIDE) as f32;
-
-    pub(super) fn new(smooth: &Padded, rows: usize) -> Self {
-        let width = smooth.stride - 2 * HALO;
-        let tap = |k: usize| k as f32 - RADIUS as f32;
-        let mut along = [vec![0.0; width], vec![0.0; width]];
-        let mut sums = [(); 3].map(|()| vec![0.0; width * rows]);
-        for line in 0..rows + 2 * RADIUS {
-            let source = smooth.line(line + HALO - RADIUS, HALO - RADIUS, width + 2 * RADIUS);
-            let [total, moment] = &mut along;
-            total.fill(0.0);
-            moment.fill(0.0);
-            for k in 0..Self::SIDE {
-                add_scaled(total, &source[k..], 1.0);
-                add_scaled(moment, &source[k..], tap(k));
-            }
-            for k in 0..Self::SIDE {
-                let Some(row) = (line + k).checked_sub(2 * RADIUS).filter(|&row| row < rows) else { continue };
-                let out = row * width..(row + 1) * width;
-                add_scaled(&mut sums[0][out.clone()], moment, 1.0);
-                // This line is the one `RADIUS - k` below the centre.
-                add_scaled(&mut sums[1][out.clone()], total, -tap(k));
-                add_scaled(&mut sums[2][out], total, 1.0);
-            }
-        }
-        Self { sums }
+/// Sum, first moment and second difference of seven neighbours along a line.
+fn sum_line(source: &[f32], total: &mut [f32], moment: &mut [f32], bend: &mut [f32]) {
+    let width = total.len();
+    let (source, moment, bend) = (&source[..width + 6], &mut moment[..width], &mut bend[..width]);
+    for u in 0..width {
+        let x = [0, 1, 2, 3, 4, 5, 6].map(|k| source[u + k]);
+        (total[u], moment[u], bend[u]) = seven(x);
     }
 }
 
-fn add_scaled(out: &mut [f32], values: &[f32], factor: f32) {
-    for (out, value) in out.iter_mut().zip(values) {
-        *out += factor * value;
+/// `Σ x_i`, `Σ i x_i` and `3 Σ_rim x_i - 4 Σ_middle x_i` for `i = -3..=3`.
+#[inline(always)]
+fn seven(x: [f32; 7]) -> (f32, f32, f32) {
+    let (rim, middle) = ((x[0] + x[6]) + (x[1] + x[5]), (x[2] + x[4]) + x[3]);
+    let moment = 3.0 * (x[6] - x[0]) + 2.0 * (x[5] - x[1]) + (x[4] - x[2]);
+    (rim + middle, moment, 3.0 * rim - 4.0 * middle)
+}
+
+impl Row<'_> {
+    /// The same row with slices whose lengths the compiler can see.
+    #[inline(always)]
+    pub(super) fn of_width(&self, width: usize) -> Self {
+        Self {
+            around: self.around.map(|line| &line[..width + 2]),
+            smooth: &self.smooth[..width],
+            total: self.total.map(|line| &line[..width]),
+            moment: self.moment.map(|line| &line[..width]),
+            bend: self.bend.map(|line| &line[..width]),
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn fit(&self, u: usize) -> Fit {
+        let (sum, down, bend_down) = seven(self.total.map(|line| line[u]));
+        let add = |x: [&[f32]; 7]| {
+            let x = x.map(|line| line[u]);
+            ((x[0] + x[6]) + (x[1] + x[5])) + ((x[2] + x[4]) + x[3])
+        };
+        Fit {
+            mean: sum * (1.0 / COUNT),
+            slope: [add(self.moment) * (1.0 / SPREAD), down * (1.0 / SPREAD)],
+            bend: (add(self.bend) + bend_down) * (1.0 / 84.0),
+        }
     }
 }

@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::fuse::{Frame, Sign, Tally};
 use crate::key::Key;
 use crate::parallel::in_chunks;
-use crate::store::Stamp;
+use crate::store::Seen;
 
 /// What a frame did.
 #[derive(Default)]
@@ -90,7 +90,7 @@ impl Copies {
         for work in present {
             self.active.put(work.slot, work.block);
             if work.tally.voxels > 0 {
-                self.active.stamp_mut(work.slot).call = self.call;
+                self.active.touch(work.slot, self.call);
                 change.touched.push(work.key);
                 change.voxels += work.tally.voxels;
             }
@@ -130,10 +130,10 @@ impl Copies {
         }
         for &key in keys {
             self.unhold(key)?;
-            if let Some((block, stamp)) = self.active.get_mut(key)
+            if let Some((block, seen)) = self.active.get_mut(key)
                 && let Some(label) = self.cold.add_to(key, block)?
             {
-                *stamp = label.stamp().with(*stamp);
+                *seen = label.seen().with(*seen);
                 self.cold.remove(key);
             }
         }
@@ -182,16 +182,16 @@ impl Copies {
                     room -= 1;
                     kept.push(partial);
                 } else {
-                    let stamp = self.stamp_now(moment);
-                    self.cold.stage(partial.key, &partial.block, stamp).map_err(|error| self.or_no_tiers(error))?;
+                    let seen = self.seen_now(moment);
+                    self.cold.stage(partial.key, &partial.block, seen).map_err(|error| self.or_no_tiers(error))?;
                 }
             }
         }
         Ok(kept)
     }
 
-    fn stamp_now(&self, moment: Moment) -> Stamp {
-        Stamp { last: moment.time, frames: 1, call: self.call }
+    fn seen_now(&self, moment: Moment) -> Seen {
+        Seen { last: moment.time, frames: 1, call: self.call }
     }
 
     /// Without cold memory it is active memory that is full.
@@ -210,8 +210,8 @@ impl Copies {
         let Some(label) = label.filter(|_| !sum.subtract(&partial.block)) else {
             return Err(refused(Sign::Minus, partial.key));
         };
-        let stamp = Stamp { frames: label.frames.saturating_sub(1), ..label.stamp() };
-        self.cold.stage_instead(partial.key, &sum, stamp)?;
+        let seen = Seen { frames: label.frames.saturating_sub(1), ..label.seen() };
+        self.cold.stage_instead(partial.key, &sum, seen)?;
         Ok(sum.is_empty())
     }
 
@@ -221,13 +221,13 @@ impl Copies {
         change.blocks += change.touched.len();
         let mut emptied = Vec::new();
         for &key in &change.touched {
-            let Some((block, stamp)) = self.active.get_mut(key) else { continue };
+            let Some((block, seen)) = self.active.get_mut(key) else { continue };
             match sign {
                 Sign::Plus => {
-                    stamp.last = moment.time;
-                    stamp.frames = stamp.frames.saturating_add(1);
+                    seen.last = moment.time;
+                    seen.frames = seen.frames.saturating_add(1);
                 }
-                Sign::Minus => stamp.frames = stamp.frames.saturating_sub(1),
+                Sign::Minus => seen.frames = seen.frames.saturating_sub(1),
             }
             if block.is_empty() {
                 emptied.push(key);
@@ -239,8 +239,8 @@ impl Copies {
         }
         for partial in partials {
             change.touched.push(partial.key);
-            let stamp = self.stamp_now(moment);
-            self.active.insert(partial.key, partial.block, stamp);
+            let seen = self.seen_now(moment);
+            self.active.insert(partial.key, partial.block, seen);
         }
     }
 }

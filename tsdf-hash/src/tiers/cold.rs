@@ -10,7 +10,7 @@ use crate::block::Block;
 use crate::error::Error;
 use crate::file::{BlockFile, Entry};
 use crate::key::Key;
-use crate::store::Stamp;
+use crate::store::Seen;
 
 /// What is known of a packed block without unpacking it.
 #[derive(Clone, Copy, Default)]
@@ -149,23 +149,23 @@ impl Cold {
     ///
     /// # Errors
     /// When nothing has room for it, or the disk fails; nothing has changed then.
-    pub(crate) fn put(&mut self, key: Key, block: &Block, stamp: Stamp) -> Result<(), Error> {
-        let (place, label) = self.merged(key, block, stamp)?;
+    pub(crate) fn put(&mut self, key: Key, block: &Block, seen: Seen) -> Result<(), Error> {
+        let (place, label) = self.merged(key, block, seen)?;
         self.install((key, place, label));
         Ok(())
     }
 
     /// The same, but only when [`commit`](Self::commit) is called.
-    pub(crate) fn stage(&mut self, key: Key, block: &Block, stamp: Stamp) -> Result<(), Error> {
-        let (place, label) = self.merged(key, block, stamp)?;
+    pub(crate) fn stage(&mut self, key: Key, block: &Block, seen: Seen) -> Result<(), Error> {
+        let (place, label) = self.merged(key, block, seen)?;
         self.push(key, place, label);
         Ok(())
     }
 
     /// Stages a block in the place of the copy that is here.
-    pub(crate) fn stage_instead(&mut self, key: Key, block: &Block, stamp: Stamp) -> Result<(), Error> {
+    pub(crate) fn stage_instead(&mut self, key: Key, block: &Block, seen: Seen) -> Result<(), Error> {
         let place = if block.is_empty() { Place::Gone } else { self.place(block)? };
-        self.push(key, place, label_of(block, stamp));
+        self.push(key, place, label_of(block, seen));
         Ok(())
     }
 
@@ -199,13 +199,13 @@ impl Cold {
         Error::TiersFull { host_bytes: self.host_bytes(), disk_bytes: self.disk_bytes() }
     }
 
-    fn merged(&mut self, key: Key, block: &Block, stamp: Stamp) -> Result<(Place, Label), Error> {
+    fn merged(&mut self, key: Key, block: &Block, seen: Seen) -> Result<(Place, Label), Error> {
         if self.label(key).is_none() {
-            return Ok((self.place(block)?, label_of(block, stamp)));
+            return Ok((self.place(block)?, label_of(block, seen)));
         }
         let mut sum = Box::new(block.clone());
         let old = self.add_to(key, &mut sum)?.unwrap_or_default();
-        Ok((self.place(&sum)?, label_of(&sum, old.stamp().with(stamp))))
+        Ok((self.place(&sum)?, label_of(&sum, old.seen().with(seen))))
     }
 
     /// Packs a block into RAM, or onto the disk if that is full.
@@ -317,13 +317,13 @@ fn index_bytes<V>(len: usize) -> usize {
     if len == 0 { 0 } else { (len / 5 + 2) * node }
 }
 
-fn label_of(block: &Block, stamp: Stamp) -> Label {
-    Label { print: block.print(), last: stamp.last, frames: stamp.frames, peaks: block.peaks() }
+fn label_of(block: &Block, seen: Seen) -> Label {
+    Label { print: block.print(), last: seen.last, frames: seen.frames, peaks: block.peaks() }
 }
 
 impl Label {
     /// As a copy that no call has touched.
-    pub(crate) fn stamp(self) -> Stamp {
-        Stamp { last: self.last, frames: self.frames, call: 0 }
+    pub(crate) fn seen(self) -> Seen {
+        Seen { last: self.last, frames: self.frames, call: 0 }
     }
 }

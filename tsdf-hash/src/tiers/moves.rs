@@ -29,9 +29,9 @@ impl Copies {
         }
         let mut old: Vec<_> = self
             .active
-            .stamps()
-            .filter(|(_, stamp)| time - stamp.last > self.limits.age)
-            .map(|(key, stamp)| (Order(stamp.last), key))
+            .sightings()
+            .filter(|(_, seen)| time - seen.last > self.limits.age)
+            .map(|(key, seen)| (Order(seen.last), key))
             .collect();
         if old.len() > self.limits.transfers {
             old.select_nth_unstable(self.limits.transfers);
@@ -60,7 +60,7 @@ impl Copies {
 
     /// Brings a cold copy into active memory, or to the held ones; `false` if there is no room to hold it.
     fn bring_back(&mut self, key: Key, time: f64) -> Result<bool, Error> {
-        let (block, stamp) = if self.limits.hold == 0.0 {
+        let (block, seen) = if self.limits.hold == 0.0 {
             let Some(copy) = self.active.get_mut(key) else { return Ok(false) };
             copy
         } else {
@@ -69,14 +69,14 @@ impl Copies {
                     return Ok(false);
                 }
                 let block = Box::new(Block::ZERO);
-                self.held.insert(key, Held { block, stamp: crate::store::Stamp::default(), since: time });
+                self.held.insert(key, Held { block, seen: crate::store::Seen::default(), since: time });
                 self.active.set_aside = self.held_bytes(1);
             }
             let Some(held) = self.held.get_mut(key) else { return Ok(false) };
-            (&mut *held.block, &mut held.stamp)
+            (&mut *held.block, &mut held.seen)
         };
         if let Some(label) = self.cold.add_to(key, block)? {
-            *stamp = label.stamp().with(*stamp);
+            *seen = label.seen().with(*seen);
             self.cold.remove(key);
         }
         Ok(true)
@@ -97,12 +97,12 @@ impl Copies {
     pub(crate) fn unhold(&mut self, key: Key) -> Result<(), Error> {
         let Some(held) = self.held.remove(key) else { return Ok(()) };
         self.active.set_aside = self.held_bytes(1);
-        if let Some((block, stamp)) = self.active.get_mut(key) {
+        if let Some((block, seen)) = self.active.get_mut(key) {
             block.add(&held.block);
-            *stamp = held.stamp.with(*stamp);
+            *seen = held.seen.with(*seen);
         } else if self.active.room() > 0 {
-            self.active.insert(key, held.block, held.stamp);
-        } else if let Err(error) = self.cold.put(key, &held.block, held.stamp) {
+            self.active.insert(key, held.block, held.seen);
+        } else if let Err(error) = self.cold.put(key, &held.block, held.seen) {
             self.held.insert(key, held);
             self.active.set_aside = self.held_bytes(1);
             return Err(error);
@@ -117,9 +117,9 @@ impl Copies {
         }
         let mut victims: Vec<_> = self
             .active
-            .stamps()
-            .filter(|(_, stamp)| stamp.call != self.call)
-            .map(|(key, stamp)| (Order(stamp.last), Order(-distance(key, eye)), key))
+            .sightings()
+            .filter(|(_, seen)| seen.call != self.call)
+            .map(|(key, seen)| (Order(seen.last), Order(-distance(key, eye)), key))
             .collect();
         if victims.len() > count {
             victims.select_nth_unstable(count);
@@ -133,7 +133,7 @@ impl Copies {
         held.sort_unstable();
         for key in held.into_iter().take(count - victims.len()) {
             if let Some(held) = self.held.remove(key)
-                && let Err(error) = self.cold.put(key, &held.block, held.stamp)
+                && let Err(error) = self.cold.put(key, &held.block, held.seen)
             {
                 self.held.insert(key, held);
                 return Err(error);
@@ -145,10 +145,10 @@ impl Copies {
 
     /// Moves an active block to cold memory, into its copy there if it has one.
     fn send_away(&mut self, key: Key) -> Result<(), Error> {
-        let Some((block, stamp)) = self.active.remove(key) else { return Ok(()) };
-        let put = self.cold.put(key, &block, stamp);
+        let Some((block, seen)) = self.active.remove(key) else { return Ok(()) };
+        let put = self.cold.put(key, &block, seen);
         if put.is_err() {
-            self.active.insert(key, block, stamp);
+            self.active.insert(key, block, seen);
         }
         put
     }

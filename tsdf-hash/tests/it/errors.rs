@@ -1,7 +1,7 @@
 //! Every input that is refused, and that the map does not notice.
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use tsdf_hash::{ColourView, DepthData, DepthView, Error, Map, NoiseModel, Settings};
+use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Error, Map, NoiseModel, Settings};
 
 use crate::scene::{Shot, look_at};
 
@@ -72,7 +72,7 @@ fn views_that_make_no_sense_change_nothing() {
     let data = DepthData::U16 { data: &comb, scale: 1000.0 };
     assert!(matches!(refuse(DepthView { data, ..good }, None, &pose), Error::NoDepth { valid: 3072 }));
     let rgb8 = vec![0; 3 * 3072 - 1];
-    let colour = ColourView { width: 64, height: 48, rgb8: &rgb8, intrinsics: good.intrinsics };
+    let colour = ColourView { width: 64, height: 48, data: ColourData::Rgb8(&rgb8), intrinsics: good.intrinsics };
     assert!(matches!(refuse(good, Some(&colour), &pose), Error::WrongLength { image: "colour", .. }));
     let mut broken = pose;
     broken.translation.vector.y = f64::NAN;
@@ -118,7 +118,7 @@ fn a_full_voxel_is_an_error_and_not_a_wrong_average() {
     let shot = wall();
     let mut map = Map::new(Settings { voxel_size: 0.04, ..Settings::default() }).unwrap();
     let rgb8 = vec![255; 3 * 3072];
-    let colour = ColourView { width: 64, height: 48, rgb8: &rgb8, intrinsics: shot.intrinsics };
+    let colour = ColourView { width: 64, height: 48, data: ColourData::Rgb8(&rgb8), intrinsics: shot.intrinsics };
     for _ in 0..1040 {
         map.integrate(&shot.view(), Some(&colour), &shot.world_from_camera).unwrap();
     }
@@ -143,7 +143,7 @@ fn a_stranger_cannot_be_taken_out() {
         assert_eq!(map.hash(), before);
     }
     let rgb8 = vec![9; 3 * 3072];
-    let colour = ColourView { width: 64, height: 48, rgb8: &rgb8, intrinsics: shot.intrinsics };
+    let colour = ColourView { width: 64, height: 48, data: ColourData::Rgb8(&rgb8), intrinsics: shot.intrinsics };
     let coloured = map.deintegrate(&shot.view(), Some(&colour), &shot.world_from_camera);
     assert!(matches!(coloured, Err(Error::NotIntegrated { .. })));
     assert_eq!(map.hash(), before);

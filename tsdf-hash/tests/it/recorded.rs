@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Matrix3, Matrix4, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
-use tsdf_hash::{ColourView, DepthData, DepthView, Intrinsics, Map, Settings};
+use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics, Map, Settings};
 
 use crate::topology::assert_manifold;
 
@@ -50,7 +50,7 @@ fn depth_view(frame: &Recorded, scale: f64, intrinsics: Intrinsics) -> DepthView
 fn fuse(frames: &[Recorded], scale: f64, intrinsics: Intrinsics) -> Map {
     let mut map = Map::new(Settings { voxel_size: 0.02, threads: 2, ..Settings::default() }).unwrap();
     for frame in frames {
-        let colour = ColourView { width: 640, height: 480, rgb8: &frame.rgb8, intrinsics };
+        let colour = ColourView { width: 640, height: 480, data: ColourData::Rgb8(&frame.rgb8), intrinsics };
         map.integrate(&depth_view(frame, scale, intrinsics), Some(&colour), &frame.world_from_camera).unwrap();
     }
     let mesh = map.mesh();

@@ -1,7 +1,7 @@
 //! Sums, not averages: any order, any number of threads, and back.
 
 use nalgebra::Isometry3;
-use tsdf_hash::{ColourView, Map, Settings};
+use tsdf_hash::{ColourData, ColourView, Map, Settings};
 
 use crate::scene::{Shot, room};
 
@@ -25,14 +25,14 @@ fn fused(shots: &[Shot], order: &[usize], threads: usize) -> Map {
 fn add(map: &mut Map, shot: &Shot, k: usize) {
     let rgb8 = colours(shot, k);
     let (width, height, intrinsics) = (shot.width, shot.height, shot.intrinsics);
-    let colour = ColourView { width, height, rgb8: &rgb8, intrinsics };
+    let colour = ColourView { width, height, data: ColourData::Rgb8(&rgb8), intrinsics };
     map.integrate(&shot.view(), Some(&colour), &shot.world_from_camera).unwrap();
 }
 
 fn take_out(map: &mut Map, shot: &Shot, k: usize) {
     let rgb8 = colours(shot, k);
     let (width, height, intrinsics) = (shot.width, shot.height, shot.intrinsics);
-    let colour = ColourView { width, height, rgb8: &rgb8, intrinsics };
+    let colour = ColourView { width, height, data: ColourData::Rgb8(&rgb8), intrinsics };
     map.deintegrate(&shot.view(), Some(&colour), &shot.world_from_camera).unwrap();
 }
 
@@ -86,7 +86,7 @@ fn images_of_another_size_colour_the_same_surface() {
     let rgb8: Vec<u8> =
         (0..width * height).flat_map(|k| if k % width < width / 2 { [255, 0, 0] } else { [0, 255, 0] }).collect();
     let mut map = Map::new(settings(1)).unwrap();
-    let colour = ColourView { width, height, rgb8: &rgb8, intrinsics };
+    let colour = ColourView { width, height, data: ColourData::Rgb8(&rgb8), intrinsics };
     map.integrate(&shot.view(), Some(&colour), &shot.world_from_camera).unwrap();
     let mesh = map.mesh();
     let (mut checked, camera_from_world) = (0, shot.world_from_camera.inverse());

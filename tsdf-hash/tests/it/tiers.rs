@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use nalgebra::{Isometry3, Point3};
-use tsdf_hash::{Arrivals, ColourView, Error, Map, Settings, Tiers, Verdict};
+use tsdf_hash::{Arrivals, ColourData, ColourView, Error, Map, Settings, Tiers, Verdict};
 
 use crate::scene::{Shot, look_at, room};
 
@@ -37,13 +37,23 @@ fn colours(shot: &Shot) -> Vec<u8> {
 
 fn add(map: &mut Map, shot: &Shot) -> Result<tsdf_hash::FrameReport, Error> {
     let rgb8 = colours(shot);
-    let colour = ColourView { width: shot.width, height: shot.height, rgb8: &rgb8, intrinsics: shot.intrinsics };
+    let colour = ColourView {
+        width: shot.width,
+        height: shot.height,
+        data: ColourData::Rgb8(&rgb8),
+        intrinsics: shot.intrinsics,
+    };
     map.integrate(&shot.view(), Some(&colour), &shot.world_from_camera)
 }
 
 fn take_out(map: &mut Map, shot: &Shot) -> Result<tsdf_hash::FrameReport, Error> {
     let rgb8 = colours(shot);
-    let colour = ColourView { width: shot.width, height: shot.height, rgb8: &rgb8, intrinsics: shot.intrinsics };
+    let colour = ColourView {
+        width: shot.width,
+        height: shot.height,
+        data: ColourData::Rgb8(&rgb8),
+        intrinsics: shot.intrinsics,
+    };
     map.deintegrate(&shot.view(), Some(&colour), &shot.world_from_camera)
 }
 

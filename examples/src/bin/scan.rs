@@ -1,0 +1,85 @@
+//! Maps a recorded RGB-D sequence: depth and colour images with poses become a map and a mesh.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Parser, ValueEnum};
+use paintcopter_examples::report::save_figures;
+use paintcopter_examples::scan::{Scan, ScanSettings, Sequence};
+
+/// Maps a recorded RGB-D sequence into a voxel-hashed distance field and its mesh.
+#[derive(Parser)]
+#[command(version, after_help = "Example:\n  scan --sequence recordings/kitchen --voxel 0.01 --out out/kitchen")]
+struct Arguments {
+    /// Folder in the layout of 7-Scenes, TUM, ICL-NUIM or Redwood
+    #[arg(long, value_name = "DIR")]
+    sequence: PathBuf,
+    /// Where the poses come from
+    #[arg(long, default_value = "given")]
+    poses: Poses,
+    /// Edge of a voxel, metres
+    #[arg(long, value_name = "METRES", default_value_t = 0.01)]
+    voxel: f64,
+    /// Units of the depth images per metre [default: the layout's]
+    #[arg(long, value_name = "UNITS")]
+    depth_scale: Option<f64>,
+    /// Farthest depth that is fused, metres
+    #[arg(long, value_name = "METRES", default_value_t = 6.0)]
+    max_depth: f64,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/scan")]
+    out: PathBuf,
+    /// Worker threads [default: all cores]; results do not depend on it
+    #[arg(long)]
+    threads: Option<usize>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Poses {
+    /// As recorded with the sequence
+    Given,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("scan: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
+    let Poses::Given = arguments.poses;
+    let folder = &arguments.out;
+    std::fs::create_dir_all(folder)
+        .map_err(|e| format!("{}: cannot be created ({e}): choose another --out", folder.display()))?;
+    let mut sequence = Sequence::open(&arguments.sequence)?;
+    if let Some(scale) = arguments.depth_scale {
+        sequence.depth_scale = scale;
+    }
+    eprintln!("{}: {} layout, {} frames", arguments.sequence.display(), sequence.layout, sequence.frames.len());
+    let threads = arguments.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+    let map = tsdf_hash::Settings {
+        voxel_size: arguments.voxel,
+        max_depth: arguments.max_depth,
+        threads: threads.clamp(1, 1024),
+        ..tsdf_hash::Settings::default()
+    };
+    let scan = Scan::run(&arguments.sequence, &sequence, ScanSettings { map, ..ScanSettings::default() })?;
+    for (_, why) in &scan.skipped {
+        eprintln!("left out: {why}");
+    }
+    scan.save_views(&sequence, folder, map.threads)?;
+    let ply = folder.join("mesh.ply");
+    let file = std::fs::File::create(&ply).map_err(|e| format!("{}: cannot be written ({e})", ply.display()))?;
+    tsdf_hash::write_ply(&scan.mesh, file)?;
+    let tum = folder.join("trajectory.tum");
+    std::fs::write(&tum, vio_ekf::tum::write(&scan.trajectory))
+        .map_err(|e| format!("{}: cannot be written ({e})", tum.display()))?;
+    // Last, so that its presence means the folder is complete.
+    save_figures(&scan.report(), folder)?;
+    println!("{}", folder.join("mesh.ply").display());
+    Ok(())
+}

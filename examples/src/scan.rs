@@ -1,0 +1,13 @@
+//! Maps a recorded RGB-D sequence: reads it frame by frame, fuses it, and shows what became of it.
+
+mod decode;
+mod layouts;
+mod report;
+mod run;
+mod sequence;
+mod views;
+
+pub use decode::{Colour, Images};
+pub use report::ScanReport;
+pub use run::{Look, Scan, ScanError, ScanSettings};
+pub use sequence::{FrameFiles, Sequence, SequenceError};

@@ -1,0 +1,243 @@
+//! The layouts that data sets come in.
+//!
+//! | layout | images | poses | depth units per metre | camera |
+//! |---|---|---|---|---|
+//! | 7-Scenes, 3DMatch | `frame-N.depth.png`, `frame-N.color.{jpg,png}` | `frame-N.pose.txt`, 4x4 | 1000 | `camera-intrinsics.txt`, 3x3, there or one folder up |
+//! | TUM | `depth.txt`, `rgb.txt` | `groundtruth.txt`, `t x y z qx qy qz qw` | 5000, or `intrinsics.txt` | `intrinsics.txt`, else 525, 525, 319.5, 239.5 |
+//! | ICL-NUIM | `depth/N.png`, `color/N.png` | `pose.txt`, `x y z qx qy qz qw` | 5000 | 481.2, -480, 319.5, 239.5 |
+//! | Redwood | `depth/`, `color/` | `trajectory.log`, 4x4 | 1000 | the JSON file, else 525, 525, 319.5, 239.5 |
+//!
+//! All poses are `world_from_camera`. `intrinsics.txt` is one line, `width height fx fy cx cy units_per_metre`.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
+use tsdf_hash::Intrinsics;
+use vio_ekf::{Stamp, tum as tum_format};
+
+use super::sequence::{FrameFiles, Sequence, SequenceError};
+
+type Result<T> = std::result::Result<T, SequenceError>;
+
+/// Frames per second of recordings that carry no stamps.
+const RATE: f64 = 30.0;
+/// The published camera of the TUM and Redwood recordings where no file says otherwise.
+const USUAL_CAMERA: Intrinsics = Intrinsics { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5 };
+/// The published camera of ICL-NUIM; its y points up.
+const ICL_CAMERA: Intrinsics = Intrinsics { fx: 481.2, fy: -480.0, cx: 319.5, cy: 239.5 };
+/// Colour belongs to the depth image within this time, seconds (the TUM tools' value).
+const NEAREST: f64 = 0.02;
+
+pub(super) fn seven_scenes(folder: &Path) -> Result<Option<Sequence>> {
+    let depth = numbered(folder, |name| name.strip_prefix("frame-")?.strip_suffix(".depth.png"))?;
+    if depth.is_empty() {
+        // Sequences often stand one folder below the camera's file.
+        let below = folder.join("seq-01");
+        return if below.is_dir() { seven_scenes(&below) } else { Ok(None) };
+    }
+    let camera = ["camera-intrinsics.txt", "../camera-intrinsics.txt"].map(|name| folder.join(name));
+    let intrinsics = match camera.iter().find(|path| path.is_file()) {
+        Some(path) => matrix_camera(path)?,
+        None => return Err(SequenceError::unreadable(&camera[0], &"missing; it holds the 3x3 camera matrix")),
+    };
+    let mut frames = Vec::with_capacity(depth.len());
+    for (number, path) in depth {
+        let beside = |ending: &str| {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().replace(".depth.png", ending);
+            path.with_file_name(name)
+        };
+        let colour = [".color.jpg", ".color.png"].map(beside).into_iter().find(|path| path.is_file());
+        let pose = beside(".pose.txt");
+        let world_from_camera = if pose.is_file() {
+            let values = numbers(&pose, &read(&pose)?)?;
+            Some(pose_of_matrix(&values).map_err(|why| SequenceError::malformed(&pose, 0, why))?)
+        } else {
+            None
+        };
+        frames.push(FrameFiles { stamp: number as f64 / RATE, depth: path, colour, world_from_camera });
+    }
+    Ok(Some(Sequence { layout: "7-Scenes", intrinsics, depth_scale: 1000.0, frames }))
+}
+
+pub(super) fn tum(folder: &Path) -> Result<Sequence> {
+    let (intrinsics, depth_scale) = match folder.join("intrinsics.txt") {
+        path if path.is_file() => match numbers(&path, &read(&path)?)?[..] {
+            [_, _, fx, fy, cx, cy, scale] => (Intrinsics { fx, fy, cx, cy }, scale),
+            ref other => {
+                let why = format!("expected width height fx fy cx cy units_per_metre, found {} numbers", other.len());
+                return Err(SequenceError::malformed(&path, 1, why));
+            }
+        },
+        _ => (USUAL_CAMERA, 5000.0),
+    };
+    let depth = listed(&folder.join("depth.txt"))?;
+    let colour = match folder.join("rgb.txt") {
+        path if path.is_file() => listed(&path)?,
+        _ => Vec::new(),
+    };
+    let truth = match folder.join("groundtruth.txt") {
+        path if path.is_file() => {
+            Some(tum_format::read(&read(&path)?).map_err(|e| SequenceError::malformed(&path, 0, e.to_string()))?)
+        }
+        _ => None,
+    };
+    let mut frames = Vec::with_capacity(depth.len());
+    for (stamp, path) in depth {
+        let after = colour.partition_point(|(t, _)| *t < stamp);
+        let near = [after.checked_sub(1), Some(after)].into_iter().flatten().filter_map(|k| colour.get(k));
+        let nearest = near.min_by(|a, b| (a.0 - stamp).abs().total_cmp(&(b.0 - stamp).abs()));
+        let world_from_camera = match (&truth, Stamp::from_secs(stamp)) {
+            // Outside the recorded poses there is none.
+            (Some(truth), Ok(at)) => truth.pose_at(at).ok(),
+            _ => None,
+        };
+        frames.push(FrameFiles {
+            stamp,
+            depth: path,
+            colour: nearest.filter(|(t, _)| (t - stamp).abs() <= NEAREST).map(|(_, path)| path.clone()),
+            world_from_camera,
+        });
+    }
+    Ok(Sequence { layout: "TUM", intrinsics, depth_scale, frames })
+}
+
+pub(super) fn icl(folder: &Path) -> Result<Sequence> {
+    let path = folder.join("pose.txt");
+    let text = read(&path)?;
+    let mut poses = Vec::new();
+    for (line, text) in text.lines().enumerate().filter(|(_, text)| !text.trim().is_empty()) {
+        let refuse = |why: String| SequenceError::malformed(&path, line + 1, why);
+        let v = numbers_of(text).map_err(refuse)?;
+        let [x, y, z, i, j, k, w] = v[..] else {
+            return Err(refuse(format!("expected x y z qx qy qz qw, found {} numbers", v.len())));
+        };
+        let q = Quaternion::new(w, i, j, k);
+        if !(0.99..=1.01).contains(&q.norm()) {
+            return Err(refuse(format!("the quaternion has length {}, not 1", q.norm())));
+        }
+        poses.push(Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_quaternion(q)));
+    }
+    let frames = in_folders(folder, &poses)?;
+    Ok(Sequence { layout: "ICL-NUIM", intrinsics: ICL_CAMERA, depth_scale: 5000.0, frames })
+}
+
+pub(super) fn redwood(folder: &Path) -> Result<Sequence> {
+    let path = folder.join("trajectory.log");
+    let values = numbers(&path, &read(&path)?)?;
+    let mut poses = Vec::new();
+    // Three counters, then a matrix.
+    for (index, entry) in values.chunks(19).enumerate() {
+        let pose = entry.get(3..).ok_or_else(|| "an entry has fewer than 19 numbers".into()).and_then(pose_of_matrix);
+        poses.push(pose.map_err(|why| SequenceError::malformed(&path, 5 * index + 1, why))?);
+    }
+    let camera = folder.join("camera_primesense.json");
+    let intrinsics = if camera.is_file() { json_camera(&camera)? } else { USUAL_CAMERA };
+    Ok(Sequence { layout: "Redwood", intrinsics, depth_scale: 1000.0, frames: in_folders(folder, &poses)? })
+}
+
+/// Frames from `depth/N.png` and `color/N.{png,jpg}`, with the poses in the same order.
+fn in_folders(folder: &Path, poses: &[Isometry3<f64>]) -> Result<Vec<FrameFiles>> {
+    let depth = numbered(&folder.join("depth"), |name| name.strip_suffix(".png"))?;
+    let colour_folder = folder.join("color");
+    let mut frames = Vec::with_capacity(depth.len());
+    for (index, (_, path)) in depth.into_iter().enumerate() {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let colour = ["png", "jpg"].map(|ending| colour_folder.join(format!("{stem}.{ending}")));
+        frames.push(FrameFiles {
+            stamp: index as f64 / RATE,
+            depth: path,
+            colour: colour.into_iter().find(|path| path.is_file()),
+            world_from_camera: poses.get(index).copied(),
+        });
+    }
+    Ok(frames)
+}
+
+/// Files of a folder whose name holds a number, by that number.
+fn numbered(folder: &Path, number: impl Fn(&str) -> Option<&str>) -> Result<BTreeMap<u64, PathBuf>> {
+    let entries = std::fs::read_dir(folder).map_err(|e| SequenceError::unreadable(folder, &e))?;
+    let mut found = BTreeMap::new();
+    for entry in entries {
+        let path = entry.map_err(|e| SequenceError::unreadable(folder, &e))?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if let Some(value) = number(&name).and_then(|digits| digits.parse().ok()) {
+            found.insert(value, path);
+        }
+    }
+    Ok(found)
+}
+
+/// A TUM list of images: `stamp path` on each line, `#` begins a comment.
+fn listed(path: &Path) -> Result<Vec<(f64, PathBuf)>> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let mut list: Vec<(f64, PathBuf)> = Vec::new();
+    for (line, text) in read(path)?.lines().enumerate() {
+        let text = text.trim();
+        if text.is_empty() || text.starts_with('#') {
+            continue;
+        }
+        let refuse = |why: &str| SequenceError::malformed(path, line + 1, why);
+        let (stamp, file) = text.split_once(char::is_whitespace).ok_or_else(|| refuse("expected: stamp path"))?;
+        let stamp: f64 = stamp.parse().ok().filter(|t: &f64| t.is_finite()).ok_or_else(|| refuse("not a stamp"))?;
+        if list.last().is_some_and(|(last, _)| stamp <= *last) {
+            return Err(refuse("its stamp is not later than the one before: sort the list"));
+        }
+        list.push((stamp, folder.join(file.trim())));
+    }
+    Ok(list)
+}
+
+fn matrix_camera(path: &Path) -> Result<Intrinsics> {
+    match numbers(path, &read(path)?)?[..] {
+        [fx, _, cx, _, fy, cy, _, _, _] => Ok(Intrinsics { fx, fy, cx, cy }),
+        ref other => Err(SequenceError::malformed(path, 0, format!("expected 3x3 numbers, found {}", other.len()))),
+    }
+}
+
+fn json_camera(path: &Path) -> Result<Intrinsics> {
+    let refuse = |why: String| SequenceError::malformed(path, 0, why);
+    let value: serde_json::Value = serde_json::from_str(&read(path)?).map_err(|e| refuse(e.to_string()))?;
+    // Column by column.
+    let entry = |k: usize| value["intrinsic_matrix"][k].as_f64();
+    match (entry(0), entry(4), entry(6), entry(7)) {
+        (Some(fx), Some(fy), Some(cx), Some(cy)) => Ok(Intrinsics { fx, fy, cx, cy }),
+        _ => Err(refuse("intrinsic_matrix does not hold nine numbers".into())),
+    }
+}
+
+/// A rigid motion from 16 numbers, row by row.
+fn pose_of_matrix(values: &[f64]) -> std::result::Result<Isometry3<f64>, String> {
+    let Ok(m) = <[f64; 16]>::try_from(values) else {
+        return Err(format!("expected 4x4 numbers, found {}", values.len()));
+    };
+    let rotation = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
+    let error = (rotation * rotation.transpose() - Matrix3::identity()).norm();
+    // A comparison that a NaN fails.
+    if !(error < 1e-3 && rotation.determinant() > 0.0) {
+        return Err("the upper left 3x3 is not a rotation".into());
+    }
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&rotation));
+    let translation = Vector3::new(m[3], m[7], m[11]);
+    if !translation.iter().all(|x| x.is_finite()) {
+        return Err("the translation is not finite".into());
+    }
+    Ok(Isometry3::from_parts(translation.into(), rotation))
+}
+
+fn read(path: &Path) -> Result<String> {
+    std::fs::read_to_string(path).map_err(|e| SequenceError::unreadable(path, &e))
+}
+
+/// All numbers of a file.
+fn numbers(path: &Path, text: &str) -> Result<Vec<f64>> {
+    let mut all = Vec::new();
+    for (line, text) in text.lines().enumerate() {
+        all.extend(numbers_of(text).map_err(|why| SequenceError::malformed(path, line + 1, why))?);
+    }
+    Ok(all)
+}
+
+fn numbers_of(text: &str) -> std::result::Result<Vec<f64>, String> {
+    text.split_whitespace().map(|word| word.parse().map_err(|_| format!("\"{word}\" is not a number"))).collect()
+}

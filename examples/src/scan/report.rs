@@ -1,0 +1,98 @@
+//! The figures of a mapping run.
+
+use serde::Serialize;
+
+use super::Scan;
+
+/// What `report.json` of a scan holds. Flat, SI units in the names; every number is finite.
+#[derive(Debug, Clone, Serialize)]
+pub struct ScanReport {
+    /// Version of the program.
+    pub version: &'static str,
+    /// Frames that were fused.
+    pub frames: usize,
+    /// Frames that were left out.
+    pub frames_skipped: usize,
+    /// Edge of a voxel.
+    pub voxel_m: f64,
+    /// Processor time of one fusion, median.
+    pub integrate_cpu_ms_median: f64,
+    /// Processor time of a ray cast of the size of the depth images, median.
+    pub raycast_cpu_ms_median: f64,
+    /// Mean distance between the depth cast and the depth that was measured from the same place.
+    pub depth_error_mean_m: f64,
+    /// Share of the measured pixels at which the map has a surface.
+    pub raycast_fill: f64,
+    /// Processor time of the mesh from nothing.
+    pub mesh_full_cpu_ms: f64,
+    /// Largest number of bytes in active memory.
+    pub active_bytes_peak: usize,
+    /// Blocks of the map.
+    pub blocks: usize,
+    /// Hash of all voxels: equal for equal maps.
+    pub map_hash: String,
+    /// Vertices of the mesh.
+    pub vertices: usize,
+    /// Triangles of the mesh.
+    pub triangles: usize,
+    /// Edges of the mesh with more than two triangles.
+    pub non_manifold_edges: usize,
+    /// Length of the camera's path.
+    pub path_length_m: f64,
+    /// Worker threads.
+    pub threads: usize,
+    /// What computed the map.
+    pub device: String,
+    /// Largest resident memory.
+    pub peak_rss_bytes: u64,
+}
+
+impl Scan {
+    /// The figures of this run.
+    pub fn report(&self) -> ScanReport {
+        let settings = self.map.settings();
+        ScanReport {
+            version: env!("CARGO_PKG_VERSION"),
+            frames: self.fused.len(),
+            frames_skipped: self.skipped.len(),
+            voxel_m: settings.voxel_size,
+            integrate_cpu_ms_median: 1e3 * median(&self.integrate_s),
+            raycast_cpu_ms_median: 1e3 * median(&self.looks.iter().map(|look| look.seconds).collect::<Vec<_>>()),
+            depth_error_mean_m: mean(self.looks.iter().map(|look| look.depth_error)),
+            raycast_fill: mean(self.looks.iter().map(|look| look.fill)),
+            mesh_full_cpu_ms: 1e3 * self.mesh_s,
+            active_bytes_peak: self.bytes_peak,
+            blocks: self.map.blocks(),
+            map_hash: format!("{:016x}", self.map.hash()),
+            vertices: self.mesh.positions.len(),
+            triangles: self.mesh.faces.len(),
+            non_manifold_edges: non_manifold_edges(&self.mesh.faces),
+            path_length_m: self.trajectory.path_length(),
+            threads: settings.threads,
+            device: "cpu".into(),
+            peak_rss_bytes: crate::report::peak_resident_bytes(),
+        }
+    }
+}
+
+/// The middle value, 0 of none.
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// 0 of none.
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len().max(1);
+    values.sum::<f64>() / count as f64
+}
+
+fn non_manifold_edges(faces: &[[u32; 3]]) -> usize {
+    let mut edges: Vec<[u32; 2]> = faces
+        .iter()
+        .flat_map(|&[a, b, c]| [[a.min(b), a.max(b)], [b.min(c), b.max(c)], [c.min(a), c.max(a)]])
+        .collect();
+    edges.sort_unstable();
+    edges.chunk_by(|a, b| a == b).filter(|same| same.len() > 2).count()
+}

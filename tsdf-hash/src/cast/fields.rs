@@ -1,0 +1,182 @@
+//! The blocks that a view can see a surface in, unpacked.
+
+use super::CastSettings;
+use super::camera::Camera;
+use crate::block::{Block, ONE, SIDE};
+use crate::key::Key;
+use crate::parallel::in_chunks;
+use crate::store::Store;
+
+/// Nodes along the edge of a block: its own voxels and the first ones of the next block.
+pub(super) const NODES: usize = SIDE + 1;
+/// Nodes of a block.
+pub(super) const ALL: usize = NODES * NODES * NODES;
+
+/// One block with its upper border, node `(x, y, z)` at entry `x + 9 (y + 9 z)`, so that every cell of it is whole.
+#[derive(Clone, Debug)]
+pub(super) struct Field {
+    /// Mean normalised distance; NaN where nothing was observed.
+    pub(super) distance: [f32; ALL],
+    pub(super) weight: [u16; ALL],
+    /// Four lanes of 16 bits: R, G, B in `0..=255`, and one; all zero where no colour was observed.
+    pub(super) colour: [u64; ALL],
+}
+
+/// A field in a view.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// Which field.
+    pub(super) field: usize,
+    /// From the first node to the camera, voxels.
+    pub(super) origin: [f32; 3],
+    /// The box around the cells that the surface crosses, relative to the camera, voxels.
+    pub(super) low: [f32; 3],
+    pub(super) high: [f32; 3],
+}
+
+/// The range of the cells that the surface crosses, `[first, last + 1]`.
+type Range = [[u8; 3]; 2];
+
+/// The fields with a surface.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Fields {
+    pub(super) fields: Vec<Field>,
+    /// In an order in which no ray meets a later one first.
+    pub(super) places: Vec<Place>,
+}
+
+impl Fields {
+    pub(super) fn select(&mut self, store: &Store, camera: &Camera, settings: &CastSettings) {
+        let seen = in_view(store, camera);
+        if self.fields.len() < seen.len() {
+            self.fields.resize(seen.len(), Field::UNSEEN);
+        }
+        let mut work: Vec<_> = self.fields.iter_mut().zip(seen).collect();
+        // Each part fills its own fields from the first one on, as far as there are blocks with a surface.
+        let parts = in_chunks(&mut work, settings.threads, |part| {
+            let (mut filled, mut ranges) = (0, Vec::new());
+            for k in 0..part.len() {
+                let key = part[k].1;
+                if let Some(range) = part[filled].0.read(store, key, settings.colour) {
+                    ranges.push((key, range));
+                    filled += 1;
+                }
+            }
+            (part.len(), ranges)
+        });
+        self.places.clear();
+        let mut first = 0;
+        for (length, ranges) in parts {
+            for (k, (key, range)) in ranges.into_iter().enumerate() {
+                let offset = camera.offset(key.block());
+                let [low, high] = range.map(|cell| [0, 1, 2].map(|k| offset[k] + f32::from(cell[k])));
+                self.places.push(Place { field: first + k, origin: offset.map(|c| -c), low, high });
+            }
+            first += length;
+        }
+    }
+}
+
+/// The blocks in view, front to back.
+fn in_view(store: &Store, camera: &Camera) -> Vec<Key> {
+    let radius = 0.5 * 3.0_f64.sqrt() * SIDE as f64;
+    let mut seen: Vec<(u32, Key)> = Vec::new();
+    for &key in store.keys() {
+        let block = key.block();
+        if camera.sees(camera.offset(block).map(|c| c + 0.5 * SIDE as f32), radius) {
+            // A ray goes from block to block through a face, always away from the camera: with each step the number of
+            // blocks to the camera's own grows by one.
+            let steps = (0..3).map(|k| block[k].abs_diff(camera.base[k])).sum();
+            seen.push((steps, key));
+        }
+    }
+    seen.sort_unstable();
+    seen.into_iter().map(|(_, key)| key).collect()
+}
+
+impl Field {
+    const UNSEEN: Self = Self { distance: [f32::NAN; ALL], weight: [0; ALL], colour: [0; ALL] };
+
+    /// Unpacks a block; `None` if the surface does not cross it.
+    fn read(&mut self, store: &Store, key: Key, with_colour: bool) -> Option<Range> {
+        let blocks = [0, 1, 2, 3, 4, 5, 6, 7].map(|n| store.get(key.neighbour([n & 1, n >> 1 & 1, n >> 2])?));
+        for (n, block) in blocks.iter().enumerate() {
+            each_row(n, |from, to, length| self.read_row(*block, from, to, length));
+        }
+        let range = self.crossed()?;
+        if with_colour {
+            for (n, block) in blocks.iter().enumerate() {
+                each_row(n, |from, to, length| self.read_colours(*block, from, to, length));
+            }
+        }
+        Some(range)
+    }
+
+    fn read_row(&mut self, block: Option<&Block>, from: usize, to: usize, length: usize) {
+        let (distance, weight) = (&mut self.distance[to..to + length], &mut self.weight[to..to + length]);
+        let Some(block) = block else {
+            distance.fill(f32::NAN);
+            weight.fill(0);
+            return;
+        };
+        let (sums, weights) = (&block.distance[from..from + length], &block.weight[from..from + length]);
+        for k in 0..length {
+            // 0 / 0 where nothing was observed.
+            distance[k] = sums[k] as f32 / (f32::from(weights[k]) * ONE as f32);
+            weight[k] = weights[k];
+        }
+    }
+
+    fn read_colours(&mut self, block: Option<&Block>, from: usize, to: usize, length: usize) {
+        for k in 0..length {
+            let rgb = block.and_then(|block| block.mean_colour(from + k));
+            self.colour[to + k] = rgb.map_or(0, |rgb| {
+                let [r, g, b] = rgb.map(|c| (c + 0.5) as u64);
+                r | g << 16 | b << 32 | 1 << 48
+            });
+        }
+    }
+
+    /// The range of the cells whose eight nodes are observed and not all on one side.
+    fn crossed(&self) -> Option<Range> {
+        let (mut solid, mut observed) = ([0_u16; NODES * NODES], [0_u16; NODES * NODES]);
+        for (row, (solid, observed)) in solid.iter_mut().zip(&mut observed).enumerate() {
+            for (x, value) in self.distance[NODES * row..NODES * (row + 1)].iter().enumerate() {
+                *solid |= u16::from(*value < 0.0) << x;
+                *observed |= u16::from(!value.is_nan()) << x;
+            }
+        }
+        let (mut low, mut high, mut columns) = ([u8::MAX; 3], [0_u8; 3], 0_u16);
+        for z in 0..SIDE {
+            for y in 0..SIDE {
+                let row = y + NODES * z;
+                let four = |rows: &[u16]| [rows[row], rows[row + 1], rows[row + NODES], rows[row + NODES + 1]];
+                let all = |rows: [u16; 4]| rows.iter().fold(0x1ff, |a, b| a & b);
+                let (seen, solid) = (all(four(&observed)), four(&solid));
+                let (any, every) = (solid.iter().fold(0, |a, b| a | b), all(solid));
+                let cells = (seen & seen >> 1) & (any | any >> 1) & !(every & every >> 1) & 0xff;
+                if cells != 0 {
+                    columns |= cells;
+                    (low[1], high[1]) = (low[1].min(y as u8), high[1].max(y as u8 + 1));
+                    (low[2], high[2]) = (low[2].min(z as u8), high[2].max(z as u8 + 1));
+                }
+            }
+        }
+        low[0] = columns.trailing_zeros() as u8;
+        high[0] = (16 - columns.leading_zeros()) as u8;
+        (columns != 0).then_some([low, high])
+    }
+}
+
+/// The rows that a field takes from the block at `+1` along x (bit 0 of `n`), y (bit 1) and z (bit 2): first voxel,
+/// first node, length.
+#[inline(always)]
+fn each_row(n: usize, mut copy: impl FnMut(usize, usize, usize)) {
+    let range = |axis: usize| if n >> axis & 1 == 1 { SIDE..NODES } else { 0..SIDE };
+    for z in range(2) {
+        for y in range(1) {
+            let x = range(0);
+            copy(x.start % SIDE + SIDE * (y % SIDE + SIDE * (z % SIDE)), x.start + NODES * (y + NODES * z), x.len());
+        }
+    }
+}
