@@ -9,5 +9,5 @@ mod views;
 
 pub use decode::{Colour, Images};
 pub use report::ScanReport;
-pub use run::{Scan, ScanError, ScanSettings};
+pub use run::{Look, Scan, ScanError, ScanSettings};
 pub use sequence::{FrameFiles, Sequence, SequenceError};

@@ -44,17 +44,77 @@ impl Block {
         (n > 0.0).then(|| [r, g, b].map(|sum| sum * (255.0 / 63.0) / n))
     }
 
-    /// Folds all voxels into `seed`.
-    pub(crate) fn hash(&self, seed: u64) -> u64 {
-        let mut h = seed;
-        for voxel in 0..VOXELS {
-            let [r, g, b, n] = self.colour[voxel].map(u64::from);
-            let distance = u64::from(self.distance[voxel].cast_unsigned());
-            h = mix(h ^ (distance << 16 | u64::from(self.weight[voxel]))).wrapping_add(r | g << 16 | b << 32 | n << 48);
+    /// Adds another block, wrapping; returns whether a counter ran over.
+    pub(crate) fn add(&mut self, other: &Self) -> bool {
+        let mut fault = false;
+        for (sum, more) in self.distance.iter_mut().zip(&other.distance) {
+            *sum = sum.wrapping_add(*more);
         }
-        mix(h)
+        for (sum, more) in self.weight.iter_mut().zip(&other.weight) {
+            let (next, over) = sum.overflowing_add(*more);
+            *sum = next;
+            fault |= over;
+        }
+        for (sums, more) in self.colour.iter_mut().zip(&other.colour) {
+            for (sum, more) in sums.iter_mut().zip(more) {
+                let (next, over) = sum.overflowing_add(*more);
+                *sum = next;
+                fault |= over;
+            }
+            fault |= sums[3] > MAX_COLOURS;
+        }
+        fault
+    }
+
+    /// Takes another block out, wrapping; returns whether it cannot have been in.
+    pub(crate) fn subtract(&mut self, other: &Self) -> bool {
+        let mut fault = false;
+        for voxel in 0..VOXELS {
+            let (weight, under) = self.weight[voxel].overflowing_sub(other.weight[voxel]);
+            let distance = self.distance[voxel].wrapping_sub(other.distance[voxel]);
+            (self.weight[voxel], self.distance[voxel]) = (weight, distance);
+            fault |= under || i64::from(distance).abs() > i64::from(weight) * i64::from(ONE);
+            for (sum, less) in self.colour[voxel].iter_mut().zip(&other.colour[voxel]) {
+                let (next, under) = sum.overflowing_sub(*less);
+                *sum = next;
+                fault |= under;
+            }
+        }
+        fault
+    }
+
+    /// The largest weight and the largest number of coloured observations: sums of blocks whose peaks do not run over
+    /// together do not run over.
+    pub(crate) fn peaks(&self) -> [u16; 2] {
+        let weight = self.weight.iter().fold(0, |most, &w| most.max(w));
+        [weight, self.colour.iter().fold(0, |most, c| most.max(c[3]))]
+    }
+
+    /// A linear form of all voxels modulo 2^64: the print of a sum of blocks is the sum of their prints, so copies that
+    /// lie in several places need not be brought together. A change of a single voxel always changes it.
+    pub(crate) fn print(&self) -> u64 {
+        let mut print = 0_u64;
+        for (voxel, factors) in FACTORS.iter().enumerate() {
+            let [r, g, b, n] = self.colour[voxel].map(u64::from);
+            let sums = i64::from(self.distance[voxel]).cast_unsigned();
+            let sums = sums.wrapping_add(u64::from(self.weight[voxel]) << 32);
+            let colour = r | g << 16 | b << 32 | n << 48;
+            print = print.wrapping_add(sums.wrapping_mul(factors[0])).wrapping_add(colour.wrapping_mul(factors[1]));
+        }
+        print
     }
 }
+
+/// Odd, so that multiplication loses nothing.
+const FACTORS: [[u64; 2]; VOXELS] = {
+    let mut factors = [[0; 2]; VOXELS];
+    let mut n = 0;
+    while n < 2 * VOXELS {
+        factors[n / 2][n % 2] = mix(n as u64 + 1) | 1;
+        n += 1;
+    }
+    factors
+};
 
 #[cfg(test)]
 mod tests {

@@ -76,6 +76,47 @@ pub enum Error {
         /// The cap, [`Settings::max_bytes`](crate::Settings::max_bytes).
         max_bytes: usize,
     },
+    /// Neither active memory nor the tiers behind it have room for the frame.
+    #[error(
+        "the tiers are full with {host_bytes} bytes in RAM and {disk_bytes} on disk: raise tiers.host_bytes or \
+         tiers.disk_bytes, or enlarge voxel_size"
+    )]
+    TiersFull {
+        /// Bytes of the host tier.
+        host_bytes: usize,
+        /// Bytes of the disk tier.
+        disk_bytes: u64,
+    },
+    /// A time that is not finite or not later than that of the frame before.
+    #[error("the frame was taken at {time} s, the last one at {last} s: times must be finite and increase")]
+    InvalidTime {
+        /// Its time, seconds.
+        time: f64,
+        /// The time of the last frame that was fused, seconds.
+        last: f64,
+    },
+    /// A disk tier without a file, or a file without a disk tier.
+    #[error("tiers.disk_bytes = {disk_bytes}: a map with a disk tier is made by with_swap, one without by new")]
+    SwapFile {
+        /// [`Tiers::disk_bytes`](crate::Tiers::disk_bytes).
+        disk_bytes: u64,
+    },
+    /// A copy outside memory is not what was put there.
+    #[error("{what} is damaged: block {block:?} cannot be read")]
+    Damaged {
+        /// Where it lies.
+        what: &'static str,
+        /// Block coordinates.
+        block: [i32; 3],
+    },
+    /// Reading or writing a file failed.
+    #[error("{what} failed")]
+    Io {
+        /// What was done.
+        what: &'static str,
+        /// Why.
+        source: std::io::Error,
+    },
     /// A voxel has taken all the observations its counters can hold without losing exactness.
     #[error("block {block:?} is saturated (weight 65535 or 1040 coloured frames): fuse fewer frames of this place")]
     Saturated {

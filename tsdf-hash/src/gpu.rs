@@ -15,11 +15,13 @@ mod stream;
 use nalgebra::Isometry3;
 
 use crate::cast::camera::Camera;
+use crate::block::Block;
 use crate::fuse::{Frame, Sign};
-use crate::key::{Key, mix};
+use crate::key::Key;
 use crate::surface::Surface;
+use crate::tiers::fold;
 use crate::view::{ColourView, DepthView, Intrinsics, check_pose, check_sides};
-use crate::{CastSettings, Error, FrameReport, Map, Settings, View};
+use crate::{CastSettings, Error, FrameReport, Map, Settings, Tiers, View};
 use cast::Caster;
 use device::Device;
 use fuse::{Fuser, Mode, Pass, Tally, fresh};
@@ -84,36 +86,60 @@ impl GpuMap {
         &self.device.name
     }
 
-    /// A map that goes on from `map`, with its settings.
+    /// A map that goes on from `map`, all its tiers, with its settings.
     ///
     /// # Errors
-    /// As [`new`](Self::new), and [`Error::OutOfBudget`].
+    /// As [`new`](Self::new), [`Error::OutOfBudget`], and those of the map's tiers.
     pub fn from_map(map: &Map, options: &GpuOptions) -> Result<Self, Error> {
         let mut gpu = Self::new(*map.settings(), options)?;
-        let store = map.store();
-        let keys = store.sorted_keys();
+        let keys = map.copies.sorted_keys();
         if keys.len() > gpu.pool.room() {
             return Err(gpu.pool.out_of_budget());
         }
-        let blocks = keys.iter().filter_map(|&key| Some((key, store.get(key)?)));
-        stream::upload(&gpu.device, &mut gpu.pool, keys.len(), blocks)?;
+        gpu.pool.reserve(&gpu.device, keys.len())?;
+        let mut sum = Box::new(Block::ZERO);
+        for key in keys {
+            map.copies.total(key, &mut sum)?;
+            stream::upload(&gpu.device, &mut gpu.pool, key, &sum)?;
+        }
         Ok(gpu)
     }
 
-    /// A copy on the processor under a cap of `max_bytes`, to mesh, to query or to store.
+    /// A copy in active memory of at most `max_bytes`, to mesh, to query or to store.
     ///
     /// # Errors
     /// [`Error::InvalidSetting`], [`Error::OutOfBudget`], [`Error::Device`].
     pub fn to_map(&self, max_bytes: usize) -> Result<Map, Error> {
-        let mut map = Map::new(Settings { max_bytes, ..self.settings })?;
+        let mut map = Map::new(Settings { max_bytes, tiers: Tiers::default(), ..self.settings })?;
         let keys = self.pool.sorted_keys();
-        if keys.len() > map.store().room() {
-            return Err(map.store().out_of_budget());
-        }
-        self.stream.download(&self.device, &self.pool, &keys, |key, block| {
-            map.store_mut().add(vec![(key, Box::new(block.clone()))]);
-        })?;
+        self.stream.download(&self.device, &self.pool, &keys, |key, block| map.copies.absorb(key, block, [0.0; 3]))?;
         Ok(map)
+    }
+
+    /// Moves all blocks into `map`, where they are added to its own, and leaves none on the device. So a map that outgrows
+    /// the device goes on: the sums of both are the sums of all frames at any time. Frames that were moved are taken out of
+    /// `map`.
+    ///
+    /// # Errors
+    /// [`Error::InvalidSetting`] if the maps differ in more than memory and threads, [`Error::Saturated`],
+    /// [`Error::OutOfBudget`], those of the tiers, [`Error::Device`]. What has not been moved is then still here.
+    pub fn pour_into(&mut self, map: &mut Map) -> Result<(), Error> {
+        let Settings { max_bytes, threads, tiers, .. } = self.settings;
+        if (Settings { max_bytes, threads, tiers, ..*map.settings() }) != self.settings {
+            let requirement = "that of the map on the device, and so must be all settings but memory and threads";
+            return Err(Error::InvalidSetting { name: "voxel_size", value: map.settings().voxel_size, requirement });
+        }
+        let mut moved = Vec::new();
+        let keys = self.pool.sorted_keys();
+        let outcome = self.stream.download(&self.device, &self.pool, &keys, |key, block| {
+            map.copies.absorb(key, block, [0.0; 3])?;
+            moved.push(key);
+            Ok(())
+        });
+        for key in moved {
+            self.pool.remove(key);
+        }
+        outcome
     }
 
     /// As [`Map::integrate`].
@@ -188,6 +214,9 @@ impl GpuMap {
             blocks: needed.len() + changed.len(),
             blocks_added: needed.len(),
             blocks_removed: emptied.len(),
+            blocks_left: 0,
+            blocks_arrived: 0,
+            blocks_overdue: 0,
         })
     }
 
@@ -231,7 +260,8 @@ impl GpuMap {
     pub fn hash(&self) -> Result<u64, Error> {
         let mut hash = 0;
         self.stream.download(&self.device, &self.pool, &self.pool.sorted_keys(), |key, block| {
-            hash = block.hash(mix(hash ^ key.0));
+            hash = fold(hash, key, block.print());
+            Ok(())
         })?;
         Ok(hash)
     }

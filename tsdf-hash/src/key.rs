@@ -38,7 +38,7 @@ impl Key {
 }
 
 /// The finaliser of splitmix64: a bijection of the 64-bit words that spreads every bit.
-pub(crate) fn mix(x: u64) -> u64 {
+pub(crate) const fn mix(x: u64) -> u64 {
     let x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     let x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
     x ^ (x >> 31)

@@ -46,6 +46,7 @@ mod block;
 mod candidates;
 mod cast;
 mod error;
+mod file;
 mod fuse;
 #[cfg(feature = "gpu")]
 mod gpu;
@@ -54,17 +55,20 @@ mod map;
 mod mesh;
 mod parallel;
 mod settings;
+mod slots;
 mod store;
 mod surface;
 mod table;
+mod tiers;
 mod view;
 
 pub use cast::{CastSettings, View};
 pub use error::Error;
 #[cfg(feature = "gpu")]
 pub use gpu::{GpuMap, GpuOptions};
-pub use map::{FrameReport, Map};
+pub use map::{FrameReport, Map, Memory};
 pub use mesh::{Mesh, write_ply};
 pub use nalgebra;
-pub use settings::{NoiseModel, Settings};
+pub use settings::{NoiseModel, Settings, Tiers};
+pub use tiers::{Arrivals, MergeAtOnce, Revisit, Verdict};
 pub use view::{ColourData, ColourView, DepthData, DepthView, Intrinsics};

@@ -1,15 +1,16 @@
 //! The map: fuse, take out, ask.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::path::Path;
 
 use nalgebra::{Isometry3, Point3};
 
 use crate::block::{Block, SIDE};
-use crate::fuse::{Frame, Sign, Tally};
-use crate::key::{Key, mix};
-use crate::parallel::in_chunks;
+use crate::fuse::{Frame, Sign};
+use crate::key::Key;
+use crate::settings::Tiers;
 use crate::store::Store;
 use crate::surface::Surface;
+use crate::tiers::{Arrivals, Copies, Moment, Moves, Revisit, Swap, Verdict};
 use crate::view::{ColourView, DepthView, check_pose};
 use crate::{Error, Settings};
 
@@ -28,7 +29,37 @@ pub struct FrameReport {
     pub blocks_added: usize,
     /// Blocks that are no longer there.
     pub blocks_removed: usize,
+    /// Blocks that left active memory by age.
+    pub blocks_left: usize,
+    /// Blocks that came back because the frame saw them again.
+    pub blocks_arrived: usize,
+    /// Blocks that were held for longer than [`Tiers::hold`] and were merged without a verdict.
+    pub blocks_overdue: usize,
 }
+
+/// Bytes and blocks of each tier. A block that has left and was seen again may have a copy in several.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Memory {
+    /// Active memory, held blocks included; capped by [`Settings::max_bytes`].
+    pub active_bytes: usize,
+    /// The host tier and the index of all cold blocks; capped by [`Tiers::host_bytes`].
+    pub host_bytes: usize,
+    /// Length of the swap file; capped by [`Tiers::disk_bytes`].
+    pub disk_bytes: u64,
+    /// Blocks in active memory, without those that are held.
+    pub active_blocks: usize,
+    /// Blocks that have come back and wait for a verdict.
+    pub held_blocks: usize,
+    /// Packed blocks in RAM.
+    pub host_blocks: usize,
+    /// Packed blocks in the swap file.
+    pub disk_blocks: usize,
+    /// Packed blocks that are still in the file that the map was opened from.
+    pub file_blocks: usize,
+}
+
+/// Seconds that pass with a frame of unknown time: the usual camera takes 30 a second.
+const FRAME_PERIOD: f64 = 1.0 / 30.0;
 
 /// A truncated signed distance field in hashed blocks of 8³ voxels.
 ///
@@ -36,15 +67,48 @@ pub struct FrameReport {
 /// `floor(point / 8h)`. Distances are positive on the side of the camera.
 pub struct Map {
     settings: Settings,
-    store: Store,
+    pub(crate) copies: Copies,
     surface: Surface,
+    clock: Clock,
+}
+
+/// The time of the last frame.
+#[derive(Clone, Copy, Default)]
+struct Clock {
+    last: Option<f64>,
+    /// Whether any frame came with its time.
+    stamped: bool,
 }
 
 impl Map {
     /// An empty map.
+    ///
+    /// # Errors
+    /// [`Error::InvalidSetting`], and [`Error::SwapFile`] when there is to be a disk tier.
     pub fn new(settings: Settings) -> Result<Self, Error> {
         settings.check()?;
-        Ok(Self { settings, store: Store::new(settings.max_bytes)?, surface: Surface::default() })
+        if settings.tiers.disk_bytes > 0 {
+            return Err(Error::SwapFile { disk_bytes: settings.tiers.disk_bytes });
+        }
+        Self::with_copies(settings, None)
+    }
+
+    /// An empty map with a disk tier in the file `swap`, which is created, or emptied, and removed with the map.
+    ///
+    /// # Errors
+    /// [`Error::InvalidSetting`], [`Error::SwapFile`] without a disk tier, [`Error::Io`].
+    pub fn with_swap(settings: Settings, swap: &Path) -> Result<Self, Error> {
+        settings.check()?;
+        if settings.tiers.disk_bytes == 0 {
+            return Err(Error::SwapFile { disk_bytes: 0 });
+        }
+        let swap = Swap::create(swap, settings.tiers.disk_bytes);
+        Self::with_copies(settings, Some(swap.map_err(|source| Error::Io { what: "creating the swap file", source })?))
+    }
+
+    fn with_copies(settings: Settings, swap: Option<Swap>) -> Result<Self, Error> {
+        let copies = Copies::new(settings.max_bytes, settings.tiers, swap)?;
+        Ok(Self { settings, copies, surface: Surface::default(), clock: Clock::default() })
     }
 
     /// The settings given to [`new`](Self::new).
@@ -54,16 +118,43 @@ impl Map {
 
     /// Fuses a depth image, and a colour image taken from the same place, seen from `world_from_camera`.
     ///
+    /// Without a time, a thirtieth of a second passes with every frame; none, once a frame has come with its time.
+    ///
     /// # Errors
     /// Views, intrinsics or pose that make no sense, [`Error::NoDepth`], [`Error::OutOfRange`], [`Error::OutOfBudget`],
-    /// [`Error::Saturated`]. The map is then as it was.
+    /// [`Error::Saturated`], and with tiers [`Error::TiersFull`], [`Error::Io`], [`Error::Damaged`]. The map is then as it
+    /// was.
     pub fn integrate(
         &mut self,
         depth: &DepthView,
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
     ) -> Result<FrameReport, Error> {
-        self.apply(Sign::Plus, depth, colour, world_from_camera)
+        let time = self.clock.last.map_or(0.0, |last| if self.clock.stamped { last } else { last + FRAME_PERIOD });
+        let report = self.apply(Sign::Plus, depth, colour, world_from_camera, time)?;
+        self.clock.last = Some(time);
+        Ok(report)
+    }
+
+    /// [`integrate`](Self::integrate) of a frame that was taken at `time`, seconds: what decides which blocks are old.
+    ///
+    /// # Errors
+    /// As [`integrate`](Self::integrate), and [`Error::InvalidTime`] unless `time` is finite and later than that of the
+    /// frame before.
+    pub fn integrate_at(
+        &mut self,
+        time: f64,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        world_from_camera: &Isometry3<f64>,
+    ) -> Result<FrameReport, Error> {
+        let last = self.clock.last.unwrap_or(f64::MIN);
+        if !(time.is_finite() && time > last) {
+            return Err(Error::InvalidTime { time, last });
+        }
+        let report = self.apply(Sign::Plus, depth, colour, world_from_camera, time)?;
+        self.clock = Clock { last: Some(time), stamped: true };
+        Ok(report)
     }
 
     /// Takes out a frame that was fused with exactly these arguments: the map is then, to the bit, as if it had never
@@ -79,7 +170,7 @@ impl Map {
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
     ) -> Result<FrameReport, Error> {
-        self.apply(Sign::Minus, depth, colour, world_from_camera)
+        self.apply(Sign::Minus, depth, colour, world_from_camera, self.clock.last.unwrap_or(0.0))
     }
 
     fn apply(
@@ -88,6 +179,7 @@ impl Map {
         depth: &DepthView,
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
+        time: f64,
     ) -> Result<FrameReport, Error> {
         depth.check()?;
         if let Some(colour) = colour {
@@ -96,175 +188,125 @@ impl Map {
         check_pose(world_from_camera)?;
         self.surface.read(depth, world_from_camera, &self.settings)?;
         let frame = Frame::new(&self.surface, &depth.intrinsics, colour, world_from_camera, &self.settings);
-        let (mut absent, mut present) = (Vec::new(), Vec::new());
-        for &key in &self.surface.keys {
-            match self.store.take(key) {
-                Some(block) => present.push((key, block, Tally::default())),
-                None => absent.push(key),
-            }
-        }
-        let outcome = change(&frame, sign, &mut absent, &mut present, self.store.room(), self.settings.threads);
-        let touched = present.iter().filter(|(_, _, tally)| tally.voxels > 0);
-        let emptied: Vec<Key> = touched.clone().filter(|(_, block, _)| block.is_empty()).map(|work| work.0).collect();
-        let mut report = FrameReport {
+        let eye = world_from_camera.translation.vector / self.settings.block_size();
+        let moment = Moment { time, eye: eye.into() };
+        let change = self.copies.change(&frame, sign, &self.surface.keys, moment, self.settings.threads)?;
+        let moves = match sign {
+            Sign::Plus => self.copies.settle(&change.touched, time),
+            Sign::Minus => Moves::default(),
+        };
+        Ok(FrameReport {
             valid_pixels: self.surface.valid,
             fused_pixels: self.surface.fused,
-            voxels: touched.clone().map(|(_, _, tally)| tally.voxels).sum(),
-            blocks: touched.count(),
-            blocks_added: 0,
-            blocks_removed: emptied.len(),
-        };
-        for (key, block, tally) in present {
-            self.store.put(key, block);
-            if tally.voxels > 0 {
-                self.store.touch(key);
-            }
-        }
-        let added = outcome.map_err(|refusal| match (refusal, sign) {
-            (Refusal::NoRoom, _) => self.store.out_of_budget(),
-            (Refusal::Fault(key), Sign::Plus) => Error::Saturated { block: key.block() },
-            (Refusal::Fault(key), Sign::Minus) => Error::NotIntegrated { block: key.block() },
-        })?;
-        report.voxels += added.iter().map(|(_, _, tally)| tally.voxels).sum::<usize>();
-        report.blocks += added.len();
-        report.blocks_added = added.len();
-        self.store.add(added.into_iter().map(|(key, block, _)| (key, block)).collect());
-        for key in emptied {
-            self.store.remove(key);
-        }
-        Ok(report)
+            voxels: change.voxels,
+            blocks: change.blocks,
+            blocks_added: change.added,
+            blocks_removed: change.removed,
+            blocks_left: moves.left,
+            blocks_arrived: moves.arrived,
+            blocks_overdue: moves.overdue,
+        })
     }
 
-    /// Bytes of the blocks and of the table that finds them: what [`Settings::max_bytes`] caps. The working memory of a
-    /// call (about 40 bytes per pixel) and the meshes handed out are not in it.
+    /// Bytes in active memory: what [`Settings::max_bytes`] caps. The working memory of a call (about 40 bytes per pixel)
+    /// and the meshes handed out are not in it.
     pub fn bytes(&self) -> usize {
-        self.store.bytes()
+        self.copies.active_bytes()
     }
 
-    /// Number of blocks, 7168 bytes each.
-    pub fn blocks(&self) -> usize {
-        self.store.len()
-    }
-
-    /// A hash of all voxels in the order of the block coordinates: equal for equal maps, whatever the order of the frames
-    /// or the number of threads.
-    pub fn hash(&self) -> u64 {
-        let mut hash = 0;
-        for key in self.store.sorted_keys() {
-            if let Some(block) = self.store.get(key) {
-                hash = block.hash(mix(hash ^ key.0));
-            }
+    /// Where the blocks are, and the bytes they take.
+    pub fn memory(&self) -> Memory {
+        let [host_blocks, disk_blocks, file_blocks] = self.copies.cold.counts();
+        Memory {
+            active_bytes: self.bytes(),
+            host_bytes: self.copies.cold.host_bytes(),
+            disk_bytes: self.copies.cold.disk_bytes(),
+            active_blocks: self.copies.active.len(),
+            held_blocks: self.copies.held.len(),
+            host_blocks,
+            disk_blocks,
+            file_blocks,
         }
-        hash
+    }
+
+    /// Number of blocks in all tiers, of 7168 bytes each when active.
+    pub fn blocks(&self) -> usize {
+        self.copies.len()
+    }
+
+    /// A hash of all voxels in all tiers, in the order of the block coordinates: equal for equal maps, whatever the order
+    /// of the frames, the number of threads, and the memory they were given.
+    pub fn hash(&self) -> u64 {
+        self.copies.hash()
+    }
+
+    /// The blocks that have come back and are held, to be looked at.
+    pub fn arrivals(&self) -> Arrivals<'_> {
+        Arrivals { held: &self.copies.held, active: self }
+    }
+
+    /// Asks for a verdict about the blocks that are held, if there are any, and returns how many were merged.
+    ///
+    /// # Errors
+    /// Those of the tiers, when a held block has to make room. The map's sums are as they were.
+    pub fn revisit(&mut self, revisit: &mut dyn Revisit) -> Result<usize, Error> {
+        if self.arrivals().is_empty() {
+            return Ok(0);
+        }
+        match revisit.judge(&self.arrivals()) {
+            Verdict::Merge => self.copies.merge_held(),
+            Verdict::Hold => Ok(0),
+        }
+    }
+
+    /// A copy of the whole map in active memory without a cap, to mesh or to query.
+    ///
+    /// # Errors
+    /// [`Error::Io`] and [`Error::Damaged`] when a block cannot be read.
+    pub fn whole(&self) -> Result<Self, Error> {
+        let settings = Settings { max_bytes: usize::MAX, tiers: Tiers::default(), ..self.settings };
+        let mut whole = Self::new(settings)?;
+        for key in self.copies.sorted_keys() {
+            let mut sum = Box::new(Block::ZERO);
+            let seen = self.copies.total(key, &mut sum)?;
+            whole.copies.active.insert(key, sum, seen);
+        }
+        Ok(whole)
     }
 
     /// Signed distance from the nearest surface, metres, by trilinear interpolation; `None` where one of the eight voxels
     /// around the point was never observed (farther than `μ` from every surface, behind one, or unseen).
     pub fn distance(&self, point_in_world: &Point3<f64>) -> Option<f64> {
-        let voxel = point_in_world.coords / self.settings.voxel_size - nalgebra::Vector3::repeat(0.5);
-        let low = voxel.map(f64::floor);
-        // A NaN fails; beyond this the key would fail below, and the cast must not saturate.
-        if !low.iter().all(|c| c.abs() <= f64::from(1 << 24)) {
-            return None;
-        }
-        let fraction = voxel - low;
-        let mut distance = 0.0;
-        for corner in 0..8 {
-            let bit = [corner & 1, corner >> 1 & 1, corner >> 2];
-            let index = [0, 1, 2].map(|axis| low[axis] as i32 + bit[axis]);
-            let key = Key::new(index.map(|c| c.div_euclid(SIDE as i32)))?;
-            let local = index.map(|c| c.rem_euclid(SIDE as i32) as usize);
-            let mean = self.store.get(key)?.mean(local[0] + SIDE * (local[1] + SIDE * local[2]))?;
-            let share: f64 = (0..3).map(|k| if bit[k] == 1 { fraction[k] } else { 1.0 - fraction[k] }).product();
-            distance += share * f64::from(mean);
-        }
-        Some(distance * self.settings.truncation())
+        interpolate(&self.settings, |key| self.store().get(key), point_in_world)
     }
 
     pub(crate) fn store(&self) -> &Store {
-        &self.store
-    }
-
-    #[cfg(feature = "gpu")]
-    pub(crate) fn store_mut(&mut self) -> &mut Store {
-        &mut self.store
+        &self.copies.active
     }
 }
 
-type Work = (Key, Box<Block>, Tally);
-
-/// Why a frame cannot be applied.
-enum Refusal {
-    NoRoom,
-    Fault(Key),
-}
-
-/// Applies a frame to the blocks that exist and returns those it adds; after a refusal the blocks are as they were.
-fn change(
-    frame: &Frame,
-    sign: Sign,
-    absent: &mut [Key],
-    present: &mut [Work],
-    room: usize,
-    threads: usize,
-) -> Result<Vec<Work>, Refusal> {
-    // Blocks that do not exist come first: whether they fit is known before anything has changed.
-    let added = match sign {
-        Sign::Plus => new_blocks(frame, absent, room, threads).ok_or(Refusal::NoRoom)?,
-        Sign::Minus => match first_touched(frame, absent, threads) {
-            Some(key) => return Err(Refusal::Fault(key)),
-            None => Vec::new(),
-        },
-    };
-    update(frame, sign, present, threads);
-    match present.iter().find(|(_, _, tally)| tally.fault).map(|&(key, _, _)| key) {
-        None => Ok(added),
-        Some(key) => {
-            // Wrapping sums form a group: the opposite update restores every bit.
-            update(frame, sign.opposite(), present, threads);
-            Err(Refusal::Fault(key))
-        }
+/// Trilinear interpolation of the distances in the blocks that `block` finds.
+pub(crate) fn interpolate<'a>(
+    settings: &Settings,
+    block: impl Fn(Key) -> Option<&'a Block>,
+    point_in_world: &Point3<f64>,
+) -> Option<f64> {
+    let voxel = point_in_world.coords / settings.voxel_size - nalgebra::Vector3::repeat(0.5);
+    let low = voxel.map(f64::floor);
+    // A NaN fails; beyond this the key would fail below, and the cast must not saturate.
+    if !low.iter().all(|c| c.abs() <= f64::from(1 << 24)) {
+        return None;
     }
-}
-
-fn update(frame: &Frame, sign: Sign, work: &mut [Work], threads: usize) {
-    in_chunks(work, threads, |chunk| {
-        for (key, block, tally) in chunk {
-            *tally = frame.apply(sign, *key, block);
-        }
-    });
-}
-
-/// The blocks that the frame needs and that do not exist, already updated; `None` if there are more than `room`.
-fn new_blocks(frame: &Frame, absent: &mut [Key], room: usize, threads: usize) -> Option<Vec<Work>> {
-    let made = AtomicUsize::new(0);
-    let parts = in_chunks(absent, threads, |keys| {
-        let mut blank = Box::new(Block::ZERO);
-        let mut part = Vec::new();
-        for &mut key in keys {
-            let tally = frame.apply(Sign::Plus, key, &mut blank);
-            if tally.voxels > 0 {
-                if made.fetch_add(1, Ordering::Relaxed) >= room {
-                    return None;
-                }
-                part.push((key, blank.clone(), tally));
-                *blank = Block::ZERO;
-            }
-        }
-        Some(part)
-    });
-    let mut all = Vec::with_capacity(made.into_inner());
-    for part in parts {
-        all.extend(part?);
+    let fraction = voxel - low;
+    let mut distance = 0.0;
+    for corner in 0..8 {
+        let bit = [corner & 1, corner >> 1 & 1, corner >> 2];
+        let index = [0, 1, 2].map(|axis| low[axis] as i32 + bit[axis]);
+        let key = Key::new(index.map(|c| c.div_euclid(SIDE as i32)))?;
+        let local = index.map(|c| c.rem_euclid(SIDE as i32) as usize);
+        let mean = block(key)?.mean(local[0] + SIDE * (local[1] + SIDE * local[2]))?;
+        let share: f64 = (0..3).map(|k| if bit[k] == 1 { fraction[k] } else { 1.0 - fraction[k] }).product();
+        distance += share * f64::from(mean);
     }
-    Some(all)
-}
-
-/// The first of these blocks that the frame would touch.
-fn first_touched(frame: &Frame, absent: &mut [Key], threads: usize) -> Option<Key> {
-    let parts = in_chunks(absent, threads, |keys| {
-        let mut blank = Box::new(Block::ZERO);
-        keys.iter().copied().find(|&key| frame.apply(Sign::Plus, key, &mut blank).voxels > 0)
-    });
-    parts.into_iter().flatten().next()
+    Some(distance * settings.truncation())
 }

@@ -23,6 +23,33 @@ impl Default for NoiseModel {
     }
 }
 
+/// Where blocks go that active memory has no room for, or that have not been seen for long (thesis Paper I, section 4.3).
+///
+/// Every tier has a hard cap in bytes. By default there is none but active memory, and a map that outgrows
+/// [`Settings::max_bytes`] refuses frames.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
+pub struct Tiers {
+    /// Cap of the host tier: packed blocks in RAM, and the index of all blocks outside active memory, of about 100 bytes
+    /// each. 0, the default, means no tier but active memory; otherwise 65536 at least.
+    pub host_bytes: usize,
+    /// Cap of the disk tier, a file of the map's own ([`Map::with_swap`](crate::Map::with_swap)); 0, the default: none.
+    pub disk_bytes: u64,
+    /// `t_old`: blocks that no frame has updated for longer leave active memory, seconds (not printed; ours: 2).
+    pub age: f64,
+    /// Most blocks that leave by age, and most that come back, per frame (not printed; ours: 1024).
+    pub transfers: usize,
+    /// How long blocks that come back are held for the caller's verdict ([`Revisit`](crate::Revisit)) before they are
+    /// merged without one, seconds (ours: 0, merged at once).
+    pub hold: f64,
+}
+
+impl Default for Tiers {
+    fn default() -> Self {
+        Self { host_bytes: 0, disk_bytes: 0, age: 2.0, transfers: 1024, hold: 0.0 }
+    }
+}
+
 /// Settings of a [`Map`](crate::Map). They cannot change while it lives: exact de-integration depends on them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
@@ -35,10 +62,12 @@ pub struct Settings {
     pub min_depth: f64,
     /// Farthest depth that is fused, metres (ours: 6; the noise of a structured-light camera reaches 6 cm there).
     pub max_depth: f64,
-    /// Hard cap on the bytes of blocks and hash table (ours: 512 MiB; thesis Paper I, section 6.1, runs in 300-600 MB).
+    /// Hard cap on the bytes of active memory: blocks, hash table, and a sixteenth of it, 256 blocks at most, to work with (ours: 512 MiB; thesis Paper I, section 6.1, runs in 300-600 MB).
     pub max_bytes: usize,
     /// Threads used inside one call; 1 spawns none. Results do not depend on it.
     pub threads: usize,
+    /// Memory besides the active one.
+    pub tiers: Tiers,
     /// Noise of the depth camera.
     pub noise: NoiseModel,
 }
@@ -52,6 +81,7 @@ impl Default for Settings {
             max_depth: 6.0,
             max_bytes: 512 << 20,
             threads: 1,
+            tiers: Tiers::default(),
             noise: NoiseModel::default(),
         }
     }
@@ -79,6 +109,12 @@ impl Settings {
         within("max_depth", self.max_depth, 1e-3, 1e3, "0.001..=1000 metres")?;
         within("max_depth", self.max_depth - self.min_depth, 1e-6, 1e3, "larger than min_depth")?;
         within("threads", self.threads as f64, 1.0, 1024.0, "1..=1024")?;
+        let tiers = &self.tiers;
+        within("tiers.host_bytes", tiers.host_bytes.wrapping_sub(1) as f64, 65535.0, f64::MAX, "0, or 65536 and more")?;
+        let disk = if tiers.host_bytes == 0 { 0.0 } else { f64::MAX };
+        within("tiers.disk_bytes", tiers.disk_bytes as f64, 0.0, disk, "0 without a host tier, which holds its index")?;
+        within("tiers.age", tiers.age, 0.0, f64::MAX, "0 seconds or more")?;
+        within("tiers.hold", tiers.hold, 0.0, f64::MAX, "0 seconds or more")?;
         within("noise.base", self.noise.base, 1e-9, 10.0, "1e-9..=10 metres")?;
         within("noise.quadratic", self.noise.quadratic, 0.0, 10.0, "0..=10 per metre")?;
         within("noise.nearest", self.noise.nearest, 0.0, 1e3, "0..=1000 metres")

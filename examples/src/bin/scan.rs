@@ -67,7 +67,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
         threads: threads.clamp(1, 1024),
         ..tsdf_hash::Settings::default()
     };
-    let scan = Scan::run(&arguments.sequence, &sequence, ScanSettings { map })?;
+    let scan = Scan::run(&arguments.sequence, &sequence, ScanSettings { map, ..ScanSettings::default() })?;
     for (_, why) in &scan.skipped {
         eprintln!("left out: {why}");
     }

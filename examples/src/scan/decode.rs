@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use image::{DynamicImage, ImageReader};
-use tsdf_hash::{ColourView, DepthData, DepthView, Intrinsics};
+use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics};
 
 use super::{FrameFiles, SequenceError};
 use crate::pictures::Rgb;
@@ -55,6 +55,11 @@ impl Images {
         self.height
     }
 
+    /// The measured depths, metres; 0 where there is none.
+    pub fn metres(&self, scale: f64) -> impl Iterator<Item = f64> {
+        self.depth.iter().map(move |&d| if d == u16::MAX { 0.0 } else { f64::from(d) / scale })
+    }
+
     /// The colour image at the size of the depth image; where there is none, the depth in grey, near bright.
     pub fn picture(&self) -> Rgb {
         let pixels = (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y)));
@@ -89,7 +94,12 @@ impl Images {
         // Pixel centres are at integers, so the image begins half a pixel before 0.
         let intrinsics =
             Intrinsics { fx: k.fx * x, fy: k.fy * y, cx: (k.cx + 0.5) * x - 0.5, cy: (k.cy + 0.5) * y - 0.5 };
-        Some(ColourView { width: colour.width, height: colour.height, rgb8: &colour.rgb8, intrinsics })
+        Some(ColourView {
+            width: colour.width,
+            height: colour.height,
+            data: ColourData::Rgb8(&colour.rgb8),
+            intrinsics,
+        })
     }
 }
 

@@ -17,6 +17,12 @@ pub struct ScanReport {
     pub voxel_m: f64,
     /// Processor time of one fusion, median.
     pub integrate_cpu_ms_median: f64,
+    /// Processor time of a ray cast of the size of the depth images, median.
+    pub raycast_cpu_ms_median: f64,
+    /// Mean distance between the depth cast and the depth that was measured from the same place.
+    pub depth_error_mean_m: f64,
+    /// Share of the measured pixels at which the map has a surface.
+    pub raycast_fill: f64,
     /// Processor time of the mesh from nothing.
     pub mesh_full_cpu_ms: f64,
     /// Largest number of bytes in active memory.
@@ -51,6 +57,9 @@ impl Scan {
             frames_skipped: self.skipped.len(),
             voxel_m: settings.voxel_size,
             integrate_cpu_ms_median: 1e3 * median(&self.integrate_s),
+            raycast_cpu_ms_median: 1e3 * median(&self.looks.iter().map(|look| look.seconds).collect::<Vec<_>>()),
+            depth_error_mean_m: mean(self.looks.iter().map(|look| look.depth_error)),
+            raycast_fill: mean(self.looks.iter().map(|look| look.fill)),
             mesh_full_cpu_ms: 1e3 * self.mesh_s,
             active_bytes_peak: self.bytes_peak,
             blocks: self.map.blocks(),
@@ -71,6 +80,12 @@ fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// 0 of none.
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len().max(1);
+    values.sum::<f64>() / count as f64
 }
 
 fn non_manifold_edges(faces: &[[u32; 3]]) -> usize {

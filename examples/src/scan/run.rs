@@ -4,17 +4,25 @@ use std::path::Path;
 
 use cpu_time::ProcessTime;
 use nalgebra::Isometry3;
-use tsdf_hash::{Map, Mesh};
+use tsdf_hash::{CastSettings, Map, Mesh, View};
 use vio_ekf::{Stamp, Trajectory};
 
 use super::{Images, Sequence, SequenceError};
 use crate::progress::Stage;
 
 /// How a sequence is mapped.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct ScanSettings {
     /// The map.
     pub map: tsdf_hash::Settings,
+    /// Frames between two looks at the map from the camera's own place.
+    pub look_every: usize,
+}
+
+impl Default for ScanSettings {
+    fn default() -> Self {
+        Self { map: tsdf_hash::Settings::default(), look_every: 10 }
+    }
 }
 
 /// A mapped sequence.
@@ -31,10 +39,23 @@ pub struct Scan {
     pub skipped: Vec<(usize, String)>,
     /// Processor time of each fusion, seconds.
     pub integrate_s: Vec<f64>,
+    /// What looking at the map showed, and took.
+    pub looks: Vec<Look>,
     /// Processor time of the mesh from nothing, seconds.
     pub mesh_s: f64,
     /// Largest number of bytes of the map.
     pub bytes_peak: usize,
+}
+
+/// The map, seen from where a frame was taken, beside that frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Look {
+    /// Processor time of the ray cast, seconds.
+    pub seconds: f64,
+    /// Mean distance between the depth cast and the depth measured, over the pixels that have both, metres.
+    pub depth_error: f64,
+    /// Share of the measured pixels at which the map has a surface.
+    pub fill: f64,
 }
 
 /// Why a run gave no map.
@@ -76,6 +97,7 @@ impl Scan {
         let mut integrate_s = Vec::with_capacity(sequence.frames.len());
         let mut fused = Vec::with_capacity(sequence.frames.len());
         let mut trajectory = Trajectory::default();
+        let (mut looks, mut view) = (Vec::new(), View::new());
         let mut bytes_peak = 0;
         for (index, frame) in sequence.frames.iter().enumerate() {
             stage.share(index as f64 / sequence.frames.len() as f64);
@@ -83,9 +105,11 @@ impl Scan {
                 skipped.push((index, format!("{}: no pose was recorded for it", frame.depth.display())));
                 continue;
             };
-            match fuse(&mut map, sequence, index, &pose) {
-                Ok(seconds) => {
+            let look = index % settings.look_every.max(1) == 0;
+            match fuse(&mut map, sequence, index, &pose, look.then_some(&mut view)) {
+                Ok((seconds, look)) => {
                     integrate_s.push(seconds);
+                    looks.extend(look);
                     fused.push(index);
                     trajectory.push(Stamp::from_secs(frame.stamp)?, pose)?;
                     bytes_peak = bytes_peak.max(map.bytes());
@@ -105,15 +129,40 @@ impl Scan {
         let mesh = map.mesh();
         let mesh_s = start.elapsed().as_secs_f64();
         stage.done(&format!("{} vertices, {} triangles", mesh.positions.len(), mesh.faces.len()));
-        Ok(Self { map, mesh, trajectory, fused, skipped, integrate_s, mesh_s, bytes_peak })
+        Ok(Self { map, mesh, trajectory, fused, skipped, looks, integrate_s, mesh_s, bytes_peak })
     }
 }
 
-/// Processor time that the fusion took, seconds.
-fn fuse(map: &mut Map, sequence: &Sequence, index: usize, pose: &Isometry3<f64>) -> Result<f64, ScanError> {
+/// Processor time that the fusion took, seconds, and a look at the map if a view is given.
+fn fuse(
+    map: &mut Map,
+    sequence: &Sequence,
+    index: usize,
+    pose: &Isometry3<f64>,
+    view: Option<&mut View>,
+) -> Result<(f64, Option<Look>), ScanError> {
     let images = Images::read(&sequence.frames[index])?;
     let depth = images.depth(sequence.intrinsics, sequence.depth_scale);
     let start = ProcessTime::now();
     map.integrate(&depth, images.colour(sequence.intrinsics).as_ref(), pose)?;
-    Ok(start.elapsed().as_secs_f64())
+    let seconds = start.elapsed().as_secs_f64();
+    let Some(view) = view else { return Ok((seconds, None)) };
+    let map_settings = map.settings();
+    let (min_depth, max_depth) = (map_settings.min_depth, map_settings.max_depth);
+    let settings = CastSettings { min_depth, max_depth, colour: true, threads: map_settings.threads };
+    let start = ProcessTime::now();
+    map.ray_cast_into(&sequence.intrinsics, depth.width, depth.height, pose, &settings, view)?;
+    let cast = start.elapsed().as_secs_f64();
+    let measured = images.metres(sequence.depth_scale).map(|z| Some(z).filter(|z| (min_depth..=max_depth).contains(z)));
+    let (mut pixels, mut hits, mut error) = (0_usize, 0_usize, 0.0);
+    for (z, seen) in measured.zip(&view.depth).filter_map(|(z, seen)| Some((z?, *seen))) {
+        pixels += 1;
+        if seen > 0.0 {
+            hits += 1;
+            error += (f64::from(seen) - z).abs();
+        }
+    }
+    let look =
+        (hits > 0).then(|| Look { seconds: cast, depth_error: error / hits as f64, fill: hits as f64 / pixels as f64 });
+    Ok((seconds, look))
 }

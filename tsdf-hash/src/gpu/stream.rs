@@ -23,13 +23,13 @@ impl Stream {
         Ok(Self { staging: device.buffer("blocks on their way", BATCH * BLOCK_BYTES, usage)? })
     }
 
-    /// Calls `each` with the blocks of these keys, in their order; keys without a block are passed over.
+    /// Calls `each` with the blocks of these keys, in their order, until it fails; keys without a block are passed over.
     pub(super) fn download(
         &self,
         device: &Device,
         pool: &Pool,
         keys: &[Key],
-        mut each: impl FnMut(Key, &Block),
+        mut each: impl FnMut(Key, &Block) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let mut block = Box::new(Block::ZERO);
         for batch in keys.chunks(BATCH) {
@@ -42,27 +42,19 @@ impl Stream {
             device.run_and_read(commands, &self.staging, places.len() * BLOCK_BYTES, |words| {
                 for ((key, _), words) in places.iter().zip(words.chunks_exact(BLOCK_WORDS)) {
                     unpack(words, &mut block);
-                    each(*key, &block);
+                    each(*key, &block)?;
                 }
-            })?;
+                Ok::<(), Error>(())
+            })??;
         }
         Ok(())
     }
 }
 
-/// Stores `count` blocks under keys that are new; the caller has seen that there is room. The driver stages them.
-pub(super) fn upload<'a>(
-    device: &Device,
-    pool: &mut Pool,
-    count: usize,
-    blocks: impl Iterator<Item = (Key, &'a Block)>,
-) -> Result<(), Error> {
-    pool.reserve(device, count)?;
-    for (key, block) in blocks {
-        let place = pool.insert(key);
-        device.write(&pool.pages[place.page], place.offset(), pack(block).into_iter())?;
-    }
-    Ok(())
+/// Stores a block under a key that is new and that the caller has reserved a slot for. The driver stages it.
+pub(super) fn upload(device: &Device, pool: &mut Pool, key: Key, block: &Block) -> Result<(), Error> {
+    let place = pool.insert(key);
+    device.write(&pool.pages[place.page], place.offset(), pack(block).into_iter())
 }
 
 /// The words of a block as the programs see it: distances, weights two to a word, colours.

@@ -99,7 +99,7 @@ fn the_cap_holds_and_a_frame_goes_in_whole_or_not_at_all() {
         assert_eq!((map.hash(), map.blocks()), (before, 0));
     }
     // A cap of a few dozen blocks, approached by a camera that turns.
-    let mut map = Map::new(Settings { max_bytes: 1 << 19, ..tight }).unwrap();
+    let mut map = Map::new(Settings { max_bytes: 600_000, ..tight }).unwrap();
     let mut refused = 0;
     for k in 0..12 {
         let turned = Isometry3::rotation(Vector3::z() * (0.3 * f64::from(k))) * shot.world_from_camera;
@@ -108,7 +108,7 @@ fn the_cap_holds_and_a_frame_goes_in_whole_or_not_at_all() {
             refused += 1;
             assert_eq!((map.hash(), map.bytes()), before);
         }
-        assert!(map.bytes() <= 1 << 19);
+        assert!(map.bytes() <= 600_000);
     }
     assert!((1..12).contains(&refused));
 }

@@ -2,7 +2,7 @@
 //! `PAINTCOPTER_REQUIRE_GPU=1` demands one.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use tsdf_hash::{CastSettings, ColourData, ColourView, Error, GpuMap, GpuOptions, Map, Settings};
+use tsdf_hash::{CastSettings, ColourData, ColourView, Error, GpuMap, GpuOptions, Map, Settings, Tiers};
 
 use crate::scene::{Shot, look_at, room};
 
@@ -161,6 +161,46 @@ fn a_map_moves_to_the_device_and_back() {
     assert!(matches!(moved.to_map(1 << 20), Err(Error::OutOfBudget { .. })));
     let tight = Map::new(Settings { max_bytes: 1 << 20, ..settings }).unwrap();
     assert_eq!(GpuMap::from_map(&tight, &options()).unwrap().blocks(), 0);
+}
+
+#[test]
+fn a_map_that_outgrows_the_device_goes_on_elsewhere() {
+    let settings = Settings { voxel_size: 0.02, max_bytes: 11 << 20, ..Settings::default() };
+    let Some(mut gpu) = open(settings, &options()) else { return };
+    let mut all = Map::new(Settings { max_bytes: 64 << 20, ..settings }).unwrap();
+    // Little active memory too, and tiers beneath it.
+    let tiers = Tiers { host_bytes: 64 << 20, ..Tiers::default() };
+    let mut map = Map::new(Settings { max_bytes: 4 << 20, tiers, ..settings }).unwrap();
+    let mut poured = 0;
+    let frames = Frame::tour(6, 4);
+    for frame in &frames {
+        let (view, colour, pose) = (frame.shot.view(), frame.colour(), frame.shot.world_from_camera);
+        all.integrate(&view, Some(&colour), &pose).unwrap();
+        if let Err(Error::OutOfBudget { .. }) = gpu.integrate(&view, Some(&colour), &pose) {
+            gpu.pour_into(&mut map).unwrap();
+            assert_eq!(gpu.blocks(), 0);
+            gpu.integrate(&view, Some(&colour), &pose).unwrap();
+            poured += 1;
+        }
+        assert!(gpu.bytes() <= 11 << 20 && map.bytes() <= 4 << 20);
+    }
+    assert!(poured > 0 && map.blocks() < all.blocks());
+    gpu.pour_into(&mut map).unwrap();
+    assert_eq!((map.hash(), map.blocks()), (all.hash(), all.blocks()));
+    let mut other = Map::new(Settings { voxel_size: 0.03, ..settings }).unwrap();
+    assert!(matches!(gpu.pour_into(&mut other), Err(Error::InvalidSetting { .. })));
+    // A map that has no room takes what it can, and nothing is lost.
+    let mut gpu = open(settings, &options()).unwrap();
+    let frame = &frames[0];
+    gpu.integrate(&frame.shot.view(), Some(&frame.colour()), &frame.shot.world_from_camera).unwrap();
+    let (whole, blocks) = (gpu.hash().unwrap(), gpu.blocks());
+    let mut tight = Map::new(Settings { max_bytes: 1 << 20, ..settings }).unwrap();
+    assert!(matches!(gpu.pour_into(&mut tight), Err(Error::OutOfBudget { .. })));
+    assert!(tight.blocks() > 0 && gpu.blocks() + tight.blocks() == blocks);
+    let mut rest = Map::new(settings).unwrap();
+    gpu.pour_into(&mut rest).unwrap();
+    GpuMap::from_map(&tight, &options()).unwrap().pour_into(&mut rest).unwrap();
+    assert_eq!(rest.hash(), whole);
 }
 
 fn wall() -> Shot {

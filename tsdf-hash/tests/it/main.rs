@@ -9,4 +9,5 @@ mod gpu;
 mod recorded;
 mod reversible;
 mod scene;
+mod tiers;
 mod topology;

@@ -1,0 +1,5 @@
+//! A map as one file.
+
+mod blocks;
+
+pub(crate) use blocks::{BlockFile, Entry};
