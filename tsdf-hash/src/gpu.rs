@@ -10,12 +10,13 @@ mod fuse;
 mod pool;
 mod probe;
 mod scratch;
+mod split;
 mod stream;
 
 use nalgebra::Isometry3;
 
-use crate::cast::camera::Camera;
 use crate::block::Block;
+use crate::cast::camera::Camera;
 use crate::fuse::{Frame, Sign};
 use crate::key::Key;
 use crate::surface::Surface;
@@ -24,13 +25,15 @@ use crate::view::{ColourView, DepthView, Intrinsics, check_pose, check_sides};
 use crate::{CastSettings, Error, FrameReport, Map, Settings, Tiers, View};
 use cast::Caster;
 use device::Device;
-use fuse::{Fuser, Mode, Pass, Tally, fresh};
+use fuse::{Fuser, Mode, Pass};
 use pool::Pool;
 use scratch::{Scratch, spread};
+use split::{Split, admit, mode, touched};
 use stream::Stream;
 
 /// Which adapter to use, and how.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct GpuOptions {
     /// Part of the adapter's name; empty for the best one (discrete before integrated).
     pub adapter: String,
@@ -264,74 +267,6 @@ impl GpuMap {
             Ok(())
         })?;
         Ok(hash)
-    }
-}
-
-fn mode(sign: Sign) -> Mode {
-    if sign == Sign::Plus { Mode::Plus } else { Mode::Minus }
-}
-
-/// The blocks that a frame has touched, or would.
-fn touched<'a>(blocks: impl Iterator<Item = &'a (Key, u32)>, tallies: &[Tally]) -> Vec<(Key, Tally)> {
-    blocks.zip(tallies).map(|((key, _), tally)| (*key, *tally)).filter(|(_, tally)| tally.voxels() > 0).collect()
-}
-
-/// Whether a frame may stay that needs some new blocks and has changed others; if so, there is memory for the new ones.
-fn admit(
-    pool: &mut Pool,
-    device: &Device,
-    sign: Sign,
-    needed: &[(Key, Tally)],
-    changed: &[(Key, Tally)],
-) -> Result<(), Error> {
-    match (sign, needed.first()) {
-        (Sign::Minus, Some((key, _))) => return Err(Error::NotIntegrated { block: key.block() }),
-        (Sign::Plus, _) if needed.len() > pool.room() => return Err(pool.out_of_budget()),
-        _ => {}
-    }
-    // The pages mix the keys, and the first of them is named.
-    match changed.iter().filter(|work| work.1.fault()).map(|work| work.0).min() {
-        Some(key) if sign == Sign::Plus => Err(Error::Saturated { block: key.block() }),
-        Some(key) => Err(Error::NotIntegrated { block: key.block() }),
-        None => pool.reserve(device, needed.len()),
-    }
-}
-
-/// Blocks of a frame, with their slots.
-struct Split {
-    absent: Vec<(Key, u32)>,
-    /// By page.
-    present: Vec<Vec<(Key, u32)>>,
-}
-
-impl Split {
-    fn new(pool: &Pool, keys: &[Key]) -> Self {
-        let mut split = Self { absent: Vec::new(), present: vec![Vec::new(); pool.pages.len()] };
-        for &key in keys {
-            match pool.get(key) {
-                Some(place) => split.present[place.page].push((key, place.slot)),
-                None => split.absent.push((key, fresh(0))),
-            }
-        }
-        split
-    }
-
-    /// Blocks that get slots now.
-    fn added(pool: &mut Pool, keys: &[(Key, Tally)]) -> Self {
-        let mut split = Self { absent: Vec::new(), present: vec![Vec::new(); pool.pages.len()] };
-        for &(key, _) in keys {
-            let place = pool.insert(key);
-            split.present[place.page].push((key, fresh(place.slot)));
-        }
-        split
-    }
-
-    fn count(&self) -> Pass<'_> {
-        Pass { mode: Mode::Count, page: 0, blocks: &self.absent }
-    }
-
-    fn update(&self, mode: Mode) -> impl Iterator<Item = Pass<'_>> {
-        self.present.iter().enumerate().map(move |(page, blocks)| Pass { mode, page, blocks })
     }
 }
 

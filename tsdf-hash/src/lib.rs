@@ -36,6 +36,7 @@
 //! | fusion undone | ours | [`Map::deintegrate`] |
 //! | noise and weights | Nguyen, Izadi, Lovell 2012; `w = 15 (σ₀/σ(z))² cos θ`: ours | [`NoiseModel`] |
 //! | mesh | thesis Paper I, section 4.6, by marching cubes; case table derived: ours | [`Map::mesh`], [`write_ply`] |
+//! | the same bytes on a GPU | ours | `GpuMap` (feature `gpu`) |
 //! | distance queries | thesis, outlook | [`Map::distance`] |
 //!
 //! Frames: the camera's z looks forward, `x` to the right and `y` down in its image; the world is the caller's. Distances

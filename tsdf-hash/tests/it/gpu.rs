@@ -2,7 +2,10 @@
 //! `PAINTCOPTER_REQUIRE_GPU=1` demands one.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use tsdf_hash::{CastSettings, ColourData, ColourView, Error, GpuMap, GpuOptions, Map, Settings, Tiers};
+use tsdf_hash::{
+    CastSettings, ColourData, ColourView, DepthData, DepthView, Error, GpuMap, GpuOptions, Intrinsics, Map, Settings,
+    Tiers,
+};
 
 use crate::scene::{Shot, look_at, room};
 
@@ -83,6 +86,47 @@ fn the_gpu_makes_the_bytes_of_the_processor() {
         gpu.integrate(&frame.shot.view(), Some(&frame.colour()), &frame.shot.world_from_camera).unwrap();
     }
     assert_eq!(Some(&gpu.hash().unwrap()), hashes.last());
+}
+
+/// Cameras of either handedness anywhere in the room, walls at arm's length included; 16-bit colours of a camera that sees
+/// only a part of the image.
+#[test]
+fn odd_cameras_agree() {
+    let Some(mut gpu) = open(settings(), &options()) else { return };
+    let mut map = Map::new(settings()).unwrap();
+    let mut state = 7_u64;
+    let mut unit = || {
+        // splitmix64
+        state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let z = (state ^ (state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let mut fused = 0;
+    for k in 0..12 {
+        let at = Vector3::new(5.0 * unit() - 2.5, 3.0 * unit() - 1.5, 2.4 * unit() + 0.3);
+        let turn = Vector3::new(6.0 * unit() - 3.0, 6.0 * unit() - 3.0, 6.0 * unit() - 3.0);
+        let focal = [90.0 + 40.0 * unit(), 90.0 + 40.0 * unit()];
+        let focal = [if k % 2 == 0 { focal[0] } else { -focal[0] }, if k % 3 == 0 { -focal[1] } else { focal[1] }];
+        let shot = Shot::take((121, 83), focal, Isometry3::new(at, turn), |o, d| Some(room::hit(o, d)));
+        let depth: Vec<u16> = shot.depth.iter().map(|z| (5000.0 * z) as u16).collect();
+        let view = DepthView { data: DepthData::U16 { data: &depth, scale: 5000.0 }, ..shot.view() };
+        let rgb16: Vec<u16> = (0..3 * 61 * 47).map(|n| (n * 7919 + k * 977) as u16).collect();
+        let (fx, fy) = (0.7 * focal[0], 0.6 * focal[1]);
+        let intrinsics = Intrinsics { fx, fy, cx: 28.3, cy: 25.1 };
+        let colour = ColourView { width: 61, height: 47, data: ColourData::Rgb16(&rgb16), intrinsics };
+        let pose = shot.world_from_camera;
+        match (map.integrate(&view, Some(&colour), &pose), gpu.integrate(&view, Some(&colour), &pose)) {
+            (Ok(expected), Ok(found)) => {
+                assert_eq!(found, expected);
+                fused += 1;
+            }
+            (Err(expected), Err(found)) => assert_eq!(found.to_string(), expected.to_string()),
+            (expected, found) => panic!("{expected:?} but {found:?}"),
+        }
+        assert_eq!(gpu.hash().unwrap(), map.hash());
+    }
+    assert!(fused > 8);
 }
 
 #[test]
@@ -228,6 +272,17 @@ fn refused_frames_leave_no_trace() {
         (gpu.integrate(&view, Some(&colour), &pose), map.integrate(&view, Some(&colour), &pose).unwrap_err());
     let (Err(Error::Saturated { block }), Error::Saturated { block: first }) = (ours, expected) else { panic!() };
     assert_eq!((block, gpu.hash().unwrap()), (first, full));
+    // A wall so near that every observation weighs 15: 4369 of them fill a voxel.
+    let near = Shot::take((24, 18), [20.0; 2], Isometry3::identity(), |_, d| Some(0.4 / d.z));
+    let mut heavy = Map::new(settings).unwrap();
+    for _ in 0..4369 {
+        heavy.integrate(&near.view(), None, &near.world_from_camera).unwrap();
+    }
+    let mut moved = GpuMap::from_map(&heavy, &options()).unwrap();
+    let expected = heavy.integrate(&near.view(), None, &near.world_from_camera).unwrap_err();
+    assert!(matches!(expected, Error::Saturated { .. }));
+    let found = moved.integrate(&near.view(), None, &near.world_from_camera).unwrap_err();
+    assert_eq!((found.to_string(), moved.hash().unwrap()), (expected.to_string(), heavy.hash()));
     // Strangers: one that reaches blocks which are not there, and one that does not.
     let moved = Isometry3::translation(0.0, 0.0, 0.3) * pose;
     assert!(matches!(gpu.deintegrate(&view, None, &moved), Err(Error::NotIntegrated { .. })));
