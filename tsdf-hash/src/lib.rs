@@ -62,6 +62,7 @@ mod view;
 
 pub use cast::{CastSettings, View};
 pub use error::Error;
+pub use file::MapFile;
 pub use map::{FrameReport, Map, Memory};
 pub use mesh::{Mesh, write_ply};
 pub use nalgebra;

@@ -4,6 +4,7 @@
 
 mod accuracy;
 mod errors;
+mod file;
 mod recorded;
 mod reversible;
 mod scene;
