@@ -138,7 +138,7 @@ impl Copies {
         }
         let peaks = [Some(block.peaks()), cold, held];
         let sum = |k: usize| peaks.iter().flatten().map(|peaks| u32::from(peaks[k])).sum::<u32>();
-        if sum(0) <= u32::from(u16::MAX) && sum(1) <= u32::from(MAX_COLOURS) {
+        if u16::try_from(sum(0)).is_ok() && sum(1) <= u32::from(MAX_COLOURS) {
             return Ok(true);
         }
         // The largest of each need not meet in one voxel.

@@ -250,8 +250,10 @@ fn mutate(good: &[u8], random: &mut Random) -> Vec<u8> {
     bytes
 }
 
-/// All that a caller can read from a file.
-fn read_all(path: &std::path::Path) -> Result<(u64, usize, Option<tsdf_hash::Mesh>, BTreeMap<String, Vec<u8>>), Error> {
+/// All that a caller can read from a file: hash and number of blocks, mesh, metadata.
+type Contents = (u64, usize, Option<tsdf_hash::Mesh>, BTreeMap<String, Vec<u8>>);
+
+fn read_all(path: &std::path::Path) -> Result<Contents, Error> {
     let file = MapFile::open(path)?;
     let (mesh, metadata) = (file.mesh()?, file.metadata()?);
     let settings = Settings { max_bytes: 1 << 24, threads: 1, tiers: Tiers::default(), ..*file.settings() };
