@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use clap::Parser;
 use paintcopter_benches::room::Shot;
-use tsdf_hash::{CastSettings, Error, GpuMap, GpuOptions, Map, Settings};
+use tsdf_hash::{CastSettings, DenseMap, Error, GpuMap, GpuOptions, Map, Settings};
 
 /// Images of a full turn, as many as in the stream `loop`; every sixth is used.
 const TURN: usize = 60;

@@ -109,6 +109,43 @@ pub enum Error {
         /// Block coordinates.
         block: [i32; 3],
     },
+    /// A file that is no map of this crate.
+    #[error("the file is no map: {what} (byte {offset})")]
+    NotAMap {
+        /// Why.
+        what: &'static str,
+        /// Where it shows, bytes from the start.
+        offset: u64,
+    },
+    /// A map's file of another version of the format.
+    #[error("the map's file is of version {found} (byte 8), this crate reads version {known}")]
+    OtherVersion {
+        /// Its version.
+        found: u32,
+        /// The one that can be read.
+        known: u32,
+    },
+    /// A map's file that is too short.
+    #[error("the map's file ends at byte {found} instead of {expected}: it was not copied as a whole")]
+    Truncated {
+        /// Its length as it should be, bytes.
+        expected: u64,
+        /// Its length.
+        found: u64,
+    },
+    /// A map's file that is not as it was written.
+    #[error("the map's file is damaged: {what} at byte {offset}")]
+    BadFile {
+        /// The part that is damaged.
+        what: &'static str,
+        /// Where it begins, or where reading it failed, bytes from the start.
+        offset: u64,
+    },
+    /// A map cannot be continued with settings that would make its sums mean something else.
+    #[error(
+        "the map was made with another voxel size, truncation, depth range or noise: only memory and threads may change"
+    )]
+    OtherSettings,
     /// Reading or writing a file failed.
     #[error("{what} failed")]
     Io {

@@ -22,7 +22,7 @@ use crate::key::Key;
 use crate::surface::Surface;
 use crate::tiers::fold;
 use crate::view::{ColourView, DepthView, Intrinsics, check_pose, check_sides};
-use crate::{CastSettings, Error, FrameReport, Map, Settings, Tiers, View};
+use crate::{CastSettings, DenseMap, Error, FrameReport, Map, Mesh, Settings, Tiers, View};
 use cast::Caster;
 use device::Device;
 use fuse::{Fuser, Mode, Pass};
@@ -52,8 +52,9 @@ impl Default for GpuOptions {
 
 /// A map whose blocks lie on a GPU. It equals, to the bit, a [`Map`] that was given the same frames.
 ///
-/// [`Settings::max_bytes`] caps the blocks on the device and their index on the processor; buffers for one frame (20 bytes
-/// per pixel, the colour image) and for blocks on their way (3.5 MiB) come on top.
+/// [`Settings::max_bytes`] caps the blocks on the device and their index on the processor; buffers for one frame (16 bytes
+/// per pixel, the colour image) and for blocks on their way (3.5 MiB) come on top. [`Settings::tiers`] plays no part: see
+/// [`pour_into`](Self::pour_into).
 pub struct GpuMap {
     settings: Settings,
     device: Device,
@@ -145,33 +146,6 @@ impl GpuMap {
         outcome
     }
 
-    /// As [`Map::integrate`].
-    ///
-    /// # Errors
-    /// The same, and [`Error::Device`]: the map is then as it was, unless the device is lost, which every later call
-    /// reports too.
-    pub fn integrate(
-        &mut self,
-        depth: &DepthView,
-        colour: Option<&ColourView>,
-        world_from_camera: &Isometry3<f64>,
-    ) -> Result<FrameReport, Error> {
-        self.apply(Sign::Plus, depth, colour, world_from_camera)
-    }
-
-    /// As [`Map::deintegrate`].
-    ///
-    /// # Errors
-    /// As [`integrate`](Self::integrate), and [`Error::NotIntegrated`].
-    pub fn deintegrate(
-        &mut self,
-        depth: &DepthView,
-        colour: Option<&ColourView>,
-        world_from_camera: &Isometry3<f64>,
-    ) -> Result<FrameReport, Error> {
-        self.apply(Sign::Minus, depth, colour, world_from_camera)
-    }
-
     fn apply(
         &mut self,
         sign: Sign,
@@ -222,12 +196,30 @@ impl GpuMap {
             blocks_overdue: 0,
         })
     }
+}
 
-    /// As [`Map::ray_cast`]; its `threads` do not matter here.
-    ///
-    /// # Errors
-    /// The same, and [`Error::Device`].
-    pub fn ray_cast(
+/// Each as the method of [`Map`] says, of blocks on the device. After an [`Error::Device`] the map is as it was, unless the
+/// device is lost, which every later call reports too.
+impl DenseMap for GpuMap {
+    fn integrate(
+        &mut self,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        world_from_camera: &Isometry3<f64>,
+    ) -> Result<FrameReport, Error> {
+        self.apply(Sign::Plus, depth, colour, world_from_camera)
+    }
+
+    fn deintegrate(
+        &mut self,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        world_from_camera: &Isometry3<f64>,
+    ) -> Result<FrameReport, Error> {
+        self.apply(Sign::Minus, depth, colour, world_from_camera)
+    }
+
+    fn ray_cast(
         &mut self,
         intrinsics: &Intrinsics,
         width: usize,
@@ -246,27 +238,39 @@ impl GpuMap {
         Ok(view)
     }
 
-    /// Bytes of the blocks' pages on the device and of their index on the processor: what [`Settings::max_bytes`] caps.
-    pub fn bytes(&self) -> usize {
+    fn bytes(&self) -> usize {
         self.pool.bytes()
     }
 
-    /// Number of blocks, 7168 bytes each.
-    pub fn blocks(&self) -> usize {
+    fn blocks(&self) -> usize {
         self.pool.len()
     }
 
-    /// As [`Map::hash`], of blocks that come back for it in batches.
-    ///
-    /// # Errors
-    /// [`Error::Device`].
-    pub fn hash(&self) -> Result<u64, Error> {
+    fn hash(&self) -> Result<u64, Error> {
         let mut hash = 0;
         self.stream.download(&self.device, &self.pool, &self.pool.sorted_keys(), |key, block| {
             hash = fold(hash, key, block.print());
             Ok(())
         })?;
         Ok(hash)
+    }
+
+    fn mesh(&self) -> Result<Mesh, Error> {
+        Ok(self.to_map(usize::MAX)?.mesh())
+    }
+}
+
+/// A map on the GPU or, where none can be used, on the processor, with the reason: one line for the caller's log.
+///
+/// # Errors
+/// Settings that make no sense, and those of [`Map::new`].
+pub fn open_map(settings: Settings, options: &GpuOptions) -> Result<(Box<dyn DenseMap>, Option<String>), Error> {
+    match GpuMap::new(settings, options) {
+        Ok(map) => Ok((Box::new(map), None)),
+        Err(error @ (Error::NoAdapter { .. } | Error::Device { .. })) => {
+            Ok((Box::new(Map::new(settings)?), Some(format!("mapping on the processor: {error}"))))
+        }
+        Err(error) => Err(error),
     }
 }
 

@@ -32,6 +32,10 @@
 //! | what | where it comes from | item |
 //! |---|---|---|
 //! | voxel hashing, a budget of memory | thesis Paper I, section 4.3 | [`Map`], [`Settings::max_bytes`] |
+//! | blocks leave and come back, regions (a)-(d) | thesis Paper I, section 4.3; partial sums: ours | [`Tiers`], [`Map::with_swap`], [`Memory`] |
+//! | what comes back is not fused before drift is known | thesis Paper I, section 4.5 | [`Revisit`], [`Map::revisit`] |
+//! | a map is stored, loaded and continued | thesis Paper II, section 6.1 | [`Map::save`], [`Map::open`], [`MapFile`] |
+//! | one map for another | ours | [`DenseMap`] |
 //! | fusion of depth and colour | thesis Paper I, section 4.3, step (b); sums instead of averages: ours | [`Map::integrate`] |
 //! | fusion undone | ours | [`Map::deintegrate`] |
 //! | noise and weights | Nguyen, Izadi, Lovell 2012; `w = 15 (σ₀/σ(z))² cos θ`: ours | [`NoiseModel`] |
@@ -40,12 +44,12 @@
 //! | distance queries | thesis, outlook | [`Map::distance`] |
 //!
 //! Frames: the camera's z looks forward, `x` to the right and `y` down in its image; the world is the caller's. Distances
-//! are positive on the camera's side of a surface. Metres. Tracking, ray casting and the move of blocks out of memory are
-//! not part of this crate yet.
+//! are positive on the camera's side of a surface. Metres. Tracking is not part of this crate yet.
 
 mod block;
 mod candidates;
 mod cast;
+mod dense;
 mod error;
 mod file;
 mod fuse;
@@ -64,9 +68,11 @@ mod tiers;
 mod view;
 
 pub use cast::{CastSettings, View};
+pub use dense::DenseMap;
 pub use error::Error;
+pub use file::MapFile;
 #[cfg(feature = "gpu")]
-pub use gpu::{GpuMap, GpuOptions};
+pub use gpu::{GpuMap, GpuOptions, open_map};
 pub use map::{FrameReport, Map, Memory};
 pub use mesh::{Mesh, write_ply};
 pub use nalgebra;

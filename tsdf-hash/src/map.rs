@@ -66,18 +66,18 @@ const FRAME_PERIOD: f64 = 1.0 / 30.0;
 /// The voxel `(i, j, k)` has its centre at `(i + ½, j + ½, k + ½) h` in the world; the block of a point is
 /// `floor(point / 8h)`. Distances are positive on the side of the camera.
 pub struct Map {
-    settings: Settings,
+    pub(crate) settings: Settings,
     pub(crate) copies: Copies,
     surface: Surface,
-    clock: Clock,
+    pub(crate) clock: Clock,
 }
 
 /// The time of the last frame.
 #[derive(Clone, Copy, Default)]
-struct Clock {
-    last: Option<f64>,
+pub(crate) struct Clock {
+    pub(crate) last: Option<f64>,
     /// Whether any frame came with its time.
-    stamped: bool,
+    pub(crate) stamped: bool,
 }
 
 impl Map {

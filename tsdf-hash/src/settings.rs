@@ -110,7 +110,8 @@ impl Settings {
         within("max_depth", self.max_depth - self.min_depth, 1e-6, 1e3, "larger than min_depth")?;
         within("threads", self.threads as f64, 1.0, 1024.0, "1..=1024")?;
         let tiers = &self.tiers;
-        within("tiers.host_bytes", tiers.host_bytes.wrapping_sub(1) as f64, 65535.0, f64::MAX, "0, or 65536 and more")?;
+        let least = if tiers.host_bytes == 0 { 0.0 } else { 65536.0 };
+        within("tiers.host_bytes", tiers.host_bytes as f64, least, f64::MAX, "0, or 65536 and more")?;
         let disk = if tiers.host_bytes == 0 { 0.0 } else { f64::MAX };
         within("tiers.disk_bytes", tiers.disk_bytes as f64, 0.0, disk, "0 without a host tier, which holds its index")?;
         within("tiers.age", tiers.age, 0.0, f64::MAX, "0 seconds or more")?;

@@ -14,6 +14,7 @@ mod revisit;
 mod swap;
 
 pub(crate) use change::Moment;
+pub(crate) use coder::{MOST_BYTES, pack};
 use cold::Cold;
 pub(crate) use cold::Label;
 pub(crate) use moves::Moves;
@@ -22,6 +23,7 @@ pub(crate) use swap::Swap;
 
 use crate::block::{Block, MAX_COLOURS};
 use crate::error::Error;
+use crate::file::{BlockFile, Entry};
 use crate::key::{Key, mix};
 use crate::settings::Tiers as Limits;
 use crate::slots::Slots;
@@ -49,6 +51,23 @@ impl Copies {
     pub(crate) fn new(max_bytes: usize, limits: Limits, swap: Option<Swap>) -> Result<Self, Error> {
         let (active, held) = (Store::new(max_bytes)?, Slots::new());
         Ok(Self { active, held, cold: Cold::new(limits.host_bytes, swap), limits, call: 0 })
+    }
+
+    /// Takes in the blocks of a file: as cold ones, or at once where there is no cold memory.
+    pub(crate) fn open(&mut self, file: BlockFile, entries: &[Entry]) -> Result<(), Error> {
+        if self.cold.exists() {
+            return self.cold.open(file, entries);
+        }
+        let file = Cold::of_file(file, entries);
+        for entry in entries {
+            if self.active.room() == 0 {
+                return Err(self.active.out_of_budget());
+            }
+            let mut block = Box::new(Block::ZERO);
+            file.add_to(entry.key, &mut block)?;
+            self.active.insert(entry.key, block, entry.label.seen());
+        }
+        Ok(())
     }
 
     /// Bytes of active memory, held blocks included.
@@ -121,7 +140,7 @@ impl Copies {
         }
         let peaks = [Some(block.peaks()), cold, held];
         let sum = |k: usize| peaks.iter().flatten().map(|peaks| u32::from(peaks[k])).sum::<u32>();
-        if sum(0) <= u32::from(u16::MAX) && sum(1) <= u32::from(MAX_COLOURS) {
+        if u16::try_from(sum(0)).is_ok() && sum(1) <= u32::from(MAX_COLOURS) {
             return Ok(true);
         }
         // The largest of each need not meet in one voxel.

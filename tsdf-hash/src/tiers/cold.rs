@@ -81,6 +81,13 @@ impl Cold {
         }
     }
 
+    /// Nothing but the blocks of a file.
+    pub(crate) fn of_file(file: BlockFile, entries: &[Entry]) -> Self {
+        let mut cold = Self::new(0, None);
+        cold.take_in(file, entries);
+        cold
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.host.len() + self.far.len() == 0
     }
@@ -122,14 +129,15 @@ impl Cold {
         let mut bytes = vec![0; usize::from(far.len)];
         match (far.in_file, &self.swap, &self.file) {
             (true, _, Some(file)) => file.read(far.at, &mut bytes)?,
-            (false, Some(swap), _) => {
-                swap.read(far.at as u32, &mut bytes)
-                    .map_err(|source| Error::Io { what: "reading the swap file", source })?;
-            }
+            (false, Some(swap), _) => swap
+                .read(far.at as u32, &mut bytes)
+                .map_err(|source| Error::Io { what: "reading the swap file", source })?,
             _ => return Err(damaged()),
         }
         let mut copy = Box::new(Block::ZERO);
-        unpack_add(&bytes, &mut copy).filter(|()| copy.print() == far.label.print).ok_or_else(damaged)?;
+        unpack_add(&bytes, &mut copy)
+            .filter(|()| Label::of(&copy, Seen::default()).same_block(far.label))
+            .ok_or_else(damaged)?;
         block.add(&copy);
         Ok(Some(far.label))
     }
@@ -165,7 +173,7 @@ impl Cold {
     /// Stages a block in the place of the copy that is here.
     pub(crate) fn stage_instead(&mut self, key: Key, block: &Block, seen: Seen) -> Result<(), Error> {
         let place = if block.is_empty() { Place::Gone } else { self.place(block)? };
-        self.push(key, place, label_of(block, seen));
+        self.push(key, place, Label::of(block, seen));
         Ok(())
     }
 
@@ -188,11 +196,16 @@ impl Cold {
         if self.need(0, entries.len()) > self.max_bytes {
             return Err(self.full());
         }
-        for &Entry { key, at, len, label } in entries {
-            self.far.insert(key, Far { at, label, len, in_file: true });
-        }
-        self.file = Some(file);
+        self.take_in(file, entries);
         Ok(())
+    }
+
+    fn take_in(&mut self, file: BlockFile, entries: &[Entry]) {
+        self.file = Some(file);
+        self.far.extend(entries.iter().map(|entry| {
+            let Entry { key, at, len, label } = *entry;
+            (key, Far { at, label, len, in_file: true })
+        }));
     }
 
     fn full(&self) -> Error {
@@ -201,11 +214,11 @@ impl Cold {
 
     fn merged(&mut self, key: Key, block: &Block, seen: Seen) -> Result<(Place, Label), Error> {
         if self.label(key).is_none() {
-            return Ok((self.place(block)?, label_of(block, seen)));
+            return Ok((self.place(block)?, Label::of(block, seen)));
         }
         let mut sum = Box::new(block.clone());
         let old = self.add_to(key, &mut sum)?.unwrap_or_default();
-        Ok((self.place(&sum)?, label_of(&sum, old.seen().with(seen))))
+        Ok((self.place(&sum)?, Label::of(&sum, old.seen().with(seen))))
     }
 
     /// Packs a block into RAM, or onto the disk if that is full.
@@ -317,11 +330,16 @@ fn index_bytes<V>(len: usize) -> usize {
     if len == 0 { 0 } else { (len / 5 + 2) * node }
 }
 
-fn label_of(block: &Block, seen: Seen) -> Label {
-    Label { print: block.print(), last: seen.last, frames: seen.frames, peaks: block.peaks() }
-}
-
 impl Label {
+    pub(crate) fn of(block: &Block, seen: Seen) -> Self {
+        Self { print: block.print(), last: seen.last, frames: seen.frames, peaks: block.peaks() }
+    }
+
+    /// Whether these can be labels of the same block.
+    fn same_block(self, other: Self) -> bool {
+        self.print == other.print && self.peaks == other.peaks
+    }
+
     /// As a copy that no call has touched.
     pub(crate) fn seen(self) -> Seen {
         Seen { last: self.last, frames: self.frames, call: 0 }

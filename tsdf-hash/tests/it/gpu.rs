@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use tsdf_hash::{
-    CastSettings, ColourData, ColourView, DepthData, DepthView, Error, GpuMap, GpuOptions, Intrinsics, Map, Settings,
+    CastSettings, ColourData, ColourView, DenseMap, DepthData, DepthView, Error, GpuMap, GpuOptions, Intrinsics, Map, Settings,
     Tiers,
 };
 
@@ -327,4 +327,16 @@ fn an_adapter_that_is_not_there_is_an_error() {
     let nowhere = GpuOptions { adapter: "no such adapter".into(), ..options() };
     let Err(Error::NoAdapter { reason }) = GpuMap::new(settings(), &nowhere) else { panic!("it was found") };
     assert!(!reason.is_empty());
+    // The processor takes over, and the reason says so.
+    let (mut map, reason) = open_map(settings(), &nowhere).unwrap();
+    assert!(reason.unwrap().contains("no GPU"));
+    let shot = wall();
+    map.integrate(&shot.view(), None, &shot.world_from_camera).unwrap();
+    let expected = map.hash().unwrap();
+    if let (mut map, None) = open_map(settings(), &options()).unwrap() {
+        map.integrate(&shot.view(), None, &shot.world_from_camera).unwrap();
+        assert_eq!((map.hash().unwrap(), map.mesh().unwrap().faces.is_empty()), (expected, false));
+    }
+    let wrong = Settings { threads: 0, ..settings() };
+    assert!(matches!(open_map(wrong, &nowhere), Err(Error::InvalidSetting { .. })));
 }

@@ -4,6 +4,7 @@
 
 mod accuracy;
 mod errors;
+mod file;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod recorded;

@@ -12,7 +12,7 @@ pub(crate) fn scratch(name: &str) -> PathBuf {
     std::env::temp_dir().join(format!("tsdf-hash-{name}-{}", std::process::id()))
 }
 
-const FREE: Settings = Settings {
+pub(crate) const FREE: Settings = Settings {
     voxel_size: 0.02,
     truncation_voxels: 4.0,
     min_depth: 0.2,
@@ -35,7 +35,7 @@ fn colours(shot: &Shot) -> Vec<u8> {
     (0..3 * shot.width * shot.height).map(|k| (k * 7 % 251) as u8).collect()
 }
 
-fn add(map: &mut Map, shot: &Shot) -> Result<tsdf_hash::FrameReport, Error> {
+pub(crate) fn add(map: &mut Map, shot: &Shot) -> Result<tsdf_hash::FrameReport, Error> {
     let rgb8 = colours(shot);
     let colour = ColourView {
         width: shot.width,
@@ -46,7 +46,7 @@ fn add(map: &mut Map, shot: &Shot) -> Result<tsdf_hash::FrameReport, Error> {
     map.integrate(&shot.view(), Some(&colour), &shot.world_from_camera)
 }
 
-fn take_out(map: &mut Map, shot: &Shot) -> Result<tsdf_hash::FrameReport, Error> {
+pub(crate) fn take_out(map: &mut Map, shot: &Shot) -> Result<tsdf_hash::FrameReport, Error> {
     let rgb8 = colours(shot);
     let colour = ColourView {
         width: shot.width,
@@ -65,7 +65,7 @@ fn assert_capped(map: &Map) {
 }
 
 /// All voxels of all tiers, read back from wherever they are: not the prints that are kept beside them.
-fn contents(map: &Map) -> (u64, usize, tsdf_hash::Mesh) {
+pub(crate) fn contents(map: &Map) -> (u64, usize, tsdf_hash::Mesh) {
     let whole = map.whole().unwrap();
     assert_eq!((whole.hash(), whole.blocks()), (map.hash(), map.blocks()));
     (whole.hash(), whole.blocks(), whole.mesh())
