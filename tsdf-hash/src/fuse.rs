@@ -4,9 +4,8 @@ use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use crate::Settings;
 use crate::block::{Block, MAX_COLOURS, ONE, SIDE};
-use crate::candidates::{TILE, Tile};
 use crate::key::Key;
-use crate::surface::{Plane, Surface};
+use crate::surface::{Plane, Surface, TILE};
 use crate::view::{ColourData, ColourView, Intrinsics};
 
 /// Colours are taken this close to the surface, in voxels (ours).
@@ -107,16 +106,16 @@ impl<'a> Frame<'a> {
         let start = (self.projection * Vector3::new(x, y, z) + self.offset).cast::<f32>();
         let step = (self.projection * h).cast::<f32>();
         let [sx, sy, sz] = [0, 1, 2].map(|axis| step.column(axis).into_owned());
-        let Some(range) = self.range(&start, &[sx, sy, sz]) else { return Tally::default() };
+        let steps = [sx, sy, sz];
+        let Some(slab) = self.slab(&start, &steps) else { return Tally::default() };
         let mut work = Work::default();
         for z in 0..SIDE {
             for y in 0..SIDE {
+                let along = slab.start + slab.step[1] * y as f32 + slab.step[2] * z as f32;
                 let row = (start + sy * y as f32) + sz * z as f32;
                 for x in [0, LANES] {
-                    // Depth is monotonic along the lanes, rounding included.
-                    let [first, last] = [x, x + LANES - 1].map(|x| row.z + sx.z * x as f32);
-                    let missed = (first < range.near && last < range.near) || (first > range.far && last > range.far);
-                    if !missed {
+                    let [first, last] = [x, x + LANES - 1].map(|x| along + slab.step[0] * x as f32);
+                    if (first < slab.reach || last < slab.reach) && (first > -slab.reach || last > -slab.reach) {
                         let lanes = Lanes::project(self.surface, &row, &sx, x);
                         self.observe::<PLUS>(block, (x + SIDE * (y + SIDE * z)) / LANES, &lanes, &mut work);
                     }
@@ -126,44 +125,62 @@ impl<'a> Frame<'a> {
         work.tally()
     }
 
-    /// Depths outside of which no voxel of a block is touched, from the squares of pixels that it projects to; `None` if
-    /// none can be.
-    fn range(&self, start: &Vector3<f32>, steps: &[Vector3<f32>; 3]) -> Option<Tile> {
-        let all = Tile { near: 0.0, far: f32::INFINITY };
+    /// Where in a block voxels can be touched, from the squares of pixels that it projects to; `None` if nowhere.
+    ///
+    /// If the inverse depth under the block is a linear function of the pixel, `1 - z ω` is one of the voxel. A voxel is
+    /// touched if it is at most `μ ω`; an inverse depth that is `e` off the function adds `z e`.
+    fn slab(&self, start: &Vector3<f32>, steps: &[Vector3<f32>; 3]) -> Option<Slab> {
         let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+        let mut far = 0.0_f32;
         for corner in 0..8 {
             let at = |axis: usize| steps[axis] * if corner >> axis & 1 == 1 { (SIDE - 1) as f32 } else { 0.0 };
             let p = start + at(0) + at(1) + at(2);
-            if p.z <= 1e-3 * self.truncation {
-                return Some(all);
+            if p.z < NEAREST {
+                return Some(Slab::ALL);
             }
+            far = far.max(p.z);
             for k in 0..2 {
                 let pixel = p[k] / p.z;
                 low[k] = low[k].min(pixel);
                 high[k] = high[k].max(pixel);
             }
         }
-        let tiles = [self.surface.width, self.surface.height];
+        let sides = [self.surface.width, self.surface.height];
         let mut ranges = [(0, 0); 2];
         for k in 0..2 {
-            // One pixel more on each side, for the rounding.
-            let last = (tiles[k] - 1) as f32;
+            // A pixel more on each side, for the rounding.
+            let last = (sides[k] - 1) as f32;
             if low[k] > last + 1.0 || high[k] < -1.0 {
                 return None;
             }
             ranges[k] = ((low[k] - 1.0).max(0.0) as usize / TILE, (high[k] + 1.0).min(last) as usize / TILE);
         }
-        let across = self.surface.width.div_ceil(TILE);
+        let across = sides[0].div_ceil(TILE);
         let [columns, lines] = ranges;
-        let mut range = Tile::EMPTY;
-        for line in lines.0..=lines.1 {
-            for tile in &self.surface.tiles[line * across + columns.0..=line * across + columns.1] {
-                range = range.with(*tile);
-            }
+        let tiles = || {
+            let line = move |line: usize| (columns.0..=columns.1).map(move |column| (column, line));
+            (lines.0..=lines.1).flat_map(line).filter_map(|(column, line)| {
+                let tile = &self.surface.tiles[line * across + column];
+                (!tile.is_empty()).then_some((column, line, tile))
+            })
+        };
+        // The flattest square speaks for all.
+        let (_, _, flattest) = tiles().min_by(|a, b| a.2.error.total_cmp(&b.2.error))?;
+        let omega = flattest.omega;
+        let (mut error, mut most) = (0.0_f32, 0.0_f32);
+        for (column, line, tile) in tiles() {
+            most = most.max(1.0 / tile.near);
+            let [u, v] = [column, line].map(|k| (k * TILE) as f32);
+            let side = (TILE - 1) as f32;
+            let corners = [(u, v), (u + side, v), (u, v + side), (u + side, v + side)];
+            let off = corners.iter().map(|&(u, v)| (tile.omega.at(u, v) - omega.at(u, v)).abs());
+            error = error.max(tile.error + off.fold(0.0, f32::max));
         }
-        // A little more than μ, for the rounding.
-        let reach = 1.001 * self.truncation + 1e-5 * range.far;
-        (range.near <= range.far).then_some(Tile { near: range.near - reach, far: range.far + reach })
+        let along = |p: &Vector3<f32>| omega.base * p.z + omega.slope[0] * p.x + omega.slope[1] * p.y;
+        // Half a pixel between a voxel's projection and its pixel; and a little for the rounding.
+        let error = error + 0.5 * (omega.slope[0].abs() + omega.slope[1].abs());
+        let reach = 1.001 * (self.truncation * most + far * error) + 1e-4;
+        Some(Slab { start: 1.0 - along(start), step: [0, 1, 2].map(|k| -along(&steps[k])), reach })
     }
 
     /// Updates the voxels `LANES unit..`.
@@ -217,6 +234,20 @@ impl<'a> Frame<'a> {
             }
         }
     }
+}
+
+/// Blocks closer to the camera's plane are searched voxel by voxel, metres.
+const NEAREST: f32 = 1e-2;
+
+/// The voxels where a linear function of their indices is between `-reach` and `reach`.
+struct Slab {
+    start: f32,
+    step: [f32; 3],
+    reach: f32,
+}
+
+impl Slab {
+    const ALL: Self = Self { start: 0.0, step: [0.0; 3], reach: 1.0 };
 }
 
 /// Neighbours along x that are updated together: a vector register.
@@ -281,7 +312,6 @@ impl Lanes {
     #[expect(clippy::needless_bitwise_bool, reason = "without branches the lanes stay in vector registers")]
     fn project(surface: &Surface, row: &Vector3<f32>, step: &Vector3<f32>, first: usize) -> Self {
         let (right, bottom) = ((surface.width - 1) as f32, (surface.height - 1) as f32);
-        let width = surface.width as f32;
         let zero = [0.0; LANES];
         let mut out = Self { index: [0; LANES], depth: zero, u: zero, v: zero, du: zero, dv: zero };
         for x in 0..LANES {
@@ -293,7 +323,8 @@ impl Lanes {
             let (i, j) = ((u + ROUNDER) - ROUNDER, (v + ROUNDER) - ROUNDER);
             (out.depth[x], out.u[x], out.v[x], out.du[x], out.dv[x]) = (z, u, v, u - i, v - j);
             let inside = (z > 0.0) & (i >= 0.0) & (i <= right) & (j >= 0.0) & (j <= bottom);
-            let index = rounded(v).wrapping_mul(width as i32).wrapping_add(rounded(u));
+            // Sides are at most 16384: fifteen bits hold what is inside, and SSE2 multiplies no wider integers at once.
+            let index = (rounded(v) & 0x7fff) * (surface.width as i32 & 0x7fff) + (rounded(u) & 0x7fff);
             out.index[x] = (index | !mask(inside)).cast_unsigned();
         }
         out

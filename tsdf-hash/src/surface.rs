@@ -3,18 +3,20 @@
 //! For a plane, inverse depth is a linear function of the pixel: `ω(u, v) = ω₀ + a (u - u₀) + b (v - v₀)`, whatever its
 //! slope. So slopes come from linear filters, and a depth edge is where second differences of `ω` exceed the noise.
 
+mod tile;
 mod window;
 
 use nalgebra::Isometry3;
+use tile::TileLine;
+pub(crate) use tile::{TILE, Tile};
 use window::{BEND_VARIANCE, BENDING, COUNT, Row, SPREAD, Windows};
 
 use crate::block::{MAX_WEIGHT, ONE};
-use crate::candidates::{self, TILE, Tile};
 use crate::fuse::ROUNDER;
 use crate::key::Key;
 use crate::parallel::in_chunks;
 use crate::view::{DepthView, Intrinsics};
-use crate::{Error, Settings};
+use crate::{Error, Settings, candidates};
 
 /// Steeper views of a surface are left to other frames (ours: 84 degrees between ray and normal).
 const LEAST_COSINE: f32 = 0.1;
@@ -117,24 +119,19 @@ impl Band<'_> {
         let noise = Noise::new(settings);
         let per_metre = (f64::from(ONE) / settings.truncation()) as f32;
         let mut windows = Windows::new(depth, settings, self.first);
-        let mut columns = Columns::new(width);
-        let (mut low, mut high) = (vec![0.0; width], vec![0.0; width]);
+        let (mut columns, mut tile_line) = (Columns::new(width), TileLine::new(width));
         let mut all = [0, 0];
         let lines = self.planes.chunks_mut(TILE * width).zip(self.tiles.chunks_mut(width.div_ceil(TILE)));
         for (line, (planes, tiles)) in lines.enumerate() {
-            low.fill(f32::INFINITY);
-            high.fill(0.0);
             for (row, planes) in planes.chunks_exact_mut(width).enumerate() {
                 let row = line * TILE + row;
                 let lens = Lens::new(&depth.intrinsics, self.first + row, per_metre);
                 let [valid, fused] = read_row(&windows.row(row), lens, noise, &mut columns);
                 columns.write(planes);
-                widen(&columns.omega, &mut low, &mut high);
+                tile_line.push(&columns.omega);
                 all = [all[0] + valid as usize, all[1] + fused as usize];
             }
-            for (tile, (low, high)) in tiles.iter_mut().zip(low.chunks(TILE).zip(high.chunks(TILE))) {
-                *tile = Tile::of(low, high);
-            }
+            tile_line.finish(self.first + line * TILE, planes, tiles);
         }
         all
     }
@@ -208,15 +205,6 @@ fn read_row(row: &Row, lens: Lens, noise: Noise, out: &mut Columns) -> [u32; 2] 
 #[inline(always)]
 fn choose(mask: u32, one: f32, other: f32) -> f32 {
     f32::from_bits(one.to_bits() & mask | other.to_bits() & !mask)
-}
-
-/// Widens the ranges of the inverse depths of columns; a 0 is none.
-fn widen(omegas: &[f32], low: &mut [f32], high: &mut [f32]) {
-    for ((&omega, low), high) in omegas.iter().zip(low).zip(high) {
-        let floor = if omega > 0.0 { omega } else { f32::INFINITY };
-        *low = if floor < *low { floor } else { *low };
-        *high = if omega > *high { omega } else { *high };
-    }
 }
 
 /// The camera, seen from one row of its image.
