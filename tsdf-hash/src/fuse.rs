@@ -46,6 +46,9 @@ pub(crate) struct Frame<'a> {
     truncation: f32,
     /// In steps of the stored distance.
     colour_reach: f32,
+    width: i32,
+    /// The last column and the last row.
+    last: [f32; 2],
 }
 
 impl<'a> Frame<'a> {
@@ -66,6 +69,8 @@ impl<'a> Frame<'a> {
             offset: pixels_from_camera * camera_from_world.translation.vector,
             voxel_size: settings.voxel_size,
             truncation: settings.truncation() as f32,
+            width: surface.width as i32,
+            last: [surface.width, surface.height].map(|side| (side - 1) as f32),
             colour_reach: (f64::from(ONE) * COLOUR_REACH / settings.truncation_voxels) as f32,
         }
     }
@@ -108,16 +113,16 @@ impl<'a> Frame<'a> {
         let [sx, sy, sz] = [0, 1, 2].map(|axis| step.column(axis).into_owned());
         let steps = [sx, sy, sz];
         let Some(slab) = self.slab(&start, &steps) else { return Tally::default() };
+        let offsets = [0, LANES].map(|first| Offsets::new(&sx, first));
         let mut work = Work::default();
         for z in 0..SIDE {
             for y in 0..SIDE {
                 let along = slab.start + slab.step[1] * y as f32 + slab.step[2] * z as f32;
                 let row = (start + sy * y as f32) + sz * z as f32;
-                for x in [0, LANES] {
-                    let [first, last] = [x, x + LANES - 1].map(|x| along + slab.step[0] * x as f32);
-                    if (first < slab.reach || last < slab.reach) && (first > -slab.reach || last > -slab.reach) {
-                        let lanes = Lanes::project(self.surface, &row, &sx, x);
-                        self.observe::<PLUS>(block, (x + SIDE * (y + SIDE * z)) / LANES, &lanes, &mut work);
+                for (half, (offsets, [least, most])) in offsets.iter().zip(slab.bounds).enumerate() {
+                    if along >= least && along <= most {
+                        let lanes = self.project(&row, offsets);
+                        self.observe::<PLUS>(block, half + HALVES * (y + SIDE * z), &lanes, &mut work);
                     }
                 }
             }
@@ -180,7 +185,27 @@ impl<'a> Frame<'a> {
         // Half a pixel between a voxel's projection and its pixel; and a little for the rounding.
         let error = error + 0.5 * (omega.slope[0].abs() + omega.slope[1].abs());
         let reach = 1.001 * (self.truncation * most + far * error) + 1e-4;
-        Some(Slab { start: 1.0 - along(start), step: [0, 1, 2].map(|k| -along(&steps[k])), reach })
+        Some(Slab::new(1.0 - along(start), [0, 1, 2].map(|k| -along(&steps[k])), reach))
+    }
+
+    #[inline(always)]
+    fn project(&self, row: &Vector3<f32>, offsets: &Offsets) -> Lanes {
+        let zero = [0.0; LANES];
+        let mut out = Lanes { index: [0; LANES], depth: zero, u: zero, v: zero, du: zero, dv: zero };
+        for x in 0..LANES {
+            let z = row.z + offsets.depth[x];
+            let inverse = 1.0 / z;
+            let u = (row.x + offsets.u[x]) * inverse;
+            let v = (row.y + offsets.v[x]) * inverse;
+            let (i, j) = ((u + ROUNDER) - ROUNDER, (v + ROUNDER) - ROUNDER);
+            (out.depth[x], out.u[x], out.v[x], out.du[x], out.dv[x]) = (z, u, v, u - i, v - j);
+            let inside =
+                mask(z > 0.0) & mask(i >= 0.0) & mask(i <= self.last[0]) & mask(j >= 0.0) & mask(j <= self.last[1]);
+            // Sides are at most 16384: fifteen bits hold what is inside, and SSE2 multiplies no wider integers at once.
+            let index = (rounded(v) & 0x7fff) * (self.width & 0x7fff) + (rounded(u) & 0x7fff);
+            out.index[x] = (index | !inside).cast_unsigned();
+        }
+        out
     }
 
     /// Updates the voxels `LANES unit..`.
@@ -243,13 +268,24 @@ const NEAREST: f32 = 1e-2;
 struct Slab {
     start: f32,
     step: [f32; 3],
-    reach: f32,
+    /// Of a row, from the function at its first voxel: where the lanes of each half can be in the slab.
+    bounds: [[f32; 2]; HALVES],
 }
 
 impl Slab {
-    const ALL: Self = Self { start: 0.0, step: [0.0; 3], reach: 1.0 };
+    const ALL: Self = Self { start: 0.0, step: [0.0; 3], bounds: [[-1.0, 1.0]; HALVES] };
+
+    fn new(start: f32, step: [f32; 3], reach: f32) -> Self {
+        let bounds = [0, LANES].map(|x| {
+            let ends = [x, x + LANES - 1].map(|x| step[0] * x as f32);
+            [-reach - ends[0].max(ends[1]), reach - ends[0].min(ends[1])]
+        });
+        Self { start, step, bounds }
+    }
 }
 
+/// Of a row of voxels.
+const HALVES: usize = SIDE / LANES;
 /// Neighbours along x that are updated together: a vector register.
 const LANES: usize = 4;
 const LIMIT: f32 = ONE as f32;
@@ -266,15 +302,22 @@ fn rounded(x: f32) -> i32 {
     (x + ROUNDER).to_bits().wrapping_sub(ROUNDER.to_bits()).cast_signed()
 }
 
+/// Adds a colour to sums or takes it out; returns whether a counter ran over or under.
 #[inline(always)]
 fn observe_colour<const PLUS: bool>(sums: &mut [u16; 4], rgb: [u16; 3]) -> bool {
-    let mut fault = false;
     for (sum, c) in sums.iter_mut().zip([rgb[0], rgb[1], rgb[2], 1]) {
-        let (next, wrapped) = if PLUS { sum.overflowing_add(c) } else { sum.overflowing_sub(c) };
-        *sum = next;
-        fault |= wrapped;
+        *sum = if PLUS { sum.wrapping_add(c) } else { sum.wrapping_sub(c) };
     }
-    fault || sums[3] > MAX_COLOURS
+    let [r, g, b, n] = *sums;
+    // A sum that ran under is at least 65536 - 63, more than 63 n for any other n than the one just refused.
+    let most = n.wrapping_mul(63);
+    n > MAX_COLOURS || (!PLUS && (r > most || g > most || b > most))
+}
+
+/// `round(63 c / 255)`.
+#[inline(always)]
+fn six_bits(c: u8) -> u16 {
+    ((u32::from(c) * 253 + 505) >> 10) as u16
 }
 
 /// What the update of a block counts, per lane.
@@ -306,28 +349,17 @@ struct Lanes {
     dv: [f32; LANES],
 }
 
-impl Lanes {
-    /// Projects the voxels `first..` of a row.
-    #[inline(always)]
-    #[expect(clippy::needless_bitwise_bool, reason = "without branches the lanes stay in vector registers")]
-    fn project(surface: &Surface, row: &Vector3<f32>, step: &Vector3<f32>, first: usize) -> Self {
-        let (right, bottom) = ((surface.width - 1) as f32, (surface.height - 1) as f32);
-        let zero = [0.0; LANES];
-        let mut out = Self { index: [0; LANES], depth: zero, u: zero, v: zero, du: zero, dv: zero };
-        for x in 0..LANES {
-            let along = (first + x) as f32;
-            let z = row.z + step.z * along;
-            let inverse = 1.0 / z;
-            let u = (row.x + step.x * along) * inverse;
-            let v = (row.y + step.y * along) * inverse;
-            let (i, j) = ((u + ROUNDER) - ROUNDER, (v + ROUNDER) - ROUNDER);
-            (out.depth[x], out.u[x], out.v[x], out.du[x], out.dv[x]) = (z, u, v, u - i, v - j);
-            let inside = (z > 0.0) & (i >= 0.0) & (i <= right) & (j >= 0.0) & (j <= bottom);
-            // Sides are at most 16384: fifteen bits hold what is inside, and SSE2 multiplies no wider integers at once.
-            let index = (rounded(v) & 0x7fff) * (surface.width as i32 & 0x7fff) + (rounded(u) & 0x7fff);
-            out.index[x] = (index | !mask(inside)).cast_unsigned();
-        }
-        out
+/// From the first voxel of a row to some neighbours: the change of `(u z, v z, z)`.
+struct Offsets {
+    u: [f32; LANES],
+    v: [f32; LANES],
+    depth: [f32; LANES],
+}
+
+impl Offsets {
+    fn new(step: &Vector3<f32>, first: usize) -> Self {
+        let along: [f32; LANES] = std::array::from_fn(|x| (first + x) as f32);
+        Self { u: along.map(|x| step.x * x), v: along.map(|x| step.y * x), depth: along.map(|x| step.z * x) }
     }
 }
 
@@ -337,6 +369,8 @@ struct ColourSource<'a> {
     /// Colour column = `scale u + shift`, likewise the row.
     scale: [f32; 2],
     shift: [f32; 2],
+    /// The last column and the last row.
+    last: [f32; 2],
 }
 
 impl<'a> ColourSource<'a> {
@@ -344,23 +378,23 @@ impl<'a> ColourSource<'a> {
         let c = &view.intrinsics;
         let scale = [c.fx / depth.fx, c.fy / depth.fy];
         let shift = [c.cx - scale[0] * depth.cx, c.cy - scale[1] * depth.cy];
-        Self { view, scale: scale.map(|s| s as f32), shift: shift.map(|s| s as f32) }
+        let last = [view.width, view.height].map(|side| (side - 1) as f32);
+        Self { view, scale: scale.map(|s| s as f32), shift: shift.map(|s| s as f32), last }
     }
 
     /// Six-bit colour of the pixel nearest to a projection; `None` outside the colour image.
     #[inline(always)]
     fn at(&self, u: f32, v: f32) -> Option<[u16; 3]> {
-        let [i, j] =
-            [u * self.scale[0] + self.shift[0], v * self.scale[1] + self.shift[1]].map(|x| (x + ROUNDER) - ROUNDER);
-        let (width, height) = (self.view.width, self.view.height);
-        if !(i >= 0.0 && i < width as f32 && j >= 0.0 && j < height as f32) {
+        let i = (u * self.scale[0] + self.shift[0] + ROUNDER) - ROUNDER;
+        let j = (v * self.scale[1] + self.shift[1] + ROUNDER) - ROUNDER;
+        if !(i >= 0.0 && i <= self.last[0] && j >= 0.0 && j <= self.last[1]) {
             return None;
         }
-        let start = 3 * (j as usize * width + i as usize);
+        let start = 3 * (rounded(j) as usize * self.view.width + rounded(i) as usize);
         match self.view.data {
             ColourData::Rgb8(data) => {
                 let rgb = data.get(start..start + 3)?;
-                Some([rgb[0], rgb[1], rgb[2]].map(|c| (u16::from(c) * 63 + 127) / 255))
+                Some([six_bits(rgb[0]), six_bits(rgb[1]), six_bits(rgb[2])])
             }
             ColourData::Rgb16(data) => {
                 let rgb = data.get(start..start + 3)?;
