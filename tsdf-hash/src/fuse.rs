@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Matrix3, Vector3};
 use crate::Settings;
 use crate::block::{Block, MAX_COLOURS, ONE, SIDE};
 use crate::key::Key;
-use crate::surface::{Plane, Surface, TILE};
+use crate::surface::{Surface, TILE};
 use crate::view::{ColourData, ColourView, Intrinsics};
 
 /// Colours are taken this close to the surface, in voxels (ours).
@@ -64,7 +64,7 @@ impl<'a> Frame<'a> {
         let camera_from_world = world_from_camera.inverse();
         Self {
             surface,
-            colour: colour.map(|view| ColourSource::new(view, k)),
+            colour: colour.map(|view| ColourSource::new(view, k, surface)),
             projection: pixels_from_camera * camera_from_world.rotation.to_rotation_matrix().into_inner(),
             offset: pixels_from_camera * camera_from_world.translation.vector,
             voxel_size: settings.voxel_size,
@@ -191,7 +191,8 @@ impl<'a> Frame<'a> {
     #[inline(always)]
     fn project(&self, row: &Vector3<f32>, offsets: &Offsets) -> Lanes {
         let zero = [0.0; LANES];
-        let mut out = Lanes { index: [0; LANES], depth: zero, u: zero, v: zero, du: zero, dv: zero };
+        let mut out =
+            Lanes { inside: [0; LANES], index: [0; LANES], depth: zero, u: zero, v: zero, du: zero, dv: zero };
         for x in 0..LANES {
             let z = row.z + offsets.depth[x];
             let inverse = 1.0 / z;
@@ -203,7 +204,8 @@ impl<'a> Frame<'a> {
                 mask(z > 0.0) & mask(i >= 0.0) & mask(i <= self.last[0]) & mask(j >= 0.0) & mask(j <= self.last[1]);
             // Sides are at most 16384: fifteen bits hold what is inside, and SSE2 multiplies no wider integers at once.
             let index = (rounded(v) & 0x7fff) * (self.width & 0x7fff) + (rounded(u) & 0x7fff);
-            out.index[x] = (index | !inside).cast_unsigned();
+            out.inside[x] = inside;
+            out.index[x] = index & inside;
         }
         out
     }
@@ -211,7 +213,7 @@ impl<'a> Frame<'a> {
     /// Updates the voxels `LANES unit..`.
     #[inline(always)]
     fn observe<const PLUS: bool>(&self, block: &mut Block, unit: usize, lanes: &Lanes, work: &mut Work) {
-        let planes = lanes.index.map(|index| self.surface.planes.get(index as usize).copied().unwrap_or(Plane::NONE));
+        let planes = lanes.index.map(|index| self.surface.planes[index as usize]);
         let offset = planes.map(|plane| plane.offset);
         let omega = planes.map(|plane| plane.scaled_omega);
         let slope_u = planes.map(|plane| plane.scaled_slope[0]);
@@ -219,7 +221,8 @@ impl<'a> Frame<'a> {
         let mut touched = [0; LANES];
         for x in 0..LANES {
             // A NaN fails, and so does an omega of 0.
-            touched[x] = mask((offset[x] - lanes.depth[x] * omega[x]).abs() <= self.truncation * omega[x]);
+            let within = (offset[x] - lanes.depth[x] * omega[x]).abs() <= self.truncation * omega[x];
+            touched[x] = mask(within) & lanes.inside[x];
         }
         if touched == [0; LANES] {
             return;
@@ -252,8 +255,10 @@ impl<'a> Frame<'a> {
             work.touched[x] -= touched[x];
         }
         if let Some(colour) = self.colour.as_ref().filter(|_| coloured != [0; LANES]) {
-            for x in (0..LANES).filter(|&x| coloured[x] != 0) {
-                if let Some(rgb) = colour.at(lanes.u[x], lanes.v[x]) {
+            for x in 0..LANES {
+                if coloured[x] != 0
+                    && let Some(rgb) = colour.at(lanes, x)
+                {
                     work.colour_fault |= observe_colour::<PLUS>(&mut block.colour[LANES * unit + x], rgb);
                 }
             }
@@ -338,8 +343,10 @@ impl Work {
 
 /// Projected voxels.
 struct Lanes {
-    /// Of the pixel; `u32::MAX` outside the image.
-    index: [u32; LANES],
+    /// All ones in the image, zero outside.
+    inside: [i32; LANES],
+    /// Of the pixel; 0 outside the image.
+    index: [i32; LANES],
     depth: [f32; LANES],
     /// The projection, pixels.
     u: [f32; LANES],
@@ -365,7 +372,10 @@ impl Offsets {
 
 /// The colour image, seen from the depth image.
 struct ColourSource<'a> {
-    view: &'a ColourView<'a>,
+    data: ColourData<'a>,
+    width: usize,
+    /// Whether its pixels are those of the depth image.
+    is_aligned: bool,
     /// Colour column = `scale u + shift`, likewise the row.
     scale: [f32; 2],
     shift: [f32; 2],
@@ -374,24 +384,37 @@ struct ColourSource<'a> {
 }
 
 impl<'a> ColourSource<'a> {
-    fn new(view: &'a ColourView<'a>, depth: &Intrinsics) -> Self {
+    fn new(view: &'a ColourView<'a>, depth: &Intrinsics, surface: &Surface) -> Self {
         let c = &view.intrinsics;
         let scale = [c.fx / depth.fx, c.fy / depth.fy];
         let shift = [c.cx - scale[0] * depth.cx, c.cy - scale[1] * depth.cy];
         let last = [view.width, view.height].map(|side| (side - 1) as f32);
-        Self { view, scale: scale.map(|s| s as f32), shift: shift.map(|s| s as f32), last }
+        let is_aligned = (view.width, view.height) == (surface.width, surface.height) && c == depth;
+        Self {
+            data: view.data,
+            width: view.width,
+            is_aligned,
+            scale: scale.map(|s| s as f32),
+            shift: shift.map(|s| s as f32),
+            last,
+        }
     }
 
-    /// Six-bit colour of the pixel nearest to a projection; `None` outside the colour image.
+    /// Six-bit colour of the pixel nearest to the projection; `None` outside the colour image.
     #[inline(always)]
-    fn at(&self, u: f32, v: f32) -> Option<[u16; 3]> {
-        let i = (u * self.scale[0] + self.shift[0] + ROUNDER) - ROUNDER;
-        let j = (v * self.scale[1] + self.shift[1] + ROUNDER) - ROUNDER;
-        if !(i >= 0.0 && i <= self.last[0] && j >= 0.0 && j <= self.last[1]) {
-            return None;
-        }
-        let start = 3 * (rounded(j) as usize * self.view.width + rounded(i) as usize);
-        match self.view.data {
+    fn at(&self, lanes: &Lanes, x: usize) -> Option<[u16; 3]> {
+        let pixel = if self.is_aligned {
+            lanes.index[x] as usize
+        } else {
+            let i = (lanes.u[x] * self.scale[0] + self.shift[0] + ROUNDER) - ROUNDER;
+            let j = (lanes.v[x] * self.scale[1] + self.shift[1] + ROUNDER) - ROUNDER;
+            if !(i >= 0.0 && i <= self.last[0] && j >= 0.0 && j <= self.last[1]) {
+                return None;
+            }
+            rounded(j) as usize * self.width + rounded(i) as usize
+        };
+        let start = 3 * pixel;
+        match self.data {
             ColourData::Rgb8(data) => {
                 let rgb = data.get(start..start + 3)?;
                 Some([six_bits(rgb[0]), six_bits(rgb[1]), six_bits(rgb[2])])
