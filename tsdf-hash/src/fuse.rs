@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Matrix3, Vector3};
 use crate::Settings;
 use crate::block::{Block, MAX_COLOURS, ONE, SIDE};
 use crate::key::Key;
-use crate::surface::{Surface, TILE};
+use crate::surface::{Surface, TILE, Tile};
 use crate::view::{ColourData, ColourView, Intrinsics};
 
 /// Colours are taken this close to the surface, in voxels (ours).
@@ -162,29 +162,37 @@ impl<'a> Frame<'a> {
         }
         let across = sides[0].div_ceil(TILE);
         let [columns, lines] = ranges;
-        let tiles = || {
-            let line = move |line: usize| (columns.0..=columns.1).map(move |column| (column, line));
-            (lines.0..=lines.1).flat_map(line).filter_map(|(column, line)| {
-                let tile = &self.surface.tiles[line * across + column];
-                (!tile.is_empty()).then_some((column, line, tile))
-            })
-        };
+        let line = |line: usize| &self.surface.tiles[line * across + columns.0..=line * across + columns.1];
         // The flattest square speaks for all.
-        let (_, _, flattest) = tiles().min_by(|a, b| a.2.error.total_cmp(&b.2.error))?;
+        let mut flattest = &Tile::EMPTY;
+        for tile in (lines.0..=lines.1).flat_map(line) {
+            if !tile.is_empty() && (flattest.is_empty() || tile.error < flattest.error) {
+                flattest = tile;
+            }
+        }
+        if flattest.is_empty() {
+            return None;
+        }
         let omega = flattest.omega;
-        let (mut error, mut most) = (0.0_f32, 0.0_f32);
-        for (column, line, tile) in tiles() {
-            most = most.max(1.0 / tile.near);
-            let [u, v] = [column, line].map(|k| (k * TILE) as f32);
-            let side = (TILE - 1) as f32;
-            let corners = [(u, v), (u + side, v), (u, v + side), (u + side, v + side)];
-            let off = corners.iter().map(|&(u, v)| (tile.omega.at(u, v) - omega.at(u, v)).abs());
-            error = error.max(tile.error + off.fold(0.0, f32::max));
+        let (mut error, mut near) = (0.0_f32, f32::INFINITY);
+        for k in lines.0..=lines.1 {
+            for (column, tile) in (columns.0..).zip(line(k)) {
+                // Two linear functions differ most at a corner; half a square more than there is, at the image's rim.
+                let half = 0.5 * TILE as f32;
+                let [u, v] = [column, k].map(|k| (k * TILE) as f32 + half);
+                let off = (tile.omega.at(u, v) - omega.at(u, v)).abs();
+                let turn = (tile.omega.slope[0] - omega.slope[0]).abs() + (tile.omega.slope[1] - omega.slope[1]).abs();
+                let bound = tile.error + off + half * turn;
+                if !tile.is_empty() {
+                    error = error.max(bound);
+                    near = near.min(tile.near);
+                }
+            }
         }
         let along = |p: &Vector3<f32>| omega.base * p.z + omega.slope[0] * p.x + omega.slope[1] * p.y;
         // Half a pixel between a voxel's projection and its pixel; and a little for the rounding.
         let error = error + 0.5 * (omega.slope[0].abs() + omega.slope[1].abs());
-        let reach = 1.001 * (self.truncation * most + far * error) + 1e-4;
+        let reach = 1.001 * (self.truncation / near + far * error) + 1e-4;
         Some(Slab::new(1.0 - along(start), [0, 1, 2].map(|k| -along(&steps[k])), reach))
     }
 
@@ -246,11 +254,11 @@ impl<'a> Frame<'a> {
             };
             sums[x] = sum;
             totals[x] = total as u16;
-            work.faults[x] |= total >> 16;
+            work.faults[x] |= total;
             if !PLUS {
                 // No sum of observations can leave `-32767 W..=32767 W`: what was taken out was not in.
                 let most = (total << 15).wrapping_sub(total);
-                work.faults[x] |= most.wrapping_sub(sum.wrapping_abs()) >> 31 & touched[x];
+                work.faults[x] |= most.wrapping_sub(sum.wrapping_abs()) & i32::MIN & touched[x];
             }
             work.touched[x] -= touched[x];
         }
@@ -329,7 +337,7 @@ fn six_bits(c: u8) -> u16 {
 #[derive(Default)]
 struct Work {
     touched: [i32; LANES],
-    /// Not zero after a counter ran over or under.
+    /// All counters: they ran over or under if there is a bit beyond the sixteenth.
     faults: [i32; LANES],
     colour_fault: bool,
 }
@@ -337,7 +345,7 @@ struct Work {
 impl Work {
     fn tally(&self) -> Tally {
         let voxels = self.touched.iter().sum::<i32>().unsigned_abs() as usize;
-        Tally { voxels, fault: self.colour_fault || self.faults != [0; LANES] }
+        Tally { voxels, fault: self.colour_fault || self.faults.iter().any(|bits| bits >> 16 != 0) }
     }
 }
 
