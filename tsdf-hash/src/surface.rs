@@ -9,7 +9,7 @@ mod window;
 use nalgebra::Isometry3;
 use tile::TileLine;
 pub(crate) use tile::{TILE, Tile};
-use window::{BEND_VARIANCE, BENDING, COUNT, Row, SPREAD, Windows};
+use window::{BEND_VARIANCE, BENDING, COUNT, ROUGHNESS, Row, SPREAD, Windows};
 
 use crate::block::{MAX_WEIGHT, ONE};
 use crate::fuse::ROUNDER;
@@ -21,7 +21,10 @@ use crate::{Error, Settings, candidates};
 /// Steeper views of a surface are left to other frames (ours: 84 degrees between ray and normal).
 const LEAST_COSINE: f32 = 0.1;
 /// A window whose rim is this many standard deviations off its middle is not plane (ours).
-const MOST_BEND: f32 = 2.5;
+const MOST_BEND: f32 = 3.0;
+/// Noise that is always granted, as a share of the model's: where the camera is better than the model, bends are found
+/// by what it shows (ours).
+const LEAST_NOISE: f32 = 0.1;
 
 /// The plane seen at a pixel: a voxel at depth `z`, `(du, dv)` pixels beside the pixel's centre, is
 /// `offset - z (scaled_omega + scaled_slope · (du, dv))` steps of the stored distance in front of it.
@@ -169,14 +172,16 @@ fn read_row(row: &Row, lens: Lens, noise: Noise, out: &mut Columns) -> [u32; 2] 
     let [above, here, below] = row.around;
     let (above, here, below) = (&above[..width + 2], &here[..width + 2], &below[..width + 2]);
     let (smooth, total, bend) = (&row.smooth[..width], &row.total[..width], &row.bend[..width]);
-    let (along, down) = (&row.slope[0][..width], &row.slope[1][..width]);
+    let (along, down, rough) = (&row.slope[0][..width], &row.slope[1][..width], &row.roughness[..width]);
     let most_bend = (MOST_BEND * BENDING) * (MOST_BEND * BENDING) * BEND_VARIANCE;
     let mut counts = [0, 0];
     for u in 0..width {
         let own = here[u + 1];
         let sigma = noise.sigma_inverse(own);
         // A NaN fails.
-        let is_plane = u32::from(bend[u] * bend[u] <= most_bend * sigma * sigma).wrapping_neg();
+        let shown = rough[u] * (1.0 / ROUGHNESS) + LEAST_NOISE * LEAST_NOISE * sigma * sigma;
+        let granted = if shown < sigma * sigma { shown } else { sigma * sigma };
+        let is_plane = u32::from(bend[u] * bend[u] <= most_bend * granted).wrapping_neg();
         let wide = [total[u] * (1.0 / COUNT), along[u] * (1.0 / SPREAD), down[u] * (1.0 / SPREAD)];
         let narrow = [smooth[u], 0.5 * (here[u + 2] - here[u]), 0.5 * (below[u + 1] - above[u + 1])];
         let omega = choose(is_plane, wide[0], narrow[0]);

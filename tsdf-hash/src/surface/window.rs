@@ -20,6 +20,8 @@ pub(super) const COUNT: f32 = 49.0;
 pub(super) const SPREAD: f32 = 196.0;
 /// Of the rim, 28 values, and of the middle, 21: `84 (rim / 28 - middle / 21)` has integer factors.
 pub(super) const BENDING: f32 = 84.0;
+/// Pixels of the window, times the variance of four second differences.
+pub(super) const ROUGHNESS: f32 = COUNT * 24.0;
 /// Variance of the bend, for noise of unit variance.
 pub(super) const BEND_VARIANCE: f32 = 1.0 / 6.0;
 
@@ -63,8 +65,11 @@ pub(super) struct Windows<'a> {
     total: Ring,
     moment: Ring,
     bend: Ring,
-    /// Of the row that was asked for: total, slopes and bend.
-    fits: [Vec<f32>; 4],
+    /// Squared second differences of a line, and their sums along it.
+    rough: Vec<f32>,
+    roughness: Ring,
+    /// Of the row that was asked for: total, slopes, bend and roughness.
+    fits: [Vec<f32>; 5],
 }
 
 /// A row and its fits; slices of the image's width. The fits are NaN where the window has a gap or an edge.
@@ -80,6 +85,8 @@ pub(super) struct Row<'a> {
     pub(super) slope: [&'a [f32]; 2],
     /// How far the rim of the window is from its middle, along both axes together, times [`BENDING`]; 0 for a plane.
     pub(super) bend: &'a [f32],
+    /// The mean square of the noise over the window times [`ROUGHNESS`], as far as second differences show it.
+    pub(super) roughness: &'a [f32],
 }
 
 impl<'a> Windows<'a> {
@@ -96,7 +103,9 @@ impl<'a> Windows<'a> {
             total: Ring::new(width),
             moment: Ring::new(width),
             bend: Ring::new(width),
-            fits: [(); 4].map(|()| vec![0.0; width]),
+            rough: vec![0.0; width + 2 * RADIUS],
+            roughness: Ring::new(width),
+            fits: [(); 5].map(|()| vec![0.0; width]),
         };
         (0..RING).for_each(|k| windows.push(k));
         windows
@@ -106,16 +115,18 @@ impl<'a> Windows<'a> {
     pub(super) fn row(&mut self, row: usize) -> Row<'_> {
         self.push(row + RING);
         let width = self.depth.width;
-        let [total, along, down, bend] = &mut self.fits;
+        let [total, along, down, bend, roughness] = &mut self.fits;
         sum_lines(self.total.seven(row + 1), total, down, bend);
         add_lines(self.moment.seven(row + 1), false, along);
         add_lines(self.bend.seven(row + 1), true, bend);
+        add_lines(self.roughness.seven(row + 1), false, roughness);
         Row {
             around: [HALO - 1, HALO, HALO + 1].map(|k| &self.raw.line(row + k)[HALO - 1..][..width + 2]),
             smooth: &self.smooth.line(row + HALO)[HALO..][..width],
             total,
             slope: [along, down],
             bend,
+            roughness,
         }
     }
 
@@ -127,9 +138,10 @@ impl<'a> Windows<'a> {
         }
         let width = self.depth.width;
         let around = [k - 2, k - 1, k].map(|k| self.raw.line(k));
-        smooth_line(around, self.noise, &mut self.smooth.line_mut(k - 1)[1..][..width + 2 * RADIUS]);
-        let source = &self.smooth.line(k - 1)[1..][..width + 2 * RADIUS];
-        sum_line(source, self.total.line_mut(k - 1), self.moment.line_mut(k - 1), self.bend.line_mut(k - 1));
+        let smooth = &mut self.smooth.line_mut(k - 1)[1..][..width + 2 * RADIUS];
+        smooth_line(around, self.noise, smooth, &mut self.rough);
+        sum_line(smooth, self.total.line_mut(k - 1), self.moment.line_mut(k - 1), self.bend.line_mut(k - 1));
+        add_line(&self.rough, self.roughness.line_mut(k - 1));
     }
 
     fn read(&mut self, k: usize) {
@@ -157,9 +169,10 @@ impl<'a> Windows<'a> {
 }
 
 /// A copy of a line with NaN where the 3x3 patch has a gap, or bends or jumps by more than four standard deviations of
-/// its noise.
-fn smooth_line(around: [&[f32]; 3], noise: Noise, out: &mut [f32]) {
+/// its noise; and the sum of its squared second differences, which is 24 times the variance of noise on a plane.
+fn smooth_line(around: [&[f32]; 3], noise: Noise, out: &mut [f32], rough: &mut [f32]) {
     let width = out.len();
+    let rough = &mut rough[..width];
     let [above, here, below] = around.map(|line| &line[..width + 2]);
     for u in 0..width {
         let omega = here[u + 1];
@@ -172,6 +185,7 @@ fn smooth_line(around: [&[f32]; 3], noise: Noise, out: &mut [f32]) {
             + second(above[u], below[u + 2])
             + second(above[u + 2], below[u]);
         let sigma = noise.sigma_inverse(omega);
+        rough[u] = bend;
         out[u] = if bend <= 2.0 * 6.0 * 16.0 * sigma * sigma { omega } else { f32::NAN };
     }
 }
@@ -183,6 +197,16 @@ fn sum_line(source: &[f32], total: &mut [f32], moment: &mut [f32], bend: &mut [f
     for u in 0..width {
         let s = &source[u..u + 7];
         (total[u], moment[u], bend[u]) = seven([s[0], s[1], s[2], s[3], s[4], s[5], s[6]]);
+    }
+}
+
+/// Sum of seven neighbours along a line.
+fn add_line(source: &[f32], out: &mut [f32]) {
+    let width = out.len();
+    let source = &source[..width + 6];
+    for u in 0..width {
+        let s = &source[u..u + 7];
+        out[u] = ((s[0] + s[6]) + (s[1] + s[5])) + ((s[2] + s[4]) + s[3]);
     }
 }
 
