@@ -13,7 +13,7 @@ use crate::view::ColourData;
 
 const SOURCE: &str = concat!(include_str!("exact.wgsl"), include_str!("fuse.wgsl"));
 /// Bytes of the program's `Frame`, and of the windows at which it is seen.
-const FRAME_BYTES: usize = 112;
+const FRAME_BYTES: usize = 128;
 const WINDOW: usize = 256;
 /// Passes that one submission can hold: one that counts and one for each page.
 const MOST_PASSES: usize = 5;
@@ -84,7 +84,7 @@ impl Fuser {
     /// Uploads what a frame is made of, for all passes until the next frame.
     pub(super) fn load(&mut self, device: &Device, frame: &Frame) -> Result<(), Error> {
         let planes = &frame.surface.planes;
-        let colours = frame.colour.as_ref().map_or(ColourData::Rgb8(&[]), |colour| colour.view.data);
+        let colours = frame.colour.as_ref().map_or(ColourData::Rgb8(&[]), |colour| colour.data);
         let words = match colours {
             ColourData::Rgb8(data) => data.len().div_ceil(4),
             ColourData::Rgb16(data) => data.len().div_ceil(2),
@@ -194,11 +194,12 @@ fn uniform(frame: &Frame, mode: Mode, first: usize, count: usize) -> [u32; FRAME
     let surface = frame.surface;
     words[12..14].copy_from_slice(&[surface.width as u32, surface.height as u32]);
     if let Some(colour) = &frame.colour {
-        words[14..16].copy_from_slice(&[colour.view.width as u32, colour.view.height as u32]);
+        words[14..16].copy_from_slice(&colour.last.map(f32::to_bits));
         words[16..18].copy_from_slice(&colour.scale.map(f32::to_bits));
         words[18..20].copy_from_slice(&colour.shift.map(f32::to_bits));
         words[22] = 4 * surface.planes.len() as u32;
-        words[23] = if matches!(colour.view.data, ColourData::Rgb8(_)) { 1 } else { 2 };
+        words[23] = if matches!(colour.data, ColourData::Rgb8(_)) { 1 } else { 2 };
+        words[28..30].copy_from_slice(&[colour.width as u32, u32::from(colour.is_aligned)]);
     }
     words[20..22].copy_from_slice(&[frame.truncation, frame.colour_reach].map(f32::to_bits));
     words[24..27].copy_from_slice(&[mode as u32, first as u32, count as u32]);

@@ -5,7 +5,8 @@ struct Frame {
     // Change of (u z, v z, z) from a voxel to the next along x, y and z.
     step: array<vec4<f32>, 3>,
     size: vec2<u32>,
-    colour_size: vec2<u32>,
+    // The last column and row of the colour image.
+    colour_last: vec2<f32>,
     colour_scale: vec2<f32>,
     colour_shift: vec2<f32>,
     truncation: f32,
@@ -20,6 +21,9 @@ struct Frame {
     first: u32,
     count: u32,
     unknown_zero: u32,
+    colour_width: u32,
+    // Whether the pixels of the colour image are those of the depth image.
+    is_aligned: u32,
 }
 
 // Nothing is written but the tally.
@@ -67,16 +71,20 @@ fn channel(at: u32) -> u32 {
     return (((word >> (16u * (at % 2u))) & 65535u) * 63u + 32767u) / 65535u;
 }
 
-// The colour of the pixel nearest to a projection and a count of one; zero outside the colour image.
-fn colour_at(u: f32, v: f32) -> vec4<u32> {
-    let i = nearest(plus(times(u, frame.colour_scale.x), frame.colour_shift.x));
-    let j = nearest(plus(times(v, frame.colour_scale.y), frame.colour_shift.y));
-    let inside = i >= 0.0 && j >= 0.0 && i < f32(frame.colour_size.x) && j < f32(frame.colour_size.y);
-    if !inside {
-        return vec4(0u);
+// The colour of the pixel nearest to a projection, or of the depth pixel itself, and a count of one; zero outside the colour
+// image.
+fn colour_at(u: f32, v: f32, depth_pixel: u32) -> vec4<u32> {
+    var pixel = depth_pixel;
+    if frame.is_aligned == 0u {
+        let i = nearest(plus(times(u, frame.colour_scale.x), frame.colour_shift.x));
+        let j = nearest(plus(times(v, frame.colour_scale.y), frame.colour_shift.y));
+        let inside = i >= 0.0 && i <= frame.colour_last.x && j >= 0.0 && j <= frame.colour_last.y;
+        if !inside {
+            return vec4(0u);
+        }
+        pixel = u32(j) * frame.colour_width + u32(i);
     }
-    let start = 3u * (u32(j) * frame.colour_size.x + u32(i));
-    return vec4(channel(start), channel(start + 1u), channel(start + 2u), 1u);
+    return vec4(channel(3u * pixel), channel(3u * pixel + 1u), channel(3u * pixel + 2u), 1u);
 }
 
 fn observe(old: Voxel, distance: f32, weight: u32) -> Voxel {
@@ -107,16 +115,9 @@ fn magnitude(x: i32) -> u32 {
 fn observe_colour(old: Voxel, change: vec4<u32>) -> Voxel {
     var voxel = old;
     let sums = vec4(old.colour.x & 0xffffu, old.colour.x >> 16u, old.colour.y & 0xffffu, old.colour.y >> 16u);
-    var next: vec4<u32>;
-    var wrapped: bool;
-    if frame.mode == MINUS {
-        next = (sums - change) & vec4(0xffffu);
-        wrapped = any(sums < change);
-    } else {
-        next = (sums + change) & vec4(0xffffu);
-        wrapped = any(next < change);
-    }
-    if wrapped || next.w > MAX_COLOURS {
+    let next = select(sums + change, sums - change, frame.mode == MINUS) & vec4(0xffffu);
+    // What is left of so many colours is no more than so many times the brightest: what was taken out was not in.
+    if next.w > MAX_COLOURS || (frame.mode == MINUS && any(next.xyz > vec3(63u * next.w))) {
         voxel.mark |= FAULT;
     }
     voxel.colour = vec2(next.x | (next.y << 16u), next.z | (next.w << 16u));
@@ -140,7 +141,8 @@ fn update(old: Voxel, projected: vec3<f32>) -> Voxel {
     if !inside {
         return old;
     }
-    let pixel = 4u * (u32(pixel_v) * frame.size.x + u32(pixel_u));
+    let depth_pixel = u32(pixel_v) * frame.size.x + u32(pixel_u);
+    let pixel = 4u * depth_pixel;
     let offset = bitcast<f32>(pixels[pixel]);
     let omega = bitcast<f32>(pixels[pixel + 1u]);
     let own = times(depth, omega);
@@ -153,7 +155,7 @@ fn update(old: Voxel, projected: vec3<f32>) -> Voxel {
     var voxel = observe(old, distance, pixels[pixel + 3u] & 15u);
     voxel.mark += 1u;
     if frame.colour_start > 0u && abs(distance) < frame.colour_reach {
-        let change = colour_at(u, v);
+        let change = colour_at(u, v, depth_pixel);
         if change.w > 0u {
             voxel = observe_colour(voxel, change);
         }
