@@ -1,12 +1,19 @@
 //! The update of one block by one frame.
 
+mod colour;
+mod slab;
+#[cfg(test)]
+mod tests;
+
+use colour::{ColourSource, observe_colour};
 use nalgebra::{Isometry3, Matrix3, Vector3};
+use slab::Slab;
 
 use crate::Settings;
-use crate::block::{Block, MAX_COLOURS, ONE, SIDE};
+use crate::block::{Block, ONE, SIDE};
 use crate::key::Key;
-use crate::surface::{Surface, TILE, Tile};
-use crate::view::{ColourData, ColourView, Intrinsics};
+use crate::surface::Surface;
+use crate::view::{ColourView, Intrinsics};
 
 /// Colours are taken this close to the surface, in voxels (ours).
 const COLOUR_REACH: f64 = 1.5;
@@ -120,7 +127,7 @@ impl<'a> Frame<'a> {
         let (start, step) = (self.start(key), self.step());
         let [sx, sy, sz] = [0, 1, 2].map(|axis| step.column(axis).into_owned());
         let steps = [sx, sy, sz];
-        let Some(slab) = self.slab(&start, &steps) else { return Tally::default() };
+        let Some(slab) = Slab::under(self.surface, self.truncation, &start, &steps) else { return Tally::default() };
         let offsets = [0, LANES].map(|first| Offsets::new(&sx, first));
         let mut work = Work::default();
         for z in 0..SIDE {
@@ -136,72 +143,6 @@ impl<'a> Frame<'a> {
             }
         }
         work.tally()
-    }
-
-    /// Where in a block voxels can be touched, from the squares of pixels that it projects to; `None` if nowhere.
-    ///
-    /// If the inverse depth under the block is a linear function of the pixel, `1 - z ω` is one of the voxel. A voxel is
-    /// touched if it is at most `μ ω`; an inverse depth that is `e` off the function adds `z e`.
-    fn slab(&self, start: &Vector3<f32>, steps: &[Vector3<f32>; 3]) -> Option<Slab> {
-        let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
-        let mut far = 0.0_f32;
-        for corner in 0..8 {
-            let at = |axis: usize| steps[axis] * if corner >> axis & 1 == 1 { (SIDE - 1) as f32 } else { 0.0 };
-            let p = start + at(0) + at(1) + at(2);
-            if p.z < NEAREST {
-                return Some(Slab::ALL);
-            }
-            far = far.max(p.z);
-            for k in 0..2 {
-                let pixel = p[k] / p.z;
-                low[k] = low[k].min(pixel);
-                high[k] = high[k].max(pixel);
-            }
-        }
-        let sides = [self.surface.width, self.surface.height];
-        let mut ranges = [(0, 0); 2];
-        for k in 0..2 {
-            // A pixel more on each side, for the rounding.
-            let last = (sides[k] - 1) as f32;
-            if low[k] > last + 1.0 || high[k] < -1.0 {
-                return None;
-            }
-            ranges[k] = ((low[k] - 1.0).max(0.0) as usize / TILE, (high[k] + 1.0).min(last) as usize / TILE);
-        }
-        let across = sides[0].div_ceil(TILE);
-        let [columns, lines] = ranges;
-        let line = |line: usize| &self.surface.tiles[line * across + columns.0..=line * across + columns.1];
-        // The flattest square speaks for all.
-        let mut flattest = &Tile::EMPTY;
-        for tile in (lines.0..=lines.1).flat_map(line) {
-            if !tile.is_empty() && (flattest.is_empty() || tile.error < flattest.error) {
-                flattest = tile;
-            }
-        }
-        if flattest.is_empty() {
-            return None;
-        }
-        let omega = flattest.omega;
-        let (mut error, mut near) = (0.0_f32, f32::INFINITY);
-        for k in lines.0..=lines.1 {
-            for (column, tile) in (columns.0..).zip(line(k)) {
-                // Two linear functions differ most at a corner; half a square more than there is, at the image's rim.
-                let half = 0.5 * TILE as f32;
-                let [u, v] = [column, k].map(|k| (k * TILE) as f32 + half);
-                let off = (tile.omega.at(u, v) - omega.at(u, v)).abs();
-                let turn = (tile.omega.slope[0] - omega.slope[0]).abs() + (tile.omega.slope[1] - omega.slope[1]).abs();
-                let bound = tile.error + off + half * turn;
-                if !tile.is_empty() {
-                    error = error.max(bound);
-                    near = near.min(tile.near);
-                }
-            }
-        }
-        let along = |p: &Vector3<f32>| omega.base * p.z + omega.slope[0] * p.x + omega.slope[1] * p.y;
-        // Half a pixel between a voxel's projection and its pixel; and a little for the rounding.
-        let error = error + 0.5 * (omega.slope[0].abs() + omega.slope[1].abs());
-        let reach = 1.001 * (self.truncation / near + far * error) + 1e-4;
-        Some(Slab::new(1.0 - along(start), [0, 1, 2].map(|k| -along(&steps[k])), reach))
     }
 
     #[inline(always)]
@@ -282,29 +223,6 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// Blocks closer to the camera's plane are searched voxel by voxel, metres.
-const NEAREST: f32 = 1e-2;
-
-/// The voxels where a linear function of their indices is between `-reach` and `reach`.
-struct Slab {
-    start: f32,
-    step: [f32; 3],
-    /// Of a row, from the function at its first voxel: where the lanes of each half can be in the slab.
-    bounds: [[f32; 2]; HALVES],
-}
-
-impl Slab {
-    const ALL: Self = Self { start: 0.0, step: [0.0; 3], bounds: [[-1.0, 1.0]; HALVES] };
-
-    fn new(start: f32, step: [f32; 3], reach: f32) -> Self {
-        let bounds = [0, LANES].map(|x| {
-            let ends = [x, x + LANES - 1].map(|x| step[0] * x as f32);
-            [-reach - ends[0].max(ends[1]), reach - ends[0].min(ends[1])]
-        });
-        Self { start, step, bounds }
-    }
-}
-
 /// Of a row of voxels.
 const HALVES: usize = SIDE / LANES;
 /// Neighbours along x that are updated together: a vector register.
@@ -321,24 +239,6 @@ fn mask(condition: bool) -> i32 {
 #[inline(always)]
 fn rounded(x: f32) -> i32 {
     (x + ROUNDER).to_bits().wrapping_sub(ROUNDER.to_bits()).cast_signed()
-}
-
-/// Adds a colour to sums or takes it out; returns whether a counter ran over or under.
-#[inline(always)]
-fn observe_colour<const PLUS: bool>(sums: &mut [u16; 4], rgb: [u16; 3]) -> bool {
-    for (sum, c) in sums.iter_mut().zip([rgb[0], rgb[1], rgb[2], 1]) {
-        *sum = if PLUS { sum.wrapping_add(c) } else { sum.wrapping_sub(c) };
-    }
-    let [r, g, b, n] = *sums;
-    // A sum that ran under is at least 65536 - 63, more than 63 n for any other n than the one just refused.
-    let most = n.wrapping_mul(63);
-    n > MAX_COLOURS || (!PLUS && (r > most || g > most || b > most))
-}
-
-/// `round(63 c / 255)`.
-#[inline(always)]
-fn six_bits(c: u8) -> u16 {
-    ((u32::from(c) * 253 + 505) >> 10) as u16
 }
 
 /// What the update of a block counts, per lane.
@@ -383,62 +283,5 @@ impl Offsets {
     fn new(step: &Vector3<f32>, first: usize) -> Self {
         let along: [f32; LANES] = std::array::from_fn(|x| (first + x) as f32);
         Self { u: along.map(|x| step.x * x), v: along.map(|x| step.y * x), depth: along.map(|x| step.z * x) }
-    }
-}
-
-/// The colour image, seen from the depth image.
-pub(crate) struct ColourSource<'a> {
-    pub(crate) data: ColourData<'a>,
-    pub(crate) width: usize,
-    /// Whether its pixels are those of the depth image.
-    pub(crate) is_aligned: bool,
-    /// Colour column = `scale u + shift`, likewise the row.
-    pub(crate) scale: [f32; 2],
-    pub(crate) shift: [f32; 2],
-    /// The last column and the last row.
-    pub(crate) last: [f32; 2],
-}
-
-impl<'a> ColourSource<'a> {
-    fn new(view: &'a ColourView<'a>, depth: &Intrinsics, surface: &Surface) -> Self {
-        let c = &view.intrinsics;
-        let scale = [c.fx / depth.fx, c.fy / depth.fy];
-        let shift = [c.cx - scale[0] * depth.cx, c.cy - scale[1] * depth.cy];
-        let last = [view.width, view.height].map(|side| (side - 1) as f32);
-        let is_aligned = (view.width, view.height) == (surface.width, surface.height) && c == depth;
-        Self {
-            data: view.data,
-            width: view.width,
-            is_aligned,
-            scale: scale.map(|s| s as f32),
-            shift: shift.map(|s| s as f32),
-            last,
-        }
-    }
-
-    /// Six-bit colour of the pixel nearest to the projection; `None` outside the colour image.
-    #[inline(always)]
-    fn at(&self, lanes: &Lanes, x: usize) -> Option<[u16; 3]> {
-        let pixel = if self.is_aligned {
-            lanes.index[x] as usize
-        } else {
-            let i = (lanes.u[x] * self.scale[0] + self.shift[0] + ROUNDER) - ROUNDER;
-            let j = (lanes.v[x] * self.scale[1] + self.shift[1] + ROUNDER) - ROUNDER;
-            if !(i >= 0.0 && i <= self.last[0] && j >= 0.0 && j <= self.last[1]) {
-                return None;
-            }
-            rounded(j) as usize * self.width + rounded(i) as usize
-        };
-        let start = 3 * pixel;
-        match self.data {
-            ColourData::Rgb8(data) => {
-                let rgb = data.get(start..start + 3)?;
-                Some([six_bits(rgb[0]), six_bits(rgb[1]), six_bits(rgb[2])])
-            }
-            ColourData::Rgb16(data) => {
-                let rgb = data.get(start..start + 3)?;
-                Some([rgb[0], rgb[1], rgb[2]].map(|c| ((u32::from(c) * 63 + 32767) / 65535) as u16))
-            }
-        }
     }
 }
