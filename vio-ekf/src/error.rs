@@ -120,3 +120,16 @@ pub enum Error {
         index: usize,
     },
 }
+
+/// A setting outside its range.
+pub(crate) fn invalid(name: &'static str, value: f64, rule: &'static str) -> Error {
+    Error::InvalidSetting { name, value, rule }
+}
+
+/// Refuses the first of the named settings that is negative or not finite.
+pub(crate) fn all_not_negative(fields: &[(&'static str, f64)]) -> Result<(), Error> {
+    match fields.iter().find(|(_, value)| !(*value >= 0.0 && value.is_finite())) {
+        Some(&(name, value)) => Err(invalid(name, value, "must be finite and not negative")),
+        None => Ok(()),
+    }
+}
