@@ -111,6 +111,16 @@ pub enum Error {
         /// End of the defined interval, included.
         last: Stamp,
     },
+    /// An index beyond the end of a list.
+    #[error("there is no {what} {index}: there are {count}, counted from 0")]
+    NoSuch {
+        /// What was asked for.
+        what: &'static str,
+        /// Its index.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
     /// A covariance is not symmetric positive definite.
     #[error("{what} covariance {index} is not symmetric positive definite: check the filter, or its export")]
     NotPositiveDefinite {

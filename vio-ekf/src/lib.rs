@@ -46,6 +46,7 @@ mod eval;
 mod format;
 mod lie;
 mod measurement;
+pub mod sim;
 mod spline;
 mod stamp;
 mod trajectory;
