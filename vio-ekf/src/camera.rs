@@ -176,8 +176,9 @@ fn perspective_jacobian(m: &Vector2<f64>, depth: f64) -> Matrix2x3<f64> {
 pub(crate) fn nearest_pose(rows: &[[f64; 4]; 3]) -> Isometry3<f64> {
     let matrix = nalgebra::Matrix3::from_fn(|r, c| rows[r][c]);
     let translation = Vector3::new(rows[0][3], rows[1][3], rows[2][3]);
-    let start = nalgebra::Rotation3::from_matrix_unchecked(matrix);
-    // The printed matrix is within rounding of a rotation: a few steps from its own quaternion settle.
-    let rotation = nalgebra::Rotation3::from_matrix_eps(&matrix, 1e-15, 50, start);
+    // U Vᵀ of the singular value decomposition; where there is none the matrix stays, and the checks refuse it.
+    let svd = matrix.svd(true, true);
+    let nearest = svd.u.zip(svd.v_t).map_or(matrix, |(u, v_t)| u * v_t);
+    let rotation = nalgebra::Rotation3::from_matrix_unchecked(nearest);
     Isometry3::from_parts(translation.into(), nalgebra::UnitQuaternion::from_rotation_matrix(&rotation))
 }

@@ -61,7 +61,7 @@ pub use eval::nees::{Nees, PoseCovariance, nees};
 pub use eval::rpe::{PairsFrom, Rpe, RpeSettings, Span, Tolerance, rpe};
 pub use eval::stats::Stats;
 pub use eval::{Evaluation, EvaluationSettings, Segment, evaluate};
-pub use format::{euroc, kitti, tum};
+pub use format::{asl, calibration, euroc, kitti, tum};
 pub use lie::{se3, so3};
 pub use measurement::{ImageView, Imu, ImuNoise};
 pub use nalgebra;
