@@ -56,7 +56,7 @@ fn kalibr_chains_are_read() {
     assert_eq!(second.camera.body_from_camera.translation.vector, Vector3::new(1.0, 2.0, 3.0));
     assert_eq!(second.time_offset_s, 0.0);
     let imu = read_kalibr_imu(
-        "imu0:\n  accelerometer_noise_density: 2e-3\n  accelerometer_random_walk: 3e-3\n  \
+        "imu0:\n  accelerometer_noise_density: 2e-3\n  accelerometer_random_walk: 3e-3\n#  update_rate: 1 # old\n  \
          gyroscope_noise_density: 1.7e-4\n  gyroscope_random_walk: 1.9e-5 # rad\n  update_rate: 200.0\n",
     )
     .unwrap();
@@ -141,7 +141,8 @@ fn mutated_calibrations_never_panic() {
 }
 
 /// One second of dead reckoning from the truth, with the true bias: what the sensor alone can do. The recorded truth has
-/// errors of its own; with its attitudes in place of the gyroscope the velocities come out no better.
+/// errors of its own: with its attitudes in place of the gyroscope the velocities come out no better. Starts are 97 samples
+/// apart, because multiples of half a second beat with the vibration.
 #[test]
 fn real_readings_carry_the_motion_for_a_second() {
     let bounds = [("MH_04_difficult", "imu_MH04", 0.06, 0.045), ("V1_02_medium", "imu_V102", 0.16, 0.055)];
@@ -152,7 +153,7 @@ fn real_readings_carry_the_motion_for_a_second() {
         let truth = euroc::read(&recorded(&format!("{folder}/groundtruth_{name}.csv.gz")).unwrap()).unwrap();
         let (stamps, poses) = (truth.trajectory.stamps(), truth.trajectory.poses());
         let (mut angles, mut speeds) = (Vec::new(), Vec::new());
-        for start in (0..stamps.len() - 200).step_by(100) {
+        for start in (0..stamps.len() - 200).step_by(97) {
             let first = samples.partition_point(|s| s.stamp < stamps[start]);
             let (mut turn, mut velocity) = (poses[start].rotation, truth.velocities_in_world[start]);
             let (gyro_bias, accel_bias) = (truth.gyro_biases[start], truth.accel_biases[start]);

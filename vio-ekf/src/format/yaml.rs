@@ -26,13 +26,10 @@ impl Document {
         let mut brackets = 0_i32;
         for (index, raw) in text.trim_start_matches('\u{feff}').lines().enumerate() {
             let line = index + 1;
-            // A comment starts at the line's start or after a space: a topic may hold the sign.
-            let content = match raw.find(" #").or_else(|| raw.starts_with('#').then_some(0)) {
-                Some(at) => &raw[..at],
-                None => raw,
-            };
+            // A comment starts at the line's start or after a space: the name of a topic may hold the sign.
+            let content = raw.find(" #").map_or(raw, |at| &raw[..at]);
             let trimmed = content.trim();
-            if trimmed.is_empty() || trimmed.starts_with('%') || trimmed == "---" || trimmed == "..." {
+            if trimmed.is_empty() || trimmed.starts_with(['#', '%']) || trimmed == "---" || trimmed == "..." {
                 continue;
             }
             let refuse = |what: &str| Error::Line { format: FORMAT, line, what: what.into() };
