@@ -74,7 +74,7 @@ impl CameraModel {
         if self.photometry.exposure_s * self.rate_hz > 1.0 {
             return Err(invalid("exposure_s", self.photometry.exposure_s, "must not exceed the time between frames"));
         }
-        if !(self.time_offset_s.abs() < 1e6) {
+        if self.time_offset_s.is_nan() || self.time_offset_s.abs() >= 1e6 {
             return Err(invalid("time_offset_s", self.time_offset_s, "must be finite and below a million seconds"));
         }
         all_not_negative(&[("stamp_jitter_s", self.stamp_jitter_s)])

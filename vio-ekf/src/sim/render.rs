@@ -38,12 +38,12 @@ impl TileRays {
             camera.bearing(&Vector2::new(x, y)).map_or(Vector3::z(), nalgebra::Unit::into_inner).cast::<f32>()
         };
         let mut directions = [[0.0; TILE]; 3];
-        for pixel in 0..TILE {
+        let along = |pixel: usize| {
             let (x, y) = (left + pixel % TILE_WIDTH, top + pixel / TILE_WIDTH);
-            let d = direction(x.min(camera.width - 1) as f64, y.min(camera.height - 1) as f64);
-            for axis in 0..3 {
-                directions[axis][pixel] = d[axis];
-            }
+            direction(x.min(camera.width - 1) as f64, y.min(camera.height - 1) as f64)
+        };
+        for (pixel, d) in (0..TILE).map(|pixel| (pixel, along(pixel))) {
+            (directions[0][pixel], directions[1][pixel], directions[2][pixel]) = (d.x, d.y, d.z);
         }
         let (x, y) = ((left + TILE_WIDTH / 2) as f64, (top + TILE_HEIGHT / 2) as f64);
         let per_column = (direction(x + 1.0, y) - direction(x - 1.0, y)) * 0.5;
@@ -275,7 +275,7 @@ fn body<'a>(cuboid: &Cuboid, eye: &Vector3<f64>, textures: &'a [Texture], share:
         Face {
             texture,
             axis,
-            distance: if index % 2 == 0 { low[axis] } else { high[axis] } as f32,
+            distance: if index.is_multiple_of(2) { low[axis] } else { high[axis] } as f32,
             origin: [origin(0), origin(1)],
             scale: (256.0 * surface.texels_per_m) as f32,
             level_at_1m: surface.texels_per_m.log2() as f32 + LEVEL_BIAS,

@@ -127,11 +127,11 @@ impl Texture {
 
     /// A chequerboard of `fields` by `fields` fields, an even number, dark 40 and light 200.
     pub fn chequered(size: usize, fields: usize) -> Result<Self, Error> {
-        if fields < 2 || fields % 2 == 1 || size % fields != 0 {
+        if fields < 2 || fields % 2 == 1 || !size.is_multiple_of(fields) {
             return Err(invalid("fields", fields as f64, "must be even and divide the size"));
         }
         let width = size / fields;
-        let grey = |i: usize| if (i % size / width + i / size / width) % 2 == 0 { 40 } else { 200 };
+        let grey = |i: usize| if (i % size / width + i / size / width).is_multiple_of(2) { 40 } else { 200 };
         Self::new(size, &(0..size * size).map(grey).collect::<Vec<u8>>())
     }
 }
