@@ -119,7 +119,7 @@ fn mutated_calibrations_never_panic() {
     let mut accepted = 0;
     for _ in 0..20_000 {
         let mut bytes = KALIBR.as_bytes().to_vec();
-        for _ in 0..1 + rng.bits() % 4 {
+        for _ in 0..=rng.bits() % 4 {
             let at = rng.bits() as usize % bytes.len().max(1);
             if bytes.is_empty() {
                 break;
