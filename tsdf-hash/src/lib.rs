@@ -40,6 +40,7 @@
 //! | fusion undone | ours | [`Map::deintegrate`] |
 //! | noise and weights | Nguyen, Izadi, Lovell 2012; `w = 15 (σ₀/σ(z))² cos θ`: ours | [`NoiseModel`] |
 //! | mesh | thesis Paper I, section 4.6, by marching cubes; case table derived: ours | [`Map::mesh`], [`write_ply`] |
+//! | the mesh of a growing map, blocks that left included | thesis Paper I, section 4.6; per-block patches: ours | [`MeshKeeper`] |
 //! | distance queries | thesis, outlook | [`Map::distance`] |
 //!
 //! Frames: the camera's z looks forward, `x` to the right and `y` down in its image; the world is the caller's. Distances
@@ -69,7 +70,7 @@ pub use dense::DenseMap;
 pub use error::Error;
 pub use file::MapFile;
 pub use map::{FrameReport, Map, Memory};
-pub use mesh::{Mesh, write_ply};
+pub use mesh::{Mesh, MeshKeeper, MeshReport, write_obj, write_ply};
 pub use nalgebra;
 pub use settings::{NoiseModel, Settings, Tiers};
 pub use tiers::{Arrivals, MergeAtOnce, Revisit, Verdict};

@@ -5,6 +5,7 @@
 mod accuracy;
 mod errors;
 mod file;
+mod incremental;
 mod recorded;
 mod reversible;
 mod scene;
