@@ -40,7 +40,11 @@
 //! | fusion undone | ours | [`Map::deintegrate`] |
 //! | noise and weights | Nguyen, Izadi, Lovell 2012; `w = 15 (σ₀/σ(z))² cos θ`: ours | [`NoiseModel`] |
 //! | mesh | thesis Paper I, section 4.6, by marching cubes; case table derived: ours | [`Map::mesh`], [`write_ply`] |
+<<<<<<< HEAD
 //! | the same bytes on a GPU | ours | `GpuMap` (feature `gpu`) |
+=======
+//! | the mesh of a growing map, blocks that left included | thesis Paper I, section 4.6; per-block patches: ours | [`MeshKeeper`] |
+>>>>>>> tsdf-mesh
 //! | distance queries | thesis, outlook | [`Map::distance`] |
 //!
 //! Frames: the camera's z looks forward, `x` to the right and `y` down in its image; the world is the caller's. Distances
@@ -74,7 +78,7 @@ pub use file::MapFile;
 #[cfg(feature = "gpu")]
 pub use gpu::{GpuMap, GpuOptions, open_map};
 pub use map::{FrameReport, Map, Memory};
-pub use mesh::{Mesh, write_ply};
+pub use mesh::{Mesh, MeshKeeper, MeshReport, write_obj, write_ply};
 pub use nalgebra;
 pub use settings::{NoiseModel, Settings, Tiers};
 pub use tiers::{Arrivals, MergeAtOnce, Revisit, Verdict};

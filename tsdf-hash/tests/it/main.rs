@@ -7,6 +7,7 @@ mod errors;
 mod file;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod incremental;
 mod recorded;
 mod reversible;
 mod scene;
