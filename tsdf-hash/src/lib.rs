@@ -40,11 +40,8 @@
 //! | fusion undone | ours | [`Map::deintegrate`] |
 //! | noise and weights | Nguyen, Izadi, Lovell 2012; `w = 15 (σ₀/σ(z))² cos θ`: ours | [`NoiseModel`] |
 //! | mesh | thesis Paper I, section 4.6, by marching cubes; case table derived: ours | [`Map::mesh`], [`write_ply`] |
-<<<<<<< HEAD
 //! | the same bytes on a GPU | ours | `GpuMap` (feature `gpu`) |
-=======
 //! | the mesh of a growing map, blocks that left included | thesis Paper I, section 4.6; per-block patches: ours | [`MeshKeeper`] |
->>>>>>> tsdf-mesh
 //! | distance queries | thesis, outlook | [`Map::distance`] |
 //!
 //! Frames: the camera's z looks forward, `x` to the right and `y` down in its image; the world is the caller's. Distances
