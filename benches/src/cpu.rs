@@ -18,6 +18,56 @@ pub fn clock_name() -> &'static str {
 /// Shortest time worth reading: the system counts a running thread's time in steps of milliseconds.
 const LEAST: f64 = 0.2;
 
+/// Seconds that all threads of this process have computed, where the system tells; `None` elsewhere.
+fn process_seconds() -> Option<f64> {
+    // The system brings a running thread's account up to date when it pauses, and else every few milliseconds.
+    std::thread::sleep(std::time::Duration::from_micros(60));
+    let mut nanoseconds = 0.0;
+    for thread in std::fs::read_dir("/proc/self/task").ok()? {
+        let text = std::fs::read_to_string(thread.ok()?.path().join("schedstat")).ok()?;
+        nanoseconds += text.split_whitespace().next()?.parse::<f64>().ok()?;
+    }
+    (nanoseconds > 0.0).then_some(nanoseconds * 1e-9)
+}
+
+/// Times of jobs of a few milliseconds that cannot be repeated, in any threads they start and wait for.
+///
+/// Threads that have ended are no longer counted by the system: with more than one, read the wall's time.
+#[derive(Debug, Default)]
+pub struct Clock {
+    cpu: Vec<f64>,
+    wall: Vec<f64>,
+}
+
+impl Clock {
+    /// Does a job and notes its times.
+    pub fn time<T>(&mut self, job: impl FnOnce() -> T) -> T {
+        let before = process_seconds();
+        let wall = Instant::now();
+        let done = job();
+        let wall = wall.elapsed().as_secs_f64();
+        self.wall.push(wall);
+        self.cpu.push(before.zip(process_seconds()).map_or(wall, |(before, after)| after - before));
+        done
+    }
+
+    /// Median processor time, milliseconds.
+    pub fn cpu_ms(&self) -> f64 {
+        median_ms(&self.cpu)
+    }
+
+    /// Median time on the wall, milliseconds.
+    pub fn wall_ms(&self) -> f64 {
+        median_ms(&self.wall)
+    }
+}
+
+fn median_ms(seconds: &[f64]) -> f64 {
+    let mut sorted = seconds.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    1e3 * sorted.get(sorted.len() / 2).copied().unwrap_or_default()
+}
+
 /// Median over `runs` (at least one) of the seconds that `job` takes on this thread, its result included but not used.
 /// Short jobs are repeated within a run.
 pub fn median_seconds<T>(runs: usize, mut job: impl FnMut() -> T) -> f64 {
