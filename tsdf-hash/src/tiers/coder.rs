@@ -244,6 +244,10 @@ fn read_list(input: &mut &[u8], voxels: &[u16], mut number: impl FnMut(usize, u3
                 number(usize::from(voxel), bits as u32 & mask);
                 bits >>= width;
             }
+            // Nothing hides behind the last voxel.
+            if bits != 0 {
+                return None;
+            }
         }
     }
     Some(())
