@@ -41,25 +41,31 @@
 
 mod deconvolution;
 mod error;
+mod feedback;
 mod footprints;
 mod ideal;
 mod image;
 mod kernel;
 mod layers;
 pub mod metrics;
+mod network;
 mod painter;
 pub mod procedural;
 mod projected_lbfgs;
 mod pursuit;
 mod saturation;
 mod strokes;
+#[cfg(feature = "train")]
+pub mod train;
 
 pub use deconvolution::Deconvolution;
 pub use error::Error;
+pub use feedback::Feedback;
 pub use ideal::ideal;
 pub use image::Image;
 pub use kernel::SprayKernel;
 pub use layers::{Layered, Sharing, Steps};
+pub use network::{Network, Shape};
 pub use painter::{Limits, Painter, Painting, Spray, Task};
 pub use pursuit::MatchingPursuit;
 pub use saturation::{MonotoneCurve, Saturation};
