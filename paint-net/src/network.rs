@@ -7,7 +7,7 @@ mod law;
 mod pass;
 mod planes;
 mod real;
-mod safetensors;
+pub(crate) mod safetensors;
 mod shape;
 mod spread;
 mod tiles;
@@ -30,7 +30,7 @@ pub(crate) use trace::Trace;
 
 use crate::error::Error;
 use crate::procedural::lattice;
-use safetensors::Tensor;
+pub(crate) use safetensors::Tensor;
 
 /// The weights of the feedback painter.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,17 +70,23 @@ impl Network {
 
     /// From the bytes of a safetensors file.
     pub fn from_safetensors(bytes: &[u8]) -> Result<Self, Error> {
-        let (tensors, _) = safetensors::read(bytes)?;
+        Self::from_tensors(&safetensors::read(bytes)?.0, None)
+    }
+
+    /// From tensors among which those of the network are; `shape` if it is known.
+    pub(crate) fn from_tensors(tensors: &[Tensor], shape: Option<Shape>) -> Result<Self, Error> {
         let of = |name: &str| {
             let found = tensors.iter().find(|t| t.name == name);
             found.ok_or_else(|| Error::Weights(format!("there is no tensor {name}")))
         };
-        // The extents of two tensors tell the sizes.
-        let (&[stages, channels], layers) = (of("sense.bias")?.shape.as_slice(), tensors.len().saturating_sub(4) / 2)
-        else {
-            return Err(Error::Weights("sense.bias does not have two extents".to_string()));
+        let shape = match (shape, of("sense.bias")?.shape.as_slice()) {
+            (Some(shape), _) => shape,
+            (None, &[stages, channels]) => {
+                let further = tensors.iter().filter(|t| t.name.starts_with("think") && t.name.ends_with("weight"));
+                Shape { channels, layers: 1 + further.count(), stages }
+            }
+            (None, _) => return Err(Error::Weights("sense.bias does not have two extents".to_string())),
         };
-        let shape = Shape { channels, layers, stages };
         shape.check()?;
         let mut parameters = vec![0.0; shape.parameters()];
         for (name, extents, range) in shape.tensors() {
@@ -98,13 +104,16 @@ impl Network {
 
     /// The bytes of a safetensors file, with notes for whoever reads it.
     pub fn to_safetensors(&self, notes: &[(&str, String)]) -> Vec<u8> {
-        let tensors: Vec<Tensor> = self
-            .shape
-            .tensors()
-            .into_iter()
-            .map(|(name, shape, range)| Tensor { name, shape, values: self.parameters[range].to_vec() })
-            .collect();
-        safetensors::write(&tensors, notes)
+        safetensors::write(&self.tensors(), notes)
+    }
+
+    pub(crate) fn tensors(&self) -> Vec<Tensor> {
+        let tensor = |(name, shape, range): (String, Vec<usize>, std::ops::Range<usize>)| Tensor {
+            name,
+            shape,
+            values: self.parameters[range].to_vec(),
+        };
+        self.shape.tensors().into_iter().map(tensor).collect()
     }
 
     pub(crate) fn from_parameters(shape: Shape, parameters: Vec<f32>) -> Self {

@@ -1,6 +1,7 @@
 //! Training of the feedback painter on procedural pictures: seeded, and the same to the last bit for any number of threads.
 
 mod adam;
+mod checkpoint;
 mod sample;
 
 use crate::error::{Error, require};
@@ -96,6 +97,11 @@ impl Trainer {
     /// The weights as they are.
     pub fn network(&self) -> Network {
         Network::from_parameters(self.settings.shape, self.parameters.clone())
+    }
+
+    /// Steps done.
+    pub fn steps_done(&self) -> usize {
+        self.step
     }
 
     /// Whether all steps are done.

@@ -3,8 +3,8 @@
 
 use paint_net::procedural::{Texture, lattice};
 use paint_net::{
-    Deconvolution, Error, Image, Layered, Limits, MatchingPursuit, MonotoneCurve, Painter, Painting, Saturation,
-    Sharing, SprayKernel, Steps, StrokeSettings, Task, boustrophedon, metrics,
+    Deconvolution, Error, Feedback, Image, Layered, Limits, MatchingPursuit, MonotoneCurve, Painter, Painting,
+    Saturation, Sharing, SprayKernel, Steps, StrokeSettings, Task, boustrophedon, metrics,
 };
 
 fn kernel() -> SprayKernel {
@@ -15,6 +15,7 @@ fn painters() -> Vec<Box<dyn Painter>> {
     vec![
         Box::new(Deconvolution::default()),
         Box::new(MatchingPursuit::default()),
+        Box::new(Feedback::shipped().unwrap()),
         Box::new(Layered::new(Deconvolution::default())),
         Box::new(Layered { sharing: Sharing::Sequential, ..Layered::new(Deconvolution::default()) }),
     ]

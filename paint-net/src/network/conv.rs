@@ -60,6 +60,8 @@ impl<T: Real> Packed<T> {
 
     fn groups<const N: usize>(&self, grid: &Grid, input: &[T], output: &mut [T], start: Start<T>, rectify: bool) {
         let plane = grid.plane();
+        let taps = |channel: usize| (0..TAPS).map(move |tap| channel * plane + tap / 3 * grid.pitch + tap % 3);
+        let offsets: Vec<usize> = (0..self.ins).flat_map(taps).collect();
         for (group, weights) in self.weights.chunks_exact(self.ins * TAPS * N).enumerate() {
             let first = group * N;
             let count = N.min(self.outs - first);
@@ -73,7 +75,7 @@ impl<T: Real> Packed<T> {
                             Start::Output => sum.copy_from_slice(&output[(first + o) * plane + at..][..BLOCK]),
                         }
                     }
-                    sums = accumulate(sums, &input[at - grid.pitch - 1..], plane, grid.pitch, weights);
+                    sums = accumulate(sums, &input[at - grid.pitch - 1..], &offsets, weights);
                     for (o, sum) in sums.iter_mut().enumerate().take(count) {
                         if rectify {
                             for s in sum.iter_mut() {
@@ -100,36 +102,32 @@ pub(crate) enum Start<'a, T> {
     Output,
 }
 
-/// The inner loop: `input` begins at the upper left neighbour of the block.
+/// The inner loop: `input` begins at the upper left neighbour of the block, `offsets` are those of the taps of all channels.
+/// One loop over all of them: unrolled by kernel columns, shifted loads would be assembled from registers, of which there are
+/// too few.
 #[inline(always)]
 fn accumulate<T: Real, const N: usize>(
     mut sums: [[T; BLOCK]; N],
     input: &[T],
-    plane: usize,
-    pitch: usize,
+    offsets: &[usize],
     weights: &[T],
 ) -> [[T; BLOCK]; N] {
-    for (channel, weights) in weights.chunks_exact(TAPS * N).enumerate() {
-        let from = &input[channel * plane..][..2 * pitch + BLOCK + 2];
-        for row in 0..3 {
-            let from = &from[row * pitch..][..BLOCK + 2];
-            for column in 0..3 {
-                let from: &[T] = &from[column..column + BLOCK];
-                let weights = &weights[(row * 3 + column) * N..][..N];
-                for o in 0..N {
-                    for l in 0..BLOCK {
-                        sums[o][l] += weights[o] * from[l];
-                    }
-                }
+    for (&offset, weights) in offsets.iter().zip(weights.chunks_exact(N)) {
+        let from = &input[offset..][..BLOCK];
+        for (sum, &weight) in sums.iter_mut().zip(weights) {
+            for (s, &v) in sum.iter_mut().zip(from) {
+                *s += weight * v;
             }
         }
     }
     sums
 }
 
-/// Values per sum of the derivative by a weight.
+/// Values per sum of the derivative by a weight, and outputs at a time.
 #[cfg(any(test, feature = "train"))]
 const WIDE: usize = 8;
+#[cfg(any(test, feature = "train"))]
+const UPS: usize = 4;
 
 /// Adds to `gradient` (`[out][in][3][3]`) the derivative of a convolution by its weights: `Σ_p up_o(p) input_i(p + tap)`.
 /// `up` is zero past the ends of rows.
@@ -141,41 +139,34 @@ pub(crate) fn weights_gradient<T: Real>(
     gradient: &mut [T],
 ) {
     let plane = grid.plane();
-    for first in (0..outs).step_by(2) {
-        // An odd last output is computed twice; the second is not used.
-        let second = (first + 1).min(outs - 1);
-        for i in 0..ins {
-            for row in 0..3 {
-                let mut sums = [[[T::default(); WIDE]; 3]; 2];
-                for y in 0..grid.height {
-                    let at = grid.at(0, y);
-                    let length = grid.width.next_multiple_of(WIDE);
-                    let ups = [&up[first * plane + at..][..length], &up[second * plane + at..][..length]];
-                    let from = &input[i * plane + at + row * grid.pitch - grid.pitch - 1..][..length + 2];
-                    sums = correlate(sums, ups, from);
-                }
-                for (o, sums) in (first..=second).zip(&sums) {
-                    for (column, sum) in sums.iter().enumerate() {
-                        let total = sum.iter().fold(T::default(), |total, &s| total + s);
-                        gradient[(o * ins + i) * TAPS + row * 3 + column] += total;
-                    }
-                }
+    let length = grid.width.next_multiple_of(WIDE);
+    for first in (0..outs).step_by(UPS) {
+        for (i, tap) in (0..ins).flat_map(|i| (0..TAPS).map(move |tap| (i, tap))) {
+            let mut sums = [[T::default(); WIDE]; UPS];
+            for y in 0..grid.height {
+                let at = grid.at(0, y);
+                // Outputs that do not exist repeat the last one and are not used.
+                let ups = std::array::from_fn(|k| &up[(first + k).min(outs - 1) * plane + at..][..length]);
+                let from = &input[i * plane + at + tap / 3 * grid.pitch + tap % 3 - grid.pitch - 1..][..length];
+                sums = correlate(sums, ups, from);
+            }
+            for (o, sum) in (first..outs).zip(&sums) {
+                let total = sum.iter().fold(T::default(), |total, &s| total + s);
+                gradient[(o * ins + i) * TAPS + tap] += total;
             }
         }
     }
 }
 
-/// One row of two outputs against one row of an input, for three columns of the kernel.
+/// One row of several outputs against one row of an input.
 #[cfg(any(test, feature = "train"))]
 #[inline(always)]
-fn correlate<T: Real>(mut sums: [[[T; WIDE]; 3]; 2], ups: [&[T]; 2], from: &[T]) -> [[[T; WIDE]; 3]; 2] {
-    for b in (0..ups[0].len()).step_by(WIDE) {
-        let (one, two, from) = (&ups[0][b..b + WIDE], &ups[1][b..b + WIDE], &from[b..b + WIDE + 2]);
-        for column in 0..3 {
-            let from = &from[column..column + WIDE];
-            for l in 0..WIDE {
-                sums[0][column][l] += one[l] * from[l];
-                sums[1][column][l] += two[l] * from[l];
+fn correlate<T: Real>(mut sums: [[T; WIDE]; UPS], ups: [&[T]; UPS], from: &[T]) -> [[T; WIDE]; UPS] {
+    for (b, from) in from.chunks_exact(WIDE).enumerate() {
+        for (sum, up) in sums.iter_mut().zip(ups) {
+            let up = &up[b * WIDE..][..WIDE];
+            for ((s, &u), &v) in sum.iter_mut().zip(up).zip(from) {
+                *s += u * v;
             }
         }
     }

@@ -14,7 +14,7 @@ const TAPS: usize = 9;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Shape {
-    /// Channels of every hidden layer. Default 8, ours.
+    /// Channels of every hidden layer. Default 12, ours.
     pub channels: usize,
     /// Hidden layers, each a 3x3 convolution and a rectifier. Default 2, ours.
     pub layers: usize,
@@ -24,7 +24,7 @@ pub struct Shape {
 
 impl Default for Shape {
     fn default() -> Self {
-        Self { channels: 8, layers: 2, stages: 8 }
+        Self { channels: 12, layers: 2, stages: 8 }
     }
 }
 

@@ -3,7 +3,7 @@
 pub(crate) struct Adam {
     mean: Vec<f32>,
     square: Vec<f32>,
-    steps: i32,
+    updates: usize,
 }
 
 const MEAN_DECAY: f64 = 0.9;
@@ -11,13 +11,24 @@ const SQUARE_DECAY: f64 = 0.999;
 
 impl Adam {
     pub(crate) fn new(parameters: usize) -> Self {
-        Self { mean: vec![0.0; parameters], square: vec![0.0; parameters], steps: 0 }
+        Self { mean: vec![0.0; parameters], square: vec![0.0; parameters], updates: 0 }
+    }
+
+    /// Goes on from means, squares and the number of updates.
+    pub(crate) fn from_state(mean: Vec<f32>, square: Vec<f32>, updates: usize) -> Self {
+        Self { mean, square, updates }
+    }
+
+    pub(crate) fn state(&self) -> (&[f32], &[f32], usize) {
+        (&self.mean, &self.square, self.updates)
     }
 
     pub(crate) fn step(&mut self, parameters: &mut [f32], gradient: &[f32], rate: f64) {
-        self.steps += 1;
-        let mean_gain = 1.0 / (1.0 - MEAN_DECAY.powi(self.steps));
-        let square_gain = 1.0 / (1.0 - SQUARE_DECAY.powi(self.steps));
+        self.updates += 1;
+        // Long before the count leaves this range, its powers are zero.
+        let count = self.updates.min(1_000_000) as i32;
+        let mean_gain = 1.0 / (1.0 - MEAN_DECAY.powi(count));
+        let square_gain = 1.0 / (1.0 - SQUARE_DECAY.powi(count));
         for (((p, &g), m), s) in parameters.iter_mut().zip(gradient).zip(&mut self.mean).zip(&mut self.square) {
             let g = f64::from(g);
             *m = (MEAN_DECAY * f64::from(*m) + (1.0 - MEAN_DECAY) * g) as f32;
