@@ -39,6 +39,7 @@
 //! Pixels: centres at integers, `x` = column, `y` = row, row 0 at the top. Lengths are in pixels, depths in the unit of the
 //! saturation curve. Every result is the same bytes for the same input.
 
+mod coats;
 mod deconvolution;
 mod error;
 mod feedback;
@@ -58,6 +59,7 @@ mod strokes;
 #[cfg(feature = "train")]
 pub mod train;
 
+pub use coats::{Coated, Coats};
 pub use deconvolution::Deconvolution;
 pub use error::Error;
 pub use feedback::Feedback;

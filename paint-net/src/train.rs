@@ -15,7 +15,7 @@ use sample::Sample;
 pub struct TrainSettings {
     /// Seed of the first weights and of all pictures. Default 1.
     pub seed: u64,
-    /// Steps of the optimiser. Default 20,000, ours.
+    /// Steps of the optimiser. Default 12,000, ours.
     pub steps: usize,
     /// Pictures per step. Default 8, ours.
     pub batch: usize,
@@ -25,7 +25,7 @@ pub struct TrainSettings {
     pub passes: usize,
     /// Sizes of the network.
     pub shape: Shape,
-    /// Learning rate after the first steps, falling to 0 along a cosine. Default 3e-3, ours.
+    /// Learning rate after the first steps, falling to 0 along a cosine. Default 4e-3, ours.
     pub learning_rate: f64,
     /// Gradients longer than this are shortened to it. Default 1, ours.
     pub longest_gradient: f64,
@@ -39,12 +39,12 @@ impl Default for TrainSettings {
     fn default() -> Self {
         Self {
             seed: 1,
-            steps: 20_000,
+            steps: 12_000,
             batch: 8,
             side: 64,
             passes: 8,
             shape: Shape::default(),
-            learning_rate: 3e-3,
+            learning_rate: 4e-3,
             longest_gradient: 1.0,
             share_of_early_passes: 0.1,
             threads: 1,
