@@ -83,7 +83,7 @@ pub(crate) fn fit(
 }
 
 /// `½ Σ w (f(c) - y)²`; replaces the canvas by its derivative with respect to each pixel's depth.
-fn ink_cost(task: &Task, reference: &Image, saturation: &Saturation, canvas: &mut [f64]) -> f64 {
+pub(crate) fn ink_cost(task: &Task, reference: &Image, saturation: &Saturation, canvas: &mut [f64]) -> f64 {
     let mut value = 0.0;
     for (k, (depth, wanted)) in canvas.iter_mut().zip(reference.data()).enumerate() {
         let weight = task.weight(k);

@@ -55,6 +55,7 @@ pub mod procedural;
 mod projected_lbfgs;
 mod pursuit;
 mod saturation;
+mod slew;
 mod strokes;
 #[cfg(feature = "train")]
 pub mod train;
@@ -71,4 +72,5 @@ pub use network::{Network, Shape};
 pub use painter::{Limits, Painter, Painting, Spray, Task};
 pub use pursuit::MatchingPursuit;
 pub use saturation::{MonotoneCurve, Saturation};
+pub use slew::SlewLimited;
 pub use strokes::{Stroke, StrokeSettings, boustrophedon};

@@ -141,7 +141,9 @@ impl Trainer {
         // A step that is no number teaches nothing.
         if length.is_finite() {
             let shorten = (settings.longest_gradient / length.max(1e-12)).min(1.0) as f32;
-            gradient.iter_mut().for_each(|g| *g *= shorten);
+            for g in &mut gradient {
+                *g *= shorten;
+            }
             self.adam.step(&mut self.parameters, &gradient, rate(settings, self.step));
         }
         self.step += 1;

@@ -13,6 +13,9 @@ pub(crate) struct Tensor {
     pub(crate) values: Vec<f32>,
 }
 
+/// Notes of a file: names and texts.
+pub(crate) type Notes = Vec<(String, String)>;
+
 /// Headers longer than this are refused; the format itself allows 100 MB.
 const LONGEST_HEADER: usize = 1 << 20;
 
@@ -55,7 +58,7 @@ fn escape(text: &str) -> String {
 }
 
 /// Tensors and notes of a file.
-pub(crate) fn read(bytes: &[u8]) -> Result<(Vec<Tensor>, Vec<(String, String)>), Error> {
+pub(crate) fn read(bytes: &[u8]) -> Result<(Vec<Tensor>, Notes), Error> {
     let bad = |why: &'static str| Error::Weights(why.to_string());
     let (length, rest) = bytes.split_first_chunk::<8>().ok_or_else(|| bad("shorter than its header"))?;
     let length = usize::try_from(u64::from_le_bytes(*length)).unwrap_or(usize::MAX);

@@ -124,7 +124,7 @@ impl<T: Real> Spread<T> {
             blend(&mut line, from, &terms);
             for phase in 0..self.along.stride {
                 let at = phase * work.plane() + work.at(0, j);
-                let row = &mut scratch[at..at + cells.width + 1];
+                let row = &mut scratch[at..=at + cells.width];
                 row.fill(T::default());
                 let values = line[..pixels.width].iter().skip(phase).step_by(self.along.stride);
                 for (out, &v) in row.iter_mut().zip(values) {

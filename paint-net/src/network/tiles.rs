@@ -39,6 +39,9 @@ impl State {
 /// A rectangle of cells: columns and rows.
 type Region = (Range<usize>, Range<usize>);
 
+/// A row of tiles: its number, and its paint and last steps after the pass.
+type Band<'a> = (usize, (&'a mut [f32], &'a mut [f32]));
+
 /// Buffers of one thread, kept from tile to tile while their size stays the same.
 struct Work {
     grids: (Grid, Grid),
@@ -106,8 +109,8 @@ impl Tiles<'_> {
         }
     }
 
-    /// Bands of tiles: number of the band, its paint and its last step after the pass.
-    fn run_bands(&self, stage: usize, before: &State, bands: Vec<(usize, (&mut [f32], &mut [f32]))>) {
+    /// One pass over some bands.
+    fn run_bands(&self, stage: usize, before: &State, bands: Vec<Band>) {
         let mut kept: Option<Work> = None;
         let (wide, high) = self.cells;
         for (band, (paint, last_step)) in bands {

@@ -99,8 +99,10 @@ fn add_loss<T: Real>(field: &Field<T>, pass: &Pass<T>, share: f64, by_ink: &mut 
     let factor = T::of(-2.0 * share / (weights * (error + FLOOR)));
     by_ink.fill(T::default());
     for y in 0..pixels.height {
-        for k in pixels.at(0, y)..pixels.at(pixels.width, y) {
-            by_ink[k] = factor * field.weight[k] * (field.wanted[k] - pass.ink[k]);
+        let at = pixels.at(0, y)..pixels.at(pixels.width, y);
+        let inks = field.wanted[at.clone()].iter().zip(&pass.ink[at.clone()]);
+        for ((up, &weight), (&wanted, &ink)) in by_ink[at.clone()].iter_mut().zip(&field.weight[at]).zip(inks) {
+            *up = factor * weight * (wanted - ink);
         }
     }
     (error + FLOOR).ln()
