@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use paint_net::{
-    Coats, Deconvolution, Error, Feedback, Image, Limits, MatchingPursuit, Painter, Painting, Saturation, SprayKernel,
-    Task, metrics,
+    Coats, Deconvolution, Error, Feedback, Image, Limits, MatchingPursuit, Painter, Painting, Saturation, SlewLimited,
+    SprayKernel, Task, metrics, slew_violations,
 };
 use serde::Serialize;
 
@@ -46,6 +46,8 @@ pub struct Job {
     pub kernel: SprayKernel,
     /// Where sprays may lie.
     pub limits: Limits,
+    /// Largest change of volume from one cell of the path to the next; `None` for any.
+    pub largest_change: Option<f64>,
     /// Threads of the network.
     pub threads: usize,
 }
@@ -101,6 +103,8 @@ pub struct Figures {
     pub sprays: usize,
     /// Looks of the network; 0 for painters that have none.
     pub passes: usize,
+    /// Places on the path where the volume changes faster than was allowed; 0 if any change is allowed.
+    pub slew_violations: usize,
     /// Sum of the volumes.
     pub volume_total: f64,
     /// CPU time of deciding on one thread, wall time on several.
@@ -113,11 +117,15 @@ impl Job {
     /// The painter that was chosen.
     pub fn painter(&self) -> Result<Box<dyn Painter>, Error> {
         let feedback = || Feedback::shipped().map(|f| Feedback { passes: self.passes, threads: self.threads, ..f });
-        Ok(match self.painter {
+        let painter: Box<dyn Painter> = match self.painter {
             Choice::Feedback => Box::new(feedback()?),
             Choice::Coats => Box::new(Coats::new(feedback()?)),
             Choice::Deconvolution => Box::new(Deconvolution::default()),
             Choice::Pursuit => Box::new(MatchingPursuit::default()),
+        };
+        Ok(match self.largest_change {
+            Some(most) => Box::new(SlewLimited::new(painter, most)),
+            None => painter,
         })
     }
 
@@ -132,6 +140,9 @@ impl Job {
             Choice::Feedback | Choice::Coats => self.passes,
             Choice::Deconvolution | Choice::Pursuit => 0,
         };
+        let size = (wanted.width(), wanted.height());
+        let slew_violations =
+            self.largest_change.map_or(0, |most| slew_violations(&painting.sprays, size, &self.limits, most));
         let small = wanted.width().min(wanted.height()) < 7;
         let figures = Figures {
             painter: painter.name(),
@@ -143,6 +154,7 @@ impl Job {
             ciede2000_mean: colour_difference(&painting.ink, wanted),
             sprays: painting.sprays.len(),
             passes,
+            slew_violations,
             volume_total: painting.sprays.iter().map(|s| s.volume).sum(),
             cpu_ms,
             threads: self.threads,

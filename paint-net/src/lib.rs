@@ -34,6 +34,9 @@
 //! | 3.3 the "ideal": Gaussian of the reference | [`ideal`] |
 //! | (ours) non-negative deconvolution | [`Deconvolution`] |
 //! | (ours) greedy matching pursuit | [`MatchingPursuit`] |
+//! | (ours) a network that looks at its canvas | [`Feedback`], [`Network`] |
+//! | (ours) coats, with a look at the wall after each | [`Coats`] |
+//! | (ours) a valve of limited speed | [`SlewLimited`] |
 //! | (ours) strokes a robot can fly | [`boustrophedon`] |
 //!
 //! Pixels: centres at integers, `x` = column, `y` = row, row 0 at the top. Lengths are in pixels, depths in the unit of the
@@ -72,5 +75,5 @@ pub use network::{Network, Shape};
 pub use painter::{Limits, Painter, Painting, Spray, Task};
 pub use pursuit::MatchingPursuit;
 pub use saturation::{MonotoneCurve, Saturation};
-pub use slew::SlewLimited;
+pub use slew::{SlewLimited, slew_violations};
 pub use strokes::{Stroke, StrokeSettings, boustrophedon};

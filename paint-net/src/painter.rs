@@ -134,6 +134,24 @@ pub trait Painter {
     ) -> Result<Painting, Error>;
 }
 
+/// So that painters that wrap others can wrap one that is chosen while running.
+impl<P: Painter + ?Sized> Painter for Box<P> {
+    fn name(&self) -> &'static str {
+        (**self).name()
+    }
+
+    fn paint(
+        &self,
+        task: &Task,
+        kernel: &SprayKernel,
+        saturation: &Saturation,
+        limits: &Limits,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Painting, Error> {
+        (**self).paint(task, kernel, saturation, limits, progress)
+    }
+}
+
 impl<P: Painter + ?Sized> Painter for &P {
     fn name(&self) -> &'static str {
         (**self).name()
@@ -194,20 +212,6 @@ impl Board {
         let mut canvas = self.bare.clone();
         self.footprints.add(volumes, canvas.data_mut());
         canvas
-    }
-
-    /// The volume of every cell in a list of sprays that lie on cells; others are left out.
-    pub(crate) fn volumes_of(&self, sprays: &[Spray]) -> Vec<f64> {
-        let (columns, rows) = (&self.footprints.columns, &self.footprints.rows);
-        let mut volumes = vec![0.0; columns.len() * rows.len()];
-        for s in sprays {
-            let i = columns.binary_search(&(s.x as usize));
-            let j = rows.binary_search(&(s.y as usize));
-            if let (Ok(i), Ok(j)) = (i, j) {
-                volumes[j * columns.len() + i] += s.volume;
-            }
-        }
-        volumes
     }
 
     pub(crate) fn painting(&self, volumes: &[f64], saturation: &Saturation) -> Painting {

@@ -1,5 +1,6 @@
 use crate::deconvolution::ink_cost;
 use crate::error::{Error, require};
+use crate::footprints::cells;
 use crate::image::Image;
 use crate::kernel::SprayKernel;
 use crate::painter::{Board, Limits, Painter, Painting, Spray, Task};
@@ -37,6 +38,15 @@ impl<P: Painter> SlewLimited<P> {
     }
 }
 
+/// How often the volume changes by more than `largest_change` from one cell of the path to the next, cells without a spray
+/// included. `size`: columns and rows of the picture. Sprays that lie on no cell of the grid of `limits` are left out.
+pub fn slew_violations(sprays: &[Spray], size: (usize, usize), limits: &Limits, largest_change: f64) -> usize {
+    let (columns, rows) = (cells(size.0, limits.along), cells(size.1, limits.row_spacing));
+    let volumes = volumes_on(&columns, &rows, sprays);
+    let path = raster(columns.len(), rows.len());
+    path.windows(2).filter(|p| (volumes[p[1]] - volumes[p[0]]).abs() > largest_change).count()
+}
+
 impl<P: Painter> Painter for SlewLimited<P> {
     fn name(&self) -> &'static str {
         "slew limited"
@@ -58,7 +68,7 @@ impl<P: Painter> Painter for SlewLimited<P> {
         let plan = self.painter.paint(task, kernel, saturation, limits, &mut |share| progress(0.3 * share))?;
         let columns = board.footprints.columns.len();
         let path = raster(columns, board.footprints.rows.len());
-        let mut volumes = board.volumes_of(&plan.sprays);
+        let mut volumes = volumes_on(&board.footprints.columns, &board.footprints.rows, &plan.sprays);
         let mut canvas = board.bare.data().to_vec();
         for (round, weight) in WEIGHTS.into_iter().enumerate() {
             let mut cost = |v: &[f64], gradient: &mut [f64]| {
@@ -85,6 +95,18 @@ impl<P: Painter> Painter for SlewLimited<P> {
         let sprays = path.iter().map(spray).filter(|s| s.volume > 0.0).collect();
         Ok(Painting { sprays, canvas, ink })
     }
+}
+
+/// The volume of every cell.
+fn volumes_on(columns: &[usize], rows: &[usize], sprays: &[Spray]) -> Vec<f64> {
+    let mut volumes = vec![0.0; columns.len() * rows.len()];
+    for s in sprays {
+        let (i, j) = (columns.binary_search(&(s.x as usize)), rows.binary_search(&(s.y as usize)));
+        if let (Ok(i), Ok(j)) = (i, j) {
+            volumes[j * columns.len() + i] += s.volume;
+        }
+    }
+    volumes
 }
 
 /// Cells in the order of the path.

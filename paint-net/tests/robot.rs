@@ -4,7 +4,7 @@
 use paint_net::procedural::{Texture, lattice};
 use paint_net::{
     Coats, Deconvolution, Error, Feedback, Image, Limits, Painter, Saturation, SlewLimited, Spray, SprayKernel, Task,
-    metrics,
+    metrics, slew_violations,
 };
 
 fn nozzle() -> SprayKernel {
@@ -123,7 +123,8 @@ fn the_valve_is_never_too_fast() {
         let limits = Limits { along, max_volume: 1.0, ..Limits::default() };
         let painter = SlewLimited::new(Feedback::shipped().unwrap(), limit);
         let painting = painter.paint(&task, &nozzle(), &Saturation::Tanh, &limits, &mut |_| ()).unwrap();
-        // All cells along the path, those that are not sprayed included.
+        assert_eq!(slew_violations(&painting.sprays, (side, side), &limits, limit), 0, "limit {limit}");
+        // By the definition: every row of cells in turn, every other one backwards.
         let columns = side.div_ceil(along);
         let mut path = vec![0.0; columns * (side / 2)];
         for s in &painting.sprays {
@@ -131,6 +132,8 @@ fn the_valve_is_never_too_fast() {
             path[j * columns + if j % 2 == 0 { i } else { columns - 1 - i }] = s.volume;
         }
         assert!(path.windows(2).all(|p| (p[1] - p[0]).abs() <= limit), "limit {limit}");
+        let faster = path.windows(2).filter(|p| (p[1] - p[0]).abs() > 0.5 * limit).count();
+        assert_eq!(slew_violations(&painting.sprays, (side, side), &limits, 0.5 * limit), faster);
         let quality = metrics::psnr(&painting.ink, &wanted, None).unwrap();
         if along == 2 {
             assert!(quality < last, "{quality} dB with {limit}, {last} dB with more");

@@ -55,6 +55,9 @@ struct Nozzle {
     /// Largest number of sprays [default: no limit]
     #[arg(long)]
     max_sprays: Option<usize>,
+    /// Largest change of volume from one place of the path to the next [default: any]
+    #[arg(long)]
+    largest_change: Option<f64>,
     /// Looks of the network at its canvas
     #[arg(long, default_value_t = 8)]
     passes: usize,
@@ -86,6 +89,9 @@ enum Command {
         /// Steps [default: the preset's]
         #[arg(long)]
         steps: Option<usize>,
+        /// Stop after this step; the schedule stays that of all steps [default: go on to the end]
+        #[arg(long)]
+        until: Option<usize>,
         /// Worker threads; the weights do not depend on it
         #[arg(long, default_value_t = 1)]
         threads: usize,
@@ -136,11 +142,11 @@ fn run(arguments: Arguments) -> Result<(), AnyError> {
             print!("{}", print_table(&compare(&job(PainterName::Feedback, &nozzle)?, &pictures, runs)?));
             Ok(())
         }
-        Some(Command::Train { preset: Preset::Painter, seed, steps, threads, resume, out }) => {
+        Some(Command::Train { preset: Preset::Painter, seed, steps, until, threads, resume, out }) => {
             create(&out)?;
             let preset = TrainSettings::default();
             let settings = TrainSettings { seed, threads, steps: steps.unwrap_or(preset.steps), ..preset };
-            learn(&Lesson { settings, resume, save_every: 500 }, &out)?;
+            learn(&Lesson { settings, resume, until, save_every: 500 }, &out)?;
             println!("{}", out.join("painter.safetensors").display());
             Ok(())
         }
@@ -162,7 +168,14 @@ fn job(painter: PainterName, nozzle: &Nozzle) -> Result<Job, AnyError> {
         ..Limits::default()
     };
     let kernel = SprayKernel::new(nozzle.sigma, nozzle.cut)?;
-    Ok(Job { painter, passes: nozzle.passes, kernel, limits, threads: nozzle.threads })
+    Ok(Job {
+        painter,
+        passes: nozzle.passes,
+        kernel,
+        limits,
+        largest_change: nozzle.largest_change,
+        threads: nozzle.threads,
+    })
 }
 
 fn paint(image: &Path, job: &Job, out: &Path) -> Result<(), AnyError> {

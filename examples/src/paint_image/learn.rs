@@ -17,6 +17,8 @@ pub struct Lesson {
     pub settings: TrainSettings,
     /// Checkpoint to go on from.
     pub resume: Option<PathBuf>,
+    /// Step after which to stop, if not at the end.
+    pub until: Option<usize>,
     /// Steps between checkpoints.
     pub save_every: usize,
 }
@@ -52,23 +54,25 @@ pub fn learn(lesson: &Lesson, folder: &Path) -> Result<(), PaintImageError> {
     let stage = Stage::start("train");
     let (mut losses, mut qualities) = (Vec::new(), Vec::new());
     let (mut loss, mut quality, mut count) = (0.0, 0.0, 0.0);
-    while !trainer.is_done() {
+    let last = lesson.until.unwrap_or(settings.steps).min(settings.steps);
+    while trainer.steps_done() < last {
         let progress = trainer.step();
         loss += progress.loss;
         quality += progress.psnr_db;
         count += 1.0;
-        if progress.step % POINT == 0 || trainer.is_done() {
+        if progress.step % POINT == 0 || progress.step == last {
             losses.push((progress.step as f64, loss / count));
             qualities.push((progress.step as f64, quality / count));
             (loss, quality, count) = (0.0, 0.0, 0.0);
         }
-        if progress.step % lesson.save_every.max(1) == 0 || trainer.is_done() {
+        if progress.step % lesson.save_every.max(1) == 0 || progress.step == last {
             save("checkpoint.safetensors", &trainer.checkpoint())?;
         }
-        stage.share(progress.step as f64 / settings.steps as f64);
+        stage.share(progress.step as f64 / last as f64);
     }
     let network = trainer.network();
-    let notes = [("seed", settings.seed.to_string()), ("steps", settings.steps.to_string())];
+    let notes =
+        [("seed", settings.seed.to_string()), ("step", format!("{} of {}", trainer.steps_done(), settings.steps))];
     let weights = network.to_safetensors(&notes);
     save("painter.safetensors", &weights)?;
     let psnr_db_last = qualities.last().map_or(0.0, |q| q.1);
@@ -76,10 +80,12 @@ pub fn learn(lesson: &Lesson, folder: &Path) -> Result<(), PaintImageError> {
         Panel { label: "loss", curves: vec![("loss", losses)] },
         Panel { label: "PSNR of the batch, dB", curves: vec![("last pass", qualities)] },
     ];
-    save_curves(&folder.join("curve.png"), "Training of the feedback painter", "step", &panels)?;
+    if panels.iter().all(|p| p.curves.iter().all(|c| c.1.len() > 1)) {
+        save_curves(&folder.join("curve.png"), "Training of the feedback painter", "step", &panels)?;
+    }
     let outcome = Outcome {
         seed: settings.seed,
-        steps: settings.steps,
+        steps: trainer.steps_done(),
         parameters: network.parameters(),
         weights_bytes: weights.len(),
         psnr_db_last,
@@ -87,6 +93,6 @@ pub fn learn(lesson: &Lesson, folder: &Path) -> Result<(), PaintImageError> {
         threads: settings.threads,
     };
     write_json(&folder.join("report.json"), &outcome)?;
-    stage.done(&format!("{} steps, {psnr_db_last:.2} dB on the last pictures", settings.steps));
+    stage.done(&format!("{last} steps, {psnr_db_last:.2} dB on the last pictures"));
     Ok(())
 }

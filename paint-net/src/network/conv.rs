@@ -62,10 +62,11 @@ impl<T: Real> Packed<T> {
         let plane = grid.plane();
         let taps = |channel: usize| (0..TAPS).map(move |tap| channel * plane + tap / 3 * grid.pitch + tap % 3);
         let offsets: Vec<usize> = (0..self.ins).flat_map(taps).collect();
-        for (group, weights) in self.weights.chunks_exact(self.ins * TAPS * N).enumerate() {
-            let first = group * N;
-            let count = N.min(self.outs - first);
-            for y in 0..grid.height {
+        // Rows outside, groups inside: the rows that all groups read stay in the nearest cache.
+        for y in 0..grid.height {
+            for (group, weights) in self.weights.chunks_exact(self.ins * TAPS * N).enumerate() {
+                let first = group * N;
+                let count = N.min(self.outs - first);
                 for x in (0..grid.width).step_by(BLOCK) {
                     let at = grid.at(x, y);
                     let mut sums = [[T::default(); BLOCK]; N];
