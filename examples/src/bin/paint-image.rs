@@ -59,7 +59,7 @@ struct Nozzle {
     #[arg(long)]
     largest_change: Option<f64>,
     /// Looks of the network at its canvas
-    #[arg(long, default_value_t = 8)]
+    #[arg(long, default_value_t = 6)]
     passes: usize,
     /// Worker threads
     #[arg(long, default_value_t = 1)]

@@ -93,6 +93,6 @@ pub fn learn(lesson: &Lesson, folder: &Path) -> Result<(), PaintImageError> {
         threads: settings.threads,
     };
     write_json(&folder.join("report.json"), &outcome)?;
-    stage.done(&format!("{last} steps, {psnr_db_last:.2} dB on the last pictures"));
+    stage.done(&format!("{} steps, {psnr_db_last:.2} dB on the last pictures", trainer.steps_done()));
     Ok(())
 }
