@@ -7,12 +7,10 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use paint_net::procedural::Texture;
-use paint_net::{Deconvolution, Limits, MatchingPursuit, Painter, Saturation, SprayKernel, Task, metrics};
 use paint_sim::ciede2000;
 use paint_sim::colour::BANDS;
 use paintcopter_benches::cpu::{Clock, median_seconds};
-use paintcopter_benches::{Rng, films, motion, room};
+use paintcopter_benches::{Rng, films, motion, painting, room};
 use paintcopter_examples::mesh_io::read_mesh;
 use paintcopter_examples::world::rock_wall;
 use serde_json::json;
@@ -49,8 +47,11 @@ enum Job {
         #[arg(long, value_name = "DIR")]
         save: Option<PathBuf>,
     },
-    /// Paints the procedural pictures, as `paint_baselines.py painters --set procedural` does
+    /// Paints pictures with every painter, as `paint_baselines.py painters slew noise` does
     Paint {
+        /// Pictures, or folders of them [default: the procedural ones, `--set procedural` of the script]
+        #[arg(long, value_name = "PATH")]
+        image: Vec<PathBuf>,
         /// Side of the pictures, pixels
         #[arg(long, default_value_t = 128, value_parser = clap::value_parser!(u16).range(16..=2048))]
         size: u16,
@@ -108,7 +109,7 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().job {
         Job::Rock { file, seed } => rock(&file, seed),
         Job::Uv { mesh, runs, save } => uv(&mesh, runs, save.as_deref()),
-        Job::Paint { size, runs } => paint(size.into(), runs),
+        Job::Paint { image, size, runs } => painting::run(&image, size.into(), runs),
         Job::Sim { count, runs } => sim(count as usize, runs),
         Job::Tsdf { stream, voxel, frames, threads, no_colour, out } => {
             tsdf(&stream, voxel, frames, threads.into(), !no_colour, out.as_deref())
@@ -184,33 +185,6 @@ fn textured(chart: &Chart) -> Result<String, std::fmt::Error> {
         writeln!(text, "f {a}/{a} {b}/{b} {c}/{c}")?;
     }
     Ok(text)
-}
-
-fn paint(size: usize, runs: usize) -> Result<(), AnyError> {
-    // The peers' nozzle and pictures: σ = 2 px cut at 4 px, seed 1000.
-    let kernel = SprayKernel::new(2.0, 2.0)?;
-    let painters: [&dyn Painter; 2] = [&Deconvolution::default(), &MatchingPursuit::default()];
-    for texture in Texture::ALL {
-        let wanted = texture.image(1000, size);
-        let task = Task::on_bare_wall(&wanted);
-        for painter in painters {
-            let run = || painter.paint(&task, &kernel, &Saturation::Tanh, &Limits::default(), &mut |_| ());
-            let painting = run()?;
-            let seconds = median_seconds(runs, run);
-            println!(
-                "{}",
-                json!({
-                    "image": format!("proc-{texture:?}").to_lowercase(), "method": format!("paint-net_{}", painter.name()),
-                    "cpu_s": seconds, "sprays": painting.sprays.len(),
-                    "psnr": metrics::psnr(&painting.ink, &wanted, None)?,
-                    "ssim": metrics::ssim(&painting.ink, &wanted, None)?,
-                    "ssim_g": metrics::ssim_gaussian(&painting.ink, &wanted, None)?,
-                    "bce": metrics::binary_cross_entropy(&painting.ink, &wanted)?,
-                })
-            );
-        }
-    }
-    Ok(())
 }
 
 fn sim(count: usize, runs: usize) -> Result<(), AnyError> {
