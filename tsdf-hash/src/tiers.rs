@@ -182,6 +182,11 @@ impl Seen {
     /// Of the sum of two copies.
     pub(crate) fn with(self, other: Self) -> Self {
         let newer = if other.last > self.last { other } else { self };
-        Self { frames: self.frames.saturating_add(other.frames), call: self.call.max(other.call), stamp: self.stamp.max(other.stamp), ..newer }
+        Self {
+            frames: self.frames.saturating_add(other.frames),
+            call: self.call.max(other.call),
+            stamp: self.stamp.max(other.stamp),
+            ..newer
+        }
     }
 }

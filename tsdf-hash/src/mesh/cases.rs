@@ -40,7 +40,8 @@ pub(crate) struct Case {
 }
 
 /// The cell of each case; bit `c` of a case is set where corner `c` is solid.
-pub(crate) static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| (0..256).map(|case| Case::of(&triangles(case))).collect());
+pub(crate) static CASES: LazyLock<Vec<Case>> =
+    LazyLock::new(|| (0..256).map(|case| Case::of(&triangles(case))).collect());
 
 impl Case {
     fn of(triangles: &[[Edge; 3]]) -> Self {

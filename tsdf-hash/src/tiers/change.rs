@@ -213,8 +213,7 @@ impl Copies {
         let Some(label) = label.filter(|_| !sum.subtract(&partial.block)) else {
             return Err(refused(Sign::Minus, partial.key));
         };
-        let seen =
-            Seen { frames: label.frames.saturating_sub(1), stamp: self.active.tick(), ..label.seen() };
+        let seen = Seen { frames: label.frames.saturating_sub(1), stamp: self.active.tick(), ..label.seen() };
         self.cold.stage_instead(partial.key, &sum, seen)?;
         Ok(sum.is_empty())
     }

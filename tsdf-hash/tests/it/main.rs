@@ -10,4 +10,5 @@ mod recorded;
 mod reversible;
 mod scene;
 mod tiers;
+mod timing;
 mod topology;
