@@ -14,6 +14,9 @@ use crate::store::Store;
 use crate::tiers::Copies;
 use crate::{Error, Map};
 
+/// Stands for blocks that no cell reaches into.
+static NOWHERE: Block = Block::ZERO;
+
 /// What [`MeshKeeper::update`] did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MeshReport {
@@ -107,7 +110,7 @@ impl MeshKeeper {
             None => self.changed.extend(copies.sorted_keys()),
         }
         report.changed = self.changed.len();
-        self.read_changed(copies)?;
+        self.mark_changed();
         report.rebuilt = self.rebuild(copies, map.settings().voxel_size)?;
         self.seen = Some(now);
         Ok(report)
@@ -122,8 +125,8 @@ impl MeshKeeper {
     pub(crate) fn of_active(store: &Store, voxel_size: f64) -> Mesh {
         let mut keeper = Self::new();
         keeper.changed.extend(store.keys());
-        let made = keeper.read_changed(store).and_then(|()| keeper.rebuild(store, voxel_size));
-        match made {
+        keeper.mark_changed();
+        match keeper.rebuild(store, voxel_size) {
             Ok(_) => keeper.mesh(),
             Err(never) => match never {},
         }
@@ -141,20 +144,15 @@ impl MeshKeeper {
         gone.len()
     }
 
-    /// Reads the signs of the changed blocks, and marks the patches that depend on them.
-    fn read_changed<S: Source>(&mut self, source: &S) -> Result<(), S::Fault> {
-        let changed = std::mem::take(&mut self.changed);
-        for &key in &changed {
-            let Some(block) = source.block(key, &mut self.work.sums[0])? else { continue };
-            let bits = Bits::of(block);
+    /// Marks what depends on the changed blocks.
+    fn mark_changed(&mut self) {
+        for key in std::mem::take(&mut self.changed) {
             match self.patches.get_mut(key) {
-                Some(patch) => patch.bits = bits,
-                None => self.patches.insert(key, Patch { bits, ..Patch::default() }),
+                Some(patch) => patch.unread = true,
+                None => self.patches.insert(key, Patch { unread: true, ..Patch::default() }),
             }
             self.mark(key);
         }
-        self.changed = changed;
-        Ok(())
     }
 
     /// Marks the patches whose cells reach into a block.
@@ -170,38 +168,46 @@ impl MeshKeeper {
         }
     }
 
+    /// Makes the marked patches, the last first: then what lies above a block has been read before it, and much of it is
+    /// still in the cache.
     fn rebuild<S: Source>(&mut self, source: &S, voxel_size: f64) -> Result<usize, S::Fault> {
+        self.dirty.sort_unstable();
         let mut rebuilt = 0;
         while let Some(&key) = self.dirty.last() {
-            self.rebuild_patch(key, source, voxel_size)?;
+            rebuilt += usize::from(self.rebuild_patch(key, source, voxel_size)?);
             self.dirty.pop();
-            rebuilt += 1;
         }
         Ok(rebuilt)
     }
 
-    fn rebuild_patch<S: Source>(&mut self, key: Key, source: &S, voxel_size: f64) -> Result<(), S::Fault> {
+    fn rebuild_patch<S: Source>(&mut self, key: Key, source: &S, voxel_size: f64) -> Result<bool, S::Fault> {
+        // The block may have been removed since.
+        let Some(patch) = self.patches.get_mut(key) else { return Ok(false) };
+        if patch.unread {
+            if let Some(block) = source.block(key, &mut self.work.sums[0])? {
+                patch.bits = Bits::of(block);
+            }
+            patch.unread = false;
+        }
         let upper = [0, 1, 2, 3, 4, 5, 6, 7].map(|n: i32| key.neighbour([n & 1, n >> 1 & 1, n >> 2]));
         let bits = upper.map(|key| self.patches.get(key?).map(|patch| patch.bits));
-        // The block itself may be gone.
-        if bits[0].is_none() {
-            return Ok(());
-        }
         let needed = self.work.bench.find(&bits);
-        let mut blocks = [None; 8];
+        let mut blocks = [&NOWHERE; 8];
         for (n, (block, sum)) in blocks.iter_mut().zip(&mut self.work.sums).enumerate() {
-            if let Some(key) = upper[n].filter(|_| needed >> n & 1 == 1) {
-                *block = source.block(key, sum)?;
+            if let Some(key) = upper[n].filter(|_| needed >> n & 1 == 1)
+                && let Some(found) = source.block(key, sum)?
+            {
+                *block = found;
             }
         }
-        let Some(patch) = self.patches.get_mut(key) else { return Ok(()) };
+        let Some(patch) = self.patches.get_mut(key) else { return Ok(false) };
         patch.dirty = false;
         if needed == 0 {
             patch.clear();
         } else {
             self.work.bench.make(patch, key, &blocks, &CASES, voxel_size);
         }
-        Ok(())
+        Ok(true)
     }
 }
 

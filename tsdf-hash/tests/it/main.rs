@@ -12,4 +12,5 @@ mod recorded;
 mod reversible;
 mod scene;
 mod tiers;
+mod timing;
 mod topology;
