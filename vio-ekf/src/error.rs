@@ -111,6 +111,18 @@ pub enum Error {
         /// End of the defined interval, included.
         last: Stamp,
     },
+    /// A measurement belongs to a time that the filter has left behind.
+    #[error(
+        "{what} of {stamp} s arrives when everything up to {now} s is settled: feed in order, or keep a longer history"
+    )]
+    Late {
+        /// Which measurement.
+        what: &'static str,
+        /// Its time by the inertial sensor's clock.
+        stamp: Stamp,
+        /// The time up to which nothing can change.
+        now: Stamp,
+    },
     /// A covariance is not symmetric positive definite.
     #[error("{what} covariance {index} is not symmetric positive definite: check the filter, or its export")]
     NotPositiveDefinite {

@@ -43,6 +43,7 @@
 mod camera;
 mod error;
 mod eval;
+mod filter;
 mod format;
 mod lie;
 mod measurement;
@@ -60,6 +61,10 @@ pub use eval::nees::{Nees, PoseCovariance, nees};
 pub use eval::rpe::{PairsFrom, Rpe, RpeSettings, Span, Tolerance, rpe};
 pub use eval::stats::Stats;
 pub use eval::{Evaluation, EvaluationSettings, Segment, evaluate};
+pub use filter::{
+    Bearing, CalibrationSettings, CoreCovariance, FrameReport, GateSettings, LandmarkSettings, Odometry,
+    PointObservation, Settings, Start, StartSigma, Status, Vio,
+};
 pub use format::{euroc, kitti, tum};
 pub use lie::{se3, so3};
 pub use measurement::{ImageView, Imu, ImuNoise};

@@ -1,0 +1,193 @@
+//! The estimator: one camera, one inertial sensor, an iterated Kalman filter around the body.
+
+mod bearing;
+mod covariance;
+mod estimator;
+mod history;
+mod interval;
+#[cfg(test)]
+mod jacobians;
+mod points;
+mod propagate;
+mod relative;
+mod settings;
+mod start;
+mod state;
+mod update;
+
+use nalgebra::{Isometry3, SMatrix, Vector3};
+
+pub use bearing::Bearing;
+pub use estimator::CoreCovariance;
+pub use points::PointObservation;
+pub use settings::{CalibrationSettings, GateSettings, LandmarkSettings, Settings};
+pub use start::{Start, StartSigma};
+
+use crate::trajectory::is_finite;
+use crate::{Camera, Error, Imu, ImuNoise, Stamp};
+use estimator::Estimator;
+
+/// A camera this much ahead of the inertial samples, in seconds, is waiting for data that does not come.
+const MAX_AHEAD: f64 = 0.1;
+
+/// Whether the estimate can be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// No start yet.
+    Uninitialised,
+    /// Running.
+    Tracking,
+}
+
+/// An estimate of the body's motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Odometry {
+    /// Its time, by the inertial sensor's clock.
+    pub stamp: Stamp,
+    /// Pose; z of the world is up.
+    pub world_from_body: Isometry3<f64>,
+    /// Velocity in body axes, m/s.
+    pub velocity_in_body: Vector3<f64>,
+    /// Angular rate in body axes, rad/s.
+    pub rate_in_body: Vector3<f64>,
+    /// Bias of the gyroscope, rad/s.
+    pub gyro_bias: Vector3<f64>,
+    /// Bias of the accelerometer, m/s².
+    pub accel_bias: Vector3<f64>,
+    /// Of the errors of, in this order, three rows each: position in world axes; velocity in body axes; attitude as a
+    /// rotation vector in **world** axes, `R_true = Exp(δθ) R`; gyroscope's bias; accelerometer's bias.
+    pub covariance: CoreCovariance,
+}
+
+impl Odometry {
+    /// Covariance of the attitude error as a rotation vector in body axes, rad².
+    pub fn attitude_covariance_in_body(&self) -> nalgebra::Matrix3<f64> {
+        let rotation = self.world_from_body.rotation.to_rotation_matrix().into_inner();
+        let world: SMatrix<f64, 3, 3> = self.covariance.fixed_view::<3, 3>(6, 6).into_owned();
+        rotation.transpose() * world * rotation
+    }
+}
+
+/// What one image, or one set of points, did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FrameReport {
+    /// Whether the estimate can be used.
+    pub status: Status,
+    /// Landmarks whose measurement was used.
+    pub used: usize,
+    /// Landmarks whose measurement was refused.
+    pub rejected: usize,
+    /// Landmarks that were new.
+    pub added: usize,
+    /// Landmarks that were dropped.
+    pub removed: usize,
+}
+
+/// One camera and one inertial sensor.
+#[derive(Debug, Clone)]
+pub struct Vio {
+    camera: Camera,
+    noise: ImuNoise,
+    settings: Settings,
+    last: Option<Imu>,
+    estimator: Option<Estimator>,
+    tracks: Vec<Track>,
+}
+
+/// What is remembered of a landmark besides its state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Track {
+    id: u64,
+    /// Failures in a row.
+    misses: u32,
+    /// Whether the current frame saw it.
+    seen: bool,
+}
+
+impl Vio {
+    /// Refuses a camera, noise or settings that cannot be.
+    pub fn new(camera: Camera, noise: ImuNoise, settings: Settings) -> Result<Self, Error> {
+        camera.check()?;
+        noise.check()?;
+        settings.check()?;
+        Ok(Self { camera, noise, settings, last: None, estimator: None, tracks: Vec::with_capacity(settings.features) })
+    }
+
+    /// Starts, or starts again, from a given state. There must be an inertial sample, and the state must not be before it.
+    pub fn start(&mut self, start: &Start) -> Result<(), Error> {
+        let Some(sample) = self.last else {
+            return Err(Error::TooFew { what: "inertial samples before the start", got: 0, need: 1 });
+        };
+        if start.stamp < sample.stamp {
+            return Err(Error::Late { what: "start", stamp: start.stamp, now: sample.stamp });
+        }
+        if !is_finite(&start.world_from_body) {
+            return Err(Error::NonFinite { what: "start pose", index: 0 });
+        }
+        let vectors = [start.velocity_in_body, start.gyro_bias, start.accel_bias];
+        if let Some(index) = vectors.iter().position(|v| v.iter().any(|v| !v.is_finite())) {
+            return Err(Error::NonFinite { what: "start velocity or bias", index });
+        }
+        start.sigma.check()?;
+        self.tracks.clear();
+        self.estimator = Some(Estimator::new(&self.camera, self.noise, &self.settings, start, sample));
+        Ok(())
+    }
+
+    /// Takes an inertial sample; stamps must increase.
+    pub fn imu(&mut self, sample: &Imu) -> Result<Status, Error> {
+        if !sample.is_finite() {
+            return Err(Error::NonFinite { what: "inertial sample", index: 0 });
+        }
+        if let Some(last) = &self.last
+            && sample.stamp <= last.stamp
+        {
+            return Err(Error::NotIncreasing { index: 0, previous: last.stamp, stamp: sample.stamp });
+        }
+        self.last = Some(*sample);
+        if let Some(estimator) = &mut self.estimator {
+            if estimator.history.is_full() {
+                let tracks = &mut self.tracks;
+                estimator.forget(|slot| {
+                    tracks.swap_remove(slot);
+                });
+            }
+            estimator.imu(*sample);
+        }
+        Ok(self.status())
+    }
+
+    /// Whether the estimate can be used.
+    pub fn status(&self) -> Status {
+        if self.estimator.is_some() { Status::Tracking } else { Status::Uninitialised }
+    }
+
+    /// The estimate at the time of the latest sample; `None` before the start.
+    pub fn output(&self) -> Option<Odometry> {
+        self.estimator.as_ref().map(Estimator::odometry)
+    }
+
+    /// Moves the filter to the exposure of an image; the number of landmarks lost on the way.
+    fn expose(&mut self, stamp: Stamp) -> Result<usize, Error> {
+        let Some(estimator) = &mut self.estimator else { return Ok(0) };
+        let shift = (estimator.state.time_offset * 1e9).round() as i64;
+        let time = Stamp::from_nanos(stamp.nanos().saturating_add(shift));
+        let anchor = estimator.history.anchor();
+        if time <= anchor {
+            return Err(Error::Late { what: "image", stamp: time, now: anchor });
+        }
+        if time.secs_since(estimator.history.latest().stamp) > MAX_AHEAD {
+            return Err(Error::OutOfRange { stamp: time, first: anchor, last: estimator.history.now() });
+        }
+        let before = self.tracks.len();
+        let tracks = &mut self.tracks;
+        estimator.advance(time, |slot| {
+            tracks.swap_remove(slot);
+        });
+        let elapsed = time.secs_since(anchor);
+        let walks = [self.settings.landmarks.bearing_walk, self.settings.landmarks.distance_walk];
+        let [bearing, distance] = walks.map(|walk| walk * walk * elapsed);
+        estimator.diffuse(bearing, distance);
+        Ok(before - self.tracks.len())
+    }
+}

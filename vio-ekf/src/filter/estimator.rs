@@ -1,0 +1,228 @@
+use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
+
+use super::covariance::{Covariance, Measurement};
+use super::history::History;
+use super::interval::Interval;
+use super::propagate::{Workspace, propagate};
+use super::settings::{LandmarkSettings, Settings};
+use super::start::Start;
+use super::state::{Landmark, State, at};
+use super::{Odometry, bearing::Bearing};
+use crate::{Camera, Imu, ImuNoise, Stamp};
+
+/// Most residuals of one update.
+const MAX_RESIDUALS: usize = 3;
+
+/// A landmark whose inverse distance has a smaller relative deviation tells how far away new ones may be; 0.3 as in ROVIO.
+const WELL_KNOWN: f64 = 0.3;
+/// As many are needed for their median to mean something.
+const ENOUGH_KNOWN: usize = 3;
+
+/// State and covariance at an anchor, the time of the last image, and the motion from there until now.
+///
+/// Nothing here knows what a pixel is: measurements come as residuals and derivatives.
+#[derive(Debug, Clone)]
+pub(crate) struct Estimator {
+    pub(crate) state: State,
+    pub(crate) covariance: Covariance,
+    pub(crate) history: History,
+    /// From the anchor until now.
+    since: Interval,
+    noise: ImuNoise,
+    gravity: f64,
+    /// Rate of the body at the anchor.
+    pub(crate) rate: Vector3<f64>,
+    work: Workspace,
+    delta: Vec<f64>,
+    scratch: Vec<f64>,
+}
+
+impl Estimator {
+    pub(crate) fn new(camera: &Camera, noise: ImuNoise, settings: &Settings, start: &Start, sample: Imu) -> Self {
+        let capacity = at::landmark(settings.features);
+        let state = State {
+            position: start.world_from_body.translation.vector,
+            velocity: start.velocity_in_body,
+            attitude: start.world_from_body.rotation,
+            gyro_bias: start.gyro_bias,
+            accel_bias: start.accel_bias,
+            camera_position: camera.body_from_camera.translation.vector,
+            camera_attitude: camera.body_from_camera.rotation,
+            time_offset: settings.calibration.time_offset_s,
+            landmarks: Vec::with_capacity(settings.features),
+        };
+        let mut covariance = Covariance::new(at::HEAD, capacity);
+        let (sigma, calibration) = (&start.sigma, &settings.calibration);
+        for (row, sigma) in [
+            (at::POSITION, [sigma.position; 3]),
+            (at::VELOCITY, [sigma.velocity; 3]),
+            (at::ATTITUDE, [sigma.tilt, sigma.tilt, sigma.yaw]),
+            (at::GYRO_BIAS, [sigma.gyro_bias; 3]),
+            (at::ACCEL_BIAS, [sigma.accel_bias; 3]),
+            (at::CAMERA_POSITION, [calibration.camera_position_sigma_m; 3]),
+            (at::CAMERA_ATTITUDE, [calibration.camera_attitude_sigma; 3]),
+        ] {
+            covariance.set_block3(row, &Matrix3::from_diagonal(&Vector3::from(sigma.map(|s| s * s))));
+        }
+        covariance.isolate(at::TIME_OFFSET, calibration.time_offset_sigma_s * calibration.time_offset_sigma_s);
+        Self {
+            rate: sample.gyro - state.gyro_bias,
+            history: History::new(sample, start.stamp, settings.history_samples),
+            since: Interval::default(),
+            noise,
+            gravity: settings.gravity,
+            work: Workspace::new(capacity),
+            delta: vec![0.0; capacity],
+            scratch: vec![0.0; capacity * MAX_RESIDUALS],
+            state,
+            covariance,
+        }
+    }
+
+    fn biases(&self) -> [Vector3<f64>; 2] {
+        [self.state.gyro_bias, self.state.accel_bias]
+    }
+
+    /// Takes one more sample; its stamp must be after all others.
+    pub(crate) fn imu(&mut self, sample: Imu) {
+        let biases = self.biases();
+        self.history.push(sample);
+        self.history.extend_to_latest(&mut self.since, &biases, &self.noise);
+    }
+
+    /// Moves the anchor to a later time; `dropped` is told the slots of landmarks that are lost on the way.
+    pub(crate) fn advance(&mut self, until: Stamp, dropped: impl FnMut(usize)) {
+        let interval = self.history.integrate(until, &self.biases(), &self.noise);
+        let step = interval.step(&self.state, self.gravity);
+        propagate(&mut self.state, &mut self.covariance, &step, &mut self.work, dropped);
+        self.history.advance(until);
+        self.rate = self.history.rate_at_anchor() - self.state.gyro_bias;
+    }
+
+    /// Brings the motion since the anchor up to date with a changed state or anchor.
+    pub(crate) fn replay(&mut self) {
+        let until = self.history.now();
+        self.since = self.history.integrate(until, &self.biases(), &self.noise);
+    }
+
+    /// The Kalman update of the whole state. False, and nothing changed, if the numbers do not allow it.
+    pub(crate) fn update<const M: usize, const C: usize>(&mut self, measurement: &Measurement<M, C>) -> bool {
+        if !self.covariance.update(measurement, &mut self.delta, &mut self.scratch) {
+            return false;
+        }
+        self.state.correct(&self.delta[..self.covariance.size()]);
+        true
+    }
+
+    /// Adds a landmark seen in the current image; there must be room.
+    pub(crate) fn add(&mut self, bearing: Bearing, warp: Matrix2<f64>, guess: &Guess) {
+        let landmark = Landmark { bearing, inverse_distance: guess.inverse_distance, warp };
+        let row = self.covariance.size();
+        let rate = self.tangent_rate(&landmark);
+        self.state.landmarks.push(landmark);
+        self.covariance.grow(at::LANDMARK);
+        // Seen at the true time of the exposure but entered at the assumed one: the bearing inherits the clock's error.
+        for k in 0..2 {
+            if rate[k] != 0.0 && self.covariance.variance(at::TIME_OFFSET) > 0.0 {
+                self.covariance.add_row(row + k, -rate[k], at::TIME_OFFSET);
+            }
+        }
+        for (r, c) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            self.covariance.row_mut(row + r)[row + c] += guess.bearing[(r, c)];
+        }
+        self.covariance.inflate(row + 2, guess.distance_variance);
+    }
+
+    /// Drops a landmark; the last one takes its slot.
+    pub(crate) fn remove(&mut self, slot: usize) {
+        self.state.landmarks.swap_remove(slot);
+        self.covariance.swap_remove(at::landmark(slot), at::LANDMARK);
+    }
+
+    /// Velocity of a landmark's bearing in tangent coordinates, rad/s: `Nᵀ(−ω_c − ρ μ × v_c)`.
+    pub(crate) fn tangent_rate(&self, landmark: &Landmark) -> Vector2<f64> {
+        let state = &self.state;
+        let camera_from_body = state.camera_attitude.inverse();
+        let rate = camera_from_body * self.rate;
+        let velocity = camera_from_body * (state.velocity + self.rate.cross(&state.camera_position));
+        let direction = landmark.bearing.direction();
+        landmark.bearing.basis().transpose() * (-rate - direction.cross(&velocity) * landmark.inverse_distance)
+    }
+
+    /// What to assume of a new landmark: as far away as those that are known well, if there are enough of them.
+    pub(crate) fn guess(&mut self, settings: &LandmarkSettings) -> Guess {
+        let sorted = &mut self.scratch;
+        let mut known = 0;
+        for (slot, landmark) in self.state.landmarks.iter().enumerate() {
+            let deviation = self.covariance.variance(at::landmark(slot) + 2).sqrt();
+            if deviation < WELL_KNOWN * landmark.inverse_distance {
+                sorted[known] = landmark.inverse_distance;
+                known += 1;
+            }
+        }
+        let mut inverse_distance = settings.inverse_distance;
+        if known >= ENOUGH_KNOWN {
+            let (_, median, _) = sorted[..known].select_nth_unstable_by(known / 2, f64::total_cmp);
+            inverse_distance = *median;
+        }
+        let deviation = settings.inverse_distance_sigma * inverse_distance;
+        Guess { inverse_distance, distance_variance: deviation * deviation, bearing: Matrix2::zeros() }
+    }
+
+    /// Moves the anchor into the middle of the samples, to make room for more.
+    pub(crate) fn forget(&mut self, dropped: impl FnMut(usize)) {
+        self.advance(self.history.middle(), dropped);
+        self.replay();
+    }
+
+    /// Process noise of the landmarks for the time since the image before.
+    pub(crate) fn diffuse(&mut self, bearing_variance: f64, relative_distance_variance: f64) {
+        for (slot, landmark) in self.state.landmarks.iter().enumerate() {
+            let row = at::landmark(slot);
+            self.covariance.inflate(row, bearing_variance);
+            self.covariance.inflate(row + 1, bearing_variance);
+            let scale = landmark.inverse_distance * landmark.inverse_distance;
+            self.covariance.inflate(row + 2, relative_distance_variance * scale);
+        }
+    }
+
+    /// The estimate now, with covariance.
+    pub(crate) fn odometry(&self) -> Odometry {
+        let step = self.since.step(&self.state, self.gravity);
+        let prior = self.covariance.block::<{ at::CORE }, { at::CORE }>(0, 0);
+        let noise = step.noise.fixed_view::<{ at::CORE }, { at::CORE }>(0, 0);
+        let covariance = step.transition * prior * step.transition.transpose() + noise;
+        Odometry {
+            stamp: self.history.now(),
+            world_from_body: step.end(&self.state.position, &self.state.attitude),
+            velocity_in_body: step.velocity,
+            rate_in_body: self.history.latest().gyro - self.state.gyro_bias,
+            gyro_bias: self.state.gyro_bias,
+            accel_bias: self.state.accel_bias,
+            covariance: (covariance + covariance.transpose()) * 0.5,
+        }
+    }
+}
+
+/// What is assumed of a landmark that is new.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Guess {
+    pub(crate) inverse_distance: f64,
+    pub(crate) distance_variance: f64,
+    /// Covariance of the tangent coordinates.
+    pub(crate) bearing: Matrix2<f64>,
+}
+
+/// A core covariance, in the order of [`at`].
+pub type CoreCovariance = SMatrix<f64, { at::CORE }, { at::CORE }>;
+
+/// Rows of a landmark's bearing and of the time offset.
+pub(crate) fn bearing_rows(slot: usize) -> [usize; 3] {
+    let row = at::landmark(slot);
+    [row, row + 1, at::TIME_OFFSET]
+}
+
+/// The part of a trial step that belongs to a landmark's bearing.
+pub(crate) fn bearing_part(delta: &SVector<f64, 3>) -> Vector2<f64> {
+    Vector2::new(delta[0], delta[1])
+}
