@@ -111,6 +111,16 @@ pub enum Error {
         /// End of the defined interval, included.
         last: Stamp,
     },
+    /// An image of another size than the camera's calibration.
+    #[error(
+        "the image has {given:?} pixels, the calibrated camera {expected:?}: use the calibration of this image size"
+    )]
+    ImageSize {
+        /// Width and height given.
+        given: (usize, usize),
+        /// Width and height of the camera.
+        expected: (usize, usize),
+    },
     /// A measurement belongs to a time that the filter has left behind.
     #[error(
         "{what} of {stamp} s arrives when everything up to {now} s is settled: feed in order, or keep a longer history"

@@ -2,30 +2,41 @@
 
 mod bearing;
 mod covariance;
+mod detect;
 mod estimator;
 mod history;
+mod images;
 mod interval;
 #[cfg(test)]
 mod jacobians;
+mod patch;
+#[cfg(test)]
+mod patches;
 mod points;
 mod propagate;
+mod pyramid;
 mod relative;
+mod rest;
 mod settings;
 mod start;
 mod state;
 mod update;
 
-use nalgebra::{Isometry3, SMatrix, Vector3};
+use nalgebra::{Isometry3, SMatrix, Translation3, Unit, Vector3};
 
 pub use bearing::Bearing;
 pub use estimator::CoreCovariance;
 pub use points::PointObservation;
-pub use settings::{CalibrationSettings, GateSettings, LandmarkSettings, Settings};
+pub use rest::RestSettings;
+pub use settings::{CalibrationSettings, GateSettings, LandmarkSettings, LimitSettings, PatchSettings, Settings};
 pub use start::{Start, StartSigma};
 
 use crate::trajectory::is_finite;
 use crate::{Camera, Error, Imu, ImuNoise, Stamp};
 use estimator::Estimator;
+use images::Sight;
+use patch::Patch;
+use rest::Rest;
 
 /// A camera this much ahead of the inertial samples, in seconds, is waiting for data that does not come.
 const MAX_AHEAD: f64 = 0.1;
@@ -33,10 +44,36 @@ const MAX_AHEAD: f64 = 0.1;
 /// Whether the estimate can be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
-    /// No start yet.
-    Uninitialised,
+    /// No start yet, and why.
+    Uninitialised(Waiting),
     /// Running.
     Tracking,
+    /// Given up, and why. Stays so until [`Vio::start`] or [`Vio::reset`].
+    Diverged(Excess),
+}
+
+/// What the start at rest waits for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Waiting {
+    /// A second without shaking, by the inertial samples.
+    ForSteadiness,
+    /// Images that have something to hold on to, and in which nothing moves.
+    ForStillImages,
+    /// The force read at rest is not gravity: axes, units or calibration of the accelerometer are wrong.
+    ForGravity,
+}
+
+/// Which limit of [`LimitSettings`] was exceeded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Excess {
+    /// The speed, or a number that is not finite.
+    Speed,
+    /// A bias.
+    Bias,
+    /// The uncertainty of the velocity.
+    Uncertainty,
+    /// Landmarks contradict the prediction, image after image.
+    Contradiction,
 }
 
 /// An estimate of the body's motion.
@@ -81,6 +118,8 @@ pub struct FrameReport {
     pub added: usize,
     /// Landmarks that were dropped.
     pub removed: usize,
+    /// Whether the body was taken to be at rest.
+    pub at_rest: bool,
 }
 
 /// One camera and one inertial sensor.
@@ -92,6 +131,14 @@ pub struct Vio {
     last: Option<Imu>,
     estimator: Option<Estimator>,
     tracks: Vec<Track>,
+    sight: Sight,
+    rest: Rest,
+    /// Images in a row that contradict the prediction.
+    contradictions: u32,
+    excess: Option<Excess>,
+    waiting: Waiting,
+    /// Name of the next landmark.
+    next_id: u64,
 }
 
 /// What is remembered of a landmark besides its state.
@@ -102,6 +149,8 @@ struct Track {
     misses: u32,
     /// Whether the current frame saw it.
     seen: bool,
+    /// What it looks like; none for a point of the caller's own.
+    patch: Option<Patch>,
 }
 
 impl Vio {
@@ -110,7 +159,20 @@ impl Vio {
         camera.check()?;
         noise.check()?;
         settings.check()?;
-        Ok(Self { camera, noise, settings, last: None, estimator: None, tracks: Vec::with_capacity(settings.features) })
+        Ok(Self {
+            camera,
+            noise,
+            settings,
+            last: None,
+            estimator: None,
+            tracks: Vec::with_capacity(settings.features),
+            sight: Sight::new(&camera, &settings.patches),
+            rest: Rest::new(settings.rest),
+            contradictions: 0,
+            excess: None,
+            waiting: Waiting::ForSteadiness,
+            next_id: 0,
+        })
     }
 
     /// Starts, or starts again, from a given state. There must be an inertial sample, and the state must not be before it.
@@ -129,9 +191,16 @@ impl Vio {
             return Err(Error::NonFinite { what: "start velocity or bias", index });
         }
         start.sigma.check()?;
-        self.tracks.clear();
+        self.reset();
         self.estimator = Some(Estimator::new(&self.camera, self.noise, &self.settings, start, sample));
         Ok(())
+    }
+
+    /// Forgets the estimate. The start at rest is tried from here on.
+    pub fn reset(&mut self) {
+        self.tracks.clear();
+        self.estimator = None;
+        (self.contradictions, self.excess) = (0, None);
     }
 
     /// Takes an inertial sample; stamps must increase.
@@ -145,6 +214,7 @@ impl Vio {
             return Err(Error::NotIncreasing { index: 0, previous: last.stamp, stamp: sample.stamp });
         }
         self.last = Some(*sample);
+        self.rest.imu(sample);
         if let Some(estimator) = &mut self.estimator {
             if estimator.history.is_full() {
                 let tracks = &mut self.tracks;
@@ -159,7 +229,11 @@ impl Vio {
 
     /// Whether the estimate can be used.
     pub fn status(&self) -> Status {
-        if self.estimator.is_some() { Status::Tracking } else { Status::Uninitialised }
+        match (&self.estimator, self.excess) {
+            (None, _) => Status::Uninitialised(self.waiting),
+            (Some(_), Some(excess)) => Status::Diverged(excess),
+            (Some(_), None) => Status::Tracking,
+        }
     }
 
     /// The estimate at the time of the latest sample; `None` before the start.
@@ -167,17 +241,56 @@ impl Vio {
         self.estimator.as_ref().map(Estimator::odometry)
     }
 
-    /// Moves the filter to the exposure of an image; the number of landmarks lost on the way.
-    fn expose(&mut self, stamp: Stamp) -> Result<usize, Error> {
-        let Some(estimator) = &mut self.estimator else { return Ok(0) };
+    /// Starts from the means of a rest.
+    fn start_at_rest(&mut self) -> Result<(), Error> {
+        let Some(sample) = self.last else { return Ok(()) };
+        let [rate, force] = self.rest.means();
+        self.waiting = match () {
+            () if !self.rest.is_steady(sample.stamp) => Waiting::ForSteadiness,
+            () if (force.norm() - self.settings.gravity).abs() > self.settings.rest.gravity_tolerance => {
+                Waiting::ForGravity
+            }
+            () => Waiting::ForStillImages,
+        };
+        if self.waiting != Waiting::ForStillImages || !self.rest.is_at_rest(sample.stamp) {
+            return Ok(());
+        }
+        let sigma = StartSigma { velocity: self.settings.rest.velocity_sigma, tilt: 0.1, ..StartSigma::default() };
+        // Level as far as the force tells; only its direction is used, the update below weighs it against the bias.
+        let attitude = Bearing::new(&Unit::new_normalize(force)).level();
+        self.start(&Start {
+            stamp: sample.stamp,
+            world_from_body: Isometry3::from_parts(Translation3::identity(), attitude),
+            velocity_in_body: Vector3::zeros(),
+            gyro_bias: rate,
+            accel_bias: Vector3::zeros(),
+            sigma,
+        })?;
+        if let Some(estimator) = &mut self.estimator {
+            estimator.weigh(&rate, &force, &self.settings.rest);
+        }
+        Ok(())
+    }
+
+    /// Moves the filter to the exposure of an image. `None` if there is no filter, or it was started after the exposure;
+    /// otherwise the number of landmarks lost on the way.
+    fn expose(&mut self, stamp: Stamp, at_rest: bool) -> Result<Option<usize>, Error> {
+        let Some(estimator) = &mut self.estimator else { return Ok(None) };
         let shift = (estimator.state.time_offset * 1e9).round() as i64;
         let time = Stamp::from_nanos(stamp.nanos().saturating_add(shift));
         let anchor = estimator.history.anchor();
+        if time <= anchor && estimator.history.is_new() {
+            return Ok(None);
+        }
         if time <= anchor {
             return Err(Error::Late { what: "image", stamp: time, now: anchor });
         }
         if time.secs_since(estimator.history.latest().stamp) > MAX_AHEAD {
             return Err(Error::OutOfRange { stamp: time, first: anchor, last: estimator.history.now() });
+        }
+        if at_rest {
+            estimator.stay(time, &self.rest.means(), &self.settings.rest);
+            return Ok(Some(0));
         }
         let before = self.tracks.len();
         let tracks = &mut self.tracks;
@@ -188,6 +301,25 @@ impl Vio {
         let walks = [self.settings.landmarks.bearing_walk, self.settings.landmarks.distance_walk];
         let [bearing, distance] = walks.map(|walk| walk * walk * elapsed);
         estimator.diffuse(bearing, distance);
-        Ok(before - self.tracks.len())
+        Ok(Some(before - self.tracks.len()))
+    }
+
+    /// The end of every image: the divergence test, and the motion since.
+    fn conclude(&mut self, mut report: FrameReport) -> FrameReport {
+        if let Some(estimator) = &mut self.estimator {
+            let contradicted = report.rejected >= 5 && report.rejected > report.used;
+            self.contradictions = if contradicted { self.contradictions + 1 } else { 0 };
+            let too_many = self.contradictions >= self.settings.limits.contradictions;
+            let excess = estimator.excess(&self.settings.limits);
+            self.excess = self.excess.or(excess).or(too_many.then_some(Excess::Contradiction));
+            estimator.replay();
+        }
+        report.status = self.status();
+        report
+    }
+
+    /// A report on nothing.
+    fn report(&self) -> FrameReport {
+        FrameReport { status: self.status(), used: 0, rejected: 0, added: 0, removed: 0, at_rest: false }
     }
 }

@@ -62,8 +62,8 @@ pub use eval::rpe::{PairsFrom, Rpe, RpeSettings, Span, Tolerance, rpe};
 pub use eval::stats::Stats;
 pub use eval::{Evaluation, EvaluationSettings, Segment, evaluate};
 pub use filter::{
-    Bearing, CalibrationSettings, CoreCovariance, FrameReport, GateSettings, LandmarkSettings, Odometry,
-    PointObservation, Settings, Start, StartSigma, Status, Vio,
+    Bearing, CalibrationSettings, CoreCovariance, Excess, FrameReport, GateSettings, LandmarkSettings, LimitSettings,
+    Odometry, PatchSettings, PointObservation, RestSettings, Settings, Start, StartSigma, Status, Vio, Waiting,
 };
 pub use format::{euroc, kitti, tum};
 pub use lie::{se3, so3};

@@ -51,6 +51,11 @@ impl Bearing {
         Vector2::new(-local.y, local.x) * (sine.atan2(local.z) / sine)
     }
 
+    /// The rotation by the shortest way from this direction to `e_z`.
+    pub(crate) fn level(&self) -> UnitQuaternion<f64> {
+        shortest(&self.direction(), &Vector3::z_axis())
+    }
+
     /// Turned by a rotation, and from there along the shortest way to `direction`.
     #[must_use]
     pub(crate) fn transported(&self, rotation: &UnitQuaternion<f64>, direction: &Unit<Vector3<f64>>) -> Self {

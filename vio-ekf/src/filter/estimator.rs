@@ -4,10 +4,11 @@ use super::covariance::{Covariance, Measurement};
 use super::history::History;
 use super::interval::Interval;
 use super::propagate::{Workspace, propagate};
-use super::settings::{LandmarkSettings, Settings};
+use super::rest::RestSettings;
+use super::settings::{LandmarkSettings, LimitSettings, Settings};
 use super::start::Start;
 use super::state::{Landmark, State, at};
-use super::{Odometry, bearing::Bearing};
+use super::{Excess, Odometry, bearing::Bearing};
 use crate::{Camera, Imu, ImuNoise, Stamp};
 
 /// Most residuals of one update.
@@ -99,6 +100,63 @@ impl Estimator {
         self.rate = self.history.rate_at_anchor() - self.state.gyro_bias;
     }
 
+    /// Moves the anchor to a later time without any motion: what the samples read is then bias and gravity.
+    pub(crate) fn stay(&mut self, until: Stamp, [rate, force]: &[Vector3<f64>; 2], rest: &RestSettings) {
+        let elapsed = until.secs_since(self.history.anchor());
+        let walks = [(at::GYRO_BIAS, self.noise.gyro_walk), (at::ACCEL_BIAS, self.noise.accel_walk)];
+        for (row, walk) in walks.into_iter().flat_map(|(row, walk)| (row..row + 3).map(move |row| (row, walk))) {
+            self.covariance.inflate(row, walk * walk * elapsed);
+        }
+        self.history.advance(until);
+        self.weigh(rate, force, rest);
+        // Nothing moves; what the correlations say about the velocity does not matter.
+        self.state.velocity = Vector3::zeros();
+        for row in at::VELOCITY..at::VELOCITY + 3 {
+            self.covariance.isolate(row, rest.velocity_sigma * rest.velocity_sigma);
+        }
+        self.rate = Vector3::zeros();
+    }
+
+    /// Measures biases and tilt by the mean rate and force of a body at rest.
+    pub(crate) fn weigh(&mut self, rate: &Vector3<f64>, force: &Vector3<f64>, rest: &RestSettings) {
+        let noise = Matrix3::identity() * rest.rate_sigma.powi(2);
+        let rows = [at::GYRO_BIAS, at::GYRO_BIAS + 1, at::GYRO_BIAS + 2];
+        let residual = rate - self.state.gyro_bias;
+        self.update(&Measurement { rows, residual, jacobian: Matrix3::identity(), noise });
+
+        let up = Vector3::new(0.0, 0.0, self.gravity);
+        let body_from_world = self.state.attitude.inverse();
+        let mut jacobian = SMatrix::<f64, 3, 6>::zeros();
+        // d(Rᵀ a)/dθ = Rᵀ hat(a) for the world-side error.
+        let tilt = body_from_world.to_rotation_matrix().into_inner() * up.cross_matrix();
+        jacobian.fixed_columns_mut::<3>(0).copy_from(&tilt);
+        jacobian.fixed_columns_mut::<3>(3).fill_with_identity();
+        let rows = std::array::from_fn(|k| if k < 3 { at::ATTITUDE + k } else { at::ACCEL_BIAS + k - 3 });
+        let residual = force - body_from_world * up - self.state.accel_bias;
+        let noise = Matrix3::identity() * rest.force_sigma.powi(2);
+        self.update(&Measurement { rows, residual, jacobian, noise });
+    }
+
+    /// The first of the limits that the state exceeds.
+    pub(crate) fn excess(&self, limits: &LimitSettings) -> Option<Excess> {
+        let state = &self.state;
+        let velocity = (at::VELOCITY..at::VELOCITY + 3).map(|row| self.covariance.variance(row)).fold(0.0, f64::max);
+        // Written so that NaN is beyond all limits.
+        let beyond = |value: f64, limit: f64| !(value <= limit);
+        if beyond(state.velocity.norm(), limits.speed) {
+            Some(Excess::Speed)
+        } else if beyond(state.gyro_bias.norm(), limits.gyro_bias) || beyond(state.accel_bias.norm(), limits.accel_bias)
+        {
+            Some(Excess::Bias)
+        } else if beyond(velocity, limits.velocity_sigma * limits.velocity_sigma) {
+            Some(Excess::Uncertainty)
+        } else if !state.position.norm_squared().is_finite() {
+            Some(Excess::Speed)
+        } else {
+            None
+        }
+    }
+
     /// Brings the motion since the anchor up to date with a changed state or anchor.
     pub(crate) fn replay(&mut self) {
         let until = self.history.now();
@@ -118,19 +176,34 @@ impl Estimator {
     pub(crate) fn add(&mut self, bearing: Bearing, warp: Matrix2<f64>, guess: &Guess) {
         let landmark = Landmark { bearing, inverse_distance: guess.inverse_distance, warp };
         let row = self.covariance.size();
-        let rate = self.tangent_rate(&landmark);
         self.state.landmarks.push(landmark);
         self.covariance.grow(at::LANDMARK);
-        // Seen at the true time of the exposure but entered at the assumed one: the bearing inherits the clock's error.
+        self.enter_bearing(row, &landmark, &guess.bearing);
+        self.covariance.inflate(row + 2, guess.distance_variance);
+    }
+
+    /// Makes a landmark's bearing that of another point, seen in the current image exactly where the old one is believed
+    /// to be, and as far away.
+    pub(crate) fn renew(&mut self, slot: usize, warp: Matrix2<f64>, bearing: &Matrix2<f64>) {
+        let row = at::landmark(slot);
+        self.state.landmarks[slot].warp = warp;
+        self.covariance.isolate(row, 0.0);
+        self.covariance.isolate(row + 1, 0.0);
+        self.enter_bearing(row, &self.state.landmarks[slot].clone(), bearing);
+    }
+
+    /// The covariance of a bearing that is new. Seen at the true time of the exposure but entered at the assumed one, it
+    /// inherits the clock's error.
+    fn enter_bearing(&mut self, row: usize, landmark: &Landmark, bearing: &Matrix2<f64>) {
+        let rate = self.tangent_rate(landmark);
         for k in 0..2 {
-            if rate[k] != 0.0 && self.covariance.variance(at::TIME_OFFSET) > 0.0 {
+            if self.covariance.variance(at::TIME_OFFSET) > 0.0 {
                 self.covariance.add_row(row + k, -rate[k], at::TIME_OFFSET);
             }
         }
         for (r, c) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            self.covariance.row_mut(row + r)[row + c] += guess.bearing[(r, c)];
+            self.covariance.row_mut(row + r)[row + c] += bearing[(r, c)];
         }
-        self.covariance.inflate(row + 2, guess.distance_variance);
     }
 
     /// Drops a landmark; the last one takes its slot.

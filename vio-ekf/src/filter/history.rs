@@ -12,6 +12,7 @@ pub(crate) struct History {
     samples: VecDeque<Imu>,
     capacity: usize,
     anchor: Stamp,
+    started: Stamp,
 }
 
 impl History {
@@ -19,12 +20,17 @@ impl History {
     pub(crate) fn new(sample: Imu, anchor: Stamp, capacity: usize) -> Self {
         let mut samples = VecDeque::with_capacity(capacity);
         samples.push_back(sample);
-        Self { samples, capacity, anchor }
+        Self { samples, capacity, anchor, started: anchor }
     }
 
     /// Time of the anchor.
     pub(crate) fn anchor(&self) -> Stamp {
         self.anchor
+    }
+
+    /// Whether the anchor is still where it started.
+    pub(crate) fn is_new(&self) -> bool {
+        self.anchor == self.started
     }
 
     /// The latest time that is known of: of the last sample, or of an anchor after it.

@@ -1,4 +1,4 @@
-use nalgebra::{Matrix2, Matrix2x3, Vector2};
+use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 
 use super::bearing::Bearing;
 use super::estimator::{Guess, bearing_part, bearing_rows};
@@ -25,8 +25,9 @@ impl Vio {
         if let Some(index) = points.iter().position(|p| p.pixel.iter().any(|v| !v.is_finite())) {
             return Err(Error::NonFinite { what: "point", index });
         }
-        let mut report =
-            FrameReport { status: self.status(), used: 0, rejected: 0, added: 0, removed: self.expose(stamp)? };
+        let mut report = self.report();
+        let Some(removed) = self.expose(stamp, false)? else { return Ok(report) };
+        report.removed = removed;
         let Some(estimator) = &mut self.estimator else { return Ok(report) };
         let offset = estimator.state.time_offset;
         let noise = Matrix2::identity() * self.settings.landmarks.pixel_sigma.powi(2);
@@ -42,14 +43,15 @@ impl Vio {
             let state = &estimator.state;
             let landmark = state.landmarks[slot];
             let (rate, late) = (estimator.tangent_rate(&landmark), state.time_offset - offset);
-            let measurement = iterate(&estimator.covariance, bearing_rows(slot), iteration, |delta| {
-                let bearing = landmark.bearing.boxplus(&(bearing_part(delta) + rate * (late + delta[2])));
-                let (pixel, by_bearing) = project(&self.camera, &bearing)?;
-                let mut jacobian = Matrix2x3::zeros();
-                jacobian.fixed_columns_mut::<2>(0).copy_from(&by_bearing);
-                jacobian.set_column(2, &(by_bearing * rate));
-                Some(Linearised { residual: point.pixel - pixel, jacobian, noise })
-            });
+            let measurement =
+                iterate(&estimator.covariance, bearing_rows(slot), iteration, Vector3::zeros(), |delta| {
+                    let bearing = landmark.bearing.boxplus(&(bearing_part(delta) + rate * (late + delta[2])));
+                    let (pixel, by_bearing) = project(&self.camera, &bearing)?;
+                    let mut jacobian = Matrix2x3::zeros();
+                    jacobian.fixed_columns_mut::<2>(0).copy_from(&by_bearing);
+                    jacobian.set_column(2, &(by_bearing * rate));
+                    Some(Linearised { residual: point.pixel - pixel, jacobian, noise })
+                });
             let gate = self.settings.gates.mahalanobis;
             let fits = |m| mahalanobis(&estimator.covariance, m).is_some_and(|d| d <= gate);
             match measurement {
@@ -86,11 +88,10 @@ impl Vio {
             let Some(warp) = by_bearing.try_inverse() else { continue };
             let covariance = warp * noise * warp.transpose();
             estimator.add(bearing, warp, &Guess { bearing: covariance, ..guess });
-            self.tracks.push(Track { id: point.id, misses: 0, seen: true });
+            self.tracks.push(Track { id: point.id, misses: 0, seen: true, patch: None });
             report.added += 1;
         }
-        estimator.replay();
-        Ok(report)
+        Ok(self.conclude(report))
     }
 }
 

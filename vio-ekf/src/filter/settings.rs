@@ -1,3 +1,4 @@
+use super::rest::RestSettings;
 use crate::Error;
 use crate::error::{all_not_negative, invalid};
 
@@ -13,6 +14,12 @@ pub struct Settings {
     pub calibration: CalibrationSettings,
     /// What is assumed of landmarks.
     pub landmarks: LandmarkSettings,
+    /// How images are read.
+    pub patches: PatchSettings,
+    /// When the body is taken to be at rest.
+    pub rest: RestSettings,
+    /// When the estimate is given up.
+    pub limits: LimitSettings,
     /// When measurements are believed.
     pub gates: GateSettings,
     /// Inertial samples that are kept for measurements that arrive late; ours: 256, which is 1.3 s at 200 Hz.
@@ -26,6 +33,9 @@ impl Default for Settings {
             gravity: 9.81,
             calibration: CalibrationSettings::default(),
             landmarks: LandmarkSettings::default(),
+            patches: PatchSettings::default(),
+            rest: RestSettings::default(),
+            limits: LimitSettings::default(),
             gates: GateSettings::default(),
             history_samples: 256,
         }
@@ -74,6 +84,49 @@ impl Default for LandmarkSettings {
     }
 }
 
+/// How images are read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct PatchSettings {
+    /// The finest of the two pyramid levels that patches are made of; 1 as in ROVIO.
+    pub first_level: usize,
+    /// Least standard deviation of a pixel's difference, grey levels; what a comparison leaves unexplained may raise it.
+    pub grey_sigma: f64,
+    /// Standard deviation of a patch's position that no pixel noise explains, pixels: interpolation, slanted surfaces; ours.
+    pub pixel_sigma: f64,
+    /// Largest share of a patch's contrast (in squares) that may be left unexplained; ours.
+    pub unexplained: f64,
+    /// Threshold of the corner test, grey levels; 5 as in ROVIO.
+    pub corner_threshold: u8,
+    /// Least smaller eigenvalue of a new patch's information, (grey level/pixel)² per pixel; ours.
+    pub score: f64,
+    /// New landmarks are sought when fewer than this share of the slots is in use; 0.8 as in ROVIO.
+    pub refill: f64,
+    /// Least distance of a new landmark from all others, pixels; ours.
+    pub nearest: f64,
+    /// Distance beyond which other landmarks no longer make a place less attractive, pixels; 100 as in ROVIO.
+    pub farthest: f64,
+    /// A patch is taken anew when it is seen larger or smaller by this factor in area; ours.
+    pub rescale: f64,
+}
+
+impl Default for PatchSettings {
+    fn default() -> Self {
+        Self {
+            first_level: 1,
+            grey_sigma: 2.0,
+            pixel_sigma: 0.1,
+            unexplained: 0.4,
+            corner_threshold: 5,
+            score: 0.5,
+            refill: 0.8,
+            nearest: 20.0,
+            farthest: 100.0,
+            rescale: 2.0,
+        }
+    }
+}
+
 /// When a measurement is believed, and how it is iterated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
@@ -89,6 +142,28 @@ pub struct GateSettings {
 impl Default for GateSettings {
     fn default() -> Self {
         Self { mahalanobis: 9.21, iterations: 20, misses: 5 }
+    }
+}
+
+/// The divergence test: the estimate is given up when any of these is exceeded. All ours.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct LimitSettings {
+    /// Speed, m/s.
+    pub speed: f64,
+    /// Standard deviation of the velocity along its worst axis, m/s: dead reckoning has lasted too long.
+    pub velocity_sigma: f64,
+    /// Bias of the gyroscope, rad/s.
+    pub gyro_bias: f64,
+    /// Bias of the accelerometer, m/s².
+    pub accel_bias: f64,
+    /// Images in a row in which most of at least five landmarks contradict the prediction.
+    pub contradictions: u32,
+}
+
+impl Default for LimitSettings {
+    fn default() -> Self {
+        Self { speed: 30.0, velocity_sigma: 1.0, gyro_bias: 0.5, accel_bias: 3.0, contradictions: 10 }
     }
 }
 
@@ -113,10 +188,19 @@ impl Settings {
             ("inverse_distance_sigma", self.landmarks.inverse_distance_sigma),
             ("pixel_sigma", self.landmarks.pixel_sigma),
             ("mahalanobis", self.gates.mahalanobis),
+            ("grey_sigma", self.patches.grey_sigma),
+            ("unexplained", self.patches.unexplained),
+            ("farthest", self.patches.farthest),
         ] {
             if !(value > 0.0 && value.is_finite()) {
                 return Err(invalid(name, value, "must be positive"));
             }
+        }
+        if self.patches.first_level > 4 {
+            return Err(invalid("first_level", self.patches.first_level as f64, "must be at most 4"));
+        }
+        if !(self.patches.rescale > 1.0) {
+            return Err(invalid("rescale", self.patches.rescale, "must be above 1"));
         }
         if self.gates.iterations == 0 {
             return Err(invalid("iterations", 0.0, "must be at least 1"));
@@ -125,6 +209,10 @@ impl Settings {
             ("camera_position_sigma_m", self.calibration.camera_position_sigma_m),
             ("camera_attitude_sigma", self.calibration.camera_attitude_sigma),
             ("time_offset_sigma_s", self.calibration.time_offset_sigma_s),
+            ("pixel_sigma", self.patches.pixel_sigma),
+            ("score", self.patches.score),
+            ("refill", self.patches.refill),
+            ("nearest", self.patches.nearest),
             ("bearing_walk", self.landmarks.bearing_walk),
             ("distance_walk", self.landmarks.distance_walk),
         ])

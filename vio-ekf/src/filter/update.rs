@@ -25,16 +25,17 @@ pub(crate) struct Iteration {
 /// The iterated Kalman update of Bell and Cathey 1993, reduced to the rows that the measurement depends on.
 ///
 /// With `H`, `y` at the trial `δ` the next trial is `P Hᵀ (H P Hᵀ + S)⁻¹ (y + H δ)`: Gauss-Newton on the posterior cost.
-/// The prior `P` is the same in all iterations. What is returned is the measurement to update with, its residual moved back
+/// The prior `P` is the same in all iterations, wherever the `first` trial is. What is returned is the measurement to update with, its residual moved back
 /// to `δ = 0`; the whole state and covariance are touched once, by that update. `None` if some linearisation fails.
 pub(crate) fn iterate<const M: usize, const C: usize>(
     covariance: &Covariance,
     rows: [usize; C],
     iteration: Iteration,
+    first: SVector<f64, C>,
     mut linearise: impl FnMut(&SVector<f64, C>) -> Option<Linearised<M, C>>,
 ) -> Option<Measurement<M, C>> {
     let prior = covariance.among(&rows);
-    let mut delta = SVector::<f64, C>::zeros();
+    let mut delta = first;
     for left in (0..iteration.limit.max(1)).rev() {
         let Linearised { residual, jacobian, noise } = linearise(&delta)?;
         let measurement = Measurement { rows, residual: residual + jacobian * delta, jacobian, noise };
