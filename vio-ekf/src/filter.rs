@@ -133,6 +133,10 @@ pub struct Vio {
     tracks: Vec<Track>,
     sight: Sight,
     rest: Rest,
+    /// Whether the image before was taken at rest.
+    rested: bool,
+    /// Angle that a rest may hide, rad.
+    unnoticed: f64,
     /// Images in a row that contradict the prediction.
     contradictions: u32,
     excess: Option<Excess>,
@@ -168,6 +172,8 @@ impl Vio {
             tracks: Vec::with_capacity(settings.features),
             sight: Sight::new(&camera, &settings.patches),
             rest: Rest::new(settings.rest),
+            rested: false,
+            unnoticed: 0.5 * settings.rest.pixels / camera.fx.min(camera.fy),
             contradictions: 0,
             excess: None,
             waiting: Waiting::ForSteadiness,
@@ -244,10 +250,10 @@ impl Vio {
     /// Starts from the means of a rest.
     fn start_at_rest(&mut self) -> Result<(), Error> {
         let Some(sample) = self.last else { return Ok(()) };
-        let [rate, force] = self.rest.means();
+        let off = |force: Vector3<f64>| (force.norm() - self.settings.gravity).abs();
         self.waiting = match () {
             () if !self.rest.is_steady(sample.stamp) => Waiting::ForSteadiness,
-            () if (force.norm() - self.settings.gravity).abs() > self.settings.rest.gravity_tolerance => {
+            () if self.rest.force().is_some_and(|force| off(force) > self.settings.rest.gravity_tolerance) => {
                 Waiting::ForGravity
             }
             () => Waiting::ForStillImages,
@@ -255,19 +261,20 @@ impl Vio {
         if self.waiting != Waiting::ForStillImages || !self.rest.is_at_rest(sample.stamp) {
             return Ok(());
         }
+        let Some(window) = self.rest.take_window() else { return Ok(()) };
         let sigma = StartSigma { velocity: self.settings.rest.velocity_sigma, tilt: 0.1, ..StartSigma::default() };
         // Level as far as the force tells; only its direction is used, the update below weighs it against the bias.
-        let attitude = Bearing::new(&Unit::new_normalize(force)).level();
+        let attitude = Bearing::new(&Unit::new_normalize(window.force)).level();
         self.start(&Start {
             stamp: sample.stamp,
             world_from_body: Isometry3::from_parts(Translation3::identity(), attitude),
             velocity_in_body: Vector3::zeros(),
-            gyro_bias: rate,
+            gyro_bias: window.rate,
             accel_bias: Vector3::zeros(),
             sigma,
         })?;
         if let Some(estimator) = &mut self.estimator {
-            estimator.weigh(&rate, &force, &self.settings.rest);
+            estimator.weigh(&window, self.unnoticed, &self.settings.rest);
         }
         Ok(())
     }
@@ -289,9 +296,18 @@ impl Vio {
             return Err(Error::OutOfRange { stamp: time, first: anchor, last: estimator.history.now() });
         }
         if at_rest {
-            estimator.stay(time, &self.rest.means(), &self.settings.rest);
+            estimator.stay(time, &self.settings.rest);
+            if !self.rested {
+                let guess = estimator.guess(&self.settings.landmarks);
+                estimator.loosen(self.unnoticed, &guess);
+            }
+            if let Some(window) = self.rest.take_window() {
+                estimator.weigh(&window, self.unnoticed, &self.settings.rest);
+            }
+            self.rested = true;
             return Ok(Some(0));
         }
+        self.rested = false;
         let before = self.tracks.len();
         let tracks = &mut self.tracks;
         estimator.advance(time, |slot| {

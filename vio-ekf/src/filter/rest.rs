@@ -16,18 +16,18 @@ const ENOUGH: usize = 5;
 pub struct RestSettings {
     /// Least time without motion, s; 1 as in ROVIO. Infinite to switch all of it off.
     pub duration_s: f64,
-    /// Largest departure of a rate from the mean since the rest began, rad/s; 0.1, ROVIO's limit of the rate itself.
+    /// Largest departure of a rate from the first one since the rest began, rad/s; 0.1, ROVIO's limit of the rate itself.
     pub rate: f64,
-    /// Largest departure of a specific force from that mean, m/s²; 0.5 as in ROVIO.
+    /// Largest departure of a specific force from the first one, m/s²; 0.5 as in ROVIO.
     pub force: f64,
-    /// Largest motion of the image since the rest began, pixels; 1 as in ROVIO.
+    /// Largest motion of the image since the rest began, pixels; ours. Half of it is taken as the standard deviation of what
+    /// goes unnoticed, in the pose and in the mean rate.
     pub pixels: f64,
     /// Velocity that may go unnoticed, m/s per axis; ours.
     pub velocity_sigma: f64,
-    /// Uncertainty of the mean force at rest that no white noise explains, m/s²: vibration; ours.
+    /// Uncertainty of the mean force over [`duration_s`](Self::duration_s) that no white noise explains, m/s²: vibration,
+    /// and motion that goes unnoticed; ours.
     pub force_sigma: f64,
-    /// The same of the mean rate, rad/s; ours.
-    pub rate_sigma: f64,
     /// Largest difference between the mean force at rest and gravity, m/s²; ours. More means wrong axes or units.
     pub gravity_tolerance: f64,
 }
@@ -36,14 +36,37 @@ impl Default for RestSettings {
     fn default() -> Self {
         Self {
             duration_s: 1.0,
-            rate: 0.1,
+            rate: 0.05,
             force: 0.5,
-            pixels: 1.0,
+            pixels: 0.5,
             velocity_sigma: 0.01,
-            force_sigma: 0.01,
-            rate_sigma: 1e-4,
+            force_sigma: 0.02,
             gravity_tolerance: 0.6,
         }
+    }
+}
+
+/// Means over a part of a rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Window {
+    since: Stamp,
+    count: u32,
+    pub(crate) rate: Vector3<f64>,
+    pub(crate) force: Vector3<f64>,
+    /// Length, s.
+    pub(crate) duration: f64,
+}
+
+impl Window {
+    fn new(sample: &Imu) -> Self {
+        Self { since: sample.stamp, count: 1, rate: sample.gyro, force: sample.accel, duration: 0.0 }
+    }
+
+    fn add(&mut self, sample: &Imu) {
+        self.count += 1;
+        self.duration = sample.stamp.secs_since(self.since);
+        self.rate += (sample.gyro - self.rate) / f64::from(self.count);
+        self.force += (sample.accel - self.force) / f64::from(self.count);
     }
 }
 
@@ -51,36 +74,35 @@ impl Default for RestSettings {
 #[derive(Debug, Clone)]
 pub(crate) struct Rest {
     settings: RestSettings,
-    since: Option<Stamp>,
-    count: u32,
-    rate: Vector3<f64>,
-    force: Vector3<f64>,
+    /// The first sample of this rest.
+    first: Option<Imu>,
+    /// Means that have not been used yet. Each sample is used once.
+    window: Option<Window>,
     watched: Vec<(Vector2<f64>, Patch)>,
     still: bool,
 }
 
 impl Rest {
     pub(crate) fn new(settings: RestSettings) -> Self {
-        let (zero, watched) = (Vector3::zeros(), Vec::with_capacity(WATCHED));
-        Self { settings, since: None, count: 0, rate: zero, force: zero, watched, still: false }
+        Self { settings, first: None, window: None, watched: Vec::with_capacity(WATCHED), still: false }
     }
 
-    /// Takes a sample; one that departs from the mean begins a new rest.
+    /// Takes a sample; one that departs from the first begins a new rest.
     pub(crate) fn imu(&mut self, sample: &Imu) {
-        let departs = (sample.gyro - self.rate).amax() > self.settings.rate
-            || (sample.accel - self.force).amax() > self.settings.force;
-        if self.since.is_none() || departs {
-            self.since = Some(sample.stamp);
-            (self.count, self.rate, self.force) = (1, sample.gyro, sample.accel);
+        let same = |first: &Imu| {
+            (sample.gyro - first.gyro).amax() <= self.settings.rate
+                && (sample.accel - first.accel).amax() <= self.settings.force
+        };
+        if !self.first.as_ref().is_some_and(same) {
+            self.first = Some(*sample);
+            self.window = None;
             self.watched.clear();
             self.still = false;
-            return;
         }
-        self.count += 1;
-        // A long rest forgets slowly, so that the biases may walk.
-        let weight = 1.0 / f64::from(self.count.min(MEMORY));
-        self.rate += (sample.gyro - self.rate) * weight;
-        self.force += (sample.accel - self.force) * weight;
+        match &mut self.window {
+            Some(window) => window.add(sample),
+            None => self.window = Some(Window::new(sample)),
+        }
     }
 
     /// Compares an image with the first one of this rest.
@@ -104,7 +126,7 @@ impl Rest {
         self.still = 2 * count > self.watched.len();
         if !self.still {
             // From here on something else is seen: the rest, if it is one, begins anew.
-            self.since = None;
+            self.first = None;
         }
     }
 
@@ -115,14 +137,16 @@ impl Rest {
 
     /// Whether the inertial samples alone would allow a rest of the needed length.
     pub(crate) fn is_steady(&self, now: Stamp) -> bool {
-        self.since.is_some_and(|since| now.secs_since(since) >= self.settings.duration_s)
+        self.first.is_some_and(|first| now.secs_since(first.stamp) >= self.settings.duration_s)
     }
 
-    /// Mean rate and specific force since the rest began.
-    pub(crate) fn means(&self) -> [Vector3<f64>; 2] {
-        [self.rate, self.force]
+    /// The means since they were last taken, over at least the duration of the settings.
+    pub(crate) fn take_window(&mut self) -> Option<Window> {
+        self.window.take_if(|window| window.duration >= self.settings.duration_s)
+    }
+
+    /// Mean specific force that has not been used yet.
+    pub(crate) fn force(&self) -> Option<Vector3<f64>> {
+        self.window.map(|window| window.force)
     }
 }
-
-/// Samples that the means look back.
-const MEMORY: u32 = 400;
