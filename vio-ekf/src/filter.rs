@@ -37,6 +37,7 @@ use estimator::Estimator;
 use images::Sight;
 use patch::Patch;
 use rest::Rest;
+use state::at;
 
 /// A camera this much ahead of the inertial samples, in seconds, is waiting for data that does not come.
 const MAX_AHEAD: f64 = 0.1;
@@ -103,6 +104,17 @@ impl Odometry {
         let world: SMatrix<f64, 3, 3> = self.covariance.fixed_view::<3, 3>(6, 6).into_owned();
         rotation.transpose() * world * rotation
     }
+}
+
+/// The camera's calibration as the filter sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Calibration {
+    /// Pose of the camera on the body.
+    pub body_from_camera: Isometry3<f64>,
+    /// Seconds to add to the camera's stamps to get the inertial sensor's time.
+    pub time_offset_s: f64,
+    /// Of the errors of, in this order: position (m), attitude as a rotation vector in **body** axes (rad), time offset (s).
+    pub covariance: SMatrix<f64, 7, 7>,
 }
 
 /// What one image, or one set of points, did.
@@ -277,6 +289,18 @@ impl Vio {
             estimator.weigh(&window, self.unnoticed, &self.settings.rest);
         }
         Ok(())
+    }
+
+    /// The camera's calibration at the last image; `None` before the start.
+    pub fn calibration(&self) -> Option<Calibration> {
+        self.estimator.as_ref().map(|estimator| Calibration {
+            body_from_camera: Isometry3::from_parts(
+                Translation3::from(estimator.state.camera_position),
+                estimator.state.camera_attitude,
+            ),
+            time_offset_s: estimator.state.time_offset,
+            covariance: estimator.covariance.block(at::CAMERA_POSITION, at::CAMERA_POSITION),
+        })
     }
 
     /// Moves the filter to the exposure of an image. `None` if there is no filter, or it was started after the exposure;

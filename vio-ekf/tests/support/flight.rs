@@ -79,7 +79,7 @@ pub(crate) struct Flight {
     pub(crate) points: Vec<Vector3<f64>>,
     pub(crate) noise: ImuNoise,
     pub(crate) pixel_sigma: f64,
-    /// Seconds that the camera's stamps lag: the stamp is the true time minus this.
+    /// Nanoseconds that the camera's stamps lag: the stamp is the true time minus this.
     pub(crate) time_offset: i64,
     pub(crate) biases: [Vector3<f64>; 2],
     pub(crate) rng: Rng,
@@ -165,9 +165,20 @@ impl Flight {
         &mut self,
         settings: Settings,
         start: &Start,
+        each: impl FnMut(&Odometry, &Motion, &[Vector3<f64>; 2]),
+    ) -> Result<Vio, Error> {
+        self.run_with(self.camera, settings, start, each)
+    }
+
+    /// The same with a camera that is not quite the one that took the pictures.
+    pub(crate) fn run_with(
+        &mut self,
+        assumed: Camera,
+        settings: Settings,
+        start: &Start,
         mut each: impl FnMut(&Odometry, &Motion, &[Vector3<f64>; 2]),
     ) -> Result<Vio, Error> {
-        let mut vio = Vio::new(self.camera, self.noise, settings)?;
+        let mut vio = Vio::new(assumed, self.noise, settings)?;
         for (k, stamp) in self.stamps().enumerate() {
             let sample = self.imu(stamp);
             vio.imu(&sample)?;
