@@ -1,10 +1,10 @@
 use nalgebra::Vector2;
 
-use super::patch::Patch;
+use super::patch::{LEVELS, Patch};
 use super::pyramid::{Level, Pyramid};
 
 /// Corners are thinned to one per square of this many pixels of the level they are found on.
-const CELL: usize = 8;
+const CELL: usize = 6;
 /// Radius of the circle of the corner test.
 const RADIUS: usize = 3;
 /// Offsets of that circle, clockwise from the top.
@@ -40,7 +40,6 @@ pub(crate) struct Detector {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Candidate {
     pixel: Vector2<f64>,
-    patch: Patch,
     quality: f64,
     /// Squared distance to the nearest landmark, pixels.
     distance: f64,
@@ -65,14 +64,14 @@ impl Detector {
         Self { cells: vec![(0, 0, 0); cells], candidates: Vec::with_capacity(cells), offsets, threshold }
     }
 
-    /// Finds corners on the finest level used, and scores them; those near `present` pixels are left out.
+    /// Finds corners on the coarsest level used, where they are few and large, and scores them on all; those near `present` pixels are left out.
     pub(crate) fn detect(
         &mut self,
         pyramid: &Pyramid,
         present: impl Iterator<Item = Vector2<f64>> + Clone,
         demands: &Demands,
     ) {
-        let level = &pyramid.used()[0];
+        let level = &pyramid.used()[LEVELS - 1];
         self.corners(level);
         self.candidates.clear();
         for &(strength, x, y) in &self.cells {
@@ -87,25 +86,25 @@ impl Detector {
             let Some(patch) = Patch::take(pyramid, &pixel) else { continue };
             let score = patch.score();
             if score >= demands.score {
-                self.candidates.push(Candidate { pixel, patch, quality: score.sqrt().sqrt(), distance });
+                self.candidates.push(Candidate { pixel, quality: score.sqrt().sqrt(), distance });
             }
         }
     }
 
     /// The best place left: a good patch, far from all landmarks. Each is given once.
-    pub(crate) fn pick(&mut self, demands: &Demands) -> Option<(Vector2<f64>, Patch)> {
+    pub(crate) fn pick(&mut self, demands: &Demands) -> Option<Vector2<f64>> {
         let far = demands.farthest * demands.farthest;
         let value = |c: &Candidate| c.quality * (c.distance / far).min(1.0);
         // The first of equals, so that the order does not depend on how they are compared.
         let best = (0..self.candidates.len())
             .reduce(|best, k| if value(&self.candidates[k]) > value(&self.candidates[best]) { k } else { best })?;
-        let Candidate { pixel, patch, .. } = self.candidates[best];
+        let pixel = self.candidates[best].pixel;
         let near = demands.nearest * demands.nearest;
         self.candidates.retain_mut(|c| {
             c.distance = c.distance.min((c.pixel - pixel).norm_squared());
             c.distance >= near && c.pixel != pixel
         });
-        Some((pixel, patch))
+        Some(pixel)
     }
 
     /// The corner test of Rosten and Drummond 2006: nine in a row of the circle all brighter, or all darker.

@@ -31,7 +31,7 @@ pub(crate) struct Sight {
 impl Sight {
     pub(crate) fn new(camera: &Camera, settings: &PatchSettings) -> Self {
         let pyramid = Pyramid::new(camera.width, camera.height, settings.first_level, LEVELS);
-        let detector = Detector::new(&pyramid.used()[0], settings.corner_threshold);
+        let detector = Detector::new(&pyramid.used()[LEVELS - 1], settings.corner_threshold);
         Self { pyramid, detector }
     }
 }
@@ -134,7 +134,8 @@ impl Vio {
         let guess = estimator.guess(&self.settings.landmarks);
         let before = self.tracks.len();
         while self.tracks.len() < self.settings.features {
-            let Some((pixel, patch)) = detector.pick(&demands) else { break };
+            let Some(pixel) = detector.pick(&demands) else { break };
+            let Some(patch) = Patch::take(pyramid, &pixel) else { continue };
             let Some(direction) = camera.bearing(&pixel) else { continue };
             let bearing = Bearing::new(&direction);
             let Some((_, by_bearing)) = project(camera, &bearing) else { continue };

@@ -148,12 +148,12 @@ fn corners_are_found_where_they_are() {
         }
     }
     let pyramid = pyramid(&data);
-    let mut detector = Detector::new(&pyramid.used()[0], 10);
+    let mut detector = Detector::new(&pyramid.used()[LEVELS - 1], 10);
     let demands = Demands { score: 1.0, nearest: 5.0, farthest: 20.0 };
     let taken = Vector2::new(30.0, 30.0);
     detector.detect(&pyramid, std::iter::once(taken), &demands);
     let mut found: Vec<Vector2<f64>> = Vec::new();
-    while let Some((pixel, _)) = detector.pick(&demands) {
+    while let Some(pixel) = detector.pick(&demands) {
         let corners = squares.iter().flat_map(|&(x, y)| {
             [(x, y), (x + 15, y), (x, y + 15), (x + 15, y + 15)].map(|(x, y)| Vector2::new(x as f64, y as f64))
         });
