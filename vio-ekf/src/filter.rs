@@ -337,10 +337,6 @@ impl Vio {
         estimator.advance(time, |slot| {
             tracks.swap_remove(slot);
         });
-        let elapsed = time.secs_since(anchor);
-        let walks = [self.settings.landmarks.bearing_walk, self.settings.landmarks.distance_walk];
-        let [bearing, distance] = walks.map(|walk| walk * walk * elapsed);
-        estimator.diffuse(bearing, distance);
         Ok(Some(before - self.tracks.len()))
     }
 

@@ -1,10 +1,12 @@
 use nalgebra::Vector2;
 
-use super::patch::{LEVELS, Patch};
+use super::patch::Patch;
 use super::pyramid::{Level, Pyramid};
 
 /// Corners are thinned to one per square of this many pixels of the level they are found on.
 const CELL: usize = 6;
+/// Pixels by which a corner is moved to see whether its patch gets better.
+const REFINE: f64 = 3.0;
 /// Radius of the circle of the corner test.
 const RADIUS: usize = 3;
 /// Offsets of that circle, clockwise from the top.
@@ -64,14 +66,14 @@ impl Detector {
         Self { cells: vec![(0, 0, 0); cells], candidates: Vec::with_capacity(cells), offsets, threshold }
     }
 
-    /// Finds corners on the coarsest level used, where they are few and large, and scores them on all; those near `present` pixels are left out.
+    /// Finds corners and scores the patches around them; those near `present` pixels are left out.
     pub(crate) fn detect(
         &mut self,
         pyramid: &Pyramid,
         present: impl Iterator<Item = Vector2<f64>> + Clone,
         demands: &Demands,
     ) {
-        let level = &pyramid.used()[LEVELS - 1];
+        let level = pyramid.corners();
         self.corners(level);
         self.candidates.clear();
         for &(strength, x, y) in &self.cells {
@@ -83,28 +85,33 @@ impl Detector {
             if distance < demands.nearest * demands.nearest {
                 continue;
             }
-            let Some(patch) = Patch::take(pyramid, &pixel) else { continue };
-            let score = patch.score();
-            if score >= demands.score {
-                self.candidates.push(Candidate { pixel, quality: score.sqrt().sqrt(), distance });
-            }
+            // A clean corner may be out of sight of the finer level's patch until it is approached.
+            let score = Patch::take(pyramid, &pixel).map(|patch| patch.score());
+            let Some(score) = score.or_else(|| sharpest(pyramid, &pixel).map(|best| best.0)) else { continue };
+            self.candidates.push(Candidate { pixel, quality: score.max(0.0).sqrt().sqrt(), distance });
         }
     }
 
-    /// The best place left: a good patch, far from all landmarks. Each is given once.
-    pub(crate) fn pick(&mut self, demands: &Demands) -> Option<Vector2<f64>> {
+    /// The best place left, and its patch: a good one, far from all landmarks. Each is given once.
+    pub(crate) fn pick(&mut self, pyramid: &Pyramid, demands: &Demands) -> Option<(Vector2<f64>, Patch)> {
         let far = demands.farthest * demands.farthest;
-        let value = |c: &Candidate| c.quality * (c.distance / far).min(1.0);
-        // The first of equals, so that the order does not depend on how they are compared.
-        let best = (0..self.candidates.len())
-            .reduce(|best, k| if value(&self.candidates[k]) > value(&self.candidates[best]) { k } else { best })?;
-        let pixel = self.candidates[best].pixel;
         let near = demands.nearest * demands.nearest;
-        self.candidates.retain_mut(|c| {
-            c.distance = c.distance.min((c.pixel - pixel).norm_squared());
-            c.distance >= near && c.pixel != pixel
-        });
-        Some(pixel)
+        let value = |c: &Candidate| c.quality * (c.distance / far).min(1.0);
+        loop {
+            // The first of equals, so that the order does not depend on how they are compared.
+            let best = (0..self.candidates.len())
+                .reduce(|best, k| if value(&self.candidates[k]) > value(&self.candidates[best]) { k } else { best })?;
+            let pixel = self.candidates.swap_remove(best).pixel;
+            let Some((score, pixel, patch)) = sharpest(pyramid, &pixel) else { continue };
+            if score < demands.score {
+                continue;
+            }
+            self.candidates.retain_mut(|c| {
+                c.distance = c.distance.min((c.pixel - pixel).norm_squared());
+                c.distance >= near
+            });
+            return Some((pixel, patch));
+        }
     }
 
     /// The corner test of Rosten and Drummond 2006: nine in a row of the circle all brighter, or all darker.
@@ -146,6 +153,16 @@ impl Detector {
             }
         }
     }
+}
+
+/// The best patch about a corner, which is known to a pixel of a coarse level only, with its score.
+fn sharpest(pyramid: &Pyramid, corner: &Vector2<f64>) -> Option<(f64, Vector2<f64>, Patch)> {
+    let offsets = (-1..=1).flat_map(|y| (-1..=1).map(move |x| Vector2::new(f64::from(x), f64::from(y)) * REFINE));
+    let patches = offsets.filter_map(|offset| {
+        let pixel = corner + offset;
+        Patch::take(pyramid, &pixel).map(|patch| (patch.score(), pixel, patch))
+    });
+    patches.reduce(|best, other| if other.0 > best.0 { other } else { best })
 }
 
 /// Whether nine neighbours on a ring of sixteen bits are set.

@@ -119,7 +119,7 @@ impl Estimator {
     /// Admits a small motion, an angle, that went unnoticed before the body was found to be at rest.
     pub(crate) fn loosen(&mut self, angle: f64, guess: &Guess) {
         let variance = angle * angle;
-        self.diffuse(variance, 0.0);
+        self.diffuse(variance);
         for axis in 0..3 {
             self.covariance.inflate(at::ATTITUDE + axis, variance);
             self.covariance.inflate(at::POSITION + axis, variance / guess.inverse_distance.powi(2));
@@ -258,14 +258,11 @@ impl Estimator {
         self.replay();
     }
 
-    /// Process noise of the landmarks for the time since the image before.
-    pub(crate) fn diffuse(&mut self, bearing_variance: f64, relative_distance_variance: f64) {
-        for (slot, landmark) in self.state.landmarks.iter().enumerate() {
-            let row = at::landmark(slot);
-            self.covariance.inflate(row, bearing_variance);
-            self.covariance.inflate(row + 1, bearing_variance);
-            let scale = landmark.inverse_distance * landmark.inverse_distance;
-            self.covariance.inflate(row + 2, relative_distance_variance * scale);
+    /// Lets all bearings become less certain, rad² per axis.
+    pub(crate) fn diffuse(&mut self, variance: f64) {
+        for row in (at::HEAD..self.covariance.size()).step_by(at::LANDMARK) {
+            self.covariance.inflate(row, variance);
+            self.covariance.inflate(row + 1, variance);
         }
     }
 

@@ -31,7 +31,7 @@ pub(crate) struct Sight {
 impl Sight {
     pub(crate) fn new(camera: &Camera, settings: &PatchSettings) -> Self {
         let pyramid = Pyramid::new(camera.width, camera.height, settings.first_level, LEVELS);
-        let detector = Detector::new(&pyramid.used()[LEVELS - 1], settings.corner_threshold);
+        let detector = Detector::new(pyramid.corners(), settings.corner_threshold);
         Self { pyramid, detector }
     }
 }
@@ -70,10 +70,12 @@ impl Vio {
         }
         let at_rest = self.rest.is_at_rest(now);
         let mut report = FrameReport { at_rest, ..self.report() };
+        let before = self.anchor();
         let Some(removed) = self.expose(stamp, at_rest)? else { return Ok(report) };
         report.removed = removed;
         if !at_rest {
-            self.follow(&mut report);
+            let elapsed = before.zip(self.anchor()).map_or(0.0, |(before, now)| now.secs_since(before));
+            self.follow(&mut report, elapsed);
         }
         if (self.tracks.len() as f64) < self.settings.patches.refill * self.settings.features as f64 {
             report.added = self.refill();
@@ -81,9 +83,16 @@ impl Vio {
         Ok(self.conclude(report))
     }
 
+    /// Time of the last image.
+    fn anchor(&self) -> Option<Stamp> {
+        self.estimator.as_ref().map(|estimator| estimator.history.anchor())
+    }
+
     /// Looks for all landmarks and updates with what is found.
-    fn follow(&mut self, report: &mut FrameReport) {
+    fn follow(&mut self, report: &mut FrameReport, elapsed: f64) {
         let Some(estimator) = &mut self.estimator else { return };
+        let drift = self.settings.patches.drift / self.camera.fx.min(self.camera.fy);
+        estimator.diffuse(drift * drift * elapsed);
         let pyramid = &self.sight.pyramid;
         let offset = estimator.state.time_offset;
 
@@ -134,8 +143,7 @@ impl Vio {
         let guess = estimator.guess(&self.settings.landmarks);
         let before = self.tracks.len();
         while self.tracks.len() < self.settings.features {
-            let Some(pixel) = detector.pick(&demands) else { break };
-            let Some(patch) = Patch::take(pyramid, &pixel) else { continue };
+            let Some((pixel, patch)) = detector.pick(pyramid, &demands) else { break };
             let Some(direction) = camera.bearing(&pixel) else { continue };
             let bearing = Bearing::new(&direction);
             let Some((_, by_bearing)) = project(camera, &bearing) else { continue };

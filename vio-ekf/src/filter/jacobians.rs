@@ -128,20 +128,23 @@ fn dense(covariance: &Covariance) -> DMatrix<f64> {
     DMatrix::from_fn(covariance.size(), covariance.size(), |r, c| covariance.row(r)[c])
 }
 
+const SMALL: f64 = 1e-8;
+
 #[test]
 fn covariance_moves_with_the_transition_of_the_whole_state() {
     let mut rng = Rng(1);
     for _ in 0..5 {
         let (state, readings) = (state(&mut rng, 4), readings(&mut rng, 10));
         let f = transition(&readings, &state);
-        let prior = random_covariance(&mut rng, f.nrows());
+        // Small, so that the products of errors, which are quadratic in it, do not show.
+        let prior = random_covariance(&mut rng, f.nrows()) * SMALL;
         let mut covariance = filled(&prior);
         let mut end = state.clone();
         let step = integrate(&readings, &state, &ImuNoise::ZERO).step(&state, GRAVITY);
         propagate(&mut end, &mut covariance, &step, &mut Workspace::new(f.nrows()), |_| panic!("lost"));
         let error = dense(&covariance) - &f * &prior * f.transpose();
         // The bias columns drop terms of the order of rate · dt · dt / 12 per step.
-        assert!(error.amax() < 2e-4, "{}", error.amax());
+        assert!(error.amax() < 2e-4 * SMALL, "{}", error.amax());
         // Without bias errors nothing is dropped: only the truncation of the differences is left.
         let mut exact = prior.clone();
         for k in at::GYRO_BIAS..at::CORE {
@@ -151,7 +154,7 @@ fn covariance_moves_with_the_transition_of_the_whole_state() {
         let mut covariance = filled(&exact);
         propagate(&mut state.clone(), &mut covariance, &step, &mut Workspace::new(f.nrows()), |_| panic!("lost"));
         let error = dense(&covariance) - &f * &exact * f.transpose();
-        assert!(error.amax() < 1e-7, "{}", error.amax());
+        assert!(error.amax() < 1e-7 * SMALL, "{}", error.amax());
     }
 }
 
@@ -329,4 +332,48 @@ fn rows_leave_and_arrive_without_disturbing_the_others() {
     assert!(
         (covariance.row(9)[4] - 0.5 * prior[(1, 10)]).abs() < 1e-12 && covariance.row(9)[4] == covariance.row(4)[9]
     );
+}
+
+#[test]
+fn products_of_errors_are_accounted_for() {
+    // A landmark whose distance is hardly known, seen from a camera whose velocity is hardly known: the spread of its
+    // bearing by drawing states and moving them.
+    let mut rng = Rng(8);
+    let mut state = state(&mut rng, 1);
+    (state.velocity, state.camera_attitude) = (Vector3::new(0.4, -0.3, 0.5), UnitQuaternion::identity());
+    state.landmarks[0].inverse_distance = 0.5;
+    let readings = readings(&mut rng, 10);
+    let n = at::landmark(1);
+    let mut prior = DMatrix::zeros(n, n);
+    let deviations = [(at::VELOCITY, 0.5), (at::VELOCITY + 1, 0.6), (at::VELOCITY + 2, 0.5), (n - 1, 0.35)];
+    for (row, deviation) in deviations {
+        prior[(row, row)] = deviation * deviation;
+    }
+    let mut normal = || (0..12).map(|_| rng.signed()).sum::<f64>() / 2.0;
+    let middle = model(&readings, &state);
+    let count = 20_000;
+    let (mut mean, mut square) = (Vector2::zeros(), Matrix2::zeros());
+    for _ in 0..count {
+        let mut delta = vec![0.0; n];
+        for (row, deviation) in deviations {
+            delta[row] = deviation * normal();
+        }
+        let mut drawn = state.clone();
+        drawn.correct(&delta);
+        let d = difference(&model(&readings, &drawn), &middle);
+        let d = Vector2::new(d[n - 3], d[n - 2]);
+        mean += d / f64::from(count);
+        square += d * d.transpose() / f64::from(count);
+    }
+    let spread = square - mean * mean.transpose();
+    let mut covariance = filled(&prior);
+    let step = integrate(&readings, &state, &ImuNoise::ZERO).step(&state, GRAVITY);
+    propagate(&mut state.clone(), &mut covariance, &step, &mut Workspace::new(n), |_| panic!("lost"));
+    let ours = covariance.block::<2, 2>(n - 3, n - 3);
+    let f = transition(&readings, &state);
+    let linear = (&f * prior * f.transpose()).view((n - 3, n - 3), (2, 2)).into_owned();
+    let linear = Matrix2::new(linear[(0, 0)], linear[(0, 1)], linear[(1, 0)], linear[(1, 1)]);
+    // The products are a tenth of the whole; they must be there to a fifth of themselves.
+    assert!((spread - linear).norm() > 0.05 * linear.norm());
+    assert!((ours - spread).norm() < 0.2 * (spread - linear).norm(), "{ours} {spread} {linear}");
 }

@@ -13,7 +13,7 @@ const HEIGHT: usize = 120;
 /// A smooth picture with structure in all directions, shifted, and with another gain and offset.
 fn picture(shift: Vector2<f64>, gain: f64, offset: f64) -> Vec<u8> {
     let value = |x: f64, y: f64| {
-        let waves = [(0.11, 0.05, 0.3), (-0.04, 0.13, 1.9), (0.09, -0.1, 4.0), (0.21, 0.17, 0.7)];
+        let waves = [(0.33, 0.15, 0.3), (-0.12, 0.39, 1.9), (0.27, -0.3, 4.0), (0.45, 0.36, 0.7)];
         waves.iter().map(|(a, b, c)| 25.0 * (a * x + b * y + c).sin()).sum::<f64>()
     };
     (0..WIDTH * HEIGHT)
@@ -25,7 +25,7 @@ fn picture(shift: Vector2<f64>, gain: f64, offset: f64) -> Vec<u8> {
 }
 
 fn pyramid(data: &[u8]) -> Pyramid {
-    let mut pyramid = Pyramid::new(WIDTH, HEIGHT, 1, LEVELS);
+    let mut pyramid = Pyramid::new(WIDTH, HEIGHT, 0, LEVELS);
     pyramid.fill(&ImageView { width: WIDTH, height: HEIGHT, data });
     pyramid
 }
@@ -75,9 +75,7 @@ fn follows_a_warp() {
     let inverse = warp.try_inverse().unwrap();
     let middle = Vector2::new(80.0, 60.0);
     let plain = picture(Vector2::zeros(), 1.0, 128.0);
-    let from = Pyramid::new(WIDTH, HEIGHT, 0, LEVELS);
-    let mut from = from;
-    from.fill(&ImageView { width: WIDTH, height: HEIGHT, data: &plain });
+    let from = pyramid(&plain);
     let turned: Vec<u8> = (0..WIDTH * HEIGHT)
         .map(|k| {
             let source = middle + inverse * (Vector2::new((k % WIDTH) as f64, (k / WIDTH) as f64) - middle);
@@ -141,31 +139,31 @@ fn normal_equations_are_those_of_a_least_squares_with_gain_and_offset() {
 fn corners_are_found_where_they_are() {
     // Bright squares on grey: four corners each, and nothing anywhere else.
     let mut data = vec![90_u8; WIDTH * HEIGHT];
-    let squares = [(30, 30), (100, 40), (60, 80)];
+    let squares = [(14, 30), (90, 50)];
     for (x0, y0) in squares {
-        for y in y0..y0 + 16 {
-            data[y * WIDTH + x0..y * WIDTH + x0 + 16].fill(170);
+        for y in y0..y0 + 48 {
+            data[y * WIDTH + x0..y * WIDTH + x0 + 48].fill(170);
         }
     }
     let pyramid = pyramid(&data);
-    let mut detector = Detector::new(&pyramid.used()[LEVELS - 1], 10);
-    let demands = Demands { score: 1.0, nearest: 5.0, farthest: 20.0 };
-    let taken = Vector2::new(30.0, 30.0);
+    let mut detector = Detector::new(pyramid.corners(), 10);
+    let demands = Demands { score: 1.0, nearest: 10.0, farthest: 20.0 };
+    let taken = Vector2::new(14.0, 30.0);
     detector.detect(&pyramid, std::iter::once(taken), &demands);
     let mut found: Vec<Vector2<f64>> = Vec::new();
-    while let Some(pixel) = detector.pick(&demands) {
+    while let Some((pixel, _)) = detector.pick(&pyramid, &demands) {
         let corners = squares.iter().flat_map(|&(x, y)| {
-            [(x, y), (x + 15, y), (x, y + 15), (x + 15, y + 15)].map(|(x, y)| Vector2::new(x as f64, y as f64))
+            [(x, y), (x + 47, y), (x, y + 47), (x + 47, y + 47)].map(|(x, y)| Vector2::new(x as f64, y as f64))
         });
         let off = corners.map(|c| (c - pixel).norm()).fold(f64::INFINITY, f64::min);
-        assert!(off < 5.0, "{pixel} is no corner");
-        assert!((pixel - taken).norm() >= 5.0 && found.iter().all(|f| (f - pixel).norm() >= 5.0));
+        assert!(off < 8.0, "{pixel} is no corner");
+        assert!((pixel - taken).norm() >= 10.0 && found.iter().all(|f| (f - pixel).norm() >= 10.0));
         found.push(pixel);
     }
-    assert!(found.len() >= 9, "{} of 11", found.len());
+    assert!(found.len() >= 6, "{} of 7", found.len());
     // A blank image has none.
     let blank = self::pyramid(&vec![90; WIDTH * HEIGHT]);
     detector.detect(&blank, std::iter::empty(), &demands);
-    assert!(detector.pick(&demands).is_none());
+    assert!(detector.pick(&blank, &demands).is_none());
     assert!(Patch::take(&blank, &Vector2::new(80.0, 60.0)).is_none());
 }

@@ -1,4 +1,4 @@
-use nalgebra::SMatrix;
+use nalgebra::{Matrix2, SMatrix, Vector3};
 
 use super::covariance::Covariance;
 use super::interval::Step;
@@ -17,6 +17,8 @@ pub(crate) struct Workspace {
     /// The camera's motion errors against all others: `Ξ P`.
     motion: Vec<f64>,
     transitions: Vec<LandmarkTransition>,
+    /// Noise of the bearings that stands for what is not linear.
+    bends: Vec<Matrix2<f64>>,
 }
 
 impl Workspace {
@@ -26,6 +28,7 @@ impl Workspace {
             stride: capacity,
             motion: vec![0.0; MOTION * capacity],
             transitions: Vec::with_capacity((capacity - at::HEAD) / at::LANDMARK),
+            bends: Vec::with_capacity((capacity - at::HEAD) / at::LANDMARK),
         }
     }
 }
@@ -71,6 +74,7 @@ pub(crate) fn propagate(
         camera.by_motion * step.noise.fixed_view::<MOTION, MOTION>(at::CORE, at::CORE) * camera.by_motion.transpose();
 
     left_product(covariance, step, &xi, work);
+    bend(covariance, &xi, &xi_xi, work);
 
     // P' = (F P) Fᵀ row by row, lower triangle, with the noise on the way.
     for row in 0..covariance.size() {
@@ -118,7 +122,44 @@ pub(crate) fn propagate(
             }
         }
     }
+    for (slot, bend) in work.bends.iter().enumerate() {
+        let at = at::landmark(slot);
+        for r in 0..2 {
+            for c in 0..2 {
+                covariance.row_mut(at + r)[at + c] += bend[(r, c)];
+            }
+        }
+    }
     covariance.mirror();
+}
+
+/// What the linear model leaves out of a bearing while the distance is not known: the products of the error of the inverse
+/// distance with itself and with that of the camera's translation. For Gaussian errors their covariances follow from `P`
+/// (Athans, Wishner and Bertolini 1968); between landmarks they are all but independent.
+fn bend(
+    covariance: &Covariance,
+    xi: &SMatrix<f64, MOTION, { at::TIME_OFFSET }>,
+    noise: &SMatrix<f64, MOTION, MOTION>,
+    work: &mut Workspace,
+) {
+    let mut translation = noise.fixed_view::<3, 3>(3, 3).into_owned();
+    for r in 0..3 {
+        for c in 0..3 {
+            let row = &work.motion[(3 + r) * work.stride..][..at::TIME_OFFSET];
+            translation[(r, c)] += xi.row(3 + c).iter().zip(row).map(|(w, p)| w * p).sum::<f64>();
+        }
+    }
+    work.bends.clear();
+    for (slot, transition) in work.transitions.iter().enumerate() {
+        let row = at::landmark(slot) + 2;
+        let variance = covariance.variance(row);
+        let common = Vector3::from_fn(|k, _| work.motion[(3 + k) * work.stride + row]);
+        let mixed = translation * variance + common * common.transpose();
+        work.bends.push(
+            transition.mixed * mixed * transition.mixed.transpose()
+                + transition.bent * transition.bent.transpose() * (0.5 * variance * variance),
+        );
+    }
 }
 
 /// `F P` into the workspace.

@@ -2,12 +2,16 @@ use nalgebra::Vector2;
 
 use crate::ImageView;
 
+/// Corners are sought on this level, unless patches begin above it.
+const CORNERS: usize = 2;
+
 /// An image and its reductions by means of 2x2 pixels.
 ///
 /// A pixel `x` of the full image lies at `(x − (2^l − 1)/2) / 2^l` on level `l`; pixel centres are integers.
 #[derive(Debug, Clone)]
 pub(crate) struct Pyramid {
     first: usize,
+    count: usize,
     levels: Vec<Level>,
 }
 
@@ -24,14 +28,15 @@ pub(crate) struct Level {
 }
 
 impl Pyramid {
-    /// Room for levels `first .. first + count` of a full image of a given size, and for the ones below.
+    /// Room for patches on levels `first .. first + count` of a full image of a given size, and for corners on a level that
+    /// is coarse enough for them to be few.
     pub(crate) fn new(width: usize, height: usize, first: usize, count: usize) -> Self {
         let level = |l: usize| {
             let (width, height) = (width >> l, height >> l);
             let scale = 1.0 / (1_usize << l) as f64;
             Level { width, height, data: vec![0; width * height], scale, offset: 0.5 / scale - 0.5 }
         };
-        Self { first, levels: (0..first + count).map(level).collect() }
+        Self { first, count, levels: (0..(first + count).max(CORNERS + 1)).map(level).collect() }
     }
 
     /// Fills all levels.
@@ -48,7 +53,12 @@ impl Pyramid {
 
     /// The levels that patches are made of, the finest first.
     pub(crate) fn used(&self) -> &[Level] {
-        &self.levels[self.first..]
+        &self.levels[self.first..self.first + self.count]
+    }
+
+    /// The level on which corners are sought.
+    pub(crate) fn corners(&self) -> &Level {
+        &self.levels[CORNERS.max(self.first)]
     }
 }
 

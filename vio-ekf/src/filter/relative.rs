@@ -1,4 +1,4 @@
-use nalgebra::{Matrix3, SMatrix, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Matrix2x3, Matrix3, SMatrix, Unit, UnitQuaternion, Vector2, Vector3};
 
 use super::state::{Landmark, State};
 
@@ -22,6 +22,10 @@ pub(crate) struct CameraMotion {
 pub(crate) struct LandmarkTransition {
     pub(crate) by_motion: SMatrix<f64, 3, 6>,
     pub(crate) by_itself: Matrix3<f64>,
+    /// Second derivative of the bearing by the inverse distance and the camera's translation.
+    pub(crate) mixed: Matrix2x3<f64>,
+    /// Second derivative of the bearing by the inverse distance.
+    pub(crate) bent: Vector2<f64>,
 }
 
 impl CameraMotion {
@@ -78,12 +82,14 @@ impl CameraMotion {
         let mut by_itself = Matrix3::zeros();
         let own = tangent * by_bearing;
         by_itself.fixed_view_mut::<2, 2>(0, 0).copy_from(&own);
-        by_itself.fixed_view_mut::<2, 1>(0, 2).copy_from(&(tangent * self.translation));
+        let own_by_distance = tangent * self.translation;
+        by_itself.fixed_view_mut::<2, 1>(0, 2).copy_from(&own_by_distance);
         by_itself.fixed_view_mut::<1, 2>(2, 0).copy_from(&(radial * by_bearing));
         by_itself[(2, 2)] = (radial * self.translation)[0] + 1.0 / length;
 
+        let bent = own_by_distance * (-2.0 * direction.dot(&self.translation) / length);
         let carried =
             Landmark { bearing, inverse_distance: landmark.inverse_distance / length, warp: own * landmark.warp };
-        Some((carried, LandmarkTransition { by_motion, by_itself }))
+        Some((carried, LandmarkTransition { by_motion, by_itself, mixed: tangent, bent }))
     }
 }

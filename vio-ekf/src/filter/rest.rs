@@ -112,8 +112,8 @@ impl Rest {
             self.still = false;
             detector.detect(pyramid, std::iter::empty(), demands);
             while self.watched.len() < WATCHED {
-                let Some(pixel) = detector.pick(demands) else { break };
-                self.watched.extend(Patch::take(pyramid, &pixel).map(|patch| (pixel, patch)));
+                let Some(found) = detector.pick(pyramid, demands) else { break };
+                self.watched.push(found);
             }
             return;
         }

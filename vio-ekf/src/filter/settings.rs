@@ -66,21 +66,11 @@ pub struct LandmarkSettings {
     pub inverse_distance_sigma: f64,
     /// Standard deviation of the pixel at which a landmark is first seen, where that is a measurement by itself; 1 px.
     pub pixel_sigma: f64,
-    /// Process noise of the bearing, rad/√s; ours: 0, the motion model has no error but the inertial sensor's.
-    pub bearing_walk: f64,
-    /// Process noise of the inverse distance relative to its value, 1/√s; ours: 0.
-    pub distance_walk: f64,
 }
 
 impl Default for LandmarkSettings {
     fn default() -> Self {
-        Self {
-            inverse_distance: 0.5,
-            inverse_distance_sigma: 0.7,
-            pixel_sigma: 1.0,
-            bearing_walk: 0.0,
-            distance_walk: 0.0,
-        }
+        Self { inverse_distance: 0.5, inverse_distance_sigma: 0.7, pixel_sigma: 1.0 }
     }
 }
 
@@ -88,12 +78,16 @@ impl Default for LandmarkSettings {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct PatchSettings {
-    /// The finest of the two pyramid levels that patches are made of; 1 as in ROVIO.
+    /// The finest of the two pyramid levels that patches are made of. ROVIO uses 1; ours is 0: linear interpolation costs
+    /// a fixed part of a level's pixel.
     pub first_level: usize,
     /// Least standard deviation of a pixel's difference, grey levels; what a comparison leaves unexplained may raise it.
     pub grey_sigma: f64,
     /// Standard deviation of a patch's position that no pixel noise explains, pixels: interpolation, slanted surfaces; ours.
     pub pixel_sigma: f64,
+    /// Random walk of the point that a patch stands for, pixels/√s: seen from elsewhere, a slanted or rough surface no longer
+    /// agrees with the patch, in a way that lasts; ours.
+    pub drift: f64,
     /// Largest share of a patch's contrast (in squares) that may be left unexplained; ours.
     pub unexplained: f64,
     /// Threshold of the corner test, grey levels; 5 as in ROVIO.
@@ -113,9 +107,10 @@ pub struct PatchSettings {
 impl Default for PatchSettings {
     fn default() -> Self {
         Self {
-            first_level: 1,
+            first_level: 0,
             grey_sigma: 2.0,
             pixel_sigma: 0.1,
+            drift: 0.25,
             unexplained: 0.4,
             corner_threshold: 5,
             score: 0.5,
@@ -210,11 +205,10 @@ impl Settings {
             ("camera_attitude_sigma", self.calibration.camera_attitude_sigma),
             ("time_offset_sigma_s", self.calibration.time_offset_sigma_s),
             ("pixel_sigma", self.patches.pixel_sigma),
+            ("drift", self.patches.drift),
             ("score", self.patches.score),
             ("refill", self.patches.refill),
             ("nearest", self.patches.nearest),
-            ("bearing_walk", self.landmarks.bearing_walk),
-            ("distance_walk", self.landmarks.distance_walk),
         ])
     }
 }
