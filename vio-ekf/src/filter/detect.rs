@@ -70,7 +70,7 @@ impl Detector {
     pub(crate) fn detect(
         &mut self,
         pyramid: &Pyramid,
-        present: impl Iterator<Item = Vector2<f64>> + Clone,
+        present: &(impl Iterator<Item = Vector2<f64>> + Clone),
         demands: &Demands,
     ) {
         let level = pyramid.corners();

@@ -151,8 +151,8 @@ impl Estimator {
     pub(crate) fn excess(&self, limits: &LimitSettings) -> Option<Excess> {
         let state = &self.state;
         let velocity = (at::VELOCITY..at::VELOCITY + 3).map(|row| self.covariance.variance(row)).fold(0.0, f64::max);
-        // Written so that NaN is beyond all limits.
-        let beyond = |value: f64, limit: f64| !(value <= limit);
+        // NaN is beyond all limits.
+        let beyond = |value: f64, limit: f64| value.is_nan() || value > limit;
         if beyond(state.velocity.norm(), limits.speed) {
             Some(Excess::Speed)
         } else if beyond(state.gyro_bias.norm(), limits.gyro_bias) || beyond(state.accel_bias.norm(), limits.accel_bias)

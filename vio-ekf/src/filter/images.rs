@@ -139,7 +139,7 @@ impl Vio {
         let demands = demands(patches);
         let (camera, state) = (&self.camera, &estimator.state);
         let present = state.landmarks.iter().filter_map(|l| camera.project(&l.bearing.direction()));
-        detector.detect(pyramid, present, &demands);
+        detector.detect(pyramid, &present, &demands);
         let guess = estimator.guess(&self.settings.landmarks);
         let before = self.tracks.len();
         while self.tracks.len() < self.settings.features {

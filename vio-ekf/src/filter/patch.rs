@@ -124,7 +124,9 @@ impl PatchLevel {
             }
         }
         let mean = values.iter().sum::<f32>() / AREA as f32;
-        values.iter_mut().for_each(|v| *v -= mean);
+        for value in &mut values {
+            *value -= mean;
+        }
         let energy = dot(&values, &values);
         // Less than a third of a grey level of contrast is noise.
         if energy < 0.1 * AREA as f32 {
@@ -157,7 +159,9 @@ impl PatchLevel {
             }
         }
         let mean = samples.iter().sum::<f32>() / AREA as f32;
-        samples.iter_mut().for_each(|s| *s -= mean);
+        for sample in &mut samples {
+            *sample -= mean;
+        }
         let gain = f64::from(dot(&self.values, &samples) / self.energy);
         // Contrast that is inverted, or all but gone, is another object or no light.
         if gain.is_nan() || gain < 0.05 {

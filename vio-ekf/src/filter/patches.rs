@@ -149,7 +149,7 @@ fn corners_are_found_where_they_are() {
     let mut detector = Detector::new(pyramid.corners(), 10);
     let demands = Demands { score: 1.0, nearest: 10.0, farthest: 20.0 };
     let taken = Vector2::new(14.0, 30.0);
-    detector.detect(&pyramid, std::iter::once(taken), &demands);
+    detector.detect(&pyramid, &std::iter::once(taken), &demands);
     let mut found: Vec<Vector2<f64>> = Vec::new();
     while let Some((pixel, _)) = detector.pick(&pyramid, &demands) {
         let corners = squares.iter().flat_map(|&(x, y)| {
@@ -163,7 +163,7 @@ fn corners_are_found_where_they_are() {
     assert!(found.len() >= 6, "{} of 7", found.len());
     // A blank image has none.
     let blank = self::pyramid(&vec![90; WIDTH * HEIGHT]);
-    detector.detect(&blank, std::iter::empty(), &demands);
+    detector.detect(&blank, &std::iter::empty(), &demands);
     assert!(detector.pick(&blank, &demands).is_none());
     assert!(Patch::take(&blank, &Vector2::new(80.0, 60.0)).is_none());
 }

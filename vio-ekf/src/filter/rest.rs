@@ -110,7 +110,7 @@ impl Rest {
         if self.watched.len() < ENOUGH {
             self.watched.clear();
             self.still = false;
-            detector.detect(pyramid, std::iter::empty(), demands);
+            detector.detect(pyramid, &std::iter::empty(), demands);
             while self.watched.len() < WATCHED {
                 let Some(found) = detector.pick(pyramid, demands) else { break };
                 self.watched.push(found);

@@ -194,7 +194,7 @@ impl Settings {
         if self.patches.first_level > 4 {
             return Err(invalid("first_level", self.patches.first_level as f64, "must be at most 4"));
         }
-        if !(self.patches.rescale > 1.0) {
+        if self.patches.rescale.is_nan() || self.patches.rescale <= 1.0 {
             return Err(invalid("rescale", self.patches.rescale, "must be above 1"));
         }
         if self.gates.iterations == 0 {
