@@ -9,6 +9,9 @@ mod images;
 mod interval;
 #[cfg(test)]
 mod jacobians;
+mod moving;
+#[cfg(test)]
+mod moving_tests;
 mod patch;
 #[cfg(test)]
 mod patches;
@@ -17,6 +20,7 @@ mod propagate;
 mod pyramid;
 mod relative;
 mod rest;
+mod scout;
 mod settings;
 mod start;
 mod state;
@@ -26,6 +30,7 @@ use nalgebra::{Isometry3, SMatrix, Translation3, Unit, Vector3};
 
 pub use bearing::Bearing;
 pub use estimator::CoreCovariance;
+pub use moving::MovingSettings;
 pub use points::PointObservation;
 pub use rest::RestSettings;
 pub use settings::{CalibrationSettings, GateSettings, LandmarkSettings, LimitSettings, PatchSettings, Settings};
@@ -37,6 +42,7 @@ use estimator::Estimator;
 use images::Sight;
 use patch::Patch;
 use rest::Rest;
+use scout::Scout;
 use state::at;
 
 /// A camera this much ahead of the inertial samples, in seconds, is waiting for data that does not come.
@@ -145,6 +151,7 @@ pub struct Vio {
     tracks: Vec<Track>,
     sight: Sight,
     rest: Rest,
+    scout: Scout,
     /// Whether the image before was taken at rest.
     rested: bool,
     /// Angle that a rest may hide, rad.
@@ -184,6 +191,7 @@ impl Vio {
             tracks: Vec::with_capacity(settings.features),
             sight: Sight::new(&camera, &settings.patches),
             rest: Rest::new(settings.rest),
+            scout: Scout::new(settings.moving),
             rested: false,
             unnoticed: 0.5 * settings.rest.pixels / camera.fx.min(camera.fy),
             contradictions: 0,
@@ -219,6 +227,7 @@ impl Vio {
         self.tracks.clear();
         self.estimator = None;
         (self.contradictions, self.excess) = (0, None);
+        self.scout = Scout::new(self.settings.moving);
     }
 
     /// Takes an inertial sample; stamps must increase.
@@ -233,6 +242,9 @@ impl Vio {
         }
         self.last = Some(*sample);
         self.rest.imu(sample);
+        if self.estimator.is_none() {
+            self.scout.imu(sample);
+        }
         if let Some(estimator) = &mut self.estimator {
             if estimator.history.is_full() {
                 let tracks = &mut self.tracks;
@@ -301,6 +313,35 @@ impl Vio {
             time_offset_s: estimator.state.time_offset,
             covariance: estimator.covariance.block(at::CAMERA_POSITION, at::CAMERA_POSITION),
         })
+    }
+
+    /// Starts from what the scout has found at the time of an image.
+    fn start_in_motion(&mut self, stamp: Stamp, motion: &moving::Motion) {
+        let Some(history) = self.scout.history() else { return };
+        let attitude = Bearing::new(&Unit::new_normalize(-motion.gravity)).level();
+        let found = Start {
+            stamp,
+            world_from_body: Isometry3::from_parts(Translation3::identity(), attitude),
+            velocity_in_body: motion.velocity,
+            gyro_bias: motion.gyro_bias,
+            accel_bias: Vector3::zeros(),
+            sigma: StartSigma {
+                position: 0.0,
+                yaw: 0.0,
+                velocity: motion.velocity_sigma,
+                tilt: motion.tilt_sigma,
+                gyro_bias: motion.gyro_bias_sigma,
+                accel_bias: self.settings.moving.accel_bias_sigma,
+            },
+        };
+        let mut estimator =
+            Estimator::new(&self.camera, self.noise, &self.settings, &found, history.before(stamp));
+        estimator.expect(motion.inverse_distance);
+        for sample in history.after(stamp) {
+            estimator.imu(*sample);
+        }
+        self.reset();
+        self.estimator = Some(estimator);
     }
 
     /// Moves the filter to the exposure of an image. `None` if there is no filter, or it was started after the exposure;

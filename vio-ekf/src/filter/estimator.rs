@@ -33,6 +33,8 @@ pub(crate) struct Estimator {
     gravity: f64,
     /// Rate of the body at the anchor.
     pub(crate) rate: Vector3<f64>,
+    /// Inverse distance of new landmarks while no other is known well, if it is not that of the settings.
+    expected: Option<f64>,
     work: Workspace,
     delta: Vec<f64>,
     scratch: Vec<f64>,
@@ -72,6 +74,7 @@ impl Estimator {
             since: Interval::default(),
             noise,
             gravity: settings.gravity,
+            expected: None,
             work: Workspace::new(capacity),
             delta: vec![0.0; capacity],
             scratch: vec![0.0; capacity * MAX_RESIDUALS],
@@ -243,13 +246,18 @@ impl Estimator {
                 known += 1;
             }
         }
-        let mut inverse_distance = settings.inverse_distance;
+        let mut inverse_distance = self.expected.unwrap_or(settings.inverse_distance);
         if known >= ENOUGH_KNOWN {
             let (_, median, _) = sorted[..known].select_nth_unstable_by(known / 2, f64::total_cmp);
             inverse_distance = *median;
         }
         let deviation = settings.inverse_distance_sigma * inverse_distance;
         Guess { inverse_distance, distance_variance: deviation * deviation, bearing: Matrix2::zeros() }
+    }
+
+    /// Says how far away the first landmarks will be.
+    pub(crate) fn expect(&mut self, inverse_distance: f64) {
+        self.expected = Some(inverse_distance);
     }
 
     /// Moves the anchor into the middle of the samples, to make room for more.

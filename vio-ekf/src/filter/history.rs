@@ -42,6 +42,17 @@ impl History {
         &self.samples[self.samples.len() - 1]
     }
 
+    /// The last sample not after a time, or the first one.
+    pub(crate) fn before(&self, stamp: Stamp) -> Imu {
+        let after = self.samples.partition_point(|sample| sample.stamp <= stamp);
+        self.samples[after.saturating_sub(1)]
+    }
+
+    /// The samples after a time.
+    pub(crate) fn after(&self, stamp: Stamp) -> impl Iterator<Item = &Imu> {
+        self.samples.iter().filter(move |sample| sample.stamp > stamp)
+    }
+
     /// Whether another sample would need more memory.
     pub(crate) fn is_full(&self) -> bool {
         self.samples.len() >= self.capacity

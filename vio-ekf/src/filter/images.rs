@@ -66,7 +66,16 @@ impl Vio {
         }
         if self.estimator.is_none() {
             self.start_at_rest()?;
-            return Ok(self.report());
+            if self.estimator.is_none() && self.settings.moving.enabled {
+                self.scout(stamp);
+            }
+            if self.estimator.is_none() {
+                return Ok(self.report());
+            }
+            // The image that the start was made with has the first landmarks.
+            let added = self.refill();
+            let report = FrameReport { added, ..self.report() };
+            return Ok(self.conclude(report));
         }
         let at_rest = self.rest.is_at_rest(now);
         let mut report = FrameReport { at_rest, ..self.report() };
@@ -81,6 +90,18 @@ impl Vio {
             report.added = self.refill();
         }
         Ok(self.conclude(report))
+    }
+
+    /// Shows an image to the scout, and starts if that has found the motion.
+    fn scout(&mut self, stamp: Stamp) {
+        let Sight { pyramid, detector } = &mut self.sight;
+        let shift = (self.settings.calibration.time_offset_s * 1e9).round() as i64;
+        let time = Stamp::from_nanos(stamp.nanos().saturating_add(shift));
+        let demands = demands(&self.settings.patches);
+        let scale = (self.settings.gravity, self.settings.history_samples);
+        if let Some(motion) = self.scout.image(time, pyramid, (detector, &demands), &self.camera, scale) {
+            self.start_in_motion(time, &motion);
+        }
     }
 
     /// Time of the last image.

@@ -15,10 +15,10 @@ const MOTION: usize = 9;
 pub(crate) struct Interval {
     pub(crate) duration: f64,
     pub(crate) rotation: UnitQuaternion<f64>,
-    velocity: Vector3<f64>,
-    position: Vector3<f64>,
+    pub(super) velocity: Vector3<f64>,
+    pub(super) position: Vector3<f64>,
     /// By the biases of gyroscope and accelerometer.
-    bias_jacobian: SMatrix<f64, MOTION, 6>,
+    pub(super) bias_jacobian: SMatrix<f64, MOTION, 6>,
     /// Of the motion's errors, from noise since the anchor.
     covariance: SMatrix<f64, MOTION, MOTION>,
     /// Between the motion's errors and the walk of the biases since the anchor.

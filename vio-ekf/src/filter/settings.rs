@@ -1,3 +1,4 @@
+use super::moving::MovingSettings;
 use super::rest::RestSettings;
 use crate::Error;
 use crate::error::{all_not_negative, invalid};
@@ -18,6 +19,8 @@ pub struct Settings {
     pub patches: PatchSettings,
     /// When the body is taken to be at rest.
     pub rest: RestSettings,
+    /// When a start in motion is believed.
+    pub moving: MovingSettings,
     /// When the estimate is given up.
     pub limits: LimitSettings,
     /// When measurements are believed.
@@ -35,6 +38,7 @@ impl Default for Settings {
             landmarks: LandmarkSettings::default(),
             patches: PatchSettings::default(),
             rest: RestSettings::default(),
+            moving: MovingSettings::default(),
             limits: LimitSettings::default(),
             gates: GateSettings::default(),
             history_samples: 256,
