@@ -334,8 +334,7 @@ impl Vio {
                 accel_bias: self.settings.moving.accel_bias_sigma,
             },
         };
-        let mut estimator =
-            Estimator::new(&self.camera, self.noise, &self.settings, &found, history.before(stamp));
+        let mut estimator = Estimator::new(&self.camera, self.noise, &self.settings, &found, history.before(stamp));
         estimator.expect(motion.inverse_distance);
         for sample in history.after(stamp) {
             estimator.imu(*sample);

@@ -36,6 +36,8 @@ struct Followed {
     pixel: Vector2<f64>,
     /// Motion between the last two images that the turn does not explain, pixels.
     flow: Vector2<f64>,
+    /// How the turns since the window began have deformed the patch.
+    warp: Matrix2<f64>,
     sightings: Vec<Sighting>,
 }
 
@@ -124,7 +126,7 @@ impl Scout {
             let Some((pixel, patch)) = detector.pick(pyramid, demands) else { break };
             let Some(direction) = camera.bearing(&pixel) else { continue };
             let sightings = vec![(0, direction.into_inner())];
-            self.followed.push(Followed { patch, pixel, flow: Vector2::zeros(), sightings });
+            self.followed.push(Followed { patch, pixel, flow: Vector2::zeros(), warp: Matrix2::identity(), sightings });
         }
     }
 }
@@ -134,18 +136,23 @@ impl Followed {
     fn follow(&mut self, image: usize, turn: &UnitQuaternion<f64>, pyramid: &Pyramid, camera: &Camera) -> Option<()> {
         let turned = camera.project(&(turn * self.sightings.last()?.1))?;
         let middle = turned + self.flow;
-        let upright = Matrix2::identity();
+        let moved = |x: f64, y: f64| {
+            let bearing = camera.bearing(&(self.pixel + Vector2::new(x, y)))?;
+            camera.project(&(turn * bearing.into_inner()))
+        };
+        self.warp = Matrix2::from_columns(&[moved(1.0, 0.0)? - turned, moved(0.0, 1.0)? - turned]) * self.warp;
+        let warp = self.warp;
         let (reach, spacing) = SEARCH;
         let places =
             (-reach..=reach).flat_map(|y| (-reach..=reach).map(move |x| Vector2::new(f64::from(x), f64::from(y))));
         let tried = places.filter_map(|offset| {
             let pixel = middle + offset * spacing;
-            Some((self.patch.compare_coarse(pyramid, &pixel, &upright)?.mismatch, pixel))
+            Some((self.patch.compare_coarse(pyramid, &pixel, &warp)?.mismatch, pixel))
         });
         let (_, mut pixel) = tried.reduce(|best, other| if other.0 < best.0 { other } else { best })?;
         for _ in 0..ITERATIONS {
-            let comparison = self.patch.compare(pyramid, &pixel, &upright)?;
-            let step = comparison.information.try_inverse()? * comparison.moment;
+            let comparison = self.patch.compare(pyramid, &pixel, &warp)?;
+            let step = warp * comparison.information.try_inverse()? * comparison.moment;
             pixel += step;
             if step.norm() < 0.01 {
                 if comparison.unexplained > 0.3 * comparison.energy || (pixel - middle).amax() > 12.0 {
