@@ -141,6 +141,39 @@ pub struct FrameReport {
 }
 
 /// One camera and one inertial sensor.
+///
+/// Feed samples and images as they come; an image may arrive up to [`Settings::history_samples`] samples late and is used
+/// at its own time, with the same result to the last bit. The filter starts by itself, at rest or in motion, or from a
+/// state that is given.
+///
+/// ```
+/// use vio_ekf::nalgebra::{Isometry3, Vector3};
+/// use vio_ekf::{Camera, ImageView, Imu, ImuNoise, Settings, Stamp, Start, StartSigma, Status, Vio};
+///
+/// let mut vio = Vio::new(Camera::euroc(), ImuNoise::default(), Settings::default())?;
+/// let at = |millis: i64| Stamp::from_nanos(millis * 1_000_000);
+/// let imu = |millis| Imu { stamp: at(millis), gyro: Vector3::zeros(), accel: Vector3::new(0.0, 0.0, 9.81) };
+/// vio.imu(&imu(0))?;
+/// vio.start(&Start {
+///     stamp: at(0),
+///     world_from_body: Isometry3::identity(),
+///     velocity_in_body: Vector3::zeros(),
+///     gyro_bias: Vector3::zeros(),
+///     accel_bias: Vector3::zeros(),
+///     sigma: StartSigma::default(),
+/// })?;
+/// let picture: Vec<u8> = (0..752 * 480).map(|k| if (k % 752 / 40 + k / 752 / 40) % 2 == 0 { 60 } else { 180 }).collect();
+/// for k in 1..=20 {
+///     vio.imu(&imu(5 * k))?;
+///     if k % 10 == 0 {
+///         let report = vio.image(at(5 * k), &ImageView::new(752, 480, &picture)?)?;
+///         assert_eq!(report.status, Status::Tracking);
+///     }
+/// }
+/// let odometry = vio.output().expect("it has been started");
+/// assert!(odometry.world_from_body.translation.vector.norm() < 0.01);
+/// # Ok::<(), vio_ekf::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Vio {
     camera: Camera,
