@@ -7,11 +7,8 @@ const MAX_STEPS: usize = 30;
 
 /// The distorted point, `None` where the radial polynomial has turned round.
 pub(super) fn distort(k: &[f64; 4], m: &Vector2<f64>) -> Option<Vector2<f64>> {
-    // Negated, so that a NaN is refused as well.
-    if !(m.norm_squared() < largest_square(k)) {
-        return None;
-    }
-    Some(evaluate(k, m))
+    // A NaN is not below any limit, and is refused with the rest.
+    (m.norm_squared() < largest_square(k)).then(|| evaluate(k, m))
 }
 
 fn evaluate([k1, k2, p1, p2]: &[f64; 4], m: &Vector2<f64>) -> Vector2<f64> {

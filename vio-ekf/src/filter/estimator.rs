@@ -301,7 +301,7 @@ pub(crate) struct Guess {
     pub(crate) bearing: Matrix2<f64>,
 }
 
-/// A core covariance, in the order of [`at`].
+/// Covariance of the core, 15 rows; their order is that of [`Odometry::covariance`].
 pub type CoreCovariance = SMatrix<f64, { at::CORE }, { at::CORE }>;
 
 /// Rows of a landmark's bearing and of the time offset.
