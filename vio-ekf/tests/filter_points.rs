@@ -24,7 +24,7 @@ fn follows_a_flight_and_knows_how_well() {
             let landmarks = LandmarkSettings { pixel_sigma, ..LandmarkSettings::default() };
             let mut frame = 0;
             flight
-                .run(Settings { landmarks, ..Settings::default() }, &start, |odometry, truth, biases| {
+                .run(&Settings { landmarks, ..Settings::default() }, &start, |odometry, truth, biases| {
                     if sums.len() <= frame {
                         sums.push([0.0; 5]);
                     }
@@ -61,7 +61,7 @@ fn learns_nothing_about_position_and_yaw() {
         let start = flight.drawn_start(StartSigma { position, yaw, ..StartSigma::default() });
         let mut least = f64::INFINITY;
         flight
-            .run(Settings::default(), &start, |odometry, _, _| {
+            .run(&Settings::default(), &start, |odometry, _, _| {
                 let of_yaw = odometry.covariance[(8, 8)] - yaw * yaw;
                 let of_position =
                     odometry.covariance.fixed_view::<3, 3>(0, 0).into_owned().symmetric_eigenvalues().min();
@@ -125,7 +125,7 @@ fn finds_the_cameras_place_and_clock() {
             time_offset_sigma_s: 0.01,
         };
         let vio =
-            flight.run_with(assumed, Settings { calibration, ..Settings::default() }, &start, |_, _, _| ()).unwrap();
+            flight.run_with(assumed, &Settings { calibration, ..Settings::default() }, &start, |_, _, _| ()).unwrap();
         let found = vio.calibration().unwrap();
         let turn = so3::log(&(truth.rotation * found.body_from_camera.rotation.inverse()));
         let shift = truth.translation.vector - found.body_from_camera.translation.vector;

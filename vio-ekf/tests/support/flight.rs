@@ -42,7 +42,7 @@ pub(crate) fn camera() -> Camera {
 /// Sways and turns through a room of about 8 m, never twice the same way.
 pub(crate) fn spline(seed: u64, seconds: f64) -> Spline {
     let mut rng = Rng(seed);
-    let phases: Vec<Vector3<f64>> = (0..4).map(|_| rng.vector() * 3.14).collect();
+    let phases: Vec<Vector3<f64>> = (0..4).map(|_| rng.vector() * std::f64::consts::PI).collect();
     let knots = (0..(seconds / 0.1) as usize + 4).map(|k| {
         let t = k as f64 * 0.1;
         let wave = |amplitude: f64, hertz: f64, phase: &Vector3<f64>| {
@@ -163,7 +163,7 @@ impl Flight {
     /// Runs a filter over the flight and shows each estimate after an image, with the truth and the true biases.
     pub(crate) fn run(
         &mut self,
-        settings: Settings,
+        settings: &Settings,
         start: &Start,
         each: impl FnMut(&Odometry, &Motion, &[Vector3<f64>; 2]),
     ) -> Result<Vio, Error> {
@@ -174,11 +174,11 @@ impl Flight {
     pub(crate) fn run_with(
         &mut self,
         assumed: Camera,
-        settings: Settings,
+        settings: &Settings,
         start: &Start,
         mut each: impl FnMut(&Odometry, &Motion, &[Vector3<f64>; 2]),
     ) -> Result<Vio, Error> {
-        let mut vio = Vio::new(assumed, self.noise, settings)?;
+        let mut vio = Vio::new(assumed, self.noise, *settings)?;
         for (k, stamp) in self.stamps().enumerate() {
             let sample = self.imu(stamp);
             vio.imu(&sample)?;
