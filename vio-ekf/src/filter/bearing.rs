@@ -80,8 +80,8 @@ fn shortest(from: &Vector3<f64>, to: &Unit<Vector3<f64>>) -> UnitQuaternion<f64>
     if cosine > 0.0 {
         return UnitQuaternion::identity();
     }
-    let helper = if from.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
-    so3::exp(&(from.cross(&helper).normalize() * std::f64::consts::PI))
+    let aside = if from.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
+    so3::exp(&(from.cross(&aside).normalize() * std::f64::consts::PI))
 }
 
 /// Products of unit quaternions leave the sphere by rounding only, but a feature's is multiplied for minutes.
