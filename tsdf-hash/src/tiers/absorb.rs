@@ -28,7 +28,7 @@ impl Copies {
             self.make_room(1, eye)?;
         }
         // Another map does not say when it saw the block: it counts as old.
-        let seen = Seen { last: f64::MIN, frames: 1, call: self.call };
+        let seen = Seen { last: f64::MIN, frames: 1, call: self.call, stamp: self.active.tick() };
         if self.active.room() > 0 {
             self.active.insert(key, Box::new(block.clone()), seen);
             return Ok(());
