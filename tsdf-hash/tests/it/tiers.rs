@@ -147,6 +147,22 @@ fn what_was_not_in_is_noticed_in_every_tier() {
 }
 
 #[test]
+fn colours_that_were_not_in_are_noticed_in_cold_blocks() {
+    let walls = [close_wall(1.0), close_wall(-1.0)];
+    let mut map = make(Settings { tiers: Tiers { age: 1.0, ..tiers(1 << 20, 0) }, ..FREE }, "colours");
+    for (side, time) in [(0, 0.0), (1, 5.0)] {
+        map.integrate_at(time, &walls[side].view(), None, &walls[side].world_from_camera).unwrap();
+    }
+    let before = contents(&map);
+    assert!(map.memory().host_blocks > 0 && map.memory().active_blocks + map.memory().host_blocks == map.blocks());
+    // Every block is there, the depth too.
+    assert!(matches!(take_out(&mut map, &walls[0]).unwrap_err(), Error::NotIntegrated { .. }));
+    assert!(contents(&map) == before);
+    map.deintegrate(&walls[0].view(), None, &walls[0].world_from_camera).unwrap();
+    assert_eq!(map.memory().host_blocks, 0);
+}
+
+#[test]
 fn full_tiers_refuse_the_frame_and_nothing_else() {
     let shots = room::tour(12, 4, &Isometry3::identity());
     for (name, tiers) in [("full-ram", tiers(1 << 18, 0)), ("full-disk", tiers(1 << 17, 1 << 18))] {
