@@ -40,6 +40,8 @@
 //! | fusion undone | ours | [`Map::deintegrate`] |
 //! | noise and weights | Nguyen, Izadi, Lovell 2012; `w = 15 (σ₀/σ(z))² cos θ`: ours | [`NoiseModel`] |
 //! | mesh | thesis Paper I, section 4.6, by marching cubes; case table derived: ours | [`Map::mesh`], [`write_ply`] |
+//! | the same bytes on a GPU | ours | `GpuMap` (feature `gpu`) |
+//! | the mesh of a growing map, blocks that left included | thesis Paper I, section 4.6; per-block patches: ours | [`MeshKeeper`] |
 //! | distance queries | thesis, outlook | [`Map::distance`] |
 //!
 //! Frames: the camera's z looks forward, `x` to the right and `y` down in its image; the world is the caller's. Distances
@@ -52,6 +54,8 @@ mod dense;
 mod error;
 mod file;
 mod fuse;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod key;
 mod map;
 mod mesh;
@@ -68,8 +72,10 @@ pub use cast::{CastSettings, View};
 pub use dense::DenseMap;
 pub use error::Error;
 pub use file::MapFile;
+#[cfg(feature = "gpu")]
+pub use gpu::{GpuMap, GpuOptions, open_map};
 pub use map::{FrameReport, Map, Memory};
-pub use mesh::{Mesh, write_ply};
+pub use mesh::{Mesh, MeshKeeper, MeshReport, write_obj, write_ply};
 pub use nalgebra;
 pub use settings::{NoiseModel, Settings, Tiers};
 pub use tiers::{Arrivals, MergeAtOnce, Revisit, Verdict};

@@ -13,6 +13,12 @@ pub(crate) struct Slots<V> {
     values: Vec<V>,
 }
 
+impl<V> Default for Slots<V> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl<V> Slots<V> {
     const SLOT_BYTES: usize = size_of::<Key>() + size_of::<V>();
 

@@ -1,5 +1,7 @@
 //! The blocks in active memory and the bytes they take.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use crate::Error;
 use crate::block::Block;
 use crate::key::Key;
@@ -17,18 +19,23 @@ pub(crate) struct Seen {
     pub(crate) frames: u32,
     /// Number of the last call that touched it.
     pub(crate) call: u32,
+    /// When it last changed, on the clock of the [`Store`], which never stands still. It goes with the block to other
+    /// tiers; moves may raise it without a change.
+    pub(crate) stamp: u64,
 }
 
 struct Slot {
     block: Option<Box<Block>>,
     seen: Seen,
-    /// When the block last changed, on a clock that never stands still: equal stamps mean equal blocks.
-    stamp: u64,
 }
+
+/// Stores of this process, to tell them apart.
+static STORES: AtomicU64 = AtomicU64::new(0);
 
 /// Blocks in dense slots, found through a hash table. A block is `None` only while a frame works on it.
 pub(crate) struct Store {
     slots: Slots<Slot>,
+    id: u64,
     clock: u64,
     max_bytes: usize,
     /// Blocks of the budget that are kept free, for work.
@@ -40,7 +47,9 @@ pub(crate) struct Store {
 impl Store {
     pub(crate) fn new(max_bytes: usize) -> Result<Self, Error> {
         let most = max_bytes / size_of::<Block>();
-        let store = Self { slots: Slots::new(), clock: 0, max_bytes, spare: (most / 16).clamp(3, 256), set_aside: 0 };
+        let id = STORES.fetch_add(1, Ordering::Relaxed);
+        let spare = (most / 16).clamp(3, 256);
+        let store = Self { slots: Slots::new(), id, clock: 0, max_bytes, spare, set_aside: 0 };
         if store.room() == 0 {
             let requirement = "large enough for one block and three to work with: 65536 bytes do";
             return Err(Error::InvalidSetting { name: "max_bytes", value: max_bytes as f64, requirement });
@@ -99,16 +108,26 @@ impl Store {
 
     /// A block to be changed.
     pub(crate) fn get_mut(&mut self, key: Key) -> Option<(&mut Block, &mut Seen)> {
+        let stamp = self.tick();
         let slot = self.slots.get_mut(key)?;
-        self.clock += 1;
-        slot.stamp = self.clock;
+        slot.seen.stamp = stamp;
         slot.block.as_deref_mut().map(|block| (block, &mut slot.seen))
     }
 
-    /// A number that changes whenever the block does; no two blocks of a store ever share one.
-    #[allow(dead_code, reason = "incremental meshing asks for it")]
-    pub(crate) fn stamp(&self, slot: usize) -> u64 {
-        self.slots.values()[slot].stamp
+    /// A number that no other store of this process has.
+    pub(crate) fn id(&self) -> u64 {
+        self.id
+    }
+
+    /// The latest stamp given.
+    pub(crate) fn clock(&self) -> u64 {
+        self.clock
+    }
+
+    /// A stamp that is later than all before.
+    pub(crate) fn tick(&mut self) -> u64 {
+        self.clock += 1;
+        self.clock
     }
 
     /// The keys in the order of their slots.
@@ -127,16 +146,15 @@ impl Store {
 
     /// Notes that a block has changed.
     pub(crate) fn touch(&mut self, slot: usize, call: u32) {
-        self.clock += 1;
-        let slot = &mut self.slots.values_mut()[slot];
-        slot.stamp = self.clock;
-        slot.seen.call = call;
+        let stamp = self.tick();
+        let seen = &mut self.slots.values_mut()[slot].seen;
+        (seen.stamp, seen.call) = (stamp, call);
     }
 
     /// Adds a block under a new key; the caller has seen that there is [`room`](Self::room).
     pub(crate) fn insert(&mut self, key: Key, block: Box<Block>, seen: Seen) {
-        self.clock += 1;
-        self.slots.insert(key, Slot { block: Some(block), seen, stamp: self.clock });
+        let seen = Seen { stamp: self.tick(), ..seen };
+        self.slots.insert(key, Slot { block: Some(block), seen });
     }
 
     pub(crate) fn remove(&mut self, key: Key) -> Option<(Box<Block>, Seen)> {

@@ -4,6 +4,8 @@
 //! surface was seen again. The map is the sum of the copies, whenever and wherever they are brought together. What all
 //! copies of a block sum up to always fits its counters: that is seen to when a frame is fused.
 
+#[cfg(feature = "gpu")]
+mod absorb;
 mod change;
 mod coder;
 mod cold;
@@ -43,12 +45,14 @@ pub(crate) struct Copies {
     limits: Limits,
     /// Number of the current or last call.
     call: u32,
+    /// How many blocks have ever been emptied.
+    pub(crate) removed: u64,
 }
 
 impl Copies {
     pub(crate) fn new(max_bytes: usize, limits: Limits, swap: Option<Swap>) -> Result<Self, Error> {
         let (active, held) = (Store::new(max_bytes)?, Slots::new());
-        Ok(Self { active, held, cold: Cold::new(limits.host_bytes, swap), limits, call: 0 })
+        Ok(Self { active, held, cold: Cold::new(limits.host_bytes, swap), limits, call: 0, removed: 0 })
     }
 
     /// Takes in the blocks of a file: as cold ones, or at once where there is no cold memory.
@@ -101,6 +105,33 @@ impl Copies {
         if self.all_active() { self.active.len() } else { self.sorted_keys().len() }
     }
 
+    /// Whether there is any copy of a block.
+    pub(crate) fn contains(&self, key: Key) -> bool {
+        self.active.slot(key).is_some() || self.held.get(key).is_some() || self.cold.label(key).is_some()
+    }
+
+    /// Appends, once each, the blocks whose sum has changed since the clock of the active store stood at `stamp`; some
+    /// that have only been moved may be among them.
+    pub(crate) fn changed_since(&self, stamp: u64, changed: &mut Vec<Key>) {
+        let later = |seen: &Seen| seen.stamp > stamp;
+        changed.extend(self.active.sightings().filter(|(_, seen)| later(seen)).map(|(key, _)| key));
+        if self.cold.latest() > stamp {
+            let cold = self.cold.labels().filter(|(_, label)| later(&label.seen())).map(|(key, _)| key);
+            changed.extend(cold);
+            changed.sort_unstable();
+            changed.dedup();
+        }
+    }
+
+    /// A block: its only copy if that is active, else the sum of all, which is added up in `sum`.
+    pub(crate) fn sum<'a>(&'a self, key: Key, sum: &'a mut Block) -> Result<Option<&'a Block>, Error> {
+        if self.all_active() || (self.held.get(key).is_none() && self.cold.label(key).is_none()) {
+            return Ok(self.active.get(key));
+        }
+        self.total(key, sum)?;
+        Ok(Some(sum))
+    }
+
     /// The sum of all copies of a block, and what is known of it.
     pub(crate) fn total(&self, key: Key, sum: &mut Block) -> Result<Seen, Error> {
         *sum = Block::ZERO;
@@ -125,7 +156,7 @@ impl Copies {
                 self.cold.label(key).map(|label| label.print),
             ];
             let print = copies.into_iter().flatten().fold(0, u64::wrapping_add);
-            mix(mix(hash ^ key.0).wrapping_add(print))
+            fold(hash, key, print)
         })
     }
 
@@ -149,10 +180,20 @@ impl Copies {
     }
 }
 
+/// Folds a block, by its print, into the hash of a map.
+pub(crate) fn fold(hash: u64, key: Key, print: u64) -> u64 {
+    mix(mix(hash ^ key.0).wrapping_add(print))
+}
+
 impl Seen {
     /// Of the sum of two copies.
     pub(crate) fn with(self, other: Self) -> Self {
         let newer = if other.last > self.last { other } else { self };
-        Self { frames: self.frames.saturating_add(other.frames), call: self.call.max(other.call), ..newer }
+        Self {
+            frames: self.frames.saturating_add(other.frames),
+            call: self.call.max(other.call),
+            stamp: self.stamp.max(other.stamp),
+            ..newer
+        }
     }
 }

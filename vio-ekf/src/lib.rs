@@ -40,14 +40,18 @@
 //! Frames: poses are `world_from_body`, world `z` up where [`Alignment::PosYaw`] or gravity is meant. Metres, radians,
 //! nanoseconds. Quaternions are Hamilton's; TUM files put the scalar last, EuRoC files first.
 
+mod camera;
 mod error;
 mod eval;
 mod format;
 mod lie;
+mod measurement;
+pub mod sim;
 mod spline;
 mod stamp;
 mod trajectory;
 
+pub use camera::{Camera, Distortion};
 pub use error::Error;
 pub use eval::align::{Alignment, align, apply};
 pub use eval::associate::{Association, PosePairs, associate};
@@ -57,8 +61,9 @@ pub use eval::nees::{Nees, PoseCovariance, nees};
 pub use eval::rpe::{PairsFrom, Rpe, RpeSettings, Span, Tolerance, rpe};
 pub use eval::stats::Stats;
 pub use eval::{Evaluation, EvaluationSettings, Segment, evaluate};
-pub use format::{euroc, kitti, tum};
+pub use format::{asl, calibration, euroc, kitti, tum};
 pub use lie::{se3, so3};
+pub use measurement::{ImageView, Imu, ImuNoise};
 pub use nalgebra;
 pub use spline::{Motion, Spline};
 pub use stamp::Stamp;

@@ -24,7 +24,7 @@ pub(crate) struct Entry {
 
 impl Entry {
     pub(crate) fn write(&self, out: &mut Vec<u8>) {
-        let Label { print, last, frames, peaks } = self.label;
+        let Label { print, last, frames, peaks, stamp: _ } = self.label;
         out.extend_from_slice(&self.key.0.to_le_bytes());
         out.extend_from_slice(&print.to_le_bytes());
         out.extend_from_slice(&last.to_le_bytes());
@@ -48,7 +48,7 @@ pub(crate) fn read_index(bytes: &[u8], section: Section, blocks: Section) -> Res
         if !ascending || Key::new(key.block()) != Some(key) || usize::from(len) > MOST_BYTES || !last.is_finite() {
             return Err(numbers.bad());
         }
-        entries.push(Entry { key, at, len, label: Label { print, last, frames, peaks } });
+        entries.push(Entry { key, at, len, label: Label { print, last, frames, peaks, stamp: 0 } });
         at += u64::from(len);
     }
     numbers.end()?;

@@ -6,11 +6,15 @@
 //! agree, and the surface closes. Every cut edge is an entry on one of its two faces and an exit on the other, so the
 //! segments link up into closed loops, and these are filled with triangles whose inner edges never lie in a face.
 
+use std::sync::LazyLock;
+
+use super::patch::LATTICE;
+
 /// Corner `c` of a cell is at `(c & 1, c >> 1 & 1, c >> 2)`; an edge is named by its lower corner and its axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Edge {
-    pub(crate) corner: usize,
-    pub(crate) axis: usize,
+struct Edge {
+    corner: usize,
+    axis: usize,
 }
 
 impl Edge {
@@ -26,18 +30,39 @@ impl Edge {
     }
 }
 
-/// Triangles of every case; bit `c` of a case is set where corner `c` is solid.
-pub(crate) struct Cases(Vec<Vec<[Edge; 3]>>);
+/// The surface in a cell.
+pub(crate) struct Case {
+    /// The cut edges: three times the lower corner's place in a lattice of 9³ corners, as seen from the cell's, and the
+    /// axis.
+    pub(crate) edges: Vec<u16>,
+    /// Counter-clockwise triangles, seen from the free side, between these edges.
+    pub(crate) triangles: Vec<[u8; 3]>,
+}
 
-impl Cases {
-    pub(crate) fn new() -> Self {
-        Self((0..256).map(|case| loops(case).iter().flat_map(|polygon| fill(polygon)).collect()).collect())
-    }
+/// The cell of each case; bit `c` of a case is set where corner `c` is solid.
+pub(crate) static CASES: LazyLock<Vec<Case>> =
+    LazyLock::new(|| (0..256).map(|case| Case::of(&triangles(case))).collect());
 
-    /// Counter-clockwise triangles, seen from the free side.
-    pub(crate) fn triangles(&self, case: u8) -> &[[Edge; 3]] {
-        &self.0[usize::from(case)]
+impl Case {
+    fn of(triangles: &[[Edge; 3]]) -> Self {
+        let mut edges: Vec<Edge> = Vec::new();
+        let mut number = |edge: Edge| {
+            let known = edges.iter().position(|&other| other == edge);
+            known.unwrap_or_else(|| {
+                edges.push(edge);
+                edges.len() - 1
+            }) as u8
+        };
+        let triangles = triangles.iter().map(|triangle| triangle.map(&mut number)).collect();
+        let place = |c: usize| (c & 1) + LATTICE * ((c >> 1 & 1) + LATTICE * (c >> 2));
+        let edges = edges.iter().map(|edge| (3 * place(edge.corner) + edge.axis) as u16).collect();
+        Self { edges, triangles }
     }
+}
+
+/// The triangles of a case, counter-clockwise seen from the free side.
+fn triangles(case: usize) -> Vec<[Edge; 3]> {
+    loops(case).iter().flat_map(|polygon| fill(polygon)).collect()
 }
 
 /// The four corners of a face, counter-clockwise from outside the cell.
@@ -108,15 +133,14 @@ fn inner_fill(polygon: &[Edge]) -> Option<Vec<[Edge; 3]>> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Cases, Edge, loops};
+    use super::{Edge, loops, triangles};
 
     #[test]
     fn every_loop_is_filled_and_every_cut_edge_is_used() {
-        let cases = Cases::new();
         for case in 0..256_usize {
             let polygons = loops(case);
-            let triangles: usize = polygons.iter().map(|p| p.len() - 2).sum();
-            assert_eq!(cases.triangles(case as u8).len(), triangles, "case {case:08b}");
+            let count: usize = polygons.iter().map(|p| p.len() - 2).sum();
+            assert_eq!(triangles(case).len(), count, "case {case:08b}");
             let mut cut = Vec::new();
             for a in 0..8_usize {
                 for b in [a | 1, a | 2, a | 4].into_iter().filter(|&b| b != a) {
@@ -134,8 +158,7 @@ mod tests {
     #[test]
     fn a_single_solid_corner_gives_one_triangle_facing_away_from_it() {
         for corner in 0..8_usize {
-            let cases = Cases::new();
-            let [triangle] = cases.triangles(1 << corner) else { panic!("one triangle") };
+            let [triangle] = triangles(1 << corner)[..] else { panic!("one triangle") };
             let at = |edge: &Edge| {
                 let mut p = [0, 1, 2].map(|k| f64::from((edge.corner >> k & 1) as u8));
                 p[edge.axis] = 0.5;
@@ -151,7 +174,7 @@ mod tests {
     #[test]
     fn random_solids_have_closed_surfaces() {
         const SIDE: usize = 9;
-        let cases = Cases::new();
+        let cases: Vec<_> = (0..256).map(triangles).collect();
         for seed in 0..20_u64 {
             // Solid with a probability of a half inside, free at the border.
             let solid = |p: [usize; 3]| {
@@ -163,8 +186,8 @@ mod tests {
             for cell in 0..SIDE * SIDE * SIDE {
                 let cell = [cell % SIDE, cell / SIDE % SIDE, cell / (SIDE * SIDE)];
                 let corner = |c: usize| [0, 1, 2].map(|k| cell[k] + (c >> k & 1));
-                let case = (0..8).fold(0, |case, c| case | u8::from(solid(corner(c))) << c);
-                for triangle in cases.triangles(case) {
+                let case = (0..8).fold(0, |case, c| case | usize::from(solid(corner(c))) << c);
+                for triangle in &cases[case] {
                     let name = triangle.map(|edge| (corner(edge.corner), edge.axis));
                     for k in 0..3 {
                         *half_edges.entry((name[k], name[(k + 1) % 3])).or_insert(0) += 1;

@@ -1,6 +1,10 @@
-//! One name per cut edge, whichever cell asks.
+//! One vertex per cut edge, whichever patch asks.
 
-use crate::block::{SIDE, VOXELS};
+use super::Mesh;
+use super::patch::Patch;
+use crate::block::VOXELS;
+use crate::key::Key;
+use crate::slots::Slots;
 
 const WORDS: usize = 3 * VOXELS / 64;
 
@@ -17,8 +21,8 @@ impl EdgeSet {
     pub(crate) const EMPTY: Self = Self { bits: [0; WORDS], base: [0; WORDS] };
 
     /// The name of the edge that leaves `voxel` along `axis`.
-    pub(crate) fn edge(voxel: [usize; 3], axis: usize) -> usize {
-        3 * (voxel[0] + SIDE * (voxel[1] + SIDE * voxel[2])) + axis
+    pub(crate) fn edge(voxel: usize, axis: usize) -> usize {
+        3 * voxel + axis
     }
 
     pub(crate) fn insert(&mut self, edge: usize) {
@@ -39,18 +43,68 @@ impl EdgeSet {
         let below = self.bits[edge / 64] & ((1 << (edge % 64)) - 1);
         self.base[edge / 64] + below.count_ones()
     }
+}
 
-    /// The edges in the order of their vertices.
-    pub(crate) fn edges(&self) -> impl Iterator<Item = usize> + '_ {
-        self.bits.iter().enumerate().flat_map(|(word, &bits)| {
-            let mut rest = bits;
-            std::iter::from_fn(move || {
-                let bit = (rest != 0).then(|| rest.trailing_zeros() as usize)?;
-                rest &= rest - 1;
-                Some(64 * word + bit)
-            })
-        })
+/// One mesh of all patches: vertices in the order of their blocks and edges, faces in the order of the blocks and cells.
+pub(crate) fn weld(patches: &Slots<Patch>) -> Mesh {
+    let mut order: Vec<(Key, u32)> = patches.keys().iter().copied().zip(0..).collect();
+    order.sort_unstable();
+    let mut edges = vec![EdgeSet::EMPTY; order.len()];
+    let owners: Vec<[u32; 8]> = order.iter().map(|&(key, slot)| owners(patches, key, slot)).collect();
+    for (&(_, slot), owners) in order.iter().zip(&owners) {
+        for vertex in &patches.values()[slot as usize].vertices {
+            edges[owners[usize::from(vertex.step)] as usize].insert(usize::from(vertex.edge));
+        }
     }
+    let count = order.iter().fold(0, |next, &(_, slot)| edges[slot as usize].number(next)) as usize;
+    let mut mesh = Mesh {
+        positions: vec![[0.0; 3]; count],
+        faces: Vec::with_capacity(patches.values().iter().map(|patch| patch.faces.len()).sum()),
+        normals: vec![[0.0; 3]; count],
+        colours: vec![[0; 3]; count],
+    };
+    let mut outward = vec![0; count];
+    let mut numbers = Vec::new();
+    for (&(_, slot), owners) in order.iter().zip(&owners) {
+        let patch = &patches.values()[slot as usize];
+        numbers.clear();
+        for vertex in &patch.vertices {
+            let number = edges[owners[usize::from(vertex.step)] as usize].vertex(usize::from(vertex.edge));
+            let at = number as usize;
+            mesh.positions[at] = vertex.position;
+            mesh.colours[at] = vertex.colour;
+            mesh.normals[at] = [0, 1, 2].map(|k| mesh.normals[at][k] + vertex.normal[k]);
+            outward[at] = vertex.outward;
+            numbers.push(number);
+        }
+        mesh.faces.extend(patch.faces.iter().map(|face| face.map(|k| numbers[usize::from(k)])));
+    }
+    for (normal, &outward) in mesh.normals.iter_mut().zip(&outward) {
+        *normal = unit(*normal).unwrap_or_else(|| along(outward));
+    }
+    mesh
+}
+
+/// Slots of the blocks that own the vertices of a patch. Where a patch has a vertex, the block of its lower end exists.
+fn owners(patches: &Slots<Patch>, key: Key, slot: u32) -> [u32; 8] {
+    let mut owners = [slot; 8];
+    for n in (1..8).filter(|n| patches.values()[slot as usize].steps >> n & 1 == 1) {
+        let owner = key.neighbour([n & 1, n >> 1 & 1, n >> 2]).and_then(|key| patches.slot(key));
+        owners[n as usize] = owner.map_or(slot, |slot| slot as u32);
+    }
+    owners
+}
+
+fn unit(v: [f32; 3]) -> Option<[f32; 3]> {
+    let norm = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+    (norm > 1e-20).then(|| v.map(|c| c / norm))
+}
+
+/// The unit vector along an edge, towards its free end.
+fn along(outward: u8) -> [f32; 3] {
+    let mut unit = [0.0; 3];
+    unit[usize::from(outward & 3)] = if outward & 4 == 0 { -1.0 } else { 1.0 };
+    unit
 }
 
 #[cfg(test)]
@@ -63,7 +117,6 @@ mod tests {
         let edges = [0, 1, 63, 64, 200, 1535];
         edges.iter().rev().for_each(|&edge| set.insert(edge));
         assert_eq!(set.number(10), 16);
-        assert_eq!(set.edges().collect::<Vec<_>>(), edges);
         assert_eq!(edges.map(|edge| set.vertex(edge)), [10, 11, 12, 13, 14, 15]);
     }
 }

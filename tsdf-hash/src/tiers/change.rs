@@ -76,7 +76,10 @@ impl Copies {
                 .and_then(|()| self.absent(frame, sign, &mut absent, moment, threads, &mut change)),
         };
         match outcome {
-            Ok(partials) => self.finish(sign, partials, moment, &mut change),
+            Ok(partials) => {
+                self.finish(sign, partials, moment, &mut change);
+                self.removed += change.removed as u64;
+            }
             Err(error) => {
                 self.cold.abort();
                 self.undo(frame, sign, &change.touched, threads);
@@ -190,12 +193,12 @@ impl Copies {
         Ok(kept)
     }
 
-    fn seen_now(&self, moment: Moment) -> Seen {
-        Seen { last: moment.time, frames: 1, call: self.call }
+    fn seen_now(&mut self, moment: Moment) -> Seen {
+        Seen { last: moment.time, frames: 1, call: self.call, stamp: self.active.tick() }
     }
 
     /// Without cold memory it is active memory that is full.
-    fn or_no_tiers(&self, error: Error) -> Error {
+    pub(super) fn or_no_tiers(&self, error: Error) -> Error {
         if self.cold.exists() { error } else { self.active.out_of_budget() }
     }
 
@@ -210,7 +213,7 @@ impl Copies {
         let Some(label) = label.filter(|_| !sum.subtract(&partial.block)) else {
             return Err(refused(Sign::Minus, partial.key));
         };
-        let seen = Seen { frames: label.frames.saturating_sub(1), ..label.seen() };
+        let seen = Seen { frames: label.frames.saturating_sub(1), stamp: self.active.tick(), ..label.seen() };
         self.cold.stage_instead(partial.key, &sum, seen)?;
         Ok(sum.is_empty())
     }

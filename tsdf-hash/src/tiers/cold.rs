@@ -20,6 +20,8 @@ pub(crate) struct Label {
     pub(crate) last: f64,
     pub(crate) frames: u32,
     pub(crate) peaks: [u16; 2],
+    /// See [`Seen::stamp`].
+    pub(crate) stamp: u64,
 }
 
 /// Where a packed block lies.
@@ -62,6 +64,8 @@ pub(crate) struct Cold {
     staged: Vec<Staged>,
     /// How many of them lie in RAM and on disk.
     pending: [usize; 2],
+    /// The latest stamp of a block that was ever put here.
+    latest: u64,
     buffer: Vec<u8>,
 }
 
@@ -77,6 +81,7 @@ impl Cold {
             hand: Key(0),
             staged: Vec::new(),
             pending: [0; 2],
+            latest: 0,
             buffer: Vec::new(),
         }
     }
@@ -113,6 +118,15 @@ impl Cold {
 
     pub(crate) fn keys(&self) -> impl Iterator<Item = Key> + '_ {
         self.host.keys().chain(self.far.keys()).copied()
+    }
+
+    pub(crate) fn latest(&self) -> u64 {
+        self.latest
+    }
+
+    pub(crate) fn labels(&self) -> impl Iterator<Item = (Key, Label)> + '_ {
+        let host = self.host.iter().map(|(&key, (_, label))| (key, *label));
+        host.chain(self.far.iter().map(|(&key, far)| (key, far.label)))
     }
 
     pub(crate) fn label(&self, key: Key) -> Option<Label> {
@@ -293,6 +307,7 @@ impl Cold {
 
     fn install(&mut self, (key, place, label): Staged) {
         self.remove(key);
+        self.latest = self.latest.max(label.stamp);
         let far = match place {
             Place::Host(bytes) => {
                 self.host.insert(key, (bytes, label));
@@ -332,7 +347,7 @@ fn index_bytes<V>(len: usize) -> usize {
 
 impl Label {
     pub(crate) fn of(block: &Block, seen: Seen) -> Self {
-        Self { print: block.print(), last: seen.last, frames: seen.frames, peaks: block.peaks() }
+        Self { print: block.print(), last: seen.last, frames: seen.frames, peaks: block.peaks(), stamp: seen.stamp }
     }
 
     /// Whether these can be labels of the same block.
@@ -342,6 +357,6 @@ impl Label {
 
     /// As a copy that no call has touched.
     pub(crate) fn seen(self) -> Seen {
-        Seen { last: self.last, frames: self.frames, call: 0 }
+        Seen { last: self.last, frames: self.frames, call: 0, stamp: self.stamp }
     }
 }

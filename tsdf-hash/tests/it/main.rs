@@ -5,8 +5,12 @@
 mod accuracy;
 mod errors;
 mod file;
+#[cfg(feature = "gpu")]
+mod gpu;
+mod incremental;
 mod recorded;
 mod reversible;
 mod scene;
 mod tiers;
+mod timing;
 mod topology;

@@ -1,0 +1,124 @@
+//! A mesh that follows its map is the mesh of the map.
+
+use nalgebra::Isometry3;
+use tsdf_hash::{Map, Mesh, MeshKeeper, Settings, Tiers, write_obj};
+
+use crate::scene::room;
+use crate::tiers::{FREE, add, take_out};
+use crate::topology::assert_manifold;
+
+#[test]
+fn frames_put_in_and_taken_out() {
+    let shots = room::tour(12, 4, &Isometry3::identity());
+    let (mut map, mut keeper) = (Map::new(FREE).unwrap(), MeshKeeper::new());
+    for shot in &shots {
+        let frame = add(&mut map, shot).unwrap();
+        let report = keeper.update(&map).unwrap();
+        assert_eq!((report.changed, report.removed), (frame.blocks, 0));
+        // Seven lower neighbours at most, and most of them changed themselves.
+        assert!(report.rebuilt >= report.changed && report.rebuilt < 2 * report.changed, "{report:?}");
+        assert_eq!(keeper.mesh(), map.mesh());
+    }
+    assert_manifold(&keeper.mesh());
+    assert_eq!(keeper.update(&map).unwrap().rebuilt, 0);
+    let removed: usize = shots
+        .iter()
+        .map(|shot| {
+            let frame = take_out(&mut map, shot).unwrap();
+            let report = keeper.update(&map).unwrap();
+            assert_eq!(keeper.mesh(), map.mesh());
+            assert_eq!(report.removed, frame.blocks_removed);
+            report.removed
+        })
+        .sum();
+    assert!(removed > 1000 && map.blocks() == 0);
+    assert_eq!(keeper.mesh(), Mesh::default());
+}
+
+/// Blocks leave after half a second of frames, come back, and some frames go to cold memory at once.
+#[test]
+fn blocks_that_left_keep_their_mesh() {
+    let shots = room::tour(16, 4, &Isometry3::identity());
+    // All there is room for a frame, a third of one with blocks that are merged late, and updates not after every frame.
+    for (max_bytes, hold, every) in [(6 << 20, 0.0, 1), (1 << 20, 0.1, 1), (2 << 20, 0.0, 5)] {
+        let tiers = Tiers { host_bytes: 64 << 20, age: 0.15, transfers: 200, hold, ..FREE.tiers };
+        let mut capped = Map::new(Settings { max_bytes, tiers, ..FREE }).unwrap();
+        let mut free = Map::new(FREE).unwrap();
+        let mut keeper = MeshKeeper::new();
+        let order: Vec<usize> = (0..16).chain([0, 1, 2, 9, 4]).collect();
+        for (step, &k) in order.iter().enumerate() {
+            add(&mut capped, &shots[k]).unwrap();
+            add(&mut free, &shots[k]).unwrap();
+            if step % every == 0 {
+                keeper.update(&capped).unwrap();
+                assert_eq!(keeper.mesh(), free.mesh(), "{max_bytes} bytes, after frame {step}");
+            }
+        }
+        let memory = capped.memory();
+        assert!(memory.host_blocks > memory.active_blocks, "{memory:?}");
+        for (step, &k) in order[..14].iter().enumerate() {
+            take_out(&mut capped, &shots[k]).unwrap();
+            take_out(&mut free, &shots[k]).unwrap();
+            if step % every == 0 {
+                keeper.update(&capped).unwrap();
+                assert_eq!(keeper.mesh(), free.mesh(), "{max_bytes} bytes, without frame {step}");
+            }
+        }
+        assert_manifold(&keeper.mesh());
+        // What is left in active memory is less than the whole.
+        assert!(capped.mesh().faces.len() < keeper.mesh().faces.len());
+    }
+}
+
+#[test]
+fn another_map_starts_anew() {
+    let shots = room::tour(12, 8, &Isometry3::identity());
+    let [mut first, mut second] = [0, 1].map(|_| Map::new(FREE).unwrap());
+    let mut keeper = MeshKeeper::new();
+    add(&mut first, &shots[0]).unwrap();
+    keeper.update(&first).unwrap();
+    add(&mut second, &shots[6]).unwrap();
+    add(&mut second, &shots[7]).unwrap();
+    for map in [&second, &first, &second] {
+        assert_eq!(keeper.update(map).unwrap().changed, map.blocks());
+        assert_eq!(keeper.mesh(), map.mesh());
+    }
+}
+
+#[test]
+fn obj_reads_back_to_the_same_bits() {
+    let mut map = Map::new(FREE).unwrap();
+    add(&mut map, &room::tour(12, 8, &Isometry3::identity())[3]).unwrap();
+    let mesh = map.mesh();
+    let mut file = Vec::new();
+    write_obj(&mesh, &mut file).unwrap();
+    let mut back = Mesh::default();
+    for line in std::str::from_utf8(&file).unwrap().lines() {
+        let (kind, rest) = line.split_once(' ').unwrap();
+        let three = |from: usize| {
+            let mut values = rest.split(' ').skip(from).map(|v| v.parse::<f32>().unwrap());
+            [0; 3].map(|_| values.next().unwrap())
+        };
+        match kind {
+            "v" => {
+                back.positions.push(three(0));
+                back.colours.push(three(3).map(|c| (255.0 * c).round() as u8));
+            }
+            "vn" => back.normals.push(three(0)),
+            "f" => {
+                let corners: Vec<u32> = rest
+                    .split(' ')
+                    .map(|corner| {
+                        let (position, normal) = corner.split_once("//").unwrap();
+                        assert_eq!(position, normal);
+                        position.parse::<u32>().unwrap() - 1
+                    })
+                    .collect();
+                back.faces.push(corners.try_into().unwrap());
+            }
+            _ => panic!("{line}"),
+        }
+    }
+    assert!(mesh.faces.len() > 1000);
+    assert_eq!(back, mesh);
+}

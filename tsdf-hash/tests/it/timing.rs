@@ -1,0 +1,51 @@
+//! Times, printed and not judged: `cargo test --release -p tsdf-hash --test it -- --ignored --nocapture`.
+
+use nalgebra::Isometry3;
+use tsdf_hash::{Map, MeshKeeper, Settings};
+
+use crate::scene::room;
+use crate::tiers::add;
+
+/// Milliseconds that this thread has run.
+fn thread_ms() -> f64 {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap();
+    text.split(' ').next().unwrap().parse::<f64>().unwrap() * 1e-6
+}
+
+fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let start = thread_ms();
+    let result = work();
+    (result, thread_ms() - start)
+}
+
+fn median(times: &mut [f64]) -> f64 {
+    times.sort_by(f64::total_cmp);
+    times[times.len() / 2]
+}
+
+#[test]
+#[ignore = "prints times"]
+fn meshes_of_the_room_at_one_centimetre() {
+    let mut map = Map::new(Settings::default()).unwrap();
+    let mut keeper = MeshKeeper::new();
+    let (mut fusions, mut updates) = (Vec::new(), Vec::new());
+    let (mut changed, mut rebuilt) = (0, 0);
+    for shot in room::tour(60, 1, &Isometry3::identity()) {
+        fusions.push(timed(|| add(&mut map, &shot).unwrap()).1);
+        let (report, time) = timed(|| keeper.update(&map).unwrap());
+        updates.push(time);
+        changed += report.changed;
+        rebuilt += report.rebuilt;
+    }
+    let worst = updates.iter().copied().fold(0.0, f64::max);
+    let (changed, rebuilt) = (changed / 60, rebuilt / 60);
+    println!("fusion {:.2} ms, update {:.2} ms (worst {worst:.2})", median(&mut fusions), median(&mut updates));
+    println!("{changed} blocks changed and {rebuilt} rebuilt per frame, {} in all", map.blocks());
+    let mut times = [0; 5].map(|_| timed(|| keeper.mesh()).1);
+    println!("welding {:.1} ms", median(&mut times));
+    let mut times = [0; 5].map(|_| timed(|| map.mesh()).1);
+    let mesh = map.mesh();
+    let (vertices, faces) = (mesh.positions.len(), mesh.faces.len());
+    println!("full mesh {:.1} ms, {vertices} vertices, {faces} faces", median(&mut times));
+    assert_eq!(keeper.mesh(), mesh);
+}
