@@ -78,7 +78,7 @@ impl Search<'_> {
     /// Least and largest depth.
     fn range(&self, from: [usize; 2], to: [usize; 2]) -> [f32; 2] {
         let width = self.depth.width;
-        let pixels = (from[1]..to[1]).flat_map(|v| self.planes.get(v * width + from[0]..v * width + to[0])).flatten();
+        let pixels = (from[1]..to[1]).filter_map(|v| self.planes.get(v * width + from[0]..v * width + to[0])).flatten();
         let depths = pixels.filter_map(Plane::omega).map(|omega| 1.0 / omega);
         depths.fold([f32::INFINITY, 0.0], |[near, far], z| [near.min(z), far.max(z)])
     }
