@@ -38,11 +38,41 @@ fn a_plane_is_exact_to_the_rounding_of_the_sums() {
             let point = Point3::from(base + normal.into_inner() * distance);
             let found = map.distance(&point).unwrap();
             assert!((found - distance).abs() < 1.5e-5, "{found} instead of {distance}");
+            let (again, gradient) = map.distance_and_gradient(&point).unwrap();
+            assert_eq!(again, found);
+            assert!((gradient - normal.into_inner()).norm() < 2e-3, "{gradient}");
         }
         assert!(map.distance(&Point3::from(base + normal.into_inner() * 0.5)).is_none());
         assert!(map.distance(&Point3::new(f64::NAN, 0.0, 0.0)).is_none());
+        assert!(map.distance_and_gradient(&Point3::new(0.0, f64::INFINITY, 0.0)).is_none());
         assert!(map.distance(&Point3::new(1e300, 0.0, 0.0)).is_none());
     }
+}
+
+#[test]
+fn the_gradient_is_that_of_the_distance() {
+    let mut map = Map::new(Settings { voxel_size: 0.02, ..Settings::default() }).unwrap();
+    for shot in room::tour(12, 4, &Isometry3::identity()) {
+        map.integrate(&shot.view(), None, &shot.world_from_camera).unwrap();
+    }
+    // Inside a cell the distance is linear along each axis, so central differences are exact; all blocks are crossed.
+    let (step, mut known) = (0.004, 0);
+    for position in map.mesh().positions.iter().step_by(7) {
+        let low = position.map(|c| ((f64::from(c) + 0.0137) / 0.02 - 0.5).floor());
+        let point = Point3::new(0.3, 0.45, 0.7) + Vector3::from(low);
+        let point = Point3::from((point.coords + Vector3::repeat(0.5)) * 0.02);
+        let Some((distance, gradient)) = map.distance_and_gradient(&point) else { continue };
+        known += 1;
+        assert_eq!(Some(distance), map.distance(&point));
+        for axis in 0..3 {
+            let mut ends = [point; 2];
+            ends[0][axis] -= step;
+            ends[1][axis] += step;
+            let [below, above] = ends.map(|p| map.distance(&p).unwrap());
+            assert!(((above - below) / (2.0 * step) - gradient[axis]).abs() < 1e-9);
+        }
+    }
+    assert!(known > 5000, "{known}");
 }
 
 #[test]
