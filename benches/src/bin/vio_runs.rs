@@ -4,9 +4,9 @@ use std::error::Error;
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
-use std::time::Instant;
 
 use clap::Parser;
+use cpu_time::ThreadTime;
 use nalgebra::Vector3;
 use paintcopter_benches::Rng;
 use serde_json::json;
@@ -22,7 +22,7 @@ type AnyError = Box<dyn Error>;
 #[derive(Parser)]
 #[command(after_help = "Example: vio_runs --sequence MH_03 --seeds 5")]
 struct Arguments {
-    /// MH_01, MH_03, MH_04, V1_02; all of them if none is named. Several may be given
+    /// `MH_01`, `MH_03`, `MH_04`, `V1_02`; all of them if none is named. Several may be given
     #[arg(long)]
     sequence: Vec<String>,
     /// Runs of each sequence, with seeds 1, 2, ...: another room, other noise
@@ -88,12 +88,12 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
         for seed in arguments.first_seed..arguments.first_seed + arguments.seeds {
             let simulation = Simulation::new(spline.clone(), Scenario { seed, ..Scenario::default() })?;
             if let Some(step) = arguments.starts {
-                starts(&simulation, name, seed, settings, arguments, step, &mut tally)?;
+                starts(&simulation, name, seed, &settings, arguments, step, &mut tally)?;
                 continue;
             }
-            let mut outcome = follow(&simulation, name, seed, settings, arguments)?;
+            let mut outcome = follow(&simulation, name, seed, &settings, arguments)?;
             for _ in 1..arguments.repeats {
-                let again = follow(&simulation, name, seed, settings, arguments)?;
+                let again = follow(&simulation, name, seed, &settings, arguments)?;
                 for (least, time) in outcome.millis.iter_mut().zip(again.millis) {
                     *least = least.min(time);
                 }
@@ -140,7 +140,9 @@ fn spline(data: &Path, name: &str, seconds: Option<f64>) -> Result<Spline, AnyEr
     let path = data.join(file);
     let output = Command::new("gzip").arg("-dc").arg(&path).output()?;
     if !output.status.success() {
-        return Err(format!("cannot read {}: set PAINTCOPTER_DATA to the folder with the recordings", path.display()).into());
+        return Err(
+            format!("cannot read {}: set PAINTCOPTER_DATA to the folder with the recordings", path.display()).into()
+        );
     }
     let text = String::from_utf8(output.stdout)?;
     let whole = if file.ends_with("csv.gz") { euroc::read(&text)?.trajectory } else { tum::read(&text)? };
@@ -156,12 +158,12 @@ fn follow(
     simulation: &Simulation,
     name: &str,
     seed: u64,
-    settings: Settings,
+    settings: &Settings,
     arguments: &Arguments,
 ) -> Result<Outcome, AnyError> {
     let (camera, imu) = (CameraModel::default().camera, ImuModel::default());
     let recording = simulation.imu(0)?;
-    let mut vio = Vio::new(camera, imu.noise, settings)?;
+    let mut vio = Vio::new(camera, imu.noise, *settings)?;
     let mut samples = recording.samples.iter();
     let first = samples.next().ok_or("the sequence is too short")?;
     vio.imu(first)?;
@@ -169,11 +171,12 @@ fn follow(
 
     let mut film = Film::new(simulation, name, seed, arguments)?;
     let (mut truth, mut estimate) = (Trajectory::default(), Trajectory::default());
-    let mut outcome = Outcome { se3: 0.0, yaw: 0.0, nees: [0.0; 5], millis: Vec::new(), imu_micros: Vec::new(), diverged: false };
+    let mut outcome =
+        Outcome { se3: 0.0, yaw: 0.0, nees: [0.0; 5], millis: Vec::new(), imu_micros: Vec::new(), diverged: false };
     let mut next = samples.next();
     while let Some(frame) = film.next()? {
         while let Some(sample) = next {
-            let began = Instant::now();
+            let began = ThreadTime::now();
             vio.imu(sample)?;
             black_box(vio.output());
             outcome.imu_micros.push(began.elapsed().as_secs_f64() * 1e6);
@@ -182,7 +185,7 @@ fn follow(
                 break;
             }
         }
-        let began = Instant::now();
+        let began = ThreadTime::now();
         let report = vio.image(frame.stamp, &frame.view())?;
         outcome.millis.push(began.elapsed().as_secs_f64() * 1e3);
         outcome.diverged |= matches!(report.status, Status::Diverged(_));
@@ -224,7 +227,7 @@ fn starts(
     simulation: &Simulation,
     name: &str,
     seed: u64,
-    settings: Settings,
+    settings: &Settings,
     arguments: &Arguments,
     step: f64,
     tally: &mut [usize; 4],
@@ -234,7 +237,7 @@ fn starts(
     let (first, last) = simulation.spline().span();
     let mut from = 0.0;
     while last.secs_since(first) > from + PATIENCE + JUDGED_AFTER + 0.1 {
-        let mut vio = Vio::new(camera, imu.noise, settings)?;
+        let mut vio = Vio::new(camera, imu.noise, *settings)?;
         let mut samples = recording.samples.iter().skip_while(|s| s.stamp.secs_since(first) < from);
         let mut film = Film::new(simulation, name, seed, arguments)?;
         film.index = (from * CameraModel::default().rate_hz) as usize + 1;
@@ -272,8 +275,11 @@ fn starts(
             let wrong = off > 0.2 * truth && off > 0.05 && !matches!(status, Status::Diverged(_));
             tally[2] += usize::from(good);
             tally[3] += usize::from(wrong);
-            println!("{}", json!({"sequence": name, "seed": seed, "from_s": from, "started_after_s": start,
-                "length_true_m": truth, "length_m": ours, "diverged": matches!(status, Status::Diverged(_))}));
+            println!(
+                "{}",
+                json!({"sequence": name, "seed": seed, "from_s": from, "started_after_s": start,
+                "length_true_m": truth, "length_m": ours, "diverged": matches!(status, Status::Diverged(_))})
+            );
         } else {
             println!("{}", json!({"sequence": name, "seed": seed, "from_s": from, "status": format!("{status:?}")}));
         }
@@ -352,7 +358,8 @@ impl<'a> Film<'a> {
             let file = folder.join(index.to_string());
             if let Ok(bytes) = std::fs::read(&file) {
                 let (head, data) = bytes.split_at_checked(16).ok_or("a file of the cache is cut off")?;
-                let stamps: [i64; 2] = [0, 8].map(|k| i64::from_le_bytes(head[k..k + 8].try_into().unwrap_or_default()));
+                let stamps: [i64; 2] =
+                    [0, 8].map(|k| i64::from_le_bytes(head[k..k + 8].try_into().unwrap_or_default()));
                 let [stamp, true_stamp] = stamps.map(Stamp::from_nanos);
                 let camera = CameraModel::default().camera;
                 let (width, height) = (camera.width, camera.height);
