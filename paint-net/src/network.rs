@@ -116,10 +116,12 @@ impl Network {
         self.shape.tensors().into_iter().map(tensor).collect()
     }
 
+    #[cfg(feature = "train")]
     pub(crate) fn from_parameters(shape: Shape, parameters: Vec<f32>) -> Self {
         Self { shape, parameters }
     }
 
+    #[cfg(feature = "train")]
     pub(crate) fn into_parameters(self) -> Vec<f32> {
         self.parameters
     }
