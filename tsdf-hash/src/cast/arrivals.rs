@@ -210,8 +210,7 @@ fn each_point(arrivals: &Arrivals, key: Key, mut work: impl FnMut(Point)) {
     let Some(patch) = Patch::of(arrivals, key) else { return };
     let corner = Vector3::from(key.block().map(|c| f64::from(c) * settings.block_size()));
     for voxel in 0..VOXELS {
-        // At one the distance is cut off, and says nothing.
-        let Some(distance) = patch.block.mean(voxel).filter(|distance| distance.abs() < 1.0) else { continue };
+        let Some(distance) = known(patch.block, voxel) else { continue };
         let at = [voxel % SIDE, voxel / SIDE % SIDE, voxel / (SIDE * SIDE)];
         let Some(normal) = patch.gradient(at, distance).and_then(|gradient| gradient.try_normalize(1e-3)) else {
             continue;
@@ -221,6 +220,11 @@ fn each_point(arrivals: &Arrivals, key: Key, mut work: impl FnMut(Point)) {
         let colour = patch.block.mean_colour(voxel).map_or(UNSEEN, |rgb| rgb.map(|c| (c + 0.5).min(255.0) as u8));
         work(Point { position, normal, distance, weight: patch.block.weight[voxel], colour });
     }
+}
+
+/// Mean of a voxel; at one it is cut off, and says nothing.
+fn known(block: &Block, voxel: usize) -> Option<f32> {
+    block.mean(voxel).filter(|distance| distance.abs() < 1.0)
 }
 
 /// A held block and those beside it.
@@ -256,12 +260,12 @@ impl<'a> Patch<'a> {
         Some(gradient)
     }
 
-    /// Mean of the next voxel along an axis.
+    /// Mean of the next voxel along an axis, unless it is cut off.
     fn next(&self, at: [usize; 3], axis: usize, up: bool) -> Option<f32> {
         let last = if up { SIDE - 1 } else { 0 };
         let block = if at[axis] == last { self.beside[axis][usize::from(up)]? } else { self.block };
         let mut next = at;
         next[axis] = (at[axis] + if up { 1 } else { SIDE - 1 }) % SIDE;
-        block.mean(next[0] + SIDE * (next[1] + SIDE * next[2]))
+        known(block, next[0] + SIDE * (next[1] + SIDE * next[2]))
     }
 }

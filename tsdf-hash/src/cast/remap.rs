@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::splat::{Raster, Target, focal};
+use super::splat::{Raster, Target, facing, focal};
 use super::{Pixel, View};
 use crate::Error;
 use crate::view::{Intrinsics, check_pose, check_sides};
@@ -11,6 +11,8 @@ use crate::view::{Intrinsics, check_pose, check_sides};
 const SHARE: f32 = 0.9;
 /// Hits so many pixels' widths behind one another are of one surface.
 const SAME_SURFACE: f64 = 4.0;
+/// Hits that were seen steeply become no wider than this many pixels, so that rims do not smear.
+const MOST_STRETCH: f64 = 2.0;
 /// Nearer or farther is not drawn, metres.
 const DEPTHS: [f64; 2] = [1e-3, 1e3];
 
@@ -19,8 +21,8 @@ impl View {
     /// frames between two ray casts ("onboard+", thesis Paper I, section 6.2; the forward projection `F` of its Eq.
     /// (5.6)).
     ///
-    /// Every hit is a piece of its tangent plane, as wide as its pixel was (`z / f`), and covers the pixels whose centres
-    /// lie within `f' (z / f) / 2z'` of its projection, at least a half; the depth of each is that of the plane there, so
+    /// Every hit is a piece of its tangent plane, as wide as its pixel was (`s = z / f`, up to twice that where it is now
+    /// seen less steeply), and covers the pixels whose centres lie within `f' s / 2z'` of its projection, at least a half; the depth of each is that of the plane there, so
     /// the rounding to pixels leaves no error on planes. The nearest surface wins, on it the hit nearest to the centre of
     /// the pixel, then the first. Gaps of one pixel are closed. Normals, colours and weights are carried along; what
     /// faces away from the new camera is left out, and what this view did not see stays empty.
@@ -67,12 +69,16 @@ impl View {
                 return Err(Error::WrongLength { image: "view", expected, found });
             }
         }
+        let eye = Point3::from(self.world_from_camera.translation.vector);
         for (at, &depth) in self.depth.iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
             let z = f64::from(depth);
             let (u, v) = ((at % self.width) as f64, (at / self.width) as f64);
             let point = self.world_from_camera * Point3::new((u - k.cx) / k.fx * z, (v - k.cy) / k.fy * z, z);
             let normal = Vector3::from(self.normals[at].map(f64::from));
-            if let Some(splat) = target.splat(&point, &normal, z / focal(&k), score(at), at as u32) {
+            // Along its slope a pixel covers more of the surface, and it shows when that is seen less steeply.
+            let stretch = target.facing(&point, &normal) / facing(&eye, &point, &normal);
+            let size = z / focal(&k) * stretch.clamp(1.0, MOST_STRETCH);
+            if let Some(splat) = target.splat(&point, &normal, size, score(at), at as u32) {
                 raster.push(splat);
             }
         }

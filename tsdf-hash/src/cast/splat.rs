@@ -13,6 +13,7 @@ const GRAZING: f64 = 0.1;
 pub(super) struct Target {
     k: Intrinsics,
     camera_from_world: Isometry3<f64>,
+    eye: Point3<f64>,
     pub(super) depths: [f64; 2],
 }
 
@@ -56,7 +57,13 @@ impl Shown {
 
 impl Target {
     pub(super) fn new(k: &Intrinsics, world_from_camera: &Isometry3<f64>, depths: [f64; 2]) -> Self {
-        Self { k: *k, camera_from_world: world_from_camera.inverse(), depths }
+        let eye = world_from_camera.translation.vector.into();
+        Self { k: *k, camera_from_world: world_from_camera.inverse(), eye, depths }
+    }
+
+    /// [`facing`] of this camera.
+    pub(super) fn facing(&self, point_in_world: &Point3<f64>, normal_in_world: &Vector3<f64>) -> f64 {
+        facing(&self.eye, point_in_world, normal_in_world)
     }
 
     pub(super) fn in_camera(&self, point_in_world: &Point3<f64>) -> Point3<f64> {
@@ -91,6 +98,12 @@ impl Target {
         let [at, slope] = [at, slope].map(|pair| pair.map(|c| c as f32));
         Some(Splat { at, inverse: (1.0 / p.z) as f32, slope, reach: reach as f32, score, source })
     }
+}
+
+/// Cosine between a normal and the direction to an eye.
+pub(super) fn facing(eye: &Point3<f64>, point: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
+    let to_eye = eye - point;
+    normal.dot(&to_eye) / to_eye.norm()
 }
 
 /// The larger focal length, pixels.
