@@ -1,7 +1,7 @@
 //! Times, printed and not judged: `cargo test --release -p tsdf-hash --test it -- --ignored --nocapture`.
 
 use nalgebra::Isometry3;
-use tsdf_hash::{Map, MeshKeeper, Settings};
+use tsdf_hash::{ArrivalSettings, ArrivalView, CastSettings, Map, MeshKeeper, Settings, Tiers, View};
 
 use crate::scene::room;
 use crate::tiers::add;
@@ -48,4 +48,34 @@ fn meshes_of_the_room_at_one_centimetre() {
     let (vertices, faces) = (mesh.positions.len(), mesh.faces.len());
     println!("full mesh {:.1} ms, {vertices} vertices, {faces} faces", median(&mut times));
     assert_eq!(keeper.mesh(), mesh);
+}
+
+#[test]
+#[ignore = "prints times"]
+fn views_of_the_room_at_one_centimetre() {
+    let tiers = Tiers { host_bytes: 64 << 20, age: 1.0, hold: f64::MAX, transfers: 200, ..Tiers::default() };
+    let mut map = Map::new(Settings { tiers, ..Settings::default() }).unwrap();
+    let shots = room::tour(60, 1, &Isometry3::identity());
+    // Around twice, half a second between frames: all that is seen in the second round has left.
+    let mut old = ArrivalView::new(ArrivalSettings::default()).unwrap();
+    let mut times = [const { Vec::new() }; 3];
+    let mut cast = View::new();
+    for (k, shot) in shots.iter().chain(&shots[..20]).enumerate() {
+        map.integrate_at(k as f64 * 0.5, &shot.view(), None, &shot.world_from_camera).unwrap();
+        let (camera, pose, next) = (&shot.intrinsics, &shot.world_from_camera, &shots[(k + 1) % 60].world_from_camera);
+        let all = CastSettings::default();
+        times[0].push(timed(|| map.ray_cast_into(camera, 640, 480, pose, &all, &mut cast).unwrap()).1);
+        times[1].push(timed(|| cast.warped(camera, (640, 480), &pose.lerp_slerp(next, 1.0 / 6.0)).unwrap()).1);
+        if k >= 60 {
+            // Another four frames, in which more of the old blocks arrive.
+            for step in 0..4 {
+                let pose = pose.lerp_slerp(next, f64::from(step) / 4.0);
+                times[2].push(timed(|| old.update(&map.arrivals(), camera, (640, 480), &pose).unwrap()).1);
+            }
+        }
+    }
+    println!("blocks held {}, hits {}", map.arrivals().len(), old.view().hits());
+    for (name, times) in ["full cast", "warped", "arrivals"].iter().zip(&mut times) {
+        println!("{name} {:.2} ms (worst {:.2})", median(times), times[times.len() - 1]);
+    }
 }
