@@ -2,7 +2,7 @@
 
 use paint_net::procedural::Texture;
 use paint_net::{
-    Deconvolution, Error, Layered, Limits, MatchingPursuit, Painter, Saturation, SprayKernel, Task, metrics,
+    Deconvolution, Error, Feedback, Layered, Limits, MatchingPursuit, Painter, Saturation, SprayKernel, Task, metrics,
 };
 use paintcopter_benches::criterion;
 
@@ -15,7 +15,8 @@ fn main() -> Result<(), Error> {
     // σ = 2 px, cut at 4 px.
     let kernel = SprayKernel::new(2.0, 2.0)?;
     let limits = Limits::default();
-    let painters: [&dyn Painter; 2] = [&Deconvolution::default(), &MatchingPursuit::default()];
+    let feedback = Feedback::shipped()?;
+    let painters: [&dyn Painter; 3] = [&feedback, &Deconvolution::default(), &MatchingPursuit::default()];
 
     let mut criterion = criterion();
     let mut group = criterion.benchmark_group("paint-net");

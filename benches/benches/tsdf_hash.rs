@@ -1,5 +1,5 @@
-//! Mapping the room of `peers/synth_rgbd.py`: fusion of 640 x 480 images at voxels of 1 and 2 cm on one thread, the mesh,
-//! and distance queries.
+//! Mapping the room of `peers/synth_rgbd.py`: fusion of coloured 640 x 480 images at voxels of 0.5, 1 and 2 cm on one thread,
+//! the mesh, and distance queries.
 
 use criterion::Throughput;
 use nalgebra::Point3;
@@ -16,17 +16,17 @@ const POINTS: usize = 100_000;
 fn map(shots: &[Shot], settings: Settings) -> Result<Map, Error> {
     let mut map = Map::new(settings)?;
     for shot in shots {
-        map.integrate(&shot.view(), None, &shot.world_from_camera)?;
+        map.integrate(&shot.view(), shot.colour().as_ref(), &shot.world_from_camera)?;
     }
     Ok(map)
 }
 
 fn main() -> Result<(), Error> {
-    let shots: Vec<Shot> = (0..TURN).step_by(STRIDE).map(|k| Shot::take(k, TURN)).collect();
+    let shots: Vec<Shot> = (0..TURN).step_by(STRIDE).map(|k| Shot::take(k, TURN).painted()).collect();
     let mut criterion = criterion();
     let mut group = criterion.benchmark_group("tsdf-hash");
-    for voxel_size in [0.02, 0.01] {
-        let settings = Settings { voxel_size, threads: 1, ..Settings::default() };
+    for voxel_size in [0.02, 0.01, 0.005] {
+        let settings = Settings { voxel_size, threads: 1, max_bytes: 2 << 30, ..Settings::default() };
         let mut fused = map(&shots, settings)?;
         let name = format!("at {} cm", 100.0 * voxel_size);
         group.throughput(Throughput::Elements(shots.len() as u64));
@@ -35,8 +35,8 @@ fn main() -> Result<(), Error> {
         let shot = &shots[0];
         group.bench_function(format!("one image out and in again {name}"), |b| {
             b.iter(|| {
-                fused.deintegrate(&shot.view(), None, &shot.world_from_camera)?;
-                fused.integrate(&shot.view(), None, &shot.world_from_camera)
+                fused.deintegrate(&shot.view(), shot.colour().as_ref(), &shot.world_from_camera)?;
+                fused.integrate(&shot.view(), shot.colour().as_ref(), &shot.world_from_camera)
             });
         });
         let faces = fused.mesh().faces.len();

@@ -6,6 +6,7 @@
   python paint_baselines.py painters --set procedural                 the built-in textures instead (no picture needed; hash-seeded, same in any language)
   python paint_baselines.py painters slew noise --image FILE          one or more own pictures (grey, cropped square, resized)
   python paint_baselines.py colour --image FILE                       several paints, Beer-Lambert
+  python paint_baselines.py export --to DIR                           the test pictures as PNG files, for `ours paint --image DIR`
   python paint_baselines.py check                                     gradients against central differences, reference values for unit tests
   python paint_baselines.py conv --budget 100 [--shared] [--additive] [--train procedural]     train and test the feedback painter (torch)
   python paint_baselines.py replica --steps 5                         time one training step of the thesis' DRAW/PAINT network (torch)
@@ -57,6 +58,17 @@ def metrics(o, y):
         bce_h=bce - h,
         ssim_g=float(ssim(o, y, data_range=1.0, gaussian_weights=True, sigma=1.5, use_sample_covariance=False)),
     )
+
+
+def run_export(a):
+    """the pictures as 16-bit PNG files, so that others work on the same numbers"""
+    from skimage import io
+
+    os.makedirs(a.to, exist_ok=True)
+    for name, y in pictures(a):
+        path = os.path.join(a.to, name + ".png")
+        io.imsave(path, np.round((1 - y) * 65535).astype(np.uint16), check_contrast=False)
+        emit(name, "export", file=path)
 
 
 def psnr(o, y):
@@ -784,6 +796,7 @@ def main():
         check=run_check,
         conv=run_conv,
         replica=run_replica,
+        export=run_export,
     )
     p.add_argument("job", nargs="+", choices=["all", *jobs], help="all = check painters slew noise colour (no torch)")
     p.add_argument(
@@ -794,6 +807,7 @@ def main():
     )
     p.add_argument("--size", type=int, default=128, help="side in pixels, a multiple of 32")
     p.add_argument("--quick", action="store_true", help="leave the free splats out")
+    p.add_argument("--to", default="pictures", metavar="DIR", help="export: folder to write to")
     p.add_argument("--seed", type=int, default=0)
     p.add_argument("--budget", type=float, default=100, help="conv: training time, CPU seconds")
     p.add_argument("--passes", type=int, default=6)

@@ -1,12 +1,46 @@
 //! Time as the processor spends it: on a machine that others use as well, wall time says little.
 
 use std::hint::black_box;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use cpu_time::ThreadTime;
+use cpu_time::{ProcessTime, ThreadTime};
 
 /// Shortest time worth reading.
 const LEAST: Duration = Duration::from_millis(100);
+
+/// Times of jobs of a few milliseconds that cannot be repeated, in all threads of this process.
+#[derive(Debug, Default)]
+pub struct Clock {
+    cpu: Vec<f64>,
+    wall: Vec<f64>,
+}
+
+impl Clock {
+    /// Does a job and notes its times.
+    pub fn time<T>(&mut self, job: impl FnOnce() -> T) -> T {
+        let (cpu, wall) = (ProcessTime::now(), Instant::now());
+        let done = job();
+        self.cpu.push(cpu.elapsed().as_secs_f64());
+        self.wall.push(wall.elapsed().as_secs_f64());
+        done
+    }
+
+    /// Median processor time, milliseconds.
+    pub fn cpu_ms(&self) -> f64 {
+        median_ms(&self.cpu)
+    }
+
+    /// Median time on the wall, milliseconds.
+    pub fn wall_ms(&self) -> f64 {
+        median_ms(&self.wall)
+    }
+}
+
+fn median_ms(seconds: &[f64]) -> f64 {
+    let mut sorted = seconds.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    1e3 * sorted.get(sorted.len() / 2).copied().unwrap_or_default()
+}
 
 /// Median over `runs` (at least one) of the seconds that `job` takes on this thread, its result included but not used.
 /// Short jobs are repeated within a run.

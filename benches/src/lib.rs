@@ -3,6 +3,7 @@
 pub mod cpu;
 pub mod films;
 pub mod motion;
+pub mod painting;
 pub mod rock;
 pub mod room;
 

@@ -1,7 +1,10 @@
-//! A furnished room seen by a depth camera: the stream `loop` that `peers/synth_rgbd.py` writes, without its colours.
+//! A furnished room seen by a depth camera: the stream `loop` that `peers/synth_rgbd.py` writes, computed here without its
+//! colours, or read from its files.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use tsdf_hash::{DepthData, DepthView, Intrinsics};
+use std::path::Path;
+
+use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
+use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics};
 
 /// Columns and rows of an image.
 const SIZE: (usize, usize) = (640, 480);
@@ -27,6 +30,8 @@ const BOXES: [[f64; 6]; 4] = [
 pub struct Shot {
     /// Millimetres along the optical axis, row by row.
     depth: Vec<u16>,
+    /// R, G, B; empty without colours.
+    rgb: Vec<u8>,
     /// Pose of the camera.
     pub world_from_camera: Isometry3<f64>,
 }
@@ -39,7 +44,21 @@ impl Shot {
         let depth = (0..SIZE.0 * SIZE.1)
             .map(|pixel| (SCALE * first_hit(&origin, &ray(&world_from_camera, pixel))).round() as u16)
             .collect();
-        Self { depth, world_from_camera }
+        Self { depth, rgb: Vec::new(), world_from_camera }
+    }
+
+    /// The colours as the map reads them.
+    pub fn colour(&self) -> Option<ColourView<'_>> {
+        let data = ColourData::Rgb8(&self.rgb);
+        (!self.rgb.is_empty()).then_some(ColourView { width: SIZE.0, height: SIZE.1, data, intrinsics: INTRINSICS })
+    }
+
+    /// A check pattern of two colours as large as the image, where only the cost of colours matters.
+    #[must_use]
+    pub fn painted(mut self) -> Self {
+        let check = |k: usize| (k % SIZE.0 / 32 + k / SIZE.0 / 32).is_multiple_of(2);
+        self.rgb = (0..SIZE.0 * SIZE.1).flat_map(|k| if check(k) { [200, 40, 30] } else { [40, 60, 190] }).collect();
+        self
     }
 
     /// The camera.
@@ -63,6 +82,33 @@ fn ray(world_from_camera: &Isometry3<f64>, pixel: usize) -> Vector3<f64> {
     let x = ((pixel % SIZE.0) as f64 - INTRINSICS.cx) / INTRINSICS.fx;
     let y = ((pixel / SIZE.0) as f64 - INTRINSICS.cy) / INTRINSICS.fy;
     world_from_camera.rotation * Vector3::new(x, y, 1.0)
+}
+
+/// The first images of a stream in the files of `synth_rgbd.py`, in its own camera.
+pub fn read(folder: &Path, most: usize, coloured: bool) -> Result<Vec<Shot>, String> {
+    let say = |path: &Path, error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
+    let poses = folder.join("groundtruth.txt");
+    let text = std::fs::read_to_string(&poses).map_err(|e| say(&poses, &e))?;
+    let mut shots = Vec::new();
+    for (k, line) in text.lines().take(most).enumerate() {
+        let row: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+        let &[_, x, y, z, i, j, k_, w] = row.as_slice() else {
+            return Err(say(&poses, &format!("line {} is not `t tx ty tz qx qy qz qw`", k + 1)));
+        };
+        let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k_));
+        let path = folder.join(format!("depth/{k:04}.png"));
+        let depth = image::open(&path).map_err(|e| say(&path, &e))?.into_luma16();
+        let path = folder.join(format!("rgb/{k:04}.png"));
+        let rgb =
+            if coloured { image::open(&path).map_err(|e| say(&path, &e))?.into_rgb8().into_raw() } else { Vec::new() };
+        let pixels = SIZE.0 * SIZE.1;
+        if depth.len() != pixels || (coloured && rgb.len() != 3 * pixels) {
+            return Err(say(&path, &"the images must be 640 x 480 pixels"));
+        }
+        let world_from_camera = Isometry3::from_parts(Translation3::new(x, y, z), rotation);
+        shots.push(Shot { depth: depth.into_raw(), rgb, world_from_camera });
+    }
+    Ok(shots)
 }
 
 /// On an ellipse, looking outwards.

@@ -6,6 +6,7 @@ pub mod appearance;
 pub mod design;
 pub mod mesh_io;
 pub mod mission;
+pub mod paint_image;
 pub mod pictures;
 pub mod placing;
 pub mod progress;

@@ -83,7 +83,7 @@ pub(crate) fn fit(
 }
 
 /// `½ Σ w (f(c) - y)²`; replaces the canvas by its derivative with respect to each pixel's depth.
-fn ink_cost(task: &Task, reference: &Image, saturation: &Saturation, canvas: &mut [f64]) -> f64 {
+pub(crate) fn ink_cost(task: &Task, reference: &Image, saturation: &Saturation, canvas: &mut [f64]) -> f64 {
     let mut value = 0.0;
     for (k, (depth, wanted)) in canvas.iter_mut().zip(reference.data()).enumerate() {
         let weight = task.weight(k);
@@ -103,6 +103,19 @@ pub(crate) fn prune(
     volumes: &mut Vec<f64>,
     stop: &Stop,
 ) {
+    let refit = Stop { iterations: stop.iterations.min(40), relative_decrease: stop.relative_decrease };
+    prune_with(board, limits, volumes, &mut |ceiling, volumes| {
+        fit(task, board, saturation, ceiling, volumes, &refit, &mut |_| ());
+    });
+}
+
+/// The same for any way to refit the volumes under their ceilings.
+pub(crate) fn prune_with(
+    board: &Board,
+    limits: &Limits,
+    volumes: &mut Vec<f64>,
+    refit: &mut dyn FnMut(&[f64], &mut Vec<f64>),
+) {
     // Dropping all small ones at once would drop neighbours that could have stood in for each other: halve the bar twice.
     for share in [0.25, 0.5, 1.0] {
         let bar = share * limits.min_volume;
@@ -118,8 +131,7 @@ pub(crate) fn prune(
         }
         let ceiling: Vec<f64> =
             board.ceiling.iter().zip(&keep).map(|(&top, &kept)| if kept { top } else { 0.0 }).collect();
-        let refit = Stop { iterations: stop.iterations.min(40), relative_decrease: stop.relative_decrease };
-        fit(task, board, saturation, &ceiling, volumes, &refit, &mut |_| ());
+        refit(&ceiling, volumes);
     }
     // The refit may have pushed a survivor below the bar: the bar is a promise.
     volumes.iter_mut().filter(|v| **v < limits.min_volume).for_each(|v| *v = 0.0);

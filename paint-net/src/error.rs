@@ -54,6 +54,9 @@ pub enum Error {
         /// First offending knot.
         index: usize,
     },
+    /// A file of weights is not one, or not of this network.
+    #[error("weights: {0}; give a safetensors file written by this crate")]
+    Weights(String),
     /// There is no place to spray, or nothing to look at.
     #[error("{0}: the task leaves nothing to do; check the masks")]
     EmptyTask(&'static str),

@@ -1,5 +1,11 @@
 use crate::kernel::SprayKernel;
 
+/// Pixels of the cells along an axis of `n` pixels. Grids start half a stride in, so that both borders are equally far from
+/// the first cell.
+pub(crate) fn cells(n: usize, stride: usize) -> Vec<usize> {
+    (((stride.max(1) - 1) / 2).min(n.saturating_sub(1))..n).step_by(stride.max(1)).collect()
+}
+
 /// `G`: from the depths of sprays on a regular grid of cells to the canvas, and its adjoint. Cell `(i, j)` sits at column
 /// `x0 + i·along`, row `y0 + j·spacing`. Nothing comes in from outside the picture and what leaves it is lost.
 pub(crate) struct Footprints {
@@ -14,8 +20,6 @@ pub(crate) struct Footprints {
 impl Footprints {
     pub(crate) fn new(kernel: &SprayKernel, size: (usize, usize), along: usize, spacing: usize) -> Self {
         let (width, height) = size;
-        // Grids start half a stride in, so that both borders are equally far from the first cell.
-        let cells = |n: usize, stride: usize| (((stride - 1) / 2).min(n - 1)..n).step_by(stride).collect();
         Self {
             taps: kernel.taps().to_vec(),
             radius: kernel.radius(),

@@ -34,33 +34,46 @@
 //! | 3.3 the "ideal": Gaussian of the reference | [`ideal`] |
 //! | (ours) non-negative deconvolution | [`Deconvolution`] |
 //! | (ours) greedy matching pursuit | [`MatchingPursuit`] |
+//! | (ours) a network that looks at its canvas | [`Feedback`], [`Network`] |
+//! | (ours) coats, with a look at the wall after each | [`Coats`] |
+//! | (ours) a valve of limited speed | [`SlewLimited`] |
 //! | (ours) strokes a robot can fly | [`boustrophedon`] |
 //!
 //! Pixels: centres at integers, `x` = column, `y` = row, row 0 at the top. Lengths are in pixels, depths in the unit of the
 //! saturation curve. Every result is the same bytes for the same input.
 
+mod coats;
 mod deconvolution;
 mod error;
+mod feedback;
 mod footprints;
 mod ideal;
 mod image;
 mod kernel;
 mod layers;
 pub mod metrics;
+mod network;
 mod painter;
 pub mod procedural;
 mod projected_lbfgs;
 mod pursuit;
 mod saturation;
+mod slew;
 mod strokes;
+#[cfg(feature = "train")]
+pub mod train;
 
+pub use coats::{Coated, Coats};
 pub use deconvolution::Deconvolution;
 pub use error::Error;
+pub use feedback::Feedback;
 pub use ideal::ideal;
 pub use image::Image;
 pub use kernel::SprayKernel;
 pub use layers::{Layered, Sharing, Steps};
+pub use network::{Network, Shape};
 pub use painter::{Limits, Painter, Painting, Spray, Task};
 pub use pursuit::MatchingPursuit;
 pub use saturation::{MonotoneCurve, Saturation};
+pub use slew::{SlewLimited, slew_violations};
 pub use strokes::{Stroke, StrokeSettings, boustrophedon};

@@ -134,6 +134,41 @@ pub trait Painter {
     ) -> Result<Painting, Error>;
 }
 
+/// So that painters that wrap others can wrap one that is chosen while running.
+impl<P: Painter + ?Sized> Painter for Box<P> {
+    fn name(&self) -> &'static str {
+        (**self).name()
+    }
+
+    fn paint(
+        &self,
+        task: &Task,
+        kernel: &SprayKernel,
+        saturation: &Saturation,
+        limits: &Limits,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Painting, Error> {
+        (**self).paint(task, kernel, saturation, limits, progress)
+    }
+}
+
+impl<P: Painter + ?Sized> Painter for &P {
+    fn name(&self) -> &'static str {
+        (**self).name()
+    }
+
+    fn paint(
+        &self,
+        task: &Task,
+        kernel: &SprayKernel,
+        saturation: &Saturation,
+        limits: &Limits,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Painting, Error> {
+        (**self).paint(task, kernel, saturation, limits, progress)
+    }
+}
+
 /// A checked task on its grid of cells: what all painters start from.
 pub(crate) struct Board {
     pub(crate) footprints: Footprints,

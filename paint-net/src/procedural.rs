@@ -1,6 +1,10 @@
 //! Seeded textures: the training and test pictures of the painters, the same numbers on every machine.
 
+mod scene;
+
 use crate::image::Image;
+
+pub use scene::scene;
 
 /// The kinds of texture, as ink pictures in `[0, 0.95]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,15 +72,25 @@ pub fn fbm(seed: u64, x: f64, y: f64, octaves: u32) -> f64 {
 }
 
 fn worley(seed: u64, x: f64, y: f64) -> f64 {
-    let mut nearest = 9.0_f64;
+    1.0 - 1.1 * worley_distances(seed, x, y).0
+}
+
+/// Distances to the nearest and second nearest of one random point per unit square, and a number in `[0, 1)` of the nearest.
+fn worley_distances(seed: u64, x: f64, y: f64) -> (f64, f64, f64) {
+    let (mut nearest, mut next, mut of) = (9.0_f64, 9.0_f64, 0.0);
     for dx in -1..=1 {
         for dy in -1..=1 {
             let (i, j) = (x.floor() as i64 + dx, y.floor() as i64 + dy);
             let (px, py) = (i as f64 + lattice(seed, i, j), j as f64 + lattice(seed.wrapping_add(1), i, j));
-            nearest = nearest.min((x - px).hypot(y - py));
+            let distance = (x - px).hypot(y - py);
+            if distance < nearest {
+                (next, nearest, of) = (nearest, distance, lattice(seed.wrapping_add(2), i, j));
+            } else {
+                next = next.min(distance);
+            }
         }
     }
-    1.0 - 1.1 * nearest
+    (nearest, next, of)
 }
 
 fn brick(seed: u64, x: f64, y: f64) -> f64 {

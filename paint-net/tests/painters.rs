@@ -3,8 +3,8 @@
 
 use paint_net::procedural::{Texture, lattice};
 use paint_net::{
-    Deconvolution, Error, Image, Layered, Limits, MatchingPursuit, MonotoneCurve, Painter, Painting, Saturation,
-    Sharing, SprayKernel, Steps, StrokeSettings, Task, boustrophedon, metrics,
+    Coats, Deconvolution, Error, Feedback, Image, Layered, Limits, MatchingPursuit, MonotoneCurve, Painter, Painting,
+    Saturation, Sharing, SprayKernel, Steps, StrokeSettings, Task, boustrophedon, metrics,
 };
 
 fn kernel() -> SprayKernel {
@@ -15,6 +15,8 @@ fn painters() -> Vec<Box<dyn Painter>> {
     vec![
         Box::new(Deconvolution::default()),
         Box::new(MatchingPursuit::default()),
+        Box::new(Feedback::shipped().unwrap()),
+        Box::new(Coats::new(Feedback::shipped().unwrap())),
         Box::new(Layered::new(Deconvolution::default())),
         Box::new(Layered { sharing: Sharing::Sequential, ..Layered::new(Deconvolution::default()) }),
     ]
@@ -80,7 +82,7 @@ fn masks_and_limits_hold() {
     let limits = Limits { max_volume: 0.2, min_volume: 0.02, max_sprays: Some(120), ..Limits::default() };
     for painter in painters() {
         let painting = paint(&*painter, &task, &limits);
-        if painter.name() != "layered" {
+        if !["layered", "coats"].contains(&painter.name()) {
             assert!(painting.sprays.len() <= 120, "{} sprays by {}", painting.sprays.len(), painter.name());
             assert!(painting.sprays.iter().all(|s| s.volume >= 0.02));
         }

@@ -5,39 +5,12 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::key::{Key, mix};
-use crate::surface::Plane;
+use crate::surface::{Plane, TILE, Tile};
 use crate::view::DepthView;
 use crate::{Error, Settings};
 
-/// Edge of the pixel squares that are looked at together.
-pub(crate) const TILE: usize = 8;
 /// Keys remembered, to drop most repetitions before sorting.
 const RECENT: usize = 4096;
-
-/// The range of fused depths in a square of pixels.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Tile {
-    /// Least depth, metres.
-    pub(crate) near: f32,
-    /// Largest depth, metres; below `near` in a square without fused pixels.
-    pub(crate) far: f32,
-}
-
-impl Tile {
-    pub(crate) const EMPTY: Self = Self { near: f32::INFINITY, far: 0.0 };
-
-    /// From the least and largest inverse depths of some columns; infinite and 0 in a column without fused pixels.
-    pub(crate) fn of(low: &[f32], high: &[f32]) -> Self {
-        let low = low.iter().fold(f32::INFINITY, |a, &b| a.min(b));
-        let high = high.iter().fold(0.0, |a: f32, &b| a.max(b));
-        if high > 0.0 { Self { near: 1.0 / high, far: 1.0 / low } } else { Self::EMPTY }
-    }
-
-    /// The range of both.
-    pub(crate) fn with(self, other: Self) -> Self {
-        Self { near: self.near.min(other.near), far: self.far.max(other.far) }
-    }
-}
 
 /// Keys of the blocks near the pixels of some rows, in no order, with repetitions.
 pub(crate) fn near(
@@ -64,7 +37,7 @@ pub(crate) fn near(
     };
     let across = width.div_ceil(TILE);
     for (k, &tile) in tiles.iter().enumerate() {
-        search.square([k % across * TILE, k / across * TILE], TILE, rows, tile)?;
+        search.square([k % across * TILE, k / across * TILE], TILE, rows, [tile.near, tile.far])?;
     }
     Ok(search.keys)
 }
@@ -85,12 +58,12 @@ struct Search<'a> {
 
 impl Search<'_> {
     /// Looks at a square whose range of depths is known.
-    fn square(&mut self, [u, v]: [usize; 2], side: usize, rows: usize, range: Tile) -> Result<(), Error> {
-        if range.far < range.near {
+    fn square(&mut self, [u, v]: [usize; 2], side: usize, rows: usize, [near, far]: [f32; 2]) -> Result<(), Error> {
+        if far < near {
             return Ok(());
         }
         let (right, below) = ((u + side).min(self.depth.width), (v + side).min(rows));
-        let (near, far) = (f64::from(range.near), f64::from(range.far));
+        let (near, far) = (f64::from(near), f64::from(far));
         if far - near > self.block && side > 1 {
             let half = side / 2;
             for corner in [[u, v], [u + half, v], [u, v + half], [u + half, v + half]] {
@@ -102,11 +75,12 @@ impl Search<'_> {
         self.frustum([u, right], [v + self.first_row, below + self.first_row], near, far)
     }
 
-    fn range(&self, from: [usize; 2], to: [usize; 2]) -> Tile {
+    /// Least and largest depth.
+    fn range(&self, from: [usize; 2], to: [usize; 2]) -> [f32; 2] {
         let width = self.depth.width;
         let pixels = (from[1]..to[1]).filter_map(|v| self.planes.get(v * width + from[0]..v * width + to[0])).flatten();
         let depths = pixels.filter_map(Plane::omega).map(|omega| 1.0 / omega);
-        depths.fold(Tile::EMPTY, |range, z| range.with(Tile { near: z, far: z }))
+        depths.fold([f32::INFINITY, 0.0], |[near, far], z| [near.min(z), far.max(z)])
     }
 
     /// Blocks that the bounding boxes of the frustum's slices touch.

@@ -1,10 +1,10 @@
 //! What the map looks like from a pose.
 
-mod camera;
+pub(crate) mod camera;
 mod cell;
-mod fields;
-mod march;
-mod tiles;
+pub(crate) mod fields;
+pub(crate) mod march;
+pub(crate) mod tiles;
 
 use camera::Camera;
 use fields::Fields;
@@ -124,7 +124,12 @@ impl View {
         self.depth.iter().filter(|z| **z > 0.0).count()
     }
 
-    fn resize(&mut self, camera: &Intrinsics, (width, height): (usize, usize), world_from_camera: &Isometry3<f64>) {
+    pub(crate) fn resize(
+        &mut self,
+        camera: &Intrinsics,
+        (width, height): (usize, usize),
+        world_from_camera: &Isometry3<f64>,
+    ) {
         (self.width, self.height) = (width, height);
         self.intrinsics = Some(*camera);
         self.world_from_camera = *world_from_camera;
@@ -178,7 +183,7 @@ impl Map {
         view.resize(intrinsics, (width, height), world_from_camera);
         let mut scratch = std::mem::take(&mut view.scratch);
         scratch.fields.select(self.store(), &camera, settings);
-        scratch.tiles.fill(&scratch.fields, &camera);
+        scratch.tiles.fill(&scratch.fields.places, &camera);
         let rows = height.div_ceil(settings.threads).next_multiple_of(tiles::SIDE);
         let chunk = rows * width;
         let mut bands: Vec<Band> = (view.depth.chunks_mut(chunk).zip(view.normals.chunks_mut(chunk)))

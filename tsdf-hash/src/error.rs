@@ -166,6 +166,20 @@ pub enum Error {
         /// Block coordinates (one of those that do not contain it).
         block: [i32; 3],
     },
+    /// No GPU can be used; [`Map`](crate::Map) works without one.
+    #[cfg(feature = "gpu")]
+    #[error("no GPU: {reason}")]
+    NoAdapter {
+        /// What was found instead.
+        reason: String,
+    },
+    /// The GPU refused something or is lost.
+    #[cfg(feature = "gpu")]
+    #[error("the GPU failed: {what}")]
+    Device {
+        /// What its driver said.
+        what: String,
+    },
     /// Writing a mesh failed.
     #[error("writing the mesh failed")]
     Write(#[from] std::io::Error),

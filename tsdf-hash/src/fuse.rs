@@ -1,13 +1,19 @@
 //! The update of one block by one frame.
 
+mod colour;
+mod slab;
+#[cfg(test)]
+mod tests;
+
+use colour::{ColourSource, observe_colour};
 use nalgebra::{Isometry3, Matrix3, Vector3};
+use slab::Slab;
 
 use crate::Settings;
-use crate::block::{Block, MAX_COLOURS, ONE, SIDE};
-use crate::candidates::{TILE, Tile};
+use crate::block::{Block, ONE, SIDE};
 use crate::key::Key;
-use crate::surface::{Plane, Surface};
-use crate::view::{ColourData, ColourView, Intrinsics};
+use crate::surface::Surface;
+use crate::view::{ColourView, Intrinsics};
 
 /// Colours are taken this close to the surface, in voxels (ours).
 const COLOUR_REACH: f64 = 1.5;
@@ -38,15 +44,18 @@ pub(crate) struct Tally {
 
 /// A frame, ready to be applied to any block.
 pub(crate) struct Frame<'a> {
-    surface: &'a Surface,
-    colour: Option<ColourSource<'a>>,
+    pub(crate) surface: &'a Surface,
+    pub(crate) colour: Option<ColourSource<'a>>,
     /// `(u z, v z, z)` from a point in the world.
     projection: Matrix3<f64>,
     offset: Vector3<f64>,
     voxel_size: f64,
-    truncation: f32,
+    pub(crate) truncation: f32,
     /// In steps of the stored distance.
-    colour_reach: f32,
+    pub(crate) colour_reach: f32,
+    width: i32,
+    /// The last column and the last row.
+    last: [f32; 2],
 }
 
 impl<'a> Frame<'a> {
@@ -62,11 +71,13 @@ impl<'a> Frame<'a> {
         let camera_from_world = world_from_camera.inverse();
         Self {
             surface,
-            colour: colour.map(|view| ColourSource::new(view, k)),
+            colour: colour.map(|view| ColourSource::new(view, k, surface)),
             projection: pixels_from_camera * camera_from_world.rotation.to_rotation_matrix().into_inner(),
             offset: pixels_from_camera * camera_from_world.translation.vector,
             voxel_size: settings.voxel_size,
             truncation: settings.truncation() as f32,
+            width: surface.width as i32,
+            last: [surface.width, surface.height].map(|side| (side - 1) as f32),
             colour_reach: (f64::from(ONE) * COLOUR_REACH / settings.truncation_voxels) as f32,
         }
     }
@@ -77,6 +88,18 @@ impl<'a> Frame<'a> {
             Sign::Plus => self.update::<true>(key, block),
             Sign::Minus => self.update::<false>(key, block),
         }
+    }
+
+    /// `(u z, v z, z)` of the first voxel of a block.
+    pub(crate) fn start(&self, key: Key) -> Vector3<f32> {
+        let centre = |c: i32| (f64::from(c) * SIDE as f64 + 0.5) * self.voxel_size;
+        let [x, y, z] = key.block().map(centre);
+        (self.projection * Vector3::new(x, y, z) + self.offset).cast()
+    }
+
+    /// Its change from a voxel to the next, a column for each axis.
+    pub(crate) fn step(&self) -> Matrix3<f32> {
+        (self.projection * self.voxel_size).cast()
     }
 
     /// In single precision, every operation rounded once to the nearest, none fused or reordered:
@@ -101,24 +124,20 @@ impl<'a> Frame<'a> {
     ///
     /// `start` and the steps are computed in double precision and rounded once.
     fn update<const PLUS: bool>(&self, key: Key, block: &mut Block) -> Tally {
-        let h = self.voxel_size;
-        let centre = |c: i32| (f64::from(c) * SIDE as f64 + 0.5) * h;
-        let [x, y, z] = key.block().map(centre);
-        let start = (self.projection * Vector3::new(x, y, z) + self.offset).cast::<f32>();
-        let step = (self.projection * h).cast::<f32>();
+        let (start, step) = (self.start(key), self.step());
         let [sx, sy, sz] = [0, 1, 2].map(|axis| step.column(axis).into_owned());
-        let Some(range) = self.range(&start, &[sx, sy, sz]) else { return Tally::default() };
+        let steps = [sx, sy, sz];
+        let Some(slab) = Slab::under(self.surface, self.truncation, &start, &steps) else { return Tally::default() };
+        let offsets = [0, LANES].map(|first| Offsets::new(&sx, first));
         let mut work = Work::default();
         for z in 0..SIDE {
             for y in 0..SIDE {
+                let along = slab.start + slab.step[1] * y as f32 + slab.step[2] * z as f32;
                 let row = (start + sy * y as f32) + sz * z as f32;
-                for x in [0, LANES] {
-                    // Depth is monotonic along the lanes, rounding included.
-                    let [first, last] = [x, x + LANES - 1].map(|x| row.z + sx.z * x as f32);
-                    let missed = (first < range.near && last < range.near) || (first > range.far && last > range.far);
-                    if !missed {
-                        let lanes = Lanes::project(self.surface, &row, &sx, x);
-                        self.observe::<PLUS>(block, (x + SIDE * (y + SIDE * z)) / LANES, &lanes, &mut work);
+                for (half, (offsets, [least, most])) in offsets.iter().zip(slab.bounds).enumerate() {
+                    if along >= least && along <= most {
+                        let lanes = self.project(&row, offsets);
+                        self.observe::<PLUS>(block, half + HALVES * (y + SIDE * z), &lanes, &mut work);
                     }
                 }
             }
@@ -126,50 +145,32 @@ impl<'a> Frame<'a> {
         work.tally()
     }
 
-    /// Depths outside of which no voxel of a block is touched, from the squares of pixels that it projects to; `None` if
-    /// none can be.
-    fn range(&self, start: &Vector3<f32>, steps: &[Vector3<f32>; 3]) -> Option<Tile> {
-        let all = Tile { near: 0.0, far: f32::INFINITY };
-        let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
-        for corner in 0..8 {
-            let at = |axis: usize| steps[axis] * if corner >> axis & 1 == 1 { (SIDE - 1) as f32 } else { 0.0 };
-            let p = start + at(0) + at(1) + at(2);
-            if p.z <= 1e-3 * self.truncation {
-                return Some(all);
-            }
-            for k in 0..2 {
-                let pixel = p[k] / p.z;
-                low[k] = low[k].min(pixel);
-                high[k] = high[k].max(pixel);
-            }
+    #[inline(always)]
+    fn project(&self, row: &Vector3<f32>, offsets: &Offsets) -> Lanes {
+        let zero = [0.0; LANES];
+        let mut out =
+            Lanes { inside: [0; LANES], index: [0; LANES], depth: zero, u: zero, v: zero, du: zero, dv: zero };
+        for x in 0..LANES {
+            let z = row.z + offsets.depth[x];
+            let inverse = 1.0 / z;
+            let u = (row.x + offsets.u[x]) * inverse;
+            let v = (row.y + offsets.v[x]) * inverse;
+            let (i, j) = ((u + ROUNDER) - ROUNDER, (v + ROUNDER) - ROUNDER);
+            (out.depth[x], out.u[x], out.v[x], out.du[x], out.dv[x]) = (z, u, v, u - i, v - j);
+            let inside =
+                mask(z > 0.0) & mask(i >= 0.0) & mask(i <= self.last[0]) & mask(j >= 0.0) & mask(j <= self.last[1]);
+            // Sides are at most 16384: fifteen bits hold what is inside, and SSE2 multiplies no wider integers at once.
+            let index = (rounded(v) & 0x7fff) * (self.width & 0x7fff) + (rounded(u) & 0x7fff);
+            out.inside[x] = inside;
+            out.index[x] = index & inside;
         }
-        let tiles = [self.surface.width, self.surface.height];
-        let mut ranges = [(0, 0); 2];
-        for k in 0..2 {
-            // One pixel more on each side, for the rounding.
-            let last = (tiles[k] - 1) as f32;
-            if low[k] > last + 1.0 || high[k] < -1.0 {
-                return None;
-            }
-            ranges[k] = ((low[k] - 1.0).max(0.0) as usize / TILE, (high[k] + 1.0).min(last) as usize / TILE);
-        }
-        let across = self.surface.width.div_ceil(TILE);
-        let [columns, lines] = ranges;
-        let mut range = Tile::EMPTY;
-        for line in lines.0..=lines.1 {
-            for tile in &self.surface.tiles[line * across + columns.0..=line * across + columns.1] {
-                range = range.with(*tile);
-            }
-        }
-        // A little more than μ, for the rounding.
-        let reach = 1.001 * self.truncation + 1e-5 * range.far;
-        (range.near <= range.far).then_some(Tile { near: range.near - reach, far: range.far + reach })
+        out
     }
 
     /// Updates the voxels `LANES unit..`.
     #[inline(always)]
     fn observe<const PLUS: bool>(&self, block: &mut Block, unit: usize, lanes: &Lanes, work: &mut Work) {
-        let planes = lanes.index.map(|index| self.surface.planes.get(index as usize).copied().unwrap_or(Plane::NONE));
+        let planes = lanes.index.map(|index| self.surface.planes[index as usize]);
         let offset = planes.map(|plane| plane.offset);
         let omega = planes.map(|plane| plane.scaled_omega);
         let slope_u = planes.map(|plane| plane.scaled_slope[0]);
@@ -177,7 +178,8 @@ impl<'a> Frame<'a> {
         let mut touched = [0; LANES];
         for x in 0..LANES {
             // A NaN fails, and so does an omega of 0.
-            touched[x] = mask((offset[x] - lanes.depth[x] * omega[x]).abs() <= self.truncation * omega[x]);
+            let within = (offset[x] - lanes.depth[x] * omega[x]).abs() <= self.truncation * omega[x];
+            touched[x] = mask(within) & lanes.inside[x];
         }
         if touched == [0; LANES] {
             return;
@@ -201,17 +203,19 @@ impl<'a> Frame<'a> {
             };
             sums[x] = sum;
             totals[x] = total as u16;
-            work.faults[x] |= total >> 16;
+            work.faults[x] |= total;
             if !PLUS {
                 // No sum of observations can leave `-32767 W..=32767 W`: what was taken out was not in.
                 let most = (total << 15).wrapping_sub(total);
-                work.faults[x] |= most.wrapping_sub(sum.wrapping_abs()) >> 31 & touched[x];
+                work.faults[x] |= most.wrapping_sub(sum.wrapping_abs()) & i32::MIN & touched[x];
             }
             work.touched[x] -= touched[x];
         }
         if let Some(colour) = self.colour.as_ref().filter(|_| coloured != [0; LANES]) {
-            for x in (0..LANES).filter(|&x| coloured[x] != 0) {
-                if let Some(rgb) = colour.at(lanes.u[x], lanes.v[x]) {
+            for (x, &near) in coloured.iter().enumerate() {
+                if near != 0
+                    && let Some(rgb) = colour.at(lanes, x)
+                {
                     work.colour_fault |= observe_colour::<PLUS>(&mut block.colour[LANES * unit + x], rgb);
                 }
             }
@@ -219,6 +223,8 @@ impl<'a> Frame<'a> {
     }
 }
 
+/// Of a row of voxels.
+const HALVES: usize = SIDE / LANES;
 /// Neighbours along x that are updated together: a vector register.
 const LANES: usize = 4;
 const LIMIT: f32 = ONE as f32;
@@ -235,22 +241,11 @@ fn rounded(x: f32) -> i32 {
     (x + ROUNDER).to_bits().wrapping_sub(ROUNDER.to_bits()).cast_signed()
 }
 
-#[inline(always)]
-fn observe_colour<const PLUS: bool>(sums: &mut [u16; 4], rgb: [u16; 3]) -> bool {
-    let mut fault = false;
-    for (sum, c) in sums.iter_mut().zip([rgb[0], rgb[1], rgb[2], 1]) {
-        let (next, wrapped) = if PLUS { sum.overflowing_add(c) } else { sum.overflowing_sub(c) };
-        *sum = next;
-        fault |= wrapped;
-    }
-    fault || sums[3] > MAX_COLOURS
-}
-
 /// What the update of a block counts, per lane.
 #[derive(Default)]
 struct Work {
     touched: [i32; LANES],
-    /// Not zero after a counter ran over or under.
+    /// All counters: they ran over or under if there is a bit beyond the sixteenth.
     faults: [i32; LANES],
     colour_fault: bool,
 }
@@ -258,14 +253,16 @@ struct Work {
 impl Work {
     fn tally(&self) -> Tally {
         let voxels = self.touched.iter().sum::<i32>().unsigned_abs() as usize;
-        Tally { voxels, fault: self.colour_fault || self.faults != [0; LANES] }
+        Tally { voxels, fault: self.colour_fault || self.faults.iter().any(|bits| bits >> 16 != 0) }
     }
 }
 
 /// Projected voxels.
 struct Lanes {
-    /// Of the pixel; `u32::MAX` outside the image.
-    index: [u32; LANES],
+    /// All ones in the image, zero outside.
+    inside: [i32; LANES],
+    /// Of the pixel; 0 outside the image.
+    index: [i32; LANES],
     depth: [f32; LANES],
     /// The projection, pixels.
     u: [f32; LANES],
@@ -275,66 +272,16 @@ struct Lanes {
     dv: [f32; LANES],
 }
 
-impl Lanes {
-    /// Projects the voxels `first..` of a row.
-    #[inline(always)]
-    #[expect(clippy::needless_bitwise_bool, reason = "without branches the lanes stay in vector registers")]
-    fn project(surface: &Surface, row: &Vector3<f32>, step: &Vector3<f32>, first: usize) -> Self {
-        let (right, bottom) = ((surface.width - 1) as f32, (surface.height - 1) as f32);
-        let width = surface.width as f32;
-        let zero = [0.0; LANES];
-        let mut out = Self { index: [0; LANES], depth: zero, u: zero, v: zero, du: zero, dv: zero };
-        for x in 0..LANES {
-            let along = (first + x) as f32;
-            let z = row.z + step.z * along;
-            let inverse = 1.0 / z;
-            let u = (row.x + step.x * along) * inverse;
-            let v = (row.y + step.y * along) * inverse;
-            let (i, j) = ((u + ROUNDER) - ROUNDER, (v + ROUNDER) - ROUNDER);
-            (out.depth[x], out.u[x], out.v[x], out.du[x], out.dv[x]) = (z, u, v, u - i, v - j);
-            let inside = (z > 0.0) & (i >= 0.0) & (i <= right) & (j >= 0.0) & (j <= bottom);
-            let index = rounded(v).wrapping_mul(width as i32).wrapping_add(rounded(u));
-            out.index[x] = (index | !mask(inside)).cast_unsigned();
-        }
-        out
-    }
+/// From the first voxel of a row to some neighbours: the change of `(u z, v z, z)`.
+struct Offsets {
+    u: [f32; LANES],
+    v: [f32; LANES],
+    depth: [f32; LANES],
 }
 
-/// The colour image, seen from the depth image.
-struct ColourSource<'a> {
-    view: &'a ColourView<'a>,
-    /// Colour column = `scale u + shift`, likewise the row.
-    scale: [f32; 2],
-    shift: [f32; 2],
-}
-
-impl<'a> ColourSource<'a> {
-    fn new(view: &'a ColourView<'a>, depth: &Intrinsics) -> Self {
-        let c = &view.intrinsics;
-        let scale = [c.fx / depth.fx, c.fy / depth.fy];
-        let shift = [c.cx - scale[0] * depth.cx, c.cy - scale[1] * depth.cy];
-        Self { view, scale: scale.map(|s| s as f32), shift: shift.map(|s| s as f32) }
-    }
-
-    /// Six-bit colour of the pixel nearest to a projection; `None` outside the colour image.
-    #[inline(always)]
-    fn at(&self, u: f32, v: f32) -> Option<[u16; 3]> {
-        let [i, j] =
-            [u * self.scale[0] + self.shift[0], v * self.scale[1] + self.shift[1]].map(|x| (x + ROUNDER) - ROUNDER);
-        let (width, height) = (self.view.width, self.view.height);
-        if !(i >= 0.0 && i < width as f32 && j >= 0.0 && j < height as f32) {
-            return None;
-        }
-        let start = 3 * (j as usize * width + i as usize);
-        match self.view.data {
-            ColourData::Rgb8(data) => {
-                let rgb = data.get(start..start + 3)?;
-                Some([rgb[0], rgb[1], rgb[2]].map(|c| (u16::from(c) * 63 + 127) / 255))
-            }
-            ColourData::Rgb16(data) => {
-                let rgb = data.get(start..start + 3)?;
-                Some([rgb[0], rgb[1], rgb[2]].map(|c| ((u32::from(c) * 63 + 32767) / 65535) as u16))
-            }
-        }
+impl Offsets {
+    fn new(step: &Vector3<f32>, first: usize) -> Self {
+        let along: [f32; LANES] = std::array::from_fn(|x| (first + x) as f32);
+        Self { u: along.map(|x| step.x * x), v: along.map(|x| step.y * x), depth: along.map(|x| step.z * x) }
     }
 }

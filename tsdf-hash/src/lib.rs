@@ -40,6 +40,7 @@
 //! | fusion undone | ours | [`Map::deintegrate`] |
 //! | noise and weights | Nguyen, Izadi, Lovell 2012; `w = 15 (σ₀/σ(z))² cos θ`: ours | [`NoiseModel`] |
 //! | mesh | thesis Paper I, section 4.6, by marching cubes; case table derived: ours | [`Map::mesh`], [`write_ply`] |
+//! | the same bytes on a GPU | ours | `GpuMap` (feature `gpu`) |
 //! | the mesh of a growing map, blocks that left included | thesis Paper I, section 4.6; per-block patches: ours | [`MeshKeeper`] |
 //! | distance queries | thesis, outlook | [`Map::distance`], [`Map::distance_and_gradient`] |
 //!
@@ -53,6 +54,8 @@ mod dense;
 mod error;
 mod file;
 mod fuse;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod key;
 mod map;
 mod mesh;
@@ -70,6 +73,8 @@ pub use cast::{CastSettings, View};
 pub use dense::DenseMap;
 pub use error::Error;
 pub use file::MapFile;
+#[cfg(feature = "gpu")]
+pub use gpu::{GpuMap, GpuOptions, open_map};
 pub use map::{FrameReport, Map, Memory};
 pub use mesh::{Mesh, MeshKeeper, MeshReport, write_obj, write_ply};
 pub use nalgebra;

@@ -3,23 +3,28 @@
 //! For a plane, inverse depth is a linear function of the pixel: `ω(u, v) = ω₀ + a (u - u₀) + b (v - v₀)`, whatever its
 //! slope. So slopes come from linear filters, and a depth edge is where second differences of `ω` exceed the noise.
 
+mod tile;
 mod window;
 
 use nalgebra::Isometry3;
-use window::{Fit, Row, Windows};
+use tile::TileLine;
+pub(crate) use tile::{TILE, Tile};
+use window::{BEND_VARIANCE, BENDING, COUNT, ROUGHNESS, Row, SPREAD, Windows};
 
 use crate::block::{MAX_WEIGHT, ONE};
-use crate::candidates::{self, TILE, Tile};
 use crate::fuse::ROUNDER;
 use crate::key::Key;
 use crate::parallel::in_chunks;
 use crate::view::{DepthView, Intrinsics};
-use crate::{Error, Settings};
+use crate::{Error, Settings, candidates};
 
 /// Steeper views of a surface are left to other frames (ours: 84 degrees between ray and normal).
 const LEAST_COSINE: f32 = 0.1;
 /// A window whose rim is this many standard deviations off its middle is not plane (ours).
-const MOST_BEND: f32 = 2.5;
+const MOST_BEND: f32 = 3.0;
+/// Noise that is always granted, as a share of the model's: where the camera is better than the model, bends are found
+/// by what it shows (ours).
+const LEAST_NOISE: f32 = 0.1;
 
 /// The plane seen at a pixel: a voxel at depth `z`, `(du, dv)` pixels beside the pixel's centre, is
 /// `offset - z (scaled_omega + scaled_slope · (du, dv))` steps of the stored distance in front of it.
@@ -117,45 +122,72 @@ impl Band<'_> {
         let noise = Noise::new(settings);
         let per_metre = (f64::from(ONE) / settings.truncation()) as f32;
         let mut windows = Windows::new(depth, settings, self.first);
-        let (mut low, mut high) = (vec![0.0; width], vec![0.0; width]);
+        let (mut columns, mut tile_line) = (Columns::new(width), TileLine::new(width));
         let mut all = [0, 0];
         let lines = self.planes.chunks_mut(TILE * width).zip(self.tiles.chunks_mut(width.div_ceil(TILE)));
         for (line, (planes, tiles)) in lines.enumerate() {
-            low.fill(f32::INFINITY);
-            high.fill(0.0);
             for (row, planes) in planes.chunks_exact_mut(width).enumerate() {
                 let row = line * TILE + row;
                 let lens = Lens::new(&depth.intrinsics, self.first + row, per_metre);
-                let [valid, fused] = read_row(&windows.row(row), &lens, noise, planes, &mut low, &mut high);
+                let [valid, fused] = read_row(&windows.row(row), lens, noise, &mut columns);
+                columns.write(planes);
+                tile_line.push(&columns.omega);
                 all = [all[0] + valid as usize, all[1] + fused as usize];
             }
-            for (tile, (low, high)) in tiles.iter_mut().zip(low.chunks(TILE).zip(high.chunks(TILE))) {
-                *tile = Tile::of(low, high);
-            }
+            tile_line.finish(self.first + line * TILE, planes, tiles);
         }
         all
     }
 }
 
-/// Fills a row of planes and widens the ranges of the inverse depth of its columns; returns the numbers of valid and of
-/// fused pixels.
-fn read_row(row: &Row, lens: &Lens, noise: Noise, planes: &mut [Plane], low: &mut [f32], high: &mut [f32]) -> [u32; 2] {
-    let width = planes.len();
-    let (row, lens) = (row.of_width(width), *lens);
+/// A row of planes, and their inverse depths; 0 where a pixel is not fused.
+struct Columns {
+    offset: Vec<f32>,
+    slope: [Vec<f32>; 2],
+    omega: Vec<f32>,
+}
+
+impl Columns {
+    fn new(width: usize) -> Self {
+        let column = || vec![0.0; width];
+        Self { offset: column(), slope: [column(), column()], omega: column() }
+    }
+
+    fn write(&self, planes: &mut [Plane]) {
+        let slopes = self.slope[0].iter().zip(&self.slope[1]);
+        for (((plane, &offset), &omega), (&u, &v)) in planes.iter_mut().zip(&self.offset).zip(&self.omega).zip(slopes) {
+            *plane = Plane { offset, scaled_omega: offset * omega, scaled_slope: [u, v] };
+        }
+    }
+}
+
+/// Fits the planes of a row; returns the numbers of valid and of fused pixels. Structures of arrays, because the
+/// arithmetic then runs in vector registers.
+fn read_row(row: &Row, lens: Lens, noise: Noise, out: &mut Columns) -> [u32; 2] {
+    // Slices of known length spare the loop its bounds checks.
+    let width = out.omega.len();
+    let (omegas, offsets) = (&mut out.omega[..width], &mut out.offset[..width]);
+    let [slopes_u, slopes_v] = &mut out.slope;
+    let (slopes_u, slopes_v) = (&mut slopes_u[..width], &mut slopes_v[..width]);
     let [above, here, below] = row.around;
-    let (low, high) = (&mut low[..width], &mut high[..width]);
+    let (above, here, below) = (&above[..width + 2], &here[..width + 2], &below[..width + 2]);
+    let (smooth, total, bend) = (&row.smooth[..width], &row.total[..width], &row.bend[..width]);
+    let (along, down, rough) = (&row.slope[0][..width], &row.slope[1][..width], &row.roughness[..width]);
+    let most_bend = (MOST_BEND * BENDING) * (MOST_BEND * BENDING) * BEND_VARIANCE;
     let mut counts = [0, 0];
-    let most_bend = MOST_BEND * MOST_BEND * Fit::BEND_VARIANCE;
     for u in 0..width {
         let own = here[u + 1];
         let sigma = noise.sigma_inverse(own);
-        let fit = row.fit(u);
         // A NaN fails.
-        let is_plane = fit.bend * fit.bend <= most_bend * sigma * sigma;
-        let narrow = [0.5 * (here[u + 2] - here[u]), 0.5 * (below[u + 1] - above[u + 1])];
-        let omega = if is_plane { fit.mean } else { row.smooth[u] };
-        let slope = [0, 1].map(|k| if is_plane { fit.slope[k] } else { narrow[k] });
-        let (offset, cosine) = lens.plane(u as i32 as f32, omega, slope);
+        let shown = rough[u] * (1.0 / ROUGHNESS) + LEAST_NOISE * LEAST_NOISE * sigma * sigma;
+        let granted = if shown < sigma * sigma { shown } else { sigma * sigma };
+        let is_plane = u32::from(bend[u] * bend[u] <= most_bend * granted).wrapping_neg();
+        let wide = [total[u] * (1.0 / COUNT), along[u] * (1.0 / SPREAD), down[u] * (1.0 / SPREAD)];
+        let narrow = [smooth[u], 0.5 * (here[u + 2] - here[u]), 0.5 * (below[u + 1] - above[u + 1])];
+        let omega = choose(is_plane, wide[0], narrow[0]);
+        let slope_u = choose(is_plane, wide[1], narrow[1]);
+        let slope_v = choose(is_plane, wide[2], narrow[2]);
+        let (offset, cosine) = lens.plane(u as i32 as f32, omega, slope_u, slope_v);
         let ratio = noise.base * omega * omega / noise.sigma_inverse(omega);
         let weight = MAX_WEIGHT * ratio * ratio * cosine;
         let weight = if weight > 1.0 { weight } else { 1.0 };
@@ -163,16 +195,21 @@ fn read_row(row: &Row, lens: &Lens, noise: Noise, planes: &mut [Plane], low: &mu
         // A NaN fails both comparisons.
         let omega = if cosine >= LEAST_COSINE { omega } else { 0.0 };
         let omega = if omega > 0.0 { omega } else { 0.0 };
-        let last = (offset * slope[1]).to_bits() & !15 | (weight + ROUNDER).to_bits() & 15;
-        planes[u] =
-            Plane { offset, scaled_omega: offset * omega, scaled_slope: [offset * slope[0], f32::from_bits(last)] };
-        let floor = if omega > 0.0 { omega } else { f32::INFINITY };
-        low[u] = if floor < low[u] { floor } else { low[u] };
-        high[u] = if omega > high[u] { omega } else { high[u] };
+        let last = (offset * slope_v).to_bits() & !15 | (weight + ROUNDER).to_bits() & 15;
+        offsets[u] = offset;
+        omegas[u] = omega;
+        slopes_u[u] = offset * slope_u;
+        slopes_v[u] = f32::from_bits(last);
         counts[0] += u32::from(own > 0.0);
         counts[1] += u32::from(omega > 0.0);
     }
     counts
+}
+
+/// One of two values, by a mask of all ones or zero: an `if` would become a branch, and the loop scalar.
+#[inline(always)]
+fn choose(mask: u32, one: f32, other: f32) -> f32 {
+    f32::from_bits(one.to_bits() & mask | other.to_bits() & !mask)
 }
 
 /// The camera, seen from one row of its image.
@@ -204,10 +241,10 @@ impl Lens {
     /// The plane with this inverse depth and these slopes at a pixel: its distance from the camera in steps of the
     /// stored distance, and the cosine between its normal and the ray.
     #[inline(always)]
-    fn plane(&self, u: f32, omega: f32, slope: [f32; 2]) -> (f32, f32) {
+    fn plane(&self, u: f32, omega: f32, slope_u: f32, slope_v: f32) -> (f32, f32) {
         let du = u - self.cx;
         // With x = z (du / fx, dv / fy, 1), the plane is n · x = 1.
-        let n = [self.focal[0] * slope[0], self.focal[1] * slope[1], omega - slope[0] * du - slope[1] * self.dv];
+        let n = [self.focal[0] * slope_u, self.focal[1] * slope_v, omega - slope_u * du - slope_v * self.dv];
         let squared = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
         let ray = du * self.inverse_focal;
         (self.per_metre / squared.sqrt(), omega / (squared * (ray * ray + self.ray)).sqrt())

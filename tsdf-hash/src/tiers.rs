@@ -4,6 +4,8 @@
 //! surface was seen again. The map is the sum of the copies, whenever and wherever they are brought together. What all
 //! copies of a block sum up to always fits its counters: that is seen to when a frame is fused.
 
+#[cfg(feature = "gpu")]
+mod absorb;
 mod change;
 mod coder;
 mod cold;
@@ -154,7 +156,7 @@ impl Copies {
                 self.cold.label(key).map(|label| label.print),
             ];
             let print = copies.into_iter().flatten().fold(0, u64::wrapping_add);
-            mix(mix(hash ^ key.0).wrapping_add(print))
+            fold(hash, key, print)
         })
     }
 
@@ -176,6 +178,11 @@ impl Copies {
         let fault = self.held.get(key).is_some_and(|held| all.add(&held.block));
         Ok(!(all.add(block) || fault))
     }
+}
+
+/// Folds a block, by its print, into the hash of a map.
+pub(crate) fn fold(hash: u64, key: Key, print: u64) -> u64 {
+    mix(mix(hash ^ key.0).wrapping_add(print))
 }
 
 impl Seen {

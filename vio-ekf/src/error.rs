@@ -111,6 +111,38 @@ pub enum Error {
         /// End of the defined interval, included.
         last: Stamp,
     },
+    /// An index beyond the end of a list.
+    #[error("there is no {what} {index}: there are {count}, counted from 0")]
+    NoSuch {
+        /// What was asked for.
+        what: &'static str,
+        /// Its index.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// An image of another size than the camera's calibration.
+    #[error(
+        "the image has {given:?} pixels, the calibrated camera {expected:?}: use the calibration of this image size"
+    )]
+    ImageSize {
+        /// Width and height given.
+        given: (usize, usize),
+        /// Width and height of the camera.
+        expected: (usize, usize),
+    },
+    /// A measurement belongs to a time that the filter has left behind.
+    #[error(
+        "{what} of {stamp} s arrives when everything up to {now} s is settled: feed in order, or keep a longer history"
+    )]
+    Late {
+        /// Which measurement.
+        what: &'static str,
+        /// Its time by the inertial sensor's clock.
+        stamp: Stamp,
+        /// The time up to which nothing can change.
+        now: Stamp,
+    },
     /// A covariance is not symmetric positive definite.
     #[error("{what} covariance {index} is not symmetric positive definite: check the filter, or its export")]
     NotPositiveDefinite {
@@ -119,4 +151,17 @@ pub enum Error {
         /// Index in the input.
         index: usize,
     },
+}
+
+/// A setting outside its range.
+pub(crate) fn invalid(name: &'static str, value: f64, rule: &'static str) -> Error {
+    Error::InvalidSetting { name, value, rule }
+}
+
+/// Refuses the first of the named settings that is negative or not finite.
+pub(crate) fn all_not_negative(fields: &[(&'static str, f64)]) -> Result<(), Error> {
+    match fields.iter().find(|(_, value)| !(*value >= 0.0 && value.is_finite())) {
+        Some(&(name, value)) => Err(invalid(name, value, "must be finite and not negative")),
+        None => Ok(()),
+    }
 }

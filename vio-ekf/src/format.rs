@@ -5,9 +5,12 @@
 //! repeats the stamp of the pose before is dropped, because public files hold such (the ground truth of TUM fr2/desk has
 //! one among 20,957). Stamps that go back are refused.
 
+pub mod asl;
+pub mod calibration;
 pub mod euroc;
 pub mod kitti;
 pub mod tum;
+mod yaml;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 

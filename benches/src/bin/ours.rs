@@ -7,12 +7,10 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use paint_net::procedural::Texture;
-use paint_net::{Deconvolution, Limits, MatchingPursuit, Painter, Saturation, SprayKernel, Task, metrics};
 use paint_sim::ciede2000;
 use paint_sim::colour::BANDS;
-use paintcopter_benches::cpu::median_seconds;
-use paintcopter_benches::{Rng, films, motion};
+use paintcopter_benches::cpu::{Clock, median_seconds};
+use paintcopter_benches::{Rng, films, motion, painting, room};
 use paintcopter_examples::mesh_io::read_mesh;
 use paintcopter_examples::world::rock_wall;
 use serde_json::json;
@@ -49,8 +47,11 @@ enum Job {
         #[arg(long, value_name = "DIR")]
         save: Option<PathBuf>,
     },
-    /// Paints the procedural pictures, as `paint_baselines.py painters --set procedural` does
+    /// Paints pictures with every painter, as `paint_baselines.py painters slew noise` does
     Paint {
+        /// Pictures, or folders of them [default: the procedural ones, `--set procedural` of the script]
+        #[arg(long, value_name = "PATH")]
+        image: Vec<PathBuf>,
         /// Side of the pictures, pixels
         #[arg(long, default_value_t = 128, value_parser = clap::value_parser!(u16).range(16..=2048))]
         size: u16,
@@ -66,6 +67,26 @@ enum Job {
         /// Runs of which the median is printed
         #[arg(long, default_value_t = 5)]
         runs: usize,
+    },
+    /// Fuses a stream of `synth_rgbd.py`, as `mapping_peers.py fuse` does
+    Tsdf {
+        /// Folder of the stream
+        stream: PathBuf,
+        /// Edge of a voxel, metres
+        #[arg(long, default_value_t = 0.01)]
+        voxel: f64,
+        /// Images to use
+        #[arg(long, default_value_t = usize::MAX)]
+        frames: usize,
+        /// Threads of one call
+        #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
+        threads: u16,
+        /// Leaves the colour images aside
+        #[arg(long)]
+        no_colour: bool,
+        /// Mesh to write, PLY, for `mapping_peers.py mesh`
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
     },
     /// Writes two trajectories of 10,000 poses as TUM text, for `ate` and `trajectory_peers.py`
     Pair {
@@ -88,8 +109,11 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().job {
         Job::Rock { file, seed } => rock(&file, seed),
         Job::Uv { mesh, runs, save } => uv(&mesh, runs, save.as_deref()),
-        Job::Paint { size, runs } => paint(size.into(), runs),
+        Job::Paint { image, size, runs } => painting::run(&image, size.into(), runs),
         Job::Sim { count, runs } => sim(count as usize, runs),
+        Job::Tsdf { stream, voxel, frames, threads, no_colour, out } => {
+            tsdf(&stream, voxel, frames, threads.into(), !no_colour, out.as_deref())
+        }
         Job::Pair { folder } => pair(&folder),
         Job::Ate { reference, estimate, runs } => judge(&reference, &estimate, runs),
     };
@@ -163,33 +187,6 @@ fn textured(chart: &Chart) -> Result<String, std::fmt::Error> {
     Ok(text)
 }
 
-fn paint(size: usize, runs: usize) -> Result<(), AnyError> {
-    // The peers' nozzle and pictures: σ = 2 px cut at 4 px, seed 1000.
-    let kernel = SprayKernel::new(2.0, 2.0)?;
-    let painters: [&dyn Painter; 2] = [&Deconvolution::default(), &MatchingPursuit::default()];
-    for texture in Texture::ALL {
-        let wanted = texture.image(1000, size);
-        let task = Task::on_bare_wall(&wanted);
-        for painter in painters {
-            let run = || painter.paint(&task, &kernel, &Saturation::Tanh, &Limits::default(), &mut |_| ());
-            let painting = run()?;
-            let seconds = median_seconds(runs, run);
-            println!(
-                "{}",
-                json!({
-                    "image": format!("proc-{texture:?}").to_lowercase(), "method": format!("paint-net_{}", painter.name()),
-                    "cpu_s": seconds, "sprays": painting.sprays.len(),
-                    "psnr": metrics::psnr(&painting.ink, &wanted, None)?,
-                    "ssim": metrics::ssim(&painting.ink, &wanted, None)?,
-                    "ssim_g": metrics::ssim_gaussian(&painting.ink, &wanted, None)?,
-                    "bce": metrics::binary_cross_entropy(&painting.ink, &wanted)?,
-                })
-            );
-        }
-    }
-    Ok(())
-}
-
 fn sim(count: usize, runs: usize) -> Result<(), AnyError> {
     let print = |fig: &str, seconds: f64| {
         let (runs, cpu_ms) = (runs.max(1), 1e3 * seconds);
@@ -206,6 +203,51 @@ fn sim(count: usize, runs: usize) -> Result<(), AnyError> {
     let pairs: Vec<[[f64; 3]; 2]> = (0..count).map(|_| [lab(), lab()]).collect();
     let difference = || pairs.iter().map(|[one, other]| ciede2000(*one, *other)).sum::<f64>();
     print("de00", median_seconds(runs, difference));
+    Ok(())
+}
+
+fn tsdf(
+    folder: &Path,
+    voxel_size: f64,
+    most: usize,
+    threads: usize,
+    coloured: bool,
+    out: Option<&Path>,
+) -> Result<(), AnyError> {
+    let shots = room::read(folder, most, coloured)?;
+    let settings = tsdf_hash::Settings { voxel_size, threads, max_bytes: 4 << 30, ..tsdf_hash::Settings::default() };
+    let mut map = tsdf_hash::Map::new(settings)?;
+    let empty = map.hash();
+    let (mut fused, mut valid) = (0, 0);
+    let mut clocks = [Clock::default(), Clock::default()];
+    for shot in &shots {
+        let colour = shot.colour();
+        let report = clocks[0].time(|| map.integrate(&shot.view(), colour.as_ref(), &shot.world_from_camera))?;
+        fused += report.fused_pixels;
+        valid += report.valid_pixels;
+    }
+    let (blocks, hash) = (map.blocks(), map.hash());
+    let mesh = map.mesh();
+    if let Some(path) = out {
+        let file = std::fs::File::create(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        tsdf_hash::write_ply(&mesh, std::io::BufWriter::new(file))?;
+    }
+    for shot in &shots {
+        let colour = shot.colour();
+        clocks[1].time(|| map.deintegrate(&shot.view(), colour.as_ref(), &shot.world_from_camera))?;
+    }
+    let [put_in, taken_out] = clocks;
+    println!(
+        "{}",
+        json!({
+            "figure": "fuse", "peer": "tsdf-hash", "voxel_m": voxel_size, "threads": threads, "frames": shots.len(),
+            "stream": folder.file_name().map(|name| name.to_string_lossy()), "colour": coloured,
+            "integrate_cpu_ms": put_in.cpu_ms(), "integrate_wall_ms": put_in.wall_ms(),
+            "deintegrate_cpu_ms": taken_out.cpu_ms(), "fused_share": fused as f64 / valid as f64, "blocks": blocks,
+            "map_hash": format!("{hash:016x}"), "verts": mesh.positions.len(), "tris": mesh.faces.len(),
+            "empty_again": map.hash() == empty,
+        })
+    );
     Ok(())
 }
 

@@ -1,11 +1,13 @@
 //! Maps a recorded RGB-D sequence: depth and colour images with poses become a map and a mesh.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
 use paintcopter_examples::report::save_figures;
-use paintcopter_examples::scan::{Scan, ScanSettings, Sequence};
+use paintcopter_examples::scan::{Device, Scan, ScanSettings, Sequence};
+use tsdf_hash::Tiers;
 
 /// Maps a recorded RGB-D sequence into a voxel-hashed distance field and its mesh.
 #[derive(Parser)]
@@ -26,6 +28,21 @@ struct Arguments {
     /// Farthest depth that is fused, metres
     #[arg(long, value_name = "METRES", default_value_t = 6.0)]
     max_depth: f64,
+    /// A stored map to go on from; its voxel size and depth range take the place of those given here
+    #[arg(long, value_name = "MAP")]
+    resume: Option<PathBuf>,
+    /// What keeps the map
+    #[arg(long, default_value = "auto")]
+    device: DeviceName,
+    /// Cap of active memory, MiB
+    #[arg(long, value_name = "MIB", default_value_t = 512)]
+    active_mib: usize,
+    /// Cap of the host tier of packed blocks, MiB; 0: none
+    #[arg(long, value_name = "MIB", default_value_t = 0)]
+    host_mib: usize,
+    /// Cap of the disk tier, MiB, a file in the folder for the results while the program runs; 0: none
+    #[arg(long, value_name = "MIB", default_value_t = 0, requires = "host_mib")]
+    disk_mib: u64,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/scan")]
     out: PathBuf,
@@ -38,6 +55,16 @@ struct Arguments {
 enum Poses {
     /// As recorded with the sequence
     Given,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum DeviceName {
+    /// The GPU where the program was built with it and there is one, else the processor
+    Auto,
+    /// The processor
+    Cpu,
+    /// A GPU, Mesa's software one included
+    Gpu,
 }
 
 fn main() -> ExitCode {
@@ -60,18 +87,13 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
         sequence.depth_scale = scale;
     }
     eprintln!("{}: {} layout, {} frames", arguments.sequence.display(), sequence.layout, sequence.frames.len());
-    let threads = arguments.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
-    let map = tsdf_hash::Settings {
-        voxel_size: arguments.voxel,
-        max_depth: arguments.max_depth,
-        threads: threads.clamp(1, 1024),
-        ..tsdf_hash::Settings::default()
-    };
-    let scan = Scan::run(&arguments.sequence, &sequence, ScanSettings { map, ..ScanSettings::default() })?;
+    let settings = settings(arguments);
+    let scan = Scan::run(&arguments.sequence, &sequence, &settings)?;
     for (_, why) in &scan.skipped {
         eprintln!("left out: {why}");
     }
-    scan.save_views(&sequence, folder, map.threads)?;
+    scan.save_views(&sequence, folder, settings.map.threads)?;
+    scan.map.save(&folder.join("map.tsdf"), Some(&scan.mesh), &BTreeMap::new())?;
     let ply = folder.join("mesh.ply");
     let file = std::fs::File::create(&ply).map_err(|e| format!("{}: cannot be written ({e})", ply.display()))?;
     tsdf_hash::write_ply(&scan.mesh, file)?;
@@ -82,4 +104,26 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     save_figures(&scan.report(), folder)?;
     println!("{}", folder.join("mesh.ply").display());
     Ok(())
+}
+
+fn settings(arguments: &Arguments) -> ScanSettings {
+    let threads = arguments.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+    let tiers =
+        Tiers { host_bytes: arguments.host_mib << 20, disk_bytes: arguments.disk_mib << 20, ..Tiers::default() };
+    let map = tsdf_hash::Settings {
+        voxel_size: arguments.voxel,
+        max_depth: arguments.max_depth,
+        max_bytes: arguments.active_mib << 20,
+        threads: threads.clamp(1, 1024),
+        tiers,
+        ..tsdf_hash::Settings::default()
+    };
+    let device = match arguments.device {
+        // The tiers are the processor's.
+        DeviceName::Auto if arguments.host_mib == 0 => Device::Auto,
+        DeviceName::Gpu => Device::Gpu,
+        DeviceName::Auto | DeviceName::Cpu => Device::Cpu,
+    };
+    let swap = (arguments.disk_mib > 0).then(|| arguments.out.join("map.swap"));
+    ScanSettings { map, device, swap, resume: arguments.resume.clone(), ..ScanSettings::default() }
 }

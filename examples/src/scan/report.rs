@@ -25,8 +25,13 @@ pub struct ScanReport {
     pub raycast_fill: f64,
     /// Processor time of the mesh from nothing.
     pub mesh_full_cpu_ms: f64,
+    /// Processor time of following the map with its mesh after a frame, median; absent for a map on a GPU.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh_incremental_cpu_ms_median: Option<f64>,
     /// Largest number of bytes in active memory.
     pub active_bytes_peak: usize,
+    /// Largest number of bytes in the host tier.
+    pub host_bytes_peak: usize,
     /// Blocks of the map.
     pub blocks: usize,
     /// Hash of all voxels: equal for equal maps.
@@ -50,18 +55,21 @@ pub struct ScanReport {
 impl Scan {
     /// The figures of this run.
     pub fn report(&self) -> ScanReport {
-        let settings = self.map.settings();
+        let (settings, course) = (self.map.settings(), &self.course);
+        let casts: Vec<f64> = course.looks.iter().map(|look| look.seconds).collect();
         ScanReport {
             version: env!("CARGO_PKG_VERSION"),
             frames: self.fused.len(),
             frames_skipped: self.skipped.len(),
             voxel_m: settings.voxel_size,
-            integrate_cpu_ms_median: 1e3 * median(&self.integrate_s),
-            raycast_cpu_ms_median: 1e3 * median(&self.looks.iter().map(|look| look.seconds).collect::<Vec<_>>()),
-            depth_error_mean_m: mean(self.looks.iter().map(|look| look.depth_error)),
-            raycast_fill: mean(self.looks.iter().map(|look| look.fill)),
-            mesh_full_cpu_ms: 1e3 * self.mesh_s,
-            active_bytes_peak: self.bytes_peak,
+            integrate_cpu_ms_median: 1e3 * median(&course.integrate_s),
+            raycast_cpu_ms_median: 1e3 * median(&casts),
+            depth_error_mean_m: mean(course.looks.iter().map(|look| look.depth_error)),
+            raycast_fill: mean(course.looks.iter().map(|look| look.fill)),
+            mesh_full_cpu_ms: 1e3 * course.mesh_s,
+            mesh_incremental_cpu_ms_median: (!course.follow_s.is_empty()).then(|| 1e3 * median(&course.follow_s)),
+            active_bytes_peak: course.active_bytes_peak,
+            host_bytes_peak: course.host_bytes_peak,
             blocks: self.map.blocks(),
             map_hash: format!("{:016x}", self.map.hash()),
             vertices: self.mesh.positions.len(),
@@ -69,7 +77,7 @@ impl Scan {
             non_manifold_edges: non_manifold_edges(&self.mesh.faces),
             path_length_m: self.trajectory.path_length(),
             threads: settings.threads,
-            device: "cpu".into(),
+            device: self.device.clone(),
             peak_rss_bytes: crate::report::peak_resident_bytes(),
         }
     }

@@ -1,27 +1,35 @@
 //! The mapping run: every frame once, in order.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use cpu_time::ProcessTime;
 use nalgebra::Isometry3;
-use tsdf_hash::{CastSettings, Map, Mesh, View};
+use tsdf_hash::{CastSettings, DepthView, Map, MapFile, Mesh, MeshKeeper};
 use vio_ekf::{Stamp, Trajectory};
 
+use super::keeper::{Device, Keeper};
 use super::{Images, Sequence, SequenceError};
 use crate::progress::Stage;
 
 /// How a sequence is mapped.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct ScanSettings {
     /// The map.
     pub map: tsdf_hash::Settings,
     /// Frames between two looks at the map from the camera's own place.
     pub look_every: usize,
+    /// Where the map is kept.
+    pub device: Device,
+    /// File of the disk tier, if there is to be one.
+    pub swap: Option<PathBuf>,
+    /// A stored map to go on from; its settings take the place of those here, but for memory and threads.
+    pub resume: Option<PathBuf>,
 }
 
 impl Default for ScanSettings {
     fn default() -> Self {
-        Self { map: tsdf_hash::Settings::default(), look_every: 10 }
+        let map = tsdf_hash::Settings::default();
+        Self { map, look_every: 10, device: Device::Cpu, swap: None, resume: None }
     }
 }
 
@@ -37,14 +45,27 @@ pub struct Scan {
     pub fused: Vec<usize>,
     /// Frames that could not be fused, with the reason.
     pub skipped: Vec<(usize, String)>,
+    /// What kept the map.
+    pub device: String,
+    /// What was measured on the way.
+    pub course: Course,
+}
+
+/// What was measured while the map grew.
+#[derive(Debug, Clone, Default)]
+pub struct Course {
     /// Processor time of each fusion, seconds.
     pub integrate_s: Vec<f64>,
+    /// Processor time of following the map with its mesh, after each fusion, seconds; empty for a map on a GPU.
+    pub follow_s: Vec<f64>,
     /// What looking at the map showed, and took.
     pub looks: Vec<Look>,
     /// Processor time of the mesh from nothing, seconds.
     pub mesh_s: f64,
-    /// Largest number of bytes of the map.
-    pub bytes_peak: usize,
+    /// Largest number of bytes in active memory.
+    pub active_bytes_peak: usize,
+    /// Largest number of bytes in the host tier.
+    pub host_bytes_peak: usize,
 }
 
 /// The map, seen from where a frame was taken, beside that frame.
@@ -64,9 +85,17 @@ pub enum ScanError {
     /// The sequence cannot be read.
     #[error(transparent)]
     Sequence(#[from] SequenceError),
-    /// The map refused its settings.
+    /// The map refused something.
     #[error(transparent)]
     Map(#[from] tsdf_hash::Error),
+    /// The stored map cannot be used.
+    #[error("{path}: {source}")]
+    Stored {
+        /// The file.
+        path: String,
+        /// What is wrong with it.
+        source: tsdf_hash::Error,
+    },
     /// The poses make no trajectory.
     #[error(transparent)]
     Trajectory(#[from] vio_ekf::Error),
@@ -76,6 +105,9 @@ pub enum ScanError {
     /// A picture cannot be saved.
     #[error(transparent)]
     Picture(#[from] crate::pictures::PictureError),
+    /// A device was asked for that this program was built without.
+    #[error("--device gpu: this program was built without it: build with --features gpu, or use --device cpu")]
+    NoGpu,
     /// No frame could be fused.
     #[error("{folder}: none of the {frames} frames could be fused; the first: {first}")]
     NothingFused {
@@ -90,15 +122,12 @@ pub enum ScanError {
 
 impl Scan {
     /// Maps a sequence by its recorded poses. Frames that cannot be used are counted and left out.
-    pub fn run(folder: &Path, sequence: &Sequence, settings: ScanSettings) -> Result<Self, ScanError> {
+    pub fn run(folder: &Path, sequence: &Sequence, settings: &ScanSettings) -> Result<Self, ScanError> {
         let stage = Stage::start("fuse");
-        let mut map = Map::new(settings.map)?;
-        let mut skipped = Vec::new();
-        let mut integrate_s = Vec::with_capacity(sequence.frames.len());
-        let mut fused = Vec::with_capacity(sequence.frames.len());
+        let mut keeper = Keeper::open(begin(settings)?, settings.device)?;
+        let (mut follower, mut course) = (MeshKeeper::new(), Course::default());
+        let (mut fused, mut skipped) = (Vec::with_capacity(sequence.frames.len()), Vec::new());
         let mut trajectory = Trajectory::default();
-        let (mut looks, mut view) = (Vec::new(), View::new());
-        let mut bytes_peak = 0;
         for (index, frame) in sequence.frames.iter().enumerate() {
             stage.share(index as f64 / sequence.frames.len() as f64);
             let Some(pose) = frame.world_from_camera else {
@@ -106,54 +135,89 @@ impl Scan {
                 continue;
             };
             let look = index % settings.look_every.max(1) == 0;
-            match fuse(&mut map, sequence, index, &pose, look.then_some(&mut view)) {
-                Ok((seconds, look)) => {
-                    integrate_s.push(seconds);
-                    looks.extend(look);
+            match take(&mut keeper, &mut follower, sequence, index, &pose, look, &mut course) {
+                Ok(()) => {
                     fused.push(index);
                     trajectory.push(Stamp::from_secs(frame.stamp)?, pose)?;
-                    bytes_peak = bytes_peak.max(map.bytes());
                 }
                 Err(why) => skipped.push((index, format!("{}: {why}", frame.depth.display()))),
             }
         }
-        if integrate_s.is_empty() {
+        if fused.is_empty() {
             let first = skipped.first().map_or_else(String::new, |(_, why)| why.clone());
             let frames = sequence.frames.len();
             return Err(ScanError::NothingFused { folder: folder.display().to_string(), frames, first });
         }
-        stage.done(&format!("{} frames, {} left out, {} blocks", integrate_s.len(), skipped.len(), map.blocks()));
+        let blocks = keeper.dense().blocks();
+        stage.done(&format!("{} frames, {} left out, {blocks} blocks", fused.len(), skipped.len()));
 
         let stage = Stage::start("mesh");
         let start = ProcessTime::now();
-        let mesh = map.mesh();
-        let mesh_s = start.elapsed().as_secs_f64();
+        let mesh = keeper.dense().mesh()?;
+        course.mesh_s = start.elapsed().as_secs_f64();
         stage.done(&format!("{} vertices, {} triangles", mesh.positions.len(), mesh.faces.len()));
-        Ok(Self { map, mesh, trajectory, fused, skipped, looks, integrate_s, mesh_s, bytes_peak })
+        let (device, map) = (keeper.device(), keeper.into_map()?);
+        Ok(Self { map, mesh, trajectory, fused, skipped, device, course })
     }
 }
 
-/// Processor time that the fusion took, seconds, and a look at the map if a view is given.
-fn fuse(
-    map: &mut Map,
+/// The map that the run starts with.
+fn begin(settings: &ScanSettings) -> Result<Map, ScanError> {
+    let Some(path) = &settings.resume else {
+        return Ok(match &settings.swap {
+            Some(swap) => Map::with_swap(settings.map, swap)?,
+            None => Map::new(settings.map)?,
+        });
+    };
+    let stored = |source| ScanError::Stored { path: path.display().to_string(), source };
+    let file = MapFile::open(path).map_err(stored)?;
+    let tsdf_hash::Settings { max_bytes, threads, tiers, .. } = settings.map;
+    let continued = tsdf_hash::Settings { max_bytes, threads, tiers, ..*file.settings() };
+    file.into_map(continued, settings.swap.as_deref()).map_err(stored)
+}
+
+/// Fuses a frame, lets the mesh follow and, if asked for, looks at the map from where the frame was taken.
+fn take(
+    keeper: &mut Keeper,
+    follower: &mut MeshKeeper,
     sequence: &Sequence,
     index: usize,
     pose: &Isometry3<f64>,
-    view: Option<&mut View>,
-) -> Result<(f64, Option<Look>), ScanError> {
+    look: bool,
+    course: &mut Course,
+) -> Result<(), ScanError> {
     let images = Images::read(&sequence.frames[index])?;
     let depth = images.depth(sequence.intrinsics, sequence.depth_scale);
     let start = ProcessTime::now();
-    map.integrate(&depth, images.colour(sequence.intrinsics).as_ref(), pose)?;
-    let seconds = start.elapsed().as_secs_f64();
-    let Some(view) = view else { return Ok((seconds, None)) };
-    let map_settings = map.settings();
-    let (min_depth, max_depth) = (map_settings.min_depth, map_settings.max_depth);
-    let settings = CastSettings { min_depth, max_depth, colour: true, threads: map_settings.threads };
+    keeper.dense().integrate(&depth, images.colour(sequence.intrinsics).as_ref(), pose)?;
+    course.integrate_s.push(start.elapsed().as_secs_f64());
+    course.active_bytes_peak = course.active_bytes_peak.max(keeper.dense().bytes());
+    if let Some(map) = keeper.map() {
+        course.host_bytes_peak = course.host_bytes_peak.max(map.memory().host_bytes);
+        let start = ProcessTime::now();
+        follower.update(map)?;
+        course.follow_s.push(start.elapsed().as_secs_f64());
+    }
+    if look {
+        course.looks.extend(look_from(keeper, &images, &depth, sequence.depth_scale, pose)?);
+    }
+    Ok(())
+}
+
+/// `None` if the map has no surface where the frame has one.
+fn look_from(
+    keeper: &mut Keeper,
+    images: &Images,
+    depth: &DepthView,
+    scale: f64,
+    pose: &Isometry3<f64>,
+) -> Result<Option<Look>, ScanError> {
+    let &tsdf_hash::Settings { min_depth, max_depth, threads, .. } = keeper.settings();
+    let settings = CastSettings { min_depth, max_depth, colour: true, threads };
     let start = ProcessTime::now();
-    map.ray_cast_into(&sequence.intrinsics, depth.width, depth.height, pose, &settings, view)?;
-    let cast = start.elapsed().as_secs_f64();
-    let measured = images.metres(sequence.depth_scale).map(|z| Some(z).filter(|z| (min_depth..=max_depth).contains(z)));
+    let view = keeper.dense().ray_cast(&depth.intrinsics, depth.width, depth.height, pose, &settings)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let measured = images.metres(scale).map(|z| Some(z).filter(|z| (min_depth..=max_depth).contains(z)));
     let (mut pixels, mut hits, mut error) = (0_usize, 0_usize, 0.0);
     for (z, seen) in measured.zip(&view.depth).filter_map(|(z, seen)| Some((z?, *seen))) {
         pixels += 1;
@@ -162,7 +226,6 @@ fn fuse(
             error += (f64::from(seen) - z).abs();
         }
     }
-    let look =
-        (hits > 0).then(|| Look { seconds: cast, depth_error: error / hits as f64, fill: hits as f64 / pixels as f64 });
-    Ok((seconds, look))
+    let look = Look { seconds, depth_error: error / hits as f64, fill: hits as f64 / pixels as f64 };
+    Ok(Some(look).filter(|_| hits > 0))
 }

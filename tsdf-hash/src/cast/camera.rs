@@ -9,11 +9,11 @@ use crate::{Error, Settings};
 
 /// Coordinates count voxel centres, so that the corners of a cell are integers, and start at a corner of the camera's own
 /// block: single precision then is fine wherever the camera is.
-pub(super) struct Camera {
-    pub(super) width: usize,
-    pub(super) height: usize,
+pub(crate) struct Camera {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
     /// Block of the camera.
-    pub(super) base: [i32; 3],
+    pub(crate) base: [i32; 3],
     /// The camera, in voxels from the first voxel of `base`.
     origin: [f32; 3],
     /// Voxels per metre of depth: columns for one pixel along a row, one along a column, and for pixel (0, 0).
@@ -22,14 +22,14 @@ pub(super) struct Camera {
     projection: Matrix3<f64>,
     /// Normals of the four sides and the front of the view, inwards, of unit length.
     sides: [Vector3<f64>; 5],
-    pub(super) min_depth: f32,
-    pub(super) max_depth: f32,
+    pub(crate) min_depth: f32,
+    pub(crate) max_depth: f32,
     /// Truncation distance in voxels.
-    pub(super) truncation: f32,
+    pub(crate) truncation: f32,
 }
 
 impl Camera {
-    pub(super) fn new(
+    pub(crate) fn new(
         k: &Intrinsics,
         (width, height): (usize, usize),
         world_from_camera: &Isometry3<f64>,
@@ -65,7 +65,7 @@ impl Camera {
     }
 
     /// Whether a ball, relative to the camera and in voxels, may be in the image.
-    pub(super) fn sees(&self, centre: [f32; 3], radius: f64) -> bool {
+    pub(crate) fn sees(&self, centre: [f32; 3], radius: f64) -> bool {
         let centre = Vector3::from(centre.map(f64::from));
         let along = self.projection.row(2).transpose();
         let (depth, reach) = (along.dot(&centre), radius * along.norm());
@@ -75,7 +75,7 @@ impl Camera {
     }
 
     /// The pixels that a box may cover, `[first u, first v, last u, last v]`; the box is given relative to the camera.
-    pub(super) fn cover(&self, low: &[f32; 3], high: &[f32; 3]) -> Option<[usize; 4]> {
+    pub(crate) fn cover(&self, low: &[f32; 3], high: &[f32; 3]) -> Option<[usize; 4]> {
         let (mut least, mut most) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         let mut behind = false;
         for n in 0..8 {
@@ -105,13 +105,13 @@ impl Camera {
     }
 
     /// Direction of the rays at the left end of a row, and its change per pixel, voxels per metre of depth.
-    pub(super) fn row(&self, v: usize) -> ([f32; 3], [f32; 3]) {
+    pub(crate) fn row(&self, v: usize) -> ([f32; 3], [f32; 3]) {
         let start = self.rays.column(2) + self.rays.column(1) * v as f64;
         (start.cast::<f32>().into(), self.rays.column(0).into_owned().cast::<f32>().into())
     }
 
     /// From the camera to the first voxel of a block, voxels.
-    pub(super) fn offset(&self, block: [i32; 3]) -> [f32; 3] {
+    pub(crate) fn offset(&self, block: [i32; 3]) -> [f32; 3] {
         [0, 1, 2].map(|k| ((block[k] - self.base[k]) * SIDE as i32) as f32 - self.origin[k])
     }
 }

@@ -10,7 +10,7 @@ use crate::store::Store;
 /// Nodes along the edge of a block: its own voxels and the first ones of the next block.
 pub(super) const NODES: usize = SIDE + 1;
 /// Nodes of a block.
-pub(super) const ALL: usize = NODES * NODES * NODES;
+pub(crate) const ALL: usize = NODES * NODES * NODES;
 
 /// One block with its upper border, node `(x, y, z)` at entry `x + 9 (y + 9 z)`, so that every cell of it is whole.
 #[derive(Clone, Debug)]
@@ -24,18 +24,26 @@ pub(super) struct Field {
 
 /// A field in a view.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(crate) struct Place {
     /// Which field.
-    pub(super) field: usize,
+    pub(crate) field: usize,
     /// From the first node to the camera, voxels.
-    pub(super) origin: [f32; 3],
+    pub(crate) origin: [f32; 3],
     /// The box around the cells that the surface crosses, relative to the camera, voxels.
-    pub(super) low: [f32; 3],
-    pub(super) high: [f32; 3],
+    pub(crate) low: [f32; 3],
+    pub(crate) high: [f32; 3],
 }
 
 /// The range of the cells that the surface crosses, `[first, last + 1]`.
-type Range = [[u8; 3]; 2];
+pub(crate) type Range = [[u8; 3]; 2];
+
+impl Place {
+    pub(crate) fn new(field: usize, key: Key, range: Range, camera: &Camera) -> Self {
+        let offset = camera.offset(key.block());
+        let [low, high] = range.map(|cell| [0, 1, 2].map(|k| offset[k] + f32::from(cell[k])));
+        Self { field, origin: offset.map(|c| -c), low, high }
+    }
+}
 
 /// The fields with a surface.
 #[derive(Clone, Debug, Default)]
@@ -47,7 +55,7 @@ pub(super) struct Fields {
 
 impl Fields {
     pub(super) fn select(&mut self, store: &Store, camera: &Camera, settings: &CastSettings) {
-        let seen = in_view(store, camera);
+        let seen = in_view(store.keys().iter().copied(), camera);
         if self.fields.len() < seen.len() {
             self.fields.resize(seen.len(), Field::UNSEEN);
         }
@@ -68,9 +76,7 @@ impl Fields {
         let mut first = 0;
         for (length, ranges) in parts {
             for (k, (key, range)) in ranges.into_iter().enumerate() {
-                let offset = camera.offset(key.block());
-                let [low, high] = range.map(|cell| [0, 1, 2].map(|k| offset[k] + f32::from(cell[k])));
-                self.places.push(Place { field: first + k, origin: offset.map(|c| -c), low, high });
+                self.places.push(Place::new(first + k, key, range, camera));
             }
             first += length;
         }
@@ -78,10 +84,10 @@ impl Fields {
 }
 
 /// The blocks in view, front to back.
-fn in_view(store: &Store, camera: &Camera) -> Vec<Key> {
+pub(crate) fn in_view(keys: impl Iterator<Item = Key>, camera: &Camera) -> Vec<Key> {
     let radius = 0.5 * 3.0_f64.sqrt() * SIDE as f64;
     let mut seen: Vec<(u32, Key)> = Vec::new();
-    for &key in store.keys() {
+    for key in keys {
         let block = key.block();
         if camera.sees(camera.offset(block).map(|c| c + 0.5 * SIDE as f32), radius) {
             // A ray goes from block to block through a face, always away from the camera: with each step the number of

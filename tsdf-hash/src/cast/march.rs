@@ -10,11 +10,11 @@ use super::tiles::{self, Tiles};
 use super::{Band, Pixel, UNSEEN};
 
 /// A ray parallel to a plane of voxels still has a finite inverse, voxels per metre.
-const LEAST_SLOPE: f32 = 1e-6;
+pub(crate) const LEAST_SLOPE: f32 = 1e-6;
 /// A field that starts this little below zero is met at its border: rounding, in truncation distances.
-const GRAZE: f32 = 1e-3;
+pub(crate) const GRAZE: f32 = 1e-3;
 /// Steps near the surface and in unobserved cells, voxels.
-const LEAST_STEP: f32 = 0.5;
+pub(crate) const LEAST_STEP: f32 = 0.5;
 
 /// Fills the rows of a band.
 pub(super) fn fill(band: &mut Band, camera: &Camera, fields: &Fields, tiles: &Tiles, colour: bool) {

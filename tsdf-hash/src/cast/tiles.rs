@@ -1,25 +1,25 @@
 //! Which fields each square of pixels may see.
 
 use super::camera::Camera;
-use super::fields::Fields;
+use super::fields::Place;
 
 /// Edge of a square, pixels.
-pub(super) const SIDE: usize = 8;
+pub(crate) const SIDE: usize = 8;
 
 /// Lists of places, front to back, one per square.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Tiles {
-    columns: usize,
+pub(crate) struct Tiles {
+    pub(crate) columns: usize,
     /// Where the list of each square starts, and where the last one ends.
-    starts: Vec<u32>,
-    lists: Vec<u32>,
+    pub(crate) starts: Vec<u32>,
+    pub(crate) lists: Vec<u32>,
 }
 
 impl Tiles {
-    pub(super) fn fill(&mut self, fields: &Fields, camera: &Camera) {
+    pub(crate) fn fill(&mut self, places: &[Place], camera: &Camera) {
         self.columns = camera.width.div_ceil(SIDE);
         let count = self.columns * camera.height.div_ceil(SIDE);
-        let covers: Vec<_> = fields.places.iter().map(|place| camera.cover(&place.low, &place.high)).collect();
+        let covers: Vec<_> = places.iter().map(|place| camera.cover(&place.low, &place.high)).collect();
         let columns = self.columns;
         let squares = |cover: &Option<[usize; 4]>| {
             let [left, top, right, bottom] = cover.map_or([1, 1, 0, 0], |pixels| pixels.map(|p| p / SIDE));
@@ -47,7 +47,7 @@ impl Tiles {
     }
 
     /// The list of the square at a column and row of squares.
-    pub(super) fn list(&self, column: usize, row: usize) -> &[u32] {
+    pub(crate) fn list(&self, column: usize, row: usize) -> &[u32] {
         let square = row * self.columns + column;
         &self.lists[self.starts[square] as usize..self.starts[square + 1] as usize]
     }

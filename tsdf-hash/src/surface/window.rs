@@ -15,9 +15,15 @@ const HALO: usize = RADIUS + 1;
 /// Lines in a ring: from the first line of a window to the one that its last edge test needs.
 const RING: usize = 2 * HALO;
 /// Values in the window.
-const COUNT: f32 = 49.0;
+pub(super) const COUNT: f32 = 49.0;
 /// `Σ i²` over the window.
-const SPREAD: f32 = 196.0;
+pub(super) const SPREAD: f32 = 196.0;
+/// Of the rim, 28 values, and of the middle, 21: `84 (rim / 28 - middle / 21)` has integer factors.
+pub(super) const BENDING: f32 = 84.0;
+/// Pixels of the window, times the variance of four second differences.
+pub(super) const ROUGHNESS: f32 = COUNT * 24.0;
+/// Variance of the bend, for noise of unit variance.
+pub(super) const BEND_VARIANCE: f32 = 1.0 / 6.0;
 
 /// The last lines of something.
 struct Ring {
@@ -59,32 +65,28 @@ pub(super) struct Windows<'a> {
     total: Ring,
     moment: Ring,
     bend: Ring,
+    /// Squared second differences of a line, and their sums along it.
+    rough: Vec<f32>,
+    roughness: Ring,
+    /// Of the row that was asked for: total, slopes, bend and roughness.
+    fits: [Vec<f32>; 5],
 }
 
-/// A row and its fits; slices of the image's width.
+/// A row and its fits; slices of the image's width. The fits are NaN where the window has a gap or an edge.
+#[derive(Clone, Copy)]
 pub(super) struct Row<'a> {
     /// Inverse depth of the row above, of the row and of the row below, with one pixel more on each side.
     pub(super) around: [&'a [f32]; 3],
     /// The row with NaN at edges.
     pub(super) smooth: &'a [f32],
-    total: [&'a [f32]; 7],
-    moment: [&'a [f32]; 7],
-    bend: [&'a [f32]; 7],
-}
-
-/// What fits the inverse depth over the window around a pixel; NaN if the window has a gap or an edge.
-#[derive(Clone, Copy)]
-pub(super) struct Fit {
-    pub(super) mean: f32,
-    /// Slopes per pixel.
-    pub(super) slope: [f32; 2],
-    /// How far the rim of the window is from its middle, along both axes together; 0 for a plane.
-    pub(super) bend: f32,
-}
-
-impl Fit {
-    /// Variance of the bend, for noise of unit variance.
-    pub(super) const BEND_VARIANCE: f32 = 1.0 / 6.0;
+    /// The mean over the window times [`COUNT`].
+    pub(super) total: &'a [f32],
+    /// Slopes per pixel times [`SPREAD`].
+    pub(super) slope: [&'a [f32]; 2],
+    /// How far the rim of the window is from its middle, along both axes together, times [`BENDING`]; 0 for a plane.
+    pub(super) bend: &'a [f32],
+    /// The mean square of the noise over the window times [`ROUGHNESS`], as far as second differences show it.
+    pub(super) roughness: &'a [f32],
 }
 
 impl<'a> Windows<'a> {
@@ -101,6 +103,9 @@ impl<'a> Windows<'a> {
             total: Ring::new(width),
             moment: Ring::new(width),
             bend: Ring::new(width),
+            rough: vec![0.0; width + 2 * RADIUS],
+            roughness: Ring::new(width),
+            fits: [(); 5].map(|()| vec![0.0; width]),
         };
         (0..RING).for_each(|k| windows.push(k));
         windows
@@ -110,12 +115,18 @@ impl<'a> Windows<'a> {
     pub(super) fn row(&mut self, row: usize) -> Row<'_> {
         self.push(row + RING);
         let width = self.depth.width;
+        let [total, along, down, bend, roughness] = &mut self.fits;
+        sum_lines(self.total.seven(row + 1), total, down, bend);
+        add_lines(self.moment.seven(row + 1), false, along);
+        add_lines(self.bend.seven(row + 1), true, bend);
+        add_lines(self.roughness.seven(row + 1), false, roughness);
         Row {
             around: [HALO - 1, HALO, HALO + 1].map(|k| &self.raw.line(row + k)[HALO - 1..][..width + 2]),
             smooth: &self.smooth.line(row + HALO)[HALO..][..width],
-            total: self.total.seven(row + 1),
-            moment: self.moment.seven(row + 1),
-            bend: self.bend.seven(row + 1),
+            total,
+            slope: [along, down],
+            bend,
+            roughness,
         }
     }
 
@@ -127,9 +138,10 @@ impl<'a> Windows<'a> {
         }
         let width = self.depth.width;
         let around = [k - 2, k - 1, k].map(|k| self.raw.line(k));
-        smooth_line(around, self.noise, &mut self.smooth.line_mut(k - 1)[1..][..width + 2 * RADIUS]);
-        let source = &self.smooth.line(k - 1)[1..][..width + 2 * RADIUS];
-        sum_line(source, self.total.line_mut(k - 1), self.moment.line_mut(k - 1), self.bend.line_mut(k - 1));
+        let smooth = &mut self.smooth.line_mut(k - 1)[1..][..width + 2 * RADIUS];
+        smooth_line(around, self.noise, smooth, &mut self.rough);
+        sum_line(smooth, self.total.line_mut(k - 1), self.moment.line_mut(k - 1), self.bend.line_mut(k - 1));
+        add_line(&self.rough, self.roughness.line_mut(k - 1));
     }
 
     fn read(&mut self, k: usize) {
@@ -157,9 +169,10 @@ impl<'a> Windows<'a> {
 }
 
 /// A copy of a line with NaN where the 3x3 patch has a gap, or bends or jumps by more than four standard deviations of
-/// its noise.
-fn smooth_line(around: [&[f32]; 3], noise: Noise, out: &mut [f32]) {
+/// its noise; and the sum of its squared second differences, which is 24 times the variance of noise on a plane.
+fn smooth_line(around: [&[f32]; 3], noise: Noise, out: &mut [f32], rough: &mut [f32]) {
     let width = out.len();
+    let rough = &mut rough[..width];
     let [above, here, below] = around.map(|line| &line[..width + 2]);
     for u in 0..width {
         let omega = here[u + 1];
@@ -172,6 +185,7 @@ fn smooth_line(around: [&[f32]; 3], noise: Noise, out: &mut [f32]) {
             + second(above[u], below[u + 2])
             + second(above[u + 2], below[u]);
         let sigma = noise.sigma_inverse(omega);
+        rough[u] = bend;
         out[u] = if bend <= 2.0 * 6.0 * 16.0 * sigma * sigma { omega } else { f32::NAN };
     }
 }
@@ -181,8 +195,18 @@ fn sum_line(source: &[f32], total: &mut [f32], moment: &mut [f32], bend: &mut [f
     let width = total.len();
     let (source, moment, bend) = (&source[..width + 6], &mut moment[..width], &mut bend[..width]);
     for u in 0..width {
-        let x = [0, 1, 2, 3, 4, 5, 6].map(|k| source[u + k]);
-        (total[u], moment[u], bend[u]) = seven(x);
+        let s = &source[u..u + 7];
+        (total[u], moment[u], bend[u]) = seven([s[0], s[1], s[2], s[3], s[4], s[5], s[6]]);
+    }
+}
+
+/// Sum of seven neighbours along a line.
+fn add_line(source: &[f32], out: &mut [f32]) {
+    let width = out.len();
+    let source = &source[..width + 6];
+    for u in 0..width {
+        let s = &source[u..u + 7];
+        out[u] = ((s[0] + s[6]) + (s[1] + s[5])) + ((s[2] + s[4]) + s[3]);
     }
 }
 
@@ -194,30 +218,22 @@ fn seven(x: [f32; 7]) -> (f32, f32, f32) {
     (rim + middle, moment, 3.0 * rim - 4.0 * middle)
 }
 
-impl Row<'_> {
-    /// The same row with slices whose lengths the compiler can see.
-    #[inline(always)]
-    pub(super) fn of_width(&self, width: usize) -> Self {
-        Self {
-            around: self.around.map(|line| &line[..width + 2]),
-            smooth: &self.smooth[..width],
-            total: self.total.map(|line| &line[..width]),
-            moment: self.moment.map(|line| &line[..width]),
-            bend: self.bend.map(|line| &line[..width]),
-        }
+/// [`seven`] across lines.
+fn sum_lines(lines: [&[f32]; 7], total: &mut [f32], moment: &mut [f32], bend: &mut [f32]) {
+    let width = total.len();
+    let ([a, b, c, d, e, f, g], moment, bend) =
+        (lines.map(|line| &line[..width]), &mut moment[..width], &mut bend[..width]);
+    for u in 0..width {
+        (total[u], moment[u], bend[u]) = seven([a[u], b[u], c[u], d[u], e[u], f[u], g[u]]);
     }
+}
 
-    #[inline(always)]
-    pub(super) fn fit(&self, u: usize) -> Fit {
-        let (sum, down, bend_down) = seven(self.total.map(|line| line[u]));
-        let add = |x: [&[f32]; 7]| {
-            let x = x.map(|line| line[u]);
-            ((x[0] + x[6]) + (x[1] + x[5])) + ((x[2] + x[4]) + x[3])
-        };
-        Fit {
-            mean: sum * (1.0 / COUNT),
-            slope: [add(self.moment) * (1.0 / SPREAD), down * (1.0 / SPREAD)],
-            bend: (add(self.bend) + bend_down) * (1.0 / 84.0),
-        }
+/// Adds seven lines to `out`, or replaces it.
+fn add_lines(lines: [&[f32]; 7], keep: bool, out: &mut [f32]) {
+    let width = out.len();
+    let [a, b, c, d, e, f, g] = lines.map(|line| &line[..width]);
+    for u in 0..width {
+        let sum = ((a[u] + g[u]) + (b[u] + f[u])) + ((c[u] + e[u]) + d[u]);
+        out[u] = if keep { out[u] + sum } else { sum };
     }
 }

@@ -198,7 +198,7 @@ impl Copies {
     }
 
     /// Without cold memory it is active memory that is full.
-    fn or_no_tiers(&self, error: Error) -> Error {
+    pub(super) fn or_no_tiers(&self, error: Error) -> Error {
         if self.cold.exists() { error } else { self.active.out_of_budget() }
     }
 

@@ -16,30 +16,44 @@ use crate::block::{Block, SIDE, VOXELS};
 pub(crate) const MOST_BYTES: usize = 2 * (8 + VOXELS / 8) + 6 * (VOXELS / GROUP) + 14 * VOXELS;
 
 const GROUP: usize = 8;
+/// Numbers are written and read as 16 bytes at a time, of which only the first count.
+const SLACK: usize = 16;
 
 /// Appends a block.
 pub(crate) fn pack(block: &Block, out: &mut Vec<u8>) {
+    let mut writer = Writer { bytes: [0; MOST_BYTES + SLACK], len: 0 };
     let mut list = [0; VOXELS];
-    let used = |v: usize| block.weight[v] != 0 || block.distance[v] != 0 || block.colour[v] != [0; 4];
-    let voxels = write_mask(used, &mut list, out);
-    write_list(out, voxels, Delta::default(), |delta, v| delta.fold(block.weight[v]));
+    let any = |v: usize| {
+        let [r, g, b, n] = block.colour[v];
+        u32::from(block.weight[v] | r | g | b | n) | block.distance[v].cast_unsigned()
+    };
+    let voxels = writer.mask(|v| any(v) != 0, &mut list);
+    let mut delta = Delta::default();
+    writer.list(voxels, |v| delta.fold(block.weight[v]));
     let mut means = Means::new();
-    write_list(out, voxels, (), |(), v| {
+    writer.list(voxels, |v| {
         let predicted = means.predict(v, block.weight[v]);
         means.set(v, block.distance[v], block.weight[v]);
         fold(block.distance[v].wrapping_sub(predicted))
     });
     let mut list = [0; VOXELS];
-    let voxels = write_mask(|v| block.colour[v] != [0; 4], &mut list, out);
-    write_list(out, voxels, Delta::default(), |delta, v| delta.fold(block.colour[v][3]));
+    let coloured = |v: usize| {
+        let [r, g, b, n] = block.colour[v];
+        r | g | b | n != 0
+    };
+    let voxels = writer.mask(coloured, &mut list);
+    let mut delta = Delta::default();
+    writer.list(voxels, |v| delta.fold(block.colour[v][3]));
     for channel in 0..3 {
-        write_list(out, voxels, Scaled::default(), |scaled, v| {
+        let mut scaled = Scaled::default();
+        writer.list(voxels, |v| {
             let [sum, count] = [block.colour[v][channel], block.colour[v][3]];
             let difference = sum.wrapping_sub(scaled.predict(count));
             scaled.set(sum, count);
             fold16(difference)
         });
     }
+    out.extend_from_slice(&writer.bytes[..writer.len]);
 }
 
 /// Adds a packed block to `block`, wrapping. `None` if the bytes are not those of a block; it is then spoilt.
@@ -158,7 +172,8 @@ impl Means {
                 .then(|| before[a].wrapping_add(before[b]).wrapping_sub(corner))
         };
         let single = || known.iter().position(|&known| known).map_or(self.last, |axis| before[axis]);
-        let mean = plane(0, 1).or_else(|| plane(0, 2)).or_else(|| plane(1, 2)).unwrap_or_else(single);
+        // Not from the voxel just before, if it can be helped: its mean is known last.
+        let mean = plane(1, 2).or_else(|| plane(0, 2)).or_else(|| plane(0, 1)).unwrap_or_else(single);
         mean.wrapping_mul(i32::from(weight))
     }
 
@@ -168,28 +183,62 @@ impl Means {
     }
 }
 
-/// Writes which voxels are `used` and lists them.
-fn write_mask<'a>(used: impl Fn(usize) -> bool, list: &'a mut [u16; VOXELS], out: &mut Vec<u8>) -> &'a [u16] {
-    let (mut rows, mut count) = (0_u64, 0);
-    let start = out.len();
-    out.extend_from_slice(&[0; 8]);
-    for row in 0..VOXELS / SIDE {
-        let mut bits = 0_u8;
-        for x in 0..SIDE {
-            let voxel = SIDE * row + x;
-            let here = used(voxel);
-            bits |= u8::from(here) << x;
-            // One more entry is written than counted, without a branch.
-            list[count.min(VOXELS - 1)] = voxel as u16;
-            count += usize::from(here);
+struct Writer {
+    bytes: [u8; MOST_BYTES + SLACK],
+    len: usize,
+}
+
+impl Writer {
+    /// Writes which voxels are `used` and lists them.
+    fn mask<'a>(&mut self, used: impl Fn(usize) -> bool, list: &'a mut [u16; VOXELS]) -> &'a [u16] {
+        let (mut rows, mut count) = (0_u64, 0);
+        let start = self.len;
+        self.len += 8;
+        for row in 0..VOXELS / SIDE {
+            let bits = (0..SIDE).fold(0, |bits, x| bits | u8::from(used(SIDE * row + x)) << x);
+            if bits != 0 {
+                rows |= 1 << row;
+                self.bytes[self.len] = bits;
+                self.len += 1;
+                list_row(row, bits, list, &mut count);
+            }
         }
-        if bits != 0 {
-            rows |= 1 << row;
-            out.push(bits);
+        self.bytes[start..start + 8].copy_from_slice(&rows.to_le_bytes());
+        &list[..count]
+    }
+
+    /// Writes one number for each voxel of a list.
+    fn list(&mut self, voxels: &[u16], mut number: impl FnMut(usize) -> u32) {
+        for group in voxels.chunks(GROUP) {
+            let (mut numbers, mut all) = ([0; GROUP], 0);
+            for (slot, &voxel) in numbers.iter_mut().zip(group) {
+                *slot = number(usize::from(voxel));
+                all |= *slot;
+            }
+            // Four numbers of an even width are whole bytes.
+            let width = (u32::BITS - all.leading_zeros()).next_multiple_of(2);
+            self.bytes[self.len] = width as u8;
+            self.len += 1;
+            let (fours, _) = numbers.as_chunks::<4>();
+            for &[a, b, c, d] in fours {
+                let low = u64::from(a) | u64::from(b) << width;
+                let high = u64::from(c) | u64::from(d) << width;
+                let bits = u128::from(low) | u128::from(high) << (2 * width);
+                if let Some(place) = self.bytes[self.len..].first_chunk_mut() {
+                    *place = bits.to_le_bytes();
+                }
+                self.len += width as usize / 2;
+            }
         }
     }
-    out[start..start + 8].copy_from_slice(&rows.to_le_bytes());
-    &list[..count]
+}
+
+fn list_row(row: usize, mut bits: u8, list: &mut [u16; VOXELS], count: &mut usize) {
+    while bits != 0 {
+        list[*count] = (SIDE * row) as u16 + bits.trailing_zeros() as u16;
+        *count += 1;
+        bits &= bits - 1;
+    }
 }
 
 fn read_mask<'a>(input: &mut &[u8], list: &'a mut [u16; VOXELS]) -> Option<&'a [u16]> {
@@ -198,55 +247,50 @@ fn read_mask<'a>(input: &mut &[u8], list: &'a mut [u16; VOXELS]) -> Option<&'a [
     while rows != 0 {
         let row = rows.trailing_zeros() as usize;
         rows &= rows - 1;
-        let mut bits = *input.split_off_first()?;
+        let bits = *input.split_off_first()?;
         if bits == 0 {
             return None;
         }
-        while bits != 0 {
-            list[count] = (SIDE * row) as u16 + bits.trailing_zeros() as u16;
-            count += 1;
-            bits &= bits - 1;
-        }
+        list_row(row, bits, list, &mut count);
     }
     Some(&list[..count])
 }
 
-/// Writes one number for each voxel of a list.
-fn write_list<S>(out: &mut Vec<u8>, voxels: &[u16], mut state: S, mut number: impl FnMut(&mut S, usize) -> u32) {
-    for group in voxels.chunks(GROUP) {
-        let (mut numbers, mut all) = ([0; GROUP], 0);
-        for (slot, &voxel) in numbers.iter_mut().zip(group) {
-            *slot = number(&mut state, usize::from(voxel));
-            all |= *slot;
-        }
-        // Four numbers of an even width are whole bytes.
-        let width = (u32::BITS - all.leading_zeros()).next_multiple_of(2);
-        out.push(width as u8);
-        for four in numbers.chunks_exact(4) {
-            let bits = four.iter().rev().fold(0_u128, |bits, &number| bits << width | u128::from(number));
-            out.extend_from_slice(&bits.to_le_bytes()[..width as usize / 2]);
-        }
-    }
-}
-
 fn read_list(input: &mut &[u8], voxels: &[u16], mut number: impl FnMut(usize, u32)) -> Option<()> {
     for group in voxels.chunks(GROUP) {
-        let width = u32::from(*input.split_off_first()?);
-        if width > u32::BITS || width % 2 != 0 {
+        let width = usize::from(*input.split_off_first()?);
+        if width > 32 || width % 2 != 0 {
             return None;
         }
         let mask = ((1_u64 << width) - 1) as u32;
         for four in [0, 4] {
-            let mut word = [0; 16];
-            word[..width as usize / 2].copy_from_slice(input.split_off(..width as usize / 2)?);
-            let mut bits = u128::from_le_bytes(word);
+            let mut bits = read_bits(input, width / 2)?;
             for &voxel in group.iter().skip(four).take(4) {
                 number(usize::from(voxel), bits as u32 & mask);
                 bits >>= width;
             }
+            // Nothing hides behind the last voxel.
+            if bits != 0 {
+                return None;
+            }
         }
     }
     Some(())
+}
+
+/// The next `count` bytes as a number.
+fn read_bits(input: &mut &[u8], count: usize) -> Option<u128> {
+    let word = match input.first_chunk() {
+        Some(word) => *word,
+        None => {
+            let mut word = [0; SLACK];
+            word[..input.len()].copy_from_slice(input);
+            word
+        }
+    };
+    input.split_off(..count)?;
+    let kept = if count == SLACK { u128::MAX } else { (1 << (8 * count)) - 1 };
+    Some(u128::from_le_bytes(word) & kept)
 }
 
 #[cfg(test)]

@@ -5,6 +5,8 @@
 mod accuracy;
 mod errors;
 mod file;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod incremental;
 mod recorded;
 mod reversible;

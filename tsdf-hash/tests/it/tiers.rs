@@ -91,6 +91,8 @@ fn caps_leave_no_trace() {
         ("disk-2", 1 << 18, tiers(5 << 17, 8 << 20), 2),
         // Room for everything, but blocks leave by age and come back slowly, so that many have two copies.
         ("age", 1 << 30, slow, 1),
+        // Much leaves at once and comes back slowly: blocks have two copies.
+        ("split", 1 << 21, Tiers { transfers: 5, ..tiers(8 << 20, 0) }, 1),
         ("held", 1 << 30, held, 2),
         ("held-tight", 1 << 20, held, 1),
     ] {
@@ -106,8 +108,8 @@ fn caps_leave_no_trace() {
         assert_eq!(memory.disk_blocks > 100, tiers.disk_bytes > 0);
         assert!(moved > 0, "{name}: {moved}");
         assert!(contents(&map) == expected, "{name} differs");
-        // And all out again, by another way.
-        for &k in order.iter().rev() {
+        // And all out again, the oldest first: what is active is from later frames, what is cold is not all.
+        for &k in &order {
             take_out(&mut map, &shots[k]).unwrap();
             assert_capped(&map);
         }
@@ -122,9 +124,10 @@ fn caps_leave_no_trace() {
 fn what_was_not_in_is_noticed_in_every_tier() {
     let shots = room::tour(12, 4, &Isometry3::identity());
     let tight = Tiers { age: 0.02, transfers: 40, ..tiers(1 << 20, 8 << 20) };
-    for hold in [0.0, 1.0] {
-        let settings = Settings { max_bytes: 1 << 19, tiers: Tiers { hold, ..tight }, ..FREE };
-        let mut map = make(settings, &format!("foreign-{hold}"));
+    // In the last case hardly any block is active.
+    for (max_bytes, hold) in [(1 << 19, 0.0), (1 << 19, 1.0), (1 << 16, 0.0)] {
+        let settings = Settings { max_bytes, tiers: Tiers { hold, ..tight }, ..FREE };
+        let mut map = make(settings, &format!("foreign-{max_bytes}-{hold}"));
         for shot in &shots[..8] {
             add(&mut map, shot).unwrap();
         }
@@ -141,6 +144,22 @@ fn what_was_not_in_is_noticed_in_every_tier() {
         add(&mut map, &shots[2]).unwrap();
         assert!(contents(&map) == before);
     }
+}
+
+#[test]
+fn colours_that_were_not_in_are_noticed_in_cold_blocks() {
+    let walls = [close_wall(1.0), close_wall(-1.0)];
+    let mut map = make(Settings { tiers: Tiers { age: 1.0, ..tiers(1 << 20, 0) }, ..FREE }, "colours");
+    for (side, time) in [(0, 0.0), (1, 5.0)] {
+        map.integrate_at(time, &walls[side].view(), None, &walls[side].world_from_camera).unwrap();
+    }
+    let before = contents(&map);
+    assert!(map.memory().host_blocks > 0 && map.memory().active_blocks + map.memory().host_blocks == map.blocks());
+    // Every block is there, the depth too.
+    assert!(matches!(take_out(&mut map, &walls[0]).unwrap_err(), Error::NotIntegrated { .. }));
+    assert!(contents(&map) == before);
+    map.deintegrate(&walls[0].view(), None, &walls[0].world_from_camera).unwrap();
+    assert_eq!(map.memory().host_blocks, 0);
 }
 
 #[test]
@@ -243,7 +262,7 @@ fn what_comes_back_waits_for_a_verdict() {
     };
     assert_eq!(map.revisit(&mut judge).unwrap(), 0);
     assert_eq!(judged, 1);
-    let hash = map.hash();
+    let hash = contents(&map).0;
     assert_eq!(map.revisit(&mut tsdf_hash::MergeAtOnce).unwrap(), back.blocks_arrived);
     assert!(map.arrivals().is_empty() && map.hash() == hash);
     // The mean of the two: equal weights but for the cosine.

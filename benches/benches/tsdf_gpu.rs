@@ -1,0 +1,60 @@
+//! The room of `peers/synth_rgbd.py` mapped and looked at on a GPU, beside the processor: wall time, because the work is
+//! done elsewhere, with the processor on one thread. `--adapter NAME` picks one; without a real GPU a software one stands
+//! in.
+
+use std::time::Instant;
+
+use clap::Parser;
+use paintcopter_benches::room::Shot;
+use tsdf_hash::{CastSettings, DenseMap, Error, GpuMap, GpuOptions, Map, Settings};
+
+/// Images of a full turn, as many as in the stream `loop`; every sixth is used.
+const TURN: usize = 60;
+const STRIDE: usize = 6;
+
+#[derive(Parser)]
+struct Args {
+    /// Part of the adapter's name.
+    #[arg(long, default_value = "")]
+    adapter: String,
+    /// What cargo passes on.
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
+/// Median of the wall time of the jobs, milliseconds.
+fn median_ms<T>(jobs: impl Iterator<Item = T>, mut run: impl FnMut(T) -> Result<(), Error>) -> Result<f64, Error> {
+    let mut times = Vec::new();
+    for job in jobs {
+        let start = Instant::now();
+        run(job)?;
+        times.push(1e3 * start.elapsed().as_secs_f64());
+    }
+    times.sort_unstable_by(f64::total_cmp);
+    Ok(times[times.len() / 2])
+}
+
+fn main() -> Result<(), Error> {
+    let args = Args::parse();
+    let options = GpuOptions { adapter: args.adapter, software: true, ..GpuOptions::default() };
+    let shots: Vec<Shot> = (0..TURN).step_by(STRIDE).map(|k| Shot::take(k, TURN)).collect();
+    for voxel_size in [0.02, 0.01, 0.005] {
+        let settings = Settings { voxel_size, ..Settings::default() };
+        let (mut map, mut gpu) = (Map::new(settings)?, GpuMap::new(settings, &options)?);
+        let cast = CastSettings::default();
+        let look = Shot::INTRINSICS;
+        let fused = [
+            median_ms(shots.iter(), |s| map.integrate(&s.view(), None, &s.world_from_camera).map(drop))?,
+            median_ms(shots.iter(), |s| gpu.integrate(&s.view(), None, &s.world_from_camera).map(drop))?,
+        ];
+        let seen = [
+            median_ms(shots.iter(), |s| map.ray_cast(&look, 640, 480, &s.world_from_camera, &cast).map(drop))?,
+            median_ms(shots.iter(), |s| gpu.ray_cast(&look, 640, 480, &s.world_from_camera, &cast).map(drop))?,
+        ];
+        let equal = map.hash() == gpu.hash()?;
+        println!("{:.0} mm on {}: {} blocks, equal: {equal}", 1e3 * voxel_size, gpu.adapter(), gpu.blocks());
+        println!("  fusion   processor {:8.2} ms   device {:8.2} ms", fused[0], fused[1]);
+        println!("  ray cast processor {:8.2} ms   device {:8.2} ms", seen[0], seen[1]);
+    }
+    Ok(())
+}

@@ -1,0 +1,195 @@
+//! Pictures to sprays: paints one, compares painters, trains the network.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use paint_net::procedural::Texture;
+use paint_net::train::TrainSettings;
+use paint_net::{Limits, SprayKernel};
+use paintcopter_examples::paint_image::{Choice, Job, Lesson, compare, learn, pictures_in, print_table, read_ink};
+use paintcopter_examples::progress::Stage;
+
+type AnyError = Box<dyn std::error::Error>;
+
+/// Decides what to spray so that the wall comes to look like a picture. Dark is paint, white is bare wall.
+#[derive(Parser)]
+#[command(
+    version,
+    args_conflicts_with_subcommands = true,
+    after_help = "Example:\n  paint-image --image photo.png --painter feedback --out out/photo\n  paint-image compare pictures/\n  paint-image train --preset painter --seed 1 --threads 2 --out out/training"
+)]
+struct Arguments {
+    #[command(subcommand)]
+    job: Option<Command>,
+    /// Picture to paint, PNG or JPEG of any size and depth
+    #[arg(long, value_name = "FILE", required = true)]
+    image: Option<PathBuf>,
+    /// Who decides the sprays
+    #[arg(long, default_value = "feedback")]
+    painter: PainterName,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/paint-image")]
+    out: PathBuf,
+    #[command(flatten)]
+    nozzle: Nozzle,
+}
+
+#[derive(Args, Clone)]
+struct Nozzle {
+    /// Standard deviation of a spray, pixels
+    #[arg(long, default_value_t = 2.0)]
+    sigma: f64,
+    /// Where a spray ends, in standard deviations
+    #[arg(long, default_value_t = 2.0)]
+    cut: f64,
+    /// Distance between sprays along a row, pixels
+    #[arg(long, default_value_t = 2)]
+    along: usize,
+    /// Distance between rows of sprays, pixels
+    #[arg(long, default_value_t = 2)]
+    row_spacing: usize,
+    /// Smallest spray worth opening the valve for
+    #[arg(long, default_value_t = 0.0)]
+    min_volume: f64,
+    /// Largest number of sprays [default: no limit]
+    #[arg(long)]
+    max_sprays: Option<usize>,
+    /// Largest change of volume from one place of the path to the next [default: any]
+    #[arg(long)]
+    largest_change: Option<f64>,
+    /// Looks of the network at its canvas
+    #[arg(long, default_value_t = 6)]
+    passes: usize,
+    /// Worker threads
+    #[arg(long, default_value_t = 1)]
+    threads: usize,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Paints every picture of a folder with every painter and prints one table
+    Compare {
+        /// Folder or picture [default: five built-in textures of 128 x 128 pixels]
+        pictures: Option<PathBuf>,
+        /// Runs of which the median time is taken
+        #[arg(long, default_value_t = 3)]
+        runs: usize,
+        #[command(flatten)]
+        nozzle: Nozzle,
+    },
+    /// Trains the network on procedural pictures
+    Train {
+        /// What to train
+        #[arg(long, default_value = "painter")]
+        preset: Preset,
+        /// Seed of the first weights and of all pictures
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// Steps [default: the preset's]
+        #[arg(long)]
+        steps: Option<usize>,
+        /// Stop after this step; the schedule stays that of all steps [default: go on to the end]
+        #[arg(long)]
+        until: Option<usize>,
+        /// Worker threads; the weights do not depend on it
+        #[arg(long, default_value_t = 1)]
+        threads: usize,
+        /// Checkpoint to go on from
+        #[arg(long, value_name = "FILE")]
+        resume: Option<PathBuf>,
+        /// Folder for the weights, the checkpoint and the curve
+        #[arg(long, value_name = "DIR", default_value = "out/training")]
+        out: PathBuf,
+    },
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Preset {
+    Painter,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum PainterName {
+    Feedback,
+    Coats,
+    Deconvolution,
+    Pursuit,
+}
+
+fn main() -> ExitCode {
+    match run(Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("paint-image: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: Arguments) -> Result<(), AnyError> {
+    match arguments.job {
+        None => {
+            // The command line requires it.
+            let image = arguments.image.unwrap_or_default();
+            paint(&image, &job(arguments.painter, &arguments.nozzle)?, &arguments.out)
+        }
+        Some(Command::Compare { pictures, runs, nozzle }) => {
+            let pictures = match pictures {
+                Some(path) => pictures_in(&path)?.iter().map(|p| read_ink(p)).collect::<Result<_, _>>()?,
+                None => Texture::ALL.map(|t| t.image(1000, 128)).to_vec(),
+            };
+            print!("{}", print_table(&compare(&job(PainterName::Feedback, &nozzle)?, &pictures, runs)?));
+            Ok(())
+        }
+        Some(Command::Train { preset: Preset::Painter, seed, steps, until, threads, resume, out }) => {
+            create(&out)?;
+            let preset = TrainSettings::default();
+            let settings = TrainSettings { seed, threads, steps: steps.unwrap_or(preset.steps), ..preset };
+            learn(&Lesson { settings, resume, until, save_every: 500 }, &out)?;
+            println!("{}", out.join("painter.safetensors").display());
+            Ok(())
+        }
+    }
+}
+
+fn job(painter: PainterName, nozzle: &Nozzle) -> Result<Job, AnyError> {
+    let painter = match painter {
+        PainterName::Feedback => Choice::Feedback,
+        PainterName::Coats => Choice::Coats,
+        PainterName::Deconvolution => Choice::Deconvolution,
+        PainterName::Pursuit => Choice::Pursuit,
+    };
+    let limits = Limits {
+        along: nozzle.along,
+        row_spacing: nozzle.row_spacing,
+        min_volume: nozzle.min_volume,
+        max_sprays: nozzle.max_sprays,
+        ..Limits::default()
+    };
+    let kernel = SprayKernel::new(nozzle.sigma, nozzle.cut)?;
+    Ok(Job {
+        painter,
+        passes: nozzle.passes,
+        kernel,
+        limits,
+        largest_change: nozzle.largest_change,
+        threads: nozzle.threads,
+    })
+}
+
+fn paint(image: &Path, job: &Job, out: &Path) -> Result<(), AnyError> {
+    let wanted = read_ink(image)?;
+    create(out)?;
+    let stage = Stage::start("paint");
+    let (painting, figures) = job.paint(&wanted, &mut |share| stage.share(share))?;
+    stage.done(&format!("{} sprays, {:.2} dB, {:.1} ms", figures.sprays, figures.psnr_db, figures.cpu_ms));
+    job.save(out, &wanted, &painting, &figures)?;
+    println!("{}", out.join("report.json").display());
+    Ok(())
+}
+
+fn create(folder: &Path) -> Result<(), AnyError> {
+    Ok(std::fs::create_dir_all(folder)
+        .map_err(|e| format!("{}: cannot be created ({e}): choose another --out", folder.display()))?)
+}

@@ -1,0 +1,287 @@
+//! The job of `paint-image`: a picture in, sprays and figures out.
+
+mod compare;
+mod learn;
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use paint_net::{
+    Coats, Deconvolution, Error, Feedback, Image, Limits, MatchingPursuit, Painter, Painting, Saturation, SlewLimited,
+    SprayKernel, Task, metrics, slew_violations,
+};
+use serde::Serialize;
+
+use crate::pictures::{PictureError, Rgb};
+
+pub use compare::{Row, compare, print_table};
+pub use learn::{Lesson, learn};
+
+/// Who decides the sprays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Choice {
+    /// The network that looks at its canvas.
+    Feedback,
+    /// The same in three coats, each of which stays on the wall.
+    Coats,
+    /// Projected L-BFGS.
+    Deconvolution,
+    /// Greedy matching pursuit.
+    Pursuit,
+}
+
+impl Choice {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Feedback, Self::Coats, Self::Deconvolution, Self::Pursuit];
+}
+
+/// How a picture is painted.
+#[derive(Debug, Clone)]
+pub struct Job {
+    /// Who decides.
+    pub painter: Choice,
+    /// Looks of the network at its canvas.
+    pub passes: usize,
+    /// The nozzle, pixels.
+    pub kernel: SprayKernel,
+    /// Where sprays may lie.
+    pub limits: Limits,
+    /// Largest change of volume from one cell of the path to the next; `None` for any.
+    pub largest_change: Option<f64>,
+    /// Threads of the network.
+    pub threads: usize,
+}
+
+/// What is wrong with painting a picture.
+#[derive(Debug, thiserror::Error)]
+pub enum PaintImageError {
+    /// The file is not a picture that can be painted.
+    #[error("{path}: {why}; give a PNG or JPEG file")]
+    Unreadable {
+        /// The file.
+        path: String,
+        /// Why.
+        why: String,
+    },
+    /// The painter refused.
+    #[error("{0}")]
+    Painter(#[from] Error),
+    /// A result could not be drawn or written.
+    #[error("{0}")]
+    Picture(#[from] PictureError),
+    /// A file could not be written or read.
+    #[error("{path}: {why}")]
+    File {
+        /// The file.
+        path: String,
+        /// What the system said.
+        why: String,
+    },
+    /// A figure is not finite.
+    #[error("{0}: a figure is not finite, the result is not usable")]
+    NotFinite(&'static str),
+}
+
+/// The figures of one picture; flat, units in the names.
+#[derive(Debug, Clone, Serialize)]
+pub struct Figures {
+    /// Name of the painter.
+    pub painter: &'static str,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Peak signal-to-noise ratio of the ink.
+    pub psnr_db: f64,
+    /// Structural similarity, 7x7 window; pictures smaller than the window have none, which is given as 0.
+    pub ssim: f64,
+    /// Cross-entropy.
+    pub bce_nats_per_px: f64,
+    /// Mean colour difference, ink taken as the grey values of sRGB.
+    pub ciede2000_mean: f64,
+    /// Number of sprays.
+    pub sprays: usize,
+    /// Looks of the network; 0 for painters that have none.
+    pub passes: usize,
+    /// Places on the path where the volume changes faster than was allowed; 0 if any change is allowed.
+    pub slew_violations: usize,
+    /// Sum of the volumes.
+    pub volume_total: f64,
+    /// CPU time of deciding on one thread, wall time on several.
+    pub cpu_ms: f64,
+    /// Threads.
+    pub threads: usize,
+}
+
+impl Job {
+    /// The painter that was chosen.
+    pub fn painter(&self) -> Result<Box<dyn Painter>, Error> {
+        let feedback = || Feedback::shipped().map(|f| Feedback { passes: self.passes, threads: self.threads, ..f });
+        let painter: Box<dyn Painter> = match self.painter {
+            Choice::Feedback => Box::new(feedback()?),
+            Choice::Coats => Box::new(Coats::new(feedback()?)),
+            Choice::Deconvolution => Box::new(Deconvolution::default()),
+            Choice::Pursuit => Box::new(MatchingPursuit::default()),
+        };
+        Ok(match self.largest_change {
+            Some(most) => Box::new(SlewLimited::new(painter, most)),
+            None => painter,
+        })
+    }
+
+    /// Decides the sprays for a wanted picture of ink.
+    pub fn paint(&self, wanted: &Image, progress: &mut dyn FnMut(f64)) -> Result<(Painting, Figures), PaintImageError> {
+        let painter = self.painter()?;
+        let clock = Clock::start(self.threads);
+        let task = Task::on_bare_wall(wanted);
+        let painting = painter.paint(&task, &self.kernel, &Saturation::Tanh, &self.limits, progress)?;
+        let cpu_ms = clock.milliseconds();
+        let passes = match self.painter {
+            Choice::Feedback | Choice::Coats => self.passes,
+            Choice::Deconvolution | Choice::Pursuit => 0,
+        };
+        let size = (wanted.width(), wanted.height());
+        let slew_violations =
+            self.largest_change.map_or(0, |most| slew_violations(&painting.sprays, size, &self.limits, most));
+        let small = wanted.width().min(wanted.height()) < 7;
+        let figures = Figures {
+            painter: painter.name(),
+            width: wanted.width(),
+            height: wanted.height(),
+            psnr_db: metrics::psnr(&painting.ink, wanted, None)?,
+            ssim: if small { 0.0 } else { metrics::ssim(&painting.ink, wanted, None)? },
+            bce_nats_per_px: metrics::binary_cross_entropy(&painting.ink, wanted)?,
+            ciede2000_mean: colour_difference(&painting.ink, wanted),
+            sprays: painting.sprays.len(),
+            passes,
+            slew_violations,
+            volume_total: painting.sprays.iter().map(|s| s.volume).sum(),
+            cpu_ms,
+            threads: self.threads,
+        };
+        let numbers = [figures.psnr_db, figures.ssim, figures.bce_nats_per_px, figures.ciede2000_mean, cpu_ms];
+        if numbers.iter().any(|f| !f.is_finite()) {
+            return Err(PaintImageError::NotFinite("report"));
+        }
+        Ok((painting, figures))
+    }
+
+    /// Writes `commands.json`, `rendered.png`, `error.png` and `report.json`.
+    pub fn save(
+        &self,
+        folder: &Path,
+        wanted: &Image,
+        painting: &Painting,
+        figures: &Figures,
+    ) -> Result<(), PaintImageError> {
+        let sigma = self.kernel.sigma();
+        let sprays: Vec<_> = painting.sprays.iter().map(|s| (s.x, s.y, s.volume, sigma, 0)).collect();
+        let model = serde_json::json!({
+            "ink": "tanh(sum of volume * exp(-d^2 / (2 sigma_px^2)))", "sigma_px": sigma,
+            "reach_px": self.kernel.radius(), "footprint": "cut to a square of 2 reach_px + 1 pixels",
+        });
+        let commands = serde_json::json!({
+            "width": wanted.width(), "height": wanted.height(), "spray_model": model, "paints": ["black"],
+            "sprays": sprays,
+        });
+        write_json(&folder.join("commands.json"), &commands)?;
+        write_json(&folder.join("report.json"), figures)?;
+        grey(&painting.ink).save(&folder.join("rendered.png"))?;
+        error_map(&painting.ink, wanted).save(&folder.join("error.png"))?;
+        Ok(())
+    }
+}
+
+/// Reads a picture of any size and depth as ink: dark is paint, transparency shows the white wall.
+pub fn read_ink(path: &Path) -> Result<Image, PaintImageError> {
+    let unreadable = |why: String| PaintImageError::Unreadable { path: path.display().to_string(), why };
+    let picture = image::open(path).map_err(|e| unreadable(format!("cannot be read as a picture ({e})")))?;
+    let rgba = picture.to_rgba32f();
+    let ink = rgba.pixels().map(|p| {
+        let [r, g, b, a] = p.0.map(f64::from);
+        // 0.2126 + 0.7152 + 0.0722 is 1 only up to rounding.
+        (a * (1.0 - (0.2126 * r + 0.7152 * g + 0.0722 * b))).clamp(0.0, 1.0)
+    });
+    Image::new(rgba.width() as usize, rgba.height() as usize, ink.collect()).map_err(|e| unreadable(e.to_string()))
+}
+
+/// The pictures of a folder in the order of their names, or the file itself.
+pub fn pictures_in(path: &Path) -> Result<Vec<PathBuf>, PaintImageError> {
+    let file_error = |why: String| PaintImageError::File { path: path.display().to_string(), why };
+    if !path.is_dir() {
+        return Ok(vec![path.to_path_buf()]);
+    }
+    let entries = std::fs::read_dir(path).map_err(|e| file_error(format!("cannot be listed ({e})")))?;
+    let is_picture = |p: &PathBuf| {
+        let extension = p.extension().map(|e| e.to_string_lossy().to_lowercase());
+        extension.is_some_and(|e| ["png", "jpg", "jpeg"].contains(&e.as_str()))
+    };
+    let mut files: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(is_picture).collect();
+    files.sort();
+    if files.is_empty() {
+        return Err(file_error("holds no PNG or JPEG file".to_string()));
+    }
+    Ok(files)
+}
+
+/// Mean CIEDE2000 between two pictures of ink, shown as the greys of sRGB.
+fn colour_difference(ink: &Image, wanted: &Image) -> f64 {
+    // The lightness of every grey level once; differences below a level do not show.
+    let lightness: Vec<f64> = (0..=u8::MAX)
+        .map(|level| {
+            let y = paint_sim::colour::decode_srgb8(level);
+            if y > 216.0 / 24389.0 { 116.0 * y.cbrt() - 16.0 } else { y * 24389.0 / 27.0 }
+        })
+        .collect();
+    let lab = |ink: f64| [lightness[usize::from(level(ink))], 0.0, 0.0];
+    let pairs = ink.data().iter().zip(wanted.data());
+    pairs.map(|(&a, &b)| paint_sim::ciede2000(lab(a), lab(b))).sum::<f64>() / ink.data().len() as f64
+}
+
+fn level(ink: f64) -> u8 {
+    (255.0 * (1.0 - ink.clamp(0.0, 1.0))).round() as u8
+}
+
+fn grey(ink: &Image) -> Rgb {
+    Rgb::from_pixels(ink.width(), ink.height(), ink.data().iter().map(|&a| [level(a); 3]))
+}
+
+/// White where right, red where too light, blue where too dark; full colour at an error of a quarter.
+fn error_map(ink: &Image, wanted: &Image) -> Rgb {
+    let colour = |(a, y): (&f64, &f64)| {
+        let error = ((a - y) / 0.25).clamp(-1.0, 1.0);
+        let fade = (255.0 * (1.0 - error.abs())).round() as u8;
+        if error < 0.0 { [255, fade, fade] } else { [fade, fade, 255] }
+    };
+    Rgb::from_pixels(ink.width(), ink.height(), ink.data().iter().zip(wanted.data()).map(colour))
+}
+
+pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> Result<(), PaintImageError> {
+    let failed = |why: String| PaintImageError::File { path: path.display().to_string(), why };
+    let text = serde_json::to_string(value).map_err(|e| failed(e.to_string()))?;
+    std::fs::write(path, text + "\n").map_err(|e| failed(format!("cannot be written ({e})")))
+}
+
+/// CPU time of this thread where the system tells it, wall time elsewhere and with several threads.
+struct Clock {
+    wall: Instant,
+    cpu: Option<f64>,
+}
+
+impl Clock {
+    fn start(threads: usize) -> Self {
+        Self { wall: Instant::now(), cpu: (threads == 1).then(Self::cpu_ms).flatten() }
+    }
+
+    fn cpu_ms() -> Option<f64> {
+        let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+        text.split_whitespace().next()?.parse::<f64>().ok().filter(|&ns| ns > 0.0).map(|ns| 1e-6 * ns)
+    }
+
+    fn milliseconds(&self) -> f64 {
+        match (self.cpu, Self::cpu_ms()) {
+            (Some(before), Some(after)) => after - before,
+            _ => 1e3 * self.wall.elapsed().as_secs_f64(),
+        }
+    }
+}

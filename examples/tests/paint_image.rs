@@ -1,0 +1,151 @@
+//! The binary `paint-image`: files out, bad files in, training in sittings.
+#![allow(clippy::unwrap_used)]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A folder of its own for each test, removed at the end.
+struct Scratch(PathBuf);
+
+impl Scratch {
+    fn new(name: &str) -> Self {
+        let folder = std::env::temp_dir().join(format!("paint-image-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        Self(folder)
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.join(name).to_str().unwrap().to_string()
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn run(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_paint-image")).args(arguments).output().unwrap()
+}
+
+fn json(path: &str) -> serde_json::Value {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+#[test]
+fn a_picture_becomes_commands_pictures_and_figures() {
+    let scratch = Scratch::new("paint");
+    // 16 bits with transparency: the right half is bare wall whatever its colour.
+    let picture = image::ImageBuffer::from_fn(40, 25, |x, y| {
+        let grey = 20_000 + 500 * y as u16;
+        image::LumaA([grey, if x < 20 { u16::MAX } else { 0 }])
+    });
+    picture.save(scratch.path("in.png")).unwrap();
+    for painter in ["feedback", "coats", "deconvolution", "pursuit"] {
+        let out = scratch.path(painter);
+        let output = run(&["--image", &scratch.path("in.png"), "--painter", painter, "--out", &out]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let report = json(&format!("{out}/report.json"));
+        for key in [
+            "psnr_db",
+            "ssim",
+            "bce_nats_per_px",
+            "ciede2000_mean",
+            "sprays",
+            "passes",
+            "volume_total",
+            "slew_violations",
+            "cpu_ms",
+            "threads",
+        ] {
+            assert!(report[key].is_number(), "{painter}: {key}");
+        }
+        let commands = json(&format!("{out}/commands.json"));
+        let sprays = commands["sprays"].as_array().unwrap();
+        assert_eq!((commands["width"].as_u64(), commands["height"].as_u64()), (Some(40), Some(25)));
+        assert_eq!(sprays.len(), report["sprays"].as_u64().unwrap() as usize);
+        // The commands alone give the picture: rendered here by the definition.
+        let depth = |x: f64, y: f64| -> f64 {
+            let of = |s: &serde_json::Value, k: usize| s[k].as_f64().unwrap();
+            let near = |s: &&serde_json::Value| (of(s, 0) - x).abs() <= 4.0 && (of(s, 1) - y).abs() <= 4.0;
+            let gauss = |s: &serde_json::Value| {
+                let squared = (of(s, 0) - x).powi(2) + (of(s, 1) - y).powi(2);
+                of(s, 2) * (-squared / (2.0 * of(s, 3).powi(2))).exp()
+            };
+            sprays.iter().filter(near).map(gauss).sum()
+        };
+        let rendered = image::open(format!("{out}/rendered.png")).unwrap().to_luma8();
+        for (x, y) in [(5, 5), (12, 20), (30, 12)] {
+            let expected = 255.0 * (1.0 - depth(f64::from(x), f64::from(y)).tanh());
+            assert!((f64::from(rendered.get_pixel(x, y).0[0]) - expected).abs() <= 0.6, "{painter} at {x}, {y}");
+        }
+        assert!(Path::new(&format!("{out}/error.png")).exists());
+    }
+}
+
+#[test]
+fn a_slow_valve_is_obeyed() {
+    let scratch = Scratch::new("slew");
+    image::GrayImage::from_fn(32, 32, |x, _| image::Luma([if x < 16 { 60 } else { 230 }]))
+        .save(scratch.path("in.png"))
+        .unwrap();
+    let out = scratch.path("out");
+    let image = scratch.path("in.png");
+    let output = run(&["--image", &image, "--largest-change", "0.01", "--out", &out]);
+    assert!(output.status.success());
+    assert_eq!(json(&format!("{out}/report.json"))["slew_violations"], 0);
+}
+
+#[test]
+fn a_blank_picture_gets_no_spray() {
+    let scratch = Scratch::new("blank");
+    image::GrayImage::from_pixel(3, 50, image::Luma([255])).save(scratch.path("in.png")).unwrap();
+    let out = scratch.path("out");
+    assert!(run(&["--image", &scratch.path("in.png"), "--out", &out]).status.success());
+    assert_eq!(json(&format!("{out}/report.json"))["sprays"], 0);
+}
+
+#[test]
+fn what_cannot_be_painted_is_named() {
+    let scratch = Scratch::new("bad");
+    std::fs::write(scratch.path("not.png"), "this is no picture").unwrap();
+    image::GrayImage::from_pixel(8, 8, image::Luma([9])).save(scratch.path("in.png")).unwrap();
+    let bytes = std::fs::read(scratch.path("in.png")).unwrap();
+    std::fs::write(scratch.path("cut.png"), &bytes[..bytes.len() / 2]).unwrap();
+    let (missing, not, cut, good) =
+        (scratch.path("missing.png"), scratch.path("not.png"), scratch.path("cut.png"), scratch.path("in.png"));
+    let out = scratch.path("out");
+    for (arguments, word) in [
+        (vec!["--image", &missing], "missing.png"),
+        (vec!["--image", &not], "not.png"),
+        (vec!["--image", &cut], "cut.png"),
+        (vec!["--image", &good, "--sigma", "0"], "sigma"),
+        (vec!["--image", &good, "--sigma", "nan"], "sigma"),
+        (vec!["--image", &good, "--along", "0"], "along"),
+        (vec!["--image", &good, "--passes", "0"], "passes"),
+        (vec!["--image", &good, "--largest-change", "0"], "largest_change"),
+        (vec!["train", "--resume", &not], "not.png"),
+    ] {
+        let output = run(&[&arguments[..], &["--out", &out]].concat());
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {text}");
+        let line = text.lines().find(|l| l.starts_with("paint-image: ")).unwrap_or_default();
+        assert!(line.contains(word), "{arguments:?}: {text}");
+    }
+}
+
+#[test]
+fn training_in_sittings_gives_the_same_weights() {
+    let scratch = Scratch::new("train");
+    let train = |name: &str, more: &[&str]| {
+        let out = scratch.path(name);
+        let output = run(&[&["train", "--steps", "40", "--out", &out], more].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        std::fs::read(format!("{out}/painter.safetensors")).unwrap()
+    };
+    let at_once = train("whole", &["--until", "3"]);
+    train("first", &["--until", "1"]);
+    let checkpoint = scratch.path("first/checkpoint.safetensors");
+    assert!(at_once == train("second", &["--until", "3", "--threads", "2", "--resume", &checkpoint]));
+}

@@ -1,0 +1,100 @@
+use std::ops::Range;
+
+use crate::error::{Error, require};
+
+/// What the network sees of a cell, in this order: missing depth under the footprint, paint, stiffness, last step, and the
+/// missing depth of the cell's four quarters.
+pub(crate) const INPUTS: usize = 8;
+/// Numbers that describe the nozzle and the grid.
+pub(crate) const SETTINGS: usize = 2;
+/// Weights of one kernel.
+const TAPS: usize = 9;
+
+/// Sizes of the network. Defaults are those of the shipped weights.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+pub struct Shape {
+    /// Channels of every hidden layer. Default 12, ours.
+    pub channels: usize,
+    /// Hidden layers, each a 3x3 convolution and a rectifier. Default 2, ours.
+    pub layers: usize,
+    /// Passes that have a bias and linear part of their own; later passes use the last. Default 8, ours.
+    pub stages: usize,
+}
+
+impl Default for Shape {
+    fn default() -> Self {
+        Self { channels: 12, layers: 2, stages: 8 }
+    }
+}
+
+impl Shape {
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let within =
+            |name, value: usize, most: usize, rule| require(name, value as f64, (1..=most).contains(&value), rule);
+        within("channels", self.channels, 64, "it must lie in 1..=64")?;
+        within("layers", self.layers, 8, "it must lie in 1..=8")?;
+        within("stages", self.stages, 64, "it must lie in 1..=64")
+    }
+
+    /// Where each tensor lies among the parameters, with its name and extents.
+    pub(crate) fn tensors(&self) -> Vec<(String, Vec<usize>, Range<usize>)> {
+        let (c, n) = (self.channels, self.stages);
+        let mut list = vec![("sense.weight".to_string(), vec![c, INPUTS, 3, 3])];
+        list.push(("sense.bias".to_string(), vec![n, c]));
+        list.push(("sense.settings".to_string(), vec![c, SETTINGS]));
+        for layer in 1..self.layers {
+            list.push((format!("think{layer}.weight"), vec![c, c, 3, 3]));
+            list.push((format!("think{layer}.bias"), vec![c]));
+        }
+        list.push(("act.weight".to_string(), vec![1, c, 3, 3]));
+        list.push(("act.linear".to_string(), vec![n, INPUTS, 3, 3]));
+        list.push(("act.bias".to_string(), vec![1]));
+        let mut at = 0;
+        list.into_iter()
+            .map(|(name, extents)| {
+                let from = at;
+                at += extents.iter().product::<usize>();
+                (name, extents, from..at)
+            })
+            .collect()
+    }
+
+    pub(crate) fn parameters(&self) -> usize {
+        self.tensors().last().map_or(0, |t| t.2.end)
+    }
+
+    /// Where the parts lie, by role.
+    pub(crate) fn layout(&self) -> Layout {
+        let mut ranges = self.tensors().into_iter().map(|t| t.2);
+        let mut next = || ranges.next().unwrap_or_default();
+        let (sense, sense_bias, settings) = (next(), next(), next());
+        let think = (1..self.layers).map(|_| (next(), next())).collect();
+        Layout { sense, sense_bias, settings, think, act: next(), linear: next(), act_bias: next().start }
+    }
+
+    /// Weights of one stage's linear part, and of its bias.
+    pub(crate) fn linear_of(&self, layout: &Layout, stage: usize) -> Range<usize> {
+        let (stage, size) = (stage.min(self.stages - 1), INPUTS * TAPS);
+        layout.linear.start + stage * size..layout.linear.start + (stage + 1) * size
+    }
+
+    /// First-layer bias of one stage.
+    pub(crate) fn bias_of(&self, layout: &Layout, stage: usize) -> Range<usize> {
+        let (stage, size) = (stage.min(self.stages - 1), self.channels);
+        layout.sense_bias.start + stage * size..layout.sense_bias.start + (stage + 1) * size
+    }
+}
+
+/// Ranges of the parameters by role.
+#[derive(Debug, Clone)]
+pub(crate) struct Layout {
+    pub(crate) sense: Range<usize>,
+    pub(crate) sense_bias: Range<usize>,
+    pub(crate) settings: Range<usize>,
+    /// Weights and biases of the further hidden layers.
+    pub(crate) think: Vec<(Range<usize>, Range<usize>)>,
+    pub(crate) act: Range<usize>,
+    pub(crate) linear: Range<usize>,
+    pub(crate) act_bias: usize,
+}

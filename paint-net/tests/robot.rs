@@ -1,0 +1,155 @@
+//! Painting as robots do: with noise, a nozzle of unknown flow, a valve that is not infinitely fast.
+#![allow(clippy::unwrap_used)]
+
+use paint_net::procedural::{Texture, lattice};
+use paint_net::{
+    Coats, Deconvolution, Error, Feedback, Image, Limits, Painter, Saturation, SlewLimited, Spray, SprayKernel, Task,
+    metrics, slew_violations,
+};
+
+fn nozzle() -> SprayKernel {
+    SprayKernel::new(2.0, 2.0).unwrap()
+}
+
+/// A wall and a nozzle that sprays 20 % too much or too little, half a pixel beside the point, and has a gain of its own.
+struct Wall {
+    canvas: Image,
+    gain: f64,
+    sprayed: i64,
+}
+
+impl Wall {
+    fn new(side: usize, gain: f64) -> Self {
+        Self { canvas: Image::filled(side, side, 0.0), gain, sprayed: 0 }
+    }
+
+    /// Normally distributed, by Box and Muller.
+    fn noise(&self, salt: i64) -> f64 {
+        let (u, v) = (lattice(77, self.sprayed, salt), lattice(78, self.sprayed, salt));
+        (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+    }
+
+    fn spray(&mut self, sprays: &[Spray]) -> Image {
+        for s in sprays {
+            self.sprayed += 1;
+            let (x, y) = (s.x + 0.5 * self.noise(0), s.y + 0.5 * self.noise(1));
+            let volume = self.gain * s.volume * (1.0 + 0.2 * self.noise(2)).max(0.0);
+            let width = self.canvas.width();
+            for j in (s.y as usize).saturating_sub(4)..(s.y as usize + 5).min(self.canvas.height()) {
+                for i in (s.x as usize).saturating_sub(4)..(s.x as usize + 5).min(width) {
+                    let d = (i as f64 - x).powi(2) + (j as f64 - y).powi(2);
+                    self.canvas.data_mut()[j * width + i] += volume * (-d / 8.0).exp();
+                }
+            }
+        }
+        self.ink()
+    }
+
+    fn ink(&self) -> Image {
+        self.canvas.map(f64::tanh)
+    }
+}
+
+#[test]
+fn looking_at_the_wall_makes_good_what_the_nozzle_does_wrong() {
+    for painter in [&Deconvolution::default() as &dyn Painter, &Feedback::shipped().unwrap()] {
+        let wanted = Texture::Worley.image(12, 96);
+        let task = Task::on_bare_wall(&wanted);
+        let quality = |ink: &Image| metrics::psnr(ink, &wanted, None).unwrap();
+        let plan = painter.paint(&task, &nozzle(), &Saturation::Tanh, &Limits::default(), &mut |_| ()).unwrap();
+        let open = quality(&Wall::new(96, 1.0).spray(&plan.sprays));
+        for gain in [0.7, 1.0, 1.3] {
+            let mut wall = Wall::new(96, gain);
+            let coated = Coats::new(painter)
+                .paint_watched(&task, &nozzle(), &Saturation::Tanh, &Limits::default(), &mut |s| Ok(wall.spray(s)))
+                .unwrap();
+            let closed = quality(&wall.ink());
+            assert!(closed > open + 2.0, "{}: {closed} dB watched, {open} dB blind, gain {gain}", painter.name());
+            assert!((coated.gain / gain - 1.0).abs() < 0.03, "gain {gain} found as {}", coated.gain);
+            assert_eq!(coated.coats.len(), 3);
+        }
+    }
+}
+
+#[test]
+fn coats_only_add_and_lose_little() {
+    let wanted = Texture::Fbm.image(4, 64);
+    let task = Task::on_bare_wall(&wanted);
+    let limits = Limits::default();
+    let paint = |painter: &dyn Painter| {
+        let ink = painter.paint(&task, &nozzle(), &Saturation::Tanh, &limits, &mut |_| ()).unwrap().ink;
+        metrics::psnr(&ink, &wanted, None).unwrap()
+    };
+    let painter = Feedback::shipped().unwrap();
+    let (once, coats) = (paint(&painter), paint(&Coats::new(painter.clone())));
+    assert!(coats > once - 0.3, "{coats} dB in coats, {once} dB at once");
+    let mut last = Image::filled(64, 64, 0.0);
+    Coats::new(painter)
+        .paint_watched(&task, &nozzle(), &Saturation::Tanh, &limits, &mut |sprays| {
+            assert!(sprays.iter().all(|s| s.volume > 0.0));
+            let width = last.width();
+            for s in sprays {
+                last.data_mut()[s.y as usize * width + s.x as usize] += s.volume;
+            }
+            Ok(last.map(f64::tanh))
+        })
+        .unwrap();
+}
+
+#[test]
+fn bad_shares_and_pictures_are_named() {
+    let wanted = Image::filled(16, 16, 0.4);
+    let task = Task::on_bare_wall(&wanted);
+    let run = |shares: Vec<f64>, seen: Image| {
+        Coats { painter: Deconvolution::default(), shares }
+            .paint_watched(&task, &nozzle(), &Saturation::Tanh, &Limits::default(), &mut |_| Ok(seen.clone()))
+            .map(|_| ())
+    };
+    let black = Image::filled(16, 16, 0.0);
+    for share in [0.0, -1.0, 1.1, f64::NAN] {
+        assert!(matches!(run(vec![share], black.clone()), Err(Error::InvalidSetting { name: "shares", .. })));
+    }
+    assert!(matches!(run(vec![1.0], Image::filled(8, 16, 0.0)), Err(Error::Mismatch { .. })));
+    assert!(run(vec![0.5, 1.0], black).is_ok());
+}
+
+#[test]
+fn the_valve_is_never_too_fast() {
+    let side = 48;
+    let wanted = Texture::Brick.image(6, side);
+    let task = Task::on_bare_wall(&wanted);
+    let mut last = f64::INFINITY;
+    for (limit, along) in [(1.0, 2), (0.05, 2), (0.01, 2), (0.02, 1)] {
+        let limits = Limits { along, max_volume: 1.0, ..Limits::default() };
+        let painter = SlewLimited::new(Feedback::shipped().unwrap(), limit);
+        let painting = painter.paint(&task, &nozzle(), &Saturation::Tanh, &limits, &mut |_| ()).unwrap();
+        assert_eq!(slew_violations(&painting.sprays, (side, side), &limits, limit), 0, "limit {limit}");
+        // By the definition: every row of cells in turn, every other one backwards.
+        let columns = side.div_ceil(along);
+        let mut path = vec![0.0; columns * (side / 2)];
+        for s in &painting.sprays {
+            let (i, j) = (s.x as usize / along, s.y as usize / 2);
+            path[j * columns + if j % 2 == 0 { i } else { columns - 1 - i }] = s.volume;
+        }
+        assert!(path.windows(2).all(|p| (p[1] - p[0]).abs() <= limit), "limit {limit}");
+        let faster = path.windows(2).filter(|p| (p[1] - p[0]).abs() > 0.5 * limit).count();
+        assert_eq!(slew_violations(&painting.sprays, (side, side), &limits, 0.5 * limit), faster);
+        let quality = metrics::psnr(&painting.ink, &wanted, None).unwrap();
+        if along == 2 {
+            assert!(quality < last, "{quality} dB with {limit}, {last} dB with more");
+            last = quality;
+        } else {
+            assert!(quality > last + 0.5, "twice the waypoints: {quality} dB after {last} dB");
+        }
+    }
+    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let refused = SlewLimited::new(Deconvolution::default(), bad).paint(
+            &task,
+            &nozzle(),
+            &Saturation::Tanh,
+            &Limits::default(),
+            &mut |_| (),
+        );
+        assert!(matches!(refused, Err(Error::InvalidSetting { name: "largest_change", .. })));
+    }
+}

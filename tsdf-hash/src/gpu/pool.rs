@@ -1,0 +1,139 @@
+//! Blocks in the device's memory: pages of slots, and on the processor the table that finds them.
+
+use wgpu::{Buffer, BufferUsages};
+
+use super::device::Device;
+use crate::Error;
+use crate::block::Block;
+use crate::key::Key;
+use crate::table::Table;
+
+pub(super) const BLOCK_BYTES: usize = size_of::<Block>();
+/// More pages would not fit one program beside its other buffers.
+pub(super) const MOST_PAGES: usize = 4;
+/// Storage buffers of a program beside the pages.
+pub(super) const OTHER_BINDINGS: usize = 2;
+/// The mesh names vertices by 32 bits, 1536 at most in a block.
+const MOST_BLOCKS: usize = 1 << 21;
+/// Bytes on the processor for each slot: its key, and its place in the list of free ones.
+const SLOT_BYTES: usize = size_of::<Key>() + size_of::<u32>();
+const VACANT: Key = Key(u64::MAX);
+
+/// Where a block lies.
+#[derive(Clone, Copy)]
+pub(super) struct Place {
+    pub(super) page: usize,
+    pub(super) slot: u32,
+}
+
+impl Place {
+    /// Offset in the page, bytes.
+    pub(super) fn offset(self) -> usize {
+        self.slot as usize * BLOCK_BYTES
+    }
+}
+
+/// All blocks of a map. Everything on the processor is allocated at once, pages one by one when they are needed.
+pub(super) struct Pool {
+    pub(super) pages: Vec<Buffer>,
+    page_blocks: usize,
+    capacity: usize,
+    max_bytes: usize,
+    table: Table,
+    /// The key in each slot used so far.
+    keys: Vec<Key>,
+    free: Vec<u32>,
+}
+
+impl Pool {
+    pub(super) fn new(device: &Device, max_bytes: usize) -> Result<Self, Error> {
+        // The table's growth makes the need jump, so the bound is searched for: it is monotone.
+        let (mut capacity, mut fails) = (0, MOST_BLOCKS.min(max_bytes / BLOCK_BYTES) + 1);
+        while capacity + 1 < fails {
+            let middle = usize::midpoint(capacity, fails);
+            if host_bytes(middle) + middle * BLOCK_BYTES <= max_bytes { capacity = middle } else { fails = middle }
+        }
+        let most = MOST_PAGES.min(device.bindings - OTHER_BINDINGS);
+        let page_blocks = (capacity / most).min(device.binding_bytes / BLOCK_BYTES);
+        if page_blocks == 0 {
+            let requirement = "large enough for four blocks: 65536 bytes do";
+            return Err(Error::InvalidSetting { name: "max_bytes", value: max_bytes as f64, requirement });
+        }
+        let capacity = most * page_blocks;
+        let mut table = Table::new();
+        table.reserve(capacity);
+        let (keys, free) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
+        let mut pool = Self { pages: Vec::new(), page_blocks, capacity, max_bytes, table, keys, free };
+        pool.reserve(device, 1)?;
+        Ok(pool)
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.keys.len() - self.free.len()
+    }
+
+    /// Blocks that can be added.
+    pub(super) fn room(&self) -> usize {
+        self.capacity - self.len()
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        host_bytes(self.capacity) + self.pages.len() * self.page_blocks * BLOCK_BYTES
+    }
+
+    pub(super) fn out_of_budget(&self) -> Error {
+        Error::OutOfBudget { used: self.bytes(), max_bytes: self.max_bytes }
+    }
+
+    pub(super) fn get(&self, key: Key) -> Option<Place> {
+        self.table.get(key).map(|slot| self.place(slot))
+    }
+
+    fn place(&self, slot: usize) -> Place {
+        Place { page: slot / self.page_blocks, slot: (slot % self.page_blocks) as u32 }
+    }
+
+    /// Makes sure that there are pages for `added` more blocks; the caller has seen that there is [`room`](Self::room).
+    pub(super) fn reserve(&mut self, device: &Device, added: usize) -> Result<(), Error> {
+        let slots = self.keys.len() + added.saturating_sub(self.free.len());
+        while self.pages.len() * self.page_blocks < slots {
+            let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
+            self.pages.push(device.buffer("blocks", self.page_blocks * BLOCK_BYTES, usage)?);
+        }
+        Ok(())
+    }
+
+    /// Gives a new key a slot, whose memory holds anything; the caller has [reserved](Self::reserve) it.
+    pub(super) fn insert(&mut self, key: Key) -> Place {
+        let slot = self.free.pop().unwrap_or(self.keys.len() as u32);
+        self.keys.resize(self.keys.len().max(slot as usize + 1), VACANT);
+        self.keys[slot as usize] = key;
+        self.table.set(key, slot);
+        self.place(slot as usize)
+    }
+
+    pub(super) fn remove(&mut self, key: Key) {
+        if let Some(slot) = self.table.get(key) {
+            self.table.remove(key);
+            self.keys[slot] = VACANT;
+            self.free.push(slot as u32);
+        }
+    }
+
+    /// All keys, in the order of their slots.
+    pub(super) fn keys(&self) -> impl Iterator<Item = Key> {
+        self.keys.iter().copied().filter(|&key| key != VACANT)
+    }
+
+    /// All keys, ascending.
+    pub(super) fn sorted_keys(&self) -> Vec<Key> {
+        let mut keys: Vec<Key> = self.keys().collect();
+        keys.sort_unstable();
+        keys
+    }
+}
+
+/// Bytes on the processor for this many blocks.
+fn host_bytes(blocks: usize) -> usize {
+    Table::bytes_for(blocks) + blocks * SLOT_BYTES
+}

@@ -1,0 +1,94 @@
+//! Blocks between the device and the processor, through a staging buffer of fixed size.
+
+use wgpu::{Buffer, BufferUsages};
+
+use super::device::Device;
+use super::pool::{BLOCK_BYTES, Pool};
+use crate::Error;
+use crate::block::{Block, VOXELS};
+use crate::key::Key;
+
+/// Blocks that move together: 3.5 MiB.
+const BATCH: usize = 512;
+const BLOCK_WORDS: usize = BLOCK_BYTES / 4;
+
+/// The staging buffer.
+pub(super) struct Stream {
+    staging: Buffer,
+}
+
+impl Stream {
+    pub(super) fn new(device: &Device) -> Result<Self, Error> {
+        let usage = BufferUsages::MAP_READ | BufferUsages::COPY_DST;
+        Ok(Self { staging: device.buffer("blocks on their way", BATCH * BLOCK_BYTES, usage)? })
+    }
+
+    /// Calls `each` with the blocks of these keys, in their order, until it fails; keys without a block are passed over.
+    pub(super) fn download(
+        &self,
+        device: &Device,
+        pool: &Pool,
+        keys: &[Key],
+        mut each: impl FnMut(Key, &Block) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let mut block = Box::new(Block::ZERO);
+        for batch in keys.chunks(BATCH) {
+            let places: Vec<_> = batch.iter().filter_map(|&key| Some((key, pool.get(key)?))).collect();
+            let mut commands = device.commands();
+            for (k, (_, place)) in places.iter().enumerate() {
+                let (from, to) = (place.offset() as u64, (k * BLOCK_BYTES) as u64);
+                commands.copy_buffer_to_buffer(&pool.pages[place.page], from, &self.staging, to, BLOCK_BYTES as u64);
+            }
+            device.run_and_read(commands, &self.staging, places.len() * BLOCK_BYTES, |words| {
+                for ((key, _), words) in places.iter().zip(words.chunks_exact(BLOCK_WORDS)) {
+                    unpack(words, &mut block);
+                    each(*key, &block)?;
+                }
+                Ok::<(), Error>(())
+            })??;
+        }
+        Ok(())
+    }
+}
+
+/// Stores a block under a key that is new and that the caller has reserved a slot for. The driver stages it.
+pub(super) fn upload(device: &Device, pool: &mut Pool, key: Key, block: &Block) -> Result<(), Error> {
+    let place = pool.insert(key);
+    device.write(&pool.pages[place.page], place.offset(), pack(block).into_iter())
+}
+
+/// The words of a block as the programs see it: distances, weights two to a word, colours.
+fn pack(block: &Block) -> [u32; BLOCK_WORDS] {
+    let mut words = [0; BLOCK_WORDS];
+    let (distances, rest) = words.split_at_mut(VOXELS);
+    let (weights, colours) = rest.split_at_mut(VOXELS / 2);
+    for (word, distance) in distances.iter_mut().zip(block.distance) {
+        *word = distance.cast_unsigned();
+    }
+    let pair = |pair: &[u16]| u32::from(pair[0]) | u32::from(pair[1]) << 16;
+    for (word, weights) in weights.iter_mut().zip(block.weight.chunks_exact(2)) {
+        *word = pair(weights);
+    }
+    for (word, sums) in colours.iter_mut().zip(block.colour.as_flattened().chunks_exact(2)) {
+        *word = pair(sums);
+    }
+    words
+}
+
+fn unpack(words: &[[u8; 4]], block: &mut Block) {
+    let (distances, rest) = words.split_at(VOXELS);
+    let (weights, colours) = rest.split_at(VOXELS / 2);
+    for (distance, &word) in block.distance.iter_mut().zip(distances) {
+        *distance = i32::from_ne_bytes(word);
+    }
+    let halves = |pair: &mut [u16], word: [u8; 4]| {
+        let word = u32::from_ne_bytes(word);
+        pair.copy_from_slice(&[word as u16, (word >> 16) as u16]);
+    };
+    for (pair, &word) in block.weight.chunks_exact_mut(2).zip(weights) {
+        halves(pair, word);
+    }
+    for (pair, &word) in block.colour.as_flattened_mut().chunks_exact_mut(2).zip(colours) {
+        halves(pair, word);
+    }
+}

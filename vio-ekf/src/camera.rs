@@ -1,0 +1,184 @@
+mod distortion;
+mod fisheye;
+
+use nalgebra::{Isometry3, Matrix2x3, Unit, Vector2, Vector3};
+
+use crate::Error;
+use crate::error::invalid;
+use crate::trajectory::is_finite;
+
+/// Longest image side that is believed.
+const MAX_SIDE: usize = 1 << 15;
+
+/// How a lens departs from a pinhole.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
+pub enum Distortion {
+    /// Not at all.
+    #[default]
+    None,
+    /// `k1, k2, p1, p2`: radial and tangential polynomial (Brown 1966; `radtan` of Kalibr).
+    RadTan([f64; 4]),
+    /// `k1 .. k4`: polynomial of the angle off the axis (Kannala and Brandt 2006; `equidistant` of Kalibr).
+    Equidistant([f64; 4]),
+}
+
+/// A camera: image size, lens, and where it sits on the body.
+///
+/// Camera axes: x right, y down, z forward. Pixel `(0, 0)` is the centre of the top left pixel.
+///
+/// ```
+/// use vio_ekf::{Camera, nalgebra::Vector3};
+/// let camera = Camera::euroc();
+/// let pixel = camera.project(&Vector3::new(0.3, -0.2, 1.0)).expect("in front of the camera");
+/// assert!((pixel.x - 499.9056).abs() < 1e-4 && (pixel.y - 160.1887).abs() < 1e-4);
+/// let bearing = camera.bearing(&pixel).expect("inside the range of the lens model");
+/// assert!((bearing.into_inner() * 1.13_f64.sqrt() - Vector3::new(0.3, -0.2, 1.0)).norm() < 1e-12);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+pub struct Camera {
+    /// Pixels per row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Focal length, pixels per unit of the normalised x.
+    pub fx: f64,
+    /// Focal length, pixels per unit of the normalised y.
+    pub fy: f64,
+    /// Column of the principal point, pixels.
+    pub cx: f64,
+    /// Row of the principal point, pixels.
+    pub cy: f64,
+    /// The lens.
+    pub distortion: Distortion,
+    /// Pose of the camera on the body; the body is the inertial sensor.
+    pub body_from_camera: Isometry3<f64>,
+}
+
+impl Camera {
+    /// The left camera of the EuRoC vehicle with its published calibration (Burri et al. 2016).
+    pub fn euroc() -> Self {
+        Self {
+            width: 752,
+            height: 480,
+            fx: 458.654,
+            fy: 457.296,
+            cx: 367.215,
+            cy: 248.375,
+            distortion: Distortion::RadTan([-0.28340811, 0.07395907, 0.00019359, 1.76187114e-5]),
+            body_from_camera: nearest_pose(&[
+                [0.0148655429818, -0.999880929698, 0.00414029679422, -0.0216401454975],
+                [0.999557249008, 0.0149672133247, 0.025715529948, -0.064676986768],
+                [-0.0257744366974, 0.00375618835797, 0.999660727178, 0.00981073058949],
+            ]),
+        }
+    }
+
+    /// Refuses a calibration that no camera has: empty image, focal length not positive, anything not finite.
+    pub fn check(&self) -> Result<(), Error> {
+        for (name, side) in [("width", self.width), ("height", self.height)] {
+            if side == 0 || side > MAX_SIDE {
+                return Err(invalid(name, side as f64, "must be between 1 and 32768 pixels"));
+            }
+        }
+        for (name, value) in [("fx", self.fx), ("fy", self.fy)] {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(invalid(name, value, "must be positive and finite, in pixels"));
+            }
+        }
+        for (name, value) in [("cx", self.cx), ("cy", self.cy)] {
+            if !value.is_finite() {
+                return Err(invalid(name, value, "must be finite, in pixels"));
+            }
+        }
+        if let Distortion::RadTan(k) | Distortion::Equidistant(k) = self.distortion
+            && let Some(&bad) = k.iter().find(|k| !k.is_finite())
+        {
+            return Err(invalid("distortion", bad, "must be finite"));
+        }
+        if is_finite(&self.body_from_camera) {
+            Ok(())
+        } else {
+            Err(Error::NonFinite { what: "body_from_camera", index: 0 })
+        }
+    }
+
+    /// Pixel of a point in camera axes, which may lie outside the image; `None` behind the camera (for a fisheye: on the
+    /// negative axis) and outside the range in which the lens model is one to one.
+    pub fn project(&self, point_in_camera: &Vector3<f64>) -> Option<Vector2<f64>> {
+        let distorted = match &self.distortion {
+            Distortion::Equidistant(k) => fisheye::project(k, point_in_camera)?,
+            Distortion::RadTan(k) => distortion::distort(k, &normalised(point_in_camera)?)?,
+            Distortion::None => normalised(point_in_camera)?,
+        };
+        Some(self.pixel(&distorted))
+    }
+
+    /// As [`project`](Self::project), with the derivative of the pixel by the point, pixels per metre.
+    pub fn project_with_jacobian(&self, point_in_camera: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
+        let (distorted, mut jacobian) = match &self.distortion {
+            Distortion::Equidistant(k) => fisheye::project_with_jacobian(k, point_in_camera)?,
+            Distortion::RadTan(k) => {
+                let m = normalised(point_in_camera)?;
+                let distorted = distortion::distort(k, &m)?;
+                (distorted, distortion::jacobian(k, &m) * perspective_jacobian(&m, point_in_camera.z))
+            }
+            Distortion::None => {
+                let m = normalised(point_in_camera)?;
+                (m, perspective_jacobian(&m, point_in_camera.z))
+            }
+        };
+        for column in 0..3 {
+            jacobian[(0, column)] *= self.fx;
+            jacobian[(1, column)] *= self.fy;
+        }
+        Some((self.pixel(&distorted), jacobian))
+    }
+
+    /// Direction in camera axes that a pixel looks along; `None` where the lens model has no inverse.
+    pub fn bearing(&self, pixel: &Vector2<f64>) -> Option<Unit<Vector3<f64>>> {
+        let distorted = Vector2::new((pixel.x - self.cx) / self.fx, (pixel.y - self.cy) / self.fy);
+        if !(distorted.x.is_finite() && distorted.y.is_finite()) {
+            return None;
+        }
+        let direction = match &self.distortion {
+            Distortion::Equidistant(k) => fisheye::direction(k, &distorted)?,
+            Distortion::RadTan(k) => distortion::undistort(k, &distorted)?.push(1.0),
+            Distortion::None => distorted.push(1.0),
+        };
+        Some(Unit::new_normalize(direction))
+    }
+
+    /// Whether a pixel lies inside the image, at least `border` pixels from the centres of its outermost pixels.
+    pub fn contains(&self, pixel: &Vector2<f64>, border: f64) -> bool {
+        let inside = |x: f64, side: usize| x >= border && x <= side as f64 - 1.0 - border;
+        inside(pixel.x, self.width) && inside(pixel.y, self.height)
+    }
+
+    fn pixel(&self, distorted: &Vector2<f64>) -> Vector2<f64> {
+        Vector2::new(self.fx * distorted.x + self.cx, self.fy * distorted.y + self.cy)
+    }
+}
+
+/// Intersection with the plane at unit depth.
+fn normalised(point: &Vector3<f64>) -> Option<Vector2<f64>> {
+    // A point in the camera's own plane would give an infinite or a meaningless pixel.
+    let usable = point.z > 1e-9 * point.norm() && point.z.is_finite();
+    usable.then(|| Vector2::new(point.x / point.z, point.y / point.z))
+}
+
+fn perspective_jacobian(m: &Vector2<f64>, depth: f64) -> Matrix2x3<f64> {
+    Matrix2x3::new(1.0, 0.0, -m.x, 0.0, 1.0, -m.y) / depth
+}
+
+/// The pose nearest to a printed 3x4 matrix, whose rotation holds only as many digits as were printed.
+pub(crate) fn nearest_pose(rows: &[[f64; 4]; 3]) -> Isometry3<f64> {
+    let matrix = nalgebra::Matrix3::from_fn(|r, c| rows[r][c]);
+    let translation = Vector3::new(rows[0][3], rows[1][3], rows[2][3]);
+    // U Vᵀ of the singular value decomposition; where there is none the matrix stays, and the checks refuse it.
+    let svd = matrix.svd(true, true);
+    let nearest = svd.u.zip(svd.v_t).map_or(matrix, |(u, v_t)| u * v_t);
+    let rotation = nalgebra::Rotation3::from_matrix_unchecked(nearest);
+    Isometry3::from_parts(translation.into(), nalgebra::UnitQuaternion::from_rotation_matrix(&rotation))
+}

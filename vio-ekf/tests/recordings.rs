@@ -1,0 +1,209 @@
+//! Calibration files and the tables of ASL folders: what was printed by others is read, what we write is read back, and
+//! what is wrong is named.
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use support::recorded;
+use vio_ekf::calibration::{
+    CameraCalibration, ImuCalibration, read_asl_camera, read_asl_imu, read_kalibr_cameras, read_kalibr_imu,
+    write_asl_camera, write_asl_imu,
+};
+use vio_ekf::{Camera, Distortion, Imu, ImuNoise, Stamp, asl, euroc};
+
+const KALIBR: &str = "%YAML:1.0
+cam0:
+  T_cam_imu: # from the inertial sensor
+    - [0.0, -1.0, 0.0, 0.25]
+    - [1.0, 0.0, 0.0, 0.0]
+    - [0.0, 0.0, 1.0, -0.5]
+    - [0.0, 0.0, 0.0, 1.0]
+  cam_overlaps: [1]
+  camera_model: pinhole
+  distortion_coeffs: [0.1, -0.2,
+      0.003, 4e-4]
+  distortion_model: equidistant
+  intrinsics: [190.5, 191, 254, 256.5]
+  resolution: [512, 511]
+  rostopic: /cam0/image_raw#1
+  timeshift_cam_imu: -0.0125
+cam1:
+  T_imu_cam:
+  - [1, 0, 0, 1]
+  - [0, 1, 0, 2]
+  - [0, 0, 1, 3]
+  - [0, 0, 0, 1]
+  camera_model: pinhole
+  distortion_coeffs: [0, 0, 0, 0]
+  distortion_model: radtan
+  intrinsics: [1, 2, 3, 4]
+  resolution: [5, 6]
+";
+
+#[test]
+fn kalibr_chains_are_read() {
+    let [first, second] = read_kalibr_cameras(KALIBR).unwrap()[..] else { panic!("two cameras") };
+    let c = first.camera;
+    assert_eq!((c.width, c.height, c.fx, c.cy), (512, 511, 190.5, 256.5));
+    assert_eq!(c.distortion, Distortion::Equidistant([0.1, -0.2, 0.003, 4e-4]));
+    assert_eq!(first.time_offset_s, -0.0125);
+    // The camera's centre: R p + t = 0 with R a quarter turn about z.
+    let centre = c.body_from_camera.translation.vector;
+    assert!((centre - Vector3::new(0.0, 0.25, 0.5)).norm() < 1e-12, "{centre}");
+    // The camera's x is the body's -y.
+    assert!((c.body_from_camera * Vector3::x() + Vector3::y()).norm() < 1e-12);
+    assert_eq!(second.camera.body_from_camera.translation.vector, Vector3::new(1.0, 2.0, 3.0));
+    assert_eq!(second.time_offset_s, 0.0);
+    let imu = read_kalibr_imu(
+        "imu0:\n  accelerometer_noise_density: 2e-3\n  accelerometer_random_walk: 3e-3\n#  update_rate: 1 # old\n  \
+         gyroscope_noise_density: 1.7e-4\n  gyroscope_random_walk: 1.9e-5 # rad\n  update_rate: 200.0\n",
+    )
+    .unwrap();
+    let noise = ImuNoise { gyro_density: 1.7e-4, gyro_walk: 1.9e-5, accel_density: 2e-3, accel_walk: 3e-3 };
+    assert_eq!((imu.noise, imu.rate_hz, imu.body_from_imu), (noise, 200.0, Isometry3::identity()));
+}
+
+#[test]
+fn what_is_written_is_read_back() {
+    let body_from_camera =
+        Isometry3::from_parts(Vector3::new(0.1, -0.2, 0.3).into(), UnitQuaternion::from_euler_angles(0.3, -1.0, 2.0));
+    for distortion in [Distortion::RadTan([-0.28, 0.07, 1.9e-4, 1.7e-5]), Distortion::Equidistant([0.1, 0.2, 0.3, 0.4])]
+    {
+        let camera = Camera { distortion, body_from_camera, ..Camera::euroc() };
+        let calibration = CameraCalibration { camera, rate_hz: Some(20.0), time_offset_s: 0.0 };
+        let back = read_asl_camera(&write_asl_camera(&calibration)).unwrap();
+        assert_eq!((back.camera.distortion, back.camera.fx, back.rate_hz), (distortion, camera.fx, Some(20.0)));
+        let error = back.camera.body_from_camera.inverse() * body_from_camera;
+        assert!(error.translation.vector.norm() + error.rotation.angle() < 1e-12);
+    }
+    let imu = ImuCalibration { noise: ImuNoise::default(), rate_hz: 200.0, body_from_imu: Isometry3::identity() };
+    assert_eq!(read_asl_imu(&write_asl_imu(&imu)).unwrap(), imu);
+    let sample = |k: i64| Imu {
+        stamp: Stamp::from_nanos(1_403_636_579_758_555_392 + 5_000_000 * k),
+        gyro: Vector3::new(0.1, -1e-17, 0.3),
+        accel: Vector3::new(1.0 / 3.0, 0.0, 9.81),
+    };
+    let samples: Vec<Imu> = (0..3).map(sample).collect();
+    assert_eq!(asl::read_imu(&asl::write_imu(&samples)).unwrap(), samples);
+    let images = [(Stamp::from_nanos(7), "a.png".to_owned()), (Stamp::from_nanos(9), "b c.png".to_owned())];
+    let text = asl::write_images(images.iter().map(|(stamp, name)| (*stamp, name.as_str())));
+    assert_eq!(asl::read_images(&text).unwrap(), images);
+}
+
+#[test]
+fn what_is_wrong_is_named() {
+    let has = |error: vio_ekf::Error, words: &[&str]| {
+        let text = error.to_string();
+        assert!(words.iter().all(|word| text.contains(word)), "{text}");
+    };
+    let spoilt = |from: &str, to: &str| read_kalibr_cameras(&KALIBR.replacen(from, to, 1)).unwrap_err();
+    has(spoilt("[0.0, -1.0, 0.0, 0.25]", "[0.0, -1.1, 0.0, 0.25]"), &["T_cam_imu", "line 3", "rigid"]);
+    has(spoilt("pinhole", "omni"), &["camera_model", "pinhole"]);
+    has(spoilt("equidistant", "fov"), &["distortion_model"]);
+    has(spoilt("190.5", "nan"), &["intrinsics", "nan"]);
+    has(spoilt("[512, 511]", "[512]"), &["resolution", "2 numbers", "1"]);
+    has(spoilt("0.003, 4e-4]", "0.003, 4e-4"), &["not closed"]);
+    has(spoilt("cam0:", "cam0"), &["key: value", "line 2"]);
+    has(read_kalibr_cameras("").unwrap_err(), &["cam0"]);
+    has(asl::read_imu("1,0,0,0,0,0,9.8\n0,0,0,0,0,0,9.8\n").unwrap_err(), &["line 2", "sort"]);
+    has(asl::read_imu("1,0,0,nan,0,0,9.8\n").unwrap_err(), &["line 1", "column 4"]);
+    has(asl::read_imu("1,0,0,0,0,9.8\n").unwrap_err(), &["6 columns"]);
+    has(asl::read_images("5,a.png\n5,b.png\n").unwrap_err(), &["line 2", "sort"]);
+    assert_eq!(asl::read_imu("1,0,0,0,0,0,9.8\n1,1,1,1,1,1,1\n2,0,0,0,0,0,9.8\n").unwrap().len(), 2);
+}
+
+#[test]
+fn mutated_calibrations_never_panic() {
+    let mut rng = support::Rng(5);
+    let mut accepted = 0;
+    for _ in 0..20_000 {
+        let mut bytes = KALIBR.as_bytes().to_vec();
+        for _ in 0..=rng.bits() % 4 {
+            let at = rng.bits() as usize % bytes.len().max(1);
+            if bytes.is_empty() {
+                break;
+            }
+            match rng.bits() % 3 {
+                0 => bytes[at] = b"[]:-,#0 \n9"[rng.bits() as usize % 10],
+                1 => drop(bytes.remove(at)),
+                _ => bytes.truncate(at + 1),
+            }
+        }
+        let text = String::from_utf8_lossy(&bytes);
+        if let Ok(cameras) = read_kalibr_cameras(&text) {
+            assert!(cameras.iter().all(|c| c.camera.check().is_ok()));
+            accepted += 1;
+        }
+        let _ = (read_kalibr_imu(&text), read_asl_camera(&text), asl::read_imu(&text), asl::read_images(&text));
+    }
+    assert!(accepted > 500, "{accepted}");
+}
+
+/// One second of dead reckoning from the truth, with the true bias: what the sensor alone can do. The recorded truth has
+/// errors of its own: with its attitudes in place of the gyroscope the velocities come out no better. Starts are 97 samples
+/// apart, because multiples of half a second beat with the vibration.
+#[test]
+fn real_readings_carry_the_motion_for_a_second() {
+    let bounds = [("MH_04_difficult", "imu_MH04", 0.06, 0.045), ("V1_02_medium", "imu_V102", 0.16, 0.055)];
+    for (name, imu, most_degrees, most_speed) in bounds {
+        let folder = format!("vio/euroc_imu_gt/{name}");
+        let Some(text) = recorded(&format!("{folder}/{imu}.txt.gz")) else { return };
+        let samples = asl::read_imu(&text).unwrap();
+        let truth = euroc::read(&recorded(&format!("{folder}/groundtruth_{name}.csv.gz")).unwrap()).unwrap();
+        let (stamps, poses) = (truth.trajectory.stamps(), truth.trajectory.poses());
+        let (mut angles, mut speeds) = (Vec::new(), Vec::new());
+        for start in (0..stamps.len() - 200).step_by(97) {
+            let first = samples.partition_point(|s| s.stamp < stamps[start]);
+            let (mut turn, mut velocity) = (poses[start].rotation, truth.velocities_in_world[start]);
+            let (gyro_bias, accel_bias) = (truth.gyro_biases[start], truth.accel_biases[start]);
+            for pair in samples[first..].windows(2).take(200) {
+                let dt = pair[1].stamp.secs_since(pair[0].stamp);
+                let rate = 0.5 * (pair[0].gyro + pair[1].gyro) - gyro_bias;
+                let force = 0.5 * (pair[0].accel + pair[1].accel) - accel_bias;
+                let half = turn * UnitQuaternion::from_scaled_axis(0.5 * rate * dt);
+                velocity += (half * force - 9.81 * Vector3::z()) * dt;
+                turn *= UnitQuaternion::from_scaled_axis(rate * dt);
+            }
+            angles.push(turn.angle_to(&poses[start + 200].rotation).to_degrees());
+            speeds.push((velocity - truth.velocities_in_world[start + 200]).norm());
+        }
+        let median = |values: &mut Vec<f64>| {
+            values.sort_by(f64::total_cmp);
+            values[values.len() / 2]
+        };
+        let (angle, speed) = (median(&mut angles), median(&mut speeds));
+        eprintln!("{name}: {angle:.3} deg, {speed:.4} m/s after one second, medians of {}", angles.len());
+        assert!(angle <= most_degrees && speed <= most_speed, "{name}: {angle} deg, {speed} m/s");
+    }
+}
+
+#[test]
+fn public_calibrations_are_read() {
+    let root = std::env::var_os("PAINTCOPTER_DATA").map_or_else(
+        || std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"),
+        std::path::PathBuf::from,
+    );
+    let folder = root.join("vio/calibration/open_vins");
+    if !folder.exists() {
+        eprintln!("SKIPPED: {} is absent; set PAINTCOPTER_DATA to the folder with the recordings", folder.display());
+        return;
+    }
+    let mut cameras = 0;
+    for set in std::fs::read_dir(folder).unwrap() {
+        let set = set.unwrap().path();
+        let text = |name: &str| std::fs::read_to_string(set.join(name)).unwrap();
+        let chain = read_kalibr_cameras(&text("kalibr_imucam_chain.yaml"));
+        cameras += chain.unwrap_or_else(|error| panic!("{}: {error}", set.display())).len();
+        let imu = read_kalibr_imu(&text("kalibr_imu_chain.yaml"));
+        imu.unwrap_or_else(|error| panic!("{}: {error}", set.display()));
+    }
+    assert!(cameras >= 6);
+    let micro = root.join("vio/euroc_V1_01_micro/mav0");
+    let text = |name: &str| std::fs::read_to_string(micro.join(name)).unwrap();
+    let camera = read_asl_camera(&text("cam0/sensor.yaml")).unwrap();
+    let error = camera.camera.body_from_camera.inverse() * Camera::euroc().body_from_camera;
+    assert!(error.rotation.angle() < 1e-9 && camera.camera.distortion == Camera::euroc().distortion);
+    assert_eq!(read_asl_imu(&text("imu0/sensor.yaml")).unwrap().noise, ImuNoise::default());
+    assert_eq!(asl::read_images(&text("cam0/data.csv")).unwrap().len(), 95);
+}
