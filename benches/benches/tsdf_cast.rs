@@ -34,7 +34,7 @@ fn main() -> Result<(), Error> {
         }
         println!(
             "{voxel_size}: error {:.4} mm, fill {:.5}, beyond 2/10/50/200 mm {far:?} of {hits}, {} blocks",
-            1e3 * sum / hits as f64,
+            1e3 * sum / f64::from(hits),
             f64::from(hits) / f64::from(seen),
             map.blocks()
         );

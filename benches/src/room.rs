@@ -56,7 +56,7 @@ impl Shot {
     /// A check pattern of two colours as large as the image, where only the cost of colours matters.
     #[must_use]
     pub fn painted(mut self) -> Self {
-        let check = |k: usize| (k % SIZE.0 / 32 + k / SIZE.0 / 32) % 2 == 0;
+        let check = |k: usize| (k % SIZE.0 / 32 + k / SIZE.0 / 32).is_multiple_of(2);
         self.rgb = (0..SIZE.0 * SIZE.1).flat_map(|k| if check(k) { [200, 40, 30] } else { [40, 60, 190] }).collect();
         self
     }

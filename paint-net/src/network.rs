@@ -14,9 +14,9 @@ mod tiles;
 #[cfg(any(test, feature = "train"))]
 mod trace;
 
-#[cfg(any(test, feature = "train"))]
+#[cfg(feature = "train")]
 pub(crate) use adjoint::Adjoint;
-#[cfg(any(test, feature = "train"))]
+#[cfg(feature = "train")]
 pub(crate) use field::Field;
 #[cfg(any(test, feature = "train"))]
 pub(crate) use law::Law;
@@ -25,7 +25,7 @@ pub(crate) use pass::Block;
 pub use shape::Shape;
 pub(crate) use spread::Spread;
 pub(crate) use tiles::{State, Tiles};
-#[cfg(any(test, feature = "train"))]
+#[cfg(feature = "train")]
 pub(crate) use trace::Trace;
 
 use crate::error::Error;
@@ -116,10 +116,12 @@ impl Network {
         self.shape.tensors().into_iter().map(tensor).collect()
     }
 
+    #[cfg(feature = "train")]
     pub(crate) fn from_parameters(shape: Shape, parameters: Vec<f32>) -> Self {
         Self { shape, parameters }
     }
 
+    #[cfg(feature = "train")]
     pub(crate) fn into_parameters(self) -> Vec<f32> {
         self.parameters
     }

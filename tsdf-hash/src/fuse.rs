@@ -212,8 +212,8 @@ impl<'a> Frame<'a> {
             work.touched[x] -= touched[x];
         }
         if let Some(colour) = self.colour.as_ref().filter(|_| coloured != [0; LANES]) {
-            for x in 0..LANES {
-                if coloured[x] != 0
+            for (x, &near) in coloured.iter().enumerate() {
+                if near != 0
                     && let Some(rgb) = colour.at(lanes, x)
                 {
                     work.colour_fault |= observe_colour::<PLUS>(&mut block.colour[LANES * unit + x], rgb);

@@ -42,7 +42,7 @@
 //! | mesh | thesis Paper I, section 4.6, by marching cubes; case table derived: ours | [`Map::mesh`], [`write_ply`] |
 //! | the same bytes on a GPU | ours | `GpuMap` (feature `gpu`) |
 //! | the mesh of a growing map, blocks that left included | thesis Paper I, section 4.6; per-block patches: ours | [`MeshKeeper`] |
-//! | distance queries | thesis, outlook | [`Map::distance`] |
+//! | distance queries | thesis, outlook | [`Map::distance`], [`Map::distance_and_gradient`] |
 //!
 //! Frames: the camera's z looks forward, `x` to the right and `y` down in its image; the world is the caller's. Distances
 //! are positive on the camera's side of a surface. Metres. Tracking is not part of this crate yet.
@@ -60,6 +60,7 @@ mod key;
 mod map;
 mod mesh;
 mod parallel;
+mod query;
 mod settings;
 mod slots;
 mod store;

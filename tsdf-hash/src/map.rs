@@ -2,11 +2,10 @@
 
 use std::path::Path;
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Isometry3;
 
-use crate::block::{Block, SIDE};
+use crate::block::Block;
 use crate::fuse::{Frame, Sign};
-use crate::key::Key;
 use crate::settings::Tiers;
 use crate::store::Store;
 use crate::surface::Surface;
@@ -274,39 +273,7 @@ impl Map {
         Ok(whole)
     }
 
-    /// Signed distance from the nearest surface, metres, by trilinear interpolation; `None` where one of the eight voxels
-    /// around the point was never observed (farther than `μ` from every surface, behind one, or unseen).
-    pub fn distance(&self, point_in_world: &Point3<f64>) -> Option<f64> {
-        interpolate(&self.settings, |key| self.store().get(key), point_in_world)
-    }
-
     pub(crate) fn store(&self) -> &Store {
         &self.copies.active
     }
-}
-
-/// Trilinear interpolation of the distances in the blocks that `block` finds.
-pub(crate) fn interpolate<'a>(
-    settings: &Settings,
-    block: impl Fn(Key) -> Option<&'a Block>,
-    point_in_world: &Point3<f64>,
-) -> Option<f64> {
-    let voxel = point_in_world.coords / settings.voxel_size - nalgebra::Vector3::repeat(0.5);
-    let low = voxel.map(f64::floor);
-    // A NaN fails; beyond this the key would fail below, and the cast must not saturate.
-    if !low.iter().all(|c| c.abs() <= f64::from(1 << 24)) {
-        return None;
-    }
-    let fraction = voxel - low;
-    let mut distance = 0.0;
-    for corner in 0..8 {
-        let bit = [corner & 1, corner >> 1 & 1, corner >> 2];
-        let index = [0, 1, 2].map(|axis| low[axis] as i32 + bit[axis]);
-        let key = Key::new(index.map(|c| c.div_euclid(SIDE as i32)))?;
-        let local = index.map(|c| c.rem_euclid(SIDE as i32) as usize);
-        let mean = block(key)?.mean(local[0] + SIDE * (local[1] + SIDE * local[2]))?;
-        let share: f64 = (0..3).map(|k| if bit[k] == 1 { fraction[k] } else { 1.0 - fraction[k] }).product();
-        distance += share * f64::from(mean);
-    }
-    Some(distance * settings.truncation())
 }

@@ -121,6 +121,28 @@ pub enum Error {
         /// How many there are.
         count: usize,
     },
+    /// An image of another size than the camera's calibration.
+    #[error(
+        "the image has {given:?} pixels, the calibrated camera {expected:?}: use the calibration of this image size"
+    )]
+    ImageSize {
+        /// Width and height given.
+        given: (usize, usize),
+        /// Width and height of the camera.
+        expected: (usize, usize),
+    },
+    /// A measurement belongs to a time that the filter has left behind.
+    #[error(
+        "{what} of {stamp} s arrives when everything up to {now} s is settled: feed in order, or keep a longer history"
+    )]
+    Late {
+        /// Which measurement.
+        what: &'static str,
+        /// Its time by the inertial sensor's clock.
+        stamp: Stamp,
+        /// The time up to which nothing can change.
+        now: Stamp,
+    },
     /// A covariance is not symmetric positive definite.
     #[error("{what} covariance {index} is not symmetric positive definite: check the filter, or its export")]
     NotPositiveDefinite {

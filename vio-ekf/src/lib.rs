@@ -1,11 +1,16 @@
-//! Trajectories, their file formats and their evaluation: the ground on which visual-inertial odometry is judged.
+//! Visual-inertial odometry: one camera and one inertial sensor in an iterated Kalman filter that is honest about what it
+//! does not know; trajectories, their file formats and their evaluation.
 //!
-//! The crate holds poses over time with exact nanosecond stamps, reads and writes them as TUM, EuRoC and KITTI text,
+//! [`Vio`] takes inertial samples and grey images, and gives pose, velocity and covariance at the rate of the samples. It
+//! compares patches of the image directly, keeps landmarks as bearing and inverse distance in the camera's axes, and never
+//! learns anything about position and yaw, which nothing can tell it. Beside it the crate holds poses over time with exact nanosecond stamps, reads and writes them as TUM, EuRoC and KITTI text,
 //! and measures how well one trajectory agrees with another: pairing in time, alignment, absolute and relative errors,
 //! consistency of covariances. A B-spline gives smooth motion with exact rates and accelerations, which is what ideal
-//! inertial sensors read. The estimator itself is not part of the crate yet.
+//! inertial sensors read.
 //!
 //! ```text
+//! p' = R v    v' = f − ω × v + Rᵀ g    R' = R hat(ω)    μ' = −ω_c × μ − (I − μμᵀ) v_c ρ    ρ' = ρ² μ·v_c
+//! δ ← K (y + H δ)    K = P Hᵀ (H P Hᵀ + S)⁻¹    P ← P − K H P
 //! ATE² = mean |g_i − (s R e_i + t)|²          E_ij = (G_i⁻¹ G_j)⁻¹ (E_i⁻¹ E_j)          NEES = eᵀ P⁻¹ e
 //! ```
 //!
@@ -26,6 +31,12 @@
 //!
 //! | what | source | item |
 //! |---|---|---|
+//! | robocentric filter on images | after ROVIO, Bloesch et al. 2017 (thesis, Paper I, section 4.1) | [`Vio`], [`Vio::image`] |
+//! | the same on a caller's points | ours | [`Vio::points`] |
+//! | motion between images, its noise | Forster et al. 2017 | [`Vio::imu`], [`ImuNoise`] |
+//! | bearing with a tangent basis | Hertzberg et al. 2013; Bloesch et al. 2017 | [`Bearing`] |
+//! | iterated update | Bell and Cathey 1993 | [`GateSettings`] |
+//! | start in motion | closed form of Martinelli 2014, refined: ours | [`MovingSettings`] |
 //! | one-call evaluation | ours | [`evaluate`] |
 //! | least-squares alignment | Umeyama 1991, Eqs. (40)-(42); Horn 1987 | [`align`] |
 //! | alignment of position and yaw | closed form, ours; Zhang and Scaramuzza 2018 for the choice of mode | [`Alignment::PosYaw`] |
@@ -43,6 +54,7 @@
 mod camera;
 mod error;
 mod eval;
+mod filter;
 mod format;
 mod lie;
 mod measurement;
@@ -61,6 +73,11 @@ pub use eval::nees::{Nees, PoseCovariance, nees};
 pub use eval::rpe::{PairsFrom, Rpe, RpeSettings, Span, Tolerance, rpe};
 pub use eval::stats::Stats;
 pub use eval::{Evaluation, EvaluationSettings, Segment, evaluate};
+pub use filter::{
+    Bearing, Calibration, CalibrationSettings, CoreCovariance, Excess, FrameReport, GateSettings, LandmarkSettings,
+    LimitSettings, MovingSettings, Odometry, PatchSettings, PointObservation, RestSettings, Settings, Start,
+    StartSigma, Status, Vio, Waiting,
+};
 pub use format::{asl, calibration, euroc, kitti, tum};
 pub use lie::{se3, so3};
 pub use measurement::{ImageView, Imu, ImuNoise};

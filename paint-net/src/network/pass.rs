@@ -42,6 +42,7 @@ impl<T: Real> Block<T> {
         self.shape
     }
 
+    #[cfg(feature = "train")]
     pub(crate) fn parameters(&self) -> &[T] {
         &self.parameters
     }

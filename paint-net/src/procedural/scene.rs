@@ -1,7 +1,7 @@
 use super::{fbm, lattice, worley_distances};
 use crate::image::Image;
 
-/// Kinds of scenes; one more than are trained on is never needed, as [`super::Texture::Brick`] is kept apart.
+/// Kinds of scenes. Bricks, [`super::Texture::Brick`], are not among them: they are kept to test with.
 const KINDS: usize = 9;
 
 /// Numbers of one scene, drawn in order.

@@ -49,7 +49,8 @@ fn slow(frame: &Frame, surface: &Surface, colour: &ColourView, key: Key, block: 
         }
         let plane = surface.planes[i as usize + SIZE.0 * j as usize];
         let own = p[2] * plane.scaled_omega;
-        if !((plane.offset - own).abs() <= frame.truncation * plane.scaled_omega) {
+        let within = (plane.offset - own).abs() <= frame.truncation * plane.scaled_omega;
+        if !within {
             continue;
         }
         touched += 1;

@@ -235,3 +235,37 @@ impl Source for Copies {
         self.sum(key, sum)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::MeshKeeper;
+    use crate::block::{Block, ONE, VOXELS};
+    use crate::key::Key;
+    use crate::store::Seen;
+    use crate::{Map, Settings};
+
+    #[test]
+    fn a_change_of_one_voxel_reaches_every_cell_around_it() {
+        let mut map = Map::new(Settings::default()).unwrap();
+        let free = Block { distance: [ONE; VOXELS], weight: [1; VOXELS], ..Block::ZERO };
+        // 4 x 4 x 4 blocks on either side of the origin.
+        for n in 0..64 {
+            let key = Key::new([n % 4 - 2, n / 4 % 4 - 2, n / 16 - 2]).unwrap();
+            map.copies.active.insert(key, Box::new(free.clone()), Seen::default());
+        }
+        let mut keeper = MeshKeeper::new();
+        keeper.update(&map).unwrap();
+        assert!(keeper.mesh().faces.is_empty());
+        // One solid voxel, at each corner of a block in turn: eight cells in up to eight blocks, an octahedron.
+        for corner in 0..8_usize {
+            let voxel = [7, 7 * 8, 7 * 64].iter().enumerate().map(|(k, v)| if corner >> k & 1 == 1 { *v } else { 0 });
+            let voxel = voxel.sum::<usize>();
+            for (distance, faces) in [(-ONE, 8), (ONE, 0)] {
+                map.copies.active.get_mut(Key::new([0; 3]).unwrap()).unwrap().0.distance[voxel] = distance;
+                assert_eq!(keeper.update(&map).unwrap().changed, 1);
+                assert_eq!(keeper.mesh().faces.len(), faces, "corner {corner}");
+                assert_eq!(keeper.mesh(), map.mesh());
+            }
+        }
+    }
+}

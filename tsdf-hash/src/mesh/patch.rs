@@ -165,7 +165,7 @@ impl Lattice<'_> {
 
 /// The block of a point of the lattice, and the voxel there.
 fn place(at: [usize; 3]) -> [usize; 2] {
-    let step = at[0] / SIDE | at[1] / SIDE << 1 | at[2] / SIDE << 2;
+    let step = (0..3).fold(0, |step, k| step | (at[k] / SIDE) << k);
     [step, (at[0] % SIDE + SIDE * (at[1] % SIDE + SIDE * (at[2] % SIDE))) % VOXELS]
 }
 

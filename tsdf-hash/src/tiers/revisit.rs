@@ -6,7 +6,7 @@ use super::Held;
 use crate::Map;
 use crate::block::Block;
 use crate::key::Key;
-use crate::map::interpolate;
+use crate::query::Cell;
 use crate::slots::Slots;
 
 /// What to do with blocks that have come back.
@@ -72,7 +72,7 @@ impl Arrivals<'_> {
 
     /// Signed distance from the old surface, metres, as [`Map::distance`].
     pub fn distance(&self, point_in_world: &Point3<f64>) -> Option<f64> {
-        interpolate(self.active.settings(), |key| self.block(key), point_in_world)
+        Cell::around(self.active.settings(), |key| self.block(key), point_in_world).map(|cell| cell.distance())
     }
 
     /// The map that they would be merged into: the new surface.

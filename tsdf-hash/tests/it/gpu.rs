@@ -292,8 +292,8 @@ fn refused_frames_leave_no_trace() {
     assert!(matches!(gpu.deintegrate(&view, None, &moved), Err(Error::NotIntegrated { .. })));
     assert_eq!(gpu.hash().unwrap(), full);
     let near = Isometry3::translation(0.0, 0.02, 0.0) * pose;
-    let other =
-        gpu.deintegrate(&view, Some(&ColourView { data: ColourData::Rgb16(&[999; 3 * 3072]), ..colour }), &near);
+    let strange = vec![999; 3 * 3072];
+    let other = gpu.deintegrate(&view, Some(&ColourView { data: ColourData::Rgb16(&strange), ..colour }), &near);
     assert!(matches!(other, Err(Error::NotIntegrated { .. })));
     assert_eq!(gpu.hash().unwrap(), full);
     // And one that was there.

@@ -73,6 +73,26 @@ fn what_is_taken_out_was_never_there() {
 }
 
 #[test]
+fn sixteen_bits_hold_the_same_colours() {
+    // 257 c / 65535 is c / 255.
+    let shot = &room::tour(8, 4, &Isometry3::identity())[1];
+    let (width, height, intrinsics) = (shot.width, shot.height, shot.intrinsics);
+    let rgb8 = colours(shot, 1);
+    let rgb16: Vec<u16> = rgb8.iter().map(|&c| 257 * u16::from(c)).collect();
+    let [eight, sixteen] = [ColourData::Rgb8(&rgb8), ColourData::Rgb16(&rgb16)].map(|data| {
+        let mut map = Map::new(settings(1)).unwrap();
+        let colour = ColourView { width, height, data, intrinsics };
+        map.integrate(&shot.view(), Some(&colour), &shot.world_from_camera).unwrap();
+        map.hash()
+    });
+    assert_eq!(eight, sixteen);
+    let mut map = fused(std::slice::from_ref(shot), &[0], 1);
+    assert_ne!(map.hash(), eight, "another picture");
+    let short = ColourView { width, height, data: ColourData::Rgb16(&rgb16[1..]), intrinsics };
+    assert!(map.integrate(&shot.view(), Some(&short), &shot.world_from_camera).is_err());
+}
+
+#[test]
 fn images_of_another_size_colour_the_same_surface() {
     // A white image of twice the size, seen by a camera of twice the focal length.
     let shot = &room::tour(8, 4, &Isometry3::identity())[1];

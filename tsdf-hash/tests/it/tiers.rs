@@ -87,8 +87,8 @@ fn caps_leave_no_trace() {
         // Half of a frame's blocks are active at once; all the rest is packed in RAM.
         ("ram", 1 << 20, tiers(8 << 20, 0), 1),
         // Hardly a block is; most is on disk.
-        ("disk", 1 << 16, tiers(1 << 19, 8 << 20), 1),
-        ("disk-2", 1 << 18, tiers(1 << 19, 8 << 20), 2),
+        ("disk", 1 << 16, tiers(5 << 17, 8 << 20), 1),
+        ("disk-2", 1 << 18, tiers(5 << 17, 8 << 20), 2),
         // Room for everything, but blocks leave by age and come back slowly, so that many have two copies.
         ("age", 1 << 30, slow, 1),
         // Much leaves at once and comes back slowly: blocks have two copies.

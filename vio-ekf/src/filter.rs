@@ -1,0 +1,434 @@
+//! The estimator: one camera, one inertial sensor, an iterated Kalman filter around the body.
+
+mod bearing;
+mod covariance;
+mod detect;
+mod estimator;
+mod history;
+mod images;
+mod interval;
+#[cfg(test)]
+mod jacobians;
+mod moving;
+#[cfg(test)]
+mod moving_tests;
+mod patch;
+#[cfg(test)]
+mod patches;
+mod points;
+mod propagate;
+mod pyramid;
+mod relative;
+mod rest;
+mod scout;
+mod settings;
+mod start;
+mod state;
+mod update;
+
+use nalgebra::{Isometry3, SMatrix, Translation3, Unit, Vector3};
+
+pub use bearing::Bearing;
+pub use estimator::CoreCovariance;
+pub use moving::MovingSettings;
+pub use points::PointObservation;
+pub use rest::RestSettings;
+pub use settings::{CalibrationSettings, GateSettings, LandmarkSettings, LimitSettings, PatchSettings, Settings};
+pub use start::{Start, StartSigma};
+
+use crate::trajectory::is_finite;
+use crate::{Camera, Error, Imu, ImuNoise, Stamp};
+use estimator::Estimator;
+use images::Sight;
+use patch::Patch;
+use rest::Rest;
+use scout::Scout;
+use state::at;
+
+/// A camera this much ahead of the inertial samples, in seconds, is waiting for data that does not come.
+const MAX_AHEAD: f64 = 0.1;
+
+/// Whether the estimate can be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// No start yet, and why.
+    Uninitialised(Waiting),
+    /// Running.
+    Tracking,
+    /// Given up, and why. Stays so until [`Vio::start`] or [`Vio::reset`].
+    Diverged(Excess),
+}
+
+/// What the start at rest waits for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Waiting {
+    /// A second without shaking, by the inertial samples.
+    ForSteadiness,
+    /// Images that have something to hold on to, and in which nothing moves.
+    ForStillImages,
+    /// The force read at rest is not gravity: axes, units or calibration of the accelerometer are wrong.
+    ForGravity,
+}
+
+/// Which limit of [`LimitSettings`] was exceeded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Excess {
+    /// The speed, or a number that is not finite.
+    Speed,
+    /// A bias.
+    Bias,
+    /// The uncertainty of the velocity.
+    Uncertainty,
+    /// Landmarks contradict the prediction, image after image.
+    Contradiction,
+}
+
+/// An estimate of the body's motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Odometry {
+    /// Its time, by the inertial sensor's clock.
+    pub stamp: Stamp,
+    /// Pose; z of the world is up.
+    pub world_from_body: Isometry3<f64>,
+    /// Velocity in body axes, m/s.
+    pub velocity_in_body: Vector3<f64>,
+    /// Angular rate in body axes, rad/s.
+    pub rate_in_body: Vector3<f64>,
+    /// Bias of the gyroscope, rad/s.
+    pub gyro_bias: Vector3<f64>,
+    /// Bias of the accelerometer, m/s².
+    pub accel_bias: Vector3<f64>,
+    /// Of the errors of, in this order, three rows each: position in world axes; velocity in body axes; attitude as a
+    /// rotation vector in **world** axes, `R_true = Exp(δθ) R`; gyroscope's bias; accelerometer's bias.
+    pub covariance: CoreCovariance,
+}
+
+impl Odometry {
+    /// Covariance of the attitude error as a rotation vector in body axes, rad².
+    pub fn attitude_covariance_in_body(&self) -> nalgebra::Matrix3<f64> {
+        let rotation = self.world_from_body.rotation.to_rotation_matrix().into_inner();
+        let world: SMatrix<f64, 3, 3> = self.covariance.fixed_view::<3, 3>(6, 6).into_owned();
+        rotation.transpose() * world * rotation
+    }
+}
+
+/// The camera's calibration as the filter sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Calibration {
+    /// Pose of the camera on the body.
+    pub body_from_camera: Isometry3<f64>,
+    /// Seconds to add to the camera's stamps to get the inertial sensor's time.
+    pub time_offset_s: f64,
+    /// Of the errors of, in this order: position (m), attitude as a rotation vector in **body** axes (rad), time offset (s).
+    pub covariance: SMatrix<f64, 7, 7>,
+}
+
+/// What one image, or one set of points, did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FrameReport {
+    /// Whether the estimate can be used.
+    pub status: Status,
+    /// Landmarks whose measurement was used.
+    pub used: usize,
+    /// Landmarks whose measurement was refused.
+    pub rejected: usize,
+    /// Landmarks that were new.
+    pub added: usize,
+    /// Landmarks that were dropped.
+    pub removed: usize,
+    /// Whether the body was taken to be at rest.
+    pub at_rest: bool,
+}
+
+/// One camera and one inertial sensor.
+///
+/// Feed samples and images as they come; an image may arrive up to [`Settings::history_samples`] samples late and is used
+/// at its own time, with the same result to the last bit. The filter starts by itself, at rest or in motion, or from a
+/// state that is given.
+///
+/// ```
+/// use vio_ekf::nalgebra::{Isometry3, Vector3};
+/// use vio_ekf::{Camera, ImageView, Imu, ImuNoise, Settings, Stamp, Start, StartSigma, Status, Vio};
+///
+/// let mut vio = Vio::new(Camera::euroc(), ImuNoise::default(), Settings::default())?;
+/// let at = |millis: i64| Stamp::from_nanos(millis * 1_000_000);
+/// let imu = |millis| Imu { stamp: at(millis), gyro: Vector3::zeros(), accel: Vector3::new(0.0, 0.0, 9.81) };
+/// vio.imu(&imu(0))?;
+/// vio.start(&Start {
+///     stamp: at(0),
+///     world_from_body: Isometry3::identity(),
+///     velocity_in_body: Vector3::zeros(),
+///     gyro_bias: Vector3::zeros(),
+///     accel_bias: Vector3::zeros(),
+///     sigma: StartSigma::default(),
+/// })?;
+/// let picture: Vec<u8> = (0..752 * 480).map(|k| if (k % 752 / 40 + k / 752 / 40) % 2 == 0 { 60 } else { 180 }).collect();
+/// for k in 1..=20 {
+///     vio.imu(&imu(5 * k))?;
+///     if k % 10 == 0 {
+///         let report = vio.image(at(5 * k), &ImageView::new(752, 480, &picture)?)?;
+///         assert_eq!(report.status, Status::Tracking);
+///     }
+/// }
+/// let odometry = vio.output().expect("it has been started");
+/// assert!(odometry.world_from_body.translation.vector.norm() < 0.01);
+/// # Ok::<(), vio_ekf::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Vio {
+    camera: Camera,
+    noise: ImuNoise,
+    settings: Settings,
+    last: Option<Imu>,
+    estimator: Option<Estimator>,
+    tracks: Vec<Track>,
+    sight: Sight,
+    rest: Rest,
+    scout: Scout,
+    /// Whether the image before was taken at rest.
+    rested: bool,
+    /// Angle that a rest may hide, rad.
+    unnoticed: f64,
+    /// Images in a row that contradict the prediction.
+    contradictions: u32,
+    excess: Option<Excess>,
+    waiting: Waiting,
+    /// Name of the next landmark.
+    next_id: u64,
+}
+
+/// What is remembered of a landmark besides its state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Track {
+    id: u64,
+    /// Failures in a row.
+    misses: u32,
+    /// Whether the current frame saw it.
+    seen: bool,
+    /// What it looks like; none for a point of the caller's own.
+    patch: Option<Patch>,
+}
+
+impl Vio {
+    /// Refuses a camera, noise or settings that cannot be.
+    pub fn new(camera: Camera, noise: ImuNoise, settings: Settings) -> Result<Self, Error> {
+        camera.check()?;
+        noise.check()?;
+        settings.check()?;
+        Ok(Self {
+            camera,
+            noise,
+            settings,
+            last: None,
+            estimator: None,
+            tracks: Vec::with_capacity(settings.features),
+            sight: Sight::new(&camera, &settings.patches),
+            rest: Rest::new(settings.rest),
+            scout: Scout::new(settings.moving),
+            rested: false,
+            unnoticed: 0.5 * settings.rest.pixels / camera.fx.min(camera.fy),
+            contradictions: 0,
+            excess: None,
+            waiting: Waiting::ForSteadiness,
+            next_id: 0,
+        })
+    }
+
+    /// Starts, or starts again, from a given state. There must be an inertial sample, and the state must not be before it.
+    pub fn start(&mut self, start: &Start) -> Result<(), Error> {
+        let Some(sample) = self.last else {
+            return Err(Error::TooFew { what: "inertial samples before the start", got: 0, need: 1 });
+        };
+        if start.stamp < sample.stamp {
+            return Err(Error::Late { what: "start", stamp: start.stamp, now: sample.stamp });
+        }
+        if !is_finite(&start.world_from_body) {
+            return Err(Error::NonFinite { what: "start pose", index: 0 });
+        }
+        let vectors = [start.velocity_in_body, start.gyro_bias, start.accel_bias];
+        if let Some(index) = vectors.iter().position(|v| v.iter().any(|v| !v.is_finite())) {
+            return Err(Error::NonFinite { what: "start velocity or bias", index });
+        }
+        start.sigma.check()?;
+        self.reset();
+        self.estimator = Some(Estimator::new(&self.camera, self.noise, &self.settings, start, sample));
+        Ok(())
+    }
+
+    /// Forgets the estimate. The start at rest is tried from here on.
+    pub fn reset(&mut self) {
+        self.tracks.clear();
+        self.estimator = None;
+        (self.contradictions, self.excess) = (0, None);
+        self.scout = Scout::new(self.settings.moving);
+    }
+
+    /// Takes an inertial sample; stamps must increase.
+    pub fn imu(&mut self, sample: &Imu) -> Result<Status, Error> {
+        if !sample.is_finite() {
+            return Err(Error::NonFinite { what: "inertial sample", index: 0 });
+        }
+        if let Some(last) = &self.last
+            && sample.stamp <= last.stamp
+        {
+            return Err(Error::NotIncreasing { index: 0, previous: last.stamp, stamp: sample.stamp });
+        }
+        self.last = Some(*sample);
+        self.rest.imu(sample);
+        if self.estimator.is_none() {
+            self.scout.imu(sample);
+        }
+        if let Some(estimator) = &mut self.estimator {
+            if estimator.history.is_full() {
+                let tracks = &mut self.tracks;
+                estimator.forget(|slot| {
+                    tracks.swap_remove(slot);
+                });
+            }
+            estimator.imu(*sample);
+        }
+        Ok(self.status())
+    }
+
+    /// Whether the estimate can be used.
+    pub fn status(&self) -> Status {
+        match (&self.estimator, self.excess) {
+            (None, _) => Status::Uninitialised(self.waiting),
+            (Some(_), Some(excess)) => Status::Diverged(excess),
+            (Some(_), None) => Status::Tracking,
+        }
+    }
+
+    /// The estimate at the time of the latest sample; `None` before the start.
+    pub fn output(&self) -> Option<Odometry> {
+        self.estimator.as_ref().map(Estimator::odometry)
+    }
+
+    /// Starts from the means of a rest.
+    fn start_at_rest(&mut self) -> Result<(), Error> {
+        let Some(sample) = self.last else { return Ok(()) };
+        let off = |force: Vector3<f64>| (force.norm() - self.settings.gravity).abs();
+        self.waiting = match () {
+            () if !self.rest.is_steady(sample.stamp) => Waiting::ForSteadiness,
+            () if self.rest.force().is_some_and(|force| off(force) > self.settings.rest.gravity_tolerance) => {
+                Waiting::ForGravity
+            }
+            () => Waiting::ForStillImages,
+        };
+        if self.waiting != Waiting::ForStillImages || !self.rest.is_at_rest(sample.stamp) {
+            return Ok(());
+        }
+        let Some(window) = self.rest.take_window() else { return Ok(()) };
+        let sigma = StartSigma { velocity: self.settings.rest.velocity_sigma, tilt: 0.1, ..StartSigma::default() };
+        // Level as far as the force tells; only its direction is used, the update below weighs it against the bias.
+        let attitude = Bearing::new(&Unit::new_normalize(window.force)).level();
+        self.start(&Start {
+            stamp: sample.stamp,
+            world_from_body: Isometry3::from_parts(Translation3::identity(), attitude),
+            velocity_in_body: Vector3::zeros(),
+            gyro_bias: window.rate,
+            accel_bias: Vector3::zeros(),
+            sigma,
+        })?;
+        if let Some(estimator) = &mut self.estimator {
+            estimator.weigh(&window, self.unnoticed, &self.settings.rest);
+        }
+        Ok(())
+    }
+
+    /// The camera's calibration at the last image; `None` before the start.
+    pub fn calibration(&self) -> Option<Calibration> {
+        self.estimator.as_ref().map(|estimator| Calibration {
+            body_from_camera: Isometry3::from_parts(
+                Translation3::from(estimator.state.camera_position),
+                estimator.state.camera_attitude,
+            ),
+            time_offset_s: estimator.state.time_offset,
+            covariance: estimator.covariance.block(at::CAMERA_POSITION, at::CAMERA_POSITION),
+        })
+    }
+
+    /// Starts from what the scout has found at the time of an image.
+    fn start_in_motion(&mut self, stamp: Stamp, motion: &moving::Motion) {
+        let Some(history) = self.scout.history() else { return };
+        let attitude = Bearing::new(&Unit::new_normalize(-motion.gravity)).level();
+        let found = Start {
+            stamp,
+            world_from_body: Isometry3::from_parts(Translation3::identity(), attitude),
+            velocity_in_body: motion.velocity,
+            gyro_bias: motion.gyro_bias,
+            accel_bias: Vector3::zeros(),
+            sigma: StartSigma {
+                position: 0.0,
+                yaw: 0.0,
+                velocity: motion.velocity_sigma,
+                tilt: motion.tilt_sigma,
+                gyro_bias: motion.gyro_bias_sigma,
+                accel_bias: self.settings.moving.accel_bias_sigma,
+            },
+        };
+        let mut estimator = Estimator::new(&self.camera, self.noise, &self.settings, &found, history.before(stamp));
+        estimator.expect(motion.inverse_distance);
+        for sample in history.after(stamp) {
+            estimator.imu(*sample);
+        }
+        self.reset();
+        self.estimator = Some(estimator);
+    }
+
+    /// Moves the filter to the exposure of an image. `None` if there is no filter, or it was started after the exposure;
+    /// otherwise the number of landmarks lost on the way.
+    fn expose(&mut self, stamp: Stamp, at_rest: bool) -> Result<Option<usize>, Error> {
+        let Some(estimator) = &mut self.estimator else { return Ok(None) };
+        let shift = (estimator.state.time_offset * 1e9).round() as i64;
+        let time = Stamp::from_nanos(stamp.nanos().saturating_add(shift));
+        let anchor = estimator.history.anchor();
+        if time <= anchor && estimator.history.is_new() {
+            return Ok(None);
+        }
+        if time <= anchor {
+            return Err(Error::Late { what: "image", stamp: time, now: anchor });
+        }
+        if time.secs_since(estimator.history.latest().stamp) > MAX_AHEAD {
+            return Err(Error::OutOfRange { stamp: time, first: anchor, last: estimator.history.now() });
+        }
+        if at_rest {
+            estimator.stay(time, &self.settings.rest);
+            if !self.rested {
+                let guess = estimator.guess(&self.settings.landmarks);
+                estimator.loosen(self.unnoticed, &guess);
+            }
+            if let Some(window) = self.rest.take_window() {
+                estimator.weigh(&window, self.unnoticed, &self.settings.rest);
+            }
+            self.rested = true;
+            return Ok(Some(0));
+        }
+        self.rested = false;
+        let before = self.tracks.len();
+        let tracks = &mut self.tracks;
+        estimator.advance(time, |slot| {
+            tracks.swap_remove(slot);
+        });
+        Ok(Some(before - self.tracks.len()))
+    }
+
+    /// The end of every image: the divergence test, and the motion since.
+    fn conclude(&mut self, mut report: FrameReport) -> FrameReport {
+        if let Some(estimator) = &mut self.estimator {
+            let contradicted = report.rejected >= 5 && report.rejected > report.used;
+            self.contradictions = if contradicted { self.contradictions + 1 } else { 0 };
+            let too_many = self.contradictions >= self.settings.limits.contradictions;
+            let excess = estimator.excess(&self.settings.limits);
+            self.excess = self.excess.or(excess).or(too_many.then_some(Excess::Contradiction));
+            estimator.replay();
+        }
+        report.status = self.status();
+        report
+    }
+
+    /// A report on nothing.
+    fn report(&self) -> FrameReport {
+        FrameReport { status: self.status(), used: 0, rejected: 0, added: 0, removed: 0, at_rest: false }
+    }
+}

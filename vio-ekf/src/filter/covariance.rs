@@ -1,0 +1,171 @@
+use nalgebra::{Matrix3, SMatrix, SVector};
+
+/// A measurement that depends on few rows of the error state: `M` residuals, `C` rows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Measurement<const M: usize, const C: usize> {
+    /// The rows that the residual depends on.
+    pub(crate) rows: [usize; C],
+    /// `y`: measured minus predicted.
+    pub(crate) residual: SVector<f64, M>,
+    /// Derivative of the prediction by those rows.
+    pub(crate) jacobian: SMatrix<f64, M, C>,
+    /// Covariance of the measurement's noise.
+    pub(crate) noise: SMatrix<f64, M, M>,
+}
+
+/// The covariance of the error state: dense, symmetric, without gaps, in memory that is claimed once.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Covariance {
+    size: usize,
+    stride: usize,
+    values: Vec<f64>,
+}
+
+impl Covariance {
+    /// Zero, of `size` rows, with room for `capacity`.
+    pub(crate) fn new(size: usize, capacity: usize) -> Self {
+        Self { size, stride: capacity, values: vec![0.0; capacity * capacity] }
+    }
+
+    pub(crate) fn size(&self) -> usize {
+        self.size
+    }
+
+    pub(crate) fn row(&self, row: usize) -> &[f64] {
+        &self.values[row * self.stride..][..self.size]
+    }
+
+    pub(crate) fn row_mut(&mut self, row: usize) -> &mut [f64] {
+        &mut self.values[row * self.stride..][..self.size]
+    }
+
+    /// Sets a variance, and the covariances of its row to zero.
+    pub(crate) fn isolate(&mut self, row: usize, variance: f64) {
+        for other in 0..self.size {
+            self.values[row * self.stride + other] = 0.0;
+            self.values[other * self.stride + row] = 0.0;
+        }
+        self.values[row * self.stride + row] = variance;
+    }
+
+    pub(crate) fn variance(&self, row: usize) -> f64 {
+        self.values[row * self.stride + row]
+    }
+
+    pub(crate) fn inflate(&mut self, row: usize, variance: f64) {
+        self.values[row * self.stride + row] += variance;
+    }
+
+    /// Adds a multiple of another error to a row's error.
+    pub(crate) fn add_row(&mut self, row: usize, weight: f64, other: usize) {
+        for column in 0..self.size {
+            self.values[row * self.stride + column] += weight * self.values[other * self.stride + column];
+        }
+        for column in 0..self.size {
+            self.values[column * self.stride + row] += weight * self.values[column * self.stride + other];
+        }
+    }
+
+    /// Any block, from given first rows.
+    pub(crate) fn block<const R: usize, const C: usize>(&self, row: usize, column: usize) -> SMatrix<f64, R, C> {
+        SMatrix::from_fn(|r, c| self.values[(row + r) * self.stride + column + c])
+    }
+
+    /// Sets a block on the diagonal.
+    pub(crate) fn set_block3(&mut self, row: usize, block: &Matrix3<f64>) {
+        for r in 0..3 {
+            for c in 0..3 {
+                self.values[(row + r) * self.stride + row + c] = block[(r, c)];
+            }
+        }
+    }
+
+    /// Copies the lower triangle onto the upper one.
+    pub(crate) fn mirror(&mut self) {
+        for row in 1..self.size {
+            let (above, from) = self.values.split_at_mut(row * self.stride);
+            for (column, &value) in from[..row].iter().enumerate() {
+                above[column * self.stride + row] = value;
+            }
+        }
+    }
+
+    /// Appends `count` rows of zeros.
+    pub(crate) fn grow(&mut self, count: usize) {
+        let old = self.size;
+        self.size += count;
+        for row in 0..self.size {
+            let from = if row < old { old } else { 0 };
+            self.row_mut(row)[from..].fill(0.0);
+        }
+    }
+
+    /// Drops `count` rows and columns at `at`; the last `count` rows take their place. Dropping is marginalising.
+    pub(crate) fn swap_remove(&mut self, at: usize, count: usize) {
+        let last = self.size - count;
+        if at != last {
+            self.values.copy_within(last * self.stride..(last + count) * self.stride, at * self.stride);
+            for row in 0..self.size {
+                let start = row * self.stride;
+                self.values.copy_within(start + last..start + last + count, start + at);
+            }
+        }
+        self.size = last;
+    }
+
+    /// Covariance `H P Hᵀ + S` of a residual.
+    pub(crate) fn innovation<const M: usize, const C: usize>(&self, m: &Measurement<M, C>) -> SMatrix<f64, M, M> {
+        m.jacobian * self.among(&m.rows) * m.jacobian.transpose() + m.noise
+    }
+
+    /// The covariance of a few rows among themselves.
+    pub(crate) fn among<const C: usize>(&self, rows: &[usize; C]) -> SMatrix<f64, C, C> {
+        SMatrix::from_fn(|r, c| self.values[rows[r] * self.stride + rows[c]])
+    }
+
+    /// The update: `δ = P Hᵀ (H P Hᵀ + S)⁻¹ y` into `delta`, and `P ← P − P Hᵀ (H P Hᵀ + S)⁻¹ H P`.
+    ///
+    /// `scratch` needs `M` times the size. Returns false and changes nothing if the innovation covariance is not
+    /// positive definite.
+    pub(crate) fn update<const M: usize, const C: usize>(
+        &mut self,
+        m: &Measurement<M, C>,
+        delta: &mut [f64],
+        scratch: &mut [f64],
+    ) -> bool {
+        let Some(factor) = self.innovation(m).cholesky() else { return false };
+        let factor = factor.l();
+        let Some(whitened) = factor.solve_lower_triangular(&m.residual) else { return false };
+        // With S = L Lᵀ: L⁻¹ H P, row by row. P ← P − Uᵀ U is then symmetric to the last bit.
+        let Some(jacobian) = factor.solve_lower_triangular(&m.jacobian) else { return false };
+        let n = self.size;
+        for k in 0..M {
+            let u = &mut scratch[k * n..(k + 1) * n];
+            u.fill(0.0);
+            for (c, &row) in m.rows.iter().enumerate() {
+                let weight = jacobian[(k, c)];
+                for (u, p) in u.iter_mut().zip(self.row(row)) {
+                    *u += weight * p;
+                }
+            }
+        }
+        let delta = &mut delta[..n];
+        delta.fill(0.0);
+        for k in 0..M {
+            for (d, u) in delta.iter_mut().zip(&scratch[k * n..(k + 1) * n]) {
+                *d += whitened[k] * u;
+            }
+        }
+        for row in 0..n {
+            let target = &mut self.values[row * self.stride..][..n];
+            for k in 0..M {
+                let u = &scratch[k * n..(k + 1) * n];
+                let weight = u[row];
+                for (p, u) in target.iter_mut().zip(u) {
+                    *p -= weight * u;
+                }
+            }
+        }
+        true
+    }
+}

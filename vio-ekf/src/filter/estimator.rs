@@ -1,0 +1,316 @@
+use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
+
+use super::covariance::{Covariance, Measurement};
+use super::history::History;
+use super::interval::Interval;
+use super::propagate::{Workspace, propagate};
+use super::rest::{RestSettings, Window};
+use super::settings::{LandmarkSettings, LimitSettings, Settings};
+use super::start::Start;
+use super::state::{Landmark, State, at};
+use super::{Excess, Odometry, bearing::Bearing};
+use crate::{Camera, Imu, ImuNoise, Stamp};
+
+/// Most residuals of one update.
+const MAX_RESIDUALS: usize = 3;
+
+/// A landmark whose inverse distance has a smaller relative deviation tells how far away new ones may be; 0.3 as in ROVIO.
+const WELL_KNOWN: f64 = 0.3;
+/// As many are needed for their median to mean something.
+const ENOUGH_KNOWN: usize = 3;
+
+/// State and covariance at an anchor, the time of the last image, and the motion from there until now.
+///
+/// Nothing here knows what a pixel is: measurements come as residuals and derivatives.
+#[derive(Debug, Clone)]
+pub(crate) struct Estimator {
+    pub(crate) state: State,
+    pub(crate) covariance: Covariance,
+    pub(crate) history: History,
+    /// From the anchor until now.
+    since: Interval,
+    noise: ImuNoise,
+    gravity: f64,
+    /// Rate of the body at the anchor.
+    pub(crate) rate: Vector3<f64>,
+    /// Inverse distance of new landmarks while no other is known well, if it is not that of the settings.
+    expected: Option<f64>,
+    work: Workspace,
+    delta: Vec<f64>,
+    scratch: Vec<f64>,
+}
+
+impl Estimator {
+    pub(crate) fn new(camera: &Camera, noise: ImuNoise, settings: &Settings, start: &Start, sample: Imu) -> Self {
+        let capacity = at::landmark(settings.features);
+        let state = State {
+            position: start.world_from_body.translation.vector,
+            velocity: start.velocity_in_body,
+            attitude: start.world_from_body.rotation,
+            gyro_bias: start.gyro_bias,
+            accel_bias: start.accel_bias,
+            camera_position: camera.body_from_camera.translation.vector,
+            camera_attitude: camera.body_from_camera.rotation,
+            time_offset: settings.calibration.time_offset_s,
+            landmarks: Vec::with_capacity(settings.features),
+        };
+        let mut covariance = Covariance::new(at::HEAD, capacity);
+        let (sigma, calibration) = (&start.sigma, &settings.calibration);
+        for (row, sigma) in [
+            (at::POSITION, [sigma.position; 3]),
+            (at::VELOCITY, [sigma.velocity; 3]),
+            (at::ATTITUDE, [sigma.tilt, sigma.tilt, sigma.yaw]),
+            (at::GYRO_BIAS, [sigma.gyro_bias; 3]),
+            (at::ACCEL_BIAS, [sigma.accel_bias; 3]),
+            (at::CAMERA_POSITION, [calibration.camera_position_sigma_m; 3]),
+            (at::CAMERA_ATTITUDE, [calibration.camera_attitude_sigma; 3]),
+        ] {
+            covariance.set_block3(row, &Matrix3::from_diagonal(&Vector3::from(sigma.map(|s| s * s))));
+        }
+        covariance.isolate(at::TIME_OFFSET, calibration.time_offset_sigma_s * calibration.time_offset_sigma_s);
+        Self {
+            rate: sample.gyro - state.gyro_bias,
+            history: History::new(sample, start.stamp, settings.history_samples),
+            since: Interval::default(),
+            noise,
+            gravity: settings.gravity,
+            expected: None,
+            work: Workspace::new(capacity),
+            delta: vec![0.0; capacity],
+            scratch: vec![0.0; capacity * MAX_RESIDUALS],
+            state,
+            covariance,
+        }
+    }
+
+    fn biases(&self) -> [Vector3<f64>; 2] {
+        [self.state.gyro_bias, self.state.accel_bias]
+    }
+
+    /// Takes one more sample; its stamp must be after all others.
+    pub(crate) fn imu(&mut self, sample: Imu) {
+        let biases = self.biases();
+        self.history.push(sample);
+        self.history.extend_to_latest(&mut self.since, &biases, &self.noise);
+    }
+
+    /// Moves the anchor to a later time; `dropped` is told the slots of landmarks that are lost on the way.
+    pub(crate) fn advance(&mut self, until: Stamp, dropped: impl FnMut(usize)) {
+        let interval = self.history.integrate(until, &self.biases(), &self.noise);
+        let step = interval.step(&self.state, self.gravity);
+        propagate(&mut self.state, &mut self.covariance, &step, &mut self.work, dropped);
+        self.history.advance(until);
+        self.rate = self.history.rate_at_anchor() - self.state.gyro_bias;
+    }
+
+    /// Moves the anchor to a later time without any motion: what the samples read is then bias and gravity.
+    pub(crate) fn stay(&mut self, until: Stamp, rest: &RestSettings) {
+        let elapsed = until.secs_since(self.history.anchor());
+        let walks = [(at::GYRO_BIAS, self.noise.gyro_walk), (at::ACCEL_BIAS, self.noise.accel_walk)];
+        for (row, walk) in walks.into_iter().flat_map(|(row, walk)| (row..row + 3).map(move |row| (row, walk))) {
+            self.covariance.inflate(row, walk * walk * elapsed);
+        }
+        self.history.advance(until);
+        // Nothing moves; what the correlations say about the velocity does not matter.
+        self.state.velocity = Vector3::zeros();
+        for row in at::VELOCITY..at::VELOCITY + 3 {
+            self.covariance.isolate(row, rest.velocity_sigma * rest.velocity_sigma);
+        }
+        self.rate = Vector3::zeros();
+    }
+
+    /// Admits a small motion, an angle, that went unnoticed before the body was found to be at rest.
+    pub(crate) fn loosen(&mut self, angle: f64, guess: &Guess) {
+        let variance = angle * angle;
+        self.diffuse(variance);
+        for axis in 0..3 {
+            self.covariance.inflate(at::ATTITUDE + axis, variance);
+            self.covariance.inflate(at::POSITION + axis, variance / guess.inverse_distance.powi(2));
+        }
+    }
+
+    /// Measures biases and tilt by the mean rate and force of a body at rest; `angle` may have gone unnoticed meanwhile.
+    pub(crate) fn weigh(&mut self, window: &Window, angle: f64, rest: &RestSettings) {
+        let white = |density: f64| density * density / window.duration;
+        let noise = (angle / window.duration).powi(2) + white(self.noise.gyro_density);
+        let rows = [at::GYRO_BIAS, at::GYRO_BIAS + 1, at::GYRO_BIAS + 2];
+        let (residual, jacobian) = (window.rate - self.state.gyro_bias, Matrix3::identity());
+        self.update(&Measurement { rows, residual, jacobian, noise: Matrix3::identity() * noise });
+
+        let up = Vector3::new(0.0, 0.0, self.gravity);
+        let body_from_world = self.state.attitude.inverse();
+        let mut jacobian = SMatrix::<f64, 3, 6>::zeros();
+        // d(Rᵀ a)/dθ = Rᵀ hat(a) for the world-side error.
+        let tilt = body_from_world.to_rotation_matrix().into_inner() * up.cross_matrix();
+        jacobian.fixed_columns_mut::<3>(0).copy_from(&tilt);
+        jacobian.fixed_columns_mut::<3>(3).fill_with_identity();
+        let rows = std::array::from_fn(|k| if k < 3 { at::ATTITUDE + k } else { at::ACCEL_BIAS + k - 3 });
+        let residual = window.force - body_from_world * up - self.state.accel_bias;
+        let noise = Matrix3::identity() * (rest.force_sigma.powi(2) + white(self.noise.accel_density));
+        self.update(&Measurement { rows, residual, jacobian, noise });
+    }
+
+    /// The first of the limits that the state exceeds.
+    pub(crate) fn excess(&self, limits: &LimitSettings) -> Option<Excess> {
+        let state = &self.state;
+        let velocity = (at::VELOCITY..at::VELOCITY + 3).map(|row| self.covariance.variance(row)).fold(0.0, f64::max);
+        // NaN is beyond all limits.
+        let beyond = |value: f64, limit: f64| value.is_nan() || value > limit;
+        if beyond(state.velocity.norm(), limits.speed) {
+            Some(Excess::Speed)
+        } else if beyond(state.gyro_bias.norm(), limits.gyro_bias) || beyond(state.accel_bias.norm(), limits.accel_bias)
+        {
+            Some(Excess::Bias)
+        } else if beyond(velocity, limits.velocity_sigma * limits.velocity_sigma) {
+            Some(Excess::Uncertainty)
+        } else if !state.position.norm_squared().is_finite() {
+            Some(Excess::Speed)
+        } else {
+            None
+        }
+    }
+
+    /// Brings the motion since the anchor up to date with a changed state or anchor.
+    pub(crate) fn replay(&mut self) {
+        let until = self.history.now();
+        self.since = self.history.integrate(until, &self.biases(), &self.noise);
+    }
+
+    /// The Kalman update of the whole state. False, and nothing changed, if the numbers do not allow it.
+    pub(crate) fn update<const M: usize, const C: usize>(&mut self, measurement: &Measurement<M, C>) -> bool {
+        if !self.covariance.update(measurement, &mut self.delta, &mut self.scratch) {
+            return false;
+        }
+        self.state.correct(&self.delta[..self.covariance.size()]);
+        true
+    }
+
+    /// Adds a landmark seen in the current image; there must be room.
+    pub(crate) fn add(&mut self, bearing: Bearing, warp: Matrix2<f64>, guess: &Guess) {
+        let landmark = Landmark { bearing, inverse_distance: guess.inverse_distance, warp };
+        let row = self.covariance.size();
+        self.state.landmarks.push(landmark);
+        self.covariance.grow(at::LANDMARK);
+        self.enter_bearing(row, &landmark, &guess.bearing);
+        self.covariance.inflate(row + 2, guess.distance_variance);
+    }
+
+    /// Makes a landmark's bearing that of another point, seen in the current image exactly where the old one is believed
+    /// to be, and as far away.
+    pub(crate) fn renew(&mut self, slot: usize, warp: Matrix2<f64>, bearing: &Matrix2<f64>) {
+        let row = at::landmark(slot);
+        self.state.landmarks[slot].warp = warp;
+        self.covariance.isolate(row, 0.0);
+        self.covariance.isolate(row + 1, 0.0);
+        self.enter_bearing(row, &self.state.landmarks[slot].clone(), bearing);
+    }
+
+    /// The covariance of a bearing that is new. Seen at the true time of the exposure but entered at the assumed one, it
+    /// inherits the clock's error.
+    fn enter_bearing(&mut self, row: usize, landmark: &Landmark, bearing: &Matrix2<f64>) {
+        let rate = self.tangent_rate(landmark);
+        for k in 0..2 {
+            if self.covariance.variance(at::TIME_OFFSET) > 0.0 {
+                self.covariance.add_row(row + k, -rate[k], at::TIME_OFFSET);
+            }
+        }
+        for (r, c) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            self.covariance.row_mut(row + r)[row + c] += bearing[(r, c)];
+        }
+    }
+
+    /// Drops a landmark; the last one takes its slot.
+    pub(crate) fn remove(&mut self, slot: usize) {
+        self.state.landmarks.swap_remove(slot);
+        self.covariance.swap_remove(at::landmark(slot), at::LANDMARK);
+    }
+
+    /// Velocity of a landmark's bearing in tangent coordinates, rad/s: `Nᵀ(−ω_c − ρ μ × v_c)`.
+    pub(crate) fn tangent_rate(&self, landmark: &Landmark) -> Vector2<f64> {
+        let state = &self.state;
+        let camera_from_body = state.camera_attitude.inverse();
+        let rate = camera_from_body * self.rate;
+        let velocity = camera_from_body * (state.velocity + self.rate.cross(&state.camera_position));
+        let direction = landmark.bearing.direction();
+        landmark.bearing.basis().transpose() * (-rate - direction.cross(&velocity) * landmark.inverse_distance)
+    }
+
+    /// What to assume of a new landmark: as far away as those that are known well, if there are enough of them.
+    pub(crate) fn guess(&mut self, settings: &LandmarkSettings) -> Guess {
+        let sorted = &mut self.scratch;
+        let mut known = 0;
+        for (slot, landmark) in self.state.landmarks.iter().enumerate() {
+            let deviation = self.covariance.variance(at::landmark(slot) + 2).sqrt();
+            if deviation < WELL_KNOWN * landmark.inverse_distance {
+                sorted[known] = landmark.inverse_distance;
+                known += 1;
+            }
+        }
+        let mut inverse_distance = self.expected.unwrap_or(settings.inverse_distance);
+        if known >= ENOUGH_KNOWN {
+            let (_, median, _) = sorted[..known].select_nth_unstable_by(known / 2, f64::total_cmp);
+            inverse_distance = *median;
+        }
+        let deviation = settings.inverse_distance_sigma * inverse_distance;
+        Guess { inverse_distance, distance_variance: deviation * deviation, bearing: Matrix2::zeros() }
+    }
+
+    /// Says how far away the first landmarks will be.
+    pub(crate) fn expect(&mut self, inverse_distance: f64) {
+        self.expected = Some(inverse_distance);
+    }
+
+    /// Moves the anchor into the middle of the samples, to make room for more.
+    pub(crate) fn forget(&mut self, dropped: impl FnMut(usize)) {
+        self.advance(self.history.middle(), dropped);
+        self.replay();
+    }
+
+    /// Lets all bearings become less certain, rad² per axis.
+    pub(crate) fn diffuse(&mut self, variance: f64) {
+        for row in (at::HEAD..self.covariance.size()).step_by(at::LANDMARK) {
+            self.covariance.inflate(row, variance);
+            self.covariance.inflate(row + 1, variance);
+        }
+    }
+
+    /// The estimate now, with covariance.
+    pub(crate) fn odometry(&self) -> Odometry {
+        let step = self.since.step(&self.state, self.gravity);
+        let prior = self.covariance.block::<{ at::CORE }, { at::CORE }>(0, 0);
+        let noise = step.noise.fixed_view::<{ at::CORE }, { at::CORE }>(0, 0);
+        let covariance = step.transition * prior * step.transition.transpose() + noise;
+        Odometry {
+            stamp: self.history.now(),
+            world_from_body: step.end(&self.state.position, &self.state.attitude),
+            velocity_in_body: step.velocity,
+            rate_in_body: self.history.latest().gyro - self.state.gyro_bias,
+            gyro_bias: self.state.gyro_bias,
+            accel_bias: self.state.accel_bias,
+            covariance: (covariance + covariance.transpose()) * 0.5,
+        }
+    }
+}
+
+/// What is assumed of a landmark that is new.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Guess {
+    pub(crate) inverse_distance: f64,
+    pub(crate) distance_variance: f64,
+    /// Covariance of the tangent coordinates.
+    pub(crate) bearing: Matrix2<f64>,
+}
+
+/// Covariance of the core, 15 rows; their order is that of [`Odometry::covariance`].
+pub type CoreCovariance = SMatrix<f64, { at::CORE }, { at::CORE }>;
+
+/// Rows of a landmark's bearing and of the time offset.
+pub(crate) fn bearing_rows(slot: usize) -> [usize; 3] {
+    let row = at::landmark(slot);
+    [row, row + 1, at::TIME_OFFSET]
+}
+
+/// The part of a trial step that belongs to a landmark's bearing.
+pub(crate) fn bearing_part(delta: &SVector<f64, 3>) -> Vector2<f64> {
+    Vector2::new(delta[0], delta[1])
+}

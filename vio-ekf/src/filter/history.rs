@@ -1,0 +1,135 @@
+use std::collections::VecDeque;
+
+use nalgebra::Vector3;
+
+use super::interval::Interval;
+use crate::{Imu, ImuNoise, Stamp};
+
+/// The inertial samples since the anchor, so that an image that arrives late is used at its own time.
+#[derive(Debug, Clone)]
+pub(crate) struct History {
+    /// Begins with the last sample at or before the anchor.
+    samples: VecDeque<Imu>,
+    capacity: usize,
+    anchor: Stamp,
+    started: Stamp,
+}
+
+impl History {
+    /// Anchored at a sample.
+    pub(crate) fn new(sample: Imu, anchor: Stamp, capacity: usize) -> Self {
+        let mut samples = VecDeque::with_capacity(capacity);
+        samples.push_back(sample);
+        Self { samples, capacity, anchor, started: anchor }
+    }
+
+    /// Time of the anchor.
+    pub(crate) fn anchor(&self) -> Stamp {
+        self.anchor
+    }
+
+    /// Whether the anchor is still where it started.
+    pub(crate) fn is_new(&self) -> bool {
+        self.anchor == self.started
+    }
+
+    /// The latest time that is known of: of the last sample, or of an anchor after it.
+    pub(crate) fn now(&self) -> Stamp {
+        self.latest().stamp.max(self.anchor)
+    }
+
+    pub(crate) fn latest(&self) -> &Imu {
+        &self.samples[self.samples.len() - 1]
+    }
+
+    /// The last sample not after a time, or the first one.
+    pub(crate) fn before(&self, stamp: Stamp) -> Imu {
+        let after = self.samples.partition_point(|sample| sample.stamp <= stamp);
+        self.samples[after.saturating_sub(1)]
+    }
+
+    /// The samples after a time.
+    pub(crate) fn after(&self, stamp: Stamp) -> impl Iterator<Item = &Imu> {
+        self.samples.iter().filter(move |sample| sample.stamp > stamp)
+    }
+
+    /// Whether another sample would need more memory.
+    pub(crate) fn is_full(&self) -> bool {
+        self.samples.len() >= self.capacity
+    }
+
+    /// Time of the sample in the middle, which is after the anchor if there are three or more.
+    pub(crate) fn middle(&self) -> Stamp {
+        self.samples[self.samples.len() / 2].stamp.max(self.anchor)
+    }
+
+    pub(crate) fn push(&mut self, sample: Imu) {
+        self.samples.push_back(sample);
+    }
+
+    /// Moves the anchor forward and forgets what is before it.
+    pub(crate) fn advance(&mut self, anchor: Stamp) {
+        self.anchor = anchor;
+        while self.samples.len() > 1 && self.samples[1].stamp <= anchor {
+            self.samples.pop_front();
+        }
+    }
+
+    /// Rate read at the anchor.
+    pub(crate) fn rate_at_anchor(&self) -> Vector3<f64> {
+        let before = &self.samples[0];
+        match self.samples.get(1) {
+            Some(after) if self.anchor > before.stamp => {
+                let gap = after.stamp.secs_since(before.stamp);
+                before.gyro + (after.gyro - before.gyro) * (self.anchor.secs_since(before.stamp) / gap)
+            }
+            _ => before.gyro,
+        }
+    }
+
+    /// Motion from the anchor until a time. Between samples rate and force are linear; after the last one they stay.
+    pub(crate) fn integrate(&self, until: Stamp, biases: &[Vector3<f64>; 2], noise: &ImuNoise) -> Interval {
+        let mut interval = Interval::default();
+        let mut from = self.anchor;
+        for (before, after) in self.samples.iter().zip(self.samples.iter().skip(1)) {
+            let to = after.stamp.min(until);
+            if to > from {
+                extend(&mut interval, before, after, (from, to), biases, noise);
+                from = to;
+            }
+        }
+        if until > from {
+            let last = self.latest();
+            extend(&mut interval, last, last, (from, until), biases, noise);
+        }
+        interval
+    }
+
+    /// Goes on with an interval that reaches until the last sample but one.
+    pub(crate) fn extend_to_latest(&self, interval: &mut Interval, biases: &[Vector3<f64>; 2], noise: &ImuNoise) {
+        let count = self.samples.len();
+        let (before, after) = (&self.samples[count.saturating_sub(2)], &self.samples[count - 1]);
+        let from = before.stamp.max(self.anchor);
+        if after.stamp > from {
+            extend(interval, before, after, (from, after.stamp), biases, noise);
+        }
+    }
+}
+
+/// Over a part of the time between two samples, or after them if they are the same.
+fn extend(
+    interval: &mut Interval,
+    before: &Imu,
+    after: &Imu,
+    (from, to): (Stamp, Stamp),
+    [gyro_bias, accel_bias]: &[Vector3<f64>; 2],
+    noise: &ImuNoise,
+) {
+    let gap = after.stamp.secs_since(before.stamp);
+    let dt = to.secs_since(from);
+    let fraction = if gap > 0.0 { (from.secs_since(before.stamp) + 0.5 * dt) / gap } else { 0.0 };
+    let mean = |a: &Vector3<f64>, b: &Vector3<f64>, bias: &Vector3<f64>| a + (b - a) * fraction - bias;
+    let rate = mean(&before.gyro, &after.gyro, gyro_bias);
+    let force = mean(&before.accel, &after.accel, accel_bias);
+    interval.extend(&rate, &force, dt, noise);
+}

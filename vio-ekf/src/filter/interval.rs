@@ -1,0 +1,199 @@
+use nalgebra::{Isometry3, Matrix3, SMatrix, Translation3, UnitQuaternion, Vector3};
+
+use super::state::{State, at};
+use crate::{ImuNoise, so3};
+
+/// Rows of the relative motion: rotation, velocity, position.
+const MOTION: usize = 9;
+
+/// What the inertial sensor says about the motion since an anchor, whatever the state at the anchor was.
+///
+/// In the body axes of the anchor, with biases removed: rotation `γ`, velocity `β` and position `α` without the part of
+/// gravity and of the initial velocity. Their errors are `(φ, δβ, δα)`, the rotation's on the side of the anchor. This is
+/// the pre-integration of Forster et al. 2017 with the error of the rotation on the other side.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Interval {
+    pub(crate) duration: f64,
+    pub(crate) rotation: UnitQuaternion<f64>,
+    pub(super) velocity: Vector3<f64>,
+    pub(super) position: Vector3<f64>,
+    /// By the biases of gyroscope and accelerometer.
+    pub(super) bias_jacobian: SMatrix<f64, MOTION, 6>,
+    /// Of the motion's errors, from noise since the anchor.
+    covariance: SMatrix<f64, MOTION, MOTION>,
+    /// Between the motion's errors and the walk of the biases since the anchor.
+    walk_covariance: SMatrix<f64, MOTION, 6>,
+    /// Variances of that walk, gyroscope and accelerometer.
+    walk: [f64; 2],
+}
+
+impl Default for Interval {
+    fn default() -> Self {
+        Self {
+            duration: 0.0,
+            rotation: UnitQuaternion::identity(),
+            velocity: Vector3::zeros(),
+            position: Vector3::zeros(),
+            bias_jacobian: SMatrix::zeros(),
+            covariance: SMatrix::zeros(),
+            walk_covariance: SMatrix::zeros(),
+            walk: [0.0; 2],
+        }
+    }
+}
+
+/// The state's motion over an interval: the nominal end, and how the errors get there.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Step {
+    /// Position and attitude of the body's end in the axes of its start.
+    pub(crate) start_from_end: (Vector3<f64>, UnitQuaternion<f64>),
+    /// Velocity at the end, in the body axes of the end.
+    pub(crate) velocity: Vector3<f64>,
+    /// Core errors at the end by core errors at the start.
+    pub(crate) transition: SMatrix<f64, { at::CORE }, { at::CORE }>,
+    /// Errors of `start_from_end` (position, rotation on the start's side) by core errors at the start.
+    pub(crate) motion: SMatrix<f64, 6, { at::CORE }>,
+    /// Covariance of the noise of the core at the end and of `start_from_end`, in this order.
+    pub(crate) noise: SMatrix<f64, { at::CORE + 6 }, { at::CORE + 6 }>,
+}
+
+impl Interval {
+    /// Goes on by `dt` seconds with the mean rate and specific force of that time, biases removed.
+    pub(crate) fn extend(&mut self, rate: &Vector3<f64>, force: &Vector3<f64>, dt: f64, noise: &ImuNoise) {
+        let middle = (self.rotation * so3::exp(&(rate * (0.5 * dt)))).to_rotation_matrix().into_inner();
+        let acceleration = middle * force;
+
+        // Bias errors act like the opposite input over the whole step.
+        let mut by_bias = SMatrix::<f64, MOTION, 6>::zeros();
+        let turned = acceleration.cross_matrix() * middle;
+        by_bias.fixed_view_mut::<3, 3>(0, 0).copy_from(&(middle * -dt));
+        by_bias.fixed_view_mut::<3, 3>(3, 0).copy_from(&(turned * (0.5 * dt * dt)));
+        by_bias.fixed_view_mut::<3, 3>(6, 0).copy_from(&(turned * (0.25 * dt * dt * dt)));
+        by_bias.fixed_view_mut::<3, 3>(3, 3).copy_from(&(middle * -dt));
+        by_bias.fixed_view_mut::<3, 3>(6, 3).copy_from(&(middle * (-0.5 * dt * dt)));
+
+        advance(&mut self.bias_jacobian, &acceleration, dt);
+        self.bias_jacobian += by_bias;
+
+        // Within the step the walk is negligible against the white noise: it acts from the next one on.
+        advance(&mut self.covariance, &acceleration, dt);
+        self.covariance = self.covariance.transpose();
+        advance(&mut self.covariance, &acceleration, dt);
+        advance(&mut self.walk_covariance, &acceleration, dt);
+        let [gyro, accel] = [noise.gyro_density, noise.accel_density].map(|density| density * density / dt);
+        let mut driven = by_bias;
+        scale(&mut driven, [0.5 * (gyro + self.walk[0]), 0.5 * (accel + self.walk[1])]);
+        let cross = (self.walk_covariance + driven) * by_bias.transpose();
+        self.covariance += cross + cross.transpose();
+        let mut walked = by_bias;
+        scale(&mut walked, self.walk);
+        self.walk_covariance += walked;
+        self.walk[0] += noise.gyro_walk * noise.gyro_walk * dt;
+        self.walk[1] += noise.accel_walk * noise.accel_walk * dt;
+
+        self.position += self.velocity * dt + acceleration * (0.5 * dt * dt);
+        self.velocity += acceleration * dt;
+        self.rotation = UnitQuaternion::new_normalize((self.rotation * so3::exp(&(rate * dt))).into_inner());
+        self.duration += dt;
+    }
+
+    /// The same motion with other biases, to first order.
+    pub(crate) fn step(&self, state: &State, gravity: f64) -> Step {
+        let start_from_world = state.attitude.inverse();
+        let (time, half) = (self.duration, 0.5 * self.duration * self.duration);
+        let down = start_from_world * Vector3::new(0.0, 0.0, -gravity);
+        let moved = state.velocity * time + down * half + self.position;
+        let velocity_in_start = state.velocity + down * time + self.velocity;
+        let end_from_start = self.rotation.inverse().to_rotation_matrix().into_inner();
+        let world_from_start = state.attitude.to_rotation_matrix().into_inner();
+
+        // d(Rᵀ g)/dθ = Rᵀ hat(g) for the world-side error.
+        let tilt = world_from_start.transpose() * Vector3::new(0.0, 0.0, -gravity).cross_matrix();
+        // Errors of rotation, velocity and position in the start's axes, by the core errors at the start.
+        let mut relative = SMatrix::<f64, MOTION, { at::CORE }>::zeros();
+        relative.fixed_view_mut::<MOTION, 6>(0, at::GYRO_BIAS).copy_from(&self.bias_jacobian);
+        relative.fixed_view_mut::<3, 3>(3, at::VELOCITY).fill_with_identity();
+        relative.fixed_view_mut::<3, 3>(3, at::ATTITUDE).copy_from(&(tilt * time));
+        relative.fixed_view_mut::<3, 3>(6, at::VELOCITY).fill_diagonal(time);
+        relative.fixed_view_mut::<3, 3>(6, at::ATTITUDE).copy_from(&(tilt * half));
+
+        // From there to the core at the end.
+        let mut compose = SMatrix::<f64, { at::CORE }, MOTION>::zeros();
+        compose.fixed_view_mut::<3, 3>(at::POSITION, 6).copy_from(&world_from_start);
+        compose.fixed_view_mut::<3, 3>(at::VELOCITY, 3).copy_from(&end_from_start);
+        let swing: Matrix3<f64> = end_from_start * velocity_in_start.cross_matrix();
+        compose.fixed_view_mut::<3, 3>(at::VELOCITY, 0).copy_from(&swing);
+        compose.fixed_view_mut::<3, 3>(at::ATTITUDE, 0).copy_from(&world_from_start);
+
+        let mut transition = compose * relative;
+        for row in [at::POSITION, at::ATTITUDE, at::GYRO_BIAS, at::ACCEL_BIAS] {
+            for k in row..row + 3 {
+                transition[(k, k)] += 1.0;
+            }
+        }
+        let lever = (world_from_start * moved).cross_matrix();
+        let mut corner = transition.fixed_view_mut::<3, 3>(at::POSITION, at::ATTITUDE);
+        corner -= lever;
+
+        let mut motion = SMatrix::<f64, 6, { at::CORE }>::zeros();
+        motion.fixed_rows_mut::<3>(0).copy_from(&relative.fixed_rows::<3>(6));
+        motion.fixed_rows_mut::<3>(3).copy_from(&relative.fixed_rows::<3>(0));
+
+        Step {
+            start_from_end: (moved, self.rotation),
+            velocity: end_from_start * velocity_in_start,
+            transition,
+            motion,
+            noise: self.noise(&compose),
+        }
+    }
+
+    /// Noise of the core and of the motion, from the noise of the relative motion and the walk.
+    fn noise(&self, compose: &SMatrix<f64, { at::CORE }, MOTION>) -> SMatrix<f64, { at::CORE + 6 }, { at::CORE + 6 }> {
+        let mut all = SMatrix::<f64, { at::CORE + 6 }, MOTION>::zeros();
+        all.fixed_rows_mut::<{ at::CORE }>(0).copy_from(compose);
+        for k in 0..3 {
+            all[(at::CORE + k, 6 + k)] = 1.0;
+            all[(at::CORE + 3 + k, k)] = 1.0;
+        }
+        let mut noise = all * self.covariance * all.transpose();
+        let walked = all * self.walk_covariance;
+        let mut columns = noise.fixed_columns_mut::<6>(at::GYRO_BIAS);
+        columns += walked;
+        let mut rows = noise.fixed_rows_mut::<6>(at::GYRO_BIAS);
+        rows += walked.transpose();
+        for k in 0..3 {
+            noise[(at::GYRO_BIAS + k, at::GYRO_BIAS + k)] += self.walk[0];
+            noise[(at::ACCEL_BIAS + k, at::ACCEL_BIAS + k)] += self.walk[1];
+        }
+        noise
+    }
+}
+
+impl Step {
+    /// Position and attitude at the end, from those at the start.
+    pub(crate) fn end(&self, position: &Vector3<f64>, attitude: &UnitQuaternion<f64>) -> Isometry3<f64> {
+        let (moved, rotation) = self.start_from_end;
+        let end = UnitQuaternion::new_normalize((attitude * rotation).into_inner());
+        Isometry3::from_parts(Translation3::from(position + attitude * moved), end)
+    }
+}
+
+/// The transition of the relative motion's errors over one step, applied to columns of such errors.
+fn advance<const C: usize>(columns: &mut SMatrix<f64, MOTION, C>, acceleration: &Vector3<f64>, dt: f64) {
+    for mut column in columns.column_iter_mut() {
+        let turned = acceleration.cross(&Vector3::new(column[0], column[1], column[2])) * dt;
+        for k in 0..3 {
+            column[6 + k] += (column[3 + k] - 0.5 * turned[k]) * dt;
+            column[3 + k] -= turned[k];
+        }
+    }
+}
+
+/// The columns of the gyroscope and of the accelerometer, each times its factor.
+fn scale(columns: &mut SMatrix<f64, MOTION, 6>, [gyro, accel]: [f64; 2]) {
+    let mut first = columns.fixed_columns_mut::<3>(0);
+    first *= gyro;
+    let mut second = columns.fixed_columns_mut::<3>(3);
+    second *= accel;
+}

@@ -1,0 +1,95 @@
+use nalgebra::{Matrix2x3, Matrix3, SMatrix, Unit, UnitQuaternion, Vector2, Vector3};
+
+use super::state::{Landmark, State};
+
+/// Motion of the camera between two of its poses, and how it depends on the body's motion and on the calibration.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct CameraMotion {
+    /// Attitude of the old camera axes in the new ones.
+    rotation: UnitQuaternion<f64>,
+    matrix: Matrix3<f64>,
+    /// Position of the old camera in the new axes.
+    translation: Vector3<f64>,
+    /// Errors `(ψ, τ)` of rotation (on the side of the new camera) and translation, by the errors of the body's motion
+    /// (position, rotation on the start's side).
+    pub(crate) by_motion: SMatrix<f64, 6, 6>,
+    /// The same by the errors of the camera's position and attitude on the body.
+    pub(crate) by_calibration: SMatrix<f64, 6, 6>,
+}
+
+/// How a landmark's error moves: `by_motion · (ψ, τ) + by_itself · e`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LandmarkTransition {
+    pub(crate) by_motion: SMatrix<f64, 3, 6>,
+    pub(crate) by_itself: Matrix3<f64>,
+    /// Second derivative of the bearing by the inverse distance and the camera's translation.
+    pub(crate) mixed: Matrix2x3<f64>,
+    /// Second derivative of the bearing by the inverse distance.
+    pub(crate) bent: Vector2<f64>,
+}
+
+impl CameraMotion {
+    /// From the pose of the body's end in the axes of its start.
+    pub(crate) fn new(state: &State, start_from_end: &(Vector3<f64>, UnitQuaternion<f64>)) -> Self {
+        let (moved, turn) = start_from_end;
+        let (lever, camera) = (state.camera_position, state.camera_attitude);
+        let camera_from_body = camera.inverse().to_rotation_matrix().into_inner();
+        let end_from_start = turn.inverse().to_rotation_matrix().into_inner();
+        let new_from_start = camera_from_body * end_from_start;
+        let swung = end_from_start * (lever - moved);
+        let rotation = camera.inverse() * turn.inverse() * camera;
+
+        let mut by_motion = SMatrix::<f64, 6, 6>::zeros();
+        by_motion.fixed_view_mut::<3, 3>(0, 3).copy_from(&-new_from_start);
+        by_motion.fixed_view_mut::<3, 3>(3, 0).copy_from(&-new_from_start);
+        by_motion.fixed_view_mut::<3, 3>(3, 3).copy_from(&(new_from_start * (lever - moved).cross_matrix()));
+        let mut by_calibration = SMatrix::<f64, 6, 6>::zeros();
+        let changed = new_from_start - camera_from_body;
+        by_calibration.fixed_view_mut::<3, 3>(0, 3).copy_from(&changed);
+        by_calibration.fixed_view_mut::<3, 3>(3, 0).copy_from(&changed);
+        by_calibration.fixed_view_mut::<3, 3>(3, 3).copy_from(&(camera_from_body * (swung - lever).cross_matrix()));
+        Self {
+            rotation,
+            matrix: rotation.to_rotation_matrix().into_inner(),
+            translation: camera_from_body * (swung - lever),
+            by_motion,
+            by_calibration,
+        }
+    }
+
+    /// The landmark seen from the new camera; the point itself stays where it is. `None` for a point that the camera
+    /// has run into.
+    pub(crate) fn carry(&self, landmark: &Landmark) -> Option<(Landmark, LandmarkTransition)> {
+        let old = landmark.bearing.direction();
+        let turned = self.matrix * old;
+        let scaled = turned + self.translation * landmark.inverse_distance;
+        let (direction, length) = Unit::new_and_get(scaled);
+        // Closer than a hundredth of its distance: rounding, and more, would decide where it is.
+        if length.is_nan() || length < 0.01 {
+            return None;
+        }
+        let bearing = landmark.bearing.transported(&self.rotation, &direction);
+        let tangent = bearing.coordinates() / length;
+        let radial = direction.transpose() * (-landmark.inverse_distance / (length * length));
+
+        let by_rotation = -turned.cross_matrix();
+        let mut by_motion = SMatrix::<f64, 3, 6>::zeros();
+        by_motion.fixed_view_mut::<2, 3>(0, 0).copy_from(&(tangent * by_rotation));
+        by_motion.fixed_view_mut::<2, 3>(0, 3).copy_from(&(tangent * landmark.inverse_distance));
+        by_motion.fixed_view_mut::<1, 3>(2, 0).copy_from(&(radial * by_rotation));
+        by_motion.fixed_view_mut::<1, 3>(2, 3).copy_from(&(radial * landmark.inverse_distance));
+        let by_bearing = self.matrix * landmark.bearing.differential();
+        let mut by_itself = Matrix3::zeros();
+        let own = tangent * by_bearing;
+        by_itself.fixed_view_mut::<2, 2>(0, 0).copy_from(&own);
+        let own_by_distance = tangent * self.translation;
+        by_itself.fixed_view_mut::<2, 1>(0, 2).copy_from(&own_by_distance);
+        by_itself.fixed_view_mut::<1, 2>(2, 0).copy_from(&(radial * by_bearing));
+        by_itself[(2, 2)] = (radial * self.translation)[0] + 1.0 / length;
+
+        let bent = own_by_distance * (-2.0 * direction.dot(&self.translation) / length);
+        let carried =
+            Landmark { bearing, inverse_distance: landmark.inverse_distance / length, warp: own * landmark.warp };
+        Some((carried, LandmarkTransition { by_motion, by_itself, mixed: tangent, bent }))
+    }
+}

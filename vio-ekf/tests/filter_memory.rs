@@ -1,0 +1,72 @@
+//! After the start the filter claims no memory: neither for a sample, nor for an image, nor for new landmarks.
+
+// A global allocator can only be written with unsafe code; this one counts and passes on.
+#![allow(unsafe_code, reason = "counting allocations needs a global allocator")]
+#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
+
+mod support;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use support::flight::Flight;
+use vio_ekf::{ImageView, Settings, Stamp, StartSigma, Vio};
+
+struct Counting;
+
+static COUNT: AtomicUsize = AtomicUsize::new(0);
+
+// SAFETY: every call is passed on unchanged to the system's allocator.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller's promises are those that `System` asks for.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations(mut job: impl FnMut()) -> usize {
+    let before = COUNT.load(Ordering::Relaxed);
+    job();
+    COUNT.load(Ordering::Relaxed) - before
+}
+
+#[test]
+fn nothing_is_allocated_after_the_start() {
+    let mut flight = Flight::new(1, 4.0);
+    let start = flight.drawn_start(StartSigma::default());
+    let mut vio = Vio::new(flight.camera, flight.noise, Settings::default()).unwrap();
+    let mut picture = vec![0_u8; 752 * 480];
+    for (k, pixel) in picture.iter_mut().enumerate() {
+        *pixel = if (k % 752 / 24 + k / 752 / 24) % 2 == 0 { 50 } else { 180 };
+    }
+    for (k, stamp) in flight.stamps().enumerate().take(600) {
+        let sample = flight.imu(stamp);
+        if k == 0 {
+            vio.imu(&sample).unwrap();
+            vio.start(&start).unwrap();
+            continue;
+        }
+        assert_eq!(allocations(|| assert!(vio.imu(&sample).is_ok())), 0, "sample {k}");
+        assert_eq!(allocations(|| assert!(vio.output().is_some())), 0, "output {k}");
+        if k % 10 == 0 {
+            // First points, then images: with the change all landmarks are lost and new ones begin.
+            let (seen, view) = (flight.see(stamp), ImageView::new(752, 480, &picture).unwrap());
+            let time = Stamp::from_nanos(stamp.nanos());
+            let count = if k < 300 {
+                allocations(|| assert!(vio.points(time, &seen).is_ok()))
+            } else {
+                allocations(|| assert!(vio.image(time, &view).is_ok()))
+            };
+            assert_eq!(count, 0, "image at sample {k}");
+        }
+    }
+}
