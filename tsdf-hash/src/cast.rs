@@ -1,11 +1,15 @@
 //! What the map looks like from a pose.
 
+mod arrivals;
 pub(crate) mod camera;
 mod cell;
 pub(crate) mod fields;
 pub(crate) mod march;
+mod remap;
+mod splat;
 pub(crate) mod tiles;
 
+pub use arrivals::{ArrivalSettings, ArrivalView};
 use camera::Camera;
 use fields::Fields;
 use nalgebra::Isometry3;

@@ -42,6 +42,9 @@
 //! | mesh | thesis Paper I, section 4.6, by marching cubes; case table derived: ours | [`Map::mesh`], [`write_ply`] |
 //! | the same bytes on a GPU | ours | `GpuMap` (feature `gpu`) |
 //! | the mesh of a growing map, blocks that left included | thesis Paper I, section 4.6; per-block patches: ours | [`MeshKeeper`] |
+//! | a surface seen from a pose | thesis Paper I, section 4.1 | [`Map::ray_cast`], [`View`] |
+//! | `R(v) = α n/n_max + β (1 − abs(sdf)/μ)`, Eqs. (5.4)-(5.6) | thesis Paper I, section 4.4, repaired | [`ArrivalView`] |
+//! | a view from elsewhere, between ray casts | thesis Paper I, section 6.2 | [`View::warped`] |
 //! | distance queries | thesis, outlook | [`Map::distance`], [`Map::distance_and_gradient`] |
 //!
 //! Frames: the camera's z looks forward, `x` to the right and `y` down in its image; the world is the caller's. Distances
@@ -69,7 +72,7 @@ mod table;
 mod tiers;
 mod view;
 
-pub use cast::{CastSettings, View};
+pub use cast::{ArrivalSettings, ArrivalView, CastSettings, View};
 pub use dense::DenseMap;
 pub use error::Error;
 pub use file::MapFile;

@@ -18,6 +18,7 @@ pub(crate) use coder::{MOST_BYTES, pack};
 use cold::Cold;
 pub(crate) use cold::Label;
 pub(crate) use moves::Moves;
+pub(crate) use revisit::Waiting;
 pub use revisit::{Arrivals, MergeAtOnce, Revisit, Verdict};
 pub(crate) use swap::Swap;
 

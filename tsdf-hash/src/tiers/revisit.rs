@@ -47,6 +47,16 @@ pub struct Arrivals<'a> {
     pub(crate) active: &'a Map,
 }
 
+/// A block that waits, told from what it was before it left again, or before more of it came.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Waiting {
+    pub(crate) key: Key,
+    /// Bits of the time when it came.
+    since: u64,
+    /// Frames in it.
+    frames: u32,
+}
+
 impl Arrivals<'_> {
     /// How many blocks wait.
     pub fn len(&self) -> usize {
@@ -78,6 +88,16 @@ impl Arrivals<'_> {
     /// The map that they would be merged into: the new surface.
     pub fn map(&self) -> &Map {
         self.active
+    }
+
+    /// The blocks and how they are, ascending.
+    pub(crate) fn waiting(&self) -> Vec<Waiting> {
+        let held = self.held.keys().iter().zip(self.held.values());
+        let waiting =
+            |(&key, held): (&Key, &Held)| Waiting { key, since: held.since.to_bits(), frames: held.seen.frames };
+        let mut all: Vec<_> = held.map(waiting).collect();
+        all.sort_unstable();
+        all
     }
 
     /// The old copy of a block, for ray casting.

@@ -9,6 +9,7 @@ mod file;
 mod gpu;
 mod incremental;
 mod recorded;
+mod remap;
 mod reversible;
 mod scene;
 mod tiers;

@@ -1,0 +1,99 @@
+//! A view, seen from elsewhere.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use super::splat::{Raster, Target, facing, focal};
+use super::{Pixel, View};
+use crate::Error;
+use crate::view::{Intrinsics, check_pose, check_sides};
+
+/// What of a hit is left of its score in pixels beside its own: only the order matters here.
+const SHARE: f32 = 0.9;
+/// Hits so many pixels' widths behind one another are of one surface.
+const SAME_SURFACE: f64 = 4.0;
+/// Hits that were seen steeply become no wider than this many pixels, so that rims do not smear.
+const MOST_STRETCH: f64 = 2.0;
+/// Nearer or farther is not drawn, metres.
+const DEPTHS: [f64; 2] = [1e-3, 1e3];
+
+impl View {
+    /// The view as a camera at another pose would see it, from this view alone: what to show or track against in the
+    /// frames between two ray casts ("onboard+", thesis Paper I, section 6.2; the forward projection `F` of its Eq.
+    /// (5.6)).
+    ///
+    /// Every hit is a piece of its tangent plane, as wide as its pixel was (`s = z / f`, up to twice that where it is now
+    /// seen less steeply), and covers the pixels whose centres lie within `f' s / 2z'` of its projection, at least a half; the depth of each is that of the plane there, so
+    /// the rounding to pixels leaves no error on planes. The nearest surface wins, on it the hit nearest to the centre of
+    /// the pixel, then the first. Gaps of one pixel are closed. Normals, colours and weights are carried along; what
+    /// faces away from the new camera is left out, and what this view did not see stays empty.
+    ///
+    /// # Errors
+    /// [`Error::InvalidSize`], [`Error::InvalidIntrinsics`], [`Error::InvalidPose`], of this view too, and
+    /// [`Error::WrongLength`] if its lists do not fit its size.
+    pub fn warped(
+        &self,
+        intrinsics: &Intrinsics,
+        (width, height): (usize, usize),
+        world_from_camera: &Isometry3<f64>,
+    ) -> Result<Self, Error> {
+        check_sides("view", width, height)?;
+        intrinsics.check("view")?;
+        check_pose(world_from_camera)?;
+        let target = Target::new(intrinsics, world_from_camera, DEPTHS);
+        let mut raster = Raster::default();
+        self.splats(&target, |_| 1.0, &mut raster)?;
+        let relative = (1.0 + SAME_SURFACE / focal(intrinsics)) as f32;
+        raster.draw((width, height), SHARE, |nearest| nearest / relative);
+        let mut view = Self::new();
+        view.resize(intrinsics, (width, height), world_from_camera);
+        for (at, shown) in raster.pixels().enumerate() {
+            let pixel = shown.map_or(Pixel::NONE, |(shown, source)| self.pixel(source, 1.0 / shown.inverse));
+            view.put(at, &pixel);
+        }
+        Ok(view)
+    }
+
+    /// Every hit as a splat in another camera, its source the number of its pixel.
+    pub(super) fn splats(
+        &self,
+        target: &Target,
+        score: impl Fn(usize) -> f32,
+        raster: &mut Raster,
+    ) -> Result<(), Error> {
+        let Some(k) = self.intrinsics else { return Ok(()) };
+        k.check("view")?;
+        check_pose(&self.world_from_camera)?;
+        let expected = self.width.saturating_mul(self.height);
+        for found in [self.depth.len(), self.normals.len(), self.colours.len(), self.weights.len()] {
+            if found != expected {
+                return Err(Error::WrongLength { image: "view", expected, found });
+            }
+        }
+        let eye = Point3::from(self.world_from_camera.translation.vector);
+        for (at, &depth) in self.depth.iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
+            let z = f64::from(depth);
+            let (u, v) = ((at % self.width) as f64, (at / self.width) as f64);
+            let point = self.world_from_camera * Point3::new((u - k.cx) / k.fx * z, (v - k.cy) / k.fy * z, z);
+            let normal = Vector3::from(self.normals[at].map(f64::from));
+            // Along its slope a pixel covers more of the surface, and it shows when that is seen less steeply.
+            let stretch = target.facing(&point, &normal) / facing(&eye, &point, &normal);
+            let size = z / focal(&k) * stretch.clamp(1.0, MOST_STRETCH);
+            if let Some(splat) = target.splat(&point, &normal, size, score(at), at as u32) {
+                raster.push(splat);
+            }
+        }
+        Ok(())
+    }
+
+    /// A pixel of this view at another depth.
+    pub(super) fn pixel(&self, at: usize, depth: f32) -> Pixel {
+        Pixel { depth, normal: self.normals[at], colour: self.colours[at], weight: self.weights[at] }
+    }
+
+    pub(super) fn put(&mut self, at: usize, pixel: &Pixel) {
+        self.depth[at] = pixel.depth;
+        self.normals[at] = pixel.normal;
+        self.colours[at] = pixel.colour;
+        self.weights[at] = pixel.weight;
+    }
+}
