@@ -43,6 +43,7 @@
 //! | the same bytes on a GPU | ours | `GpuMap` (feature `gpu`) |
 //! | the mesh of a growing map, blocks that left included | thesis Paper I, section 4.6; per-block patches: ours | [`MeshKeeper`] |
 //! | distance queries | thesis, outlook | [`Map::distance`], [`Map::distance_and_gradient`] |
+//! | distances for planners, far from surfaces | thesis, outlook; branch and bound over sites: ours | [`DistanceField`] |
 //!
 //! Frames: the camera's z looks forward, `x` to the right and `y` down in its image; the world is the caller's. Distances
 //! are positive on the camera's side of a surface. Metres. Tracking is not part of this crate yet.
@@ -51,6 +52,7 @@ mod block;
 mod candidates;
 mod cast;
 mod dense;
+mod edf;
 mod error;
 mod file;
 mod fuse;
@@ -71,6 +73,7 @@ mod view;
 
 pub use cast::{CastSettings, View};
 pub use dense::DenseMap;
+pub use edf::{DistanceField, DistanceReport, DistanceSettings};
 pub use error::Error;
 pub use file::MapFile;
 #[cfg(feature = "gpu")]
