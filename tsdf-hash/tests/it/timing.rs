@@ -1,6 +1,6 @@
 //! Times, printed and not judged: `cargo test --release -p tsdf-hash --test it -- --ignored --nocapture`.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 use tsdf_hash::{Map, MeshKeeper, Settings};
 
 use crate::scene::room;
@@ -48,4 +48,19 @@ fn meshes_of_the_room_at_one_centimetre() {
     let (vertices, faces) = (mesh.positions.len(), mesh.faces.len());
     println!("full mesh {:.1} ms, {vertices} vertices, {faces} faces", median(&mut times));
     assert_eq!(keeper.mesh(), mesh);
+}
+
+#[test]
+#[ignore = "prints times"]
+fn distances_in_the_room_at_one_centimetre() {
+    let mut map = Map::new(Settings::default()).unwrap();
+    for shot in room::tour(60, 1, &Isometry3::identity()) {
+        map.integrate(&shot.view(), None, &shot.world_from_camera).unwrap();
+    }
+    let points: Vec<_> =
+        map.mesh().positions.iter().step_by(5).map(|p| Point3::from(p.map(|c| f64::from(c) + 0.013))).collect();
+    let mut times = [0; 5].map(|_| timed(|| points.iter().filter_map(|p| map.distance_and_gradient(p)).count()).1);
+    let known = points.iter().filter(|p| map.distance_and_gradient(p).is_some()).count();
+    let each = 1e6 * median(&mut times) / points.len() as f64;
+    println!("distance and gradient {each:.0} ns, {known} of {} known", points.len());
 }
