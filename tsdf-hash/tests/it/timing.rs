@@ -12,13 +12,13 @@ fn thread_ms() -> f64 {
     text.split(' ').next().unwrap().parse::<f64>().unwrap() * 1e-6
 }
 
-fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
+pub(crate) fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let start = thread_ms();
     let result = work();
     (result, thread_ms() - start)
 }
 
-fn median(times: &mut [f64]) -> f64 {
+pub(crate) fn median(times: &mut [f64]) -> f64 {
     times.sort_by(f64::total_cmp);
     times[times.len() / 2]
 }
