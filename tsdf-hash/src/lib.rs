@@ -46,6 +46,7 @@
 //! | `R(v) = α n/n_max + β (1 − abs(sdf)/μ)`, Eqs. (5.4)-(5.6) | thesis Paper I, section 4.4, repaired | [`ArrivalView`] |
 //! | a view from elsewhere, between ray casts | thesis Paper I, section 6.2 | [`View::warped`] |
 //! | distance queries | thesis, outlook | [`Map::distance`], [`Map::distance_and_gradient`] |
+//! | distances for planners, far from surfaces | thesis, outlook; branch and bound over sites: ours | [`DistanceField`] |
 //!
 //! Frames: the camera's z looks forward, `x` to the right and `y` down in its image; the world is the caller's. Distances
 //! are positive on the camera's side of a surface. Metres. Tracking is not part of this crate yet.
@@ -54,6 +55,7 @@ mod block;
 mod candidates;
 mod cast;
 mod dense;
+mod edf;
 mod error;
 mod file;
 mod fuse;
@@ -74,6 +76,7 @@ mod view;
 
 pub use cast::{ArrivalSettings, ArrivalView, CastSettings, View};
 pub use dense::DenseMap;
+pub use edf::{DistanceField, DistanceReport, DistanceSettings};
 pub use error::Error;
 pub use file::MapFile;
 #[cfg(feature = "gpu")]

@@ -30,8 +30,8 @@ impl Default for NoiseModel {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct Tiers {
-    /// Cap of the host tier: packed blocks in RAM, and the index of all blocks outside active memory, of about 100 bytes
-    /// each. 0, the default, means no tier but active memory; otherwise 65536 at least.
+    /// Cap of the host tier: packed blocks in RAM, and the index of all blocks outside active memory, of 150 bytes
+    /// each at most. 0, the default, means no tier but active memory; otherwise 65536 at least.
     pub host_bytes: usize,
     /// Cap of the disk tier, a file of the map's own ([`Map::with_swap`](crate::Map::with_swap)); 0, the default: none.
     pub disk_bytes: u64,

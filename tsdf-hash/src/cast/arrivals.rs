@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::splat::{Raster, Target};
+use super::splat::{Piece, Raster, Target};
 use super::{Pixel, UNSEEN, View};
 use crate::block::{Block, SIDE, VOXELS};
 use crate::key::Key;
@@ -123,7 +123,8 @@ impl ArrivalView {
         intrinsics.check("view")?;
         check_pose(world_from_camera)?;
         let settings = arrivals.map().settings();
-        let target = Target::new(intrinsics, world_from_camera, [self.settings.min_depth, self.settings.max_depth]);
+        let depths = [self.settings.min_depth, self.settings.max_depth];
+        let target = Target::new(intrinsics, (width, height), world_from_camera, depths);
         self.raster.clear();
         let entries = self.view.depth.len();
         self.view.splats(&target, |at| self.reliability[at], &mut self.raster)?;
@@ -142,7 +143,9 @@ impl ArrivalView {
             each_point(arrivals, waiting.key, |point| {
                 let source = (entries + fresh.len()) as u32;
                 let score = self.settings.reliability(point.weight, point.distance);
-                let splat = target.splat(&point.position, &point.normal, settings.voxel_size, score, source);
+                let (size, normal) = (settings.voxel_size, point.normal);
+                let piece = Piece { point: point.position, normal, size, cosine: 1.0, stretch: 1.0 };
+                let splat = target.splat(&piece, score, source);
                 whole &= splat.is_some_and(|splat| splat.inside((width, height)));
                 if let Some(splat) = splat {
                     self.raster.push(splat);

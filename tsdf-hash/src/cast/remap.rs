@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::splat::{Raster, Target, facing, focal};
+use super::splat::{Piece, Raster, Target, focal};
 use super::{Pixel, View};
 use crate::Error;
 use crate::view::{Intrinsics, check_pose, check_sides};
@@ -39,7 +39,7 @@ impl View {
         check_sides("view", width, height)?;
         intrinsics.check("view")?;
         check_pose(world_from_camera)?;
-        let target = Target::new(intrinsics, world_from_camera, DEPTHS);
+        let target = Target::new(intrinsics, (width, height), world_from_camera, DEPTHS);
         let mut raster = Raster::default();
         self.splats(&target, |_| 1.0, &mut raster)?;
         let relative = (1.0 + SAME_SURFACE / focal(intrinsics)) as f32;
@@ -69,17 +69,23 @@ impl View {
                 return Err(Error::WrongLength { image: "view", expected, found });
             }
         }
+        let rotation = self.world_from_camera.rotation.to_rotation_matrix().into_inner();
         let eye = Point3::from(self.world_from_camera.translation.vector);
-        for (at, &depth) in self.depth.iter().enumerate().filter(|(_, depth)| **depth > 0.0) {
-            let z = f64::from(depth);
-            let (u, v) = ((at % self.width) as f64, (at / self.width) as f64);
-            let point = self.world_from_camera * Point3::new((u - k.cx) / k.fx * z, (v - k.cy) / k.fy * z, z);
-            let normal = Vector3::from(self.normals[at].map(f64::from));
-            // Along its slope a pixel covers more of the surface, and it shows when that is seen less steeply.
-            let stretch = target.facing(&point, &normal) / facing(&eye, &point, &normal);
-            let size = z / focal(&k) * stretch.clamp(1.0, MOST_STRETCH);
-            if let Some(splat) = target.splat(&point, &normal, size, score(at), at as u32) {
-                raster.push(splat);
+        let (pixel, width) = (1.0 / focal(&k), self.width.max(1));
+        let rows = self.depth.chunks(width).zip(self.normals.chunks(width)).enumerate();
+        for (v, (depths, normals)) in rows {
+            for (u, (&depth, normal)) in depths.iter().zip(normals).enumerate().filter(|(_, (depth, _))| **depth > 0.0)
+            {
+                let z = f64::from(depth);
+                let ray = rotation * Vector3::new((u as f64 - k.cx) / k.fx, (v as f64 - k.cy) / k.fy, 1.0);
+                let normal = Vector3::from(normal.map(f64::from));
+                // Along its slope a pixel covers more of the surface, and that shows when it is seen less steeply.
+                let cosine = -normal.dot(&ray) / ray.norm();
+                let piece = Piece { point: eye + ray * z, normal, size: z * pixel, cosine, stretch: MOST_STRETCH };
+                let at = v * width + u;
+                if let Some(splat) = target.splat(&piece, score(at), at as u32) {
+                    raster.push(splat);
+                }
             }
         }
         Ok(())

@@ -280,14 +280,11 @@ fn read_list(input: &mut &[u8], voxels: &[u16], mut number: impl FnMut(usize, u3
 
 /// The next `count` bytes as a number.
 fn read_bits(input: &mut &[u8], count: usize) -> Option<u128> {
-    let word = match input.first_chunk() {
-        Some(word) => *word,
-        None => {
-            let mut word = [0; SLACK];
-            word[..input.len()].copy_from_slice(input);
-            word
-        }
-    };
+    let word = input.first_chunk().copied().unwrap_or_else(|| {
+        let mut word = [0; SLACK];
+        word[..input.len()].copy_from_slice(input);
+        word
+    });
     input.split_off(..count)?;
     let kept = if count == SLACK { u128::MAX } else { (1 << (8 * count)) - 1 };
     Some(u128::from_le_bytes(word) & kept)

@@ -1,6 +1,6 @@
 //! Times, printed and not judged: `cargo test --release -p tsdf-hash --test it -- --ignored --nocapture`.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 use tsdf_hash::{ArrivalSettings, ArrivalView, CastSettings, Map, MeshKeeper, Settings, Tiers, View};
 
 use crate::scene::room;
@@ -12,13 +12,13 @@ fn thread_ms() -> f64 {
     text.split(' ').next().unwrap().parse::<f64>().unwrap() * 1e-6
 }
 
-fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
+pub(crate) fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let start = thread_ms();
     let result = work();
     (result, thread_ms() - start)
 }
 
-fn median(times: &mut [f64]) -> f64 {
+pub(crate) fn median(times: &mut [f64]) -> f64 {
     times.sort_by(f64::total_cmp);
     times[times.len() / 2]
 }
@@ -78,4 +78,19 @@ fn views_of_the_room_at_one_centimetre() {
     for (name, times) in ["full cast", "warped", "arrivals"].iter().zip(&mut times) {
         println!("{name} {:.2} ms (worst {:.2})", median(times), times[times.len() - 1]);
     }
+}
+
+#[test]
+#[ignore = "prints times"]
+fn distances_in_the_room_at_one_centimetre() {
+    let mut map = Map::new(Settings::default()).unwrap();
+    for shot in room::tour(60, 1, &Isometry3::identity()) {
+        map.integrate(&shot.view(), None, &shot.world_from_camera).unwrap();
+    }
+    let points: Vec<_> =
+        map.mesh().positions.iter().step_by(5).map(|p| Point3::from(p.map(|c| f64::from(c) + 0.013))).collect();
+    let mut times = [0; 5].map(|_| timed(|| points.iter().filter_map(|p| map.distance_and_gradient(p)).count()).1);
+    let known = points.iter().filter(|p| map.distance_and_gradient(p).is_some()).count();
+    let each = 1e6 * median(&mut times) / points.len() as f64;
+    println!("distance and gradient {each:.0} ns, {known} of {} known", points.len());
 }
