@@ -4,6 +4,8 @@ mod patch;
 mod search;
 mod settings;
 mod signs;
+#[cfg(test)]
+mod tests;
 mod tree;
 
 use nalgebra::{Point3, Vector3};

@@ -181,7 +181,7 @@ fn is_the_distance_of_the_room() {
     assert!(near.len() > 20_000 && far.len() > 5_000, "{} {}", near.len(), far.len());
     let most = near.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     assert!(most < 0.5, "nearer by {most} voxels");
-    // At the edges of the boxes, where the surface is rounded, it may be a little more.
+    // At the corners of the boxes, which voxels round off, it may be a little more.
     let within = far.iter().filter(|&&error| error < 0.5).count();
     let most = far.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     assert!(within as f64 > 0.998 * far.len() as f64 && most < 0.75, "{within} of {}, {most} voxels", far.len());
