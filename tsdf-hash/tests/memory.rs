@@ -112,8 +112,8 @@ fn room_in_eight_mebibytes(frames: usize, shrink: usize) {
         map.integrate(&shot.view(), None, &shot.world_from_camera).unwrap();
         let [all, blocks] = peaks(start);
         let memory = map.memory();
-        // One block of the host tier's is for unpacking.
-        assert!(blocks <= CAP + BLOCK, "{blocks} bytes of blocks");
+        // Blocks lie in the host tier, too, until they are packed.
+        assert!(blocks <= CAP + HOST, "{blocks} bytes of blocks");
         assert!(all <= CAP + HOST + work, "{all} bytes, {work} of them in work; {memory:?}");
         assert!(memory.active_bytes <= CAP && memory.host_bytes <= HOST && memory.disk_bytes <= 256 << 20);
     }
