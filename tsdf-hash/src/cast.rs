@@ -148,8 +148,8 @@ impl View {
 impl Map {
     /// The surface as a camera at `world_from_camera` sees it, by casting one ray per pixel through the blocks.
     ///
-    /// A hit is where the interpolated distance first falls through zero, in a cell whose eight voxels have all been
-    /// observed. A ray that meets the solid from an unobserved side ends there without a hit.
+    /// A hit is where the interpolated distance first falls through zero, within half a voxel of an observed
+    /// voxel along each axis. A ray that meets the solid from an unobserved side ends there without a hit.
     ///
     /// # Errors
     /// Settings, size, intrinsics or pose that make no sense.

@@ -39,20 +39,47 @@ impl Cell {
         [c[0], c[1], c[Y], c[Y + 1], c[Z], c[Z + 1], c[Z + Y], c[Z + Y + 1]]
     }
 
-    /// The interpolated value; NaN if one of the eight corners is.
+    /// The corners, as far as they are needed: NaN where the nearest one is unobserved.
+    ///
+    /// An observed voxel speaks for the cube around it. In there, corners that were not observed take the value of their
+    /// neighbour along x, else y, else z.
+    #[cold]
+    fn completed(&self, mut c: [f32; 8]) -> [f32; 8] {
+        let [x, y, z] = self.along.map(|a| usize::from(a > 0.5));
+        if c[x + 2 * y + 4 * z].is_nan() {
+            return [f32::NAN; 8];
+        }
+        for stride in [1, 2, 4] {
+            for k in 0..8 {
+                if c[k].is_nan() {
+                    c[k] = c[k ^ stride];
+                }
+            }
+        }
+        c
+    }
+
     #[inline(always)]
-    pub(super) fn value(&self, distance: &[f32; ALL]) -> f32 {
-        let c = self.corners(distance);
+    fn between(&self, c: &[f32; 8]) -> f32 {
         let [x, y, z] = self.along;
         let along_x = [0, 2, 4, 6].map(|k| c[k] + x * (c[k + 1] - c[k]));
         let along_y = [0, 2].map(|k| along_x[k] + y * (along_x[k + 1] - along_x[k]));
         along_y[0] + z * (along_y[1] - along_y[0])
     }
 
+    /// The interpolated value; NaN if the nearest corner is.
+    #[inline(always)]
+    pub(super) fn value(&self, distance: &[f32; ALL]) -> f32 {
+        let c = self.corners(distance);
+        let value = self.between(&c);
+        if value.is_nan() { self.between(&self.completed(c)) } else { value }
+    }
+
     /// The interpolated value, and its derivatives per voxel.
     #[inline(always)]
     pub(super) fn value_and_gradient(&self, distance: &[f32; ALL]) -> (f32, [f32; 3]) {
         let c = self.corners(distance);
+        let c = if self.between(&c).is_nan() { self.completed(c) } else { c };
         let [x, y, z] = self.along;
         let rise_x = [0, 2, 4, 6].map(|k| c[k + 1] - c[k]);
         let along_x = [0, 1, 2, 3].map(|k| c[2 * k] + x * rise_x[k]);
@@ -115,10 +142,29 @@ mod tests {
             assert!((value - f(p)).abs() < 1e-4 && (cell.value(&field) - f(p)).abs() < 1e-4, "{p:?}");
             assert!((0..3).all(|k| (gradient[k] - expected[k]).abs() < 1e-4), "{p:?}: {gradient:?}");
         }
-        // One unobserved corner is enough, even one that counts for nothing.
-        field[4 + 4 * Y + 4 * Z] = f32::NAN;
-        assert!(Cell::at([3.5, 3.5, 3.5]).value(&field).is_nan() && Cell::at([4.2, 4.7, 4.1]).value(&field).is_nan());
-        assert!(Cell::at([2.5, 3.5, 3.5]).value(&field).is_finite());
+    }
+
+    /// f = 1 + y + 2 z wherever x <= 4 has been observed; nothing beyond.
+    #[test]
+    fn an_observed_voxel_speaks_for_the_cube_around_it() {
+        let f = |[_, y, z]: [f32; 3]| 1.0 + y + 2.0 * z;
+        let mut field = [f32::NAN; ALL];
+        (0..ALL).filter(|k| node(*k)[0] <= 4.0).for_each(|k| field[k] = f(node(k)));
+        for p in [[4.0, 2.3, 5.1], [4.25, 2.3, 5.1], [4.5, 7.5, 0.0]] {
+            let cell = Cell::at(p);
+            let (value, gradient) = cell.value_and_gradient(&field);
+            assert!((cell.value(&field) - f(p)).abs() < 1e-4 && (value - f(p)).abs() < 1e-4, "{p:?}");
+            assert!((0..3).all(|k| (gradient[k] - [0.0, 1.0, 2.0][k]).abs() < 1e-4), "{p:?}: {gradient:?}");
+        }
+        for p in [[4.51, 2.3, 5.1], [5.5, 2.3, 5.1]] {
+            let cell = Cell::at(p);
+            assert!(cell.value(&field).is_nan() && cell.value_and_gradient(&field).0.is_nan(), "{p:?}");
+        }
+        // One corner alone is enough for its own eighth of the cell.
+        field.fill(f32::NAN);
+        field[4 + 4 * Y + 4 * Z] = 0.5;
+        assert_eq!(Cell::at([3.6, 4.4, 3.7]).value(&field), 0.5);
+        assert!(Cell::at([3.6, 4.6, 3.4]).value(&field).is_nan());
     }
 
     #[test]

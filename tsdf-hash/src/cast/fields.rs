@@ -143,24 +143,22 @@ impl Field {
         }
     }
 
-    /// The range of the cells whose eight nodes are observed and not all on one side.
+    /// The range of the cells that have observed nodes on both sides.
     fn crossed(&self) -> Option<Range> {
-        let (mut solid, mut observed) = ([0_u16; NODES * NODES], [0_u16; NODES * NODES]);
-        for (row, (solid, observed)) in solid.iter_mut().zip(&mut observed).enumerate() {
+        let (mut solid, mut free) = ([0_u16; NODES * NODES], [0_u16; NODES * NODES]);
+        for (row, (solid, free)) in solid.iter_mut().zip(&mut free).enumerate() {
             for (x, value) in self.distance[NODES * row..NODES * (row + 1)].iter().enumerate() {
                 *solid |= u16::from(*value < 0.0) << x;
-                *observed |= u16::from(!value.is_nan()) << x;
+                *free |= u16::from(*value >= 0.0) << x;
             }
         }
         let (mut low, mut high, mut columns) = ([u8::MAX; 3], [0_u8; 3], 0_u16);
         for z in 0..SIDE {
             for y in 0..SIDE {
                 let row = y + NODES * z;
-                let four = |rows: &[u16]| [rows[row], rows[row + 1], rows[row + NODES], rows[row + NODES + 1]];
-                let all = |rows: [u16; 4]| rows.iter().fold(0x1ff, |a, b| a & b);
-                let (seen, solid) = (all(four(&observed)), four(&solid));
-                let (any, every) = (solid.iter().fold(0, |a, b| a | b), all(solid));
-                let cells = (seen & seen >> 1) & (any | any >> 1) & !(every & every >> 1) & 0xff;
+                let any = |rows: &[u16]| rows[row] | rows[row + 1] | rows[row + NODES] | rows[row + NODES + 1];
+                let (solid, free) = (any(&solid), any(&free));
+                let cells = (solid | solid >> 1) & (free | free >> 1) & 0xff;
                 if cells != 0 {
                     columns |= cells;
                     (low[1], high[1]) = (low[1].min(y as u8), high[1].max(y as u8 + 1));

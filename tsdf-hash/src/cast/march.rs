@@ -143,7 +143,7 @@ impl Ray<'_> {
             let weight = self.field.weight[cell.nearest()];
             Outcome::Hit(Pixel { depth, normal: [gx * scale, gy * scale, gz * scale], colour, weight })
         } else {
-            // A back face, or a NaN: the cell of the hit is not wholly observed.
+            // A back face, or a NaN: the voxel at the hit is not observed.
             Outcome::Blocked
         }
     }

@@ -111,11 +111,32 @@ fn between(a: f32, b: f32, share: f32) -> f32 {
     return plus(a, times(share, minus(b, a)));
 }
 
-// UNOBSERVED if one of the corners is.
+// The nearest corner.
+fn nearest_of(cell: Cell) -> vec3<u32> {
+    return select(vec3(0u), vec3(1u), cell.along > vec3(0.5));
+}
+
+// Corners of which the nearest is observed; those that are not take the value of their neighbour along x, else y, else z.
+fn completed(corners: array<f32, 8>) -> array<f32, 8> {
+    var c = corners;
+    for (var stride = 1u; stride < 8u; stride *= 2u) {
+        for (var k = 0u; k < 8u; k++) {
+            if c[k] > OBSERVED {
+                c[k] = c[k ^ stride];
+            }
+        }
+    }
+    return c;
+}
+
+// UNOBSERVED if the nearest corner is.
 fn sample(ray: Ray, cell: Cell) -> f32 {
-    let c = corners(ray, cell);
+    var c = corners(ray, cell);
     if !whole(c) {
-        return UNOBSERVED;
+        if c[dot(nearest_of(cell), vec3(1u, 2u, 4u))] > OBSERVED {
+            return UNOBSERVED;
+        }
+        c = completed(c);
     }
     let near = between(between(c[0], c[1], cell.along.x), between(c[2], c[3], cell.along.x), cell.along.y);
     let far = between(between(c[4], c[5], cell.along.x), between(c[6], c[7], cell.along.x), cell.along.y);
@@ -154,9 +175,12 @@ fn coloured(at: u32) -> vec4<u32> {
 fn refine(ray: Ray, near: f32, above: f32, far: f32, below: f32) -> Pixel {
     let t = plus(near, times(minus(far, near), divide(above, minus(above, below))));
     let cell = cell_at(ray, t);
-    let c = corners(ray, cell);
+    var c = corners(ray, cell);
     if !whole(c) {
-        return NONE;
+        if c[dot(nearest_of(cell), vec3(1u, 2u, 4u))] > OBSERVED {
+            return NONE;
+        }
+        c = completed(c);
     }
     let x = cell.along.x;
     let y = cell.along.y;
@@ -186,7 +210,7 @@ fn refine(ray: Ray, near: f32, above: f32, far: f32, below: f32) -> Pixel {
     if view.with_colour == 1u {
         colour = colour_of(ray, cell);
     }
-    let nearest_node = cell.first + u32(x > 0.5) + Y * u32(y > 0.5) + Z * u32(z > 0.5);
+    let nearest_node = cell.first + dot(nearest_of(cell), vec3(1u, Y, Z));
     let weight = nodes[ray.field + 3u * nearest_node + 1u] & 0xffffu;
     return Pixel(depth, vec3(times(gx, scale), times(gy, scale), times(gz, scale)), colour, weight);
 }

@@ -59,8 +59,8 @@ fn position(node: u32) -> vec3<u32> {
     return vec3(node % NODES, node / NODES % NODES, node / (NODES * NODES));
 }
 
-// The range of the cells whose eight nodes are observed and not all on one side: 4 bits each for the lowest along x, y, z
-// and for the highest, plus one; 0 if there are none.
+// The range of the cells that have observed nodes on both sides: 4 bits each for the lowest along x, y, z and for the
+// highest, plus one; 0 if there are none.
 @compute @workgroup_size(256)
 fn range(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -76,25 +76,22 @@ fn range(
     }
     for (var node = lane; node < ALL; node += LANES) {
         let at = find(block, position(node));
-        // Bit 0: observed; bit 1: solid.
+        // 0: unobserved; 1: free; 2: solid.
         var state = 0u;
         if weight_of(at) > 0u {
-            state = 1u + 2u * u32(bitcast<i32>(word(at, at.voxel)) < 0);
+            state = 1u + u32(bitcast<i32>(word(at, at.voxel)) < 0);
         }
         states[node] = state;
     }
     workgroupBarrier();
     for (var cell = lane; cell < 512u; cell += LANES) {
         let corner = vec3(cell % 8u, cell / 8u % 8u, cell / 64u);
-        var every = 3u;
         var any = 0u;
         for (var k = 0u; k < 8u; k++) {
             let node = corner + vec3(k & 1u, (k >> 1u) & 1u, k >> 2u);
-            let state = states[node.x + NODES * (node.y + NODES * node.z)];
-            every &= state;
-            any |= state;
+            any |= states[node.x + NODES * (node.y + NODES * node.z)];
         }
-        if every == 1u && any == 3u {
+        if any == 3u {
             for (var k = 0u; k < 3u; k++) {
                 atomicMin(&low[k], corner[k]);
                 atomicMax(&high[k], corner[k] + 1u);
