@@ -29,12 +29,12 @@ pub struct Mesh {
 }
 
 impl Map {
-    /// The zero level of the field by marching cubes, where all eight voxels of a cell have been observed; of the blocks
-    /// in active memory. [`MeshKeeper`] has that of all tiers, and follows a map that changes.
+    /// The zero level of the field by marching cubes, where all eight voxels of a cell have been observed and the distance
+    /// does not jump; of the blocks in active memory. [`MeshKeeper`] has that of all tiers, and follows a map that changes.
     ///
     /// Vertices and faces come in the order of the block coordinates, so equal maps give equal meshes. The sign test is
     /// "solid where the distance is below zero". Every edge has at most two faces.
     pub fn mesh(&self) -> Mesh {
-        MeshKeeper::of_active(self.store(), self.settings().voxel_size)
+        MeshKeeper::of_active(self.store(), &patch::Scale::new(self.settings()))
     }
 }

@@ -4,7 +4,7 @@ use std::convert::Infallible;
 
 use super::Mesh;
 use super::cases::CASES;
-use super::patch::{Bench, Patch};
+use super::patch::{Bench, Patch, Scale};
 use super::rows::Bits;
 use super::weld::weld;
 use crate::block::Block;
@@ -111,7 +111,7 @@ impl MeshKeeper {
         }
         report.changed = self.changed.len();
         self.mark_changed();
-        report.rebuilt = self.rebuild(copies, map.settings().voxel_size)?;
+        report.rebuilt = self.rebuild(copies, &Scale::new(map.settings()))?;
         self.seen = Some(now);
         Ok(report)
     }
@@ -122,11 +122,11 @@ impl MeshKeeper {
     }
 
     /// The mesh of the blocks in active memory.
-    pub(crate) fn of_active(store: &Store, voxel_size: f64) -> Mesh {
+    pub(crate) fn of_active(store: &Store, scale: &Scale) -> Mesh {
         let mut keeper = Self::new();
         keeper.changed.extend(store.keys());
         keeper.mark_changed();
-        match keeper.rebuild(store, voxel_size) {
+        match keeper.rebuild(store, scale) {
             Ok(_) => keeper.mesh(),
             Err(never) => match never {},
         }
@@ -170,17 +170,17 @@ impl MeshKeeper {
 
     /// Makes the marked patches, the last first: then what lies above a block has been read before it, and much of it is
     /// still in the cache.
-    fn rebuild<S: Source>(&mut self, source: &S, voxel_size: f64) -> Result<usize, S::Fault> {
+    fn rebuild<S: Source>(&mut self, source: &S, scale: &Scale) -> Result<usize, S::Fault> {
         self.dirty.sort_unstable();
         let mut rebuilt = 0;
         while let Some(&key) = self.dirty.last() {
-            rebuilt += usize::from(self.rebuild_patch(key, source, voxel_size)?);
+            rebuilt += usize::from(self.rebuild_patch(key, source, scale)?);
             self.dirty.pop();
         }
         Ok(rebuilt)
     }
 
-    fn rebuild_patch<S: Source>(&mut self, key: Key, source: &S, voxel_size: f64) -> Result<bool, S::Fault> {
+    fn rebuild_patch<S: Source>(&mut self, key: Key, source: &S, scale: &Scale) -> Result<bool, S::Fault> {
         // The block may have been removed since.
         let Some(patch) = self.patches.get_mut(key) else { return Ok(false) };
         if patch.unread {
@@ -205,7 +205,7 @@ impl MeshKeeper {
         if needed == 0 {
             patch.clear();
         } else {
-            self.work.bench.make(patch, key, &blocks, &CASES, voxel_size);
+            self.work.bench.make(patch, key, &blocks, &CASES, scale);
         }
         Ok(true)
     }
@@ -247,7 +247,9 @@ mod tests {
     #[test]
     fn a_change_of_one_voxel_reaches_every_cell_around_it() {
         let mut map = Map::new(Settings::default()).unwrap();
-        let free = Block { distance: [ONE; VOXELS], weight: [1; VOXELS], ..Block::ZERO };
+        // Two thirds of a voxel away: what is farther from a neighbour on the other side is torn.
+        let near = ONE / 6;
+        let free = Block { distance: [near; VOXELS], weight: [1; VOXELS], ..Block::ZERO };
         // 4 x 4 x 4 blocks on either side of the origin.
         for n in 0..64 {
             let key = Key::new([n % 4 - 2, n / 4 % 4 - 2, n / 16 - 2]).unwrap();
@@ -260,7 +262,7 @@ mod tests {
         for corner in 0..8_usize {
             let voxel = [7, 7 * 8, 7 * 64].iter().enumerate().map(|(k, v)| if corner >> k & 1 == 1 { *v } else { 0 });
             let voxel = voxel.sum::<usize>();
-            for (distance, faces) in [(-ONE, 8), (ONE, 0)] {
+            for (distance, faces) in [(-near, 8), (-ONE, 0), (near, 0)] {
                 map.copies.active.get_mut(Key::new([0; 3]).unwrap()).unwrap().0.distance[voxel] = distance;
                 assert_eq!(keeper.update(&map).unwrap().changed, 1);
                 assert_eq!(keeper.mesh().faces.len(), faces, "corner {corner}");

@@ -9,7 +9,8 @@ use nalgebra::Vector3;
 use super::cases::Case;
 use super::rows::{Bits, Rows};
 use super::weld::EdgeSet;
-use crate::block::{Block, SIDE, VOXELS};
+use crate::Settings;
+use crate::block::{Block, ONE, SIDE, VOXELS};
 use crate::key::Key;
 
 /// Colour of vertices that no colour image has seen.
@@ -19,6 +20,9 @@ pub(crate) const LATTICE: usize = SIDE + 1;
 /// Edges between them, with those that leave the lattice.
 const EDGES: usize = 3 * LATTICE * LATTICE * LATTICE;
 const NEW: u16 = u16::MAX;
+/// No distance changes by more than a voxel from one voxel to the next. Where its mean changes by more than this many
+/// (ours), no surface lies between the two: they were seen from two sides, and one of them through something.
+const MOST_RISE: f64 = 1.75;
 
 /// Where the surface cuts an edge.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +38,8 @@ pub(crate) struct Vertex {
     pub(crate) step: u8,
     /// Its name in that block.
     pub(crate) edge: u16,
+    /// The distance jumps here: see [`MOST_RISE`].
+    torn: bool,
 }
 
 /// A patch, and the bits of its block.
@@ -78,7 +84,7 @@ impl Bench {
     }
 
     /// Makes the patch of the cells that were found; `blocks` are those that their corners lie in.
-    pub(crate) fn make(&mut self, patch: &mut Patch, key: Key, blocks: &[&Block; 8], cases: &[Case], voxel_size: f64) {
+    pub(crate) fn make(&mut self, patch: &mut Patch, key: Key, blocks: &[&Block; 8], cases: &[Case], scale: &Scale) {
         patch.clear();
         self.edges.clear();
         patch.faces.reserve(2 * self.cells.len());
@@ -97,13 +103,19 @@ impl Bench {
             patch.faces.extend(case.triangles.iter().map(|triangle| triangle.map(|k| corners[usize::from(k)])));
         }
         // Apart from the loop above, whose branches nobody can foresee: here the processor waits for many voxels at once.
-        let lattice = Lattice { corner: key.block().map(|c| f64::from(c) * SIDE as f64), blocks, voxel_size };
+        let lattice = Lattice { corner: key.block().map(|c| f64::from(c) * SIDE as f64), blocks, scale };
+        let mut torn = false;
         patch.vertices.reserve(self.edges.len());
         for &edge in &self.edges {
             self.vertex[usize::from(edge)] = NEW;
             let vertex = lattice.vertex(usize::from(edge));
             patch.steps |= 1 << vertex.step;
+            torn |= vertex.torn;
             patch.vertices.push(vertex);
+        }
+        if torn {
+            let triangles = self.cells.iter().map(|&(_, case)| cases[usize::from(case)].triangles.len());
+            patch.drop_torn(triangles);
         }
         patch.add_normals();
     }
@@ -114,6 +126,31 @@ impl Patch {
         self.vertices.clear();
         self.faces.clear();
         self.steps = 0;
+    }
+
+    /// Takes away the cells that have a torn vertex, then all vertices without a face. `triangles` has how many faces each
+    /// cell has.
+    #[cold]
+    fn drop_torn(&mut self, triangles: impl Iterator<Item = usize>) {
+        let Self { vertices, faces, .. } = self;
+        let mut rest = std::mem::take(faces).into_iter();
+        for count in triangles {
+            let cell: Vec<_> = rest.by_ref().take(count).collect();
+            if !cell.as_flattened().iter().any(|&k| vertices[usize::from(k)].torn) {
+                faces.extend(cell);
+            }
+        }
+        let mut names = vec![NEW; vertices.len()];
+        let mut kept = Vec::new();
+        for k in faces.as_flattened_mut() {
+            let name = &mut names[usize::from(*k)];
+            if *name == NEW {
+                *name = kept.len() as u16;
+                kept.push(vertices[usize::from(*k)]);
+            }
+            *k = *name;
+        }
+        *vertices = kept;
     }
 
     fn add_normals(&mut self) {
@@ -128,12 +165,26 @@ impl Patch {
     }
 }
 
+/// What a patch must know about its map.
+pub(crate) struct Scale {
+    voxel_size: f64,
+    /// In steps of the stored distance.
+    most_rise: f64,
+}
+
+impl Scale {
+    pub(crate) fn new(settings: &Settings) -> Self {
+        let voxel = f64::from(ONE) / settings.truncation_voxels;
+        Self { voxel_size: settings.voxel_size, most_rise: MOST_RISE * voxel }
+    }
+}
+
 /// The voxels of a block and the first ones of those above it.
 struct Lattice<'a> {
     /// The first voxel of the block.
     corner: [f64; 3],
     blocks: &'a [&'a Block; 8],
-    voxel_size: f64,
+    scale: &'a Scale,
 }
 
 impl Lattice<'_> {
@@ -147,10 +198,11 @@ impl Lattice<'_> {
         // The ratio of means by the ratio of sums, whose difference is exact: t = a / (a - b).
         let [(s0, w0), (s1, w1)] = ends.map(|(block, k)| (i64::from(block.distance[k]), i64::from(block.weight[k])));
         let (a, b) = (s0 * w1, s1 * w0);
-        let t = a as f64 / (a - b) as f64;
+        let rise = (a - b) as f64;
+        let t = a as f64 / rise;
         let position = [0, 1, 2].map(|k| {
             let along = if k == axis { t } else { 0.0 };
-            ((self.corner[k] + at[k] as f64 + 0.5 + along) * self.voxel_size) as f32
+            ((self.corner[k] + at[k] as f64 + 0.5 + along) * self.scale.voxel_size) as f32
         });
         Vertex {
             position,
@@ -159,6 +211,7 @@ impl Lattice<'_> {
             outward: axis as u8 | u8::from(a < b) << 2,
             step: step as u8,
             edge: EdgeSet::edge(voxel, axis) as u16,
+            torn: rise.abs() > self.scale.most_rise * (w0 * w1) as f64,
         }
     }
 }

@@ -115,3 +115,30 @@ fn ply_holds_what_the_mesh_holds() {
     let index = |k: usize| u32::from_le_bytes(face[1 + 4 * k..5 + 4 * k].try_into().unwrap());
     assert_eq!([0, 1, 2].map(index), mesh.faces[mesh.faces.len() - 1]);
 }
+
+#[test]
+fn no_wall_is_drawn_where_only_its_two_edges_were_seen() {
+    // A step: its upper half in one image, its lower half in the other, so that no image has a depth edge.
+    let faces_half_way = |voxels: f64| {
+        let mut map = Map::new(Settings { voxel_size: 0.02, ..Settings::default() }).unwrap();
+        let step = 0.02 * voxels;
+        let pose = look_at(Point3::origin(), Point3::new(1.5, 0.0, 0.0));
+        for far in [false, true] {
+            let x = if far { 1.5 + step } else { 1.5 };
+            let half = |d: &Vector3<f64>| (x / d.x * d.y < 0.0) != far;
+            let shot = Shot::take((240, 180), [780.0; 2], pose, |_, d| half(d).then_some(x / d.x));
+            map.integrate(&shot.view(), None, &pose).unwrap();
+        }
+        let mesh = map.mesh();
+        assert_manifold(&mesh);
+        let middle =
+            |face: &&[u32; 3]| face.iter().map(|&k| f64::from(mesh.positions[k as usize][0]) / 3.0).sum::<f64>();
+        let half_way = |face: &&[u32; 3]| (middle(face) - 1.5 - 0.5 * step).abs() < 0.25 * step;
+        [mesh.faces.iter().filter(half_way).count(), mesh.faces.len()]
+    };
+    let [wall, planes] = faces_half_way(3.0);
+    assert!(wall == 0 && planes > 600, "{wall} {planes}");
+    // A step of one voxel is a slope like any other: two faces in each of the 16 voxels that it is long, at least.
+    let [slope, _] = faces_half_way(1.0);
+    assert!(slope >= 32, "{slope}");
+}
