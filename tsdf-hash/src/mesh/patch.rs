@@ -212,7 +212,7 @@ impl Ends {
 #[inline(always)]
 fn place(name: usize) -> [usize; 2] {
     let [x, y, z] = [name >> 2 & 15, name >> 6 & 15, name >> 10 & 15];
-    let step = x / SIDE | y / SIDE << 1 | z / SIDE << 2;
+    let step = (x / SIDE) | ((y / SIDE) << 1) | ((z / SIDE) << 2);
     [step & 7, x % SIDE + SIDE * (y % SIDE + SIDE * (z % SIDE))]
 }
 
