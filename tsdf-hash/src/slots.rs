@@ -76,15 +76,20 @@ impl<V> Slots<V> {
         &mut self.values
     }
 
-    /// Inserts a key that is not there yet.
-    pub(crate) fn insert(&mut self, key: Key, value: V) {
-        let len = self.len() + 1;
+    /// Makes room for `added` more at once.
+    pub(crate) fn reserve(&mut self, added: usize) {
+        let len = self.len() + added;
         if len > self.keys.capacity() {
             let more = Self::capacity_for(len) - self.len();
             self.keys.reserve_exact(more);
             self.values.reserve_exact(more);
         }
         self.table.reserve(len);
+    }
+
+    /// Inserts a key that is not there yet.
+    pub(crate) fn insert(&mut self, key: Key, value: V) {
+        self.reserve(1);
         self.table.set(key, self.len() as u32);
         self.keys.push(key);
         self.values.push(value);

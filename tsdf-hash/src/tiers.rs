@@ -108,7 +108,7 @@ impl Copies {
 
     /// Whether there is any copy of a block.
     pub(crate) fn contains(&self, key: Key) -> bool {
-        self.active.slot(key).is_some() || self.held.get(key).is_some() || self.cold.label(key).is_some()
+        self.active.slot(key).is_some() || self.held.get(key).is_some() || self.cold.contains(key)
     }
 
     /// Appends, once each, the blocks whose sum has changed since the clock of the active store stood at `stamp`; some
@@ -117,17 +117,23 @@ impl Copies {
         let later = |seen: &Seen| seen.stamp > stamp;
         changed.extend(self.active.sightings().filter(|(_, seen)| later(seen)).map(|(key, _)| key));
         if self.cold.latest() > stamp {
-            let cold = self.cold.labels().filter(|(_, label)| later(&label.seen())).map(|(key, _)| key);
-            changed.extend(cold);
+            changed.extend(self.cold.sightings().filter(|(_, seen)| later(seen)).map(|(key, _)| key));
             changed.sort_unstable();
             changed.dedup();
         }
     }
 
-    /// A block: its only copy if that is active, else the sum of all, which is added up in `sum`.
+    /// A block: its only copy if that is there to be looked at, else the sum of all, which is added up in `sum`.
     pub(crate) fn sum<'a>(&'a self, key: Key, sum: &'a mut Block) -> Result<Option<&'a Block>, Error> {
-        if self.all_active() || (self.held.get(key).is_none() && self.cold.label(key).is_none()) {
-            return Ok(self.active.get(key));
+        let (active, held) = (self.active.get(key), self.held.get(key));
+        if self.all_active() || (held.is_none() && !self.cold.contains(key)) {
+            return Ok(active);
+        }
+        if active.is_none()
+            && held.is_none()
+            && let Some(loose) = self.cold.loose.get(key)
+        {
+            return Ok(Some(loose));
         }
         self.total(key, sum)?;
         Ok(Some(sum))
@@ -136,7 +142,7 @@ impl Copies {
     /// The sum of all copies of a block, and what is known of it.
     pub(crate) fn total(&self, key: Key, sum: &mut Block) -> Result<Seen, Error> {
         *sum = Block::ZERO;
-        let mut seen = self.cold.add_to(key, sum)?.map(Label::seen).unwrap_or_default();
+        let mut seen = self.cold.add_to(key, sum)?.unwrap_or_default();
         if let Some(held) = self.held.get(key) {
             sum.add(&held.block);
             seen = seen.with(held.seen);
@@ -154,7 +160,7 @@ impl Copies {
             let copies = [
                 self.active.get(key).map(Block::print),
                 self.held.get(key).map(|held| held.block.print()),
-                self.cold.label(key).map(|label| label.print),
+                self.cold.print(key),
             ];
             let print = copies.into_iter().flatten().fold(0, u64::wrapping_add);
             fold(hash, key, print)
@@ -163,7 +169,7 @@ impl Copies {
 
     /// Whether a block can be added to the other copies without running over.
     fn fits(&self, key: Key, block: &Block) -> Result<bool, Error> {
-        let cold = self.cold.label(key).map(|label| label.peaks);
+        let cold = self.cold.peaks(key);
         let held = self.held.get(key).map(|held| held.block.peaks());
         if cold.is_none() && held.is_none() {
             return Ok(true);

@@ -8,7 +8,7 @@
 
 use std::sync::LazyLock;
 
-use super::patch::LATTICE;
+use super::patch::corner;
 
 /// Corner `c` of a cell is at `(c & 1, c >> 1 & 1, c >> 2)`; an edge is named by its lower corner and its axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,8 +32,7 @@ impl Edge {
 
 /// The surface in a cell.
 pub(crate) struct Case {
-    /// The cut edges: three times the lower corner's place in a lattice of 9³ corners, as seen from the cell's, and the
-    /// axis.
+    /// The cut edges: the name of the lower corner, as seen from the cell's lowest, and the axis.
     pub(crate) edges: Vec<u16>,
     /// Counter-clockwise triangles, seen from the free side, between these edges.
     pub(crate) triangles: Vec<[u8; 3]>,
@@ -54,8 +53,8 @@ impl Case {
             }) as u8
         };
         let triangles = triangles.iter().map(|triangle| triangle.map(&mut number)).collect();
-        let place = |c: usize| (c & 1) + LATTICE * ((c >> 1 & 1) + LATTICE * (c >> 2));
-        let edges = edges.iter().map(|edge| (3 * place(edge.corner) + edge.axis) as u16).collect();
+        let name = |edge: &Edge| corner([edge.corner & 1, edge.corner >> 1 & 1, edge.corner >> 2]) + edge.axis;
+        let edges = edges.iter().map(|edge| name(edge) as u16).collect();
         Self { edges, triangles }
     }
 }

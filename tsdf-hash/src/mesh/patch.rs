@@ -10,19 +10,23 @@ use super::cases::Case;
 use super::rows::{Bits, Rows};
 use super::weld::EdgeSet;
 use crate::Settings;
-use crate::block::{Block, ONE, SIDE, VOXELS};
+use crate::block::{Block, ONE, SIDE};
 use crate::key::Key;
 
 /// Colour of vertices that no colour image has seen.
 const UNSEEN: [u8; 3] = [128; 3];
-/// Corners of the cells of a block along an axis.
-pub(crate) const LATTICE: usize = SIDE + 1;
-/// Edges between them, with those that leave the lattice.
-const EDGES: usize = 3 * LATTICE * LATTICE * LATTICE;
+/// Edges between the corners of the cells of a block, as far as their names go.
+const EDGES: usize = corner([SIDE; 3]) + 4;
 const NEW: u16 = u16::MAX;
 /// No distance changes by more than a voxel from one voxel to the next. Where its mean changes by more than this many
 /// (ours), no surface lies between the two: they were seen from two sides, and one of them through something.
 const MOST_RISE: f64 = 1.75;
+
+/// The name of a corner, from its coordinates `0..=8`: four bits each, above two for the axis of an edge that leaves it.
+/// Names add up as coordinates do.
+pub(super) const fn corner(at: [usize; 3]) -> usize {
+    at[0] << 2 | at[1] << 6 | at[2] << 10
+}
 
 /// Where the surface cuts an edge.
 #[derive(Clone, Copy, Debug)]
@@ -60,14 +64,22 @@ pub(crate) struct Patch {
 pub(crate) struct Bench {
     /// Vertex on an edge of the lattice.
     vertex: Vec<u16>,
-    /// Crossed cells, and the edges that are cut.
+    /// Crossed cells by their lowest corners, and the edges that are cut.
     cells: Vec<(u16, u8)>,
     edges: Vec<u16>,
+    ends: Vec<Ends>,
+}
+
+/// The voxels at the lower and the upper end of an edge.
+struct Ends {
+    distance: [i32; 2],
+    weight: [u16; 2],
+    colour: [[u16; 4]; 2],
 }
 
 impl Bench {
     pub(crate) fn new() -> Self {
-        Self { vertex: vec![NEW; EDGES], cells: Vec::new(), edges: Vec::new() }
+        Self { vertex: vec![NEW; EDGES], cells: Vec::new(), edges: Vec::new(), ends: Vec::new() }
     }
 
     /// Finds the cells that the surface crosses and returns the blocks that their corners lie in, bit `n` for step `n`.
@@ -75,7 +87,7 @@ impl Bench {
         self.cells.clear();
         let mut blocks = 0;
         Rows::with_border(bits).crossed(|cell, case| {
-            self.cells.push(((cell[0] + LATTICE * (cell[1] + LATTICE * cell[2])) as u16, case));
+            self.cells.push((corner(cell) as u16, case));
             // The steps that this cell takes beyond the block, in any combination.
             blocks |= [0b1, 0b11, 0b101, 0b1111, 0b1_0001, 0b11_0011, 0b101_0101, 0xff]
                 [(0..3).fold(0, |steps, k| steps | usize::from(cell[k] + 1 == SIDE) << k)];
@@ -92,7 +104,7 @@ impl Bench {
             let case = &cases[usize::from(case)];
             let mut corners = [0; 12];
             for (corner, &edge) in corners.iter_mut().zip(&case.edges) {
-                let edge = 3 * cell + edge;
+                let edge = cell + edge;
                 let vertex = &mut self.vertex[usize::from(edge)];
                 if *vertex == NEW {
                     *vertex = self.edges.len() as u16;
@@ -102,13 +114,16 @@ impl Bench {
             }
             patch.faces.extend(case.triangles.iter().map(|triangle| triangle.map(|k| corners[usize::from(k)])));
         }
-        // Apart from the loop above, whose branches nobody can foresee: here the processor waits for many voxels at once.
-        let lattice = Lattice { corner: key.block().map(|c| f64::from(c) * SIDE as f64), blocks, scale };
+        // Apart from the loop above, whose branches nobody can foresee, and from the arithmetic: here the processor waits for
+        // many voxels at once.
+        self.ends.clear();
+        self.ends.extend(self.edges.iter().map(|&edge| Ends::read(usize::from(edge), blocks)));
+        let grid = Grid::new(key, scale);
         let mut torn = false;
         patch.vertices.reserve(self.edges.len());
-        for &edge in &self.edges {
+        for (&edge, ends) in self.edges.iter().zip(&self.ends) {
             self.vertex[usize::from(edge)] = NEW;
-            let vertex = lattice.vertex(usize::from(edge));
+            let vertex = grid.vertex(usize::from(edge), ends);
             patch.steps |= 1 << vertex.step;
             torn |= vertex.torn;
             patch.vertices.push(vertex);
@@ -154,12 +169,13 @@ impl Patch {
     }
 
     fn add_normals(&mut self) {
-        for face in &self.faces {
-            let [a, b, c] = face.map(|k| Vector3::from(self.vertices[usize::from(k)].position));
-            let normal = (b - a).cross(&(c - a));
-            for &k in face {
+        for &[a, b, c] in &self.faces {
+            let at = |k: u16| Vector3::from(self.vertices[usize::from(k)].position);
+            let first = at(a);
+            let normal = (at(b) - first).cross(&(at(c) - first));
+            for k in [a, b, c] {
                 let sum = &mut self.vertices[usize::from(k)].normal;
-                *sum = [0, 1, 2].map(|k| sum[k] + normal[k]);
+                *sum = [sum[0] + normal.x, sum[1] + normal.y, sum[2] + normal.z];
             }
         }
     }
@@ -179,60 +195,86 @@ impl Scale {
     }
 }
 
-/// The voxels of a block and the first ones of those above it.
-struct Lattice<'a> {
-    /// The first voxel of the block.
-    corner: [f64; 3],
-    blocks: &'a [&'a Block; 8],
-    scale: &'a Scale,
-}
-
-impl Lattice<'_> {
-    fn vertex(&self, edge: usize) -> Vertex {
-        let (point, axis) = (edge / 3, edge % 3);
-        let at = [point % LATTICE, point / LATTICE % LATTICE, point / (LATTICE * LATTICE)];
-        let mut beyond = at;
-        beyond[axis] += 1;
-        let ([step, voxel], [other_step, other]) = (place(at), place(beyond));
-        let ends = [(self.blocks[step], voxel), (self.blocks[other_step], other)];
-        // The ratio of means by the ratio of sums, whose difference is exact: t = a / (a - b).
-        let [(s0, w0), (s1, w1)] = ends.map(|(block, k)| (i64::from(block.distance[k]), i64::from(block.weight[k])));
-        let (a, b) = (s0 * w1, s1 * w0);
-        let rise = (a - b) as f64;
-        let t = a as f64 / rise;
-        let position = [0, 1, 2].map(|k| {
-            let along = if k == axis { t } else { 0.0 };
-            ((self.corner[k] + at[k] as f64 + 0.5 + along) * self.scale.voxel_size) as f32
-        });
-        Vertex {
-            position,
-            normal: [0.0; 3],
-            colour: blend(ends.map(|(block, voxel)| block.colour[voxel].map(f32::from)), t as f32),
-            outward: axis as u8 | u8::from(a < b) << 2,
-            step: step as u8,
-            edge: EdgeSet::edge(voxel, axis) as u16,
-            torn: rise.abs() > self.scale.most_rise * (w0 * w1) as f64,
+impl Ends {
+    #[inline(always)]
+    fn read(edge: usize, blocks: &[&Block; 8]) -> Self {
+        let ([step, voxel], [other_step, other]) = (place(edge), place(edge + (4 << (4 * (edge & 3)))));
+        let (lower, upper) = (blocks[step], blocks[other_step]);
+        Self {
+            distance: [lower.distance[voxel], upper.distance[other]],
+            weight: [lower.weight[voxel], upper.weight[other]],
+            colour: [lower.colour[voxel], upper.colour[other]],
         }
     }
 }
 
-/// The block of a point of the lattice, and the voxel there.
-fn place(at: [usize; 3]) -> [usize; 2] {
-    let step = (0..3).fold(0, |step, k| step | (at[k] / SIDE) << k);
-    [step, (at[0] % SIDE + SIDE * (at[1] % SIDE + SIDE * (at[2] % SIDE))) % VOXELS]
+/// The block of a corner or of the lower end of an edge, and the voxel there.
+#[inline(always)]
+fn place(name: usize) -> [usize; 2] {
+    let [x, y, z] = [name >> 2 & 15, name >> 6 & 15, name >> 10 & 15];
+    let step = (x / SIDE) | ((y / SIDE) << 1) | ((z / SIDE) << 2);
+    [step & 7, x % SIDE + SIDE * (y % SIDE + SIDE * (z % SIDE))]
+}
+
+/// Where the corners of the cells of a block are.
+struct Grid<'a> {
+    /// Coordinates in voxels, for each axis, and in metres.
+    voxels: [[f64; 16]; 3],
+    metres: [[f32; 16]; 3],
+    scale: &'a Scale,
+}
+
+impl<'a> Grid<'a> {
+    fn new(key: Key, scale: &'a Scale) -> Self {
+        let mut grid = Self { voxels: [[0.0; 16]; 3], metres: [[0.0; 16]; 3], scale };
+        for (axis, c) in key.block().into_iter().enumerate() {
+            for n in 0..=SIDE {
+                let at = f64::from(c) * SIDE as f64 + n as f64 + 0.5;
+                grid.voxels[axis][n] = at;
+                grid.metres[axis][n] = (at * scale.voxel_size) as f32;
+            }
+        }
+        grid
+    }
+
+    #[inline(always)]
+    fn vertex(&self, edge: usize, ends: &Ends) -> Vertex {
+        let ([step, voxel], axis) = (place(edge), (edge & 3).min(2));
+        // The ratio of means by the ratio of sums, whose difference is exact: t = a / (a - b). All are below 2^48.
+        let a = f64::from(ends.distance[0]) * f64::from(ends.weight[1]);
+        let b = f64::from(ends.distance[1]) * f64::from(ends.weight[0]);
+        let t = a / (a - b);
+        let at = [edge >> 2 & 15, edge >> 6 & 15, edge >> 10 & 15];
+        let mut position = [self.metres[0][at[0]], self.metres[1][at[1]], self.metres[2][at[2]]];
+        position[axis] = ((self.voxels[axis][at[axis]] + t) * self.scale.voxel_size) as f32;
+        Vertex {
+            position,
+            normal: [0.0; 3],
+            colour: blend(ends.colour, t as f32),
+            outward: axis as u8 | u8::from(a < b) << 2,
+            step: step as u8,
+            edge: EdgeSet::edge(voxel, axis) as u16,
+            torn: (a - b).abs() > self.scale.most_rise * f64::from(ends.weight[0]) * f64::from(ends.weight[1]),
+        }
+    }
 }
 
 /// The mean colour at `t` between two voxels, from their sums and counts; that of one where the other has none.
-fn blend([a, b]: [[f32; 4]; 2], t: f32) -> [u8; 3] {
-    let t = if b[3] == 0.0 { 0.0 } else { t };
-    let t = if a[3] == 0.0 { 1.0 } else { t };
-    if a[3] + b[3] == 0.0 {
+#[inline(always)]
+fn blend([a, b]: [[u16; 4]; 2], t: f32) -> [u8; 3] {
+    let t = if b[3] == 0 { 0.0 } else { t };
+    let t = if a[3] == 0 { 1.0 } else { t };
+    if a[3] | b[3] == 0 {
         return UNSEEN;
     }
     // Six bits to eight; a count of none only meets a share of zero.
     let scale = 255.0 / 63.0;
-    let (share, other) = ((1.0 - t) * scale / a[3].max(1.0), t * scale / b[3].max(1.0));
-    [0, 1, 2].map(|k| (a[k] * share + b[k] * other + 0.5) as u8)
+    let (share, other) = ((1.0 - t) * scale / f32::from(a[3].max(1)), t * scale / f32::from(b[3].max(1)));
+    let mut colour = [0; 3];
+    for (k, colour) in colour.iter_mut().enumerate() {
+        *colour = (f32::from(a[k]) * share + f32::from(b[k]) * other + 0.5) as u8;
+    }
+    colour
 }
 
 #[cfg(test)]
@@ -242,7 +284,7 @@ mod tests {
     #[test]
     fn colours_are_means_of_six_bits() {
         // Sums of three and of one observation: 10 and 31 of 63.
-        let (three, one, none) = ([30.0, 0.0, 189.0, 3.0], [31.0, 63.0, 0.0, 1.0], [0.0; 4]);
+        let (three, one, none) = ([30, 0, 189, 3], [31, 63, 0, 1], [0; 4]);
         assert_eq!(blend([three, none], 0.7), [40, 0, 255]);
         assert_eq!(blend([none, one], 0.2), [125, 255, 0]);
         // (10 + (31 - 10) / 3) 255 / 63 = 68.8.

@@ -33,6 +33,7 @@ impl Copies {
             self.active.insert(key, Box::new(block.clone()), seen);
             return Ok(());
         }
-        self.cold.put(key, block, seen).map_err(|error| self.or_no_tiers(error))
+        let put = self.cold.put(key, Box::new(block.clone()), seen);
+        put.map_err(|(_, error)| self.or_no_tiers(error))
     }
 }

@@ -17,9 +17,20 @@ pub(crate) struct Change {
     pub(crate) removed: usize,
     /// Blocks that the frame touched and that are active.
     pub(crate) touched: Vec<Key>,
+    /// Blocks that it touched where they lie in host memory.
+    in_host: Vec<Key>,
 }
 
-/// An active block in work, out of its slot.
+/// A frame, and what is to be done with it.
+#[derive(Clone, Copy)]
+struct Job<'a> {
+    frame: &'a Frame<'a>,
+    sign: Sign,
+    moment: Moment,
+    threads: usize,
+}
+
+/// A block in work, out of its slot.
 struct Present {
     key: Key,
     slot: usize,
@@ -27,7 +38,7 @@ struct Present {
     tally: Tally,
 }
 
-/// The part of a frame in a block that was not active.
+/// The part of a frame in a block that was neither active nor loose in host memory.
 struct Partial {
     key: Key,
     block: Box<Block>,
@@ -52,6 +63,7 @@ impl Copies {
         moment: Moment,
         threads: usize,
     ) -> Result<Change, Error> {
+        let job = Job { frame, sign, moment, threads };
         self.call = self.call.wrapping_add(1);
         if sign == Sign::Minus {
             // What is taken out must have been in: that can be seen on whole sums only.
@@ -65,15 +77,13 @@ impl Copies {
                 None => absent.push(key),
             }
         }
-        update(frame, sign, &mut present, threads);
+        job.update(sign, &mut present);
         let mut change = Change::default();
         let fault = present.iter().find(|work| work.tally.fault).map(|work| work.key);
         self.put_back(present, &mut change);
         let outcome = match fault {
             Some(key) => Err(refused(sign, key)),
-            None => self
-                .split_blocks_fit(sign, &change.touched)
-                .and_then(|()| self.absent(frame, sign, &mut absent, moment, threads, &mut change)),
+            None => self.split_blocks_fit(sign, &change.touched).and_then(|()| self.absent(job, absent, &mut change)),
         };
         match outcome {
             Ok(partials) => {
@@ -82,7 +92,7 @@ impl Copies {
             }
             Err(error) => {
                 self.cold.abort();
-                self.undo(frame, sign, &change.touched, threads);
+                self.undo(job, &change.touched);
                 return Err(error);
             }
         }
@@ -101,13 +111,13 @@ impl Copies {
     }
 
     /// Wrapping sums form a group: the opposite update restores every bit.
-    fn undo(&mut self, frame: &Frame, sign: Sign, touched: &[Key], threads: usize) {
+    fn undo(&mut self, job: Job, touched: &[Key]) {
         let taken = touched.iter().filter_map(|&key| {
             let slot = self.active.slot(key)?;
             Some(Present { key, slot, block: self.active.take(slot)?, tally: Tally::default() })
         });
         let mut present: Vec<_> = taken.collect();
-        update(frame, sign.opposite(), &mut present, threads);
+        job.update(job.sign.opposite(), &mut present);
         for work in present {
             self.active.put(work.slot, work.block);
         }
@@ -134,63 +144,118 @@ impl Copies {
         for &key in keys {
             self.unhold(key)?;
             if let Some((block, seen)) = self.active.get_mut(key)
-                && let Some(label) = self.cold.add_to(key, block)?
+                && let Some(older) = self.cold.add_to(key, block)?
             {
-                *seen = label.seen().with(*seen);
+                *seen = older.with(*seen);
                 self.cold.remove(key);
             }
         }
         Ok(())
     }
 
-    /// The parts of the frame in blocks that are not active. Those that active memory has no room for, once it has sent
-    /// away all that the frame does not touch, are staged in cold memory; the others are returned.
-    fn absent(
-        &mut self,
-        frame: &Frame,
-        sign: Sign,
-        mut absent: &mut [Key],
-        moment: Moment,
-        threads: usize,
-        change: &mut Change,
-    ) -> Result<Vec<Partial>, Error> {
-        let threads = threads.min(self.active.spare() - 2);
-        // One blank block per thread, and one to check sums with.
-        let spare = self.active.spare() - 1 - threads;
-        let mut room = self.active.room();
-        let mut kept: Vec<Partial> = Vec::new();
-        while !absent.is_empty() {
-            let count = (room + spare).min(absent.len());
-            let (some, rest) = absent.split_at_mut(count);
-            absent = rest;
-            let partials = partials(frame, some, threads);
-            let mut waiting = partials.len();
-            for partial in partials {
-                change.voxels += partial.voxels;
-                change.blocks += 1;
-                if sign == Sign::Minus {
-                    change.removed += usize::from(self.take_out_cold(&partial)?);
-                    continue;
-                }
-                if !self.fits(partial.key, &partial.block)? {
-                    return Err(refused(sign, partial.key));
-                }
-                change.added += usize::from(self.is_new(partial.key));
-                if room == 0 {
-                    self.make_room(waiting, moment.eye)?;
-                    room = self.active.room().saturating_sub(kept.len());
-                }
-                waiting -= 1;
-                if room > 0 {
-                    room -= 1;
-                    kept.push(partial);
-                } else {
-                    let seen = self.seen_now(moment);
-                    self.cold.stage(partial.key, &partial.block, seen).map_err(|error| self.or_no_tiers(error))?;
-                }
+    /// The frame in blocks that are not active. As long as active memory has room, once it has sent away what the frame does
+    /// not touch, it gets copies of what is new in them: those are returned. For the rest, loose blocks in host memory are
+    /// changed where they lie, and what is new elsewhere is staged in cold memory.
+    fn absent(&mut self, job: Job, mut absent: Vec<Key>, change: &mut Change) -> Result<Vec<Partial>, Error> {
+        let mut kept = Vec::new();
+        while job.sign == Sign::Plus && !absent.is_empty() && self.active.room() + self.movable() > kept.len() {
+            let some = self.in_flight(job, &kept).min(absent.len());
+            self.add_partials(job, &mut absent[..some], &mut kept, change)?;
+            absent.drain(..some);
+        }
+        // To stage one block, another one may have to be packed.
+        loop {
+            let (loose, mut others): (Vec<_>, Vec<_>) =
+                absent.into_iter().partition(|&key| self.cold.loose.note(key, self.call));
+            absent = loose;
+            if others.is_empty() {
+                break;
+            }
+            for some in others.chunks_mut(self.in_flight(job, &kept)) {
+                self.add_partials(job, some, &mut kept, change)?;
             }
         }
+        // Last, because nobody would know how to take it back.
+        self.change_in_host(job, &absent, change)?;
         Ok(kept)
+    }
+
+    /// How many partial sums may wait outside the tiers: one blank block per thread, and one to check sums with, count too.
+    fn in_flight(&self, job: Job, kept: &[Partial]) -> usize {
+        (self.active.room() + self.active.spare())
+            .saturating_sub(kept.len() + 1 + self.threads_for_partials(job))
+            .max(1)
+    }
+
+    fn threads_for_partials(&self, job: Job) -> usize {
+        job.threads.min(self.active.spare() - 2)
+    }
+
+    /// Adds the parts of a frame in blocks that are neither active nor loose, or takes them out.
+    fn add_partials(
+        &mut self,
+        job: Job,
+        keys: &mut [Key],
+        kept: &mut Vec<Partial>,
+        change: &mut Change,
+    ) -> Result<(), Error> {
+        let partials = partials(job.frame, keys, self.threads_for_partials(job));
+        let mut waiting = partials.len();
+        let mut room = self.active.room().saturating_sub(kept.len());
+        let mut movable = self.movable();
+        for partial in partials {
+            change.voxels += partial.voxels;
+            change.blocks += 1;
+            if job.sign == Sign::Minus {
+                change.removed += usize::from(self.take_out_cold(&partial)?);
+                continue;
+            }
+            if !self.fits(partial.key, &partial.block)? {
+                return Err(refused(job.sign, partial.key));
+            }
+            change.added += usize::from(self.is_new(partial.key));
+            if room == 0 && movable > 0 {
+                self.make_room(waiting, job.moment.eye)?;
+                movable = 0;
+                room = self.active.room().saturating_sub(kept.len());
+            }
+            waiting -= 1;
+            if room > 0 {
+                room -= 1;
+                kept.push(partial);
+            } else {
+                let seen = self.seen_now(job.moment);
+                self.cold.stage(partial.key, partial.block, seen).map_err(|error| self.or_no_tiers(error))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Changes loose blocks. After an error they are as they were.
+    fn change_in_host(&mut self, job: Job, keys: &[Key], change: &mut Change) -> Result<(), Error> {
+        let taken = keys.iter().filter_map(|&key| {
+            let (slot, block) = self.cold.loose.take(key)?;
+            Some(Present { key, slot, block, tally: Tally::default() })
+        });
+        let mut present: Vec<_> = taken.collect();
+        job.update(job.sign, &mut present);
+        let outcome = present.iter().try_for_each(|work| {
+            // Out of its slot it does not count twice: what it has to fit together with is held.
+            let alone = job.sign == Sign::Minus || self.held.len() == 0;
+            let fits = !work.tally.fault && (alone || self.fits(work.key, &work.block)?);
+            if fits { Ok(()) } else { Err(refused(job.sign, work.key)) }
+        });
+        if outcome.is_err() {
+            job.update(job.sign.opposite(), &mut present);
+        }
+        for work in present {
+            self.cold.loose.put(work.slot, work.block);
+            if work.tally.voxels > 0 {
+                change.in_host.push(work.key);
+                change.voxels += work.tally.voxels;
+            }
+        }
+        outcome
     }
 
     fn seen_now(&mut self, moment: Moment) -> Seen {
@@ -203,19 +268,20 @@ impl Copies {
     }
 
     fn is_new(&self, key: Key) -> bool {
-        self.cold.label(key).is_none() && self.held.get(key).is_none()
+        !self.cold.contains(key) && self.held.get(key).is_none()
     }
 
     /// Takes a partial sum out of a block that is cold; returns whether nothing is left of it.
     fn take_out_cold(&mut self, partial: &Partial) -> Result<bool, Error> {
         let mut sum = Box::new(Block::ZERO);
-        let label = self.cold.add_to(partial.key, &mut sum)?;
-        let Some(label) = label.filter(|_| !sum.subtract(&partial.block)) else {
+        let seen = self.cold.add_to(partial.key, &mut sum)?;
+        let Some(seen) = seen.filter(|_| !sum.subtract(&partial.block)) else {
             return Err(refused(Sign::Minus, partial.key));
         };
-        let seen = Seen { frames: label.frames.saturating_sub(1), stamp: self.active.tick(), ..label.seen() };
-        self.cold.stage_instead(partial.key, &sum, seen)?;
-        Ok(sum.is_empty())
+        let seen = Seen { frames: seen.frames.saturating_sub(1), stamp: self.active.tick(), ..seen };
+        let gone = sum.is_empty();
+        self.cold.stage_instead(partial.key, sum, seen)?;
+        Ok(gone)
     }
 
     /// Nothing can fail any more.
@@ -225,13 +291,7 @@ impl Copies {
         let mut emptied = Vec::new();
         for &key in &change.touched {
             let Some((block, seen)) = self.active.get_mut(key) else { continue };
-            match sign {
-                Sign::Plus => {
-                    seen.last = moment.time;
-                    seen.frames = seen.frames.saturating_add(1);
-                }
-                Sign::Minus => seen.frames = seen.frames.saturating_sub(1),
-            }
+            seen.count(sign, moment);
             if block.is_empty() {
                 emptied.push(key);
             }
@@ -239,6 +299,13 @@ impl Copies {
         change.removed += emptied.len();
         for key in emptied {
             self.active.remove(key);
+        }
+        change.blocks += change.in_host.len();
+        for &key in &change.in_host {
+            let Some(mut seen) = self.cold.loose.seen(key) else { continue };
+            seen.count(sign, moment);
+            seen.stamp = self.active.tick();
+            change.removed += usize::from(self.cold.note_change(key, seen));
         }
         for partial in partials {
             change.touched.push(partial.key);
@@ -248,19 +315,33 @@ impl Copies {
     }
 }
 
+impl Seen {
+    fn count(&mut self, sign: Sign, moment: Moment) {
+        match sign {
+            Sign::Plus => {
+                self.last = moment.time;
+                self.frames = self.frames.saturating_add(1);
+            }
+            Sign::Minus => self.frames = self.frames.saturating_sub(1),
+        }
+    }
+}
+
+impl Job<'_> {
+    fn update(&self, sign: Sign, present: &mut [Present]) {
+        in_chunks(present, self.threads, |chunk| {
+            for work in chunk {
+                work.tally = self.frame.apply(sign, work.key, &mut work.block);
+            }
+        });
+    }
+}
+
 fn refused(sign: Sign, key: Key) -> Error {
     match sign {
         Sign::Plus => Error::Saturated { block: key.block() },
         Sign::Minus => Error::NotIntegrated { block: key.block() },
     }
-}
-
-fn update(frame: &Frame, sign: Sign, present: &mut [Present], threads: usize) {
-    in_chunks(present, threads, |chunk| {
-        for work in chunk {
-            work.tally = frame.apply(sign, work.key, &mut work.block);
-        }
-    });
 }
 
 /// What the frame adds to each of these blocks, for those it touches.

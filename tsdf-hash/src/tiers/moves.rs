@@ -51,7 +51,7 @@ impl Copies {
             if arrived == self.limits.transfers {
                 break;
             }
-            if self.cold.label(key).is_some() && self.bring_back(key, time).unwrap_or(false) {
+            if self.cold.contains(key) && self.bring_back(key, time).unwrap_or(false) {
                 arrived += 1;
             }
         }
@@ -75,8 +75,8 @@ impl Copies {
             let Some(held) = self.held.get_mut(key) else { return Ok(false) };
             (&mut *held.block, &mut held.seen)
         };
-        if let Some(label) = self.cold.add_to(key, block)? {
-            *seen = label.seen().with(*seen);
+        if let Some(older) = self.cold.add_to(key, block)? {
+            *seen = older.with(*seen);
             self.cold.remove(key);
         }
         Ok(true)
@@ -102,12 +102,20 @@ impl Copies {
             *seen = held.seen.with(*seen);
         } else if self.active.room() > 0 {
             self.active.insert(key, held.block, held.seen);
-        } else if let Err(error) = self.cold.put(key, &held.block, held.seen) {
-            self.held.insert(key, held);
-            self.active.set_aside = self.held_bytes(1);
-            return Err(error);
+        } else {
+            return self.put_held_away(key, held);
         }
         Ok(())
+    }
+
+    fn put_held_away(&mut self, key: Key, held: Held) -> Result<(), Error> {
+        let Held { block, seen, since } = held;
+        let put = self.cold.put(key, block, seen).map_err(|(block, error)| {
+            self.held.insert(key, Held { block, seen, since });
+            error
+        });
+        self.active.set_aside = self.held_bytes(1);
+        put
     }
 
     /// Sends away up to `count` blocks that the current call has not touched, by age, then by distance; then held ones.
@@ -132,13 +140,9 @@ impl Copies {
         let mut held = self.held.keys().to_vec();
         held.sort_unstable();
         for key in held.into_iter().take(count - victims.len()) {
-            if let Some(held) = self.held.remove(key)
-                && let Err(error) = self.cold.put(key, &held.block, held.seen)
-            {
-                self.held.insert(key, held);
-                return Err(error);
+            if let Some(held) = self.held.remove(key) {
+                self.put_held_away(key, held)?;
             }
-            self.active.set_aside = self.held_bytes(1);
         }
         Ok(())
     }
@@ -146,11 +150,18 @@ impl Copies {
     /// Moves an active block to cold memory, into its copy there if it has one.
     fn send_away(&mut self, key: Key) -> Result<(), Error> {
         let Some((block, seen)) = self.active.remove(key) else { return Ok(()) };
-        let put = self.cold.put(key, &block, seen);
-        if put.is_err() {
+        self.cold.put(key, block, seen).map_err(|(block, error)| {
             self.active.insert(key, block, seen);
+            error
+        })
+    }
+
+    /// How many blocks [`make_room`](Self::make_room) can send away at most.
+    pub(super) fn movable(&self) -> usize {
+        if !self.cold.exists() {
+            return 0;
         }
-        put
+        self.active.sightings().filter(|(_, seen)| seen.call != self.call).count() + self.held.len()
     }
 }
 
@@ -161,7 +172,7 @@ fn distance(key: Key, eye: [f64; 3]) -> f64 {
 
 /// Finite numbers in their order.
 #[derive(Clone, Copy, PartialEq)]
-struct Order(f64);
+pub(super) struct Order(pub(super) f64);
 
 impl Eq for Order {}
 

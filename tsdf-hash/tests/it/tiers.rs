@@ -31,30 +31,20 @@ fn make(settings: Settings, name: &str) -> Map {
     if settings.tiers.disk_bytes == 0 { Map::new(settings) } else { Map::with_swap(settings, &scratch(name)) }.unwrap()
 }
 
-fn colours(shot: &Shot) -> Vec<u8> {
+pub(crate) fn colours(shot: &Shot) -> Vec<u8> {
     (0..3 * shot.width * shot.height).map(|k| (k * 7 % 251) as u8).collect()
 }
 
+pub(crate) fn colour_view<'a>(shot: &Shot, rgb8: &'a [u8]) -> ColourView<'a> {
+    ColourView { width: shot.width, height: shot.height, data: ColourData::Rgb8(rgb8), intrinsics: shot.intrinsics }
+}
+
 pub(crate) fn add(map: &mut Map, shot: &Shot) -> Result<tsdf_hash::FrameReport, Error> {
-    let rgb8 = colours(shot);
-    let colour = ColourView {
-        width: shot.width,
-        height: shot.height,
-        data: ColourData::Rgb8(&rgb8),
-        intrinsics: shot.intrinsics,
-    };
-    map.integrate(&shot.view(), Some(&colour), &shot.world_from_camera)
+    map.integrate(&shot.view(), Some(&colour_view(shot, &colours(shot))), &shot.world_from_camera)
 }
 
 pub(crate) fn take_out(map: &mut Map, shot: &Shot) -> Result<tsdf_hash::FrameReport, Error> {
-    let rgb8 = colours(shot);
-    let colour = ColourView {
-        width: shot.width,
-        height: shot.height,
-        data: ColourData::Rgb8(&rgb8),
-        intrinsics: shot.intrinsics,
-    };
-    map.deintegrate(&shot.view(), Some(&colour), &shot.world_from_camera)
+    map.deintegrate(&shot.view(), Some(&colour_view(shot, &colours(shot))), &shot.world_from_camera)
 }
 
 fn assert_capped(map: &Map) {

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3};
 use tsdf_hash::{ArrivalSettings, ArrivalView, CastSettings, Map, MeshKeeper, Settings, Tiers, View};
 
 use crate::scene::room;
-use crate::tiers::add;
+use crate::tiers::{add, colour_view, colours};
 
 /// Milliseconds that this thread has run.
 fn thread_ms() -> f64 {
@@ -39,7 +39,9 @@ fn meshes_of_the_room_at_one_centimetre() {
     }
     let worst = updates.iter().copied().fold(0.0, f64::max);
     let (changed, rebuilt) = (changed / 60, rebuilt / 60);
-    println!("fusion {:.2} ms, update {:.2} ms (worst {worst:.2})", median(&mut fusions), median(&mut updates));
+    let mean = updates.iter().sum::<f64>() / 60.0;
+    println!("fusion {:.2} ms", median(&mut fusions));
+    println!("update {:.2} ms (mean {mean:.2}, worst {worst:.2})", median(&mut updates));
     println!("{changed} blocks changed and {rebuilt} rebuilt per frame, {} in all", map.blocks());
     let mut times = [0; 5].map(|_| timed(|| keeper.mesh()).1);
     println!("welding {:.1} ms", median(&mut times));
@@ -93,4 +95,36 @@ fn distances_in_the_room_at_one_centimetre() {
     let known = points.iter().filter(|p| map.distance_and_gradient(p).is_some()).count();
     let each = 1e6 * median(&mut times) / points.len() as f64;
     println!("distance and gradient {each:.0} ns, {known} of {} known", points.len());
+}
+
+/// What a small budget costs: rounds of the room without one and with 8 MiB of active and 64 MiB of host memory, in turns.
+#[test]
+#[ignore = "prints times"]
+fn price_of_eight_mebibytes() {
+    let shots = room::tour(60, 1, &Isometry3::identity());
+    let tiers = Tiers { host_bytes: 64 << 20, ..Tiers::default() };
+    let capped = Settings { max_bytes: 8 << 20, tiers, ..Settings::default() };
+    let rgb8 = colours(&shots[0]);
+    let mut times = [const { Vec::new() }; 2];
+    let mut hashes = Vec::new();
+    for round in 0..6 {
+        let mut map = Map::new([Settings::default(), capped][round % 2]).unwrap();
+        for shot in &shots {
+            let (depth, colour, pose) = (shot.view(), colour_view(shot, &rgb8), &shot.world_from_camera);
+            times[round % 2].push(timed(|| map.integrate(&depth, Some(&colour), pose).unwrap()).1);
+        }
+        hashes.push(map.hash());
+        if round < 2 {
+            println!("{:?}", map.memory());
+        }
+    }
+    let [free, capped] = times.map(|mut times| {
+        let sum: f64 = times.iter().sum();
+        let middle = median(&mut times);
+        let late = times[times.len() * 99 / 100];
+        println!("median {middle:.2} ms, p99 {late:.2} ms ({:.2} medians), sum {sum:.0} ms", late / middle);
+        [middle, sum]
+    });
+    println!("ratio of medians {:.3}, of sums {:.3}", capped[0] / free[0], capped[1] / free[1]);
+    assert!(hashes.iter().all(|&hash| hash == hashes[0]));
 }
