@@ -1,4 +1,5 @@
-//! Which blocks may hold a voxel within `μ` of a measured depth.
+//! Which blocks may hold a voxel that is up to `μ` behind a measured depth, and up to `μ` or as far as space is carved in
+//! front of it.
 //!
 //! A superset is enough: fusion tests every voxel itself, so what is found here changes the time and never the map.
 
@@ -29,8 +30,8 @@ pub(crate) fn near(
         depth,
         origin: world_from_camera.translation.vector / settings.block_size(),
         rotation: world_from_camera.rotation.to_rotation_matrix().into_inner() / settings.block_size(),
-        // A little more than μ: the voxels are projected in single precision.
-        reach: settings.truncation() * 1.001 + 1e-4 * settings.voxel_size,
+        // A little more than that: the voxels are projected in single precision.
+        reach: [settings.front(), settings.truncation()].map(|reach| reach * 1.001 + 1e-4 * settings.voxel_size),
         block: settings.block_size(),
         recent: vec![Key(u64::MAX); RECENT],
         keys: Vec::new(),
@@ -50,7 +51,8 @@ struct Search<'a> {
     origin: Vector3<f64>,
     /// Blocks in the world from metres in the camera.
     rotation: nalgebra::Matrix3<f64>,
-    reach: f64,
+    /// In front and behind.
+    reach: [f64; 2],
     block: f64,
     recent: Vec<Key>,
     keys: Vec<Key>,
@@ -94,7 +96,7 @@ impl Search<'_> {
             let pixel = [edge(u, n & 1), edge(v, n >> 1)];
             *ray = self.rotation * Vector3::new((pixel[0] - k.cx) / k.fx, (pixel[1] - k.cy) / k.fy, 1.0);
         }
-        let (near, far) = ((near - self.reach).max(0.0), far + self.reach);
+        let (near, far) = ((near - self.reach[0]).max(0.0), far + self.reach[1]);
         let slices = ((far - near) / self.block).ceil();
         let step = (far - near) / slices;
         for slice in 0..slices as usize {
@@ -147,8 +149,10 @@ mod tests {
         // A ramp with a step, seen from oblique poses by cameras of either handedness.
         let data: Vec<f32> =
             (0..80 * 60).map(|k| 0.9 + 0.004 * (k % 80) as f32 + if k / 80 > 30 { 0.35 } else { 0.0 }).collect();
-        for (threads, fx, fy) in [(1, 70.0, 70.0), (2, 60.0, -75.0), (3, -65.0, 80.0)] {
-            let settings = Settings { voxel_size: 0.01, threads, ..Settings::default() };
+        for (threads, fx, fy, carve) in
+            [(1, 70.0, 70.0, 0.0), (2, 60.0, -75.0, 0.0), (3, -65.0, 80.0, 0.0), (2, 65.0, 70.0, 0.6)]
+        {
+            let settings = Settings { voxel_size: 0.01, carve, threads, ..Settings::default() };
             let intrinsics = Intrinsics { fx, fy, cx: 38.3, cy: 31.7 };
             let view = DepthView { width: 80, height: 60, data: DepthData::F32 { data: &data }, intrinsics };
             let pose = Isometry3::new(Vector3::new(0.05, -0.02, -1.0), Vector3::new(0.3, -0.4, 0.2 * fx / 60.0));

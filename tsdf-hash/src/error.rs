@@ -143,7 +143,7 @@ pub enum Error {
     },
     /// A map cannot be continued with settings that would make its sums mean something else.
     #[error(
-        "the map was made with another voxel size, truncation, depth range or noise: only memory and threads may change"
+        "the map was made with another voxel size, truncation, carving, depth range or noise: only memory and threads may change"
     )]
     OtherSettings,
     /// Reading or writing a file failed.

@@ -50,7 +50,8 @@ pub(crate) struct Frame<'a> {
     projection: Matrix3<f64>,
     offset: Vector3<f64>,
     voxel_size: f64,
-    pub(crate) truncation: f32,
+    /// Voxels are touched this far in front of a surface, from the one (behind it: `-μ`) to the other, metres.
+    pub(crate) reach: [f32; 2],
     /// In steps of the stored distance.
     pub(crate) colour_reach: f32,
     width: i32,
@@ -75,7 +76,7 @@ impl<'a> Frame<'a> {
             projection: pixels_from_camera * camera_from_world.rotation.to_rotation_matrix().into_inner(),
             offset: pixels_from_camera * camera_from_world.translation.vector,
             voxel_size: settings.voxel_size,
-            truncation: settings.truncation() as f32,
+            reach: [-settings.truncation(), settings.front()].map(|reach| reach as f32),
             width: surface.width as i32,
             last: [surface.width, surface.height].map(|side| (side - 1) as f32),
             colour_reach: (f64::from(ONE) * COLOUR_REACH / settings.truncation_voxels) as f32,
@@ -113,7 +114,7 @@ impl<'a> Frame<'a> {
     ///                p.z > 0, 0 <= i <= width - 1, 0 <= j <= height - 1, or the voxel is not touched
     ///                plane = planes[i + width j]
     ///                own = p.z scaled_omega
-    ///                |offset - own| <= μ scaled_omega, or the voxel is not touched
+    ///                -μ scaled_omega <= offset - own <= front scaled_omega, or the voxel is not touched
     ///                du = u - i;  dv = v - j
     ///                q = offset - p.z (scaled_omega + (slope_u du + slope_v dv))
     ///                coloured = |q| < reach
@@ -122,12 +123,12 @@ impl<'a> Frame<'a> {
     ///                S += w q;  W += w                               in integers
     /// ```
     ///
-    /// `start` and the steps are computed in double precision and rounded once.
+    /// `front` is `μ`, or the distance that is carved if that is larger. `start` and the steps are computed in double precision and rounded once.
     fn update<const PLUS: bool>(&self, key: Key, block: &mut Block) -> Tally {
         let (start, step) = (self.start(key), self.step());
         let [sx, sy, sz] = [0, 1, 2].map(|axis| step.column(axis).into_owned());
         let steps = [sx, sy, sz];
-        let Some(slab) = Slab::under(self.surface, self.truncation, &start, &steps) else { return Tally::default() };
+        let Some(slab) = Slab::under(self.surface, self.reach, &start, &steps) else { return Tally::default() };
         let offsets = [0, LANES].map(|first| Offsets::new(&sx, first));
         let mut work = Work::default();
         for z in 0..SIDE {
@@ -178,8 +179,9 @@ impl<'a> Frame<'a> {
         let mut touched = [0; LANES];
         for x in 0..LANES {
             // A NaN fails, and so does an omega of 0.
-            let within = (offset[x] - lanes.depth[x] * omega[x]).abs() <= self.truncation * omega[x];
-            touched[x] = mask(within) & lanes.inside[x];
+            let ahead = offset[x] - lanes.depth[x] * omega[x];
+            let within = mask(ahead >= self.reach[0] * omega[x]) & mask(ahead <= self.reach[1] * omega[x]);
+            touched[x] = within & lanes.inside[x];
         }
         if touched == [0; LANES] {
             return;

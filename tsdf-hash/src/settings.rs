@@ -58,6 +58,9 @@ pub struct Settings {
     pub voxel_size: f64,
     /// Truncation distance `μ` in voxels (not printed; the usual 4).
     pub truncation_voxels: f64,
+    /// How far in front of a measured surface space counts as free, metres; up to `μ` it does anyhow (ours: 0, no farther).
+    /// What has moved away is carved out, at the price of blocks for all that space. A camera's whole view: `max_depth`.
+    pub carve: f64,
     /// Nearest depth that is fused, metres (ours: 0.2).
     pub min_depth: f64,
     /// Farthest depth that is fused, metres (ours: 6; the noise of a structured-light camera reaches 6 cm there).
@@ -77,6 +80,7 @@ impl Default for Settings {
         Self {
             voxel_size: 0.01,
             truncation_voxels: 4.0,
+            carve: 0.0,
             min_depth: 0.2,
             max_depth: 6.0,
             max_bytes: 512 << 20,
@@ -93,6 +97,11 @@ impl Settings {
         self.truncation_voxels * self.voxel_size
     }
 
+    /// How far in front of a measured depth voxels are touched, metres.
+    pub(crate) fn front(&self) -> f64 {
+        self.truncation().max(self.carve)
+    }
+
     /// Edge of a block, metres.
     pub(crate) fn block_size(&self) -> f64 {
         self.voxel_size * SIDE as f64
@@ -105,6 +114,7 @@ impl Settings {
         };
         within("voxel_size", self.voxel_size, 1e-4, 10.0, "1e-4..=10 metres")?;
         within("truncation_voxels", self.truncation_voxels, 1.0, 64.0, "1..=64 voxels")?;
+        within("carve", self.carve, 0.0, 1e3, "0..=1000 metres")?;
         within("min_depth", self.min_depth, 1e-3, 1e3, "0.001..=1000 metres")?;
         within("max_depth", self.max_depth, 1e-3, 1e3, "0.001..=1000 metres")?;
         within("max_depth", self.max_depth - self.min_depth, 1e-6, 1e3, "larger than min_depth")?;

@@ -28,7 +28,10 @@ struct Arguments {
     /// Farthest depth that is fused, metres
     #[arg(long, value_name = "METRES", default_value_t = 6.0)]
     max_depth: f64,
-    /// A stored map to go on from; its voxel size and depth range take the place of those given here
+    /// How far in front of a surface space counts as free, metres: what has moved away is carved out of the map
+    #[arg(long, value_name = "METRES", default_value_t = 0.0)]
+    carve: f64,
+    /// A stored map to go on from; its voxel size, carving and depth range take the place of those given here
     #[arg(long, value_name = "MAP")]
     resume: Option<PathBuf>,
     /// What keeps the map
@@ -113,6 +116,7 @@ fn settings(arguments: &Arguments) -> ScanSettings {
     let map = tsdf_hash::Settings {
         voxel_size: arguments.voxel,
         max_depth: arguments.max_depth,
+        carve: arguments.carve,
         max_bytes: arguments.active_mib << 20,
         threads: threads.clamp(1, 1024),
         tiers,

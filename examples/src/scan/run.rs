@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use cpu_time::ProcessTime;
 use nalgebra::Isometry3;
-use tsdf_hash::{CastSettings, DepthView, Map, MapFile, Mesh, MeshKeeper};
+use tsdf_hash::{CastSettings, Map, MapFile, Mesh, MeshKeeper};
 use vio_ekf::{Stamp, Trajectory};
 
 use super::keeper::{Device, Keeper};
@@ -16,7 +16,7 @@ use crate::progress::Stage;
 pub struct ScanSettings {
     /// The map.
     pub map: tsdf_hash::Settings,
-    /// Frames between two looks at the map from the camera's own place.
+    /// Frames between two looks at the map from where the camera was.
     pub look_every: usize,
     /// Where the map is kept.
     pub device: Device,
@@ -58,7 +58,7 @@ pub struct Course {
     pub integrate_s: Vec<f64>,
     /// Processor time of following the map with its mesh, after each fusion, seconds; empty for a map on a GPU.
     pub follow_s: Vec<f64>,
-    /// What looking at the map showed, and took.
+    /// What looking at the map showed, and took: at the finished map, or, if blocks leave active memory, on the way.
     pub looks: Vec<Look>,
     /// Processor time of the mesh from nothing, seconds.
     pub mesh_s: f64,
@@ -128,14 +128,16 @@ impl Scan {
         let (mut follower, mut course) = (MeshKeeper::new(), Course::default());
         let (mut fused, mut skipped) = (Vec::with_capacity(sequence.frames.len()), Vec::new());
         let mut trajectory = Trajectory::default();
+        // What has left active memory is not seen by a ray: then each look comes while its surroundings are still there.
+        let leaving = settings.map.tiers.host_bytes > 0;
+        let due = |index: usize| index.is_multiple_of(settings.look_every.max(1));
         for (index, frame) in sequence.frames.iter().enumerate() {
             stage.share(index as f64 / sequence.frames.len() as f64);
             let Some(pose) = frame.world_from_camera else {
                 skipped.push((index, format!("{}: no pose was recorded for it", frame.depth.display())));
                 continue;
             };
-            let look = index % settings.look_every.max(1) == 0;
-            match take(&mut keeper, &mut follower, sequence, index, &pose, look, &mut course) {
+            match take(&mut keeper, &mut follower, sequence, index, &pose, leaving && due(index), &mut course) {
                 Ok(()) => {
                     fused.push(index);
                     trajectory.push(Stamp::from_secs(frame.stamp)?, pose)?;
@@ -150,6 +152,15 @@ impl Scan {
         }
         let blocks = keeper.dense().blocks();
         stage.done(&format!("{} frames, {} left out, {blocks} blocks", fused.len(), skipped.len()));
+
+        if !leaving {
+            let stage = Stage::start("look");
+            for &index in fused.iter().filter(|&&index| due(index)) {
+                stage.share(index as f64 / sequence.frames.len() as f64);
+                course.looks.extend(look_from(&mut keeper, sequence, index)?);
+            }
+            stage.done(&format!("{} ray casts", course.looks.len()));
+        }
 
         let stage = Stage::start("mesh");
         let start = ProcessTime::now();
@@ -199,25 +210,23 @@ fn take(
         course.follow_s.push(start.elapsed().as_secs_f64());
     }
     if look {
-        course.looks.extend(look_from(keeper, &images, &depth, sequence.depth_scale, pose)?);
+        course.looks.extend(look_from(keeper, sequence, index)?);
     }
     Ok(())
 }
 
 /// `None` if the map has no surface where the frame has one.
-fn look_from(
-    keeper: &mut Keeper,
-    images: &Images,
-    depth: &DepthView,
-    scale: f64,
-    pose: &Isometry3<f64>,
-) -> Result<Option<Look>, ScanError> {
+fn look_from(keeper: &mut Keeper, sequence: &Sequence, index: usize) -> Result<Option<Look>, ScanError> {
+    let frame = &sequence.frames[index];
+    let Some(pose) = &frame.world_from_camera else { return Ok(None) };
+    let images = Images::read(frame)?;
+    let depth = images.depth(sequence.intrinsics, sequence.depth_scale);
     let &tsdf_hash::Settings { min_depth, max_depth, threads, .. } = keeper.settings();
     let settings = CastSettings { min_depth, max_depth, colour: true, threads };
     let start = ProcessTime::now();
     let view = keeper.dense().ray_cast(&depth.intrinsics, depth.width, depth.height, pose, &settings)?;
     let seconds = start.elapsed().as_secs_f64();
-    let measured = images.metres(scale).map(|z| Some(z).filter(|z| (min_depth..=max_depth).contains(z)));
+    let measured = images.metres(sequence.depth_scale).map(|z| Some(z).filter(|z| (min_depth..=max_depth).contains(z)));
     let (mut pixels, mut hits, mut error) = (0_usize, 0_usize, 0.0);
     for (z, seen) in measured.zip(&view.depth).filter_map(|(z, seen)| Some((z?, *seen))) {
         pixels += 1;

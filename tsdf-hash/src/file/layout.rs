@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::settings::{NoiseModel, Settings, Tiers};
 
 pub(crate) const MAGIC: [u8; 8] = *b"TSDFHASH";
-pub(crate) const VERSION: u32 = 1;
+pub(crate) const VERSION: u32 = 2;
 /// Written as all numbers are, the lowest byte first.
 const MARK: u32 = 0x0102_0304;
 /// Bytes of the head.
@@ -151,9 +151,12 @@ impl<'a> Numbers<'a> {
 
 /// The settings, and the time of the last frame.
 pub(crate) fn write_settings(settings: &Settings, last: Option<f64>, stamped: bool) -> Vec<u8> {
-    let Settings { voxel_size, truncation_voxels, min_depth, max_depth, max_bytes, threads, tiers, noise } = *settings;
+    let Settings { voxel_size, truncation_voxels, carve, min_depth, max_depth, max_bytes, threads, tiers, noise } =
+        *settings;
     let mut out = Vec::new();
-    for number in [voxel_size, truncation_voxels, min_depth, max_depth, noise.base, noise.quadratic, noise.nearest] {
+    for number in
+        [voxel_size, truncation_voxels, carve, min_depth, max_depth, noise.base, noise.quadratic, noise.nearest]
+    {
         out.extend_from_slice(&number.to_le_bytes());
     }
     for count in [max_bytes as u64, threads as u64, tiers.host_bytes as u64, tiers.disk_bytes, tiers.transfers as u64] {
@@ -168,7 +171,8 @@ pub(crate) fn write_settings(settings: &Settings, last: Option<f64>, stamped: bo
 pub(crate) fn read_settings(bytes: &[u8], offset: u64) -> Result<(Settings, Option<f64>, bool), Error> {
     let mut numbers = Numbers::new(bytes, offset, NAMES[0]);
     let n = &mut numbers;
-    let [voxel_size, truncation_voxels, min_depth, max_depth] = [n.f64()?, n.f64()?, n.f64()?, n.f64()?];
+    let [voxel_size, truncation_voxels, carve] = [n.f64()?, n.f64()?, n.f64()?];
+    let [min_depth, max_depth] = [n.f64()?, n.f64()?];
     let noise = NoiseModel { base: n.f64()?, quadratic: n.f64()?, nearest: n.f64()? };
     // A cap beyond this machine's words is no cap.
     let mut count = || n.u64().map(|count| usize::try_from(count).unwrap_or(usize::MAX));
@@ -177,7 +181,8 @@ pub(crate) fn read_settings(bytes: &[u8], offset: u64) -> Result<(Settings, Opti
     let tiers = Tiers { host_bytes, disk_bytes, transfers, age: n.f64()?, hold: n.f64()? };
     let (last, stamped) = (n.f64()?, n.f64()? == 1.0);
     numbers.end()?;
-    let settings = Settings { voxel_size, truncation_voxels, min_depth, max_depth, max_bytes, threads, tiers, noise };
+    let settings =
+        Settings { voxel_size, truncation_voxels, carve, min_depth, max_depth, max_bytes, threads, tiers, noise };
     settings.check()?;
     Ok((settings, (!last.is_nan()).then_some(last), stamped))
 }

@@ -9,7 +9,7 @@ use crate::surface::{Surface, TILE, Tile};
 /// Blocks closer to the camera's plane are searched voxel by voxel, metres.
 const NEAREST: f32 = 1e-2;
 
-/// The voxels where a linear function of their indices is between `-reach` and `reach`.
+/// The voxels where a linear function of their indices is between two limits.
 pub(super) struct Slab {
     pub(super) start: f32,
     pub(super) step: [f32; 3],
@@ -23,10 +23,10 @@ impl Slab {
     /// Where in a block voxels can be touched, from the squares of pixels that it projects to; `None` if nowhere.
     ///
     /// If the inverse depth under the block is a linear function of the pixel, `1 - z ω` is one of the voxel. A voxel is
-    /// touched if it is at most `μ ω`; an inverse depth that is `e` off the function adds `z e`.
+    /// touched if that is between `-μ ω` and `front ω`; an inverse depth that is `e` off the function adds `z e`.
     pub(super) fn under(
         surface: &Surface,
-        truncation: f32,
+        reach: [f32; 2],
         start: &Vector3<f32>,
         steps: &[Vector3<f32>; 3],
     ) -> Option<Self> {
@@ -87,14 +87,14 @@ impl Slab {
         let along = |p: &Vector3<f32>| omega.base * p.z + omega.slope[0] * p.x + omega.slope[1] * p.y;
         // Half a pixel between a voxel's projection and its pixel; and a little for the rounding.
         let error = error + 0.5 * (omega.slope[0].abs() + omega.slope[1].abs());
-        let reach = 1.001 * (truncation / near + far * error) + 1e-4;
+        let reach = reach.map(|reach| 1.001 * (reach.abs() / near + far * error) + 1e-4);
         Some(Self::new(1.0 - along(start), [0, 1, 2].map(|k| -along(&steps[k])), reach))
     }
 
-    fn new(start: f32, step: [f32; 3], reach: f32) -> Self {
+    fn new(start: f32, step: [f32; 3], [behind, front]: [f32; 2]) -> Self {
         let bounds = [0, LANES].map(|x| {
             let ends = [x, x + LANES - 1].map(|x| step[0] * x as f32);
-            [-reach - ends[0].max(ends[1]), reach - ends[0].min(ends[1])]
+            [-behind - ends[0].max(ends[1]), front - ends[0].min(ends[1])]
         });
         Self { start, step, bounds }
     }

@@ -201,7 +201,8 @@ fn uniform(frame: &Frame, mode: Mode, first: usize, count: usize) -> [u32; FRAME
         words[23] = if matches!(colour.data, ColourData::Rgb8(_)) { 1 } else { 2 };
         words[28..30].copy_from_slice(&[colour.width as u32, u32::from(colour.is_aligned)]);
     }
-    words[20..22].copy_from_slice(&[frame.truncation, frame.colour_reach].map(f32::to_bits));
+    words[20..22].copy_from_slice(&[frame.reach[0], frame.colour_reach].map(f32::to_bits));
+    words[30] = frame.reach[1].to_bits();
     words[24..27].copy_from_slice(&[mode as u32, first as u32, count as u32]);
     words
 }

@@ -9,7 +9,8 @@ struct Frame {
     colour_last: vec2<f32>,
     colour_scale: vec2<f32>,
     colour_shift: vec2<f32>,
-    truncation: f32,
+    // Voxels are touched this far in front of a surface, at least (behind it: negative) and at most.
+    least_ahead: f32,
     colour_reach: f32,
     // Words of the frame before its colours; 0 without colours.
     colour_start: u32,
@@ -24,6 +25,7 @@ struct Frame {
     colour_width: u32,
     // Whether the pixels of the colour image are those of the depth image.
     is_aligned: u32,
+    most_ahead: f32,
 }
 
 // Nothing is written but the tally.
@@ -146,7 +148,8 @@ fn update(old: Voxel, projected: vec3<f32>) -> Voxel {
     let offset = bitcast<f32>(pixels[pixel]);
     let omega = bitcast<f32>(pixels[pixel + 1u]);
     let own = times(depth, omega);
-    if !(omega > 0.0 && abs(minus(offset, own)) <= times(frame.truncation, omega)) {
+    let ahead = minus(offset, own);
+    if !(omega > 0.0 && ahead >= times(frame.least_ahead, omega) && ahead <= times(frame.most_ahead, omega)) {
         return old;
     }
     let along_u = times(bitcast<f32>(pixels[pixel + 2u]), minus(u, pixel_u));

@@ -24,6 +24,8 @@ fn settings_out_of_range_are_named() {
         (Settings { voxel_size: f64::NAN, ..good }, "voxel_size"),
         (Settings { voxel_size: 0.0, ..good }, "voxel_size"),
         (Settings { truncation_voxels: 0.5, ..good }, "truncation_voxels"),
+        (Settings { carve: -0.1, ..good }, "carve"),
+        (Settings { carve: f64::NAN, ..good }, "carve"),
         (Settings { min_depth: -1.0, ..good }, "min_depth"),
         (Settings { max_depth: f64::INFINITY, ..good }, "max_depth"),
         (Settings { max_depth: 0.1, ..good }, "max_depth"),

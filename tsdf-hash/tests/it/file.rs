@@ -124,7 +124,7 @@ fn files_that_are_not_what_they_should_be_are_named() {
     };
     assert!(open(&good).is_ok());
     assert!(matches!(changed(0, b"PLY"), Err(Error::NotAMap { offset: 0, .. })));
-    assert!(matches!(changed(8, &[2]), Err(Error::OtherVersion { found: 2, known: 1 })));
+    assert!(matches!(changed(8, &[3]), Err(Error::OtherVersion { found: 3, known: 2 })));
     assert!(matches!(changed(12, &[1, 2, 3, 4]), Err(Error::NotAMap { offset: 12, .. })));
     assert!(matches!(changed(16, &[7]), Err(Error::BadFile { offset: 0, .. })));
     let end = good.len() as u64;

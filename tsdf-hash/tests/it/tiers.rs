@@ -15,6 +15,7 @@ pub(crate) fn scratch(name: &str) -> PathBuf {
 pub(crate) const FREE: Settings = Settings {
     voxel_size: 0.02,
     truncation_voxels: 4.0,
+    carve: 0.0,
     min_depth: 0.2,
     max_depth: 6.0,
     max_bytes: 1 << 30,
