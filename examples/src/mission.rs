@@ -58,6 +58,8 @@ pub struct MissionSettings {
 /// The painters to choose from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PainterChoice {
+    /// The network that looks at its canvas.
+    Feedback,
     /// All sprays at once.
     Deconvolution,
     /// One spray after the other.
@@ -71,7 +73,7 @@ impl Default for MissionSettings {
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             texel: 0.0125,
             spot: 0.025,
-            painter: PainterChoice::Deconvolution,
+            painter: PainterChoice::Feedback,
             limits: Limits { along: 2, row_spacing: 3, min_volume: 0.01, ..Limits::default() },
             planner: planner_settings(),
             ptu: PtuSettings::default(),

@@ -34,7 +34,7 @@ struct Arguments {
     #[arg(long)]
     design: Option<String>,
     /// Who decides the sprays
-    #[arg(long, default_value = "deconvolution")]
+    #[arg(long, default_value = "feedback")]
     painter: PainterName,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/paintcopter")]
@@ -56,7 +56,11 @@ enum Up {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum PainterName {
+    /// The network that looks at its canvas
+    Feedback,
+    /// The best plan for all sprays at once, by optimisation
     Deconvolution,
+    /// One spray after the other
     Pursuit,
 }
 
@@ -79,6 +83,7 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
         settings.threads = threads.clamp(1, 1024);
     }
     settings.painter = match arguments.painter {
+        PainterName::Feedback => PainterChoice::Feedback,
         PainterName::Deconvolution => PainterChoice::Deconvolution,
         PainterName::Pursuit => PainterChoice::Pursuit,
     };

@@ -1,6 +1,8 @@
 //! What to spray: the wanted picture into layers.
 
-use paint_net::{Deconvolution, Image, Layered, Limits, MatchingPursuit, Painter, Painting, SprayKernel, Task};
+use paint_net::{
+    Deconvolution, Feedback, Image, Layered, Limits, MatchingPursuit, Painter, Painting, SprayKernel, Task,
+};
 
 use super::{MissionError, MissionSettings, PainterChoice};
 use crate::appearance::Appearance;
@@ -45,6 +47,10 @@ pub(super) fn decide(
     let mut progress = |share: f64| stage.share(share);
     let (ink, limits) = (appearance.ink(), &settings.limits);
     let layers = match settings.painter {
+        PainterChoice::Feedback => {
+            let painter = Feedback { threads: settings.threads, ..Feedback::shipped()? };
+            layered(painter, &task, &kernel, ink, limits, &mut progress)
+        }
         PainterChoice::Deconvolution => layered(Deconvolution::default(), &task, &kernel, ink, limits, &mut progress),
         PainterChoice::Pursuit => layered(MatchingPursuit::default(), &task, &kernel, ink, limits, &mut progress),
     }?;
