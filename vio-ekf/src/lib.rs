@@ -37,6 +37,7 @@
 //! | bearing with a tangent basis | Hertzberg et al. 2013; Bloesch et al. 2017 | [`Bearing`] |
 //! | iterated update | Bell and Cathey 1993 | [`GateSettings`] |
 //! | start in motion | closed form of Martinelli 2014, refined: ours | [`MovingSettings`] |
+//! | axes and units of inertial samples | ours | [`check_samples`] |
 //! | one-call evaluation | ours | [`evaluate`] |
 //! | least-squares alignment | Umeyama 1991, Eqs. (40)-(42); Horn 1987 | [`align`] |
 //! | alignment of position and yaw | closed form, ours; Zhang and Scaramuzza 2018 for the choice of mode | [`Alignment::PosYaw`] |
@@ -58,6 +59,7 @@ mod filter;
 mod format;
 mod lie;
 mod measurement;
+mod sanity;
 pub mod sim;
 mod spline;
 mod stamp;
@@ -82,6 +84,7 @@ pub use format::{asl, calibration, euroc, kitti, tum};
 pub use lie::{se3, so3};
 pub use measurement::{ImageView, Imu, ImuNoise};
 pub use nalgebra;
+pub use sanity::{SampleFindings, check_samples};
 pub use spline::{Motion, Spline};
 pub use stamp::Stamp;
 pub use trajectory::{Trajectory, interpolate, path_lengths};
