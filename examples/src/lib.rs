@@ -15,4 +15,5 @@ pub mod report;
 pub mod scan;
 pub mod surface;
 pub mod targets;
+pub mod vio;
 pub mod world;
