@@ -35,6 +35,7 @@
 //! | 3.3 the network: READ, PAINT, learned stop | [`thesis::Network`] |
 //! | (ours) non-negative deconvolution | [`Deconvolution`] |
 //! | (ours) greedy matching pursuit | [`MatchingPursuit`] |
+//! | (ours) few sprays at free places, of free spreads | [`FreeSplats`] |
 //! | (ours) a network that looks at its canvas | [`Feedback`], [`Network`] |
 //! | (ours) coats, with a look at the wall after each | [`Coats`] |
 //! | (ours) a valve of limited speed | [`SlewLimited`] |
@@ -60,6 +61,7 @@ mod projected_lbfgs;
 mod pursuit;
 mod saturation;
 mod slew;
+mod splats;
 mod strokes;
 // The way back is needed only to train.
 #[cfg_attr(not(feature = "train"), allow(dead_code))]
@@ -80,4 +82,5 @@ pub use painter::{Limits, Painter, Painting, Spray, Task};
 pub use pursuit::MatchingPursuit;
 pub use saturation::{MonotoneCurve, Saturation};
 pub use slew::{SlewLimited, slew_violations};
+pub use splats::FreeSplats;
 pub use strokes::{Stroke, StrokeSettings, boustrophedon};
