@@ -17,6 +17,7 @@ mod functions;
 mod lstm;
 mod matrix;
 mod network;
+mod painter;
 
 mod read;
 mod rollout;
@@ -31,6 +32,7 @@ mod tests;
 #[cfg(feature = "train")]
 pub(crate) use adjoint::ModelAdjoint;
 pub use network::Network;
+pub use painter::Thesis;
 
 pub use rollout::Objective;
 #[cfg(feature = "train")]

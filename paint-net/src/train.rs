@@ -2,12 +2,14 @@
 
 mod adam;
 mod checkpoint;
+mod patch;
 mod sample;
 mod thesis;
 
 use crate::error::{Error, require};
 use crate::network::{Adjoint, Block, Network, Shape, Trace};
 use adam::{Adam, shorten};
+pub use patch::thesis_patch;
 use sample::Sample;
 pub use thesis::{ThesisLoss, ThesisSettings, ThesisTrainer};
 

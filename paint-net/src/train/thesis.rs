@@ -114,7 +114,7 @@ impl ThesisTrainer {
 
     /// One step of the optimiser. `picture` gives the ink of the `n`th sample since the start of training, `side` x `side`
     /// pixels in `[0, 1]`, the same at every call.
-    pub fn step(&mut self, picture: &(dyn Fn(u64) -> Image + Sync)) -> Result<ThesisLoss, Error> {
+    pub fn step(&mut self, picture: &(dyn Fn(u64) -> Result<Image, Error> + Sync)) -> Result<ThesisLoss, Error> {
         let (settings, parameters) = (&self.settings, &self.parameters);
         let first = (self.step * settings.batch) as u64;
         let adjoint = ModelAdjoint::new(&settings.shape, parameters);
@@ -122,7 +122,7 @@ impl ThesisTrainer {
         let results = in_threads(settings.threads, settings.batch.div_ceil(CHUNK), &|chunk| {
             let numbers = chunk * CHUNK..settings.batch.min((chunk + 1) * CHUNK);
             let samples: Vec<u64> = numbers.map(|k| first + k as u64).collect();
-            let pictures: Vec<Image> = samples.iter().map(|&n| picture(n)).collect();
+            let pictures: Vec<Image> = samples.iter().map(|&n| picture(n)).collect::<Result<_, _>>()?;
             let mut rollout = prepare(settings, &pictures.iter().collect::<Vec<_>>(), &samples)?;
             rollout.run(&model, settings.objective.gated);
             let found = (rollout.terms(settings.objective.prior), steps_used(&rollout));
