@@ -99,13 +99,18 @@ impl Interval {
 
     /// The same motion with other biases, to first order.
     pub(crate) fn step(&self, state: &State, gravity: f64) -> Step {
-        let start_from_world = state.attitude.inverse();
+        self.step_from(&state.velocity, &state.attitude, gravity)
+    }
+
+    /// The same from velocity and attitude at the start, which is all that it depends on.
+    pub(crate) fn step_from(&self, velocity: &Vector3<f64>, attitude: &UnitQuaternion<f64>, gravity: f64) -> Step {
+        let start_from_world = attitude.inverse();
         let (time, half) = (self.duration, 0.5 * self.duration * self.duration);
         let down = start_from_world * Vector3::new(0.0, 0.0, -gravity);
-        let moved = state.velocity * time + down * half + self.position;
-        let velocity_in_start = state.velocity + down * time + self.velocity;
+        let moved = velocity * time + down * half + self.position;
+        let velocity_in_start = velocity + down * time + self.velocity;
         let end_from_start = self.rotation.inverse().to_rotation_matrix().into_inner();
-        let world_from_start = state.attitude.to_rotation_matrix().into_inner();
+        let world_from_start = attitude.to_rotation_matrix().into_inner();
 
         // d(Rᵀ g)/dθ = Rᵀ hat(g) for the world-side error.
         let tilt = world_from_start.transpose() * Vector3::new(0.0, 0.0, -gravity).cross_matrix();
@@ -171,6 +176,16 @@ impl Interval {
 }
 
 impl Step {
+    /// Covariance of the core at the end, symmetric to the last bit, from that at the start.
+    pub(crate) fn carry(
+        &self,
+        core: &SMatrix<f64, { at::CORE }, { at::CORE }>,
+    ) -> SMatrix<f64, { at::CORE }, { at::CORE }> {
+        let noise = self.noise.fixed_view::<{ at::CORE }, { at::CORE }>(0, 0);
+        let covariance = self.transition * core * self.transition.transpose() + noise;
+        (covariance + covariance.transpose()) * 0.5
+    }
+
     /// Position and attitude at the end, from those at the start.
     pub(crate) fn end(&self, position: &Vector3<f64>, attitude: &UnitQuaternion<f64>) -> Isometry3<f64> {
         let (moved, rotation) = self.start_from_end;
