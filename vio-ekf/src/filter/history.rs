@@ -42,17 +42,6 @@ impl History {
         &self.samples[self.samples.len() - 1]
     }
 
-    /// The last sample not after a time, or the first one.
-    pub(crate) fn before(&self, stamp: Stamp) -> Imu {
-        let after = self.samples.partition_point(|sample| sample.stamp <= stamp);
-        self.samples[after.saturating_sub(1)]
-    }
-
-    /// The samples after a time.
-    pub(crate) fn after(&self, stamp: Stamp) -> impl Iterator<Item = &Imu> {
-        self.samples.iter().filter(move |sample| sample.stamp > stamp)
-    }
-
     /// Whether another sample would need more memory.
     pub(crate) fn is_full(&self) -> bool {
         self.samples.len() >= self.capacity
@@ -90,19 +79,31 @@ impl History {
     /// Motion from the anchor until a time. Between samples rate and force are linear; after the last one they stay.
     pub(crate) fn integrate(&self, until: Stamp, biases: &[Vector3<f64>; 2], noise: &ImuNoise) -> Interval {
         let mut interval = Interval::default();
-        let mut from = self.anchor;
-        for (before, after) in self.samples.iter().zip(self.samples.iter().skip(1)) {
-            let to = after.stamp.min(until);
-            if to > from {
-                extend(&mut interval, before, after, (from, to), biases, noise);
-                from = to;
+        self.extend(&mut interval, (self.anchor, until), biases, noise);
+        interval
+    }
+
+    /// Goes on with an interval over a span of time.
+    pub(crate) fn extend(
+        &self,
+        interval: &mut Interval,
+        (mut from, until): (Stamp, Stamp),
+        biases: &[Vector3<f64>; 2],
+        noise: &ImuNoise,
+    ) {
+        let first = self.samples.partition_point(|sample| sample.stamp <= from).saturating_sub(1);
+        for (before, after) in self.samples.iter().skip(first).zip(self.samples.iter().skip(first + 1)) {
+            if from >= until {
+                return;
             }
+            let to = after.stamp.min(until);
+            extend(interval, before, after, (from, to), biases, noise);
+            from = to;
         }
         if until > from {
             let last = self.latest();
-            extend(&mut interval, last, last, (from, until), biases, noise);
+            extend(interval, last, last, (from, until), biases, noise);
         }
-        interval
     }
 
     /// Goes on with an interval that reaches until the last sample but one.
