@@ -34,6 +34,7 @@
 //! | 3.3 the "ideal": Gaussian of the reference | [`ideal`] |
 //! | (ours) non-negative deconvolution | [`Deconvolution`] |
 //! | (ours) greedy matching pursuit | [`MatchingPursuit`] |
+//! | (ours) few sprays at free places, of free spreads | [`FreeSplats`] |
 //! | (ours) a network that looks at its canvas | [`Feedback`], [`Network`] |
 //! | (ours) coats, with a look at the wall after each | [`Coats`] |
 //! | (ours) a valve of limited speed | [`SlewLimited`] |
@@ -59,6 +60,7 @@ mod projected_lbfgs;
 mod pursuit;
 mod saturation;
 mod slew;
+mod splats;
 mod strokes;
 #[cfg(feature = "train")]
 pub mod train;
@@ -76,4 +78,5 @@ pub use painter::{Limits, Painter, Painting, Spray, Task};
 pub use pursuit::MatchingPursuit;
 pub use saturation::{MonotoneCurve, Saturation};
 pub use slew::{SlewLimited, slew_violations};
+pub use splats::FreeSplats;
 pub use strokes::{Stroke, StrokeSettings, boustrophedon};

@@ -1,14 +1,14 @@
 //! The estimator: one camera, one inertial sensor, an iterated Kalman filter around the body.
 
 mod bearing;
-mod covariance;
+pub(crate) mod covariance;
 mod detect;
 mod estimator;
 mod follower;
-mod history;
+pub(crate) mod history;
 mod images;
 mod inherit;
-mod interval;
+pub(crate) mod interval;
 #[cfg(test)]
 mod jacobians;
 mod moving;
@@ -25,8 +25,8 @@ mod rest;
 mod scout;
 mod settings;
 mod start;
-mod state;
-mod update;
+pub(crate) mod state;
+pub(crate) mod update;
 
 use nalgebra::{Isometry3, SMatrix, Translation3, Unit, Vector2, Vector3};
 
@@ -38,7 +38,6 @@ pub use rest::RestSettings;
 pub use settings::{CalibrationSettings, GateSettings, LandmarkSettings, LimitSettings, PatchSettings, Settings};
 pub use start::{Start, StartSigma};
 
-use crate::trajectory::is_finite;
 use crate::{Camera, Error, Imu, ImuNoise, Stamp};
 use estimator::Estimator;
 use follower::Follower;
@@ -250,17 +249,7 @@ impl Vio {
         let Some(sample) = self.last else {
             return Err(Error::TooFew { what: "inertial samples before the start", got: 0, need: 1 });
         };
-        if start.stamp < sample.stamp {
-            return Err(Error::Late { what: "start", stamp: start.stamp, now: sample.stamp });
-        }
-        if !is_finite(&start.world_from_body) {
-            return Err(Error::NonFinite { what: "start pose", index: 0 });
-        }
-        let vectors = [start.velocity_in_body, start.gyro_bias, start.accel_bias];
-        if let Some(index) = vectors.iter().position(|v| v.iter().any(|v| !v.is_finite())) {
-            return Err(Error::NonFinite { what: "start velocity or bias", index });
-        }
-        start.sigma.check()?;
+        start.check(sample.stamp)?;
         self.reset();
         self.estimator = Some(Estimator::new(&self.camera, self.noise, &self.settings, start, sample));
         Ok(())

@@ -27,6 +27,12 @@ impl Covariance {
         Self { size, stride: capacity, values: vec![0.0; capacity * capacity] }
     }
 
+    /// Becomes equal to another of the same capacity, without claiming memory.
+    pub(crate) fn assign(&mut self, other: &Self) {
+        self.size = other.size;
+        self.values.copy_from_slice(&other.values);
+    }
+
     pub(crate) fn size(&self) -> usize {
         self.size
     }

@@ -269,7 +269,6 @@ impl Estimator {
     pub(crate) fn odometry(&self) -> Odometry {
         let step = self.since.step(&self.state, self.gravity);
         let prior = self.covariance.block::<{ at::CORE }, { at::CORE }>(0, 0);
-        let covariance = step.moved(&prior) + self.since.core_noise(&step);
         Odometry {
             stamp: self.history.now(),
             world_from_body: step.end(&self.state.position, &self.state.attitude),
@@ -277,7 +276,7 @@ impl Estimator {
             rate_in_body: self.history.latest().gyro - self.state.gyro_bias,
             gyro_bias: self.state.gyro_bias,
             accel_bias: self.state.accel_bias,
-            covariance: (covariance + covariance.transpose()) * 0.5,
+            covariance: step.carry(&prior),
         }
     }
 }

@@ -66,20 +66,32 @@ impl History {
 
     /// Rate read at the anchor.
     pub(crate) fn rate_at_anchor(&self) -> Vector3<f64> {
-        let before = &self.samples[0];
-        match self.samples.get(1) {
-            Some(after) if self.anchor > before.stamp => {
-                let gap = after.stamp.secs_since(before.stamp);
-                before.gyro + (after.gyro - before.gyro) * (self.anchor.secs_since(before.stamp) / gap)
+        self.reading(self.anchor).gyro
+    }
+
+    /// What the sensor would have read at a time: linear between samples, constant before the first and after the last.
+    pub(crate) fn reading(&self, stamp: Stamp) -> Imu {
+        let after = self.samples.partition_point(|sample| sample.stamp <= stamp);
+        let before = self.samples[after.saturating_sub(1)];
+        match self.samples.get(after) {
+            Some(next) if stamp > before.stamp => {
+                let share = stamp.secs_since(before.stamp) / next.stamp.secs_since(before.stamp);
+                let gyro = before.gyro + (next.gyro - before.gyro) * share;
+                Imu { stamp, gyro, accel: before.accel + (next.accel - before.accel) * share }
             }
-            _ => before.gyro,
+            _ => Imu { stamp, ..before },
         }
     }
 
     /// Motion from the anchor until a time. Between samples rate and force are linear; after the last one they stay.
     pub(crate) fn integrate(&self, until: Stamp, biases: &[Vector3<f64>; 2], noise: &ImuNoise) -> Interval {
+        self.between(self.anchor, until, biases, noise)
+    }
+
+    /// The same from a time after the anchor.
+    pub(crate) fn between(&self, from: Stamp, until: Stamp, biases: &[Vector3<f64>; 2], noise: &ImuNoise) -> Interval {
         let mut interval = Interval::default();
-        self.extend(&mut interval, (self.anchor, until), biases, noise);
+        self.extend(&mut interval, (from, until), biases, noise);
         interval
     }
 

@@ -51,6 +51,8 @@ pub(crate) struct Step {
     pub(crate) velocity: Vector3<f64>,
     /// Core errors at the end by core errors at the start.
     pub(crate) transition: SMatrix<f64, { at::CORE }, { at::CORE }>,
+    /// Covariance of the core's noise at the end.
+    pub(crate) noise: SMatrix<f64, { at::CORE }, { at::CORE }>,
     /// Errors of the relative motion (rotation, velocity, position, in the start's axes) by core errors at the start.
     relative: SMatrix<f64, MOTION, { at::CORE }>,
     /// Core errors at the end by those of the relative motion.
@@ -108,13 +110,18 @@ impl Interval {
 
     /// The same motion with other biases, to first order.
     pub(crate) fn step(&self, state: &State, gravity: f64) -> Step {
-        let start_from_world = state.attitude.inverse();
+        self.step_from(&state.velocity, &state.attitude, gravity)
+    }
+
+    /// The same from velocity and attitude at the start, which is all that it depends on.
+    pub(crate) fn step_from(&self, velocity: &Vector3<f64>, attitude: &UnitQuaternion<f64>, gravity: f64) -> Step {
+        let start_from_world = attitude.inverse();
         let (time, half) = (self.duration, 0.5 * self.duration * self.duration);
         let down = start_from_world * Vector3::new(0.0, 0.0, -gravity);
-        let moved = state.velocity * time + down * half + self.position;
-        let velocity_in_start = state.velocity + down * time + self.velocity;
+        let moved = velocity * time + down * half + self.position;
+        let velocity_in_start = velocity + down * time + self.velocity;
         let end_from_start = self.rotation.inverse().to_rotation_matrix().into_inner();
-        let world_from_start = state.attitude.to_rotation_matrix().into_inner();
+        let world_from_start = attitude.to_rotation_matrix().into_inner();
 
         // d(Rᵀ g)/dθ = Rᵀ hat(g) for the world-side error.
         let tilt = world_from_start.transpose() * Vector3::new(0.0, 0.0, -gravity).cross_matrix();
@@ -148,15 +155,16 @@ impl Interval {
             start_from_end: (moved, self.rotation),
             velocity: end_from_start * velocity_in_start,
             transition,
+            noise: self.core_noise(&compose),
             relative,
             compose,
         }
     }
 
     /// Covariance of the core's noise at the end.
-    pub(crate) fn core_noise(&self, step: &Step) -> SMatrix<f64, { at::CORE }, { at::CORE }> {
-        let mut noise = sandwich(&step.compose, &self.covariance);
-        let walked = step.compose * self.walk_covariance;
+    fn core_noise(&self, compose: &SMatrix<f64, { at::CORE }, MOTION>) -> SMatrix<f64, { at::CORE }, { at::CORE }> {
+        let mut noise = sandwich(compose, &self.covariance);
+        let walked = compose * self.walk_covariance;
         let mut columns = noise.fixed_columns_mut::<6>(at::GYRO_BIAS);
         columns += walked;
         let mut rows = noise.fixed_rows_mut::<6>(at::GYRO_BIAS);
@@ -212,17 +220,18 @@ fn times_transposed<const A: usize, const R: usize, const C: usize>(
 }
 
 impl Step {
+    /// Covariance of the core at the end, symmetric to the last bit, from that at the start.
+    pub(crate) fn carry(
+        &self,
+        core: &SMatrix<f64, { at::CORE }, { at::CORE }>,
+    ) -> SMatrix<f64, { at::CORE }, { at::CORE }> {
+        let covariance = sandwich(&self.transition, core) + self.noise;
+        (covariance + covariance.transpose()) * 0.5
+    }
+
     /// Errors of `start_from_end` (position, rotation on the start's side) by core errors at the start.
     pub(crate) fn motion(&self) -> SMatrix<f64, 6, { at::CORE }> {
         reordered(&self.relative)
-    }
-
-    /// Covariance of the core's errors at the end, from that at the start, without noise.
-    pub(crate) fn moved(
-        &self,
-        prior: &SMatrix<f64, { at::CORE }, { at::CORE }>,
-    ) -> SMatrix<f64, { at::CORE }, { at::CORE }> {
-        sandwich(&self.transition, prior)
     }
 
     /// Position and attitude at the end, from those at the start.

@@ -69,7 +69,7 @@ pub(crate) fn propagate(
     xi.fixed_columns_mut::<{ at::CORE }>(0).copy_from(&(camera.by_motion * step.motion()));
     xi.fixed_columns_mut::<6>(at::CAMERA_POSITION).copy_from(&camera.by_calibration);
     // Noise of the core and of ξ.
-    let (core, noise) = (interval.core_noise(step), interval.noise(step));
+    let (core, noise) = (&step.noise, interval.noise(step));
     let xi_core = camera.by_motion * noise.motion_core;
     let xi_xi = camera.by_motion * noise.motion * camera.by_motion.transpose();
 
