@@ -150,11 +150,11 @@ fn share_out(
         let ceiling = if last { f64::INFINITY } else { saturation.inverse(top) };
         let mut sprays = Vec::new();
         for spray in &whole.sprays {
-            let depth = whole.canvas.at(spray.x as usize, spray.y as usize);
+            let depth = depth_at(&whole.canvas, spray);
             let share = (depth.min(ceiling) - depth.min(floor)) / depth;
             if share > 0.0 {
                 let spray = Spray { volume: spray.volume * share, ..*spray };
-                add_spray(&mut canvas, kernel, &spray);
+                kernel.stamp(&spray, &mut canvas);
                 sprays.push(spray);
             }
         }
@@ -164,13 +164,8 @@ fn share_out(
     layers
 }
 
-fn add_spray(canvas: &mut Image, kernel: &SprayKernel, spray: &Spray) {
-    let (width, height, radius) = (canvas.width(), canvas.height(), kernel.radius());
-    let (cx, cy) = (spray.x as usize, spray.y as usize);
-    for y in cy.saturating_sub(radius)..(cy + radius + 1).min(height) {
-        let down = spray.volume * kernel.taps()[y + radius - cy];
-        for x in cx.saturating_sub(radius)..(cx + radius + 1).min(width) {
-            canvas.data_mut()[y * width + x] += down * kernel.taps()[x + radius - cx];
-        }
-    }
+/// Depth at the pixel nearest to a spray.
+fn depth_at(canvas: &Image, spray: &Spray) -> f64 {
+    let nearest = |at: f64, n: usize| (at.round().max(0.0) as usize).min(n - 1);
+    canvas.at(nearest(spray.x, canvas.width()), nearest(spray.y, canvas.height()))
 }

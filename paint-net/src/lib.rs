@@ -32,8 +32,10 @@
 //! | 3.2 layers by intensity | [`Layered`] |
 //! | 3.3 spray footprint, ink `tanh c` | [`SprayKernel`], [`Saturation`] |
 //! | 3.3 the "ideal": Gaussian of the reference | [`ideal`] |
+//! | 3.3 the network: READ, PAINT, learned stop | [`thesis::Network`] |
 //! | (ours) non-negative deconvolution | [`Deconvolution`] |
 //! | (ours) greedy matching pursuit | [`MatchingPursuit`] |
+//! | (ours) few sprays at free places, of free spreads | [`FreeSplats`] |
 //! | (ours) a network that looks at its canvas | [`Feedback`], [`Network`] |
 //! | (ours) coats, with a look at the wall after each | [`Coats`] |
 //! | (ours) a valve of limited speed | [`SlewLimited`] |
@@ -59,7 +61,11 @@ mod projected_lbfgs;
 mod pursuit;
 mod saturation;
 mod slew;
+mod splats;
 mod strokes;
+// The way back is needed only to train.
+#[cfg_attr(not(feature = "train"), allow(dead_code))]
+pub mod thesis;
 #[cfg(feature = "train")]
 pub mod train;
 
@@ -76,4 +82,5 @@ pub use painter::{Limits, Painter, Painting, Spray, Task};
 pub use pursuit::MatchingPursuit;
 pub use saturation::{MonotoneCurve, Saturation};
 pub use slew::{SlewLimited, slew_violations};
+pub use splats::FreeSplats;
 pub use strokes::{Stroke, StrokeSettings, boustrophedon};

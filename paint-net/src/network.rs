@@ -18,10 +18,9 @@ mod trace;
 pub(crate) use adjoint::Adjoint;
 #[cfg(feature = "train")]
 pub(crate) use field::Field;
-#[cfg(any(test, feature = "train"))]
-pub(crate) use law::Law;
-pub(crate) use law::Scaled;
+pub(crate) use law::{Law, Scaled};
 pub(crate) use pass::Block;
+pub(crate) use real::Real;
 pub use shape::Shape;
 pub(crate) use spread::Spread;
 pub(crate) use tiles::{State, Tiles};

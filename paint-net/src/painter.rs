@@ -105,6 +105,8 @@ pub struct Spray {
     pub y: f64,
     /// Depth added at the centre, in the unit of the saturation curve.
     pub volume: f64,
+    /// Standard deviation, pixels: the kernel's, unless a painter may open the cone.
+    pub sigma: f64,
 }
 
 /// What a painter decided.
@@ -175,6 +177,8 @@ pub(crate) struct Board {
     /// Largest volume per cell; 0 where the nozzle may not spray.
     pub(crate) ceiling: Vec<f64>,
     pub(crate) bare: Image,
+    /// Standard deviation of every spray.
+    sigma: f64,
 }
 
 impl Board {
@@ -186,9 +190,7 @@ impl Board {
     ) -> Result<Self, Error> {
         task.check()?;
         limits.check()?;
-        if let Saturation::BeerLambert { density } = saturation {
-            require("density", *density, *density > 0.0 && density.is_finite(), "it must be positive and finite")?;
-        }
+        saturation.check()?;
         let footprints = Footprints::new(kernel, task.reference.size(), limits.along, limits.row_spacing);
         let width = task.reference.width();
         // A spray that reaches no pixel of positive weight would only waste paint, and nothing would hold it down.
@@ -204,7 +206,7 @@ impl Board {
             .zip(seen)
             .map(|((x, y), seen)| if seen > 0.0 && allowed(x, y) { limits.max_volume } else { 0.0 })
             .collect();
-        Ok(Self { footprints, ceiling, bare: task.bare() })
+        Ok(Self { footprints, ceiling, bare: task.bare(), sigma: kernel.sigma() })
     }
 
     /// The canvas after spraying `volumes`.
@@ -217,17 +219,14 @@ impl Board {
     pub(crate) fn painting(&self, volumes: &[f64], saturation: &Saturation) -> Painting {
         let canvas = self.canvas(volumes);
         let ink = canvas.map(|c| saturation.forward(c));
-        let columns = &self.footprints.columns;
-        let sprays = volumes
-            .iter()
-            .enumerate()
-            .filter(|(_, v)| **v > 0.0)
-            .map(|(k, &volume)| Spray {
-                x: columns[k % columns.len()] as f64,
-                y: self.footprints.rows[k / columns.len()] as f64,
-                volume,
-            })
-            .collect();
+        let sprays = (0..volumes.len()).filter(|&k| volumes[k] > 0.0).map(|k| self.spray(k, volumes[k])).collect();
         Painting { sprays, canvas, ink }
+    }
+
+    /// The spray of a cell.
+    pub(crate) fn spray(&self, cell: usize, volume: f64) -> Spray {
+        let (columns, rows) = (&self.footprints.columns, &self.footprints.rows);
+        let (x, y) = (columns[cell % columns.len()] as f64, rows[cell / columns.len()] as f64);
+        Spray { x, y, volume, sigma: self.sigma }
     }
 }

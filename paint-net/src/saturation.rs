@@ -1,4 +1,4 @@
-use crate::error::Error;
+use crate::error::{Error, require};
 
 /// Ink above this is out of reach of an asymptotic law: its depth would be unbounded (cap of the atanh in Paper IV's setting).
 const NEARLY_SATURATED: f64 = 0.995;
@@ -18,6 +18,16 @@ pub enum Saturation {
 }
 
 impl Saturation {
+    /// Refuses a density that is none.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        match self {
+            Self::BeerLambert { density } => {
+                require("density", *density, *density > 0.0 && density.is_finite(), "it must be positive and finite")
+            }
+            Self::Tanh | Self::Curve(_) => Ok(()),
+        }
+    }
+
     /// Ink at a depth; depths below zero count as zero.
     pub fn forward(&self, depth: f64) -> f64 {
         let depth = depth.max(0.0);

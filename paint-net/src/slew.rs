@@ -87,12 +87,7 @@ impl<P: Painter> Painter for SlewLimited<P> {
         progress(1.0);
         let canvas = board.canvas(&volumes);
         let ink: Image = canvas.map(|c| saturation.forward(c));
-        let spray = |&cell: &usize| Spray {
-            x: board.footprints.columns[cell % columns] as f64,
-            y: board.footprints.rows[cell / columns] as f64,
-            volume: volumes[cell],
-        };
-        let sprays = path.iter().map(spray).filter(|s| s.volume > 0.0).collect();
+        let sprays = path.iter().filter(|&&c| volumes[c] > 0.0).map(|&c| board.spray(c, volumes[c])).collect();
         Ok(Painting { sprays, canvas, ink })
     }
 }

@@ -57,6 +57,7 @@ mod error;
 mod eval;
 mod filter;
 mod format;
+mod fusion;
 mod lie;
 mod measurement;
 mod sanity;
@@ -81,6 +82,9 @@ pub use filter::{
     StartSigma, Status, Vio, Waiting,
 };
 pub use format::{asl, calibration, euroc, kitti, tum};
+pub use fusion::{
+    AlignmentSettings, FusionSettings, MountSettings, PoseFusion, PoseMeasurement, PoseSource, SourceEstimate,
+};
 pub use lie::{se3, so3};
 pub use measurement::{ImageView, Imu, ImuNoise};
 pub use nalgebra;

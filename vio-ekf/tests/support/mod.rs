@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
 
 pub(crate) mod flight;
+pub(crate) mod sequences;
 
 use std::path::PathBuf;
 use std::process::Command;
