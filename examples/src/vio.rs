@@ -13,6 +13,7 @@ mod recording;
 mod report;
 mod run;
 mod simulate;
+mod tuning;
 
 pub use compare::{Comparison, compare};
 pub use error::VioError;
@@ -24,3 +25,4 @@ pub use recording::{Images, Recording, Shot, Truth};
 pub use report::{VioReport, save};
 pub use run::{Run, RunSettings, Segment, run};
 pub use simulate::{Flight, Simulated, SimulationSettings, simulate};
+pub use tuning::{Lessons, Tuning, TuningReport, tune_noise};

@@ -7,8 +7,8 @@ use std::process::{Command, Output};
 use paintcopter_examples::vio::{
     Flight, Overrides, Recording, RunSettings, SimulationSettings, judge, open_euroc, open_mcap, run, simulate,
 };
+use vio_ekf::Camera;
 use vio_ekf::sim::{CameraModel, RoomSettings, Scenario};
-use vio_ekf::{Camera, Settings};
 
 /// A folder of its own for each test, removed at the end.
 struct Scratch(PathBuf);
@@ -39,7 +39,7 @@ fn flight(seconds: f64, raw: bool) -> SimulationSettings {
 
 fn follow(recording: &Recording, threads: usize) -> String {
     recording.check(9.81).unwrap();
-    let run = run(recording, &RunSettings { filter: Settings::default(), threads }).unwrap();
+    let run = run(recording, &RunSettings { threads, ..RunSettings::default() }).unwrap();
     assert!(run.skipped.len() <= 1 && run.lost.is_empty(), "{:?} {:?}", run.skipped, run.lost);
     let judgement = judge(&run, recording.truth.as_ref().unwrap()).unwrap().unwrap();
     // Six seconds in the air, three metres: a hundredth of it is what the filter promises.
@@ -273,10 +273,10 @@ fn real_images_at_rest_do_not_drift() {
         std::fs::write(target, output.stdout).unwrap();
     };
     unpack("imu0/data.csv.gz", "imu0/data.csv");
-    unpack("state_groundtruth_estimate0/V1_01_easy_original.txt.gz", "state_groundtruth_estimate0/data.csv");
+    unpack("state_groundtruth_estimate0/V1_01_easy.txt.gz", "state_groundtruth_estimate0/data.csv");
     let recording = open_euroc(&s.0, &Overrides::default()).unwrap();
     recording.check(9.81).unwrap();
-    let run = run(&recording, &RunSettings { filter: Settings::default(), threads: 1 }).unwrap();
+    let run = run(&recording, &RunSettings::default()).unwrap();
     assert_eq!((run.frames, run.skipped.len(), run.lost.len()), (95, 0, 0), "{:?} {:?}", run.skipped, run.lost);
     let judgement = judge(&run, recording.truth.as_ref().unwrap()).unwrap().unwrap();
     let worst = judgement.errors.iter().map(|e| e.position.norm()).fold(0.0, f64::max);

@@ -65,6 +65,8 @@ pub mod sim;
 mod spline;
 mod stamp;
 mod trajectory;
+#[cfg(feature = "tune")]
+pub mod tune;
 
 pub use camera::{Camera, Distortion};
 pub use error::Error;

@@ -5,10 +5,11 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use paintcopter_examples::vio::{
-    Flight, Overrides, RunSettings, SimulationSettings, VioReport, compare, judge, open_euroc, open_mcap, run, save,
-    simulate,
+    Flight, Lessons, Overrides, RunSettings, SimulationSettings, Tuning, VioReport, compare, judge, open_euroc,
+    open_mcap, run, save, simulate,
 };
 use vio_ekf::sim::Scenario;
+use vio_ekf::tune::TuneSettings;
 use vio_ekf::{CalibrationSettings, Settings};
 
 type AnyError = Box<dyn std::error::Error>;
@@ -34,6 +35,8 @@ enum Job {
     Sim(Sim),
     /// Compares an estimated trajectory with a reference
     Eval(Eval),
+    /// Finds the noise settings with which recordings are followed best
+    Tune(Tune),
 }
 
 #[derive(Args)]
@@ -114,12 +117,50 @@ struct Eval {
     out: Option<PathBuf>,
 }
 
+#[derive(Args)]
+struct Tune {
+    /// A recording with its truth, EuRoC/ASL; may be given again. Without any: simulated flights
+    #[arg(long, value_name = "DIR")]
+    euroc: Vec<PathBuf>,
+    /// Simulated flights
+    #[arg(long, default_value_t = 4, conflicts_with = "euroc")]
+    flights: usize,
+    /// Seconds of each
+    #[arg(long, default_value_t = 12.0, conflicts_with = "euroc")]
+    seconds: f64,
+    /// Factors on the noise to start from: the gyroscope's white noise and walk, the accelerometer's, and the images'
+    #[arg(long, value_name = "FACTORS", value_delimiter = ',', num_args = 5, default_value = "1,1,1,1,1")]
+    start: Vec<f64>,
+    /// Evaluations at most
+    #[arg(long, default_value_t = 200)]
+    evaluations: usize,
+    /// How much dishonest covariances cost beside errors
+    #[arg(long, value_name = "WEIGHT", default_value_t = 0.5)]
+    honesty: f64,
+    /// Compare with so many points drawn at random
+    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
+    random: usize,
+    /// Go on from trials.csv in the folder
+    #[arg(long)]
+    resume: bool,
+    /// Seed of the flights and the random points
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/vio-tune")]
+    out: PathBuf,
+    /// Worker threads [default: all cores]; results do not depend on it
+    #[arg(long)]
+    threads: Option<usize>,
+}
+
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let done = match &arguments.command {
         None => track(&arguments.track),
         Some(Job::Sim(sim)) => render(sim),
         Some(Job::Eval(eval)) => evaluate(eval),
+        Some(Job::Tune(tune)) => search(tune),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -161,7 +202,7 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         findings.gaps
     );
     let threads = threads(arguments.threads);
-    let run = run(&recording, &RunSettings { filter, threads })?;
+    let run = run(&recording, &RunSettings { filter, threads, ..RunSettings::default() })?;
     for why in run.skipped.iter().take(3) {
         eprintln!("left out: {why}");
     }
@@ -211,6 +252,39 @@ fn evaluate(arguments: &Eval) -> Result<(), AnyError> {
         make(folder)?;
         paintcopter_examples::report::save_figures(&comparison, folder)?;
     }
+    Ok(())
+}
+
+fn search(arguments: &Tune) -> Result<(), AnyError> {
+    make(&arguments.out)?;
+    let lessons = if arguments.euroc.is_empty() {
+        Lessons::simulated(arguments.flights, arguments.seconds, arguments.seed)?
+    } else {
+        let open = |folder: &PathBuf| {
+            let recording = open_euroc(folder, &Overrides::default())?;
+            recording.check(Settings::default().gravity).map(|_| recording)
+        };
+        Lessons::Recordings(arguments.euroc.iter().map(open).collect::<Result<_, _>>()?)
+    };
+    let factors: [f64; 5] = arguments.start.as_slice().try_into().map_err(|_| "--start: give five factors")?;
+    if !factors.iter().all(|factor| (1e-6..=1e6).contains(factor)) {
+        return Err("--start: the factors must be between 1e-6 and 1e6".into());
+    }
+    let tuning = Tuning {
+        search: TuneSettings { evaluations: arguments.evaluations, ..TuneSettings::default() },
+        start: factors.map(f64::log10),
+        consistency_weight: arguments.honesty.max(0.0),
+        random: arguments.random,
+        seed: arguments.seed,
+        resume: arguments.resume,
+        threads: threads(arguments.threads),
+    };
+    let report = tune_noise(&lessons, &tuning, &arguments.out)?;
+    eprintln!(
+        "position error {:.4} m at the start, {:.4} m now; NEES {:.1}, now {:.1}",
+        report.ate_start_m, report.ate_best_m, report.nees_start, report.nees_best
+    );
+    println!("{}", arguments.out.join("report.md").display());
     Ok(())
 }
 

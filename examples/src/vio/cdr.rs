@@ -50,13 +50,6 @@ impl<'a> Cdr<'a> {
         Some(values)
     }
 
-    /// A list of numbers.
-    pub(super) fn f64_list(&mut self) -> Option<Vec<f64>> {
-        let count = self.u32()? as usize;
-        // No list is longer than the bytes that are left: a broken length must not cost memory.
-        (count <= self.bytes.len() / 8).then(|| (0..count).map(|_| self.f64s::<1>().map(|[v]| v)).collect())?
-    }
-
     pub(super) fn blob(&mut self) -> Option<&'a [u8]> {
         let count = self.u32()? as usize;
         self.take(count)

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use cpu_time::ThreadTime;
 use vio_ekf::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use vio_ekf::{Calibration, Error, Excess, Odometry, Settings, Stamp, Status, Trajectory, Vio, Waiting};
+use vio_ekf::{Calibration, Error, Excess, ImuNoise, Odometry, Settings, Stamp, Status, Trajectory, Vio, Waiting};
 
 use super::recording::Shot;
 use super::{Recording, VioError};
@@ -21,8 +21,12 @@ const LOST_AFTER: f64 = 0.5;
 pub struct RunSettings {
     /// The filter.
     pub filter: Settings,
+    /// Inertial noise instead of the recording's own.
+    pub noise: Option<ImuNoise>,
     /// 1: everything on one thread; otherwise images are decoded on a second one. The results do not depend on it.
     pub threads: usize,
+    /// Whether no progress is shown.
+    pub quiet: bool,
 }
 
 /// A stretch without interruption. After each interruption the filter starts anew, in a world of its own.
@@ -65,12 +69,14 @@ pub struct Run {
 /// [`VioError`] if the recording cannot be used, or the filter never starts.
 pub fn run(recording: &Recording, settings: &RunSettings) -> Result<Run, VioError> {
     let mut driver = Driver::new(recording, settings)?;
-    let stage = Stage::start("odometry");
+    let stage = (!settings.quiet).then(|| Stage::start("odometry"));
     let total = recording.images.count().max(1) as f64;
     let mut seen = 0.0;
     let mut each = |shot: Shot| {
         seen += 1.0;
-        stage.share(seen / total);
+        if let Some(stage) = &stage {
+            stage.share(seen / total);
+        }
         driver.shot(shot)
     };
     if settings.threads < 2 {
@@ -85,7 +91,9 @@ pub fn run(recording: &Recording, settings: &RunSettings) -> Result<Run, VioErro
     }
     let run = driver.finish()?;
     let poses: usize = run.segments.iter().map(|segment| segment.odometry.len()).sum();
-    stage.done(&format!("{poses} poses of {} images, {} left out", run.frames, run.skipped.len()));
+    if let Some(stage) = stage {
+        stage.done(&format!("{poses} poses of {} images, {} left out", run.frames, run.skipped.len()));
+    }
     Ok(run)
 }
 
@@ -111,7 +119,7 @@ impl<'a> Driver<'a> {
         filter.calibration.time_offset_s += recording.camera.time_offset_s;
         Ok(Self {
             recording,
-            vio: Vio::new(recording.camera.camera, recording.imu.noise, filter)?,
+            vio: Vio::new(recording.camera.camera, settings.noise.unwrap_or(recording.imu.noise), filter)?,
             next: 0,
             segments: Vec::new(),
             frames: 0,

@@ -70,7 +70,7 @@ pub struct Simulated {
 /// # Errors
 /// [`VioError`] if the motion or the settings cannot be, or a file cannot be written.
 pub fn simulate(settings: &SimulationSettings, folder: &Path) -> Result<Simulated, VioError> {
-    let spline = spline(settings)?;
+    let spline = flight_spline(&settings.flight, settings.seconds, settings.scenario.seed)?;
     let simulation = Simulation::new(spline, settings.scenario.clone())?;
     let recording = simulation.imu(0)?;
     let camera =
@@ -218,8 +218,8 @@ fn truth(simulation: &Simulation, recording: &ImuRecording) -> Result<euroc::Sta
     Ok(states)
 }
 
-fn spline(settings: &SimulationSettings) -> Result<Spline, VioError> {
-    let seconds = settings.seconds;
+/// The motion of a flight; the seed draws the phases of the one through the room.
+pub(super) fn flight_spline(flight: &Flight, seconds: f64, seed: u64) -> Result<Spline, VioError> {
     if !(1.0..=3600.0).contains(&seconds) {
         let (name, rule) = ("seconds", "must be between 1 and 3600");
         return Err(vio_ekf::Error::InvalidSetting { name, value: seconds, rule }.into());
@@ -230,8 +230,8 @@ fn spline(settings: &SimulationSettings) -> Result<Spline, VioError> {
         let knots = (0..count).map(|k| pose((k - 1) as f64 * KNOTS as f64 * 1e-9)).collect();
         Spline::new(Stamp::from_nanos(FIRST - KNOTS), KNOTS, knots)
     };
-    Ok(match &settings.flight {
-        Flight::Room => generated(&|t| room_pose(t, settings.scenario.seed))?,
+    Ok(match flight {
+        Flight::Room => generated(&|t| room_pose(t, seed))?,
         Flight::Wall => generated(&wall_pose)?,
         Flight::File(path) => {
             let whole = read_truth(path)?.trajectory;
