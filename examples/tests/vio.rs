@@ -213,7 +213,7 @@ fn what_is_wrong_is_named_and_what_is_left_out_is_counted() {
         &|f| edit(f, "imu0/sensor.yaml", |t| t.replace("rate_hz: 200", "rate_hz: 100")),
         &["200.0 Hz", "100.0 Hz"],
     );
-    refused("microseconds", &imu(&|c| c[0].truncate(c[0].len() - 3)), &["Hz", "unit of the stamps"]);
+    refused("microseconds", &imu(&|c| c[0] = c[0][..c[0].len() - 3].to_string()), &["Hz", "unit of the stamps"]);
     refused(
         "units",
         &imu(&|c| c[4..].iter_mut().for_each(|v| *v = (v.parse::<f64>().unwrap() / 9.81).to_string())),

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use paintcopter_examples::vio::{
     Flight, Lessons, Overrides, RunSettings, SimulationSettings, Tuning, VioReport, compare, judge, open_euroc,
-    open_mcap, run, save, simulate,
+    open_mcap, run, save, simulate, tune_noise,
 };
 use vio_ekf::sim::Scenario;
 use vio_ekf::tune::TuneSettings;
@@ -129,7 +129,7 @@ struct Tune {
     #[arg(long, default_value_t = 12.0, conflicts_with = "euroc")]
     seconds: f64,
     /// Factors on the noise to start from: the gyroscope's white noise and walk, the accelerometer's, and the images'
-    #[arg(long, value_name = "FACTORS", value_delimiter = ',', num_args = 5, default_value = "1,1,1,1,1")]
+    #[arg(long, value_name = "FACTORS", value_delimiter = ',', default_value = "1,1,1,1,1")]
     start: Vec<f64>,
     /// Evaluations at most
     #[arg(long, default_value_t = 200)]
