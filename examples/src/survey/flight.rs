@@ -5,6 +5,7 @@ use vio_ekf::{Spline, Stamp};
 
 use super::SurveyError;
 use crate::mesh_io::TriangleMesh;
+use crate::placing::mean_normal;
 
 /// Distance of the robot from the foremost point of the surface, metres.
 const STAND_OFF: f64 = 1.5;
@@ -92,14 +93,8 @@ fn place(corners: &[Vector3<f64>], legs: &[f64], mut t: f64) -> Vector3<f64> {
 
 /// The level direction that a surface faces, unit length.
 fn front(mesh: &TriangleMesh) -> Option<Vector3<f64>> {
-    let (mut sum, mut total) = (Vector3::zeros(), 0.0);
-    for face in &mesh.faces {
-        let [a, b, c] = face.map(|i| Vector3::from(mesh.positions[i as usize].map(f64::from)));
-        let area = (b - a).cross(&(c - a));
-        sum += area;
-        total += area.norm();
-    }
-    let level = Vector3::new(sum.x, sum.y, 0.0) / total;
+    let facing = mean_normal(mesh);
+    let level = Vector3::new(facing.x, facing.y, 0.0);
     (level.norm() >= FRONT).then(|| level.normalize())
 }
 
