@@ -20,6 +20,8 @@ mod network;
 mod painter;
 
 mod read;
+#[cfg(test)]
+mod reference;
 mod rollout;
 mod rows;
 mod shape;

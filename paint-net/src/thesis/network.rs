@@ -15,6 +15,9 @@ pub struct Network {
 const SHAPE: &str = "shape";
 /// First bias of the volume: many small sprays rather than a black wall, whose derivatives vanish (ours).
 const FIRST_VOLUME: f32 = -2.0;
+/// First biases of READ's log variance and log spacing: wide filters over the middle of the picture, which see enough to learn
+/// from; narrow ones would see a few pixels of its border (ours).
+const FIRST_WINDOW: [f32; 2] = [2.0, -0.5];
 
 impl Network {
     /// Untrained weights: uniform within one over the root of the inputs; forget gates start open (bias 1).
@@ -33,6 +36,8 @@ impl Network {
             parameters[forget..forget + shape.hidden].fill(1.0);
         }
         parameters[layers.spray.bias().start + 3] = FIRST_VOLUME;
+        let window = layers.attention.bias().start + 2;
+        parameters[window..window + 2].copy_from_slice(&FIRST_WINDOW);
         Ok(Self { shape, parameters })
     }
 
