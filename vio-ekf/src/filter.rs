@@ -26,6 +26,7 @@ mod scout;
 mod settings;
 mod start;
 pub(crate) mod state;
+mod trust;
 pub(crate) mod update;
 
 use nalgebra::{Isometry3, SMatrix, Translation3, Unit, Vector2, Vector3};
@@ -37,6 +38,7 @@ pub use points::PointObservation;
 pub use rest::RestSettings;
 pub use settings::{CalibrationSettings, GateSettings, LandmarkSettings, LimitSettings, PatchSettings, Settings};
 pub use start::{Start, StartSigma};
+pub use trust::SensorSettings;
 
 use crate::{Camera, Error, Imu, ImuNoise, Stamp};
 use estimator::Estimator;

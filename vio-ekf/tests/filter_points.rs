@@ -7,8 +7,8 @@ mod support;
 use nalgebra::{Isometry3, SVector};
 use support::flight::{Flight, nees};
 use vio_ekf::{
-    CalibrationSettings, Error, ImageView, Imu, LandmarkSettings, PointObservation, Settings, Stamp, Start, StartSigma,
-    Status, Vio, chi2, nalgebra, so3,
+    CalibrationSettings, Error, ImageView, Imu, LandmarkSettings, PointObservation, SensorSettings, Settings, Stamp,
+    Start, StartSigma, Status, Vio, chi2, nalgebra, so3,
 };
 
 #[test]
@@ -77,10 +77,10 @@ fn learns_nothing_about_position_and_yaw() {
 #[test]
 fn order_of_arrival_does_not_matter() {
     // Images that come 40 samples late, several in a row, change the output by not a single bit.
-    let feed = |delay: usize| {
+    let feed = |delay: usize, settings: Settings| {
         let mut flight = Flight::new(5, 6.0);
         let start = flight.drawn_start(StartSigma::default());
-        let mut vio = Vio::new(flight.camera, flight.noise, Settings::default()).unwrap();
+        let mut vio = Vio::new(flight.camera, flight.noise, settings).unwrap();
         let stamps: Vec<_> = flight.stamps().collect();
         let samples: Vec<_> = stamps.iter().map(|s| flight.imu(*s)).collect();
         let images: Vec<_> = stamps.iter().step_by(10).skip(1).map(|s| (*s, flight.see(*s))).collect();
@@ -100,8 +100,12 @@ fn order_of_arrival_does_not_matter() {
         }
         vio.output().unwrap()
     };
-    let (prompt, late) = (feed(0), feed(40));
-    assert_eq!(prompt, late);
+    // Also where the samples are not believed: what is held of them must not depend on when it is asked for.
+    let doubting = SensorSettings { gyro_range: 0.3, roughness: 0.5, ..SensorSettings::default() };
+    let doubting = Settings { sensor: doubting, ..Settings::default() };
+    assert_eq!(feed(0, Settings::default()), feed(40, Settings::default()));
+    assert_eq!(feed(0, doubting), feed(40, doubting));
+    assert_ne!(feed(0, doubting), feed(0, Settings::default()));
 }
 
 #[test]

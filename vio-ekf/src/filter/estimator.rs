@@ -68,7 +68,7 @@ impl Estimator {
         covariance.isolate(at::TIME_OFFSET, calibration.time_offset_sigma_s * calibration.time_offset_sigma_s);
         Self {
             rate: sample.gyro - state.gyro_bias,
-            history: History::new(sample, start.stamp, settings.history_samples),
+            history: History::new(sample, start.stamp, settings.history_samples).judging(settings.sensor),
             since: Interval::default(),
             noise,
             gravity: settings.gravity,

@@ -1,5 +1,6 @@
 use super::moving::MovingSettings;
 use super::rest::RestSettings;
+use super::trust::SensorSettings;
 use crate::Error;
 use crate::error::{all_not_negative, invalid};
 
@@ -11,6 +12,8 @@ pub struct Settings {
     pub features: usize,
     /// Magnitude of gravity, m/s²; 9.81.
     pub gravity: f64,
+    /// How the inertial sensor may be worse than its data sheet.
+    pub sensor: SensorSettings,
     /// How well the camera's calibration is known.
     pub calibration: CalibrationSettings,
     /// What is assumed of landmarks.
@@ -34,6 +37,7 @@ impl Default for Settings {
         Self {
             features: 25,
             gravity: 9.81,
+            sensor: SensorSettings::default(),
             calibration: CalibrationSettings::default(),
             landmarks: LandmarkSettings::default(),
             patches: PatchSettings::default(),
@@ -191,6 +195,9 @@ impl Settings {
             ("grey_sigma", self.patches.grey_sigma),
             ("unexplained", self.patches.unexplained),
             ("farthest", self.patches.farthest),
+            ("gyro_range", self.sensor.gyro_range),
+            ("accel_range", self.sensor.accel_range),
+            ("roughness", self.sensor.roughness),
         ] {
             if !(value > 0.0 && value.is_finite()) {
                 return Err(invalid(name, value, "must be positive"));
