@@ -4,6 +4,7 @@ mod bearing;
 pub(crate) mod covariance;
 mod detect;
 mod estimator;
+mod external;
 pub(crate) mod history;
 mod images;
 pub(crate) mod interval;
