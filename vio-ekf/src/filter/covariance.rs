@@ -62,6 +62,17 @@ impl Covariance {
         self.values[row * self.stride + row] += variance;
     }
 
+    /// Sets the covariance of two rows.
+    pub(crate) fn correlate(&mut self, row: usize, other: usize, value: f64) {
+        self.values[row * self.stride + other] = value;
+        self.values[other * self.stride + row] = value;
+    }
+
+    /// Rows that there is room for.
+    pub(crate) fn capacity(&self) -> usize {
+        self.stride
+    }
+
     /// Adds a multiple of another error to a row's error.
     pub(crate) fn add_row(&mut self, row: usize, weight: f64, other: usize) {
         for column in 0..self.size {

@@ -42,17 +42,6 @@ impl History {
         &self.samples[self.samples.len() - 1]
     }
 
-    /// The last sample not after a time, or the first one.
-    pub(crate) fn before(&self, stamp: Stamp) -> Imu {
-        let after = self.samples.partition_point(|sample| sample.stamp <= stamp);
-        self.samples[after.saturating_sub(1)]
-    }
-
-    /// The samples after a time.
-    pub(crate) fn after(&self, stamp: Stamp) -> impl Iterator<Item = &Imu> {
-        self.samples.iter().filter(move |sample| sample.stamp > stamp)
-    }
-
     /// Whether another sample would need more memory.
     pub(crate) fn is_full(&self) -> bool {
         self.samples.len() >= self.capacity
@@ -100,26 +89,33 @@ impl History {
     }
 
     /// The same from a time after the anchor.
-    pub(crate) fn between(
+    pub(crate) fn between(&self, from: Stamp, until: Stamp, biases: &[Vector3<f64>; 2], noise: &ImuNoise) -> Interval {
+        let mut interval = Interval::default();
+        self.extend(&mut interval, (from, until), biases, noise);
+        interval
+    }
+
+    /// Goes on with an interval over a span of time.
+    pub(crate) fn extend(
         &self,
-        mut from: Stamp,
-        until: Stamp,
+        interval: &mut Interval,
+        (mut from, until): (Stamp, Stamp),
         biases: &[Vector3<f64>; 2],
         noise: &ImuNoise,
-    ) -> Interval {
-        let mut interval = Interval::default();
-        for (before, after) in self.samples.iter().zip(self.samples.iter().skip(1)) {
-            let to = after.stamp.min(until);
-            if to > from {
-                extend(&mut interval, before, after, (from, to), biases, noise);
-                from = to;
+    ) {
+        let first = self.samples.partition_point(|sample| sample.stamp <= from).saturating_sub(1);
+        for (before, after) in self.samples.iter().skip(first).zip(self.samples.iter().skip(first + 1)) {
+            if from >= until {
+                return;
             }
+            let to = after.stamp.min(until);
+            extend(interval, before, after, (from, to), biases, noise);
+            from = to;
         }
         if until > from {
             let last = self.latest();
-            extend(&mut interval, last, last, (from, until), biases, noise);
+            extend(interval, last, last, (from, until), biases, noise);
         }
-        interval
     }
 
     /// Goes on with an interval that reaches until the last sample but one.
