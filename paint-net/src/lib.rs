@@ -32,6 +32,7 @@
 //! | 3.2 layers by intensity | [`Layered`] |
 //! | 3.3 spray footprint, ink `tanh c` | [`SprayKernel`], [`Saturation`] |
 //! | 3.3 the "ideal": Gaussian of the reference | [`ideal`] |
+//! | 3.3 the network: READ, PAINT, learned stop | [`thesis::Network`] |
 //! | (ours) non-negative deconvolution | [`Deconvolution`] |
 //! | (ours) greedy matching pursuit | [`MatchingPursuit`] |
 //! | (ours) few sprays at free places, of free spreads | [`FreeSplats`] |
@@ -63,6 +64,9 @@ mod saturation;
 mod slew;
 mod splats;
 mod strokes;
+// The way back is needed only to train.
+#[cfg_attr(not(feature = "train"), allow(dead_code))]
+pub mod thesis;
 #[cfg(feature = "train")]
 pub mod train;
 

@@ -1,13 +1,17 @@
-//! Training of the feedback painter on procedural pictures: seeded, and the same to the last bit for any number of threads.
+//! Training of the feedback painter on procedural pictures, and of the thesis' network on pictures given: seeded, and the same to the last bit for any number of threads.
 
 mod adam;
 mod checkpoint;
+mod patch;
 mod sample;
+mod thesis;
 
 use crate::error::{Error, require};
 use crate::network::{Adjoint, Block, Network, Shape, Trace};
-use adam::Adam;
+use adam::{Adam, shorten};
+pub use patch::thesis_patch;
 use sample::Sample;
+pub use thesis::{ThesisLoss, ThesisSettings, ThesisTrainer};
 
 /// How the network is trained.
 #[derive(Debug, Clone, PartialEq)]
@@ -137,13 +141,7 @@ impl Trainer {
                 *sum += g * share as f32;
             }
         }
-        let length = gradient.iter().map(|&g| f64::from(g).powi(2)).sum::<f64>().sqrt();
-        // A step that is no number teaches nothing.
-        if length.is_finite() {
-            let shorten = (settings.longest_gradient / length.max(1e-12)).min(1.0) as f32;
-            for g in &mut gradient {
-                *g *= shorten;
-            }
+        if shorten(&mut gradient, settings.longest_gradient) {
             self.adam.step(&mut self.parameters, &gradient, rate(settings, self.step));
         }
         self.step += 1;

@@ -4,6 +4,7 @@ mod arrivals;
 pub(crate) mod camera;
 mod cell;
 pub(crate) mod fields;
+mod lanes;
 pub(crate) mod march;
 mod remap;
 mod splat;

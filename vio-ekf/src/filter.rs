@@ -1,12 +1,15 @@
 //! The estimator: one camera, one inertial sensor, an iterated Kalman filter around the body.
 
 mod bearing;
-mod covariance;
+pub(crate) mod covariance;
 mod detect;
 mod estimator;
-mod history;
+mod external;
+mod follower;
+pub(crate) mod history;
 mod images;
-mod interval;
+mod inherit;
+pub(crate) mod interval;
 #[cfg(test)]
 mod jacobians;
 mod moving;
@@ -23,10 +26,10 @@ mod rest;
 mod scout;
 mod settings;
 mod start;
-mod state;
-mod update;
+pub(crate) mod state;
+pub(crate) mod update;
 
-use nalgebra::{Isometry3, SMatrix, Translation3, Unit, Vector3};
+use nalgebra::{Isometry3, SMatrix, Translation3, Unit, Vector2, Vector3};
 
 pub use bearing::Bearing;
 pub use estimator::CoreCovariance;
@@ -36,9 +39,9 @@ pub use rest::RestSettings;
 pub use settings::{CalibrationSettings, GateSettings, LandmarkSettings, LimitSettings, PatchSettings, Settings};
 pub use start::{Start, StartSigma};
 
-use crate::trajectory::is_finite;
 use crate::{Camera, Error, Imu, ImuNoise, Stamp};
 use estimator::Estimator;
+use follower::Follower;
 use images::Sight;
 use patch::Patch;
 use rest::Rest;
@@ -47,6 +50,9 @@ use state::at;
 
 /// A camera this much ahead of the inertial samples, in seconds, is waiting for data that does not come.
 const MAX_AHEAD: f64 = 0.1;
+
+/// Contradictions in a row that show a start in motion to have been wrong.
+const DOUBTED: u32 = 3;
 
 /// Whether the estimate can be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -185,6 +191,9 @@ pub struct Vio {
     sight: Sight,
     rest: Rest,
     scout: Scout,
+    follower: Follower,
+    /// Until then a start in motion may turn out to have been wrong.
+    doubtful: Option<Stamp>,
     /// Whether the image before was taken at rest.
     rested: bool,
     /// Angle that a rest may hide, rad.
@@ -225,6 +234,8 @@ impl Vio {
             sight: Sight::new(&camera, &settings.patches),
             rest: Rest::new(settings.rest),
             scout: Scout::new(settings.moving),
+            follower: Follower::default(),
+            doubtful: None,
             rested: false,
             unnoticed: 0.5 * settings.rest.pixels / camera.fx.min(camera.fy),
             contradictions: 0,
@@ -239,17 +250,7 @@ impl Vio {
         let Some(sample) = self.last else {
             return Err(Error::TooFew { what: "inertial samples before the start", got: 0, need: 1 });
         };
-        if start.stamp < sample.stamp {
-            return Err(Error::Late { what: "start", stamp: start.stamp, now: sample.stamp });
-        }
-        if !is_finite(&start.world_from_body) {
-            return Err(Error::NonFinite { what: "start pose", index: 0 });
-        }
-        let vectors = [start.velocity_in_body, start.gyro_bias, start.accel_bias];
-        if let Some(index) = vectors.iter().position(|v| v.iter().any(|v| !v.is_finite())) {
-            return Err(Error::NonFinite { what: "start velocity or bias", index });
-        }
-        start.sigma.check()?;
+        start.check(sample.stamp)?;
         self.reset();
         self.estimator = Some(Estimator::new(&self.camera, self.noise, &self.settings, start, sample));
         Ok(())
@@ -261,6 +262,8 @@ impl Vio {
         self.estimator = None;
         (self.contradictions, self.excess) = (0, None);
         self.scout = Scout::new(self.settings.moving);
+        self.follower = Follower::default();
+        self.doubtful = None;
     }
 
     /// Takes an inertial sample; stamps must increase.
@@ -348,40 +351,53 @@ impl Vio {
         })
     }
 
-    /// Starts from what the scout has found at the time of an image.
-    fn start_in_motion(&mut self, stamp: Stamp, motion: &moving::Motion) {
-        let Some(history) = self.scout.history() else { return };
-        let attitude = Bearing::new(&Unit::new_normalize(-motion.gravity)).level();
+    /// Starts from what the scout has found at the time of an image. `look` tells of a point by its name how it is seen in that
+    /// image, and what it looks like.
+    fn start_in_motion(
+        &mut self,
+        stamp: Stamp,
+        motion: &moving::Motion,
+        mut look: impl FnMut(u64) -> Option<(Vector2<f64>, Option<Patch>)>,
+    ) {
+        let samples: Vec<Imu> = self.scout.samples().copied().collect();
+        let after = samples.partition_point(|sample| sample.stamp <= stamp).max(1);
+        let Some(before) = samples.get(after - 1) else { return };
         let found = Start {
             stamp,
-            world_from_body: Isometry3::from_parts(Translation3::identity(), attitude),
+            world_from_body: Isometry3::from_parts(Translation3::identity(), motion.attitude),
             velocity_in_body: motion.velocity,
             gyro_bias: motion.gyro_bias,
-            accel_bias: Vector3::zeros(),
-            sigma: StartSigma {
-                position: 0.0,
-                yaw: 0.0,
-                velocity: motion.velocity_sigma,
-                tilt: motion.tilt_sigma,
-                gyro_bias: motion.gyro_bias_sigma,
-                accel_bias: self.settings.moving.accel_bias_sigma,
-            },
+            accel_bias: motion.accel_bias,
+            sigma: StartSigma::default(),
         };
-        let mut estimator = Estimator::new(&self.camera, self.noise, &self.settings, &found, history.before(stamp));
-        estimator.expect(motion.inverse_distance);
-        for sample in history.after(stamp) {
+        let mut estimator = Estimator::new(&self.camera, self.noise, &self.settings, &found, *before);
+        self.reset();
+        let pixel_sigma = self.settings.moving.pixel_sigma;
+        estimator.inherit(motion, |id| {
+            let (pixel, patch) = look(id)?;
+            let bearing = Bearing::new(&self.camera.bearing(&pixel)?);
+            let warp = points::project(&self.camera, &bearing)?.1.try_inverse()?;
+            self.tracks.push(Track { id, misses: 0, seen: true, patch });
+            Some((bearing, warp, warp * warp.transpose() * (pixel_sigma * pixel_sigma)))
+        });
+        for sample in &samples[after..] {
             estimator.imu(*sample);
         }
-        self.reset();
+        self.next_id = self.tracks.iter().map(|track| track.id + 1).fold(self.next_id, u64::max);
+        self.doubtful = Some(later(stamp, self.settings.moving.doubt_s));
         self.estimator = Some(estimator);
+    }
+
+    /// Time of an image by the inertial sensor's clock, as far as that is known before the start.
+    fn inertial_time(&self, stamp: Stamp) -> Stamp {
+        later(stamp, self.settings.calibration.time_offset_s)
     }
 
     /// Moves the filter to the exposure of an image. `None` if there is no filter, or it was started after the exposure;
     /// otherwise the number of landmarks lost on the way.
     fn expose(&mut self, stamp: Stamp, at_rest: bool) -> Result<Option<usize>, Error> {
         let Some(estimator) = &mut self.estimator else { return Ok(None) };
-        let shift = (estimator.state.time_offset * 1e9).round() as i64;
-        let time = Stamp::from_nanos(stamp.nanos().saturating_add(shift));
+        let time = later(stamp, estimator.state.time_offset);
         let anchor = estimator.history.anchor();
         if time <= anchor && estimator.history.is_new() {
             return Ok(None);
@@ -418,10 +434,17 @@ impl Vio {
         if let Some(estimator) = &mut self.estimator {
             let contradicted = report.rejected >= 5 && report.rejected > report.used;
             self.contradictions = if contradicted { self.contradictions + 1 } else { 0 };
-            let too_many = self.contradictions >= self.settings.limits.contradictions;
+            let now = estimator.history.anchor();
+            let doubtful = self.doubtful.is_some_and(|until| now < until);
+            let most = if doubtful { DOUBTED } else { self.settings.limits.contradictions };
+            let too_many = self.contradictions >= most;
             let excess = estimator.excess(&self.settings.limits);
             self.excess = self.excess.or(excess).or(too_many.then_some(Excess::Contradiction));
             estimator.replay();
+            if doubtful && self.excess.is_some() {
+                // The start was wrong: better none than this one.
+                self.reset();
+            }
         }
         report.status = self.status();
         report
@@ -431,4 +454,9 @@ impl Vio {
     fn report(&self) -> FrameReport {
         FrameReport { status: self.status(), used: 0, rejected: 0, added: 0, removed: 0, at_rest: false }
     }
+}
+
+/// A time some seconds later.
+fn later(stamp: Stamp, seconds: f64) -> Stamp {
+    Stamp::from_nanos(stamp.nanos().saturating_add((seconds * 1e9).round() as i64))
 }

@@ -56,6 +56,7 @@ mod error;
 mod eval;
 mod filter;
 mod format;
+mod fusion;
 mod lie;
 mod measurement;
 pub mod sim;
@@ -79,6 +80,10 @@ pub use filter::{
     StartSigma, Status, Vio, Waiting,
 };
 pub use format::{asl, calibration, euroc, kitti, tum};
+pub use fusion::{
+    AlignmentSettings, FusionSettings, ImuPair, ImuPairSettings, MountSettings, PoseFusion, PoseMeasurement,
+    PoseSource, SourceEstimate, Tally, UnifiedSettings, UnifiedVio,
+};
 pub use lie::{se3, so3};
 pub use measurement::{ImageView, Imu, ImuNoise};
 pub use nalgebra;

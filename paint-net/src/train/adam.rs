@@ -38,3 +38,13 @@ impl Adam {
         }
     }
 }
+
+/// Shortens a gradient to the longest allowed; false if it is no number, which teaches nothing.
+pub(super) fn shorten(gradient: &mut [f32], longest: f64) -> bool {
+    let length = gradient.iter().map(|&g| f64::from(g).powi(2)).sum::<f64>().sqrt();
+    let factor = (longest / length.max(1e-12)).min(1.0) as f32;
+    for g in gradient {
+        *g *= factor;
+    }
+    length.is_finite()
+}

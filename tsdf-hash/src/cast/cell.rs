@@ -2,18 +2,18 @@
 
 use super::UNSEEN;
 use super::fields::{ALL, NODES};
-use super::march::{max, min};
+use super::lanes::{max, min};
 use crate::fuse::ROUNDER;
 
-const Y: usize = NODES;
-const Z: usize = NODES * NODES;
+pub(super) const Y: usize = NODES;
+pub(super) const Z: usize = NODES * NODES;
 /// From the first node of a cell to the last one.
 const SPAN: usize = 1 + Y + Z;
 
 /// A cell and where in it a point lies, `0..=1` along each axis.
 pub(super) struct Cell {
-    first: usize,
-    along: [f32; 3],
+    pub(super) first: usize,
+    pub(super) along: [f32; 3],
 }
 
 impl Cell {

@@ -1,11 +1,15 @@
-//! One ray, through the fields of its tile.
+//! Eight neighbouring rays at a time, through the fields of their square.
 //!
-//! Only additions, subtractions, multiplications, divisions, square roots, comparisons and integers, in the order in which
-//! they are written: the result is the same on every processor that rounds as IEEE 754 asks.
+//! One ray is a chain: where it is, what is there, where it goes next; the processor waits for each link. Eight of them in step
+//! fill the waits, and most of their arithmetic is done in vectors.
+//!
+//! Only additions, subtractions, multiplications, divisions, square roots, comparisons and integers, for each ray in the
+//! order in which they are written: the result is the same on every processor that rounds as IEEE 754 asks.
 
 use super::camera::Camera;
 use super::cell::Cell;
-use super::fields::{Field, Fields};
+use super::fields::{Field, Fields, Place};
+use super::lanes::{Cells, LANES, Lanes, flags, lanes, max, min, set};
 use super::tiles::{self, Tiles};
 use super::{Band, Pixel, UNSEEN};
 
@@ -16,135 +20,156 @@ pub(crate) const GRAZE: f32 = 1e-3;
 /// Steps near the surface and in unobserved cells, voxels.
 pub(crate) const LEAST_STEP: f32 = 0.5;
 
+// One row of a square is one group of rays.
+const _: () = assert!(tiles::SIDE == LANES);
+
 /// Fills the rows of a band.
 pub(super) fn fill(band: &mut Band, camera: &Camera, fields: &Fields, tiles: &Tiles, colour: bool) {
     let width = camera.width;
     let rows = band.depth.len() / width;
-    let scene = Scene { camera, fields, colour };
     for top in (0..rows).step_by(tiles::SIDE) {
         for left in (0..width).step_by(tiles::SIDE) {
             let list = tiles.list(left / tiles::SIDE, (band.first + top) / tiles::SIDE);
             for row in top..(top + tiles::SIDE).min(rows) {
-                let (start, step) = camera.row(band.first + row);
-                for u in left..(left + tiles::SIDE).min(width) {
-                    let direction = [0, 1, 2].map(|k| start[k] + step[k] * u as f32);
-                    band.set(row * width + u, &scene.cast(direction, list));
+                let rays = Rays::new(camera, band.first + row, left);
+                let wanted = (width - left).min(LANES);
+                for (lane, pixel) in rays.cast(wanted, fields, list, colour)[..wanted].iter().enumerate() {
+                    band.set(row * width + left + lane, pixel);
                 }
             }
         }
     }
 }
 
-/// What a ray did in one field.
-enum Outcome {
-    /// Left it without meeting the surface.
-    Through,
-    /// Met the solid from a side where no distance was observed.
-    Blocked,
-    Hit(Pixel),
-}
-
-struct Scene<'a> {
+/// Rays of neighbouring pixels of a row.
+struct Rays<'a> {
     camera: &'a Camera,
-    fields: &'a Fields,
-    colour: bool,
+    /// Voxels per metre of depth.
+    direction: [Lanes; 3],
+    inverse: [Lanes; 3],
+    /// Metres of depth per voxel along the ray.
+    per_voxel: Lanes,
 }
 
-impl Scene<'_> {
-    fn cast(&self, direction: [f32; 3], list: &[u32]) -> Pixel {
-        let inverse = direction.map(|d| 1.0 / if d.abs() < LEAST_SLOPE { LEAST_SLOPE } else { d });
+impl<'a> Rays<'a> {
+    fn new(camera: &'a Camera, row: usize, left: usize) -> Self {
+        let (start, step) = camera.row(row);
+        let direction = [0, 1, 2].map(|k| lanes(|n| start[k] + step[k] * (left + n) as f32));
+        let inverse = direction.map(|d| lanes(|n| 1.0 / if d[n].abs() < LEAST_SLOPE { LEAST_SLOPE } else { d[n] }));
         let [dx, dy, dz] = direction;
-        let per_voxel = 1.0 / (dx * dx + dy * dy + dz * dz).sqrt();
+        let per_voxel = lanes(|n| 1.0 / (dx[n] * dx[n] + dy[n] * dy[n] + dz[n] * dz[n]).sqrt());
+        Self { camera, direction, inverse, per_voxel }
+    }
+
+    /// What the first `wanted` rays meet.
+    fn cast(&self, wanted: usize, fields: &Fields, list: &[u32], colour: bool) -> [Pixel; LANES] {
+        let mut pixels = [Pixel::NONE; LANES];
+        let mut under_way = u8::MAX >> (LANES - wanted);
         for &k in list {
-            let place = &self.fields.places[k as usize];
-            let [x, y, z] = [0, 1, 2].map(|k| sorted(place.low[k] * inverse[k], place.high[k] * inverse[k]));
-            let enter = max(max(x.0, y.0), max(z.0, self.camera.min_depth));
-            let leave = min(min(x.1, y.1), min(z.1, self.camera.max_depth));
-            if enter <= leave {
-                let field = &self.fields.fields[place.field];
-                let reach = self.camera.truncation;
-                let ray = Ray { origin: place.origin, direction, per_voxel, reach, field, colour: self.colour };
-                match ray.through(enter, leave) {
-                    Outcome::Through => {}
-                    Outcome::Blocked => return Pixel::NONE,
-                    Outcome::Hit(pixel) => return pixel,
+            let place = &fields.places[k as usize];
+            let (enter, leave) = self.crossing(place);
+            let inside = flags(|n| enter[n] <= leave[n]) & under_way;
+            if inside != 0 {
+                let field = &fields.fields[place.field];
+                let within = Within { rays: self, origin: &place.origin, field, colour };
+                under_way &= !within.march(inside, enter, &leave, &mut pixels);
+                if under_way == 0 {
+                    break;
                 }
             }
         }
-        Pixel::NONE
+        pixels
+    }
+
+    /// Depths between which the rays are in the box of a place.
+    #[inline(always)]
+    fn crossing(&self, place: &Place) -> (Lanes, Lanes) {
+        let (mut enter, mut leave) = ([self.camera.min_depth; LANES], [self.camera.max_depth; LANES]);
+        for k in 0..3 {
+            for n in 0..LANES {
+                let (a, b) = (place.low[k] * self.inverse[k][n], place.high[k] * self.inverse[k][n]);
+                enter[n] = max(enter[n], min(a, b));
+                leave[n] = min(leave[n], max(a, b));
+            }
+        }
+        (enter, leave)
     }
 }
 
-pub(super) fn max(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
-pub(super) fn min(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-fn sorted(a: f32, b: f32) -> (f32, f32) {
-    if a < b { (a, b) } else { (b, a) }
-}
-
-/// A ray `origin + t direction` in the nodes of a field; `t` is the depth in metres.
-struct Ray<'a> {
+/// Rays in the nodes of a field.
+struct Within<'a> {
+    rays: &'a Rays<'a>,
     field: &'a Field,
-    origin: [f32; 3],
-    direction: [f32; 3],
-    /// Metres of depth per voxel along the ray.
-    per_voxel: f32,
-    /// Truncation distance in voxels.
-    reach: f32,
+    /// The camera, from the first node.
+    origin: &'a [f32; 3],
     colour: bool,
 }
 
-impl Ray<'_> {
-    fn through(&self, enter: f32, leave: f32) -> Outcome {
-        let mut outside: Option<(f32, f32)> = None;
-        let mut t = enter;
+impl Within<'_> {
+    /// Moves the rays of the set `inside` from `t` to `leave`, depths in metres. Returns those that end here: at a surface, whose
+    /// pixel is then set, or at the solid met from a side where no distance was observed.
+    #[inline(always)]
+    fn march(&self, mut inside: u8, mut t: Lanes, leave: &Lanes, pixels: &mut [Pixel; LANES]) -> u8 {
+        let reach = self.rays.camera.truncation;
+        let mut ended = 0;
+        // The step before: its depth, and its value where that was outside, else NaN.
+        let (mut near, mut above) = ([0.0; LANES], [f32::NAN; LANES]);
         loop {
-            let value = self.cell(t).value(&self.field.distance);
-            let step = if value >= 0.0 {
-                outside = Some((t, value));
-                max(value * self.reach, LEAST_STEP)
-            } else if value < 0.0 {
-                return match outside {
-                    Some(before) => self.refine(before, (t, value)),
-                    None if value > -GRAZE => self.refine((t, 0.0), (t, value)),
-                    None => Outcome::Blocked,
-                };
-            } else {
-                outside = None;
-                LEAST_STEP
-            };
-            if t >= leave {
-                return Outcome::Through;
+            let cells = self.cells(&t);
+            let mut value = [0.0; LANES];
+            for n in set(inside) {
+                // Not in vectors: eight corners from eight places each would go through memory twice.
+                value[n] = cells.cell(n).value(&self.field.distance);
             }
-            t = min(t + step * self.per_voxel, leave);
+            let solid = flags(|n| value[n] < 0.0) & inside;
+            for n in set(solid) {
+                let before = if !above[n].is_nan() {
+                    (near[n], above[n])
+                } else if value[n] > -GRAZE {
+                    (t[n], 0.0)
+                } else {
+                    continue;
+                };
+                if let Some(pixel) = self.refine(n, before, (t[n], value[n])) {
+                    pixels[n] = pixel;
+                }
+            }
+            ended |= solid;
+            inside &= !(solid | flags(|n| t[n] >= leave[n]));
+            if inside == 0 {
+                return ended;
+            }
+            (near, above) = (t, value);
+            t = lanes(|n| {
+                // Of a NaN the maximum is the other.
+                let step = max(value[n] * reach, LEAST_STEP);
+                min(t[n] + step * self.rays.per_voxel[n], leave[n])
+            });
         }
     }
 
-    fn cell(&self, t: f32) -> Cell {
-        Cell::at([0, 1, 2].map(|k| self.origin[k] + self.direction[k] * t))
+    #[inline(always)]
+    fn cells(&self, t: &Lanes) -> Cells {
+        Cells::at([0, 1, 2].map(|k| lanes(|n| self.origin[k] + self.rays.direction[k][n] * t[n])))
     }
 
-    /// From two depths on either side of the surface: one step of the secant, one of Newton.
-    fn refine(&self, (near, above): (f32, f32), (far, below): (f32, f32)) -> Outcome {
+    /// From two depths of a ray on either side of the surface: one step of the secant, one of Newton.
+    #[inline(always)]
+    fn refine(&self, lane: usize, (near, above): (f32, f32), (far, below): (f32, f32)) -> Option<Pixel> {
         let t = near + (far - near) * (above / (above - below));
-        let cell = self.cell(t);
+        let [dx, dy, dz] = self.rays.direction.map(|d| d[lane]);
+        let [x, y, z] = *self.origin;
+        let cell = Cell::at([x + dx * t, y + dy * t, z + dz * t]);
         let (value, [gx, gy, gz]) = cell.value_and_gradient(&self.field.distance);
-        let slope = gx * self.direction[0] + gy * self.direction[1] + gz * self.direction[2];
-        if slope < 0.0 {
-            let reach = LEAST_STEP * self.per_voxel;
+        let slope = gx * dx + gy * dy + gz * dz;
+        // Otherwise a back face, or a NaN: the voxel at the hit is not observed.
+        (slope < 0.0).then(|| {
+            let reach = LEAST_STEP * self.rays.per_voxel[lane];
             let depth = t + min(max(-value / slope, -reach), reach);
             let scale = 1.0 / (gx * gx + gy * gy + gz * gz).sqrt();
             let colour = if self.colour { cell.colour(&self.field.colour) } else { UNSEEN };
             let weight = self.field.weight[cell.nearest()];
-            Outcome::Hit(Pixel { depth, normal: [gx * scale, gy * scale, gz * scale], colour, weight })
-        } else {
-            // A back face, or a NaN: the voxel at the hit is not observed.
-            Outcome::Blocked
-        }
+            Pixel { depth, normal: [gx * scale, gy * scale, gz * scale], colour, weight }
+        })
     }
 }

@@ -27,6 +27,12 @@ impl Covariance {
         Self { size, stride: capacity, values: vec![0.0; capacity * capacity] }
     }
 
+    /// Becomes equal to another of the same capacity, without claiming memory.
+    pub(crate) fn assign(&mut self, other: &Self) {
+        self.size = other.size;
+        self.values.copy_from_slice(&other.values);
+    }
+
     pub(crate) fn size(&self) -> usize {
         self.size
     }
@@ -54,6 +60,17 @@ impl Covariance {
 
     pub(crate) fn inflate(&mut self, row: usize, variance: f64) {
         self.values[row * self.stride + row] += variance;
+    }
+
+    /// Sets the covariance of two rows.
+    pub(crate) fn correlate(&mut self, row: usize, other: usize, value: f64) {
+        self.values[row * self.stride + other] = value;
+        self.values[other * self.stride + row] = value;
+    }
+
+    /// Rows that there is room for.
+    pub(crate) fn capacity(&self) -> usize {
+        self.stride
     }
 
     /// Adds a multiple of another error to a row's error.

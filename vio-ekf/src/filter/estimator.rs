@@ -12,7 +12,7 @@ use super::{Excess, Odometry, bearing::Bearing};
 use crate::{Camera, Imu, ImuNoise, Stamp};
 
 /// Most residuals of one update.
-const MAX_RESIDUALS: usize = 3;
+const MAX_RESIDUALS: usize = 6;
 
 /// A landmark whose inverse distance has a smaller relative deviation tells how far away new ones may be; 0.3 as in ROVIO.
 const WELL_KNOWN: f64 = 0.3;
@@ -29,12 +29,10 @@ pub(crate) struct Estimator {
     pub(crate) history: History,
     /// From the anchor until now.
     since: Interval,
-    noise: ImuNoise,
-    gravity: f64,
+    pub(super) noise: ImuNoise,
+    pub(super) gravity: f64,
     /// Rate of the body at the anchor.
     pub(crate) rate: Vector3<f64>,
-    /// Inverse distance of new landmarks while no other is known well, if it is not that of the settings.
-    expected: Option<f64>,
     work: Workspace,
     delta: Vec<f64>,
     scratch: Vec<f64>,
@@ -74,7 +72,6 @@ impl Estimator {
             since: Interval::default(),
             noise,
             gravity: settings.gravity,
-            expected: None,
             work: Workspace::new(capacity),
             delta: vec![0.0; capacity],
             scratch: vec![0.0; capacity * MAX_RESIDUALS],
@@ -97,8 +94,7 @@ impl Estimator {
     /// Moves the anchor to a later time; `dropped` is told the slots of landmarks that are lost on the way.
     pub(crate) fn advance(&mut self, until: Stamp, dropped: impl FnMut(usize)) {
         let interval = self.history.integrate(until, &self.biases(), &self.noise);
-        let step = interval.step(&self.state, self.gravity);
-        propagate(&mut self.state, &mut self.covariance, &step, &mut self.work, dropped);
+        propagate(&mut self.state, &mut self.covariance, (&interval, self.gravity), &mut self.work, dropped);
         self.history.advance(until);
         self.rate = self.history.rate_at_anchor() - self.state.gyro_bias;
     }
@@ -246,18 +242,13 @@ impl Estimator {
                 known += 1;
             }
         }
-        let mut inverse_distance = self.expected.unwrap_or(settings.inverse_distance);
+        let mut inverse_distance = settings.inverse_distance;
         if known >= ENOUGH_KNOWN {
             let (_, median, _) = sorted[..known].select_nth_unstable_by(known / 2, f64::total_cmp);
             inverse_distance = *median;
         }
         let deviation = settings.inverse_distance_sigma * inverse_distance;
         Guess { inverse_distance, distance_variance: deviation * deviation, bearing: Matrix2::zeros() }
-    }
-
-    /// Says how far away the first landmarks will be.
-    pub(crate) fn expect(&mut self, inverse_distance: f64) {
-        self.expected = Some(inverse_distance);
     }
 
     /// Moves the anchor into the middle of the samples, to make room for more.
@@ -278,8 +269,6 @@ impl Estimator {
     pub(crate) fn odometry(&self) -> Odometry {
         let step = self.since.step(&self.state, self.gravity);
         let prior = self.covariance.block::<{ at::CORE }, { at::CORE }>(0, 0);
-        let noise = step.noise.fixed_view::<{ at::CORE }, { at::CORE }>(0, 0);
-        let covariance = step.transition * prior * step.transition.transpose() + noise;
         Odometry {
             stamp: self.history.now(),
             world_from_body: step.end(&self.state.position, &self.state.attitude),
@@ -287,7 +276,7 @@ impl Estimator {
             rate_in_body: self.history.latest().gyro - self.state.gyro_bias,
             gyro_bias: self.state.gyro_bias,
             accel_bias: self.state.accel_bias,
-            covariance: (covariance + covariance.transpose()) * 0.5,
+            covariance: step.carry(&prior),
         }
     }
 }

@@ -42,17 +42,6 @@ impl History {
         &self.samples[self.samples.len() - 1]
     }
 
-    /// The last sample not after a time, or the first one.
-    pub(crate) fn before(&self, stamp: Stamp) -> Imu {
-        let after = self.samples.partition_point(|sample| sample.stamp <= stamp);
-        self.samples[after.saturating_sub(1)]
-    }
-
-    /// The samples after a time.
-    pub(crate) fn after(&self, stamp: Stamp) -> impl Iterator<Item = &Imu> {
-        self.samples.iter().filter(move |sample| sample.stamp > stamp)
-    }
-
     /// Whether another sample would need more memory.
     pub(crate) fn is_full(&self) -> bool {
         self.samples.len() >= self.capacity
@@ -77,32 +66,56 @@ impl History {
 
     /// Rate read at the anchor.
     pub(crate) fn rate_at_anchor(&self) -> Vector3<f64> {
-        let before = &self.samples[0];
-        match self.samples.get(1) {
-            Some(after) if self.anchor > before.stamp => {
-                let gap = after.stamp.secs_since(before.stamp);
-                before.gyro + (after.gyro - before.gyro) * (self.anchor.secs_since(before.stamp) / gap)
+        self.reading(self.anchor).gyro
+    }
+
+    /// What the sensor would have read at a time: linear between samples, constant before the first and after the last.
+    pub(crate) fn reading(&self, stamp: Stamp) -> Imu {
+        let after = self.samples.partition_point(|sample| sample.stamp <= stamp);
+        let before = self.samples[after.saturating_sub(1)];
+        match self.samples.get(after) {
+            Some(next) if stamp > before.stamp => {
+                let share = stamp.secs_since(before.stamp) / next.stamp.secs_since(before.stamp);
+                let gyro = before.gyro + (next.gyro - before.gyro) * share;
+                Imu { stamp, gyro, accel: before.accel + (next.accel - before.accel) * share }
             }
-            _ => before.gyro,
+            _ => Imu { stamp, ..before },
         }
     }
 
     /// Motion from the anchor until a time. Between samples rate and force are linear; after the last one they stay.
     pub(crate) fn integrate(&self, until: Stamp, biases: &[Vector3<f64>; 2], noise: &ImuNoise) -> Interval {
+        self.between(self.anchor, until, biases, noise)
+    }
+
+    /// The same from a time after the anchor.
+    pub(crate) fn between(&self, from: Stamp, until: Stamp, biases: &[Vector3<f64>; 2], noise: &ImuNoise) -> Interval {
         let mut interval = Interval::default();
-        let mut from = self.anchor;
-        for (before, after) in self.samples.iter().zip(self.samples.iter().skip(1)) {
-            let to = after.stamp.min(until);
-            if to > from {
-                extend(&mut interval, before, after, (from, to), biases, noise);
-                from = to;
+        self.extend(&mut interval, (from, until), biases, noise);
+        interval
+    }
+
+    /// Goes on with an interval over a span of time.
+    pub(crate) fn extend(
+        &self,
+        interval: &mut Interval,
+        (mut from, until): (Stamp, Stamp),
+        biases: &[Vector3<f64>; 2],
+        noise: &ImuNoise,
+    ) {
+        let first = self.samples.partition_point(|sample| sample.stamp <= from).saturating_sub(1);
+        for (before, after) in self.samples.iter().skip(first).zip(self.samples.iter().skip(first + 1)) {
+            if from >= until {
+                return;
             }
+            let to = after.stamp.min(until);
+            extend(interval, before, after, (from, to), biases, noise);
+            from = to;
         }
         if until > from {
             let last = self.latest();
-            extend(&mut interval, last, last, (from, until), biases, noise);
+            extend(interval, last, last, (from, until), biases, noise);
         }
-        interval
     }
 
     /// Goes on with an interval that reaches until the last sample but one.

@@ -94,14 +94,18 @@ impl Vio {
 
     /// Shows an image to the scout, and starts if that has found the motion.
     fn scout(&mut self, stamp: Stamp) {
+        let time = self.inertial_time(stamp);
         let Sight { pyramid, detector } = &mut self.sight;
-        let shift = (self.settings.calibration.time_offset_s * 1e9).round() as i64;
-        let time = Stamp::from_nanos(stamp.nanos().saturating_add(shift));
-        let demands = demands(&self.settings.patches);
-        let scale = (self.settings.gravity, self.settings.history_samples);
-        if let Some(motion) = self.scout.image(time, pyramid, (detector, &demands), &self.camera, scale) {
-            self.start_in_motion(time, &motion);
-        }
+        let turn = self.scout.turn(time);
+        self.follower.image(turn, pyramid, (detector, &demands(&self.settings.patches)), &self.camera);
+        let Some(motion) = self.scout.image(time, self.follower.seen(), &self.camera, self.settings.gravity) else {
+            return;
+        };
+        let (pyramid, follower) = (self.sight.pyramid.clone(), self.follower.clone());
+        self.start_in_motion(time, &motion, |id| {
+            let pixel = follower.pixel(id)?;
+            Some((pixel, Some(Patch::take(&pyramid, &pixel)?)))
+        });
     }
 
     /// Time of the last image.

@@ -51,10 +51,21 @@ pub(crate) struct Step {
     pub(crate) velocity: Vector3<f64>,
     /// Core errors at the end by core errors at the start.
     pub(crate) transition: SMatrix<f64, { at::CORE }, { at::CORE }>,
-    /// Errors of `start_from_end` (position, rotation on the start's side) by core errors at the start.
-    pub(crate) motion: SMatrix<f64, 6, { at::CORE }>,
-    /// Covariance of the noise of the core at the end and of `start_from_end`, in this order.
-    pub(crate) noise: SMatrix<f64, { at::CORE + 6 }, { at::CORE + 6 }>,
+    /// Covariance of the core's noise at the end.
+    pub(crate) noise: SMatrix<f64, { at::CORE }, { at::CORE }>,
+    /// Errors of the relative motion (rotation, velocity, position, in the start's axes) by core errors at the start.
+    relative: SMatrix<f64, MOTION, { at::CORE }>,
+    /// Core errors at the end by those of the relative motion.
+    compose: SMatrix<f64, { at::CORE }, MOTION>,
+}
+
+/// Covariance of the noise of an interval.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct StepNoise {
+    /// Of `start_from_end`.
+    pub(crate) motion: SMatrix<f64, 6, 6>,
+    /// Between that and the core at the end.
+    pub(crate) motion_core: SMatrix<f64, 6, { at::CORE }>,
 }
 
 impl Interval {
@@ -99,13 +110,18 @@ impl Interval {
 
     /// The same motion with other biases, to first order.
     pub(crate) fn step(&self, state: &State, gravity: f64) -> Step {
-        let start_from_world = state.attitude.inverse();
+        self.step_from(&state.velocity, &state.attitude, gravity)
+    }
+
+    /// The same from velocity and attitude at the start, which is all that it depends on.
+    pub(crate) fn step_from(&self, velocity: &Vector3<f64>, attitude: &UnitQuaternion<f64>, gravity: f64) -> Step {
+        let start_from_world = attitude.inverse();
         let (time, half) = (self.duration, 0.5 * self.duration * self.duration);
         let down = start_from_world * Vector3::new(0.0, 0.0, -gravity);
-        let moved = state.velocity * time + down * half + self.position;
-        let velocity_in_start = state.velocity + down * time + self.velocity;
+        let moved = velocity * time + down * half + self.position;
+        let velocity_in_start = velocity + down * time + self.velocity;
         let end_from_start = self.rotation.inverse().to_rotation_matrix().into_inner();
-        let world_from_start = state.attitude.to_rotation_matrix().into_inner();
+        let world_from_start = attitude.to_rotation_matrix().into_inner();
 
         // d(Rᵀ g)/dθ = Rᵀ hat(g) for the world-side error.
         let tilt = world_from_start.transpose() * Vector3::new(0.0, 0.0, -gravity).cross_matrix();
@@ -135,29 +151,20 @@ impl Interval {
         let mut corner = transition.fixed_view_mut::<3, 3>(at::POSITION, at::ATTITUDE);
         corner -= lever;
 
-        let mut motion = SMatrix::<f64, 6, { at::CORE }>::zeros();
-        motion.fixed_rows_mut::<3>(0).copy_from(&relative.fixed_rows::<3>(6));
-        motion.fixed_rows_mut::<3>(3).copy_from(&relative.fixed_rows::<3>(0));
-
         Step {
             start_from_end: (moved, self.rotation),
             velocity: end_from_start * velocity_in_start,
             transition,
-            motion,
-            noise: self.noise(&compose),
+            noise: self.core_noise(&compose),
+            relative,
+            compose,
         }
     }
 
-    /// Noise of the core and of the motion, from the noise of the relative motion and the walk.
-    fn noise(&self, compose: &SMatrix<f64, { at::CORE }, MOTION>) -> SMatrix<f64, { at::CORE + 6 }, { at::CORE + 6 }> {
-        let mut all = SMatrix::<f64, { at::CORE + 6 }, MOTION>::zeros();
-        all.fixed_rows_mut::<{ at::CORE }>(0).copy_from(compose);
-        for k in 0..3 {
-            all[(at::CORE + k, 6 + k)] = 1.0;
-            all[(at::CORE + 3 + k, k)] = 1.0;
-        }
-        let mut noise = all * self.covariance * all.transpose();
-        let walked = all * self.walk_covariance;
+    /// Covariance of the core's noise at the end.
+    fn core_noise(&self, compose: &SMatrix<f64, { at::CORE }, MOTION>) -> SMatrix<f64, { at::CORE }, { at::CORE }> {
+        let mut noise = sandwich(compose, &self.covariance);
+        let walked = compose * self.walk_covariance;
         let mut columns = noise.fixed_columns_mut::<6>(at::GYRO_BIAS);
         columns += walked;
         let mut rows = noise.fixed_rows_mut::<6>(at::GYRO_BIAS);
@@ -168,9 +175,65 @@ impl Interval {
         }
         noise
     }
+
+    /// The noise of the motion from start to end, and what it has in common with the core's.
+    pub(crate) fn noise(&self, step: &Step) -> StepNoise {
+        let both = self.covariance * step.compose.transpose();
+        let mut motion_core = reordered(&both);
+        let mut walk = motion_core.fixed_columns_mut::<6>(at::GYRO_BIAS);
+        walk += reordered(&self.walk_covariance);
+        StepNoise { motion: reordered(&reordered(&self.covariance).transpose()), motion_core }
+    }
+}
+
+/// Position and rotation, in this order, of rows of the relative motion.
+fn reordered<const C: usize>(rows: &SMatrix<f64, MOTION, C>) -> SMatrix<f64, 6, C> {
+    let mut out = SMatrix::<f64, 6, C>::zeros();
+    out.fixed_rows_mut::<3>(0).copy_from(&rows.fixed_rows::<3>(6));
+    out.fixed_rows_mut::<3>(3).copy_from(&rows.fixed_rows::<3>(0));
+    out
+}
+
+/// `F P Fᵀ` of a symmetric `P` and an `F` of which most is zero.
+fn sandwich<const R: usize, const C: usize>(f: &SMatrix<f64, R, C>, p: &SMatrix<f64, C, C>) -> SMatrix<f64, R, R> {
+    // F P = (P Fᵀ)ᵀ, and the same once more.
+    times_transposed(&times_transposed(p, f).transpose(), f)
+}
+
+/// `A Fᵀ`.
+fn times_transposed<const A: usize, const R: usize, const C: usize>(
+    a: &SMatrix<f64, A, C>,
+    f: &SMatrix<f64, R, C>,
+) -> SMatrix<f64, A, R> {
+    let mut out = SMatrix::<f64, A, R>::zeros();
+    for c in 0..C {
+        for r in 0..R {
+            let weight = f[(r, c)];
+            if weight != 0.0 {
+                for k in 0..A {
+                    out[(k, r)] += a[(k, c)] * weight;
+                }
+            }
+        }
+    }
+    out
 }
 
 impl Step {
+    /// Covariance of the core at the end, symmetric to the last bit, from that at the start.
+    pub(crate) fn carry(
+        &self,
+        core: &SMatrix<f64, { at::CORE }, { at::CORE }>,
+    ) -> SMatrix<f64, { at::CORE }, { at::CORE }> {
+        let covariance = sandwich(&self.transition, core) + self.noise;
+        (covariance + covariance.transpose()) * 0.5
+    }
+
+    /// Errors of `start_from_end` (position, rotation on the start's side) by core errors at the start.
+    pub(crate) fn motion(&self) -> SMatrix<f64, 6, { at::CORE }> {
+        reordered(&self.relative)
+    }
+
     /// Position and attitude at the end, from those at the start.
     pub(crate) fn end(&self, position: &Vector3<f64>, attitude: &UnitQuaternion<f64>) -> Isometry3<f64> {
         let (moved, rotation) = self.start_from_end;

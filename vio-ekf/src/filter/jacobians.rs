@@ -63,11 +63,13 @@ fn integrate(readings: &[[Vector3<f64>; 2]], state: &State, noise: &ImuNoise) ->
 
 /// The nominal model of a whole interval, without any covariance.
 fn model(readings: &[[Vector3<f64>; 2]], state: &State) -> State {
-    let step = integrate(readings, state, &ImuNoise::ZERO).step(state, GRAVITY);
+    let interval = integrate(readings, state, &ImuNoise::ZERO);
     let mut end = state.clone();
     let capacity = at::landmark(state.landmarks.len());
     let mut covariance = Covariance::new(capacity, capacity);
-    propagate(&mut end, &mut covariance, &step, &mut Workspace::new(capacity), |_| panic!("a landmark was lost"));
+    propagate(&mut end, &mut covariance, (&interval, GRAVITY), &mut Workspace::new(capacity), |_| {
+        panic!("a landmark was lost")
+    });
     end
 }
 
@@ -140,8 +142,8 @@ fn covariance_moves_with_the_transition_of_the_whole_state() {
         let prior = random_covariance(&mut rng, f.nrows()) * SMALL;
         let mut covariance = filled(&prior);
         let mut end = state.clone();
-        let step = integrate(&readings, &state, &ImuNoise::ZERO).step(&state, GRAVITY);
-        propagate(&mut end, &mut covariance, &step, &mut Workspace::new(f.nrows()), |_| panic!("lost"));
+        let interval = integrate(&readings, &state, &ImuNoise::ZERO);
+        propagate(&mut end, &mut covariance, (&interval, GRAVITY), &mut Workspace::new(f.nrows()), |_| panic!("lost"));
         let error = dense(&covariance) - &f * &prior * f.transpose();
         // The bias columns drop terms of the order of rate · dt · dt / 12 per step.
         assert!(error.amax() < 2e-4 * SMALL, "{}", error.amax());
@@ -152,7 +154,9 @@ fn covariance_moves_with_the_transition_of_the_whole_state() {
             exact.column_mut(k).fill(0.0);
         }
         let mut covariance = filled(&exact);
-        propagate(&mut state.clone(), &mut covariance, &step, &mut Workspace::new(f.nrows()), |_| panic!("lost"));
+        propagate(&mut state.clone(), &mut covariance, (&interval, GRAVITY), &mut Workspace::new(f.nrows()), |_| {
+            panic!("lost")
+        });
         let error = dense(&covariance) - &f * &exact * f.transpose();
         assert!(error.amax() < 1e-7 * SMALL, "{}", error.amax());
     }
@@ -199,8 +203,8 @@ fn noise_is_the_sum_over_the_samples() {
         }
     }
     let mut covariance = Covariance::new(n, n);
-    let step = integrate(&readings, &state, &noise).step(&state, GRAVITY);
-    propagate(&mut state.clone(), &mut covariance, &step, &mut Workspace::new(n), |_| panic!("lost"));
+    let interval = integrate(&readings, &state, &noise);
+    propagate(&mut state.clone(), &mut covariance, (&interval, GRAVITY), &mut Workspace::new(n), |_| panic!("lost"));
     let ours = dense(&covariance);
     for row in 0..n {
         for column in 0..n {
@@ -225,8 +229,10 @@ fn position_and_yaw_never_reach_what_the_camera_sees() {
             let mut prior = DMatrix::zeros(n, n);
             prior[(row, row)] = 1.0;
             let mut covariance = filled(&prior);
-            let step = integrate(&readings, &state, &ImuNoise::ZERO).step(&state, GRAVITY);
-            propagate(&mut state.clone(), &mut covariance, &step, &mut Workspace::new(n), |_| panic!("lost"));
+            let interval = integrate(&readings, &state, &ImuNoise::ZERO);
+            propagate(&mut state.clone(), &mut covariance, (&interval, GRAVITY), &mut Workspace::new(n), |_| {
+                panic!("lost")
+            });
             for k in (at::VELOCITY..n).filter(|&k| k != at::ATTITUDE + 2) {
                 assert!(covariance.variance(k) == 0.0, "row {k} depends on gauge direction {direction}");
             }
@@ -367,8 +373,8 @@ fn products_of_errors_are_accounted_for() {
     }
     let spread = square - mean * mean.transpose();
     let mut covariance = filled(&prior);
-    let step = integrate(&readings, &state, &ImuNoise::ZERO).step(&state, GRAVITY);
-    propagate(&mut state.clone(), &mut covariance, &step, &mut Workspace::new(n), |_| panic!("lost"));
+    let interval = integrate(&readings, &state, &ImuNoise::ZERO);
+    propagate(&mut state.clone(), &mut covariance, (&interval, GRAVITY), &mut Workspace::new(n), |_| panic!("lost"));
     let ours = covariance.block::<2, 2>(n - 3, n - 3);
     let f = transition(&readings, &state);
     let linear = (&f * prior * f.transpose()).view((n - 3, n - 3), (2, 2)).into_owned();

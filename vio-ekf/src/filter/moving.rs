@@ -1,12 +1,27 @@
-use nalgebra::{Matrix3, Matrix6, SMatrix, SVector, Unit, UnitQuaternion, Vector2, Vector3, Vector6};
+//! What some images and the inertial samples between them tell about the motion when nothing is known before.
+
+mod closed;
+mod refine;
+mod turn;
+
+use nalgebra::{SMatrix, SVector, Unit, UnitQuaternion, Vector3};
 
 use super::bearing::Bearing;
 use super::interval::Interval;
+use super::state::at;
 use crate::so3;
 
-/// Unknowns besides the distances: velocity, gravity, gyroscope's bias.
-const GLOBAL: usize = 9;
-const ITERATIONS: usize = 50;
+/// Unknowns besides the points: velocity and gravity at the first image, biases of gyroscope and accelerometer.
+pub(super) const GLOBAL: usize = 12;
+const VELOCITY: usize = 0;
+const GRAVITY: usize = 3;
+const BIASES: usize = 6;
+/// A point whose misfit is this many times that of the others is another one in each image.
+const STRAY: f64 = 2.5;
+/// The window is solved again if the gyroscope's bias is found so far from what it was made with, rad/s.
+const FAR_OFF: f64 = 3e-3;
+/// Fewer points than this prove nothing.
+pub(crate) const ENOUGH: usize = 10;
 
 /// When a start in motion is believed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,33 +29,36 @@ const ITERATIONS: usize = 50;
 pub struct MovingSettings {
     /// Whether a start in motion is tried at all; yes.
     pub enabled: bool,
-    /// Longest time that is looked back, s; ours.
-    pub window_s: f64,
-    /// Standard deviation of a tracked place, pixels; ours.
+    /// Least time that is looked at, s; ours.
+    pub least_s: f64,
+    /// Longest time that is looked back while the scale is not known, s; ours.
+    pub outlook_s: f64,
+    /// Standard deviation of a tracked place, pixels; ours. What the points themselves show may raise it.
     pub pixel_sigma: f64,
     /// Largest root mean square misfit, pixels; ours.
     pub misfit: f64,
-    /// Largest standard deviation of the velocity relative to the speed: the scale must be known this well; ours.
+    /// Largest relative standard deviation of the scale; ours.
     pub scale_sigma: f64,
-    /// Largest difference between gravity as found and as it is, m/s²; ours.
-    pub gravity_tolerance: f64,
     /// Standard deviation of the gyroscope's bias before anything is known, rad/s; ours.
     pub gyro_bias_sigma: f64,
     /// The same of the accelerometer's, m/s²; ours.
     pub accel_bias_sigma: f64,
+    /// Time after a start in which contradictions make it try again instead of giving up, s; ours.
+    pub doubt_s: f64,
 }
 
 impl Default for MovingSettings {
     fn default() -> Self {
         Self {
             enabled: true,
-            window_s: 1.0,
+            least_s: 0.5,
+            outlook_s: 3.0,
             pixel_sigma: 0.3,
-            misfit: 0.6,
+            misfit: 1.0,
             scale_sigma: 0.05,
-            gravity_tolerance: 0.5,
             gyro_bias_sigma: 0.05,
             accel_bias_sigma: 0.1,
+            doubt_s: 3.0,
         }
     }
 }
@@ -48,269 +66,205 @@ impl Default for MovingSettings {
 /// A point as one of the images of the window sees it: which image, and the direction in camera axes.
 pub(crate) type Sighting = (usize, Vector3<f64>);
 
-/// What the window tells about its end.
+/// What some images see.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Scene<'a> {
+    /// Sightings of each point, in the order of the images, two at least.
+    pub(crate) points: &'a [Vec<Sighting>],
+    /// Position and attitude of the camera on the body.
+    pub(crate) camera: (Vector3<f64>, UnitQuaternion<f64>),
+    /// Pixels per radian.
+    pub(crate) focal_length: f64,
+    /// Magnitude of gravity.
+    pub(crate) gravity: f64,
+}
+
+/// A scene and the motion between its images.
+struct Window<'a> {
+    scene: &'a Scene<'a>,
+    /// From the first image to each.
+    intervals: Vec<Interval>,
+    /// Bias of the gyroscope that the intervals were made with; that of the accelerometer was zero.
+    gyro_bias: Vector3<f64>,
+}
+
+/// What the window tells about its end. Errors of the core and of the distances are those of the window's unknowns, times
+/// their derivatives.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Motion {
     /// Velocity in body axes.
     pub(crate) velocity: Vector3<f64>,
-    /// Gravity, pointing down, in body axes.
-    pub(crate) gravity: Vector3<f64>,
+    /// Attitude of the body in a world whose z axis points up; the yaw is arbitrary.
+    pub(crate) attitude: UnitQuaternion<f64>,
     pub(crate) gyro_bias: Vector3<f64>,
-    pub(crate) velocity_sigma: f64,
-    pub(crate) tilt_sigma: f64,
-    pub(crate) gyro_bias_sigma: f64,
-    /// Median over the points, 1/m.
+    pub(crate) accel_bias: Vector3<f64>,
+    /// Covariance of the window's unknowns.
+    pub(crate) covariance: SMatrix<f64, GLOBAL, GLOBAL>,
+    /// Errors of the core by theirs.
+    pub(crate) core: SMatrix<f64, { at::CORE }, GLOBAL>,
+    /// The points that the last image sees.
+    pub(crate) landmarks: Vec<Depth>,
+    /// Relative standard deviation of the scale.
+    pub(crate) scale_sigma: f64,
+    /// Length of the window, s.
+    pub(crate) duration: f64,
+}
+
+/// Inverse distance of a point at the last image.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Depth {
+    /// Which of the window's points, and its name.
+    pub(crate) point: usize,
+    pub(crate) id: u64,
     pub(crate) inverse_distance: f64,
+    /// Variance of its own, independent of all else.
+    pub(crate) variance: f64,
+    /// Derivative by the window's unknowns: what it has in common with all else.
+    pub(crate) gradient: SVector<f64, GLOBAL>,
+}
+
+/// What is asked of a window.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Verdict {
+    /// The motion is known.
+    Known(Box<Motion>),
+    /// Nothing contradicts, but the scale is not known well enough yet: in hover and in straight flight at constant speed no
+    /// camera can know it.
+    Open,
+    /// The points contradict each other or the samples.
+    Contradiction,
 }
 
 /// Motion over some images from the inertial sensor's part in between and the directions of points.
 ///
-/// The closed form of Martinelli 2014 gives velocity, gravity and distances; a descent on the directions then refines
-/// them together with the gyroscope's bias, with the known magnitude of gravity. `None` if the points contradict each
-/// other, if gravity comes out wrong, or if the scale is not known: in hover and in straight flight at constant speed no
-/// camera can know it.
+/// The bias of the gyroscope follows from the directions alone (Kneip and Lynen 2013), velocity, gravity and distances
+/// from a closed form (Martinelli 2014), and all of them together with the accelerometer's bias from a descent on the
+/// directions. Points that do not fit are left out. `integrate` gives the samples' part from the first image to each, with a
+/// bias of the gyroscope that is not far from the true one: what is summed up depends on it in more than first order.
 pub(crate) fn solve(
-    intervals: &[Interval],
-    points: &[Vec<Sighting>],
-    camera: &(Vector3<f64>, UnitQuaternion<f64>),
-    focal_length: f64,
-    gravity: f64,
+    integrate: impl Fn(&Vector3<f64>) -> Vec<Interval>,
+    scene: &Scene,
     settings: &MovingSettings,
-) -> Option<Motion> {
-    let (mut global, mut inverse_distances) = closed_form(intervals, points, camera)?;
-    let off = (global.fixed_rows::<3>(3).norm() - gravity).abs();
-    if off.is_nan() || off > 0.5 * gravity {
-        return None;
+) -> Verdict {
+    let mut window = Window { scene, intervals: integrate(&Vector3::zeros()), gyro_bias: Vector3::zeros() };
+    for _ in 0..2 {
+        let gyro_bias = turn::gyro_bias(&window, settings);
+        window = Window { scene, intervals: integrate(&gyro_bias), gyro_bias };
     }
-    let weight = (focal_length / settings.pixel_sigma).powi(2);
-    let prior = |global: &SVector<f64, GLOBAL>| {
-        // Gravity has a known length, up to the accelerometer's bias; the gyroscope's bias is small.
-        let down = global.fixed_rows::<3>(3).into_owned();
-        let bias = global.fixed_rows::<3>(6).into_owned();
-        let (long, biased) = (settings.accel_bias_sigma.powi(-2), settings.gyro_bias_sigma.powi(-2));
-        let (mut matrix, mut vector) = (SMatrix::<f64, GLOBAL, GLOBAL>::zeros(), SVector::<f64, GLOBAL>::zeros());
-        let along = down.normalize();
-        matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&(along * along.transpose() * long));
-        vector.fixed_rows_mut::<3>(3).copy_from(&(along * ((gravity - down.norm()) * long)));
-        matrix.fixed_view_mut::<3, 3>(6, 6).fill_diagonal(biased);
-        vector.fixed_rows_mut::<3>(6).copy_from(&(bias * -biased));
-        (matrix, vector, (gravity - down.norm()).powi(2) * long + bias.norm_squared() * biased)
+    let verdict = with_bias(&window, settings);
+    match verdict {
+        Verdict::Known(motion) if (motion.gyro_bias - window.gyro_bias).norm() > FAR_OFF => {
+            let gyro_bias = motion.gyro_bias;
+            with_bias(&Window { scene, intervals: integrate(&gyro_bias), gyro_bias }, settings)
+        }
+        verdict => verdict,
+    }
+}
+
+fn with_bias(window: &Window, settings: &MovingSettings) -> Verdict {
+    let points = window.scene.points.len();
+    let mut kept: Vec<usize> = (0..points).collect();
+    for _ in 0..3 {
+        let Some(first) = closed::closed_form(window, &kept) else { return Verdict::Open };
+        let Some(found) = refine::refine(window, &kept, first, settings) else { return Verdict::Contradiction };
+        let typical = median(found.misfits.clone()).max(settings.pixel_sigma);
+        let before = kept.len();
+        kept = kept.into_iter().zip(&found.misfits).filter(|(_, m)| **m <= STRAY * typical).map(|(k, _)| k).collect();
+        if kept.len() < ENOUGH.max(points / 2) {
+            return Verdict::Contradiction;
+        }
+        if kept.len() == before {
+            return judge(window, &kept, &found, settings);
+        }
+    }
+    Verdict::Contradiction
+}
+
+fn judge(window: &Window, kept: &[usize], found: &refine::Solution, settings: &MovingSettings) -> Verdict {
+    let biased = found.global.fixed_rows::<3>(BIASES + 3).amax() > 4.0 * settings.accel_bias_sigma;
+    if found.misfit.is_nan() || found.misfit > settings.misfit || biased {
+        return Verdict::Contradiction;
+    }
+    let motion = at_the_end(window, kept, found);
+    if motion.scale_sigma > settings.scale_sigma || motion.landmarks.len() < ENOUGH / 2 {
+        return Verdict::Open;
+    }
+    Verdict::Known(Box::new(motion))
+}
+
+/// The solution moved to the last image.
+fn at_the_end(window: &Window, kept: &[usize], found: &refine::Solution) -> Motion {
+    let global = &found.global;
+    let last = &window.intervals[window.intervals.len() - 1];
+    let biases = global.fixed_rows::<6>(BIASES).into_owned();
+    let (rotation, moved, _) = last.with_biases(&window.change(&biases));
+    let time = last.duration;
+    let down = global.fixed_rows::<3>(GRAVITY).into_owned();
+    let end_from_first = rotation.inverse().to_rotation_matrix().into_inner();
+    let velocity = end_from_first * (global.fixed_rows::<3>(VELOCITY) + down * time + moved);
+    let down = end_from_first * down;
+    let attitude = Bearing::new(&Unit::new_normalize(-down)).level();
+
+    // Errors of the core by errors of the unknowns. Turning the end by φ (in the axes of the first image) turns what is
+    // expressed in its axes the other way.
+    let mut core = SMatrix::<f64, { at::CORE }, GLOBAL>::zeros();
+    let turn = end_from_first * last.by_biases(0);
+    core.fixed_view_mut::<3, 3>(at::VELOCITY, VELOCITY).copy_from(&end_from_first);
+    core.fixed_view_mut::<3, 3>(at::VELOCITY, GRAVITY).copy_from(&(end_from_first * time));
+    let by_biases = end_from_first * last.by_biases(3) + velocity.cross_matrix() * turn;
+    core.fixed_view_mut::<3, 6>(at::VELOCITY, BIASES).copy_from(&by_biases);
+    // δ(down) = Rᵀ hat(g) δθ, inverted for the two components that it determines.
+    let level = attitude.to_rotation_matrix().into_inner() / window.scene.gravity;
+    let mut tilt = SMatrix::<f64, 3, GLOBAL>::zeros();
+    tilt.fixed_view_mut::<3, 3>(0, GRAVITY).copy_from(&(level * end_from_first));
+    tilt.fixed_view_mut::<3, 6>(0, BIASES).copy_from(&(level * down.cross_matrix() * turn));
+    core.fixed_rows_mut::<1>(at::ATTITUDE).copy_from(&-tilt.row(1));
+    core.fixed_rows_mut::<1>(at::ATTITUDE + 1).copy_from(&tilt.row(0));
+    core.fixed_view_mut::<6, 6>(at::GYRO_BIAS, BIASES).fill_with_identity();
+
+    let landmarks = found.depths(window, kept);
+    let scale = |landmark: &Depth| {
+        landmark.gradient.dot(&(found.covariance * landmark.gradient)).sqrt() / landmark.inverse_distance
     };
-    // Levenberg-Marquardt: the closed form is off where the gyroscope's bias is not small.
-    let mut sums = normal_equations(intervals, points, camera, &global, &inverse_distances)?;
-    let (mut damping, mut converged) = (1e-6, false);
-    for _ in 0..ITERATIONS {
-        let (matrix, vector, cost) = prior(&global);
-        let mut matrix = matrix + sums.matrix * weight;
-        let descent = vector + sums.vector * weight;
-        // Damping holds back along the valley of the scale long before it does across: the end is judged without it.
-        converged = descent.dot(&matrix.cholesky()?.solve(&descent)) < 1e-3;
-        if converged {
-            break;
-        }
-        for k in 0..GLOBAL {
-            matrix[(k, k)] *= 1.0 + damping;
-        }
-        let step = matrix.cholesky()?.solve(&descent);
-        let next = global + step;
-        let distances: Vec<f64> = inverse_distances
-            .iter()
-            .zip(&sums.back)
-            .map(|(distance, (a, b))| (distance + a - b.dot(&step)).clamp(1e-3, 20.0))
-            .collect();
-        let cost = cost + sums.square * weight;
-        let moved = normal_equations(intervals, points, camera, &next, &distances)
-            .map(|moved| (prior(&next).2 + moved.square * weight, moved));
-        match moved {
-            Some((lower, moved)) if lower < cost => {
-                (global, inverse_distances, sums) = (next, distances, moved);
-                damping *= 0.1;
-            }
-            _ => damping *= 10.0,
-        }
-        if damping > 1e3 {
-            break;
-        }
+    let scales: Vec<f64> = landmarks.iter().map(scale).collect();
+    Motion {
+        velocity,
+        attitude,
+        gyro_bias: biases.fixed_rows::<3>(0).into_owned(),
+        accel_bias: biases.fixed_rows::<3>(3).into_owned(),
+        covariance: found.covariance,
+        core,
+        scale_sigma: if scales.is_empty() { f64::INFINITY } else { median(scales) },
+        landmarks,
+        duration: time,
     }
-    if !converged {
-        return None;
-    }
-    let information = prior(&global).0 + sums.matrix * weight;
-    let misfit = (sums.square / sums.count).sqrt() * focal_length;
-    if misfit.is_nan() || misfit > settings.misfit {
-        return None;
-    }
-    report(intervals, &global, &inverse_distances, &information, gravity, settings)
 }
 
-/// The solution moved to the last image, if it is good enough.
-fn report(
-    intervals: &[Interval],
-    global: &SVector<f64, GLOBAL>,
-    inverse_distances: &[f64],
-    information: &SMatrix<f64, GLOBAL, GLOBAL>,
-    gravity: f64,
-    settings: &MovingSettings,
-) -> Option<Motion> {
-    let covariance = information.cholesky()?.inverse();
-    let deviation = |at: usize| (0..3).map(|k| covariance[(at + k, at + k)]).fold(0.0, f64::max).sqrt();
-    let down = global.fixed_rows::<3>(3).into_owned();
-    let bias = global.fixed_rows::<3>(6).into_owned();
-    let last = intervals.last()?;
-    let (rotation, velocity, _) = last.with_gyro_bias(&bias);
-    let end = global.fixed_rows::<3>(0) + down * last.duration + velocity;
-    // What the accelerometer's bias does to the velocity over the window.
-    let drifted = settings.accel_bias_sigma * last.duration;
-    let velocity_sigma = deviation(0).hypot(drifted);
-    let wrong = (down.norm() - gravity).abs() > settings.gravity_tolerance;
-    if wrong || deviation(0) > settings.scale_sigma * end.norm() {
-        return None;
+impl Window<'_> {
+    /// What other biases are in addition to those that the intervals were made with.
+    fn change(&self, biases: &SVector<f64, 6>) -> SVector<f64, 6> {
+        let mut change = *biases;
+        let mut gyro = change.fixed_rows_mut::<3>(0);
+        gyro -= self.gyro_bias;
+        change
     }
-    let mut sorted = inverse_distances.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    Some(Motion {
-        velocity: rotation.inverse() * end,
-        gravity: rotation.inverse() * down,
-        gyro_bias: bias,
-        velocity_sigma,
-        tilt_sigma: (deviation(3) / gravity).hypot(settings.accel_bias_sigma / gravity),
-        gyro_bias_sigma: deviation(6),
-        inverse_distance: sorted[sorted.len() / 2],
-    })
-}
-
-/// Position of the body at an image in the axes of the first, and its derivatives by the global unknowns.
-fn place(
-    interval: &Interval,
-    global: &SVector<f64, GLOBAL>,
-) -> (Vector3<f64>, UnitQuaternion<f64>, Matrix3<f64>, Matrix3<f64>) {
-    let bias = global.fixed_rows::<3>(6).into_owned();
-    let (rotation, _, position) = interval.with_gyro_bias(&bias);
-    let time = interval.duration;
-    let moved = global.fixed_rows::<3>(0) * time + global.fixed_rows::<3>(3) * (0.5 * time * time) + position;
-    let (turn, shift) = interval.by_gyro_bias();
-    (moved, rotation, turn, shift)
-}
-
-/// Velocity, gravity and a zero bias, and the inverse distances, by linear least squares on
-/// `m × (d m₀ + t − r − Q t) = 0` with `r = v T + g T²/2 + α`, the bias taken as zero.
-fn closed_form(
-    intervals: &[Interval],
-    points: &[Vec<Sighting>],
-    (lever, camera): &(Vector3<f64>, UnitQuaternion<f64>),
-) -> Option<(SVector<f64, GLOBAL>, Vec<f64>)> {
-    let zero = SVector::<f64, GLOBAL>::zeros();
-    let (mut matrix, mut vector) = (Matrix6::zeros(), Vector6::zeros());
-    let mut back = Vec::with_capacity(points.len());
-    for sightings in points {
-        let first = camera * sightings[0].1;
-        let (mut hh, mut hg, mut h) = (0.0, Vector6::<f64>::zeros(), 0.0);
-        let (mut own, mut right) = (Matrix6::zeros(), Vector6::zeros());
-        for (image, direction) in &sightings[1..] {
-            let (alpha, rotation, _, _) = place(&intervals[*image], &zero);
-            let time = intervals[*image].duration;
-            let cross = (rotation * (camera * direction)).cross_matrix();
-            let known = cross * (alpha + rotation * lever - lever);
-            let by_distance = cross * first;
-            let mut by_global = SMatrix::<f64, 3, 6>::zeros();
-            by_global.fixed_columns_mut::<3>(0).copy_from(&(cross * -time));
-            by_global.fixed_columns_mut::<3>(3).copy_from(&(cross * (-0.5 * time * time)));
-            hh += by_distance.norm_squared();
-            hg += by_global.transpose() * by_distance;
-            h += by_distance.dot(&known);
-            own += by_global.transpose() * by_global;
-            right += by_global.transpose() * known;
-        }
-        if hh < 1e-12 {
-            return None;
-        }
-        matrix += own - hg * hg.transpose() / hh;
-        vector += right - hg * (h / hh);
-        back.push((h / hh, hg / hh));
-    }
-    let solution = matrix.cholesky()?.solve(&vector);
-    let mut global = zero;
-    global.fixed_rows_mut::<6>(0).copy_from(&solution);
-    let distances = back.iter().map(|(a, b)| 1.0 / (a - b.dot(&solution)).clamp(0.1, 100.0));
-    Some((global, distances.collect()))
-}
-
-/// Sums of the linearised directions, distances eliminated.
-struct Sums {
-    matrix: SMatrix<f64, GLOBAL, GLOBAL>,
-    vector: SVector<f64, GLOBAL>,
-    /// Per point: step of its inverse distance for a global step `s` is `a − b·s`.
-    back: Vec<(f64, SVector<f64, GLOBAL>)>,
-    square: f64,
-    count: f64,
-}
-
-fn normal_equations(
-    intervals: &[Interval],
-    points: &[Vec<Sighting>],
-    (lever, camera): &(Vector3<f64>, UnitQuaternion<f64>),
-    global: &SVector<f64, GLOBAL>,
-    inverse_distances: &[f64],
-) -> Option<Sums> {
-    let mut sums = Sums {
-        matrix: SMatrix::zeros(),
-        vector: SVector::zeros(),
-        back: Vec::with_capacity(points.len()),
-        square: 0.0,
-        count: 0.0,
-    };
-    let places: Vec<_> = intervals.iter().map(|interval| place(interval, global)).collect();
-    for (sightings, &rho) in points.iter().zip(inverse_distances) {
-        let start = camera * sightings[0].1 + lever * rho;
-        let (mut own, mut cross, mut right) = (0.0, SVector::<f64, GLOBAL>::zeros(), 0.0);
-        for (image, seen) in &sightings[1..] {
-            let (moved, rotation, turn, shift) = &places[*image];
-            let time = intervals[*image].duration;
-            let camera_from_first = (camera.inverse() * rotation.inverse()).to_rotation_matrix().into_inner();
-            let from_body = start - moved * rho;
-            let q = camera_from_first * from_body - camera.inverse() * lever * rho;
-            let (direction, length) = Unit::try_new_and_get(q, 1e-3)?;
-            let bearing = Bearing::new(&Unit::new_unchecked(*seen));
-            // Chord between the predicted and the seen direction, in the tangent plane of the latter.
-            let flat = bearing.differential().transpose();
-            let residual: Vector2<f64> = -(flat * direction.into_inner());
-            let by_point = flat * (Matrix3::identity() - direction.into_inner() * direction.transpose()) / length;
-            let by_moved = by_point * camera_from_first * -rho;
-            let by_rho = by_point * (camera_from_first * (lever - moved) - camera.inverse() * lever);
-            let mut by_global = SMatrix::<f64, 2, GLOBAL>::zeros();
-            by_global.fixed_columns_mut::<3>(0).copy_from(&(by_moved * time));
-            by_global.fixed_columns_mut::<3>(3).copy_from(&(by_moved * (0.5 * time * time)));
-            let by_bias = by_moved * shift + by_point * camera_from_first * from_body.cross_matrix() * turn;
-            by_global.fixed_columns_mut::<3>(6).copy_from(&by_bias);
-            own += by_rho.norm_squared();
-            cross += by_global.transpose() * by_rho;
-            right += by_rho.dot(&residual);
-            sums.matrix += by_global.transpose() * by_global;
-            sums.vector += by_global.transpose() * residual;
-            sums.square += residual.norm_squared();
-            sums.count += 2.0;
-        }
-        // A little stiffness keeps points without parallax in place.
-        let own = own + 1e-9;
-        sums.matrix -= cross * cross.transpose() / own;
-        sums.vector -= cross * (right / own);
-        sums.back.push((right / own, cross / own));
-    }
-    Some(sums)
 }
 
 impl Interval {
-    /// Rotation, velocity and position parts with another bias of the gyroscope than the one they were made with.
-    fn with_gyro_bias(&self, bias: &Vector3<f64>) -> (UnitQuaternion<f64>, Vector3<f64>, Vector3<f64>) {
-        let change = |row: usize| self.bias_jacobian.fixed_view::<3, 3>(row, 0) * bias;
-        (so3::exp(&change(0)) * self.rotation, self.velocity + change(3), self.position + change(6))
+    /// Rotation, velocity and position parts with biases that differ from those it was made with.
+    fn with_biases(&self, change: &SVector<f64, 6>) -> (UnitQuaternion<f64>, Vector3<f64>, Vector3<f64>) {
+        let part = |row: usize| self.by_biases(row) * change;
+        (so3::exp(&part(0)) * self.rotation, self.velocity + part(3), self.position + part(6))
     }
 
-    /// Derivatives of rotation and position by the gyroscope's bias.
-    fn by_gyro_bias(&self) -> (Matrix3<f64>, Matrix3<f64>) {
-        (
-            self.bias_jacobian.fixed_view::<3, 3>(0, 0).into_owned(),
-            self.bias_jacobian.fixed_view::<3, 3>(6, 0).into_owned(),
-        )
+    /// Derivatives by the biases: of the rotation (0), the velocity (3) or the position (6).
+    fn by_biases(&self, row: usize) -> SMatrix<f64, 3, 6> {
+        self.bias_jacobian.fixed_view::<3, 6>(row, 0).into_owned()
     }
+}
+
+/// The value in the middle; there must be one.
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

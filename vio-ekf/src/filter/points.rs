@@ -25,6 +25,10 @@ impl Vio {
         if let Some(index) = points.iter().position(|p| p.pixel.iter().any(|v| !v.is_finite())) {
             return Err(Error::NonFinite { what: "point", index });
         }
+        if self.estimator.is_none() && self.settings.moving.enabled {
+            self.scout_points(stamp, points);
+            return Ok(FrameReport { added: self.tracks.len(), ..self.report() });
+        }
         let mut report = self.report();
         let Some(removed) = self.expose(stamp, false)? else { return Ok(report) };
         report.removed = removed;
@@ -92,6 +96,16 @@ impl Vio {
             report.added += 1;
         }
         Ok(self.conclude(report))
+    }
+
+    /// Shows points to the scout, and starts if that has found the motion.
+    fn scout_points(&mut self, stamp: Stamp, points: &[PointObservation]) {
+        let time = self.inertial_time(stamp);
+        let camera = self.camera;
+        let seen = points.iter().filter_map(|p| Some((p.id, camera.bearing(&p.pixel)?.into_inner())));
+        if let Some(motion) = self.scout.image(time, seen, &camera, self.settings.gravity) {
+            self.start_in_motion(time, &motion, |id| points.iter().find(|p| p.id == id).map(|p| (p.pixel, None)));
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 use nalgebra::{Matrix2, SMatrix, Vector3};
 
 use super::covariance::Covariance;
-use super::interval::Step;
+use super::interval::{Interval, Step};
 use super::relative::{CameraMotion, LandmarkTransition};
 use super::state::{State, at};
 
@@ -41,10 +41,11 @@ impl Workspace {
 pub(crate) fn propagate(
     state: &mut State,
     covariance: &mut Covariance,
-    step: &Step,
+    (interval, gravity): (&Interval, f64),
     work: &mut Workspace,
     mut dropped: impl FnMut(usize),
 ) {
+    let step = &interval.step(state, gravity);
     let camera = CameraMotion::new(state, &step.start_from_end);
     for slot in (0..state.landmarks.len()).rev() {
         if camera.carry(&state.landmarks[slot]).is_none() {
@@ -65,13 +66,12 @@ pub(crate) fn propagate(
 
     // ξ by the rows of the head: body motion by the core, then calibration.
     let mut xi = SMatrix::<f64, MOTION, { at::TIME_OFFSET }>::zeros();
-    xi.fixed_columns_mut::<{ at::CORE }>(0).copy_from(&(camera.by_motion * step.motion));
+    xi.fixed_columns_mut::<{ at::CORE }>(0).copy_from(&(camera.by_motion * step.motion()));
     xi.fixed_columns_mut::<6>(at::CAMERA_POSITION).copy_from(&camera.by_calibration);
     // Noise of the core and of ξ.
-    let core = step.noise.fixed_view::<{ at::CORE }, { at::CORE }>(0, 0).into_owned();
-    let xi_core = camera.by_motion * step.noise.fixed_view::<MOTION, { at::CORE }>(at::CORE, 0);
-    let xi_xi =
-        camera.by_motion * step.noise.fixed_view::<MOTION, MOTION>(at::CORE, at::CORE) * camera.by_motion.transpose();
+    let (core, noise) = (&step.noise, interval.noise(step));
+    let xi_core = camera.by_motion * noise.motion_core;
+    let xi_xi = camera.by_motion * noise.motion * camera.by_motion.transpose();
 
     left_product(covariance, step, &xi, work);
     bend(covariance, &xi, &xi_xi, work);

@@ -1,169 +1,152 @@
-use nalgebra::{Matrix2, UnitQuaternion, Vector2, Vector3};
+//! Before the start in motion: the last seconds of samples, images and points, and whether they tell the motion.
 
-use super::detect::{Demands, Detector};
+use std::collections::VecDeque;
+
+use nalgebra::{UnitQuaternion, Vector3};
+
 use super::history::History;
 use super::interval::Interval;
-use super::moving::{Motion, MovingSettings, Sighting, solve};
-use super::patch::Patch;
-use super::pyramid::Pyramid;
+use super::moving::{Motion, MovingSettings, Scene, Sighting, Verdict, solve};
 use crate::{Camera, Imu, ImuNoise, Stamp};
 
-/// Points that are followed.
-const POINTS: usize = 25;
-/// Fewer than this are not worth a trial.
-const ENOUGH: usize = 10;
-/// Share of the window that must have passed before the first trial.
-const EARLIEST: f64 = 0.45;
-/// Places to either side, and their spacing in pixels, at which a point is looked for.
-const SEARCH: (i32, f64) = (4, 2.0);
-/// Iterations of the alignment.
-const ITERATIONS: usize = 10;
+/// Points seen in fewer images than this have nothing to say.
+const SHORTEST: usize = 5;
+/// Between two trials, images.
+const EVERY: usize = 2;
 
-/// Follows points by their looks alone, the turn between images taken from the gyroscope, until [`solve`] can tell the motion.
+/// Keeps a window of images and what they see, and asks it for the motion.
 #[derive(Debug, Clone)]
 pub(crate) struct Scout {
     settings: MovingSettings,
-    history: Option<History>,
-    /// From the first image of the window to each.
-    intervals: Vec<Interval>,
-    followed: Vec<Followed>,
-    last: Option<Imu>,
+    /// From the last one before the first image on.
+    samples: VecDeque<Imu>,
+    images: VecDeque<Stamp>,
+    points: Vec<Point>,
+    /// Images that the window has lost at its beginning.
+    lost: usize,
+    untried: usize,
 }
 
+/// One point: who it is to whoever follows it, and where it was seen, images counted from the very first.
 #[derive(Debug, Clone)]
-struct Followed {
-    patch: Patch,
-    pixel: Vector2<f64>,
-    /// Motion between the last two images that the turn does not explain, pixels.
-    flow: Vector2<f64>,
-    /// How the turns since the window began have deformed the patch.
-    warp: Matrix2<f64>,
-    sightings: Vec<Sighting>,
+struct Point {
+    id: u64,
+    sightings: VecDeque<Sighting>,
 }
 
 impl Scout {
     pub(crate) fn new(settings: MovingSettings) -> Self {
-        Self { settings, history: None, intervals: Vec::new(), followed: Vec::new(), last: None }
-    }
-
-    /// The samples of the window.
-    pub(crate) fn history(&self) -> Option<&History> {
-        self.history.as_ref()
+        Self { settings, samples: VecDeque::new(), images: VecDeque::new(), points: Vec::new(), lost: 0, untried: 0 }
     }
 
     pub(crate) fn imu(&mut self, sample: &Imu) {
-        self.last = Some(*sample);
-        if let Some(history) = &mut self.history {
-            if history.is_full() {
-                self.history = None;
-            } else {
-                history.push(*sample);
-            }
+        self.samples.push_back(*sample);
+        let from = sample.stamp.nanos().saturating_sub((self.settings.outlook_s * 1.2e9) as i64);
+        let from = self.images.front().map_or(from, |image| image.nanos().max(from));
+        while self.samples.len() > 2 && self.samples[1].stamp.nanos() <= from {
+            self.samples.pop_front();
         }
     }
 
-    /// Takes an image; its time and the motion there once both are known.
+    /// The samples around a time and after it.
+    pub(crate) fn samples(&self) -> impl Iterator<Item = &Imu> {
+        self.samples.iter()
+    }
+
+    /// Turn of the body from the last image until a time: its attitude then in the axes of that image.
+    pub(crate) fn turn(&self, until: Stamp) -> Option<UnitQuaternion<f64>> {
+        let (&from, sample) = (self.images.back()?, *self.samples.front()?);
+        let mut interval = Interval::default();
+        let mut history = History::new(sample, from, self.samples.len());
+        self.samples.iter().skip(1).for_each(|sample| history.push(*sample));
+        history.extend(&mut interval, (from, until), &[Vector3::zeros(); 2], &ImuNoise::ZERO);
+        Some(interval.rotation)
+    }
+
+    /// Takes what an image sees: names and directions in camera axes. The motion at that image, once it is known; its
+    /// landmarks are named as the points are.
     pub(crate) fn image(
         &mut self,
         stamp: Stamp,
-        pyramid: &Pyramid,
-        (detector, demands): (&mut Detector, &Demands),
+        seen: impl Iterator<Item = (u64, Vector3<f64>)>,
         camera: &Camera,
-        (gravity, samples): (f64, usize),
-    ) -> Option<Motion> {
-        let Some(history) = self.history.as_ref().filter(|history| stamp > history.anchor()) else {
-            self.begin(stamp, pyramid, detector, demands, camera, samples);
-            return None;
-        };
-        let interval = history.integrate(stamp, &[Vector3::zeros(); 2], &ImuNoise::ZERO);
-        let before = self.intervals.last()?.rotation;
-        let attitude = camera.body_from_camera.rotation;
-        let turn = attitude.inverse() * interval.rotation.inverse() * before * attitude;
-        self.intervals.push(interval);
-        let image = self.intervals.len() - 1;
-        self.followed.retain_mut(|followed| followed.follow(image, &turn, pyramid, camera).is_some());
-
-        let elapsed = self.intervals[image].duration;
-        if self.followed.len() < ENOUGH {
-            self.begin(stamp, pyramid, detector, demands, camera, samples);
+        gravity: f64,
+    ) -> Option<Box<Motion>> {
+        let first = self.samples.front()?;
+        if self.images.back().is_some_and(|last| stamp <= *last) || stamp < first.stamp {
             return None;
         }
-        if elapsed < EARLIEST * self.settings.window_s {
-            return None;
-        }
-        let points: Vec<Vec<Sighting>> = self.followed.iter().map(|f| f.sightings.clone()).collect();
-        let place = (camera.body_from_camera.translation.vector, attitude);
-        let motion = solve(&self.intervals, &points, &place, camera.fx.min(camera.fy), gravity, &self.settings);
-        if motion.is_none() && elapsed > self.settings.window_s {
-            self.begin(stamp, pyramid, detector, demands, camera, samples);
-        }
-        motion
-    }
-
-    /// Begins a new window.
-    fn begin(
-        &mut self,
-        stamp: Stamp,
-        pyramid: &Pyramid,
-        detector: &mut Detector,
-        demands: &Demands,
-        camera: &Camera,
-        samples: usize,
-    ) {
-        self.followed.clear();
-        self.intervals.clear();
-        self.intervals.push(Interval::default());
-        // The sample before the image, as far as it is known.
-        let sample = self.history.take().map(|history| history.before(stamp)).or(self.last);
-        self.history = sample.map(|sample| History::new(sample, stamp, samples));
-        if let (Some(history), Some(last)) = (&mut self.history, self.last)
-            && last.stamp > history.latest().stamp
-        {
-            history.push(last);
-        }
-        detector.detect(pyramid, &std::iter::empty(), demands);
-        while self.followed.len() < POINTS {
-            let Some((pixel, patch)) = detector.pick(pyramid, demands) else { break };
-            let Some(direction) = camera.bearing(&pixel) else { continue };
-            let sightings = vec![(0, direction.into_inner())];
-            self.followed.push(Followed { patch, pixel, flow: Vector2::zeros(), warp: Matrix2::identity(), sightings });
-        }
-    }
-}
-
-impl Followed {
-    /// Finds the point in the next image, or gives it up.
-    fn follow(&mut self, image: usize, turn: &UnitQuaternion<f64>, pyramid: &Pyramid, camera: &Camera) -> Option<()> {
-        let turned = camera.project(&(turn * self.sightings.last()?.1))?;
-        let middle = turned + self.flow;
-        let moved = |x: f64, y: f64| {
-            let bearing = camera.bearing(&(self.pixel + Vector2::new(x, y)))?;
-            camera.project(&(turn * bearing.into_inner()))
-        };
-        self.warp = Matrix2::from_columns(&[moved(1.0, 0.0)? - turned, moved(0.0, 1.0)? - turned]) * self.warp;
-        let warp = self.warp;
-        let (reach, spacing) = SEARCH;
-        let places =
-            (-reach..=reach).flat_map(|y| (-reach..=reach).map(move |x| Vector2::new(f64::from(x), f64::from(y))));
-        let tried = places.filter_map(|offset| {
-            let pixel = middle + offset * spacing;
-            Some((self.patch.compare_coarse(pyramid, &pixel, &warp)?.mismatch, pixel))
-        });
-        let (_, mut pixel) = tried.reduce(|best, other| if other.0 < best.0 { other } else { best })?;
-        for _ in 0..ITERATIONS {
-            let comparison = self.patch.compare(pyramid, &pixel, &warp)?;
-            let step = warp * comparison.information.try_inverse()? * comparison.moment;
-            pixel += step;
-            if step.norm() < 0.01 {
-                if comparison.unexplained > 0.3 * comparison.energy || (pixel - middle).amax() > 12.0 {
-                    return None;
-                }
-                self.flow = pixel - turned;
-                self.pixel = pixel;
-                self.sightings.push((image, camera.bearing(&pixel)?.into_inner()));
-                return Some(());
+        self.images.push_back(stamp);
+        let image = self.lost + self.images.len() - 1;
+        for (id, direction) in seen {
+            match self.points.iter_mut().find(|point| point.id == id) {
+                Some(point) => point.sightings.push_back((image, direction)),
+                None => self.points.push(Point { id, sightings: VecDeque::from([(image, direction)]) }),
             }
         }
-        None
+        self.forget(stamp);
+        self.untried += 1;
+        if self.untried < EVERY || stamp.secs_since(self.images[0]) < self.settings.least_s {
+            return None;
+        }
+        self.untried = 0;
+        self.attempt(camera, gravity)
+    }
+
+    /// Drops images that are too old, and points that no image of the window sees any more.
+    fn forget(&mut self, now: Stamp) {
+        while now.secs_since(self.images[0]) > self.settings.outlook_s {
+            self.images.pop_front();
+            self.lost += 1;
+        }
+        for point in &mut self.points {
+            while point.sightings.front().is_some_and(|sighting| sighting.0 < self.lost) {
+                point.sightings.pop_front();
+            }
+        }
+        self.points.retain(|point| !point.sightings.is_empty());
+    }
+
+    fn attempt(&mut self, camera: &Camera, gravity: f64) -> Option<Box<Motion>> {
+        let worth = |point: &&Point| point.sightings.len() >= SHORTEST;
+        let ids: Vec<u64> = self.points.iter().filter(worth).map(|point| point.id).collect();
+        if ids.len() < super::moving::ENOUGH {
+            return None;
+        }
+        let lost = self.lost;
+        let local = |point: &Point| point.sightings.iter().map(|(image, d)| (image - lost, *d)).collect();
+        let points: Vec<Vec<Sighting>> = self.points.iter().filter(worth).map(local).collect();
+        let scene = Scene {
+            points: &points,
+            camera: (camera.body_from_camera.translation.vector, camera.body_from_camera.rotation),
+            focal_length: camera.fx.min(camera.fy),
+            gravity,
+        };
+        let history = self.history();
+        let Verdict::Known(mut motion) = solve(|bias| self.intervals(&history, bias), &scene, &self.settings) else {
+            return None;
+        };
+        for landmark in &mut motion.landmarks {
+            landmark.id = ids[landmark.point];
+        }
+        Some(motion)
+    }
+
+    /// The samples from the first image on; there must be one of each.
+    fn history(&self) -> History {
+        let mut history = History::new(self.samples[0], self.images[0], self.samples.len());
+        self.samples.iter().skip(1).for_each(|sample| history.push(*sample));
+        history
+    }
+
+    /// From the first image to each.
+    fn intervals(&self, history: &History, gyro_bias: &Vector3<f64>) -> Vec<Interval> {
+        let (biases, mut interval, mut from) = ([*gyro_bias, Vector3::zeros()], Interval::default(), self.images[0]);
+        let each = self.images.iter().map(|&until| {
+            history.extend(&mut interval, (from, until), &biases, &ImuNoise::ZERO);
+            from = until;
+            interval.clone()
+        });
+        each.collect()
     }
 }

@@ -1,6 +1,7 @@
 use nalgebra::{Isometry3, Vector3};
 
 use crate::error::all_not_negative;
+use crate::trajectory::is_finite;
 use crate::{Error, Stamp};
 
 /// A state to start from, and how far it may be off.
@@ -18,6 +19,23 @@ pub struct Start {
     pub accel_bias: Vector3<f64>,
     /// Standard deviations of the above.
     pub sigma: StartSigma,
+}
+
+impl Start {
+    /// Refuses what is not finite, negative deviations, and a time before that of the latest inertial sample.
+    pub(crate) fn check(&self, latest: Stamp) -> Result<(), Error> {
+        if self.stamp < latest {
+            return Err(Error::Late { what: "start", stamp: self.stamp, now: latest });
+        }
+        if !is_finite(&self.world_from_body) {
+            return Err(Error::NonFinite { what: "start pose", index: 0 });
+        }
+        let vectors = [self.velocity_in_body, self.gyro_bias, self.accel_bias];
+        if let Some(index) = vectors.iter().position(|v| v.iter().any(|v| !v.is_finite())) {
+            return Err(Error::NonFinite { what: "start velocity or bias", index });
+        }
+        self.sigma.check()
+    }
 }
 
 /// Standard deviations of a start, per axis. The errors of all quantities are taken as independent.

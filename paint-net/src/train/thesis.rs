@@ -1,0 +1,269 @@
+//! Training of the thesis' network (Paper IV, section 3.3), on pictures that the caller gives.
+
+use super::adam::{Adam, shorten};
+use super::checkpoint::State;
+use super::in_threads;
+use crate::error::{Error, require};
+use crate::image::Image;
+use crate::procedural::lattice;
+use crate::thesis::{Model, ModelAdjoint, Network, Noise, Objective, Rollout, Shape, Terms};
+
+/// How the thesis' network is trained.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+pub struct ThesisSettings {
+    /// Seed of the first weights and of all noise. Default 1.
+    pub seed: u64,
+    /// Sizes of the network. Default [`Shape::MNIST`].
+    pub shape: Shape,
+    /// Steps of the optimiser. Default 7000 (100 epochs of 7000 pictures), ours.
+    pub steps: usize,
+    /// Pictures per step. Default 100 (as in figure 8.7).
+    pub batch: usize,
+    /// First learning rate. Default 1e-4 (section 3.3).
+    pub learning_rate: f64,
+    /// Last learning rate; in between it falls exponentially. Default 1e-7 (section 3.3).
+    pub last_learning_rate: f64,
+    /// Gradients longer than this are shortened to it. Default 10, ours.
+    pub longest_gradient: f64,
+    /// Weights of the terms of the loss.
+    pub objective: Objective,
+    /// Threads; the weights do not depend on it. Default 1.
+    pub threads: usize,
+}
+
+impl Default for ThesisSettings {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            shape: Shape::MNIST,
+            steps: 7000,
+            batch: 100,
+            learning_rate: 1e-4,
+            last_learning_rate: 1e-7,
+            longest_gradient: 10.0,
+            objective: Objective::default(),
+            threads: 1,
+        }
+    }
+}
+
+/// Pictures that are worked on together, whatever the number of threads: sums depend on it.
+const CHUNK: usize = 25;
+
+/// Means over a batch of pictures, nats per picture.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ThesisLoss {
+    /// The whole loss.
+    pub total: f64,
+    /// Cross-entropy between `ε + (1 - 2ε) tanh c` and the picture, `ε` = 0.001.
+    pub cross_entropy: f64,
+    /// Divergence of the latent code from a standard normal, all steps together.
+    pub latent: f64,
+    /// Divergence of `z_paint` from its prior, before its weight.
+    pub stop: f64,
+    /// `Σ |v_t - v_{t-1}|`, before its weight.
+    pub variation: f64,
+    /// Steps up to the stop.
+    pub steps: f64,
+}
+
+/// Training under way.
+#[derive(Debug, Clone)]
+pub struct ThesisTrainer {
+    settings: ThesisSettings,
+    parameters: Vec<f32>,
+    adam: Adam,
+    step: usize,
+}
+
+impl ThesisTrainer {
+    /// Random weights for a seed.
+    pub fn new(settings: ThesisSettings) -> Result<Self, Error> {
+        let whole =
+            |name, value: usize, most: usize, rule| require(name, value as f64, (1..=most).contains(&value), rule);
+        whole("steps", settings.steps, 100_000_000, "it must lie in 1..=1e8")?;
+        whole("batch", settings.batch, 4096, "it must lie in 1..=4096")?;
+        whole("threads", settings.threads, 1024, "it must lie in 1..=1024")?;
+        for (name, rate) in
+            [("learning_rate", settings.learning_rate), ("last_learning_rate", settings.last_learning_rate)]
+        {
+            require(name, rate, rate > 0.0 && rate <= 1.0, "it must lie in (0, 1]")?;
+        }
+        let longest = settings.longest_gradient;
+        require("longest_gradient", longest, longest > 0.0, "it must be positive")?;
+        let Objective { stop, variation, prior, .. } = settings.objective;
+        for (name, weight) in [("objective.stop", stop), ("objective.variation", variation)] {
+            require(name, weight, (0.0..=1e6).contains(&weight), "it must lie in [0, 1e6]")?;
+        }
+        require("objective.prior", prior, prior.abs() <= 50.0, "it must lie in [-50, 50]")?;
+        let parameters = Network::random(settings.shape, settings.seed)?.into_parameters();
+        let adam = Adam::new(parameters.len());
+        Ok(Self { settings, parameters, adam, step: 0 })
+    }
+
+    /// The weights as they are.
+    pub fn network(&self) -> Network {
+        Network::from_parameters(self.settings.shape, self.parameters.clone())
+    }
+
+    /// Steps done.
+    pub fn steps_done(&self) -> usize {
+        self.step
+    }
+
+    /// One step of the optimiser. `picture` gives the ink of the `n`th sample since the start of training, `side` x `side`
+    /// pixels in `[0, 1]`, the same at every call.
+    pub fn step(&mut self, picture: &(dyn Fn(u64) -> Result<Image, Error> + Sync)) -> Result<ThesisLoss, Error> {
+        let (settings, parameters) = (&self.settings, &self.parameters);
+        let first = (self.step * settings.batch) as u64;
+        let adjoint = ModelAdjoint::new(&settings.shape, parameters);
+        let model = Model::new(&settings.shape, parameters);
+        let results = in_threads(settings.threads, settings.batch.div_ceil(CHUNK), &|chunk| {
+            let numbers = chunk * CHUNK..settings.batch.min((chunk + 1) * CHUNK);
+            let samples: Vec<u64> = numbers.map(|k| first + k as u64).collect();
+            let pictures: Vec<Image> = samples.iter().map(|&n| picture(n)).collect::<Result<_, _>>()?;
+            let mut rollout = prepare(settings, &pictures.iter().collect::<Vec<_>>(), &samples)?;
+            rollout.run(&model, settings.objective.gated);
+            let found = (rollout.terms(settings.objective.prior), steps_used(&rollout));
+            let mut gradient = vec![0.0; parameters.len()];
+            rollout.back(&adjoint, &settings.objective, &mut gradient);
+            Ok((found, gradient))
+        });
+        // Always in the order of the pictures: floating-point sums depend on it.
+        let share = 1.0 / settings.batch as f64;
+        let mut gradient = vec![0.0_f32; parameters.len()];
+        let mut sums = Sums::default();
+        for result in results {
+            let (found, one) = result?;
+            sums.add(found);
+            for (sum, g) in gradient.iter_mut().zip(one) {
+                *sum += g * share as f32;
+            }
+        }
+        if shorten(&mut gradient, settings.longest_gradient) {
+            let falling =
+                (settings.last_learning_rate / settings.learning_rate).powf(self.step as f64 / settings.steps as f64);
+            self.adam.step(&mut self.parameters, &gradient, settings.learning_rate * falling);
+        }
+        self.step += 1;
+        Ok(sums.means(&self.settings.objective, self.settings.batch))
+    }
+
+    /// The loss on pictures that are not trained on, with noise that is the same at every call.
+    pub fn validate(&self, pictures: &[Image]) -> Result<ThesisLoss, Error> {
+        let model = Model::new(&self.settings.shape, &self.parameters);
+        let mut sums = Sums::default();
+        let chunks: Vec<&[Image]> = pictures.chunks(CHUNK).collect();
+        for result in in_threads(self.settings.threads, chunks.len().max(1), &|chunk| {
+            let Some(pictures) = chunks.get(chunk) else { return Err(Error::EmptyTask("there is no picture")) };
+            // Numbers that no training reaches.
+            let samples: Vec<u64> = (0..pictures.len()).map(|k| (1 << 50) + (chunk * CHUNK + k) as u64).collect();
+            let mut rollout = prepare(&self.settings, &pictures.iter().collect::<Vec<_>>(), &samples)?;
+            rollout.run(&model, self.settings.objective.gated);
+            Ok((rollout.terms(self.settings.objective.prior), steps_used(&rollout)))
+        }) {
+            sums.add(result?);
+        }
+        Ok(sums.means(&self.settings.objective, pictures.len()))
+    }
+
+    /// The state of training as the bytes of a safetensors file: going on from it gives the same weights, to the last bit, as
+    /// never having stopped.
+    pub fn checkpoint(&self) -> Vec<u8> {
+        let state = State { tensors: self.network().tensors(), adam: self.adam.clone(), step: self.step };
+        state.write(fingerprint(&self.settings))
+    }
+
+    /// Goes on from a checkpoint that was made with the same settings; only the number of threads may differ.
+    pub fn resume(settings: ThesisSettings, checkpoint: &[u8]) -> Result<Self, Error> {
+        let mut trainer = Self::new(settings)?;
+        let state = State::read(checkpoint, trainer.parameters.len(), &fingerprint(&trainer.settings))?;
+        trainer.parameters = Network::from_tensors(&state.tensors)?.into_parameters();
+        trainer.step = state.step;
+        trainer.adam = state.adam;
+        Ok(trainer)
+    }
+}
+
+#[derive(Default)]
+struct Sums {
+    terms: Terms,
+    steps: usize,
+}
+
+impl Sums {
+    fn add(&mut self, (terms, steps): (Terms, usize)) {
+        self.terms.cross_entropy += terms.cross_entropy;
+        self.terms.latent += terms.latent;
+        self.terms.stop += terms.stop;
+        self.terms.variation += terms.variation;
+        self.steps += steps;
+    }
+
+    fn means(&self, objective: &Objective, count: usize) -> ThesisLoss {
+        let share = 1.0 / count as f64;
+        ThesisLoss {
+            total: share * self.terms.total(objective),
+            cross_entropy: share * self.terms.cross_entropy,
+            latent: share * self.terms.latent,
+            stop: share * self.terms.stop,
+            variation: share * self.terms.variation,
+            steps: share * self.steps as f64,
+        }
+    }
+}
+
+fn steps_used(rollout: &Rollout<f32>) -> usize {
+    (0..rollout.batch).map(|k| (0..rollout.shape.steps).filter(|&t| rollout.paints(t, k)).count()).sum()
+}
+
+/// A batch on a bare wall, with the noise that belongs to its samples.
+fn prepare(settings: &ThesisSettings, pictures: &[&Image], samples: &[u64]) -> Result<Rollout<f32>, Error> {
+    let shape = &settings.shape;
+    let expected = (shape.side, shape.side);
+    let mut wanted = Vec::with_capacity(pictures.len() * shape.pixels());
+    for picture in pictures {
+        if picture.size() != expected {
+            return Err(Error::Mismatch { what: "picture", found: picture.size(), expected });
+        }
+        picture.check_range("picture", 0.0, 1.0, "ink in [0, 1]")?;
+        wanted.extend(picture.data().iter().map(|&v| v as f32));
+    }
+    let mut noise = Noise::none(shape, pictures.len());
+    for t in 0..shape.steps {
+        for (row, &n) in noise.latent.at_mut(t).chunks_exact_mut(shape.latent).zip(samples) {
+            let draw = |k: usize, which: i64| uniform(settings.seed, n, (t * shape.latent + k) as i64, which);
+            for (k, pair) in row.chunks_mut(2).enumerate() {
+                // Two normal numbers from two uniform ones (Box and Muller 1958).
+                let (length, angle) = ((-2.0 * draw(k, 1).ln()).sqrt(), std::f64::consts::TAU * draw(k, 2));
+                pair[0] = (length * angle.cos()) as f32;
+                if let Some(second) = pair.get_mut(1) {
+                    *second = (length * angle.sin()) as f32;
+                }
+            }
+        }
+        for (v, &n) in noise.stop.at_mut(t).iter_mut().zip(samples) {
+            let u = uniform(settings.seed, n, t as i64, 3);
+            *v = (u / (1.0 - u)).ln() as f32;
+        }
+    }
+    let before = vec![0.0; wanted.len()];
+    Ok(Rollout::new(shape, wanted, before, noise))
+}
+
+/// In `[1e-6, 1 - 1e-6]`.
+fn uniform(seed: u64, sample: u64, k: i64, which: i64) -> f64 {
+    let stream = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ sample.wrapping_mul(0xD134_2543_DE82_EF95);
+    lattice(stream, k, which).clamp(1e-6, 1.0 - 1e-6)
+}
+
+/// All settings that decide on the weights.
+fn fingerprint(settings: &ThesisSettings) -> String {
+    let ThesisSettings { threads: _, seed, shape, steps, batch, learning_rate, last_learning_rate, .. } = settings;
+    let ThesisSettings { longest_gradient, objective, .. } = settings;
+    format!(
+        "seed {seed}, {steps} steps of {batch} pictures, rate {learning_rate} to {last_learning_rate}, gradient up to \
+         {longest_gradient}, {shape:?}, {objective:?}"
+    )
+}

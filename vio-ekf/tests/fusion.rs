@@ -1,0 +1,522 @@
+//! Poses of others and an inertial sensor: accuracy, honesty, order, and what must be refused.
+
+#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
+
+mod support;
+
+use nalgebra::{Isometry3, Matrix6, Translation3, Vector3, Vector6};
+use support::Rng;
+use support::flight::{Flight, nees};
+use vio_ekf::{
+    AlignmentSettings, Error, Excess, FusionSettings, Imu, ImuNoise, MountSettings, Odometry, PoseFusion,
+    PoseMeasurement, PoseSource, Stamp, Start, StartSigma, chi2, nalgebra, so3,
+};
+
+/// A source of poses along a flight: its true frame, place, scale and delay.
+#[derive(Clone, Copy)]
+struct Tracker {
+    source_from_world: Isometry3<f64>,
+    body_from_sensor: Isometry3<f64>,
+    scale: f64,
+    /// Its stamps are this late, ns.
+    late: i64,
+    position_sigma: f64,
+    attitude_sigma: f64,
+}
+
+impl Default for Tracker {
+    fn default() -> Self {
+        let body_from_sensor = Isometry3::new(Vector3::new(0.25, -0.1, 0.05), Vector3::new(0.3, -0.4, 0.5));
+        Self {
+            source_from_world: Isometry3::identity(),
+            body_from_sensor,
+            scale: 1.0,
+            late: 0,
+            position_sigma: 0.01,
+            attitude_sigma: 0.005,
+        }
+    }
+}
+
+impl Tracker {
+    /// What a filter that knows all about the source assumes.
+    fn known(&self) -> PoseSource {
+        PoseSource {
+            alignment: AlignmentSettings { source_from_world: self.source_from_world, ..AlignmentSettings::default() },
+            mount: MountSettings { body_from_sensor: self.body_from_sensor, ..MountSettings::default() },
+            scale: self.scale,
+            time_offset_s: -self.late as f64 * 1e-9,
+            ..PoseSource::default()
+        }
+    }
+
+    /// The pose taken at a time, with noise.
+    fn pose(&self, flight: &mut Flight, taken: Stamp) -> PoseMeasurement {
+        let world_from_sensor = flight.truth(taken).world_from_body * self.body_from_sensor;
+        let stretched = Isometry3::from_parts(
+            (world_from_sensor.translation.vector * self.scale).into(),
+            world_from_sensor.rotation,
+        );
+        let exact = self.source_from_world * stretched;
+        let pose = Isometry3::from_parts(
+            Translation3::from(exact.translation.vector + flight.rng.normals() * self.position_sigma),
+            so3::exp(&(flight.rng.normals() * self.attitude_sigma)) * exact.rotation,
+        );
+        let stamp = Stamp::from_nanos(taken.nanos() + self.late);
+        PoseMeasurement::isotropic(0, stamp, pose, self.position_sigma, self.attitude_sigma)
+    }
+}
+
+/// Runs a filter over a flight with a pose every 50 ms that arrives 40 ms after it was taken.
+fn run(
+    flight: &mut Flight,
+    source: &Tracker,
+    assumed: PoseSource,
+    start: &Start,
+    mut each: impl FnMut(&Odometry, &vio_ekf::Motion, &[Vector3<f64>; 2]),
+) -> PoseFusion {
+    let mut fusion = PoseFusion::new(flight.noise, &[assumed], FusionSettings::default()).unwrap();
+    let first = flight.first();
+    for (k, stamp) in flight.stamps().enumerate() {
+        fusion.imu(&flight.imu(stamp)).unwrap();
+        if k == 0 {
+            fusion.start(start).unwrap();
+        }
+        let taken = Stamp::from_nanos(stamp.nanos() - 40_000_000);
+        if taken > first && (k + 3) % 10 == 0 {
+            fusion.pose(&source.pose(flight, taken)).unwrap();
+        }
+        let odometry = fusion.output().unwrap();
+        assert_eq!(odometry.stamp, stamp);
+        each(&odometry, &flight.truth(stamp), &flight.biases);
+    }
+    fusion
+}
+
+#[test]
+fn a_circle_is_followed_without_any_pose() {
+    // At constant rate ω about the vertical and speed v the body reads ω e_z and (0, v ω, g) in axes that look along the path.
+    let (rate, speed, radius) = (0.8, 1.6, 2.0);
+    let mut fusion = PoseFusion::new(ImuNoise::default(), &[PoseSource::default()], FusionSettings::default()).unwrap();
+    let at = |k: i64| Stamp::from_nanos(k * 5_000_000);
+    let biases = [Vector3::new(0.01, -0.02, 0.03), Vector3::new(0.2, 0.1, -0.1)];
+    for k in 0..=400 {
+        let sample = Imu {
+            stamp: at(k),
+            gyro: Vector3::z() * rate + biases[0],
+            accel: Vector3::new(0.0, speed * rate, 9.81) + biases[1],
+        };
+        fusion.imu(&sample).unwrap();
+        if k == 0 {
+            let start = Start {
+                stamp: at(0),
+                world_from_body: Isometry3::translation(0.0, -radius, 1.0),
+                velocity_in_body: Vector3::x() * speed,
+                gyro_bias: biases[0],
+                accel_bias: biases[1],
+                sigma: StartSigma::default(),
+            };
+            fusion.start(&start).unwrap();
+        }
+    }
+    let output = fusion.output().unwrap();
+    let angle: f64 = rate * 2.0;
+    let expected = Vector3::new(radius * angle.sin(), -radius * angle.cos(), 1.0);
+    assert!((output.world_from_body.translation.vector - expected).norm() < 2e-5, "{output:?}");
+    assert!((output.velocity_in_body - Vector3::x() * speed).norm() < 2e-5);
+    assert!((output.rate_in_body - Vector3::z() * rate).norm() < 1e-12);
+    assert!(so3::log(&output.world_from_body.rotation).metric_distance(&(Vector3::z() * angle)) < 1e-9);
+}
+
+#[test]
+fn follows_a_flight_and_knows_how_well() {
+    let runs = 20;
+    let mut sums: Vec<[f64; 5]> = vec![];
+    for seed in 1..=runs {
+        let mut flight = Flight::new(seed, 15.0);
+        let source = Tracker { late: 30_000_000, ..Tracker::default() };
+        let start = flight.drawn_start(StartSigma { position: 0.05, yaw: 0.02, ..StartSigma::default() });
+        let mut index = 0;
+        run(&mut flight, &source, source.known(), &start, |odometry, truth, biases| {
+            if sums.len() <= index {
+                sums.push([0.0; 5]);
+            }
+            for (sum, value) in sums[index].iter_mut().zip(nees(odometry, truth, biases)) {
+                *sum += value / runs as f64;
+            }
+            index += 1;
+            let off = truth.world_from_body.translation.vector - odometry.world_from_body.translation.vector;
+            assert!(index < 200 || off.norm() < 0.04, "seed {seed}, sample {index}: {off}");
+        });
+    }
+    let (low, high) = chi2::mean_band(3, runs as usize, 0.95).unwrap();
+    let share =
+        |k: usize| sums.iter().filter(|sums| (low..=high).contains(&sums[k])).count() as f64 / sums.len() as f64;
+    let mean = |k: usize| sums.iter().map(|sums| sums[k]).sum::<f64>() / sums.len() as f64;
+    for (k, what) in ["position", "attitude", "velocity", "gyro bias", "accel bias"].iter().enumerate() {
+        eprintln!("{what}: mean {:.2}, in the band {:.2}", mean(k), share(k));
+        assert!(share(k) > 0.8, "{what}: {}", share(k));
+        assert!((2.5..3.5).contains(&mean(k)), "{what}: {}", mean(k));
+    }
+}
+
+#[test]
+fn finds_frame_place_scale_and_clock_of_the_source() {
+    // Each number within what its own deviation allows, and the deviations themselves small.
+    for seed in 1..=4 {
+        let mut flight = Flight::new(seed, 30.0);
+        let source = Tracker {
+            source_from_world: Isometry3::new(Vector3::new(3.0, -2.0, 1.0), Vector3::new(0.0, 0.0, 0.8)),
+            scale: 1.1,
+            late: 60_000_000,
+            ..Tracker::default()
+        };
+        let turned = |angle: f64, rng: &mut Rng| so3::exp(&(rng.vector().normalize() * angle));
+        let mount = source.body_from_sensor;
+        let mut assumed = source.known();
+        assumed.alignment = AlignmentSettings {
+            source_from_world: Isometry3::from_parts(
+                (source.source_from_world.translation.vector + flight.rng.vector() * 0.4).into(),
+                so3::exp(&Vector3::new(0.02, -0.03, 0.5)) * source.source_from_world.rotation,
+            ),
+            position_sigma: 0.3,
+            tilt_sigma: 0.03,
+            yaw_sigma: 0.5,
+            ..AlignmentSettings::default()
+        };
+        assumed.mount = MountSettings {
+            body_from_sensor: Isometry3::from_parts(
+                (mount.translation.vector + flight.rng.vector() * 0.05).into(),
+                turned(0.05, &mut flight.rng) * mount.rotation,
+            ),
+            position_sigma: 0.04,
+            attitude_sigma: 0.04,
+        };
+        (assumed.scale, assumed.scale_sigma) = (1.0, 0.1);
+        (assumed.time_offset_s, assumed.time_offset_sigma_s) = (-0.05, 0.01);
+        // Position and yaw of the body are what is measured from.
+        let start = flight.drawn_start(StartSigma::default());
+        let fusion = run(&mut flight, &source, assumed, &start, |_, _, _| ());
+        let found = fusion.source_estimate(0).unwrap();
+        let between = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
+            let shift = a.translation.vector - b.translation.vector;
+            let turn = so3::log(&(a.rotation * b.rotation.inverse()));
+            Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
+        };
+        let mut error = nalgebra::SVector::<f64, 14>::zeros();
+        error.fixed_rows_mut::<6>(0).copy_from(&between(&source.source_from_world, &found.source_from_world));
+        error.fixed_rows_mut::<6>(6).copy_from(&between(&mount, &found.body_from_sensor));
+        error[12] = (source.scale / found.scale).ln();
+        error[13] = -0.06 - found.time_offset_s;
+        let square = error.dot(&found.covariance.cholesky().unwrap().solve(&error));
+        let sigma = found.covariance.map_diagonal(f64::sqrt);
+        eprintln!("seed {seed}: {square:.1}\n error {error:.5?}\n sigma {sigma:.5?}");
+        assert!(square < chi2::quantile(0.999, 14).unwrap(), "seed {seed}: {square}");
+        assert!(sigma.fixed_rows::<3>(3).max() < 0.01 && sigma[12] < 0.002 && sigma[13] < 1e-3, "{sigma}");
+        assert!(error[5].abs() < 0.02 && error[13].abs() < 2e-3, "{error}");
+    }
+}
+
+#[test]
+fn follows_a_source_that_drifts() {
+    // Its frame turns about the body and shifts; the world's own position and yaw must then be given up as slowly.
+    let mut flight = Flight::new(5, 25.0);
+    let source = Tracker::default();
+    let mut assumed = source.known();
+    (assumed.alignment.position_walk, assumed.alignment.yaw_walk) = (0.02, 0.01);
+    let start = flight.drawn_start(StartSigma::default());
+    let mut fusion = PoseFusion::new(flight.noise, &[assumed], FusionSettings::default()).unwrap();
+    let (mut drift, mut worst) = (Isometry3::identity(), 0.0_f64);
+    for (k, stamp) in flight.stamps().enumerate() {
+        fusion.imu(&flight.imu(stamp)).unwrap();
+        if k == 0 {
+            fusion.start(&start).unwrap();
+            continue;
+        }
+        let root = 0.005_f64.sqrt();
+        let here = Translation3::from(flight.truth(stamp).world_from_body.translation.vector);
+        let turn = so3::exp(&(Vector3::z() * (flight.rng.normal() * 0.01 * root)));
+        let shift = Translation3::from(flight.rng.normals() * (0.02 * root));
+        drift = drift * here * (shift * Isometry3::from_parts(Translation3::identity(), turn)) * here.inverse();
+        if k % 10 == 0 {
+            let now = Tracker { source_from_world: drift, ..source };
+            fusion.pose(&now.pose(&mut flight, stamp)).unwrap();
+            assert_eq!(fusion.refused(), 0, "sample {k}");
+            let output = fusion.output().unwrap();
+            let truth = flight.truth(stamp).world_from_body;
+            let off = truth.translation.vector - output.world_from_body.translation.vector;
+            let covariance = output.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+            worst = worst.max(off.dot(&covariance.cholesky().unwrap().solve(&off)));
+        }
+    }
+    let sigma = fusion.output().unwrap().covariance.fixed_view::<3, 3>(0, 0).trace().sqrt();
+    eprintln!("largest square {worst:.1}, deviation at the end {sigma:.3} m");
+    assert!(worst < 25.0, "{worst}");
+    // The walk alone makes 0.02 √(3·25) m; the inertial sensor holds on to little of it.
+    assert!((0.08..0.5).contains(&sigma), "{sigma}");
+}
+
+/// Samples, poses of two sources, and a filter for them.
+fn two_sources(seed: u64) -> (Vec<Imu>, Vec<(usize, PoseMeasurement)>, PoseFusion, Start) {
+    let mut flight = Flight::new(seed, 4.0);
+    let sources = [Tracker::default(), Tracker { late: 20_000_000, position_sigma: 0.03, ..Tracker::default() }];
+    let start = flight.drawn_start(StartSigma { position: 0.05, yaw: 0.02, ..StartSigma::default() });
+    let stamps: Vec<_> = flight.stamps().collect();
+    let samples: Vec<_> = stamps.iter().map(|stamp| flight.imu(*stamp)).collect();
+    let mut poses = vec![];
+    for (which, source) in sources.iter().enumerate() {
+        for (k, stamp) in stamps.iter().enumerate().skip(1).step_by(7 + 2 * which) {
+            // Between samples, and both sources at one time now and then.
+            let taken = Stamp::from_nanos((stamp.nanos() + 1_300_000).min(flight.spline.span().1.nanos()));
+            let mut pose = source.pose(&mut flight, taken);
+            pose.source = which;
+            if k % 5 == 0 {
+                pose.source_from_sensor.translation.vector.x += 2.0;
+            }
+            poses.push((k, pose));
+        }
+    }
+    let mut assumed = sources.map(|source| source.known());
+    assumed[1].alignment.yaw_sigma = 0.1;
+    assumed[1].time_offset_sigma_s = 0.005;
+    let fusion = PoseFusion::new(flight.noise, &assumed, FusionSettings::default()).unwrap();
+    (samples, poses, fusion, start)
+}
+
+#[test]
+fn order_of_arrival_does_not_matter() {
+    let (samples, poses, fusion, start) = two_sources(8);
+    // Poses arrive when the sample has come that is `delay` after them, in the order that the random numbers say.
+    let feed = |delay: &mut dyn FnMut(usize) -> usize| {
+        let mut fusion = fusion.clone();
+        let mut due: Vec<_> = poses.iter().map(|(k, pose)| (k + delay(*k), pose)).collect();
+        due.sort_by_key(|(k, _)| *k);
+        let mut due = due.into_iter().peekable();
+        for (k, sample) in samples.iter().enumerate() {
+            fusion.imu(sample).unwrap();
+            if k == 0 {
+                fusion.start(&start).unwrap();
+            }
+            while let Some((_, pose)) = due.next_if(|(at, _)| *at <= k || k + 1 == samples.len()) {
+                fusion.pose(pose).unwrap();
+            }
+        }
+        (fusion.output().unwrap(), fusion.source_estimate(0).unwrap(), fusion.source_estimate(1).unwrap())
+    };
+    let prompt = feed(&mut |_| 1);
+    for seed in 0..6 {
+        let mut rng = Rng(seed);
+        let shuffled = feed(&mut |_| (rng.bits() % 150) as usize);
+        assert_eq!(prompt, shuffled, "seed {seed}");
+    }
+    // Before the samples that they lie between, as well.
+    assert_eq!(prompt, feed(&mut |_| 0));
+}
+
+#[test]
+fn outliers_are_refused_and_a_source_that_is_wrong_is_told() {
+    let rmse = |share: u64| {
+        let mut flight = Flight::new(4, 12.0);
+        let source = Tracker::default();
+        let start = flight.drawn_start(StartSigma { position: 0.05, yaw: 0.02, ..StartSigma::default() });
+        let mut fusion = PoseFusion::new(flight.noise, &[source.known()], FusionSettings::default()).unwrap();
+        let mut luck = Rng(99);
+        let (mut sum, mut count, mut refused) = (0.0, 0, 0);
+        for (k, stamp) in flight.stamps().enumerate() {
+            fusion.imu(&flight.imu(stamp)).unwrap();
+            if k == 0 {
+                fusion.start(&start).unwrap();
+            } else if k % 10 == 0 {
+                let mut pose = source.pose(&mut flight, stamp);
+                if luck.bits() % 100 < share {
+                    let wrong = Isometry3::new(luck.vector() * 2.0, luck.vector());
+                    pose.source_from_sensor = wrong * pose.source_from_sensor;
+                }
+                fusion.pose(&pose).unwrap();
+                refused += u32::from(fusion.refused() > 0);
+                let truth = flight.truth(stamp).world_from_body.translation.vector;
+                sum += (fusion.output().unwrap().world_from_body.translation.vector - truth).norm_squared();
+                count += 1;
+            }
+        }
+        assert_eq!(fusion.diverged(), None);
+        (f64::sqrt(sum / f64::from(count)), refused)
+    };
+    let ((clean, none), (dirty, some)) = (rmse(0), rmse(20));
+    eprintln!("{clean:.4} m, with a fifth wrong {dirty:.4} m, {some} refused");
+    assert!(none <= 2 && (30..70).contains(&some), "{none}, {some}");
+    assert!(dirty < 1.3 * clean && clean < 0.02, "{clean}, {dirty}");
+
+    // Ten in a row, and the estimate is given up; a new start takes it back.
+    let mut flight = Flight::new(4, 2.0);
+    let source = Tracker::default();
+    let start = flight.drawn_start(StartSigma::default());
+    let mut fusion = PoseFusion::new(flight.noise, &[source.known()], FusionSettings::default()).unwrap();
+    for (k, stamp) in flight.stamps().enumerate().take(250) {
+        fusion.imu(&flight.imu(stamp)).unwrap();
+        if k == 0 {
+            fusion.start(&start).unwrap();
+        } else if k % 10 == 0 {
+            let mut pose = source.pose(&mut flight, stamp);
+            pose.source_from_sensor.translation.vector.z += 1.0;
+            fusion.pose(&pose).unwrap();
+            assert_eq!(fusion.diverged().is_some(), k >= 100, "sample {k}");
+        }
+    }
+    assert_eq!(fusion.diverged(), Some(Excess::Contradiction));
+    let again = Start { stamp: Stamp::from_nanos(start.stamp.nanos() + 2_000_000_000), ..start };
+    fusion.start(&again).unwrap();
+    assert_eq!((fusion.diverged(), fusion.refused()), (None, 0));
+}
+
+#[test]
+fn without_poses_it_says_when_it_knows_nothing_any_more() {
+    let mut flight = Flight::new(2, 30.0);
+    let start = flight.drawn_start(StartSigma::default());
+    let mut fusion = PoseFusion::new(flight.noise, &[PoseSource::default()], FusionSettings::default()).unwrap();
+    let mut told = None;
+    for (k, stamp) in flight.stamps().enumerate() {
+        fusion.imu(&flight.imu(stamp)).unwrap();
+        if k == 0 {
+            fusion.start(&start).unwrap();
+        }
+        let output = fusion.output().unwrap();
+        assert!(output.covariance.iter().all(|v| v.is_finite()));
+        if told.is_none() && fusion.diverged().is_some() {
+            told = Some(output.covariance.fixed_view::<3, 3>(3, 3).diagonal().max().sqrt());
+        }
+    }
+    // One metre per second, looked at every 32 samples.
+    assert_eq!(fusion.diverged(), Some(Excess::Uncertainty));
+    assert!((0.95..1.2).contains(&told.unwrap()), "{told:?}");
+}
+
+#[test]
+fn a_direction_without_information_is_not_believed() {
+    // A scan laid against a wall: nothing about y, z and the turn about x. The numbers there are nonsense.
+    let flight = Flight::new(3, 1.0);
+    let start = Start {
+        stamp: Stamp::from_nanos(0),
+        world_from_body: Isometry3::identity(),
+        velocity_in_body: Vector3::zeros(),
+        gyro_bias: Vector3::zeros(),
+        accel_bias: Vector3::zeros(),
+        sigma: StartSigma { position: 0.1, yaw: 0.1, ..StartSigma::default() },
+    };
+    let mut fusion = PoseFusion::new(flight.noise, &[PoseSource::default()], FusionSettings::default()).unwrap();
+    let imu =
+        |k: i64| Imu { stamp: Stamp::from_nanos(k * 5_000_000), gyro: Vector3::zeros(), accel: Vector3::z() * 9.81 };
+    fusion.imu(&imu(0)).unwrap();
+    fusion.start(&start).unwrap();
+    fusion.imu(&imu(1)).unwrap();
+    let before = fusion.output().unwrap();
+    let information = Matrix6::from_diagonal(&Vector6::new(1e8, 0.0, 0.0, 0.0, 1e8, 1e8));
+    let residual = Vector6::new(0.05, 1e3, -1e3, 2.0, 0.01, 0.05);
+    let stamp = imu(1).stamp;
+    // The turn about x is applied last: the others keep their meaning only for small ones, so leave it small here.
+    let residual = Vector6::new(residual[0], residual[1], residual[2], 1e-4, residual[4], residual[5]);
+    fusion.pose(&PoseMeasurement::from_residual(0, stamp, before.world_from_body, &residual, information)).unwrap();
+    let after = fusion.output().unwrap();
+    assert_eq!(fusion.refused(), 0);
+    let position = after.world_from_body.translation.vector;
+    assert!((position - Vector3::new(0.05, 0.0, 0.0)).norm() < 1e-3, "{position}");
+    let turn = so3::log(&after.world_from_body.rotation);
+    assert!((turn - Vector3::new(0.0, 0.01, 0.05)).norm() < 1e-3, "{turn}");
+    for (row, sigma) in [(0, 1e-4), (1, 0.1), (2, 0.1), (6, 0.01), (7, 1e-4), (8, 1e-4)] {
+        let ours = after.covariance[(row, row)].sqrt();
+        assert!((ours / sigma - 1.0).abs() < 0.05, "row {row}: {ours}");
+    }
+}
+
+#[test]
+fn refuses_what_it_cannot_use() {
+    let mut flight = Flight::new(1, 4.0);
+    let (noise, settings) = (flight.noise, FusionSettings::default());
+    let source = Tracker::default();
+    let known = source.known();
+    assert!(matches!(PoseFusion::new(noise, &[], settings), Err(Error::InvalidSetting { name: "sources", .. })));
+    for (bad, what) in [
+        (PoseSource { scale: 0.0, ..known }, "scale"),
+        (PoseSource { scale_sigma: -1.0, ..known }, "scale_sigma"),
+        (PoseSource { time_offset_s: f64::NAN, ..known }, "time_offset_s"),
+    ] {
+        let refused = PoseFusion::new(noise, &[bad], settings);
+        assert!(matches!(refused, Err(Error::InvalidSetting { name, .. }) if name == what), "{what}");
+    }
+    for bad in [
+        FusionSettings { gravity: 0.0, ..settings },
+        FusionSettings { gate: f64::NAN, ..settings },
+        FusionSettings { iterations: 0, ..settings },
+        FusionSettings { history_samples: 1, ..settings },
+        FusionSettings { history_poses: 1_000_000, ..settings },
+    ] {
+        assert!(matches!(PoseFusion::new(noise, &[known], bad), Err(Error::InvalidSetting { .. })), "{bad:?}");
+    }
+
+    let mut fusion = PoseFusion::new(noise, &[known], settings).unwrap();
+    let start = flight.drawn_start(StartSigma::default());
+    assert!(matches!(fusion.start(&start), Err(Error::TooFew { .. })));
+    assert!(fusion.output().is_none() && fusion.source_estimate(0).is_none());
+    let first = flight.first();
+    let at = |ms: i64| Stamp::from_nanos(first.nanos() + ms * 1_000_000);
+    let sample = flight.imu(first);
+    let nan = Vector3::new(0.0, f64::NAN, 0.0);
+    assert!(matches!(fusion.imu(&Imu { accel: nan, ..sample }), Err(Error::NonFinite { .. })));
+    fusion.imu(&sample).unwrap();
+    assert!(matches!(fusion.imu(&sample), Err(Error::NotIncreasing { .. })));
+    assert!(matches!(fusion.start(&Start { stamp: at(-5), ..start }), Err(Error::Late { .. })));
+    assert!(matches!(fusion.start(&Start { gyro_bias: nan, ..start }), Err(Error::NonFinite { .. })));
+    fusion.start(&start).unwrap();
+    for k in 1..=20 {
+        fusion.imu(&flight.imu(at(5 * k))).unwrap();
+    }
+    let good = source.pose(&mut flight, at(50));
+    let lopsided = {
+        let mut information = good.information;
+        information[(0, 1)] = 1e3;
+        information
+    };
+    for (bad, what) in [
+        (PoseMeasurement { source: 1, ..good }, "source"),
+        (PoseMeasurement { source_from_sensor: Translation3::from(nan) * good.source_from_sensor, ..good }, "pose"),
+        (PoseMeasurement { information: good.information * f64::INFINITY, ..good }, "infinite"),
+        (PoseMeasurement { information: -good.information, ..good }, "negative"),
+        (PoseMeasurement { information: lopsided, ..good }, "lopsided"),
+        (PoseMeasurement { stamp: at(300), ..good }, "ahead"),
+        (PoseMeasurement { stamp: at(-1), ..good }, "before the start"),
+        (PoseMeasurement { stamp: Stamp::from_nanos(i64::MAX), ..good }, "end of time"),
+    ] {
+        let before = fusion.output();
+        assert!(fusion.pose(&bad).is_err(), "{what}");
+        assert_eq!(fusion.output(), before, "{what}");
+    }
+    fusion.pose(&good).unwrap();
+    assert!(matches!(fusion.pose(&good), Err(Error::NotIncreasing { .. })));
+    // What is older than the history is settled, poses or not.
+    for k in 21..=600 {
+        fusion.imu(&flight.imu(at(5 * k))).unwrap();
+    }
+    let old = source.pose(&mut flight, at(1_000));
+    assert!(matches!(fusion.pose(&old), Err(Error::Late { what: "pose", .. })));
+    let recent = source.pose(&mut flight, at(2_000));
+    fusion.pose(&recent).unwrap();
+}
+
+#[test]
+fn a_pose_says_where_the_body_is() {
+    let mut flight = Flight::new(6, 1.0);
+    let source = Tracker {
+        source_from_world: Isometry3::new(Vector3::new(3.0, -2.0, 1.0), Vector3::new(0.1, 0.2, 0.8)),
+        scale: 1.3,
+        position_sigma: 1e-9,
+        attitude_sigma: 1e-9,
+        ..Tracker::default()
+    };
+    let fusion = PoseFusion::new(flight.noise, &[source.known()], FusionSettings::default()).unwrap();
+    let first = flight.first();
+    let pose = source.pose(&mut flight, first);
+    let (body, truth) = (fusion.body_at(&pose).unwrap(), flight.truth(first).world_from_body);
+    assert!((body.translation.vector - truth.translation.vector).norm() < 1e-7);
+    assert!(so3::angle_between(&body.rotation, &truth.rotation) < 1e-7);
+    assert!(matches!(fusion.body_at(&PoseMeasurement { source: 3, ..pose }), Err(Error::NoSuch { .. })));
+}

@@ -1,0 +1,74 @@
+//! After the start the fusion claims no memory: neither for a sample, nor for a pose, however late, nor for an output.
+
+// A global allocator can only be written with unsafe code; this one counts and passes on.
+#![allow(unsafe_code, reason = "counting allocations needs a global allocator")]
+#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
+
+mod support;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use support::flight::Flight;
+use vio_ekf::{FusionSettings, PoseFusion, PoseMeasurement, PoseSource, Stamp, StartSigma};
+
+struct Counting;
+
+static COUNT: AtomicUsize = AtomicUsize::new(0);
+
+// SAFETY: every call is passed on unchanged to the system's allocator.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller's promises are those that `System` asks for.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations(mut job: impl FnMut()) -> usize {
+    let before = COUNT.load(Ordering::Relaxed);
+    job();
+    COUNT.load(Ordering::Relaxed) - before
+}
+
+#[test]
+fn nothing_is_allocated_after_the_start() {
+    let mut flight = Flight::new(1, 12.0);
+    let start = flight.drawn_start(StartSigma::default());
+    let mut fusion = PoseFusion::new(flight.noise, &[PoseSource::default(); 2], FusionSettings::default()).unwrap();
+    for (k, stamp) in flight.stamps().enumerate() {
+        let sample = flight.imu(stamp);
+        if k == 0 {
+            fusion.imu(&sample).unwrap();
+            fusion.start(&start).unwrap();
+            continue;
+        }
+        assert_eq!(allocations(|| assert!(fusion.imu(&sample).is_ok())), 0, "sample {k}");
+        assert_eq!(allocations(|| assert!(fusion.output().is_some())), 0, "output {k}");
+        // Few poses, none for a while, more than the history holds; late ones and early ones.
+        let due = match k {
+            0..=800 => k % 10 == 0,
+            801..=1400 => false,
+            _ => k % 2 == 0,
+        };
+        if due && k > 100 {
+            for (source, back) in [(0, 40), (1, 3 * (k % 5) as i64 - 1)] {
+                let taken = Stamp::from_nanos((stamp.nanos() - 5_000_000 * back).min(flight.spline.span().1.nanos()));
+                let pose = PoseMeasurement::isotropic(source, taken, flight.truth(taken).world_from_body, 0.01, 0.01);
+                let count = allocations(|| {
+                    let _ = fusion.pose(&pose);
+                });
+                assert_eq!(count, 0, "pose at sample {k}");
+            }
+        }
+    }
+    assert_eq!(fusion.diverged(), None);
+}
