@@ -4,6 +4,7 @@ mod bearing;
 pub(crate) mod covariance;
 mod detect;
 mod estimator;
+mod external;
 mod follower;
 pub(crate) mod history;
 mod images;

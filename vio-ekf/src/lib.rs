@@ -81,7 +81,8 @@ pub use filter::{
 };
 pub use format::{asl, calibration, euroc, kitti, tum};
 pub use fusion::{
-    AlignmentSettings, FusionSettings, MountSettings, PoseFusion, PoseMeasurement, PoseSource, SourceEstimate,
+    AlignmentSettings, FusionSettings, ImuPair, ImuPairSettings, MountSettings, PoseFusion, PoseMeasurement,
+    PoseSource, SourceEstimate, Tally, UnifiedSettings, UnifiedVio,
 };
 pub use lie::{se3, so3};
 pub use measurement::{ImageView, Imu, ImuNoise};

@@ -12,7 +12,7 @@ use super::{Excess, Odometry, bearing::Bearing};
 use crate::{Camera, Imu, ImuNoise, Stamp};
 
 /// Most residuals of one update.
-const MAX_RESIDUALS: usize = 3;
+const MAX_RESIDUALS: usize = 6;
 
 /// A landmark whose inverse distance has a smaller relative deviation tells how far away new ones may be; 0.3 as in ROVIO.
 const WELL_KNOWN: f64 = 0.3;
