@@ -399,6 +399,10 @@ impl Vio {
     /// otherwise the number of landmarks lost on the way.
     fn expose(&mut self, stamp: Stamp, at_rest: bool) -> Result<Option<usize>, Error> {
         let Some(estimator) = &mut self.estimator else { return Ok(None) };
+        let clock = &self.settings.calibration;
+        if clock.stamp_jitter_s > 0.0 {
+            estimator.doubt_clock(clock.time_offset_s, clock.stamp_jitter_s);
+        }
         let time = later(stamp, estimator.state.time_offset);
         let anchor = estimator.history.anchor();
         if time <= anchor && estimator.history.is_new() {

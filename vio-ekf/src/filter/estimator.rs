@@ -115,6 +115,12 @@ impl Estimator {
         self.rate = Vector3::zeros();
     }
 
+    /// Takes a new image's clock to be off by something of its own.
+    pub(crate) fn doubt_clock(&mut self, offset: f64, jitter: f64) {
+        self.state.time_offset = offset;
+        self.covariance.isolate(at::TIME_OFFSET, jitter * jitter);
+    }
+
     /// Admits a small motion, an angle, that went unnoticed before the body was found to be at rest.
     pub(crate) fn loosen(&mut self, angle: f64, guess: &Guess) {
         let variance = angle * angle;

@@ -62,6 +62,9 @@ pub struct CalibrationSettings {
     pub time_offset_s: f64,
     /// Its standard deviation, s; ours: 0.
     pub time_offset_sigma_s: f64,
+    /// Standard deviation of the stamp of each image, s; ours: 0. With it every image has an offset of its own, found with the
+    /// landmarks that it sees, and the mean offset is taken as known.
+    pub stamp_jitter_s: f64,
 }
 
 /// Priors and process noise of landmarks.
@@ -216,6 +219,7 @@ impl Settings {
             ("camera_position_sigma_m", self.calibration.camera_position_sigma_m),
             ("camera_attitude_sigma", self.calibration.camera_attitude_sigma),
             ("time_offset_sigma_s", self.calibration.time_offset_sigma_s),
+            ("stamp_jitter_s", self.calibration.stamp_jitter_s),
             ("pixel_sigma", self.patches.pixel_sigma),
             ("drift", self.patches.drift),
             ("score", self.patches.score),

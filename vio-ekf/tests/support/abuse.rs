@@ -128,9 +128,11 @@ fn follow(simulation: &Simulation, name: &str, halves: u32, seed: u64) -> Outcom
     let camera = smaller(&super::sequences::camera(name), halves);
     let imu = ImuModel::default();
     let mut settings = Settings::default();
-    if ABUSES[seed as usize % ABUSES.len()] == Abuse::Saturated {
-        // The data sheet says so.
-        settings.sensor.gyro_range = 1.0;
+    // What the data sheets say.
+    match ABUSES[seed as usize % ABUSES.len()] {
+        Abuse::Saturated => settings.sensor.gyro_range = 1.0,
+        Abuse::Jitter => settings.calibration.stamp_jitter_s = 0.005,
+        _ => (),
     }
     let mut vio = Vio::new(camera, imu.noise, settings).unwrap();
     let samples = simulation.imu(0).unwrap().samples;
