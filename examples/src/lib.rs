@@ -14,6 +14,7 @@ pub mod recording;
 pub mod report;
 pub mod scan;
 pub mod surface;
+pub mod survey;
 pub mod targets;
 pub mod vio;
 pub mod world;

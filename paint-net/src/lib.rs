@@ -38,7 +38,7 @@
 //! | (ours) few sprays at free places, of free spreads | [`FreeSplats`] |
 //! | (ours) a network that looks at its canvas | [`Feedback`], [`Network`] |
 //! | (ours) coats, with a look at the wall after each | [`Coats`] |
-//! | (ours) a valve of limited speed | [`SlewLimited`] |
+//! | (ours) a valve of limited speed, and a path that suits it | [`SlewLimited`], [`Route`] |
 //! | (ours) strokes a robot can fly | [`boustrophedon`] |
 //!
 //! Pixels: centres at integers, `x` = column, `y` = row, row 0 at the top. Lengths are in pixels, depths in the unit of the
@@ -59,6 +59,7 @@ mod painter;
 pub mod procedural;
 mod projected_lbfgs;
 mod pursuit;
+mod route;
 mod saturation;
 mod slew;
 mod splats;
@@ -80,6 +81,7 @@ pub use layers::{Layered, Sharing, Steps};
 pub use network::{Network, Shape};
 pub use painter::{Limits, Painter, Painting, Spray, Task};
 pub use pursuit::MatchingPursuit;
+pub use route::Route;
 pub use saturation::{MonotoneCurve, Saturation};
 pub use slew::{SlewLimited, slew_violations};
 pub use splats::FreeSplats;

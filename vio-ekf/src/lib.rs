@@ -80,12 +80,13 @@ pub use eval::stats::Stats;
 pub use eval::{Evaluation, EvaluationSettings, Segment, evaluate};
 pub use filter::{
     Bearing, Calibration, CalibrationSettings, CoreCovariance, Excess, FrameReport, GateSettings, LandmarkSettings,
-    LimitSettings, MovingSettings, Odometry, PatchSettings, PointObservation, RestSettings, Settings, Start,
-    StartSigma, Status, Vio, Waiting,
+    LimitSettings, MovingSettings, Odometry, PatchSettings, PointObservation, RestSettings, SensorSettings, Settings,
+    Start, StartSigma, Status, Vio, Waiting,
 };
 pub use format::{asl, calibration, euroc, kitti, tum};
 pub use fusion::{
-    AlignmentSettings, FusionSettings, MountSettings, PoseFusion, PoseMeasurement, PoseSource, SourceEstimate,
+    AlignmentSettings, FusionSettings, ImuPair, ImuPairSettings, MountSettings, PoseFusion, PoseMeasurement,
+    PoseSource, SourceEstimate, Tally, UnifiedSettings, UnifiedVio,
 };
 pub use lie::{se3, so3};
 pub use measurement::{ImageView, Imu, ImuNoise};
