@@ -37,6 +37,7 @@
 //! | bearing with a tangent basis | Hertzberg et al. 2013; Bloesch et al. 2017 | [`Bearing`] |
 //! | iterated update | Bell and Cathey 1993 | [`GateSettings`] |
 //! | start in motion | closed form of Martinelli 2014, refined: ours | [`MovingSettings`] |
+//! | axes and units of inertial samples | ours | [`check_samples`] |
 //! | one-call evaluation | ours | [`evaluate`] |
 //! | least-squares alignment | Umeyama 1991, Eqs. (40)-(42); Horn 1987 | [`align`] |
 //! | alignment of position and yaw | closed form, ours; Zhang and Scaramuzza 2018 for the choice of mode | [`Alignment::PosYaw`] |
@@ -59,10 +60,13 @@ mod format;
 mod fusion;
 mod lie;
 mod measurement;
+mod sanity;
 pub mod sim;
 mod spline;
 mod stamp;
 mod trajectory;
+#[cfg(feature = "tune")]
+pub mod tune;
 
 pub use camera::{Camera, Distortion};
 pub use error::Error;
@@ -87,6 +91,7 @@ pub use fusion::{
 pub use lie::{se3, so3};
 pub use measurement::{ImageView, Imu, ImuNoise};
 pub use nalgebra;
+pub use sanity::{SampleFindings, check_samples};
 pub use spline::{Motion, Spline};
 pub use stamp::Stamp;
 pub use trajectory::{Trajectory, interpolate, path_lengths};
