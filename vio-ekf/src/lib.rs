@@ -40,6 +40,7 @@
 //! | inertial sensor and foreign poses | Weiss and Siegwart 2011; Lynen et al. 2013 (thesis, Paper II, section 4) | [`PoseFusion`] |
 //! | poses as measurements of the odometry | thesis, outlook: one estimator instead of two; ours | [`Vio::pose`], [`UnifiedVio`] |
 //! | two inertial sensors as one | ours | [`ImuPair`] |
+//! | axes and units of inertial samples | ours | [`check_samples`] |
 //! | one-call evaluation | ours | [`evaluate`] |
 //! | least-squares alignment | Umeyama 1991, Eqs. (40)-(42); Horn 1987 | [`align`] |
 //! | alignment of position and yaw | closed form, ours; Zhang and Scaramuzza 2018 for the choice of mode | [`Alignment::PosYaw`] |
@@ -62,10 +63,13 @@ mod format;
 mod fusion;
 mod lie;
 mod measurement;
+mod sanity;
 pub mod sim;
 mod spline;
 mod stamp;
 mod trajectory;
+#[cfg(feature = "tune")]
+pub mod tune;
 
 pub use camera::{Camera, Distortion};
 pub use error::Error;
@@ -79,8 +83,8 @@ pub use eval::stats::Stats;
 pub use eval::{Evaluation, EvaluationSettings, Segment, evaluate};
 pub use filter::{
     Bearing, Calibration, CalibrationSettings, CoreCovariance, Excess, FrameReport, GateSettings, LandmarkSettings,
-    LimitSettings, MovingSettings, Odometry, PatchSettings, PointObservation, RestSettings, Settings, Start,
-    StartSigma, Status, Vio, Waiting,
+    LimitSettings, MovingSettings, Odometry, PatchSettings, PointObservation, RestSettings, SensorSettings, Settings,
+    Start, StartSigma, Status, Vio, Waiting,
 };
 pub use format::{asl, calibration, euroc, kitti, tum};
 pub use fusion::{
@@ -90,6 +94,7 @@ pub use fusion::{
 pub use lie::{se3, so3};
 pub use measurement::{ImageView, Imu, ImuNoise};
 pub use nalgebra;
+pub use sanity::{SampleFindings, check_samples};
 pub use spline::{Motion, Spline};
 pub use stamp::Stamp;
 pub use trajectory::{Trajectory, interpolate, path_lengths};

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use paint_net::procedural::Texture;
 use paint_net::train::TrainSettings;
-use paint_net::{Limits, SprayKernel};
+use paint_net::{Limits, Route, SprayKernel};
 use paintcopter_examples::paint_image::{Choice, Job, Lesson, compare, learn, pictures_in, print_table, read_ink};
 use paintcopter_examples::progress::Stage;
 
@@ -58,6 +58,9 @@ struct Nozzle {
     /// Largest change of volume from one place of the path to the next [default: any]
     #[arg(long)]
     largest_change: Option<f64>,
+    /// Path for which that holds: row by row, or along what is alike
+    #[arg(long, default_value = "rows")]
+    route: RouteName,
     /// Looks of the network at its canvas
     #[arg(long, default_value_t = 6)]
     passes: usize,
@@ -115,6 +118,13 @@ enum PainterName {
     Coats,
     Deconvolution,
     Pursuit,
+    Splats,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum RouteName {
+    Rows,
+    Alike,
 }
 
 fn main() -> ExitCode {
@@ -159,6 +169,7 @@ fn job(painter: PainterName, nozzle: &Nozzle) -> Result<Job, AnyError> {
         PainterName::Coats => Choice::Coats,
         PainterName::Deconvolution => Choice::Deconvolution,
         PainterName::Pursuit => Choice::Pursuit,
+        PainterName::Splats => Choice::Splats,
     };
     let limits = Limits {
         along: nozzle.along,
@@ -174,6 +185,10 @@ fn job(painter: PainterName, nozzle: &Nozzle) -> Result<Job, AnyError> {
         kernel,
         limits,
         largest_change: nozzle.largest_change,
+        route: match nozzle.route {
+            RouteName::Rows => Route::Rows,
+            RouteName::Alike => Route::Alike,
+        },
         threads: nozzle.threads,
     })
 }
