@@ -15,7 +15,7 @@ use serde::Serialize;
 use crate::pictures::{PictureError, Rgb};
 
 pub use compare::{Row, compare, print_table};
-pub use learn::{Lesson, learn};
+pub use learn::{Lesson, Pictures, ThesisLesson, learn, learn_thesis};
 
 /// Who decides the sprays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
