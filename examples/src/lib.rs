@@ -14,5 +14,6 @@ pub mod recording;
 pub mod report;
 pub mod scan;
 pub mod surface;
+pub mod survey;
 pub mod targets;
 pub mod world;

@@ -99,7 +99,7 @@ fn hang(facing: &Vector3<f64>) -> Rotation3<f64> {
 }
 
 /// Sum of the area vectors over the sum of their lengths: length 1 for a plane, 0 for a closed surface.
-fn mean_normal(mesh: &TriangleMesh) -> Vector3<f64> {
+pub(crate) fn mean_normal(mesh: &TriangleMesh) -> Vector3<f64> {
     let (mut sum, mut total) = (Vector3::zeros(), 0.0);
     for face in &mesh.faces {
         let [a, b, c] = face.map(|i| Vector3::from(mesh.positions[i as usize].map(f64::from)));

@@ -10,10 +10,10 @@ use cpu_time::ThreadTime;
 use nalgebra::Vector3;
 use paintcopter_benches::Rng;
 use serde_json::json;
-use vio_ekf::sim::{CameraModel, Frame, ImuModel, Scenario, Simulation};
+use vio_ekf::sim::{CameraModel, Frame, ImuModel, Scenario, Simulation, camera_ahead, painting_flight};
 use vio_ekf::{
-    Alignment, Association, ImageView, Odometry, Settings, Spline, Stamp, Start, StartSigma, Status, Trajectory, Vio,
-    ate, euroc, nalgebra, so3, tum,
+    Alignment, Association, Camera, ImageView, Odometry, Settings, Spline, Stamp, Start, StartSigma, Status,
+    Trajectory, Vio, ate, euroc, nalgebra, so3, tum,
 };
 
 type AnyError = Box<dyn Error>;
@@ -22,7 +22,7 @@ type AnyError = Box<dyn Error>;
 #[derive(Parser)]
 #[command(after_help = "Example: vio_runs --sequence MH_03 --seeds 5")]
 struct Arguments {
-    /// `MH_01`, `MH_03`, `MH_04`, `V1_02`; all of them if none is named. Several may be given
+    /// `MH_01`, `MH_03`, `MH_04`, `V1_02`, `paint_1`, `paint_2`; all of them if none is named. Several may be given
     #[arg(long)]
     sequence: Vec<String>,
     /// Runs of each sequence, with seeds 1, 2, ...: another room, other noise
@@ -43,9 +43,6 @@ struct Arguments {
     /// Folder with the recordings
     #[arg(long, env = "PAINTCOPTER_DATA", default_value = "../shared/data")]
     data: PathBuf,
-    /// Instead of whole sequences: let the filter start by itself, without help, every so many seconds
-    #[arg(long, value_name = "SECONDS")]
-    starts: Option<f64>,
     /// Runs of which the shortest time of each frame counts: on a shared machine a frame may be interrupted
     #[arg(long, default_value_t = 1)]
     repeats: usize,
@@ -79,18 +76,14 @@ struct Outcome {
 
 fn run(arguments: &Arguments) -> Result<(), AnyError> {
     let settings: Settings = serde_json::from_str(&arguments.settings)?;
-    let all = ["MH_01", "MH_03", "MH_04", "V1_02"].map(String::from).to_vec();
+    let all = ["MH_01", "MH_03", "MH_04", "V1_02", "paint_1", "paint_2"].map(String::from).to_vec();
     let names = if arguments.sequence.is_empty() { &all } else { &arguments.sequence };
-    let mut tally = [0; 4];
     let (mut errors, mut millis, mut imu_micros, mut diverged) = (Vec::new(), Vec::new(), Vec::new(), 0);
     for name in names {
         let spline = spline(&arguments.data, name, arguments.seconds)?;
         for seed in arguments.first_seed..arguments.first_seed + arguments.seeds {
-            let simulation = Simulation::new(spline.clone(), Scenario { seed, ..Scenario::default() })?;
-            if let Some(step) = arguments.starts {
-                starts(&simulation, name, seed, &settings, arguments, step, &mut tally)?;
-                continue;
-            }
+            let cameras = vec![CameraModel { camera: camera(name), ..CameraModel::default() }];
+            let simulation = Simulation::new(spline.clone(), Scenario { seed, cameras, ..Scenario::default() })?;
             let mut outcome = follow(&simulation, name, seed, &settings, arguments)?;
             for _ in 1..arguments.repeats {
                 let again = follow(&simulation, name, seed, &settings, arguments)?;
@@ -113,11 +106,6 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
             println!("{line}");
         }
     }
-    if arguments.starts.is_some() {
-        let [tried, started, good, false_ones] = tally;
-        println!("{}", json!({"tried": tried, "started": started, "good": good, "false": false_ones}));
-        return Ok(());
-    }
     let worst = errors.iter().copied().fold(0.0, f64::max);
     let summary = json!({
         "runs": errors.len(), "ate_se3_mean_m": errors.iter().sum::<f64>() / errors.len() as f64,
@@ -128,6 +116,11 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
     Ok(())
 }
 
+/// The camera of a sequence.
+fn camera(name: &str) -> Camera {
+    if name.starts_with("paint") { camera_ahead() } else { Camera::euroc() }
+}
+
 /// The motion of a recording, cut to some seconds.
 fn spline(data: &Path, name: &str, seconds: Option<f64>) -> Result<Spline, AnyError> {
     let file = match name {
@@ -135,7 +128,9 @@ fn spline(data: &Path, name: &str, seconds: Option<f64>) -> Result<Spline, AnyEr
         "MH_03" => "trajectories/euroc/MH_03_medium.txt.gz",
         "MH_04" => "vio/euroc_imu_gt/MH_04_difficult/groundtruth_MH_04_difficult.csv.gz",
         "V1_02" => "vio/euroc_imu_gt/V1_02_medium/groundtruth_V1_02_medium.csv.gz",
-        _ => return Err(format!("`{name}` is no sequence: MH_01, MH_03, MH_04 or V1_02").into()),
+        "paint_1" => return Ok(painting_flight(1, seconds.unwrap_or(60.0))?),
+        "paint_2" => return Ok(painting_flight(2, seconds.unwrap_or(60.0))?),
+        _ => return Err(format!("`{name}` is no sequence: MH_01, MH_03, MH_04, V1_02, paint_1 or paint_2").into()),
     };
     let path = data.join(file);
     let output = Command::new("gzip").arg("-dc").arg(&path).output()?;
@@ -161,9 +156,9 @@ fn follow(
     settings: &Settings,
     arguments: &Arguments,
 ) -> Result<Outcome, AnyError> {
-    let (camera, imu) = (CameraModel::default().camera, ImuModel::default());
+    let imu = ImuModel::default();
     let recording = simulation.imu(0)?;
-    let mut vio = Vio::new(camera, imu.noise, *settings)?;
+    let mut vio = Vio::new(camera(name), imu.noise, *settings)?;
     let mut samples = recording.samples.iter();
     let first = samples.next().ok_or("the sequence is too short")?;
     vio.imu(first)?;
@@ -215,77 +210,6 @@ fn follow(
         std::fs::write(folder.join(format!("{name}_{seed}.tum")), tum::write(&estimate))?;
     }
     Ok(outcome)
-}
-
-/// Seconds in which a start must come.
-const PATIENCE: f64 = 5.0;
-/// Seconds after the start at which its scale is judged.
-const JUDGED_AFTER: f64 = 5.0;
-
-/// Starts without help all along a sequence: tried, started, scale right to 5 %, scale wrong by more than 20 % unflagged.
-fn starts(
-    simulation: &Simulation,
-    name: &str,
-    seed: u64,
-    settings: &Settings,
-    arguments: &Arguments,
-    step: f64,
-    tally: &mut [usize; 4],
-) -> Result<(), AnyError> {
-    let (camera, imu) = (CameraModel::default().camera, ImuModel::default());
-    let recording = simulation.imu(0)?;
-    let (first, last) = simulation.spline().span();
-    let mut from = 0.0;
-    while last.secs_since(first) > from + PATIENCE + JUDGED_AFTER + 0.1 {
-        let mut vio = Vio::new(camera, imu.noise, *settings)?;
-        let mut samples = recording.samples.iter().skip_while(|s| s.stamp.secs_since(first) < from);
-        let mut film = Film::new(simulation, name, seed, arguments)?;
-        film.index = (from * CameraModel::default().rate_hz) as usize + 1;
-        let (mut began, mut path) = (None, Vec::new());
-        let mut status = vio.status();
-        while let Some(frame) = film.next()? {
-            for sample in samples.by_ref() {
-                vio.imu(sample)?;
-                if sample.stamp >= frame.stamp {
-                    break;
-                }
-            }
-            status = vio.image(frame.stamp, &frame.view())?.status;
-            let after = frame.stamp.secs_since(first) - from;
-            if let Some(odometry) = vio.output() {
-                let start = *began.get_or_insert(after);
-                path.push((simulation.motion(odometry.stamp)?.world_from_body, odometry.world_from_body));
-                if after > start + JUDGED_AFTER {
-                    break;
-                }
-            } else if after > PATIENCE {
-                break;
-            }
-        }
-        tally[0] += 1;
-        if let Some(start) = began {
-            tally[1] += 1;
-            let length = |of: &dyn Fn(usize) -> nalgebra::Isometry3<f64>| {
-                (1..path.len()).map(|k| (of(k).translation.vector - of(k - 1).translation.vector).norm()).sum::<f64>()
-            };
-            let (truth, ours) = (length(&|k| path[k].0), length(&|k| path[k].1));
-            let off = (ours - truth).abs();
-            // Where nothing moves there is no scale: then a centimetre is right.
-            let good = off < 0.05 * truth || off < 0.01;
-            let wrong = off > 0.2 * truth && off > 0.05 && !matches!(status, Status::Diverged(_));
-            tally[2] += usize::from(good);
-            tally[3] += usize::from(wrong);
-            println!(
-                "{}",
-                json!({"sequence": name, "seed": seed, "from_s": from, "started_after_s": start,
-                "length_true_m": truth, "length_m": ours, "diverged": matches!(status, Status::Diverged(_))})
-            );
-        } else {
-            println!("{}", json!({"sequence": name, "seed": seed, "from_s": from, "status": format!("{status:?}")}));
-        }
-        from += step;
-    }
-    Ok(())
 }
 
 /// The truth, less errors drawn from what the start admits.

@@ -8,6 +8,7 @@ use paintcopter_examples::design::{Design, Picture};
 use paintcopter_examples::mesh_io::{TriangleMesh, read_mesh};
 use paintcopter_examples::mission::{Mission, MissionSettings, PainterChoice};
 use paintcopter_examples::placing::{Placing, UpAxis, place};
+use paintcopter_examples::survey::Survey;
 use paintcopter_examples::world::rock_wall;
 
 type AnyError = Box<dyn std::error::Error>;
@@ -33,6 +34,9 @@ struct Arguments {
     /// [default: strata on the rock wall, stripes on a mesh]
     #[arg(long)]
     design: Option<String>,
+    /// Scan the surface first, with the robot's own camera, inertial sensor and depth camera, and paint what it has mapped
+    #[arg(long, conflicts_with = "texture")]
+    scan: bool,
     /// Who decides the sprays
     #[arg(long, default_value = "feedback")]
     painter: PainterName,
@@ -90,11 +94,12 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
     let mission = match &arguments.mesh {
         None => {
             let design = Design::from_name(arguments.design.as_deref().unwrap_or("strata"), arguments.seed)?;
-            Mission::run("Rock wall", &rock_wall(arguments.seed), &design, settings)?
+            let wall = seen(rock_wall(arguments.seed), arguments, settings.threads)?;
+            Mission::run("Rock wall", &wall, &design, settings)?
         }
         Some(path) => {
             let in_file = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
-            let mesh = load(path, arguments)?;
+            let mesh = seen(load(path, arguments)?, arguments, settings.threads).map_err(|e| in_file(&e))?;
             let design = match &arguments.texture {
                 Some(texture) => Design::Texture(Picture::open(texture)?),
                 None => Design::from_name(arguments.design.as_deref().unwrap_or("stripes"), arguments.seed)?,
@@ -107,6 +112,16 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
     eprintln!("{}", report.summary());
     println!("{}", folder.join("report.md").display());
     Ok(())
+}
+
+/// The mesh that is painted: the true one, or what the robot finds of it.
+fn seen(mesh: TriangleMesh, arguments: &Arguments, threads: usize) -> Result<TriangleMesh, AnyError> {
+    if !arguments.scan {
+        return Ok(mesh);
+    }
+    let survey = Survey::fly(&mesh, arguments.seed, threads)?;
+    survey.save(&arguments.out)?;
+    Ok(survey.mesh)
 }
 
 /// Reads and places a mesh.

@@ -64,7 +64,8 @@ pub struct CalibrationSettings {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct LandmarkSettings {
-    /// Inverse distance of a new landmark while no other is known well, 1/m; 0.5 as in ROVIO.
+    /// Inverse distance of a new landmark while no other is known well, 1/m; ours, ROVIO has 0.5. All first landmarks share what
+    /// is wrong with it, which the filter does not know: better a little far than near.
     pub inverse_distance: f64,
     /// Standard deviation of a new landmark's inverse distance, relative to its value; ours.
     pub inverse_distance_sigma: f64,
@@ -74,7 +75,7 @@ pub struct LandmarkSettings {
 
 impl Default for LandmarkSettings {
     fn default() -> Self {
-        Self { inverse_distance: 0.5, inverse_distance_sigma: 0.7, pixel_sigma: 1.0 }
+        Self { inverse_distance: 0.3, inverse_distance_sigma: 0.7, pixel_sigma: 1.0 }
     }
 }
 

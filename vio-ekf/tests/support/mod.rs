@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "every test file uses its own part of this")]
 #![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
 
+pub(crate) mod abuse;
 pub(crate) mod flight;
 pub(crate) mod sequences;
 

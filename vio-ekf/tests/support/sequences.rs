@@ -1,8 +1,10 @@
 //! The motions on which the filter is judged, and what a point tracker or a camera records along them.
 
-use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
-use vio_ekf::sim::{CameraModel, ImuRecording, RoomSettings, Scenario, Simulation};
-use vio_ekf::{Camera, PointObservation, Spline, Stamp, Trajectory, euroc, nalgebra, so3, tum};
+use nalgebra::{Isometry3, Point3, Vector2, Vector3};
+use vio_ekf::sim::{
+    CameraModel, ImuModel, ImuRecording, RoomSettings, Scenario, Simulation, camera_ahead, painting_flight,
+};
+use vio_ekf::{Camera, PointObservation, Spline, Stamp, Start, StartSigma, Trajectory, euroc, nalgebra, so3, tum};
 
 use super::{Rng, recorded};
 
@@ -16,8 +18,8 @@ pub(crate) fn motion(name: &str) -> Option<Spline> {
         "MH_03" => "trajectories/euroc/MH_03_medium.txt.gz",
         "MH_04" => "vio/euroc_imu_gt/MH_04_difficult/groundtruth_MH_04_difficult.csv.gz",
         "V1_02" => "vio/euroc_imu_gt/V1_02_medium/groundtruth_V1_02_medium.csv.gz",
-        "paint_1" => return Some(painting(1)),
-        _ => return Some(painting(2)),
+        "paint_1" => return Some(painting_flight(1, 60.0).unwrap()),
+        _ => return Some(painting_flight(2, 60.0).unwrap()),
     };
     let text = recorded(file)?;
     let whole: Trajectory =
@@ -25,39 +27,9 @@ pub(crate) fn motion(name: &str) -> Option<Spline> {
     Some(Spline::from_trajectory(&whole, 50_000_000).unwrap())
 }
 
-/// A robot that paints: rows along a wall to and fro at up to 0.8 m/s, each a little higher, held against gusts, the nose to
-/// the wall and swaying.
-fn painting(seed: u64) -> Spline {
-    let mut rng = Rng(seed);
-    let phases: Vec<Vector3<f64>> = (0..3).map(|_| rng.vector() * std::f64::consts::PI).collect();
-    let row_s = 8.0;
-    let knots = (0..1200).map(|k| {
-        let t = f64::from(k) * 0.05;
-        let wave = |amplitude: f64, hertz: f64, phase: &Vector3<f64>| {
-            Vector3::from_fn(|i, _| {
-                amplitude * (std::f64::consts::TAU * hertz * (1.0 + 0.17 * i as f64) * t + phase[i]).sin()
-            })
-        };
-        // A sine to and fro has the speed 0.8 m/s in the middle of each row.
-        let along = 2.0 * (std::f64::consts::PI * t / row_s).cos();
-        let position = Vector3::new(0.0, along, 0.05 * t) + wave(0.03, 0.7, &phases[0]) + wave(0.12, 0.21, &phases[1]);
-        let tilt = wave(0.05, 0.6, &phases[2]);
-        // Leaning into the acceleration, as a multirotor must.
-        let lean = 0.5 * along * (std::f64::consts::PI / row_s).powi(2) / 9.81;
-        let rotation = so3::exp(&Vector3::new(tilt.x + lean, tilt.y, 2.0 * tilt.z));
-        Isometry3::from_parts(Translation3::from(position), rotation)
-    });
-    Spline::new(Stamp::from_nanos(1_000_000_000), 50_000_000, knots.collect()).unwrap()
-}
-
 /// The camera of the sequences; on the robot that paints it looks ahead.
 pub(crate) fn camera(name: &str) -> Camera {
-    if !name.starts_with("paint") {
-        return Camera::euroc();
-    }
-    let ahead = Rotation3::from_matrix_unchecked(nalgebra::Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0));
-    let rotation = UnitQuaternion::from_rotation_matrix(&ahead);
-    Camera { body_from_camera: Isometry3::from_parts(Translation3::new(0.1, 0.0, 0.05), rotation), ..Camera::euroc() }
+    if name.starts_with("paint") { camera_ahead() } else { Camera::euroc() }
 }
 
 /// A sequence with its room and its inertial samples.
@@ -115,5 +87,25 @@ impl Sequence {
             }
         }
         seen
+    }
+}
+
+/// The truth, less errors drawn from what the start admits.
+pub(crate) fn drawn_start(simulation: &Simulation, stamp: Stamp, seed: u64) -> Start {
+    let imu = ImuModel::default();
+    let sigma =
+        StartSigma { gyro_bias: imu.gyro_bias_sigma, accel_bias: imu.accel_bias_sigma, ..StartSigma::default() };
+    let mut rng = Rng(seed);
+    let motion = simulation.motion(stamp).unwrap();
+    let pose = motion.world_from_body;
+    let tilt = rng.normals().component_mul(&Vector3::new(sigma.tilt, sigma.tilt, 0.0));
+    Start {
+        stamp,
+        world_from_body: Isometry3::from_parts(pose.translation, so3::exp(&-tilt) * pose.rotation),
+        velocity_in_body: pose.rotation.inverse() * motion.velocity_in_world - rng.normals() * sigma.velocity,
+        // The simulator draws the biases around zero.
+        gyro_bias: Vector3::zeros(),
+        accel_bias: Vector3::zeros(),
+        sigma,
     }
 }

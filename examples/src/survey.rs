@@ -1,0 +1,155 @@
+//! The scan before the paint: the robot flies along a surface it has no mesh of, finds out where it is with its own camera and
+//! inertial sensor, and maps with its own depth camera. What it paints afterwards is what it has mapped.
+
+mod flight;
+mod judge;
+mod sensors;
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use paint_sim::TriangleSurface;
+use tsdf_hash::{DepthData, DepthView, Map};
+use vio_ekf::sim::{RoomSettings, Scenario, Simulation};
+use vio_ekf::{ImuNoise, Stamp, Status, Trajectory, Vio};
+
+pub use judge::SurveyFigures;
+
+use crate::mesh_io::TriangleMesh;
+use crate::progress::Stage;
+use sensors::{Eyes, FRAMES_PER_SECOND};
+
+/// Edge of a voxel of the map, metres: below the size of a spray spot.
+const VOXEL: f64 = 0.02;
+/// One image in so many is fused: neighbours see the same.
+const FUSE_EVERY: usize = 4;
+
+/// A scanned surface, and how well it was scanned.
+pub struct Survey {
+    /// The surface as the robot mapped it, in the world's frame.
+    pub mesh: TriangleMesh,
+    /// How far it is from the true one.
+    pub figures: SurveyFigures,
+    /// Where the robot was.
+    flown: Trajectory,
+    /// Where it took itself to be.
+    estimated: Trajectory,
+}
+
+/// Why a surface could not be scanned.
+#[derive(Debug, thiserror::Error)]
+pub enum SurveyError {
+    /// It has no front to fly along.
+    #[error("the surface closes in on itself: a scan flies along surfaces that face one side; paint it without --scan")]
+    NoFront,
+    /// It is too small or too large for the flight.
+    #[error(
+        "the surface is {width:.1} m by {height:.1} m: a scan wants 0.5 to 30 m; change its scale, or paint it without --scan"
+    )]
+    Size {
+        /// Along the flight, metres.
+        width: f64,
+        /// Upwards, metres.
+        height: f64,
+    },
+    /// The odometry did not start or gave up.
+    #[error(
+        "the odometry did not come to an end ({0:?}): the surface may be too plain to be followed; paint it without --scan"
+    )]
+    Lost(Status),
+    /// The sensors' simulation or the odometry refused.
+    #[error("odometry: {0}")]
+    Odometry(#[from] vio_ekf::Error),
+    /// The map refused.
+    #[error("map: {0}")]
+    Map(#[from] tsdf_hash::Error),
+    /// The renderer refused.
+    #[error("camera: {0}")]
+    Camera(#[from] paint_sim::Error),
+}
+
+impl Survey {
+    /// Flies along `mesh` (metres, z up), which the robot only sees through its sensors.
+    ///
+    /// The robot starts at rest at a place that is known, as at a charging station: position and heading of the first
+    /// estimate are set to the truth. Everything after that is its own.
+    pub fn fly(mesh: &TriangleMesh, seed: u64, threads: usize) -> Result<Self, SurveyError> {
+        let stage = Stage::start("survey");
+        let surface = TriangleSurface::new(&mesh.positions, &mesh.faces)?;
+        let route = flight::along(mesh)?;
+        let eyes = Eyes::new(mesh, &surface, route.towards, seed, threads);
+        let camera = eyes.camera;
+        let simulation = inertial(route.spline, seed)?;
+        let mut samples = simulation.imu(0)?.samples.into_iter().peekable();
+        let mut vio = Vio::new(camera, ImuNoise::default(), vio_ekf::Settings::default())?;
+        let mut map = Map::new(tsdf_hash::Settings { voxel_size: VOXEL, threads, ..tsdf_hash::Settings::default() })?;
+
+        let mut world_from_start = None;
+        let (mut flown, mut estimated) = (Trajectory::default(), Trajectory::default());
+        let (first, last) = simulation.spline().span();
+        let count = (last.secs_since(first) * FRAMES_PER_SECOND) as usize;
+        for k in 1..count {
+            let stamp = Stamp::from_nanos(first.nanos() + (k as f64 * 1e9 / FRAMES_PER_SECOND) as i64);
+            while let Some(sample) = samples.next_if(|sample| sample.stamp <= stamp) {
+                vio.imu(&sample)?;
+            }
+            let truth = simulation.motion(stamp)?.world_from_body;
+            let shot = eyes.look(k, &(truth * camera.body_from_camera))?;
+            let report = vio.image(stamp, &shot.grey())?;
+            let (Status::Tracking, Some(odometry)) = (report.status, vio.output()) else { continue };
+            let world_from_start =
+                *world_from_start.get_or_insert_with(|| same_place_and_heading(&odometry.world_from_body, &truth));
+            let pose = world_from_start * odometry.world_from_body;
+            flown.push(stamp, truth)?;
+            estimated.push(stamp, pose)?;
+            if k % FUSE_EVERY == 0 {
+                let data = DepthData::F32 { data: &shot.depth };
+                let view =
+                    DepthView { width: camera.width, height: camera.height, data, intrinsics: eyes.intrinsics() };
+                match map.integrate(&view, None, &(pose * camera.body_from_camera)) {
+                    // Past the edge of the surface there is nothing to fuse.
+                    Ok(_) | Err(tsdf_hash::Error::NoDepth { .. }) => {}
+                    Err(error) => return Err(error.into()),
+                }
+            }
+            stage.share(k as f64 / count as f64);
+        }
+        if vio.status() != Status::Tracking {
+            return Err(SurveyError::Lost(vio.status()));
+        }
+        let mapped = map.mesh();
+        let scanned = TriangleMesh { positions: mapped.positions, faces: mapped.faces, ..TriangleMesh::default() };
+        let figures = judge::figures(&surface, mesh, &scanned, &flown, &estimated)?;
+        stage.done(&figures.summary());
+        Ok(Self { mesh: scanned, figures, flown, estimated })
+    }
+}
+
+/// The inertial sensor along the flight.
+fn inertial(spline: vio_ekf::Spline, seed: u64) -> Result<Simulation, vio_ekf::Error> {
+    // The cameras look at the surface, not at the simulator's own room.
+    let room = RoomSettings { texture_size: 64, furniture: 0, ..RoomSettings::default() };
+    Simulation::new(spline, Scenario { seed, cameras: Vec::new(), room, ..Scenario::default() })
+}
+
+/// The turn about the vertical and the shift that bring `from` to the place and heading of `to`.
+fn same_place_and_heading(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Isometry3<f64> {
+    let turn = (to.rotation * from.rotation.inverse()).to_rotation_matrix();
+    let yaw = (turn[(1, 0)] - turn[(0, 1)]).atan2(turn[(0, 0)] + turn[(1, 1)]);
+    let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw);
+    Isometry3::from_parts((to.translation.vector - rotation * from.translation.vector).into(), rotation)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn heading_and_place_are_taken_over_and_the_vertical_is_not() {
+        let from = Isometry3::new(Vector3::new(1.0, 2.0, 3.0), Vector3::new(0.1, 0.0, 0.4));
+        let yaw = Isometry3::new(Vector3::new(-4.0, 0.3, 1.0), Vector3::new(0.0, 0.0, 2.1));
+        assert!((same_place_and_heading(&from, &(yaw * from)).to_matrix() - yaw.to_matrix()).norm() < 1e-12);
+        let tilted = Isometry3::new(Vector3::zeros(), Vector3::new(0.2, 0.0, 0.0)) * from;
+        let found = same_place_and_heading(&from, &tilted);
+        assert!((found.rotation * Vector3::z() - Vector3::z()).norm() < 1e-12);
+        assert!(((found * from).translation.vector - tilted.translation.vector).norm() < 1e-12);
+    }
+}

@@ -1,0 +1,140 @@
+//! The way of a scan: rows along the front of a surface, from rest to rest.
+
+use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use vio_ekf::{Spline, Stamp};
+
+use super::SurveyError;
+use crate::mesh_io::TriangleMesh;
+use crate::placing::mean_normal;
+
+/// Distance of the robot from the foremost point of the surface, metres.
+const STAND_OFF: f64 = 1.5;
+/// Distance between rows, metres: the camera sees twice that.
+const ROW: f64 = 0.8;
+/// The robot stays this far inside the edges, metres.
+const INSIDE: f64 = 0.4;
+/// Shortest row, metres: without motion there is no scale.
+const SHORTEST: f64 = 0.6;
+/// Lowest flight, metres.
+const LOWEST: f64 = 0.4;
+/// Top speed, m/s.
+const SPEED: f64 = 1.2;
+/// Shortest time between two turns, seconds.
+const LEAST_LEG: f64 = 1.5;
+/// Rest before take-off, in which the odometry starts, seconds.
+const REST: f64 = 2.5;
+/// The robot looks left and right on its way: angle (rad) and period (s). Grooves are seen from both sides.
+const SWAY: (f64, f64) = (0.2, 5.0);
+/// Knots of the spline per second.
+const KNOTS_PER_SECOND: f64 = 10.0;
+/// A surface has a front if its mean normal is at least this long and level; a sphere's has no length.
+const FRONT: f64 = 0.4;
+
+/// A flight along a surface.
+pub(super) struct Route {
+    /// The motion of the body.
+    pub(super) spline: Spline,
+    /// Level unit vector from the robot towards the surface.
+    pub(super) towards: Vector3<f64>,
+}
+
+pub(super) fn along(mesh: &TriangleMesh) -> Result<Route, SurveyError> {
+    let front = front(mesh).ok_or(SurveyError::NoFront)?;
+    let up = Vector3::z();
+    let side = front.cross(&up);
+    let range = |axis: &Vector3<f64>| {
+        let along = mesh.positions.iter().map(|p| Vector3::from(p.map(f64::from)).dot(axis));
+        along.fold((f64::MAX, f64::MIN), |(low, high), a| (low.min(a), high.max(a)))
+    };
+    let ((left, right), (bottom, top), (_, foremost)) = (range(&side), range(&up), range(&front));
+    let (width, height) = (right - left, top - bottom);
+    if !(0.5..=30.0).contains(&width) || !(0.5..=30.0).contains(&height) {
+        return Err(SurveyError::Size { width, height });
+    }
+    let middle = 0.5 * (left + right);
+    let half = (0.5 * width - INSIDE).max(0.5 * SHORTEST);
+    let rows = (height / ROW).ceil().max(2.0) as usize;
+    let corners: Vec<Vector3<f64>> = (0..rows)
+        .flat_map(|row| {
+            let level = (bottom + (row as f64 + 0.5) / rows as f64 * height).max(LOWEST);
+            let ends = if row % 2 == 0 { [-half, half] } else { [half, -half] };
+            ends.map(|end| side * (middle + end) + up * level + front * (foremost + STAND_OFF))
+        })
+        .collect();
+
+    let legs: Vec<f64> = corners.windows(2).map(|c| (1.875 * (c[1] - c[0]).norm() / SPEED).max(LEAST_LEG)).collect();
+    let duration = REST + legs.iter().sum::<f64>();
+    let heading =
+        UnitQuaternion::from_rotation_matrix(&Rotation3::from_basis_unchecked(&[-front, -front.cross(&-up), up]));
+    let knots = (0..=(duration * KNOTS_PER_SECOND).ceil() as usize + 3)
+        .map(|k| {
+            // The first knots lie before the start of the motion that they make.
+            let t = (k as f64 - 1.0) / KNOTS_PER_SECOND - REST;
+            let sway = SWAY.0 * (std::f64::consts::TAU * t.max(0.0) / SWAY.1).sin();
+            let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), sway) * heading;
+            Isometry3::from_parts(Translation3::from(place(&corners, &legs, t)), rotation)
+        })
+        .collect();
+    let spline = Spline::new(Stamp::from_nanos(0), (1e9 / KNOTS_PER_SECOND) as i64, knots)?;
+    Ok(Route { spline, towards: -front })
+}
+
+/// Where the way has come to after `t` seconds: each leg from rest to rest with the least jerk.
+fn place(corners: &[Vector3<f64>], legs: &[f64], mut t: f64) -> Vector3<f64> {
+    for (ends, &duration) in corners.windows(2).zip(legs) {
+        if t < duration {
+            let s = (t / duration).max(0.0);
+            return ends[0] + (ends[1] - ends[0]) * (s * s * s * (10.0 + s * (6.0 * s - 15.0)));
+        }
+        t -= duration;
+    }
+    corners[corners.len() - 1]
+}
+
+/// The level direction that a surface faces, unit length.
+fn front(mesh: &TriangleMesh) -> Option<Vector3<f64>> {
+    let facing = mean_normal(mesh);
+    let level = Vector3::new(facing.x, facing.y, 0.0);
+    (level.norm() >= FRONT).then(|| level.normalize())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::rock_wall;
+
+    #[test]
+    fn the_robot_keeps_its_distance_and_looks_at_the_wall() {
+        let mesh = rock_wall(1);
+        let route = along(&mesh).unwrap();
+        assert!((route.towards - Vector3::x()).norm() < 0.1);
+        let foremost = mesh.positions.iter().map(|p| f64::from(p[0])).fold(f64::MAX, f64::min);
+        let (first, last) = route.spline.span();
+        let mut seen = (f64::MAX, f64::MIN);
+        for k in 0..=1000 {
+            let t = first.nanos() + (last.nanos() - first.nanos()) / 1000 * k;
+            let pose = route.spline.sample(Stamp::from_nanos(t)).unwrap().world_from_body;
+            let p = pose.translation.vector;
+            assert!((foremost - p.x - STAND_OFF).abs() < 0.3 && p.z > 1.5 && p.z < 3.7);
+            assert!((pose * Vector3::x()).x > 0.9 && (pose * Vector3::z() - Vector3::z()).norm() < 1e-9);
+            seen = (seen.0.min(p.y), seen.1.max(p.y));
+        }
+        assert!(seen.1 - seen.0 > 3.5, "from end to end: {seen:?}");
+        let start = route.spline.sample(Stamp::from_secs(0.5).unwrap()).unwrap();
+        assert!(start.velocity_in_world.norm() < 1e-9, "the odometry starts at rest");
+    }
+
+    #[test]
+    fn what_cannot_be_flown_along_is_refused() {
+        let mut mesh = rock_wall(1);
+        for face in mesh.faces.clone() {
+            mesh.faces.push([face[0], face[2], face[1]]);
+        }
+        assert!(matches!(along(&mesh), Err(SurveyError::NoFront)));
+        let mut mesh = rock_wall(1);
+        for position in &mut mesh.positions {
+            *position = position.map(|c| 0.1 * c);
+        }
+        assert!(matches!(along(&mesh), Err(SurveyError::Size { .. })));
+    }
+}

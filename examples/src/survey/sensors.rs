@@ -1,0 +1,146 @@
+//! What the robot sees on its way: grey images of rough stone, and their depth.
+
+use nalgebra::{Isometry3, Matrix3, UnitQuaternion, UnitVector3, Vector3};
+use paint_net::procedural::{lattice, value_noise};
+use paint_sim::{Hit, Lights, Look, TriangleSurface, render};
+use tsdf_hash::Intrinsics;
+use vio_ekf::{Camera, Distortion, ImageView};
+
+use super::SurveyError;
+use crate::mesh_io::TriangleMesh;
+
+/// Images per second.
+pub(super) const FRAMES_PER_SECOND: f64 = 20.0;
+/// Size of an image and its focal length, pixels: half of the EuRoC vehicle's.
+const IMAGE: (usize, usize, f64) = (376, 240, 229.0);
+/// Standard deviation of a pixel's noise, grey levels.
+const GREY_NOISE: f64 = 2.0;
+/// Standard deviation of a depth at distance z: `a + b (z - 0.4)²`, metres (Nguyen, Izadi, Lovell 2012).
+const DEPTH_NOISE: [f64; 2] = [0.0012, 0.0019];
+/// (lattice spacing in metres, share of the contrast) of the stone's mottling, coarse to fine.
+const MOTTLES: [(f64, f64); 5] = [(0.35, 0.25), (0.12, 0.25), (0.05, 0.3), (0.025, 0.25), (0.012, 0.15)];
+
+/// The robot's camera, with the depth of every pixel, before a surface.
+pub(super) struct Eyes<'a> {
+    /// Lens, and place on the body.
+    pub(super) camera: Camera,
+    mesh: &'a TriangleMesh,
+    surface: &'a TriangleSurface,
+    lights: Lights,
+    seed: u64,
+    threads: usize,
+}
+
+/// One image.
+pub(super) struct Shot {
+    grey: Vec<u8>,
+    /// Along the optical axis, metres; 0 where there is nothing.
+    pub(super) depth: Vec<f32>,
+}
+
+impl Shot {
+    pub(super) fn grey(&self) -> ImageView<'_> {
+        ImageView { width: IMAGE.0, height: IMAGE.1, data: &self.grey }
+    }
+}
+
+impl<'a> Eyes<'a> {
+    /// `towards`: from the robot to the surface.
+    pub(super) fn new(
+        mesh: &'a TriangleMesh,
+        surface: &'a TriangleSurface,
+        towards: Vector3<f64>,
+        seed: u64,
+        threads: usize,
+    ) -> Self {
+        // Light from everywhere; the sun is behind the surface and costs no shadows.
+        let towards_sun = UnitVector3::new_normalize(towards);
+        let lights = Lights { towards_sun, sun: [0.0; 3], ambient: [1.0; 3], background: [0.2; 3] };
+        Self { camera: camera(), mesh, surface, lights, seed, threads }
+    }
+
+    pub(super) fn intrinsics(&self) -> Intrinsics {
+        let Camera { fx, fy, cx, cy, .. } = self.camera;
+        Intrinsics { fx, fy, cx, cy }
+    }
+
+    /// Image `index`, taken from a pose.
+    pub(super) fn look(&self, index: usize, world_from_camera: &Isometry3<f64>) -> Result<Shot, SurveyError> {
+        let Camera { width, height, fx, fy, cx, cy, .. } = self.camera;
+        let (width, height) = (width as u32, height as u32);
+        let camera = paint_sim::Camera { fx, fy, cx, cy, width, height, world_from_camera: *world_from_camera };
+        let stone = |hit: &Hit| Look { albedo: [self.stone(hit) as f32; 3], normal: hit.normal };
+        let mut frame = render(self.surface, &camera, &stone, &self.lights, 1, self.threads)?;
+        let grey = frame.colour.iter().enumerate().map(|(pixel, colour)| {
+            let noisy = f64::from(colour[0]) + GREY_NOISE * self.normal(2 * index, pixel);
+            noisy.round().clamp(0.0, 255.0) as u8
+        });
+        let grey = grey.collect();
+        for (pixel, depth) in frame.depth.iter_mut().enumerate().filter(|(_, depth)| **depth > 0.0) {
+            let z = f64::from(*depth);
+            let sigma = DEPTH_NOISE[0] + DEPTH_NOISE[1] * (z - 0.4) * (z - 0.4);
+            *depth = (z + sigma * self.normal(2 * index + 1, pixel)) as f32;
+        }
+        Ok(Shot { grey, depth: frame.depth })
+    }
+
+    /// Albedo of the stone: noise in the plane that the surface is most nearly in.
+    fn stone(&self, hit: &Hit) -> f64 {
+        let corners = self.mesh.faces[hit.face as usize].map(|i| self.mesh.positions[i as usize]);
+        let [u, v] = hit.barycentric;
+        let shares = [1.0 - u - v, u, v];
+        let p: Vector3<f64> =
+            corners.iter().zip(shares).map(|(c, share)| Vector3::from(c.map(f64::from)) * share).sum();
+        let (u, v) = match hit.normal.abs().imax() {
+            0 => (p.y, p.z),
+            1 => (p.x, p.z),
+            _ => (p.x, p.y),
+        };
+        let mottle = |(k, (spacing, share)): (usize, (f64, f64))| {
+            share * (value_noise(self.seed.wrapping_add(101 * k as u64), u / spacing, v / spacing) - 0.5)
+        };
+        (0.35 + MOTTLES.into_iter().enumerate().map(mottle).sum::<f64>()).clamp(0.02, 0.9)
+    }
+
+    /// A number of the standard normal distribution for a pixel of an image.
+    fn normal(&self, image: usize, pixel: usize) -> f64 {
+        let uniform = |half: i64| lattice(self.seed ^ 0x5EE5, image as i64, 2 * pixel as i64 + half);
+        (-2.0 * (1.0 - uniform(0)).ln()).sqrt() * (std::f64::consts::TAU * uniform(1)).cos()
+    }
+}
+
+/// Looks ahead along the body's x axis, z up.
+fn camera() -> Camera {
+    let (width, height, focal) = IMAGE;
+    let axes = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+    let rotation = UnitQuaternion::from_matrix(&axes);
+    Camera {
+        width,
+        height,
+        fx: focal,
+        fy: focal,
+        cx: (width as f64 - 1.0) / 2.0,
+        cy: (height as f64 - 1.0) / 2.0,
+        distortion: Distortion::None,
+        body_from_camera: Isometry3::from_parts(Vector3::new(0.12, 0.0, 0.02).into(), rotation),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Point3, Vector2};
+
+    use super::*;
+
+    #[test]
+    fn the_camera_looks_ahead_with_the_sky_above() {
+        let camera = camera();
+        let see = |point_in_body: Point3<f64>| {
+            camera.project(&(camera.body_from_camera.inverse() * point_in_body).coords).unwrap_or(Vector2::repeat(-1.0))
+        };
+        let ahead = see(Point3::new(3.0, 0.0, 0.02));
+        assert!((ahead - Vector2::new(187.5, 119.5)).norm() < 1e-9);
+        assert!(see(Point3::new(3.0, 0.5, 0.02)).x < ahead.x, "what is on the left is on the left");
+        assert!(see(Point3::new(3.0, 0.0, 0.5)).y < ahead.y, "what is above is above");
+    }
+}
