@@ -5,11 +5,12 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use paint_net::procedural::Texture;
-use paint_net::thesis::Shape;
+use paint_net::thesis::{Objective, Shape};
 use paint_net::train::{ThesisSettings, TrainSettings};
-use paint_net::{Limits, SprayKernel};
+use paint_net::{Image, Limits, SprayKernel};
 use paintcopter_examples::paint_image::{
-    Choice, Job, Lesson, Pictures, ThesisLesson, compare, learn, learn_thesis, pictures_in, print_table, read_ink,
+    Choice, Job, Lesson, Pictures, ThesisLesson, compare, equal_sprays, learn, learn_thesis, pictures_in,
+    print_equal_sprays, print_table, read_ink,
 };
 use paintcopter_examples::progress::Stage;
 
@@ -81,6 +82,14 @@ enum Command {
         #[command(flatten)]
         nozzle: Nozzle,
     },
+    /// Compares a trained thesis' network with other painters at its number of sprays
+    EqualSprays {
+        /// Weights: thesis.safetensors of a training with --preset thesis-paint
+        #[arg(long, value_name = "FILE")]
+        weights: PathBuf,
+        /// Folder or picture [default: five built-in textures of 128 x 128 pixels]
+        pictures: Option<PathBuf>,
+    },
     /// Trains a network: the feedback painter's, or the thesis' on digits or on procedural patches
     Train(Training),
 }
@@ -111,6 +120,9 @@ struct Training {
     /// Last learning rate, for the thesis' presets [default: the thesis']
     #[arg(long)]
     last_rate: Option<f64>,
+    /// Train the thesis' network as its algorithm is printed: the decision to paint on does not scale the volume
+    #[arg(long)]
+    as_printed: bool,
     /// Worker threads; the weights do not depend on it
     #[arg(long, default_value_t = 1)]
     threads: usize,
@@ -155,19 +167,28 @@ fn run(arguments: Arguments) -> Result<(), AnyError> {
             paint(&image, &job(arguments.painter, &arguments.nozzle)?, &arguments.out)
         }
         Some(Command::Compare { pictures, runs, nozzle }) => {
-            let pictures = match pictures {
-                Some(path) => pictures_in(&path)?.iter().map(|p| read_ink(p)).collect::<Result<_, _>>()?,
-                None => Texture::ALL.map(|t| t.image(1000, 128)).to_vec(),
-            };
+            let pictures = pictures_or_textures(pictures)?;
             print!("{}", print_table(&compare(&job(PainterName::Feedback, &nozzle)?, &pictures, runs)?));
+            Ok(())
+        }
+        Some(Command::EqualSprays { weights, pictures }) => {
+            print!("{}", print_equal_sprays(&equal_sprays(&weights, &pictures_or_textures(pictures)?)?));
             Ok(())
         }
         Some(Command::Train(training)) => train(training),
     }
 }
 
+fn pictures_or_textures(pictures: Option<PathBuf>) -> Result<Vec<Image>, AnyError> {
+    Ok(match pictures {
+        Some(path) => pictures_in(&path)?.iter().map(|p| read_ink(p)).collect::<Result<_, _>>()?,
+        None => Texture::ALL.map(|t| t.image(1000, 128)).to_vec(),
+    })
+}
+
 fn train(training: Training) -> Result<(), AnyError> {
-    let Training { preset, data, seed, steps, until, batch, rate, last_rate, threads, resume, out } = training;
+    let Training { preset, data, seed, steps, until, batch, rate, last_rate, as_printed, threads, resume, out } =
+        training;
     create(&out)?;
     let (shape, pictures) = match preset {
         Preset::Painter => {
@@ -197,6 +218,7 @@ fn train(training: Training) -> Result<(), AnyError> {
         batch: batch.unwrap_or(preset.batch),
         learning_rate: rate.unwrap_or(preset.learning_rate),
         last_learning_rate: last_rate.unwrap_or(preset.last_learning_rate),
+        objective: Objective { gated: !as_printed, ..preset.objective },
         ..preset
     };
     learn_thesis(&ThesisLesson { settings, pictures, resume, until, save_every: 100 }, &out)?;
