@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use paint_net::procedural::Texture;
 use paint_net::{
-    Coats, Deconvolution, Feedback, Image, Limits, MatchingPursuit, Painter, Painting, Saturation, SlewLimited, Spray,
-    SprayKernel, Task, metrics, slew_violations,
+    Coats, Deconvolution, Feedback, FreeSplats, Image, Limits, MatchingPursuit, Painter, Painting, Route, Saturation,
+    SlewLimited, Spray, SprayKernel, Task, metrics, slew_violations,
 };
 use paintcopter_examples::paint_image::{pictures_in, read_ink};
 use serde_json::{Value, json};
@@ -55,11 +55,23 @@ pub fn run(images: &[PathBuf], size: usize, runs: usize) -> Result<(), Box<dyn E
         for (method, painter) in &painters {
             print(method.clone(), measure(&**painter, wanted, &kernel, &Limits::default(), runs)?);
         }
-        for (limit, along) in [(0.05, 2), (0.02, 2), (0.05, 1), (0.02, 1)] {
-            let (figures, violations) = limited(&feedback, wanted, &kernel, limit, along)?;
-            let mut figures = figures;
-            figures["violations"] = json!(violations);
-            print(format!("slew{limit}_every{along}px"), figures);
+        // Splats are not cut, as the peers have it; and with the cut nozzle.
+        for sprays in [400, 1600] {
+            let splats = FreeSplats { sprays, ..FreeSplats::default() };
+            let whole = SprayKernel::new(2.0, 6.0)?;
+            print(format!("splats_{sprays}"), measure(&splats, wanted, &whole, &Limits::default(), runs)?);
+            print(format!("splats_{sprays}_cut"), measure(&splats, wanted, &kernel, &Limits::default(), 1)?);
+        }
+        for (limit, along, route) in [
+            (0.05, 2, Route::Rows),
+            (0.02, 2, Route::Rows),
+            (0.05, 2, Route::Alike),
+            (0.02, 2, Route::Alike),
+            (0.05, 1, Route::Rows),
+            (0.02, 1, Route::Rows),
+        ] {
+            let name = format!("slew{limit}_every{along}px_{route:?}").to_lowercase();
+            print(name, limited(&feedback, wanted, &kernel, (limit, along, route))?);
         }
         for (method, gain, painter) in [
             ("noise_open", 1.0, None),
@@ -103,9 +115,8 @@ fn limited(
     feedback: &Feedback,
     wanted: &Image,
     kernel: &SprayKernel,
-    share: f64,
-    along: usize,
-) -> Result<(Value, usize), paint_net::Error> {
+    (share, along, route): (f64, usize, Route),
+) -> Result<Value, paint_net::Error> {
     let task = Task::on_bare_wall(wanted);
     let limits = Limits { along, ..Limits::default() };
     let free = feedback.paint(&task, kernel, &Saturation::Tanh, &limits, &mut |_| ())?;
@@ -114,12 +125,15 @@ fn limited(
     volumes.resize(columns * rows, 0.0);
     volumes.sort_unstable_by(f64::total_cmp);
     let top = 1.5 * volumes[(0.99 * (volumes.len() - 1) as f64) as usize];
-    let painter = SlewLimited::new(feedback.clone(), share * top);
+    let painter = SlewLimited { route, ..SlewLimited::new(feedback, share * top) };
     let limits = Limits { max_volume: top, ..limits };
-    let painting = painter.paint(&task, kernel, &Saturation::Tanh, &limits, &mut |_| ())?;
-    let size = (wanted.width(), wanted.height());
-    let violations = slew_violations(&painting.sprays, size, &limits, share * top);
-    Ok((quality(&painting, wanted)?, violations))
+    let run = || painter.fly(&task, kernel, &Saturation::Tanh, &limits, &mut |_| ());
+    let (waypoints, painting) = run()?;
+    let mut figures = quality(&painting, wanted)?;
+    figures["violations"] = json!(slew_violations(&waypoints, share * top));
+    figures["waypoints"] = json!(waypoints.len());
+    figures["cpu_s"] = json!(median_seconds(1, run));
+    Ok(figures)
 }
 
 /// Sprays with noise: all at once without looking, or in coats.

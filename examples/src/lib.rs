@@ -16,4 +16,5 @@ pub mod scan;
 pub mod surface;
 pub mod survey;
 pub mod targets;
+pub mod vio;
 pub mod world;

@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use paint_net::{
-    Coats, Deconvolution, Error, Feedback, Image, Limits, MatchingPursuit, Painter, Painting, Saturation, SlewLimited,
-    SprayKernel, Task, metrics, slew_violations,
+    Coats, Deconvolution, Error, Feedback, FreeSplats, Image, Limits, MatchingPursuit, Painter, Painting, Route,
+    Saturation, SlewLimited, SprayKernel, Task, metrics, slew_violations,
 };
 use serde::Serialize;
 
@@ -30,11 +30,13 @@ pub enum Choice {
     Deconvolution,
     /// Greedy matching pursuit.
     Pursuit,
+    /// Few sprays at free places, of free spreads.
+    Splats,
 }
 
 impl Choice {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Feedback, Self::Coats, Self::Deconvolution, Self::Pursuit];
+    pub const ALL: [Self; 5] = [Self::Feedback, Self::Coats, Self::Deconvolution, Self::Pursuit, Self::Splats];
 }
 
 /// How a picture is painted.
@@ -50,6 +52,8 @@ pub struct Job {
     pub limits: Limits,
     /// Largest change of volume from one cell of the path to the next; `None` for any.
     pub largest_change: Option<f64>,
+    /// The path for which that holds.
+    pub route: Route,
     /// Threads of the network.
     pub threads: usize,
 }
@@ -124,30 +128,37 @@ impl Job {
             Choice::Coats => Box::new(Coats::new(feedback()?)),
             Choice::Deconvolution => Box::new(Deconvolution::default()),
             Choice::Pursuit => Box::new(MatchingPursuit::default()),
+            Choice::Splats => Box::new(FreeSplats {
+                sprays: self.limits.max_sprays.unwrap_or(FreeSplats::default().sprays),
+                ..FreeSplats::default()
+            }),
         };
-        Ok(match self.largest_change {
-            Some(most) => Box::new(SlewLimited::new(painter, most)),
-            None => painter,
-        })
+        Ok(painter)
     }
 
     /// Decides the sprays for a wanted picture of ink.
     pub fn paint(&self, wanted: &Image, progress: &mut dyn FnMut(f64)) -> Result<(Painting, Figures), PaintImageError> {
         let painter = self.painter()?;
+        let name = painter.name();
         let clock = Clock::start(self.threads);
         let task = Task::on_bare_wall(wanted);
-        let painting = painter.paint(&task, &self.kernel, &Saturation::Tanh, &self.limits, progress)?;
+        let (kernel, ink, limits) = (&self.kernel, &Saturation::Tanh, &self.limits);
+        let (painting, slew_violations) = match self.largest_change {
+            None => (painter.paint(&task, kernel, ink, limits, progress)?, 0),
+            Some(most) => {
+                let slow = SlewLimited { route: self.route, ..SlewLimited::new(painter, most) };
+                let (waypoints, painting) = slow.fly(&task, kernel, ink, limits, progress)?;
+                (painting, slew_violations(&waypoints, most))
+            }
+        };
         let cpu_ms = clock.milliseconds();
         let passes = match self.painter {
             Choice::Feedback | Choice::Coats => self.passes,
-            Choice::Deconvolution | Choice::Pursuit => 0,
+            Choice::Deconvolution | Choice::Pursuit | Choice::Splats => 0,
         };
-        let size = (wanted.width(), wanted.height());
-        let slew_violations =
-            self.largest_change.map_or(0, |most| slew_violations(&painting.sprays, size, &self.limits, most));
         let small = wanted.width().min(wanted.height()) < 7;
         let figures = Figures {
-            painter: painter.name(),
+            painter: name,
             width: wanted.width(),
             height: wanted.height(),
             psnr_db: metrics::psnr(&painting.ink, wanted, None)?,
@@ -176,11 +187,10 @@ impl Job {
         painting: &Painting,
         figures: &Figures,
     ) -> Result<(), PaintImageError> {
-        let sigma = self.kernel.sigma();
-        let sprays: Vec<_> = painting.sprays.iter().map(|s| (s.x, s.y, s.volume, sigma, 0)).collect();
+        let sprays: Vec<_> = painting.sprays.iter().map(|s| (s.x, s.y, s.volume, s.sigma, 0)).collect();
         let model = serde_json::json!({
-            "ink": "tanh(sum of volume * exp(-d^2 / (2 sigma_px^2)))", "sigma_px": sigma,
-            "reach_px": self.kernel.radius(), "footprint": "cut to a square of 2 reach_px + 1 pixels",
+            "ink": "tanh(sum of volume * exp(-d^2 / (2 sigma_px^2)))", "cut_sigma": self.kernel.cut(),
+            "footprint": "pixels no more than cut_sigma * sigma_px away along each axis",
         });
         let commands = serde_json::json!({
             "width": wanted.width(), "height": wanted.height(), "spray_model": model, "paints": ["black"],

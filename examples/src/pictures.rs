@@ -2,6 +2,7 @@
 
 mod curves;
 mod error_map;
+mod paths;
 mod scene;
 
 use std::path::Path;
@@ -11,6 +12,7 @@ use plotters::style::{FontStyle, register_font};
 
 pub use curves::{Panel, save_curves};
 pub use error_map::save_error_map;
+pub use paths::{PathPanel, save_paths};
 pub use scene::{Polyline, Projection, Scene, save_scene};
 
 /// What is wrong with drawing or saving a picture.

@@ -42,7 +42,7 @@ fn a_picture_becomes_commands_pictures_and_figures() {
         image::LumaA([grey, if x < 20 { u16::MAX } else { 0 }])
     });
     picture.save(scratch.path("in.png")).unwrap();
-    for painter in ["feedback", "coats", "deconvolution", "pursuit"] {
+    for painter in ["feedback", "coats", "deconvolution", "pursuit", "splats"] {
         let out = scratch.path(painter);
         let output = run(&["--image", &scratch.path("in.png"), "--painter", painter, "--out", &out]);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -68,7 +68,9 @@ fn a_picture_becomes_commands_pictures_and_figures() {
         // The commands alone give the picture: rendered here by the definition.
         let depth = |x: f64, y: f64| -> f64 {
             let of = |s: &serde_json::Value, k: usize| s[k].as_f64().unwrap();
-            let near = |s: &&serde_json::Value| (of(s, 0) - x).abs() <= 4.0 && (of(s, 1) - y).abs() <= 4.0;
+            let near = |s: &&serde_json::Value| {
+                (of(s, 0) - x).abs() <= 2.0 * of(s, 3) && (of(s, 1) - y).abs() <= 2.0 * of(s, 3)
+            };
             let gauss = |s: &serde_json::Value| {
                 let squared = (of(s, 0) - x).powi(2) + (of(s, 1) - y).powi(2);
                 of(s, 2) * (-squared / (2.0 * of(s, 3).powi(2))).exp()
@@ -92,9 +94,15 @@ fn a_slow_valve_is_obeyed() {
         .unwrap();
     let out = scratch.path("out");
     let image = scratch.path("in.png");
-    let output = run(&["--image", &image, "--largest-change", "0.01", "--out", &out]);
-    assert!(output.status.success());
-    assert_eq!(json(&format!("{out}/report.json"))["slew_violations"], 0);
+    let mut quality = Vec::new();
+    for route in ["rows", "alike"] {
+        let output = run(&["--image", &image, "--largest-change", "0.01", "--route", route, "--out", &out]);
+        assert!(output.status.success());
+        let report = json(&format!("{out}/report.json"));
+        assert_eq!(report["slew_violations"], 0);
+        quality.push(report["psnr_db"].as_f64().unwrap());
+    }
+    assert!(quality[1] > quality[0] + 1.0, "an edge across the rows: {quality:?}");
 }
 
 #[test]

@@ -38,13 +38,15 @@
 //! | (ours) few sprays at free places, of free spreads | [`FreeSplats`] |
 //! | (ours) a network that looks at its canvas | [`Feedback`], [`Network`] |
 //! | (ours) coats, with a look at the wall after each | [`Coats`] |
-//! | (ours) a valve of limited speed | [`SlewLimited`] |
+//! | (ours) a valve of limited speed, and a path that suits it | [`SlewLimited`], [`Route`] |
+//! | (ours) several paints that mix (Kubelka-Munk) | [`Palette`], [`Coloured`] |
 //! | (ours) strokes a robot can fly | [`boustrophedon`] |
 //!
 //! Pixels: centres at integers, `x` = column, `y` = row, row 0 at the top. Lengths are in pixels, depths in the unit of the
 //! saturation curve. Every result is the same bytes for the same input.
 
 mod coats;
+mod coloured;
 mod deconvolution;
 mod error;
 mod feedback;
@@ -56,9 +58,11 @@ mod layers;
 pub mod metrics;
 mod network;
 mod painter;
+mod palette;
 pub mod procedural;
 mod projected_lbfgs;
 mod pursuit;
+mod route;
 mod saturation;
 mod slew;
 mod splats;
@@ -70,6 +74,7 @@ pub mod thesis;
 pub mod train;
 
 pub use coats::{Coated, Coats};
+pub use coloured::{ColourPainting, ColourTask, Coloured, Judge, Picture};
 pub use deconvolution::Deconvolution;
 pub use error::Error;
 pub use feedback::Feedback;
@@ -79,7 +84,9 @@ pub use kernel::SprayKernel;
 pub use layers::{Layered, Sharing, Steps};
 pub use network::{Network, Shape};
 pub use painter::{Limits, Painter, Painting, Spray, Task};
+pub use palette::{MOST_PAINTS, Paint, Palette};
 pub use pursuit::MatchingPursuit;
+pub use route::Route;
 pub use saturation::{MonotoneCurve, Saturation};
 pub use slew::{SlewLimited, slew_violations};
 pub use splats::FreeSplats;

@@ -20,6 +20,7 @@ pub(crate) use adjoint::Adjoint;
 pub(crate) use field::Field;
 pub(crate) use law::{Law, Scaled};
 pub(crate) use pass::Block;
+pub(crate) use planes::{BLOCK, Grid};
 pub(crate) use real::Real;
 pub use shape::Shape;
 pub(crate) use spread::Spread;

@@ -223,6 +223,19 @@ impl Board {
         Painting { sprays, canvas, ink }
     }
 
+    /// The volume of every cell; sprays that lie on none are left out.
+    pub(crate) fn volumes(&self, sprays: &[Spray]) -> Vec<f64> {
+        let (columns, rows) = (&self.footprints.columns, &self.footprints.rows);
+        let mut volumes = vec![0.0; self.footprints.cells()];
+        for s in sprays {
+            let (i, j) = (columns.binary_search(&(s.x as usize)), rows.binary_search(&(s.y as usize)));
+            if let (Ok(i), Ok(j)) = (i, j) {
+                volumes[j * columns.len() + i] += s.volume;
+            }
+        }
+        volumes
+    }
+
     /// The spray of a cell.
     pub(crate) fn spray(&self, cell: usize, volume: f64) -> Spray {
         let (columns, rows) = (&self.footprints.columns, &self.footprints.rows);

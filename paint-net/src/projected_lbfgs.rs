@@ -57,10 +57,10 @@ pub(crate) fn minimise(
                 trial[k] = (x[k] + step * direction[k]).clamp(0.0, ceiling[k]);
             }
             let trial_value = cost(&trial, &mut trial_gradient);
-            let predicted: f64 = (0..n).map(|k| gradient[k] * (trial[k] - x[k])).sum();
+            let s: Vec<f64> = trial.iter().zip(&*x).map(|(t, x)| t - x).collect();
+            let predicted = dot(&gradient, &s);
             if trial_value <= value + 1e-4 * predicted {
-                let s: Vec<f64> = (0..n).map(|k| trial[k] - x[k]).collect();
-                let y: Vec<f64> = (0..n).map(|k| trial_gradient[k] - gradient[k]).collect();
+                let y: Vec<f64> = trial_gradient.iter().zip(&gradient).map(|(t, g)| t - g).collect();
                 let curvature = dot(&s, &y);
                 if curvature > 1e-12 * dot(&y, &y).sqrt() * dot(&s, &s).sqrt() {
                     if history.len() == MEMORY {
@@ -88,21 +88,19 @@ pub(crate) fn minimise(
 
 /// `-H g` on the free variables, zero on the others.
 fn descent_direction(gradient: &[f64], free: &[bool], history: &[(Vec<f64>, Vec<f64>, f64)]) -> Vec<f64> {
-    let masked_dot = |a: &[f64], b: &[f64]| -> f64 {
-        a.iter().zip(b).zip(free).map(|((x, y), &f)| if f { x * y } else { 0.0 }).sum()
+    // 1 and 0 rather than a condition, so that the loops below run over whole blocks.
+    let mask: Vec<f64> = free.iter().map(|&f| f64::from(u8::from(f))).collect();
+    let mut q: Vec<f64> = gradient.iter().zip(&mask).map(|(g, m)| g * m).collect();
+    let add = |q: &mut [f64], weight: f64, other: &[f64]| {
+        q.iter_mut().zip(other).zip(&mask).for_each(|((q, o), m)| *q += weight * o * m);
     };
-    let mut q: Vec<f64> = gradient.iter().zip(free).map(|(&g, &f)| if f { g } else { 0.0 }).collect();
     let mut weights = Vec::with_capacity(history.len());
     for (s, y, _) in history.iter().rev() {
-        let rho = masked_dot(s, y);
+        let rho = masked_dot(s, y, &mask);
         // A pair whose curvature lies in variables that are now bound says nothing about the free ones.
-        let weight = if rho > 1e-300 { masked_dot(s, &q) / rho } else { 0.0 };
-        for k in 0..q.len() {
-            if free[k] {
-                q[k] -= weight * y[k];
-            }
-        }
-        weights.push(weight);
+        let weight = if rho > 1e-300 { dot(s, &q) / rho } else { 0.0 };
+        add(&mut q, -weight, y);
+        weights.push((rho, weight));
     }
     if let Some((_, y, curvature)) = history.last() {
         let scale = curvature / dot(y, y).max(1e-300);
@@ -110,13 +108,10 @@ fn descent_direction(gradient: &[f64], free: &[bool], history: &[(Vec<f64>, Vec<
             *v *= scale;
         }
     }
-    for ((s, y, _), weight) in history.iter().zip(weights.into_iter().rev()) {
-        let rho = masked_dot(s, y);
-        let correction = if rho > 1e-300 { masked_dot(y, &q) / rho } else { weight };
-        for k in 0..q.len() {
-            if free[k] {
-                q[k] += (weight - correction) * s[k];
-            }
+    for ((s, y, _), (rho, weight)) in history.iter().zip(weights.into_iter().rev()) {
+        if rho > 1e-300 {
+            let correction = dot(y, &q) / rho;
+            add(&mut q, weight - correction, s);
         }
     }
     for v in &mut q {
@@ -125,8 +120,32 @@ fn descent_direction(gradient: &[f64], free: &[bool], history: &[(Vec<f64>, Vec<
     q
 }
 
+/// Sums that run side by side: one alone would wait for itself at every step.
+const LANES: usize = 8;
+
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
+    let mut sums = [0.0; LANES];
+    let (a_blocks, b_blocks) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest: f64 = a_blocks.remainder().iter().zip(b_blocks.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in a_blocks.zip(b_blocks) {
+        for k in 0..LANES {
+            sums[k] += x[k] * y[k];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
+
+fn masked_dot(a: &[f64], b: &[f64], mask: &[f64]) -> f64 {
+    let mut sums = [0.0; LANES];
+    let blocks = a.chunks_exact(LANES).zip(b.chunks_exact(LANES)).zip(mask.chunks_exact(LANES));
+    for ((x, y), m) in blocks {
+        for k in 0..LANES {
+            sums[k] += x[k] * y[k] * m[k];
+        }
+    }
+    let done = a.len() / LANES * LANES;
+    let rest: f64 = (done..a.len()).map(|k| a[k] * b[k] * mask[k]).sum();
+    sums.iter().sum::<f64>() + rest
 }
 
 #[cfg(test)]

@@ -1,50 +1,89 @@
 use crate::deconvolution::ink_cost;
 use crate::error::{Error, require};
-use crate::footprints::cells;
 use crate::image::Image;
 use crate::kernel::SprayKernel;
 use crate::painter::{Board, Limits, Painter, Painting, Spray, Task};
 use crate::projected_lbfgs::{Stop, minimise};
+use crate::route::Route;
 use crate::saturation::Saturation;
 
-/// Volumes that a valve of limited speed can follow: along the path over all cells, row by row and every other row
-/// backwards, the volume changes by at most `largest_change` from one cell to the next. Ours.
+/// Volumes that a valve of limited speed can follow: along a path over all cells the volume changes by at most
+/// `largest_change` from one cell to the next. Ours.
 ///
 /// Starts from a painter's plan and minimises
 ///
 /// ```text
-/// ½ Σ w (f(c₀ + G v) - y)²  +  ρ/2 Σ_k max(0, |v_k - v_{k-1}| - L)²,    0 ≤ v ≤ v_max
+/// ½ Σ w (f(c₀ + G v) - y)²    subject to  |v_k - v_{k-1}| ≤ L,  0 ≤ v ≤ v_max
 /// ```
 ///
-/// for rising `ρ`; what still changes too fast in the end is cut down to the largest sequence below it that does not. A
-/// finer grid along the rows gives the valve more time per pixel: half the distance between cells, twice the slope.
+/// by augmented Lagrangians (Hestenes 1969, Powell 1969; for bounds on both sides Rockafellar 1973): the limit costs
+/// `ρ/2 dist(v_k - v_{k-1} + λ_k/ρ, [-L, L])²`, and after each round the prices `λ` take over what the limit still gives. What
+/// changes too fast in the end, by a percent or so, is cut down to the largest sequence below it that does not.
+///
+/// Volumes on a path that follows what is alike ([`Route::Alike`]) can change more slowly; which cells are alike is known better
+/// once the volumes are: the path is laid three times. A finer grid along the path gives the valve more time per pixel as well.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SlewLimited<P> {
     /// Who plans without the limit.
     pub painter: P,
     /// Largest change of volume from one cell of the path to the next.
     pub largest_change: f64,
-    /// Iterations for each `ρ`.
+    /// The path over the cells. Default row by row.
+    pub route: Route,
+    /// Iterations of each round. Default 30, ours.
     pub iterations: usize,
 }
 
-/// Rising weights of the limit, for inks in `[0, 1]` and volumes of that order.
-const WEIGHTS: [f64; 5] = [0.1, 1.0, 10.0, 100.0, 1000.0];
+/// Rounds of prices, and the weight `ρ` of the first and its growth, for inks in `[0, 1]` and volumes of that order.
+const ROUNDS: usize = 14;
+const FIRST_WEIGHT: f64 = 1.0;
+const GROWTH: f64 = 1.5;
+/// How often a path that follows the volumes is laid.
+const PATHS: usize = 3;
 
 impl<P: Painter> SlewLimited<P> {
-    /// 60 iterations for each of the five weights (ours).
+    /// Row by row, 30 iterations per round.
     pub fn new(painter: P, largest_change: f64) -> Self {
-        Self { painter, largest_change, iterations: 60 }
+        Self { painter, largest_change, route: Route::Rows, iterations: 30 }
+    }
+
+    /// The cells in flying order, those where the valve is shut (volume 0) included, and what is painted.
+    pub fn fly(
+        &self,
+        task: &Task,
+        kernel: &SprayKernel,
+        saturation: &Saturation,
+        limits: &Limits,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<(Vec<Spray>, Painting), Error> {
+        let limit = self.largest_change;
+        require("largest_change", limit, limit > 0.0 && limit.is_finite(), "it must be positive and finite")?;
+        let board = Board::new(task, kernel, saturation, limits)?;
+        let plan = self.painter.paint(task, kernel, saturation, limits, &mut |share| progress(0.3 * share))?;
+        let mut volumes = board.volumes(&plan.sprays);
+        let laps = if self.route == Route::Rows { 1 } else { PATHS };
+        let (columns, rows) = (board.footprints.columns.len(), board.footprints.rows.len());
+        let mut path = Vec::new();
+        for lap in 0..laps {
+            path = self.route.path(columns, rows, &volumes);
+            let valve = Valve { task, board: &board, saturation, path: &path, limit };
+            valve.slow(&mut volumes, self.iterations, &mut |share| {
+                progress(0.3 + 0.7 * (lap as f64 + share) / laps as f64);
+            });
+        }
+        envelope(&path, &mut volumes, limit);
+        progress(1.0);
+        let waypoints: Vec<Spray> = path.iter().map(|&cell| board.spray(cell, volumes[cell])).collect();
+        let canvas = board.canvas(&volumes);
+        let ink: Image = canvas.map(|c| saturation.forward(c));
+        let sprays = waypoints.iter().copied().filter(|s| s.volume > 0.0).collect();
+        Ok((waypoints, Painting { sprays, canvas, ink }))
     }
 }
 
-/// How often the volume changes by more than `largest_change` from one cell of the path to the next, cells without a spray
-/// included. `size`: columns and rows of the picture. Sprays that lie on no cell of the grid of `limits` are left out.
-pub fn slew_violations(sprays: &[Spray], size: (usize, usize), limits: &Limits, largest_change: f64) -> usize {
-    let (columns, rows) = (cells(size.0, limits.along), cells(size.1, limits.row_spacing));
-    let volumes = volumes_on(&columns, &rows, sprays);
-    let path = raster(columns.len(), rows.len());
-    path.windows(2).filter(|p| (volumes[p[1]] - volumes[p[0]]).abs() > largest_change).count()
+/// How often the volume changes by more than `largest_change` from one waypoint to the next.
+pub fn slew_violations(waypoints: &[Spray], largest_change: f64) -> usize {
+    waypoints.windows(2).filter(|p| (p[1].volume - p[0].volume).abs() > largest_change).count()
 }
 
 impl<P: Painter> Painter for SlewLimited<P> {
@@ -62,66 +101,60 @@ impl<P: Painter> Painter for SlewLimited<P> {
         limits: &Limits,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Painting, Error> {
-        let limit = self.largest_change;
-        require("largest_change", limit, limit > 0.0 && limit.is_finite(), "it must be positive and finite")?;
-        let board = Board::new(task, kernel, saturation, limits)?;
-        let plan = self.painter.paint(task, kernel, saturation, limits, &mut |share| progress(0.3 * share))?;
-        let columns = board.footprints.columns.len();
-        let path = raster(columns, board.footprints.rows.len());
-        let mut volumes = volumes_on(&board.footprints.columns, &board.footprints.rows, &plan.sprays);
-        let mut canvas = board.bare.data().to_vec();
-        for (round, weight) in WEIGHTS.into_iter().enumerate() {
+        self.fly(task, kernel, saturation, limits, progress).map(|(_, painting)| painting)
+    }
+}
+
+/// A path with a valve that follows it slowly.
+struct Valve<'a> {
+    task: &'a Task<'a>,
+    board: &'a Board,
+    saturation: &'a Saturation,
+    path: &'a [usize],
+    limit: f64,
+}
+
+impl Valve<'_> {
+    /// Slows the volumes down, nearly to the limit.
+    fn slow(&self, volumes: &mut Vec<f64>, iterations: usize, progress: &mut dyn FnMut(f64)) {
+        let mut canvas = self.board.bare.data().to_vec();
+        let mut prices = vec![0.0; self.path.len()];
+        let mut weight = FIRST_WEIGHT;
+        for round in 0..ROUNDS {
             let mut cost = |v: &[f64], gradient: &mut [f64]| {
-                canvas.copy_from_slice(board.bare.data());
-                board.footprints.add(v, &mut canvas);
-                let value = ink_cost(task, task.reference, saturation, &mut canvas);
-                board.footprints.gather(&canvas, gradient);
-                value + excess_cost(&path, v, limit, weight, gradient)
+                canvas.copy_from_slice(self.board.bare.data());
+                self.board.footprints.add(v, &mut canvas);
+                let value = ink_cost(self.task, self.task.reference, self.saturation, &mut canvas);
+                self.board.footprints.gather(&canvas, gradient);
+                value + self.excess_cost(v, weight, &prices, gradient)
             };
-            let stop = Stop { iterations: self.iterations, relative_decrease: 1e-6 };
-            minimise(&mut volumes, &board.ceiling, &stop, &mut cost, &mut |share| {
-                progress(0.3 + 0.7 * (round as f64 + share) / WEIGHTS.len() as f64);
-            });
-        }
-        envelope(&path, &mut volumes, limit);
-        progress(1.0);
-        let canvas = board.canvas(&volumes);
-        let ink: Image = canvas.map(|c| saturation.forward(c));
-        let sprays = path.iter().filter(|&&c| volumes[c] > 0.0).map(|&c| board.spray(c, volumes[c])).collect();
-        Ok(Painting { sprays, canvas, ink })
-    }
-}
-
-/// The volume of every cell.
-fn volumes_on(columns: &[usize], rows: &[usize], sprays: &[Spray]) -> Vec<f64> {
-    let mut volumes = vec![0.0; columns.len() * rows.len()];
-    for s in sprays {
-        let (i, j) = (columns.binary_search(&(s.x as usize)), rows.binary_search(&(s.y as usize)));
-        if let (Ok(i), Ok(j)) = (i, j) {
-            volumes[j * columns.len() + i] += s.volume;
+            let stop = Stop { iterations, relative_decrease: 1e-7 };
+            minimise(volumes, &self.board.ceiling, &stop, &mut cost, &mut |_| ());
+            for (price, pair) in prices.iter_mut().zip(self.path.windows(2)) {
+                *price = weight * self.excess(volumes, pair, *price / weight);
+            }
+            weight *= GROWTH;
+            progress((round + 1) as f64 / ROUNDS as f64);
         }
     }
-    volumes
-}
 
-/// Cells in the order of the path.
-fn raster(columns: usize, rows: usize) -> Vec<usize> {
-    (0..rows)
-        .flat_map(|j| (0..columns).map(move |i| j * columns + if j % 2 == 0 { i } else { columns - 1 - i }))
-        .collect()
-}
-
-/// `ρ/2 Σ max(0, |Δv| - L)²`; adds its derivative.
-fn excess_cost(path: &[usize], volumes: &[f64], limit: f64, weight: f64, gradient: &mut [f64]) -> f64 {
-    let mut value = 0.0;
-    for pair in path.windows(2) {
-        let change = volumes[pair[1]] - volumes[pair[0]];
-        let excess = (change.abs() - limit).max(0.0) * change.signum();
-        value += 0.5 * weight * excess * excess;
-        gradient[pair[1]] += weight * excess;
-        gradient[pair[0]] -= weight * excess;
+    /// How far a change, shifted, lies outside of the limit.
+    fn excess(&self, volumes: &[f64], pair: &[usize], shift: f64) -> f64 {
+        let change = volumes[pair[1]] - volumes[pair[0]] + shift;
+        change - change.clamp(-self.limit, self.limit)
     }
-    value
+
+    /// `ρ/2 Σ dist(Δv + λ/ρ, [-L, L])²`; adds its derivative.
+    fn excess_cost(&self, volumes: &[f64], weight: f64, prices: &[f64], gradient: &mut [f64]) -> f64 {
+        let mut value = 0.0;
+        for (pair, price) in self.path.windows(2).zip(prices) {
+            let excess = self.excess(volumes, pair, price / weight);
+            value += 0.5 * weight * excess * excess;
+            gradient[pair[1]] += weight * excess;
+            gradient[pair[0]] -= weight * excess;
+        }
+        value
+    }
 }
 
 /// The largest sequence below `volumes` that changes by no more than `limit`: once forwards, once back.
@@ -144,7 +177,7 @@ mod tests {
     #[test]
     fn the_envelope_is_the_largest_slow_sequence_below() {
         // In closed form: min_j v_j + L |k - j| along the path.
-        let path = raster(5, 4);
+        let path = Route::Rows.path(5, 4, &[]);
         assert_eq!(path[..8], [0, 1, 2, 3, 4, 9, 8, 7]);
         let volumes: Vec<f64> = (0..20).map(|k| lattice(1, k, 0)).collect();
         let mut found = volumes.clone();

@@ -3,8 +3,8 @@
 
 use paint_net::procedural::{Texture, lattice};
 use paint_net::{
-    Coats, Deconvolution, Error, Feedback, Image, Limits, Painter, Saturation, SlewLimited, Spray, SprayKernel, Task,
-    metrics, slew_violations,
+    Coats, Deconvolution, Error, Feedback, Image, Limits, Painter, Route, Saturation, SlewLimited, Spray, SprayKernel,
+    Task, metrics, slew_violations,
 };
 
 fn nozzle() -> SprayKernel {
@@ -122,8 +122,8 @@ fn the_valve_is_never_too_fast() {
     for (limit, along) in [(1.0, 2), (0.05, 2), (0.01, 2), (0.02, 1)] {
         let limits = Limits { along, max_volume: 1.0, ..Limits::default() };
         let painter = SlewLimited::new(Feedback::shipped().unwrap(), limit);
-        let painting = painter.paint(&task, &nozzle(), &Saturation::Tanh, &limits, &mut |_| ()).unwrap();
-        assert_eq!(slew_violations(&painting.sprays, (side, side), &limits, limit), 0, "limit {limit}");
+        let (waypoints, painting) = painter.fly(&task, &nozzle(), &Saturation::Tanh, &limits, &mut |_| ()).unwrap();
+        assert_eq!(slew_violations(&waypoints, limit), 0, "limit {limit}");
         // By the definition: every row of cells in turn, every other one backwards.
         let columns = side.div_ceil(along);
         let mut path = vec![0.0; columns * (side / 2)];
@@ -131,9 +131,10 @@ fn the_valve_is_never_too_fast() {
             let (i, j) = (s.x as usize / along, s.y as usize / 2);
             path[j * columns + if j % 2 == 0 { i } else { columns - 1 - i }] = s.volume;
         }
+        assert!(path.iter().copied().eq(waypoints.iter().map(|s| s.volume)));
         assert!(path.windows(2).all(|p| (p[1] - p[0]).abs() <= limit), "limit {limit}");
         let faster = path.windows(2).filter(|p| (p[1] - p[0]).abs() > 0.5 * limit).count();
-        assert_eq!(slew_violations(&painting.sprays, (side, side), &limits, 0.5 * limit), faster);
+        assert_eq!(slew_violations(&waypoints, 0.5 * limit), faster);
         let quality = metrics::psnr(&painting.ink, &wanted, None).unwrap();
         if along == 2 {
             assert!(quality < last, "{quality} dB with {limit}, {last} dB with more");
@@ -152,4 +153,62 @@ fn the_valve_is_never_too_fast() {
         );
         assert!(matches!(refused, Err(Error::InvalidSetting { name: "largest_change", .. })));
     }
+}
+
+#[test]
+fn a_path_along_what_is_alike_is_as_long_and_asks_less_of_the_valve() {
+    for (texture, width, height) in [(Texture::Worley, 48, 48), (Texture::Stripes, 46, 41)] {
+        let whole = texture.image(6, 48);
+        let wanted = Image::from_fn(width, height, |x, y| whole.at(x, y));
+        let task = Task::on_bare_wall(&wanted);
+        let limits = Limits { max_volume: 1.0, ..Limits::default() };
+        let fly = |route| {
+            let painter = SlewLimited { route, ..SlewLimited::new(Feedback::shipped().unwrap(), 0.02) };
+            let (waypoints, painting) = painter.fly(&task, &nozzle(), &Saturation::Tanh, &limits, &mut |_| ()).unwrap();
+            assert_eq!(slew_violations(&waypoints, 0.02), 0);
+            let length: f64 = waypoints.windows(2).map(|p| (p[1].x - p[0].x).hypot(p[1].y - p[0].y)).sum();
+            (waypoints.len(), length, metrics::psnr(&painting.ink, &wanted, None).unwrap())
+        };
+        let (rows, alike) = (fly(Route::Rows), fly(Route::Alike));
+        assert_eq!((rows.0, rows.1), (alike.0, alike.1));
+        assert!(alike.2 > rows.2 + 0.5, "{texture:?}: {} dB row by row, {} dB along what is alike", rows.2, alike.2);
+    }
+}
+
+/// The optimum under a slow valve, by the conditions it must meet: no feasible small change of the volumes lowers the error.
+#[test]
+fn volumes_under_a_slow_valve_are_nearly_optimal() {
+    let side = 24;
+    let wanted = Texture::Fbm.image(3, side);
+    let task = Task::on_bare_wall(&wanted);
+    let limits = Limits { max_volume: 1.0, ..Limits::default() };
+    let limit = 0.02;
+    let painter = SlewLimited { iterations: 100, ..SlewLimited::new(Deconvolution::default(), limit) };
+    let (waypoints, painting) = painter.fly(&task, &nozzle(), &Saturation::Tanh, &limits, &mut |_| ()).unwrap();
+    let best = metrics::psnr(&painting.ink, &wanted, None).unwrap();
+    let quality = |volumes: &[f64]| {
+        let mut canvas = Image::filled(side, side, 0.0);
+        for (s, &volume) in waypoints.iter().zip(volumes) {
+            nozzle().stamp(&Spray { volume, ..*s }, &mut canvas);
+        }
+        metrics::psnr(&canvas.map(f64::tanh), &wanted, None).unwrap()
+    };
+    let volumes: Vec<f64> = waypoints.iter().map(|s| s.volume).collect();
+    assert!((quality(&volumes) - best).abs() < 1e-9);
+    let (mut tried, mut better) = (0, 0.0_f64);
+    for k in 0..200 {
+        // A stretch of the path, a little more or a little less.
+        let of = |salt: i64| lattice(9, k, salt);
+        let first = (of(0) * volumes.len() as f64) as usize;
+        let end = (first + 1 + (of(1) * 40.0) as usize).min(volumes.len());
+        let mut other = volumes.clone();
+        other[first..end].iter_mut().for_each(|v| *v += 0.004 * (of(2) - 0.5));
+        let feasible =
+            other.iter().all(|v| (0.0..=1.0).contains(v)) && other.windows(2).all(|p| (p[1] - p[0]).abs() <= limit);
+        if feasible {
+            tried += 1;
+            better = better.max(quality(&other) - best);
+        }
+    }
+    assert!(tried > 20 && better < 2e-3, "{tried} changes tried, the best gained {better} dB");
 }

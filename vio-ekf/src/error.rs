@@ -143,6 +143,36 @@ pub enum Error {
         /// The time up to which nothing can change.
         now: Stamp,
     },
+    /// Inertial samples come at another rate than their calibration says.
+    #[error(
+        "the inertial samples come at {measured_hz:.1} Hz, the calibration says {claimed_hz:.1} Hz: check the unit of the \
+         stamps, or correct the rate"
+    )]
+    SampleRate {
+        /// One over the median time between samples.
+        measured_hz: f64,
+        /// What the calibration says.
+        claimed_hz: f64,
+    },
+    /// The accelerometer does not read gravity.
+    #[error(
+        "the accelerometer reads {force:.3} m/s² on average, gravity is {gravity:.2}: check its unit (m/s², not g) and scale"
+    )]
+    NoGravity {
+        /// Typical length of the specific force, m/s².
+        force: f64,
+        /// What was expected, m/s².
+        gravity: f64,
+    },
+    /// Accelerometer and gyroscope do not turn together.
+    #[error(
+        "gravity test: accelerometer and gyroscope have different axes; they would agree if the accelerometer's \
+         (x, y, z) were read as {hint}: check axes and signs of both sensors"
+    )]
+    SwappedAxes {
+        /// The assignment that fits.
+        hint: String,
+    },
     /// A covariance is not symmetric positive definite.
     #[error("{what} covariance {index} is not symmetric positive definite: check the filter, or its export")]
     NotPositiveDefinite {

@@ -4,6 +4,7 @@ mod bearing;
 pub(crate) mod covariance;
 mod detect;
 mod estimator;
+mod external;
 mod follower;
 pub(crate) mod history;
 mod images;
@@ -26,6 +27,7 @@ mod scout;
 mod settings;
 mod start;
 pub(crate) mod state;
+mod trust;
 pub(crate) mod update;
 
 use nalgebra::{Isometry3, SMatrix, Translation3, Unit, Vector2, Vector3};
@@ -37,6 +39,7 @@ pub use points::PointObservation;
 pub use rest::RestSettings;
 pub use settings::{CalibrationSettings, GateSettings, LandmarkSettings, LimitSettings, PatchSettings, Settings};
 pub use start::{Start, StartSigma};
+pub use trust::SensorSettings;
 
 use crate::{Camera, Error, Imu, ImuNoise, Stamp};
 use estimator::Estimator;
@@ -396,6 +399,10 @@ impl Vio {
     /// otherwise the number of landmarks lost on the way.
     fn expose(&mut self, stamp: Stamp, at_rest: bool) -> Result<Option<usize>, Error> {
         let Some(estimator) = &mut self.estimator else { return Ok(None) };
+        let clock = &self.settings.calibration;
+        if clock.stamp_jitter_s > 0.0 {
+            estimator.doubt_clock(clock.time_offset_s, clock.stamp_jitter_s);
+        }
         let time = later(stamp, estimator.state.time_offset);
         let anchor = estimator.history.anchor();
         if time <= anchor && estimator.history.is_new() {

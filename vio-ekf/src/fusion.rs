@@ -1,17 +1,21 @@
 //! Loosely coupled fusion: an inertial sensor, and poses that others have measured.
 
 mod belief;
+mod imu_pair;
 mod measurement;
 mod model;
 #[cfg(test)]
 mod model_tests;
 mod settings;
 mod timeline;
+mod unified;
 
 use nalgebra::{Isometry3, Matrix6, SMatrix, Translation3};
 
+pub use imu_pair::{ImuPair, ImuPairSettings};
 pub use measurement::PoseMeasurement;
 pub use settings::{AlignmentSettings, FusionSettings, MountSettings, PoseSource};
+pub use unified::{Tally, UnifiedSettings, UnifiedVio};
 
 use crate::error::invalid;
 use crate::filter::state::at;

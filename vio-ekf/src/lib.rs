@@ -37,6 +37,7 @@
 //! | bearing with a tangent basis | Hertzberg et al. 2013; Bloesch et al. 2017 | [`Bearing`] |
 //! | iterated update | Bell and Cathey 1993 | [`GateSettings`] |
 //! | start in motion | closed form of Martinelli 2014, refined: ours | [`MovingSettings`] |
+//! | axes and units of inertial samples | ours | [`check_samples`] |
 //! | one-call evaluation | ours | [`evaluate`] |
 //! | least-squares alignment | Umeyama 1991, Eqs. (40)-(42); Horn 1987 | [`align`] |
 //! | alignment of position and yaw | closed form, ours; Zhang and Scaramuzza 2018 for the choice of mode | [`Alignment::PosYaw`] |
@@ -59,10 +60,13 @@ mod format;
 mod fusion;
 mod lie;
 mod measurement;
+mod sanity;
 pub mod sim;
 mod spline;
 mod stamp;
 mod trajectory;
+#[cfg(feature = "tune")]
+pub mod tune;
 
 pub use camera::{Camera, Distortion};
 pub use error::Error;
@@ -76,16 +80,18 @@ pub use eval::stats::Stats;
 pub use eval::{Evaluation, EvaluationSettings, Segment, evaluate};
 pub use filter::{
     Bearing, Calibration, CalibrationSettings, CoreCovariance, Excess, FrameReport, GateSettings, LandmarkSettings,
-    LimitSettings, MovingSettings, Odometry, PatchSettings, PointObservation, RestSettings, Settings, Start,
-    StartSigma, Status, Vio, Waiting,
+    LimitSettings, MovingSettings, Odometry, PatchSettings, PointObservation, RestSettings, SensorSettings, Settings,
+    Start, StartSigma, Status, Vio, Waiting,
 };
 pub use format::{asl, calibration, euroc, kitti, tum};
 pub use fusion::{
-    AlignmentSettings, FusionSettings, MountSettings, PoseFusion, PoseMeasurement, PoseSource, SourceEstimate,
+    AlignmentSettings, FusionSettings, ImuPair, ImuPairSettings, MountSettings, PoseFusion, PoseMeasurement,
+    PoseSource, SourceEstimate, Tally, UnifiedSettings, UnifiedVio,
 };
 pub use lie::{se3, so3};
 pub use measurement::{ImageView, Imu, ImuNoise};
 pub use nalgebra;
+pub use sanity::{SampleFindings, check_samples};
 pub use spline::{Motion, Spline};
 pub use stamp::Stamp;
 pub use trajectory::{Trajectory, interpolate, path_lengths};

@@ -39,6 +39,8 @@ pub use room::{Cuboid, Occluder, Room, RoomSettings, Surface};
 pub use texture::Texture;
 
 use camera::Renderer;
+#[cfg(feature = "tune")]
+pub(crate) use rng::Rng;
 use rng::derive;
 
 use crate::error::invalid;

@@ -7,7 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use paint_net::procedural::Texture;
 use paint_net::thesis::{Objective, Shape};
 use paint_net::train::{ThesisSettings, TrainSettings};
-use paint_net::{Image, Limits, SprayKernel};
+use paint_net::{Image, Limits, Route, SprayKernel};
 use paintcopter_examples::paint_image::{
     Choice, Job, Lesson, Pictures, ThesisLesson, compare, equal_sprays, learn, learn_thesis, pictures_in,
     print_equal_sprays, print_table, read_ink,
@@ -62,6 +62,9 @@ struct Nozzle {
     /// Largest change of volume from one place of the path to the next [default: any]
     #[arg(long)]
     largest_change: Option<f64>,
+    /// Path for which that holds: row by row, or along what is alike
+    #[arg(long, default_value = "rows")]
+    route: RouteName,
     /// Looks of the network at its canvas
     #[arg(long, default_value_t = 6)]
     passes: usize,
@@ -147,6 +150,13 @@ enum PainterName {
     Coats,
     Deconvolution,
     Pursuit,
+    Splats,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum RouteName {
+    Rows,
+    Alike,
 }
 
 fn main() -> ExitCode {
@@ -232,6 +242,7 @@ fn job(painter: PainterName, nozzle: &Nozzle) -> Result<Job, AnyError> {
         PainterName::Coats => Choice::Coats,
         PainterName::Deconvolution => Choice::Deconvolution,
         PainterName::Pursuit => Choice::Pursuit,
+        PainterName::Splats => Choice::Splats,
     };
     let limits = Limits {
         along: nozzle.along,
@@ -247,6 +258,10 @@ fn job(painter: PainterName, nozzle: &Nozzle) -> Result<Job, AnyError> {
         kernel,
         limits,
         largest_change: nozzle.largest_change,
+        route: match nozzle.route {
+            RouteName::Rows => Route::Rows,
+            RouteName::Alike => Route::Alike,
+        },
         threads: nozzle.threads,
     })
 }

@@ -13,7 +13,7 @@ pub struct Panel<'a> {
 }
 
 /// Dark enough to read on white, apart for colour-blind readers too (Okabe and Ito's palette).
-const COLOURS: [RGBColor; 4] =
+pub(super) const COLOURS: [RGBColor; 4] =
     [RGBColor(0, 114, 178), RGBColor(213, 94, 0), RGBColor(0, 158, 115), RGBColor(204, 121, 167)];
 
 /// Draws the panels under each other over one horizontal axis and saves the picture.

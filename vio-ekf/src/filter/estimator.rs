@@ -12,7 +12,7 @@ use super::{Excess, Odometry, bearing::Bearing};
 use crate::{Camera, Imu, ImuNoise, Stamp};
 
 /// Most residuals of one update.
-const MAX_RESIDUALS: usize = 3;
+const MAX_RESIDUALS: usize = 6;
 
 /// A landmark whose inverse distance has a smaller relative deviation tells how far away new ones may be; 0.3 as in ROVIO.
 const WELL_KNOWN: f64 = 0.3;
@@ -68,7 +68,7 @@ impl Estimator {
         covariance.isolate(at::TIME_OFFSET, calibration.time_offset_sigma_s * calibration.time_offset_sigma_s);
         Self {
             rate: sample.gyro - state.gyro_bias,
-            history: History::new(sample, start.stamp, settings.history_samples),
+            history: History::new(sample, start.stamp, settings.history_samples).judging(settings.sensor),
             since: Interval::default(),
             noise,
             gravity: settings.gravity,
@@ -113,6 +113,12 @@ impl Estimator {
             self.covariance.isolate(row, rest.velocity_sigma * rest.velocity_sigma);
         }
         self.rate = Vector3::zeros();
+    }
+
+    /// Takes a new image's clock to be off by something of its own.
+    pub(crate) fn doubt_clock(&mut self, offset: f64, jitter: f64) {
+        self.state.time_offset = offset;
+        self.covariance.isolate(at::TIME_OFFSET, jitter * jitter);
     }
 
     /// Admits a small motion, an angle, that went unnoticed before the body was found to be at rest.

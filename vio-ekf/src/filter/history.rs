@@ -3,6 +3,7 @@ use std::collections::VecDeque;
 use nalgebra::Vector3;
 
 use super::interval::Interval;
+use super::trust::{SensorSettings, Trust};
 use crate::{Imu, ImuNoise, Stamp};
 
 /// The inertial samples since the anchor, so that an image that arrives late is used at its own time.
@@ -10,6 +11,11 @@ use crate::{Imu, ImuNoise, Stamp};
 pub(crate) struct History {
     /// Begins with the last sample at or before the anchor.
     samples: VecDeque<Imu>,
+    /// Of each sample, and what it is judged by; without settings the data sheet is believed.
+    trusts: VecDeque<Trust>,
+    sensor: Option<SensorSettings>,
+    /// The last two samples, the latest first.
+    recent: [Imu; 2],
     capacity: usize,
     anchor: Stamp,
     started: Stamp,
@@ -20,7 +26,14 @@ impl History {
     pub(crate) fn new(sample: Imu, anchor: Stamp, capacity: usize) -> Self {
         let mut samples = VecDeque::with_capacity(capacity);
         samples.push_back(sample);
-        Self { samples, capacity, anchor, started: anchor }
+        let mut trusts = VecDeque::with_capacity(capacity);
+        trusts.push_back(Trust::default());
+        Self { samples, trusts, sensor: None, recent: [sample; 2], capacity, anchor, started: anchor }
+    }
+
+    /// The same, but the samples are believed only as far as they deserve.
+    pub(crate) fn judging(self, sensor: SensorSettings) -> Self {
+        Self { sensor: Some(sensor), ..self }
     }
 
     /// Time of the anchor.
@@ -53,7 +66,19 @@ impl History {
     }
 
     pub(crate) fn push(&mut self, sample: Imu) {
+        let trust = self.sensor.map_or(Trust::default(), |sensor| {
+            self.trusts[self.trusts.len() - 1].after([&self.recent[0], &self.recent[1]], &sample, &sensor)
+        });
+        self.recent = [sample, self.recent[0]];
+        self.trusts.push_back(trust);
         self.samples.push_back(sample);
+    }
+
+    /// Densities of the white noise between two neighbours, the first of which has this index.
+    fn densities(&self, index: usize, noise: &ImuNoise) -> [[f64; 3]; 2] {
+        let Some(sensor) = &self.sensor else { return [[noise.gyro_density; 3], [noise.accel_density; 3]] };
+        let gap = self.samples[index + 1].stamp.secs_since(self.samples[index].stamp);
+        self.trusts[index + 1].densities(&self.trusts[index], noise, gap, sensor)
     }
 
     /// Moves the anchor forward and forgets what is before it.
@@ -61,6 +86,7 @@ impl History {
         self.anchor = anchor;
         while self.samples.len() > 1 && self.samples[1].stamp <= anchor {
             self.samples.pop_front();
+            self.trusts.pop_front();
         }
     }
 
@@ -104,17 +130,25 @@ impl History {
         noise: &ImuNoise,
     ) {
         let first = self.samples.partition_point(|sample| sample.stamp <= from).saturating_sub(1);
-        for (before, after) in self.samples.iter().skip(first).zip(self.samples.iter().skip(first + 1)) {
+        for index in first..self.samples.len() - 1 {
             if from >= until {
                 return;
             }
+            let (before, after) = (&self.samples[index], &self.samples[index + 1]);
             let to = after.stamp.min(until);
-            extend(interval, before, after, (from, to), biases, noise);
+            extend(interval, before, after, (from, to), biases, (noise, &self.densities(index, noise)));
             from = to;
         }
         if until > from {
             let last = self.latest();
-            extend(interval, last, last, (from, until), biases, noise);
+            extend(
+                interval,
+                last,
+                last,
+                (from, until),
+                biases,
+                (noise, &[[noise.gyro_density; 3], [noise.accel_density; 3]]),
+            );
         }
     }
 
@@ -124,7 +158,8 @@ impl History {
         let (before, after) = (&self.samples[count.saturating_sub(2)], &self.samples[count - 1]);
         let from = before.stamp.max(self.anchor);
         if after.stamp > from {
-            extend(interval, before, after, (from, after.stamp), biases, noise);
+            let densities = self.densities(count - 2, noise);
+            extend(interval, before, after, (from, after.stamp), biases, (noise, &densities));
         }
     }
 }
@@ -136,7 +171,7 @@ fn extend(
     after: &Imu,
     (from, to): (Stamp, Stamp),
     [gyro_bias, accel_bias]: &[Vector3<f64>; 2],
-    noise: &ImuNoise,
+    (noise, densities): (&ImuNoise, &[[f64; 3]; 2]),
 ) {
     let gap = after.stamp.secs_since(before.stamp);
     let dt = to.secs_since(from);
@@ -144,5 +179,5 @@ fn extend(
     let mean = |a: &Vector3<f64>, b: &Vector3<f64>, bias: &Vector3<f64>| a + (b - a) * fraction - bias;
     let rate = mean(&before.gyro, &after.gyro, gyro_bias);
     let force = mean(&before.accel, &after.accel, accel_bias);
-    interval.extend(&rate, &force, dt, noise);
+    interval.extend_shaken(&rate, &force, dt, noise, densities);
 }

@@ -70,7 +70,20 @@ pub(crate) struct StepNoise {
 
 impl Interval {
     /// Goes on by `dt` seconds with the mean rate and specific force of that time, biases removed.
+    #[cfg(test)]
     pub(crate) fn extend(&mut self, rate: &Vector3<f64>, force: &Vector3<f64>, dt: f64, noise: &ImuNoise) {
+        self.extend_shaken(rate, force, dt, noise, &[[noise.gyro_density; 3], [noise.accel_density; 3]]);
+    }
+
+    /// The same with white noise of another density on each axis of gyroscope and accelerometer.
+    pub(crate) fn extend_shaken(
+        &mut self,
+        rate: &Vector3<f64>,
+        force: &Vector3<f64>,
+        dt: f64,
+        noise: &ImuNoise,
+        densities: &[[f64; 3]; 2],
+    ) {
         let middle = (self.rotation * so3::exp(&(rate * (0.5 * dt)))).to_rotation_matrix().into_inner();
         let acceleration = middle * force;
 
@@ -91,9 +104,11 @@ impl Interval {
         self.covariance = self.covariance.transpose();
         advance(&mut self.covariance, &acceleration, dt);
         advance(&mut self.walk_covariance, &acceleration, dt);
-        let [gyro, accel] = [noise.gyro_density, noise.accel_density].map(|density| density * density / dt);
         let mut driven = by_bias;
-        scale(&mut driven, [0.5 * (gyro + self.walk[0]), 0.5 * (accel + self.walk[1])]);
+        for (k, mut column) in driven.column_iter_mut().enumerate() {
+            let density = densities[k / 3][k % 3];
+            column *= 0.5 * (density * density / dt + self.walk[k / 3]);
+        }
         let cross = (self.walk_covariance + driven) * by_bias.transpose();
         self.covariance += cross + cross.transpose();
         let mut walked = by_bias;

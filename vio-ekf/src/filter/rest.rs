@@ -9,6 +9,9 @@ use crate::{Imu, Stamp};
 const WATCHED: usize = 8;
 /// As many must agree.
 const ENOUGH: usize = 5;
+/// Samples are averaged over this before they are compared, s: the motors of a vehicle that stands shake it by several m/s²,
+/// but do not move it.
+const BLOCK_S: f64 = 0.1;
 
 /// When the body is taken to be at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,9 +19,10 @@ const ENOUGH: usize = 5;
 pub struct RestSettings {
     /// Least time without motion, s; 1 as in ROVIO. Infinite to switch all of it off.
     pub duration_s: f64,
-    /// Largest departure of a rate from the first one since the rest began, rad/s; 0.1, ROVIO's limit of the rate itself.
+    /// Largest departure of a rate, averaged over a tenth of a second, from the first one since the rest began, rad/s; ours
+    /// (ROVIO limits the rate itself, to 0.1).
     pub rate: f64,
-    /// Largest departure of a specific force from the first one, m/s²; 0.5 as in ROVIO.
+    /// Largest departure of a specific force, averaged likewise, from the first one, m/s²; 0.5 as in ROVIO.
     pub force: f64,
     /// Largest motion of the image since the rest began, pixels; ours. Half of it is taken as the standard deviation of what
     /// goes unnoticed, in the pose and in the mean rate.
@@ -74,8 +78,10 @@ impl Window {
 #[derive(Debug, Clone)]
 pub(crate) struct Rest {
     settings: RestSettings,
-    /// The first sample of this rest.
+    /// The mean of the first block of this rest, at the time of its first sample.
     first: Option<Imu>,
+    /// The block that is being averaged.
+    block: Option<Window>,
     /// Means that have not been used yet. Each sample is used once.
     window: Option<Window>,
     watched: Vec<(Vector2<f64>, Patch)>,
@@ -84,20 +90,30 @@ pub(crate) struct Rest {
 
 impl Rest {
     pub(crate) fn new(settings: RestSettings) -> Self {
-        Self { settings, first: None, window: None, watched: Vec::with_capacity(WATCHED), still: false }
+        Self { settings, first: None, block: None, window: None, watched: Vec::with_capacity(WATCHED), still: false }
     }
 
-    /// Takes a sample; one that departs from the first begins a new rest.
+    /// Takes a sample; a block that departs from the first begins a new rest.
     pub(crate) fn imu(&mut self, sample: &Imu) {
-        let same = |first: &Imu| {
-            (sample.gyro - first.gyro).amax() <= self.settings.rate
-                && (sample.accel - first.accel).amax() <= self.settings.force
+        let block = match &mut self.block {
+            Some(block) => {
+                block.add(sample);
+                *block
+            }
+            None => *self.block.insert(Window::new(sample)),
         };
-        if !self.first.as_ref().is_some_and(same) {
-            self.first = Some(*sample);
-            self.window = None;
-            self.watched.clear();
-            self.still = false;
+        if block.duration >= BLOCK_S {
+            self.block = None;
+            let same = |first: &Imu| {
+                (block.rate - first.gyro).amax() <= self.settings.rate
+                    && (block.force - first.accel).amax() <= self.settings.force
+            };
+            if !self.first.as_ref().is_some_and(same) {
+                self.first = Some(Imu { stamp: block.since, gyro: block.rate, accel: block.force });
+                self.window = None;
+                self.watched.clear();
+                self.still = false;
+            }
         }
         match &mut self.window {
             Some(window) => window.add(sample),

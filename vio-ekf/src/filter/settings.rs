@@ -1,5 +1,6 @@
 use super::moving::MovingSettings;
 use super::rest::RestSettings;
+use super::trust::SensorSettings;
 use crate::Error;
 use crate::error::{all_not_negative, invalid};
 
@@ -11,6 +12,8 @@ pub struct Settings {
     pub features: usize,
     /// Magnitude of gravity, m/s²; 9.81.
     pub gravity: f64,
+    /// How the inertial sensor may be worse than its data sheet.
+    pub sensor: SensorSettings,
     /// How well the camera's calibration is known.
     pub calibration: CalibrationSettings,
     /// What is assumed of landmarks.
@@ -34,6 +37,7 @@ impl Default for Settings {
         Self {
             features: 25,
             gravity: 9.81,
+            sensor: SensorSettings::default(),
             calibration: CalibrationSettings::default(),
             landmarks: LandmarkSettings::default(),
             patches: PatchSettings::default(),
@@ -58,6 +62,9 @@ pub struct CalibrationSettings {
     pub time_offset_s: f64,
     /// Its standard deviation, s; ours: 0.
     pub time_offset_sigma_s: f64,
+    /// Standard deviation of the stamp of each image, s; ours: 0. With it every image has an offset of its own, found with the
+    /// landmarks that it sees, and the mean offset is taken as known.
+    pub stamp_jitter_s: f64,
 }
 
 /// Priors and process noise of landmarks.
@@ -191,6 +198,9 @@ impl Settings {
             ("grey_sigma", self.patches.grey_sigma),
             ("unexplained", self.patches.unexplained),
             ("farthest", self.patches.farthest),
+            ("gyro_range", self.sensor.gyro_range),
+            ("accel_range", self.sensor.accel_range),
+            ("roughness", self.sensor.roughness),
         ] {
             if !(value > 0.0 && value.is_finite()) {
                 return Err(invalid(name, value, "must be positive"));
@@ -209,6 +219,7 @@ impl Settings {
             ("camera_position_sigma_m", self.calibration.camera_position_sigma_m),
             ("camera_attitude_sigma", self.calibration.camera_attitude_sigma),
             ("time_offset_sigma_s", self.calibration.time_offset_sigma_s),
+            ("stamp_jitter_s", self.calibration.stamp_jitter_s),
             ("pixel_sigma", self.patches.pixel_sigma),
             ("drift", self.patches.drift),
             ("score", self.patches.score),

@@ -48,6 +48,23 @@ impl PoseMeasurement {
         Self { source, stamp, source_from_sensor, information }
     }
 
+    /// The same knowledge as a pose of the body in the world, given where the world is in the source's frame and the sensor on
+    /// the body.
+    #[must_use]
+    pub fn of_body(&self, source_from_world: &Isometry3<f64>, body_from_sensor: &Isometry3<f64>) -> Self {
+        let world_from_body = source_from_world.inverse() * self.source_from_sensor * body_from_sensor.inverse();
+        // With A the world's attitude, e_p = A (δp − hat(R t) δθ) and e_θ = A δθ.
+        let rotation = source_from_world.rotation.to_rotation_matrix().into_inner();
+        let lever = world_from_body.rotation * body_from_sensor.translation.vector;
+        let mut jacobian = Matrix6::zeros();
+        jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
+        jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&-(rotation * lever.cross_matrix()));
+        jacobian.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotation);
+        let information = jacobian.transpose() * self.information * jacobian;
+        let information = (information + information.transpose()) * 0.5;
+        Self { source_from_sensor: world_from_body, information, ..*self }
+    }
+
     /// `W` with `WᵀW` the information: it turns the residual into one of unit covariance.
     pub(crate) fn whitener(&self) -> Result<Matrix6<f64>, Error> {
         if !is_finite(&self.source_from_sensor) {

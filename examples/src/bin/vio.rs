@@ -1,0 +1,298 @@
+//! Visual-inertial odometry from the command line: recordings of a camera and an inertial sensor become trajectories.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use paintcopter_examples::vio::{
+    Flight, Lessons, Overrides, RunSettings, SimulationSettings, Tuning, VioReport, compare, judge, open_euroc,
+    open_mcap, run, save, simulate, tune_noise,
+};
+use vio_ekf::sim::Scenario;
+use vio_ekf::tune::TuneSettings;
+use vio_ekf::{CalibrationSettings, Settings};
+
+type AnyError = Box<dyn std::error::Error>;
+
+/// Runs the visual-inertial filter over a recording: trajectory, figures and pictures.
+#[derive(Parser)]
+#[command(
+    version,
+    args_conflicts_with_subcommands = true,
+    after_help = "Examples:\n  vio --euroc recordings/MH_01_easy --out out/MH_01\n  vio sim --flight wall --mcap --out out/sim\n  \
+                  vio eval truth.tum estimate.tum"
+)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Option<Job>,
+    #[command(flatten)]
+    track: Track,
+}
+
+#[derive(Subcommand)]
+enum Job {
+    /// Renders a flight as an EuRoC folder that any odometry can run, and as MCAP
+    Sim(Sim),
+    /// Compares an estimated trajectory with a reference
+    Eval(Eval),
+    /// Finds the noise settings with which recordings are followed best
+    Tune(Tune),
+}
+
+#[derive(Args)]
+struct Track {
+    /// Folder in the layout of EuRoC/ASL: mav0/cam0, mav0/imu0 and, if known, the truth
+    #[arg(long, value_name = "DIR", conflicts_with = "mcap", required_unless_present = "mcap")]
+    euroc: Option<PathBuf>,
+    /// MCAP file with images, inertial samples and, unless given by files of Kalibr, calibration
+    #[arg(long, value_name = "FILE")]
+    mcap: Option<PathBuf>,
+    /// Kalibr's camera chain, instead of the recording's own calibration
+    #[arg(long, value_name = "YAML")]
+    cameras: Option<PathBuf>,
+    /// Kalibr's file of the inertial sensor, instead of the recording's own
+    #[arg(long, value_name = "YAML")]
+    imu: Option<PathBuf>,
+    /// True poses, TUM or EuRoC text, instead of the recording's own
+    #[arg(long, value_name = "FILE")]
+    truth: Option<PathBuf>,
+    /// Landmarks that are followed at once
+    #[arg(long, value_name = "NUMBER", default_value_t = 25)]
+    features: usize,
+    /// Estimate the camera's place and clock as well, starting from the calibration
+    #[arg(long)]
+    calibrate: bool,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/vio")]
+    out: PathBuf,
+    /// Worker threads [default: all cores]; results do not depend on it
+    #[arg(long)]
+    threads: Option<usize>,
+}
+
+#[derive(Args)]
+struct Sim {
+    /// The motion
+    #[arg(long, default_value = "room")]
+    flight: FlightName,
+    /// Fly along these poses instead, TUM or EuRoC text, smoothed
+    #[arg(long, value_name = "FILE", conflicts_with = "flight")]
+    trajectory: Option<PathBuf>,
+    /// Seconds of it at most
+    #[arg(long, default_value_t = 30.0)]
+    seconds: f64,
+    /// Write recording.mcap as well
+    #[arg(long)]
+    mcap: bool,
+    /// With pixels as they are, not as PNG
+    #[arg(long, requires = "mcap")]
+    raw: bool,
+    /// Seed of the room, the biases and the noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder for the recording
+    #[arg(long, value_name = "DIR", default_value = "out/vio-sim")]
+    out: PathBuf,
+    /// Worker threads [default: all cores]; results do not depend on it
+    #[arg(long)]
+    threads: Option<usize>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum FlightName {
+    /// Swaying and turning through a room
+    Room,
+    /// Rows along a wall, as a painting robot flies
+    Wall,
+}
+
+#[derive(Args)]
+struct Eval {
+    /// Reference, TUM or EuRoC text
+    reference: PathBuf,
+    /// Estimate, TUM or EuRoC text
+    estimate: PathBuf,
+    /// Folder for report.json as well
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+#[derive(Args)]
+struct Tune {
+    /// A recording with its truth, EuRoC/ASL; may be given again. Without any: simulated flights
+    #[arg(long, value_name = "DIR")]
+    euroc: Vec<PathBuf>,
+    /// Simulated flights
+    #[arg(long, default_value_t = 4, conflicts_with = "euroc")]
+    flights: usize,
+    /// Seconds of each
+    #[arg(long, default_value_t = 12.0, conflicts_with = "euroc")]
+    seconds: f64,
+    /// Factors on the noise to start from: the gyroscope's white noise and walk, the accelerometer's, and the images'
+    #[arg(long, value_name = "FACTORS", value_delimiter = ',', default_value = "1,1,1,1,1")]
+    start: Vec<f64>,
+    /// Evaluations at most
+    #[arg(long, default_value_t = 200)]
+    evaluations: usize,
+    /// How much dishonest covariances cost beside errors
+    #[arg(long, value_name = "WEIGHT", default_value_t = 0.5)]
+    honesty: f64,
+    /// Compare with so many points drawn at random
+    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
+    random: usize,
+    /// Go on from trials.csv in the folder
+    #[arg(long)]
+    resume: bool,
+    /// Seed of the flights and the random points
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/vio-tune")]
+    out: PathBuf,
+    /// Worker threads [default: all cores]; results do not depend on it
+    #[arg(long)]
+    threads: Option<usize>,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let done = match &arguments.command {
+        None => track(&arguments.track),
+        Some(Job::Sim(sim)) => render(sim),
+        Some(Job::Eval(eval)) => evaluate(eval),
+        Some(Job::Tune(tune)) => search(tune),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("vio: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// How far the calibration may be off with `--calibrate`: what a ruler and a guess leave.
+const ROUGH: CalibrationSettings = CalibrationSettings {
+    camera_position_sigma_m: 0.03,
+    camera_attitude_sigma: 0.05,
+    time_offset_s: 0.0,
+    time_offset_sigma_s: 0.01,
+};
+
+fn track(arguments: &Track) -> Result<(), AnyError> {
+    let folder = &arguments.out;
+    make(folder)?;
+    let overrides =
+        Overrides { cameras: arguments.cameras.clone(), imu: arguments.imu.clone(), truth: arguments.truth.clone() };
+    let recording = match (&arguments.euroc, &arguments.mcap) {
+        (Some(folder), _) => open_euroc(folder, &overrides)?,
+        (None, Some(file)) => open_mcap(file, &overrides)?,
+        (None, None) => return Err("name a recording with --euroc or --mcap".into()),
+    };
+    let calibration = if arguments.calibrate { ROUGH } else { CalibrationSettings::default() };
+    let filter = Settings { features: arguments.features, calibration, ..Settings::default() };
+    filter.check()?;
+    let findings = recording.check(filter.gravity)?;
+    eprintln!(
+        "{}: {} images, {} inertial samples at {:.0} Hz, {} gaps",
+        recording.name,
+        recording.images.count(),
+        recording.samples.len(),
+        findings.rate_hz,
+        findings.gaps
+    );
+    let threads = threads(arguments.threads);
+    let run = run(&recording, &RunSettings { filter, threads, ..RunSettings::default() })?;
+    for why in run.skipped.iter().take(3) {
+        eprintln!("left out: {why}");
+    }
+    for (stamp, why) in &run.lost {
+        eprintln!("given up at {stamp} s: {why}");
+    }
+    let judgement = recording.truth.as_ref().map(|truth| judge(&run, truth)).transpose()?.flatten();
+    let report = VioReport::new(&recording, &findings, &run, judgement.as_ref(), threads)?;
+    save(&report, &recording, &run, judgement.as_ref(), folder)?;
+    println!("{}", folder.join("report.md").display());
+    // The files are there to look at, but such a trajectory is not to be relied on.
+    if let Some((stamp, why)) = run.lost.last() {
+        let then = if run.tracking_at_end { "started anew" } else { "not started again" };
+        return Err(format!("{}: the estimate was given up at {stamp} s ({why}), and {then}", recording.name).into());
+    }
+    Ok(())
+}
+
+fn render(arguments: &Sim) -> Result<(), AnyError> {
+    make(&arguments.out)?;
+    let flight = match (&arguments.trajectory, arguments.flight) {
+        (Some(file), _) => Flight::File(file.clone()),
+        (None, FlightName::Room) => Flight::Room,
+        (None, FlightName::Wall) => Flight::Wall,
+    };
+    let settings = SimulationSettings {
+        flight,
+        seconds: arguments.seconds,
+        scenario: Scenario { seed: arguments.seed, ..Scenario::default() },
+        mcap: arguments.mcap,
+        raw: arguments.raw,
+        threads: threads(arguments.threads),
+    };
+    let simulated = simulate(&settings, &arguments.out)?;
+    eprintln!(
+        "{} images, {} inertial samples, {:.1} m in {:.1} s",
+        simulated.frames, simulated.samples, simulated.path_length_m, simulated.duration_s
+    );
+    println!("{}", arguments.out.display());
+    Ok(())
+}
+
+fn evaluate(arguments: &Eval) -> Result<(), AnyError> {
+    let comparison = compare(&arguments.reference, &arguments.estimate)?;
+    print!("{}", comparison.table());
+    if let Some(folder) = &arguments.out {
+        make(folder)?;
+        paintcopter_examples::report::save_figures(&comparison, folder)?;
+    }
+    Ok(())
+}
+
+fn search(arguments: &Tune) -> Result<(), AnyError> {
+    make(&arguments.out)?;
+    let lessons = if arguments.euroc.is_empty() {
+        Lessons::simulated(arguments.flights, arguments.seconds, arguments.seed)?
+    } else {
+        let open = |folder: &PathBuf| {
+            let recording = open_euroc(folder, &Overrides::default())?;
+            recording.check(Settings::default().gravity).map(|_| recording)
+        };
+        Lessons::Recordings(arguments.euroc.iter().map(open).collect::<Result<_, _>>()?)
+    };
+    let factors: [f64; 5] = arguments.start.as_slice().try_into().map_err(|_| "--start: give five factors")?;
+    if !factors.iter().all(|factor| (1e-6..=1e6).contains(factor)) {
+        return Err("--start: the factors must be between 1e-6 and 1e6".into());
+    }
+    let tuning = Tuning {
+        search: TuneSettings { evaluations: arguments.evaluations, ..TuneSettings::default() },
+        start: factors.map(f64::log10),
+        consistency_weight: arguments.honesty.max(0.0),
+        random: arguments.random,
+        seed: arguments.seed,
+        resume: arguments.resume,
+        threads: threads(arguments.threads),
+    };
+    let report = tune_noise(&lessons, &tuning, &arguments.out)?;
+    eprintln!(
+        "position error {:.4} m at the start, {:.4} m now; NEES {:.1}, now {:.1}",
+        report.ate_start_m, report.ate_best_m, report.nees_start, report.nees_best
+    );
+    println!("{}", arguments.out.join("report.md").display());
+    Ok(())
+}
+
+fn make(folder: &Path) -> Result<(), String> {
+    std::fs::create_dir_all(folder)
+        .map_err(|e| format!("{}: cannot be created ({e}): choose another --out", folder.display()))
+}
+
+fn threads(asked: Option<usize>) -> usize {
+    asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).clamp(1, 1024)
+}

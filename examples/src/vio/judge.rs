@@ -1,0 +1,174 @@
+//! The estimate against the truth.
+
+use vio_ekf::nalgebra::{Isometry3, Matrix3, Vector3};
+use vio_ekf::{
+    Alignment, Association, Error, Odometry, PairsFrom, RpeSettings, Span, Stamp, Tolerance, apply, ate, rpe, so3,
+};
+
+use super::recording::Truth;
+use super::run::heading_onto;
+use super::{Run, VioError};
+
+/// Standard deviations that a recorded truth has of its own, added to those that the filter claims: 1 mm, 0.1 degrees,
+/// 3 mm/s. Ours; without them the first poses, which the filter knows exactly by definition, would decide.
+const TRUTH_SIGMA: [f64; 3] = [1e-3, 1.7e-3, 3e-3];
+/// Path length of the relative error, m.
+const RPE_LENGTH: f64 = 10.0;
+
+/// How good a run is.
+#[derive(Debug, Clone)]
+pub struct Judgement {
+    /// Root mean square position error after rigid alignment, m.
+    pub ate_se3: f64,
+    /// The same after alignment of position and yaw, m.
+    pub ate_yaw: f64,
+    /// Median translation error over 10 m of path, m; `None` for a shorter path.
+    pub rpe_10m_median: Option<f64>,
+    /// Mean normalised squared error of the position; 3 is right.
+    pub nees_position: f64,
+    /// The same of the attitude.
+    pub nees_attitude: f64,
+    /// The same of the velocity, if that is known.
+    pub nees_velocity: Option<f64>,
+    /// Share of the truth's duration for which there is an estimate.
+    pub coverage: f64,
+    /// Truth and estimate in the truth's world, aligned in position and yaw.
+    pub aligned: Vec<(Stamp, Isometry3<f64>, Isometry3<f64>)>,
+    /// Errors and what the filter thought of them, for each pose.
+    pub errors: Vec<ErrorAt>,
+}
+
+/// Error of one pose in the filter's world, which is the truth's where the stretch begins.
+#[derive(Debug, Clone, Copy)]
+pub struct ErrorAt {
+    /// Its time.
+    pub stamp: Stamp,
+    /// Of the position, m.
+    pub position: Vector3<f64>,
+    /// Of the attitude, rotation vector in world axes, rad.
+    pub attitude: Vector3<f64>,
+    /// Standard deviations claimed for the position.
+    pub position_sigma: Vector3<f64>,
+    /// Standard deviations claimed for the attitude.
+    pub attitude_sigma: Vector3<f64>,
+}
+
+/// Judges a run. `None` if truth and estimate have no time in common.
+///
+/// # Errors
+/// [`VioError::Library`] if the poses cannot be aligned.
+pub fn judge(run: &Run, truth: &Truth) -> Result<Option<Judgement>, VioError> {
+    let estimate = run.trajectory()?;
+    let association = Association { interpolate: true, ..Association::default() };
+    let pairs = match association.pair_up(&truth.trajectory, &estimate) {
+        Err(Error::NoMatches { .. }) => return Ok(None),
+        other => other?,
+    };
+    let error = |alignment| position_error(&pairs.reference, &pairs.estimate, alignment);
+    let (ate_yaw, onto) = error(Alignment::PosYaw)?;
+    let (ate_se3, _) = error(Alignment::Se3)?;
+    let settings = RpeSettings {
+        span: Span::Metres(RPE_LENGTH),
+        all_pairs: true,
+        tolerance: Tolerance::Metres(0.5),
+        pairs_from: PairsFrom::Reference,
+    };
+    let rpe_10m_median = match rpe(&pairs.reference, &pairs.estimate, &settings) {
+        Ok(rpe) => Some(rpe.translation.median),
+        Err(Error::NoPairs { .. }) => None,
+        Err(error) => return Err(error.into()),
+    };
+    let covered = pairs.stamps[pairs.stamps.len() - 1].secs_since(pairs.stamps[0]);
+    let coverage = if truth.trajectory.duration_s() > 0.0 { covered / truth.trajectory.duration_s() } else { 1.0 };
+    let (mut errors, mut sums) = (Vec::new(), Sums::default());
+    for segment in &run.segments {
+        follow(&segment.odometry, truth, &mut errors, &mut sums);
+    }
+    let count = (errors.len() as f64).max(1.0);
+    Ok(Some(Judgement {
+        ate_se3,
+        ate_yaw,
+        rpe_10m_median,
+        nees_position: sums.position / count,
+        nees_attitude: sums.attitude / count,
+        nees_velocity: (!truth.velocities_in_world.is_empty()).then(|| sums.velocity / count),
+        coverage: coverage.min(1.0),
+        aligned: pairs.stamps.iter().zip(&pairs.reference).zip(onto).map(|((&s, &g), e)| (s, g, e)).collect(),
+        errors,
+    }))
+}
+
+/// Root mean square position error, and the estimate after alignment. Poses that do not tell a rotation, as at rest, are
+/// aligned in position and heading at the first of them.
+fn position_error(
+    reference: &[Isometry3<f64>],
+    estimate: &[Isometry3<f64>],
+    alignment: Alignment,
+) -> Result<(f64, Vec<Isometry3<f64>>), VioError> {
+    match ate(reference, estimate, alignment) {
+        Ok(result) => Ok((result.position.rmse, apply(&result.reference_from_estimate, estimate))),
+        Err(Error::Degenerate { .. }) => {
+            let onto = heading_onto(&reference[0], &estimate[0]);
+            let turned: Vec<_> = estimate.iter().map(|pose| onto * pose).collect();
+            let shift = mean_shift(reference, &turned);
+            let moved: Vec<_> =
+                turned.iter().map(|pose| Isometry3::translation(shift.x, shift.y, shift.z) * pose).collect();
+            let square = |(g, e): (&Isometry3<f64>, &Isometry3<f64>)| {
+                (g.translation.vector - e.translation.vector).norm_squared()
+            };
+            let mean = reference.iter().zip(&moved).map(square).sum::<f64>() / reference.len() as f64;
+            Ok((mean.sqrt(), moved))
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+fn mean_shift(reference: &[Isometry3<f64>], estimate: &[Isometry3<f64>]) -> Vector3<f64> {
+    let pairs = reference.iter().zip(estimate);
+    pairs.map(|(g, e)| g.translation.vector - e.translation.vector).sum::<Vector3<f64>>() / reference.len() as f64
+}
+
+#[derive(Default)]
+struct Sums {
+    position: f64,
+    attitude: f64,
+    velocity: f64,
+}
+
+/// Errors along one stretch, the truth moved to where the stretch begins.
+fn follow(odometry: &[Odometry], truth: &Truth, errors: &mut Vec<ErrorAt>, sums: &mut Sums) {
+    let known = |o: &&Odometry| truth.trajectory.pose_at(o.stamp).is_ok();
+    let mut filter_from_truth = None;
+    for o in odometry.iter().filter(known) {
+        let Ok(pose) = truth.trajectory.pose_at(o.stamp) else { continue };
+        let onto = *filter_from_truth.get_or_insert_with(|| heading_onto(&o.world_from_body, &pose));
+        let moved = onto * pose;
+        let position = moved.translation.vector - o.world_from_body.translation.vector;
+        let attitude = so3::log(&(moved.rotation * o.world_from_body.rotation.inverse()));
+        let block = |row: usize| o.covariance.fixed_view::<3, 3>(row, row).into_owned();
+        sums.position += square(&position, block(0), TRUTH_SIGMA[0]);
+        sums.attitude += square(&attitude, block(6), TRUTH_SIGMA[1]);
+        if let Some(velocity) = velocity_at(truth, o.stamp) {
+            let error = pose.rotation.inverse() * velocity - o.velocity_in_body;
+            sums.velocity += square(&error, block(3), TRUTH_SIGMA[2]);
+        }
+        let sigma = |row: usize| block(row).diagonal().map(|variance| variance.max(0.0).sqrt());
+        let (position_sigma, attitude_sigma) = (sigma(0), sigma(6));
+        errors.push(ErrorAt { stamp: o.stamp, position, attitude, position_sigma, attitude_sigma });
+    }
+}
+
+/// `eᵀ (P + σ² I)⁻¹ e`; infinite if P is no covariance, so that the report refuses it.
+fn square(error: &Vector3<f64>, covariance: Matrix3<f64>, sigma: f64) -> f64 {
+    let claimed = covariance + Matrix3::identity() * (sigma * sigma);
+    claimed.cholesky().map_or(f64::INFINITY, |factor| error.dot(&factor.solve(error)))
+}
+
+fn velocity_at(truth: &Truth, stamp: Stamp) -> Option<Vector3<f64>> {
+    let (stamps, velocities) = (truth.trajectory.stamps(), &truth.velocities_in_world);
+    let next = stamps.partition_point(|&s| s < stamp);
+    let after = velocities.get(next)?;
+    let Some(before) = next.checked_sub(1) else { return Some(*after) };
+    let fraction = stamp.secs_since(stamps[before]) / stamps[next].secs_since(stamps[before]);
+    Some(velocities[before].lerp(after, fraction))
+}

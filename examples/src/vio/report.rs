@@ -1,0 +1,196 @@
+//! The figures of a run, and the page that shows them.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use serde::Serialize;
+use vio_ekf::{SampleFindings, so3, tum};
+
+use super::error::write_file;
+use super::{Judgement, Recording, Run, VioError, plots};
+use crate::report::save_figures;
+
+/// What `report.json` of a run holds. Flat, SI units in the names; every number is finite. What needs the truth is absent
+/// where that is unknown.
+#[derive(Debug, Clone, Serialize)]
+pub struct VioReport {
+    /// Version of the program.
+    pub version: &'static str,
+    /// Images that the filter took.
+    pub frames: usize,
+    /// Images that were left out.
+    pub frames_skipped: usize,
+    /// Inertial samples that it took.
+    pub imu_samples: usize,
+    /// Gaps in the inertial samples.
+    pub imu_gaps: usize,
+    /// Time from the first to the last pose.
+    pub duration_s: f64,
+    /// Length of the estimated path.
+    pub path_length_m: f64,
+    /// Root mean square position error after rigid alignment.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ate_se3_rmse_m: Option<f64>,
+    /// The same after alignment of position and yaw.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ate_yaw_rmse_m: Option<f64>,
+    /// Median translation error over 10 m of path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rpe_10m_median_m: Option<f64>,
+    /// Mean normalised squared error of the position: 3 is honest.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nees_position_mean: Option<f64>,
+    /// The same of the attitude.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nees_attitude_mean: Option<f64>,
+    /// The same of the velocity.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nees_velocity_mean: Option<f64>,
+    /// Share of the truth's duration for which there is an estimate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coverage: Option<f64>,
+    /// Processor time of an image, median.
+    pub frame_cpu_ms_median: f64,
+    /// The same, 99th percentile.
+    pub frame_cpu_ms_p99: f64,
+    /// Processor time of an inertial sample with output and covariance, median.
+    pub imu_cpu_us_median: f64,
+    /// Whether the estimate was given up at any time.
+    pub diverged: bool,
+    /// How often the filter was started anew.
+    pub resets: usize,
+    /// Time from the first image to the first pose.
+    pub initialised_after_s: f64,
+    /// Angle between the camera's attitude as estimated and as in the calibration.
+    pub extrinsics_error_rad: f64,
+    /// Estimated time to add to the camera's stamps to get the inertial sensor's.
+    pub time_offset_s: f64,
+    /// Worker threads.
+    pub threads: usize,
+}
+
+impl VioReport {
+    /// The figures of a run.
+    ///
+    /// # Errors
+    /// [`VioError::Library`] if the filter gave poses that are not finite.
+    pub fn new(
+        recording: &Recording,
+        findings: &SampleFindings,
+        run: &Run,
+        judgement: Option<&Judgement>,
+        threads: usize,
+    ) -> Result<Self, VioError> {
+        let trajectory = run.trajectory()?;
+        let attitude = recording.camera.camera.body_from_camera.rotation;
+        Ok(Self {
+            version: env!("CARGO_PKG_VERSION"),
+            frames: run.frames,
+            frames_skipped: run.skipped.len(),
+            imu_samples: run.imu_samples,
+            imu_gaps: findings.gaps,
+            duration_s: trajectory.duration_s(),
+            path_length_m: trajectory.path_length(),
+            ate_se3_rmse_m: judgement.map(|j| j.ate_se3),
+            ate_yaw_rmse_m: judgement.map(|j| j.ate_yaw),
+            rpe_10m_median_m: judgement.and_then(|j| j.rpe_10m_median),
+            nees_position_mean: judgement.map(|j| j.nees_position),
+            nees_attitude_mean: judgement.map(|j| j.nees_attitude),
+            nees_velocity_mean: judgement.and_then(|j| j.nees_velocity),
+            coverage: judgement.map(|j| j.coverage),
+            frame_cpu_ms_median: 1e3 * quantile(&run.frame_s, 0.5),
+            frame_cpu_ms_p99: 1e3 * quantile(&run.frame_s, 0.99),
+            imu_cpu_us_median: 1e6 * quantile(&run.imu_s, 0.5),
+            diverged: !run.lost.is_empty(),
+            resets: run.lost.len(),
+            initialised_after_s: run.initialised_after_s,
+            extrinsics_error_rad: so3::angle_between(&attitude, &run.calibration.body_from_camera.rotation),
+            time_offset_s: run.calibration.time_offset_s,
+            threads,
+        })
+    }
+
+    fn markdown(&self, recording: &Recording, run: &Run, judged: bool) -> String {
+        let mut text = format!(
+            "# {}\n\n{} images ({} left out) and {} inertial samples; {:.1} m in {:.1} s. Version {}.\n\n",
+            recording.name,
+            self.frames,
+            self.frames_skipped,
+            self.imu_samples,
+            self.path_length_m,
+            self.duration_s,
+            self.version
+        );
+        for (stamp, why) in &run.lost {
+            let _ = writeln!(text, "**Given up at {stamp} s**: {why}. Started anew from there.\n");
+        }
+        let mut pictures =
+            vec![("trajectory.png", "From above and from the side"), ("state.png", "What the filter thinks")];
+        if judged {
+            pictures.push(("error.png", "Errors after alignment of position and yaw"));
+            pictures.push((
+                "sigma.png",
+                "Errors from the start on, and three standard deviations as the filter claims them",
+            ));
+        }
+        for (file, caption) in pictures {
+            let _ = writeln!(text, "**{caption}**\n\n![{caption}]({file})\n");
+        }
+        text.push_str("| figure | value |\n|---|---|\n");
+        let mut row = |figure: &str, value: Option<String>| {
+            let _ = writeln!(text, "| {figure} | {} |", value.unwrap_or_else(|| "-".into()));
+        };
+        let metres = |value: Option<f64>| value.map(|v| format!("{v:.4} m"));
+        let plain = |value: Option<f64>| value.map(|v| format!("{v:.2}"));
+        row("position error, rigid alignment, RMS", metres(self.ate_se3_rmse_m));
+        row("position error, position and yaw aligned, RMS", metres(self.ate_yaw_rmse_m));
+        row("error over 10 m of path, median", metres(self.rpe_10m_median_m));
+        row("NEES of position (3 is honest)", plain(self.nees_position_mean));
+        row("NEES of attitude", plain(self.nees_attitude_mean));
+        row("NEES of velocity", plain(self.nees_velocity_mean));
+        row("share of the truth covered", self.coverage.map(|v| format!("{:.1} %", 100.0 * v)));
+        row("started after", Some(format!("{:.2} s", self.initialised_after_s)));
+        row("started anew", Some(self.resets.to_string()));
+        let frame = format!("{:.2} / {:.2} ms", self.frame_cpu_ms_median, self.frame_cpu_ms_p99);
+        row("processor time of an image, median / 99 %", Some(frame));
+        row("processor time of an inertial sample with covariance", Some(format!("{:.1} us", self.imu_cpu_us_median)));
+        let degrees = self.extrinsics_error_rad.to_degrees();
+        row("camera's attitude, estimate against calibration", Some(format!("{degrees:.3} deg")));
+        row("camera's clock behind the inertial sensor's", Some(format!("{:.2} ms", 1e3 * self.time_offset_s)));
+        text.push_str("\nAll figures, in SI units, are in [report.json](report.json); poses in [trajectory.tum](trajectory.tum).\n");
+        if !run.skipped.is_empty() {
+            let _ = writeln!(text, "\nImages left out; the first of them:\n");
+            for why in run.skipped.iter().take(10) {
+                let _ = writeln!(text, "- {why}");
+            }
+        }
+        text
+    }
+}
+
+/// Writes `trajectory.tum`, the pictures, `report.md` and, last, `report.json` into a folder.
+///
+/// # Errors
+/// [`VioError`] names the file that could not be written, or the figure that is not finite.
+pub fn save(
+    report: &VioReport,
+    recording: &Recording,
+    run: &Run,
+    judgement: Option<&Judgement>,
+    folder: &Path,
+) -> Result<(), VioError> {
+    let trajectory = run.trajectory()?;
+    write_file(&folder.join("trajectory.tum"), tum::write(&trajectory).as_bytes())?;
+    plots::save(&trajectory, run, judgement, folder)?;
+    write_file(&folder.join("report.md"), report.markdown(recording, run, judgement.is_some()).as_bytes())?;
+    // Last, so that its presence means the folder is complete.
+    save_figures(report, folder)?;
+    Ok(())
+}
+
+/// The value below which a share of the values lies; 0 of none.
+fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    sorted.get((sorted.len().saturating_sub(1) as f64 * share).round() as usize).copied().unwrap_or(0.0)
+}

@@ -1,0 +1,310 @@
+//! The run: samples and images in the order of their stamps, and what the filter made of them.
+
+use std::sync::mpsc::sync_channel;
+use std::time::Duration;
+
+use cpu_time::ThreadTime;
+use vio_ekf::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use vio_ekf::{Calibration, Error, Excess, ImuNoise, Odometry, Settings, Stamp, Status, Trajectory, Vio, Waiting};
+
+use super::recording::Shot;
+use super::{Recording, VioError};
+use crate::progress::Stage;
+
+/// Images that wait for the filter when they are decoded beside it.
+const AHEAD: usize = 4;
+/// A gap in the inertial samples, s, after which the motion cannot be carried on.
+const LOST_AFTER: f64 = 0.5;
+
+/// How a recording is run.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct RunSettings {
+    /// The filter.
+    pub filter: Settings,
+    /// Inertial noise instead of the recording's own.
+    pub noise: Option<ImuNoise>,
+    /// 1: everything on one thread; otherwise images are decoded on a second one. The results do not depend on it.
+    pub threads: usize,
+    /// Whether no progress is shown.
+    pub quiet: bool,
+}
+
+/// A stretch without interruption. After each interruption the filter starts anew, in a world of its own.
+#[derive(Debug, Clone, Default)]
+pub struct Segment {
+    /// The estimate after each image, stamps strictly increasing.
+    pub odometry: Vec<Odometry>,
+    /// Landmarks used with each image.
+    pub used: Vec<usize>,
+}
+
+/// What came of a recording.
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// The stretches, in order; at least one, none of them empty.
+    pub segments: Vec<Segment>,
+    /// Images that the filter took.
+    pub frames: usize,
+    /// Images that it could not take, with the reason.
+    pub skipped: Vec<String>,
+    /// Inertial samples that it took.
+    pub imu_samples: usize,
+    /// Seconds from the first image to the first estimate.
+    pub initialised_after_s: f64,
+    /// Why and when it gave up, each time.
+    pub lost: Vec<(Stamp, String)>,
+    /// Whether it runs at the end.
+    pub tracking_at_end: bool,
+    /// The camera's calibration at the end.
+    pub calibration: Calibration,
+    /// Processor time of each image while running, s.
+    pub frame_s: Vec<f64>,
+    /// Processor time of an inertial sample with its output and covariance, s: the mean between two images, for each.
+    pub imu_s: Vec<f64>,
+}
+
+/// Runs the filter over a recording.
+///
+/// # Errors
+/// [`VioError`] if the recording cannot be used, or the filter never starts.
+pub fn run(recording: &Recording, settings: &RunSettings) -> Result<Run, VioError> {
+    let mut driver = Driver::new(recording, settings)?;
+    let stage = (!settings.quiet).then(|| Stage::start("odometry"));
+    let total = recording.images.count().max(1) as f64;
+    let mut seen = 0.0;
+    let mut each = |shot: Shot| {
+        seen += 1.0;
+        if let Some(stage) = &stage {
+            stage.share(seen / total);
+        }
+        driver.shot(shot)
+    };
+    if settings.threads < 2 {
+        recording.images.read().try_for_each(&mut each)?;
+    } else {
+        std::thread::scope(|scope| {
+            let (sender, receiver) = sync_channel(AHEAD);
+            // Ends by itself when the receiver is dropped.
+            scope.spawn(move || recording.images.read().try_for_each(|shot| sender.send(shot)));
+            receiver.into_iter().try_for_each(&mut each)
+        })?;
+    }
+    let run = driver.finish()?;
+    let poses: usize = run.segments.iter().map(|segment| segment.odometry.len()).sum();
+    if let Some(stage) = stage {
+        stage.done(&format!("{poses} poses of {} images, {} left out", run.frames, run.skipped.len()));
+    }
+    Ok(run)
+}
+
+struct Driver<'a> {
+    recording: &'a Recording,
+    vio: Vio,
+    /// Index of the next inertial sample.
+    next: usize,
+    segments: Vec<Segment>,
+    frames: usize,
+    skipped: Vec<String>,
+    first_image: Option<Stamp>,
+    last_image: Option<Stamp>,
+    lost: Vec<(Stamp, String)>,
+    frame_s: Vec<f64>,
+    imu_s: Vec<f64>,
+    calibration: Option<Calibration>,
+}
+
+impl<'a> Driver<'a> {
+    fn new(recording: &'a Recording, settings: &RunSettings) -> Result<Self, VioError> {
+        let mut filter = settings.filter;
+        filter.calibration.time_offset_s += recording.camera.time_offset_s;
+        Ok(Self {
+            recording,
+            vio: Vio::new(recording.camera.camera, settings.noise.unwrap_or(recording.imu.noise), filter)?,
+            next: 0,
+            segments: Vec::new(),
+            frames: 0,
+            skipped: Vec::new(),
+            first_image: None,
+            last_image: None,
+            lost: Vec::new(),
+            frame_s: Vec::new(),
+            imu_s: Vec::new(),
+            calibration: None,
+        })
+    }
+
+    /// An image, after the samples that come before it.
+    fn shot(&mut self, Shot { stamp, picture }: Shot) -> Result<(), VioError> {
+        let picture = match picture {
+            Ok(picture) => picture,
+            Err(why) => return self.skip(why),
+        };
+        let expected = self.recording.camera.camera;
+        if (picture.width, picture.height) != (expected.width, expected.height) {
+            let given = (picture.width, picture.height);
+            let why = Error::ImageSize { given, expected: (expected.width, expected.height) }.to_string();
+            // The first image decides whether it is the calibration that is wrong, or one picture.
+            if self.frames == 0 {
+                return Err(VioError::Unusable { recording: self.recording.name.clone(), why });
+            }
+            return self.skip(format!("image of {stamp} s: {why}"));
+        }
+        if self.last_image.is_some_and(|last| stamp <= last) {
+            return self.skip(format!("image of {stamp} s: another one of that time or later came before it"));
+        }
+        self.feed_until(stamp)?;
+        let began = ThreadTime::now();
+        let report = match self.vio.image(stamp, &picture.view()) {
+            Ok(report) => report,
+            // Before the first sample, or after the last one.
+            Err(error @ (Error::Late { .. } | Error::OutOfRange { .. })) => {
+                return self.skip(format!("image of {stamp} s: {error}"));
+            }
+            Err(error) => return Err(error.into()),
+        };
+        let elapsed = began.elapsed();
+        self.frames += 1;
+        self.first_image.get_or_insert(stamp);
+        self.last_image = Some(stamp);
+        match report.status {
+            Status::Tracking => self.keep(report.used, elapsed),
+            Status::Diverged(excess) => self.lose(stamp, describe(excess)),
+            Status::Uninitialised(_) => {}
+        }
+        Ok(())
+    }
+
+    fn skip(&mut self, why: String) -> Result<(), VioError> {
+        self.skipped.push(why);
+        Ok(())
+    }
+
+    /// Feeds the samples up to the first one that is not before the image.
+    fn feed_until(&mut self, stamp: Stamp) -> Result<(), VioError> {
+        let samples = &self.recording.samples;
+        let offset = self.vio.calibration().map_or(self.recording.camera.time_offset_s, |c| c.time_offset_s);
+        let time = stamp.nanos().saturating_add((offset * 1e9).round() as i64);
+        let from = self.next;
+        let began = ThreadTime::now();
+        while let Some(sample) = samples.get(self.next) {
+            if self.next > 0 && samples[self.next - 1].stamp.nanos() >= time {
+                break;
+            }
+            if self.next > 0 && self.vio.output().is_some() {
+                let gap = sample.stamp.secs_since(samples[self.next - 1].stamp);
+                if gap > LOST_AFTER {
+                    self.lose(sample.stamp, format!("{gap:.2} s without inertial samples"));
+                }
+            }
+            self.vio.imu(sample)?;
+            std::hint::black_box(self.vio.output());
+            self.next += 1;
+        }
+        let count = self.next - from;
+        if count > 0 && self.vio.output().is_some() {
+            self.imu_s.push(began.elapsed().as_secs_f64() / count as f64);
+        }
+        Ok(())
+    }
+
+    /// Remembers the estimate.
+    fn keep(&mut self, used: usize, elapsed: Duration) {
+        let Some(odometry) = self.vio.output() else { return };
+        // The first segment, and the first after each loss.
+        if self.segments.len() <= self.lost.len() {
+            self.segments.resize_with(self.lost.len() + 1, Segment::default);
+        }
+        let Some(segment) = self.segments.last_mut() else { return };
+        if segment.odometry.last().is_none_or(|last| last.stamp < odometry.stamp) {
+            segment.odometry.push(odometry);
+            segment.used.push(used);
+        }
+        self.frame_s.push(elapsed.as_secs_f64());
+        self.calibration = self.vio.calibration();
+    }
+
+    fn lose(&mut self, stamp: Stamp, why: String) {
+        self.lost.push((stamp, why));
+        self.vio.reset();
+    }
+
+    fn finish(self) -> Result<Run, VioError> {
+        let unusable = |why: String| VioError::Unusable { recording: self.recording.name.clone(), why };
+        if self.frames == 0 {
+            let first = self.skipped.first().map_or("there is none", String::as_str);
+            let count = self.recording.images.count();
+            return Err(unusable(format!("none of the {count} images could be used; the first: {first}")));
+        }
+        let segments: Vec<Segment> = self.segments.into_iter().filter(|s| !s.odometry.is_empty()).collect();
+        let (Some(first), Some(calibration)) = (segments.first(), self.calibration) else {
+            let why = self.lost.last().map_or(waiting(self.vio.status()), |(_, why)| why.clone());
+            return Err(unusable(format!("the odometry never started: {why}")));
+        };
+        let began = self.first_image.unwrap_or(first.odometry[0].stamp);
+        Ok(Run {
+            initialised_after_s: first.odometry[0].stamp.secs_since(began).max(0.0),
+            frames: self.frames,
+            skipped: self.skipped,
+            imu_samples: self.next,
+            lost: self.lost,
+            tracking_at_end: self.vio.status() == Status::Tracking,
+            calibration,
+            frame_s: self.frame_s,
+            imu_s: self.imu_s,
+            segments,
+        })
+    }
+}
+
+fn describe(excess: Excess) -> String {
+    match excess {
+        Excess::Speed => "the speed ran away",
+        Excess::Bias => "a bias grew beyond what a sensor has",
+        Excess::Uncertainty => "nothing was seen for too long",
+        Excess::Contradiction => {
+            "images and inertial samples contradict each other: check axes, calibration and clocks of both"
+        }
+    }
+    .into()
+}
+
+fn waiting(status: Status) -> String {
+    match status {
+        Status::Uninitialised(Waiting::ForSteadiness) => {
+            "there was no second of rest to start from, and no motion that tells the scale"
+        }
+        Status::Uninitialised(Waiting::ForStillImages) => "the images show nothing to hold on to, or move at rest",
+        Status::Uninitialised(Waiting::ForGravity) => {
+            "gravity test: at rest the accelerometer does not read gravity; check its axes, unit and calibration"
+        }
+        Status::Tracking | Status::Diverged(_) => "no image came after the start",
+    }
+    .into()
+}
+
+impl Run {
+    /// All stretches in the world of the first: each begins at the place and heading where the one before it ended.
+    ///
+    /// # Errors
+    /// [`VioError::Library`] if the filter gave poses that are not finite.
+    pub fn trajectory(&self) -> Result<Trajectory, VioError> {
+        let mut joined = Trajectory::default();
+        for segment in &self.segments {
+            let first = segment.odometry[0].world_from_body;
+            let onto = joined.poses().last().map_or_else(Isometry3::identity, |last| heading_onto(last, &first));
+            for odometry in &segment.odometry {
+                joined.push(odometry.stamp, onto * odometry.world_from_body)?;
+            }
+        }
+        Ok(joined)
+    }
+}
+
+/// The shift and the turn about the vertical that take one pose to the place and heading of another.
+pub(super) fn heading_onto(target: &Isometry3<f64>, from: &Isometry3<f64>) -> Isometry3<f64> {
+    // The turn about z that is nearest to the rotation between both.
+    let q = (target.rotation * from.rotation.inverse()).into_inner();
+    let yaw = 2.0 * q.k.atan2(q.w);
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw);
+    Isometry3::from_parts(Translation3::from(target.translation.vector - turn * from.translation.vector), turn)
+}

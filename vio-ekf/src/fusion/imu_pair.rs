@@ -1,0 +1,260 @@
+use nalgebra::{Isometry3, Vector3};
+
+use crate::error::{all_not_negative, invalid};
+use crate::trajectory::is_finite;
+use crate::{Error, Imu, ImuNoise};
+
+/// Samples of each sensor that wait for the other at most.
+const WAITING: usize = 64;
+
+/// How two inertial sensors on one body are joined.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct ImuPairSettings {
+    /// Noise of the first sensor, whose axes and place are the body's.
+    pub first: ImuNoise,
+    /// Noise of the second.
+    pub second: ImuNoise,
+    /// Pose of the second sensor on the body; identity.
+    pub body_from_second: Isometry3<f64>,
+    /// Standard deviation of the difference of the gyroscopes' biases at the start, rad/s per axis; ours: 0.02.
+    pub gyro_bias_sigma: f64,
+    /// Standard deviation of the difference of the accelerometers' biases at the start, m/s² per axis; ours: 0.2.
+    pub accel_bias_sigma: f64,
+    /// A second sensor that is this late, or silent for so long, is left out, s; ours: 0.02.
+    pub patience_s: f64,
+}
+
+impl Default for ImuPairSettings {
+    fn default() -> Self {
+        Self {
+            first: ImuNoise::default(),
+            second: ImuNoise::default(),
+            body_from_second: Isometry3::identity(),
+            gyro_bias_sigma: 0.02,
+            accel_bias_sigma: 0.2,
+            patience_s: 0.02,
+        }
+    }
+}
+
+/// Joins two inertial sensors of one body into one that is better than either.
+///
+/// With `y₁ = u + b₁ + n₁` and `y₂ = u + b₂ + n₂` in the same axes, the difference `d = b₁ − b₂` of the biases is measured at
+/// every sample, whatever the motion, by a Kalman filter of one state per axis. What the pair reads is
+///
+/// ```text
+/// y = w₁ (y₁ − κ d̂) + w₂ (y₂ + (1 − κ) d̂) = u + (b₁ − κ d) + w₁ n₁ + w₂ n₂ + (w₂ − κ) (d̂ − d)
+/// w₂ = σ₁² / (σ₁² + σ₂²) = 1 − w₁        κ = q₁² / (q₁² + q₂²)
+/// ```
+///
+/// with densities σ of the white noise and q of the walks. These weights make the noise of `y` independent of what `d` is
+/// measured with, and the walk of its bias `b₁ − κ d` independent of that of `d`: nothing is left in the difference that an
+/// estimator with both biases in its state could still use. White noise and walk of the pair are `σ₁σ₂/√(σ₁² + σ₂²)` and
+/// `q₁q₂/√(q₁² + q₂²)`, see [`noise`](Self::noise). The bias of the pair stays the same when the second sensor falls silent.
+///
+/// The force at a lever arm r is moved to the body: `f₁ = f₂ − α × r − ω × (ω × r)`, with α from the last two samples. Their
+/// noise enters as its difference, which integrates to nothing. Both sensors must be on one clock.
+#[derive(Debug, Clone)]
+pub struct ImuPair {
+    settings: ImuPairSettings,
+    gyro: Difference,
+    accel: Difference,
+    waiting: Vec<Imu>,
+    /// Of the second sensor, in its own axes: the last one not after what was read, and all later ones.
+    second: Vec<Imu>,
+    /// The last sample read.
+    last: Option<Imu>,
+}
+
+/// One kind of sensor: the difference of the biases, and the weights.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Difference {
+    mean: Vector3<f64>,
+    /// Per axis.
+    variance: f64,
+    /// Of the difference of two samples times the time between samples.
+    white: f64,
+    /// Per second.
+    walk: f64,
+    /// `w₂` and `κ`.
+    weight: f64,
+    share: f64,
+}
+
+impl Difference {
+    fn new([white_1, white_2]: [f64; 2], [walk_1, walk_2]: [f64; 2], sigma: f64) -> Self {
+        let share = |a: f64, b: f64| if a + b > 0.0 { a * a / (a * a + b * b) } else { 0.5 };
+        Self {
+            mean: Vector3::zeros(),
+            variance: sigma * sigma,
+            white: white_1 * white_1 + white_2 * white_2,
+            walk: walk_1 * walk_1 + walk_2 * walk_2,
+            weight: share(white_1, white_2),
+            share: share(walk_1, walk_2),
+        }
+    }
+
+    /// Learns from two readings, `dt` seconds after those before.
+    fn learn(&mut self, first: &Vector3<f64>, second: &Vector3<f64>, dt: f64) {
+        self.variance += self.walk * dt;
+        let gain = self.variance / (self.variance + self.white / dt);
+        if gain.is_finite() {
+            self.mean += (first - second - self.mean) * gain;
+            self.variance *= 1.0 - gain;
+        }
+    }
+
+    /// What the pair reads; of the first sensor only, with the pair's bias, if the second is silent.
+    fn joined(&self, first: Vector3<f64>, second: Option<Vector3<f64>>) -> Vector3<f64> {
+        let first = first - self.mean * self.share;
+        second.map_or(first, |second| {
+            let second = second + self.mean * (1.0 - self.share);
+            first + (second - first) * self.weight
+        })
+    }
+}
+
+impl ImuPair {
+    /// Refuses settings that cannot be.
+    pub fn new(settings: ImuPairSettings) -> Result<Self, Error> {
+        settings.first.check()?;
+        settings.second.check()?;
+        if !is_finite(&settings.body_from_second) {
+            return Err(Error::NonFinite { what: "body_from_second", index: 0 });
+        }
+        if !(settings.patience_s > 0.0 && settings.patience_s <= 1.0) {
+            return Err(invalid("patience_s", settings.patience_s, "must be above 0 and at most 1 s"));
+        }
+        all_not_negative(&[
+            ("gyro_bias_sigma", settings.gyro_bias_sigma),
+            ("accel_bias_sigma", settings.accel_bias_sigma),
+        ])?;
+        let (a, b) = (settings.first, settings.second);
+        Ok(Self {
+            settings,
+            gyro: Difference::new(
+                [a.gyro_density, b.gyro_density],
+                [a.gyro_walk, b.gyro_walk],
+                settings.gyro_bias_sigma,
+            ),
+            accel: Difference::new(
+                [a.accel_density, b.accel_density],
+                [a.accel_walk, b.accel_walk],
+                settings.accel_bias_sigma,
+            ),
+            waiting: Vec::with_capacity(WAITING + 1),
+            second: Vec::with_capacity(WAITING + 1),
+            last: None,
+        })
+    }
+
+    /// Noise of what the pair reads.
+    pub fn noise(&self) -> ImuNoise {
+        let (a, b) = (&self.settings.first, &self.settings.second);
+        let joined = |a: f64, b: f64| if a + b > 0.0 { a * b / a.hypot(b) } else { 0.0 };
+        ImuNoise {
+            gyro_density: joined(a.gyro_density, b.gyro_density),
+            gyro_walk: joined(a.gyro_walk, b.gyro_walk),
+            accel_density: joined(a.accel_density, b.accel_density),
+            accel_walk: joined(a.accel_walk, b.accel_walk),
+        }
+    }
+
+    /// The share κ of the difference of the biases that the pair's bias `b₁ − κ (b₁ − b₂)` has, of gyroscope and
+    /// accelerometer.
+    pub fn bias_shares(&self) -> [f64; 2] {
+        [self.gyro.share, self.accel.share]
+    }
+
+    /// Takes a sample of the first sensor; stamps must increase.
+    pub fn first(&mut self, sample: &Imu) -> Result<(), Error> {
+        let last = self.waiting.last().or(self.last.as_ref());
+        check(sample, last)?;
+        if self.waiting.len() >= WAITING {
+            return Err(Error::TooFew { what: "samples read from the pair while new ones came", got: 0, need: 1 });
+        }
+        self.waiting.push(*sample);
+        Ok(())
+    }
+
+    /// Takes a sample of the second sensor in its own axes; stamps must increase.
+    pub fn second(&mut self, sample: &Imu) -> Result<(), Error> {
+        check(sample, self.second.last())?;
+        if self.second.len() >= WAITING {
+            // The first sensor is silent; what it will be compared with is recent.
+            self.second.remove(0);
+        }
+        self.second.push(*sample);
+        Ok(())
+    }
+
+    /// The next sample of the pair, at the time of one of the first sensor and in its axes, if the second has got there or has
+    /// been waited for long enough.
+    pub fn read(&mut self) -> Option<Imu> {
+        let sample = *self.waiting.first()?;
+        let newest = self.waiting[self.waiting.len() - 1].stamp;
+        let other = self.second_at(&sample);
+        let late = newest.secs_since(sample.stamp) >= self.settings.patience_s;
+        if other.is_none() && !late {
+            return None;
+        }
+        self.waiting.remove(0);
+        let dt = self.last.map_or(0.0, |last| sample.stamp.secs_since(last.stamp));
+        let turn = self.settings.body_from_second.rotation;
+        let rate_2 = other.map(|other| turn * other.gyro);
+        if let Some(rate_2) = &rate_2
+            && dt > 0.0
+        {
+            self.gyro.learn(&sample.gyro, rate_2, dt);
+        }
+        let gyro = self.gyro.joined(sample.gyro, rate_2);
+        let angular = self.last.map_or(Vector3::zeros(), |last| (gyro - last.gyro) / dt);
+        let lever = self.settings.body_from_second.translation.vector;
+        let moved = angular.cross(&lever) + gyro.cross(&gyro.cross(&lever));
+        let force_2 = other.map(|other| turn * other.accel - moved);
+        if let Some(force_2) = &force_2
+            && dt > 0.0
+        {
+            self.accel.learn(&sample.accel, force_2, dt);
+        }
+        let accel = self.accel.joined(sample.accel, force_2);
+        let read = Imu { stamp: sample.stamp, gyro, accel };
+        self.last = Some(read);
+        let used = self.second.partition_point(|other| other.stamp <= sample.stamp).saturating_sub(1);
+        self.second.drain(..used);
+        Some(read)
+    }
+
+    /// What the second sensor reads at the time of a sample, if it has got there and was not silent before.
+    fn second_at(&self, sample: &Imu) -> Option<Imu> {
+        let index = self.second.partition_point(|other| other.stamp < sample.stamp);
+        let after = self.second.get(index)?;
+        if after.stamp == sample.stamp {
+            return Some(*after);
+        }
+        let before = self.second.get(index.checked_sub(1)?)?;
+        let gap = after.stamp.secs_since(before.stamp);
+        if gap > self.settings.patience_s {
+            return None;
+        }
+        let share = sample.stamp.secs_since(before.stamp) / gap;
+        Some(Imu {
+            stamp: sample.stamp,
+            gyro: before.gyro + (after.gyro - before.gyro) * share,
+            accel: before.accel + (after.accel - before.accel) * share,
+        })
+    }
+}
+
+fn check(sample: &Imu, last: Option<&Imu>) -> Result<(), Error> {
+    if !sample.is_finite() {
+        return Err(Error::NonFinite { what: "inertial sample", index: 0 });
+    }
+    match last {
+        Some(last) if sample.stamp <= last.stamp => {
+            Err(Error::NotIncreasing { index: 0, previous: last.stamp, stamp: sample.stamp })
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,93 @@
+//! The search for noise settings: on a function whose least point is known, and on flights whose noise is known.
+#![cfg(feature = "tune")]
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use support::flight::{GRAVITY, camera, spline};
+use vio_ekf::sim::ImuModel;
+use vio_ekf::tune::{NoisePoint, PointRecording, Score, Trial, TuneSettings, cost, tune, with_factors};
+use vio_ekf::{Error, ImuNoise, Settings};
+
+/// A bent valley with its floor at (1, -1, 0.5, -0.5, 0).
+fn valley(x: &NoisePoint) -> f64 {
+    let at = [1.0, -1.0, 0.5, -0.5, 0.0];
+    let d: Vec<f64> = x.iter().zip(at).map(|(x, at)| x - at).collect();
+    d.iter().map(|d| d * d).sum::<f64>() + 2.0 * (d[0] + d[1]).powi(2) + d[2].powi(4) + (d[3] * d[4]).powi(2)
+}
+
+#[test]
+fn the_floor_of_a_valley_is_found_within_the_bounds() {
+    let found = tune(&[0.0; 5], &TuneSettings::default(), &[], valley).unwrap();
+    assert!(found.best.cost < 1e-3, "{:?}", found.best);
+    assert!(found.trials.len() <= 200);
+    // With a range of half a decade the floor is out of reach, and nothing outside is asked for.
+    let near = TuneSettings { range: 0.5, step: 0.25, ..TuneSettings::default() };
+    let bounded = tune(&[0.0; 5], &near, &[], valley).unwrap();
+    assert!(bounded.trials.iter().all(|trial| trial.point.iter().all(|x| x.abs() <= 0.5 + 1e-12)));
+    assert!((bounded.best.point[0] - 0.5).abs() < 1e-6 && (bounded.best.point[1] + 0.5).abs() < 1e-6);
+}
+
+#[test]
+fn an_interrupted_search_goes_on_where_it_stopped() {
+    let whole = tune(&[0.0; 5], &TuneSettings::default(), &[], valley).unwrap();
+    let known: Vec<Trial> = whole.trials[..40].to_vec();
+    let mut computed = 0;
+    let resumed = tune(&[0.0; 5], &TuneSettings::default(), &known, |x| {
+        computed += 1;
+        valley(x)
+    })
+    .unwrap();
+    assert_eq!(resumed, whole);
+    assert!(computed <= whole.trials.len() - 40, "{computed} of {}", whole.trials.len());
+}
+
+#[test]
+fn the_cost_is_an_error_and_honesty_in_logarithms() {
+    let honest = Score { ate: 0.1, nees: [3.0; 3], lost: 0.0 };
+    assert!((cost(&[honest], 0.7) - 0.1_f64.ln()).abs() < 1e-12);
+    // Twice the error in one of two recordings: a factor of the root of two.
+    let worse = Score { ate: 0.2, ..honest };
+    assert!((cost(&[honest, worse], 0.7) - (0.1_f64.ln() + 0.5 * 2_f64.ln())).abs() < 1e-12);
+    // Too bold and too timid by the same factor cost the same.
+    let (bold, timid) = (Score { nees: [12.0; 3], ..honest }, Score { nees: [0.75; 3], ..honest });
+    assert!((cost(&[bold], 0.5) - cost(&[timid], 0.5)).abs() < 1e-12);
+    assert!((cost(&[bold], 0.5) - (0.1_f64.ln() + 0.5 * 4_f64.ln())).abs() < 1e-12);
+    assert!(cost(&[Score { lost: 0.5, ..honest }], 0.5) > cost(&[Score { lost: 0.25, ..honest }], 0.5));
+    assert!(cost(&[Score { ate: f64::MAX, nees: [f64::MAX; 3], lost: 1.0 }], 0.5).is_finite());
+}
+
+#[test]
+fn known_noise_costs_less_than_wrong_noise() {
+    let record =
+        |seed| PointRecording::simulate(&spline(seed, 8.0), &camera(), &ImuModel::default(), 1.0, GRAVITY, seed);
+    let recordings: Vec<PointRecording> = (1..4).map(|seed| record(seed).unwrap()).collect();
+    let cost_of = |point: NoisePoint| {
+        let score = |r: &PointRecording| r.score(&ImuNoise::default(), &Settings::default(), &point).unwrap();
+        cost(&recordings.iter().map(score).collect::<Vec<_>>(), 0.5)
+    };
+    let right = cost_of([0.0; 5]);
+    assert_eq!(right, cost_of([0.0; 5]), "the same flight twice");
+    for wrong in [[1.0; 5], [-1.0; 5], [0.0, 0.0, 0.0, 0.0, 1.0], [1.5, 0.0, 1.5, 0.0, -0.5]] {
+        assert!(cost_of(wrong) > right + 0.2, "{wrong:?}: {} against {right}", cost_of(wrong));
+    }
+    let (noise, settings) = with_factors(&ImuNoise::default(), &Settings::default(), &[1.0, 0.0, -1.0, 0.0, 0.30103]);
+    assert!((noise.gyro_density / ImuNoise::default().gyro_density - 10.0).abs() < 1e-9);
+    assert!((noise.accel_density / ImuNoise::default().accel_density - 0.1).abs() < 1e-9);
+    assert!((settings.landmarks.pixel_sigma - 2.0).abs() < 1e-4 && (settings.patches.grey_sigma - 4.0).abs() < 1e-4);
+}
+
+#[test]
+fn searches_that_cannot_be_are_refused() {
+    let refused = |settings: TuneSettings| match tune(&[0.0; 5], &settings, &[], valley) {
+        Err(Error::InvalidSetting { name, .. }) => name,
+        other => panic!("{other:?}"),
+    };
+    let usual = TuneSettings::default();
+    assert_eq!(refused(TuneSettings { evaluations: 3, ..usual }), "evaluations");
+    assert_eq!(refused(TuneSettings { range: f64::NAN, ..usual }), "range");
+    assert_eq!(refused(TuneSettings { step: 4.0, ..usual }), "step");
+    assert_eq!(refused(TuneSettings { precision: 0.0, ..usual }), "precision");
+    assert!(matches!(tune(&[f64::NAN; 5], &usual, &[], valley), Err(Error::NonFinite { .. })));
+    assert!(matches!(tune(&[0.0; 5], &usual, &[], |_| f64::NAN), Err(Error::NonFinite { .. })));
+}
