@@ -1,6 +1,7 @@
 //! The job of `paint-image`: a picture in, sprays and figures out.
 
 mod compare;
+mod equal_sprays;
 mod learn;
 
 use std::path::{Path, PathBuf};
@@ -15,7 +16,8 @@ use serde::Serialize;
 use crate::pictures::{PictureError, Rgb};
 
 pub use compare::{Row, compare, print_table};
-pub use learn::{Lesson, learn};
+pub use equal_sprays::{EqualSprays, equal_sprays, print_equal_sprays};
+pub use learn::{Lesson, Pictures, ThesisLesson, learn, learn_thesis};
 
 /// Who decides the sprays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
