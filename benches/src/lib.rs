@@ -2,6 +2,7 @@
 
 pub mod cpu;
 pub mod films;
+pub mod flight;
 pub mod motion;
 pub mod painting;
 pub mod rock;
