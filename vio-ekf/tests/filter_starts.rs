@@ -138,6 +138,43 @@ fn starts_wherever_the_robot_paints() {
     assert_eq!((tally.good, tally.wrong), (4, 0), "{tally:?}");
 }
 
+#[test]
+fn a_start_that_is_contradicted_is_taken_back() {
+    let sequence = Sequence::new("paint_1", 3, false, |_| ()).unwrap();
+    let first = sequence.span().0;
+    let mut vio = Vio::new(sequence.camera, ImuNoise::default(), settings()).unwrap();
+    let mut samples = sequence.imu.samples.iter();
+    let (mut began, mut fooled, mut statuses) = (None, 0, Vec::new());
+    for frame in 0..120 {
+        let stamp = Stamp::from_nanos(first.nanos() + 4_000_000 + frame * 50_000_000);
+        for sample in samples.by_ref() {
+            vio.imu(sample).unwrap();
+            if sample.stamp >= stamp {
+                break;
+            }
+        }
+        let mut seen = sequence.see(stamp);
+        // Right after the start everything is taken for its neighbour, for four images.
+        if began.is_some() && fooled < 4 {
+            fooled += 1;
+            let ids: Vec<u64> = seen.iter().map(|point| point.id).collect();
+            for (k, point) in seen.iter_mut().enumerate() {
+                point.id = ids[(k + 1) % ids.len()];
+            }
+        }
+        vio.points(stamp, &seen).unwrap();
+        if vio.status() == Status::Tracking {
+            began.get_or_insert(frame);
+        }
+        if statuses.last() != Some(&vio.status()) {
+            statuses.push(vio.status());
+        }
+    }
+    let [Status::Uninitialised(_), Status::Tracking, Status::Uninitialised(_), Status::Tracking] = statuses[..] else {
+        panic!("{statuses:?}");
+    };
+}
+
 /// Starts over all sequences on points: `cargo test --release -p vio-ekf --test filter_starts -- --ignored --nocapture
 /// points`. `STARTS` is how many per sequence (34).
 #[test]

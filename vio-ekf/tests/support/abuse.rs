@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 use vio_ekf::sim::{CameraModel, Gain, ImuModel, RoomSettings, Scenario, Simulation, Vibration, camera_ahead};
-use vio_ekf::{Camera, Odometry, Settings, Spline, Stamp, Status, Vio, nalgebra, so3};
+use vio_ekf::{Camera, Odometry, Settings, Spline, Stamp, Status, Vio, chi2, nalgebra, so3};
 
 use super::Rng;
 use super::sequences::{SEQUENCES, drawn_start, motion};
@@ -42,7 +42,7 @@ pub(crate) const ABUSES: [Abuse; 8] = [
 /// What became of the estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Outcome {
-    /// Not flagged, and at the end within 0.5 m and 0.2 m/s.
+    /// Not flagged, and at the end within 0.2 m/s and 0.5 m, or within 1 m and the claimed covariance (99.9 %).
     pub(crate) survived: bool,
     pub(crate) flagged: bool,
     pub(crate) position_error: f64,
@@ -161,7 +161,12 @@ fn follow(simulation: &Simulation, name: &str, halves: u32, seed: u64) -> Outcom
     let o = vio.output().unwrap();
     let (position_error, velocity_error) = errors(simulation, &o);
     let flagged = matches!(vio.status(), Status::Diverged(_));
-    let survived = !flagged && position_error < 0.5 && velocity_error < 0.2;
+    let claimed = o.covariance.fixed_view::<3, 3>(0, 0).into_owned().cholesky().is_some_and(|factor| {
+        let off = offset(simulation, &o);
+        off.dot(&factor.solve(&off)) < chi2::quantile(0.999, 3).unwrap()
+    });
+    let near = position_error < 0.5 || position_error < 1.0 && claimed;
+    let survived = !flagged && near && velocity_error < 0.2;
     Outcome { survived, flagged, position_error, velocity_error, finite }
 }
 
@@ -169,8 +174,12 @@ fn errors(simulation: &Simulation, o: &Odometry) -> (f64, f64) {
     let stamp = o.stamp.min(simulation.spline().span().1);
     let truth = simulation.motion(stamp).unwrap();
     let velocity = truth.world_from_body.rotation.inverse() * truth.velocity_in_world - o.velocity_in_body;
-    let position = truth.world_from_body.translation.vector - o.world_from_body.translation.vector;
-    (position.norm(), velocity.norm())
+    (offset(simulation, o).norm(), velocity.norm())
+}
+
+fn offset(simulation: &Simulation, o: &Odometry) -> Vector3<f64> {
+    let stamp = o.stamp.min(simulation.spline().span().1);
+    simulation.motion(stamp).unwrap().world_from_body.translation.vector - o.world_from_body.translation.vector
 }
 
 fn trace(simulation: &Simulation, vio: &Vio, o: &Odometry) {

@@ -96,7 +96,8 @@ pub(crate) fn drawn_start(simulation: &Simulation, stamp: Stamp, seed: u64) -> S
     let sigma =
         StartSigma { gyro_bias: imu.gyro_bias_sigma, accel_bias: imu.accel_bias_sigma, ..StartSigma::default() };
     let mut rng = Rng(seed);
-    let motion = simulation.motion(stamp).unwrap();
+    // A stamp that jitters may be a little before the beginning.
+    let motion = simulation.motion(stamp.max(simulation.spline().span().0)).unwrap();
     let pose = motion.world_from_body;
     let tilt = rng.normals().component_mul(&Vector3::new(sigma.tilt, sigma.tilt, 0.0));
     Start {
