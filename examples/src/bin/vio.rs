@@ -177,6 +177,7 @@ const ROUGH: CalibrationSettings = CalibrationSettings {
     camera_attitude_sigma: 0.05,
     time_offset_s: 0.0,
     time_offset_sigma_s: 0.01,
+    stamp_jitter_s: 0.0,
 };
 
 fn track(arguments: &Track) -> Result<(), AnyError> {
