@@ -3,6 +3,7 @@
 pub mod colours;
 pub mod cpu;
 pub mod films;
+pub mod flight;
 pub mod motion;
 pub mod painting;
 pub mod rock;

@@ -2,6 +2,7 @@
 
 mod colour;
 mod compare;
+mod equal_sprays;
 mod learn;
 
 use std::path::{Path, PathBuf};
@@ -17,7 +18,8 @@ use crate::pictures::{PictureError, Rgb};
 
 pub use colour::{ColourFigures, Glazes, compare_colours, read_picture};
 pub use compare::{Row, compare, print_table};
-pub use learn::{Lesson, learn};
+pub use equal_sprays::{EqualSprays, equal_sprays, print_equal_sprays};
+pub use learn::{Lesson, Pictures, ThesisLesson, learn, learn_thesis};
 
 /// Who decides the sprays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

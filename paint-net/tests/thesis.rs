@@ -95,6 +95,14 @@ fn the_painter_paints_what_its_network_says_and_obeys_limits() {
     free.sprays.iter().for_each(|s| kernel.stamp(s, &mut canvas));
     assert!(metrics::psnr(&free.ink, &canvas.map(f64::tanh), None).unwrap() > 150.0);
 
+    // One tile, and one pixel.
+    for side in [12, 1] {
+        let small = Image::filled(side, side, 0.5);
+        let painting = paint(network.clone(), &Task::on_bare_wall(&small), &Limits::default());
+        assert!(painting.ink.data().iter().all(|a| (0.0..=1.0).contains(a)));
+    }
+    assert!(network.paint(&[]).unwrap().is_empty());
+
     let tight = Limits { max_sprays: Some(7), max_volume: 0.05, ..Limits::default() };
     let few = paint(network.clone(), &task, &tight);
     assert!(few.sprays.len() == 7 && few.sprays.iter().all(|s| s.volume <= 0.05));

@@ -37,6 +37,9 @@
 //! | bearing with a tangent basis | Hertzberg et al. 2013; Bloesch et al. 2017 | [`Bearing`] |
 //! | iterated update | Bell and Cathey 1993 | [`GateSettings`] |
 //! | start in motion | closed form of Martinelli 2014, refined: ours | [`MovingSettings`] |
+//! | inertial sensor and foreign poses | Weiss and Siegwart 2011; Lynen et al. 2013 (thesis, Paper II, section 4) | [`PoseFusion`] |
+//! | poses as measurements of the odometry | thesis, outlook: one estimator instead of two; ours | [`Vio::pose`], [`UnifiedVio`] |
+//! | two inertial sensors as one | ours | [`ImuPair`] |
 //! | axes and units of inertial samples | ours | [`check_samples`] |
 //! | one-call evaluation | ours | [`evaluate`] |
 //! | least-squares alignment | Umeyama 1991, Eqs. (40)-(42); Horn 1987 | [`align`] |

@@ -5,10 +5,12 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use paint_net::procedural::Texture;
-use paint_net::train::TrainSettings;
-use paint_net::{Limits, Route, SprayKernel};
+use paint_net::thesis::{Objective, Shape};
+use paint_net::train::{ThesisSettings, TrainSettings};
+use paint_net::{Image, Limits, Route, SprayKernel};
 use paintcopter_examples::paint_image::{
-    Choice, Glazes, Job, Lesson, compare, learn, pictures_in, print_table, read_ink, read_picture,
+    Choice, Glazes, Job, Lesson, Pictures, ThesisLesson, compare, equal_sprays, learn, learn_thesis, pictures_in,
+    print_equal_sprays, print_table, read_ink, read_picture,
 };
 use paintcopter_examples::progress::Stage;
 
@@ -89,35 +91,63 @@ enum Command {
         #[command(flatten)]
         nozzle: Nozzle,
     },
-    /// Trains the network on procedural pictures
-    Train {
-        /// What to train
-        #[arg(long, default_value = "painter")]
-        preset: Preset,
-        /// Seed of the first weights and of all pictures
-        #[arg(long, default_value_t = 1)]
-        seed: u64,
-        /// Steps [default: the preset's]
-        #[arg(long)]
-        steps: Option<usize>,
-        /// Stop after this step; the schedule stays that of all steps [default: go on to the end]
-        #[arg(long)]
-        until: Option<usize>,
-        /// Worker threads; the weights do not depend on it
-        #[arg(long, default_value_t = 1)]
-        threads: usize,
-        /// Checkpoint to go on from
+    /// Compares a trained thesis' network with other painters at its number of sprays
+    EqualSprays {
+        /// Weights: thesis.safetensors of a training with --preset thesis-paint
         #[arg(long, value_name = "FILE")]
-        resume: Option<PathBuf>,
-        /// Folder for the weights, the checkpoint and the curve
-        #[arg(long, value_name = "DIR", default_value = "out/training")]
-        out: PathBuf,
+        weights: PathBuf,
+        /// Folder or picture [default: five built-in textures of 128 x 128 pixels]
+        pictures: Option<PathBuf>,
     },
+    /// Trains a network: the feedback painter's, or the thesis' on digits or on procedural patches
+    Train(Training),
+}
+
+#[derive(Args, Clone)]
+struct Training {
+    /// What to train
+    #[arg(long, default_value = "painter")]
+    preset: Preset,
+    /// Folder with the pictures of MNIST, or the file; for thesis-mnist
+    #[arg(long, value_name = "PATH", required_if_eq("preset", "thesis-mnist"))]
+    data: Option<PathBuf>,
+    /// Seed of the first weights and of all pictures
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Steps [default: the preset's]
+    #[arg(long)]
+    steps: Option<usize>,
+    /// Stop after this step; the schedule stays that of all steps [default: go on to the end]
+    #[arg(long)]
+    until: Option<usize>,
+    /// Pictures per step [default: the preset's]
+    #[arg(long)]
+    batch: Option<usize>,
+    /// First learning rate [default: the preset's]
+    #[arg(long)]
+    rate: Option<f64>,
+    /// Last learning rate, for the thesis' presets [default: the thesis']
+    #[arg(long)]
+    last_rate: Option<f64>,
+    /// Train the thesis' network as its algorithm is printed: the decision to paint on does not scale the volume
+    #[arg(long)]
+    as_printed: bool,
+    /// Worker threads; the weights do not depend on it
+    #[arg(long, default_value_t = 1)]
+    threads: usize,
+    /// Checkpoint to go on from
+    #[arg(long, value_name = "FILE")]
+    resume: Option<PathBuf>,
+    /// Folder for the weights, the checkpoint, the curve and the film
+    #[arg(long, value_name = "DIR", default_value = "out/training")]
+    out: PathBuf,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Preset {
     Painter,
+    ThesisMnist,
+    ThesisPaint,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -164,22 +194,63 @@ fn run(arguments: Arguments) -> Result<(), AnyError> {
             }
         }
         Some(Command::Compare { pictures, runs, nozzle }) => {
-            let pictures = match pictures {
-                Some(path) => pictures_in(&path)?.iter().map(|p| read_ink(p)).collect::<Result<_, _>>()?,
-                None => Texture::ALL.map(|t| t.image(1000, 128)).to_vec(),
-            };
+            let pictures = pictures_or_textures(pictures)?;
             print!("{}", print_table(&compare(&job(PainterName::Feedback, &nozzle)?, &pictures, runs)?));
             Ok(())
         }
-        Some(Command::Train { preset: Preset::Painter, seed, steps, until, threads, resume, out }) => {
-            create(&out)?;
-            let preset = TrainSettings::default();
-            let settings = TrainSettings { seed, threads, steps: steps.unwrap_or(preset.steps), ..preset };
-            learn(&Lesson { settings, resume, until, save_every: 500 }, &out)?;
-            println!("{}", out.join("painter.safetensors").display());
+        Some(Command::EqualSprays { weights, pictures }) => {
+            print!("{}", print_equal_sprays(&equal_sprays(&weights, &pictures_or_textures(pictures)?)?));
             Ok(())
         }
+        Some(Command::Train(training)) => train(training),
     }
+}
+
+fn pictures_or_textures(pictures: Option<PathBuf>) -> Result<Vec<Image>, AnyError> {
+    Ok(match pictures {
+        Some(path) => pictures_in(&path)?.iter().map(|p| read_ink(p)).collect::<Result<_, _>>()?,
+        None => Texture::ALL.map(|t| t.image(1000, 128)).to_vec(),
+    })
+}
+
+fn train(training: Training) -> Result<(), AnyError> {
+    let Training { preset, data, seed, steps, until, batch, rate, last_rate, as_printed, threads, resume, out } =
+        training;
+    create(&out)?;
+    let (shape, pictures) = match preset {
+        Preset::Painter => {
+            let preset = TrainSettings::default();
+            let settings = TrainSettings {
+                seed,
+                threads,
+                steps: steps.unwrap_or(preset.steps),
+                batch: batch.unwrap_or(preset.batch),
+                learning_rate: rate.unwrap_or(preset.learning_rate),
+                ..preset
+            };
+            learn(&Lesson { settings, resume, until, save_every: 500 }, &out)?;
+            println!("{}", out.join("painter.safetensors").display());
+            return Ok(());
+        }
+        // The command line requires the data.
+        Preset::ThesisMnist => (Shape::MNIST, Pictures::Digits(data.unwrap_or_default())),
+        Preset::ThesisPaint => (Shape::PAINT, Pictures::Patches),
+    };
+    let preset = ThesisSettings::default();
+    let settings = ThesisSettings {
+        seed,
+        shape,
+        threads,
+        steps: steps.unwrap_or(preset.steps),
+        batch: batch.unwrap_or(preset.batch),
+        learning_rate: rate.unwrap_or(preset.learning_rate),
+        last_learning_rate: last_rate.unwrap_or(preset.last_learning_rate),
+        objective: Objective { gated: !as_printed, ..preset.objective },
+        ..preset
+    };
+    learn_thesis(&ThesisLesson { settings, pictures, resume, until, save_every: 100 }, &out)?;
+    println!("{}", out.join("thesis.safetensors").display());
+    Ok(())
 }
 
 fn job(painter: PainterName, nozzle: &Nozzle) -> Result<Job, AnyError> {

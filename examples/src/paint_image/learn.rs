@@ -1,3 +1,8 @@
+mod digits;
+mod film;
+mod gzip;
+mod thesis;
+
 use std::path::{Path, PathBuf};
 
 use paint_net::train::{TrainSettings, Trainer};
@@ -6,6 +11,8 @@ use serde::Serialize;
 use super::{PaintImageError, write_json};
 use crate::pictures::{Panel, save_curves};
 use crate::progress::Stage;
+
+pub use thesis::{Pictures, ThesisLesson, learn_thesis};
 
 /// Steps between two points of the curve.
 const POINT: usize = 50;

@@ -1,4 +1,4 @@
-//! Loss and gradients against another program (PyTorch), at equal weights, pictures and noise: both rows of Table 8.1.
+//! Loss and gradients against another program (`PyTorch`), at equal weights, pictures and noise: both rows of Table 8.1.
 //! `benches/peers/thesis_reference.py` wrote the file; both draw weights, pictures and noise from the same hash.
 
 use super::adjoint::ModelAdjoint;

@@ -35,6 +35,9 @@ impl Network {
     /// Paints pictures of `side` x `side` pixels, without noise: for each the steps up to the stop. `pictures`: wanted ink in
     /// `[0, 1]` and the depth of paint that is there already.
     pub fn paint(&self, pictures: &[(Image, Option<Image>)]) -> Result<Vec<Vec<Step>>, Error> {
+        if pictures.is_empty() {
+            return Ok(Vec::new());
+        }
         let shape = self.shape();
         let expected = (shape.side, shape.side);
         let (mut wanted, mut before) = (Vec::new(), Vec::new());

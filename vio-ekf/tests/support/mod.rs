@@ -5,7 +5,9 @@
 
 pub(crate) mod abuse;
 pub(crate) mod flight;
+pub(crate) mod imus;
 pub(crate) mod sequences;
+pub(crate) mod tracker;
 
 use std::path::PathBuf;
 use std::process::Command;
