@@ -36,7 +36,8 @@
 //! | motion between images, its noise | Forster et al. 2017 | [`Vio::imu`], [`ImuNoise`] |
 //! | bearing with a tangent basis | Hertzberg et al. 2013; Bloesch et al. 2017 | [`Bearing`] |
 //! | iterated update | Bell and Cathey 1993 | [`GateSettings`] |
-//! | start in motion | closed form of Martinelli 2014, refined: ours | [`MovingSettings`] |
+//! | start in motion | gyroscope: Kneip and Lynen 2013; closed form: Martinelli 2014; refined: ours | [`MovingSettings`] |
+//! | noise that samples show | ours | [`SensorSettings`] |
 //! | inertial sensor and foreign poses | Weiss and Siegwart 2011; Lynen et al. 2013 (thesis, Paper II, section 4) | [`PoseFusion`] |
 //! | poses as measurements of the odometry | thesis, outlook: one estimator instead of two; ours | [`Vio::pose`], [`UnifiedVio`] |
 //! | two inertial sensors as one | ours | [`ImuPair`] |

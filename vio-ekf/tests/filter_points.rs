@@ -7,8 +7,8 @@ mod support;
 use nalgebra::{Isometry3, SVector};
 use support::flight::{Flight, nees};
 use vio_ekf::{
-    CalibrationSettings, Error, ImageView, Imu, LandmarkSettings, PointObservation, SensorSettings, Settings, Stamp,
-    Start, StartSigma, Status, Vio, chi2, nalgebra, so3,
+    CalibrationSettings, Error, ImageView, Imu, LandmarkSettings, MovingSettings, PointObservation, SensorSettings,
+    Settings, Stamp, Start, StartSigma, Status, Vio, chi2, nalgebra, so3,
 };
 
 #[test]
@@ -189,6 +189,12 @@ fn refuses_what_it_cannot_use() {
     assert!(matches!(
         Vio::new(flight.camera, flight.noise, settings),
         Err(Error::InvalidSetting { name: "features", .. })
+    ));
+    let moving = MovingSettings { pixel_sigma: 0.0, ..MovingSettings::default() };
+    let settings = Settings { moving, ..Settings::default() };
+    assert!(matches!(
+        Vio::new(flight.camera, flight.noise, settings),
+        Err(Error::InvalidSetting { name: "moving.pixel_sigma", .. })
     ));
     let mut vio = Vio::new(flight.camera, flight.noise, Settings::default()).unwrap();
     let start = flight.drawn_start(StartSigma::default());

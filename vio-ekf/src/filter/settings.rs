@@ -201,6 +201,13 @@ impl Settings {
             ("gyro_range", self.sensor.gyro_range),
             ("accel_range", self.sensor.accel_range),
             ("roughness", self.sensor.roughness),
+            ("moving.least_s", self.moving.least_s),
+            ("moving.outlook_s", self.moving.outlook_s),
+            ("moving.pixel_sigma", self.moving.pixel_sigma),
+            ("moving.misfit", self.moving.misfit),
+            ("moving.scale_sigma", self.moving.scale_sigma),
+            ("moving.gyro_bias_sigma", self.moving.gyro_bias_sigma),
+            ("moving.accel_bias_sigma", self.moving.accel_bias_sigma),
         ] {
             if !(value > 0.0 && value.is_finite()) {
                 return Err(invalid(name, value, "must be positive"));
@@ -220,6 +227,7 @@ impl Settings {
             ("camera_attitude_sigma", self.calibration.camera_attitude_sigma),
             ("time_offset_sigma_s", self.calibration.time_offset_sigma_s),
             ("stamp_jitter_s", self.calibration.stamp_jitter_s),
+            ("moving.doubt_s", self.moving.doubt_s),
             ("pixel_sigma", self.patches.pixel_sigma),
             ("drift", self.patches.drift),
             ("score", self.patches.score),
