@@ -55,7 +55,7 @@ pub enum Arrival {
     /// Points that the camera has seen.
     Points(Stamp, Vec<PointObservation>),
     /// A pose of the body in the world.
-    Pose(PoseMeasurement),
+    Pose(Box<PoseMeasurement>),
 }
 
 /// A flight, recorded.
@@ -116,7 +116,7 @@ impl Flight {
                 so3::exp(&turn) * truth.rotation,
             );
             let pose = PoseMeasurement::isotropic(0, stamp, pose, position, attitude);
-            timed.push((stamp.nanos() + delay, Arrival::Pose(pose)));
+            timed.push((stamp.nanos() + delay, Arrival::Pose(Box::new(pose))));
         }
         timed.sort_by_key(|(at, _)| *at);
         let arrivals = timed.into_iter().map(|(_, arrival)| arrival).collect();

@@ -18,7 +18,7 @@ mod tuning;
 pub use compare::{Comparison, compare};
 pub use error::VioError;
 pub use euroc_folder::{Overrides, open_euroc};
-pub use judge::{ErrorAt, Judgement, judge};
+pub use judge::{AlignedPair, ErrorAt, Judgement, judge};
 pub use mcap_in::open_mcap;
 pub use picture::Grey;
 pub use recording::{Images, Recording, Shot, Truth};

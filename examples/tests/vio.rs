@@ -1,6 +1,7 @@
 //! The odometry as people run it: folders and MCAP files in, trajectories and figures out, and what is wrong is named.
 #![allow(clippy::unwrap_used)]
 
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -250,6 +251,41 @@ fn swapped_axes_are_found_by_the_gravity_test() {
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{text}");
     assert!(text.contains("gravity test") && text.contains("axes"), "{text}");
+}
+
+/// A circle, seen in another frame, a centimetre too high and too low in turns: then the error is a centimetre.
+#[test]
+fn trajectories_are_compared() {
+    let s = Scratch::new("eval");
+    let (mut reference, mut estimate) = (String::from("# t x y z q\n"), String::new());
+    let (sin, cos) = 0.25_f64.sin_cos();
+    for k in 0..2000 {
+        let angle = 0.01 * f64::from(k);
+        let (x, y, z) = (2.0 * angle.cos(), 2.0 * angle.sin(), 0.1 * angle.cos());
+        let up = if k % 2 == 0 { 0.01 } else { -0.01 };
+        let t = 0.05 * f64::from(k);
+        writeln!(reference, "{t} {x} {y} {z} 0 0 0 1").unwrap();
+        // Turned by half a radian about the vertical and shifted.
+        let (c, s2) = (0.5_f64.cos(), 0.5_f64.sin());
+        writeln!(estimate, "{t} {} {} {} 0 0 {sin} {cos}", c * x - s2 * y + 3.0, s2 * x + c * y - 1.0, z + up + 7.0)
+            .unwrap();
+    }
+    let [a, b] = [("a.tum", reference), ("b.tum", estimate)].map(|(name, text)| {
+        std::fs::write(s.0.join(name), text).unwrap();
+        s.0.join(name)
+    });
+    let output = vio(&["eval", a.to_str().unwrap(), b.to_str().unwrap()], &s.0.join("out"));
+    let table = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success() && table.contains("2000 pairs") && table.contains("100.0 %"), "{table}");
+    let report: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(s.0.join("out/report.json")).unwrap()).unwrap();
+    for key in ["ate_yaw_rmse_m", "ate_se3_rmse_m"] {
+        let value = report[key].as_f64().unwrap();
+        assert!((value - 0.01).abs() < 1e-4, "{key}: {value}");
+    }
+    assert!(report["ate_yaw_rotation_rmse_rad"].as_f64().unwrap() < 1e-3);
+    let missing = vio(&["eval", a.to_str().unwrap(), "no/such.tum"], &s.0.join("out"));
+    assert!(String::from_utf8_lossy(&missing.stderr).contains("no/such.tum") && missing.status.code() == Some(1));
 }
 
 /// The whole of what can be done with the real images that are there: a vehicle that hardly moves for 4.7 s.

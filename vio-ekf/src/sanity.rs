@@ -6,7 +6,7 @@ use crate::{Error, Imu, so3};
 /// Length of the pieces over which the gyroscope is integrated, s: short enough for one without calibration.
 const WINDOW_S: f64 = 8.0;
 /// Forces are averaged over this first, s: vibration and most of the acceleration of a flight cancel.
-const BLOCK_S: f64 = 1.0;
+const BLOCK_S: f64 = 2.6;
 /// The mean force may differ from gravity by this, m/s²: acceleration, and the bias.
 const GRAVITY_TOLERANCE: f64 = 2.0;
 /// Measured and claimed rate may differ by this share.
@@ -15,8 +15,9 @@ const RATE_TOLERANCE: f64 = 0.2;
 const GAP: f64 = 5.0;
 /// Another assignment of the axes is held to be the right one if it scatters gravity less by this factor...
 const CLEARER: f64 = 0.6;
-/// ... and by this much, (m/s²)²: where little turns, all assignments look alike.
-const CLEAR: f64 = 0.5;
+/// ... and if the one given scatters it by more than this, (m/s²)²: less is what changes of speed make, 5 m/s from block to
+/// block. A multirotor's force stays along its own axis: an assignment that turns about that axis smears nothing at all.
+const IMPLAUSIBLE: f64 = 3.5;
 
 /// What [`check_samples`] found in samples that it did not refuse.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,7 +33,7 @@ pub struct SampleFindings {
 /// Whether inertial samples can be what they claim to be: finite, in order, as frequent as said, and with a force that
 /// averages to gravity when the gyroscope's turns are taken out.
 ///
-/// The last is a test of axes and units that needs no calibration and no camera. Second by second the mean of
+/// The last is a test of axes and units that needs no calibration and no camera. Piece by piece, 2.6 s each, the mean of
 /// `R_k f_k`, with `R_k` integrated from the gyroscope, is gravity up to the change of speed. If the axes of one sensor are swapped or
 /// mirrored against those of the other, gravity is smeared instead; the 24 rotations by quarters, each with both signs of
 /// the gyroscope, are tried, and one that does much better is named. Motion that
@@ -150,7 +151,7 @@ fn check_gravity(windows: &[Window], gravity: f64) -> Result<(), Error> {
         .map(|(axes, sign)| (scatter(&axes, sign), axes, sign))
         .min_by(|a, b| a.0.total_cmp(&b.0));
     match best {
-        Some((least, axes, sign)) if least < CLEARER * as_given && as_given - least > CLEAR => {
+        Some((least, axes, sign)) if least < CLEARER * as_given && as_given > IMPLAUSIBLE => {
             let gyroscope = if sign == 0 { "" } else { ", and the gyroscope negated" };
             Err(Error::SwappedAxes { hint: format!("{}{gyroscope}", names(&axes)) })
         }

@@ -124,9 +124,11 @@ pub fn tune(
     config.rho_begin = settings.step;
     config.rho_end = settings.precision;
     config.max_fun = settings.evaluations;
-    // Landmarks come and go: the cost has small steps everywhere, on which one convergence may rest too early.
+    // Landmarks come and go: the cost has small steps everywhere, on which one convergence rests too early.
     let mut restart = RestartConfig::new();
     restart.cycle_budget_frac = 0.0;
+    restart.max_restarts = 5;
+    restart.improve_rel_tol = 1e-3;
     config.restart = Some(restart);
     let refused = |_| invalid("evaluations", settings.evaluations as f64, "leaves no search");
     let mut solver = Bobyqa::new(start.len(), config).map_err(refused)?;

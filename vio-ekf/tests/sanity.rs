@@ -3,10 +3,11 @@
 
 mod support;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 use support::flight::{Flight, GRAVITY};
 use support::recorded;
-use vio_ekf::{Error, Imu, Stamp, asl, check_samples, nalgebra};
+use vio_ekf::sim::ImuModel;
+use vio_ekf::{Error, Imu, Spline, Stamp, asl, check_samples, nalgebra};
 
 /// A simulated flight that tilts by about 15 degrees, and real ones where they are there.
 fn recordings() -> Vec<(&'static str, Vec<Imu>)> {
@@ -91,4 +92,20 @@ fn units_rates_and_order_are_checked() {
         .map(|k| Imu { stamp: Stamp::from_nanos(5_000_000 * k), gyro: Vector3::zeros(), accel: Vector3::x() * GRAVITY })
         .collect();
     assert!(check_samples(&rest, 200.0, GRAVITY).is_ok());
+}
+
+/// A multirotor leans into the way it accelerates: its force stays along its own axis, whatever it does.
+#[test]
+fn a_flight_that_leans_as_it_accelerates_is_no_swap_of_axes() {
+    let (frequency, reach) = (0.87_f64, 1.8);
+    let knots = (0..200).map(|k| {
+        let along = reach * (frequency * 0.05 * f64::from(k)).sin();
+        let lean = (frequency * frequency * along / GRAVITY).atan();
+        Isometry3::new(Vector3::new(0.0, along, 1.0), Vector3::new(lean, 0.0, 0.0))
+    });
+    let spline = Spline::new(Stamp::from_nanos(0), 50_000_000, knots.collect()).unwrap();
+    let samples = ImuModel::ideal(200.0).record(&spline, GRAVITY, 1).unwrap().samples;
+    // It does: sideways forces are below a tenth of what the acceleration is.
+    assert!(samples.iter().all(|sample| sample.accel.xy().norm() < 0.15));
+    assert!(check_samples(&samples, 200.0, GRAVITY).is_ok());
 }

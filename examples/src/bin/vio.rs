@@ -172,13 +172,14 @@ fn main() -> ExitCode {
 }
 
 /// How far the calibration may be off with `--calibrate`: what a ruler and a guess leave.
-const ROUGH: CalibrationSettings = CalibrationSettings {
-    camera_position_sigma_m: 0.03,
-    camera_attitude_sigma: 0.05,
-    time_offset_s: 0.0,
-    time_offset_sigma_s: 0.01,
-    stamp_jitter_s: 0.0,
-};
+fn rough() -> CalibrationSettings {
+    CalibrationSettings {
+        camera_position_sigma_m: 0.03,
+        camera_attitude_sigma: 0.05,
+        time_offset_sigma_s: 0.01,
+        ..CalibrationSettings::default()
+    }
+}
 
 fn track(arguments: &Track) -> Result<(), AnyError> {
     let folder = &arguments.out;
@@ -190,7 +191,7 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         (None, Some(file)) => open_mcap(file, &overrides)?,
         (None, None) => return Err("name a recording with --euroc or --mcap".into()),
     };
-    let calibration = if arguments.calibrate { ROUGH } else { CalibrationSettings::default() };
+    let calibration = if arguments.calibrate { rough() } else { CalibrationSettings::default() };
     let filter = Settings { features: arguments.features, calibration, ..Settings::default() };
     filter.check()?;
     let findings = recording.check(filter.gravity)?;

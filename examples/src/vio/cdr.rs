@@ -67,3 +67,27 @@ impl<'a> Cdr<'a> {
         Some((Stamp::from_nanos(seconds * 1_000_000_000 + nanos), self.string()?))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A header, a byte and a number, in both orders of bytes: from the rules of the encoding, not from our writer.
+    #[test]
+    fn both_byte_orders_are_read_and_alignment_counts_from_the_fifth_byte() {
+        // The number lies at the sixteenth byte of the body, the twentieth of all: no padding, if counted rightly.
+        let text = [b'a', b'b', 0, 5];
+        let little = [&[0, 1, 0, 0, 7, 0, 0, 0, 9, 0, 0, 0, 3, 0, 0, 0], &text[..], &1.5_f64.to_le_bytes()].concat();
+        let big = [&[0, 0, 0, 0, 0, 0, 0, 7, 0, 0, 0, 9, 0, 0, 0, 3], &text[..], &1.5_f64.to_be_bytes()].concat();
+        for bytes in [little, big] {
+            let mut cdr = Cdr::new(&bytes).unwrap_or_else(|| panic!("no encoding"));
+            assert_eq!(cdr.header(), Some((Stamp::from_nanos(7_000_000_009), "ab")));
+            assert_eq!(cdr.byte(), Some(5));
+            assert_eq!(cdr.f64s::<1>().map(|[v]| v), Some(1.5));
+            assert_eq!(cdr.byte(), None);
+        }
+        assert!(Cdr::new(&[0, 3, 0, 0]).is_none() && Cdr::new(&[0]).is_none());
+        // A length beyond the end.
+        assert_eq!(Cdr::new(&[0, 1, 0, 0, 255, 255, 255, 255, 1]).and_then(|mut cdr| cdr.string()), None);
+    }
+}

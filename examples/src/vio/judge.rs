@@ -15,6 +15,9 @@ const TRUTH_SIGMA: [f64; 3] = [1e-3, 1.7e-3, 3e-3];
 /// Path length of the relative error, m.
 const RPE_LENGTH: f64 = 10.0;
 
+/// Time, true pose, and estimated pose moved into the truth's world.
+pub type AlignedPair = (Stamp, Isometry3<f64>, Isometry3<f64>);
+
 /// How good a run is.
 #[derive(Debug, Clone)]
 pub struct Judgement {
@@ -33,7 +36,7 @@ pub struct Judgement {
     /// Share of the truth's duration for which there is an estimate.
     pub coverage: f64,
     /// Truth and estimate in the truth's world, aligned in position and yaw.
-    pub aligned: Vec<(Stamp, Isometry3<f64>, Isometry3<f64>)>,
+    pub aligned: Vec<AlignedPair>,
     /// Errors and what the filter thought of them, for each pose.
     pub errors: Vec<ErrorAt>,
 }

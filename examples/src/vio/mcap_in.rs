@@ -129,7 +129,7 @@ impl Found {
                 self.image_stamps.extend(image_stamp(name, data));
             }
             "foxglove.CameraCalibration" => {
-                self.camera = Some(messages::CameraCalibration::decode(data).map_err(|_| bad())?)
+                self.camera = Some(messages::CameraCalibration::decode(data).map_err(|_| bad())?);
             }
             "foxglove.FrameTransform" => self.frames.push(FrameTransform::decode(data).map_err(|_| bad())?),
             "foxglove.FrameTransforms" if self.frames.len() < 1000 => {
@@ -302,4 +302,26 @@ fn unpack(encoding: &str, (width, height, step): (usize, usize, usize), data: &[
     };
     let rows = data.chunks_exact(step.max(1)).take(height);
     Ok(Grey { width, height, data: rows.flat_map(|r| r[..row].chunks_exact(channels).map(luma)).collect() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_are_unpacked_with_padding_and_colours_by_their_weight() {
+        let grey = |encoding: &str, size, data: &[u8]| unpack(encoding, size, data).map(|grey| grey.data);
+        assert_eq!(grey("mono8", (2, 2, 3), &[1, 2, 99, 3, 4, 99]), Ok(vec![1, 2, 3, 4]));
+        // Red, green and blue alone: 29.9, 58.7 and 11.4 per cent.
+        let colours = [255, 0, 0, 0, 255, 0, 0, 0, 255];
+        assert_eq!(grey("rgb8", (3, 1, 9), &colours), Ok(vec![76, 150, 29]));
+        assert_eq!(grey("bgr8", (3, 1, 9), &colours), Ok(vec![29, 150, 76]));
+        assert_eq!(grey("bgra8", (1, 1, 4), &[0, 0, 255, 7]), Ok(vec![76]));
+        for (encoding, size, data) in
+            [("mono8", (2, 2, 1), &[0; 9][..]), ("mono8", (2, 2, 2), &[0; 3]), ("mono16", (1, 1, 2), &[0; 2])]
+        {
+            assert!(grey(encoding, size, data).is_err(), "{encoding} {size:?}");
+        }
+        assert!(unpack("rgb8", (usize::MAX, 1, usize::MAX), &[0; 4]).is_err());
+    }
 }

@@ -1,8 +1,9 @@
 use std::path::Path;
 
 use vio_ekf::nalgebra::Vector3;
-use vio_ekf::{Stamp, Trajectory, so3};
+use vio_ekf::{Trajectory, so3};
 
+use super::judge::AlignedPair;
 use super::{Judgement, Run, VioError};
 use crate::pictures::{Panel, PathPanel, save_curves, save_paths};
 
@@ -65,10 +66,9 @@ fn save_state(run: &Run, path: &Path) -> Result<(), VioError> {
 
 fn save_errors(judgement: &Judgement, path: &Path) -> Result<(), VioError> {
     let Some(&(first, ..)) = judgement.aligned.first() else { return Ok(()) };
-    let curve =
-        |value: &dyn Fn(&(Stamp, vio_ekf::nalgebra::Isometry3<f64>, vio_ekf::nalgebra::Isometry3<f64>)) -> f64| {
-            thinned(judgement.aligned.iter().map(|at| (at.0.secs_since(first), value(at))).collect())
-        };
+    let curve = |value: &dyn Fn(&AlignedPair) -> f64| {
+        thinned(judgement.aligned.iter().map(|at| (at.0.secs_since(first), value(at))).collect())
+    };
     let position = curve(&|(_, g, e)| 100.0 * (g.translation.vector - e.translation.vector).norm());
     let attitude = curve(&|(_, g, e)| so3::angle_between(&g.rotation, &e.rotation).to_degrees());
     let panels = [

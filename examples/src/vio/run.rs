@@ -137,7 +137,10 @@ impl<'a> Driver<'a> {
     fn shot(&mut self, Shot { stamp, picture }: Shot) -> Result<(), VioError> {
         let picture = match picture {
             Ok(picture) => picture,
-            Err(why) => return self.skip(why),
+            Err(why) => {
+                self.skip(why);
+                return Ok(());
+            }
         };
         let expected = self.recording.camera.camera;
         if (picture.width, picture.height) != (expected.width, expected.height) {
@@ -147,10 +150,12 @@ impl<'a> Driver<'a> {
             if self.frames == 0 {
                 return Err(VioError::Unusable { recording: self.recording.name.clone(), why });
             }
-            return self.skip(format!("image of {stamp} s: {why}"));
+            self.skip(format!("image of {stamp} s: {why}"));
+            return Ok(());
         }
         if self.last_image.is_some_and(|last| stamp <= last) {
-            return self.skip(format!("image of {stamp} s: another one of that time or later came before it"));
+            self.skip(format!("image of {stamp} s: another one of that time or later came before it"));
+            return Ok(());
         }
         self.feed_until(stamp)?;
         let began = ThreadTime::now();
@@ -158,7 +163,8 @@ impl<'a> Driver<'a> {
             Ok(report) => report,
             // Before the first sample, or after the last one.
             Err(error @ (Error::Late { .. } | Error::OutOfRange { .. })) => {
-                return self.skip(format!("image of {stamp} s: {error}"));
+                self.skip(format!("image of {stamp} s: {error}"));
+                return Ok(());
             }
             Err(error) => return Err(error.into()),
         };
@@ -174,9 +180,8 @@ impl<'a> Driver<'a> {
         Ok(())
     }
 
-    fn skip(&mut self, why: String) -> Result<(), VioError> {
+    fn skip(&mut self, why: String) {
         self.skipped.push(why);
-        Ok(())
     }
 
     /// Feeds the samples up to the first one that is not before the image.

@@ -1,5 +1,6 @@
 //! Noise settings from recordings: what is run, what it costs, and the page about it.
 
+use std::f64::consts::LN_10;
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::Write as _;
@@ -262,9 +263,11 @@ fn save(
     (trials, random): (&[Trial], &[Trial]),
     folder: &Path,
 ) -> Result<(), VioError> {
-    let mut curves = vec![("search", best_so_far(trials))];
+    // What is worse than the start would hide the rest.
+    let better = |of: &[Trial]| best_so_far(of).into_iter().filter(|point| point.1 <= trials[0].cost / LN_10).collect();
+    let mut curves = vec![("search", better(trials))];
     if !random.is_empty() {
-        curves.push(("random points", best_so_far(random)));
+        curves.push(("random points", better(random)));
     }
     let powers = |k: usize| trials.iter().enumerate().map(|(i, t)| (i as f64 + 1.0, t.point[k])).collect();
     let panels = [
@@ -333,7 +336,7 @@ fn best_so_far(trials: &[Trial]) -> Vec<(f64, f64)> {
     let mut least = f64::INFINITY;
     let mut lower = |(index, trial): (usize, &Trial)| {
         least = least.min(trial.cost);
-        (index as f64 + 1.0, least / std::f64::consts::LN_10)
+        (index as f64 + 1.0, least / LN_10)
     };
     trials.iter().enumerate().map(&mut lower).collect()
 }
@@ -348,7 +351,8 @@ fn uniform(state: &mut u64) -> f64 {
 
 /// Numbers are written so that they read back to the last bit.
 fn line(point: &NoisePoint, cost: f64) -> String {
-    point.iter().map(|power| format!("{power},")).collect::<String>() + &format!("{cost}\n")
+    let [a, b, c, d, e] = point;
+    format!("{a},{b},{c},{d},{e},{cost}\n")
 }
 
 fn trials_text(trials: &[Trial]) -> String {
