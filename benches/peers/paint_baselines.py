@@ -23,7 +23,9 @@ for _k in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_k, "1")
 import argparse
 import json
+import struct
 import time
+import zlib
 
 import numpy as np
 from scipy import ndimage as ndi
@@ -69,6 +71,26 @@ def run_export(a):
         path = os.path.join(a.to, name + ".png")
         io.imsave(path, np.round((1 - y) * 65535).astype(np.uint16), check_contrast=False)
         emit(name, "export", file=path)
+    from skimage import data, transform
+
+    os.makedirs(os.path.join(a.to, "colour"), exist_ok=True)
+    for name in ("astronaut", "coffee"):
+        picture = transform.resize(getattr(data, name)(), (a.size, a.size, 3), anti_aliasing=True).clip(0.02, 1)
+        path = os.path.join(a.to, "colour", name + ".png")
+        save_rgb16(path, np.round(picture * 65535).astype(np.uint16))
+        emit(name, "export", file=path)
+
+
+def save_rgb16(path, picture):
+    """a PNG file of 16 bits in three channels, which the usual writers cannot"""
+    chunk = lambda kind, data: (
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    )
+    height, width, _ = picture.shape
+    rows = b"".join(b"\0" + row.astype(">u2").tobytes() for row in picture)
+    with open(path, "wb") as file:
+        file.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 16, 2, 0, 0, 0)))
+        file.write(chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
 
 
 def psnr(o, y):

@@ -1,5 +1,6 @@
 //! The job of `paint-image`: a picture in, sprays and figures out.
 
+mod colour;
 mod compare;
 mod equal_sprays;
 mod learn;
@@ -8,13 +9,14 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use paint_net::{
-    Coats, Deconvolution, Error, Feedback, FreeSplats, Image, Limits, MatchingPursuit, Painter, Painting, Route,
-    Saturation, SlewLimited, SprayKernel, Task, metrics, slew_violations,
+    Coats, Deconvolution, Error, Feedback, FreeSplats, Image, Layered, Limits, MatchingPursuit, Painter, Painting,
+    Route, Saturation, SlewLimited, SprayKernel, Task, metrics, slew_violations,
 };
 use serde::Serialize;
 
 use crate::pictures::{PictureError, Rgb};
 
+pub use colour::{ColourFigures, Glazes, compare_colours, read_picture};
 pub use compare::{Row, compare, print_table};
 pub use equal_sprays::{EqualSprays, equal_sprays, print_equal_sprays};
 pub use learn::{Lesson, Pictures, ThesisLesson, learn, learn_thesis};
@@ -54,6 +56,8 @@ pub struct Job {
     pub largest_change: Option<f64>,
     /// The path for which that holds.
     pub route: Route,
+    /// Whether to paint in layers, a base coat first (thesis, Paper IV, section 3.2).
+    pub layers: bool,
     /// Threads of the network.
     pub threads: usize,
 }
@@ -133,7 +137,7 @@ impl Job {
                 ..FreeSplats::default()
             }),
         };
-        Ok(painter)
+        Ok(if self.layers { Box::new(Layered::new(painter)) } else { painter })
     }
 
     /// Decides the sprays for a wanted picture of ink.

@@ -106,6 +106,58 @@ fn a_slow_valve_is_obeyed() {
 }
 
 #[test]
+fn a_picture_in_colour_becomes_commands_of_every_paint() {
+    let scratch = Scratch::new("colour");
+    image::RgbImage::from_fn(36, 20, |x, y| image::Rgb([250 - 5 * x as u8, 120 + 6 * y as u8, 200]))
+        .save(scratch.path("in.png"))
+        .unwrap();
+    for (palette, count) in [("cmy", 3), ("six", 6)] {
+        let out = scratch.path(palette);
+        let output = run(&["--image", &scratch.path("in.png"), "--palette", palette, "--out", &out]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let (report, commands) = (json(&format!("{out}/report.json")), json(&format!("{out}/commands.json")));
+        assert!(report["ciede2000_mean"].as_f64().unwrap() < 3.0, "{report}");
+        assert_eq!(commands["paints"].as_array().unwrap().len(), count);
+        let sprays = commands["sprays"].as_array().unwrap();
+        assert_eq!(sprays.len() as u64, report["sprays"].as_u64().unwrap());
+        assert!(sprays.iter().all(|s| s[4].as_u64().unwrap() < count as u64));
+        // The commands alone give the picture: glazes by Beer and Lambert, rendered here by the definition.
+        let rendered = image::open(format!("{out}/rendered.png")).unwrap().to_rgb8();
+        let of = |s: &serde_json::Value, k: usize| s[k].as_f64().unwrap();
+        for (x, y) in [(5.0, 5.0), (20.0, 11.0)] {
+            for band in 0..3 {
+                let near = |s: &&serde_json::Value| (of(s, 0) - x).abs() <= 4.0 && (of(s, 1) - y).abs() <= 4.0;
+                let absorbed = |s: &serde_json::Value| {
+                    let squared = (of(s, 0) - x).powi(2) + (of(s, 1) - y).powi(2);
+                    let k =
+                        commands["spray_model"]["absorption"][s[4].as_u64().unwrap() as usize][band].as_f64().unwrap();
+                    2.0 * k * of(s, 2) * (-squared / (2.0 * of(s, 3).powi(2))).exp()
+                };
+                let expected = 255.0 * (-sprays.iter().filter(near).map(absorbed).sum::<f64>()).exp();
+                let found = f64::from(rendered.get_pixel(x as u32, y as u32).0[band]);
+                assert!((found - expected).abs() <= 0.6, "{palette}, band {band}: {found} {expected}");
+            }
+        }
+    }
+}
+
+#[test]
+fn layers_are_sprayed_one_after_the_other() {
+    let scratch = Scratch::new("layers");
+    image::GrayImage::from_fn(40, 30, |x, _| image::Luma([250 - 6 * x as u8])).save(scratch.path("in.png")).unwrap();
+    let report = |extra: &[&str], out: &str| {
+        let image = scratch.path("in.png");
+        let output = run(&[&["--image", &image, "--out", out], extra].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        json(&format!("{out}/report.json"))
+    };
+    let (whole, layers) = (report(&[], &scratch.path("whole")), report(&["--layers"], &scratch.path("layers")));
+    let of = |report: &serde_json::Value, key: &str| report[key].as_f64().unwrap();
+    assert!(of(&layers, "sprays") > 1.5 * of(&whole, "sprays"), "every layer sprays");
+    assert!((of(&layers, "psnr_db") - of(&whole, "psnr_db")).abs() < 0.01, "the layers add up to the whole");
+}
+
+#[test]
 fn a_blank_picture_gets_no_spray() {
     let scratch = Scratch::new("blank");
     image::GrayImage::from_pixel(3, 50, image::Luma([255])).save(scratch.path("in.png")).unwrap();

@@ -10,7 +10,7 @@ use clap::{Parser, Subcommand};
 use paint_sim::ciede2000;
 use paint_sim::colour::BANDS;
 use paintcopter_benches::cpu::{Clock, median_seconds};
-use paintcopter_benches::{Rng, films, motion, painting, room};
+use paintcopter_benches::{Rng, colours, films, motion, painting, room};
 use paintcopter_examples::mesh_io::read_mesh;
 use paintcopter_examples::world::rock_wall;
 use serde_json::json;
@@ -55,6 +55,15 @@ enum Job {
         /// Side of the pictures, pixels
         #[arg(long, default_value_t = 128, value_parser = clap::value_parser!(u16).range(16..=2048))]
         size: u16,
+        /// Runs of which the median is printed
+        #[arg(long, default_value_t = 3)]
+        runs: usize,
+    },
+    /// Paints pictures in several paints, as `paint_baselines.py colour` does
+    Colour {
+        /// Pictures, or folders of them
+        #[arg(long, value_name = "PATH", required = true)]
+        image: Vec<PathBuf>,
         /// Runs of which the median is printed
         #[arg(long, default_value_t = 3)]
         runs: usize,
@@ -110,6 +119,7 @@ fn main() -> ExitCode {
         Job::Rock { file, seed } => rock(&file, seed),
         Job::Uv { mesh, runs, save } => uv(&mesh, runs, save.as_deref()),
         Job::Paint { image, size, runs } => painting::run(&image, size.into(), runs),
+        Job::Colour { image, runs } => colours::run(&image, runs),
         Job::Sim { count, runs } => sim(count as usize, runs),
         Job::Tsdf { stream, voxel, frames, threads, no_colour, out } => {
             tsdf(&stream, voxel, frames, threads.into(), !no_colour, out.as_deref())

@@ -9,8 +9,8 @@ use paint_net::thesis::{Objective, Shape};
 use paint_net::train::{ThesisSettings, TrainSettings};
 use paint_net::{Image, Limits, Route, SprayKernel};
 use paintcopter_examples::paint_image::{
-    Choice, Job, Lesson, Pictures, ThesisLesson, compare, equal_sprays, learn, learn_thesis, pictures_in,
-    print_equal_sprays, print_table, read_ink,
+    Choice, Glazes, Job, Lesson, Pictures, ThesisLesson, compare, equal_sprays, learn, learn_thesis, pictures_in,
+    print_equal_sprays, print_table, read_ink, read_picture,
 };
 use paintcopter_examples::progress::Stage;
 
@@ -32,6 +32,9 @@ struct Arguments {
     /// Who decides the sprays
     #[arg(long, default_value = "feedback")]
     painter: PainterName,
+    /// Paint in colour with these glazes; the painter is then the one of colours
+    #[arg(long)]
+    palette: Option<PaletteName>,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/paint-image")]
     out: PathBuf,
@@ -65,6 +68,9 @@ struct Nozzle {
     /// Path for which that holds: row by row, or along what is alike
     #[arg(long, default_value = "rows")]
     route: RouteName,
+    /// Paint in layers by intensity, the base coat first
+    #[arg(long)]
+    layers: bool,
     /// Looks of the network at its canvas
     #[arg(long, default_value_t = 6)]
     passes: usize,
@@ -154,6 +160,13 @@ enum PainterName {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
+enum PaletteName {
+    Cmy,
+    Cmyk,
+    Six,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
 enum RouteName {
     Rows,
     Alike,
@@ -174,7 +187,11 @@ fn run(arguments: Arguments) -> Result<(), AnyError> {
         None => {
             // The command line requires it.
             let image = arguments.image.unwrap_or_default();
-            paint(&image, &job(arguments.painter, &arguments.nozzle)?, &arguments.out)
+            let job = job(arguments.painter, &arguments.nozzle)?;
+            match arguments.palette {
+                None => paint(&image, &job, &arguments.out),
+                Some(palette) => paint_colours(&image, &job, palette, &arguments.out),
+            }
         }
         Some(Command::Compare { pictures, runs, nozzle }) => {
             let pictures = pictures_or_textures(pictures)?;
@@ -262,6 +279,7 @@ fn job(painter: PainterName, nozzle: &Nozzle) -> Result<Job, AnyError> {
             RouteName::Rows => Route::Rows,
             RouteName::Alike => Route::Alike,
         },
+        layers: nozzle.layers,
         threads: nozzle.threads,
     })
 }
@@ -273,6 +291,23 @@ fn paint(image: &Path, job: &Job, out: &Path) -> Result<(), AnyError> {
     let (painting, figures) = job.paint(&wanted, &mut |share| stage.share(share))?;
     stage.done(&format!("{} sprays, {:.2} dB, {:.1} ms", figures.sprays, figures.psnr_db, figures.cpu_ms));
     job.save(out, &wanted, &painting, &figures)?;
+    println!("{}", out.join("report.json").display());
+    Ok(())
+}
+
+fn paint_colours(image: &Path, job: &Job, palette: PaletteName, out: &Path) -> Result<(), AnyError> {
+    let glazes = match palette {
+        PaletteName::Cmy => Glazes::Cmy,
+        PaletteName::Cmyk => Glazes::Cmyk,
+        PaletteName::Six => Glazes::Six,
+    };
+    let (wanted, palette) = (read_picture(image)?, glazes.palette()?);
+    create(out)?;
+    let stage = Stage::start("paint");
+    let (painting, figures) = job.paint_colours(&wanted, &palette, &mut |share| stage.share(share))?;
+    stage
+        .done(&format!("{} sprays, CIEDE2000 {:.2}, {:.1} ms", figures.sprays, figures.ciede2000_mean, figures.cpu_ms));
+    job.save_colours(out, &palette, &painting, &figures)?;
     println!("{}", out.join("report.json").display());
     Ok(())
 }

@@ -1,0 +1,167 @@
+//! A picture in several paints.
+
+use std::path::Path;
+
+use paint_net::{ColourPainting, ColourTask, Coloured, Paint, Palette, Picture};
+use paint_sim::colour::lab;
+use serde::Serialize;
+
+use super::{Clock, Job, PaintImageError, write_json};
+use crate::pictures::Rgb;
+
+/// Which glazes are in the guns, on a white wall.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Glazes {
+    /// Cyan, magenta, yellow.
+    Cmy,
+    /// The same and black.
+    Cmyk,
+    /// The same, red and green.
+    Six,
+}
+
+impl Glazes {
+    /// The palette; what unit depth over white looks like is that of the peers (`paint_baselines.py colour`).
+    pub fn palette(self) -> Result<Palette, PaintImageError> {
+        let all = [
+            ("cyan", [0.04, 0.52, 0.75]),
+            ("magenta", [0.75, 0.04, 0.35]),
+            ("yellow", [0.92, 0.85, 0.05]),
+            ("black", [0.06; 3]),
+            ("red", [0.8, 0.15, 0.05]),
+            ("green", [0.1, 0.45, 0.15]),
+        ];
+        let count = match self {
+            Self::Cmy => 3,
+            Self::Cmyk => 4,
+            Self::Six => 6,
+        };
+        let paints = all[..count].iter().map(|(name, colour)| Paint::glaze(name, *colour)).collect();
+        Ok(Palette::new([1.0; 3], paints)?)
+    }
+}
+
+/// The figures of one picture in colour; flat, units in the names.
+#[derive(Debug, Clone, Serialize)]
+pub struct ColourFigures {
+    /// Name of the painter.
+    pub painter: &'static str,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Peak signal-to-noise ratio over the stored values of all three bands.
+    pub psnr_db: f64,
+    /// Mean colour difference.
+    pub ciede2000_mean: f64,
+    /// The colour difference that 5 % of the pixels exceed.
+    pub ciede2000_p95: f64,
+    /// Number of sprays, all paints.
+    pub sprays: usize,
+    /// Number of paints.
+    pub paints: usize,
+    /// Sum of the volumes.
+    pub volume_total: f64,
+    /// CPU time of deciding on one thread.
+    pub cpu_ms: f64,
+    /// Threads.
+    pub threads: usize,
+}
+
+/// Reads a picture of any size and depth; transparency shows the white wall.
+pub fn read_picture(path: &Path) -> Result<Picture, PaintImageError> {
+    let unreadable = |why: String| PaintImageError::Unreadable { path: path.display().to_string(), why };
+    let picture = image::open(path).map_err(|e| unreadable(format!("cannot be read as a picture ({e})")))?.to_rgba32f();
+    let over_white = |p: &image::Rgba<f32>| {
+        let [r, g, b, a] = p.0.map(f64::from);
+        [r, g, b].map(|v| (a * v + 1.0 - a).clamp(0.0, 1.0))
+    };
+    let (width, height) = (picture.width() as usize, picture.height() as usize);
+    Picture::new(width, height, picture.pixels().map(over_white).collect()).map_err(|e| unreadable(e.to_string()))
+}
+
+/// Peak signal-to-noise ratio, and mean and 95th percentile of CIEDE2000; both pictures in sRGB as stored.
+pub fn compare_colours(painted: &Picture, wanted: &Picture) -> (f64, f64, f64) {
+    let pairs = painted.data().iter().zip(wanted.data());
+    let squared: f64 = pairs.clone().flat_map(|(a, b)| a.iter().zip(b)).map(|(a, b)| (a - b).powi(2)).sum();
+    let mut differences: Vec<f64> = pairs.map(|(a, b)| paint_sim::ciede2000(lab_of(*a), lab_of(*b))).collect();
+    let mean = differences.iter().sum::<f64>() / differences.len() as f64;
+    differences.sort_unstable_by(f64::total_cmp);
+    let p95 = differences[(0.95 * (differences.len() - 1) as f64) as usize];
+    (-10.0 * (squared / (3 * differences.len()) as f64 + 1e-20).log10(), mean, p95)
+}
+
+/// Stored sRGB to Lab (IEC 61966-2-1, D65).
+fn lab_of(stored: [f64; 3]) -> [f64; 3] {
+    let [r, g, b] = stored.map(|v| if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) });
+    let xyz = [
+        0.4124564 * r + 0.3575761 * g + 0.1804375 * b,
+        0.2126729 * r + 0.7151522 * g + 0.0721750 * b,
+        0.0193339 * r + 0.1191920 * g + 0.9503041 * b,
+    ];
+    lab(xyz, [0.95047, 1.0, 1.08883])
+}
+
+impl Job {
+    /// Decides the sprays of every paint for a wanted picture.
+    pub fn paint_colours(
+        &self,
+        wanted: &Picture,
+        palette: &Palette,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<(ColourPainting, ColourFigures), PaintImageError> {
+        let clock = Clock::start(1);
+        let task = ColourTask::new(wanted);
+        let painting = Coloured::default().paint(&task, palette, &self.kernel, &self.limits, progress)?;
+        let cpu_ms = clock.milliseconds();
+        let (psnr_db, ciede2000_mean, ciede2000_p95) = compare_colours(&painting.picture, wanted);
+        let figures = ColourFigures {
+            painter: "coloured",
+            width: wanted.width(),
+            height: wanted.height(),
+            psnr_db,
+            ciede2000_mean,
+            ciede2000_p95,
+            sprays: painting.sprays.iter().map(Vec::len).sum(),
+            paints: palette.paints().len(),
+            volume_total: painting.sprays.iter().flatten().map(|s| s.volume).sum(),
+            cpu_ms,
+            threads: 1,
+        };
+        if [psnr_db, ciede2000_mean, ciede2000_p95, figures.volume_total].iter().any(|f| !f.is_finite()) {
+            return Err(PaintImageError::NotFinite("report"));
+        }
+        Ok((painting, figures))
+    }
+
+    /// Writes `commands.json`, `rendered.png` and `report.json`.
+    pub fn save_colours(
+        &self,
+        folder: &Path,
+        palette: &Palette,
+        painting: &ColourPainting,
+        figures: &ColourFigures,
+    ) -> Result<(), PaintImageError> {
+        // Paint by paint: a nozzle is washed as seldom as can be, and wet paints mix in any order.
+        let of = |(index, sprays): (usize, &Vec<paint_net::Spray>)| -> Vec<(f64, f64, f64, f64, usize)> {
+            sprays.iter().map(|s| (s.x, s.y, s.volume, s.sigma, index)).collect()
+        };
+        let sprays: Vec<_> = painting.sprays.iter().enumerate().flat_map(of).collect();
+        let model = serde_json::json!({
+            "colour": "Kubelka-Munk film of the depths sum of volume * exp(-d^2 / (2 sigma_px^2)) over the wall",
+            "wall": palette.wall(), "cut_sigma": self.kernel.cut(),
+            "absorption": palette.paints().iter().map(|p| p.absorption).collect::<Vec<_>>(),
+            "scattering": palette.paints().iter().map(|p| p.scattering).collect::<Vec<_>>(),
+        });
+        let names: Vec<_> = palette.paints().iter().map(|p| &p.name).collect();
+        let commands = serde_json::json!({
+            "width": figures.width, "height": figures.height, "spray_model": model, "paints": names, "sprays": sprays,
+        });
+        write_json(&folder.join("commands.json"), &commands)?;
+        write_json(&folder.join("report.json"), figures)?;
+        let byte = |v: f64| (255.0 * v).round() as u8;
+        let pixels = painting.picture.data().iter().map(|c| c.map(byte));
+        Rgb::from_pixels(figures.width, figures.height, pixels).save(&folder.join("rendered.png"))?;
+        Ok(())
+    }
+}
