@@ -123,6 +123,7 @@ fn images(folder: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
+#[allow(clippy::too_many_lines, reason = "a list of cases")]
 fn what_is_wrong_is_named_and_what_is_left_out_is_counted() {
     let sound = Scratch::new("sound");
     simulate(&flight(5.0, false), &sound.0).unwrap();
@@ -193,7 +194,7 @@ fn what_is_wrong_is_named_and_what_is_left_out_is_counted() {
                         if k == 7 { l.rsplit_once(',').unwrap().0.to_string() + ",NaN\n" } else { l.to_string() + "\n" }
                     })
                     .collect()
-            })
+            });
         },
         &["imu0/data.csv", "line 8", "column 7", "NaN"],
     );
