@@ -97,7 +97,9 @@ fn pictures_within_reach_are_painted() {
             let canvases: Vec<Image> = (painting.sprays.iter())
                 .map(|sprays| {
                     let mut canvas = Image::filled(40, 40, 0.0);
-                    sprays.iter().for_each(|s| nozzle().stamp(s, &mut canvas));
+                    for spray in sprays {
+                        nozzle().stamp(spray, &mut canvas);
+                    }
                     canvas
                 })
                 .collect();
