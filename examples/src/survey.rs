@@ -79,13 +79,19 @@ impl Survey {
         let camera = eyes.camera;
         let simulation = inertial(route.spline, seed)?;
         let mut samples = simulation.imu(0)?.samples.into_iter().peekable();
-        let mut vio = Vio::new(camera, ImuNoise::default(), vio_ekf::Settings::default())?;
         let mut map = Map::new(tsdf_hash::Settings { voxel_size: VOXEL, threads, ..tsdf_hash::Settings::default() })?;
 
         let mut world_from_start = None;
         let (mut flown, mut estimated) = (Trajectory::default(), Trajectory::default());
         let (first, last) = simulation.spline().span();
         let count = (last.secs_since(first) * FRAMES_PER_SECOND) as usize;
+        let mut vio = {
+            // The odometry does not read depth, but need not guess how far away the surface is at first.
+            let before = eyes.look(0, &(simulation.motion(first)?.world_from_body * camera.body_from_camera))?;
+            let mut settings = vio_ekf::Settings::default();
+            settings.landmarks.inverse_distance = 1.0 / before.distance().unwrap_or(1.0);
+            Vio::new(camera, ImuNoise::default(), settings)?
+        };
         for k in 1..count {
             let stamp = Stamp::from_nanos(first.nanos() + (k as f64 * 1e9 / FRAMES_PER_SECOND) as i64);
             while let Some(sample) = samples.next_if(|sample| sample.stamp <= stamp) {

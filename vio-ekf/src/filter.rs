@@ -426,7 +426,12 @@ impl Vio {
             self.rested = true;
             return Ok(Some(0));
         }
-        self.rested = false;
+        if self.rested {
+            // It set off before that was seen: by as much as goes unnoticed, within the last image or two.
+            let guess = estimator.guess(&self.settings.landmarks);
+            estimator.loosen(self.unnoticed, &guess);
+            self.rested = false;
+        }
         let before = self.tracks.len();
         let tracks = &mut self.tracks;
         estimator.advance(time, |slot| {

@@ -42,6 +42,13 @@ impl Shot {
     pub(super) fn grey(&self) -> ImageView<'_> {
         ImageView { width: IMAGE.0, height: IMAGE.1, data: &self.grey }
     }
+
+    /// The middle one of all depths, metres; `None` of nothing but sky.
+    pub(super) fn distance(&self) -> Option<f64> {
+        let mut depths: Vec<f32> = self.depth.iter().copied().filter(|depth| *depth > 0.0).collect();
+        let middle = depths.len() / 2;
+        (!depths.is_empty()).then(|| f64::from(*depths.select_nth_unstable_by(middle, f32::total_cmp).1))
+    }
 }
 
 impl<'a> Eyes<'a> {
