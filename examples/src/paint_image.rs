@@ -1,6 +1,7 @@
 //! The job of `paint-image`: a picture in, sprays and figures out.
 
 mod colour;
+mod commands;
 mod compare;
 mod equal_sprays;
 mod learn;
@@ -17,6 +18,7 @@ use serde::Serialize;
 use crate::pictures::{PictureError, Rgb};
 
 pub use colour::{ColourFigures, Glazes, compare_colours, read_picture};
+pub use commands::NOZZLE_SPEED;
 pub use compare::{Row, compare, print_table};
 pub use equal_sprays::{EqualSprays, equal_sprays, print_equal_sprays};
 pub use learn::{Lesson, Pictures, ThesisLesson, learn, learn_thesis};
@@ -183,7 +185,7 @@ impl Job {
         Ok((painting, figures))
     }
 
-    /// Writes `commands.json`, `rendered.png`, `error.png` and `report.json`.
+    /// Writes `commands.json`, `commands.mcap`, `rendered.png`, `error.png` and `report.json`.
     pub fn save(
         &self,
         folder: &Path,
@@ -191,16 +193,12 @@ impl Job {
         painting: &Painting,
         figures: &Figures,
     ) -> Result<(), PaintImageError> {
-        let sprays: Vec<_> = painting.sprays.iter().map(|s| (s.x, s.y, s.volume, s.sigma, 0)).collect();
         let model = serde_json::json!({
             "ink": "tanh(sum of volume * exp(-d^2 / (2 sigma_px^2)))", "cut_sigma": self.kernel.cut(),
             "footprint": "pixels no more than cut_sigma * sigma_px away along each axis",
         });
-        let commands = serde_json::json!({
-            "width": wanted.width(), "height": wanted.height(), "spray_model": model, "paints": ["black"],
-            "sprays": sprays,
-        });
-        write_json(&folder.join("commands.json"), &commands)?;
+        let sprays: Vec<_> = commands::commands(&painting.sprays, 0).collect();
+        commands::save(folder, (wanted.width(), wanted.height()), &model, &["black"], &sprays)?;
         write_json(&folder.join("report.json"), figures)?;
         grey(&painting.ink).save(&folder.join("rendered.png"))?;
         error_map(&painting.ink, wanted).save(&folder.join("error.png"))?;

@@ -33,6 +33,27 @@ fn json(path: &str) -> serde_json::Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
+/// The recording holds the sprays of `commands.json` in the same order, at times that suit a nozzle of 100 px/s.
+fn assert_recorded(out: &str, sprays: &[serde_json::Value]) {
+    let bytes = std::fs::read(format!("{out}/commands.mcap")).unwrap();
+    assert!(mcap::Summary::read(&bytes).unwrap().unwrap().channels.values().any(|c| c.topic == "/sprays"));
+    let messages: Vec<_> = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).collect();
+    assert_eq!(messages.len(), sprays.len());
+    let place = |s: &serde_json::Value| [0, 1].map(|k| s[k].as_f64().unwrap());
+    let (mut flown, mut last) = (0.0, sprays.first().map(place));
+    for (message, spray) in messages.iter().zip(sprays) {
+        let schema = message.channel.schema.as_ref().unwrap();
+        assert_eq!((schema.name.as_str(), schema.encoding.as_str()), ("paintcopter.Spray", "jsonschema"));
+        let json: serde_json::Value = serde_json::from_slice(&message.data).unwrap();
+        for (k, key) in ["x_px", "y_px", "volume", "sigma_px", "paint"].iter().enumerate() {
+            assert_eq!(json[key], spray[k], "{key}");
+        }
+        let (from, to) = (last.replace(place(spray)).unwrap(), place(spray));
+        flown += (to[0] - from[0]).hypot(to[1] - from[1]);
+        assert!((1e-9 * message.log_time as f64 - flown / 100.0).abs() < 1e-6);
+    }
+}
+
 #[test]
 fn a_picture_becomes_commands_pictures_and_figures() {
     let scratch = Scratch::new("paint");
@@ -65,6 +86,7 @@ fn a_picture_becomes_commands_pictures_and_figures() {
         let sprays = commands["sprays"].as_array().unwrap();
         assert_eq!((commands["width"].as_u64(), commands["height"].as_u64()), (Some(40), Some(25)));
         assert_eq!(sprays.len(), report["sprays"].as_u64().unwrap() as usize);
+        assert_recorded(&out, sprays);
         // The commands alone give the picture: rendered here by the definition.
         let depth = |x: f64, y: f64| -> f64 {
             let of = |s: &serde_json::Value, k: usize| s[k].as_f64().unwrap();
@@ -120,6 +142,7 @@ fn a_picture_in_colour_becomes_commands_of_every_paint() {
         assert_eq!(commands["paints"].as_array().unwrap().len(), count);
         let sprays = commands["sprays"].as_array().unwrap();
         assert_eq!(sprays.len() as u64, report["sprays"].as_u64().unwrap());
+        assert_recorded(&out, sprays);
         assert!(sprays.iter().all(|s| s[4].as_u64().unwrap() < count as u64));
         // The commands alone give the picture: glazes by Beer and Lambert, rendered here by the definition.
         let rendered = image::open(format!("{out}/rendered.png")).unwrap().to_rgb8();
@@ -164,6 +187,7 @@ fn a_blank_picture_gets_no_spray() {
     let out = scratch.path("out");
     assert!(run(&["--image", &scratch.path("in.png"), "--out", &out]).status.success());
     assert_eq!(json(&format!("{out}/report.json"))["sprays"], 0);
+    assert_recorded(&out, &[]);
 }
 
 #[test]

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use paint_net::{ColourPainting, ColourTask, Coloured, Paint, Palette, Picture};
+use paint_net::{ColourPainting, ColourTask, Coloured, Paint, Palette, Picture, Spray};
 use paint_sim::colour::lab;
 use serde::Serialize;
 
-use super::{Clock, Job, PaintImageError, write_json};
+use super::{Clock, Job, PaintImageError, commands, write_json};
 use crate::pictures::Rgb;
 
 /// Which glazes are in the guns, on a white wall.
@@ -134,7 +134,7 @@ impl Job {
         Ok((painting, figures))
     }
 
-    /// Writes `commands.json`, `rendered.png` and `report.json`.
+    /// Writes `commands.json`, `commands.mcap`, `rendered.png` and `report.json`.
     pub fn save_colours(
         &self,
         folder: &Path,
@@ -143,21 +143,16 @@ impl Job {
         figures: &ColourFigures,
     ) -> Result<(), PaintImageError> {
         // Paint by paint: a nozzle is washed as seldom as can be, and wet paints mix in any order.
-        let of = |(index, sprays): (usize, &Vec<paint_net::Spray>)| -> Vec<(f64, f64, f64, f64, usize)> {
-            sprays.iter().map(|s| (s.x, s.y, s.volume, s.sigma, index)).collect()
-        };
-        let sprays: Vec<_> = painting.sprays.iter().enumerate().flat_map(of).collect();
+        let of_paint = |(paint, sprays): (usize, &Vec<Spray>)| commands::commands(sprays, paint).collect::<Vec<_>>();
+        let sprays: Vec<_> = painting.sprays.iter().enumerate().flat_map(of_paint).collect();
         let model = serde_json::json!({
             "colour": "Kubelka-Munk film of the depths sum of volume * exp(-d^2 / (2 sigma_px^2)) over the wall",
             "wall": palette.wall(), "cut_sigma": self.kernel.cut(),
             "absorption": palette.paints().iter().map(|p| p.absorption).collect::<Vec<_>>(),
             "scattering": palette.paints().iter().map(|p| p.scattering).collect::<Vec<_>>(),
         });
-        let names: Vec<_> = palette.paints().iter().map(|p| &p.name).collect();
-        let commands = serde_json::json!({
-            "width": figures.width, "height": figures.height, "spray_model": model, "paints": names, "sprays": sprays,
-        });
-        write_json(&folder.join("commands.json"), &commands)?;
+        let names: Vec<_> = palette.paints().iter().map(|p| p.name.as_str()).collect();
+        commands::save(folder, (figures.width, figures.height), &model, &names, &sprays)?;
         write_json(&folder.join("report.json"), figures)?;
         let byte = |v: f64| (255.0 * v).round() as u8;
         let pixels = painting.picture.data().iter().map(|c| c.map(byte));
