@@ -19,7 +19,7 @@ use crate::pictures::{PictureError, Rgb};
 
 pub use colour::{ColourFigures, Glazes, compare_colours, read_picture};
 pub use commands::NOZZLE_SPEED;
-pub use compare::{Row, compare, print_table};
+pub use compare::{Row, compare, table};
 pub use equal_sprays::{EqualSprays, equal_sprays, print_equal_sprays};
 pub use learn::{Lesson, Pictures, ThesisLesson, learn, learn_thesis};
 
@@ -273,7 +273,12 @@ fn error_map(ink: &Image, wanted: &Image) -> Rgb {
 pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> Result<(), PaintImageError> {
     let failed = |why: String| PaintImageError::File { path: path.display().to_string(), why };
     let text = serde_json::to_string(value).map_err(|e| failed(e.to_string()))?;
-    std::fs::write(path, text + "\n").map_err(|e| failed(format!("cannot be written ({e})")))
+    write_text(path, &(text + "\n"))
+}
+
+fn write_text(path: &Path, text: &str) -> Result<(), PaintImageError> {
+    let failed = |why: String| PaintImageError::File { path: path.display().to_string(), why };
+    std::fs::write(path, text).map_err(|e| failed(format!("cannot be written ({e})")))
 }
 
 /// CPU time of this thread where the system tells it, wall time elsewhere and with several threads.

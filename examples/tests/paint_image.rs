@@ -109,6 +109,43 @@ fn a_picture_becomes_commands_pictures_and_figures() {
 }
 
 #[test]
+fn painters_are_compared_in_a_table_and_side_by_side() {
+    let scratch = Scratch::new("compare");
+    let folder = scratch.path("pictures");
+    std::fs::create_dir(&folder).unwrap();
+    // A wide picture that is enlarged, and a high one that is made smaller.
+    for (name, width, height) in [("a.png", 64, 32), ("b.png", 40, 300)] {
+        let picture = image::GrayImage::from_fn(width, height, |x, y| image::Luma([40 + (x + y / 2) as u8]));
+        picture.save(format!("{folder}/{name}")).unwrap();
+    }
+    let out = scratch.path("out");
+    let output = run(&["compare", &folder, "--runs", "1", "--out", &out]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let table = std::fs::read_to_string(format!("{out}/compare.md")).unwrap();
+    assert_eq!(table, String::from_utf8(output.stdout).unwrap());
+    let rows: Vec<Vec<&str>> = table.lines().map(|l| l.split('|').map(str::trim).collect()).collect();
+    assert_eq!(rows.len(), 2 + 5);
+    assert!(rows.iter().all(|row| row.len() == rows[0].len()));
+    // The row of the first painter is the mean of painting the pictures one by one.
+    let alone = |name: &str| {
+        assert!(run(&["--image", &format!("{folder}/{name}"), "--out", &out]).status.success());
+        json(&format!("{out}/report.json"))["psnr_db"].as_f64().unwrap()
+    };
+    let mean = 0.5 * (alone("a.png") + alone("b.png"));
+    assert_eq!(rows[2][2], format!("{mean:.2}"));
+    // Tiles of 256 pixels, 12 apart, 26 for the caption: six columns, two rows.
+    let sheet = image::open(format!("{out}/compare.png")).unwrap().to_luma8();
+    assert_eq!(sheet.dimensions(), (12 + 6 * 268, 12 + 2 * 294));
+    for column in 0..6 {
+        let left = 12 + 268 * column;
+        // Grey 40 + 64 / 2 in the middle of the first picture, white beside the narrow one.
+        let middle = sheet.get_pixel(left + 128, 12 + 26 + 32).0[0];
+        assert!((72..=88).contains(&middle), "column {column}: {middle}");
+        assert_eq!(sheet.get_pixel(left + 100, 12 + 294 + 26 + 128).0[0], 255, "column {column}");
+    }
+}
+
+#[test]
 fn a_slow_valve_is_obeyed() {
     let scratch = Scratch::new("slew");
     image::GrayImage::from_fn(32, 32, |x, _| image::Luma([if x < 16 { 60 } else { 230 }]))
