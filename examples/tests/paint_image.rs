@@ -179,6 +179,10 @@ fn a_picture_in_colour_becomes_commands_of_every_paint() {
         let (report, commands) = (json(&format!("{out}/report.json")), json(&format!("{out}/commands.json")));
         assert!(report["ciede2000_mean"].as_f64().unwrap() < 3.0, "{report}");
         assert_eq!(commands["paints"].as_array().unwrap().len(), count);
+        assert_luma_figures(&scratch.path("in.png"), &out, &report);
+        // The map has a caption and a bar beside it.
+        let map = image::open(format!("{out}/error.png")).unwrap().to_rgb8();
+        assert!(map.width() > 1000 && map.pixels().collect::<std::collections::BTreeSet<_>>().len() > 20);
         let sprays = commands["sprays"].as_array().unwrap();
         assert_eq!(sprays.len() as u64, report["sprays"].as_u64().unwrap());
         assert_recorded(&out, sprays);
@@ -201,6 +205,38 @@ fn a_picture_in_colour_becomes_commands_of_every_paint() {
             }
         }
     }
+}
+
+/// Similarity and cross-entropy in colour are those of the lumas, computed here by the definitions.
+fn assert_luma_figures(wanted: &str, out: &str, report: &serde_json::Value) {
+    let ink = |path: &str| -> (usize, Vec<f64>) {
+        let picture = image::open(path).unwrap().to_rgb8();
+        let luma =
+            |p: &image::Rgb<u8>| 0.2126 * f64::from(p.0[0]) + 0.7152 * f64::from(p.0[1]) + 0.0722 * f64::from(p.0[2]);
+        (picture.width() as usize, picture.pixels().map(|p| 1.0 - luma(p) / 255.0).collect())
+    };
+    let ((width, a), (_, y)) = (ink(&format!("{out}/rendered.png")), ink(wanted));
+    let nats = |(&a, &y): (&f64, &f64)| -(y * a.ln() + (1.0 - y) * (1.0 - a).ln());
+    let entropy = a.iter().zip(&y).map(nats).sum::<f64>() / a.len() as f64;
+    let found = report["bce_nats_per_px"].as_f64().unwrap();
+    // The rendered picture is rounded to bytes.
+    assert!((found - entropy).abs() < 1e-4, "{found} {entropy}");
+    let (mut sum, mut windows) = (0.0, 0.0);
+    for top in 0..=a.len() / width - 7 {
+        for left in 0..=width - 7 {
+            let window = |of: &dyn Fn(usize) -> f64| -> f64 {
+                (0..49).map(|k| of((top + k / 7) * width + left + k % 7)).sum::<f64>()
+            };
+            let (ma, my) = (window(&|k| a[k]) / 49.0, window(&|k| y[k]) / 49.0);
+            let covariance = |p: &[f64], mp: f64, q: &[f64], mq: f64| window(&|k| (p[k] - mp) * (q[k] - mq)) / 48.0;
+            let (c1, c2) = (0.01_f64.powi(2), 0.03_f64.powi(2));
+            sum += (2.0 * ma * my + c1) * (2.0 * covariance(&a, ma, &y, my) + c2)
+                / ((ma * ma + my * my + c1) * (covariance(&a, ma, &a, ma) + covariance(&y, my, &y, my) + c2));
+            windows += 1.0;
+        }
+    }
+    let found = report["ssim"].as_f64().unwrap();
+    assert!((found - sum / windows).abs() < 0.005, "{found} {}", sum / windows);
 }
 
 #[test]

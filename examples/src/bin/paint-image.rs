@@ -311,7 +311,7 @@ fn paint_colours(image: &Path, job: &Job, palette: PaletteName, out: &Path) -> R
     let (painting, figures) = job.paint_colours(&wanted, &palette, &mut |share| stage.share(share))?;
     stage
         .done(&format!("{} sprays, CIEDE2000 {:.2}, {:.1} ms", figures.sprays, figures.ciede2000_mean, figures.cpu_ms));
-    job.save_colours(out, &palette, &painting, &figures)?;
+    job.save_colours(out, &wanted, &palette, &painting, &figures)?;
     println!("{}", out.join("report.json").display());
     Ok(())
 }
