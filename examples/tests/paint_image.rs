@@ -287,11 +287,80 @@ fn what_cannot_be_painted_is_named() {
         (vec!["--image", &good, "--largest-change", "0"], "largest_change"),
         (vec!["train", "--resume", &not], "not.png"),
     ] {
-        let output = run(&[&arguments[..], &["--out", &out]].concat());
-        let text = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {text}");
-        let line = text.lines().find(|l| l.starts_with("paint-image: ")).unwrap_or_default();
-        assert!(line.contains(word), "{arguments:?}: {text}");
+        assert_refused(&[&arguments[..], &["--out", &out]].concat(), &[word]);
+    }
+}
+
+/// One line that holds the words, nothing else of note, and the exit code of a failure.
+fn assert_refused(arguments: &[&str], words: &[&str]) {
+    let output = run(arguments);
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}: {text}");
+    let lines: Vec<&str> = text.lines().filter(|l| l.starts_with("paint-image: ")).collect();
+    assert_eq!(lines.len(), 1, "{arguments:?}: {text}");
+    assert!(words.iter().all(|word| lines[0].contains(word)), "{arguments:?}: {text}");
+    assert!(!text.contains("panicked"), "{text}");
+}
+
+#[test]
+fn weights_that_are_cut_or_foreign_are_named() {
+    let scratch = Scratch::new("weights");
+    image::GrayImage::from_pixel(8, 8, image::Luma([9])).save(scratch.path("in.png")).unwrap();
+    let shipped =
+        std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../paint-net/weights/painter.safetensors")).unwrap();
+    // A header that claims to be longer than any file, and whole weights of another network.
+    let endless = [&[0xff; 8][..], &shipped[8..]].concat();
+    let files = [
+        ("empty", &[][..], "shorter than its header"),
+        ("header", &shipped[..100], "cut off"),
+        ("half", &shipped[..shipped.len() / 2], "cut off"),
+        ("last", &shipped[..shipped.len() - 1], "cut off"),
+        ("endless", &endless, "cut off"),
+        ("text", b"this is text, and quite a lot of it", "safetensors"),
+        ("foreign", &shipped, "safetensors"),
+    ];
+    let (image, out) = (scratch.path("in.png"), scratch.path("out"));
+    for (name, bytes, word) in files {
+        let file = scratch.path(name);
+        std::fs::write(&file, bytes).unwrap();
+        assert_refused(&["equal-sprays", "--weights", &file, &image], &[name, word]);
+        assert_refused(&["train", "--resume", &file, "--out", &out], &[name, word]);
+        assert_refused(&["train", "--preset", "thesis-paint", "--resume", &file, "--out", &out], &[name, word]);
+    }
+}
+
+#[test]
+fn absurd_settings_are_named() {
+    let scratch = Scratch::new("absurd");
+    image::GrayImage::from_pixel(8, 8, image::Luma([9])).save(scratch.path("in.png")).unwrap();
+    let (image, out) = (scratch.path("in.png"), scratch.path("out"));
+    for (setting, value, word) in [
+        ("--sigma", "1e9", "`sigma`"),
+        ("--cut", "-1", "`cut`"),
+        ("--along", "1000000000", "`along`"),
+        ("--row-spacing", "18446744073709551615", "`row_spacing`"),
+        ("--min-volume", "1e9", "`min_volume`"),
+    ] {
+        let setting = format!("{setting}={value}");
+        for more in [&["--painter", "feedback"][..], &["--painter", "splats"], &["--palette", "cmy"]] {
+            assert_refused(&[&["--image", &image, &setting, "--out", &out], more].concat(), &[word]);
+        }
+    }
+    for (setting, word) in [("--passes=100000000000", "`passes`"), ("--threads=1000000000", "`threads`")] {
+        assert_refused(&["--image", &image, setting, "--out", &out], &[word]);
+    }
+    for setting in ["--layers", "--largest-change=0.1"] {
+        assert_refused(&["--image", &image, "--palette", "cmy", setting, "--out", &out], &["--palette"]);
+    }
+    for (setting, word) in [
+        ("--steps=0", "`steps`"),
+        ("--batch=0", "`batch`"),
+        ("--rate=nan", "`learning_rate`"),
+        ("--threads=0", "`threads`"),
+    ] {
+        for preset in ["painter", "thesis-paint"] {
+            assert_refused(&["train", "--preset", preset, setting, "--out", &out], &[word]);
+        }
     }
 }
 

@@ -305,6 +305,9 @@ fn paint_colours(image: &Path, job: &Job, palette: PaletteName, out: &Path) -> R
         PaletteName::Cmyk => Glazes::Cmyk,
         PaletteName::Six => Glazes::Six,
     };
+    if job.layers || job.largest_change.is_some() {
+        return Err("--layers and --largest-change are for one paint: leave them out, or --palette".into());
+    }
     let (wanted, palette) = (read_picture(image)?, glazes.palette()?);
     create(out)?;
     let stage = Stage::start("paint");
