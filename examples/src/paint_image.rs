@@ -1,12 +1,13 @@
 //! The job of `paint-image`: a picture in, sprays and figures out.
 
+mod clock;
 mod colour;
+mod commands;
 mod compare;
 mod equal_sprays;
 mod learn;
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use paint_net::{
     Coats, Deconvolution, Error, Feedback, FreeSplats, Image, Layered, Limits, MatchingPursuit, Painter, Painting,
@@ -14,10 +15,12 @@ use paint_net::{
 };
 use serde::Serialize;
 
+use self::clock::Clock;
 use crate::pictures::{PictureError, Rgb};
 
 pub use colour::{ColourFigures, Glazes, compare_colours, read_picture};
-pub use compare::{Row, compare, print_table};
+pub use commands::NOZZLE_SPEED;
+pub use compare::{Row, compare, table};
 pub use equal_sprays::{EqualSprays, equal_sprays, print_equal_sprays};
 pub use learn::{Lesson, Pictures, ThesisLesson, learn, learn_thesis};
 
@@ -160,13 +163,12 @@ impl Job {
             Choice::Feedback | Choice::Coats => self.passes,
             Choice::Deconvolution | Choice::Pursuit | Choice::Splats => 0,
         };
-        let small = wanted.width().min(wanted.height()) < 7;
         let figures = Figures {
             painter: name,
             width: wanted.width(),
             height: wanted.height(),
             psnr_db: metrics::psnr(&painting.ink, wanted, None)?,
-            ssim: if small { 0.0 } else { metrics::ssim(&painting.ink, wanted, None)? },
+            ssim: ssim(&painting.ink, wanted)?,
             bce_nats_per_px: metrics::binary_cross_entropy(&painting.ink, wanted)?,
             ciede2000_mean: colour_difference(&painting.ink, wanted),
             sprays: painting.sprays.len(),
@@ -183,7 +185,7 @@ impl Job {
         Ok((painting, figures))
     }
 
-    /// Writes `commands.json`, `rendered.png`, `error.png` and `report.json`.
+    /// Writes `commands.json`, `commands.mcap`, `rendered.png`, `error.png` and `report.json`.
     pub fn save(
         &self,
         folder: &Path,
@@ -191,16 +193,12 @@ impl Job {
         painting: &Painting,
         figures: &Figures,
     ) -> Result<(), PaintImageError> {
-        let sprays: Vec<_> = painting.sprays.iter().map(|s| (s.x, s.y, s.volume, s.sigma, 0)).collect();
         let model = serde_json::json!({
             "ink": "tanh(sum of volume * exp(-d^2 / (2 sigma_px^2)))", "cut_sigma": self.kernel.cut(),
             "footprint": "pixels no more than cut_sigma * sigma_px away along each axis",
         });
-        let commands = serde_json::json!({
-            "width": wanted.width(), "height": wanted.height(), "spray_model": model, "paints": ["black"],
-            "sprays": sprays,
-        });
-        write_json(&folder.join("commands.json"), &commands)?;
+        let sprays: Vec<_> = commands::commands(&painting.sprays, 0).collect();
+        commands::save(folder, (wanted.width(), wanted.height()), &model, &["black"], &sprays)?;
         write_json(&folder.join("report.json"), figures)?;
         grey(&painting.ink).save(&folder.join("rendered.png"))?;
         error_map(&painting.ink, wanted).save(&folder.join("error.png"))?;
@@ -215,10 +213,20 @@ pub fn read_ink(path: &Path) -> Result<Image, PaintImageError> {
     let rgba = picture.to_rgba32f();
     let ink = rgba.pixels().map(|p| {
         let [r, g, b, a] = p.0.map(f64::from);
-        // 0.2126 + 0.7152 + 0.0722 is 1 only up to rounding.
-        (a * (1.0 - (0.2126 * r + 0.7152 * g + 0.0722 * b))).clamp(0.0, 1.0)
+        a.clamp(0.0, 1.0) * ink_of([r, g, b])
     });
     Image::new(rgba.width() as usize, rgba.height() as usize, ink.collect()).map_err(|e| unreadable(e.to_string()))
+}
+
+/// The ink that looks as dark as a colour: 1 less its luma, the weights of BT.709 on values as stored.
+fn ink_of([r, g, b]: [f64; 3]) -> f64 {
+    // 0.2126 + 0.7152 + 0.0722 is 1 only up to rounding.
+    (1.0 - (0.2126 * r + 0.7152 * g + 0.0722 * b)).clamp(0.0, 1.0)
+}
+
+/// Structural similarity; 0 for pictures smaller than its window, which have none.
+fn ssim(ink: &Image, wanted: &Image) -> Result<f64, Error> {
+    if wanted.width().min(wanted.height()) < 7 { Ok(0.0) } else { metrics::ssim(ink, wanted, None) }
 }
 
 /// The pictures of a folder in the order of their names, or the file itself.
@@ -275,29 +283,10 @@ fn error_map(ink: &Image, wanted: &Image) -> Rgb {
 pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> Result<(), PaintImageError> {
     let failed = |why: String| PaintImageError::File { path: path.display().to_string(), why };
     let text = serde_json::to_string(value).map_err(|e| failed(e.to_string()))?;
-    std::fs::write(path, text + "\n").map_err(|e| failed(format!("cannot be written ({e})")))
+    write_text(path, &(text + "\n"))
 }
 
-/// CPU time of this thread where the system tells it, wall time elsewhere and with several threads.
-struct Clock {
-    wall: Instant,
-    cpu: Option<f64>,
-}
-
-impl Clock {
-    fn start(threads: usize) -> Self {
-        Self { wall: Instant::now(), cpu: (threads == 1).then(Self::cpu_ms).flatten() }
-    }
-
-    fn cpu_ms() -> Option<f64> {
-        let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-        text.split_whitespace().next()?.parse::<f64>().ok().filter(|&ns| ns > 0.0).map(|ns| 1e-6 * ns)
-    }
-
-    fn milliseconds(&self) -> f64 {
-        match (self.cpu, Self::cpu_ms()) {
-            (Some(before), Some(after)) => after - before,
-            _ => 1e3 * self.wall.elapsed().as_secs_f64(),
-        }
-    }
+fn write_text(path: &Path, text: &str) -> Result<(), PaintImageError> {
+    let failed = |why: String| PaintImageError::File { path: path.display().to_string(), why };
+    std::fs::write(path, text).map_err(|e| failed(format!("cannot be written ({e})")))
 }

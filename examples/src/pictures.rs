@@ -1,9 +1,11 @@
-//! The pictures of a run: textures, the error map with its colour bar, curves over time, the scene with the flown path.
+//! The pictures of a run: textures, the error map with its colour bar, curves over time, the scene with the flown path, sheets
+//! of pictures side by side.
 
 mod curves;
 mod error_map;
 mod paths;
 mod scene;
+mod sheet;
 
 use std::path::Path;
 use std::sync::Once;
@@ -14,6 +16,7 @@ pub use curves::{Panel, save_curves};
 pub use error_map::save_error_map;
 pub use paths::{PathPanel, save_paths};
 pub use scene::{Polyline, Projection, Scene, save_scene};
+pub use sheet::{Tile, save_sheet};
 
 /// What is wrong with drawing or saving a picture.
 #[derive(Debug, thiserror::Error)]

@@ -33,6 +33,27 @@ fn json(path: &str) -> serde_json::Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
+/// The recording holds the sprays of `commands.json` in the same order, at times that suit a nozzle of 100 px/s.
+fn assert_recorded(out: &str, sprays: &[serde_json::Value]) {
+    let bytes = std::fs::read(format!("{out}/commands.mcap")).unwrap();
+    assert!(mcap::Summary::read(&bytes).unwrap().unwrap().channels.values().any(|c| c.topic == "/sprays"));
+    let messages: Vec<_> = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).collect();
+    assert_eq!(messages.len(), sprays.len());
+    let place = |s: &serde_json::Value| [0, 1].map(|k| s[k].as_f64().unwrap());
+    let (mut flown, mut last) = (0.0, sprays.first().map(place));
+    for (message, spray) in messages.iter().zip(sprays) {
+        let schema = message.channel.schema.as_ref().unwrap();
+        assert_eq!((schema.name.as_str(), schema.encoding.as_str()), ("paintcopter.Spray", "jsonschema"));
+        let json: serde_json::Value = serde_json::from_slice(&message.data).unwrap();
+        for (k, key) in ["x_px", "y_px", "volume", "sigma_px", "paint"].iter().enumerate() {
+            assert_eq!(json[key], spray[k], "{key}");
+        }
+        let (from, to) = (last.replace(place(spray)).unwrap(), place(spray));
+        flown += (to[0] - from[0]).hypot(to[1] - from[1]);
+        assert!((1e-9 * message.log_time as f64 - flown / 100.0).abs() < 1e-6);
+    }
+}
+
 #[test]
 fn a_picture_becomes_commands_pictures_and_figures() {
     let scratch = Scratch::new("paint");
@@ -65,6 +86,7 @@ fn a_picture_becomes_commands_pictures_and_figures() {
         let sprays = commands["sprays"].as_array().unwrap();
         assert_eq!((commands["width"].as_u64(), commands["height"].as_u64()), (Some(40), Some(25)));
         assert_eq!(sprays.len(), report["sprays"].as_u64().unwrap() as usize);
+        assert_recorded(&out, sprays);
         // The commands alone give the picture: rendered here by the definition.
         let depth = |x: f64, y: f64| -> f64 {
             let of = |s: &serde_json::Value, k: usize| s[k].as_f64().unwrap();
@@ -83,6 +105,45 @@ fn a_picture_becomes_commands_pictures_and_figures() {
             assert!((f64::from(rendered.get_pixel(x, y).0[0]) - expected).abs() <= 0.6, "{painter} at {x}, {y}");
         }
         assert!(Path::new(&format!("{out}/error.png")).exists());
+    }
+}
+
+#[test]
+fn painters_are_compared_in_a_table_and_side_by_side() {
+    let scratch = Scratch::new("compare");
+    let folder = scratch.path("pictures");
+    std::fs::create_dir(&folder).unwrap();
+    // A wide picture that is enlarged, and a high one that is made smaller.
+    for (name, width, height) in [("a.png", 64, 32), ("b.png", 40, 300)] {
+        let picture = image::GrayImage::from_fn(width, height, |x, y| image::Luma([40 + (x + y / 2) as u8]));
+        picture.save(format!("{folder}/{name}")).unwrap();
+    }
+    let out = scratch.path("out");
+    let output = run(&["compare", &folder, "--runs", "1", "--out", &out]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let table = std::fs::read_to_string(format!("{out}/compare.md")).unwrap();
+    assert_eq!(table, String::from_utf8(output.stdout).unwrap());
+    let rows: Vec<Vec<&str>> = table.lines().map(|l| l.split('|').map(str::trim).collect()).collect();
+    assert_eq!(rows.len(), 2 + 5);
+    assert!(rows.iter().all(|row| row.len() == rows[0].len()));
+    // The row of the first painter is the mean of painting the pictures one by one.
+    let alone = |name: &str| {
+        assert!(run(&["--image", &format!("{folder}/{name}"), "--out", &out]).status.success());
+        json(&format!("{out}/report.json"))["psnr_db"].as_f64().unwrap()
+    };
+    let mean = 0.5 * (alone("a.png") + alone("b.png"));
+    assert_eq!(rows[2][2], format!("{mean:.2}"));
+    // Tiles of 256 pixels, 12 apart, 26 for the caption: six columns, two rows.
+    let sheet = image::open(format!("{out}/compare.png")).unwrap().to_luma8();
+    assert_eq!(sheet.dimensions(), (12 + 6 * 268, 12 + 2 * 294));
+    for column in 0..6 {
+        let left = 12 + 268 * column;
+        // Grey 40 + 32 + 16 / 2 in the middle of the first picture (a mean, as the greedy painter speckles), white beside
+        // the narrow one.
+        let middle = image::imageops::crop_imm(&sheet, left + 96, 12 + 26 + 32, 64, 64).to_image();
+        let mean = middle.pixels().map(|p| f64::from(p.0[0])).sum::<f64>() / (64.0 * 64.0);
+        assert!((mean - 80.0).abs() < 5.0, "column {column}: {mean}");
+        assert_eq!(sheet.get_pixel(left + 100, 12 + 294 + 26 + 128).0[0], 255, "column {column}");
     }
 }
 
@@ -118,8 +179,14 @@ fn a_picture_in_colour_becomes_commands_of_every_paint() {
         let (report, commands) = (json(&format!("{out}/report.json")), json(&format!("{out}/commands.json")));
         assert!(report["ciede2000_mean"].as_f64().unwrap() < 3.0, "{report}");
         assert_eq!(commands["paints"].as_array().unwrap().len(), count);
+        assert_luma_figures(&scratch.path("in.png"), &out, &report);
+        // The map is drawn, within its axes: not one colour all over.
+        let map = image::open(format!("{out}/error.png")).unwrap().to_rgb8();
+        let inside = image::imageops::crop_imm(&map, 150, 100, 1000, 500).to_image();
+        assert!(inside.pixels().collect::<std::collections::HashSet<_>>().len() > 5);
         let sprays = commands["sprays"].as_array().unwrap();
         assert_eq!(sprays.len() as u64, report["sprays"].as_u64().unwrap());
+        assert_recorded(&out, sprays);
         assert!(sprays.iter().all(|s| s[4].as_u64().unwrap() < count as u64));
         // The commands alone give the picture: glazes by Beer and Lambert, rendered here by the definition.
         let rendered = image::open(format!("{out}/rendered.png")).unwrap().to_rgb8();
@@ -139,6 +206,38 @@ fn a_picture_in_colour_becomes_commands_of_every_paint() {
             }
         }
     }
+}
+
+/// Similarity and cross-entropy in colour are those of the lumas, computed here by the definitions.
+fn assert_luma_figures(wanted: &str, out: &str, report: &serde_json::Value) {
+    let ink = |path: &str| -> (usize, Vec<f64>) {
+        let picture = image::open(path).unwrap().to_rgb8();
+        let luma =
+            |p: &image::Rgb<u8>| 0.2126 * f64::from(p.0[0]) + 0.7152 * f64::from(p.0[1]) + 0.0722 * f64::from(p.0[2]);
+        (picture.width() as usize, picture.pixels().map(|p| 1.0 - luma(p) / 255.0).collect())
+    };
+    let ((width, a), (_, y)) = (ink(&format!("{out}/rendered.png")), ink(wanted));
+    let nats = |(&a, &y): (&f64, &f64)| -(y * a.ln() + (1.0 - y) * (1.0 - a).ln());
+    let entropy = a.iter().zip(&y).map(nats).sum::<f64>() / a.len() as f64;
+    let found = report["bce_nats_per_px"].as_f64().unwrap();
+    // The rendered picture is rounded to bytes.
+    assert!((found - entropy).abs() < 1e-4, "{found} {entropy}");
+    let (mut sum, mut windows) = (0.0, 0.0);
+    for top in 0..=a.len() / width - 7 {
+        for left in 0..=width - 7 {
+            let window = |of: &dyn Fn(usize) -> f64| -> f64 {
+                (0..49).map(|k| of((top + k / 7) * width + left + k % 7)).sum::<f64>()
+            };
+            let (ma, my) = (window(&|k| a[k]) / 49.0, window(&|k| y[k]) / 49.0);
+            let covariance = |p: &[f64], mp: f64, q: &[f64], mq: f64| window(&|k| (p[k] - mp) * (q[k] - mq)) / 48.0;
+            let (c1, c2) = (0.01_f64.powi(2), 0.03_f64.powi(2));
+            sum += (2.0 * ma * my + c1) * (2.0 * covariance(&a, ma, &y, my) + c2)
+                / ((ma * ma + my * my + c1) * (covariance(&a, ma, &a, ma) + covariance(&y, my, &y, my) + c2));
+            windows += 1.0;
+        }
+    }
+    let found = report["ssim"].as_f64().unwrap();
+    assert!((found - sum / windows).abs() < 0.005, "{found} {}", sum / windows);
 }
 
 #[test]
@@ -164,6 +263,7 @@ fn a_blank_picture_gets_no_spray() {
     let out = scratch.path("out");
     assert!(run(&["--image", &scratch.path("in.png"), "--out", &out]).status.success());
     assert_eq!(json(&format!("{out}/report.json"))["sprays"], 0);
+    assert_recorded(&out, &[]);
 }
 
 #[test]
@@ -187,11 +287,80 @@ fn what_cannot_be_painted_is_named() {
         (vec!["--image", &good, "--largest-change", "0"], "largest_change"),
         (vec!["train", "--resume", &not], "not.png"),
     ] {
-        let output = run(&[&arguments[..], &["--out", &out]].concat());
-        let text = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {text}");
-        let line = text.lines().find(|l| l.starts_with("paint-image: ")).unwrap_or_default();
-        assert!(line.contains(word), "{arguments:?}: {text}");
+        assert_refused(&[&arguments[..], &["--out", &out]].concat(), &[word]);
+    }
+}
+
+/// One line that holds the words, nothing else of note, and the exit code of a failure.
+fn assert_refused(arguments: &[&str], words: &[&str]) {
+    let output = run(arguments);
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}: {text}");
+    let lines: Vec<&str> = text.lines().filter(|l| l.starts_with("paint-image: ")).collect();
+    assert_eq!(lines.len(), 1, "{arguments:?}: {text}");
+    assert!(words.iter().all(|word| lines[0].contains(word)), "{arguments:?}: {text}");
+    assert!(!text.contains("panicked"), "{text}");
+}
+
+#[test]
+fn weights_that_are_cut_or_foreign_are_named() {
+    let scratch = Scratch::new("weights");
+    image::GrayImage::from_pixel(8, 8, image::Luma([9])).save(scratch.path("in.png")).unwrap();
+    let shipped =
+        std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../paint-net/weights/painter.safetensors")).unwrap();
+    // A header that claims to be longer than any file, and whole weights of another network.
+    let endless = [&[0xff; 8][..], &shipped[8..]].concat();
+    let files = [
+        ("empty", &[][..], "shorter than its header"),
+        ("header", &shipped[..100], "cut off"),
+        ("half", &shipped[..shipped.len() / 2], "cut off"),
+        ("last", &shipped[..shipped.len() - 1], "cut off"),
+        ("endless", &endless, "cut off"),
+        ("text", b"this is text, and quite a lot of it", "safetensors"),
+        ("foreign", &shipped, "safetensors"),
+    ];
+    let (image, out) = (scratch.path("in.png"), scratch.path("out"));
+    for (name, bytes, word) in files {
+        let file = scratch.path(name);
+        std::fs::write(&file, bytes).unwrap();
+        assert_refused(&["equal-sprays", "--weights", &file, &image], &[name, word]);
+        assert_refused(&["train", "--resume", &file, "--out", &out], &[name, word]);
+        assert_refused(&["train", "--preset", "thesis-paint", "--resume", &file, "--out", &out], &[name, word]);
+    }
+}
+
+#[test]
+fn absurd_settings_are_named() {
+    let scratch = Scratch::new("absurd");
+    image::GrayImage::from_pixel(8, 8, image::Luma([9])).save(scratch.path("in.png")).unwrap();
+    let (image, out) = (scratch.path("in.png"), scratch.path("out"));
+    for (setting, value, word) in [
+        ("--sigma", "1e9", "`sigma`"),
+        ("--cut", "-1", "`cut`"),
+        ("--along", "1000000000", "`along`"),
+        ("--row-spacing", "18446744073709551615", "`row_spacing`"),
+        ("--min-volume", "1e9", "`min_volume`"),
+    ] {
+        let setting = format!("{setting}={value}");
+        for more in [&["--painter", "feedback"][..], &["--painter", "splats"], &["--palette", "cmy"]] {
+            assert_refused(&[&["--image", &image, &setting, "--out", &out], more].concat(), &[word]);
+        }
+    }
+    for (setting, word) in [("--passes=100000000000", "`passes`"), ("--threads=1000000000", "`threads`")] {
+        assert_refused(&["--image", &image, setting, "--out", &out], &[word]);
+    }
+    for setting in ["--layers", "--largest-change=0.1"] {
+        assert_refused(&["--image", &image, "--palette", "cmy", setting, "--out", &out], &["--palette"]);
+    }
+    for (setting, word) in [
+        ("--steps=0", "`steps`"),
+        ("--batch=0", "`batch`"),
+        ("--rate=nan", "`learning_rate`"),
+        ("--threads=0", "`threads`"),
+    ] {
+        for preset in ["painter", "thesis-paint"] {
+            assert_refused(&["train", "--preset", preset, setting, "--out", &out], &[word]);
+        }
     }
 }
 

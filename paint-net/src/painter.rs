@@ -66,9 +66,9 @@ impl<'a> Task<'a> {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Limits {
-    /// Distance between sprays along a row, pixels. Default 2 (σ of the thesis' nozzle).
+    /// Distance between sprays along a row, 1 to 1000 pixels. Default 2 (σ of the thesis' nozzle).
     pub along: usize,
-    /// Distance between rows, pixels. Default 2.
+    /// Distance between rows, 1 to 1000 pixels. Default 2.
     pub row_spacing: usize,
     /// Largest depth of one spray. Default 3: beyond it ink no longer shows a difference.
     pub max_volume: f64,
@@ -86,8 +86,10 @@ impl Default for Limits {
 
 impl Limits {
     pub(crate) fn check(&self) -> Result<(), Error> {
-        require("along", self.along as f64, self.along > 0, "it must be at least 1 pixel")?;
-        require("row_spacing", self.row_spacing as f64, self.row_spacing > 0, "it must be at least 1 pixel")?;
+        // Work is done in whole cells: one far larger than the picture is only empty work.
+        for (name, spacing) in [("along", self.along), ("row_spacing", self.row_spacing)] {
+            require(name, spacing as f64, (1..=1000).contains(&spacing), "it must lie in 1..=1000 pixels")?;
+        }
         let max = self.max_volume;
         require("max_volume", max, max > 0.0 && max.is_finite(), "it must be positive and finite")?;
         let min = self.min_volume;

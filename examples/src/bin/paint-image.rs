@@ -10,7 +10,7 @@ use paint_net::train::{ThesisSettings, TrainSettings};
 use paint_net::{Image, Limits, Route, SprayKernel};
 use paintcopter_examples::paint_image::{
     Choice, Glazes, Job, Lesson, Pictures, ThesisLesson, compare, equal_sprays, learn, learn_thesis, pictures_in,
-    print_equal_sprays, print_table, read_ink, read_picture,
+    print_equal_sprays, read_ink, read_picture, table,
 };
 use paintcopter_examples::progress::Stage;
 
@@ -81,13 +81,16 @@ struct Nozzle {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Paints every picture of a folder with every painter and prints one table
+    /// Paints every picture of a folder with every painter: one table, and the canvases side by side
     Compare {
         /// Folder or picture [default: five built-in textures of 128 x 128 pixels]
         pictures: Option<PathBuf>,
         /// Runs of which the median time is taken
         #[arg(long, default_value_t = 3)]
         runs: usize,
+        /// Folder for compare.md and compare.png
+        #[arg(long, value_name = "DIR", default_value = "out/compare")]
+        out: PathBuf,
         #[command(flatten)]
         nozzle: Nozzle,
     },
@@ -193,9 +196,10 @@ fn run(arguments: Arguments) -> Result<(), AnyError> {
                 Some(palette) => paint_colours(&image, &job, palette, &arguments.out),
             }
         }
-        Some(Command::Compare { pictures, runs, nozzle }) => {
+        Some(Command::Compare { pictures, runs, out, nozzle }) => {
             let pictures = pictures_or_textures(pictures)?;
-            print!("{}", print_table(&compare(&job(PainterName::Feedback, &nozzle)?, &pictures, runs)?));
+            create(&out)?;
+            print!("{}", table(&compare(&job(PainterName::Feedback, &nozzle)?, &pictures, runs, &out)?));
             Ok(())
         }
         Some(Command::EqualSprays { weights, pictures }) => {
@@ -301,13 +305,16 @@ fn paint_colours(image: &Path, job: &Job, palette: PaletteName, out: &Path) -> R
         PaletteName::Cmyk => Glazes::Cmyk,
         PaletteName::Six => Glazes::Six,
     };
+    if job.layers || job.largest_change.is_some() {
+        return Err("--layers and --largest-change are for one paint: leave them out, or --palette".into());
+    }
     let (wanted, palette) = (read_picture(image)?, glazes.palette()?);
     create(out)?;
     let stage = Stage::start("paint");
     let (painting, figures) = job.paint_colours(&wanted, &palette, &mut |share| stage.share(share))?;
     stage
         .done(&format!("{} sprays, CIEDE2000 {:.2}, {:.1} ms", figures.sprays, figures.ciede2000_mean, figures.cpu_ms));
-    job.save_colours(out, &palette, &painting, &figures)?;
+    job.save_colours(out, &wanted, &palette, &painting, &figures)?;
     println!("{}", out.join("report.json").display());
     Ok(())
 }

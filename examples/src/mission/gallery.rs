@@ -76,7 +76,7 @@ impl Mission {
         let ink = self.appearance.ink();
         picture(&|k| ink.inverse(self.wanted.data()[k])).save(&folder.join("wanted.png"))?;
         picture(&|k| painted.data()[k]).save(&folder.join("painted.png"))?;
-        save_error_map(&folder.join("error.png"), width, &self.colour_difference(), self.settings.texel)?;
+        save_error_map(&folder.join("error.png"), width, &self.colour_difference(), (self.settings.texel, "m"))?;
         Ok(())
     }
 

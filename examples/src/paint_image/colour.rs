@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
-use paint_net::{ColourPainting, ColourTask, Coloured, Paint, Palette, Picture};
+use paint_net::{ColourPainting, ColourTask, Coloured, Error, Image, Paint, Palette, Picture, Spray, metrics};
 use paint_sim::colour::lab;
 use serde::Serialize;
 
-use super::{Clock, Job, PaintImageError, write_json};
-use crate::pictures::Rgb;
+use super::clock::Clock;
+use super::{Job, PaintImageError, commands, ink_of, ssim, write_json};
+use crate::pictures::{Rgb, save_error_map};
 
 /// Which glazes are in the guns, on a white wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,6 +53,11 @@ pub struct ColourFigures {
     pub height: usize,
     /// Peak signal-to-noise ratio over the stored values of all three bands.
     pub psnr_db: f64,
+    /// Structural similarity, 7x7 window, of the ink that a painting in black would be judged by (1 less the luma); 0 for
+    /// pictures smaller than the window.
+    pub ssim: f64,
+    /// Cross-entropy of the same ink.
+    pub bce_nats_per_px: f64,
     /// Mean colour difference.
     pub ciede2000_mean: f64,
     /// The colour difference that 5 % of the pixels exceed.
@@ -83,12 +89,22 @@ pub fn read_picture(path: &Path) -> Result<Picture, PaintImageError> {
 /// Peak signal-to-noise ratio, and mean and 95th percentile of CIEDE2000; both pictures in sRGB as stored.
 pub fn compare_colours(painted: &Picture, wanted: &Picture) -> (f64, f64, f64) {
     let pairs = painted.data().iter().zip(wanted.data());
-    let squared: f64 = pairs.clone().flat_map(|(a, b)| a.iter().zip(b)).map(|(a, b)| (a - b).powi(2)).sum();
-    let mut differences: Vec<f64> = pairs.map(|(a, b)| paint_sim::ciede2000(lab_of(*a), lab_of(*b))).collect();
+    let squared: f64 = pairs.flat_map(|(a, b)| a.iter().zip(b)).map(|(a, b)| (a - b).powi(2)).sum();
+    let mut differences = differences(painted, wanted);
     let mean = differences.iter().sum::<f64>() / differences.len() as f64;
     differences.sort_unstable_by(f64::total_cmp);
     let p95 = differences[(0.95 * (differences.len() - 1) as f64) as usize];
     (-10.0 * (squared / (3 * differences.len()) as f64 + 1e-20).log10(), mean, p95)
+}
+
+/// CIEDE2000 of every pixel.
+fn differences(painted: &Picture, wanted: &Picture) -> Vec<f64> {
+    let pairs = painted.data().iter().zip(wanted.data());
+    pairs.map(|(a, b)| paint_sim::ciede2000(lab_of(*a), lab_of(*b))).collect()
+}
+
+fn ink(picture: &Picture) -> Result<Image, Error> {
+    Image::new(picture.width(), picture.height(), picture.data().iter().map(|c| ink_of(*c)).collect())
 }
 
 /// Stored sRGB to Lab (IEC 61966-2-1, D65).
@@ -115,11 +131,14 @@ impl Job {
         let painting = Coloured::default().paint(&task, palette, &self.kernel, &self.limits, progress)?;
         let cpu_ms = clock.milliseconds();
         let (psnr_db, ciede2000_mean, ciede2000_p95) = compare_colours(&painting.picture, wanted);
+        let (painted_ink, wanted_ink) = (ink(&painting.picture)?, ink(wanted)?);
         let figures = ColourFigures {
             painter: "coloured",
             width: wanted.width(),
             height: wanted.height(),
             psnr_db,
+            ssim: ssim(&painted_ink, &wanted_ink)?,
+            bce_nats_per_px: metrics::binary_cross_entropy(&painted_ink, &wanted_ink)?,
             ciede2000_mean,
             ciede2000_p95,
             sprays: painting.sprays.iter().map(Vec::len).sum(),
@@ -128,40 +147,40 @@ impl Job {
             cpu_ms,
             threads: 1,
         };
-        if [psnr_db, ciede2000_mean, ciede2000_p95, figures.volume_total].iter().any(|f| !f.is_finite()) {
+        let ColourFigures { ssim, bce_nats_per_px, volume_total, .. } = figures;
+        let numbers = [psnr_db, ssim, bce_nats_per_px, ciede2000_mean, ciede2000_p95, volume_total];
+        if numbers.iter().any(|f| !f.is_finite()) {
             return Err(PaintImageError::NotFinite("report"));
         }
         Ok((painting, figures))
     }
 
-    /// Writes `commands.json`, `rendered.png` and `report.json`.
+    /// Writes `commands.json`, `commands.mcap`, `rendered.png`, `error.png` (CIEDE2000 of every pixel) and `report.json`.
     pub fn save_colours(
         &self,
         folder: &Path,
+        wanted: &Picture,
         palette: &Palette,
         painting: &ColourPainting,
         figures: &ColourFigures,
     ) -> Result<(), PaintImageError> {
         // Paint by paint: a nozzle is washed as seldom as can be, and wet paints mix in any order.
-        let of = |(index, sprays): (usize, &Vec<paint_net::Spray>)| -> Vec<(f64, f64, f64, f64, usize)> {
-            sprays.iter().map(|s| (s.x, s.y, s.volume, s.sigma, index)).collect()
-        };
-        let sprays: Vec<_> = painting.sprays.iter().enumerate().flat_map(of).collect();
+        let of_paint = |(paint, sprays): (usize, &Vec<Spray>)| commands::commands(sprays, paint).collect::<Vec<_>>();
+        let sprays: Vec<_> = painting.sprays.iter().enumerate().flat_map(of_paint).collect();
         let model = serde_json::json!({
             "colour": "Kubelka-Munk film of the depths sum of volume * exp(-d^2 / (2 sigma_px^2)) over the wall",
             "wall": palette.wall(), "cut_sigma": self.kernel.cut(),
             "absorption": palette.paints().iter().map(|p| p.absorption).collect::<Vec<_>>(),
             "scattering": palette.paints().iter().map(|p| p.scattering).collect::<Vec<_>>(),
         });
-        let names: Vec<_> = palette.paints().iter().map(|p| &p.name).collect();
-        let commands = serde_json::json!({
-            "width": figures.width, "height": figures.height, "spray_model": model, "paints": names, "sprays": sprays,
-        });
-        write_json(&folder.join("commands.json"), &commands)?;
+        let names: Vec<_> = palette.paints().iter().map(|p| p.name.as_str()).collect();
+        commands::save(folder, (figures.width, figures.height), &model, &names, &sprays)?;
         write_json(&folder.join("report.json"), figures)?;
         let byte = |v: f64| (255.0 * v).round() as u8;
         let pixels = painting.picture.data().iter().map(|c| c.map(byte));
         Rgb::from_pixels(figures.width, figures.height, pixels).save(&folder.join("rendered.png"))?;
+        let map: Vec<_> = differences(&painting.picture, wanted).into_iter().map(Some).collect();
+        save_error_map(&folder.join("error.png"), figures.width, &map, (1.0, "px"))?;
         Ok(())
     }
 }

@@ -1,7 +1,14 @@
-use paint_net::Image;
+use std::fmt::Write;
+use std::path::Path;
+
+use paint_net::{Image, Painting};
 use serde::Serialize;
 
-use super::{Choice, Figures, Job, PaintImageError};
+use super::{Choice, Figures, Job, PaintImageError, grey, write_text};
+use crate::pictures::{Tile, save_sheet};
+
+/// Pictures on the sheet: the first ones.
+const SHOWN: usize = 8;
 
 /// One painter over all pictures: means.
 #[derive(Debug, Clone, Serialize)]
@@ -20,19 +27,22 @@ pub struct Row {
     pub cpu_ms: f64,
 }
 
-/// Paints every picture with every painter, in turn, `runs` times.
-pub fn compare(job: &Job, pictures: &[Image], runs: usize) -> Result<Vec<Row>, PaintImageError> {
+/// Paints every picture with every painter, in turn, `runs` times; writes `compare.md` and, with the wanted pictures and all
+/// canvases side by side, `compare.png`.
+pub fn compare(job: &Job, pictures: &[Image], runs: usize, folder: &Path) -> Result<Vec<Row>, PaintImageError> {
+    let wanted = |picture| vec![Tile { caption: "wanted".to_string(), picture: grey(picture) }];
+    let mut sheet: Vec<Vec<Tile>> = pictures.iter().take(SHOWN).map(wanted).collect();
     let mut rows = Vec::with_capacity(Choice::ALL.len());
     for painter in Choice::ALL {
         let job = Job { painter, ..job.clone() };
         let mut all: Vec<Figures> = Vec::with_capacity(pictures.len());
-        for picture in pictures {
-            let runs: Result<Vec<Figures>, _> =
-                (0..runs.max(1)).map(|_| job.paint(picture, &mut |_| ()).map(|(_, figures)| figures)).collect();
-            let mut runs = runs?;
-            runs.sort_by(|a, b| a.cpu_ms.total_cmp(&b.cpu_ms));
-            let median = runs.len() / 2;
-            all.push(runs.swap_remove(median));
+        for (k, picture) in pictures.iter().enumerate() {
+            let (painting, figures) = median_run(&job, picture, runs)?;
+            if let Some(tiles) = sheet.get_mut(k) {
+                let caption = format!("{}, {:.2} dB", figures.painter, figures.psnr_db);
+                tiles.push(Tile { caption, picture: grey(&painting.ink) });
+            }
+            all.push(figures);
         }
         let mean = |of: &dyn Fn(&Figures) -> f64| all.iter().map(of).sum::<f64>() / all.len().max(1) as f64;
         rows.push(Row {
@@ -44,20 +54,34 @@ pub fn compare(job: &Job, pictures: &[Image], runs: usize) -> Result<Vec<Row>, P
             cpu_ms: mean(&|f| f.cpu_ms),
         });
     }
+    write_text(&folder.join("compare.md"), &table(&rows))?;
+    save_sheet(&folder.join("compare.png"), &sheet)?;
     Ok(rows)
 }
 
-/// The rows as a table for people.
-pub fn print_table(rows: &[Row]) -> String {
-    let head = format!(
-        "{:14} {:>9} {:>7} {:>10} {:>8} {:>9}\n",
-        "painter", "PSNR, dB", "SSIM", "CIEDE2000", "sprays", "CPU, ms"
-    );
-    let line = |r: &Row| {
-        format!(
-            "{:14} {:9.2} {:7.3} {:10.2} {:8.0} {:9.2}\n",
+/// The same painting every time; the time is the median's.
+fn median_run(job: &Job, picture: &Image, runs: usize) -> Result<(Painting, Figures), PaintImageError> {
+    let runs: Result<Vec<_>, _> = (0..runs.max(1)).map(|_| job.paint(picture, &mut |_| ())).collect();
+    let mut runs = runs?;
+    runs.sort_by(|a, b| a.1.cpu_ms.total_cmp(&b.1.cpu_ms));
+    let median = runs.len() / 2;
+    Ok(runs.swap_remove(median))
+}
+
+/// The rows as a table in Markdown that reads well as plain text too.
+pub fn table(rows: &[Row]) -> String {
+    let mut text = "\
+| painter        | PSNR, dB |  SSIM | CIEDE2000 | sprays |  CPU, ms |
+|----------------|---------:|------:|----------:|-------:|---------:|
+"
+    .to_string();
+    for r in rows {
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "| {:14} | {:8.2} | {:5.3} | {:9.2} | {:6.0} | {:8.2} |",
             r.painter, r.psnr_db, r.ssim, r.ciede2000, r.sprays, r.cpu_ms
-        )
-    };
-    head + &rows.iter().map(line).collect::<String>()
+        );
+    }
+    text
 }

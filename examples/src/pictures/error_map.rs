@@ -8,9 +8,14 @@ use super::{PictureError, draw};
 /// Colour differences above this share one colour: 20 is a plainly different colour.
 const CEILING: f64 = 20.0;
 
-/// Saves a map of CIEDE2000 differences over the texture, axes in metres, with its colour bar. `difference` holds one
-/// value per texel, row 0 at the top; `None` where there is no surface.
-pub fn save_error_map(path: &Path, width: usize, difference: &[Option<f64>], texel: f64) -> Result<(), PictureError> {
+/// Saves a map of CIEDE2000 differences over the texture with its colour bar. `difference` holds one value per texel, row 0 at
+/// the top; `None` where there is no surface. `texel` is the side of one in the unit of the axes, which is named.
+pub fn save_error_map(
+    path: &Path,
+    width: usize,
+    difference: &[Option<f64>],
+    (texel, unit): (f64, &str),
+) -> Result<(), PictureError> {
     let height = difference.len() / width.max(1);
     let zoom = (1200.0 / width as f64).min(900.0 / height as f64);
     let (map_width, map_height) = ((width as f64 * zoom) as u32, (height as f64 * zoom) as u32);
@@ -25,8 +30,8 @@ pub fn save_error_map(path: &Path, width: usize, difference: &[Option<f64>], tex
         chart
             .configure_mesh()
             .disable_mesh()
-            .x_desc("along the surface, m")
-            .y_desc("up the surface, m")
+            .x_desc(format!("along the surface, {unit}"))
+            .y_desc(format!("up the surface, {unit}"))
             .label_style(("sans-serif", 18))
             .axis_desc_style(("sans-serif", 20))
             .draw()?;

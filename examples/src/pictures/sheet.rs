@@ -1,0 +1,51 @@
+use std::path::Path;
+
+use image::RgbImage;
+use image::imageops::{FilterType, resize};
+use plotters::element::BitMapElement;
+use plotters::prelude::*;
+
+use super::{PictureError, Rgb, draw};
+
+/// A picture and what stands above it.
+pub struct Tile {
+    /// One short line.
+    pub caption: String,
+    /// Any size: it is fitted into the tile.
+    pub picture: Rgb,
+}
+
+/// Longer side of a picture in its tile, pixels.
+const SIDE: u32 = 256;
+const GAP: u32 = 12;
+const CAPTION: u32 = 26;
+
+/// Draws pictures side by side, one row after the other, and saves the sheet.
+pub fn save_sheet(path: &Path, rows: &[Vec<Tile>]) -> Result<(), PictureError> {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0) as u32;
+    let (across, down) = (SIDE + GAP, SIDE + GAP + CAPTION);
+    let sheet = draw(columns * across + GAP, rows.len() as u32 * down + GAP, |area| {
+        for (row, tiles) in (0..).zip(rows) {
+            for (column, tile) in (0..).zip(tiles) {
+                let (left, top) = ((GAP + column * across) as i32, (GAP + row * down) as i32);
+                area.draw(&Text::new(tile.caption.as_str(), (left, top), ("sans-serif", 20)))?;
+                let (size, data) = fitted(&tile.picture);
+                let element = BitMapElement::with_owned_buffer((left, top + CAPTION as i32), size, data);
+                area.draw(&element.ok_or("a picture with fewer pixels than it says")?)?;
+            }
+        }
+        Ok(())
+    })?;
+    sheet.save(path)
+}
+
+/// Size and pixels with the longer side `SIDE`: averaged when made smaller; square pixels stay visible when made larger.
+fn fitted(picture: &Rgb) -> ((u32, u32), Vec<u8>) {
+    let longer = picture.width.max(picture.height).max(1);
+    let scaled = |side: u32| ((f64::from(side) * f64::from(SIDE) / f64::from(longer)).round() as u32).max(1);
+    let (width, height) = (scaled(picture.width), scaled(picture.height));
+    let filter = if longer > SIDE { FilterType::Triangle } else { FilterType::Nearest };
+    let resized = RgbImage::from_raw(picture.width, picture.height, picture.data.clone())
+        .map(|source| resize(&source, width, height, filter).into_raw());
+    ((width, height), resized.unwrap_or_default())
+}
