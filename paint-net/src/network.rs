@@ -4,6 +4,7 @@ mod adjoint;
 mod conv;
 mod field;
 mod law;
+pub(crate) mod layout;
 mod pass;
 mod planes;
 mod real;
@@ -75,11 +76,7 @@ impl Network {
 
     /// From tensors among which those of the network are; `shape` if it is known.
     pub(crate) fn from_tensors(tensors: &[Tensor], shape: Option<Shape>) -> Result<Self, Error> {
-        let of = |name: &str| {
-            let found = tensors.iter().find(|t| t.name == name);
-            found.ok_or_else(|| Error::Weights(format!("there is no tensor {name}")))
-        };
-        let shape = match (shape, of("sense.bias")?.shape.as_slice()) {
+        let shape = match (shape, layout::find(tensors, "sense.bias")?.shape.as_slice()) {
             (Some(shape), _) => shape,
             (None, &[stages, channels]) => {
                 let further = tensors.iter().filter(|t| t.name.starts_with("think") && t.name.ends_with("weight"));
@@ -88,17 +85,7 @@ impl Network {
             (None, _) => return Err(Error::Weights("sense.bias does not have two extents".to_string())),
         };
         shape.check()?;
-        let mut parameters = vec![0.0; shape.parameters()];
-        for (name, extents, range) in shape.tensors() {
-            let tensor = of(&name)?;
-            if tensor.shape != extents {
-                return Err(Error::Weights(format!("{name} has the extents {:?}, not {extents:?}", tensor.shape)));
-            }
-            if let Some(value) = tensor.values.iter().find(|v| !v.is_finite()) {
-                return Err(Error::Weights(format!("{name} holds {value}")));
-            }
-            parameters[range].copy_from_slice(&tensor.values);
-        }
+        let parameters = layout::parameters(tensors, &shape.tensors())?;
         Ok(Self { shape, parameters })
     }
 
@@ -108,12 +95,7 @@ impl Network {
     }
 
     pub(crate) fn tensors(&self) -> Vec<Tensor> {
-        let tensor = |(name, shape, range): (String, Vec<usize>, std::ops::Range<usize>)| Tensor {
-            name,
-            shape,
-            values: self.parameters[range].to_vec(),
-        };
-        self.shape.tensors().into_iter().map(tensor).collect()
+        layout::tensors(&self.parameters, self.shape.tensors())
     }
 
     #[cfg(feature = "train")]

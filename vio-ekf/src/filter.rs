@@ -30,7 +30,7 @@ pub(crate) mod state;
 mod trust;
 pub(crate) mod update;
 
-use nalgebra::{Isometry3, SMatrix, Translation3, Unit, Vector2, Vector3};
+use nalgebra::{Isometry3, SMatrix, Translation3, Vector3};
 
 pub use bearing::Bearing;
 pub use estimator::CoreCovariance;
@@ -309,38 +309,6 @@ impl Vio {
         self.estimator.as_ref().map(Estimator::odometry)
     }
 
-    /// Starts from the means of a rest.
-    fn start_at_rest(&mut self) -> Result<(), Error> {
-        let Some(sample) = self.last else { return Ok(()) };
-        let off = |force: Vector3<f64>| (force.norm() - self.settings.gravity).abs();
-        self.waiting = match () {
-            () if !self.rest.is_steady(sample.stamp) => Waiting::ForSteadiness,
-            () if self.rest.force().is_some_and(|force| off(force) > self.settings.rest.gravity_tolerance) => {
-                Waiting::ForGravity
-            }
-            () => Waiting::ForStillImages,
-        };
-        if self.waiting != Waiting::ForStillImages || !self.rest.is_at_rest(sample.stamp) {
-            return Ok(());
-        }
-        let Some(window) = self.rest.take_window() else { return Ok(()) };
-        let sigma = StartSigma { velocity: self.settings.rest.velocity_sigma, tilt: 0.1, ..StartSigma::default() };
-        // Level as far as the force tells; only its direction is used, the update below weighs it against the bias.
-        let attitude = Bearing::new(&Unit::new_normalize(window.force)).level();
-        self.start(&Start {
-            stamp: sample.stamp,
-            world_from_body: Isometry3::from_parts(Translation3::identity(), attitude),
-            velocity_in_body: Vector3::zeros(),
-            gyro_bias: window.rate,
-            accel_bias: Vector3::zeros(),
-            sigma,
-        })?;
-        if let Some(estimator) = &mut self.estimator {
-            estimator.weigh(&window, self.unnoticed, &self.settings.rest);
-        }
-        Ok(())
-    }
-
     /// The camera's calibration at the last image; `None` before the start.
     pub fn calibration(&self) -> Option<Calibration> {
         self.estimator.as_ref().map(|estimator| Calibration {
@@ -351,43 +319,6 @@ impl Vio {
             time_offset_s: estimator.state.time_offset,
             covariance: estimator.covariance.block(at::CAMERA_POSITION, at::CAMERA_POSITION),
         })
-    }
-
-    /// Starts from what the scout has found at the time of an image. `look` tells of a point by its name how it is seen in that
-    /// image, and what it looks like.
-    fn start_in_motion(
-        &mut self,
-        stamp: Stamp,
-        motion: &moving::Motion,
-        mut look: impl FnMut(u64) -> Option<(Vector2<f64>, Option<Patch>)>,
-    ) {
-        let samples: Vec<Imu> = self.scout.samples().copied().collect();
-        let after = samples.partition_point(|sample| sample.stamp <= stamp).max(1);
-        let Some(before) = samples.get(after - 1) else { return };
-        let found = Start {
-            stamp,
-            world_from_body: Isometry3::from_parts(Translation3::identity(), motion.attitude),
-            velocity_in_body: motion.velocity,
-            gyro_bias: motion.gyro_bias,
-            accel_bias: motion.accel_bias,
-            sigma: StartSigma::default(),
-        };
-        let mut estimator = Estimator::new(&self.camera, self.noise, &self.settings, &found, *before);
-        self.reset();
-        let pixel_sigma = self.settings.moving.pixel_sigma;
-        estimator.inherit(motion, |id| {
-            let (pixel, patch) = look(id)?;
-            let bearing = Bearing::new(&self.camera.bearing(&pixel)?);
-            let warp = points::project(&self.camera, &bearing)?.1.try_inverse()?;
-            self.tracks.push(Track { id, misses: 0, seen: true, patch });
-            Some((bearing, warp, warp * warp.transpose() * (pixel_sigma * pixel_sigma)))
-        });
-        for sample in &samples[after..] {
-            estimator.imu(*sample);
-        }
-        self.next_id = self.tracks.iter().map(|track| track.id + 1).fold(self.next_id, u64::max);
-        self.doubtful = Some(later(stamp, self.settings.moving.doubt_s));
-        self.estimator = Some(estimator);
     }
 
     /// Time of an image by the inertial sensor's clock, as far as that is known before the start.

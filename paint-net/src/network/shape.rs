@@ -1,5 +1,6 @@
 use std::ops::Range;
 
+use super::layout::Part;
 use crate::error::{Error, require};
 
 /// What the network sees of a cell, in this order: missing depth under the footprint, paint, stiffness, last step, and the
@@ -38,7 +39,7 @@ impl Shape {
     }
 
     /// Where each tensor lies among the parameters, with its name and extents.
-    pub(crate) fn tensors(&self) -> Vec<(String, Vec<usize>, Range<usize>)> {
+    pub(crate) fn tensors(&self) -> Vec<Part> {
         let (c, n) = (self.channels, self.stages);
         let mut list = vec![("sense.weight".to_string(), vec![c, INPUTS, 3, 3])];
         list.push(("sense.bias".to_string(), vec![n, c]));

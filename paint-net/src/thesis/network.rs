@@ -1,7 +1,7 @@
 use super::rollout::Model;
 use super::shape::Shape;
 use crate::error::Error;
-use crate::network::{Tensor, safetensors};
+use crate::network::{Tensor, layout, safetensors};
 use crate::procedural::lattice;
 
 /// The weights of the thesis' network.
@@ -47,11 +47,8 @@ impl Network {
     }
 
     pub(crate) fn from_tensors(tensors: &[Tensor]) -> Result<Self, Error> {
-        let of = |name: &str| {
-            let found = tensors.iter().find(|t| t.name == name);
-            found.ok_or_else(|| Error::Weights(format!("there is no tensor {name}")))
-        };
-        let &[side, steps, latent, hidden, read, radius, stop, paint] = of(SHAPE)?.values.as_slice() else {
+        let &[side, steps, latent, hidden, read, radius, stop, paint] = layout::find(tensors, SHAPE)?.values.as_slice()
+        else {
             return Err(Error::Weights(format!("the tensor {SHAPE} does not hold eight sizes")));
         };
         // What is no size at all becomes 0 here, which is refused.
@@ -67,23 +64,7 @@ impl Network {
             paint: whole(paint),
         };
         shape.check()?;
-        let mut parameters = vec![0.0; shape.parameters()];
-        for layer in shape.layers().all() {
-            for (part, extents, range) in [
-                ("weight", vec![layer.inputs, layer.outputs], layer.weight()),
-                ("bias", vec![layer.outputs], layer.bias()),
-            ] {
-                let name = format!("{}.{part}", layer.name);
-                let tensor = of(&name)?;
-                if tensor.shape != extents {
-                    return Err(Error::Weights(format!("{name} has the extents {:?}, not {extents:?}", tensor.shape)));
-                }
-                if let Some(value) = tensor.values.iter().find(|v| !v.is_finite()) {
-                    return Err(Error::Weights(format!("{name} holds {value}")));
-                }
-                parameters[range].copy_from_slice(&tensor.values);
-            }
-        }
+        let parameters = layout::parameters(tensors, &shape.parts())?;
         Ok(Self { shape, parameters })
     }
 
@@ -97,15 +78,7 @@ impl Network {
         let sizes = [s.side, s.steps, s.latent, s.hidden, s.read].map(|n| n as f32);
         let sizes = [&sizes[..], &[s.radius as f32, s.stop as f32, s.paint as f32]].concat();
         let mut tensors = vec![Tensor { name: SHAPE.into(), shape: vec![sizes.len()], values: sizes }];
-        for layer in self.shape.layers().all() {
-            for (part, shape, range) in [
-                ("weight", vec![layer.inputs, layer.outputs], layer.weight()),
-                ("bias", vec![layer.outputs], layer.bias()),
-            ] {
-                let values = self.parameters[range].to_vec();
-                tensors.push(Tensor { name: format!("{}.{part}", layer.name), shape, values });
-            }
-        }
+        tensors.extend(layout::tensors(&self.parameters, self.shape.parts()));
         tensors
     }
 

@@ -1,6 +1,7 @@
 use std::ops::Range;
 
 use crate::error::{Error, require};
+use crate::network::layout::Part;
 
 /// Sizes of the thesis' network: a row of its Table 8.1, and what the table leaves open.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,6 +59,18 @@ impl Shape {
         within("paint", self.paint, 1, 4096, "it must lie in 1..=4096")?;
         require("radius", self.radius, self.radius > 0.0 && self.radius <= 1e3, "it must lie in (0, 1000] pixels")?;
         require("stop", self.stop, self.stop >= 0.0 && self.stop <= 1e6, "it must lie in [0, 1e6]")
+    }
+
+    /// The layers' weights and biases as named tensors.
+    pub(crate) fn parts(&self) -> Vec<Part> {
+        let of = |layer: Layer| {
+            let part = |name, extents, range| (format!("{}.{name}", layer.name), extents, range);
+            [
+                part("weight", vec![layer.inputs, layer.outputs], layer.weight()),
+                part("bias", vec![layer.outputs], layer.bias()),
+            ]
+        };
+        self.layers().all().into_iter().flat_map(of).collect()
     }
 
     pub(crate) fn layers(&self) -> Layers {

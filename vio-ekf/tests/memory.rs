@@ -1,4 +1,4 @@
-//! After the start the filter claims no memory: neither for a sample, nor for an image, nor for new landmarks.
+//! After their start the estimators claim no memory.
 
 // A global allocator can only be written with unsafe code; this one counts and passes on.
 #![allow(unsafe_code, reason = "counting allocations needs a global allocator")]
@@ -10,7 +10,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use support::flight::Flight;
-use vio_ekf::{ImageView, Settings, Stamp, StartSigma, Vio};
+use vio_ekf::{FusionSettings, ImageView, PoseFusion, PoseMeasurement, PoseSource, Settings, Stamp, StartSigma, Vio};
 
 struct Counting;
 
@@ -42,8 +42,9 @@ fn allocations(mut job: impl FnMut()) -> usize {
     COUNT.get() - before
 }
 
+/// Neither for a sample, nor for an image, nor for new landmarks.
 #[test]
-fn nothing_is_allocated_after_the_start() {
+fn the_filter_allocates_nothing() {
     let mut flight = Flight::new(1, 4.0);
     let start = flight.drawn_start(StartSigma::default());
     let mut vio = Vio::new(flight.camera, flight.noise, Settings::default()).unwrap();
@@ -72,4 +73,39 @@ fn nothing_is_allocated_after_the_start() {
             assert_eq!(count, 0, "image at sample {k}");
         }
     }
+}
+
+/// Neither for a sample, nor for a pose, however late, nor for an output.
+#[test]
+fn the_fusion_allocates_nothing() {
+    let mut flight = Flight::new(1, 12.0);
+    let start = flight.drawn_start(StartSigma::default());
+    let mut fusion = PoseFusion::new(flight.noise, &[PoseSource::default(); 2], FusionSettings::default()).unwrap();
+    for (k, stamp) in flight.stamps().enumerate() {
+        let sample = flight.imu(stamp);
+        if k == 0 {
+            fusion.imu(&sample).unwrap();
+            fusion.start(&start).unwrap();
+            continue;
+        }
+        assert_eq!(allocations(|| assert!(fusion.imu(&sample).is_ok())), 0, "sample {k}");
+        assert_eq!(allocations(|| assert!(fusion.output().is_some())), 0, "output {k}");
+        // Few poses, none for a while, more than the history holds; late ones and early ones.
+        let due = match k {
+            0..=800 => k % 10 == 0,
+            801..=1400 => false,
+            _ => k % 2 == 0,
+        };
+        if due && k > 100 {
+            for (source, back) in [(0, 40), (1, 3 * (k % 5) as i64 - 1)] {
+                let taken = Stamp::from_nanos((stamp.nanos() - 5_000_000 * back).min(flight.spline.span().1.nanos()));
+                let pose = PoseMeasurement::isotropic(source, taken, flight.truth(taken).world_from_body, 0.01, 0.01);
+                let count = allocations(|| {
+                    let _ = fusion.pose(&pose);
+                });
+                assert_eq!(count, 0, "pose at sample {k}");
+            }
+        }
+    }
+    assert_eq!(fusion.diverged(), None);
 }
