@@ -51,15 +51,17 @@ impl Vio {
     ///
     /// `stamp` is the middle of the exposure by the camera's clock. The image must be of the camera's size.
     pub fn image(&mut self, stamp: Stamp, image: &ImageView) -> Result<FrameReport, Error> {
-        if (image.width, image.height) != (self.camera.width, self.camera.height) {
-            return Err(Error::ImageSize {
-                given: (image.width, image.height),
-                expected: (self.camera.width, self.camera.height),
-            });
+        let image = image.checked(&self.camera)?;
+        if let Some(second) = &mut self.second {
+            second.show(None);
         }
-        let image = ImageView::new(image.width, image.height, image.data)?;
+        self.shown(stamp, &image)
+    }
+
+    /// Takes an image of the first camera; that of the second, if there is one, has been taken.
+    pub(super) fn shown(&mut self, stamp: Stamp, image: &ImageView) -> Result<FrameReport, Error> {
         let Sight { pyramid, detector } = &mut self.sight;
-        pyramid.fill(&image);
+        pyramid.fill(image);
         let now = self.last.map_or(stamp, |sample| sample.stamp);
         if self.rest.is_steady(now) {
             self.rest.image(pyramid, detector, &demands(&self.settings.patches));
@@ -154,6 +156,9 @@ impl Vio {
                 refresh(estimator, slot, track, pyramid, &self.camera, &self.settings.patches);
             }
         }
+        if let Some(second) = &self.second {
+            second.correct(estimator, pyramid, &self.camera, &self.settings);
+        }
     }
 
     /// Starts landmarks in the free slots; returns how many.
@@ -174,7 +179,12 @@ impl Vio {
             let Some((_, by_bearing)) = project(camera, &bearing) else { continue };
             let Some(warp) = by_bearing.try_inverse() else { continue };
             let covariance = warp * warp.transpose() * patches.pixel_sigma.powi(2);
-            estimator.add(bearing, warp, &Guess { bearing: covariance, ..guess });
+            let guess = Guess { bearing: covariance, ..guess };
+            let measured = self
+                .second
+                .as_ref()
+                .and_then(|second| second.first_guess(&patch, (&bearing, &warp), &guess, &self.settings));
+            estimator.add(bearing, warp, &measured.unwrap_or(guess));
             self.tracks.push(Track { id: self.next_id, misses: 0, seen: true, patch: Some(patch) });
             self.next_id += 1;
         }
