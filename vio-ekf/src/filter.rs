@@ -247,7 +247,7 @@ impl Vio {
             follower: Follower::default(),
             doubtful: None,
             rested: false,
-            unnoticed: 0.5 * settings.rest.pixels / camera.fx.min(camera.fy),
+            unnoticed: Rest::new(settings.rest).unnoticed(&camera),
             contradictions: 0,
             excess: None,
             waiting: Waiting::ForSteadiness,
@@ -359,18 +359,13 @@ impl Vio {
                 let guess = estimator.guess(&self.settings.landmarks);
                 estimator.loosen(self.unnoticed, &guess);
             }
-            if let Some(window) = self.rest.take_window() {
+            if let Some(window) = self.rest.take_certain_window(time) {
                 estimator.weigh(&window, self.unnoticed, &self.settings.rest);
             }
             self.rested = true;
             return Ok(Some(0));
         }
-        if self.rested {
-            // It set off before that was seen: by as much as goes unnoticed, within the last image or two.
-            let guess = estimator.guess(&self.settings.landmarks);
-            estimator.loosen(self.unnoticed, &guess);
-            self.rested = false;
-        }
+        self.rested = false;
         let before = self.tracks.len();
         let tracks = &mut self.tracks;
         estimator.advance(time, |slot| {

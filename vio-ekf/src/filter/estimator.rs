@@ -8,7 +8,7 @@ use super::rest::{RestSettings, Window};
 use super::settings::{LandmarkSettings, LimitSettings, Settings};
 use super::start::Start;
 use super::state::{Landmark, State, at};
-use super::{Excess, Odometry, bearing::Bearing};
+use super::{Excess, Odometry, bearing::Bearing, later};
 use crate::{Camera, Imu, ImuNoise, Stamp};
 
 /// Most residuals of one update.
@@ -99,8 +99,10 @@ impl Estimator {
         self.rate = self.history.rate_at_anchor() - self.state.gyro_bias;
     }
 
-    /// Moves the anchor to a later time without any motion: what the samples read is then bias and gravity.
-    pub(crate) fn stay(&mut self, until: Stamp, rest: &RestSettings) {
+    /// Goes on to a time without any motion: what the samples read is then bias and gravity. The anchor stays behind by the delay
+    /// of the settings: should the body turn out to have set off meanwhile, the samples since the anchor tell how.
+    pub(crate) fn stay(&mut self, now: Stamp, rest: &RestSettings) {
+        let until = later(now, -rest.delay_s).max(self.history.oldest()).max(self.history.anchor());
         let elapsed = until.secs_since(self.history.anchor());
         let walks = [(at::GYRO_BIAS, self.noise.gyro_walk), (at::ACCEL_BIAS, self.noise.accel_walk)];
         for (row, walk) in walks.into_iter().flat_map(|(row, walk)| (row..row + 3).map(move |row| (row, walk))) {

@@ -233,6 +233,8 @@ impl Settings {
             ("time_offset_sigma_s", self.calibration.time_offset_sigma_s),
             ("stamp_jitter_s", self.calibration.stamp_jitter_s),
             ("moving.doubt_s", self.moving.doubt_s),
+            ("rest.delay_s", self.rest.delay_s),
+            ("rest.pixels", self.rest.pixels),
             ("pixel_sigma", self.patches.pixel_sigma),
             ("drift", self.patches.drift),
             ("score", self.patches.score),
