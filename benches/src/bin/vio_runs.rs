@@ -133,9 +133,10 @@ fn follow(
     let imu = ImuModel::default();
     let recording = simulation.imu(0)?;
     let [left, right] = cameras(name);
-    let mut vio = match arguments.stereo {
-        true => Vio::stereo(left, right, imu.noise, *settings)?,
-        false => Vio::new(left, imu.noise, *settings)?,
+    let mut vio = if arguments.stereo {
+        Vio::stereo(left, right, imu.noise, *settings)?
+    } else {
+        Vio::new(left, imu.noise, *settings)?
     };
     let mut samples = recording.samples.iter();
     let first = samples.next().ok_or("the sequence is too short")?;
