@@ -1,4 +1,4 @@
-use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{Matrix1, Matrix2, Matrix3, SMatrix, SVector, Vector1, Vector2, Vector3};
 
 use super::covariance::{Covariance, Measurement};
 use super::distance::InverseDistance;
@@ -202,8 +202,26 @@ impl Estimator {
         self.covariance.add_row(row, 1.0, at::EXPECTED);
     }
 
+    /// Adds a landmark whose inverse distance has been measured, with a variance: that tells of the others, too.
+    pub(crate) fn add_measured(
+        &mut self,
+        bearing: Bearing,
+        warp: Matrix2<f64>,
+        covariance: &Matrix2<f64>,
+        (inverse_distance, variance): (f64, f64),
+    ) {
+        let expected = self.state.expected.value;
+        self.update(&Measurement {
+            rows: [at::EXPECTED],
+            residual: Vector1::new(inverse_distance - expected),
+            jacobian: Matrix1::new(1.0),
+            noise: Matrix1::new(variance + (self.landmarks.inverse_distance_sigma * expected).powi(2)),
+        });
+        self.add_at(bearing, warp, covariance, (inverse_distance, variance));
+    }
+
     /// Adds a landmark with an inverse distance, and its variance, that nothing else depends on.
-    pub(crate) fn add_at(
+    pub(super) fn add_at(
         &mut self,
         bearing: Bearing,
         warp: Matrix2<f64>,

@@ -2,6 +2,7 @@ use nalgebra::{Matrix2x3, Matrix3, SMatrix, Unit, UnitQuaternion, Vector2, Vecto
 
 use super::distance::InverseDistance;
 use super::state::{Landmark, State};
+use crate::Camera;
 
 /// Motion of the camera between two of its poses, and how it depends on the body's motion and on the calibration.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,6 +56,18 @@ impl CameraMotion {
             translation: camera_from_body * (swung - lever),
             by_motion,
             by_calibration,
+        }
+    }
+
+    /// From one camera of a rig to another, which is known exactly.
+    pub(crate) fn between(first: &Camera, second: &Camera) -> Self {
+        let second_from_first = second.body_from_camera.inverse() * first.body_from_camera;
+        Self {
+            rotation: second_from_first.rotation,
+            matrix: second_from_first.rotation.to_rotation_matrix().into_inner(),
+            translation: second_from_first.translation.vector,
+            by_motion: SMatrix::zeros(),
+            by_calibration: SMatrix::zeros(),
         }
     }
 

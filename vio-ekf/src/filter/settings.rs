@@ -1,4 +1,5 @@
 use super::moving::MovingSettings;
+use super::pair::PairSettings;
 use super::rest::RestSettings;
 use super::trust::SensorSettings;
 use crate::Error;
@@ -20,6 +21,8 @@ pub struct Settings {
     pub landmarks: LandmarkSettings,
     /// How images are read.
     pub patches: PatchSettings,
+    /// How the images of a pair of cameras are compared.
+    pub pair: PairSettings,
     /// When the body is taken to be at rest.
     pub rest: RestSettings,
     /// When a start in motion is believed.
@@ -41,6 +44,7 @@ impl Default for Settings {
             calibration: CalibrationSettings::default(),
             landmarks: LandmarkSettings::default(),
             patches: PatchSettings::default(),
+            pair: PairSettings::default(),
             rest: RestSettings::default(),
             moving: MovingSettings::default(),
             limits: LimitSettings::default(),
@@ -232,6 +236,7 @@ impl Settings {
         if self.gates.iterations == 0 {
             return Err(invalid("iterations", 0.0, "must be at least 1"));
         }
+        self.pair.check()?;
         all_not_negative(&[
             ("camera_position_sigma_m", self.calibration.camera_position_sigma_m),
             ("camera_attitude_sigma", self.calibration.camera_attitude_sigma),
