@@ -165,6 +165,10 @@ fn public_calibrations_are_read() {
     let camera = read_asl_camera(&text("cam0/sensor.yaml")).unwrap();
     let error = camera.camera.body_from_camera.inverse() * Camera::euroc().body_from_camera;
     assert!(error.rotation.angle() < 1e-9 && camera.camera.distortion == Camera::euroc().distortion);
+    let right = read_asl_camera(&text("cam1/sensor.yaml")).unwrap().camera;
+    let error = right.body_from_camera.inverse() * Camera::euroc_right().body_from_camera;
+    assert!(error.rotation.angle() < 1e-9 && error.translation.vector.norm() < 1e-9);
+    assert_eq!(Camera { body_from_camera: right.body_from_camera, ..Camera::euroc_right() }, right);
     assert_eq!(read_asl_imu(&text("imu0/sensor.yaml")).unwrap().noise, ImuNoise::default());
     assert_eq!(asl::read_images(&text("cam0/data.csv")).unwrap().len(), 95);
 }
