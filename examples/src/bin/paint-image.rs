@@ -135,6 +135,9 @@ struct Training {
     /// Train the thesis' network as its algorithm is printed: the decision to paint on does not scale the volume
     #[arg(long)]
     as_printed: bool,
+    /// Weight of the divergence of the latent code, for the thesis' presets; less pays for more detail [default: the thesis']
+    #[arg(long)]
+    latent_weight: Option<f64>,
     /// Worker threads; the weights do not depend on it
     #[arg(long, default_value_t = 1)]
     threads: usize,
@@ -218,8 +221,8 @@ fn pictures_or_textures(pictures: Option<PathBuf>) -> Result<Vec<Image>, AnyErro
 }
 
 fn train(training: Training) -> Result<(), AnyError> {
-    let Training { preset, data, seed, steps, until, batch, rate, last_rate, as_printed, threads, resume, out } =
-        training;
+    let Training { preset, data, seed, steps, until, batch, rate, last_rate, as_printed, latent_weight, .. } = training;
+    let Training { threads, resume, out, .. } = training;
     create(&out)?;
     let (shape, pictures) = match preset {
         Preset::Painter => {
@@ -249,7 +252,11 @@ fn train(training: Training) -> Result<(), AnyError> {
         batch: batch.unwrap_or(preset.batch),
         learning_rate: rate.unwrap_or(preset.learning_rate),
         last_learning_rate: last_rate.unwrap_or(preset.last_learning_rate),
-        objective: Objective { gated: !as_printed, ..preset.objective },
+        objective: Objective {
+            gated: !as_printed,
+            latent: latent_weight.unwrap_or(preset.objective.latent),
+            ..preset.objective
+        },
         ..preset
     };
     learn_thesis(&ThesisLesson { settings, pictures, resume, until, save_every: 100 }, &out)?;
