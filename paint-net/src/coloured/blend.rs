@@ -248,20 +248,21 @@ mod tests {
         let wanted = Picture::new(SIZE.0, SIZE.1, pixels(|_| palette.colour(&depths))).unwrap();
         let mut blend = Blend::new(&ColourTask::new(&wanted), palette, Judge::Bands, &kernel, &limits);
         let squared = kernel.squared();
+        let footprints = Footprints::new(&squared, SIZE, limits.along, limits.row_spacing);
+        let cells = footprints.cells();
         let (found, bends) = blend.start(3.0, squared.mass());
-        let cells = found.len() / 2;
         // An odd number of columns and of rows.
         let middle = cells / 2;
         for (p, depth) in depths.into_iter().enumerate() {
             assert!((found[p * cells + middle] - depth).abs() < 1e-3, "paint {p}: {}", found[p * cells + middle]);
             let slopes = measure.map(|band| palette.adjoint(&depths, band)[p]);
-            let inside = squared.mass() * slopes.iter().map(|s| s * s).sum::<f64>();
-            // A corner sees less than the middle, and has the floor, 3 % of the mean, like all.
-            let mean = bends[p * cells..(p + 1) * cells].iter().sum::<f64>() / cells as f64 / 1.03;
-            let expected = inside + 0.03 * mean;
-            let bend = bends[p * cells + middle];
-            assert!((bend / expected - 1.0).abs() < 1e-3, "paint {p}: {bend}, expected {expected}");
-            assert!(bends[p * cells] < 0.8 * bend && bends[p * cells] > 0.03 * mean);
+            let bend = slopes.iter().map(|s| s * s).sum::<f64>();
+            let mut expected = vec![0.0; cells];
+            footprints.gather(&pixels(|_| bend), &mut expected);
+            let floor = 0.03 * expected.iter().sum::<f64>() / cells as f64;
+            for (k, (found, expected)) in bends[p * cells..].iter().zip(&expected).enumerate() {
+                assert!((found / (expected + floor) - 1.0).abs() < 1e-3, "paint {p}, cell {k}: {found}, {expected}");
+            }
         }
     }
 }
