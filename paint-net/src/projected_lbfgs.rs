@@ -35,8 +35,8 @@ pub(crate) fn minimise(
         progress(iteration as f64 / stop.iterations as f64);
         // 1 and 0 rather than a condition, so that all loops run over whole blocks.
         for (((free, x), g), top) in free.iter_mut().zip(&*x).zip(&gradient).zip(ceiling) {
-            let bound = (*x <= 0.0) & (*g >= 0.0) | (*x >= *top) & (*g <= 0.0);
-            *free = f64::from(u8::from(!bound));
+            let bound = *x <= 0.0 && *g >= 0.0 || *x >= *top && *g <= 0.0;
+            *free = if bound { 0.0 } else { 1.0 };
         }
         let mut direction = descent_direction(&gradient, &free, &history);
         let mut slope = dot(&direction, &gradient);

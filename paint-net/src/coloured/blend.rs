@@ -88,7 +88,9 @@ impl Blend {
         self.gather(true, mass_of_squares, &ones, &mut bends);
         for bends in bends.chunks_exact_mut(cells) {
             let floor = FLOOR * bends.iter().sum::<f64>() / cells as f64 + 1e-12;
-            bends.iter_mut().for_each(|v| *v += floor);
+            for v in bends {
+                *v += floor;
+            }
         }
         (means, bends)
     }
@@ -215,8 +217,8 @@ mod tests {
                     footprints.add(volumes, depth);
                 }
                 let mut cost = 0.0;
-                for k in 0..SIZE.0 * SIZE.1 {
-                    let (colour, wanted) = (palette.colour(&[depths[0][k], depths[1][k]]), wanted.data()[k]);
+                for (k, &wanted) in wanted.data().iter().enumerate() {
+                    let colour = palette.colour(&depths.each_ref().map(|depth| depth[k]));
                     for row in difference(wanted) {
                         let miss: f64 = (0..3).map(|b| row[b] * (colour[b] - wanted[b])).sum();
                         cost += 0.5 * weight.data()[k] / heaviest * miss * miss;

@@ -111,10 +111,10 @@ impl Mixture {
     #[inline(always)]
     fn slopes(&self, paint: usize, films: &[Film; 3]) -> [Block; 3] {
         let mut slopes = [[0.0; BLOCK]; 3];
-        for (band, film) in films.iter().enumerate() {
+        for (band, (slopes, film)) in slopes.iter_mut().zip(films).enumerate() {
             let (k, s) = (self.absorption[paint][band], self.scattering[paint][band]);
-            for lane in 0..BLOCK {
-                slopes[band][lane] = k * film.by_absorption[lane] + s * film.by_scattering[lane];
+            for ((slope, by_k), by_s) in slopes.iter_mut().zip(&film.by_absorption).zip(&film.by_scattering) {
+                *slope = k * by_k + s * by_s;
             }
         }
         slopes
@@ -166,9 +166,9 @@ impl Film {
     /// Beer-Lambert; how the colour changes by scattering is left at 0, as no paint has any.
     #[inline(always)]
     fn fill_glazes(&mut self, absorption: &Block, g: f32) {
-        for lane in 0..BLOCK {
-            self.colour[lane] = g * Real::exp(-2.0 * absorption[lane]);
-            self.by_absorption[lane] = -2.0 * self.colour[lane];
+        for ((k, colour), by_absorption) in absorption.iter().zip(&mut self.colour).zip(&mut self.by_absorption) {
+            *colour = g * Real::exp(-2.0 * k);
+            *by_absorption = -2.0 * *colour;
         }
     }
 }
