@@ -4,10 +4,12 @@ pub mod colours;
 pub mod cpu;
 pub mod films;
 pub mod flight;
+pub mod frames;
 pub mod motion;
 pub mod painting;
 pub mod rock;
 pub mod room;
+pub mod sequences;
 
 use std::time::Duration;
 

@@ -75,6 +75,24 @@ impl Camera {
         }
     }
 
+    /// The right camera of the EuRoC vehicle with its published calibration (Burri et al. 2016), 0.11 m beside the left one.
+    pub fn euroc_right() -> Self {
+        Self {
+            width: 752,
+            height: 480,
+            fx: 457.587,
+            fy: 456.134,
+            cx: 379.999,
+            cy: 255.238,
+            distortion: Distortion::RadTan([-0.28368365, 0.07451284, -0.00010473, -3.55590700e-05]),
+            body_from_camera: nearest_pose(&[
+                [0.0125552670891, -0.999755099723, 0.0182237714554, -0.0198435579556],
+                [0.999598781151, 0.0130119051815, 0.0251588363115, 0.0453689425024],
+                [-0.0253898008918, 0.0179005838253, 0.999517347078, 0.00786212447038],
+            ]),
+        }
+    }
+
     /// Refuses a calibration that no camera has: empty image, focal length not positive, anything not finite.
     pub fn check(&self) -> Result<(), Error> {
         for (name, side) in [("width", self.width), ("height", self.height)] {

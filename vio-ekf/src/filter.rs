@@ -1,8 +1,10 @@
-//! The estimator: one camera, one inertial sensor, an iterated Kalman filter around the body.
+//! The estimator: a camera, maybe a second one, an inertial sensor, an iterated Kalman filter around the body.
 
 mod bearing;
+mod bends;
 pub(crate) mod covariance;
 mod detect;
+mod distance;
 mod estimator;
 mod external;
 mod follower;
@@ -15,6 +17,9 @@ mod jacobians;
 mod moving;
 #[cfg(test)]
 mod moving_tests;
+mod pair;
+#[cfg(test)]
+mod pair_tests;
 mod patch;
 #[cfg(test)]
 mod patches;
@@ -35,6 +40,7 @@ use nalgebra::{Isometry3, SMatrix, Translation3, Vector3};
 pub use bearing::Bearing;
 pub use estimator::CoreCovariance;
 pub use moving::MovingSettings;
+pub use pair::PairSettings;
 pub use points::PointObservation;
 pub use rest::RestSettings;
 pub use settings::{CalibrationSettings, GateSettings, LandmarkSettings, LimitSettings, PatchSettings, Settings};
@@ -45,6 +51,7 @@ use crate::{Camera, Error, Imu, ImuNoise, Stamp};
 use estimator::Estimator;
 use follower::Follower;
 use images::Sight;
+use pair::Second;
 use patch::Patch;
 use rest::Rest;
 use scout::Scout;
@@ -148,7 +155,7 @@ pub struct FrameReport {
     pub at_rest: bool,
 }
 
-/// One camera and one inertial sensor.
+/// A camera, maybe a second one beside it, and an inertial sensor.
 ///
 /// Feed samples and images as they come; an image may arrive up to [`Settings::history_samples`] samples late and is used
 /// at its own time, with the same result to the last bit. The filter starts by itself, at rest or in motion, or from a
@@ -191,6 +198,8 @@ pub struct Vio {
     estimator: Option<Estimator>,
     tracks: Vec<Track>,
     sight: Sight,
+    /// The other camera of a pair.
+    second: Option<Second>,
     rest: Rest,
     scout: Scout,
     follower: Follower,
@@ -234,12 +243,13 @@ impl Vio {
             estimator: None,
             tracks: Vec::with_capacity(settings.features),
             sight: Sight::new(&camera, &settings.patches),
+            second: None,
             rest: Rest::new(settings.rest),
             scout: Scout::new(settings.moving),
             follower: Follower::default(),
             doubtful: None,
             rested: false,
-            unnoticed: 0.5 * settings.rest.pixels / camera.fx.min(camera.fy),
+            unnoticed: Rest::new(settings.rest).unnoticed(&camera),
             contradictions: 0,
             excess: None,
             waiting: Waiting::ForSteadiness,
@@ -348,21 +358,15 @@ impl Vio {
         if at_rest {
             estimator.stay(time, &self.settings.rest);
             if !self.rested {
-                let guess = estimator.guess(&self.settings.landmarks);
-                estimator.loosen(self.unnoticed, &guess);
+                estimator.loosen(self.unnoticed);
             }
-            if let Some(window) = self.rest.take_window() {
+            if let Some(window) = self.rest.take_certain_window(time) {
                 estimator.weigh(&window, self.unnoticed, &self.settings.rest);
             }
             self.rested = true;
             return Ok(Some(0));
         }
-        if self.rested {
-            // It set off before that was seen: by as much as goes unnoticed, within the last image or two.
-            let guess = estimator.guess(&self.settings.landmarks);
-            estimator.loosen(self.unnoticed, &guess);
-            self.rested = false;
-        }
+        self.rested = false;
         let before = self.tracks.len();
         let tracks = &mut self.tracks;
         estimator.advance(time, |slot| {

@@ -1,5 +1,5 @@
-//! Visual-inertial odometry: one camera and one inertial sensor in an iterated Kalman filter that is honest about what it
-//! does not know; trajectories, their file formats and their evaluation.
+//! Visual-inertial odometry: a camera, or a pair, and an inertial sensor in an iterated Kalman filter that is honest about
+//! what it does not know; trajectories, their file formats and their evaluation.
 //!
 //! [`Vio`] takes inertial samples and grey images, and gives pose, velocity and covariance at the rate of the samples. It
 //! compares patches of the image directly, keeps landmarks as bearing and inverse distance in the camera's axes, and never
@@ -32,6 +32,7 @@
 //! | what | source | item |
 //! |---|---|---|
 //! | robocentric filter on images | after ROVIO, Bloesch et al. 2017 (thesis, Paper I, section 4.1) | [`Vio`], [`Vio::image`] |
+//! | distances by a second camera | ours | [`Vio::stereo`], [`Vio::image_pair`] |
 //! | the same on a caller's points | ours | [`Vio::points`] |
 //! | motion between images, its noise | Forster et al. 2017 | [`Vio::imu`], [`ImuNoise`] |
 //! | bearing with a tangent basis | Hertzberg et al. 2013; Bloesch et al. 2017 | [`Bearing`] |
@@ -84,8 +85,8 @@ pub use eval::stats::Stats;
 pub use eval::{Evaluation, EvaluationSettings, Segment, evaluate};
 pub use filter::{
     Bearing, Calibration, CalibrationSettings, CoreCovariance, Excess, FrameReport, GateSettings, LandmarkSettings,
-    LimitSettings, MovingSettings, Odometry, PatchSettings, PointObservation, RestSettings, SensorSettings, Settings,
-    Start, StartSigma, Status, Vio, Waiting,
+    LimitSettings, MovingSettings, Odometry, PairSettings, PatchSettings, PointObservation, RestSettings,
+    SensorSettings, Settings, Start, StartSigma, Status, Vio, Waiting,
 };
 pub use format::{asl, calibration, euroc, kitti, tum};
 pub use fusion::{

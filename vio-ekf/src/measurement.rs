@@ -1,7 +1,7 @@
 use nalgebra::Vector3;
 
 use crate::trajectory::same_length;
-use crate::{Error, Stamp};
+use crate::{Camera, Error, Stamp};
 
 /// One sample of an inertial measurement unit, in the axes of the unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,6 +37,15 @@ impl<'a> ImageView<'a> {
     pub fn new(width: usize, height: usize, data: &'a [u8]) -> Result<Self, Error> {
         same_length("image data", data.len(), "width times height", width.saturating_mul(height))?;
         Ok(Self { width, height, data })
+    }
+
+    /// Refuses an image that is not of a camera's size, or not of its own: the fields are public.
+    pub(crate) fn checked(&self, camera: &Camera) -> Result<Self, Error> {
+        let (given, expected) = ((self.width, self.height), (camera.width, camera.height));
+        if given != expected {
+            return Err(Error::ImageSize { given, expected });
+        }
+        Self::new(self.width, self.height, self.data)
     }
 }
 

@@ -32,7 +32,7 @@ mod room;
 mod texture;
 
 pub use camera::{CameraModel, Frame};
-pub use flight::{camera_ahead, painting_flight};
+pub use flight::{camera_ahead, camera_ahead_right, painting_flight};
 pub use imu::{ImuLimits, ImuModel, ImuRecording, Vibration};
 pub use photometry::{Gain, Photometry};
 pub use room::{Cuboid, Occluder, Room, RoomSettings, Surface};

@@ -47,7 +47,9 @@ fn allocations(mut job: impl FnMut()) -> usize {
 fn the_filter_allocates_nothing() {
     let mut flight = Flight::new(1, 4.0);
     let start = flight.drawn_start(StartSigma::default());
-    let mut vio = Vio::new(flight.camera, flight.noise, Settings::default()).unwrap();
+    let mut other = flight.camera;
+    other.body_from_camera.translation.y -= 0.11;
+    let mut vio = Vio::stereo(flight.camera, other, flight.noise, Settings::default()).unwrap();
     let mut picture = vec![0_u8; 752 * 480];
     for (k, pixel) in picture.iter_mut().enumerate() {
         *pixel = if (k % 752 / 24 + k / 752 / 24) % 2 == 0 { 50 } else { 180 };
@@ -62,13 +64,15 @@ fn the_filter_allocates_nothing() {
         assert_eq!(allocations(|| assert!(vio.imu(&sample).is_ok())), 0, "sample {k}");
         assert_eq!(allocations(|| assert!(vio.output().is_some())), 0, "output {k}");
         if k % 10 == 0 {
-            // First points, then images: with the change all landmarks are lost and new ones begin.
+            // First points, then images, then pairs of them: with the change all landmarks are lost and new ones begin.
             let (seen, view) = (flight.see(stamp), ImageView::new(752, 480, &picture).unwrap());
             let time = Stamp::from_nanos(stamp.nanos());
             let count = if k < 300 {
                 allocations(|| assert!(vio.points(time, &seen).is_ok()))
-            } else {
+            } else if k < 450 {
                 allocations(|| assert!(vio.image(time, &view).is_ok()))
+            } else {
+                allocations(|| assert!(vio.image_pair(time, &view, &view).is_ok()))
             };
             assert_eq!(count, 0, "image at sample {k}");
         }

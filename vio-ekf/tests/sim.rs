@@ -6,7 +6,7 @@ use vio_ekf::sim::{
     CameraModel, Cuboid, Gain, ImuModel, Occluder, Photometry, Room, RoomSettings, Scenario, Simulation, Surface,
     Texture, Vibration,
 };
-use vio_ekf::{Error, Spline, Stamp};
+use vio_ekf::{Camera, Error, Spline, Stamp};
 
 const KNOT_NS: i64 = 50_000_000;
 
@@ -292,4 +292,22 @@ fn what_cannot_be_is_refused_by_name() {
     assert!(matches!(simulation.imu(1), Err(Error::NoSuch { index: 1, .. })));
     assert!(matches!(simulation.frame(0, 100_000), Err(Error::NoSuch { .. })));
     assert!(matches!(simulation.frame(2, 0), Err(Error::NoSuch { index: 2, .. })));
+}
+
+#[test]
+fn a_second_camera_changes_nothing_for_the_first() {
+    let record = |cameras: Vec<Camera>| {
+        let model = |camera| CameraModel { camera, stamp_jitter_s: 0.002, ..CameraModel::default() };
+        let cameras = cameras.into_iter().map(model).collect();
+        Simulation::new(wild(), Scenario { cameras, room: small_room(), ..Scenario::default() }).unwrap()
+    };
+    let alone = record(vec![Camera::euroc()]);
+    let pair = record(vec![Camera::euroc(), Camera::euroc_right()]);
+    let frame = |simulation: &Simulation, which| simulation.frame(which, 7).unwrap().unwrap();
+    assert_eq!(frame(&alone, 0), frame(&pair, 0));
+    assert_eq!(alone.imu(0).unwrap().samples, pair.imu(0).unwrap().samples);
+    // The second one has noise of its own.
+    let twice = record(vec![Camera::euroc(); 2]);
+    let (first, second) = (frame(&twice, 0), frame(&twice, 1));
+    assert!(first.data != second.data && first.stamp != second.stamp && first.true_stamp == second.true_stamp);
 }

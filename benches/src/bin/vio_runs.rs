@@ -2,18 +2,20 @@
 
 use std::error::Error;
 use std::hint::black_box;
-use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::path::PathBuf;
+use std::process::ExitCode;
 
 use clap::Parser;
 use cpu_time::ThreadTime;
 use nalgebra::Vector3;
 use paintcopter_benches::Rng;
+use paintcopter_benches::frames::Frames;
+use paintcopter_benches::sequences::{SEQUENCES, cameras, motion};
 use serde_json::json;
-use vio_ekf::sim::{CameraModel, Frame, ImuModel, Scenario, Simulation, camera_ahead, painting_flight};
+use vio_ekf::sim::{CameraModel, ImuModel, Scenario, Simulation};
 use vio_ekf::{
-    Alignment, Association, Camera, ImageView, Odometry, Settings, Spline, Stamp, Start, StartSigma, Status,
-    Trajectory, Vio, ate, euroc, nalgebra, so3, tum,
+    Alignment, Association, Odometry, Settings, Stamp, Start, StartSigma, Status, Trajectory, Vio, ate, nalgebra, so3,
+    tum,
 };
 
 type AnyError = Box<dyn Error>;
@@ -34,6 +36,9 @@ struct Arguments {
     /// Seconds of each sequence; all by default
     #[arg(long)]
     seconds: Option<f64>,
+    /// With the second camera
+    #[arg(long)]
+    stereo: bool,
     /// Settings of the filter that differ from the default, as JSON
     #[arg(long, default_value = "{}")]
     settings: String,
@@ -76,13 +81,15 @@ struct Outcome {
 
 fn run(arguments: &Arguments) -> Result<(), AnyError> {
     let settings: Settings = serde_json::from_str(&arguments.settings)?;
-    let all = ["MH_01", "MH_03", "MH_04", "V1_02", "paint_1", "paint_2"].map(String::from).to_vec();
+    let all = SEQUENCES.map(String::from).to_vec();
     let names = if arguments.sequence.is_empty() { &all } else { &arguments.sequence };
     let (mut errors, mut millis, mut imu_micros, mut diverged) = (Vec::new(), Vec::new(), Vec::new(), 0);
     for name in names {
-        let spline = spline(&arguments.data, name, arguments.seconds)?;
+        let spline = motion(&arguments.data, name, arguments.seconds)?;
         for seed in arguments.first_seed..arguments.first_seed + arguments.seeds {
-            let cameras = vec![CameraModel { camera: camera(name), ..CameraModel::default() }];
+            let count = if arguments.stereo { 2 } else { 1 };
+            let model = |camera| CameraModel { camera, ..CameraModel::default() };
+            let cameras = cameras(name)[..count].iter().copied().map(model).collect();
             let simulation = Simulation::new(spline.clone(), Scenario { seed, cameras, ..Scenario::default() })?;
             let mut outcome = follow(&simulation, name, seed, &settings, arguments)?;
             for _ in 1..arguments.repeats {
@@ -116,39 +123,6 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
     Ok(())
 }
 
-/// The camera of a sequence.
-fn camera(name: &str) -> Camera {
-    if name.starts_with("paint") { camera_ahead() } else { Camera::euroc() }
-}
-
-/// The motion of a recording, cut to some seconds.
-fn spline(data: &Path, name: &str, seconds: Option<f64>) -> Result<Spline, AnyError> {
-    let file = match name {
-        "MH_01" => "trajectories/euroc/MH_01_easy.txt.gz",
-        "MH_03" => "trajectories/euroc/MH_03_medium.txt.gz",
-        "MH_04" => "vio/euroc_imu_gt/MH_04_difficult/groundtruth_MH_04_difficult.csv.gz",
-        "V1_02" => "vio/euroc_imu_gt/V1_02_medium/groundtruth_V1_02_medium.csv.gz",
-        "paint_1" => return Ok(painting_flight(1, seconds.unwrap_or(60.0))?),
-        "paint_2" => return Ok(painting_flight(2, seconds.unwrap_or(60.0))?),
-        _ => return Err(format!("`{name}` is no sequence: MH_01, MH_03, MH_04, V1_02, paint_1 or paint_2").into()),
-    };
-    let path = data.join(file);
-    let output = Command::new("gzip").arg("-dc").arg(&path).output()?;
-    if !output.status.success() {
-        return Err(
-            format!("cannot read {}: set PAINTCOPTER_DATA to the folder with the recordings", path.display()).into()
-        );
-    }
-    let text = String::from_utf8(output.stdout)?;
-    let whole = if file.ends_with("csv.gz") { euroc::read(&text)?.trajectory } else { tum::read(&text)? };
-    let mut cut = Trajectory::default();
-    let first = whole.stamps().first().copied().unwrap_or_default();
-    for (stamp, pose) in whole.iter().take_while(|(s, _)| seconds.is_none_or(|most| s.secs_since(first) <= most)) {
-        cut.push(stamp, *pose)?;
-    }
-    Ok(Spline::from_trajectory(&cut, 50_000_000)?)
-}
-
 fn follow(
     simulation: &Simulation,
     name: &str,
@@ -158,18 +132,27 @@ fn follow(
 ) -> Result<Outcome, AnyError> {
     let imu = ImuModel::default();
     let recording = simulation.imu(0)?;
-    let mut vio = Vio::new(camera(name), imu.noise, *settings)?;
+    let [left, right] = cameras(name);
+    let mut vio = if arguments.stereo {
+        Vio::stereo(left, right, imu.noise, *settings)?
+    } else {
+        Vio::new(left, imu.noise, *settings)?
+    };
     let mut samples = recording.samples.iter();
     let first = samples.next().ok_or("the sequence is too short")?;
     vio.imu(first)?;
     vio.start(&start(simulation, first.stamp, &imu, seed)?)?;
 
-    let mut film = Film::new(simulation, name, seed, arguments)?;
+    let folder = |side: &str| arguments.cache.as_ref().map(|cache| cache.join(format!("{name}_{seed}{side}")));
+    let first = Frames::new(simulation, 0, left, folder(""))?;
+    let second = arguments.stereo.then(|| Frames::new(simulation, 1, right, folder("_right"))).transpose()?;
     let (mut truth, mut estimate) = (Trajectory::default(), Trajectory::default());
     let mut outcome =
         Outcome { se3: 0.0, yaw: 0.0, nees: [0.0; 5], millis: Vec::new(), imu_micros: Vec::new(), diverged: false };
     let mut next = samples.next();
-    while let Some(frame) = film.next()? {
+    for index in 0..first.count() {
+        let Some(frame) = first.get(index)? else { continue };
+        let other = second.as_ref().map(|second| second.get(index)).transpose()?.flatten();
         while let Some(sample) = next {
             let began = ThreadTime::now();
             vio.imu(sample)?;
@@ -181,7 +164,10 @@ fn follow(
             }
         }
         let began = ThreadTime::now();
-        let report = vio.image(frame.stamp, &frame.view())?;
+        let report = match &other {
+            Some(other) => vio.image_pair(frame.stamp, &frame.view(), &other.view())?,
+            None => vio.image(frame.stamp, &frame.view())?,
+        };
         outcome.millis.push(began.elapsed().as_secs_f64() * 1e3);
         outcome.diverged |= matches!(report.status, Status::Diverged(_));
         if std::env::var_os("VIO_TRACE").is_some() {
@@ -251,53 +237,4 @@ fn quantile(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     sorted.get(((sorted.len() as f64 - 1.0) * share).round() as usize).copied().unwrap_or(0.0)
-}
-
-/// The frames of a sequence, rendered or from an earlier run.
-struct Film<'a> {
-    simulation: &'a Simulation,
-    folder: Option<PathBuf>,
-    index: usize,
-}
-
-impl<'a> Film<'a> {
-    fn new(simulation: &'a Simulation, name: &str, seed: u64, arguments: &Arguments) -> Result<Self, AnyError> {
-        let folder = arguments.cache.as_ref().map(|cache| cache.join(format!("{name}_{seed}")));
-        if let Some(folder) = &folder {
-            std::fs::create_dir_all(folder)?;
-        }
-        Ok(Self { simulation, folder, index: 0 })
-    }
-
-    fn next(&mut self) -> Result<Option<Frame>, AnyError> {
-        while self.index < self.simulation.frame_count(0) {
-            let index = self.index;
-            self.index += 1;
-            let Some(folder) = &self.folder else {
-                match self.simulation.frame(0, index)? {
-                    Some(frame) => return Ok(Some(frame)),
-                    None => continue,
-                }
-            };
-            let file = folder.join(index.to_string());
-            if let Ok(bytes) = std::fs::read(&file) {
-                let (head, data) = bytes.split_at_checked(16).ok_or("a file of the cache is cut off")?;
-                let stamps: [i64; 2] =
-                    [0, 8].map(|k| i64::from_le_bytes(head[k..k + 8].try_into().unwrap_or_default()));
-                let [stamp, true_stamp] = stamps.map(Stamp::from_nanos);
-                let camera = CameraModel::default().camera;
-                let (width, height) = (camera.width, camera.height);
-                ImageView::new(width, height, data)?;
-                return Ok(Some(Frame { stamp, true_stamp, width, height, data: data.to_vec() }));
-            }
-            if let Some(frame) = self.simulation.frame(0, index)? {
-                let mut bytes = frame.stamp.nanos().to_le_bytes().to_vec();
-                bytes.extend(frame.true_stamp.nanos().to_le_bytes());
-                bytes.extend(&frame.data);
-                std::fs::write(file, bytes)?;
-                return Ok(Some(frame));
-            }
-        }
-        Ok(None)
-    }
 }

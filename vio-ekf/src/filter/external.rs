@@ -46,7 +46,8 @@ impl Vio {
             // What patches drift since the last image is counted from here on at the next one.
             if self.tracks.iter().any(|track| track.patch.is_some()) {
                 let drift = self.settings.patches.drift / self.camera.fx.min(self.camera.fy);
-                estimator.diffuse(drift * drift * stamp.secs_since(anchor));
+                let elapsed = estimator.history.anchor().secs_since(anchor);
+                estimator.diffuse(drift * drift * elapsed);
             }
         }
         let measurement = against(estimator, pose, &whitener);

@@ -65,6 +65,11 @@ impl History {
         self.samples[self.samples.len() / 2].stamp.max(self.anchor)
     }
 
+    /// An anchor from here on leaves room for as many samples again.
+    pub(crate) fn oldest(&self) -> Stamp {
+        self.samples[self.samples.len().saturating_sub(self.capacity / 2)].stamp
+    }
+
     pub(crate) fn push(&mut self, sample: Imu) {
         let trust = self.sensor.map_or(Trust::default(), |sensor| {
             self.trusts[self.trusts.len() - 1].after([&self.recent[0], &self.recent[1]], &sample, &sensor)

@@ -3,7 +3,7 @@ use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 use super::bearing::Bearing;
 use super::covariance::Measurement;
 use super::detect::{Demands, Detector};
-use super::estimator::{Estimator, Guess, bearing_part, bearing_rows};
+use super::estimator::{Estimator, bearing_part, bearing_rows};
 use super::patch::{Comparison, LEVELS, Patch};
 use super::points::project;
 use super::pyramid::Pyramid;
@@ -51,15 +51,17 @@ impl Vio {
     ///
     /// `stamp` is the middle of the exposure by the camera's clock. The image must be of the camera's size.
     pub fn image(&mut self, stamp: Stamp, image: &ImageView) -> Result<FrameReport, Error> {
-        if (image.width, image.height) != (self.camera.width, self.camera.height) {
-            return Err(Error::ImageSize {
-                given: (image.width, image.height),
-                expected: (self.camera.width, self.camera.height),
-            });
+        let image = image.checked(&self.camera)?;
+        if let Some(second) = &mut self.second {
+            second.show(None);
         }
-        let image = ImageView::new(image.width, image.height, image.data)?;
+        self.shown(stamp, &image)
+    }
+
+    /// Takes an image of the first camera; that of the second, if there is one, has been taken.
+    pub(super) fn shown(&mut self, stamp: Stamp, image: &ImageView) -> Result<FrameReport, Error> {
         let Sight { pyramid, detector } = &mut self.sight;
-        pyramid.fill(&image);
+        pyramid.fill(image);
         let now = self.last.map_or(stamp, |sample| sample.stamp);
         if self.rest.is_steady(now) {
             self.rest.image(pyramid, detector, &demands(&self.settings.patches));
@@ -141,9 +143,8 @@ impl Vio {
         }
         for slot in (0..self.tracks.len()).rev() {
             let track = &self.tracks[slot];
-            let near = estimator.state.landmarks[slot].inverse_distance;
-            if !track.seen || track.misses >= self.settings.gates.misses || !(0.0..MAX_INVERSE_DISTANCE).contains(&near)
-            {
+            let near = estimator.state.landmarks[slot].inverse_distance.value;
+            if !track.seen || track.misses >= self.settings.gates.misses || near > MAX_INVERSE_DISTANCE {
                 self.tracks.swap_remove(slot);
                 estimator.remove(slot);
                 report.removed += 1;
@@ -153,6 +154,9 @@ impl Vio {
             if track.misses == 0 {
                 refresh(estimator, slot, track, pyramid, &self.camera, &self.settings.patches);
             }
+        }
+        if let Some(second) = &self.second {
+            second.correct(estimator, pyramid, &self.camera, &self.settings);
         }
     }
 
@@ -165,7 +169,6 @@ impl Vio {
         let (camera, state) = (&self.camera, &estimator.state);
         let present = state.landmarks.iter().filter_map(|l| camera.project(&l.bearing.direction()));
         detector.detect(pyramid, &present, &demands);
-        let guess = estimator.guess(&self.settings.landmarks);
         let before = self.tracks.len();
         while self.tracks.len() < self.settings.features {
             let Some((pixel, patch)) = detector.pick(pyramid, &demands) else { break };
@@ -174,7 +177,11 @@ impl Vio {
             let Some((_, by_bearing)) = project(camera, &bearing) else { continue };
             let Some(warp) = by_bearing.try_inverse() else { continue };
             let covariance = warp * warp.transpose() * patches.pixel_sigma.powi(2);
-            estimator.add(bearing, warp, &Guess { bearing: covariance, ..guess });
+            let second = self.second.as_ref();
+            match second.and_then(|second| second.first_sight(&patch, (&bearing, &warp), &self.settings)) {
+                Some(measured) => estimator.add_measured(bearing, warp, &covariance, measured),
+                None => estimator.add(bearing, warp, &covariance),
+            }
             self.tracks.push(Track { id: self.next_id, misses: 0, seen: true, patch: Some(patch) });
             self.next_id += 1;
         }

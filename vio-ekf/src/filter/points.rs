@@ -1,7 +1,7 @@
 use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 
 use super::bearing::Bearing;
-use super::estimator::{Guess, bearing_part, bearing_rows};
+use super::estimator::{bearing_part, bearing_rows};
 use super::update::{Iteration, Linearised, iterate, mahalanobis};
 use super::{FrameReport, Track, Vio};
 use crate::{Camera, Error, Stamp};
@@ -25,14 +25,32 @@ impl Vio {
         if let Some(index) = points.iter().position(|p| p.pixel.iter().any(|v| !v.is_finite())) {
             return Err(Error::NonFinite { what: "point", index });
         }
-        if self.estimator.is_none() && self.settings.moving.enabled {
-            self.scout_points(stamp, points);
+        let now = self.last.map_or(stamp, |sample| sample.stamp);
+        self.rest.points(now, points, self.settings.landmarks.pixel_sigma);
+        self.unnoticed = self.rest.unnoticed(&self.camera);
+        if self.estimator.is_none() {
+            self.start_at_rest()?;
+            if self.estimator.is_some() {
+                let report = FrameReport { added: self.admit(points), ..self.report() };
+                return Ok(self.conclude(report));
+            }
+            if self.settings.moving.enabled {
+                self.scout_points(stamp, points);
+            }
             return Ok(FrameReport { added: self.tracks.len(), ..self.report() });
         }
-        let mut report = self.report();
-        let Some(removed) = self.expose(stamp, false)? else { return Ok(report) };
+        let at_rest = self.rest.is_at_rest(now);
+        let mut report = FrameReport { at_rest, ..self.report() };
+        let Some(removed) = self.expose(stamp, at_rest)? else { return Ok(report) };
         report.removed = removed;
-        let Some(estimator) = &mut self.estimator else { return Ok(report) };
+        self.measure(points, at_rest, &mut report);
+        report.added = self.admit(points);
+        Ok(self.conclude(report))
+    }
+
+    /// Updates with all landmarks that are among the points, unless the body rests, and drops the others.
+    fn measure(&mut self, points: &[PointObservation], at_rest: bool, report: &mut FrameReport) {
+        let Some(estimator) = &mut self.estimator else { return };
         let offset = estimator.state.time_offset;
         let noise = Matrix2::identity() * self.settings.landmarks.pixel_sigma.powi(2);
         let iteration = Iteration { limit: self.settings.gates.iterations, tolerance: 1e-3 };
@@ -44,6 +62,9 @@ impl Vio {
             let Some(slot) = self.tracks.iter().position(|t| t.id == point.id) else { continue };
             let track = &mut self.tracks[slot];
             track.seen = true;
+            if at_rest {
+                continue;
+            }
             let state = &estimator.state;
             let landmark = state.landmarks[slot];
             let (rate, late) = (estimator.tangent_rate(&landmark), state.time_offset - offset);
@@ -71,14 +92,18 @@ impl Vio {
         }
         for slot in (0..self.tracks.len()).rev() {
             let track = &self.tracks[slot];
-            let behind = estimator.state.landmarks[slot].inverse_distance <= 0.0;
-            if !track.seen || track.misses >= self.settings.gates.misses || behind {
+            if !track.seen || track.misses >= self.settings.gates.misses {
                 self.tracks.swap_remove(slot);
                 estimator.remove(slot);
                 report.removed += 1;
             }
         }
-        let guess = estimator.guess(&self.settings.landmarks);
+    }
+
+    /// Starts landmarks with points that are new, while there is room; returns how many.
+    fn admit(&mut self, points: &[PointObservation]) -> usize {
+        let Some(estimator) = &mut self.estimator else { return 0 };
+        let before = self.tracks.len();
         for point in points {
             if self.tracks.len() == self.settings.features {
                 break;
@@ -90,12 +115,11 @@ impl Vio {
             let bearing = Bearing::new(&direction);
             let Some((_, by_bearing)) = project(&self.camera, &bearing) else { continue };
             let Some(warp) = by_bearing.try_inverse() else { continue };
-            let covariance = warp * noise * warp.transpose();
-            estimator.add(bearing, warp, &Guess { bearing: covariance, ..guess });
+            let covariance = warp * warp.transpose() * self.settings.landmarks.pixel_sigma.powi(2);
+            estimator.add(bearing, warp, &covariance);
             self.tracks.push(Track { id: point.id, misses: 0, seen: true, patch: None });
-            report.added += 1;
         }
-        Ok(self.conclude(report))
+        self.tracks.len() - before
     }
 
     /// Shows points to the scout, and starts if that has found the motion.

@@ -1,9 +1,13 @@
+mod watch;
+
 use nalgebra::{Vector2, Vector3};
 
+use super::PointObservation;
 use super::detect::{Demands, Detector};
 use super::patch::Patch;
 use super::pyramid::Pyramid;
-use crate::{Imu, Stamp};
+use crate::{Camera, Imu, Stamp};
+use watch::{Verdict, Watch};
 
 /// Patches that are watched for motion.
 const WATCHED: usize = 8;
@@ -27,6 +31,9 @@ pub struct RestSettings {
     /// Largest motion of the image since the rest began, pixels; ours. Half of it is taken as the standard deviation of what
     /// goes unnoticed, in the pose and in the mean rate.
     pub pixels: f64,
+    /// A body is only seen to have set off some time after it did. What it was doing this long ago is certain, s; ours. A rest that
+    /// ends is taken to have ended then, and the samples since tell the motion.
+    pub delay_s: f64,
     /// Velocity that may go unnoticed, m/s per axis; ours.
     pub velocity_sigma: f64,
     /// Uncertainty of the mean force over [`duration_s`](Self::duration_s) that no white noise explains, m/s²: vibration,
@@ -43,7 +50,8 @@ impl Default for RestSettings {
             rate: 0.05,
             force: 0.5,
             pixels: 0.5,
-            velocity_sigma: 0.01,
+            delay_s: 0.5,
+            velocity_sigma: 0.003,
             force_sigma: 0.02,
             gravity_tolerance: 0.6,
         }
@@ -84,13 +92,29 @@ pub(crate) struct Rest {
     block: Option<Window>,
     /// Means that have not been used yet. Each sample is used once.
     window: Option<Window>,
+    /// Those of a window that has ended, until it is certain that nothing moved before its end.
+    held: Option<Window>,
     watched: Vec<(Vector2<f64>, Patch)>,
+    /// The same for points of a caller's own.
+    watch: Watch,
     still: bool,
+    /// Motion of the image that is not told from noise, pixels.
+    tolerance: f64,
 }
 
 impl Rest {
     pub(crate) fn new(settings: RestSettings) -> Self {
-        Self { settings, first: None, block: None, window: None, watched: Vec::with_capacity(WATCHED), still: false }
+        Self {
+            settings,
+            first: None,
+            block: None,
+            window: None,
+            held: None,
+            watched: Vec::with_capacity(WATCHED),
+            watch: Watch::new(),
+            still: false,
+            tolerance: settings.pixels,
+        }
     }
 
     /// Takes a sample; a block that departs from the first begins a new rest.
@@ -110,8 +134,9 @@ impl Rest {
             };
             if !self.first.as_ref().is_some_and(same) {
                 self.first = Some(Imu { stamp: block.since, gyro: block.rate, accel: block.force });
-                self.window = None;
+                (self.window, self.held) = (None, None);
                 self.watched.clear();
+                self.watch.clear();
                 self.still = false;
             }
         }
@@ -139,11 +164,33 @@ impl Rest {
             (shift.norm() < self.settings.pixels).then_some(())
         };
         let count = self.watched.iter().filter_map(unmoved).count();
-        self.still = 2 * count > self.watched.len();
-        if !self.still {
+        let still = 2 * count > self.watched.len();
+        self.conclude(Verdict { still, tolerance: self.settings.pixels });
+    }
+
+    /// Compares points, each with noise of `sigma` pixels, with where they were at the beginning of this rest.
+    pub(crate) fn points(&mut self, now: Stamp, points: &[PointObservation], sigma: f64) {
+        match self.watch.judge(now, points, (sigma, self.settings.pixels)) {
+            Some(verdict) => {
+                self.conclude(verdict);
+                // Slow motion takes its time to stand out from the noise.
+                self.still &= self.watch.age(now) >= self.settings.duration_s;
+            }
+            None => self.still = false,
+        }
+    }
+
+    fn conclude(&mut self, Verdict { still, tolerance }: Verdict) {
+        (self.still, self.tolerance) = (still, tolerance);
+        if !still {
             // From here on something else is seen: the rest, if it is one, begins anew.
             self.first = None;
         }
+    }
+
+    /// Standard deviation of an angle that goes unnoticed, rad.
+    pub(crate) fn unnoticed(&self, camera: &Camera) -> f64 {
+        0.5 * self.tolerance / camera.fx.min(camera.fy)
     }
 
     /// Whether nothing has moved for long enough.
@@ -159,6 +206,16 @@ impl Rest {
     /// The means since they were last taken, over at least the duration of the settings.
     pub(crate) fn take_window(&mut self) -> Option<Window> {
         self.window.take_if(|window| window.duration >= self.settings.duration_s)
+    }
+
+    /// The same, of a time of which it is certain by now that nothing moved.
+    pub(crate) fn take_certain_window(&mut self, now: Stamp) -> Option<Window> {
+        let until = |window: &Window| window.duration + self.settings.delay_s;
+        let certain = self.held.take_if(|window| now.secs_since(window.since) >= until(window));
+        if self.held.is_none() {
+            self.held = self.take_window();
+        }
+        certain
     }
 
     /// Mean specific force that has not been used yet.

@@ -1,4 +1,5 @@
 use super::moving::MovingSettings;
+use super::pair::PairSettings;
 use super::rest::RestSettings;
 use super::trust::SensorSettings;
 use crate::Error;
@@ -20,6 +21,8 @@ pub struct Settings {
     pub landmarks: LandmarkSettings,
     /// How images are read.
     pub patches: PatchSettings,
+    /// How the images of a pair of cameras are compared.
+    pub pair: PairSettings,
     /// When the body is taken to be at rest.
     pub rest: RestSettings,
     /// When a start in motion is believed.
@@ -41,6 +44,7 @@ impl Default for Settings {
             calibration: CalibrationSettings::default(),
             landmarks: LandmarkSettings::default(),
             patches: PatchSettings::default(),
+            pair: PairSettings::default(),
             rest: RestSettings::default(),
             moving: MovingSettings::default(),
             limits: LimitSettings::default(),
@@ -71,10 +75,14 @@ pub struct CalibrationSettings {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct LandmarkSettings {
-    /// Inverse distance of a new landmark while no other is known well, 1/m; ours, ROVIO has 0.5. All first landmarks share what
-    /// is wrong with it, which the filter does not know: better a little far than near.
+    /// Inverse distance that is expected of landmarks at the start, 1/m; ours, ROVIO has 0.5. From then on it is estimated.
     pub inverse_distance: f64,
-    /// Standard deviation of a new landmark's inverse distance, relative to its value; ours.
+    /// Standard deviation of what all first landmarks have in common: the scene is larger or smaller than expected. Relative to
+    /// [`inverse_distance`](Self::inverse_distance); ours. Where the distance is known roughly, say 0.1.
+    pub common_sigma: f64,
+    /// Random walk of what is expected, relative to it, 1/√s: the camera comes to see another scene; ours.
+    pub common_walk: f64,
+    /// Standard deviation of a landmark's inverse distance from what is expected, relative to that; ours.
     pub inverse_distance_sigma: f64,
     /// Standard deviation of the pixel at which a landmark is first seen, where that is a measurement by itself; 1 px.
     pub pixel_sigma: f64,
@@ -82,7 +90,13 @@ pub struct LandmarkSettings {
 
 impl Default for LandmarkSettings {
     fn default() -> Self {
-        Self { inverse_distance: 0.3, inverse_distance_sigma: 0.7, pixel_sigma: 1.0 }
+        Self {
+            inverse_distance: 0.3,
+            common_sigma: 0.4,
+            common_walk: 0.3,
+            inverse_distance_sigma: 0.7,
+            pixel_sigma: 1.0,
+        }
     }
 }
 
@@ -222,12 +236,17 @@ impl Settings {
         if self.gates.iterations == 0 {
             return Err(invalid("iterations", 0.0, "must be at least 1"));
         }
+        self.pair.check()?;
         all_not_negative(&[
             ("camera_position_sigma_m", self.calibration.camera_position_sigma_m),
             ("camera_attitude_sigma", self.calibration.camera_attitude_sigma),
             ("time_offset_sigma_s", self.calibration.time_offset_sigma_s),
             ("stamp_jitter_s", self.calibration.stamp_jitter_s),
             ("moving.doubt_s", self.moving.doubt_s),
+            ("rest.delay_s", self.rest.delay_s),
+            ("rest.pixels", self.rest.pixels),
+            ("common_sigma", self.landmarks.common_sigma),
+            ("common_walk", self.landmarks.common_walk),
             ("pixel_sigma", self.patches.pixel_sigma),
             ("drift", self.patches.drift),
             ("score", self.patches.score),

@@ -45,3 +45,10 @@ pub fn camera_ahead() -> Camera {
     let rotation = UnitQuaternion::from_rotation_matrix(&ahead);
     Camera { body_from_camera: Isometry3::from_parts(Translation3::new(0.1, 0.0, 0.05), rotation), ..Camera::euroc() }
 }
+
+/// A second camera of that robot, mounted beside the first as the right one of the EuRoC vehicle is beside the left.
+pub fn camera_ahead_right() -> Camera {
+    let right = Camera::euroc_right();
+    let left_from_right = Camera::euroc().body_from_camera.inverse() * right.body_from_camera;
+    Camera { body_from_camera: camera_ahead().body_from_camera * left_from_right, ..right }
+}
