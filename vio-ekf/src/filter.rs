@@ -21,6 +21,7 @@ mod pair_tests;
 mod patch;
 #[cfg(test)]
 mod patches;
+mod point_pairs;
 mod points;
 mod propagate;
 mod pyramid;
@@ -39,6 +40,7 @@ pub use bearing::Bearing;
 pub use estimator::CoreCovariance;
 pub use moving::MovingSettings;
 pub use pair::PairSettings;
+pub use point_pairs::PointPair;
 pub use points::PointObservation;
 pub use rest::RestSettings;
 pub use settings::{CalibrationSettings, GateSettings, LandmarkSettings, LimitSettings, PatchSettings, Settings};

@@ -6,7 +6,7 @@ use super::bearing::Bearing;
 use super::covariance::Measurement;
 use super::estimator::{Estimator, Guess};
 use super::patch::{Comparison, LEVELS, Patch};
-use super::points::project;
+use super::points::{PointObservation, project};
 use super::pyramid::Pyramid;
 use super::relative::CameraMotion;
 use super::settings::{PatchSettings, Settings};
@@ -105,6 +105,8 @@ pub(crate) struct Second {
     pyramid: Pyramid,
     /// Whether the pyramid holds the image that belongs to the one of the first camera.
     shown: bool,
+    /// Memory of [`Vio::point_pairs`].
+    pub(super) points: Vec<PointObservation>,
 }
 
 /// Where a landmark is in the second image if its inverse distance is a given one.
@@ -129,7 +131,7 @@ impl Second {
     pub(crate) fn new(first: &Camera, camera: Camera, patches: &PatchSettings) -> Self {
         let pyramid = Pyramid::new(camera.width, camera.height, patches.first_level, LEVELS);
         let rig = CameraMotion::between(first, &camera);
-        Self { camera, rig, pyramid, shown: false }
+        Self { camera, rig, pyramid, shown: false, points: Vec::new() }
     }
 
     pub(crate) fn show(&mut self, image: Option<&ImageView>) {
