@@ -89,7 +89,9 @@ impl Survey {
             // The odometry does not read depth, but need not guess how far away the surface is at first.
             let before = eyes.look(0, &(simulation.motion(first)?.world_from_body * camera.body_from_camera))?;
             let mut settings = vio_ekf::Settings::default();
-            settings.landmarks.inverse_distance = 1.0 / before.distance().unwrap_or(1.0);
+            if let Some(distance) = before.distance() {
+                (settings.landmarks.inverse_distance, settings.landmarks.common_sigma) = (1.0 / distance, 0.1);
+            }
             Vio::new(camera, ImuNoise::default(), settings)?
         };
         for k in 1..count {

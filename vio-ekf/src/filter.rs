@@ -1,8 +1,10 @@
 //! The estimator: a camera, maybe a second one, an inertial sensor, an iterated Kalman filter around the body.
 
 mod bearing;
+mod bends;
 pub(crate) mod covariance;
 mod detect;
+mod distance;
 mod estimator;
 mod external;
 mod follower;
@@ -358,8 +360,7 @@ impl Vio {
         if at_rest {
             estimator.stay(time, &self.settings.rest);
             if !self.rested {
-                let guess = estimator.guess(&self.settings.landmarks);
-                estimator.loosen(self.unnoticed, &guess);
+                estimator.loosen(self.unnoticed);
             }
             if let Some(window) = self.rest.take_certain_window(time) {
                 estimator.weigh(&window, self.unnoticed, &self.settings.rest);

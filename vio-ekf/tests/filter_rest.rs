@@ -62,7 +62,7 @@ fn a_rest_on_points_and_the_take_off_after_it() {
     }
     let mean = |k: usize| sums[REST..].iter().map(|row| row[k]).sum::<f64>() / (seconds - REST) as f64;
     let after = [mean(0), mean(1), mean(2)];
-    assert!(after.iter().all(|square| (1.2..4.2).contains(square)), "{after:.2?}");
+    assert!(after.iter().all(|square| (1.0..4.2).contains(square)), "{after:.2?}");
 }
 
 /// With pixels of noise, the filter starts by itself from a rest, and from nothing that only feels like one.
@@ -84,12 +84,13 @@ fn starts_from_a_rest_of_points() {
         (vio.status(), vio.output())
     };
     let still = |_: f64| Isometry3::translation(0.3, 0.2, 0.1);
-    for moved in [0.0, 3.0] {
+    for moved in [0.0, 6.0] {
         let (status, output) = wait(&still, moved);
         assert_eq!(status, Status::Tracking);
         let output = output.unwrap();
         let velocity = output.velocity_in_body.norm();
-        assert!(velocity < 0.03 && output.world_from_body.translation.vector.norm() < 0.02, "{velocity} m/s");
+        let moved = output.world_from_body.translation.vector.norm();
+        assert!(velocity < 0.03 && moved < 0.02, "{velocity} m/s, {moved} m");
     }
     // Constant velocity feels like rest to the inertial sensor: sideways, ahead, and about the axis of the camera.
     let turn = |t: f64| Isometry3::rotation(Vector3::new(0.04 * t, 0.0, 0.0));

@@ -73,6 +73,14 @@ impl Covariance {
         self.stride
     }
 
+    /// Multiplies an error by a factor.
+    pub(crate) fn scale(&mut self, row: usize, factor: f64) {
+        for other in 0..self.size {
+            self.values[row * self.stride + other] *= factor;
+            self.values[other * self.stride + row] *= factor;
+        }
+    }
+
     /// Adds a multiple of another error to a row's error.
     pub(crate) fn add_row(&mut self, row: usize, weight: f64, other: usize) {
         for column in 0..self.size {

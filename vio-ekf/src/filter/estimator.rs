@@ -1,6 +1,7 @@
-use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{Matrix1, Matrix2, Matrix3, SMatrix, SVector, Vector1, Vector2, Vector3};
 
 use super::covariance::{Covariance, Measurement};
+use super::distance::InverseDistance;
 use super::history::History;
 use super::interval::Interval;
 use super::propagate::{Workspace, propagate};
@@ -14,11 +15,6 @@ use crate::{Camera, Imu, ImuNoise, Stamp};
 /// Most residuals of one update.
 const MAX_RESIDUALS: usize = 6;
 
-/// A landmark whose inverse distance has a smaller relative deviation tells how far away new ones may be; 0.3 as in ROVIO.
-const WELL_KNOWN: f64 = 0.3;
-/// As many are needed for their median to mean something.
-const ENOUGH_KNOWN: usize = 3;
-
 /// State and covariance at an anchor, the time of the last image, and the motion from there until now.
 ///
 /// Nothing here knows what a pixel is: measurements come as residuals and derivatives.
@@ -31,6 +27,7 @@ pub(crate) struct Estimator {
     since: Interval,
     pub(super) noise: ImuNoise,
     pub(super) gravity: f64,
+    landmarks: LandmarkSettings,
     /// Rate of the body at the anchor.
     pub(crate) rate: Vector3<f64>,
     work: Workspace,
@@ -50,6 +47,7 @@ impl Estimator {
             camera_position: camera.body_from_camera.translation.vector,
             camera_attitude: camera.body_from_camera.rotation,
             time_offset: settings.calibration.time_offset_s,
+            expected: InverseDistance::new(settings.landmarks.inverse_distance),
             landmarks: Vec::with_capacity(settings.features),
         };
         let mut covariance = Covariance::new(at::HEAD, capacity);
@@ -65,13 +63,16 @@ impl Estimator {
         ] {
             covariance.set_block3(row, &Matrix3::from_diagonal(&Vector3::from(sigma.map(|s| s * s))));
         }
-        covariance.isolate(at::TIME_OFFSET, calibration.time_offset_sigma_s * calibration.time_offset_sigma_s);
+        covariance.isolate(at::TIME_OFFSET, calibration.time_offset_sigma_s.powi(2));
+        let common = settings.landmarks.common_sigma * settings.landmarks.inverse_distance;
+        covariance.isolate(at::EXPECTED, common * common);
         Self {
             rate: sample.gyro - state.gyro_bias,
             history: History::new(sample, start.stamp, settings.history_samples).judging(settings.sensor),
             since: Interval::default(),
             noise,
             gravity: settings.gravity,
+            landmarks: settings.landmarks,
             work: Workspace::new(capacity),
             delta: vec![0.0; capacity],
             scratch: vec![0.0; capacity * MAX_RESIDUALS],
@@ -93,6 +94,9 @@ impl Estimator {
 
     /// Moves the anchor to a later time; `dropped` is told the slots of landmarks that are lost on the way.
     pub(crate) fn advance(&mut self, until: Stamp, dropped: impl FnMut(usize)) {
+        self.settle();
+        let walk = self.landmarks.common_walk * self.state.expected.value;
+        self.covariance.inflate(at::EXPECTED, walk * walk * until.secs_since(self.history.anchor()));
         let interval = self.history.integrate(until, &self.biases(), &self.noise);
         propagate(&mut self.state, &mut self.covariance, (&interval, self.gravity), &mut self.work, dropped);
         self.history.advance(until);
@@ -124,12 +128,12 @@ impl Estimator {
     }
 
     /// Admits a small motion, an angle, that went unnoticed before the body was found to be at rest.
-    pub(crate) fn loosen(&mut self, angle: f64, guess: &Guess) {
+    pub(crate) fn loosen(&mut self, angle: f64) {
         let variance = angle * angle;
         self.diffuse(variance);
         for axis in 0..3 {
             self.covariance.inflate(at::ATTITUDE + axis, variance);
-            self.covariance.inflate(at::POSITION + axis, variance / guess.inverse_distance.powi(2));
+            self.covariance.inflate(at::POSITION + axis, variance / self.state.expected.value.powi(2));
         }
     }
 
@@ -189,14 +193,77 @@ impl Estimator {
         true
     }
 
-    /// Adds a landmark seen in the current image; there must be room.
-    pub(crate) fn add(&mut self, bearing: Bearing, warp: Matrix2<f64>, guess: &Guess) {
-        let landmark = Landmark { bearing, inverse_distance: guess.inverse_distance, warp };
+    /// Adds a landmark seen in the current image, of which nothing is known but that it is among the others; there must be room.
+    /// `covariance` is that of its tangent coordinates.
+    pub(crate) fn add(&mut self, bearing: Bearing, warp: Matrix2<f64>, covariance: &Matrix2<f64>) {
+        let expected = self.state.expected.value;
+        let row = self.covariance.size() + 2;
+        self.add_at(bearing, warp, covariance, (expected, (self.landmarks.inverse_distance_sigma * expected).powi(2)));
+        self.covariance.add_row(row, 1.0, at::EXPECTED);
+    }
+
+    /// Adds a landmark whose inverse distance has been measured, with a variance: that tells of the others, too.
+    pub(crate) fn add_measured(
+        &mut self,
+        bearing: Bearing,
+        warp: Matrix2<f64>,
+        covariance: &Matrix2<f64>,
+        (inverse_distance, variance): (f64, f64),
+    ) {
+        let expected = self.state.expected.value;
+        self.update(&Measurement {
+            rows: [at::EXPECTED],
+            residual: Vector1::new(inverse_distance - expected),
+            jacobian: Matrix1::new(1.0),
+            noise: Matrix1::new(variance + (self.landmarks.inverse_distance_sigma * expected).powi(2)),
+        });
+        self.add_at(bearing, warp, covariance, (inverse_distance, variance));
+    }
+
+    /// Adds a landmark with an inverse distance, and its variance, that nothing else depends on.
+    pub(super) fn add_at(
+        &mut self,
+        bearing: Bearing,
+        warp: Matrix2<f64>,
+        covariance: &Matrix2<f64>,
+        (inverse_distance, variance): (f64, f64),
+    ) {
+        let landmark = Landmark { bearing, inverse_distance: InverseDistance::new(inverse_distance), warp };
         let row = self.covariance.size();
         self.state.landmarks.push(landmark);
         self.covariance.grow(at::LANDMARK);
-        self.enter_bearing(row, &landmark, &guess.bearing);
-        self.covariance.inflate(row + 2, guess.distance_variance);
+        self.enter_bearing(row, &landmark, covariance);
+        self.covariance.inflate(row + 2, variance);
+    }
+
+    /// Expects new landmarks to be as far away as those that there are.
+    pub(crate) fn expect(&mut self) {
+        let count = self.state.landmarks.len();
+        if count == 0 {
+            return;
+        }
+        let share = 1.0 / count as f64;
+        let mean = self.state.landmarks.iter().map(|landmark| landmark.inverse_distance.value * share).sum::<f64>();
+        self.state.expected = InverseDistance::new(mean);
+        self.covariance.isolate(at::EXPECTED, 0.0);
+        for slot in 0..count {
+            self.covariance.add_row(at::EXPECTED, share, at::landmark(slot) + 2);
+        }
+        self.covariance.inflate(at::EXPECTED, (self.landmarks.inverse_distance_sigma * mean).powi(2) * share);
+    }
+
+    /// Brings the covariance in step with inverse distances that have become smaller.
+    fn settle(&mut self) {
+        let landmarks = self.state.landmarks.iter_mut().map(|landmark| &mut landmark.inverse_distance).enumerate();
+        for (row, distance) in landmarks
+            .map(|(slot, distance)| (at::landmark(slot) + 2, distance))
+            .chain([(at::EXPECTED, &mut self.state.expected)])
+        {
+            let factor = distance.settle();
+            if factor < 1.0 {
+                self.covariance.scale(row, factor);
+            }
+        }
     }
 
     /// Makes a landmark's bearing that of another point, seen in the current image exactly where the old one is believed
@@ -236,27 +303,7 @@ impl Estimator {
         let rate = camera_from_body * self.rate;
         let velocity = camera_from_body * (state.velocity + self.rate.cross(&state.camera_position));
         let direction = landmark.bearing.direction();
-        landmark.bearing.basis().transpose() * (-rate - direction.cross(&velocity) * landmark.inverse_distance)
-    }
-
-    /// What to assume of a new landmark: as far away as those that are known well, if there are enough of them.
-    pub(crate) fn guess(&mut self, settings: &LandmarkSettings) -> Guess {
-        let sorted = &mut self.scratch;
-        let mut known = 0;
-        for (slot, landmark) in self.state.landmarks.iter().enumerate() {
-            let deviation = self.covariance.variance(at::landmark(slot) + 2).sqrt();
-            if deviation < WELL_KNOWN * landmark.inverse_distance {
-                sorted[known] = landmark.inverse_distance;
-                known += 1;
-            }
-        }
-        let mut inverse_distance = settings.inverse_distance;
-        if known >= ENOUGH_KNOWN {
-            let (_, median, _) = sorted[..known].select_nth_unstable_by(known / 2, f64::total_cmp);
-            inverse_distance = *median;
-        }
-        let deviation = settings.inverse_distance_sigma * inverse_distance;
-        Guess { inverse_distance, distance_variance: deviation * deviation, bearing: Matrix2::zeros() }
+        landmark.bearing.basis().transpose() * (-rate - direction.cross(&velocity) * landmark.inverse_distance.value)
     }
 
     /// Moves the anchor into the middle of the samples, to make room for more.
@@ -287,15 +334,6 @@ impl Estimator {
             covariance: step.carry(&prior),
         }
     }
-}
-
-/// What is assumed of a landmark that is new.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Guess {
-    pub(crate) inverse_distance: f64,
-    pub(crate) distance_variance: f64,
-    /// Covariance of the tangent coordinates.
-    pub(crate) bearing: Matrix2<f64>,
 }
 
 /// Covariance of the core, 15 rows; their order is that of [`Odometry::covariance`].

@@ -3,7 +3,7 @@ use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 use super::bearing::Bearing;
 use super::covariance::Measurement;
 use super::detect::{Demands, Detector};
-use super::estimator::{Estimator, Guess, bearing_part, bearing_rows};
+use super::estimator::{Estimator, bearing_part, bearing_rows};
 use super::patch::{Comparison, LEVELS, Patch};
 use super::points::project;
 use super::pyramid::Pyramid;
@@ -143,9 +143,8 @@ impl Vio {
         }
         for slot in (0..self.tracks.len()).rev() {
             let track = &self.tracks[slot];
-            let near = estimator.state.landmarks[slot].inverse_distance;
-            if !track.seen || track.misses >= self.settings.gates.misses || !(0.0..MAX_INVERSE_DISTANCE).contains(&near)
-            {
+            let near = estimator.state.landmarks[slot].inverse_distance.value;
+            if !track.seen || track.misses >= self.settings.gates.misses || near > MAX_INVERSE_DISTANCE {
                 self.tracks.swap_remove(slot);
                 estimator.remove(slot);
                 report.removed += 1;
@@ -170,7 +169,6 @@ impl Vio {
         let (camera, state) = (&self.camera, &estimator.state);
         let present = state.landmarks.iter().filter_map(|l| camera.project(&l.bearing.direction()));
         detector.detect(pyramid, &present, &demands);
-        let guess = estimator.guess(&self.settings.landmarks);
         let before = self.tracks.len();
         while self.tracks.len() < self.settings.features {
             let Some((pixel, patch)) = detector.pick(pyramid, &demands) else { break };
@@ -179,12 +177,11 @@ impl Vio {
             let Some((_, by_bearing)) = project(camera, &bearing) else { continue };
             let Some(warp) = by_bearing.try_inverse() else { continue };
             let covariance = warp * warp.transpose() * patches.pixel_sigma.powi(2);
-            let guess = Guess { bearing: covariance, ..guess };
-            let measured = self
-                .second
-                .as_ref()
-                .and_then(|second| second.first_guess(&patch, (&bearing, &warp), &guess, &self.settings));
-            estimator.add(bearing, warp, &measured.unwrap_or(guess));
+            let second = self.second.as_ref();
+            match second.and_then(|second| second.first_sight(&patch, (&bearing, &warp), &self.settings)) {
+                Some(measured) => estimator.add_measured(bearing, warp, &covariance, measured),
+                None => estimator.add(bearing, warp, &covariance),
+            }
             self.tracks.push(Track { id: self.next_id, misses: 0, seen: true, patch: Some(patch) });
             self.next_id += 1;
         }

@@ -1,7 +1,7 @@
 use nalgebra::{Matrix2, SVector};
 
 use super::bearing::Bearing;
-use super::estimator::{Estimator, Guess};
+use super::estimator::Estimator;
 use super::moving::{GLOBAL, Motion};
 use super::state::at;
 
@@ -38,12 +38,7 @@ impl Estimator {
                 break;
             }
             let Some((bearing, warp, covariance)) = look(depth.id) else { continue };
-            let guess = Guess {
-                inverse_distance: depth.inverse_distance,
-                distance_variance: depth.variance,
-                bearing: covariance,
-            };
-            self.add(bearing, warp, &guess);
+            self.add_at(bearing, warp, &covariance, (depth.inverse_distance, depth.variance));
             let row = self.covariance.size() - 1;
             let spread = motion.covariance * depth.gradient;
             let with_core = motion.core * spread;
@@ -56,5 +51,6 @@ impl Estimator {
             self.covariance.inflate(row, spread.dot(&depth.gradient));
             entered.push((row, depth.gradient));
         }
+        self.expect();
     }
 }

@@ -4,7 +4,8 @@ use nalgebra::{Matrix1, Matrix2, Vector1, Vector2};
 
 use super::bearing::Bearing;
 use super::covariance::Measurement;
-use super::estimator::{Estimator, Guess};
+use super::distance::InverseDistance;
+use super::estimator::Estimator;
 use super::patch::{Comparison, LEVELS, Patch};
 use super::points::{PointObservation, project};
 use super::pyramid::Pyramid;
@@ -146,18 +147,16 @@ impl Second {
         (self.pyramid, self.shown) = (pyramid, true);
     }
 
-    /// What to assume of a new landmark, if both cameras see it.
-    pub(crate) fn first_guess(
+    /// Inverse distance of a new landmark, and its variance, if both cameras see it.
+    pub(crate) fn first_sight(
         &self,
         patch: &Patch,
         look: (&Bearing, &Matrix2<f64>),
-        guess: &Guess,
         settings: &Settings,
-    ) -> Option<Guess> {
+    ) -> Option<(f64, f64)> {
         let depth = self.measure(patch, look, (0.0, 1.0 / settings.pair.nearest_m), settings)?;
         // Farther than infinity by noise alone: as far as cannot be told from it.
-        let inverse_distance = depth.inverse_distance.max(0.5 * depth.variance.sqrt());
-        Some(Guess { inverse_distance, distance_variance: depth.variance, ..*guess })
+        Some((depth.inverse_distance.max(0.5 * depth.variance.sqrt()), depth.variance))
     }
 
     /// Measures the distances of all landmarks, as they are seen now.
@@ -171,7 +170,7 @@ impl Second {
             let deviation = estimator.covariance.variance(row).sqrt();
             let Some((pixel, by_bearing)) = project(camera, &landmark.bearing) else { continue };
             let (Some(patch), Some(warp)) = (Patch::take(first, &pixel), by_bearing.try_inverse()) else { continue };
-            let middle = landmark.inverse_distance;
+            let middle = landmark.inverse_distance.value;
             let range = (middle - DEVIATIONS * deviation, middle + DEVIATIONS * deviation);
             let Some(depth) = self.measure(&patch, (&landmark.bearing, &warp), range, settings) else { continue };
             let measurement = Measurement {
@@ -201,7 +200,10 @@ impl Second {
         if !self.shown {
             return None;
         }
-        let place = |inverse_distance| self.place(&Landmark { bearing: *bearing, inverse_distance, warp: *warp });
+        let place = |inverse_distance| {
+            let inverse_distance = InverseDistance::new(inverse_distance);
+            self.place(&Landmark { bearing: *bearing, inverse_distance, warp: *warp })
+        };
         let first = self.seek(patch, &place, (low, high), settings)?;
         let mut inverse_distance = first;
         for _ in 0..settings.gates.iterations {

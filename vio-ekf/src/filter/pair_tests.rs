@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Matrix2, UnitQuaternion, Vector2, Vector3, Vector4};
 
 use super::bearing::Bearing;
+use super::distance::InverseDistance;
 use super::pair::{Depth, Second};
 use super::patch::{LEVELS, Patch};
 use super::points::project;
@@ -110,10 +111,15 @@ fn a_landmark_is_where_the_other_camera_sees_its_point() {
     for k in 0..60 {
         let pixel = Vector2::new(120.0 + 9.0 * f64::from(k), 60.0 + 67.0 * f64::from(k % 6));
         let bearing = Bearing::new(&first.bearing(&pixel).unwrap());
-        let landmark =
-            Landmark { bearing, inverse_distance: 0.1 + 0.02 * f64::from(k), warp: Matrix2::new(1.1, 0.2, -0.3, 0.9) };
+        let landmark = |near| Landmark {
+            bearing,
+            inverse_distance: InverseDistance::new(near),
+            warp: Matrix2::new(1.1, 0.2, -0.3, 0.9),
+        };
+        let near = 0.1 + 0.02 * f64::from(k);
+        let (at, landmark) = (landmark, landmark(near));
         let seen = |landmark: &Landmark| {
-            let point = landmark.bearing.direction() / landmark.inverse_distance;
+            let point = landmark.bearing.direction() / landmark.inverse_distance.value;
             let in_body = first.body_from_camera * nalgebra::Point3::from(point);
             other.project(&(other.body_from_camera.inverse() * in_body).coords).unwrap()
         };
@@ -121,9 +127,8 @@ fn a_landmark_is_where_the_other_camera_sees_its_point() {
         assert!((place.pixel - seen(&landmark)).norm() < 1e-9);
         // Derivatives by differences of the same projection.
         let h = 1e-6;
-        let [near, far] =
-            [h, -h].map(|h| seen(&Landmark { inverse_distance: landmark.inverse_distance + h, ..landmark }));
-        assert!(((near - far) / (2.0 * h) - place.slope).norm() < 1e-4, "{}", place.slope);
+        let [nearer, farther] = [h, -h].map(|h| seen(&at(near + h)));
+        assert!(((nearer - farther) / (2.0 * h) - place.slope).norm() < 1e-4, "{}", place.slope);
         for axis in 0..2 {
             let step = landmark.warp.column(axis) * h;
             let [one, two] = [step, -step].map(|step| seen(&Landmark { bearing: bearing.boxplus(&step), ..landmark }));

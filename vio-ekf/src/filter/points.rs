@@ -1,7 +1,7 @@
 use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 
 use super::bearing::Bearing;
-use super::estimator::{Guess, bearing_part, bearing_rows};
+use super::estimator::{bearing_part, bearing_rows};
 use super::update::{Iteration, Linearised, iterate, mahalanobis};
 use super::{FrameReport, Track, Vio};
 use crate::{Camera, Error, Stamp};
@@ -92,8 +92,7 @@ impl Vio {
         }
         for slot in (0..self.tracks.len()).rev() {
             let track = &self.tracks[slot];
-            let behind = estimator.state.landmarks[slot].inverse_distance <= 0.0;
-            if !track.seen || track.misses >= self.settings.gates.misses || behind {
+            if !track.seen || track.misses >= self.settings.gates.misses {
                 self.tracks.swap_remove(slot);
                 estimator.remove(slot);
                 report.removed += 1;
@@ -104,7 +103,6 @@ impl Vio {
     /// Starts landmarks with points that are new, while there is room; returns how many.
     fn admit(&mut self, points: &[PointObservation]) -> usize {
         let Some(estimator) = &mut self.estimator else { return 0 };
-        let guess = estimator.guess(&self.settings.landmarks);
         let before = self.tracks.len();
         for point in points {
             if self.tracks.len() == self.settings.features {
@@ -118,7 +116,7 @@ impl Vio {
             let Some((_, by_bearing)) = project(&self.camera, &bearing) else { continue };
             let Some(warp) = by_bearing.try_inverse() else { continue };
             let covariance = warp * warp.transpose() * self.settings.landmarks.pixel_sigma.powi(2);
-            estimator.add(bearing, warp, &Guess { bearing: covariance, ..guess });
+            estimator.add(bearing, warp, &covariance);
             self.tracks.push(Track { id: point.id, misses: 0, seen: true, patch: None });
         }
         self.tracks.len() - before

@@ -1,5 +1,6 @@
-use nalgebra::{Matrix2, SMatrix, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
+use super::bends::{Bends, lasting};
 use super::covariance::Covariance;
 use super::interval::{Interval, Step};
 use super::relative::{CameraMotion, LandmarkTransition};
@@ -17,8 +18,7 @@ pub(crate) struct Workspace {
     /// The camera's motion errors against all others: `Ξ P`.
     motion: Vec<f64>,
     transitions: Vec<LandmarkTransition>,
-    /// Noise of the bearings that stands for what is not linear.
-    bends: Vec<Matrix2<f64>>,
+    bends: Bends,
 }
 
 impl Workspace {
@@ -28,7 +28,7 @@ impl Workspace {
             stride: capacity,
             motion: vec![0.0; MOTION * capacity],
             transitions: Vec::with_capacity((capacity - at::HEAD) / at::LANDMARK),
-            bends: Vec::with_capacity((capacity - at::HEAD) / at::LANDMARK),
+            bends: Bends::new((capacity - at::HEAD) / at::LANDMARK),
         }
     }
 }
@@ -61,6 +61,7 @@ pub(crate) fn propagate(
             work.transitions.push(transition);
         }
     }
+    let start_from_world = state.attitude.inverse();
     let end = step.end(&state.position, &state.attitude);
     (state.position, state.attitude, state.velocity) = (end.translation.vector, end.rotation, step.velocity);
 
@@ -74,7 +75,9 @@ pub(crate) fn propagate(
     let xi_xi = camera.by_motion * noise.motion * camera.by_motion.transpose();
 
     left_product(covariance, step, &xi, work);
-    bend(covariance, &xi, &xi_xi, work);
+    let translation = translation(&xi, &xi_xi, work);
+    let lasting = lasting(covariance, &start_from_world, interval.duration);
+    work.bends.note(covariance, |row| Vector3::from_fn(|k, _| work.motion[(3 + k) * work.stride + row]));
 
     // P' = (F P) Fᵀ row by row, lower triangle, with the noise on the way.
     for row in 0..covariance.size() {
@@ -122,26 +125,16 @@ pub(crate) fn propagate(
             }
         }
     }
-    for (slot, bend) in work.bends.iter().enumerate() {
-        let at = at::landmark(slot);
-        for r in 0..2 {
-            for c in 0..2 {
-                covariance.row_mut(at + r)[at + c] += bend[(r, c)];
-            }
-        }
-    }
+    work.bends.apply(state, covariance, (&translation, lasting), &work.transitions);
     covariance.mirror();
 }
 
-/// What the linear model leaves out of a bearing while the distance is not known: the products of the error of the inverse
-/// distance with itself and with that of the camera's translation. For Gaussian errors their covariances follow from `P`
-/// (Athans, Wishner and Bertolini 1968); between landmarks they are all but independent.
-fn bend(
-    covariance: &Covariance,
+/// Covariance of the camera's translation.
+fn translation(
     xi: &SMatrix<f64, MOTION, { at::TIME_OFFSET }>,
     noise: &SMatrix<f64, MOTION, MOTION>,
-    work: &mut Workspace,
-) {
+    work: &Workspace,
+) -> Matrix3<f64> {
     let mut translation = noise.fixed_view::<3, 3>(3, 3).into_owned();
     for r in 0..3 {
         for c in 0..3 {
@@ -149,17 +142,7 @@ fn bend(
             translation[(r, c)] += xi.row(3 + c).iter().zip(row).map(|(w, p)| w * p).sum::<f64>();
         }
     }
-    work.bends.clear();
-    for (slot, transition) in work.transitions.iter().enumerate() {
-        let row = at::landmark(slot) + 2;
-        let variance = covariance.variance(row);
-        let common = Vector3::from_fn(|k, _| work.motion[(3 + k) * work.stride + row]);
-        let mixed = translation * variance + common * common.transpose();
-        work.bends.push(
-            transition.mixed * mixed * transition.mixed.transpose()
-                + transition.bent * transition.bent.transpose() * (0.5 * variance * variance),
-        );
-    }
+    translation
 }
 
 /// `F P` into the workspace.

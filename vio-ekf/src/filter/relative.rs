@@ -1,5 +1,6 @@
 use nalgebra::{Matrix2x3, Matrix3, SMatrix, Unit, UnitQuaternion, Vector2, Vector3};
 
+use super::distance::InverseDistance;
 use super::state::{Landmark, State};
 use crate::Camera;
 
@@ -73,9 +74,9 @@ impl CameraMotion {
     /// The landmark seen from the new camera; the point itself stays where it is. `None` for a point that the camera
     /// has run into.
     pub(crate) fn carry(&self, landmark: &Landmark) -> Option<(Landmark, LandmarkTransition)> {
-        let old = landmark.bearing.direction();
+        let (old, near) = (landmark.bearing.direction(), landmark.inverse_distance.value);
         let turned = self.matrix * old;
-        let scaled = turned + self.translation * landmark.inverse_distance;
+        let scaled = turned + self.translation * near;
         let (direction, length) = Unit::new_and_get(scaled);
         // Closer than a hundredth of its distance: rounding, and more, would decide where it is.
         if length.is_nan() || length < 0.01 {
@@ -83,14 +84,14 @@ impl CameraMotion {
         }
         let bearing = landmark.bearing.transported(&self.rotation, &direction);
         let tangent = bearing.coordinates() / length;
-        let radial = direction.transpose() * (-landmark.inverse_distance / (length * length));
+        let radial = direction.transpose() * (-near / (length * length));
 
         let by_rotation = -turned.cross_matrix();
         let mut by_motion = SMatrix::<f64, 3, 6>::zeros();
         by_motion.fixed_view_mut::<2, 3>(0, 0).copy_from(&(tangent * by_rotation));
-        by_motion.fixed_view_mut::<2, 3>(0, 3).copy_from(&(tangent * landmark.inverse_distance));
+        by_motion.fixed_view_mut::<2, 3>(0, 3).copy_from(&(tangent * near));
         by_motion.fixed_view_mut::<1, 3>(2, 0).copy_from(&(radial * by_rotation));
-        by_motion.fixed_view_mut::<1, 3>(2, 3).copy_from(&(radial * landmark.inverse_distance));
+        by_motion.fixed_view_mut::<1, 3>(2, 3).copy_from(&(radial * near));
         let by_bearing = self.matrix * landmark.bearing.differential();
         let mut by_itself = Matrix3::zeros();
         let own = tangent * by_bearing;
@@ -101,8 +102,8 @@ impl CameraMotion {
         by_itself[(2, 2)] = (radial * self.translation)[0] + 1.0 / length;
 
         let bent = own_by_distance * (-2.0 * direction.dot(&self.translation) / length);
-        let carried =
-            Landmark { bearing, inverse_distance: landmark.inverse_distance / length, warp: own * landmark.warp };
+        let inverse_distance = InverseDistance::new(near / length);
+        let carried = Landmark { bearing, inverse_distance, warp: own * landmark.warp };
         Some((carried, LandmarkTransition { by_motion, by_itself, mixed: tangent, bent }))
     }
 }

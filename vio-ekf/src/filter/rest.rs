@@ -51,7 +51,7 @@ impl Default for RestSettings {
             force: 0.5,
             pixels: 0.5,
             delay_s: 0.5,
-            velocity_sigma: 0.01,
+            velocity_sigma: 0.003,
             force_sigma: 0.02,
             gravity_tolerance: 0.6,
         }

@@ -75,10 +75,14 @@ pub struct CalibrationSettings {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct LandmarkSettings {
-    /// Inverse distance of a new landmark while no other is known well, 1/m; ours, ROVIO has 0.5. All first landmarks share what
-    /// is wrong with it, which the filter does not know: better a little far than near.
+    /// Inverse distance that is expected of landmarks at the start, 1/m; ours, ROVIO has 0.5. From then on it is estimated.
     pub inverse_distance: f64,
-    /// Standard deviation of a new landmark's inverse distance, relative to its value; ours.
+    /// Standard deviation of what all first landmarks have in common: the scene is larger or smaller than expected. Relative to
+    /// [`inverse_distance`](Self::inverse_distance); ours. Where the distance is known roughly, say 0.1.
+    pub common_sigma: f64,
+    /// Random walk of what is expected, relative to it, 1/√s: the camera comes to see another scene; ours.
+    pub common_walk: f64,
+    /// Standard deviation of a landmark's inverse distance from what is expected, relative to that; ours.
     pub inverse_distance_sigma: f64,
     /// Standard deviation of the pixel at which a landmark is first seen, where that is a measurement by itself; 1 px.
     pub pixel_sigma: f64,
@@ -86,7 +90,13 @@ pub struct LandmarkSettings {
 
 impl Default for LandmarkSettings {
     fn default() -> Self {
-        Self { inverse_distance: 0.3, inverse_distance_sigma: 0.7, pixel_sigma: 1.0 }
+        Self {
+            inverse_distance: 0.3,
+            common_sigma: 0.4,
+            common_walk: 0.3,
+            inverse_distance_sigma: 0.7,
+            pixel_sigma: 1.0,
+        }
     }
 }
 
@@ -235,6 +245,8 @@ impl Settings {
             ("moving.doubt_s", self.moving.doubt_s),
             ("rest.delay_s", self.rest.delay_s),
             ("rest.pixels", self.rest.pixels),
+            ("common_sigma", self.landmarks.common_sigma),
+            ("common_walk", self.landmarks.common_walk),
             ("pixel_sigma", self.patches.pixel_sigma),
             ("drift", self.patches.drift),
             ("score", self.patches.score),

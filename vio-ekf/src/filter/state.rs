@@ -1,10 +1,11 @@
 use nalgebra::{Matrix2, UnitQuaternion, Vector2, Vector3};
 
 use super::bearing::Bearing;
+use super::distance::InverseDistance;
 use crate::so3;
 
 /// First row of each block of the error state. The blocks after the core are the camera's pose on the body and the
-/// offset of its clock; the landmarks follow, three rows each.
+/// offset of its clock, then what the landmarks have in common; they follow, three rows each.
 pub(crate) mod at {
     /// Position error in world axes.
     pub(crate) const POSITION: usize = 0;
@@ -24,8 +25,10 @@ pub(crate) mod at {
     pub(crate) const CAMERA_ATTITUDE: usize = 18;
     /// Time offset of the camera.
     pub(crate) const TIME_OFFSET: usize = 21;
+    /// Inverse distance that is expected of new landmarks.
+    pub(crate) const EXPECTED: usize = 22;
     /// Rows before the first landmark.
-    pub(crate) const HEAD: usize = 22;
+    pub(crate) const HEAD: usize = 23;
     /// Rows of a landmark: two of the bearing, one of the inverse distance.
     pub(crate) const LANDMARK: usize = 3;
 
@@ -52,6 +55,9 @@ pub(crate) struct State {
     pub(crate) camera_attitude: UnitQuaternion<f64>,
     /// Seconds to add to a camera's stamp to get the inertial sensor's time.
     pub(crate) time_offset: f64,
+    /// Inverse distance that is expected of new landmarks, 1/m: a landmark's own differs from it independently of the others', so
+    /// that all together know no more of the scale than the scene does.
+    pub(crate) expected: InverseDistance,
     pub(crate) landmarks: Vec<Landmark>,
 }
 
@@ -60,7 +66,7 @@ pub(crate) struct State {
 pub(crate) struct Landmark {
     pub(crate) bearing: Bearing,
     /// `ρ = 1/d`, 1/m.
-    pub(crate) inverse_distance: f64,
+    pub(crate) inverse_distance: InverseDistance,
     /// Tangent coordinates per pixel of the patch as it was taken: how the patch has been deformed since.
     pub(crate) warp: Matrix2<f64>,
 }
@@ -77,9 +83,10 @@ impl State {
         self.camera_position += block(at::CAMERA_POSITION);
         self.camera_attitude = turned(&block(at::CAMERA_ATTITUDE), &self.camera_attitude);
         self.time_offset += delta[at::TIME_OFFSET];
+        self.expected.correct(delta[at::EXPECTED]);
         for (landmark, d) in self.landmarks.iter_mut().zip(delta[at::HEAD..].chunks_exact(at::LANDMARK)) {
             landmark.bearing = landmark.bearing.boxplus(&Vector2::new(d[0], d[1]));
-            landmark.inverse_distance += d[2];
+            landmark.inverse_distance.correct(d[2]);
         }
     }
 }
