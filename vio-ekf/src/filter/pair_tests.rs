@@ -209,7 +209,7 @@ fn pixels_of_the_second_camera_move_with_bearing_distance_and_clock() {
     for k in 0..40 {
         let pixel = Vector2::new(150.0 + 11.0 * f64::from(k), 80.0 + 61.0 * f64::from(k % 6));
         let bearing = Bearing::new(&first.bearing(&pixel).unwrap());
-        let inverse_distance = 0.1 + 0.02 * f64::from(k);
+        let inverse_distance = InverseDistance::new(0.1 + 0.02 * f64::from(k));
         let landmark = Landmark { bearing, inverse_distance, warp: Matrix2::identity() * 3.0 };
         let look = |delta: Vector4<f64>| second.look(&landmark, &rate, 0.01, &delta).unwrap();
         let jacobian = look(Vector4::zeros()).1;

@@ -1,5 +1,6 @@
 use nalgebra::{Matrix2, Matrix2x4, Vector2, Vector4};
 
+use super::distance::InverseDistance;
 use super::estimator::Estimator;
 use super::pair::Second;
 use super::points::PointObservation;
@@ -61,23 +62,26 @@ impl Vio {
 impl Second {
     /// Lets a new landmark begin where both cameras see it, as uncertain as any other: the update that follows weighs the pixels.
     fn place_first(&self, estimator: &mut Estimator, slot: usize, pixel: &Vector2<f64>, settings: &Settings) {
-        let landmark = Landmark { warp: Matrix2::identity(), ..estimator.state.landmarks[slot] };
-        let mut inverse_distance = landmark.inverse_distance;
+        let landmark = estimator.state.landmarks[slot];
+        let mut near = landmark.inverse_distance.value;
         for _ in 0..settings.gates.iterations {
-            let Some(place) = self.place(&Landmark { inverse_distance, ..landmark }) else { return };
+            let Some(place) = self.place(&Landmark { inverse_distance: InverseDistance::new(near), ..landmark }) else {
+                return;
+            };
             let step = place.slope.dot(&(pixel - place.pixel)) / place.slope.norm_squared();
-            inverse_distance += step;
+            near += step;
             if step.abs() * place.slope.norm() < 0.01 {
                 break;
             }
         }
         let most = 1.0 / settings.pair.nearest_m;
-        if !(0.0..most).contains(&inverse_distance) {
+        // What is too far to be told from infinity stays where it is expected to be.
+        if !(f64::MIN_POSITIVE..most).contains(&near) {
             return;
         }
         let row = at::landmark(slot) + 2;
-        let deviation = settings.landmarks.inverse_distance_sigma * landmark.inverse_distance.max(inverse_distance);
-        estimator.state.landmarks[slot].inverse_distance = inverse_distance;
+        let deviation = settings.landmarks.inverse_distance_sigma * landmark.inverse_distance.value.max(near);
+        estimator.state.landmarks[slot].inverse_distance = InverseDistance::new(near);
         estimator.covariance.isolate(row, deviation * deviation);
     }
 
@@ -117,7 +121,7 @@ impl Second {
     ) -> Option<(Vector2<f64>, Matrix2x4<f64>)> {
         let moved = Landmark {
             bearing: landmark.bearing.boxplus(&(delta.fixed_rows::<2>(0) + rate * (late + delta[3]))),
-            inverse_distance: landmark.inverse_distance + delta[2],
+            inverse_distance: InverseDistance::new(landmark.inverse_distance.value + delta[2]),
             // Then the place's deformation is the derivative by the tangent coordinates.
             warp: Matrix2::identity(),
         };
