@@ -3,7 +3,7 @@ use std::collections::VecDeque;
 use nalgebra::Vector3;
 
 use super::interval::Interval;
-use super::trust::{SensorSettings, Trust};
+use super::trust::{Judge, SensorSettings, Trust};
 use crate::{Imu, ImuNoise, Stamp};
 
 /// The inertial samples since the anchor, so that an image that arrives late is used at its own time.
@@ -14,8 +14,7 @@ pub(crate) struct History {
     /// Of each sample, and what it is judged by; without settings the data sheet is believed.
     trusts: VecDeque<Trust>,
     sensor: Option<SensorSettings>,
-    /// The last two samples, the latest first.
-    recent: [Imu; 2],
+    judge: Judge,
     capacity: usize,
     anchor: Stamp,
     started: Stamp,
@@ -28,7 +27,7 @@ impl History {
         samples.push_back(sample);
         let mut trusts = VecDeque::with_capacity(capacity);
         trusts.push_back(Trust::default());
-        Self { samples, trusts, sensor: None, recent: [sample; 2], capacity, anchor, started: anchor }
+        Self { samples, trusts, sensor: None, judge: Judge::new(sample), capacity, anchor, started: anchor }
     }
 
     /// The same, but the samples are believed only as far as they deserve.
@@ -71,19 +70,15 @@ impl History {
     }
 
     pub(crate) fn push(&mut self, sample: Imu) {
-        let trust = self.sensor.map_or(Trust::default(), |sensor| {
-            self.trusts[self.trusts.len() - 1].after([&self.recent[0], &self.recent[1]], &sample, &sensor)
-        });
-        self.recent = [sample, self.recent[0]];
-        self.trusts.push_back(trust);
+        let trust = self.sensor.map(|sensor| self.judge.sample(&sample, &sensor));
+        self.trusts.push_back(trust.unwrap_or_default());
         self.samples.push_back(sample);
     }
 
     /// Densities of the white noise between two neighbours, the first of which has this index.
     fn densities(&self, index: usize, noise: &ImuNoise) -> [[f64; 3]; 2] {
         let Some(sensor) = &self.sensor else { return [[noise.gyro_density; 3], [noise.accel_density; 3]] };
-        let gap = self.samples[index + 1].stamp.secs_since(self.samples[index].stamp);
-        self.trusts[index + 1].densities(&self.trusts[index], noise, gap, sensor)
+        self.trusts[index + 1].densities(&self.trusts[index], noise, sensor)
     }
 
     /// Moves the anchor forward and forgets what is before it.

@@ -1,3 +1,5 @@
+use nalgebra::Vector3;
+
 use crate::{Imu, ImuNoise};
 
 /// How an inertial sensor may be worse than its data sheet.
@@ -8,8 +10,8 @@ pub struct SensorSettings {
     pub gyro_range: f64,
     /// The accelerometer reads no more than this on any axis, m/s²; 18 g as the ADIS16448.
     pub accel_range: f64,
-    /// Noise that the samples themselves show counts where it exceeds that of the data sheet by this factor; 4, ours. What
-    /// shakes the sensor faster than it samples is noise.
+    /// Noise that the samples themselves show counts where it exceeds that of the data sheet by this factor; 4, ours. Shaking is
+    /// noise: in full for the gyroscope, for the accelerometer what of it drifts.
     pub roughness: f64,
 }
 
@@ -23,46 +25,100 @@ impl Default for SensorSettings {
 const SATURATED_S: f64 = 0.05;
 /// Share of the range from which on a reading is at its end.
 const END: f64 = 0.99;
-/// Weight of the latest sample in the mean of the roughness.
+/// Octaves in which noise is measured, of which those are used whose values are at most this far apart, s: flight is slower.
+const OCTAVES: usize = 6;
+const SLOWEST_S: f64 = 0.05;
+/// Mean square of the third difference in each octave, for white noise of unit density, times the spacing of its values: 20 in the
+/// first, less in the others, which are smoothed. From the sums of squares of the filters in a row.
+const GAINS: [f64; OCTAVES] = [20.0, 6.875, 5.070_312_5, 4.711_425_8, 4.627_472, 4.606_844];
+/// Weight of the latest value in the mean of an octave, and the most it is in slower ones.
 const LATEST: f64 = 1.0 / 32.0;
+const MOST: f64 = 1.0 / 8.0;
+/// Values from which on an octave's mean is one.
+const SETTLED: u32 = 8;
 
-/// What the samples until one of them show about their own noise. It depends on them alone, not on when it is asked for.
+/// What a sample says about its noise.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Trust {
-    /// Variance of a reading, mean over the axes of gyroscope and accelerometer.
-    variance: [f64; 2],
+    /// Density of the white noise that the samples until this one show, mean over the axes of gyroscope and accelerometer.
+    shown: [f64; 2],
     /// By axis.
     saturated: [[bool; 3]; 2],
 }
 
-impl Trust {
-    /// After the next sample; `two` are those before it, the latest first.
-    pub(crate) fn after(&self, two: [&Imu; 2], sample: &Imu, settings: &SensorSettings) -> Self {
-        // The second difference of white noise has six times its variance; steady motion, and motion that changes steadily, has
-        // none.
-        let differences = [
-            (sample.gyro - two[0].gyro * 2.0 + two[1].gyro).norm_squared() / 18.0,
-            (sample.accel - two[0].accel * 2.0 + two[1].accel).norm_squared() / 18.0,
-        ];
-        let mut variance = self.variance;
-        for (mean, latest) in variance.iter_mut().zip(differences) {
-            *mean += LATEST * (latest - *mean);
+/// Measures the noise of samples by the samples themselves. What it says depends on them alone, not on when it is asked.
+///
+/// Shaking a sensor makes lines in its spectrum. An angle shakes as it is seen, but a velocity is only integrated: a line of some
+/// metres per second squared moves it by centimetres per second to and fro, and never away. White noise, which does drift, is in
+/// all octaves alike. So the accelerometer's noise is that of its quietest octave.
+#[derive(Debug, Clone)]
+pub(crate) struct Judge {
+    latest: Imu,
+    /// Time between two samples, mean, s.
+    spacing: f64,
+    gyro: Octave,
+    accel: [Octave; OCTAVES],
+}
+
+/// Readings of half the rate of the octave before.
+#[derive(Debug, Clone, Copy, Default)]
+struct Octave {
+    /// The latest first.
+    before: [Vector3<f64>; 3],
+    count: u32,
+    /// Mean square of the third difference, by axis.
+    roughness: f64,
+}
+
+impl Octave {
+    /// Takes a reading; gives one to the next octave, every second time.
+    fn push(&mut self, reading: Vector3<f64>, weight: f64) -> Option<Vector3<f64>> {
+        let [a, b, c] = self.before;
+        self.before = [reading, a, b];
+        self.count = self.count.saturating_add(1);
+        if self.count <= 3 {
+            return None;
         }
-        let saturated = [(sample.gyro, settings.gyro_range), (sample.accel, settings.accel_range)]
-            .map(|(reading, range)| std::array::from_fn(|axis| reading[axis].abs() >= END * range));
-        Self { variance, saturated }
+        // Motion has next to none.
+        let difference = (reading - c) - (a - b) * 3.0;
+        self.roughness += weight * (difference.norm_squared() / 3.0 - self.roughness);
+        self.count.is_multiple_of(2).then(|| ((reading + c) + (a + b) * 3.0) / 8.0)
+    }
+}
+
+impl Judge {
+    /// Of the samples after one.
+    pub(crate) fn new(sample: Imu) -> Self {
+        Self { latest: sample, spacing: 0.0, gyro: Octave::default(), accel: [Octave::default(); OCTAVES] }
     }
 
-    /// Densities of the white noise between two samples, `gap` seconds apart, by axis of gyroscope and accelerometer.
-    pub(crate) fn densities(
-        &self,
-        before: &Self,
-        noise: &ImuNoise,
-        gap: f64,
-        settings: &SensorSettings,
-    ) -> [[f64; 3]; 2] {
+    /// Takes the next sample.
+    pub(crate) fn sample(&mut self, sample: &Imu, settings: &SensorSettings) -> Trust {
+        let gap = sample.stamp.secs_since(self.latest.stamp);
+        self.spacing += if self.spacing > 0.0 { LATEST * (gap - self.spacing) } else { gap };
+        self.latest = *sample;
+        self.gyro.push(sample.gyro, LATEST);
+        let (mut reading, mut spacing, mut weight) = (Some(sample.accel), self.spacing, LATEST);
+        let mut quietest = f64::INFINITY;
+        for (octave, gain) in self.accel.iter_mut().zip(GAINS) {
+            reading = reading.and_then(|reading| octave.push(reading, weight));
+            if octave.count >= SETTLED && spacing <= SLOWEST_S.max(self.spacing) {
+                quietest = quietest.min(octave.roughness * spacing / gain);
+            }
+            (spacing, weight) = (2.0 * spacing, (2.0 * weight).min(MOST));
+        }
+        let accel = if quietest.is_finite() { quietest.sqrt() } else { 0.0 };
+        let saturated = [(sample.gyro, settings.gyro_range), (sample.accel, settings.accel_range)]
+            .map(|(reading, range)| std::array::from_fn(|axis| reading[axis].abs() >= END * range));
+        Trust { shown: [(self.gyro.roughness * self.spacing / GAINS[0]).sqrt(), accel], saturated }
+    }
+}
+
+impl Trust {
+    /// Densities of the white noise between two samples, by axis of gyroscope and accelerometer.
+    pub(crate) fn densities(&self, before: &Self, noise: &ImuNoise, settings: &SensorSettings) -> [[f64; 3]; 2] {
         let density = |k: usize, sheet: f64, range: f64| {
-            let shown = (self.variance[k].max(before.variance[k]) * gap).sqrt();
+            let shown = self.shown[k].max(before.shown[k]);
             let density = if shown > settings.roughness * sheet { shown } else { sheet };
             std::array::from_fn(|axis| {
                 let saturated = self.saturated[k][axis] || before.saturated[k][axis];
@@ -82,20 +138,17 @@ mod tests {
 
     const SHEET: ImuNoise = ImuNoise { gyro_density: 2e-4, accel_density: 2e-3, ..ImuNoise::ZERO };
 
-    /// Densities after two seconds at 200 Hz of a motion that changes steadily, with readings added to the accelerometer's.
+    /// Densities after two seconds at 200 Hz of a motion that changes steadily, with readings added on all axes.
     fn shown(add: impl Fn(usize) -> f64, settings: &SensorSettings) -> [[f64; 3]; 2] {
         let sample = |k: usize| {
             let t = k as f64 * 0.005;
-            let gyro = Vector3::new(0.3, 1.2, -0.5) * t;
+            let gyro = Vector3::new(0.3, 1.2, -0.5) * t + Vector3::repeat(add(k));
             let accel = Vector3::new(1.0, 2.0, 9.81) + Vector3::repeat(add(k));
             Imu { stamp: Stamp::from_nanos(k as i64 * 5_000_000), gyro, accel }
         };
-        let trusts = (2..400).scan(Trust::default(), |trust, k| {
-            *trust = trust.after([&sample(k - 1), &sample(k - 2)], &sample(k), settings);
-            Some(*trust)
-        });
-        let trusts: Vec<Trust> = trusts.collect();
-        trusts[397].densities(&trusts[396], &SHEET, 0.005, settings)
+        let mut judge = Judge::new(sample(0));
+        let trusts: Vec<Trust> = (1..400).map(|k| judge.sample(&sample(k), settings)).collect();
+        trusts[398].densities(&trusts[397], &SHEET, settings)
     }
 
     #[test]
@@ -112,9 +165,23 @@ mod tests {
             ((z ^ (z >> 27)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
         };
         let [gyro, accel] = shown(noise, &SensorSettings::default());
-        assert_eq!(gyro, [2e-4; 3]);
         let expected = (0.005_f64 / 3.0).sqrt();
-        assert!((accel[0] / expected - 1.0).abs() < 0.3, "{} {expected}", accel[0]);
+        assert!((gyro[0] / expected - 1.0).abs() < 0.3, "{} {expected}", gyro[0]);
+        // The least of four octaves is a little less.
+        assert!((0.6..1.2).contains(&(accel[0] / expected)), "{} {expected}", accel[0]);
+    }
+
+    #[test]
+    fn a_line_shakes_but_does_not_drift() {
+        let line = |hertz: f64| move |k: usize| 6.0 * (std::f64::consts::TAU * hertz * 0.005 * k as f64).sin();
+        for hertz in [26.0, 87.0, 113.0, 174.0] {
+            let [gyro, accel] = shown(line(hertz), &SensorSettings::default());
+            // |2 sin(π f / 200)|³ / √20 of 6/√2, as the density of white noise.
+            let expected = 6.0 / 2_f64.sqrt() * (2.0 * (std::f64::consts::PI * hertz / 200.0).sin()).abs().powi(3);
+            let expected = expected * (0.005_f64 / 20.0).sqrt();
+            assert!((gyro[0] / expected - 1.0).abs() < 0.05, "{hertz}: {} {expected}", gyro[0]);
+            assert!(accel[0] < 0.01, "{hertz}: {}", accel[0]);
+        }
     }
 
     #[test]
