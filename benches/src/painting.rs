@@ -110,7 +110,7 @@ fn measure(
 }
 
 /// A valve that changes by at most a share of its range per waypoint. The range is one and a half times the 99th percentile
-/// of the volumes without limit, as the peers have it.
+/// of the volumes that L-BFGS would spray without limit, as the peers have it.
 fn limited(
     feedback: &Feedback,
     wanted: &Image,
@@ -119,7 +119,7 @@ fn limited(
 ) -> Result<Value, paint_net::Error> {
     let task = Task::on_bare_wall(wanted);
     let limits = Limits { along, ..Limits::default() };
-    let free = feedback.paint(&task, kernel, &Saturation::Tanh, &limits, &mut |_| ())?;
+    let free = Deconvolution::default().paint(&task, kernel, &Saturation::Tanh, &limits, &mut |_| ())?;
     let (columns, rows) = (wanted.width().div_ceil(along), wanted.height().div_ceil(limits.row_spacing));
     let mut volumes: Vec<f64> = free.sprays.iter().map(|s| s.volume).collect();
     volumes.resize(columns * rows, 0.0);

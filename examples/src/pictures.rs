@@ -1,6 +1,7 @@
 //! The pictures of a run: textures, the error map with its colour bar, curves over time, the scene with the flown path, sheets
 //! of pictures side by side.
 
+mod chart;
 mod curves;
 mod error_map;
 mod paths;

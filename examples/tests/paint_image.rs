@@ -4,6 +4,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use paint_net::thesis::{Network, Shape};
+
 /// A folder of its own for each test, removed at the end.
 struct Scratch(PathBuf);
 
@@ -257,6 +259,70 @@ fn layers_are_sprayed_one_after_the_other() {
 }
 
 #[test]
+fn the_network_of_a_file_paints_is_compared_and_paints_in_layers() {
+    let scratch = Scratch::new("thesis");
+    let picture = scratch.path("in.png");
+    image::GrayImage::from_fn(40, 24, |x, _| image::Luma([30 + 5 * x as u8])).save(&picture).unwrap();
+    let shape = Shape { side: 16, steps: 12, latent: 4, hidden: 10, read: 3, radius: 4.0, stop: 9.0, paint: 6 };
+    let (weights, out) = (scratch.path("thesis.safetensors"), scratch.path("out"));
+    std::fs::write(&weights, Network::random(shape, 1).unwrap().to_safetensors(&[])).unwrap();
+    let sprays = |more: &[&str]| {
+        let job = ["--image", &picture, "--painter", "thesis", "--weights", &weights, "--out", &out];
+        let output = run(&[&job, more].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let report = json(&format!("{out}/report.json"));
+        (report["painter"].as_str().unwrap().to_string(), report["sprays"].as_u64().unwrap())
+    };
+    let (alone, layered) = (sprays(&[]), sprays(&["--layers=sequential"]));
+    assert_eq!((alone.0.as_str(), layered.0.as_str()), ("thesis", "thesis, layers"));
+    // Six tiles of at most twelve steps, of which some fall beside the picture; a plan for each layer.
+    assert!((1..=6 * 12).contains(&alone.1) && layered.1 > alone.1, "{alone:?} {layered:?}");
+    assert!(run(&["compare", &picture, "--runs", "1", "--weights", &weights, "--out", &out]).status.success());
+    let table = std::fs::read_to_string(format!("{out}/compare.md")).unwrap();
+    let rows: Vec<&str> = table.lines().skip(2).filter_map(|l| l.split('|').nth(1)).map(str::trim).collect();
+    assert_eq!(rows, ["feedback", "coats", "deconvolution", "pursuit", "splats", "thesis", "thesis, layers"]);
+    for (row, (name, sprays)) in table.lines().skip(7).zip([alone, layered]) {
+        let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+        assert_eq!((cells[1], cells[5]), (name.as_str(), sprays.to_string().as_str()));
+    }
+}
+
+#[test]
+fn every_picture_of_a_folder_is_painted_and_filmed() {
+    let scratch = Scratch::new("folder");
+    let folder = scratch.path("pictures");
+    std::fs::create_dir(&folder).unwrap();
+    for (name, shade) in [("a.png", 100), ("a.jpg", 200)] {
+        image::RgbImage::from_fn(64, 64, |x, y| image::Rgb([shade, 60 + (x + y) as u8, 90]))
+            .save(format!("{folder}/{name}"))
+            .unwrap();
+    }
+    std::fs::write(format!("{folder}/notes.txt"), "no picture").unwrap();
+    for more in [&["--painter", "coats"][..], &["--palette", "cmy"]] {
+        let out = scratch.path("out");
+        let output = run(&[&["--image", &folder, "--out", &out], more].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        for name in ["a.png", "a.jpg"] {
+            let file = |name_of: &str| image::open(format!("{out}/{name}/{name_of}")).unwrap().to_rgb8();
+            assert!(Path::new(&format!("{out}/{name}/report.json")).exists());
+            // What is wanted and eight moments, in tiles of 256 pixels, 12 apart, below a caption of 26.
+            let (film, rendered) = (file("film.png"), file("rendered.png"));
+            assert_eq!(film.dimensions(), (12 + 9 * 268, 12 + 294));
+            let tile = |k: u32| image::imageops::crop_imm(&film, 12 + k * 268, 38, 256, 256).to_image();
+            let difference = |k: u32| {
+                let tile = tile(k);
+                let pairs = tile.enumerate_pixels().map(|(x, y, p)| (p, rendered.get_pixel(x / 4, y / 4)));
+                pairs.map(|(a, b)| (0..3).map(|c| a.0[c].abs_diff(b.0[c])).max().unwrap()).max().unwrap()
+            };
+            // The last moment is the result; at the first most of it is still bare wall.
+            assert!(difference(8) <= 1, "{name} {more:?}: {}", difference(8));
+            assert!(difference(1) > 50);
+        }
+        std::fs::remove_dir_all(&out).unwrap();
+    }
+}
+
+#[test]
 fn a_blank_picture_gets_no_spray() {
     let scratch = Scratch::new("blank");
     image::GrayImage::from_pixel(3, 50, image::Luma([255])).save(scratch.path("in.png")).unwrap();
@@ -324,6 +390,7 @@ fn weights_that_are_cut_or_foreign_are_named() {
         let file = scratch.path(name);
         std::fs::write(&file, bytes).unwrap();
         assert_refused(&["equal-sprays", "--weights", &file, &image], &[name, word]);
+        assert_refused(&["compare", "--weights", &file, &image], &[name, word]);
         assert_refused(&["train", "--resume", &file, "--out", &out], &[name, word]);
         assert_refused(&["train", "--preset", "thesis-paint", "--resume", &file, "--out", &out], &[name, word]);
     }
@@ -349,9 +416,19 @@ fn absurd_settings_are_named() {
     for (setting, word) in [("--passes=100000000000", "`passes`"), ("--threads=1000000000", "`threads`")] {
         assert_refused(&["--image", &image, setting, "--out", &out], &[word]);
     }
-    for setting in ["--layers", "--largest-change=0.1"] {
-        assert_refused(&["--image", &image, "--palette", "cmy", setting, "--out", &out], &["--palette"]);
+    for setting in [
+        "--layers",
+        "--largest-change=0.1",
+        "--painter=coats",
+        "--passes=3",
+        "--threads=2",
+        "--route=rows",
+        "--weights=x",
+    ] {
+        let name = setting.split('=').next().unwrap();
+        assert_refused(&["--image", &image, "--palette", "cmy", setting, "--out", &out], &["--palette", name]);
     }
+    assert_refused(&["--image", &image, "--painter", "thesis", "--out", &out], &["--weights"]);
     for (setting, word) in [
         ("--steps=0", "`steps`"),
         ("--batch=0", "`batch`"),

@@ -1,14 +1,14 @@
 //! Pictures in several paints.
 
 mod blend;
+mod mixture;
 mod unmix;
 
 use crate::error::{Error, require};
-use crate::footprints::Footprints;
 use crate::image::Image;
 use crate::kernel::SprayKernel;
 use crate::painter::{Board, Limits, Spray, Task};
-use crate::palette::{MOST_PAINTS, Palette, difference};
+use crate::palette::{MOST_PAINTS, Palette};
 use crate::projected_lbfgs::{Stop, minimise};
 use crate::saturation::Saturation;
 use blend::Blend;
@@ -130,29 +130,22 @@ impl Coloured {
         let cells = Task { weight: task.weight, paintable: task.paintable, ..Task::on_bare_wall(&blank) };
         // The law does not matter for where the cells are.
         let board = Board::new(&cells, kernel, &Saturation::Tanh, limits)?;
-        let mut wall = Wall::new(task, palette, self.judge, limits.max_volume);
-        wall.unmix();
         let depth_per_volume = kernel.mass() / (limits.along * limits.row_spacing) as f64;
-        let scale = wall.scale(&board, kernel, limits, depth_per_volume);
-        let mut blend = Blend::new(&wall, &board, kernel, limits);
-        let mut volumes: Vec<f64> = blend.means().iter().map(|depth| depth / depth_per_volume).collect();
+        let mut blend = Blend::new(task, palette, self.judge, kernel, limits);
+        let (depths, bends) = blend.start(limits.max_volume, kernel.squared().mass());
+        let mut volumes: Vec<f64> = depths.iter().map(|depth| depth / depth_per_volume).collect();
+        // Values of the fit are alike in curvature: `unit` of depth each, where all cells have the same.
+        let unit: Vec<f64> = bends.iter().map(|bend| depth_per_volume / bend.sqrt()).collect();
         let paints = palette.paints().len();
         let mut fit = |volumes: &mut Vec<f64>, ceiling: &[f64], progress: &mut dyn FnMut(f64)| {
-            // From volumes to variables of one scale, and back.
-            let mut values: Vec<f64> = volumes.iter().zip(&scale).map(|(v, s)| v * depth_per_volume * s).collect();
-            let top: Vec<f64> = ceiling.iter().zip(&scale).map(|(v, s)| v * depth_per_volume * s).collect();
-            let mut paint = vec![0.0; values.len()];
-            let mut cost = |values: &[f64], gradient: &mut [f64]| {
-                paint.iter_mut().zip(values).zip(&scale).for_each(|((p, v), s)| *p = v / s);
-                let cost = blend.cost(&paint, gradient);
-                gradient.iter_mut().zip(&scale).for_each(|(g, s)| *g /= s);
-                cost
-            };
+            let values_of = |v: &[f64]| v.iter().zip(&unit).map(|(v, unit)| v * depth_per_volume / unit).collect();
+            let (mut values, top): (Vec<f64>, Vec<f64>) = (values_of(volumes), values_of(ceiling));
+            let mut cost = |values: &[f64], gradient: &mut [f64]| blend.cost(values, &unit, gradient);
             let stop = Stop { iterations: self.iterations, relative_decrease: 1e-5 };
             minimise(&mut values, &top, &stop, &mut cost, progress);
-            let back = values.iter().zip(&scale).zip(ceiling).map(|((v, s), &top)| (v / s / depth_per_volume).min(top));
+            let back = values.iter().zip(&unit).zip(ceiling);
             volumes.clear();
-            volumes.extend(back);
+            volumes.extend(back.map(|((v, unit), &top)| (v * unit / depth_per_volume).min(top)));
         };
         let mut ceiling = board.ceiling.repeat(paints);
         fit(&mut volumes, &ceiling, progress);
@@ -162,10 +155,12 @@ impl Coloured {
         volumes.iter_mut().filter(|v| **v < limits.min_volume).for_each(|v| *v = 0.0);
         let each = volumes.chunks_exact(board.footprints.cells());
         let paintings: Vec<_> = each.map(|volumes| board.painting(volumes, &Saturation::Tanh)).collect();
-        for (p, painting) in paintings.iter().enumerate() {
-            wall.depths.iter_mut().zip(painting.canvas.data()).for_each(|(d, &depth)| d[p] = depth);
-        }
-        let data = wall.depths.iter().map(|d| palette.colour(d).map(|v| v.clamp(0.0, 1.0))).collect();
+        let colour_at = |k: usize| {
+            let mut depths = [0.0; MOST_PAINTS];
+            depths.iter_mut().zip(&paintings).for_each(|(depth, painting)| *depth = painting.canvas.data()[k]);
+            palette.colour(&depths).map(|v| v.clamp(0.0, 1.0))
+        };
+        let data = (0..width * height).map(colour_at).collect();
         progress(1.0);
         Ok(ColourPainting {
             picture: Picture { width, height, data },
@@ -191,55 +186,4 @@ fn keep_most(volumes: &[f64], ceiling: &mut [f64], paints: usize, limits: &Limit
         }
     }
     dropped
-}
-
-/// What is wanted, and the depths that would show it, pixel by pixel.
-struct Wall<'a> {
-    wanted: &'a Picture,
-    palette: &'a Palette,
-    weight: Option<&'a Image>,
-    measures: Vec<[[f64; 3]; 3]>,
-    depths: Vec<[f64; MOST_PAINTS]>,
-    deepest: f64,
-}
-
-impl<'a> Wall<'a> {
-    fn new(task: &ColourTask<'a>, palette: &'a Palette, judge: Judge, deepest: f64) -> Self {
-        let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let measure = |colour: &[f64; 3]| match judge {
-            Judge::Eye => difference(*colour),
-            Judge::Bands => identity,
-        };
-        let data = &task.wanted.data;
-        Self {
-            wanted: task.wanted,
-            palette,
-            weight: task.weight,
-            measures: data.iter().map(measure).collect(),
-            depths: vec![[0.0; MOST_PAINTS]; data.len()],
-            deepest,
-        }
-    }
-
-    fn weight(&self, k: usize) -> f64 {
-        self.weight.map_or(1.0, |w| w.data()[k])
-    }
-
-    /// The root of the curvature of the cost by the paint of every cell, paint after paint, with a floor where there is none.
-    fn scale(&self, board: &Board, kernel: &SprayKernel, limits: &Limits, depth_per_volume: f64) -> Vec<f64> {
-        const FLOOR: f64 = 0.03;
-        let size = (self.wanted.width, self.wanted.height);
-        let squared = Footprints::new(&kernel.squared(), size, limits.along, limits.row_spacing);
-        let bends: Vec<_> = (0..self.depths.len()).map(|k| self.bends(k)).collect();
-        let mut scale = vec![0.0; self.palette.paints().len() * board.footprints.cells()];
-        for (p, out) in scale.chunks_exact_mut(board.footprints.cells()).enumerate() {
-            let bend: Vec<f64> = bends.iter().map(|b| b[p]).collect();
-            squared.gather(&bend, out);
-            let floor = FLOOR * out.iter().sum::<f64>() / out.len() as f64 + 1e-12;
-            for v in out {
-                *v = (*v + floor).sqrt() / depth_per_volume;
-            }
-        }
-        scale
-    }
 }

@@ -74,7 +74,7 @@ pub struct Limits {
     pub max_volume: f64,
     /// Sprays smaller than this are not worth opening the valve for; they are dropped and the others refitted. Default 0.
     pub min_volume: f64,
-    /// Largest number of sprays; `None` for no limit.
+    /// Largest number of sprays, 0 to leave the wall as it is; `None` for no limit.
     pub max_sprays: Option<usize>,
 }
 

@@ -1,7 +1,7 @@
 //! Limited-memory quasi-Newton on a box (Nocedal's two-loop recursion on the free variables, step projected onto the box).
 
 /// Pairs of steps remembered.
-const MEMORY: usize = 10;
+const MEMORY: usize = 6;
 
 /// When to stop.
 pub(crate) struct Stop {
@@ -29,11 +29,15 @@ pub(crate) fn minimise(
     let mut history: Vec<(Vec<f64>, Vec<f64>, f64)> = Vec::with_capacity(MEMORY);
     let mut trial = vec![0.0; n];
     let mut trial_gradient = vec![0.0; n];
+    let mut free = vec![0.0; n];
     let mut small_steps = 0;
     for iteration in 0..stop.iterations {
         progress(iteration as f64 / stop.iterations as f64);
-        let free: Vec<bool> =
-            (0..n).map(|k| !(x[k] <= 0.0 && gradient[k] >= 0.0 || x[k] >= ceiling[k] && gradient[k] <= 0.0)).collect();
+        // 1 and 0 rather than a condition, so that all loops run over whole blocks.
+        for (((free, x), g), top) in free.iter_mut().zip(&*x).zip(&gradient).zip(ceiling) {
+            let bound = *x <= 0.0 && *g >= 0.0 || *x >= *top && *g <= 0.0;
+            *free = if bound { 0.0 } else { 1.0 };
+        }
         let mut direction = descent_direction(&gradient, &free, &history);
         let mut slope = dot(&direction, &gradient);
         if slope >= 0.0 {
@@ -86,17 +90,15 @@ pub(crate) fn minimise(
     }
 }
 
-/// `-H g` on the free variables, zero on the others.
-fn descent_direction(gradient: &[f64], free: &[bool], history: &[(Vec<f64>, Vec<f64>, f64)]) -> Vec<f64> {
-    // 1 and 0 rather than a condition, so that the loops below run over whole blocks.
-    let mask: Vec<f64> = free.iter().map(|&f| f64::from(u8::from(f))).collect();
-    let mut q: Vec<f64> = gradient.iter().zip(&mask).map(|(g, m)| g * m).collect();
+/// `-H g` on the free variables, for which `free` is 1, zero on the others.
+fn descent_direction(gradient: &[f64], free: &[f64], history: &[(Vec<f64>, Vec<f64>, f64)]) -> Vec<f64> {
+    let mut q: Vec<f64> = gradient.iter().zip(free).map(|(g, free)| g * free).collect();
     let add = |q: &mut [f64], weight: f64, other: &[f64]| {
-        q.iter_mut().zip(other).zip(&mask).for_each(|((q, o), m)| *q += weight * o * m);
+        q.iter_mut().zip(other).zip(free).for_each(|((q, o), free)| *q += weight * o * free);
     };
     let mut weights = Vec::with_capacity(history.len());
     for (s, y, _) in history.iter().rev() {
-        let rho = masked_dot(s, y, &mask);
+        let rho = masked_dot(s, y, free);
         // A pair whose curvature lies in variables that are now bound says nothing about the free ones.
         let weight = if rho > 1e-300 { dot(s, &q) / rho } else { 0.0 };
         add(&mut q, -weight, y);

@@ -113,15 +113,23 @@ fn pictures_within_reach_are_painted() {
 }
 
 #[test]
-fn the_bare_wall_gets_no_spray() {
-    for palette in [glazes(1), glazes(3), glazes(6), covering()] {
-        for (width, height) in [(1, 1), (30, 17), (8, 41)] {
-            let wanted = Picture::new(width, height, vec![palette.wall(); width * height]).unwrap();
-            let painting = Coloured::default()
-                .paint(&ColourTask::new(&wanted), &palette, &nozzle(), &Limits::default(), &mut |_| ())
-                .unwrap();
-            assert!(painting.sprays.iter().all(Vec::is_empty), "{} paints", palette.paints().len());
-        }
+fn a_thousand_bare_walls_get_no_spray() {
+    for k in 0..1000 {
+        let of = |what: i64| lattice(72, k, what);
+        let whole = |what: i64, from: usize, to: usize| from + (of(what) * (to - from) as f64) as usize;
+        let colour = |what: i64| [0, 1, 2].map(|band| 0.02 + 0.96 * of(what + band));
+        let paints = (0..whole(0, 1, 7) as i64).map(|p| match of(10 + p) {
+            kind if kind < 0.5 => Paint::glaze("glaze", colour(20 + 3 * p)),
+            _ => Paint::opaque("cover", colour(20 + 3 * p), 0.1 + 5.0 * of(40 + p)),
+        });
+        let palette = Palette::new(colour(50), paints.collect()).unwrap();
+        let (width, height) = (whole(1, 1, 40), whole(2, 1, 40));
+        let wanted = Picture::new(width, height, vec![palette.wall(); width * height]).unwrap();
+        let painter = Coloured { judge: if of(3) < 0.5 { Judge::Eye } else { Judge::Bands }, ..Coloured::default() };
+        let limits = Limits { along: whole(4, 1, 5), row_spacing: whole(5, 1, 5), ..Limits::default() };
+        let nozzle = SprayKernel::new(0.3 + 4.0 * of(6), 1.0 + 3.0 * of(7)).unwrap();
+        let painting = painter.paint(&ColourTask::new(&wanted), &palette, &nozzle, &limits, &mut |_| ()).unwrap();
+        assert!(painting.sprays.iter().all(Vec::is_empty), "wall {k}, {} paints", palette.paints().len());
     }
 }
 

@@ -59,17 +59,38 @@ fn canvas_is_the_sum_of_the_sprays() {
 }
 
 #[test]
-fn an_empty_picture_gets_no_spray() {
-    for k in 0..100 {
-        let (w, h) = (8 + k % 37, 8 + (k * 7) % 29);
-        let blank = Image::filled(w, h, 0.0);
-        let before = Image::from_fn(w, h, |x, y| lattice(k as u64, x as i64, y as i64));
-        for painter in painters() {
-            for canvas in [None, Some(&before)] {
-                let task = Task { canvas, ..Task::on_bare_wall(&blank) };
-                assert!(paint(&*painter, &task, &Limits::default()).sprays.is_empty(), "{}", painter.name());
-            }
-        }
+fn a_thousand_empty_pictures_get_no_spray() {
+    for k in 0..1000_u64 {
+        let of = |what: i64| lattice(71, k as i64, what);
+        let whole = |what: i64, from: usize, to: usize| from + (of(what) * (to - from) as f64) as usize;
+        let blank = Image::filled(whole(0, 1, 50), whole(1, 1, 50), 0.0);
+        let before = Image::from_fn(blank.width(), blank.height(), |x, y| 4.0 * lattice(k, x as i64, y as i64));
+        let canvas = (of(2) < 0.5).then_some(&before);
+        let nozzle = SprayKernel::new(0.3 + 5.0 * of(3), 1.0 + 4.0 * of(4)).unwrap();
+        let limits = Limits {
+            along: whole(5, 1, 6),
+            row_spacing: whole(6, 1, 6),
+            max_volume: 0.01 + 5.0 * of(7),
+            min_volume: 0.01 * of(8),
+            max_sprays: (of(9) < 0.3).then_some(whole(10, 0, 500)),
+        };
+        let law = if of(11) < 0.5 { Saturation::Tanh } else { Saturation::BeerLambert { density: 0.1 + 3.0 * of(12) } };
+        let painters = painters();
+        let painter = &painters[k as usize % painters.len()];
+        let task = Task { canvas, ..Task::on_bare_wall(&blank) };
+        let painting = painter.paint(&task, &nozzle, &law, &limits, &mut |_| ()).unwrap();
+        assert!(painting.sprays.is_empty(), "picture {k}: {} sprays by {}", painting.sprays.len(), painter.name());
+    }
+}
+
+#[test]
+fn none_may_be_asked_for() {
+    let wanted = Texture::Worley.image(2, 32);
+    let before = wanted.map(|ink| 0.5 * ink);
+    let task = Task { canvas: Some(&before), ..Task::on_bare_wall(&wanted) };
+    for painter in painters() {
+        let painting = paint(&*painter, &task, &Limits { max_sprays: Some(0), ..Limits::default() });
+        assert!(painting.sprays.is_empty() && painting.canvas == before, "{}", painter.name());
     }
 }
 

@@ -2,16 +2,18 @@
 
 use std::path::Path;
 
+use clap::ValueEnum;
 use paint_net::{ColourPainting, ColourTask, Coloured, Error, Image, Paint, Palette, Picture, Spray, metrics};
 use paint_sim::colour::lab;
 use serde::Serialize;
 
 use super::clock::Clock;
+use super::film::save_film;
 use super::{Job, PaintImageError, commands, ink_of, ssim, write_json};
 use crate::pictures::{Rgb, save_error_map};
 
 /// Which glazes are in the guns, on a white wall.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Glazes {
     /// Cyan, magenta, yellow.
     Cmy,
@@ -97,6 +99,14 @@ pub fn compare_colours(painted: &Picture, wanted: &Picture) -> (f64, f64, f64) {
     (-10.0 * (squared / (3 * differences.len()) as f64 + 1e-20).log10(), mean, p95)
 }
 
+fn byte(stored: f64) -> u8 {
+    (255.0 * stored.clamp(0.0, 1.0)).round() as u8
+}
+
+fn rgb(picture: &Picture) -> Rgb {
+    Rgb::from_pixels(picture.width(), picture.height(), picture.data().iter().map(|c| c.map(byte)))
+}
+
 /// CIEDE2000 of every pixel.
 fn differences(painted: &Picture, wanted: &Picture) -> Vec<f64> {
     let pairs = painted.data().iter().zip(wanted.data());
@@ -155,7 +165,8 @@ impl Job {
         Ok((painting, figures))
     }
 
-    /// Writes `commands.json`, `commands.mcap`, `rendered.png`, `error.png` (CIEDE2000 of every pixel) and `report.json`.
+    /// Writes `commands.json`, `commands.mcap`, `rendered.png`, `error.png` (CIEDE2000 of every pixel), `film.png` and
+    /// `report.json`.
     pub fn save_colours(
         &self,
         folder: &Path,
@@ -176,11 +187,11 @@ impl Job {
         let names: Vec<_> = palette.paints().iter().map(|p| p.name.as_str()).collect();
         commands::save(folder, (figures.width, figures.height), &model, &names, &sprays)?;
         write_json(&folder.join("report.json"), figures)?;
-        let byte = |v: f64| (255.0 * v).round() as u8;
-        let pixels = painting.picture.data().iter().map(|c| c.map(byte));
-        Rgb::from_pixels(figures.width, figures.height, pixels).save(&folder.join("rendered.png"))?;
+        rgb(&painting.picture).save(&folder.join("rendered.png"))?;
         let map: Vec<_> = differences(&painting.picture, wanted).into_iter().map(Some).collect();
         save_error_map(&folder.join("error.png"), figures.width, &map, (1.0, "px"))?;
-        Ok(())
+        let paints: Vec<&[Spray]> = painting.sprays.iter().map(Vec::as_slice).collect();
+        let show = |depths: &[f64]| palette.colour(depths).map(byte);
+        save_film(&folder.join("film.png"), rgb(wanted), &paints, &self.kernel, &show)
     }
 }

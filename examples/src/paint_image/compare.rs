@@ -1,7 +1,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use paint_net::{Image, Painting};
+use paint_net::{Image, Painting, Sharing};
 use serde::Serialize;
 
 use super::{Choice, Figures, Job, PaintImageError, grey, write_text};
@@ -27,14 +27,19 @@ pub struct Row {
     pub cpu_ms: f64,
 }
 
-/// Paints every picture with every painter, in turn, `runs` times; writes `compare.md` and, with the wanted pictures and all
+/// Paints every picture with every painter, the thesis' network among them if the job has one, in turn, `runs` times; writes `compare.md` and, with the wanted pictures and all
 /// canvases side by side, `compare.png`.
 pub fn compare(job: &Job, pictures: &[Image], runs: usize, folder: &Path) -> Result<Vec<Row>, PaintImageError> {
     let wanted = |picture| vec![Tile { caption: "wanted".to_string(), picture: grey(picture) }];
     let mut sheet: Vec<Vec<Tile>> = pictures.iter().take(SHOWN).map(wanted).collect();
-    let mut rows = Vec::with_capacity(Choice::ALL.len());
-    for painter in Choice::ALL {
-        let job = Job { painter, ..job.clone() };
+    let mut jobs: Vec<Job> = Choice::READY.map(|painter| Job { painter, ..job.clone() }).to_vec();
+    if job.thesis.is_some() {
+        // As the thesis has it: in layers, each planned by itself; and the whole picture at once.
+        let layers = [None, Some(Sharing::Sequential)];
+        jobs.extend(layers.map(|layers| Job { painter: Choice::Thesis, layers, ..job.clone() }));
+    }
+    let mut rows = Vec::with_capacity(jobs.len());
+    for job in jobs {
         let mut all: Vec<Figures> = Vec::with_capacity(pictures.len());
         for (k, picture) in pictures.iter().enumerate() {
             let (painting, figures) = median_run(&job, picture, runs)?;
@@ -46,7 +51,7 @@ pub fn compare(job: &Job, pictures: &[Image], runs: usize, folder: &Path) -> Res
         }
         let mean = |of: &dyn Fn(&Figures) -> f64| all.iter().map(of).sum::<f64>() / all.len().max(1) as f64;
         rows.push(Row {
-            painter: all.first().map_or_else(String::new, |f| f.painter.to_string()),
+            painter: job.name(),
             psnr_db: mean(&|f| f.psnr_db),
             ssim: mean(&|f| f.ssim),
             ciede2000: mean(&|f| f.ciede2000_mean),

@@ -1,9 +1,9 @@
 use std::path::Path;
 
-use paint_net::thesis::{Network, Thesis};
+use paint_net::thesis::Thesis;
 use paint_net::{Feedback, FreeSplats, Image, Limits, Painter, Saturation, SprayKernel, Task, metrics};
 
-use super::PaintImageError;
+use super::{PaintImageError, read_network};
 
 /// Two painters beside the thesis' network, on one picture, none with more sprays than that.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,10 +21,7 @@ pub struct EqualSprays {
 /// Paints every picture with the network of a file, and with the others at its number of sprays. All have one nozzle: σ = 2 px,
 /// cut at 4 σ; the thesis' network chooses its spreads itself.
 pub fn equal_sprays(weights: &Path, pictures: &[Image]) -> Result<Vec<EqualSprays>, PaintImageError> {
-    let file_error = |why: String| PaintImageError::File { path: weights.display().to_string(), why };
-    let bytes = std::fs::read(weights).map_err(|e| file_error(format!("cannot be read ({e})")))?;
-    let network = Network::from_safetensors(&bytes).map_err(|e| file_error(e.to_string()))?;
-    let thesis = Thesis { network };
+    let thesis = Thesis { network: read_network(weights)? };
     let (feedback, splats) = (Feedback::shipped()?, FreeSplats { sprays: 1_000_000, ..FreeSplats::default() });
     let kernel = SprayKernel::new(2.0, 4.0)?;
     pictures

@@ -2,6 +2,7 @@ use std::path::Path;
 
 use plotters::prelude::*;
 
+use super::chart::{COLOURS, draw_axes, draw_legend, name_curve};
 use super::{PictureError, draw};
 
 /// One panel of curves over a shared horizontal axis.
@@ -11,10 +12,6 @@ pub struct Panel<'a> {
     /// Curves: name and points.
     pub curves: Vec<(&'a str, Vec<(f64, f64)>)>,
 }
-
-/// Dark enough to read on white, apart for colour-blind readers too (Okabe and Ito's palette).
-pub(super) const COLOURS: [RGBColor; 4] =
-    [RGBColor(0, 114, 178), RGBColor(213, 94, 0), RGBColor(0, 158, 115), RGBColor(204, 121, 167)];
 
 /// Draws the panels under each other over one horizontal axis and saves the picture.
 pub fn save_curves(path: &Path, title: &str, horizontal: &str, panels: &[Panel]) -> Result<(), PictureError> {
@@ -30,30 +27,15 @@ pub fn save_curves(path: &Path, title: &str, horizontal: &str, panels: &[Panel])
                 .x_label_area_size(42)
                 .y_label_area_size(78)
                 .build_cartesian_2d(left..right, low..high)?;
-            chart
-                .configure_mesh()
-                .light_line_style(RGBColor(238, 238, 238))
-                .x_desc(horizontal)
-                .y_desc(panel.label)
-                .label_style(("sans-serif", 17))
-                .axis_desc_style(("sans-serif", 19))
-                .draw()?;
+            draw_axes(&mut chart, horizontal, panel.label)?;
             for ((name, curve), colour) in panel.curves.iter().zip(COLOURS) {
                 // A gap in the data (NaN) is a gap in the line.
                 for piece in curve.split(|p| !p.1.is_finite()).filter(|piece| piece.len() > 1) {
                     chart.draw_series(LineSeries::new(piece.iter().copied(), colour.stroke_width(1)))?;
                 }
-                chart
-                    .draw_series(std::iter::empty::<PathElement<(f64, f64)>>())?
-                    .label(*name)
-                    .legend(move |(x, y)| PathElement::new([(x, y), (x + 22, y)], colour.stroke_width(3)));
+                name_curve(chart.draw_series(std::iter::empty::<PathElement<(f64, f64)>>())?, name, colour);
             }
-            chart
-                .configure_series_labels()
-                .position(SeriesLabelPosition::UpperRight)
-                .background_style(WHITE.mix(0.85))
-                .label_font(("sans-serif", 18))
-                .draw()?;
+            draw_legend(&mut chart)?;
         }
         Ok(())
     })?;

@@ -2,7 +2,7 @@ use std::path::Path;
 
 use plotters::prelude::*;
 
-use super::curves::COLOURS;
+use super::chart::{COLOURS, draw_axes, draw_legend, name_curve};
 use super::{PictureError, draw};
 
 /// Paths in a plane, drawn with the same scale on both axes.
@@ -31,26 +31,12 @@ pub fn save_paths(path: &Path, title: &str, panels: &[PathPanel]) -> Result<(), 
                 .x_label_area_size(42)
                 .y_label_area_size(78)
                 .build_cartesian_2d(horizontal, vertical)?;
-            chart
-                .configure_mesh()
-                .light_line_style(RGBColor(238, 238, 238))
-                .x_desc(panel.horizontal)
-                .y_desc(panel.vertical)
-                .label_style(("sans-serif", 17))
-                .axis_desc_style(("sans-serif", 19))
-                .draw()?;
+            draw_axes(&mut chart, panel.horizontal, panel.vertical)?;
             for ((name, curve), colour) in panel.curves.iter().zip(COLOURS) {
-                chart
-                    .draw_series(LineSeries::new(curve.iter().copied(), colour.stroke_width(2)))?
-                    .label(*name)
-                    .legend(move |(x, y)| PathElement::new([(x, y), (x + 22, y)], colour.stroke_width(3)));
+                let line = LineSeries::new(curve.iter().copied(), colour.stroke_width(2));
+                name_curve(chart.draw_series(line)?, name, colour);
             }
-            chart
-                .configure_series_labels()
-                .position(SeriesLabelPosition::UpperRight)
-                .background_style(WHITE.mix(0.85))
-                .label_font(("sans-serif", 18))
-                .draw()?;
+            draw_legend(&mut chart)?;
         }
         Ok(())
     })?;

@@ -1,15 +1,18 @@
 //! The run: samples and images in the order of their stamps, and what the filter made of them.
 
+mod reasons;
+
 use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 
 use cpu_time::ThreadTime;
 use vio_ekf::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use vio_ekf::{Calibration, Error, Excess, ImuNoise, Odometry, Settings, Stamp, Status, Trajectory, Vio, Waiting};
+use vio_ekf::{Calibration, Error, ImuNoise, Odometry, Settings, Stamp, Status, Trajectory, Vio};
 
 use super::recording::Shot;
 use super::{Recording, VioError};
 use crate::progress::Stage;
+use reasons::{describe, waiting};
 
 /// Images that wait for the filter when they are decoded beside it.
 const AHEAD: usize = 4;
@@ -279,32 +282,6 @@ impl<'a> Driver<'a> {
             segments,
         })
     }
-}
-
-fn describe(excess: Excess) -> String {
-    match excess {
-        Excess::Speed => "the speed ran away",
-        Excess::Bias => "a bias grew beyond what a sensor has",
-        Excess::Uncertainty => "nothing was seen for too long",
-        Excess::Contradiction => {
-            "images and inertial samples contradict each other: check axes, calibration and clocks of both"
-        }
-    }
-    .into()
-}
-
-fn waiting(status: Status) -> String {
-    match status {
-        Status::Uninitialised(Waiting::ForSteadiness) => {
-            "there was no second of rest to start from, and no motion that tells the scale"
-        }
-        Status::Uninitialised(Waiting::ForStillImages) => "the images show nothing to hold on to, or move at rest",
-        Status::Uninitialised(Waiting::ForGravity) => {
-            "gravity test: at rest the accelerometer does not read gravity; check its axes, unit and calibration"
-        }
-        Status::Tracking | Status::Diverged(_) => "no image came after the start",
-    }
-    .into()
 }
 
 impl Run {

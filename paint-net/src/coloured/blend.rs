@@ -1,258 +1,270 @@
 //! All paints of all cells at once, in single precision: what they look like, how far that is from what is wanted, and the
 //! derivative.
 
-use super::Wall;
+use super::mixture::{Block, Mixture, ROWS};
+use super::{ColourTask, Judge};
+use crate::footprints;
 use crate::kernel::SprayKernel;
 use crate::network::{BLOCK, Grid, Spread};
-use crate::painter::{Board, Limits};
-use crate::palette::{MOST_PAINTS, Palette};
-
-/// One value for each pixel of a block.
-type Block = [f32; BLOCK];
+use crate::painter::Limits;
+use crate::palette::{MOST_PAINTS, Palette, difference};
 
 /// The cost of paint. Paint of a cell is measured by the depth that it gives where all cells have the same.
-pub(super) struct Blend<'a> {
-    palette: &'a Palette,
+pub(super) struct Blend {
+    mixture: Mixture,
     cells: Grid,
     pixels: Grid,
     spread: Spread<f32>,
+    /// The same for squared footprints.
+    squared: Spread<f32>,
     scratch: Vec<f32>,
     /// One plane per band.
     wanted: Vec<f32>,
-    /// The measure `M = BᵀB` of differences: `M₀₀ M₀₁ M₀₂ M₁₁ M₁₂ M₂₂`, zero outside the picture.
+    /// The measure `M = w BᵀB` of differences in planes `M₀₀ M₀₁ M₀₂ M₁₁ M₁₂ M₂₂`, zero outside the picture.
     measure: Vec<f32>,
     /// One plane per paint.
     paint: Vec<f32>,
-    /// Depth of each paint, then the derivative by it.
+    /// Depth of each paint, then what is gathered from it.
     depth: Vec<f32>,
 }
 
-impl<'a> Blend<'a> {
-    pub(super) fn new(wall: &Wall<'a>, board: &Board, kernel: &SprayKernel, limits: &Limits) -> Self {
-        let (columns, rows) = (&board.footprints.columns, &board.footprints.rows);
-        let stride = (limits.along, limits.row_spacing);
-        let spread = Spread::new(kernel.taps(), stride, (columns[0], rows[0]));
+impl Blend {
+    pub(super) fn new(
+        task: &ColourTask,
+        palette: &Palette,
+        judge: Judge,
+        kernel: &SprayKernel,
+        limits: &Limits,
+    ) -> Self {
+        let (width, height) = (task.wanted.width(), task.wanted.height());
+        let (columns, rows) = (footprints::cells(width, limits.along), footprints::cells(height, limits.row_spacing));
+        let of_profile = |taps| Spread::new(taps, (limits.along, limits.row_spacing), (columns[0], rows[0]));
+        let (spread, squared) = (of_profile(kernel.taps()), of_profile(kernel.squared().taps()));
         let cells = Grid::new(columns.len(), rows.len(), spread.reach());
-        let (width, height) = (wall.wanted.width, wall.wanted.height);
         let pixels = Grid::new(width, height, 0);
-        let fill = |count: usize, value: &dyn Fn(usize, usize) -> f64| {
-            let mut planes = pixels.planes(count);
-            for plane in 0..count {
-                for y in 0..height {
-                    let row = pixels.row_mut(&mut planes, plane, y);
-                    row.iter_mut().enumerate().for_each(|(x, v)| *v = value(plane, y * width + x) as f32);
+        let (mut wanted, mut measure) = (pixels.planes(3), pixels.planes(6));
+        // Only shares count, and any weight fits single precision as a share.
+        let largest = task.weight.map_or(1.0, |w| w.data().iter().copied().fold(0.0, f64::max));
+        for (k, colour) in task.wanted.data().iter().enumerate() {
+            let at = pixels.at(k % width, k / width);
+            let share = task.weight.map_or(1.0, |w| w.data()[k] / largest);
+            let eye = match judge {
+                Judge::Eye => difference(*colour),
+                Judge::Bands => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            };
+            for i in 0..3 {
+                wanted[i * pixels.plane() + at] = colour[i] as f32;
+                for j in i..3 {
+                    let sum: f64 = eye.iter().map(|row| row[i] * row[j]).sum();
+                    measure[ROWS[i][j] * pixels.plane() + at] = (share * sum) as f32;
                 }
             }
-            planes
-        };
-        let paints = wall.palette.paints().len();
-        let pairs = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+        }
+        let mixture = Mixture::new(palette);
         Self {
-            palette: wall.palette,
-            scratch: spread.scratch(&cells).planes(stride.0),
-            wanted: fill(3, &|band, k| wall.wanted.data[k][band]),
-            measure: fill(6, &|pair, k| {
-                let (i, j) = pairs[pair];
-                wall.weight(k) * wall.measures[k].iter().map(|row| row[i] * row[j]).sum::<f64>()
-            }),
-            paint: cells.planes(paints),
-            depth: fill(paints, &|p, k| wall.depths[k][p]),
+            scratch: spread.scratch(&cells).planes(limits.along),
+            paint: cells.planes(mixture.paints),
+            depth: pixels.planes(mixture.paints),
+            mixture,
             cells,
             pixels,
             spread,
+            squared,
+            wanted,
+            measure,
         }
     }
 
-    /// For a start: the mean depth that is wanted under each footprint.
-    pub(super) fn means(&mut self) -> Vec<f64> {
-        let mut means = vec![0.0; self.paints() * self.cells.width * self.cells.height];
-        self.gather(&mut means, 1.0);
-        means
+    /// For a start, paint after paint: the mean under the footprint of every cell of the depth that its pixels would need if
+    /// each could be painted alone; and `Σ g² (∂I/∂d)ᵀ M (∂I/∂d)` there, with a floor where that is nothing.
+    pub(super) fn start(&mut self, deepest: f64, mass_of_squares: f64) -> (Vec<f64>, Vec<f64>) {
+        const FLOOR: f64 = 0.03;
+        let cells = self.cells.width * self.cells.height;
+        let ones = vec![1.0; self.mixture.paints * cells];
+        let (mut means, mut bends) = (ones.clone(), ones.clone());
+        self.for_blocks(|mixture, depths, wanted, measure| mixture.unmix(depths, wanted, measure, deepest as f32));
+        self.gather(false, 1.0, &ones, &mut means);
+        self.for_blocks(Mixture::bend);
+        self.gather(true, mass_of_squares, &ones, &mut bends);
+        for bends in bends.chunks_exact_mut(cells) {
+            let floor = FLOOR * bends.iter().sum::<f64>() / cells as f64 + 1e-12;
+            for v in bends {
+                *v += floor;
+            }
+        }
+        (means, bends)
     }
 
-    /// `½ Σ (I - T)ᵀ M (I - T)` for the paint of every cell, paint after paint, and its derivative.
-    pub(super) fn cost(&mut self, paint: &[f64], gradient: &mut [f64]) -> f64 {
+    /// `½ Σ (I - T)ᵀ M (I - T)` and its derivative by `values`, one per cell, paint after paint. `unit` of the depth that a cell
+    /// gives where all cells have the same is a value of 1.
+    pub(super) fn cost(&mut self, values: &[f64], unit: &[f64], gradient: &mut [f64]) -> f64 {
         let (columns, rows) = (self.cells.width, self.cells.height);
-        for p in 0..self.paints() {
+        for p in 0..self.mixture.paints {
             for j in 0..rows {
-                let from = &paint[(p * rows + j) * columns..][..columns];
+                let from = (p * rows + j) * columns..(p * rows + j + 1) * columns;
                 let to = self.cells.row_mut(&mut self.paint, p, j);
-                to.iter_mut().zip(from).for_each(|(to, &v)| *to = v as f32);
+                for ((to, v), unit) in to.iter_mut().zip(&values[from.clone()]).zip(&unit[from]) {
+                    *to = (v * unit) as f32;
+                }
             }
             let (from, to) = (&self.paint[p * self.cells.plane()..], &mut self.depth[p * self.pixels.plane()..]);
             self.spread.spread(&self.cells, from, &self.pixels, to, &mut self.scratch);
         }
         let mut cost = 0.0;
-        for y in 0..self.pixels.height {
-            for x in (0..self.pixels.width).step_by(BLOCK) {
-                cost += f64::from(self.look(self.pixels.at(x, y)));
-            }
-        }
+        self.for_blocks(|mixture, depths, wanted, measure| cost += f64::from(mixture.look(depths, wanted, measure)));
         // A footprint's mean is its sum over as many pixels as a cell has.
         let stride = self.spread.stride();
-        self.gather(gradient, (stride.0 * stride.1) as f64);
+        self.gather(false, (stride.0 * stride.1) as f64, unit, gradient);
         0.5 * cost
     }
 
-    fn paints(&self) -> usize {
-        self.palette.paints().len()
-    }
-
-    /// `cells = factor · mean under each footprint` of the planes of `depth`.
-    fn gather(&mut self, out: &mut [f64], factor: f64) {
-        let (columns, rows) = (self.cells.width, self.cells.height);
-        for p in 0..self.paints() {
-            let from = &self.depth[p * self.pixels.plane()..];
-            self.spread.mean(&self.cells, &mut self.paint, p, &self.pixels, from, &mut self.scratch);
-            for j in 0..rows {
-                let to = &mut out[(p * rows + j) * columns..][..columns];
-                let from = self.cells.row(&self.paint, p, j);
-                to.iter_mut().zip(from).for_each(|(to, &v)| *to = factor * f64::from(v));
-            }
-        }
-    }
-
-    /// The cost of a block of pixels; puts the derivative in the place of the depths.
-    fn look(&mut self, at: usize) -> f32 {
-        let plane = self.pixels.plane();
-        let block =
-            |planes: &[f32], k: usize| -> Block { std::array::from_fn(|lane| planes[k * plane + at..][..BLOCK][lane]) };
-        let paints = self.palette.paints();
-        let mut depths = [[0.0; BLOCK]; MOST_PAINTS];
-        for (p, depth) in depths.iter_mut().take(paints.len()).enumerate() {
-            *depth = block(&self.depth, p);
-        }
-        let films: [Film; 3] = std::array::from_fn(|band| {
-            let (mut absorption, mut scattering) = ([0.0; BLOCK], [0.0; BLOCK]);
-            for (paint, depth) in paints.iter().zip(&depths) {
-                let (k, s) = (paint.absorption[band] as f32, paint.scattering[band] as f32);
-                for lane in 0..BLOCK {
-                    absorption[lane] += k * depth[lane];
-                    scattering[lane] += s * depth[lane];
-                }
-            }
-            Film::new(&absorption, &scattering, self.palette.wall()[band] as f32)
-        });
-        let miss: [Block; 3] = std::array::from_fn(|band| {
-            let wanted = block(&self.wanted, band);
-            std::array::from_fn(|lane| films[band].colour[lane] - wanted[lane])
-        });
-        let m: [Block; 6] = std::array::from_fn(|pair| block(&self.measure, pair));
-        // M (I - T), band by band.
-        let pull: [Block; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]].map(|row: [usize; 3]| {
-            std::array::from_fn(|l| m[row[0]][l] * miss[0][l] + m[row[1]][l] * miss[1][l] + m[row[2]][l] * miss[2][l])
-        });
-        for (p, paint) in paints.iter().enumerate() {
-            let mut slope = [0.0; BLOCK];
-            for band in 0..3 {
-                let (k, s) = (paint.absorption[band] as f32, paint.scattering[band] as f32);
-                let film = &films[band];
-                for lane in 0..BLOCK {
-                    slope[lane] += pull[band][lane] * (k * film.by_absorption[lane] + s * film.by_scattering[lane]);
-                }
-            }
-            self.depth[p * plane + at..][..BLOCK].copy_from_slice(&slope);
-        }
-        let costs: Block =
-            std::array::from_fn(|l| pull[0][l] * miss[0][l] + pull[1][l] * miss[1][l] + pull[2][l] * miss[2][l]);
-        costs.iter().sum()
-    }
-}
-
-/// `palette::film` for a block of pixels.
-struct Film {
-    colour: Block,
-    by_absorption: Block,
-    by_scattering: Block,
-}
-
-impl Film {
+    /// Works on the depths of all paints, a block of pixels after the other, given what is wanted there and its measure.
     #[inline(always)]
-    fn new(absorption: &Block, scattering: &Block, g: f32) -> Self {
-        let mut out = Self { colour: [0.0; BLOCK], by_absorption: [0.0; BLOCK], by_scattering: [0.0; BLOCK] };
-        for lane in 0..BLOCK {
-            let (k, s) = (absorption[lane], scattering[lane]);
-            let (t, rise) = tanhc(k * (k + 2.0 * s));
-            let (above, below) = (s - g * (k + s), k + s - s * g);
-            let over = 1.0 / (1.0 + t * below);
-            let colour = (g + t * above) * over;
-            let (by_k, by_s) = (2.0 * rise * (k + s), 2.0 * rise * k);
-            out.colour[lane] = colour;
-            out.by_absorption[lane] = (by_k * above - t * g - colour * (by_k * below + t)) * over;
-            out.by_scattering[lane] = (by_s * above + t * (1.0 - g) * (1.0 - colour) - colour * by_s * below) * over;
+    fn for_blocks(&mut self, mut work: impl FnMut(&Mixture, &mut [Block; MOST_PAINTS], &[Block; 3], &[Block; 6])) {
+        let plane = self.pixels.plane();
+        let mut depths = [[0.0; BLOCK]; MOST_PAINTS];
+        for y in 0..self.pixels.height {
+            for x in (0..self.pixels.width).step_by(BLOCK) {
+                let at = self.pixels.at(x, y);
+                let (mut wanted, mut measure) = ([[0.0; BLOCK]; 3], [[0.0; BLOCK]; 6]);
+                load(&self.wanted, plane, at, &mut wanted);
+                load(&self.measure, plane, at, &mut measure);
+                let paints = &mut depths[..self.mixture.paints];
+                load(&self.depth, plane, at, paints);
+                work(&self.mixture, &mut depths, &wanted, &measure);
+                for (p, depth) in depths[..self.mixture.paints].iter().enumerate() {
+                    self.depth[p * plane + at..][..BLOCK].copy_from_slice(depth);
+                }
+            }
         }
-        out
+    }
+
+    /// `cells = factor · unit · mean under each footprint` of the planes of `depth`.
+    fn gather(&mut self, squared: bool, factor: f64, unit: &[f64], out: &mut [f64]) {
+        let (columns, rows) = (self.cells.width, self.cells.height);
+        let spread = if squared { &self.squared } else { &self.spread };
+        for p in 0..self.mixture.paints {
+            let from = &self.depth[p * self.pixels.plane()..];
+            spread.mean(&self.cells, &mut self.paint, p, &self.pixels, from, &mut self.scratch);
+            for j in 0..rows {
+                let to = (p * rows + j) * columns..(p * rows + j + 1) * columns;
+                let from = self.cells.row(&self.paint, p, j);
+                for ((to, unit), &v) in out[to.clone()].iter_mut().zip(&unit[to]).zip(from) {
+                    *to = factor * unit * f64::from(v);
+                }
+            }
+        }
     }
 }
 
-/// `tanh √q / √q` by the ninth convergent of Lambert's continued fraction, within 5e-5 of it, and its derivative by `q`.
+/// A block of every plane.
 #[inline(always)]
-fn tanhc(q: f32) -> (f32, f32) {
-    // Up to here the convergent is good; beyond, the hyperbolic tangent is 1.
-    const LAST: f32 = 27.0;
-    let c = q.min(LAST);
-    let above = (((c + 990.0) * c + 135_135.0) * c + 4_729_725.0) * c + 34_459_425.0;
-    let below = (((45.0 * c + 13_860.0) * c + 945_945.0) * c + 16_216_200.0) * c + 34_459_425.0;
-    let t = if q > LAST { 1.0 / q.sqrt() } else { above / below };
-    let small = -1.0 / 3.0 + c * (4.0 / 15.0 - c * (17.0 / 105.0));
-    let large = (1.0 - q * t * t - t) / (2.0 * q.max(0.01));
-    (t, if q < 0.05 { small } else { large })
+fn load(planes: &[f32], plane: usize, at: usize, blocks: &mut [Block]) {
+    for (k, block) in blocks.iter_mut().enumerate() {
+        block.copy_from_slice(&planes[k * plane + at..][..BLOCK]);
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coloured::{ColourTask, Judge, Picture};
+    use crate::coloured::Picture;
+    use crate::footprints::Footprints;
     use crate::image::Image;
-    use crate::painter::Task;
     use crate::palette::Paint;
     use crate::procedural::lattice;
-    use crate::saturation::Saturation;
+
+    const SIZE: (usize, usize) = (21, 14);
+
+    fn of(k: usize, salt: i64) -> f64 {
+        lattice(11, k as i64, salt)
+    }
+
+    fn pixels<T>(value: impl Fn(usize) -> T) -> Vec<T> {
+        (0..SIZE.0 * SIZE.1).map(value).collect()
+    }
+
+    /// With a paint that covers, and with glazes alone.
+    fn palettes() -> [Palette; 2] {
+        let blue = Paint::glaze("blue", [0.1, 0.3, 0.8]);
+        let others = [Paint::opaque("white", [0.9; 3], 2.0), Paint::glaze("red", [0.9, 0.2, 0.3])];
+        others.map(|other| Palette::new([0.9, 0.8, 0.7], vec![blue.clone(), other]).unwrap())
+    }
+
+    fn nozzle() -> (SprayKernel, Limits) {
+        (SprayKernel::new(2.0, 2.0).unwrap(), Limits { along: 2, row_spacing: 3, ..Limits::default() })
+    }
 
     #[test]
     fn cost_and_derivative_are_those_of_the_definition() {
-        let palette = Palette::new(
-            [0.9, 0.8, 0.7],
-            vec![Paint::glaze("blue", [0.1, 0.3, 0.8]), Paint::opaque("white", [0.9; 3], 2.0)],
-        )
-        .unwrap();
-        let (width, height) = (21, 14);
-        let of = |k: usize, salt: i64| lattice(11, k as i64, salt);
-        let colours = (0..width * height).map(|k| [of(k, 0), of(k, 1), of(k, 2)]).collect();
-        let wanted = Picture::new(width, height, colours).unwrap();
-        let kernel = SprayKernel::new(2.0, 2.0).unwrap();
-        let limits = Limits { along: 2, row_spacing: 3, ..Limits::default() };
-        let blank = Image::filled(width, height, 0.0);
-        let board = Board::new(&Task::on_bare_wall(&blank), &kernel, &Saturation::Tanh, &limits).unwrap();
-        let wall = Wall::new(&ColourTask::new(&wanted), &palette, Judge::Eye, 3.0);
-        let mut blend = Blend::new(&wall, &board, &kernel, &limits);
-        let cells = board.footprints.cells();
+        let wanted = Picture::new(SIZE.0, SIZE.1, pixels(|k| [of(k, 0), of(k, 1), of(k, 2)])).unwrap();
+        // Only their ratios count, and the largest is more than single precision holds.
+        let weight = Image::new(SIZE.0, SIZE.1, pixels(|k| 1e200 * of(k, 4))).unwrap();
+        let heaviest = weight.data().iter().copied().fold(0.0, f64::max);
+        let task = ColourTask { weight: Some(&weight), ..ColourTask::new(&wanted) };
+        let (kernel, limits) = nozzle();
+        let footprints = Footprints::new(&kernel, SIZE, limits.along, limits.row_spacing);
+        let cells = footprints.cells();
         let depth_per_volume = kernel.mass() / 6.0;
-        let paint: Vec<f64> = (0..2 * cells).map(|k| 0.6 * of(k, 3)).collect();
-        let exact = |paint: &[f64]| {
-            let volumes: Vec<f64> = paint.iter().map(|v| v / depth_per_volume).collect();
-            let depths = [board.canvas(&volumes[..cells]), board.canvas(&volumes[cells..])];
-            let mut cost = 0.0;
-            for k in 0..width * height {
-                let colour = palette.colour(&[depths[0].data()[k], depths[1].data()[k]]);
-                for row in &wall.measures[k] {
-                    let miss: f64 = (0..3).map(|b| row[b] * (colour[b] - wanted.data()[k][b])).sum();
-                    cost += 0.5 * miss * miss;
+        let values: Vec<f64> = (0..2 * cells).map(|k| 0.6 * of(k, 3)).collect();
+        let unit: Vec<f64> = (0..2 * cells).map(|k| 0.5 + of(k, 5)).collect();
+        for palette in palettes() {
+            let mut blend = Blend::new(&task, &palette, Judge::Eye, &kernel, &limits);
+            let exact = |values: &[f64]| {
+                let volumes: Vec<f64> = values.iter().zip(&unit).map(|(v, unit)| v * unit / depth_per_volume).collect();
+                let mut depths = [pixels(|_| 0.0), pixels(|_| 0.0)];
+                for (volumes, depth) in volumes.chunks_exact(cells).zip(&mut depths) {
+                    footprints.add(volumes, depth);
                 }
-            }
-            cost
-        };
-        let mut gradient = vec![0.0; paint.len()];
-        let cost = blend.cost(&paint, &mut gradient);
-        assert!((cost / exact(&paint) - 1.0).abs() < 1e-4, "{cost} {}", exact(&paint));
-        for k in (0..2 * cells).step_by(7) {
-            let shifted = |h: f64| {
-                let mut paint = paint.clone();
-                paint[k] += h;
-                exact(&paint)
+                let mut cost = 0.0;
+                for (k, &wanted) in wanted.data().iter().enumerate() {
+                    let colour = palette.colour(&depths.each_ref().map(|depth| depth[k]));
+                    for row in difference(wanted) {
+                        let miss: f64 = (0..3).map(|b| row[b] * (colour[b] - wanted[b])).sum();
+                        cost += 0.5 * weight.data()[k] / heaviest * miss * miss;
+                    }
+                }
+                cost
             };
-            let expected = (shifted(1e-5) - shifted(-1e-5)) / 2e-5;
-            assert!((gradient[k] - expected).abs() < 2e-3 * expected.abs() + 0.05, "{k}: {} {expected}", gradient[k]);
+            let mut gradient = vec![0.0; values.len()];
+            let cost = blend.cost(&values, &unit, &mut gradient);
+            assert!((cost / exact(&values) - 1.0).abs() < 1e-4, "{cost} {}", exact(&values));
+            for k in (0..2 * cells).step_by(7) {
+                let shifted = |h: f64| {
+                    let mut values = values.clone();
+                    values[k] += h;
+                    exact(&values)
+                };
+                let (found, expected) = (gradient[k], (shifted(1e-5) - shifted(-1e-5)) / 2e-5);
+                assert!((found - expected).abs() < 2e-3 * expected.abs() + 0.05, "{k}: {found} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_start_shows_an_even_colour_and_knows_its_curvature() {
+        let (kernel, limits) = nozzle();
+        // Of glazes, which add up as the start takes all paints to do.
+        let palette = &palettes()[1];
+        let (depths, measure) = ([0.7, 0.4], [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+        let wanted = Picture::new(SIZE.0, SIZE.1, pixels(|_| palette.colour(&depths))).unwrap();
+        let mut blend = Blend::new(&ColourTask::new(&wanted), palette, Judge::Bands, &kernel, &limits);
+        let squared = kernel.squared();
+        let footprints = Footprints::new(&squared, SIZE, limits.along, limits.row_spacing);
+        let cells = footprints.cells();
+        let (found, bends) = blend.start(3.0, squared.mass());
+        // An odd number of columns and of rows.
+        let middle = cells / 2;
+        for (p, depth) in depths.into_iter().enumerate() {
+            assert!((found[p * cells + middle] - depth).abs() < 1e-3, "paint {p}: {}", found[p * cells + middle]);
+            let slopes = measure.map(|band| palette.adjoint(&depths, band)[p]);
+            let bend = slopes.iter().map(|s| s * s).sum::<f64>();
+            let mut expected = vec![0.0; cells];
+            footprints.gather(&pixels(|_| bend), &mut expected);
+            let floor = 0.03 * expected.iter().sum::<f64>() / cells as f64;
+            for (k, (found, expected)) in bends[p * cells..].iter().zip(&expected).enumerate() {
+                assert!((found / (expected + floor) - 1.0).abs() < 1e-3, "paint {p}, cell {k}: {found}, {expected}");
+            }
         }
     }
 }

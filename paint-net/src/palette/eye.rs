@@ -13,15 +13,17 @@ pub(crate) fn difference(colour: [f64; 3]) -> [[f64; 3]; 3] {
     let mut lab = [0.0; 3];
     let mut lab_by_colour = [[0.0; 3]; 3];
     let (mut f, mut f_by) = ([0.0; 3], [[0.0; 3]; 3]);
+    let linear = colour.map(decode);
     for row in 0..3 {
-        let xyz: f64 = (0..3).map(|c| XYZ[row][c] * decode(colour[c]).0).sum::<f64>() / WHITE[row];
+        let xyz: f64 = (0..3).map(|c| XYZ[row][c] * linear[c].0).sum::<f64>() / WHITE[row];
         let (value, slope) = if xyz > 216.0 / 24389.0 {
-            (xyz.cbrt(), 1.0 / (3.0 * xyz.cbrt().powi(2)))
+            let root = xyz.cbrt();
+            (root, 1.0 / (3.0 * root * root))
         } else {
             (24389.0 / 27.0 / 116.0 * xyz + 16.0 / 116.0, 24389.0 / 27.0 / 116.0)
         };
         f[row] = value;
-        f_by[row] = std::array::from_fn(|c| slope * XYZ[row][c] / WHITE[row] * decode(colour[c]).1);
+        f_by[row] = std::array::from_fn(|c| slope * XYZ[row][c] / WHITE[row] * linear[c].1);
     }
     for (row, of) in [[0.0, 116.0, 0.0], [500.0, -500.0, 0.0], [0.0, 200.0, -200.0]].into_iter().enumerate() {
         lab[row] = (0..3).map(|k| of[k] * f[k]).sum();
@@ -58,7 +60,8 @@ fn decode(stored: f64) -> (f64, f64) {
         (stored / 12.92, 1.0 / 12.92)
     } else {
         let base = (stored + 0.055) / 1.055;
-        (base.powf(2.4), 2.4 / 1.055 * base.powf(1.4))
+        let value = base.powf(2.4);
+        (value, 2.4 / 1.055 * value / base)
     }
 }
 

@@ -86,7 +86,7 @@ impl<T: Real> Rollout<T> {
         for t in (0..steps).rev() {
             self.paint_back(t, model, objective, &mut stamp, &mut d);
             self.decoder.back(t, &model.decoder, &mut d.decoder_memory, &d.decoder_state, &mut d.decoder_inputs);
-            self.sample_back(t, model, &mut d);
+            self.sample_back(t, T::of(objective.latent), model, &mut d);
             self.encoder.back(t, &model.encoder, &mut d.encoder_memory, &d.encoder_state, &mut d.encoder_inputs);
             self.read_back(t, model, &mut reader, &mut d);
         }
@@ -164,7 +164,7 @@ impl<T: Real> Rollout<T> {
     }
 
     /// From the derivative by the decoder's inputs to those by the states of encoder (added) and decoder (set).
-    fn sample_back(&self, t: usize, model: &ModelAdjoint<T>, d: &mut Back<T>) {
+    fn sample_back(&self, t: usize, weight: T, model: &ModelAdjoint<T>, d: &mut Back<T>) {
         let (z, h) = (self.shape.latent, self.shape.hidden);
         let d_latent = d.latent.at_mut(t);
         let rows = d_latent.chunks_exact_mut(2 * z).zip(self.latent.at(t).chunks_exact(2 * z));
@@ -174,8 +174,8 @@ impl<T: Real> Rollout<T> {
             let (mean, log_deviation) = latent.split_at(z);
             for k in 0..z {
                 let deviation = log_deviation[k].exp();
-                d_mean[k] = d_inputs[k] + mean[k];
-                d_log[k] = d_inputs[k] * noise[k] * deviation + deviation * deviation - T::of(1.0);
+                d_mean[k] = d_inputs[k] + weight * mean[k];
+                d_log[k] = d_inputs[k] * noise[k] * deviation + weight * (deviation * deviation - T::of(1.0));
             }
         }
         for (state, inputs) in d.decoder_state.chunks_exact_mut(h).zip(d.decoder_inputs.chunks_exact(z + h)) {

@@ -57,6 +57,8 @@ impl<T: Real> Noise<T> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Objective {
+    /// Weight of the divergence of `z`. Default 1 (the thesis); less pays for more detail.
+    pub latent: f64,
     /// Weight of the divergence of `z_paint`. Default 1, ours.
     pub stop: f64,
     /// Weight of the change of volume from one step to the next. Default 0.1, ours.
@@ -71,7 +73,7 @@ pub struct Objective {
 
 impl Default for Objective {
     fn default() -> Self {
-        Self { stop: 1.0, variation: 0.1, prior: -1.0, gated: true }
+        Self { latent: 1.0, stop: 1.0, variation: 0.1, prior: -1.0, gated: true }
     }
 }
 
@@ -86,7 +88,10 @@ pub(crate) struct Terms {
 
 impl Terms {
     pub(crate) fn total(&self, objective: &Objective) -> f64 {
-        self.cross_entropy + self.latent + objective.stop * self.stop + objective.variation * self.variation
+        self.cross_entropy
+            + objective.latent * self.latent
+            + objective.stop * self.stop
+            + objective.variation * self.variation
     }
 }
 

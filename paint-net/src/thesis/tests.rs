@@ -38,7 +38,7 @@ fn every_derivative_is_that_of_the_loss() {
         let mut spent = rollout(&free, &parameters, gated).spent.at(free.steps - 1).to_vec();
         spent.sort_unstable_by(f64::total_cmp);
         let shape = small(0.5 * (spent[1] + spent[2]));
-        let objective = Objective { prior: -0.4, gated, ..Objective::default() };
+        let objective = Objective { latent: 0.7, prior: -0.4, gated, ..Objective::default() };
         let loss = |parameters: &[f64]| rollout(&shape, parameters, gated).terms(objective.prior).total(&objective);
         let mut gradient = vec![0.0; parameters.len()];
         let mut whole = rollout(&shape, &parameters, gated);

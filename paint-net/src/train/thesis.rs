@@ -92,8 +92,10 @@ impl ThesisTrainer {
         }
         let longest = settings.longest_gradient;
         require("longest_gradient", longest, longest > 0.0, "it must be positive")?;
-        let Objective { stop, variation, prior, .. } = settings.objective;
-        for (name, weight) in [("objective.stop", stop), ("objective.variation", variation)] {
+        let Objective { latent, stop, variation, prior, .. } = settings.objective;
+        for (name, weight) in
+            [("objective.latent", latent), ("objective.stop", stop), ("objective.variation", variation)]
+        {
             require(name, weight, (0.0..=1e6).contains(&weight), "it must lie in [0, 1e6]")?;
         }
         require("objective.prior", prior, prior.abs() <= 50.0, "it must lie in [-50, 50]")?;

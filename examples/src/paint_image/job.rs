@@ -1,0 +1,194 @@
+use std::path::Path;
+
+use clap::ValueEnum;
+use paint_net::thesis::{Network, Thesis};
+use paint_net::{
+    Coats, Deconvolution, Feedback, FreeSplats, Image, Layered, Limits, MatchingPursuit, Painter, Painting, Route,
+    Saturation, Sharing, SlewLimited, SprayKernel, Task, metrics, slew_violations,
+};
+use serde::Serialize;
+
+use super::clock::Clock;
+use super::film::save_film;
+use super::{PaintImageError, colour_difference, commands, error_map, grey, level, ssim, write_json};
+
+/// Who decides the sprays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Choice {
+    /// The network that looks at its canvas.
+    Feedback,
+    /// The same in three coats, each of which stays on the wall.
+    Coats,
+    /// Projected L-BFGS.
+    Deconvolution,
+    /// Greedy matching pursuit.
+    Pursuit,
+    /// Few sprays at free places, of free spreads.
+    Splats,
+    /// The thesis' network; needs weights.
+    Thesis,
+}
+
+impl Choice {
+    /// All that need no weights.
+    pub const READY: [Self; 5] = [Self::Feedback, Self::Coats, Self::Deconvolution, Self::Pursuit, Self::Splats];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Feedback => "feedback",
+            Self::Coats => "coats",
+            Self::Deconvolution => "deconvolution",
+            Self::Pursuit => "pursuit",
+            Self::Splats => "splats",
+            Self::Thesis => "thesis",
+        }
+    }
+}
+
+/// How a picture is painted.
+#[derive(Debug, Clone)]
+pub struct Job {
+    /// Who decides.
+    pub painter: Choice,
+    /// Looks of the network at its canvas.
+    pub passes: usize,
+    /// The nozzle, pixels.
+    pub kernel: SprayKernel,
+    /// Where sprays may lie.
+    pub limits: Limits,
+    /// Largest change of volume from one cell of the path to the next; `None` for any.
+    pub largest_change: Option<f64>,
+    /// The path for which that holds.
+    pub route: Route,
+    /// Whether to paint in layers, a base coat first, and how they share the paint (thesis, Paper IV, section 3.2).
+    pub layers: Option<Sharing>,
+    /// Threads of the network.
+    pub threads: usize,
+    /// The thesis' network, if there is one.
+    pub thesis: Option<Network>,
+}
+
+/// The figures of one picture; flat, units in the names.
+#[derive(Debug, Clone, Serialize)]
+pub struct Figures {
+    /// Name of the painter.
+    pub painter: String,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Peak signal-to-noise ratio of the ink.
+    pub psnr_db: f64,
+    /// Structural similarity, 7x7 window; pictures smaller than the window have none, which is given as 0.
+    pub ssim: f64,
+    /// Cross-entropy.
+    pub bce_nats_per_px: f64,
+    /// Mean colour difference, ink taken as the grey values of sRGB.
+    pub ciede2000_mean: f64,
+    /// Number of sprays.
+    pub sprays: usize,
+    /// Looks of the network; 0 for painters that have none.
+    pub passes: usize,
+    /// Places on the path where the volume changes faster than was allowed; 0 if any change is allowed.
+    pub slew_violations: usize,
+    /// Sum of the volumes.
+    pub volume_total: f64,
+    /// CPU time of deciding on one thread, wall time on several.
+    pub cpu_ms: f64,
+    /// Threads.
+    pub threads: usize,
+}
+
+impl Job {
+    /// For tables.
+    pub fn name(&self) -> String {
+        let name = self.painter.name();
+        if self.layers.is_some() { format!("{name}, layers") } else { name.to_string() }
+    }
+
+    /// The painter that was chosen.
+    pub fn painter(&self) -> Result<Box<dyn Painter>, PaintImageError> {
+        let feedback = || Feedback::shipped().map(|f| Feedback { passes: self.passes, threads: self.threads, ..f });
+        let painter: Box<dyn Painter> = match self.painter {
+            Choice::Feedback => Box::new(feedback()?),
+            Choice::Coats => Box::new(Coats::new(feedback()?)),
+            Choice::Deconvolution => Box::new(Deconvolution::default()),
+            Choice::Pursuit => Box::new(MatchingPursuit::default()),
+            Choice::Splats => Box::new(FreeSplats {
+                sprays: self.limits.max_sprays.unwrap_or(FreeSplats::default().sprays),
+                ..FreeSplats::default()
+            }),
+            Choice::Thesis => {
+                let none =
+                    || PaintImageError::Settings("the painter thesis needs a network: give --weights".to_string());
+                Box::new(Thesis { network: self.thesis.clone().ok_or_else(none)? })
+            }
+        };
+        Ok(match self.layers {
+            Some(sharing) => Box::new(Layered { sharing, ..Layered::new(painter) }),
+            None => painter,
+        })
+    }
+
+    /// Decides the sprays for a wanted picture of ink.
+    pub fn paint(&self, wanted: &Image, progress: &mut dyn FnMut(f64)) -> Result<(Painting, Figures), PaintImageError> {
+        let painter = self.painter()?;
+        let clock = Clock::start(self.threads);
+        let task = Task::on_bare_wall(wanted);
+        let (kernel, ink, limits) = (&self.kernel, &Saturation::Tanh, &self.limits);
+        let (painting, slew_violations) = match self.largest_change {
+            None => (painter.paint(&task, kernel, ink, limits, progress)?, 0),
+            Some(most) => {
+                let slow = SlewLimited { route: self.route, ..SlewLimited::new(painter, most) };
+                let (waypoints, painting) = slow.fly(&task, kernel, ink, limits, progress)?;
+                (painting, slew_violations(&waypoints, most))
+            }
+        };
+        let cpu_ms = clock.milliseconds();
+        let passes = match self.painter {
+            Choice::Feedback | Choice::Coats => self.passes,
+            Choice::Deconvolution | Choice::Pursuit | Choice::Splats | Choice::Thesis => 0,
+        };
+        let figures = Figures {
+            painter: self.name(),
+            width: wanted.width(),
+            height: wanted.height(),
+            psnr_db: metrics::psnr(&painting.ink, wanted, None)?,
+            ssim: ssim(&painting.ink, wanted)?,
+            bce_nats_per_px: metrics::binary_cross_entropy(&painting.ink, wanted)?,
+            ciede2000_mean: colour_difference(&painting.ink, wanted),
+            sprays: painting.sprays.len(),
+            passes,
+            slew_violations,
+            volume_total: painting.sprays.iter().map(|s| s.volume).sum(),
+            cpu_ms,
+            threads: self.threads,
+        };
+        let numbers = [figures.psnr_db, figures.ssim, figures.bce_nats_per_px, figures.ciede2000_mean, cpu_ms];
+        if numbers.iter().any(|f| !f.is_finite()) {
+            return Err(PaintImageError::NotFinite("report"));
+        }
+        Ok((painting, figures))
+    }
+
+    /// Writes `commands.json`, `commands.mcap`, `rendered.png`, `error.png`, `film.png` and `report.json`.
+    pub fn save(
+        &self,
+        folder: &Path,
+        wanted: &Image,
+        painting: &Painting,
+        figures: &Figures,
+    ) -> Result<(), PaintImageError> {
+        let model = serde_json::json!({
+            "ink": "tanh(sum of volume * exp(-d^2 / (2 sigma_px^2)))", "cut_sigma": self.kernel.cut(),
+            "footprint": "pixels no more than cut_sigma * sigma_px away along each axis",
+        });
+        let sprays: Vec<_> = commands::commands(&painting.sprays, 0).collect();
+        commands::save(folder, (wanted.width(), wanted.height()), &model, &["black"], &sprays)?;
+        write_json(&folder.join("report.json"), figures)?;
+        grey(&painting.ink).save(&folder.join("rendered.png"))?;
+        error_map(&painting.ink, wanted).save(&folder.join("error.png"))?;
+        let show = |depths: &[f64]| [level(depths[0].tanh()); 3];
+        save_film(&folder.join("film.png"), grey(wanted), &[&painting.sprays], &self.kernel, &show)
+    }
+}

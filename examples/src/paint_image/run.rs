@@ -1,0 +1,173 @@
+use std::path::{Path, PathBuf};
+
+use paint_net::procedural::Texture;
+use paint_net::thesis::{Objective, Shape};
+use paint_net::train::{ThesisSettings, TrainSettings};
+use paint_net::{Image, Limits, Route, Sharing, SprayKernel};
+
+use super::command_line::{Arguments, Command, Nozzle, Preset, RouteName, SharingName, Training};
+use super::{
+    Choice, Glazes, Job, Lesson, PaintImageError, Pictures, ThesisLesson, compare, equal_sprays, learn, learn_thesis,
+    pictures_in, print_equal_sprays, read_ink, read_network, read_picture, table,
+};
+use crate::progress::Stage;
+
+/// Does what the command line asks for.
+pub fn run(arguments: Arguments) -> Result<(), PaintImageError> {
+    match arguments.job {
+        None => {
+            // The command line requires it.
+            let image = arguments.image.unwrap_or_default();
+            let Arguments { painter, palette, out, nozzle, .. } = arguments;
+            if palette.is_some() {
+                only_for_one_paint(painter, &nozzle)?;
+            }
+            let job = job(painter.unwrap_or(Choice::Feedback), &nozzle)?;
+            for file in pictures_in(&image)? {
+                let out = if image.is_dir() { out.join(file.file_name().unwrap_or_default()) } else { out.clone() };
+                match palette {
+                    None => paint(&file, &job, &out)?,
+                    Some(palette) => paint_colours(&file, &job, palette, &out)?,
+                }
+            }
+            Ok(())
+        }
+        Some(Command::Compare { pictures, runs, out, nozzle }) => {
+            let pictures = pictures_or_textures(pictures)?;
+            create(&out)?;
+            print!("{}", table(&compare(&job(Choice::Feedback, &nozzle)?, &pictures, runs, &out)?));
+            Ok(())
+        }
+        Some(Command::EqualSprays { weights, pictures }) => {
+            print!("{}", print_equal_sprays(&equal_sprays(&weights, &pictures_or_textures(pictures)?)?));
+            Ok(())
+        }
+        Some(Command::Train(training)) => train(training),
+    }
+}
+
+/// The painter of colours has settings of its own.
+fn only_for_one_paint(painter: Option<Choice>, nozzle: &Nozzle) -> Result<(), PaintImageError> {
+    let given = [
+        ("--painter", painter.is_some()),
+        ("--layers", nozzle.layers.is_some()),
+        ("--largest-change", nozzle.largest_change.is_some()),
+        ("--route", nozzle.route.is_some()),
+        ("--passes", nozzle.passes.is_some()),
+        ("--threads", nozzle.threads.is_some()),
+        ("--weights", nozzle.weights.is_some()),
+    ];
+    let given: Vec<&str> = given.iter().filter(|g| g.1).map(|g| g.0).collect();
+    if given.is_empty() {
+        return Ok(());
+    }
+    let given = given.join(", ");
+    Err(PaintImageError::Settings(format!("{given}: for one paint only; leave that out, or --palette")))
+}
+
+fn pictures_or_textures(pictures: Option<PathBuf>) -> Result<Vec<Image>, PaintImageError> {
+    Ok(match pictures {
+        Some(path) => pictures_in(&path)?.iter().map(|p| read_ink(p)).collect::<Result<_, _>>()?,
+        None => Texture::ALL.map(|t| t.image(1000, 128)).to_vec(),
+    })
+}
+
+fn train(training: Training) -> Result<(), PaintImageError> {
+    let Training { preset, data, seed, steps, until, batch, rate, last_rate, as_printed, latent_weight, .. } = training;
+    let Training { threads, resume, out, .. } = training;
+    create(&out)?;
+    let (shape, pictures) = match preset {
+        Preset::Painter => {
+            let preset = TrainSettings::default();
+            let settings = TrainSettings {
+                seed,
+                threads,
+                steps: steps.unwrap_or(preset.steps),
+                batch: batch.unwrap_or(preset.batch),
+                learning_rate: rate.unwrap_or(preset.learning_rate),
+                ..preset
+            };
+            learn(&Lesson { settings, resume, until, save_every: 500 }, &out)?;
+            println!("{}", out.join("painter.safetensors").display());
+            return Ok(());
+        }
+        // The command line requires the data.
+        Preset::ThesisMnist => (Shape::MNIST, Pictures::Digits(data.unwrap_or_default())),
+        Preset::ThesisPaint => (Shape::PAINT, Pictures::Patches),
+    };
+    let preset = ThesisSettings::default();
+    let settings = ThesisSettings {
+        seed,
+        shape,
+        threads,
+        steps: steps.unwrap_or(preset.steps),
+        batch: batch.unwrap_or(preset.batch),
+        learning_rate: rate.unwrap_or(preset.learning_rate),
+        last_learning_rate: last_rate.unwrap_or(preset.last_learning_rate),
+        objective: Objective {
+            gated: !as_printed,
+            latent: latent_weight.unwrap_or(preset.objective.latent),
+            ..preset.objective
+        },
+        ..preset
+    };
+    learn_thesis(&ThesisLesson { settings, pictures, resume, until, save_every: 100 }, &out)?;
+    println!("{}", out.join("thesis.safetensors").display());
+    Ok(())
+}
+
+fn job(painter: Choice, nozzle: &Nozzle) -> Result<Job, PaintImageError> {
+    Ok(Job {
+        painter,
+        passes: nozzle.passes.unwrap_or(6),
+        kernel: SprayKernel::new(nozzle.sigma, nozzle.cut)?,
+        limits: Limits {
+            along: nozzle.along,
+            row_spacing: nozzle.row_spacing,
+            min_volume: nozzle.min_volume,
+            max_sprays: nozzle.max_sprays,
+            ..Limits::default()
+        },
+        largest_change: nozzle.largest_change,
+        route: match nozzle.route {
+            Some(RouteName::Alike) => Route::Alike,
+            Some(RouteName::Rows) | None => Route::Rows,
+        },
+        layers: nozzle.layers.map(|sharing| match sharing {
+            SharingName::Joint => Sharing::Joint,
+            SharingName::Sequential => Sharing::Sequential,
+        }),
+        threads: nozzle.threads.unwrap_or(1),
+        thesis: nozzle.weights.as_deref().map(read_network).transpose()?,
+    })
+}
+
+fn paint(image: &Path, job: &Job, out: &Path) -> Result<(), PaintImageError> {
+    let wanted = read_ink(image)?;
+    create(out)?;
+    let stage = Stage::start("paint");
+    let (painting, figures) = job.paint(&wanted, &mut |share| stage.share(share))?;
+    stage.done(&format!("{} sprays, {:.2} dB, {:.1} ms", figures.sprays, figures.psnr_db, figures.cpu_ms));
+    job.save(out, &wanted, &painting, &figures)?;
+    println!("{}", out.join("report.json").display());
+    Ok(())
+}
+
+fn paint_colours(image: &Path, job: &Job, glazes: Glazes, out: &Path) -> Result<(), PaintImageError> {
+    let (wanted, palette) = (read_picture(image)?, glazes.palette()?);
+    create(out)?;
+    let stage = Stage::start("paint");
+    let (painting, figures) = job.paint_colours(&wanted, &palette, &mut |share| stage.share(share))?;
+    stage
+        .done(&format!("{} sprays, CIEDE2000 {:.2}, {:.1} ms", figures.sprays, figures.ciede2000_mean, figures.cpu_ms));
+    job.save_colours(out, &wanted, &palette, &painting, &figures)?;
+    println!("{}", out.join("report.json").display());
+    Ok(())
+}
+
+fn create(folder: &Path) -> Result<(), PaintImageError> {
+    std::fs::create_dir_all(folder).map_err(|e| PaintImageError::File {
+        path: folder.display().to_string(),
+        why: format!("cannot be created ({e}): choose another --out"),
+    })
+}
