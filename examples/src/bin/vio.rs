@@ -295,6 +295,10 @@ fn search(arguments: &Tune) -> Result<(), AnyError> {
         "position error {:.4} m at the start, {:.4} m now; NEES {:.1}, now {:.1}",
         report.ate_start_m, report.ate_best_m, report.nees_start, report.nees_best
     );
+    if let Some(ratio) = report.ratio_to_random {
+        let (worse, points, seconds) = (100.0 * (ratio - 1.0), report.random_samples, report.search_wall_s);
+        eprintln!("{worse:+.1} % against the best of {points} random points, after {seconds:.1} s");
+    }
     println!("{}", arguments.out.join("report.md").display());
     Ok(())
 }
