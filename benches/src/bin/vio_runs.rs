@@ -14,8 +14,8 @@ use paintcopter_benches::sequences::{SEQUENCES, cameras, motion};
 use serde_json::json;
 use vio_ekf::sim::{CameraModel, ImuModel, Scenario, Simulation};
 use vio_ekf::{
-    Alignment, Association, Odometry, Settings, Stamp, Start, StartSigma, Status, Trajectory, Vio, ate, nalgebra, so3,
-    tum,
+    Alignment, Association, Odometry, Settings, Stamp, Start, StartSigma, Status, Trajectory, Vio, ate, chi2, nalgebra,
+    so3, tum,
 };
 
 type AnyError = Box<dyn Error>;
@@ -72,7 +72,8 @@ const NEES: [&str; 5] = ["position", "attitude", "velocity", "gyro_bias", "accel
 struct Outcome {
     se3: f64,
     yaw: f64,
-    nees: [f64; 5],
+    /// After each image.
+    nees: Vec<[f64; 5]>,
     millis: Vec<f64>,
     /// Time of an inertial sample together with an output with covariance.
     imu_micros: Vec<f64>,
@@ -86,6 +87,7 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
     let (mut errors, mut millis, mut imu_micros, mut diverged) = (Vec::new(), Vec::new(), Vec::new(), 0);
     for name in names {
         let spline = motion(&arguments.data, name, arguments.seconds)?;
+        let mut squares = Vec::new();
         for seed in arguments.first_seed..arguments.first_seed + arguments.seeds {
             let count = if arguments.stereo { 2 } else { 1 };
             let model = |camera| CameraModel { camera, ..CameraModel::default() };
@@ -107,10 +109,15 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
                 "frames": outcome.millis.len(), "frame_ms_median": quantile(&outcome.millis, 0.5),
                 "frame_ms_p99": quantile(&outcome.millis, 0.99), "diverged": outcome.diverged,
             });
-            for (what, value) in NEES.iter().zip(outcome.nees) {
-                line[format!("nees_{what}")] = json!(value);
+            for (k, what) in NEES.iter().enumerate() {
+                let sum: f64 = outcome.nees.iter().map(|squares| squares[k]).sum();
+                line[format!("nees_{what}")] = json!(sum / outcome.nees.len() as f64);
             }
             println!("{line}");
+            squares.push(outcome.nees);
+        }
+        if arguments.seeds > 1 {
+            println!("{}", honesty(name, &squares)?);
         }
     }
     let worst = errors.iter().copied().fold(0.0, f64::max);
@@ -121,6 +128,22 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
     });
     println!("{summary}");
     Ok(())
+}
+
+/// Over the runs of a sequence: the mean of all squared errors, and for how much of the time the mean over the runs lies where it does
+/// 95 % of the time if the claim is right.
+fn honesty(name: &str, runs: &[Vec<[f64; 5]>]) -> Result<serde_json::Value, AnyError> {
+    let (low, high) = chi2::mean_band(3, runs.len(), 0.95)?;
+    let frames = runs.iter().map(Vec::len).min().unwrap_or(0);
+    let mut line = json!({ "all_of": name, "runs": runs.len(), "nees_band": [low, high] });
+    for (k, what) in NEES.iter().enumerate() {
+        let mean = |frame: usize| runs.iter().map(|run| run[frame][k]).sum::<f64>() / runs.len() as f64;
+        let means: Vec<f64> = (0..frames).map(mean).collect();
+        let inside = means.iter().filter(|mean| (low..=high).contains(*mean)).count();
+        line[format!("in_band_{what}")] = json!(inside as f64 / frames as f64);
+        line[format!("nees_{what}")] = json!(means.iter().sum::<f64>() / frames as f64);
+    }
+    Ok(line)
 }
 
 fn follow(
@@ -148,7 +171,7 @@ fn follow(
     let second = arguments.stereo.then(|| Frames::new(simulation, 1, right, folder("_right"))).transpose()?;
     let (mut truth, mut estimate) = (Trajectory::default(), Trajectory::default());
     let mut outcome =
-        Outcome { se3: 0.0, yaw: 0.0, nees: [0.0; 5], millis: Vec::new(), imu_micros: Vec::new(), diverged: false };
+        Outcome { se3: 0.0, yaw: 0.0, nees: Vec::new(), millis: Vec::new(), imu_micros: Vec::new(), diverged: false };
     let mut next = samples.next();
     for index in 0..first.count() {
         let Some(frame) = first.get(index)? else { continue };
@@ -181,12 +204,8 @@ fn follow(
         truth.push(odometry.stamp, motion.world_from_body)?;
         estimate.push(odometry.stamp, odometry.world_from_body)?;
         let (gyro, accel) = recording.biases_at(odometry.stamp);
-        for (sum, value) in outcome.nees.iter_mut().zip(nees(&odometry, &motion, [gyro, accel])) {
-            *sum += value;
-        }
+        outcome.nees.push(nees(&odometry, &motion, [gyro, accel]));
     }
-    let count = estimate.len() as f64;
-    outcome.nees.iter_mut().for_each(|sum| *sum /= count);
     let pairs = Association::default().pair_up(&truth, &estimate)?;
     outcome.se3 = ate(&pairs.reference, &pairs.estimate, Alignment::Se3)?.position.rmse;
     outcome.yaw = ate(&pairs.reference, &pairs.estimate, Alignment::PosYaw)?.position.rmse;

@@ -59,6 +59,7 @@ impl Keeper {
     }
 
     /// The map, if the processor keeps it.
+    #[cfg_attr(not(feature = "gpu"), allow(clippy::unnecessary_wraps, reason = "a map on a GPU must be fetched"))]
     pub(super) fn map(&self) -> Option<&Map> {
         match self {
             Self::Cpu(map) => Some(map),
@@ -84,6 +85,7 @@ impl Keeper {
     }
 
     /// The map in the processor's memory.
+    #[cfg_attr(not(feature = "gpu"), allow(clippy::unnecessary_wraps, reason = "a map on a GPU must be fetched"))]
     pub(super) fn into_map(self) -> Result<Map, ScanError> {
         match self {
             Self::Cpu(map) => Ok(*map),

@@ -1,11 +1,13 @@
 //! Recordings as MCAP: images as Foxglove or ROS 2 has them, inertial samples as ROS 2 has them.
 
+mod pixels;
+
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use foxglove::Decode;
-use foxglove::messages::{self, CompressedImage, FrameTransform, FrameTransforms, PoseInFrame, RawImage, Timestamp};
+use foxglove::messages::{self, FrameTransform, FrameTransforms, PoseInFrame, Timestamp};
 use mcap::Message;
 use vio_ekf::calibration::{self, CameraCalibration, ImuCalibration};
 use vio_ekf::nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
@@ -16,7 +18,8 @@ use super::error::read_text;
 use super::euroc_folder::{Overrides, read_truth};
 use super::mcap_out::NOISE_SCHEMA;
 use super::recording::{Shot, Truth};
-use super::{Grey, Images, Recording, VioError};
+use super::{Images, Recording, VioError};
+use pixels::{image, image_stamp};
 
 /// Opens an MCAP file: one pass for everything but the images, which are read later, one by one.
 ///
@@ -47,12 +50,13 @@ pub fn open_mcap(path: &Path, overrides: &Overrides) -> Result<Recording, VioErr
         None => (!found.truth.is_empty()).then_some(Truth { trajectory: found.truth, velocities_in_world: Vec::new() }),
     };
     let images = Images::Mcap { path: path.to_path_buf(), topic, stamps: found.image_stamps };
-    Ok(Recording { name: path.display().to_string(), camera, imu, samples: found.samples, images, truth })
+    let name = path.display().to_string();
+    Ok(Recording { name, camera, imu, samples: found.samples, images, second: None, truth })
 }
 
 /// The images of a topic in the order of the file.
 pub(super) fn read_images(path: PathBuf, topic: String) -> Box<dyn Iterator<Item = Shot> + Send> {
-    let failed = |why: String| Shot { stamp: Stamp::default(), picture: Err(why) };
+    let failed = |why: String| Shot { stamp: Stamp::default(), picture: Err(why), second: None };
     let messages = match messages_of(&path) {
         Ok(messages) => messages,
         Err(error) => return Box::new(std::iter::once(failed(error.to_string()))),
@@ -62,7 +66,8 @@ pub(super) fn read_images(path: PathBuf, topic: String) -> Box<dyn Iterator<Item
             let decoded = image(&message);
             Some(match decoded {
                 Some((stamp, picture)) => {
-                    Shot { stamp, picture: picture.map_err(|why| format!("image of {stamp} s: {why}")) }
+                    let picture = picture.map_err(|why| format!("image of {stamp} s: {why}"));
+                    Shot { stamp, picture, second: None }
                 }
                 None => failed("a message on the images' topic that is no image".into()),
             })
@@ -235,93 +240,4 @@ fn noise(data: &[u8]) -> Option<(ImuNoise, f64, f64)> {
     };
     noise.check().ok()?;
     Some((noise, number("rate_hz")?, number("timeshift_cam_imu").unwrap_or(0.0)))
-}
-
-fn image_stamp(schema: &str, data: &[u8]) -> Option<Stamp> {
-    match schema {
-        "foxglove.RawImage" => RawImage::decode(data).ok()?.timestamp.map(stamp),
-        "foxglove.CompressedImage" => CompressedImage::decode(data).ok()?.timestamp.map(stamp),
-        _ => Cdr::new(data)?.header().map(|(stamp, _)| stamp),
-    }
-}
-
-/// Time and pixels of an image; `None` if the message is none.
-fn image(message: &Message) -> Option<(Stamp, Result<Grey, String>)> {
-    let data = message.data.as_ref();
-    match message.channel.schema.as_ref()?.name.as_str() {
-        "foxglove.RawImage" => {
-            let raw = RawImage::decode(data).ok()?;
-            let size = (raw.width as usize, raw.height as usize, raw.step as usize);
-            Some((stamp(raw.timestamp?), unpack(&raw.encoding, size, &raw.data)))
-        }
-        "foxglove.CompressedImage" => {
-            let image = CompressedImage::decode(data).ok()?;
-            Some((stamp(image.timestamp?), Grey::decode(&image.data)))
-        }
-        "sensor_msgs/msg/Image" => {
-            let mut cdr = Cdr::new(data)?;
-            let (stamp, _) = cdr.header()?;
-            let (height, width, encoding) = (cdr.u32()? as usize, cdr.u32()? as usize, cdr.string()?);
-            let _big_endian = cdr.byte()?;
-            let (step, pixels) = (cdr.u32()? as usize, cdr.blob()?);
-            Some((stamp, unpack(encoding, (width, height, step), pixels)))
-        }
-        "sensor_msgs/msg/CompressedImage" => {
-            let mut cdr = Cdr::new(data)?;
-            let (stamp, _) = cdr.header()?;
-            let _format = cdr.string()?;
-            Some((stamp, Grey::decode(cdr.blob()?)))
-        }
-        _ => None,
-    }
-}
-
-/// Pixels as they are in memory, row by row with padding, to grey.
-fn unpack(encoding: &str, (width, height, step): (usize, usize, usize), data: &[u8]) -> Result<Grey, String> {
-    let (channels, red) = match encoding {
-        "mono8" | "8UC1" => (1, 0),
-        "rgb8" => (3, 0),
-        "bgr8" | "8UC3" => (3, 2),
-        "rgba8" => (4, 0),
-        "bgra8" => (4, 2),
-        other => {
-            return Err(format!("pixels encoded as `{other}` are not read: record mono8, rgb8, bgr8, PNG or JPEG"));
-        }
-    };
-    let row = width.saturating_mul(channels);
-    if step < row || data.len() < step.saturating_mul(height) {
-        return Err(format!("{} bytes are too few for {width}x{height} pixels in rows of {step}", data.len()));
-    }
-    let luma = |pixel: &[u8]| {
-        if channels == 1 {
-            return pixel[0];
-        }
-        // ITU-R BT.601, as the colour cameras' own conversion.
-        let (r, g, b) = (u32::from(pixel[red]), u32::from(pixel[1]), u32::from(pixel[2 - red]));
-        ((299 * r + 587 * g + 114 * b + 500) / 1000) as u8
-    };
-    let rows = data.chunks_exact(step.max(1)).take(height);
-    Ok(Grey { width, height, data: rows.flat_map(|r| r[..row].chunks_exact(channels).map(luma)).collect() })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn pixels_are_unpacked_with_padding_and_colours_by_their_weight() {
-        let grey = |encoding: &str, size, data: &[u8]| unpack(encoding, size, data).map(|grey| grey.data);
-        assert_eq!(grey("mono8", (2, 2, 3), &[1, 2, 99, 3, 4, 99]), Ok(vec![1, 2, 3, 4]));
-        // Red, green and blue alone: 29.9, 58.7 and 11.4 per cent.
-        let colours = [255, 0, 0, 0, 255, 0, 0, 0, 255];
-        assert_eq!(grey("rgb8", (3, 1, 9), &colours), Ok(vec![76, 150, 29]));
-        assert_eq!(grey("bgr8", (3, 1, 9), &colours), Ok(vec![29, 150, 76]));
-        assert_eq!(grey("bgra8", (1, 1, 4), &[0, 0, 255, 7]), Ok(vec![76]));
-        for (encoding, size, data) in
-            [("mono8", (2, 2, 1), &[0; 9][..]), ("mono8", (2, 2, 2), &[0; 3]), ("mono16", (1, 1, 2), &[0; 2])]
-        {
-            assert!(grey(encoding, size, data).is_err(), "{encoding} {size:?}");
-        }
-        assert!(unpack("rgb8", (usize::MAX, 1, usize::MAX), &[0; 4]).is_err());
-    }
 }

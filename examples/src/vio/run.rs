@@ -1,15 +1,18 @@
 //! The run: samples and images in the order of their stamps, and what the filter made of them.
 
+mod reasons;
+
 use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 
 use cpu_time::ThreadTime;
 use vio_ekf::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use vio_ekf::{Calibration, Error, Excess, ImuNoise, Odometry, Settings, Stamp, Status, Trajectory, Vio, Waiting};
+use vio_ekf::{Calibration, Error, ImuNoise, Odometry, Settings, Stamp, Status, Trajectory, Vio};
 
 use super::recording::Shot;
 use super::{Recording, VioError};
 use crate::progress::Stage;
+use reasons::{describe, waiting};
 
 /// Images that wait for the filter when they are decoded beside it.
 const AHEAD: usize = 4;
@@ -45,6 +48,8 @@ pub struct Run {
     pub segments: Vec<Segment>,
     /// Images that the filter took.
     pub frames: usize,
+    /// Those among them that came with one of the second camera.
+    pub pairs: usize,
     /// Images that it could not take, with the reason.
     pub skipped: Vec<String>,
     /// Inertial samples that it took.
@@ -80,12 +85,12 @@ pub fn run(recording: &Recording, settings: &RunSettings) -> Result<Run, VioErro
         driver.shot(shot)
     };
     if settings.threads < 2 {
-        recording.images.read().try_for_each(&mut each)?;
+        recording.shots().try_for_each(&mut each)?;
     } else {
         std::thread::scope(|scope| {
             let (sender, receiver) = sync_channel(AHEAD);
             // Ends by itself when the receiver is dropped.
-            scope.spawn(move || recording.images.read().try_for_each(|shot| sender.send(shot)));
+            scope.spawn(move || recording.shots().try_for_each(|shot| sender.send(shot)));
             receiver.into_iter().try_for_each(&mut each)
         })?;
     }
@@ -104,6 +109,7 @@ struct Driver<'a> {
     next: usize,
     segments: Vec<Segment>,
     frames: usize,
+    pairs: usize,
     skipped: Vec<String>,
     first_image: Option<Stamp>,
     last_image: Option<Stamp>,
@@ -117,12 +123,18 @@ impl<'a> Driver<'a> {
     fn new(recording: &'a Recording, settings: &RunSettings) -> Result<Self, VioError> {
         let mut filter = settings.filter;
         filter.calibration.time_offset_s += recording.camera.time_offset_s;
+        let (camera, noise) = (recording.camera.camera, settings.noise.unwrap_or(recording.imu.noise));
+        let vio = match &recording.second {
+            Some(second) => Vio::stereo(camera, second.camera, noise, filter)?,
+            None => Vio::new(camera, noise, filter)?,
+        };
         Ok(Self {
             recording,
-            vio: Vio::new(recording.camera.camera, settings.noise.unwrap_or(recording.imu.noise), filter)?,
+            vio,
             next: 0,
             segments: Vec::new(),
             frames: 0,
+            pairs: 0,
             skipped: Vec::new(),
             first_image: None,
             last_image: None,
@@ -134,7 +146,7 @@ impl<'a> Driver<'a> {
     }
 
     /// An image, after the samples that come before it.
-    fn shot(&mut self, Shot { stamp, picture }: Shot) -> Result<(), VioError> {
+    fn shot(&mut self, Shot { stamp, picture, second }: Shot) -> Result<(), VioError> {
         let picture = match picture {
             Ok(picture) => picture,
             Err(why) => {
@@ -157,9 +169,14 @@ impl<'a> Driver<'a> {
             self.skip(format!("image of {stamp} s: another one of that time or later came before it"));
             return Ok(());
         }
+        let second = second.and_then(|second| second.map_err(|why| self.skip(why)).ok());
         self.feed_until(stamp)?;
         let began = ThreadTime::now();
-        let report = match self.vio.image(stamp, &picture.view()) {
+        let taken = match &second {
+            Some(second) => self.vio.image_pair(stamp, &picture.view(), &second.view()),
+            None => self.vio.image(stamp, &picture.view()),
+        };
+        let report = match taken {
             Ok(report) => report,
             // Before the first sample, or after the last one.
             Err(error @ (Error::Late { .. } | Error::OutOfRange { .. })) => {
@@ -170,6 +187,7 @@ impl<'a> Driver<'a> {
         };
         let elapsed = began.elapsed();
         self.frames += 1;
+        self.pairs += usize::from(second.is_some());
         self.first_image.get_or_insert(stamp);
         self.last_image = Some(stamp);
         match report.status {
@@ -240,6 +258,10 @@ impl<'a> Driver<'a> {
             let count = self.recording.images.count();
             return Err(unusable(format!("none of the {count} images could be used; the first: {first}")));
         }
+        if self.recording.second.is_some() && self.pairs == 0 {
+            let first = self.skipped.first().map_or("their stamps are not those of the first camera's", String::as_str);
+            return Err(unusable(format!("no image of the second camera could be used; the first: {first}")));
+        }
         let segments: Vec<Segment> = self.segments.into_iter().filter(|s| !s.odometry.is_empty()).collect();
         let (Some(first), Some(calibration)) = (segments.first(), self.calibration) else {
             let why = self.lost.last().map_or(waiting(self.vio.status()), |(_, why)| why.clone());
@@ -249,6 +271,7 @@ impl<'a> Driver<'a> {
         Ok(Run {
             initialised_after_s: first.odometry[0].stamp.secs_since(began).max(0.0),
             frames: self.frames,
+            pairs: self.pairs,
             skipped: self.skipped,
             imu_samples: self.next,
             lost: self.lost,
@@ -259,32 +282,6 @@ impl<'a> Driver<'a> {
             segments,
         })
     }
-}
-
-fn describe(excess: Excess) -> String {
-    match excess {
-        Excess::Speed => "the speed ran away",
-        Excess::Bias => "a bias grew beyond what a sensor has",
-        Excess::Uncertainty => "nothing was seen for too long",
-        Excess::Contradiction => {
-            "images and inertial samples contradict each other: check axes, calibration and clocks of both"
-        }
-    }
-    .into()
-}
-
-fn waiting(status: Status) -> String {
-    match status {
-        Status::Uninitialised(Waiting::ForSteadiness) => {
-            "there was no second of rest to start from, and no motion that tells the scale"
-        }
-        Status::Uninitialised(Waiting::ForStillImages) => "the images show nothing to hold on to, or move at rest",
-        Status::Uninitialised(Waiting::ForGravity) => {
-            "gravity test: at rest the accelerometer does not read gravity; check its axes, unit and calibration"
-        }
-        Status::Tracking | Status::Diverged(_) => "no image came after the start",
-    }
-    .into()
 }
 
 impl Run {

@@ -1,9 +1,9 @@
 //! Noise settings from recordings: what is run, what it costs, and the page about it.
 
-use std::f64::consts::LN_10;
-use std::fmt::Write as _;
+mod page;
+mod trials;
+
 use std::fs::File;
-use std::io::Write as _;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
@@ -13,12 +13,12 @@ use vio_ekf::sim::ImuModel;
 use vio_ekf::tune::{NoisePoint, PointRecording, Score, Trial, TuneSettings, cost, tune, with_factors};
 use vio_ekf::{Camera, ImuNoise, Settings};
 
-use super::error::{read_text, write_file};
+use super::error::write_file;
 use super::simulate::flight_spline;
 use super::{Flight, Recording, RunSettings, VioError, judge, run};
-use crate::pictures::{Panel, save_curves};
 use crate::progress::Stage;
-use crate::report::save_figures;
+use page::save;
+use trials::{append, read_trials, trials_text};
 
 /// Standard deviation of the simulated points, pixels.
 const PIXEL_SIGMA: f64 = 1.0;
@@ -256,123 +256,10 @@ pub fn tune_noise(lessons: &Lessons, tuning: &Tuning, folder: &Path) -> Result<T
     Ok(report)
 }
 
-fn save(
-    report: &TuningReport,
-    lessons: &Lessons,
-    tuning: &Tuning,
-    (trials, random): (&[Trial], &[Trial]),
-    folder: &Path,
-) -> Result<(), VioError> {
-    // What is worse than the start would hide the rest.
-    let better = |of: &[Trial]| best_so_far(of).into_iter().filter(|point| point.1 <= trials[0].cost / LN_10).collect();
-    let mut curves = vec![("search", better(trials))];
-    if !random.is_empty() {
-        curves.push(("random points", better(random)));
-    }
-    let powers = |k: usize| trials.iter().enumerate().map(|(i, t)| (i as f64 + 1.0, t.point[k])).collect();
-    let panels = [
-        Panel { label: "best so far [log10 m]", curves },
-        Panel { label: "inertial [powers of 10]", curves: (0..4).map(|k| (GROUPS[k], powers(k))).collect() },
-        Panel { label: "image [powers of 10]", curves: vec![(GROUPS[4], powers(4))] },
-    ];
-    save_curves(&folder.join("tune.png"), "Search for noise settings", "evaluation", &panels)?;
-    let base = match lessons {
-        Lessons::Points(_) => (ImuNoise::default(), 200.0),
-        Lessons::Recordings(recordings) => (recordings[0].imu.noise, recordings[0].imu.rate_hz),
-    };
-    let best = [
-        report.factor_gyro_white,
-        report.factor_gyro_walk,
-        report.factor_accel_white,
-        report.factor_accel_walk,
-        report.factor_image,
-    ];
-    let (noise, settings) = with_factors(&base.0, &Settings::default(), &best.map(f64::log10));
-    let yaml = format!(
-        "imu0:\n  gyroscope_noise_density: {:e}\n  gyroscope_random_walk: {:e}\n  accelerometer_noise_density: {:e}\n  \
-         accelerometer_random_walk: {:e}\n  update_rate: {}\n",
-        noise.gyro_density, noise.gyro_walk, noise.accel_density, noise.accel_walk, base.1
-    );
-    write_file(&folder.join("noise.yaml"), yaml.as_bytes())?;
-    write_file(&folder.join("report.md"), markdown(report, tuning, best, &settings).as_bytes())?;
-    save_figures(report, folder)?;
-    Ok(())
-}
-
-fn markdown(report: &TuningReport, tuning: &Tuning, best: [f64; 5], settings: &Settings) -> String {
-    let mut text = format!(
-        "# Noise settings from {} recordings\n\n{} evaluations in {:.0} s on {} threads. Version {}.\n\n![Search](tune.png)\n\n\
-         | noise | start | found |\n|---|---|---|\n",
-        report.recordings, report.evaluations, report.search_wall_s, report.threads, report.version
-    );
-    for ((name, power), factor) in GROUPS.iter().zip(tuning.start).zip(best) {
-        let _ = writeln!(text, "| {name}, factor | {:.3} | {factor:.3} |", 10_f64.powf(power));
-    }
-    let mut row = |name: &str, start: f64, found: f64| {
-        let _ = writeln!(text, "| {name} | {start:.4} | {found:.4} |");
-    };
-    row("position error, geometric mean [m]", report.ate_start_m, report.ate_best_m);
-    row("NEES, mean (3 is honest)", report.nees_start, report.nees_best);
-    row("error weighted by dishonesty [m]", report.weighted_error_start_m, report.weighted_error_best_m);
-    if let (Some(error), Some(ratio)) = (report.weighted_error_random_m, report.ratio_to_random) {
-        let _ = writeln!(
-            text,
-            "\nThe best of {} points drawn at random inside the same bounds: {error:.4} m; the search reaches {ratio:.3} of it.",
-            report.random_samples
-        );
-    }
-    let (patches, landmarks) = (&settings.patches, &settings.landmarks);
-    let _ = writeln!(
-        text,
-        "\nThe inertial noise is in [noise.yaml](noise.yaml), for `vio --imu`. For images: `grey_sigma` {:.3}, `pixel_sigma` \
-         {:.4} of patches and {:.4} of landmarks. Every point tried is in [trials.csv](trials.csv), all figures in \
-         [report.json](report.json).",
-        patches.grey_sigma, patches.pixel_sigma, landmarks.pixel_sigma
-    );
-    text
-}
-
-fn best_so_far(trials: &[Trial]) -> Vec<(f64, f64)> {
-    let mut least = f64::INFINITY;
-    let mut lower = |(index, trial): (usize, &Trial)| {
-        least = least.min(trial.cost);
-        (index as f64 + 1.0, least / LN_10)
-    };
-    trials.iter().enumerate().map(&mut lower).collect()
-}
-
 /// splitmix64, in `[0, 1)`.
 fn uniform(state: &mut u64) -> f64 {
     *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let z = (*state ^ (*state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-}
-
-/// Numbers are written so that they read back to the last bit.
-fn line(point: &NoisePoint, cost: f64) -> String {
-    let [a, b, c, d, e] = point;
-    format!("{a},{b},{c},{d},{e},{cost}\n")
-}
-
-fn trials_text(trials: &[Trial]) -> String {
-    trials.iter().map(|trial| line(&trial.point, trial.cost)).collect()
-}
-
-fn append(log: &mut File, path: &Path, point: &NoisePoint, cost: f64) -> Result<(), VioError> {
-    log.write_all(line(point, cost).as_bytes()).map_err(|error| VioError::unwritable(path, &error))
-}
-
-fn read_trials(path: &Path) -> Result<Vec<Trial>, VioError> {
-    let text = read_text(path)?;
-    let mut trials = Vec::new();
-    // A last line that was cut off is computed again.
-    for (index, line) in text.split_inclusive('\n').filter(|line| line.ends_with('\n')).enumerate() {
-        let numbers: Option<Vec<f64>> = line.trim().split(',').map(|field| field.parse().ok()).collect();
-        match numbers.as_deref() {
-            Some(&[a, b, c, d, e, cost]) => trials.push(Trial { point: [a, b, c, d, e], cost }),
-            _ => return Err(VioError::malformed(path, &format!("line {}: expected six numbers", index + 1))),
-        }
-    }
-    Ok(trials)
 }

@@ -136,7 +136,7 @@ impl Default for PatchSettings {
             first_level: 0,
             grey_sigma: 2.0,
             pixel_sigma: 0.1,
-            drift: 0.25,
+            drift: 0.15,
             unexplained: 0.4,
             corner_threshold: 5,
             score: 0.5,
