@@ -12,6 +12,7 @@ mod plots;
 mod recording;
 mod report;
 mod run;
+mod second;
 mod simulate;
 mod tuning;
 
@@ -24,5 +25,6 @@ pub use picture::Grey;
 pub use recording::{Images, Recording, Shot, Truth};
 pub use report::{VioReport, save};
 pub use run::{Run, RunSettings, Segment, run};
+pub use second::{Second, open_euroc_pair};
 pub use simulate::{Flight, Simulated, SimulationSettings, simulate};
 pub use tuning::{Lessons, Tuning, TuningReport, tune_noise};

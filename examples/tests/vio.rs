@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use paintcopter_examples::vio::{
-    Flight, Overrides, Recording, RunSettings, SimulationSettings, judge, open_euroc, open_mcap, run, simulate,
+    Flight, Overrides, Recording, RunSettings, SimulationSettings, judge, open_euroc, open_euroc_pair, open_mcap, run,
+    simulate,
 };
 use vio_ekf::Camera;
 use vio_ekf::sim::{CameraModel, RoomSettings, Scenario};
@@ -73,6 +74,65 @@ fn folders_and_mcap_files_give_the_same_trajectory() {
     let raw = Scratch::new("raw");
     simulate(&SimulationSettings { threads: 1, ..flight(8.0, true) }, &raw.0).unwrap();
     assert_eq!(follow(&open_mcap(&raw.0.join("recording.mcap"), &none).unwrap(), 1), through_mcap);
+}
+
+#[test]
+fn a_second_camera_is_used_where_it_has_images() {
+    let s = Scratch::new("pair");
+    let mut settings = flight(6.0, false);
+    settings.mcap = false;
+    let left = settings.scenario.cameras[0].clone();
+    let place = Camera::euroc().body_from_camera.inverse() * Camera::euroc_right().body_from_camera;
+    let camera = Camera { body_from_camera: left.camera.body_from_camera * place, ..left.camera };
+    settings.scenario.cameras.push(CameraModel { camera, ..left });
+    simulate(&settings, &s.0).unwrap();
+    let none = Overrides::default();
+    let follow = |recording: &Recording, threads: usize| {
+        recording.check(9.81).unwrap();
+        run(recording, &RunSettings { threads, quiet: true, ..RunSettings::default() }).unwrap()
+    };
+    let recording = open_euroc_pair(&s.0, &none).unwrap();
+    let pair = follow(&recording, 1);
+    assert_eq!((pair.frames, pair.pairs), (120, 120));
+    assert_eq!(follow(&recording, 2).trajectory().unwrap(), pair.trajectory().unwrap(), "threads");
+    let error = |run: &paintcopter_examples::vio::Run| judge(run, recording.truth.as_ref().unwrap()).unwrap().unwrap();
+    assert!(error(&pair).ate_yaw < 0.03, "{}", error(&pair).ate_yaw);
+    // With one camera the trajectory is another one.
+    let alone = follow(&open_euroc(&s.0, &none).unwrap(), 1);
+    assert!(alone.pairs == 0 && alone.trajectory().unwrap() != pair.trajectory().unwrap());
+
+    // One image is lost, one is no image, one is small: the first camera goes on alone.
+    let second = |k: usize| {
+        let mut files: Vec<PathBuf> =
+            std::fs::read_dir(s.0.join("mav0/cam1/data")).unwrap().map(|e| e.unwrap().path()).collect();
+        files.sort();
+        files[k].clone()
+    };
+    let (broken, small) = (second(50), second(60));
+    std::fs::write(&broken, "PNG").unwrap();
+    image::GrayImage::new(16, 16).save(&small).unwrap();
+    edit(&s.0, "cam1/data.csv", |text| {
+        text.lines().enumerate().filter(|(k, _)| *k != 80).map(|(_, line)| line.to_string() + "\n").collect()
+    });
+    let holes = follow(&open_euroc_pair(&s.0, &none).unwrap(), 1);
+    assert_eq!((holes.frames, holes.pairs, holes.skipped.len()), (120, 117, 2), "{:?}", holes.skipped);
+    assert!(error(&holes).ate_yaw < 0.03);
+
+    // Not a single one, no calibration, no folder.
+    let refused = |words: &[&str]| {
+        let output = vio(&["--stereo", "--euroc", s.0.to_str().unwrap()], &s.0.join("out"));
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(1) && words.iter().all(|word| text.contains(word)), "{text}");
+    };
+    edit(&s.0, "cam1/data.csv", |text| {
+        let later = |line: &str| if line.starts_with('#') { line.to_string() } else { line.replacen("17", "18", 1) };
+        text.lines().map(|line| later(line) + "\n").collect()
+    });
+    refused(&["no image of the second camera", "stamps"]);
+    std::fs::remove_file(s.0.join("mav0/cam1/sensor.yaml")).unwrap();
+    refused(&["cam1/sensor.yaml"]);
+    std::fs::remove_dir_all(s.0.join("mav0/cam1")).unwrap();
+    refused(&["no second camera", "mav0/cam1"]);
 }
 
 /// Numbers of two texts, one by one.

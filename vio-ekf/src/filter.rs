@@ -25,6 +25,7 @@ mod pair_tests;
 mod patch;
 #[cfg(test)]
 mod patches;
+mod point_pairs;
 mod points;
 mod propagate;
 mod pyramid;
@@ -44,6 +45,7 @@ pub use bearing::Bearing;
 pub use estimator::CoreCovariance;
 pub use moving::MovingSettings;
 pub use pair::PairSettings;
+pub use point_pairs::PointPair;
 pub use points::PointObservation;
 pub use report::{Calibration, Excess, FrameReport, Odometry, Status, Waiting};
 pub use rest::RestSettings;

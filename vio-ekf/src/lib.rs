@@ -32,7 +32,7 @@
 //! | what | source | item |
 //! |---|---|---|
 //! | robocentric filter on images | after ROVIO, Bloesch et al. 2017 (thesis, Paper I, section 4.1) | [`Vio`], [`Vio::image`] |
-//! | distances by a second camera | ours | [`Vio::stereo`], [`Vio::image_pair`] |
+//! | distances by a second camera | ours | [`Vio::stereo`], [`Vio::image_pair`], [`Vio::point_pairs`] |
 //! | the same on a caller's points | ours | [`Vio::points`] |
 //! | motion between images, its noise | Forster et al. 2017 | [`Vio::imu`], [`ImuNoise`] |
 //! | bearing with a tangent basis | Hertzberg et al. 2013; Bloesch et al. 2017 | [`Bearing`] |
@@ -85,7 +85,7 @@ pub use eval::stats::Stats;
 pub use eval::{Evaluation, EvaluationSettings, Segment, evaluate};
 pub use filter::{
     Bearing, Calibration, CalibrationSettings, CoreCovariance, Excess, FrameReport, GateSettings, LandmarkSettings,
-    LimitSettings, MovingSettings, Odometry, PairSettings, PatchSettings, PointObservation, RestSettings,
+    LimitSettings, MovingSettings, Odometry, PairSettings, PatchSettings, PointObservation, PointPair, RestSettings,
     SensorSettings, Settings, Start, StartSigma, Status, Vio, Waiting,
 };
 pub use format::{asl, calibration, euroc, kitti, tum};

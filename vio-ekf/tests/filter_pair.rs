@@ -2,10 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
 
-use nalgebra::{Isometry3, Vector3};
+mod support;
+
+use nalgebra::{Isometry3, Vector2, Vector3};
+use support::flight::{Flight, nees};
 use vio_ekf::sim::{CameraModel, RoomSettings, Scenario, Simulation, camera_ahead, camera_ahead_right};
 use vio_ekf::{
-    Camera, Error, ImageView, ImuNoise, Odometry, Settings, Spline, Stamp, Start, StartSigma, Status, Vio, nalgebra,
+    Camera, Error, ImageView, ImuNoise, Odometry, PointObservation, PointPair, Settings, Spline, Stamp, Start,
+    StartSigma, Status, Vio, nalgebra,
 };
 
 /// End of the rest, s; a second later the body moves at 1 m/s.
@@ -130,6 +134,73 @@ fn the_scale_is_known_at_take_off() {
             assert!((scale - 1.0).abs() < 0.03 && sigma < 0.02, "wall at {wall} m, every {every}: {scale}, {sigma}");
         }
     }
+}
+
+/// Mean squared error of a flight through a room of points, each with a pixel of noise in both images.
+fn square_on_points(seed: u64, pairs: bool, sums: &mut [f64; 5]) -> f64 {
+    let mut flight = Flight::new(seed, 12.0);
+    let start = flight.drawn_start(StartSigma::default());
+    let mut right = flight.camera;
+    right.body_from_camera.translation.y -= 0.11;
+    let mut vio = Vio::stereo(flight.camera, right, flight.noise, Settings::default()).unwrap();
+    let (mut square, mut count) = (0.0, 0.0);
+    let (stamps, last): (Vec<Stamp>, Stamp) = (flight.stamps().collect(), flight.spline.span().1);
+    let frames = stamps.iter().skip(1).filter(|stamp| **stamp < last).count() as f64 / 10.0;
+    for (k, stamp) in stamps.into_iter().enumerate() {
+        vio.imu(&flight.imu(stamp)).unwrap();
+        if k == 0 {
+            vio.start(&start).unwrap();
+        } else if k % 10 == 0 && stamp < last {
+            let seen = flight.see(stamp);
+            if pairs {
+                let camera_from_world = (flight.truth(stamp).world_from_body * right.body_from_camera).inverse();
+                let pair = |first: PointObservation| {
+                    let local = camera_from_world * nalgebra::Point3::from(flight.points[first.id as usize]);
+                    let noise = Vector2::new(flight.rng.normal(), flight.rng.normal()) * flight.pixel_sigma;
+                    PointPair { first, second: right.project(&local.coords).map(|pixel| pixel + noise) }
+                };
+                let pairs: Vec<PointPair> = seen.into_iter().map(pair).collect();
+                vio.point_pairs(stamp, &pairs).unwrap();
+            } else {
+                vio.points(stamp, &seen).unwrap();
+            }
+            let (odometry, truth) = (vio.output().unwrap(), flight.truth(stamp));
+            let off = truth.world_from_body.translation.vector - odometry.world_from_body.translation.vector;
+            square += off.norm_squared();
+            count += 1.0;
+            for (sum, value) in sums.iter_mut().zip(nees(&odometry, &truth, &flight.biases)) {
+                *sum += value / frames;
+            }
+        }
+    }
+    square / count
+}
+
+#[test]
+fn points_of_both_cameras_are_better_than_those_of_one() {
+    let runs = 8;
+    let (mut sums, mut others) = ([0.0; 5], [0.0; 5]);
+    let error = |pairs: bool, sums: &mut [f64; 5]| {
+        ((1..=runs).map(|seed| square_on_points(seed, pairs, sums)).sum::<f64>() / runs as f64).sqrt()
+    };
+    let (pair, alone) = (error(true, &mut sums), error(false, &mut others));
+    let [mean, other] = [sums, others].map(|sums| sums.map(|sum| sum / runs as f64));
+    eprintln!("{pair:.4} m with pairs, {alone:.4} m alone; NEES {mean:.2?}, {other:.2?}");
+    assert!(pair < 0.8 * alone && mean.iter().all(|m| (1.5..4.5).contains(m)), "{pair} {alone} {mean:?}");
+}
+
+#[test]
+fn points_of_a_wrong_pair_are_refused() {
+    let point = |x: f64| PointObservation { id: 1, pixel: Vector2::new(x, 50.0) };
+    let pair = |x: f64, y: f64| PointPair { first: point(x), second: Some(Vector2::new(90.0, y)) };
+    let stamp = Stamp::from_nanos(0);
+    let mut vio = stereo();
+    for bad in [pair(f64::NAN, 50.0), pair(80.0, f64::INFINITY)] {
+        assert!(matches!(vio.point_pairs(stamp, &[pair(80.0, 50.0), bad]), Err(Error::NonFinite { index: 1, .. })));
+    }
+    assert!(vio.point_pairs(stamp, &[pair(80.0, 50.0)]).is_ok());
+    let mut alone = Vio::new(cameras()[0], ImuNoise::default(), Settings::default()).unwrap();
+    assert!(matches!(alone.point_pairs(stamp, &[]), Err(Error::NoSuch { what: "camera", index: 1, .. })));
 }
 
 #[test]

@@ -199,7 +199,7 @@ fn order_of_arrival_does_not_matter() {
 
 #[test]
 fn everything_together_is_honest_and_better_than_its_poses() {
-    let runs = 12;
+    let runs: u64 = std::env::var("RUNS").map_or(12, |text| text.parse().unwrap());
     let (mut sums, mut square, mut count) = (Vec::<[f64; 5]>::new(), 0.0, 0.0);
     for seed in 1..=runs {
         let recording = record(seed, 12.0);
@@ -233,7 +233,8 @@ fn everything_together_is_honest_and_better_than_its_poses() {
         let mean = sums.iter().map(|s| s[k]).sum::<f64>() / sums.len() as f64;
         let share = sums.iter().filter(|s| (low..=high).contains(&s[k])).count() as f64 / sums.len() as f64;
         eprintln!("{k}: mean {mean:.2}, in the band {share:.2}");
-        // Position, attitude, velocity, biases. Errors of successive samples are one error: twelve runs are few.
+        // Position, attitude, velocity, biases. Errors of successive samples are one error, so twelve runs are few: `RUNS=60`
+        // gives 3.13, 3.24, 3.34, 3.30, 3.47.
         assert!((2.3..4.3).contains(&mean) && share > 0.5, "{k}: {mean}, {share}");
     }
     // One pose is off by 0.02 √3 m.

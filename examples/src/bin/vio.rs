@@ -6,11 +6,11 @@ use std::process::ExitCode;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use paintcopter_examples::vio::{
     Flight, Lessons, Overrides, RunSettings, SimulationSettings, Tuning, VioReport, compare, judge, open_euroc,
-    open_mcap, run, save, simulate, tune_noise,
+    open_euroc_pair, open_mcap, run, save, simulate, tune_noise,
 };
-use vio_ekf::sim::Scenario;
+use vio_ekf::sim::{CameraModel, Scenario};
 use vio_ekf::tune::TuneSettings;
-use vio_ekf::{CalibrationSettings, Settings};
+use vio_ekf::{CalibrationSettings, Camera, Settings};
 
 type AnyError = Box<dyn std::error::Error>;
 
@@ -56,6 +56,9 @@ struct Track {
     /// True poses, TUM or EuRoC text, instead of the recording's own
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
+    /// With the second camera of the folder, mav0/cam1
+    #[arg(long, requires = "euroc")]
+    stereo: bool,
     /// Landmarks that are followed at once
     #[arg(long, value_name = "NUMBER", default_value_t = 25)]
     features: usize,
@@ -87,6 +90,9 @@ struct Sim {
     /// With pixels as they are, not as PNG
     #[arg(long, requires = "mcap")]
     raw: bool,
+    /// With a second camera, 0.11 m beside the first, in the folder
+    #[arg(long)]
+    stereo: bool,
     /// Seed of the room, the biases and the noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -187,6 +193,7 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
     let overrides =
         Overrides { cameras: arguments.cameras.clone(), imu: arguments.imu.clone(), truth: arguments.truth.clone() };
     let recording = match (&arguments.euroc, &arguments.mcap) {
+        (Some(folder), _) if arguments.stereo => open_euroc_pair(folder, &overrides)?,
         (Some(folder), _) => open_euroc(folder, &overrides)?,
         (None, Some(file)) => open_mcap(file, &overrides)?,
         (None, None) => return Err("name a recording with --euroc or --mcap".into()),
@@ -230,10 +237,12 @@ fn render(arguments: &Sim) -> Result<(), AnyError> {
         (None, FlightName::Room) => Flight::Room,
         (None, FlightName::Wall) => Flight::Wall,
     };
+    let second = arguments.stereo.then(|| CameraModel { camera: Camera::euroc_right(), ..CameraModel::default() });
+    let cameras = std::iter::once(CameraModel::default()).chain(second).collect();
     let settings = SimulationSettings {
         flight,
         seconds: arguments.seconds,
-        scenario: Scenario { seed: arguments.seed, ..Scenario::default() },
+        scenario: Scenario { seed: arguments.seed, cameras, ..Scenario::default() },
         mcap: arguments.mcap,
         raw: arguments.raw,
         threads: threads(arguments.threads),
@@ -286,6 +295,10 @@ fn search(arguments: &Tune) -> Result<(), AnyError> {
         "position error {:.4} m at the start, {:.4} m now; NEES {:.1}, now {:.1}",
         report.ate_start_m, report.ate_best_m, report.nees_start, report.nees_best
     );
+    if let Some(ratio) = report.ratio_to_random {
+        let (worse, points, seconds) = (100.0 * (ratio - 1.0), report.random_samples, report.search_wall_s);
+        eprintln!("{worse:+.1} % against the best of {points} random points, after {seconds:.1} s");
+    }
     println!("{}", arguments.out.join("report.md").display());
     Ok(())
 }

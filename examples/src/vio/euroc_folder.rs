@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use vio_ekf::calibration::{self, CameraCalibration, ImuCalibration};
-use vio_ekf::{asl, euroc, nalgebra::Isometry3, tum};
+use vio_ekf::{Stamp, asl, euroc, nalgebra::Isometry3, tum};
 
 use super::error::read_text;
 use super::recording::Truth;
@@ -25,49 +25,57 @@ pub struct Overrides {
 /// # Errors
 /// [`VioError`] names the file and what is wrong with it.
 pub fn open_euroc(folder: &Path, overrides: &Overrides) -> Result<Recording, VioError> {
-    let inside = folder.join("mav0");
-    let root = if inside.is_dir() { inside } else { folder.to_path_buf() };
+    let root = inside(folder);
     if !root.join("cam0").is_dir() || !root.join("imu0").is_dir() {
         let why = "expected the folders mav0/cam0 and mav0/imu0, as in the EuRoC data set".into();
         return Err(VioError::Unusable { recording: folder.display().to_string(), why });
     }
-    let (camera, imu) = calibrations(&root, overrides)?;
-    let table = root.join("cam0/data.csv");
-    let listed = asl::read_images(&read_text(&table)?).map_err(|error| VioError::malformed(&table, &error))?;
-    let images = listed.into_iter().map(|(stamp, name)| (stamp, root.join("cam0/data").join(name))).collect();
+    let camera = camera(&root, overrides, 0)?;
+    let imu = ImuCalibration { body_from_imu: Isometry3::identity(), ..imu(&root, overrides)? };
+    let images = images(&root, 0)?;
     let table = root.join("imu0/data.csv");
     let samples = asl::read_imu(&read_text(&table)?).map_err(|error| VioError::malformed(&table, &error))?;
     let name = folder.display().to_string();
-    Ok(Recording { name, camera, imu, samples, images: Images::Files(images), truth: truth(&root, overrides)? })
+    let truth = truth(&root, overrides)?;
+    Ok(Recording { name, camera, imu, samples, images: Images::Files(images), second: None, truth })
 }
 
-/// Both calibrations, the camera's relative to the inertial sensor.
-fn calibrations(root: &Path, overrides: &Overrides) -> Result<(CameraCalibration, ImuCalibration), VioError> {
-    let read = |path: &Path| Ok::<_, VioError>((path.to_path_buf(), read_text(path)?));
-    let mut imu = match &overrides.imu {
-        Some(path) => read(path).and_then(|(path, text)| {
-            calibration::read_kalibr_imu(&text).map_err(|error| VioError::malformed(&path, &error))
-        })?,
-        None => read(&root.join("imu0/sensor.yaml")).and_then(|(path, text)| {
-            calibration::read_asl_imu(&text).map_err(|error| VioError::malformed(&path, &error))
-        })?,
-    };
-    let mut camera = match &overrides.cameras {
+/// The folder with the sensors: `mav0` below a folder, or itself.
+pub(super) fn inside(folder: &Path) -> PathBuf {
+    let below = folder.join("mav0");
+    if below.is_dir() { below } else { folder.to_path_buf() }
+}
+
+/// The inertial sensor. The pose that it is given is that of the folder's body.
+fn imu(root: &Path, overrides: &Overrides) -> Result<ImuCalibration, VioError> {
+    if let Some(path) = &overrides.imu {
+        return calibration::read_kalibr_imu(&read_text(path)?).map_err(|error| VioError::malformed(path, &error));
+    }
+    let path = root.join("imu0/sensor.yaml");
+    calibration::read_asl_imu(&read_text(&path)?).map_err(|error| VioError::malformed(&path, &error))
+}
+
+/// Camera `which` on the inertial sensor.
+pub(super) fn camera(root: &Path, overrides: &Overrides, which: usize) -> Result<CameraCalibration, VioError> {
+    if let Some(path) = &overrides.cameras {
         // Kalibr's chain is relative to the inertial sensor already.
-        Some(path) => {
-            let (path, text) = read(path)?;
-            let cameras =
-                calibration::read_kalibr_cameras(&text).map_err(|error| VioError::malformed(&path, &error))?;
-            imu.body_from_imu = Isometry3::identity();
-            cameras[0]
-        }
-        None => read(&root.join("cam0/sensor.yaml")).and_then(|(path, text)| {
-            calibration::read_asl_camera(&text).map_err(|error| VioError::malformed(&path, &error))
-        })?,
-    };
-    camera.camera.body_from_camera = imu.body_from_imu.inverse() * camera.camera.body_from_camera;
-    imu.body_from_imu = Isometry3::identity();
-    Ok((camera, imu))
+        let chain = calibration::read_kalibr_cameras(&read_text(path)?);
+        let chain = chain.map_err(|error| VioError::malformed(path, &error))?;
+        return chain.get(which).copied().ok_or_else(|| VioError::malformed(path, &"holds one camera only"));
+    }
+    let path = root.join(format!("cam{which}/sensor.yaml"));
+    let camera = calibration::read_asl_camera(&read_text(&path)?);
+    let mut camera = camera.map_err(|error| VioError::malformed(&path, &error))?;
+    camera.camera.body_from_camera = imu(root, overrides)?.body_from_imu.inverse() * camera.camera.body_from_camera;
+    Ok(camera)
+}
+
+/// Times and files of the images of camera `which`.
+pub(super) fn images(root: &Path, which: usize) -> Result<Vec<(Stamp, PathBuf)>, VioError> {
+    let folder = root.join(format!("cam{which}"));
+    let table = folder.join("data.csv");
+    let listed = asl::read_images(&read_text(&table)?).map_err(|error| VioError::malformed(&table, &error))?;
+    Ok(listed.into_iter().map(|(stamp, name)| (stamp, folder.join("data").join(name))).collect())
 }
 
 /// What is known of the motion: the file named, else the ones that public recordings have.

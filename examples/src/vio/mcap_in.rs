@@ -50,12 +50,13 @@ pub fn open_mcap(path: &Path, overrides: &Overrides) -> Result<Recording, VioErr
         None => (!found.truth.is_empty()).then_some(Truth { trajectory: found.truth, velocities_in_world: Vec::new() }),
     };
     let images = Images::Mcap { path: path.to_path_buf(), topic, stamps: found.image_stamps };
-    Ok(Recording { name: path.display().to_string(), camera, imu, samples: found.samples, images, truth })
+    let name = path.display().to_string();
+    Ok(Recording { name, camera, imu, samples: found.samples, images, second: None, truth })
 }
 
 /// The images of a topic in the order of the file.
 pub(super) fn read_images(path: PathBuf, topic: String) -> Box<dyn Iterator<Item = Shot> + Send> {
-    let failed = |why: String| Shot { stamp: Stamp::default(), picture: Err(why) };
+    let failed = |why: String| Shot { stamp: Stamp::default(), picture: Err(why), second: None };
     let messages = match messages_of(&path) {
         Ok(messages) => messages,
         Err(error) => return Box::new(std::iter::once(failed(error.to_string()))),
@@ -65,7 +66,8 @@ pub(super) fn read_images(path: PathBuf, topic: String) -> Box<dyn Iterator<Item
             let decoded = image(&message);
             Some(match decoded {
                 Some((stamp, picture)) => {
-                    Shot { stamp, picture: picture.map_err(|why| format!("image of {stamp} s: {why}")) }
+                    let picture = picture.map_err(|why| format!("image of {stamp} s: {why}"));
+                    Shot { stamp, picture, second: None }
                 }
                 None => failed("a message on the images' topic that is no image".into()),
             })

@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use vio_ekf::calibration::{CameraCalibration, ImuCalibration};
 use vio_ekf::{Imu, SampleFindings, Stamp, Trajectory, check_samples, nalgebra::Vector3};
 
-use super::{Grey, VioError, mcap_in};
+use super::{Grey, Second, VioError, mcap_in};
 
 /// A camera and an inertial sensor, recorded; the body is the inertial sensor.
 #[derive(Debug, Clone)]
@@ -18,6 +18,8 @@ pub struct Recording {
     pub samples: Vec<Imu>,
     /// The images, not yet read.
     pub images: Images,
+    /// A second camera beside the first.
+    pub second: Option<Second>,
     /// What is known of the true motion.
     pub truth: Option<Truth>,
 }
@@ -53,6 +55,8 @@ pub struct Shot {
     pub stamp: Stamp,
     /// The image, or why there is none.
     pub picture: Result<Grey, String>,
+    /// The image that a second camera took together with it, if there is one.
+    pub second: Option<Result<Grey, String>>,
 }
 
 impl Images {
@@ -73,17 +77,24 @@ impl Images {
     }
 
     /// Reads them one after the other, as they are asked for.
-    pub fn read(&self) -> Box<dyn Iterator<Item = Shot> + Send + '_> {
+    fn read(&self) -> Box<dyn Iterator<Item = Shot> + Send + '_> {
         match self {
-            Self::Files(files) => {
-                Box::new(files.iter().map(|(stamp, path)| Shot { stamp: *stamp, picture: Grey::read(path) }))
-            }
+            Self::Files(files) => Box::new(files.iter().map(|(stamp, path)| Shot {
+                stamp: *stamp,
+                picture: Grey::read(path),
+                second: None,
+            })),
             Self::Mcap { path, topic, .. } => mcap_in::read_images(path.clone(), topic.clone()),
         }
     }
 }
 
 impl Recording {
+    /// Reads the images one after the other, as they are asked for, each with that of the second camera.
+    pub fn shots(&self) -> impl Iterator<Item = Shot> + Send + '_ {
+        self.images.read().map(|shot| Shot { second: self.second.as_ref().and_then(|s| s.picture(shot.stamp)), ..shot })
+    }
+
     /// Refuses a recording whose inertial samples cannot be, or whose images were taken at another time.
     ///
     /// # Errors

@@ -18,6 +18,8 @@ pub struct VioReport {
     pub version: &'static str,
     /// Images that the filter took.
     pub frames: usize,
+    /// Those among them that came with one of the second camera.
+    pub pairs: usize,
     /// Images that were left out.
     pub frames_skipped: usize,
     /// Inertial samples that it took.
@@ -86,6 +88,7 @@ impl VioReport {
         Ok(Self {
             version: env!("CARGO_PKG_VERSION"),
             frames: run.frames,
+            pairs: run.pairs,
             frames_skipped: run.skipped.len(),
             imu_samples: run.imu_samples,
             imu_gaps: findings.gaps,

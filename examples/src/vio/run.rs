@@ -48,6 +48,8 @@ pub struct Run {
     pub segments: Vec<Segment>,
     /// Images that the filter took.
     pub frames: usize,
+    /// Those among them that came with one of the second camera.
+    pub pairs: usize,
     /// Images that it could not take, with the reason.
     pub skipped: Vec<String>,
     /// Inertial samples that it took.
@@ -83,12 +85,12 @@ pub fn run(recording: &Recording, settings: &RunSettings) -> Result<Run, VioErro
         driver.shot(shot)
     };
     if settings.threads < 2 {
-        recording.images.read().try_for_each(&mut each)?;
+        recording.shots().try_for_each(&mut each)?;
     } else {
         std::thread::scope(|scope| {
             let (sender, receiver) = sync_channel(AHEAD);
             // Ends by itself when the receiver is dropped.
-            scope.spawn(move || recording.images.read().try_for_each(|shot| sender.send(shot)));
+            scope.spawn(move || recording.shots().try_for_each(|shot| sender.send(shot)));
             receiver.into_iter().try_for_each(&mut each)
         })?;
     }
@@ -107,6 +109,7 @@ struct Driver<'a> {
     next: usize,
     segments: Vec<Segment>,
     frames: usize,
+    pairs: usize,
     skipped: Vec<String>,
     first_image: Option<Stamp>,
     last_image: Option<Stamp>,
@@ -120,12 +123,18 @@ impl<'a> Driver<'a> {
     fn new(recording: &'a Recording, settings: &RunSettings) -> Result<Self, VioError> {
         let mut filter = settings.filter;
         filter.calibration.time_offset_s += recording.camera.time_offset_s;
+        let (camera, noise) = (recording.camera.camera, settings.noise.unwrap_or(recording.imu.noise));
+        let vio = match &recording.second {
+            Some(second) => Vio::stereo(camera, second.camera, noise, filter)?,
+            None => Vio::new(camera, noise, filter)?,
+        };
         Ok(Self {
             recording,
-            vio: Vio::new(recording.camera.camera, settings.noise.unwrap_or(recording.imu.noise), filter)?,
+            vio,
             next: 0,
             segments: Vec::new(),
             frames: 0,
+            pairs: 0,
             skipped: Vec::new(),
             first_image: None,
             last_image: None,
@@ -137,7 +146,7 @@ impl<'a> Driver<'a> {
     }
 
     /// An image, after the samples that come before it.
-    fn shot(&mut self, Shot { stamp, picture }: Shot) -> Result<(), VioError> {
+    fn shot(&mut self, Shot { stamp, picture, second }: Shot) -> Result<(), VioError> {
         let picture = match picture {
             Ok(picture) => picture,
             Err(why) => {
@@ -160,9 +169,14 @@ impl<'a> Driver<'a> {
             self.skip(format!("image of {stamp} s: another one of that time or later came before it"));
             return Ok(());
         }
+        let second = second.and_then(|second| second.map_err(|why| self.skip(why)).ok());
         self.feed_until(stamp)?;
         let began = ThreadTime::now();
-        let report = match self.vio.image(stamp, &picture.view()) {
+        let taken = match &second {
+            Some(second) => self.vio.image_pair(stamp, &picture.view(), &second.view()),
+            None => self.vio.image(stamp, &picture.view()),
+        };
+        let report = match taken {
             Ok(report) => report,
             // Before the first sample, or after the last one.
             Err(error @ (Error::Late { .. } | Error::OutOfRange { .. })) => {
@@ -173,6 +187,7 @@ impl<'a> Driver<'a> {
         };
         let elapsed = began.elapsed();
         self.frames += 1;
+        self.pairs += usize::from(second.is_some());
         self.first_image.get_or_insert(stamp);
         self.last_image = Some(stamp);
         match report.status {
@@ -243,6 +258,10 @@ impl<'a> Driver<'a> {
             let count = self.recording.images.count();
             return Err(unusable(format!("none of the {count} images could be used; the first: {first}")));
         }
+        if self.recording.second.is_some() && self.pairs == 0 {
+            let first = self.skipped.first().map_or("their stamps are not those of the first camera's", String::as_str);
+            return Err(unusable(format!("no image of the second camera could be used; the first: {first}")));
+        }
         let segments: Vec<Segment> = self.segments.into_iter().filter(|s| !s.odometry.is_empty()).collect();
         let (Some(first), Some(calibration)) = (segments.first(), self.calibration) else {
             let why = self.lost.last().map_or(waiting(self.vio.status()), |(_, why)| why.clone());
@@ -252,6 +271,7 @@ impl<'a> Driver<'a> {
         Ok(Run {
             initialised_after_s: first.odometry[0].stamp.secs_since(began).max(0.0),
             frames: self.frames,
+            pairs: self.pairs,
             skipped: self.skipped,
             imu_samples: self.next,
             lost: self.lost,

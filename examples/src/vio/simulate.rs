@@ -6,7 +6,7 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use vio_ekf::calibration::{CameraCalibration, ImuCalibration, write_asl_camera, write_asl_imu};
 use vio_ekf::nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
-use vio_ekf::sim::{Frame, ImuRecording, Scenario, Simulation};
+use vio_ekf::sim::{CameraModel, Frame, ImuRecording, Scenario, Simulation};
 use vio_ekf::{Spline, Stamp, Trajectory, asl, euroc, so3, tum};
 
 use super::error::{make_folder, write_file};
@@ -55,7 +55,7 @@ pub struct SimulationSettings {
 /// What was written.
 #[derive(Debug, Clone, Copy)]
 pub struct Simulated {
-    /// Images.
+    /// Images of the first camera.
     pub frames: usize,
     /// Inertial samples.
     pub samples: usize,
@@ -65,7 +65,7 @@ pub struct Simulated {
     pub path_length_m: f64,
 }
 
-/// Renders a flight into `mav0`, `truth.tum` and, if asked for, `recording.mcap` in a folder.
+/// Renders a flight, as all cameras of the scenario see it, into `mav0`, `truth.tum` and, if asked for, `recording.mcap` in a folder.
 ///
 /// # Errors
 /// [`VioError`] if the motion or the settings cannot be, or a file cannot be written.
@@ -73,18 +73,26 @@ pub fn simulate(settings: &SimulationSettings, folder: &Path) -> Result<Simulate
     let spline = flight_spline(&settings.flight, settings.seconds, settings.scenario.seed)?;
     let simulation = Simulation::new(spline, settings.scenario.clone())?;
     let recording = simulation.imu(0)?;
-    let camera =
-        settings.scenario.cameras.first().ok_or(vio_ekf::Error::NoSuch { what: "camera", index: 0, count: 0 })?;
     let model = settings.scenario.imus.first().ok_or(vio_ekf::Error::NoSuch { what: "imu", index: 0, count: 0 })?;
     // Without the time offset: a calibration that knows it would leave nothing to find.
-    let camera = CameraCalibration { camera: camera.camera, rate_hz: Some(camera.rate_hz), time_offset_s: 0.0 };
+    let calibrated = |model: &CameraModel| CameraCalibration {
+        camera: model.camera,
+        rate_hz: Some(model.rate_hz),
+        time_offset_s: 0.0,
+    };
+    let cameras: Vec<CameraCalibration> = settings.scenario.cameras.iter().map(calibrated).collect();
+    let camera = cameras.first().ok_or(vio_ekf::Error::NoSuch { what: "camera", index: 0, count: 0 })?;
     let imu = ImuCalibration { noise: model.noise, rate_hz: model.rate_hz, body_from_imu: Isometry3::identity() };
 
     let root = folder.join("mav0");
-    for part in ["cam0/data", "imu0", "state_groundtruth_estimate0"] {
+    for part in ["imu0", "state_groundtruth_estimate0"] {
         make_folder(&root.join(part))?;
     }
-    write_file(&root.join("cam0/sensor.yaml"), write_asl_camera(&camera).as_bytes())?;
+    for (which, camera) in cameras.iter().enumerate() {
+        let folder = root.join(format!("cam{which}"));
+        make_folder(&folder.join("data"))?;
+        write_file(&folder.join("sensor.yaml"), write_asl_camera(camera).as_bytes())?;
+    }
     write_file(&root.join("imu0/sensor.yaml"), write_asl_imu(&imu).as_bytes())?;
     write_file(&root.join("imu0/data.csv"), asl::write_imu(&recording.samples).as_bytes())?;
     let truth = truth(&simulation, &recording)?;
@@ -94,7 +102,7 @@ pub fn simulate(settings: &SimulationSettings, folder: &Path) -> Result<Simulate
     let began = recording.samples.first().map_or(Stamp::from_nanos(FIRST), |sample| sample.stamp);
     let mcap = settings
         .mcap
-        .then(|| McapWriter::create(&folder.join("recording.mcap"), began, &camera, &imu, settings.raw))
+        .then(|| McapWriter::create(&folder.join("recording.mcap"), began, camera, &imu, settings.raw))
         .transpose()?;
     let out = Sink {
         root,
@@ -102,7 +110,7 @@ pub fn simulate(settings: &SimulationSettings, folder: &Path) -> Result<Simulate
         samples: &recording,
         truth: &truth.trajectory,
         next: (0, 0),
-        names: Vec::new(),
+        names: vec![Vec::new(); cameras.len()],
         raw: settings.raw,
     };
     let frames = render(&simulation, settings.threads, out)?;
@@ -114,8 +122,9 @@ pub fn simulate(settings: &SimulationSettings, folder: &Path) -> Result<Simulate
     })
 }
 
-/// A frame, ready to be written.
+/// A frame of a camera, ready to be written.
 struct Developed {
+    which: usize,
     stamp: Stamp,
     grey: Grey,
     png: Vec<u8>,
@@ -124,12 +133,16 @@ struct Developed {
 /// Renders in parallel, a few frames at a time, and writes in order.
 fn render(simulation: &Simulation, threads: usize, mut out: Sink) -> Result<usize, VioError> {
     let stage = Stage::start("render");
-    let (count, threads) = (simulation.frame_count(0), threads.max(1));
+    let (cameras, threads) = (out.names.len(), threads.max(1));
+    let counts = (0..cameras).map(|which| simulation.frame_count(which));
+    // The frames of a moment one after the other; a camera that takes fewer has none at the end.
+    let count = cameras * counts.max().unwrap_or(0);
     for first in (0..count).step_by(threads) {
         stage.share(first as f64 / count as f64);
         let batch = first..(first + threads).min(count);
         let developed: Vec<Result<Option<Developed>, VioError>> = std::thread::scope(|scope| {
-            let workers: Vec<_> = batch.map(|index| scope.spawn(move || develop(simulation, index))).collect();
+            let workers: Vec<_> =
+                batch.map(|k| scope.spawn(move || develop(simulation, k % cameras, k / cameras))).collect();
             let join = |worker: std::thread::ScopedJoinHandle<'_, _>| {
                 worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
             };
@@ -146,13 +159,16 @@ fn render(simulation: &Simulation, threads: usize, mut out: Sink) -> Result<usiz
     Ok(frames)
 }
 
-fn develop(simulation: &Simulation, index: usize) -> Result<Option<Developed>, VioError> {
-    let Some(Frame { stamp, width, height, data, .. }) = simulation.frame(0, index)? else { return Ok(None) };
+fn develop(simulation: &Simulation, which: usize, index: usize) -> Result<Option<Developed>, VioError> {
+    if index >= simulation.frame_count(which) {
+        return Ok(None);
+    }
+    let Some(Frame { stamp, width, height, data, .. }) = simulation.frame(which, index)? else { return Ok(None) };
     let mut png = Vec::new();
     PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Sub)
         .write_image(&data, width as u32, height as u32, ExtendedColorType::L8)
         .map_err(|error| VioError::unwritable(Path::new("image"), &error))?;
-    Ok(Some(Developed { stamp, grey: Grey { width, height, data }, png }))
+    Ok(Some(Developed { which, stamp, grey: Grey { width, height, data }, png }))
 }
 
 /// Where frames go, and with them the samples and poses up to their time.
@@ -163,15 +179,20 @@ struct Sink<'a> {
     truth: &'a Trajectory,
     /// Next sample and next pose for the MCAP file.
     next: (usize, usize),
-    names: Vec<(Stamp, String)>,
+    /// Images of each camera.
+    names: Vec<Vec<(Stamp, String)>>,
     raw: bool,
 }
 
 impl Sink<'_> {
     fn frame(&mut self, frame: &Developed) -> Result<(), VioError> {
         let name = format!("{}.png", frame.stamp.nanos());
-        write_file(&self.root.join("cam0/data").join(&name), &frame.png)?;
-        self.names.push((frame.stamp, name));
+        write_file(&self.root.join(format!("cam{}/data", frame.which)).join(&name), &frame.png)?;
+        self.names[frame.which].push((frame.stamp, name));
+        // The MCAP file has the first camera only.
+        if frame.which > 0 {
+            return Ok(());
+        }
         self.catch_up(frame.stamp)?;
         if let Some(mcap) = &mut self.mcap {
             let pixels = if self.raw { Pixels::Raw(&frame.grey) } else { Pixels::Png(&frame.png) };
@@ -196,10 +217,12 @@ impl Sink<'_> {
 
     fn finish(mut self) -> Result<usize, VioError> {
         self.catch_up(Stamp::from_nanos(i64::MAX))?;
-        let table = asl::write_images(self.names.iter().map(|(stamp, name)| (*stamp, name.as_str())));
-        write_file(&self.root.join("cam0/data.csv"), table.as_bytes())?;
+        for (which, names) in self.names.iter().enumerate() {
+            let table = asl::write_images(names.iter().map(|(stamp, name)| (*stamp, name.as_str())));
+            write_file(&self.root.join(format!("cam{which}/data.csv")), table.as_bytes())?;
+        }
         self.mcap.map(McapWriter::finish).transpose()?;
-        Ok(self.names.len())
+        Ok(self.names.first().map_or(0, Vec::len))
     }
 }
 

@@ -7,7 +7,7 @@ use super::covariance::Measurement;
 use super::distance::InverseDistance;
 use super::estimator::Estimator;
 use super::patch::{Comparison, LEVELS, Patch};
-use super::points::project;
+use super::points::{PointObservation, project};
 use super::pyramid::Pyramid;
 use super::relative::CameraMotion;
 use super::settings::{PatchSettings, Settings};
@@ -106,6 +106,8 @@ pub(crate) struct Second {
     pyramid: Pyramid,
     /// Whether the pyramid holds the image that belongs to the one of the first camera.
     shown: bool,
+    /// Memory of [`Vio::point_pairs`].
+    pub(super) points: Vec<PointObservation>,
 }
 
 /// Where a landmark is in the second image if its inverse distance is a given one.
@@ -130,7 +132,7 @@ impl Second {
     pub(crate) fn new(first: &Camera, camera: Camera, patches: &PatchSettings) -> Self {
         let pyramid = Pyramid::new(camera.width, camera.height, patches.first_level, LEVELS);
         let rig = CameraMotion::between(first, &camera);
-        Self { camera, rig, pyramid, shown: false }
+        Self { camera, rig, pyramid, shown: false, points: Vec::new() }
     }
 
     pub(crate) fn show(&mut self, image: Option<&ImageView>) {

@@ -1,6 +1,6 @@
 //! What a pair of cameras measures, against closed forms.
 
-use nalgebra::{Isometry3, Matrix2, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Isometry3, Matrix2, UnitQuaternion, Vector2, Vector3, Vector4};
 
 use super::bearing::Bearing;
 use super::distance::InverseDistance;
@@ -199,4 +199,26 @@ fn nothing_is_found_where_it_is_not() {
     let warp = project(&camera, &bearing).unwrap().1.try_inverse().unwrap();
     let patch = Patch::take(&first, &pixel).unwrap();
     assert!(second.measure(&patch, (&bearing, &warp), wide(0.0), &settings).is_none());
+}
+
+#[test]
+fn pixels_of_the_second_camera_move_with_bearing_distance_and_clock() {
+    let [first, other] = [Camera::euroc(), Camera::euroc_right()];
+    let second = Second::new(&first, other, &Settings::default().patches);
+    let rate = Vector2::new(0.3, -0.5);
+    for k in 0..40 {
+        let pixel = Vector2::new(150.0 + 11.0 * f64::from(k), 80.0 + 61.0 * f64::from(k % 6));
+        let bearing = Bearing::new(&first.bearing(&pixel).unwrap());
+        let inverse_distance = InverseDistance::new(0.1 + 0.02 * f64::from(k));
+        let landmark = Landmark { bearing, inverse_distance, warp: Matrix2::identity() * 3.0 };
+        let look = |delta: Vector4<f64>| second.look(&landmark, &rate, 0.01, &delta).unwrap();
+        let jacobian = look(Vector4::zeros()).1;
+        for column in 0..4 {
+            let h = 1e-6;
+            let [one, two] = [h, -h].map(|h| look(Vector4::from_fn(|r, _| if r == column { h } else { 0.0 })).0);
+            let slope = (one - two) / (2.0 * h);
+            // The clock has moved the bearing by half a hundredth, as far as its two steps do not commute.
+            assert!((slope - jacobian.column(column)).norm() < 1e-3 * jacobian.norm(), "column {column}");
+        }
+    }
 }
