@@ -46,7 +46,7 @@ pub struct PairSettings {
 
 impl Default for PairSettings {
     fn default() -> Self {
-        Self { pixel_sigma: 0.2, nearest_m: 0.5, distinct: 2.0 }
+        Self { pixel_sigma: 0.3, nearest_m: 0.5, distinct: 2.0 }
     }
 }
 
