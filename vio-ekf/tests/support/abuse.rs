@@ -20,7 +20,7 @@ pub(crate) enum Abuse {
     Bare,
     /// A turn by 150 degrees within 0.6 seconds.
     WhipPan,
-    /// A gyroscope that ends at 0.6 rad/s, and a turn by 40 degrees within 0.6 seconds, at nearly three times that.
+    /// A gyroscope that ends at 0.8 rad/s, and a turn by 40 degrees within 0.6 seconds, at more than twice that.
     Saturated,
     /// Propellers shake the sensor: 6 m/s² and 0.15 rad/s at 87 and 174 Hz.
     Vibration,
@@ -88,7 +88,7 @@ fn simulation(abuse: Abuse, name: &str, seed: u64, seconds: f64, halves: u32) ->
         Abuse::Dropped => camera.drop_probability = 0.3,
         Abuse::Bare => (0..3).for_each(|_| room.blank[(rng.bits() % 6) as usize] = true),
         Abuse::WhipPan => (),
-        Abuse::Saturated => imu.limits.gyro_range = 0.6,
+        Abuse::Saturated => imu.limits.gyro_range = 0.8,
         Abuse::Vibration => {
             let line = |frequency_hz| Vibration { frequency_hz, gyro_amplitude: 0.15, accel_amplitude: 6.0 };
             imu.vibrations = vec![line(87.0), line(174.0)];
@@ -130,7 +130,7 @@ fn follow(simulation: &Simulation, name: &str, halves: u32, seed: u64) -> Outcom
     let mut settings = Settings::default();
     // What the data sheets say.
     match ABUSES[seed as usize % ABUSES.len()] {
-        Abuse::Saturated => settings.sensor.gyro_range = 0.6,
+        Abuse::Saturated => settings.sensor.gyro_range = 0.8,
         Abuse::Jitter => settings.calibration.stamp_jitter_s = 0.005,
         _ => (),
     }
