@@ -1,0 +1,149 @@
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Runs the visual-inertial filter over a recording: trajectory, figures and pictures.
+#[derive(Parser)]
+#[command(
+    version,
+    args_conflicts_with_subcommands = true,
+    after_help = "Examples:\n  vio --euroc recordings/MH_01_easy --out out/MH_01\n  vio sim --flight wall --mcap --out out/sim\n  \
+                  vio eval truth.tum estimate.tum"
+)]
+pub struct Arguments {
+    #[command(subcommand)]
+    pub(super) command: Option<Job>,
+    #[command(flatten)]
+    pub(super) track: Track,
+}
+
+#[derive(Subcommand)]
+pub(super) enum Job {
+    /// Renders a flight as an EuRoC folder that any odometry can run, and as MCAP
+    Sim(Sim),
+    /// Compares an estimated trajectory with a reference
+    Eval(Eval),
+    /// Finds the noise settings with which recordings are followed best
+    Tune(Tune),
+}
+
+#[derive(Args)]
+pub(super) struct Track {
+    /// Folder in the layout of EuRoC/ASL: mav0/cam0, mav0/imu0 and, if known, the truth
+    #[arg(long, value_name = "DIR", conflicts_with = "mcap", required_unless_present = "mcap")]
+    pub(super) euroc: Option<PathBuf>,
+    /// MCAP file with images, inertial samples and, unless given by files of Kalibr, calibration
+    #[arg(long, value_name = "FILE")]
+    pub(super) mcap: Option<PathBuf>,
+    /// Kalibr's camera chain, instead of the recording's own calibration
+    #[arg(long, value_name = "YAML")]
+    pub(super) cameras: Option<PathBuf>,
+    /// Kalibr's file of the inertial sensor, instead of the recording's own
+    #[arg(long, value_name = "YAML")]
+    pub(super) imu: Option<PathBuf>,
+    /// True poses, TUM or EuRoC text, instead of the recording's own
+    #[arg(long, value_name = "FILE")]
+    pub(super) truth: Option<PathBuf>,
+    /// With the second camera of the folder, mav0/cam1
+    #[arg(long, requires = "euroc")]
+    pub(super) stereo: bool,
+    /// Landmarks that are followed at once
+    #[arg(long, value_name = "NUMBER", default_value_t = 25)]
+    pub(super) features: usize,
+    /// Estimate the camera's place and clock as well, starting from the calibration
+    #[arg(long)]
+    pub(super) calibrate: bool,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/vio")]
+    pub(super) out: PathBuf,
+    /// Worker threads [default: all cores]; results do not depend on it
+    #[arg(long)]
+    pub(super) threads: Option<usize>,
+}
+
+#[derive(Args)]
+pub(super) struct Sim {
+    /// The motion
+    #[arg(long, default_value = "room")]
+    pub(super) flight: FlightName,
+    /// Fly along these poses instead, TUM or EuRoC text, smoothed
+    #[arg(long, value_name = "FILE", conflicts_with = "flight")]
+    pub(super) trajectory: Option<PathBuf>,
+    /// Seconds of it at most
+    #[arg(long, default_value_t = 30.0)]
+    pub(super) seconds: f64,
+    /// Write recording.mcap as well
+    #[arg(long)]
+    pub(super) mcap: bool,
+    /// With pixels as they are, not as PNG
+    #[arg(long, requires = "mcap")]
+    pub(super) raw: bool,
+    /// With a second camera, 0.11 m beside the first, in the folder
+    #[arg(long)]
+    pub(super) stereo: bool,
+    /// Seed of the room, the biases and the noise
+    #[arg(long, default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Folder for the recording
+    #[arg(long, value_name = "DIR", default_value = "out/vio-sim")]
+    pub(super) out: PathBuf,
+    /// Worker threads [default: all cores]; results do not depend on it
+    #[arg(long)]
+    pub(super) threads: Option<usize>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub(super) enum FlightName {
+    /// Swaying and turning through a room
+    Room,
+    /// Rows along a wall, as a painting robot flies
+    Wall,
+}
+
+#[derive(Args)]
+pub(super) struct Eval {
+    /// Reference, TUM or EuRoC text
+    pub(super) reference: PathBuf,
+    /// Estimate, TUM or EuRoC text
+    pub(super) estimate: PathBuf,
+    /// Folder for report.json as well
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: Option<PathBuf>,
+}
+
+#[derive(Args)]
+pub(super) struct Tune {
+    /// A recording with its truth, EuRoC/ASL; may be given again. Without any: simulated flights
+    #[arg(long, value_name = "DIR")]
+    pub(super) euroc: Vec<PathBuf>,
+    /// Simulated flights
+    #[arg(long, default_value_t = 4, conflicts_with = "euroc")]
+    pub(super) flights: usize,
+    /// Seconds of each
+    #[arg(long, default_value_t = 12.0, conflicts_with = "euroc")]
+    pub(super) seconds: f64,
+    /// Factors on the noise to start from: the gyroscope's white noise and walk, the accelerometer's, and the images'
+    #[arg(long, value_name = "FACTORS", value_delimiter = ',', default_value = "1,1,1,1,1")]
+    pub(super) start: Vec<f64>,
+    /// Evaluations at most
+    #[arg(long, default_value_t = 200)]
+    pub(super) evaluations: usize,
+    /// How much dishonest covariances cost beside errors
+    #[arg(long, value_name = "WEIGHT", default_value_t = 0.5)]
+    pub(super) honesty: f64,
+    /// Compare with so many points drawn at random
+    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
+    pub(super) random: usize,
+    /// Go on from trials.csv in the folder
+    #[arg(long)]
+    pub(super) resume: bool,
+    /// Seed of the flights and the random points
+    #[arg(long, default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/vio-tune")]
+    pub(super) out: PathBuf,
+    /// Worker threads [default: all cores]; results do not depend on it
+    #[arg(long)]
+    pub(super) threads: Option<usize>,
+}
