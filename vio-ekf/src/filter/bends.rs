@@ -5,7 +5,7 @@ use super::relative::LandmarkTransition;
 use super::state::{State, at};
 
 /// An error of the velocity lasts at least this long, s; ours.
-const LASTS: f64 = 0.1;
+pub(super) const LASTS: f64 = 0.1;
 
 /// What the linear model leaves out of the bearings while velocity and distances are not known: the products `τ δρ` and `δρ²` of the
 /// errors of the camera's translation and of the inverse distances.
@@ -79,4 +79,27 @@ pub(super) fn lasting(covariance: &Covariance, body_from_world: &UnitQuaternion<
     let turn = body_from_world.to_rotation_matrix().into_inner();
     let both = (turn * covariance.block::<3, 3>(at::POSITION, at::VELOCITY)).trace();
     1.0 + 2.0 * (LASTS + (both / velocity).max(0.0)) / duration
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_product_counts_for_as_long_as_the_velocity_has_been_wrong() {
+        // A velocity that has been off by the same for 0.3 s, in a body that is turned against the world.
+        let (turn, deviation, since, dt) = (UnitQuaternion::from_euler_angles(0.4, -0.7, 1.1), 0.2_f64, 0.3, 0.05);
+        let world_from_body = turn.to_rotation_matrix().into_inner();
+        let mut covariance = Covariance::new(at::HEAD, at::HEAD);
+        for r in 0..3 {
+            covariance.inflate(at::VELOCITY + r, deviation * deviation);
+            for c in 0..3 {
+                let both = world_from_body[(r, c)] * deviation * deviation * since;
+                covariance.correlate(at::POSITION + r, at::VELOCITY + c, both);
+            }
+        }
+        let found = lasting(&covariance, &turn.inverse(), dt);
+        assert!((found - (1.0 + 2.0 * (LASTS + since) / dt)).abs() < 1e-12, "{found}");
+        assert_eq!(lasting(&Covariance::new(at::HEAD, at::HEAD), &turn, dt), 1.0);
+    }
 }

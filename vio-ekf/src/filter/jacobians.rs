@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix2, SMatrix, SVector, Unit, UnitQuaternion, Vector2, Vector3};
 
 use super::bearing::Bearing;
+use super::bends::LASTS;
 use super::covariance::{Covariance, Measurement};
 use super::distance::InverseDistance;
 use super::interval::Interval;
@@ -409,7 +410,7 @@ fn products_of_errors_are_accounted_for() {
     };
     let linear = block(&|r, c| linear[(r, c)]);
     // Counted for as many steps as it lasts; nothing is known here of the position.
-    let products = (block(&|r, c| covariance.row(r)[c]) - linear) / (1.0 + 2.0 * 0.1 / interval.duration);
+    let products = (block(&|r, c| covariance.row(r)[c]) - linear) / (1.0 + 2.0 * LASTS / interval.duration);
     let expected = spread - linear;
     assert!(expected.norm() > 0.03 * linear.norm(), "{expected} {linear}");
     assert!((products - expected).norm() < 0.25 * expected.norm(), "{products} {expected}");

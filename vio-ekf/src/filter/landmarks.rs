@@ -120,3 +120,46 @@ impl Estimator {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, Vector3};
+
+    use super::*;
+    use crate::{Camera, Imu, ImuNoise, Settings, Stamp, Start, StartSigma};
+
+    #[test]
+    fn landmarks_know_together_what_one_knows_of_the_scene() {
+        let stamp = Stamp::from_nanos(0);
+        let sample = Imu { stamp, gyro: Vector3::zeros(), accel: Vector3::new(0.0, 0.0, 9.81) };
+        let start = Start {
+            stamp,
+            world_from_body: Isometry3::identity(),
+            velocity_in_body: Vector3::zeros(),
+            gyro_bias: Vector3::zeros(),
+            accel_bias: Vector3::zeros(),
+            sigma: StartSigma::default(),
+        };
+        let settings = Settings::default();
+        let mut estimator = Estimator::new(&Camera::euroc(), ImuNoise::default(), &settings, &start, sample);
+        let bearing = Bearing::new(&Vector3::z_axis());
+        for _ in 0..4 {
+            estimator.add(bearing, Matrix2::identity(), &Matrix2::identity());
+        }
+        let prior = settings.landmarks;
+        let of = |sigma: f64| (sigma * prior.inverse_distance).powi(2);
+        let (common, own) = (of(prior.common_sigma), of(prior.inverse_distance_sigma));
+        let row = |slot: usize| at::landmark(slot) + 2;
+        for (one, other) in [(0, 3), (2, 1), (2, 2)] {
+            let expected = common + if one == other { own } else { 0.0 };
+            assert!((estimator.covariance.row(row(one))[row(other)] - expected).abs() < 1e-12, "{one}, {other}");
+        }
+        // One that is measured well tells of the others as one that differs from them by its own deviation.
+        estimator.add_measured(bearing, Matrix2::identity(), &Matrix2::identity(), (0.4, 0.0));
+        let gain = common / (common + own);
+        let moved = prior.inverse_distance + gain * (0.4 - prior.inverse_distance);
+        assert!((estimator.state.expected.value - moved).abs() < 1e-12);
+        assert!((estimator.state.landmarks[1].inverse_distance.value - moved).abs() < 1e-12);
+        assert!((estimator.covariance.variance(at::EXPECTED) - common * (1.0 - gain)).abs() < 1e-12);
+    }
+}
