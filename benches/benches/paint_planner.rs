@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use nalgebra::Vector4;
 use paint_planner::{OptimalPlanner, Planner, SmoothingPlanner, Trajectory};
 use paintcopter_benches::{criterion, rock};
-use paintcopter_examples::adapters::{Robot, Wall};
+use paintcopter_examples::adapters::{MeshSurface, Robot};
 use paintcopter_examples::mission::MissionSettings;
 use ptu_kinematics::Ptu;
 
@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let MissionSettings { planner: settings, ptu, .. } = MissionSettings::default();
     let surface = rock::rock()?;
     let targets = rock::stroke(&surface, TARGETS);
-    let (robot, wall) = (Robot::new(Ptu::new(ptu)?), Wall(&surface.world));
+    let (robot, wall) = (Robot::new(Ptu::new(ptu)?), MeshSurface(&surface.world));
 
     let mut criterion = criterion();
     let mut group = criterion.benchmark_group("paint-planner");

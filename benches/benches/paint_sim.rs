@@ -14,7 +14,7 @@ use paint_sim::{
 };
 use paintcopter_benches::films::Films;
 use paintcopter_benches::{Rng, criterion, rock};
-use paintcopter_examples::adapters::{PlannedFlight, Robot, ServoGun, Wall};
+use paintcopter_examples::adapters::{MeshSurface, PlanReference, Robot, ServoPanTilt};
 use paintcopter_examples::mission::MissionSettings;
 use paintcopter_examples::surface::PaintSurface;
 use ptu_kinematics::Ptu;
@@ -88,7 +88,7 @@ fn deposit(group: &mut Group, surface: &PaintSurface) -> Result<(), AnyError> {
 }
 
 /// The first seconds of a reference.
-struct Beginning<'a>(PlannedFlight<'a>);
+struct Beginning<'a>(PlanReference<'a>);
 
 impl Reference for Beginning<'_> {
     fn duration(&self) -> f64 {
@@ -105,10 +105,10 @@ fn flight(group: &mut Group, surface: &PaintSurface) -> Result<(), AnyError> {
     let settings = MissionSettings::default();
     let robot = Robot::new(Ptu::new(settings.ptu)?);
     let targets = rock::stroke(surface, 300);
-    let plan = OptimalPlanner::default().plan(&targets, &Wall(&surface.world), &robot, &settings.planner)?;
+    let plan = OptimalPlanner::default().plan(&targets, &MeshSurface(&surface.world), &robot, &settings.planner)?;
     let stand_off = settings.planner.nozzle.stand_off;
-    let reference = Beginning(PlannedFlight { plan: &plan, ptu: &robot.ptu, stand_off });
-    let mut gun = ServoGun::new(robot.ptu.clone(), settings.servo)?;
+    let reference = Beginning(PlanReference { plan: &plan, ptu: &robot.ptu, stand_off });
+    let mut gun = ServoPanTilt::new(robot.ptu.clone(), settings.servo)?;
     let usual = FlightSettings::default();
     fly(&reference, &mut gun, &surface.world, &usual)?;
     group.throughput(Throughput::Elements(FLOWN as u64));

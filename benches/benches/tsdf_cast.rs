@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 use paintcopter_benches::cpu::median_seconds;
-use paintcopter_benches::room::Shot;
+use paintcopter_benches::room::RgbdFrame;
 use tsdf_hash::{CastSettings, Error, Map, Settings, View};
 
 const TURN: usize = 60;
@@ -19,18 +19,18 @@ fn main() -> Result<(), Error> {
 }
 
 fn room(name: &str, world: &Isometry3<f64>, voxel_size: f64) -> Result<(), Error> {
-    let shots: Vec<Shot> = (0..TURN).map(|k| Shot::take(k, TURN)).collect();
+    let frames: Vec<RgbdFrame> = (0..TURN).map(|k| RgbdFrame::take(k, TURN)).collect();
     let mut map = Map::new(Settings { voxel_size, ..Settings::default() })?;
-    for shot in &shots {
-        map.integrate(&shot.view(), None, &(world * shot.world_from_camera))?;
+    for frame in &frames {
+        map.integrate(&frame.view(), None, &(world * frame.world_from_camera))?;
     }
     let settings = CastSettings::default();
     let mut view = View::new();
     let (mut sum, mut hits, mut seen) = (0.0, 0, 0);
     let mut far = [0; 4];
-    for shot in &shots {
-        map.ray_cast_into(&Shot::INTRINSICS, 640, 480, &(world * shot.world_from_camera), &settings, &mut view)?;
-        for (z, exact) in view.depth.iter().zip(&shot.exact_depth()) {
+    for frame in &frames {
+        map.ray_cast_into(&RgbdFrame::INTRINSICS, 640, 480, &(world * frame.world_from_camera), &settings, &mut view)?;
+        for (z, exact) in view.depth.iter().zip(&frame.exact_depth()) {
             seen += 1;
             if *z > 0.0 {
                 let e = (f64::from(*z) - exact).abs();
@@ -42,8 +42,8 @@ fn room(name: &str, world: &Isometry3<f64>, voxel_size: f64) -> Result<(), Error
             }
         }
     }
-    let pose = world * shots[7].world_from_camera;
-    let time = median_seconds(5, || map.ray_cast_into(&Shot::INTRINSICS, 640, 480, &pose, &settings, &mut view));
+    let pose = world * frames[7].world_from_camera;
+    let time = median_seconds(5, || map.ray_cast_into(&RgbdFrame::INTRINSICS, 640, 480, &pose, &settings, &mut view));
     println!(
         "{name}, {voxel_size} m: {:.1} ms, error {:.4} mm, fill {:.5}, beyond 2/10/50/200 mm {far:?} of {hits}, {} blocks",
         1e3 * time,

@@ -5,7 +5,7 @@
 use std::time::Instant;
 
 use clap::Parser;
-use paintcopter_benches::room::Shot;
+use paintcopter_benches::room::RgbdFrame;
 use tsdf_hash::{CastSettings, DenseMap, Error, GpuMap, GpuOptions, Map, Settings};
 
 /// Images of a full turn, as many as in the stream `loop`; every sixth is used.
@@ -37,19 +37,19 @@ fn median_ms<T>(jobs: impl Iterator<Item = T>, mut run: impl FnMut(T) -> Result<
 fn main() -> Result<(), Error> {
     let args = Args::parse();
     let options = GpuOptions { adapter: args.adapter, software: true, ..GpuOptions::default() };
-    let shots: Vec<Shot> = (0..TURN).step_by(STRIDE).map(|k| Shot::take(k, TURN)).collect();
+    let frames: Vec<RgbdFrame> = (0..TURN).step_by(STRIDE).map(|k| RgbdFrame::take(k, TURN)).collect();
     for voxel_size in [0.02, 0.01, 0.005] {
         let settings = Settings { voxel_size, ..Settings::default() };
         let (mut map, mut gpu) = (Map::new(settings)?, GpuMap::new(settings, &options)?);
         let cast = CastSettings::default();
-        let look = Shot::INTRINSICS;
+        let intrinsics = RgbdFrame::INTRINSICS;
         let fused = [
-            median_ms(shots.iter(), |s| map.integrate(&s.view(), None, &s.world_from_camera).map(drop))?,
-            median_ms(shots.iter(), |s| gpu.integrate(&s.view(), None, &s.world_from_camera).map(drop))?,
+            median_ms(frames.iter(), |s| map.integrate(&s.view(), None, &s.world_from_camera).map(drop))?,
+            median_ms(frames.iter(), |s| gpu.integrate(&s.view(), None, &s.world_from_camera).map(drop))?,
         ];
         let seen = [
-            median_ms(shots.iter(), |s| map.ray_cast(&look, 640, 480, &s.world_from_camera, &cast).map(drop))?,
-            median_ms(shots.iter(), |s| gpu.ray_cast(&look, 640, 480, &s.world_from_camera, &cast).map(drop))?,
+            median_ms(frames.iter(), |s| map.ray_cast(&intrinsics, 640, 480, &s.world_from_camera, &cast).map(drop))?,
+            median_ms(frames.iter(), |s| gpu.ray_cast(&intrinsics, 640, 480, &s.world_from_camera, &cast).map(drop))?,
         ];
         let equal = map.hash() == gpu.hash()?;
         println!("{:.0} mm on {}: {} blocks, equal: {equal}", 1e3 * voxel_size, gpu.adapter(), gpu.blocks());

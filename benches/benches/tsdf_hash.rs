@@ -3,7 +3,7 @@
 
 use criterion::Throughput;
 use nalgebra::Point3;
-use paintcopter_benches::room::Shot;
+use paintcopter_benches::room::RgbdFrame;
 use paintcopter_benches::{Rng, criterion};
 use tsdf_hash::{Error, Map, Settings};
 
@@ -13,30 +13,31 @@ const STRIDE: usize = 6;
 /// Points whose distance is asked.
 const POINTS: usize = 100_000;
 
-fn map(shots: &[Shot], settings: Settings) -> Result<Map, Error> {
+fn map(frames: &[RgbdFrame], settings: Settings) -> Result<Map, Error> {
     let mut map = Map::new(settings)?;
-    for shot in shots {
-        map.integrate(&shot.view(), shot.colour().as_ref(), &shot.world_from_camera)?;
+    for frame in frames {
+        map.integrate(&frame.view(), frame.colour().as_ref(), &frame.world_from_camera)?;
     }
     Ok(map)
 }
 
 fn main() -> Result<(), Error> {
-    let shots: Vec<Shot> = (0..TURN).step_by(STRIDE).map(|k| Shot::take(k, TURN).painted()).collect();
+    let frames: Vec<RgbdFrame> = (0..TURN).step_by(STRIDE).map(|k| RgbdFrame::take(k, TURN).painted()).collect();
     let mut criterion = criterion();
     let mut group = criterion.benchmark_group("tsdf-hash");
     for voxel_size in [0.02, 0.01, 0.005] {
         let settings = Settings { voxel_size, threads: 1, max_bytes: 2 << 30, ..Settings::default() };
-        let mut fused = map(&shots, settings)?;
+        let mut fused = map(&frames, settings)?;
         let name = format!("at {} cm", 100.0 * voxel_size);
-        group.throughput(Throughput::Elements(shots.len() as u64));
-        group.bench_function(format!("fusion of {} images {name}", shots.len()), |b| b.iter(|| map(&shots, settings)));
+        group.throughput(Throughput::Elements(frames.len() as u64));
+        group
+            .bench_function(format!("fusion of {} images {name}", frames.len()), |b| b.iter(|| map(&frames, settings)));
         group.throughput(Throughput::Elements(2));
-        let shot = &shots[0];
+        let frame = &frames[0];
         group.bench_function(format!("one image out and in again {name}"), |b| {
             b.iter(|| {
-                fused.deintegrate(&shot.view(), shot.colour().as_ref(), &shot.world_from_camera)?;
-                fused.integrate(&shot.view(), shot.colour().as_ref(), &shot.world_from_camera)
+                fused.deintegrate(&frame.view(), frame.colour().as_ref(), &frame.world_from_camera)?;
+                fused.integrate(&frame.view(), frame.colour().as_ref(), &frame.world_from_camera)
             });
         });
         let faces = fused.mesh().faces.len();

@@ -33,14 +33,14 @@ def main():
     a.add_argument("stream")
     a.add_argument("--voxel", type=float, nargs="+", default=[0.02, 0.01, 0.005], metavar="METRES")
     a.add_argument("--rounds", type=int, default=2)
-    a.add_argument("--ours", help="the binary `ours` (default: built here with cargo)")
+    a.add_argument("--ours", help="the binary `library_figures` (default: built here with cargo)")
     o = a.parse_args()
     ours = o.ours
     if not ours:
-        build = ["cargo", "build", "--release", "-q", "-p", "paintcopter-benches", "--bin", "ours"]
+        build = ["cargo", "build", "--release", "-q", "-p", "paintcopter-benches", "--bin", "library_figures"]
         subprocess.run(build, cwd=ROOT, check=True)
         target = os.environ.get("CARGO_TARGET_DIR", os.path.join(ROOT, "target"))
-        ours = os.path.join(ROOT, target, "release", "ours")
+        ours = os.path.join(ROOT, target, "release", "library_figures")
     peers = [sys.executable, os.path.join(HERE, "mapping_peers.py")]
     with tempfile.TemporaryDirectory() as folder:
         for voxel in o.voxel:
@@ -52,7 +52,7 @@ def main():
                 other = last_json([*peers, "fuse", o.stream, "--voxel", str(voxel), "--every", "1000000"])
                 ms["ours"].append(one["integrate_cpu_ms"])
                 ms["open3d"].append(other["integrate_cpu_ms"])
-            judged = last_json([*peers, "mesh", o.stream, "--file", mesh])
+            evaluated = last_json([*peers, "mesh", o.stream, "--file", mesh])
             mine, theirs = statistics.median(ms["ours"]), statistics.median(ms["open3d"])
             figures = dict(
                 figure="fusion_ratio",
@@ -68,7 +68,7 @@ def main():
                 map_hash=one["map_hash"],
             )
             keep = ("err_mean_mm", "err_p95_mm", "err_max_mm", "compl_5mm", "edges_nonmanifold")
-            print(json.dumps(figures | {"ours_" + k: judged[k] for k in keep if k in judged}), flush=True)
+            print(json.dumps(figures | {"ours_" + k: evaluated[k] for k in keep if k in evaluated}), flush=True)
 
 
 main()

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Open3D as the peer of tsdf-hash on streams made by synth_rgbd.py, and the judge of any mesh or trajectory on them.
+"""Open3D as the peer of tsdf-hash on streams made by synth_rgbd.py, and the evaluation of any mesh or trajectory on them.
 Prints one JSON line per figure.  Needs numpy and open3d (pip install open3d==0.19.0; 0.20.0 for everything but `legacy`).
 
     python3 synth_rgbd.py loop --preset loop
@@ -140,7 +140,7 @@ class Stream:
         return g.cast(M[:3, 3], g.rays(M[:3, :3]))[0].reshape(g.H, g.W)
 
 
-def judge(s, v, tri):
+def evaluate(s, v, tri):
     Wi = np.linalg.inv(s.world)
     r = {}
     if len(v):
@@ -302,7 +302,7 @@ def fuse(s):
         verts=len(v),
         tris=len(tri),
         **extra,
-        **judge(s, v, tri),
+        **evaluate(s, v, tri),
     )
 
 
@@ -452,7 +452,7 @@ def main():
         v, t = np.asarray(m.vertices), np.asarray(m.triangles)
         if not len(v):
             sys.exit(f"{A.file}: no vertices")
-        emit(figure="mesh", file=os.path.basename(A.file), frames=s.n, verts=len(v), tris=len(t), **judge(s, v, t))
+        emit(figure="mesh", file=os.path.basename(A.file), frames=s.n, verts=len(v), tris=len(t), **evaluate(s, v, t))
     elif A.what == "trajectory":
         tg, _ = tum(A.stream + "/groundtruth.txt")
         te, P = tum(A.file)

@@ -6,7 +6,7 @@
   python paint_baselines.py painters --set procedural                 the built-in textures instead (no picture needed; hash-seeded, same in any language)
   python paint_baselines.py painters slew noise --image FILE          one or more own pictures (grey, cropped square, resized)
   python paint_baselines.py colour --image FILE                       several paints, Beer-Lambert
-  python paint_baselines.py export --to DIR                           the test pictures as PNG files, for `ours paint --image DIR`
+  python paint_baselines.py export --to DIR                           the test pictures as PNG files, for `library_figures paint --image DIR`
   python paint_baselines.py check                                     gradients against central differences, reference values for unit tests
   python paint_baselines.py conv --budget 100 [--shared] [--additive] [--train procedural]     train and test the feedback painter (torch)
   python paint_baselines.py replica --steps 5                         time one training step of the thesis' DRAW/PAINT network (torch)

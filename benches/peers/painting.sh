@@ -8,8 +8,8 @@ out=${1:-out/painting}
 python=${PYTHON:-python3}
 mkdir -p "$out"
 export OMP_NUM_THREADS=1
-cargo build --release -q -p paintcopter-benches --bin ours
-ours=${CARGO_TARGET_DIR:-target}/release/ours
+cargo build --release -q -p paintcopter-benches --bin library_figures
+ours=${CARGO_TARGET_DIR:-target}/release/library_figures
 "$python" benches/peers/paint_baselines.py export --to "$out/five" >/dev/null
 # In turn, so that a machine that is busy is busy for both.
 "$python" benches/peers/paint_baselines.py colour >"$out/peers-colour.jsonl"

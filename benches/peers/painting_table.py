@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Means over the pictures from the lines of `ours` and `paint_baselines.py`, as the table of docs/src/paint-net.md.
+"""Means over the pictures from the lines of `library_figures` and `paint_baselines.py`, as the table of docs/src/paint-net.md.
 
 python painting_table.py FILE.jsonl...       see painting.sh, which makes the files"""
 

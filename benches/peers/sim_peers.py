@@ -2,7 +2,7 @@
 """Peers of paint-sim on one core: Kubelka-Munk in numpy, colours with colour-science. One JSON line per figure.
 
   pip install numpy colour-science
-  python3 sim_peers.py                   then: cargo run --release -p paintcopter-benches --bin ours -- sim
+  python3 sim_peers.py                   then: cargo run --release -p paintcopter-benches --bin library_figures -- sim
   python3 sim_peers.py --count 100000    fewer films and colours
 
 km_*_x36: reflectance of films over 36 bands, K and S of one paint, thickness 0 to 60 um. `coth` is the printed form, which

@@ -3,8 +3,8 @@
 
   pip install evo
   python3 trajectory_peers.py reference.txt estimate.txt
-  cargo run --release -p paintcopter-benches --bin ours -- ate reference.txt estimate.txt      same names, same rules
-  cargo run --release -p paintcopter-benches --bin ours -- pair DIR                            writes 10,000 poses of either
+  cargo run --release -p paintcopter-benches --bin library_figures -- ate reference.txt estimate.txt      same names, same rules
+  cargo run --release -p paintcopter-benches --bin library_figures -- pair DIR                            writes 10,000 poses of either
 
 Pairs are nearest in time within 10 ms. rmse_m, rmse_deg: root mean square of the position and the rotation after the
 alignment. cpu_ms = median of the runs, CPU time: pairing, alignment and error, files already read."""
@@ -19,7 +19,7 @@ from evo.core import metrics, sync
 from evo.tools import file_interface
 
 
-def judge(reference, estimate, mode):
+def evaluate(reference, estimate, mode):
     """evo's steps for `evo_ape`, once for either part of the pose."""
     one, other = sync.associate_trajectories(reference, estimate, max_diff=0.01)
     if mode != "none":
@@ -51,7 +51,7 @@ def main():
         times = []
         for _ in range(a.runs):
             start = time.process_time()
-            pairs, errors = judge(reference, estimate, mode)
+            pairs, errors = evaluate(reference, estimate, mode)
             times.append(time.process_time() - start)
         cpu_ms = round(1e3 * statistics.median(times), 3)
         print(json.dumps(dict(fig=f"ate_{mode}", peer="evo", pairs=pairs, **errors, cpu_ms=cpu_ms)))

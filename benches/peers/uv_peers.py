@@ -6,7 +6,7 @@
   taskset -c 0 python uv_peers.py disk   mesh.obj --cut --only arap        cut a sphere along its longest shortest path first
   taskset -c 0 python uv_peers.py disk   mesh.obj --loop 2                 Loop-subdivide twice first
   taskset -c 0 python uv_peers.py closed mesh.obj --res 1024 --pad 2       xatlas: default, brute force, loose charts
-  ... --save DIR      also writes DIR/<mesh>_<figure>.obj with vt, ready for uv_judge.py
+  ... --save DIR      also writes DIR/<mesh>_<figure>.obj with vt, ready for uv_evaluation.py
 
 On one core the clock is CPU time (says "clock":"cpu"), on several it is wall time. s = median over runs.
 arap = sum A((s1-1)^2+(s2-1)^2)/sum A (s2 signed); sd = sum A(s1^2+s2^2+s1^-2+s2^-2)/(4 sum A), 1 = isometry, |s2| where flipped.

@@ -10,12 +10,12 @@ const LEAST: Duration = Duration::from_millis(100);
 
 /// Times of jobs of a few milliseconds that cannot be repeated, in all threads of this process.
 #[derive(Debug, Default)]
-pub struct Clock {
+pub struct CpuTimer {
     cpu: Vec<f64>,
     wall: Vec<f64>,
 }
 
-impl Clock {
+impl CpuTimer {
     /// Does a job and notes its times.
     pub fn time<T>(&mut self, job: impl FnOnce() -> T) -> T {
         let (cpu, wall) = (ProcessTime::now(), Instant::now());

@@ -49,9 +49,9 @@ impl MapErrors {
 #[derive(Debug, Clone)]
 pub enum Arrival {
     /// A sample of the head's inertial sensor, which defines the body.
-    First(Imu),
+    PrimaryImu(Imu),
     /// A sample of the autopilot's.
-    Second(Imu),
+    SecondaryImu(Imu),
     /// Points that the camera has seen.
     Points(Stamp, Vec<PointObservation>),
     /// A pose of the body in the world.
@@ -92,13 +92,13 @@ impl Flight {
         let mut rng = Rng(seed.wrapping_mul(7919));
         let camera = camera();
         let mut timed: Vec<(i64, Arrival)> = Vec::new();
-        timed.extend(recorded[0].samples.iter().map(|s| (s.stamp.nanos(), Arrival::First(*s))));
-        timed.extend(recorded[1].samples.iter().map(|s| (s.stamp.nanos(), Arrival::Second(*s))));
+        timed.extend(recorded[0].samples.iter().map(|s| (s.stamp.nanos(), Arrival::PrimaryImu(*s))));
+        timed.extend(recorded[1].samples.iter().map(|s| (s.stamp.nanos(), Arrival::SecondaryImu(*s))));
 
         let (begin, end) = spline.span();
         let points = points(&spline, &mut rng)?;
         for stamp in stamps(begin, end, IMAGES[0]) {
-            let seen = see(&camera, &points, &spline.sample(stamp)?, &mut rng);
+            let seen = observe(&camera, &points, &spline.sample(stamp)?, &mut rng);
             timed.push((stamp.nanos() + IMAGES[1], Arrival::Points(stamp, seen)));
         }
         let delay = (map.delay_s * 1e9) as i64;
@@ -193,7 +193,7 @@ fn points(spline: &Spline, rng: &mut Rng) -> Result<Vec<Vector3<f64>>, Error> {
         .collect())
 }
 
-fn see(camera: &Camera, points: &[Vector3<f64>], motion: &Motion, rng: &mut Rng) -> Vec<PointObservation> {
+fn observe(camera: &Camera, points: &[Vector3<f64>], motion: &Motion, rng: &mut Rng) -> Vec<PointObservation> {
     let camera_from_world = (motion.world_from_body * camera.body_from_camera).inverse();
     let mut seen = Vec::new();
     for (id, point) in (0..).zip(points) {

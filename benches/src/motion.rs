@@ -41,7 +41,7 @@ mod tests {
     use super::*;
     use vio_ekf::{Alignment, ate};
 
-    /// Root mean squares by evo 1.38.1 (`peers/trajectory_peers.py`) on the files that `ours pair` writes.
+    /// Root mean squares by evo 1.38.1 (`peers/trajectory_peers.py`) on the files that `library_figures pair` writes.
     #[test]
     fn evo_finds_the_same_errors() {
         let (truth, estimate) = pair(10_000).unwrap();

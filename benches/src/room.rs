@@ -27,7 +27,7 @@ const BOXES: [[f64; 6]; 4] = [
 ];
 
 /// A depth image and where it was taken.
-pub struct Shot {
+pub struct RgbdFrame {
     /// Millimetres along the optical axis, row by row.
     depth: Vec<u16>,
     /// R, G, B; empty without colours.
@@ -36,7 +36,7 @@ pub struct Shot {
     pub world_from_camera: Isometry3<f64>,
 }
 
-impl Shot {
+impl RgbdFrame {
     /// Image `k` of `n` on the way around the room.
     pub fn take(k: usize, n: usize) -> Self {
         let world_from_camera = pose(k, n);
@@ -85,11 +85,11 @@ fn ray(world_from_camera: &Isometry3<f64>, pixel: usize) -> Vector3<f64> {
 }
 
 /// The first images of a stream in the files of `synth_rgbd.py`, in its own camera.
-pub fn read(folder: &Path, most: usize, coloured: bool) -> Result<Vec<Shot>, String> {
+pub fn read(folder: &Path, most: usize, coloured: bool) -> Result<Vec<RgbdFrame>, String> {
     let say = |path: &Path, error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
     let poses = folder.join("groundtruth.txt");
     let text = std::fs::read_to_string(&poses).map_err(|e| say(&poses, &e))?;
-    let mut shots = Vec::new();
+    let mut frames = Vec::new();
     for (k, line) in text.lines().take(most).enumerate() {
         let row: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
         let &[_, x, y, z, i, j, k_, w] = row.as_slice() else {
@@ -106,9 +106,9 @@ pub fn read(folder: &Path, most: usize, coloured: bool) -> Result<Vec<Shot>, Str
             return Err(say(&path, &"the images must be 640 x 480 pixels"));
         }
         let world_from_camera = Isometry3::from_parts(Translation3::new(x, y, z), rotation);
-        shots.push(Shot { depth: depth.into_raw(), rgb, world_from_camera });
+        frames.push(RgbdFrame { depth: depth.into_raw(), rgb, world_from_camera });
     }
-    Ok(shots)
+    Ok(frames)
 }
 
 /// On an ellipse, looking outwards.
@@ -153,12 +153,12 @@ mod tests {
             (7, [(0, 0, 1504), (320, 240, 2494), (639, 479, 2001), (100, 400, 1685), (560, 60, 2247)], 661_483_120),
         ];
         for (k, pixels, sum) in images {
-            let shot = Shot::take(k, 60);
+            let frame = RgbdFrame::take(k, 60);
             for (u, v, expected) in pixels {
-                assert_eq!(shot.depth[v * SIZE.0 + u], expected, "image {k}, pixel {u}, {v}");
+                assert_eq!(frame.depth[v * SIZE.0 + u], expected, "image {k}, pixel {u}, {v}");
             }
             // Another libm may round a handful of pixels the other way.
-            let found: i64 = shot.depth.iter().copied().map(i64::from).sum();
+            let found: i64 = frame.depth.iter().copied().map(i64::from).sum();
             assert!((found - sum).abs() < 10, "image {k}: {found}");
         }
     }

@@ -1,4 +1,4 @@
-//! The motions along which the odometry is judged, and the cameras that go along.
+//! The motions along which the odometry is evaluated, and the cameras that go along.
 
 use std::error::Error;
 use std::path::Path;

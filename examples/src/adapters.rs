@@ -7,9 +7,9 @@ use paint_sim::{PanTilt, Reference, ReferenceState, TriangleSurface};
 use ptu_kinematics::{Hover, Joints, Ptu, Servo};
 
 /// The simulator's mesh as the planner's surface.
-pub struct Wall<'a>(pub &'a TriangleSurface);
+pub struct MeshSurface<'a>(pub &'a TriangleSurface);
 
-impl paint_planner::Surface for Wall<'_> {
+impl paint_planner::Surface for MeshSurface<'_> {
     fn cast(
         &self,
         origin: &Point3<f64>,
@@ -75,12 +75,12 @@ impl Tool for Robot {
 }
 
 /// The kinematic chain on two servos as the simulator's pan-tilt unit.
-pub struct ServoGun {
+pub struct ServoPanTilt {
     ptu: Ptu,
     servos: [Servo; 2],
 }
 
-impl ServoGun {
+impl ServoPanTilt {
     /// Both servos at rest at zero.
     pub fn new(ptu: Ptu, servo: ptu_kinematics::ServoSettings) -> Result<Self, ptu_kinematics::Error> {
         let servo = Servo::new(servo, 0.0)?;
@@ -88,7 +88,7 @@ impl ServoGun {
     }
 }
 
-impl PanTilt for ServoGun {
+impl PanTilt for ServoPanTilt {
     fn command(&self, world_from_body: &Isometry3<f64>, aim: &Point3<f64>) -> [f64; 2] {
         match self.ptu.aim(world_from_body, aim) {
             Ok(aim) => [aim.joints.pan, aim.joints.tilt],
@@ -120,7 +120,7 @@ impl PanTilt for ServoGun {
 }
 
 /// A plan as the simulator's reference.
-pub struct PlannedFlight<'a> {
+pub struct PlanReference<'a> {
     /// The plan.
     pub plan: &'a Plan,
     /// The chain it was made for.
@@ -129,7 +129,7 @@ pub struct PlannedFlight<'a> {
     pub stand_off: f64,
 }
 
-impl Reference for PlannedFlight<'_> {
+impl Reference for PlanReference<'_> {
     fn duration(&self) -> f64 {
         self.plan.trajectory.duration()
     }

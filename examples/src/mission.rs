@@ -3,8 +3,8 @@
 mod decide;
 mod figures;
 mod fly;
-mod gallery;
 mod inspect;
+mod mission_output;
 mod plan;
 
 pub use inspect::Inspection;
@@ -58,7 +58,7 @@ pub struct MissionSettings {
 /// The painters to choose from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PainterChoice {
-    /// The network that looks at its canvas.
+    /// The network with feedback from its canvas.
     Feedback,
     /// All sprays at once.
     Deconvolution,

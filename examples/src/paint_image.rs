@@ -1,15 +1,15 @@
 //! The job of `paint-image`: a picture in, sprays and figures out.
 
-mod clock;
 mod colour;
 mod command_line;
 mod commands;
 mod compare;
+mod cpu_timer;
 mod equal_sprays;
-mod film;
 mod job;
-mod learn;
+mod progress_strip;
 mod run;
+mod training;
 
 use std::path::{Path, PathBuf};
 
@@ -24,9 +24,9 @@ pub use command_line::Arguments;
 pub use commands::NOZZLE_SPEED;
 pub use compare::{Row, compare, table};
 pub use equal_sprays::{EqualSprays, equal_sprays, print_equal_sprays};
-pub use job::{Choice, Figures, Job};
-pub use learn::{Lesson, Pictures, ThesisLesson, learn, learn_thesis};
+pub use job::{Figures, Job, PainterKind};
 pub use run::run;
+pub use training::{ThesisTrainingRun, TrainingImages, TrainingRun, train_painter, train_thesis};
 
 /// What is wrong with painting a picture.
 #[derive(Debug, thiserror::Error)]

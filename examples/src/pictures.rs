@@ -2,22 +2,22 @@
 //! of pictures side by side.
 
 mod chart;
+mod contact_sheet;
 mod curves;
 mod error_map;
 mod paths;
 mod scene;
-mod sheet;
 
 use std::path::Path;
 use std::sync::Once;
 
 use plotters::style::{FontStyle, register_font};
 
+pub use contact_sheet::{Tile, save_contact_sheet};
 pub use curves::{Panel, save_curves};
 pub use error_map::save_error_map;
 pub use paths::{PathPanel, save_paths};
 pub use scene::{Polyline, Projection, Scene, save_scene};
-pub use sheet::{Tile, save_sheet};
 
 /// What is wrong with drawing or saving a picture.
 #[derive(Debug, thiserror::Error)]

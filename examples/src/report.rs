@@ -7,7 +7,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-pub use check::{Check, Must, Unit};
+pub use check::{Check, Requirement, Unit};
 
 /// The figures of one mission. Flat, SI units in the names; every number is finite.
 #[derive(Debug, Clone, Serialize)]
@@ -127,9 +127,16 @@ impl Report {
 
     /// Every figure that is asked for, with what is asked of it: the one place where the floors stand.
     pub fn checks(&self) -> Vec<Check> {
-        use Must::{AtLeast, AtMost, Open};
+        use Requirement::{AtLeast, AtMost, Open};
         use Unit::{Centimetres, Count, Decibels, Index, Milliseconds, Percent, Ratio, Relative};
-        let check = |figure, value: f64, unit, must, papers| Check { figure, value, unit, must, papers, detail: None };
+        let check = |figure, value: f64, unit, requirement, papers| Check {
+            figure,
+            value,
+            unit,
+            requirement,
+            papers,
+            detail: None,
+        };
         let beside = |check: Check, unit: Unit, value: f64| Check { detail: Some(unit.show(value)), ..check };
         let smoothing = self.smoothing_normal_deviation_mean_m;
         let locked = self.ptu_locked_hit_error_rms_m;
@@ -209,9 +216,9 @@ impl Report {
     pub fn summary(&self) -> String {
         let mut text = String::new();
         for check in self.checks() {
-            let verdict = if check.holds() { "" } else { "  NOT REACHED" };
-            let (figure, value, must) = (check.figure, check.value_text(), check.must_text());
-            let _ = writeln!(text, "  {figure:48} {value:>20}   {must:12}{verdict}");
+            let mark = if check.holds() { "" } else { "  NOT REACHED" };
+            let (figure, value, requirement) = (check.figure, check.value_text(), check.requirement_text());
+            let _ = writeln!(text, "  {figure:48} {value:>20}   {requirement:12}{mark}");
         }
         text
     }
@@ -243,9 +250,9 @@ impl Report {
         }
         text.push_str("| figure | this run | asked for | papers | |\n|---|---|---|---|---|\n");
         for check in self.checks() {
-            let verdict = if check.holds() { "yes" } else { "**no**" };
-            let (figure, value, must) = (check.figure, check.value_text(), check.must_text());
-            let _ = writeln!(text, "| {figure} | {value} | {must} | {} | {verdict} |", check.papers);
+            let mark = if check.holds() { "yes" } else { "**no**" };
+            let (figure, value, requirement) = (check.figure, check.value_text(), check.requirement_text());
+            let _ = writeln!(text, "| {figure} | {value} | {requirement} | {} | {mark} |", check.papers);
         }
         let _ = writeln!(
             text,

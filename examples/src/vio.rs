@@ -1,34 +1,34 @@
-//! Runs the odometry over recordings, judges what comes out, and makes recordings to run it on.
+//! Runs the odometry over recordings, evaluates the trajectories, and makes recordings to run it on.
 
 mod cdr;
 mod command_line;
 mod compare;
 mod error;
 mod euroc_folder;
-mod job;
-mod judge;
+mod evaluation;
+mod grey_image;
 mod mcap_in;
 mod mcap_out;
-mod picture;
 mod plots;
 mod recording;
 mod report;
 mod run;
-mod second;
 mod simulate;
+mod stereo;
+mod subcommands;
 mod tuning;
 
 pub use command_line::Arguments;
 pub use compare::{Comparison, compare};
 pub use error::VioError;
 pub use euroc_folder::{Overrides, open_euroc};
-pub use job::execute;
-pub use judge::{AlignedPair, ErrorAt, Judgement, judge};
+pub use evaluation::{AlignedPair, PoseError, RunEvaluation, evaluate_run};
+pub use grey_image::GreyImage;
 pub use mcap_in::open_mcap;
-pub use picture::Grey;
-pub use recording::{Images, Recording, Shot, Truth};
+pub use recording::{CameraFrame, GroundTruth, Images, Recording};
 pub use report::{VioReport, save};
 pub use run::{Run, RunSettings, Segment, run};
-pub use second::{Second, open_euroc_pair};
 pub use simulate::{Flight, Simulated, SimulationSettings, simulate};
-pub use tuning::{Lessons, Tuning, TuningReport, tune_noise};
+pub use stereo::{SecondCamera, open_euroc_stereo};
+pub use subcommands::execute;
+pub use tuning::{Tuning, TuningData, TuningReport, tune_noise};

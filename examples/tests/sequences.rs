@@ -110,7 +110,7 @@ fn redwood(s: &Scratch) {
 fn run(folder: &Path, threads: usize) -> Scan {
     let sequence = Sequence::open(folder).unwrap();
     let map = tsdf_hash::Settings { voxel_size: 0.02, threads, ..tsdf_hash::Settings::default() };
-    Scan::run(folder, &sequence, &ScanSettings { map, look_every: 1, ..ScanSettings::default() }).unwrap()
+    Scan::run(folder, &sequence, &ScanSettings { map, ray_cast_every: 1, ..ScanSettings::default() }).unwrap()
 }
 
 #[test]
@@ -134,10 +134,10 @@ fn three_layouts_give_the_same_wall() {
             // Six bits per channel.
             assert!(colour[0].abs_diff(200) <= 4 && colour[1].abs_diff(20) <= 4, "{layout}: {colour:?}");
         }
-        for look in &scan.course.looks {
-            assert!(look.depth_error < 1e-3 && look.fill > 0.8, "{layout}: {look:?}");
+        for cast in &scan.metrics.ray_casts {
+            assert!(cast.depth_error < 1e-3 && cast.fill > 0.8, "{layout}: {cast:?}");
         }
-        assert_eq!(scan.course.looks.len(), 3, "{layout}");
+        assert_eq!(scan.metrics.ray_casts.len(), 3, "{layout}");
         assert_eq!(scan.map.hash(), run(&s.0, 3).map.hash(), "{layout}");
     }
 }

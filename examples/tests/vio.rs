@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use paintcopter_examples::vio::{
-    Flight, Overrides, Recording, RunSettings, SimulationSettings, judge, open_euroc, open_euroc_pair, open_mcap, run,
-    simulate,
+    Flight, Overrides, Recording, RunSettings, SimulationSettings, evaluate_run, open_euroc, open_euroc_stereo,
+    open_mcap, run, simulate,
 };
 use vio_ekf::Camera;
 use vio_ekf::sim::{CameraModel, RoomSettings, Scenario};
@@ -43,11 +43,11 @@ fn follow(recording: &Recording, threads: usize) -> String {
     recording.check(9.81).unwrap();
     let run = run(recording, &RunSettings { threads, ..RunSettings::default() }).unwrap();
     assert!(run.skipped.len() <= 1 && run.lost.is_empty(), "{:?} {:?}", run.skipped, run.lost);
-    let judgement = judge(&run, recording.truth.as_ref().unwrap()).unwrap().unwrap();
+    let evaluation = evaluate_run(&run, recording.truth.as_ref().unwrap()).unwrap().unwrap();
     // Six seconds in the air, three metres: a hundredth of it is what the filter promises.
-    assert!(judgement.ate_yaw < 0.05 && judgement.ate_se3 <= judgement.ate_yaw + 1e-9, "{judgement:?}");
-    assert!(judgement.coverage > 0.75, "{}", judgement.coverage);
-    assert!(judgement.nees_position < 20.0 && judgement.nees_attitude < 20.0);
+    assert!(evaluation.ate_yaw < 0.05 && evaluation.ate_se3 <= evaluation.ate_yaw + 1e-9, "{evaluation:?}");
+    assert!(evaluation.coverage > 0.75, "{}", evaluation.coverage);
+    assert!(evaluation.nees_position < 20.0 && evaluation.nees_attitude < 20.0);
     vio_ekf::tum::write(&run.trajectory().unwrap())
 }
 
@@ -91,11 +91,12 @@ fn a_second_camera_is_used_where_it_has_images() {
         recording.check(9.81).unwrap();
         run(recording, &RunSettings { threads, quiet: true, ..RunSettings::default() }).unwrap()
     };
-    let recording = open_euroc_pair(&s.0, &none).unwrap();
+    let recording = open_euroc_stereo(&s.0, &none).unwrap();
     let pair = follow(&recording, 1);
     assert_eq!((pair.frames, pair.pairs), (120, 120));
     assert_eq!(follow(&recording, 2).trajectory().unwrap(), pair.trajectory().unwrap(), "threads");
-    let error = |run: &paintcopter_examples::vio::Run| judge(run, recording.truth.as_ref().unwrap()).unwrap().unwrap();
+    let error =
+        |run: &paintcopter_examples::vio::Run| evaluate_run(run, recording.truth.as_ref().unwrap()).unwrap().unwrap();
     assert!(error(&pair).ate_yaw < 0.03, "{}", error(&pair).ate_yaw);
     // With one camera the trajectory is another one.
     let alone = follow(&open_euroc(&s.0, &none).unwrap(), 1);
@@ -114,7 +115,7 @@ fn a_second_camera_is_used_where_it_has_images() {
     edit(&s.0, "cam1/data.csv", |text| {
         text.lines().enumerate().filter(|(k, _)| *k != 80).map(|(_, line)| line.to_string() + "\n").collect()
     });
-    let holes = follow(&open_euroc_pair(&s.0, &none).unwrap(), 1);
+    let holes = follow(&open_euroc_stereo(&s.0, &none).unwrap(), 1);
     assert_eq!((holes.frames, holes.pairs, holes.skipped.len()), (120, 117, 2), "{:?}", holes.skipped);
     assert!(error(&holes).ate_yaw < 0.03);
 
@@ -374,20 +375,20 @@ fn real_images_at_rest_do_not_drift() {
     recording.check(9.81).unwrap();
     let run = run(&recording, &RunSettings::default()).unwrap();
     assert_eq!((run.frames, run.skipped.len(), run.lost.len()), (95, 0, 0), "{:?} {:?}", run.skipped, run.lost);
-    let judgement = judge(&run, recording.truth.as_ref().unwrap()).unwrap().unwrap();
-    let worst = judgement.errors.iter().map(|e| e.position.norm()).fold(0.0, f64::max);
+    let evaluation = evaluate_run(&run, recording.truth.as_ref().unwrap()).unwrap().unwrap();
+    let worst = evaluation.errors.iter().map(|e| e.position.norm()).fold(0.0, f64::max);
     eprintln!(
         "started after {:.2} s; drift at most {:.2} cm; NEES of position {:.2}, attitude {:.2}, velocity {:?}",
         run.initialised_after_s,
         100.0 * worst,
-        judgement.nees_position,
-        judgement.nees_attitude,
-        judgement.nees_velocity
+        evaluation.nees_position,
+        evaluation.nees_attitude,
+        evaluation.nees_velocity
     );
     assert!(run.initialised_after_s < 2.5, "{}", run.initialised_after_s);
     assert!(worst < 0.02, "{worst} m");
     // Honest: 99.9 % of chi-square with 3 degrees of freedom is 16.3, and a mean cannot exceed that.
-    for nees in [judgement.nees_position, judgement.nees_attitude, judgement.nees_velocity.unwrap_or(0.0)] {
+    for nees in [evaluation.nees_position, evaluation.nees_attitude, evaluation.nees_velocity.unwrap_or(0.0)] {
         assert!(nees < 16.3, "{nees}");
     }
 }

@@ -6,9 +6,9 @@ use std::process::ExitCode;
 use clap::{Parser, ValueEnum};
 use paintcopter_examples::design::{Design, Picture};
 use paintcopter_examples::mesh_io::{TriangleMesh, read_mesh};
+use paintcopter_examples::mesh_placement::{MeshPlacement, UpAxis, place_mesh};
 use paintcopter_examples::mission::{Mission, MissionSettings, PainterChoice};
-use paintcopter_examples::placing::{Placing, UpAxis, place};
-use paintcopter_examples::survey::Survey;
+use paintcopter_examples::scan_flight::ScanFlight;
 use paintcopter_examples::world::rock_wall;
 
 type AnyError = Box<dyn std::error::Error>;
@@ -60,7 +60,7 @@ enum Up {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum PainterName {
-    /// The network that looks at its canvas
+    /// The network with feedback from its canvas
     Feedback,
     /// The best plan for all sprays at once, by optimisation
     Deconvolution,
@@ -119,9 +119,9 @@ fn seen(mesh: TriangleMesh, arguments: &Arguments, threads: usize) -> Result<Tri
     if !arguments.scan {
         return Ok(mesh);
     }
-    let survey = Survey::fly(&mesh, arguments.seed, threads)?;
-    survey.save(&arguments.out)?;
-    Ok(survey.mesh)
+    let scan_flight = ScanFlight::fly(&mesh, arguments.seed, threads)?;
+    scan_flight.save(&arguments.out)?;
+    Ok(scan_flight.mesh)
 }
 
 /// Reads and places a mesh.
@@ -147,8 +147,8 @@ fn load(path: &Path, arguments: &Arguments) -> Result<TriangleMesh, AnyError> {
             }
         }
     };
-    let placed =
-        place(&mut mesh, Placing { scale: arguments.scale, up }).map_err(|e| format!("{}: {e}", path.display()))?;
+    let placed = place_mesh(&mut mesh, MeshPlacement { scale: arguments.scale, up })
+        .map_err(|e| format!("{}: {e}", path.display()))?;
     let hung = if placed.hung { ", hung like a wall" } else { "" };
     eprintln!("{}: {} faces, scale {:.4}{hung}", path.display(), mesh.faces.len(), placed.scale);
     Ok(mesh)

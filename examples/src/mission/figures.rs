@@ -13,7 +13,7 @@ use super::{LayerFlight, Mission, MissionError};
 use crate::appearance::{DENSITY, UNIT_THICKNESS};
 use crate::report::{Report, peak_resident_bytes};
 
-/// Samples between two looks for collisions in a flight: 50 ms, 2.5 cm at full speed.
+/// Samples between two collision checks in a flight: 50 ms, 2.5 cm at full speed.
 const COLLISION_STRIDE: usize = 5;
 /// Step of the dense check of the planned limits, seconds; the certificates do not depend on it.
 const LIMIT_STEP: f64 = 0.02;

@@ -8,7 +8,7 @@ use paint_sim::{Film, FlightLog, FlightSettings, SprayModel};
 use super::decide::SPRAY_CUT;
 use super::plan::Planned;
 use super::{LayerFlight, MissionError, MissionSettings};
-use crate::adapters::{PlannedFlight, Robot, ServoGun};
+use crate::adapters::{PlanReference, Robot, ServoPanTilt};
 use crate::progress::Stage;
 use crate::surface::PaintSurface;
 
@@ -82,8 +82,8 @@ fn fly_three(
         FlightSettings { ptu_locked: true, ..usual },
     ];
     let one = |flight: &FlightSettings| -> Result<FlightLog, MissionError> {
-        let reference = PlannedFlight { plan, ptu: &robot.ptu, stand_off: settings.planner.nozzle.stand_off };
-        let mut gun = ServoGun::new(robot.ptu.clone(), settings.servo)?;
+        let reference = PlanReference { plan, ptu: &robot.ptu, stand_off: settings.planner.nozzle.stand_off };
+        let mut gun = ServoPanTilt::new(robot.ptu.clone(), settings.servo)?;
         Ok(paint_sim::fly(&reference, &mut gun, &surface.world, flight)?)
     };
     if settings.threads < 2 {

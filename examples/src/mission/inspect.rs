@@ -1,4 +1,4 @@
-//! After the paint: a look at the wall with a depth camera, and the flight as trajectories.
+//! After the paint: the wall mapped with a depth camera, and the flight as trajectories.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use paint_sim::{Camera, Frame, Hit, Lights, Look, Surface, render};
@@ -22,7 +22,7 @@ const POSE_STEP: f64 = 0.1;
 /// Views around a surface that closes in, at each of two heights.
 const RING: usize = 12;
 
-/// A second look at a mission by other means.
+/// A mission checked by other means.
 pub struct Inspection {
     /// The painted surface as a depth camera maps it, with the colours seen.
     pub mesh: Mesh,
@@ -32,12 +32,12 @@ pub struct Inspection {
     pub flown: Trajectory,
     /// What the localisation took it for.
     pub believed: Trajectory,
-    /// Root mean square position error between the two after rigid alignment, the ATE by which odometry is judged, metres.
+    /// Root mean square position error between the two after rigid alignment, the ATE of odometry, metres.
     pub slam_ate: f64,
 }
 
 impl Mission {
-    /// Maps the painted surface with a simulated depth camera, and judges the localisation of the flight.
+    /// Maps the painted surface with a simulated depth camera, and evaluates the localisation of the flight.
     pub fn inspect(&self) -> Result<Inspection, MissionError> {
         let mesh = self.scan()?;
         let world = &self.surface.world;
@@ -53,7 +53,7 @@ impl Mission {
         let painted = self.painted_depth();
         // Even light from everywhere: the colours of the map are the surface's own.
         let lights = Lights { sun: [0.0; 3], ambient: [1.0; 3], ..Lights::default() };
-        let shade = |hit: &Hit| -> Look { self.look(&painted, hit) };
+        let shade = |hit: &Hit| -> Look { self.shading(&painted, hit) };
         let threads = self.settings.threads;
         let settings = tsdf_hash::Settings { voxel_size: VOXEL, threads, ..tsdf_hash::Settings::default() };
         let mut map = Map::new(settings)?;
@@ -75,7 +75,7 @@ impl Mission {
             .fold((Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)), |(l, h), p| (l.inf(&p), h.sup(&p)));
         let centre = (low + high) / 2.0;
         let up = Vector3::z();
-        let look = |eye: Vector3<f64>, target: Vector3<f64>| {
+        let camera_at = |eye: Vector3<f64>, target: Vector3<f64>| {
             Camera::looking_at(&Point3::from(eye), &Point3::from(target), &up, OPENING, IMAGE)
         };
         let facing = self.surface.facing();
@@ -90,7 +90,7 @@ impl Mission {
                 for column in 0..GRID.0 {
                     let along = side * (share(column, GRID.0) * width) + up * (share(row, GRID.1) * (high.z - low.z));
                     let target = centre + along;
-                    cameras.push(look(target + front * (depth + DISTANCE), target)?);
+                    cameras.push(camera_at(target + front * (depth + DISTANCE), target)?);
                 }
             }
         } else {
@@ -99,7 +99,7 @@ impl Mission {
                 for k in 0..RING {
                     let (sin, cos) = (std::f64::consts::TAU * k as f64 / RING as f64).sin_cos();
                     let target = Vector3::new(centre.x, centre.y, low.z + height * (high.z - low.z));
-                    cameras.push(look(target + Vector3::new(cos, sin, 0.1) * radius, target)?);
+                    cameras.push(camera_at(target + Vector3::new(cos, sin, 0.1) * radius, target)?);
                 }
             }
         }

@@ -8,7 +8,7 @@ use paint_planner::{Error, OptimalPlanner, Plan, Planner, Settings, SmoothingPla
 use super::decide::kernel;
 use super::figures::path_length;
 use super::{MissionError, MissionSettings};
-use crate::adapters::{Robot, Wall};
+use crate::adapters::{MeshSurface, Robot};
 use crate::progress::Stage;
 use crate::surface::PaintSurface;
 use crate::targets::{Route, route};
@@ -32,7 +32,7 @@ pub(super) fn plan(
 ) -> Result<Planned, MissionError> {
     let stage = Stage::start("plan");
     let kernel = kernel(settings)?;
-    let wall = Wall(&surface.world);
+    let wall = MeshSurface(&surface.world);
     let mut planned = Planned { layers: Vec::with_capacity(layers.len()), seconds: 0.0, abandoned: 0.0 };
     for (k, layer) in layers.iter().enumerate() {
         stage.share(k as f64 / layers.len() as f64);

@@ -7,8 +7,8 @@ use paint_net::{ColourPainting, ColourTask, Coloured, Error, Image, Paint, Palet
 use paint_sim::colour::lab;
 use serde::Serialize;
 
-use super::clock::Clock;
-use super::film::save_film;
+use super::cpu_timer::CpuTimer;
+use super::progress_strip::save_progress_strip;
 use super::{Job, PaintImageError, commands, ink_of, ssim, write_json};
 use crate::pictures::{Rgb, save_error_map};
 
@@ -55,7 +55,7 @@ pub struct ColourFigures {
     pub height: usize,
     /// Peak signal-to-noise ratio over the stored values of all three bands.
     pub psnr_db: f64,
-    /// Structural similarity, 7x7 window, of the ink that a painting in black would be judged by (1 less the luma); 0 for
+    /// Structural similarity, 7x7 window, of the ink that a painting in black would be measured by (1 less the luma); 0 for
     /// pictures smaller than the window.
     pub ssim: f64,
     /// Cross-entropy of the same ink.
@@ -136,10 +136,10 @@ impl Job {
         palette: &Palette,
         progress: &mut dyn FnMut(f64),
     ) -> Result<(ColourPainting, ColourFigures), PaintImageError> {
-        let clock = Clock::start(1);
+        let timer = CpuTimer::start(1);
         let task = ColourTask::new(wanted);
         let painting = Coloured::default().paint(&task, palette, &self.kernel, &self.limits, progress)?;
-        let cpu_ms = clock.milliseconds();
+        let cpu_ms = timer.milliseconds();
         let (psnr_db, ciede2000_mean, ciede2000_p95) = compare_colours(&painting.picture, wanted);
         let (painted_ink, wanted_ink) = (ink(&painting.picture)?, ink(wanted)?);
         let figures = ColourFigures {
@@ -192,6 +192,6 @@ impl Job {
         save_error_map(&folder.join("error.png"), figures.width, &map, (1.0, "px"))?;
         let paints: Vec<&[Spray]> = painting.sprays.iter().map(Vec::as_slice).collect();
         let show = |depths: &[f64]| palette.colour(depths).map(byte);
-        save_film(&folder.join("film.png"), rgb(wanted), &paints, &self.kernel, &show)
+        save_progress_strip(&folder.join("film.png"), rgb(wanted), &paints, &self.kernel, &show)
     }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use super::{Choice, Glazes};
+use super::{Glazes, PainterKind};
 
 /// Decides what to spray so that the wall comes to look like a picture. Dark is paint, white is bare wall.
 #[derive(Parser)]
@@ -21,7 +21,7 @@ pub struct Arguments {
     pub(super) image: Option<PathBuf>,
     /// Who decides the sprays [default: feedback]
     #[arg(long)]
-    pub(super) painter: Option<Choice>,
+    pub(super) painter: Option<PainterKind>,
     /// Paint in colour with these glazes; the painter is then the one of colours
     #[arg(long)]
     pub(super) palette: Option<Glazes>,
@@ -61,7 +61,7 @@ pub(super) struct Nozzle {
     /// Paint in layers by intensity, the base coat first: one plan cut into layers, or with "=sequential" a plan for each layer
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "joint")]
     pub(super) layers: Option<SharingName>,
-    /// Looks of the network at its canvas [default: 6]
+    /// Passes of the network over its canvas [default: 6]
     #[arg(long)]
     pub(super) passes: Option<usize>,
     /// Worker threads [default: 1]

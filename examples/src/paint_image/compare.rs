@@ -4,8 +4,8 @@ use std::path::Path;
 use paint_net::{Image, Painting, Sharing};
 use serde::Serialize;
 
-use super::{Choice, Figures, Job, PaintImageError, grey, write_text};
-use crate::pictures::{Tile, save_sheet};
+use super::{Figures, Job, PaintImageError, PainterKind, grey, write_text};
+use crate::pictures::{Tile, save_contact_sheet};
 
 /// Pictures on the sheet: the first ones.
 const SHOWN: usize = 8;
@@ -32,11 +32,11 @@ pub struct Row {
 pub fn compare(job: &Job, pictures: &[Image], runs: usize, folder: &Path) -> Result<Vec<Row>, PaintImageError> {
     let wanted = |picture| vec![Tile { caption: "wanted".to_string(), picture: grey(picture) }];
     let mut sheet: Vec<Vec<Tile>> = pictures.iter().take(SHOWN).map(wanted).collect();
-    let mut jobs: Vec<Job> = Choice::READY.map(|painter| Job { painter, ..job.clone() }).to_vec();
+    let mut jobs: Vec<Job> = PainterKind::WITHOUT_WEIGHTS.map(|painter| Job { painter, ..job.clone() }).to_vec();
     if job.thesis.is_some() {
         // As the thesis has it: in layers, each planned by itself; and the whole picture at once.
         let layers = [None, Some(Sharing::Sequential)];
-        jobs.extend(layers.map(|layers| Job { painter: Choice::Thesis, layers, ..job.clone() }));
+        jobs.extend(layers.map(|layers| Job { painter: PainterKind::Thesis, layers, ..job.clone() }));
     }
     let mut rows = Vec::with_capacity(jobs.len());
     for job in jobs {
@@ -60,7 +60,7 @@ pub fn compare(job: &Job, pictures: &[Image], runs: usize, folder: &Path) -> Res
         });
     }
     write_text(&folder.join("compare.md"), &table(&rows))?;
-    save_sheet(&folder.join("compare.png"), &sheet)?;
+    save_contact_sheet(&folder.join("compare.png"), &sheet)?;
     Ok(rows)
 }
 

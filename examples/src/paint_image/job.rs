@@ -8,14 +8,14 @@ use paint_net::{
 };
 use serde::Serialize;
 
-use super::clock::Clock;
-use super::film::save_film;
+use super::cpu_timer::CpuTimer;
+use super::progress_strip::save_progress_strip;
 use super::{PaintImageError, colour_difference, commands, error_map, grey, level, ssim, write_json};
 
 /// Who decides the sprays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Choice {
-    /// The network that looks at its canvas.
+pub enum PainterKind {
+    /// The network with feedback from its canvas.
     Feedback,
     /// The same in three coats, each of which stays on the wall.
     Coats,
@@ -29,9 +29,10 @@ pub enum Choice {
     Thesis,
 }
 
-impl Choice {
+impl PainterKind {
     /// All that need no weights.
-    pub const READY: [Self; 5] = [Self::Feedback, Self::Coats, Self::Deconvolution, Self::Pursuit, Self::Splats];
+    pub const WITHOUT_WEIGHTS: [Self; 5] =
+        [Self::Feedback, Self::Coats, Self::Deconvolution, Self::Pursuit, Self::Splats];
 
     fn name(self) -> &'static str {
         match self {
@@ -49,8 +50,8 @@ impl Choice {
 #[derive(Debug, Clone)]
 pub struct Job {
     /// Who decides.
-    pub painter: Choice,
-    /// Looks of the network at its canvas.
+    pub painter: PainterKind,
+    /// Passes of the network over its canvas.
     pub passes: usize,
     /// The nozzle, pixels.
     pub kernel: SprayKernel,
@@ -87,7 +88,7 @@ pub struct Figures {
     pub ciede2000_mean: f64,
     /// Number of sprays.
     pub sprays: usize,
-    /// Looks of the network; 0 for painters that have none.
+    /// Passes of the network; 0 for painters that have none.
     pub passes: usize,
     /// Places on the path where the volume changes faster than was allowed; 0 if any change is allowed.
     pub slew_violations: usize,
@@ -110,15 +111,15 @@ impl Job {
     pub fn painter(&self) -> Result<Box<dyn Painter>, PaintImageError> {
         let feedback = || Feedback::shipped().map(|f| Feedback { passes: self.passes, threads: self.threads, ..f });
         let painter: Box<dyn Painter> = match self.painter {
-            Choice::Feedback => Box::new(feedback()?),
-            Choice::Coats => Box::new(Coats::new(feedback()?)),
-            Choice::Deconvolution => Box::new(Deconvolution::default()),
-            Choice::Pursuit => Box::new(MatchingPursuit::default()),
-            Choice::Splats => Box::new(FreeSplats {
+            PainterKind::Feedback => Box::new(feedback()?),
+            PainterKind::Coats => Box::new(Coats::new(feedback()?)),
+            PainterKind::Deconvolution => Box::new(Deconvolution::default()),
+            PainterKind::Pursuit => Box::new(MatchingPursuit::default()),
+            PainterKind::Splats => Box::new(FreeSplats {
                 sprays: self.limits.max_sprays.unwrap_or(FreeSplats::default().sprays),
                 ..FreeSplats::default()
             }),
-            Choice::Thesis => {
+            PainterKind::Thesis => {
                 let none =
                     || PaintImageError::Settings("the painter thesis needs a network: give --weights".to_string());
                 Box::new(Thesis { network: self.thesis.clone().ok_or_else(none)? })
@@ -133,7 +134,7 @@ impl Job {
     /// Decides the sprays for a wanted picture of ink.
     pub fn paint(&self, wanted: &Image, progress: &mut dyn FnMut(f64)) -> Result<(Painting, Figures), PaintImageError> {
         let painter = self.painter()?;
-        let clock = Clock::start(self.threads);
+        let timer = CpuTimer::start(self.threads);
         let task = Task::on_bare_wall(wanted);
         let (kernel, ink, limits) = (&self.kernel, &Saturation::Tanh, &self.limits);
         let (painting, slew_violations) = match self.largest_change {
@@ -144,10 +145,10 @@ impl Job {
                 (painting, slew_violations(&waypoints, most))
             }
         };
-        let cpu_ms = clock.milliseconds();
+        let cpu_ms = timer.milliseconds();
         let passes = match self.painter {
-            Choice::Feedback | Choice::Coats => self.passes,
-            Choice::Deconvolution | Choice::Pursuit | Choice::Splats | Choice::Thesis => 0,
+            PainterKind::Feedback | PainterKind::Coats => self.passes,
+            PainterKind::Deconvolution | PainterKind::Pursuit | PainterKind::Splats | PainterKind::Thesis => 0,
         };
         let figures = Figures {
             painter: self.name(),
@@ -189,6 +190,6 @@ impl Job {
         grey(&painting.ink).save(&folder.join("rendered.png"))?;
         error_map(&painting.ink, wanted).save(&folder.join("error.png"))?;
         let show = |depths: &[f64]| [level(depths[0].tanh()); 3];
-        save_film(&folder.join("film.png"), grey(wanted), &[&painting.sprays], &self.kernel, &show)
+        save_progress_strip(&folder.join("film.png"), grey(wanted), &[&painting.sprays], &self.kernel, &show)
     }
 }

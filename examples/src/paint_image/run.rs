@@ -7,8 +7,8 @@ use paint_net::{Image, Limits, Route, Sharing, SprayKernel};
 
 use super::command_line::{Arguments, Command, Nozzle, Preset, RouteName, SharingName, Training};
 use super::{
-    Choice, Glazes, Job, Lesson, PaintImageError, Pictures, ThesisLesson, compare, equal_sprays, learn, learn_thesis,
-    pictures_in, print_equal_sprays, read_ink, read_network, read_picture, table,
+    Glazes, Job, PaintImageError, PainterKind, ThesisTrainingRun, TrainingImages, TrainingRun, compare, equal_sprays,
+    pictures_in, print_equal_sprays, read_ink, read_network, read_picture, table, train_painter, train_thesis,
 };
 use crate::progress::Stage;
 
@@ -22,7 +22,7 @@ pub fn run(arguments: Arguments) -> Result<(), PaintImageError> {
             if palette.is_some() {
                 only_for_one_paint(painter, &nozzle)?;
             }
-            let job = job(painter.unwrap_or(Choice::Feedback), &nozzle)?;
+            let job = job(painter.unwrap_or(PainterKind::Feedback), &nozzle)?;
             for file in pictures_in(&image)? {
                 let out = if image.is_dir() { out.join(file.file_name().unwrap_or_default()) } else { out.clone() };
                 match palette {
@@ -35,19 +35,19 @@ pub fn run(arguments: Arguments) -> Result<(), PaintImageError> {
         Some(Command::Compare { pictures, runs, out, nozzle }) => {
             let pictures = pictures_or_textures(pictures)?;
             create(&out)?;
-            print!("{}", table(&compare(&job(Choice::Feedback, &nozzle)?, &pictures, runs, &out)?));
+            print!("{}", table(&compare(&job(PainterKind::Feedback, &nozzle)?, &pictures, runs, &out)?));
             Ok(())
         }
         Some(Command::EqualSprays { weights, pictures }) => {
             print!("{}", print_equal_sprays(&equal_sprays(&weights, &pictures_or_textures(pictures)?)?));
             Ok(())
         }
-        Some(Command::Train(training)) => train(training),
+        Some(Command::Train(training)) => run_training(training),
     }
 }
 
 /// The painter of colours has settings of its own.
-fn only_for_one_paint(painter: Option<Choice>, nozzle: &Nozzle) -> Result<(), PaintImageError> {
+fn only_for_one_paint(painter: Option<PainterKind>, nozzle: &Nozzle) -> Result<(), PaintImageError> {
     let given = [
         ("--painter", painter.is_some()),
         ("--layers", nozzle.layers.is_some()),
@@ -72,7 +72,7 @@ fn pictures_or_textures(pictures: Option<PathBuf>) -> Result<Vec<Image>, PaintIm
     })
 }
 
-fn train(training: Training) -> Result<(), PaintImageError> {
+fn run_training(training: Training) -> Result<(), PaintImageError> {
     let Training { preset, data, seed, steps, until, batch, rate, last_rate, as_printed, latent_weight, .. } = training;
     let Training { threads, resume, out, .. } = training;
     create(&out)?;
@@ -87,13 +87,13 @@ fn train(training: Training) -> Result<(), PaintImageError> {
                 learning_rate: rate.unwrap_or(preset.learning_rate),
                 ..preset
             };
-            learn(&Lesson { settings, resume, until, save_every: 500 }, &out)?;
+            train_painter(&TrainingRun { settings, resume, until, save_every: 500 }, &out)?;
             println!("{}", out.join("painter.safetensors").display());
             return Ok(());
         }
         // The command line requires the data.
-        Preset::ThesisMnist => (Shape::MNIST, Pictures::Digits(data.unwrap_or_default())),
-        Preset::ThesisPaint => (Shape::PAINT, Pictures::Patches),
+        Preset::ThesisMnist => (Shape::MNIST, TrainingImages::Digits(data.unwrap_or_default())),
+        Preset::ThesisPaint => (Shape::PAINT, TrainingImages::Patches),
     };
     let preset = ThesisSettings::default();
     let settings = ThesisSettings {
@@ -111,12 +111,12 @@ fn train(training: Training) -> Result<(), PaintImageError> {
         },
         ..preset
     };
-    learn_thesis(&ThesisLesson { settings, pictures, resume, until, save_every: 100 }, &out)?;
+    train_thesis(&ThesisTrainingRun { settings, pictures, resume, until, save_every: 100 }, &out)?;
     println!("{}", out.join("thesis.safetensors").display());
     Ok(())
 }
 
-fn job(painter: Choice, nozzle: &Nozzle) -> Result<Job, PaintImageError> {
+fn job(painter: PainterKind, nozzle: &Nozzle) -> Result<Job, PaintImageError> {
     Ok(Job {
         painter,
         passes: nozzle.passes.unwrap_or(6),

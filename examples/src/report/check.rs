@@ -5,12 +5,12 @@
 pub struct Check {
     /// What was measured.
     pub figure: &'static str,
-    /// The number that is judged: SI units, ratios and shares as they are.
+    /// The number that is checked: SI units, ratios and shares as they are.
     pub value: f64,
     /// How people read the number.
     pub unit: Unit,
     /// What is asked of it.
-    pub must: Must,
+    pub requirement: Requirement,
     /// What the papers report.
     pub papers: &'static str,
     /// The figure behind the number where that is a ratio or a difference.
@@ -19,7 +19,7 @@ pub struct Check {
 
 /// What is asked of a figure.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Must {
+pub enum Requirement {
     /// This or less.
     AtMost(f64),
     /// This or more.
@@ -68,19 +68,19 @@ impl Unit {
 impl Check {
     /// Whether the figure is what is asked for; a NaN never is.
     pub fn holds(&self) -> bool {
-        match self.must {
-            Must::AtMost(limit) => self.value <= limit,
-            Must::AtLeast(limit) => self.value >= limit,
-            Must::Open => true,
+        match self.requirement {
+            Requirement::AtMost(limit) => self.value <= limit,
+            Requirement::AtLeast(limit) => self.value >= limit,
+            Requirement::Open => true,
         }
     }
 
     /// How far inside its limit the figure is; negative outside, infinite where nothing is asked.
     pub fn margin(&self) -> f64 {
-        match self.must {
-            Must::AtMost(limit) => limit - self.value,
-            Must::AtLeast(limit) => self.value - limit,
-            Must::Open => f64::INFINITY,
+        match self.requirement {
+            Requirement::AtMost(limit) => limit - self.value,
+            Requirement::AtLeast(limit) => self.value - limit,
+            Requirement::Open => f64::INFINITY,
         }
     }
 
@@ -91,11 +91,11 @@ impl Check {
     }
 
     /// What is asked, for people.
-    pub fn must_text(&self) -> String {
-        match self.must {
-            Must::AtMost(limit) => format!("≤ {}", self.unit.show(limit)),
-            Must::AtLeast(limit) => format!("≥ {}", self.unit.show(limit)),
-            Must::Open => "-".into(),
+    pub fn requirement_text(&self) -> String {
+        match self.requirement {
+            Requirement::AtMost(limit) => format!("≤ {}", self.unit.show(limit)),
+            Requirement::AtLeast(limit) => format!("≥ {}", self.unit.show(limit)),
+            Requirement::Open => "-".into(),
         }
     }
 }
@@ -104,22 +104,22 @@ impl Check {
 mod tests {
     use super::*;
 
-    fn check(value: f64, must: Must) -> Check {
-        Check { figure: "", value, unit: Unit::Centimetres, must, papers: "-", detail: None }
+    fn check(value: f64, requirement: Requirement) -> Check {
+        Check { figure: "", value, unit: Unit::Centimetres, requirement, papers: "-", detail: None }
     }
 
     #[test]
     fn a_limit_includes_itself_and_nan_never_holds() {
-        for (value, must, holds) in [
-            (0.015, Must::AtMost(0.015), true),
-            (0.0151, Must::AtMost(0.015), false),
-            (5.0, Must::AtLeast(5.0), true),
-            (4.99, Must::AtLeast(5.0), false),
-            (1e9, Must::Open, true),
-            (f64::NAN, Must::AtMost(1.0), false),
-            (f64::NAN, Must::AtLeast(1.0), false),
+        for (value, requirement, holds) in [
+            (0.015, Requirement::AtMost(0.015), true),
+            (0.0151, Requirement::AtMost(0.015), false),
+            (5.0, Requirement::AtLeast(5.0), true),
+            (4.99, Requirement::AtLeast(5.0), false),
+            (1e9, Requirement::Open, true),
+            (f64::NAN, Requirement::AtMost(1.0), false),
+            (f64::NAN, Requirement::AtLeast(1.0), false),
         ] {
-            let check = check(value, must);
+            let check = check(value, requirement);
             assert_eq!(check.holds(), holds, "{check:?}");
             assert_eq!(check.margin() >= 0.0, holds, "{check:?}");
         }
@@ -127,9 +127,10 @@ mod tests {
 
     #[test]
     fn people_read_centimetres() {
-        let plain = check(0.0123, Must::AtMost(0.015));
-        assert_eq!((plain.value_text(), plain.must_text()), ("1.23 cm".into(), "≤ 1.50 cm".into()));
-        let ratio = Check { unit: Unit::Ratio, detail: Some("4.50 cm".into()), ..check(11.25, Must::AtLeast(5.0)) };
-        assert_eq!((ratio.value_text(), ratio.must_text()), ("11.25x (4.50 cm)".into(), "≥ 5.00x".into()));
+        let plain = check(0.0123, Requirement::AtMost(0.015));
+        assert_eq!((plain.value_text(), plain.requirement_text()), ("1.23 cm".into(), "≤ 1.50 cm".into()));
+        let ratio =
+            Check { unit: Unit::Ratio, detail: Some("4.50 cm".into()), ..check(11.25, Requirement::AtLeast(5.0)) };
+        assert_eq!((ratio.value_text(), ratio.requirement_text()), ("11.25x (4.50 cm)".into(), "≥ 5.00x".into()));
     }
 }

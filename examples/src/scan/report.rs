@@ -55,21 +55,22 @@ pub struct ScanReport {
 impl Scan {
     /// The figures of this run.
     pub fn report(&self) -> ScanReport {
-        let (settings, course) = (self.map.settings(), &self.course);
-        let casts: Vec<f64> = course.looks.iter().map(|look| look.seconds).collect();
+        let (settings, metrics) = (self.map.settings(), &self.metrics);
+        let casts: Vec<f64> = metrics.ray_casts.iter().map(|cast| cast.seconds).collect();
         ScanReport {
             version: env!("CARGO_PKG_VERSION"),
             frames: self.fused.len(),
             frames_skipped: self.skipped.len(),
             voxel_m: settings.voxel_size,
-            integrate_cpu_ms_median: 1e3 * median(&course.integrate_s),
+            integrate_cpu_ms_median: 1e3 * median(&metrics.integrate_s),
             raycast_cpu_ms_median: 1e3 * median(&casts),
-            depth_error_mean_m: mean(course.looks.iter().map(|look| look.depth_error)),
-            raycast_fill: mean(course.looks.iter().map(|look| look.fill)),
-            mesh_full_cpu_ms: 1e3 * course.mesh_s,
-            mesh_incremental_cpu_ms_median: (!course.follow_s.is_empty()).then(|| 1e3 * median(&course.follow_s)),
-            active_bytes_peak: course.active_bytes_peak,
-            host_bytes_peak: course.host_bytes_peak,
+            depth_error_mean_m: mean(metrics.ray_casts.iter().map(|cast| cast.depth_error)),
+            raycast_fill: mean(metrics.ray_casts.iter().map(|cast| cast.fill)),
+            mesh_full_cpu_ms: 1e3 * metrics.mesh_s,
+            mesh_incremental_cpu_ms_median: (!metrics.mesh_update_s.is_empty())
+                .then(|| 1e3 * median(&metrics.mesh_update_s)),
+            active_bytes_peak: metrics.active_bytes_peak,
+            host_bytes_peak: metrics.host_bytes_peak,
             blocks: self.map.blocks(),
             map_hash: format!("{:016x}", self.map.hash()),
             vertices: self.mesh.positions.len(),

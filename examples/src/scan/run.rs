@@ -7,7 +7,7 @@ use nalgebra::Isometry3;
 use tsdf_hash::{CastSettings, Map, MapFile, Mesh, MeshKeeper};
 use vio_ekf::{Stamp, Trajectory};
 
-use super::keeper::{Device, Keeper};
+use super::map_store::{Device, MapStore};
 use super::{Images, Sequence, SequenceError};
 use crate::progress::Stage;
 
@@ -16,8 +16,8 @@ use crate::progress::Stage;
 pub struct ScanSettings {
     /// The map.
     pub map: tsdf_hash::Settings,
-    /// Frames between two looks at the map from where the camera was.
-    pub look_every: usize,
+    /// Frames between two ray casts of the map from where the camera was.
+    pub ray_cast_every: usize,
     /// Where the map is kept.
     pub device: Device,
     /// File of the disk tier, if there is to be one.
@@ -29,7 +29,7 @@ pub struct ScanSettings {
 impl Default for ScanSettings {
     fn default() -> Self {
         let map = tsdf_hash::Settings::default();
-        Self { map, look_every: 10, device: Device::Cpu, swap: None, resume: None }
+        Self { map, ray_cast_every: 10, device: Device::Cpu, swap: None, resume: None }
     }
 }
 
@@ -48,18 +48,18 @@ pub struct Scan {
     /// What kept the map.
     pub device: String,
     /// What was measured on the way.
-    pub course: Course,
+    pub metrics: ScanMetrics,
 }
 
 /// What was measured while the map grew.
 #[derive(Debug, Clone, Default)]
-pub struct Course {
+pub struct ScanMetrics {
     /// Processor time of each fusion, seconds.
     pub integrate_s: Vec<f64>,
-    /// Processor time of following the map with its mesh, after each fusion, seconds; empty for a map on a GPU.
-    pub follow_s: Vec<f64>,
-    /// What looking at the map showed, and took: at the finished map, or, if blocks leave active memory, on the way.
-    pub looks: Vec<Look>,
+    /// Processor time of the incremental mesh update after each fusion, seconds; empty for a map on a GPU.
+    pub mesh_update_s: Vec<f64>,
+    /// Ray casts of the map: of the finished one, or, if blocks leave active memory, on the way.
+    pub ray_casts: Vec<RayCastCheck>,
     /// Processor time of the mesh from nothing, seconds.
     pub mesh_s: f64,
     /// Largest number of bytes in active memory.
@@ -70,7 +70,7 @@ pub struct Course {
 
 /// The map, seen from where a frame was taken, beside that frame.
 #[derive(Debug, Clone, Copy)]
-pub struct Look {
+pub struct RayCastCheck {
     /// Processor time of the ray cast, seconds.
     pub seconds: f64,
     /// Mean distance between the depth cast and the depth measured, over the pixels that have both, metres.
@@ -124,20 +124,20 @@ impl Scan {
     /// Maps a sequence by its recorded poses. Frames that cannot be used are counted and left out.
     pub fn run(folder: &Path, sequence: &Sequence, settings: &ScanSettings) -> Result<Self, ScanError> {
         let stage = Stage::start("fuse");
-        let mut keeper = Keeper::open(begin(settings)?, settings.device)?;
-        let (mut follower, mut course) = (MeshKeeper::new(), Course::default());
+        let mut store = MapStore::open(initial_map(settings)?, settings.device)?;
+        let (mut mesher, mut metrics) = (MeshKeeper::new(), ScanMetrics::default());
         let (mut fused, mut skipped) = (Vec::with_capacity(sequence.frames.len()), Vec::new());
         let mut trajectory = Trajectory::default();
-        // What has left active memory is not seen by a ray: then each look comes while its surroundings are still there.
+        // What has left active memory is not seen by a ray: then each ray cast comes while its surroundings are still there.
         let leaving = settings.map.tiers.host_bytes > 0;
-        let due = |index: usize| index.is_multiple_of(settings.look_every.max(1));
+        let due = |index: usize| index.is_multiple_of(settings.ray_cast_every.max(1));
         for (index, frame) in sequence.frames.iter().enumerate() {
             stage.share(index as f64 / sequence.frames.len() as f64);
             let Some(pose) = frame.world_from_camera else {
                 skipped.push((index, format!("{}: no pose was recorded for it", frame.depth.display())));
                 continue;
             };
-            match take(&mut keeper, &mut follower, sequence, index, &pose, leaving && due(index), &mut course) {
+            match fuse_frame(&mut store, &mut mesher, sequence, index, &pose, leaving && due(index), &mut metrics) {
                 Ok(()) => {
                     fused.push(index);
                     trajectory.push(Stamp::from_secs(frame.stamp)?, pose)?;
@@ -150,30 +150,30 @@ impl Scan {
             let frames = sequence.frames.len();
             return Err(ScanError::NothingFused { folder: folder.display().to_string(), frames, first });
         }
-        let blocks = keeper.dense().blocks();
+        let blocks = store.dense().blocks();
         stage.done(&format!("{} frames, {} left out, {blocks} blocks", fused.len(), skipped.len()));
 
         if !leaving {
-            let stage = Stage::start("look");
+            let stage = Stage::start("ray cast");
             for &index in fused.iter().filter(|&&index| due(index)) {
                 stage.share(index as f64 / sequence.frames.len() as f64);
-                course.looks.extend(look_from(&mut keeper, sequence, index)?);
+                metrics.ray_casts.extend(ray_cast_check(&mut store, sequence, index)?);
             }
-            stage.done(&format!("{} ray casts", course.looks.len()));
+            stage.done(&format!("{} ray casts", metrics.ray_casts.len()));
         }
 
         let stage = Stage::start("mesh");
         let start = ProcessTime::now();
-        let mesh = keeper.dense().mesh()?;
-        course.mesh_s = start.elapsed().as_secs_f64();
+        let mesh = store.dense().mesh()?;
+        metrics.mesh_s = start.elapsed().as_secs_f64();
         stage.done(&format!("{} vertices, {} triangles", mesh.positions.len(), mesh.faces.len()));
-        let (device, map) = (keeper.device(), keeper.into_map()?);
-        Ok(Self { map, mesh, trajectory, fused, skipped, device, course })
+        let (device, map) = (store.device(), store.into_map()?);
+        Ok(Self { map, mesh, trajectory, fused, skipped, device, metrics })
     }
 }
 
 /// The map that the run starts with.
-fn begin(settings: &ScanSettings) -> Result<Map, ScanError> {
+fn initial_map(settings: &ScanSettings) -> Result<Map, ScanError> {
     let Some(path) = &settings.resume else {
         return Ok(match &settings.swap {
             Some(swap) => Map::with_swap(settings.map, swap)?,
@@ -187,44 +187,44 @@ fn begin(settings: &ScanSettings) -> Result<Map, ScanError> {
     file.into_map(continued, settings.swap.as_deref()).map_err(stored)
 }
 
-/// Fuses a frame, lets the mesh follow and, if asked for, looks at the map from where the frame was taken.
-fn take(
-    keeper: &mut Keeper,
-    follower: &mut MeshKeeper,
+/// Fuses a frame, updates the mesh and, if asked for, casts the map from where the frame was taken.
+fn fuse_frame(
+    store: &mut MapStore,
+    mesher: &mut MeshKeeper,
     sequence: &Sequence,
     index: usize,
     pose: &Isometry3<f64>,
-    look: bool,
-    course: &mut Course,
+    ray_cast: bool,
+    metrics: &mut ScanMetrics,
 ) -> Result<(), ScanError> {
     let images = Images::read(&sequence.frames[index])?;
     let depth = images.depth(sequence.intrinsics, sequence.depth_scale);
     let start = ProcessTime::now();
-    keeper.dense().integrate(&depth, images.colour(sequence.intrinsics).as_ref(), pose)?;
-    course.integrate_s.push(start.elapsed().as_secs_f64());
-    course.active_bytes_peak = course.active_bytes_peak.max(keeper.dense().bytes());
-    if let Some(map) = keeper.map() {
-        course.host_bytes_peak = course.host_bytes_peak.max(map.memory().host_bytes);
+    store.dense().integrate(&depth, images.colour(sequence.intrinsics).as_ref(), pose)?;
+    metrics.integrate_s.push(start.elapsed().as_secs_f64());
+    metrics.active_bytes_peak = metrics.active_bytes_peak.max(store.dense().bytes());
+    if let Some(map) = store.map() {
+        metrics.host_bytes_peak = metrics.host_bytes_peak.max(map.memory().host_bytes);
         let start = ProcessTime::now();
-        follower.update(map)?;
-        course.follow_s.push(start.elapsed().as_secs_f64());
+        mesher.update(map)?;
+        metrics.mesh_update_s.push(start.elapsed().as_secs_f64());
     }
-    if look {
-        course.looks.extend(look_from(keeper, sequence, index)?);
+    if ray_cast {
+        metrics.ray_casts.extend(ray_cast_check(store, sequence, index)?);
     }
     Ok(())
 }
 
 /// `None` if the map has no surface where the frame has one.
-fn look_from(keeper: &mut Keeper, sequence: &Sequence, index: usize) -> Result<Option<Look>, ScanError> {
+fn ray_cast_check(store: &mut MapStore, sequence: &Sequence, index: usize) -> Result<Option<RayCastCheck>, ScanError> {
     let frame = &sequence.frames[index];
     let Some(pose) = &frame.world_from_camera else { return Ok(None) };
     let images = Images::read(frame)?;
     let depth = images.depth(sequence.intrinsics, sequence.depth_scale);
-    let &tsdf_hash::Settings { min_depth, max_depth, threads, .. } = keeper.settings();
+    let &tsdf_hash::Settings { min_depth, max_depth, threads, .. } = store.settings();
     let settings = CastSettings { min_depth, max_depth, colour: true, threads };
     let start = ProcessTime::now();
-    let view = keeper.dense().ray_cast(&depth.intrinsics, depth.width, depth.height, pose, &settings)?;
+    let view = store.dense().ray_cast(&depth.intrinsics, depth.width, depth.height, pose, &settings)?;
     let seconds = start.elapsed().as_secs_f64();
     let measured = images.metres(sequence.depth_scale).map(|z| Some(z).filter(|z| (min_depth..=max_depth).contains(z)));
     let (mut pixels, mut hits, mut error) = (0_usize, 0_usize, 0.0);
@@ -235,6 +235,6 @@ fn look_from(keeper: &mut Keeper, sequence: &Sequence, index: usize) -> Result<O
             error += (f64::from(seen) - z).abs();
         }
     }
-    let look = Look { seconds, depth_error: error / hits as f64, fill: hits as f64 / pixels as f64 };
-    Ok(Some(look).filter(|_| hits > 0))
+    let check = RayCastCheck { seconds, depth_error: error / hits as f64, fill: hits as f64 / pixels as f64 };
+    Ok(Some(check).filter(|_| hits > 0))
 }

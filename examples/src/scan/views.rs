@@ -30,7 +30,7 @@ impl Scan {
         let lights = Lights { sun: [0.0; 3], ambient: [1.0; 3], ..Lights::default() };
         let seen = |camera: &Camera, colours: bool| -> Result<Rgb, ScanError> {
             let towards_camera = camera.world_from_camera * -Vector3::z();
-            let shade = |hit: &Hit| look(&self.mesh, hit, (!colours).then_some(&towards_camera));
+            let shade = |hit: &Hit| shading(&self.mesh, hit, (!colours).then_some(&towards_camera));
             Ok(picture(&render(&surface, camera, &shade, &lights, SMOOTH, threads)?))
         };
         // The picture's "up" is -y, or +y where the focal length is negative.
@@ -48,7 +48,7 @@ impl Scan {
 }
 
 /// The mesh in its own colours, or in grey by the angle to `lamp`.
-fn look(mesh: &Mesh, hit: &Hit, lamp: Option<&Vector3<f64>>) -> Look {
+fn shading(mesh: &Mesh, hit: &Hit, lamp: Option<&Vector3<f64>>) -> Look {
     let [a, b, c] = mesh.faces[hit.face as usize].map(|vertex| vertex as usize);
     let [s, t] = hit.barycentric.map(|w| w as f32);
     let blend = |of: &dyn Fn(usize) -> [f32; 3]| -> [f32; 3] {

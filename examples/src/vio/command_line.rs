@@ -12,13 +12,13 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 )]
 pub struct Arguments {
     #[command(subcommand)]
-    pub(super) command: Option<Job>,
+    pub(super) command: Option<Command>,
     #[command(flatten)]
     pub(super) track: Track,
 }
 
 #[derive(Subcommand)]
-pub(super) enum Job {
+pub(super) enum Command {
     /// Renders a flight as an EuRoC folder that any odometry can run, and as MCAP
     Sim(Sim),
     /// Compares an estimated trajectory with a reference

@@ -6,7 +6,7 @@ use vio_ekf::calibration::{self, CameraCalibration, ImuCalibration};
 use vio_ekf::{Stamp, asl, euroc, nalgebra::Isometry3, tum};
 
 use super::error::read_text;
-use super::recording::Truth;
+use super::recording::GroundTruth;
 use super::{Images, Recording, VioError};
 
 /// Files that take the place of those in the folder.
@@ -79,7 +79,7 @@ pub(super) fn images(root: &Path, which: usize) -> Result<Vec<(Stamp, PathBuf)>,
 }
 
 /// What is known of the motion: the file named, else the ones that public recordings have.
-fn truth(root: &Path, overrides: &Overrides) -> Result<Option<Truth>, VioError> {
+fn truth(root: &Path, overrides: &Overrides) -> Result<Option<GroundTruth>, VioError> {
     let usual = ["state_groundtruth_estimate0/data.csv", "mocap0/data.csv"].map(|name| root.join(name));
     let Some(path) = overrides.truth.as_ref().or_else(|| usual.iter().find(|path| path.is_file())) else {
         return Ok(None);
@@ -88,13 +88,13 @@ fn truth(root: &Path, overrides: &Overrides) -> Result<Option<Truth>, VioError> 
 }
 
 /// Reads poses: comma-separated as EuRoC writes them, else TUM's columns.
-pub(super) fn read_truth(path: &Path) -> Result<Truth, VioError> {
+pub(super) fn read_truth(path: &Path) -> Result<GroundTruth, VioError> {
     let text = read_text(path)?;
     let is_data = |line: &&str| !line.trim().is_empty() && !line.starts_with(['#', '\u{feff}']);
     let in_file = |error: vio_ekf::Error| VioError::malformed(path, &error);
     if text.lines().find(is_data).is_some_and(|line| line.contains(',')) {
         let states = euroc::read(&text).map_err(in_file)?;
-        return Ok(Truth { trajectory: states.trajectory, velocities_in_world: states.velocities_in_world });
+        return Ok(GroundTruth { trajectory: states.trajectory, velocities_in_world: states.velocities_in_world });
     }
-    Ok(Truth { trajectory: tum::read(&text).map_err(in_file)?, velocities_in_world: Vec::new() })
+    Ok(GroundTruth { trajectory: tum::read(&text).map_err(in_file)?, velocities_in_world: Vec::new() })
 }

@@ -17,7 +17,7 @@ use super::cdr::Cdr;
 use super::error::read_text;
 use super::euroc_folder::{Overrides, read_truth};
 use super::mcap_out::NOISE_SCHEMA;
-use super::recording::{Shot, Truth};
+use super::recording::{CameraFrame, GroundTruth};
 use super::{Images, Recording, VioError};
 use pixels::{image, image_stamp};
 
@@ -47,7 +47,8 @@ pub fn open_mcap(path: &Path, overrides: &Overrides) -> Result<Recording, VioErr
     let (camera, imu) = found.calibrations(path, overrides)?;
     let truth = match &overrides.truth {
         Some(path) => Some(read_truth(path)?),
-        None => (!found.truth.is_empty()).then_some(Truth { trajectory: found.truth, velocities_in_world: Vec::new() }),
+        None => (!found.truth.is_empty())
+            .then_some(GroundTruth { trajectory: found.truth, velocities_in_world: Vec::new() }),
     };
     let images = Images::Mcap { path: path.to_path_buf(), topic, stamps: found.image_stamps };
     let name = path.display().to_string();
@@ -55,8 +56,8 @@ pub fn open_mcap(path: &Path, overrides: &Overrides) -> Result<Recording, VioErr
 }
 
 /// The images of a topic in the order of the file.
-pub(super) fn read_images(path: PathBuf, topic: String) -> Box<dyn Iterator<Item = Shot> + Send> {
-    let failed = |why: String| Shot { stamp: Stamp::default(), picture: Err(why), second: None };
+pub(super) fn read_images(path: PathBuf, topic: String) -> Box<dyn Iterator<Item = CameraFrame> + Send> {
+    let failed = |why: String| CameraFrame { stamp: Stamp::default(), picture: Err(why), second: None };
     let messages = match messages_of(&path) {
         Ok(messages) => messages,
         Err(error) => return Box::new(std::iter::once(failed(error.to_string()))),
@@ -67,7 +68,7 @@ pub(super) fn read_images(path: PathBuf, topic: String) -> Box<dyn Iterator<Item
             Some(match decoded {
                 Some((stamp, picture)) => {
                     let picture = picture.map_err(|why| format!("image of {stamp} s: {why}"));
-                    Shot { stamp, picture, second: None }
+                    CameraFrame { stamp, picture, second: None }
                 }
                 None => failed("a message on the images' topic that is no image".into()),
             })

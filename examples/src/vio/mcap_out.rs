@@ -15,7 +15,7 @@ use vio_ekf::calibration::{CameraCalibration, ImuCalibration};
 use vio_ekf::nalgebra::{Isometry3, Vector3};
 use vio_ekf::{Distortion, Imu, Stamp};
 
-use super::{Grey, VioError};
+use super::{GreyImage, VioError};
 
 /// Frames of the sensors.
 pub(super) const IMU_FRAME: &str = "imu";
@@ -55,7 +55,7 @@ float64 z
 /// An image on its way into a file.
 pub(super) enum Pixels<'a> {
     /// As it is.
-    Raw(&'a Grey),
+    Raw(&'a GreyImage),
     /// Already a PNG.
     Png(&'a [u8]),
 }

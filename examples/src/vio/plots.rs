@@ -3,8 +3,8 @@ use std::path::Path;
 use vio_ekf::nalgebra::Vector3;
 use vio_ekf::{Trajectory, so3};
 
-use super::judge::AlignedPair;
-use super::{Judgement, Run, VioError};
+use super::evaluation::AlignedPair;
+use super::{Run, RunEvaluation, VioError};
 use crate::pictures::{Panel, PathPanel, save_curves, save_paths};
 
 /// Points of a curve at most: more cannot be seen.
@@ -14,22 +14,22 @@ const POINTS: usize = 3000;
 pub(super) fn save(
     trajectory: &Trajectory,
     run: &Run,
-    judgement: Option<&Judgement>,
+    evaluation: Option<&RunEvaluation>,
     folder: &Path,
 ) -> Result<(), VioError> {
-    save_path(trajectory, judgement, &folder.join("trajectory.png"))?;
+    save_path(trajectory, evaluation, &folder.join("trajectory.png"))?;
     save_state(run, &folder.join("state.png"))?;
-    if let Some(judgement) = judgement {
-        save_errors(judgement, &folder.join("error.png"))?;
-        save_sigmas(judgement, &folder.join("sigma.png"))?;
+    if let Some(evaluation) = evaluation {
+        save_errors(evaluation, &folder.join("error.png"))?;
+        save_sigmas(evaluation, &folder.join("sigma.png"))?;
     }
     Ok(())
 }
 
 type Curve = Vec<(f64, f64)>;
 
-fn save_path(trajectory: &Trajectory, judgement: Option<&Judgement>, path: &Path) -> Result<(), VioError> {
-    let (estimate, truth): (Vec<Vector3<f64>>, Vec<Vector3<f64>>) = match judgement {
+fn save_path(trajectory: &Trajectory, evaluation: Option<&RunEvaluation>, path: &Path) -> Result<(), VioError> {
+    let (estimate, truth): (Vec<Vector3<f64>>, Vec<Vector3<f64>>) = match evaluation {
         Some(j) => j.aligned.iter().map(|(_, g, e)| (e.translation.vector, g.translation.vector)).unzip(),
         None => (trajectory.poses().iter().map(|pose| pose.translation.vector).collect(), Vec::new()),
     };
@@ -64,10 +64,10 @@ fn save_state(run: &Run, path: &Path) -> Result<(), VioError> {
     Ok(save_curves(path, "What the filter thinks", "time [s]", &panels)?)
 }
 
-fn save_errors(judgement: &Judgement, path: &Path) -> Result<(), VioError> {
-    let Some(&(first, ..)) = judgement.aligned.first() else { return Ok(()) };
+fn save_errors(evaluation: &RunEvaluation, path: &Path) -> Result<(), VioError> {
+    let Some(&(first, ..)) = evaluation.aligned.first() else { return Ok(()) };
     let curve = |value: &dyn Fn(&AlignedPair) -> f64| {
-        thinned(judgement.aligned.iter().map(|at| (at.0.secs_since(first), value(at))).collect())
+        thinned(evaluation.aligned.iter().map(|at| (at.0.secs_since(first), value(at))).collect())
     };
     let position = curve(&|(_, g, e)| 100.0 * (g.translation.vector - e.translation.vector).norm());
     let attitude = curve(&|(_, g, e)| so3::angle_between(&g.rotation, &e.rotation).to_degrees());
@@ -78,15 +78,15 @@ fn save_errors(judgement: &Judgement, path: &Path) -> Result<(), VioError> {
     Ok(save_curves(path, "Errors after alignment of position and yaw", "time [s]", &panels)?)
 }
 
-fn save_sigmas(judgement: &Judgement, path: &Path) -> Result<(), VioError> {
-    let Some(first) = judgement.errors.first().map(|error| error.stamp) else { return Ok(()) };
-    let panel = |label, factor: f64, pick: &dyn Fn(&super::judge::ErrorAt) -> (f64, f64)| {
+fn save_sigmas(evaluation: &RunEvaluation, path: &Path) -> Result<(), VioError> {
+    let Some(first) = evaluation.errors.first().map(|error| error.stamp) else { return Ok(()) };
+    let panel = |label, factor: f64, pick: &dyn Fn(&super::evaluation::PoseError) -> (f64, f64)| {
         let curve = |value: &dyn Fn(f64, f64) -> f64| -> Curve {
-            let at = |error: &super::judge::ErrorAt| {
+            let at = |error: &super::evaluation::PoseError| {
                 let (error_value, sigma) = pick(error);
                 (error.stamp.secs_since(first), factor * value(error_value, sigma))
             };
-            thinned(judgement.errors.iter().map(at).collect())
+            thinned(evaluation.errors.iter().map(at).collect())
         };
         let curves = vec![
             ("error", curve(&|e, _| e)),

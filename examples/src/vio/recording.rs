@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use vio_ekf::calibration::{CameraCalibration, ImuCalibration};
 use vio_ekf::{Imu, SampleFindings, Stamp, Trajectory, check_samples, nalgebra::Vector3};
 
-use super::{Grey, Second, VioError, mcap_in};
+use super::{GreyImage, SecondCamera, VioError, mcap_in};
 
 /// A camera and an inertial sensor, recorded; the body is the inertial sensor.
 #[derive(Debug, Clone)]
@@ -19,14 +19,14 @@ pub struct Recording {
     /// The images, not yet read.
     pub images: Images,
     /// A second camera beside the first.
-    pub second: Option<Second>,
+    pub second: Option<SecondCamera>,
     /// What is known of the true motion.
-    pub truth: Option<Truth>,
+    pub truth: Option<GroundTruth>,
 }
 
 /// The true motion of the body, as far as it was recorded.
 #[derive(Debug, Clone)]
-pub struct Truth {
+pub struct GroundTruth {
     /// Poses.
     pub trajectory: Trajectory,
     /// Velocity in world axes, m/s, one per pose; empty if it was not recorded.
@@ -50,13 +50,13 @@ pub enum Images {
 }
 
 /// An image that was due.
-pub struct Shot {
+pub struct CameraFrame {
     /// Middle of the exposure by the camera's clock.
     pub stamp: Stamp,
     /// The image, or why there is none.
-    pub picture: Result<Grey, String>,
+    pub picture: Result<GreyImage, String>,
     /// The image that a second camera took together with it, if there is one.
-    pub second: Option<Result<Grey, String>>,
+    pub second: Option<Result<GreyImage, String>>,
 }
 
 impl Images {
@@ -77,11 +77,11 @@ impl Images {
     }
 
     /// Reads them one after the other, as they are asked for.
-    fn read(&self) -> Box<dyn Iterator<Item = Shot> + Send + '_> {
+    fn read(&self) -> Box<dyn Iterator<Item = CameraFrame> + Send + '_> {
         match self {
-            Self::Files(files) => Box::new(files.iter().map(|(stamp, path)| Shot {
+            Self::Files(files) => Box::new(files.iter().map(|(stamp, path)| CameraFrame {
                 stamp: *stamp,
-                picture: Grey::read(path),
+                picture: GreyImage::read(path),
                 second: None,
             })),
             Self::Mcap { path, topic, .. } => mcap_in::read_images(path.clone(), topic.clone()),
@@ -91,8 +91,10 @@ impl Images {
 
 impl Recording {
     /// Reads the images one after the other, as they are asked for, each with that of the second camera.
-    pub fn shots(&self) -> impl Iterator<Item = Shot> + Send + '_ {
-        self.images.read().map(|shot| Shot { second: self.second.as_ref().and_then(|s| s.picture(shot.stamp)), ..shot })
+    pub fn camera_frames(&self) -> impl Iterator<Item = CameraFrame> + Send + '_ {
+        self.images
+            .read()
+            .map(|frame| CameraFrame { second: self.second.as_ref().and_then(|s| s.picture(frame.stamp)), ..frame })
     }
 
     /// Refuses a recording whose inertial samples cannot be, or whose images were taken at another time.

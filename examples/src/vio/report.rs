@@ -1,4 +1,4 @@
-//! The figures of a run, and the page that shows them.
+//! The figures of a run, and the report that shows them.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -7,7 +7,7 @@ use serde::Serialize;
 use vio_ekf::{SampleFindings, so3, tum};
 
 use super::error::write_file;
-use super::{Judgement, Recording, Run, VioError, plots};
+use super::{Recording, Run, RunEvaluation, VioError, plots};
 use crate::report::save_figures;
 
 /// What `report.json` of a run holds. Flat, SI units in the names; every number is finite. What needs the truth is absent
@@ -80,7 +80,7 @@ impl VioReport {
         recording: &Recording,
         findings: &SampleFindings,
         run: &Run,
-        judgement: Option<&Judgement>,
+        evaluation: Option<&RunEvaluation>,
         threads: usize,
     ) -> Result<Self, VioError> {
         let trajectory = run.trajectory()?;
@@ -94,13 +94,13 @@ impl VioReport {
             imu_gaps: findings.gaps,
             duration_s: trajectory.duration_s(),
             path_length_m: trajectory.path_length(),
-            ate_se3_rmse_m: judgement.map(|j| j.ate_se3),
-            ate_yaw_rmse_m: judgement.map(|j| j.ate_yaw),
-            rpe_10m_median_m: judgement.and_then(|j| j.rpe_10m_median),
-            nees_position_mean: judgement.map(|j| j.nees_position),
-            nees_attitude_mean: judgement.map(|j| j.nees_attitude),
-            nees_velocity_mean: judgement.and_then(|j| j.nees_velocity),
-            coverage: judgement.map(|j| j.coverage),
+            ate_se3_rmse_m: evaluation.map(|j| j.ate_se3),
+            ate_yaw_rmse_m: evaluation.map(|j| j.ate_yaw),
+            rpe_10m_median_m: evaluation.and_then(|j| j.rpe_10m_median),
+            nees_position_mean: evaluation.map(|j| j.nees_position),
+            nees_attitude_mean: evaluation.map(|j| j.nees_attitude),
+            nees_velocity_mean: evaluation.and_then(|j| j.nees_velocity),
+            coverage: evaluation.map(|j| j.coverage),
             frame_cpu_ms_median: 1e3 * quantile(&run.frame_s, 0.5),
             frame_cpu_ms_p99: 1e3 * quantile(&run.frame_s, 0.99),
             imu_cpu_us_median: 1e6 * quantile(&run.imu_s, 0.5),
@@ -113,7 +113,7 @@ impl VioReport {
         })
     }
 
-    fn markdown(&self, recording: &Recording, run: &Run, judged: bool) -> String {
+    fn markdown(&self, recording: &Recording, run: &Run, evaluated: bool) -> String {
         let mut text = format!(
             "# {}\n\n{} images ({} left out) and {} inertial samples; {:.1} m in {:.1} s. Version {}.\n\n",
             recording.name,
@@ -129,7 +129,7 @@ impl VioReport {
         }
         let mut pictures =
             vec![("trajectory.png", "From above and from the side"), ("state.png", "What the filter thinks")];
-        if judged {
+        if evaluated {
             pictures.push(("error.png", "Errors after alignment of position and yaw"));
             pictures.push((
                 "sigma.png",
@@ -179,13 +179,13 @@ pub fn save(
     report: &VioReport,
     recording: &Recording,
     run: &Run,
-    judgement: Option<&Judgement>,
+    evaluation: Option<&RunEvaluation>,
     folder: &Path,
 ) -> Result<(), VioError> {
     let trajectory = run.trajectory()?;
     write_file(&folder.join("trajectory.tum"), tum::write(&trajectory).as_bytes())?;
-    plots::save(&trajectory, run, judgement, folder)?;
-    write_file(&folder.join("report.md"), report.markdown(recording, run, judgement.is_some()).as_bytes())?;
+    plots::save(&trajectory, run, evaluation, folder)?;
+    write_file(&folder.join("report.md"), report.markdown(recording, run, evaluation.is_some()).as_bytes())?;
     // Last, so that its presence means the folder is complete.
     save_figures(report, folder)?;
     Ok(())

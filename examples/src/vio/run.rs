@@ -1,6 +1,6 @@
 //! The run: samples and images in the order of their stamps, and what the filter made of them.
 
-mod reasons;
+mod status_text;
 
 use std::sync::mpsc::sync_channel;
 use std::time::Duration;
@@ -9,10 +9,10 @@ use cpu_time::ThreadTime;
 use vio_ekf::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use vio_ekf::{Calibration, Error, ImuNoise, Odometry, Settings, Stamp, Status, Trajectory, Vio};
 
-use super::recording::Shot;
+use super::recording::CameraFrame;
 use super::{Recording, VioError};
 use crate::progress::Stage;
-use reasons::{describe, waiting};
+use status_text::{divergence_text, initialization_text};
 
 /// Images that wait for the filter when they are decoded beside it.
 const AHEAD: usize = 4;
@@ -77,20 +77,20 @@ pub fn run(recording: &Recording, settings: &RunSettings) -> Result<Run, VioErro
     let stage = (!settings.quiet).then(|| Stage::start("odometry"));
     let total = recording.images.count().max(1) as f64;
     let mut seen = 0.0;
-    let mut each = |shot: Shot| {
+    let mut each = |frame: CameraFrame| {
         seen += 1.0;
         if let Some(stage) = &stage {
             stage.share(seen / total);
         }
-        driver.shot(shot)
+        driver.camera_frame(frame)
     };
     if settings.threads < 2 {
-        recording.shots().try_for_each(&mut each)?;
+        recording.camera_frames().try_for_each(&mut each)?;
     } else {
         std::thread::scope(|scope| {
             let (sender, receiver) = sync_channel(AHEAD);
             // Ends by itself when the receiver is dropped.
-            scope.spawn(move || recording.shots().try_for_each(|shot| sender.send(shot)));
+            scope.spawn(move || recording.camera_frames().try_for_each(|frame| sender.send(frame)));
             receiver.into_iter().try_for_each(&mut each)
         })?;
     }
@@ -146,7 +146,7 @@ impl<'a> Driver<'a> {
     }
 
     /// An image, after the samples that come before it.
-    fn shot(&mut self, Shot { stamp, picture, second }: Shot) -> Result<(), VioError> {
+    fn camera_frame(&mut self, CameraFrame { stamp, picture, second }: CameraFrame) -> Result<(), VioError> {
         let picture = match picture {
             Ok(picture) => picture,
             Err(why) => {
@@ -192,7 +192,7 @@ impl<'a> Driver<'a> {
         self.last_image = Some(stamp);
         match report.status {
             Status::Tracking => self.keep(report.used, elapsed),
-            Status::Diverged(excess) => self.lose(stamp, describe(excess)),
+            Status::Diverged(excess) => self.lose(stamp, divergence_text(excess)),
             Status::Uninitialised(_) => {}
         }
         Ok(())
@@ -264,7 +264,7 @@ impl<'a> Driver<'a> {
         }
         let segments: Vec<Segment> = self.segments.into_iter().filter(|s| !s.odometry.is_empty()).collect();
         let (Some(first), Some(calibration)) = (segments.first(), self.calibration) else {
-            let why = self.lost.last().map_or(waiting(self.vio.status()), |(_, why)| why.clone());
+            let why = self.lost.last().map_or(initialization_text(self.vio.status()), |(_, why)| why.clone());
             return Err(unusable(format!("the odometry never started: {why}")));
         };
         let began = self.first_image.unwrap_or(first.odometry[0].stamp);

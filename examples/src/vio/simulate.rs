@@ -12,7 +12,7 @@ use vio_ekf::{Spline, Stamp, Trajectory, asl, euroc, so3, tum};
 use super::error::{make_folder, write_file};
 use super::euroc_folder::read_truth;
 use super::mcap_out::{McapWriter, Pixels};
-use super::{Grey, VioError};
+use super::{GreyImage, VioError};
 use crate::progress::Stage;
 
 /// Time between two knots of the motion, ns.
@@ -123,10 +123,10 @@ pub fn simulate(settings: &SimulationSettings, folder: &Path) -> Result<Simulate
 }
 
 /// A frame of a camera, ready to be written.
-struct Developed {
+struct EncodedImage {
     which: usize,
     stamp: Stamp,
-    grey: Grey,
+    grey: GreyImage,
     png: Vec<u8>,
 }
 
@@ -140,9 +140,9 @@ fn render(simulation: &Simulation, threads: usize, mut out: Sink) -> Result<usiz
     for first in (0..count).step_by(threads) {
         stage.share(first as f64 / count as f64);
         let batch = first..(first + threads).min(count);
-        let developed: Vec<Result<Option<Developed>, VioError>> = std::thread::scope(|scope| {
+        let developed: Vec<Result<Option<EncodedImage>, VioError>> = std::thread::scope(|scope| {
             let workers: Vec<_> =
-                batch.map(|k| scope.spawn(move || develop(simulation, k % cameras, k / cameras))).collect();
+                batch.map(|k| scope.spawn(move || encode_image(simulation, k % cameras, k / cameras))).collect();
             let join = |worker: std::thread::ScopedJoinHandle<'_, _>| {
                 worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
             };
@@ -159,7 +159,7 @@ fn render(simulation: &Simulation, threads: usize, mut out: Sink) -> Result<usiz
     Ok(frames)
 }
 
-fn develop(simulation: &Simulation, which: usize, index: usize) -> Result<Option<Developed>, VioError> {
+fn encode_image(simulation: &Simulation, which: usize, index: usize) -> Result<Option<EncodedImage>, VioError> {
     if index >= simulation.frame_count(which) {
         return Ok(None);
     }
@@ -168,7 +168,7 @@ fn develop(simulation: &Simulation, which: usize, index: usize) -> Result<Option
     PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Sub)
         .write_image(&data, width as u32, height as u32, ExtendedColorType::L8)
         .map_err(|error| VioError::unwritable(Path::new("image"), &error))?;
-    Ok(Some(Developed { which, stamp, grey: Grey { width, height, data }, png }))
+    Ok(Some(EncodedImage { which, stamp, grey: GreyImage { width, height, data }, png }))
 }
 
 /// Where frames go, and with them the samples and poses up to their time.
@@ -185,7 +185,7 @@ struct Sink<'a> {
 }
 
 impl Sink<'_> {
-    fn frame(&mut self, frame: &Developed) -> Result<(), VioError> {
+    fn frame(&mut self, frame: &EncodedImage) -> Result<(), VioError> {
         let name = format!("{}.png", frame.stamp.nanos());
         write_file(&self.root.join(format!("cam{}/data", frame.which)).join(&name), &frame.png)?;
         self.names[frame.which].push((frame.stamp, name));

@@ -1,7 +1,7 @@
-//! Noise settings from recordings: what is run, what it costs, and the page about it.
+//! Noise settings from recordings: what is run, what it costs, and the report.
 
-mod page;
-mod trials;
+mod output;
+mod trial_log;
 
 use std::fs::File;
 use std::path::Path;
@@ -15,10 +15,10 @@ use vio_ekf::{Camera, ImuNoise, Settings};
 
 use super::error::write_file;
 use super::simulate::flight_spline;
-use super::{Flight, Recording, RunSettings, VioError, judge, run};
+use super::{Flight, Recording, RunSettings, VioError, evaluate_run, run};
 use crate::progress::Stage;
-use page::save;
-use trials::{append, read_trials, trials_text};
+use output::save;
+use trial_log::{append, read_trials, trials_text};
 
 /// Standard deviation of the simulated points, pixels.
 const PIXEL_SIGMA: f64 = 1.0;
@@ -27,7 +27,7 @@ const GROUPS: [&str; 5] =
     ["gyroscope, white", "gyroscope, walk", "accelerometer, white", "accelerometer, walk", "image"];
 
 /// What the settings are tuned on.
-pub enum Lessons {
+pub enum TuningData {
     /// Simulated flights before points.
     Points(Vec<PointRecording>),
     /// Recordings whose true motion is known.
@@ -100,7 +100,7 @@ pub struct TuningReport {
     pub threads: usize,
 }
 
-impl Lessons {
+impl TuningData {
     /// As many simulated flights of so many seconds, before points.
     ///
     /// # Errors
@@ -144,26 +144,26 @@ fn score_recording(recording: &Recording, point: &NoisePoint) -> Result<Score, V
         Err(VioError::Unusable { .. }) => return Ok(lost),
         Err(error) => return Err(error),
     };
-    let Some(judgement) = judge(&run, truth)? else { return Ok(lost) };
-    let nees = [judgement.nees_position, judgement.nees_attitude, judgement.nees_velocity.unwrap_or(3.0)];
-    Ok(Score { ate: judgement.ate_yaw, nees, lost: 1.0 - judgement.coverage })
+    let Some(evaluation) = evaluate_run(&run, truth)? else { return Ok(lost) };
+    let nees = [evaluation.nees_position, evaluation.nees_attitude, evaluation.nees_velocity.unwrap_or(3.0)];
+    Ok(Score { ate: evaluation.ate_yaw, nees, lost: 1.0 - evaluation.coverage })
 }
 
 /// Scores of all recordings at one point, some at a time.
-fn scores(lessons: &Lessons, point: &NoisePoint, threads: usize) -> Result<Vec<Score>, VioError> {
+fn scores(data: &TuningData, point: &NoisePoint, threads: usize) -> Result<Vec<Score>, VioError> {
     let next = AtomicUsize::new(0);
     let work = || {
         let mut done = Vec::new();
         loop {
             let index = next.fetch_add(1, Ordering::Relaxed);
-            if index >= lessons.len() {
+            if index >= data.len() {
                 return done;
             }
-            done.push((index, lessons.score(index, point)));
+            done.push((index, data.score(index, point)));
         }
     };
     let mut all: Vec<_> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads.clamp(1, lessons.len())).map(|_| scope.spawn(work)).collect();
+        let workers: Vec<_> = (0..threads.clamp(1, data.len())).map(|_| scope.spawn(work)).collect();
         let join = |worker: std::thread::ScopedJoinHandle<'_, _>| {
             worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
         };
@@ -178,7 +178,7 @@ fn scores(lessons: &Lessons, point: &NoisePoint, threads: usize) -> Result<Vec<S
 ///
 /// # Errors
 /// [`VioError`] if the recordings cannot be used, or a file cannot be written.
-pub fn tune_noise(lessons: &Lessons, tuning: &Tuning, folder: &Path) -> Result<TuningReport, VioError> {
+pub fn tune_noise(data: &TuningData, tuning: &Tuning, folder: &Path) -> Result<TuningReport, VioError> {
     tuning.search.check()?;
     let path = folder.join("trials.csv");
     let known = if tuning.resume && path.is_file() { read_trials(&path)? } else { Vec::new() };
@@ -190,7 +190,7 @@ pub fn tune_noise(lessons: &Lessons, tuning: &Tuning, folder: &Path) -> Result<T
 
     let stage = Stage::start("tune");
     let evaluate = |point: &NoisePoint| {
-        let scores = scores(lessons, point, tuning.threads)?;
+        let scores = scores(data, point, tuning.threads)?;
         Ok::<_, VioError>(cost(&scores, tuning.consistency_weight))
     };
     let found = tune(&tuning.start, &tuning.search, &known, |point| {
@@ -224,7 +224,7 @@ pub fn tune_noise(lessons: &Lessons, tuning: &Tuning, folder: &Path) -> Result<T
     }
 
     let (start, best) =
-        (scores(lessons, &tuning.start, tuning.threads)?, scores(lessons, &found.best.point, tuning.threads)?);
+        (scores(data, &tuning.start, tuning.threads)?, scores(data, &found.best.point, tuning.threads)?);
     let geometric =
         |scores: &[Score]| (scores.iter().map(|s| s.ate.max(1e-9).ln()).sum::<f64>() / scores.len() as f64).exp();
     let nees = |scores: &[Score]| scores.iter().flat_map(|s| s.nees).sum::<f64>() / (3.0 * scores.len() as f64);
@@ -232,7 +232,7 @@ pub fn tune_noise(lessons: &Lessons, tuning: &Tuning, folder: &Path) -> Result<T
     let factor = found.best.point.map(|power| 10_f64.powf(power));
     let report = TuningReport {
         version: env!("CARGO_PKG_VERSION"),
-        recordings: lessons.len(),
+        recordings: data.len(),
         evaluations: found.trials.len(),
         evaluations_computed: computed,
         weighted_error_start_m: found.trials[0].cost.exp(),
@@ -252,7 +252,7 @@ pub fn tune_noise(lessons: &Lessons, tuning: &Tuning, folder: &Path) -> Result<T
         search_wall_s,
         threads: tuning.threads,
     };
-    save(&report, lessons, tuning, (&found.trials, &random), folder)?;
+    save(&report, data, tuning, (&found.trials, &random), folder)?;
     Ok(report)
 }
 

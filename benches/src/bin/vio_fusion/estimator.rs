@@ -106,7 +106,7 @@ impl Estimator {
     pub(crate) fn take(&mut self, arrival: &Arrival) -> Result<Option<Odometry>, AnyError> {
         match self {
             Self::Odometry { vio, start } => match arrival {
-                Arrival::First(sample) => {
+                Arrival::PrimaryImu(sample) => {
                     vio.imu(sample)?;
                     if let Some(start) = start.take() {
                         vio.start(&start)?;
@@ -117,7 +117,7 @@ impl Estimator {
                 _ => {}
             },
             Self::Cascade { vio, fusion, start, settings } => match arrival {
-                Arrival::First(sample) => {
+                Arrival::PrimaryImu(sample) => {
                     if let Some(vio) = vio {
                         vio.imu(sample)?;
                         if let Some((start, _)) = start {
@@ -125,7 +125,7 @@ impl Estimator {
                         }
                     }
                 }
-                Arrival::Second(sample) => {
+                Arrival::SecondaryImu(sample) => {
                     fusion.imu(sample)?;
                     if let Some((_, start)) = start.take() {
                         fusion.start(&start)?;
@@ -148,7 +148,7 @@ impl Estimator {
                 }
             },
             Self::Unified { vio, start, second, map } => match arrival {
-                Arrival::First(sample) => {
+                Arrival::PrimaryImu(sample) => {
                     vio.imu(sample)?;
                     if let Some(wanted) = start {
                         match vio.start(wanted) {
@@ -162,7 +162,7 @@ impl Estimator {
                     }
                     return Ok(vio.output());
                 }
-                Arrival::Second(sample) if *second => drop(vio.second_imu(sample)?),
+                Arrival::SecondaryImu(sample) if *second => drop(vio.second_imu(sample)?),
                 Arrival::Points(stamp, points) => vio.points(*stamp, points)?,
                 Arrival::Pose(pose) if *map => vio.pose(pose)?,
                 _ => {}

@@ -6,7 +6,7 @@ use mcap::Message;
 use vio_ekf::Stamp;
 
 use super::stamp;
-use crate::vio::Grey;
+use crate::vio::GreyImage;
 use crate::vio::cdr::Cdr;
 
 /// Time of an image; `None` if the message is none.
@@ -19,7 +19,7 @@ pub(super) fn image_stamp(schema: &str, data: &[u8]) -> Option<Stamp> {
 }
 
 /// Time and pixels of an image; `None` if the message is none.
-pub(super) fn image(message: &Message) -> Option<(Stamp, Result<Grey, String>)> {
+pub(super) fn image(message: &Message) -> Option<(Stamp, Result<GreyImage, String>)> {
     let data = message.data.as_ref();
     match message.channel.schema.as_ref()?.name.as_str() {
         "foxglove.RawImage" => {
@@ -29,7 +29,7 @@ pub(super) fn image(message: &Message) -> Option<(Stamp, Result<Grey, String>)> 
         }
         "foxglove.CompressedImage" => {
             let image = CompressedImage::decode(data).ok()?;
-            Some((stamp(image.timestamp?), Grey::decode(&image.data)))
+            Some((stamp(image.timestamp?), GreyImage::decode(&image.data)))
         }
         "sensor_msgs/msg/Image" => {
             let mut cdr = Cdr::new(data)?;
@@ -43,14 +43,14 @@ pub(super) fn image(message: &Message) -> Option<(Stamp, Result<Grey, String>)> 
             let mut cdr = Cdr::new(data)?;
             let (stamp, _) = cdr.header()?;
             let _format = cdr.string()?;
-            Some((stamp, Grey::decode(cdr.blob()?)))
+            Some((stamp, GreyImage::decode(cdr.blob()?)))
         }
         _ => None,
     }
 }
 
 /// Pixels as they are in memory, row by row with padding, to grey.
-fn unpack(encoding: &str, (width, height, step): (usize, usize, usize), data: &[u8]) -> Result<Grey, String> {
+fn unpack(encoding: &str, (width, height, step): (usize, usize, usize), data: &[u8]) -> Result<GreyImage, String> {
     let (channels, red) = match encoding {
         "mono8" | "8UC1" => (1, 0),
         "rgb8" => (3, 0),
@@ -74,7 +74,7 @@ fn unpack(encoding: &str, (width, height, step): (usize, usize, usize), data: &[
         ((299 * r + 587 * g + 114 * b + 500) / 1000) as u8
     };
     let rows = data.chunks_exact(step.max(1)).take(height);
-    Ok(Grey { width, height, data: rows.flat_map(|r| r[..row].chunks_exact(channels).map(luma)).collect() })
+    Ok(GreyImage { width, height, data: rows.flat_map(|r| r[..row].chunks_exact(channels).map(luma)).collect() })
 }
 
 #[cfg(test)]

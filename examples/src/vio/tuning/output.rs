@@ -7,7 +7,7 @@ use std::path::Path;
 use vio_ekf::tune::{Trial, with_factors};
 use vio_ekf::{ImuNoise, Settings};
 
-use super::{GROUPS, Lessons, Tuning, TuningReport};
+use super::{GROUPS, Tuning, TuningData, TuningReport};
 use crate::pictures::{Panel, save_curves};
 use crate::report::save_figures;
 use crate::vio::VioError;
@@ -16,7 +16,7 @@ use crate::vio::error::write_file;
 /// Writes `noise.yaml`, `tune.png`, `report.md` and `report.json`.
 pub(super) fn save(
     report: &TuningReport,
-    lessons: &Lessons,
+    data: &TuningData,
     tuning: &Tuning,
     (trials, random): (&[Trial], &[Trial]),
     folder: &Path,
@@ -34,9 +34,9 @@ pub(super) fn save(
         Panel { label: "image [powers of 10]", curves: vec![(GROUPS[4], powers(4))] },
     ];
     save_curves(&folder.join("tune.png"), "Search for noise settings", "evaluation", &panels)?;
-    let base = match lessons {
-        Lessons::Points(_) => (ImuNoise::default(), 200.0),
-        Lessons::Recordings(recordings) => (recordings[0].imu.noise, recordings[0].imu.rate_hz),
+    let base = match data {
+        TuningData::Points(_) => (ImuNoise::default(), 200.0),
+        TuningData::Recordings(recordings) => (recordings[0].imu.noise, recordings[0].imu.rate_hz),
     };
     let best = [
         report.factor_gyro_white,

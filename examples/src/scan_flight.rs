@@ -1,8 +1,8 @@
 //! The scan before the paint: the robot flies along a surface it has no mesh of, finds out where it is with its own camera and
 //! inertial sensor, and maps with its own depth camera. What it paints afterwards is what it has mapped.
 
-mod flight;
-mod judge;
+mod evaluation;
+mod route;
 mod sensors;
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -11,11 +11,11 @@ use tsdf_hash::{DepthData, DepthView, Map};
 use vio_ekf::sim::{RoomSettings, Scenario, Simulation};
 use vio_ekf::{ImuNoise, Stamp, Status, Trajectory, Vio};
 
-pub use judge::SurveyFigures;
+pub use evaluation::ScanFlightFigures;
 
 use crate::mesh_io::TriangleMesh;
 use crate::progress::Stage;
-use sensors::{Eyes, FRAMES_PER_SECOND};
+use sensors::{FRAMES_PER_SECOND, SimulatedCamera};
 
 /// Edge of a voxel of the map, metres: below the size of a spray spot.
 const VOXEL: f64 = 0.02;
@@ -23,11 +23,11 @@ const VOXEL: f64 = 0.02;
 const FUSE_EVERY: usize = 4;
 
 /// A scanned surface, and how well it was scanned.
-pub struct Survey {
+pub struct ScanFlight {
     /// The surface as the robot mapped it, in the world's frame.
     pub mesh: TriangleMesh,
     /// How far it is from the true one.
-    pub figures: SurveyFigures,
+    pub figures: ScanFlightFigures,
     /// Where the robot was.
     flown: Trajectory,
     /// Where it took itself to be.
@@ -36,7 +36,7 @@ pub struct Survey {
 
 /// Why a surface could not be scanned.
 #[derive(Debug, thiserror::Error)]
-pub enum SurveyError {
+pub enum ScanFlightError {
     /// It has no front to fly along.
     #[error("the surface closes in on itself: a scan flies along surfaces that face one side; paint it without --scan")]
     NoFront,
@@ -66,17 +66,17 @@ pub enum SurveyError {
     Camera(#[from] paint_sim::Error),
 }
 
-impl Survey {
+impl ScanFlight {
     /// Flies along `mesh` (metres, z up), which the robot only sees through its sensors.
     ///
     /// The robot starts at rest at a place that is known, as at a charging station: position and heading of the first
     /// estimate are set to the truth. Everything after that is its own.
-    pub fn fly(mesh: &TriangleMesh, seed: u64, threads: usize) -> Result<Self, SurveyError> {
+    pub fn fly(mesh: &TriangleMesh, seed: u64, threads: usize) -> Result<Self, ScanFlightError> {
         let stage = Stage::start("survey");
         let surface = TriangleSurface::new(&mesh.positions, &mesh.faces)?;
-        let route = flight::along(mesh)?;
-        let eyes = Eyes::new(mesh, &surface, route.towards, seed, threads);
-        let camera = eyes.camera;
+        let route = route::along(mesh)?;
+        let sensor = SimulatedCamera::new(mesh, &surface, route.towards, seed, threads);
+        let camera = sensor.camera;
         let simulation = inertial(route.spline, seed)?;
         let mut samples = simulation.imu(0)?.samples.into_iter().peekable();
         let mut map = Map::new(tsdf_hash::Settings { voxel_size: VOXEL, threads, ..tsdf_hash::Settings::default() })?;
@@ -87,7 +87,7 @@ impl Survey {
         let count = (last.secs_since(first) * FRAMES_PER_SECOND) as usize;
         let mut vio = {
             // The odometry does not read depth, but need not guess how far away the surface is at first.
-            let before = eyes.look(0, &(simulation.motion(first)?.world_from_body * camera.body_from_camera))?;
+            let before = sensor.capture(0, &(simulation.motion(first)?.world_from_body * camera.body_from_camera))?;
             let mut settings = vio_ekf::Settings::default();
             if let Some(distance) = before.distance() {
                 (settings.landmarks.inverse_distance, settings.landmarks.common_sigma) = (1.0 / distance, 0.1);
@@ -100,18 +100,18 @@ impl Survey {
                 vio.imu(&sample)?;
             }
             let truth = simulation.motion(stamp)?.world_from_body;
-            let shot = eyes.look(k, &(truth * camera.body_from_camera))?;
-            let report = vio.image(stamp, &shot.grey())?;
+            let image = sensor.capture(k, &(truth * camera.body_from_camera))?;
+            let report = vio.image(stamp, &image.grey())?;
             let (Status::Tracking, Some(odometry)) = (report.status, vio.output()) else { continue };
             let world_from_start =
-                *world_from_start.get_or_insert_with(|| same_place_and_heading(&odometry.world_from_body, &truth));
+                *world_from_start.get_or_insert_with(|| yaw_alignment(&odometry.world_from_body, &truth));
             let pose = world_from_start * odometry.world_from_body;
             flown.push(stamp, truth)?;
             estimated.push(stamp, pose)?;
             if k % FUSE_EVERY == 0 {
-                let data = DepthData::F32 { data: &shot.depth };
+                let data = DepthData::F32 { data: &image.depth };
                 let view =
-                    DepthView { width: camera.width, height: camera.height, data, intrinsics: eyes.intrinsics() };
+                    DepthView { width: camera.width, height: camera.height, data, intrinsics: sensor.intrinsics() };
                 match map.integrate(&view, None, &(pose * camera.body_from_camera)) {
                     // Past the edge of the surface there is nothing to fuse.
                     Ok(_) | Err(tsdf_hash::Error::NoDepth { .. }) => {}
@@ -121,11 +121,11 @@ impl Survey {
             stage.share(k as f64 / count as f64);
         }
         if vio.status() != Status::Tracking {
-            return Err(SurveyError::Lost(vio.status()));
+            return Err(ScanFlightError::Lost(vio.status()));
         }
         let mapped = map.mesh();
         let scanned = TriangleMesh { positions: mapped.positions, faces: mapped.faces, ..TriangleMesh::default() };
-        let figures = judge::figures(&surface, mesh, &scanned, &flown, &estimated)?;
+        let figures = evaluation::figures(&surface, mesh, &scanned, &flown, &estimated)?;
         stage.done(&figures.summary());
         Ok(Self { mesh: scanned, figures, flown, estimated })
     }
@@ -139,7 +139,7 @@ fn inertial(spline: vio_ekf::Spline, seed: u64) -> Result<Simulation, vio_ekf::E
 }
 
 /// The turn about the vertical and the shift that bring `from` to the place and heading of `to`.
-fn same_place_and_heading(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Isometry3<f64> {
+fn yaw_alignment(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Isometry3<f64> {
     let turn = (to.rotation * from.rotation.inverse()).to_rotation_matrix();
     let yaw = (turn[(1, 0)] - turn[(0, 1)]).atan2(turn[(0, 0)] + turn[(1, 1)]);
     let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw);
@@ -154,9 +154,9 @@ mod tests {
     fn heading_and_place_are_taken_over_and_the_vertical_is_not() {
         let from = Isometry3::new(Vector3::new(1.0, 2.0, 3.0), Vector3::new(0.1, 0.0, 0.4));
         let yaw = Isometry3::new(Vector3::new(-4.0, 0.3, 1.0), Vector3::new(0.0, 0.0, 2.1));
-        assert!((same_place_and_heading(&from, &(yaw * from)).to_matrix() - yaw.to_matrix()).norm() < 1e-12);
+        assert!((yaw_alignment(&from, &(yaw * from)).to_matrix() - yaw.to_matrix()).norm() < 1e-12);
         let tilted = Isometry3::new(Vector3::zeros(), Vector3::new(0.2, 0.0, 0.0)) * from;
-        let found = same_place_and_heading(&from, &tilted);
+        let found = yaw_alignment(&from, &tilted);
         assert!((found.rotation * Vector3::z() - Vector3::z()).norm() < 1e-12);
         assert!(((found * from).translation.vector - tilted.translation.vector).norm() < 1e-12);
     }

@@ -1,6 +1,6 @@
 //! The scan before the paint, on a small piece of the built-in wall.
 
-use paintcopter_examples::survey::{Survey, SurveyError};
+use paintcopter_examples::scan_flight::{ScanFlight, ScanFlightError};
 use paintcopter_examples::world::{CENTRE, rock_wall};
 
 /// 1.6 m by 0.8 m, as high above the ground as the whole wall.
@@ -15,14 +15,14 @@ fn small_wall() -> paintcopter_examples::mesh_io::TriangleMesh {
 /// The floors are what a person would call a useful scan, several times what is reached.
 #[test]
 fn a_wall_is_mapped_by_the_robots_own_senses_whatever_the_threads() {
-    let survey = Survey::fly(&small_wall(), 1, 2).unwrap();
-    let figures = &survey.figures;
+    let scan = ScanFlight::fly(&small_wall(), 1, 2).unwrap();
+    let figures = &scan.figures;
     println!("{figures:?}");
     assert!(figures.position_error_max_m < 0.15 && figures.ate_se3_rmse_m < 0.05);
     assert!(figures.mesh_error_mean_m < 0.006 && figures.covered_share > 0.97);
     assert!(figures.path_length_m > 1.5 && figures.duration_s > 3.0);
-    let again = Survey::fly(&small_wall(), 1, 1).unwrap();
-    assert!(again.mesh.positions == survey.mesh.positions && again.mesh.faces == survey.mesh.faces);
+    let again = ScanFlight::fly(&small_wall(), 1, 1).unwrap();
+    assert!(again.mesh.positions == scan.mesh.positions && again.mesh.faces == scan.mesh.faces);
 }
 
 #[test]
@@ -31,7 +31,7 @@ fn a_surface_that_cannot_be_flown_along_is_refused_before_take_off() {
     for position in &mut mesh.positions {
         *position = position.map(|c| 100.0 * c);
     }
-    let error = Survey::fly(&mesh, 1, 1).err().unwrap();
-    assert!(matches!(error, SurveyError::Size { .. }), "{error}");
+    let error = ScanFlight::fly(&mesh, 1, 1).err().unwrap();
+    assert!(matches!(error, ScanFlightError::Size { .. }), "{error}");
     assert!(error.to_string().contains("change its scale"), "{error}");
 }

@@ -18,13 +18,13 @@ pub enum Device {
 }
 
 /// A map on one of the devices.
-pub(super) enum Keeper {
+pub(super) enum MapStore {
     Cpu(Box<Map>),
     #[cfg(feature = "gpu")]
     Gpu(Box<GpuMap>),
 }
 
-impl Keeper {
+impl MapStore {
     pub(super) fn open(map: Map, device: Device) -> Result<Self, ScanError> {
         match device {
             Device::Cpu => Ok(Self::Cpu(Box::new(map))),

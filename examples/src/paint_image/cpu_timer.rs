@@ -1,12 +1,12 @@
 use std::time::Instant;
 
 /// CPU time of this thread where the system tells it, wall time elsewhere and with several threads.
-pub(super) struct Clock {
+pub(super) struct CpuTimer {
     wall: Instant,
     cpu: Option<f64>,
 }
 
-impl Clock {
+impl CpuTimer {
     pub(super) fn start(threads: usize) -> Self {
         Self { wall: Instant::now(), cpu: (threads == 1).then(Self::cpu_ms).flatten() }
     }

@@ -3,7 +3,7 @@
 use vio_ekf::{Excess, Status, Waiting};
 
 /// Why the filter gave up.
-pub(super) fn describe(excess: Excess) -> String {
+pub(super) fn divergence_text(excess: Excess) -> String {
     match excess {
         Excess::Speed => "the speed ran away",
         Excess::Bias => "a bias grew beyond what a sensor has",
@@ -16,7 +16,7 @@ pub(super) fn describe(excess: Excess) -> String {
 }
 
 /// Why it has not started.
-pub(super) fn waiting(status: Status) -> String {
+pub(super) fn initialization_text(status: Status) -> String {
     match status {
         Status::Uninitialised(Waiting::ForSteadiness) => {
             "there was no second of rest to start from, and no motion that tells the scale"

@@ -6,7 +6,7 @@ use paint_sim::{Hit, Lights, Look, TriangleSurface, render};
 use tsdf_hash::Intrinsics;
 use vio_ekf::{Camera, Distortion, ImageView};
 
-use super::SurveyError;
+use super::ScanFlightError;
 use crate::mesh_io::TriangleMesh;
 
 /// Images per second.
@@ -18,10 +18,10 @@ const GREY_NOISE: f64 = 2.0;
 /// Standard deviation of a depth at distance z: `a + b (z - 0.4)²`, metres (Nguyen, Izadi, Lovell 2012).
 const DEPTH_NOISE: [f64; 2] = [0.0012, 0.0019];
 /// (lattice spacing in metres, share of the contrast) of the stone's mottling, coarse to fine.
-const MOTTLES: [(f64, f64); 5] = [(0.35, 0.25), (0.12, 0.25), (0.05, 0.3), (0.025, 0.25), (0.012, 0.15)];
+const TEXTURE_OCTAVES: [(f64, f64); 5] = [(0.35, 0.25), (0.12, 0.25), (0.05, 0.3), (0.025, 0.25), (0.012, 0.15)];
 
 /// The robot's camera, with the depth of every pixel, before a surface.
-pub(super) struct Eyes<'a> {
+pub(super) struct SimulatedCamera<'a> {
     /// Lens, and place on the body.
     pub(super) camera: Camera,
     mesh: &'a TriangleMesh,
@@ -32,13 +32,13 @@ pub(super) struct Eyes<'a> {
 }
 
 /// One image.
-pub(super) struct Shot {
+pub(super) struct SimulatedImage {
     grey: Vec<u8>,
     /// Along the optical axis, metres; 0 where there is nothing.
     pub(super) depth: Vec<f32>,
 }
 
-impl Shot {
+impl SimulatedImage {
     pub(super) fn grey(&self) -> ImageView<'_> {
         ImageView { width: IMAGE.0, height: IMAGE.1, data: &self.grey }
     }
@@ -51,7 +51,7 @@ impl Shot {
     }
 }
 
-impl<'a> Eyes<'a> {
+impl<'a> SimulatedCamera<'a> {
     /// `towards`: from the robot to the surface.
     pub(super) fn new(
         mesh: &'a TriangleMesh,
@@ -72,12 +72,16 @@ impl<'a> Eyes<'a> {
     }
 
     /// Image `index`, taken from a pose.
-    pub(super) fn look(&self, index: usize, world_from_camera: &Isometry3<f64>) -> Result<Shot, SurveyError> {
+    pub(super) fn capture(
+        &self,
+        index: usize,
+        world_from_camera: &Isometry3<f64>,
+    ) -> Result<SimulatedImage, ScanFlightError> {
         let Camera { width, height, fx, fy, cx, cy, .. } = self.camera;
         let (width, height) = (width as u32, height as u32);
         let camera = paint_sim::Camera { fx, fy, cx, cy, width, height, world_from_camera: *world_from_camera };
-        let stone = |hit: &Hit| Look { albedo: [self.stone(hit) as f32; 3], normal: hit.normal };
-        let mut frame = render(self.surface, &camera, &stone, &self.lights, 1, self.threads)?;
+        let shade = |hit: &Hit| Look { albedo: [self.albedo(hit) as f32; 3], normal: hit.normal };
+        let mut frame = render(self.surface, &camera, &shade, &self.lights, 1, self.threads)?;
         let grey = frame.colour.iter().enumerate().map(|(pixel, colour)| {
             let noisy = f64::from(colour[0]) + GREY_NOISE * self.normal(2 * index, pixel);
             noisy.round().clamp(0.0, 255.0) as u8
@@ -88,11 +92,11 @@ impl<'a> Eyes<'a> {
             let sigma = DEPTH_NOISE[0] + DEPTH_NOISE[1] * (z - 0.4) * (z - 0.4);
             *depth = (z + sigma * self.normal(2 * index + 1, pixel)) as f32;
         }
-        Ok(Shot { grey, depth: frame.depth })
+        Ok(SimulatedImage { grey, depth: frame.depth })
     }
 
     /// Albedo of the stone: noise in the plane that the surface is most nearly in.
-    fn stone(&self, hit: &Hit) -> f64 {
+    fn albedo(&self, hit: &Hit) -> f64 {
         let corners = self.mesh.faces[hit.face as usize].map(|i| self.mesh.positions[i as usize]);
         let [u, v] = hit.barycentric;
         let shares = [1.0 - u - v, u, v];
@@ -103,10 +107,10 @@ impl<'a> Eyes<'a> {
             1 => (p.x, p.z),
             _ => (p.x, p.y),
         };
-        let mottle = |(k, (spacing, share)): (usize, (f64, f64))| {
+        let octave = |(k, (spacing, share)): (usize, (f64, f64))| {
             share * (value_noise(self.seed.wrapping_add(101 * k as u64), u / spacing, v / spacing) - 0.5)
         };
-        (0.35 + MOTTLES.into_iter().enumerate().map(mottle).sum::<f64>()).clamp(0.02, 0.9)
+        (0.35 + TEXTURE_OCTAVES.into_iter().enumerate().map(octave).sum::<f64>()).clamp(0.02, 0.9)
     }
 
     /// A number of the standard normal distribution for a pixel of an image.

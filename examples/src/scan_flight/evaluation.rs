@@ -1,4 +1,4 @@
-//! How well a surface was scanned, and what it looks like.
+//! How well a surface was scanned, and a picture of it.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use paint_sim::{Camera, Hit, Lights, Look, Surface, TriangleSurface, render};
 use serde::Serialize;
 use vio_ekf::{Alignment, Trajectory, ate};
 
-use super::{Survey, SurveyError};
+use super::{ScanFlight, ScanFlightError};
 use crate::mesh_io::{TriangleMesh, write_ply};
 use crate::mission::MissionError;
 use crate::pictures::{Polyline, Rgb, Scene, save_scene};
@@ -19,7 +19,7 @@ const VIEW: (u32, u32) = (1400, 900);
 
 /// Figures of a scan. Flat, SI units in the names.
 #[derive(Debug, Clone, Serialize)]
-pub struct SurveyFigures {
+pub struct ScanFlightFigures {
     /// Time with an estimate.
     pub duration_s: f64,
     /// Way flown meanwhile.
@@ -40,7 +40,7 @@ pub struct SurveyFigures {
     pub triangles: usize,
 }
 
-impl SurveyFigures {
+impl ScanFlightFigures {
     pub(super) fn summary(&self) -> String {
         format!(
             "{:.0} m flown, {:.1} cm of drift at most; {} triangles, {:.1} mm off in the mean, {:.1} % of the surface",
@@ -59,7 +59,7 @@ pub(super) fn figures(
     scanned: &TriangleMesh,
     flown: &Trajectory,
     estimated: &Trajectory,
-) -> Result<SurveyFigures, SurveyError> {
+) -> Result<ScanFlightFigures, ScanFlightError> {
     let distances = |points: &[[f32; 3]], to: &TriangleSurface| -> Vec<f64> {
         points.iter().map(|p| to.distance(&Point3::from(p.map(f64::from)), 1.0)).collect()
     };
@@ -68,7 +68,7 @@ pub(super) fn figures(
     let map = TriangleSurface::new(&scanned.positions, &scanned.faces)?;
     let near = distances(&mesh.positions, &map).into_iter().filter(|d| *d <= NEAR).count();
     let apart = |(a, b): (&Isometry3<f64>, &Isometry3<f64>)| (a.translation.vector - b.translation.vector).norm();
-    Ok(SurveyFigures {
+    Ok(ScanFlightFigures {
         duration_s: flown.duration_s(),
         path_length_m: flown.path_length(),
         ate_se3_rmse_m: ate(flown.poses(), estimated.poses(), Alignment::Se3)?.position.rmse,
@@ -81,7 +81,7 @@ pub(super) fn figures(
     })
 }
 
-impl Survey {
+impl ScanFlight {
     /// Writes `survey.json`, `survey.png`, `survey.ply` and both trajectories into an existing folder.
     pub fn save(&self, folder: &Path) -> Result<(), MissionError> {
         let write = |name: &str, text: String| {

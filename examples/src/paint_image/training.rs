@@ -1,6 +1,6 @@
 mod digits;
-mod film;
 mod gzip;
+mod rollout;
 mod thesis;
 
 use std::path::{Path, PathBuf};
@@ -12,14 +12,14 @@ use super::{PaintImageError, write_json};
 use crate::pictures::{Panel, save_curves};
 use crate::progress::Stage;
 
-pub use thesis::{Pictures, ThesisLesson, learn_thesis};
+pub use thesis::{ThesisTrainingRun, TrainingImages, train_thesis};
 
 /// Steps between two points of the curve.
 const POINT: usize = 50;
 
 /// A training: its settings, and where to go on from.
 #[derive(Debug, Clone)]
-pub struct Lesson {
+pub struct TrainingRun {
     /// How to train.
     pub settings: TrainSettings,
     /// Checkpoint to go on from.
@@ -42,10 +42,10 @@ struct Outcome {
 }
 
 /// Trains, and writes `painter.safetensors`, `checkpoint.safetensors`, `curve.png` and `report.json` into the folder.
-pub fn learn(lesson: &Lesson, folder: &Path) -> Result<(), PaintImageError> {
+pub fn train_painter(run: &TrainingRun, folder: &Path) -> Result<(), PaintImageError> {
     let started = std::time::Instant::now();
-    let settings = &lesson.settings;
-    let mut trainer = match &lesson.resume {
+    let settings = &run.settings;
+    let mut trainer = match &run.resume {
         None => Trainer::new(settings.clone())?,
         Some(path) => {
             let file_error = |why: String| PaintImageError::File { path: path.display().to_string(), why };
@@ -61,7 +61,7 @@ pub fn learn(lesson: &Lesson, folder: &Path) -> Result<(), PaintImageError> {
     let stage = Stage::start("train");
     let (mut losses, mut qualities) = (Vec::new(), Vec::new());
     let (mut loss, mut quality, mut count) = (0.0, 0.0, 0.0);
-    let last = lesson.until.unwrap_or(settings.steps).min(settings.steps);
+    let last = run.until.unwrap_or(settings.steps).min(settings.steps);
     while trainer.steps_done() < last {
         let progress = trainer.step();
         loss += progress.loss;
@@ -72,7 +72,7 @@ pub fn learn(lesson: &Lesson, folder: &Path) -> Result<(), PaintImageError> {
             qualities.push((progress.step as f64, quality / count));
             (loss, quality, count) = (0.0, 0.0, 0.0);
         }
-        if progress.step % lesson.save_every.max(1) == 0 || progress.step == last {
+        if progress.step % run.save_every.max(1) == 0 || progress.step == last {
             save("checkpoint.safetensors", &trainer.checkpoint())?;
         }
         stage.share(progress.step as f64 / last as f64);

@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use paint_sim::ciede2000;
 use paint_sim::colour::BANDS;
-use paintcopter_benches::cpu::{Clock, median_seconds};
+use paintcopter_benches::cpu::{CpuTimer, median_seconds};
 use paintcopter_benches::{Rng, colours, films, motion, painting, room};
 use paintcopter_examples::mesh_io::read_mesh;
 use paintcopter_examples::world::rock_wall;
@@ -43,7 +43,7 @@ enum Job {
         /// Runs of which the median is printed
         #[arg(long, default_value_t = 3)]
         runs: usize,
-        /// Folder for OBJ files with texture coordinates, for `uv_judge.py`
+        /// Folder for OBJ files with texture coordinates, for `uv_evaluation.py`
         #[arg(long, value_name = "DIR")]
         save: Option<PathBuf>,
     },
@@ -102,7 +102,7 @@ enum Job {
         /// Folder to write into
         folder: PathBuf,
     },
-    /// Judges a TUM trajectory by another, as `trajectory_peers.py` does
+    /// Errors of a TUM trajectory against another, as `trajectory_peers.py` does
     Ate {
         /// TUM text
         reference: PathBuf,
@@ -125,12 +125,12 @@ fn main() -> ExitCode {
             tsdf(&stream, voxel, frames, threads.into(), !no_colour, out.as_deref())
         }
         Job::Pair { folder } => pair(&folder),
-        Job::Ate { reference, estimate, runs } => judge(&reference, &estimate, runs),
+        Job::Ate { reference, estimate, runs } => trajectory_errors(&reference, &estimate, runs),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("ours: {error}");
+            eprintln!("library_figures: {error}");
             ExitCode::FAILURE
         }
     }
@@ -224,15 +224,15 @@ fn tsdf(
     coloured: bool,
     out: Option<&Path>,
 ) -> Result<(), AnyError> {
-    let shots = room::read(folder, most, coloured)?;
+    let frames = room::read(folder, most, coloured)?;
     let settings = tsdf_hash::Settings { voxel_size, threads, max_bytes: 4 << 30, ..tsdf_hash::Settings::default() };
     let mut map = tsdf_hash::Map::new(settings)?;
     let empty = map.hash();
     let (mut fused, mut valid) = (0, 0);
-    let mut clocks = [Clock::default(), Clock::default()];
-    for shot in &shots {
-        let colour = shot.colour();
-        let report = clocks[0].time(|| map.integrate(&shot.view(), colour.as_ref(), &shot.world_from_camera))?;
+    let mut timers = [CpuTimer::default(), CpuTimer::default()];
+    for frame in &frames {
+        let colour = frame.colour();
+        let report = timers[0].time(|| map.integrate(&frame.view(), colour.as_ref(), &frame.world_from_camera))?;
         fused += report.fused_pixels;
         valid += report.valid_pixels;
     }
@@ -242,15 +242,15 @@ fn tsdf(
         let file = std::fs::File::create(path).map_err(|e| format!("{}: {e}", path.display()))?;
         tsdf_hash::write_ply(&mesh, std::io::BufWriter::new(file))?;
     }
-    for shot in &shots {
-        let colour = shot.colour();
-        clocks[1].time(|| map.deintegrate(&shot.view(), colour.as_ref(), &shot.world_from_camera))?;
+    for frame in &frames {
+        let colour = frame.colour();
+        timers[1].time(|| map.deintegrate(&frame.view(), colour.as_ref(), &frame.world_from_camera))?;
     }
-    let [put_in, taken_out] = clocks;
+    let [put_in, taken_out] = timers;
     println!(
         "{}",
         json!({
-            "figure": "fuse", "peer": "tsdf-hash", "voxel_m": voxel_size, "threads": threads, "frames": shots.len(),
+            "figure": "fuse", "peer": "tsdf-hash", "voxel_m": voxel_size, "threads": threads, "frames": frames.len(),
             "stream": folder.file_name().map(|name| name.to_string_lossy()), "colour": coloured,
             "integrate_cpu_ms": put_in.cpu_ms(), "integrate_wall_ms": put_in.wall_ms(),
             "deintegrate_cpu_ms": taken_out.cpu_ms(), "fused_share": fused as f64 / valid as f64, "blocks": blocks,
@@ -268,7 +268,7 @@ fn pair(folder: &Path) -> Result<(), AnyError> {
     write(&folder.join("estimate.txt"), &tum::write(&estimate))
 }
 
-fn judge(reference: &Path, estimate: &Path, runs: usize) -> Result<(), AnyError> {
+fn trajectory_errors(reference: &Path, estimate: &Path, runs: usize) -> Result<(), AnyError> {
     let read = |path: &Path| -> Result<Trajectory, AnyError> {
         let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
         tum::read(&text).map_err(|e| format!("{}: {e}", path.display()).into())

@@ -130,12 +130,12 @@ impl Mission {
             ambient: [0.28, 0.30, 0.34],
             ..Lights::default()
         };
-        let shade = |hit: &Hit| self.look(painted, hit);
+        let shade = |hit: &Hit| self.shading(painted, hit);
         Ok(render(&self.surface.world, camera, &shade, &lights, 2, self.settings.threads)?)
     }
 
-    /// Look of a point of the world: painted and smooth on the disk, grey elsewhere.
-    pub(super) fn look(&self, painted: &paint_net::Image, hit: &Hit) -> Look {
+    /// Shading of a point of the world: painted and smooth on the disk, grey elsewhere.
+    pub(super) fn shading(&self, painted: &paint_net::Image, hit: &Hit) -> Look {
         let Some(face) = self.surface.disk().faces().get(hit.face as usize) else {
             return Look { albedo: [0.4; 3], normal: hit.normal };
         };

@@ -3,14 +3,14 @@ use std::path::Path;
 use paint_net::{Image, Spray, SprayKernel};
 
 use super::PaintImageError;
-use crate::pictures::{Rgb, Tile, save_sheet};
+use crate::pictures::{Rgb, Tile, save_contact_sheet};
 
 /// Moments that are shown, beside the wanted picture.
 const MOMENTS: usize = 8;
 
 /// How the wall comes to look like the picture: what is wanted, and the wall after every eighth of the sprays, paint after
 /// paint. `show`: sRGB of the depths of all paints.
-pub(super) fn save_film(
+pub(super) fn save_progress_strip(
     path: &Path,
     wanted: Rgb,
     paints: &[&[Spray]],
@@ -37,5 +37,5 @@ pub(super) fn save_film(
         });
         tiles.push(Tile { caption: format!("{done} sprays"), picture: Rgb::from_pixels(width, height, pixels) });
     }
-    Ok(save_sheet(path, &[tiles])?)
+    Ok(save_contact_sheet(path, &[tiles])?)
 }

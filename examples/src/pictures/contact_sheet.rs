@@ -21,7 +21,7 @@ const GAP: u32 = 12;
 const CAPTION: u32 = 26;
 
 /// Draws pictures side by side, one row after the other, and saves the sheet.
-pub fn save_sheet(path: &Path, rows: &[Vec<Tile>]) -> Result<(), PictureError> {
+pub fn save_contact_sheet(path: &Path, rows: &[Vec<Tile>]) -> Result<(), PictureError> {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0) as u32;
     let (across, down) = (SIDE + GAP, SIDE + GAP + CAPTION);
     let sheet = draw(columns * across + GAP, rows.len() as u32 * down + GAP, |area| {

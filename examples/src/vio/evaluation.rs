@@ -5,13 +5,13 @@ use vio_ekf::{
     Alignment, Association, Error, Odometry, PairsFrom, RpeSettings, Span, Stamp, Tolerance, apply, ate, rpe, so3,
 };
 
-use super::recording::Truth;
+use super::recording::GroundTruth;
 use super::run::heading_onto;
 use super::{Run, VioError};
 
 /// Standard deviations that a recorded truth has of its own, added to those that the filter claims: 1 mm, 0.1 degrees,
 /// 3 mm/s. Ours; without them the first poses, which the filter knows exactly by definition, would decide.
-const TRUTH_SIGMA: [f64; 3] = [1e-3, 1.7e-3, 3e-3];
+const GROUND_TRUTH_SIGMA: [f64; 3] = [1e-3, 1.7e-3, 3e-3];
 /// Path length of the relative error, m.
 const RPE_LENGTH: f64 = 10.0;
 
@@ -20,7 +20,7 @@ pub type AlignedPair = (Stamp, Isometry3<f64>, Isometry3<f64>);
 
 /// How good a run is.
 #[derive(Debug, Clone)]
-pub struct Judgement {
+pub struct RunEvaluation {
     /// Root mean square position error after rigid alignment, m.
     pub ate_se3: f64,
     /// The same after alignment of position and yaw, m.
@@ -37,13 +37,13 @@ pub struct Judgement {
     pub coverage: f64,
     /// Truth and estimate in the truth's world, aligned in position and yaw.
     pub aligned: Vec<AlignedPair>,
-    /// Errors and what the filter thought of them, for each pose.
-    pub errors: Vec<ErrorAt>,
+    /// Errors and the standard deviations that the filter claims, for each pose.
+    pub errors: Vec<PoseError>,
 }
 
 /// Error of one pose in the filter's world, which is the truth's where the stretch begins.
 #[derive(Debug, Clone, Copy)]
-pub struct ErrorAt {
+pub struct PoseError {
     /// Its time.
     pub stamp: Stamp,
     /// Of the position, m.
@@ -56,11 +56,11 @@ pub struct ErrorAt {
     pub attitude_sigma: Vector3<f64>,
 }
 
-/// Judges a run. `None` if truth and estimate have no time in common.
+/// Evaluates a run. `None` if truth and estimate have no time in common.
 ///
 /// # Errors
 /// [`VioError::Library`] if the poses cannot be aligned.
-pub fn judge(run: &Run, truth: &Truth) -> Result<Option<Judgement>, VioError> {
+pub fn evaluate_run(run: &Run, truth: &GroundTruth) -> Result<Option<RunEvaluation>, VioError> {
     let estimate = run.trajectory()?;
     let association = Association { interpolate: true, ..Association::default() };
     let pairs = match association.pair_up(&truth.trajectory, &estimate) {
@@ -85,10 +85,10 @@ pub fn judge(run: &Run, truth: &Truth) -> Result<Option<Judgement>, VioError> {
     let coverage = if truth.trajectory.duration_s() > 0.0 { covered / truth.trajectory.duration_s() } else { 1.0 };
     let (mut errors, mut sums) = (Vec::new(), Sums::default());
     for segment in &run.segments {
-        follow(&segment.odometry, truth, &mut errors, &mut sums);
+        accumulate_errors(&segment.odometry, truth, &mut errors, &mut sums);
     }
     let count = (errors.len() as f64).max(1.0);
-    Ok(Some(Judgement {
+    Ok(Some(RunEvaluation {
         ate_se3,
         ate_yaw,
         rpe_10m_median,
@@ -139,7 +139,7 @@ struct Sums {
 }
 
 /// Errors along one stretch, the truth moved to where the stretch begins.
-fn follow(odometry: &[Odometry], truth: &Truth, errors: &mut Vec<ErrorAt>, sums: &mut Sums) {
+fn accumulate_errors(odometry: &[Odometry], truth: &GroundTruth, errors: &mut Vec<PoseError>, sums: &mut Sums) {
     let known = |o: &&Odometry| truth.trajectory.pose_at(o.stamp).is_ok();
     let mut filter_from_truth = None;
     for o in odometry.iter().filter(known) {
@@ -149,15 +149,15 @@ fn follow(odometry: &[Odometry], truth: &Truth, errors: &mut Vec<ErrorAt>, sums:
         let position = moved.translation.vector - o.world_from_body.translation.vector;
         let attitude = so3::log(&(moved.rotation * o.world_from_body.rotation.inverse()));
         let block = |row: usize| o.covariance.fixed_view::<3, 3>(row, row).into_owned();
-        sums.position += square(&position, block(0), TRUTH_SIGMA[0]);
-        sums.attitude += square(&attitude, block(6), TRUTH_SIGMA[1]);
+        sums.position += square(&position, block(0), GROUND_TRUTH_SIGMA[0]);
+        sums.attitude += square(&attitude, block(6), GROUND_TRUTH_SIGMA[1]);
         if let Some(velocity) = velocity_at(truth, o.stamp) {
             let error = pose.rotation.inverse() * velocity - o.velocity_in_body;
-            sums.velocity += square(&error, block(3), TRUTH_SIGMA[2]);
+            sums.velocity += square(&error, block(3), GROUND_TRUTH_SIGMA[2]);
         }
         let sigma = |row: usize| block(row).diagonal().map(|variance| variance.max(0.0).sqrt());
         let (position_sigma, attitude_sigma) = (sigma(0), sigma(6));
-        errors.push(ErrorAt { stamp: o.stamp, position, attitude, position_sigma, attitude_sigma });
+        errors.push(PoseError { stamp: o.stamp, position, attitude, position_sigma, attitude_sigma });
     }
 }
 
@@ -167,7 +167,7 @@ fn square(error: &Vector3<f64>, covariance: Matrix3<f64>, sigma: f64) -> f64 {
     claimed.cholesky().map_or(f64::INFINITY, |factor| error.dot(&factor.solve(error)))
 }
 
-fn velocity_at(truth: &Truth, stamp: Stamp) -> Option<Vector3<f64>> {
+fn velocity_at(truth: &GroundTruth, stamp: Stamp) -> Option<Vector3<f64>> {
     let (stamps, velocities) = (truth.trajectory.stamps(), &truth.velocities_in_world);
     let next = stamps.partition_point(|&s| s < stamp);
     let after = velocities.get(next)?;

@@ -4,7 +4,7 @@ use nalgebra::{Rotation3, Vector3};
 
 use crate::mesh_io::TriangleMesh;
 
-/// Height of the lowest vertex above the ground after placing, metres: room for the robot below its gun.
+/// Height of the lowest vertex above the ground after placement, metres: room for the robot below its gun.
 const CLEAR_OF_GROUND: f64 = 1.5;
 /// A mesh whose normals agree more than this (mean normal, 1 = a plane) is a relief and is hung like a wall.
 const RELIEF: f64 = 0.5;
@@ -22,7 +22,7 @@ pub enum UpAxis {
 
 /// How to place a mesh.
 #[derive(Debug, Clone, Copy)]
-pub struct Placing {
+pub struct MeshPlacement {
     /// Scale; `None` makes the longest side of the bounding box 3 m.
     pub scale: Option<f64>,
     /// The file's up axis.
@@ -32,9 +32,9 @@ pub struct Placing {
 /// Longest side when no scale is given, metres.
 const LONGEST_SIDE: f64 = 3.0;
 
-/// What is wrong with a mesh before placing.
+/// What is wrong with a mesh before placement.
 #[derive(Debug, thiserror::Error)]
-pub enum PlacingError {
+pub enum PlacementError {
     /// A vertex is NaN or infinite.
     #[error("vertex {0} is not finite: repair the mesh")]
     NotFinite(usize),
@@ -48,29 +48,29 @@ pub enum PlacingError {
 
 /// What was done to the mesh.
 #[derive(Debug, Clone, Copy)]
-pub struct Placed {
+pub struct PlacementResult {
     /// Scale used.
     pub scale: f64,
     /// Whether a lying relief was turned upright.
     pub hung: bool,
 }
 
-/// Scales the mesh, turns its up axis to z, hangs reliefs like a wall that looks along -x, and puts it over the origin clear
+/// Scales the mesh, turns its up axis to z, turns flat pieces upright like a wall that faces -x, and puts it over the origin clear
 /// of the ground.
-pub fn place(mesh: &mut TriangleMesh, placing: Placing) -> Result<Placed, PlacingError> {
+pub fn place_mesh(mesh: &mut TriangleMesh, placement: MeshPlacement) -> Result<PlacementResult, PlacementError> {
     if let Some(k) = mesh.positions.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
-        return Err(PlacingError::NotFinite(k));
+        return Err(PlacementError::NotFinite(k));
     }
     let (low, high) = bounds(mesh);
     let longest = (high - low).max();
     if longest.is_nan() || longest <= 0.0 {
-        return Err(PlacingError::NoExtent);
+        return Err(PlacementError::NoExtent);
     }
-    let scale = placing.scale.unwrap_or(LONGEST_SIDE / longest);
+    let scale = placement.scale.unwrap_or(LONGEST_SIDE / longest);
     if !(scale.is_finite() && scale > 0.0) {
-        return Err(PlacingError::Scale(scale));
+        return Err(PlacementError::Scale(scale));
     }
-    let upright = match placing.up {
+    let upright = match placement.up {
         UpAxis::X => Rotation3::from_axis_angle(&Vector3::y_axis(), -std::f64::consts::FRAC_PI_2),
         UpAxis::Y => Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2),
         UpAxis::Z => Rotation3::identity(),
@@ -82,10 +82,10 @@ pub fn place(mesh: &mut TriangleMesh, placing: Placing) -> Result<Placed, Placin
     transform(mesh, |p| turn * (p - middle) * scale);
     let lift = CLEAR_OF_GROUND - bounds(mesh).0.z;
     transform(mesh, |p| p + Vector3::new(0.0, 0.0, lift));
-    Ok(Placed { scale, hung })
+    Ok(PlacementResult { scale, hung })
 }
 
-/// The rotation that makes a relief look along -x: about z alone if it already stands, else tipped up first.
+/// The rotation that makes a flat piece face -x: about z alone if it already stands, else tipped up first.
 fn hang(facing: &Vector3<f64>) -> Rotation3<f64> {
     let flat = Vector3::new(facing.x, facing.y, 0.0);
     let tip = if flat.norm() > 0.7 * facing.norm() {
@@ -133,7 +133,7 @@ mod tests {
     fn a_lying_terrain_is_hung_to_face_the_robot() {
         // y up, lying in xz: the normal is +y.
         let mut mesh = square([[0.0, 0.0, 0.0], [0.0, 0.0, 10.0], [20.0, 0.0, 10.0], [20.0, 0.0, 0.0]]);
-        let placed = place(&mut mesh, Placing { scale: None, up: UpAxis::Y }).unwrap();
+        let placed = place_mesh(&mut mesh, MeshPlacement { scale: None, up: UpAxis::Y }).unwrap();
         assert!(placed.hung && (placed.scale - 0.15).abs() < 1e-12);
         let normal = mean_normal(&mesh);
         assert!((normal + Vector3::x()).norm() < 1e-6, "{normal}");
@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn a_standing_wall_only_turns_about_z() {
         let mut mesh = square([[0.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 2.0, 1.0], [0.0, 0.0, 1.0]]);
-        place(&mut mesh, Placing { scale: Some(1.0), up: UpAxis::Z }).unwrap();
+        place_mesh(&mut mesh, MeshPlacement { scale: Some(1.0), up: UpAxis::Z }).unwrap();
         let (low, high) = bounds(&mesh);
         assert!((mean_normal(&mesh) + Vector3::x()).norm() < 1e-6);
         assert!((high.z - low.z - 1.0).abs() < 1e-5 && (high.y - low.y - 2.0).abs() < 1e-5);
@@ -154,12 +154,15 @@ mod tests {
         let mesh = || square([[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
         for scale in [-1.0, 0.0, f64::NAN] {
             assert!(matches!(
-                place(&mut mesh(), Placing { scale: Some(scale), up: UpAxis::Z }),
-                Err(PlacingError::Scale(_))
+                place_mesh(&mut mesh(), MeshPlacement { scale: Some(scale), up: UpAxis::Z }),
+                Err(PlacementError::Scale(_))
             ));
         }
         let mut bad = mesh();
         bad.positions[2][1] = f32::NAN;
-        assert!(matches!(place(&mut bad, Placing { scale: None, up: UpAxis::Z }), Err(PlacingError::NotFinite(2))));
+        assert!(matches!(
+            place_mesh(&mut bad, MeshPlacement { scale: None, up: UpAxis::Z }),
+            Err(PlacementError::NotFinite(2))
+        ));
     }
 }

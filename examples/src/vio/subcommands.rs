@@ -4,10 +4,10 @@ use vio_ekf::sim::{CameraModel, Scenario};
 use vio_ekf::tune::TuneSettings;
 use vio_ekf::{CalibrationSettings, Camera, Settings};
 
-use super::command_line::{Arguments, Eval, FlightName, Job, Sim, Track, Tune};
+use super::command_line::{Arguments, Command, Eval, FlightName, Sim, Track, Tune};
 use super::{
-    Flight, Lessons, Overrides, RunSettings, SimulationSettings, Tuning, VioReport, compare, judge, open_euroc,
-    open_euroc_pair, open_mcap, run, save, simulate, tune_noise,
+    Flight, Overrides, RunSettings, SimulationSettings, Tuning, TuningData, VioReport, compare, evaluate_run,
+    open_euroc, open_euroc_stereo, open_mcap, run, save, simulate, tune_noise,
 };
 use crate::report::save_figures;
 
@@ -20,14 +20,14 @@ type AnyError = Box<dyn std::error::Error>;
 pub fn execute(arguments: &Arguments) -> Result<(), AnyError> {
     match &arguments.command {
         None => track(&arguments.track),
-        Some(Job::Sim(sim)) => render(sim),
-        Some(Job::Eval(eval)) => evaluate(eval),
-        Some(Job::Tune(tune)) => search(tune),
+        Some(Command::Sim(sim)) => render(sim),
+        Some(Command::Eval(eval)) => evaluate(eval),
+        Some(Command::Tune(tune)) => search(tune),
     }
 }
 
 /// How far the calibration may be off with `--calibrate`: what a ruler and a guess leave.
-fn rough() -> CalibrationSettings {
+fn rough_calibration() -> CalibrationSettings {
     CalibrationSettings {
         camera_position_sigma_m: 0.03,
         camera_attitude_sigma: 0.05,
@@ -42,12 +42,12 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
     let overrides =
         Overrides { cameras: arguments.cameras.clone(), imu: arguments.imu.clone(), truth: arguments.truth.clone() };
     let recording = match (&arguments.euroc, &arguments.mcap) {
-        (Some(folder), _) if arguments.stereo => open_euroc_pair(folder, &overrides)?,
+        (Some(folder), _) if arguments.stereo => open_euroc_stereo(folder, &overrides)?,
         (Some(folder), _) => open_euroc(folder, &overrides)?,
         (None, Some(file)) => open_mcap(file, &overrides)?,
         (None, None) => return Err("name a recording with --euroc or --mcap".into()),
     };
-    let calibration = if arguments.calibrate { rough() } else { CalibrationSettings::default() };
+    let calibration = if arguments.calibrate { rough_calibration() } else { CalibrationSettings::default() };
     let filter = Settings { features: arguments.features, calibration, ..Settings::default() };
     filter.check()?;
     let findings = recording.check(filter.gravity)?;
@@ -67,9 +67,9 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
     for (stamp, why) in &run.lost {
         eprintln!("given up at {stamp} s: {why}");
     }
-    let judgement = recording.truth.as_ref().map(|truth| judge(&run, truth)).transpose()?.flatten();
-    let report = VioReport::new(&recording, &findings, &run, judgement.as_ref(), threads)?;
-    save(&report, &recording, &run, judgement.as_ref(), folder)?;
+    let evaluation = recording.truth.as_ref().map(|truth| evaluate_run(&run, truth)).transpose()?.flatten();
+    let report = VioReport::new(&recording, &findings, &run, evaluation.as_ref(), threads)?;
+    save(&report, &recording, &run, evaluation.as_ref(), folder)?;
     println!("{}", folder.join("report.md").display());
     // The files are there to look at, but such a trajectory is not to be relied on.
     if let Some((stamp, why)) = run.lost.last() {
@@ -117,14 +117,14 @@ fn evaluate(arguments: &Eval) -> Result<(), AnyError> {
 
 fn search(arguments: &Tune) -> Result<(), AnyError> {
     make(&arguments.out)?;
-    let lessons = if arguments.euroc.is_empty() {
-        Lessons::simulated(arguments.flights, arguments.seconds, arguments.seed)?
+    let data = if arguments.euroc.is_empty() {
+        TuningData::simulated(arguments.flights, arguments.seconds, arguments.seed)?
     } else {
         let open = |folder: &PathBuf| {
             let recording = open_euroc(folder, &Overrides::default())?;
             recording.check(Settings::default().gravity).map(|_| recording)
         };
-        Lessons::Recordings(arguments.euroc.iter().map(open).collect::<Result<_, _>>()?)
+        TuningData::Recordings(arguments.euroc.iter().map(open).collect::<Result<_, _>>()?)
     };
     let factors: [f64; 5] = arguments.start.as_slice().try_into().map_err(|_| "--start: give five factors")?;
     if !factors.iter().all(|factor| (1e-6..=1e6).contains(factor)) {
@@ -139,7 +139,7 @@ fn search(arguments: &Tune) -> Result<(), AnyError> {
         resume: arguments.resume,
         threads: threads(arguments.threads),
     };
-    let report = tune_noise(&lessons, &tuning, &arguments.out)?;
+    let report = tune_noise(&data, &tuning, &arguments.out)?;
     eprintln!(
         "position error {:.4} m at the start, {:.4} m now; NEES {:.1}, now {:.1}",
         report.ate_start_m, report.ate_best_m, report.nees_start, report.nees_best

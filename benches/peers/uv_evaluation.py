@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Independent judge of a UV layout: reads an OBJ with vt indices, prints one JSON object.
+"""Independent evaluation of a UV layout: reads an OBJ with vt indices, prints one JSON object.
 
-needs numpy only.   example:  python uv_judge.py atlas.obj --texel 0.0125
+needs numpy only.   example:  python uv_evaluation.py atlas.obj --texel 0.0125
 s1 >= |s2| are the signed singular values of the map surface triangle -> UV triangle times metres_per_uv;
 metres_per_uv is sqrt(surface area / UV area) unless --metres-per-uv is given (1 = UVs already in metres).
 
@@ -19,7 +19,7 @@ metres_per_uv is sqrt(surface area / UV area) unless --metres-per-uv is given (1
   boundary_ratio         open surface edges, divided by sqrt(surface area)
   util_unit, util_bbox   (UV area - overlaps) / unit square (null when a UV leaves it), / bounding box of the UVs
   scale_*                metres per uv unit of each chart, sqrt(A3/Auv): area-weighted mean, std, rel_std, min, max
-exit status: 0 judged, 2 unreadable input."""
+exit status: 0 evaluated, 2 unreadable input."""
 
 import argparse
 import json
@@ -190,7 +190,7 @@ def wquantile(x, w, q):
     return float(x[o][min(np.searchsorted(c, q * c[-1]), len(x) - 1)])
 
 
-def judge(V, T, F, G, metres=None, texel=None, pair_limit=20_000_000):
+def evaluate(V, T, F, G, metres=None, texel=None, pair_limit=20_000_000):
     X, U = V[F], T[G]
     e1, e2 = X[:, 1] - X[:, 0], X[:, 2] - X[:, 0]
     A = 0.5 * np.linalg.norm(np.cross(e1, e2), axis=1)
@@ -292,7 +292,7 @@ def judge(V, T, F, G, metres=None, texel=None, pair_limit=20_000_000):
 def main():
     ap = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     ap.add_argument("obj")
-    ap.add_argument("--metres-per-uv", type=float, help="one global scale to judge against (default: area-preserving)")
+    ap.add_argument("--metres-per-uv", type=float, help="one global scale to compare against (default: area-preserving)")
     ap.add_argument("--texel", type=float, help="texel edge in metres: adds the atlas size in pixels")
     ap.add_argument(
         "--pair-limit",
@@ -302,9 +302,9 @@ def main():
     )
     a = ap.parse_args()
     try:
-        r = judge(*read_obj(a.obj), a.metres_per_uv, a.texel, a.pair_limit)
+        r = evaluate(*read_obj(a.obj), a.metres_per_uv, a.texel, a.pair_limit)
     except (OSError, ValueError) as e:
-        print(f"uv_judge: {a.obj}: {e}", file=sys.stderr)
+        print(f"uv_evaluation: {a.obj}: {e}", file=sys.stderr)
         return 2
     print(json.dumps({k: (float(f"{v:.12g}") if isinstance(v, float) else v) for k, v in r.items()}, allow_nan=False))
     return 0

@@ -7,7 +7,7 @@ use crate::pictures::Rgb;
 
 /// Moments that are shown, beside the wanted picture.
 const MOMENTS: usize = 10;
-/// Pixels of the film per pixel of the picture.
+/// Pixels of the rollout picture per pixel of the picture.
 const ENLARGED: u32 = 4;
 const READ: [u8; 3] = [213, 40, 30];
 const SPRAY: [u8; 3] = [0, 150, 70];
@@ -15,15 +15,15 @@ const GAP: usize = 2;
 
 /// One row per picture: the wanted ink, then the canvas while it is painted, evenly over the steps that it took, with READ's
 /// window in red and the spray in green (two standard deviations each way). `bright`: paint is white on black.
-pub(super) fn film(network: &Network, pictures: &[Image], bright: bool) -> Result<Rgb, Error> {
+pub(super) fn rollout_picture(network: &Network, pictures: &[Image], bright: bool) -> Result<Rgb, Error> {
     let tasks: Vec<(Image, Option<Image>)> = pictures.iter().map(|p| (p.clone(), None)).collect();
     let side = network.shape().side;
     let cell = (side + GAP) * ENLARGED as usize;
     let (width, height) = (cell * (MOMENTS + 1), cell * pictures.len());
-    let mut film = Rgb::from_pixels(width, height, (0..width * height).map(|_| [128; 3]));
+    let mut strip = Rgb::from_pixels(width, height, (0..width * height).map(|_| [128; 3]));
     for (row, (picture, steps)) in pictures.iter().zip(network.paint(&tasks)?).enumerate() {
         let mut put = |column: usize, ink: &Image, step: Option<&Step>| {
-            draw(&mut film, (column * cell, row * cell), ink, step, bright);
+            draw(&mut strip, (column * cell, row * cell), ink, step, bright);
         };
         put(0, picture, None);
         let mut canvas = picture.map(|_| 0.0);
@@ -37,7 +37,7 @@ pub(super) fn film(network: &Network, pictures: &[Image], bright: bool) -> Resul
             }
         }
     }
-    Ok(film)
+    Ok(strip)
 }
 
 /// Adds a step's spray, uncut, to a canvas.
@@ -48,7 +48,7 @@ pub(super) fn stamp(step: &Step, canvas: &mut Image) -> Result<(), Error> {
     Ok(())
 }
 
-fn draw(film: &mut Rgb, (left, top): (usize, usize), ink: &Image, step: Option<&Step>, bright: bool) {
+fn draw(strip: &mut Rgb, (left, top): (usize, usize), ink: &Image, step: Option<&Step>, bright: bool) {
     let shades = ink.data().iter().map(|&a| {
         let level = (255.0 * if bright { a } else { 1.0 - a }).round() as u8;
         [level; 3]
@@ -59,10 +59,10 @@ fn draw(film: &mut Rgb, (left, top): (usize, usize), ink: &Image, step: Option<&
         frame(&mut tile, step.window.centre, 0.5 * step.window.extent + step.window.sigma, READ);
         frame(&mut tile, step.place, sigma, SPRAY);
     }
-    let (film_width, width) = (film.width as usize, tile.width as usize);
+    let (film_width, width) = (strip.width as usize, tile.width as usize);
     for (j, row) in tile.data.chunks_exact(3 * width).enumerate() {
         let at = 3 * ((top + j) * film_width + left);
-        film.data[at..at + row.len()].copy_from_slice(row);
+        strip.data[at..at + row.len()].copy_from_slice(row);
     }
 }
 

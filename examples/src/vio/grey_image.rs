@@ -5,7 +5,7 @@ use vio_ekf::ImageView;
 
 /// A grey image with 8 bits per pixel.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Grey {
+pub struct GreyImage {
     /// Pixels per row.
     pub width: usize,
     /// Rows.
@@ -14,7 +14,7 @@ pub struct Grey {
     pub data: Vec<u8>,
 }
 
-impl Grey {
+impl GreyImage {
     /// Reads a PNG or JPEG file; colours become grey, 16 bits become 8.
     pub(super) fn read(path: &Path) -> Result<Self, String> {
         let in_file = |why: &dyn std::fmt::Display| format!("{}: cannot be read ({why})", path.display());

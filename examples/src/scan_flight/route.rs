@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use vio_ekf::{Spline, Stamp};
 
-use super::SurveyError;
+use super::ScanFlightError;
 use crate::mesh_io::TriangleMesh;
-use crate::placing::mean_normal;
+use crate::mesh_placement::mean_normal;
 
 /// Distance of the robot from the foremost point of the surface, metres.
 const STAND_OFF: f64 = 1.5;
@@ -38,8 +38,8 @@ pub(super) struct Route {
     pub(super) towards: Vector3<f64>,
 }
 
-pub(super) fn along(mesh: &TriangleMesh) -> Result<Route, SurveyError> {
-    let front = front(mesh).ok_or(SurveyError::NoFront)?;
+pub(super) fn along(mesh: &TriangleMesh) -> Result<Route, ScanFlightError> {
+    let front = front(mesh).ok_or(ScanFlightError::NoFront)?;
     let up = Vector3::z();
     let side = front.cross(&up);
     let range = |axis: &Vector3<f64>| {
@@ -49,7 +49,7 @@ pub(super) fn along(mesh: &TriangleMesh) -> Result<Route, SurveyError> {
     let ((left, right), (bottom, top), (_, foremost)) = (range(&side), range(&up), range(&front));
     let (width, height) = (right - left, top - bottom);
     if !(0.5..=30.0).contains(&width) || !(0.5..=30.0).contains(&height) {
-        return Err(SurveyError::Size { width, height });
+        return Err(ScanFlightError::Size { width, height });
     }
     let middle = 0.5 * (left + right);
     let half = (0.5 * width - INSIDE).max(0.5 * SHORTEST);
@@ -72,7 +72,7 @@ pub(super) fn along(mesh: &TriangleMesh) -> Result<Route, SurveyError> {
             let t = (k as f64 - 1.0) / KNOTS_PER_SECOND - REST;
             let sway = SWAY.0 * (std::f64::consts::TAU * t.max(0.0) / SWAY.1).sin();
             let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), sway) * heading;
-            Isometry3::from_parts(Translation3::from(place(&corners, &legs, t)), rotation)
+            Isometry3::from_parts(Translation3::from(position_at(&corners, &legs, t)), rotation)
         })
         .collect();
     let spline = Spline::new(Stamp::from_nanos(0), (1e9 / KNOTS_PER_SECOND) as i64, knots)?;
@@ -80,7 +80,7 @@ pub(super) fn along(mesh: &TriangleMesh) -> Result<Route, SurveyError> {
 }
 
 /// Where the way has come to after `t` seconds: each leg from rest to rest with the least jerk.
-fn place(corners: &[Vector3<f64>], legs: &[f64], mut t: f64) -> Vector3<f64> {
+fn position_at(corners: &[Vector3<f64>], legs: &[f64], mut t: f64) -> Vector3<f64> {
     for (ends, &duration) in corners.windows(2).zip(legs) {
         if t < duration {
             let s = (t / duration).max(0.0);
@@ -130,11 +130,11 @@ mod tests {
         for face in mesh.faces.clone() {
             mesh.faces.push([face[0], face[2], face[1]]);
         }
-        assert!(matches!(along(&mesh), Err(SurveyError::NoFront)));
+        assert!(matches!(along(&mesh), Err(ScanFlightError::NoFront)));
         let mut mesh = rock_wall(1);
         for position in &mut mesh.positions {
             *position = position.map(|c| 0.1 * c);
         }
-        assert!(matches!(along(&mesh), Err(SurveyError::Size { .. })));
+        assert!(matches!(along(&mesh), Err(ScanFlightError::Size { .. })));
     }
 }

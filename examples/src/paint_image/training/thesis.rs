@@ -8,7 +8,7 @@ use paint_net::train::{ThesisLoss, ThesisSettings, ThesisTrainer, thesis_patch};
 use paint_net::{Error, Image, metrics};
 use serde::Serialize;
 
-use super::film::{film, stamp};
+use super::rollout::{rollout_picture, stamp};
 use super::{PaintImageError, digits, write_json};
 use crate::pictures::{Panel, save_curves};
 use crate::progress::Stage;
@@ -18,13 +18,13 @@ const TRAINED: usize = 7000;
 /// Patches that are held out, and their numbers, which no training reaches.
 const HELD: u64 = 200;
 const FIRST_HELD: u64 = 1 << 40;
-/// Pictures in the film.
+/// Pictures in the rollout picture.
 const SHOWN: usize = 10;
 
 /// What the network is shown.
 #[derive(Debug, Clone)]
-pub enum Pictures {
-    /// Digits from a file or folder in the format of MNIST: the first 7000 to train, the others to judge by.
+pub enum TrainingImages {
+    /// Digits from a file or folder in the format of MNIST: the first 7000 to train, the others to test.
     Digits(PathBuf),
     /// Patches of procedural scenes.
     Patches,
@@ -32,16 +32,16 @@ pub enum Pictures {
 
 /// A training of the thesis' network.
 #[derive(Debug, Clone)]
-pub struct ThesisLesson {
+pub struct ThesisTrainingRun {
     /// How to train.
     pub settings: ThesisSettings,
     /// On what.
-    pub pictures: Pictures,
+    pub pictures: TrainingImages,
     /// Checkpoint to go on from; the curve beside it is gone on with.
     pub resume: Option<PathBuf>,
     /// Step after which to stop, if not at the end.
     pub until: Option<usize>,
-    /// Steps between checkpoints and looks at the pictures held out.
+    /// Steps between checkpoints and evaluations on the held-out pictures.
     pub save_every: usize,
 }
 
@@ -66,11 +66,11 @@ struct Outcome {
 }
 
 /// Trains, and writes `thesis.safetensors`, `checkpoint.safetensors`, `curve.csv`, `curve.png`, `film.png` and `report.json`.
-pub fn learn_thesis(lesson: &ThesisLesson, folder: &Path) -> Result<(), PaintImageError> {
+pub fn train_thesis(run: &ThesisTrainingRun, folder: &Path) -> Result<(), PaintImageError> {
     let started = std::time::Instant::now();
-    let settings = &lesson.settings;
-    let (shown, held) = pictures(lesson)?;
-    let mut trainer = match &lesson.resume {
+    let settings = &run.settings;
+    let (shown, held) = pictures(run)?;
+    let mut trainer = match &run.resume {
         None => ThesisTrainer::new(settings.clone())?,
         Some(path) => {
             let bytes = std::fs::read(path).map_err(|e| file_error(path, format!("cannot be read ({e})")))?;
@@ -81,18 +81,18 @@ pub fn learn_thesis(lesson: &ThesisLesson, folder: &Path) -> Result<(), PaintIma
         let path = folder.join(name);
         std::fs::write(&path, bytes).map_err(|e| file_error(&path, e.to_string()))
     };
-    let mut curve = Curve::before(lesson.resume.as_deref(), trainer.steps_done());
+    let mut curve = Curve::before(run.resume.as_deref(), trainer.steps_done());
     let picture = |n: u64| match &shown {
         Some(digits) => Ok(digits[(lattice(settings.seed, n as i64, -13) * digits.len() as f64) as usize].clone()),
         None => thesis_patch(settings.seed, n, &settings.shape),
     };
-    let last = lesson.until.unwrap_or(settings.steps).min(settings.steps);
+    let last = run.until.unwrap_or(settings.steps).min(settings.steps);
     let stage = Stage::start("train");
     while trainer.steps_done() < last {
         let loss = trainer.step(&picture)?;
         let step = trainer.steps_done();
         curve.add(step, "trained", &loss);
-        if step % lesson.save_every.max(1) == 0 || step == last {
+        if step % run.save_every.max(1) == 0 || step == last {
             curve.add(step, "held", &trainer.validate(&held)?);
             save("checkpoint.safetensors", &trainer.checkpoint())?;
             save("curve.csv", curve.text().as_bytes())?;
@@ -104,10 +104,10 @@ pub fn learn_thesis(lesson: &ThesisLesson, folder: &Path) -> Result<(), PaintIma
         [("seed", settings.seed.to_string()), ("step", format!("{} of {}", trainer.steps_done(), settings.steps))];
     save("thesis.safetensors", &network.to_safetensors(&notes))?;
     curve.draw(&folder.join("curve.png"))?;
-    let bright = matches!(lesson.pictures, Pictures::Digits(_));
-    film(&network, &held[..SHOWN.min(held.len())], bright)?.save(&folder.join("film.png"))?;
+    let bright = matches!(run.pictures, TrainingImages::Digits(_));
+    rollout_picture(&network, &held[..SHOWN.min(held.len())], bright)?.save(&folder.join("film.png"))?;
     let loss = trainer.validate(&held)?;
-    let painted = judge(&network, &held)?;
+    let painted = evaluate(&network, &held)?;
     let outcome = Outcome {
         seed: settings.seed,
         steps: trainer.steps_done(),
@@ -132,11 +132,11 @@ pub fn learn_thesis(lesson: &ThesisLesson, folder: &Path) -> Result<(), PaintIma
     Ok(())
 }
 
-/// Digits to train on, if they are not made on the way, and pictures to judge by.
-fn pictures(lesson: &ThesisLesson) -> Result<(Option<Vec<Image>>, Vec<Image>), PaintImageError> {
-    let shape = &lesson.settings.shape;
-    match &lesson.pictures {
-        Pictures::Digits(path) => {
+/// Digits to train on, if they are not made on the way, and held-out pictures to test.
+fn pictures(run: &ThesisTrainingRun) -> Result<(Option<Vec<Image>>, Vec<Image>), PaintImageError> {
+    let shape = &run.settings.shape;
+    match &run.pictures {
+        TrainingImages::Digits(path) => {
             let mut all = digits::read(path, shape.side)?;
             if all.len() <= TRAINED {
                 return Err(file_error(path, format!("holds {} pictures: give more than {TRAINED}", all.len())));
@@ -144,15 +144,15 @@ fn pictures(lesson: &ThesisLesson) -> Result<(Option<Vec<Image>>, Vec<Image>), P
             let held = all.split_off(TRAINED);
             Ok((Some(all), held))
         }
-        Pictures::Patches => {
-            let held = (0..HELD).map(|k| thesis_patch(lesson.settings.seed, FIRST_HELD + k, shape));
+        TrainingImages::Patches => {
+            let held = (0..HELD).map(|k| thesis_patch(run.settings.seed, FIRST_HELD + k, shape));
             Ok((None, held.collect::<Result<_, _>>()?))
         }
     }
 }
 
 /// Means over the pictures as they are painted without noise: cross-entropy per pixel, PSNR, steps.
-fn judge(network: &Network, pictures: &[Image]) -> Result<[f64; 3], Error> {
+fn evaluate(network: &Network, pictures: &[Image]) -> Result<[f64; 3], Error> {
     let mut sums = [0.0; 3];
     for some in pictures.chunks(50) {
         let tasks: Vec<(Image, Option<Image>)> = some.iter().map(|p| (p.clone(), None)).collect();

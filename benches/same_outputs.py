@@ -1,0 +1,101 @@
+"""Compares two folders of outputs file by file; every difference is named. Exit code 1 if any is left.
+
+Text may name things differently (keys of reports, headings) as long as every figure in it is the same and in the same order:
+such a file counts as renamed, and its words are listed. Figures that are times are left out by their key.
+
+    python3 benches/same_outputs.py OUT_BASE OUT_HEAD
+"""
+
+import json
+import re
+import sys
+from pathlib import Path
+
+TIME = re.compile(r"(^|_)(ms|s|us|seconds|cpu|wall)(_|$)|time|MiB_peak|resident")
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+TEXT = {".json", ".md", ".txt", ".toml", ".yaml", ""}
+
+
+def leaves(value, key=""):
+    """Key and value of every leaf of a JSON document, in order."""
+    if isinstance(value, dict):
+        for name, child in value.items():
+            yield from leaves(child, f"{key}.{name}" if key else name)
+    elif isinstance(value, list):
+        for child in value:
+            yield from leaves(child, f"{key}[]")
+    else:
+        yield key, value
+
+
+def json_difference(base, head, timed):
+    """None if equal but for names and times; otherwise what differs. The renamed keys."""
+    base, head = list(leaves(base)), list(leaves(head))
+    renamed = []
+    if len(base) != len(head):
+        gone = sorted({k for k, _ in base} - {k for k, _ in head})
+        new = sorted({k for k, _ in head} - {k for k, _ in base})
+        return f"{len(base)} values became {len(head)}: gone {gone}, new {new}", renamed
+    for (base_key, base_value), (head_key, head_value) in zip(base, head):
+        if base_key != head_key:
+            renamed.append(f"{base_key} -> {head_key}")
+        if base_value != head_value and base_key not in timed and head_key not in timed:
+            return f"{base_key}: {base_value} became {head_value}", renamed
+    return None, renamed
+
+
+def text_difference(base, head):
+    """Line by line: figures must agree; lines about times are passed over."""
+    base, head = base.splitlines(), head.splitlines()
+    if len(base) != len(head):
+        return f"{len(base)} lines became {len(head)}", []
+    renamed = []
+    for number, (one, two) in enumerate(zip(base, head), 1):
+        if one == two:
+            continue
+        if NUMBER.findall(one) != NUMBER.findall(two):
+            return f"line {number}: {one!r} became {two!r}", renamed
+        renamed.append(f"line {number}")
+    return None, renamed
+
+
+def is_time(key):
+    return bool(TIME.search(key.split(".")[-1].rstrip("[]")))
+
+
+def compare(base, head):
+    """What differs between two files, and what was only renamed."""
+    one, two = base.read_bytes(), head.read_bytes()
+    if one == two:
+        return None, []
+    if base.suffix == ".json":
+        documents = json.loads(one), json.loads(two)
+        timed = {key for document in documents for key, _ in leaves(document) if is_time(key)}
+        return json_difference(*documents, timed)
+    if base.suffix in TEXT:
+        return text_difference(one.decode(), two.decode())
+    return f"{len(one)} bytes became {len(two)}, or others", []
+
+
+def main():
+    base, head = map(Path, sys.argv[1:3])
+    listing = lambda root: {p.relative_to(root) for p in root.rglob("*") if p.is_file() and p.name != "log"}
+    files = listing(base), listing(head)
+    counts = {"same": 0, "renamed": 0, "different": 0}
+    for name in sorted(files[0] ^ files[1]):
+        counts["different"] += 1
+        print(f"{name}: only in {'the base' if name in files[0] else 'the head'}")
+    for name in sorted(files[0] & files[1]):
+        different, renamed = compare(base / name, head / name)
+        kind = "different" if different else "renamed" if renamed else "same"
+        counts[kind] += 1
+        if different:
+            print(f"{name}: {different}")
+        for words in renamed:
+            print(f"{name}: renamed: {words}")
+    print(", ".join(f"{count} {kind}" for kind, count in counts.items()))
+    return counts["different"] > 0 or not any(counts.values())
+
+
+if __name__ == "__main__":
+    sys.exit(main())
