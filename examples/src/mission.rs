@@ -246,7 +246,7 @@ impl Mission {
 
 fn describe(surface: &PaintSurface) -> String {
     let quality = surface.chart.quality();
-    let f = &surface.findings;
+    let f = &surface.repair_report;
     let mut text = format!(
         "{} faces, {:.2} m², {} flips, stretch energy {:.4}",
         surface.disk().faces().len(),

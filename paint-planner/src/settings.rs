@@ -22,7 +22,7 @@ pub struct Settings {
     /// Where the flight begins; `None`: at the first target served.
     pub start: Option<VehicleState>,
     /// Where the flight ends; `None`: at the last target served.
-    pub finish: Option<VehicleState>,
+    pub goal: Option<VehicleState>,
 }
 
 /// Stage 1 of the optimal planner (VR paper, Eqs. (1)-(6)).
@@ -45,16 +45,16 @@ pub struct NozzleSettings {
     pub ca: f64,
     /// Weight `c_b` of direction differences between neighbours, m^2 (ours: 0.005).
     pub cb: f64,
-    /// Weight `c_c` of the change since the previous round; repaired mode damps the position only, since `aim` holds the
+    /// Weight `c_c` of the change since the previous round; sequential mode damps the position only, since `aim` holds the
     /// direction (ours: 0.02).
     pub cc: f64,
     /// Weight `c_d` of the normal deviation (ours: 1).
     pub cd: f64,
-    /// Weight of the miss of the spray axis, repaired mode, m^2 per rad^2 (ours: 0.01; the papers only bound it by the cone).
+    /// Weight of the miss of the spray axis, sequential mode, m^2 per rad^2 (ours: 0.01; the papers only bound it by the cone).
     pub aim: f64,
-    /// Weight of the distance error along the normal, repaired mode (ours: 0.05; the papers only bound it).
+    /// Weight of the distance error along the normal, sequential mode (ours: 0.05; the papers only bound it).
     pub distance: f64,
-    /// Re-linearisations in repaired mode (ours: 4).
+    /// Re-linearisations in sequential mode (ours: 4).
     pub rounds: usize,
     /// Jacobi iterations in paper-exact mode (ours: 40).
     pub iterations: usize,
@@ -134,7 +134,7 @@ impl Default for Settings {
             clearance: 0.03,
             break_length: 0.15,
             start: None,
-            finish: None,
+            goal: None,
         }
     }
 }
@@ -237,7 +237,7 @@ impl Settings {
         if let TimingPolicy::Uniform { speed } = timing.policy {
             ensure("timing.policy.speed", speed, speed > 0.0 && speed.is_finite(), positive)?;
         }
-        for (name, pose) in [("start", &self.start), ("finish", &self.finish)] {
+        for (name, pose) in [("start", &self.start), ("goal", &self.goal)] {
             if let Some(state) = pose {
                 let numbers =
                     [state.position.x, state.position.y, state.position.z, state.heading, state.pan, state.tilt];

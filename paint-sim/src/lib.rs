@@ -35,7 +35,7 @@
 //! | source | equation | item |
 //! |---|---|---|
 //! | VR paper, Section IV (form ours) | conical Gaussian spray, per area and volume | [`SprayModel::density`] |
-//! | handheld paper, Section V (ours) | paint per texel, exact books | [`Film::deposit`], [`Books`] |
+//! | handheld paper, Section V (ours) | paint per texel, exact books | [`Film::deposit`], [`MassBalance`] |
 //! | Kubelka 1948 | film of finite thickness on a ground | [`km::reflectance`] |
 //! | Kubelka-Munk 1931 | opaque film, Riccati equation | [`km::opaque_reflectance`], [`km::gradient`] |
 //! | Kubelka 1954 | layers on layers | [`km::Layer::over`] |
@@ -44,7 +44,7 @@
 //! | CIE 015, IEC 61966-2-1 | XYZ, CIELAB, sRGB of 36 bands | [`colour`] |
 //! | Sharma, Wu, Dalal 2005 | colour difference CIEDE2000 | [`ciede2000`] |
 //! | Paper II, Section 5.2 (roll and pitch), drag ours | first-order attitude, rotor drag | [`flight::Vehicle::step`] |
-//! | catenary (textbook) | hose force | [`flight::Tether::force`] |
+//! | catenary (textbook) | hose force | [`flight::HoseModel::force`] |
 //! | Paper II, Section 7.2 | hit error, distance error, angle errors | [`FlightStatistics`] |
 
 pub mod colour;
@@ -62,9 +62,9 @@ pub use nalgebra;
 
 pub use colour::ciede2000;
 pub use error::Error;
-pub use film::{Books, Film, Texel};
+pub use film::{Film, MassBalance, Texel, spray};
 pub use flight::{FlightLog, FlightSettings, FlightStatistics, PanTilt, Reference, ReferenceState, fly};
 pub use paint::{Paint, Substrate};
-pub use render::{Camera, Frame, Lights, Look, render};
+pub use render::{Camera, Frame, Lights, Shading, render};
 pub use spray::{Shot, SprayModel};
 pub use surface::{Hit, Surface, TriangleSurface};

@@ -2,8 +2,7 @@
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 
-use crate::Error;
-use crate::error::{check_positive, check_range};
+use crate::error::{Error, check_positive, check_range};
 
 /// One quantum of paint in the books: one femtolitre, in cubic metres.
 pub const QUANTUM: f64 = 1e-18;
@@ -118,7 +117,7 @@ impl<'a> Cone<'a> {
     }
 
     /// Whether a ball may touch the cone; never false when it does.
-    pub(crate) fn may_touch(&self, center: &Point3<f64>, radius: f64) -> bool {
+    pub(crate) fn may_intersect(&self, center: &Point3<f64>, radius: f64) -> bool {
         let ray = center - self.origin;
         let depth = ray.dot(self.axis);
         if depth < -radius || depth > self.range + radius {

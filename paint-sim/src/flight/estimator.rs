@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
-use super::settings::Airframe;
-use super::vehicle::{Command, GRAVITY, Vehicle};
+use super::airframe::{Airframe, Command, GRAVITY};
+use super::vehicle::Vehicle;
 
 /// The estimated state, and the acceleration that the model does not explain.
 #[derive(Debug, Clone, Copy, PartialEq)]

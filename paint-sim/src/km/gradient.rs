@@ -1,6 +1,6 @@
 //! How the reflectance of a film changes with its parameters, in closed form.
 
-use super::{domain, tanhc};
+use super::domain::{domain, tanhc};
 
 /// Partial derivatives of [`super::reflectance`].
 #[derive(Debug, Clone, Copy, PartialEq)]
