@@ -17,7 +17,7 @@ struct CachedDistance {
 /// has used up the slack.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct DistanceCache {
-    known: Vec<CachedDistance>,
+    spheres: Vec<CachedDistance>,
 }
 
 /// Collision checks of one tool against one surface.
@@ -38,17 +38,17 @@ impl<'a> ClearanceChecker<'a> {
         self.tool.spheres(state, &mut self.spheres);
         for (k, &(centre, radius)) in self.spheres.iter().enumerate() {
             let need = radius + clearance;
-            match cache.known.get(k) {
+            match cache.spheres.get(k) {
                 Some(last) if last.distance - (centre - last.centre).norm() >= need => continue,
                 Some(last) if last.distance + (centre - last.centre).norm() < need => return false,
                 _ => {}
             }
             let distance = self.surface.distance(&centre, need + QUERY_MARGIN);
             let fresh = CachedDistance { centre, distance };
-            if k < cache.known.len() {
-                cache.known[k] = fresh;
-            } else if k == cache.known.len() {
-                cache.known.push(fresh);
+            if k < cache.spheres.len() {
+                cache.spheres[k] = fresh;
+            } else if k == cache.spheres.len() {
+                cache.spheres.push(fresh);
             }
             if distance < need {
                 return false;
@@ -63,15 +63,16 @@ impl<'a> ClearanceChecker<'a> {
         self.tool.spheres(state, &mut self.spheres);
         let mut least = below;
         for (k, &(centre, radius)) in self.spheres.iter().enumerate() {
-            if cache.known.get(k).is_some_and(|last| last.distance - (centre - last.centre).norm() - radius >= least) {
+            if cache.spheres.get(k).is_some_and(|last| last.distance - (centre - last.centre).norm() - radius >= least)
+            {
                 continue;
             }
             let distance = self.surface.distance(&centre, radius + below.max(0.0) + QUERY_MARGIN);
             let fresh = CachedDistance { centre, distance };
-            if k < cache.known.len() {
-                cache.known[k] = fresh;
-            } else if k == cache.known.len() {
-                cache.known.push(fresh);
+            if k < cache.spheres.len() {
+                cache.spheres[k] = fresh;
+            } else if k == cache.spheres.len() {
+                cache.spheres.push(fresh);
             }
             least = least.min(distance - radius);
         }

@@ -1,4 +1,4 @@
-//! The vehicle's way past all targets served, with flights between separate strokes.
+//! The route of the vehicle past all targets served, with flights between separate strokes.
 
 use crate::angle::nearest_equivalent;
 use crate::clearance::{ClearanceChecker, DistanceCache};
@@ -10,9 +10,9 @@ use nalgebra::Vector3;
 /// Greatest motion between two collision checks of a flight, m and (scaled by one metre) rad.
 const CHECK_STEP: f64 = 0.05;
 /// Retreats tried, m.
-const RETREATS: [f64; 6] = [0.15, 0.3, 0.6, 1.2, 2.4, 4.8];
+const RETREAT_DISTANCES: [f64; 6] = [0.15, 0.3, 0.6, 1.2, 2.4, 4.8];
 /// Climbs tried on top of a retreat, m.
-const CLIMBS: [f64; 7] = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
+const CLIMB_HEIGHTS: [f64; 7] = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
 
 /// A place the vehicle passes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,7 +67,7 @@ pub(crate) fn build(
         push(&mut route, state, Some(i), rest);
         name = format!("target {i}");
     }
-    if let Some(error) = refused.filter(|_| route.iter().all(|stop| stop.target.is_none())) {
+    if let Some(error) = refused.filter(|_| route.iter().all(|point| point.target.is_none())) {
         return Err(error);
     }
     if let (Some(state), Some(last)) = (settings.goal, route.last().copied()) {
@@ -84,7 +84,7 @@ fn push(route: &mut Vec<RoutePoint>, mut state: VehicleState, target: Option<usi
     route.push(RoutePoint { state, target, rest });
 }
 
-/// Adds the stops between two states: straight if that is clear, else back off from the surface on both sides, else
+/// Adds the route points between two states: straight if that is clear, else back off from the surface on both sides, else
 /// climb over it as well. Detours halt at their corners, so that the trajectory between them is the checked line; returns
 /// whether the arrival has to halt too.
 fn add_transit(
@@ -105,13 +105,13 @@ fn add_transit(
     }
     // Backwards from the surface: against the spray; or against the heading, along which the body came in.
     let retreats: [fn(&VehicleState) -> Vector3<f64>; 2] = [VehicleState::spray_azimuth, VehicleState::forward];
-    let back = |state: &VehicleState, forward: fn(&VehicleState) -> Vector3<f64>, way: f64| VehicleState {
-        position: state.position - forward(state) * way,
+    let back = |state: &VehicleState, forward: fn(&VehicleState) -> Vector3<f64>, distance: f64| VehicleState {
+        position: state.position - forward(state) * distance,
         ..*state
     };
-    for way in RETREATS {
+    for retreat in RETREAT_DISTANCES {
         for forward in retreats {
-            let corners = [*from, back(from, forward, way), back(to, forward, way), *to];
+            let corners = [*from, back(from, forward, retreat), back(to, forward, retreat), *to];
             if legs_are_clear(checker, &corners, settings.clearance) {
                 add_detour(route, &corners);
                 return Ok(true);
@@ -119,15 +119,15 @@ fn add_transit(
         }
     }
     let top = from.position.z.max(to.position.z);
-    for way in RETREATS {
-        for climb in CLIMBS {
+    for retreat in RETREAT_DISTANCES {
+        for climb in CLIMB_HEIGHTS {
             for forward in retreats {
                 let over = |state: &VehicleState| {
-                    let mut high = back(state, forward, way);
+                    let mut high = back(state, forward, retreat);
                     high.position.z = top + climb;
                     high
                 };
-                let (out, home) = (back(from, forward, way), back(to, forward, way));
+                let (out, home) = (back(from, forward, retreat), back(to, forward, retreat));
                 let corners = [*from, out, over(from), over(to), home, *to];
                 if legs_are_clear(checker, &corners, settings.clearance) {
                     add_detour(route, &corners);
@@ -139,7 +139,7 @@ fn add_transit(
     Err(Error::NoTransit { from: names.0.to_owned(), to: names.1.to_owned() })
 }
 
-/// Intermediate stops of a straight flight.
+/// Intermediate points of a straight flight.
 fn add_straight(route: &mut Vec<RoutePoint>, from: &VehicleState, to: &VehicleState, spacing: f64) {
     let pieces = ((to.position - from.position).norm() / spacing).ceil().clamp(1.0, 1e5) as usize;
     for k in 1..pieces {

@@ -15,22 +15,22 @@ const HEADING_LEVER: f64 = 0.5;
 /// Overshoot of a correction, so that the loop ends.
 const OVERCORRECTION: f64 = 1.01;
 
-/// A trajectory with the time of every stop.
+/// A trajectory with the time of every route point.
 #[derive(Debug, Clone)]
 pub(crate) struct TimedTrajectory {
     pub(crate) trajectory: Trajectory,
-    /// Time of each stop, s.
+    /// Time of each route point, s.
     pub(crate) times: Vec<f64>,
     pub(crate) extrema: Extrema,
-    /// Greatest distance between the trajectory and a stop at its time, m.
+    /// Greatest distance between the trajectory and a route point at its time, m.
     pub(crate) deviation: f64,
     /// Final global stretch factor.
     pub(crate) stretch: f64,
 }
 
-/// Finds times such that all limits hold, certified. `dense` makes every stop a knot.
+/// Finds times such that all limits hold, certified. `dense` makes every route point a knot.
 ///
-/// Rounds of: speed profile, minimum snap through the knots, exact extrema. Stops that the curve misses become knots,
+/// Rounds of: speed profile, minimum snap through the knots, exact extrema. Route points that the curve misses become knots,
 /// segments that break a limit are slowed. Whatever is left is repaired by one global stretch, which is exact because
 /// the path does not depend on it.
 pub(crate) fn schedule(
@@ -61,7 +61,7 @@ pub(crate) fn schedule(
             let (now, then) = (deviation <= settings.tolerance, other.deviation <= settings.tolerance);
             (now && !then) || (now == then && attempt.duration() * stretch < other.trajectory.duration())
         };
-        // Before the curve follows the stops, the latest attempt is the one to keep.
+        // Before the curve follows the route points, the latest attempt is the one to keep.
         if best.as_ref().is_none_or(|other| better(other) || other.deviation > settings.tolerance) {
             best = Some(stretched(attempt, times, most, deviation, stretch));
         }
@@ -109,18 +109,18 @@ fn limit_ratio(extrema: &Extrema, settings: &TimingSettings) -> f64 {
         .max(extrema.heading_rate / settings.max_heading_rate)
 }
 
-/// Halts, ends and flights are knots, and one stop per spacing or per bend.
+/// Halts, ends and flights are knots, and one route point per spacing or per bend.
 fn first_knots(route: &[RoutePoint], settings: &TimingSettings, dense: bool) -> Vec<usize> {
     let mut knots = vec![0];
-    let (mut way, mut turn) = (0.0, 0.0);
+    let (mut travelled, mut turn) = (0.0, 0.0);
     for i in 1..route.len() {
-        way += (route[i].state.position - route[i - 1].state.position).norm();
+        travelled += (route[i].state.position - route[i - 1].state.position).norm();
         turn += (route[i].state.heading - route[i - 1].state.heading).abs();
         let edge = |j: usize| route[j].target.is_none() || route[j].rest;
         let must = dense || i + 1 == route.len() || edge(i) || edge(i + 1) || edge(i - 1);
-        if must || way >= settings.knot_spacing * 0.999 || turn > 0.3 {
+        if must || travelled >= settings.knot_spacing * 0.999 || turn > 0.3 {
             knots.push(i);
-            (way, turn) = (0.0, 0.0);
+            (travelled, turn) = (0.0, 0.0);
         }
     }
     knots
@@ -133,9 +133,9 @@ fn fit(route: &[RoutePoint], knots: &[usize], durations: &[f64]) -> Result<Traje
     Trajectory::minimum_snap(&points, &own, &rest)
 }
 
-fn coordinates(stop: &RoutePoint) -> Vector4<f64> {
-    let p = stop.state.position;
-    Vector4::new(p.x, p.y, p.z, stop.state.heading)
+fn coordinates(point: &RoutePoint) -> Vector4<f64> {
+    let p = point.state.position;
+    Vector4::new(p.x, p.y, p.z, point.state.heading)
 }
 
 fn cumulative(durations: &[f64]) -> Vec<f64> {
@@ -148,7 +148,7 @@ fn cumulative(durations: &[f64]) -> Vec<f64> {
     times
 }
 
-/// Greatest deviation from any stop, and per segment the stop missed most beyond the tolerance.
+/// Greatest deviation from any route point, and per segment the one missed most beyond the tolerance.
 fn missed_points(
     route: &[RoutePoint],
     knots: &[usize],

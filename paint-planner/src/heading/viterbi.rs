@@ -37,8 +37,8 @@ impl Path {
 
 /// Cost of one edge, Eq. (7) with the squared distance the text asks for: `dpsi^2 / D^2 + c_e D^2`.
 fn edge(from: &Node, to: &Node, turn: f64, ce: f64) -> f64 {
-    let way = (to.position - from.position).norm_squared();
-    turn * turn / (way + MIN_SQUARED_STEP) + ce * way
+    let distance = (to.position - from.position).norm_squared();
+    turn * turn / (distance + MIN_SQUARED_STEP) + ce * distance
 }
 
 /// Viterbi over the graph. Equal costs go to the lowest bin. Where no bin of a layer can be reached inside the window,

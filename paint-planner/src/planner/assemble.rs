@@ -52,12 +52,12 @@ pub(super) fn assemble_plan(
     let waypoints: Vec<Waypoint> = route
         .iter()
         .zip(&timed.times)
-        .map(|(stop, &time)| Waypoint { time, state: stop.state, target: stop.target })
+        .map(|(point, &time)| Waypoint { time, state: point.state, target: point.target })
         .collect();
     let mut flow = vec![0.0; targets.len()];
-    for (stops, times) in route.windows(2).zip(timed.times.windows(2)) {
-        let (length, dose) = stroke_between(stops, targets);
-        if let Some(target) = stops[0].target.filter(|_| length > 0.0) {
+    for (points, times) in route.windows(2).zip(timed.times.windows(2)) {
+        let (length, dose) = stroke_between(points, targets);
+        if let Some(target) = points[0].target.filter(|_| length > 0.0) {
             // Dose times spot speed: the volume on the stroke does not depend on the timing.
             flow[target] = dose * length / (times[1] - times[0]);
         }

@@ -57,16 +57,16 @@ fn smooth(targets: &[Target], linked: &[bool], settings: &Settings) -> Vec<Nozzl
     let mut facing = first_facing(targets);
     let mut x = Vec::with_capacity(targets.len());
     let mut raw: Vec<[f64; 5]> = Vec::with_capacity(targets.len());
-    let mut way = 0.0;
+    let mut arc_length = 0.0;
     for (i, target) in targets.iter().enumerate() {
         // The normal of a floor has no horizontal part: keep facing as before.
         let flat = Vector3::new(target.normal.x, target.normal.y, 0.0);
         facing = flat.try_normalize(1e-6).unwrap_or(facing);
         if i > 0 {
-            way += (target.point - targets[i - 1].point).norm();
+            arc_length += (target.point - targets[i - 1].point).norm();
         }
         let p = target.point + facing * settings.nozzle.stand_off;
-        x.push(way);
+        x.push(arc_length);
         raw.push([p.x, p.y, p.z, -facing.x, -facing.y]);
     }
     let mut result = Vec::with_capacity(targets.len());
