@@ -44,8 +44,8 @@ pub enum Error {
         /// How many faces were given.
         faces: usize,
     },
-    /// More paint than the books can count.
-    #[error("the books would exceed 2^64 femtolitres (18 cubic metres): check the unit of the shot volumes (m^3)")]
+    /// More paint than the mass balance can count.
+    #[error("the paint would exceed 2^64 femtolitres (18 cubic metres): check the unit of the shot volumes (m^3)")]
     MassOverflow,
     /// The hose cannot reach the vehicle.
     #[error("a hose of {length} m cannot span {distance} m: lengthen it or move its base")]

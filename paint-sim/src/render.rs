@@ -91,19 +91,19 @@ pub struct Lights {
 }
 
 impl Default for Lights {
-    /// A high sun from the front right (ours).
+    /// A high sun from the front right.
     fn default() -> Self {
         let towards_sun = UnitVector3::new_normalize(Vector3::new(0.3, -0.4, 0.87));
         Self { towards_sun, sun: [0.7; 3], ambient: [0.3; 3], background: [0.85, 0.9, 1.0] }
     }
 }
 
-/// What a point of the surface looks like.
+/// How a point of the surface is shaded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shading {
     /// Albedo, linear RGB.
     pub albedo: [f32; 3],
-    /// Unit normal for the light, either side: the hit's own for facets, an interpolated one for a smooth look. Shadows and
+    /// Unit normal for the light, either side: the hit's own for facets, an interpolated one for smooth shading. Shadows and
     /// [`Frame::normals`] follow the geometry.
     pub normal: Vector3<f64>,
 }
@@ -125,7 +125,7 @@ pub struct Frame {
     pub normals: Vec<[f32; 3]>,
 }
 
-/// Renders `surface`; `shade` gives the look of a hit, surfaces are matt and two-sided.
+/// Renders `surface`; `shade` gives the shading of a hit, surfaces are matt and two-sided.
 ///
 /// Each pixel's colour is the mean of `supersampling`^2 rays on a regular grid, each with a shadow ray towards the sun;
 /// depth, face and normal belong to the pixel's centre. The picture does not depend on `threads`.

@@ -15,7 +15,7 @@ pub struct Aim {
     /// Distance from the nozzle tip to the target along the line between them, metres.
     pub distance: f64,
     /// Angle between the spray axis and the line from the tip to the target; zero unless clamped. Radians.
-    pub miss: f64,
+    pub pointing_error: f64,
     /// Whether a limit was in the way.
     pub clamped: bool,
 }
@@ -46,5 +46,5 @@ pub(crate) fn aim_in_body(s: &PtuSettings, target: &Point3<f64>) -> Result<Aim, 
     if distance <= 0.0 {
         return Err(Error::TooClose { axis: "nozzle", distance: k, offset: along.hypot(above) });
     }
-    Ok(Aim { joints: Joints { pan: wrap(pan), tilt: wrap(tilt) }, distance, miss: 0.0, clamped: false })
+    Ok(Aim { joints: Joints { pan: wrap(pan), tilt: wrap(tilt) }, distance, pointing_error: 0.0, clamped: false })
 }

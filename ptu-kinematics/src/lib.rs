@@ -19,7 +19,7 @@
 //! // The robot hovers, rolled by three degrees in the wind; where must the gun point to hit this spot of the wall?
 //! let world_from_body = Isometry3::new(Vector3::new(0.0, 0.0, 2.0), Vector3::new(0.05, 0.0, 0.0));
 //! let aim = ptu.aim(&world_from_body, &Point3::new(0.8, 0.1, 2.1))?;
-//! assert!(aim.miss < 1e-12 && !aim.clamped);
+//! assert!(aim.pointing_error < 1e-12 && !aim.clamped);
 //! let nozzle = ptu.forward(&world_from_body, aim.joints);
 //! let hit = nozzle.tip + nozzle.direction.into_inner() * aim.distance;
 //! assert!((hit - Point3::new(0.8, 0.1, 2.1)).norm() < 1e-12);

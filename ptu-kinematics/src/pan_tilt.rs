@@ -161,7 +161,7 @@ impl Ptu {
     ///
     /// The spray axis need not meet the pan or the tilt axis: with `e` its lateral offset and `η` its height over the
     /// tilt axis, pan is corrected by `asin(e/ρ)` and tilt by `asin(η/k)`. Angles beyond the limits are clamped and the
-    /// remaining miss is returned. Fails with [`Error::TooClose`] when the target lies inside those offsets or behind
+    /// remaining pointing error is returned. Fails with [`Error::TooClose`] when the target lies inside those offsets or behind
     /// the nozzle.
     pub fn aim(&self, world_from_body: &Isometry3<f64>, target: &Point3<f64>) -> Result<Aim, Error> {
         finite("target", (*target).into())?;
@@ -174,8 +174,8 @@ impl Ptu {
         }
         let nozzle = self.forward(&Isometry3::identity(), joints);
         let line = in_body - nozzle.tip;
-        let miss = nozzle.direction.cross(&line).norm().atan2(nozzle.direction.dot(&line));
-        Ok(Aim { joints, distance: line.norm(), miss, clamped: true })
+        let pointing_error = nozzle.direction.cross(&line).norm().atan2(nozzle.direction.dot(&line));
+        Ok(Aim { joints, distance: line.norm(), pointing_error, clamped: true })
     }
 }
 

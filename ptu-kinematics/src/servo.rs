@@ -13,9 +13,9 @@ pub struct ServoSettings {
     pub resolution: f64,
     /// Largest speed in rad/s. Default 354°/s: 59 rpm without load at 12 V (AX-12A data sheet).
     pub max_rate: f64,
-    /// Time constant of the first-order response in seconds. Default 0.03, ours.
+    /// Time constant of the first-order response in seconds. Default 0.03.
     pub time_constant: f64,
-    /// Time from command to the start of the motion in seconds. Default 0.02, ours (bus and firmware cycle).
+    /// Time from command to the start of the motion in seconds. Default 0.02 (bus and firmware cycle).
     pub dead_time: f64,
     /// Mechanical limits in radians. Default ±150° (AX-12A data sheet).
     pub limits: Range,

@@ -8,12 +8,12 @@ use crate::joints::Range;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct PtuSettings {
-    /// `b`: body origin to a point on the pan axis, in body axes. Default (0.45, 0, 0.05), ours: the papers name the
+    /// `b`: body origin to a point on the pan axis, in body axes. Default (0.45, 0, 0.05): the papers name the
     /// arm but print no length; this one carries the gun clear of the rotors.
     pub body_from_pan_axis: Vector3<f64>,
-    /// `a`: that point to the tilt axis, in the panned frame. Default (0.03, 0, 0.04), ours.
+    /// `a`: that point to the tilt axis, in the panned frame. Default (0.03, 0, 0.04).
     pub pan_from_tilt_axis: Vector3<f64>,
-    /// `c`: tilt axis to the nozzle tip, in the tilted frame. Default (0.12, 0, 0.02), ours.
+    /// `c`: tilt axis to the nozzle tip, in the tilted frame. Default (0.12, 0, 0.02).
     pub tilt_from_tip: Vector3<f64>,
     /// `μ`: angle of the spray axis above the x axis of the tilted frame. Default 0.
     pub gun_pitch: f64,

@@ -9,7 +9,7 @@ use paint_sim::spray::QUANTUM;
 use ptu_kinematics::Joints;
 
 use super::inspect::Inspection;
-use super::{LayerFlight, Mission, MissionError};
+use super::{LayerFlight, Mission, MissionError, MissionSettings};
 use crate::appearance::{DENSITY, UNIT_THICKNESS};
 use crate::report::{Report, peak_resident_bytes};
 
@@ -36,10 +36,10 @@ impl Mission {
         let flight_time: f64 = self.flights.iter().map(|f| f.plan.trajectory.duration()).sum();
         let path: f64 = self.flights.iter().map(|f| path_length(&f.plan)).sum();
 
-        let books = self.film.books();
+        let balance = self.film.mass_balance();
         let on_texels: u64 = self.film.volumes().iter().sum();
         let kilograms = |quanta: u64| quanta as f64 * QUANTUM * DENSITY;
-        let balance = (i128::from(books.emitted) - i128::from(on_texels) - i128::from(books.overspray)).abs();
+        let unaccounted = (i128::from(balance.emitted) - i128::from(on_texels) - i128::from(balance.overspray)).abs();
 
         let canvas = self.layers.last().map_or(&self.wanted, |l| &l.ink);
         let filtered = ideal(&self.wanted, self.settings.spot / self.settings.texel)?;
@@ -69,10 +69,10 @@ impl Mission {
             planning_per_flight_time: self.planning / flight_time,
             path_length_m: path,
             flight_time_s: flight_time,
-            paint_emitted_kg: kilograms(books.emitted),
+            paint_emitted_kg: kilograms(balance.emitted),
             paint_deposited_kg: kilograms(on_texels),
-            paint_overspray_kg: kilograms(books.overspray),
-            mass_balance_relative: balance as f64 / books.emitted.max(1) as f64,
+            paint_overspray_kg: kilograms(balance.overspray),
+            mass_balance_relative: unaccounted as f64 / balance.emitted.max(1) as f64,
             psnr_canvas_db: metrics::psnr(canvas, &self.wanted, weight)?,
             psnr_ideal_db: metrics::psnr(&filtered, &self.wanted, weight)?,
             psnr_painted_db: metrics::psnr(&painted, &self.wanted, weight)?,
@@ -80,7 +80,7 @@ impl Mission {
             ssim_painted: metrics::ssim(&painted, &self.wanted, weight)?,
             ciede2000_mean: mean(self.colour_difference().into_iter().flatten()),
             collisions: self.flights.iter().map(|f| self.collisions(&f.flight)).sum(),
-            limit_violations: self.flights.iter().map(|f| self.limit_violations(f)).sum(),
+            limit_violations: self.flights.iter().map(|f| limit_violations(&f.plan, &f.flight, &self.settings)).sum(),
             scan_error_mean_m: inspection.mesh_error,
             slam_ate_rms_m: inspection.slam_ate,
             layers: self.layers.len(),
@@ -129,7 +129,7 @@ impl Mission {
             for (k, target) in f.route.targets.iter().enumerate().filter(|(_, t)| t.dose > 0.0) {
                 total += 1;
                 let heading = 0.0;
-                let joints = self.robot.ptu.inverse_unlimited(&target.point, &-target.normal, heading).joints;
+                let joints = self.robot.chain.inverse_unlimited(&target.point, &-target.normal, heading).joints;
                 // Any heading will do: only the tilt is decided by the normal.
                 if !self.settings.ptu.tilt_limits.contains(joints.tilt) {
                     out_of_reach += 1;
@@ -157,37 +157,35 @@ impl Mission {
         let touches = |sample: &&FlightSample| {
             spheres.clear();
             let joints = Joints { pan: sample.pan_tilt[0], tilt: sample.pan_tilt[1] };
-            self.robot.spheres_at(&sample.world_from_body, joints, &mut spheres);
+            self.robot.spheres_at(&sample.world_from_body, &joints, &mut spheres);
             spheres
                 .iter()
                 .any(|(centre, radius)| paint_sim::Surface::distance(&self.surface.world, centre, *radius) < *radius)
         };
         log.samples.iter().step_by(COLLISION_STRIDE).filter(touches).count()
     }
+}
 
-    /// Moments at which the plan exceeds speed or acceleration, or the flown gun its joint limits.
-    fn limit_violations(&self, f: &LayerFlight) -> usize {
-        let timing = &self.settings.planner.timing;
-        let slack = 1.0 + 1e-9;
-        let steps = (f.plan.trajectory.duration() / LIMIT_STEP) as usize;
-        let planned = (0..=steps)
-            .map(|k| f.plan.trajectory.sample(k as f64 * LIMIT_STEP))
-            .filter(|s| {
-                s.velocity.norm() > timing.max_speed * slack || s.acceleration.norm() > timing.max_acceleration * slack
-            })
-            .count();
-        let ptu = &self.settings.ptu;
-        // The servo's steps do not divide the limits: allow one half step.
-        let margin = 0.5 * self.settings.servo.resolution;
-        let inside =
-            |angle: f64, range: ptu_kinematics::Range| angle >= range.min - margin && angle <= range.max + margin;
-        let joints = f
-            .flight
-            .samples
-            .iter()
-            .filter(|s| !inside(s.pan_tilt[0], ptu.pan_limits) || !inside(s.pan_tilt[1], ptu.tilt_limits));
-        planned + joints.count()
-    }
+/// Moments at which the plan exceeds speed or acceleration, or the flown gun its joint limits.
+fn limit_violations(plan: &Plan, flight: &FlightLog, settings: &MissionSettings) -> usize {
+    let timing = &settings.planner.timing;
+    let slack = 1.0 + 1e-9;
+    let steps = (plan.trajectory.duration() / LIMIT_STEP) as usize;
+    let planned = (0..=steps)
+        .map(|k| plan.trajectory.sample(k as f64 * LIMIT_STEP))
+        .filter(|s| {
+            s.velocity.norm() > timing.max_speed * slack || s.acceleration.norm() > timing.max_acceleration * slack
+        })
+        .count();
+    let ptu = &settings.ptu;
+    // The servo's steps do not divide the limits: allow one half step.
+    let margin = 0.5 * settings.servo.resolution;
+    let inside = |angle: f64, range: ptu_kinematics::Range| angle >= range.min - margin && angle <= range.max + margin;
+    let joints = flight
+        .samples
+        .iter()
+        .filter(|s| !inside(s.pan_tilt[0], ptu.pan_limits) || !inside(s.pan_tilt[1], ptu.tilt_limits));
+    planned + joints.count()
 }
 
 struct Deviations {
@@ -211,5 +209,5 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 /// The pose of the nozzle at a sample: x along the spray.
 pub(super) fn nozzle_pose(mission: &Mission, sample: &FlightSample) -> Isometry3<f64> {
     let joints = Joints { pan: sample.pan_tilt[0], tilt: sample.pan_tilt[1] };
-    mission.robot.ptu.world_from_nozzle(&sample.world_from_body, joints)
+    mission.robot.chain.world_from_nozzle(&sample.world_from_body, joints)
 }

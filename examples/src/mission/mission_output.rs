@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use paint_planner::normal_deviation;
 use paint_sim::flight::FlightSample;
-use paint_sim::{Camera, Frame, Hit, Lights, Look, render};
+use paint_sim::{Camera, Frame, Hit, Lights, Shading, render};
 use uv_param::SurfacePoint;
 
 use super::figures::nozzle_pose;
@@ -135,9 +135,9 @@ impl Mission {
     }
 
     /// Shading of a point of the world: painted and smooth on the disk, grey elsewhere.
-    pub(super) fn shading(&self, painted: &paint_net::Image, hit: &Hit) -> Look {
+    pub(super) fn shading(&self, painted: &paint_net::Image, hit: &Hit) -> Shading {
         let Some(face) = self.surface.disk().faces().get(hit.face as usize) else {
-            return Look { albedo: [0.4; 3], normal: hit.normal };
+            return Shading { albedo: [0.4; 3], normal: hit.normal };
         };
         let uv = self.surface.chart.uv();
         let [a, b] = hit.barycentric;
@@ -149,7 +149,7 @@ impl Mission {
         let y = (painted.height() as f64 * texel - mix(1)) / texel - 0.5;
         let albedo = self.appearance.linear(bilinear(painted, x, y)).map(|c| c as f32);
         let at = SurfacePoint { face: hit.face, barycentric: [1.0 - a - b, a, b] };
-        Look { albedo, normal: self.surface.chart.smooth_normal(at).into_inner() }
+        Shading { albedo, normal: self.surface.chart.smooth_normal(at).into_inner() }
     }
 
     /// A camera on the surface's mean side that has all the points in view.

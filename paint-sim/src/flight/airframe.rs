@@ -22,7 +22,7 @@ pub struct Command {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct Airframe {
-    /// Mass with arm and spray gun, kg. Default 4.2 (ours; Paper II names the airframe, a DJI Matrice 100, but no mass).
+    /// Mass with arm and spray gun, kg. Default 4.2 (Paper II names the airframe, a DJI Matrice 100, but no mass).
     pub mass: f64,
     /// Gain from the roll command to roll. Default 1.017 (the small multirotor published with the ETH model predictive controller).
     pub roll_gain: f64,
@@ -32,9 +32,9 @@ pub struct Airframe {
     pub pitch_gain: f64,
     /// Time constant of pitch, s. Default 0.175 (same source).
     pub pitch_time_constant: f64,
-    /// Time constant of the yaw rate, s. Default 0.15 (ours).
+    /// Time constant of the yaw rate, s. Default 0.15.
     pub yaw_time_constant: f64,
-    /// Linear drag per mass along the body's axes, 1/s. Default 0.3, 0.3, 0.1 (ours).
+    /// Linear drag per mass along the body's axes, 1/s. Default 0.3, 0.3, 0.1.
     pub drag: [f64; 3],
     /// Largest commanded roll or pitch, rad. Default 25 degrees (same source as the gains).
     pub tilt_limit: f64,

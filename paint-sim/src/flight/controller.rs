@@ -12,7 +12,7 @@ pub trait Controller {
     fn command(&mut self, time: f64, estimate: &Estimate, reference: &dyn Reference) -> Command;
 }
 
-/// Gains of [`CascadedController`] (all ours).
+/// Gains of [`CascadedController`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct ControllerSettings {
@@ -35,7 +35,7 @@ impl Default for ControllerSettings {
 }
 
 /// Cascaded PD control with feed-forward of velocity, acceleration and jerk, rejection of the observed disturbance, and
-/// inversion of the known first-order attitude lag. Ours.
+/// inversion of the known first-order attitude lag.
 #[derive(Debug, Clone)]
 pub struct CascadedController {
     airframe: Airframe,

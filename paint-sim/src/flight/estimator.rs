@@ -20,7 +20,7 @@ pub struct Estimate {
     pub yaw_rate: f64,
 }
 
-/// Bandwidths of the observer (all ours).
+/// Bandwidths of the observer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct ObserverSettings {

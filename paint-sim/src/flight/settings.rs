@@ -10,11 +10,11 @@ use crate::error::{Error, check_not_negative, check_positive, check_range};
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct Wind {
-    /// Mean velocity of the air in the world, m/s. Default 2 along x (ours).
+    /// Mean velocity of the air in the world, m/s. Default 2 along x.
     pub mean: Vector3<f64>,
-    /// Standard deviation of the gusts per axis, m/s. Default 0.5 (ours).
+    /// Standard deviation of the gusts per axis, m/s. Default 0.5.
     pub gust_sigma: f64,
-    /// Time constant of the gusts, s. Default 1.5 (ours).
+    /// Time constant of the gusts, s. Default 1.5.
     pub gust_time: f64,
 }
 
@@ -32,7 +32,7 @@ impl Wind {
 }
 
 /// The error of the pose that the controller is given: a slow Ornstein-Uhlenbeck drift plus white noise at 100 Hz, each
-/// axis by itself. All presets are ours.
+/// axis by itself. The presets are engineering values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Localisation {
@@ -87,7 +87,7 @@ impl Default for Localisation {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct Valve {
-    /// Time from the command to the paint, s. Default 50 ms (ours).
+    /// Time from the command to the paint, s. Default 50 ms.
     pub dead_time: f64,
     /// How much earlier than the reference says the command is given, s. Default 50 ms: the dead time is known.
     pub lead: f64,
@@ -115,7 +115,7 @@ pub struct FlightSettings {
     pub valve: Valve,
     /// Keeps pan and tilt at zero. Default false.
     pub ptu_locked: bool,
-    /// Hover at the start before the reference begins, s; the observer learns wind and hose. Default 5 (ours).
+    /// Hover at the start before the reference begins, s; the observer learns wind and hose. Default 5.
     pub settle: f64,
     /// Samples per second of the log; a divisor of 1000. Default 100 Hz.
     pub log_rate: u32,
