@@ -6,6 +6,8 @@ mod fly;
 mod inspect;
 mod mission_output;
 mod plan;
+#[cfg(test)]
+mod test_panel;
 
 pub use inspect::Inspection;
 

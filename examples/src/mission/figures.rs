@@ -211,3 +211,33 @@ pub(super) fn nozzle_pose(mission: &Mission, sample: &FlightSample) -> Isometry3
     let joints = Joints { pan: sample.pan_tilt[0], tilt: sample.pan_tilt[1] };
     mission.robot.chain.world_from_nozzle(&sample.world_from_body, joints)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_panel;
+    use super::*;
+    use ptu_kinematics::{PtuSettings, Range};
+
+    #[test]
+    fn limit_violations_are_counted() {
+        let settings = MissionSettings::default();
+        let (plan, flight) = test_panel::flown(&settings);
+        assert_eq!(limit_violations(&plan, &flight, &settings), 0);
+        // The same flight judged by a unit whose pan ends at 0.05 rad, which this stroke needs more than.
+        let narrow = PtuSettings { pan_limits: Range::symmetric(0.05), ..settings.ptu };
+        let judged = MissionSettings { ptu: narrow, ..settings.clone() };
+        let margin = 0.05 + 0.5 * settings.servo.resolution;
+        let beyond = flight.samples.iter().filter(|s| s.pan_tilt[0].abs() > margin).count();
+        assert!(beyond > 10, "the flight must leave the narrow limits");
+        assert_eq!(limit_violations(&plan, &flight, &judged), beyond);
+        let flat = PtuSettings { tilt_limits: Range::symmetric(0.02), ..settings.ptu };
+        assert!(limit_violations(&plan, &flight, &MissionSettings { ptu: flat, ..settings.clone() }) > 0);
+        // And by a vehicle that may fly only half as fast, or accelerate a tenth.
+        let mut slow = settings.clone();
+        slow.planner.timing.max_speed = 0.5 * plan.report.extrema.speed;
+        assert!(limit_violations(&plan, &flight, &slow) > 0);
+        let mut gentle = settings;
+        gentle.planner.timing.max_acceleration = 0.1 * plan.report.extrema.acceleration;
+        assert!(limit_violations(&plan, &flight, &gentle) > 0);
+    }
+}

@@ -113,3 +113,28 @@ fn hose(plan: &Plan) -> HoseModel {
     // A tenth of slack, and a metre for wind and overshoot.
     HoseModel { base, length: 1.1 * farthest + 1.0, line_density: 0.12, base_on_floor: true }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_panel;
+    use super::*;
+    use ptu_kinematics::Ptu;
+
+    #[test]
+    fn the_seed_and_the_layer_change_wind_and_localisation() {
+        let settings = MissionSettings { seed: 1, threads: 1, ..MissionSettings::default() };
+        let surface = test_panel::surface();
+        let robot = Robot::new(Ptu::new(settings.ptu).unwrap());
+        let plan = test_panel::plan(&surface, &robot, &settings);
+        let fly = |seed, layer| {
+            let settings = MissionSettings { seed, ..settings.clone() };
+            fly_three(&plan, &surface, &robot, &settings, layer).unwrap()
+        };
+        let (usual, again, other, next) = (fly(1, 0), fly(1, 0), fly(2, 0), fly(1, 1));
+        for k in 0..3 {
+            assert_eq!(usual[k], again[k]);
+            assert_ne!(usual[k], other[k], "flight {k} ignores the seed");
+            assert_ne!(usual[k], next[k], "flight {k} is the same in every layer");
+        }
+    }
+}
