@@ -14,7 +14,7 @@ use crate::progress::Stage;
 
 pub use thesis::{ThesisTrainingRun, TrainingImages, train_thesis};
 
-/// Steps between two points of the curve.
+/// ThresholdSpacing between two points of the curve.
 const POINT: usize = 50;
 
 /// A training: its settings, and where to go on from.
@@ -26,7 +26,7 @@ pub struct TrainingRun {
     pub resume: Option<PathBuf>,
     /// Step after which to stop, if not at the end.
     pub until: Option<usize>,
-    /// Steps between checkpoints.
+    /// ThresholdSpacing between checkpoints.
     pub save_every: usize,
 }
 
