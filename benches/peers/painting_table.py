@@ -90,7 +90,7 @@ def main():
             ("valve 5 %, boustrophedon path, waypoints every pixel", "paint-net_slew0.05_every1px_boustrophedon"),
             ("peer: valve 5 %, boustrophedon path", "slew_grid2_0.05"),
             ("**valve 2 % per waypoint, context-based path**", "paint-net_slew0.02_every2px_contextbased"),
-            ("valve 2 %, row by row", "paint-net_slew0.02_every2px_boustrophedon"),
+            ("valve 2 %, boustrophedon path", "paint-net_slew0.02_every2px_boustrophedon"),
             ("valve 2 %, row by row, waypoints every pixel", "paint-net_slew0.02_every1px_boustrophedon"),
             ("peer: valve 2 %, row by row", "slew_grid2_0.02"),
             ("noise, blind", "paint-net_noise_open"),

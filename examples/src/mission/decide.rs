@@ -4,7 +4,8 @@ use paint_net::{
     Deconvolution, Feedback, Image, Layered, MatchingPursuit, Observer, PaintProblem, Painter, Painting, SprayKernel,
 };
 
-use super::{MissionError, MissionSettings, PainterChoice};
+use super::error::MissionError;
+use super::settings::{MissionSettings, PainterChoice};
 use crate::appearance::Appearance;
 use crate::progress::Stage;
 use crate::surface::PaintSurface;

@@ -3,7 +3,8 @@ use std::path::Path;
 use paint_net::thesis::ThesisPainter;
 use paint_net::{Feedback, FreeSprays, Image, Limits, PaintProblem, Painter, SprayKernel, metrics};
 
-use super::{PaintImageError, read_network};
+use super::error::PaintImageError;
+use super::files::read_network;
 
 /// Two painters beside the thesis' network, on one picture, none with more sprays than that.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -34,7 +34,7 @@ impl<T: Copy + Default> Activations<T> {
     }
 
     #[cfg(any(test, feature = "train"))]
-    /// ThresholdSpacing one after another.
+    /// Steps one after another.
     pub(crate) fn steps(&self, range: Range<usize>) -> &[T] {
         &self.data[range.start * self.step..range.end * self.step]
     }

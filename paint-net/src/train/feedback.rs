@@ -13,7 +13,7 @@ use crate::network::{Adjoint, Architecture, Network, PackedNetwork, Unrolled};
 pub struct TrainSettings {
     /// Seed of the first weights and of all pictures. Default 1.
     pub seed: u64,
-    /// ThresholdSpacing of the optimiser. Default 12,000, ours.
+    /// Steps of the optimiser. Default 12,000, ours.
     pub steps: usize,
     /// Pictures per step. Default 8, ours.
     pub batch: usize,
@@ -60,7 +60,7 @@ pub struct Trainer {
 /// What one step of training found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrainProgress {
-    /// ThresholdSpacing done.
+    /// Steps done.
     pub step: usize,
     /// Mean over the batch of `Σ_k share_k ln(mse_k + 1e-3)`.
     pub loss: f64,

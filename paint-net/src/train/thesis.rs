@@ -16,7 +16,7 @@ pub struct ThesisSettings {
     pub seed: u64,
     /// Sizes of the network. Default [`Architecture::MNIST`].
     pub architecture: Architecture,
-    /// ThresholdSpacing of the optimiser. Default 7000 (100 epochs of 7000 pictures), ours.
+    /// Steps of the optimiser. Default 7000 (100 epochs of 7000 pictures), ours.
     pub steps: usize,
     /// Pictures per step. Default 100 (as in figure 8.7).
     pub batch: usize,
@@ -64,7 +64,7 @@ pub struct ThesisLoss {
     pub stop: f64,
     /// `Σ |v_t - v_{t-1}|`, before its weight.
     pub variation: f64,
-    /// ThresholdSpacing up to the stop.
+    /// Steps up to the stop.
     pub steps: f64,
 }
 
@@ -106,7 +106,7 @@ impl ThesisTrainer {
         Network::from_parameters(self.settings.architecture, self.descent.parameters.clone())
     }
 
-    /// ThresholdSpacing done.
+    /// Steps done.
     pub fn steps_done(&self) -> usize {
         self.descent.steps()
     }

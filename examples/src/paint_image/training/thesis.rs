@@ -8,8 +8,10 @@ use paint_net::train::{ThesisLoss, ThesisSettings, ThesisTrainer, thesis_patch};
 use paint_net::{Error, Image, metrics};
 use serde::Serialize;
 
+use super::digits;
 use super::rollout::{rollout_picture, stamp};
-use super::{PaintImageError, digits, write_json};
+use crate::paint_image::error::PaintImageError;
+use crate::paint_image::files::write_json;
 use crate::pictures::{Panel, save_curves};
 use crate::progress::Stage;
 
@@ -41,7 +43,7 @@ pub struct ThesisTrainingRun {
     pub resume: Option<PathBuf>,
     /// Step after which to stop, if not at the end.
     pub until: Option<usize>,
-    /// ThresholdSpacing between checkpoints and evaluations on the held-out pictures.
+    /// Steps between checkpoints and evaluations on the held-out pictures.
     pub save_every: usize,
 }
 
