@@ -104,7 +104,7 @@ impl MixtureCost {
         }
         let mut cost = 0.0;
         self.for_blocks(|mixture, depths, wanted, metric| {
-            cost += f64::from(mixture.cost_and_gradient(depths, wanted, metric))
+            cost += f64::from(mixture.cost_and_gradient(depths, wanted, metric));
         });
         // A footprint's mean is its sum over as many pixels as a cell has.
         let stride = self.footprint.stride();

@@ -44,7 +44,7 @@ impl<T: Real> Adjoint<T> {
     }
 
     /// From the derivatives by `paint` and `last_step` after a pass to those before it, in place. `ink_gradient`: derivative
-    /// of the loss by the ink that the pass looked at, over whole pixel planes; it is overwritten. `gradient` is added to.
+    /// of the loss by the ink that the pass rendered, over whole pixel planes; it is overwritten. `gradient` is added to.
     pub(crate) fn pass(
         &mut self,
         (problem, network, stage): (&TileProblem<T>, &PackedNetwork<T>, usize),

@@ -165,7 +165,7 @@ impl<T: Real> Pass<T> {
         network.output_layer.apply(cells, last, &mut self.step, Start::Output, false);
     }
 
-    /// Takes the step within `[0, upper_bounds]`; `paint` and `last_step` are replaced. A bare cell that is not short of paint stays
+    /// Takes the step within the bounds; `paint` and `last_step` are replaced. A bare cell that is not short of paint stays
     /// bare: an empty picture gets exactly nothing.
     pub(crate) fn update(&self, problem: &TileProblem<T>, paint: &mut [T], last_step: &mut [T]) {
         let cells = &problem.cells;

@@ -78,7 +78,7 @@ impl<T: Real> Unrolled<T> {
                 adjoint.pass(at, pass, (paint, last_step), &mut by_ink, gradient, &mut self.scratch);
             }
         }
-        // The first pass looks at the bare wall: what lies before it does not matter.
+        // The first pass renders the bare wall: what lies before it does not matter.
         by_ink.fill(T::default());
         adjoint.pass(
             (problem, network, 0),

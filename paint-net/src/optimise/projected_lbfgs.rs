@@ -7,7 +7,7 @@ const MEMORY: usize = 6;
 pub(crate) struct StoppingRule {
     /// Largest number of iterations.
     pub(crate) iterations: usize,
-    /// StoppingRule once an iteration lowers the cost by less than this share of it.
+    /// Stop once an iteration lowers the cost by less than this share of it.
     pub(crate) relative_decrease: f64,
 }
 

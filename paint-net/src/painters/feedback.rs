@@ -8,7 +8,8 @@ use crate::painter::{Observer, Painter};
 use crate::painting::Painting;
 use crate::problem::{PaintGrid, PaintProblem};
 
-/// The network that learns to paint: it looks at its canvas, changes all sprays at once, and looks again. Ours.
+/// A feedback network (Zamir et al. 2017) on the canvas: it renders, changes all volumes at once, and renders again. Ours; the
+/// network of Paper IV decides one spray per step ([`crate::thesis`]).
 ///
 /// Every pass renders the canvas, measures what is missing under each spray, and lets a small convolutional network, the same
 /// on every cell and in every pass, decide how much paint to add or to take back from the plan.
@@ -16,7 +17,7 @@ use crate::problem::{PaintGrid, PaintProblem};
 pub struct Feedback {
     /// The weights.
     pub network: Network,
-    /// Looks at the canvas; 6 unless changed (ours): more bring a few hundredths of a dB, fewer are faster.
+    /// Passes over the canvas; 6 unless changed (ours): more bring a few hundredths of a dB, fewer are faster.
     pub passes: usize,
     /// Side of the tiles that are worked on one after the other, cells. It decides on memory and speed only, the painting is
     /// the same to the last bit.

@@ -12,7 +12,7 @@ pub(crate) struct FilterGrid<T> {
     pub(crate) spacing: T,
     pub(crate) variance: T,
     pub(crate) gain: T,
-    /// Whether variance and spacing lie inside their bounds: outside they do not follow what was raw for.
+    /// Whether variance and spacing lie inside their bounds: outside they do not follow the raw output.
     free: (bool, bool),
 }
 

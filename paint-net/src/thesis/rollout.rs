@@ -56,7 +56,7 @@ impl<T: Real> Noise<T> {
     }
 }
 
-/// What the loss is made of beside the cross-entropy; the thesis names the loss_terms and does not give their weights.
+/// What the loss is made of beside the cross-entropy; the thesis names the terms and does not give their weights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Objective {

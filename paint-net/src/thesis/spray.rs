@@ -1,4 +1,4 @@
-//! PAINT: one spray, a round Gaussian of free place, spread and volume, and its adjoint.
+//! PAINT: one spray, a round Gaussian of free position, spread and volume, and its adjoint.
 
 use super::architecture::Architecture;
 use super::nonlinearities::{sigmoid, softplus};
@@ -14,7 +14,7 @@ pub(crate) struct SprayParameters<T> {
 }
 
 impl<T: Real> SprayParameters<T> {
-    /// From the four numbers that PAINT asks for: place, each from -1 to 1 over the picture, spread, volume. The thesis does
+    /// From PAINT's four raw outputs: position, each from -1 to 1 over the picture, spread, volume. The thesis does
     /// not print these links; ours keep σ within a factor of three, and volumes above zero.
     pub(crate) fn new(architecture: &Architecture, raw: &[T]) -> Self {
         let (half, one) = (T::of(0.5 * (architecture.side + 1) as f64), T::of(1.0));
@@ -27,7 +27,7 @@ impl<T: Real> SprayParameters<T> {
     }
 
     #[cfg(any(test, feature = "train"))]
-    /// From derivatives by place, spread and volume to those by the numbers raw for.
+    /// From derivatives by place, spread and volume to those by the raw outputs.
     pub(crate) fn backward(architecture: &Architecture, raw: &[T], [x, y, sigma, volume]: [T; 4], d_raw: &mut [T]) {
         let half = T::of(0.5 * (architecture.side + 1) as f64);
         let s = sigmoid(raw[2]);

@@ -1,4 +1,4 @@
-//! The stop_sample to paint on: a relaxed coin (concrete distribution, Maddison et al. 2017, temperature 1).
+//! The decision to paint on: a relaxed coin (concrete distribution, Maddison et al. 2017, temperature 1).
 
 #[cfg(any(test, feature = "train"))]
 use super::nonlinearities::{sigmoid, softplus};

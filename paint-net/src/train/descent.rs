@@ -24,6 +24,9 @@ pub(super) struct StepSettings {
     pub(super) learning_rate: f64,
 }
 
+/// From the number of a job and the parameters to the figures of its samples and the sum of their gradients.
+type Job<'a, R, E> = dyn Fn(usize, &[f32]) -> Result<(R, Vec<f32>), E> + Sync + 'a;
+
 impl Descent {
     pub(super) fn new(parameters: Vec<f32>) -> Self {
         Self { adam: Adam::new(parameters.len()), parameters, steps: 0 }
@@ -34,12 +37,12 @@ impl Descent {
         self.steps
     }
 
-    /// One step against the mean gradient of all samples. `job` gives the figures of its samples and the sum of their gradients;
-    /// the figures are collected in the order of the jobs. If a job fails, nothing changes.
+    /// One step against the mean gradient of all samples. The figures are
+    /// collected in the order of the jobs. If a job fails, nothing changes.
     pub(super) fn step<R: Send, E: Send>(
         &mut self,
         settings: &StepSettings,
-        job: &(dyn Fn(usize, &[f32]) -> Result<(R, Vec<f32>), E> + Sync),
+        job: &Job<R, E>,
         collect: &mut dyn FnMut(R),
     ) -> Result<(), E> {
         let parameters = &self.parameters;
