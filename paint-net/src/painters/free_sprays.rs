@@ -31,7 +31,7 @@ use reseed::reseed;
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct FreeSprays {
-    /// Largest number of sprays; [`Limits::max_sprays`] applies as well. Default 400, ours.
+    /// Largest number of sprays; [`crate::Limits::max_sprays`] applies as well. Default 400, ours.
     pub sprays: usize,
     /// Largest spread of a spray over the nozzle's own, at least 1. Default 4, ours.
     pub max_sigma_ratio: f64,
