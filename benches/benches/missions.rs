@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use clap::Parser;
 use paintcopter_examples::design::Design;
-use paintcopter_examples::mission::{Mission, MissionSettings};
+use paintcopter_examples::mission::{Mission, MissionSettings, inspect, report, save};
 use paintcopter_examples::report::Check;
 use paintcopter_examples::world::rock_wall;
 
@@ -85,8 +85,8 @@ fn checks(seed: u64, threads: Option<u16>, folder: Option<&Path>) -> Result<Vec<
     }
     let mission = Mission::run("Rock wall", &rock_wall(seed), &Design::Strata { seed }, settings)?;
     let report = match folder {
-        Some(folder) => mission.save(folder)?,
-        None => mission.report(&mission.inspect()?)?,
+        Some(folder) => save(&mission, folder)?,
+        None => report(&mission, &inspect(&mission)?)?,
     };
     Ok(report.checks())
 }

@@ -1,35 +1,18 @@
 //! Triangle meshes from files: OBJ (with or without texture coordinates), PLY (all encodings, vertex colours), OFF; and
 //! the painted surface back out as PLY.
 
+mod fault;
+mod mesh;
 mod obj;
 mod off;
 mod ply;
 
 use std::path::{Path, PathBuf};
 
+pub use mesh::{MeshUv, TriangleMesh};
 pub use ply::write_ply;
 
-/// A triangle mesh as it stands in a file: nothing welded, nothing repaired. Lengths in the file's unit.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct TriangleMesh {
-    /// Vertex positions.
-    pub positions: Vec<[f32; 3]>,
-    /// Vertex indices, three per triangle; polygons are fanned.
-    pub faces: Vec<[u32; 3]>,
-    /// Colours per vertex, sRGB in `[0, 1]`, where the file has them.
-    pub colours: Option<Vec<[f32; 3]>>,
-    /// Texture coordinates with indices of their own, where the file has them.
-    pub uv: Option<MeshUv>,
-}
-
-/// Texture coordinates of an OBJ: indices separate from the vertices'.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct MeshUv {
-    /// Coordinates; v = 1 is the top row of the image.
-    pub coordinates: Vec<[f32; 2]>,
-    /// Indices into `coordinates`, three per triangle.
-    pub faces: Vec<[u32; 3]>,
-}
+use fault::Fault;
 
 /// What is wrong with a mesh file.
 #[derive(Debug, thiserror::Error)]
@@ -68,18 +51,6 @@ pub enum MeshError {
     },
 }
 
-/// A fault at a place in a file, before the path is known.
-struct Fault {
-    place: String,
-    what: String,
-}
-
-impl Fault {
-    fn at_line(line: usize, what: impl Into<String>) -> Self {
-        Self { place: format!("line {line}"), what: what.into() }
-    }
-}
-
 /// Reads a mesh; the extension decides the format.
 pub fn read_mesh(path: &Path) -> Result<TriangleMesh, MeshError> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
@@ -96,21 +67,4 @@ pub fn read_mesh(path: &Path) -> Result<TriangleMesh, MeshError> {
         return Err(MeshError::Empty { path: path.into(), vertices: mesh.positions.len() });
     }
     Ok(mesh)
-}
-
-/// Splits a polygon into a fan of triangles about its first corner.
-fn fan<T: Copy>(corners: &[T], mut triangle: impl FnMut([T; 3])) {
-    for k in 1..corners.len().saturating_sub(1) {
-        triangle([corners[0], corners[k], corners[k + 1]]);
-    }
-}
-
-/// Parses the next number of a line.
-fn number<'a, T: std::str::FromStr>(
-    words: &mut impl Iterator<Item = &'a str>,
-    line: usize,
-    what: &str,
-) -> Result<T, Fault> {
-    let word = words.next().ok_or_else(|| Fault::at_line(line, format!("{what} is missing")))?;
-    word.parse().map_err(|_| Fault::at_line(line, format!("{what} \"{word}\" is not a number of the expected kind")))
 }

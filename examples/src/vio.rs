@@ -1,5 +1,6 @@
 //! Runs the odometry over recordings, evaluates the trajectories, and makes recordings to run it on.
 
+mod camera_frames;
 mod cdr;
 mod command_line;
 mod compare;
@@ -18,6 +19,7 @@ mod stereo;
 mod subcommands;
 mod tuning;
 
+pub use camera_frames::{CameraFrame, camera_frames};
 pub use command_line::Arguments;
 pub use compare::{Comparison, compare};
 pub use error::VioError;
@@ -25,10 +27,10 @@ pub use euroc_folder::{Overrides, open_euroc};
 pub use evaluation::{AlignedPair, PoseError, RunEvaluation, evaluate_run};
 pub use grey_image::GreyImage;
 pub use mcap_in::open_mcap;
-pub use recording::{CameraFrame, GroundTruth, Images, Recording};
+pub use recording::{GroundTruth, Images, Recording, SecondCamera};
 pub use report::{VioReport, save};
 pub use run::{Run, RunSettings, Segment, run};
 pub use simulate::{Flight, Simulated, SimulationSettings, simulate};
-pub use stereo::{SecondCamera, open_euroc_stereo};
+pub use stereo::open_euroc_stereo;
 pub use subcommands::execute;
 pub use tuning::{Tuning, TuningData, TuningReport, tune_noise};

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use paintcopter_examples::design::Design;
 use paintcopter_examples::mesh_io::{TriangleMesh, read_mesh};
-use paintcopter_examples::mission::{Mission, MissionSettings};
+use paintcopter_examples::mission::{Mission, MissionSettings, save};
 
 /// A panel 1.2 m wide and 0.8 m high with a soft bulge, facing -x, its lower edge 2 m up.
 fn panel() -> TriangleMesh {
@@ -34,7 +34,7 @@ fn paint(threads: usize) -> (PathBuf, paintcopter_examples::report::Report) {
     std::fs::create_dir_all(&folder).unwrap();
     let settings = MissionSettings { seed: 3, threads, ..MissionSettings::default() };
     let mission = Mission::run("panel", &panel(), &Design::Gradient, settings).unwrap();
-    let report = mission.save(&folder).unwrap();
+    let report = save(&mission, &folder).unwrap();
     (folder, report)
 }
 

@@ -7,7 +7,7 @@ use std::process::Command;
 
 use image::{ImageBuffer, Luma, Rgb};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use paintcopter_examples::scan::{Scan, ScanSettings, Sequence};
+use paintcopter_examples::scan::{Scan, ScanSettings, open_sequence};
 
 const SIZE: (u32, u32) = (96, 72);
 /// Camera of the pictures: width 96 pixels, 70 degrees.
@@ -108,7 +108,7 @@ fn redwood(s: &Scratch) {
 }
 
 fn run(folder: &Path, threads: usize) -> Scan {
-    let sequence = Sequence::open(folder).unwrap();
+    let sequence = open_sequence(folder).unwrap();
     let map = tsdf_hash::Settings { voxel_size: 0.02, threads, ..tsdf_hash::Settings::default() };
     Scan::run(folder, &sequence, &ScanSettings { map, ray_cast_every: 1, ..ScanSettings::default() }).unwrap()
 }
@@ -120,7 +120,7 @@ fn three_layouts_give_the_same_wall() {
     for (layout, write) in layouts {
         let s = Scratch::new(layout);
         write(&s);
-        let sequence = Sequence::open(&s.0).unwrap();
+        let sequence = open_sequence(&s.0).unwrap();
         assert_eq!(sequence.layout, layout);
         for (frame, expected) in sequence.frames.iter().zip(poses()) {
             let error = frame.world_from_camera.unwrap().inverse() * expected;

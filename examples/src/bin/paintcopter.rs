@@ -7,8 +7,8 @@ use clap::{Parser, ValueEnum};
 use paintcopter_examples::design::{Design, Picture};
 use paintcopter_examples::mesh_io::{TriangleMesh, read_mesh};
 use paintcopter_examples::mesh_placement::{MeshPlacement, UpAxis, place_mesh};
-use paintcopter_examples::mission::{Mission, MissionSettings, PainterChoice};
-use paintcopter_examples::scan_flight::ScanFlight;
+use paintcopter_examples::mission::{Mission, MissionSettings, PainterChoice, save};
+use paintcopter_examples::scan_flight::{ScanFlight, save as save_scan_flight};
 use paintcopter_examples::world::rock_wall;
 
 type AnyError = Box<dyn std::error::Error>;
@@ -108,7 +108,7 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
             Mission::run(&name, &mesh, &design, settings).map_err(|e| in_file(&e))?
         }
     };
-    let report = mission.save(folder)?;
+    let report = save(&mission, folder)?;
     eprintln!("{}", report.summary());
     println!("{}", folder.join("report.md").display());
     Ok(())
@@ -120,7 +120,7 @@ fn seen(mesh: TriangleMesh, arguments: &Arguments, threads: usize) -> Result<Tri
         return Ok(mesh);
     }
     let scan_flight = ScanFlight::fly(&mesh, arguments.seed, threads)?;
-    scan_flight.save(&arguments.out)?;
+    save_scan_flight(&scan_flight, &arguments.out)?;
     Ok(scan_flight.mesh)
 }
 

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
 use paintcopter_examples::report::save_figures;
-use paintcopter_examples::scan::{Device, Scan, ScanSettings, Sequence};
+use paintcopter_examples::scan::{Device, Scan, ScanReport, ScanSettings, open_sequence, save_views};
 use tsdf_hash::Tiers;
 
 /// Maps a recorded RGB-D sequence into a voxel-hashed distance field and its mesh.
@@ -85,7 +85,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let folder = &arguments.out;
     std::fs::create_dir_all(folder)
         .map_err(|e| format!("{}: cannot be created ({e}): choose another --out", folder.display()))?;
-    let mut sequence = Sequence::open(&arguments.sequence)?;
+    let mut sequence = open_sequence(&arguments.sequence)?;
     if let Some(scale) = arguments.depth_scale {
         sequence.depth_scale = scale;
     }
@@ -95,7 +95,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     for (_, why) in &scan.skipped {
         eprintln!("left out: {why}");
     }
-    scan.save_views(&sequence, folder, settings.map.threads)?;
+    save_views(&scan, &sequence, folder, settings.map.threads)?;
     scan.map.save(&folder.join("map.tsdf"), Some(&scan.mesh), &BTreeMap::new())?;
     let ply = folder.join("mesh.ply");
     let file = std::fs::File::create(&ply).map_err(|e| format!("{}: cannot be written ({e})", ply.display()))?;
@@ -104,7 +104,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     std::fs::write(&tum, vio_ekf::tum::write(&scan.trajectory))
         .map_err(|e| format!("{}: cannot be written ({e})", tum.display()))?;
     // Last, so that its presence means the folder is complete.
-    save_figures(&scan.report(), folder)?;
+    save_figures(&ScanReport::new(&scan), folder)?;
     println!("{}", folder.join("mesh.ply").display());
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! Wavefront OBJ: v (with optional colour), vt, f. Groups, normals and materials are passed over.
 
-use super::{Fault, MeshUv, TriangleMesh, fan, number};
+use super::fault::{Fault, number};
+use super::mesh::{MeshUv, TriangleMesh, fan};
 
 pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
     let text = String::from_utf8_lossy(bytes);

@@ -1,6 +1,7 @@
 //! OFF and COFF: counts, vertices, polygons; comments start with `#`.
 
-use super::{Fault, TriangleMesh, fan, number};
+use super::fault::{Fault, number};
+use super::mesh::{TriangleMesh, fan};
 
 pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
     let text = String::from_utf8_lossy(bytes);

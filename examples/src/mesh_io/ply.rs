@@ -6,7 +6,8 @@ use std::path::Path;
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{DefaultElement, Property};
 
-use super::{Fault, TriangleMesh, fan};
+use super::fault::Fault;
+use super::mesh::{TriangleMesh, fan};
 
 pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
     let ply = Parser::<DefaultElement>::new()

@@ -4,7 +4,8 @@ use paint_net::{
     Deconvolution, Feedback, Image, Layered, Limits, MatchingPursuit, Painter, Painting, SprayKernel, Task,
 };
 
-use super::{MissionError, MissionSettings, PainterChoice};
+use super::error::MissionError;
+use super::settings::{MissionSettings, PainterChoice};
 use crate::appearance::Appearance;
 use crate::progress::Stage;
 use crate::surface::PaintSurface;

@@ -1,16 +1,18 @@
 //! The figures of a mission.
 
-use nalgebra::Isometry3;
-use paint_net::{Image, ideal, metrics};
-use paint_planner::{Plan, normal_deviation};
+use paint_net::{ideal, metrics};
+use paint_planner::normal_deviation;
 use paint_sim::FlightLog;
 use paint_sim::flight::{FlightSample, FlightStatistics};
 use paint_sim::spray::QUANTUM;
 use ptu_kinematics::Joints;
 
+use super::error::MissionError;
+use super::fly::LayerFlight;
 use super::inspect::Inspection;
-use super::{LayerFlight, Mission, MissionError};
-use crate::appearance::{DENSITY, UNIT_THICKNESS};
+use super::plan::path_length;
+use super::run::Mission;
+use crate::appearance::DENSITY;
 use crate::report::{Report, peak_resident_bytes};
 
 /// Samples between two collision checks in a flight: 50 ms, 2.5 cm at full speed.
@@ -18,176 +20,133 @@ const COLLISION_STRIDE: usize = 5;
 /// Step of the dense check of the planned limits, seconds; the certificates do not depend on it.
 const LIMIT_STEP: f64 = 0.02;
 
-/// Length of the vehicle's trajectory, metres.
-pub(super) fn path_length(plan: &Plan) -> f64 {
-    let steps = (plan.trajectory.duration() / 0.05).ceil().max(1.0);
-    let at = |k: f64| plan.trajectory.sample(plan.trajectory.duration() * k / steps).position;
-    (0..steps as usize).map(|k| (at(k as f64 + 1.0) - at(k as f64)).norm()).sum()
+/// All figures, with those of the inspection.
+pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, MissionError> {
+    let quality = mission.surface.chart.quality();
+    let deviations = normal_deviations(mission);
+    let flown = statistics(&mission.flights, |f| &f.flight);
+    let slam = statistics(&mission.flights, |f| &f.slam);
+    let locked = statistics(&mission.flights, |f| &f.locked);
+    let flight_time: f64 = mission.flights.iter().map(|f| f.plan.trajectory.duration()).sum();
+    let path: f64 = mission.flights.iter().map(|f| path_length(&f.plan)).sum();
+
+    let books = mission.film.books();
+    let on_texels: u64 = mission.film.volumes().iter().sum();
+    let kilograms = |quanta: u64| quanta as f64 * QUANTUM * DENSITY;
+    let balance = (i128::from(books.emitted) - i128::from(on_texels) - i128::from(books.overspray)).abs();
+
+    let canvas = mission.layers.last().map_or(&mission.wanted, |l| &l.ink);
+    let filtered = ideal(&mission.wanted, mission.settings.spot / mission.settings.texel)?;
+    let painted = mission.painted_ink();
+    let weight = Some(&mission.coverage);
+    Ok(Report {
+        version: env!("CARGO_PKG_VERSION"),
+        surface: mission.name.clone(),
+        seed: mission.settings.seed,
+        surface_area_m2: mission.surface.disk().area(),
+        faces: mission.surface.disk().faces().len(),
+        uv_flips: quality.flips,
+        uv_symmetric_dirichlet: quality.symmetric_dirichlet,
+        normal_deviation_mean_m: deviations.mean,
+        normal_deviation_max_m: deviations.max,
+        smoothing_normal_deviation_mean_m: deviations.smoothing_mean,
+        unreachable_normal_share: deviations.unreachable,
+        unreachable_paint_share: mission.share_out_of_reach(),
+        hit_error_rms_m: flown.hit_error_rms,
+        hit_error_p95_m: flown.hit_error_p95,
+        hit_error_rms_slam_m: slam.hit_error_rms,
+        nozzle_distance_std_m: flown.nozzle_distance_std,
+        ptu_locked_hit_error_rms_m: locked.hit_error_rms,
+        pan_error_rms_rad: flown.pan_error_rms,
+        tilt_error_rms_rad: flown.tilt_error_rms,
+        planning_s_per_m: mission.planning / path,
+        planning_per_flight_time: mission.planning / flight_time,
+        path_length_m: path,
+        flight_time_s: flight_time,
+        paint_emitted_kg: kilograms(books.emitted),
+        paint_deposited_kg: kilograms(on_texels),
+        paint_overspray_kg: kilograms(books.overspray),
+        mass_balance_relative: balance as f64 / books.emitted.max(1) as f64,
+        psnr_canvas_db: metrics::psnr(canvas, &mission.wanted, weight)?,
+        psnr_ideal_db: metrics::psnr(&filtered, &mission.wanted, weight)?,
+        psnr_painted_db: metrics::psnr(&painted, &mission.wanted, weight)?,
+        ssim_canvas: metrics::ssim(canvas, &mission.wanted, weight)?,
+        ssim_painted: metrics::ssim(&painted, &mission.wanted, weight)?,
+        ciede2000_mean: mean(mission.colour_difference().into_iter().flatten()),
+        collisions: mission.flights.iter().map(|f| collisions(mission, &f.flight)).sum(),
+        limit_violations: mission.flights.iter().map(|f| limit_violations(mission, f)).sum(),
+        scan_error_mean_m: inspection.mesh_error,
+        slam_ate_rms_m: inspection.slam_ate,
+        layers: mission.layers.len(),
+        strokes: mission.flights.iter().map(|f| f.route.strokes).sum(),
+        wall_s: mission.started.elapsed().as_secs_f64(),
+        peak_rss_bytes: peak_resident_bytes(),
+    })
 }
 
-impl Mission {
-    /// All figures, with those of the inspection.
-    pub fn report(&self, inspection: &Inspection) -> Result<Report, MissionError> {
-        let quality = self.surface.chart.quality();
-        let deviations = self.normal_deviations();
-        let flown = statistics(&self.flights, |f| &f.flight);
-        let slam = statistics(&self.flights, |f| &f.slam);
-        let locked = statistics(&self.flights, |f| &f.locked);
-        let flight_time: f64 = self.flights.iter().map(|f| f.plan.trajectory.duration()).sum();
-        let path: f64 = self.flights.iter().map(|f| path_length(&f.plan)).sum();
-
-        let books = self.film.books();
-        let on_texels: u64 = self.film.volumes().iter().sum();
-        let kilograms = |quanta: u64| quanta as f64 * QUANTUM * DENSITY;
-        let balance = (i128::from(books.emitted) - i128::from(on_texels) - i128::from(books.overspray)).abs();
-
-        let canvas = self.layers.last().map_or(&self.wanted, |l| &l.ink);
-        let filtered = ideal(&self.wanted, self.settings.spot / self.settings.texel)?;
-        let painted = self.painted_ink();
-        let weight = Some(&self.coverage);
-        Ok(Report {
-            version: env!("CARGO_PKG_VERSION"),
-            surface: self.name.clone(),
-            seed: self.settings.seed,
-            surface_area_m2: self.surface.disk().area(),
-            faces: self.surface.disk().faces().len(),
-            uv_flips: quality.flips,
-            uv_symmetric_dirichlet: quality.symmetric_dirichlet,
-            normal_deviation_mean_m: deviations.mean,
-            normal_deviation_max_m: deviations.max,
-            smoothing_normal_deviation_mean_m: deviations.smoothing_mean,
-            unreachable_normal_share: deviations.unreachable,
-            unreachable_paint_share: self.share_out_of_reach(),
-            hit_error_rms_m: flown.hit_error_rms,
-            hit_error_p95_m: flown.hit_error_p95,
-            hit_error_rms_slam_m: slam.hit_error_rms,
-            nozzle_distance_std_m: flown.nozzle_distance_std,
-            ptu_locked_hit_error_rms_m: locked.hit_error_rms,
-            pan_error_rms_rad: flown.pan_error_rms,
-            tilt_error_rms_rad: flown.tilt_error_rms,
-            planning_s_per_m: self.planning / path,
-            planning_per_flight_time: self.planning / flight_time,
-            path_length_m: path,
-            flight_time_s: flight_time,
-            paint_emitted_kg: kilograms(books.emitted),
-            paint_deposited_kg: kilograms(on_texels),
-            paint_overspray_kg: kilograms(books.overspray),
-            mass_balance_relative: balance as f64 / books.emitted.max(1) as f64,
-            psnr_canvas_db: metrics::psnr(canvas, &self.wanted, weight)?,
-            psnr_ideal_db: metrics::psnr(&filtered, &self.wanted, weight)?,
-            psnr_painted_db: metrics::psnr(&painted, &self.wanted, weight)?,
-            ssim_canvas: metrics::ssim(canvas, &self.wanted, weight)?,
-            ssim_painted: metrics::ssim(&painted, &self.wanted, weight)?,
-            ciede2000_mean: mean(self.colour_difference().into_iter().flatten()),
-            collisions: self.flights.iter().map(|f| self.collisions(&f.flight)).sum(),
-            limit_violations: self.flights.iter().map(|f| self.limit_violations(f)).sum(),
-            scan_error_mean_m: inspection.mesh_error,
-            slam_ate_rms_m: inspection.slam_ate,
-            layers: self.layers.len(),
-            strokes: self.flights.iter().map(|f| f.route.strokes).sum(),
-            wall_s: self.started.elapsed().as_secs_f64(),
-            peak_rss_bytes: peak_resident_bytes(),
-        })
-    }
-
-    /// Paint depth per pixel as it came out, 0 beside the surface.
-    pub(super) fn painted_depth(&self) -> Image {
-        let mut depth = self.wanted.map(|_| 0.0);
-        for (k, &pixel) in self.pixels.iter().enumerate() {
-            depth.data_mut()[pixel] = self.film.thickness(k) / UNIT_THICKNESS;
-        }
-        depth
-    }
-
-    fn painted_ink(&self) -> Image {
-        self.painted_depth().map(|d| self.appearance.ink().forward(d))
-    }
-
-    /// CIEDE2000 between painted and wanted per pixel, `None` beside the surface.
-    pub(super) fn colour_difference(&self) -> Vec<Option<f64>> {
-        let painted = self.painted_depth();
-        let pixel = |k: usize| {
-            let wanted = self.appearance.ink().inverse(self.wanted.data()[k]);
-            paint_sim::ciede2000(self.appearance.lab(painted.data()[k]), self.appearance.lab(wanted))
-        };
-        (0..painted.data().len()).map(|k| (self.coverage.data()[k] > 0.0).then(|| pixel(k))).collect()
-    }
-
-    /// Share of the decided paint that was not planned: no surface below the spray, or no pose of the robot.
-    pub(super) fn share_out_of_reach(&self) -> f64 {
-        let (mut planned, mut wanted) = (0.0, self.abandoned);
-        for f in &self.flights {
-            wanted += f.route.lost + f.route.paint();
-            planned += (0..f.route.targets.len()).map(|k| f.plan.volume(k)).sum::<f64>();
-        }
-        if wanted > 0.0 { (1.0 - planned / wanted).max(0.0) } else { 0.0 }
-    }
-
-    fn normal_deviations(&self) -> Deviations {
-        let (mut ours, mut smoothing, mut out_of_reach, mut total) = (Vec::new(), Vec::new(), 0, 0);
-        for f in &self.flights {
-            for (k, target) in f.route.targets.iter().enumerate().filter(|(_, t)| t.dose > 0.0) {
-                total += 1;
-                let heading = 0.0;
-                let joints = self.robot.ptu.inverse_unlimited(&target.point, &-target.normal, heading).joints;
-                // Any heading will do: only the tilt is decided by the normal.
-                if !self.settings.ptu.tilt_limits.contains(joints.tilt) {
-                    out_of_reach += 1;
-                    continue;
-                }
-                if f.plan.reachable[k] {
-                    ours.push(normal_deviation(target, &f.plan.nozzle[k].position));
-                }
-                if f.smoothing.reachable[k] {
-                    smoothing.push(normal_deviation(target, &f.smoothing.nozzle[k].position));
-                }
+fn normal_deviations(mission: &Mission) -> Deviations {
+    let (mut ours, mut smoothing, mut out_of_reach, mut total) = (Vec::new(), Vec::new(), 0, 0);
+    for f in &mission.flights {
+        for (k, target) in f.route.targets.iter().enumerate().filter(|(_, t)| t.dose > 0.0) {
+            total += 1;
+            let heading = 0.0;
+            let joints = mission.robot.ptu.inverse_unlimited(&target.point, &-target.normal, heading).joints;
+            // Any heading will do: only the tilt is decided by the normal.
+            if !mission.settings.ptu.tilt_limits.contains(joints.tilt) {
+                out_of_reach += 1;
+                continue;
+            }
+            if f.plan.reachable[k] {
+                ours.push(normal_deviation(target, &f.plan.nozzle[k].position));
+            }
+            if f.smoothing.reachable[k] {
+                smoothing.push(normal_deviation(target, &f.smoothing.nozzle[k].position));
             }
         }
-        Deviations {
-            mean: mean(ours.iter().copied()),
-            max: ours.iter().fold(0.0, |m, &d| m.max(d)),
-            smoothing_mean: mean(smoothing.iter().copied()),
-            unreachable: f64::from(out_of_reach) / f64::from(total.max(1)),
-        }
     }
-
-    /// Moments of a flight at which the robot overlaps the surface.
-    fn collisions(&self, log: &FlightLog) -> usize {
-        let mut spheres = Vec::new();
-        let touches = |sample: &&FlightSample| {
-            spheres.clear();
-            let joints = Joints { pan: sample.pan_tilt[0], tilt: sample.pan_tilt[1] };
-            self.robot.spheres_at(&sample.world_from_body, joints, &mut spheres);
-            spheres
-                .iter()
-                .any(|(centre, radius)| paint_sim::Surface::distance(&self.surface.world, centre, *radius) < *radius)
-        };
-        log.samples.iter().step_by(COLLISION_STRIDE).filter(touches).count()
+    Deviations {
+        mean: mean(ours.iter().copied()),
+        max: ours.iter().fold(0.0, |m, &d| m.max(d)),
+        smoothing_mean: mean(smoothing.iter().copied()),
+        unreachable: f64::from(out_of_reach) / f64::from(total.max(1)),
     }
+}
 
-    /// Moments at which the plan exceeds speed or acceleration, or the flown gun its joint limits.
-    fn limit_violations(&self, f: &LayerFlight) -> usize {
-        let timing = &self.settings.planner.timing;
-        let slack = 1.0 + 1e-9;
-        let steps = (f.plan.trajectory.duration() / LIMIT_STEP) as usize;
-        let planned = (0..=steps)
-            .map(|k| f.plan.trajectory.sample(k as f64 * LIMIT_STEP))
-            .filter(|s| {
-                s.velocity.norm() > timing.max_speed * slack || s.acceleration.norm() > timing.max_acceleration * slack
-            })
-            .count();
-        let ptu = &self.settings.ptu;
-        // The servo's steps do not divide the limits: allow one half step.
-        let margin = 0.5 * self.settings.servo.resolution;
-        let inside =
-            |angle: f64, range: ptu_kinematics::Range| angle >= range.min - margin && angle <= range.max + margin;
-        let joints = f
-            .flight
-            .samples
+/// Moments of a flight at which the robot overlaps the surface.
+fn collisions(mission: &Mission, log: &FlightLog) -> usize {
+    let mut spheres = Vec::new();
+    let touches = |sample: &&FlightSample| {
+        spheres.clear();
+        let joints = Joints { pan: sample.pan_tilt[0], tilt: sample.pan_tilt[1] };
+        mission.robot.spheres_at(&sample.world_from_body, joints, &mut spheres);
+        spheres
             .iter()
-            .filter(|s| !inside(s.pan_tilt[0], ptu.pan_limits) || !inside(s.pan_tilt[1], ptu.tilt_limits));
-        planned + joints.count()
-    }
+            .any(|(centre, radius)| paint_sim::Surface::distance(&mission.surface.world, centre, *radius) < *radius)
+    };
+    log.samples.iter().step_by(COLLISION_STRIDE).filter(touches).count()
+}
+
+/// Moments at which the plan exceeds speed or acceleration, or the flown gun its joint limits.
+fn limit_violations(mission: &Mission, f: &LayerFlight) -> usize {
+    let timing = &mission.settings.planner.timing;
+    let slack = 1.0 + 1e-9;
+    let steps = (f.plan.trajectory.duration() / LIMIT_STEP) as usize;
+    let planned = (0..=steps)
+        .map(|k| f.plan.trajectory.sample(k as f64 * LIMIT_STEP))
+        .filter(|s| {
+            s.velocity.norm() > timing.max_speed * slack || s.acceleration.norm() > timing.max_acceleration * slack
+        })
+        .count();
+    let ptu = &mission.settings.ptu;
+    // The servo's steps do not divide the limits: allow one half step.
+    let margin = 0.5 * mission.settings.servo.resolution;
+    let inside = |angle: f64, range: ptu_kinematics::Range| angle >= range.min - margin && angle <= range.max + margin;
+    let joints = f
+        .flight
+        .samples
+        .iter()
+        .filter(|s| !inside(s.pan_tilt[0], ptu.pan_limits) || !inside(s.pan_tilt[1], ptu.tilt_limits));
+    planned + joints.count()
 }
 
 struct Deviations {
@@ -206,10 +165,4 @@ fn statistics(flights: &[LayerFlight], of: impl Fn(&LayerFlight) -> &FlightLog) 
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
     if count > 0.0 { sum / count } else { 0.0 }
-}
-
-/// The pose of the nozzle at a sample: x along the spray.
-pub(super) fn nozzle_pose(mission: &Mission, sample: &FlightSample) -> Isometry3<f64> {
-    let joints = Joints { pan: sample.pan_tilt[0], tilt: sample.pan_tilt[1] };
-    mission.robot.ptu.world_from_nozzle(&sample.world_from_body, joints)
 }

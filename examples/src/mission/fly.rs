@@ -6,17 +6,35 @@ use paint_sim::flight::{Localisation, Tether};
 use paint_sim::{Film, FlightLog, FlightSettings, SprayModel};
 
 use super::decide::SPRAY_CUT;
+use super::error::MissionError;
 use super::plan::Planned;
-use super::{LayerFlight, MissionError, MissionSettings};
+use super::settings::MissionSettings;
 use crate::adapters::{PlanReference, Robot, ServoPanTilt};
 use crate::progress::Stage;
 use crate::surface::PaintSurface;
+use crate::targets::Route;
 
 /// Motion of the nozzle that one shot stands for, metres: widens the spot by less than a percent.
 const SHOT_STEP: f64 = 0.01;
 
 /// Paint that has met nothing after this way is overspray, metres: what lies behind the edge of a surface stays clean.
 const SPRAY_RANGE: f64 = 0.35;
+
+/// One layer of paint, decided, planned and flown.
+pub struct LayerFlight {
+    /// Its strokes on the surface.
+    pub route: Route,
+    /// The plan.
+    pub plan: Plan,
+    /// The baseline planner on the same targets.
+    pub smoothing: Plan,
+    /// Flown with motion capture: the flight whose paint counts.
+    pub flight: FlightLog,
+    /// Flown with a localisation that errs by 7 cm.
+    pub slam: FlightLog,
+    /// Flown with the pan-tilt unit locked forward.
+    pub locked: FlightLog,
+}
 
 /// Flies every layer three times.
 pub(super) fn fly(

@@ -5,7 +5,9 @@ use paint_sim::{Camera, Frame, Hit, Lights, Look, Surface, render};
 use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics, Map, Mesh};
 use vio_ekf::{Alignment, Stamp, Trajectory};
 
-use super::{Mission, MissionError};
+use super::error::MissionError;
+use super::run::Mission;
+use super::shading::shading;
 
 /// Size of the depth camera's images, pixels.
 const IMAGE: (u32, u32) = (320, 240);
@@ -36,98 +38,95 @@ pub struct Inspection {
     pub slam_ate: f64,
 }
 
-impl Mission {
-    /// Maps the painted surface with a simulated depth camera, and evaluates the localisation of the flight.
-    pub fn inspect(&self) -> Result<Inspection, MissionError> {
-        let mesh = self.scan()?;
-        let world = &self.surface.world;
-        let off = |p: &[f32; 3]| world.distance(&Point3::from(p.map(f64::from)), 1.0);
-        let mesh_error = mesh.positions.iter().map(off).sum::<f64>() / mesh.positions.len().max(1) as f64;
-        let (flown, believed) = self.trajectories()?;
-        let slam_ate = vio_ekf::ate(flown.poses(), believed.poses(), Alignment::Se3)?.position.rmse;
-        Ok(Inspection { mesh, mesh_error, flown, believed, slam_ate })
-    }
-
-    /// Looks at the painted surface from all sides that have paint, and fuses what it sees.
-    fn scan(&self) -> Result<Mesh, MissionError> {
-        let painted = self.painted_depth();
-        // Even light from everywhere: the colours of the map are the surface's own.
-        let lights = Lights { sun: [0.0; 3], ambient: [1.0; 3], ..Lights::default() };
-        let shade = |hit: &Hit| -> Look { self.shading(&painted, hit) };
-        let threads = self.settings.threads;
-        let settings = tsdf_hash::Settings { voxel_size: VOXEL, threads, ..tsdf_hash::Settings::default() };
-        let mut map = Map::new(settings)?;
-        for camera in self.viewpoints()? {
-            let frame = render(&self.surface.world, &camera, &shade, &lights, 1, threads)?;
-            if frame.depth.iter().any(|&depth| depth > 0.0) {
-                fuse(&mut map, &camera, &frame)?;
-            }
-        }
-        Ok(map.mesh())
-    }
-
-    /// A grid of viewpoints before a surface that faces one side, two rings around one that does not.
-    fn viewpoints(&self) -> Result<Vec<Camera>, MissionError> {
-        let positions = self.surface.disk().positions();
-        let (low, high) = positions
-            .iter()
-            .map(|p| Vector3::from(*p))
-            .fold((Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)), |(l, h), p| (l.inf(&p), h.sup(&p)));
-        let centre = (low + high) / 2.0;
-        let up = Vector3::z();
-        let camera_at = |eye: Vector3<f64>, target: Vector3<f64>| {
-            Camera::looking_at(&Point3::from(eye), &Point3::from(target), &up, OPENING, IMAGE)
-        };
-        let facing = self.surface.facing();
-        let flat = Vector3::new(facing.x, facing.y, 0.0);
-        let mut cameras = Vec::new();
-        if let Some(front) = flat.try_normalize(0.5) {
-            let side: Vector3<f64> = up.cross(&front);
-            let share = |k: usize, n: usize| (k as f64 + 0.5) / n as f64 - 0.5;
-            let width = side.abs().dot(&(high - low));
-            let depth = 0.5 * front.abs().dot(&(high - low));
-            for row in 0..GRID.1 {
-                for column in 0..GRID.0 {
-                    let along = side * (share(column, GRID.0) * width) + up * (share(row, GRID.1) * (high.z - low.z));
-                    let target = centre + along;
-                    cameras.push(camera_at(target + front * (depth + DISTANCE), target)?);
-                }
-            }
-        } else {
-            let radius = 0.5 * (high - low).xy().norm() + DISTANCE;
-            for height in [0.3, 0.8] {
-                for k in 0..RING {
-                    let (sin, cos) = (std::f64::consts::TAU * k as f64 / RING as f64).sin_cos();
-                    let target = Vector3::new(centre.x, centre.y, low.z + height * (high.z - low.z));
-                    cameras.push(camera_at(target + Vector3::new(cos, sin, 0.1) * radius, target)?);
-                }
-            }
-        }
-        Ok(cameras)
-    }
-
-    /// The flights one after the other at 10 Hz: as flown, and as the drifting localisation saw them.
-    fn trajectories(&self) -> Result<(Trajectory, Trajectory), MissionError> {
-        let mut flown = Trajectory::default();
-        let mut believed = Trajectory::default();
-        let mut start = 0.0;
-        for f in &self.flights {
-            let stride = (POSE_STEP / f.slam.interval).round().max(1.0) as usize;
-            for sample in f.slam.samples.iter().step_by(stride) {
-                let stamp = Stamp::from_secs(start + sample.time)?;
-                if flown.stamps().last().is_some_and(|&last| last >= stamp) {
-                    continue;
-                }
-                flown.push(stamp, sample.world_from_body)?;
-                let rotation = sample.world_from_body.rotation;
-                believed.push(stamp, Isometry3::from_parts(sample.estimated_position.into(), rotation))?;
-            }
-            start += f.plan.trajectory.duration();
-        }
-        Ok((flown, believed))
-    }
+/// Maps the painted surface with a simulated depth camera, and evaluates the localisation of the flight.
+pub fn inspect(mission: &Mission) -> Result<Inspection, MissionError> {
+    let mesh = scan(mission)?;
+    let world = &mission.surface.world;
+    let off = |p: &[f32; 3]| world.distance(&Point3::from(p.map(f64::from)), 1.0);
+    let mesh_error = mesh.positions.iter().map(off).sum::<f64>() / mesh.positions.len().max(1) as f64;
+    let (flown, believed) = trajectories(mission)?;
+    let slam_ate = vio_ekf::ate(flown.poses(), believed.poses(), Alignment::Se3)?.position.rmse;
+    Ok(Inspection { mesh, mesh_error, flown, believed, slam_ate })
 }
 
+/// Looks at the painted surface from all sides that have paint, and fuses what it sees.
+fn scan(mission: &Mission) -> Result<Mesh, MissionError> {
+    let painted = mission.painted_depth();
+    // Even light from everywhere: the colours of the map are the surface's own.
+    let lights = Lights { sun: [0.0; 3], ambient: [1.0; 3], ..Lights::default() };
+    let shade = |hit: &Hit| -> Look { shading(mission, &painted, hit) };
+    let threads = mission.settings.threads;
+    let settings = tsdf_hash::Settings { voxel_size: VOXEL, threads, ..tsdf_hash::Settings::default() };
+    let mut map = Map::new(settings)?;
+    for camera in viewpoints(mission)? {
+        let frame = render(&mission.surface.world, &camera, &shade, &lights, 1, threads)?;
+        if frame.depth.iter().any(|&depth| depth > 0.0) {
+            fuse(&mut map, &camera, &frame)?;
+        }
+    }
+    Ok(map.mesh())
+}
+
+/// A grid of viewpoints before a surface that faces one side, two rings around one that does not.
+fn viewpoints(mission: &Mission) -> Result<Vec<Camera>, MissionError> {
+    let positions = mission.surface.disk().positions();
+    let (low, high) = positions
+        .iter()
+        .map(|p| Vector3::from(*p))
+        .fold((Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)), |(l, h), p| (l.inf(&p), h.sup(&p)));
+    let centre = (low + high) / 2.0;
+    let up = Vector3::z();
+    let camera_at = |eye: Vector3<f64>, target: Vector3<f64>| {
+        Camera::looking_at(&Point3::from(eye), &Point3::from(target), &up, OPENING, IMAGE)
+    };
+    let facing = mission.surface.facing();
+    let flat = Vector3::new(facing.x, facing.y, 0.0);
+    let mut cameras = Vec::new();
+    if let Some(front) = flat.try_normalize(0.5) {
+        let side: Vector3<f64> = up.cross(&front);
+        let share = |k: usize, n: usize| (k as f64 + 0.5) / n as f64 - 0.5;
+        let width = side.abs().dot(&(high - low));
+        let depth = 0.5 * front.abs().dot(&(high - low));
+        for row in 0..GRID.1 {
+            for column in 0..GRID.0 {
+                let along = side * (share(column, GRID.0) * width) + up * (share(row, GRID.1) * (high.z - low.z));
+                let target = centre + along;
+                cameras.push(camera_at(target + front * (depth + DISTANCE), target)?);
+            }
+        }
+    } else {
+        let radius = 0.5 * (high - low).xy().norm() + DISTANCE;
+        for height in [0.3, 0.8] {
+            for k in 0..RING {
+                let (sin, cos) = (std::f64::consts::TAU * k as f64 / RING as f64).sin_cos();
+                let target = Vector3::new(centre.x, centre.y, low.z + height * (high.z - low.z));
+                cameras.push(camera_at(target + Vector3::new(cos, sin, 0.1) * radius, target)?);
+            }
+        }
+    }
+    Ok(cameras)
+}
+
+/// The flights one after the other at 10 Hz: as flown, and as the drifting localisation saw them.
+fn trajectories(mission: &Mission) -> Result<(Trajectory, Trajectory), MissionError> {
+    let mut flown = Trajectory::default();
+    let mut believed = Trajectory::default();
+    let mut start = 0.0;
+    for f in &mission.flights {
+        let stride = (POSE_STEP / f.slam.interval).round().max(1.0) as usize;
+        for sample in f.slam.samples.iter().step_by(stride) {
+            let stamp = Stamp::from_secs(start + sample.time)?;
+            if flown.stamps().last().is_some_and(|&last| last >= stamp) {
+                continue;
+            }
+            flown.push(stamp, sample.world_from_body)?;
+            let rotation = sample.world_from_body.rotation;
+            believed.push(stamp, Isometry3::from_parts(sample.estimated_position.into(), rotation))?;
+        }
+        start += f.plan.trajectory.duration();
+    }
+    Ok((flown, believed))
+}
 /// Puts one rendered frame into the map.
 fn fuse(map: &mut Map, camera: &Camera, frame: &Frame) -> Result<(), MissionError> {
     let (width, height) = (frame.width as usize, frame.height as usize);

@@ -5,11 +5,13 @@ use std::path::Path;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use paint_planner::normal_deviation;
 use paint_sim::flight::FlightSample;
-use paint_sim::{Camera, Frame, Hit, Lights, Look, render};
-use uv_param::SurfacePoint;
+use paint_sim::{Camera, Frame, Hit, Lights, render};
 
-use super::figures::nozzle_pose;
-use super::{Mission, MissionError};
+use super::error::MissionError;
+use super::figures::report;
+use super::inspect::inspect;
+use super::run::Mission;
+use super::shading::shading;
 use crate::mesh_io::write_ply;
 use crate::pictures::{Panel, Polyline, Rgb, Scene, save_curves, save_error_map, save_scene};
 use crate::progress::Stage;
@@ -26,230 +28,200 @@ const RECORDING_STEP: f64 = 0.1;
 /// Points in a curve: more than the picture has columns shows nothing more.
 const CURVE_POINTS: usize = 2800;
 
-impl Mission {
-    /// Writes pictures, mesh, recording and report into an existing folder; the report last, so that its presence means the
-    /// folder is complete.
-    pub fn save(&self, folder: &Path) -> Result<crate::report::Report, MissionError> {
-        let stage = Stage::start("pictures");
-        self.save_textures(folder)?;
-        stage.share(0.2);
-        let colours = self.vertex_colours();
-        let positions: Vec<[f32; 3]> = self.surface.disk().positions().iter().map(|p| p.map(|c| c as f32)).collect();
-        let ply = folder.join("surface.ply");
-        write_ply(&ply, &positions, self.surface.disk().faces(), &colours)
-            .map_err(|source| MissionError::Unwritable { path: ply.display().to_string(), source })?;
-        stage.share(0.4);
-        self.save_views(folder)?;
-        stage.share(0.8);
-        self.save_angles(&folder.join("angles.png"))?;
-        self.save_mcap(
-            folder,
-            &ColouredMesh { positions: &positions, faces: self.surface.disk().faces(), colours: &colours },
-        )?;
-        stage.done(&folder.display().to_string());
+/// Writes pictures, mesh, recording and report into an existing folder; the report last, so that its presence means the
+/// folder is complete.
+pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, MissionError> {
+    let stage = Stage::start("pictures");
+    save_textures(mission, folder)?;
+    stage.share(0.2);
+    let colours = vertex_colours(mission);
+    let positions: Vec<[f32; 3]> = mission.surface.disk().positions().iter().map(|p| p.map(|c| c as f32)).collect();
+    let ply = folder.join("surface.ply");
+    write_ply(&ply, &positions, mission.surface.disk().faces(), &colours)
+        .map_err(|source| MissionError::Unwritable { path: ply.display().to_string(), source })?;
+    stage.share(0.4);
+    save_views(mission, folder)?;
+    stage.share(0.8);
+    save_angles(mission, &folder.join("angles.png"))?;
+    save_mcap(
+        mission,
+        folder,
+        &ColouredMesh { positions: &positions, faces: mission.surface.disk().faces(), colours: &colours },
+    )?;
+    stage.done(&folder.display().to_string());
 
-        let stage = Stage::start("scan");
-        let found = self.inspect()?;
-        let unwritable = |path: &Path, source| MissionError::Unwritable { path: path.display().to_string(), source };
-        let ply = folder.join("scan.ply");
-        write_ply(&ply, &found.mesh.positions, &found.mesh.faces, &found.mesh.colours)
-            .map_err(|source| unwritable(&ply, source))?;
-        for (name, trajectory) in [("flight_true.tum", &found.flown), ("flight_slam.tum", &found.believed)] {
-            let path = folder.join(name);
-            std::fs::write(&path, vio_ekf::tum::write(trajectory)).map_err(|source| unwritable(&path, source))?;
-        }
-        stage.done(&format!("{} faces, {:.2} mm off the surface", found.mesh.faces.len(), 1e3 * found.mesh_error));
-        let report = self.report(&found)?;
-        report.save(folder)?;
-        Ok(report)
+    let stage = Stage::start("scan");
+    let found = inspect(mission)?;
+    let unwritable = |path: &Path, source| MissionError::Unwritable { path: path.display().to_string(), source };
+    let ply = folder.join("scan.ply");
+    write_ply(&ply, &found.mesh.positions, &found.mesh.faces, &found.mesh.colours)
+        .map_err(|source| unwritable(&ply, source))?;
+    for (name, trajectory) in [("flight_true.tum", &found.flown), ("flight_slam.tum", &found.believed)] {
+        let path = folder.join(name);
+        std::fs::write(&path, vio_ekf::tum::write(trajectory)).map_err(|source| unwritable(&path, source))?;
     }
-
-    fn save_textures(&self, folder: &Path) -> Result<(), MissionError> {
-        let (width, height) = (self.wanted.width(), self.wanted.height());
-        let painted = self.painted_depth();
-        let picture = |depth: &dyn Fn(usize) -> f64| {
-            let pixels = (0..width * height)
-                .map(|k| if self.coverage.data()[k] > 0.0 { self.appearance.srgb(depth(k)) } else { BESIDE });
-            let picture = Rgb::from_pixels(width, height, pixels);
-            picture.enlarged((1400 / width as u32).clamp(1, 8))
-        };
-        let ink = self.appearance.ink();
-        picture(&|k| ink.inverse(self.wanted.data()[k])).save(&folder.join("wanted.png"))?;
-        picture(&|k| painted.data()[k]).save(&folder.join("painted.png"))?;
-        save_error_map(&folder.join("error.png"), width, &self.colour_difference(), (self.settings.texel, "m"))?;
-        Ok(())
-    }
-
-    /// Colour of every vertex of the disk: the paint on the texel below it.
-    fn vertex_colours(&self) -> Vec<[u8; 3]> {
-        let painted = self.painted_depth();
-        let texel = self.settings.texel;
-        let (width, height) = (painted.width(), painted.height());
-        let at = |uv: &[f64; 2]| {
-            let x = ((uv[0] / texel) as usize).min(width - 1);
-            let y = (((height as f64 * texel - uv[1]) / texel) as usize).min(height - 1);
-            self.appearance.srgb(painted.at(x, y))
-        };
-        self.surface.chart.uv().iter().map(at).collect()
-    }
-
-    fn save_views(&self, folder: &Path) -> Result<(), MissionError> {
-        let painted = self.painted_depth();
-        let corners: Vec<Point3<f64>> = self.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
-        let frame = self.view(&self.camera(&corners)?, &painted)?;
-        picture_of(&frame).save(&folder.join("painted_view.png"))?;
-
-        // The base coat alone: all layers on top of each other hide the surface and one another.
-        let Some(base) = self.flights.first() else { return Ok(()) };
-        let path = |of: &dyn Fn(&FlightSample) -> Point3<f64>| -> Vec<Point3<f64>> {
-            base.flight.samples.iter().step_by(10).map(of).collect()
-        };
-        let vehicle = path(&|s| s.world_from_body.translation.vector.into());
-        let camera = self.camera(&[corners, vehicle.clone()].concat())?;
-        let frame = self.view(&camera, &painted)?;
-        let project = |p: &Point3<f64>| {
-            let c = camera.world_from_camera.inverse_transform_point(p);
-            (c.z > 0.05).then(|| (camera.fx * c.x / c.z + camera.cx, camera.fy * c.y / c.z + camera.cy, c.z))
-        };
-        let lines = [
-            Polyline { points: path(&|s| s.nozzle), colour: [0, 90, 200], radius: 0.5 },
-            Polyline { points: vehicle, colour: [230, 110, 20], radius: 0.7 },
-        ];
-        let scene = Scene { picture: picture_of(&frame), depth: &frame.depth, project: &project };
-        save_scene(&folder.join("path.png"), scene, &lines)?;
-        Ok(())
-    }
-
-    /// The painted surface in the light of a sun behind the camera's shoulder.
-    fn view(&self, camera: &Camera, painted: &paint_net::Image) -> Result<Frame, MissionError> {
-        let away = -(camera.world_from_camera.rotation * Vector3::z());
-        let side = Vector3::z().cross(&away);
-        let lights = Lights {
-            towards_sun: UnitVector3::new_normalize(away + 0.75 * Vector3::z() + 0.35 * side),
-            sun: [0.95, 0.9, 0.8],
-            ambient: [0.28, 0.30, 0.34],
-            ..Lights::default()
-        };
-        let shade = |hit: &Hit| self.shading(painted, hit);
-        Ok(render(&self.surface.world, camera, &shade, &lights, 2, self.settings.threads)?)
-    }
-
-    /// Shading of a point of the world: painted and smooth on the disk, grey elsewhere.
-    pub(super) fn shading(&self, painted: &paint_net::Image, hit: &Hit) -> Look {
-        let Some(face) = self.surface.disk().faces().get(hit.face as usize) else {
-            return Look { albedo: [0.4; 3], normal: hit.normal };
-        };
-        let uv = self.surface.chart.uv();
-        let [a, b] = hit.barycentric;
-        let mix = |k: usize| {
-            (1.0 - a - b) * uv[face[0] as usize][k] + a * uv[face[1] as usize][k] + b * uv[face[2] as usize][k]
-        };
-        let texel = self.settings.texel;
-        let x = mix(0) / texel - 0.5;
-        let y = (painted.height() as f64 * texel - mix(1)) / texel - 0.5;
-        let albedo = self.appearance.linear(bilinear(painted, x, y)).map(|c| c as f32);
-        let at = SurfacePoint { face: hit.face, barycentric: [1.0 - a - b, a, b] };
-        Look { albedo, normal: self.surface.chart.smooth_normal(at).into_inner() }
-    }
-
-    /// A camera on the surface's mean side that has all the points in view.
-    fn camera(&self, points: &[Point3<f64>]) -> Result<Camera, MissionError> {
-        let (low, high) = points.iter().fold((Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)), |(l, h), p| {
-            (l.inf(&p.coords), h.sup(&p.coords))
-        });
-        let centre = (low + high) / 2.0;
-        let facing = self.surface.facing();
-        let flat = Vector3::new(facing.x, facing.y, 0.0);
-        let front: Vector3<f64> = flat.try_normalize(0.1).unwrap_or(-Vector3::x());
-        let side: Vector3<f64> = Vector3::z().cross(&front);
-        let direction = (front + side * 0.45 + Vector3::z() * 0.28).normalize();
-        let up = Vector3::z();
-        // Step back until everything fits, then look at the middle of what is seen.
-        let (mut target, mut distance) = (centre, 0.8 * (high - low).norm());
-        for _ in 0..40 {
-            let eye = Point3::from(target + direction * distance);
-            let camera = Camera::looking_at(&eye, &Point3::from(target), &up, 0.8, VIEW)?;
-            let seen = points.iter().map(|p| camera.world_from_camera.inverse_transform_point(p));
-            let (mut left, mut right, mut top, mut bottom) = (f64::MAX, f64::MIN, f64::MAX, f64::MIN);
-            for p in seen {
-                let (u, v) = (p.x / p.z.max(0.1), p.y / p.z.max(0.1));
-                (left, right) = (left.min(u), right.max(u));
-                (top, bottom) = (top.min(v), bottom.max(v));
-            }
-            let (half_width, half_height) = (camera.cx / camera.fx, camera.cy / camera.fy);
-            let fill = ((right - left) / (2.0 * half_width)).max((bottom - top) / (2.0 * half_height));
-            let shift = Vector3::new(0.5 * (left + right), 0.5 * (top + bottom), 0.0) * distance;
-            target += camera.world_from_camera.rotation * shift;
-            distance *= 1.0 + 0.7 * (fill / FILL - 1.0).clamp(-0.5, 0.5);
-        }
-        Ok(Camera::looking_at(&Point3::from(target + direction * distance), &Point3::from(target), &up, 0.8, VIEW)?)
-    }
-
-    fn save_angles(&self, path: &Path) -> Result<(), MissionError> {
-        let mut curves: [Vec<(f64, f64)>; 6] = std::array::from_fn(|_| Vec::new());
-        let total: usize = self.flights.iter().map(|f| f.flight.samples.len()).sum();
-        let stride = (total / CURVE_POINTS).max(1);
-        let mut start = 0.0;
-        for f in &self.flights {
-            for s in f.flight.samples.iter().step_by(stride) {
-                let minutes = (start + s.time) / 60.0;
-                let open = |v: f64| if s.flow > 0.0 { v } else { f64::NAN };
-                curves[0].push((minutes, s.desired_pan_tilt[0].to_degrees()));
-                curves[1].push((minutes, s.pan_tilt[0].to_degrees()));
-                curves[2].push((minutes, s.desired_pan_tilt[1].to_degrees()));
-                curves[3].push((minutes, s.pan_tilt[1].to_degrees()));
-                curves[4].push((minutes, open(100.0 * s.distance)));
-            }
-            for (k, t) in f.route.targets.iter().enumerate().filter(|(k, t)| t.dose > 0.0 && f.plan.reachable[*k]) {
-                let minutes = (start + f.plan.target_time[k]) / 60.0;
-                curves[5].push((minutes, 100.0 * normal_deviation(t, &f.plan.nozzle[k].position)));
-            }
-            start += f.plan.trajectory.duration();
-        }
-        let [wanted_pan, pan, wanted_tilt, tilt, distance, deviation] = curves;
-        let panels = [
-            Panel { label: "pan, degrees", curves: vec![("desired", wanted_pan), ("actual", pan)] },
-            Panel { label: "tilt, degrees", curves: vec![("desired", wanted_tilt), ("actual", tilt)] },
-            Panel { label: "distance, cm", curves: vec![("nozzle to surface, valve open", distance)] },
-            Panel { label: "off the normal, cm", curves: vec![("planned nozzle", deviation)] },
-        ];
-        save_curves(path, "Pan-tilt unit and nozzle over the mission", "time, min", &panels)?;
-        Ok(())
-    }
-
-    fn save_mcap(&self, folder: &Path, mesh: &ColouredMesh) -> Result<(), MissionError> {
-        let mut moments = Vec::new();
-        let mut remarks = Vec::new();
-        let mut start = 0.0;
-        for (k, f) in self.flights.iter().enumerate() {
-            let strokes = f.route.strokes;
-            remarks.push((start, format!("layer {} of {}: {strokes} strokes", k + 1, self.flights.len())));
-            let stride = (RECORDING_STEP / f.flight.interval).round().max(1.0) as usize;
-            moments.extend(f.flight.samples.iter().step_by(stride).map(|s| Moment {
-                time: start + s.time,
-                world_from_body: s.world_from_body,
-                world_from_nozzle: nozzle_pose(self, s),
-                joints: s.pan_tilt,
-                hit: s.hit,
-                flow: s.flow,
-            }));
-            start += f.plan.trajectory.duration();
-        }
-        save_recording(&folder.join("mission.mcap"), mesh, &moments, &remarks)?;
-        Ok(())
-    }
+    stage.done(&format!("{} faces, {:.2} mm off the surface", found.mesh.faces.len(), 1e3 * found.mesh_error));
+    let figures = report(mission, &found)?;
+    figures.save(folder)?;
+    Ok(figures)
 }
 
+fn save_textures(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
+    let (width, height) = (mission.wanted.width(), mission.wanted.height());
+    let painted = mission.painted_depth();
+    let picture = |depth: &dyn Fn(usize) -> f64| {
+        let pixels = (0..width * height)
+            .map(|k| if mission.coverage.data()[k] > 0.0 { mission.appearance.srgb(depth(k)) } else { BESIDE });
+        let picture = Rgb::from_pixels(width, height, pixels);
+        picture.enlarged((1400 / width as u32).clamp(1, 8))
+    };
+    let ink = mission.appearance.ink();
+    picture(&|k| ink.inverse(mission.wanted.data()[k])).save(&folder.join("wanted.png"))?;
+    picture(&|k| painted.data()[k]).save(&folder.join("painted.png"))?;
+    save_error_map(&folder.join("error.png"), width, &mission.colour_difference(), (mission.settings.texel, "m"))?;
+    Ok(())
+}
+
+/// Colour of every vertex of the disk: the paint on the texel below it.
+fn vertex_colours(mission: &Mission) -> Vec<[u8; 3]> {
+    let painted = mission.painted_depth();
+    let texel = mission.settings.texel;
+    let (width, height) = (painted.width(), painted.height());
+    let at = |uv: &[f64; 2]| {
+        let x = ((uv[0] / texel) as usize).min(width - 1);
+        let y = (((height as f64 * texel - uv[1]) / texel) as usize).min(height - 1);
+        mission.appearance.srgb(painted.at(x, y))
+    };
+    mission.surface.chart.uv().iter().map(at).collect()
+}
+
+fn save_views(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
+    let painted = mission.painted_depth();
+    let corners: Vec<Point3<f64>> = mission.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
+    let frame = view(mission, &camera(mission, &corners)?, &painted)?;
+    picture_of(&frame).save(&folder.join("painted_view.png"))?;
+
+    // The base coat alone: all layers on top of each other hide the surface and one another.
+    let Some(base) = mission.flights.first() else { return Ok(()) };
+    let path = |of: &dyn Fn(&FlightSample) -> Point3<f64>| -> Vec<Point3<f64>> {
+        base.flight.samples.iter().step_by(10).map(of).collect()
+    };
+    let vehicle = path(&|s| s.world_from_body.translation.vector.into());
+    let camera = camera(mission, &[corners, vehicle.clone()].concat())?;
+    let frame = view(mission, &camera, &painted)?;
+    let project = |p: &Point3<f64>| {
+        let c = camera.world_from_camera.inverse_transform_point(p);
+        (c.z > 0.05).then(|| (camera.fx * c.x / c.z + camera.cx, camera.fy * c.y / c.z + camera.cy, c.z))
+    };
+    let lines = [
+        Polyline { points: path(&|s| s.nozzle), colour: [0, 90, 200], radius: 0.5 },
+        Polyline { points: vehicle, colour: [230, 110, 20], radius: 0.7 },
+    ];
+    let scene = Scene { picture: picture_of(&frame), depth: &frame.depth, project: &project };
+    save_scene(&folder.join("path.png"), scene, &lines)?;
+    Ok(())
+}
+
+/// The painted surface in the light of a sun behind the camera's shoulder.
+fn view(mission: &Mission, camera: &Camera, painted: &paint_net::Image) -> Result<Frame, MissionError> {
+    let away = -(camera.world_from_camera.rotation * Vector3::z());
+    let side = Vector3::z().cross(&away);
+    let lights = Lights {
+        towards_sun: UnitVector3::new_normalize(away + 0.75 * Vector3::z() + 0.35 * side),
+        sun: [0.95, 0.9, 0.8],
+        ambient: [0.28, 0.30, 0.34],
+        ..Lights::default()
+    };
+    let shade = |hit: &Hit| shading(mission, painted, hit);
+    Ok(render(&mission.surface.world, camera, &shade, &lights, 2, mission.settings.threads)?)
+}
+
+/// A camera on the surface's mean side that has all the points in view.
+fn camera(mission: &Mission, points: &[Point3<f64>]) -> Result<Camera, MissionError> {
+    let (low, high) = points
+        .iter()
+        .fold((Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)), |(l, h), p| (l.inf(&p.coords), h.sup(&p.coords)));
+    let centre = (low + high) / 2.0;
+    let facing = mission.surface.facing();
+    let flat = Vector3::new(facing.x, facing.y, 0.0);
+    let front: Vector3<f64> = flat.try_normalize(0.1).unwrap_or(-Vector3::x());
+    let side: Vector3<f64> = Vector3::z().cross(&front);
+    let direction = (front + side * 0.45 + Vector3::z() * 0.28).normalize();
+    let up = Vector3::z();
+    // Step back until everything fits, then look at the middle of what is seen.
+    let (mut target, mut distance) = (centre, 0.8 * (high - low).norm());
+    for _ in 0..40 {
+        let eye = Point3::from(target + direction * distance);
+        let camera = Camera::looking_at(&eye, &Point3::from(target), &up, 0.8, VIEW)?;
+        let seen = points.iter().map(|p| camera.world_from_camera.inverse_transform_point(p));
+        let (mut left, mut right, mut top, mut bottom) = (f64::MAX, f64::MIN, f64::MAX, f64::MIN);
+        for p in seen {
+            let (u, v) = (p.x / p.z.max(0.1), p.y / p.z.max(0.1));
+            (left, right) = (left.min(u), right.max(u));
+            (top, bottom) = (top.min(v), bottom.max(v));
+        }
+        let (half_width, half_height) = (camera.cx / camera.fx, camera.cy / camera.fy);
+        let fill = ((right - left) / (2.0 * half_width)).max((bottom - top) / (2.0 * half_height));
+        let shift = Vector3::new(0.5 * (left + right), 0.5 * (top + bottom), 0.0) * distance;
+        target += camera.world_from_camera.rotation * shift;
+        distance *= 1.0 + 0.7 * (fill / FILL - 1.0).clamp(-0.5, 0.5);
+    }
+    Ok(Camera::looking_at(&Point3::from(target + direction * distance), &Point3::from(target), &up, 0.8, VIEW)?)
+}
+
+fn save_angles(mission: &Mission, path: &Path) -> Result<(), MissionError> {
+    let mut curves: [Vec<(f64, f64)>; 6] = std::array::from_fn(|_| Vec::new());
+    let total: usize = mission.flights.iter().map(|f| f.flight.samples.len()).sum();
+    let stride = (total / CURVE_POINTS).max(1);
+    let mut start = 0.0;
+    for f in &mission.flights {
+        for s in f.flight.samples.iter().step_by(stride) {
+            let minutes = (start + s.time) / 60.0;
+            let open = |v: f64| if s.flow > 0.0 { v } else { f64::NAN };
+            curves[0].push((minutes, s.desired_pan_tilt[0].to_degrees()));
+            curves[1].push((minutes, s.pan_tilt[0].to_degrees()));
+            curves[2].push((minutes, s.desired_pan_tilt[1].to_degrees()));
+            curves[3].push((minutes, s.pan_tilt[1].to_degrees()));
+            curves[4].push((minutes, open(100.0 * s.distance)));
+        }
+        for (k, t) in f.route.targets.iter().enumerate().filter(|(k, t)| t.dose > 0.0 && f.plan.reachable[*k]) {
+            let minutes = (start + f.plan.target_time[k]) / 60.0;
+            curves[5].push((minutes, 100.0 * normal_deviation(t, &f.plan.nozzle[k].position)));
+        }
+        start += f.plan.trajectory.duration();
+    }
+    let [wanted_pan, pan, wanted_tilt, tilt, distance, deviation] = curves;
+    let panels = [
+        Panel { label: "pan, degrees", curves: vec![("desired", wanted_pan), ("actual", pan)] },
+        Panel { label: "tilt, degrees", curves: vec![("desired", wanted_tilt), ("actual", tilt)] },
+        Panel { label: "distance, cm", curves: vec![("nozzle to surface, valve open", distance)] },
+        Panel { label: "off the normal, cm", curves: vec![("planned nozzle", deviation)] },
+    ];
+    save_curves(path, "Pan-tilt unit and nozzle over the mission", "time, min", &panels)?;
+    Ok(())
+}
+
+fn save_mcap(mission: &Mission, folder: &Path, mesh: &ColouredMesh) -> Result<(), MissionError> {
+    let mut moments = Vec::new();
+    let mut remarks = Vec::new();
+    let mut start = 0.0;
+    for (k, f) in mission.flights.iter().enumerate() {
+        let strokes = f.route.strokes;
+        remarks.push((start, format!("layer {} of {}: {strokes} strokes", k + 1, mission.flights.len())));
+        let stride = (RECORDING_STEP / f.flight.interval).round().max(1.0) as usize;
+        moments.extend(f.flight.samples.iter().step_by(stride).map(|s| Moment {
+            time: start + s.time,
+            world_from_body: s.world_from_body,
+            world_from_nozzle: mission.nozzle_pose(s),
+            joints: s.pan_tilt,
+            hit: s.hit,
+            flow: s.flow,
+        }));
+        start += f.plan.trajectory.duration();
+    }
+    save_recording(&folder.join("mission.mcap"), mesh, &moments, &remarks)?;
+    Ok(())
+}
 fn picture_of(frame: &Frame) -> Rgb {
     Rgb::from_pixels(frame.width as usize, frame.height as usize, frame.colour.iter().copied())
-}
-
-fn bilinear(image: &paint_net::Image, x: f64, y: f64) -> f64 {
-    let (w, h) = (image.width(), image.height());
-    let (x, y) = (x.clamp(0.0, (w - 1) as f64), y.clamp(0.0, (h - 1) as f64));
-    let (x0, y0) = (x as usize, y as usize);
-    let (x1, y1) = ((x0 + 1).min(w - 1), (y0 + 1).min(h - 1));
-    let (fx, fy) = (x - x0 as f64, y - y0 as f64);
-    let row = |y: usize| image.at(x0, y) * (1.0 - fx) + image.at(x1, y) * fx;
-    row(y0) * (1.0 - fy) + row(y1) * fy
 }

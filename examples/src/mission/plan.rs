@@ -6,8 +6,8 @@ use paint_net::{Painting, StrokeSettings, boustrophedon};
 use paint_planner::{Error, OptimalPlanner, Plan, Planner, Settings, SmoothingPlanner};
 
 use super::decide::kernel;
-use super::figures::path_length;
-use super::{MissionError, MissionSettings};
+use super::error::MissionError;
+use super::settings::MissionSettings;
 use crate::adapters::{MeshSurface, Robot};
 use crate::progress::Stage;
 use crate::surface::PaintSurface;
@@ -62,4 +62,11 @@ pub(super) fn plan(
     let metres: f64 = planned.layers.iter().map(|(_, plan, _)| path_length(plan)).sum();
     stage.done(&format!("{metres:.0} m of path, {:.1} ms per metre", 1e3 * planned.seconds / metres));
     Ok(planned)
+}
+
+/// Length of the vehicle's trajectory, metres.
+pub(super) fn path_length(plan: &Plan) -> f64 {
+    let steps = (plan.trajectory.duration() / 0.05).ceil().max(1.0);
+    let at = |k: f64| plan.trajectory.sample(plan.trajectory.duration() * k / steps).position;
+    (0..steps as usize).map(|k| (at(k as f64 + 1.0) - at(k as f64)).norm()).sum()
 }

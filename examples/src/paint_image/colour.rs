@@ -7,9 +7,13 @@ use paint_net::{ColourPainting, ColourTask, Coloured, Error, Image, Paint, Palet
 use paint_sim::colour::lab;
 use serde::Serialize;
 
+use super::commands;
 use super::cpu_timer::CpuTimer;
+use super::error::PaintImageError;
+use super::files::write_json;
+use super::ink::{ink_of, ssim};
+use super::job::Job;
 use super::progress_strip::save_progress_strip;
-use super::{Job, PaintImageError, commands, ink_of, ssim, write_json};
 use crate::pictures::{Rgb, save_error_map};
 
 /// Which glazes are in the guns, on a white wall.
@@ -128,70 +132,68 @@ fn lab_of(stored: [f64; 3]) -> [f64; 3] {
     lab(xyz, [0.95047, 1.0, 1.08883])
 }
 
-impl Job {
-    /// Decides the sprays of every paint for a wanted picture.
-    pub fn paint_colours(
-        &self,
-        wanted: &Picture,
-        palette: &Palette,
-        progress: &mut dyn FnMut(f64),
-    ) -> Result<(ColourPainting, ColourFigures), PaintImageError> {
-        let timer = CpuTimer::start(1);
-        let task = ColourTask::new(wanted);
-        let painting = Coloured::default().paint(&task, palette, &self.kernel, &self.limits, progress)?;
-        let cpu_ms = timer.milliseconds();
-        let (psnr_db, ciede2000_mean, ciede2000_p95) = compare_colours(&painting.picture, wanted);
-        let (painted_ink, wanted_ink) = (ink(&painting.picture)?, ink(wanted)?);
-        let figures = ColourFigures {
-            painter: "coloured",
-            width: wanted.width(),
-            height: wanted.height(),
-            psnr_db,
-            ssim: ssim(&painted_ink, &wanted_ink)?,
-            bce_nats_per_px: metrics::binary_cross_entropy(&painted_ink, &wanted_ink)?,
-            ciede2000_mean,
-            ciede2000_p95,
-            sprays: painting.sprays.iter().map(Vec::len).sum(),
-            paints: palette.paints().len(),
-            volume_total: painting.sprays.iter().flatten().map(|s| s.volume).sum(),
-            cpu_ms,
-            threads: 1,
-        };
-        let ColourFigures { ssim, bce_nats_per_px, volume_total, .. } = figures;
-        let numbers = [psnr_db, ssim, bce_nats_per_px, ciede2000_mean, ciede2000_p95, volume_total];
-        if numbers.iter().any(|f| !f.is_finite()) {
-            return Err(PaintImageError::NotFinite("report"));
-        }
-        Ok((painting, figures))
+/// Decides the sprays of every paint for a wanted picture.
+pub fn paint_colours(
+    job: &Job,
+    wanted: &Picture,
+    palette: &Palette,
+    progress: &mut dyn FnMut(f64),
+) -> Result<(ColourPainting, ColourFigures), PaintImageError> {
+    let timer = CpuTimer::start(1);
+    let task = ColourTask::new(wanted);
+    let painting = Coloured::default().paint(&task, palette, &job.kernel, &job.limits, progress)?;
+    let cpu_ms = timer.milliseconds();
+    let (psnr_db, ciede2000_mean, ciede2000_p95) = compare_colours(&painting.picture, wanted);
+    let (painted_ink, wanted_ink) = (ink(&painting.picture)?, ink(wanted)?);
+    let figures = ColourFigures {
+        painter: "coloured",
+        width: wanted.width(),
+        height: wanted.height(),
+        psnr_db,
+        ssim: ssim(&painted_ink, &wanted_ink)?,
+        bce_nats_per_px: metrics::binary_cross_entropy(&painted_ink, &wanted_ink)?,
+        ciede2000_mean,
+        ciede2000_p95,
+        sprays: painting.sprays.iter().map(Vec::len).sum(),
+        paints: palette.paints().len(),
+        volume_total: painting.sprays.iter().flatten().map(|s| s.volume).sum(),
+        cpu_ms,
+        threads: 1,
+    };
+    let ColourFigures { ssim, bce_nats_per_px, volume_total, .. } = figures;
+    let numbers = [psnr_db, ssim, bce_nats_per_px, ciede2000_mean, ciede2000_p95, volume_total];
+    if numbers.iter().any(|f| !f.is_finite()) {
+        return Err(PaintImageError::NotFinite("report"));
     }
+    Ok((painting, figures))
+}
 
-    /// Writes `commands.json`, `commands.mcap`, `rendered.png`, `error.png` (CIEDE2000 of every pixel), `film.png` and
-    /// `report.json`.
-    pub fn save_colours(
-        &self,
-        folder: &Path,
-        wanted: &Picture,
-        palette: &Palette,
-        painting: &ColourPainting,
-        figures: &ColourFigures,
-    ) -> Result<(), PaintImageError> {
-        // Paint by paint: a nozzle is washed as seldom as can be, and wet paints mix in any order.
-        let of_paint = |(paint, sprays): (usize, &Vec<Spray>)| commands::commands(sprays, paint).collect::<Vec<_>>();
-        let sprays: Vec<_> = painting.sprays.iter().enumerate().flat_map(of_paint).collect();
-        let model = serde_json::json!({
-            "colour": "Kubelka-Munk film of the depths sum of volume * exp(-d^2 / (2 sigma_px^2)) over the wall",
-            "wall": palette.wall(), "cut_sigma": self.kernel.cut(),
-            "absorption": palette.paints().iter().map(|p| p.absorption).collect::<Vec<_>>(),
-            "scattering": palette.paints().iter().map(|p| p.scattering).collect::<Vec<_>>(),
-        });
-        let names: Vec<_> = palette.paints().iter().map(|p| p.name.as_str()).collect();
-        commands::save(folder, (figures.width, figures.height), &model, &names, &sprays)?;
-        write_json(&folder.join("report.json"), figures)?;
-        rgb(&painting.picture).save(&folder.join("rendered.png"))?;
-        let map: Vec<_> = differences(&painting.picture, wanted).into_iter().map(Some).collect();
-        save_error_map(&folder.join("error.png"), figures.width, &map, (1.0, "px"))?;
-        let paints: Vec<&[Spray]> = painting.sprays.iter().map(Vec::as_slice).collect();
-        let show = |depths: &[f64]| palette.colour(depths).map(byte);
-        save_progress_strip(&folder.join("film.png"), rgb(wanted), &paints, &self.kernel, &show)
-    }
+/// Writes `commands.json`, `commands.mcap`, `rendered.png`, `error.png` (CIEDE2000 of every pixel), `film.png` and
+/// `report.json`.
+pub fn save_colours(
+    job: &Job,
+    folder: &Path,
+    wanted: &Picture,
+    palette: &Palette,
+    painting: &ColourPainting,
+    figures: &ColourFigures,
+) -> Result<(), PaintImageError> {
+    // Paint by paint: a nozzle is washed as seldom as can be, and wet paints mix in any order.
+    let of_paint = |(paint, sprays): (usize, &Vec<Spray>)| commands::commands(sprays, paint).collect::<Vec<_>>();
+    let sprays: Vec<_> = painting.sprays.iter().enumerate().flat_map(of_paint).collect();
+    let model = serde_json::json!({
+        "colour": "Kubelka-Munk film of the depths sum of volume * exp(-d^2 / (2 sigma_px^2)) over the wall",
+        "wall": palette.wall(), "cut_sigma": job.kernel.cut(),
+        "absorption": palette.paints().iter().map(|p| p.absorption).collect::<Vec<_>>(),
+        "scattering": palette.paints().iter().map(|p| p.scattering).collect::<Vec<_>>(),
+    });
+    let names: Vec<_> = palette.paints().iter().map(|p| p.name.as_str()).collect();
+    commands::save(folder, (figures.width, figures.height), &model, &names, &sprays)?;
+    write_json(&folder.join("report.json"), figures)?;
+    rgb(&painting.picture).save(&folder.join("rendered.png"))?;
+    let map: Vec<_> = differences(&painting.picture, wanted).into_iter().map(Some).collect();
+    save_error_map(&folder.join("error.png"), figures.width, &map, (1.0, "px"))?;
+    let paints: Vec<&[Spray]> = painting.sprays.iter().map(Vec::as_slice).collect();
+    let show = |depths: &[f64]| palette.colour(depths).map(byte);
+    save_progress_strip(&folder.join("film.png"), rgb(wanted), &paints, &job.kernel, &show)
 }

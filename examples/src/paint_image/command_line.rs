@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use super::{Glazes, PainterKind};
+use super::colour::Glazes;
+use super::job::PainterKind;
 
 /// Decides what to spray so that the wall comes to look like a picture. Dark is paint, white is bare wall.
 #[derive(Parser)]

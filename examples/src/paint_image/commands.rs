@@ -8,7 +8,8 @@ use std::path::Path;
 use paint_net::Spray;
 use serde::Serialize;
 
-use super::{PaintImageError, write_json};
+use super::error::PaintImageError;
+use super::files::write_json;
 
 /// Speed of the nozzle in `commands.mcap`, pixels per second.
 pub const NOZZLE_SPEED: f64 = 100.0;

@@ -4,7 +4,10 @@ use std::path::Path;
 use paint_net::{Image, Painting, Sharing};
 use serde::Serialize;
 
-use super::{Figures, Job, PaintImageError, PainterKind, grey, write_text};
+use super::error::PaintImageError;
+use super::files::write_text;
+use super::ink::grey;
+use super::job::{Figures, Job, PainterKind};
 use crate::pictures::{Tile, save_contact_sheet};
 
 /// Pictures on the sheet: the first ones.

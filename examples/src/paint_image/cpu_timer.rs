@@ -1,3 +1,5 @@
+//! Processor time of a piece of work.
+
 use std::time::Instant;
 
 /// CPU time of this thread where the system tells it, wall time elsewhere and with several threads.

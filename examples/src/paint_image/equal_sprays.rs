@@ -3,7 +3,8 @@ use std::path::Path;
 use paint_net::thesis::Thesis;
 use paint_net::{Feedback, FreeSplats, Image, Limits, Painter, Saturation, SprayKernel, Task, metrics};
 
-use super::{PaintImageError, read_network};
+use super::error::PaintImageError;
+use super::files::read_network;
 
 /// Two painters beside the thesis' network, on one picture, none with more sprays than that.
 #[derive(Debug, Clone, Copy, PartialEq)]

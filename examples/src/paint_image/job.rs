@@ -1,3 +1,5 @@
+//! One picture in one paint: who paints it, how, and with what result.
+
 use std::path::Path;
 
 use clap::ValueEnum;
@@ -8,9 +10,12 @@ use paint_net::{
 };
 use serde::Serialize;
 
+use super::commands;
 use super::cpu_timer::CpuTimer;
+use super::error::PaintImageError;
+use super::files::write_json;
+use super::ink::{colour_difference, error_map, grey, level, ssim};
 use super::progress_strip::save_progress_strip;
-use super::{PaintImageError, colour_difference, commands, error_map, grey, level, ssim, write_json};
 
 /// Who decides the sprays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -1,8 +1,10 @@
+//! The wall while it is painted, moment by moment.
+
 use std::path::Path;
 
 use paint_net::{Image, Spray, SprayKernel};
 
-use super::PaintImageError;
+use super::error::PaintImageError;
 use crate::pictures::{Rgb, Tile, save_contact_sheet};
 
 /// Moments that are shown, beside the wanted picture.

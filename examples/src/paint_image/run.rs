@@ -1,3 +1,5 @@
+//! What the command line asks for, done.
+
 use std::path::{Path, PathBuf};
 
 use paint_net::procedural::Texture;
@@ -5,11 +7,15 @@ use paint_net::thesis::{Objective, Shape};
 use paint_net::train::{ThesisSettings, TrainSettings};
 use paint_net::{Image, Limits, Route, Sharing, SprayKernel};
 
+use super::colour::{Glazes, paint_colours, read_picture, save_colours};
 use super::command_line::{Arguments, Command, Nozzle, Preset, RouteName, SharingName, Training};
-use super::{
-    Glazes, Job, PaintImageError, PainterKind, ThesisTrainingRun, TrainingImages, TrainingRun, compare, equal_sprays,
-    pictures_in, print_equal_sprays, read_ink, read_network, read_picture, table, train_painter, train_thesis,
-};
+use super::compare::{compare, table};
+use super::equal_sprays::{equal_sprays, print_equal_sprays};
+use super::error::PaintImageError;
+use super::files::{pictures_in, read_network};
+use super::ink::read_ink;
+use super::job::{Job, PainterKind};
+use super::training::{ThesisTrainingRun, TrainingImages, TrainingRun, train_painter, train_thesis};
 use crate::progress::Stage;
 
 /// Does what the command line asks for.
@@ -27,7 +33,7 @@ pub fn run(arguments: Arguments) -> Result<(), PaintImageError> {
                 let out = if image.is_dir() { out.join(file.file_name().unwrap_or_default()) } else { out.clone() };
                 match palette {
                     None => paint(&file, &job, &out)?,
-                    Some(palette) => paint_colours(&file, &job, palette, &out)?,
+                    Some(palette) => paint_file_in_colours(&file, &job, palette, &out)?,
                 }
             }
             Ok(())
@@ -153,14 +159,14 @@ fn paint(image: &Path, job: &Job, out: &Path) -> Result<(), PaintImageError> {
     Ok(())
 }
 
-fn paint_colours(image: &Path, job: &Job, glazes: Glazes, out: &Path) -> Result<(), PaintImageError> {
+fn paint_file_in_colours(image: &Path, job: &Job, glazes: Glazes, out: &Path) -> Result<(), PaintImageError> {
     let (wanted, palette) = (read_picture(image)?, glazes.palette()?);
     create(out)?;
     let stage = Stage::start("paint");
-    let (painting, figures) = job.paint_colours(&wanted, &palette, &mut |share| stage.share(share))?;
+    let (painting, figures) = paint_colours(job, &wanted, &palette, &mut |share| stage.share(share))?;
     stage
         .done(&format!("{} sprays, CIEDE2000 {:.2}, {:.1} ms", figures.sprays, figures.ciede2000_mean, figures.cpu_ms));
-    job.save_colours(out, &wanted, &palette, &painting, &figures)?;
+    save_colours(job, out, &wanted, &palette, &painting, &figures)?;
     println!("{}", out.join("report.json").display());
     Ok(())
 }

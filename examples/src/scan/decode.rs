@@ -5,7 +5,8 @@ use std::path::Path;
 use image::{DynamicImage, ImageReader};
 use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics};
 
-use super::{FrameFiles, SequenceError};
+use super::error::SequenceError;
+use super::sequence::FrameFiles;
 use crate::pictures::Rgb;
 
 /// The images of a frame in memory.

@@ -16,7 +16,8 @@ use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuat
 use tsdf_hash::Intrinsics;
 use vio_ekf::{Stamp, tum as tum_format};
 
-use super::sequence::{FrameFiles, Sequence, SequenceError};
+use super::error::SequenceError;
+use super::sequence::{FrameFiles, Sequence};
 
 type Result<T> = std::result::Result<T, SequenceError>;
 
@@ -29,7 +30,29 @@ const ICL_CAMERA: Intrinsics = Intrinsics { fx: 481.2, fy: -480.0, cx: 319.5, cy
 /// Colour belongs to the depth image within this time, seconds (the TUM tools' value).
 const NEAREST: f64 = 0.02;
 
-pub(super) fn seven_scenes(folder: &Path) -> Result<Option<Sequence>> {
+/// Recognises the layout of a folder and lists its frames.
+///
+/// # Errors
+/// [`SequenceError`]; images themselves are read later, by [`Images::read`](super::Images::read).
+pub fn open_sequence(folder: &Path) -> Result<Sequence> {
+    let sequence = if folder.join("depth.txt").is_file() {
+        tum(folder)?
+    } else if folder.join("trajectory.log").is_file() {
+        redwood(folder)?
+    } else if folder.join("pose.txt").is_file() && folder.join("depth").is_dir() {
+        icl(folder)?
+    } else if let Some(frames) = seven_scenes(folder)? {
+        frames
+    } else {
+        return Err(SequenceError::UnknownLayout { folder: folder.display().to_string() });
+    };
+    if sequence.frames.is_empty() {
+        return Err(SequenceError::malformed(folder, 0, "the sequence has no frame"));
+    }
+    Ok(sequence)
+}
+
+fn seven_scenes(folder: &Path) -> Result<Option<Sequence>> {
     let depth = numbered(folder, |name| name.strip_prefix("frame-")?.strip_suffix(".depth.png"))?;
     if depth.is_empty() {
         // Sequences often stand one folder below the camera's file.
@@ -60,7 +83,7 @@ pub(super) fn seven_scenes(folder: &Path) -> Result<Option<Sequence>> {
     Ok(Some(Sequence { layout: "7-Scenes", intrinsics, depth_scale: 1000.0, frames }))
 }
 
-pub(super) fn tum(folder: &Path) -> Result<Sequence> {
+fn tum(folder: &Path) -> Result<Sequence> {
     let (intrinsics, depth_scale) = match folder.join("intrinsics.txt") {
         path if path.is_file() => match numbers(&path, &read(&path)?)?[..] {
             [_, _, fx, fy, cx, cy, scale] => (Intrinsics { fx, fy, cx, cy }, scale),
@@ -102,7 +125,7 @@ pub(super) fn tum(folder: &Path) -> Result<Sequence> {
     Ok(Sequence { layout: "TUM", intrinsics, depth_scale, frames })
 }
 
-pub(super) fn icl(folder: &Path) -> Result<Sequence> {
+fn icl(folder: &Path) -> Result<Sequence> {
     let path = folder.join("pose.txt");
     let text = read(&path)?;
     let mut poses = Vec::new();
@@ -122,7 +145,7 @@ pub(super) fn icl(folder: &Path) -> Result<Sequence> {
     Ok(Sequence { layout: "ICL-NUIM", intrinsics: ICL_CAMERA, depth_scale: 5000.0, frames })
 }
 
-pub(super) fn redwood(folder: &Path) -> Result<Sequence> {
+fn redwood(folder: &Path) -> Result<Sequence> {
     let path = folder.join("trajectory.log");
     let values = numbers(&path, &read(&path)?)?;
     let mut poses = Vec::new();

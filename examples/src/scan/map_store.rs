@@ -4,7 +4,7 @@ use tsdf_hash::{DenseMap, Map, Settings};
 #[cfg(feature = "gpu")]
 use tsdf_hash::{GpuMap, GpuOptions};
 
-use super::ScanError;
+use super::error::ScanError;
 
 /// Which device keeps the map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::Scan;
+use super::run::Scan;
 
 /// What `report.json` of a scan holds. Flat, SI units in the names; every number is finite.
 #[derive(Debug, Clone, Serialize)]
@@ -52,15 +52,15 @@ pub struct ScanReport {
     pub peak_rss_bytes: u64,
 }
 
-impl Scan {
-    /// The figures of this run.
-    pub fn report(&self) -> ScanReport {
-        let (settings, metrics) = (self.map.settings(), &self.metrics);
+impl ScanReport {
+    /// The figures of a run.
+    pub fn new(scan: &Scan) -> Self {
+        let (settings, metrics) = (scan.map.settings(), &scan.metrics);
         let casts: Vec<f64> = metrics.ray_casts.iter().map(|cast| cast.seconds).collect();
-        ScanReport {
+        Self {
             version: env!("CARGO_PKG_VERSION"),
-            frames: self.fused.len(),
-            frames_skipped: self.skipped.len(),
+            frames: scan.fused.len(),
+            frames_skipped: scan.skipped.len(),
             voxel_m: settings.voxel_size,
             integrate_cpu_ms_median: 1e3 * median(&metrics.integrate_s),
             raycast_cpu_ms_median: 1e3 * median(&casts),
@@ -71,14 +71,14 @@ impl Scan {
                 .then(|| 1e3 * median(&metrics.mesh_update_s)),
             active_bytes_peak: metrics.active_bytes_peak,
             host_bytes_peak: metrics.host_bytes_peak,
-            blocks: self.map.blocks(),
-            map_hash: format!("{:016x}", self.map.hash()),
-            vertices: self.mesh.positions.len(),
-            triangles: self.mesh.faces.len(),
-            non_manifold_edges: non_manifold_edges(&self.mesh.faces),
-            path_length_m: self.trajectory.path_length(),
+            blocks: scan.map.blocks(),
+            map_hash: format!("{:016x}", scan.map.hash()),
+            vertices: scan.mesh.positions.len(),
+            triangles: scan.mesh.faces.len(),
+            non_manifold_edges: non_manifold_edges(&scan.mesh.faces),
+            path_length_m: scan.trajectory.path_length(),
             threads: settings.threads,
-            device: self.device.clone(),
+            device: scan.device.clone(),
             peak_rss_bytes: crate::report::peak_resident_bytes(),
         }
     }

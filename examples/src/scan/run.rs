@@ -7,8 +7,10 @@ use nalgebra::Isometry3;
 use tsdf_hash::{CastSettings, Map, MapFile, Mesh, MeshKeeper};
 use vio_ekf::{Stamp, Trajectory};
 
+use super::decode::Images;
+use super::error::ScanError;
 use super::map_store::{Device, MapStore};
-use super::{Images, Sequence, SequenceError};
+use super::sequence::Sequence;
 use crate::progress::Stage;
 
 /// How a sequence is mapped.
@@ -77,47 +79,6 @@ pub struct RayCastCheck {
     pub depth_error: f64,
     /// Share of the measured pixels at which the map has a surface.
     pub fill: f64,
-}
-
-/// Why a run gave no map.
-#[derive(Debug, thiserror::Error)]
-pub enum ScanError {
-    /// The sequence cannot be read.
-    #[error(transparent)]
-    Sequence(#[from] SequenceError),
-    /// The map refused something.
-    #[error(transparent)]
-    Map(#[from] tsdf_hash::Error),
-    /// The stored map cannot be used.
-    #[error("{path}: {source}")]
-    Stored {
-        /// The file.
-        path: String,
-        /// What is wrong with it.
-        source: tsdf_hash::Error,
-    },
-    /// The poses make no trajectory.
-    #[error(transparent)]
-    Trajectory(#[from] vio_ekf::Error),
-    /// A picture cannot be rendered.
-    #[error(transparent)]
-    Render(#[from] paint_sim::Error),
-    /// A picture cannot be saved.
-    #[error(transparent)]
-    Picture(#[from] crate::pictures::PictureError),
-    /// A device was asked for that this program was built without.
-    #[error("--device gpu: this program was built without it: build with --features gpu, or use --device cpu")]
-    NoGpu,
-    /// No frame could be fused.
-    #[error("{folder}: none of the {frames} frames could be fused; the first: {first}")]
-    NothingFused {
-        /// The sequence.
-        folder: String,
-        /// Frames it lists.
-        frames: usize,
-        /// What was wrong with the first of them.
-        first: String,
-    },
 }
 
 impl Scan {

@@ -6,7 +6,10 @@ use nalgebra::{Isometry3, Translation3, Vector3};
 use paint_sim::{Camera, Frame, Hit, Lights, Look, TriangleSurface, render};
 use tsdf_hash::Mesh;
 
-use super::{Images, Scan, ScanError, Sequence};
+use super::decode::Images;
+use super::error::ScanError;
+use super::run::Scan;
+use super::sequence::Sequence;
 use crate::pictures::Rgb;
 
 /// How far behind the middle camera the overview stands, metres.
@@ -16,37 +19,34 @@ const ABOVE: f64 = 0.6;
 /// Samples per pixel and direction.
 const SMOOTH: u32 = 2;
 
-impl Scan {
-    /// Writes `views.png`, recorded picture, coloured mesh, shaded mesh and their overview, into a folder.
-    pub fn save_views(&self, sequence: &Sequence, folder: &Path, threads: usize) -> Result<(), ScanError> {
-        let middle = self.fused[self.fused.len() / 2];
-        let images = Images::read(&sequence.frames[middle])?;
-        let Some(world_from_camera) = sequence.frames[middle].world_from_camera else { return Ok(()) };
-        let k = sequence.intrinsics;
-        let (width, height) = (images.width() as u32, images.height() as u32);
-        let here = Camera { fx: k.fx, fy: k.fy, cx: k.cx, cy: k.cy, width, height, world_from_camera };
-        let surface = TriangleSurface::new(&self.mesh.positions, &self.mesh.faces)?;
-        // Even light, and what is shaded is shaded here: a lamp would throw shadows from behind the picture.
-        let lights = Lights { sun: [0.0; 3], ambient: [1.0; 3], ..Lights::default() };
-        let seen = |camera: &Camera, colours: bool| -> Result<Rgb, ScanError> {
-            let towards_camera = camera.world_from_camera * -Vector3::z();
-            let shade = |hit: &Hit| shading(&self.mesh, hit, (!colours).then_some(&towards_camera));
-            Ok(picture(&render(&surface, camera, &shade, &lights, SMOOTH, threads)?))
-        };
-        // The picture's "up" is -y, or +y where the focal length is negative.
-        let up = -k.fy.signum() * ABOVE;
-        let back = Isometry3::from_parts(
-            Translation3::new(0.0, up, -BEHIND),
-            nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), up.signum() * (ABOVE / 3.0).atan()),
-        );
-        let behind = Camera { world_from_camera: world_from_camera * back, ..here };
-        let recorded = images.picture();
-        let quarters = [recorded, seen(&here, true)?, seen(&here, false)?, seen(&behind, true)?];
-        four(&quarters).save(&folder.join("views.png"))?;
-        Ok(())
-    }
+/// Writes `views.png`, recorded picture, coloured mesh, shaded mesh and their overview, into a folder.
+pub fn save_views(scan: &Scan, sequence: &Sequence, folder: &Path, threads: usize) -> Result<(), ScanError> {
+    let middle = scan.fused[scan.fused.len() / 2];
+    let images = Images::read(&sequence.frames[middle])?;
+    let Some(world_from_camera) = sequence.frames[middle].world_from_camera else { return Ok(()) };
+    let k = sequence.intrinsics;
+    let (width, height) = (images.width() as u32, images.height() as u32);
+    let here = Camera { fx: k.fx, fy: k.fy, cx: k.cx, cy: k.cy, width, height, world_from_camera };
+    let surface = TriangleSurface::new(&scan.mesh.positions, &scan.mesh.faces)?;
+    // Even light, and what is shaded is shaded here: a lamp would throw shadows from behind the picture.
+    let lights = Lights { sun: [0.0; 3], ambient: [1.0; 3], ..Lights::default() };
+    let seen = |camera: &Camera, colours: bool| -> Result<Rgb, ScanError> {
+        let towards_camera = camera.world_from_camera * -Vector3::z();
+        let shade = |hit: &Hit| shading(&scan.mesh, hit, (!colours).then_some(&towards_camera));
+        Ok(picture(&render(&surface, camera, &shade, &lights, SMOOTH, threads)?))
+    };
+    // The picture's "up" is -y, or +y where the focal length is negative.
+    let up = -k.fy.signum() * ABOVE;
+    let back = Isometry3::from_parts(
+        Translation3::new(0.0, up, -BEHIND),
+        nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), up.signum() * (ABOVE / 3.0).atan()),
+    );
+    let behind = Camera { world_from_camera: world_from_camera * back, ..here };
+    let recorded = images.picture();
+    let quarters = [recorded, seen(&here, true)?, seen(&here, false)?, seen(&behind, true)?];
+    four(&quarters).save(&folder.join("views.png"))?;
+    Ok(())
 }
-
 /// The mesh in its own colours, or in grey by the angle to `lamp`.
 fn shading(mesh: &Mesh, hit: &Hit, lamp: Option<&Vector3<f64>>) -> Look {
     let [a, b, c] = mesh.faces[hit.face as usize].map(|vertex| vertex as usize);

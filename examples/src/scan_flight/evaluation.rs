@@ -1,22 +1,15 @@
-//! How well a surface was scanned, and a picture of it.
+//! How well a surface was scanned.
 
-use std::path::Path;
-
-use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
-use paint_sim::{Camera, Hit, Lights, Look, Surface, TriangleSurface, render};
+use nalgebra::{Isometry3, Point3};
+use paint_sim::{Surface, TriangleSurface};
 use serde::Serialize;
 use vio_ekf::{Alignment, Trajectory, ate};
 
-use super::{ScanFlight, ScanFlightError};
-use crate::mesh_io::{TriangleMesh, write_ply};
-use crate::mission::MissionError;
-use crate::pictures::{Polyline, Rgb, Scene, save_scene};
+use super::error::ScanFlightError;
+use crate::mesh_io::TriangleMesh;
 
 /// A place of the true surface counts as scanned when the map is no farther from it than this, metres.
 const NEAR: f64 = 0.05;
-/// Size of the picture, pixels.
-const VIEW: (u32, u32) = (1400, 900);
-
 /// Figures of a scan. Flat, SI units in the names.
 #[derive(Debug, Clone, Serialize)]
 pub struct ScanFlightFigures {
@@ -79,54 +72,4 @@ pub(super) fn figures(
         vertices: scanned.positions.len(),
         triangles: scanned.faces.len(),
     })
-}
-
-impl ScanFlight {
-    /// Writes `survey.json`, `survey.png`, `survey.ply` and both trajectories into an existing folder.
-    pub fn save(&self, folder: &Path) -> Result<(), MissionError> {
-        let write = |name: &str, text: String| {
-            let path = folder.join(name);
-            std::fs::write(&path, text)
-                .map_err(|source| MissionError::Unwritable { path: path.display().to_string(), source })
-        };
-        write("survey_true.tum", vio_ekf::tum::write(&self.flown))?;
-        write("survey_estimated.tum", vio_ekf::tum::write(&self.estimated))?;
-        let ply = folder.join("survey.ply");
-        let grey = vec![[180; 3]; self.mesh.positions.len()];
-        write_ply(&ply, &self.mesh.positions, &self.mesh.faces, &grey)
-            .map_err(|source| MissionError::Unwritable { path: ply.display().to_string(), source })?;
-        self.save_picture(&folder.join("survey.png"))?;
-        let figures = serde_json::to_string_pretty(&self.figures).map_err(crate::report::ReportError::from)?;
-        write("survey.json", figures + "\n")
-    }
-
-    /// The map with the way that was flown (blue) and the way that was estimated (orange), from behind the robot's shoulder.
-    fn save_picture(&self, path: &Path) -> Result<(), MissionError> {
-        let surface = TriangleSurface::new(&self.mesh.positions, &self.mesh.faces)?;
-        let way = |of: &Trajectory| -> Vec<Point3<f64>> {
-            of.poses().iter().step_by(4).map(|pose| pose.translation.vector.into()).collect()
-        };
-        let (true_way, estimated) = (way(&self.flown), way(&self.estimated));
-        let middle: Vector3<f64> =
-            true_way.iter().map(|p| p.coords).sum::<Vector3<f64>>() / true_way.len().max(1) as f64;
-        let ahead = self.flown.poses().first().map_or(Vector3::x(), |pose| pose * Vector3::x());
-        let reach = true_way.iter().map(|p| (p.coords - middle).norm()).fold(1.0, f64::max);
-        let aside = Vector3::z().cross(&ahead);
-        let eye = middle - ahead * (2.2 * reach) + aside * (1.1 * reach) + Vector3::z() * (0.7 * reach);
-        let camera = Camera::looking_at(&eye.into(), &(middle + ahead * 0.7).into(), &Vector3::z(), 1.05, VIEW)?;
-        let towards_sun = UnitVector3::new_normalize(Vector3::z() - ahead * 0.6 - aside);
-        let lights = Lights { towards_sun, ..Lights::default() };
-        let shade = |hit: &Hit| Look { albedo: [0.62, 0.56, 0.5], normal: hit.normal };
-        let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        let frame = render(&surface, &camera, &shade, &lights, 2, threads)?;
-        let project = |p: &Point3<f64>| {
-            let c = camera.world_from_camera.inverse_transform_point(p);
-            (c.z > 0.05).then(|| (camera.fx * c.x / c.z + camera.cx, camera.fy * c.y / c.z + camera.cy, c.z))
-        };
-        let picture = Rgb::from_pixels(VIEW.0 as usize, VIEW.1 as usize, frame.colour.iter().copied());
-        let scene = Scene { picture, depth: &frame.depth, project: &project };
-        let line = |points, colour| Polyline { points, colour, radius: 1.2 };
-        save_scene(path, scene, &[line(true_way, [0, 90, 200]), line(estimated, [230, 110, 20])])?;
-        Ok(())
-    }
 }

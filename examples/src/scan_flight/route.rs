@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use vio_ekf::{Spline, Stamp};
 
-use super::ScanFlightError;
+use super::error::ScanFlightError;
 use crate::mesh_io::TriangleMesh;
 use crate::mesh_placement::mean_normal;
 

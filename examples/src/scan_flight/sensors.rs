@@ -6,7 +6,7 @@ use paint_sim::{Hit, Lights, Look, TriangleSurface, render};
 use tsdf_hash::Intrinsics;
 use vio_ekf::{Camera, Distortion, ImageView};
 
-use super::ScanFlightError;
+use super::error::ScanFlightError;
 use crate::mesh_io::TriangleMesh;
 
 /// Images per second.

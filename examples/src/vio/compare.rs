@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::Serialize;
 use vio_ekf::{Alignment, Error, Evaluation, EvaluationSettings};
 
-use super::VioError;
+use super::error::VioError;
 use super::euroc_folder::read_truth;
 
 /// What `vio eval` finds. Flat, SI units in the names; what cannot be determined is absent.

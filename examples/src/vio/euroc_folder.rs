@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 use vio_ekf::calibration::{self, CameraCalibration, ImuCalibration};
 use vio_ekf::{Stamp, asl, euroc, nalgebra::Isometry3, tum};
 
-use super::error::read_text;
-use super::recording::GroundTruth;
-use super::{Images, Recording, VioError};
+use super::error::{VioError, read_text};
+use super::recording::{GroundTruth, Images, Recording};
 
 /// Files that take the place of those in the folder.
 #[derive(Debug, Clone, Default)]

@@ -5,9 +5,9 @@ use vio_ekf::{
     Alignment, Association, Error, Odometry, PairsFrom, RpeSettings, Span, Stamp, Tolerance, apply, ate, rpe, so3,
 };
 
+use super::error::VioError;
 use super::recording::GroundTruth;
-use super::run::heading_onto;
-use super::{Run, VioError};
+use super::run::{Run, heading_onto};
 
 /// Standard deviations that a recorded truth has of its own, added to those that the filter claims: 1 mm, 0.1 degrees,
 /// 3 mm/s. Ours; without them the first poses, which the filter knows exactly by definition, would decide.

@@ -1,5 +1,6 @@
 //! Recordings as MCAP: images as Foxglove or ROS 2 has them, inertial samples as ROS 2 has them.
 
+mod fields;
 mod pixels;
 
 use std::fs::File;
@@ -7,18 +8,18 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use foxglove::Decode;
-use foxglove::messages::{self, FrameTransform, FrameTransforms, PoseInFrame, Timestamp};
+use foxglove::messages::{self, FrameTransform, FrameTransforms, PoseInFrame};
 use mcap::Message;
 use vio_ekf::calibration::{self, CameraCalibration, ImuCalibration};
-use vio_ekf::nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use vio_ekf::nalgebra::Isometry3;
 use vio_ekf::{Camera, Distortion, Imu, ImuNoise, Stamp, Trajectory};
 
-use super::cdr::Cdr;
-use super::error::read_text;
+use super::error::{VioError, read_text};
 use super::euroc_folder::{Overrides, read_truth};
+use super::grey_image::GreyImage;
 use super::mcap_out::NOISE_SCHEMA;
-use super::recording::{CameraFrame, GroundTruth};
-use super::{Images, Recording, VioError};
+use super::recording::{GroundTruth, Images, Recording};
+use fields::{imu, isometry, noise, stamp};
 use pixels::{image, image_stamp};
 
 /// Opens an MCAP file: one pass for everything but the images, which are read later, one by one.
@@ -55,24 +56,21 @@ pub fn open_mcap(path: &Path, overrides: &Overrides) -> Result<Recording, VioErr
     Ok(Recording { name, camera, imu, samples: found.samples, images, second: None, truth })
 }
 
-/// The images of a topic in the order of the file.
-pub(super) fn read_images(path: PathBuf, topic: String) -> Box<dyn Iterator<Item = CameraFrame> + Send> {
-    let failed = |why: String| CameraFrame { stamp: Stamp::default(), picture: Err(why), second: None };
+/// The images of a topic in the order of the file, with their stamps.
+pub(super) fn read_images(
+    path: PathBuf,
+    topic: String,
+) -> Box<dyn Iterator<Item = (Stamp, Result<GreyImage, String>)> + Send> {
+    let failed = |why: String| (Stamp::default(), Err(why));
     let messages = match messages_of(&path) {
         Ok(messages) => messages,
         Err(error) => return Box::new(std::iter::once(failed(error.to_string()))),
     };
     Box::new(messages.filter_map(move |message| match message {
-        Ok(message) if message.channel.topic == topic => {
-            let decoded = image(&message);
-            Some(match decoded {
-                Some((stamp, picture)) => {
-                    let picture = picture.map_err(|why| format!("image of {stamp} s: {why}"));
-                    CameraFrame { stamp, picture, second: None }
-                }
-                None => failed("a message on the images' topic that is no image".into()),
-            })
-        }
+        Ok(message) if message.channel.topic == topic => Some(match image(&message) {
+            Some((stamp, picture)) => (stamp, picture.map_err(|why| format!("image of {stamp} s: {why}"))),
+            None => failed("a message on the images' topic that is no image".into()),
+        }),
         Ok(_) => None,
         Err(error) => Some(failed(broken(&path, &error).to_string())),
     }))
@@ -207,38 +205,4 @@ impl Found {
         let (width, height) = (message.width as usize, message.height as usize);
         Ok(Camera { width, height, fx: k[0], fy: k[4], cx: k[2], cy: k[5], distortion, body_from_camera })
     }
-}
-
-fn stamp(time: Timestamp) -> Stamp {
-    Stamp::from_nanos(i64::from(time.sec()) * 1_000_000_000 + i64::from(time.nsec()))
-}
-
-fn isometry(t: Option<messages::Vector3>, q: Option<messages::Quaternion>) -> Option<Isometry3<f64>> {
-    let (t, q) = (t?, q?);
-    let rotation = UnitQuaternion::try_new(Quaternion::new(q.w, q.x, q.y, q.z), 0.5)?;
-    Some(Isometry3::from_parts(Translation3::new(t.x, t.y, t.z), rotation))
-}
-
-fn imu(data: &[u8]) -> Option<(Imu, String)> {
-    let mut cdr = Cdr::new(data)?;
-    let (stamp, frame) = cdr.header()?;
-    let _orientation = cdr.f64s::<13>()?;
-    let gyro = Vector3::from(cdr.f64s::<3>()?);
-    let _covariance = cdr.f64s::<9>()?;
-    let accel = Vector3::from(cdr.f64s::<3>()?);
-    Some((Imu { stamp, gyro, accel }, frame.to_string()))
-}
-
-/// Noise, rate and offset of the camera's clock from our own message.
-fn noise(data: &[u8]) -> Option<(ImuNoise, f64, f64)> {
-    let value: serde_json::Value = serde_json::from_slice(data).ok()?;
-    let number = |key: &str| value.get(key)?.as_f64();
-    let noise = ImuNoise {
-        gyro_density: number("gyroscope_noise_density")?,
-        gyro_walk: number("gyroscope_random_walk")?,
-        accel_density: number("accelerometer_noise_density")?,
-        accel_walk: number("accelerometer_random_walk")?,
-    };
-    noise.check().ok()?;
-    Some((noise, number("rate_hz")?, number("timeshift_cam_imu").unwrap_or(0.0)))
 }

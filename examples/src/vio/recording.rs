@@ -1,9 +1,11 @@
+//! A recording: its sensors, their samples, and where its images are.
+
 use std::path::PathBuf;
 
 use vio_ekf::calibration::{CameraCalibration, ImuCalibration};
-use vio_ekf::{Imu, SampleFindings, Stamp, Trajectory, check_samples, nalgebra::Vector3};
+use vio_ekf::{Camera, Imu, SampleFindings, Stamp, Trajectory, check_samples, nalgebra::Vector3};
 
-use super::{GreyImage, SecondCamera, VioError, mcap_in};
+use super::error::VioError;
 
 /// A camera and an inertial sensor, recorded; the body is the inertial sensor.
 #[derive(Debug, Clone)]
@@ -22,6 +24,15 @@ pub struct Recording {
     pub second: Option<SecondCamera>,
     /// What is known of the true motion.
     pub truth: Option<GroundTruth>,
+}
+
+/// A second camera, recorded beside the first.
+#[derive(Debug, Clone)]
+pub struct SecondCamera {
+    /// The camera on the body.
+    pub camera: Camera,
+    /// Its images, by rising stamps.
+    pub(super) images: Vec<(Stamp, PathBuf)>,
 }
 
 /// The true motion of the body, as far as it was recorded.
@@ -49,16 +60,6 @@ pub enum Images {
     },
 }
 
-/// An image that was due.
-pub struct CameraFrame {
-    /// Middle of the exposure by the camera's clock.
-    pub stamp: Stamp,
-    /// The image, or why there is none.
-    pub picture: Result<GreyImage, String>,
-    /// The image that a second camera took together with it, if there is one.
-    pub second: Option<Result<GreyImage, String>>,
-}
-
 impl Images {
     /// How many there should be.
     pub fn count(&self) -> usize {
@@ -75,28 +76,9 @@ impl Images {
             Self::Mcap { stamps, .. } => Some((*stamps.iter().min()?, *stamps.iter().max()?)),
         }
     }
-
-    /// Reads them one after the other, as they are asked for.
-    fn read(&self) -> Box<dyn Iterator<Item = CameraFrame> + Send + '_> {
-        match self {
-            Self::Files(files) => Box::new(files.iter().map(|(stamp, path)| CameraFrame {
-                stamp: *stamp,
-                picture: GreyImage::read(path),
-                second: None,
-            })),
-            Self::Mcap { path, topic, .. } => mcap_in::read_images(path.clone(), topic.clone()),
-        }
-    }
 }
 
 impl Recording {
-    /// Reads the images one after the other, as they are asked for, each with that of the second camera.
-    pub fn camera_frames(&self) -> impl Iterator<Item = CameraFrame> + Send + '_ {
-        self.images
-            .read()
-            .map(|frame| CameraFrame { second: self.second.as_ref().and_then(|s| s.picture(frame.stamp)), ..frame })
-    }
-
     /// Refuses a recording whose inertial samples cannot be, or whose images were taken at another time.
     ///
     /// # Errors

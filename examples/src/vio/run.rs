@@ -9,8 +9,9 @@ use cpu_time::ThreadTime;
 use vio_ekf::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use vio_ekf::{Calibration, Error, ImuNoise, Odometry, Settings, Stamp, Status, Trajectory, Vio};
 
-use super::recording::CameraFrame;
-use super::{Recording, VioError};
+use super::camera_frames::{CameraFrame, camera_frames};
+use super::error::VioError;
+use super::recording::Recording;
 use crate::progress::Stage;
 use status_text::{divergence_text, initialization_text};
 
@@ -85,12 +86,12 @@ pub fn run(recording: &Recording, settings: &RunSettings) -> Result<Run, VioErro
         driver.camera_frame(frame)
     };
     if settings.threads < 2 {
-        recording.camera_frames().try_for_each(&mut each)?;
+        camera_frames(recording).try_for_each(&mut each)?;
     } else {
         std::thread::scope(|scope| {
             let (sender, receiver) = sync_channel(AHEAD);
             // Ends by itself when the receiver is dropped.
-            scope.spawn(move || recording.camera_frames().try_for_each(|frame| sender.send(frame)));
+            scope.spawn(move || camera_frames(recording).try_for_each(|frame| sender.send(frame)));
             receiver.into_iter().try_for_each(&mut each)
         })?;
     }

@@ -1,3 +1,5 @@
+//! The estimators that are compared, behind one interface.
+
 use nalgebra::{Isometry3, Vector3};
 use paintcopter_benches::Rng;
 use paintcopter_benches::flight::{Arrival, Flight, PIXEL_SIGMA, normals};
@@ -7,7 +9,9 @@ use vio_ekf::{
     nalgebra, so3,
 };
 
-use super::{AnyError, Arguments};
+use super::arguments::Arguments;
+
+type AnyError = Box<dyn std::error::Error>;
 
 /// What is fed to which filter.
 #[derive(Clone, Copy, PartialEq)]

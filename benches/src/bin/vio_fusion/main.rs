@@ -1,11 +1,13 @@
 //! One estimator or two: the same flights through a cascade (odometry on one inertial sensor, its poses into a second filter
 //! with the autopilot's) and through one filter that takes everything. Prints a Markdown table.
 
+mod arguments;
 mod estimator;
 
 use std::error::Error;
 use std::process::ExitCode;
 
+use arguments::Arguments;
 use clap::Parser;
 use estimator::{Estimator, Way};
 use nalgebra::{Isometry3, Matrix3, Vector3};
@@ -13,42 +15,6 @@ use paintcopter_benches::flight::{Flight, MapErrors, sway};
 use vio_ekf::{Odometry, nalgebra, so3};
 
 type AnyError = Box<dyn Error>;
-
-/// Compares the cascade of two filters with one filter on the same simulated flights.
-#[derive(Parser)]
-#[command(after_help = "Example: vio_fusion --flights 10 --seconds 60 --coarse 3")]
-struct Arguments {
-    /// Flights, with seeds 1, 2, ...: another motion, another room, other noise
-    #[arg(long, default_value_t = 10)]
-    flights: u64,
-    /// The first of the seeds
-    #[arg(long, default_value_t = 1)]
-    first_seed: u64,
-    /// Seconds of each flight
-    #[arg(long, default_value_t = 60.0)]
-    seconds: f64,
-    /// Seconds after the start that do not count: its errors are drawn, the same for all
-    #[arg(long, default_value_t = 5.0)]
-    settle: f64,
-    /// Noise of the autopilot's inertial sensor, in units of that of the sensor head (ADIS16448)
-    #[arg(long, default_value_t = 3.0)]
-    coarse: f64,
-    /// Delay of the map's poses, s
-    #[arg(long, default_value_t = 0.1)]
-    delay: f64,
-    /// What the cascade assumes of the odometry's poses: white noise, m
-    #[arg(long, default_value_t = 0.01)]
-    odometry_sigma_m: f64,
-    /// White noise, rad
-    #[arg(long, default_value_t = 0.01)]
-    odometry_sigma_rad: f64,
-    /// Drift of the position, m/√s
-    #[arg(long, default_value_t = 0.01)]
-    odometry_walk_m: f64,
-    /// Drift of the yaw, rad/√s
-    #[arg(long, default_value_t = 0.0005)]
-    odometry_walk_rad: f64,
-}
 
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {

@@ -5,7 +5,7 @@ use std::path::Path;
 use paint_net::Image;
 
 use super::gzip;
-use crate::paint_image::PaintImageError;
+use crate::paint_image::error::PaintImageError;
 
 /// Bytes before the pixels: magic number, pictures, rows, columns, big-endian.
 const HEADER: usize = 16;

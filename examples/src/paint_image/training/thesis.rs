@@ -8,8 +8,10 @@ use paint_net::train::{ThesisLoss, ThesisSettings, ThesisTrainer, thesis_patch};
 use paint_net::{Error, Image, metrics};
 use serde::Serialize;
 
+use super::digits;
 use super::rollout::{rollout_picture, stamp};
-use super::{PaintImageError, digits, write_json};
+use crate::paint_image::error::PaintImageError;
+use crate::paint_image::files::write_json;
 use crate::pictures::{Panel, save_curves};
 use crate::progress::Stage;
 

@@ -5,9 +5,9 @@ use foxglove::messages::{CompressedImage, RawImage};
 use mcap::Message;
 use vio_ekf::Stamp;
 
-use super::stamp;
-use crate::vio::GreyImage;
+use super::fields::stamp;
 use crate::vio::cdr::Cdr;
+use crate::vio::grey_image::GreyImage;
 
 /// Time of an image; `None` if the message is none.
 pub(super) fn image_stamp(schema: &str, data: &[u8]) -> Option<Stamp> {

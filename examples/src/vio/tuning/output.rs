@@ -7,11 +7,12 @@ use std::path::Path;
 use vio_ekf::tune::{Trial, with_factors};
 use vio_ekf::{ImuNoise, Settings};
 
-use super::{GROUPS, Tuning, TuningData, TuningReport};
+use super::data::TuningData;
+use super::report::TuningReport;
+use super::settings::{GROUPS, Tuning};
 use crate::pictures::{Panel, save_curves};
 use crate::report::save_figures;
-use crate::vio::VioError;
-use crate::vio::error::write_file;
+use crate::vio::error::{VioError, write_file};
 
 /// Writes `noise.yaml`, `tune.png`, `report.md` and `report.json`.
 pub(super) fn save(

@@ -6,8 +6,7 @@ use std::path::Path;
 
 use vio_ekf::tune::{NoisePoint, Trial};
 
-use crate::vio::VioError;
-use crate::vio::error::read_text;
+use crate::vio::error::{VioError, read_text};
 
 /// Numbers are written so that they read back to the last bit.
 fn line(point: &NoisePoint, cost: f64) -> String {

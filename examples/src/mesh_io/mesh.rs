@@ -1,0 +1,30 @@
+//! A triangle mesh as it stands in a file.
+
+/// A triangle mesh as it stands in a file: nothing welded, nothing repaired. Lengths in the file's unit.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TriangleMesh {
+    /// Vertex positions.
+    pub positions: Vec<[f32; 3]>,
+    /// Vertex indices, three per triangle; polygons are fanned.
+    pub faces: Vec<[u32; 3]>,
+    /// Colours per vertex, sRGB in `[0, 1]`, where the file has them.
+    pub colours: Option<Vec<[f32; 3]>>,
+    /// Texture coordinates with indices of their own, where the file has them.
+    pub uv: Option<MeshUv>,
+}
+
+/// Texture coordinates of an OBJ: indices separate from the vertices'.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct MeshUv {
+    /// Coordinates; v = 1 is the top row of the image.
+    pub coordinates: Vec<[f32; 2]>,
+    /// Indices into `coordinates`, three per triangle.
+    pub faces: Vec<[u32; 3]>,
+}
+
+/// Splits a polygon into a fan of triangles about its first corner.
+pub(super) fn fan<T: Copy>(corners: &[T], mut triangle: impl FnMut([T; 3])) {
+    for k in 1..corners.len().saturating_sub(1) {
+        triangle([corners[0], corners[k], corners[k + 1]]);
+    }
+}

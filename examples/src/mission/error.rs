@@ -1,0 +1,69 @@
+//! Why a mission could not be finished.
+
+use crate::appearance::AppearanceError;
+use crate::design::DesignError;
+use crate::pictures::PictureError;
+use crate::recording::RecordingError;
+use crate::report::ReportError;
+use crate::surface::SurfaceError;
+
+/// Why a mission could not be finished.
+#[derive(Debug, thiserror::Error)]
+pub enum MissionError {
+    /// The mesh is not a surface that can be painted.
+    #[error(transparent)]
+    Surface(#[from] SurfaceError),
+    /// The design does not fit the mesh.
+    #[error(transparent)]
+    Design(#[from] DesignError),
+    /// The painter refused.
+    #[error("painter: {0}")]
+    Painter(#[from] paint_net::Error),
+    /// No plan.
+    #[error("planner: {0}")]
+    Planner(#[from] paint_planner::Error),
+    /// The robot's constants.
+    #[error("kinematics: {0}")]
+    Kinematics(#[from] ptu_kinematics::Error),
+    /// The simulation refused.
+    #[error("simulation: {0}")]
+    Simulation(#[from] paint_sim::Error),
+    /// The paint.
+    #[error("paint: {0}")]
+    Appearance(#[from] AppearanceError),
+    /// The design asks for nothing that can be painted.
+    #[error("the design leaves nothing to paint: {0}")]
+    NothingToPaint(&'static str),
+    /// Most of the wanted paint is out of reach.
+    #[error(
+        "{percent:.0} % of the wanted paint cannot be sprayed by any pose of the robot: turn the mesh (--up), change its \
+         scale (--scale) or choose a design on the parts that face sideways"
+    )]
+    OutOfReach {
+        /// Share out of reach.
+        percent: f64,
+    },
+    /// The map of the painted surface.
+    #[error("scan: {0}")]
+    Scan(#[from] tsdf_hash::Error),
+    /// The trajectories of the flight.
+    #[error("trajectories: {0}")]
+    Trajectory(#[from] vio_ekf::Error),
+    /// A picture.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    /// The recording.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// The report.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    /// A file.
+    #[error("{path}: cannot be written ({source}): check that the folder exists and is writable")]
+    Unwritable {
+        /// The file.
+        path: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}

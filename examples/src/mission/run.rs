@@ -1,0 +1,154 @@
+//! The mission itself: its stages in order, and what they leave.
+
+use std::fmt::Write as _;
+use std::time::Instant;
+
+use nalgebra::Isometry3;
+use paint_net::{Image, Painting};
+use paint_sim::Film;
+use paint_sim::flight::FlightSample;
+use ptu_kinematics::{Joints, Ptu};
+
+use super::decide::decide;
+use super::error::MissionError;
+use super::fly::{LayerFlight, fly, spray};
+use super::plan::plan;
+use super::settings::MissionSettings;
+use crate::adapters::Robot;
+use crate::appearance::{Appearance, UNIT_THICKNESS};
+use crate::design::Design;
+use crate::mesh_io::TriangleMesh;
+use crate::progress::Stage;
+use crate::surface::PaintSurface;
+
+/// A mission is given up when more of the wanted paint than this is out of reach.
+const MOST_OUT_OF_REACH: f64 = 0.9;
+
+/// Everything a mission made; what the report, the pictures and the recording are drawn from.
+pub struct Mission {
+    pub(super) settings: MissionSettings,
+    pub(super) name: String,
+    pub(super) surface: PaintSurface,
+    pub(super) appearance: Appearance,
+    pub(super) robot: Robot,
+    pub(super) wanted: Image,
+    pub(super) coverage: Image,
+    pub(super) layers: Vec<Painting>,
+    pub(super) flights: Vec<LayerFlight>,
+    pub(super) film: Film,
+    /// Pixel of every texel of the film.
+    pub(super) pixels: Vec<usize>,
+    pub(super) planning: f64,
+    /// Paint of layers that no pose of the robot can spray at all, m³.
+    pub(super) abandoned: f64,
+    pub(super) started: Instant,
+}
+
+impl Mission {
+    /// Runs the whole job up to the painted film. `name` is what the report calls the surface.
+    pub fn run(
+        name: &str,
+        mesh: &TriangleMesh,
+        design: &Design,
+        settings: MissionSettings,
+    ) -> Result<Self, MissionError> {
+        let started = Instant::now();
+        let ptu = Ptu::new(settings.ptu)?;
+        let robot = Robot::new(ptu);
+        let appearance = Appearance::charcoal_on_sandstone()?;
+
+        let stage = Stage::start("unwrap");
+        let surface = PaintSurface::new(mesh, settings.texel, &|s| stage.share(s))?;
+        stage.done(&describe(&surface));
+
+        let coverage = surface.coverage();
+        // Nothing is wanted beside the surface, and no more than the paint can show.
+        let mut wanted = design.on_surface(&surface, mesh)?.map(|ink| ink.min(appearance.ink().max_ink()));
+        for (ink, covered) in wanted.data_mut().iter_mut().zip(coverage.data()) {
+            *ink *= covered;
+        }
+        let layers = decide(&surface, &wanted, &coverage, &appearance, &settings)?;
+        let planned = plan(&layers, &surface, &robot, &settings)?;
+        let (planning, abandoned) = (planned.seconds, planned.abandoned);
+        let flights = fly(planned, &surface, &robot, &settings)?;
+        let (film, pixels) = spray(&flights, &surface, &settings)?;
+
+        let mission = Self {
+            settings,
+            name: name.to_string(),
+            surface,
+            appearance,
+            robot,
+            wanted,
+            coverage,
+            layers,
+            flights,
+            film,
+            pixels,
+            planning,
+            abandoned,
+            started,
+        };
+        let share = mission.share_out_of_reach();
+        if share > MOST_OUT_OF_REACH {
+            return Err(MissionError::OutOfReach { percent: 100.0 * share });
+        }
+        Ok(mission)
+    }
+
+    /// Paint depth per pixel as it came out, 0 beside the surface.
+    pub(super) fn painted_depth(&self) -> Image {
+        let mut depth = self.wanted.map(|_| 0.0);
+        for (k, &pixel) in self.pixels.iter().enumerate() {
+            depth.data_mut()[pixel] = self.film.thickness(k) / UNIT_THICKNESS;
+        }
+        depth
+    }
+
+    pub(super) fn painted_ink(&self) -> Image {
+        self.painted_depth().map(|d| self.appearance.ink().forward(d))
+    }
+
+    /// CIEDE2000 between painted and wanted per pixel, `None` beside the surface.
+    pub(super) fn colour_difference(&self) -> Vec<Option<f64>> {
+        let painted = self.painted_depth();
+        let pixel = |k: usize| {
+            let wanted = self.appearance.ink().inverse(self.wanted.data()[k]);
+            paint_sim::ciede2000(self.appearance.lab(painted.data()[k]), self.appearance.lab(wanted))
+        };
+        (0..painted.data().len()).map(|k| (self.coverage.data()[k] > 0.0).then(|| pixel(k))).collect()
+    }
+
+    /// Share of the decided paint that was not planned: no surface below the spray, or no pose of the robot.
+    pub(super) fn share_out_of_reach(&self) -> f64 {
+        let (mut planned, mut wanted) = (0.0, self.abandoned);
+        for f in &self.flights {
+            wanted += f.route.lost + f.route.paint();
+            planned += (0..f.route.targets.len()).map(|k| f.plan.volume(k)).sum::<f64>();
+        }
+        if wanted > 0.0 { (1.0 - planned / wanted).max(0.0) } else { 0.0 }
+    }
+
+    /// The pose of the nozzle at a sample: x along the spray.
+    pub(super) fn nozzle_pose(&self, sample: &FlightSample) -> Isometry3<f64> {
+        let joints = Joints { pan: sample.pan_tilt[0], tilt: sample.pan_tilt[1] };
+        self.robot.ptu.world_from_nozzle(&sample.world_from_body, joints)
+    }
+}
+
+fn describe(surface: &PaintSurface) -> String {
+    let quality = surface.chart.quality();
+    let f = &surface.findings;
+    let mut text = format!(
+        "{} faces, {:.2} m², {} flips, stretch energy {:.4}",
+        surface.disk().faces().len(),
+        surface.disk().area(),
+        quality.flips,
+        quality.symmetric_dirichlet
+    );
+    if f.components > 1 {
+        let rest = f.area_in_other_components_m2;
+        let _ = write!(text, "; the largest of {} parts, {rest:.2} m² in the others stay bare", f.components);
+    }
+    text
+}

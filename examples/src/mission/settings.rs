@@ -1,0 +1,63 @@
+//! What a mission can be told.
+
+use paint_net::Limits;
+use ptu_kinematics::{PtuSettings, ServoSettings};
+
+/// Everything a mission can be told.
+#[derive(Debug, Clone)]
+pub struct MissionSettings {
+    /// Seed of the design, the wind and the localisation errors.
+    pub seed: u64,
+    /// Worker threads.
+    pub threads: usize,
+    /// Size of a texel, metres. Default 1.25 cm (Paper IV, section 4).
+    pub texel: f64,
+    /// Standard deviation of a spray spot at the stand-off, metres. Default 2.5 cm (Paper IV: half the radius of 5 cm).
+    pub spot: f64,
+    /// Which painter decides.
+    pub painter: PainterChoice,
+    /// Where sprays may lie, in texels. Default: 2 along a row, rows 3 apart (ours).
+    pub limits: Limits,
+    /// The planner's settings.
+    pub planner: paint_planner::Settings,
+    /// The robot's kinematics.
+    pub ptu: PtuSettings,
+    /// The servos of its pan-tilt unit.
+    pub servo: ServoSettings,
+}
+
+/// The painters to choose from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PainterChoice {
+    /// The network with feedback from its canvas.
+    Feedback,
+    /// All sprays at once.
+    Deconvolution,
+    /// One spray after the other.
+    Pursuit,
+}
+
+impl Default for MissionSettings {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            threads: std::thread::available_parallelism().map_or(1, usize::from),
+            texel: 0.0125,
+            spot: 0.025,
+            painter: PainterChoice::Feedback,
+            limits: Limits { along: 2, row_spacing: 3, min_volume: 0.01, ..Limits::default() },
+            planner: planner_settings(),
+            ptu: PtuSettings::default(),
+            servo: ServoSettings::default(),
+        }
+    }
+}
+
+/// The planner's defaults with a weaker pull between neighbours: the normals are averaged over a footprint already.
+fn planner_settings() -> paint_planner::Settings {
+    let defaults = paint_planner::Settings::default();
+    paint_planner::Settings {
+        nozzle: paint_planner::NozzleSettings { ca: 0.1, cb: 0.002, ..defaults.nozzle },
+        ..defaults
+    }
+}

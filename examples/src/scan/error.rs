@@ -1,0 +1,86 @@
+//! Why a sequence cannot be read, or gave no map.
+
+use std::path::Path;
+
+/// What is wrong with a recorded sequence.
+#[derive(Debug, thiserror::Error)]
+pub enum SequenceError {
+    /// The folder follows none of the layouts.
+    #[error(
+        "{folder}: no sequence found: expected frame-*.depth.png (7-Scenes), depth.txt (TUM), depth/ with pose.txt \
+         (ICL-NUIM) or depth/ with trajectory.log (Redwood)"
+    )]
+    UnknownLayout {
+        /// The folder.
+        folder: String,
+    },
+    /// A file cannot be read.
+    #[error("{path}: cannot be read ({why})")]
+    Unreadable {
+        /// The file.
+        path: String,
+        /// What the system or the decoder said.
+        why: String,
+    },
+    /// A text file does not say what it should.
+    #[error("{path}, line {line}: {why}")]
+    Malformed {
+        /// The file.
+        path: String,
+        /// Counted from 1; 0 for the file as a whole.
+        line: usize,
+        /// What was expected, and found.
+        why: String,
+    },
+}
+
+impl SequenceError {
+    pub(super) fn malformed(path: &Path, line: usize, why: impl Into<String>) -> Self {
+        Self::Malformed { path: path.display().to_string(), line, why: why.into() }
+    }
+
+    pub(super) fn unreadable(path: &Path, why: &dyn std::fmt::Display) -> Self {
+        Self::Unreadable { path: path.display().to_string(), why: why.to_string() }
+    }
+}
+
+/// Why a run gave no map.
+#[derive(Debug, thiserror::Error)]
+pub enum ScanError {
+    /// The sequence cannot be read.
+    #[error(transparent)]
+    Sequence(#[from] SequenceError),
+    /// The map refused something.
+    #[error(transparent)]
+    Map(#[from] tsdf_hash::Error),
+    /// The stored map cannot be used.
+    #[error("{path}: {source}")]
+    Stored {
+        /// The file.
+        path: String,
+        /// What is wrong with it.
+        source: tsdf_hash::Error,
+    },
+    /// The poses make no trajectory.
+    #[error(transparent)]
+    Trajectory(#[from] vio_ekf::Error),
+    /// A picture cannot be rendered.
+    #[error(transparent)]
+    Render(#[from] paint_sim::Error),
+    /// A picture cannot be saved.
+    #[error(transparent)]
+    Picture(#[from] crate::pictures::PictureError),
+    /// A device was asked for that this program was built without.
+    #[error("--device gpu: this program was built without it: build with --features gpu, or use --device cpu")]
+    NoGpu,
+    /// No frame could be fused.
+    #[error("{folder}: none of the {frames} frames could be fused; the first: {first}")]
+    NothingFused {
+        /// The sequence.
+        folder: String,
+        /// Frames it lists.
+        frames: usize,
+        /// What was wrong with the first of them.
+        first: String,
+    },
+}

@@ -1,0 +1,127 @@
+//! The flight itself: sensors, odometry and map, image by image.
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use paint_sim::TriangleSurface;
+use tsdf_hash::{DepthData, DepthView, Map};
+use vio_ekf::sim::{RoomSettings, Scenario, Simulation};
+use vio_ekf::{ImuNoise, Stamp, Status, Trajectory, Vio};
+
+use super::error::ScanFlightError;
+use super::evaluation::{ScanFlightFigures, figures};
+use super::route::along;
+use super::sensors::{FRAMES_PER_SECOND, SimulatedCamera};
+use crate::mesh_io::TriangleMesh;
+use crate::progress::Stage;
+
+/// Edge of a voxel of the map, metres: below the size of a spray spot.
+const VOXEL: f64 = 0.02;
+/// One image in so many is fused: neighbours see the same.
+const FUSE_EVERY: usize = 4;
+
+/// A scanned surface, and how well it was scanned.
+pub struct ScanFlight {
+    /// The surface as the robot mapped it, in the world's frame.
+    pub mesh: TriangleMesh,
+    /// How far it is from the true one.
+    pub figures: ScanFlightFigures,
+    /// Where the robot was.
+    pub(super) flown: Trajectory,
+    /// Where it took itself to be.
+    pub(super) estimated: Trajectory,
+}
+
+impl ScanFlight {
+    /// Flies along `mesh` (metres, z up), which the robot only sees through its sensors.
+    ///
+    /// The robot starts at rest at a place that is known, as at a charging station: position and heading of the first
+    /// estimate are set to the truth. Everything after that is its own.
+    pub fn fly(mesh: &TriangleMesh, seed: u64, threads: usize) -> Result<Self, ScanFlightError> {
+        let stage = Stage::start("survey");
+        let surface = TriangleSurface::new(&mesh.positions, &mesh.faces)?;
+        let route = along(mesh)?;
+        let sensor = SimulatedCamera::new(mesh, &surface, route.towards, seed, threads);
+        let camera = sensor.camera;
+        let simulation = inertial(route.spline, seed)?;
+        let mut samples = simulation.imu(0)?.samples.into_iter().peekable();
+        let mut map = Map::new(tsdf_hash::Settings { voxel_size: VOXEL, threads, ..tsdf_hash::Settings::default() })?;
+
+        let mut world_from_start = None;
+        let (mut flown, mut estimated) = (Trajectory::default(), Trajectory::default());
+        let (first, last) = simulation.spline().span();
+        let count = (last.secs_since(first) * FRAMES_PER_SECOND) as usize;
+        let mut vio = {
+            // The odometry does not read depth, but need not guess how far away the surface is at first.
+            let before = sensor.capture(0, &(simulation.motion(first)?.world_from_body * camera.body_from_camera))?;
+            let mut settings = vio_ekf::Settings::default();
+            if let Some(distance) = before.distance() {
+                (settings.landmarks.inverse_distance, settings.landmarks.common_sigma) = (1.0 / distance, 0.1);
+            }
+            Vio::new(camera, ImuNoise::default(), settings)?
+        };
+        for k in 1..count {
+            let stamp = Stamp::from_nanos(first.nanos() + (k as f64 * 1e9 / FRAMES_PER_SECOND) as i64);
+            while let Some(sample) = samples.next_if(|sample| sample.stamp <= stamp) {
+                vio.imu(&sample)?;
+            }
+            let truth = simulation.motion(stamp)?.world_from_body;
+            let image = sensor.capture(k, &(truth * camera.body_from_camera))?;
+            let report = vio.image(stamp, &image.grey())?;
+            let (Status::Tracking, Some(odometry)) = (report.status, vio.output()) else { continue };
+            let world_from_start =
+                *world_from_start.get_or_insert_with(|| yaw_alignment(&odometry.world_from_body, &truth));
+            let pose = world_from_start * odometry.world_from_body;
+            flown.push(stamp, truth)?;
+            estimated.push(stamp, pose)?;
+            if k % FUSE_EVERY == 0 {
+                let data = DepthData::F32 { data: &image.depth };
+                let view =
+                    DepthView { width: camera.width, height: camera.height, data, intrinsics: sensor.intrinsics() };
+                match map.integrate(&view, None, &(pose * camera.body_from_camera)) {
+                    // Past the edge of the surface there is nothing to fuse.
+                    Ok(_) | Err(tsdf_hash::Error::NoDepth { .. }) => {}
+                    Err(error) => return Err(error.into()),
+                }
+            }
+            stage.share(k as f64 / count as f64);
+        }
+        if vio.status() != Status::Tracking {
+            return Err(ScanFlightError::Lost(vio.status()));
+        }
+        let mapped = map.mesh();
+        let scanned = TriangleMesh { positions: mapped.positions, faces: mapped.faces, ..TriangleMesh::default() };
+        let figures = figures(&surface, mesh, &scanned, &flown, &estimated)?;
+        stage.done(&figures.summary());
+        Ok(Self { mesh: scanned, figures, flown, estimated })
+    }
+}
+
+/// The inertial sensor along the flight.
+fn inertial(spline: vio_ekf::Spline, seed: u64) -> Result<Simulation, vio_ekf::Error> {
+    // The cameras look at the surface, not at the simulator's own room.
+    let room = RoomSettings { texture_size: 64, furniture: 0, ..RoomSettings::default() };
+    Simulation::new(spline, Scenario { seed, cameras: Vec::new(), room, ..Scenario::default() })
+}
+
+/// The turn about the vertical and the shift that bring `from` to the place and heading of `to`.
+fn yaw_alignment(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Isometry3<f64> {
+    let turn = (to.rotation * from.rotation.inverse()).to_rotation_matrix();
+    let yaw = (turn[(1, 0)] - turn[(0, 1)]).atan2(turn[(0, 0)] + turn[(1, 1)]);
+    let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw);
+    Isometry3::from_parts((to.translation.vector - rotation * from.translation.vector).into(), rotation)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn heading_and_place_are_taken_over_and_the_vertical_is_not() {
+        let from = Isometry3::new(Vector3::new(1.0, 2.0, 3.0), Vector3::new(0.1, 0.0, 0.4));
+        let yaw = Isometry3::new(Vector3::new(-4.0, 0.3, 1.0), Vector3::new(0.0, 0.0, 2.1));
+        assert!((yaw_alignment(&from, &(yaw * from)).to_matrix() - yaw.to_matrix()).norm() < 1e-12);
+        let tilted = Isometry3::new(Vector3::zeros(), Vector3::new(0.2, 0.0, 0.0)) * from;
+        let found = yaw_alignment(&from, &tilted);
+        assert!((found.rotation * Vector3::z() - Vector3::z()).norm() < 1e-12);
+        assert!(((found * from).translation.vector - tilted.translation.vector).norm() < 1e-12);
+    }
+}

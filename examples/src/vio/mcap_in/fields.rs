@@ -1,0 +1,41 @@
+//! Times, poses, inertial samples and noise out of messages.
+
+use foxglove::messages::{self, Timestamp};
+use vio_ekf::nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use vio_ekf::{Imu, ImuNoise, Stamp};
+
+use crate::vio::cdr::Cdr;
+
+pub(super) fn stamp(time: Timestamp) -> Stamp {
+    Stamp::from_nanos(i64::from(time.sec()) * 1_000_000_000 + i64::from(time.nsec()))
+}
+
+pub(super) fn isometry(t: Option<messages::Vector3>, q: Option<messages::Quaternion>) -> Option<Isometry3<f64>> {
+    let (t, q) = (t?, q?);
+    let rotation = UnitQuaternion::try_new(Quaternion::new(q.w, q.x, q.y, q.z), 0.5)?;
+    Some(Isometry3::from_parts(Translation3::new(t.x, t.y, t.z), rotation))
+}
+
+pub(super) fn imu(data: &[u8]) -> Option<(Imu, String)> {
+    let mut cdr = Cdr::new(data)?;
+    let (stamp, frame) = cdr.header()?;
+    let _orientation = cdr.f64s::<13>()?;
+    let gyro = Vector3::from(cdr.f64s::<3>()?);
+    let _covariance = cdr.f64s::<9>()?;
+    let accel = Vector3::from(cdr.f64s::<3>()?);
+    Some((Imu { stamp, gyro, accel }, frame.to_string()))
+}
+
+/// Noise, rate and offset of the camera's clock from our own message.
+pub(super) fn noise(data: &[u8]) -> Option<(ImuNoise, f64, f64)> {
+    let value: serde_json::Value = serde_json::from_slice(data).ok()?;
+    let number = |key: &str| value.get(key)?.as_f64();
+    let noise = ImuNoise {
+        gyro_density: number("gyroscope_noise_density")?,
+        gyro_walk: number("gyroscope_random_walk")?,
+        accel_density: number("accelerometer_noise_density")?,
+        accel_walk: number("accelerometer_random_walk")?,
+    };
+    noise.check().ok()?;
+    Some((noise, number("rate_hz")?, number("timeshift_cam_imu").unwrap_or(0.0)))
+}

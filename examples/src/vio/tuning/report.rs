@@ -1,0 +1,50 @@
+//! The figures of a tuning.
+
+use serde::Serialize;
+
+/// What `report.json` of a tuning holds.
+#[derive(Debug, Clone, Serialize)]
+pub struct TuningReport {
+    /// Version of the program.
+    pub version: &'static str,
+    /// Recordings.
+    pub recordings: usize,
+    /// Points that the search asked for.
+    pub evaluations: usize,
+    /// Points whose cost was computed in this run, random ones left out.
+    pub evaluations_computed: usize,
+    /// Geometric mean of the position errors, each worsened by its dishonesty: at the start of the search.
+    pub weighted_error_start_m: f64,
+    /// The same at its end.
+    pub weighted_error_best_m: f64,
+    /// Geometric mean of the position errors at the start.
+    pub ate_start_m: f64,
+    /// The same at the end.
+    pub ate_best_m: f64,
+    /// Mean normalised squared error of position, attitude and velocity at the start; 3 is honest.
+    pub nees_start: f64,
+    /// The same at the end.
+    pub nees_best: f64,
+    /// Factor on the gyroscope's white noise.
+    pub factor_gyro_white: f64,
+    /// Factor on its walk.
+    pub factor_gyro_walk: f64,
+    /// Factor on the accelerometer's white noise.
+    pub factor_accel_white: f64,
+    /// Factor on its walk.
+    pub factor_accel_walk: f64,
+    /// Factor on the noise in images.
+    pub factor_image: f64,
+    /// Points drawn at random.
+    pub random_samples: usize,
+    /// Weighted error of the best of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weighted_error_random_m: Option<f64>,
+    /// Weighted error of the search over that of the best random point.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ratio_to_random: Option<f64>,
+    /// Wall-clock time of the search.
+    pub search_wall_s: f64,
+    /// Worker threads.
+    pub threads: usize,
+}

@@ -1,0 +1,131 @@
+//! The search for noise settings: which points are tried, and what they cost.
+
+use std::fs::File;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use vio_ekf::tune::{NoisePoint, Score, Trial, cost, tune};
+
+use super::data::TuningData;
+use super::output::save;
+use super::report::TuningReport;
+use super::settings::Tuning;
+use super::trial_log::{append, read_trials, trials_text};
+use crate::progress::Stage;
+use crate::vio::error::{VioError, write_file};
+
+/// Scores of all recordings at one point, some at a time.
+fn scores(data: &TuningData, point: &NoisePoint, threads: usize) -> Result<Vec<Score>, VioError> {
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut done = Vec::new();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            if index >= data.len() {
+                return done;
+            }
+            done.push((index, data.score(index, point)));
+        }
+    };
+    let mut all: Vec<_> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads.clamp(1, data.len())).map(|_| scope.spawn(work)).collect();
+        let join = |worker: std::thread::ScopedJoinHandle<'_, _>| {
+            worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        };
+        workers.into_iter().flat_map(join).collect()
+    });
+    // In the order of the recordings: sums must not depend on who was first.
+    all.sort_unstable_by_key(|(index, _)| *index);
+    all.into_iter().map(|(_, score)| score).collect()
+}
+
+/// Searches, and writes `trials.csv` as it goes, then `noise.yaml`, `tune.png`, `report.md` and `report.json`.
+///
+/// # Errors
+/// [`VioError`] if the recordings cannot be used, or a file cannot be written.
+pub fn tune_noise(data: &TuningData, tuning: &Tuning, folder: &Path) -> Result<TuningReport, VioError> {
+    tuning.search.check()?;
+    let path = folder.join("trials.csv");
+    let known = if tuning.resume && path.is_file() { read_trials(&path)? } else { Vec::new() };
+    write_file(&path, trials_text(&known).as_bytes())?;
+    let mut log = File::options().append(true).open(&path).map_err(|error| VioError::unwritable(&path, &error))?;
+    let mut computed = 0;
+    let mut failed = None;
+    let started = Instant::now();
+
+    let stage = Stage::start("tune");
+    let evaluate = |point: &NoisePoint| {
+        let scores = scores(data, point, tuning.threads)?;
+        Ok::<_, VioError>(cost(&scores, tuning.consistency_weight))
+    };
+    let found = tune(&tuning.start, &tuning.search, &known, |point| {
+        computed += 1;
+        stage.share(computed as f64 / tuning.search.evaluations as f64);
+        let value = if failed.is_none() { evaluate(point) } else { Ok(f64::NAN) };
+        value.and_then(|value| append(&mut log, &path, point, value).map(|()| value)).unwrap_or_else(|error| {
+            failed.get_or_insert(error);
+            f64::NAN
+        })
+    });
+    if let Some(error) = failed {
+        return Err(error);
+    }
+    let found = found?;
+    let search_wall_s = started.elapsed().as_secs_f64();
+    // Complete and in order, reused points included: the next one to resume needs nothing else.
+    write_file(&path, trials_text(&found.trials).as_bytes())?;
+    stage.done(&format!("{} evaluations, {computed} of them computed", found.trials.len()));
+
+    let mut random = Vec::with_capacity(tuning.random);
+    if tuning.random > 0 {
+        let stage = Stage::start("random points");
+        let mut state = tuning.seed;
+        for k in 0..tuning.random {
+            stage.share(k as f64 / tuning.random as f64);
+            let point = tuning.start.map(|power| power + tuning.search.range * (2.0 * uniform(&mut state) - 1.0));
+            random.push(Trial { point, cost: evaluate(&point)? });
+        }
+        stage.done(&format!("{} evaluations", random.len()));
+    }
+
+    let (start, best) =
+        (scores(data, &tuning.start, tuning.threads)?, scores(data, &found.best.point, tuning.threads)?);
+    let geometric =
+        |scores: &[Score]| (scores.iter().map(|s| s.ate.max(1e-9).ln()).sum::<f64>() / scores.len() as f64).exp();
+    let nees = |scores: &[Score]| scores.iter().flat_map(|s| s.nees).sum::<f64>() / (3.0 * scores.len() as f64);
+    let least = random.iter().map(|trial| trial.cost).fold(f64::INFINITY, f64::min);
+    let factor = found.best.point.map(|power| 10_f64.powf(power));
+    let report = TuningReport {
+        version: env!("CARGO_PKG_VERSION"),
+        recordings: data.len(),
+        evaluations: found.trials.len(),
+        evaluations_computed: computed,
+        weighted_error_start_m: found.trials[0].cost.exp(),
+        weighted_error_best_m: found.best.cost.exp(),
+        ate_start_m: geometric(&start),
+        ate_best_m: geometric(&best),
+        nees_start: nees(&start),
+        nees_best: nees(&best),
+        factor_gyro_white: factor[0],
+        factor_gyro_walk: factor[1],
+        factor_accel_white: factor[2],
+        factor_accel_walk: factor[3],
+        factor_image: factor[4],
+        random_samples: random.len(),
+        weighted_error_random_m: (!random.is_empty()).then(|| least.exp()),
+        ratio_to_random: (!random.is_empty()).then(|| (found.best.cost - least).exp()),
+        search_wall_s,
+        threads: tuning.threads,
+    };
+    save(&report, data, tuning, (&found.trials, &random), folder)?;
+    Ok(report)
+}
+
+/// splitmix64, in `[0, 1)`.
+fn uniform(state: &mut u64) -> f64 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let z = (*state ^ (*state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+}
