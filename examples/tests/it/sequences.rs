@@ -1,13 +1,14 @@
 //! Recorded sequences: the layouts say the same in different words, and what is wrong is named.
-#![allow(clippy::unwrap_used)]
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use image::{ImageBuffer, Luma, Rgb};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use paintcopter_examples::scan::{Scan, ScanSettings, open_sequence};
+
+use crate::scratch::Scratch;
 
 const SIZE: (u32, u32) = (96, 72);
 /// Camera of the pictures: width 96 pixels, 70 degrees.
@@ -15,37 +16,14 @@ const CAMERA: [f64; 4] = [68.0, 68.0, 47.5, 35.5];
 /// Where the wall is, metres in the world's z.
 const WALL: f64 = 1.5;
 
-/// A folder of its own for each test, removed at the end.
-struct Scratch(PathBuf);
-
-impl Scratch {
-    fn new(name: &str) -> Self {
-        let folder = std::env::temp_dir().join(format!("paintcopter-scan-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
-        Self(folder)
+/// Depth of the wall from a pose without rotation about x or y, and a red picture.
+fn images(s: &Scratch, depth: &str, colour: &str, metres: f64, scale: f64) {
+    for name in [depth, colour] {
+        std::fs::create_dir_all(s.0.join(name).parent().unwrap()).unwrap();
     }
-
-    fn write(&self, name: &str, text: &str) {
-        let path = self.0.join(name);
-        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-        std::fs::write(path, text).unwrap();
-    }
-
-    /// Depth of the wall from a pose without rotation about x or y, and a red picture.
-    fn images(&self, depth: &str, colour: &str, metres: f64, scale: f64) {
-        for name in [depth, colour] {
-            std::fs::create_dir_all(self.0.join(name).parent().unwrap()).unwrap();
-        }
-        let value = (metres * scale).round() as u16;
-        ImageBuffer::from_pixel(SIZE.0, SIZE.1, Luma([value])).save(self.0.join(depth)).unwrap();
-        ImageBuffer::from_pixel(SIZE.0, SIZE.1, Rgb([200_u8, 20, 20])).save(self.0.join(colour)).unwrap();
-    }
-}
-
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
+    let value = (metres * scale).round() as u16;
+    ImageBuffer::from_pixel(SIZE.0, SIZE.1, Luma([value])).save(s.0.join(depth)).unwrap();
+    ImageBuffer::from_pixel(SIZE.0, SIZE.1, Rgb([200_u8, 20, 20])).save(s.0.join(colour)).unwrap();
 }
 
 /// Three poses before the wall: aside, nearer, and rolled.
@@ -73,7 +51,7 @@ fn seven_scenes(s: &Scratch) {
     s.write("camera-intrinsics.txt", &format!("{fx} 0 {cx}\n0 {fy} {cy}\n0 0 1\n"));
     for (k, pose) in poses().iter().enumerate() {
         let name = |ending: &str| format!("frame-{k:06}.{ending}");
-        s.images(&name("depth.png"), &name("color.png"), WALL - pose.translation.z, 1000.0);
+        images(s, &name("depth.png"), &name("color.png"), WALL - pose.translation.z, 1000.0);
         s.write(&name("pose.txt"), &matrix(pose));
     }
 }
@@ -84,7 +62,7 @@ fn tum(s: &Scratch) {
     let (mut depth, mut colour, mut truth) = (String::from("# list\n"), String::new(), String::new());
     for (k, pose) in poses().iter().enumerate() {
         let (d, c) = (format!("depth/{k}.png"), format!("rgb/{k}.png"));
-        s.images(&d, &c, WALL - pose.translation.z, 1000.0);
+        images(s, &d, &c, WALL - pose.translation.z, 1000.0);
         let stamp = 100.0 + 0.1 * k as f64;
         writeln!(depth, "{stamp} {d}").unwrap();
         // The colour camera is a little late.
@@ -101,7 +79,7 @@ fn redwood(s: &Scratch) {
     s.write("camera_primesense.json", &format!("{{\"intrinsic_matrix\":[{fx},0,0,0,{fy},0,{cx},{cy},1]}}"));
     let mut log = String::new();
     for (k, pose) in poses().iter().enumerate() {
-        s.images(&format!("depth/{k:05}.png"), &format!("color/{k:05}.png"), WALL - pose.translation.z, 1000.0);
+        images(s, &format!("depth/{k:05}.png"), &format!("color/{k:05}.png"), WALL - pose.translation.z, 1000.0);
         write!(log, "{k} {k} {}\n{}", k + 1, matrix(pose)).unwrap();
     }
     s.write("trajectory.log", &log);
@@ -148,7 +126,7 @@ fn icl_has_its_y_upwards() {
     let mut lines = String::new();
     for k in 1..=2 {
         // Only the upper half of the picture has depth.
-        s.images(&format!("depth/{k}.png"), &format!("color/{k}.png"), WALL, 5000.0);
+        images(&s, &format!("depth/{k}.png"), &format!("color/{k}.png"), WALL, 5000.0);
         let path = s.0.join(format!("depth/{k}.png"));
         let mut depth = image::open(&path).unwrap().into_luma16();
         depth.enumerate_pixels_mut().filter(|(_, y, _)| *y >= SIZE.1 / 2).for_each(|(_, _, p)| p.0 = [0]);

@@ -1,5 +1,4 @@
 //! Reading meshes: the same surface in every format, and the broken ones of public collections without a panic.
-#![allow(clippy::unwrap_used)]
 
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,4 @@
 //! The odometry as people run it: folders and MCAP files in, trajectories and figures out, and what is wrong is named.
-#![allow(clippy::unwrap_used)]
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -12,22 +11,7 @@ use paintcopter_examples::vio::{
 use vio_ekf::Camera;
 use vio_ekf::sim::{CameraModel, RoomSettings, Scenario};
 
-/// A folder of its own for each test, removed at the end.
-struct Scratch(PathBuf);
-
-impl Scratch {
-    fn new(name: &str) -> Self {
-        let folder = std::env::temp_dir().join(format!("paintcopter-vio-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
-        Self(folder)
-    }
-}
-
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
+use crate::scratch::Scratch;
 
 /// A flight seen by a small camera, so that the tests stay short.
 fn flight(seconds: f64, raw: bool) -> SimulationSettings {
@@ -379,15 +363,15 @@ fn real_images_at_rest_do_not_drift() {
     let worst = evaluation.errors.iter().map(|e| e.position.norm()).fold(0.0, f64::max);
     eprintln!(
         "started after {:.2} s; drift at most {:.2} cm; NEES of position {:.2}, attitude {:.2}, velocity {:?}",
-        run.initialised_after_s,
+        run.initialization_time_s,
         100.0 * worst,
         evaluation.nees_position,
         evaluation.nees_attitude,
         evaluation.nees_velocity
     );
-    assert!(run.initialised_after_s < 2.5, "{}", run.initialised_after_s);
+    assert!(run.initialization_time_s < 2.5, "{}", run.initialization_time_s);
     assert!(worst < 0.02, "{worst} m");
-    // Honest: 99.9 % of chi-square with 3 degrees of freedom is 16.3, and a mean cannot exceed that.
+    // Consistent: 99.9 % of chi-square with 3 degrees of freedom is 16.3, and a mean cannot exceed that.
     for nees in [evaluation.nees_position, evaluation.nees_attitude, evaluation.nees_velocity.unwrap_or(0.0)] {
         assert!(nees < 16.3, "{nees}");
     }

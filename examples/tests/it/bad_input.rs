@@ -1,34 +1,12 @@
 //! The binary on input that cannot be painted: one clear line, an exit code, no panic.
-#![allow(clippy::unwrap_used)]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
+
+use crate::scratch::Scratch;
 
 fn paintcopter(arguments: &[&str], folder: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_paintcopter")).args(arguments).arg("--out").arg(folder).output().unwrap()
-}
-
-/// A folder of its own for each test, removed at the end.
-struct Scratch(PathBuf);
-
-impl Scratch {
-    fn new(name: &str) -> Self {
-        let folder = std::env::temp_dir().join(format!("paintcopter-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
-        Self(folder)
-    }
-
-    fn file(&self, name: &str, text: &str) -> String {
-        let path = self.0.join(name);
-        std::fs::write(&path, text).unwrap();
-        path.to_str().unwrap().to_string()
-    }
-}
-
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
 }
 
 /// Runs on a mesh and expects one line that holds all the words.
@@ -50,7 +28,8 @@ const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 fn meshes_that_are_no_surface_are_refused() {
     let s = Scratch::new("meshes");
     let mesh = |name: &str, text: &str, words: &[&str]| {
-        let file = s.file(name, text);
+        s.write(name, text);
+        let file = s.path(name);
         refused(&s, &["--mesh", &file], &[&[name], words].concat());
     };
     refused(&s, &["--mesh", "no/such/file.obj"], &["no/such/file.obj", "cannot be read"]);
@@ -71,14 +50,18 @@ fn meshes_that_are_no_surface_are_refused() {
 #[test]
 fn options_that_make_no_sense_are_refused() {
     let s = Scratch::new("options");
-    let square = s.file("square.obj", &format!("{SQUARE}f 1 2 3\nf 1 3 4\n"));
+    let file = |name: &str, text: &str| {
+        s.write(name, text);
+        s.path(name)
+    };
+    let square = file("square.obj", &format!("{SQUARE}f 1 2 3\nf 1 3 4\n"));
     refused(&s, &["--mesh", &square, "--scale", "-1"], &["--scale -1", "positive"]);
     refused(&s, &["--mesh", &square, "--design", "zebra"], &["zebra", "stripes"]);
     refused(&s, &["--mesh", &square, "--design", "colours"], &["vertex colours"]);
     refused(&s, &["--mesh", &square, "--texture", "none.png"], &["texture coordinates"]);
-    let textured = s.file("textured.obj", &format!("{SQUARE}vt 0 0\nf 1/1 2/1 3/1\nf 1/1 3/1 4/1\n"));
+    let textured = file("textured.obj", &format!("{SQUARE}vt 0 0\nf 1/1 2/1 3/1\nf 1/1 3/1 4/1\n"));
     refused(&s, &["--mesh", &textured, "--texture", "none.png"], &["none.png"]);
-    let not_a_picture = s.file("design.png", "this is text");
+    let not_a_picture = file("design.png", "this is text");
     refused(&s, &["--mesh", &square, "--design", &not_a_picture], &["design.png", "picture"]);
 }
 
@@ -87,15 +70,16 @@ fn a_surface_that_no_gun_reaches_is_refused() {
     // A sheet folded flat: one half looks up, the other down.
     let s = Scratch::new("flat");
     let text = "OFF\n6 4 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 -0.05\n0 1 -0.05\n3 0 1 2\n3 0 2 3\n3 1 4 5\n3 1 5 2\n";
-    let sheet = s.file("sheet.off", text);
+    s.write("sheet.off", text);
+    let sheet = s.path("sheet.off");
     refused(&s, &["--mesh", &sheet], &["sheet.off", "cannot be sprayed"]);
 }
 
 #[test]
 fn an_output_folder_that_cannot_be_made_is_named() {
     let s = Scratch::new("folder");
-    let file = s.file("taken", "a file where a folder should be");
-    let output = paintcopter(&[], &Path::new(&file).join("out"));
+    s.write("taken", "a file where a folder should be");
+    let output = paintcopter(&[], &s.0.join("taken/out"));
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1));
     assert!(text.contains("taken") && text.contains("--out"), "{text}");

@@ -1,31 +1,11 @@
 //! The binary `paint-image`: files out, bad files in, training in sittings.
-#![allow(clippy::unwrap_used)]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 
 use paint_net::thesis::{Architecture, Network};
 
-/// A folder of its own for each test, removed at the end.
-struct Scratch(PathBuf);
-
-impl Scratch {
-    fn new(name: &str) -> Self {
-        let folder = std::env::temp_dir().join(format!("paint-image-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
-        Self(folder)
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.join(name).to_str().unwrap().to_string()
-    }
-}
-
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
+use crate::scratch::Scratch;
 
 fn run(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_paint-image")).args(arguments).output().unwrap()
@@ -310,9 +290,9 @@ fn every_picture_of_a_folder_is_painted_and_filmed() {
             let file = |name_of: &str| image::open(format!("{out}/{name}/{name_of}")).unwrap().to_rgb8();
             assert!(Path::new(&format!("{out}/{name}/report.json")).exists());
             // What is wanted and eight moments, in tiles of 256 pixels, 12 apart, below a caption of 26.
-            let (film, rendered) = (file("film.png"), file("rendered.png"));
-            assert_eq!(film.dimensions(), (12 + 9 * 268, 12 + 294));
-            let tile = |k: u32| image::imageops::crop_imm(&film, 12 + k * 268, 38, 256, 256).to_image();
+            let (strip, rendered) = (file("progress.png"), file("rendered.png"));
+            assert_eq!(strip.dimensions(), (12 + 9 * 268, 12 + 294));
+            let tile = |k: u32| image::imageops::crop_imm(&strip, 12 + k * 268, 38, 256, 256).to_image();
             let difference = |k: u32| {
                 let tile = tile(k);
                 let pairs = tile.enumerate_pixels().map(|(x, y, p)| (p, rendered.get_pixel(x / 4, y / 4)));

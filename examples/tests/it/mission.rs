@@ -1,5 +1,4 @@
 //! The whole job on a panel of one square metre: what it leaves behind, and that it is the same for any number of threads.
-#![allow(clippy::unwrap_used)]
 
 use std::path::{Path, PathBuf};
 
