@@ -146,7 +146,7 @@ fn noisy(
 ) -> Result<Value, paint_net::Error> {
     let (task, limits, ink) = (Task::on_bare_wall(wanted), Limits::default(), Saturation::Tanh);
     let mut wall = wanted.map(|_| 0.0);
-    let mut rng = Rng(0);
+    let mut rng = Rng::new(0);
     let mut spray = |sprays: &[Spray]| {
         for s in sprays {
             deposit(&mut wall, s, gain, kernel, &mut rng);
