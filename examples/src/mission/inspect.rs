@@ -1,7 +1,7 @@
 //! After the paint: the wall mapped with a depth camera, and the flight as trajectories.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use paint_sim::{Camera, Frame, Hit, Lights, Look, Surface, render};
+use paint_sim::{Camera, Frame, Hit, Lights, Shading, Surface, render};
 use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics, Map, Mesh};
 use vio_ekf::{Alignment, Stamp, Trajectory};
 
@@ -54,7 +54,7 @@ fn scan(mission: &Mission) -> Result<Mesh, MissionError> {
     let painted = mission.painted_depth();
     // Even light from everywhere: the colours of the map are the surface's own.
     let lights = Lights { sun: [0.0; 3], ambient: [1.0; 3], ..Lights::default() };
-    let shade = |hit: &Hit| -> Look { shading(mission, &painted, hit) };
+    let shade = |hit: &Hit| -> Shading { shading(mission, &painted, hit) };
     let threads = mission.settings.threads;
     let settings = tsdf_hash::Settings { voxel_size: VOXEL, threads, ..tsdf_hash::Settings::default() };
     let mut map = Map::new(settings)?;

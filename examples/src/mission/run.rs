@@ -132,13 +132,13 @@ impl Mission {
     /// The pose of the nozzle at a sample: x along the spray.
     pub(super) fn nozzle_pose(&self, sample: &FlightSample) -> Isometry3<f64> {
         let joints = Joints { pan: sample.pan_tilt[0], tilt: sample.pan_tilt[1] };
-        self.robot.ptu.world_from_nozzle(&sample.world_from_body, joints)
+        self.robot.chain.world_from_nozzle(&sample.world_from_body, joints)
     }
 }
 
 fn describe(surface: &PaintSurface) -> String {
     let quality = surface.chart.quality();
-    let f = &surface.findings;
+    let f = &surface.repair_report;
     let mut text = format!(
         "{} faces, {:.2} m², {} flips, stretch energy {:.4}",
         surface.disk().faces().len(),

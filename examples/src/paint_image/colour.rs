@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use clap::ValueEnum;
-use paint_net::{ColourPainting, ColourTask, Coloured, Error, Image, Paint, Palette, Picture, Spray, metrics};
+use paint_net::{
+    ColourImage, ColourPainting, ColourProblem, ColourSeparation, Error, Image, Paint, Palette, Spray, metrics,
+};
 use paint_sim::colour::lab;
 use serde::Serialize;
 
@@ -81,7 +83,7 @@ pub struct ColourFigures {
 }
 
 /// Reads a picture of any size and depth; transparency shows the white wall.
-pub fn read_picture(path: &Path) -> Result<Picture, PaintImageError> {
+pub fn read_picture(path: &Path) -> Result<ColourImage, PaintImageError> {
     let unreadable = |why: String| PaintImageError::Unreadable { path: path.display().to_string(), why };
     let picture = image::open(path).map_err(|e| unreadable(format!("cannot be read as a picture ({e})")))?.to_rgba32f();
     let over_white = |p: &image::Rgba<f32>| {
@@ -89,11 +91,11 @@ pub fn read_picture(path: &Path) -> Result<Picture, PaintImageError> {
         [r, g, b].map(|v| (a * v + 1.0 - a).clamp(0.0, 1.0))
     };
     let (width, height) = (picture.width() as usize, picture.height() as usize);
-    Picture::new(width, height, picture.pixels().map(over_white).collect()).map_err(|e| unreadable(e.to_string()))
+    ColourImage::new(width, height, picture.pixels().map(over_white).collect()).map_err(|e| unreadable(e.to_string()))
 }
 
 /// Peak signal-to-noise ratio, and mean and 95th percentile of CIEDE2000; both pictures in sRGB as stored.
-pub fn compare_colours(painted: &Picture, wanted: &Picture) -> (f64, f64, f64) {
+pub fn compare_colours(painted: &ColourImage, wanted: &ColourImage) -> (f64, f64, f64) {
     let pairs = painted.data().iter().zip(wanted.data());
     let squared: f64 = pairs.flat_map(|(a, b)| a.iter().zip(b)).map(|(a, b)| (a - b).powi(2)).sum();
     let mut differences = differences(painted, wanted);
@@ -107,17 +109,17 @@ fn byte(stored: f64) -> u8 {
     (255.0 * stored.clamp(0.0, 1.0)).round() as u8
 }
 
-fn rgb(picture: &Picture) -> Rgb {
+fn rgb(picture: &ColourImage) -> Rgb {
     Rgb::from_pixels(picture.width(), picture.height(), picture.data().iter().map(|c| c.map(byte)))
 }
 
 /// CIEDE2000 of every pixel.
-fn differences(painted: &Picture, wanted: &Picture) -> Vec<f64> {
+fn differences(painted: &ColourImage, wanted: &ColourImage) -> Vec<f64> {
     let pairs = painted.data().iter().zip(wanted.data());
     pairs.map(|(a, b)| paint_sim::ciede2000(lab_of(*a), lab_of(*b))).collect()
 }
 
-fn ink(picture: &Picture) -> Result<Image, Error> {
+fn ink(picture: &ColourImage) -> Result<Image, Error> {
     Image::new(picture.width(), picture.height(), picture.data().iter().map(|c| ink_of(*c)).collect())
 }
 
@@ -135,16 +137,16 @@ fn lab_of(stored: [f64; 3]) -> [f64; 3] {
 /// Decides the sprays of every paint for a wanted picture.
 pub fn paint_colours(
     job: &Job,
-    wanted: &Picture,
+    wanted: &ColourImage,
     palette: &Palette,
     progress: &mut dyn FnMut(f64),
 ) -> Result<(ColourPainting, ColourFigures), PaintImageError> {
     let timer = CpuTimer::start(1);
-    let task = ColourTask::new(wanted);
-    let painting = Coloured::default().paint(&task, palette, &job.kernel, &job.limits, progress)?;
+    let problem = ColourProblem::new(wanted, palette).with_kernel(&job.kernel).with_limits(&job.limits);
+    let painting = ColourSeparation::default().paint_observed(&problem, &mut |share| progress(share))?;
     let cpu_ms = timer.milliseconds();
-    let (psnr_db, ciede2000_mean, ciede2000_p95) = compare_colours(&painting.picture, wanted);
-    let (painted_ink, wanted_ink) = (ink(&painting.picture)?, ink(wanted)?);
+    let (psnr_db, ciede2000_mean, ciede2000_p95) = compare_colours(&painting.image, wanted);
+    let (painted_ink, wanted_ink) = (ink(&painting.image)?, ink(wanted)?);
     let figures = ColourFigures {
         painter: "coloured",
         width: wanted.width(),
@@ -173,7 +175,7 @@ pub fn paint_colours(
 pub fn save_colours(
     job: &Job,
     folder: &Path,
-    wanted: &Picture,
+    wanted: &ColourImage,
     palette: &Palette,
     painting: &ColourPainting,
     figures: &ColourFigures,
@@ -183,15 +185,15 @@ pub fn save_colours(
     let sprays: Vec<_> = painting.sprays.iter().enumerate().flat_map(of_paint).collect();
     let model = serde_json::json!({
         "colour": "Kubelka-Munk film of the depths sum of volume * exp(-d^2 / (2 sigma_px^2)) over the wall",
-        "wall": palette.wall(), "cut_sigma": job.kernel.cut(),
+        "wall": palette.substrate(), "cut_sigma": job.kernel.cut(),
         "absorption": palette.paints().iter().map(|p| p.absorption).collect::<Vec<_>>(),
         "scattering": palette.paints().iter().map(|p| p.scattering).collect::<Vec<_>>(),
     });
     let names: Vec<_> = palette.paints().iter().map(|p| p.name.as_str()).collect();
     commands::save(folder, (figures.width, figures.height), &model, &names, &sprays)?;
     write_json(&folder.join("report.json"), figures)?;
-    rgb(&painting.picture).save(&folder.join("rendered.png"))?;
-    let map: Vec<_> = differences(&painting.picture, wanted).into_iter().map(Some).collect();
+    rgb(&painting.image).save(&folder.join("rendered.png"))?;
+    let map: Vec<_> = differences(&painting.image, wanted).into_iter().map(Some).collect();
     save_error_map(&folder.join("error.png"), figures.width, &map, (1.0, "px"))?;
     let paints: Vec<&[Spray]> = painting.sprays.iter().map(Vec::as_slice).collect();
     let show = |depths: &[f64]| palette.colour(depths).map(byte);

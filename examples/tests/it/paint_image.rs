@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use paint_net::thesis::{Network, Shape};
+use paint_net::thesis::{Architecture, Network};
 
 use crate::scratch::Scratch;
 
@@ -45,7 +45,7 @@ fn a_picture_becomes_commands_pictures_and_figures() {
         image::LumaA([grey, if x < 20 { u16::MAX } else { 0 }])
     });
     picture.save(scratch.path("in.png")).unwrap();
-    for painter in ["feedback", "coats", "deconvolution", "pursuit", "splats"] {
+    for painter in ["feedback", "closed-loop", "deconvolution", "pursuit", "free-sprays"] {
         let out = scratch.path(painter);
         let output = run(&["--image", &scratch.path("in.png"), "--painter", painter, "--out", &out]);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -243,9 +243,10 @@ fn the_network_of_a_file_paints_is_compared_and_paints_in_layers() {
     let scratch = Scratch::new("thesis");
     let picture = scratch.path("in.png");
     image::GrayImage::from_fn(40, 24, |x, _| image::Luma([30 + 5 * x as u8])).save(&picture).unwrap();
-    let shape = Shape { side: 16, steps: 12, latent: 4, hidden: 10, read: 3, radius: 4.0, stop: 9.0, paint: 6 };
+    let architecture =
+        Architecture { side: 16, steps: 12, latent: 4, hidden: 10, read: 3, radius: 4.0, stop: 9.0, paint: 6 };
     let (weights, out) = (scratch.path("thesis.safetensors"), scratch.path("out"));
-    std::fs::write(&weights, Network::random(shape, 1).unwrap().to_safetensors(&[])).unwrap();
+    std::fs::write(&weights, Network::random(architecture, 1).unwrap().to_safetensors(&[])).unwrap();
     let sprays = |more: &[&str]| {
         let job = ["--image", &picture, "--painter", "thesis", "--weights", &weights, "--out", &out];
         let output = run(&[&job, more].concat());
@@ -260,7 +261,10 @@ fn the_network_of_a_file_paints_is_compared_and_paints_in_layers() {
     assert!(run(&["compare", &picture, "--runs", "1", "--weights", &weights, "--out", &out]).status.success());
     let table = std::fs::read_to_string(format!("{out}/compare.md")).unwrap();
     let rows: Vec<&str> = table.lines().skip(2).filter_map(|l| l.split('|').nth(1)).map(str::trim).collect();
-    assert_eq!(rows, ["feedback", "coats", "deconvolution", "pursuit", "splats", "thesis", "thesis, layers"]);
+    assert_eq!(
+        rows,
+        ["feedback", "closed-loop", "deconvolution", "pursuit", "free-sprays", "thesis", "thesis, layers"]
+    );
     for (row, (name, sprays)) in table.lines().skip(7).zip([alone, layered]) {
         let cells: Vec<&str> = row.split('|').map(str::trim).collect();
         assert_eq!((cells[1], cells[5]), (name.as_str(), sprays.to_string().as_str()));
@@ -278,7 +282,7 @@ fn every_picture_of_a_folder_is_painted_and_filmed() {
             .unwrap();
     }
     std::fs::write(format!("{folder}/notes.txt"), "no picture").unwrap();
-    for more in [&["--painter", "coats"][..], &["--palette", "cmy"]] {
+    for more in [&["--painter", "closed-loop"][..], &["--palette", "cmy"]] {
         let out = scratch.path("out");
         let output = run(&[&["--image", &folder, "--out", &out], more].concat());
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -330,7 +334,7 @@ fn what_cannot_be_painted_is_named() {
         (vec!["--image", &good, "--sigma", "nan"], "sigma"),
         (vec!["--image", &good, "--along", "0"], "along"),
         (vec!["--image", &good, "--passes", "0"], "passes"),
-        (vec!["--image", &good, "--largest-change", "0"], "largest_change"),
+        (vec!["--image", &good, "--largest-change", "0"], "slew_limit"),
         (vec!["train", "--resume", &not], "not.png"),
     ] {
         assert_refused(&[&arguments[..], &["--out", &out]].concat(), &[word]);
@@ -389,7 +393,7 @@ fn absurd_settings_are_named() {
         ("--min-volume", "1e9", "`min_volume`"),
     ] {
         let setting = format!("{setting}={value}");
-        for more in [&["--painter", "feedback"][..], &["--painter", "splats"], &["--palette", "cmy"]] {
+        for more in [&["--painter", "feedback"][..], &["--painter", "free-sprays"], &["--palette", "cmy"]] {
             assert_refused(&[&["--image", &image, &setting, "--out", &out], more].concat(), &[word]);
         }
     }
@@ -399,7 +403,7 @@ fn absurd_settings_are_named() {
     for setting in [
         "--layers",
         "--largest-change=0.1",
-        "--painter=coats",
+        "--painter=closed-loop",
         "--passes=3",
         "--threads=2",
         "--route=rows",
