@@ -243,7 +243,7 @@ fn sim(count: usize, runs: usize) -> Result<(), AnyError> {
     let mut wide = vec![[0.0; BANDS]; count];
     print("km_f64_x36", median_seconds(runs, || films.wide(black_box(&mut wide))));
 
-    let mut rng = Rng(4);
+    let mut rng = Rng::new(4);
     let mut lab = || [rng.between(0.0, 100.0), rng.between(-80.0, 80.0), rng.between(-80.0, 80.0)];
     let pairs: Vec<[[f64; 3]; 2]> = (0..count).map(|_| [lab(), lab()]).collect();
     let difference = || pairs.iter().map(|[one, other]| ciede2000(*one, *other)).sum::<f64>();

@@ -222,7 +222,7 @@ fn start(simulation: &Simulation, stamp: Stamp, imu: &ImuModel, seed: u64) -> Re
     let motion = simulation.motion(stamp)?;
     let (gyro_bias, accel_bias) = (imu.gyro_bias_sigma, imu.accel_bias_sigma);
     let sigma = StartSigma { gyro_bias, accel_bias, ..StartSigma::default() };
-    let mut rng = Rng(seed);
+    let mut rng = Rng::new(seed);
     let mut normals = || Vector3::from_fn(|_, _| (0..12).map(|_| rng.unit()).sum::<f64>() - 6.0);
     let pose = motion.world_from_body;
     let tilt = normals().component_mul(&Vector3::new(sigma.tilt, sigma.tilt, 0.0));

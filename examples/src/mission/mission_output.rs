@@ -6,13 +6,14 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use paint_planner::normal_deviation;
 use paint_sim::flight::FlightSample;
 use paint_sim::{Camera, Frame, Hit, Lights, render};
+use tsdf_hash::Mesh;
 
 use super::error::MissionError;
 use super::figures::report;
 use super::inspect::inspect;
 use super::run::Mission;
 use super::shading::shading;
-use crate::mesh_io::write_ply;
+use crate::mesh_io::{PlyMesh, write_ply};
 use crate::pictures::{Panel, Polyline, Rgb, Scene, save_curves, save_error_map, save_scene};
 use crate::progress::Stage;
 use crate::recording::{ColouredMesh, RobotState, save_recording};
@@ -36,8 +37,9 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
     stage.share(0.2);
     let colours = vertex_colours(mission);
     let positions: Vec<[f32; 3]> = mission.surface.disk().positions().iter().map(|p| p.map(|c| c as f32)).collect();
+    let faces = mission.surface.disk().faces();
     let ply = folder.join("surface.ply");
-    write_ply(&ply, &positions, mission.surface.disk().faces(), &colours)
+    write_ply(&ply, &PlyMesh { positions: &positions, normals: None, colours: &colours, faces })
         .map_err(|source| MissionError::Unwritable { path: ply.display().to_string(), source })?;
     stage.share(0.4);
     save_views(mission, folder)?;
@@ -53,9 +55,10 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
     let stage = Stage::start("scan");
     let found = inspect(mission)?;
     let unwritable = |path: &Path, source| MissionError::Unwritable { path: path.display().to_string(), source };
+    let Mesh { positions, faces, colours, .. } = &found.mesh;
+    let found_mesh = PlyMesh { positions, normals: None, colours, faces };
     let ply = folder.join("scan.ply");
-    write_ply(&ply, &found.mesh.positions, &found.mesh.faces, &found.mesh.colours)
-        .map_err(|source| unwritable(&ply, source))?;
+    write_ply(&ply, &found_mesh).map_err(|source| unwritable(&ply, source))?;
     for (name, trajectory) in [("flight_true.tum", &found.flown), ("flight_slam.tum", &found.estimated)] {
         let path = folder.join(name);
         std::fs::write(&path, vio_ekf::tum::write(trajectory)).map_err(|source| unwritable(&path, source))?;

@@ -7,7 +7,7 @@ use paint_sim::{Camera, Hit, Lights, Shading, TriangleSurface, render};
 use vio_ekf::Trajectory;
 
 use super::fly::ScanFlight;
-use crate::mesh_io::write_ply;
+use crate::mesh_io::{PlyMesh, write_ply};
 use crate::mission::MissionError;
 use crate::pictures::{Polyline, Rgb, Scene, save_scene};
 
@@ -24,8 +24,9 @@ pub fn save(scan: &ScanFlight, folder: &Path) -> Result<(), MissionError> {
     write("scan_flight_true.tum", vio_ekf::tum::write(&scan.flown))?;
     write("scan_flight_estimated.tum", vio_ekf::tum::write(&scan.estimated))?;
     let ply = folder.join("scan_flight.ply");
-    let grey = vec![[180; 3]; scan.mesh.positions.len()];
-    write_ply(&ply, &scan.mesh.positions, &scan.mesh.faces, &grey)
+    let (positions, faces) = (&scan.mesh.positions, &scan.mesh.faces);
+    let grey = vec![[180; 3]; positions.len()];
+    write_ply(&ply, &PlyMesh { positions, normals: None, colours: &grey, faces })
         .map_err(|source| MissionError::Unwritable { path: ply.display().to_string(), source })?;
     save_picture(scan, &folder.join("scan_flight.png"))?;
     let figures = serde_json::to_string_pretty(&scan.figures).map_err(crate::report::ReportError::from)?;

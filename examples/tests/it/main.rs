@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod bad_input;
+mod five_joint_arm;
 mod independence;
 mod meshes;
 mod mission;

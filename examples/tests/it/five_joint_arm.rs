@@ -1,5 +1,4 @@
 //! The planner with another arm: strokes planned and checked with five joints instead of the pan-tilt unit.
-#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
 
 use nalgebra::{Point3, Vector3};
 use paint_planner::{Settings, Target, Tool, plan};
