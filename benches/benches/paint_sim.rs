@@ -9,7 +9,7 @@ use nalgebra::{Point3, Vector3};
 use paint_planner::{OptimalPlanner, Planner};
 use paint_sim::colour::{BANDS, Spectrum, spectrum_srgb8};
 use paint_sim::{
-    Camera, Film, FlightSettings, Hit, Lights, Look, Reference, ReferenceState, Shot, SprayModel, ciede2000, fly,
+    Camera, Film, FlightSettings, Hit, Lights, Reference, ReferenceState, Shading, Shot, SprayModel, ciede2000, fly,
     render,
 };
 use paintcopter_benches::films::Films;
@@ -61,7 +61,7 @@ fn films(group: &mut Group) -> Result<(), AnyError> {
 }
 
 fn colours(group: &mut Group) {
-    let mut rng = Rng(4);
+    let mut rng = Rng::new(4);
     let mut lab = || [rng.between(0.0, 100.0), rng.between(-80.0, 80.0), rng.between(-80.0, 80.0)];
     let pairs: Vec<[[f64; 3]; 2]> = (0..FEWER).map(|_| [lab(), lab()]).collect();
     group.throughput(Throughput::Elements(FEWER as u64));
@@ -107,8 +107,8 @@ fn flight(group: &mut Group, surface: &PaintSurface) -> Result<(), AnyError> {
     let targets = rock::stroke(surface, 300);
     let plan = OptimalPlanner::default().plan(&targets, &MeshSurface(&surface.world), &robot, &settings.planner)?;
     let stand_off = settings.planner.nozzle.stand_off;
-    let reference = Beginning(PlanReference { plan: &plan, ptu: &robot.ptu, stand_off });
-    let mut gun = ServoPanTilt::new(robot.ptu.clone(), settings.servo)?;
+    let reference = Beginning(PlanReference { plan: &plan, chain: &robot.chain, stand_off });
+    let mut gun = ServoPanTilt::new(robot.chain.clone(), settings.servo)?;
     let usual = FlightSettings::default();
     fly(&reference, &mut gun, &surface.world, &usual)?;
     group.throughput(Throughput::Elements(FLOWN as u64));
@@ -122,7 +122,7 @@ fn picture(group: &mut Group, surface: &PaintSurface) -> Result<(), AnyError> {
     let size = (640, 480);
     let (eye, middle) = (Point3::new(-5.0, 0.5, 2.6), Point3::new(0.0, 0.0, 2.6));
     let camera = Camera::looking_at(&eye, &middle, &Vector3::z(), 1.0, size)?;
-    let shade = |hit: &Hit| Look { albedo: [0.5; 3], normal: hit.normal };
+    let shade = |hit: &Hit| Shading { albedo: [0.5; 3], normal: hit.normal };
     let lights = Lights::default();
     render(&surface.world, &camera, &shade, &lights, 1, 1)?;
     group.throughput(Throughput::Elements(u64::from(size.0 * size.1)));

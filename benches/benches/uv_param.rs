@@ -6,7 +6,7 @@ use criterion::Throughput;
 use paintcopter_benches::rock::TEXEL;
 use paintcopter_benches::{Rng, criterion};
 use paintcopter_examples::world::rock_wall;
-use uv_param::{Method, Settings, Spray, TexelMap, largest_disk, nozzle_command, unwrap};
+use uv_param::{Method, NozzleSettings, Settings, TexelMap, largest_disk, nozzle_command, unwrap};
 
 /// Points looked up.
 const POINTS: usize = 100_000;
@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mesh = rock_wall(1);
     let (disk, _) = largest_disk(&mesh.positions, &mesh.faces)?;
     let chart = unwrap(&disk, &Settings::default(), |_| ())?;
-    let mut rng = Rng(3);
+    let mut rng = Rng::new(3);
     let places: Vec<[f64; 2]> =
         (0..POINTS).map(|_| [rng.between(0.0, chart.width()), rng.between(0.0, chart.height())]).collect();
 
@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     });
     group.throughput(Throughput::Elements(POSES as u64));
     group.bench_function("nozzle command", |b| {
-        let command = |at: &[f64; 2]| nozzle_command(&chart, *at, &Spray::default()).is_ok();
+        let command = |at: &[f64; 2]| nozzle_command(&chart, *at, &NozzleSettings::default()).is_ok();
         b.iter(|| places[..POSES].iter().filter(|at| command(at)).count());
     });
     group.finish();

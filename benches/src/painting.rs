@@ -145,7 +145,7 @@ fn noisy(
     gain: f64,
 ) -> Result<Value, paint_net::Error> {
     let problem = PaintProblem::new(wanted).with_kernel(kernel);
-    let mut wall = NoisyWall { canvas: wanted.map(|_| 0.0), gain, kernel, rng: Rng(0) };
+    let mut wall = NoisyWall { canvas: wanted.map(|_| 0.0), gain, kernel, rng: Rng::new(0) };
     let found = match closed {
         None => {
             wall.deposit(&feedback.paint(&problem)?.sprays);

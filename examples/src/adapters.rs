@@ -4,7 +4,7 @@
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use paint_planner::{NozzleState, Plan, Tool, VehicleState};
 use paint_sim::{PanTilt, Reference, ReferenceState, TriangleSurface};
-use ptu_kinematics::{Hover, Joints, Ptu, Servo};
+use ptu_kinematics::{Hover, Joints, KinematicChain, Ptu, Servo};
 
 /// The simulator's mesh as the planner's surface.
 pub struct MeshSurface<'a>(pub &'a TriangleSurface);
@@ -26,51 +26,58 @@ impl paint_planner::Surface for MeshSurface<'_> {
     }
 }
 
-/// The kinematic chain, with the room it takes, as the planner's tool.
-pub struct Robot {
+/// A kinematic chain, with the room it takes, as the planner's tool.
+pub struct Robot<C = Ptu> {
     /// The chain.
-    pub ptu: Ptu,
+    pub chain: C,
     /// Radius of the sphere about the body that holds the rotors, metres.
     pub body_radius: f64,
     /// Radius of the arm and the gun, metres.
     pub arm_radius: f64,
 }
 
-impl Robot {
-    /// The chain with its published limits, a body of 35 cm radius and an arm 5 cm thick (ours).
-    pub fn new(ptu: Ptu) -> Self {
-        Self { ptu, body_radius: 0.35, arm_radius: 0.025 }
+impl<C: KinematicChain> Robot<C> {
+    /// The chain with its limits, a body of 35 cm radius and an arm 5 cm thick.
+    pub fn new(chain: C) -> Self {
+        Self { chain, body_radius: 0.35, arm_radius: 0.025 }
     }
 
     /// Spheres that cover the robot in any pose of the body: rotors, arm, gun without its last centimetres.
-    pub fn spheres_at(&self, world_from_body: &Isometry3<f64>, joints: Joints, out: &mut Vec<(Point3<f64>, f64)>) {
+    pub fn spheres_at(&self, world_from_body: &Isometry3<f64>, joints: &C::Joints, out: &mut Vec<(Point3<f64>, f64)>) {
         let body = Point3::from(world_from_body.translation.vector);
-        let settings = self.ptu.settings();
-        let shoulder = world_from_body * Point3::from(settings.body_from_pan_axis);
-        let nozzle = self.ptu.forward(world_from_body, joints);
+        let nozzle = self.chain.forward(world_from_body, joints);
+        let mut members = self.chain.members(world_from_body, joints);
         // The sphere at the tip ends where the paint begins.
-        let gun = nozzle.tip - nozzle.direction.into_inner() * self.arm_radius;
-        out.push((body, self.body_radius));
-        for share in [0.75, 1.0] {
-            out.push((body + (shoulder - body) * share, self.arm_radius));
+        if let Some(tip) = members.last_mut() {
+            *tip = nozzle.tip - nozzle.direction.into_inner() * self.arm_radius;
         }
-        for share in [0.33, 0.67, 1.0] {
-            out.push((shoulder + (gun - shoulder) * share, self.arm_radius));
+        out.push((body, self.body_radius));
+        if let Some(shoulder) = members.first() {
+            for share in [0.75, 1.0] {
+                out.push((body + (shoulder - body) * share, self.arm_radius));
+            }
+        }
+        for member in members.windows(2) {
+            for share in [0.33, 0.67, 1.0] {
+                out.push((member[0] + (member[1] - member[0]) * share, self.arm_radius));
+            }
         }
     }
 }
 
-impl Tool for Robot {
+/// The planner's pan and tilt are azimuth and elevation of the spray axis: for the pan-tilt unit with a level gun its
+/// joint angles.
+impl<C: KinematicChain> Tool for Robot<C> {
     fn vehicle(&self, nozzle: &NozzleState, heading: f64) -> Option<VehicleState> {
-        let hover = self.ptu.inverse(&nozzle.position, &nozzle.direction, heading).ok()?;
-        let Joints { pan, tilt } = hover.joints;
+        let hover = self.chain.inverse(&nozzle.position, &nozzle.direction, heading).ok()?;
+        let [pan, tilt] = self.chain.spray_angles(&hover.joints);
         Some(VehicleState { position: hover.position, heading, pan, tilt })
     }
 
     fn spheres(&self, vehicle: &VehicleState, out: &mut Vec<(Point3<f64>, f64)>) {
-        let joints = Joints { pan: vehicle.pan, tilt: vehicle.tilt };
+        let joints = self.chain.point(vehicle.pan, vehicle.tilt);
         let hover = Hover { position: vehicle.position, heading: vehicle.heading, joints };
-        self.spheres_at(&hover.world_from_body(), joints, out);
+        self.spheres_at(&hover.world_from_body(), &hover.joints, out);
     }
 }
 
@@ -120,16 +127,16 @@ impl PanTilt for ServoPanTilt {
 }
 
 /// A plan as the simulator's reference.
-pub struct PlanReference<'a> {
+pub struct PlanReference<'a, C = Ptu> {
     /// The plan.
     pub plan: &'a Plan,
     /// The chain it was made for.
-    pub ptu: &'a Ptu,
+    pub chain: &'a C,
     /// Distance at which the gun points at nothing in particular on flights between strokes, metres.
     pub stand_off: f64,
 }
 
-impl Reference for PlanReference<'_> {
+impl<C: KinematicChain> Reference for PlanReference<'_, C> {
     fn duration(&self) -> f64 {
         self.plan.trajectory.duration()
     }
@@ -142,9 +149,9 @@ impl Reference for PlanReference<'_> {
         let still = |v: Vector3<f64>| if inside { v } else { Vector3::zeros() };
         let aim = if setpoint.transit {
             // Between strokes the planned joint angles are held: aim at the point ahead of the nozzle they give.
-            let joints = Joints { pan: setpoint.pan, tilt: setpoint.tilt };
+            let joints = self.chain.point(setpoint.pan, setpoint.tilt);
             let hover = Hover { position: sample.position, heading: sample.heading, joints };
-            let nozzle = self.ptu.forward(&hover.world_from_body(), joints);
+            let nozzle = self.chain.forward(&hover.world_from_body(), &hover.joints);
             nozzle.tip + nozzle.direction.into_inner() * self.stand_off
         } else {
             setpoint.aim

@@ -10,6 +10,8 @@ mod plan;
 mod run;
 mod settings;
 mod shading;
+#[cfg(test)]
+mod test_panel;
 
 pub use error::MissionError;
 pub use figures::report;

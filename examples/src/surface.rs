@@ -3,12 +3,12 @@
 use nalgebra::{Point3, UnitVector3, Vector3};
 use paint_net::Image;
 use paint_sim::{Texel, TriangleSurface};
-use uv_param::{Chart, CutSettings, Disk, Findings, NormalMode, Settings, Spray, TexelMap};
+use uv_param::{Chart, CutSettings, Disk, NormalMode, NozzleSettings, RepairReport, Settings, TexelMap};
 
 use crate::mesh_io::TriangleMesh;
 
 /// A chart is stretched too much to paint where a length changes by more than this factor: spots would be ellipses.
-const MOST_STRETCH: f64 = 1.6;
+const MAX_STRETCH: f64 = 1.6;
 /// Radius over which the normal is averaged for the robot, metres: the footprint of a spray (Paper IV, section 3.3).
 const FOOTPRINT: f64 = 0.05;
 
@@ -21,7 +21,7 @@ pub struct PaintSurface {
     /// Everything there is to hit: the disk's faces first, in their order, then the rest of the mesh.
     pub world: TriangleSurface,
     /// What was left out of the disk.
-    pub findings: Findings,
+    pub repair_report: RepairReport,
 }
 
 /// What is wrong with a mesh as a surface to paint.
@@ -40,16 +40,16 @@ impl PaintSurface {
     pub fn new(mesh: &TriangleMesh, texel: f64, progress: &dyn Fn(f64)) -> Result<Self, SurfaceError> {
         let positions: Vec<[f64; 3]> = mesh.positions.iter().map(|p| p.map(f64::from)).collect();
         let repair = uv_param::Repair { weld: true, split_vertices: true };
-        let (disk, findings) = uv_param::largest_disk_with(&positions, &mesh.faces, repair)?;
+        let (disk, repair_report) = uv_param::largest_disk_with(&positions, &mesh.faces, repair)?;
         let settings = Settings { up: Some([0.0, 0.0, 1.0]), ..Settings::default() };
-        let cuts = CutSettings { max_stretch: MOST_STRETCH, ..CutSettings::default() };
+        let cuts = CutSettings { max_stretch: MAX_STRETCH, ..CutSettings::default() };
         let chart = uv_param::unwrap_with_cuts(&disk, &settings, &cuts, |p| {
             let share = p.iteration as f64 / settings.iterations as f64;
             progress(if p.stage == uv_param::Stage::Cut { 0.0 } else { share });
         })?;
         let texels = TexelMap::new(&chart, texel)?;
         let world = world(&disk, mesh)?;
-        Ok(Self { chart, texels, world, findings })
+        Ok(Self { chart, texels, world, repair_report })
     }
 
     /// The part of the mesh that is painted.
@@ -80,7 +80,7 @@ impl PaintSurface {
             .map(|(x, y)| {
                 self.texels.at(x, y).is_some_and(|point| {
                     let [s1, s2] = self.chart.stretch(point.face);
-                    let even = s1 < MOST_STRETCH && s2 > 1.0 / MOST_STRETCH;
+                    let even = s1 < MAX_STRETCH && s2 > 1.0 / MAX_STRETCH;
                     // A texel at the rim may hold a sliver of surface beside its centre.
                     let centred = self.chart.locate(self.texels.uv_of_texel(x, y)).is_some();
                     centred && even && !steep(&self.chart.smooth_normal(point))
@@ -109,8 +109,9 @@ impl PaintSurface {
     pub fn lift(&self, x: f64, y: f64) -> Option<(Point3<f64>, UnitVector3<f64>)> {
         let texel = self.texels.texel_m;
         let uv = [(x + 0.5) * texel, (self.height() as f64 - y - 0.5) * texel];
-        let spray = Spray { normal: NormalMode::Footprint { radius: FOOTPRINT }, ..Spray::default() };
-        let command = uv_param::nozzle_command(&self.chart, uv, &spray).ok()?;
+        let nozzle =
+            NozzleSettings { normal: NormalMode::Footprint { radius: FOOTPRINT }, ..NozzleSettings::default() };
+        let command = uv_param::nozzle_command(&self.chart, uv, &nozzle).ok()?;
         Some((command.point, -command.direction))
     }
 

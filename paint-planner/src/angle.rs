@@ -9,7 +9,7 @@ pub(crate) fn wrap(angle: f64) -> f64 {
 }
 
 /// The representative of `angle` nearest to `reference`.
-pub(crate) fn near(angle: f64, reference: f64) -> f64 {
+pub(crate) fn nearest_equivalent(angle: f64, reference: f64) -> f64 {
     reference + wrap(angle - reference)
 }
 
@@ -22,6 +22,6 @@ mod tests {
         assert_eq!(wrap(-PI), PI);
         assert_eq!(wrap(PI), PI);
         assert!((wrap(5.0 * PI + 0.25) - (0.25 - PI)).abs() < 1e-12);
-        assert!((near(-3.0, 3.0) - (TAU - 3.0)).abs() < 1e-12);
+        assert!((nearest_equivalent(-3.0, 3.0) - (TAU - 3.0)).abs() < 1e-12);
     }
 }

@@ -4,11 +4,11 @@ use crate::world::{Surface, Tool, VehicleState};
 use nalgebra::Point3;
 
 /// How far distances are resolved, m: spheres farther off than this need no query for a long way.
-const HORIZON: f64 = 1.0;
+const QUERY_MARGIN: f64 = 1.0;
 
 /// What was known about one sphere at the last query.
 #[derive(Debug, Clone, Copy)]
-struct Known {
+struct CachedDistance {
     centre: Point3<f64>,
     distance: f64,
 }
@@ -16,39 +16,39 @@ struct Known {
 /// The last queries of every sphere of one body; a body moving along a path asks the surface only when the motion since
 /// has used up the slack.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Memory {
-    known: Vec<Known>,
+pub(crate) struct DistanceCache {
+    spheres: Vec<CachedDistance>,
 }
 
 /// Collision checks of one tool against one surface.
-pub(crate) struct Checker<'a> {
+pub(crate) struct ClearanceChecker<'a> {
     surface: &'a dyn Surface,
     tool: &'a dyn Tool,
     spheres: Vec<(Point3<f64>, f64)>,
 }
 
-impl<'a> Checker<'a> {
+impl<'a> ClearanceChecker<'a> {
     pub(crate) fn new(surface: &'a dyn Surface, tool: &'a dyn Tool) -> Self {
         Self { surface, tool, spheres: Vec::new() }
     }
 
     /// Whether every sphere keeps `clearance` from the surface.
-    pub(crate) fn clear(&mut self, state: &VehicleState, clearance: f64, memory: &mut Memory) -> bool {
+    pub(crate) fn is_clear(&mut self, state: &VehicleState, clearance: f64, cache: &mut DistanceCache) -> bool {
         self.spheres.clear();
         self.tool.spheres(state, &mut self.spheres);
         for (k, &(centre, radius)) in self.spheres.iter().enumerate() {
             let need = radius + clearance;
-            match memory.known.get(k) {
+            match cache.spheres.get(k) {
                 Some(last) if last.distance - (centre - last.centre).norm() >= need => continue,
                 Some(last) if last.distance + (centre - last.centre).norm() < need => return false,
                 _ => {}
             }
-            let distance = self.surface.distance(&centre, need + HORIZON);
-            let fresh = Known { centre, distance };
-            if k < memory.known.len() {
-                memory.known[k] = fresh;
-            } else if k == memory.known.len() {
-                memory.known.push(fresh);
+            let distance = self.surface.distance(&centre, need + QUERY_MARGIN);
+            let fresh = CachedDistance { centre, distance };
+            if k < cache.spheres.len() {
+                cache.spheres[k] = fresh;
+            } else if k == cache.spheres.len() {
+                cache.spheres.push(fresh);
             }
             if distance < need {
                 return false;
@@ -58,20 +58,21 @@ impl<'a> Checker<'a> {
     }
 
     /// Smallest distance between a sphere and the surface, negative where they overlap, clipped at `below`, m.
-    pub(crate) fn clearance(&mut self, state: &VehicleState, below: f64, memory: &mut Memory) -> f64 {
+    pub(crate) fn clearance(&mut self, state: &VehicleState, below: f64, cache: &mut DistanceCache) -> f64 {
         self.spheres.clear();
         self.tool.spheres(state, &mut self.spheres);
         let mut least = below;
         for (k, &(centre, radius)) in self.spheres.iter().enumerate() {
-            if memory.known.get(k).is_some_and(|last| last.distance - (centre - last.centre).norm() - radius >= least) {
+            if cache.spheres.get(k).is_some_and(|last| last.distance - (centre - last.centre).norm() - radius >= least)
+            {
                 continue;
             }
-            let distance = self.surface.distance(&centre, radius + below.max(0.0) + HORIZON);
-            let fresh = Known { centre, distance };
-            if k < memory.known.len() {
-                memory.known[k] = fresh;
-            } else if k == memory.known.len() {
-                memory.known.push(fresh);
+            let distance = self.surface.distance(&centre, radius + below.max(0.0) + QUERY_MARGIN);
+            let fresh = CachedDistance { centre, distance };
+            if k < cache.spheres.len() {
+                cache.spheres[k] = fresh;
+            } else if k == cache.spheres.len() {
+                cache.spheres.push(fresh);
             }
             least = least.min(distance - radius);
         }

@@ -38,16 +38,16 @@ pub enum Error {
         /// Number of targets given.
         count: usize,
     },
-    /// No stroke, or not the finish pose, can be reached by straight, retracted or climbing flight. (Single strokes that
+    /// No stroke, or not the goal pose, can be reached by straight, retracted or climbing flight. (Single strokes that
     /// cannot are marked as not reachable instead.)
     #[error("no collision-free way from {from} to {to}: split the path there, or lower the clearance")]
-    NoBridge {
+    NoTransit {
         /// Where the stretch before ends ("start pose" or a target index).
         from: String,
-        /// Where the stretch after begins ("finish pose" or a target index).
+        /// Where the stretch after begins ("goal pose" or a target index).
         to: String,
     },
-    /// The final trajectory touches the surface although its waypoints do not.
+    /// The final trajectory violations the surface although its waypoints do not.
     #[error("the trajectory comes to {clearance:.3} m from the surface: raise `clearance` or lower `timing.tolerance`")]
     Collision {
         /// Distance between the collision body and the surface, m (negative: overlap).

@@ -1,15 +1,15 @@
 //! Stage 2: the heading of the vehicle, globally optimal on a grid and then smoothed off it (VR paper, Eq. (7)).
 
+mod graph;
 mod smooth;
-mod table;
 mod viterbi;
 
-use crate::clearance::{Checker, Memory};
+use crate::clearance::{ClearanceChecker, DistanceCache};
 use crate::settings::HeadingSettings;
 use crate::target::NozzleState;
 use crate::world::{Tool, VehicleState};
 
-pub(crate) use table::Table;
+pub(crate) use graph::HeadingGraph;
 
 /// Vehicle states of the nozzle states that have an admissible heading.
 pub(crate) struct Headings {
@@ -23,23 +23,23 @@ pub(crate) struct Headings {
 
 /// Chooses headings for `nozzles` (in path order), each keeping its own `clearance` from the surface. `linked[i]`: i and i+1
 /// belong to one stroke.
-pub(crate) fn choose(
+pub(crate) fn choose_headings(
     nozzles: &[Option<NozzleState>],
     linked: &[bool],
     tool: &dyn Tool,
-    checker: &mut Checker<'_>,
+    checker: &mut ClearanceChecker<'_>,
     clearance: &[f64],
     settings: &HeadingSettings,
 ) -> Headings {
-    let table = Table::build(nozzles, tool, checker, clearance, settings.bins);
-    let path = viterbi::search(&table, linked, settings);
+    let graph = HeadingGraph::build(nozzles, tool, checker, clearance, settings.bins);
+    let path = viterbi::search(&graph, linked, settings);
     let mut vehicle: Vec<Option<VehicleState>> = vec![None; nozzles.len()];
     let mut joined = vec![false; nozzles.len().saturating_sub(1)];
     for run in path.runs() {
-        let on_grid: Vec<f64> = run.clone().map(|i| table.heading(path.bins[i].unwrap_or(0))).collect();
+        let on_grid: Vec<f64> = run.clone().map(|i| graph.heading(path.bins[i].unwrap_or(0))).collect();
         let states: Vec<NozzleState> = run.clone().filter_map(|i| nozzles[i]).collect();
-        let polished = polish(&states, &on_grid, tool, checker, &clearance[run.clone()], settings);
-        for (i, state) in run.clone().zip(polished) {
+        let smoothed = smooth_off_grid(&states, &on_grid, tool, checker, &clearance[run.clone()], settings);
+        for (i, state) in run.clone().zip(smoothed) {
             vehicle[i] = state;
         }
         joined[run.start..run.end - 1].fill(true);
@@ -48,11 +48,11 @@ pub(crate) fn choose(
 }
 
 /// Smooths the headings of one run; states that become inadmissible are pulled back to the grid, in the end all of them.
-fn polish(
+fn smooth_off_grid(
     states: &[NozzleState],
     on_grid: &[f64],
     tool: &dyn Tool,
-    checker: &mut Checker<'_>,
+    checker: &mut ClearanceChecker<'_>,
     clearance: &[f64],
     settings: &HeadingSettings,
 ) -> Vec<Option<VehicleState>> {
@@ -63,13 +63,13 @@ fn polish(
     let mut weights = vec![1.0; states.len()];
     for _ in 0..6 {
         let headings = smooth::whittaker(&grid, &weights, stiffness);
-        let mut memory = Memory::default();
+        let mut cache = DistanceCache::default();
         let vehicles: Vec<Option<VehicleState>> = states
             .iter()
             .zip(&headings)
             .zip(clearance)
             .map(|((nozzle, &heading), &clearance)| {
-                tool.vehicle(nozzle, heading).filter(|v| checker.clear(v, clearance, &mut memory))
+                tool.vehicle(nozzle, heading).filter(|v| checker.is_clear(v, clearance, &mut cache))
             })
             .collect();
         if vehicles.iter().all(Option::is_some) {

@@ -49,7 +49,7 @@
 //!
 //! | paper | item |
 //! |---|---|
-//! | VR paper, Eqs. (1)-(6) = thesis, Eqs. (7.1)-(7.6) | [`OptimalPlanner`] with [`Mode::PaperExact`]; [`Mode::Repaired`] is the default |
+//! | VR paper, Eqs. (1)-(6) = thesis, Eqs. (7.1)-(7.6) | [`OptimalPlanner`] with [`Mode::PaperExact`]; [`Mode::Sequential`] is the default |
 //! | VR paper, Eq. (7) = thesis, Eq. (7.7) | [`HeadingSettings`], searched globally |
 //! | thesis, section 7.5, timing | [`TimingPolicy`] |
 //! | Richter et al., minimum snap | [`Trajectory::minimum_snap`] |
@@ -58,17 +58,17 @@
 
 mod angle;
 mod bernstein;
-mod block;
+mod block_tridiagonal;
 mod clearance;
 mod error;
 mod heading;
 mod lowess;
+mod minimum_snap;
 mod nozzle;
 mod plan;
 mod planner;
 mod route;
 mod settings;
-mod snap;
 mod target;
 mod timing;
 mod trajectory;
@@ -78,7 +78,7 @@ pub use error::Error;
 pub use nalgebra;
 pub use nozzle::Mode;
 pub use plan::{Plan, PlanReport, Setpoint, Waypoint};
-pub use planner::{OptimalPlanner, Planner, SmoothingPlanner};
+pub use planner::{OptimalPlanner, Planner, SmoothingPlanner, plan};
 pub use settings::{HeadingSettings, LowessSettings, NozzleSettings, Settings, TimingPolicy, TimingSettings};
 pub use target::{NozzleState, Target, normal_deviation};
 pub use trajectory::{Extrema, Sample, Trajectory};

@@ -1,8 +1,9 @@
 //! The planners: one trait, the optimal planner and the smoothing baseline.
 
-mod finish;
+mod assemble;
 mod optimal;
 mod smoothing;
+mod strategy;
 
 use crate::error::Error;
 use crate::plan::Plan;
@@ -12,19 +13,12 @@ use crate::world::{Surface, Tool};
 
 pub use optimal::OptimalPlanner;
 pub use smoothing::SmoothingPlanner;
+pub use strategy::Planner;
 
-/// Turns targets into a plan.
-pub trait Planner {
-    /// Short name for reports.
-    fn name(&self) -> &'static str;
-
-    /// Plans the whole path. Targets that cannot be served are marked in [`Plan::reachable`]; an error means that no
-    /// part of the path can be flown, or that the input is unusable.
-    fn plan(
-        &self,
-        targets: &[Target],
-        surface: &dyn Surface,
-        tool: &dyn Tool,
-        settings: &Settings,
-    ) -> Result<Plan, Error>;
+/// Plans a whole path with the optimal planner in one call; see [`Planner::plan`].
+///
+/// # Errors
+/// As [`Planner::plan`].
+pub fn plan(targets: &[Target], surface: &dyn Surface, tool: &dyn Tool, settings: &Settings) -> Result<Plan, Error> {
+    OptimalPlanner::default().plan(targets, surface, tool, settings)
 }

@@ -1,4 +1,4 @@
-//! All numbers of the planners. `Default` holds the published values; those the papers keep to themselves are ours.
+//! All numbers of the planners. `Default` holds the published values; where the papers print none, an engineering value.
 
 use crate::error::Error;
 use crate::world::VehicleState;
@@ -15,14 +15,14 @@ pub struct Settings {
     pub timing: TimingSettings,
     /// The smoothing planner's filter.
     pub lowess: LowessSettings,
-    /// Least distance between collision body and surface, m (ours: 0.03).
+    /// Least distance between collision body and surface, m (default 0.03).
     pub clearance: f64,
-    /// Neighbouring targets farther apart than this are separate strokes with a flight between them, m (ours: 0.15).
+    /// Neighbouring targets farther apart than this are separate strokes with a flight between them, m (default 0.15).
     pub break_length: f64,
     /// Where the flight begins; `None`: at the first target served.
     pub start: Option<VehicleState>,
     /// Where the flight ends; `None`: at the last target served.
-    pub finish: Option<VehicleState>,
+    pub goal: Option<VehicleState>,
 }
 
 /// Stage 1 of the optimal planner (VR paper, Eqs. (1)-(6)).
@@ -35,30 +35,30 @@ pub struct NozzleSettings {
     pub min: f64,
     /// Greatest distance along the normal, m (0.15, Paper II section 7.1).
     pub max: f64,
-    /// Full opening angle theta of the spray cone that has to contain the target, rad (ours: 16 degrees).
+    /// Full opening angle theta of the spray cone that has to contain the target, rad (default 16 degrees).
     pub cone: f64,
-    /// Greatest angle between the normal and the line from target to nozzle, rad (ours: 25 degrees).
+    /// Greatest angle between the normal and the line from target to nozzle, rad (default 25 degrees).
     pub incidence: f64,
-    /// Greatest elevation of the spray axis, rad (ours: 44 degrees, one inside the +-45 of the pan-tilt unit).
+    /// Greatest elevation of the spray axis, rad (default 44 degrees, one inside the +-45 of the pan-tilt unit).
     pub max_elevation: f64,
-    /// Weight `c_a` of position differences between neighbours (ours: 0.5).
+    /// Weight `c_a` of position differences between neighbours (default 0.5).
     pub ca: f64,
-    /// Weight `c_b` of direction differences between neighbours, m^2 (ours: 0.005).
+    /// Weight `c_b` of direction differences between neighbours, m^2 (default 0.005).
     pub cb: f64,
-    /// Weight `c_c` of the change since the previous round; repaired mode damps the position only, since `aim` holds the
-    /// direction (ours: 0.02).
+    /// Weight `c_c` of the change since the previous round; sequential mode damps the position only, since `aim` holds the
+    /// direction (default 0.02).
     pub cc: f64,
-    /// Weight `c_d` of the normal deviation (ours: 1).
+    /// Weight `c_d` of the normal deviation (default 1).
     pub cd: f64,
-    /// Weight of the miss of the spray axis, repaired mode, m^2 per rad^2 (ours: 0.01; the papers only bound it by the cone).
+    /// Weight of the miss of the spray axis, sequential mode, m^2 per rad^2 (default 0.01; the papers only bound it by the cone).
     pub aim: f64,
-    /// Weight of the distance error along the normal, repaired mode (ours: 0.05; the papers only bound it).
+    /// Weight of the distance error along the normal, sequential mode (default 0.05; the papers only bound it).
     pub distance: f64,
-    /// Re-linearisations in repaired mode (ours: 4).
+    /// Re-linearisations in sequential mode (default 4).
     pub rounds: usize,
-    /// Jacobi iterations in paper-exact mode (ours: 40).
+    /// Jacobi iterations in paper-exact mode (default 40).
     pub iterations: usize,
-    /// Inradius of the triangle around a target whose edges carry the three planes of the paper-exact mode, m (ours:
+    /// Inradius of the triangle around a target whose edges carry the three planes of the paper-exact mode, m (default
     /// 0.01).
     pub facet: f64,
 }
@@ -67,15 +67,15 @@ pub struct NozzleSettings {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct HeadingSettings {
-    /// Heading bins on the full circle (ours: 72).
+    /// Heading bins on the full circle (default 72).
     pub bins: usize,
-    /// Most bins the heading may change from one target to the next (ours: 3).
+    /// Most bins the heading may change from one target to the next (default 3).
     pub window: usize,
-    /// Weight `c_e` of the squared way of the vehicle, rad^2/m^4 (ours: 2000).
+    /// Weight `c_e` of the squared distance the vehicle travels, rad^2/m^4 (default 2000).
     pub ce: f64,
-    /// Weight of the squared pan angle at each target, 1/m^2: keeps off the joint limits (ours: 0.5).
+    /// Weight of the squared pan angle at each target, 1/m^2: keeps off the joint limits (default 0.5).
     pub pan: f64,
-    /// Length over which headings are smoothed off the grid, m (ours: 0.3); 0 leaves them on the grid.
+    /// Length over which headings are smoothed off the grid, m (default 0.3); 0 leaves them on the grid.
     pub smoothing: f64,
 }
 
@@ -96,31 +96,31 @@ pub enum TimingPolicy {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct TimingSettings {
-    /// How times are chosen (ours: uniform 0.4 m/s).
+    /// How times are chosen (default uniform 0.4 m/s).
     pub policy: TimingPolicy,
-    /// Greatest speed of the vehicle, m/s (ours: 0.5).
+    /// Greatest speed of the vehicle, m/s (default 0.5).
     pub max_speed: f64,
-    /// Greatest acceleration of the vehicle, m/s^2 (ours: 1).
+    /// Greatest acceleration of the vehicle, m/s^2 (default 1).
     pub max_acceleration: f64,
-    /// Greatest heading rate, rad/s (ours: 1).
+    /// Greatest heading rate, rad/s (default 1).
     pub max_heading_rate: f64,
-    /// Greatest flow of paint, m^3/s (ours: 2e-6).
+    /// Greatest flow of paint, m^3/s (default 2e-6).
     pub max_flow: f64,
-    /// Distance between trajectory knots where the path is smooth, m (ours: 0.1).
+    /// Distance between trajectory knots where the path is smooth, m (default 0.1).
     pub knot_spacing: f64,
-    /// Greatest distance between the trajectory and a planned waypoint at its time, m (ours: 0.002).
+    /// Greatest distance between the trajectory and a planned waypoint at its time, m (default 0.002).
     pub tolerance: f64,
-    /// Rounds of knot insertion and local slowing before the rest is scaled globally (ours: 30).
+    /// Rounds of knot insertion and local slowing before the rest is scaled globally (default 30).
     pub rounds: usize,
 }
 
-/// LOWESS of the smoothing planner (Paper II, section 6.2; the values are ours).
+/// LOWESS of the smoothing planner (Paper II, section 6.2, which prints no values).
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct LowessSettings {
-    /// Length of path that one local fit sees, m (ours: 0.5).
+    /// Length of path that one local fit sees, m (default 0.5).
     pub span: f64,
-    /// Robustifying passes with bisquare weights (ours: 2).
+    /// Robustifying passes with bisquare weights (default 2).
     pub passes: usize,
 }
 
@@ -134,7 +134,7 @@ impl Default for Settings {
             clearance: 0.03,
             break_length: 0.15,
             start: None,
-            finish: None,
+            goal: None,
         }
     }
 }
@@ -237,7 +237,7 @@ impl Settings {
         if let TimingPolicy::Uniform { speed } = timing.policy {
             ensure("timing.policy.speed", speed, speed > 0.0 && speed.is_finite(), positive)?;
         }
-        for (name, pose) in [("start", &self.start), ("finish", &self.finish)] {
+        for (name, pose) in [("start", &self.start), ("goal", &self.goal)] {
             if let Some(state) = pose {
                 let numbers =
                     [state.position.x, state.position.y, state.position.z, state.heading, state.pan, state.tilt];

@@ -62,3 +62,8 @@ pub(crate) fn check(targets: &[Target]) -> Result<(), Error> {
     }
     Ok(())
 }
+
+/// Which neighbouring targets are close enough to be one stroke.
+pub(crate) fn stroke_links(targets: &[Target], break_length: f64) -> Vec<bool> {
+    targets.windows(2).map(|pair| (pair[1].point - pair[0].point).norm() <= break_length).collect()
+}

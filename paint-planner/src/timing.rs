@@ -1,67 +1,67 @@
 //! Times for the route, and the trajectory within limits that results.
 
-pub(crate) mod profile;
+pub(crate) mod speed_profile;
 
 use crate::error::Error;
-use crate::route::Stop;
+use crate::route::RoutePoint;
 use crate::settings::{TimingPolicy, TimingSettings};
 use crate::target::Target;
 use crate::trajectory::{Extrema, Trajectory};
 use nalgebra::Vector4;
-use profile::Profile;
+use speed_profile::SpeedProfile;
 
 /// Metres of deviation that a radian of heading error counts as: about the lever of an arm.
-const LEVER: f64 = 0.5;
+const HEADING_LEVER: f64 = 0.5;
 /// Overshoot of a correction, so that the loop ends.
-const EXTRA: f64 = 1.01;
+const OVERCORRECTION: f64 = 1.01;
 
-/// A trajectory with the time of every stop.
+/// A trajectory with the time of every route point.
 #[derive(Debug, Clone)]
-pub(crate) struct Timed {
+pub(crate) struct TimedTrajectory {
     pub(crate) trajectory: Trajectory,
-    /// Time of each stop, s.
+    /// Time of each route point, s.
     pub(crate) times: Vec<f64>,
     pub(crate) extrema: Extrema,
-    /// Greatest distance between the trajectory and a stop at its time, m.
+    /// Greatest distance between the trajectory and a route point at its time, m.
     pub(crate) deviation: f64,
     /// Final global stretch factor.
     pub(crate) stretch: f64,
 }
 
-/// Finds times such that all limits hold, certified. `dense` makes every stop a knot.
+/// Finds times such that all limits hold, certified. `dense` makes every route point a knot.
 ///
-/// Rounds of: speed profile, minimum snap through the knots, exact extrema. Stops that the curve misses become knots,
+/// Rounds of: speed profile, minimum snap through the knots, exact extrema. Route points that the curve misses become knots,
 /// segments that break a limit are slowed. Whatever is left is repaired by one global stretch, which is exact because
 /// the path does not depend on it.
 pub(crate) fn schedule(
-    route: &[Stop],
+    route: &[RoutePoint],
     targets: &[Target],
     settings: &TimingSettings,
     dense: bool,
-) -> Result<Timed, Error> {
-    let profile = Profile::new(route, targets, settings);
+) -> Result<TimedTrajectory, Error> {
+    let profile = SpeedProfile::new(route, targets, settings);
     let local = matches!(settings.policy, TimingPolicy::Uniform { .. });
     let mut knots = first_knots(route, settings, dense);
-    let mut slow = vec![1.0; route.len() - 1];
-    let mut best: Option<Timed> = None;
+    let mut slowdown = vec![1.0; route.len() - 1];
+    let mut best: Option<TimedTrajectory> = None;
     for round in 0..=settings.rounds {
-        let durations = profile.durations(&slow, settings);
+        let durations = profile.durations(&slowdown, settings);
         let attempt = fit(route, &knots, &durations)?;
         let mut most = Extrema::default();
-        let mut excess = vec![1.0; knots.len() - 1];
-        for (i, worst) in excess.iter_mut().enumerate() {
+        let mut ratios = vec![1.0; knots.len() - 1];
+        for (i, worst) in ratios.iter_mut().enumerate() {
             let extrema = attempt.segment_extrema(i);
             most = most.max(extrema);
-            *worst = ratio(&extrema, settings);
+            *worst = limit_ratio(&extrema, settings);
         }
         let times = cumulative(&durations);
-        let (deviation, missed) = missed(route, &knots, &attempt, &times, settings.tolerance);
-        let stretch = ratio(&most, settings).max(1.0);
-        let better = |other: &Timed| {
+        let (deviation, missed) = missed_points(route, &knots, &attempt, &times, settings.tolerance);
+        let stretch = limit_ratio(&most, settings).max(1.0);
+        let better = |other: &TimedTrajectory| {
             let (now, then) = (deviation <= settings.tolerance, other.deviation <= settings.tolerance);
             (now && !then) || (now == then && attempt.duration() * stretch < other.trajectory.duration())
         };
-        // Before the curve follows the stops, the latest attempt is the one to keep.
+        // Before the curve follows the route points, the latest attempt is the one to keep.
         if best.as_ref().is_none_or(|other| better(other) || other.deviation > settings.tolerance) {
             best = Some(stretched(attempt, times, most, deviation, stretch));
         }
@@ -70,7 +70,7 @@ pub(crate) fn schedule(
             break;
         }
         if local {
-            brake(&mut slow, &knots, &excess);
+            slow_down(&mut slowdown, &knots, &ratios);
         }
         knots.extend(missed);
         knots.sort_unstable();
@@ -80,7 +80,13 @@ pub(crate) fn schedule(
     Ok(timed)
 }
 
-fn stretched(trajectory: Trajectory, mut times: Vec<f64>, most: Extrema, deviation: f64, mut k: f64) -> Timed {
+fn stretched(
+    trajectory: Trajectory,
+    mut times: Vec<f64>,
+    most: Extrema,
+    deviation: f64,
+    mut k: f64,
+) -> TimedTrajectory {
     if k > 1.0 {
         // The certificate is an upper bound; one more part in 1e9 covers the rounding of the division.
         k *= 1.0 + 1e-9;
@@ -93,43 +99,43 @@ fn stretched(trajectory: Trajectory, mut times: Vec<f64>, most: Extrema, deviati
         acceleration: most.acceleration / (k * k),
         heading_rate: most.heading_rate / k,
     };
-    Timed { trajectory: trajectory.stretched(k), times, extrema, deviation, stretch: k }
+    TimedTrajectory { trajectory: trajectory.stretched(k), times, extrema, deviation, stretch: k }
 }
 
 /// How much slower a segment has to be flown; at most 1 where it is within limits.
-fn ratio(extrema: &Extrema, settings: &TimingSettings) -> f64 {
+fn limit_ratio(extrema: &Extrema, settings: &TimingSettings) -> f64 {
     (extrema.speed / settings.max_speed)
         .max((extrema.acceleration / settings.max_acceleration).sqrt())
         .max(extrema.heading_rate / settings.max_heading_rate)
 }
 
-/// Halts, ends and flights are knots, and one stop per spacing or per bend.
-fn first_knots(route: &[Stop], settings: &TimingSettings, dense: bool) -> Vec<usize> {
+/// Halts, ends and flights are knots, and one route point per spacing or per bend.
+fn first_knots(route: &[RoutePoint], settings: &TimingSettings, dense: bool) -> Vec<usize> {
     let mut knots = vec![0];
-    let (mut way, mut turn) = (0.0, 0.0);
+    let (mut travelled, mut turn) = (0.0, 0.0);
     for i in 1..route.len() {
-        way += (route[i].state.position - route[i - 1].state.position).norm();
+        travelled += (route[i].state.position - route[i - 1].state.position).norm();
         turn += (route[i].state.heading - route[i - 1].state.heading).abs();
         let edge = |j: usize| route[j].target.is_none() || route[j].rest;
         let must = dense || i + 1 == route.len() || edge(i) || edge(i + 1) || edge(i - 1);
-        if must || way >= settings.knot_spacing * 0.999 || turn > 0.3 {
+        if must || travelled >= settings.knot_spacing * 0.999 || turn > 0.3 {
             knots.push(i);
-            (way, turn) = (0.0, 0.0);
+            (travelled, turn) = (0.0, 0.0);
         }
     }
     knots
 }
 
-fn fit(route: &[Stop], knots: &[usize], durations: &[f64]) -> Result<Trajectory, Error> {
+fn fit(route: &[RoutePoint], knots: &[usize], durations: &[f64]) -> Result<Trajectory, Error> {
     let points: Vec<Vector4<f64>> = knots.iter().map(|&i| coordinates(&route[i])).collect();
     let rest: Vec<bool> = knots.iter().map(|&i| route[i].rest).collect();
     let own: Vec<f64> = knots.windows(2).map(|pair| durations[pair[0]..pair[1]].iter().sum()).collect();
     Trajectory::minimum_snap(&points, &own, &rest)
 }
 
-fn coordinates(stop: &Stop) -> Vector4<f64> {
-    let p = stop.state.position;
-    Vector4::new(p.x, p.y, p.z, stop.state.heading)
+fn coordinates(point: &RoutePoint) -> Vector4<f64> {
+    let p = point.state.position;
+    Vector4::new(p.x, p.y, p.z, point.state.heading)
 }
 
 fn cumulative(durations: &[f64]) -> Vec<f64> {
@@ -142,8 +148,14 @@ fn cumulative(durations: &[f64]) -> Vec<f64> {
     times
 }
 
-/// Greatest deviation from any stop, and per segment the stop missed most beyond the tolerance.
-fn missed(route: &[Stop], knots: &[usize], curve: &Trajectory, times: &[f64], tolerance: f64) -> (f64, Vec<usize>) {
+/// Greatest deviation from any route point, and per segment the one missed most beyond the tolerance.
+fn missed_points(
+    route: &[RoutePoint],
+    knots: &[usize],
+    curve: &Trajectory,
+    times: &[f64],
+    tolerance: f64,
+) -> (f64, Vec<usize>) {
     let mut greatest = 0.0_f64;
     let mut result = Vec::new();
     for pair in knots.windows(2) {
@@ -151,7 +163,7 @@ fn missed(route: &[Stop], knots: &[usize], curve: &Trajectory, times: &[f64], to
         for i in pair[0] + 1..pair[1] {
             let sample = curve.sample(times[i]);
             let place = (sample.position - route[i].state.position).norm();
-            let error = place.max(LEVER * (sample.heading - route[i].state.heading).abs());
+            let error = place.max(HEADING_LEVER * (sample.heading - route[i].state.heading).abs());
             greatest = greatest.max(error);
             if error > worst {
                 (worst, at) = (error, Some(i));
@@ -163,13 +175,13 @@ fn missed(route: &[Stop], knots: &[usize], curve: &Trajectory, times: &[f64], to
 }
 
 /// Slows the edges of segments beyond the limits, and half as much those next to them: the curve is stiff.
-fn brake(slow: &mut [f64], knots: &[usize], excess: &[f64]) {
+fn slow_down(slowdown: &mut [f64], knots: &[usize], ratios: &[f64]) {
     for (i, pair) in knots.windows(2).enumerate() {
-        let beside = excess[i.saturating_sub(1)].max(excess[(i + 1).min(excess.len() - 1)]);
-        let factor = excess[i].max(1.0 + 0.5 * (beside - 1.0)).min(1.5);
+        let beside = ratios[i.saturating_sub(1)].max(ratios[(i + 1).min(ratios.len() - 1)]);
+        let factor = ratios[i].max(1.0 + 0.5 * (beside - 1.0)).min(1.5);
         if factor > 1.0 {
-            for edge in &mut slow[pair[0]..pair[1]] {
-                *edge *= factor * EXTRA;
+            for edge in &mut slowdown[pair[0]..pair[1]] {
+                *edge *= factor * OVERCORRECTION;
             }
         }
     }

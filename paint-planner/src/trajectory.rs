@@ -2,7 +2,7 @@
 
 use crate::bernstein::Bernstein;
 use crate::error::Error;
-use crate::snap::{Joint, joints};
+use crate::minimum_snap::{KnotDerivatives, knot_derivatives};
 use nalgebra::{Point3, Vector3, Vector4};
 
 /// The vehicle at one instant.
@@ -72,7 +72,8 @@ impl Trajectory {
                 continue;
             }
             let (stretch, own) = (&points[first..=last], &durations[first..last]);
-            let derivatives = joints(stretch, own).ok_or(Error::Numerical { stage: "the minimum-snap system" })?;
+            let derivatives =
+                knot_derivatives(stretch, own).ok_or(Error::Numerical { stage: "the minimum-snap system" })?;
             for (i, &t) in own.iter().enumerate() {
                 segments.push(hermite(&stretch[i], &derivatives[i], &stretch[i + 1], &derivatives[i + 1], t));
             }
@@ -147,10 +148,17 @@ impl Trajectory {
 }
 
 /// Bernstein coefficients of the degree-7 polynomials with the given derivatives at both ends.
-fn hermite(start: &Vector4<f64>, out: &Joint, end: &Vector4<f64>, into: &Joint, t: f64) -> [Bernstein; 4] {
+fn hermite(
+    start: &Vector4<f64>,
+    out: &KnotDerivatives,
+    end: &Vector4<f64>,
+    into: &KnotDerivatives,
+    t: f64,
+) -> [Bernstein; 4] {
     std::array::from_fn(|axis| {
-        let ladder = |p: f64, joint: &Joint, t: f64| {
-            let (v, a, j) = (joint[(0, axis)] * t, joint[(1, axis)] * t * t, joint[(2, axis)] * t * t * t);
+        let ladder = |p: f64, derivatives: &KnotDerivatives, t: f64| {
+            let (v, a, j) =
+                (derivatives[(0, axis)] * t, derivatives[(1, axis)] * t * t, derivatives[(2, axis)] * t * t * t);
             [p, p + v / 7.0, p + 2.0 * v / 7.0 + a / 42.0, p + 3.0 * v / 7.0 + a / 14.0 + j / 210.0]
         };
         let (a, b) = (ladder(start[axis], out, t), ladder(end[axis], into, -t));

@@ -1,23 +1,14 @@
 //! From reflectance spectra to colours: CIE XYZ under D65, CIELAB, sRGB.
 
 mod ciede2000;
+mod spectrum;
 mod tables;
 
 pub use ciede2000::ciede2000;
-
-/// Number of spectral bands: 380 to 730 nm in steps of 10 nm.
-pub const BANDS: usize = 36;
-
-/// One value per band.
-pub type Spectrum = [f64; BANDS];
+pub use spectrum::{BANDS, Spectrum, wavelength};
 
 /// Tristimulus values of the D65 white that sRGB is defined for (IEC 61966-2-1).
 pub const WHITE: [f64; 3] = [0.95047, 1.0, 1.08883];
-
-/// Wavelength of a band, nm.
-pub fn wavelength(band: usize) -> f64 {
-    380.0 + 10.0 * band as f64
-}
 
 /// Tristimulus values of a reflecting surface under D65 for the 2 degree observer, `Y = 1` for the perfect white: the
 /// plain sum over the bands, whose own white is (0.950119, 1, 1.088161), see [`band_white`].

@@ -44,12 +44,12 @@ pub enum Error {
         /// How many faces were given.
         faces: usize,
     },
-    /// More paint than the books can count.
-    #[error("the books would exceed 2^64 femtolitres (18 cubic metres): check the unit of the shot volumes (m^3)")]
-    BooksOverflow,
+    /// More paint than the mass balance can count.
+    #[error("the paint would exceed 2^64 femtolitres (18 cubic metres): check the unit of the shot volumes (m^3)")]
+    MassOverflow,
     /// The hose cannot reach the vehicle.
     #[error("a hose of {length} m cannot span {distance} m: lengthen it or move its base")]
-    TetherTooShort {
+    HoseTooShort {
         /// Length of the hose, m.
         length: f64,
         /// Distance from base to vehicle, m.

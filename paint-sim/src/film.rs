@@ -2,61 +2,32 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Point3, UnitVector3};
+use crate::error::{Error, check_positive, check_range};
+use crate::spray::{QUANTUM, Shot, SprayModel};
+use crate::surface::Surface;
 
-use crate::Error;
-use crate::error::check_positive;
-use crate::spray::QUANTUM;
-
+mod ball_tree;
 mod deposit;
-mod tree;
+mod mass_balance;
+mod texel;
+mod texel_index;
 
-use tree::Tree;
+pub use mass_balance::MassBalance;
+pub use texel::Texel;
 
-/// A piece of the painted surface.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Texel {
-    /// Its centre in the world frame, m.
-    pub point: Point3<f64>,
-    /// Unit normal of the painted side.
-    pub normal: UnitVector3<f64>,
-    /// Area of real surface that it stands for, m^2.
-    pub area: f64,
-}
-
-/// Where the paint went, in quanta of one femtolitre. `emitted == deposited + overspray` always holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Books {
-    /// Paint that left the nozzle.
-    pub emitted: u64,
-    /// Paint on the texels.
-    pub deposited: u64,
-    /// Paint that met no texel.
-    pub overspray: u64,
-}
-
-impl Books {
-    /// Whether nothing was lost or invented.
-    pub fn balanced(&self) -> bool {
-        self.deposited.checked_add(self.overspray) == Some(self.emitted)
-    }
-}
+use ball_tree::BallTree;
+use deposit::{SHOTS_PER_BATCH, count_quanta, deposit_batch};
+use texel::check_unit;
+use texel_index::TexelIndex;
 
 /// One layer of paint on a set of texels.
 ///
 /// Several paints are several films on the same texels, see [`Film::layer`].
 #[derive(Debug, Clone)]
 pub struct Film {
-    canvas: Arc<Canvas>,
+    index: Arc<TexelIndex>,
     volumes: Vec<u64>,
-    books: Books,
-}
-
-/// The texels and the index over them: shared by all films on one surface.
-#[derive(Debug)]
-struct Canvas {
-    texels: Vec<Texel>,
-    tree: Tree,
+    mass_balance: MassBalance,
 }
 
 impl Film {
@@ -79,20 +50,24 @@ impl Film {
             check_positive("texel area", texel.area)?;
             check_unit("length of a texel normal", &texel.normal)?;
         }
-        let tree = Tree::new(&texels);
+        let tree = BallTree::new(&texels);
         let volumes = vec![0; texels.len()];
-        Ok(Self { canvas: Arc::new(Canvas { texels, tree }), volumes, books: Books::default() })
+        Ok(Self { index: Arc::new(TexelIndex { texels, tree }), volumes, mass_balance: MassBalance::default() })
     }
 
     /// An empty film on the same texels: the next paint, or the next coat on a dry one.
     #[must_use]
     pub fn layer(&self) -> Self {
-        Self { canvas: Arc::clone(&self.canvas), volumes: vec![0; self.volumes.len()], books: Books::default() }
+        Self {
+            index: Arc::clone(&self.index),
+            volumes: vec![0; self.volumes.len()],
+            mass_balance: MassBalance::default(),
+        }
     }
 
     /// The texels, in the order in which they were given.
     pub fn texels(&self) -> &[Texel] {
-        &self.canvas.texels
+        &self.index.texels
     }
 
     /// Paint per texel in femtolitres.
@@ -102,19 +77,70 @@ impl Film {
 
     /// Thickness of the paint on texel `index`, m; zero where there is no such texel.
     pub fn thickness(&self, index: usize) -> f64 {
-        match (self.volumes.get(index), self.canvas.texels.get(index)) {
+        match (self.volumes.get(index), self.index.texels.get(index)) {
             (Some(&volume), Some(texel)) => volume as f64 * QUANTUM / texel.area,
             _ => 0.0,
         }
     }
 
-    /// The books since the film was empty.
-    pub fn books(&self) -> Books {
-        self.books
+    /// The mass balance since the film was empty.
+    pub fn mass_balance(&self) -> MassBalance {
+        self.mass_balance
+    }
+
+    /// Sprays `shots` onto the film and returns the mass balance of this call.
+    ///
+    /// Each texel receives `V * density * area` where the shadow ray from the nozzle to its centre is free; a texel that
+    /// is coarse for the spot is integrated by Gauss's rule over a square of its area. If the texels of a shot
+    /// together claim more than its share `efficiency` (they are a finite sum), they are scaled down to it. Each shot is
+    /// rounded to whole femtolitres by the largest remainder, so the result is the same for every number of `threads`.
+    /// `progress(done, total)` is called on the calling thread about every thousand shots.
+    ///
+    /// # Errors
+    /// Shots or settings that are not finite or out of range, no threads, or paint beyond 2^64 femtolitres; the film is
+    /// then unchanged.
+    pub fn deposit(
+        &mut self,
+        shots: &[Shot],
+        spray: &SprayModel,
+        surface: &dyn Surface,
+        threads: usize,
+        progress: &mut dyn FnMut(usize, usize),
+    ) -> Result<MassBalance, Error> {
+        spray.check()?;
+        check_range("threads", threads as f64, 1.0, 1024.0, "between 1 and 1024")?;
+        let emitted = count_quanta(shots)?;
+        self.mass_balance.emitted.checked_add(emitted).ok_or(Error::MassOverflow)?;
+
+        let mut deposited = 0;
+        for (number, batch) in shots.chunks(SHOTS_PER_BATCH).enumerate() {
+            for (texel, quanta) in deposit_batch(&self.index, batch, spray, surface, threads) {
+                self.volumes[texel as usize] += quanta;
+                deposited += quanta;
+            }
+            progress(number * SHOTS_PER_BATCH + batch.len(), shots.len());
+        }
+        let call = MassBalance { emitted, deposited, overspray: emitted - deposited };
+        self.mass_balance.emitted += call.emitted;
+        self.mass_balance.deposited += call.deposited;
+        self.mass_balance.overspray += call.overspray;
+        Ok(call)
     }
 }
 
-/// Unit vectors can be built unchecked, and a wrong length would silently scale the paint.
-fn check_unit(what: &'static str, vector: &UnitVector3<f64>) -> Result<(), Error> {
-    crate::error::check_range(what, vector.norm(), 1.0 - 1e-6, 1.0 + 1e-6, "1 within 1e-6")
+/// Sprays `shots` onto bare `texels` in one call; the mass balance is [`Film::mass_balance`]. See [`Film::deposit`] for
+/// several coats and for progress.
+///
+/// # Errors
+/// As [`Film::new`] and [`Film::deposit`].
+pub fn spray(
+    texels: Vec<Texel>,
+    shots: &[Shot],
+    model: &SprayModel,
+    surface: &dyn Surface,
+    threads: usize,
+) -> Result<Film, Error> {
+    let mut film = Film::new(texels)?;
+    film.deposit(shots, model, surface, threads, &mut |_, _| ())?;
+    Ok(film)
 }

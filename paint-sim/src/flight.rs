@@ -2,33 +2,35 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::Error;
+use crate::error::{Error, check_range};
 use crate::surface::Surface;
 
+mod airframe;
 mod controller;
 mod estimator;
+mod hose;
 mod log;
 mod noise;
-mod ptu;
+mod pan_tilt;
 mod reference;
-mod servo;
+mod sample;
 mod settings;
 mod statistics;
-mod tether;
 mod vehicle;
 
+pub use airframe::{Airframe, Command, GRAVITY};
 pub use controller::{CascadedController, Controller, ControllerSettings};
 pub use estimator::{Estimate, Estimator, ObserverSettings};
-pub use log::{FlightLog, FlightSample};
-pub use ptu::{PanTilt, StraightPanTilt};
+pub use hose::{Catenary, HoseModel};
+pub use log::FlightLog;
+pub use pan_tilt::{IdealPanTilt, PanTilt};
 pub use reference::{Reference, ReferenceState};
-pub use servo::{Servo, ServoSettings};
-pub use settings::{Airframe, FlightSettings, Localisation, Valve, Wind};
+pub use sample::FlightSample;
+pub use settings::{FlightSettings, Localisation, Valve, Wind};
 pub use statistics::FlightStatistics;
-pub use tether::{Catenary, Tether};
-pub use vehicle::{Command, GRAVITY, Vehicle};
+pub use vehicle::Vehicle;
 
-use noise::{Air, PoseSensor};
+use noise::{PoseSensor, WindModel};
 
 /// Steps of the physics per second.
 const RATE: u32 = 1000;
@@ -37,11 +39,11 @@ const STEP: f64 = 1.0 / RATE as f64;
 const CONTROL_STEPS: i64 = 10;
 const CONTROL_STEP: f64 = CONTROL_STEPS as f64 * STEP;
 /// The spray is followed this far, m.
-const SPRAY_REACH: f64 = 10.0;
+const MAX_SPRAY_DISTANCE: f64 = 10.0;
 /// A vehicle farther than this from its reference is lost, m.
-const LOST: f64 = 20.0;
+const DIVERGENCE_DISTANCE: f64 = 20.0;
 /// Longest flight, s: a reference that asks for more has a wrong unit.
-const LONGEST: f64 = 86_400.0;
+const MAX_DURATION: f64 = 86_400.0;
 
 /// Flies `reference` with the built-in observer and controller, see [`fly_with`].
 ///
@@ -75,17 +77,17 @@ pub fn fly_with(
 ) -> Result<FlightLog, Error> {
     settings.check()?;
     let duration = reference.duration();
-    crate::error::check_range("duration of the reference", duration, 0.0, LONGEST, "between 0 and a day")?;
-    crate::error::check_range("delay of the pan-tilt unit", ptu.delay(), 0.0, 1.0, "between 0 and 1 s")?;
-    let hover = Hover { reference };
+    check_range("duration of the reference", duration, 0.0, MAX_DURATION, "between 0 and a day")?;
+    check_range("delay of the pan-tilt unit", ptu.delay(), 0.0, 1.0, "between 0 and 1 s")?;
+    let hover = HoldBeforeStart { reference };
     let start = checked(reference, 0.0)?;
 
     let mut vehicle = Vehicle::at_rest(start.position, start.heading);
-    let mut air = Air::new(&settings.wind, STEP, settings.seed);
+    let mut wind = WindModel::new(&settings.wind, STEP, settings.seed);
     let mut sensor = PoseSensor::new(settings.localisation, CONTROL_STEP, settings.seed);
     let mut estimator = Estimator::new(settings.airframe, ObserverSettings::default(), &sensor.measure(&vehicle));
     let mut command = Command { thrust: settings.airframe.mass * GRAVITY, ..Command::default() };
-    let mut hose = Vector3::zeros();
+    let mut hose_force = Vector3::zeros();
     let mut aim = [0.0; 2];
     let mut pan_tilt = [0.0; 2];
     ptu.reset(aim);
@@ -101,7 +103,7 @@ pub fn fly_with(
         if step % CONTROL_STEPS == 0 {
             let wanted = checked(&hover, time)?;
             let distance = (vehicle.position - wanted.position).norm();
-            if distance.is_nan() || distance > LOST {
+            if distance.is_nan() || distance > DIVERGENCE_DISTANCE {
                 return Err(Error::Diverged { time, distance });
             }
             if step > first {
@@ -112,8 +114,8 @@ pub fn fly_with(
                 return Err(Error::BadCallback { who: "the controller", time });
             }
             estimator.set_command(command);
-            if let Some(tether) = &settings.tether {
-                hose = tether.force(&vehicle.position)?;
+            if let Some(model) = &settings.hose {
+                hose_force = model.force(&vehicle.position)?;
             }
             // A command holds for one control step, so on average it acts half a step later still.
             let ahead = ptu.delay() + 0.5 * CONTROL_STEP;
@@ -121,10 +123,10 @@ pub fn fly_with(
             aim = target.map_or([0.0; 2], |point| ptu.command(&estimator.predict(ahead), &point));
         }
         if step >= 0 && step % log_steps == 0 {
-            let scene = Scene { reference, ptu, surface, settings };
+            let scene = SampleContext { reference, ptu, surface, settings };
             samples.push(scene.sample(time, &vehicle, pan_tilt, estimator.estimate())?);
         }
-        vehicle.step(&settings.airframe, &command, &air.step(), &hose, STEP);
+        vehicle.step(&settings.airframe, &command, &wind.step(), &hose_force, STEP);
         pan_tilt = ptu.step(aim, STEP);
         if !pan_tilt.iter().all(|v| v.is_finite()) {
             return Err(Error::BadCallback { who: "the pan-tilt unit", time });
@@ -134,11 +136,11 @@ pub fn fly_with(
 }
 
 /// The reference, standing still at its first state before time zero.
-struct Hover<'a> {
+struct HoldBeforeStart<'a> {
     reference: &'a dyn Reference,
 }
 
-impl Reference for Hover<'_> {
+impl Reference for HoldBeforeStart<'_> {
     fn duration(&self) -> f64 {
         self.reference.duration()
     }
@@ -159,14 +161,14 @@ fn checked(reference: &dyn Reference, time: f64) -> Result<ReferenceState, Error
 }
 
 /// What a sample of the log is measured against.
-struct Scene<'a> {
+struct SampleContext<'a> {
     reference: &'a dyn Reference,
     ptu: &'a dyn PanTilt,
     surface: &'a dyn Surface,
     settings: &'a FlightSettings,
 }
 
-impl Scene<'_> {
+impl SampleContext<'_> {
     fn sample(
         &self,
         time: f64,
@@ -180,7 +182,7 @@ impl Scene<'_> {
         if !nozzle.iter().chain(axis.iter()).all(|v| v.is_finite()) {
             return Err(Error::BadCallback { who: "the pan-tilt unit", time });
         }
-        let distance = self.surface.cast(&nozzle, &axis, SPRAY_REACH).map(|hit| hit.distance);
+        let distance = self.surface.cast(&nozzle, &axis, MAX_SPRAY_DISTANCE).map(|hit| hit.distance);
         Ok(FlightSample {
             time,
             world_from_body,

@@ -1,4 +1,4 @@
-//! Spray deposit with exact books, Kubelka-Munk appearance, a renderer, and the closed-loop flight that paints.
+//! Spray deposit with an exact mass balance, Kubelka-Munk appearance, a renderer, and the closed-loop flight that paints.
 //!
 //! A [`Film`] collects the paint of [`Shot`]s on texels in whole femtolitres; a [`Paint`] turns its thickness into a
 //! spectrum and a colour; [`render()`] shows the result to any camera; [`fly`] simulates the vehicle, wind, hose, pan-tilt
@@ -24,8 +24,8 @@
 //! let texel = |i: i32| Texel { point: Point3::new(0.0, f64::from(i) * 1e-3, 0.0), normal: -Vector3::x_axis(), area: 1e-6 };
 //! let mut film = Film::new((-50..=50).map(texel).collect())?;
 //! let shot = Shot { origin: Point3::new(-0.1, 0.0, 0.0), axis: Vector3::x_axis(), volume: 2e-9 };
-//! let books = film.deposit(&[shot], &SprayModel::default(), &wall, 1, &mut |_, _| {})?;
-//! assert!(books.balanced());
+//! let balance = film.deposit(&[shot], &SprayModel::default(), &wall, 1, &mut |_, _| {})?;
+//! assert!(balance.balanced());
 //! let coat = Paint::yellow(50e-6)?.over(film.thickness(50), &Substrate::grey(0.3)?)?;
 //! println!("{:?}", coat.srgb().rgb);
 //! # Ok(())
@@ -35,7 +35,7 @@
 //! | source | equation | item |
 //! |---|---|---|
 //! | VR paper, Section IV (form ours) | conical Gaussian spray, per area and volume | [`SprayModel::density`] |
-//! | handheld paper, Section V (ours) | paint per texel, exact books | [`Film::deposit`], [`Books`] |
+//! | handheld paper, Section V (ours) | paint per texel, exact mass balance | [`Film::deposit`], [`MassBalance`] |
 //! | Kubelka 1948 | film of finite thickness on a ground | [`km::reflectance`] |
 //! | Kubelka-Munk 1931 | opaque film, Riccati equation | [`km::opaque_reflectance`], [`km::gradient`] |
 //! | Kubelka 1954 | layers on layers | [`km::Layer::over`] |
@@ -43,8 +43,8 @@
 //! | Saunderson 1942 | the air above the paint | [`km::saunderson`] |
 //! | CIE 015, IEC 61966-2-1 | XYZ, CIELAB, sRGB of 36 bands | [`colour`] |
 //! | Sharma, Wu, Dalal 2005 | colour difference CIEDE2000 | [`ciede2000`] |
-//! | Paper II, Section 5.2 (roll and pitch), drag ours | first-order attitude, rotor drag | [`flight::Vehicle::step`] |
-//! | catenary (textbook) | hose force | [`flight::Tether::force`] |
+//! | Paper II, Section 5.2 (roll and pitch), linear drag | first-order attitude, rotor drag | [`flight::Vehicle::step`] |
+//! | catenary (textbook) | hose force | [`flight::HoseModel::force`] |
 //! | Paper II, Section 7.2 | hit error, distance error, angle errors | [`FlightStatistics`] |
 
 pub mod colour;
@@ -62,9 +62,9 @@ pub use nalgebra;
 
 pub use colour::ciede2000;
 pub use error::Error;
-pub use film::{Books, Film, Texel};
+pub use film::{Film, MassBalance, Texel, spray};
 pub use flight::{FlightLog, FlightSettings, FlightStatistics, PanTilt, Reference, ReferenceState, fly};
 pub use paint::{Paint, Substrate};
-pub use render::{Camera, Frame, Lights, Look, render};
+pub use render::{Camera, Frame, Lights, Shading, render};
 pub use spray::{Shot, SprayModel};
 pub use surface::{Hit, Surface, TriangleSurface};

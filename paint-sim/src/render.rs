@@ -2,13 +2,12 @@
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 
-use crate::Error;
 use crate::colour::encode_srgb8;
-use crate::error::{check_positive, check_range};
+use crate::error::{Error, check_positive, check_range};
 use crate::surface::{Hit, Surface};
 
 /// Rays end here, m: beyond it there is only background.
-const FAR: f64 = 1e4;
+const MAX_RAY_LENGTH: f64 = 1e4;
 
 /// A pinhole camera with `OpenCV` axes: x right, y down, z forward. The centre of pixel (0, 0) has the image
 /// coordinates (0, 0), so that a camera in the middle has `cx = (width - 1) / 2`.
@@ -34,7 +33,7 @@ impl Camera {
     /// A camera at `eye` that looks at `target`, with `up` upwards in the picture and the given horizontal opening angle.
     ///
     /// # Errors
-    /// Numbers that are not finite, `target` at `eye`, a view along `up`, an angle outside 0..pi or an empty image.
+    /// Numbers that are not finite, `target` at `eye`, a renderer along `up`, an angle outside 0..pi or an empty image.
     pub fn looking_at(
         eye: &Point3<f64>,
         target: &Point3<f64>,
@@ -45,7 +44,7 @@ impl Camera {
         check_range("horizontal angle of a camera", horizontal_angle, 1e-6, 3.1, "between 0 and 3.1 rad")?;
         let forward = target - eye;
         check_positive("distance from the eye to the target", forward.norm())?;
-        check_positive("angle between the view and `up`", forward.cross(up).norm())?;
+        check_positive("angle between the renderer and `up`", forward.cross(up).norm())?;
         // In OpenCV axes the picture's "up" is -y.
         let world_from_camera = Isometry3::face_towards(eye, target, &-up);
         let f = 0.5 * f64::from(width) / (0.5 * horizontal_angle).tan();
@@ -92,19 +91,19 @@ pub struct Lights {
 }
 
 impl Default for Lights {
-    /// A high sun from the front right (ours).
+    /// A high sun from the front right.
     fn default() -> Self {
         let towards_sun = UnitVector3::new_normalize(Vector3::new(0.3, -0.4, 0.87));
         Self { towards_sun, sun: [0.7; 3], ambient: [0.3; 3], background: [0.85, 0.9, 1.0] }
     }
 }
 
-/// What a point of the surface looks like.
+/// How a point of the surface is shaded.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Look {
+pub struct Shading {
     /// Albedo, linear RGB.
     pub albedo: [f32; 3],
-    /// Unit normal for the light, either side: the hit's own for facets, an interpolated one for a smooth look. Shadows and
+    /// Unit normal for the light, either side: the hit's own for facets, an interpolated one for smooth shading. Shadows and
     /// [`Frame::normals`] follow the geometry.
     pub normal: Vector3<f64>,
 }
@@ -126,7 +125,7 @@ pub struct Frame {
     pub normals: Vec<[f32; 3]>,
 }
 
-/// Renders `surface`; `shade` gives the look of a hit, surfaces are matt and two-sided.
+/// Renders `surface`; `shade` gives the shading of a hit, surfaces are matt and two-sided.
 ///
 /// Each pixel's colour is the mean of `supersampling`^2 rays on a regular grid, each with a shadow ray towards the sun;
 /// depth, face and normal belong to the pixel's centre. The picture does not depend on `threads`.
@@ -136,7 +135,7 @@ pub struct Frame {
 pub fn render(
     surface: &dyn Surface,
     camera: &Camera,
-    shade: &(dyn Fn(&Hit) -> Look + Sync),
+    shade: &(dyn Fn(&Hit) -> Shading + Sync),
     lights: &Lights,
     supersampling: u32,
     threads: usize,
@@ -148,7 +147,7 @@ pub fn render(
     if !(light.into_iter().all(|v| v.is_finite()) && lights.towards_sun.iter().all(|v| v.is_finite())) {
         return Err(Error::NotFinite { what: "light", index: 0 });
     }
-    let view = View { surface, camera, shade, lights, supersampling };
+    let renderer = RowRenderer { surface, camera, shade, lights, supersampling };
     let pixels = camera.width as usize * camera.height as usize;
     let mut frame = Frame {
         width: camera.width,
@@ -168,13 +167,13 @@ pub fn render(
         .collect();
     if threads == 1 {
         for row in &mut rows {
-            view.fill(row);
+            renderer.fill(row);
         }
     } else {
         let share = rows.len().div_ceil(threads);
         std::thread::scope(|scope| {
             for chunk in rows.chunks_mut(share) {
-                scope.spawn(|| chunk.iter_mut().for_each(|row| view.fill(row)));
+                scope.spawn(|| chunk.iter_mut().for_each(|row| renderer.fill(row)));
             }
         });
     }
@@ -190,15 +189,15 @@ struct Row<'a> {
     normals: &'a mut [[f32; 3]],
 }
 
-struct View<'a> {
+struct RowRenderer<'a> {
     surface: &'a dyn Surface,
     camera: &'a Camera,
-    shade: &'a (dyn Fn(&Hit) -> Look + Sync),
+    shade: &'a (dyn Fn(&Hit) -> Shading + Sync),
     lights: &'a Lights,
     supersampling: u32,
 }
 
-impl View<'_> {
+impl RowRenderer<'_> {
     fn fill(&self, row: &mut Row) {
         for column in 0..row.colour.len() {
             let (u, v) = (column as f64, f64::from(row.v));
@@ -216,7 +215,7 @@ impl View<'_> {
 
     fn cast(&self, direction: &Vector3<f64>) -> Option<Hit> {
         let eye = Point3::from(self.camera.world_from_camera.translation.vector);
-        self.surface.cast(&eye, direction, FAR)
+        self.surface.cast(&eye, direction, MAX_RAY_LENGTH)
     }
 
     /// Mean light over a regular grid of rays inside the pixel.
@@ -234,7 +233,7 @@ impl View<'_> {
 
     fn light(&self, hit: Option<&Hit>, direction: &Vector3<f64>) -> [f32; 3] {
         let Some(hit) = hit else { return self.lights.background };
-        let Look { albedo, normal: shading } = (self.shade)(hit);
+        let Shading { albedo, normal: shading } = (self.shade)(hit);
         let normal = facing(hit, direction);
         let towards_sun = self.lights.towards_sun.as_ref();
         let lit_side = if shading.dot(&normal) < 0.0 { -shading } else { shading };
@@ -243,7 +242,7 @@ impl View<'_> {
             let eye = self.camera.world_from_camera.translation.vector;
             // Off the surface by more than the rounding of the hit, or it would shade itself.
             let start = Point3::from(eye + direction * hit.distance + normal * (1e-6 * (1.0 + hit.distance)));
-            if self.surface.occluded(&start, towards_sun, FAR) {
+            if self.surface.occluded(&start, towards_sun, MAX_RAY_LENGTH) {
                 cosine = 0.0;
             }
         }

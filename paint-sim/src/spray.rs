@@ -2,30 +2,29 @@
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 
-use crate::Error;
-use crate::error::{check_positive, check_range};
+use crate::error::{Error, check_positive, check_range};
 
-/// One quantum of paint in the books: one femtolitre, in cubic metres.
+/// One quantum of paint in the mass balance: one femtolitre, in cubic metres.
 pub const QUANTUM: f64 = 1e-18;
 
 /// A conical spray whose flux is Gaussian in slope space, `g(s) = exp(-|s|^2 / 2 t^2) / (2 pi t^2)` with `t = tan(sigma)`
 /// and `s` the sideways offset per metre of depth along the axis.
 ///
-/// The cone model is the VR paper's (Section IV); it prints neither angle nor flow, so the defaults are ours.
+/// The cone model is the VR paper's (Section IV); it prints neither angle nor flow, so the defaults are engineering values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct SprayModel {
     /// Standard deviation of the spread as an angle from the axis, rad; the slope's deviation is its tangent.
-    /// Default 8 degrees (ours): a spot of 14 mm sigma from 10 cm.
+    /// Default 8 degrees: a spot of 14 mm sigma from 10 cm.
     pub sigma: f64,
-    /// Half opening of the cone in multiples of sigma, measured in slope; the Gaussian is renormalised inside. Default 3 (ours).
+    /// Half opening of the cone in multiples of sigma, measured in slope; the Gaussian is renormalised inside. Default 3.
     pub cut: f64,
-    /// Share of the paint inside the cone that sticks where it lands, 0..=1; the rest is overspray. Default 1 (ours).
+    /// Share of the paint inside the cone that sticks where it lands, 0..=1; the rest is overspray. Default 1.
     pub efficiency: f64,
-    /// Depth along the axis beyond which paint counts as overspray, m. Default 1 (ours).
+    /// Depth along the axis beyond which paint counts as overspray, m. Default 1.
     pub range: f64,
     /// How far before a texel its shadow ray ends, m: larger than the roughness by which texels lie below the mesh.
-    /// Default 1 mm (ours).
+    /// Default 1 mm.
     pub shadow_bias: f64,
 }
 
@@ -118,7 +117,7 @@ impl<'a> Cone<'a> {
     }
 
     /// Whether a ball may touch the cone; never false when it does.
-    pub(crate) fn may_touch(&self, center: &Point3<f64>, radius: f64) -> bool {
+    pub(crate) fn may_intersect(&self, center: &Point3<f64>, radius: f64) -> bool {
         let ray = center - self.origin;
         let depth = ray.dot(self.axis);
         if depth < -radius || depth > self.range + radius {

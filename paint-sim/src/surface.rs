@@ -1,34 +1,7 @@
-//! The surface that is painted, seen as something rays can hit.
-
-use nalgebra::{Point3, Vector3};
+//! The surface that is painted: ray casts and distances.
 
 mod mesh;
+mod ray_query;
 
 pub use mesh::TriangleSurface;
-
-/// Where a ray meets a surface.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hit {
-    /// Distance from the origin of the ray, m.
-    pub distance: f64,
-    /// Index of the triangle.
-    pub face: u32,
-    /// Weights of the triangle's second and third vertex; the first has `1 - a - b`.
-    pub barycentric: [f64; 2],
-    /// Geometric unit normal of the triangle by the right-hand rule of its vertices; it is not turned towards the ray.
-    pub normal: Vector3<f64>,
-}
-
-/// What this crate needs to know of a surface. All points and vectors are in the world frame, in metres.
-pub trait Surface: Sync {
-    /// The first hit of the ray within `max` metres, from either side of the surface. `direction` has unit length.
-    fn cast(&self, origin: &Point3<f64>, direction: &Vector3<f64>, max: f64) -> Option<Hit>;
-
-    /// Whether anything lies on the ray before `max` metres. Override it where any hit is cheaper than the first one.
-    fn occluded(&self, origin: &Point3<f64>, direction: &Vector3<f64>, max: f64) -> bool {
-        self.cast(origin, direction, max).is_some()
-    }
-
-    /// Distance from `point` to the closest point of the surface, at most `max` (also returned when it is farther), m.
-    fn distance(&self, point: &Point3<f64>, max: f64) -> f64;
-}
+pub use ray_query::{Hit, Surface};

@@ -67,23 +67,23 @@ fn the_white_of_the_bands() {
     assert_eq!(white.rgb, [255; 3]);
 }
 
-/// What a stack of paints must look like: computed in Python from the pigments' formulas and the textbook form.
-struct Look {
+/// The colour of a stack of paints, computed in Python from the pigments' formulas and the textbook form.
+struct ExpectedColour {
     xyz: [f64; 3],
     lab: [f64; 3],
     rgb: [u8; 3],
     clipped: bool,
 }
 
-fn assert_looks(stack: &Substrate, look: &Look) {
+fn assert_colour(stack: &Substrate, expected: &ExpectedColour) {
     let reflectance = stack.reflectance();
     let (values, lab, screen) = (xyz(reflectance), spectrum_lab(reflectance), spectrum_srgb8(reflectance));
     for i in 0..3 {
-        assert!((values[i] - look.xyz[i]).abs() < 6e-8, "{values:?} instead of {:?}", look.xyz);
-        assert!((lab[i] - look.lab[i]).abs() < 6e-5, "{lab:?} instead of {:?}", look.lab);
+        assert!((values[i] - expected.xyz[i]).abs() < 6e-8, "{values:?} instead of {:?}", expected.xyz);
+        assert!((lab[i] - expected.lab[i]).abs() < 6e-5, "{lab:?} instead of {:?}", expected.lab);
     }
-    assert_eq!(screen.rgb, look.rgb);
-    assert_eq!(screen.clipped, look.clipped);
+    assert_eq!(screen.rgb, expected.rgb);
+    assert_eq!(screen.clipped, expected.clipped);
 }
 
 #[test]
@@ -91,27 +91,27 @@ fn stacks_of_the_synthetic_pigments() {
     // A film of one metre, since the formulas are for d = 1.
     let (yellow, blue, white) = (Paint::yellow(1.0).unwrap(), Paint::blue(1.0).unwrap(), Paint::white(1.0).unwrap());
     let ground = Substrate::grey(0.9).unwrap();
-    assert_looks(
+    assert_colour(
         &yellow.over(1.0, &ground).unwrap(),
-        &Look {
+        &ExpectedColour {
             xyz: [0.6749521, 0.6957015, 0.1333447],
             lab: [86.78561, 3.09571, 77.87654],
             rgb: [255, 212, 54],
             clipped: true,
         },
     );
-    assert_looks(
+    assert_colour(
         &blue.over(1.0, &ground).unwrap(),
-        &Look {
+        &ExpectedColour {
             xyz: [0.2201758, 0.2238477, 0.8257989],
             lab: [54.43290, 3.52461, -60.99152],
             rgb: [0, 135, 236],
             clipped: true,
         },
     );
-    assert_looks(
+    assert_colour(
         &white.over(1.0, &Substrate::grey(0.05).unwrap()).unwrap(),
-        &Look {
+        &ExpectedColour {
             xyz: [0.4867837, 0.5125842, 0.5565916],
             lab: [76.83528, -0.0636, 0.1132],
             rgb: [190, 190, 189],
@@ -119,9 +119,9 @@ fn stacks_of_the_synthetic_pigments() {
         },
     );
     let mixed = Paint::mix(&[(yellow, 0.7), (blue, 0.3)]).unwrap().over(1.0, &ground).unwrap();
-    assert_looks(
+    assert_colour(
         &mixed,
-        &Look {
+        &ExpectedColour {
             xyz: [0.3689504, 0.4328191, 0.1435435],
             lab: [71.74589, -13.43306, 49.47531],
             rgb: [180, 181, 82],
@@ -129,9 +129,9 @@ fn stacks_of_the_synthetic_pigments() {
         },
     );
     let yellow_on_top = yellow.over(0.7, &blue.over(0.3, &ground).unwrap()).unwrap();
-    assert_looks(
+    assert_colour(
         &yellow_on_top,
-        &Look {
+        &ExpectedColour {
             xyz: [0.4325981, 0.4893518, 0.1383666],
             lab: [75.41098, -9.35710, 57.03337],
             rgb: [201, 188, 75],
@@ -139,9 +139,9 @@ fn stacks_of_the_synthetic_pigments() {
         },
     );
     let blue_on_top = blue.over(0.3, &yellow.over(0.7, &ground).unwrap()).unwrap();
-    assert_looks(
+    assert_colour(
         &blue_on_top,
-        &Look {
+        &ExpectedColour {
             xyz: [0.3259795, 0.3893049, 0.1661913],
             lab: [68.70089, -15.05826, 39.13009],
             rgb: [165, 174, 95],

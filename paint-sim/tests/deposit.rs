@@ -1,9 +1,9 @@
-//! Spray on texels: closed forms, books, shadows, threads.
+//! Spray on texels: closed forms, balance, shadows, threads.
 #![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use paint_sim::spray::QUANTUM;
-use paint_sim::{Books, Error, Film, Shot, SprayModel, Texel, TriangleSurface};
+use paint_sim::{Error, Film, Hit, MassBalance, Shot, SprayModel, Surface, Texel, TriangleSurface};
 
 fn unit(x: f64, y: f64, z: f64) -> UnitVector3<f64> {
     UnitVector3::new_normalize(Vector3::new(x, y, z))
@@ -36,7 +36,13 @@ fn shot(x: f64, y: f64, volume: f64) -> Shot {
     Shot { origin: Point3::new(x, y, 0.0), axis: unit(0.0, 0.0, 1.0), volume }
 }
 
-fn spray(film: &mut Film, shots: &[Shot], model: &SprayModel, surface: &TriangleSurface, threads: usize) -> Books {
+fn spray(
+    film: &mut Film,
+    shots: &[Shot],
+    model: &SprayModel,
+    surface: &TriangleSurface,
+    threads: usize,
+) -> MassBalance {
     film.deposit(shots, model, surface, threads, &mut |_, _| {}).unwrap()
 }
 
@@ -68,11 +74,11 @@ fn all_paint_lands_on_a_plane_whatever_its_tilt() {
         let mut texels = tilted_plane(degrees.to_radians(), 0.1, step, 0.4);
         texels.retain(|texel| texel.point.y.abs() < 0.17);
         let mut film = Film::new(texels).unwrap();
-        let books = spray(&mut film, &[shot(0.0, 0.0, 1e-9)], &model, &far_plate(), 1);
-        let share = books.deposited as f64 / books.emitted as f64;
+        let balance = spray(&mut film, &[shot(0.0, 0.0, 1e-9)], &model, &far_plate(), 1);
+        let share = balance.deposited as f64 / balance.emitted as f64;
         assert!((share - 1.0).abs() < 1e-3, "{degrees}: {share}");
-        assert!(books.balanced() && books.emitted == 1_000_000_000);
-        assert_eq!(film.volumes().iter().sum::<u64>(), books.deposited);
+        assert!(balance.balanced() && balance.emitted == 1_000_000_000);
+        assert_eq!(film.volumes().iter().sum::<u64>(), balance.deposited);
     }
 }
 
@@ -84,8 +90,8 @@ fn a_straight_pass_leaves_the_line_dose() {
     let offsets = [0.0, 0.01, 0.02, 0.03];
     let texel = |&y: &f64| Texel { point: Point3::new(0.0, y, 0.1), normal: unit(0.0, 0.0, -1.0), area: 1e-8 };
     let mut film = Film::new(offsets.iter().map(texel).collect()).unwrap();
-    let books = spray(&mut film, &shots, &uncut(), &far_plate(), 2);
-    assert!(books.balanced());
+    let balance = spray(&mut film, &shots, &uncut(), &far_plate(), 2);
+    assert!(balance.balanced());
     let deviation = 0.1 * 8.0_f64.to_radians().tan();
     for (i, y) in offsets.iter().enumerate() {
         let dose = 283.862 * flow * (-0.5 * (y / deviation).powi(2)).exp();
@@ -99,8 +105,8 @@ fn coarse_texels_are_integrated() {
     // One square of 4 cm at 10 cm catches erf(0.02 / (sqrt(2) 0.1 tan 8 deg))^2 of the paint (erf from Python's math).
     let texel = Texel { point: Point3::new(0.0, 0.0, 0.1), normal: unit(0.0, 0.0, -1.0), area: 0.04 * 0.04 };
     let mut film = Film::new(vec![texel]).unwrap();
-    let books = spray(&mut film, &[shot(0.0, 0.0, 1e-9)], &uncut(), &far_plate(), 1);
-    let share = books.deposited as f64 / books.emitted as f64;
+    let balance = spray(&mut film, &[shot(0.0, 0.0, 1e-9)], &uncut(), &far_plate(), 1);
+    let share = balance.deposited as f64 / balance.emitted as f64;
     assert!((share / ERF_SQUARED - 1.0).abs() < 2e-3, "{share}");
 }
 const ERF_SQUARED: f64 = 0.7145072034719534;
@@ -145,7 +151,7 @@ fn shadows_and_backs_get_nothing() {
     let surface = TriangleSurface::new(&positions, &faces).unwrap();
     let mut film = Film::new(tilted_plane(0.0, 0.1, 2e-3, 0.05)).unwrap();
     let mut back = film.layer();
-    let books = spray(&mut film, &[shot(0.0, 0.0, 1e-9)], &SprayModel::default(), &surface, 1);
+    let balance = spray(&mut film, &[shot(0.0, 0.0, 1e-9)], &SprayModel::default(), &surface, 1);
     for (texel, &volume) in film.texels().iter().zip(film.volumes()) {
         if texel.point.x > 1e-9 {
             assert_eq!(volume, 0, "{}", texel.point);
@@ -153,7 +159,7 @@ fn shadows_and_backs_get_nothing() {
             assert!(volume > 0, "{}", texel.point);
         }
     }
-    assert!(books.balanced() && books.overspray > 0);
+    assert!(balance.balanced() && balance.overspray > 0);
     let from_behind = Shot { origin: Point3::new(0.0, 0.0, 0.2), axis: unit(0.0, 0.0, -1.0), volume: 1e-9 };
     assert_eq!(spray(&mut back, &[from_behind], &SprayModel::default(), &far_plate(), 1).deposited, 0);
 }
@@ -164,21 +170,21 @@ fn the_same_bytes_for_any_number_of_threads() {
     let surface = TriangleSurface::new(&positions, &faces).unwrap();
     let shots: Vec<Shot> = (0..3000).map(|i| shot(0.05 * (f64::from(i) * 0.01).sin(), 0.0, 5.4321e-12)).collect();
     let blank = Film::new(tilted_plane(0.3, 0.1, 2e-3, 0.06)).unwrap();
-    let results: Vec<(Vec<u64>, Books)> = [1, 2, 3, 7]
+    let results: Vec<(Vec<u64>, MassBalance)> = [1, 2, 3, 7]
         .map(|threads| {
             let mut film = blank.layer();
             let mut calls = Vec::new();
             film.deposit(&shots, &SprayModel::default(), &surface, threads, &mut |done, all| calls.push((done, all)))
                 .unwrap();
             assert_eq!(calls, [(1024, 3000), (2048, 3000), (3000, 3000)]);
-            (film.volumes().to_vec(), film.books())
+            (film.volumes().to_vec(), film.mass_balance())
         })
         .to_vec();
     assert!(results.windows(2).all(|pair| pair[0] == pair[1]));
-    let (volumes, books) = &results[0];
-    assert!(books.balanced() && books.deposited > 0);
-    assert_eq!(volumes.iter().sum::<u64>(), books.deposited);
-    assert_eq!(books.emitted, 3000 * 5_432_100);
+    let (volumes, balance) = &results[0];
+    assert!(balance.balanced() && balance.deposited > 0);
+    assert_eq!(volumes.iter().sum::<u64>(), balance.deposited);
+    assert_eq!(balance.emitted, 3000 * 5_432_100);
 }
 
 #[test]
@@ -188,8 +194,8 @@ fn texels_cannot_claim_more_than_was_sprayed() {
     texels.extend(texels.clone());
     let mut film = Film::new(texels).unwrap();
     let model = SprayModel { efficiency: 0.6, ..SprayModel::default() };
-    let books = spray(&mut film, &[shot(0.0, 0.0, 1e-9)], &model, &far_plate(), 1);
-    assert_eq!(books, Books { emitted: 1_000_000_000, deposited: 600_000_000, overspray: 400_000_000 });
+    let balance = spray(&mut film, &[shot(0.0, 0.0, 1e-9)], &model, &far_plate(), 1);
+    assert_eq!(balance, MassBalance { emitted: 1_000_000_000, deposited: 600_000_000, overspray: 400_000_000 });
 }
 
 #[test]
@@ -199,7 +205,7 @@ fn thickness_is_volume_over_area() {
     spray(&mut film, &[shot(0.0, 0.0, 1e-9)], &SprayModel::default(), &far_plate(), 1);
     assert_eq!(film.thickness(0), film.volumes()[0] as f64 * QUANTUM / 1e-6);
     assert_eq!(film.thickness(1), 0.0);
-    assert_eq!(film.layer().books(), Books::default());
+    assert_eq!(film.layer().mass_balance(), MassBalance::default());
 }
 
 #[test]
@@ -215,7 +221,7 @@ fn bad_input_is_named_and_leaves_the_film_alone() {
     let mut film = Film::new(texels).unwrap();
     let mut attempt = |shots: &[Shot], model: &SprayModel, threads| {
         let result = film.deposit(shots, model, &far_plate(), threads, &mut |_, _| {});
-        assert_eq!(film.books(), Books::default());
+        assert_eq!(film.mass_balance(), MassBalance::default());
         result.unwrap_err()
     };
     let (good, model) = (shot(0.0, 0.0, 1e-9), SprayModel::default());
@@ -226,8 +232,59 @@ fn bad_input_is_named_and_leaves_the_film_alone() {
     bad.axis = UnitVector3::new_unchecked(Vector3::new(0.0, 0.0, 2.0));
     assert!(matches!(attempt(&[bad], &model, 1), Error::OutOfRange { .. }));
     assert!(matches!(attempt(&[shot(0.0, 0.0, -1.0)], &model, 1), Error::OutOfRange { .. }));
-    assert!(matches!(attempt(&[shot(0.0, 0.0, 10.0), shot(0.0, 0.0, 10.0)], &model, 1), Error::BooksOverflow));
+    assert!(matches!(attempt(&[shot(0.0, 0.0, 10.0), shot(0.0, 0.0, 10.0)], &model, 1), Error::MassOverflow));
     assert!(matches!(attempt(&[good], &model, 0), Error::OutOfRange { what: "threads", .. }));
     let wide = SprayModel { sigma: 2.0, ..model };
     assert!(matches!(attempt(&[good], &wide, 1), Error::OutOfRange { what: "spray.sigma", .. }));
+}
+
+/// A ball in the spray, in closed form: a user's own surface.
+struct Ball {
+    centre: Point3<f64>,
+    radius: f64,
+}
+
+impl Surface for Ball {
+    fn cast(&self, origin: &Point3<f64>, direction: &Vector3<f64>, max: f64) -> Option<Hit> {
+        let to_centre = self.centre - origin;
+        let along = to_centre.dot(direction);
+        let beside = to_centre.norm_squared() - along * along;
+        let half = (self.radius * self.radius - beside).max(0.0).sqrt();
+        let distance = along - half;
+        let meets = beside < self.radius * self.radius && (0.0..=max).contains(&distance);
+        let normal = (direction * distance - to_centre) / self.radius;
+        meets.then_some(Hit { distance, face: 0, barycentric: [0.0; 2], normal })
+    }
+
+    fn distance(&self, point: &Point3<f64>, max: f64) -> f64 {
+        ((point - self.centre).norm() - self.radius).abs().min(max)
+    }
+}
+
+#[test]
+fn one_call_sprays_past_a_surface_of_the_users_own() {
+    let ball = Ball { centre: Point3::new(0.004, 0.0, 0.05), radius: 0.008 };
+    let texels = tilted_plane(0.0, 0.1, 1e-3, 0.06);
+    let shots = [shot(0.0, 0.0, 1e-9)];
+    let film = paint_sim::spray(texels.clone(), &shots, &SprayModel::default(), &ball, 1).unwrap();
+    let open = paint_sim::spray(texels, &shots, &SprayModel::default(), &far_plate(), 1).unwrap();
+    assert!(film.mass_balance().balanced());
+    let (mut dark, mut lit) = (0, 0);
+    for (texel, (behind, free)) in film.texels().iter().zip(film.volumes().iter().zip(open.volumes())) {
+        // The line from the nozzle to the texel passes the ball's centre at this distance.
+        let line = texel.point.coords.normalize();
+        let passing = ball.centre.coords.cross(&line).norm();
+        if *free == 0 || (passing - ball.radius).abs() < 1e-6 {
+            continue;
+        }
+        if passing < ball.radius {
+            assert_eq!(*behind, 0, "{}", texel.point);
+            dark += 1;
+        } else {
+            // What the open plane claims beyond a whole shot by its finite sum is scaled away.
+            assert!(behind.abs_diff(*free) <= 1 + free / 1000, "{}", texel.point);
+            lit += 1;
+        }
+    }
+    assert!(dark > 100 && lit > 1000, "{dark} {lit}");
 }

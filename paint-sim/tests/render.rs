@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use paint_sim::colour::encode_srgb8;
-use paint_sim::{Camera, Error, Hit, Lights, Look, TriangleSurface, render};
+use paint_sim::{Camera, Error, Hit, Lights, Shading, TriangleSurface, render};
 
 fn camera(width: u32, height: u32) -> Camera {
     let (cx, cy) = (0.5 * (f64::from(width) - 1.0), 0.5 * (f64::from(height) - 1.0));
@@ -19,8 +19,8 @@ fn lights() -> Lights {
     }
 }
 
-fn white(hit: &Hit) -> Look {
-    Look { albedo: [1.0; 3], normal: hit.normal }
+fn white(hit: &Hit) -> Shading {
+    Shading { albedo: [1.0; 3], normal: hit.normal }
 }
 
 /// Two triangles through z = 2 + slope x, far larger than the picture.
@@ -162,8 +162,8 @@ fn a_camera_looks_at_its_target() {
 fn light_follows_the_normal_of_the_look() {
     // A plane that faces the camera, told to lean 60 degrees away from the sun behind the camera: half the light.
     let sun = Lights { towards_sun: -Vector3::z_axis(), sun: [0.5; 3], ambient: [0.0; 3], background: [0.0; 3] };
-    let leaning = |hit: &Hit| Look { normal: Vector3::new(0.75_f64.sqrt(), 0.0, -0.5), ..white(hit) };
-    let level = |shade: &(dyn Fn(&Hit) -> Look + Sync)| {
+    let leaning = |hit: &Hit| Shading { normal: Vector3::new(0.75_f64.sqrt(), 0.0, -0.5), ..white(hit) };
+    let level = |shade: &(dyn Fn(&Hit) -> Shading + Sync)| {
         let frame = render(&slanted(0.0), &camera(9, 9), shade, &sun, 1, 1).unwrap();
         frame.colour[40][0]
     };

@@ -1,8 +1,13 @@
+//! Identification of the hardware constants from measured nozzle poses.
+
 use nalgebra::{DMatrix, DVector, Point3, UnitVector3, Vector3};
 
+use crate::angle::elevation_rotation;
 use crate::error::{Error, finite};
-use crate::forward::{Nozzle, lift};
-use crate::settings::{Joints, Ptu, PtuSettings};
+use crate::hover::Nozzle;
+use crate::joints::Joints;
+use crate::pan_tilt::Ptu;
+use crate::settings::PtuSettings;
 
 /// One measured nozzle pose, in body axes, with the joint angles at that moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,7 +31,7 @@ pub struct Calibration {
     pub direction_rms: f64,
 }
 
-/// Fits the offsets `a`, `b`, `c` and the gun pitch `μ` to observed nozzle poses (ours).
+/// Fits the offsets `a`, `b`, `c` and the gun pitch `μ` to observed nozzle poses.
 ///
 /// Given the joint angles the tip is linear in the nine offsets, so the fit is one least-squares problem. Two directions
 /// can never be told apart — `a_z` from `b_z` and `a_y` from `c_y`, whose axes stay parallel — and a joint that did not
@@ -47,7 +52,7 @@ pub fn calibrate(prior: &PtuSettings, observations: &[Observation]) -> Result<Ca
         finite("observed tip", o.tip_in_body.into())?;
         finite("observed direction", o.direction_in_body.into_inner().into())?;
         let pan = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), o.joints.pan);
-        let tilted = pan * lift(o.joints.tilt);
+        let tilted = pan * elevation_rotation(o.joints.tilt);
         design.fixed_view_mut::<3, 3>(3 * k, 0).copy_from(pan.matrix());
         design.fixed_view_mut::<3, 3>(3 * k, 3).fill_with_identity();
         design.fixed_view_mut::<3, 3>(3 * k, 6).copy_from(tilted.matrix());

@@ -1,3 +1,5 @@
+//! What can go wrong, and what to do about it.
+
 /// What can go wrong; every variant names the input and the way out.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -31,6 +33,14 @@ pub enum Error {
         min: f64,
         /// Upper limit, in radians.
         max: f64,
+    },
+    /// No joint angles within the limits of a serial arm turn the spray axis along the wanted direction.
+    #[error(
+        "no joint angles within the limits spray along this direction ({left:.4} rad remain): choose another heading"
+    )]
+    Unreachable {
+        /// Angle that remains, in radians.
+        left: f64,
     },
     /// The target lies inside the gun's own reach: no pair of angles points the spray axis at it from in front.
     #[error("target is {distance:.4} m from the {axis} axis, but the spray axis passes it at {offset:.4} m: move back")]

@@ -19,7 +19,7 @@
 //! // The robot hovers, rolled by three degrees in the wind; where must the gun point to hit this spot of the wall?
 //! let world_from_body = Isometry3::new(Vector3::new(0.0, 0.0, 2.0), Vector3::new(0.05, 0.0, 0.0));
 //! let aim = ptu.aim(&world_from_body, &Point3::new(0.8, 0.1, 2.1))?;
-//! assert!(aim.miss < 1e-12 && !aim.clamped);
+//! assert!(aim.pointing_error < 1e-12 && !aim.clamped);
 //! let nozzle = ptu.forward(&world_from_body, aim.joints);
 //! let hit = nozzle.tip + nozzle.direction.into_inner() * aim.distance;
 //! assert!((hit - Point3::new(0.8, 0.1, 2.1)).norm() < 1e-12);
@@ -29,46 +29,43 @@
 //! | what | where in the thesis | item |
 //! |---|---|---|
 //! | axes of the pan-tilt unit | Paper II, Fig. 6.3 | [`PtuSettings`] |
-//! | forward kinematics | not printed; ours, from Fig. 6.3 | [`Ptu::forward`] |
-//! | inverse kinematics in hover | not printed; ours | [`Ptu::inverse`] |
+//! | forward kinematics | not printed; from Fig. 6.3 | [`Ptu::forward`] |
+//! | inverse kinematics in hover | not printed; from Fig. 6.3 | [`Ptu::inverse`] |
+//! | any arm in place of the pan-tilt unit | not in the thesis | [`KinematicChain`] |
+//! | serial arm, inverse by damped least squares | Wampler 1986; Nakamura and Hanafusa 1986 | [`SerialArm`] |
 //! | pointing at a target | Eq. (6.1), of which only the symbols survive | [`Ptu::aim`] |
 //! | servo (AX-12A) | Paper II, section 3 | [`Servo`] |
-//! | identification of `a`, `b`, `c`, `μ` | ours | [`calibrate`] |
+//! | identification of `a`, `b`, `c`, `μ` | not in the thesis; linear least squares | [`calibrate`] |
 //!
 //! Frames: world `z` up; body `x` forward, `y` left, `z` up. Metres, radians, seconds.
 
 mod aim;
+mod angle;
 mod calibrate;
+mod chain;
 mod error;
-mod forward;
-mod inverse;
-mod jacobian;
+mod hover;
+mod joints;
+mod pan_tilt;
+#[cfg(feature = "urdf")]
+mod pan_tilt_urdf;
+mod serial_arm;
 mod servo;
 mod settings;
 #[cfg(feature = "urdf")]
 mod urdf;
 
 pub use aim::Aim;
+pub use angle::wrap;
 pub use calibrate::{Calibration, Observation, calibrate};
+pub use chain::KinematicChain;
 pub use error::Error;
-pub use forward::Nozzle;
-pub use inverse::Hover;
-pub use jacobian::Jacobian;
+pub use hover::{Hover, Nozzle};
+pub use joints::{Joints, Range};
 pub use nalgebra;
-pub use servo::{Servo, ServoSettings};
-pub use settings::{Joints, Ptu, PtuSettings, Range};
+pub use pan_tilt::{Jacobian, Ptu};
 #[cfg(feature = "urdf")]
-pub use urdf::UrdfJointSigns;
-
-/// Wraps an angle in radians into `(-π, π]`.
-///
-/// ```
-/// use std::f64::consts::PI;
-/// assert!((ptu_kinematics::wrap(1.5 * PI) + 0.5 * PI).abs() < 1e-15);
-/// assert_eq!(ptu_kinematics::wrap(-PI), PI);
-/// ```
-pub fn wrap(angle: f64) -> f64 {
-    let turns = (angle / std::f64::consts::TAU).round();
-    let wrapped = angle - turns * std::f64::consts::TAU;
-    if wrapped <= -std::f64::consts::PI { wrapped + std::f64::consts::TAU } else { wrapped }
-}
+pub use pan_tilt_urdf::UrdfJointSigns;
+pub use serial_arm::{SerialArm, SerialJoint};
+pub use servo::{Servo, ServoSettings};
+pub use settings::PtuSettings;

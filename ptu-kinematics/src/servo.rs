@@ -1,7 +1,9 @@
+//! A position-controlled servo in time.
+
 use std::collections::VecDeque;
 
 use crate::error::{Error, finite};
-use crate::settings::Range;
+use crate::joints::Range;
 
 /// Constants of one position-controlled servo.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,9 +13,9 @@ pub struct ServoSettings {
     pub resolution: f64,
     /// Largest speed in rad/s. Default 354°/s: 59 rpm without load at 12 V (AX-12A data sheet).
     pub max_rate: f64,
-    /// Time constant of the first-order response in seconds. Default 0.03, ours.
+    /// Time constant of the first-order response in seconds. Default 0.03.
     pub time_constant: f64,
-    /// Time from command to the start of the motion in seconds. Default 0.02, ours (bus and firmware cycle).
+    /// Time from command to the start of the motion in seconds. Default 0.02 (bus and firmware cycle).
     pub dead_time: f64,
     /// Mechanical limits in radians. Default ±150° (AX-12A data sheet).
     pub limits: Range,
@@ -39,7 +41,7 @@ pub struct Servo {
     angle: f64,
     goal: f64,
     clock: f64,
-    waiting: VecDeque<(f64, f64)>,
+    pending: VecDeque<(f64, f64)>,
 }
 
 impl Servo {
@@ -62,7 +64,7 @@ impl Servo {
         }
         finite("servo limits", [settings.limits.min, settings.limits.max])?;
         let angle = settings.limits.clamp(angle);
-        Ok(Self { settings, angle, goal: angle, clock: 0.0, waiting: VecDeque::new() })
+        Ok(Self { settings, angle, goal: angle, clock: 0.0, pending: VecDeque::new() })
     }
 
     /// Present angle in radians.
@@ -95,20 +97,20 @@ impl Servo {
     /// ignored, as a servo ignores a corrupt packet; a negative or non-finite `dt` moves nothing.
     pub fn step(&mut self, command: f64, dt: f64) -> f64 {
         if command.is_finite() {
-            self.waiting.push_back((self.clock + self.settings.dead_time, self.representable(command)));
+            self.pending.push_back((self.clock + self.settings.dead_time, self.representable(command)));
         }
         if !(dt.is_finite() && dt > 0.0) {
             return self.angle;
         }
         let end = self.clock + dt;
-        while let Some(&(due, goal)) = self.waiting.front() {
+        while let Some(&(due, goal)) = self.pending.front() {
             if due > end {
                 break;
             }
             self.follow((due - self.clock).max(0.0));
             self.clock = self.clock.max(due);
             self.goal = goal;
-            self.waiting.pop_front();
+            self.pending.pop_front();
         }
         self.follow(end - self.clock);
         self.clock = end;

@@ -168,7 +168,7 @@ fn the_spray_axis_goes_through_the_target_from_any_attitude() {
         let line = target - nozzle.tip;
         if aim.clamped {
             clamped += 1;
-            assert!((nozzle.direction.angle(&line) - aim.miss).abs() < 1e-7);
+            assert!((nozzle.direction.angle(&line) - aim.pointing_error).abs() < 1e-7);
             assert!(ptu.check_limits(aim.joints).is_ok());
         } else {
             let hit = nozzle.tip + nozzle.direction.into_inner() * aim.distance;

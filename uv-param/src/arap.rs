@@ -4,21 +4,38 @@ mod anderson;
 
 use crate::disk::Disk;
 use crate::error::Error;
-use crate::layout::Laplacian;
+use crate::laplacian::Laplacian;
+use crate::parametrizer::{Layout, Parametrizer, Progress, Stage, StoppingCriterion};
 use crate::triangle::Frame;
-use crate::unwrap::{Progress, Settings, Stage};
+use crate::tutte::tutte_layout;
 use anderson::Anderson;
 
 /// Energies per area below this are rounding.
-const ISOMETRY: f64 = 1e-28;
+const ZERO_ENERGY: f64 = 1e-28;
+
+/// As-rigid-as-possible: the energy `sum A |J - R|^2`, from Tutte's layout. It may fold triangles over.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Arap {
+    /// When to stop.
+    pub stopping: StoppingCriterion,
+}
+
+impl Parametrizer for Arap {
+    fn parametrize(&self, disk: &Disk, progress: &mut dyn FnMut(Progress)) -> Result<Layout, Error> {
+        self.stopping.check()?;
+        let (mut laplacian, mut uv) = tutte_layout(disk, progress)?;
+        let iterations = minimise_arap(disk, &disk.frames(), &mut laplacian, &mut uv, &self.stopping, progress)?;
+        Ok(Layout { uv, iterations })
+    }
+}
 
 /// Improves `uv` until the energy `sum A |J - R|^2` stops falling; returns the number of iterations.
-pub(crate) fn arap(
+pub(crate) fn minimise_arap(
     disk: &Disk,
     frames: &[Frame],
     laplacian: &mut Laplacian,
     uv: &mut [[f64; 2]],
-    settings: &Settings,
+    stopping: &StoppingCriterion,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<usize, Error> {
     let pinned = disk.loops[0][0] as usize;
@@ -36,8 +53,8 @@ pub(crate) fn arap(
     let mut plain = x.clone();
     let mut last = f64::INFINITY;
     let mut slow = 0;
-    let mut iterations = settings.iterations;
-    for iteration in 1..=settings.iterations {
+    let mut iterations = stopping.iterations;
+    for iteration in 1..=stopping.iterations {
         let mut energy = local_step(disk, frames, &x, &mut rotations, &mut right) / area;
         if energy > last {
             // The extrapolation went too far; the plain step never does.
@@ -47,9 +64,9 @@ pub(crate) fn arap(
         }
         progress(Progress { stage: Stage::Arap, iteration, energy });
         // Accelerated steps are uneven: one that gains little says nothing yet.
-        let gains = last.is_infinite() || last - energy > settings.tolerance * last;
+        let gains = last.is_infinite() || last - energy > stopping.tolerance * last;
         slow = if gains { 0 } else { slow + 1 };
-        if slow == 2 || energy < ISOMETRY {
+        if slow == 2 || energy < ZERO_ENERGY {
             iterations = iteration - 1;
             break;
         }
@@ -61,8 +78,8 @@ pub(crate) fn arap(
         plain.copy_from_slice(&right);
         x = anderson.next(&x, &plain);
     }
-    // The last extrapolation has not been judged; the plain step it came from is never worse than its start.
-    let best = if iterations == settings.iterations { &plain } else { &x };
+    // The last extrapolation has not been evaluated; the plain step it came from is never worse than its start.
+    let best = if iterations == stopping.iterations { &plain } else { &x };
     for (v, at) in uv.iter_mut().enumerate() {
         *at = [best[v], best[size + v]];
     }

@@ -3,25 +3,17 @@
 mod locate;
 mod normals;
 mod placement;
+mod surface_point;
 
 use nalgebra::{Point3, Unit, Vector3};
 
 use crate::disk::Disk;
+use crate::distortion::Quality;
 use crate::error::Error;
-use crate::quality::Quality;
 use crate::triangle::Frame;
 use locate::Grid;
 pub(crate) use locate::inside;
-
-/// A point of the surface: a face of the disk and the weights of its corners (non-negative, sum 1).
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct SurfacePoint {
-    /// Face of the [`Disk`].
-    pub face: u32,
-    /// Weights of corners 0, 1, 2.
-    pub barycentric: [f64; 3],
-}
+pub use surface_point::SurfacePoint;
 
 /// The layout of a [`Disk`]: one uv point in metres per vertex, `0 <= u <= width`, `0 <= v <= height`, `width >=
 /// height`. Not mirrored: seen from the side the normals point to, u runs right and v runs up.
@@ -38,7 +30,7 @@ pub struct Chart {
 
 impl Chart {
     /// A chart from a layout of your own (metres, one point per disk vertex): it is turned into its smallest box, long
-    /// side horizontal, and judged. `up` as in [`crate::Settings::up`]; `iterations` is only reported.
+    /// side horizontal, and its distortion is measured. `up` as in [`crate::Settings::up`]; `iterations` is only reported.
     ///
     /// # Errors
     /// [`Error::Length`], [`Error::NonFiniteValue`], or [`Error::FlatPoints`] for a layout on one line.
@@ -48,7 +40,7 @@ impl Chart {
         }
         let [width, height] = placement::place(&disk, &mut uv, up)?;
         let grid = Grid::new(&uv, &disk.faces, [width, height]);
-        let quality = Quality::judge(&disk, &uv, grid.overlap(&uv, &disk.faces), iterations);
+        let quality = Quality::measure(&disk, &uv, grid.overlap(&uv, &disk.faces), iterations);
         let vertex_normals = normals::vertex_normals(&disk);
         Ok(Self { disk, uv, width, height, quality, vertex_normals, grid })
     }
@@ -77,7 +69,7 @@ impl Chart {
         self.height
     }
 
-    /// How true the chart is.
+    /// Distortion metrics.
     pub fn quality(&self) -> &Quality {
         &self.quality
     }

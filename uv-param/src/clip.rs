@@ -1,18 +1,18 @@
 //! Convex polygons cut by straight lines.
 
 /// A triangle cut by at most four lines has at most seven corners.
-const MOST: usize = 8;
+const MAX_CORNERS: usize = 8;
 
 /// A convex polygon on the stack.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Polygon {
-    corners: [[f64; 2]; MOST],
+    corners: [[f64; 2]; MAX_CORNERS],
     count: usize,
 }
 
 impl Polygon {
     pub(crate) fn triangle([a, b, c]: [[f64; 2]; 3]) -> Self {
-        let mut corners = [[0.0; 2]; MOST];
+        let mut corners = [[0.0; 2]; MAX_CORNERS];
         corners[..3].copy_from_slice(&[a, b, c]);
         Self { corners, count: 3 }
     }
@@ -42,7 +42,7 @@ impl Polygon {
         if corners.iter().all(|p| depth(p) >= 0.0) {
             return *self;
         }
-        let mut out = Self { corners: [[0.0; 2]; MOST], count: 0 };
+        let mut out = Self { corners: [[0.0; 2]; MAX_CORNERS], count: 0 };
         for (i, p) in corners.iter().enumerate() {
             let q = &corners[(i + 1) % self.count];
             let (from, to) = (depth(p), depth(q));
@@ -59,7 +59,7 @@ impl Polygon {
 
     fn push(&mut self, p: [f64; 2]) {
         // Rounding can make a polygon minutely non-convex; a corner beyond the last changes nothing measurable.
-        if self.count < MOST {
+        if self.count < MAX_CORNERS {
             self.corners[self.count] = p;
             self.count += 1;
         }

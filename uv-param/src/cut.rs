@@ -1,41 +1,42 @@
 //! Cuts to where a layout is distorted most, so that surfaces far from flat become paintable charts.
 
+mod candidates;
 mod paths;
-mod tips;
 
 use crate::chart::Chart;
 use crate::disk::Disk;
 use crate::error::Error;
-use crate::unwrap::{Layout, Method, Progress, Settings, Stage, check, lay_out, relax};
-use paths::Paths;
+use crate::parametrizer::{Layout, Progress, Stage};
+use crate::unwrap::{Method, Settings, parametrize, relax};
+use paths::BoundaryPaths;
 
-/// Tips that are tried for every cut; the one that gains most is cut (ours).
-const CANDIDATES: usize = 4;
-/// How many times so many are tried before giving up (ours).
-const ROUNDS: usize = 3;
-/// Newton iterations that show what a cut is worth (ours).
-const TRIAL: usize = 4;
-/// Newton iterations from one cut to the next (ours).
-const SETTLE: usize = 10;
-/// Newton iterations of a layout from the start (ours).
-const FRESH: usize = 30;
-/// Tolerance of all three: the next cut moves everything again (ours).
-const ROUGH: f64 = 1e-3;
-/// A cut must take away at least this fraction of the cost (ours).
-const GAIN: f64 = 0.01;
-/// Cost of an overlap of the whole chart, in units of the energy of an isometry (ours): paint goes to the wrong place
+/// Candidates that are tried for every cut; the one that gains most is cut.
+const CANDIDATES_PER_ROUND: usize = 4;
+/// How many times so many are tried before giving up.
+const MAX_ROUNDS: usize = 3;
+/// Newton iterations that show what a cut is worth.
+const TRIAL_ITERATIONS: usize = 4;
+/// Newton iterations from one cut to the next.
+const SETTLE_ITERATIONS: usize = 10;
+/// Newton iterations of a layout from the start.
+const FRESH_ITERATIONS: usize = 30;
+/// Tolerance of all three: the next cut moves everything again.
+const TRIAL_TOLERANCE: f64 = 1e-3;
+/// A cut must take away at least this fraction of the cost.
+const MIN_GAIN: f64 = 0.01;
+/// Cost of an overlap of the whole chart, in units of the energy of an isometry: paint goes to the wrong place
 /// there, which is worse than stretch.
-const OVERLAP: f64 = 10.0;
+const OVERLAP_WEIGHT: f64 = 10.0;
 
 /// When and how far to cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct CutSettings {
-    /// Stretch `max(s1, 1 / s2)` that a face should not exceed, above 1. Default 1.5 (ours).
+    /// Stretch `max(s1, 1 / s2)` that a face should not exceed, above 1. Default 1.5.
     pub max_stretch: f64,
-    /// Share of the area, 0 to 1, that may exceed it or lie on other parts of the chart. Default 0.03 (ours).
+    /// Share of the area, 0 to 1, that may exceed it or lie on other parts of the chart. Default 0.03.
     pub share: f64,
-    /// Most cuts. Default 24 (ours).
+    /// Most cuts. Default 24.
     pub max_cuts: usize,
 }
 
@@ -64,19 +65,19 @@ pub fn unwrap_with_cuts(
     cuts: &CutSettings,
     mut progress: impl FnMut(Progress),
 ) -> Result<Chart, Error> {
-    check(settings)?;
+    settings.check()?;
     check_cuts(cuts)?;
     let progress: &mut dyn FnMut(Progress) = &mut progress;
     let settings =
         Settings { method: if settings.method == Method::Arap { Method::Auto } else { settings.method }, ..*settings };
-    let mut best = Opened::start(disk, &settings, cuts, progress)?;
-    while best.unfit(cuts) > cuts.share && best.chart.disk().cuts() < cuts.max_cuts {
+    let mut best = CutLayout::start(disk, &settings, cuts, progress)?;
+    while best.unpaintable_share(cuts) > cuts.share && best.chart.disk().cuts() < cuts.max_cuts {
         let Some(next) = best.best_cut()? else { break };
         best = next;
         best.report(progress);
     }
     if best.chart.disk().cuts() > 0 {
-        best = best.relaxed(&settings, progress)?;
+        best = best.relax(&settings, progress)?;
     }
     Chart::new(best.chart.into_disk(), best.layout.uv, best.layout.iterations, settings.up)
 }
@@ -91,18 +92,18 @@ fn check_cuts(cuts: &CutSettings) -> Result<(), Error> {
     Ok(())
 }
 
-/// Settings that tell which cut is better, no more.
-fn rough(iterations: usize) -> Settings {
-    Settings { iterations, tolerance: ROUGH, method: Method::SymmetricDirichlet, up: None }
+/// Settings that tell which cut is if_improved, no more.
+fn trial_settings(iterations: usize) -> Settings {
+    Settings { iterations, tolerance: TRIAL_TOLERANCE, method: Method::SymmetricDirichlet, up: None }
 }
 
-/// A surface, cut as far as it is, with its layout and the chart that judges it.
-struct Opened {
+/// A surface, cut as far as it is, with its layout and the chart that measures it.
+struct CutLayout {
     chart: Chart,
     layout: Layout,
 }
 
-impl Opened {
+impl CutLayout {
     fn new(disk: Disk, layout: Layout) -> Result<Self, Error> {
         let chart = Chart::new(disk, layout.uv.clone(), layout.iterations, None)?;
         Ok(Self { chart, layout })
@@ -118,12 +119,12 @@ impl Opened {
     ) -> Result<Self, Error> {
         let mut disk = disk.clone();
         loop {
-            let collapsed = match lay_out(&disk, settings, progress) {
+            let collapsed = match parametrize(&disk, settings, progress) {
                 Ok(layout) => return Self::new(disk, layout),
                 Err(error @ Error::CollapsedStart { .. }) if disk.cuts() < cuts.max_cuts => error,
                 Err(error) => return Err(error),
             };
-            let paths = Paths::new(&disk);
+            let paths = BoundaryPaths::new(&disk);
             disk = disk.cut(&paths.from(paths.farthest().ok_or(collapsed)?))?;
         }
     }
@@ -131,11 +132,11 @@ impl Opened {
     /// What cuts are to lower: 0 for an isometry that does not overlap itself.
     fn cost(&self) -> f64 {
         let quality = self.chart.quality();
-        quality.symmetric_dirichlet - 1.0 + OVERLAP * quality.overlap_share
+        quality.symmetric_dirichlet - 1.0 + OVERLAP_WEIGHT * quality.overlap_share
     }
 
     /// Share of the area that cannot be painted: stretched beyond the bound or overlapping.
-    fn unfit(&self, cuts: &CutSettings) -> f64 {
+    fn unpaintable_share(&self, cuts: &CutSettings) -> f64 {
         let disk = self.chart.disk();
         let beyond = |&f: &usize| {
             let [s1, s2] = self.chart.stretch(f as u32);
@@ -148,22 +149,24 @@ impl Opened {
     /// The cut to a large hole if it pays, because no number of other cuts does what joining it does; else of the cuts to the
     /// worst places the one that lowers the cost most; if none pays in the end, of those to the next places.
     fn best_cut(&self) -> Result<Option<Self>, Error> {
-        let paths = Paths::new(self.chart.disk());
-        if let Some(hole) = tips::hole(self.chart.disk(), &paths) {
-            let joined = self.better(self.joined(&paths.from(hole)))?;
+        let paths = BoundaryPaths::new(self.chart.disk());
+        if let Some(hole) = candidates::hole_to_join(self.chart.disk(), &paths) {
+            let joined = self.if_improved(self.joined(&paths.from(hole)))?;
             if joined.is_some() {
                 return Ok(joined);
             }
         }
-        for tips in tips::tips(&self.chart, &paths, ROUNDS * CANDIDATES).chunks(CANDIDATES) {
+        for candidates in candidates::cut_candidates(&self.chart, &paths, MAX_ROUNDS * CANDIDATES_PER_ROUND)
+            .chunks(CANDIDATES_PER_ROUND)
+        {
             let mut best: Option<Self> = None;
-            for &tip in tips {
-                let trial = self.cut(&paths.from(tip))?.relaxed(&rough(TRIAL), &mut |_| ());
-                let trial = self.better(trial)?;
+            for &candidate in candidates {
+                let trial = self.cut(&paths.from(candidate))?.relax(&trial_settings(TRIAL_ITERATIONS), &mut |_| ());
+                let trial = self.if_improved(trial)?;
                 best = trial.filter(|trial| best.as_ref().is_none_or(|best| trial.cost() < best.cost())).or(best);
             }
             if let Some(best) = best {
-                let settled = self.better(best.relaxed(&rough(SETTLE), &mut |_| ()))?;
+                let settled = self.if_improved(best.relax(&trial_settings(SETTLE_ITERATIONS), &mut |_| ()))?;
                 if settled.is_some() {
                     return Ok(settled);
                 }
@@ -173,17 +176,17 @@ impl Opened {
     }
 
     /// A trial that pays. One that drowns in rounding does not.
-    fn better(&self, trial: Result<Self, Error>) -> Result<Option<Self>, Error> {
+    fn if_improved(&self, trial: Result<Self, Error>) -> Result<Option<Self>, Error> {
         match trial {
             Err(Error::Singular | Error::CollapsedStart { .. }) => Ok(None),
-            trial => trial.map(|trial| (trial.cost() <= (1.0 - GAIN) * self.cost()).then_some(trial)),
+            trial => trial.map(|trial| (trial.cost() <= (1.0 - MIN_GAIN) * self.cost()).then_some(trial)),
         }
     }
 
     /// Cut to a hole and laid out from the start: a ring that overlaps itself is wound up, and unwinds only slowly.
     fn joined(&self, path: &[u32]) -> Result<Self, Error> {
         let disk = self.chart.disk().cut(path)?;
-        let layout = lay_out(&disk, &rough(FRESH), &mut |_| ())?;
+        let layout = parametrize(&disk, &trial_settings(FRESH_ITERATIONS), &mut |_| ())?;
         Self::new(disk, layout)
     }
 
@@ -196,9 +199,9 @@ impl Opened {
     }
 
     /// Some flip-free iterations further.
-    fn relaxed(self, settings: &Settings, progress: &mut dyn FnMut(Progress)) -> Result<Self, Error> {
+    fn relax(self, settings: &Settings, progress: &mut dyn FnMut(Progress)) -> Result<Self, Error> {
         let Self { chart, mut layout } = self;
-        relax(chart.disk(), &mut layout, settings, progress)?;
+        relax(chart.disk(), &mut layout, &settings.stopping(), progress)?;
         Self::new(chart.into_disk(), layout)
     }
 

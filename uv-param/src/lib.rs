@@ -9,7 +9,7 @@
 //! far from flat for one piece, such as busts, are cut open where the distortion is high ([`unwrap_with_cuts`]).
 //!
 //! ```
-//! use uv_param::{Settings, Spray, TexelMap, largest_disk, nozzle_command, unwrap};
+//! use uv_param::{Settings, NozzleSettings, TexelMap, largest_disk, nozzle_command, unwrap};
 //!
 //! // A 2 m x 1 m wall with a right-angled fold, z up.
 //! let positions = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 0., 1.], [1., 0., 1.], [1., 1., 1.]];
@@ -20,48 +20,55 @@
 //! assert!((chart.width() - 2.0).abs() < 1e-9 && (chart.height() - 1.0).abs() < 1e-9);
 //! let texels = TexelMap::new(&chart, 0.0125)?;
 //! assert_eq!((texels.width, texels.height), (160, 80));
-//! let nozzle = nozzle_command(&chart, [0.5, 0.25], &Spray::default())?;
+//! let nozzle = nozzle_command(&chart, [0.5, 0.25], &NozzleSettings::default())?;
 //! assert!((nozzle.point.z - 0.25).abs() < 1e-9);
 //! # Ok::<(), uv_param::Error>(())
 //! ```
 //!
 //! | equation | item |
 //! |---|---|
-//! | Liu et al. 2008, local/global ARAP | [`unwrap`], [`Method::Arap`] |
-//! | Peng et al. 2018, Anderson acceleration of the iteration | [`Method::Arap`] |
-//! | Smith and Schaefer 2015, symmetric Dirichlet energy | [`Method::SymmetricDirichlet`] |
+//! | Liu et al. 2008, local/global ARAP | [`unwrap`], [`Arap`] |
+//! | Peng et al. 2018, Anderson acceleration of the iteration | [`Arap`] |
+//! | Smith and Schaefer 2015, symmetric Dirichlet energy | [`SymmetricDirichlet`] |
 //! | thesis 8, "cuts along high distortion areas"; Gu et al. 2002, cut to the worst distortion | [`unwrap_with_cuts`], [`Disk::cut`] |
-//! | Tutte 1963, convex combination start | [`unwrap`] |
+//! | Tutte 1963, barycentric layout | [`Tutte`] |
+//! | a map of your own | [`Parametrizer`], [`unwrap_by`] |
 //! | thesis 8.3.1, box of smallest area by rotating calipers | [`min_area_rectangle`], [`Chart::new`] |
 //! | thesis 8.3.1, 1 px = 1.25 cm texture | [`TexelMap`], [`Texture`] |
 //! | thesis Eq. (8.1), `p_3D = sum b_i V_i` | [`Chart::locate`], [`Chart::point`] |
 //! | thesis Eq. (8.1), `n`, `w_dir`, `w_pos` | [`nozzle_command`] |
 
 mod arap;
-mod calipers;
 mod chart;
 mod clip;
 mod cut;
 mod disk;
+mod distortion;
 mod error;
-mod layout;
+mod laplacian;
 mod linear;
-mod quality;
-mod spray_pose;
+mod min_area_rectangle;
+mod nozzle;
+mod parametrizer;
 mod symmetric_dirichlet;
 mod texel;
 mod texture;
 mod triangle;
+mod tutte;
 mod unwrap;
 
-pub use calipers::{Rectangle, convex_hull, min_area_rectangle};
+pub use arap::Arap;
 pub use chart::{Chart, SurfacePoint};
 pub use cut::{CutSettings, unwrap_with_cuts};
-pub use disk::{Disk, Findings, Repair, largest_disk, largest_disk_with};
+pub use disk::{Disk, Repair, RepairReport, largest_disk, largest_disk_with};
+pub use distortion::Quality;
 pub use error::Error;
+pub use min_area_rectangle::{Rectangle, convex_hull, min_area_rectangle};
 pub use nalgebra;
-pub use quality::Quality;
-pub use spray_pose::{NormalMode, NozzleCommand, Spray, nozzle_command};
+pub use nozzle::{NormalMode, NozzleCommand, NozzleSettings, nozzle_command};
+pub use parametrizer::{Layout, Parametrizer, Progress, Stage, StoppingCriterion};
+pub use symmetric_dirichlet::SymmetricDirichlet;
 pub use texel::TexelMap;
 pub use texture::{Texture, linear_from_srgb, luminance};
-pub use unwrap::{Method, Progress, Settings, Stage, unwrap};
+pub use tutte::Tutte;
+pub use unwrap::{Method, Settings, unwrap, unwrap_by};

@@ -10,25 +10,42 @@ use faer::sparse::linalg::SupernodalThreshold;
 use crate::disk::Disk;
 use crate::error::Error;
 use crate::linear::Spd;
+use crate::parametrizer::{Layout, Parametrizer, Progress, Stage, StoppingCriterion};
 use crate::triangle::{Frame, Jacobian, flips};
-use crate::unwrap::{Progress, Settings, Stage};
+use crate::tutte::tutte_layout;
 use local::Local;
 
-/// Fraction of the step to the first collapse that is tried (ours).
-const SAFE: f64 = 0.9;
+/// Fraction of the step to the first collapse that is tried.
+const COLLAPSE_MARGIN: f64 = 0.9;
 /// Sufficient decrease of a step (Armijo; the usual value).
 const ARMIJO: f64 = 1e-4;
 /// Shortest step relative to the Newton step; below it rounding decides.
-const SHORTEST: f64 = 1e-12;
-/// Added to the diagonal, relative to it, so that the projected Hessian stays definite (ours).
+const MIN_STEP: f64 = 1e-12;
+/// Added to the diagonal, relative to it, so that the projected Hessian stays definite.
 const DAMPING: f64 = 1e-10;
 
+/// The symmetric Dirichlet energy, from Tutte's layout: no triangle can fold over.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SymmetricDirichlet {
+    /// When to stop.
+    pub stopping: StoppingCriterion,
+}
+
+impl Parametrizer for SymmetricDirichlet {
+    fn parametrize(&self, disk: &Disk, progress: &mut dyn FnMut(Progress)) -> Result<Layout, Error> {
+        self.stopping.check()?;
+        let (_, mut uv) = tutte_layout(disk, progress)?;
+        let iterations = minimise_symmetric_dirichlet(disk, &disk.frames(), &mut uv, &self.stopping, progress)?;
+        Ok(Layout { uv, iterations })
+    }
+}
+
 /// Improves a flip-free `uv` until the energy stops falling; returns the number of iterations.
-pub(crate) fn symmetric_dirichlet(
+pub(crate) fn minimise_symmetric_dirichlet(
     disk: &Disk,
     frames: &[Frame],
     uv: &mut Vec<[f64; 2]>,
-    settings: &Settings,
+    stopping: &StoppingCriterion,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<usize, Error> {
     let faces = flips(uv, &disk.faces);
@@ -38,24 +55,24 @@ pub(crate) fn symmetric_dirichlet(
     let area: f64 = frames.iter().map(|f| f.area).sum();
     let mut system = Newton::new(disk)?;
     let mut last = energy(disk, frames, uv);
-    for iteration in 1..=settings.iterations {
+    for iteration in 1..=stopping.iterations {
         let step = system.step(disk, frames, uv)?;
         let Some(next) = line_search(disk, frames, uv, &step, last) else { return Ok(iteration - 1) };
         // Over 4, so that an isometry reads 1; progress is measured against what is above it.
         let (before, now) = (last / area / 4.0, next / area / 4.0);
         last = next;
         progress(Progress { stage: Stage::SymmetricDirichlet, iteration, energy: now });
-        if before - now <= settings.tolerance * (before - 1.0).max(0.0) + f64::EPSILON {
+        if before - now <= stopping.tolerance * (before - 1.0).max(0.0) + f64::EPSILON {
             return Ok(iteration);
         }
     }
-    Ok(settings.iterations)
+    Ok(stopping.iterations)
 }
 
 /// Moves `uv` along a step that lowers the energy enough and flips nothing; returns the new energy, or `None` where rounding
 /// leaves no such step.
 fn line_search(disk: &Disk, frames: &[Frame], uv: &mut Vec<[f64; 2]>, step: &Step, last: f64) -> Option<f64> {
-    let limit = SAFE * first_collapse(disk, uv, &step.direction);
+    let limit = COLLAPSE_MARGIN * first_collapse(disk, uv, &step.direction);
     let moved = |length: f64| -> Vec<[f64; 2]> {
         let along = |(at, d): (&[f64; 2], &[f64])| [at[0] + length * d[0], at[1] + length * d[1]];
         uv.iter().zip(step.direction.chunks_exact(2)).map(along).collect()
@@ -72,7 +89,7 @@ fn line_search(disk: &Disk, frames: &[Frame], uv: &mut Vec<[f64; 2]>, step: &Ste
             break (trial, next);
         }
         length *= 0.5;
-        if length < SHORTEST {
+        if length < MIN_STEP {
             return None;
         }
     };

@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::triangle::orientation;
 
 /// Largest number of texels of one map (a 16k square).
-const MOST: usize = 1 << 28;
+const MAX_TEXELS: usize = 1 << 28;
 
 /// A chart that reaches past the last texel by less than this fraction of a texel gets no other one: it belongs to the
 /// last, and a wall of 2 m has 160 texels of 1.25 cm even if its width was computed as 2 m plus rounding.
@@ -42,8 +42,8 @@ impl TexelMap {
         }
         let count = |length: f64| (length / texel_m - ROUNDING).ceil().max(1.0);
         let (columns, rows) = (count(chart.width()), count(chart.height()));
-        if columns * rows > MOST as f64 {
-            return Err(Error::TooManyTexels { texel_m, width: columns, height: rows, limit: MOST });
+        if columns * rows > MAX_TEXELS as f64 {
+            return Err(Error::TooManyTexels { texel_m, width: columns, height: rows, limit: MAX_TEXELS });
         }
         let (width, height) = (columns as usize, rows as usize);
         let mut map = Self {

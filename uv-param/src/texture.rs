@@ -132,7 +132,7 @@ impl Texture<3> {
 }
 
 /// Rec. 709 luminance of linear RGB: `0.2126 R + 0.7152 G + 0.0722 B`. The thesis works on grey textures and does not say
-/// which grey; this is ours.
+/// which grey.
 pub fn luminance([r, g, b]: [f32; 3]) -> f32 {
     0.2126 * r + 0.7152 * g + 0.0722 * b
 }

@@ -1,18 +1,19 @@
 //! The one call: a disk in, a metric chart out.
 
-use crate::arap::arap;
+use crate::arap::minimise_arap;
 use crate::chart::Chart;
 use crate::disk::Disk;
 use crate::error::Error;
-use crate::layout::Laplacian;
-use crate::symmetric_dirichlet::symmetric_dirichlet;
-use crate::triangle::{self, Frame};
+use crate::parametrizer::{Layout, Parametrizer, Progress, StoppingCriterion};
+use crate::symmetric_dirichlet::minimise_symmetric_dirichlet;
+use crate::triangle::flips;
+use crate::tutte::tutte_layout;
 
 /// Which energy shapes the chart.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Method {
-    /// ARAP as the thesis uses it; where that flips a face, the flip-free energy instead (ours).
+    /// ARAP as the thesis uses it; where that flips a face, the flip-free energy instead.
     #[default]
     Auto,
     /// ARAP only; [`crate::Quality::flips`] tells whether the chart is usable.
@@ -25,9 +26,9 @@ pub enum Method {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct Settings {
-    /// Most iterations of each minimiser. Default 100 (ours; the thesis gives none).
+    /// Most iterations of each minimiser. Default 100 (the thesis gives none).
     pub iterations: usize,
-    /// Stop when an iteration lowers the energy by less than this fraction of it. Default 1e-6 (ours).
+    /// Stop when an iteration lowers the energy by less than this fraction of it. Default 1e-6.
     pub tolerance: f64,
     /// Energy. Default [`Method::Auto`].
     pub method: Method,
@@ -42,28 +43,15 @@ impl Default for Settings {
     }
 }
 
-/// What [`unwrap`] is doing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stage {
-    /// The injective start on a circle; one report, energy 0.
-    Start,
-    /// Local/global iterations.
-    Arap,
-    /// A cut was made by [`crate::unwrap_with_cuts`]; the iteration is the number of cuts so far.
-    Cut,
-    /// Newton iterations on the symmetric Dirichlet energy.
-    SymmetricDirichlet,
-}
+impl Settings {
+    pub(crate) fn stopping(&self) -> StoppingCriterion {
+        StoppingCriterion { iterations: self.iterations, tolerance: self.tolerance }
+    }
 
-/// One report of [`unwrap`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Progress {
-    /// What is being done.
-    pub stage: Stage,
-    /// Iteration of this stage, from 1.
-    pub iteration: usize,
-    /// Energy per area: ARAP (0 = isometry) or symmetric Dirichlet over 4 (1 = isometry).
-    pub energy: f64,
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        self.stopping().check()?;
+        check_up(self.up)
+    }
 }
 
 /// Lays the surface out in the plane in its own scale (metres) and turns it into its smallest box. `progress` is called
@@ -73,35 +61,43 @@ pub struct Progress {
 /// [`Error::Setting`] for settings out of range; [`Error::Singular`] and [`Error::CollapsedStart`] for surfaces whose
 /// layout drowns in rounding.
 pub fn unwrap(disk: &Disk, settings: &Settings, mut progress: impl FnMut(Progress)) -> Result<Chart, Error> {
-    check(settings)?;
-    let layout = lay_out(disk, settings, &mut progress)?;
+    settings.check()?;
+    let layout = parametrize(disk, settings, &mut progress)?;
     Chart::new(disk.clone(), layout.uv, layout.iterations, settings.up)
 }
 
-/// A layout as the minimisers leave it. A chart's uv is turned into its box, and rounding while turning may flip a needle;
-/// what is to be improved further starts from here.
-#[derive(Debug, Clone)]
-pub(crate) struct Layout {
-    pub(crate) uv: Vec<[f64; 2]>,
-    pub(crate) iterations: usize,
+/// As [`unwrap`] with a parametrizer of choice; `up` as in [`Settings::up`].
+///
+/// # Errors
+/// Those of the parametrizer and of [`Chart::new`]; [`Error::Setting`] for an `up` that is no direction.
+pub fn unwrap_by(
+    disk: &Disk,
+    parametrizer: &dyn Parametrizer,
+    up: Option<[f64; 3]>,
+    mut progress: impl FnMut(Progress),
+) -> Result<Chart, Error> {
+    check_up(up)?;
+    let layout = parametrizer.parametrize(disk, &mut progress)?;
+    Chart::new(disk.clone(), layout.uv, layout.iterations, up)
 }
 
-/// Start and minimisers, as `settings` ask for.
-pub(crate) fn lay_out(disk: &Disk, settings: &Settings, progress: &mut dyn FnMut(Progress)) -> Result<Layout, Error> {
-    let unit = disk.area().sqrt();
-    let frames = frames(disk);
-    let mut laplacian = Laplacian::new(disk)?;
-    let start = metric(laplacian.tutte(disk)?, disk, unit);
-    progress(Progress { stage: Stage::Start, iteration: 1, energy: 0.0 });
-
+/// The layout that `settings` ask for.
+pub(crate) fn parametrize(
+    disk: &Disk,
+    settings: &Settings,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<Layout, Error> {
+    let frames = disk.frames();
+    let stopping = settings.stopping();
+    let (mut laplacian, start) = tutte_layout(disk, progress)?;
     let mut layout = Layout { uv: start.clone(), iterations: 0 };
     if settings.method != Method::SymmetricDirichlet {
-        layout.iterations += arap(disk, &frames, &mut laplacian, &mut layout.uv, settings, progress)?;
+        layout.iterations += minimise_arap(disk, &frames, &mut laplacian, &mut layout.uv, &stopping, progress)?;
     }
-    let flipped = settings.method == Method::Auto && triangle::flips(&layout.uv, &disk.faces) > 0;
+    let flipped = settings.method == Method::Auto && flips(&layout.uv, disk.faces()) > 0;
     if flipped || settings.method == Method::SymmetricDirichlet {
         layout.uv = start;
-        layout.iterations += symmetric_dirichlet(disk, &frames, &mut layout.uv, settings, progress)?;
+        layout.iterations += minimise_symmetric_dirichlet(disk, &frames, &mut layout.uv, &stopping, progress)?;
     }
     Ok(layout)
 }
@@ -110,37 +106,17 @@ pub(crate) fn lay_out(disk: &Disk, settings: &Settings, progress: &mut dyn FnMut
 pub(crate) fn relax(
     disk: &Disk,
     layout: &mut Layout,
-    settings: &Settings,
+    stopping: &StoppingCriterion,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<(), Error> {
-    layout.iterations += symmetric_dirichlet(disk, &frames(disk), &mut layout.uv, settings, progress)?;
+    layout.iterations += minimise_symmetric_dirichlet(disk, &disk.frames(), &mut layout.uv, stopping, progress)?;
     Ok(())
 }
 
-fn frames(disk: &Disk) -> Vec<Frame> {
-    (0..disk.faces.len()).map(|f| Frame::new(disk.corners(f))).collect()
-}
-
-pub(crate) fn check(settings: &Settings) -> Result<(), Error> {
-    let up_is_direction = |up: [f64; 3]| up.iter().all(|x| x.is_finite()) && up.iter().any(|&x| x != 0.0);
-    if settings.iterations == 0 {
-        return Err(Error::Setting { name: "iterations", value: 0.0, must_be: "at least 1" });
-    }
-    if !(0.0..1.0).contains(&settings.tolerance) {
-        return Err(Error::Setting { name: "tolerance", value: settings.tolerance, must_be: "in [0, 1)" });
-    }
-    if settings.up.is_some_and(|up| !up_is_direction(up)) {
+fn check_up(up: Option<[f64; 3]>) -> Result<(), Error> {
+    let is_direction = |up: [f64; 3]| up.iter().all(|x| x.is_finite()) && up.iter().any(|&x| x != 0.0);
+    if up.is_some_and(|up| !is_direction(up)) {
         return Err(Error::Setting { name: "up", value: f64::NAN, must_be: "finite and not zero" });
     }
     Ok(())
-}
-
-/// The layout in the scale in which its area is that of the surface.
-fn metric(mut uv: Vec<[f64; 2]>, disk: &Disk, unit: f64) -> Vec<[f64; 2]> {
-    let plane: f64 = disk.faces.iter().map(|face| 0.5 * triangle::orientation(face.map(|v| uv[v as usize]))).sum();
-    let scale = unit / plane.sqrt();
-    for at in uv.iter_mut().flatten() {
-        *at *= scale;
-    }
-    uv
 }

@@ -40,7 +40,7 @@ fn every_mesh_is_a_disk_or_is_refused_for_what_it_is() {
         match (&outcome, expected) {
             (Ok((disk, _)), Ok(loops)) => assert_eq!(disk.boundary_loops().len(), loops, "{name}"),
             (Err(error), Err(words)) => assert!(format!("{error:?}").starts_with(words), "{name}: {error:?}"),
-            _ => panic!("{name}: {:?}", outcome.map(|(_, findings)| findings)),
+            _ => panic!("{name}: {:?}", outcome.map(|(_, report)| report)),
         }
     }
 }

@@ -7,7 +7,7 @@ mod common;
 use common::{Rng, grid};
 use uv_param::nalgebra::Vector3;
 use uv_param::{
-    Chart, Error, NormalMode, Repair, Settings, Spray, SurfacePoint, TexelMap, Texture, largest_disk_with,
+    Chart, Error, NormalMode, NozzleSettings, Repair, Settings, SurfacePoint, TexelMap, Texture, largest_disk_with,
     linear_from_srgb, luminance, nozzle_command, unwrap,
 };
 
@@ -153,8 +153,8 @@ fn an_image_on_another_layout_is_carried_over() {
     let faces: Vec<[u32; 3]> = faces.iter().enumerate().map(wind).collect();
     let corner_uv: Vec<[[f32; 2]; 3]> =
         faces.iter().map(|f| f.map(|v| [positions[v as usize][2] as f32, positions[v as usize][0] as f32])).collect();
-    let (disk, findings) = largest_disk_with(&positions, &faces, Repair::default()).unwrap();
-    assert_eq!(findings.reversed_faces, 12);
+    let (disk, report) = largest_disk_with(&positions, &faces, Repair::default()).unwrap();
+    assert_eq!(report.reversed_faces, 12);
     let chart = unwrap(&disk, &Settings::default(), |_| ()).unwrap();
     let map = TexelMap::new(&chart, 0.05).unwrap();
     let texture = Texture::from_image(&map, &disk, &corner_uv, |[u, v]| [u as f32, v as f32]).unwrap();
@@ -197,23 +197,23 @@ fn light_is_linear() {
 fn the_nozzle_stands_off_along_the_normal() {
     // R = 2 sigma = 5 cm: 0.2836 m at 10 degrees, 0.1866 m at 15, 0.1374 m at 20.
     for (degrees, expected) in [(10.0_f64, 0.2836), (15.0, 0.1866), (20.0, 0.1374)] {
-        let spray = Spray { half_angle: degrees.to_radians(), ..Spray::default() };
+        let spray = NozzleSettings { half_angle: degrees.to_radians(), ..NozzleSettings::default() };
         assert!((spray.stand_off() - expected).abs() < 5e-5);
     }
     let chart = flat_wall();
     for normal in [NormalMode::Face, NormalMode::Smooth, NormalMode::Footprint { radius: 0.05 }] {
-        let spray = Spray { normal, ..Spray::default() };
+        let spray = NozzleSettings { normal, ..NozzleSettings::default() };
         let nozzle = nozzle_command(&chart, [0.7, 0.3], &spray).unwrap();
         let expected = [0.7, -spray.stand_off(), 0.3];
         assert!(nozzle.position.coords.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9));
         assert!((nozzle.direction.y - 1.0).abs() < 1e-12);
         assert!((nozzle.point.y).abs() < 1e-12 && (nozzle.normal.y + 1.0).abs() < 1e-12);
     }
-    let outside = nozzle_command(&chart, [2.5, 0.3], &Spray::default()).unwrap_err();
+    let outside = nozzle_command(&chart, [2.5, 0.3], &NozzleSettings::default()).unwrap_err();
     assert_eq!(outside, Error::OutsideChart { u: 2.5, v: 0.3 });
-    let flat_cone = Spray { half_angle: 2.0, ..Spray::default() };
+    let flat_cone = NozzleSettings { half_angle: 2.0, ..NozzleSettings::default() };
     assert!(matches!(nozzle_command(&chart, [0.7, 0.3], &flat_cone), Err(Error::Setting { name: "half_angle", .. })));
-    let no_spot = Spray { sigma: f64::NAN, ..Spray::default() };
+    let no_spot = NozzleSettings { sigma: f64::NAN, ..NozzleSettings::default() };
     assert!(matches!(nozzle_command(&chart, [0.7, 0.3], &no_spot), Err(Error::Setting { name: "sigma", .. })));
 }
 

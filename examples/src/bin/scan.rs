@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
+use paintcopter_examples::mesh_io::{PlyMesh, write_ply};
 use paintcopter_examples::report::save_figures;
 use paintcopter_examples::scan::{Device, Scan, ScanReport, ScanSettings, open_sequence, save_views};
 use tsdf_hash::Tiers;
@@ -98,8 +99,9 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     save_views(&scan, &sequence, folder, settings.map.threads)?;
     scan.map.save(&folder.join("map.tsdf"), Some(&scan.mesh), &BTreeMap::new())?;
     let ply = folder.join("mesh.ply");
-    let file = std::fs::File::create(&ply).map_err(|e| format!("{}: cannot be written ({e})", ply.display()))?;
-    tsdf_hash::write_ply(&scan.mesh, file)?;
+    let tsdf_hash::Mesh { positions, normals, colours, faces, .. } = &scan.mesh;
+    write_ply(&ply, &PlyMesh { positions, normals: Some(normals), colours, faces })
+        .map_err(|e| format!("{}: cannot be written ({e})", ply.display()))?;
     let tum = folder.join("trajectory.tum");
     std::fs::write(&tum, vio_ekf::tum::write(&scan.trajectory))
         .map_err(|e| format!("{}: cannot be written ({e})", tum.display()))?;

@@ -11,7 +11,7 @@ use crate::progress::Stage;
 use crate::surface::PaintSurface;
 
 /// Weight of texels out of reach against those in reach.
-const BARE_WEIGHT: f64 = 0.02;
+const UNPAINTABLE_WEIGHT: f64 = 0.02;
 /// Where the cone of the spray ends, in deviations: all but 0.2 % of the paint lies inside.
 pub(super) const SPRAY_CUT: f64 = 3.5;
 
@@ -40,7 +40,7 @@ pub(super) fn decide(
     }
     // What nobody can spray must not pull paint from its neighbours; a little weight keeps overspray off it.
     let weight = Image::from_fn(coverage.width(), coverage.height(), |x, y| {
-        let share = if paintable[y * coverage.width() + x] { 1.0 } else { BARE_WEIGHT };
+        let share = if paintable[y * coverage.width() + x] { 1.0 } else { UNPAINTABLE_WEIGHT };
         share * coverage.at(x, y)
     });
     let kernel = kernel(settings)?;

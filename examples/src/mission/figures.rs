@@ -1,7 +1,7 @@
 //! The figures of a mission.
 
 use paint_net::{ideal, metrics};
-use paint_planner::normal_deviation;
+use paint_planner::{Plan, normal_deviation};
 use paint_sim::FlightLog;
 use paint_sim::flight::{FlightSample, FlightStatistics};
 use paint_sim::spray::QUANTUM;
@@ -12,6 +12,7 @@ use super::fly::LayerFlight;
 use super::inspect::Inspection;
 use super::plan::path_length;
 use super::run::Mission;
+use super::settings::MissionSettings;
 use crate::appearance::DENSITY;
 use crate::report::{Report, peak_resident_bytes};
 
@@ -30,10 +31,10 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
     let flight_time: f64 = mission.flights.iter().map(|f| f.plan.trajectory.duration()).sum();
     let path: f64 = mission.flights.iter().map(|f| path_length(&f.plan)).sum();
 
-    let books = mission.film.books();
+    let balance = mission.film.mass_balance();
     let on_texels: u64 = mission.film.volumes().iter().sum();
     let kilograms = |quanta: u64| quanta as f64 * QUANTUM * DENSITY;
-    let balance = (i128::from(books.emitted) - i128::from(on_texels) - i128::from(books.overspray)).abs();
+    let unaccounted = (i128::from(balance.emitted) - i128::from(on_texels) - i128::from(balance.overspray)).abs();
 
     let canvas = mission.layers.last().map_or(&mission.wanted, |l| &l.ink);
     let filtered = ideal(&mission.wanted, mission.settings.spot / mission.settings.texel)?;
@@ -63,10 +64,10 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         planning_per_flight_time: mission.planning / flight_time,
         path_length_m: path,
         flight_time_s: flight_time,
-        paint_emitted_kg: kilograms(books.emitted),
+        paint_emitted_kg: kilograms(balance.emitted),
         paint_deposited_kg: kilograms(on_texels),
-        paint_overspray_kg: kilograms(books.overspray),
-        mass_balance_relative: balance as f64 / books.emitted.max(1) as f64,
+        paint_overspray_kg: kilograms(balance.overspray),
+        mass_balance_relative: unaccounted as f64 / balance.emitted.max(1) as f64,
         psnr_canvas_db: metrics::psnr(canvas, &mission.wanted, weight)?,
         psnr_ideal_db: metrics::psnr(&filtered, &mission.wanted, weight)?,
         psnr_painted_db: metrics::psnr(&painted, &mission.wanted, weight)?,
@@ -74,7 +75,7 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         ssim_painted: metrics::ssim(&painted, &mission.wanted, weight)?,
         ciede2000_mean: mean(mission.colour_difference().into_iter().flatten()),
         collisions: mission.flights.iter().map(|f| collisions(mission, &f.flight)).sum(),
-        limit_violations: mission.flights.iter().map(|f| limit_violations(mission, f)).sum(),
+        limit_violations: mission.flights.iter().map(|f| limit_violations(&f.plan, &f.flight, &mission.settings)).sum(),
         scan_error_mean_m: inspection.mesh_error,
         slam_ate_rms_m: inspection.slam_ate,
         layers: mission.layers.len(),
@@ -90,7 +91,7 @@ fn normal_deviations(mission: &Mission) -> Deviations {
         for (k, target) in f.route.targets.iter().enumerate().filter(|(_, t)| t.dose > 0.0) {
             total += 1;
             let heading = 0.0;
-            let joints = mission.robot.ptu.inverse_unlimited(&target.point, &-target.normal, heading).joints;
+            let joints = mission.robot.chain.inverse_unlimited(&target.point, &-target.normal, heading).joints;
             // Any heading will do: only the tilt is decided by the normal.
             if !mission.settings.ptu.tilt_limits.contains(joints.tilt) {
                 out_of_reach += 1;
@@ -118,7 +119,7 @@ fn collisions(mission: &Mission, log: &FlightLog) -> usize {
     let touches = |sample: &&FlightSample| {
         spheres.clear();
         let joints = Joints { pan: sample.pan_tilt[0], tilt: sample.pan_tilt[1] };
-        mission.robot.spheres_at(&sample.world_from_body, joints, &mut spheres);
+        mission.robot.spheres_at(&sample.world_from_body, &joints, &mut spheres);
         spheres
             .iter()
             .any(|(centre, radius)| paint_sim::Surface::distance(&mission.surface.world, centre, *radius) < *radius)
@@ -127,22 +128,21 @@ fn collisions(mission: &Mission, log: &FlightLog) -> usize {
 }
 
 /// Moments at which the plan exceeds speed or acceleration, or the flown gun its joint limits.
-fn limit_violations(mission: &Mission, f: &LayerFlight) -> usize {
-    let timing = &mission.settings.planner.timing;
+fn limit_violations(plan: &Plan, flight: &FlightLog, settings: &MissionSettings) -> usize {
+    let timing = &settings.planner.timing;
     let slack = 1.0 + 1e-9;
-    let steps = (f.plan.trajectory.duration() / LIMIT_STEP) as usize;
+    let steps = (plan.trajectory.duration() / LIMIT_STEP) as usize;
     let planned = (0..=steps)
-        .map(|k| f.plan.trajectory.sample(k as f64 * LIMIT_STEP))
+        .map(|k| plan.trajectory.sample(k as f64 * LIMIT_STEP))
         .filter(|s| {
             s.velocity.norm() > timing.max_speed * slack || s.acceleration.norm() > timing.max_acceleration * slack
         })
         .count();
-    let ptu = &mission.settings.ptu;
+    let ptu = &settings.ptu;
     // The servo's steps do not divide the limits: allow one half step.
-    let margin = 0.5 * mission.settings.servo.resolution;
+    let margin = 0.5 * settings.servo.resolution;
     let inside = |angle: f64, range: ptu_kinematics::Range| angle >= range.min - margin && angle <= range.max + margin;
-    let joints = f
-        .flight
+    let joints = flight
         .samples
         .iter()
         .filter(|s| !inside(s.pan_tilt[0], ptu.pan_limits) || !inside(s.pan_tilt[1], ptu.tilt_limits));
@@ -165,4 +165,34 @@ fn statistics(flights: &[LayerFlight], of: impl Fn(&LayerFlight) -> &FlightLog) 
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
     if count > 0.0 { sum / count } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_panel;
+    use super::*;
+    use ptu_kinematics::{PtuSettings, Range};
+
+    #[test]
+    fn limit_violations_are_counted() {
+        let settings = MissionSettings::default();
+        let (plan, flight) = test_panel::flown(&settings);
+        assert_eq!(limit_violations(&plan, &flight, &settings), 0);
+        // The same flight judged by a unit whose pan ends at 0.05 rad, which this stroke needs more than.
+        let narrow = PtuSettings { pan_limits: Range::symmetric(0.05), ..settings.ptu };
+        let judged = MissionSettings { ptu: narrow, ..settings.clone() };
+        let margin = 0.05 + 0.5 * settings.servo.resolution;
+        let beyond = flight.samples.iter().filter(|s| s.pan_tilt[0].abs() > margin).count();
+        assert!(beyond > 10, "the flight must leave the narrow limits");
+        assert_eq!(limit_violations(&plan, &flight, &judged), beyond);
+        let flat = PtuSettings { tilt_limits: Range::symmetric(0.02), ..settings.ptu };
+        assert!(limit_violations(&plan, &flight, &MissionSettings { ptu: flat, ..settings.clone() }) > 0);
+        // And by a vehicle that may fly only half as fast, or accelerate a tenth.
+        let mut slow = settings.clone();
+        slow.planner.timing.max_speed = 0.5 * plan.report.extrema.speed;
+        assert!(limit_violations(&plan, &flight, &slow) > 0);
+        let mut gentle = settings;
+        gentle.planner.timing.max_acceleration = 0.1 * plan.report.extrema.acceleration;
+        assert!(limit_violations(&plan, &flight, &gentle) > 0);
+    }
 }

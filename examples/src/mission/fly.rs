@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 use paint_planner::Plan;
-use paint_sim::flight::{Localisation, Tether};
+use paint_sim::flight::{HoseModel, Localisation};
 use paint_sim::{Film, FlightLog, FlightSettings, SprayModel};
 
 use super::decide::SPRAY_CUT;
@@ -69,8 +69,8 @@ pub(super) fn spray(
     film.deposit(&shots, &spray_model(settings), &surface.world, settings.threads, &mut |done, total| {
         stage.share(done as f64 / total as f64);
     })?;
-    let books = film.books();
-    let share = 100.0 * books.deposited as f64 / books.emitted.max(1) as f64;
+    let balance = film.mass_balance();
+    let share = 100.0 * balance.deposited as f64 / balance.emitted.max(1) as f64;
     stage.done(&format!("{share:.1} % of the paint on the surface"));
     Ok((film, pixels))
 }
@@ -82,7 +82,7 @@ fn spray_model(settings: &MissionSettings) -> SprayModel {
 }
 
 /// The same plan with motion capture, with a drifting localisation, and with the pan-tilt unit locked.
-fn fly_three(
+pub(super) fn fly_three(
     plan: &Plan,
     surface: &PaintSurface,
     robot: &Robot,
@@ -90,7 +90,7 @@ fn fly_three(
     layer: u64,
 ) -> Result<[FlightLog; 3], MissionError> {
     let usual = FlightSettings {
-        tether: Some(hose(plan)),
+        hose: Some(hose(plan)),
         seed: settings.seed.wrapping_mul(0x9E37_79B9).wrapping_add(layer),
         ..FlightSettings::default()
     };
@@ -100,8 +100,8 @@ fn fly_three(
         FlightSettings { ptu_locked: true, ..usual },
     ];
     let one = |flight: &FlightSettings| -> Result<FlightLog, MissionError> {
-        let reference = PlanReference { plan, ptu: &robot.ptu, stand_off: settings.planner.nozzle.stand_off };
-        let mut gun = ServoPanTilt::new(robot.ptu.clone(), settings.servo)?;
+        let reference = PlanReference { plan, chain: &robot.chain, stand_off: settings.planner.nozzle.stand_off };
+        let mut gun = ServoPanTilt::new(robot.chain.clone(), settings.servo)?;
         Ok(paint_sim::fly(&reference, &mut gun, &surface.world, flight)?)
     };
     if settings.threads < 2 {
@@ -116,7 +116,7 @@ fn fly_three(
 }
 
 /// The paint hose: from the ground behind the middle of the flight, long enough for all of it.
-fn hose(plan: &Plan) -> Tether {
+fn hose(plan: &Plan) -> HoseModel {
     let positions = || plan.waypoints.iter().map(|w| w.state.position);
     let count = plan.waypoints.len() as f64;
     let middle: Vector3<f64> = positions().map(|p| p.coords).sum::<Vector3<f64>>() / count;
@@ -129,5 +129,30 @@ fn hose(plan: &Plan) -> Tether {
     let base = Point3::new(middle.x - back.x, middle.y - back.y, 0.0);
     let farthest = positions().map(|p| (p - base).norm()).fold(0.0, f64::max);
     // A tenth of slack, and a metre for wind and overshoot.
-    Tether { base, length: 1.1 * farthest + 1.0, line_density: 0.12, base_on_floor: true }
+    HoseModel { base, length: 1.1 * farthest + 1.0, line_density: 0.12, base_on_floor: true }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_panel;
+    use super::*;
+    use ptu_kinematics::Ptu;
+
+    #[test]
+    fn the_seed_and_the_layer_change_wind_and_localisation() {
+        let settings = MissionSettings { seed: 1, threads: 1, ..MissionSettings::default() };
+        let surface = test_panel::surface();
+        let robot = Robot::new(Ptu::new(settings.ptu).unwrap());
+        let plan = test_panel::plan(&surface, &robot, &settings);
+        let fly = |seed, layer| {
+            let settings = MissionSettings { seed, ..settings.clone() };
+            fly_three(&plan, &surface, &robot, &settings, layer).unwrap()
+        };
+        let (usual, again, other, next) = (fly(1, 0), fly(1, 0), fly(2, 0), fly(1, 1));
+        for k in 0..3 {
+            assert_eq!(usual[k], again[k]);
+            assert_ne!(usual[k], other[k], "flight {k} ignores the seed");
+            assert_ne!(usual[k], next[k], "flight {k} is the same in every layer");
+        }
+    }
 }

@@ -1,14 +1,14 @@
 //! How the painted surface looks where a ray hits it.
 
-use paint_sim::{Hit, Look};
+use paint_sim::{Hit, Shading};
 use uv_param::SurfacePoint;
 
 use super::run::Mission;
 
 /// Shading of a point of the world: painted and smooth on the disk, grey elsewhere.
-pub(super) fn shading(mission: &Mission, painted: &paint_net::Image, hit: &Hit) -> Look {
+pub(super) fn shading(mission: &Mission, painted: &paint_net::Image, hit: &Hit) -> Shading {
     let Some(face) = mission.surface.disk().faces().get(hit.face as usize) else {
-        return Look { albedo: [0.4; 3], normal: hit.normal };
+        return Shading { albedo: [0.4; 3], normal: hit.normal };
     };
     let uv = mission.surface.chart.uv();
     let [a, b] = hit.barycentric;
@@ -19,7 +19,7 @@ pub(super) fn shading(mission: &Mission, painted: &paint_net::Image, hit: &Hit) 
     let y = (painted.height() as f64 * texel - mix(1)) / texel - 0.5;
     let albedo = mission.appearance.linear(bilinear(painted, x, y)).map(|c| c as f32);
     let at = SurfacePoint { face: hit.face, barycentric: [1.0 - a - b, a, b] };
-    Look { albedo, normal: mission.surface.chart.smooth_normal(at).into_inner() }
+    Shading { albedo, normal: mission.surface.chart.smooth_normal(at).into_inner() }
 }
 
 fn bilinear(image: &paint_net::Image, x: f64, y: f64) -> f64 {

@@ -170,7 +170,7 @@ pub fn paint_colours(
     Ok((painting, figures))
 }
 
-/// Writes `commands.json`, `commands.mcap`, `rendered.png`, `error.png` (CIEDE2000 of every pixel), `film.png` and
+/// Writes `commands.json`, `commands.mcap`, `rendered.png`, `error.png` (CIEDE2000 of every pixel), `progress.png` and
 /// `report.json`.
 pub fn save_colours(
     job: &Job,
@@ -197,5 +197,5 @@ pub fn save_colours(
     save_error_map(&folder.join("error.png"), figures.width, &map, (1.0, "px"))?;
     let paints: Vec<&[Spray]> = painting.sprays.iter().map(Vec::as_slice).collect();
     let show = |depths: &[f64]| palette.colour(depths).map(byte);
-    save_progress_strip(&folder.join("film.png"), rgb(wanted), &paints, &job.kernel, &show)
+    save_progress_strip(&folder.join("progress.png"), rgb(wanted), &paints, &job.kernel, &show)
 }

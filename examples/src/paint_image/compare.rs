@@ -1,3 +1,5 @@
+//! All painters on the same pictures, in one table.
+
 use std::fmt::Write;
 use std::path::Path;
 

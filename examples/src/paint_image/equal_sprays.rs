@@ -1,3 +1,5 @@
+//! The thesis' network beside other painters at the same number of sprays.
+
 use std::path::Path;
 
 use paint_net::thesis::ThesisPainter;

@@ -178,7 +178,7 @@ impl Job {
         Ok((painting, figures))
     }
 
-    /// Writes `commands.json`, `commands.mcap`, `rendered.png`, `error.png`, `film.png` and `report.json`.
+    /// Writes `commands.json`, `commands.mcap`, `rendered.png`, `error.png`, `progress.png` and `report.json`.
     pub fn save(
         &self,
         folder: &Path,
@@ -196,6 +196,6 @@ impl Job {
         grey(&painting.ink).save(&folder.join("rendered.png"))?;
         error_map(&painting.ink, wanted).save(&folder.join("error.png"))?;
         let show = |depths: &[f64]| [level(depths[0].tanh()); 3];
-        save_progress_strip(&folder.join("film.png"), grey(wanted), &[&painting.sprays], &self.kernel, &show)
+        save_progress_strip(&folder.join("progress.png"), grey(wanted), &[&painting.sprays], &self.kernel, &show)
     }
 }

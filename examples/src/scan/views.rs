@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nalgebra::{Isometry3, Translation3, Vector3};
-use paint_sim::{Camera, Frame, Hit, Lights, Look, TriangleSurface, render};
+use paint_sim::{Camera, Frame, Hit, Lights, Shading, TriangleSurface, render};
 use tsdf_hash::Mesh;
 
 use super::decode::Images;
@@ -48,7 +48,7 @@ pub fn save_views(scan: &Scan, sequence: &Sequence, folder: &Path, threads: usiz
     Ok(())
 }
 /// The mesh in its own colours, or in grey by the angle to `lamp`.
-fn shading(mesh: &Mesh, hit: &Hit, lamp: Option<&Vector3<f64>>) -> Look {
+fn shading(mesh: &Mesh, hit: &Hit, lamp: Option<&Vector3<f64>>) -> Shading {
     let [a, b, c] = mesh.faces[hit.face as usize].map(|vertex| vertex as usize);
     let [s, t] = hit.barycentric.map(|w| w as f32);
     let blend = |of: &dyn Fn(usize) -> [f32; 3]| -> [f32; 3] {
@@ -60,7 +60,7 @@ fn shading(mesh: &Mesh, hit: &Hit, lamp: Option<&Vector3<f64>>) -> Look {
         None => blend(&|v| mesh.colours[v].map(linear)),
         Some(lamp) => [(0.05 + 0.75 * normal.dot(lamp).max(0.0)) as f32; 3],
     };
-    Look { albedo, normal }
+    Shading { albedo, normal }
 }
 
 /// Linear light of an 8-bit sRGB value.

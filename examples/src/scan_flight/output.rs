@@ -3,33 +3,34 @@
 use std::path::Path;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
-use paint_sim::{Camera, Hit, Lights, Look, TriangleSurface, render};
+use paint_sim::{Camera, Hit, Lights, Shading, TriangleSurface, render};
 use vio_ekf::Trajectory;
 
 use super::fly::ScanFlight;
-use crate::mesh_io::write_ply;
+use crate::mesh_io::{PlyMesh, write_ply};
 use crate::mission::MissionError;
 use crate::pictures::{Polyline, Rgb, Scene, save_scene};
 
 /// Size of the picture, pixels.
 const VIEW: (u32, u32) = (1400, 900);
 
-/// Writes `survey.json`, `survey.png`, `survey.ply` and both trajectories into an existing folder.
+/// Writes `scan_flight.json`, `scan_flight.png`, `scan_flight.ply` and both trajectories into an existing folder.
 pub fn save(scan: &ScanFlight, folder: &Path) -> Result<(), MissionError> {
     let write = |name: &str, text: String| {
         let path = folder.join(name);
         std::fs::write(&path, text)
             .map_err(|source| MissionError::Unwritable { path: path.display().to_string(), source })
     };
-    write("survey_true.tum", vio_ekf::tum::write(&scan.flown))?;
-    write("survey_estimated.tum", vio_ekf::tum::write(&scan.estimated))?;
-    let ply = folder.join("survey.ply");
-    let grey = vec![[180; 3]; scan.mesh.positions.len()];
-    write_ply(&ply, &scan.mesh.positions, &scan.mesh.faces, &grey)
+    write("scan_flight_true.tum", vio_ekf::tum::write(&scan.flown))?;
+    write("scan_flight_estimated.tum", vio_ekf::tum::write(&scan.estimated))?;
+    let ply = folder.join("scan_flight.ply");
+    let (positions, faces) = (&scan.mesh.positions, &scan.mesh.faces);
+    let grey = vec![[180; 3]; positions.len()];
+    write_ply(&ply, &PlyMesh { positions, normals: None, colours: &grey, faces })
         .map_err(|source| MissionError::Unwritable { path: ply.display().to_string(), source })?;
-    save_picture(scan, &folder.join("survey.png"))?;
+    save_picture(scan, &folder.join("scan_flight.png"))?;
     let figures = serde_json::to_string_pretty(&scan.figures).map_err(crate::report::ReportError::from)?;
-    write("survey.json", figures + "\n")
+    write("scan_flight.json", figures + "\n")
 }
 
 /// The map with the way that was flown (blue) and the way that was estimated (orange), from behind the robot's shoulder.
@@ -47,7 +48,7 @@ fn save_picture(scan: &ScanFlight, path: &Path) -> Result<(), MissionError> {
     let camera = Camera::looking_at(&eye.into(), &(middle + ahead * 0.7).into(), &Vector3::z(), 1.05, VIEW)?;
     let towards_sun = UnitVector3::new_normalize(Vector3::z() - ahead * 0.6 - aside);
     let lights = Lights { towards_sun, ..Lights::default() };
-    let shade = |hit: &Hit| Look { albedo: [0.62, 0.56, 0.5], normal: hit.normal };
+    let shade = |hit: &Hit| Shading { albedo: [0.62, 0.56, 0.5], normal: hit.normal };
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let frame = render(&surface, &camera, &shade, &lights, 2, threads)?;
     let project = |p: &Point3<f64>| {

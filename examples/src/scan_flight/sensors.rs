@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, UnitVector3, Vector3};
 use paint_net::procedural::{lattice, value_noise};
-use paint_sim::{Hit, Lights, Look, TriangleSurface, render};
+use paint_sim::{Hit, Lights, Shading, TriangleSurface, render};
 use tsdf_hash::Intrinsics;
 use vio_ekf::{Camera, Distortion, ImageView};
 
@@ -80,7 +80,7 @@ impl<'a> SimulatedCamera<'a> {
         let Camera { width, height, fx, fy, cx, cy, .. } = self.camera;
         let (width, height) = (width as u32, height as u32);
         let camera = paint_sim::Camera { fx, fy, cx, cy, width, height, world_from_camera: *world_from_camera };
-        let shade = |hit: &Hit| Look { albedo: [self.albedo(hit) as f32; 3], normal: hit.normal };
+        let shade = |hit: &Hit| Shading { albedo: [self.albedo(hit) as f32; 3], normal: hit.normal };
         let mut frame = render(self.surface, &camera, &shade, &self.lights, 1, self.threads)?;
         let grey = frame.colour.iter().enumerate().map(|(pixel, colour)| {
             let noisy = f64::from(colour[0]) + GREY_NOISE * self.normal(2 * index, pixel);

@@ -1,14 +1,14 @@
 //! Whittaker's smoother: least squares between data and second differences, by a banded factorisation.
 
-use crate::angle::near;
-use crate::block::BlockTridiagonal;
+use crate::angle::nearest_equivalent;
+use crate::block_tridiagonal::BlockTridiagonal;
 use nalgebra::{Matrix2, Vector2};
 
 /// Continues angles without jumps of a turn.
 pub(crate) fn unwrap(angles: &[f64]) -> Vec<f64> {
     let mut result: Vec<f64> = Vec::with_capacity(angles.len());
     for &angle in angles {
-        let next = result.last().map_or(angle, |&last| near(angle, last));
+        let next = result.last().map_or(angle, |&last| nearest_equivalent(angle, last));
         result.push(next);
     }
     result

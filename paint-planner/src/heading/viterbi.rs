@@ -1,12 +1,12 @@
 //! Shortest path through (state x heading bin): the global optimum of VR paper, Eq. (7), on the grid.
 
-use super::table::{Node, Table};
+use super::graph::{HeadingGraph, Node};
 use crate::settings::HeadingSettings;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// Keeps the quotient of Eq. (7) finite where the body stands still, m^2.
-const STILL: f64 = 1e-6;
+const MIN_SQUARED_STEP: f64 = 1e-6;
 const NO_PARENT: u32 = u32::MAX;
 
 /// The best bins and where the vehicle has to be carried over a break.
@@ -37,28 +37,28 @@ impl Path {
 
 /// Cost of one edge, Eq. (7) with the squared distance the text asks for: `dpsi^2 / D^2 + c_e D^2`.
 fn edge(from: &Node, to: &Node, turn: f64, ce: f64) -> f64 {
-    let way = (to.position - from.position).norm_squared();
-    turn * turn / (way + STILL) + ce * way
+    let distance = (to.position - from.position).norm_squared();
+    turn * turn / (distance + MIN_SQUARED_STEP) + ce * distance
 }
 
-/// Viterbi over the table. Equal costs go to the lowest bin. Where no bin of a layer can be reached inside the window,
+/// Viterbi over the graph. Equal costs go to the lowest bin. Where no bin of a layer can be reached inside the window,
 /// or the strokes are not linked, any bin may follow any other: the flight between is planned separately.
-pub(crate) fn search(table: &Table, linked: &[bool], settings: &HeadingSettings) -> Path {
-    let bins = table.bins;
+pub(crate) fn search(graph: &HeadingGraph, linked: &[bool], settings: &HeadingSettings) -> Path {
+    let bins = graph.bins;
     let window = settings.window.min(bins / 2 - 1) as isize;
-    let mut parents = vec![NO_PARENT; table.nodes.len()];
-    let mut joined = vec![false; table.len().saturating_sub(1)];
+    let mut parents = vec![NO_PARENT; graph.nodes.len()];
+    let mut joined = vec![false; graph.len().saturating_sub(1)];
     let mut best = vec![f64::INFINITY; bins];
     let mut previous: Option<usize> = None;
-    for i in 0..table.len() {
-        let layer = table.layer(i);
+    for i in 0..graph.len() {
+        let layer = graph.layer(i);
         if layer.iter().all(Option::is_none) {
             continue;
         }
         let mut next = vec![0.0; bins];
         if let Some(before) = previous {
             let parent = &mut parents[i * bins..(i + 1) * bins];
-            let old = table.layer(before);
+            let old = graph.layer(before);
             next.fill(f64::INFINITY);
             if before + 1 == i && linked[before] {
                 relax((old, &best), (layer, &mut next), parent, window, settings.ce);
@@ -74,7 +74,7 @@ pub(crate) fn search(table: &Table, linked: &[bool], settings: &HeadingSettings)
         best = next;
         previous = Some(i);
     }
-    trace(table, &parents, joined, &best, previous)
+    trace(graph, &parents, joined, &best, previous)
 }
 
 /// Cheapest ways from one layer to the next over turns of at most `reach` bins.
@@ -106,8 +106,8 @@ fn candidates(bin: usize, bins: usize, reach: isize) -> impl Iterator<Item = (us
     })
 }
 
-fn trace(table: &Table, parents: &[u32], joined: Vec<bool>, best: &[f64], last: Option<usize>) -> Path {
-    let mut path = Path { bins: vec![None; table.len()], joined, cost: 0.0 };
+fn trace(graph: &HeadingGraph, parents: &[u32], joined: Vec<bool>, best: &[f64], last: Option<usize>) -> Path {
+    let mut path = Path { bins: vec![None; graph.len()], joined, cost: 0.0 };
     let Some(last) = last else { return path };
     let mut bin = 0;
     for (candidate, cost) in best.iter().enumerate() {
@@ -117,11 +117,11 @@ fn trace(table: &Table, parents: &[u32], joined: Vec<bool>, best: &[f64], last: 
     }
     path.cost = best[bin];
     for i in (0..=last).rev() {
-        if table.layer(i).iter().all(Option::is_none) {
+        if graph.layer(i).iter().all(Option::is_none) {
             continue;
         }
         path.bins[i] = Some(bin);
-        match parents[i * table.bins + bin] {
+        match parents[i * graph.bins + bin] {
             NO_PARENT => break,
             parent => bin = parent as usize,
         }
@@ -134,20 +134,20 @@ mod tests {
     use super::*;
     use nalgebra::Point3;
 
-    /// Every path through a small random table, by counting in base `bins`.
-    fn brute_force(table: &Table, settings: &HeadingSettings) -> f64 {
-        let (bins, layers) = (table.bins, table.len());
+    /// Every path through a small random graph, by counting in base `bins`.
+    fn brute_force(graph: &HeadingGraph, settings: &HeadingSettings) -> f64 {
+        let (bins, layers) = (graph.bins, graph.len());
         let mut least = f64::INFINITY;
         'paths: for code in 0..bins.pow(layers as u32) {
             let choice: Vec<usize> = (0..layers).map(|i| code / bins.pow(i as u32) % bins).collect();
             let mut cost = 0.0;
             for i in 0..layers {
-                let Some(node) = table.layer(i)[choice[i]] else { continue 'paths };
+                let Some(node) = graph.layer(i)[choice[i]] else { continue 'paths };
                 cost += settings.pan * node.pan * node.pan;
                 if i == 0 {
                     continue;
                 }
-                let Some(before) = table.layer(i - 1)[choice[i - 1]] else { continue 'paths };
+                let Some(before) = graph.layer(i - 1)[choice[i - 1]] else { continue 'paths };
                 let shift = (choice[i] + bins - choice[i - 1]) % bins;
                 let turns = shift.min(bins - shift);
                 if turns > settings.window {
@@ -177,9 +177,9 @@ mod tests {
                     (random() < 0.7).then(|| Node { position, pan: random() - 0.5 })
                 })
                 .collect();
-            let table = Table::from_nodes(bins, nodes);
-            let expected = brute_force(&table, &settings);
-            let path = search(&table, &[true; 4], &settings);
+            let graph = HeadingGraph::from_nodes(bins, nodes);
+            let expected = brute_force(&graph, &settings);
+            let path = search(&graph, &[true; 4], &settings);
             if expected.is_finite() {
                 solvable += 1;
                 assert!((path.cost - expected).abs() < 1e-9 * expected);
@@ -194,8 +194,8 @@ mod tests {
     #[test]
     fn ties_go_to_the_lowest_bin() {
         let node = Node { position: Point3::origin(), pan: 0.0 };
-        let table = Table::from_nodes(4, vec![Some(node); 12]);
-        let path = search(&table, &[true; 2], &HeadingSettings::default());
+        let graph = HeadingGraph::from_nodes(4, vec![Some(node); 12]);
+        let path = search(&graph, &[true; 2], &HeadingSettings::default());
         assert_eq!(path.bins, vec![Some(0); 3]);
     }
 }

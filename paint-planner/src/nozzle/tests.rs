@@ -1,7 +1,7 @@
 //! The interior-point method against Clarabel, and stage 1 against a known optimum.
 
-use super::program::Program;
-use super::{Mode, interior, optimise, starts};
+use super::quadratic_program::QuadraticProgram;
+use super::{Mode, initial_states, interior_point, optimise};
 use crate::settings::NozzleSettings;
 use crate::target::{Target, normal_deviation};
 use clarabel::algebra::CscMatrix;
@@ -21,9 +21,9 @@ impl Random {
     }
 }
 
-/// A random strictly convex program whose walls admit the origin and whose caps, partly, do not.
-fn random_program(count: usize, random: &mut Random) -> Program {
-    let mut program = Program::new(count, 4, 3, 0.3);
+/// A random strictly convex program whose hard rows admit the origin and whose soft ones, partly, do not.
+fn random_program(count: usize, random: &mut Random) -> QuadraticProgram {
+    let mut program = QuadraticProgram::new(count, 4, 3, 0.3);
     for i in 0..count {
         let root = Matrix5::from_fn(|_, _| random.next());
         program.hessian.diagonal[i] = root * root.transpose() + Matrix5::identity() * 4.0;
@@ -31,22 +31,22 @@ fn random_program(count: usize, random: &mut Random) -> Program {
             program.hessian.lower[i] = Matrix5::from_fn(|_, _| 0.3 * random.next());
         }
         program.gradient[i] = Vector5::from_fn(|_, _| 3.0 * random.next());
-        program.lens[i] = Matrix2x5::from_fn(|_, _| random.next());
+        program.soft_map[i] = Matrix2x5::from_fn(|_, _| random.next());
         for _ in 0..4 {
-            program.push_wall(Vector3::from_fn(|_, _| random.next()), 0.05 + 0.2 * random.next().abs());
+            program.push_hard(Vector3::from_fn(|_, _| random.next()), 0.05 + 0.2 * random.next().abs());
         }
         for _ in 0..3 {
-            program.push_cap(Vector2::new(random.next(), random.next()), 0.2 * random.next());
+            program.push_soft(Vector2::new(random.next(), random.next()), 0.2 * random.next());
         }
     }
     program
 }
 
 /// Clarabel's answer to the same program: variables x, then one relaxation per cap.
-fn by_clarabel(program: &Program) -> Vec<f64> {
-    let (count, walls, caps) = (program.gradient.len(), program.walls, program.caps);
-    let (states, per_state) = (5 * count, walls + caps);
-    let variables = states + caps * count;
+fn by_clarabel(program: &QuadraticProgram) -> Vec<f64> {
+    let (count, hard, soft) = (program.gradient.len(), program.hard_rows, program.soft_rows);
+    let (states, per_state) = (5 * count, hard + soft);
+    let variables = states + soft * count;
     let (mut ri, mut ci, mut values) = (vec![], vec![], vec![]);
     let mut upper = |r: usize, c: usize, v: f64| {
         if r <= c {
@@ -72,12 +72,12 @@ fn by_clarabel(program: &Program) -> Vec<f64> {
     for (j, row) in program.rows.iter().enumerate() {
         let (i, k) = (j / per_state, j % per_state);
         let mut line = Vector5::zeros();
-        if k < walls {
+        if k < hard {
             line.fixed_rows_mut::<3>(0).copy_from(&row.a);
         } else {
-            line = program.lens[i].tr_mul(&row.a.xy());
+            line = program.soft_map[i].tr_mul(&row.a.xy());
             ri.push(j);
-            ci.push(states + caps * i + k - walls);
+            ci.push(states + soft * i + k - hard);
             values.push(-1.0);
         }
         for r in 0..5 {
@@ -116,7 +116,7 @@ fn the_interior_point_method_agrees_with_clarabel() {
         let count = 1 + 3 * round;
         let program = random_program(count, &mut random);
         let mut x = vec![Vector5::zeros(); count];
-        let outcome = interior::solve(&program, &mut x).unwrap();
+        let outcome = interior_point::solve(&program, &mut x).unwrap();
         relaxed += usize::from(outcome.slack > 1e-3);
         for (k, expected) in by_clarabel(&program).into_iter().enumerate() {
             assert!((x[k / 5][k % 5] - expected).abs() < 1e-6, "round {round}");
@@ -146,8 +146,8 @@ fn three_targets_of_known_optimum() {
         rounds: 12,
         ..NozzleSettings::default()
     };
-    let starts = starts(&targets, &settings);
-    let result = optimise(&targets, &starts, &[true; 2], Mode::Repaired, &settings).unwrap();
+    let initial_states = initial_states(&targets, &settings);
+    let result = optimise(&targets, &initial_states, &[true; 2], Mode::Sequential, &settings).unwrap();
     let expected = [[-0.1, 0.0, 0.0111922], [-0.0905293, 0.0, 0.0559610], [-0.1, 0.0, 0.0271922]];
     let deviations = [0.011192, 0.017549, 0.007192];
     for i in 0..3 {
@@ -162,8 +162,8 @@ fn the_answer_is_a_minimum_of_the_cost_as_written() {
     let mut random = Random(5);
     let targets: Vec<Target> = (0..12).map(|i| target(0.025 * f64::from(i), 0.2 * random.next())).collect();
     let settings = NozzleSettings { cb: 0.0, cc: 1e-9, rounds: 10, ..NozzleSettings::default() };
-    let starts = starts(&targets, &settings);
-    let result = optimise(&targets, &starts, &[true; 11], Mode::Repaired, &settings).unwrap();
+    let initial_states = initial_states(&targets, &settings);
+    let result = optimise(&targets, &initial_states, &[true; 11], Mode::Sequential, &settings).unwrap();
     let p: Vec<Point3<f64>> = result.states.iter().map(|s| s.unwrap().position).collect();
     let cost = |p: &[Point3<f64>]| {
         let smooth: f64 = p.windows(2).map(|pair| settings.ca * (pair[1] - pair[0]).norm_squared()).sum();
@@ -189,8 +189,9 @@ fn cut_links_leave_the_strokes_alone() {
     let targets: Vec<Target> = (0..6).map(|i| target(if i < 3 { 0.02 } else { 1.0 } * f64::from(i), 0.1)).collect();
     let settings = NozzleSettings::default();
     let linked = [true, true, false, true, true];
-    let whole = optimise(&targets, &starts(&targets, &settings), &linked, Mode::Repaired, &settings).unwrap();
-    let part = optimise(&targets[..3], &starts(&targets[..3], &settings), &[true; 2], Mode::Repaired, &settings);
+    let whole = optimise(&targets, &initial_states(&targets, &settings), &linked, Mode::Sequential, &settings).unwrap();
+    let part =
+        optimise(&targets[..3], &initial_states(&targets[..3], &settings), &[true; 2], Mode::Sequential, &settings);
     for (a, b) in whole.states[..3].iter().zip(part.unwrap().states) {
         assert!((a.unwrap().position - b.unwrap().position).norm() < 1e-6);
     }

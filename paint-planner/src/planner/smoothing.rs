@@ -1,16 +1,15 @@
 //! The smoothing planner, the baseline of Paper II, section 6.2: face the wall horizontally, smooth, fly.
 
-use super::Planner;
-use super::finish::{Draft, finish};
-use super::optimal::links;
-use crate::clearance::Checker;
+use super::assemble::{UntimedPlan, assemble_plan};
+use super::strategy::Planner;
+use crate::clearance::ClearanceChecker;
 use crate::error::Error;
 use crate::lowess::lowess;
 use crate::nozzle::Nozzles;
 use crate::plan::Plan;
 use crate::route;
 use crate::settings::Settings;
-use crate::target::{NozzleState, Target, check};
+use crate::target::{NozzleState, Target, check, stroke_links};
 use crate::world::{Surface, Tool, VehicleState};
 use nalgebra::{Point3, UnitVector3, Vector3};
 
@@ -33,7 +32,7 @@ impl Planner for SmoothingPlanner {
     ) -> Result<Plan, Error> {
         settings.check()?;
         check(targets)?;
-        let linked = links(targets, settings.break_length);
+        let linked = stroke_links(targets, settings.break_length);
         let nozzles = smooth(targets, &linked, settings);
         let mut vehicle: Vec<Option<VehicleState>> = nozzles
             .iter()
@@ -48,8 +47,8 @@ impl Planner for SmoothingPlanner {
         let route = route::build(&mut vehicle, &linked, None, settings)?;
         let states = nozzles.into_iter().zip(&vehicle).map(|(n, v)| v.map(|_| n)).collect();
         let nozzles = Nozzles { states, rounds: 0, steps: 0, slack: 0.0 };
-        let draft = Draft { nozzles, vehicle, heading_cost: 0.0, route };
-        Ok(finish(&draft, targets, &mut Checker::new(surface, tool), settings, false)?.0)
+        let untimed = UntimedPlan { nozzles, vehicle, heading_cost: 0.0, route };
+        Ok(assemble_plan(&untimed, targets, &mut ClearanceChecker::new(surface, tool), settings, false)?.0)
     }
 }
 
@@ -58,16 +57,16 @@ fn smooth(targets: &[Target], linked: &[bool], settings: &Settings) -> Vec<Nozzl
     let mut facing = first_facing(targets);
     let mut x = Vec::with_capacity(targets.len());
     let mut raw: Vec<[f64; 5]> = Vec::with_capacity(targets.len());
-    let mut way = 0.0;
+    let mut arc_length = 0.0;
     for (i, target) in targets.iter().enumerate() {
         // The normal of a floor has no horizontal part: keep facing as before.
         let flat = Vector3::new(target.normal.x, target.normal.y, 0.0);
         facing = flat.try_normalize(1e-6).unwrap_or(facing);
         if i > 0 {
-            way += (target.point - targets[i - 1].point).norm();
+            arc_length += (target.point - targets[i - 1].point).norm();
         }
         let p = target.point + facing * settings.nozzle.stand_off;
-        x.push(way);
+        x.push(arc_length);
         raw.push([p.x, p.y, p.z, -facing.x, -facing.y]);
     }
     let mut result = Vec::with_capacity(targets.len());

@@ -139,7 +139,7 @@ fn strokes_apart_are_joined_by_clear_flights() {
         pan: 0.0,
         tilt: 0.0,
     };
-    let settings = Settings { start: Some(pose(3.0)), finish: Some(pose(2.5)), ..Settings::default() };
+    let settings = Settings { start: Some(pose(3.0)), goal: Some(pose(2.5)), ..Settings::default() };
     let plan = optimal(&targets, &wall, &settings).unwrap();
     assert_eq!(plan.report.served, 40);
     assert_sound(&plan, &targets, &settings);
@@ -155,7 +155,7 @@ fn starting_at_the_first_waypoint_changes_nothing() {
     let wall = Wall::bumpy(0.1);
     let targets = wall.rows(1.0, 1, 0.2);
     let plan = optimal(&targets, &wall, &Settings::default()).unwrap();
-    let settings = Settings { start: Some(plan.vehicle[0]), finish: Some(plan.vehicle[40]), ..Settings::default() };
+    let settings = Settings { start: Some(plan.vehicle[0]), goal: Some(plan.vehicle[40]), ..Settings::default() };
     let again = optimal(&targets, &wall, &settings).unwrap();
     assert_sound(&again, &targets, &settings);
     assert!((again.trajectory.duration() / plan.trajectory.duration() - 1.0).abs() < 0.05);
@@ -246,7 +246,7 @@ fn paper_exact_mode_depends_on_the_world_frame_and_the_repaired_mode_does_not() 
     };
     // Eqs. (4)-(5) compare world x with the azimuth: at 0.9 rad the rows bind differently.
     assert!(spread(Mode::PaperExact) > 1e-4);
-    assert!(spread(Mode::Repaired) < 1e-9);
+    assert!(spread(Mode::Sequential) < 1e-9);
 }
 
 #[test]

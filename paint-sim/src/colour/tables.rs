@@ -1,6 +1,6 @@
 //! The numbers of the CIE: the 1931 2 degree observer and the D65 illuminant at the 36 bands.
 
-use super::BANDS;
+use super::spectrum::BANDS;
 
 /// Colour matching functions x, y, z of the CIE 1931 2 degree observer (CIE 015), one row per band.
 pub(super) const OBSERVER: [[f64; 3]; BANDS] = [

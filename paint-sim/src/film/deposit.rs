@@ -2,70 +2,30 @@
 
 use nalgebra::Vector3;
 
-use super::{Books, Canvas, Film, Texel, check_unit};
+use super::texel::{Texel, check_unit};
+use super::texel_index::TexelIndex;
+use crate::error::{Error, check_not_negative};
 use crate::spray::{Cone, QUANTUM, Shot, SprayModel};
 use crate::surface::Surface;
-use crate::{Error, error::check_not_negative, error::check_range};
 
 /// Shots that are worked on between two calls of `progress`; bounds the memory of the hit lists.
-const BATCH: usize = 1024;
+pub(super) const SHOTS_PER_BATCH: usize = 1024;
 
 /// Up to this size, in deviations of the spot, a texel is one sample.
-const SMALL: f64 = 0.125;
+const SINGLE_SAMPLE_SIZE: f64 = 0.125;
 
 /// Larger texels are cut into pieces of at most this size, in deviations; each takes two by two Gauss points, which
 /// leaves a relative error of about 5e-5.
-const PIECE: f64 = 0.5;
+const MAX_PIECE_SIZE: f64 = 0.5;
 
 /// Most pieces per side of one texel.
-const MOST_PIECES: f64 = 8.0;
+const MAX_PIECES_PER_SIDE: f64 = 8.0;
 
 /// Gauss points of order two on -1/2..1/2: `+- 1/sqrt(12)`.
 const GAUSS: f64 = 0.288_675_134_594_812_9;
 
-impl Film {
-    /// Sprays `shots` onto the film and returns the books of this call.
-    ///
-    /// Each texel receives `V * density * area` where the shadow ray from the nozzle to its centre is free; a texel that
-    /// is coarse for the spot is integrated by Gauss's rule over a square of its area. If the texels of a shot
-    /// together claim more than its share `efficiency` (they are a finite sum), they are scaled down to it. Each shot is
-    /// rounded to whole femtolitres by the largest remainder, so the result is the same for every number of `threads`.
-    /// `progress(done, total)` is called on the calling thread about every thousand shots.
-    ///
-    /// # Errors
-    /// Shots or settings that are not finite or out of range, no threads, or books beyond 2^64 femtolitres; the film is
-    /// then unchanged.
-    pub fn deposit(
-        &mut self,
-        shots: &[Shot],
-        spray: &SprayModel,
-        surface: &dyn Surface,
-        threads: usize,
-        progress: &mut dyn FnMut(usize, usize),
-    ) -> Result<Books, Error> {
-        spray.check()?;
-        check_range("threads", threads as f64, 1.0, 1024.0, "between 1 and 1024")?;
-        let emitted = check_shots(shots)?;
-        self.books.emitted.checked_add(emitted).ok_or(Error::BooksOverflow)?;
-
-        let mut deposited = 0;
-        for (number, batch) in shots.chunks(BATCH).enumerate() {
-            for (texel, quanta) in spray_batch(&self.canvas, batch, spray, surface, threads) {
-                self.volumes[texel as usize] += quanta;
-                deposited += quanta;
-            }
-            progress(number * BATCH + batch.len(), shots.len());
-        }
-        let call = Books { emitted, deposited, overspray: emitted - deposited };
-        self.books.emitted += call.emitted;
-        self.books.deposited += call.deposited;
-        self.books.overspray += call.overspray;
-        Ok(call)
-    }
-}
-
 /// Quanta that the shots emit in total.
-fn check_shots(shots: &[Shot]) -> Result<u64, Error> {
+pub(super) fn count_quanta(shots: &[Shot]) -> Result<u64, Error> {
     let mut emitted = 0_u64;
     for (index, shot) in shots.iter().enumerate() {
         if !(shot.origin.iter().chain(shot.axis.iter()).all(|v| v.is_finite()) && shot.volume.is_finite()) {
@@ -74,9 +34,9 @@ fn check_shots(shots: &[Shot]) -> Result<u64, Error> {
         check_unit("length of a shot's axis", &shot.axis)?;
         check_not_negative("shot volume", shot.volume)?;
         // The cast saturates, so an absurd volume ends in the overflow error as well.
-        emitted = emitted.checked_add(quanta(shot.volume)).ok_or(Error::BooksOverflow)?;
+        emitted = emitted.checked_add(quanta(shot.volume)).ok_or(Error::MassOverflow)?;
     }
-    if emitted == u64::MAX { Err(Error::BooksOverflow) } else { Ok(emitted) }
+    if emitted == u64::MAX { Err(Error::MassOverflow) } else { Ok(emitted) }
 }
 
 fn quanta(volume: f64) -> u64 {
@@ -84,8 +44,8 @@ fn quanta(volume: f64) -> u64 {
 }
 
 /// The hit list of a batch: (texel, quanta). Integer sums do not depend on the order, so the threads need no other care.
-fn spray_batch(
-    canvas: &Canvas,
+pub(super) fn deposit_batch(
+    texels: &TexelIndex,
     batch: &[Shot],
     spray: &SprayModel,
     surface: &dyn Surface,
@@ -94,7 +54,7 @@ fn spray_batch(
     let work = |shots: &[Shot]| {
         let mut scratch = Scratch::default();
         for shot in shots {
-            spray_shot(canvas, shot, spray, surface, &mut scratch);
+            deposit_shot(texels, shot, spray, surface, &mut scratch);
         }
         scratch.hits
     };
@@ -120,7 +80,7 @@ struct Scratch {
     hits: Vec<(u32, u64)>,
 }
 
-fn spray_shot(canvas: &Canvas, shot: &Shot, spray: &SprayModel, surface: &dyn Surface, scratch: &mut Scratch) {
+fn deposit_shot(texels: &TexelIndex, shot: &Shot, spray: &SprayModel, surface: &dyn Surface, scratch: &mut Scratch) {
     let emitted = quanta(shot.volume);
     if emitted == 0 {
         return;
@@ -129,8 +89,8 @@ fn spray_shot(canvas: &Canvas, shot: &Shot, spray: &SprayModel, surface: &dyn Su
     let clearance = surface.distance(&shot.origin, spray.range) * (1.0 - 1e-9);
     let Scratch { stack, shares, .. } = scratch;
     shares.clear();
-    canvas.tree.for_each(&cone, stack, |index| {
-        let texel = &canvas.texels[index as usize];
+    texels.tree.for_each(&cone, stack, |index| {
+        let texel = &texels.texels[index as usize];
         let share = texel_share(&cone, texel);
         if share > 0.0 && !in_shadow(&cone, texel, spray.shadow_bias, clearance, surface) {
             shares.push((index, share));
@@ -143,11 +103,15 @@ fn spray_shot(canvas: &Canvas, shot: &Shot, spray: &SprayModel, surface: &dyn Su
 fn texel_share(cone: &Cone, texel: &Texel) -> f64 {
     let side = texel.area.sqrt();
     let deviation = (texel.point - cone.origin).dot(cone.axis) * cone.deviation;
-    if side <= SMALL * deviation {
+    if side <= SINGLE_SAMPLE_SIZE * deviation {
         return cone.density(&texel.point, &texel.normal) * texel.area;
     }
     // A texel at or behind the nozzle's height has no positive deviation; part of it may still be before the nozzle.
-    let pieces = if deviation > 0.0 { (side / (PIECE * deviation)).ceil().min(MOST_PIECES) } else { MOST_PIECES };
+    let pieces = if deviation > 0.0 {
+        (side / (MAX_PIECE_SIZE * deviation)).ceil().min(MAX_PIECES_PER_SIDE)
+    } else {
+        MAX_PIECES_PER_SIDE
+    };
     let step = side / pieces;
     let (u, v) = tangents(&texel.normal);
     let points = || (0..2 * pieces as u32).map(|i| gauss_point(i) * step - 0.5 * side);

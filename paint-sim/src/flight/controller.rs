@@ -2,10 +2,9 @@
 
 use nalgebra::{Rotation3, Vector3};
 
+use super::airframe::{Airframe, Command, GRAVITY};
 use super::estimator::{Estimate, wrap};
 use super::reference::Reference;
-use super::settings::Airframe;
-use super::vehicle::{Command, GRAVITY};
 
 /// Something that flies the vehicle along a reference, asked every 10 ms. It may look ahead in the reference.
 pub trait Controller {
@@ -13,7 +12,7 @@ pub trait Controller {
     fn command(&mut self, time: f64, estimate: &Estimate, reference: &dyn Reference) -> Command;
 }
 
-/// Gains of [`CascadedController`] (all ours).
+/// Gains of [`CascadedController`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct ControllerSettings {
@@ -36,7 +35,7 @@ impl Default for ControllerSettings {
 }
 
 /// Cascaded PD control with feed-forward of velocity, acceleration and jerk, rejection of the observed disturbance, and
-/// inversion of the known first-order attitude lag. Ours.
+/// inversion of the known first-order attitude lag.
 #[derive(Debug, Clone)]
 pub struct CascadedController {
     airframe: Airframe,
@@ -72,15 +71,15 @@ impl Controller for CascadedController {
         let lift = force.z.max(0.2 * GRAVITY);
         let pitch = (force.x / lift).atan();
         let roll = (-force.y / force.x.hypot(lift)).atan();
-        let lead = |target: f64, rate: f64, now: f64, lag: f64, gain: f64| {
+        let invert_lag = |target: f64, rate: f64, now: f64, lag: f64, gain: f64| {
             let command = (now + lag * (rate + gains.attitude * (target - now))) / gain;
             command.clamp(-frame.tilt_limit, frame.tilt_limit)
         };
         let [roll_now, pitch_now, yaw] = estimate.attitude;
         let upright = (roll_now.cos() * pitch_now.cos()).max(0.5);
         Command {
-            roll: lead(roll, -jerk.y / lift, roll_now, frame.roll_lag, frame.roll_gain),
-            pitch: lead(pitch, jerk.x / lift, pitch_now, frame.pitch_lag, frame.pitch_gain),
+            roll: invert_lag(roll, -jerk.y / lift, roll_now, frame.roll_time_constant, frame.roll_gain),
+            pitch: invert_lag(pitch, jerk.x / lift, pitch_now, frame.pitch_time_constant, frame.pitch_gain),
             yaw_rate: wanted.heading_rate + gains.heading * wrap(wanted.heading - yaw),
             thrust: frame.mass * (force.z / upright).clamp(0.2 * GRAVITY, 2.0 * GRAVITY),
         }

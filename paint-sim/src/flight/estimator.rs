@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
-use super::settings::Airframe;
-use super::vehicle::{Command, GRAVITY, Vehicle};
+use super::airframe::{Airframe, Command, GRAVITY};
+use super::vehicle::Vehicle;
 
 /// The estimated state, and the acceleration that the model does not explain.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,7 +20,7 @@ pub struct Estimate {
     pub yaw_rate: f64,
 }
 
-/// Bandwidths of the observer (all ours).
+/// Bandwidths of the observer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct ObserverSettings {

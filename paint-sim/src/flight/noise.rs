@@ -9,8 +9,8 @@ use crate::rng::Rng;
 /// Three independent Ornstein-Uhlenbeck processes, stepped exactly: `w+ = a w + sigma sqrt(1 - a^2) N(0,1)`.
 #[derive(Debug, Clone)]
 pub(super) struct OrnsteinUhlenbeck {
-    keep: f64,
-    kick: f64,
+    decay: f64,
+    noise: f64,
     value: Vector3<f64>,
     rng: Rng,
 }
@@ -19,14 +19,14 @@ impl OrnsteinUhlenbeck {
     /// Starts in the stationary distribution.
     pub(super) fn new(sigma: f64, time: f64, dt: f64, seed: u64, stream: u64) -> Self {
         let mut rng = Rng::new(seed, stream);
-        let keep = (-dt / time).exp();
+        let decay = (-dt / time).exp();
         let value = sigma * normal3(&mut rng);
-        Self { keep, kick: sigma * (1.0 - keep * keep).sqrt(), value, rng }
+        Self { decay, noise: sigma * (1.0 - decay * decay).sqrt(), value, rng }
     }
 
     pub(super) fn step(&mut self) -> Vector3<f64> {
-        if self.kick > 0.0 {
-            self.value = self.keep * self.value + self.kick * normal3(&mut self.rng);
+        if self.noise > 0.0 {
+            self.value = self.decay * self.value + self.noise * normal3(&mut self.rng);
         }
         self.value
     }
@@ -37,12 +37,12 @@ fn normal3(rng: &mut Rng) -> Vector3<f64> {
 }
 
 /// The moving air.
-pub(super) struct Air {
+pub(super) struct WindModel {
     mean: Vector3<f64>,
     gusts: OrnsteinUhlenbeck,
 }
 
-impl Air {
+impl WindModel {
     pub(super) fn new(wind: &Wind, dt: f64, seed: u64) -> Self {
         Self { mean: wind.mean, gusts: OrnsteinUhlenbeck::new(wind.gust_sigma, wind.gust_time, dt, seed, 1) }
     }

@@ -2,56 +2,19 @@
 
 use nalgebra::Vector3;
 
-use super::tether::Tether;
-use crate::Error;
-use crate::error::{check_not_negative, check_positive, check_range};
-
-/// Mass and responses of the vehicle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
-pub struct Airframe {
-    /// Mass with arm and spray gun, kg. Default 4.2 (ours; Paper II names the airframe, a DJI Matrice 100, but no mass).
-    pub mass: f64,
-    /// Gain from the roll command to roll. Default 1.017 (the small multirotor published with the ETH model predictive controller).
-    pub roll_gain: f64,
-    /// Time constant of roll, s. Default 0.1847 (same source).
-    pub roll_lag: f64,
-    /// Gain from the pitch command to pitch. Default 0.789 (same source).
-    pub pitch_gain: f64,
-    /// Time constant of pitch, s. Default 0.175 (same source).
-    pub pitch_lag: f64,
-    /// Time constant of the yaw rate, s. Default 0.15 (ours).
-    pub yaw_lag: f64,
-    /// Linear drag per mass along the body's axes, 1/s. Default 0.3, 0.3, 0.1 (ours).
-    pub drag: [f64; 3],
-    /// Largest commanded roll or pitch, rad. Default 25 degrees (same source as the gains).
-    pub tilt_limit: f64,
-}
-
-impl Default for Airframe {
-    fn default() -> Self {
-        Self {
-            mass: 4.2,
-            roll_gain: 1.017,
-            roll_lag: 0.1847,
-            pitch_gain: 0.789,
-            pitch_lag: 0.175,
-            yaw_lag: 0.15,
-            drag: [0.3, 0.3, 0.1],
-            tilt_limit: 25.0_f64.to_radians(),
-        }
-    }
-}
+use super::airframe::Airframe;
+use super::hose::HoseModel;
+use crate::error::{Error, check_not_negative, check_positive, check_range};
 
 /// Wind as a mean and gusts; each axis of the gusts is an Ornstein-Uhlenbeck process.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct Wind {
-    /// Mean velocity of the air in the world, m/s. Default 2 along x (ours).
+    /// Mean velocity of the air in the world, m/s. Default 2 along x.
     pub mean: Vector3<f64>,
-    /// Standard deviation of the gusts per axis, m/s. Default 0.5 (ours).
+    /// Standard deviation of the gusts per axis, m/s. Default 0.5.
     pub gust_sigma: f64,
-    /// Time constant of the gusts, s. Default 1.5 (ours).
+    /// Time constant of the gusts, s. Default 1.5.
     pub gust_time: f64,
 }
 
@@ -69,7 +32,7 @@ impl Wind {
 }
 
 /// The error of the pose that the controller is given: a slow Ornstein-Uhlenbeck drift plus white noise at 100 Hz, each
-/// axis by itself. All presets are ours.
+/// axis by itself. The presets are engineering values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Localisation {
@@ -124,7 +87,7 @@ impl Default for Localisation {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct Valve {
-    /// Time from the command to the paint, s. Default 50 ms (ours).
+    /// Time from the command to the paint, s. Default 50 ms.
     pub dead_time: f64,
     /// How much earlier than the reference says the command is given, s. Default 50 ms: the dead time is known.
     pub lead: f64,
@@ -145,14 +108,14 @@ pub struct FlightSettings {
     /// The air.
     pub wind: Wind,
     /// The hose; `None` for a free flight (default).
-    pub tether: Option<Tether>,
+    pub hose: Option<HoseModel>,
     /// The error of the pose estimate. Default [`Localisation::mocap`].
     pub localisation: Localisation,
     /// The valve.
     pub valve: Valve,
     /// Keeps pan and tilt at zero. Default false.
     pub ptu_locked: bool,
-    /// Hover at the start before the reference begins, s; the observer learns wind and hose. Default 5 (ours).
+    /// Hover at the start before the reference begins, s; the observer learns wind and hose. Default 5.
     pub settle: f64,
     /// Samples per second of the log; a divisor of 1000. Default 100 Hz.
     pub log_rate: u32,
@@ -165,7 +128,7 @@ impl Default for FlightSettings {
         Self {
             airframe: Airframe::default(),
             wind: Wind::default(),
-            tether: None,
+            hose: None,
             localisation: Localisation::default(),
             valve: Valve::default(),
             ptu_locked: false,
@@ -178,14 +141,23 @@ impl Default for FlightSettings {
 
 impl FlightSettings {
     pub(crate) fn check(&self) -> Result<(), Error> {
-        let Airframe { mass, roll_gain, roll_lag, pitch_gain, pitch_lag, yaw_lag, drag, tilt_limit } = self.airframe;
+        let Airframe {
+            mass,
+            roll_gain,
+            roll_time_constant,
+            pitch_gain,
+            pitch_time_constant,
+            yaw_time_constant,
+            drag,
+            tilt_limit,
+        } = self.airframe;
         for (what, value) in [
             ("airframe.mass", mass),
             ("airframe.roll_gain", roll_gain),
-            ("airframe.roll_lag", roll_lag),
+            ("airframe.roll_time_constant", roll_time_constant),
             ("airframe.pitch_gain", pitch_gain),
-            ("airframe.pitch_lag", pitch_lag),
-            ("airframe.yaw_lag", yaw_lag),
+            ("airframe.pitch_time_constant", pitch_time_constant),
+            ("airframe.yaw_time_constant", yaw_time_constant),
             ("wind.gust_time", self.wind.gust_time),
             ("localisation.drift_time", self.localisation.drift_time),
         ] {
@@ -210,7 +182,7 @@ impl FlightSettings {
         check_range("settle", self.settle, 0.0, 3600.0, "between 0 and an hour")?;
         let divides = self.log_rate > 0 && 1000 % self.log_rate == 0;
         if divides {
-            self.tether.as_ref().map_or(Ok(()), Tether::check)
+            self.hose.as_ref().map_or(Ok(()), HoseModel::check)
         } else {
             Err(Error::OutOfRange { what: "log_rate", value: f64::from(self.log_rate), allowed: "a divisor of 1000" })
         }

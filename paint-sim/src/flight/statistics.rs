@@ -1,6 +1,6 @@
 //! The figures by which a painting flight is judged.
 
-use super::log::FlightSample;
+use super::sample::FlightSample;
 
 /// Errors over the samples with an open valve (Paper II, Section 7.2, measures the same quantities), and extremes over
 /// all samples. Zero where there is no sample to measure.

@@ -2,23 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
-use super::settings::Airframe;
-
-/// Standard gravity, m/s^2.
-pub const GRAVITY: f64 = 9.80665;
-
-/// What the controller asks of the attitude loop.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Command {
-    /// Roll (about the body's x axis), rad.
-    pub roll: f64,
-    /// Pitch (about the body's y axis, positive lets the body accelerate forward), rad.
-    pub pitch: f64,
-    /// Yaw rate, rad/s.
-    pub yaw_rate: f64,
-    /// Thrust along the body's z axis, N.
-    pub thrust: f64,
-}
+use super::airframe::{Airframe, Command, GRAVITY};
 
 /// The state of the vehicle. World frame z up; body frame x forward, y left, z up.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,30 +49,5 @@ impl Vehicle {
         self.acceleration = thrust - Vector3::new(0.0, 0.0, GRAVITY) + drag + force / airframe.mass;
         self.velocity += self.acceleration * dt;
         self.position += self.velocity * dt;
-    }
-}
-
-impl Airframe {
-    /// Roll, pitch and yaw after `dt` seconds of a constant command: `tau x' = k u - x` solved exactly for roll and pitch.
-    pub(crate) fn attitude_after(&self, attitude: [f64; 3], yaw_rate: f64, command: &Command, dt: f64) -> [f64; 3] {
-        let follow = |x: f64, gain: f64, tau: f64, u: f64| x + (gain * u - x) * -(-dt / tau).exp_m1();
-        // The exact integral of the first-order yaw rate.
-        let turned =
-            command.yaw_rate * dt + (yaw_rate - command.yaw_rate) * self.yaw_lag * -(-dt / self.yaw_lag).exp_m1();
-        [
-            follow(attitude[0], self.roll_gain, self.roll_lag, command.roll),
-            follow(attitude[1], self.pitch_gain, self.pitch_lag, command.pitch),
-            attitude[2] + turned,
-        ]
-    }
-
-    pub(crate) fn yaw_rate_after(&self, yaw_rate: f64, command: f64, dt: f64) -> f64 {
-        yaw_rate + (command - yaw_rate) * -(-dt / self.yaw_lag).exp_m1()
-    }
-
-    /// Acceleration by drag for a velocity relative to the air, world frame.
-    pub(crate) fn drag_acceleration(&self, rotation: &UnitQuaternion<f64>, relative: &Vector3<f64>) -> Vector3<f64> {
-        let in_body = rotation.inverse_transform_vector(relative);
-        -(rotation * in_body.component_mul(&Vector3::from(self.drag)))
     }
 }

@@ -1,6 +1,6 @@
 //! How the reflectance of a film changes with its parameters, in closed form.
 
-use super::{domain, tanhc};
+use super::domain::{domain, tanhc};
 
 /// Partial derivatives of [`super::reflectance`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,7 +15,7 @@ pub struct Gradient {
     pub ground: f64,
 }
 
-/// The gradient of [`super::reflectance`] at the same arguments, moved into the domain in the same way. Ours, by
+/// The gradient of [`super::reflectance`] at the same arguments, moved into the domain in the same way. Derived by
 /// differentiating `R(t)` and `t = tanh(g d)/g` in `u = g^2`.
 pub fn gradient(k: f64, s: f64, thickness: f64, ground: f64) -> Gradient {
     let (k, s, d, rg) = domain(k, s, thickness, ground);

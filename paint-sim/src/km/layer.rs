@@ -1,8 +1,7 @@
-//! Films as things that can be stacked, and the air above them.
+//! Layers stacked on one another, and the interface with the air.
 
-use super::tanhc;
-use crate::Error;
-use crate::error::{check_not_negative, check_range};
+use super::domain::{domain, tanhc};
+use crate::error::{Error, check_not_negative, check_range};
 
 /// What one layer does to diffuse light by itself, seen from above (1) and from below (2).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,7 +23,7 @@ impl Layer {
         check_not_negative("absorption", absorption)?;
         check_not_negative("scattering", scattering)?;
         check_not_negative("thickness", thickness)?;
-        let (k, s, d, _) = super::domain(absorption, scattering, thickness, 0.0);
+        let (k, s, d, _) = domain(absorption, scattering, thickness, 0.0);
         let x = k.sqrt() * (k + 2.0 * s).sqrt() * d;
         let t = d * tanhc(x);
         let down = 1.0 + (k + s) * t;

@@ -7,8 +7,8 @@ use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode, TraversalAction}
 use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::Triangle;
 
-use super::{Hit, Surface};
-use crate::Error;
+use super::ray_query::{Hit, Surface};
+use crate::error::Error;
 
 /// A triangle soup: open, unequal, duplicate and zero-area triangles are fine (the last are never hit).
 ///
@@ -70,8 +70,8 @@ impl Surface for TriangleSurface {
         let ray = ShearedRay::new(origin, direction)?;
         let (leaf, (distance, barycentric)) = self.tree.find_best(
             max,
-            |node, best| ray.enter(node, best).unwrap_or(f64::MAX),
-            |leaf, best| ray.meet(&self.corners[leaf as usize], best),
+            |node, best| ray.entry_distance(node, best).unwrap_or(f64::MAX),
+            |leaf, best| ray.intersect(&self.corners[leaf as usize], best),
         )?;
         let normal = scaled_normal(&self.corners[leaf as usize]).normalize();
         Some(Hit { distance, face: self.faces[leaf as usize], barycentric, normal })
@@ -81,10 +81,10 @@ impl Surface for TriangleSurface {
         let Some(ray) = ShearedRay::new(origin, direction) else { return false };
         let mut found = false;
         self.tree.traverse(|node| {
-            if ray.enter(node, max).is_none() {
+            if ray.entry_distance(node, max).is_none() {
                 return TraversalAction::Prune;
             }
-            found = node.leaf_data().is_some_and(|leaf| ray.meet(&self.corners[leaf as usize], max).is_some());
+            found = node.leaf_data().is_some_and(|leaf| ray.intersect(&self.corners[leaf as usize], max).is_some());
             if found { TraversalAction::EarlyExit } else { TraversalAction::Continue }
         });
         found
@@ -137,7 +137,7 @@ impl ShearedRay {
     }
 
     /// Distance at which the ray enters a box, where it does so before `max`.
-    fn enter(&self, node: &BvhNode, max: f64) -> Option<f64> {
+    fn entry_distance(&self, node: &BvhNode, max: f64) -> Option<f64> {
         let (low, high) = (node.mins(), node.maxs());
         let between = |low: f64, high: f64, i: usize| {
             let (a, b) = ((low - self.origin[i]) * self.inverse[i], (high - self.origin[i]) * self.inverse[i]);
@@ -150,7 +150,7 @@ impl ShearedRay {
     }
 
     /// Distance and barycentric weights of the second and third corner, where the ray meets the triangle before `max`.
-    fn meet(&self, triangle: &[Vector3<f64>; 3], max: f64) -> Option<(f64, [f64; 2])> {
+    fn intersect(&self, triangle: &[Vector3<f64>; 3], max: f64) -> Option<(f64, [f64; 2])> {
         let [kx, ky, kz] = self.axes;
         let [a, b, c] = triangle.map(|corner| {
             let p = corner - self.origin;

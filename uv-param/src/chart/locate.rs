@@ -1,6 +1,6 @@
 //! Which face covers a point of the chart: a uniform grid of candidate lists, decided by the exact predicate.
 
-use super::SurfacePoint;
+use super::surface_point::SurfacePoint;
 use crate::clip::Polygon;
 use crate::triangle::orientation;
 

@@ -4,9 +4,9 @@ use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::Vector3;
 
-use crate::calipers::min_area_rectangle;
 use crate::disk::Disk;
 use crate::error::Error;
+use crate::min_area_rectangle::min_area_rectangle;
 use crate::triangle::Frame;
 
 /// Rotates and shifts `uv` so that its box of smallest area has its corner at the origin and its long side along u;

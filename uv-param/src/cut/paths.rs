@@ -5,27 +5,27 @@ use std::collections::BinaryHeap;
 
 use crate::disk::Disk;
 
-/// How much dearer than its length a sharply convex edge is, and how much cheaper a sharply concave one (ours): seams in
+/// How much dearer than its length a sharply convex edge is, and how much cheaper a sharply concave one: seams in
 /// creases are seen least and disturb a spray least.
-const RIDGE: f64 = 0.5;
-/// Length over which bending counts as sharp, relative to the square root of the area (ours).
-const SHARP: f64 = 0.05;
+const CREASE_FACTOR: f64 = 0.5;
+/// Length over which bending counts as sharp, relative to the square root of the area.
+const CREASE_LENGTH: f64 = 0.05;
 /// End of the paths.
-const HERE: u32 = u32::MAX;
+const ROOT: u32 = u32::MAX;
 
 /// A shortest-path tree rooted in the outer boundary.
-pub(super) struct Paths {
+pub(super) struct BoundaryPaths {
     /// Price of the way out, metres for flat surfaces.
     pub(super) distance: Vec<f64>,
     toward: Vec<u32>,
 }
 
-impl Paths {
+impl BoundaryPaths {
     /// Dijkstra's algorithm. The rims of holes are free: they are cut already, and a path that walks along one opens it.
     pub(super) fn new(disk: &Disk) -> Self {
         let vertices = disk.positions.len();
         let neighbours = Neighbours::new(disk);
-        let mut paths = Self { distance: vec![f64::INFINITY; vertices], toward: vec![HERE; vertices] };
+        let mut paths = Self { distance: vec![f64::INFINITY; vertices], toward: vec![ROOT; vertices] };
         // Bits of floats that are not negative sort like the floats.
         let mut queue = BinaryHeap::new();
         for &v in &disk.loops[0] {
@@ -55,10 +55,10 @@ impl Paths {
         inner.max_by(|&a, &b| self.distance[a].total_cmp(&self.distance[b])).map(|v| v as u32)
     }
 
-    /// The vertices from `tip` to the outer boundary.
-    pub(super) fn from(&self, tip: u32) -> Vec<u32> {
-        let step = |&v: &u32| Some(self.toward[v as usize]).filter(|&next| next != HERE);
-        std::iter::successors(Some(tip), step).collect()
+    /// The vertices from `start` to the outer boundary.
+    pub(super) fn from(&self, start: u32) -> Vec<u32> {
+        let step = |&v: &u32| Some(self.toward[v as usize]).filter(|&next| next != ROOT);
+        std::iter::successors(Some(start), step).collect()
     }
 }
 
@@ -71,7 +71,7 @@ struct Neighbours {
 impl Neighbours {
     fn new(disk: &Disk) -> Self {
         let vertices = disk.positions.len();
-        let sharp = SHARP * disk.area().sqrt();
+        let sharp = CREASE_LENGTH * disk.area().sqrt();
         let mut list = Vec::with_capacity(2 * disk.twins.len());
         for h in 0..disk.twins.len() {
             let face = disk.faces[h / 3];
@@ -115,5 +115,5 @@ fn price(disk: &Disk, h: usize, twin: usize, sharp: f64) -> f64 {
     // Positive where the surface is convex.
     let bend = left.cross(&right).dot(&edge).atan2(length * left.dot(&right));
     let across = (left.norm() + right.norm()) / (3.0 * length);
-    length * (1.0 + RIDGE * (bend * sharp / across).tanh())
+    length * (1.0 + CREASE_FACTOR * (bend * sharp / across).tanh())
 }

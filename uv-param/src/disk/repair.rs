@@ -1,36 +1,36 @@
 //! From a triangle soup to a [`Disk`], with an account of what was left out.
 
-use super::adjacency::{EdgeTable, boundary_loops, fans, half_edge};
-use super::{BORDER, Disk};
+use super::half_edges::{BORDER, EdgeTable, boundary_loops, fans, half_edge};
+use super::surface::Disk;
 use crate::error::Error;
 use crate::triangle;
 
 /// A face whose height is below this fraction of its longest edge has no measurable shape: it is the relative rounding
-/// of the f32 coordinates that meshes are stored in (ours).
+/// of the f32 coordinates that meshes are stored in.
 const FLAT: f64 = 1e-7;
 
 /// Beyond this products of lengths overflow; every f32 is below it.
-const LARGEST: f64 = 1e40;
+const MAX_COORDINATE: f64 = 1e40;
 
 /// Half-edges are counted in 32 bits.
-const MOST: usize = (u32::MAX / 6) as usize;
+const MAX_COUNT: usize = (u32::MAX / 6) as usize;
 
 /// What [`largest_disk_with`] may change in the mesh.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct Repair {
     /// Merge vertices at exactly the same position. Files often split vertices along texture seams or store three
-    /// vertices per face; without welding such a mesh falls apart. Off by default (ours).
+    /// vertices per face; without welding such a mesh falls apart. Off by default.
     pub weld: bool,
     /// Give each fan of faces around a non-manifold vertex a vertex of its own; the surface itself does not change. Off
-    /// by default (ours).
+    /// by default.
     pub split_vertices: bool,
 }
 
 /// What [`largest_disk`] found and left out.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct Findings {
+pub struct RepairReport {
     /// Edge-connected parts of the mesh (after dropping degenerate faces).
     pub components: usize,
     /// Faces of the parts that were not kept.
@@ -59,7 +59,7 @@ pub struct Findings {
 /// # Errors
 /// Names the vertex, edge or face when the mesh is empty, not finite, or the kept part is not a disk (possibly with
 /// holes); see [`Error`] for the way out of each.
-pub fn largest_disk(positions: &[[f32; 3]], faces: &[[u32; 3]]) -> Result<(Disk, Findings), Error> {
+pub fn largest_disk(positions: &[[f32; 3]], faces: &[[u32; 3]]) -> Result<(Disk, RepairReport), Error> {
     let positions: Vec<[f64; 3]> = positions.iter().map(|p| p.map(f64::from)).collect();
     largest_disk_with(&positions, faces, Repair::default())
 }
@@ -69,25 +69,25 @@ pub fn largest_disk_with(
     positions: &[[f64; 3]],
     faces: &[[u32; 3]],
     repair: Repair,
-) -> Result<(Disk, Findings), Error> {
-    let mut findings = Findings { unreferenced_vertices: check(positions, faces)?, ..Findings::default() };
+) -> Result<(Disk, RepairReport), Error> {
+    let mut report = RepairReport { unreferenced_vertices: check(positions, faces)?, ..RepairReport::default() };
     let mut soup: Vec<[u32; 3]> = faces.to_vec();
     if repair.weld {
-        findings.welded_vertices = weld(positions, &mut soup);
+        report.welded_vertices = weld(positions, &mut soup);
     }
-    let mut kept = without_degenerate(positions, &soup, &mut findings);
+    let mut kept = without_degenerate(positions, &soup, &mut report);
     if kept.is_empty() {
         return Err(Error::ZeroArea);
     }
-    kept = largest_component(positions, &soup, &kept, &mut findings);
+    kept = largest_component(positions, &soup, &kept, &mut report);
     let mut oriented: Vec<[u32; 3]> = kept.iter().map(|&f| soup[f as usize]).collect();
     let table = EdgeTable::new(positions.len(), &oriented);
     let (mut twins, reversed) = orient(positions, &mut oriented, &table, &kept)?;
-    findings.reversed_faces = reversed.iter().filter(|&&r| r).count();
-    let vertex_source = separate_fans(&mut oriented, &twins, positions.len(), repair, &mut findings)?;
+    report.reversed_faces = reversed.iter().filter(|&&r| r).count();
+    let vertex_source = separate_fans(&mut oriented, &twins, positions.len(), repair, &mut report)?;
 
     let loops = boundary_loops(vertex_source.len(), &oriented, &twins);
-    findings.boundary_loops = loops.len();
+    report.boundary_loops = loops.len();
     check_topology(vertex_source.len(), &twins, loops.len())?;
     let positions_kept: Vec<[f64; 3]> = vertex_source.iter().map(|&v| positions[v as usize]).collect();
     twins.shrink_to_fit();
@@ -106,7 +106,7 @@ pub fn largest_disk_with(
         source_faces: faces.len(),
     };
     disk.sort_loops();
-    Ok((disk, findings))
+    Ok((disk, report))
 }
 
 /// Refuses what no later step could name; returns the number of unreferenced vertices.
@@ -115,8 +115,8 @@ fn check(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Result<usize, Error> {
         return Err(Error::Empty);
     }
     let count = positions.len().max(faces.len());
-    if count > MOST {
-        return Err(Error::TooLarge { count, limit: MOST });
+    if count > MAX_COUNT {
+        return Err(Error::TooLarge { count, limit: MAX_COUNT });
     }
     let mut used = vec![false; positions.len()];
     for (face, corners) in faces.iter().enumerate() {
@@ -126,7 +126,7 @@ fn check(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Result<usize, Error> {
         }
     }
     for (vertex, position) in positions.iter().enumerate() {
-        if used[vertex] && !position.iter().all(|x| x.abs() <= LARGEST) {
+        if used[vertex] && !position.iter().all(|x| x.abs() <= MAX_COORDINATE) {
             return Err(Error::NonFinite { vertex });
         }
     }
@@ -156,13 +156,13 @@ fn weld(positions: &[[f64; 3]], faces: &mut [[u32; 3]]) -> usize {
 }
 
 /// Indices of the faces that have a shape and are not repeated.
-fn without_degenerate(positions: &[[f64; 3]], faces: &[[u32; 3]], findings: &mut Findings) -> Vec<u32> {
+fn without_degenerate(positions: &[[f64; 3]], faces: &[[u32; 3]], report: &mut RepairReport) -> Vec<u32> {
     let has_shape = |f: &u32| {
         let corners = faces[*f as usize];
         triangle::has_shape(corners.map(|v| positions[v as usize]), FLAT)
     };
     let mut kept: Vec<u32> = (0..faces.len() as u32).filter(has_shape).collect();
-    findings.degenerate_faces_dropped = faces.len() - kept.len();
+    report.degenerate_faces_dropped = faces.len() - kept.len();
 
     let sorted = |f: u32| {
         let mut corners = faces[f as usize];
@@ -173,12 +173,12 @@ fn without_degenerate(positions: &[[f64; 3]], faces: &[[u32; 3]], findings: &mut
     kept.sort_by_cached_key(|&f| (sorted(f), f));
     kept.dedup_by(|a, b| sorted(*a) == sorted(*b));
     kept.sort_unstable();
-    findings.duplicate_faces_dropped = shaped - kept.len();
+    report.duplicate_faces_dropped = shaped - kept.len();
     kept
 }
 
 /// Faces of the edge-connected part with the largest area.
-fn largest_component(positions: &[[f64; 3]], faces: &[[u32; 3]], kept: &[u32], findings: &mut Findings) -> Vec<u32> {
+fn largest_component(positions: &[[f64; 3]], faces: &[[u32; 3]], kept: &[u32], report: &mut RepairReport) -> Vec<u32> {
     let list: Vec<[u32; 3]> = kept.iter().map(|&f| faces[f as usize]).collect();
     let mut parent: Vec<u32> = (0..list.len() as u32).collect();
     for group in EdgeTable::new(positions.len(), &list).groups() {
@@ -194,12 +194,12 @@ fn largest_component(positions: &[[f64; 3]], faces: &[[u32; 3]], kept: &[u32], f
     }
     // Roots are the smallest faces of their parts, so the first of equal areas is the part that comes first.
     let largest = (0..list.len()).fold(0, |best, f| if areas[f] > areas[best] { f } else { best });
-    findings.components = areas.iter().filter(|&&a| a > 0.0).count();
-    findings.area_in_other_components_m2 =
+    report.components = areas.iter().filter(|&&a| a > 0.0).count();
+    report.area_in_other_components_m2 =
         areas.iter().enumerate().filter(|&(f, _)| f != largest).map(|(_, area)| area).sum();
     let chosen: Vec<u32> =
         (0..list.len()).filter(|&f| root(&mut parent, f as u32) as usize == largest).map(|f| kept[f]).collect();
-    findings.faces_in_other_components = kept.len() - chosen.len();
+    report.faces_in_other_components = kept.len() - chosen.len();
     chosen
 }
 
@@ -278,7 +278,7 @@ fn separate_fans(
     twins: &[u32],
     vertices: usize,
     repair: Repair,
-    findings: &mut Findings,
+    report: &mut RepairReport,
 ) -> Result<Vec<u32>, Error> {
     let (fan_of_corner, fan_source) = fans(faces, twins);
     let mut seen = vec![false; vertices];
@@ -287,7 +287,7 @@ fn separate_fans(
             if !repair.split_vertices {
                 return Err(Error::NonManifoldVertex { vertex });
             }
-            findings.split_vertices += 1;
+            report.split_vertices += 1;
         }
     }
     let mut order: Vec<u32> = (0..fan_source.len() as u32).collect();

@@ -67,7 +67,7 @@ struct Outcome {
     threads: usize,
 }
 
-/// Trains, and writes `thesis.safetensors`, `checkpoint.safetensors`, `curve.csv`, `curve.png`, `film.png` and `report.json`.
+/// Trains, and writes `thesis.safetensors`, `checkpoint.safetensors`, `curve.csv`, `curve.png`, `rollout.png` and `report.json`.
 pub fn train_thesis(run: &ThesisTrainingRun, folder: &Path) -> Result<(), PaintImageError> {
     let started = std::time::Instant::now();
     let settings = &run.settings;
@@ -107,7 +107,7 @@ pub fn train_thesis(run: &ThesisTrainingRun, folder: &Path) -> Result<(), PaintI
     save("thesis.safetensors", &network.to_safetensors(&notes))?;
     curve.draw(&folder.join("curve.png"))?;
     let bright = matches!(run.pictures, TrainingImages::Digits(_));
-    rollout_picture(&network, &held[..SHOWN.min(held.len())], bright)?.save(&folder.join("film.png"))?;
+    rollout_picture(&network, &held[..SHOWN.min(held.len())], bright)?.save(&folder.join("rollout.png"))?;
     let loss = trainer.validate(&held)?;
     let painted = evaluate(&network, &held)?;
     let outcome = Outcome {

@@ -1,0 +1,16 @@
+//! The result of stage 1.
+
+use crate::target::NozzleState;
+
+/// Nozzle states with what it took to find them.
+#[derive(Debug, Clone)]
+pub(crate) struct Nozzles {
+    /// One state per target; targets without a start keep `None`.
+    pub(crate) states: Vec<Option<NozzleState>>,
+    /// Rounds (sequential) or Jacobi iterations (paper-exact) done.
+    pub(crate) rounds: usize,
+    /// Interior-point steps, summed.
+    pub(crate) steps: usize,
+    /// Greatest relaxation of a soft cone row in the last round.
+    pub(crate) slack: f64,
+}

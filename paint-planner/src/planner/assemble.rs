@@ -1,0 +1,195 @@
+//! From a route to a plan: times, flow, figures.
+
+use crate::clearance::{ClearanceChecker, DistanceCache};
+use crate::error::Error;
+use crate::nozzle::Nozzles;
+use crate::plan::{Plan, PlanReport, Waypoint};
+use crate::route::{RoutePoint, between};
+use crate::settings::{Settings, TimingPolicy};
+use crate::target::{NozzleState, Target, normal_deviation};
+use crate::timing::speed_profile::stroke_between;
+use crate::timing::{TimedTrajectory, schedule};
+use crate::world::VehicleState;
+
+/// Greatest motion between two samples at the clearance of the trajectory, m.
+const CLEARANCE_STEP: f64 = 0.02;
+/// Clearances beyond this are not resolved, m.
+const MAX_CLEARANCE: f64 = 1.0;
+
+/// A path with its vehicle states, not timed yet.
+pub(super) struct UntimedPlan {
+    pub(super) nozzles: Nozzles,
+    pub(super) vehicle: Vec<Option<VehicleState>>,
+    pub(super) heading_cost: f64,
+    pub(super) route: Vec<RoutePoint>,
+}
+
+/// Where the trajectory comes nearer to the surface than half the clearance its waypoints keep: between two waypoints.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ClearanceViolation {
+    /// Index of the waypoint before.
+    pub(super) waypoint: usize,
+    /// How much clearance is missing, m.
+    pub(super) missing: f64,
+}
+
+/// Times the route and gathers the plan, with the places where it comes too near the surface. `dense` binds the trajectory to
+/// every waypoint.
+pub(super) fn assemble_plan(
+    untimed: &UntimedPlan,
+    targets: &[Target],
+    checker: &mut ClearanceChecker<'_>,
+    settings: &Settings,
+    dense: bool,
+) -> Result<(Plan, Vec<ClearanceViolation>), Error> {
+    check_stamps(targets, &settings.timing.policy)?;
+    let mut route = untimed.route.clone();
+    if let [only] = route[..] {
+        // One state to hold: a trajectory still needs two knots.
+        route.push(RoutePoint { target: None, ..only });
+    }
+    let timed = schedule(&route, targets, &settings.timing, dense)?;
+    let waypoints: Vec<Waypoint> = route
+        .iter()
+        .zip(&timed.times)
+        .map(|(point, &time)| Waypoint { time, state: point.state, target: point.target })
+        .collect();
+    let mut flow = vec![0.0; targets.len()];
+    for (points, times) in route.windows(2).zip(timed.times.windows(2)) {
+        let (length, dose) = stroke_between(points, targets);
+        if let Some(target) = points[0].target.filter(|_| length > 0.0) {
+            // Dose times spot speed: the volume on the stroke does not depend on the timing.
+            flow[target] = dose * length / (times[1] - times[0]);
+        }
+    }
+    let reachable: Vec<bool> = untimed.vehicle.iter().map(Option::is_some).collect();
+    let ideal = |target: &Target| NozzleState {
+        position: target.point + target.normal.into_inner() * settings.nozzle.stand_off,
+        direction: -target.normal,
+    };
+    let nozzle: Vec<NozzleState> = untimed
+        .nozzles
+        .states
+        .iter()
+        .zip(targets)
+        .map(|(state, target)| state.unwrap_or_else(|| ideal(target)))
+        .collect();
+    let (clearance, violations) = least_clearance(&timed, &waypoints, checker, 0.5 * settings.clearance);
+    let report = report(untimed, targets, &nozzle, &timed, clearance);
+    let plan = Plan {
+        nozzle,
+        vehicle: fill(&untimed.vehicle, &waypoints),
+        target_time: target_times(targets.len(), &waypoints),
+        reachable,
+        flow,
+        trajectory: timed.trajectory,
+        waypoints,
+        report,
+        points: Plan::points_of(targets),
+    };
+    Ok((plan, violations))
+}
+
+/// Gradient-preserving timing needs increasing time stamps.
+fn check_stamps(targets: &[Target], policy: &TimingPolicy) -> Result<(), Error> {
+    if *policy != TimingPolicy::GradientPreserving {
+        return Ok(());
+    }
+    for (index, target) in targets.iter().enumerate() {
+        let Some(time) = target.time else {
+            return Err(Error::Target { index, what: "gradient-preserving timing needs a time stamp" });
+        };
+        if index > 0 && targets[index - 1].time.is_some_and(|before| before >= time) {
+            return Err(Error::Target { index, what: "the time stamp must be later than the one before" });
+        }
+    }
+    Ok(())
+}
+
+fn report(
+    untimed: &UntimedPlan,
+    targets: &[Target],
+    nozzle: &[NozzleState],
+    timed: &TimedTrajectory,
+    clearance: f64,
+) -> PlanReport {
+    let deviation = |i: usize| match untimed.vehicle[i] {
+        Some(_) => normal_deviation(&targets[i], &nozzle[i].position),
+        None => 0.0,
+    };
+    let normal_deviation: Vec<f64> = (0..targets.len()).map(deviation).collect();
+    let served = untimed.vehicle.iter().flatten().count();
+    PlanReport {
+        normal_deviation_mean: normal_deviation.iter().sum::<f64>() / served as f64,
+        normal_deviation_max: normal_deviation.iter().fold(0.0, |most, d| most.max(*d)),
+        normal_deviation,
+        served,
+        slack: untimed.nozzles.slack,
+        rounds: untimed.nozzles.rounds,
+        steps: untimed.nozzles.steps,
+        heading_cost: untimed.heading_cost,
+        extrema: timed.extrema,
+        stretch: timed.stretch,
+        path_deviation: timed.deviation,
+        clearance,
+    }
+}
+
+/// Flies the trajectory with the planned joints and measures the distance to the surface: the least of all, and where it
+/// falls below `wanted`.
+fn least_clearance(
+    timed: &TimedTrajectory,
+    waypoints: &[Waypoint],
+    checker: &mut ClearanceChecker<'_>,
+    wanted: f64,
+) -> (f64, Vec<ClearanceViolation>) {
+    let mut cache = DistanceCache::default();
+    let mut least = MAX_CLEARANCE;
+    let mut violations = Vec::new();
+    for (waypoint, pair) in waypoints.windows(2).enumerate() {
+        let (from, to) = (&pair[0].state, &pair[1].state);
+        let turn = (to.heading - from.heading).abs() + (to.pan - from.pan).abs() + (to.tilt - from.tilt).abs();
+        let samples = (((to.position - from.position).norm() + turn) / CLEARANCE_STEP).ceil().clamp(1.0, 1e4) as usize;
+        let mut here = MAX_CLEARANCE;
+        for k in 0..=samples {
+            let share = k as f64 / samples as f64;
+            let sample = timed.trajectory.sample(pair[0].time + (pair[1].time - pair[0].time) * share);
+            let joints = between(from, to, share);
+            let state = VehicleState { position: sample.position, heading: sample.heading, ..joints };
+            // Only what is nearer than the least so far matters, and every violation.
+            here = here.min(checker.clearance(&state, least.max(wanted), &mut cache));
+        }
+        if here < wanted {
+            violations.push(ClearanceViolation { waypoint, missing: wanted - here });
+        }
+        least = least.min(here);
+    }
+    (least, violations)
+}
+
+/// Vehicle states of targets not served: the one before, at the beginning the one after.
+fn fill(vehicle: &[Option<VehicleState>], waypoints: &[Waypoint]) -> Vec<VehicleState> {
+    let mut last = waypoints.iter().find(|w| w.target.is_some()).unwrap_or(&waypoints[0]).state;
+    let mut result: Vec<VehicleState> = Vec::with_capacity(vehicle.len());
+    for state in vehicle {
+        last = state.unwrap_or(last);
+        result.push(last);
+    }
+    result
+}
+
+/// Times of all targets; those not served are spread evenly between their neighbours.
+fn target_times(count: usize, waypoints: &[Waypoint]) -> Vec<f64> {
+    let served: Vec<(usize, f64)> = waypoints.iter().filter_map(|w| w.target.map(|i| (i, w.time))).collect();
+    (0..count)
+        .map(|i| {
+            let after = served.partition_point(|(index, _)| *index < i);
+            match (after.checked_sub(1).map(|k| served[k]), served.get(after)) {
+                (_, Some(&(index, time))) if index == i => time,
+                (Some((a, s)), Some(&(b, t))) => s + (t - s) * (i - a) as f64 / (b - a) as f64,
+                (Some((_, time)), None) | (None, Some(&(_, time))) => time,
+                (None, None) => 0.0,
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,176 @@
+//! Speed along the route: limits per edge and route point, then one pass forward and one backward for the acceleration.
+
+use crate::route::RoutePoint;
+use crate::settings::{TimingPolicy, TimingSettings};
+use crate::target::Target;
+
+/// Share of the acceleration limit left to speeding up and slowing down; the rest is for curves and for the overshoot
+/// of polynomials.
+const TANGENTIAL: f64 = 0.45;
+/// Share of the acceleration limit that curves are planned with.
+const NORMAL: f64 = 0.7;
+/// Peak speed and acceleration of the rest-to-rest polynomial of unit length and duration.
+const PEAK_SPEED: f64 = 2.1875;
+const PEAK_ACCELERATION: f64 = 7.513_188_404;
+/// No edge takes less, s.
+const MIN_DURATION: f64 = 1e-3;
+
+/// What the route asks of the times of its edges (edge i leads from route point i to i+1).
+pub(crate) struct SpeedProfile {
+    /// Distance that the body travels, m.
+    travel: Vec<f64>,
+    /// Turn of the body, rad.
+    turn: Vec<f64>,
+    /// Least duration by spot speed, flow, speed and heading rate, s.
+    min_duration: Vec<f64>,
+    /// Greatest speed at a route point by curvature, m/s; 0 where the vehicle halts.
+    speed_limit: Vec<f64>,
+    /// Edges whose time is given by stamps and may only be stretched all together, except for starting and halting.
+    stamped: Vec<bool>,
+    /// The factor by which the stamps are stretched already.
+    pub(crate) factor: f64,
+}
+
+impl SpeedProfile {
+    pub(crate) fn new(route: &[RoutePoint], targets: &[Target], settings: &TimingSettings) -> Self {
+        let mut profile = Self {
+            travel: vec![],
+            turn: vec![],
+            min_duration: vec![],
+            speed_limit: vec![],
+            stamped: vec![],
+            factor: 1.0,
+        };
+        let mut stamps = Vec::with_capacity(route.len());
+        for pair in route.windows(2) {
+            let travel = (pair[1].state.position - pair[0].state.position).norm();
+            let turn = (pair[1].state.heading - pair[0].state.heading).abs();
+            let (length, dose) = stroke_between(pair, targets);
+            let vehicle = (travel / settings.max_speed).max(turn / settings.max_heading_rate);
+            let stamp = stamp(pair, targets, settings);
+            let spot = match settings.policy {
+                TimingPolicy::Uniform { speed } => length / speed,
+                TimingPolicy::GradientPreserving => 0.0,
+            };
+            let min_duration = vehicle.max(spot).max(length * dose / settings.max_flow).max(MIN_DURATION);
+            // Thesis, section 7.5: the factor of the segment that needs most is the factor of all.
+            profile.factor = profile.factor.max(stamp.map_or(1.0, |stamp| min_duration / stamp));
+            profile.min_duration.push(min_duration);
+            profile.travel.push(travel);
+            profile.turn.push(turn);
+            profile.stamped.push(stamp.is_some());
+            stamps.push(stamp);
+        }
+        for (min_duration, stamp) in profile.min_duration.iter_mut().zip(&stamps) {
+            *min_duration = stamp.map_or(*min_duration, |stamp| stamp * profile.factor);
+        }
+        profile.speed_limit = (0..route.len())
+            .map(|i| {
+                if route[i].rest || i == 0 || i + 1 == route.len() {
+                    0.0
+                } else if profile.stamped[i - 1] && profile.stamped[i] {
+                    f64::INFINITY
+                } else {
+                    let bend = curvature(route, i, settings.knot_spacing);
+                    (NORMAL * settings.max_acceleration / bend.max(1e-9)).sqrt()
+                }
+            })
+            .collect();
+        profile
+    }
+
+    /// Durations of all edges; `slowdown[i] >= 1` lowers the speed of edge i.
+    pub(crate) fn durations(&self, slowdown: &[f64], settings: &TimingSettings) -> Vec<f64> {
+        let edges = self.travel.len();
+        let edge_speed = |i: usize| self.travel[i] / (self.min_duration[i] * slowdown[i]);
+        let mut speed: Vec<f64> = (0..=edges)
+            .map(|i| {
+                let before = if i > 0 { edge_speed(i - 1) } else { f64::INFINITY };
+                let after = if i < edges { edge_speed(i) } else { f64::INFINITY };
+                let drag = if i > 0 { slowdown[i - 1] } else { 1.0 }.max(if i < edges { slowdown[i] } else { 1.0 });
+                (self.speed_limit[i] / drag).min(before).min(after)
+            })
+            .collect();
+        let mut lowered: Vec<bool> = self.speed_limit.iter().map(|speed_limit| *speed_limit == 0.0).collect();
+        self.pass(0..edges, 0, &mut speed, &mut lowered, settings);
+        self.pass((0..edges).rev(), 1, &mut speed, &mut lowered, settings);
+        (0..edges)
+            .map(|i| {
+                let min_duration = self.min_duration[i] * slowdown[i];
+                if self.stamped[i] && !lowered[i] && !lowered[i + 1] {
+                    return min_duration;
+                }
+                let sum = speed[i] + speed[i + 1];
+                let moving = if sum > 1e-6 { 2.0 * self.travel[i] / sum } else { self.halt_to_halt(i, settings) };
+                moving.max(min_duration)
+            })
+            .collect()
+    }
+
+    /// Limits speeds by what can be gained since the route point before, in the order of `edges`; `from` is 0 when edges are
+    /// entered at their first point. On stamped edges only until the speed they ask for is reached.
+    fn pass(
+        &self,
+        edges: impl Iterator<Item = usize>,
+        from: usize,
+        speed: &mut [f64],
+        lowered: &mut [bool],
+        settings: &TimingSettings,
+    ) {
+        let gain = 2.0 * TANGENTIAL * settings.max_acceleration;
+        let mut ramp = true;
+        for i in edges {
+            let (enter, leave) = (i + from, i + 1 - from);
+            ramp |= self.speed_limit[enter] == 0.0 || !self.stamped[i];
+            if !ramp {
+                continue;
+            }
+            let reach = (speed[enter] * speed[enter] + gain * self.travel[i]).sqrt();
+            if reach < speed[leave] {
+                speed[leave] = reach;
+                lowered[leave] = true;
+            } else if self.stamped[i] {
+                ramp = false;
+            }
+        }
+    }
+
+    /// Time of an edge between two halts: the closed form of the minimum-snap polynomial.
+    fn halt_to_halt(&self, i: usize, settings: &TimingSettings) -> f64 {
+        let by_speed = PEAK_SPEED * self.travel[i] / settings.max_speed;
+        let by_turn = PEAK_SPEED * self.turn[i] / settings.max_heading_rate;
+        let by_acceleration = (PEAK_ACCELERATION * self.travel[i] / settings.max_acceleration).sqrt();
+        // The certificate may exceed the closed form in the last digits.
+        1.001 * by_speed.max(by_turn).max(by_acceleration)
+    }
+}
+
+/// Length of stroke on the surface between two route points, m, and the dose on it; zero on flights.
+pub(crate) fn stroke_between(pair: &[RoutePoint], targets: &[Target]) -> (f64, f64) {
+    match (pair[0].target, pair[1].target) {
+        (Some(a), Some(b)) if b == a + 1 => ((targets[b].point - targets[a].point).norm(), targets[a].dose),
+        _ => (0.0, 0.0),
+    }
+}
+
+/// Time the person took for this edge, s, where that is to be preserved.
+fn stamp(pair: &[RoutePoint], targets: &[Target], settings: &TimingSettings) -> Option<f64> {
+    match (settings.policy, pair[0].target, pair[1].target) {
+        (TimingPolicy::GradientPreserving, Some(a), Some(b)) if b == a + 1 => {
+            targets[b].time.zip(targets[a].time).map(|(after, before)| after - before)
+        }
+        _ => None,
+    }
+}
+
+/// Curvature of the route at a point, 1/m, seen over about `scale` metres so that the noise of close waypoints does not
+/// count as curves.
+fn curvature(route: &[RoutePoint], i: usize, scale: f64) -> f64 {
+    let here = route[i].state.position;
+    let far = |j: &usize| (route[*j].state.position - here).norm() >= scale;
+    let before = (0..i).rev().take_while(|&j| i - j < 64).find(far).unwrap_or(i - 1);
+    let after = (i + 1..route.len()).take_while(|&j| j - i < 64).find(far).unwrap_or(i + 1);
+    let (a, b) = (here - route[before].state.position, route[after].state.position - here);
+    let (la, lb) = (a.norm(), b.norm());
+    if la < 1e-9 || lb < 1e-9 { 0.0 } else { (b / lb - a / la).norm() / (0.5 * (la + lb)) }
+}
