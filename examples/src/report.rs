@@ -183,7 +183,7 @@ impl Report {
                 locked,
             ),
             check("Planning per metre of path", self.planning_s_per_m, Milliseconds, AtMost(0.1), "356 ms"),
-            check("Paint books, relative", self.mass_balance_relative, Relative, AtMost(1e-12), NOT_REPORTED),
+            check("Mass balance, relative", self.mass_balance_relative, Relative, AtMost(1e-12), NOT_REPORTED),
             beside(
                 check(
                     "Canvas over the Gaussian-filtered ideal, PSNR",
