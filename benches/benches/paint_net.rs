@@ -2,7 +2,7 @@
 
 use paint_net::procedural::Texture;
 use paint_net::{
-    Deconvolution, Error, Feedback, Layered, Limits, MatchingPursuit, Painter, Saturation, SprayKernel, Task, metrics,
+    Deconvolution, Error, Feedback, Layered, MatchingPursuit, PaintProblem, Painter, SprayKernel, metrics,
 };
 use paintcopter_benches::criterion;
 
@@ -14,7 +14,6 @@ const SEED: u64 = 1000;
 fn main() -> Result<(), Error> {
     // σ = 2 px, cut at 4 px.
     let kernel = SprayKernel::new(2.0, 2.0)?;
-    let limits = Limits::default();
     let feedback = Feedback::shipped()?;
     let painters: [&dyn Painter; 3] = [&feedback, &Deconvolution::default(), &MatchingPursuit::default()];
 
@@ -22,18 +21,17 @@ fn main() -> Result<(), Error> {
     let mut group = criterion.benchmark_group("paint-net");
     for (name, texture) in [("clouds", Texture::Fbm), ("brick", Texture::Brick)] {
         let wanted = texture.image(SEED, SIDE);
-        let task = Task::on_bare_wall(&wanted);
-        let ink = Saturation::Tanh;
+        let problem = PaintProblem::new(&wanted).with_kernel(&kernel);
         for painter in painters {
-            painter.paint(&task, &kernel, &ink, &limits, &mut |_| ())?;
+            painter.paint(&problem)?;
             group.bench_function(format!("{} of {name}", painter.name()), |b| {
-                b.iter(|| painter.paint(&task, &kernel, &ink, &limits, &mut |_| ()));
+                b.iter(|| painter.paint(&problem));
             });
         }
         let layered = Layered::new(Deconvolution::default());
-        layered.paint_layers(&task, &kernel, &ink, &limits, &mut |_| ())?;
+        layered.paint(&problem)?;
         group.bench_function(format!("layered deconvolution of {name}"), |b| {
-            b.iter(|| layered.paint_layers(&task, &kernel, &ink, &limits, &mut |_| ()));
+            b.iter(|| layered.paint(&problem));
         });
     }
     let (one, other) = (Texture::Fbm.image(SEED, SIDE), Texture::Brick.image(SEED, SIDE));

@@ -61,7 +61,7 @@ fn films(group: &mut Group) -> Result<(), AnyError> {
 }
 
 fn colours(group: &mut Group) {
-    let mut rng = Rng(4);
+    let mut rng = Rng::new(4);
     let mut lab = || [rng.between(0.0, 100.0), rng.between(-80.0, 80.0), rng.between(-80.0, 80.0)];
     let pairs: Vec<[[f64; 3]; 2]> = (0..FEWER).map(|_| [lab(), lab()]).collect();
     group.throughput(Throughput::Elements(FEWER as u64));

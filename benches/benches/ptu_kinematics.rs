@@ -44,7 +44,7 @@ fn case(ptu: &Ptu, rng: &mut Rng) -> Case {
 
 fn main() -> Result<(), Error> {
     let ptu = Ptu::new(PtuSettings::default())?;
-    let mut rng = Rng(1);
+    let mut rng = Rng::new(1);
     let cases: Vec<Case> = (0..COUNT).map(|_| case(&ptu, &mut rng)).collect();
     // Refused input would be timed as well: none of it may be.
     for case in &cases {

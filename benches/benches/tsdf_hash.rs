@@ -44,7 +44,7 @@ fn main() -> Result<(), Error> {
         group.throughput(Throughput::Elements(faces as u64));
         group.bench_function(format!("mesh {name}"), |b| b.iter(|| fused.mesh()));
         // Near the floor, where the map knows distances.
-        let mut rng = Rng(6);
+        let mut rng = Rng::new(6);
         let points: Vec<Point3<f64>> = (0..POINTS)
             .map(|_| Point3::new(rng.between(-3.0, 3.0), rng.between(-2.0, 2.0), rng.between(-0.02, 0.02)))
             .collect();

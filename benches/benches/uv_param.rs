@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mesh = rock_wall(1);
     let (disk, _) = largest_disk(&mesh.positions, &mesh.faces)?;
     let chart = unwrap(&disk, &Settings::default(), |_| ())?;
-    let mut rng = Rng(3);
+    let mut rng = Rng::new(3);
     let places: Vec<[f64; 2]> =
         (0..POINTS).map(|_| [rng.between(0.0, chart.width()), rng.between(0.0, chart.height())]).collect();
 

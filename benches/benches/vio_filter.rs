@@ -64,7 +64,7 @@ fn at_rest(sample: i64) -> Imu {
 
 /// Grey boxes of all sizes, seen four times with noise of about two grey levels.
 fn pictures() -> Vec<Vec<u8>> {
-    let mut rng = Rng(1);
+    let mut rng = Rng::new(1);
     let mut picture = vec![100.0; WIDTH * HEIGHT];
     for _ in 0..1500 {
         let (x, y) = (rng.between(0.0, WIDTH as f64) as usize, rng.between(0.0, HEIGHT as f64) as usize);

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use paint_net::{ColourTask, Coloured, Limits, SprayKernel};
+use paint_net::{ColourProblem, ColourSeparation, SprayKernel};
 use paintcopter_examples::paint_image::{Glazes, compare_colours, pictures_in, read_picture};
 use serde_json::json;
 
@@ -12,15 +12,16 @@ use crate::cpu::median_seconds;
 /// Prints one JSON object per picture and palette.
 pub fn run(images: &[PathBuf], runs: usize) -> Result<(), Box<dyn Error>> {
     let kernel = SprayKernel::new(2.0, 2.0)?;
-    let (painter, limits) = (Coloured::default(), Limits::default());
+    let painter = ColourSeparation::default();
     for path in images {
         for file in pictures_in(path)? {
             let wanted = read_picture(&file)?;
             for (name, glazes) in [("cmy", Glazes::Cmy), ("cmyk", Glazes::Cmyk), ("six", Glazes::Six)] {
                 let palette = glazes.palette()?;
-                let run = || painter.paint(&ColourTask::new(&wanted), &palette, &kernel, &limits, &mut |_| ());
+                let problem = ColourProblem::new(&wanted, &palette).with_kernel(&kernel);
+                let run = || painter.paint(&problem);
                 let painting = run()?;
-                let (psnr, mean, p95) = compare_colours(&painting.picture, &wanted);
+                let (psnr, mean, p95) = compare_colours(&painting.image, &wanted);
                 let volume: f64 = painting.sprays.iter().flatten().map(|s| s.volume).sum();
                 println!(
                     "{}",

@@ -21,7 +21,7 @@ impl Films {
     /// # Errors
     /// None that this paint is known to give; it is checked.
     pub fn new(count: usize) -> Result<Self, Error> {
-        let mut rng = Rng(2);
+        let mut rng = Rng::new(2);
         let thickness = (0..count).map(|_| rng.between(0.0, THICKEST)).collect();
         Ok(Self { paint: Paint::yellow(20e-6)?, ground: Substrate::grey(0.5)?, thickness })
     }

@@ -89,7 +89,7 @@ impl Flight {
         let body_from_imu = Isometry3::new(Vector3::new(-0.12, 0.03, -0.08), Vector3::new(0.02, -0.03, 1.57));
         let second = ImuModel { noise, rate_hz: 250.0, body_from_imu, ..ImuModel::default() };
         let recorded = [first.record(&spline, GRAVITY, seed)?, second.record(&spline, GRAVITY, seed + 1_000_000)?];
-        let mut rng = Rng(seed.wrapping_mul(7919));
+        let mut rng = Rng::new(seed.wrapping_mul(7919));
         let camera = camera();
         let mut timed: Vec<(i64, Arrival)> = Vec::new();
         timed.extend(recorded[0].samples.iter().map(|s| (s.stamp.nanos(), Arrival::PrimaryImu(*s))));
@@ -156,7 +156,7 @@ fn camera() -> Camera {
 /// # Errors
 /// None that such a motion is known to give; it is checked.
 pub fn sway(seed: u64, seconds: f64) -> Result<Spline, Error> {
-    let mut rng = Rng(seed);
+    let mut rng = Rng::new(seed);
     let phases: [Vector3<f64>; 4] = std::array::from_fn(|_| Vector3::from_fn(|_, _| rng.between(-3.2, 3.2)));
     let knots = (0..(seconds / 0.1) as usize + 4).map(|k| {
         let t = k as f64 * 0.1;

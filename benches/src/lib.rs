@@ -14,6 +14,8 @@ pub mod sequences;
 use std::time::Duration;
 
 use criterion::Criterion;
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 
 /// Few samples over a short time, so that all benches together take minutes; the command line overrides them.
 pub fn criterion() -> Criterion {
@@ -24,17 +26,19 @@ pub fn criterion() -> Criterion {
         .configure_from_args()
 }
 
-/// splitmix64 (Steele, Lea, Flood 2014): all the randomness of the scenes.
+/// All the randomness of the scenes: splitmix64.
 #[derive(Debug, Clone)]
-pub struct Rng(pub u64);
+pub struct Rng(SplitMix64);
 
 impl Rng {
+    /// Starts from a seed.
+    pub fn new(seed: u64) -> Self {
+        Self(SplitMix64::seed_from_u64(seed))
+    }
+
     /// A number in `[0, 1)`.
     pub fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+        (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
     /// A number between `low` and `high`.

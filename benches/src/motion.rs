@@ -15,7 +15,7 @@ const INTERVAL: i64 = 10_000_000;
 /// None that these poses are known to give; they are checked.
 pub fn pair(count: usize) -> Result<(Trajectory, Trajectory), Error> {
     let (mut truth, mut estimate) = (Trajectory::default(), Trajectory::default());
-    let mut rng = Rng(7);
+    let mut rng = Rng::new(7);
     let frame = Isometry3::new(Vector3::new(3.0, -1.0, 0.5), Vector3::new(0.0, 0.0, 0.8));
     let mut drift = Vector3::zeros();
     for k in 0..count {

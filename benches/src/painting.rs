@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use paint_net::procedural::Texture;
 use paint_net::{
-    Coats, Deconvolution, Feedback, FreeSplats, Image, Limits, MatchingPursuit, Painter, Painting, Route, Saturation,
-    SlewLimited, Spray, SprayKernel, Task, metrics, slew_violations,
+    ClosedLoopPainter, Deconvolution, Feedback, FreeSprays, Image, Limits, MatchingPursuit, Observer, PaintProblem,
+    Painter, Painting, ScanOrder, SlewLimited, Spray, SprayKernel, metrics, slew_violations,
 };
 use paintcopter_examples::paint_image::{pictures_in, read_ink};
 use serde_json::{Value, json};
@@ -46,7 +46,7 @@ pub fn run(images: &[PathBuf], size: usize, runs: usize) -> Result<(), Box<dyn E
         for passes in [2, 3, 4, 5, 6, 8, 12] {
             painters.push((format!("feedback_p{passes}"), Box::new(Feedback { passes, ..feedback.clone() })));
         }
-        painters.push(("additive_coats".into(), Box::new(Coats::new(feedback.clone()))));
+        painters.push(("closed_loop_plan".into(), Box::new(ClosedLoopPainter::new(feedback.clone()))));
         for iterations in STOPS {
             let stopped = Deconvolution { iterations, tolerance: 0.0 };
             painters.push((format!("deconvolution_it{iterations}"), Box::new(stopped)));
@@ -55,29 +55,29 @@ pub fn run(images: &[PathBuf], size: usize, runs: usize) -> Result<(), Box<dyn E
         for (method, painter) in &painters {
             print(method.clone(), measure(&**painter, wanted, &kernel, &Limits::default(), runs)?);
         }
-        // Splats are not cut, as the peers have it; and with the cut nozzle.
+        // Free sprays are not cut, as the peers have it; and with the cut nozzle.
         for sprays in [400, 1600] {
-            let splats = FreeSplats { sprays, ..FreeSplats::default() };
+            let painter = FreeSprays { sprays, ..FreeSprays::default() };
             let whole = SprayKernel::new(2.0, 6.0)?;
-            print(format!("splats_{sprays}"), measure(&splats, wanted, &whole, &Limits::default(), runs)?);
-            print(format!("splats_{sprays}_cut"), measure(&splats, wanted, &kernel, &Limits::default(), 1)?);
+            print(format!("free_sprays_{sprays}"), measure(&painter, wanted, &whole, &Limits::default(), runs)?);
+            print(format!("free_sprays_{sprays}_cut"), measure(&painter, wanted, &kernel, &Limits::default(), 1)?);
         }
-        for (limit, along, route) in [
-            (0.05, 2, Route::Rows),
-            (0.02, 2, Route::Rows),
-            (0.05, 2, Route::Alike),
-            (0.02, 2, Route::Alike),
-            (0.05, 1, Route::Rows),
-            (0.02, 1, Route::Rows),
+        for (limit, along, order) in [
+            (0.05, 2, ScanOrder::Boustrophedon),
+            (0.02, 2, ScanOrder::Boustrophedon),
+            (0.05, 2, ScanOrder::ContextBased),
+            (0.02, 2, ScanOrder::ContextBased),
+            (0.05, 1, ScanOrder::Boustrophedon),
+            (0.02, 1, ScanOrder::Boustrophedon),
         ] {
-            let name = format!("slew{limit}_every{along}px_{route:?}").to_lowercase();
-            print(name, limited(&feedback, wanted, &kernel, (limit, along, route))?);
+            let name = format!("slew{limit}_every{along}px_{order:?}").to_lowercase();
+            print(name, limited(&feedback, wanted, &kernel, (limit, along, order))?);
         }
         for (method, gain, painter) in [
             ("noise_open", 1.0, None),
-            ("noise_closed", 1.0, Some(Coats::new(feedback.clone()))),
-            ("noise_closed_gain0.7", 0.7, Some(Coats::new(feedback.clone()))),
-            ("noise_closed_gain1.3", 1.3, Some(Coats::new(feedback.clone()))),
+            ("noise_closed", 1.0, Some(ClosedLoopPainter::new(feedback.clone()))),
+            ("noise_closed_gain0.7", 0.7, Some(ClosedLoopPainter::new(feedback.clone()))),
+            ("noise_closed_gain1.3", 1.3, Some(ClosedLoopPainter::new(feedback.clone()))),
         ] {
             print(method.into(), noisy(&feedback, painter.as_ref(), wanted, &kernel, gain)?);
         }
@@ -102,8 +102,8 @@ fn measure(
     limits: &Limits,
     runs: usize,
 ) -> Result<Value, paint_net::Error> {
-    let task = Task::on_bare_wall(wanted);
-    let run = || painter.paint(&task, kernel, &Saturation::Tanh, limits, &mut |_| ());
+    let problem = PaintProblem::new(wanted).with_kernel(kernel).with_limits(limits);
+    let run = || painter.paint(&problem);
     let mut figures = quality(&run()?, wanted)?;
     figures["cpu_s"] = json!(median_seconds(runs, run));
     Ok(figures)
@@ -115,65 +115,81 @@ fn limited(
     feedback: &Feedback,
     wanted: &Image,
     kernel: &SprayKernel,
-    (share, along, route): (f64, usize, Route),
+    (share, along, order): (f64, usize, ScanOrder),
 ) -> Result<Value, paint_net::Error> {
-    let task = Task::on_bare_wall(wanted);
     let limits = Limits { along, ..Limits::default() };
-    let free = Deconvolution::default().paint(&task, kernel, &Saturation::Tanh, &limits, &mut |_| ())?;
+    let problem = PaintProblem::new(wanted).with_kernel(kernel);
+    let free = Deconvolution::default().paint(&problem.with_limits(&limits))?;
     let (columns, rows) = (wanted.width().div_ceil(along), wanted.height().div_ceil(limits.row_spacing));
     let mut volumes: Vec<f64> = free.sprays.iter().map(|s| s.volume).collect();
     volumes.resize(columns * rows, 0.0);
     volumes.sort_unstable_by(f64::total_cmp);
     let top = 1.5 * volumes[(0.99 * (volumes.len() - 1) as f64) as usize];
-    let painter = SlewLimited { route, ..SlewLimited::new(feedback, share * top) };
+    let painter = SlewLimited { order, ..SlewLimited::new(feedback, share * top) };
     let limits = Limits { max_volume: top, ..limits };
-    let run = || painter.fly(&task, kernel, &Saturation::Tanh, &limits, &mut |_| ());
-    let (waypoints, painting) = run()?;
+    let run = || painter.paint(&problem.with_limits(&limits));
+    let painting = run()?;
     let mut figures = quality(&painting, wanted)?;
-    figures["violations"] = json!(slew_violations(&waypoints, share * top));
-    figures["waypoints"] = json!(waypoints.len());
+    figures["violations"] = json!(slew_violations(&painting.waypoints, share * top));
+    figures["waypoints"] = json!(painting.waypoints.len());
     figures["cpu_s"] = json!(median_seconds(1, run));
     Ok(figures)
 }
 
-/// Sprays with noise: all at once without looking, or in coats.
+/// Sprays with noise: open loop, or closed loop.
 fn noisy(
     feedback: &Feedback,
-    coats: Option<&Coats<Feedback>>,
+    closed: Option<&ClosedLoopPainter<Feedback>>,
     wanted: &Image,
     kernel: &SprayKernel,
     gain: f64,
 ) -> Result<Value, paint_net::Error> {
-    let (task, limits, ink) = (Task::on_bare_wall(wanted), Limits::default(), Saturation::Tanh);
-    let mut wall = wanted.map(|_| 0.0);
-    let mut rng = Rng(0);
-    let mut spray = |sprays: &[Spray]| {
-        for s in sprays {
-            deposit(&mut wall, s, gain, kernel, &mut rng);
+    let problem = PaintProblem::new(wanted).with_kernel(kernel);
+    let mut wall = NoisyWall { canvas: wanted.map(|_| 0.0), gain, kernel, rng: Rng::new(0) };
+    let found = match closed {
+        None => {
+            wall.deposit(&feedback.paint(&problem)?.sprays);
+            1.0
         }
-        Ok(wall.map(f64::tanh))
+        Some(closed) => closed.paint_observed(&problem, &mut wall)?.flow_gain,
     };
-    let (seen, found) = match coats {
-        None => (spray(&feedback.paint(&task, kernel, &ink, &limits, &mut |_| ())?.sprays)?, 1.0),
-        Some(coats) => {
-            let coated = coats.paint_watched(&task, kernel, &ink, &limits, &mut spray)?;
-            (wall.map(f64::tanh), coated.gain)
-        }
-    };
+    let seen = wall.canvas.map(f64::tanh);
     Ok(json!({ "psnr": metrics::psnr(&seen, wanted, None)?, "gain": gain, "gain_found": found }))
 }
 
-fn deposit(wall: &mut Image, s: &Spray, gain: f64, kernel: &SprayKernel, rng: &mut Rng) {
-    let mut normal = || (-2.0 * (1.0 - rng.unit()).ln()).sqrt() * (std::f64::consts::TAU * rng.unit()).cos();
-    let (x, y) = (s.x + AIM_NOISE * normal(), s.y + AIM_NOISE * normal());
-    let volume = gain * s.volume * (1.0 + VOLUME_NOISE * normal()).max(0.0);
-    let (width, height, reach) = (wall.width(), wall.height(), kernel.radius());
-    let range =
-        |centre: f64, end: usize| (centre as usize).saturating_sub(reach)..(centre as usize + reach + 1).min(end);
-    for j in range(s.y, height) {
-        for i in range(s.x, width) {
-            let squared = (i as f64 - x).powi(2) + (j as f64 - y).powi(2);
-            wall.data_mut()[j * width + i] += volume * (-squared / (2.0 * kernel.sigma().powi(2))).exp();
+/// A wall and a nozzle with noise and a gain of its own.
+struct NoisyWall<'a> {
+    canvas: Image,
+    gain: f64,
+    kernel: &'a SprayKernel,
+    rng: Rng,
+}
+
+impl Observer for NoisyWall<'_> {
+    fn spray(&mut self, sprays: &[Spray]) -> Result<Option<Image>, paint_net::Error> {
+        self.deposit(sprays);
+        Ok(Some(self.canvas.map(f64::tanh)))
+    }
+}
+
+impl NoisyWall<'_> {
+    fn deposit(&mut self, sprays: &[Spray]) {
+        for s in sprays {
+            let rng = &mut self.rng;
+            let mut normal = || (-2.0 * (1.0 - rng.unit()).ln()).sqrt() * (std::f64::consts::TAU * rng.unit()).cos();
+            let (x, y) = (s.x + AIM_NOISE * normal(), s.y + AIM_NOISE * normal());
+            let volume = self.gain * s.volume * (1.0 + VOLUME_NOISE * normal()).max(0.0);
+            let (width, height, reach) = (self.canvas.width(), self.canvas.height(), self.kernel.radius());
+            let range = |centre: f64, end: usize| {
+                (centre as usize).saturating_sub(reach)..(centre as usize + reach + 1).min(end)
+            };
+            for j in range(s.y, height) {
+                for i in range(s.x, width) {
+                    let squared = (i as f64 - x).powi(2) + (j as f64 - y).powi(2);
+                    self.canvas.data_mut()[j * width + i] +=
+                        volume * (-squared / (2.0 * self.kernel.sigma().powi(2))).exp();
+                }
+            }
         }
     }
 }
@@ -183,10 +199,10 @@ fn seams(feedback: &Feedback, kernel: &SprayKernel, pictures: &[(String, Image)]
     const SIDE: usize = 2048;
     let Some((name, picture)) = pictures.first() else { return Ok(()) };
     let wanted = Image::from_fn(SIDE, SIDE, |x, y| picture.at(x % picture.width(), y % picture.height()));
-    let task = Task::on_bare_wall(&wanted);
+    let problem = PaintProblem::new(&wanted).with_kernel(kernel);
     let run = |tile: usize, threads: usize| {
         let painter = Feedback { tile, threads, ..feedback.clone() };
-        painter.paint(&task, kernel, &Saturation::Tanh, &Limits::default(), &mut |_| ())
+        painter.paint(&problem)
     };
     let (whole, tiled) = (run(SIDE, 1)?, run(64, 2)?);
     let strip = Image::from_fn(SIDE, SIDE, |x, y| {

@@ -10,7 +10,7 @@ mod ply;
 use std::path::{Path, PathBuf};
 
 pub use mesh::{MeshUv, TriangleMesh};
-pub use ply::write_ply;
+pub use ply::{PlyMesh, write_ply};
 
 use fault::Fault;
 

@@ -15,7 +15,7 @@ use nalgebra::{Isometry3, Point3};
 
 /// The robot at one moment of the flight.
 #[derive(Debug, Clone, Copy)]
-pub struct Moment {
+pub struct RobotState {
     /// Seconds since take-off.
     pub time: f64,
     /// Pose of the body.
@@ -56,12 +56,12 @@ pub enum RecordingError {
     Encoding(String),
 }
 
-/// Writes the recording: the mesh and the log once, everything else once per moment.
+/// Writes the recording: the mesh and the log once, everything else once per state.
 pub fn save_recording(
     path: &Path,
     mesh: &ColouredMesh,
-    moments: &[Moment],
-    remarks: &[(f64, String)],
+    states: &[RobotState],
+    log_lines: &[(f64, String)],
 ) -> Result<(), RecordingError> {
     let file =
         File::create(path).map_err(|source| RecordingError::Unwritable { path: path.display().to_string(), source })?;
@@ -74,15 +74,15 @@ pub fn save_recording(
     let spray = recorder.channel::<SceneUpdate>("/spray")?;
     let text = recorder.channel::<Log>("/log")?;
 
-    let start = moments.first().map_or(0.0, |m| m.time);
+    let start = states.first().map_or(0.0, |m| m.time);
     recorder.write(surface, start, &mesh_scene(mesh))?;
     recorder.write(spray, start, &robot_scene())?;
-    let mut remarks = remarks.iter().peekable();
-    for moment in moments {
-        while let Some((time, message)) = remarks.next_if(|(time, _)| *time <= moment.time) {
-            recorder.write(text, *time, &remark(*time, message))?;
+    let mut log_lines = log_lines.iter().peekable();
+    for state in states {
+        while let Some((time, message)) = log_lines.next_if(|(time, _)| *time <= state.time) {
+            recorder.write(text, *time, &log_message(*time, message))?;
         }
-        let stamp = Some(Timestamp::saturating_from_epoch_secs_f64(moment.time));
+        let stamp = Some(Timestamp::saturating_from_epoch_secs_f64(state.time));
         let in_world = |child: &str, pose: &Isometry3<f64>| FrameTransform {
             timestamp: stamp,
             parent_frame_id: "world".into(),
@@ -90,13 +90,13 @@ pub fn save_recording(
             translation: Some(vector(pose)),
             rotation: Some(quaternion(pose)),
         };
-        let frames = vec![in_world("body", &moment.world_from_body), in_world("nozzle", &moment.world_from_nozzle)];
-        recorder.write(transforms, moment.time, &FrameTransforms { transforms: frames })?;
+        let frames = vec![in_world("body", &state.world_from_body), in_world("nozzle", &state.world_from_nozzle)];
+        recorder.write(transforms, state.time, &FrameTransforms { transforms: frames })?;
         let body = Some(Pose {
-            position: Some(vector(&moment.world_from_body)),
-            orientation: Some(quaternion(&moment.world_from_body)),
+            position: Some(vector(&state.world_from_body)),
+            orientation: Some(quaternion(&state.world_from_body)),
         });
-        recorder.write(pose, moment.time, &PoseInFrame { timestamp: stamp, frame_id: "world".into(), pose: body })?;
+        recorder.write(pose, state.time, &PoseInFrame { timestamp: stamp, frame_id: "world".into(), pose: body })?;
         let joint = |name: &str, position: f64| JointState {
             name: name.into(),
             position: Some(position),
@@ -104,9 +104,9 @@ pub fn save_recording(
             acceleration: None,
             effort: None,
         };
-        let states = vec![joint("pan", moment.joints[0]), joint("tilt", moment.joints[1])];
-        recorder.write(joints, moment.time, &JointStates { timestamp: stamp, joints: states })?;
-        recorder.write(spray, moment.time, &spray_scene(moment))?;
+        let states = vec![joint("pan", state.joints[0]), joint("tilt", state.joints[1])];
+        recorder.write(joints, state.time, &JointStates { timestamp: stamp, joints: states })?;
+        recorder.write(spray, state.time, &spray_scene(state))?;
     }
     recorder.writer.finish().map_err(failed)?;
     Ok(())
@@ -197,10 +197,10 @@ fn robot_scene() -> SceneUpdate {
 }
 
 /// The arm from body to nozzle, and the spray ray: blue while the valve is open.
-fn spray_scene(moment: &Moment) -> SceneUpdate {
-    let tip = Point3::from(moment.world_from_nozzle.translation.vector);
-    let end = moment.hit.unwrap_or(tip);
-    let body = Point3::from(moment.world_from_body.translation.vector);
+fn spray_scene(state: &RobotState) -> SceneUpdate {
+    let tip = Point3::from(state.world_from_nozzle.translation.vector);
+    let end = state.hit.unwrap_or(tip);
+    let body = Point3::from(state.world_from_body.translation.vector);
     let line = |a: Point3<f64>, b: Point3<f64>, thickness: f64, colour: [u8; 3]| LinePrimitive {
         r#type: line_primitive::Type::LineStrip as i32,
         pose: None,
@@ -211,9 +211,9 @@ fn spray_scene(moment: &Moment) -> SceneUpdate {
         colors: Vec::new(),
         indices: Vec::new(),
     };
-    let ray = if moment.flow > 0.0 { [30, 90, 220] } else { [170, 170, 170] };
+    let ray = if state.flow > 0.0 { [30, 90, 220] } else { [170, 170, 170] };
     scene(vec![SceneEntity {
-        timestamp: Some(Timestamp::saturating_from_epoch_secs_f64(moment.time)),
+        timestamp: Some(Timestamp::saturating_from_epoch_secs_f64(state.time)),
         frame_id: "world".into(),
         id: "spray".into(),
         lines: vec![line(body, tip, 0.03, [60, 60, 60]), line(tip, end, 0.01, ray)],
@@ -221,7 +221,7 @@ fn spray_scene(moment: &Moment) -> SceneUpdate {
     }])
 }
 
-fn remark(time: f64, message: &str) -> Log {
+fn log_message(time: f64, message: &str) -> Log {
     Log {
         timestamp: Some(Timestamp::saturating_from_epoch_secs_f64(time)),
         level: log::Level::Info as i32,
@@ -239,7 +239,7 @@ mod tests {
     #[test]
     fn the_recording_reads_back() {
         let path = std::env::temp_dir().join(format!("paintcopter-recording-{}.mcap", std::process::id()));
-        let moment = |time: f64| Moment {
+        let moment = |time: f64| RobotState {
             time,
             world_from_body: Isometry3::translation(1.0, 2.0, 3.0),
             world_from_nozzle: Isometry3::translation(1.5, 2.0, 3.0),
@@ -252,8 +252,8 @@ mod tests {
             faces: &[[0, 1, 2]],
             colours: &[[255, 0, 0]; 3],
         };
-        let moments: Vec<Moment> = (0..5).map(|k| moment(f64::from(k) * 0.5)).collect();
-        save_recording(&path, &mesh, &moments, &[(0.0, "take-off".into()), (1.0, "layer 1".into())]).unwrap();
+        let states: Vec<RobotState> = (0..5).map(|k| moment(f64::from(k) * 0.5)).collect();
+        save_recording(&path, &mesh, &states, &[(0.0, "take-off".into()), (1.0, "layer 1".into())]).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         std::fs::remove_file(&path).unwrap();
         let mut count = BTreeMap::new();

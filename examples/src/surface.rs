@@ -8,7 +8,7 @@ use uv_param::{Chart, CutSettings, Disk, NormalMode, NozzleSettings, RepairRepor
 use crate::mesh_io::TriangleMesh;
 
 /// A chart is stretched too much to paint where a length changes by more than this factor: spots would be ellipses.
-const MOST_STRETCH: f64 = 1.6;
+const MAX_STRETCH: f64 = 1.6;
 /// Radius over which the normal is averaged for the robot, metres: the footprint of a spray (Paper IV, section 3.3).
 const FOOTPRINT: f64 = 0.05;
 
@@ -42,7 +42,7 @@ impl PaintSurface {
         let repair = uv_param::Repair { weld: true, split_vertices: true };
         let (disk, repair_report) = uv_param::largest_disk_with(&positions, &mesh.faces, repair)?;
         let settings = Settings { up: Some([0.0, 0.0, 1.0]), ..Settings::default() };
-        let cuts = CutSettings { max_stretch: MOST_STRETCH, ..CutSettings::default() };
+        let cuts = CutSettings { max_stretch: MAX_STRETCH, ..CutSettings::default() };
         let chart = uv_param::unwrap_with_cuts(&disk, &settings, &cuts, |p| {
             let share = p.iteration as f64 / settings.iterations as f64;
             progress(if p.stage == uv_param::Stage::Cut { 0.0 } else { share });
@@ -80,7 +80,7 @@ impl PaintSurface {
             .map(|(x, y)| {
                 self.texels.at(x, y).is_some_and(|point| {
                     let [s1, s2] = self.chart.stretch(point.face);
-                    let even = s1 < MOST_STRETCH && s2 > 1.0 / MOST_STRETCH;
+                    let even = s1 < MAX_STRETCH && s2 > 1.0 / MAX_STRETCH;
                     // A texel at the rim may hold a sliver of surface beside its centre.
                     let centred = self.chart.locate(self.texels.uv_of_texel(x, y)).is_some();
                     centred && even && !steep(&self.chart.smooth_normal(point))

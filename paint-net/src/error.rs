@@ -1,10 +1,12 @@
+//! What can go wrong.
+
 /// What can go wrong; every variant names the input and the way out.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A picture has no pixels, or its data do not fill it.
     #[error("{what} has {width} x {height} pixels and {values} values: give width x height values, none of them zero")]
-    Shape {
+    ImageSize {
         /// Which picture.
         what: &'static str,
         /// Columns.
@@ -58,8 +60,8 @@ pub enum Error {
     #[error("weights: {0}; give a safetensors file written by this crate")]
     Weights(String),
     /// There is no place to spray, or nothing to look at.
-    #[error("{0}: the task leaves nothing to do; check the masks")]
-    EmptyTask(&'static str),
+    #[error("{0}: the problem leaves nothing to do; check the masks")]
+    EmptyProblem(&'static str),
 }
 
 /// Refuses a setting outside its range.

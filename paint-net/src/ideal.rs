@@ -1,3 +1,5 @@
+//! The "ideal" of Paper IV.
+
 use crate::error::{Error, require};
 use crate::image::Image;
 

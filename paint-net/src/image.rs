@@ -1,3 +1,5 @@
+//! A single-channel image.
+
 use crate::error::Error;
 
 /// A single-channel picture: row by row from the top, `data[y * width + x]`.
@@ -12,7 +14,7 @@ impl Image {
     /// From its values; every value must be finite and the count must be `width * height > 0`.
     pub fn new(width: usize, height: usize, data: Vec<f64>) -> Result<Self, Error> {
         if width == 0 || height == 0 || width.checked_mul(height) != Some(data.len()) {
-            return Err(Error::Shape { what: "picture", width, height, values: data.len() });
+            return Err(Error::ImageSize { what: "picture", width, height, values: data.len() });
         }
         let image = Self { width, height, data };
         image.check_range("picture", f64::MIN, f64::MAX, "a finite number")?;

@@ -1,6 +1,6 @@
-//! Painters: given the picture that is wanted and the paint that is already there, what to spray where.
+//! Painters: given the image that is wanted and the paint that is already there, what to spray where.
 //!
-//! A spray at pixel `μ` adds the depth `v exp(-|p - μ|² / 2σ²)` to the canvas `c`; the eye sees the ink `a = f(c)`, where `f`
+//! A spray at pixel `μ` adds the depth `v exp(-|p - μ|² / 2σ²)` to the canvas `c`; what is seen is the ink `a = f(c)`, where `f`
 //! saturates: `tanh` in the thesis, Beer-Lambert, or any rising curve, for instance one sampled from Kubelka-Munk.
 //! Painting is then deconvolution with a sign: paint can be added, never taken away,
 //!
@@ -8,86 +8,81 @@
 //! min  ½ Σ_p w_p ( f(c₀ + G v)_p - y_p )²     subject to  0 ≤ v ≤ v_max
 //! ```
 //!
-//! with `G` the sum of footprints, `y` the wanted ink and `c₀` the paint already on the wall.
+//! with `G` the matrix of footprints, `y` the wanted ink, `c₀` the paint already on the wall and `w` weights: a [`PaintProblem`].
 //!
 //! ```
-//! use paint_net::{Deconvolution, Image, Limits, Painter, Saturation, SprayKernel, Task, metrics};
+//! use paint_net::{Deconvolution, Image, PaintProblem, Painter, SprayKernel, metrics};
 //!
 //! // A soft disc of ink on a bare wall.
 //! let wanted = Image::from_fn(48, 48, |x, y| {
 //!     let r = (x as f64 - 24.0).hypot(y as f64 - 24.0);
 //!     0.7 / (1.0 + ((r - 12.0) / 1.5).exp())
 //! });
-//! let task = Task::on_bare_wall(&wanted);
 //! let kernel = SprayKernel::new(2.0, 4.0)?;
-//! let painting =
-//!     Deconvolution::default().paint(&task, &kernel, &Saturation::Tanh, &Limits::default(), &mut |_| ())?;
+//! let painting = Deconvolution::default().paint(&PaintProblem::new(&wanted).with_kernel(&kernel))?;
 //! assert!(metrics::psnr(&painting.ink, &wanted, None)? > 35.0);
 //! # Ok::<(), paint_net::Error>(())
 //! ```
 //!
-//! | thesis, Paper IV | item |
+//! Three levels of use: [`paint()`] in one call, a [`Painter`] on a [`PaintProblem`], and the trait [`Painter`] for a painter of
+//! one's own, which the wrapping painters take like any other.
+//!
+//! | source | item |
 //! |---|---|
-//! | 3.1 reference, canvas, sprays | [`Task`], [`Painting`], [`Spray`] |
-//! | 3.2 layers by intensity | [`Layered`] |
-//! | 3.3 spray footprint, ink `tanh c` | [`SprayKernel`], [`Saturation`] |
-//! | 3.3 the "ideal": Gaussian of the reference | [`ideal`] |
-//! | 3.3 the network: READ, PAINT, learned stop | [`thesis::Network`] |
-//! | (ours) non-negative deconvolution | [`Deconvolution`] |
-//! | (ours) greedy matching pursuit | [`MatchingPursuit`] |
-//! | (ours) few sprays at free places, of free spreads | [`FreeSplats`] |
-//! | (ours) a network that looks at its canvas | [`Feedback`], [`Network`] |
-//! | (ours) coats, with a look at the wall after each | [`Coats`] |
-//! | (ours) a valve of limited speed, and a path that suits it | [`SlewLimited`], [`Route`] |
-//! | (ours) several paints that mix (Kubelka-Munk) | [`Palette`], [`Coloured`] |
-//! | (ours) strokes a robot can fly | [`boustrophedon`] |
+//! | Paper IV, 3.1: reference, canvas, sprays | [`PaintProblem`], [`Painting`], [`Spray`] |
+//! | Paper IV, 3.2: layers by intensity | [`Layered`] |
+//! | Paper IV, 3.3: spray footprint, ink `tanh c` | [`SprayKernel`], [`Saturation`] |
+//! | Paper IV, 3.3: the "ideal", a Gaussian of the reference | [`ideal`] |
+//! | Paper IV, 3.3: the network with READ, PAINT and a learned stop | [`thesis::ThesisPainter`], [`thesis::Network`] |
+//! | non-negative deconvolution by projected L-BFGS | [`Deconvolution`] |
+//! | matching pursuit (Mallat and Zhang 1993) | [`MatchingPursuit`] |
+//! | few sprays at free positions, of free spreads | [`FreeSprays`] |
+//! | a feedback network (as Zamir et al. 2017), convolutional; ours: Paper IV paints one spray per step | [`Feedback`], [`Network`] |
+//! | closed loop: coats, and a measurement after each; ours: Paper IV paints open loop | [`ClosedLoopPainter`] |
+//! | a valve of limited slew rate (augmented Lagrangian), on a context-based path (Dafner et al. 2000) | [`SlewLimited`], [`ScanOrder`] |
+//! | several paints that mix (Kubelka and Munk 1931) | [`Palette`], [`ColourSeparation`] |
+//! | strokes a robot can fly | [`boustrophedon`] |
 //!
 //! Pixels: centres at integers, `x` = column, `y` = row, row 0 at the top. Lengths are in pixels, depths in the unit of the
 //! saturation curve. Every result is the same bytes for the same input.
 
-mod coats;
-mod coloured;
-mod deconvolution;
+mod colour;
 mod error;
-mod feedback;
-mod footprints;
 mod ideal;
 mod image;
-mod kernel;
-mod layers;
 pub mod metrics;
+mod model;
 mod network;
+mod optimise;
 mod painter;
-mod palette;
+mod painters;
+mod painting;
+mod path;
+mod problem;
 pub mod procedural;
-mod projected_lbfgs;
-mod pursuit;
-mod route;
-mod saturation;
-mod slew;
-mod splats;
-mod strokes;
-// The way back is needed only to train.
-#[cfg_attr(not(feature = "train"), allow(dead_code))]
 pub mod thesis;
 #[cfg(feature = "train")]
 pub mod train;
 
-pub use coats::{Coated, Coats};
-pub use coloured::{ColourPainting, ColourTask, Coloured, Judge, Picture};
-pub use deconvolution::Deconvolution;
+pub use colour::{
+    ColourImage, ColourMetric, ColourPainting, ColourProblem, ColourSeparation, MAX_PAINTS, Paint, Palette,
+};
 pub use error::Error;
-pub use feedback::Feedback;
 pub use ideal::ideal;
 pub use image::Image;
-pub use kernel::SprayKernel;
-pub use layers::{Layered, Sharing, Steps};
-pub use network::{Network, Shape};
-pub use painter::{Limits, Painter, Painting, Spray, Task};
-pub use palette::{MOST_PAINTS, Paint, Palette};
-pub use pursuit::MatchingPursuit;
-pub use route::Route;
-pub use saturation::{MonotoneCurve, Saturation};
-pub use slew::{SlewLimited, slew_violations};
-pub use splats::FreeSplats;
-pub use strokes::{Stroke, StrokeSettings, boustrophedon};
+pub use model::{MonotoneCurve, Saturation, Spray, SprayKernel};
+pub use network::{Architecture, Network};
+pub use painter::{Observer, Painter};
+pub use painters::{
+    ClosedLoopPainter, Deconvolution, Feedback, FreeSprays, LayerPlanning, Layered, MatchingPursuit, SlewLimited,
+    ThresholdSpacing, slew_violations,
+};
+pub use painting::Painting;
+pub use path::{ScanOrder, Stroke, StrokeSettings, boustrophedon};
+pub use problem::{Limits, PaintProblem};
+
+/// Paints an image in one call: wanted ink in `[0, 1]`, by the feedback network with its shipped weights, on a bare wall, with
+/// the thesis' nozzle and `tanh`.
+pub fn paint(wanted: &Image) -> Result<Painting, Error> {
+    Feedback::shipped()?.paint(&PaintProblem::new(wanted))
+}

@@ -103,7 +103,7 @@ fn windowed_ssim(
         count += 1.0;
     }
     if count == 0.0 {
-        return Err(Error::EmptyTask("no window of the similarity lies wholly on weighted pixels"));
+        return Err(Error::EmptyProblem("no window of the similarity lies wholly on weighted pixels"));
     }
     Ok(sum / count)
 }
@@ -116,7 +116,7 @@ fn check(picture: &Image, reference: &Image, weight: Option<&Image>) -> Result<(
         }
     }
     if weight.is_some_and(|w| w.data().iter().all(|&v| v <= 0.0)) {
-        return Err(Error::EmptyTask("every pixel has weight 0"));
+        return Err(Error::EmptyProblem("every pixel has weight 0"));
     }
     Ok(())
 }

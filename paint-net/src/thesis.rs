@@ -8,36 +8,38 @@
 //!     z_paint ~ Q(Z_paint | h_dec),   c += σ(z_paint) v exp(-|p - μ|² / 2σ²),   S += 1 - σ(z_paint)
 //! ```
 //!
-//! [`Thesis`] is the painter, [`Network`] its weights, [`Shape`] the rows of Table 8.1. Training is in `paint_net::train`.
+//! [`ThesisPainter`] is the painter, [`Network`] its weights, [`Architecture`] the rows of Table 8.1. Training is in `paint_net::train`.
 
+mod activations;
 #[cfg(any(test, feature = "train"))]
 mod adjoint;
+mod architecture;
 mod dense;
-mod functions;
+#[cfg(any(test, feature = "train"))]
+mod loss;
 mod lstm;
 mod matrix;
 mod network;
+mod nonlinearities;
 mod painter;
-
-mod read;
+mod read_attention;
 #[cfg(test)]
 mod reference;
 mod rollout;
-mod rows;
-mod shape;
 mod spray;
-mod steps;
+mod step;
 mod stop;
 #[cfg(test)]
 mod tests;
 
 #[cfg(feature = "train")]
-pub(crate) use adjoint::ModelAdjoint;
+pub(crate) use adjoint::{ModelAdjoint, backward};
+pub use architecture::Architecture;
+#[cfg(feature = "train")]
+pub(crate) use loss::{LossTerms, loss_terms};
 pub use network::Network;
-pub use painter::Thesis;
-
+pub use painter::ThesisPainter;
 pub use rollout::Objective;
 #[cfg(feature = "train")]
-pub(crate) use rollout::{Model, Noise, Rollout, Terms};
-pub use shape::Shape;
-pub use steps::{Step, Window};
+pub(crate) use rollout::{Model, Noise, Rollout};
+pub use step::{AttentionWindow, Step};

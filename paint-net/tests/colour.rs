@@ -2,7 +2,9 @@
 #![allow(clippy::unwrap_used)]
 
 use paint_net::procedural::lattice;
-use paint_net::{ColourTask, Coloured, Error, Image, Judge, Limits, Paint, Palette, Picture, SprayKernel};
+use paint_net::{
+    ColourImage, ColourMetric, ColourProblem, ColourSeparation, Error, Image, Limits, Paint, Palette, SprayKernel,
+};
 
 fn nozzle() -> SprayKernel {
     SprayKernel::new(2.0, 2.0).unwrap()
@@ -26,7 +28,7 @@ fn covering() -> Palette {
 }
 
 /// A picture that this palette can paint: smooth depths of every paint.
-fn paintable(palette: &Palette, side: usize) -> Picture {
+fn paintable(palette: &Palette, side: usize) -> ColourImage {
     let bumps = |x: usize, y: usize, p: usize| {
         let bump = |k: usize| {
             let of = |salt: i64| lattice(40 + p as u64, k as i64, salt);
@@ -39,11 +41,11 @@ fn paintable(palette: &Palette, side: usize) -> Picture {
         let depths: Vec<f64> = (0..palette.paints().len()).map(|p| bumps(k % side, k / side, p)).collect();
         palette.colour(&depths)
     };
-    Picture::new(side, side, (0..side * side).map(colour).collect()).unwrap()
+    ColourImage::new(side, side, (0..side * side).map(colour).collect()).unwrap()
 }
 
 /// Peak signal-to-noise ratio over all bands.
-fn psnr(one: &Picture, other: &Picture) -> f64 {
+fn psnr(one: &ColourImage, other: &ColourImage) -> f64 {
     let pairs = one.data().iter().flatten().zip(other.data().iter().flatten());
     let sum: f64 = pairs.map(|(a, b)| (a - b).powi(2)).sum();
     -10.0 * (sum / (3 * one.data().len()) as f64).log10()
@@ -86,13 +88,12 @@ fn masstones_are_what_they_were_called() {
 #[test]
 fn pictures_within_reach_are_painted() {
     for (palette, least) in [(glazes(3), 36.0), (glazes(6), 36.0), (covering(), 34.0)] {
-        for judge in [Judge::Eye, Judge::Bands] {
+        for metric in [ColourMetric::Ciede2000, ColourMetric::Euclidean] {
             let wanted = paintable(&palette, 40);
-            let painter = Coloured { judge, ..Coloured::default() };
-            let painting =
-                painter.paint(&ColourTask::new(&wanted), &palette, &nozzle(), &Limits::default(), &mut |_| ()).unwrap();
-            let quality = psnr(&painting.picture, &wanted);
-            assert!(quality > least, "{judge:?}, {} paints: {quality} dB", palette.paints().len());
+            let painter = ColourSeparation { metric, ..ColourSeparation::default() };
+            let painting = painter.paint(&ColourProblem::new(&wanted, &palette).with_kernel(&nozzle())).unwrap();
+            let quality = psnr(&painting.image, &wanted);
+            assert!(quality > least, "{metric:?}, {} paints: {quality} dB", palette.paints().len());
             // The sprays alone give the picture.
             let canvases: Vec<Image> = (painting.sprays.iter())
                 .map(|sprays| {
@@ -105,7 +106,7 @@ fn pictures_within_reach_are_painted() {
                 .collect();
             for k in 0..40 * 40 {
                 let depths: Vec<f64> = canvases.iter().map(|c| c.data()[k]).collect();
-                let (found, expected) = (painting.picture.data()[k], palette.colour(&depths));
+                let (found, expected) = (painting.image.data()[k], palette.colour(&depths));
                 assert!(found.iter().zip(expected).all(|(f, e)| (f - e).abs() < 1e-9));
             }
         }
@@ -124,11 +125,15 @@ fn a_thousand_bare_walls_get_no_spray() {
         });
         let palette = Palette::new(colour(50), paints.collect()).unwrap();
         let (width, height) = (whole(1, 1, 40), whole(2, 1, 40));
-        let wanted = Picture::new(width, height, vec![palette.wall(); width * height]).unwrap();
-        let painter = Coloured { judge: if of(3) < 0.5 { Judge::Eye } else { Judge::Bands }, ..Coloured::default() };
+        let wanted = ColourImage::new(width, height, vec![palette.substrate(); width * height]).unwrap();
+        let painter = ColourSeparation {
+            metric: if of(3) < 0.5 { ColourMetric::Ciede2000 } else { ColourMetric::Euclidean },
+            ..ColourSeparation::default()
+        };
         let limits = Limits { along: whole(4, 1, 5), row_spacing: whole(5, 1, 5), ..Limits::default() };
         let nozzle = SprayKernel::new(0.3 + 4.0 * of(6), 1.0 + 3.0 * of(7)).unwrap();
-        let painting = painter.paint(&ColourTask::new(&wanted), &palette, &nozzle, &limits, &mut |_| ()).unwrap();
+        let painting =
+            painter.paint(&ColourProblem::new(&wanted, &palette).with_kernel(&nozzle).with_limits(&limits)).unwrap();
         assert!(painting.sprays.iter().all(Vec::is_empty), "wall {k}, {} paints", palette.paints().len());
     }
 }
@@ -138,9 +143,11 @@ fn limits_and_masks_hold() {
     let palette = glazes(4);
     let wanted = paintable(&palette, 32);
     let mask: Vec<bool> = (0..32 * 32).map(|k| k % 32 < 20).collect();
-    let task = ColourTask { paintable: Some(&mask), ..ColourTask::new(&wanted) };
     let limits = Limits { max_volume: 0.1, min_volume: 0.01, max_sprays: Some(60), ..Limits::default() };
-    let painting = Coloured::default().paint(&task, &palette, &nozzle(), &limits, &mut |_| ()).unwrap();
+    let kernel = nozzle();
+    let problem = ColourProblem::new(&wanted, &palette).with_kernel(&kernel).with_limits(&limits);
+    let problem = ColourProblem { paintable: Some(&mask), ..problem };
+    let painting = ColourSeparation::default().paint(&problem).unwrap();
     for sprays in &painting.sprays {
         assert!(sprays.len() <= 60);
         assert!(sprays.iter().all(|s| (0.01..=0.1).contains(&s.volume) && s.x < 20.0));
@@ -155,17 +162,21 @@ fn bad_palettes_and_pictures_are_named() {
     assert!(matches!(Palette::new([1.0; 3], vec![paint(); 7]), Err(Error::InvalidSetting { name: "paints", .. })));
     assert!(matches!(
         Palette::new([1.0, f64::NAN, 0.0], vec![paint()]),
-        Err(Error::InvalidSetting { name: "wall", .. })
+        Err(Error::InvalidSetting { name: "substrate", .. })
     ));
     let black = Paint::glaze("hole", [0.0, 0.5, 0.5]);
     assert!(matches!(Palette::new([1.0; 3], vec![black]), Err(Error::InvalidSetting { name: "absorption", .. })));
     let nothing = Paint { name: "water".into(), absorption: [0.0; 3], scattering: [0.0; 3] };
     assert!(matches!(Palette::new([1.0; 3], vec![nothing]), Err(Error::InvalidSetting { name: "absorption", .. })));
-    assert!(matches!(Picture::new(2, 1, vec![[0.5; 3], [0.0, f64::NAN, 0.0]]), Err(Error::Pixel { x: 1, y: 0, .. })));
-    assert!(matches!(Picture::new(2, 1, vec![[0.5; 3]]), Err(Error::Shape { values: 1, .. })));
-    let wanted = Picture::new(4, 4, vec![[0.5; 3]; 16]).unwrap();
+    assert!(matches!(
+        ColourImage::new(2, 1, vec![[0.5; 3], [0.0, f64::NAN, 0.0]]),
+        Err(Error::Pixel { x: 1, y: 0, .. })
+    ));
+    assert!(matches!(ColourImage::new(2, 1, vec![[0.5; 3]]), Err(Error::ImageSize { values: 1, .. })));
+    let wanted = ColourImage::new(4, 4, vec![[0.5; 3]; 16]).unwrap();
     let other = Image::filled(3, 4, 1.0);
-    let task = ColourTask { weight: Some(&other), ..ColourTask::new(&wanted) };
-    let refused = Coloured::default().paint(&task, &glazes(1), &nozzle(), &Limits::default(), &mut |_| ());
+    let palette = glazes(1);
+    let problem = ColourProblem { weight: Some(&other), ..ColourProblem::new(&wanted, &palette) };
+    let refused = ColourSeparation::default().paint(&problem);
     assert!(matches!(refused, Err(Error::Mismatch { what: "weight", .. })));
 }

@@ -3,8 +3,9 @@
 
 use paint_net::procedural::{Texture, lattice};
 use paint_net::{
-    Coats, Deconvolution, Error, Feedback, FreeSplats, Image, Layered, Limits, MatchingPursuit, MonotoneCurve, Painter,
-    Painting, Saturation, Sharing, SprayKernel, Steps, StrokeSettings, Task, boustrophedon, metrics,
+    ClosedLoopPainter, Deconvolution, Error, Feedback, FreeSprays, Image, LayerPlanning, Layered, Limits,
+    MatchingPursuit, MonotoneCurve, PaintProblem, Painter, Painting, Saturation, SprayKernel, StrokeSettings,
+    ThresholdSpacing, boustrophedon, metrics,
 };
 
 fn kernel() -> SprayKernel {
@@ -16,15 +17,15 @@ fn painters() -> Vec<Box<dyn Painter>> {
         Box::new(Deconvolution::default()),
         Box::new(MatchingPursuit::default()),
         Box::new(Feedback::shipped().unwrap()),
-        Box::new(FreeSplats { sprays: 100, ..FreeSplats::default() }),
-        Box::new(Coats::new(Feedback::shipped().unwrap())),
+        Box::new(FreeSprays { sprays: 100, ..FreeSprays::default() }),
+        Box::new(ClosedLoopPainter::new(Feedback::shipped().unwrap())),
         Box::new(Layered::new(Deconvolution::default())),
-        Box::new(Layered { sharing: Sharing::Sequential, ..Layered::new(Deconvolution::default()) }),
+        Box::new(Layered { planning: LayerPlanning::Sequential, ..Layered::new(Deconvolution::default()) }),
     ]
 }
 
-fn paint(painter: &dyn Painter, task: &Task, limits: &Limits) -> Painting {
-    painter.paint(task, &kernel(), &Saturation::Tanh, limits, &mut |_| ()).unwrap()
+fn paint(painter: &dyn Painter, problem: &PaintProblem, limits: &Limits) -> Painting {
+    painter.paint(&problem.with_kernel(&kernel()).with_limits(limits)).unwrap()
 }
 
 /// The canvas by the definition: every spray's Gaussian added pixel by pixel.
@@ -45,9 +46,9 @@ fn render(painting: &Painting, kernel: &SprayKernel, bare: &Image) -> Image {
 fn canvas_is_the_sum_of_the_sprays() {
     let wanted = Texture::Fbm.image(5, 40);
     let before = Image::from_fn(40, 40, |x, _| 0.01 * x as f64);
-    let task = Task { canvas: Some(&before), ..Task::on_bare_wall(&wanted) };
+    let problem = PaintProblem { canvas: Some(&before), ..PaintProblem::new(&wanted) };
     for painter in painters() {
-        let painting = paint(&*painter, &task, &Limits::default());
+        let painting = paint(&*painter, &problem, &Limits::default());
         let expected = render(&painting, &kernel(), &before);
         for (a, b) in painting.canvas.data().iter().zip(expected.data()) {
             assert!((a - b).abs() < 1e-9, "{}: {a} against {b}", painter.name());
@@ -74,11 +75,13 @@ fn a_thousand_empty_pictures_get_no_spray() {
             min_volume: 0.01 * of(8),
             max_sprays: (of(9) < 0.3).then_some(whole(10, 0, 500)),
         };
-        let law = if of(11) < 0.5 { Saturation::Tanh } else { Saturation::BeerLambert { density: 0.1 + 3.0 * of(12) } };
+        let curve =
+            if of(11) < 0.5 { Saturation::Tanh } else { Saturation::BeerLambert { density: 0.1 + 3.0 * of(12) } };
         let painters = painters();
         let painter = &painters[k as usize % painters.len()];
-        let task = Task { canvas, ..Task::on_bare_wall(&blank) };
-        let painting = painter.paint(&task, &nozzle, &law, &limits, &mut |_| ()).unwrap();
+        let problem = PaintProblem { canvas, ..PaintProblem::new(&blank) };
+        let painting =
+            painter.paint(&problem.with_kernel(&nozzle).with_saturation(&curve).with_limits(&limits)).unwrap();
         assert!(painting.sprays.is_empty(), "picture {k}: {} sprays by {}", painting.sprays.len(), painter.name());
     }
 }
@@ -87,9 +90,9 @@ fn a_thousand_empty_pictures_get_no_spray() {
 fn none_may_be_asked_for() {
     let wanted = Texture::Worley.image(2, 32);
     let before = wanted.map(|ink| 0.5 * ink);
-    let task = Task { canvas: Some(&before), ..Task::on_bare_wall(&wanted) };
+    let problem = PaintProblem { canvas: Some(&before), ..PaintProblem::new(&wanted) };
     for painter in painters() {
-        let painting = paint(&*painter, &task, &Limits { max_sprays: Some(0), ..Limits::default() });
+        let painting = paint(&*painter, &problem, &Limits { max_sprays: Some(0), ..Limits::default() });
         assert!(painting.sprays.is_empty() && painting.canvas == before, "{}", painter.name());
     }
 }
@@ -99,12 +102,14 @@ fn masks_and_limits_hold() {
     let wanted = Texture::Worley.image(2, 48);
     let paintable: Vec<bool> = (0..48 * 48).map(|k| (k % 48) < 24).collect();
     let weight = Image::from_fn(48, 48, |_, y| if y < 30 { 1.0 } else { 0.0 });
-    let task = Task { paintable: Some(&paintable), weight: Some(&weight), ..Task::on_bare_wall(&wanted) };
+    let problem = PaintProblem { paintable: Some(&paintable), weight: Some(&weight), ..PaintProblem::new(&wanted) };
     let limits = Limits { max_volume: 0.2, min_volume: 0.02, max_sprays: Some(120), ..Limits::default() };
     for painter in painters() {
-        let painting = paint(&*painter, &task, &limits);
-        if !["layered", "coats"].contains(&painter.name()) {
+        let painting = paint(&*painter, &problem, &limits);
+        if !["layered", "closed loop"].contains(&painter.name()) {
             assert!(painting.sprays.len() <= 120, "{} sprays by {}", painting.sprays.len(), painter.name());
+        }
+        if painter.name() != "layered" {
             assert!(painting.sprays.iter().all(|s| s.volume >= 0.02));
         }
         assert!(painting.sprays.len() > 40);
@@ -119,7 +124,7 @@ fn deconvolution_meets_the_optimality_conditions() {
     // At the optimum of the convex part the gradient vanishes on sprays and is not negative elsewhere.
     let wanted = Texture::Stripes.image(3, 32);
     let exact = Deconvolution { iterations: 5000, tolerance: 0.0 };
-    let painting = paint(&exact, &Task::on_bare_wall(&wanted), &Limits::default());
+    let painting = paint(&exact, &PaintProblem::new(&wanted), &Limits::default());
     let k = kernel();
     let slope = |cx: i64, cy: i64| -> f64 {
         let mut sum = 0.0;
@@ -149,9 +154,9 @@ fn deconvolution_meets_the_optimality_conditions() {
 #[test]
 fn the_first_greedy_spray_is_the_best_single_spray() {
     let wanted = Texture::Glyph.image(9, 24);
-    let one = MatchingPursuit { placements: 1, smallest_gain: 1e-12, refit: 0, ..MatchingPursuit::default() };
+    let one = MatchingPursuit { placements: 1, min_gain: 1e-12, refit: 0, ..MatchingPursuit::default() };
     let limits = Limits { along: 1, row_spacing: 1, ..Limits::default() };
-    let painting = paint(&one, &Task::on_bare_wall(&wanted), &limits);
+    let painting = paint(&one, &PaintProblem::new(&wanted), &limits);
     let k = kernel();
     // On a bare wall the linearisation is exact at zero: the best cell maximises <g, y>² / <g, g>.
     let score = |cx: usize, cy: usize| -> f64 {
@@ -175,14 +180,13 @@ fn the_first_greedy_spray_is_the_best_single_spray() {
 #[test]
 fn layers_climb_and_cost_little() {
     let wanted = Texture::Fbm.image(11, 64);
-    let task = Task::on_bare_wall(&wanted);
+    let problem = PaintProblem::new(&wanted);
     let psnr = |p: &Painting| metrics::psnr(&p.ink, &wanted, None).unwrap();
-    let direct = psnr(&paint(&Deconvolution::default(), &task, &Limits::default()));
-    for (sharing, loss) in [(Sharing::Joint, 1e-6), (Sharing::Sequential, 1.5)] {
-        let painter = Layered { sharing, ..Layered::new(Deconvolution::default()) };
-        let thresholds = painter.thresholds(&task).unwrap();
-        let layers =
-            painter.paint_layers(&task, &kernel(), &Saturation::Tanh, &Limits::default(), &mut |_| ()).unwrap();
+    let direct = psnr(&paint(&Deconvolution::default(), &problem, &Limits::default()));
+    for (planning, loss) in [(LayerPlanning::Joint, 1e-6), (LayerPlanning::Sequential, 1.5)] {
+        let painter = Layered { planning, ..Layered::new(Deconvolution::default()) };
+        let thresholds = painter.thresholds(&problem).unwrap();
+        let layers = paint(&painter, &problem, &Limits::default()).into_layers();
         assert_eq!(layers.len(), thresholds.len());
         assert!(layers.len() >= 3);
         for pair in layers.windows(2) {
@@ -193,7 +197,7 @@ fn layers_climb_and_cost_little() {
             assert!(highest < top + 0.1, "layer up to {top} reaches {highest}");
         }
         let reached = psnr(&layers[layers.len() - 1]);
-        assert!(reached >= direct - loss, "{sharing:?}: {reached} against {direct}");
+        assert!(reached >= direct - loss, "{planning:?}: {reached} against {direct}");
     }
 }
 
@@ -201,15 +205,15 @@ fn layers_climb_and_cost_little() {
 fn thresholds_follow_both_readings() {
     // Ink 0.00, 0.01, … 0.99: the 20th percentile by linear interpolation is 0.198.
     let ramp = Image::from_fn(100, 1, |x, _| x as f64 / 100.0);
-    let task = Task::on_bare_wall(&ramp);
+    let problem = PaintProblem::new(&ramp);
     let step = 50.0 / 255.0;
     let from_base = Layered::new(Deconvolution::default());
     let expected = [0.198, 0.198 + step, 0.198 + 2.0 * step, 0.198 + 3.0 * step, 0.198 + 4.0 * step, 1.0];
-    let found = from_base.thresholds(&task).unwrap();
+    let found = from_base.thresholds(&problem).unwrap();
     assert_eq!(found.len(), expected.len());
     assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
-    let absolute = Layered { steps: Steps::Absolute, ..from_base };
-    let found = absolute.thresholds(&task).unwrap();
+    let absolute = Layered { spacing: ThresholdSpacing::Absolute, ..from_base };
+    let found = absolute.thresholds(&problem).unwrap();
     let expected = [0.198, 2.0 * step, 3.0 * step, 4.0 * step, 5.0 * step, 1.0];
     assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
 }
@@ -218,26 +222,26 @@ fn thresholds_follow_both_readings() {
 fn saturation_laws_invert_and_differentiate() {
     let knots: Vec<(f64, f64)> =
         (0..=40).map(|k| 0.1 * f64::from(k)).map(|c| (c, 0.9 * (1.0 - (-1.3 * c).exp()))).collect();
-    let laws = [
+    let curves = [
         Saturation::Tanh,
         Saturation::BeerLambert { density: 1.7 },
         Saturation::Curve(MonotoneCurve::new(&knots).unwrap()),
     ];
-    for law in &laws {
-        assert_eq!(law.forward(0.0), 0.0);
+    for curve in &curves {
+        assert_eq!(curve.forward(0.0), 0.0);
         for k in 1..200 {
             let depth = 0.01 * f64::from(k);
-            let ink = law.forward(depth);
-            assert!((law.inverse(ink) - depth).abs() < 1e-9, "{law:?} at {depth}");
-            let difference = (law.forward(depth + 1e-6) - law.forward(depth - 1e-6)) / 2e-6;
-            assert!((law.derivative(depth) - difference).abs() < 1e-6 + 1e-6 / depth, "{law:?} at {depth}");
+            let ink = curve.forward(depth);
+            assert!((curve.inverse(ink) - depth).abs() < 1e-9, "{curve:?} at {depth}");
+            let difference = (curve.forward(depth + 1e-6) - curve.forward(depth - 1e-6)) / 2e-6;
+            assert!((curve.derivative(depth) - difference).abs() < 1e-6 + 1e-6 / depth, "{curve:?} at {depth}");
         }
-        assert!((law.forward(law.inverse(1.0)) - law.max_ink()).abs() < 1e-12);
+        assert!((curve.forward(curve.inverse(1.0)) - curve.max_ink()).abs() < 1e-12);
     }
-    // The curve reproduces the law it was sampled from.
-    let law = &laws[2];
+    // The curve reproduces the curve it was sampled from.
+    let curve = &curves[2];
     assert!(
-        (0..390).map(|k| 0.01 * f64::from(k)).all(|c| (law.forward(c) - 0.9 * (1.0 - (-1.3 * c).exp())).abs() < 2e-4)
+        (0..390).map(|k| 0.01 * f64::from(k)).all(|c| (curve.forward(c) - 0.9 * (1.0 - (-1.3 * c).exp())).abs() < 2e-4)
     );
     for bad in [
         vec![(0.0, 0.0)],
@@ -254,10 +258,10 @@ fn a_curve_that_is_tanh_gives_the_same_painting() {
     let knots: Vec<(f64, f64)> = (0..=600).map(|k| 0.01 * f64::from(k)).map(|c| (c, c.tanh())).collect();
     let curve = Saturation::Curve(MonotoneCurve::new(&knots).unwrap());
     let wanted = Texture::Fbm.image(21, 40);
-    let task = Task::on_bare_wall(&wanted);
+    let problem = PaintProblem::new(&wanted);
     for painter in painters() {
-        let psnr = |law: &Saturation| {
-            let p = painter.paint(&task, &kernel(), law, &Limits::default(), &mut |_| ()).unwrap();
+        let psnr = |curve: &Saturation| {
+            let p = painter.paint(&problem.with_kernel(&kernel()).with_saturation(curve)).unwrap();
             metrics::psnr(&p.ink, &wanted, None).unwrap()
         };
         assert!((psnr(&curve) - psnr(&Saturation::Tanh)).abs() < 0.2, "{}", painter.name());
@@ -269,7 +273,7 @@ fn strokes_keep_every_spray_and_alternate() {
     let wanted = Texture::Glyph.image(4, 60);
     let painting = paint(
         &Deconvolution::default(),
-        &Task::on_bare_wall(&wanted),
+        &PaintProblem::new(&wanted),
         &Limits { min_volume: 0.02, ..Limits::default() },
     );
     let strokes = boustrophedon(&painting.sprays, &StrokeSettings::default()).unwrap();
@@ -297,24 +301,24 @@ fn strokes_keep_every_spray_and_alternate() {
 fn bad_input_is_named() {
     let wanted = Image::filled(8, 8, 0.5);
     let other = Image::filled(9, 8, 0.5);
-    let run = |task: &Task, limits: &Limits| {
-        Deconvolution::default().paint(task, &kernel(), &Saturation::Tanh, limits, &mut |_| ())
+    let run = |problem: &PaintProblem, limits: &Limits| {
+        Deconvolution::default().paint(&problem.with_kernel(&kernel()).with_limits(limits))
     };
-    let task = Task::on_bare_wall(&wanted);
-    let mismatched = Task { canvas: Some(&other), ..task };
+    let problem = PaintProblem::new(&wanted);
+    let mismatched = PaintProblem { canvas: Some(&other), ..problem };
     assert!(matches!(run(&mismatched, &Limits::default()), Err(Error::Mismatch { what: "canvas", .. })));
     let negative = Image::filled(8, 8, -0.1);
-    let task_negative = Task { canvas: Some(&negative), ..task };
+    let task_negative = PaintProblem { canvas: Some(&negative), ..problem };
     assert!(matches!(run(&task_negative, &Limits::default()), Err(Error::Pixel { what: "canvas", x: 0, y: 0, .. })));
     let over = Image::filled(8, 8, 1.5);
-    assert!(matches!(run(&Task::on_bare_wall(&over), &Limits::default()), Err(Error::Pixel { what: "reference", .. })));
+    assert!(matches!(run(&PaintProblem::new(&over), &Limits::default()), Err(Error::Pixel { what: "reference", .. })));
     let nowhere = vec![false; 64];
-    let task_nowhere = Task { paintable: Some(&nowhere), ..task };
-    assert!(matches!(run(&task_nowhere, &Limits::default()), Err(Error::EmptyTask(_))));
+    let task_nowhere = PaintProblem { paintable: Some(&nowhere), ..problem };
+    assert!(matches!(run(&task_nowhere, &Limits::default()), Err(Error::EmptyProblem(_))));
     let zero = Limits { along: 0, ..Limits::default() };
-    assert!(matches!(run(&task, &zero), Err(Error::InvalidSetting { name: "along", .. })));
+    assert!(matches!(run(&problem, &zero), Err(Error::InvalidSetting { name: "along", .. })));
     assert!(matches!(Image::new(2, 2, vec![0.0, 0.0, 0.0, f64::NAN]), Err(Error::Pixel { x: 1, y: 1, .. })));
-    assert!(matches!(Image::new(2, 2, vec![0.0]), Err(Error::Shape { values: 1, .. })));
+    assert!(matches!(Image::new(2, 2, vec![0.0]), Err(Error::ImageSize { values: 1, .. })));
     assert!(matches!(SprayKernel::new(f64::NAN, 2.0), Err(Error::InvalidSetting { name: "sigma", .. })));
     assert!(matches!(metrics::ssim(&wanted, &other, None), Err(Error::Mismatch { .. })));
 }

@@ -2,9 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use paint_net::procedural::{Texture, lattice};
-use paint_net::{
-    Deconvolution, Image, Limits, MatchingPursuit, Painter, Saturation, SprayKernel, Task, ideal, metrics,
-};
+use paint_net::{Deconvolution, Image, Limits, MatchingPursuit, PaintProblem, Painter, SprayKernel, ideal, metrics};
 
 fn close(value: f64, expected: f64, tolerance: f64) {
     assert!((value - expected).abs() <= tolerance, "{value} is not {expected} within {tolerance}");
@@ -53,8 +51,7 @@ fn mean_psnr(painter: &dyn Painter, limits: &Limits) -> f64 {
         .iter()
         .map(|texture| {
             let wanted = texture.image(1000, 128);
-            let painting =
-                painter.paint(&Task::on_bare_wall(&wanted), &kernel, &Saturation::Tanh, limits, &mut |_| ()).unwrap();
+            let painting = painter.paint(&PaintProblem::new(&wanted).with_kernel(&kernel).with_limits(limits)).unwrap();
             metrics::psnr(&painting.ink, &wanted, None).unwrap()
         })
         .sum();
@@ -80,7 +77,7 @@ fn deconvolution_reaches_scipys_optimum() {
 fn pursuit_reaches_the_greedy_baseline() {
     // numpy greedy on a grid of 1 px, 1600 placements: 22.99 dB, after a joint refit 26.12 dB.
     let limits = Limits { along: 1, row_spacing: 1, ..Limits::default() };
-    let greedy = MatchingPursuit { placements: 1600, smallest_gain: 1e-12, refit: 0, ..MatchingPursuit::default() };
+    let greedy = MatchingPursuit { placements: 1600, min_gain: 1e-12, refit: 0, ..MatchingPursuit::default() };
     close(mean_psnr(&greedy, &limits), 22.99, 0.15);
     let refitted = mean_psnr(&MatchingPursuit { refit: 200, ..greedy }, &limits);
     assert!(refitted > 26.0, "mean PSNR {refitted}");

@@ -2,14 +2,15 @@
 #![cfg(feature = "train")]
 #![allow(clippy::unwrap_used)]
 
-use paint_net::thesis::{Network, Shape, Thesis};
+use paint_net::thesis::{Architecture, Network, ThesisPainter};
 use paint_net::train::{ThesisSettings, ThesisTrainer, thesis_patch};
-use paint_net::{Error, Image, Limits, Painter, Painting, Saturation, SprayKernel, Task, metrics};
+use paint_net::{Error, Image, Limits, PaintProblem, Painter, Painting, SprayKernel, metrics};
 
-const SMALL: Shape = Shape { side: 12, steps: 10, latent: 4, hidden: 12, read: 3, radius: 4.0, stop: 4.0, paint: 8 };
+const SMALL: Architecture =
+    Architecture { side: 12, steps: 10, latent: 4, hidden: 12, read: 3, radius: 4.0, stop: 4.0, paint: 8 };
 
 fn settings() -> ThesisSettings {
-    ThesisSettings { shape: SMALL, steps: 20, batch: 60, learning_rate: 3e-3, ..ThesisSettings::default() }
+    ThesisSettings { architecture: SMALL, steps: 20, batch: 60, learning_rate: 3e-3, ..ThesisSettings::default() }
 }
 
 fn picture(n: u64) -> Result<Image, Error> {
@@ -23,9 +24,9 @@ fn trained(mut trainer: ThesisTrainer, steps: usize) -> ThesisTrainer {
     trainer
 }
 
-fn paint(network: Network, task: &Task, limits: &Limits) -> Painting {
+fn paint(network: Network, problem: &PaintProblem, limits: &Limits) -> Painting {
     let kernel = SprayKernel::new(2.0, 4.0).unwrap();
-    Thesis { network }.paint(task, &kernel, &Saturation::Tanh, limits, &mut |_| ()).unwrap()
+    ThesisPainter { network }.paint(&problem.with_kernel(&kernel).with_limits(limits)).unwrap()
 }
 
 #[test]
@@ -87,9 +88,9 @@ fn the_painter_paints_what_its_network_says_and_obeys_limits() {
     let network = trained(ThesisTrainer::new(settings()).unwrap(), 20).network();
     // Two tiles and a part of others.
     let wanted = Image::from_fn(29, 17, |x, y| 0.6 * f64::from(u8::from((x / 5 + y / 4) % 2 == 0)));
-    let task = Task::on_bare_wall(&wanted);
-    let free = paint(network.clone(), &task, &Limits::default());
-    assert!(free.sprays.len() > 10 && free == paint(network.clone(), &task, &Limits::default()));
+    let problem = PaintProblem::new(&wanted);
+    let free = paint(network.clone(), &problem, &Limits::default());
+    assert!(free.sprays.len() > 10 && free == paint(network.clone(), &problem, &Limits::default()));
     let kernel = SprayKernel::new(2.0, 4.0).unwrap();
     let mut canvas = wanted.map(|_| 0.0);
     free.sprays.iter().for_each(|s| kernel.stamp(s, &mut canvas));
@@ -98,16 +99,16 @@ fn the_painter_paints_what_its_network_says_and_obeys_limits() {
     // One tile, and one pixel.
     for side in [12, 1] {
         let small = Image::filled(side, side, 0.5);
-        let painting = paint(network.clone(), &Task::on_bare_wall(&small), &Limits::default());
+        let painting = paint(network.clone(), &PaintProblem::new(&small), &Limits::default());
         assert!(painting.ink.data().iter().all(|a| (0.0..=1.0).contains(a)));
     }
     assert!(network.paint(&[]).unwrap().is_empty());
 
     let tight = Limits { max_sprays: Some(7), max_volume: 0.05, ..Limits::default() };
-    let few = paint(network.clone(), &task, &tight);
+    let few = paint(network.clone(), &problem, &tight);
     assert!(few.sprays.len() == 7 && few.sprays.iter().all(|s| s.volume <= 0.05));
     let left: Vec<bool> = (0..29 * 17).map(|k| k % 29 < 10).collect();
-    let masked = paint(network, &Task { paintable: Some(&left), ..task }, &Limits::default());
+    let masked = paint(network, &PaintProblem { paintable: Some(&left), ..problem }, &Limits::default());
     assert!(masked.sprays.iter().all(|s| s.x < 9.5 + 1e-9));
 }
 
@@ -116,8 +117,8 @@ fn bad_settings_and_pictures_are_named() {
     for (name, bad) in [
         ("steps", ThesisSettings { steps: 0, ..settings() }),
         ("batch", ThesisSettings { batch: 0, ..settings() }),
-        ("read", ThesisSettings { shape: Shape { read: 1, ..SMALL }, ..settings() }),
-        ("radius", ThesisSettings { shape: Shape { radius: f64::NAN, ..SMALL }, ..settings() }),
+        ("read", ThesisSettings { architecture: Architecture { read: 1, ..SMALL }, ..settings() }),
+        ("radius", ThesisSettings { architecture: Architecture { radius: f64::NAN, ..SMALL }, ..settings() }),
         ("last_learning_rate", ThesisSettings { last_learning_rate: -1.0, ..settings() }),
     ] {
         assert!(matches!(ThesisTrainer::new(bad), Err(Error::InvalidSetting { name: n, .. }) if n == name), "{name}");
@@ -125,5 +126,5 @@ fn bad_settings_and_pictures_are_named() {
     let mut trainer = ThesisTrainer::new(settings()).unwrap();
     assert!(matches!(trainer.step(&|_| Ok(Image::filled(5, 5, 0.1))), Err(Error::Mismatch { .. })));
     assert!(matches!(trainer.step(&|_| Ok(Image::filled(12, 12, 1.1))), Err(Error::Pixel { .. })));
-    assert!(matches!(trainer.validate(&[]), Err(Error::EmptyTask(_))));
+    assert!(matches!(trainer.validate(&[]), Err(Error::EmptyProblem(_))));
 }

@@ -3,11 +3,11 @@
 #![allow(clippy::unwrap_used)]
 
 use paint_net::train::{TrainSettings, Trainer};
-use paint_net::{Error, Shape};
+use paint_net::{Architecture, Error};
 
 fn settings() -> TrainSettings {
-    let shape = Shape { channels: 3, layers: 2, stages: 2 };
-    TrainSettings { steps: 30, batch: 5, side: 24, passes: 3, shape, ..TrainSettings::default() }
+    let architecture = Architecture { channels: 3, layers: 2, stages: 2 };
+    TrainSettings { steps: 30, batch: 5, side: 24, passes: 3, architecture, ..TrainSettings::default() }
 }
 
 fn trained(mut trainer: Trainer, steps: usize) -> Trainer {
@@ -59,7 +59,10 @@ fn bad_settings_are_named() {
         ("side", TrainSettings { side: 3, ..settings() }),
         ("threads", TrainSettings { threads: 0, ..settings() }),
         ("learning_rate", TrainSettings { learning_rate: f64::NAN, ..settings() }),
-        ("channels", TrainSettings { shape: Shape { channels: 0, ..Shape::default() }, ..settings() }),
+        (
+            "channels",
+            TrainSettings { architecture: Architecture { channels: 0, ..Architecture::default() }, ..settings() },
+        ),
     ] {
         assert!(matches!(Trainer::new(bad), Err(Error::InvalidSetting { name: n, .. }) if n == name), "{name}");
     }

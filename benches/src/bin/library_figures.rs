@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use nalgebra::{Matrix2, Vector2, Vector3};
 use paint_sim::ciede2000;
 use paint_sim::colour::BANDS;
 use paintcopter_benches::cpu::{CpuTimer, median_seconds};
@@ -14,7 +15,7 @@ use paintcopter_benches::{Rng, colours, films, motion, painting, room};
 use paintcopter_examples::mesh_io::read_mesh;
 use paintcopter_examples::world::rock_wall;
 use serde_json::json;
-use uv_param::{Chart, Method, Settings, largest_disk, unwrap};
+use uv_param::{Chart, CutSettings, Method, Settings, largest_disk, unwrap, unwrap_with_cuts};
 use vio_ekf::{Alignment, Association, Trajectory, ate, tum};
 
 type AnyError = Box<dyn Error>;
@@ -36,7 +37,7 @@ enum Job {
         #[arg(long, default_value_t = 1)]
         seed: u64,
     },
-    /// Unwraps the largest disk of a mesh, as `uv_peers.py disk` does
+    /// Unwraps the largest disk of a mesh, as `uv_peers.py disk` does, and once more with cuts
     Uv {
         /// OBJ, PLY or OFF
         mesh: PathBuf,
@@ -178,7 +179,41 @@ fn uv(path: &Path, runs: usize, save: Option<&Path>) -> Result<(), AnyError> {
             write(&folder.join(format!("{stem}_uv-param_{fig}.obj")), &textured(&chart)?)?;
         }
     }
+    let (settings, cuts) = (Settings::default(), CutSettings::default());
+    let chart = unwrap_with_cuts(&disk, &settings, &cuts, |_| ())?;
+    let seconds = median_seconds(runs, || unwrap_with_cuts(&disk, &settings, &cuts, |_| ()));
+    let q = chart.quality();
+    println!(
+        "{}",
+        json!({
+            "mesh": name, "fig": "uv-param_cuts", "s": seconds, "runs": runs.max(1), "cuts": q.cuts,
+            "seam_ratio": q.seam_length_m / q.area_m2.sqrt(), "sd": q.symmetric_dirichlet,
+            "within_1.5": share_within(&chart, 1.5), "within_1.6": share_within(&chart, 1.6),
+            "overlap_area_frac": q.overlap_share, "length_err_mean": q.length_err_mean, "length_err_p99": q.length_err_p99,
+        })
+    );
     Ok(())
+}
+
+/// Share of the area whose stretch `max(s1, 1 / s2)` is at most a bound.
+fn share_within(chart: &Chart, bound: f64) -> f64 {
+    let (mut within, mut all) = (0.0, 0.0);
+    for face in chart.disk().faces() {
+        let [p, q, r] = face.map(|i| Vector3::from(chart.disk().positions()[i as usize]));
+        let [a, b, c] = face.map(|i| Vector2::from(chart.uv()[i as usize]));
+        let (edge, other) = (q - p, r - p);
+        let normal = edge.cross(&other);
+        let along = edge.normalize();
+        let across = normal.normalize().cross(&along);
+        let plane = Matrix2::new(edge.norm(), other.dot(&along), 0.0, other.dot(&across));
+        let Some(inverse) = plane.try_inverse() else { continue };
+        let stretch = (Matrix2::from_columns(&[b - a, c - a]) * inverse).singular_values();
+        all += normal.norm();
+        if stretch.max().max(1.0 / stretch.min()) <= bound {
+            within += normal.norm();
+        }
+    }
+    within / all
 }
 
 /// A chart as an OBJ with texture coordinates in metres.
@@ -208,7 +243,7 @@ fn sim(count: usize, runs: usize) -> Result<(), AnyError> {
     let mut wide = vec![[0.0; BANDS]; count];
     print("km_f64_x36", median_seconds(runs, || films.wide(black_box(&mut wide))));
 
-    let mut rng = Rng(4);
+    let mut rng = Rng::new(4);
     let mut lab = || [rng.between(0.0, 100.0), rng.between(-80.0, 80.0), rng.between(-80.0, 80.0)];
     let pairs: Vec<[[f64; 3]; 2]> = (0..count).map(|_| [lab(), lab()]).collect();
     let difference = || pairs.iter().map(|[one, other]| ciede2000(*one, *other)).sum::<f64>();

@@ -46,7 +46,7 @@ struct Arguments {
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
     /// Folder with the recordings
-    #[arg(long, env = "PAINTCOPTER_DATA", default_value = "../shared/data")]
+    #[arg(long, env = "PAINTCOPTER_DATA")]
     data: PathBuf,
     /// Runs of which the shortest time of each frame counts: on a shared machine a frame may be interrupted
     #[arg(long, default_value_t = 1)]
@@ -117,7 +117,7 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
             squares.push(outcome.nees);
         }
         if arguments.seeds > 1 {
-            println!("{}", honesty(name, &squares)?);
+            println!("{}", consistency(name, &squares)?);
         }
     }
     let worst = errors.iter().copied().fold(0.0, f64::max);
@@ -132,7 +132,7 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
 
 /// Over the runs of a sequence: the mean of all squared errors, and for how much of the time the mean over the runs lies where it does
 /// 95 % of the time if the claim is right.
-fn honesty(name: &str, runs: &[Vec<[f64; 5]>]) -> Result<serde_json::Value, AnyError> {
+fn consistency(name: &str, runs: &[Vec<[f64; 5]>]) -> Result<serde_json::Value, AnyError> {
     let (low, high) = chi2::mean_band(3, runs.len(), 0.95)?;
     let frames = runs.iter().map(Vec::len).min().unwrap_or(0);
     let mut line = json!({ "all_of": name, "runs": runs.len(), "nees_band": [low, high] });
@@ -222,7 +222,7 @@ fn start(simulation: &Simulation, stamp: Stamp, imu: &ImuModel, seed: u64) -> Re
     let motion = simulation.motion(stamp)?;
     let (gyro_bias, accel_bias) = (imu.gyro_bias_sigma, imu.accel_bias_sigma);
     let sigma = StartSigma { gyro_bias, accel_bias, ..StartSigma::default() };
-    let mut rng = Rng(seed);
+    let mut rng = Rng::new(seed);
     let mut normals = || Vector3::from_fn(|_, _| (0..12).map(|_| rng.unit()).sum::<f64>() - 6.0);
     let pose = motion.world_from_body;
     let tilt = normals().component_mul(&Vector3::new(sigma.tilt, sigma.tilt, 0.0));

@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
+use paintcopter_examples::mesh_io::{PlyMesh, write_ply};
 use paintcopter_examples::report::save_figures;
 use paintcopter_examples::scan::{Device, Scan, ScanReport, ScanSettings, open_sequence, save_views};
-use tsdf_hash::Tiers;
+use tsdf_hash::MemoryLimits;
 
 /// Maps a recorded RGB-D sequence into a voxel-hashed distance field and its mesh.
 #[derive(Parser)]
@@ -98,8 +99,9 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     save_views(&scan, &sequence, folder, settings.map.threads)?;
     scan.map.save(&folder.join("map.tsdf"), Some(&scan.mesh), &BTreeMap::new())?;
     let ply = folder.join("mesh.ply");
-    let file = std::fs::File::create(&ply).map_err(|e| format!("{}: cannot be written ({e})", ply.display()))?;
-    tsdf_hash::write_ply(&scan.mesh, file)?;
+    let tsdf_hash::Mesh { positions, normals, colours, faces, .. } = &scan.mesh;
+    write_ply(&ply, &PlyMesh { positions, normals: Some(normals), colours, faces })
+        .map_err(|e| format!("{}: cannot be written ({e})", ply.display()))?;
     let tum = folder.join("trajectory.tum");
     std::fs::write(&tum, vio_ekf::tum::write(&scan.trajectory))
         .map_err(|e| format!("{}: cannot be written ({e})", tum.display()))?;
@@ -111,19 +113,22 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
 
 fn settings(arguments: &Arguments) -> ScanSettings {
     let threads = arguments.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
-    let tiers =
-        Tiers { host_bytes: arguments.host_mib << 20, disk_bytes: arguments.disk_mib << 20, ..Tiers::default() };
+    let memory = MemoryLimits {
+        host_bytes: arguments.host_mib << 20,
+        disk_bytes: arguments.disk_mib << 20,
+        ..MemoryLimits::default()
+    };
     let map = tsdf_hash::Settings {
         voxel_size: arguments.voxel,
         max_depth: arguments.max_depth,
         carve: arguments.carve,
         max_bytes: arguments.active_mib << 20,
         threads: threads.clamp(1, 1024),
-        tiers,
+        memory,
         ..tsdf_hash::Settings::default()
     };
     let device = match arguments.device {
-        // The tiers are the processor's.
+        // Eviction is done by the map on the processor only.
         DeviceName::Auto if arguments.host_mib == 0 => Device::Auto,
         DeviceName::Gpu => Device::Gpu,
         DeviceName::Auto | DeviceName::Cpu => Device::Cpu,

@@ -1,4 +1,8 @@
 //! Wavefront OBJ: v (with optional colour), vt, f. Groups, normals and materials are passed over.
+//!
+//! Read here and not by `tobj` (4.0.5): that tears a mesh at every group, numbers the vertices anew, gives corners without
+//! texture coordinates those of the corner before, names no line in its errors, and overflows on `f 1/-9`. `obj` and `obj-rs`
+//! know no vertex colours.
 
 use super::fault::{Fault, number};
 use super::mesh::{MeshUv, TriangleMesh, fan};

@@ -1,10 +1,14 @@
-//! PLY: positions, colours and faces by `ply-rs-bw`; writing in binary little endian.
+//! PLY by `ply-rs-bw`: positions, colours and faces in all encodings; writing in binary little endian.
 
 use std::io::{self, Write};
 use std::path::Path;
 
 use ply_rs_bw::parser::Parser;
-use ply_rs_bw::ply::{DefaultElement, Property};
+use ply_rs_bw::ply::{
+    Addable, DefaultElement, ElementDef, Encoding, Header, Property, PropertyAccess, PropertyDef, PropertyType,
+    ScalarType,
+};
+use ply_rs_bw::writer::Writer;
 
 use super::fault::Fault;
 use super::mesh::{TriangleMesh, fan};
@@ -17,18 +21,19 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
     let mut mesh = TriangleMesh::default();
     let mut colours = Vec::new();
     for (k, vertex) in ply.payload.get("vertex").into_iter().flatten().enumerate() {
-        let read = |name: &str| vertex.get(name).and_then(scalar);
+        let read = |name: &str| vertex.get(name).and_then(Property::to_f32_lossy);
         let [Some(x), Some(y), Some(z)] = ["x", "y", "z"].map(read) else {
             return Err(fault(k, "vertex", "x, y and z must be numbers"));
         };
-        mesh.positions.push([x as f32, y as f32, z as f32]);
+        mesh.positions.push([x, y, z]);
         if let [Some(r), Some(g), Some(b)] = ["red", "green", "blue"].map(|name| vertex.get(name).and_then(unit)) {
             colours.push([r, g, b]);
         }
     }
     for (k, face) in ply.payload.get("face").into_iter().flatten().enumerate() {
-        let indices = ["vertex_indices", "vertex_index"].iter().find_map(|name| face.get(*name)).and_then(index_list);
-        let corners = indices.ok_or_else(|| fault(k, "face", "no list of vertex indices"))?;
+        let indices = ["vertex_indices", "vertex_index"].iter().find_map(|name| face.get(*name));
+        let corners =
+            indices.and_then(Property::to_u32_list).ok_or_else(|| fault(k, "face", "no list of vertex indices"))?;
         if let Some(bad) = corners.iter().find(|&&i| i as usize >= mesh.positions.len()) {
             let what = format!("vertex {bad} does not exist ({} vertices)", mesh.positions.len());
             return Err(fault(k, "face", &what));
@@ -39,20 +44,6 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
         mesh.colours = Some(colours);
     }
     Ok(mesh)
-}
-
-fn scalar(property: &Property) -> Option<f64> {
-    Some(match *property {
-        Property::Char(v) => v.into(),
-        Property::UChar(v) => v.into(),
-        Property::Short(v) => v.into(),
-        Property::UShort(v) => v.into(),
-        Property::Int(v) => v.into(),
-        Property::UInt(v) => v.into(),
-        Property::Float(v) => v.into(),
-        Property::Double(v) => v,
-        _ => return None,
-    })
 }
 
 /// A colour channel in `[0, 1]`: integers are scaled by their type's maximum.
@@ -66,40 +57,90 @@ fn unit(property: &Property) -> Option<f32> {
     })
 }
 
-fn index_list(property: &Property) -> Option<Vec<u32>> {
-    match property {
-        Property::ListUChar(v) => Some(v.iter().map(|&i| i.into()).collect()),
-        Property::ListUShort(v) => Some(v.iter().map(|&i| i.into()).collect()),
-        Property::ListUInt(v) => Some(v.clone()),
-        Property::ListChar(v) => v.iter().map(|&i| u32::try_from(i).ok()).collect(),
-        Property::ListShort(v) => v.iter().map(|&i| u32::try_from(i).ok()).collect(),
-        Property::ListInt(v) => v.iter().map(|&i| u32::try_from(i).ok()).collect(),
-        _ => None,
+/// A mesh to write; one normal, if there are any, and one sRGB colour per vertex.
+pub struct PlyMesh<'a> {
+    /// Vertices.
+    pub positions: &'a [[f32; 3]],
+    /// Unit normals of the vertices.
+    pub normals: Option<&'a [[f32; 3]]>,
+    /// Colours of the vertices.
+    pub colours: &'a [[u8; 3]],
+    /// Vertex indices, three per triangle.
+    pub faces: &'a [[u32; 3]],
+}
+
+/// Names of a vertex's numbers and colour channels, in the order of the file.
+const COORDINATES: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
+const CHANNELS: [&str; 3] = ["red", "green", "blue"];
+
+/// A vertex while it is written.
+#[derive(Default)]
+struct Vertex {
+    coordinates: [f32; 6],
+    colour: [u8; 3],
+}
+
+impl PropertyAccess for Vertex {
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn get_float(&self, name: &str) -> Option<f32> {
+        COORDINATES.iter().position(|n| *n == name).map(|k| self.coordinates[k])
+    }
+
+    fn get_uchar(&self, name: &str) -> Option<u8> {
+        CHANNELS.iter().position(|n| *n == name).map(|k| self.colour[k])
     }
 }
 
-/// Writes a binary little-endian PLY with one sRGB colour per vertex.
-pub fn write_ply(path: &Path, positions: &[[f32; 3]], faces: &[[u32; 3]], colours: &[[u8; 3]]) -> io::Result<()> {
-    let mut out = io::BufWriter::new(std::fs::File::create(path)?);
-    write!(
-        out,
-        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
-         property uchar red\nproperty uchar green\nproperty uchar blue\nelement face {}\n\
-         property list uchar int vertex_indices\nend_header\n",
-        positions.len(),
-        faces.len()
-    )?;
-    for (position, colour) in positions.iter().zip(colours) {
-        for coordinate in position {
-            out.write_all(&coordinate.to_le_bytes())?;
-        }
-        out.write_all(colour)?;
+/// A face while it is written.
+#[derive(Default)]
+struct Face([i32; 3]);
+
+impl PropertyAccess for Face {
+    fn new() -> Self {
+        Self::default()
     }
-    for face in faces {
-        out.write_all(&[3])?;
-        for index in face {
-            out.write_all(&index.to_le_bytes())?;
+
+    fn get_list_int(&self, _: &str) -> Option<&[i32]> {
+        Some(&self.0)
+    }
+}
+
+/// Writes a binary little-endian PLY.
+pub fn write_ply(path: &Path, mesh: &PlyMesh) -> io::Result<()> {
+    let mut out = io::BufWriter::new(std::fs::File::create(path)?);
+    let element = |name: &str, count: usize, properties: &[(&str, PropertyType)]| {
+        let mut element = ElementDef { count, ..ElementDef::new(name.into()) };
+        for (name, kind) in properties {
+            element.properties.add(PropertyDef::new((*name).into(), kind.clone()));
         }
+        element
+    };
+    let coordinates = &COORDINATES[..if mesh.normals.is_some() { 6 } else { 3 }];
+    let coordinates = coordinates.iter().map(|name| (*name, PropertyType::Scalar(ScalarType::Float)));
+    let channels = CHANNELS.map(|name| (name, PropertyType::Scalar(ScalarType::UChar)));
+    let properties: Vec<_> = coordinates.chain(channels).collect();
+    let vertex = element("vertex", mesh.positions.len(), &properties);
+    let indices = ("vertex_indices", PropertyType::List(ScalarType::UChar, ScalarType::Int));
+    let face = element("face", mesh.faces.len(), &[indices]);
+    let mut header = Header { encoding: Encoding::BinaryLittleEndian, ..Header::new() };
+    header.elements.add(vertex.clone());
+    header.elements.add(face.clone());
+
+    let writer = Writer::<Vertex>::new();
+    writer.write_header(&mut out, &header)?;
+    for (k, ([x, y, z], colour)) in mesh.positions.iter().zip(mesh.colours).enumerate() {
+        let [nx, ny, nz] = mesh.normals.and_then(|normals| normals.get(k)).copied().unwrap_or_default();
+        let element = Vertex { coordinates: [*x, *y, *z, nx, ny, nz], colour: *colour };
+        writer.write_little_endian_element(&mut out, &element, &vertex)?;
+    }
+    let writer = Writer::<Face>::new();
+    for corners in mesh.faces {
+        let index = |i: u32| i32::try_from(i).map_err(io::Error::other);
+        let [a, b, c] = *corners;
+        writer.write_little_endian_element(&mut out, &Face([index(a)?, index(b)?, index(c)?]), &face)?;
     }
     out.flush()
 }

@@ -1,7 +1,7 @@
 //! What to spray: the wanted picture into layers.
 
 use paint_net::{
-    Deconvolution, Feedback, Image, Layered, Limits, MatchingPursuit, Painter, Painting, SprayKernel, Task,
+    Deconvolution, Feedback, Image, Layered, MatchingPursuit, Observer, PaintProblem, Painter, Painting, SprayKernel,
 };
 
 use super::error::MissionError;
@@ -11,7 +11,7 @@ use crate::progress::Stage;
 use crate::surface::PaintSurface;
 
 /// Weight of texels out of reach against those in reach.
-const BARE_WEIGHT: f64 = 0.02;
+const UNPAINTABLE_WEIGHT: f64 = 0.02;
 /// Where the cone of the spray ends, in deviations: all but 0.2 % of the paint lies inside.
 pub(super) const SPRAY_CUT: f64 = 3.5;
 
@@ -40,20 +40,24 @@ pub(super) fn decide(
     }
     // What nobody can spray must not pull paint from its neighbours; a little weight keeps overspray off it.
     let weight = Image::from_fn(coverage.width(), coverage.height(), |x, y| {
-        let share = if paintable[y * coverage.width() + x] { 1.0 } else { BARE_WEIGHT };
+        let share = if paintable[y * coverage.width() + x] { 1.0 } else { UNPAINTABLE_WEIGHT };
         share * coverage.at(x, y)
     });
-    let task = Task { reference: wanted, canvas: None, weight: Some(&weight), paintable: Some(&paintable) };
     let kernel = kernel(settings)?;
+    let problem = PaintProblem::new(wanted)
+        .with_weight(&weight)
+        .with_paintable(&paintable)
+        .with_kernel(&kernel)
+        .with_saturation(appearance.ink())
+        .with_limits(&settings.limits);
     let mut progress = |share: f64| stage.share(share);
-    let (ink, limits) = (appearance.ink(), &settings.limits);
     let layers = match settings.painter {
         PainterChoice::Feedback => {
             let painter = Feedback { threads: settings.threads, ..Feedback::shipped()? };
-            layered(painter, &task, &kernel, ink, limits, &mut progress)
+            layers(painter, &problem, &mut progress)
         }
-        PainterChoice::Deconvolution => layered(Deconvolution::default(), &task, &kernel, ink, limits, &mut progress),
-        PainterChoice::Pursuit => layered(MatchingPursuit::default(), &task, &kernel, ink, limits, &mut progress),
+        PainterChoice::Deconvolution => layers(Deconvolution::default(), &problem, &mut progress),
+        PainterChoice::Pursuit => layers(MatchingPursuit::default(), &problem, &mut progress),
     }?;
     let sprays: usize = layers.iter().map(|l| l.sprays.len()).sum();
     if sprays == 0 {
@@ -63,13 +67,10 @@ pub(super) fn decide(
     Ok(layers)
 }
 
-fn layered<P: Painter>(
+fn layers<P: Painter>(
     painter: P,
-    task: &Task,
-    kernel: &SprayKernel,
-    ink: &paint_net::Saturation,
-    limits: &Limits,
-    progress: &mut dyn FnMut(f64),
+    problem: &PaintProblem,
+    progress: &mut dyn Observer,
 ) -> Result<Vec<Painting>, paint_net::Error> {
-    Layered::new(painter).paint_layers(task, kernel, ink, limits, progress)
+    Layered::new(painter).paint_observed(problem, progress).map(Painting::into_layers)
 }

@@ -12,7 +12,7 @@ use super::shading::shading;
 /// Size of the depth camera's images, pixels.
 const IMAGE: (u32, u32) = (320, 240);
 /// Horizontal opening angle of the depth camera, radians: a common structured-light camera's 58 degrees.
-const OPENING: f64 = 1.02;
+const FIELD_OF_VIEW: f64 = 1.02;
 /// Distance of the camera from the surface's box, metres.
 const DISTANCE: f64 = 1.6;
 /// Edge of a voxel of the map, metres.
@@ -32,8 +32,8 @@ pub struct Inspection {
     pub mesh_error: f64,
     /// The flight under the drifting localisation: what was flown.
     pub flown: Trajectory,
-    /// What the localisation took it for.
-    pub believed: Trajectory,
+    /// What the localisation estimated.
+    pub estimated: Trajectory,
     /// Root mean square position error between the two after rigid alignment, the ATE of odometry, metres.
     pub slam_ate: f64,
 }
@@ -44,9 +44,9 @@ pub fn inspect(mission: &Mission) -> Result<Inspection, MissionError> {
     let world = &mission.surface.world;
     let off = |p: &[f32; 3]| world.distance(&Point3::from(p.map(f64::from)), 1.0);
     let mesh_error = mesh.positions.iter().map(off).sum::<f64>() / mesh.positions.len().max(1) as f64;
-    let (flown, believed) = trajectories(mission)?;
-    let slam_ate = vio_ekf::ate(flown.poses(), believed.poses(), Alignment::Se3)?.position.rmse;
-    Ok(Inspection { mesh, mesh_error, flown, believed, slam_ate })
+    let (flown, estimated) = trajectories(mission)?;
+    let slam_ate = vio_ekf::ate(flown.poses(), estimated.poses(), Alignment::Se3)?.position.rmse;
+    Ok(Inspection { mesh, mesh_error, flown, estimated, slam_ate })
 }
 
 /// Looks at the painted surface from all sides that have paint, and fuses what it sees.
@@ -77,7 +77,7 @@ fn viewpoints(mission: &Mission) -> Result<Vec<Camera>, MissionError> {
     let centre = (low + high) / 2.0;
     let up = Vector3::z();
     let camera_at = |eye: Vector3<f64>, target: Vector3<f64>| {
-        Camera::looking_at(&Point3::from(eye), &Point3::from(target), &up, OPENING, IMAGE)
+        Camera::looking_at(&Point3::from(eye), &Point3::from(target), &up, FIELD_OF_VIEW, IMAGE)
     };
     let facing = mission.surface.facing();
     let flat = Vector3::new(facing.x, facing.y, 0.0);
@@ -110,7 +110,7 @@ fn viewpoints(mission: &Mission) -> Result<Vec<Camera>, MissionError> {
 /// The flights one after the other at 10 Hz: as flown, and as the drifting localisation saw them.
 fn trajectories(mission: &Mission) -> Result<(Trajectory, Trajectory), MissionError> {
     let mut flown = Trajectory::default();
-    let mut believed = Trajectory::default();
+    let mut estimated = Trajectory::default();
     let mut start = 0.0;
     for f in &mission.flights {
         let stride = (POSE_STEP / f.slam.interval).round().max(1.0) as usize;
@@ -121,11 +121,11 @@ fn trajectories(mission: &Mission) -> Result<(Trajectory, Trajectory), MissionEr
             }
             flown.push(stamp, sample.world_from_body)?;
             let rotation = sample.world_from_body.rotation;
-            believed.push(stamp, Isometry3::from_parts(sample.estimated_position.into(), rotation))?;
+            estimated.push(stamp, Isometry3::from_parts(sample.estimated_position.into(), rotation))?;
         }
         start += f.plan.trajectory.duration();
     }
-    Ok((flown, believed))
+    Ok((flown, estimated))
 }
 /// Puts one rendered frame into the map.
 fn fuse(map: &mut Map, camera: &Camera, frame: &Frame) -> Result<(), MissionError> {

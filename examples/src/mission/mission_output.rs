@@ -6,24 +6,25 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use paint_planner::normal_deviation;
 use paint_sim::flight::FlightSample;
 use paint_sim::{Camera, Frame, Hit, Lights, render};
+use tsdf_hash::Mesh;
 
 use super::error::MissionError;
 use super::figures::report;
 use super::inspect::inspect;
 use super::run::Mission;
 use super::shading::shading;
-use crate::mesh_io::write_ply;
+use crate::mesh_io::{PlyMesh, write_ply};
 use crate::pictures::{Panel, Polyline, Rgb, Scene, save_curves, save_error_map, save_scene};
 use crate::progress::Stage;
-use crate::recording::{ColouredMesh, Moment, save_recording};
+use crate::recording::{ColouredMesh, RobotState, save_recording};
 
 /// Width and height of the rendered views, pixels.
 const VIEW: (u32, u32) = (1500, 940);
 /// Colour beside the surface in the texture pictures.
-const BESIDE: [u8; 3] = [255, 255, 255];
+const BACKGROUND: [u8; 3] = [255, 255, 255];
 /// Share of the view that the surface fills.
 const FILL: f64 = 0.86;
-/// Seconds between two moments of the recording.
+/// Seconds between two states of the recording.
 const RECORDING_STEP: f64 = 0.1;
 /// Points in a curve: more than the picture has columns shows nothing more.
 const CURVE_POINTS: usize = 2800;
@@ -36,8 +37,9 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
     stage.share(0.2);
     let colours = vertex_colours(mission);
     let positions: Vec<[f32; 3]> = mission.surface.disk().positions().iter().map(|p| p.map(|c| c as f32)).collect();
+    let faces = mission.surface.disk().faces();
     let ply = folder.join("surface.ply");
-    write_ply(&ply, &positions, mission.surface.disk().faces(), &colours)
+    write_ply(&ply, &PlyMesh { positions: &positions, normals: None, colours: &colours, faces })
         .map_err(|source| MissionError::Unwritable { path: ply.display().to_string(), source })?;
     stage.share(0.4);
     save_views(mission, folder)?;
@@ -53,10 +55,11 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
     let stage = Stage::start("scan");
     let found = inspect(mission)?;
     let unwritable = |path: &Path, source| MissionError::Unwritable { path: path.display().to_string(), source };
+    let Mesh { positions, faces, colours, .. } = &found.mesh;
+    let found_mesh = PlyMesh { positions, normals: None, colours, faces };
     let ply = folder.join("scan.ply");
-    write_ply(&ply, &found.mesh.positions, &found.mesh.faces, &found.mesh.colours)
-        .map_err(|source| unwritable(&ply, source))?;
-    for (name, trajectory) in [("flight_true.tum", &found.flown), ("flight_slam.tum", &found.believed)] {
+    write_ply(&ply, &found_mesh).map_err(|source| unwritable(&ply, source))?;
+    for (name, trajectory) in [("flight_true.tum", &found.flown), ("flight_slam.tum", &found.estimated)] {
         let path = folder.join(name);
         std::fs::write(&path, vio_ekf::tum::write(trajectory)).map_err(|source| unwritable(&path, source))?;
     }
@@ -71,7 +74,7 @@ fn save_textures(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
     let painted = mission.painted_depth();
     let picture = |depth: &dyn Fn(usize) -> f64| {
         let pixels = (0..width * height)
-            .map(|k| if mission.coverage.data()[k] > 0.0 { mission.appearance.srgb(depth(k)) } else { BESIDE });
+            .map(|k| if mission.coverage.data()[k] > 0.0 { mission.appearance.srgb(depth(k)) } else { BACKGROUND });
         let picture = Rgb::from_pixels(width, height, pixels);
         picture.enlarged((1400 / width as u32).clamp(1, 8))
     };
@@ -202,14 +205,14 @@ fn save_angles(mission: &Mission, path: &Path) -> Result<(), MissionError> {
 }
 
 fn save_mcap(mission: &Mission, folder: &Path, mesh: &ColouredMesh) -> Result<(), MissionError> {
-    let mut moments = Vec::new();
-    let mut remarks = Vec::new();
+    let mut states = Vec::new();
+    let mut log_lines = Vec::new();
     let mut start = 0.0;
     for (k, f) in mission.flights.iter().enumerate() {
         let strokes = f.route.strokes;
-        remarks.push((start, format!("layer {} of {}: {strokes} strokes", k + 1, mission.flights.len())));
+        log_lines.push((start, format!("layer {} of {}: {strokes} strokes", k + 1, mission.flights.len())));
         let stride = (RECORDING_STEP / f.flight.interval).round().max(1.0) as usize;
-        moments.extend(f.flight.samples.iter().step_by(stride).map(|s| Moment {
+        states.extend(f.flight.samples.iter().step_by(stride).map(|s| RobotState {
             time: start + s.time,
             world_from_body: s.world_from_body,
             world_from_nozzle: mission.nozzle_pose(s),
@@ -219,7 +222,7 @@ fn save_mcap(mission: &Mission, folder: &Path, mesh: &ColouredMesh) -> Result<()
         }));
         start += f.plan.trajectory.duration();
     }
-    save_recording(&folder.join("mission.mcap"), mesh, &moments, &remarks)?;
+    save_recording(&folder.join("mission.mcap"), mesh, &states, &log_lines)?;
     Ok(())
 }
 fn picture_of(frame: &Frame) -> Rgb {

@@ -20,7 +20,7 @@ pub(super) struct Planned {
     /// Time the optimal planner took, seconds on one core.
     pub(super) seconds: f64,
     /// Paint of layers that no pose of the robot can spray at all, m³.
-    pub(super) abandoned: f64,
+    pub(super) unreachable_paint: f64,
 }
 
 /// Plans every layer; each flight begins where the one before ends.
@@ -33,13 +33,13 @@ pub(super) fn plan(
     let stage = Stage::start("plan");
     let kernel = kernel(settings)?;
     let wall = MeshSurface(&surface.world);
-    let mut planned = Planned { layers: Vec::with_capacity(layers.len()), seconds: 0.0, abandoned: 0.0 };
+    let mut planned = Planned { layers: Vec::with_capacity(layers.len()), seconds: 0.0, unreachable_paint: 0.0 };
     for (k, layer) in layers.iter().enumerate() {
         stage.share(k as f64 / layers.len() as f64);
         let strokes = boustrophedon(&layer.sprays, &StrokeSettings::default())?;
         let route = route(surface, &strokes, &kernel, settings.limits.along);
         if route.targets.len() < 2 {
-            planned.abandoned += route.lost;
+            planned.unreachable_paint += route.lost;
             continue;
         }
         let start = planned.layers.last().and_then(|(_, plan, _)| plan.waypoints.last()).map(|w| w.state);
@@ -47,7 +47,7 @@ pub(super) fn plan(
         let clock = Instant::now();
         let plan = match OptimalPlanner::default().plan(&route.targets, &wall, robot, &here) {
             Err(Error::NothingReachable { .. }) => {
-                planned.abandoned += route.paint() + route.lost;
+                planned.unreachable_paint += route.paint() + route.lost;
                 continue;
             }
             plan => plan?,

@@ -22,7 +22,7 @@ use crate::progress::Stage;
 use crate::surface::PaintSurface;
 
 /// A mission is given up when more of the wanted paint than this is out of reach.
-const MOST_OUT_OF_REACH: f64 = 0.9;
+const MAX_UNREACHABLE_SHARE: f64 = 0.9;
 
 /// Everything a mission made; what the report, the pictures and the recording are drawn from.
 pub struct Mission {
@@ -40,7 +40,7 @@ pub struct Mission {
     pub(super) pixels: Vec<usize>,
     pub(super) planning: f64,
     /// Paint of layers that no pose of the robot can spray at all, m³.
-    pub(super) abandoned: f64,
+    pub(super) unreachable_paint: f64,
     pub(super) started: Instant,
 }
 
@@ -69,7 +69,7 @@ impl Mission {
         }
         let layers = decide(&surface, &wanted, &coverage, &appearance, &settings)?;
         let planned = plan(&layers, &surface, &robot, &settings)?;
-        let (planning, abandoned) = (planned.seconds, planned.abandoned);
+        let (planning, unreachable_paint) = (planned.seconds, planned.unreachable_paint);
         let flights = fly(planned, &surface, &robot, &settings)?;
         let (film, pixels) = spray(&flights, &surface, &settings)?;
 
@@ -86,14 +86,19 @@ impl Mission {
             film,
             pixels,
             planning,
-            abandoned,
+            unreachable_paint,
             started,
         };
         let share = mission.share_out_of_reach();
-        if share > MOST_OUT_OF_REACH {
+        if share > MAX_UNREACHABLE_SHARE {
             return Err(MissionError::OutOfReach { percent: 100.0 * share });
         }
         Ok(mission)
+    }
+
+    /// The layers, in the order in which they were flown.
+    pub fn flights(&self) -> &[LayerFlight] {
+        &self.flights
     }
 
     /// Paint depth per pixel as it came out, 0 beside the surface.
@@ -121,7 +126,7 @@ impl Mission {
 
     /// Share of the decided paint that was not planned: no surface below the spray, or no pose of the robot.
     pub(super) fn share_out_of_reach(&self) -> f64 {
-        let (mut planned, mut wanted) = (0.0, self.abandoned);
+        let (mut planned, mut wanted) = (0.0, self.unreachable_paint);
         for f in &self.flights {
             wanted += f.route.lost + f.route.paint();
             planned += (0..f.route.targets.len()).map(|k| f.plan.volume(k)).sum::<f64>();

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use clap::ValueEnum;
-use paint_net::{ColourPainting, ColourTask, Coloured, Error, Image, Paint, Palette, Picture, Spray, metrics};
+use paint_net::{
+    ColourImage, ColourPainting, ColourProblem, ColourSeparation, Error, Image, Paint, Palette, Spray, metrics,
+};
 use paint_sim::colour::lab;
 use serde::Serialize;
 
@@ -15,6 +17,7 @@ use super::ink::{ink_of, ssim};
 use super::job::Job;
 use super::progress_strip::save_progress_strip;
 use crate::pictures::{Rgb, save_error_map};
+use crate::report::check_finite;
 
 /// Which glazes are in the guns, on a white wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -81,7 +84,7 @@ pub struct ColourFigures {
 }
 
 /// Reads a picture of any size and depth; transparency shows the white wall.
-pub fn read_picture(path: &Path) -> Result<Picture, PaintImageError> {
+pub fn read_picture(path: &Path) -> Result<ColourImage, PaintImageError> {
     let unreadable = |why: String| PaintImageError::Unreadable { path: path.display().to_string(), why };
     let picture = image::open(path).map_err(|e| unreadable(format!("cannot be read as a picture ({e})")))?.to_rgba32f();
     let over_white = |p: &image::Rgba<f32>| {
@@ -89,11 +92,11 @@ pub fn read_picture(path: &Path) -> Result<Picture, PaintImageError> {
         [r, g, b].map(|v| (a * v + 1.0 - a).clamp(0.0, 1.0))
     };
     let (width, height) = (picture.width() as usize, picture.height() as usize);
-    Picture::new(width, height, picture.pixels().map(over_white).collect()).map_err(|e| unreadable(e.to_string()))
+    ColourImage::new(width, height, picture.pixels().map(over_white).collect()).map_err(|e| unreadable(e.to_string()))
 }
 
 /// Peak signal-to-noise ratio, and mean and 95th percentile of CIEDE2000; both pictures in sRGB as stored.
-pub fn compare_colours(painted: &Picture, wanted: &Picture) -> (f64, f64, f64) {
+pub fn compare_colours(painted: &ColourImage, wanted: &ColourImage) -> (f64, f64, f64) {
     let pairs = painted.data().iter().zip(wanted.data());
     let squared: f64 = pairs.flat_map(|(a, b)| a.iter().zip(b)).map(|(a, b)| (a - b).powi(2)).sum();
     let mut differences = differences(painted, wanted);
@@ -107,17 +110,17 @@ fn byte(stored: f64) -> u8 {
     (255.0 * stored.clamp(0.0, 1.0)).round() as u8
 }
 
-fn rgb(picture: &Picture) -> Rgb {
+fn rgb(picture: &ColourImage) -> Rgb {
     Rgb::from_pixels(picture.width(), picture.height(), picture.data().iter().map(|c| c.map(byte)))
 }
 
 /// CIEDE2000 of every pixel.
-fn differences(painted: &Picture, wanted: &Picture) -> Vec<f64> {
+fn differences(painted: &ColourImage, wanted: &ColourImage) -> Vec<f64> {
     let pairs = painted.data().iter().zip(wanted.data());
     pairs.map(|(a, b)| paint_sim::ciede2000(lab_of(*a), lab_of(*b))).collect()
 }
 
-fn ink(picture: &Picture) -> Result<Image, Error> {
+fn ink(picture: &ColourImage) -> Result<Image, Error> {
     Image::new(picture.width(), picture.height(), picture.data().iter().map(|c| ink_of(*c)).collect())
 }
 
@@ -135,16 +138,16 @@ fn lab_of(stored: [f64; 3]) -> [f64; 3] {
 /// Decides the sprays of every paint for a wanted picture.
 pub fn paint_colours(
     job: &Job,
-    wanted: &Picture,
+    wanted: &ColourImage,
     palette: &Palette,
     progress: &mut dyn FnMut(f64),
 ) -> Result<(ColourPainting, ColourFigures), PaintImageError> {
     let timer = CpuTimer::start(1);
-    let task = ColourTask::new(wanted);
-    let painting = Coloured::default().paint(&task, palette, &job.kernel, &job.limits, progress)?;
+    let problem = ColourProblem::new(wanted, palette).with_kernel(&job.kernel).with_limits(&job.limits);
+    let painting = ColourSeparation::default().paint_observed(&problem, &mut |share| progress(share))?;
     let cpu_ms = timer.milliseconds();
-    let (psnr_db, ciede2000_mean, ciede2000_p95) = compare_colours(&painting.picture, wanted);
-    let (painted_ink, wanted_ink) = (ink(&painting.picture)?, ink(wanted)?);
+    let (psnr_db, ciede2000_mean, ciede2000_p95) = compare_colours(&painting.image, wanted);
+    let (painted_ink, wanted_ink) = (ink(&painting.image)?, ink(wanted)?);
     let figures = ColourFigures {
         painter: "coloured",
         width: wanted.width(),
@@ -160,20 +163,16 @@ pub fn paint_colours(
         cpu_ms,
         threads: 1,
     };
-    let ColourFigures { ssim, bce_nats_per_px, volume_total, .. } = figures;
-    let numbers = [psnr_db, ssim, bce_nats_per_px, ciede2000_mean, ciede2000_p95, volume_total];
-    if numbers.iter().any(|f| !f.is_finite()) {
-        return Err(PaintImageError::NotFinite("report"));
-    }
+    check_finite(&figures)?;
     Ok((painting, figures))
 }
 
-/// Writes `commands.json`, `commands.mcap`, `rendered.png`, `error.png` (CIEDE2000 of every pixel), `film.png` and
+/// Writes `commands.json`, `commands.mcap`, `rendered.png`, `error.png` (CIEDE2000 of every pixel), `progress.png` and
 /// `report.json`.
 pub fn save_colours(
     job: &Job,
     folder: &Path,
-    wanted: &Picture,
+    wanted: &ColourImage,
     palette: &Palette,
     painting: &ColourPainting,
     figures: &ColourFigures,
@@ -183,17 +182,17 @@ pub fn save_colours(
     let sprays: Vec<_> = painting.sprays.iter().enumerate().flat_map(of_paint).collect();
     let model = serde_json::json!({
         "colour": "Kubelka-Munk film of the depths sum of volume * exp(-d^2 / (2 sigma_px^2)) over the wall",
-        "wall": palette.wall(), "cut_sigma": job.kernel.cut(),
+        "wall": palette.substrate(), "cut_sigma": job.kernel.cut(),
         "absorption": palette.paints().iter().map(|p| p.absorption).collect::<Vec<_>>(),
         "scattering": palette.paints().iter().map(|p| p.scattering).collect::<Vec<_>>(),
     });
     let names: Vec<_> = palette.paints().iter().map(|p| p.name.as_str()).collect();
     commands::save(folder, (figures.width, figures.height), &model, &names, &sprays)?;
     write_json(&folder.join("report.json"), figures)?;
-    rgb(&painting.picture).save(&folder.join("rendered.png"))?;
-    let map: Vec<_> = differences(&painting.picture, wanted).into_iter().map(Some).collect();
+    rgb(&painting.image).save(&folder.join("rendered.png"))?;
+    let map: Vec<_> = differences(&painting.image, wanted).into_iter().map(Some).collect();
     save_error_map(&folder.join("error.png"), figures.width, &map, (1.0, "px"))?;
     let paints: Vec<&[Spray]> = painting.sprays.iter().map(Vec::as_slice).collect();
     let show = |depths: &[f64]| palette.colour(depths).map(byte);
-    save_progress_strip(&folder.join("film.png"), rgb(wanted), &paints, &job.kernel, &show)
+    save_progress_strip(&folder.join("progress.png"), rgb(wanted), &paints, &job.kernel, &show)
 }

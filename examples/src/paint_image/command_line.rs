@@ -138,7 +138,7 @@ pub(super) struct Training {
     /// Checkpoint to go on from
     #[arg(long, value_name = "FILE")]
     pub(super) resume: Option<PathBuf>,
-    /// Folder for the weights, the checkpoint, the curve and the film
+    /// Folder for the weights, the checkpoint, the curve and the rollout picture
     #[arg(long, value_name = "DIR", default_value = "out/training")]
     pub(super) out: PathBuf,
 }

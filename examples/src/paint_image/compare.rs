@@ -1,7 +1,9 @@
+//! All painters on the same pictures, in one table.
+
 use std::fmt::Write;
 use std::path::Path;
 
-use paint_net::{Image, Painting, Sharing};
+use paint_net::{Image, LayerPlanning, Painting};
 use serde::Serialize;
 
 use super::error::PaintImageError;
@@ -38,7 +40,7 @@ pub fn compare(job: &Job, pictures: &[Image], runs: usize, folder: &Path) -> Res
     let mut jobs: Vec<Job> = PainterKind::WITHOUT_WEIGHTS.map(|painter| Job { painter, ..job.clone() }).to_vec();
     if job.thesis.is_some() {
         // As the thesis has it: in layers, each planned by itself; and the whole picture at once.
-        let layers = [None, Some(Sharing::Sequential)];
+        let layers = [None, Some(LayerPlanning::Sequential)];
         jobs.extend(layers.map(|layers| Job { painter: PainterKind::Thesis, layers, ..job.clone() }));
     }
     let mut rows = Vec::with_capacity(jobs.len());

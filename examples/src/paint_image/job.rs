@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use clap::ValueEnum;
-use paint_net::thesis::{Network, Thesis};
+use paint_net::thesis::{Network, ThesisPainter};
 use paint_net::{
-    Coats, Deconvolution, Feedback, FreeSplats, Image, Layered, Limits, MatchingPursuit, Painter, Painting, Route,
-    Saturation, Sharing, SlewLimited, SprayKernel, Task, metrics, slew_violations,
+    ClosedLoopPainter, Deconvolution, Feedback, FreeSprays, Image, LayerPlanning, Layered, Limits, MatchingPursuit,
+    PaintProblem, Painter, Painting, ScanOrder, SlewLimited, SprayKernel, metrics, slew_violations,
 };
 use serde::Serialize;
 
@@ -16,6 +16,7 @@ use super::error::PaintImageError;
 use super::files::write_json;
 use super::ink::{colour_difference, error_map, grey, level, ssim};
 use super::progress_strip::save_progress_strip;
+use crate::report::check_finite;
 
 /// Who decides the sprays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -23,13 +24,13 @@ pub enum PainterKind {
     /// The network with feedback from its canvas.
     Feedback,
     /// The same in three coats, each of which stays on the wall.
-    Coats,
+    ClosedLoop,
     /// Projected L-BFGS.
     Deconvolution,
     /// Greedy matching pursuit.
     Pursuit,
     /// Few sprays at free places, of free spreads.
-    Splats,
+    FreeSprays,
     /// The thesis' network; needs weights.
     Thesis,
 }
@@ -37,15 +38,15 @@ pub enum PainterKind {
 impl PainterKind {
     /// All that need no weights.
     pub const WITHOUT_WEIGHTS: [Self; 5] =
-        [Self::Feedback, Self::Coats, Self::Deconvolution, Self::Pursuit, Self::Splats];
+        [Self::Feedback, Self::ClosedLoop, Self::Deconvolution, Self::Pursuit, Self::FreeSprays];
 
     fn name(self) -> &'static str {
         match self {
             Self::Feedback => "feedback",
-            Self::Coats => "coats",
+            Self::ClosedLoop => "closed-loop",
             Self::Deconvolution => "deconvolution",
             Self::Pursuit => "pursuit",
-            Self::Splats => "splats",
+            Self::FreeSprays => "free-sprays",
             Self::Thesis => "thesis",
         }
     }
@@ -63,11 +64,11 @@ pub struct Job {
     /// Where sprays may lie.
     pub limits: Limits,
     /// Largest change of volume from one cell of the path to the next; `None` for any.
-    pub largest_change: Option<f64>,
+    pub slew_limit: Option<f64>,
     /// The path for which that holds.
-    pub route: Route,
+    pub order: ScanOrder,
     /// Whether to paint in layers, a base coat first, and how they share the paint (thesis, Paper IV, section 3.2).
-    pub layers: Option<Sharing>,
+    pub layers: Option<LayerPlanning>,
     /// Threads of the network.
     pub threads: usize,
     /// The thesis' network, if there is one.
@@ -117,21 +118,21 @@ impl Job {
         let feedback = || Feedback::shipped().map(|f| Feedback { passes: self.passes, threads: self.threads, ..f });
         let painter: Box<dyn Painter> = match self.painter {
             PainterKind::Feedback => Box::new(feedback()?),
-            PainterKind::Coats => Box::new(Coats::new(feedback()?)),
+            PainterKind::ClosedLoop => Box::new(ClosedLoopPainter::new(feedback()?)),
             PainterKind::Deconvolution => Box::new(Deconvolution::default()),
             PainterKind::Pursuit => Box::new(MatchingPursuit::default()),
-            PainterKind::Splats => Box::new(FreeSplats {
-                sprays: self.limits.max_sprays.unwrap_or(FreeSplats::default().sprays),
-                ..FreeSplats::default()
+            PainterKind::FreeSprays => Box::new(FreeSprays {
+                sprays: self.limits.max_sprays.unwrap_or(FreeSprays::default().sprays),
+                ..FreeSprays::default()
             }),
             PainterKind::Thesis => {
                 let none =
                     || PaintImageError::Settings("the painter thesis needs a network: give --weights".to_string());
-                Box::new(Thesis { network: self.thesis.clone().ok_or_else(none)? })
+                Box::new(ThesisPainter { network: self.thesis.clone().ok_or_else(none)? })
             }
         };
         Ok(match self.layers {
-            Some(sharing) => Box::new(Layered { sharing, ..Layered::new(painter) }),
+            Some(planning) => Box::new(Layered { planning, ..Layered::new(painter) }),
             None => painter,
         })
     }
@@ -140,20 +141,21 @@ impl Job {
     pub fn paint(&self, wanted: &Image, progress: &mut dyn FnMut(f64)) -> Result<(Painting, Figures), PaintImageError> {
         let painter = self.painter()?;
         let timer = CpuTimer::start(self.threads);
-        let task = Task::on_bare_wall(wanted);
-        let (kernel, ink, limits) = (&self.kernel, &Saturation::Tanh, &self.limits);
-        let (painting, slew_violations) = match self.largest_change {
-            None => (painter.paint(&task, kernel, ink, limits, progress)?, 0),
-            Some(most) => {
-                let slow = SlewLimited { route: self.route, ..SlewLimited::new(painter, most) };
-                let (waypoints, painting) = slow.fly(&task, kernel, ink, limits, progress)?;
-                (painting, slew_violations(&waypoints, most))
+        let problem = PaintProblem::new(wanted).with_kernel(&self.kernel).with_limits(&self.limits);
+        let mut observer = |share| progress(share);
+        let (painting, slew_violations) = match self.slew_limit {
+            None => (painter.paint_observed(&problem, &mut observer)?, 0),
+            Some(limit) => {
+                let slow = SlewLimited { order: self.order, ..SlewLimited::new(painter, limit) };
+                let painting = slow.paint_observed(&problem, &mut observer)?;
+                let violations = slew_violations(&painting.waypoints, limit);
+                (painting, violations)
             }
         };
         let cpu_ms = timer.milliseconds();
         let passes = match self.painter {
-            PainterKind::Feedback | PainterKind::Coats => self.passes,
-            PainterKind::Deconvolution | PainterKind::Pursuit | PainterKind::Splats | PainterKind::Thesis => 0,
+            PainterKind::Feedback | PainterKind::ClosedLoop => self.passes,
+            PainterKind::Deconvolution | PainterKind::Pursuit | PainterKind::FreeSprays | PainterKind::Thesis => 0,
         };
         let figures = Figures {
             painter: self.name(),
@@ -170,14 +172,11 @@ impl Job {
             cpu_ms,
             threads: self.threads,
         };
-        let numbers = [figures.psnr_db, figures.ssim, figures.bce_nats_per_px, figures.ciede2000_mean, cpu_ms];
-        if numbers.iter().any(|f| !f.is_finite()) {
-            return Err(PaintImageError::NotFinite("report"));
-        }
+        check_finite(&figures)?;
         Ok((painting, figures))
     }
 
-    /// Writes `commands.json`, `commands.mcap`, `rendered.png`, `error.png`, `film.png` and `report.json`.
+    /// Writes `commands.json`, `commands.mcap`, `rendered.png`, `error.png`, `progress.png` and `report.json`.
     pub fn save(
         &self,
         folder: &Path,
@@ -195,6 +194,6 @@ impl Job {
         grey(&painting.ink).save(&folder.join("rendered.png"))?;
         error_map(&painting.ink, wanted).save(&folder.join("error.png"))?;
         let show = |depths: &[f64]| [level(depths[0].tanh()); 3];
-        save_progress_strip(&folder.join("film.png"), grey(wanted), &[&painting.sprays], &self.kernel, &show)
+        save_progress_strip(&folder.join("progress.png"), grey(wanted), &[&painting.sprays], &self.kernel, &show)
     }
 }

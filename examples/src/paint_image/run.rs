@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use paint_net::procedural::Texture;
-use paint_net::thesis::{Objective, Shape};
+use paint_net::thesis::{Architecture, Objective};
 use paint_net::train::{ThesisSettings, TrainSettings};
-use paint_net::{Image, Limits, Route, Sharing, SprayKernel};
+use paint_net::{Image, LayerPlanning, Limits, ScanOrder, SprayKernel};
 
 use super::colour::{Glazes, paint_colours, read_picture, save_colours};
 use super::command_line::{Arguments, Command, Nozzle, Preset, RouteName, SharingName, Training};
@@ -82,7 +82,7 @@ fn run_training(training: Training) -> Result<(), PaintImageError> {
     let Training { preset, data, seed, steps, until, batch, rate, last_rate, as_printed, latent_weight, .. } = training;
     let Training { threads, resume, out, .. } = training;
     create(&out)?;
-    let (shape, pictures) = match preset {
+    let (architecture, pictures) = match preset {
         Preset::Painter => {
             let preset = TrainSettings::default();
             let settings = TrainSettings {
@@ -98,13 +98,13 @@ fn run_training(training: Training) -> Result<(), PaintImageError> {
             return Ok(());
         }
         // The command line requires the data.
-        Preset::ThesisMnist => (Shape::MNIST, TrainingImages::Digits(data.unwrap_or_default())),
-        Preset::ThesisPaint => (Shape::PAINT, TrainingImages::Patches),
+        Preset::ThesisMnist => (Architecture::MNIST, TrainingImages::Digits(data.unwrap_or_default())),
+        Preset::ThesisPaint => (Architecture::PAINT, TrainingImages::Patches),
     };
     let preset = ThesisSettings::default();
     let settings = ThesisSettings {
         seed,
-        shape,
+        architecture,
         threads,
         steps: steps.unwrap_or(preset.steps),
         batch: batch.unwrap_or(preset.batch),
@@ -134,14 +134,14 @@ fn job(painter: PainterKind, nozzle: &Nozzle) -> Result<Job, PaintImageError> {
             max_sprays: nozzle.max_sprays,
             ..Limits::default()
         },
-        largest_change: nozzle.largest_change,
-        route: match nozzle.route {
-            Some(RouteName::Alike) => Route::Alike,
-            Some(RouteName::Rows) | None => Route::Rows,
+        slew_limit: nozzle.largest_change,
+        order: match nozzle.route {
+            Some(RouteName::Alike) => ScanOrder::ContextBased,
+            Some(RouteName::Rows) | None => ScanOrder::Boustrophedon,
         },
         layers: nozzle.layers.map(|sharing| match sharing {
-            SharingName::Joint => Sharing::Joint,
-            SharingName::Sequential => Sharing::Sequential,
+            SharingName::Joint => LayerPlanning::Joint,
+            SharingName::Sequential => LayerPlanning::Sequential,
         }),
         threads: nozzle.threads.unwrap_or(1),
         thesis: nozzle.weights.as_deref().map(read_network).transpose()?,

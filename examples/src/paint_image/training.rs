@@ -1,7 +1,6 @@
 //! Training of the networks.
 
 mod digits;
-mod gzip;
 mod painter;
 mod rollout;
 mod thesis;

@@ -1,3 +1,5 @@
+//! Pictures side by side with captions.
+
 use std::path::Path;
 
 use image::RgbImage;

@@ -1,3 +1,5 @@
+//! Curves over a common horizontal axis.
+
 use std::path::Path;
 
 use plotters::prelude::*;

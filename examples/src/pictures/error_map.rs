@@ -1,3 +1,5 @@
+//! A map of errors in colours, with its colour bar.
+
 use std::path::Path;
 
 use plotters::prelude::*;

@@ -1,3 +1,5 @@
+//! Paths in two planes, at one scale.
+
 use std::path::Path;
 
 use plotters::prelude::*;

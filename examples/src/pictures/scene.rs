@@ -1,3 +1,5 @@
+//! Lines in a rendered scene, hidden where the scene is in front.
+
 use std::path::Path;
 
 use nalgebra::Point3;

@@ -36,7 +36,7 @@ impl ScanFlight {
     /// The robot starts at rest at a place that is known, as at a charging station: position and heading of the first
     /// estimate are set to the truth. Everything after that is its own.
     pub fn fly(mesh: &TriangleMesh, seed: u64, threads: usize) -> Result<Self, ScanFlightError> {
-        let stage = Stage::start("survey");
+        let stage = Stage::start("scan flight");
         let surface = TriangleSurface::new(&mesh.positions, &mesh.faces)?;
         let route = along(mesh)?;
         let sensor = SimulatedCamera::new(mesh, &surface, route.towards, seed, threads);

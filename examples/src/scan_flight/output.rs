@@ -7,29 +7,32 @@ use paint_sim::{Camera, Hit, Lights, Shading, TriangleSurface, render};
 use vio_ekf::Trajectory;
 
 use super::fly::ScanFlight;
-use crate::mesh_io::write_ply;
+use crate::mesh_io::{PlyMesh, write_ply};
 use crate::mission::MissionError;
 use crate::pictures::{Polyline, Rgb, Scene, save_scene};
+use crate::report::{ReportError, check_finite};
 
 /// Size of the picture, pixels.
 const VIEW: (u32, u32) = (1400, 900);
 
-/// Writes `survey.json`, `survey.png`, `survey.ply` and both trajectories into an existing folder.
+/// Writes `scan_flight.json`, `scan_flight.png`, `scan_flight.ply` and both trajectories into an existing folder.
 pub fn save(scan: &ScanFlight, folder: &Path) -> Result<(), MissionError> {
     let write = |name: &str, text: String| {
         let path = folder.join(name);
         std::fs::write(&path, text)
             .map_err(|source| MissionError::Unwritable { path: path.display().to_string(), source })
     };
-    write("survey_true.tum", vio_ekf::tum::write(&scan.flown))?;
-    write("survey_estimated.tum", vio_ekf::tum::write(&scan.estimated))?;
-    let ply = folder.join("survey.ply");
-    let grey = vec![[180; 3]; scan.mesh.positions.len()];
-    write_ply(&ply, &scan.mesh.positions, &scan.mesh.faces, &grey)
+    write("scan_flight_true.tum", vio_ekf::tum::write(&scan.flown))?;
+    write("scan_flight_estimated.tum", vio_ekf::tum::write(&scan.estimated))?;
+    let ply = folder.join("scan_flight.ply");
+    let (positions, faces) = (&scan.mesh.positions, &scan.mesh.faces);
+    let grey = vec![[180; 3]; positions.len()];
+    write_ply(&ply, &PlyMesh { positions, normals: None, colours: &grey, faces })
         .map_err(|source| MissionError::Unwritable { path: ply.display().to_string(), source })?;
-    save_picture(scan, &folder.join("survey.png"))?;
-    let figures = serde_json::to_string_pretty(&scan.figures).map_err(crate::report::ReportError::from)?;
-    write("survey.json", figures + "\n")
+    save_picture(scan, &folder.join("scan_flight.png"))?;
+    check_finite(&scan.figures)?;
+    let figures = serde_json::to_string_pretty(&scan.figures).map_err(ReportError::from)?;
+    write("scan_flight.json", figures + "\n")
 }
 
 /// The map with the way that was flown (blue) and the way that was estimated (orange), from behind the robot's shoulder.

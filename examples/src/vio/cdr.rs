@@ -1,93 +1,152 @@
-//! As much of the encoding of ROS 2 messages (CDR) as images and inertial samples need.
+//! ROS 2 messages in CDR: images and inertial samples, read in either byte order, written in little endian.
 
+use byteorder::{BigEndian, LittleEndian};
+use cdr_encoding::{from_bytes, to_writer};
+use serde::{Deserialize, Serialize};
 use vio_ekf::Stamp;
 
-/// Reads values one after the other; `None` at the end of the bytes.
-pub(super) struct Cdr<'a> {
-    /// After the four bytes that name the encoding: alignment counts from here.
-    bytes: &'a [u8],
-    at: usize,
-    little: bool,
+/// `std_msgs/Header`.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Header {
+    seconds: i32,
+    nanos: u32,
+    pub(super) frame_id: String,
 }
 
-impl<'a> Cdr<'a> {
-    pub(super) fn new(bytes: &'a [u8]) -> Option<Self> {
-        let (head, body) = bytes.split_at_checked(4)?;
-        // The plain encoding only: 0 for big, 1 for little endian.
-        (head[0] == 0 && head[1] <= 1).then_some(Self { bytes: body, at: 0, little: head[1] == 1 })
+impl Header {
+    pub(super) fn new(stamp: Stamp, frame_id: &str) -> Self {
+        let nanos = stamp.nanos();
+        let (seconds, nanos) = (nanos.div_euclid(1_000_000_000) as i32, nanos.rem_euclid(1_000_000_000) as u32);
+        Self { seconds, nanos, frame_id: frame_id.into() }
     }
 
-    fn take(&mut self, count: usize) -> Option<&'a [u8]> {
-        let end = self.at.checked_add(count)?;
-        let bytes = self.bytes.get(self.at..end)?;
-        self.at = end;
-        Some(bytes)
+    pub(super) fn stamp(&self) -> Stamp {
+        Stamp::from_nanos(i64::from(self.seconds) * 1_000_000_000 + i64::from(self.nanos))
     }
+}
 
-    /// A number of `N` bytes, which lies at a multiple of `N`, in little endian.
-    fn scalar<const N: usize>(&mut self) -> Option<[u8; N]> {
-        self.at = self.at.checked_next_multiple_of(N)?;
-        let mut bytes: [u8; N] = self.take(N)?.try_into().ok()?;
-        if !self.little {
-            bytes.reverse();
-        }
-        Some(bytes)
-    }
+/// `sensor_msgs/Image`.
+#[derive(Deserialize)]
+pub(super) struct Image<'a> {
+    pub(super) header: Header,
+    pub(super) height: u32,
+    pub(super) width: u32,
+    pub(super) encoding: String,
+    _is_bigendian: u8,
+    pub(super) step: u32,
+    #[serde(borrow)]
+    pub(super) data: &'a [u8],
+}
 
-    pub(super) fn byte(&mut self) -> Option<u8> {
-        self.scalar::<1>().map(|[byte]| byte)
-    }
+/// `sensor_msgs/CompressedImage`.
+#[derive(Deserialize)]
+pub(super) struct CompressedImage<'a> {
+    pub(super) header: Header,
+    _format: String,
+    #[serde(borrow)]
+    pub(super) data: &'a [u8],
+}
 
-    pub(super) fn u32(&mut self) -> Option<u32> {
-        self.scalar().map(u32::from_le_bytes)
-    }
+/// `sensor_msgs/Imu`; covariances row by row.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Imu {
+    pub(super) header: Header,
+    /// x, y, z, w.
+    pub(super) orientation: [f64; 4],
+    pub(super) orientation_covariance: [f64; 9],
+    pub(super) angular_velocity: [f64; 3],
+    pub(super) angular_velocity_covariance: [f64; 9],
+    pub(super) linear_acceleration: [f64; 3],
+    pub(super) linear_acceleration_covariance: [f64; 9],
+}
 
-    pub(super) fn f64s<const N: usize>(&mut self) -> Option<[f64; N]> {
-        let mut values = [0.0; N];
-        for value in &mut values {
-            *value = f64::from_le_bytes(self.scalar()?);
-        }
-        Some(values)
-    }
+/// A message of these bytes; `None` if they end too early, or are encoded otherwise than in plain CDR.
+pub(super) fn decode<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Option<T> {
+    // The encapsulation header: plain CDR in big (0) or little endian (1), two bytes of options. Alignment counts after it.
+    let (head, body) = bytes.split_first_chunk::<4>()?;
+    let message = match head[..2] {
+        [0, 0] => from_bytes::<T, BigEndian>(body),
+        [0, 1] => from_bytes::<T, LittleEndian>(body),
+        _ => return None,
+    };
+    message.ok().map(|(message, _)| message)
+}
 
-    pub(super) fn blob(&mut self) -> Option<&'a [u8]> {
-        let count = self.u32()? as usize;
-        self.take(count)
-    }
-
-    pub(super) fn string(&mut self) -> Option<&'a str> {
-        let bytes = self.blob()?;
-        std::str::from_utf8(bytes.strip_suffix(&[0]).unwrap_or(bytes)).ok()
-    }
-
-    /// `std_msgs/Header`: time and frame.
-    pub(super) fn header(&mut self) -> Option<(Stamp, &'a str)> {
-        let seconds = i64::from(i32::from_le_bytes(self.scalar()?));
-        let nanos = i64::from(self.u32()?);
-        Some((Stamp::from_nanos(seconds * 1_000_000_000 + nanos), self.string()?))
-    }
+/// The bytes of a message.
+pub(super) fn encode(message: &impl Serialize) -> cdr_encoding::Result<Vec<u8>> {
+    let mut bytes = vec![0, 1, 0, 0];
+    to_writer::<_, LittleEndian, _>(&mut bytes, message)?;
+    Ok(bytes)
 }
 
 #[cfg(test)]
 mod tests {
+    use rand_xoshiro::SplitMix64;
+    use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
+
     use super::*;
 
-    /// A header, a byte and a number, in both orders of bytes: from the rules of the encoding, not from our writer.
+    type Message = (Header, u8, f64);
+
+    /// A header, a byte and a number, in both orders of bytes: from the rules of the encoding, not from a writer.
     #[test]
     fn both_byte_orders_are_read_and_alignment_counts_from_the_fifth_byte() {
         // The number lies at the sixteenth byte of the body, the twentieth of all: no padding, if counted rightly.
         let text = [b'a', b'b', 0, 5];
         let little = [&[0, 1, 0, 0, 7, 0, 0, 0, 9, 0, 0, 0, 3, 0, 0, 0], &text[..], &1.5_f64.to_le_bytes()].concat();
         let big = [&[0, 0, 0, 0, 0, 0, 0, 7, 0, 0, 0, 9, 0, 0, 0, 3], &text[..], &1.5_f64.to_be_bytes()].concat();
-        for bytes in [little, big] {
-            let mut cdr = Cdr::new(&bytes).unwrap_or_else(|| panic!("no encoding"));
-            assert_eq!(cdr.header(), Some((Stamp::from_nanos(7_000_000_009), "ab")));
-            assert_eq!(cdr.byte(), Some(5));
-            assert_eq!(cdr.f64s::<1>().map(|[v]| v), Some(1.5));
-            assert_eq!(cdr.byte(), None);
+        let header = Header::new(Stamp::from_nanos(7_000_000_009), "ab");
+        assert_eq!(header.stamp(), Stamp::from_nanos(7_000_000_009));
+        let expected = (header, 5, 1.5);
+        for bytes in [&little, &big] {
+            assert_eq!(decode::<Message>(bytes).as_ref(), Some(&expected));
+            for cut in 0..bytes.len() {
+                assert_eq!(decode::<Message>(&bytes[..cut]), None, "cut at {cut}");
+            }
         }
-        assert!(Cdr::new(&[0, 3, 0, 0]).is_none() && Cdr::new(&[0]).is_none());
-        // A length beyond the end.
-        assert_eq!(Cdr::new(&[0, 1, 0, 0, 255, 255, 255, 255, 1]).and_then(|mut cdr| cdr.string()), None);
+        assert_eq!(encode(&expected).unwrap(), little);
+        // Before 1970 the seconds are rounded down.
+        let early = Stamp::from_nanos(-1);
+        assert_eq!((Header::new(early, "").seconds, Header::new(early, "").stamp()), (-1, early));
+    }
+
+    /// Changed at random, a message is read or refused.
+    #[test]
+    fn damaged_messages_do_no_harm() {
+        let header = Header::new(Stamp::from_nanos(3_000_000_007), "camera");
+        let image = encode(&(header, 2_u32, 3_u32, "mono8", 0_u8, 3_u32, vec![9_u8; 6])).unwrap();
+        let read: Image = decode(&image).unwrap();
+        assert_eq!(
+            (read.height, read.width, read.step, read.encoding.as_str(), read.data),
+            (2, 3, 3, "mono8", &[9; 6][..])
+        );
+        let mut random = SplitMix64::seed_from_u64(7);
+        let mut refused = 0;
+        for _ in 0..3000 {
+            let mut bytes = image.clone();
+            for _ in 0..=random.next_u64() % 3 {
+                let at = (random.next_u64() % bytes.len() as u64) as usize;
+                bytes[at] = random.next_u64() as u8;
+            }
+            refused += usize::from(decode::<Image>(&bytes).is_none());
+            let _ = decode::<CompressedImage>(&bytes);
+            let _ = decode::<Imu>(&bytes);
+        }
+        assert!(refused > 300, "only {refused} refused");
+    }
+
+    #[test]
+    fn other_encodings_and_absurd_lengths_are_refused() {
+        // Parameter lists, XCDR2, nothing.
+        for head in [&[0, 3, 0, 0][..], &[0, 7, 0, 0], &[1, 0, 0, 0], &[0]] {
+            assert_eq!(decode::<u8>(&[head, &[5]].concat()), None, "{head:?}");
+        }
+        assert_eq!(decode::<u8>(&[0, 1, 0, 0, 5]), Some(5));
+        // Four gigabytes of text, of pixels.
+        let length = [0, 1, 0, 0, 255, 255, 255, 255, 1];
+        assert_eq!(decode::<String>(&length), None);
+        assert_eq!(decode::<&[u8]>(&length), None);
+        // Text that is no UTF-8.
+        assert_eq!(decode::<String>(&[0, 1, 0, 0, 2, 0, 0, 0, 0xff, 0]), None);
     }
 }

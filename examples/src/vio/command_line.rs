@@ -1,3 +1,5 @@
+//! What `vio` can be told.
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -128,9 +130,9 @@ pub(super) struct Tune {
     /// Evaluations at most
     #[arg(long, default_value_t = 200)]
     pub(super) evaluations: usize,
-    /// How much dishonest covariances cost beside errors
+    /// Weight of inconsistent covariances (NEES off 3) beside position errors
     #[arg(long, value_name = "WEIGHT", default_value_t = 0.5)]
-    pub(super) honesty: f64,
+    pub(super) consistency: f64,
     /// Compare with so many points drawn at random
     #[arg(long, value_name = "NUMBER", default_value_t = 0)]
     pub(super) random: usize,

@@ -1,3 +1,5 @@
+//! Why there is no usable trajectory, and files in and out with that error.
+
 use std::path::Path;
 
 use crate::pictures::PictureError;

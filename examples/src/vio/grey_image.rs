@@ -1,3 +1,5 @@
+//! Grey images from files and messages.
+
 use std::path::Path;
 
 use image::{DynamicImage, ImageReader};

@@ -12,10 +12,12 @@ use foxglove::messages::{
     Vector3 as FoxgloveVector3,
 };
 use vio_ekf::calibration::{CameraCalibration, ImuCalibration};
-use vio_ekf::nalgebra::{Isometry3, Vector3};
+use vio_ekf::nalgebra::Isometry3;
 use vio_ekf::{Distortion, Imu, Stamp};
 
-use super::{GreyImage, VioError};
+use super::cdr;
+use super::error::VioError;
+use super::grey_image::GreyImage;
 
 /// Frames of the sensors.
 pub(super) const IMU_FRAME: &str = "imu";
@@ -117,7 +119,7 @@ impl McapWriter {
 
     /// A sample.
     pub(super) fn imu(&mut self, sample: &Imu) -> Result<(), VioError> {
-        let bytes = imu_cdr(sample, self.noise);
+        let bytes = cdr::encode(&imu_message(sample, self.noise)).map_err(|error| self.failed(&error))?;
         self.bytes(self.imu, sample.stamp, &bytes)
     }
 
@@ -226,27 +228,17 @@ fn quaternion(pose: &Isometry3<f64>) -> Quaternion {
     Quaternion { x: q.i, y: q.j, z: q.k, w: q.w }
 }
 
-/// `sensor_msgs/msg/Imu` in the encoding of ROS 2 (CDR, little endian). The covariances are those of one sample.
-fn imu_cdr(sample: &Imu, [gyro, accel]: [f64; 2]) -> Vec<u8> {
-    let mut bytes = vec![0, 1, 0, 0];
-    let nanos = sample.stamp.nanos();
-    bytes.extend((nanos.div_euclid(1_000_000_000) as i32).to_le_bytes());
-    bytes.extend((nanos.rem_euclid(1_000_000_000) as u32).to_le_bytes());
-    bytes.extend((IMU_FRAME.len() as u32 + 1).to_le_bytes());
-    bytes.extend(IMU_FRAME.as_bytes());
-    bytes.push(0);
-    // Numbers lie at multiples of eight, counted after the first four bytes.
-    bytes.resize(4 + (bytes.len() - 4).next_multiple_of(8), 0);
+/// The message of a sample. The covariances are those of one sample.
+fn imu_message(sample: &Imu, [gyro, accel]: [f64; 2]) -> cdr::Imu {
     let diagonal = |variance: f64| [variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance];
-    // The first covariance of -1 says that there is no orientation.
-    let no_orientation = [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-    let mut put = |values: &[f64]| values.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
-    put(&[0.0, 0.0, 0.0, 1.0]);
-    put(&no_orientation);
-    let axes = |v: &Vector3<f64>| [v.x, v.y, v.z];
-    put(&axes(&sample.gyro));
-    put(&diagonal(gyro));
-    put(&axes(&sample.accel));
-    put(&diagonal(accel));
-    bytes
+    cdr::Imu {
+        header: cdr::Header::new(sample.stamp, IMU_FRAME),
+        orientation: [0.0, 0.0, 0.0, 1.0],
+        // The first covariance of -1 says that there is no orientation.
+        orientation_covariance: [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        angular_velocity: sample.gyro.into(),
+        angular_velocity_covariance: diagonal(gyro),
+        linear_acceleration: sample.accel.into(),
+        linear_acceleration_covariance: diagonal(accel),
+    }
 }

@@ -1,3 +1,5 @@
+//! The pictures of an odometry run.
+
 use std::path::Path;
 
 use vio_ekf::nalgebra::Vector3;

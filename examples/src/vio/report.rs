@@ -19,7 +19,7 @@ pub struct VioReport {
     /// Images that the filter took.
     pub frames: usize,
     /// Those among them that came with one of the second camera.
-    pub pairs: usize,
+    pub stereo_pairs: usize,
     /// Images that were left out.
     pub frames_skipped: usize,
     /// Inertial samples that it took.
@@ -39,7 +39,7 @@ pub struct VioReport {
     /// Median translation error over 10 m of path.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rpe_10m_median_m: Option<f64>,
-    /// Mean normalised squared error of the position: 3 is honest.
+    /// Mean normalised squared error of the position: 3 is consistent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nees_position_mean: Option<f64>,
     /// The same of the attitude.
@@ -57,12 +57,12 @@ pub struct VioReport {
     pub frame_cpu_ms_p99: f64,
     /// Processor time of an inertial sample with output and covariance, median.
     pub imu_cpu_us_median: f64,
-    /// Whether the estimate was given up at any time.
+    /// Whether the filter diverged at any time.
     pub diverged: bool,
-    /// How often the filter was started anew.
+    /// How often the filter was reset.
     pub resets: usize,
     /// Time from the first image to the first pose.
-    pub initialised_after_s: f64,
+    pub initialization_time_s: f64,
     /// Angle between the camera's attitude as estimated and as in the calibration.
     pub extrinsics_error_rad: f64,
     /// Estimated time to add to the camera's stamps to get the inertial sensor's.
@@ -88,7 +88,7 @@ impl VioReport {
         Ok(Self {
             version: env!("CARGO_PKG_VERSION"),
             frames: run.frames,
-            pairs: run.pairs,
+            stereo_pairs: run.pairs,
             frames_skipped: run.skipped.len(),
             imu_samples: run.imu_samples,
             imu_gaps: findings.gaps,
@@ -106,7 +106,7 @@ impl VioReport {
             imu_cpu_us_median: 1e6 * quantile(&run.imu_s, 0.5),
             diverged: !run.lost.is_empty(),
             resets: run.lost.len(),
-            initialised_after_s: run.initialised_after_s,
+            initialization_time_s: run.initialization_time_s,
             extrinsics_error_rad: so3::angle_between(&attitude, &run.calibration.body_from_camera.rotation),
             time_offset_s: run.calibration.time_offset_s,
             threads,
@@ -125,10 +125,10 @@ impl VioReport {
             self.version
         );
         for (stamp, why) in &run.lost {
-            let _ = writeln!(text, "**Given up at {stamp} s**: {why}. Started anew from there.\n");
+            let _ = writeln!(text, "**Diverged at {stamp} s**: {why}. Restarted from there.\n");
         }
         let mut pictures =
-            vec![("trajectory.png", "From above and from the side"), ("state.png", "What the filter thinks")];
+            vec![("trajectory.png", "From above and from the side"), ("state.png", "State of the filter")];
         if evaluated {
             pictures.push(("error.png", "Errors after alignment of position and yaw"));
             pictures.push((
@@ -148,18 +148,18 @@ impl VioReport {
         row("position error, rigid alignment, RMS", metres(self.ate_se3_rmse_m));
         row("position error, position and yaw aligned, RMS", metres(self.ate_yaw_rmse_m));
         row("error over 10 m of path, median", metres(self.rpe_10m_median_m));
-        row("NEES of position (3 is honest)", plain(self.nees_position_mean));
+        row("NEES of position (3 is consistent)", plain(self.nees_position_mean));
         row("NEES of attitude", plain(self.nees_attitude_mean));
         row("NEES of velocity", plain(self.nees_velocity_mean));
         row("share of the truth covered", self.coverage.map(|v| format!("{:.1} %", 100.0 * v)));
-        row("started after", Some(format!("{:.2} s", self.initialised_after_s)));
-        row("started anew", Some(self.resets.to_string()));
+        row("initialization after", Some(format!("{:.2} s", self.initialization_time_s)));
+        row("resets", Some(self.resets.to_string()));
         let frame = format!("{:.2} / {:.2} ms", self.frame_cpu_ms_median, self.frame_cpu_ms_p99);
         row("processor time of an image, median / 99 %", Some(frame));
         row("processor time of an inertial sample with covariance", Some(format!("{:.1} us", self.imu_cpu_us_median)));
         let degrees = self.extrinsics_error_rad.to_degrees();
         row("camera's attitude, estimate against calibration", Some(format!("{degrees:.3} deg")));
-        row("camera's clock behind the inertial sensor's", Some(format!("{:.2} ms", 1e3 * self.time_offset_s)));
+        row("time offset, camera to IMU", Some(format!("{:.2} ms", 1e3 * self.time_offset_s)));
         text.push_str("\nAll figures, in SI units, are in [report.json](report.json); poses in [trajectory.tum](trajectory.tum).\n");
         if !run.skipped.is_empty() {
             let _ = writeln!(text, "\nImages left out; the first of them:\n");

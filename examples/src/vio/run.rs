@@ -16,9 +16,9 @@ use crate::progress::Stage;
 use status_text::{divergence_text, initialization_text};
 
 /// Images that wait for the filter when they are decoded beside it.
-const AHEAD: usize = 4;
+const DECODE_QUEUE: usize = 4;
 /// A gap in the inertial samples, s, after which the motion cannot be carried on.
-const LOST_AFTER: f64 = 0.5;
+const MAX_IMU_GAP: f64 = 0.5;
 
 /// How a recording is run.
 #[derive(Debug, Clone, Copy, Default)]
@@ -56,7 +56,7 @@ pub struct Run {
     /// Inertial samples that it took.
     pub imu_samples: usize,
     /// Seconds from the first image to the first estimate.
-    pub initialised_after_s: f64,
+    pub initialization_time_s: f64,
     /// Why and when it gave up, each time.
     pub lost: Vec<(Stamp, String)>,
     /// Whether it runs at the end.
@@ -74,7 +74,7 @@ pub struct Run {
 /// # Errors
 /// [`VioError`] if the recording cannot be used, or the filter never starts.
 pub fn run(recording: &Recording, settings: &RunSettings) -> Result<Run, VioError> {
-    let mut driver = Driver::new(recording, settings)?;
+    let mut runner = FilterRunner::new(recording, settings)?;
     let stage = (!settings.quiet).then(|| Stage::start("odometry"));
     let total = recording.images.count().max(1) as f64;
     let mut seen = 0.0;
@@ -83,19 +83,19 @@ pub fn run(recording: &Recording, settings: &RunSettings) -> Result<Run, VioErro
         if let Some(stage) = &stage {
             stage.share(seen / total);
         }
-        driver.camera_frame(frame)
+        runner.camera_frame(frame)
     };
     if settings.threads < 2 {
         camera_frames(recording).try_for_each(&mut each)?;
     } else {
         std::thread::scope(|scope| {
-            let (sender, receiver) = sync_channel(AHEAD);
+            let (sender, receiver) = sync_channel(DECODE_QUEUE);
             // Ends by itself when the receiver is dropped.
             scope.spawn(move || camera_frames(recording).try_for_each(|frame| sender.send(frame)));
             receiver.into_iter().try_for_each(&mut each)
         })?;
     }
-    let run = driver.finish()?;
+    let run = runner.finish()?;
     let poses: usize = run.segments.iter().map(|segment| segment.odometry.len()).sum();
     if let Some(stage) = stage {
         stage.done(&format!("{poses} poses of {} images, {} left out", run.frames, run.skipped.len()));
@@ -103,7 +103,7 @@ pub fn run(recording: &Recording, settings: &RunSettings) -> Result<Run, VioErro
     Ok(run)
 }
 
-struct Driver<'a> {
+struct FilterRunner<'a> {
     recording: &'a Recording,
     vio: Vio,
     /// Index of the next inertial sample.
@@ -120,7 +120,7 @@ struct Driver<'a> {
     calibration: Option<Calibration>,
 }
 
-impl<'a> Driver<'a> {
+impl<'a> FilterRunner<'a> {
     fn new(recording: &'a Recording, settings: &RunSettings) -> Result<Self, VioError> {
         let mut filter = settings.filter;
         filter.calibration.time_offset_s += recording.camera.time_offset_s;
@@ -192,8 +192,8 @@ impl<'a> Driver<'a> {
         self.first_image.get_or_insert(stamp);
         self.last_image = Some(stamp);
         match report.status {
-            Status::Tracking => self.keep(report.used, elapsed),
-            Status::Diverged(excess) => self.lose(stamp, divergence_text(excess)),
+            Status::Tracking => self.record_estimate(report.used, elapsed),
+            Status::Diverged(excess) => self.end_segment(stamp, divergence_text(excess)),
             Status::Uninitialised(_) => {}
         }
         Ok(())
@@ -216,8 +216,8 @@ impl<'a> Driver<'a> {
             }
             if self.next > 0 && self.vio.output().is_some() {
                 let gap = sample.stamp.secs_since(samples[self.next - 1].stamp);
-                if gap > LOST_AFTER {
-                    self.lose(sample.stamp, format!("{gap:.2} s without inertial samples"));
+                if gap > MAX_IMU_GAP {
+                    self.end_segment(sample.stamp, format!("{gap:.2} s without inertial samples"));
                 }
             }
             self.vio.imu(sample)?;
@@ -232,7 +232,7 @@ impl<'a> Driver<'a> {
     }
 
     /// Remembers the estimate.
-    fn keep(&mut self, used: usize, elapsed: Duration) {
+    fn record_estimate(&mut self, used: usize, elapsed: Duration) {
         let Some(odometry) = self.vio.output() else { return };
         // The first segment, and the first after each loss.
         if self.segments.len() <= self.lost.len() {
@@ -247,7 +247,7 @@ impl<'a> Driver<'a> {
         self.calibration = self.vio.calibration();
     }
 
-    fn lose(&mut self, stamp: Stamp, why: String) {
+    fn end_segment(&mut self, stamp: Stamp, why: String) {
         self.lost.push((stamp, why));
         self.vio.reset();
     }
@@ -270,7 +270,7 @@ impl<'a> Driver<'a> {
         };
         let began = self.first_image.unwrap_or(first.odometry[0].stamp);
         Ok(Run {
-            initialised_after_s: first.odometry[0].stamp.secs_since(began).max(0.0),
+            initialization_time_s: first.odometry[0].stamp.secs_since(began).max(0.0),
             frames: self.frames,
             pairs: self.pairs,
             skipped: self.skipped,

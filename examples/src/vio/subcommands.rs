@@ -1,3 +1,5 @@
+//! The subcommands of `vio`.
+
 use std::path::{Path, PathBuf};
 
 use vio_ekf::sim::{CameraModel, Scenario};
@@ -16,7 +18,7 @@ type AnyError = Box<dyn std::error::Error>;
 /// Does what the command line asks for.
 ///
 /// # Errors
-/// What was wrong with which input or option; also if an estimate was given up, though its files are written.
+/// What was wrong with which input or option; also if the filter diverged, though its files are written.
 pub fn execute(arguments: &Arguments) -> Result<(), AnyError> {
     match &arguments.command {
         None => track(&arguments.track),
@@ -65,7 +67,7 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         eprintln!("left out: {why}");
     }
     for (stamp, why) in &run.lost {
-        eprintln!("given up at {stamp} s: {why}");
+        eprintln!("diverged at {stamp} s: {why}");
     }
     let evaluation = recording.truth.as_ref().map(|truth| evaluate_run(&run, truth)).transpose()?.flatten();
     let report = VioReport::new(&recording, &findings, &run, evaluation.as_ref(), threads)?;
@@ -73,8 +75,8 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
     println!("{}", folder.join("report.md").display());
     // The files are there to look at, but such a trajectory is not to be relied on.
     if let Some((stamp, why)) = run.lost.last() {
-        let then = if run.tracking_at_end { "started anew" } else { "not started again" };
-        return Err(format!("{}: the estimate was given up at {stamp} s ({why}), and {then}", recording.name).into());
+        let then = if run.tracking_at_end { "was restarted" } else { "was not restarted" };
+        return Err(format!("{}: the filter diverged at {stamp} s ({why}), and {then}", recording.name).into());
     }
     Ok(())
 }
@@ -133,7 +135,7 @@ fn search(arguments: &Tune) -> Result<(), AnyError> {
     let tuning = Tuning {
         search: TuneSettings { evaluations: arguments.evaluations, ..TuneSettings::default() },
         start: factors.map(f64::log10),
-        consistency_weight: arguments.honesty.max(0.0),
+        consistency_weight: arguments.consistency.max(0.0),
         random: arguments.random,
         seed: arguments.seed,
         resume: arguments.resume,

@@ -1,18 +1,18 @@
 //! The derivative of a pass, by hand: every function here is the adjoint of one in `pass.rs`, in reverse order.
 
+use super::architecture::INPUTS;
 use super::conv::{Packed, Start, weights_gradient};
-use super::field::{Field, Scratch};
-use super::law::Law;
-use super::pass::{Block, DAMPING, Pass, SOFTEST, halves, input, is_closed};
+use super::pass::{DAMPING, MIN_CURVATURE, PackedNetwork, Pass, halves, input, is_closed};
 use super::real::Real;
-use super::shape::INPUTS;
+use super::response::Response;
+use super::tile_problem::{Scratch, TileProblem};
 
 /// The adjoint convolutions, and room for the derivatives by what lies between the layers.
 #[derive(Debug, Clone)]
 pub(crate) struct Adjoint<T> {
-    sense: Packed<T>,
-    think: Vec<Packed<T>>,
-    act: Packed<T>,
+    features_layer: Packed<T>,
+    hidden_layers: Vec<Packed<T>>,
+    output_layer: Packed<T>,
     linear: Vec<Packed<T>>,
     step: Vec<T>,
     hidden: [Vec<T>; 2],
@@ -21,16 +21,20 @@ pub(crate) struct Adjoint<T> {
 }
 
 impl<T: Real> Adjoint<T> {
-    pub(crate) fn new(block: &Block<T>, field: &Field<T>) -> Self {
-        let (p, layout, shape) = (&block.parameters, &block.layout, &block.shape);
-        let c = shape.channels;
-        let cells = &field.cells;
+    pub(crate) fn new(network: &PackedNetwork<T>, problem: &TileProblem<T>) -> Self {
+        let (p, layout, architecture) = (&network.parameters, &network.layout, &network.architecture);
+        let c = architecture.channels;
+        let cells = &problem.cells;
         Self {
-            sense: Packed::adjoint(&p[layout.sense.clone()], INPUTS, c),
-            think: layout.think.iter().map(|(weights, _)| Packed::adjoint(&p[weights.clone()], c, c)).collect(),
-            act: Packed::adjoint(&p[layout.act.clone()], c, 1),
-            linear: (0..shape.stages)
-                .map(|stage| Packed::adjoint(&p[shape.linear_of(layout, stage)], INPUTS, 1))
+            features_layer: Packed::adjoint(&p[layout.features_layer.clone()], INPUTS, c),
+            hidden_layers: layout
+                .hidden_layers
+                .iter()
+                .map(|(weights, _)| Packed::adjoint(&p[weights.clone()], c, c))
+                .collect(),
+            output_layer: Packed::adjoint(&p[layout.output_layer.clone()], c, 1),
+            linear: (0..architecture.stages)
+                .map(|stage| Packed::adjoint(&p[architecture.linear_of(layout, stage)], INPUTS, 1))
                 .collect(),
             step: cells.planes(1),
             hidden: [cells.planes(c), cells.planes(c)],
@@ -40,24 +44,24 @@ impl<T: Real> Adjoint<T> {
     }
 
     /// From the derivatives by `paint` and `last_step` after a pass to those before it, in place. `ink_gradient`: derivative
-    /// of the loss by the ink that the pass looked at, over whole pixel planes; it is overwritten. `gradient` is added to.
+    /// of the loss by the ink that the pass rendered, over whole pixel planes; it is overwritten. `gradient` is added to.
     pub(crate) fn pass(
         &mut self,
-        (field, block, stage): (&Field<T>, &Block<T>, usize),
+        (problem, network, stage): (&TileProblem<T>, &PackedNetwork<T>, usize),
         pass: &Pass<T>,
         (paint, last_step): (&mut [T], &mut [T]),
         ink_gradient: &mut [T],
         gradient: &mut [T],
         scratch: &mut Scratch<T>,
     ) {
-        self.act(field, pass, paint, last_step);
-        self.think(field, block, stage, pass, gradient);
-        self.sense(field, pass, paint, last_step, ink_gradient, scratch);
-        self.look(field, pass, paint, ink_gradient, scratch);
+        self.update(problem, pass, paint, last_step);
+        self.predict(problem, network, stage, pass, gradient);
+        self.features(problem, pass, paint, last_step, ink_gradient, scratch);
+        self.render(problem, pass, paint, ink_gradient, scratch);
     }
 
-    fn act(&mut self, field: &Field<T>, pass: &Pass<T>, paint: &mut [T], last_step: &mut [T]) {
-        let cells = &field.cells;
+    fn update(&mut self, problem: &TileProblem<T>, pass: &Pass<T>, paint: &mut [T], last_step: &mut [T]) {
+        let cells = &problem.cells;
         let zero = T::default();
         for y in 0..cells.height {
             for k in cells.at(0, y)..cells.at(cells.width, y) {
@@ -67,7 +71,7 @@ impl<T: Real> Adjoint<T> {
                 if is_closed(before, pass.inputs[k]) {
                     // after = before: the step was nothing.
                     self.step[k] = zero;
-                } else if after > zero && after < field.top[k] {
+                } else if after > zero && after < problem.upper_bounds[k] {
                     self.step[k] = both;
                     paint[k] = both - last_step[k];
                 } else {
@@ -78,36 +82,48 @@ impl<T: Real> Adjoint<T> {
         }
     }
 
-    fn think(&mut self, field: &Field<T>, block: &Block<T>, stage: usize, pass: &Pass<T>, gradient: &mut [T]) {
-        let (cells, layout, shape) = (&field.cells, &block.layout, &block.shape);
-        let c = shape.channels;
+    fn predict(
+        &mut self,
+        problem: &TileProblem<T>,
+        network: &PackedNetwork<T>,
+        stage: usize,
+        pass: &Pass<T>,
+        gradient: &mut [T],
+    ) {
+        let (cells, layout, architecture) = (&problem.cells, &network.layout, &network.architecture);
+        let c = architecture.channels;
         let zeros = vec![T::default(); c.max(INPUTS)];
-        let stage = stage.min(shape.stages - 1);
-        gradient[layout.act_bias] += sum(field, &self.step, 0);
-        weights_gradient(cells, (&pass.inputs, INPUTS), (&self.step, 1), &mut gradient[shape.linear_of(layout, stage)]);
+        let stage = stage.min(architecture.stages - 1);
+        gradient[layout.output_bias] += sum(problem, &self.step, 0);
         weights_gradient(
             cells,
-            (&pass.hidden[shape.layers - 1], c),
+            (&pass.inputs, INPUTS),
             (&self.step, 1),
-            &mut gradient[layout.act.clone()],
+            &mut gradient[architecture.linear_of(layout, stage)],
+        );
+        weights_gradient(
+            cells,
+            (&pass.hidden[architecture.layers - 1], c),
+            (&self.step, 1),
+            &mut gradient[layout.output_layer.clone()],
         );
         let start = Start::Bias(zeros.as_slice());
         self.linear[stage].apply(cells, &self.step, &mut self.inputs, start, false);
-        self.act.apply(cells, &self.step, &mut self.hidden[0], start, false);
-        for layer in (0..shape.layers).rev() {
+        self.output_layer.apply(cells, &self.step, &mut self.hidden[0], start, false);
+        for layer in (0..architecture.layers).rev() {
             for (up, &value) in self.hidden[0].iter_mut().zip(&pass.hidden[layer]) {
                 *up = if value > T::default() { *up } else { T::default() };
             }
             let (bias, weights) = match layer.checked_sub(1) {
-                Some(k) => (layout.think[k].1.clone(), layout.think[k].0.clone()),
-                None => (shape.bias_of(layout, stage), layout.sense.clone()),
+                Some(k) => (layout.hidden_layers[k].1.clone(), layout.hidden_layers[k].0.clone()),
+                None => (architecture.bias_of(layout, stage), layout.features_layer.clone()),
             };
             for k in 0..c {
-                let total = sum(field, &self.hidden[0], k);
+                let total = sum(problem, &self.hidden[0], k);
                 gradient[bias.start + k] += total;
                 if layer == 0 {
-                    for (s, &setting) in field.settings.iter().enumerate() {
-                        gradient[layout.settings.start + k * field.settings.len() + s] += setting * total;
+                    for (s, &setting) in problem.conditioning.iter().enumerate() {
+                        gradient[layout.conditioning.start + k * problem.conditioning.len() + s] += setting * total;
                     }
                 }
             }
@@ -118,87 +134,90 @@ impl<T: Real> Adjoint<T> {
             weights_gradient(cells, (below, ins), (&self.hidden[0], c), &mut gradient[weights]);
             if let Some(k) = layer.checked_sub(1) {
                 let (up, down) = self.hidden.split_at_mut(1);
-                self.think[k].apply(cells, &up[0], &mut down[0], start, false);
+                self.hidden_layers[k].apply(cells, &up[0], &mut down[0], start, false);
                 self.hidden.swap(0, 1);
             } else {
-                self.sense.apply(cells, &self.hidden[0], &mut self.inputs, Start::Output, false);
+                self.features_layer.apply(cells, &self.hidden[0], &mut self.inputs, Start::Output, false);
             }
         }
     }
 
-    fn sense(
+    fn features(
         &mut self,
-        field: &Field<T>,
+        problem: &TileProblem<T>,
         pass: &Pass<T>,
         paint: &mut [T],
         last_step: &mut [T],
         ink_gradient: &mut [T],
         scratch: &mut Scratch<T>,
     ) {
-        let (cells, pixels) = (&field.cells, &field.pixels);
+        let (cells, pixels) = (&problem.cells, &problem.pixels);
         let plane = cells.plane();
         for y in 0..cells.height {
             for k in cells.at(0, y)..cells.at(cells.width, y) {
                 paint[k] += self.inputs[input::PAINT * plane + k];
                 last_step[k] = self.inputs[input::LAST_STEP * plane + k];
                 // q = g / (W + softest)
-                let stiffness = pass.inputs[input::STIFFNESS * plane + k] + T::of(SOFTEST);
-                let by_pull = self.inputs[k] / stiffness;
+                let curvature = pass.inputs[input::CURVATURE * plane + k] + T::of(MIN_CURVATURE);
+                let by_pull = self.inputs[k] / curvature;
                 self.inputs[k] = by_pull;
-                self.inputs[input::STIFFNESS * plane + k] += -(by_pull * pass.inputs[k]);
+                self.inputs[input::CURVATURE * plane + k] += -(by_pull * pass.inputs[k]);
             }
         }
-        let (pull, rest) = scratch.pixels.split_at_mut(pixels.plane());
-        let (stiff, missing) = rest.split_at_mut(pixels.plane());
-        let (along, down) = field.spread.stride();
+        let (weighted_residual, rest) = scratch.pixels.split_at_mut(pixels.plane());
+        let (curvature_term, missing) = rest.split_at_mut(pixels.plane());
+        let (along, down) = problem.footprint.stride();
         let share = T::of(1.0 / (along * down) as f64);
-        // The mean is the adjoint of the spread over the pixels per cell; so is its adjoint.
-        field.spread.spread(cells, &self.inputs, pixels, pull, &mut scratch.spread);
-        self.cells.copy_from_slice(&self.inputs[input::STIFFNESS * plane..][..plane]);
-        field.spread.spread(cells, &self.cells, pixels, stiff, &mut scratch.spread);
-        unquarter(field, &self.inputs, missing);
+        // The mean is the adjoint of the deposit over the pixels per cell; so is its adjoint.
+        problem.footprint.deposit(cells, &self.inputs, pixels, weighted_residual, &mut scratch.phases);
+        self.cells.copy_from_slice(&self.inputs[input::CURVATURE * plane..][..plane]);
+        problem.footprint.deposit(cells, &self.cells, pixels, curvature_term, &mut scratch.phases);
+        quadrant_means_adjoint(problem, &self.inputs, missing);
         let damping = T::of(DAMPING);
         for y in 0..pixels.height {
             for k in pixels.at(0, y)..pixels.at(pixels.width, y) {
-                let (a, w, weight) = (pass.ink[k], pass.slope[k], field.weight[k]);
-                let r = field.wanted[k] - a;
-                let (pull, stiff, missing) = (share * pull[k], share * stiff[k], missing[k]);
+                let (a, w, weight) = (pass.ink[k], pass.slope[k], problem.weight[k]);
+                let r = problem.wanted[k] - a;
+                let (weighted_residual, curvature_term, missing) =
+                    (share * weighted_residual[k], share * curvature_term[k], missing[k]);
                 let below = w * w + damping;
-                let by_residual = weight * w * (pull + missing / below);
-                let by_slope =
-                    weight * (r * pull + T::of(2.0) * w * stiff + missing * r * (damping - w * w) / (below * below));
-                ink_gradient[k] += by_slope * slope_by_ink(&field.law, a) - by_residual;
+                let by_residual = weight * w * (weighted_residual + missing / below);
+                let by_slope = weight
+                    * (r * weighted_residual
+                        + T::of(2.0) * w * curvature_term
+                        + missing * r * (damping - w * w) / (below * below));
+                ink_gradient[k] += by_slope * slope_by_ink(&problem.response, a) - by_residual;
             }
         }
     }
 
-    fn look(
+    fn render(
         &mut self,
-        field: &Field<T>,
+        problem: &TileProblem<T>,
         pass: &Pass<T>,
         paint: &mut [T],
         ink_gradient: &mut [T],
         scratch: &mut Scratch<T>,
     ) {
-        add_by_paint(field, pass, paint, ink_gradient, &mut self.cells, scratch);
+        add_by_paint(problem, pass, paint, ink_gradient, &mut self.cells, scratch);
     }
 }
 
 /// Adds to `paint` the derivative through the ink: `Gᵀ (w · ink_gradient)`.
 pub(crate) fn add_by_paint<T: Real>(
-    field: &Field<T>,
+    problem: &TileProblem<T>,
     pass: &Pass<T>,
     paint: &mut [T],
     ink_gradient: &mut [T],
     cells_scratch: &mut [T],
     scratch: &mut Scratch<T>,
 ) {
-    let (cells, pixels) = (&field.cells, &field.pixels);
+    let (cells, pixels) = (&problem.cells, &problem.pixels);
     for (up, &w) in ink_gradient.iter_mut().zip(&pass.slope) {
         *up = *up * w;
     }
-    field.spread.mean(cells, cells_scratch, 0, pixels, ink_gradient, &mut scratch.spread);
-    let (along, down) = field.spread.stride();
+    problem.footprint.mean(cells, cells_scratch, 0, pixels, ink_gradient, &mut scratch.phases);
+    let (along, down) = problem.footprint.stride();
     let gain = T::of((along * down) as f64);
     for y in 0..cells.height {
         for k in cells.at(0, y)..cells.at(cells.width, y) {
@@ -207,32 +226,32 @@ pub(crate) fn add_by_paint<T: Real>(
     }
 }
 
-/// How the slope of the law changes with its ink.
-fn slope_by_ink<T: Real>(law: &Law, ink: T) -> T {
-    match law {
+/// How the slope of the response changes with its ink.
+fn slope_by_ink<T: Real>(response: &Response, ink: T) -> T {
+    match response {
         // 1 - a²
-        Law::Tanh => T::of(-2.0) * ink,
+        Response::Tanh => T::of(-2.0) * ink,
         // Training is done on tanh; a table is only painted with, and its slope taken as constant.
-        Law::Table(_) => T::default(),
+        Response::Table(_) => T::default(),
     }
 }
 
 /// Sum over the cells of one plane.
-fn sum<T: Real>(field: &Field<T>, planes: &[T], k: usize) -> T {
-    let cells = &field.cells;
+fn sum<T: Real>(problem: &TileProblem<T>, planes: &[T], k: usize) -> T {
+    let cells = &problem.cells;
     (0..cells.height)
         .fold(T::default(), |total, y| total + cells.row(planes, k, y).iter().fold(T::default(), |row, &v| row + v))
 }
 
-/// Adjoint of the means over quarters.
-fn unquarter<T: Real>(field: &Field<T>, inputs: &[T], to: &mut [T]) {
-    let (cells, pixels, (along, down)) = (&field.cells, &field.pixels, field.spread.stride());
+/// Adjoint of the means over quadrants.
+fn quadrant_means_adjoint<T: Real>(problem: &TileProblem<T>, inputs: &[T], to: &mut [T]) {
+    let (cells, pixels, (along, down)) = (&problem.cells, &problem.pixels, problem.footprint.stride());
     let ((lefts, wide), (tops, high)) = (halves(along), halves(down));
     let share = T::of(1.0 / (wide * high) as f64);
     to.fill(T::default());
-    for (quarter, (dy, dx)) in tops.iter().flat_map(|&t| lefts.iter().map(move |&l| (t, l))).enumerate() {
+    for (quadrant, (dy, dx)) in tops.iter().flat_map(|&t| lefts.iter().map(move |&l| (t, l))).enumerate() {
         for j in 0..cells.height {
-            let up = cells.row(inputs, input::QUARTERS + quarter, j);
+            let up = cells.row(inputs, input::QUADRANTS + quadrant, j);
             for y in (j * down + dy..j * down + dy + high).take_while(|&y| y < pixels.height) {
                 let row = pixels.row_mut(to, 0, y);
                 for x in dx..dx + wide {

@@ -3,7 +3,7 @@
 //! Every output is summed in the same order (input channel, row, column), wherever in a block it falls: a picture painted in
 //! tiles is the same to the last bit.
 
-use super::planes::{BLOCK, Grid};
+use super::padded_grid::{BLOCK, PaddedGrid};
 use super::real::Real;
 
 /// Taps of one kernel.
@@ -49,7 +49,7 @@ impl<T: Real> Packed<T> {
 
     /// `output = conv(input) + start`, where `start` is the output itself or the bias; negative results become zero with
     /// `rectify`. Output values past the end of a row are zeroed.
-    pub(crate) fn apply(&self, grid: &Grid, input: &[T], output: &mut [T], start: Start<T>, rectify: bool) {
+    pub(crate) fn apply(&self, grid: &PaddedGrid, input: &[T], output: &mut [T], start: Start<T>, rectify: bool) {
         // One output alone must not pay for a group.
         if self.outs == 1 {
             self.groups::<1>(grid, input, output, start, rectify);
@@ -58,7 +58,7 @@ impl<T: Real> Packed<T> {
         }
     }
 
-    fn groups<const N: usize>(&self, grid: &Grid, input: &[T], output: &mut [T], start: Start<T>, rectify: bool) {
+    fn groups<const N: usize>(&self, grid: &PaddedGrid, input: &[T], output: &mut [T], start: Start<T>, rectify: bool) {
         let plane = grid.plane();
         let taps = |channel: usize| (0..TAPS).map(move |tap| channel * plane + tap / 3 * grid.pitch + tap % 3);
         let offsets: Vec<usize> = (0..self.ins).flat_map(taps).collect();
@@ -134,7 +134,7 @@ const UPS: usize = 4;
 /// `up` is zero past the ends of rows.
 #[cfg(any(test, feature = "train"))]
 pub(crate) fn weights_gradient<T: Real>(
-    grid: &Grid,
+    grid: &PaddedGrid,
     (input, ins): (&[T], usize),
     (up, outs): (&[T], usize),
     gradient: &mut [T],

@@ -1,3 +1,5 @@
+//! The real numbers that the networks compute with.
+
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
@@ -20,7 +22,7 @@ pub(crate) trait Real:
     /// Nearest number to `value`.
     fn of(value: f64) -> Self;
     /// The same number in double precision.
-    fn wide(self) -> f64;
+    fn to_f64(self) -> f64;
 
     /// The larger of the two; `other` if `self` is no number.
     fn at_least(self, other: Self) -> Self {
@@ -44,7 +46,7 @@ impl Real for f32 {
         value as f32
     }
 
-    fn wide(self) -> f64 {
+    fn to_f64(self) -> f64 {
         f64::from(self)
     }
 
@@ -78,7 +80,7 @@ impl Real for f64 {
         value
     }
 
-    fn wide(self) -> f64 {
+    fn to_f64(self) -> f64 {
         self
     }
 
@@ -99,7 +101,7 @@ mod tests {
     fn the_fast_exponential_is_the_exponential() {
         let worst = (-8700..=8800).map(|k| {
             let x = k as f32 * 0.01;
-            (Real::exp(x).wide() / f64::from(x).exp() - 1.0).abs()
+            (Real::exp(x).to_f64() / f64::from(x).exp() - 1.0).abs()
         });
         assert!(worst.fold(0.0, f64::max) < 2e-7);
         assert_eq!(Real::exp(0.0_f32), 1.0);

@@ -1,7 +1,9 @@
-use super::{fbm, lattice, worley_distances};
+//! Random scenes for training.
+
+use super::noise::{fbm, lattice, worley_distances};
 use crate::image::Image;
 
-/// Kinds of scenes. Bricks, [`super::Texture::Brick`], are not among them: they are kept to test with.
+/// Kinds of scenes. Bricks, `Texture::Brick`, are not among them: they are kept to test with.
 const KINDS: usize = 9;
 
 /// Numbers of one scene, drawn in order.

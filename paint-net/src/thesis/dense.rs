@@ -1,7 +1,9 @@
 //! Linear layers over a batch, and their adjoint.
 
-use super::matrix::{Panels, transposed};
-use super::shape::Layer;
+use super::architecture::Layer;
+use super::matrix::Panels;
+#[cfg(any(test, feature = "train"))]
+use super::matrix::transposed;
 use crate::network::Real;
 
 /// A layer ready to be applied.
@@ -26,13 +28,15 @@ impl<T: Real> Dense<T> {
     }
 }
 
-/// The way back through a layer.
+#[cfg(any(test, feature = "train"))]
+/// The backward pass through a layer.
 #[derive(Debug, Clone)]
 pub(crate) struct DenseAdjoint<T> {
     layer: Layer,
     across: Panels<T>,
 }
 
+#[cfg(any(test, feature = "train"))]
 impl<T: Real> DenseAdjoint<T> {
     pub(crate) fn new(layer: &Layer, parameters: &[T]) -> Self {
         let across = transposed(&parameters[layer.weight()], layer.outputs);

@@ -1,8 +1,10 @@
 //! A recurrent layer with long short-term memory (Hochreiter and Schmidhuber 1997, with forget gates).
 
-use super::dense::{Dense, DenseAdjoint};
-use super::functions::{sigmoid, tanh};
-use super::rows::Rows;
+use super::activations::Activations;
+use super::dense::Dense;
+#[cfg(any(test, feature = "train"))]
+use super::dense::DenseAdjoint;
+use super::nonlinearities::{sigmoid, tanh};
 use crate::network::Real;
 
 /// What the layer did: `steps` rows of inputs and gates, `steps + 1` of memory and state, the first of which are zero.
@@ -14,10 +16,10 @@ use crate::network::Real;
 #[derive(Debug, Clone)]
 pub(crate) struct Lstm<T> {
     hidden: usize,
-    pub(crate) inputs: Rows<T>,
-    gates: Rows<T>,
-    memory: Rows<T>,
-    pub(crate) state: Rows<T>,
+    pub(crate) inputs: Activations<T>,
+    gates: Activations<T>,
+    memory: Activations<T>,
+    pub(crate) state: Activations<T>,
 }
 
 impl<T: Real> Lstm<T> {
@@ -25,10 +27,10 @@ impl<T: Real> Lstm<T> {
     pub(crate) fn new(steps: usize, batch: usize, given: usize, hidden: usize) -> Self {
         Self {
             hidden,
-            inputs: Rows::new(steps, batch, given + hidden),
-            gates: Rows::new(steps, batch, 4 * hidden),
-            memory: Rows::new(steps + 1, batch, hidden),
-            state: Rows::new(steps + 1, batch, hidden),
+            inputs: Activations::new(steps, batch, given + hidden),
+            gates: Activations::new(steps, batch, 4 * hidden),
+            memory: Activations::new(steps + 1, batch, hidden),
+            state: Activations::new(steps + 1, batch, hidden),
         }
     }
 
@@ -62,10 +64,18 @@ impl<T: Real> Lstm<T> {
         }
     }
 
-    /// The way back through step `t`: `memory` and `state` hold the derivatives by what the step left; afterwards `memory`
+    #[cfg(any(test, feature = "train"))]
+    /// The backward pass through step `t`: `memory` and `state` hold the derivatives by what the step left; afterwards `memory`
     /// holds those by what it found, and `inputs` those by the inputs, own state included. The gates are overwritten with
     /// their derivatives, for [`Lstm::add_weights`].
-    pub(crate) fn back(&mut self, t: usize, layer: &DenseAdjoint<T>, memory: &mut [T], state: &[T], inputs: &mut [T]) {
+    pub(crate) fn backward(
+        &mut self,
+        t: usize,
+        layer: &DenseAdjoint<T>,
+        memory: &mut [T],
+        state: &[T],
+        inputs: &mut [T],
+    ) {
         let h = self.hidden;
         let one = T::of(1.0);
         let (before, after) = (self.memory.at(t), self.memory.at(t + 1));
@@ -92,7 +102,8 @@ impl<T: Real> Lstm<T> {
         layer.add_inputs(self.gates.at(t), inputs);
     }
 
-    /// Adds the derivative by the weights, after the way back through all `steps`.
+    #[cfg(any(test, feature = "train"))]
+    /// Adds the derivative by the weights, after the backward pass through all `steps`.
     pub(crate) fn add_weights(&self, layer: &DenseAdjoint<T>, steps: usize, gradient: &mut [T]) {
         layer.add_weights(self.inputs.steps(0..steps), self.gates.steps(0..steps), gradient);
     }

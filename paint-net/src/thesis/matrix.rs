@@ -85,10 +85,12 @@ impl<T: Real> Panels<T> {
     }
 }
 
+#[cfg(any(test, feature = "train"))]
 /// Side of the squares that are turned one by one: one side of the copy always jumps by rows.
 const SQUARE: usize = 16;
 
-/// Rows as columns.
+#[cfg(any(test, feature = "train"))]
+/// Activations as columns.
 pub(crate) fn transposed<T: Real>(matrix: &[T], columns: usize) -> Vec<T> {
     let rows = matrix.len() / columns;
     let mut out = vec![T::default(); matrix.len()];

@@ -1,18 +1,23 @@
-use super::rollout::Model;
-use super::shape::Shape;
+//! The weights of the thesis' network.
+
+use super::architecture::Architecture;
+use super::rollout::{Model, Noise, Rollout};
+use super::step::{Step, steps_of};
 use crate::error::Error;
-use crate::network::{Tensor, layout, safetensors};
+use crate::image::Image;
+use crate::network::layout;
+use crate::network::safetensors::{self, Tensor};
 use crate::procedural::lattice;
 
 /// The weights of the thesis' network.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network {
-    shape: Shape,
+    architecture: Architecture,
     parameters: Vec<f32>,
 }
 
 /// Tensor that holds the sizes.
-const SHAPE: &str = "shape";
+const SIZES: &str = "shape";
 /// First bias of the volume: many small sprays rather than a black wall, whose derivatives vanish (ours).
 const FIRST_VOLUME: f32 = -2.0;
 /// First biases of READ's log variance and log spacing: wide filters over the middle of the picture, which see enough to learn
@@ -21,10 +26,10 @@ const FIRST_WINDOW: [f32; 2] = [2.0, -0.5];
 
 impl Network {
     /// Untrained weights: uniform within one over the root of the inputs; forget gates start open (bias 1).
-    pub fn random(shape: Shape, seed: u64) -> Result<Self, Error> {
-        shape.check()?;
-        let mut parameters = vec![0.0_f32; shape.parameters()];
-        let layers = shape.layers();
+    pub fn random(architecture: Architecture, seed: u64) -> Result<Self, Error> {
+        architecture.check()?;
+        let mut parameters = vec![0.0_f32; architecture.parameters()];
+        let layers = architecture.layers();
         for layer in layers.all() {
             let half_width = 1.0 / (layer.inputs as f64).sqrt();
             for k in layer.weight() {
@@ -32,13 +37,13 @@ impl Network {
             }
         }
         for layer in [layers.encoder, layers.decoder] {
-            let forget = layer.bias().start + shape.hidden;
-            parameters[forget..forget + shape.hidden].fill(1.0);
+            let forget = layer.bias().start + architecture.hidden;
+            parameters[forget..forget + architecture.hidden].fill(1.0);
         }
         parameters[layers.spray.bias().start + 3] = FIRST_VOLUME;
         let window = layers.attention.bias().start + 2;
         parameters[window..window + 2].copy_from_slice(&FIRST_WINDOW);
-        Ok(Self { shape, parameters })
+        Ok(Self { architecture, parameters })
     }
 
     /// From the bytes of a safetensors file.
@@ -47,13 +52,13 @@ impl Network {
     }
 
     pub(crate) fn from_tensors(tensors: &[Tensor]) -> Result<Self, Error> {
-        let &[side, steps, latent, hidden, read, radius, stop, paint] = layout::find(tensors, SHAPE)?.values.as_slice()
+        let &[side, steps, latent, hidden, read, radius, stop, paint] = layout::find(tensors, SIZES)?.values.as_slice()
         else {
-            return Err(Error::Weights(format!("the tensor {SHAPE} does not hold eight sizes")));
+            return Err(Error::Weights(format!("the tensor {SIZES} does not hold eight sizes")));
         };
         // What is no size at all becomes 0 here, which is refused.
         let whole = |size: f32| size as usize;
-        let shape = Shape {
+        let architecture = Architecture {
             side: whole(side),
             steps: whole(steps),
             latent: whole(latent),
@@ -63,9 +68,9 @@ impl Network {
             stop: f64::from(stop),
             paint: whole(paint),
         };
-        shape.check()?;
-        let parameters = layout::parameters(tensors, &shape.parts())?;
-        Ok(Self { shape, parameters })
+        architecture.check()?;
+        let parameters = layout::parameters(tensors, &architecture.parts())?;
+        Ok(Self { architecture, parameters })
     }
 
     /// The bytes of a safetensors file, with notes for whoever reads it.
@@ -74,17 +79,17 @@ impl Network {
     }
 
     pub(crate) fn tensors(&self) -> Vec<Tensor> {
-        let s = &self.shape;
+        let s = &self.architecture;
         let sizes = [s.side, s.steps, s.latent, s.hidden, s.read].map(|n| n as f32);
         let sizes = [&sizes[..], &[s.radius as f32, s.stop as f32, s.paint as f32]].concat();
-        let mut tensors = vec![Tensor { name: SHAPE.into(), shape: vec![sizes.len()], values: sizes }];
-        tensors.extend(layout::tensors(&self.parameters, self.shape.parts()));
+        let mut tensors = vec![Tensor { name: SIZES.into(), shape: vec![sizes.len()], values: sizes }];
+        tensors.extend(layout::tensors(&self.parameters, self.architecture.parts()));
         tensors
     }
 
     /// Sizes.
-    pub fn shape(&self) -> Shape {
-        self.shape
+    pub fn architecture(&self) -> Architecture {
+        self.architecture
     }
 
     /// Number of weights.
@@ -92,13 +97,36 @@ impl Network {
         self.parameters.len()
     }
 
-    pub(crate) fn model(&self) -> Model<f32> {
-        Model::new(&self.shape, &self.parameters)
+    /// Paints pictures of `side` x `side` pixels, without noise: for each the steps up to the stop. `pictures`: wanted ink in
+    /// `[0, 1]` and the depth of paint that is there already.
+    pub fn paint(&self, pictures: &[(Image, Option<Image>)]) -> Result<Vec<Vec<Step>>, Error> {
+        if pictures.is_empty() {
+            return Ok(Vec::new());
+        }
+        let architecture = self.architecture;
+        let expected = (architecture.side, architecture.side);
+        let (mut wanted, mut before) = (Vec::new(), Vec::new());
+        for (picture, canvas) in pictures {
+            let there = canvas.clone().unwrap_or_else(|| picture.map(|_| 0.0));
+            for (what, image) in [("picture", picture), ("canvas", &there)] {
+                if image.size() != expected {
+                    return Err(Error::Mismatch { what, found: image.size(), expected });
+                }
+            }
+            picture.check_range("picture", 0.0, 1.0, "ink in [0, 1]")?;
+            there.check_range("canvas", 0.0, f64::MAX, "a depth of 0 or more")?;
+            wanted.extend(picture.data().iter().map(|&v| v as f32));
+            // Beyond a depth of 20, tanh is 1 in every digit.
+            before.extend(there.data().iter().map(|&v| v.min(20.0) as f32));
+        }
+        let mut rollout = Rollout::new(&architecture, wanted, before, Noise::none(&architecture, pictures.len()));
+        rollout.run(&Model::new(&self.architecture, &self.parameters), true);
+        Ok((0..pictures.len()).map(|k| steps_of(&rollout, k)).collect())
     }
 
     #[cfg(feature = "train")]
-    pub(crate) fn from_parameters(shape: Shape, parameters: Vec<f32>) -> Self {
-        Self { shape, parameters }
+    pub(crate) fn from_parameters(architecture: Architecture, parameters: Vec<f32>) -> Self {
+        Self { architecture, parameters }
     }
 
     #[cfg(feature = "train")]

@@ -1,64 +1,60 @@
-use super::{Network, Step};
+//! The thesis' network as a painter.
+
+use super::network::Network;
+use super::step::Step;
 use crate::error::Error;
 use crate::image::Image;
-use crate::kernel::SprayKernel;
-use crate::painter::{Limits, Painter, Painting, Spray, Task};
-use crate::saturation::Saturation;
+use crate::model::{Spray, SprayKernel};
+use crate::painter::{Observer, Painter};
+use crate::painting::Painting;
+use crate::problem::PaintProblem;
 
 /// The thesis' painter: pictures larger than its network are painted tile by tile.
 ///
 /// Every tile is given the canvas as it is, with what its neighbours left there, and sprays reach over its border. Tiles are
 /// painted in four rounds, none of which holds two that touch. Places, spreads and their number are the network's: of the
 /// limits only the volumes and the number of sprays hold (the largest stay), of the kernel only the cut (in units of each
-/// spray's own spread), of the task's weights nothing. Deterministic: the network paints its mean.
+/// spray's own spread), of the problem's weights nothing. Deterministic: the network paints its mean.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Thesis {
+pub struct ThesisPainter {
     /// The weights; there are none in the crate, as they are too large.
     pub network: Network,
 }
 
-impl Painter for Thesis {
+impl Painter for ThesisPainter {
     fn name(&self) -> &'static str {
         "thesis"
     }
 
-    fn paint(
-        &self,
-        task: &Task,
-        kernel: &SprayKernel,
-        saturation: &Saturation,
-        limits: &Limits,
-        progress: &mut dyn FnMut(f64),
-    ) -> Result<Painting, Error> {
-        task.check()?;
-        limits.check()?;
-        let side = self.network.shape().side;
-        let bare = task.bare();
+    fn paint_observed(&self, problem: &PaintProblem, observer: &mut dyn Observer) -> Result<Painting, Error> {
+        problem.check()?;
+        let (kernel, limits, saturation) = (problem.kernel, problem.limits, problem.saturation);
+        let side = self.network.architecture().side;
+        let initial = problem.initial_canvas();
         // The network knows tanh only: what matters is the depth that an ink asks for.
-        let wanted = task.reference.map(|ink| saturation.inverse(ink).tanh());
+        let wanted = problem.reference.map(|ink| saturation.inverse(ink).tanh());
         let tiles = |extent: usize| extent.div_ceil(side);
         let (columns, rows) = (tiles(wanted.width()), tiles(wanted.height()));
-        let mut canvas = bare.clone();
+        let mut canvas = initial.clone();
         let mut sprays = Vec::new();
         for (round, (right, down)) in [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().enumerate() {
-            progress(round as f64 / 4.0);
+            observer.progress(round as f64 / 4.0);
             let corners =
                 (down..rows).step_by(2).flat_map(|j| (right..columns).step_by(2).map(move |i| (i * side, j * side)));
             let corners: Vec<(usize, usize)> = corners.collect();
             let pictures: Vec<_> =
                 corners.iter().map(|&at| (part(&wanted, at, side), Some(part(&canvas, at, side)))).collect();
             for (corner, steps) in corners.iter().zip(self.network.paint(&pictures)?) {
-                sprays.extend(steps.iter().filter_map(|step| spray(step, *corner, task, limits)));
+                sprays.extend(steps.iter().filter_map(|step| spray(step, *corner, problem)));
             }
-            canvas = painted(&bare, &sprays, kernel);
+            canvas = painted(&initial, &sprays, kernel);
         }
         if limits.max_sprays.is_some_and(|most| most < sprays.len()) {
             keep_largest(&mut sprays, limits.max_sprays.unwrap_or_default());
-            canvas = painted(&bare, &sprays, kernel);
+            canvas = painted(&initial, &sprays, kernel);
         }
-        progress(1.0);
-        let ink = canvas.map(|c| saturation.forward(c));
-        Ok(Painting { sprays, canvas, ink })
+        observer.progress(1.0);
+        Ok(Painting::new(sprays, canvas, saturation))
     }
 }
 
@@ -71,15 +67,20 @@ fn part(image: &Image, (left, top): (usize, usize), side: usize) -> Image {
 }
 
 /// A step as a spray, if the nozzle may give it.
-fn spray(step: &Step, (left, top): (usize, usize), task: &Task, limits: &Limits) -> Option<Spray> {
-    let (x, y) = (left as f64 + step.place.0, top as f64 + step.place.1);
-    let volume = step.volume.min(limits.max_volume);
-    let (width, height) = task.reference.size();
+fn spray(step: &Step, (left, top): (usize, usize), problem: &PaintProblem) -> Option<Spray> {
+    let (x, y) = (left as f64 + step.position.0, top as f64 + step.position.1);
+    let volume = step.volume.min(problem.limits.max_volume);
+    let (width, height) = problem.reference.size();
     let inside = |at: f64, extent: usize| (-0.5..extent as f64 - 0.5).contains(&at);
     let allowed = inside(x, width)
         && inside(y, height)
-        && task.paintable.is_none_or(|mask| mask[y.round().max(0.0) as usize * width + x.round().max(0.0) as usize]);
-    (allowed && volume > 0.0 && volume >= limits.min_volume).then_some(Spray { x, y, volume, sigma: step.sigma })
+        && problem.paintable.is_none_or(|mask| mask[y.round().max(0.0) as usize * width + x.round().max(0.0) as usize]);
+    (allowed && volume > 0.0 && volume >= problem.limits.min_volume).then_some(Spray {
+        x,
+        y,
+        volume,
+        sigma: step.sigma,
+    })
 }
 
 /// The earliest of equal volumes stay; the order remains.
@@ -91,8 +92,8 @@ fn keep_largest(sprays: &mut Vec<Spray>, most: usize) {
     *sprays = order.into_iter().map(|k| sprays[k]).collect();
 }
 
-fn painted(bare: &Image, sprays: &[Spray], kernel: &SprayKernel) -> Image {
-    let mut canvas = bare.clone();
+fn painted(initial: &Image, sprays: &[Spray], kernel: &SprayKernel) -> Image {
+    let mut canvas = initial.clone();
     for spray in sprays {
         kernel.stamp(spray, &mut canvas);
     }

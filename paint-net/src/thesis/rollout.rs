@@ -1,12 +1,12 @@
 //! Paper IV, algorithm 3, over a batch of pictures.
 
+use super::activations::Activations;
+use super::architecture::Architecture;
 use super::dense::Dense;
-use super::functions::{sigmoid, tanh};
 use super::lstm::Lstm;
-use super::read::Reader;
-use super::rows::Rows;
-use super::shape::Shape;
-use super::spray::{Aim, Stamp};
+use super::nonlinearities::{sigmoid, tanh};
+use super::read_attention::ReadAttention;
+use super::spray::{SprayParameters, SprayStamp};
 use super::stop;
 use crate::network::Real;
 
@@ -23,8 +23,8 @@ pub(crate) struct Model<T> {
 }
 
 impl<T: Real> Model<T> {
-    pub(crate) fn new(shape: &Shape, parameters: &[T]) -> Self {
-        let layers = shape.layers();
+    pub(crate) fn new(architecture: &Architecture, parameters: &[T]) -> Self {
+        let layers = architecture.layers();
         let dense = |layer| Dense::new(layer, parameters);
         Self {
             attention: dense(&layers.attention),
@@ -42,14 +42,17 @@ impl<T: Real> Model<T> {
 #[derive(Debug, Clone)]
 pub(crate) struct Noise<T> {
     /// Standard normal, `latent` per sample.
-    pub(crate) latent: Rows<T>,
+    pub(crate) latent: Activations<T>,
     /// `ln u - ln(1 - u)`, `u` uniform.
-    pub(crate) stop: Rows<T>,
+    pub(crate) stop: Activations<T>,
 }
 
 impl<T: Real> Noise<T> {
-    pub(crate) fn none(shape: &Shape, batch: usize) -> Self {
-        Self { latent: Rows::new(shape.steps, batch, shape.latent), stop: Rows::new(shape.steps, batch, 1) }
+    pub(crate) fn none(architecture: &Architecture, batch: usize) -> Self {
+        Self {
+            latent: Activations::new(architecture.steps, batch, architecture.latent),
+            stop: Activations::new(architecture.steps, batch, 1),
+        }
     }
 }
 
@@ -77,28 +80,10 @@ impl Default for Objective {
     }
 }
 
-/// Sums over the batch, in nats.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Terms {
-    pub(crate) cross_entropy: f64,
-    pub(crate) latent: f64,
-    pub(crate) stop: f64,
-    pub(crate) variation: f64,
-}
-
-impl Terms {
-    pub(crate) fn total(&self, objective: &Objective) -> f64 {
-        self.cross_entropy
-            + objective.latent * self.latent
-            + objective.stop * self.stop
-            + objective.variation * self.variation
-    }
-}
-
-/// Everything that the way back needs.
+/// Everything that the backward pass needs.
 #[derive(Debug, Clone)]
 pub(crate) struct Rollout<T> {
-    pub(crate) shape: Shape,
+    pub(crate) architecture: Architecture,
     pub(crate) batch: usize,
     /// Wanted ink, row by row, a picture per sample.
     pub(crate) wanted: Vec<T>,
@@ -106,54 +91,54 @@ pub(crate) struct Rollout<T> {
     /// Depth of paint, as it is now.
     pub(crate) depth: Vec<T>,
     /// Ink before every step, and after the last.
-    pub(crate) ink: Rows<T>,
-    pub(crate) attention: Rows<T>,
+    pub(crate) ink: Activations<T>,
+    pub(crate) attention: Activations<T>,
     pub(crate) encoder: Lstm<T>,
-    pub(crate) latent: Rows<T>,
+    pub(crate) latent: Activations<T>,
     pub(crate) decoder: Lstm<T>,
-    pub(crate) paint: Rows<T>,
-    pub(crate) spray: Rows<T>,
-    pub(crate) logit: Rows<T>,
+    pub(crate) paint: Activations<T>,
+    pub(crate) spray: Activations<T>,
+    pub(crate) logit: Activations<T>,
     /// Volume as sprayed: gated, and zero after the stop.
-    pub(crate) volume: Rows<T>,
+    pub(crate) volume: Activations<T>,
     /// `S_stop` before every step.
-    pub(crate) spent: Rows<T>,
+    pub(crate) stop_sum: Activations<T>,
 }
 
 impl<T: Real> Rollout<T> {
     /// `before`: depth of paint that is on the wall already.
-    pub(crate) fn new(shape: &Shape, wanted: Vec<T>, before: Vec<T>, noise: Noise<T>) -> Self {
-        let (steps, batch) = (shape.steps, wanted.len() / shape.pixels());
-        let rows = |width| Rows::new(steps, batch, width);
+    pub(crate) fn new(architecture: &Architecture, wanted: Vec<T>, before: Vec<T>, noise: Noise<T>) -> Self {
+        let (steps, batch) = (architecture.steps, wanted.len() / architecture.pixels());
+        let rows = |width| Activations::new(steps, batch, width);
         Self {
-            shape: *shape,
+            architecture: *architecture,
             batch,
             wanted,
             noise,
             depth: before,
-            ink: Rows::new(steps + 1, batch, shape.pixels()),
+            ink: Activations::new(steps + 1, batch, architecture.pixels()),
             attention: rows(5),
-            encoder: Lstm::new(steps, batch, shape.glimpse() + shape.hidden, shape.hidden),
-            latent: rows(2 * shape.latent),
-            decoder: Lstm::new(steps, batch, shape.latent, shape.hidden),
-            paint: rows(shape.paint),
+            encoder: Lstm::new(steps, batch, architecture.glimpse() + architecture.hidden, architecture.hidden),
+            latent: rows(2 * architecture.latent),
+            decoder: Lstm::new(steps, batch, architecture.latent, architecture.hidden),
+            paint: rows(architecture.paint),
             spray: rows(4),
             logit: rows(1),
             volume: rows(1),
-            spent: Rows::new(steps + 1, batch, 1),
+            stop_sum: Activations::new(steps + 1, batch, 1),
         }
     }
 
     /// Whether sample `k` still paints at step `t`.
     pub(crate) fn paints(&self, t: usize, k: usize) -> bool {
-        self.spent.at(t)[k] <= T::of(self.shape.stop)
+        self.stop_sum.at(t)[k] <= T::of(self.architecture.stop)
     }
 
     /// All `T` steps.
     pub(crate) fn run(&mut self, model: &Model<T>, gated: bool) {
-        let (mut reader, mut stamp) = (Reader::new(&self.shape), Stamp::new(&self.shape));
+        let (mut reader, mut stamp) = (ReadAttention::new(&self.architecture), SprayStamp::new(&self.architecture));
         self.show(0);
-        for t in 0..self.shape.steps {
+        for t in 0..self.architecture.steps {
             self.read(t, model, &mut reader); //       x̂ = x - tanh c,  r = read(x, x̂, h_dec)
             self.encoder.step(t, &model.encoder); //   h_enc = RNN([r, h_dec])
             self.sample(t, model); //                  z ~ Q(Z | h_enc)
@@ -169,23 +154,23 @@ impl<T: Real> Rollout<T> {
         }
     }
 
-    fn read(&mut self, t: usize, model: &Model<T>, reader: &mut Reader<T>) {
-        let (pixels, glimpse, h) = (self.shape.pixels(), self.shape.glimpse(), self.shape.hidden);
+    fn read(&mut self, t: usize, model: &Model<T>, reader: &mut ReadAttention<T>) {
+        let (pixels, glimpse, h) = (self.architecture.pixels(), self.architecture.glimpse(), self.architecture.hidden);
         let state = self.decoder.state.at(t);
         let attention = self.attention.at_mut(t);
         model.attention.apply(state, attention);
         let inputs = self.encoder.inputs.at_mut(t).chunks_exact_mut(glimpse + 2 * h);
         let pictures = self.wanted.chunks_exact(pixels).zip(self.ink.at(t).chunks_exact(pixels));
-        let asked = attention.chunks_exact(5).zip(state.chunks_exact(h));
-        for ((inputs, (picture, ink)), (asked, state)) in inputs.zip(pictures).zip(asked) {
-            let (glance, rest) = inputs.split_at_mut(glimpse);
-            reader.read(asked, picture, ink, glance);
+        let raw = attention.chunks_exact(5).zip(state.chunks_exact(h));
+        for ((inputs, (picture, ink)), (raw, state)) in inputs.zip(pictures).zip(raw) {
+            let (glimpse, rest) = inputs.split_at_mut(glimpse);
+            reader.read(raw, picture, ink, glimpse);
             rest[..h].copy_from_slice(state);
         }
     }
 
     fn sample(&mut self, t: usize, model: &Model<T>) {
-        let (z, h) = (self.shape.latent, self.shape.hidden);
+        let (z, h) = (self.architecture.latent, self.architecture.hidden);
         let latent = self.latent.at_mut(t);
         model.latent.apply(self.encoder.state.at(t + 1), latent);
         let inputs = self.decoder.inputs.at_mut(t).chunks_exact_mut(z + h);
@@ -198,8 +183,8 @@ impl<T: Real> Rollout<T> {
         }
     }
 
-    fn paint(&mut self, t: usize, model: &Model<T>, gated: bool, stamp: &mut Stamp<T>) {
-        let (shape, state) = (self.shape, self.decoder.state.at(t + 1));
+    fn paint(&mut self, t: usize, model: &Model<T>, gated: bool, stamp: &mut SprayStamp<T>) {
+        let (architecture, state) = (self.architecture, self.decoder.state.at(t + 1));
         model.stop.apply(state, self.logit.at_mut(t));
         let hidden = self.paint.at_mut(t);
         model.paint.apply(state, hidden);
@@ -210,58 +195,24 @@ impl<T: Real> Rollout<T> {
         for k in 0..self.batch {
             let open = self.gate(t, k);
             let paints = self.paints(t, k);
-            let (spent, after) = self.spent.pair(t);
-            after[k] = spent[k] + T::of(1.0) - open;
+            let (stop_sum, after) = self.stop_sum.pair(t);
+            after[k] = stop_sum[k] + T::of(1.0) - open;
             if paints {
-                let aim = Aim::new(&shape, &self.spray.at(t)[4 * k..4 * k + 4]);
-                let volume = if gated { open * aim.volume } else { aim.volume };
+                let spray = SprayParameters::new(&architecture, &self.spray.at(t)[4 * k..4 * k + 4]);
+                let volume = if gated { open * spray.volume } else { spray.volume };
                 self.volume.at_mut(t)[k] = volume;
-                stamp.add(&aim, volume, &mut self.depth[k * shape.pixels()..(k + 1) * shape.pixels()]);
+                stamp.add(&spray, volume, &mut self.depth[k * architecture.pixels()..(k + 1) * architecture.pixels()]);
             }
         }
     }
 
     /// `z_paint` of a sample.
-    pub(crate) fn decision(&self, t: usize, k: usize) -> T {
+    pub(crate) fn stop_sample(&self, t: usize, k: usize) -> T {
         stop::sample(self.logit.at(t)[k], self.noise.stop.at(t)[k])
     }
 
     /// `σ(z_paint)` of a sample.
     pub(crate) fn gate(&self, t: usize, k: usize) -> T {
-        sigmoid(self.decision(t, k))
+        sigmoid(self.stop_sample(t, k))
     }
-
-    /// The loss, term by term.
-    pub(crate) fn terms(&self, prior: f64) -> Terms {
-        let mut terms = Terms::default();
-        let steps = self.shape.steps;
-        for (&ink, &wanted) in self.ink.at(steps).iter().zip(&self.wanted) {
-            let (shown, wanted) = (floored(ink).wide(), wanted.wide());
-            terms.cross_entropy -= wanted * shown.ln() + (1.0 - wanted) * (1.0 - shown).ln();
-        }
-        for t in 0..steps {
-            for latent in self.latent.at(t).chunks_exact(2 * self.shape.latent) {
-                let (mean, log_deviation) = latent.split_at(self.shape.latent);
-                for (m, l) in mean.iter().zip(log_deviation) {
-                    let (m, l) = (m.wide(), l.wide());
-                    terms.latent += 0.5 * (m * m + (2.0 * l).exp() - 2.0 * l - 1.0);
-                }
-            }
-            for k in 0..self.batch {
-                terms.stop += stop::divergence(self.decision(t, k), self.logit.at(t)[k], T::of(prior)).wide();
-                if t > 0 {
-                    terms.variation += (self.volume.at(t)[k].wide() - self.volume.at(t - 1)[k].wide()).abs();
-                }
-            }
-        }
-        terms
-    }
-}
-
-/// Ink never reaches 0 or 1 in the cross-entropy, or a bare wall would cost infinitely much.
-pub(crate) const FLOOR: f64 = 1e-3;
-
-/// `ε + (1 - 2ε) a`.
-pub(crate) fn floored<T: Real>(ink: T) -> T {
-    T::of(FLOOR) + T::of(1.0 - 2.0 * FLOOR) * ink
 }

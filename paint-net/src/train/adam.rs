@@ -1,3 +1,5 @@
+//! Adam, and the clipping of gradients.
+
 /// Adam (Kingma and Ba 2015) with its published constants.
 #[derive(Debug, Clone)]
 pub(crate) struct Adam {
@@ -39,10 +41,10 @@ impl Adam {
     }
 }
 
-/// Shortens a gradient to the longest allowed; false if it is no number, which teaches nothing.
-pub(super) fn shorten(gradient: &mut [f32], longest: f64) -> bool {
+/// Clips a gradient to the largest norm allowed; false if it is no number, which teaches nothing.
+pub(super) fn clip_norm(gradient: &mut [f32], max_norm: f64) -> bool {
     let length = gradient.iter().map(|&g| f64::from(g).powi(2)).sum::<f64>().sqrt();
-    let factor = (longest / length.max(1e-12)).min(1.0) as f32;
+    let factor = (max_norm / length.max(1e-12)).min(1.0) as f32;
     for g in gradient {
         *g *= factor;
     }

@@ -1,27 +1,28 @@
-use crate::deconvolution::Deconvolution;
+//! Images for the thesis' network.
+
 use crate::error::Error;
 use crate::ideal::ideal;
 use crate::image::Image;
-use crate::layers::Layered;
-use crate::painter::Task;
+use crate::painters::{Deconvolution, Layered};
+use crate::problem::PaintProblem;
 use crate::procedural::{lattice, scene};
-use crate::thesis::Shape;
+use crate::thesis::Architecture;
 
 /// The `n`th picture for the thesis' network: a procedural scene in place of a photograph, treated as Paper IV, section 3.3
 /// treats those. Every second picture is one of its layers between two thresholds of ink, eroded (3 x 3) and blurred with half
 /// the spray radius; the others are whole pictures, blurred (ours: so that the network can also paint without layers). The
 /// thesis turns every picture four ways; scenes are turned at random anyway.
-pub fn thesis_patch(seed: u64, n: u64, shape: &Shape) -> Result<Image, Error> {
-    let picture = scene(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(n), shape.side, shape.side);
+pub fn thesis_patch(seed: u64, n: u64, architecture: &Architecture) -> Result<Image, Error> {
+    let picture = scene(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(n), architecture.side, architecture.side);
     let draw = |k: i64| lattice(seed ^ 0x7E515, n as i64, k);
     let part = if draw(0) < 0.5 { picture } else { eroded(&layer(&picture, draw(1))?) };
-    ideal(&part, 0.5 * shape.radius)
+    ideal(&part, 0.5 * architecture.radius)
 }
 
 /// The slice of ink between two thresholds; `which` in `[0, 1)` says which.
 fn layer(picture: &Image, which: f64) -> Result<Image, Error> {
     // The painter plays no part in the thresholds.
-    let tops = Layered::new(Deconvolution::default()).thresholds(&Task::on_bare_wall(picture))?;
+    let tops = Layered::new(Deconvolution::default()).thresholds(&PaintProblem::new(picture))?;
     let k = (which * tops.len() as f64) as usize;
     let (from, to) = (if k == 0 { 0.0 } else { tops[k - 1] }, tops[k]);
     Ok(picture.map(|ink| ink.clamp(from, to) - from))

@@ -1,12 +1,12 @@
 //! Training of the thesis' network (Paper IV, section 3.3), on pictures that the caller gives.
 
-use super::adam::{Adam, shorten};
-use super::checkpoint::State;
-use super::in_threads;
+use super::descent::{Descent, StepSettings, parallel_map};
 use crate::error::{Error, require};
 use crate::image::Image;
 use crate::procedural::lattice;
-use crate::thesis::{Model, ModelAdjoint, Network, Noise, Objective, Rollout, Shape, Terms};
+use crate::thesis::{
+    Architecture, LossTerms, Model, ModelAdjoint, Network, Noise, Objective, Rollout, backward, loss_terms,
+};
 
 /// How the thesis' network is trained.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,8 +14,8 @@ use crate::thesis::{Model, ModelAdjoint, Network, Noise, Objective, Rollout, Sha
 pub struct ThesisSettings {
     /// Seed of the first weights and of all noise. Default 1.
     pub seed: u64,
-    /// Sizes of the network. Default [`Shape::MNIST`].
-    pub shape: Shape,
+    /// Sizes of the network. Default [`Architecture::MNIST`].
+    pub architecture: Architecture,
     /// Steps of the optimiser. Default 7000 (100 epochs of 7000 pictures), ours.
     pub steps: usize,
     /// Pictures per step. Default 100 (as in figure 8.7).
@@ -25,7 +25,7 @@ pub struct ThesisSettings {
     /// Last learning rate; in between it falls exponentially. Default 1e-7 (section 3.3).
     pub last_learning_rate: f64,
     /// Gradients longer than this are shortened to it. Default 10, ours.
-    pub longest_gradient: f64,
+    pub max_gradient_norm: f64,
     /// Weights of the terms of the loss.
     pub objective: Objective,
     /// Threads; the weights do not depend on it. Default 1.
@@ -36,12 +36,12 @@ impl Default for ThesisSettings {
     fn default() -> Self {
         Self {
             seed: 1,
-            shape: Shape::MNIST,
+            architecture: Architecture::MNIST,
             steps: 7000,
             batch: 100,
             learning_rate: 1e-4,
             last_learning_rate: 1e-7,
-            longest_gradient: 10.0,
+            max_gradient_norm: 10.0,
             objective: Objective::default(),
             threads: 1,
         }
@@ -72,9 +72,7 @@ pub struct ThesisLoss {
 #[derive(Debug, Clone)]
 pub struct ThesisTrainer {
     settings: ThesisSettings,
-    parameters: Vec<f32>,
-    adam: Adam,
-    step: usize,
+    descent: Descent,
 }
 
 impl ThesisTrainer {
@@ -90,8 +88,8 @@ impl ThesisTrainer {
         {
             require(name, rate, rate > 0.0 && rate <= 1.0, "it must lie in (0, 1]")?;
         }
-        let longest = settings.longest_gradient;
-        require("longest_gradient", longest, longest > 0.0, "it must be positive")?;
+        let longest = settings.max_gradient_norm;
+        require("max_gradient_norm", longest, longest > 0.0, "it must be positive")?;
         let Objective { latent, stop, variation, prior, .. } = settings.objective;
         for (name, weight) in
             [("objective.latent", latent), ("objective.stop", stop), ("objective.variation", variation)]
@@ -99,71 +97,63 @@ impl ThesisTrainer {
             require(name, weight, (0.0..=1e6).contains(&weight), "it must lie in [0, 1e6]")?;
         }
         require("objective.prior", prior, prior.abs() <= 50.0, "it must lie in [-50, 50]")?;
-        let parameters = Network::random(settings.shape, settings.seed)?.into_parameters();
-        let adam = Adam::new(parameters.len());
-        Ok(Self { settings, parameters, adam, step: 0 })
+        let descent = Descent::new(Network::random(settings.architecture, settings.seed)?.into_parameters());
+        Ok(Self { settings, descent })
     }
 
     /// The weights as they are.
     pub fn network(&self) -> Network {
-        Network::from_parameters(self.settings.shape, self.parameters.clone())
+        Network::from_parameters(self.settings.architecture, self.descent.parameters.clone())
     }
 
     /// Steps done.
     pub fn steps_done(&self) -> usize {
-        self.step
+        self.descent.steps()
     }
 
     /// One step of the optimiser. `picture` gives the ink of the `n`th sample since the start of training, `side` x `side`
     /// pixels in `[0, 1]`, the same at every call.
     pub fn step(&mut self, picture: &(dyn Fn(u64) -> Result<Image, Error> + Sync)) -> Result<ThesisLoss, Error> {
-        let (settings, parameters) = (&self.settings, &self.parameters);
-        let first = (self.step * settings.batch) as u64;
-        let adjoint = ModelAdjoint::new(&settings.shape, parameters);
-        let model = Model::new(&settings.shape, parameters);
-        let results = in_threads(settings.threads, settings.batch.div_ceil(CHUNK), &|chunk| {
+        let (settings, step) = (&self.settings, self.descent.steps());
+        let first = (step * settings.batch) as u64;
+        let adjoint = ModelAdjoint::new(&settings.architecture, &self.descent.parameters);
+        let model = Model::new(&settings.architecture, &self.descent.parameters);
+        let job = |chunk: usize, parameters: &[f32]| {
             let numbers = chunk * CHUNK..settings.batch.min((chunk + 1) * CHUNK);
             let samples: Vec<u64> = numbers.map(|k| first + k as u64).collect();
             let pictures: Vec<Image> = samples.iter().map(|&n| picture(n)).collect::<Result<_, _>>()?;
             let mut rollout = prepare(settings, &pictures.iter().collect::<Vec<_>>(), &samples)?;
             rollout.run(&model, settings.objective.gated);
-            let found = (rollout.terms(settings.objective.prior), steps_used(&rollout));
+            let found = (loss_terms(&rollout, settings.objective.prior), steps_used(&rollout));
             let mut gradient = vec![0.0; parameters.len()];
-            rollout.back(&adjoint, &settings.objective, &mut gradient);
+            backward(&mut rollout, &adjoint, &settings.objective, &mut gradient);
             Ok((found, gradient))
-        });
-        // Always in the order of the pictures: floating-point sums depend on it.
-        let share = 1.0 / settings.batch as f64;
-        let mut gradient = vec![0.0_f32; parameters.len()];
+        };
+        let falling = (settings.last_learning_rate / settings.learning_rate).powf(step as f64 / settings.steps as f64);
+        let step_settings = StepSettings {
+            threads: settings.threads,
+            jobs: settings.batch.div_ceil(CHUNK),
+            samples: settings.batch,
+            max_gradient_norm: settings.max_gradient_norm,
+            learning_rate: settings.learning_rate * falling,
+        };
         let mut sums = Sums::default();
-        for result in results {
-            let (found, one) = result?;
-            sums.add(found);
-            for (sum, g) in gradient.iter_mut().zip(one) {
-                *sum += g * share as f32;
-            }
-        }
-        if shorten(&mut gradient, settings.longest_gradient) {
-            let falling =
-                (settings.last_learning_rate / settings.learning_rate).powf(self.step as f64 / settings.steps as f64);
-            self.adam.step(&mut self.parameters, &gradient, settings.learning_rate * falling);
-        }
-        self.step += 1;
+        self.descent.step(&step_settings, &job, &mut |found| sums.add(found))?;
         Ok(sums.means(&self.settings.objective, self.settings.batch))
     }
 
     /// The loss on pictures that are not trained on, with noise that is the same at every call.
     pub fn validate(&self, pictures: &[Image]) -> Result<ThesisLoss, Error> {
-        let model = Model::new(&self.settings.shape, &self.parameters);
+        let model = Model::new(&self.settings.architecture, &self.descent.parameters);
         let mut sums = Sums::default();
         let chunks: Vec<&[Image]> = pictures.chunks(CHUNK).collect();
-        for result in in_threads(self.settings.threads, chunks.len().max(1), &|chunk| {
-            let Some(pictures) = chunks.get(chunk) else { return Err(Error::EmptyTask("there is no picture")) };
+        for result in parallel_map(self.settings.threads, chunks.len().max(1), &|chunk| {
+            let Some(pictures) = chunks.get(chunk) else { return Err(Error::EmptyProblem("there is no picture")) };
             // Numbers that no training reaches.
             let samples: Vec<u64> = (0..pictures.len()).map(|k| (1 << 50) + (chunk * CHUNK + k) as u64).collect();
             let mut rollout = prepare(&self.settings, &pictures.iter().collect::<Vec<_>>(), &samples)?;
             rollout.run(&model, self.settings.objective.gated);
-            Ok((rollout.terms(self.settings.objective.prior), steps_used(&rollout)))
+            Ok((loss_terms(&rollout, self.settings.objective.prior), steps_used(&rollout)))
         }) {
             sums.add(result?);
         }
@@ -173,29 +163,28 @@ impl ThesisTrainer {
     /// The state of training as the bytes of a safetensors file: going on from it gives the same weights, to the last bit, as
     /// never having stopped.
     pub fn checkpoint(&self) -> Vec<u8> {
-        let state = State { tensors: self.network().tensors(), adam: self.adam.clone(), step: self.step };
-        state.write(fingerprint(&self.settings))
+        self.descent.checkpoint(self.network().tensors(), fingerprint(&self.settings))
     }
 
     /// Goes on from a checkpoint that was made with the same settings; only the number of threads may differ.
     pub fn resume(settings: ThesisSettings, checkpoint: &[u8]) -> Result<Self, Error> {
         let mut trainer = Self::new(settings)?;
-        let state = State::read(checkpoint, trainer.parameters.len(), &fingerprint(&trainer.settings))?;
-        trainer.parameters = Network::from_tensors(&state.tensors)?.into_parameters();
-        trainer.step = state.step;
-        trainer.adam = state.adam;
+        let fingerprint = fingerprint(&trainer.settings);
+        trainer
+            .descent
+            .resume(checkpoint, &fingerprint, |tensors| Network::from_tensors(tensors).map(Network::into_parameters))?;
         Ok(trainer)
     }
 }
 
 #[derive(Default)]
 struct Sums {
-    terms: Terms,
+    terms: LossTerms,
     steps: usize,
 }
 
 impl Sums {
-    fn add(&mut self, (terms, steps): (Terms, usize)) {
+    fn add(&mut self, (terms, steps): (LossTerms, usize)) {
         self.terms.cross_entropy += terms.cross_entropy;
         self.terms.latent += terms.latent;
         self.terms.stop += terms.stop;
@@ -217,14 +206,14 @@ impl Sums {
 }
 
 fn steps_used(rollout: &Rollout<f32>) -> usize {
-    (0..rollout.batch).map(|k| (0..rollout.shape.steps).filter(|&t| rollout.paints(t, k)).count()).sum()
+    (0..rollout.batch).map(|k| (0..rollout.architecture.steps).filter(|&t| rollout.paints(t, k)).count()).sum()
 }
 
 /// A batch on a bare wall, with the noise that belongs to its samples.
 fn prepare(settings: &ThesisSettings, pictures: &[&Image], samples: &[u64]) -> Result<Rollout<f32>, Error> {
-    let shape = &settings.shape;
-    let expected = (shape.side, shape.side);
-    let mut wanted = Vec::with_capacity(pictures.len() * shape.pixels());
+    let architecture = &settings.architecture;
+    let expected = (architecture.side, architecture.side);
+    let mut wanted = Vec::with_capacity(pictures.len() * architecture.pixels());
     for picture in pictures {
         if picture.size() != expected {
             return Err(Error::Mismatch { what: "picture", found: picture.size(), expected });
@@ -232,10 +221,10 @@ fn prepare(settings: &ThesisSettings, pictures: &[&Image], samples: &[u64]) -> R
         picture.check_range("picture", 0.0, 1.0, "ink in [0, 1]")?;
         wanted.extend(picture.data().iter().map(|&v| v as f32));
     }
-    let mut noise = Noise::none(shape, pictures.len());
-    for t in 0..shape.steps {
-        for (row, &n) in noise.latent.at_mut(t).chunks_exact_mut(shape.latent).zip(samples) {
-            let draw = |k: usize, which: i64| uniform(settings.seed, n, (t * shape.latent + k) as i64, which);
+    let mut noise = Noise::none(architecture, pictures.len());
+    for t in 0..architecture.steps {
+        for (row, &n) in noise.latent.at_mut(t).chunks_exact_mut(architecture.latent).zip(samples) {
+            let draw = |k: usize, which: i64| uniform(settings.seed, n, (t * architecture.latent + k) as i64, which);
             for (k, pair) in row.chunks_mut(2).enumerate() {
                 // Two normal numbers from two uniform ones (Box and Muller 1958).
                 let (length, angle) = ((-2.0 * draw(k, 1).ln()).sqrt(), std::f64::consts::TAU * draw(k, 2));
@@ -251,7 +240,7 @@ fn prepare(settings: &ThesisSettings, pictures: &[&Image], samples: &[u64]) -> R
         }
     }
     let before = vec![0.0; wanted.len()];
-    Ok(Rollout::new(shape, wanted, before, noise))
+    Ok(Rollout::new(architecture, wanted, before, noise))
 }
 
 /// In `[1e-6, 1 - 1e-6]`.
@@ -262,10 +251,31 @@ fn uniform(seed: u64, sample: u64, k: i64, which: i64) -> f64 {
 
 /// All settings that decide on the weights.
 fn fingerprint(settings: &ThesisSettings) -> String {
-    let ThesisSettings { threads: _, seed, shape, steps, batch, learning_rate, last_learning_rate, .. } = settings;
-    let ThesisSettings { longest_gradient, objective, .. } = settings;
+    let ThesisSettings { threads: _, seed, architecture, steps, batch, learning_rate, last_learning_rate, .. } =
+        settings;
+    let ThesisSettings { max_gradient_norm, objective, .. } = settings;
     format!(
         "seed {seed}, {steps} steps of {batch} pictures, rate {learning_rate} to {last_learning_rate}, gradient up to \
-         {longest_gradient}, {shape:?}, {objective:?}"
+         {max_gradient_norm}, {architecture:?}, {objective:?}"
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_seed_decides_on_weights_and_noise() {
+        let architecture =
+            Architecture { side: 8, steps: 4, latent: 3, hidden: 5, read: 2, radius: 3.0, stop: 3.0, paint: 4 };
+        let trainer = |seed| {
+            ThesisTrainer::new(ThesisSettings { seed, architecture, batch: 2, ..ThesisSettings::default() }).unwrap()
+        };
+        let picture = |_| Ok(Image::filled(8, 8, 0.5));
+        let (mut one, mut other) = (trainer(1), trainer(2));
+        assert!(one.network() != other.network());
+        // The same weights on the same pictures with other noise have another loss.
+        other.descent.parameters.clone_from(&one.descent.parameters);
+        assert!(one.step(&picture).unwrap().total != other.step(&picture).unwrap().total);
+    }
 }

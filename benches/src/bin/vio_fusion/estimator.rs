@@ -201,7 +201,7 @@ fn moved(motion: &Motion, body_from_imu: &Isometry3<f64>) -> (Isometry3<f64>, Ve
 fn start(flight: &Flight, seed: u64, body_from_imu: &Isometry3<f64>, share: [f64; 2]) -> Result<Start, AnyError> {
     let stamp = flight.spline.span().0;
     let (pose, velocity) = moved(&flight.spline.sample(stamp)?, body_from_imu);
-    let mut rng = Rng(seed);
+    let mut rng = Rng::new(seed);
     let admitted = |sigma: f64, share: f64| sigma * (1.0 - share).hypot(share);
     let sigma = StartSigma {
         gyro_bias: admitted(flight.imus[0].gyro_bias_sigma, share[0]),

@@ -1,14 +1,17 @@
 //! Pictures in the format of the MNIST data set (`idx3-ubyte`), packed with gzip or not.
 
+use std::io::Read as _;
 use std::path::Path;
 
+use flate2::read::MultiGzDecoder;
 use paint_net::Image;
 
-use super::gzip;
 use crate::paint_image::error::PaintImageError;
 
 /// Bytes before the pixels: magic number, pictures, rows, columns, big-endian.
 const HEADER: usize = 16;
+/// Largest contents of a packed file that are read.
+const MOST_BYTES: u64 = 1 << 30;
 /// Unsigned bytes in three dimensions.
 const MAGIC: usize = 0x0803;
 
@@ -19,7 +22,13 @@ pub(super) fn read(path: &Path, side: usize) -> Result<Vec<Image>, PaintImageErr
     let wrong = |why: String| PaintImageError::File { path: file.display().to_string(), why };
     let bytes = std::fs::read(&file).map_err(|e| wrong(format!("cannot be read ({e})")))?;
     let bytes = if bytes.starts_with(&[0x1f, 0x8b]) {
-        gzip::unpack(&bytes).ok_or_else(|| wrong("is not a whole gzip file: fetch it again".into()))?
+        let mut unpacked = Vec::new();
+        // No more than a data set of a million pictures: a small file can unpack to any size.
+        let mut decoder = MultiGzDecoder::new(&bytes[..]).take(MOST_BYTES);
+        decoder
+            .read_to_end(&mut unpacked)
+            .map_err(|e| wrong(format!("is not a whole gzip file ({e}): fetch it again")))?;
+        unpacked
     } else {
         bytes
     };
@@ -59,6 +68,37 @@ fn only_file(folder: &Path) -> Result<std::path::PathBuf, PaintImageError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// `printf '\0\0\10\3\0\0\0\1\0\0\0\2\0\0\0\2\0\63\146\377' | gzip -n9`, by the outside program: one picture.
+    const PACKED: &[u8] = &[
+        31, 139, 8, 0, 0, 0, 0, 0, 2, 3, 99, 96, 224, 96, 102, 96, 96, 96, 4, 98, 38, 48, 54, 78, 251, 15, 0, 3, 180,
+        54, 250, 20, 0, 0, 0,
+    ];
+
+    #[test]
+    fn a_packed_file_is_read_and_a_damaged_one_named() {
+        let file = std::env::temp_dir().join(format!("paintcopter-{}-idx3-ubyte.gz", std::process::id()));
+        let read_bytes = |bytes: &[u8]| {
+            std::fs::write(&file, bytes).unwrap();
+            let read = read(&file, 2);
+            std::fs::remove_file(&file).unwrap();
+            read
+        };
+        let pictures = read_bytes(PACKED).unwrap();
+        assert!(pictures.len() == 1 && pictures[0].data() == [0.0, 0.2, 0.4, 1.0]);
+        for cut in 2..PACKED.len() {
+            let error = read_bytes(&PACKED[..cut]).unwrap_err().to_string();
+            assert!(error.contains("gzip") && error.contains("idx3-ubyte.gz"), "cut at {cut}: {error}");
+        }
+        for bit in 16..8 * PACKED.len() {
+            let mut bytes = PACKED.to_vec();
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            // Time, system and flags say nothing about the contents; nothing else may change them unseen.
+            if let Ok(read) = read_bytes(&bytes) {
+                assert!(read.len() == 1 && read[0].data() == pictures[0].data(), "bit {bit}");
+            }
+        }
+    }
 
     #[test]
     fn pictures_come_back_and_broken_files_are_named() {

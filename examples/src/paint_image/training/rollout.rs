@@ -17,7 +17,7 @@ const GAP: usize = 2;
 /// window in red and the spray in green (two standard deviations each way). `bright`: paint is white on black.
 pub(super) fn rollout_picture(network: &Network, pictures: &[Image], bright: bool) -> Result<Rgb, Error> {
     let tasks: Vec<(Image, Option<Image>)> = pictures.iter().map(|p| (p.clone(), None)).collect();
-    let side = network.shape().side;
+    let side = network.architecture().side;
     let cell = (side + GAP) * ENLARGED as usize;
     let (width, height) = (cell * (MOMENTS + 1), cell * pictures.len());
     let mut strip = Rgb::from_pixels(width, height, (0..width * height).map(|_| [128; 3]));
@@ -42,7 +42,7 @@ pub(super) fn rollout_picture(network: &Network, pictures: &[Image], bright: boo
 
 /// Adds a step's spray, uncut, to a canvas.
 pub(super) fn stamp(step: &Step, canvas: &mut Image) -> Result<(), Error> {
-    let (x, y) = step.place;
+    let (x, y) = step.position;
     let spray = paint_net::Spray { x, y, volume: step.volume, sigma: step.sigma };
     SprayKernel::new(step.sigma, 100.0)?.stamp(&spray, canvas);
     Ok(())
@@ -57,7 +57,7 @@ fn draw(strip: &mut Rgb, (left, top): (usize, usize), ink: &Image, step: Option<
     if let Some(step) = step {
         let sigma = 2.0 * step.sigma;
         frame(&mut tile, step.window.centre, 0.5 * step.window.extent + step.window.sigma, READ);
-        frame(&mut tile, step.place, sigma, SPRAY);
+        frame(&mut tile, step.position, sigma, SPRAY);
     }
     let (film_width, width) = (strip.width as usize, tile.width as usize);
     for (j, row) in tile.data.chunks_exact(3 * width).enumerate() {

@@ -14,6 +14,7 @@ use crate::paint_image::error::PaintImageError;
 use crate::paint_image::files::write_json;
 use crate::pictures::{Panel, save_curves};
 use crate::progress::Stage;
+use crate::report::check_finite;
 
 /// Digits that are trained on; the others, which come after them in the file, are held out.
 const TRAINED: usize = 7000;
@@ -67,7 +68,7 @@ struct Outcome {
     threads: usize,
 }
 
-/// Trains, and writes `thesis.safetensors`, `checkpoint.safetensors`, `curve.csv`, `curve.png`, `film.png` and `report.json`.
+/// Trains, and writes `thesis.safetensors`, `checkpoint.safetensors`, `curve.csv`, `curve.png`, `rollout.png` and `report.json`.
 pub fn train_thesis(run: &ThesisTrainingRun, folder: &Path) -> Result<(), PaintImageError> {
     let started = std::time::Instant::now();
     let settings = &run.settings;
@@ -86,7 +87,7 @@ pub fn train_thesis(run: &ThesisTrainingRun, folder: &Path) -> Result<(), PaintI
     let mut curve = Curve::before(run.resume.as_deref(), trainer.steps_done());
     let picture = |n: u64| match &shown {
         Some(digits) => Ok(digits[(lattice(settings.seed, n as i64, -13) * digits.len() as f64) as usize].clone()),
-        None => thesis_patch(settings.seed, n, &settings.shape),
+        None => thesis_patch(settings.seed, n, &settings.architecture),
     };
     let last = run.until.unwrap_or(settings.steps).min(settings.steps);
     let stage = Stage::start("train");
@@ -107,7 +108,7 @@ pub fn train_thesis(run: &ThesisTrainingRun, folder: &Path) -> Result<(), PaintI
     save("thesis.safetensors", &network.to_safetensors(&notes))?;
     curve.draw(&folder.join("curve.png"))?;
     let bright = matches!(run.pictures, TrainingImages::Digits(_));
-    rollout_picture(&network, &held[..SHOWN.min(held.len())], bright)?.save(&folder.join("film.png"))?;
+    rollout_picture(&network, &held[..SHOWN.min(held.len())], bright)?.save(&folder.join("rollout.png"))?;
     let loss = trainer.validate(&held)?;
     let painted = evaluate(&network, &held)?;
     let outcome = Outcome {
@@ -119,27 +120,28 @@ pub fn train_thesis(run: &ThesisTrainingRun, folder: &Path) -> Result<(), PaintI
         bce_nats_per_picture: loss.cross_entropy,
         kl_latent_nats_per_picture: loss.latent,
         steps_used_mean: loss.steps,
-        steps_used_share: loss.steps / settings.shape.steps as f64,
+        steps_used_share: loss.steps / settings.architecture.steps as f64,
         painted_bce_nats_per_px: painted[0],
         painted_psnr_db: painted[1],
         painted_steps_mean: painted[2],
         wall_s: started.elapsed().as_secs_f64(),
         threads: settings.threads,
     };
+    check_finite(&outcome)?;
     write_json(&folder.join("report.json"), &outcome)?;
     stage.done(&format!(
         "{} steps; held out: {:.1} nats per picture, {:.1} of {} steps used",
-        outcome.steps, outcome.bce_nats_per_picture, outcome.steps_used_mean, settings.shape.steps
+        outcome.steps, outcome.bce_nats_per_picture, outcome.steps_used_mean, settings.architecture.steps
     ));
     Ok(())
 }
 
 /// Digits to train on, if they are not made on the way, and held-out pictures to test.
 fn pictures(run: &ThesisTrainingRun) -> Result<(Option<Vec<Image>>, Vec<Image>), PaintImageError> {
-    let shape = &run.settings.shape;
+    let architecture = &run.settings.architecture;
     match &run.pictures {
         TrainingImages::Digits(path) => {
-            let mut all = digits::read(path, shape.side)?;
+            let mut all = digits::read(path, architecture.side)?;
             if all.len() <= TRAINED {
                 return Err(file_error(path, format!("holds {} pictures: give more than {TRAINED}", all.len())));
             }
@@ -147,7 +149,7 @@ fn pictures(run: &ThesisTrainingRun) -> Result<(Option<Vec<Image>>, Vec<Image>),
             Ok((Some(all), held))
         }
         TrainingImages::Patches => {
-            let held = (0..HELD).map(|k| thesis_patch(run.settings.seed, FIRST_HELD + k, shape));
+            let held = (0..HELD).map(|k| thesis_patch(run.settings.seed, FIRST_HELD + k, architecture));
             Ok((None, held.collect::<Result<_, _>>()?))
         }
     }

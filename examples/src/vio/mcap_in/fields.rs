@@ -1,10 +1,10 @@
 //! Times, poses, inertial samples and noise out of messages.
 
 use foxglove::messages::{self, Timestamp};
-use vio_ekf::nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use vio_ekf::nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use vio_ekf::{Imu, ImuNoise, Stamp};
 
-use crate::vio::cdr::Cdr;
+use crate::vio::cdr;
 
 pub(super) fn stamp(time: Timestamp) -> Stamp {
     Stamp::from_nanos(i64::from(time.sec()) * 1_000_000_000 + i64::from(time.nsec()))
@@ -16,14 +16,11 @@ pub(super) fn isometry(t: Option<messages::Vector3>, q: Option<messages::Quatern
     Some(Isometry3::from_parts(Translation3::new(t.x, t.y, t.z), rotation))
 }
 
+/// A sample of `sensor_msgs/Imu`, and its frame.
 pub(super) fn imu(data: &[u8]) -> Option<(Imu, String)> {
-    let mut cdr = Cdr::new(data)?;
-    let (stamp, frame) = cdr.header()?;
-    let _orientation = cdr.f64s::<13>()?;
-    let gyro = Vector3::from(cdr.f64s::<3>()?);
-    let _covariance = cdr.f64s::<9>()?;
-    let accel = Vector3::from(cdr.f64s::<3>()?);
-    Some((Imu { stamp, gyro, accel }, frame.to_string()))
+    let message: cdr::Imu = cdr::decode(data)?;
+    let (gyro, accel) = (message.angular_velocity.into(), message.linear_acceleration.into());
+    Some((Imu { stamp: message.header.stamp(), gyro, accel }, message.header.frame_id))
 }
 
 /// Noise, rate and offset of the camera's clock from our own message.

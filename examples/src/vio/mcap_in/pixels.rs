@@ -6,7 +6,7 @@ use mcap::Message;
 use vio_ekf::Stamp;
 
 use super::fields::stamp;
-use crate::vio::cdr::Cdr;
+use crate::vio::cdr;
 use crate::vio::grey_image::GreyImage;
 
 /// Time of an image; `None` if the message is none.
@@ -14,7 +14,7 @@ pub(super) fn image_stamp(schema: &str, data: &[u8]) -> Option<Stamp> {
     match schema {
         "foxglove.RawImage" => RawImage::decode(data).ok()?.timestamp.map(stamp),
         "foxglove.CompressedImage" => CompressedImage::decode(data).ok()?.timestamp.map(stamp),
-        _ => Cdr::new(data)?.header().map(|(stamp, _)| stamp),
+        _ => cdr::decode::<cdr::Header>(data).map(|header| header.stamp()),
     }
 }
 
@@ -32,18 +32,13 @@ pub(super) fn image(message: &Message) -> Option<(Stamp, Result<GreyImage, Strin
             Some((stamp(image.timestamp?), GreyImage::decode(&image.data)))
         }
         "sensor_msgs/msg/Image" => {
-            let mut cdr = Cdr::new(data)?;
-            let (stamp, _) = cdr.header()?;
-            let (height, width, encoding) = (cdr.u32()? as usize, cdr.u32()? as usize, cdr.string()?);
-            let _big_endian = cdr.byte()?;
-            let (step, pixels) = (cdr.u32()? as usize, cdr.blob()?);
-            Some((stamp, unpack(encoding, (width, height, step), pixels)))
+            let raw: cdr::Image = cdr::decode(data)?;
+            let size = (raw.width as usize, raw.height as usize, raw.step as usize);
+            Some((raw.header.stamp(), unpack(&raw.encoding, size, raw.data)))
         }
         "sensor_msgs/msg/CompressedImage" => {
-            let mut cdr = Cdr::new(data)?;
-            let (stamp, _) = cdr.header()?;
-            let _format = cdr.string()?;
-            Some((stamp, GreyImage::decode(cdr.blob()?)))
+            let image: cdr::CompressedImage = cdr::decode(data)?;
+            Some((image.header.stamp(), GreyImage::decode(image.data)))
         }
         _ => None,
     }

@@ -71,8 +71,8 @@ fn markdown(report: &TuningReport, tuning: &Tuning, best: [f64; 5], settings: &S
         let _ = writeln!(text, "| {name} | {start:.4} | {found:.4} |");
     };
     row("position error, geometric mean [m]", report.ate_start_m, report.ate_best_m);
-    row("NEES, mean (3 is honest)", report.nees_start, report.nees_best);
-    row("error weighted by dishonesty [m]", report.weighted_error_start_m, report.weighted_error_best_m);
+    row("NEES, mean (3 is consistent)", report.nees_start, report.nees_best);
+    row("error weighted by inconsistency [m]", report.weighted_error_start_m, report.weighted_error_best_m);
     if let (Some(error), Some(ratio)) = (report.weighted_error_random_m, report.ratio_to_random) {
         let _ = writeln!(
             text,

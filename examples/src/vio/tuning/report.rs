@@ -13,7 +13,7 @@ pub struct TuningReport {
     pub evaluations: usize,
     /// Points whose cost was computed in this run, random ones left out.
     pub evaluations_computed: usize,
-    /// Geometric mean of the position errors, each worsened by its dishonesty: at the start of the search.
+    /// Geometric mean of the position errors, each weighted by the inconsistency of its covariance: at the start of the search.
     pub weighted_error_start_m: f64,
     /// The same at its end.
     pub weighted_error_best_m: f64,
@@ -21,7 +21,7 @@ pub struct TuningReport {
     pub ate_start_m: f64,
     /// The same at the end.
     pub ate_best_m: f64,
-    /// Mean normalised squared error of position, attitude and velocity at the start; 3 is honest.
+    /// Mean normalised squared error of position, attitude and velocity at the start; 3 is consistent.
     pub nees_start: f64,
     /// The same at the end.
     pub nees_best: f64,

@@ -5,6 +5,8 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 use vio_ekf::tune::{NoisePoint, Score, Trial, cost, tune};
 
 use super::data::TuningData;
@@ -80,10 +82,10 @@ pub fn tune_noise(data: &TuningData, tuning: &Tuning, folder: &Path) -> Result<T
     let mut random = Vec::with_capacity(tuning.random);
     if tuning.random > 0 {
         let stage = Stage::start("random points");
-        let mut state = tuning.seed;
+        let mut generator = SplitMix64::seed_from_u64(tuning.seed);
         for k in 0..tuning.random {
             stage.share(k as f64 / tuning.random as f64);
-            let point = tuning.start.map(|power| power + tuning.search.range * (2.0 * uniform(&mut state) - 1.0));
+            let point = tuning.start.map(|power| power + tuning.search.range * (2.0 * uniform(&mut generator) - 1.0));
             random.push(Trial { point, cost: evaluate(&point)? });
         }
         stage.done(&format!("{} evaluations", random.len()));
@@ -122,10 +124,7 @@ pub fn tune_noise(data: &TuningData, tuning: &Tuning, folder: &Path) -> Result<T
     Ok(report)
 }
 
-/// splitmix64, in `[0, 1)`.
-fn uniform(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let z = (*state ^ (*state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+/// A number in `[0, 1)`.
+fn uniform(random: &mut SplitMix64) -> f64 {
+    (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
 }

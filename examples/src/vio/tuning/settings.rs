@@ -13,7 +13,7 @@ pub struct Tuning {
     pub search: TuneSettings,
     /// Powers of ten on the noise that is given, from which the search starts.
     pub start: NoisePoint,
-    /// How much dishonest covariances cost, beside errors.
+    /// Weight of inconsistent covariances (NEES off 3) beside position errors.
     pub consistency_weight: f64,
     /// Points drawn at random inside the same bounds, to compare with.
     pub random: usize,

@@ -1,0 +1,15 @@
+//! The binaries and what they share, from outside: one test binary, so that everything is linked once.
+#![allow(clippy::unwrap_used)]
+
+mod bad_input;
+mod five_joint_arm;
+mod independence;
+mod meshes;
+mod mission;
+mod module_graph;
+mod paint_image;
+mod recorded;
+mod scan_flight;
+mod scratch;
+mod sequences;
+mod vio;

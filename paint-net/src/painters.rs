@@ -1,0 +1,18 @@
+//! The painters: three that plan on a grid of cells, one network, one of free sprays, and three that wrap others.
+
+mod closed_loop;
+mod deconvolution;
+mod feedback;
+mod fitting;
+mod free_sprays;
+mod layers;
+mod pursuit;
+mod slew;
+
+pub use closed_loop::ClosedLoopPainter;
+pub use deconvolution::Deconvolution;
+pub use feedback::Feedback;
+pub use free_sprays::FreeSprays;
+pub use layers::{LayerPlanning, Layered, ThresholdSpacing};
+pub use pursuit::MatchingPursuit;
+pub use slew::{SlewLimited, slew_violations};

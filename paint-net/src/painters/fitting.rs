@@ -1,0 +1,73 @@
+//! The least-squares fit in ink that all painters on a grid share, and the dropping of sprays that are not worth it.
+
+use crate::optimise::{StoppingRule, minimise};
+use crate::problem::{Limits, PaintGrid, PaintProblem};
+
+/// Fits the volumes under their upper bounds so that the ink comes as near the reference as it can.
+pub(super) fn fit(
+    problem: &PaintProblem,
+    grid: &PaintGrid,
+    upper_bounds: &[f64],
+    volumes: &mut Vec<f64>,
+    stop: &StoppingRule,
+    progress: &mut dyn FnMut(f64),
+) {
+    let mut canvas = grid.initial.data().to_vec();
+    let mut cost = |v: &[f64], gradient: &mut [f64]| {
+        canvas.copy_from_slice(grid.initial.data());
+        grid.footprints.deposit(v, &mut canvas);
+        let value = ink_cost(problem, &mut canvas);
+        grid.footprints.adjoint(&canvas, gradient);
+        value
+    };
+    minimise(volumes, upper_bounds, stop, &mut cost, progress);
+}
+
+/// `½ Σ w (f(c) - y)²`; replaces the canvas by its derivative with respect to each pixel's depth.
+pub(super) fn ink_cost(problem: &PaintProblem, canvas: &mut [f64]) -> f64 {
+    let mut value = 0.0;
+    for (k, (depth, wanted)) in canvas.iter_mut().zip(problem.reference.data()).enumerate() {
+        let weight = problem.weight(k);
+        let residual = problem.saturation.forward(*depth) - wanted;
+        value += 0.5 * weight * residual * residual;
+        *depth = weight * residual * problem.saturation.derivative(*depth);
+    }
+    value
+}
+
+/// Drops sprays below the smallest volume and beyond the largest number, refitting the rest in between.
+pub(super) fn prune(problem: &PaintProblem, grid: &PaintGrid, volumes: &mut Vec<f64>, stop: &StoppingRule) {
+    let stop = StoppingRule { iterations: stop.iterations.min(40), relative_decrease: stop.relative_decrease };
+    prune_with(grid, problem.limits, volumes, &mut |upper_bounds, volumes| {
+        fit(problem, grid, upper_bounds, volumes, &stop, &mut |_| ());
+    });
+}
+
+/// The same for any way to refit the volumes under their upper bounds.
+pub(super) fn prune_with(
+    grid: &PaintGrid,
+    limits: &Limits,
+    volumes: &mut Vec<f64>,
+    refit: &mut dyn FnMut(&[f64], &mut Vec<f64>),
+) {
+    // Dropping all small ones at once would drop neighbours that could have stood in for each other: the threshold rises in
+    // three steps.
+    for share in [0.25, 0.5, 1.0] {
+        let threshold = share * limits.min_volume;
+        let mut keep: Vec<bool> = volumes.iter().map(|&v| v > threshold).collect();
+        if let Some(most) = limits.max_sprays {
+            let mut order: Vec<usize> = (0..volumes.len()).filter(|&k| keep[k]).collect();
+            let target = most + ((1.0 - share) * order.len().saturating_sub(most) as f64) as usize;
+            order.sort_by(|&a, &b| volumes[b].total_cmp(&volumes[a]).then(a.cmp(&b)));
+            order.iter().skip(target).for_each(|&k| keep[k] = false);
+        }
+        if keep.iter().zip(volumes.iter()).all(|(&kept, &v)| kept || v == 0.0) {
+            continue;
+        }
+        let upper_bounds: Vec<f64> =
+            grid.upper_bounds.iter().zip(&keep).map(|(&upper, &kept)| if kept { upper } else { 0.0 }).collect();
+        refit(&upper_bounds, volumes);
+    }
+    // The refit may have pushed a survivor below the threshold, which is a promise.
+    volumes.iter_mut().filter(|v| **v < limits.min_volume).for_each(|v| *v = 0.0);
+}

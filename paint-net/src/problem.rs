@@ -1,0 +1,10 @@
+//! The painting problem, and the grid of cells on which it is solved.
+
+pub(crate) mod defaults;
+mod limits;
+mod paint_grid;
+mod paint_problem;
+
+pub use limits::Limits;
+pub(crate) use paint_grid::PaintGrid;
+pub use paint_problem::PaintProblem;
