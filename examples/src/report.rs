@@ -265,16 +265,32 @@ impl Report {
     }
 }
 
+/// Refuses figures of which one is NaN or infinite.
+///
+/// # Errors
+/// [`ReportError::NotFinite`] names the figure.
+pub fn check_finite(figures: &impl Serialize) -> Result<(), ReportError> {
+    // serde_json makes null of NaN and infinity.
+    fn first_null(value: &serde_json::Value, name: &str) -> Option<String> {
+        let below = |key: &str| if name.is_empty() { key.to_owned() } else { format!("{name}.{key}") };
+        match value {
+            serde_json::Value::Null => Some(name.to_owned()),
+            serde_json::Value::Object(fields) => fields.iter().find_map(|(key, v)| first_null(v, &below(key))),
+            serde_json::Value::Array(all) => {
+                all.iter().enumerate().find_map(|(k, v)| first_null(v, &below(&k.to_string())))
+            }
+            _ => None,
+        }
+    }
+    first_null(&serde_json::to_value(figures)?, "").map_or(Ok(()), |name| Err(ReportError::NotFinite(name)))
+}
+
 /// Writes flat figures as `report.json` into a folder.
 ///
 /// # Errors
 /// [`ReportError::NotFinite`] names the figure that is NaN or infinite.
 pub fn save_figures<T: Serialize>(figures: &T, folder: &Path) -> Result<(), ReportError> {
-    let value = serde_json::to_value(figures)?;
-    // serde_json writes NaN and infinity as null.
-    if let Some((name, _)) = value.as_object().and_then(|o| o.iter().find(|(_, v)| v.is_null())) {
-        return Err(ReportError::NotFinite(name.clone()));
-    }
+    check_finite(figures)?;
     write(&folder.join("report.json"), &(serde_json::to_string_pretty(figures)? + "\n"))
 }
 
@@ -287,4 +303,41 @@ pub fn peak_resident_bytes() -> u64 {
 
 fn write(path: &Path, text: &str) -> Result<(), ReportError> {
     std::fs::write(path, text).map_err(|source| ReportError::Unwritable { path: path.display().to_string(), source })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Serialize)]
+    struct Figures {
+        error_m: f64,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        drift_m: Option<f64>,
+        rows: Vec<[f64; 2]>,
+    }
+
+    #[test]
+    fn a_report_with_a_figure_that_is_not_finite_is_named_and_not_written() {
+        let folder = std::env::temp_dir().join(format!("paintcopter-report-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let save = |error_m: f64, drift_m: Option<f64>, row: f64| {
+            save_figures(&Figures { error_m, drift_m, rows: vec![[0.0; 2], [1.0, row]] }, &folder)
+        };
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            for (figures, name) in [
+                (save(bad, None, 0.0), "error_m"),
+                (save(1.0, Some(bad), 0.0), "drift_m"),
+                (save(1.0, None, bad), "rows.1.1"),
+            ] {
+                let Err(ReportError::NotFinite(found)) = figures else { panic!("{bad} was written") };
+                assert_eq!(found, name);
+            }
+        }
+        assert!(!folder.join("report.json").exists());
+        save(1.0, None, 2.0).unwrap();
+        let text = std::fs::read_to_string(folder.join("report.json")).unwrap();
+        assert_eq!(text.split_whitespace().collect::<String>(), r#"{"error_m":1.0,"rows":[[0.0,0.0],[1.0,2.0]]}"#);
+        std::fs::remove_dir_all(folder).unwrap();
+    }
 }

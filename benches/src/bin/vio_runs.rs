@@ -46,7 +46,7 @@ struct Arguments {
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
     /// Folder with the recordings
-    #[arg(long, env = "PAINTCOPTER_DATA", default_value = "../shared/data")]
+    #[arg(long, env = "PAINTCOPTER_DATA")]
     data: PathBuf,
     /// Runs of which the shortest time of each frame counts: on a shared machine a frame may be interrupted
     #[arg(long, default_value_t = 1)]

@@ -2,9 +2,9 @@
 
 use paint_net::{ideal, metrics};
 use paint_planner::{Plan, normal_deviation};
-use paint_sim::FlightLog;
 use paint_sim::flight::{FlightSample, FlightStatistics};
 use paint_sim::spray::QUANTUM;
+use paint_sim::{FlightLog, TriangleSurface};
 use ptu_kinematics::Joints;
 
 use super::error::MissionError;
@@ -13,6 +13,7 @@ use super::inspect::Inspection;
 use super::plan::path_length;
 use super::run::Mission;
 use super::settings::MissionSettings;
+use crate::adapters::Robot;
 use crate::appearance::DENSITY;
 use crate::report::{Report, peak_resident_bytes};
 
@@ -74,7 +75,7 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         ssim_canvas: metrics::ssim(canvas, &mission.wanted, weight)?,
         ssim_painted: metrics::ssim(&painted, &mission.wanted, weight)?,
         ciede2000_mean: mean(mission.colour_difference().into_iter().flatten()),
-        collisions: mission.flights.iter().map(|f| collisions(mission, &f.flight)).sum(),
+        collisions: mission.flights.iter().map(|f| collisions(&mission.robot, &mission.surface.world, &f.flight)).sum(),
         limit_violations: mission.flights.iter().map(|f| limit_violations(&f.plan, &f.flight, &mission.settings)).sum(),
         scan_error_mean_m: inspection.mesh_error,
         slam_ate_rms_m: inspection.slam_ate,
@@ -114,15 +115,13 @@ fn normal_deviations(mission: &Mission) -> Deviations {
 }
 
 /// Moments of a flight at which the robot overlaps the surface.
-fn collisions(mission: &Mission, log: &FlightLog) -> usize {
+fn collisions(robot: &Robot, surface: &TriangleSurface, log: &FlightLog) -> usize {
     let mut spheres = Vec::new();
     let touches = |sample: &&FlightSample| {
         spheres.clear();
         let joints = Joints { pan: sample.pan_tilt[0], tilt: sample.pan_tilt[1] };
-        mission.robot.spheres_at(&sample.world_from_body, &joints, &mut spheres);
-        spheres
-            .iter()
-            .any(|(centre, radius)| paint_sim::Surface::distance(&mission.surface.world, centre, *radius) < *radius)
+        robot.spheres_at(&sample.world_from_body, &joints, &mut spheres);
+        spheres.iter().any(|(centre, radius)| paint_sim::Surface::distance(surface, centre, *radius) < *radius)
     };
     log.samples.iter().step_by(COLLISION_STRIDE).filter(touches).count()
 }
@@ -171,7 +170,19 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 mod tests {
     use super::super::test_panel;
     use super::*;
-    use ptu_kinematics::{PtuSettings, Range};
+    use ptu_kinematics::{Ptu, PtuSettings, Range};
+
+    /// None where the planner kept clear, all of them for a robot that is larger than its distance from the wall.
+    #[test]
+    fn collisions_are_counted() {
+        let settings = MissionSettings::default();
+        let (_, flight) = test_panel::flown(&settings);
+        let world = &test_panel::surface().world;
+        let robot = Robot::new(Ptu::new(settings.ptu).unwrap());
+        assert_eq!(collisions(&robot, world, &flight), 0);
+        let checked = flight.samples.len().div_ceil(COLLISION_STRIDE);
+        assert_eq!(collisions(&Robot { body_radius: 3.0, ..robot }, world, &flight), checked);
+    }
 
     #[test]
     fn limit_violations_are_counted() {

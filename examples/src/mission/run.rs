@@ -96,6 +96,11 @@ impl Mission {
         Ok(mission)
     }
 
+    /// The layers, in the order in which they were flown.
+    pub fn flights(&self) -> &[LayerFlight] {
+        &self.flights
+    }
+
     /// Paint depth per pixel as it came out, 0 beside the surface.
     pub(super) fn painted_depth(&self) -> Image {
         let mut depth = self.wanted.map(|_| 0.0);

@@ -17,6 +17,7 @@ use super::ink::{ink_of, ssim};
 use super::job::Job;
 use super::progress_strip::save_progress_strip;
 use crate::pictures::{Rgb, save_error_map};
+use crate::report::check_finite;
 
 /// Which glazes are in the guns, on a white wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -162,11 +163,7 @@ pub fn paint_colours(
         cpu_ms,
         threads: 1,
     };
-    let ColourFigures { ssim, bce_nats_per_px, volume_total, .. } = figures;
-    let numbers = [psnr_db, ssim, bce_nats_per_px, ciede2000_mean, ciede2000_p95, volume_total];
-    if numbers.iter().any(|f| !f.is_finite()) {
-        return Err(PaintImageError::NotFinite("report"));
-    }
+    check_finite(&figures)?;
     Ok((painting, figures))
 }
 

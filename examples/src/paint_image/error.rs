@@ -3,6 +3,7 @@
 use paint_net::Error;
 
 use crate::pictures::PictureError;
+use crate::report::ReportError;
 
 /// What is wrong with painting a picture.
 #[derive(Debug, thiserror::Error)]
@@ -32,7 +33,7 @@ pub enum PaintImageError {
         /// What the system said.
         why: String,
     },
-    /// A figure is not finite.
-    #[error("{0}: a figure is not finite, the result is not usable")]
-    NotFinite(&'static str),
+    /// A figure is not finite, or the figures cannot be written.
+    #[error(transparent)]
+    Report(#[from] ReportError),
 }

@@ -16,6 +16,7 @@ use super::error::PaintImageError;
 use super::files::write_json;
 use super::ink::{colour_difference, error_map, grey, level, ssim};
 use super::progress_strip::save_progress_strip;
+use crate::report::check_finite;
 
 /// Who decides the sprays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -171,10 +172,7 @@ impl Job {
             cpu_ms,
             threads: self.threads,
         };
-        let numbers = [figures.psnr_db, figures.ssim, figures.bce_nats_per_px, figures.ciede2000_mean, cpu_ms];
-        if numbers.iter().any(|f| !f.is_finite()) {
-            return Err(PaintImageError::NotFinite("report"));
-        }
+        check_finite(&figures)?;
         Ok((painting, figures))
     }
 

@@ -10,6 +10,7 @@ use super::fly::ScanFlight;
 use crate::mesh_io::{PlyMesh, write_ply};
 use crate::mission::MissionError;
 use crate::pictures::{Polyline, Rgb, Scene, save_scene};
+use crate::report::{ReportError, check_finite};
 
 /// Size of the picture, pixels.
 const VIEW: (u32, u32) = (1400, 900);
@@ -29,7 +30,8 @@ pub fn save(scan: &ScanFlight, folder: &Path) -> Result<(), MissionError> {
     write_ply(&ply, &PlyMesh { positions, normals: None, colours: &grey, faces })
         .map_err(|source| MissionError::Unwritable { path: ply.display().to_string(), source })?;
     save_picture(scan, &folder.join("scan_flight.png"))?;
-    let figures = serde_json::to_string_pretty(&scan.figures).map_err(crate::report::ReportError::from)?;
+    check_finite(&scan.figures)?;
+    let figures = serde_json::to_string_pretty(&scan.figures).map_err(ReportError::from)?;
     write("scan_flight.json", figures + "\n")
 }
 

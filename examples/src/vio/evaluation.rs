@@ -175,3 +175,59 @@ fn velocity_at(truth: &GroundTruth, stamp: Stamp) -> Option<Vector3<f64>> {
     let fraction = stamp.secs_since(stamps[before]) / stamps[next].secs_since(stamps[before]);
     Some(velocities[before].lerp(after, fraction))
 }
+
+#[cfg(test)]
+mod tests {
+    use vio_ekf::nalgebra::{Matrix3, UnitQuaternion};
+    use vio_ekf::{Stamp, Trajectory};
+
+    use super::*;
+
+    /// A body that has turned by 90 degrees, seen by a filter whose world is turned and shifted: the errors are those of the
+    /// body's axes, the world's for the position, and the covariance that goes with each is not round.
+    #[test]
+    fn errors_are_taken_in_the_frames_of_their_covariances() {
+        let turned = |yaw: f64| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw);
+        let poses =
+            [0.0, 1.0, 2.0].map(|x| Isometry3::from_parts([x, 0.0, 0.0].into(), turned(0.5 * std::f64::consts::PI)));
+        let stamps = [0, 1, 2].map(|k| Stamp::from_nanos(k * 1_000_000_000));
+        let mut trajectory = Trajectory::default();
+        stamps.iter().zip(poses).for_each(|(stamp, pose)| trajectory.push(*stamp, pose).unwrap());
+        // Along x of the world is backwards along y of the body: -y.
+        let truth = GroundTruth { trajectory, velocities_in_world: vec![Vector3::x(); 3] };
+        let filter_from_truth = Isometry3::from_parts([5.0, -3.0, 1.0].into(), turned(0.7));
+        let (position_error, velocity_error) = (Vector3::new(0.02, -0.03, 0.01), Vector3::new(0.1, 0.02, -0.3));
+        let (position_sigma, velocity_sigma) = (Vector3::new(0.01, 0.02, 0.04), Vector3::new(0.05, 0.04, 0.2));
+        let mut covariance = vio_ekf::CoreCovariance::identity() * 1e-4;
+        covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::from_diagonal(&position_sigma.map(|s| s * s)));
+        covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&Matrix3::from_diagonal(&velocity_sigma.map(|s| s * s)));
+        let odometry: Vec<Odometry> = [0, 1, 2]
+            .map(|k| {
+                let mut world_from_body = filter_from_truth * poses[k];
+                // The first pose is where the worlds are brought together.
+                if k > 0 {
+                    world_from_body.translation.vector -= position_error;
+                }
+                Odometry {
+                    stamp: stamps[k],
+                    world_from_body,
+                    velocity_in_body: -Vector3::y() - velocity_error,
+                    rate_in_body: Vector3::zeros(),
+                    gyro_bias: Vector3::zeros(),
+                    accel_bias: Vector3::zeros(),
+                    covariance,
+                }
+            })
+            .into();
+        let (mut errors, mut sums) = (Vec::new(), Sums::default());
+        accumulate_errors(&odometry, &truth, &mut errors, &mut sums);
+        let nees = |error: Vector3<f64>, sigma: Vector3<f64>, truth: f64| {
+            error.zip_map(&sigma, |e, s| e * e / (s * s + truth * truth)).sum()
+        };
+        assert_eq!(errors.len(), 3);
+        assert!((errors[1].position - position_error).norm() < 1e-12 && errors[2].attitude.norm() < 1e-12);
+        assert!((sums.position - 2.0 * nees(position_error, position_sigma, 1e-3)).abs() < 1e-9);
+        assert!((sums.velocity - 3.0 * nees(velocity_error, velocity_sigma, 3e-3)).abs() < 1e-9, "{}", sums.velocity);
+        assert!(sums.attitude < 1e-12);
+    }
+}

@@ -1,12 +1,14 @@
 //! Reading meshes: the same surface in every format, and the broken ones of public collections without a panic.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use paintcopter_examples::mesh_io::{MeshError, PlyMesh, TriangleMesh, read_mesh, write_ply};
 use paintcopter_examples::surface::PaintSurface;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
+
+use crate::recorded::recorded;
 
 fn write(name: &str, bytes: &[u8]) -> PathBuf {
     let path = std::env::temp_dir().join(format!("paintcopter-{}-{name}", std::process::id()));
@@ -152,12 +154,8 @@ fn an_obj_of_any_program_is_one_connected_mesh() {
 /// Every mesh of the public collections is either unwrapped into texels or refused with a reason.
 #[test]
 fn public_meshes_are_painted_or_refused() {
-    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
-    let folder = std::env::var("PAINTCOPTER_DATA").unwrap_or_else(|_| default.into());
-    let Ok(collections) = std::fs::read_dir(Path::new(&folder).join("meshes")) else {
-        eprintln!("skipped: no meshes in {folder}; set PAINTCOPTER_DATA");
-        return;
-    };
+    let Some(collections) = recorded("meshes") else { return };
+    let collections = std::fs::read_dir(collections).unwrap();
     let mut files: Vec<PathBuf> = collections
         .flatten()
         .flat_map(|c| std::fs::read_dir(c.path()).into_iter().flatten().flatten())

@@ -7,12 +7,13 @@ use std::process::{Command, Output};
 
 use flate2::read::MultiGzDecoder;
 use paintcopter_examples::vio::{
-    Flight, Overrides, Recording, RunSettings, SimulationSettings, evaluate_run, open_euroc, open_euroc_stereo,
-    open_mcap, run, simulate,
+    Flight, Images, Overrides, Recording, RunSettings, SimulationSettings, camera_frames, evaluate_run, open_euroc,
+    open_euroc_stereo, open_mcap, run, simulate,
 };
-use vio_ekf::Camera;
 use vio_ekf::sim::{CameraModel, RoomSettings, Scenario};
+use vio_ekf::{Camera, Distortion, Stamp};
 
+use crate::recorded::recorded;
 use crate::scratch::Scratch;
 
 /// A flight seen by a small camera, so that the tests stay short.
@@ -53,6 +54,15 @@ fn folders_and_mcap_files_give_the_same_trajectory() {
     let (a, b) = (recorded.camera.camera, folder.camera.camera);
     assert_eq!((a.distortion, a.fx, a.cy, a.width), (b.distortion, b.fx, b.cy, b.width));
     assert!((a.body_from_camera.inverse() * b.body_from_camera).rotation.angle() < 1e-12);
+    // A camera whose clock is 30 ms behind the inertial sensor's, with a calibration that says so, saw the same.
+    let mut late = folder.clone();
+    late.camera.time_offset_s = 0.03;
+    let Images::Files(files) = &mut late.images else { panic!("a folder has files") };
+    files.iter_mut().for_each(|(stamp, _)| *stamp = Stamp::from_nanos(stamp.nanos() - 30_000_000));
+    let found = run(&late, &RunSettings { threads: 1, quiet: true, ..RunSettings::default() }).unwrap();
+    assert_eq!(found.calibration.time_offset_s, 0.03);
+    close(&vio_ekf::tum::write(&found.trajectory().unwrap()), &reference, 1e-6);
+
     let through_mcap = follow(&recorded, 1);
     // The camera's attitude goes through a quaternion in one and a matrix in the other: equal to rounding only.
     close(&through_mcap, &reference, 1e-6);
@@ -60,6 +70,121 @@ fn folders_and_mcap_files_give_the_same_trajectory() {
     let raw = Scratch::new("raw");
     simulate(&SimulationSettings { threads: 1, ..flight(8.0, true) }, &raw.0).unwrap();
     assert_eq!(follow(&open_mcap(&raw.0.join("recording.mcap"), &none).unwrap(), 1), through_mcap);
+}
+
+/// `std_msgs/Header` as the encoding's rules have it, little endian, after its four bytes; `put` then aligns what follows.
+fn ros_header(stamp: Stamp, frame: &str) -> Vec<u8> {
+    let mut bytes = vec![0, 1, 0, 0];
+    bytes.extend(((stamp.nanos() / 1_000_000_000) as i32).to_le_bytes());
+    bytes.extend(((stamp.nanos() % 1_000_000_000) as u32).to_le_bytes());
+    put_blob(&mut bytes, &[frame.as_bytes(), &[0]].concat());
+    bytes
+}
+
+fn put<const N: usize>(bytes: &mut Vec<u8>, number: [u8; N]) {
+    bytes.resize(4 + (bytes.len() - 4).next_multiple_of(N), 0);
+    bytes.extend(number);
+}
+
+fn put_blob(bytes: &mut Vec<u8>, blob: &[u8]) {
+    put(bytes, (blob.len() as u32).to_le_bytes());
+    bytes.extend(blob);
+}
+
+/// A bag as ROS 2 records it: raw and compressed images, inertial samples, calibration in Kalibr's files.
+#[test]
+fn a_bag_of_ros_2_is_read_like_the_folder() {
+    let s = Scratch::new("bag");
+    let simulated = simulate(&SimulationSettings { mcap: false, ..flight(2.0, false) }, &s.0).unwrap();
+    let folder = open_euroc(&s.0, &Overrides::default()).unwrap();
+    let frames: Vec<_> = camera_frames(&folder).collect();
+    assert_eq!(frames.len(), simulated.frames);
+    let camera = folder.camera.camera;
+    let t = camera.body_from_camera.inverse().to_homogeneous();
+    let rows: Vec<String> = t.row_iter().map(|r| format!("  - [{}, {}, {}, {}]", r[0], r[1], r[2], r[3])).collect();
+    let Distortion::RadTan([k1, k2, p1, p2]) = camera.distortion else { panic!("another camera") };
+    let yaml = format!(
+        "cam0:\n  T_cam_imu:\n{}\n  camera_model: pinhole\n  distortion_model: radtan\n  distortion_coeffs: [{k1}, {k2}, {p1}, \
+         {p2}]\n  intrinsics: [{}, {}, {}, {}]\n  resolution: [{}, {}]\n  timeshift_cam_imu: 0.004\n",
+        rows.join("\n"),
+        camera.fx,
+        camera.fy,
+        camera.cx,
+        camera.cy,
+        camera.width,
+        camera.height
+    );
+    s.write("cameras.yaml", yaml);
+    let noise = folder.imu.noise;
+    s.write(
+        "imu.yaml",
+        format!(
+            "rostopic: /imu\nupdate_rate: 200.0\ngyroscope_noise_density: {}\ngyroscope_random_walk: {}\n\
+             accelerometer_noise_density: {}\naccelerometer_random_walk: {}\n",
+            noise.gyro_density, noise.gyro_walk, noise.accel_density, noise.accel_walk
+        ),
+    );
+    let overrides = Overrides { cameras: Some(s.0.join("cameras.yaml")), imu: Some(s.0.join("imu.yaml")), truth: None };
+    for compressed in [false, true] {
+        let file = s.0.join("bag_0.mcap");
+        let mut writer = mcap::WriteOptions::new()
+            .compression(None)
+            .profile("ros2")
+            .create(std::io::BufWriter::new(std::fs::File::create(&file).unwrap()))
+            .unwrap();
+        let name = if compressed { "sensor_msgs/msg/CompressedImage" } else { "sensor_msgs/msg/Image" };
+        let mut channel = |topic: &str, schema: &str| {
+            let schema = writer.add_schema(schema, "ros2msg", b"").unwrap();
+            writer.add_channel(schema, topic, "cdr", &std::collections::BTreeMap::new()).unwrap()
+        };
+        let channels = [channel("/imu/data", "sensor_msgs/msg/Imu"), channel("/camera/image", name)];
+        let mut write = |channel: usize, stamp: Stamp, data: &[u8]| {
+            let time = stamp.nanos() as u64;
+            let header = mcap::records::MessageHeader {
+                channel_id: channels[channel],
+                sequence: 0,
+                log_time: time,
+                publish_time: time,
+            };
+            writer.write_to_known_channel(&header, data).unwrap();
+        };
+        for sample in &folder.samples {
+            let mut bytes = ros_header(sample.stamp, "imu_link");
+            let numbers = [&[0.0; 13][..], sample.gyro.as_slice(), &[0.0; 9], sample.accel.as_slice(), &[0.0; 9]];
+            numbers.iter().flat_map(|part| part.iter()).for_each(|v| put(&mut bytes, v.to_le_bytes()));
+            write(0, sample.stamp, &bytes);
+        }
+        for frame in &frames {
+            let grey = frame.picture.as_ref().unwrap();
+            let mut bytes = ros_header(frame.stamp, "camera");
+            if compressed {
+                let mut png = std::io::Cursor::new(Vec::new());
+                let image =
+                    image::GrayImage::from_raw(grey.width as u32, grey.height as u32, grey.data.clone()).unwrap();
+                image.write_to(&mut png, image::ImageFormat::Png).unwrap();
+                put_blob(&mut bytes, b"png\0");
+                put_blob(&mut bytes, png.get_ref());
+            } else {
+                put(&mut bytes, (grey.height as u32).to_le_bytes());
+                put(&mut bytes, (grey.width as u32).to_le_bytes());
+                put_blob(&mut bytes, b"mono8\0");
+                bytes.push(0);
+                put(&mut bytes, (grey.width as u32).to_le_bytes());
+                put_blob(&mut bytes, &grey.data);
+            }
+            write(1, frame.stamp, &bytes);
+        }
+        writer.finish().unwrap();
+        let bag = open_mcap(&file, &overrides).unwrap();
+        assert_eq!((&bag.samples, bag.images.count()), (&folder.samples, frames.len()));
+        assert_eq!(bag.camera.time_offset_s, 0.004);
+        let (a, b) = (bag.camera.camera, camera);
+        assert_eq!((a.distortion, a.fx, a.cy, a.width), (b.distortion, b.fx, b.cy, b.width));
+        assert!((a.body_from_camera.inverse() * b.body_from_camera).translation.vector.norm() < 1e-12);
+        for (found, expected) in camera_frames(&bag).zip(&frames) {
+            assert_eq!((found.stamp, found.picture.unwrap()), (expected.stamp, expected.picture.clone().unwrap()));
+        }
+    }
 }
 
 #[test]
@@ -339,13 +464,7 @@ fn trajectories_are_compared() {
 /// The whole of what can be done with the real images that are there: a vehicle that hardly moves for 4.7 s.
 #[test]
 fn real_images_at_rest_do_not_drift() {
-    let root = std::env::var_os("PAINTCOPTER_DATA")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
-    let source = root.join("vio/euroc_V1_01_micro/mav0");
-    if !source.exists() {
-        eprintln!("SKIPPED: {} is absent; set PAINTCOPTER_DATA to the folder with the recordings", source.display());
-        return;
-    }
+    let Some(source) = recorded("vio/euroc_V1_01_micro/mav0") else { return };
     let s = Scratch::new("micro");
     copy(&source, &s.0.join("mav0"));
     let unpack = |from: &str, to: &str| {

@@ -9,6 +9,7 @@ use crate::paint_image::error::PaintImageError;
 use crate::paint_image::files::write_json;
 use crate::pictures::{Panel, save_curves};
 use crate::progress::Stage;
+use crate::report::check_finite;
 
 /// Steps between two points of the curve.
 const POINT: usize = 50;
@@ -95,6 +96,7 @@ pub fn train_painter(run: &TrainingRun, folder: &Path) -> Result<(), PaintImageE
         wall_s: started.elapsed().as_secs_f64(),
         threads: settings.threads,
     };
+    check_finite(&outcome)?;
     write_json(&folder.join("report.json"), &outcome)?;
     stage.done(&format!("{} steps, {psnr_db_last:.2} dB on the last pictures", trainer.steps_done()));
     Ok(())

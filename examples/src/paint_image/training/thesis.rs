@@ -14,6 +14,7 @@ use crate::paint_image::error::PaintImageError;
 use crate::paint_image::files::write_json;
 use crate::pictures::{Panel, save_curves};
 use crate::progress::Stage;
+use crate::report::check_finite;
 
 /// Digits that are trained on; the others, which come after them in the file, are held out.
 const TRAINED: usize = 7000;
@@ -126,6 +127,7 @@ pub fn train_thesis(run: &ThesisTrainingRun, folder: &Path) -> Result<(), PaintI
         wall_s: started.elapsed().as_secs_f64(),
         threads: settings.threads,
     };
+    check_finite(&outcome)?;
     write_json(&folder.join("report.json"), &outcome)?;
     stage.done(&format!(
         "{} steps; held out: {:.1} nats per picture, {:.1} of {} steps used",
