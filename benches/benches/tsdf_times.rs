@@ -94,7 +94,7 @@ fn distance_field(shots: &[RgbdFrame]) -> Result<(), Error> {
     let mut fresh = DistanceField::new(&settings)?;
     println!("  from scratch {:.1} ms", timed(|| fresh.update(&map))?.1);
     println!("  {} sites in {} blocks", field.sites().count(), map.blocks());
-    let mut rng = Rng(1);
+    let mut rng = Rng::new(1);
     let mut next = || Point3::new(rng.between(-3.0, 3.0), rng.between(-2.0, 2.0), rng.between(0.0, 3.0));
     let points: Vec<_> = (0..20_000).map(|_| next()).collect();
     for (low, high) in [(0.0, 0.1), (0.1, 0.3), (0.3, 0.6), (0.6, 1.0), (1.0, 2.0)] {
