@@ -9,7 +9,7 @@ A fault is a piece of code, which must occur exactly once in its file, what stan
     replace = "canvas += 2.0 * depth"
     test = "cargo test --release -p paint-sim --test deposit conserves_mass"
 
-    python3 benches/faults.py [NAME_PART ...]     from any folder; the copy is a worktree of HEAD, built in its own target folder
+    python3 benches/faults.py [NAME_PART ...]     from any folder; the copy is a worktree of HEAD
 
 The test must pass without the fault and fail with it; code that does not compile does not count. Exit code 1 if a fault was
 not seen.
@@ -71,7 +71,8 @@ def check(fault, folder, target, sound):
 
 
 def main():
-    target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "faults"
+    # The same as ever: what the crates stand on is built already, and the copy's own crates have their own names there.
+    target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).resolve()
     folder = Path(tempfile.mkdtemp()) / "code"
     git = lambda *words: subprocess.run(["git", "-C", str(ROOT), "worktree", *words], check=True, capture_output=True)
     git("add", "--detach", str(folder), "HEAD")

@@ -4,7 +4,7 @@
 use nalgebra::{Isometry3, Vector3};
 use paintcopter_benches::cpu::median_seconds;
 use paintcopter_benches::room::RgbdFrame;
-use tsdf_hash::{CastSettings, Error, Map, Settings, View};
+use tsdf_hash::{Error, Map, RayCastSettings, Settings, View};
 
 const TURN: usize = 60;
 
@@ -24,7 +24,7 @@ fn room(name: &str, world: &Isometry3<f64>, voxel_size: f64) -> Result<(), Error
     for frame in &frames {
         map.integrate(&frame.view(), None, &(world * frame.world_from_camera))?;
     }
-    let settings = CastSettings::default();
+    let settings = RayCastSettings::default();
     let mut view = View::new();
     let (mut sum, mut hits, mut seen) = (0.0, 0, 0);
     let mut far = [0; 4];

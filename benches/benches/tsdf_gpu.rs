@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use clap::Parser;
 use paintcopter_benches::room::RgbdFrame;
-use tsdf_hash::{CastSettings, DenseMap, Error, GpuMap, GpuOptions, Map, Settings};
+use tsdf_hash::{DenseMap, Error, GpuMap, GpuOptions, Map, RayCastSettings, Settings};
 
 /// Images of a full turn, as many as in the stream `loop`; every sixth is used.
 const TURN: usize = 60;
@@ -41,7 +41,7 @@ fn main() -> Result<(), Error> {
     for voxel_size in [0.02, 0.01, 0.005] {
         let settings = Settings { voxel_size, ..Settings::default() };
         let (mut map, mut gpu) = (Map::new(settings)?, GpuMap::new(settings, &options)?);
-        let cast = CastSettings::default();
+        let cast = RayCastSettings::default();
         let intrinsics = RgbdFrame::INTRINSICS;
         let fused = [
             median_ms(frames.iter(), |s| map.integrate(&s.view(), None, &s.world_from_camera).map(drop))?,

@@ -42,6 +42,13 @@ fn median_ms(seconds: &[f64]) -> f64 {
     1e3 * sorted.get(sorted.len() / 2).copied().unwrap_or_default()
 }
 
+/// The result of a job that cannot be repeated, and the seconds that it takes on this thread.
+pub fn seconds<T>(job: impl FnOnce() -> T) -> (T, f64) {
+    let start = ThreadTime::now();
+    let done = job();
+    (done, start.elapsed().as_secs_f64())
+}
+
 /// Median over `runs` (at least one) of the seconds that `job` takes on this thread, its result included but not used.
 /// Short jobs are repeated within a run.
 pub fn median_seconds<T>(runs: usize, mut job: impl FnMut() -> T) -> f64 {

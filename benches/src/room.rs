@@ -123,6 +123,18 @@ fn pose(k: usize, n: usize) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(centre), rotation)
 }
 
+/// Distance of a point in the air from the nearest surface; exact near surfaces.
+pub fn distance(p: &Point3<f64>) -> f64 {
+    let walls = (0..3).map(|k| (p[k] - LOW[k]).min(HIGH[k] - p[k]));
+    let spheres = SPHERES.iter().map(|s| (p - Point3::new(s[0], s[1], s[2])).norm() - s[3]);
+    let boxes = BOXES.iter().map(|b| {
+        let half = |k: usize| (b[k + 3] - b[k]) / 2.0;
+        let q = Vector3::from([0, 1, 2].map(|k| (p[k] - f64::midpoint(b[k], b[k + 3])).abs() - half(k)));
+        q.map(|c| c.max(0.0)).norm() + q.max().min(0.0)
+    });
+    walls.chain(spheres).chain(boxes).fold(f64::INFINITY, f64::min)
+}
+
 /// The `t` at which `o + t d` first meets a surface.
 fn first_hit(o: &Point3<f64>, d: &Vector3<f64>) -> f64 {
     let slab = |k: usize, bound: f64| (bound - o[k]) / d[k];

@@ -18,3 +18,20 @@ pub mod surface;
 pub mod targets;
 pub mod vio;
 pub mod world;
+
+/// The code in the README and in the book compiles.
+#[cfg(doctest)]
+mod documents {
+    #[doc = include_str!("../../README.md")]
+    mod readme {}
+    #[doc = include_str!("../../docs/src/frames.md")]
+    mod frames {}
+    #[doc = include_str!("../../docs/src/extending.md")]
+    mod extending {}
+    #[doc = include_str!("../../docs/src/tsdf-hash.md")]
+    mod tsdf_hash {}
+    #[doc = include_str!("../../docs/src/vio-ekf.md")]
+    mod vio_ekf {}
+    #[doc = include_str!("../../docs/src/vio-fusion.md")]
+    mod vio_fusion {}
+}

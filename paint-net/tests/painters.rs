@@ -108,6 +108,8 @@ fn masks_and_limits_hold() {
         let painting = paint(&*painter, &problem, &limits);
         if !["layered", "closed loop"].contains(&painter.name()) {
             assert!(painting.sprays.len() <= 120, "{} sprays by {}", painting.sprays.len(), painter.name());
+        }
+        if painter.name() != "layered" {
             assert!(painting.sprays.iter().all(|s| s.volume >= 0.02));
         }
         assert!(painting.sprays.len() > 40);

@@ -76,15 +76,15 @@ pub enum Error {
         /// The cap, [`Settings::max_bytes`](crate::Settings::max_bytes).
         max_bytes: usize,
     },
-    /// Neither active memory nor the tiers behind it have room for the frame.
+    /// Neither active memory nor the memory for evicted blocks has room for the frame.
     #[error(
-        "the tiers are full with {host_bytes} bytes in RAM and {disk_bytes} on disk: raise tiers.host_bytes or \
-         tiers.disk_bytes, or enlarge voxel_size"
+        "evicted blocks fill {host_bytes} bytes in RAM and {disk_bytes} on disk: raise memory.host_bytes or \
+         memory.disk_bytes, or enlarge voxel_size"
     )]
-    TiersFull {
-        /// Bytes of the host tier.
+    StorageFull {
+        /// Bytes of evicted blocks in RAM.
         host_bytes: usize,
-        /// Bytes of the disk tier.
+        /// Bytes of the swap file.
         disk_bytes: u64,
     },
     /// A time that is not finite or not later than that of the frame before.
@@ -95,23 +95,23 @@ pub enum Error {
         /// The time of the last frame that was fused, seconds.
         last: f64,
     },
-    /// A disk tier without a file, or a file without a disk tier.
-    #[error("tiers.disk_bytes = {disk_bytes}: a map with a disk tier is made by with_swap, one without by new")]
-    SwapFile {
-        /// [`Tiers::disk_bytes`](crate::Tiers::disk_bytes).
+    /// A cap on the swap file without such a file, or the other way round.
+    #[error("memory.disk_bytes = {disk_bytes}: a map with a swap file is made by with_swap, one without by new")]
+    SwapFileMismatch {
+        /// [`MemoryLimits::disk_bytes`](crate::MemoryLimits::disk_bytes).
         disk_bytes: u64,
     },
-    /// A copy outside memory is not what was put there.
-    #[error("{what} is damaged: block {block:?} cannot be read")]
-    Damaged {
-        /// Where it lies.
+    /// An evicted or stored block is not what was put there.
+    #[error("{what} is corrupt: block {block:?} cannot be read")]
+    CorruptBlock {
+        /// Where it was read from.
         what: &'static str,
         /// Block coordinates.
         block: [i32; 3],
     },
     /// A file that is no map of this crate.
     #[error("the file is no map: {what} (byte {offset})")]
-    NotAMap {
+    NotAMapFile {
         /// Why.
         what: &'static str,
         /// Where it shows, bytes from the start.
@@ -119,7 +119,7 @@ pub enum Error {
     },
     /// A map's file of another version of the format.
     #[error("the map's file is of version {found} (byte 8), this crate reads version {known}")]
-    OtherVersion {
+    UnsupportedVersion {
         /// Its version.
         found: u32,
         /// The one that can be read.
@@ -134,9 +134,9 @@ pub enum Error {
         found: u64,
     },
     /// A map's file that is not as it was written.
-    #[error("the map's file is damaged: {what} at byte {offset}")]
-    BadFile {
-        /// The part that is damaged.
+    #[error("the map's file is corrupt: {what} at byte {offset}")]
+    CorruptFile {
+        /// The part that is corrupt.
         what: &'static str,
         /// Where it begins, or where reading it failed, bytes from the start.
         offset: u64,
@@ -145,7 +145,7 @@ pub enum Error {
     #[error(
         "the map was made with another voxel size, truncation, carving, depth range or noise: only memory and threads may change"
     )]
-    OtherSettings,
+    IncompatibleSettings,
     /// Reading or writing a file failed.
     #[error("{what} failed")]
     Io {

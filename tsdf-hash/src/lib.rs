@@ -32,58 +32,79 @@
 //! | what | where it comes from | item |
 //! |---|---|---|
 //! | voxel hashing, a budget of memory | thesis Paper I, section 4.3 | [`Map`], [`Settings::max_bytes`] |
-//! | blocks leave and come back, regions (a)-(d) | thesis Paper I, section 4.3; partial sums: ours | [`Tiers`], [`Map::with_swap`], [`Memory`] |
-//! | what comes back is not fused before drift is known | thesis Paper I, section 4.5 | [`Revisit`], [`Map::revisit`] |
+//! | eviction and reloading, regions (a)-(d) | thesis Paper I, section 4.3; copies as partial sums: ours | [`MemoryLimits`], [`Map::with_swap`], [`MemoryUsage`] |
+//! | reloaded blocks are not fused before drift is known | thesis Paper I, section 4.5 | [`ReloadedBlocks`], [`MergePolicy`], [`Map::merge_reloaded`] |
 //! | a map is stored, loaded and continued | thesis Paper II, section 6.1 | [`Map::save`], [`Map::open`], [`MapFile`] |
-//! | one map for another | ours | [`DenseMap`] |
-//! | fusion of depth and colour | thesis Paper I, section 4.3, step (b); sums instead of averages: ours | [`Map::integrate`] |
-//! | fusion undone | ours | [`Map::deintegrate`] |
+//! | one map for another | | [`DenseMap`] |
+//! | a layer of voxel blocks, as voxblox has it | Oleynikova et al. 2017 | [`TsdfLayer`], [`BlockReader`], [`VoxelBlock`] |
+//! | integration of depth and colour | thesis Paper I, section 4.3, step (b); sums instead of averages: ours | [`Map::integrate`] |
+//! | deintegration | Dai et al. 2017; exact by integer sums: ours | [`Map::deintegrate`] |
 //! | noise and weights | Nguyen, Izadi, Lovell 2012; `w = 15 (σ₀/σ(z))² cos θ`: ours | [`NoiseModel`] |
 //! | mesh | thesis Paper I, section 4.6, by marching cubes; case table derived: ours | [`Map::mesh`], [`write_ply`] |
 //! | the same bytes on a GPU | ours | `GpuMap` (feature `gpu`) |
-//! | the mesh of a growing map, blocks that left included | thesis Paper I, section 4.6; per-block patches: ours | [`MeshKeeper`] |
+//! | the mesh of a growing map, evicted blocks included | thesis Paper I, section 4.6 | [`IncrementalMesher`] |
 //! | a surface seen from a pose | thesis Paper I, section 4.1 | [`Map::ray_cast`], [`View`] |
-//! | `R(v) = α n/n_max + β (1 − abs(sdf)/μ)`, Eqs. (5.4)-(5.6) | thesis Paper I, section 4.4, repaired | [`ArrivalView`] |
-//! | a view from elsewhere, between ray casts | thesis Paper I, section 6.2 | [`View::warped`] |
+//! | `R(v) = α n/n_max + β (1 − abs(sdf)/μ)`, Eqs. (5.4)-(5.6) | thesis Paper I, section 4.4, corrected | [`IncrementalRayCast`] |
+//! | forward projection of a view between ray casts | thesis Paper I, section 6.2 | [`View::warped`] |
 //! | distance queries | thesis, outlook | [`Map::distance`], [`Map::distance_and_gradient`] |
 //! | distances for planners, far from surfaces | thesis, outlook; branch and bound over sites: ours | [`DistanceField`] |
 //!
 //! Frames: the camera's z looks forward, `x` to the right and `y` down in its image; the world is the caller's. Distances
 //! are positive on the camera's side of a surface. Metres. Tracking is not part of this crate yet.
 
-mod block;
-mod candidates;
-mod cast;
-mod dense;
-mod edf;
+mod blocks;
+mod changes;
+mod codec;
+mod dense_map;
+mod derived_blocks;
+mod distance_field;
 mod error;
 mod file;
-mod fuse;
+mod frame_clock;
 #[cfg(feature = "gpu")]
 mod gpu;
-mod key;
+mod hashing;
+mod images;
+mod integration;
 mod map;
 mod mesh;
 mod parallel;
-mod query;
+mod ray_cast;
+mod report;
+mod rounding;
 mod settings;
-mod slots;
-mod store;
-mod surface;
-mod table;
-mod tiers;
-mod view;
+mod storage;
+mod tsdf_layer;
 
-pub use cast::{ArrivalSettings, ArrivalView, CastSettings, View};
-pub use dense::DenseMap;
-pub use edf::{DistanceField, DistanceReport, DistanceSettings};
+/// The recipe of the README, as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;
+
+pub use blocks::voxel_block::VoxelBlock;
+pub use changes::{BlockChanges, MapVersion};
+pub use dense_map::DenseMap;
+pub use derived_blocks::UpdateReport;
+pub use distance_field::field::DistanceField;
+pub use distance_field::settings::DistanceSettings;
 pub use error::Error;
-pub use file::MapFile;
+pub use file::map_file::MapFile;
 #[cfg(feature = "gpu")]
-pub use gpu::{GpuMap, GpuOptions, open_map};
-pub use map::{FrameReport, Map, Memory};
-pub use mesh::{Mesh, MeshKeeper, MeshReport, write_obj, write_ply};
+pub use gpu::gpu_map::{GpuMap, gpu_or_cpu_map};
+#[cfg(feature = "gpu")]
+pub use gpu::options::GpuOptions;
+pub use images::{ColourData, ColourView, DepthData, DepthView, Intrinsics};
+pub use map::Map;
+pub use mesh::incremental::IncrementalMesher;
+pub use mesh::obj::write_obj;
+pub use mesh::ply::write_ply;
+pub use mesh::triangle_mesh::Mesh;
 pub use nalgebra;
-pub use settings::{NoiseModel, Settings, Tiers};
-pub use tiers::{Arrivals, MergeAtOnce, Revisit, Verdict};
-pub use view::{ColourData, ColourView, DepthData, DepthView, Intrinsics};
+pub use ray_cast::incremental::{IncrementalRayCast, IncrementalRayCastSettings};
+pub use ray_cast::settings::RayCastSettings;
+pub use ray_cast::view::View;
+pub use report::{FrameReport, MemoryUsage};
+pub use settings::{MemoryLimits, NoiseModel, Settings};
+pub use storage::merge_policy::{MergeDecision, MergeImmediately, MergePolicy};
+pub use storage::reloaded::ReloadedBlocks;
+pub use tsdf_layer::{BlockReader, TsdfLayer};

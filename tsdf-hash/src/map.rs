@@ -1,64 +1,33 @@
-//! The map: fuse, take out, ask.
+//! The map: fuse, take out, look, mesh, ask, store.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3, Vector3};
 
-use crate::block::Block;
-use crate::fuse::{Frame, Sign};
-use crate::settings::Tiers;
-use crate::store::Store;
-use crate::surface::Surface;
-use crate::tiers::{Arrivals, Copies, Moment, Moves, Revisit, Swap, Verdict};
-use crate::view::{ColourView, DepthView, check_pose};
-use crate::{Error, Settings};
-
-/// What a frame did to the map.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FrameReport {
-    /// Pixels with a depth between `min_depth` and `max_depth`.
-    pub valid_pixels: usize,
-    /// Those of them that lie on smooth patches, seen not too steeply: the ones that are fused.
-    pub fused_pixels: usize,
-    /// Voxels that were updated.
-    pub voxels: usize,
-    /// Blocks with such voxels.
-    pub blocks: usize,
-    /// Blocks that were not there before.
-    pub blocks_added: usize,
-    /// Blocks that are no longer there.
-    pub blocks_removed: usize,
-    /// Blocks that left active memory by age.
-    pub blocks_left: usize,
-    /// Blocks that came back because the frame saw them again.
-    pub blocks_arrived: usize,
-    /// Blocks that were held for longer than [`Tiers::hold`] and were merged without a verdict.
-    pub blocks_overdue: usize,
-}
-
-/// Bytes and blocks of each tier. A block that has left and was seen again may have a copy in several.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Memory {
-    /// Active memory, held blocks included; capped by [`Settings::max_bytes`].
-    pub active_bytes: usize,
-    /// The host tier and the index of all cold blocks; capped by [`Tiers::host_bytes`].
-    pub host_bytes: usize,
-    /// Length of the swap file; capped by [`Tiers::disk_bytes`].
-    pub disk_bytes: u64,
-    /// Blocks in active memory, without those that are held.
-    pub active_blocks: usize,
-    /// Blocks that have come back and wait for a verdict.
-    pub held_blocks: usize,
-    /// Packed blocks in RAM.
-    pub host_blocks: usize,
-    /// Packed blocks in the swap file.
-    pub disk_blocks: usize,
-    /// Packed blocks that are still in the file that the map was opened from.
-    pub file_blocks: usize,
-}
-
-/// Seconds that pass with a frame of unknown time: the usual camera takes 30 a second.
-const FRAME_PERIOD: f64 = 1.0 / 30.0;
+use crate::blocks::trilinear::TrilinearCell;
+use crate::blocks::voxel_block::VoxelBlock;
+use crate::error::Error;
+use crate::file::contents::Contents;
+use crate::file::writer;
+use crate::frame_clock::FrameClock;
+use crate::images::{ColourView, DepthView, Intrinsics};
+use crate::integration::integrator::{Frame, Operation};
+use crate::integration::plane_image::PlaneImage;
+use crate::mesh::block_mesh::MeshScale;
+use crate::mesh::incremental::IncrementalMesher;
+use crate::mesh::triangle_mesh::Mesh;
+use crate::ray_cast::camera::Camera;
+use crate::ray_cast::caster;
+use crate::ray_cast::settings::RayCastSettings;
+use crate::ray_cast::view::View;
+use crate::report::{FrameReport, MemoryUsage};
+use crate::settings::{MemoryLimits, Settings};
+use crate::storage::block_storage::{BlockStorage, Transfers};
+use crate::storage::frame_update::{FrameJob, apply_frame};
+use crate::storage::merge_policy::{MergeDecision, MergePolicy};
+use crate::storage::reloaded::ReloadedBlocks;
+use crate::storage::swap_file::SwapFile;
 
 /// A truncated signed distance field in hashed blocks of 8³ voxels.
 ///
@@ -66,48 +35,78 @@ const FRAME_PERIOD: f64 = 1.0 / 30.0;
 /// `floor(point / 8h)`. Distances are positive on the side of the camera.
 pub struct Map {
     pub(crate) settings: Settings,
-    pub(crate) copies: Copies,
-    surface: Surface,
-    pub(crate) clock: Clock,
-}
-
-/// The time of the last frame.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct Clock {
-    pub(crate) last: Option<f64>,
-    /// Whether any frame came with its time.
-    pub(crate) stamped: bool,
+    pub(crate) storage: BlockStorage,
+    plane_image: PlaneImage,
+    pub(crate) clock: FrameClock,
 }
 
 impl Map {
     /// An empty map.
     ///
     /// # Errors
-    /// [`Error::InvalidSetting`], and [`Error::SwapFile`] when there is to be a disk tier.
+    /// [`Error::InvalidSetting`], and [`Error::SwapFileMismatch`] when there is to be a swap file.
     pub fn new(settings: Settings) -> Result<Self, Error> {
         settings.check()?;
-        if settings.tiers.disk_bytes > 0 {
-            return Err(Error::SwapFile { disk_bytes: settings.tiers.disk_bytes });
+        if settings.memory.disk_bytes > 0 {
+            return Err(Error::SwapFileMismatch { disk_bytes: settings.memory.disk_bytes });
         }
-        Self::with_copies(settings, None)
+        Self::with_storage(settings, None)
     }
 
-    /// An empty map with a disk tier in the file `swap`, which is created, or emptied, and removed with the map.
+    /// An empty map with the swap file `swap`, which is created, or emptied, and removed with the map.
     ///
     /// # Errors
-    /// [`Error::InvalidSetting`], [`Error::SwapFile`] without a disk tier, [`Error::Io`].
+    /// [`Error::InvalidSetting`], [`Error::SwapFileMismatch`] without [`MemoryLimits::disk_bytes`], [`Error::Io`].
     pub fn with_swap(settings: Settings, swap: &Path) -> Result<Self, Error> {
         settings.check()?;
-        if settings.tiers.disk_bytes == 0 {
-            return Err(Error::SwapFile { disk_bytes: 0 });
+        if settings.memory.disk_bytes == 0 {
+            return Err(Error::SwapFileMismatch { disk_bytes: 0 });
         }
-        let swap = Swap::create(swap, settings.tiers.disk_bytes);
-        Self::with_copies(settings, Some(swap.map_err(|source| Error::Io { what: "creating the swap file", source })?))
+        let swap = SwapFile::create(swap, settings.memory.disk_bytes);
+        Self::with_storage(settings, Some(swap.map_err(|source| Error::Io { what: "creating the swap file", source })?))
     }
 
-    fn with_copies(settings: Settings, swap: Option<Swap>) -> Result<Self, Error> {
-        let copies = Copies::new(settings.max_bytes, settings.tiers, swap)?;
-        Ok(Self { settings, copies, surface: Surface::default(), clock: Clock::default() })
+    fn with_storage(settings: Settings, swap: Option<SwapFile>) -> Result<Self, Error> {
+        let storage = BlockStorage::new(settings.max_bytes, settings.memory, swap)?;
+        Ok(Self { settings, storage, plane_image: PlaneImage::default(), clock: FrameClock::default() })
+    }
+
+    /// Opens a file written by [`save`](Self::save) with the settings it was saved with; [`MapFile`](crate::MapFile) does it
+    /// with others.
+    ///
+    /// # Errors
+    /// As [`MapFile::open`](crate::MapFile::open) and [`MapFile::into_map`](crate::MapFile::into_map).
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let contents = Contents::read(path)?;
+        let settings = contents.settings;
+        Self::from_contents(contents, settings, None)
+    }
+
+    /// What [`MapFile::into_map`](crate::MapFile::into_map) does.
+    pub(crate) fn from_contents(contents: Contents, settings: Settings, swap: Option<&Path>) -> Result<Self, Error> {
+        let Settings { max_bytes, threads, memory, .. } = settings;
+        if settings != (Settings { max_bytes, threads, memory, ..contents.settings }) {
+            return Err(Error::IncompatibleSettings);
+        }
+        let mut map = match swap {
+            Some(swap) => Self::with_swap(settings, swap)?,
+            None => Self::new(settings)?,
+        };
+        map.clock = contents.clock;
+        let (file, blocks) = contents.into_blocks();
+        map.storage.open(file, &blocks)?;
+        Ok(map)
+    }
+
+    /// Writes the whole map, evicted blocks included, to a file; with a mesh, if there is one, and with any metadata.
+    ///
+    /// It is written beside and moved to its place when it is complete and on disk: after a crash there is the old file or
+    /// the new one.
+    ///
+    /// # Errors
+    /// [`Error::Io`], and [`Error::CorruptBlock`] when a block cannot be read.
+    pub fn save(&self, path: &Path, mesh: Option<&Mesh>, metadata: &BTreeMap<String, Vec<u8>>) -> Result<(), Error> {
+        writer::save(path, &self.settings, self.clock, &self.storage, mesh, metadata)
     }
 
     /// The settings given to [`new`](Self::new).
@@ -121,18 +120,15 @@ impl Map {
     ///
     /// # Errors
     /// Views, intrinsics or pose that make no sense, [`Error::NoDepth`], [`Error::OutOfRange`], [`Error::OutOfBudget`],
-    /// [`Error::Saturated`], and with tiers [`Error::TiersFull`], [`Error::Io`], [`Error::Damaged`]. The map is then as it
-    /// was.
+    /// [`Error::Saturated`], and where blocks can be evicted [`Error::StorageFull`], [`Error::Io`], [`Error::CorruptBlock`].
+    /// The map is then as it was.
     pub fn integrate(
         &mut self,
         depth: &DepthView,
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
     ) -> Result<FrameReport, Error> {
-        let time = self.clock.last.map_or(0.0, |last| if self.clock.stamped { last } else { last + FRAME_PERIOD });
-        let report = self.apply(Sign::Plus, depth, colour, world_from_camera, time)?;
-        self.clock.last = Some(time);
-        Ok(report)
+        self.integrate_then(self.clock.next(), depth, colour, world_from_camera)
     }
 
     /// [`integrate`](Self::integrate) of a frame that was taken at `time`, seconds: what decides which blocks are old.
@@ -147,12 +143,18 @@ impl Map {
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
     ) -> Result<FrameReport, Error> {
-        let last = self.clock.last.unwrap_or(f64::MIN);
-        if !(time.is_finite() && time > last) {
-            return Err(Error::InvalidTime { time, last });
-        }
-        let report = self.apply(Sign::Plus, depth, colour, world_from_camera, time)?;
-        self.clock = Clock { last: Some(time), stamped: true };
+        self.integrate_then(self.clock.at(time)?, depth, colour, world_from_camera)
+    }
+
+    fn integrate_then(
+        &mut self,
+        clock: FrameClock,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        world_from_camera: &Isometry3<f64>,
+    ) -> Result<FrameReport, Error> {
+        let report = self.apply(Operation::Integrate, depth, colour, world_from_camera, clock.time())?;
+        self.clock = clock;
         Ok(report)
     }
 
@@ -169,111 +171,168 @@ impl Map {
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
     ) -> Result<FrameReport, Error> {
-        self.apply(Sign::Minus, depth, colour, world_from_camera, self.clock.last.unwrap_or(0.0))
+        self.apply(Operation::Deintegrate, depth, colour, world_from_camera, self.clock.time())
     }
 
     fn apply(
         &mut self,
-        sign: Sign,
+        operation: Operation,
         depth: &DepthView,
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
         time: f64,
     ) -> Result<FrameReport, Error> {
-        depth.check()?;
-        if let Some(colour) = colour {
-            colour.check()?;
-        }
-        check_pose(world_from_camera)?;
-        self.surface.read(depth, world_from_camera, &self.settings)?;
-        let frame = Frame::new(&self.surface, &depth.intrinsics, colour, world_from_camera, &self.settings);
-        let eye = world_from_camera.translation.vector / self.settings.block_size();
-        let moment = Moment { time, eye: eye.into() };
-        let change = self.copies.change(&frame, sign, &self.surface.keys, moment, self.settings.threads)?;
-        let moves = match sign {
-            Sign::Plus => self.copies.settle(&change.touched, time),
-            Sign::Minus => Moves::default(),
+        let frame = Frame::read(&mut self.plane_image, depth, colour, world_from_camera, &self.settings)?;
+        let camera = world_from_camera.translation.vector / self.settings.block_size();
+        let job = FrameJob { frame: &frame, operation, time, camera: camera.into(), threads: self.settings.threads };
+        let change = apply_frame(&mut self.storage, job, &frame.plane_image.keys)?;
+        let transfers = match operation {
+            Operation::Integrate => self.storage.transfer(&change.touched, time),
+            Operation::Deintegrate => Transfers::default(),
         };
         Ok(FrameReport {
-            valid_pixels: self.surface.valid,
-            fused_pixels: self.surface.fused,
+            valid_pixels: self.plane_image.valid,
+            fused_pixels: self.plane_image.fused,
             voxels: change.voxels,
             blocks: change.blocks,
             blocks_added: change.added,
             blocks_removed: change.removed,
-            blocks_left: moves.left,
-            blocks_arrived: moves.arrived,
-            blocks_overdue: moves.overdue,
+            blocks_evicted: transfers.evicted,
+            blocks_reloaded: transfers.reloaded,
+            blocks_timed_out: transfers.timed_out,
         })
     }
 
     /// Bytes in active memory: what [`Settings::max_bytes`] caps. The working memory of a call (about 17 bytes per pixel)
     /// and the meshes handed out are not in it.
     pub fn bytes(&self) -> usize {
-        self.copies.active_bytes()
+        self.storage.active_bytes()
     }
 
     /// Where the blocks are, and the bytes they take.
-    pub fn memory(&self) -> Memory {
-        let [host_blocks, disk_blocks, file_blocks] = self.copies.cold.counts();
-        Memory {
+    pub fn memory(&self) -> MemoryUsage {
+        let [host_blocks, disk_blocks, file_blocks] = self.storage.evicted.counts();
+        MemoryUsage {
             active_bytes: self.bytes(),
-            host_bytes: self.copies.cold.host_bytes(),
-            disk_bytes: self.copies.cold.disk_bytes(),
-            active_blocks: self.copies.active.len(),
-            held_blocks: self.copies.held.len(),
+            host_bytes: self.storage.evicted.host_bytes(),
+            disk_bytes: self.storage.evicted.disk_bytes(),
+            active_blocks: self.storage.active.len(),
+            reloaded_blocks: self.storage.reloaded.len(),
             host_blocks,
             disk_blocks,
             file_blocks,
         }
     }
 
-    /// Number of blocks in all tiers, of 7168 bytes each when active.
+    /// Number of blocks, evicted ones included, of 7168 bytes each when active.
     pub fn blocks(&self) -> usize {
-        self.copies.len()
+        self.storage.len()
     }
 
-    /// A hash of all voxels in all tiers, in the order of the block coordinates: equal for equal maps, whatever the order
-    /// of the frames, the number of threads, and the memory they were given.
+    /// A hash of all voxels, evicted ones included, in the order of the block coordinates: equal for equal maps, whatever
+    /// the order of the frames, the number of threads, and the memory they were given.
     pub fn hash(&self) -> u64 {
-        self.copies.hash()
+        self.storage.hash()
     }
 
-    /// The blocks that have come back and are held, to be looked at.
-    pub fn arrivals(&self) -> Arrivals<'_> {
-        Arrivals { held: &self.copies.held, active: self }
+    /// The reloaded blocks that wait for a decision, to be looked at.
+    pub fn reloaded_blocks(&self) -> ReloadedBlocks<'_> {
+        ReloadedBlocks::new(&self.storage.reloaded, &self.storage.active, &self.settings)
     }
 
-    /// Asks for a verdict about the blocks that are held, if there are any, and returns how many were merged.
+    /// Asks for a decision about the reloaded blocks, if there are any, and returns how many were merged.
     ///
     /// # Errors
-    /// Those of the tiers, when a held block has to make room. The map's sums are as they were.
-    pub fn revisit(&mut self, revisit: &mut dyn Revisit) -> Result<usize, Error> {
-        if self.arrivals().is_empty() {
+    /// Those of the evicted memory, when a reloaded block has to make room. The map's sums are as they were.
+    pub fn merge_reloaded(&mut self, policy: &mut dyn MergePolicy) -> Result<usize, Error> {
+        let reloaded = self.reloaded_blocks();
+        if reloaded.is_empty() {
             return Ok(0);
         }
-        match revisit.judge(&self.arrivals()) {
-            Verdict::Merge => self.copies.merge_held(),
-            Verdict::Hold => Ok(0),
+        match policy.decide(&reloaded) {
+            MergeDecision::Merge => self.storage.merge_reloaded(),
+            MergeDecision::Defer => Ok(0),
         }
     }
 
     /// A copy of the whole map in active memory without a cap, to mesh or to query.
     ///
     /// # Errors
-    /// [`Error::Io`] and [`Error::Damaged`] when a block cannot be read.
-    pub fn whole(&self) -> Result<Self, Error> {
-        let settings = Settings { max_bytes: usize::MAX, tiers: Tiers::default(), ..self.settings };
+    /// [`Error::Io`] and [`Error::CorruptBlock`] when a block cannot be read.
+    pub fn consolidated(&self) -> Result<Self, Error> {
+        let settings = Settings { max_bytes: usize::MAX, memory: MemoryLimits::default(), ..self.settings };
         let mut whole = Self::new(settings)?;
-        for key in self.copies.sorted_keys() {
-            let mut sum = Box::new(Block::ZERO);
-            let seen = self.copies.total(key, &mut sum)?;
-            whole.copies.active.insert(key, sum, seen);
+        for key in self.storage.sorted_keys() {
+            let mut sum = Box::new(VoxelBlock::ZERO);
+            let history = self.storage.total(key, &mut sum)?;
+            whole.storage.active.insert(key, sum, history);
         }
         Ok(whole)
     }
 
-    pub(crate) fn store(&self) -> &Store {
-        &self.copies.active
+    /// The surface as a camera at `world_from_camera` sees it, by casting one ray per pixel through the active blocks.
+    ///
+    /// A hit is where the interpolated distance first falls through zero, within half a voxel of an observed
+    /// voxel along each axis. A ray that meets the solid from an unobserved side ends there without a hit.
+    ///
+    /// # Errors
+    /// Settings, size, intrinsics or pose that make no sense.
+    pub fn ray_cast(
+        &self,
+        intrinsics: &Intrinsics,
+        width: usize,
+        height: usize,
+        world_from_camera: &Isometry3<f64>,
+        settings: &RayCastSettings,
+    ) -> Result<View, Error> {
+        let mut view = View::new();
+        self.ray_cast_into(intrinsics, width, height, world_from_camera, settings, &mut view)?;
+        Ok(view)
+    }
+
+    /// [`ray_cast`](Self::ray_cast) into a view that exists.
+    ///
+    /// # Errors
+    /// As [`ray_cast`](Self::ray_cast); the view is then as it was.
+    pub fn ray_cast_into(
+        &self,
+        intrinsics: &Intrinsics,
+        width: usize,
+        height: usize,
+        world_from_camera: &Isometry3<f64>,
+        settings: &RayCastSettings,
+        view: &mut View,
+    ) -> Result<(), Error> {
+        let camera = Camera::new(intrinsics, (width, height), world_from_camera, &self.settings, settings)?;
+        view.resize(intrinsics, (width, height), world_from_camera);
+        caster::fill(&self.storage.active, &camera, settings, view);
+        Ok(())
+    }
+
+    /// The zero level of the field by marching cubes, where all eight voxels of a cell have been observed and the distance
+    /// does not jump; of the blocks in active memory. [`IncrementalMesher`] has that of all blocks, and follows a map that
+    /// changes.
+    ///
+    /// Vertices and faces come in the order of the block coordinates, so equal maps give equal meshes. The sign test is
+    /// "solid where the distance is below zero". Every edge has at most two faces.
+    pub fn mesh(&self) -> Mesh {
+        IncrementalMesher::of_active(&self.storage.active, &MeshScale::new(&self.settings))
+    }
+
+    /// Signed distance from the nearest surface, metres, by trilinear interpolation in active memory; `None` where one of
+    /// the eight voxels around the point was never observed (farther than `μ` from every surface, behind one, or unseen).
+    pub fn distance(&self, point_in_world: &Point3<f64>) -> Option<f64> {
+        self.cell_around(point_in_world).map(|cell| cell.distance())
+    }
+
+    /// [`distance`](Self::distance), and its gradient in the world: the exact one of the interpolation, of length about
+    /// one near a surface, away from it. It jumps where the point passes from one cell of voxels to the next.
+    pub fn distance_and_gradient(&self, point_in_world: &Point3<f64>) -> Option<(f64, Vector3<f64>)> {
+        let cell = self.cell_around(point_in_world)?;
+        Some((cell.distance(), cell.gradient() / self.settings.voxel_size))
+    }
+
+    fn cell_around(&self, point_in_world: &Point3<f64>) -> Option<TrilinearCell> {
+        TrilinearCell::around(&self.settings, |key| self.storage.active.get(key), point_in_world)
     }
 }

@@ -1,7 +1,7 @@
 //! How fine, how far, how much memory.
 
-use crate::Error;
-use crate::block::SIDE;
+use crate::blocks::voxel_block::SIDE;
+use crate::error::Error;
 
 /// Axial noise of a depth camera: `σ(z) = base + quadratic (z − nearest)²`, metres.
 ///
@@ -23,30 +23,32 @@ impl Default for NoiseModel {
     }
 }
 
-/// Where blocks go that active memory has no room for, or that have not been seen for long (thesis Paper I, section 4.3).
+/// Where blocks are evicted to that active memory has no room for, or that have not been updated for long (thesis Paper I,
+/// section 4.3).
 ///
-/// Every tier has a hard cap in bytes. By default there is none but active memory, and a map that outgrows
-/// [`Settings::max_bytes`] refuses frames.
+/// RAM and disk have hard caps in bytes. By default nothing is evicted, and a map that outgrows [`Settings::max_bytes`]
+/// refuses frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
-pub struct Tiers {
-    /// Cap of the host tier: packed blocks in RAM, and the index of all blocks outside active memory, of 150 bytes
-    /// each at most. 0, the default, means no tier but active memory; otherwise 65536 at least.
+pub struct MemoryLimits {
+    /// Cap of the evicted blocks in RAM and of the index of all evicted blocks, of 150 bytes each at most. 0, the default,
+    /// means that nothing is evicted; otherwise 65536 at least.
     pub host_bytes: usize,
-    /// Cap of the disk tier, a file of the map's own ([`Map::with_swap`](crate::Map::with_swap)); 0, the default: none.
+    /// Cap of the swap file ([`Map::with_swap`](crate::Map::with_swap)); 0, the default: none.
     pub disk_bytes: u64,
-    /// `t_old`: blocks that no frame has updated for longer leave active memory, seconds (not printed; ours: 2).
-    pub age: f64,
-    /// Most blocks that leave by age, and most that come back, per frame (not printed; ours: 1024).
-    pub transfers: usize,
-    /// How long blocks that come back are held for the caller's verdict ([`Revisit`](crate::Revisit)) before they are
-    /// merged without one, seconds (ours: 0, merged at once).
-    pub hold: f64,
+    /// `t_old`: blocks that no frame has updated for longer are evicted, seconds (not printed; ours: 2).
+    pub max_age: f64,
+    /// Most blocks that are evicted by age, and most that are reloaded, per frame (not printed; ours: 1024).
+    pub max_transfers: usize,
+    /// How long reloaded blocks wait for the caller's decision ([`MergePolicy`](crate::MergePolicy)) before they are merged
+    /// without one, seconds (not in the paper, which merges in one place and waits in another; 0, the default: merged at
+    /// once).
+    pub merge_timeout: f64,
 }
 
-impl Default for Tiers {
+impl Default for MemoryLimits {
     fn default() -> Self {
-        Self { host_bytes: 0, disk_bytes: 0, age: 2.0, transfers: 1024, hold: 0.0 }
+        Self { host_bytes: 0, disk_bytes: 0, max_age: 2.0, max_transfers: 1024, merge_timeout: 0.0 }
     }
 }
 
@@ -70,7 +72,7 @@ pub struct Settings {
     /// Threads used inside one call; 1 spawns none. Results do not depend on it.
     pub threads: usize,
     /// Memory besides the active one.
-    pub tiers: Tiers,
+    pub memory: MemoryLimits,
     /// Noise of the depth camera.
     pub noise: NoiseModel,
 }
@@ -85,7 +87,7 @@ impl Default for Settings {
             max_depth: 6.0,
             max_bytes: 512 << 20,
             threads: 1,
-            tiers: Tiers::default(),
+            memory: MemoryLimits::default(),
             noise: NoiseModel::default(),
         }
     }
@@ -119,13 +121,19 @@ impl Settings {
         within("max_depth", self.max_depth, 1e-3, 1e3, "0.001..=1000 metres")?;
         within("max_depth", self.max_depth - self.min_depth, 1e-6, 1e3, "larger than min_depth")?;
         within("threads", self.threads as f64, 1.0, 1024.0, "1..=1024")?;
-        let tiers = &self.tiers;
-        let least = if tiers.host_bytes == 0 { 0.0 } else { 65536.0 };
-        within("tiers.host_bytes", tiers.host_bytes as f64, least, f64::MAX, "0, or 65536 and more")?;
-        let disk = if tiers.host_bytes == 0 { 0.0 } else { f64::MAX };
-        within("tiers.disk_bytes", tiers.disk_bytes as f64, 0.0, disk, "0 without a host tier, which holds its index")?;
-        within("tiers.age", tiers.age, 0.0, f64::MAX, "0 seconds or more")?;
-        within("tiers.hold", tiers.hold, 0.0, f64::MAX, "0 seconds or more")?;
+        let memory = &self.memory;
+        let least = if memory.host_bytes == 0 { 0.0 } else { 65536.0 };
+        within("memory.host_bytes", memory.host_bytes as f64, least, f64::MAX, "0, or 65536 and more")?;
+        let disk = if memory.host_bytes == 0 { 0.0 } else { f64::MAX };
+        within(
+            "memory.disk_bytes",
+            memory.disk_bytes as f64,
+            0.0,
+            disk,
+            "0 without memory.host_bytes, which holds its index",
+        )?;
+        within("memory.max_age", memory.max_age, 0.0, f64::MAX, "0 seconds or more")?;
+        within("memory.merge_timeout", memory.merge_timeout, 0.0, f64::MAX, "0 seconds or more")?;
         within("noise.base", self.noise.base, 1e-9, 10.0, "1e-9..=10 metres")?;
         within("noise.quadratic", self.noise.quadratic, 0.0, 10.0, "0..=10 per metre")?;
         within("noise.nearest", self.noise.nearest, 0.0, 1e3, "0..=1000 metres")

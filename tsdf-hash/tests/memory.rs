@@ -7,8 +7,10 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
 
 #[path = "it/scene.rs"]
-#[allow(dead_code, reason = "shared with the other tests")]
 mod scene;
+
+#[path = "it/random.rs"]
+mod random;
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -16,12 +18,13 @@ use std::collections::BTreeMap;
 use std::io::{Seek, SeekFrom, Write};
 
 use nalgebra::{Isometry3, Point3};
+use random::Random;
 use scene::{Shot, look_at, room};
-use tsdf_hash::{Error, Map, MapFile, Settings, Tiers};
+use tsdf_hash::{Error, Map, MapFile, MemoryLimits, Settings};
 
 /// Bytes that a thread holds, and the most it has held at once.
 #[derive(Clone, Copy)]
-struct Held {
+struct ReloadedBlock {
     now: isize,
     peak: isize,
 }
@@ -30,14 +33,14 @@ struct Held {
 const BLOCK: usize = 14 * 512;
 
 thread_local! {
-    static ALL: Cell<Held> = const { Cell::new(Held { now: 0, peak: 0 }) };
-    static BLOCKS: Cell<Held> = const { Cell::new(Held { now: 0, peak: 0 }) };
+    static ALL: Cell<ReloadedBlock> = const { Cell::new(ReloadedBlock { now: 0, peak: 0 }) };
+    static BLOCKS: Cell<ReloadedBlock> = const { Cell::new(ReloadedBlock { now: 0, peak: 0 }) };
 }
 
 fn count(size: usize, sign: isize) {
-    let add = |held: &Cell<Held>| {
+    let add = |held: &Cell<ReloadedBlock>| {
         let now = held.get().now + sign * size as isize;
-        held.set(Held { now, peak: held.get().peak.max(now) });
+        held.set(ReloadedBlock { now, peak: held.get().peak.max(now) });
     };
     // Threads that end have no counter any more.
     let _ = ALL.try_with(add);
@@ -75,7 +78,7 @@ static ALLOCATOR: Counting = Counting;
 fn mark() -> [isize; 2] {
     [&ALL, &BLOCKS].map(|held| {
         let now = held.get().now;
-        held.set(Held { now, peak: now });
+        held.set(ReloadedBlock { now, peak: now });
         now
     })
 }
@@ -89,7 +92,7 @@ fn scratch(name: &str) -> std::path::PathBuf {
     std::env::temp_dir().join(format!("tsdf-hash-memory-{name}-{}", std::process::id()))
 }
 
-/// A turn in the room at 1 cm with 8 MiB for active memory, half of that for packed blocks, and the disk.
+/// A turn in the room at 1 cm with 8 MiB for active memory, half of that for evicted blocks, and the disk.
 fn room_in_eight_mebibytes(frames: usize, shrink: usize) {
     const CAP: usize = 8 << 20;
     const HOST: usize = 4 << 20;
@@ -103,8 +106,8 @@ fn room_in_eight_mebibytes(frames: usize, shrink: usize) {
         free.integrate(&shot.view(), None, &shot.world_from_camera).unwrap();
         work = work.max(peaks(start)[0] - free.bytes());
     }
-    let tiers = Tiers { host_bytes: HOST, disk_bytes: 256 << 20, ..Tiers::default() };
-    let settings = Settings { max_bytes: CAP, tiers, ..Settings::default() };
+    let memory = MemoryLimits { host_bytes: HOST, disk_bytes: 256 << 20, ..MemoryLimits::default() };
+    let settings = Settings { max_bytes: CAP, memory, ..Settings::default() };
     let start = mark();
     let mut map = Map::with_swap(settings, &scratch("room")).unwrap();
     for shot in &shots {
@@ -112,7 +115,7 @@ fn room_in_eight_mebibytes(frames: usize, shrink: usize) {
         map.integrate(&shot.view(), None, &shot.world_from_camera).unwrap();
         let [all, blocks] = peaks(start);
         let memory = map.memory();
-        // Blocks lie in the host tier, too, until they are packed.
+        // Evicted blocks are blocks, too, until they are compressed.
         assert!(blocks <= CAP + HOST, "{blocks} bytes of blocks");
         assert!(all <= CAP + HOST + work, "{all} bytes, {work} of them in work; {memory:?}");
         assert!(memory.active_bytes <= CAP && memory.host_bytes <= HOST && memory.disk_bytes <= 256 << 20);
@@ -121,7 +124,7 @@ fn room_in_eight_mebibytes(frames: usize, shrink: usize) {
     println!("last frame: {all} bytes at most, {blocks} of blocks, {work} in work; {:?}", map.memory());
     assert!(free.bytes() > 10 * CAP);
     assert_eq!((map.hash(), map.blocks()), (free.hash(), free.blocks()));
-    assert_eq!(map.whole().unwrap().hash(), free.hash());
+    assert_eq!(map.consolidated().unwrap().hash(), free.hash());
 }
 
 #[test]
@@ -152,8 +155,8 @@ fn corridor(x: f64) -> Shot {
 #[test]
 fn a_kilometre_of_corridor_fits_what_ten_metres_need() {
     let (active, host) = (1 << 20, 6 << 20);
-    let tiers = Tiers { host_bytes: host, disk_bytes: 1 << 30, ..Tiers::default() };
-    let settings = Settings { voxel_size: 0.1, max_bytes: active, max_depth: 8.0, tiers, ..Settings::default() };
+    let memory = MemoryLimits { host_bytes: host, disk_bytes: 1 << 30, ..MemoryLimits::default() };
+    let settings = Settings { voxel_size: 0.1, max_bytes: active, max_depth: 8.0, memory, ..Settings::default() };
     let start = mark();
     let mut map = Map::with_swap(settings, &scratch("corridor")).unwrap();
     let (mut first, mut ten, mut most, mut disk) = (None, 0, 0, Vec::new());
@@ -164,7 +167,7 @@ fn a_kilometre_of_corridor_fits_what_ten_metres_need() {
         drop(shot);
         let memory = map.memory();
         assert!(memory.active_bytes <= active && memory.host_bytes <= host, "{memory:?}");
-        // From when the blocks have filled their tier.
+        // From when the evicted blocks have filled their RAM.
         if memory.disk_bytes > 0 {
             let now = ALL.get().now - start[0];
             // From pillar to pillar, and all the way.
@@ -180,7 +183,7 @@ fn a_kilometre_of_corridor_fits_what_ten_metres_need() {
     // What the thread holds is flat, and below the caps and what a call keeps for the next one.
     assert!(most <= ten + (1 << 16) && most as usize <= active + host + 64 * 160 * 120);
     // Nothing is lost on the way, and nothing is left behind.
-    let whole = map.whole().unwrap();
+    let whole = map.consolidated().unwrap();
     assert!(whole.blocks() == map.blocks() && whole.hash() == map.hash());
     drop((map, whole, disk));
     // A line printed above may be kept by the harness.
@@ -189,7 +192,7 @@ fn a_kilometre_of_corridor_fits_what_ten_metres_need() {
 
 /// The format's own checksum, from its description: a chain of splitmix64 finalisers over words of eight bytes.
 fn checksum(bytes: &[u8]) -> u64 {
-    let mix = |x: u64| {
+    let mix64 = |x: u64| {
         let x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         let x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
         x ^ (x >> 31)
@@ -197,18 +200,12 @@ fn checksum(bytes: &[u8]) -> u64 {
     let words = bytes.len() / 8 + 1;
     let mut padded = bytes.to_vec();
     padded.resize(8 * words, 0);
-    let state =
-        padded.as_chunks::<8>().0.iter().fold(0, |state, word| mix(state ^ u64::from_le_bytes(*word)).wrapping_add(1));
-    mix(state ^ bytes.len() as u64)
-}
-
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, bound: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        ((self.0 >> 33) as usize) % bound
-    }
+    let state = padded
+        .as_chunks::<8>()
+        .0
+        .iter()
+        .fold(0, |state, word| mix64(state ^ u64::from_le_bytes(*word)).wrapping_add(1));
+    mix64(state ^ bytes.len() as u64)
 }
 
 /// Makes all checksums of the head right again, as far as the sections it names exist.
@@ -228,25 +225,30 @@ fn seal(bytes: &mut [u8]) {
     bytes[144..152].copy_from_slice(&sum.to_le_bytes());
 }
 
+/// Uniform in `0..bound`.
+fn below(random: &mut Random, bound: usize) -> usize {
+    (random.uniform() * bound as f64) as usize
+}
+
 fn mutate(good: &[u8], random: &mut Random) -> Vec<u8> {
     let mut bytes = good.to_vec();
-    for _ in 0..=random.below(3) {
+    for _ in 0..=below(random, 3) {
         let length = bytes.len();
         if length == 0 {
             break;
         }
         // Half of all mutations go where the lengths are.
-        let at = if random.below(2) == 0 { random.below(length.min(300)) } else { random.below(length) };
-        let to = (at + 1 + random.below(40)).min(length);
-        match random.below(7) {
-            0 => bytes[at] ^= 1 << random.below(8),
-            1 => bytes[at] = random.below(256) as u8,
-            2 => bytes[at..to].fill(if random.below(2) == 0 { 0 } else { 255 }),
+        let at = if below(random, 2) == 0 { below(random, length.min(300)) } else { below(random, length) };
+        let to = (at + 1 + below(random, 40)).min(length);
+        match below(random, 7) {
+            0 => bytes[at] ^= 1 << below(random, 8),
+            1 => bytes[at] = below(random, 256) as u8,
+            2 => bytes[at..to].fill(if below(random, 2) == 0 { 0 } else { 255 }),
             3 => bytes.truncate(at.max(1)),
             4 => drop(bytes.drain(at..to)),
-            5 => drop(bytes.splice(at..at, std::iter::repeat_n(random.below(256) as u8, to - at)).count()),
+            5 => drop(bytes.splice(at..at, std::iter::repeat_n(below(random, 256) as u8, to - at)).count()),
             _ => {
-                let from = random.below(length - (to - at) + 1);
+                let from = below(random, length - (to - at) + 1);
                 bytes.copy_within(from..from + (to - at), at);
             }
         }
@@ -260,7 +262,7 @@ type Contents = (u64, usize, Option<tsdf_hash::Mesh>, BTreeMap<String, Vec<u8>>)
 fn read_all(path: &std::path::Path) -> Result<Contents, Error> {
     let file = MapFile::open(path)?;
     let (mesh, metadata) = (file.mesh()?, file.metadata()?);
-    let settings = Settings { max_bytes: 1 << 24, threads: 1, tiers: Tiers::default(), ..*file.settings() };
+    let settings = Settings { max_bytes: 1 << 24, threads: 1, memory: MemoryLimits::default(), ..*file.settings() };
     let map = file.into_map(settings, None)?;
     Ok((map.hash(), map.blocks(), mesh, metadata))
 }
@@ -278,12 +280,12 @@ fn fuzz(mutations: usize) {
     let metadata = [("camera".to_string(), vec![3; 20]), ("place".to_string(), b"wall".to_vec())].into();
     map.save(&path, Some(&map.mesh()), &metadata).unwrap();
     let (good, expected) = (std::fs::read(&path).unwrap(), read_all(&path).unwrap());
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     let mut file = std::fs::File::options().write(true).open(&path).unwrap();
     let (mut accepted, mut sealed_accepted, mut most) = (0, 0, 0);
     for _ in 0..mutations {
         let mut bytes = mutate(&good, &mut random);
-        let sealed = random.below(3) == 0;
+        let sealed = below(&mut random, 3) == 0;
         if sealed {
             seal(&mut bytes);
         }

@@ -10,7 +10,6 @@ pub mod calibration;
 pub mod euroc;
 pub mod kitti;
 pub mod tum;
-mod yaml;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 

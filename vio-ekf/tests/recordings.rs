@@ -1,5 +1,6 @@
 //! Calibration files and the tables of ASL folders: what was printed by others is read, what we write is read back, and
 //! what is wrong is named.
+#![cfg(feature = "yaml")]
 #![allow(clippy::unwrap_used)]
 
 mod support;
@@ -97,19 +98,38 @@ fn what_is_wrong_is_named() {
         assert!(words.iter().all(|word| text.contains(word)), "{text}");
     };
     let spoilt = |from: &str, to: &str| read_kalibr_cameras(&KALIBR.replacen(from, to, 1)).unwrap_err();
-    has(spoilt("[0.0, -1.0, 0.0, 0.25]", "[0.0, -1.1, 0.0, 0.25]"), &["T_cam_imu", "line 3", "rigid"]);
+    has(spoilt("[0.0, -1.0, 0.0, 0.25]", "[0.0, -1.1, 0.0, 0.25]"), &["cam0.T_cam_imu", "line 4", "rigid"]);
     has(spoilt("pinhole", "omni"), &["camera_model", "pinhole"]);
     has(spoilt("equidistant", "fov"), &["distortion_model"]);
     has(spoilt("190.5", "nan"), &["intrinsics", "nan"]);
     has(spoilt("[512, 511]", "[512]"), &["resolution", "2 numbers", "1"]);
-    has(spoilt("0.003, 4e-4]", "0.003, 4e-4"), &["not closed"]);
-    has(spoilt("cam0:", "cam0"), &["key: value", "line 2"]);
+    has(spoilt("  resolution: [512, 511]\n", ""), &["cam0.resolution", "line 3", "missing"]);
+    // What is not YAML, or not the YAML that is meant: the line, and the format that is expected.
+    has(spoilt("0.003, 4e-4]", "0.003, 4e-4"), &["line 1", "Kalibr"]);
+    has(spoilt("cam0:", "cam0"), &["line 3", "Kalibr"]);
+    has(spoilt("[512, 511]", "{width: 512}"), &["line 14", "Kalibr"]);
+    has(spoilt("cam1:", "cam1: 3\ncam2:"), &["line 17", "Kalibr"]);
+    has(spoilt("resolution: [512, 511]", "camera_model: pinhole"), &["line 14", "duplicate", "camera_model"]);
     has(read_kalibr_cameras("").unwrap_err(), &["cam0"]);
+    has(read_kalibr_imu("").unwrap_err(), &["update_rate", "missing"]);
     has(asl::read_imu("1,0,0,0,0,0,9.8\n0,0,0,0,0,0,9.8\n").unwrap_err(), &["line 2", "sort"]);
     has(asl::read_imu("1,0,0,nan,0,0,9.8\n").unwrap_err(), &["line 1", "column 4"]);
     has(asl::read_imu("1,0,0,0,0,9.8\n").unwrap_err(), &["6 columns"]);
     has(asl::read_images("5,a.png\n5,b.png\n").unwrap_err(), &["line 2", "sort"]);
     assert_eq!(asl::read_imu("1,0,0,0,0,0,9.8\n1,1,1,1,1,1,1\n2,0,0,0,0,0,9.8\n").unwrap().len(), 2);
+}
+
+/// `%YAML:1.0` is no directive of YAML, a matrix has a tag of OpenCV's, lists go on over lines, numbers stand in quotes.
+#[test]
+fn what_opencv_writes_is_read() {
+    let text = "\u{feff}%YAML:1.0\n---\nT_BS: !!opencv-matrix\n   rows: 4\n   cols: 4\n   dt: d\n   \
+                data: [ 1., 0., 0., 5e-1, 0., 1., 0., 0.,\n       0., 0., 1., -2., 0., 0., 0., 1. ]\nrate_hz: \"200\"\n\
+                gyroscope_noise_density: 1.6968e-04 # [ rad / s / sqrt(Hz) ]\ngyroscope_random_walk: 2e-5\n\
+                accelerometer_noise_density: 2.0000e-3\naccelerometer_random_walk: .003\n";
+    let imu = read_asl_imu(text).unwrap();
+    let noise = ImuNoise { gyro_density: 1.6968e-4, gyro_walk: 2e-5, accel_density: 2e-3, accel_walk: 3e-3 };
+    assert_eq!((imu.noise, imu.rate_hz), (noise, 200.0));
+    assert_eq!(imu.body_from_imu, Isometry3::translation(0.5, 0.0, -2.0));
 }
 
 #[test]

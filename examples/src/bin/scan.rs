@@ -8,7 +8,7 @@ use clap::{Parser, ValueEnum};
 use paintcopter_examples::mesh_io::{PlyMesh, write_ply};
 use paintcopter_examples::report::save_figures;
 use paintcopter_examples::scan::{Device, Scan, ScanReport, ScanSettings, open_sequence, save_views};
-use tsdf_hash::Tiers;
+use tsdf_hash::MemoryLimits;
 
 /// Maps a recorded RGB-D sequence into a voxel-hashed distance field and its mesh.
 #[derive(Parser)]
@@ -113,19 +113,22 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
 
 fn settings(arguments: &Arguments) -> ScanSettings {
     let threads = arguments.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
-    let tiers =
-        Tiers { host_bytes: arguments.host_mib << 20, disk_bytes: arguments.disk_mib << 20, ..Tiers::default() };
+    let memory = MemoryLimits {
+        host_bytes: arguments.host_mib << 20,
+        disk_bytes: arguments.disk_mib << 20,
+        ..MemoryLimits::default()
+    };
     let map = tsdf_hash::Settings {
         voxel_size: arguments.voxel,
         max_depth: arguments.max_depth,
         carve: arguments.carve,
         max_bytes: arguments.active_mib << 20,
         threads: threads.clamp(1, 1024),
-        tiers,
+        memory,
         ..tsdf_hash::Settings::default()
     };
     let device = match arguments.device {
-        // The tiers are the processor's.
+        // Eviction is done by the map on the processor only.
         DeviceName::Auto if arguments.host_mib == 0 => Device::Auto,
         DeviceName::Gpu => Device::Gpu,
         DeviceName::Auto | DeviceName::Cpu => Device::Cpu,

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use cpu_time::ProcessTime;
 use nalgebra::Isometry3;
-use tsdf_hash::{CastSettings, Map, MapFile, Mesh, MeshKeeper};
+use tsdf_hash::{IncrementalMesher, Map, MapFile, Mesh, RayCastSettings};
 use vio_ekf::{Stamp, Trajectory};
 
 use super::decode::Images;
@@ -86,11 +86,11 @@ impl Scan {
     pub fn run(folder: &Path, sequence: &Sequence, settings: &ScanSettings) -> Result<Self, ScanError> {
         let stage = Stage::start("fuse");
         let mut store = MapStore::open(initial_map(settings)?, settings.device)?;
-        let (mut mesher, mut metrics) = (MeshKeeper::new(), ScanMetrics::default());
+        let (mut mesher, mut metrics) = (IncrementalMesher::new(), ScanMetrics::default());
         let (mut fused, mut skipped) = (Vec::with_capacity(sequence.frames.len()), Vec::new());
         let mut trajectory = Trajectory::default();
         // What has left active memory is not seen by a ray: then each ray cast comes while its surroundings are still there.
-        let leaving = settings.map.tiers.host_bytes > 0;
+        let leaving = settings.map.memory.host_bytes > 0;
         let due = |index: usize| index.is_multiple_of(settings.ray_cast_every.max(1));
         for (index, frame) in sequence.frames.iter().enumerate() {
             stage.share(index as f64 / sequence.frames.len() as f64);
@@ -143,15 +143,15 @@ fn initial_map(settings: &ScanSettings) -> Result<Map, ScanError> {
     };
     let stored = |source| ScanError::Stored { path: path.display().to_string(), source };
     let file = MapFile::open(path).map_err(stored)?;
-    let tsdf_hash::Settings { max_bytes, threads, tiers, .. } = settings.map;
-    let continued = tsdf_hash::Settings { max_bytes, threads, tiers, ..*file.settings() };
+    let tsdf_hash::Settings { max_bytes, threads, memory, .. } = settings.map;
+    let continued = tsdf_hash::Settings { max_bytes, threads, memory, ..*file.settings() };
     file.into_map(continued, settings.swap.as_deref()).map_err(stored)
 }
 
 /// Fuses a frame, updates the mesh and, if asked for, casts the map from where the frame was taken.
 fn fuse_frame(
     store: &mut MapStore,
-    mesher: &mut MeshKeeper,
+    mesher: &mut IncrementalMesher,
     sequence: &Sequence,
     index: usize,
     pose: &Isometry3<f64>,
@@ -183,7 +183,7 @@ fn ray_cast_check(store: &mut MapStore, sequence: &Sequence, index: usize) -> Re
     let images = Images::read(frame)?;
     let depth = images.depth(sequence.intrinsics, sequence.depth_scale);
     let &tsdf_hash::Settings { min_depth, max_depth, threads, .. } = store.settings();
-    let settings = CastSettings { min_depth, max_depth, colour: true, threads };
+    let settings = RayCastSettings { min_depth, max_depth, colour: true, threads };
     let start = ProcessTime::now();
     let view = store.dense().ray_cast(&depth.intrinsics, depth.width, depth.height, pose, &settings)?;
     let seconds = start.elapsed().as_secs_f64();

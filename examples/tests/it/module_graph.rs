@@ -150,7 +150,11 @@ impl ModuleGraph {
             "super" => self.modules[module].parent.map(Target::Module).into_iter().collect(),
             name => self.member(module, name, depth + 1),
         };
-        for name in &path[1..] {
+        for (before, name) in path.iter().zip(&path[1..]) {
+            // A function may bear the name of a module beside it; only the module has members.
+            if before.starts_with(char::is_lowercase) && found.iter().any(|target| matches!(target, Target::Module(_))) {
+                found.retain(|target| matches!(target, Target::Module(_)));
+            }
             let mut next = BTreeSet::new();
             for target in &found {
                 match target {
@@ -571,6 +575,17 @@ mod tests {
         let mut ring = ring;
         ring[1].1 = "pub use crate::b::X; pub struct Z;";
         assert_eq!(circles_of(&ring), [["a", "b", "c"]]);
+    }
+
+    #[test]
+    fn a_function_that_bears_the_name_of_a_module_has_no_members() {
+        let files = [
+            ("lib.rs", "mod a; mod b; mod c; pub use b::a;"),
+            ("a.rs", "pub struct A;"),
+            ("b.rs", "use crate::c::C; pub fn a(_: C) {}"),
+            ("c.rs", "use crate::a::A; pub struct C(A);"),
+        ];
+        assert!(circles_of(&files).is_empty());
     }
 
     #[test]

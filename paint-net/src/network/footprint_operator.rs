@@ -19,6 +19,8 @@ struct Axis<T> {
     /// Per phase: `(step + reach, tap)`, taps normalised to the sum 1.
     phases: Vec<Vec<(usize, T)>>,
     reach: usize,
+    /// Cells further apart have no pixel in common.
+    overlap: usize,
     /// Standard deviation of the profile, in strides.
     deviation: T,
 }
@@ -43,7 +45,8 @@ impl<T: Real> Axis<T> {
             .collect();
         let variance: f64 = taps.iter().zip(-radius..).map(|(tap, d)| tap * (d * d) as f64).sum();
         let deviation = T::of((variance / total).sqrt() / stride as f64);
-        Self { stride, phases, reach: reach as usize, deviation }
+        let overlap = 2 * (taps.len() / 2) / stride;
+        Self { stride, phases, reach: reach as usize, overlap, deviation }
     }
 }
 
@@ -53,9 +56,14 @@ impl<T: Real> FootprintOperator<T> {
         Self { along: Axis::new(taps, stride.0, first.0), down: Axis::new(taps, stride.1, first.1) }
     }
 
-    /// Cells beyond which a cell has no pixel in common with another's footprint, and margin that cell grids need.
+    /// Margin that grids of cells need.
     pub(crate) fn reach(&self) -> usize {
         self.along.reach.max(self.down.reach)
+    }
+
+    /// Two cells further apart than this have no pixel in common.
+    pub(crate) fn overlap(&self) -> usize {
+        self.along.overlap.max(self.down.overlap)
     }
 
     /// Rows and columns of pixels per cell.

@@ -1,7 +1,12 @@
-//! The safetensors format, as far as networks of `f32` need it: eight bytes with the length of a JSON header, the header
-//! (`name → dtype, shape, data_offsets`), and the numbers, little-endian.
+//! Named tensors of `f32` in the safetensors format.
+//!
+//! Files are read and checked by the crate `safetensors`. The header is written here: the crate writes notes in an order that
+//! differs from run to run, and one training must give the same bytes twice.
 
 use std::fmt::Write as _;
+
+use ::safetensors::{Dtype, SafeTensorError, SafeTensors};
+use serde_json::Value;
 
 use crate::error::Error;
 
@@ -13,27 +18,21 @@ pub(crate) struct Tensor {
     pub(crate) values: Vec<f32>,
 }
 
-/// Notes of a file: names and texts.
+/// Notes of a file: names and texts, in no order.
 pub(crate) type Notes = Vec<(String, String)>;
 
-/// Headers longer than this are refused; the format itself allows 100 MB.
-const LONGEST_HEADER: usize = 1 << 20;
-
-/// The bytes of a file with these tensors, in this order, and notes.
+/// The bytes of a file with these tensors and notes, in this order.
 pub(crate) fn write(tensors: &[Tensor], notes: &[(&str, String)]) -> Vec<u8> {
-    let mut header = String::from("{\"__metadata__\":{");
-    for (k, (name, note)) in notes.iter().enumerate() {
-        let comma = if k > 0 { "," } else { "" };
-        // Writing into a string cannot fail.
-        let _ = write!(header, "{comma}\"{}\":\"{}\"", escape(name), escape(note));
-    }
-    header.push('}');
+    let quoted = |text: &str| Value::from(text).to_string();
+    let notes: Vec<String> = notes.iter().map(|(name, note)| format!("{}:{}", quoted(name), quoted(note))).collect();
+    let mut header = format!("{{\"__metadata__\":{{{}}}", notes.join(","));
     let mut at = 0;
     for t in tensors {
         let end = at + 4 * t.values.len();
         let shape: Vec<String> = t.shape.iter().map(ToString::to_string).collect();
-        let (name, shape) = (escape(&t.name), shape.join(","));
-        let _ = write!(header, ",\"{name}\":{{\"dtype\":\"F32\",\"shape\":[{shape}],\"data_offsets\":[{at},{end}]}}");
+        let (name, shape) = (quoted(&t.name), shape.join(","));
+        // Writing into a string cannot fail.
+        let _ = write!(header, ",{name}:{{\"dtype\":\"F32\",\"shape\":[{shape}],\"data_offsets\":[{at},{end}]}}");
         at = end;
     }
     header.push('}');
@@ -47,151 +46,22 @@ pub(crate) fn write(tensors: &[Tensor], notes: &[(&str, String)]) -> Vec<u8> {
     bytes
 }
 
-fn escape(text: &str) -> String {
-    text.chars()
-        .filter(|c| !c.is_control())
-        .flat_map(|c| {
-            let slash = matches!(c, '"' | '\\').then_some('\\');
-            slash.into_iter().chain([c])
-        })
-        .collect()
-}
-
-/// Tensors and notes of a file.
+/// Tensors and notes of a file, the tensors in the order of their values.
 pub(crate) fn read(bytes: &[u8]) -> Result<(Vec<Tensor>, Notes), Error> {
-    let bad = |why: &'static str| Error::Weights(why.to_string());
-    let (length, rest) = bytes.split_first_chunk::<8>().ok_or_else(|| bad("shorter than its header"))?;
-    let length = usize::try_from(u64::from_le_bytes(*length)).unwrap_or(usize::MAX);
-    if length > LONGEST_HEADER || length > rest.len() {
-        return Err(bad("the header is longer than the file: not safetensors, or cut off"));
-    }
-    let (header, data) = rest.split_at(length);
-    let header = std::str::from_utf8(header).map_err(|_| bad("the header is not text: not safetensors"))?;
-    let Some(Value::Object(entries)) = Parser { text: header.trim_end(), depth: 0 }.whole() else {
-        return Err(bad("the header is not a JSON object: not safetensors"));
-    };
-    let (mut tensors, mut notes) = (Vec::new(), Vec::new());
-    for (name, value) in entries {
-        let Value::Object(fields) = value else { return Err(bad("an entry of the header is not an object")) };
-        if name == "__metadata__" {
-            notes.extend(fields.into_iter().filter_map(|(k, v)| match v {
-                Value::Text(text) => Some((k, text)),
-                Value::Object(_) | Value::List(_) | Value::Whole => None,
-            }));
-            continue;
+    let bad = |error: SafeTensorError| Error::Weights(format!("not safetensors, or cut off ({error})"));
+    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(bad)?;
+    let file = SafeTensors::deserialize(bytes).map_err(bad)?;
+    let tensor = |name: String| {
+        let view = file.tensor(&name).map_err(bad)?;
+        if view.dtype() != Dtype::F32 {
+            return Err(Error::Weights(format!("tensor {name} is not F32")));
         }
-        tensors.push(tensor(name, &fields, data)?);
-    }
+        let values = view.data().as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
+        Ok(Tensor { shape: view.shape().to_vec(), values, name })
+    };
+    let tensors = metadata.offset_keys().into_iter().map(tensor).collect::<Result<_, _>>()?;
+    let notes = metadata.metadata().iter().flatten().map(|(name, note)| (name.clone(), note.clone())).collect();
     Ok((tensors, notes))
-}
-
-fn tensor(name: String, fields: &[(String, Value)], data: &[u8]) -> Result<Tensor, Error> {
-    let field = |key: &str| fields.iter().find(|(k, _)| k == key).map(|(_, v)| v);
-    let bad = |why: &str| Error::Weights(format!("tensor {name} {why}"));
-    if !matches!(field("dtype"), Some(Value::Text(t)) if t == "F32") {
-        return Err(bad("is not F32"));
-    }
-    let list = |key: &str| match field(key) {
-        Some(Value::List(list)) => Ok(list.clone()),
-        _ => Err(bad("lacks its shape or offsets")),
-    };
-    let (shape, offsets) = (list("shape")?, list("data_offsets")?);
-    let count = shape.iter().try_fold(4_usize, |n, &k| n.checked_mul(k)).ok_or_else(|| bad("is too large"))?;
-    let &[from, to] = offsets.as_slice() else { return Err(bad("does not have two offsets")) };
-    let bytes =
-        data.get(from..to).filter(|b| b.len() == count).ok_or_else(|| bad("does not fit the file: cut off?"))?;
-    let values = bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
-    Ok(Tensor { name, shape, values })
-}
-
-/// As much of JSON as headers hold.
-enum Value {
-    Object(Vec<(String, Value)>),
-    List(Vec<usize>),
-    Text(String),
-    /// No header needs it outside of lists.
-    Whole,
-}
-
-struct Parser<'a> {
-    text: &'a str,
-    depth: usize,
-}
-
-impl Parser<'_> {
-    fn whole(mut self) -> Option<Value> {
-        let value = self.value()?;
-        self.text.trim_start().is_empty().then_some(value)
-    }
-
-    fn take(&mut self, token: char) -> bool {
-        self.text = self.text.trim_start();
-        self.text.strip_prefix(token).map(|rest| self.text = rest).is_some()
-    }
-
-    fn value(&mut self) -> Option<Value> {
-        if self.take('{') {
-            // Headers nest twice.
-            self.depth += 1;
-            if self.depth > 4 {
-                return None;
-            }
-            let entries = self.list('}', |p| {
-                let key = p.take('"').then(|| p.string()).flatten()?;
-                p.take(':').then(|| p.value()).flatten().map(|value| (key, value))
-            });
-            self.depth -= 1;
-            entries.map(Value::Object)
-        } else if self.take('[') {
-            self.list(']', Self::number).map(Value::List)
-        } else if self.take('"') {
-            self.string().map(Value::Text)
-        } else {
-            self.number().map(|_| Value::Whole)
-        }
-    }
-
-    fn list<R>(&mut self, end: char, mut item: impl FnMut(&mut Self) -> Option<R>) -> Option<Vec<R>> {
-        let mut items = Vec::new();
-        if self.take(end) {
-            return Some(items);
-        }
-        loop {
-            items.push(item(self)?);
-            if self.take(end) {
-                return Some(items);
-            }
-            if !self.take(',') {
-                return None;
-            }
-        }
-    }
-
-    fn number(&mut self) -> Option<usize> {
-        self.text = self.text.trim_start();
-        let digits = self.text.len() - self.text.trim_start_matches(|c: char| c.is_ascii_digit()).len();
-        let (number, rest) = self.text.split_at(digits);
-        self.text = rest;
-        number.parse().ok()
-    }
-
-    /// The rest of a string, up to its closing quote.
-    fn string(&mut self) -> Option<String> {
-        let mut text = String::new();
-        let mut characters = self.text.chars();
-        loop {
-            match characters.next()? {
-                '"' => break,
-                '\\' => match characters.next()? {
-                    c @ ('"' | '\\' | '/') => text.push(c),
-                    _ => return None,
-                },
-                c => text.push(c),
-            }
-        }
-        self.text = characters.as_str();
-        Some(text)
-    }
 }
 
 #[cfg(test)]
@@ -223,6 +93,15 @@ mod tests {
         assert_eq!(header.len(), 0x40);
         let (tensors, _) = read(&bytes).unwrap();
         assert_eq!(tensors, [Tensor { name: "x".into(), shape: vec![2], values: vec![1.0, 2.0] }]);
+    }
+
+    #[test]
+    fn the_shipped_weights_are_written_byte_for_byte() {
+        let shipped = include_bytes!("../../weights/painter.safetensors");
+        let (tensors, mut notes) = read(shipped).unwrap();
+        notes.sort();
+        let notes: Vec<(&str, String)> = notes.iter().map(|(name, note)| (name.as_str(), note.clone())).collect();
+        assert!(write(&tensors, &notes) == shipped);
     }
 
     #[test]

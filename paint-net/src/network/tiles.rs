@@ -147,9 +147,10 @@ impl Tiles<'_> {
         work.pass.update(problem, &mut work.paint, &mut work.last_step);
     }
 
-    /// A tile with its halo, the receptive field of a pass: the layers of the network, and two footprints between cells.
+    /// A tile with its halo, the receptive field of a pass: a cell per convolution, and the footprints of two cells that share a
+    /// pixel.
     fn with_halo(&self, columns: &Range<usize>, rows: &Range<usize>) -> Region {
-        let halo = self.network.architecture().layers + 1 + 2 * self.footprint.reach();
+        let halo = self.network.architecture().layers + 1 + self.footprint.overlap();
         let grown = |r: &Range<usize>, end: usize| r.start.saturating_sub(halo)..(r.end + halo).min(end);
         (grown(columns, self.cells.0), grown(rows, self.cells.1))
     }

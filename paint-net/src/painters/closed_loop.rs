@@ -81,18 +81,19 @@ fn coat(
     let scaled = |s: &Spray| Spray { volume: (share * s.volume / flow.gain).min(limits.max_volume), ..*s };
     let sprays: Vec<Spray> = plan.sprays.iter().map(scaled).filter(|s| s.volume >= limits.min_volume).collect();
     let waypoints = plan.waypoints.iter().map(scaled).collect();
-    let (sprays, after) = if let Some(ink) = observer.spray(&sprays)? {
+    let after = if let Some(ink) = observer.spray(&sprays)? {
         let after = depth_of(&ink, problem)?;
         flow.update(problem, share, canvas, plan, &after);
-        (sprays, after)
-    } else {
+        after
+    } else if sprays.len() == plan.sprays.len() {
         // Nobody measured: the share is painted as planned.
-        let before = canvas.data();
         let mut after = plan.canvas.clone();
-        for (c, &before) in after.data_mut().iter_mut().zip(before) {
+        for (c, &before) in after.data_mut().iter_mut().zip(canvas.data()) {
             *c = before + share * (*c - before);
         }
-        (plan.sprays.iter().map(scaled).collect(), after)
+        after
+    } else {
+        Painting::render(&PaintProblem { canvas: Some(canvas), ..*problem }, sprays.clone()).canvas
     };
     Ok(Painting { waypoints, ..Painting::new(sprays, after, problem.saturation) })
 }

@@ -1,13 +1,14 @@
 //! Seeded noise functions of the plane.
 
-/// A number in `[0, 1)` for a lattice point: the splitmix64 finaliser over seed and coordinates.
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+
+/// A number in `[0, 1)` for a lattice point: the first of the splitmix64 stream that seed and coordinates start.
 pub fn lattice(seed: u64, x: i64, y: i64) -> f64 {
-    let mut z = seed
-        .wrapping_add(0x9E37_79B9_7F4A_7C15_u64.wrapping_mul(x.wrapping_add(1) as u64))
+    let start = seed
+        .wrapping_add(0x9E37_79B9_7F4A_7C15_u64.wrapping_mul(x as u64))
         .wrapping_add(0xC2B2_AE3D_27D4_EB4F_u64.wrapping_mul(y.wrapping_add(1) as u64));
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    (SplitMix64::seed_from_u64(start).next_u64() >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 /// Value noise in `[0, 1]`: lattice numbers blended by quintics, so that second derivatives are continuous.

@@ -172,3 +172,21 @@ fn fingerprint(settings: &TrainSettings) -> String {
         architecture.layers, architecture.channels, architecture.stages
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_seed_decides_on_weights_and_pictures() {
+        let trainer = |seed| {
+            let settings = TrainSettings { seed, batch: 2, side: 16, passes: 2, ..TrainSettings::default() };
+            Trainer::new(settings).unwrap()
+        };
+        let (mut one, mut other) = (trainer(1), trainer(2));
+        assert!(one.network() != other.network());
+        // The same weights on other pictures have another loss.
+        other.descent.parameters.clone_from(&one.descent.parameters);
+        assert!(one.step().loss != other.step().loss);
+    }
+}

@@ -259,3 +259,23 @@ fn fingerprint(settings: &ThesisSettings) -> String {
          {max_gradient_norm}, {architecture:?}, {objective:?}"
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_seed_decides_on_weights_and_noise() {
+        let architecture =
+            Architecture { side: 8, steps: 4, latent: 3, hidden: 5, read: 2, radius: 3.0, stop: 3.0, paint: 4 };
+        let trainer = |seed| {
+            ThesisTrainer::new(ThesisSettings { seed, architecture, batch: 2, ..ThesisSettings::default() }).unwrap()
+        };
+        let picture = |_| Ok(Image::filled(8, 8, 0.5));
+        let (mut one, mut other) = (trainer(1), trainer(2));
+        assert!(one.network() != other.network());
+        // The same weights on the same pictures with other noise have another loss.
+        other.descent.parameters.clone_from(&one.descent.parameters);
+        assert!(one.step(&picture).unwrap().total != other.step(&picture).unwrap().total);
+    }
+}

@@ -1,6 +1,6 @@
 //! A checksum of 64 bits.
 
-use crate::key::mix;
+use crate::hashing::mix64;
 
 /// Each word of eight bytes enters a chain of bijections: whatever changes in one word changes the result.
 #[derive(Clone, Default)]
@@ -38,7 +38,7 @@ impl Checksum {
     }
 
     fn enter(&mut self, word: [u8; 8]) {
-        self.state = mix(self.state ^ u64::from_le_bytes(word)).wrapping_add(1);
+        self.state = mix64(self.state ^ u64::from_le_bytes(word)).wrapping_add(1);
     }
 
     pub(crate) fn value(&self) -> u64 {
@@ -46,7 +46,7 @@ impl Checksum {
         let begun = (self.length % 8) as usize;
         last.word[begun..].fill(0);
         last.enter(last.word);
-        mix(last.state ^ self.length)
+        mix64(last.state ^ self.length)
     }
 }
 

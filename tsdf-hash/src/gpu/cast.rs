@@ -5,15 +5,16 @@
 
 use wgpu::{Buffer, BufferUsages};
 
-use super::device::{Device, Program};
-use super::pool::{MOST_PAGES, OTHER_BINDINGS, Pool};
-use super::{Scratch, spread};
-use crate::cast::camera::Camera;
-use crate::cast::fields::{ALL, Place, Range, in_view};
-use crate::cast::march::{GRAZE, LEAST_SLOPE, LEAST_STEP};
-use crate::cast::tiles::Tiles;
-use crate::key::Key;
-use crate::{Error, View};
+use crate::blocks::block_key::BlockKey;
+use crate::error::Error;
+use crate::gpu::device::{Device, Program};
+use crate::gpu::pool::{MAX_PAGES, OTHER_BINDINGS, Pool};
+use crate::gpu::scratch::{Scratch, spread};
+use crate::ray_cast::camera::Camera;
+use crate::ray_cast::march::{GRAZING_TOLERANCE, MIN_SLOPE, MIN_STEP};
+use crate::ray_cast::tiles::Tiles;
+use crate::ray_cast::unpacked::{ALL, CellRange, VisibleBlock, in_view};
+use crate::ray_cast::view::View;
 
 const EXACT: &str = include_str!("exact.wgsl");
 const FIELDS: &str = include_str!("fields.wgsl");
@@ -26,7 +27,7 @@ const WINDOW: usize = 256;
 const PIXEL_WORDS: usize = 6;
 /// Bytes of a block with its border, unpacked.
 const FIELD_BYTES: usize = 12 * ALL;
-const NOWHERE: u32 = u32::MAX;
+const ABSENT: u32 = u32::MAX;
 
 /// The programs and their buffers.
 pub(super) struct Caster {
@@ -45,7 +46,7 @@ pub(super) struct Caster {
 
 impl Caster {
     pub(super) fn new(device: &Device) -> Result<Self, Error> {
-        let pages = MOST_PAGES.min(device.bindings - OTHER_BINDINGS);
+        let pages = MAX_PAGES.min(device.bindings - OTHER_BINDINGS);
         let fields = [EXACT, FIELDS, &page_word(pages)].concat();
         let mut writable = vec![false; OTHER_BINDINGS + pages];
         writable[1] = true;
@@ -54,7 +55,7 @@ impl Caster {
         Ok(Self {
             range: device.program("range", &fields, &writable)?,
             unpack: device.program("unpack", &fields, &writable)?,
-            cast: device.program("look", &[EXACT, CAST].concat(), &[false, false, true])?,
+            cast: device.program("ray_cast", &[EXACT, CAST].concat(), &[false, false, true])?,
             uniform: device.buffer("view", 3 * WINDOW, BufferUsages::UNIFORM | BufferUsages::COPY_DST)?,
             blocks: Scratch::new("blocks in view", storage),
             ranges: Scratch::new("ranges of cells", read),
@@ -77,15 +78,15 @@ impl Caster {
     ) -> Result<(), Error> {
         let seen = in_view(pool.keys(), camera);
         let ranges = self.ranges(device, pool, &seen)?;
-        let crossed: Vec<(Key, Range)> =
+        let crossed: Vec<(BlockKey, CellRange)> =
             seen.into_iter().zip(ranges).filter_map(|(key, range)| Some((key, range?))).collect();
-        let places: Vec<Place> =
-            crossed.iter().enumerate().map(|(k, &(key, range))| Place::new(k, key, range, camera)).collect();
+        let places: Vec<VisibleBlock> =
+            crossed.iter().enumerate().map(|(k, &(key, range))| VisibleBlock::new(k, key, range, camera)).collect();
         self.tiles.fill(&places, camera);
         let mut commands = device.commands();
         let fields = self.fields.of(device, FIELD_BYTES * crossed.len())?.clone();
-        let keys: Vec<Key> = crossed.iter().map(|(key, _)| *key).collect();
-        self.walk(device, pool, &keys, Pass { fields: &fields, unpack: true, colour }, &mut commands)?;
+        let keys: Vec<BlockKey> = crossed.iter().map(|(key, _)| *key).collect();
+        self.record_blocks(device, pool, &keys, Pass { fields: &fields, unpack: true, colour }, &mut commands)?;
         self.cast(device, camera, &places, colour, &fields, &mut commands)?;
         let bytes = 4 * PIXEL_WORDS * view.depth.len();
         let staging = self.staging.of(device, bytes)?;
@@ -93,12 +94,12 @@ impl Caster {
         device.run_and_read(commands, staging, bytes, |words| read_pixels(words, view))
     }
 
-    /// For each block, the range of its cells that the surface crosses.
-    fn ranges(&mut self, device: &Device, pool: &Pool, keys: &[Key]) -> Result<Vec<Option<Range>>, Error> {
+    /// For each block, the range of its cells that the plane_image crosses.
+    fn ranges(&mut self, device: &Device, pool: &Pool, keys: &[BlockKey]) -> Result<Vec<Option<CellRange>>, Error> {
         let bytes = 4 * keys.len();
         let ranges = self.ranges.of(device, bytes)?.clone();
         let mut commands = device.commands();
-        self.walk(device, pool, keys, Pass { fields: &ranges, unpack: false, colour: false }, &mut commands)?;
+        self.record_blocks(device, pool, keys, Pass { fields: &ranges, unpack: false, colour: false }, &mut commands)?;
         let staging = self.staging.of(device, bytes)?;
         commands.copy_buffer_to_buffer(&ranges, 0, staging, 0, bytes as u64);
         device.run_and_read(commands, staging, bytes, |words| {
@@ -111,11 +112,11 @@ impl Caster {
     }
 
     /// Records a pass over blocks and their upper neighbours.
-    fn walk(
+    fn record_blocks(
         &mut self,
         device: &Device,
         pool: &Pool,
-        keys: &[Key],
+        keys: &[BlockKey],
         pass: Pass,
         commands: &mut wgpu::CommandEncoder,
     ) -> Result<(), Error> {
@@ -123,9 +124,9 @@ impl Caster {
             return Ok(());
         }
         let blocks = self.blocks.of(device, 32 * keys.len())?;
-        let place = |key: Key, n: i32| {
+        let place = |key: BlockKey, n: i32| {
             let place = key.neighbour([n & 1, n >> 1 & 1, n >> 2]).and_then(|key| pool.get(key));
-            place.map_or(NOWHERE, |place| (place.page as u32) << 24 | place.slot)
+            place.map_or(ABSENT, |place| (place.page as u32) << 24 | place.slot)
         };
         let groups = keys.iter().flat_map(|&key| [[0, 1, 2, 3], [4, 5, 6, 7]].map(|half| half.map(|n| place(key, n))));
         let groups: Vec<[u32; 4]> = groups.collect();
@@ -134,7 +135,7 @@ impl Caster {
         device.write(&self.uniform, window, [keys.len() as u32, u32::from(pass.colour), 0, 0].into_iter())?;
         let program = if pass.unpack { &self.unpack } else { &self.range };
         // Pages that do not exist yet are never read: the first one stands in for them.
-        let pages = MOST_PAGES.min(device.bindings - OTHER_BINDINGS);
+        let pages = MAX_PAGES.min(device.bindings - OTHER_BINDINGS);
         let pages = (0..pages).map(|page| pool.pages.get(page).unwrap_or(&pool.pages[0]));
         let storage: Vec<&Buffer> = [blocks, pass.fields].into_iter().chain(pages).collect();
         let group = device.bind(program, REQUEST_BYTES, &self.uniform, &storage);
@@ -147,7 +148,7 @@ impl Caster {
         &mut self,
         device: &Device,
         camera: &Camera,
-        places: &[Place],
+        places: &[VisibleBlock],
         colour: bool,
         fields: &Buffer,
         commands: &mut wgpu::CommandEncoder,
@@ -163,7 +164,7 @@ impl Caster {
         let at_places = scene.len();
         for place in places {
             scene.extend(place.origin.map(f32::to_bits));
-            scene.push(place.field as u32);
+            scene.push(place.block as u32);
             scene.extend(place.low.map(f32::to_bits));
             scene.extend(place.high.map(f32::to_bits));
         }
@@ -173,7 +174,7 @@ impl Caster {
         scene.extend(&self.tiles.lists);
         let [x, y, z] = step.map(f32::to_bits);
         let [near, far, truncation] = [camera.min_depth, camera.max_depth, camera.truncation].map(f32::to_bits);
-        let [slope, graze, least] = [LEAST_SLOPE, GRAZE, LEAST_STEP].map(f32::to_bits);
+        let [slope, graze, least] = [MIN_SLOPE, GRAZING_TOLERANCE, MIN_STEP].map(f32::to_bits);
         let [at_places, at_starts, at_lists] = [at_places, at_starts, at_lists].map(|at| at as u32);
         let sizes = [width as u32, height as u32, self.tiles.columns as u32, u32::from(colour)];
         let rest = [x, y, z, near, far, truncation, slope, graze, least, at_places, at_starts, at_lists, 0];
@@ -193,7 +194,7 @@ impl Caster {
 struct Pass<'a> {
     /// What is written.
     fields: &'a Buffer,
-    /// Whether to unpack them, or else look where the surface crosses them.
+    /// Whether to unpack them, or else to find where the surface crosses them.
     unpack: bool,
     colour: bool,
 }

@@ -1,8 +1,8 @@
-// One ray per pixel through the unpacked blocks of its square, as cast/march.rs and cast/cell.rs do it.
+// One ray per pixel through the unpacked blocks of its tile, as ray_cast/march.rs and ray_cast/cell.rs do it.
 
 struct View {
     size: vec2<u32>,
-    // Squares of pixels per row of them.
+    // Tiles of pixels per row of them.
     columns: u32,
     with_colour: u32,
     // Change of the direction from pixel to pixel, voxels per metre of depth.
@@ -10,11 +10,11 @@ struct View {
     min_depth: f32,
     max_depth: f32,
     truncation: f32,
-    least_slope: f32,
-    graze: f32,
-    least_step: f32,
-    // Words of the scene before its places, its starts and its lists; directions of rows come first.
-    places: u32,
+    min_slope: f32,
+    grazing_tolerance: f32,
+    min_step: f32,
+    // Words of the scene before its blocks, its starts and its lists; directions of rows come first.
+    visible: u32,
     starts: u32,
     lists: u32,
     unknown_zero: u32,
@@ -35,8 +35,8 @@ const UNOBSERVED: f32 = 4.0;
 const UNSEEN: u32 = 0x808080u;
 
 struct Ray {
-    // First node of the field, its words counted.
-    field: u32,
+    // First node of the block, its words counted.
+    block: u32,
     origin: vec3<f32>,
     direction: vec3<f32>,
     per_voxel: f32,
@@ -56,7 +56,7 @@ struct Pixel {
 
 const NONE: Pixel = Pixel(0.0, vec3(0.0), UNSEEN, 0u);
 
-// What a ray did in a field.
+// What a ray did in a block.
 struct Outcome {
     // 0: it left; 1: it ends.
     ends: bool,
@@ -94,7 +94,7 @@ fn cell_at(ray: Ray, t: f32) -> Cell {
 }
 
 fn corners(ray: Ray, cell: Cell) -> array<f32, 8> {
-    let first = ray.field + 3u * cell.first;
+    let first = ray.block + 3u * cell.first;
     var c: array<f32, 8>;
     for (var k = 0u; k < 8u; k++) {
         c[k] = bitcast<f32>(nodes[first + 3u * ((k & 1u) + Y * ((k >> 1u) & 1u) + Z * (k >> 2u))]);
@@ -152,7 +152,7 @@ fn colour_of(ray: Ray, cell: Cell) -> u32 {
     for (var z = 0u; z < 2u; z++) {
         var rows: array<vec4<u32>, 2>;
         for (var y = 0u; y < 2u; y++) {
-            let at = ray.field + 3u * (cell.first + Y * y + Z * z);
+            let at = ray.block + 3u * (cell.first + Y * y + Z * z);
             rows[y] = (16u - share[0]) * coloured(at) + share[0] * coloured(at + 3u);
         }
         layers[z] = ((16u - share[1]) * rows[0] + share[1] * rows[1]) >> vec4(4u);
@@ -203,7 +203,7 @@ fn refine(ray: Ray, near: f32, above: f32, far: f32, below: f32) -> Pixel {
     if !(slope < 0.0) {
         return NONE;
     }
-    let reach = times(view.least_step, ray.per_voxel);
+    let reach = times(view.min_step, ray.per_voxel);
     let depth = plus(t, smaller(larger(divide(-value, slope), -reach), reach));
     let scale = quotient(1.0, root(plus(plus(times(gx, gx), times(gy, gy)), times(gz, gz))));
     var colour = UNSEEN;
@@ -211,7 +211,7 @@ fn refine(ray: Ray, near: f32, above: f32, far: f32, below: f32) -> Pixel {
         colour = colour_of(ray, cell);
     }
     let nearest_node = cell.first + dot(nearest_of(cell), vec3(1u, Y, Z));
-    let weight = nodes[ray.field + 3u * nearest_node + 1u] & 0xffffu;
+    let weight = nodes[ray.block + 3u * nearest_node + 1u] & 0xffffu;
     return Pixel(depth, vec3(times(gx, scale), times(gy, scale), times(gz, scale)), colour, weight);
 }
 
@@ -222,17 +222,17 @@ fn through(ray: Ray, enter: f32, leave: f32) -> Outcome {
     var t = enter;
     loop {
         let value = sample(ray, cell_at(ray, t));
-        var step = view.least_step;
+        var step = view.min_step;
         if value > OBSERVED {
             outside = false;
         } else if value >= 0.0 {
             outside = true;
             before = t;
             before_value = value;
-            step = larger(times(value, view.truncation), view.least_step);
+            step = larger(times(value, view.truncation), view.min_step);
         } else if outside {
             return Outcome(true, refine(ray, before, before_value, t, value));
-        } else if value > -view.graze {
+        } else if value > -view.grazing_tolerance {
             return Outcome(true, refine(ray, t, 0.0, t, value));
         } else {
             return Outcome(true, NONE);
@@ -245,18 +245,18 @@ fn through(ray: Ray, enter: f32, leave: f32) -> Outcome {
     return Outcome(false, NONE);
 }
 
-fn cast_ray(direction: vec3<f32>, square: u32) -> Pixel {
+fn cast_ray(direction: vec3<f32>, tile: u32) -> Pixel {
     var inverse: vec3<f32>;
     for (var k = 0u; k < 3u; k++) {
-        inverse[k] = divide(1.0, select(direction[k], view.least_slope, abs(direction[k]) < view.least_slope));
+        inverse[k] = divide(1.0, select(direction[k], view.min_slope, abs(direction[k]) < view.min_slope));
     }
     let d = direction;
     let squared = plus(plus(times(d.x, d.x), times(d.y, d.y)), times(d.z, d.z));
     let per_voxel = quotient(1.0, root(squared));
-    for (var k = scene[view.starts + square]; k < scene[view.starts + square + 1u]; k++) {
-        let place = view.places + 10u * scene[view.lists + k];
-        let low = vector(place + 4u);
-        let high = vector(place + 7u);
+    for (var k = scene[view.starts + tile]; k < scene[view.starts + tile + 1u]; k++) {
+        let visible = view.visible + 10u * scene[view.lists + k];
+        let low = vector(visible + 4u);
+        let high = vector(visible + 7u);
         var enter = view.min_depth;
         var leave = view.max_depth;
         for (var axis = 0u; axis < 3u; axis++) {
@@ -266,7 +266,7 @@ fn cast_ray(direction: vec3<f32>, square: u32) -> Pixel {
             leave = min(leave, max(a, b));
         }
         if enter <= leave {
-            let ray = Ray(scene[place + 3u] * 3u * ALL, vector(place), direction, per_voxel);
+            let ray = Ray(scene[visible + 3u] * 3u * ALL, vector(visible), direction, per_voxel);
             let outcome = through(ray, enter, leave);
             if outcome.ends {
                 return outcome.pixel;
@@ -277,7 +277,7 @@ fn cast_ray(direction: vec3<f32>, square: u32) -> Pixel {
 }
 
 @compute @workgroup_size(8, 8)
-fn look(@builtin(global_invocation_id) id: vec3<u32>) {
+fn ray_cast(@builtin(global_invocation_id) id: vec3<u32>) {
     unknown_zero = view.unknown_zero;
     if any(id.xy >= view.size) {
         return;

@@ -7,8 +7,8 @@ use std::task::{Context, Poll, Waker};
 
 use wgpu::{Buffer, BufferUsages, ComputePipeline};
 
-use super::GpuOptions;
-use crate::Error;
+use crate::error::Error;
+use crate::gpu::options::GpuOptions;
 
 /// Storage buffers of the integration: what the weakest adapters offer.
 const LEAST_BINDINGS: u32 = 4;

@@ -6,20 +6,20 @@
 
 var<private> unknown_zero: u32;
 
-fn held(x: f32) -> f32 {
+fn rounded_once(x: f32) -> f32 {
     return bitcast<f32>(bitcast<u32>(x) ^ unknown_zero);
 }
 
 fn plus(a: f32, b: f32) -> f32 {
-    return held(a + b);
+    return rounded_once(a + b);
 }
 
 fn minus(a: f32, b: f32) -> f32 {
-    return held(a - b);
+    return rounded_once(a - b);
 }
 
 fn times(a: f32, b: f32) -> f32 {
-    return held(a * b);
+    return rounded_once(a * b);
 }
 
 // 1.5 2^23: adding it rounds a float below 2^22 to an integer, to even at a tie.

@@ -1,4 +1,4 @@
-// Blocks with their upper borders, as cast/fields.rs unpacks them: which cells the surface crosses, then the nodes of the
+// Blocks with their upper borders, as ray_cast/unpacked.rs unpacks them: which cells the surface crosses, then the nodes of the
 // blocks where it does. `page_word` reads a page of the pool; it is generated, for as many pages as there are.
 
 struct Request {

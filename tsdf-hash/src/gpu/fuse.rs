@@ -2,14 +2,14 @@
 
 use wgpu::{Buffer, BufferUsages};
 
-use super::device::{Device, Program};
-use super::pool::Pool;
-use super::{Scratch, spread};
-use crate::Error;
-use crate::fuse::Frame;
-use crate::key::Key;
-use crate::surface::Plane;
-use crate::view::ColourData;
+use crate::blocks::block_key::BlockKey;
+use crate::error::Error;
+use crate::gpu::device::{Device, Program};
+use crate::gpu::pool::Pool;
+use crate::gpu::scratch::{Scratch, spread};
+use crate::images::ColourData;
+use crate::integration::integrator::Frame;
+use crate::integration::plane::Plane;
 
 const SOURCE: &str = concat!(include_str!("exact.wgsl"), include_str!("fuse.wgsl"));
 /// Bytes of the program's `Frame`, and of the windows at which it is seen.
@@ -25,22 +25,22 @@ const FRESH: u32 = 1 << 31;
 pub(super) enum Mode {
     /// Counts the voxels that a frame would touch in blocks that do not exist.
     Count = 0,
-    Plus = 1,
-    Minus = 2,
+    Integrate = 1,
+    Deintegrate = 2,
 }
 
 /// What a frame did to a block.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Tally(u32);
+pub(super) struct UpdateCount(u32);
 
-impl Tally {
+impl UpdateCount {
     /// Voxels touched.
     pub(super) fn voxels(self) -> usize {
         (self.0 & 0xffff) as usize
     }
 
     /// A counter ran over or under; the opposite update restores the block exactly.
-    pub(super) fn fault(self) -> bool {
+    pub(super) fn overflow(self) -> bool {
         self.0 & 1 << 16 != 0
     }
 
@@ -56,7 +56,7 @@ pub(super) struct Fuser {
     uniform: Buffer,
     pixels: Scratch,
     blocks: Scratch,
-    tallies: Scratch,
+    counts: Scratch,
     staging: Scratch,
 }
 
@@ -65,7 +65,7 @@ pub(super) struct Pass<'a> {
     pub(super) mode: Mode,
     pub(super) page: usize,
     /// Blocks of this pass, with their slots in the page.
-    pub(super) blocks: &'a [(Key, u32)],
+    pub(super) blocks: &'a [(BlockKey, u32)],
 }
 
 impl Fuser {
@@ -76,14 +76,14 @@ impl Fuser {
             uniform: device.buffer("frame", MOST_PASSES * WINDOW, BufferUsages::UNIFORM | BufferUsages::COPY_DST)?,
             pixels: Scratch::new("pixels", storage),
             blocks: Scratch::new("block list", storage),
-            tallies: Scratch::new("tallies", storage | BufferUsages::COPY_SRC),
-            staging: Scratch::new("tallies on their way", BufferUsages::MAP_READ | BufferUsages::COPY_DST),
+            counts: Scratch::new("counts", storage | BufferUsages::COPY_SRC),
+            staging: Scratch::new("counts on their way", BufferUsages::MAP_READ | BufferUsages::COPY_DST),
         })
     }
 
     /// Uploads what a frame is made of, for all passes until the next frame.
     pub(super) fn load(&mut self, device: &Device, frame: &Frame) -> Result<(), Error> {
-        let planes = &frame.surface.planes;
+        let planes = &frame.plane_image.planes;
         let colours = frame.colour.as_ref().map_or(ColourData::Rgb8(&[]), |colour| colour.data);
         let words = match colours {
             ColourData::Rgb8(data) => data.len().div_ceil(4),
@@ -110,20 +110,20 @@ impl Fuser {
         }
     }
 
-    /// Runs the passes in one submission and returns the tallies of their blocks, pass by pass.
+    /// Runs the passes in one submission and returns the counts of their blocks, pass by pass.
     pub(super) fn run(
         &mut self,
         device: &Device,
         pool: &Pool,
         frame: &Frame,
         passes: &[Pass],
-    ) -> Result<Vec<Tally>, Error> {
+    ) -> Result<Vec<UpdateCount>, Error> {
         let mut commands = self.record(device, pool, frame, passes)?;
         let bytes = 4 * total(passes);
         let staging = self.staging.of(device, bytes)?;
-        commands.copy_buffer_to_buffer(self.tallies.of(device, bytes)?, 0, staging, 0, bytes as u64);
+        commands.copy_buffer_to_buffer(self.counts.of(device, bytes)?, 0, staging, 0, bytes as u64);
         device.run_and_read(commands, staging, bytes, |words| {
-            words.iter().map(|&word| Tally(u32::from_ne_bytes(word))).collect()
+            words.iter().map(|&word| UpdateCount(u32::from_ne_bytes(word))).collect()
         })
     }
 
@@ -146,7 +146,7 @@ impl Fuser {
     ) -> Result<wgpu::CommandEncoder, Error> {
         let total = total(passes);
         let blocks = self.blocks.of(device, 16 * total)?;
-        let tallies = self.tallies.of(device, 4 * total)?;
+        let counts = self.counts.of(device, 4 * total)?;
         let pixels = self.pixels.of(device, 0)?;
         let mut commands = device.commands();
         let mut first = 0;
@@ -164,7 +164,7 @@ impl Fuser {
             )?;
             let words = uniform(frame, pass.mode, first, pass.blocks.len());
             device.write(&self.uniform, k * WINDOW, words.into_iter())?;
-            let storage = [blocks, pixels, tallies, &pool.pages[pass.page]];
+            let storage = [blocks, pixels, counts, &pool.pages[pass.page]];
             let group = device.bind(&self.program, FRAME_BYTES, &self.uniform, &storage);
             self.program.dispatch(&mut commands, &group, k * WINDOW, spread(pass.blocks.len()));
             first += pass.blocks.len();
@@ -191,13 +191,13 @@ fn uniform(frame: &Frame, mode: Mode, first: usize, count: usize) -> [u32; FRAME
             words[4 * axis + k] = step[(k, axis)].to_bits();
         }
     }
-    let surface = frame.surface;
-    words[12..14].copy_from_slice(&[surface.width as u32, surface.height as u32]);
+    let plane_image = frame.plane_image;
+    words[12..14].copy_from_slice(&[plane_image.width as u32, plane_image.height as u32]);
     if let Some(colour) = &frame.colour {
         words[14..16].copy_from_slice(&colour.last.map(f32::to_bits));
         words[16..18].copy_from_slice(&colour.scale.map(f32::to_bits));
         words[18..20].copy_from_slice(&colour.shift.map(f32::to_bits));
-        words[22] = 4 * surface.planes.len() as u32;
+        words[22] = 4 * plane_image.planes.len() as u32;
         words[23] = if matches!(colour.data, ColourData::Rgb8(_)) { 1 } else { 2 };
         words[28..30].copy_from_slice(&[colour.width as u32, u32::from(colour.is_aligned)]);
     }

@@ -1,4 +1,4 @@
-// The update of blocks by a frame, voxel by voxel as fuse.rs does it. One workgroup per block, two neighbouring voxels per
+// The update of blocks by a frame, voxel by voxel as integration/integrator.rs does it. One workgroup per block, two neighbouring voxels per
 // invocation: those whose weights share a word. No two invocations write the same word, so no order can show.
 
 struct Frame {
@@ -28,10 +28,10 @@ struct Frame {
     most_ahead: f32,
 }
 
-// Nothing is written but the tally.
+// Nothing is written but the count.
 const COUNT: u32 = 0u;
-const PLUS: u32 = 1u;
-const MINUS: u32 = 2u;
+const INTEGRATE: u32 = 1u;
+const DEINTEGRATE: u32 = 2u;
 
 const BLOCK_WORDS: u32 = 1792u;
 const WEIGHTS: u32 = 512u;
@@ -41,8 +41,8 @@ const MAX_COLOURS: u32 = 1040u;
 
 // The slot's bit for a block whose memory holds something else yet.
 const FRESH: u32 = 0x80000000u;
-// Of a tally; its low bits count voxels.
-const FAULT: u32 = 0x10000u;
+// Of a count; its low bits count voxels.
+const OVERFLOW: u32 = 0x10000u;
 const OBSERVED: u32 = 0x20000u;
 
 @group(0) @binding(0) var<uniform> frame: Frame;
@@ -50,16 +50,16 @@ const OBSERVED: u32 = 0x20000u;
 @group(0) @binding(1) var<storage, read> blocks: array<vec4<u32>>;
 // Planes of four words, then colours.
 @group(0) @binding(2) var<storage, read> pixels: array<u32>;
-@group(0) @binding(3) var<storage, read_write> tallies: array<u32>;
+@group(0) @binding(3) var<storage, read_write> counts: array<u32>;
 @group(0) @binding(4) var<storage, read_write> pool: array<u32>;
 
-var<workgroup> tally: atomic<u32>;
+var<workgroup> block_count: atomic<u32>;
 
 struct Voxel {
     distance: i32,
     weight: u32,
     colour: vec2<u32>,
-    // Of the tally.
+    // Of the count.
     mark: u32,
 }
 
@@ -93,18 +93,18 @@ fn observe(old: Voxel, distance: f32, weight: u32) -> Voxel {
     var voxel = old;
     let q = i32(nearest(clamp(distance, f32(-ONE), f32(ONE))));
     let change = q * i32(weight);
-    if frame.mode == MINUS {
+    if frame.mode == DEINTEGRATE {
         voxel.distance -= change;
         voxel.weight = (voxel.weight - weight) & 0xffffu;
         // No sum of observations can leave this range: what was taken out was not in.
         if old.weight < weight || magnitude(voxel.distance) > voxel.weight * u32(ONE) {
-            voxel.mark |= FAULT;
+            voxel.mark |= OVERFLOW;
         }
     } else {
         voxel.distance += change;
         voxel.weight = (voxel.weight + weight) & 0xffffu;
         if voxel.weight < weight {
-            voxel.mark |= FAULT;
+            voxel.mark |= OVERFLOW;
         }
     }
     return voxel;
@@ -117,10 +117,10 @@ fn magnitude(x: i32) -> u32 {
 fn observe_colour(old: Voxel, change: vec4<u32>) -> Voxel {
     var voxel = old;
     let sums = vec4(old.colour.x & 0xffffu, old.colour.x >> 16u, old.colour.y & 0xffffu, old.colour.y >> 16u);
-    let next = select(sums + change, sums - change, frame.mode == MINUS) & vec4(0xffffu);
+    let next = select(sums + change, sums - change, frame.mode == DEINTEGRATE) & vec4(0xffffu);
     // What is left of so many colours is no more than so many times the brightest: what was taken out was not in.
-    if next.w > MAX_COLOURS || (frame.mode == MINUS && any(next.xyz > vec3(63u * next.w))) {
-        voxel.mark |= FAULT;
+    if next.w > MAX_COLOURS || (frame.mode == DEINTEGRATE && any(next.xyz > vec3(63u * next.w))) {
+        voxel.mark |= OVERFLOW;
     }
     voxel.colour = vec2(next.x | (next.y << 16u), next.z | (next.w << 16u));
     return voxel;
@@ -215,7 +215,7 @@ fn fuse(
             pool[colours + 1u] = voxel.colour.y;
         }
         packed_weights |= voxel.weight << (16u * k);
-        mark = ((mark & 0xffffu) + (voxel.mark & 0xffffu)) | ((mark | voxel.mark) & FAULT);
+        mark = ((mark & 0xffffu) + (voxel.mark & 0xffffu)) | ((mark | voxel.mark) & OVERFLOW);
     }
     if packed_weights > 0u {
         mark |= OBSERVED;
@@ -225,13 +225,13 @@ fn fuse(
     }
     // Counts add and flags unite: the order of the invocations does not show.
     if (mark & 0xffffu) > 0u {
-        atomicAdd(&tally, mark & 0xffffu);
+        atomicAdd(&block_count, mark & 0xffffu);
     }
     if (mark >> 16u) > 0u {
-        atomicOr(&tally, mark & 0xffff0000u);
+        atomicOr(&block_count, mark & 0xffff0000u);
     }
     workgroupBarrier();
     if pair == 0u {
-        tallies[frame.first + at] = atomicLoad(&tally);
+        counts[frame.first + at] = atomicLoad(&block_count);
     }
 }

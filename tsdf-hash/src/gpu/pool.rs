@@ -2,24 +2,24 @@
 
 use wgpu::{Buffer, BufferUsages};
 
-use super::device::Device;
-use crate::Error;
-use crate::block::Block;
-use crate::key::Key;
-use crate::table::Table;
+use crate::blocks::active_blocks::MAX_BLOCKS;
+use crate::blocks::block_key::BlockKey;
+use crate::blocks::hash_table::HashTable;
+use crate::blocks::voxel_block::VoxelBlock;
+use crate::changes::ChangeClock;
+use crate::error::Error;
+use crate::gpu::device::Device;
 
-pub(super) const BLOCK_BYTES: usize = size_of::<Block>();
+pub(super) const BLOCK_BYTES: usize = size_of::<VoxelBlock>();
 /// More pages would not fit one program beside its other buffers.
-pub(super) const MOST_PAGES: usize = 4;
+pub(super) const MAX_PAGES: usize = 4;
 /// Storage buffers of a program beside the pages.
 pub(super) const OTHER_BINDINGS: usize = 2;
-/// The mesh names vertices by 32 bits, 1536 at most in a block.
-const MOST_BLOCKS: usize = 1 << 21;
-/// Bytes on the processor for each slot: its key, and its place in the list of free ones.
-const SLOT_BYTES: usize = size_of::<Key>() + size_of::<u32>();
-const VACANT: Key = Key(u64::MAX);
+/// Bytes on the processor for each slot: its key, its stamp, and its place in the list of free ones.
+const SLOT_BYTES: usize = size_of::<BlockKey>() + size_of::<u64>() + size_of::<u32>();
+const VACANT: BlockKey = BlockKey(u64::MAX);
 
-/// Where a block lies.
+/// The memory of a block.
 #[derive(Clone, Copy)]
 pub(super) struct Place {
     pub(super) page: usize,
@@ -39,31 +39,35 @@ pub(super) struct Pool {
     page_blocks: usize,
     capacity: usize,
     max_bytes: usize,
-    table: Table,
+    table: HashTable,
     /// The key in each slot used so far.
-    keys: Vec<Key>,
+    keys: Vec<BlockKey>,
+    /// When the block in each slot last changed, on the clock.
+    stamps: Vec<u64>,
     free: Vec<u32>,
+    pub(super) clock: ChangeClock,
 }
 
 impl Pool {
     pub(super) fn new(device: &Device, max_bytes: usize) -> Result<Self, Error> {
         // The table's growth makes the need jump, so the bound is searched for: it is monotone.
-        let (mut capacity, mut fails) = (0, MOST_BLOCKS.min(max_bytes / BLOCK_BYTES) + 1);
+        let (mut capacity, mut fails) = (0, MAX_BLOCKS.min(max_bytes / BLOCK_BYTES) + 1);
         while capacity + 1 < fails {
             let middle = usize::midpoint(capacity, fails);
             if host_bytes(middle) + middle * BLOCK_BYTES <= max_bytes { capacity = middle } else { fails = middle }
         }
-        let most = MOST_PAGES.min(device.bindings - OTHER_BINDINGS);
+        let most = MAX_PAGES.min(device.bindings - OTHER_BINDINGS);
         let page_blocks = (capacity / most).min(device.binding_bytes / BLOCK_BYTES);
         if page_blocks == 0 {
             let requirement = "large enough for four blocks: 65536 bytes do";
             return Err(Error::InvalidSetting { name: "max_bytes", value: max_bytes as f64, requirement });
         }
         let capacity = most * page_blocks;
-        let mut table = Table::new();
+        let mut table = HashTable::new();
         table.reserve(capacity);
-        let (keys, free) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
-        let mut pool = Self { pages: Vec::new(), page_blocks, capacity, max_bytes, table, keys, free };
+        let (keys, stamps) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
+        let (free, clock) = (Vec::with_capacity(capacity), ChangeClock::new());
+        let mut pool = Self { pages: Vec::new(), page_blocks, capacity, max_bytes, table, keys, stamps, free, clock };
         pool.reserve(device, 1)?;
         Ok(pool)
     }
@@ -85,7 +89,7 @@ impl Pool {
         Error::OutOfBudget { used: self.bytes(), max_bytes: self.max_bytes }
     }
 
-    pub(super) fn get(&self, key: Key) -> Option<Place> {
+    pub(super) fn get(&self, key: BlockKey) -> Option<Place> {
         self.table.get(key).map(|slot| self.place(slot))
     }
 
@@ -104,30 +108,46 @@ impl Pool {
     }
 
     /// Gives a new key a slot, whose memory holds anything; the caller has [reserved](Self::reserve) it.
-    pub(super) fn insert(&mut self, key: Key) -> Place {
+    pub(super) fn insert(&mut self, key: BlockKey) -> Place {
         let slot = self.free.pop().unwrap_or(self.keys.len() as u32);
         self.keys.resize(self.keys.len().max(slot as usize + 1), VACANT);
         self.keys[slot as usize] = key;
+        self.stamps.resize(self.keys.len(), 0);
+        self.stamps[slot as usize] = self.clock.tick();
         self.table.set(key, slot);
         self.place(slot as usize)
     }
 
-    pub(super) fn remove(&mut self, key: Key) {
+    pub(super) fn remove(&mut self, key: BlockKey) {
         if let Some(slot) = self.table.get(key) {
             self.table.remove(key);
             self.keys[slot] = VACANT;
             self.free.push(slot as u32);
+            self.clock.count_removed(1);
         }
     }
 
+    /// Notes that a block has changed.
+    pub(super) fn mark_changed(&mut self, key: BlockKey) {
+        if let Some(slot) = self.table.get(key) {
+            self.stamps[slot] = self.clock.tick();
+        }
+    }
+
+    /// The blocks that have changed since the clock stood at `stamp`.
+    pub(super) fn changed_since(&self, stamp: u64) -> impl Iterator<Item = BlockKey> {
+        let later = move |(key, at): (&BlockKey, &u64)| (*key != VACANT && *at > stamp).then_some(*key);
+        self.keys.iter().zip(&self.stamps).filter_map(later)
+    }
+
     /// All keys, in the order of their slots.
-    pub(super) fn keys(&self) -> impl Iterator<Item = Key> {
+    pub(super) fn keys(&self) -> impl Iterator<Item = BlockKey> {
         self.keys.iter().copied().filter(|&key| key != VACANT)
     }
 
     /// All keys, ascending.
-    pub(super) fn sorted_keys(&self) -> Vec<Key> {
-        let mut keys: Vec<Key> = self.keys().collect();
+    pub(super) fn sorted_keys(&self) -> Vec<BlockKey> {
+        let mut keys: Vec<BlockKey> = self.keys().collect();
         keys.sort_unstable();
         keys
     }
@@ -135,5 +155,5 @@ impl Pool {
 
 /// Bytes on the processor for this many blocks.
 fn host_bytes(blocks: usize) -> usize {
-    Table::bytes_for(blocks) + blocks * SLOT_BYTES
+    HashTable::bytes_for(blocks) + blocks * SLOT_BYTES
 }

@@ -2,10 +2,10 @@
 
 use wgpu::BufferUsages;
 
-use super::device::Device;
-use crate::Error;
-use crate::fuse::ROUNDER;
-use crate::key::mix;
+use crate::error::Error;
+use crate::gpu::device::Device;
+use crate::hashing::mix64;
+use crate::rounding::ROUNDER;
 
 const SOURCE: &str = concat!(include_str!("exact.wgsl"), include_str!("probe.wgsl"));
 /// Values that one pair yields.
@@ -30,7 +30,7 @@ pub(super) fn check(device: &Device) -> Result<(), Error> {
 
 /// Positive floats: every fourth pair with mantissas near their ends, where roundings are hardest.
 fn pair(n: u64) -> [f32; 2] {
-    let word = mix(n + 1);
+    let word = mix64(n + 1);
     let float = |word: u64| {
         let mantissa = match word >> 32 & 3 {
             _ if !n.is_multiple_of(4) => word,
@@ -42,7 +42,7 @@ fn pair(n: u64) -> [f32; 2] {
         // Exponents within 2^±24 of one.
         f32::from_bits(((103 + (word >> 40 & 63) % 49) << 23 | mantissa & 0x7f_ffff) as u32)
     };
-    [float(word), float(mix(word))]
+    [float(word), float(mix64(word))]
 }
 
 /// The same as the program of `probe.wgsl`.
@@ -77,7 +77,7 @@ fn ask(device: &Device, pairs: &[[f32; 2]]) -> Result<Vec<[u32; RESULTS]>, Error
 mod tests {
     use super::{ask, pair, processor};
     use crate::gpu::device::Device;
-    use crate::gpu::tests::options;
+    use crate::gpu::test_adapter::options;
 
     /// Four million pairs against the processor, and values known without either.
     #[test]

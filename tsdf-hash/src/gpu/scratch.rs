@@ -2,8 +2,8 @@
 
 use wgpu::{Buffer, BufferUsages};
 
-use super::device::Device;
-use crate::Error;
+use crate::error::Error;
+use crate::gpu::device::Device;
 
 /// Workgroups along one side of a dispatch.
 const MOST_GROUPS: usize = 65535;

@@ -1,38 +1,41 @@
 //! Which blocks of a frame are where, and whether what it did to them may stay.
 
-use super::device::Device;
-use super::fuse::{Mode, Pass, Tally, fresh};
-use super::pool::Pool;
-use crate::Error;
-use crate::fuse::Sign;
-use crate::key::Key;
+use crate::blocks::block_key::BlockKey;
+use crate::error::Error;
+use crate::gpu::device::Device;
+use crate::gpu::fuse::{Mode, Pass, UpdateCount, fresh};
+use crate::gpu::pool::Pool;
+use crate::integration::integrator::Operation;
 
 /// The mode of an update.
-pub(super) fn mode(sign: Sign) -> Mode {
-    if sign == Sign::Plus { Mode::Plus } else { Mode::Minus }
+pub(super) fn mode(operation: Operation) -> Mode {
+    if operation == Operation::Integrate { Mode::Integrate } else { Mode::Deintegrate }
 }
 
 /// The blocks that a frame has touched, or would.
-pub(super) fn touched<'a>(blocks: impl Iterator<Item = &'a (Key, u32)>, tallies: &[Tally]) -> Vec<(Key, Tally)> {
-    blocks.zip(tallies).map(|((key, _), tally)| (*key, *tally)).filter(|(_, tally)| tally.voxels() > 0).collect()
+pub(super) fn touched<'a>(
+    blocks: impl Iterator<Item = &'a (BlockKey, u32)>,
+    counts: &[UpdateCount],
+) -> Vec<(BlockKey, UpdateCount)> {
+    blocks.zip(counts).map(|((key, _), count)| (*key, *count)).filter(|(_, count)| count.voxels() > 0).collect()
 }
 
 /// Whether a frame may stay that needs some new blocks and has changed others; if so, there is memory for the new ones.
 pub(super) fn admit(
     pool: &mut Pool,
     device: &Device,
-    sign: Sign,
-    needed: &[(Key, Tally)],
-    changed: &[(Key, Tally)],
+    operation: Operation,
+    needed: &[(BlockKey, UpdateCount)],
+    changed: &[(BlockKey, UpdateCount)],
 ) -> Result<(), Error> {
-    match (sign, needed.first()) {
-        (Sign::Minus, Some((key, _))) => return Err(Error::NotIntegrated { block: key.block() }),
-        (Sign::Plus, _) if needed.len() > pool.room() => return Err(pool.out_of_budget()),
+    match (operation, needed.first()) {
+        (Operation::Deintegrate, Some((key, _))) => return Err(Error::NotIntegrated { block: key.block() }),
+        (Operation::Integrate, _) if needed.len() > pool.room() => return Err(pool.out_of_budget()),
         _ => {}
     }
     // The pages mix the keys, and the first of them is named.
-    match changed.iter().filter(|work| work.1.fault()).map(|work| work.0).min() {
-        Some(key) if sign == Sign::Plus => Err(Error::Saturated { block: key.block() }),
+    match changed.iter().filter(|work| work.1.overflow()).map(|work| work.0).min() {
+        Some(key) if operation == Operation::Integrate => Err(Error::Saturated { block: key.block() }),
         Some(key) => Err(Error::NotIntegrated { block: key.block() }),
         None => pool.reserve(device, needed.len()),
     }
@@ -40,13 +43,13 @@ pub(super) fn admit(
 
 /// Blocks of a frame, with their slots.
 pub(super) struct Split {
-    pub(super) absent: Vec<(Key, u32)>,
+    pub(super) absent: Vec<(BlockKey, u32)>,
     /// By page.
-    pub(super) present: Vec<Vec<(Key, u32)>>,
+    pub(super) present: Vec<Vec<(BlockKey, u32)>>,
 }
 
 impl Split {
-    pub(super) fn new(pool: &Pool, keys: &[Key]) -> Self {
+    pub(super) fn new(pool: &Pool, keys: &[BlockKey]) -> Self {
         let mut split = Self { absent: Vec::new(), present: vec![Vec::new(); pool.pages.len()] };
         for &key in keys {
             match pool.get(key) {
@@ -58,7 +61,7 @@ impl Split {
     }
 
     /// Blocks that get slots now.
-    pub(super) fn added(pool: &mut Pool, keys: &[(Key, Tally)]) -> Self {
+    pub(super) fn added(pool: &mut Pool, keys: &[(BlockKey, UpdateCount)]) -> Self {
         let mut split = Self { absent: Vec::new(), present: vec![Vec::new(); pool.pages.len()] };
         for &(key, _) in keys {
             let place = pool.insert(key);

@@ -2,11 +2,11 @@
 
 use wgpu::{Buffer, BufferUsages};
 
-use super::device::Device;
-use super::pool::{BLOCK_BYTES, Pool};
-use crate::Error;
-use crate::block::{Block, VOXELS};
-use crate::key::Key;
+use crate::blocks::block_key::BlockKey;
+use crate::blocks::voxel_block::{VOXELS, VoxelBlock};
+use crate::error::Error;
+use crate::gpu::device::Device;
+use crate::gpu::pool::{BLOCK_BYTES, Pool};
 
 /// Blocks that move together: 3.5 MiB.
 const BATCH: usize = 512;
@@ -28,10 +28,10 @@ impl Stream {
         &self,
         device: &Device,
         pool: &Pool,
-        keys: &[Key],
-        mut each: impl FnMut(Key, &Block) -> Result<(), Error>,
+        keys: &[BlockKey],
+        mut each: impl FnMut(BlockKey, &VoxelBlock) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        let mut block = Box::new(Block::ZERO);
+        let mut block = Box::new(VoxelBlock::ZERO);
         for batch in keys.chunks(BATCH) {
             let places: Vec<_> = batch.iter().filter_map(|&key| Some((key, pool.get(key)?))).collect();
             let mut commands = device.commands();
@@ -52,13 +52,13 @@ impl Stream {
 }
 
 /// Stores a block under a key that is new and that the caller has reserved a slot for. The driver stages it.
-pub(super) fn upload(device: &Device, pool: &mut Pool, key: Key, block: &Block) -> Result<(), Error> {
+pub(super) fn upload(device: &Device, pool: &mut Pool, key: BlockKey, block: &VoxelBlock) -> Result<(), Error> {
     let place = pool.insert(key);
     device.write(&pool.pages[place.page], place.offset(), pack(block).into_iter())
 }
 
 /// The words of a block as the programs see it: distances, weights two to a word, colours.
-fn pack(block: &Block) -> [u32; BLOCK_WORDS] {
+fn pack(block: &VoxelBlock) -> [u32; BLOCK_WORDS] {
     let mut words = [0; BLOCK_WORDS];
     let (distances, rest) = words.split_at_mut(VOXELS);
     let (weights, colours) = rest.split_at_mut(VOXELS / 2);
@@ -75,7 +75,7 @@ fn pack(block: &Block) -> [u32; BLOCK_WORDS] {
     words
 }
 
-fn unpack(words: &[[u8; 4]], block: &mut Block) {
+fn unpack(words: &[[u8; 4]], block: &mut VoxelBlock) {
     let (distances, rest) = words.split_at(VOXELS);
     let (weights, colours) = rest.split_at(VOXELS / 2);
     for (distance, &word) in block.distance.iter_mut().zip(distances) {

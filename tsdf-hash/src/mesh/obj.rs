@@ -2,8 +2,8 @@
 
 use std::io::Write;
 
-use super::Mesh;
-use crate::Error;
+use crate::error::Error;
+use crate::mesh::triangle_mesh::Mesh;
 
 /// Writes a mesh as Wavefront OBJ with normals, and with colours `0..=1` behind the coordinates of the vertices, where
 /// most programs look for them. Numbers are written so that they read back to the same bits.

@@ -2,8 +2,8 @@
 
 use std::io::Write;
 
-use super::Mesh;
-use crate::Error;
+use crate::error::Error;
+use crate::mesh::triangle_mesh::Mesh;
 
 /// Writes a mesh as binary little-endian PLY with normals and 8-bit colours.
 ///

@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use tsdf_hash::{Map, Settings};
 
+use crate::random::Random;
 use crate::scene::{Shot, look_at, room};
 
 fn plane_map(fy: f64) -> (Map, Unit<Vector3<f64>>, f64) {
@@ -103,15 +104,11 @@ fn noise_averages_out() {
     // 40 images of a wall at 1.5 m, each with the noise of the model: sigma = 1.2 mm + 1.9 mm * 1.1^2 = 3.5 mm.
     let pose = look_at(Point3::new(0.0, 0.0, 0.0), Point3::new(1.0, 0.1, 0.05));
     let mut map = Map::new(Settings { voxel_size: 0.02, ..Settings::default() }).unwrap();
-    let mut state = 1_u64;
-    let mut uniform = move || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 11) as f64 / (1_u64 << 53) as f64
-    };
+    let mut random = Random::new(1);
     for _ in 0..40 {
         let mut shot = Shot::take((160, 120), [130.0; 2], pose, |o, d| Some((1.5 - o.x) / d.x));
         for z in &mut shot.depth {
-            let sum: f64 = (0..4).map(|_| uniform()).sum();
+            let sum: f64 = (0..4).map(|_| random.uniform()).sum();
             *z += (0.0035 * 3.0_f64.sqrt() * (sum - 2.0)) as f32;
         }
         map.integrate(&shot.view(), None, &pose).unwrap();

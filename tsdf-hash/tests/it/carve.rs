@@ -1,7 +1,7 @@
 //! Space that is seen to be free.
 
 use nalgebra::{Point3, Vector3};
-use tsdf_hash::{Map, Settings, Tiers};
+use tsdf_hash::{Map, MemoryLimits, Settings};
 
 use crate::scene::{Shot, look_at};
 
@@ -64,8 +64,8 @@ fn carving_depends_on_no_order_and_leaves_nothing_behind() {
     let shots = shots(3, 4);
     let mut map = fused(settings, &shots);
     let turned: Vec<_> = shots.iter().rev().map(|shot| Shot { depth: shot.depth.clone(), ..*shot }).collect();
-    let tiers = Tiers { host_bytes: 4 << 20, ..Tiers::default() };
-    let capped = fused(Settings { max_bytes: 1 << 20, threads: 2, tiers, ..settings }, &turned);
+    let memory = MemoryLimits { host_bytes: 4 << 20, ..MemoryLimits::default() };
+    let capped = fused(Settings { max_bytes: 1 << 20, threads: 2, memory, ..settings }, &turned);
     assert!(capped.memory().host_blocks > 0);
     assert_eq!((map.hash(), map.blocks()), (capped.hash(), capped.blocks()));
     for shot in &shots {

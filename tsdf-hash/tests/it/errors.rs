@@ -152,3 +152,19 @@ fn a_stranger_cannot_be_taken_out() {
     map.deintegrate(&shot.view(), None, &shot.world_from_camera).unwrap();
     assert!(map.deintegrate(&shot.view(), None, &shot.world_from_camera).is_err() && map.blocks() == 0);
 }
+
+/// 65535 means "no depth" at every scale: with 20000 units per metre it would be a surface at 3.28 m.
+#[test]
+fn the_largest_integer_is_no_depth() {
+    let mut shot = wall();
+    shot.depth.iter_mut().for_each(|z| *z += 1.0);
+    let mut units: Vec<u16> = shot.depth.iter().map(|z| (20_000.0 * z) as u16).collect();
+    // The right half of the image.
+    (0..48).for_each(|row| units[64 * row + 32..64 * (row + 1)].fill(u16::MAX));
+    let view = DepthView { data: DepthData::U16 { data: &units, scale: 20_000.0 }, ..shot.view() };
+    let mut map = Map::new(Settings { voxel_size: 0.02, ..Settings::default() }).unwrap();
+    let report = map.integrate(&view, None, &shot.world_from_camera).unwrap();
+    assert_eq!(report.valid_pixels, 32 * 48);
+    assert!(report.fused_pixels <= 32 * 48);
+    assert!(map.mesh().positions.iter().all(|p| Point3::from(p.map(f64::from)).coords.norm() < 3.0));
+}

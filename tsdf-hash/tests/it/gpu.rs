@@ -3,10 +3,11 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use tsdf_hash::{
-    CastSettings, ColourData, ColourView, DenseMap, DepthData, DepthView, Error, GpuMap, GpuOptions, Intrinsics, Map,
-    Settings, Tiers, open_map,
+    ColourData, ColourView, DenseMap, DepthData, DepthView, DistanceField, DistanceSettings, Error, GpuMap, GpuOptions,
+    IncrementalMesher, Intrinsics, Map, MemoryLimits, RayCastSettings, Settings, TsdfLayer, gpu_or_cpu_map,
 };
 
+use crate::random::Random;
 use crate::scene::{Shot, look_at, room};
 
 fn options() -> GpuOptions {
@@ -96,14 +97,8 @@ fn odd_cameras_agree() {
     let settings = Settings { carve: 0.4, ..settings() };
     let Some(mut gpu) = open(settings, &options()) else { return };
     let mut map = Map::new(settings).unwrap();
-    let mut state = 7_u64;
-    let mut unit = || {
-        // splitmix64
-        state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (state ^ (state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    };
+    let mut random = Random::new(7);
+    let mut unit = || random.uniform();
     let mut fused = 0;
     for k in 0..12 {
         let at = Vector3::new(5.0 * unit() - 2.5, 3.0 * unit() - 1.5, 2.4 * unit() + 0.3);
@@ -152,7 +147,7 @@ fn the_same_rays_hit_the_same_surface() {
     let mut map = Map::new(settings).unwrap();
     let frames = Frame::tour(8, 4);
     let look = |gpu: &mut GpuMap, map: &Map, pose: &Isometry3<f64>, colour| {
-        let cast = CastSettings { colour, ..CastSettings::default() };
+        let cast = RayCastSettings { colour, ..RayCastSettings::default() };
         let k = frames[0].shot.intrinsics;
         let (expected, found) =
             (map.ray_cast(&k, 161, 117, pose, &cast).unwrap(), gpu.ray_cast(&k, 161, 117, pose, &cast).unwrap());
@@ -214,38 +209,38 @@ fn a_map_that_outgrows_the_device_goes_on_elsewhere() {
     let settings = Settings { voxel_size: 0.02, max_bytes: 11 << 20, ..Settings::default() };
     let Some(mut gpu) = open(settings, &options()) else { return };
     let mut all = Map::new(Settings { max_bytes: 64 << 20, ..settings }).unwrap();
-    // Little active memory too, and tiers beneath it.
-    let tiers = Tiers { host_bytes: 64 << 20, ..Tiers::default() };
-    let mut map = Map::new(Settings { max_bytes: 4 << 20, tiers, ..settings }).unwrap();
-    let mut poured = 0;
+    // Little active memory too, and eviction.
+    let memory = MemoryLimits { host_bytes: 64 << 20, ..MemoryLimits::default() };
+    let mut map = Map::new(Settings { max_bytes: 4 << 20, memory, ..settings }).unwrap();
+    let mut drained = 0;
     let frames = Frame::tour(6, 4);
     for frame in &frames {
         let (view, colour, pose) = (frame.shot.view(), frame.colour(), frame.shot.world_from_camera);
         all.integrate(&view, Some(&colour), &pose).unwrap();
         if let Err(Error::OutOfBudget { .. }) = gpu.integrate(&view, Some(&colour), &pose) {
-            gpu.pour_into(&mut map).unwrap();
+            gpu.drain_into(&mut map).unwrap();
             assert_eq!(gpu.blocks(), 0);
             gpu.integrate(&view, Some(&colour), &pose).unwrap();
-            poured += 1;
+            drained += 1;
         }
         assert!(gpu.bytes() <= 11 << 20 && map.bytes() <= 4 << 20);
     }
-    assert!(poured > 0 && map.blocks() < all.blocks());
-    gpu.pour_into(&mut map).unwrap();
+    assert!(drained > 0 && map.blocks() < all.blocks());
+    gpu.drain_into(&mut map).unwrap();
     assert_eq!((map.hash(), map.blocks()), (all.hash(), all.blocks()));
     let mut other = Map::new(Settings { voxel_size: 0.03, ..settings }).unwrap();
-    assert!(matches!(gpu.pour_into(&mut other), Err(Error::InvalidSetting { .. })));
+    assert!(matches!(gpu.drain_into(&mut other), Err(Error::InvalidSetting { .. })));
     // A map that has no room takes what it can, and nothing is lost.
     let mut gpu = open(settings, &options()).unwrap();
     let frame = &frames[0];
     gpu.integrate(&frame.shot.view(), Some(&frame.colour()), &frame.shot.world_from_camera).unwrap();
     let (whole, blocks) = (gpu.hash().unwrap(), gpu.blocks());
     let mut tight = Map::new(Settings { max_bytes: 1 << 20, ..settings }).unwrap();
-    assert!(matches!(gpu.pour_into(&mut tight), Err(Error::OutOfBudget { .. })));
+    assert!(matches!(gpu.drain_into(&mut tight), Err(Error::OutOfBudget { .. })));
     assert!(tight.blocks() > 0 && gpu.blocks() + tight.blocks() == blocks);
     let mut rest = Map::new(settings).unwrap();
-    gpu.pour_into(&mut rest).unwrap();
-    GpuMap::from_map(&tight, &options()).unwrap().pour_into(&mut rest).unwrap();
+    gpu.drain_into(&mut rest).unwrap();
+    GpuMap::from_map(&tight, &options()).unwrap().drain_into(&mut rest).unwrap();
     assert_eq!(rest.hash(), whole);
 }
 
@@ -334,15 +329,64 @@ fn an_adapter_that_is_not_there_is_an_error() {
     let Err(Error::NoAdapter { reason }) = GpuMap::new(settings(), &nowhere) else { panic!("it was found") };
     assert!(!reason.is_empty());
     // The processor takes over, and the reason says so.
-    let (mut map, reason) = open_map(settings(), &nowhere).unwrap();
+    let (mut map, reason) = gpu_or_cpu_map(settings(), &nowhere).unwrap();
     assert!(reason.unwrap().contains("no GPU"));
     let shot = wall();
     map.integrate(&shot.view(), None, &shot.world_from_camera).unwrap();
     let expected = map.hash().unwrap();
-    if let (mut map, None) = open_map(settings(), &options()).unwrap() {
+    if let (mut map, None) = gpu_or_cpu_map(settings(), &options()).unwrap() {
         map.integrate(&shot.view(), None, &shot.world_from_camera).unwrap();
         assert_eq!((map.hash().unwrap(), map.mesh().unwrap().faces.is_empty()), (expected, false));
     }
     let wrong = Settings { threads: 0, ..settings() };
-    assert!(matches!(open_map(wrong, &nowhere), Err(Error::InvalidSetting { .. })));
+    assert!(matches!(gpu_or_cpu_map(wrong, &nowhere), Err(Error::InvalidSetting { .. })));
+}
+
+/// The mesh, the distance field and distance queries follow a map wherever it is kept.
+#[test]
+fn followers_see_the_same_map_on_the_device() {
+    let settings = Settings { voxel_size: 0.04, max_bytes: 32 << 20, ..Settings::default() };
+    let Some(mut gpu) = open(settings, &options()) else { return };
+    let mut cpu = Map::new(settings).unwrap();
+    let mut meshers = [IncrementalMesher::new(), IncrementalMesher::new()];
+    let mut fields = [0, 1].map(|_| DistanceField::new(&DistanceSettings::default()).unwrap());
+    let frames = Frame::tour(5, 4);
+    let mut removed = 0;
+    for step in 0..8 {
+        // Five frames in, then three out again.
+        let frame = &frames[if step < 5 { step } else { step - 5 }];
+        let (view, colour, pose) = (frame.shot.view(), frame.colour(), frame.shot.world_from_camera);
+        let mut reports = Vec::new();
+        for (k, map) in [&mut cpu as &mut dyn DenseMap, &mut gpu].into_iter().enumerate() {
+            if step < 5 {
+                map.integrate_at(step as f64, &view, Some(&colour), &pose).unwrap();
+            } else {
+                map.deintegrate(&view, Some(&colour), &pose).unwrap();
+            }
+            reports.push((meshers[k].update(&*map).unwrap(), fields[k].update(&*map).unwrap()));
+        }
+        assert_eq!(reports[0], reports[1]);
+        removed += reports[0].0.removed;
+        assert_eq!(meshers[0].mesh(), cpu.mesh());
+        assert_eq!(meshers[1].mesh(), cpu.mesh());
+        assert!(fields[0].sites().eq(fields[1].sites()) && fields[0].sites().count() > 1000);
+    }
+    assert!(removed > 100);
+    let mesh = DenseMap::mesh(&gpu).unwrap();
+    assert_eq!(mesh, cpu.mesh());
+    let mut known = 0;
+    for position in mesh.positions.iter().step_by(mesh.positions.len() / 40) {
+        let point = Point3::from(position.map(|c| f64::from(c) + 0.01));
+        let expected = cpu.distance_and_gradient(&point);
+        assert_eq!(gpu.distance_and_gradient(&point).unwrap(), expected);
+        assert_eq!(TsdfLayer::distance(&cpu, &point).unwrap(), cpu.distance(&point));
+        known += usize::from(expected.is_some());
+    }
+    assert!(known > 20, "{known}");
+    // Time does not go back on either.
+    let (view, pose) = (frames[0].shot.view(), frames[0].shot.world_from_camera);
+    for map in [&mut cpu as &mut dyn DenseMap, &mut gpu] {
+        let refused = map.integrate_at(3.0, &view, None, &pose);
+        assert!(matches!(refused, Err(Error::InvalidTime { last: 4.0, .. })), "{refused:?}");
+    }
 }

@@ -1,57 +1,58 @@
 //! A mesh that follows its map is the mesh of the map.
 
 use nalgebra::Isometry3;
-use tsdf_hash::{Map, Mesh, MeshKeeper, Settings, Tiers, write_obj};
+use tsdf_hash::{IncrementalMesher, Map, MemoryLimits, Mesh, Settings, write_obj};
 
+use crate::eviction::{FREE, add, take_out};
 use crate::scene::room;
-use crate::tiers::{FREE, add, take_out};
 use crate::topology::assert_manifold;
 
 #[test]
 fn frames_put_in_and_taken_out() {
     let shots = room::tour(12, 4, &Isometry3::identity());
-    let (mut map, mut keeper) = (Map::new(FREE).unwrap(), MeshKeeper::new());
+    let (mut map, mut mesher) = (Map::new(FREE).unwrap(), IncrementalMesher::new());
     for shot in &shots {
         let frame = add(&mut map, shot).unwrap();
-        let report = keeper.update(&map).unwrap();
+        let report = mesher.update(&map).unwrap();
         assert_eq!((report.changed, report.removed), (frame.blocks, 0));
         // Seven lower neighbours at most, and most of them changed themselves.
         assert!(report.rebuilt >= report.changed && report.rebuilt < 2 * report.changed, "{report:?}");
-        assert_eq!(keeper.mesh(), map.mesh());
+        assert_eq!(mesher.mesh(), map.mesh());
     }
-    assert_manifold(&keeper.mesh());
-    assert_eq!(keeper.update(&map).unwrap().rebuilt, 0);
+    assert_manifold(&mesher.mesh());
+    assert_eq!(mesher.update(&map).unwrap().rebuilt, 0);
     let removed: usize = shots
         .iter()
         .map(|shot| {
             let frame = take_out(&mut map, shot).unwrap();
-            let report = keeper.update(&map).unwrap();
-            assert_eq!(keeper.mesh(), map.mesh());
+            let report = mesher.update(&map).unwrap();
+            assert_eq!(mesher.mesh(), map.mesh());
             assert_eq!(report.removed, frame.blocks_removed);
             report.removed
         })
         .sum();
     assert!(removed > 1000 && map.blocks() == 0);
-    assert_eq!(keeper.mesh(), Mesh::default());
+    assert_eq!(mesher.mesh(), Mesh::default());
 }
 
-/// Blocks leave after half a second of frames, come back, and some frames go to cold memory at once.
+/// Blocks are evicted after half a second of frames and reloaded, and some frames go to evicted memory at once.
 #[test]
-fn blocks_that_left_keep_their_mesh() {
+fn evicted_blocks_keep_their_mesh() {
     let shots = room::tour(16, 4, &Isometry3::identity());
     // All there is room for a frame, a third of one with blocks that are merged late, and updates not after every frame.
-    for (max_bytes, hold, every) in [(6 << 20, 0.0, 1), (1 << 20, 0.1, 1), (2 << 20, 0.0, 5)] {
-        let tiers = Tiers { host_bytes: 64 << 20, age: 0.15, transfers: 200, hold, ..FREE.tiers };
-        let mut capped = Map::new(Settings { max_bytes, tiers, ..FREE }).unwrap();
+    for (max_bytes, merge_timeout, every) in [(6 << 20, 0.0, 1), (1 << 20, 0.1, 1), (2 << 20, 0.0, 5)] {
+        let memory =
+            MemoryLimits { host_bytes: 64 << 20, max_age: 0.15, max_transfers: 200, merge_timeout, ..FREE.memory };
+        let mut capped = Map::new(Settings { max_bytes, memory, ..FREE }).unwrap();
         let mut free = Map::new(FREE).unwrap();
-        let mut keeper = MeshKeeper::new();
+        let mut mesher = IncrementalMesher::new();
         let order: Vec<usize> = (0..16).chain([0, 1, 2, 9, 4]).collect();
         for (step, &k) in order.iter().enumerate() {
             add(&mut capped, &shots[k]).unwrap();
             add(&mut free, &shots[k]).unwrap();
             if step % every == 0 {
-                keeper.update(&capped).unwrap();
-                assert_eq!(keeper.mesh(), free.mesh(), "{max_bytes} bytes, after frame {step}");
+                mesher.update(&capped).unwrap();
+                assert_eq!(mesher.mesh(), free.mesh(), "{max_bytes} bytes, after frame {step}");
             }
         }
         let memory = capped.memory();
@@ -60,13 +61,13 @@ fn blocks_that_left_keep_their_mesh() {
             take_out(&mut capped, &shots[k]).unwrap();
             take_out(&mut free, &shots[k]).unwrap();
             if step % every == 0 {
-                keeper.update(&capped).unwrap();
-                assert_eq!(keeper.mesh(), free.mesh(), "{max_bytes} bytes, without frame {step}");
+                mesher.update(&capped).unwrap();
+                assert_eq!(mesher.mesh(), free.mesh(), "{max_bytes} bytes, without frame {step}");
             }
         }
-        assert_manifold(&keeper.mesh());
+        assert_manifold(&mesher.mesh());
         // What is left in active memory is less than the whole.
-        assert!(capped.mesh().faces.len() < keeper.mesh().faces.len());
+        assert!(capped.mesh().faces.len() < mesher.mesh().faces.len());
     }
 }
 
@@ -74,14 +75,14 @@ fn blocks_that_left_keep_their_mesh() {
 fn another_map_starts_anew() {
     let shots = room::tour(12, 8, &Isometry3::identity());
     let [mut first, mut second] = [0, 1].map(|_| Map::new(FREE).unwrap());
-    let mut keeper = MeshKeeper::new();
+    let mut mesher = IncrementalMesher::new();
     add(&mut first, &shots[0]).unwrap();
-    keeper.update(&first).unwrap();
+    mesher.update(&first).unwrap();
     add(&mut second, &shots[6]).unwrap();
     add(&mut second, &shots[7]).unwrap();
     for map in [&second, &first, &second] {
-        assert_eq!(keeper.update(map).unwrap().changed, map.blocks());
-        assert_eq!(keeper.mesh(), map.mesh());
+        assert_eq!(mesher.update(map).unwrap().changed, map.blocks());
+        assert_eq!(mesher.mesh(), map.mesh());
     }
 }
 

@@ -4,16 +4,17 @@
 
 mod accuracy;
 mod carve;
-mod edf;
+mod distance_field;
 mod errors;
-mod file;
+mod eviction;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod incremental;
+mod layers;
+mod map_file;
+mod random;
 mod recorded;
-mod remap;
 mod reversible;
 mod scene;
-mod tiers;
-mod timing;
 mod topology;
+mod views;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Point3, Vector3};
 use tsdf_hash::{Map, Mesh, Settings, write_ply};
 
+use crate::random::Random;
 use crate::scene::{Shot, hit_sphere, look_at};
 
 /// How often each directed edge occurs.
@@ -80,13 +81,12 @@ fn a_sphere_is_watertight_and_round() {
 fn noise_tears_no_seams() {
     // Random relief of several voxels: every case of the cells, ambiguous ones included, over many block borders.
     let mut map = Map::new(Settings { voxel_size: 0.02, ..Settings::default() }).unwrap();
-    let mut state = 7_u64;
+    let mut random = Random::new(7);
     for k in 0..6 {
         let pose = look_at(Point3::new(0.0, 0.1 * f64::from(k), 0.0), Point3::new(1.5, 0.0, 0.1 * f64::from(k)));
         let mut shot = Shot::take((160, 120), [130.0; 2], pose, |o, d| Some((1.5 - o.x) / d.x));
         for z in &mut shot.depth {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            *z += 0.02 * ((state >> 40) as f32 / (1_u64 << 24) as f32 - 0.5);
+            *z += 0.02 * (random.uniform() as f32 - 0.5);
         }
         map.integrate(&shot.view(), None, &pose).unwrap();
     }

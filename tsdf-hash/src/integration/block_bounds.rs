@@ -1,0 +1,102 @@
+//! Where in a block voxels can be touched: a bound that spares work and never changes the map.
+
+use nalgebra::Vector3;
+
+use crate::blocks::voxel_block::SIDE;
+use crate::integration::plane_image::PlaneImage;
+use crate::integration::plane_tile::{TILE, Tile};
+use crate::integration::voxel_lanes::{HALVES, LANES};
+
+/// Blocks closer to the camera's plane are searched voxel by voxel, metres.
+const NEAREST: f32 = 1e-2;
+
+/// The voxels where a linear function of their indices is between two limits.
+pub(crate) struct BlockBounds {
+    pub(crate) start: f32,
+    pub(crate) step: [f32; 3],
+    /// Of a row, from the function at its first voxel: where the lanes of each half can be in the slab.
+    pub(crate) bounds: [[f32; 2]; HALVES],
+}
+
+impl BlockBounds {
+    const ALL: Self = Self { start: 0.0, step: [0.0; 3], bounds: [[-1.0, 1.0]; HALVES] };
+
+    /// Where in a block voxels can be touched, from the squares of pixels that it projects to; `None` if nowhere.
+    ///
+    /// If the inverse depth under the block is a linear function of the pixel, `1 - z ω` is one of the voxel. A voxel is
+    /// touched if that is between `-μ ω` and `front ω`; an inverse depth that is `e` off the function adds `z e`.
+    pub(crate) fn under(
+        surface: &PlaneImage,
+        reach: [f32; 2],
+        start: &Vector3<f32>,
+        steps: &[Vector3<f32>; 3],
+    ) -> Option<Self> {
+        let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+        let mut far = 0.0_f32;
+        for corner in 0..8 {
+            let at = |axis: usize| steps[axis] * if corner >> axis & 1 == 1 { (SIDE - 1) as f32 } else { 0.0 };
+            let p = start + at(0) + at(1) + at(2);
+            if p.z < NEAREST {
+                return Some(Self::ALL);
+            }
+            far = far.max(p.z);
+            for k in 0..2 {
+                let pixel = p[k] / p.z;
+                low[k] = low[k].min(pixel);
+                high[k] = high[k].max(pixel);
+            }
+        }
+        let sides = [surface.width, surface.height];
+        let mut ranges = [(0, 0); 2];
+        for k in 0..2 {
+            // A pixel more on each side, for the rounding.
+            let last = (sides[k] - 1) as f32;
+            if low[k] > last + 1.0 || high[k] < -1.0 {
+                return None;
+            }
+            ranges[k] = ((low[k] - 1.0).max(0.0) as usize / TILE, (high[k] + 1.0).min(last) as usize / TILE);
+        }
+        let across = sides[0].div_ceil(TILE);
+        let [columns, lines] = ranges;
+        let line = |line: usize| &surface.tiles[line * across + columns.0..=line * across + columns.1];
+        // The tile with the least error stands for all.
+        let mut flattest = &Tile::EMPTY;
+        for tile in (lines.0..=lines.1).flat_map(line) {
+            if !tile.is_empty() && (flattest.is_empty() || tile.error < flattest.error) {
+                flattest = tile;
+            }
+        }
+        if flattest.is_empty() {
+            return None;
+        }
+        let omega = flattest.omega;
+        let (mut error, mut near) = (0.0_f32, f32::INFINITY);
+        for k in lines.0..=lines.1 {
+            for (column, tile) in (columns.0..).zip(line(k)) {
+                // Two linear functions differ most at a corner; half a square more than there is, at the image's rim.
+                let half = 0.5 * TILE as f32;
+                let [u, v] = [column, k].map(|k| (k * TILE) as f32 + half);
+                let off = (tile.omega.at(u, v) - omega.at(u, v)).abs();
+                let turn = (tile.omega.slope[0] - omega.slope[0]).abs() + (tile.omega.slope[1] - omega.slope[1]).abs();
+                let bound = tile.error + off + half * turn;
+                if !tile.is_empty() {
+                    error = error.max(bound);
+                    near = near.min(tile.near);
+                }
+            }
+        }
+        let along = |p: &Vector3<f32>| omega.base * p.z + omega.slope[0] * p.x + omega.slope[1] * p.y;
+        // Half a pixel between a voxel's projection and its pixel; and a little for the rounding.
+        let error = error + 0.5 * (omega.slope[0].abs() + omega.slope[1].abs());
+        let reach = reach.map(|reach| 1.001 * (reach.abs() / near + far * error) + 1e-4);
+        Some(Self::new(1.0 - along(start), [0, 1, 2].map(|k| -along(&steps[k])), reach))
+    }
+
+    fn new(start: f32, step: [f32; 3], [behind, front]: [f32; 2]) -> Self {
+        let bounds = [0, LANES].map(|x| {
+            let ends = [x, x + LANES - 1].map(|x| step[0] * x as f32);
+            [-behind - ends[0].max(ends[1]), front - ends[0].min(ends[1])]
+        });
+        Self { start, step, bounds }
+    }
+}

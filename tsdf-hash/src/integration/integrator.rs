@@ -1,0 +1,272 @@
+//! The update of one block by one frame.
+
+use nalgebra::{Isometry3, Matrix3, Vector3};
+
+use crate::blocks::block_key::BlockKey;
+use crate::blocks::voxel_block::{ONE, SIDE, VoxelBlock};
+use crate::error::Error;
+use crate::images::{ColourView, DepthView, Intrinsics, check_pose};
+use crate::integration::block_bounds::BlockBounds;
+use crate::integration::colour::{ColourSource, accumulate_colour};
+use crate::integration::plane_image::PlaneImage;
+use crate::integration::voxel_lanes::{HALVES, LANES, ProjectedVoxels, RowOffsets, mask};
+use crate::rounding::{ROUNDER, rounded};
+use crate::settings::Settings;
+
+/// Colours are taken this close to the surface, in voxels (ours).
+const COLOUR_REACH: f64 = 1.5;
+/// Whether a frame is put in or taken out.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Operation {
+    Integrate,
+    Deintegrate,
+}
+
+impl Operation {
+    pub(crate) fn opposite(self) -> Self {
+        if self == Self::Integrate { Self::Deintegrate } else { Self::Integrate }
+    }
+}
+
+/// What an update did.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct UpdateCount {
+    /// Voxels touched.
+    pub(crate) voxels: usize,
+    /// A counter ran over (plus) or under (minus). The sums wrap, so the opposite update restores the block exactly.
+    pub(crate) overflow: bool,
+}
+
+/// A frame, ready to be applied to any block.
+pub(crate) struct Frame<'a> {
+    pub(crate) plane_image: &'a PlaneImage,
+    pub(crate) colour: Option<ColourSource<'a>>,
+    /// `(u z, v z, z)` from a point in the world.
+    pub(crate) projection: Matrix3<f64>,
+    pub(crate) offset: Vector3<f64>,
+    pub(crate) voxel_size: f64,
+    /// Voxels are touched this far in front of a surface, from the one (behind it: `-μ`) to the other, metres.
+    pub(crate) reach: [f32; 2],
+    /// In steps of the stored distance.
+    pub(crate) colour_reach: f32,
+    width: i32,
+    /// The last column and the last row.
+    last: [f32; 2],
+}
+
+impl<'a> Frame<'a> {
+    pub(crate) fn new(
+        plane_image: &'a PlaneImage,
+        intrinsics: &Intrinsics,
+        colour: Option<&'a ColourView<'a>>,
+        world_from_camera: &Isometry3<f64>,
+        settings: &Settings,
+    ) -> Self {
+        let k = intrinsics;
+        let pixels_from_camera = Matrix3::new(k.fx, 0.0, k.cx, 0.0, k.fy, k.cy, 0.0, 0.0, 1.0);
+        let camera_from_world = world_from_camera.inverse();
+        Self {
+            plane_image,
+            colour: colour.map(|view| ColourSource::new(view, k, plane_image)),
+            projection: pixels_from_camera * camera_from_world.rotation.to_rotation_matrix().into_inner(),
+            offset: pixels_from_camera * camera_from_world.translation.vector,
+            voxel_size: settings.voxel_size,
+            reach: [-settings.truncation(), settings.front()].map(|reach| reach as f32),
+            width: plane_image.width as i32,
+            last: [plane_image.width, plane_image.height].map(|side| (side - 1) as f32),
+            colour_reach: (f64::from(ONE) * COLOUR_REACH / settings.truncation_voxels) as f32,
+        }
+    }
+
+    /// Checks a frame and fits its planes, for the processor and the GPU alike.
+    pub(crate) fn read(
+        plane_image: &'a mut PlaneImage,
+        depth: &DepthView,
+        colour: Option<&'a ColourView<'a>>,
+        world_from_camera: &Isometry3<f64>,
+        settings: &Settings,
+    ) -> Result<Self, Error> {
+        depth.check()?;
+        if let Some(colour) = colour {
+            colour.check()?;
+        }
+        check_pose(world_from_camera)?;
+        plane_image.read(depth, world_from_camera, settings)?;
+        Ok(Self::new(plane_image, &depth.intrinsics, colour, world_from_camera, settings))
+    }
+
+    /// Adds the frame to a block, or takes it out. What is touched, and by how much, depends on the frame only.
+    pub(crate) fn apply(&self, operation: Operation, key: BlockKey, block: &mut VoxelBlock) -> UpdateCount {
+        match operation {
+            Operation::Integrate => self.update::<true>(key, block),
+            Operation::Deintegrate => self.update::<false>(key, block),
+        }
+    }
+
+    /// `(u z, v z, z)` of the first voxel of a block.
+    pub(crate) fn start(&self, key: BlockKey) -> Vector3<f32> {
+        let centre = |c: i32| (f64::from(c) * SIDE as f64 + 0.5) * self.voxel_size;
+        let [x, y, z] = key.block().map(centre);
+        (self.projection * Vector3::new(x, y, z) + self.offset).cast()
+    }
+
+    /// Its change from a voxel to the next, a column for each axis.
+    pub(crate) fn step(&self) -> Matrix3<f32> {
+        (self.projection * self.voxel_size).cast()
+    }
+
+    /// In single precision, every operation rounded once to the nearest, none fused or reordered:
+    ///
+    /// ```text
+    /// per frame      step_x, step_y, step_z                          the change of (u z, v z, z) from voxel to voxel
+    /// per block      start                                           (u z, v z, z) of voxel (0, 0, 0)
+    /// per voxel      p = ((start + step_y y) + step_z z) + step_x x
+    ///                r = 1 / p.z;  u = p.x r;  v = p.y r             correctly rounded division
+    ///                i = round(u);  j = round(v)                     to even at a tie
+    ///                p.z > 0, 0 <= i <= width - 1, 0 <= j <= height - 1, or the voxel is not touched
+    ///                plane = planes[i + width j]
+    ///                own = p.z scaled_omega
+    ///                -μ scaled_omega <= offset - own <= front scaled_omega, or the voxel is not touched
+    ///                du = u - i;  dv = v - j
+    ///                q = offset - p.z (scaled_omega + (slope_u du + slope_v dv))
+    ///                coloured = |q| < reach
+    ///                q = round(min(max(q, -32767), 32767))
+    ///                w = the last four bits of slope_v
+    ///                S += w q;  W += w                               in integers
+    /// ```
+    ///
+    /// `front` is `μ`, or the distance that is carved if that is larger. `start` and the steps are computed in double precision and rounded once.
+    fn update<const INTEGRATE: bool>(&self, key: BlockKey, block: &mut VoxelBlock) -> UpdateCount {
+        let (start, step) = (self.start(key), self.step());
+        let [sx, sy, sz] = [0, 1, 2].map(|axis| step.column(axis).into_owned());
+        let steps = [sx, sy, sz];
+        let Some(bounds) = BlockBounds::under(self.plane_image, self.reach, &start, &steps) else {
+            return UpdateCount::default();
+        };
+        let offsets = [0, LANES].map(|first| RowOffsets::new(&sx, first));
+        let mut counts = LaneCounts::default();
+        for z in 0..SIDE {
+            for y in 0..SIDE {
+                let along = bounds.start + bounds.step[1] * y as f32 + bounds.step[2] * z as f32;
+                let row = (start + sy * y as f32) + sz * z as f32;
+                for (half, (offsets, [least, most])) in offsets.iter().zip(bounds.bounds).enumerate() {
+                    if along >= least && along <= most {
+                        let lanes = self.project(&row, offsets);
+                        self.accumulate::<INTEGRATE>(block, half + HALVES * (y + SIDE * z), &lanes, &mut counts);
+                    }
+                }
+            }
+        }
+        counts.count()
+    }
+
+    #[inline(always)]
+    fn project(&self, row: &Vector3<f32>, offsets: &RowOffsets) -> ProjectedVoxels {
+        let zero = [0.0; LANES];
+        let mut out = ProjectedVoxels {
+            inside: [0; LANES],
+            index: [0; LANES],
+            depth: zero,
+            u: zero,
+            v: zero,
+            du: zero,
+            dv: zero,
+        };
+        for x in 0..LANES {
+            let z = row.z + offsets.depth[x];
+            let inverse = 1.0 / z;
+            let u = (row.x + offsets.u[x]) * inverse;
+            let v = (row.y + offsets.v[x]) * inverse;
+            let (i, j) = ((u + ROUNDER) - ROUNDER, (v + ROUNDER) - ROUNDER);
+            (out.depth[x], out.u[x], out.v[x], out.du[x], out.dv[x]) = (z, u, v, u - i, v - j);
+            let inside =
+                mask(z > 0.0) & mask(i >= 0.0) & mask(i <= self.last[0]) & mask(j >= 0.0) & mask(j <= self.last[1]);
+            // Sides are at most 16384: fifteen bits hold what is inside, and SSE2 multiplies no wider integers at once.
+            let index = (rounded(v) & 0x7fff) * (self.width & 0x7fff) + (rounded(u) & 0x7fff);
+            out.inside[x] = inside;
+            out.index[x] = index & inside;
+        }
+        out
+    }
+
+    /// Updates the voxels `LANES unit..`.
+    #[inline(always)]
+    fn accumulate<const INTEGRATE: bool>(
+        &self,
+        block: &mut VoxelBlock,
+        unit: usize,
+        lanes: &ProjectedVoxels,
+        counts: &mut LaneCounts,
+    ) {
+        let planes = lanes.index.map(|index| self.plane_image.planes[index as usize]);
+        let offset = planes.map(|plane| plane.offset);
+        let omega = planes.map(|plane| plane.scaled_omega);
+        let slope_u = planes.map(|plane| plane.scaled_slope[0]);
+        let slope_v = planes.map(|plane| plane.scaled_slope[1]);
+        let mut touched = [0; LANES];
+        for x in 0..LANES {
+            // A NaN fails, and so does an omega of 0.
+            let ahead = offset[x] - lanes.depth[x] * omega[x];
+            let within = mask(ahead >= self.reach[0] * omega[x]) & mask(ahead <= self.reach[1] * omega[x]);
+            touched[x] = within & lanes.inside[x];
+        }
+        if touched == [0; LANES] {
+            return;
+        }
+        let sums = &mut block.distance.as_chunks_mut::<LANES>().0[unit];
+        let totals = &mut block.weight.as_chunks_mut::<LANES>().0[unit];
+        let mut coloured = [0; LANES];
+        for x in 0..LANES {
+            let at_voxel = omega[x] + (slope_u[x] * lanes.du[x] + slope_v[x] * lanes.dv[x]);
+            let q = offset[x] - lanes.depth[x] * at_voxel;
+            coloured[x] = mask(q.abs() < self.colour_reach) & touched[x];
+            let q = if q > -LIMIT { q } else { -LIMIT };
+            let q = if q < LIMIT { q } else { LIMIT };
+            let weight = slope_v[x].to_bits().cast_signed() & 15 & touched[x];
+            // An integer below 2^19, so the product is exact.
+            let product = rounded(((q + ROUNDER) - ROUNDER) * weight as f32) & touched[x];
+            let (sum, total) = if INTEGRATE {
+                (sums[x].wrapping_add(product), i32::from(totals[x]) + weight)
+            } else {
+                (sums[x].wrapping_sub(product), i32::from(totals[x]) - weight)
+            };
+            sums[x] = sum;
+            totals[x] = total as u16;
+            counts.counters[x] |= total;
+            if !INTEGRATE {
+                // No sum of observations can leave `-32767 W..=32767 W`: what was taken out was not in.
+                let most = (total << 15).wrapping_sub(total);
+                counts.counters[x] |= most.wrapping_sub(sum.wrapping_abs()) & i32::MIN & touched[x];
+            }
+            counts.touched[x] -= touched[x];
+        }
+        if let Some(colour) = self.colour.as_ref().filter(|_| coloured != [0; LANES]) {
+            for (x, &near) in coloured.iter().enumerate() {
+                if near != 0
+                    && let Some(rgb) = colour.at(lanes, x)
+                {
+                    counts.colour_overflow |= accumulate_colour::<INTEGRATE>(&mut block.colour[LANES * unit + x], rgb);
+                }
+            }
+        }
+    }
+}
+
+/// Largest stored distance of one observation.
+const LIMIT: f32 = ONE as f32;
+
+/// What the update of a block counts, per lane.
+#[derive(Default)]
+struct LaneCounts {
+    touched: [i32; LANES],
+    /// All counters: they ran over or under if there is a bit beyond the sixteenth.
+    counters: [i32; LANES],
+    colour_overflow: bool,
+}
+
+impl LaneCounts {
+    fn count(&self) -> UpdateCount {
+        let voxels = self.touched.iter().sum::<i32>().unsigned_abs() as usize;
+        UpdateCount { voxels, overflow: self.colour_overflow || self.counters.iter().any(|bits| bits >> 16 != 0) }
+    }
+}

@@ -1,0 +1,229 @@
+//! The plane image: a depth image with a small plane fitted at every pixel.
+//!
+//! For a plane, inverse depth is a linear function of the pixel: `ω(u, v) = ω₀ + a (u - u₀) + b (v - v₀)`, whatever its
+//! slope. So slopes come from linear filters, and a depth edge is where second differences of `ω` exceed the noise.
+
+use nalgebra::Isometry3;
+
+use crate::blocks::block_key::BlockKey;
+use crate::blocks::voxel_block::{MAX_WEIGHT, ONE};
+use crate::error::Error;
+use crate::images::{DepthView, Intrinsics};
+use crate::integration::block_selection::select_blocks;
+use crate::integration::inverse_depth_noise::InverseDepthNoise;
+use crate::integration::plane::Plane;
+use crate::integration::plane_tile::{TILE, Tile, TileLine};
+use crate::integration::plane_windows::{BEND_VARIANCE, BENDING, COUNT, ROUGHNESS, Row, SPREAD, Windows};
+use crate::parallel::in_chunks;
+use crate::rounding::ROUNDER;
+use crate::settings::Settings;
+
+/// Steeper views of a surface are left to other frames (ours: 84 degrees between ray and normal).
+const LEAST_COSINE: f32 = 0.1;
+/// A window whose rim is this many standard deviations off its middle is not plane (ours).
+const MOST_BEND: f32 = 3.0;
+/// InverseDepthNoise that is always granted, as a share of the model's: where the camera is better than the model, bends are found
+/// by what it shows (ours).
+const LEAST_NOISE: f32 = 0.1;
+
+/// All pixels of a frame, with the blocks near them.
+#[derive(Default)]
+pub(crate) struct PlaneImage {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    /// Row-major.
+    pub(crate) planes: Vec<Plane>,
+    /// The fused depths in squares of [`TILE`] pixels, row-major.
+    pub(crate) tiles: Vec<Tile>,
+    /// Pixels with a depth in the range.
+    pub(crate) valid: usize,
+    /// Those of them that are fused.
+    pub(crate) fused: usize,
+    /// The blocks that may hold a voxel within `μ` of a fused pixel, ascending.
+    pub(crate) keys: Vec<BlockKey>,
+}
+
+/// Rows `first..` of the output, as many as the slices hold.
+struct Band<'a> {
+    first: usize,
+    planes: &'a mut [Plane],
+    tiles: &'a mut [Tile],
+}
+
+impl PlaneImage {
+    /// Reads a frame, keeping the buffers of the last one.
+    pub(crate) fn read(
+        &mut self,
+        depth: &DepthView,
+        world_from_camera: &Isometry3<f64>,
+        settings: &Settings,
+    ) -> Result<(), Error> {
+        let (width, height) = (depth.width, depth.height);
+        (self.width, self.height) = (width, height);
+        self.planes.resize(width * height, Plane::NONE);
+        self.tiles.resize(width.div_ceil(TILE) * height.div_ceil(TILE), Tile::EMPTY);
+        // Whole tiles, so that each band can look for its own blocks.
+        let lines = height.div_ceil(TILE).div_ceil(settings.threads);
+        let planes = self.planes.chunks_mut(lines * TILE * width);
+        let mut bands: Vec<Band> = planes
+            .zip(self.tiles.chunks_mut(lines * width.div_ceil(TILE)))
+            .enumerate()
+            .map(|(k, (planes, tiles))| Band { first: k * lines * TILE, planes, tiles })
+            .collect();
+        let found = in_chunks(&mut bands, settings.threads, |bands| {
+            let mut all = (0, 0, Ok(Vec::new()));
+            for band in bands {
+                let [valid, fused] = band.fill(depth, settings);
+                let keys = select_blocks(band.first, band.planes, band.tiles, depth, world_from_camera, settings);
+                all = (all.0 + valid, all.1 + fused, keys);
+            }
+            all
+        });
+        (self.valid, self.fused) = (0, 0);
+        self.keys.clear();
+        for (valid, fused, keys) in found {
+            self.valid += valid;
+            self.fused += fused;
+            self.keys.extend(keys?);
+        }
+        self.keys.sort_unstable();
+        self.keys.dedup();
+        if self.fused == 0 { Err(Error::NoDepth { valid: self.valid }) } else { Ok(()) }
+    }
+}
+
+impl Band<'_> {
+    /// Returns how many pixels of the band have a depth in the range and how many of them are fused.
+    fn fill(&mut self, depth: &DepthView, settings: &Settings) -> [usize; 2] {
+        let width = depth.width;
+        let noise = InverseDepthNoise::new(settings);
+        let per_metre = (f64::from(ONE) / settings.truncation()) as f32;
+        let mut windows = Windows::new(depth, settings, self.first);
+        let (mut columns, mut tile_line) = (Columns::new(width), TileLine::new(width));
+        let mut all = [0, 0];
+        let lines = self.planes.chunks_mut(TILE * width).zip(self.tiles.chunks_mut(width.div_ceil(TILE)));
+        for (line, (planes, tiles)) in lines.enumerate() {
+            for (row, planes) in planes.chunks_exact_mut(width).enumerate() {
+                let row = line * TILE + row;
+                let lens = Lens::new(&depth.intrinsics, self.first + row, per_metre);
+                let [valid, fused] = read_row(&windows.row(row), lens, noise, &mut columns);
+                columns.write(planes);
+                tile_line.push(&columns.omega);
+                all = [all[0] + valid as usize, all[1] + fused as usize];
+            }
+            tile_line.finish(self.first + line * TILE, planes, tiles);
+        }
+        all
+    }
+}
+
+/// A row of planes, and their inverse depths; 0 where a pixel is not fused.
+struct Columns {
+    offset: Vec<f32>,
+    slope: [Vec<f32>; 2],
+    omega: Vec<f32>,
+}
+
+impl Columns {
+    fn new(width: usize) -> Self {
+        let column = || vec![0.0; width];
+        Self { offset: column(), slope: [column(), column()], omega: column() }
+    }
+
+    fn write(&self, planes: &mut [Plane]) {
+        let slopes = self.slope[0].iter().zip(&self.slope[1]);
+        for (((plane, &offset), &omega), (&u, &v)) in planes.iter_mut().zip(&self.offset).zip(&self.omega).zip(slopes) {
+            *plane = Plane { offset, scaled_omega: offset * omega, scaled_slope: [u, v] };
+        }
+    }
+}
+
+/// Fits the planes of a row; returns the numbers of valid and of fused pixels. Structures of arrays, because the
+/// arithmetic then runs in vector registers.
+fn read_row(row: &Row, lens: Lens, noise: InverseDepthNoise, out: &mut Columns) -> [u32; 2] {
+    // Slices of known length spare the loop its bounds checks.
+    let width = out.omega.len();
+    let (omegas, offsets) = (&mut out.omega[..width], &mut out.offset[..width]);
+    let [slopes_u, slopes_v] = &mut out.slope;
+    let (slopes_u, slopes_v) = (&mut slopes_u[..width], &mut slopes_v[..width]);
+    let [above, here, below] = row.around;
+    let (above, here, below) = (&above[..width + 2], &here[..width + 2], &below[..width + 2]);
+    let (smooth, total, bend) = (&row.smooth[..width], &row.total[..width], &row.bend[..width]);
+    let (along, down, rough) = (&row.slope[0][..width], &row.slope[1][..width], &row.roughness[..width]);
+    let most_bend = (MOST_BEND * BENDING) * (MOST_BEND * BENDING) * BEND_VARIANCE;
+    let mut counts = [0, 0];
+    for u in 0..width {
+        let own = here[u + 1];
+        let sigma = noise.sigma_inverse(own);
+        // A NaN fails.
+        let shown = rough[u] * (1.0 / ROUGHNESS) + LEAST_NOISE * LEAST_NOISE * sigma * sigma;
+        let granted = if shown < sigma * sigma { shown } else { sigma * sigma };
+        let is_plane = u32::from(bend[u] * bend[u] <= most_bend * granted).wrapping_neg();
+        let wide = [total[u] * (1.0 / COUNT), along[u] * (1.0 / SPREAD), down[u] * (1.0 / SPREAD)];
+        let narrow = [smooth[u], 0.5 * (here[u + 2] - here[u]), 0.5 * (below[u + 1] - above[u + 1])];
+        let omega = choose(is_plane, wide[0], narrow[0]);
+        let slope_u = choose(is_plane, wide[1], narrow[1]);
+        let slope_v = choose(is_plane, wide[2], narrow[2]);
+        let (offset, cosine) = lens.plane(u as i32 as f32, omega, slope_u, slope_v);
+        let ratio = noise.base * omega * omega / noise.sigma_inverse(omega);
+        let weight = MAX_WEIGHT * ratio * ratio * cosine;
+        let weight = if weight > 1.0 { weight } else { 1.0 };
+        let weight = if weight < MAX_WEIGHT { weight } else { MAX_WEIGHT };
+        // A NaN fails both comparisons.
+        let omega = if cosine >= LEAST_COSINE { omega } else { 0.0 };
+        let omega = if omega > 0.0 { omega } else { 0.0 };
+        let last = (offset * slope_v).to_bits() & !15 | (weight + ROUNDER).to_bits() & 15;
+        offsets[u] = offset;
+        omegas[u] = omega;
+        slopes_u[u] = offset * slope_u;
+        slopes_v[u] = f32::from_bits(last);
+        counts[0] += u32::from(own > 0.0);
+        counts[1] += u32::from(omega > 0.0);
+    }
+    counts
+}
+
+/// One of two values, by a mask of all ones or zero: an `if` would become a branch, and the loop scalar.
+#[inline(always)]
+fn choose(mask: u32, one: f32, other: f32) -> f32 {
+    f32::from_bits(one.to_bits() & mask | other.to_bits() & !mask)
+}
+
+/// The camera, seen from one row of its image.
+#[derive(Clone, Copy)]
+struct Lens {
+    focal: [f32; 2],
+    inverse_focal: f32,
+    /// Steps of the stored distance per metre.
+    per_metre: f32,
+    cx: f32,
+    /// Row of the pixel from the principal point, in pixels, and squared in focal lengths.
+    dv: f32,
+    ray: f32,
+}
+
+impl Lens {
+    fn new(k: &Intrinsics, v: usize, per_metre: f32) -> Self {
+        let dv = v as f64 - k.cy;
+        Self {
+            focal: [k.fx as f32, k.fy as f32],
+            inverse_focal: (1.0 / k.fx) as f32,
+            per_metre,
+            cx: k.cx as f32,
+            dv: dv as f32,
+            ray: ((dv / k.fy) * (dv / k.fy) + 1.0) as f32,
+        }
+    }
+
+    /// The plane with this inverse depth and these slopes at a pixel: its distance from the camera in steps of the
+    /// stored distance, and the cosine between its normal and the ray.
+    #[inline(always)]
+    fn plane(&self, u: f32, omega: f32, slope_u: f32, slope_v: f32) -> (f32, f32) {
+        let du = u - self.cx;
+        // With x = z (du / fx, dv / fy, 1), the plane is n · x = 1.
+        let n = [self.focal[0] * slope_u, self.focal[1] * slope_v, omega - slope_u * du - slope_v * self.dv];
+        let squared = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+        let ray = du * self.inverse_focal;
+        (self.per_metre / squared.sqrt(), omega / (squared * (ray * ray + self.ray)).sqrt())
+    }
+}

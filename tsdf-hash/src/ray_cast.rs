@@ -1,0 +1,15 @@
+//! What the map looks like from a pose.
+
+pub(crate) mod camera;
+pub(crate) mod caster;
+mod cell;
+mod forward_projection;
+pub(crate) mod incremental;
+pub(crate) mod lanes;
+pub(crate) mod march;
+pub(crate) mod pixel;
+pub(crate) mod settings;
+mod splat;
+pub(crate) mod tiles;
+pub(crate) mod unpacked;
+pub(crate) mod view;

@@ -1,0 +1,110 @@
+//! Reads calibrations of both formats.
+
+use nalgebra::Isometry3;
+
+use super::schema::{CameraChain, CameraSection, ImuChain, ImuSection, parse};
+use super::section::Section;
+use super::types::{CameraCalibration, ImuCalibration};
+use crate::{Camera, Distortion, Error, ImuNoise};
+
+const WHOLE_FILE: Section = Section { prefix: "", line: 1 };
+
+/// Reads the `sensor.yaml` of an EuRoC/ASL camera.
+pub fn read_asl_camera(text: &str) -> Result<CameraCalibration, Error> {
+    let keys: CameraSection = parse(text)?;
+    let at = WHOLE_FILE;
+    let body_from_camera = at.asl_pose(keys.body_from_sensor.as_ref())?;
+    let camera = camera(&at, &keys, "distortion_coefficients", body_from_camera)?;
+    Ok(CameraCalibration { camera, rate_hz: at.optional("rate_hz", &keys.rate_hz)?, time_offset_s: 0.0 })
+}
+
+/// Reads the `sensor.yaml` of an EuRoC/ASL inertial sensor.
+pub fn read_asl_imu(text: &str) -> Result<ImuCalibration, Error> {
+    let keys: ImuSection = parse(text)?;
+    let at = WHOLE_FILE;
+    let rate_hz = at.number("rate_hz", &keys.rate_hz)?;
+    imu(&at, &keys, rate_hz, at.asl_pose(keys.body_from_sensor.as_ref())?)
+}
+
+/// Reads the cameras `cam0`, `cam1` ... of a Kalibr camera chain, in the order of the file.
+pub fn read_kalibr_cameras(text: &str) -> Result<Vec<CameraCalibration>, Error> {
+    let CameraChain(sections) = parse(text)?;
+    if sections.is_empty() {
+        return Err(Error::TooFew { what: "cameras (`cam0:` ...) in the Kalibr text", got: 0, need: 1 });
+    }
+    let read = |(name, section): &(String, serde_saphyr::Spanned<CameraSection>)| {
+        let keys = &section.value;
+        let at = Section { prefix: &format!("{name}."), line: section.referenced.line() };
+        let body_from_camera = if keys.camera_from_imu.is_some() {
+            at.pose("T_cam_imu", &keys.camera_from_imu)?.inverse()
+        } else {
+            at.pose("T_imu_cam", &keys.imu_from_camera)?
+        };
+        let camera = camera(&at, keys, "distortion_coeffs", body_from_camera)?;
+        let time_offset_s = at.optional("timeshift_cam_imu", &keys.timeshift_cam_imu)?.unwrap_or(0.0);
+        Ok(CameraCalibration { camera, rate_hz: None, time_offset_s })
+    };
+    sections.iter().map(read).collect()
+}
+
+/// Reads the inertial sensor of a Kalibr file: `imu0`, or the bare keys of its input file.
+pub fn read_kalibr_imu(text: &str) -> Result<ImuCalibration, Error> {
+    let (at, keys) = match parse::<ImuChain>(text)?.imu0 {
+        Some(section) => (Section { prefix: "imu0.", line: section.referenced.line() }, section.value),
+        None => (WHOLE_FILE, parse(text)?),
+    };
+    let rate_hz = at.number("update_rate", &keys.update_rate)?;
+    let body_from_imu = if keys.imu_from_body.is_some() {
+        at.pose("T_i_b", &keys.imu_from_body)?.inverse()
+    } else {
+        Isometry3::identity()
+    };
+    imu(&at, &keys, rate_hz, body_from_imu)
+}
+
+fn camera(
+    at: &Section,
+    keys: &CameraSection,
+    coefficients: &str,
+    body_from_camera: Isometry3<f64>,
+) -> Result<Camera, Error> {
+    let (model, line) = at.required("camera_model", &keys.camera_model)?;
+    if model != "pinhole" {
+        return Err(at.refuse(line, "camera_model", "only `pinhole` is known"));
+    }
+    let [width, height] = at.numbers("resolution", &keys.resolution)?;
+    let [fx, fy, cx, cy] = at.numbers("intrinsics", &keys.intrinsics)?;
+    let four = || at.numbers(coefficients, &keys.distortion_coefficients);
+    let (model, line) = at.required("distortion_model", &keys.distortion_model)?;
+    let distortion = match model.as_str() {
+        "radtan" | "radial-tangential" | "plumb_bob" => Distortion::RadTan(four()?),
+        "equidistant" => Distortion::Equidistant(four()?),
+        "none" => Distortion::None,
+        _ => {
+            let known = "only `radtan`, `radial-tangential`, `equidistant`, `none` are known";
+            return Err(at.refuse(line, "distortion_model", known));
+        }
+    };
+    if !(1.0..=32768.0).contains(&width) || !(1.0..=32768.0).contains(&height) {
+        let (_, line) = at.required("resolution", &keys.resolution)?;
+        return Err(at.refuse(line, "resolution", "must be between 1 and 32768 pixels"));
+    }
+    let (width, height) = (width as usize, height as usize);
+    let camera = Camera { width, height, fx, fy, cx, cy, distortion, body_from_camera };
+    camera.check()?;
+    Ok(camera)
+}
+
+fn imu(at: &Section, keys: &ImuSection, rate_hz: f64, body_from_imu: Isometry3<f64>) -> Result<ImuCalibration, Error> {
+    let noise = ImuNoise {
+        gyro_density: at.number("gyroscope_noise_density", &keys.gyroscope_noise_density)?,
+        gyro_walk: at.number("gyroscope_random_walk", &keys.gyroscope_random_walk)?,
+        accel_density: at.number("accelerometer_noise_density", &keys.accelerometer_noise_density)?,
+        accel_walk: at.number("accelerometer_random_walk", &keys.accelerometer_random_walk)?,
+    };
+    noise.check()?;
+    if rate_hz <= 0.0 {
+        return Err(crate::error::invalid("rate_hz", rate_hz, "must be positive"));
+    }
+    Ok(ImuCalibration { noise, rate_hz, body_from_imu })
+}

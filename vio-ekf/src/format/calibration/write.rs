@@ -1,0 +1,53 @@
+//! Writes the `sensor.yaml` of EuRoC/ASL folders.
+
+use nalgebra::Isometry3;
+
+use super::types::{CameraCalibration, ImuCalibration};
+use crate::Distortion;
+
+/// The `sensor.yaml` of an EuRoC/ASL camera. `Distortion::None` becomes a polynomial of zeros, which it equals.
+pub fn write_asl_camera(calibration: &CameraCalibration) -> String {
+    let camera = &calibration.camera;
+    let (model, k) = match camera.distortion {
+        Distortion::None => ("radial-tangential", [0.0; 4]),
+        Distortion::RadTan(k) => ("radial-tangential", k),
+        Distortion::Equidistant(k) => ("equidistant", k),
+    };
+    let rate = calibration.rate_hz.map_or(String::new(), |rate| format!("rate_hz: {rate}\n"));
+    format!(
+        "%YAML:1.0\nsensor_type: camera\n{}{rate}resolution: [{}, {}]\ncamera_model: pinhole\n\
+         intrinsics: [{}, {}, {}, {}]\ndistortion_model: {model}\ndistortion_coefficients: [{}, {}, {}, {}]\n",
+        pose_text(&camera.body_from_camera),
+        camera.width,
+        camera.height,
+        camera.fx,
+        camera.fy,
+        camera.cx,
+        camera.cy,
+        k[0],
+        k[1],
+        k[2],
+        k[3]
+    )
+}
+
+/// The `sensor.yaml` of an EuRoC/ASL inertial sensor.
+pub fn write_asl_imu(calibration: &ImuCalibration) -> String {
+    let noise = &calibration.noise;
+    format!(
+        "%YAML:1.0\nsensor_type: imu\n{}rate_hz: {}\ngyroscope_noise_density: {}\ngyroscope_random_walk: {}\n\
+         accelerometer_noise_density: {}\naccelerometer_random_walk: {}\n",
+        pose_text(&calibration.body_from_imu),
+        calibration.rate_hz,
+        noise.gyro_density,
+        noise.gyro_walk,
+        noise.accel_density,
+        noise.accel_walk
+    )
+}
+
+fn pose_text(pose: &Isometry3<f64>) -> String {
+    let matrix = pose.to_homogeneous();
+    let numbers: Vec<String> = matrix.transpose().iter().map(f64::to_string).collect();
+    format!("T_BS:\n  cols: 4\n  rows: 4\n  data: [{}]\n", numbers.join(", "))
+}
