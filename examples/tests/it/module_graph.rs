@@ -152,7 +152,8 @@ impl ModuleGraph {
         };
         for (before, name) in path.iter().zip(&path[1..]) {
             // A function may bear the name of a module beside it; only the module has members.
-            if before.starts_with(char::is_lowercase) && found.iter().any(|target| matches!(target, Target::Module(_))) {
+            if before.starts_with(char::is_lowercase) && found.iter().any(|target| matches!(target, Target::Module(_)))
+            {
                 found.retain(|target| matches!(target, Target::Module(_)));
             }
             let mut next = BTreeSet::new();
