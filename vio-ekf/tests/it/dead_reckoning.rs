@@ -5,7 +5,9 @@
 use crate::support::recorded;
 use nalgebra::Vector3;
 use vio_ekf::sim::{ImuModel, RoomSettings, Scenario, Simulation, painting_flight};
-use vio_ekf::{Camera, Imu, ImuNoise, Settings, Stamp, Start, StartSigma, Vio, asl, euroc, nalgebra};
+use vio_ekf::{
+    Camera, Imu, ImuNoise, InitialSigma, InitialState, LandmarkSettings, Settings, Stamp, Vio, asl, euroc, nalgebra,
+};
 
 /// Stamps of truth and samples agree to this, ns.
 const SAME: i64 = 1_000;
@@ -22,7 +24,11 @@ fn flight(name: &str, imu: &str) -> Option<(Vec<Imu>, euroc::States)> {
 /// the truth apart, each from the true state and biases.
 fn medians(samples: &[Imu], truth: &euroc::States, gravity: f64, steps: usize, every: usize) -> (f64, f64, usize) {
     let (stamps, poses) = (truth.trajectory.stamps(), truth.trajectory.poses());
-    let settings = Settings { gravity, features: 1, ..Settings::default() };
+    let settings = Settings {
+        gravity,
+        landmarks: LandmarkSettings { max_count: 1, ..LandmarkSettings::default() },
+        ..Settings::default()
+    };
     let asleep = Vio::new(Camera::euroc(), ImuNoise::default(), settings).unwrap();
     let (mut angles, mut speeds) = (Vec::new(), Vec::new());
     for row in (0..stamps.len() - steps).step_by(every) {
@@ -31,13 +37,13 @@ fn medians(samples: &[Imu], truth: &euroc::States, gravity: f64, steps: usize, e
         let begin = poses[row];
         let mut vio = asleep.clone();
         vio.imu(coming.next().unwrap()).unwrap();
-        vio.start(&Start {
+        vio.initialize(&InitialState {
             stamp: from,
             world_from_body: begin,
             velocity_in_body: begin.rotation.inverse() * truth.velocities_in_world[row],
             gyro_bias: truth.gyro_biases[row],
             accel_bias: truth.accel_biases[row],
-            sigma: StartSigma::default(),
+            sigma: InitialSigma::default(),
         })
         .unwrap();
         for sample in coming.take_while(|s| s.stamp <= to) {
@@ -85,8 +91,8 @@ fn the_truth_between_its_corrections() {
     }
 }
 
-/// The same on samples of our own, whose noise is known: after a second the angle is that of a random walk of the gyroscope's
-/// density, and the speed that of the accelerometer's, with gravity along the wrong axis for the other half.
+/// The same on samples of our own, whose noise is known. After a second the angle is a random walk of the gyroscope's density; the
+/// speed is one of the accelerometer's, with what its bias has walked and what gravity does along axes that have tilted.
 #[test]
 fn a_second_of_generated_samples() {
     let imu = ImuModel { gyro_bias_sigma: 0.0, accel_bias_sigma: 0.0, ..ImuModel::default() };
@@ -112,9 +118,9 @@ fn a_second_of_generated_samples() {
     // Medians of the length of a normal vector: 1.538 deviations of an axis.
     let noise = imu.noise;
     let degrees = (1.538 * noise.gyro_density).to_degrees();
-    let tilted = (9.81 * noise.gyro_density).powi(2) / 3.0;
-    // Two axes of three feel the tilt; the mean of the variances stands for them.
-    let metres = 1.538 * (noise.accel_density.powi(2) + 2.0 / 3.0 * tilted).sqrt();
+    // Integrated random walks have a third of the variance. Two axes of three feel the tilt; the mean stands for them.
+    let (walked, tilted) = (noise.accel_walk.powi(2) / 3.0, (9.81 * noise.gyro_density).powi(2) / 3.0);
+    let metres = 1.538 * (noise.accel_density.powi(2) + walked + 2.0 / 3.0 * tilted).sqrt();
     eprintln!("{angle:.4} deg of {degrees:.4}, {speed:.5} m/s of {metres:.5}, medians of {count}");
     assert!((angle / degrees - 1.0).abs() < 0.15 && (speed / metres - 1.0).abs() < 0.15, "{angle} deg, {speed} m/s");
 }
