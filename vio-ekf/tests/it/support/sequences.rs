@@ -8,7 +8,8 @@ use vio_ekf::{
     Camera, InitialSigma, InitialState, PointObservation, Spline, Stamp, Trajectory, euroc, nalgebra, so3, tum,
 };
 
-use super::{Rng, recorded};
+use super::recorded;
+use super::rng::Rng;
 
 /// Four recorded flights and two along a wall that is to be painted.
 pub(crate) const SEQUENCES: [&str; 6] = ["MH_01", "MH_03", "MH_04", "V1_02", "paint_1", "paint_2"];
@@ -23,7 +24,7 @@ pub(crate) fn motion(name: &str) -> Option<Spline> {
         "paint_1" => return Some(painting_flight(1, 60.0).unwrap()),
         _ => return Some(painting_flight(2, 60.0).unwrap()),
     };
-    let text = recorded(file)?;
+    let text = recorded::text(file)?;
     let whole: Trajectory =
         if file.ends_with("csv.gz") { euroc::read(&text).unwrap().trajectory } else { tum::read(&text).unwrap() };
     Some(Spline::from_trajectory(&whole, 50_000_000).unwrap())
@@ -59,7 +60,7 @@ impl Sequence {
         let imu = simulation.imu(0).unwrap();
         let walls = simulation.room().walls;
         let (middle, half) = ((walls.min + walls.max) / 2.0, (walls.max - walls.min) / 2.0);
-        let mut rng = Rng(seed);
+        let mut rng = Rng::new(seed);
         // So many that a good twenty-five are in sight from everywhere.
         let point = |_| {
             let mut unit = rng.vector();
@@ -76,7 +77,7 @@ impl Sequence {
 
     /// What a tracker of points sees at a time; the noise comes from the time.
     pub(crate) fn see(&self, stamp: Stamp) -> Vec<PointObservation> {
-        let mut rng = Rng(stamp.nanos() as u64);
+        let mut rng = Rng::new(stamp.nanos() as u64);
         let camera_from_world =
             (self.simulation.motion(stamp).unwrap().world_from_body * self.camera.body_from_camera).inverse();
         let mut seen = Vec::new();
@@ -97,7 +98,7 @@ pub(crate) fn drawn_start(simulation: &Simulation, stamp: Stamp, seed: u64) -> I
     let imu = ImuModel::default();
     let sigma =
         InitialSigma { gyro_bias: imu.gyro_bias_sigma, accel_bias: imu.accel_bias_sigma, ..InitialSigma::default() };
-    let mut rng = Rng(seed);
+    let mut rng = Rng::new(seed);
     // A stamp that jitters may be a little before the beginning.
     let motion = simulation.motion(stamp.max(simulation.spline().span().0)).unwrap();
     let pose = motion.world_from_body;

@@ -1,10 +1,6 @@
 //! The search for noise settings: on a function whose least point is known, and on flights whose noise is known.
-#![cfg(feature = "tune")]
-#![allow(clippy::unwrap_used)]
 
-mod support;
-
-use support::flight::{GRAVITY, camera, spline};
+use crate::support::flight::{GRAVITY, camera, spline};
 use vio_ekf::sim::ImuModel;
 use vio_ekf::tune::{NoisePoint, PointRecording, Score, Trial, TuneSettings, cost, tune, with_factors};
 use vio_ekf::{Error, ImuNoise, Settings};

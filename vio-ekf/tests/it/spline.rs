@@ -1,11 +1,8 @@
 //! The B-spline against published digits and against differences of itself.
 
-#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
-
-mod support;
-
+use crate::support::recorded;
+use crate::support::rng::Rng;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use support::{Rng, recorded};
 use vio_ekf::{Error, Motion, Spline, Stamp, Trajectory, nalgebra, so3, tum};
 
 fn nanos(nanos: i64) -> Stamp {
@@ -58,7 +55,7 @@ fn check_derivatives(spline: &Spline, at: Stamp) {
 
 #[test]
 fn derivatives_are_derivatives_also_across_knots() {
-    let mut rng = Rng(3);
+    let mut rng = Rng::new(3);
     let knots: Vec<_> = (0..20)
         .map(|_| Isometry3::from_parts(Translation3::from(rng.vector()), so3::exp(&(rng.vector() * 0.5))))
         .collect();
@@ -95,7 +92,7 @@ fn reproduces_constant_velocity_and_constant_rate() {
 
 #[test]
 fn follows_a_recorded_flight() {
-    let Some(text) = recorded("trajectories/euroc/MH_03_medium.txt.gz") else { return };
+    let Some(text) = recorded::text("trajectories/euroc/MH_03_medium.txt.gz") else { return };
     let truth = tum::read(&text).unwrap();
     let spline = Spline::from_trajectory(&truth, 50_000_000).unwrap();
     let (first, last) = spline.span();

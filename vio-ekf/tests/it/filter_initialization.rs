@@ -1,11 +1,7 @@
 //! Starts in motion: everywhere along the sequences, without any help.
 
-#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
-
-mod support;
-
+use crate::support::sequences::{SEQUENCES, Sequence};
 use nalgebra::{Isometry3, Vector3};
-use support::sequences::{SEQUENCES, Sequence};
 use vio_ekf::{
     Alignment, DynamicInitializationSettings, ImuNoise, LandmarkSettings, Settings, Stamp, Status, Vio, align, ate,
     nalgebra,
@@ -186,7 +182,7 @@ fn a_start_that_is_contradicted_is_taken_back() {
     };
 }
 
-/// Starts over all sequences on points: `cargo test --release -p vio-ekf --test filter_starts -- --ignored --nocapture
+/// Starts over all sequences on points: `cargo test --release -p vio-ekf --test it filter_starts -- --ignored --nocapture
 /// points`. `STARTS` is how many per sequence (34).
 #[test]
 #[ignore = "two minutes"]

@@ -1,11 +1,7 @@
 //! The filter with a second camera: it knows how far away things are before it has moved.
 
-#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
-
-mod support;
-
+use crate::support::flight::{Flight, nees};
 use nalgebra::{Isometry3, Vector2, Vector3};
-use support::flight::{Flight, nees};
 use vio_ekf::sim::{RoomSettings, Scenario, SimulatedCamera, Simulation, camera_ahead, camera_ahead_right};
 use vio_ekf::{
     Camera, Error, ImageView, ImuNoise, InitialSigma, InitialState, Odometry, PointObservation, PointPair, Settings,

@@ -1,11 +1,7 @@
 //! A body that stands before it flies, seen by a tracker of points.
 
-#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
-
-mod support;
-
+use crate::support::flight::{Flight, nees, spline};
 use nalgebra::{Isometry3, Vector3};
-use support::flight::{Flight, nees, spline};
 use vio_ekf::{DynamicInitializationSettings, InitialSigma, Settings, Spline, Stamp, Status, Vio, nalgebra};
 
 /// Seconds of rest.

@@ -1,12 +1,11 @@
 //! The simulator against closed forms: what a sensor reads, where a corner of the room lands, how much noise there is.
-#![allow(clippy::unwrap_used)]
 
 use nalgebra::{Isometry3, Matrix2, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
 use vio_ekf::sim::{
     Cuboid, Gain, ImuModel, Occluder, Photometry, Room, RoomSettings, Scenario, SimulatedCamera, Simulation, Surface,
     Texture, Vibration,
 };
-use vio_ekf::{Camera, Error, Spline, Stamp};
+use vio_ekf::{Camera, Error, ImuNoise, Spline, Stamp};
 
 const KNOT_NS: i64 = 50_000_000;
 
@@ -132,6 +131,26 @@ fn noise_biases_saturation_and_vibration_are_what_was_asked_for() {
     assert!(samples.windows(2).all(|w| w[0].stamp < w[1].stamp));
     assert_eq!(record(&lossy, 3), record(&lossy, 3));
     assert_ne!(record(&lossy, 3).samples, record(&lossy, 4).samples);
+}
+
+/// Without biases, the white noise is all that a seed can change.
+#[test]
+fn the_seed_makes_the_white_noise() {
+    let noise = ImuNoise { gyro_walk: 0.0, accel_walk: 0.0, ..ImuNoise::default() };
+    let model = ImuModel { noise, gyro_bias_sigma: 0.0, accel_bias_sigma: 0.0, ..ImuModel::default() };
+    let [first, second] = [3, 4].map(|seed| model.record(&wild(), 9.81, seed).unwrap().samples);
+    for (a, b) in first.iter().zip(&second) {
+        assert!(a.stamp == b.stamp && a.gyro != b.gyro && a.accel != b.accel, "{a:?} {b:?}");
+    }
+}
+
+/// Kalibr's `timeshift_cam_imu`: what is added to a stamp of the camera to get the inertial sensor's time.
+#[test]
+fn the_cameras_clock_is_behind_by_its_offset() {
+    let model = SimulatedCamera { time_offset_s: 0.007, ..forward_camera(Photometry::default()) };
+    let scenario = Scenario { cameras: vec![model], room: small_room(), ..Scenario::default() };
+    let frame = Simulation::new(wild(), scenario).unwrap().frame(0, 5).unwrap().unwrap();
+    assert_eq!(frame.true_stamp.nanos() - frame.stamp.nanos(), 7_000_000);
 }
 
 /// A room of chequered walls: fields of 32 texels, 4 mm each.

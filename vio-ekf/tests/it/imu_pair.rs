@@ -1,12 +1,8 @@
 //! Two inertial sensors joined into one: noise, walk, lever arm, silence.
 
-#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
-
-mod support;
-
+use crate::support::flight::{Flight, GRAVITY};
+use crate::support::imus::{bias, models, settings};
 use nalgebra::Vector3;
-use support::flight::{Flight, GRAVITY};
-use support::imus::{bias, models, settings};
 use vio_ekf::sim::ImuModel;
 use vio_ekf::{Imu, ImuNoise, ImuPair, ImuPairSettings, nalgebra};
 

@@ -1,13 +1,10 @@
 //! Real inertial samples carried on from the recorded truth by the filter itself, without any camera.
 //!
-//! The figures: `cargo test --release -p vio-ekf --test dead_reckoning -- --nocapture`.
+//! The figures: `cargo test --release -p vio-ekf --test it dead_reckoning -- --nocapture`.
 
-#![allow(clippy::unwrap_used)]
-
-mod support;
-
+use crate::support::recorded;
 use nalgebra::Vector3;
-use support::recorded;
+use vio_ekf::sim::{ImuModel, RoomSettings, Scenario, Simulation, painting_flight};
 use vio_ekf::{
     Camera, Imu, ImuNoise, InitialSigma, InitialState, LandmarkSettings, Settings, Stamp, Vio, asl, euroc, nalgebra,
 };
@@ -18,8 +15,8 @@ const SAME: i64 = 1_000;
 /// A flight's samples, and its truth at (nearly) the same times.
 fn flight(name: &str, imu: &str) -> Option<(Vec<Imu>, euroc::States)> {
     let folder = format!("vio/euroc_imu_gt/{name}");
-    let samples = asl::read_imu(&recorded(&format!("{folder}/{imu}.txt.gz"))?).unwrap();
-    let truth = euroc::read(&recorded(&format!("{folder}/groundtruth_{name}.csv.gz")).unwrap()).unwrap();
+    let samples = asl::read_imu(&recorded::text(&format!("{folder}/{imu}.txt.gz"))?).unwrap();
+    let truth = euroc::read(&recorded::text(&format!("{folder}/groundtruth_{name}.csv.gz")).unwrap()).unwrap();
     Some((samples, truth))
 }
 
@@ -92,4 +89,38 @@ fn the_truth_between_its_corrections() {
         // Printed: velocities to 1e-6 m/s, quaternions to 1e-6.
         assert!(angle < 2e-4 && speed < 1.5e-5, "{name}: {angle} deg, {speed} m/s");
     }
+}
+
+/// The same on samples of our own, whose noise is known. After a second the angle is a random walk of the gyroscope's density; the
+/// speed is one of the accelerometer's, with what its bias has walked and what gravity does along axes that have tilted.
+#[test]
+fn a_second_of_generated_samples() {
+    let imu = ImuModel { gyro_bias_sigma: 0.0, accel_bias_sigma: 0.0, ..ImuModel::default() };
+    let scenario = Scenario {
+        imus: vec![imu.clone()],
+        room: RoomSettings { texture_size: 64, ..RoomSettings::default() },
+        ..Scenario::default()
+    };
+    let simulation = Simulation::new(painting_flight(3, 60.0).unwrap(), scenario).unwrap();
+    let recording = simulation.imu(0).unwrap();
+    let samples = asl::read_imu(&asl::write_imu(&recording.samples)).unwrap();
+    let mut truth = euroc::States::default();
+    for sample in &samples {
+        let motion = simulation.motion(sample.stamp).unwrap();
+        truth.trajectory.push(sample.stamp, motion.world_from_body).unwrap();
+        truth.velocities_in_world.push(motion.velocity_in_world);
+        let (gyro, accel) = recording.biases_at(sample.stamp);
+        truth.gyro_biases.push(gyro);
+        truth.accel_biases.push(accel);
+    }
+    let truth = euroc::read(&euroc::write(&truth).unwrap()).unwrap();
+    let (angle, speed, count) = medians(&samples, &truth, 9.81, 200, 17);
+    // Medians of the length of a normal vector: 1.538 deviations of an axis.
+    let noise = imu.noise;
+    let degrees = (1.538 * noise.gyro_density).to_degrees();
+    // Integrated random walks have a third of the variance. Two axes of three feel the tilt; the mean stands for them.
+    let (walked, tilted) = (noise.accel_walk.powi(2) / 3.0, (9.81 * noise.gyro_density).powi(2) / 3.0);
+    let metres = 1.538 * (noise.accel_density.powi(2) + walked + 2.0 / 3.0 * tilted).sqrt();
+    eprintln!("{angle:.4} deg of {degrees:.4}, {speed:.5} m/s of {metres:.5}, medians of {count}");
+    assert!((angle / degrees - 1.0).abs() < 0.15 && (speed / metres - 1.0).abs() < 0.15, "{angle} deg, {speed} m/s");
 }

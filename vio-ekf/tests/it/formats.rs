@@ -1,9 +1,8 @@
 //! The three text formats: what is read, what is refused and where, and that nothing panics.
 
-mod support;
-
+use crate::support::recorded;
+use crate::support::rng::Rng;
 use nalgebra::{Isometry3, Vector3};
-use support::{Rng, recorded};
 use vio_ekf::{Error, InvalidStamp, Stamp, Trajectory, euroc, kitti, nalgebra, so3, tum};
 
 #[test]
@@ -129,7 +128,7 @@ fn kitti_takes_the_nearest_rotation_and_refuses_what_is_none() {
 
 #[test]
 fn writing_and_reading_gives_the_same_poses() {
-    let mut rng = Rng(4);
+    let mut rng = Rng::new(4);
     let mut trajectory = Trajectory::default();
     for i in 0..200 {
         let position = rng.vector() * 10_f64.powi(i % 12 - 6);
@@ -170,7 +169,7 @@ fn damaged_text_is_an_error_or_a_trajectory_but_never_a_panic() {
         "#",
         "\n",
     ];
-    let mut rng = Rng(5);
+    let mut rng = Rng::new(5);
     let (mut accepted, mut refused) = (0, 0);
     for _ in 0..20_000 {
         let mut text = valid[(rng.bits() % 3) as usize].to_owned();
@@ -209,7 +208,7 @@ fn reads_every_recorded_trajectory() {
         ("trajectories/euroc/MH_01_easy.txt.gz", 181.9, 80.6),
         ("trajectories/euroc/MH_03_medium.txt.gz", 131.5, 130.9),
     ] {
-        let Some(text) = recorded(path) else { return };
+        let Some(text) = recorded::text(path) else { return };
         let trajectory = tum::read(&text).unwrap();
         assert!((trajectory.duration_s() - seconds).abs() < 0.06, "{path}: {} s", trajectory.duration_s());
         assert!((trajectory.path_length() - metres).abs() < 0.06, "{path}: {} m", trajectory.path_length());
@@ -220,10 +219,12 @@ fn reads_every_recorded_trajectory() {
         ("trajectories/uzhfpv/indoor_forward_3_snapdragon_with_gt.txt.gz", 24750),
         ("trajectories/tum_vi/dataset-room1_512_16.txt.gz", 16541),
     ] {
-        let Some(text) = recorded(path) else { return };
+        let Some(text) = recorded::text(path) else { return };
         assert_eq!(tum::read(&text).unwrap().len(), poses, "{path}");
     }
-    let Some(text) = recorded("vio/euroc_imu_gt/MH_04_difficult/groundtruth_MH_04_difficult.csv.gz") else { return };
+    let Some(text) = recorded::text("vio/euroc_imu_gt/MH_04_difficult/groundtruth_MH_04_difficult.csv.gz") else {
+        return;
+    };
     let states = euroc::read(&text).unwrap();
     // Published: 98.8 s, 91.7 m. Velocities and biases are given for each pose.
     assert!(

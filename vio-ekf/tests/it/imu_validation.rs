@@ -1,11 +1,8 @@
 //! Samples that cannot be: real readings pass as they are, and are refused when spoilt in any of the usual ways.
-#![allow(clippy::unwrap_used)]
 
-mod support;
-
+use crate::support::flight::{Flight, GRAVITY};
+use crate::support::recorded;
 use nalgebra::{Isometry3, Matrix3, Vector3};
-use support::flight::{Flight, GRAVITY};
-use support::recorded;
 use vio_ekf::sim::ImuModel;
 use vio_ekf::{Error, Imu, Spline, Stamp, asl, nalgebra, validate_samples};
 
@@ -15,7 +12,7 @@ fn recordings() -> Vec<(&'static str, Vec<Imu>)> {
     let stamps: Vec<Stamp> = flight.stamps().collect();
     let mut recordings = vec![("simulated", stamps.into_iter().map(|stamp| flight.imu(stamp)).collect())];
     for (name, file) in [("MH_04_difficult", "imu_MH04"), ("V1_02_medium", "imu_V102")] {
-        if let Some(text) = recorded(&format!("vio/euroc_imu_gt/{name}/{file}.txt.gz")) {
+        if let Some(text) = recorded::text(&format!("vio/euroc_imu_gt/{name}/{file}.txt.gz")) {
             recordings.push((name, asl::read_imu(&text).unwrap()));
         }
     }

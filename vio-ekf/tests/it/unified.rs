@@ -1,13 +1,9 @@
 //! One estimator for two inertial sensors, a camera and poses of a map.
 
-#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
-
-mod support;
-
+use crate::support::flight::{Flight, GRAVITY, nees};
+use crate::support::imus::{bias, models, settings};
+use crate::support::rng::Rng;
 use nalgebra::{Isometry3, Matrix6, SMatrix, SVector, Translation3, Vector3, Vector6};
-use support::Rng;
-use support::flight::{Flight, GRAVITY, nees};
-use support::imus::{bias, models, settings};
 use vio_ekf::sim::{ImuModel, ImuRecording};
 use vio_ekf::{
     BodyPose, CoreCovariance, Error, Imu, ImuNoise, ImuPair, ImuPairSettings, InitialSigma, InitialState, Odometry,
@@ -67,7 +63,7 @@ fn a_pose_adds_its_information_to_that_of_the_filter() {
 
 #[test]
 fn a_pose_of_a_sensor_in_another_frame_says_the_same_of_the_body() {
-    let mut rng = Rng(5);
+    let mut rng = Rng::new(5);
     let pose = |rng: &mut Rng| Isometry3::new(rng.vector() * 2.0, rng.vector() * 2.0);
     for _ in 0..20 {
         let (source_from_world, body_from_sensor, world_from_body) = (pose(&mut rng), pose(&mut rng), pose(&mut rng));
@@ -177,7 +173,7 @@ fn order_of_arrival_does_not_matter() {
     let recording = record(3, 8.0);
     let mut runs = vec![];
     for seed in 0..4 {
-        let mut rng = Rng(seed);
+        let mut rng = Rng::new(seed);
         let mut outputs = vec![];
         // Second samples up to 4.5 ms, all else up to 180 ms late, in any order.
         let late = |_| if seed == 0 { 0 } else { (rng.bits() % 180_000_000) as i64 };

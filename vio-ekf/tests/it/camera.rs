@@ -1,9 +1,6 @@
 //! Lenses: published values, closed forms, derivatives against differences, and what must be refused.
-#![allow(clippy::unwrap_used, reason = "tests")]
 
-mod support;
-
-use support::Rng;
+use crate::support::rng::Rng;
 use vio_ekf::nalgebra::{Matrix2x3, Vector2, Vector3};
 use vio_ekf::{Camera, Distortion};
 
@@ -56,7 +53,7 @@ fn bearing_inverts_project_over_the_whole_image() {
 
 #[test]
 fn jacobians_agree_with_differences() {
-    let mut rng = Rng(11);
+    let mut rng = Rng::new(11);
     for camera in lenses() {
         for case in 0..200 {
             let scale = if case == 0 { 0.0 } else { 0.7 };

@@ -1,11 +1,7 @@
 //! The filter on points: accuracy, honesty, and what it must not claim to know.
 
-#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
-
-mod support;
-
+use crate::support::flight::{Flight, nees};
 use nalgebra::{Isometry3, SVector};
-use support::flight::{Flight, nees};
 use vio_ekf::{
     CalibrationSettings, DynamicInitializationSettings, Error, ImageView, Imu, ImuSettings, InitialSigma, InitialState,
     LandmarkSettings, PointObservation, Settings, Stamp, Status, Vio, chi2, nalgebra, so3,

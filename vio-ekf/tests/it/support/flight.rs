@@ -6,25 +6,13 @@ use vio_ekf::{
     Spline, Stamp, Vio, nalgebra, so3,
 };
 
-use super::Rng;
+use super::rng::Rng;
 
 pub(crate) const GRAVITY: f64 = 9.81;
 /// 200 Hz.
 const IMU_STEP: i64 = 5_000_000;
 /// 20 Hz.
 const IMAGES_EVERY: i64 = 10;
-
-impl Rng {
-    /// Normal distribution (Box and Muller).
-    pub(crate) fn normal(&mut self) -> f64 {
-        let (u, v) = (self.signed() * 0.5 + 0.5, self.signed());
-        (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::PI * v).cos()
-    }
-
-    pub(crate) fn normals(&mut self) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| self.normal())
-    }
-}
 
 /// A pinhole that looks along the body's x axis.
 pub(crate) fn camera() -> Camera {
@@ -41,7 +29,7 @@ pub(crate) fn camera() -> Camera {
 
 /// Sways and turns through a room of about 8 m, never twice the same way.
 pub(crate) fn spline(seed: u64, seconds: f64) -> Spline {
-    let mut rng = Rng(seed);
+    let mut rng = Rng::new(seed);
     let phases: Vec<Vector3<f64>> = (0..4).map(|_| rng.vector() * std::f64::consts::PI).collect();
     let knots = (0..(seconds / 0.1) as usize + 4).map(|k| {
         let t = k as f64 * 0.1;
@@ -61,7 +49,7 @@ pub(crate) fn spline(seed: u64, seconds: f64) -> Spline {
 
 /// Points on the walls of a room of 9 m.
 pub(crate) fn points(seed: u64, count: usize) -> Vec<Vector3<f64>> {
-    let mut rng = Rng(seed ^ 0x5555);
+    let mut rng = Rng::new(seed ^ 0x5555);
     (0..count)
         .map(|_| {
             let mut point = rng.vector();
@@ -87,7 +75,7 @@ pub(crate) struct Flight {
 
 impl Flight {
     pub(crate) fn new(seed: u64, seconds: f64) -> Self {
-        let mut rng = Rng(seed.wrapping_mul(7919));
+        let mut rng = Rng::new(seed.wrapping_mul(7919));
         let biases = [rng.vector() * 0.02, rng.vector() * 0.1];
         let noise = ImuNoise::default();
         let (spline, points) = (spline(seed, seconds), points(seed, 250));

@@ -1,10 +1,6 @@
 //! Everything that goes wrong in the air: the estimate survives, or says that it has not.
 
-#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
-
-mod support;
-
-use support::abuse::{ABUSES, Outcome, run};
+use crate::support::abuse::{ABUSES, Outcome, run};
 
 #[test]
 fn no_light_and_too_much_of_it() {
@@ -16,7 +12,7 @@ fn no_light_and_too_much_of_it() {
     }
 }
 
-/// The suite, 60 cases of 15 s, and its table: `cargo test --release -p vio-ekf --test filter_abuse -- --ignored
+/// The suite, 60 cases of 15 s, and its table: `cargo test --release -p vio-ekf --test it filter_abuse -- --ignored
 /// --nocapture`. `CASES` is a list of cases instead, `VIO_TRACE` shows the errors of every image.
 #[test]
 #[ignore = "renders 18,000 images"]

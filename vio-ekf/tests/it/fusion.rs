@@ -1,13 +1,9 @@
 //! Poses of others and an inertial sensor: accuracy, honesty, and the order of arrival.
 
-#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
-
-mod support;
-
+use crate::support::flight::{Flight, nees};
+use crate::support::rng::Rng;
+use crate::support::tracker::Tracker;
 use nalgebra::{Isometry3, Translation3, Vector3, Vector6};
-use support::Rng;
-use support::flight::{Flight, nees};
-use support::tracker::Tracker;
 use vio_ekf::{
     AlignmentSettings, ExtrinsicsSettings, FusionSettings, Imu, ImuNoise, InitialSigma, InitialState, Odometry,
     PoseFusion, PoseMeasurement, PoseSource, Stamp, chi2, nalgebra, so3,
@@ -251,7 +247,7 @@ fn order_of_arrival_does_not_matter() {
     };
     let prompt = feed(&mut |_| 1);
     for seed in 0..6 {
-        let mut rng = Rng(seed);
+        let mut rng = Rng::new(seed);
         let shuffled = feed(&mut |_| (rng.bits() % 150) as usize);
         assert_eq!(prompt, shuffled, "seed {seed}");
     }

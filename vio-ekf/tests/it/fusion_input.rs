@@ -1,13 +1,9 @@
 //! What the fusion of poses does with input that is wrong, missing, singular or late.
 
-#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
-
-mod support;
-
+use crate::support::flight::Flight;
+use crate::support::rng::Rng;
+use crate::support::tracker::Tracker;
 use nalgebra::{Isometry3, Matrix6, Translation3, Vector3, Vector6};
-use support::Rng;
-use support::flight::Flight;
-use support::tracker::Tracker;
 use vio_ekf::{
     DivergenceCause, Error, FusionSettings, Imu, InitialSigma, InitialState, PoseFusion, PoseMeasurement, PoseSource,
     Stamp, nalgebra, so3,
@@ -20,7 +16,7 @@ fn outliers_are_refused_and_a_source_that_is_wrong_is_told() {
         let source = Tracker::default();
         let start = flight.drawn_start(InitialSigma { position: 0.05, yaw: 0.02, ..InitialSigma::default() });
         let mut fusion = PoseFusion::new(flight.noise, &[source.known()], FusionSettings::default()).unwrap();
-        let mut luck = Rng(99);
+        let mut luck = Rng::new(99);
         let (mut sum, mut count, mut refused) = (0.0, 0, 0);
         for (k, stamp) in flight.stamps().enumerate() {
             fusion.imu(&flight.imu(stamp)).unwrap();

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Vector3};
 use vio_ekf::sim::{Gain, ImuModel, RoomSettings, Scenario, SimulatedCamera, Simulation, Vibration, camera_ahead};
 use vio_ekf::{Camera, Odometry, Settings, Spline, Stamp, Status, Vio, chi2, nalgebra, so3};
 
-use super::Rng;
+use super::rng::Rng;
 use super::sequences::{SEQUENCES, drawn_start, motion};
 
 /// What goes wrong.
@@ -76,7 +76,7 @@ fn part(abuse: Abuse, name: &str, from: f64, seconds: f64) -> Option<Spline> {
 
 /// A recording of `seconds`, abused from the fifth second on; `halves` is how often the image is halved in size.
 fn simulation(abuse: Abuse, name: &str, seed: u64, seconds: f64, halves: u32) -> Option<Simulation> {
-    let mut rng = Rng(seed);
+    let mut rng = Rng::new(seed);
     let spline = part(abuse, name, 0.5 + 0.5 * rng.signed(), seconds)?;
     let (mut imu, mut room) = (ImuModel::default(), RoomSettings::default());
     let lens = if name.starts_with("paint") { camera_ahead() } else { Camera::euroc() };

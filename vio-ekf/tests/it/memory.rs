@@ -2,14 +2,11 @@
 
 // A global allocator can only be written with unsafe code; this one counts and passes on.
 #![allow(unsafe_code, reason = "counting allocations needs a global allocator")]
-#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
-
-mod support;
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use support::flight::Flight;
+use crate::support::flight::Flight;
 use vio_ekf::{FusionSettings, ImageView, InitialSigma, PoseFusion, PoseMeasurement, PoseSource, Settings, Stamp, Vio};
 
 struct Counting;

@@ -1,11 +1,7 @@
 //! Agreement with `evo` 1.38.1, the evaluation tool in common use. Its figures stand in `evo_*.txt` beside this file.
 
-#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
-
-mod support;
-
+use crate::support::recorded;
 use nalgebra::Isometry3;
-use support::recorded;
 use vio_ekf::{
     Alignment, Association, Error, PairsFrom, PosePairs, RpeSettings, Span, Stats, Tolerance, align, apply, ate, kitti,
     nalgebra, rpe, tum,
@@ -86,7 +82,7 @@ fn equals_evo_on_a_synthetic_pair() {
 
 #[test]
 fn equals_evo_on_public_recordings() {
-    let file = |name: &str| recorded(&format!("trajectories/evo/{name}.txt.gz"));
+    let file = |name: &str| recorded::text(&format!("trajectories/evo/{name}.txt.gz"));
     let lines = compare(include_str!("evo_public.txt"), |case| {
         if case == "KITTI_00" {
             return Some((kitti::read(&file("KITTI_00_gt")?).unwrap(), kitti::read(&file("KITTI_00_ORB")?).unwrap()));
@@ -95,13 +91,13 @@ fn equals_evo_on_public_recordings() {
         let truth = if name.starts_with("fr2") { "fr2_desk_groundtruth" } else { "freiburg1_xyz-groundtruth" };
         Some(paired(&file(truth)?, &file(name)?, name != case))
     });
-    assert!(lines == 140 || recorded("trajectories/evo/V102.txt.gz").is_none(), "{lines} lines");
+    assert!(lines == 140 || recorded::text("trajectories/evo/V102.txt.gz").is_none(), "{lines} lines");
 }
 
 #[test]
 fn position_and_yaw_separate_the_runs_that_a_rigid_alignment_cannot() {
     // The second run is the first, seen from a tilted frame. Figures: an independent numpy program, pairs within 0.02 s.
-    let file = |name: &str| recorded(&format!("trajectories/evo/freiburg1_xyz-{name}.txt.gz"));
+    let file = |name: &str| recorded::text(&format!("trajectories/evo/freiburg1_xyz-{name}.txt.gz"));
     let Some(truth) = file("groundtruth") else { return };
     for (run, metres, degrees) in [("rgbdslam", 0.0140, 1.414), ("rgbdslam_drift", 0.0521, 21.3)] {
         let association = Association { max_difference_s: 0.02, ..Default::default() };

@@ -1,12 +1,8 @@
 //! The filter on images: standing still, starting from it, and light that changes.
 
-#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
-
-mod support;
-
+use crate::support::flight::{GRAVITY, camera};
+use crate::support::rng::Rng;
 use nalgebra::{UnitQuaternion, Vector3};
-use support::Rng;
-use support::flight::{GRAVITY, camera};
 use vio_ekf::{Camera, ImageView, Imu, ImuNoise, InitializationStatus, Settings, Stamp, Status, Vio, nalgebra, so3};
 
 const WIDTH: usize = 320;
@@ -19,7 +15,7 @@ fn small_camera() -> Camera {
 
 /// Grey boxes of all sizes.
 fn boxes(seed: u64) -> Vec<u8> {
-    let mut rng = Rng(seed);
+    let mut rng = Rng::new(seed);
     let mut data = vec![100_u8; WIDTH * HEIGHT];
     for _ in 0..150 {
         let [x, y, w, h, grey] = [WIDTH, HEIGHT, 40, 40, 180].map(|most| (rng.bits() % most as u64) as usize);
@@ -50,7 +46,7 @@ struct Still {
 
 impl Still {
     fn new(seed: u64) -> Self {
-        let mut rng = Rng(seed);
+        let mut rng = Rng::new(seed);
         let attitude = so3::exp(&(rng.vector() * 0.4));
         let biases = [rng.vector() * 0.02, rng.vector() * 0.1];
         Self { attitude, biases, noise: ImuNoise::default(), rng }
@@ -181,4 +177,39 @@ fn light_that_changes_does_not_look_like_motion() {
     assert!(used > 500 && rejected * 20 < used, "{used} used, {rejected} rejected");
     assert!(end.world_from_body.translation.vector.norm() < 0.03, "{}", end.world_from_body.translation.vector);
     assert!(so3::angle_between(&end.world_from_body.rotation, &still.attitude) < 0.005);
+}
+
+/// The claimed deviation of the position after two seconds at rest, as if it were a hover, by the drift of templates.
+fn deviation_at_rest(drift: f64) -> f64 {
+    let mut still = Still::new(11);
+    let stationary = vio_ekf::StationarySettings { min_duration_s: f64::INFINITY, ..Default::default() };
+    let patches = vio_ekf::PatchSettings { template_drift: drift, ..Default::default() };
+    let mut vio =
+        Vio::new(small_camera(), still.noise, Settings { stationary, patches, ..Settings::default() }).unwrap();
+    let picture = boxes(3);
+    vio.imu(&still.imu(0)).unwrap();
+    vio.initialize(&vio_ekf::InitialState {
+        stamp: Stamp::from_nanos(0),
+        world_from_body: nalgebra::Isometry3::from_parts(Vector3::zeros().into(), still.attitude),
+        velocity_in_body: Vector3::zeros(),
+        gyro_bias: still.biases[0],
+        accel_bias: still.biases[1],
+        sigma: vio_ekf::InitialSigma::default(),
+    })
+    .unwrap();
+    for sample in 1..400 {
+        let imu = still.imu(sample);
+        vio.imu(&imu).unwrap();
+        if sample % 10 == 0 {
+            let data = seen(&picture, 1.0, 0, &mut still.rng);
+            vio.image(imu.stamp, &ImageView::new(WIDTH, HEIGHT, &data).unwrap()).unwrap();
+        }
+    }
+    vio.output().unwrap().covariance.fixed_view::<3, 3>(0, 0).trace().sqrt()
+}
+
+#[test]
+fn templates_that_drift_widen_the_covariance() {
+    let [none, usual, much] = [0.0, 0.15, 1.0].map(deviation_at_rest);
+    assert!(none > 0.0 && usual > 1.003 * none && much > 1.1 * usual, "{none} m, {usual} m, {much} m");
 }

@@ -1,0 +1,30 @@
+//! What the crate promises, against closed forms, brute force, other programs and recordings.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
+
+mod camera;
+mod dead_reckoning;
+mod evaluation;
+mod evo;
+mod filter_abuse;
+mod filter_honesty;
+mod filter_images;
+mod filter_initialization;
+mod filter_points;
+mod filter_stationary;
+mod filter_stereo;
+mod formats;
+mod fusion;
+mod fusion_input;
+mod imu_pair;
+mod imu_validation;
+mod lie;
+mod memory;
+#[cfg(feature = "yaml")]
+mod recordings;
+mod sim;
+mod spline;
+mod support;
+#[cfg(feature = "tune")]
+mod tune;
+mod unified;
