@@ -151,6 +151,10 @@ pub(super) fn parse<T: DeserializeOwned>(text: &str) -> Result<T, Error> {
     serde_saphyr::from_str(&yaml).map_err(|error| {
         let line = error.location().map_or(0, |at| at.line() as usize);
         let what = UserMessageFormatter.format_message(error.without_snippet());
-        Error::Line { format: FORMAT, line, what: format!("{what}: give YAML as EuRoC's `sensor.yaml` or Kalibr has it") }
+        Error::Line {
+            format: FORMAT,
+            line,
+            what: format!("{what}: give YAML as EuRoC's `sensor.yaml` or Kalibr has it"),
+        }
     })
 }
