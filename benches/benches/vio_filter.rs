@@ -1,10 +1,11 @@
 //! The odometry filter: a sample, an output with covariance, an image. The body stands still and is not told so, which
-//! costs what motion costs: every landmark is carried, looked for and used.
+//! costs what motion costs: every landmark is propagated, aligned and used.
 
 use nalgebra::{Isometry3, Vector3};
 use paintcopter_benches::{Rng, criterion};
 use vio_ekf::{
-    Camera, Error, ImageView, Imu, ImuNoise, RestSettings, Settings, Stamp, Start, StartSigma, Vio, nalgebra,
+    Camera, Error, ImageView, Imu, ImuNoise, InitialSigma, InitialState, LandmarkSettings, Settings, Stamp,
+    StationarySettings, Vio, nalgebra,
 };
 
 const WIDTH: usize = 752;
@@ -18,21 +19,22 @@ struct Scene {
 }
 
 impl Scene {
-    fn new(features: usize) -> Result<Self, Error> {
-        let rest = RestSettings { duration_s: f64::INFINITY, ..RestSettings::default() };
+    fn new(max_count: usize) -> Result<Self, Error> {
+        let stationary = StationarySettings { min_duration_s: f64::INFINITY, ..StationarySettings::default() };
         let mut patches = Settings::default().patches;
         // Room for the many landmarks of the larger scene.
-        (patches.nearest, patches.farthest) = (10.0, 50.0);
-        let settings = Settings { features, rest, patches, ..Settings::default() };
+        (patches.min_distance, patches.penalty_distance) = (10.0, 50.0);
+        let landmarks = LandmarkSettings { max_count, ..LandmarkSettings::default() };
+        let settings = Settings { landmarks, stationary, patches, ..Settings::default() };
         let mut vio = Vio::new(Camera::euroc(), ImuNoise::default(), settings)?;
         vio.imu(&at_rest(0))?;
-        vio.start(&Start {
+        vio.initialize(&InitialState {
             stamp: Stamp::from_nanos(0),
             world_from_body: Isometry3::identity(),
             velocity_in_body: Vector3::zeros(),
             gyro_bias: Vector3::zeros(),
             accel_bias: Vector3::zeros(),
-            sigma: StartSigma::default(),
+            sigma: InitialSigma::default(),
         })?;
         let mut scene = Self { vio, sample: 0, pictures: pictures() };
         for _ in 0..20 {

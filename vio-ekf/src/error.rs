@@ -1,4 +1,6 @@
-use crate::Stamp;
+//! What can go wrong.
+
+use crate::stamp::{InvalidStamp, Stamp};
 
 /// What can go wrong; every variant names the input and the way out.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -14,12 +16,9 @@ pub enum Error {
         /// What is wrong and what is expected.
         what: String,
     },
-    /// A text is no decimal number of seconds that fits 64-bit nanoseconds.
-    #[error("`{text}` is not a time in seconds between -9.2e9 and 9.2e9: check the first column")]
-    InvalidStamp {
-        /// The text, or the number, as given.
-        text: String,
-    },
+    /// A time that does not fit 64-bit nanoseconds, or is none.
+    #[error(transparent)]
+    InvalidStamp(#[from] InvalidStamp),
     /// Stamps do not strictly increase.
     #[error("stamp {index} ({stamp} s) is not after its predecessor ({previous} s): sort the poses, drop duplicates")]
     NotIncreasing {
@@ -131,16 +130,16 @@ pub enum Error {
         /// Width and height of the camera.
         expected: (usize, usize),
     },
-    /// A measurement belongs to a time that the filter has left behind.
+    /// A measurement is older than the state of the filter.
     #[error(
-        "{what} of {stamp} s arrives when everything up to {now} s is settled: feed in order, or keep a longer history"
+        "{what} of {stamp} s arrives after the state has gone on to {now} s: feed in order, or use a longer buffer"
     )]
     Late {
         /// Which measurement.
         what: &'static str,
         /// Its time by the inertial sensor's clock.
         stamp: Stamp,
-        /// The time up to which nothing can change.
+        /// The time of the state.
         now: Stamp,
     },
     /// Inertial samples come at another rate than their calibration says.
@@ -186,6 +185,14 @@ pub enum Error {
 /// A setting outside its range.
 pub(crate) fn invalid(name: &'static str, value: f64, rule: &'static str) -> Error {
     Error::InvalidSetting { name, value, rule }
+}
+
+/// Refuses the first of the named settings that is not positive and finite.
+pub(crate) fn all_positive(fields: &[(&'static str, f64)]) -> Result<(), Error> {
+    match fields.iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
+        Some(&(name, value)) => Err(invalid(name, value, "must be positive")),
+        None => Ok(()),
+    }
 }
 
 /// Refuses the first of the named settings that is negative or not finite.

@@ -36,13 +36,13 @@
 //! | the same on a caller's points | ours | [`Vio::points`] |
 //! | motion between images, its noise | Forster et al. 2017 | [`Vio::imu`], [`ImuNoise`] |
 //! | bearing with a tangent basis | Hertzberg et al. 2013; Bloesch et al. 2017 | [`Bearing`] |
-//! | iterated update | Bell and Cathey 1993 | [`GateSettings`] |
-//! | start in motion | gyroscope: Kneip and Lynen 2013; closed form: Martinelli 2014; refined: ours | [`MovingSettings`] |
-//! | noise that samples show | ours | [`SensorSettings`] |
+//! | iterated update | Bell and Cathey 1993 | [`UpdateSettings`] |
+//! | start in motion | gyroscope: Kneip and Lynen 2013; closed form: Martinelli 2014; refined: ours | [`DynamicInitializationSettings`] |
+//! | noise that samples show | ours | [`ImuSettings`] |
 //! | inertial sensor and foreign poses | Weiss and Siegwart 2011; Lynen et al. 2013 (thesis, Paper II, section 4) | [`PoseFusion`] |
 //! | poses as measurements of the odometry | thesis, outlook: one estimator instead of two; ours | [`Vio::pose`], [`UnifiedVio`] |
 //! | two inertial sensors as one | ours | [`ImuPair`] |
-//! | axes and units of inertial samples | ours | [`check_samples`] |
+//! | axes and units of inertial samples | ours | [`validate_samples`] |
 //! | one-call evaluation | ours | [`evaluate`] |
 //! | least-squares alignment | Umeyama 1991, Eqs. (40)-(42); Horn 1987 | [`align`] |
 //! | alignment of position and yaw | closed form, ours; Zhang and Scaramuzza 2018 for the choice of mode | [`Alignment::PosYaw`] |
@@ -58,22 +58,31 @@
 //! nanoseconds. Quaternions are Hamilton's; TUM files put the scalar last, EuRoC files first.
 
 mod camera;
+mod core;
 mod error;
 mod eval;
 mod filter;
 mod format;
 mod fusion;
+mod imu_validation;
 mod lie;
-mod measurement;
-mod sanity;
+mod samples;
 pub mod sim;
 mod spline;
 mod stamp;
+#[cfg(test)]
+mod test_random;
 mod trajectory;
 #[cfg(feature = "tune")]
 pub mod tune;
 
 pub use camera::{Camera, Distortion};
+pub use core::core_state::{CoreCovariance, CoreState};
+pub use core::divergence::{DivergenceCause, DivergenceSettings};
+pub use core::imu_noise_estimator::ImuSettings;
+pub use core::initial_state::{InitialSigma, InitialState};
+pub use core::iterated_update::Linearization;
+pub use core::odometry::Odometry;
 pub use error::Error;
 pub use eval::align::{Alignment, align, apply};
 pub use eval::associate::{Association, PosePairs, associate};
@@ -84,19 +93,19 @@ pub use eval::rpe::{PairsFrom, Rpe, RpeSettings, Span, Tolerance, rpe};
 pub use eval::stats::Stats;
 pub use eval::{Evaluation, EvaluationSettings, Segment, evaluate};
 pub use filter::{
-    Bearing, Calibration, CalibrationSettings, CoreCovariance, Excess, FrameReport, GateSettings, LandmarkSettings,
-    LimitSettings, MovingSettings, Odometry, PairSettings, PatchSettings, PointObservation, PointPair, RestSettings,
-    SensorSettings, Settings, Start, StartSigma, Status, Vio, Waiting,
+    Bearing, BodyPose, Calibration, CalibrationSettings, DynamicInitializationSettings, FrameReport,
+    InitializationStatus, LandmarkSettings, Measurement, PatchSettings, PointObservation, PointPair, Settings,
+    StationarySettings, Status, StereoSettings, Trial, UpdateSettings, Vio, VioState, error_state,
 };
 pub use format::{asl, calibration, euroc, kitti, tum};
 pub use fusion::{
-    AlignmentSettings, FusionSettings, ImuPair, ImuPairSettings, MountSettings, PoseFusion, PoseMeasurement,
-    PoseSource, SourceEstimate, Tally, UnifiedSettings, UnifiedVio,
+    AlignmentSettings, ExtrinsicsSettings, FusionSettings, ImuPair, ImuPairSettings, MeasurementCounts, PoseFusion,
+    PoseMeasurement, PoseSource, SourceEstimate, UnifiedSettings, UnifiedVio,
 };
+pub use imu_validation::{ImuValidation, validate_samples};
 pub use lie::{se3, so3};
-pub use measurement::{ImageView, Imu, ImuNoise};
 pub use nalgebra;
-pub use sanity::{SampleFindings, check_samples};
+pub use samples::{ImageView, Imu, ImuNoise};
 pub use spline::{Motion, Spline};
-pub use stamp::Stamp;
+pub use stamp::{InvalidStamp, Stamp};
 pub use trajectory::{Trajectory, interpolate, path_lengths};

@@ -31,7 +31,7 @@ mod rng;
 mod room;
 mod texture;
 
-pub use camera::{CameraModel, Frame};
+pub use camera::{Frame, SimulatedCamera};
 pub use flight::{camera_ahead, camera_ahead_right, painting_flight};
 pub use imu::{ImuLimits, ImuModel, ImuRecording, Vibration};
 pub use photometry::{Gain, Photometry};
@@ -39,7 +39,7 @@ pub use room::{Cuboid, Occluder, Room, RoomSettings, Surface};
 pub use texture::Texture;
 
 use camera::Renderer;
-#[cfg(feature = "tune")]
+#[cfg(any(test, feature = "tune"))]
 pub(crate) use rng::Rng;
 use rng::derive;
 
@@ -57,7 +57,7 @@ pub struct Scenario {
     /// Inertial sensors; one of the EuRoC vehicle.
     pub imus: Vec<ImuModel>,
     /// Cameras; the left one of the EuRoC vehicle.
-    pub cameras: Vec<CameraModel>,
+    pub cameras: Vec<SimulatedCamera>,
     /// The room.
     pub room: RoomSettings,
 }
@@ -68,7 +68,7 @@ impl Default for Scenario {
             seed: 1,
             gravity: 9.81,
             imus: vec![ImuModel::default()],
-            cameras: vec![CameraModel::default()],
+            cameras: vec![SimulatedCamera::default()],
             room: RoomSettings::default(),
         }
     }
@@ -101,7 +101,7 @@ impl Simulation {
             imu.check()?;
         }
         let renderer =
-            |(index, model): (u64, CameraModel)| Renderer::new(model, &spline, derive(scenario.seed, 1000 + index));
+            |(index, model): (u64, SimulatedCamera)| Renderer::new(model, &spline, derive(scenario.seed, 1000 + index));
         let renderers = (0..).zip(scenario.cameras).map(renderer).collect::<Result<_, _>>()?;
         Ok(Self { spline, seed: scenario.seed, gravity: scenario.gravity, imus: scenario.imus, renderers, room })
     }

@@ -1,5 +1,8 @@
+//! Smooth motions: uniform cumulative cubic B-splines (Sommer et al. 2020).
+
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
+use crate::stamp::InvalidStamp;
 use crate::trajectory::check_poses;
 use crate::{Error, Stamp, Trajectory, so3};
 
@@ -55,7 +58,7 @@ impl Spline {
         let duration = knots.len() as i128 * i128::from(interval_ns);
         let last = i128::from(first_knot.nanos()) + duration;
         if last.max(duration) > i128::from(i64::MAX) {
-            return Err(Error::InvalidStamp { text: (last.max(duration) as f64 / 1e9).to_string() });
+            return Err(InvalidStamp { text: (last.max(duration) as f64 / 1e9).to_string() }.into());
         }
         Ok(Self { first_knot, interval_ns, knots })
     }

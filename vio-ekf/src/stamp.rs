@@ -1,7 +1,15 @@
+//! Time in integer nanoseconds.
+
 use std::fmt;
 use std::str::FromStr;
 
-use crate::Error;
+/// A text is no decimal number of seconds that fits 64-bit nanoseconds.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{text}` is not a time in seconds between -9.2e9 and 9.2e9: check the first column")]
+pub struct InvalidStamp {
+    /// The text, or the number, as given.
+    pub text: String,
+}
 
 /// A time in integer nanoseconds; the epoch is whatever the recording uses.
 ///
@@ -27,13 +35,13 @@ impl Stamp {
     }
 
     /// From seconds, rounded to the nearest nanosecond. Refuses NaN and what does not fit.
-    pub fn from_secs(secs: f64) -> Result<Self, Error> {
+    pub fn from_secs(secs: f64) -> Result<Self, InvalidStamp> {
         let nanos = (secs * 1e9).round();
         // 2^63 is exact in f64, the largest i64 is not.
         if (-9_223_372_036_854_775_808.0..9_223_372_036_854_775_808.0).contains(&nanos) {
             Ok(Self(nanos as i64))
         } else {
-            Err(Error::InvalidStamp { text: secs.to_string() })
+            Err(InvalidStamp { text: secs.to_string() })
         }
     }
 
@@ -45,6 +53,12 @@ impl Stamp {
     /// Seconds, to the resolution of an `f64` (about 0.2 µs for dates of this century).
     pub fn as_secs(self) -> f64 {
         self.0 as f64 / 1e9
+    }
+
+    /// A time some seconds later, rounded to the nearest nanosecond; at the ends of the range it stays there.
+    #[must_use]
+    pub fn plus_secs(self, secs: f64) -> Self {
+        Self(self.0.saturating_add((secs * 1e9).round() as i64))
     }
 
     /// Seconds from `earlier` to `self`, negative if `earlier` is later; formed from the exact integer difference.
@@ -63,11 +77,11 @@ impl fmt::Display for Stamp {
 }
 
 impl FromStr for Stamp {
-    type Err = Error;
+    type Err = InvalidStamp;
 
     /// Reads decimal seconds, with or without a power of ten.
-    fn from_str(text: &str) -> Result<Self, Error> {
-        scaled_integer(text, 9).map(Self).ok_or_else(|| Error::InvalidStamp { text: text.to_owned() })
+    fn from_str(text: &str) -> Result<Self, InvalidStamp> {
+        scaled_integer(text, 9).map(Self).ok_or_else(|| InvalidStamp { text: text.to_owned() })
     }
 }
 

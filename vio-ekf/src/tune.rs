@@ -37,7 +37,7 @@ pub fn with_factors(noise: &ImuNoise, settings: &Settings, point: &NoisePoint) -
     let mut settings = *settings;
     settings.landmarks.pixel_sigma *= image;
     settings.patches.pixel_sigma *= image;
-    settings.patches.grey_sigma *= image;
+    settings.patches.intensity_sigma *= image;
     (noise, settings)
 }
 

@@ -8,7 +8,9 @@ mod support;
 
 use nalgebra::Vector3;
 use support::recorded;
-use vio_ekf::{Camera, Imu, ImuNoise, Settings, Stamp, Start, StartSigma, Vio, asl, euroc, nalgebra};
+use vio_ekf::{
+    Camera, Imu, ImuNoise, InitialSigma, InitialState, LandmarkSettings, Settings, Stamp, Vio, asl, euroc, nalgebra,
+};
 
 /// Stamps of truth and samples agree to this, ns.
 const SAME: i64 = 1_000;
@@ -25,7 +27,11 @@ fn flight(name: &str, imu: &str) -> Option<(Vec<Imu>, euroc::States)> {
 /// the truth apart, each from the true state and biases.
 fn medians(samples: &[Imu], truth: &euroc::States, gravity: f64, steps: usize, every: usize) -> (f64, f64, usize) {
     let (stamps, poses) = (truth.trajectory.stamps(), truth.trajectory.poses());
-    let settings = Settings { gravity, features: 1, ..Settings::default() };
+    let settings = Settings {
+        gravity,
+        landmarks: LandmarkSettings { max_count: 1, ..LandmarkSettings::default() },
+        ..Settings::default()
+    };
     let asleep = Vio::new(Camera::euroc(), ImuNoise::default(), settings).unwrap();
     let (mut angles, mut speeds) = (Vec::new(), Vec::new());
     for row in (0..stamps.len() - steps).step_by(every) {
@@ -34,13 +40,13 @@ fn medians(samples: &[Imu], truth: &euroc::States, gravity: f64, steps: usize, e
         let begin = poses[row];
         let mut vio = asleep.clone();
         vio.imu(coming.next().unwrap()).unwrap();
-        vio.start(&Start {
+        vio.initialize(&InitialState {
             stamp: from,
             world_from_body: begin,
             velocity_in_body: begin.rotation.inverse() * truth.velocities_in_world[row],
             gyro_bias: truth.gyro_biases[row],
             accel_bias: truth.accel_biases[row],
-            sigma: StartSigma::default(),
+            sigma: InitialSigma::default(),
         })
         .unwrap();
         for sample in coming.take_while(|s| s.stamp <= to) {

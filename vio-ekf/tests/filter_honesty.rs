@@ -18,7 +18,7 @@ fn run(name: &str, seed: u64, seconds: f64, images: bool, settings: &Settings) -
     let mut vio = Vio::new(sequence.camera, ImuNoise::default(), *settings).unwrap();
     let mut samples = sequence.imu.samples.iter();
     vio.imu(samples.next().unwrap()).unwrap();
-    vio.start(&drawn_start(&sequence.simulation, first, seed)).unwrap();
+    vio.initialize(&drawn_start(&sequence.simulation, first, seed)).unwrap();
     let mut squares = Vec::new();
     for frame in 0.. {
         let stamp = Stamp::from_nanos(first.nanos() + 4_000_000 + frame as i64 * 50_000_000);

@@ -7,7 +7,7 @@ mod support;
 use nalgebra::{UnitQuaternion, Vector3};
 use support::Rng;
 use support::flight::{GRAVITY, camera};
-use vio_ekf::{Camera, ImageView, Imu, ImuNoise, Settings, Stamp, Status, Vio, Waiting, nalgebra, so3};
+use vio_ekf::{Camera, ImageView, Imu, ImuNoise, InitializationStatus, Settings, Stamp, Status, Vio, nalgebra, so3};
 
 const WIDTH: usize = 320;
 const HEIGHT: usize = 240;
@@ -133,26 +133,29 @@ fn starts_only_from_a_rest_that_it_sees() {
     // Constant velocity feels like rest to the inertial sensor, but not to the camera.
     assert_ne!(run(1.0, 1, &boxes(2)), Status::Tracking);
     // Nothing to see, nothing to know.
-    assert_eq!(run(1.0, 0, &vec![90; WIDTH * HEIGHT]), Status::Uninitialised(Waiting::ForStillImages));
+    assert_eq!(
+        run(1.0, 0, &vec![90; WIDTH * HEIGHT]),
+        Status::Uninitialised(InitializationStatus::WaitingForStationaryImages)
+    );
     // Readings in units of g.
-    assert_eq!(run(1.0 / GRAVITY, 0, &boxes(2)), Status::Uninitialised(Waiting::ForGravity));
+    assert_eq!(run(1.0 / GRAVITY, 0, &boxes(2)), Status::Uninitialised(InitializationStatus::GravityMismatch));
 }
 
 #[test]
 fn light_that_changes_does_not_look_like_motion() {
     let mut still = Still::new(11);
-    // Rest is not recognised here: every image is measured.
-    let rest = vio_ekf::RestSettings { duration_s: f64::INFINITY, ..Default::default() };
-    let mut vio = Vio::new(small_camera(), still.noise, Settings { rest, ..Settings::default() }).unwrap();
+    // StationaryDetector is not recognised here: every image is measured.
+    let stationary = vio_ekf::StationarySettings { min_duration_s: f64::INFINITY, ..Default::default() };
+    let mut vio = Vio::new(small_camera(), still.noise, Settings { stationary, ..Settings::default() }).unwrap();
     let picture = boxes(3);
     vio.imu(&still.imu(0)).unwrap();
-    vio.start(&vio_ekf::Start {
+    vio.initialize(&vio_ekf::InitialState {
         stamp: Stamp::from_nanos(0),
         world_from_body: nalgebra::Isometry3::from_parts(Vector3::zeros().into(), still.attitude),
         velocity_in_body: Vector3::zeros(),
         gyro_bias: still.biases[0],
         accel_bias: still.biases[1],
-        sigma: vio_ekf::StartSigma::default(),
+        sigma: vio_ekf::InitialSigma::default(),
     })
     .unwrap();
     let (mut used, mut rejected) = (0, 0);

@@ -7,8 +7,8 @@ mod support;
 use nalgebra::{Isometry3, SVector};
 use support::flight::{Flight, nees};
 use vio_ekf::{
-    CalibrationSettings, Error, ImageView, Imu, LandmarkSettings, MovingSettings, PointObservation, SensorSettings,
-    Settings, Stamp, Start, StartSigma, Status, Vio, chi2, nalgebra, so3,
+    CalibrationSettings, DynamicInitializationSettings, Error, ImageView, Imu, ImuSettings, InitialSigma, InitialState,
+    LandmarkSettings, PointObservation, Settings, Stamp, Status, Vio, chi2, nalgebra, so3,
 };
 
 #[test]
@@ -20,7 +20,7 @@ fn follows_a_flight_and_knows_how_well() {
         for seed in 1..=runs {
             let mut flight = Flight::new(seed, seconds);
             flight.pixel_sigma = pixel_sigma;
-            let start = flight.drawn_start(StartSigma::default());
+            let start = flight.drawn_start(InitialSigma::default());
             let landmarks = LandmarkSettings { pixel_sigma, ..LandmarkSettings::default() };
             let mut frame = 0;
             flight
@@ -58,7 +58,7 @@ fn learns_nothing_about_position_and_yaw() {
     // What gravity and a camera cannot see must stay as uncertain as it was, however many images: not one bit is learnt.
     for (position, yaw) in [(10.0, 0.0), (0.0, 0.5)] {
         let mut flight = Flight::new(3, 12.0);
-        let start = flight.drawn_start(StartSigma { position, yaw, ..StartSigma::default() });
+        let start = flight.drawn_start(InitialSigma { position, yaw, ..InitialSigma::default() });
         let mut least = f64::INFINITY;
         flight
             .run(&Settings::default(), &start, |odometry, _, _| {
@@ -79,7 +79,7 @@ fn order_of_arrival_does_not_matter() {
     // Images that come 40 samples late, several in a row, change the output by not a single bit.
     let feed = |delay: usize, settings: Settings| {
         let mut flight = Flight::new(5, 6.0);
-        let start = flight.drawn_start(StartSigma::default());
+        let start = flight.drawn_start(InitialSigma::default());
         let mut vio = Vio::new(flight.camera, flight.noise, settings).unwrap();
         let stamps: Vec<_> = flight.stamps().collect();
         let samples: Vec<_> = stamps.iter().map(|s| flight.imu(*s)).collect();
@@ -89,7 +89,7 @@ fn order_of_arrival_does_not_matter() {
         for (k, sample) in samples.iter().enumerate() {
             vio.imu(sample).unwrap();
             if k == 0 {
-                vio.start(&start).unwrap();
+                vio.initialize(&start).unwrap();
             }
             while let Some((stamp, points)) = next
                 && (k + 1 == samples.len() || k >= delay && *stamp <= samples[k - delay].stamp)
@@ -101,8 +101,8 @@ fn order_of_arrival_does_not_matter() {
         vio.output().unwrap()
     };
     // Also where the samples are not believed: what is held of them must not depend on when it is asked for.
-    let doubting = SensorSettings { gyro_range: 0.3, roughness: 0.5, ..SensorSettings::default() };
-    let doubting = Settings { sensor: doubting, ..Settings::default() };
+    let doubting = ImuSettings { gyro_range: 0.3, noise_inflation: 0.5, ..ImuSettings::default() };
+    let doubting = Settings { imu: doubting, ..Settings::default() };
     assert_eq!(feed(0, Settings::default()), feed(40, Settings::default()));
     assert_eq!(feed(0, doubting), feed(40, doubting));
     assert_ne!(feed(0, doubting), feed(0, Settings::default()));
@@ -121,7 +121,7 @@ fn finds_the_cameras_place_and_clock() {
             Isometry3::from_parts((truth.translation.vector + shift).into(), so3::exp(&turn) * truth.rotation);
         let assumed = flight.camera;
         flight.camera.body_from_camera = truth;
-        let start = flight.drawn_start(StartSigma::default());
+        let start = flight.drawn_start(InitialSigma::default());
         let calibration = CalibrationSettings {
             camera_position_sigma_m: 0.02,
             camera_attitude_sigma: 0.03,
@@ -156,7 +156,7 @@ fn stamps_that_jitter_are_seen_through() {
         let mut sum = 0.0;
         for seed in 1..=3 {
             let mut flight = Flight::new(seed, 10.0);
-            let start = flight.drawn_start(StartSigma::default());
+            let start = flight.drawn_start(InitialSigma::default());
             let calibration = CalibrationSettings { stamp_jitter_s, ..CalibrationSettings::default() };
             let settings = Settings { calibration, ..Settings::default() };
             let mut vio = Vio::new(flight.camera, flight.noise, settings).unwrap();
@@ -164,7 +164,7 @@ fn stamps_that_jitter_are_seen_through() {
             for (k, &stamp) in stamps.iter().enumerate() {
                 vio.imu(&flight.imu(stamp)).unwrap();
                 if k == 0 {
-                    vio.start(&start).unwrap();
+                    vio.initialize(&start).unwrap();
                 } else if k % 10 == 0 {
                     let seen = flight.see(stamp);
                     let jitter = flight.rng.normal() * 0.005;
@@ -185,20 +185,22 @@ fn stamps_that_jitter_are_seen_through() {
 #[test]
 fn refuses_what_it_cannot_use() {
     let mut flight = Flight::new(1, 2.0);
-    let settings = Settings { features: 0, ..Settings::default() };
+    let settings =
+        Settings { landmarks: LandmarkSettings { max_count: 0, ..LandmarkSettings::default() }, ..Settings::default() };
     assert!(matches!(
         Vio::new(flight.camera, flight.noise, settings),
-        Err(Error::InvalidSetting { name: "features", .. })
+        Err(Error::InvalidSetting { name: "landmarks.max_count", .. })
     ));
-    let moving = MovingSettings { pixel_sigma: 0.0, ..MovingSettings::default() };
-    let settings = Settings { moving, ..Settings::default() };
+    let dynamic_initialization =
+        DynamicInitializationSettings { pixel_sigma: 0.0, ..DynamicInitializationSettings::default() };
+    let settings = Settings { dynamic_initialization, ..Settings::default() };
     assert!(matches!(
         Vio::new(flight.camera, flight.noise, settings),
-        Err(Error::InvalidSetting { name: "moving.pixel_sigma", .. })
+        Err(Error::InvalidSetting { name: "dynamic_initialization.pixel_sigma", .. })
     ));
     let mut vio = Vio::new(flight.camera, flight.noise, Settings::default()).unwrap();
-    let start = flight.drawn_start(StartSigma::default());
-    assert!(matches!(vio.start(&start), Err(Error::TooFew { .. })));
+    let start = flight.drawn_start(InitialSigma::default());
+    assert!(matches!(vio.initialize(&start), Err(Error::TooFew { .. })));
     assert!(vio.output().is_none());
     let first = flight.first();
     let sample = flight.imu(first);
@@ -208,9 +210,9 @@ fn refuses_what_it_cannot_use() {
     assert!(matches!(vio.imu(&sample), Err(Error::NotIncreasing { .. })));
     // Before the start images are looked at, not used.
     assert_eq!(vio.points(first, &[]).unwrap().used, 0);
-    let bad = Start { accel_bias: nalgebra::Vector3::repeat(f64::INFINITY), ..start };
-    assert!(matches!(vio.start(&bad), Err(Error::NonFinite { .. })));
-    vio.start(&start).unwrap();
+    let bad = InitialState { accel_bias: nalgebra::Vector3::repeat(f64::INFINITY), ..start };
+    assert!(matches!(vio.initialize(&bad), Err(Error::NonFinite { .. })));
+    vio.initialize(&start).unwrap();
     let later = |ms: i64| Stamp::from_nanos(first.nanos() + ms * 1_000_000);
     vio.imu(&flight.imu(later(5))).unwrap();
     vio.points(later(5), &flight.see(later(5))).unwrap();

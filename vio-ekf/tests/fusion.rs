@@ -9,8 +9,8 @@ use support::Rng;
 use support::flight::{Flight, nees};
 use support::tracker::Tracker;
 use vio_ekf::{
-    AlignmentSettings, FusionSettings, Imu, ImuNoise, MountSettings, Odometry, PoseFusion, PoseMeasurement, PoseSource,
-    Stamp, Start, StartSigma, chi2, nalgebra, so3,
+    AlignmentSettings, ExtrinsicsSettings, FusionSettings, Imu, ImuNoise, InitialSigma, InitialState, Odometry,
+    PoseFusion, PoseMeasurement, PoseSource, Stamp, chi2, nalgebra, so3,
 };
 
 /// Runs a filter over a flight with a pose every 50 ms that arrives 40 ms after it was taken.
@@ -18,7 +18,7 @@ fn run(
     flight: &mut Flight,
     source: &Tracker,
     assumed: PoseSource,
-    start: &Start,
+    start: &InitialState,
     mut each: impl FnMut(&Odometry, &vio_ekf::Motion, &[Vector3<f64>; 2]),
 ) -> PoseFusion {
     let mut fusion = PoseFusion::new(flight.noise, &[assumed], FusionSettings::default()).unwrap();
@@ -26,7 +26,7 @@ fn run(
     for (k, stamp) in flight.stamps().enumerate() {
         fusion.imu(&flight.imu(stamp)).unwrap();
         if k == 0 {
-            fusion.start(start).unwrap();
+            fusion.initialize(start).unwrap();
         }
         let taken = Stamp::from_nanos(stamp.nanos() - 40_000_000);
         if taken > first && (k + 3) % 10 == 0 {
@@ -54,15 +54,15 @@ fn a_circle_is_followed_without_any_pose() {
         };
         fusion.imu(&sample).unwrap();
         if k == 0 {
-            let start = Start {
+            let start = InitialState {
                 stamp: at(0),
                 world_from_body: Isometry3::translation(0.0, -radius, 1.0),
                 velocity_in_body: Vector3::x() * speed,
                 gyro_bias: biases[0],
                 accel_bias: biases[1],
-                sigma: StartSigma::default(),
+                sigma: InitialSigma::default(),
             };
-            fusion.start(&start).unwrap();
+            fusion.initialize(&start).unwrap();
         }
     }
     let output = fusion.output().unwrap();
@@ -81,7 +81,7 @@ fn follows_a_flight_and_knows_how_well() {
     for seed in 1..=runs {
         let mut flight = Flight::new(seed, 15.0);
         let source = Tracker { late: 30_000_000, ..Tracker::default() };
-        let start = flight.drawn_start(StartSigma { position: 0.05, yaw: 0.02, ..StartSigma::default() });
+        let start = flight.drawn_start(InitialSigma { position: 0.05, yaw: 0.02, ..InitialSigma::default() });
         let mut index = 0;
         run(&mut flight, &source, source.known(), &start, |odometry, truth, biases| {
             if sums.len() <= index {
@@ -118,7 +118,7 @@ fn finds_frame_place_scale_and_clock_of_the_source() {
             ..Tracker::default()
         };
         let turned = |angle: f64, rng: &mut Rng| so3::exp(&(rng.vector().normalize() * angle));
-        let mount = source.body_from_sensor;
+        let extrinsics = source.body_from_sensor;
         let mut assumed = source.known();
         assumed.alignment = AlignmentSettings {
             source_from_world: Isometry3::from_parts(
@@ -130,10 +130,10 @@ fn finds_frame_place_scale_and_clock_of_the_source() {
             yaw_sigma: 0.5,
             ..AlignmentSettings::default()
         };
-        assumed.mount = MountSettings {
+        assumed.extrinsics = ExtrinsicsSettings {
             body_from_sensor: Isometry3::from_parts(
-                (mount.translation.vector + flight.rng.vector() * 0.05).into(),
-                turned(0.05, &mut flight.rng) * mount.rotation,
+                (extrinsics.translation.vector + flight.rng.vector() * 0.05).into(),
+                turned(0.05, &mut flight.rng) * extrinsics.rotation,
             ),
             position_sigma: 0.04,
             attitude_sigma: 0.04,
@@ -141,7 +141,7 @@ fn finds_frame_place_scale_and_clock_of_the_source() {
         (assumed.scale, assumed.scale_sigma) = (1.0, 0.1);
         (assumed.time_offset_s, assumed.time_offset_sigma_s) = (-0.05, 0.01);
         // Position and yaw of the body are what is measured from.
-        let start = flight.drawn_start(StartSigma::default());
+        let start = flight.drawn_start(InitialSigma::default());
         let fusion = run(&mut flight, &source, assumed, &start, |_, _, _| ());
         let found = fusion.source_estimate(0).unwrap();
         let between = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
@@ -151,7 +151,7 @@ fn finds_frame_place_scale_and_clock_of_the_source() {
         };
         let mut error = nalgebra::SVector::<f64, 14>::zeros();
         error.fixed_rows_mut::<6>(0).copy_from(&between(&source.source_from_world, &found.source_from_world));
-        error.fixed_rows_mut::<6>(6).copy_from(&between(&mount, &found.body_from_sensor));
+        error.fixed_rows_mut::<6>(6).copy_from(&between(&extrinsics, &found.body_from_sensor));
         error[12] = (source.scale / found.scale).ln();
         error[13] = -0.06 - found.time_offset_s;
         let square = error.dot(&found.covariance.cholesky().unwrap().solve(&error));
@@ -170,13 +170,13 @@ fn follows_a_source_that_drifts() {
     let source = Tracker::default();
     let mut assumed = source.known();
     (assumed.alignment.position_walk, assumed.alignment.yaw_walk) = (0.02, 0.01);
-    let start = flight.drawn_start(StartSigma::default());
+    let start = flight.drawn_start(InitialSigma::default());
     let mut fusion = PoseFusion::new(flight.noise, &[assumed], FusionSettings::default()).unwrap();
     let (mut drift, mut worst) = (Isometry3::identity(), 0.0_f64);
     for (k, stamp) in flight.stamps().enumerate() {
         fusion.imu(&flight.imu(stamp)).unwrap();
         if k == 0 {
-            fusion.start(&start).unwrap();
+            fusion.initialize(&start).unwrap();
             continue;
         }
         let root = 0.005_f64.sqrt();
@@ -187,7 +187,7 @@ fn follows_a_source_that_drifts() {
         if k % 10 == 0 {
             let now = Tracker { source_from_world: drift, ..source };
             fusion.pose(&now.pose(&mut flight, stamp)).unwrap();
-            assert_eq!(fusion.refused(), 0, "sample {k}");
+            assert_eq!(fusion.consecutive_outliers(), 0, "sample {k}");
             let output = fusion.output().unwrap();
             let truth = flight.truth(stamp).world_from_body;
             let off = truth.translation.vector - output.world_from_body.translation.vector;
@@ -203,10 +203,10 @@ fn follows_a_source_that_drifts() {
 }
 
 /// Samples, poses of two sources, and a filter for them.
-fn two_sources(seed: u64) -> (Vec<Imu>, Vec<(usize, PoseMeasurement)>, PoseFusion, Start) {
+fn two_sources(seed: u64) -> (Vec<Imu>, Vec<(usize, PoseMeasurement)>, PoseFusion, InitialState) {
     let mut flight = Flight::new(seed, 4.0);
     let sources = [Tracker::default(), Tracker { late: 20_000_000, position_sigma: 0.03, ..Tracker::default() }];
-    let start = flight.drawn_start(StartSigma { position: 0.05, yaw: 0.02, ..StartSigma::default() });
+    let start = flight.drawn_start(InitialSigma { position: 0.05, yaw: 0.02, ..InitialSigma::default() });
     let stamps: Vec<_> = flight.stamps().collect();
     let samples: Vec<_> = stamps.iter().map(|stamp| flight.imu(*stamp)).collect();
     let mut poses = vec![];
@@ -241,7 +241,7 @@ fn order_of_arrival_does_not_matter() {
         for (k, sample) in samples.iter().enumerate() {
             fusion.imu(sample).unwrap();
             if k == 0 {
-                fusion.start(&start).unwrap();
+                fusion.initialize(&start).unwrap();
             }
             while let Some((_, pose)) = due.next_if(|(at, _)| *at <= k || k + 1 == samples.len()) {
                 fusion.pose(pose).unwrap();

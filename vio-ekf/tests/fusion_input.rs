@@ -9,8 +9,8 @@ use support::Rng;
 use support::flight::Flight;
 use support::tracker::Tracker;
 use vio_ekf::{
-    Error, Excess, FusionSettings, Imu, PoseFusion, PoseMeasurement, PoseSource, Stamp, Start, StartSigma, nalgebra,
-    so3,
+    DivergenceCause, Error, FusionSettings, Imu, InitialSigma, InitialState, PoseFusion, PoseMeasurement, PoseSource,
+    Stamp, nalgebra, so3,
 };
 
 #[test]
@@ -18,14 +18,14 @@ fn outliers_are_refused_and_a_source_that_is_wrong_is_told() {
     let rmse = |share: u64| {
         let mut flight = Flight::new(4, 12.0);
         let source = Tracker::default();
-        let start = flight.drawn_start(StartSigma { position: 0.05, yaw: 0.02, ..StartSigma::default() });
+        let start = flight.drawn_start(InitialSigma { position: 0.05, yaw: 0.02, ..InitialSigma::default() });
         let mut fusion = PoseFusion::new(flight.noise, &[source.known()], FusionSettings::default()).unwrap();
         let mut luck = Rng(99);
         let (mut sum, mut count, mut refused) = (0.0, 0, 0);
         for (k, stamp) in flight.stamps().enumerate() {
             fusion.imu(&flight.imu(stamp)).unwrap();
             if k == 0 {
-                fusion.start(&start).unwrap();
+                fusion.initialize(&start).unwrap();
             } else if k % 10 == 0 {
                 let mut pose = source.pose(&mut flight, stamp);
                 if luck.bits() % 100 < share {
@@ -33,7 +33,7 @@ fn outliers_are_refused_and_a_source_that_is_wrong_is_told() {
                     pose.source_from_sensor = wrong * pose.source_from_sensor;
                 }
                 fusion.pose(&pose).unwrap();
-                refused += u32::from(fusion.refused() > 0);
+                refused += u32::from(fusion.consecutive_outliers() > 0);
                 let truth = flight.truth(stamp).world_from_body.translation.vector;
                 sum += (fusion.output().unwrap().world_from_body.translation.vector - truth).norm_squared();
                 count += 1;
@@ -50,12 +50,12 @@ fn outliers_are_refused_and_a_source_that_is_wrong_is_told() {
     // Ten in a row, and the estimate is given up; a new start takes it back.
     let mut flight = Flight::new(4, 2.0);
     let source = Tracker::default();
-    let start = flight.drawn_start(StartSigma::default());
+    let start = flight.drawn_start(InitialSigma::default());
     let mut fusion = PoseFusion::new(flight.noise, &[source.known()], FusionSettings::default()).unwrap();
     for (k, stamp) in flight.stamps().enumerate().take(250) {
         fusion.imu(&flight.imu(stamp)).unwrap();
         if k == 0 {
-            fusion.start(&start).unwrap();
+            fusion.initialize(&start).unwrap();
         } else if k % 10 == 0 {
             let mut pose = source.pose(&mut flight, stamp);
             pose.source_from_sensor.translation.vector.z += 1.0;
@@ -63,22 +63,22 @@ fn outliers_are_refused_and_a_source_that_is_wrong_is_told() {
             assert_eq!(fusion.diverged().is_some(), k >= 100, "sample {k}");
         }
     }
-    assert_eq!(fusion.diverged(), Some(Excess::Contradiction));
-    let again = Start { stamp: Stamp::from_nanos(start.stamp.nanos() + 2_000_000_000), ..start };
-    fusion.start(&again).unwrap();
-    assert_eq!((fusion.diverged(), fusion.refused()), (None, 0));
+    assert_eq!(fusion.diverged(), Some(DivergenceCause::ConsecutiveOutliers));
+    let again = InitialState { stamp: Stamp::from_nanos(start.stamp.nanos() + 2_000_000_000), ..start };
+    fusion.initialize(&again).unwrap();
+    assert_eq!((fusion.diverged(), fusion.consecutive_outliers()), (None, 0));
 }
 
 #[test]
 fn without_poses_it_says_when_it_knows_nothing_any_more() {
     let mut flight = Flight::new(2, 30.0);
-    let start = flight.drawn_start(StartSigma::default());
+    let start = flight.drawn_start(InitialSigma::default());
     let mut fusion = PoseFusion::new(flight.noise, &[PoseSource::default()], FusionSettings::default()).unwrap();
     let mut told = None;
     for (k, stamp) in flight.stamps().enumerate() {
         fusion.imu(&flight.imu(stamp)).unwrap();
         if k == 0 {
-            fusion.start(&start).unwrap();
+            fusion.initialize(&start).unwrap();
         }
         let output = fusion.output().unwrap();
         assert!(output.covariance.iter().all(|v| v.is_finite()));
@@ -87,7 +87,7 @@ fn without_poses_it_says_when_it_knows_nothing_any_more() {
         }
     }
     // One metre per second, looked at every 32 samples.
-    assert_eq!(fusion.diverged(), Some(Excess::Uncertainty));
+    assert_eq!(fusion.diverged(), Some(DivergenceCause::Uncertainty));
     assert!((0.95..1.2).contains(&told.unwrap()), "{told:?}");
 }
 
@@ -95,19 +95,19 @@ fn without_poses_it_says_when_it_knows_nothing_any_more() {
 fn a_direction_without_information_is_not_believed() {
     // A scan laid against a wall: nothing about y, z and the turn about x. The shifts there are nonsense.
     let flight = Flight::new(3, 1.0);
-    let start = Start {
+    let start = InitialState {
         stamp: Stamp::from_nanos(0),
         world_from_body: Isometry3::identity(),
         velocity_in_body: Vector3::zeros(),
         gyro_bias: Vector3::zeros(),
         accel_bias: Vector3::zeros(),
-        sigma: StartSigma { position: 0.1, yaw: 0.1, ..StartSigma::default() },
+        sigma: InitialSigma { position: 0.1, yaw: 0.1, ..InitialSigma::default() },
     };
     let mut fusion = PoseFusion::new(flight.noise, &[PoseSource::default()], FusionSettings::default()).unwrap();
     let imu =
         |k: i64| Imu { stamp: Stamp::from_nanos(k * 5_000_000), gyro: Vector3::zeros(), accel: Vector3::z() * 9.81 };
     fusion.imu(&imu(0)).unwrap();
-    fusion.start(&start).unwrap();
+    fusion.initialize(&start).unwrap();
     fusion.imu(&imu(1)).unwrap();
     let before = fusion.output().unwrap();
     let information = Matrix6::from_diagonal(&Vector6::new(1e8, 0.0, 0.0, 0.0, 1e8, 1e8));
@@ -115,7 +115,7 @@ fn a_direction_without_information_is_not_believed() {
     let stamp = imu(1).stamp;
     fusion.pose(&PoseMeasurement::from_residual(0, stamp, before.world_from_body, &residual, information)).unwrap();
     let after = fusion.output().unwrap();
-    assert_eq!(fusion.refused(), 0);
+    assert_eq!(fusion.consecutive_outliers(), 0);
     let position = after.world_from_body.translation.vector;
     assert!((position - Vector3::new(0.05, 0.0, 0.0)).norm() < 1e-3, "{position}");
     let turn = so3::log(&after.world_from_body.rotation);
@@ -143,17 +143,17 @@ fn refuses_what_it_cannot_use() {
     }
     for bad in [
         FusionSettings { gravity: 0.0, ..settings },
-        FusionSettings { gate: f64::NAN, ..settings },
-        FusionSettings { iterations: 0, ..settings },
-        FusionSettings { history_samples: 1, ..settings },
-        FusionSettings { history_poses: 1_000_000, ..settings },
+        FusionSettings { max_mahalanobis: f64::NAN, ..settings },
+        FusionSettings { max_iterations: 0, ..settings },
+        FusionSettings { buffer_samples: 1, ..settings },
+        FusionSettings { buffer_poses: 1_000_000, ..settings },
     ] {
         assert!(matches!(PoseFusion::new(noise, &[known], bad), Err(Error::InvalidSetting { .. })), "{bad:?}");
     }
 
     let mut fusion = PoseFusion::new(noise, &[known], settings).unwrap();
-    let start = flight.drawn_start(StartSigma::default());
-    assert!(matches!(fusion.start(&start), Err(Error::TooFew { .. })));
+    let start = flight.drawn_start(InitialSigma::default());
+    assert!(matches!(fusion.initialize(&start), Err(Error::TooFew { .. })));
     assert!(fusion.output().is_none() && fusion.source_estimate(0).is_none());
     let first = flight.first();
     let at = |ms: i64| Stamp::from_nanos(first.nanos() + ms * 1_000_000);
@@ -162,9 +162,9 @@ fn refuses_what_it_cannot_use() {
     assert!(matches!(fusion.imu(&Imu { accel: nan, ..sample }), Err(Error::NonFinite { .. })));
     fusion.imu(&sample).unwrap();
     assert!(matches!(fusion.imu(&sample), Err(Error::NotIncreasing { .. })));
-    assert!(matches!(fusion.start(&Start { stamp: at(-5), ..start }), Err(Error::Late { .. })));
-    assert!(matches!(fusion.start(&Start { gyro_bias: nan, ..start }), Err(Error::NonFinite { .. })));
-    fusion.start(&start).unwrap();
+    assert!(matches!(fusion.initialize(&InitialState { stamp: at(-5), ..start }), Err(Error::Late { .. })));
+    assert!(matches!(fusion.initialize(&InitialState { gyro_bias: nan, ..start }), Err(Error::NonFinite { .. })));
+    fusion.initialize(&start).unwrap();
     for k in 1..=20 {
         fusion.imu(&flight.imu(at(5 * k))).unwrap();
     }

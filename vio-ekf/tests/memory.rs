@@ -10,7 +10,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use support::flight::Flight;
-use vio_ekf::{FusionSettings, ImageView, PoseFusion, PoseMeasurement, PoseSource, Settings, Stamp, StartSigma, Vio};
+use vio_ekf::{FusionSettings, ImageView, InitialSigma, PoseFusion, PoseMeasurement, PoseSource, Settings, Stamp, Vio};
 
 struct Counting;
 
@@ -46,7 +46,7 @@ fn allocations(mut job: impl FnMut()) -> usize {
 #[test]
 fn the_filter_allocates_nothing() {
     let mut flight = Flight::new(1, 4.0);
-    let start = flight.drawn_start(StartSigma::default());
+    let start = flight.drawn_start(InitialSigma::default());
     let mut other = flight.camera;
     other.body_from_camera.translation.y -= 0.11;
     let mut vio = Vio::stereo(flight.camera, other, flight.noise, Settings::default()).unwrap();
@@ -58,7 +58,7 @@ fn the_filter_allocates_nothing() {
         let sample = flight.imu(stamp);
         if k == 0 {
             vio.imu(&sample).unwrap();
-            vio.start(&start).unwrap();
+            vio.initialize(&start).unwrap();
             continue;
         }
         assert_eq!(allocations(|| assert!(vio.imu(&sample).is_ok())), 0, "sample {k}");
@@ -83,13 +83,13 @@ fn the_filter_allocates_nothing() {
 #[test]
 fn the_fusion_allocates_nothing() {
     let mut flight = Flight::new(1, 12.0);
-    let start = flight.drawn_start(StartSigma::default());
+    let start = flight.drawn_start(InitialSigma::default());
     let mut fusion = PoseFusion::new(flight.noise, &[PoseSource::default(); 2], FusionSettings::default()).unwrap();
     for (k, stamp) in flight.stamps().enumerate() {
         let sample = flight.imu(stamp);
         if k == 0 {
             fusion.imu(&sample).unwrap();
-            fusion.start(&start).unwrap();
+            fusion.initialize(&start).unwrap();
             continue;
         }
         assert_eq!(allocations(|| assert!(fusion.imu(&sample).is_ok())), 0, "sample {k}");

@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Matrix2, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
 use vio_ekf::sim::{
-    CameraModel, Cuboid, Gain, ImuModel, Occluder, Photometry, Room, RoomSettings, Scenario, Simulation, Surface,
+    Cuboid, Gain, ImuModel, Occluder, Photometry, Room, RoomSettings, Scenario, SimulatedCamera, Simulation, Surface,
     Texture, Vibration,
 };
 use vio_ekf::{Camera, Error, Spline, Stamp};
@@ -29,8 +29,8 @@ fn at_rest() -> Spline {
 }
 
 /// The EuRoC lens, with its axis along the body's x and the image's y down.
-fn forward_camera(photometry: Photometry) -> CameraModel {
-    let mut model = CameraModel { photometry, ..CameraModel::default() };
+fn forward_camera(photometry: Photometry) -> SimulatedCamera {
+    let mut model = SimulatedCamera { photometry, ..SimulatedCamera::default() };
     let axes = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
     let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
     model.camera.body_from_camera = Isometry3::from_parts(Translation3::new(0.05, 0.02, -0.03), turn);
@@ -275,8 +275,8 @@ fn what_cannot_be_is_refused_by_name() {
     refused(imu(&|m| m.rate_hz = f64::NAN), "rate_hz");
     refused(imu(&|m| m.limits.drop_probability = 1.0), "drop_probability");
     refused(imu(&|m| m.gyro_matrix[(0, 0)] = f64::NAN), "gyro_matrix");
-    let camera = |change: &dyn Fn(&mut CameraModel)| {
-        let mut model = CameraModel::default();
+    let camera = |change: &dyn Fn(&mut SimulatedCamera)| {
+        let mut model = SimulatedCamera::default();
         change(&mut model);
         Scenario { cameras: vec![model], room: small_room(), ..Scenario::default() }
     };
@@ -297,7 +297,7 @@ fn what_cannot_be_is_refused_by_name() {
 #[test]
 fn a_second_camera_changes_nothing_for_the_first() {
     let record = |cameras: Vec<Camera>| {
-        let model = |camera| CameraModel { camera, stamp_jitter_s: 0.002, ..CameraModel::default() };
+        let model = |camera| SimulatedCamera { camera, stamp_jitter_s: 0.002, ..SimulatedCamera::default() };
         let cameras = cameras.into_iter().map(model).collect();
         Simulation::new(wild(), Scenario { cameras, room: small_room(), ..Scenario::default() }).unwrap()
     };

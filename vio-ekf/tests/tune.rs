@@ -75,7 +75,9 @@ fn known_noise_costs_less_than_wrong_noise() {
         with_factors(&ImuNoise::default(), &Settings::default(), &[1.0, 0.0, -1.0, 0.0, 2_f64.log10()]);
     assert!((noise.gyro_density / ImuNoise::default().gyro_density - 10.0).abs() < 1e-9);
     assert!((noise.accel_density / ImuNoise::default().accel_density - 0.1).abs() < 1e-9);
-    assert!((settings.landmarks.pixel_sigma - 2.0).abs() < 1e-4 && (settings.patches.grey_sigma - 4.0).abs() < 1e-4);
+    assert!(
+        (settings.landmarks.pixel_sigma - 2.0).abs() < 1e-4 && (settings.patches.intensity_sigma - 4.0).abs() < 1e-4
+    );
 }
 
 #[test]

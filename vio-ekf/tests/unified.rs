@@ -10,8 +10,8 @@ use support::flight::{Flight, GRAVITY, nees};
 use support::imus::{bias, models, settings};
 use vio_ekf::sim::{ImuModel, ImuRecording};
 use vio_ekf::{
-    CoreCovariance, Error, Imu, ImuNoise, ImuPair, ImuPairSettings, Odometry, PointObservation, PoseMeasurement,
-    Settings, Stamp, Start, StartSigma, UnifiedSettings, UnifiedVio, Vio, chi2, nalgebra, so3,
+    BodyPose, CoreCovariance, Error, Imu, ImuNoise, ImuPair, ImuPairSettings, InitialSigma, InitialState, Odometry,
+    PointObservation, PoseMeasurement, Settings, Stamp, UnifiedSettings, UnifiedVio, Vio, chi2, nalgebra, so3,
 };
 
 /// A vector of three normal numbers times a matrix, and back: any symmetric positive definite matrix.
@@ -25,18 +25,18 @@ fn a_pose_adds_its_information_to_that_of_the_filter() {
     // Without landmarks the core is all there is: P⁺ = (P⁻¹ + HᵀΛH)⁻¹, δ = P⁺ HᵀΛ y.
     for seed in 1..=5 {
         let mut flight = Flight::new(seed, 2.0);
-        let start = flight.drawn_start(StartSigma { position: 0.1, yaw: 0.05, ..StartSigma::default() });
+        let start = flight.drawn_start(InitialSigma { position: 0.1, yaw: 0.05, ..InitialSigma::default() });
         let mut vio = Vio::new(flight.camera, flight.noise, Settings::default()).unwrap();
         for (k, stamp) in flight.stamps().enumerate().take(60) {
             vio.imu(&flight.imu(stamp)).unwrap();
             if k == 0 {
-                vio.start(&start).unwrap();
+                vio.initialize(&start).unwrap();
             }
         }
         let before = vio.output().unwrap();
         let information = random_information(&mut flight.rng);
         let residual = Vector6::from_fn(|_, _| flight.rng.signed() * 1e-3);
-        let pose = PoseMeasurement::from_residual(0, before.stamp, before.world_from_body, &residual, information);
+        let pose = BodyPose::from_residual(before.stamp, before.world_from_body, &residual, information);
         assert!(vio.pose(&pose).unwrap());
         let after = vio.output().unwrap();
 
@@ -59,7 +59,7 @@ fn a_pose_adds_its_information_to_that_of_the_filter() {
 
         // A pose that cannot be is refused and changes nothing but the time of the last measurement.
         let wrong = Translation3::new(5.0, 0.0, 0.0) * after.world_from_body;
-        let wrong = PoseMeasurement::isotropic(0, after.stamp, wrong, 0.01, 0.01);
+        let wrong = BodyPose::isotropic(after.stamp, wrong, 0.01, 0.01);
         assert!(!vio.pose(&wrong).unwrap());
         assert_eq!(vio.output().unwrap(), after);
     }
@@ -75,7 +75,7 @@ fn a_pose_of_a_sensor_in_another_frame_says_the_same_of_the_body() {
         let measured = source_from_world * world_from_body * body_from_sensor;
         let seen = PoseMeasurement { source: 0, stamp: Stamp::default(), source_from_sensor: measured, information };
         let body = seen.of_body(&source_from_world, &body_from_sensor);
-        assert!((body.source_from_sensor.to_homogeneous() - world_from_body.to_homogeneous()).amax() < 1e-12);
+        assert!((body.world_from_body.to_homogeneous() - world_from_body.to_homogeneous()).amax() < 1e-12);
         // The same error, seen in the source's frame and in the world, has the same squared length.
         let error = Vector6::from_fn(|_, _| rng.signed() * 1e-5);
         let (shift, turn) = (error.fixed_rows::<3>(0).into_owned(), error.fixed_rows::<3>(3).into_owned());
@@ -99,7 +99,7 @@ struct Recording {
     imus: [ImuRecording; 2],
     points: Vec<(Stamp, Vec<PointObservation>)>,
     poses: Vec<PoseMeasurement>,
-    start: Start,
+    start: InitialState,
 }
 
 const POSE_SIGMA: [f64; 2] = [0.02, 0.01];
@@ -110,7 +110,7 @@ fn record(seed: u64, seconds: f64) -> Recording {
     let imus = [0, 1].map(|k| models[k].record(&flight.spline, GRAVITY, 100 * seed + k as u64).unwrap());
     let shares = ImuPair::new(settings(&models)).unwrap().bias_shares();
     flight.biases = bias(&imus, &models[1].body_from_imu.rotation, shares, flight.first());
-    let start = flight.drawn_start(StartSigma::default());
+    let start = flight.drawn_start(InitialSigma::default());
     let stamps: Vec<Stamp> = flight.stamps().collect();
     let points = stamps.iter().skip(10).step_by(10).map(|stamp| (*stamp, flight.see(*stamp))).collect();
     let mut poses = vec![];
@@ -128,7 +128,8 @@ fn record(seed: u64, seconds: f64) -> Recording {
 
 impl Recording {
     fn estimator(&self) -> UnifiedVio {
-        let unified = UnifiedSettings { pair: Some(settings(&self.models)), lag_s: 0.2, ..UnifiedSettings::default() };
+        let unified =
+            UnifiedSettings { imu_pair: Some(settings(&self.models)), lag_s: 0.2, ..UnifiedSettings::default() };
         UnifiedVio::new(self.flight.camera, Settings::default(), unified).unwrap()
     }
 
@@ -136,7 +137,7 @@ impl Recording {
     fn feed(&self, mut delay: impl FnMut(usize) -> i64, mut each: impl FnMut(&Odometry)) -> UnifiedVio {
         enum What<'a> {
             First(&'a Imu),
-            Second(&'a Imu),
+            StereoCamera(&'a Imu),
             Points(Stamp, &'a [PointObservation]),
             Pose(&'a PoseMeasurement),
         }
@@ -144,7 +145,7 @@ impl Recording {
         due.extend(self.imus[0].samples.iter().map(|s| (s.stamp.nanos(), What::First(s))));
         due.extend(self.imus[1].samples.iter().enumerate().map(|(k, s)| {
             // The second sensor up to 4.5 ms late: less than the time between two samples, they keep their order.
-            (s.stamp.nanos() + delay(k) / 40, What::Second(s))
+            (s.stamp.nanos() + delay(k) / 40, What::StereoCamera(s))
         }));
         due.extend(self.points.iter().enumerate().map(|(k, (s, p))| (s.nanos() + delay(k), What::Points(*s, p))));
         due.extend(self.poses.iter().enumerate().map(|(k, p)| (p.stamp.nanos() + delay(k), What::Pose(p))));
@@ -156,11 +157,11 @@ impl Recording {
         for (_, what) in due.iter().filter(|(at, _)| *at <= end) {
             match what {
                 What::First(sample) => drop(unified.imu(sample).unwrap()),
-                What::Second(sample) => drop(unified.second_imu(sample).unwrap()),
+                What::StereoCamera(sample) => drop(unified.second_imu(sample).unwrap()),
                 What::Points(stamp, points) => unified.points(*stamp, points).unwrap(),
                 What::Pose(pose) => unified.pose(pose).unwrap(),
             }
-            if !started && let Ok(()) = unified.start(&self.start) {
+            if !started && let Ok(()) = unified.initialize(&self.start) {
                 started = true;
             }
             if let (What::First(_), Some(odometry)) = (what, unified.output()) {
@@ -181,8 +182,8 @@ fn order_of_arrival_does_not_matter() {
         // Second samples up to 4.5 ms, all else up to 180 ms late, in any order.
         let late = |_| if seed == 0 { 0 } else { (rng.bits() % 180_000_000) as i64 };
         let unified = recording.feed(late, |odometry| outputs.push(*odometry));
-        assert_eq!((unified.tally().late, unified.tally().poses_refused), (0, 0));
-        assert!(unified.tally().images > 100 && unified.tally().poses > 50, "{:?}", unified.tally());
+        assert_eq!((unified.counts().too_late, unified.counts().poses_rejected), (0, 0));
+        assert!(unified.counts().images > 100 && unified.counts().poses > 50, "{:?}", unified.counts());
         runs.push(outputs);
     }
     for (seed, outputs) in runs.iter().enumerate().skip(1) {
@@ -252,11 +253,11 @@ fn refuses_what_it_cannot_use() {
         (UnifiedSettings { lag_s: f64::NAN, ..base }, "lag_s"),
         (UnifiedSettings { pose_time_offset_s: f64::INFINITY, ..base }, "pose_time_offset_s"),
         (
-            UnifiedSettings { pair: Some(ImuPairSettings { patience_s: 0.0, ..Default::default() }), ..base },
-            "patience_s",
+            UnifiedSettings { imu_pair: Some(ImuPairSettings { timeout_s: 0.0, ..Default::default() }), ..base },
+            "timeout_s",
         ),
         (
-            UnifiedSettings { pair: Some(ImuPairSettings { gyro_bias_sigma: -1.0, ..Default::default() }), ..base },
+            UnifiedSettings { imu_pair: Some(ImuPairSettings { gyro_bias_sigma: -1.0, ..Default::default() }), ..base },
             "gyro_bias_sigma",
         ),
     ] {
@@ -285,18 +286,17 @@ fn refuses_what_it_cannot_use() {
         let stamp = Stamp::from_nanos(sample.stamp.nanos() + k);
         unified.points(stamp, &[]).unwrap();
     }
-    let tally = unified.tally();
-    assert_eq!(tally.images + tally.late, 200 - 64);
+    let counts = unified.counts();
+    assert_eq!(counts.images + counts.too_late, 200 - 64);
 
     // The filter itself: in order, or told.
     let mut vio = Vio::new(camera, ImuNoise::default(), Settings::default()).unwrap();
-    assert!(!vio.pose(&recording.poses[0]).unwrap());
+    let here = Isometry3::identity();
+    let first = recording.poses[0].of_body(&here, &here);
+    assert!(!vio.pose(&first).unwrap());
     vio.imu(&sample).unwrap();
-    vio.start(&recording.start).unwrap();
-    let at = |ms: i64| PoseMeasurement {
-        stamp: Stamp::from_nanos(sample.stamp.nanos() + 1_000_000 * ms),
-        ..recording.poses[0]
-    };
+    vio.initialize(&recording.start).unwrap();
+    let at = |ms: i64| BodyPose { stamp: Stamp::from_nanos(sample.stamp.nanos() + 1_000_000 * ms), ..first };
     assert!(matches!(vio.pose(&at(-1)), Err(Error::Late { what: "pose", .. })));
     assert!(matches!(vio.pose(&at(500)), Err(Error::OutOfRange { .. })));
 }

@@ -12,10 +12,10 @@ use paintcopter_benches::Rng;
 use paintcopter_benches::frames::Frames;
 use paintcopter_benches::sequences::{SEQUENCES, cameras, motion};
 use serde_json::json;
-use vio_ekf::sim::{CameraModel, ImuModel, Scenario, Simulation};
+use vio_ekf::sim::{ImuModel, Scenario, SimulatedCamera, Simulation};
 use vio_ekf::{
-    Alignment, Association, Odometry, Settings, Stamp, Start, StartSigma, Status, Trajectory, Vio, ate, chi2, nalgebra,
-    so3, tum,
+    Alignment, Association, InitialSigma, InitialState, Odometry, Settings, Stamp, Status, Trajectory, Vio, ate, chi2,
+    nalgebra, so3, tum,
 };
 
 type AnyError = Box<dyn Error>;
@@ -90,7 +90,7 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
         let mut squares = Vec::new();
         for seed in arguments.first_seed..arguments.first_seed + arguments.seeds {
             let count = if arguments.stereo { 2 } else { 1 };
-            let model = |camera| CameraModel { camera, ..CameraModel::default() };
+            let model = |camera| SimulatedCamera { camera, ..SimulatedCamera::default() };
             let cameras = cameras(name)[..count].iter().copied().map(model).collect();
             let simulation = Simulation::new(spline.clone(), Scenario { seed, cameras, ..Scenario::default() })?;
             let mut outcome = follow(&simulation, name, seed, &settings, arguments)?;
@@ -164,7 +164,7 @@ fn follow(
     let mut samples = recording.samples.iter();
     let first = samples.next().ok_or("the sequence is too short")?;
     vio.imu(first)?;
-    vio.start(&start(simulation, first.stamp, &imu, seed)?)?;
+    vio.initialize(&start(simulation, first.stamp, &imu, seed)?)?;
 
     let folder = |side: &str| arguments.cache.as_ref().map(|cache| cache.join(format!("{name}_{seed}{side}")));
     let first = Frames::new(simulation, 0, left, folder(""))?;
@@ -218,15 +218,15 @@ fn follow(
 }
 
 /// The truth, less errors drawn from what the start admits.
-fn start(simulation: &Simulation, stamp: Stamp, imu: &ImuModel, seed: u64) -> Result<Start, AnyError> {
+fn start(simulation: &Simulation, stamp: Stamp, imu: &ImuModel, seed: u64) -> Result<InitialState, AnyError> {
     let motion = simulation.motion(stamp)?;
     let (gyro_bias, accel_bias) = (imu.gyro_bias_sigma, imu.accel_bias_sigma);
-    let sigma = StartSigma { gyro_bias, accel_bias, ..StartSigma::default() };
+    let sigma = InitialSigma { gyro_bias, accel_bias, ..InitialSigma::default() };
     let mut rng = Rng::new(seed);
     let mut normals = || Vector3::from_fn(|_, _| (0..12).map(|_| rng.unit()).sum::<f64>() - 6.0);
     let pose = motion.world_from_body;
     let tilt = normals().component_mul(&Vector3::new(sigma.tilt, sigma.tilt, 0.0));
-    Ok(Start {
+    Ok(InitialState {
         stamp,
         world_from_body: nalgebra::Isometry3::from_parts(pose.translation, so3::exp(&-tilt) * pose.rotation),
         velocity_in_body: pose.rotation.inverse() * motion.velocity_in_world - normals() * sigma.velocity,

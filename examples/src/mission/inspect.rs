@@ -115,7 +115,7 @@ fn trajectories(mission: &Mission) -> Result<(Trajectory, Trajectory), MissionEr
     for f in &mission.flights {
         let stride = (POSE_STEP / f.slam.interval).round().max(1.0) as usize;
         for sample in f.slam.samples.iter().step_by(stride) {
-            let stamp = Stamp::from_secs(start + sample.time)?;
+            let stamp = Stamp::from_secs(start + sample.time).map_err(vio_ekf::Error::from)?;
             if flown.stamps().last().is_some_and(|&last| last >= stamp) {
                 continue;
             }

@@ -101,7 +101,7 @@ impl Scan {
             match fuse_frame(&mut store, &mut mesher, sequence, index, &pose, leaving && due(index), &mut metrics) {
                 Ok(()) => {
                     fused.push(index);
-                    trajectory.push(Stamp::from_secs(frame.stamp)?, pose)?;
+                    trajectory.push(Stamp::from_secs(frame.stamp).map_err(vio_ekf::Error::from)?, pose)?;
                 }
                 Err(why) => skipped.push((index, format!("{}: {why}", frame.depth.display()))),
             }

@@ -54,7 +54,7 @@ impl ScanFlight {
             let before = sensor.capture(0, &(simulation.motion(first)?.world_from_body * camera.body_from_camera))?;
             let mut settings = vio_ekf::Settings::default();
             if let Some(distance) = before.distance() {
-                (settings.landmarks.inverse_distance, settings.landmarks.common_sigma) = (1.0 / distance, 0.1);
+                (settings.landmarks.inverse_distance, settings.landmarks.shared_sigma) = (1.0 / distance, 0.1);
             }
             Vio::new(camera, ImuNoise::default(), settings)?
         };

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use vio_ekf::calibration::{CameraCalibration, ImuCalibration};
-use vio_ekf::{Camera, Imu, SampleFindings, Stamp, Trajectory, check_samples, nalgebra::Vector3};
+use vio_ekf::{Camera, Imu, ImuValidation, Stamp, Trajectory, nalgebra::Vector3, validate_samples};
 
 use super::error::VioError;
 
@@ -83,10 +83,10 @@ impl Recording {
     ///
     /// # Errors
     /// [`VioError::Unusable`] names the recording and what is wrong.
-    pub fn check(&self, gravity: f64) -> Result<SampleFindings, VioError> {
+    pub fn check(&self, gravity: f64) -> Result<ImuValidation, VioError> {
         let unusable = |why: String| VioError::Unusable { recording: self.name.clone(), why };
         let findings =
-            check_samples(&self.samples, self.imu.rate_hz, gravity).map_err(|error| unusable(error.to_string()))?;
+            validate_samples(&self.samples, self.imu.rate_hz, gravity).map_err(|error| unusable(error.to_string()))?;
         let Some((first, last)) = self.images.span() else {
             return Err(unusable("there are no images".into()));
         };

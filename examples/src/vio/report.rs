@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use serde::Serialize;
-use vio_ekf::{SampleFindings, so3, tum};
+use vio_ekf::{ImuValidation, so3, tum};
 
 use super::error::write_file;
 use super::{Recording, Run, RunEvaluation, VioError, plots};
@@ -78,7 +78,7 @@ impl VioReport {
     /// [`VioError::Library`] if the filter gave poses that are not finite.
     pub fn new(
         recording: &Recording,
-        findings: &SampleFindings,
+        findings: &ImuValidation,
         run: &Run,
         evaluation: Option<&RunEvaluation>,
         threads: usize,

@@ -6,7 +6,7 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use vio_ekf::calibration::{CameraCalibration, ImuCalibration, write_asl_camera, write_asl_imu};
 use vio_ekf::nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
-use vio_ekf::sim::{CameraModel, Frame, ImuRecording, Scenario, Simulation};
+use vio_ekf::sim::{Frame, ImuRecording, Scenario, SimulatedCamera, Simulation};
 use vio_ekf::{Spline, Stamp, Trajectory, asl, euroc, so3, tum};
 
 use super::error::{make_folder, write_file};
@@ -75,7 +75,7 @@ pub fn simulate(settings: &SimulationSettings, folder: &Path) -> Result<Simulate
     let recording = simulation.imu(0)?;
     let model = settings.scenario.imus.first().ok_or(vio_ekf::Error::NoSuch { what: "imu", index: 0, count: 0 })?;
     // Without the time offset: a calibration that knows it would leave nothing to find.
-    let calibrated = |model: &CameraModel| CameraCalibration {
+    let calibrated = |model: &SimulatedCamera| CameraCalibration {
         camera: model.camera,
         rate_hz: Some(model.rate_hz),
         time_offset_s: 0.0,

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use vio_ekf::sim::{CameraModel, Scenario};
+use vio_ekf::sim::{Scenario, SimulatedCamera};
 use vio_ekf::tune::TuneSettings;
-use vio_ekf::{CalibrationSettings, Camera, Settings};
+use vio_ekf::{CalibrationSettings, Camera, LandmarkSettings, Settings};
 
 use super::command_line::{Arguments, Command, Eval, FlightName, Sim, Track, Tune};
 use super::{
@@ -50,7 +50,8 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         (None, None) => return Err("name a recording with --euroc or --mcap".into()),
     };
     let calibration = if arguments.calibrate { rough_calibration() } else { CalibrationSettings::default() };
-    let filter = Settings { features: arguments.features, calibration, ..Settings::default() };
+    let landmarks = LandmarkSettings { max_count: arguments.features, ..LandmarkSettings::default() };
+    let filter = Settings { landmarks, calibration, ..Settings::default() };
     filter.check()?;
     let findings = recording.check(filter.gravity)?;
     eprintln!(
@@ -88,8 +89,9 @@ fn render(arguments: &Sim) -> Result<(), AnyError> {
         (None, FlightName::Room) => Flight::Room,
         (None, FlightName::Wall) => Flight::Wall,
     };
-    let second = arguments.stereo.then(|| CameraModel { camera: Camera::euroc_right(), ..CameraModel::default() });
-    let cameras = std::iter::once(CameraModel::default()).chain(second).collect();
+    let second =
+        arguments.stereo.then(|| SimulatedCamera { camera: Camera::euroc_right(), ..SimulatedCamera::default() });
+    let cameras = std::iter::once(SimulatedCamera::default()).chain(second).collect();
     let settings = SimulationSettings {
         flight,
         seconds: arguments.seconds,

@@ -10,7 +10,7 @@ use paintcopter_examples::vio::{
     Flight, Images, Overrides, Recording, RunSettings, SimulationSettings, camera_frames, evaluate_run, open_euroc,
     open_euroc_stereo, open_mcap, run, simulate,
 };
-use vio_ekf::sim::{CameraModel, RoomSettings, Scenario};
+use vio_ekf::sim::{RoomSettings, Scenario, SimulatedCamera};
 use vio_ekf::{Camera, Distortion, Stamp};
 
 use crate::recorded::recorded;
@@ -21,7 +21,7 @@ fn flight(seconds: f64, raw: bool) -> SimulationSettings {
     let euroc = Camera::euroc();
     let camera = Camera { width: 376, height: 240, fx: 229.3, fy: 228.6, cx: 183.4, cy: 123.9, ..euroc };
     let room = RoomSettings { texture_size: 512, ..RoomSettings::default() };
-    let cameras = vec![CameraModel { camera, ..CameraModel::default() }];
+    let cameras = vec![SimulatedCamera { camera, ..SimulatedCamera::default() }];
     let scenario = Scenario { cameras, room, seed: 5, ..Scenario::default() };
     SimulationSettings { flight: Flight::Room, seconds, scenario, mcap: true, raw, threads: 2 }
 }
@@ -197,7 +197,7 @@ fn a_second_camera_is_used_where_it_has_images() {
     let left = settings.scenario.cameras[0].clone();
     let place = Camera::euroc().body_from_camera.inverse() * Camera::euroc_right().body_from_camera;
     let camera = Camera { body_from_camera: left.camera.body_from_camera * place, ..left.camera };
-    settings.scenario.cameras.push(CameraModel { camera, ..left });
+    settings.scenario.cameras.push(SimulatedCamera { camera, ..left });
     simulate(&settings, &s.0).unwrap();
     let none = Overrides::default();
     let follow = |recording: &Recording, threads: usize| {

@@ -1,73 +1,32 @@
-use nalgebra::{Isometry3, SMatrix, Vector3};
+//! What the filter reports about itself and about each image.
 
-use super::CoreCovariance;
-use crate::Stamp;
+use nalgebra::{Isometry3, SMatrix};
+
+use crate::core::divergence::DivergenceCause;
 
 /// Whether the estimate can be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
-    /// No start yet, and why.
-    Uninitialised(Waiting),
+    /// Not initialised yet, and why.
+    Uninitialised(InitializationStatus),
     /// Running.
     Tracking,
-    /// Given up, and why. Stays so until [`Vio::start`](crate::Vio::start) or [`Vio::reset`](crate::Vio::reset).
-    Diverged(Excess),
+    /// Given up, and why. Stays so until [`Vio::initialize`](crate::Vio::initialize) or [`Vio::reset`](crate::Vio::reset).
+    Diverged(DivergenceCause),
 }
 
-/// What the start at rest waits for.
+/// What the initialization at rest waits for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Waiting {
-    /// A second without shaking, by the inertial samples.
-    ForSteadiness,
-    /// Images that have something to hold on to, and in which nothing moves.
-    ForStillImages,
+pub enum InitializationStatus {
+    /// A second in which rate and force do not change.
+    WaitingForSteadyImu,
+    /// Images with corners, and without parallax.
+    WaitingForStationaryImages,
     /// The force read at rest is not gravity: axes, units or calibration of the accelerometer are wrong.
-    ForGravity,
+    GravityMismatch,
 }
 
-/// Which limit of [`LimitSettings`](crate::LimitSettings) was exceeded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Excess {
-    /// The speed, or a number that is not finite.
-    Speed,
-    /// A bias.
-    Bias,
-    /// The uncertainty of the velocity.
-    Uncertainty,
-    /// Landmarks contradict the prediction, image after image.
-    Contradiction,
-}
-
-/// An estimate of the body's motion.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Odometry {
-    /// Its time, by the inertial sensor's clock.
-    pub stamp: Stamp,
-    /// Pose; z of the world is up.
-    pub world_from_body: Isometry3<f64>,
-    /// Velocity in body axes, m/s.
-    pub velocity_in_body: Vector3<f64>,
-    /// Angular rate in body axes, rad/s.
-    pub rate_in_body: Vector3<f64>,
-    /// Bias of the gyroscope, rad/s.
-    pub gyro_bias: Vector3<f64>,
-    /// Bias of the accelerometer, m/s².
-    pub accel_bias: Vector3<f64>,
-    /// Of the errors of, in this order, three rows each: position in world axes; velocity in body axes; attitude as a
-    /// rotation vector in **world** axes, `R_true = Exp(δθ) R`; gyroscope's bias; accelerometer's bias.
-    pub covariance: CoreCovariance,
-}
-
-impl Odometry {
-    /// Covariance of the attitude error as a rotation vector in body axes, rad².
-    pub fn attitude_covariance_in_body(&self) -> nalgebra::Matrix3<f64> {
-        let rotation = self.world_from_body.rotation.to_rotation_matrix().into_inner();
-        let world: SMatrix<f64, 3, 3> = self.covariance.fixed_view::<3, 3>(6, 6).into_owned();
-        rotation.transpose() * world * rotation
-    }
-}
-
-/// The camera's calibration as the filter sees it.
+/// The camera's calibration as the filter estimates it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Calibration {
     /// Pose of the camera on the body.
@@ -85,12 +44,19 @@ pub struct FrameReport {
     pub status: Status,
     /// Landmarks whose measurement was used.
     pub used: usize,
-    /// Landmarks whose measurement was refused.
+    /// Landmarks whose measurement failed, or was an outlier.
     pub rejected: usize,
     /// Landmarks that were new.
     pub added: usize,
     /// Landmarks that were dropped.
     pub removed: usize,
-    /// Whether the body was taken to be at rest.
-    pub at_rest: bool,
+    /// Whether the body was taken to be stationary.
+    pub stationary: bool,
+}
+
+impl FrameReport {
+    /// Nothing yet.
+    pub(crate) fn empty(status: Status) -> Self {
+        Self { status, used: 0, rejected: 0, added: 0, removed: 0, stationary: false }
+    }
 }

@@ -1,3 +1,5 @@
+//! Two inertial sensors on one body as one.
+
 use nalgebra::{Isometry3, Vector3};
 
 use crate::error::{all_not_negative, invalid};
@@ -5,9 +7,9 @@ use crate::trajectory::is_finite;
 use crate::{Error, Imu, ImuNoise};
 
 /// Samples of each sensor that wait for the other at most.
-const WAITING: usize = 64;
+const MAX_PENDING: usize = 64;
 
-/// How two inertial sensors on one body are joined.
+/// How two inertial sensors on one body are fuse.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct ImuPairSettings {
@@ -22,7 +24,7 @@ pub struct ImuPairSettings {
     /// Standard deviation of the difference of the accelerometers' biases at the start, m/s² per axis; ours: 0.2.
     pub accel_bias_sigma: f64,
     /// A second sensor that is this late, or silent for so long, is left out, s; ours: 0.02.
-    pub patience_s: f64,
+    pub timeout_s: f64,
 }
 
 impl Default for ImuPairSettings {
@@ -33,7 +35,7 @@ impl Default for ImuPairSettings {
             body_from_second: Isometry3::identity(),
             gyro_bias_sigma: 0.02,
             accel_bias_sigma: 0.2,
-            patience_s: 0.02,
+            timeout_s: 0.02,
         }
     }
 }
@@ -58,9 +60,9 @@ impl Default for ImuPairSettings {
 #[derive(Debug, Clone)]
 pub struct ImuPair {
     settings: ImuPairSettings,
-    gyro: Difference,
-    accel: Difference,
-    waiting: Vec<Imu>,
+    gyro: BiasDifference,
+    accel: BiasDifference,
+    pending: Vec<Imu>,
     /// Of the second sensor, in its own axes: the last one not after what was read, and all later ones.
     second: Vec<Imu>,
     /// The last sample read.
@@ -69,7 +71,7 @@ pub struct ImuPair {
 
 /// One kind of sensor: the difference of the biases, and the weights.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Difference {
+struct BiasDifference {
     mean: Vector3<f64>,
     /// Per axis.
     variance: f64,
@@ -82,7 +84,7 @@ struct Difference {
     share: f64,
 }
 
-impl Difference {
+impl BiasDifference {
     fn new([white_1, white_2]: [f64; 2], [walk_1, walk_2]: [f64; 2], sigma: f64) -> Self {
         let share = |a: f64, b: f64| if a + b > 0.0 { a * a / (a * a + b * b) } else { 0.5 };
         Self {
@@ -96,7 +98,7 @@ impl Difference {
     }
 
     /// Learns from two readings, `dt` seconds after those before.
-    fn learn(&mut self, first: &Vector3<f64>, second: &Vector3<f64>, dt: f64) {
+    fn update(&mut self, first: &Vector3<f64>, second: &Vector3<f64>, dt: f64) {
         self.variance += self.walk * dt;
         let gain = self.variance / (self.variance + self.white / dt);
         if gain.is_finite() {
@@ -106,7 +108,7 @@ impl Difference {
     }
 
     /// What the pair reads; of the first sensor only, with the pair's bias, if the second is silent.
-    fn joined(&self, first: Vector3<f64>, second: Option<Vector3<f64>>) -> Vector3<f64> {
+    fn fuse(&self, first: Vector3<f64>, second: Option<Vector3<f64>>) -> Vector3<f64> {
         let first = first - self.mean * self.share;
         second.map_or(first, |second| {
             let second = second + self.mean * (1.0 - self.share);
@@ -123,8 +125,8 @@ impl ImuPair {
         if !is_finite(&settings.body_from_second) {
             return Err(Error::NonFinite { what: "body_from_second", index: 0 });
         }
-        if !(settings.patience_s > 0.0 && settings.patience_s <= 1.0) {
-            return Err(invalid("patience_s", settings.patience_s, "must be above 0 and at most 1 s"));
+        if !(settings.timeout_s > 0.0 && settings.timeout_s <= 1.0) {
+            return Err(invalid("timeout_s", settings.timeout_s, "must be above 0 and at most 1 s"));
         }
         all_not_negative(&[
             ("gyro_bias_sigma", settings.gyro_bias_sigma),
@@ -133,18 +135,18 @@ impl ImuPair {
         let (a, b) = (settings.first, settings.second);
         Ok(Self {
             settings,
-            gyro: Difference::new(
+            gyro: BiasDifference::new(
                 [a.gyro_density, b.gyro_density],
                 [a.gyro_walk, b.gyro_walk],
                 settings.gyro_bias_sigma,
             ),
-            accel: Difference::new(
+            accel: BiasDifference::new(
                 [a.accel_density, b.accel_density],
                 [a.accel_walk, b.accel_walk],
                 settings.accel_bias_sigma,
             ),
-            waiting: Vec::with_capacity(WAITING + 1),
-            second: Vec::with_capacity(WAITING + 1),
+            pending: Vec::with_capacity(MAX_PENDING + 1),
+            second: Vec::with_capacity(MAX_PENDING + 1),
             last: None,
         })
     }
@@ -152,12 +154,12 @@ impl ImuPair {
     /// Noise of what the pair reads.
     pub fn noise(&self) -> ImuNoise {
         let (a, b) = (&self.settings.first, &self.settings.second);
-        let joined = |a: f64, b: f64| if a + b > 0.0 { a * b / a.hypot(b) } else { 0.0 };
+        let fuse = |a: f64, b: f64| if a + b > 0.0 { a * b / a.hypot(b) } else { 0.0 };
         ImuNoise {
-            gyro_density: joined(a.gyro_density, b.gyro_density),
-            gyro_walk: joined(a.gyro_walk, b.gyro_walk),
-            accel_density: joined(a.accel_density, b.accel_density),
-            accel_walk: joined(a.accel_walk, b.accel_walk),
+            gyro_density: fuse(a.gyro_density, b.gyro_density),
+            gyro_walk: fuse(a.gyro_walk, b.gyro_walk),
+            accel_density: fuse(a.accel_density, b.accel_density),
+            accel_walk: fuse(a.accel_walk, b.accel_walk),
         }
     }
 
@@ -169,19 +171,19 @@ impl ImuPair {
 
     /// Takes a sample of the first sensor; stamps must increase.
     pub fn first(&mut self, sample: &Imu) -> Result<(), Error> {
-        let last = self.waiting.last().or(self.last.as_ref());
-        check(sample, last)?;
-        if self.waiting.len() >= WAITING {
+        let last = self.pending.last().or(self.last.as_ref());
+        sample.check_after(last)?;
+        if self.pending.len() >= MAX_PENDING {
             return Err(Error::TooFew { what: "samples read from the pair while new ones came", got: 0, need: 1 });
         }
-        self.waiting.push(*sample);
+        self.pending.push(*sample);
         Ok(())
     }
 
     /// Takes a sample of the second sensor in its own axes; stamps must increase.
     pub fn second(&mut self, sample: &Imu) -> Result<(), Error> {
-        check(sample, self.second.last())?;
-        if self.second.len() >= WAITING {
+        sample.check_after(self.second.last())?;
+        if self.second.len() >= MAX_PENDING {
             // The first sensor is silent; what it will be compared with is recent.
             self.second.remove(0);
         }
@@ -192,33 +194,33 @@ impl ImuPair {
     /// The next sample of the pair, at the time of one of the first sensor and in its axes, if the second has got there or has
     /// been waited for long enough.
     pub fn read(&mut self) -> Option<Imu> {
-        let sample = *self.waiting.first()?;
-        let newest = self.waiting[self.waiting.len() - 1].stamp;
+        let sample = *self.pending.first()?;
+        let newest = self.pending[self.pending.len() - 1].stamp;
         let other = self.second_at(&sample);
-        let late = newest.secs_since(sample.stamp) >= self.settings.patience_s;
+        let late = newest.secs_since(sample.stamp) >= self.settings.timeout_s;
         if other.is_none() && !late {
             return None;
         }
-        self.waiting.remove(0);
+        self.pending.remove(0);
         let dt = self.last.map_or(0.0, |last| sample.stamp.secs_since(last.stamp));
-        let turn = self.settings.body_from_second.rotation;
-        let rate_2 = other.map(|other| turn * other.gyro);
+        let rotation = self.settings.body_from_second.rotation;
+        let rate_2 = other.map(|other| rotation * other.gyro);
         if let Some(rate_2) = &rate_2
             && dt > 0.0
         {
-            self.gyro.learn(&sample.gyro, rate_2, dt);
+            self.gyro.update(&sample.gyro, rate_2, dt);
         }
-        let gyro = self.gyro.joined(sample.gyro, rate_2);
+        let gyro = self.gyro.fuse(sample.gyro, rate_2);
         let angular = self.last.map_or(Vector3::zeros(), |last| (gyro - last.gyro) / dt);
         let lever = self.settings.body_from_second.translation.vector;
         let moved = angular.cross(&lever) + gyro.cross(&gyro.cross(&lever));
-        let force_2 = other.map(|other| turn * other.accel - moved);
+        let force_2 = other.map(|other| rotation * other.accel - moved);
         if let Some(force_2) = &force_2
             && dt > 0.0
         {
-            self.accel.learn(&sample.accel, force_2, dt);
+            self.accel.update(&sample.accel, force_2, dt);
         }
-        let accel = self.accel.joined(sample.accel, force_2);
+        let accel = self.accel.fuse(sample.accel, force_2);
         let read = Imu { stamp: sample.stamp, gyro, accel };
         self.last = Some(read);
         let used = self.second.partition_point(|other| other.stamp <= sample.stamp).saturating_sub(1);
@@ -235,7 +237,7 @@ impl ImuPair {
         }
         let before = self.second.get(index.checked_sub(1)?)?;
         let gap = after.stamp.secs_since(before.stamp);
-        if gap > self.settings.patience_s {
+        if gap > self.settings.timeout_s {
             return None;
         }
         let share = sample.stamp.secs_since(before.stamp) / gap;
@@ -244,17 +246,5 @@ impl ImuPair {
             gyro: before.gyro + (after.gyro - before.gyro) * share,
             accel: before.accel + (after.accel - before.accel) * share,
         })
-    }
-}
-
-fn check(sample: &Imu, last: Option<&Imu>) -> Result<(), Error> {
-    if !sample.is_finite() {
-        return Err(Error::NonFinite { what: "inertial sample", index: 0 });
-    }
-    match last {
-        Some(last) if sample.stamp <= last.stamp => {
-            Err(Error::NotIncreasing { index: 0, previous: last.stamp, stamp: sample.stamp })
-        }
-        _ => Ok(()),
     }
 }

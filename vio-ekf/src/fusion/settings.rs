@@ -1,8 +1,12 @@
+//! Settings of the fusion, and of its sources.
+
 use nalgebra::Isometry3;
 
+use crate::Error;
+use crate::core::divergence::DivergenceSettings;
+use crate::core::imu_noise_estimator::check_buffer;
 use crate::error::{all_not_negative, invalid};
 use crate::trajectory::is_finite;
-use crate::{Error, LimitSettings};
 
 /// Settings of [`PoseFusion`](super::PoseFusion).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -10,22 +14,28 @@ use crate::{Error, LimitSettings};
 pub struct FusionSettings {
     /// Magnitude of gravity, m/s²; 9.81.
     pub gravity: f64,
-    /// Largest squared Mahalanobis length of a pose's residual; 22.46, 99.9 % of chi-square with 6 degrees of freedom.
-    pub gate: f64,
+    /// The gate: largest squared Mahalanobis distance of a pose's residual; 22.46, 99.9 % of chi-square with 6 degrees of freedom.
+    pub max_mahalanobis: f64,
     /// Linearisations of one update at most; ours: 5.
-    pub iterations: usize,
-    /// When the estimate is given up; `contradictions` counts poses refused in a row, whatever their sources.
-    pub limits: LimitSettings,
+    pub max_iterations: usize,
+    /// When the estimate is given up; outliers in a row are counted over all sources.
+    pub divergence: DivergenceSettings,
     /// Inertial samples that are kept for poses that arrive late; ours: 256, which is 1.3 s at 200 Hz.
-    pub history_samples: usize,
+    pub buffer_samples: usize,
     /// Poses that are kept for others that arrive later; ours: 64.
-    pub history_poses: usize,
+    pub buffer_poses: usize,
 }
 
 impl Default for FusionSettings {
     fn default() -> Self {
-        let limits = LimitSettings::default();
-        Self { gravity: 9.81, gate: 22.46, iterations: 5, limits, history_samples: 256, history_poses: 64 }
+        Self {
+            gravity: 9.81,
+            max_mahalanobis: 22.46,
+            max_iterations: 5,
+            divergence: DivergenceSettings::default(),
+            buffer_samples: 256,
+            buffer_poses: 64,
+        }
     }
 }
 
@@ -35,18 +45,14 @@ impl FusionSettings {
         if !(self.gravity > 0.0 && self.gravity < 100.0) {
             return Err(invalid("gravity", self.gravity, "must be positive, in m/s²: 9.81 on earth"));
         }
-        if self.gate.is_nan() || self.gate <= 0.0 {
-            return Err(invalid("gate", self.gate, "must be positive"));
+        if self.max_mahalanobis.is_nan() || self.max_mahalanobis <= 0.0 {
+            return Err(invalid("max_mahalanobis", self.max_mahalanobis, "must be positive"));
         }
-        if self.iterations == 0 {
-            return Err(invalid("iterations", 0.0, "must be at least 1"));
+        if self.max_iterations == 0 {
+            return Err(invalid("max_iterations", 0.0, "must be at least 1"));
         }
-        for (name, count) in [("history_samples", self.history_samples), ("history_poses", self.history_poses)] {
-            if !(8..=100_000).contains(&count) {
-                return Err(invalid(name, count as f64, "must be between 8 and 100000"));
-            }
-        }
-        Ok(())
+        check_buffer("buffer_samples", self.buffer_samples)?;
+        check_buffer("buffer_poses", self.buffer_poses)
     }
 }
 
@@ -56,8 +62,8 @@ impl FusionSettings {
 pub struct PoseSource {
     /// The source's frame against the world.
     pub alignment: AlignmentSettings,
-    /// The source's sensor on the body.
-    pub mount: MountSettings,
+    /// The extrinsics: the source's sensor on the body.
+    pub extrinsics: ExtrinsicsSettings,
     /// Length in the source's frame per length in the world; 1.
     pub scale: f64,
     /// Its relative standard deviation; 0.
@@ -73,7 +79,7 @@ impl Default for PoseSource {
     fn default() -> Self {
         Self {
             alignment: AlignmentSettings::default(),
-            mount: MountSettings::default(),
+            extrinsics: ExtrinsicsSettings::default(),
             scale: 1.0,
             scale_sigma: 0.0,
             time_offset_s: 0.0,
@@ -82,7 +88,7 @@ impl Default for PoseSource {
     }
 }
 
-/// Where the source's frame is, how well that is known, and how it drifts.
+/// Alignment of the source's frame with the world: how well it is known, and how it drifts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct AlignmentSettings {
@@ -116,10 +122,10 @@ impl Default for AlignmentSettings {
     }
 }
 
-/// Where the source's sensor is on the body.
+/// The extrinsics of a source: where its sensor is on the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct MountSettings {
+pub struct ExtrinsicsSettings {
     /// Pose of the sensor on the body; identity.
     pub body_from_sensor: Isometry3<f64>,
     /// Standard deviation of its position, m per axis; 0.
@@ -128,7 +134,7 @@ pub struct MountSettings {
     pub attitude_sigma: f64,
 }
 
-impl Default for MountSettings {
+impl Default for ExtrinsicsSettings {
     fn default() -> Self {
         Self { body_from_sensor: Isometry3::identity(), position_sigma: 0.0, attitude_sigma: 0.0 }
     }
@@ -140,7 +146,7 @@ impl PoseSource {
         if !is_finite(&self.alignment.source_from_world) {
             return Err(Error::NonFinite { what: "source_from_world", index: 0 });
         }
-        if !is_finite(&self.mount.body_from_sensor) {
+        if !is_finite(&self.extrinsics.body_from_sensor) {
             return Err(Error::NonFinite { what: "body_from_sensor", index: 0 });
         }
         if !(self.scale > 0.0 && self.scale.is_finite()) {
@@ -156,8 +162,8 @@ impl PoseSource {
             ("alignment.position_walk", self.alignment.position_walk),
             ("alignment.tilt_walk", self.alignment.tilt_walk),
             ("alignment.yaw_walk", self.alignment.yaw_walk),
-            ("mount.position_sigma", self.mount.position_sigma),
-            ("mount.attitude_sigma", self.mount.attitude_sigma),
+            ("extrinsics.position_sigma", self.extrinsics.position_sigma),
+            ("extrinsics.attitude_sigma", self.extrinsics.attitude_sigma),
             ("scale_sigma", self.scale_sigma),
             ("time_offset_sigma_s", self.time_offset_sigma_s),
         ])

@@ -1,14 +1,16 @@
+//! The odometry with one or two inertial sensors and with poses from a map, in order of time.
+
 use nalgebra::Isometry3;
 
-use super::{ImuPair, ImuPairSettings, PoseMeasurement};
+use super::imu_pair::{ImuPair, ImuPairSettings};
+use super::pose_measurement::PoseMeasurement;
+use crate::core::initial_state::InitialState;
 use crate::error::invalid;
-use crate::{
-    Camera, Error, FrameReport, ImageView, Imu, ImuNoise, Odometry, PointObservation, Settings, Stamp, Start, Status,
-    Vio,
-};
+use crate::filter::{BodyPose, FrameReport, PointObservation, Settings, Status, Vio};
+use crate::{Camera, Error, ImageView, Imu, ImuNoise, Odometry, Stamp};
 
-/// Measurements that wait at most.
-const WAITING: usize = 64;
+/// Measurements in the delay buffer at most.
+const MAX_PENDING: usize = 64;
 
 /// Settings of [`UnifiedVio`] beside those of its filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,7 +19,7 @@ pub struct UnifiedSettings {
     /// The body's own inertial sensor.
     pub imu: ImuNoise,
     /// A second one, if there is one; `first` is then the body's own and `imu` is not used.
-    pub pair: Option<ImuPairSettings>,
+    pub imu_pair: Option<ImuPairSettings>,
     /// Measurements are used when they are this old, s, and may arrive in any order until then; 0.1. As much as the slowest
     /// source needs; zero to use everything as it comes.
     pub lag_s: f64,
@@ -33,7 +35,7 @@ impl Default for UnifiedSettings {
     fn default() -> Self {
         Self {
             imu: ImuNoise::default(),
-            pair: None,
+            imu_pair: None,
             lag_s: 0.1,
             source_from_world: Isometry3::identity(),
             body_from_sensor: Isometry3::identity(),
@@ -58,39 +60,39 @@ pub struct UnifiedVio {
     /// Seconds to add to the camera's stamps, as far as the order of measurements goes.
     camera_offset: i64,
     /// In order of time.
-    waiting: Vec<Waiting>,
-    pictures: Vec<Vec<u8>>,
-    sights: Vec<Vec<PointObservation>>,
+    pending: Vec<Pending>,
+    image_buffers: Vec<Vec<u8>>,
+    point_buffers: Vec<Vec<PointObservation>>,
     frame: Option<FrameReport>,
-    tally: Tally,
+    counts: MeasurementCounts,
 }
 
-/// What has become of the measurements.
+/// Counts of measurements by their outcome.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Tally {
+pub struct MeasurementCounts {
     /// Images, or sets of points, that the filter has taken.
     pub images: usize,
     /// Poses that were used.
     pub poses: usize,
-    /// Poses that contradicted the estimate.
-    pub poses_refused: usize,
-    /// Measurements that the filter could not place, because they were older than others that it had taken.
-    pub late: usize,
+    /// Poses that failed their gate.
+    pub poses_rejected: usize,
+    /// Measurements that arrived too late: older than others that the filter had taken.
+    pub too_late: usize,
 }
 
 #[derive(Debug, Clone)]
-struct Waiting {
+struct Pending {
     /// Time by the inertial sensor's clock; images before poses.
-    place: (Stamp, bool),
-    what: What,
+    order: (Stamp, bool),
+    measurement: PendingMeasurement,
 }
 
 #[derive(Debug, Clone)]
 #[allow(clippy::large_enum_variant, reason = "a box would claim memory for every pose")]
-enum What {
+enum PendingMeasurement {
     Image(Stamp, Vec<u8>),
     Points(Stamp, Vec<PointObservation>),
-    Pose(PoseMeasurement),
+    Pose(BodyPose),
 }
 
 impl UnifiedVio {
@@ -109,18 +111,18 @@ impl UnifiedVio {
                 return Err(Error::NonFinite { what, index: 0 });
             }
         }
-        let pair = settings.pair.map(ImuPair::new).transpose()?;
+        let pair = settings.imu_pair.map(ImuPair::new).transpose()?;
         let noise = pair.as_ref().map_or(settings.imu, ImuPair::noise);
         Ok(Self {
             vio: Vio::new(camera, noise, vio)?,
             pair,
             settings,
             camera_offset: nanos(vio.calibration.time_offset_s),
-            waiting: Vec::with_capacity(WAITING + 1),
-            pictures: Vec::new(),
-            sights: Vec::new(),
+            pending: Vec::with_capacity(MAX_PENDING + 1),
+            image_buffers: Vec::new(),
+            point_buffers: Vec::new(),
             frame: None,
-            tally: Tally::default(),
+            counts: MeasurementCounts::default(),
         })
     }
 
@@ -129,9 +131,9 @@ impl UnifiedVio {
         &self.vio
     }
 
-    /// Starts, or starts again, from a given state; its biases are those of the pair where there are two sensors.
-    pub fn start(&mut self, start: &Start) -> Result<(), Error> {
-        self.vio.start(start)
+    /// Initialises, or initialises again, from a given state; its biases are those of the pair where there are two sensors.
+    pub fn initialize(&mut self, initial: &InitialState) -> Result<(), Error> {
+        self.vio.initialize(initial)
     }
 
     /// Takes a sample of the body's own inertial sensor, and uses the measurements that have become old enough.
@@ -139,9 +141,9 @@ impl UnifiedVio {
         match &mut self.pair {
             Some(pair) => {
                 pair.first(sample)?;
-                self.go_on()
+                self.drain_pair()
             }
-            None => self.inertial(sample),
+            None => self.process_imu(sample),
         }
     }
 
@@ -151,7 +153,7 @@ impl UnifiedVio {
             return Err(Error::NoSuch { what: "inertial sensor", index: 1, count: 1 });
         };
         pair.second(sample)?;
-        self.go_on()
+        self.drain_pair()
     }
 
     /// Takes an image; see [`Vio::image`].
@@ -161,10 +163,10 @@ impl UnifiedVio {
             return Err(Error::ImageSize { given: (image.width, image.height), expected });
         }
         let image = ImageView::new(image.width, image.height, image.data)?;
-        let mut copy = self.pictures.pop().unwrap_or_default();
+        let mut copy = self.image_buffers.pop().unwrap_or_default();
         copy.clear();
         copy.extend_from_slice(image.data);
-        self.wait((later(stamp, self.camera_offset), false), What::Image(stamp, copy));
+        self.enqueue((plus_nanos(stamp, self.camera_offset), false), PendingMeasurement::Image(stamp, copy));
         Ok(())
     }
 
@@ -173,81 +175,84 @@ impl UnifiedVio {
         if let Some(index) = points.iter().position(|p| p.pixel.iter().any(|v| !v.is_finite())) {
             return Err(Error::NonFinite { what: "point", index });
         }
-        let mut copy = self.sights.pop().unwrap_or_default();
+        let mut copy = self.point_buffers.pop().unwrap_or_default();
         copy.clear();
         copy.extend_from_slice(points);
-        self.wait((later(stamp, self.camera_offset), false), What::Points(stamp, copy));
+        self.enqueue((plus_nanos(stamp, self.camera_offset), false), PendingMeasurement::Points(stamp, copy));
         Ok(())
     }
 
-    /// Takes a pose of the source's sensor in the source's frame; `source` is not used.
+    /// Takes a pose of the source's sensor in the source's frame. There is one source, with index 0.
     pub fn pose(&mut self, pose: &PoseMeasurement) -> Result<(), Error> {
+        if pose.source != 0 {
+            return Err(Error::NoSuch { what: "source", index: pose.source, count: 1 });
+        }
         pose.whitener()?;
         let mut body = pose.of_body(&self.settings.source_from_world, &self.settings.body_from_sensor);
-        body.stamp = later(pose.stamp, nanos(self.settings.pose_time_offset_s));
-        self.wait((body.stamp, true), What::Pose(body));
+        body.stamp = plus_nanos(pose.stamp, nanos(self.settings.pose_time_offset_s));
+        self.enqueue((body.stamp, true), PendingMeasurement::Pose(body));
         Ok(())
     }
 
-    /// The estimate at the time of the latest inertial sample; `None` before the start.
+    /// The estimate at the time of the latest inertial sample; `None` before the initialization.
     pub fn output(&self) -> Option<Odometry> {
         self.vio.output()
     }
 
-    /// What has become of the measurements so far.
-    pub fn tally(&self) -> Tally {
-        self.tally
+    /// Counts of the measurements so far.
+    pub fn counts(&self) -> MeasurementCounts {
+        self.counts
     }
 
     /// What the latest image did; `None` before the first.
-    pub fn frame(&self) -> Option<FrameReport> {
+    pub fn last_frame(&self) -> Option<FrameReport> {
         self.frame
     }
 
-    fn go_on(&mut self) -> Result<Status, Error> {
+    fn drain_pair(&mut self) -> Result<Status, Error> {
         while let Some(sample) = self.pair.as_mut().and_then(ImuPair::read) {
-            self.inertial(&sample)?;
+            self.process_imu(&sample)?;
         }
         Ok(self.vio.status())
     }
 
-    fn inertial(&mut self, sample: &Imu) -> Result<Status, Error> {
+    fn process_imu(&mut self, sample: &Imu) -> Result<Status, Error> {
         self.vio.imu(sample)?;
-        let old = later(sample.stamp, -nanos(self.settings.lag_s));
-        while self.waiting.first().is_some_and(|waiting| waiting.place.0 <= old) {
-            self.use_first();
+        let old = plus_nanos(sample.stamp, -nanos(self.settings.lag_s));
+        while self.pending.first().is_some_and(|pending| pending.order.0 <= old) {
+            self.process_oldest();
         }
         Ok(self.vio.status())
     }
 
-    /// Puts a measurement in its place. If too many wait, the oldest is used now.
-    fn wait(&mut self, place: (Stamp, bool), what: What) {
-        if self.waiting.len() >= WAITING {
-            self.use_first();
+    /// Puts a measurement into the delay buffer. If that is full, the oldest is used now.
+    fn enqueue(&mut self, order: (Stamp, bool), measurement: PendingMeasurement) {
+        if self.pending.len() >= MAX_PENDING {
+            self.process_oldest();
         }
-        let index = self.waiting.partition_point(|waiting| waiting.place <= place);
-        self.waiting.insert(index, Waiting { place, what });
+        let index = self.pending.partition_point(|pending| pending.order <= order);
+        self.pending.insert(index, Pending { order, measurement });
     }
 
-    fn use_first(&mut self) {
-        let Waiting { what, .. } = self.waiting.remove(0);
-        let frame = match what {
-            What::Image(stamp, data) => {
+    fn process_oldest(&mut self) {
+        let Pending { measurement, .. } = self.pending.remove(0);
+        let frame = match measurement {
+            PendingMeasurement::Image(stamp, data) => {
                 let (width, height) = (self.vio.camera().width, self.vio.camera().height);
                 let report = self.vio.image(stamp, &ImageView { width, height, data: &data });
-                self.pictures.push(data);
+                self.image_buffers.push(data);
                 report
             }
-            What::Points(stamp, points) => {
+            PendingMeasurement::Points(stamp, points) => {
                 let report = self.vio.points(stamp, &points);
-                self.sights.push(points);
+                self.point_buffers.push(points);
                 report
             }
-            What::Pose(pose) => {
+            PendingMeasurement::Pose(pose) => {
                 match self.vio.pose(&pose) {
-                    Ok(true) => self.tally.poses += 1,
-                    Ok(false) => self.tally.poses_refused += 1,
-                    Err(_) => self.tally.late += 1,
+                    Ok(true) => self.counts.poses += 1,
+                    Ok(false) => self.counts.poses_rejected += 1,
+                    Err(_) => self.counts.too_late += 1,
                 }
                 return;
             }
@@ -255,10 +260,10 @@ impl UnifiedVio {
         match frame {
             Ok(report) => {
                 self.frame = Some(report);
-                self.tally.images += 1;
+                self.counts.images += 1;
             }
             // All else was checked when it came.
-            Err(_) => self.tally.late += 1,
+            Err(_) => self.counts.too_late += 1,
         }
     }
 }
@@ -267,6 +272,6 @@ fn nanos(seconds: f64) -> i64 {
     (seconds * 1e9).round() as i64
 }
 
-fn later(stamp: Stamp, nanos: i64) -> Stamp {
+fn plus_nanos(stamp: Stamp, nanos: i64) -> Stamp {
     Stamp::from_nanos(stamp.nanos().saturating_add(nanos))
 }

@@ -10,7 +10,7 @@ use crate::{Camera, Error, ImageView, Spline, Stamp};
 /// A camera, its shutter, and its clock.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct CameraModel {
+pub struct SimulatedCamera {
     /// Lens and place on the body; the left camera of the EuRoC vehicle.
     pub camera: Camera,
     /// Frames per second; 20.
@@ -25,7 +25,7 @@ pub struct CameraModel {
     pub drop_probability: f64,
 }
 
-impl Default for CameraModel {
+impl Default for SimulatedCamera {
     fn default() -> Self {
         Self {
             camera: Camera::euroc(),
@@ -60,7 +60,7 @@ impl Frame {
     }
 }
 
-impl CameraModel {
+impl SimulatedCamera {
     /// Refuses a camera that cannot be, with the field that says so.
     pub fn check(&self) -> Result<(), Error> {
         self.camera.check()?;
@@ -91,7 +91,7 @@ pub(super) struct Shot {
 
 /// A camera with everything computed that does not depend on the pose.
 pub(super) struct Renderer {
-    model: CameraModel,
+    model: SimulatedCamera,
     seed: u64,
     first: Stamp,
     frames: usize,
@@ -99,7 +99,7 @@ pub(super) struct Renderer {
 }
 
 impl Renderer {
-    pub(super) fn new(model: CameraModel, spline: &Spline, seed: u64) -> Result<Self, Error> {
+    pub(super) fn new(model: SimulatedCamera, spline: &Spline, seed: u64) -> Result<Self, Error> {
         model.check()?;
         let half_exposure = (model.photometry.exposure_s * 0.5e9).ceil() as i64;
         let (start, end) = spline.span();
@@ -118,7 +118,7 @@ impl Renderer {
         Ok(Self { model, seed, first, frames, tiles })
     }
 
-    pub(super) fn model(&self) -> &CameraModel {
+    pub(super) fn model(&self) -> &SimulatedCamera {
         &self.model
     }
 

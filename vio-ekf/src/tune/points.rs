@@ -3,8 +3,8 @@ use nalgebra::{Isometry3, Point3, Translation3, Vector2, Vector3};
 use super::{NoisePoint, Score, with_factors};
 use crate::sim::{ImuModel, Rng};
 use crate::{
-    Alignment, Camera, Error, Imu, ImuNoise, Motion, Odometry, PointObservation, Settings, Spline, Stamp, Start,
-    StartSigma, Status, Vio, ate, so3,
+    Alignment, Camera, Error, Imu, ImuNoise, InitialSigma, InitialState, Motion, Odometry, PointObservation, Settings,
+    Spline, Stamp, Status, Vio, ate, so3,
 };
 
 /// Time between two images, ns.
@@ -23,7 +23,7 @@ pub struct PointRecording {
     samples: Vec<Imu>,
     images: Vec<(Stamp, Vec<PointObservation>)>,
     truth: Vec<Motion>,
-    start: Start,
+    start: InitialState,
 }
 
 impl PointRecording {
@@ -61,7 +61,7 @@ impl PointRecording {
         let mut samples = self.samples.iter();
         if let Some(sample) = samples.next() {
             vio.imu(sample)?;
-            vio.start(&self.start)?;
+            vio.initialize(&self.start)?;
         }
         for ((stamp, seen), motion) in self.images.iter().zip(&self.truth) {
             for sample in samples.by_ref() {
@@ -122,11 +122,11 @@ fn see(
 }
 
 /// A start drawn around the truth: one that is exact would make any covariance look honest.
-fn drawn_start(motion: &Motion, stamp: Stamp, biases: [Vector3<f64>; 2], rng: &mut Rng) -> Start {
-    let sigma = StartSigma::default();
+fn drawn_start(motion: &Motion, stamp: Stamp, biases: [Vector3<f64>; 2], rng: &mut Rng) -> InitialState {
+    let sigma = InitialSigma::default();
     let pose = motion.world_from_body;
     let tilt = rng.normal_vector().component_mul(&Vector3::new(sigma.tilt, sigma.tilt, 0.0));
-    Start {
+    InitialState {
         stamp,
         world_from_body: Isometry3::from_parts(
             Translation3::from(pose.translation.vector),

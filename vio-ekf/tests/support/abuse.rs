@@ -1,7 +1,7 @@
 //! Recordings of a flight that goes wrong for a while, and what the filter makes of them.
 
 use nalgebra::{Isometry3, Vector3};
-use vio_ekf::sim::{CameraModel, Gain, ImuModel, RoomSettings, Scenario, Simulation, Vibration, camera_ahead};
+use vio_ekf::sim::{Gain, ImuModel, RoomSettings, Scenario, SimulatedCamera, Simulation, Vibration, camera_ahead};
 use vio_ekf::{Camera, Odometry, Settings, Spline, Stamp, Status, Vio, chi2, nalgebra, so3};
 
 use super::Rng;
@@ -80,7 +80,7 @@ fn simulation(abuse: Abuse, name: &str, seed: u64, seconds: f64, halves: u32) ->
     let spline = part(abuse, name, 0.5 + 0.5 * rng.signed(), seconds)?;
     let (mut imu, mut room) = (ImuModel::default(), RoomSettings::default());
     let lens = if name.starts_with("paint") { camera_ahead() } else { Camera::euroc() };
-    let mut camera = CameraModel { camera: smaller(&lens, halves), ..CameraModel::default() };
+    let mut camera = SimulatedCamera { camera: smaller(&lens, halves), ..SimulatedCamera::default() };
     let gain = |factor| vec![Gain { from_s: 5.0, until_s: 7.0, factor, offset: 0.0 }];
     match abuse {
         Abuse::Black => camera.photometry.gains = gain(0.0),
@@ -130,7 +130,7 @@ fn follow(simulation: &Simulation, name: &str, halves: u32, seed: u64) -> Outcom
     let mut settings = Settings::default();
     // What the data sheets say.
     match ABUSES[seed as usize % ABUSES.len()] {
-        Abuse::Saturated => settings.sensor.gyro_range = 0.8,
+        Abuse::Saturated => settings.imu.gyro_range = 0.8,
         Abuse::Jitter => settings.calibration.stamp_jitter_s = 0.005,
         _ => (),
     }
@@ -139,7 +139,7 @@ fn follow(simulation: &Simulation, name: &str, halves: u32, seed: u64) -> Outcom
     let mut samples = samples.iter();
     let first = samples.next().unwrap();
     vio.imu(first).unwrap();
-    vio.start(&drawn_start(simulation, first.stamp, seed)).unwrap();
+    vio.initialize(&drawn_start(simulation, first.stamp, seed)).unwrap();
     let mut finite = true;
     for frame in simulation.frames(0) {
         let frame = frame.unwrap();

@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
 use vio_ekf::{
-    Camera, Distortion, Error, Imu, ImuNoise, Motion, Odometry, PointObservation, Settings, Spline, Stamp, Start,
-    StartSigma, Vio, nalgebra, so3,
+    Camera, Distortion, Error, Imu, ImuNoise, InitialSigma, InitialState, Motion, Odometry, PointObservation, Settings,
+    Spline, Stamp, Vio, nalgebra, so3,
 };
 
 use super::Rng;
@@ -142,12 +142,12 @@ impl Flight {
     }
 
     /// A start drawn around the truth; position and yaw exact, they are what is measured from.
-    pub(crate) fn drawn_start(&mut self, sigma: StartSigma) -> Start {
+    pub(crate) fn drawn_start(&mut self, sigma: InitialSigma) -> InitialState {
         let motion = self.truth(self.first());
         let pose = motion.world_from_body;
         let velocity = pose.rotation.inverse() * motion.velocity_in_world;
         let tilt = self.rng.normals().component_mul(&Vector3::new(sigma.tilt, sigma.tilt, sigma.yaw));
-        Start {
+        InitialState {
             stamp: self.first(),
             world_from_body: Isometry3::from_parts(
                 Translation3::from(pose.translation.vector + self.rng.normals() * sigma.position),
@@ -164,7 +164,7 @@ impl Flight {
     pub(crate) fn run(
         &mut self,
         settings: &Settings,
-        start: &Start,
+        start: &InitialState,
         each: impl FnMut(&Odometry, &Motion, &[Vector3<f64>; 2]),
     ) -> Result<Vio, Error> {
         self.run_with(self.camera, settings, start, each)
@@ -175,7 +175,7 @@ impl Flight {
         &mut self,
         assumed: Camera,
         settings: &Settings,
-        start: &Start,
+        start: &InitialState,
         mut each: impl FnMut(&Odometry, &Motion, &[Vector3<f64>; 2]),
     ) -> Result<Vio, Error> {
         let mut vio = Vio::new(assumed, self.noise, *settings)?;
@@ -183,7 +183,7 @@ impl Flight {
             let sample = self.imu(stamp);
             vio.imu(&sample)?;
             if k == 0 {
-                vio.start(start)?;
+                vio.initialize(start)?;
             } else if k as i64 % IMAGES_EVERY == 0 && stamp < self.spline.span().1 {
                 let seen = self.see(stamp);
                 vio.points(Stamp::from_nanos(stamp.nanos() - self.time_offset), &seen)?;

@@ -2,9 +2,11 @@
 
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 use vio_ekf::sim::{
-    CameraModel, ImuModel, ImuRecording, RoomSettings, Scenario, Simulation, camera_ahead, painting_flight,
+    ImuModel, ImuRecording, RoomSettings, Scenario, SimulatedCamera, Simulation, camera_ahead, painting_flight,
 };
-use vio_ekf::{Camera, PointObservation, Spline, Stamp, Start, StartSigma, Trajectory, euroc, nalgebra, so3, tum};
+use vio_ekf::{
+    Camera, InitialSigma, InitialState, PointObservation, Spline, Stamp, Trajectory, euroc, nalgebra, so3, tum,
+};
 
 use super::{Rng, recorded};
 
@@ -48,7 +50,7 @@ impl Sequence {
         let texture_size = if textured { RoomSettings::default().texture_size } else { 64 };
         let mut scenario = Scenario {
             seed,
-            cameras: vec![CameraModel { camera, ..CameraModel::default() }],
+            cameras: vec![SimulatedCamera { camera, ..SimulatedCamera::default() }],
             room: RoomSettings { texture_size, ..RoomSettings::default() },
             ..Scenario::default()
         };
@@ -91,16 +93,16 @@ impl Sequence {
 }
 
 /// The truth, less errors drawn from what the start admits.
-pub(crate) fn drawn_start(simulation: &Simulation, stamp: Stamp, seed: u64) -> Start {
+pub(crate) fn drawn_start(simulation: &Simulation, stamp: Stamp, seed: u64) -> InitialState {
     let imu = ImuModel::default();
     let sigma =
-        StartSigma { gyro_bias: imu.gyro_bias_sigma, accel_bias: imu.accel_bias_sigma, ..StartSigma::default() };
+        InitialSigma { gyro_bias: imu.gyro_bias_sigma, accel_bias: imu.accel_bias_sigma, ..InitialSigma::default() };
     let mut rng = Rng(seed);
     // A stamp that jitters may be a little before the beginning.
     let motion = simulation.motion(stamp.max(simulation.spline().span().0)).unwrap();
     let pose = motion.world_from_body;
     let tilt = rng.normals().component_mul(&Vector3::new(sigma.tilt, sigma.tilt, 0.0));
-    Start {
+    InitialState {
         stamp,
         world_from_body: Isometry3::from_parts(pose.translation, so3::exp(&-tilt) * pose.rotation),
         velocity_in_body: pose.rotation.inverse() * motion.velocity_in_world - rng.normals() * sigma.velocity,

@@ -1,7 +1,7 @@
 //! A source of poses, such as a motion capture or a camera that is tracked.
 
 use nalgebra::{Isometry3, Translation3, Vector3};
-use vio_ekf::{AlignmentSettings, MountSettings, PoseMeasurement, PoseSource, Stamp, nalgebra, so3};
+use vio_ekf::{AlignmentSettings, ExtrinsicsSettings, PoseMeasurement, PoseSource, Stamp, nalgebra, so3};
 
 use super::flight::Flight;
 
@@ -36,7 +36,7 @@ impl Tracker {
     pub(crate) fn known(&self) -> PoseSource {
         PoseSource {
             alignment: AlignmentSettings { source_from_world: self.source_from_world, ..AlignmentSettings::default() },
-            mount: MountSettings { body_from_sensor: self.body_from_sensor, ..MountSettings::default() },
+            extrinsics: ExtrinsicsSettings { body_from_sensor: self.body_from_sensor, ..ExtrinsicsSettings::default() },
             scale: self.scale,
             time_offset_s: -self.late as f64 * 1e-9,
             ..PoseSource::default()

@@ -4,9 +4,9 @@ use nalgebra::{Isometry3, Vector3};
 use paintcopter_benches::Rng;
 use paintcopter_benches::flight::{Arrival, Flight, PIXEL_SIGMA, normals};
 use vio_ekf::{
-    AlignmentSettings, Error, FusionSettings, ImuPair, ImuPairSettings, LandmarkSettings, Motion, MountSettings,
-    Odometry, PoseFusion, PoseMeasurement, PoseSource, Settings, Start, StartSigma, UnifiedSettings, UnifiedVio, Vio,
-    nalgebra, so3,
+    AlignmentSettings, Error, ExtrinsicsSettings, FusionSettings, ImuPair, ImuPairSettings, ImuSettings, InitialSigma,
+    InitialState, LandmarkSettings, Motion, Odometry, PoseFusion, PoseMeasurement, PoseSource, Settings,
+    UnifiedSettings, UnifiedVio, Vio, nalgebra, so3,
 };
 
 use super::arguments::Arguments;
@@ -33,9 +33,22 @@ pub(crate) enum Way {
 /// The three kinds. The cascade estimates the autopilot's sensor as its body, the others that of the head.
 #[allow(clippy::large_enum_variant, reason = "there is one at a time")]
 pub(crate) enum Estimator {
-    Odometry { vio: Vio, start: Option<Start> },
-    Cascade { vio: Option<Vio>, fusion: PoseFusion, start: Option<(Start, Start)>, settings: CascadeSettings },
-    Unified { vio: UnifiedVio, start: Option<Start>, second: bool, map: bool },
+    Odometry {
+        vio: Vio,
+        start: Option<InitialState>,
+    },
+    Cascade {
+        vio: Option<Vio>,
+        fusion: PoseFusion,
+        start: Option<(InitialState, InitialState)>,
+        settings: CascadeSettings,
+    },
+    Unified {
+        vio: UnifiedVio,
+        start: Option<InitialState>,
+        second: bool,
+        map: bool,
+    },
 }
 
 pub(crate) struct CascadeSettings {
@@ -48,7 +61,11 @@ impl Estimator {
         let noise = [flight.imus[0].noise, flight.imus[1].noise];
         let body_from_second = flight.imus[1].body_from_imu;
         let landmarks = LandmarkSettings { pixel_sigma: PIXEL_SIGMA, ..LandmarkSettings::default() };
-        let settings = Settings { landmarks, history_samples: 512, ..Settings::default() };
+        let settings = Settings {
+            landmarks,
+            imu: ImuSettings { buffer_samples: 512, ..ImuSettings::default() },
+            ..Settings::default()
+        };
         let start = |body_from_imu: &Isometry3<f64>, share: [f64; 2]| start(flight, seed, body_from_imu, share);
         let here = Isometry3::identity();
         Ok(match way {
@@ -57,7 +74,10 @@ impl Estimator {
                 start: Some(start(&here, [0.0; 2])?),
             },
             Way::MapOnly | Way::Cascade { .. } => {
-                let mount = MountSettings { body_from_sensor: body_from_second.inverse(), ..MountSettings::default() };
+                let extrinsics = ExtrinsicsSettings {
+                    body_from_sensor: body_from_second.inverse(),
+                    ..ExtrinsicsSettings::default()
+                };
                 let walks = if matches!(way, Way::Cascade { drifts: false, .. }) {
                     [0.0; 2]
                 } else {
@@ -66,8 +86,8 @@ impl Estimator {
                 let alignment =
                     AlignmentSettings { position_walk: walks[0], yaw_walk: walks[1], ..AlignmentSettings::default() };
                 let sources = [
-                    PoseSource { mount, ..PoseSource::default() },
-                    PoseSource { mount, alignment, ..PoseSource::default() },
+                    PoseSource { extrinsics, ..PoseSource::default() },
+                    PoseSource { extrinsics, alignment, ..PoseSource::default() },
                 ];
                 let vio = match way {
                     Way::MapOnly => None,
@@ -92,7 +112,7 @@ impl Estimator {
                 let share = if second { ImuPair::new(pair)?.bias_shares() } else { [0.0; 2] };
                 let unified = UnifiedSettings {
                     imu: noise[0],
-                    pair: second.then_some(pair),
+                    imu_pair: second.then_some(pair),
                     lag_s: if map { arguments.delay } else { 0.0 },
                     ..UnifiedSettings::default()
                 };
@@ -113,7 +133,7 @@ impl Estimator {
                 Arrival::PrimaryImu(sample) => {
                     vio.imu(sample)?;
                     if let Some(start) = start.take() {
-                        vio.start(&start)?;
+                        vio.initialize(&start)?;
                     }
                     return Ok(vio.output());
                 }
@@ -125,14 +145,14 @@ impl Estimator {
                     if let Some(vio) = vio {
                         vio.imu(sample)?;
                         if let Some((start, _)) = start {
-                            vio.start(start)?;
+                            vio.initialize(start)?;
                         }
                     }
                 }
                 Arrival::SecondaryImu(sample) => {
                     fusion.imu(sample)?;
                     if let Some((_, start)) = start.take() {
-                        fusion.start(&start)?;
+                        fusion.initialize(&start)?;
                     }
                     return Ok(fusion.output());
                 }
@@ -155,7 +175,7 @@ impl Estimator {
                 Arrival::PrimaryImu(sample) => {
                     vio.imu(sample)?;
                     if let Some(wanted) = start {
-                        match vio.start(wanted) {
+                        match vio.initialize(wanted) {
                             // With two sensors there is no sample before both have spoken.
                             Err(Error::TooFew { .. }) => {}
                             done => {
@@ -198,19 +218,24 @@ fn moved(motion: &Motion, body_from_imu: &Isometry3<f64>) -> (Isometry3<f64>, Ve
 
 /// The truth, less errors drawn from what the start admits; position and yaw are what is measured from. The bias is
 /// `b₁ − κ (b₁ − b₂)`: of the first sensor, of the second, or of a pair.
-fn start(flight: &Flight, seed: u64, body_from_imu: &Isometry3<f64>, share: [f64; 2]) -> Result<Start, AnyError> {
+fn start(
+    flight: &Flight,
+    seed: u64,
+    body_from_imu: &Isometry3<f64>,
+    share: [f64; 2],
+) -> Result<InitialState, AnyError> {
     let stamp = flight.spline.span().0;
     let (pose, velocity) = moved(&flight.spline.sample(stamp)?, body_from_imu);
     let mut rng = Rng::new(seed);
     let admitted = |sigma: f64, share: f64| sigma * (1.0 - share).hypot(share);
-    let sigma = StartSigma {
+    let sigma = InitialSigma {
         gyro_bias: admitted(flight.imus[0].gyro_bias_sigma, share[0]),
         accel_bias: admitted(flight.imus[0].accel_bias_sigma, share[1]),
-        ..StartSigma::default()
+        ..InitialSigma::default()
     };
     let tilt = normals(&mut rng).component_mul(&Vector3::new(sigma.tilt, sigma.tilt, 0.0));
     let slip = body_from_imu.rotation.inverse() * normals(&mut rng) * sigma.velocity;
-    Ok(Start {
+    Ok(InitialState {
         stamp,
         world_from_body: Isometry3::from_parts(pose.translation, so3::exp(&-tilt) * pose.rotation),
         velocity_in_body: velocity - slip,

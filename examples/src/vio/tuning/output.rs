@@ -83,10 +83,10 @@ fn markdown(report: &TuningReport, tuning: &Tuning, best: [f64; 5], settings: &S
     let (patches, landmarks) = (&settings.patches, &settings.landmarks);
     let _ = writeln!(
         text,
-        "\nThe inertial noise is in [noise.yaml](noise.yaml), for `vio --imu`. For images: `grey_sigma` {:.3}, `pixel_sigma` \
+        "\nThe inertial noise is in [noise.yaml](noise.yaml), for `vio --imu`. For images: `intensity_sigma` {:.3}, `pixel_sigma` \
          {:.4} of patches and {:.4} of landmarks. Every point tried is in [trials.csv](trials.csv), all figures in \
          [report.json](report.json).",
-        patches.grey_sigma, patches.pixel_sigma, landmarks.pixel_sigma
+        patches.intensity_sigma, patches.pixel_sigma, landmarks.pixel_sigma
     );
     text
 }

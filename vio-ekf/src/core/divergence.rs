@@ -1,0 +1,69 @@
+//! The divergence test: limits on the state beyond which an estimate is given up.
+
+use super::core_state::CoreState;
+use super::covariance::Covariance;
+use super::error_state;
+
+/// The divergence test: the estimate is given up when any of these is exceeded. All ours.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct DivergenceSettings {
+    /// Speed, m/s.
+    pub max_speed: f64,
+    /// Standard deviation of the velocity along its worst axis, m/s: dead reckoning has lasted too long.
+    pub max_velocity_sigma: f64,
+    /// Bias of the gyroscope, rad/s.
+    pub max_gyro_bias: f64,
+    /// Bias of the accelerometer, m/s².
+    pub max_accel_bias: f64,
+    /// Outliers in a row: images in which most of at least five landmarks fail their gate, or poses that do.
+    pub max_consecutive_outliers: u32,
+}
+
+impl Default for DivergenceSettings {
+    fn default() -> Self {
+        Self {
+            max_speed: 30.0,
+            max_velocity_sigma: 1.0,
+            max_gyro_bias: 0.5,
+            max_accel_bias: 3.0,
+            max_consecutive_outliers: 10,
+        }
+    }
+}
+
+/// Which limit of [`DivergenceSettings`] was exceeded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DivergenceCause {
+    /// The speed, or a number that is not finite.
+    Speed,
+    /// A bias.
+    Bias,
+    /// The uncertainty of the velocity.
+    Uncertainty,
+    /// Measurements fail their gate, one after the other.
+    ConsecutiveOutliers,
+}
+
+/// The first of the limits that the core of the state exceeds.
+pub(crate) fn exceeded_limit(
+    core: &CoreState,
+    covariance: &Covariance,
+    settings: &DivergenceSettings,
+) -> Option<DivergenceCause> {
+    let rows = error_state::VELOCITY..error_state::VELOCITY + 3;
+    let velocity_variance = rows.map(|row| covariance.variance(row)).fold(0.0, f64::max);
+    // NaN is beyond all limits.
+    let exceeds = |value: f64, limit: f64| value.is_nan() || value > limit;
+    if exceeds(core.velocity.norm(), settings.max_speed) || !core.position.norm_squared().is_finite() {
+        Some(DivergenceCause::Speed)
+    } else if exceeds(core.gyro_bias.norm(), settings.max_gyro_bias)
+        || exceeds(core.accel_bias.norm(), settings.max_accel_bias)
+    {
+        Some(DivergenceCause::Bias)
+    } else if exceeds(velocity_variance, settings.max_velocity_sigma * settings.max_velocity_sigma) {
+        Some(DivergenceCause::Uncertainty)
+    } else {
+        None
+    }
+}

@@ -1,0 +1,56 @@
+//! The output of a filter: the core state now, with its covariance.
+
+use nalgebra::{Isometry3, SMatrix, Vector3};
+
+use super::core_state::{CoreCovariance, CoreState};
+use super::imu_buffer::ImuBuffer;
+use super::preintegration::ImuPreintegration;
+use crate::Stamp;
+
+/// An estimate of the body's motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Odometry {
+    /// Its time, by the inertial sensor's clock.
+    pub stamp: Stamp,
+    /// Pose; z of the world is up.
+    pub world_from_body: Isometry3<f64>,
+    /// Velocity in body axes, m/s.
+    pub velocity_in_body: Vector3<f64>,
+    /// Angular rate in body axes, rad/s.
+    pub rate_in_body: Vector3<f64>,
+    /// Bias of the gyroscope, rad/s.
+    pub gyro_bias: Vector3<f64>,
+    /// Bias of the accelerometer, m/s².
+    pub accel_bias: Vector3<f64>,
+    /// Of the errors of, in this order, three rows each: position in world axes; velocity in body axes; attitude as a
+    /// rotation vector in **world** axes, `R_true = Exp(δθ) R`; gyroscope's bias; accelerometer's bias.
+    pub covariance: CoreCovariance,
+}
+
+impl Odometry {
+    /// The estimate at the time of the latest sample: the state carried forward by the preintegration since its time.
+    pub(crate) fn predict(
+        core: &CoreState,
+        covariance: &CoreCovariance,
+        (buffer, prediction): (&ImuBuffer, &ImuPreintegration),
+        gravity: f64,
+    ) -> Self {
+        let transition = prediction.transition(&core.velocity, &core.attitude, gravity);
+        Self {
+            stamp: buffer.now(),
+            world_from_body: transition.end(&core.position, &core.attitude),
+            velocity_in_body: transition.velocity,
+            rate_in_body: buffer.latest().gyro - core.gyro_bias,
+            gyro_bias: core.gyro_bias,
+            accel_bias: core.accel_bias,
+            covariance: transition.propagate_covariance(covariance),
+        }
+    }
+
+    /// Covariance of the attitude error as a rotation vector in body axes, rad².
+    pub fn attitude_covariance_in_body(&self) -> nalgebra::Matrix3<f64> {
+        let rotation = self.world_from_body.rotation.to_rotation_matrix().into_inner();
+        let world: SMatrix<f64, 3, 3> = self.covariance.fixed_view::<3, 3>(6, 6).into_owned();
+        rotation.transpose() * world * rotation
+    }
+}

@@ -1,0 +1,118 @@
+//! What an image does to the filter: alignment and update landmark by landmark, then landmark management.
+
+use super::frontend::corner_detector::DetectionCriteria;
+use super::frontend::image_frontend::ImageFrontend;
+use super::frontend::patch::Patch;
+use super::frontend::patch_alignment::{PatchAlignment, align_patch};
+use super::frontend::pyramid::Pyramid;
+use super::landmarks;
+use super::report::FrameReport;
+use super::settings::{PatchSettings, Settings};
+use super::state::landmark::{project, unproject};
+use super::stereo::stereo_camera::StereoCamera;
+use super::tracking_state::{LandmarkTrack, TrackingState};
+use crate::Camera;
+
+/// Inverse distance beyond which a landmark is too near to be tracked, 1/m.
+const MAX_INVERSE_DISTANCE: f64 = 20.0;
+
+/// Aligns the patches of all landmarks and updates with those that pass the gates. One after the other, not all at once: each
+/// alignment begins from what the landmarks before it have corrected.
+pub(crate) fn align_and_update(
+    tracking: &mut TrackingState,
+    pyramid: &Pyramid,
+    camera: &Camera,
+    settings: &Settings,
+    report: &mut FrameReport,
+) {
+    let TrackingState { estimator, tracks } = tracking;
+    let offset = estimator.state.time_offset;
+    for (slot, track) in tracks.iter_mut().enumerate() {
+        let time_offset_error = estimator.state.time_offset - offset;
+        track.in_view = true;
+        let alignment = track.patch.as_ref().map_or(PatchAlignment::OutOfView, |patch| {
+            align_patch(estimator, slot, time_offset_error, (patch, pyramid), camera, settings)
+        });
+        match alignment {
+            PatchAlignment::Converged(measurement) if estimator.update(&measurement) => {
+                report.used += 1;
+                track.failures = 0;
+            }
+            PatchAlignment::OutOfView => track.in_view = false,
+            _ => {
+                report.rejected += 1;
+                track.failures += 1;
+            }
+        }
+    }
+}
+
+/// Drops landmarks that left the view, failed too often or came too near.
+pub(crate) fn drop_landmarks(tracking: &mut TrackingState, settings: &Settings, report: &mut FrameReport) {
+    for slot in (0..tracking.tracks.len()).rev() {
+        let track = &tracking.tracks[slot];
+        let inverse_distance = tracking.estimator.state.landmarks[slot].inverse_distance.value;
+        let failed = track.failures >= settings.update.max_consecutive_failures;
+        if !track.in_view || failed || inverse_distance > MAX_INVERSE_DISTANCE {
+            tracking.remove(slot);
+            report.removed += 1;
+        }
+    }
+}
+
+/// Extracts templates anew where they are seen at another scale. What is tracked from then on is another point: the one that is
+/// seen exactly where the filter estimates the old one.
+pub(crate) fn update_templates(
+    tracking: &mut TrackingState,
+    pyramid: &Pyramid,
+    camera: &Camera,
+    settings: &PatchSettings,
+) {
+    let TrackingState { estimator, tracks } = tracking;
+    for (slot, track) in tracks.iter_mut().enumerate() {
+        if track.failures > 0 {
+            continue;
+        }
+        let landmark = estimator.state.landmarks[slot];
+        let Some((pixel, by_bearing)) = project(camera, &landmark.bearing) else { continue };
+        let area = (by_bearing * landmark.warp).determinant();
+        if (1.0 / settings.max_area_change..=settings.max_area_change).contains(&area) {
+            continue;
+        }
+        let (Some(patch), Some(warp)) = (Patch::extract(pyramid, &pixel), by_bearing.try_inverse()) else { continue };
+        if patch.shi_tomasi_score() < settings.min_score {
+            continue;
+        }
+        track.patch = Some(patch);
+        let covariance = warp * warp.transpose() * settings.pixel_sigma.powi(2);
+        landmarks::reset_bearing(estimator, slot, warp, &covariance);
+    }
+}
+
+/// Detects landmarks for the free slots; returns how many.
+pub(crate) fn detect_landmarks(
+    tracking: &mut TrackingState,
+    frontend: &mut ImageFrontend,
+    stereo: Option<&StereoCamera>,
+    camera: &Camera,
+    settings: &Settings,
+) -> usize {
+    let ImageFrontend { pyramid, detector, next_id } = frontend;
+    let TrackingState { estimator, tracks } = tracking;
+    let criteria = DetectionCriteria::from(&settings.patches);
+    let present = estimator.state.landmarks.iter().filter_map(|l| camera.project(&l.bearing.direction()));
+    detector.detect(pyramid, &present, &criteria);
+    let before = tracks.len();
+    while tracks.len() < settings.landmarks.max_count {
+        let Some((pixel, patch)) = detector.take_best(pyramid, &criteria) else { break };
+        let Some((bearing, warp)) = unproject(camera, &pixel) else { continue };
+        let covariance = warp * warp.transpose() * settings.patches.pixel_sigma.powi(2);
+        match stereo.and_then(|stereo| stereo.initial_distance(&patch, (&bearing, &warp), settings)) {
+            Some(measured) => landmarks::add_with_distance(estimator, bearing, warp, &covariance, measured),
+            None => landmarks::add(estimator, bearing, warp, &covariance),
+        }
+        tracks.push(LandmarkTrack::new(*next_id, Some(patch)));
+        *next_id += 1;
+    }
+    tracks.len() - before
+}

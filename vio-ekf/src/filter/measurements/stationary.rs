@@ -1,0 +1,71 @@
+//! The stationary body as a measurement: its mean rate is the gyroscope's bias, its mean force gravity and the accelerometer's.
+
+use nalgebra::{Matrix3, SMatrix, Vector3};
+
+use super::measurement::{Measurement, Trial};
+use super::update::ungated_update;
+use crate::core::iterated_update::Linearization;
+use crate::filter::estimator::Estimator;
+use crate::filter::settings::StationarySettings;
+use crate::filter::state::error_state;
+use crate::filter::stationary::detector::StationaryMean;
+
+/// The mean rate, of which all is bias.
+#[derive(Debug, Clone, Copy)]
+struct MeanRate {
+    rate: Vector3<f64>,
+    variance: f64,
+}
+
+impl Measurement<3, 3> for MeanRate {
+    fn rows(&self) -> [usize; 3] {
+        [error_state::GYRO_BIAS, error_state::GYRO_BIAS + 1, error_state::GYRO_BIAS + 2]
+    }
+
+    fn linearize(&self, trial: &Trial<'_, 3>) -> Option<Linearization<3, 3>> {
+        let residual = self.rate - trial.core().gyro_bias;
+        Some(Linearization { residual, jacobian: Matrix3::identity(), noise: Matrix3::identity() * self.variance })
+    }
+}
+
+/// The mean specific force, `Rᵀ(0, 0, g) + b_a`.
+#[derive(Debug, Clone, Copy)]
+struct MeanForce {
+    force: Vector3<f64>,
+    gravity: f64,
+    variance: f64,
+}
+
+impl Measurement<3, 6> for MeanForce {
+    fn rows(&self) -> [usize; 6] {
+        std::array::from_fn(|k| if k < 3 { error_state::ATTITUDE + k } else { error_state::ACCEL_BIAS + k - 3 })
+    }
+
+    fn linearize(&self, trial: &Trial<'_, 6>) -> Option<Linearization<3, 6>> {
+        let core = trial.core();
+        let up = Vector3::new(0.0, 0.0, self.gravity);
+        let body_from_world = core.attitude.inverse();
+        let mut jacobian = SMatrix::<f64, 3, 6>::zeros();
+        // d(Rᵀ a)/dθ = Rᵀ hat(a) for the world-side error.
+        let tilt = body_from_world.to_rotation_matrix().into_inner() * up.cross_matrix();
+        jacobian.fixed_columns_mut::<3>(0).copy_from(&tilt);
+        jacobian.fixed_columns_mut::<3>(3).fill_with_identity();
+        let residual = self.force - body_from_world * up - core.accel_bias;
+        Some(Linearization { residual, jacobian, noise: Matrix3::identity() * self.variance })
+    }
+}
+
+/// Updates biases and tilt with the means of a stationary body; a rotation by `angle` may be undetected over their time.
+pub(crate) fn stationary_update(
+    estimator: &mut Estimator,
+    mean: &StationaryMean,
+    angle: f64,
+    settings: &StationarySettings,
+) {
+    let white = |density: f64| density * density / mean.duration;
+    let variance = (angle / mean.duration).powi(2) + white(estimator.noise.gyro_density);
+    ungated_update(estimator, &MeanRate { rate: mean.rate, variance });
+    let variance = settings.force_sigma.powi(2) + white(estimator.noise.accel_density);
+    let gravity = estimator.gravity;
+    ungated_update(estimator, &MeanForce { force: mean.force, gravity, variance });
+}

@@ -1,0 +1,35 @@
+//! How well the camera's calibration is known.
+
+use crate::Error;
+use crate::error::{all_not_negative, invalid};
+
+/// Uncertainty of the calibration. A zero means known exactly: the quantity is then not estimated.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct CalibrationSettings {
+    /// Standard deviation of the camera's position on the body, m per axis; ours: 0.
+    pub camera_position_sigma_m: f64,
+    /// Standard deviation of the camera's attitude on the body, rad per axis; ours: 0.
+    pub camera_attitude_sigma: f64,
+    /// Seconds to add to the camera's stamps to get the inertial sensor's time (`timeshift_cam_imu` of Kalibr); 0.
+    pub time_offset_s: f64,
+    /// Its standard deviation, s; ours: 0.
+    pub time_offset_sigma_s: f64,
+    /// Standard deviation of the stamp of each image, s; ours: 0. With it every image has an offset of its own, found with the
+    /// landmarks that it sees, and the mean offset is taken as known.
+    pub stamp_jitter_s: f64,
+}
+
+impl CalibrationSettings {
+    pub(super) fn check(&self) -> Result<(), Error> {
+        if self.time_offset_s.is_nan() || self.time_offset_s.abs() > 10.0 {
+            return Err(invalid("time_offset_s", self.time_offset_s, "must be below 10 s"));
+        }
+        all_not_negative(&[
+            ("camera_position_sigma_m", self.camera_position_sigma_m),
+            ("camera_attitude_sigma", self.camera_attitude_sigma),
+            ("time_offset_sigma_s", self.time_offset_sigma_s),
+            ("stamp_jitter_s", self.stamp_jitter_s),
+        ])
+    }
+}

@@ -1,0 +1,56 @@
+//! The nominal state.
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2, Vector3};
+
+use super::error_state;
+use super::inverse_distance::InverseDistance;
+use super::landmark::Landmark;
+use crate::core::core_state::{CoreState, block, rotated};
+
+/// The state of the odometry: core, calibration of the camera, landmarks in the camera's axes (Bloesch et al. 2017).
+#[derive(Debug, Clone, PartialEq)]
+pub struct VioState {
+    /// Pose, velocity and biases of the body.
+    pub(crate) core: CoreState,
+    /// Position of the camera on the body.
+    pub(crate) camera_position: Vector3<f64>,
+    /// Attitude of the camera, `body_from_camera`.
+    pub(crate) camera_attitude: UnitQuaternion<f64>,
+    /// Seconds to add to a camera's stamp to get the inertial sensor's time.
+    pub(crate) time_offset: f64,
+    /// The shared depth prior, 1/m: the inverse distance of a new landmark is this plus an error of its own, so that all landmarks
+    /// together know no more of the scale than the prior does.
+    pub(crate) depth_prior: InverseDistance,
+    pub(crate) landmarks: Vec<Landmark>,
+}
+
+impl VioState {
+    /// Pose, velocity and biases of the body.
+    pub fn core(&self) -> &CoreState {
+        &self.core
+    }
+
+    /// Pose of the camera on the body.
+    pub fn body_from_camera(&self) -> Isometry3<f64> {
+        Isometry3::from_parts(Translation3::from(self.camera_position), self.camera_attitude)
+    }
+
+    /// Seconds to add to the camera's stamps to get the inertial sensor's time.
+    pub fn time_offset_s(&self) -> f64 {
+        self.time_offset
+    }
+
+    /// `x ← x ⊞ δ`.
+    pub(crate) fn correct(&mut self, delta: &[f64]) {
+        self.core = self.core.corrected(delta);
+        self.camera_position += block(delta, error_state::CAMERA_POSITION);
+        self.camera_attitude = rotated(&block(delta, error_state::CAMERA_ATTITUDE), &self.camera_attitude);
+        self.time_offset += delta[error_state::TIME_OFFSET];
+        self.depth_prior.correct(delta[error_state::DEPTH_PRIOR]);
+        let landmark_errors = delta[error_state::FIRST_LANDMARK..].chunks_exact(error_state::LANDMARK_SIZE);
+        for (landmark, d) in self.landmarks.iter_mut().zip(landmark_errors) {
+            landmark.bearing = landmark.bearing.boxplus(&Vector2::new(d[0], d[1]));
+            landmark.inverse_distance.correct(d[2]);
+        }
+    }
+}

@@ -1,0 +1,8 @@
+//! Depth from a second camera.
+
+pub(crate) mod epipolar_search;
+pub(crate) mod rig;
+pub(crate) mod stereo_camera;
+pub(crate) mod stereo_points;
+#[cfg(test)]
+mod tests;

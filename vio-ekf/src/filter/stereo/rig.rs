@@ -1,0 +1,38 @@
+//! The second camera, fixed beside the first.
+
+use nalgebra::{Matrix2, Vector2};
+
+use crate::Camera;
+use crate::filter::propagation::camera_motion::CameraMotion;
+use crate::filter::state::landmark::{Landmark, project};
+
+/// The second camera and its extrinsics, which are taken as known.
+#[derive(Debug, Clone)]
+pub(crate) struct StereoRig {
+    pub(crate) camera: Camera,
+    /// As if the first camera had moved to the second one's pose.
+    second_from_first: CameraMotion,
+}
+
+/// Where the second camera sees a landmark.
+pub(crate) struct StereoProjection {
+    pub(crate) pixel: Vector2<f64>,
+    /// Pixels of the image per pixel of the patch.
+    pub(crate) warp: Matrix2<f64>,
+    /// Derivative of the pixel by the inverse distance: along the epipolar line.
+    pub(crate) by_inverse_distance: Vector2<f64>,
+}
+
+impl StereoRig {
+    pub(crate) fn new(first: &Camera, camera: Camera) -> Self {
+        Self { camera, second_from_first: CameraMotion::between(first, &camera) }
+    }
+
+    /// Projects a landmark of the first camera into the second image.
+    pub(crate) fn project(&self, landmark: &Landmark) -> Option<StereoProjection> {
+        let (seen, transition) = self.second_from_first.transform(landmark)?;
+        let (pixel, by_bearing) = project(&self.camera, &seen.bearing)?;
+        let by_inverse_distance = by_bearing * transition.by_itself.fixed_view::<2, 1>(0, 2);
+        Some(StereoProjection { pixel, warp: by_bearing * seen.warp, by_inverse_distance })
+    }
+}

@@ -1,0 +1,76 @@
+//! A filter that has been initialised: the estimator, and what is remembered of each landmark besides its state.
+
+use super::estimator::Estimator;
+use super::frontend::patch::Patch;
+use super::landmarks;
+use super::settings::PatchSettings;
+use crate::{Camera, Imu, Stamp};
+
+/// What is remembered of a landmark besides its state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LandmarkTrack {
+    pub(crate) id: u64,
+    /// Failures in a row.
+    pub(crate) failures: u32,
+    /// Whether the current image, or set of points, sees it.
+    pub(crate) in_view: bool,
+    /// Its template; none for a point of the caller's own.
+    pub(crate) patch: Option<Patch>,
+}
+
+impl LandmarkTrack {
+    pub(crate) fn new(id: u64, patch: Option<Patch>) -> Self {
+        Self { id, failures: 0, in_view: true, patch }
+    }
+}
+
+/// Estimator and tracks; a track has the index of its landmark's slot.
+#[derive(Debug, Clone)]
+pub(crate) struct TrackingState {
+    pub(crate) estimator: Estimator,
+    pub(crate) tracks: Vec<LandmarkTrack>,
+}
+
+impl TrackingState {
+    pub(crate) fn new(estimator: Estimator, max_count: usize) -> Self {
+        Self { estimator, tracks: Vec::with_capacity(max_count) }
+    }
+
+    /// Takes an inertial sample.
+    pub(crate) fn imu(&mut self, sample: &Imu) {
+        let Self { estimator, tracks } = self;
+        if estimator.buffer.is_full() {
+            estimator.free_buffer(|slot| {
+                tracks.swap_remove(slot);
+            });
+        }
+        estimator.imu(*sample);
+    }
+
+    /// Propagates to a later time; returns how many landmarks were lost on the way.
+    pub(crate) fn propagate_to(&mut self, until: Stamp) -> usize {
+        let Self { estimator, tracks } = self;
+        let before = tracks.len();
+        estimator.propagate_to(until, |slot| {
+            tracks.swap_remove(slot);
+        });
+        before - tracks.len()
+    }
+
+    /// Process noise of the templates over some seconds.
+    pub(crate) fn drift_templates(&mut self, camera: &Camera, settings: &PatchSettings, elapsed: f64) {
+        let drift = settings.template_drift / camera.fx.min(camera.fy);
+        self.estimator.inflate_bearings(drift * drift * elapsed);
+    }
+
+    /// Drops a landmark; the last one takes its slot.
+    pub(crate) fn remove(&mut self, slot: usize) {
+        self.tracks.swap_remove(slot);
+        landmarks::remove(&mut self.estimator, slot);
+    }
+
+    /// Slot of a landmark.
+    pub(crate) fn slot_of(&self, id: u64) -> Option<usize> {
+        self.tracks.iter().position(|track| track.id == id)
+    }
+}

@@ -1,0 +1,505 @@
+//! The odometry as its callers see it, and one image as the steps of the algorithm.
+
+use nalgebra::Vector2;
+
+use super::divergence_monitor::DivergenceMonitor;
+use super::estimator::Estimator;
+use super::frontend::corner_detector::DetectionCriteria;
+use super::frontend::image_frontend::ImageFrontend;
+use super::frontend::klt_tracker::KltTracker;
+use super::frontend::patch::Patch;
+use super::image_tracking::{align_and_update, detect_landmarks, drop_landmarks, update_templates};
+use super::initialization::dynamic::result::InitialMotion;
+use super::initialization::dynamic_initializer::DynamicInitializer;
+use super::initialization::from_initialization::from_initialization;
+use super::initialization::static_initializer;
+use super::measurements::measurement::Measurement;
+use super::measurements::pose::BodyPose;
+use super::measurements::stationary::stationary_update;
+use super::measurements::update::gated_update;
+use super::point_observation::{PointObservation, PointPair};
+use super::point_tracking::{add_points, drop_points, update_with_points};
+use super::report::{Calibration, FrameReport, InitializationStatus, Status};
+use super::settings::Settings;
+use super::state::error_state;
+use super::stationary::detector::StationaryDetector;
+use super::stationary::zero_velocity::{inflate_undetected_motion, zero_velocity_propagate};
+use super::stereo::stereo_camera::StereoCamera;
+use super::stereo::stereo_points::{check_pairs, update_with_second_points};
+use super::tracking_state::TrackingState;
+use crate::core::initial_state::InitialState;
+use crate::core::odometry::Odometry;
+use crate::{Camera, Error, ImageView, Imu, ImuNoise, Stamp};
+
+/// A measurement this much ahead of the inertial samples, in seconds, is waiting for data that does not come.
+const MAX_AHEAD: f64 = 0.1;
+
+/// A camera, maybe a second one beside it, and an inertial sensor.
+///
+/// Feed samples and images as they come; an image may arrive up to [`ImuSettings::buffer_samples`](crate::ImuSettings::buffer_samples)
+/// samples late and is used at its own time, with the same result to the last bit. The filter initialises itself, at rest or in
+/// motion, or from a state that is given.
+///
+/// ```
+/// use vio_ekf::nalgebra::{Isometry3, Vector3};
+/// use vio_ekf::{Camera, ImageView, Imu, ImuNoise, InitialSigma, InitialState, Settings, Stamp, Status, Vio};
+///
+/// let mut vio = Vio::new(Camera::euroc(), ImuNoise::default(), Settings::default())?;
+/// let at = |millis: i64| Stamp::from_nanos(millis * 1_000_000);
+/// let imu = |millis| Imu { stamp: at(millis), gyro: Vector3::zeros(), accel: Vector3::new(0.0, 0.0, 9.81) };
+/// vio.imu(&imu(0))?;
+/// vio.initialize(&InitialState {
+///     stamp: at(0),
+///     world_from_body: Isometry3::identity(),
+///     velocity_in_body: Vector3::zeros(),
+///     gyro_bias: Vector3::zeros(),
+///     accel_bias: Vector3::zeros(),
+///     sigma: InitialSigma::default(),
+/// })?;
+/// let picture: Vec<u8> = (0..752 * 480).map(|k| if (k % 752 / 40 + k / 752 / 40) % 2 == 0 { 60 } else { 180 }).collect();
+/// for k in 1..=20 {
+///     vio.imu(&imu(5 * k))?;
+///     if k % 10 == 0 {
+///         let report = vio.image(at(5 * k), &ImageView::new(752, 480, &picture)?)?;
+///         assert_eq!(report.status, Status::Tracking);
+///     }
+/// }
+/// let odometry = vio.output().expect("it has been initialised");
+/// assert!(odometry.world_from_body.translation.vector.norm() < 0.01);
+/// # Ok::<(), vio_ekf::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Vio {
+    camera: Camera,
+    noise: ImuNoise,
+    settings: Settings,
+    last_sample: Option<Imu>,
+    /// None before the initialization.
+    tracking: Option<TrackingState>,
+    frontend: ImageFrontend,
+    /// The second camera.
+    stereo: Option<StereoCamera>,
+    stationary: StationaryDetector,
+    /// Whether the last image was taken at rest.
+    was_stationary: bool,
+    dynamic_initializer: DynamicInitializer,
+    klt_tracker: KltTracker,
+    initialization: InitializationStatus,
+    divergence: DivergenceMonitor,
+}
+
+impl Vio {
+    /// Refuses a camera, noise or settings that cannot be.
+    pub fn new(camera: Camera, noise: ImuNoise, settings: Settings) -> Result<Self, Error> {
+        camera.check()?;
+        noise.check()?;
+        settings.check()?;
+        Ok(Self {
+            camera,
+            noise,
+            settings,
+            last_sample: None,
+            tracking: None,
+            frontend: ImageFrontend::new(&camera, &settings.patches),
+            stereo: None,
+            stationary: StationaryDetector::new(settings.stationary),
+            was_stationary: false,
+            dynamic_initializer: DynamicInitializer::new(settings.dynamic_initialization),
+            klt_tracker: KltTracker::default(),
+            initialization: InitializationStatus::WaitingForSteadyImu,
+            divergence: DivergenceMonitor::default(),
+        })
+    }
+
+    /// With a second camera fixed beside the first, whose images measure the distances of landmarks: [`image_pair`](Self::image_pair).
+    ///
+    /// The pose of one camera against the other is taken as known; [`StereoSettings::pixel_sigma`](crate::StereoSettings::pixel_sigma)
+    /// covers what is wrong with it. The pose that [`CalibrationSettings`](crate::CalibrationSettings) lets the filter estimate is that
+    /// of the first camera on the body.
+    pub fn stereo(first: Camera, second: Camera, noise: ImuNoise, settings: Settings) -> Result<Self, Error> {
+        let mono = Self::new(first, noise, settings)?;
+        let stereo = StereoCamera::new(&first, second, &settings.patches)?;
+        Ok(Self { stereo: Some(stereo), ..mono })
+    }
+
+    /// Initialises, or initialises again, from a given state. There must be an inertial sample, and the state must not be before it.
+    pub fn initialize(&mut self, initial: &InitialState) -> Result<(), Error> {
+        let Some(sample) = self.last_sample else {
+            return Err(Error::TooFew { what: "inertial samples before the initialization", got: 0, need: 1 });
+        };
+        initial.check(sample.stamp)?;
+        self.reset();
+        let estimator = Estimator::new(&self.camera, self.noise, &self.settings, initial, sample);
+        self.tracking = Some(TrackingState::new(estimator, self.settings.landmarks.max_count));
+        Ok(())
+    }
+
+    /// Drops the estimate. The filter tries to initialise itself from here on.
+    pub fn reset(&mut self) {
+        self.tracking = None;
+        self.divergence = DivergenceMonitor::default();
+        self.dynamic_initializer = DynamicInitializer::new(self.settings.dynamic_initialization);
+        self.klt_tracker = KltTracker::default();
+    }
+
+    /// Takes an inertial sample; stamps must increase.
+    pub fn imu(&mut self, sample: &Imu) -> Result<Status, Error> {
+        sample.check_after(self.last_sample.as_ref())?;
+        self.last_sample = Some(*sample);
+        self.stationary.imu(sample);
+        match &mut self.tracking {
+            Some(tracking) => tracking.imu(sample),
+            None => self.dynamic_initializer.imu(sample),
+        }
+        Ok(self.status())
+    }
+
+    /// Takes an image of the camera.
+    ///
+    /// `stamp` is the middle of the exposure by the camera's clock. The image must be of the camera's size.
+    pub fn image(&mut self, stamp: Stamp, image: &ImageView) -> Result<FrameReport, Error> {
+        let image = image.checked(&self.camera)?;
+        if let Some(stereo) = &mut self.stereo {
+            stereo.set_image(None);
+        }
+        self.process_image(stamp, &image)
+    }
+
+    /// Takes the images that both cameras took at the same moment. Where one of a pair is lost, that of the first camera may be
+    /// given to [`image`](Self::image) alone.
+    ///
+    /// `stamp` is the middle of the exposure by the cameras' clock. Both images must be of their camera's size; a filter that was not
+    /// made by [`stereo`](Self::stereo) refuses them.
+    pub fn image_pair(&mut self, stamp: Stamp, first: &ImageView, second: &ImageView) -> Result<FrameReport, Error> {
+        let first = first.checked(&self.camera)?;
+        let stereo = self.stereo.as_mut().ok_or(NO_SECOND_CAMERA)?;
+        stereo.set_image(Some(&second.checked(&stereo.rig.camera)?));
+        self.process_image(stamp, &first)
+    }
+
+    /// The filter's algorithm for one image.
+    fn process_image(&mut self, stamp: Stamp, image: &ImageView) -> Result<FrameReport, Error> {
+        self.frontend.set_image(image);
+        let now = self.now_or(stamp);
+        if self.stationary.is_imu_stationary(now) {
+            self.stationary.image(&mut self.frontend, &self.settings.patches);
+        }
+        if self.tracking.is_none() {
+            return self.initialize_with_image(stamp);
+        }
+        let stationary = self.stationary.is_stationary(now);
+        let mut report = FrameReport { stationary, ..self.empty_report() };
+        let before = self.state_stamp();
+
+        // Preintegrate and propagate, without motion if the body is stationary.
+        let Some(lost) = self.propagate_to_image(stamp, stationary)? else { return Ok(report) };
+        report.removed = lost;
+        let elapsed = before.zip(self.state_stamp()).map_or(0.0, |(before, now)| now.secs_since(before));
+
+        let Self { tracking: Some(tracking), frontend, stereo, camera, settings, .. } = self else {
+            return Ok(report);
+        };
+        if !stationary {
+            tracking.drift_templates(camera, &settings.patches, elapsed);
+            // Align patches and update, landmark by landmark.
+            align_and_update(tracking, &frontend.pyramid, camera, settings, &mut report);
+            // Manage landmarks.
+            drop_landmarks(tracking, settings, &mut report);
+            update_templates(tracking, &frontend.pyramid, camera, &settings.patches);
+            if let Some(stereo) = stereo {
+                stereo.update_distances(&mut tracking.estimator, &frontend.pyramid, camera, settings);
+            }
+        }
+        let enough = settings.patches.start_detection_ratio * settings.landmarks.max_count as f64;
+        if (tracking.tracks.len() as f64) < enough {
+            report.added = detect_landmarks(tracking, frontend, stereo.as_ref(), camera, settings);
+        }
+        Ok(self.check_divergence(report))
+    }
+
+    /// Takes the points that a tracker of the caller found in an image.
+    ///
+    /// `stamp` is the middle of the exposure by the camera's clock. Each point carries independent noise of
+    /// [`LandmarkSettings::pixel_sigma`](crate::LandmarkSettings::pixel_sigma). Landmarks that are not among the points are
+    /// dropped; points that are new take their place while there is room, in the order given.
+    pub fn points(&mut self, stamp: Stamp, points: &[PointObservation]) -> Result<FrameReport, Error> {
+        if let Some(index) = points.iter().position(|p| p.pixel.iter().any(|v| !v.is_finite())) {
+            return Err(Error::NonFinite { what: "point", index });
+        }
+        let now = self.now_or(stamp);
+        self.stationary.points(now, points, self.settings.landmarks.pixel_sigma);
+        if self.tracking.is_none() {
+            return self.initialize_with_points(stamp, points);
+        }
+        let stationary = self.stationary.is_stationary(now);
+        let mut report = FrameReport { stationary, ..self.empty_report() };
+        let Some(lost) = self.propagate_to_image(stamp, stationary)? else { return Ok(report) };
+        report.removed = lost;
+        if let Self { tracking: Some(tracking), camera, settings, .. } = self {
+            update_with_points(tracking, points, camera, settings, &mut report);
+            drop_points(tracking, settings, &mut report);
+            report.added = add_points(tracking, points, camera, settings);
+        }
+        Ok(self.check_divergence(report))
+    }
+
+    /// As [`points`](Self::points) with a second camera: the filter must have been made by [`stereo`](Self::stereo). All pixels of
+    /// both images carry independent noise.
+    pub fn point_pairs(&mut self, stamp: Stamp, pairs: &[PointPair]) -> Result<FrameReport, Error> {
+        check_pairs(pairs)?;
+        let stereo = self.stereo.as_mut().ok_or(NO_SECOND_CAMERA)?;
+        // Taken out and put back, so that its memory is claimed once.
+        let mut first = std::mem::take(&mut stereo.points);
+        first.clear();
+        first.extend(pairs.iter().map(|pair| pair.first));
+        let report = self.points(stamp, &first);
+        let Self { stereo: Some(stereo), tracking, settings, .. } = self else { return report };
+        stereo.points = first;
+        let report = report?;
+        if let Some(tracking) = tracking {
+            update_with_second_points(tracking, (stamp, pairs), &stereo.rig, settings, &report);
+        }
+        Ok(report)
+    }
+
+    /// Takes a pose of the body in the filter's world that somebody else has measured; see [`update`](Self::update) for its time and
+    /// for what is returned.
+    ///
+    /// The errors of successive poses are taken as independent. For errors that last for a time τ, of poses dt apart, divide
+    /// the information by `2 τ / dt`.
+    pub fn pose(&mut self, pose: &BodyPose) -> Result<bool, Error> {
+        self.update(pose.stamp, &pose.measurement()?)
+    }
+
+    /// Takes a measurement of any other sensor: a position fix, a barometer, a range, a wheel.
+    ///
+    /// Its time is by the inertial sensor's clock, not before that of the last image or measurement; a measurement and an image of
+    /// the same time must come in the order image, measurement. [`UnifiedVio`](crate::UnifiedVio) sees to the order of images and
+    /// poses. Returns whether it was used: it is not before the initialization, nor if its gate refuses it.
+    pub fn update<const M: usize, const C: usize>(
+        &mut self,
+        stamp: Stamp,
+        measurement: &impl Measurement<M, C>,
+    ) -> Result<bool, Error> {
+        let Some(tracking) = &mut self.tracking else { return Ok(false) };
+        let (rows, count) = (measurement.rows(), tracking.estimator.covariance.size());
+        if let Some(&row) = rows.iter().find(|row| **row >= count) {
+            return Err(Error::NoSuch { what: "row of the error state", index: row, count });
+        }
+        check_time(&tracking.estimator, stamp, measurement.name())?;
+        let before = tracking.estimator.buffer.state_stamp();
+        if stamp > before {
+            if self.was_stationary && self.stationary.is_stationary(tracking.estimator.buffer.now()) {
+                zero_velocity_propagate(&mut tracking.estimator, stamp, &self.settings.stationary);
+            } else {
+                tracking.propagate_to(stamp);
+            }
+            // The drift of templates since the last image is counted from here on at the next one.
+            if tracking.tracks.iter().any(|track| track.patch.is_some()) {
+                let elapsed = tracking.estimator.buffer.state_stamp().secs_since(before);
+                tracking.drift_templates(&self.camera, &self.settings.patches, elapsed);
+            }
+        }
+        let used = gated_update(&mut tracking.estimator, measurement);
+        self.divergence.check_state(&tracking.estimator, &self.settings.divergence);
+        tracking.estimator.update_prediction();
+        Ok(used)
+    }
+
+    /// Whether the estimate can be used.
+    pub fn status(&self) -> Status {
+        match (&self.tracking, self.divergence.cause()) {
+            (None, _) => Status::Uninitialised(self.initialization),
+            (Some(_), Some(cause)) => Status::Diverged(cause),
+            (Some(_), None) => Status::Tracking,
+        }
+    }
+
+    /// The estimate at the time of the latest sample; `None` before the initialization.
+    pub fn output(&self) -> Option<Odometry> {
+        self.tracking.as_ref().map(|tracking| tracking.estimator.odometry())
+    }
+
+    /// The camera's calibration at the last image; `None` before the initialization.
+    pub fn calibration(&self) -> Option<Calibration> {
+        self.tracking.as_ref().map(|TrackingState { estimator, .. }| Calibration {
+            body_from_camera: estimator.state.body_from_camera(),
+            time_offset_s: estimator.state.time_offset,
+            covariance: estimator.covariance.block(error_state::CAMERA_POSITION, error_state::CAMERA_POSITION),
+        })
+    }
+
+    /// The camera as it was given.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// Propagates to the time of an image. `None` if the filter was initialised after the image; otherwise the number of landmarks
+    /// lost on the way.
+    fn propagate_to_image(&mut self, stamp: Stamp, stationary: bool) -> Result<Option<usize>, Error> {
+        let Some(tracking) = &mut self.tracking else { return Ok(None) };
+        let calibration = &self.settings.calibration;
+        if calibration.stamp_jitter_s > 0.0 {
+            tracking.estimator.reset_time_offset(calibration.time_offset_s, calibration.stamp_jitter_s);
+        }
+        let time = stamp.plus_secs(tracking.estimator.state.time_offset);
+        let state_stamp = tracking.estimator.buffer.state_stamp();
+        if time <= state_stamp && tracking.estimator.buffer.is_at_start() {
+            return Ok(None);
+        }
+        if time <= state_stamp {
+            return Err(Error::Late { what: "image", stamp: time, now: state_stamp });
+        }
+        check_time(&tracking.estimator, time, "image")?;
+        let was_stationary = std::mem::replace(&mut self.was_stationary, stationary);
+        if !stationary {
+            return Ok(Some(tracking.propagate_to(time)));
+        }
+        let settings = &self.settings.stationary;
+        let angle = self.stationary.undetected_angle(&self.camera);
+        zero_velocity_propagate(&mut tracking.estimator, time, settings);
+        if !was_stationary {
+            inflate_undetected_motion(&mut tracking.estimator, angle);
+        }
+        if let Some(mean) = self.stationary.take_certain_mean(time) {
+            stationary_update(&mut tracking.estimator, &mean, angle, settings);
+        }
+        Ok(Some(0))
+    }
+
+    /// The end of every image: the divergence test, and the prediction from the image until now.
+    fn check_divergence(&mut self, mut report: FrameReport) -> FrameReport {
+        if let Some(tracking) = &mut self.tracking {
+            let wrong = self.divergence.check_image(&tracking.estimator, &self.settings.divergence, &report);
+            tracking.estimator.update_prediction();
+            if wrong {
+                self.reset();
+            }
+        }
+        report.status = self.status();
+        report
+    }
+
+    /// Tries to initialise, at rest or in motion, when an image has been set.
+    fn initialize_with_image(&mut self, stamp: Stamp) -> Result<FrameReport, Error> {
+        self.initialize_at_rest()?;
+        if self.tracking.is_none() && self.settings.dynamic_initialization.enabled {
+            self.track_before_initialization(stamp);
+        }
+        let Self { tracking: Some(tracking), frontend, stereo, camera, settings, .. } = self else {
+            return Ok(self.empty_report());
+        };
+        // The image that the initialization was made with has the first landmarks.
+        let added = detect_landmarks(tracking, frontend, stereo.as_ref(), camera, settings);
+        let report = FrameReport { added, ..self.empty_report() };
+        Ok(self.check_divergence(report))
+    }
+
+    /// The same with points.
+    fn initialize_with_points(&mut self, stamp: Stamp, points: &[PointObservation]) -> Result<FrameReport, Error> {
+        self.initialize_at_rest()?;
+        if let Self { tracking: Some(tracking), camera, settings, .. } = self {
+            let added = add_points(tracking, points, camera, settings);
+            let report = FrameReport { added, ..self.empty_report() };
+            return Ok(self.check_divergence(report));
+        }
+        if self.settings.dynamic_initialization.enabled {
+            let (time, camera) = (self.unsynchronized_time(stamp), self.camera);
+            let observed = points.iter().filter_map(|p| Some((p.id, camera.bearing(&p.pixel)?.into_inner())));
+            if let Some(motion) = self.dynamic_initializer.image(time, observed, &camera, self.settings.gravity) {
+                let pixel = |id| points.iter().find(|p| p.id == id).map(|p| (p.pixel, None));
+                self.initialize_in_motion(time, &motion, pixel);
+            }
+        }
+        let added = self.tracking.as_ref().map_or(0, |tracking| tracking.tracks.len());
+        Ok(FrameReport { added, ..self.empty_report() })
+    }
+
+    /// Initialises from the means of a stationary period.
+    fn initialize_at_rest(&mut self) -> Result<(), Error> {
+        let Some(sample) = self.last_sample else { return Ok(()) };
+        self.initialization = static_initializer::status(&self.stationary, sample.stamp, &self.settings);
+        if self.initialization != InitializationStatus::WaitingForStationaryImages {
+            return Ok(());
+        }
+        let found = static_initializer::initial_state(&mut self.stationary, sample.stamp, &self.settings);
+        let Some((initial, mean)) = found else { return Ok(()) };
+        self.initialize(&initial)?;
+        let angle = self.stationary.undetected_angle(&self.camera);
+        if let Some(tracking) = &mut self.tracking {
+            stationary_update(&mut tracking.estimator, &mean, angle, &self.settings.stationary);
+        }
+        Ok(())
+    }
+
+    /// Tracks points into the current image, and initialises if they tell the motion.
+    fn track_before_initialization(&mut self, stamp: Stamp) {
+        let time = self.unsynchronized_time(stamp);
+        let ImageFrontend { pyramid, detector, .. } = &mut self.frontend;
+        let rotation = self.dynamic_initializer.rotation_since_image(time);
+        let criteria = DetectionCriteria::from(&self.settings.patches);
+        self.klt_tracker.track(rotation, pyramid, (detector, &criteria), &self.camera);
+        let observed = self.klt_tracker.observations();
+        let motion = self.dynamic_initializer.image(time, observed, &self.camera, self.settings.gravity);
+        if let Some(motion) = motion {
+            // The reset of the initialization would clear it.
+            let tracker = std::mem::take(&mut self.klt_tracker);
+            let pyramid = self.frontend.pyramid.clone();
+            self.initialize_in_motion(time, &motion, |id| {
+                let pixel = tracker.pixel(id)?;
+                Some((pixel, Some(Patch::extract(&pyramid, &pixel)?)))
+            });
+        }
+    }
+
+    /// Initialises from the motion at the time of an image. `observe` gives the pixel of a point, by its id, in that image, and its
+    /// patch.
+    fn initialize_in_motion(
+        &mut self,
+        time: Stamp,
+        motion: &InitialMotion,
+        observe: impl FnMut(u64) -> Option<(Vector2<f64>, Option<Patch>)>,
+    ) {
+        let samples: Vec<Imu> = self.dynamic_initializer.samples().copied().collect();
+        let sensors = (&self.camera, self.noise, &self.settings);
+        let Some(tracking) = from_initialization(sensors, time, motion, &samples, observe) else { return };
+        self.reset();
+        let ids = tracking.tracks.iter().map(|track| track.id + 1);
+        self.frontend.next_id = ids.fold(self.frontend.next_id, u64::max);
+        let probation = time.plus_secs(self.settings.dynamic_initialization.probation_s);
+        self.divergence = DivergenceMonitor::on_probation(probation);
+        self.tracking = Some(tracking);
+    }
+
+    /// Time of the latest sample; before the first that of an image.
+    fn now_or(&self, stamp: Stamp) -> Stamp {
+        self.last_sample.map_or(stamp, |sample| sample.stamp)
+    }
+
+    /// Time of an image by the inertial sensor's clock, as far as that is known before the initialization.
+    fn unsynchronized_time(&self, stamp: Stamp) -> Stamp {
+        stamp.plus_secs(self.settings.calibration.time_offset_s)
+    }
+
+    fn state_stamp(&self) -> Option<Stamp> {
+        self.tracking.as_ref().map(|tracking| tracking.estimator.buffer.state_stamp())
+    }
+
+    fn empty_report(&self) -> FrameReport {
+        FrameReport::empty(self.status())
+    }
+}
+
+const NO_SECOND_CAMERA: Error = Error::NoSuch { what: "camera", index: 1, count: 1 };
+
+/// Refuses times before that of the state, or far ahead of the samples.
+fn check_time(estimator: &Estimator, stamp: Stamp, what: &'static str) -> Result<(), Error> {
+    let state_stamp = estimator.buffer.state_stamp();
+    if stamp < state_stamp {
+        return Err(Error::Late { what, stamp, now: state_stamp });
+    }
+    if stamp.secs_since(estimator.buffer.latest().stamp) > MAX_AHEAD {
+        return Err(Error::OutOfRange { stamp, first: state_stamp, last: estimator.buffer.now() });
+    }
+    Ok(())
+}
