@@ -13,10 +13,13 @@ use tsdf_hash::{
 
 const TURN: usize = 60;
 
+/// A measurement on some frames.
+type Part = fn(&[RgbdFrame]) -> Result<(), Error>;
+
 fn main() -> Result<(), Error> {
     let wanted = std::env::args().skip(1).find(|word| !word.starts_with('-')).unwrap_or_default();
     let shots: Vec<RgbdFrame> = (0..TURN).map(|k| RgbdFrame::take(k, TURN).painted()).collect();
-    let parts: [(&str, fn(&[RgbdFrame]) -> Result<(), Error>); 5] =
+    let parts: [(&str, Part); 5] =
         [("mesh", meshes), ("field", distance_field), ("views", views), ("queries", queries), ("budget", budget)];
     for (name, part) in parts.into_iter().filter(|(name, _)| name.contains(&wanted)) {
         println!("{name}");
