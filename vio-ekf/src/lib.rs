@@ -1,5 +1,8 @@
-//! Visual-inertial odometry: a camera, or a pair, and an inertial sensor in an iterated Kalman filter that is honest about
-//! what it does not know; trajectories, their file formats and their evaluation.
+//! Visual-inertial odometry: a camera, or a pair, and an inertial sensor in an iterated Kalman filter; trajectories, their file
+//! formats and their evaluation.
+//!
+//! The filter is not consistent in every case: its first seconds are overconfident before a scene much farther away than
+//! expected, and conservative elsewhere. `docs/src/results.md` has the NEES of each sequence, and tests keep it there.
 //!
 //! [`Vio`] takes inertial samples and grey images, and gives pose, velocity and covariance at the rate of the samples. It
 //! compares patches of the image directly, keeps landmarks as bearing and inverse distance in the camera's axes, and never
