@@ -13,10 +13,13 @@ use tsdf_hash::{
 
 const TURN: usize = 60;
 
+/// A measurement on some frames.
+type Part = fn(&[RgbdFrame]) -> Result<(), Error>;
+
 fn main() -> Result<(), Error> {
     let wanted = std::env::args().skip(1).find(|word| !word.starts_with('-')).unwrap_or_default();
     let shots: Vec<RgbdFrame> = (0..TURN).map(|k| RgbdFrame::take(k, TURN).painted()).collect();
-    let parts: [(&str, fn(&[RgbdFrame]) -> Result<(), Error>); 5] =
+    let parts: [(&str, Part); 5] =
         [("mesh", meshes), ("field", distance_field), ("views", views), ("queries", queries), ("budget", budget)];
     for (name, part) in parts.into_iter().filter(|(name, _)| name.contains(&wanted)) {
         println!("{name}");
@@ -94,7 +97,7 @@ fn distance_field(shots: &[RgbdFrame]) -> Result<(), Error> {
     let mut fresh = DistanceField::new(&settings)?;
     println!("  from scratch {:.1} ms", timed(|| fresh.update(&map))?.1);
     println!("  {} sites in {} blocks", field.sites().count(), map.blocks());
-    let mut rng = Rng(1);
+    let mut rng = Rng::new(1);
     let mut next = || Point3::new(rng.between(-3.0, 3.0), rng.between(-2.0, 2.0), rng.between(0.0, 3.0));
     let points: Vec<_> = (0..20_000).map(|_| next()).collect();
     for (low, high) in [(0.0, 0.1), (0.1, 0.3), (0.3, 0.6), (0.6, 1.0), (1.0, 2.0)] {

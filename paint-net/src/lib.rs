@@ -86,3 +86,8 @@ pub use problem::{Limits, PaintProblem};
 pub fn paint(wanted: &Image) -> Result<Painting, Error> {
     Feedback::shipped()?.paint(&PaintProblem::new(wanted))
 }
+
+/// The examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

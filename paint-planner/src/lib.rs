@@ -13,7 +13,7 @@
 //!
 //! ```
 //! use paint_planner::nalgebra::{Point3, UnitVector3, Vector3};
-//! use paint_planner::{Hit, NozzleState, OptimalPlanner, Planner, Settings, Surface, Target, Tool, VehicleState};
+//! use paint_planner::{Hit, NozzleState, Settings, Surface, Target, Tool, VehicleState, plan};
 //!
 //! struct Wall; // the plane x = 0, seen from x < 0
 //! impl Surface for Wall {
@@ -41,7 +41,7 @@
 //! let point = |i: usize| Point3::new(0.0, 0.025 * i as f64, 1.0);
 //! let target = |i| Target { point: point(i), normal: -Vector3::x_axis(), dose: 2e-6, time: None };
 //! let targets: Vec<Target> = (0..40).map(target).collect();
-//! let plan = OptimalPlanner::default().plan(&targets, &Wall, &Gimbal, &Settings::default())?;
+//! let plan = plan(&targets, &Wall, &Gimbal, &Settings::default())?;
 //! assert!(plan.report.normal_deviation_max < 0.01 && plan.report.extrema.acceleration <= 1.0);
 //! assert!((plan.volume(3) - 2e-6 * 0.025).abs() < 1e-18);
 //! # Ok::<(), paint_planner::Error>(())
@@ -77,9 +77,17 @@ mod world;
 pub use error::Error;
 pub use nalgebra;
 pub use nozzle::Mode;
+#[cfg(feature = "measure")]
+#[doc(hidden)]
+pub use nozzle::{StageOneProgram, StandardForm};
 pub use plan::{Plan, PlanReport, Setpoint, Waypoint};
 pub use planner::{OptimalPlanner, Planner, SmoothingPlanner, plan};
 pub use settings::{HeadingSettings, LowessSettings, NozzleSettings, Settings, TimingPolicy, TimingSettings};
 pub use target::{NozzleState, Target, normal_deviation};
 pub use trajectory::{Extrema, Sample, Trajectory};
 pub use world::{Hit, Surface, Tool, VehicleState};
+
+/// The recipe of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

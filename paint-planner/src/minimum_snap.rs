@@ -1,4 +1,4 @@
-//! Minimum-snap knot_derivatives: the derivatives at the knots that minimise the integral of the squared snap (Richter et al.).
+//! Minimum snap: the derivatives at the knots that minimise the integral of the squared snap (Richter et al.).
 
 use crate::block_tridiagonal::BlockTridiagonal;
 use nalgebra::{Matrix3, SMatrix, Vector3, Vector4};
@@ -110,7 +110,7 @@ mod tests {
         let points: Vec<Vector4<f64>> =
             (0..count).map(|i| Vector4::from_fn(|r, _| (0.4 * i as f64 * (r + 1) as f64).sin())).collect();
         let y = knot_derivatives(&points, &durations).unwrap();
-        // Dense: minimise over all interior_point derivatives at once, columns ordered knot by knot.
+        // Dense: minimise over all interior derivatives at once, columns ordered knot by knot.
         let size = 3 * (count - 2);
         let place = |knot: usize, r: usize| (knot > 0 && knot < count - 1).then(|| 3 * (knot - 1) + r);
         for axis in 0..4 {

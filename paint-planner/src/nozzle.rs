@@ -2,10 +2,14 @@
 
 mod initial_state;
 mod interior_point;
+#[cfg(feature = "measure")]
+mod measure;
 mod paper_exact;
 mod quadratic_program;
 mod sequential;
 mod solution;
+#[cfg(any(test, feature = "measure"))]
+mod standard_form;
 #[cfg(test)]
 mod tests;
 
@@ -14,7 +18,11 @@ use crate::settings::NozzleSettings;
 use crate::target::Target;
 
 pub(crate) use initial_state::{InitialState, initial_states};
+#[cfg(feature = "measure")]
+pub use measure::StageOneProgram;
 pub(crate) use solution::Nozzles;
+#[cfg(feature = "measure")]
+pub use standard_form::StandardForm;
 
 /// Which formulation stage 1 solves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -68,3 +68,8 @@ pub use paint::{Paint, Substrate};
 pub use render::{Camera, Frame, Lights, Shading, render};
 pub use spray::{Shot, SprayModel};
 pub use surface::{Hit, Surface, TriangleSurface};
+
+/// The recipe of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -288,3 +288,41 @@ fn one_call_sprays_past_a_surface_of_the_users_own() {
     }
     assert!(dark > 100 && lit > 1000, "{dark} {lit}");
 }
+
+#[test]
+fn no_shot_loses_or_invents_paint() {
+    // Any cone, any shot, any texels; the same for one thread and for three.
+    let mut state = 9_u64;
+    let mut uniform = move |low: f64, high: f64| {
+        state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        low + (high - low) * ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    for _ in 0..60 {
+        let model = SprayModel {
+            sigma: uniform(0.01, 0.5),
+            cut: uniform(0.5, 5.0),
+            efficiency: uniform(0.0, 1.0),
+            range: uniform(0.05, 1.0),
+            ..SprayModel::default()
+        };
+        let mut film = Film::new(tilted_plane(uniform(-1.0, 1.0), 0.1, uniform(0.002, 0.02), 0.05)).unwrap();
+        let shots: Vec<Shot> = (0..20)
+            .map(|_| Shot {
+                axis: UnitVector3::new_normalize(Vector3::new(uniform(-1.0, 1.0), uniform(-1.0, 1.0), 1.0)),
+                ..shot(uniform(-0.05, 0.05), uniform(-0.05, 0.05), uniform(0.0, 1e-12))
+            })
+            .collect();
+        let mut again = film.layer();
+        let balance = spray(&mut film, &shots, &model, &far_plate(), 1);
+        let emitted: u64 = shots.iter().map(|s| (s.volume / QUANTUM).round() as u64).sum();
+        assert!(balance.balanced() && balance.emitted == emitted, "{model:?}");
+        assert_eq!(film.volumes().iter().sum::<u64>(), balance.deposited);
+        // Rounding may add half a quantum per shot.
+        assert!(balance.deposited as f64 <= model.efficiency * emitted as f64 + 20.0, "{balance:?} {model:?}");
+        assert_eq!(spray(&mut again, &shots, &model, &far_plate(), 3), balance);
+        assert_eq!(again.volumes(), film.volumes());
+    }
+}

@@ -69,3 +69,8 @@ pub use pan_tilt_urdf::UrdfJointSigns;
 pub use serial_arm::{SerialArm, SerialJoint};
 pub use servo::{Servo, ServoSettings};
 pub use settings::PtuSettings;
+
+/// The recipe of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

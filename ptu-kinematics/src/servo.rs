@@ -83,7 +83,7 @@ impl Servo {
     }
 
     /// The command that the hardware can represent nearest to `angle`.
-    pub fn representable(&self, angle: f64) -> f64 {
+    pub fn quantise(&self, angle: f64) -> f64 {
         let clamped = self.settings.limits.clamp(angle);
         if self.settings.resolution == 0.0 {
             return clamped;
@@ -97,7 +97,7 @@ impl Servo {
     /// ignored, as a servo ignores a corrupt packet; a negative or non-finite `dt` moves nothing.
     pub fn step(&mut self, command: f64, dt: f64) -> f64 {
         if command.is_finite() {
-            self.pending.push_back((self.clock + self.settings.dead_time, self.representable(command)));
+            self.pending.push_back((self.clock + self.settings.dead_time, self.quantise(command)));
         }
         if !(dt.is_finite() && dt > 0.0) {
             return self.angle;

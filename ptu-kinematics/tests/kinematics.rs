@@ -246,6 +246,60 @@ fn calibration_recovers_the_offsets() {
 }
 
 #[test]
+fn calibration_reports_root_mean_squares() {
+    let truth = reference();
+    let ptu = Ptu::new(truth).unwrap();
+    let mut random = Random(6);
+    let (slant, shift) = (0.01, 0.002);
+    let observations: Vec<Observation> = (0..400)
+        .map(|k| {
+            let joints = random.hover().joints;
+            let nozzle = ptu.forward(&Isometry3::identity(), joints);
+            // Errors of one size and both signs: what is left after the fit is that size, for any number of observations.
+            let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+            let lateral = Vector3::new(-joints.pan.sin(), joints.pan.cos(), 0.0);
+            let turn = UnitQuaternion::from_scaled_axis(lateral * (sign * slant));
+            let tip_in_body = nozzle.tip + lateral * (sign * shift);
+            Observation { joints, tip_in_body, direction_in_body: turn * nozzle.direction }
+        })
+        .collect();
+    let found = calibrate(&truth, &observations).unwrap();
+    assert!((found.direction_rms / slant - 1.0).abs() < 0.01, "{}", found.direction_rms);
+    assert!((found.tip_rms / shift - 1.0).abs() < 0.03, "{}", found.tip_rms);
+    assert!((found.settings.gun_pitch - truth.gun_pitch).abs() < 1e-3);
+}
+
+#[test]
+fn calibration_refuses_what_it_cannot_use() {
+    let ptu = Ptu::new(reference()).unwrap();
+    let mut random = Random(7);
+    let mut good: Vec<Observation> = (0..3)
+        .map(|_| {
+            let joints = random.hover().joints;
+            let nozzle = ptu.forward(&Isometry3::identity(), joints);
+            Observation { joints, tip_in_body: nozzle.tip, direction_in_body: nozzle.direction }
+        })
+        .collect();
+    assert!(calibrate(&reference(), &good).is_ok());
+    assert!(matches!(calibrate(&reference(), &good[..2]), Err(Error::Calibration { .. })));
+    let refused = |change: &dyn Fn(&mut Observation)| {
+        let mut bad = good.clone();
+        change(&mut bad[1]);
+        calibrate(&reference(), &bad)
+    };
+    assert!(matches!(refused(&|o| o.joints.tilt = f64::NAN), Err(Error::NonFinite { what: "observation", .. })));
+    assert!(matches!(refused(&|o| o.tip_in_body.y = f64::NAN), Err(Error::NonFinite { what: "observed tip", .. })));
+    let nan = UnitVector3::new_unchecked(Vector3::repeat(f64::NAN));
+    let refused = refused(&|o| o.direction_in_body = nan);
+    assert!(matches!(refused, Err(Error::NonFinite { what: "observed direction", .. })));
+    // Two of three directions sideways: the mean is too short to be an axis.
+    for o in &mut good[..2] {
+        o.direction_in_body = UnitVector3::new_normalize(Vector3::new(-o.joints.pan.sin(), o.joints.pan.cos(), 0.0));
+    }
+    assert!(matches!(calibrate(&reference(), &good), Err(Error::Calibration { .. })));
+}
+
+#[test]
 fn wrapping_covers_the_circle_once() {
     for k in -50..=50 {
         let angle = 0.37 * f64::from(k);

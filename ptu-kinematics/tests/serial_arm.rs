@@ -1,5 +1,6 @@
 //! A five-joint arm and the pan-tilt unit behind one trait.
 #![cfg(feature = "urdf")]
+#![allow(clippy::unwrap_used)]
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
 use ptu_kinematics::{Error, Hover, KinematicChain, Ptu, Range, SerialArm, SerialJoint};

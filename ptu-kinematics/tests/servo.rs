@@ -62,6 +62,61 @@ fn commands_are_quantised_and_clamped() {
 }
 
 #[test]
+fn quantised_commands_stay_within_limits_that_no_step_hits() {
+    // Seven steps of 0.03 from -0.1 lead to 0.11, beyond the limit.
+    let settings = ServoSettings {
+        resolution: 0.03,
+        limits: Range::symmetric(0.1),
+        time_constant: 0.0,
+        dead_time: 0.0,
+        max_rate: 1e6,
+    };
+    let mut servo = Servo::new(settings, 0.0).unwrap();
+    assert_eq!(servo.quantise(0.5), 0.1);
+    assert_eq!(servo.step(0.1, 1.0), 0.1);
+    assert!((servo.quantise(0.06) - 0.05).abs() < 1e-12);
+    assert_eq!(servo.quantise(-0.5), -0.1);
+}
+
+#[test]
+fn the_delay_is_dead_time_and_time_constant() {
+    let servo = Servo::new(ServoSettings { dead_time: 0.02, ..plain() }, 0.1).unwrap();
+    assert!((servo.delay() - 0.07).abs() < 1e-15);
+    assert_eq!(servo.angle(), 0.1);
+    assert_eq!(servo.settings().dead_time, 0.02);
+    // Beyond the limits the servo starts at them.
+    assert_eq!(Servo::new(plain(), 5.0).unwrap().angle(), 2.0);
+}
+
+#[test]
+fn commands_in_one_step_take_effect_one_after_the_other() {
+    // A command at t = 0 is due at 0.02, one at 0.01 at 0.03; the step from 0.01 to 0.06 holds both.
+    let mut servo = Servo::new(ServoSettings { dead_time: 0.02, max_rate: 1e6, ..plain() }, 0.0).unwrap();
+    servo.step(1.0, 0.01);
+    let angle = servo.step(-1.0, 0.05);
+    let first = 1.0 - (-0.01_f64 / 0.05).exp();
+    let expected = -1.0 + (first + 1.0) * (-0.03_f64 / 0.05).exp();
+    assert!((angle - expected).abs() < 1e-12, "{angle} {expected}");
+}
+
+#[test]
+fn bad_settings_are_named() {
+    for (name, settings) in [
+        ("resolution", ServoSettings { resolution: -1e-3, ..plain() }),
+        ("time_constant", ServoSettings { time_constant: f64::NAN, ..plain() }),
+        ("dead_time", ServoSettings { dead_time: -0.1, ..plain() }),
+        ("max_rate", ServoSettings { max_rate: f64::INFINITY, ..plain() }),
+    ] {
+        assert!(
+            matches!(Servo::new(settings, 0.0), Err(Error::InvalidSetting { name: found, .. }) if found == name),
+            "{name}"
+        );
+    }
+    let limits = Range { min: f64::NAN, max: 1.0 };
+    assert!(matches!(Servo::new(ServoSettings { limits, ..plain() }, 0.0), Err(Error::NonFinite { .. })));
+}
+
+#[test]
 fn bad_numbers_move_nothing() {
     let mut servo = Servo::new(ServoSettings::default(), 0.3).unwrap();
     assert_eq!(servo.step(f64::NAN, 1.0), 0.3);
@@ -70,4 +125,37 @@ fn bad_numbers_move_nothing() {
     assert!(matches!(Servo::new(ServoSettings::default(), f64::NAN), Err(Error::NonFinite { .. })));
     let stuck = ServoSettings { max_rate: 0.0, ..ServoSettings::default() };
     assert!(matches!(Servo::new(stuck, 0.0), Err(Error::InvalidSetting { name: "max_rate", .. })));
+}
+
+#[test]
+fn a_servo_never_leaves_its_limits_and_never_outruns_its_rate() {
+    // Any settings, any commands, any steps (splitmix64).
+    let mut state = 3_u64;
+    let mut uniform = move |low: f64, high: f64| {
+        state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        low + (high - low) * ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    for _ in 0..500 {
+        let limits = Range { min: uniform(-2.0, 0.0), max: uniform(0.0, 2.0) };
+        let settings = ServoSettings {
+            resolution: uniform(-0.05, 0.1).max(0.0),
+            max_rate: uniform(0.1, 10.0),
+            time_constant: uniform(-0.02, 0.1).max(0.0),
+            dead_time: uniform(-0.02, 0.1).max(0.0),
+            limits,
+        };
+        let mut servo = Servo::new(settings, uniform(-3.0, 3.0)).unwrap();
+        for _ in 0..50 {
+            let (command, dt) = (uniform(-3.0, 3.0), uniform(0.0, 0.05));
+            let before = servo.angle();
+            let angle = servo.step(command, dt);
+            assert!(limits.contains(angle), "{angle} outside {limits:?} with {settings:?}");
+            assert!((angle - before).abs() <= settings.max_rate * dt + 1e-12, "{settings:?}");
+            let goal = servo.quantise(command);
+            assert!(limits.contains(goal) && servo.quantise(goal) == goal, "{settings:?}");
+        }
+    }
 }

@@ -92,7 +92,7 @@ fn check_cuts(cuts: &CutSettings) -> Result<(), Error> {
     Ok(())
 }
 
-/// Settings that tell which cut is if_improved, no more.
+/// Settings that tell whether a cut improves the chart, no more.
 fn trial_settings(iterations: usize) -> Settings {
     Settings { iterations, tolerance: TRIAL_TOLERANCE, method: Method::SymmetricDirichlet, up: None }
 }

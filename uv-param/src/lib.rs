@@ -72,3 +72,8 @@ pub use texel::TexelMap;
 pub use texture::{Texture, linear_from_srgb, luminance};
 pub use tutte::Tutte;
 pub use unwrap::{Method, Settings, unwrap, unwrap_by};
+
+/// The recipe of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -6,8 +6,8 @@ use paint_planner::{Plan, Target};
 use paint_sim::FlightLog;
 use ptu_kinematics::Ptu;
 
-use super::MissionSettings;
 use super::fly::fly_three;
+use super::settings::MissionSettings;
 use crate::adapters::{MeshSurface, Robot};
 use crate::mesh_io::TriangleMesh;
 use crate::surface::PaintSurface;

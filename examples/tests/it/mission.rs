@@ -12,7 +12,7 @@ use paintcopter_examples::report::Report;
 use crate::scratch::Scratch;
 
 /// The most that the valve gives, m³/s: so little that strokes must be flown more slowly for it.
-const MAX_FLOW: f64 = 0.5e-6;
+const MAX_FLOW: f64 = 0.1e-6;
 
 /// A panel 1.2 m wide and 0.8 m high with a soft bulge, facing -x, its lower edge 2 m up. Texture coordinates run from its
 /// left to its right as the robot sees it, and upwards.

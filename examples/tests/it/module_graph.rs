@@ -91,33 +91,28 @@ impl ModuleGraph {
                     at = end;
                 }
                 "mod" if depth == 0 && is_name(next) => {
-                    let child = match tokens.get(at + 2).map(String::as_str) {
-                        Some("{") => {
-                            let end = block_end(tokens, at + 2);
-                            let below = &tokens[at + 3..end - 1];
-                            let child = self.add(file, &folder.join(next), Some(index), below)?;
-                            at = end - 1;
-                            child
-                        }
-                        _ => {
-                            let path = module_file(file, folder, next, explicit.take().as_deref());
-                            let is_mod_rs = path.file_name().is_some_and(|n| n == "mod.rs");
-                            let stem = path.with_extension("");
-                            let below = if is_mod_rs { path.parent().unwrap_or(folder).to_path_buf() } else { stem };
-                            let tokens = self::tokens(&std::fs::read_to_string(&path).map_err(|error| {
-                                std::io::Error::new(error.kind(), format!("{}: {error}", path.display()))
-                            })?);
-                            at += 1;
-                            self.add(&path, &below, Some(index), &tokens)?
-                        }
+                    let child = if tokens.get(at + 2).is_some_and(|t| t == "{") {
+                        let end = block_end(tokens, at + 2);
+                        let below = &tokens[at + 3..end - 1];
+                        at = end - 1;
+                        self.add(file, &folder.join(next), Some(index), below)?
+                    } else {
+                        let path = module_file(file, folder, next, explicit.take().as_deref());
+                        let is_mod_rs = path.file_name().is_some_and(|n| n == "mod.rs");
+                        let below = if is_mod_rs { path.with_file_name("") } else { path.with_extension("") };
+                        let text = std::fs::read_to_string(&path);
+                        let in_file =
+                            |e: std::io::Error| std::io::Error::new(e.kind(), format!("{}: {e}", path.display()));
+                        at += 1;
+                        self.add(&path, &below, Some(index), &self::tokens(&text.map_err(in_file)?))?
                     };
                     self.modules[index].children.insert(next.to_owned(), child);
                 }
-                "fn" | "struct" | "enum" | "trait" | "type" | "const" | "static" if depth == 0 => {
-                    if is_name(next) && !["fn", "unsafe", "extern", "mut", "_"].contains(&next) {
-                        self.modules[index].items.insert(next.to_owned());
-                        at += 1;
-                    }
+                "fn" | "struct" | "enum" | "trait" | "type" | "const" | "static"
+                    if depth == 0 && is_name(next) && !["fn", "unsafe", "extern", "mut", "_"].contains(&next) =>
+                {
+                    self.modules[index].items.insert(next.to_owned());
+                    at += 1;
                 }
                 "macro_rules" if next == "!" => {
                     let name = tokens.get(at + 2).cloned().unwrap_or_default();
@@ -152,7 +147,8 @@ impl ModuleGraph {
         };
         for (before, name) in path.iter().zip(&path[1..]) {
             // A function may bear the name of a module beside it; only the module has members.
-            if before.starts_with(char::is_lowercase) && found.iter().any(|target| matches!(target, Target::Module(_))) {
+            if before.starts_with(char::is_lowercase) && found.iter().any(|target| matches!(target, Target::Module(_)))
+            {
                 found.retain(|target| matches!(target, Target::Module(_)));
             }
             let mut next = BTreeSet::new();

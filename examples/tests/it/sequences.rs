@@ -48,17 +48,17 @@ fn quaternion(pose: &Isometry3<f64>) -> String {
 
 fn seven_scenes(s: &Scratch) {
     let [fx, fy, cx, cy] = CAMERA;
-    s.write("camera-intrinsics.txt", &format!("{fx} 0 {cx}\n0 {fy} {cy}\n0 0 1\n"));
+    s.write("camera-intrinsics.txt", format!("{fx} 0 {cx}\n0 {fy} {cy}\n0 0 1\n"));
     for (k, pose) in poses().iter().enumerate() {
         let name = |ending: &str| format!("frame-{k:06}.{ending}");
         images(s, &name("depth.png"), &name("color.png"), WALL - pose.translation.z, 1000.0);
-        s.write(&name("pose.txt"), &matrix(pose));
+        s.write(&name("pose.txt"), matrix(pose));
     }
 }
 
 fn tum(s: &Scratch) {
     let [fx, fy, cx, cy] = CAMERA;
-    s.write("intrinsics.txt", &format!("{} {} {fx} {fy} {cx} {cy} 1000\n", SIZE.0, SIZE.1));
+    s.write("intrinsics.txt", format!("{} {} {fx} {fy} {cx} {cy} 1000\n", SIZE.0, SIZE.1));
     let (mut depth, mut colour, mut truth) = (String::from("# list\n"), String::new(), String::new());
     for (k, pose) in poses().iter().enumerate() {
         let (d, c) = (format!("depth/{k}.png"), format!("rgb/{k}.png"));
@@ -76,7 +76,7 @@ fn tum(s: &Scratch) {
 
 fn redwood(s: &Scratch) {
     let [fx, fy, cx, cy] = CAMERA;
-    s.write("camera_primesense.json", &format!("{{\"intrinsic_matrix\":[{fx},0,0,0,{fy},0,{cx},{cy},1]}}"));
+    s.write("camera_primesense.json", format!("{{\"intrinsic_matrix\":[{fx},0,0,0,{fy},0,{cx},{cy},1]}}"));
     let mut log = String::new();
     for (k, pose) in poses().iter().enumerate() {
         images(s, &format!("depth/{k:05}.png"), &format!("color/{k:05}.png"), WALL - pose.translation.z, 1000.0);

@@ -58,7 +58,9 @@ fn folders_and_mcap_files_give_the_same_trajectory() {
     let mut late = folder.clone();
     late.camera.time_offset_s = 0.03;
     let Images::Files(files) = &mut late.images else { panic!("a folder has files") };
-    files.iter_mut().for_each(|(stamp, _)| *stamp = Stamp::from_nanos(stamp.nanos() - 30_000_000));
+    for (stamp, _) in files.iter_mut() {
+        *stamp = Stamp::from_nanos(stamp.nanos() - 30_000_000);
+    }
     let found = run(&late, &RunSettings { threads: 1, quiet: true, ..RunSettings::default() }).unwrap();
     assert_eq!(found.calibration.time_offset_s, 0.03);
     close(&vio_ekf::tum::write(&found.trajectory().unwrap()), &reference, 1e-6);

@@ -31,6 +31,7 @@ impl Saturation {
     }
 
     /// Ink at a depth; depths below zero count as zero.
+    #[inline]
     pub fn forward(&self, depth: f64) -> f64 {
         let depth = depth.max(0.0);
         match self {
@@ -41,6 +42,7 @@ impl Saturation {
     }
 
     /// `f'(c)`.
+    #[inline]
     pub fn derivative(&self, depth: f64) -> f64 {
         let depth = depth.max(0.0);
         match self {

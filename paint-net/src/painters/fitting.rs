@@ -1,5 +1,6 @@
 //! The least-squares fit in ink that all painters on a grid share, and the dropping of sprays that are not worth it.
 
+use crate::model::Saturation;
 use crate::optimise::{StoppingRule, minimise};
 use crate::problem::{Limits, PaintGrid, PaintProblem};
 
@@ -16,7 +17,7 @@ pub(super) fn fit(
     let mut cost = |v: &[f64], gradient: &mut [f64]| {
         canvas.copy_from_slice(grid.initial.data());
         grid.footprints.deposit(v, &mut canvas);
-        let value = ink_cost(problem, &mut canvas);
+        let value = ink_cost(problem, problem.saturation, &mut canvas);
         grid.footprints.adjoint(&canvas, gradient);
         value
     };
@@ -24,13 +25,15 @@ pub(super) fn fit(
 }
 
 /// `½ Σ w (f(c) - y)²`; replaces the canvas by its derivative with respect to each pixel's depth.
-pub(super) fn ink_cost(problem: &PaintProblem, canvas: &mut [f64]) -> f64 {
+///
+/// The saturation is an argument of its own so that the compiler knows that writing the canvas does not change it.
+pub(super) fn ink_cost(problem: &PaintProblem, saturation: &Saturation, canvas: &mut [f64]) -> f64 {
     let mut value = 0.0;
     for (k, (depth, wanted)) in canvas.iter_mut().zip(problem.reference.data()).enumerate() {
         let weight = problem.weight(k);
-        let residual = problem.saturation.forward(*depth) - wanted;
+        let residual = saturation.forward(*depth) - wanted;
         value += 0.5 * weight * residual * residual;
-        *depth = weight * residual * problem.saturation.derivative(*depth);
+        *depth = weight * residual * saturation.derivative(*depth);
     }
     value
 }

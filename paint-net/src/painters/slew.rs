@@ -111,7 +111,7 @@ impl SlewFit<'_> {
             let mut cost = |v: &[f64], gradient: &mut [f64]| {
                 canvas.copy_from_slice(self.grid.initial.data());
                 self.grid.footprints.deposit(v, &mut canvas);
-                let value = ink_cost(self.problem, &mut canvas);
+                let value = ink_cost(self.problem, self.problem.saturation, &mut canvas);
                 self.grid.footprints.adjoint(&canvas, gradient);
                 value + self.penalty(v, penalty, &multipliers, gradient)
             };

@@ -44,7 +44,7 @@ impl Linearisation {
     }
 }
 
-/// SQP: build, solve, step, re-point.
+/// SQP: build, solve, step, linearise again.
 pub(super) fn optimise(
     targets: &[Target],
     initial_states: &[Option<InitialState>],
@@ -61,8 +61,7 @@ pub(super) fn optimise(
     let mut result = Nozzles { states: vec![None; targets.len()], rounds: 0, steps: 0, slack: 0.0 };
     for round in 1..=settings.rounds {
         let program = build(&points, &stroke_links, settings);
-        let mut x: Vec<Vector5<f64>> =
-            points.iter().map(|c| Vector5::new(c.position.x, c.position.y, c.position.z, 0.0, 0.0)).collect();
+        let mut x = start_of(&points);
         let outcome = solve(&program, &mut x)?;
         result.rounds = round;
         result.steps += outcome.steps;
@@ -85,6 +84,25 @@ pub(super) fn optimise(
         }
     }
     Ok(result)
+}
+
+/// The states that the program of these linearisations starts from: no correction yet.
+fn start_of(points: &[Linearisation]) -> Vec<Vector5<f64>> {
+    points.iter().map(|c| Vector5::new(c.position.x, c.position.y, c.position.z, 0.0, 0.0)).collect()
+}
+
+/// The first of the programs that [`optimise`] solves for one stroke, and where it starts.
+#[cfg(any(test, feature = "measure"))]
+pub(super) fn first_program(
+    targets: &[Target],
+    initial_states: &[Option<InitialState>],
+    settings: &NozzleSettings,
+) -> (QuadraticProgram, Vec<Vector5<f64>>) {
+    let linearised =
+        |(s, t): (&Option<InitialState>, &Target)| s.map(|s| Linearisation::new(*t, s.state.position, s.tangents));
+    let points: Vec<Linearisation> = initial_states.iter().zip(targets).filter_map(linearised).collect();
+    let links = vec![true; points.len().saturating_sub(1)];
+    (build(&points, &links, settings), start_of(&points))
 }
 
 /// Rotates `axis` towards `aim` until the angle between them is at most `half`.

@@ -1,6 +1,7 @@
 //! The interior-point method against Clarabel, and stage 1 against a known optimum.
 
 use super::quadratic_program::QuadraticProgram;
+use super::standard_form::StandardForm;
 use super::{Mode, initial_states, interior_point, optimise};
 use crate::settings::NozzleSettings;
 use crate::target::{Target, normal_deviation};
@@ -42,59 +43,15 @@ fn random_program(count: usize, random: &mut Random) -> QuadraticProgram {
     program
 }
 
-/// Clarabel's answer to the same program: variables x, then one relaxation per cap.
+/// Clarabel's answer to the same program.
 fn by_clarabel(program: &QuadraticProgram) -> Vec<f64> {
-    let (count, hard, soft) = (program.gradient.len(), program.hard_rows, program.soft_rows);
-    let (states, per_state) = (5 * count, hard + soft);
-    let variables = states + soft * count;
-    let (mut ri, mut ci, mut values) = (vec![], vec![], vec![]);
-    let mut upper = |r: usize, c: usize, v: f64| {
-        if r <= c {
-            ri.push(r);
-            ci.push(c);
-            values.push(v);
-        }
+    let form = StandardForm::new(program);
+    let matrix = |rows: usize, triplets: &[(usize, usize, f64)]| {
+        let (r, (c, v)): (Vec<usize>, (Vec<usize>, Vec<f64>)) = triplets.iter().map(|&(r, c, v)| (r, (c, v))).unzip();
+        CscMatrix::new_from_triplets(rows, form.variables, r, c, v)
     };
-    for i in 0..count {
-        for r in 0..5 {
-            for c in 0..5 {
-                upper(5 * i + r, 5 * i + c, program.hessian.diagonal[i][(r, c)]);
-                if i + 1 < count {
-                    upper(5 * i + c, 5 * i + 5 + r, program.hessian.lower[i][(r, c)]);
-                }
-            }
-        }
-    }
-    let p = CscMatrix::new_from_triplets(variables, variables, ri, ci, values);
-    let mut q: Vec<f64> = program.gradient.iter().flat_map(|g| g.iter().copied()).collect();
-    q.resize(variables, program.penalty);
-    let (mut ri, mut ci, mut values, mut b) = (vec![], vec![], vec![], vec![]);
-    for (j, row) in program.rows.iter().enumerate() {
-        let (i, k) = (j / per_state, j % per_state);
-        let mut line = Vector5::zeros();
-        if k < hard {
-            line.fixed_rows_mut::<3>(0).copy_from(&row.a);
-        } else {
-            line = program.soft_map[i].tr_mul(&row.a.xy());
-            ri.push(j);
-            ci.push(states + soft * i + k - hard);
-            values.push(-1.0);
-        }
-        for r in 0..5 {
-            ri.push(j);
-            ci.push(5 * i + r);
-            values.push(line[r]);
-        }
-        b.push(row.b);
-    }
-    for e in states..variables {
-        ri.push(b.len());
-        ci.push(e);
-        values.push(-1.0);
-        b.push(0.0);
-    }
-    let a = CscMatrix::new_from_triplets(b.len(), variables, ri, ci, values);
-    let cones = [NonnegativeConeT(b.len())];
+    let (p, a) = (matrix(form.variables, &form.p), matrix(form.b.len(), &form.a));
+    let cones = [NonnegativeConeT(form.b.len())];
     let settings = DefaultSettings {
         verbose: false,
         tol_gap_abs: 1e-13,
@@ -103,9 +60,9 @@ fn by_clarabel(program: &QuadraticProgram) -> Vec<f64> {
         max_iter: 200,
         ..DefaultSettings::default()
     };
-    let mut solver = DefaultSolver::new(&p, &q, &a, &b, &cones, settings).unwrap();
+    let mut solver = DefaultSolver::new(&p, &form.q, &a, &form.b, &cones, settings).unwrap();
     solver.solve();
-    solver.solution.x[..states].to_vec()
+    solver.solution.x[..form.states].to_vec()
 }
 
 #[test]

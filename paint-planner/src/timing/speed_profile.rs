@@ -174,3 +174,112 @@ fn curvature(route: &[RoutePoint], i: usize, scale: f64) -> f64 {
     let (la, lb) = (a.norm(), b.norm());
     if la < 1e-9 || lb < 1e-9 { 0.0 } else { (b / lb - a / la).norm() / (0.5 * (la + lb)) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::VehicleState;
+    use nalgebra::{Point3, Vector3};
+
+    /// A metre of straight stroke in steps of 0.1 m that turns by `turn` radians per step.
+    fn stroke(turn: f64, dose: f64) -> (Vec<RoutePoint>, Vec<Target>) {
+        let point = |i: usize| Point3::new(0.0, 0.1 * i as f64, 1.0);
+        let targets =
+            (0..=10).map(|i| Target { point: point(i), normal: -Vector3::x_axis(), dose, time: None }).collect();
+        let state = |i: usize| VehicleState { position: point(i), heading: turn * i as f64, pan: 0.0, tilt: 0.0 };
+        let route = (0..=10).map(|i| RoutePoint { state: state(i), target: Some(i), rest: false }).collect();
+        (route, targets)
+    }
+
+    /// Duration of an edge in the middle, where neither start nor end slows it.
+    fn middle(turn: f64, dose: f64, settings: &TimingSettings) -> f64 {
+        let (route, targets) = stroke(turn, dose);
+        SpeedProfile::new(&route, &targets, settings).durations(&[1.0; 10], settings)[5]
+    }
+
+    #[test]
+    fn an_edge_takes_what_its_slowest_limit_asks_for() {
+        let settings = TimingSettings {
+            policy: TimingPolicy::Uniform { speed: 0.4 },
+            max_speed: 0.5,
+            max_acceleration: 100.0,
+            max_heading_rate: 1.0,
+            max_flow: 2e-6,
+            ..TimingSettings::default()
+        };
+        // 0.1 m at the wanted speed; at the speed of the vehicle; a turn of 0.5 rad; a dose of 1e-5 m^3/m.
+        assert!((middle(0.0, 0.0, &settings) - 0.25).abs() < 1e-12);
+        let racing = TimingSettings { policy: TimingPolicy::Uniform { speed: 2.0 }, ..settings.clone() };
+        assert!((middle(0.0, 0.0, &racing) - 0.2).abs() < 1e-12);
+        assert!((middle(0.5, 0.0, &settings) - 0.5).abs() < 1e-12);
+        assert!((middle(-0.5, 0.0, &settings) - 0.5).abs() < 1e-12);
+        assert!((middle(0.0, 1e-5, &settings) - 0.5).abs() < 1e-12);
+        // `slowdown` stretches.
+        let (route, targets) = stroke(0.0, 0.0);
+        let slowed = SpeedProfile::new(&route, &targets, &settings).durations(&[2.0; 10], &settings);
+        assert!((slowed[5] - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn starts_and_halts_ramp_within_the_tangential_share() {
+        let settings = TimingSettings::default();
+        let (route, targets) = stroke(0.0, 0.0);
+        let durations = SpeedProfile::new(&route, &targets, &settings).durations(&[1.0; 10], &settings);
+        // From rest with 0.45 m/s^2 over 0.1 m: v = 0.3 m/s, t = 2 s / v.
+        assert!((durations[0] - 0.2 / 0.3).abs() < 1e-12, "{}", durations[0]);
+        assert!((durations[9] - durations[0]).abs() < 1e-12);
+        assert!(durations[4] < durations[1] && durations[1] < durations[0]);
+        // A halt in the middle ramps on both sides.
+        let mut halting = route;
+        halting[5].rest = true;
+        let halted = SpeedProfile::new(&halting, &targets, &settings).durations(&[1.0; 10], &settings);
+        assert!((halted[4] - durations[0]).abs() < 1e-12 && (halted[5] - durations[0]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn two_halts_are_joined_by_the_closed_form() {
+        let settings = TimingSettings::default();
+        let (mut route, targets) = stroke(0.0, 0.0);
+        route.truncate(2);
+        let only =
+            |settings: &TimingSettings| SpeedProfile::new(&route, &targets, settings).durations(&[1.0], settings)[0];
+        // Rest to rest over 0.1 m: peak acceleration 7.5132 L / T^2, peak speed 2.1875 L / T.
+        assert!((only(&settings) - 1.001 * (7.513_188_404_f64 * 0.1).sqrt()).abs() < 1e-9);
+        let crawling = TimingSettings { max_speed: 0.05, ..settings.clone() };
+        assert!((only(&crawling) - 1.001 * 2.1875 * 0.1 / 0.05).abs() < 1e-9);
+        route[1].state.heading = 1.0;
+        let only =
+            |settings: &TimingSettings| SpeedProfile::new(&route, &targets, settings).durations(&[1.0], settings)[0];
+        assert!((only(&settings) - 1.001 * 2.1875).abs() < 1e-9);
+    }
+
+    #[test]
+    fn corners_are_taken_at_the_speed_that_their_curvature_allows() {
+        let settings = TimingSettings { max_acceleration: 0.2, knot_spacing: 0.09, ..TimingSettings::default() };
+        let (mut route, targets) = stroke(0.0, 0.0);
+        // A right angle at point 5: |b - a| / mean length = sqrt(2) / 0.1.
+        for (i, point) in route.iter_mut().enumerate().skip(6) {
+            point.state.position = Point3::new(0.1 * (i as f64 - 5.0), 0.5, 1.0);
+        }
+        let profile = SpeedProfile::new(&route, &targets, &settings);
+        let expected = (NORMAL * 0.2 / (2.0_f64.sqrt() / 0.1)).sqrt();
+        assert!((profile.speed_limit[5] - expected).abs() < 1e-9, "{} {expected}", profile.speed_limit[5]);
+        assert_eq!((profile.speed_limit[0], profile.speed_limit[10]), (0.0, 0.0));
+        assert!(profile.speed_limit[3] > 10.0);
+    }
+
+    #[test]
+    fn stamps_are_stretched_by_one_factor() {
+        let settings = TimingSettings { policy: TimingPolicy::GradientPreserving, ..TimingSettings::default() };
+        let (route, mut targets) = stroke(0.0, 0.0);
+        for (i, target) in targets.iter_mut().enumerate() {
+            // 0.1 m in 0.1 s where 0.2 s is the least; one edge takes three times as long.
+            target.time = Some(0.1 * i as f64 + if i > 5 { 0.2 } else { 0.0 });
+        }
+        let profile = SpeedProfile::new(&route, &targets, &settings);
+        assert!((profile.factor - 2.0).abs() < 1e-9, "{}", profile.factor);
+        let durations = profile.durations(&[1.0; 10], &settings);
+        assert!((durations[5] - 0.6).abs() < 1e-9 && (durations[4] - 0.2).abs() < 1e-9, "{durations:?}");
+        assert_eq!(profile.speed_limit[4], f64::INFINITY);
+    }
+}

@@ -1,8 +1,8 @@
 //! A triangle mesh with a bounding volume hierarchy: the ready implementation of [`Surface`].
 
+use glam::DVec3;
 use nalgebra::{Point3, Vector3};
 use parry3d_f64::bounding_volume::Aabb;
-use parry3d_f64::math::Vector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode, TraversalAction};
 use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::Triangle;
@@ -110,8 +110,8 @@ fn scaled_normal([a, b, c]: &[Vector3<f64>; 3]) -> Vector3<f64> {
     (b - a).cross(&(c - a))
 }
 
-fn vector(v: &Vector3<f64>) -> Vector {
-    Vector::new(v.x, v.y, v.z)
+fn vector(v: &Vector3<f64>) -> DVec3 {
+    DVec3::new(v.x, v.y, v.z)
 }
 
 /// A ray in coordinates where it runs along the third axis: edge tests become 2D and exactly antisymmetric.

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 
-/// ByteReader from bytes; an error names what was read and where.
+/// Reads numbers from bytes; an error names what was read and where.
 pub(crate) struct ByteReader<'a> {
     bytes: &'a [u8],
     offset: u64,

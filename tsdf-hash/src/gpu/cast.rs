@@ -94,7 +94,7 @@ impl Caster {
         device.run_and_read(commands, staging, bytes, |words| read_pixels(words, view))
     }
 
-    /// For each block, the range of its cells that the plane_image crosses.
+    /// For each block, the range of its cells that the surface crosses.
     fn ranges(&mut self, device: &Device, pool: &Pool, keys: &[BlockKey]) -> Result<Vec<Option<CellRange>>, Error> {
         let bytes = 4 * keys.len();
         let ranges = self.ranges.of(device, bytes)?.clone();

@@ -179,7 +179,9 @@ impl GpuMap {
         let passes: Vec<Pass> = added.update(Mode::Integrate).collect();
         let done = self.fuser.submit(&self.device, &self.pool, &frame, &passes);
         done.map_err(|error| self.device.lose(error))?;
-        changed.iter().for_each(|work| self.pool.mark_changed(work.0));
+        for work in &changed {
+            self.pool.mark_changed(work.0);
+        }
         let emptied: Vec<BlockKey> = changed.iter().filter(|work| !work.1.observed()).map(|work| work.0).collect();
         for &key in &emptied {
             self.pool.remove(key);

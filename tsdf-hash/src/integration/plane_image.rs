@@ -22,7 +22,7 @@ use crate::settings::Settings;
 const LEAST_COSINE: f32 = 0.1;
 /// A window whose rim is this many standard deviations off its middle is not plane (ours).
 const MOST_BEND: f32 = 3.0;
-/// InverseDepthNoise that is always granted, as a share of the model's: where the camera is better than the model, bends are found
+/// Noise that is always granted, as a share of the model's: where the camera is better than the model, bends are found
 /// by what it shows (ours).
 const LEAST_NOISE: f32 = 0.1;
 

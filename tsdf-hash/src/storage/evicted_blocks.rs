@@ -202,7 +202,9 @@ impl EvictedBlocks {
 
     pub(crate) fn abort(&mut self) {
         for (_, evicted) in std::mem::take(&mut self.staged) {
-            evicted.iter().for_each(|evicted| self.release(evicted));
+            if let Some(evicted) = &evicted {
+                self.release(evicted);
+            }
         }
     }
 

@@ -6,24 +6,44 @@ use std::path::PathBuf;
 /// Vertices and triangles.
 pub type Mesh = (Vec<[f64; 3]>, Vec<[u32; 3]>);
 
-/// A mesh of the data folder (`PAINTCOPTER_DATA`, default beside the workspace); `None`, said on stderr, if it is absent.
-pub fn data_mesh(name: &str) -> Option<Mesh> {
-    let path = data_root().join("meshes").join(name);
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        eprintln!("SKIPPED: {} is absent; set PAINTCOPTER_DATA", path.display());
-        return None;
-    };
-    Some(if text.starts_with("OFF") { read_off(&text) } else { read_obj(&text) })
+/// A mesh of the folder `tests/fixtures`.
+pub fn fixture(name: &str) -> Mesh {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name);
+    read(&std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display())))
 }
 
-fn data_root() -> PathBuf {
-    std::env::var_os("PAINTCOPTER_DATA")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from)
+/// A mesh of the data folder that `PAINTCOPTER_DATA` names; `None`, said on stderr, where there is none.
+///
+/// # Panics
+/// If `PAINTCOPTER_REQUIRE_DATA` is set and there is none.
+pub fn data_mesh(name: &str) -> Option<Mesh> {
+    let text = std::fs::read_to_string(data_root()?.join(name)).ok();
+    if text.is_none() {
+        absent(&format!("the data folder holds no meshes/{name}"));
+    }
+    text.map(|text| read(&text))
+}
+
+fn data_root() -> Option<PathBuf> {
+    let root = std::env::var_os("PAINTCOPTER_DATA").map(|root| PathBuf::from(root).join("meshes"));
+    if root.is_none() {
+        absent("PAINTCOPTER_DATA names no folder with meshes");
+    }
+    root
+}
+
+fn absent(what: &str) {
+    assert!(std::env::var_os("PAINTCOPTER_REQUIRE_DATA").is_none(), "{what}, and PAINTCOPTER_REQUIRE_DATA is set");
+    eprintln!("SKIPPED: {what}");
+}
+
+fn read(text: &str) -> Mesh {
+    if text.starts_with("OFF") { read_off(text) } else { read_obj(text) }
 }
 
 /// All meshes of the data folder, relative to `meshes/`, sorted.
 pub fn all_data_meshes() -> Vec<String> {
-    let root = data_root().join("meshes");
+    let Some(root) = data_root() else { return Vec::new() };
     let mut found = Vec::new();
     let mut folders = vec![root.clone()];
     while let Some(folder) = folders.pop() {
@@ -37,7 +57,7 @@ pub fn all_data_meshes() -> Vec<String> {
         }
     }
     if found.is_empty() {
-        eprintln!("SKIPPED: no meshes under {}; set PAINTCOPTER_DATA", root.display());
+        absent("there are no meshes in the data folder");
     }
     found.sort();
     found

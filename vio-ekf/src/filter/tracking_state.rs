@@ -19,6 +19,8 @@ pub(crate) struct LandmarkTrack {
 }
 
 impl LandmarkTrack {
+    // The track keeps the patch: a reference would be copied.
+    #[allow(clippy::large_types_passed_by_value)]
     pub(crate) fn new(id: u64, patch: Option<Patch>) -> Self {
         Self { id, failures: 0, in_view: true, patch }
     }

@@ -73,7 +73,7 @@ pub struct PoseFusion {
 /// The estimate of a source.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SourceEstimate {
-    /// Pose of the world in the source's source_state.
+    /// Pose of the world in the source's frame.
     pub source_from_world: Isometry3<f64>,
     /// Pose of the source's sensor on the body.
     pub body_from_sensor: Isometry3<f64>,

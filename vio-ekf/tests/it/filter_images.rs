@@ -140,7 +140,7 @@ fn starts_only_from_a_rest_that_it_sees() {
 #[test]
 fn light_that_changes_does_not_look_like_motion() {
     let mut still = Still::new(11);
-    // Rest is not recognised here: every image is measured.
+    // Standing still is not recognised here: every image is measured.
     let stationary = vio_ekf::StationarySettings { min_duration_s: f64::INFINITY, ..Default::default() };
     let mut vio = Vio::new(small_camera(), still.noise, Settings { stationary, ..Settings::default() }).unwrap();
     let picture = boxes(3);

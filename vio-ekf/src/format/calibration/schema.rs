@@ -50,7 +50,7 @@ pub(super) struct ImuSection {
     pub(super) accelerometer_random_walk: Field<Numbers>,
 }
 
-/// A matrix as OpenCV writes it; `rows` and `cols` are known.
+/// A matrix as `OpenCV` writes it; `rows` and `cols` are known.
 #[derive(Deserialize)]
 pub(super) struct OpenCvMatrix {
     pub(super) data: Field<Numbers>,
@@ -144,7 +144,7 @@ impl<'de> Deserialize<'de> for Numbers {
     }
 }
 
-/// Reads a text without the lines that begin with `%`: OpenCV's header `%YAML:1.0` is not YAML.
+/// Reads a text without the lines that begin with `%`: the header of `OpenCV`, `%YAML:1.0`, is not YAML.
 pub(super) fn parse<T: DeserializeOwned>(text: &str) -> Result<T, Error> {
     let lines = text.trim_start_matches('\u{feff}').lines();
     let yaml: String = lines.flat_map(|line| [if line.starts_with('%') { "" } else { line }, "\n"]).collect();

@@ -17,6 +17,8 @@ pub(super) struct Section<'a> {
     pub(super) line: u64,
 }
 
+// A field is what the schema gives: a key that may be missing.
+#[allow(clippy::ref_option)]
 impl Section<'_> {
     pub(super) fn refuse(&self, line: u64, key: &str, what: &str) -> Error {
         let what = format!("`{}{key}`: {what}", self.prefix);

@@ -170,7 +170,7 @@ fn equations(
     for (&k, point) in kept.iter().zip(points) {
         let observations = &window.input.points[k];
         let anchor = &body_poses[observations[0].0];
-        // A weak prior keeps points without parallax in body_pose.
+        // A weak prior keeps points without parallax in place.
         let (mut own, mut link, mut right) = (Matrix3::zeros(), SMatrix::<f64, 3, GLOBAL>::zeros(), Vector3::zeros());
         own[(2, 2)] = 1e-9;
         let mut square = 0.0;
