@@ -1,7 +1,7 @@
 //! Noise settings that fit recordings: five factors, found without derivatives.
 //!
 //! What a data sheet says about noise is not what a filter needs: vibration, lost samples and a model that is not the world
-//! add to it. [`tune`] looks for the factors that make the errors over some recordings small and the covariances honest.
+//! add to it. [`tune`] looks for the factors that make the errors over some recordings small and the covariances consistent.
 //!
 //! ```text
 //! cost = mean over recordings of  ln ATE + w · mean |ln (NEES / 3)|
@@ -83,7 +83,7 @@ pub struct Tuned {
 pub struct Score {
     /// Root mean square position error after alignment of position and yaw, m.
     pub ate: f64,
-    /// Mean normalised squared error of position, attitude and velocity; 3 is honest.
+    /// Mean normalised squared error of position, attitude and velocity; 3 is consistent.
     pub nees: [f64; 3],
     /// Share of the recording without a usable estimate, 0 to 1.
     pub lost: f64,
@@ -95,12 +95,12 @@ const LEAST_ATE: f64 = 1e-4;
 /// that the search finds its way back.
 const LOSS_FACTOR: f64 = 1e4;
 
-/// The cost of some recordings: its exponential is an error in metres, worse by the share of dishonesty.
+/// The cost of some recordings: its exponential is an error in metres, worse by the inconsistency.
 pub fn cost(scores: &[Score], consistency_weight: f64) -> f64 {
     let one = |score: &Score| {
-        let dishonesty = score.nees.iter().map(|nees| (nees / 3.0).clamp(1e-3, 1e6).ln().abs()).sum::<f64>() / 3.0;
+        let inconsistency = score.nees.iter().map(|nees| (nees / 3.0).clamp(1e-3, 1e6).ln().abs()).sum::<f64>() / 3.0;
         let error = score.ate.clamp(LEAST_ATE, 1e3).ln();
-        error + consistency_weight * dishonesty + score.lost * LOSS_FACTOR.ln()
+        error + consistency_weight * inconsistency + score.lost * LOSS_FACTOR.ln()
     };
     scores.iter().map(one).sum::<f64>() / scores.len().max(1) as f64
 }

@@ -14,7 +14,7 @@ pub struct PoseCovariance {
     pub attitude: Matrix3<f64>,
 }
 
-/// Normalised squared errors `eᵀ P⁻¹ e`: chi-square of 3 degrees of freedom, mean 3, if the covariance is honest.
+/// Normalised squared errors `eᵀ P⁻¹ e`: chi-square of 3 degrees of freedom, mean 3, if the covariance is consistent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Nees {
     /// Of the position, one per pose.

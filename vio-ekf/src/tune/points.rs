@@ -121,7 +121,7 @@ fn see(
     seen
 }
 
-/// A start drawn around the truth: one that is exact would make any covariance look honest.
+/// A start drawn around the truth: one that is exact would make any covariance look consistent.
 fn drawn_start(motion: &Motion, stamp: Stamp, biases: [Vector3<f64>; 2], rng: &mut Rng) -> InitialState {
     let sigma = InitialSigma::default();
     let pose = motion.world_from_body;

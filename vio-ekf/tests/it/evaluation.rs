@@ -249,7 +249,7 @@ fn chi_square_equals_scipy() {
 }
 
 #[test]
-fn normalised_errors_of_honest_covariances_average_three() {
+fn normalised_errors_of_consistent_covariances_average_three() {
     let mut rng = Rng::new(10);
     let (mut reference, mut estimate, mut covariances) = (vec![], vec![], vec![]);
     // Twelve uniforms minus six: variance 1, near enough to normal.
@@ -267,9 +267,9 @@ fn normalised_errors_of_honest_covariances_average_three() {
             attitude: attitude_root * attitude_root.transpose(),
         });
     }
-    let honest = nees(&reference, &estimate, &covariances).unwrap();
+    let consistent = nees(&reference, &estimate, &covariances).unwrap();
     let (low, high) = chi2::mean_band(3, runs, 0.999).unwrap();
-    for mean in [honest.position_stats.mean, honest.attitude_stats.mean] {
+    for mean in [consistent.position_stats.mean, consistent.attitude_stats.mean] {
         assert!(low < mean && mean < high, "{low} {mean} {high}");
     }
     // By hand: an error of 2σ along one axis.

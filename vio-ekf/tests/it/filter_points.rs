@@ -1,4 +1,4 @@
-//! The filter on points: accuracy, honesty, and what it must not claim to know.
+//! The filter on points: accuracy, consistency, and what it must not claim to know.
 
 use crate::support::flight::{Flight, nees};
 use nalgebra::{Isometry3, SVector};

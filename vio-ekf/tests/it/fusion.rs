@@ -1,4 +1,4 @@
-//! Poses of others and an inertial sensor: accuracy, honesty, and the order of arrival.
+//! Poses of others and an inertial sensor: accuracy, consistency, and the order of arrival.
 
 use crate::support::flight::{Flight, nees};
 use crate::support::rng::Rng;

@@ -7,7 +7,7 @@ mod dead_reckoning;
 mod evaluation;
 mod evo;
 mod filter_abuse;
-mod filter_honesty;
+mod filter_consistency;
 mod filter_images;
 mod filter_initialization;
 mod filter_points;

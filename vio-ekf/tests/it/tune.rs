@@ -39,17 +39,18 @@ fn an_interrupted_search_goes_on_where_it_stopped() {
 }
 
 #[test]
-fn the_cost_is_an_error_and_honesty_in_logarithms() {
-    let honest = Score { ate: 0.1, nees: [3.0; 3], lost: 0.0 };
-    assert!((cost(&[honest], 0.7) - 0.1_f64.ln()).abs() < 1e-12);
+fn the_cost_is_an_error_and_a_consistency_in_logarithms() {
+    let consistent = Score { ate: 0.1, nees: [3.0; 3], lost: 0.0 };
+    assert!((cost(&[consistent], 0.7) - 0.1_f64.ln()).abs() < 1e-12);
     // Twice the error in one of two recordings: a factor of the root of two.
-    let worse = Score { ate: 0.2, ..honest };
-    assert!((cost(&[honest, worse], 0.7) - (0.1_f64.ln() + 0.5 * 2_f64.ln())).abs() < 1e-12);
-    // Too bold and too timid by the same factor cost the same.
-    let (bold, timid) = (Score { nees: [12.0; 3], ..honest }, Score { nees: [0.75; 3], ..honest });
-    assert!((cost(&[bold], 0.5) - cost(&[timid], 0.5)).abs() < 1e-12);
-    assert!((cost(&[bold], 0.5) - (0.1_f64.ln() + 0.5 * 4_f64.ln())).abs() < 1e-12);
-    assert!(cost(&[Score { lost: 0.5, ..honest }], 0.5) > cost(&[Score { lost: 0.25, ..honest }], 0.5));
+    let worse = Score { ate: 0.2, ..consistent };
+    assert!((cost(&[consistent, worse], 0.7) - (0.1_f64.ln() + 0.5 * 2_f64.ln())).abs() < 1e-12);
+    // Overconfident and conservative by the same factor cost the same.
+    let (overconfident, conservative) =
+        (Score { nees: [12.0; 3], ..consistent }, Score { nees: [0.75; 3], ..consistent });
+    assert!((cost(&[overconfident], 0.5) - cost(&[conservative], 0.5)).abs() < 1e-12);
+    assert!((cost(&[overconfident], 0.5) - (0.1_f64.ln() + 0.5 * 4_f64.ln())).abs() < 1e-12);
+    assert!(cost(&[Score { lost: 0.5, ..consistent }], 0.5) > cost(&[Score { lost: 0.25, ..consistent }], 0.5));
     assert!(cost(&[Score { ate: f64::MAX, nees: [f64::MAX; 3], lost: 1.0 }], 0.5).is_finite());
 }
 
@@ -74,6 +75,15 @@ fn known_noise_costs_less_than_wrong_noise() {
     assert!(
         (settings.landmarks.pixel_sigma - 2.0).abs() < 1e-4 && (settings.patches.intensity_sigma - 4.0).abs() < 1e-4
     );
+}
+
+/// A frame or a sign that is wrong in one of the errors costs hundreds.
+#[test]
+fn the_score_of_the_right_noise_is_consistent() {
+    let recording =
+        PointRecording::simulate(&spline(5, 8.0), &camera(), &ImuModel::default(), 1.0, GRAVITY, 5).unwrap();
+    let score = recording.score(&ImuNoise::default(), &Settings::default(), &[0.0; 5]).unwrap();
+    assert!(score.lost == 0.0 && score.nees.iter().all(|nees| (0.1..12.0).contains(nees)), "{score:?}");
 }
 
 #[test]

@@ -195,7 +195,7 @@ fn order_of_arrival_does_not_matter() {
 }
 
 #[test]
-fn everything_together_is_honest_and_better_than_its_poses() {
+fn everything_together_is_consistent_and_better_than_its_poses() {
     let runs: u64 = std::env::var("RUNS").map_or(12, |text| text.parse().unwrap());
     let (mut sums, mut square, mut count) = (Vec::<[f64; 5]>::new(), 0.0, 0.0);
     for seed in 1..=runs {

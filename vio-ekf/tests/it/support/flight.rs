@@ -185,7 +185,7 @@ impl Flight {
     }
 }
 
-/// Normalised squared errors of position, attitude, velocity, both biases: each of mean 3 if the filter is honest.
+/// Normalised squared errors of position, attitude, velocity, both biases: each of mean 3 if the filter is consistent.
 pub(crate) fn nees(o: &Odometry, truth: &Motion, biases: &[Vector3<f64>; 2]) -> [f64; 5] {
     let rotation = o.world_from_body.rotation;
     let velocity = truth.world_from_body.rotation.inverse() * truth.velocity_in_world;

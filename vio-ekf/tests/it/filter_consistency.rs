@@ -41,7 +41,7 @@ fn run(name: &str, seed: u64, seconds: f64, images: bool, settings: &Settings) -
 }
 
 /// Share of the time in the band, and mean over all, of `runs` runs.
-fn honesty(name: &str, runs: u64, seconds: f64, images: bool, settings: &Settings) -> Option<[(f64, f64); 5]> {
+fn consistency(name: &str, runs: u64, seconds: f64, images: bool, settings: &Settings) -> Option<[(f64, f64); 5]> {
     let mut sums: Vec<[f64; 5]> = Vec::new();
     for seed in 1..=runs {
         let squares = run(name, seed, seconds, images, settings)?;
@@ -83,7 +83,7 @@ fn report(images: bool, settings: &Settings, (runs, seconds): (u64, u64), measur
     let asked = (number("RUNS", runs), number("SECONDS", seconds));
     let wanted = std::env::var("SEQUENCE").ok();
     for name in SEQUENCES.iter().filter(|name| wanted.as_ref().is_none_or(|wanted| wanted == **name)) {
-        let Some(found) = honesty(name, asked.0, asked.1 as f64, images, settings) else { continue };
+        let Some(found) = consistency(name, asked.0, asked.1 as f64, images, settings) else { continue };
         for (what, (inside, mean)) in NAMES.iter().zip(found) {
             eprintln!("{name} {what}: {:.0} % of the time in the band, mean {mean:.2}", 100.0 * inside);
         }
@@ -98,10 +98,10 @@ fn on_points() -> Settings {
 }
 
 /// A guard for every day, over the first ten seconds, which are the hardest: the suites below say how consistent the filter is.
-/// Of eight runs the band is from 1.5 to 4.9.
+/// Of eight runs the band is from 1.6 to 4.9.
 #[test]
 fn claims_are_as_near_the_truth_as_they_were_while_painting() {
-    let found = honesty("paint_1", 8, 10.0, false, &on_points()).unwrap();
+    let found = consistency("paint_1", 8, 10.0, false, &on_points()).unwrap();
     let measured = [(100.0, 3.36), (96.0, 3.94), (95.0, 3.24), (92.0, 3.44), (100.0, 3.90)];
     assert_no_worse("paint_1", &found, &measured, (5.0, 0.2));
 }
@@ -118,7 +118,7 @@ const ON_POINTS: [(&str, Figures); 6] = [
     ("paint_2", [(100.0, 3.18), (100.0, 2.99), (94.0, 3.14), (96.0, 3.13), (99.0, 3.0)]),
 ];
 
-/// Fifty runs of 30 s of each sequence on points: `cargo test --release -p vio-ekf --test it filter_honesty::all_sequences_on_points
+/// Fifty runs of 30 s of each sequence on points: `cargo test --release -p vio-ekf --test it filter_consistency::all_sequences_on_points
 /// -- --ignored --nocapture`. `RUNS`, `SECONDS` and `SEQUENCE` ask for others, which are printed only; `VIO_TRACE` shows the mean
 /// of each second.
 #[test]
@@ -137,7 +137,7 @@ const ON_IMAGES: [(&str, Figures); 6] = [
     ("paint_2", [(93.0, 2.56), (91.0, 2.41), (79.0, 2.33), (92.0, 2.59), (98.0, 3.01)]),
 ];
 
-/// Ten runs of 8 s on rendered images: `... filter_honesty::all_sequences_on_images -- --ignored --nocapture`.
+/// Ten runs of 8 s on rendered images: `... filter_consistency::all_sequences_on_images -- --ignored --nocapture`.
 #[test]
 #[ignore = "renders 9,600 images"]
 fn all_sequences_on_images() {
