@@ -3,9 +3,9 @@
 //!
 //! [`Vio`] takes inertial samples and grey images, and gives pose, velocity and covariance at the rate of the samples. It
 //! compares patches of the image directly and keeps landmarks as bearing and inverse distance in the camera's axes; position and
-//! yaw are unobservable, and no measurement of its own changes what it knows of them. Its covariances are consistent over whole
-//! flights on images, and too small in the first seconds after a start before a scene that is much farther away than expected: the
-//! tests hold the figures per sequence, the book prints them. Beside it the crate holds poses over time with exact nanosecond
+//! yaw are unobservable, and no measurement of its own changes what it knows of them. Over whole flights on
+//! images most of its covariances are consistent and the others mostly too large; in the first seconds before a scene that is much
+//! farther away than expected they are too small. The tests hold the figures per sequence, the book prints them. Beside it the crate holds poses over time with exact nanosecond
 //! stamps, reads and writes them as TUM, EuRoC and KITTI text, and measures how well one trajectory agrees with another: pairing in
 //! time, alignment, absolute and relative errors, consistency of covariances. A B-spline gives smooth motion with exact rates and
 //! accelerations, which is what ideal inertial sensors read.
