@@ -361,7 +361,7 @@ fn weights_that_are_cut_or_foreign_are_named() {
     // A header that claims to be longer than any file, and whole weights of another network.
     let endless = [&[0xff; 8][..], &shipped[8..]].concat();
     let files = [
-        ("empty", &[][..], "shorter than its header"),
+        ("empty", &[][..], "cut off"),
         ("header", &shipped[..100], "cut off"),
         ("half", &shipped[..shipped.len() / 2], "cut off"),
         ("last", &shipped[..shipped.len() - 1], "cut off"),
