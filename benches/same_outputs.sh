@@ -27,8 +27,7 @@ run() {
             "$bin/vio" --euroc recording --out mono >>log 2>&1
             "$bin/vio" --euroc recording --stereo --out stereo >>log 2>&1
             "$bin/vio" --mcap recording/recording.mcap --calibrate --out mcap >>log 2>&1
-            "$bin/vio" eval mono/truth.tum mono/trajectory.tum >eval.txt 2>>log ||
-                "$bin/vio" eval recording/truth.tum mono/trajectory.tum >eval.txt 2>>log || true
+            "$bin/vio" eval recording/truth.tum mono/trajectory.tum >eval.txt 2>>log
             ;;
         paint-image)
             cp "$root/docs/src/images/rock.png" picture.png

@@ -1,15 +1,14 @@
-//! Visual-inertial odometry: a camera, or a pair, and an inertial sensor in an iterated Kalman filter; trajectories, their file
-//! formats and their evaluation.
-//!
-//! The filter is not consistent in every case: its first seconds are overconfident before a scene much farther away than
-//! expected, and conservative elsewhere. `docs/src/results.md` has the NEES of each sequence, and tests keep it there.
+//! Visual-inertial odometry: a camera, or a pair, and an inertial sensor in an iterated extended Kalman filter; trajectories, their
+//! file formats and their evaluation.
 //!
 //! [`Vio`] takes inertial samples and grey images, and gives pose, velocity and covariance at the rate of the samples. It
-//! compares patches of the image directly, keeps landmarks as bearing and inverse distance in the camera's axes, and never
-//! learns anything about position and yaw, which nothing can tell it. Beside it the crate holds poses over time with exact nanosecond stamps, reads and writes them as TUM, EuRoC and KITTI text,
-//! and measures how well one trajectory agrees with another: pairing in time, alignment, absolute and relative errors,
-//! consistency of covariances. A B-spline gives smooth motion with exact rates and accelerations, which is what ideal
-//! inertial sensors read.
+//! compares patches of the image directly and keeps landmarks as bearing and inverse distance in the camera's axes; position and
+//! yaw are unobservable, and no measurement of its own changes what it knows of them. Over whole flights on
+//! images most of its covariances are consistent and the others mostly too large; in the first seconds before a scene that is much
+//! farther away than expected they are too small. The tests hold the figures per sequence, the book prints them. Beside it the crate holds poses over time with exact nanosecond
+//! stamps, reads and writes them as TUM, EuRoC and KITTI text, and measures how well one trajectory agrees with another: pairing in
+//! time, alignment, absolute and relative errors, consistency of covariances. A B-spline gives smooth motion with exact rates and
+//! accelerations, which is what ideal inertial sensors read.
 //!
 //! ```text
 //! p' = R v    v' = f − ω × v + Rᵀ g    R' = R hat(ω)    μ' = −ω_c × μ − (I − μμᵀ) v_c ρ    ρ' = ρ² μ·v_c
@@ -41,6 +40,7 @@
 //! | bearing with a tangent basis | Hertzberg et al. 2013; Bloesch et al. 2017 | [`Bearing`] |
 //! | iterated update | Bell and Cathey 1993 | [`UpdateSettings`] |
 //! | start in motion | gyroscope: Kneip and Lynen 2013; closed form: Martinelli 2014; refined: ours | [`DynamicInitializationSettings`] |
+//! | any other sensor: position, height, range, wheel | the update of the literature; the trait: ours | [`Measurement`], [`Vio::update`] |
 //! | noise that samples show | ours | [`ImuSettings`] |
 //! | inertial sensor and foreign poses | Weiss and Siegwart 2011; Lynen et al. 2013 (thesis, Paper II, section 4) | [`PoseFusion`] |
 //! | poses as measurements of the odometry | thesis, outlook: one estimator instead of two; ours | [`Vio::pose`], [`UnifiedVio`] |
@@ -112,3 +112,8 @@ pub use samples::{ImageView, Imu, ImuNoise};
 pub use spline::{Motion, Spline};
 pub use stamp::{InvalidStamp, Stamp};
 pub use trajectory::{Trajectory, interpolate, path_lengths};
+
+/// The recipe of the README, as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

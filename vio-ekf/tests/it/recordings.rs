@@ -117,7 +117,7 @@ fn what_is_wrong_is_named() {
     assert_eq!(asl::read_imu("1,0,0,0,0,0,9.8\n1,1,1,1,1,1,1\n2,0,0,0,0,0,9.8\n").unwrap().len(), 2);
 }
 
-/// `%YAML:1.0` is no directive of YAML, a matrix has a tag of OpenCV's, lists go on over lines, numbers stand in quotes.
+/// `%YAML:1.0` is no directive of YAML, a matrix has a tag of `OpenCV`'s, lists go on over lines, numbers stand in quotes.
 #[test]
 fn what_opencv_writes_is_read() {
     let text = "\u{feff}%YAML:1.0\n---\nT_BS: !!opencv-matrix\n   rows: 4\n   cols: 4\n   dt: d\n   \
