@@ -13,7 +13,7 @@ from pathlib import Path
 
 # Keys and lines of what the machine took, which no two runs share.
 TIME = re.compile(r"^planning_|^wall_|cpu|peak_rss|_(ms|us)(_|$)|per_second")
-TIME_LINE = re.compile(r"processor time|planning|wall clock|\bms\b|resident|took")
+TIME_LINE = re.compile(r"processor time|planning|wall clock|\bms\b|resident|took|computed in")
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 TEXT = {".json", ".md", ".txt", ".toml", ".yaml", ""}
 
