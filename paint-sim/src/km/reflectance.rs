@@ -10,7 +10,7 @@ use super::domain::{LARGEST, bounded, domain, tanhc};
 /// `R = (Rg (e - p^2) + p (1-e)) / (1 - p^2 e - p Rg (1-e))` where absorption rules, since there the first numerator
 /// would cancel. Either way the relative error is a few units in the last place times `1 + g d`.
 ///
-/// Arguments outside their domain (negative, NaN, ground above 1) are moved to its border; [`Layer`] and
+/// Arguments outside their domain (negative, NaN, ground above 1) are moved to its border; [`Layer`](super::Layer) and
 /// [`crate::paint::Paint`] reject them instead.
 pub fn reflectance(k: f64, s: f64, thickness: f64, ground: f64) -> f64 {
     let (k, s, d, rg) = domain(k, s, thickness, ground);

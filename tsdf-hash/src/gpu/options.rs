@@ -6,7 +6,7 @@
 pub struct GpuOptions {
     /// Part of the adapter's name; empty for the best one (discrete before integrated).
     pub adapter: String,
-    /// Whether an adapter may be a program on the processor, such as Mesa's lavapipe: slower than [`Map`], and
+    /// Whether an adapter may be a program on the processor, such as Mesa's lavapipe: slower than [`Map`](crate::Map), and
     /// meant for tests.
     pub software: bool,
     /// The largest single buffer, bytes; the adapter's own limit holds in any case (ours: none).
