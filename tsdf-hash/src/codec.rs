@@ -1,5 +1,9 @@
 //! The block codec: voxel blocks in few bytes, without loss, for evicted blocks and map files.
 //!
+//! Kept beside `lz4_flex` 0.14, measured on 3133 coloured blocks of 7-Scenes at 1 cm: 0.143 of the 7168 bytes where LZ4 leaves
+//! 0.271 (0.243 with its bytes sorted by significance), in 6.8 us against 8.4 and back in 5.5 us against 7.6
+//! (`cargo bench -p paintcopter-benches --bench tsdf_codec`).
+//!
 //! ```text
 //! mask (voxels that hold anything) · weights · distances · mask (coloured voxels) · counts · reds · greens · blues
 //! mask    8 bytes, a bit per row of 8 voxels that is not empty; then a byte for each of those rows
@@ -18,6 +22,17 @@ pub(crate) const MAX_BYTES: usize = 2 * (8 + VOXELS / 8) + 6 * (VOXELS / GROUP) 
 const GROUP: usize = 8;
 /// Numbers are written and read as 16 bytes at a time, of which only the first count.
 const SLACK: usize = 16;
+
+/// Appends a block in few bytes, without loss: what map files hold, and what to send elsewhere.
+pub fn encode_block(block: &VoxelBlock, out: &mut Vec<u8>) {
+    encode(block, out);
+}
+
+/// A block from the bytes of [`encode_block`]; `None` if they are none.
+pub fn decode_block(bytes: &[u8]) -> Option<VoxelBlock> {
+    let mut block = VoxelBlock::ZERO;
+    decode_add(bytes, &mut block).map(|()| block)
+}
 
 /// Appends a block.
 pub(crate) fn encode(block: &VoxelBlock, out: &mut Vec<u8>) {

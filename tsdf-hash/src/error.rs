@@ -118,7 +118,10 @@ pub enum Error {
         offset: u64,
     },
     /// A map's file of another version of the format.
-    #[error("the map's file is of version {found} (byte 8), this crate reads version {known}")]
+    #[error(
+        "the map's file is of version {found} (byte 8), this crate reads version {known}: save it again with the release \
+         that wrote it, as a mesh, or scan anew"
+    )]
     UnsupportedVersion {
         /// Its version.
         found: u32,

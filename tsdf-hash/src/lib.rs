@@ -83,6 +83,7 @@ pub struct Readme;
 
 pub use blocks::voxel_block::VoxelBlock;
 pub use changes::{BlockChanges, MapVersion};
+pub use codec::{decode_block, encode_block};
 pub use dense_map::DenseMap;
 pub use derived_blocks::UpdateReport;
 pub use distance_field::field::DistanceField;

@@ -21,6 +21,7 @@ use nalgebra::{Isometry3, Point3};
 use random::Random;
 use scene::{Shot, look_at, room};
 use tsdf_hash::{Error, Map, MapFile, MemoryLimits, Settings};
+use twox_hash::XxHash3_64;
 
 /// Bytes that a thread holds, and the most it has held at once.
 #[derive(Clone, Copy)]
@@ -190,24 +191,6 @@ fn a_kilometre_of_corridor_fits_what_ten_metres_need() {
     assert!(ALL.get().now - start[0] < 1024);
 }
 
-/// The format's own checksum, from its description: a chain of splitmix64 finalisers over words of eight bytes.
-fn checksum(bytes: &[u8]) -> u64 {
-    let mix64 = |x: u64| {
-        let x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        x ^ (x >> 31)
-    };
-    let words = bytes.len() / 8 + 1;
-    let mut padded = bytes.to_vec();
-    padded.resize(8 * words, 0);
-    let state = padded
-        .as_chunks::<8>()
-        .0
-        .iter()
-        .fold(0, |state, word| mix64(state ^ u64::from_le_bytes(*word)).wrapping_add(1));
-    mix64(state ^ bytes.len() as u64)
-}
-
 /// Makes all checksums of the head right again, as far as the sections it names exist.
 fn seal(bytes: &mut [u8]) {
     if bytes.len() < 152 {
@@ -217,11 +200,11 @@ fn seal(bytes: &mut [u8]) {
         let number = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap()) as usize;
         let (at, length) = (number(24 + 24 * k), number(32 + 24 * k));
         if let Some(section) = at.checked_add(length).and_then(|end| bytes.get(at..end)) {
-            let sum = checksum(section);
+            let sum = XxHash3_64::oneshot(section);
             bytes[40 + 24 * k..48 + 24 * k].copy_from_slice(&sum.to_le_bytes());
         }
     }
-    let sum = checksum(&bytes[..144]);
+    let sum = XxHash3_64::oneshot(&bytes[..144]);
     bytes[144..152].copy_from_slice(&sum.to_le_bytes());
 }
 

@@ -81,6 +81,7 @@ impl TrilinearCell {
 }
 
 /// A point in voxels from the first voxel's centre, the centre below it along all axes, and that one's number.
+#[inline(always)]
 fn lowest_voxel(settings: &Settings, point_in_world: &Point3<f64>) -> Option<(Vector3<f64>, Vector3<f64>, [i32; 3])> {
     let voxel = point_in_world.coords / settings.voxel_size - Vector3::repeat(0.5);
     let low = voxel.map(f64::floor);

@@ -53,6 +53,12 @@ impl VoxelBlock {
         true
     }
 
+    /// The sums of a voxel: `S` of the distances in steps of `μ / 32767`, `W` of the weights, and those of R, G, B in six bits
+    /// with the number of coloured observations; `None` if there is no such voxel.
+    pub fn sums(&self, voxel: usize) -> Option<(i32, u16, [u16; 4])> {
+        Some((*self.distance.get(voxel)?, self.weight[voxel], self.colour[voxel]))
+    }
+
     /// Sum of the weights of a voxel's observations; 0 where nothing was observed.
     pub fn weight(&self, voxel: usize) -> u16 {
         self.weight.get(voxel).copied().unwrap_or(0)

@@ -5,7 +5,7 @@ use crate::file::byte_reader::ByteReader;
 use crate::file::checksum::Checksum;
 
 pub(crate) const MAGIC: [u8; 8] = *b"TSDFHASH";
-pub(crate) const VERSION: u32 = 2;
+pub(crate) const VERSION: u32 = 3;
 /// Written as all numbers are, the lowest byte first.
 const BYTE_ORDER: u32 = 0x0102_0304;
 /// Bytes of the header.

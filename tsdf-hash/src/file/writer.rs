@@ -87,7 +87,7 @@ impl Output {
 
     /// Writes the sums of all copies; returns their index, too.
     fn blocks(&mut self, storage: &BlockStorage) -> Result<(Section, Vec<u8>), Error> {
-        let (start, mut checksum) = (self.at, Checksum::default());
+        let (start, mut checksum) = (self.at, Checksum::new());
         let (mut index, mut bytes, mut sum) = (Vec::new(), Vec::new(), Box::new(VoxelBlock::ZERO));
         for key in storage.sorted_keys() {
             let history = storage.total(key, &mut sum)?;

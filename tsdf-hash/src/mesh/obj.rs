@@ -1,4 +1,6 @@
 //! Meshes as Wavefront OBJ.
+//!
+//! `tobj`, the well-kept crate for the format, reads only.
 
 use std::io::Write;
 

@@ -1,4 +1,7 @@
 //! Meshes as binary PLY.
+//!
+//! Written here rather than by `ply-rs-bw`, which the binaries of the workspace read with: that keeps a map of properties per
+//! vertex, and brings a parser generator that a library which only writes has no use for.
 
 use std::io::Write;
 

@@ -30,6 +30,12 @@ fn a_change_of_one_voxel_reaches_every_cell_around_it() {
             assert_eq!(mesher.update(&map).unwrap().changed, 1);
             assert_eq!(mesher.mesh().faces.len(), faces, "corner {corner}");
             assert_eq!(mesher.mesh(), map.mesh());
+            // Half a voxel from the centre of the solid one, along the axes.
+            let centre = [0, 1, 2].map(|k| if corner >> k & 1 == 1 { 0.075 } else { 0.005 });
+            for position in &mesher.mesh().positions {
+                let offset = nalgebra::Vector3::from(position.map(f64::from)) - nalgebra::Vector3::from(centre);
+                assert!((offset.norm() - 0.005).abs() < 1e-6, "corner {corner}: {position:?}");
+            }
         }
     }
 }

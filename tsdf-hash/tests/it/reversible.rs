@@ -53,17 +53,18 @@ fn order_and_threads_do_not_show() {
 
 #[test]
 fn what_is_taken_out_was_never_there() {
-    let shots = room::tour(6, 4, &Isometry3::identity());
-    let mut map = fused(&shots, &[0, 1, 2, 3, 4, 5], 1);
+    // A quarter of what a camera sees is seen by the next one, too: most blocks are changed and not just removed.
+    let shots = &room::tour(12, 4, &Isometry3::identity())[..6];
+    let mut map = fused(shots, &[0, 1, 2, 3, 4, 5], 1);
     for k in [2, 0, 5] {
         take_out(&mut map, &shots[k], k);
     }
-    let rest = fused(&shots, &[1, 3, 4], 2);
+    let rest = fused(shots, &[1, 3, 4], 2);
     assert_eq!((map.hash(), map.blocks()), (rest.hash(), rest.blocks()));
     // A frame that moves to its corrected pose.
     take_out(&mut map, &shots[3], 3);
     add(&mut map, &shots[0], 0);
-    assert_eq!(map.hash(), fused(&shots, &[0, 1, 4], 1).hash());
+    assert_eq!(map.hash(), fused(shots, &[0, 1, 4], 1).hash());
     for k in [4, 1, 0] {
         take_out(&mut map, &shots[k], k);
     }
