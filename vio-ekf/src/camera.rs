@@ -1,14 +1,13 @@
 mod distortion;
 mod fisheye;
+pub(crate) mod model;
 
 use nalgebra::{Isometry3, Matrix2x3, Unit, Vector2, Vector3};
 
 use crate::Error;
 use crate::error::invalid;
+use model::{CameraModel, check_side};
 use crate::trajectory::is_finite;
-
-/// Longest image side that is believed.
-const MAX_SIDE: usize = 1 << 15;
 
 /// How a lens departs from a pinhole.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -96,9 +95,7 @@ impl Camera {
     /// Refuses a calibration that no camera has: empty image, focal length not positive, anything not finite.
     pub fn check(&self) -> Result<(), Error> {
         for (name, side) in [("width", self.width), ("height", self.height)] {
-            if side == 0 || side > MAX_SIDE {
-                return Err(invalid(name, side as f64, "must be between 1 and 32768 pixels"));
-            }
+            check_side(name, side)?;
         }
         for (name, value) in [("fx", self.fx), ("fy", self.fy)] {
             if !(value > 0.0 && value.is_finite()) {
@@ -176,6 +173,36 @@ impl Camera {
 
     fn pixel(&self, distorted: &Vector2<f64>) -> Vector2<f64> {
         Vector2::new(self.fx * distorted.x + self.cx, self.fy * distorted.y + self.cy)
+    }
+}
+
+impl CameraModel for Camera {
+    fn image_size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
+    fn body_from_camera(&self) -> Isometry3<f64> {
+        self.body_from_camera
+    }
+
+    fn project_with_jacobian(&self, point_in_camera: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
+        Self::project_with_jacobian(self, point_in_camera)
+    }
+
+    fn bearing(&self, pixel: &Vector2<f64>) -> Option<Unit<Vector3<f64>>> {
+        Self::bearing(self, pixel)
+    }
+
+    fn project(&self, point_in_camera: &Vector3<f64>) -> Option<Vector2<f64>> {
+        Self::project(self, point_in_camera)
+    }
+
+    fn focal_length(&self) -> f64 {
+        self.fx.min(self.fy)
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        Self::check(self)
     }
 }
 

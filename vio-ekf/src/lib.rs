@@ -79,6 +79,7 @@ mod trajectory;
 #[cfg(feature = "tune")]
 pub mod tune;
 
+pub use camera::model::CameraModel;
 pub use camera::{Camera, Distortion};
 pub use core::core_state::{CoreCovariance, CoreState};
 pub use core::divergence::{DivergenceCause, DivergenceSettings};

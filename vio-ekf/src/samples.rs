@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::trajectory::same_length;
-use crate::{Camera, Error, Stamp};
+use crate::{Error, Stamp};
 
 /// One sample of an inertial measurement unit, in the axes of the unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,9 +54,9 @@ impl<'a> ImageView<'a> {
         Ok(Self { width, height, data })
     }
 
-    /// Refuses an image that is not of a camera's size, or not of its own: the fields are public.
-    pub(crate) fn checked(&self, camera: &Camera) -> Result<Self, Error> {
-        let (given, expected) = ((self.width, self.height), (camera.width, camera.height));
+    /// Refuses an image that is not of the expected width and height, or not of its own: the fields are public.
+    pub(crate) fn checked(&self, expected: (usize, usize)) -> Result<Self, Error> {
+        let given = (self.width, self.height);
         if given != expected {
             return Err(Error::ImageSize { given, expected });
         }

@@ -26,6 +26,7 @@ mod camera;
 mod flight;
 mod imu;
 mod photometry;
+mod points;
 mod render;
 mod rng;
 mod room;
@@ -35,6 +36,7 @@ pub use camera::{Frame, SimulatedCamera};
 pub use flight::{camera_ahead, camera_ahead_right, painting_flight};
 pub use imu::{ImuLimits, ImuModel, ImuRecording, Vibration};
 pub use photometry::{Gain, Photometry};
+pub use points::{forward_pinhole, observe_points, swaying_flight};
 pub use room::{Cuboid, Occluder, Room, RoomSettings, Surface};
 pub use texture::Texture;
 

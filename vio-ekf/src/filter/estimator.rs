@@ -15,7 +15,7 @@ use crate::core::imu_buffer::ImuBuffer;
 use crate::core::initial_state::InitialState;
 use crate::core::odometry::Odometry;
 use crate::core::preintegration::ImuPreintegration;
-use crate::{Camera, Imu, ImuNoise, Stamp};
+use crate::{CameraModel, Imu, ImuNoise, Stamp};
 
 /// Most residuals of one update.
 pub(crate) const MAX_RESIDUALS: usize = 6;
@@ -42,7 +42,7 @@ pub(crate) struct Estimator {
 
 impl Estimator {
     pub(crate) fn new(
-        camera: &Camera,
+        camera: &dyn CameraModel,
         noise: ImuNoise,
         settings: &Settings,
         initial: &InitialState,
@@ -51,8 +51,8 @@ impl Estimator {
         let capacity = error_state::landmark(settings.landmarks.max_count);
         let state = VioState {
             core: CoreState::from(initial),
-            camera_position: camera.body_from_camera.translation.vector,
-            camera_attitude: camera.body_from_camera.rotation,
+            camera_position: camera.body_from_camera().translation.vector,
+            camera_attitude: camera.body_from_camera().rotation,
             time_offset: settings.calibration.time_offset_s,
             depth_prior: InverseDistance::new(settings.landmarks.inverse_distance),
             landmarks: Vec::with_capacity(settings.landmarks.max_count),

@@ -11,7 +11,7 @@ use super::settings::{PatchSettings, Settings};
 use super::state::landmark::{project, unproject};
 use super::stereo::stereo_camera::StereoCamera;
 use super::tracking_state::{LandmarkTrack, TrackingState};
-use crate::Camera;
+use crate::CameraModel;
 
 /// Inverse distance beyond which a landmark is too near to be tracked, 1/m.
 const MAX_INVERSE_DISTANCE: f64 = 20.0;
@@ -21,7 +21,7 @@ const MAX_INVERSE_DISTANCE: f64 = 20.0;
 pub(crate) fn align_and_update(
     tracking: &mut TrackingState,
     pyramid: &Pyramid,
-    camera: &Camera,
+    camera: &dyn CameraModel,
     settings: &Settings,
     report: &mut FrameReport,
 ) {
@@ -65,7 +65,7 @@ pub(crate) fn drop_landmarks(tracking: &mut TrackingState, settings: &Settings, 
 pub(crate) fn update_templates(
     tracking: &mut TrackingState,
     pyramid: &Pyramid,
-    camera: &Camera,
+    camera: &dyn CameraModel,
     settings: &PatchSettings,
 ) {
     let TrackingState { estimator, tracks } = tracking;
@@ -94,7 +94,7 @@ pub(crate) fn detect_landmarks(
     tracking: &mut TrackingState,
     frontend: &mut ImageFrontend,
     stereo: Option<&StereoCamera>,
-    camera: &Camera,
+    camera: &dyn CameraModel,
     settings: &Settings,
 ) -> usize {
     let ImageFrontend { pyramid, detector, next_id } = frontend;

@@ -8,13 +8,13 @@ use super::report::FrameReport;
 use super::settings::Settings;
 use super::state::landmark::unproject;
 use super::tracking_state::{LandmarkTrack, TrackingState};
-use crate::Camera;
+use crate::CameraModel;
 
 /// Updates with all landmarks that are among the points, unless the body is stationary.
 pub(crate) fn update_with_points(
     tracking: &mut TrackingState,
     points: &[PointObservation],
-    camera: &Camera,
+    camera: &dyn CameraModel,
     settings: &Settings,
     report: &mut FrameReport,
 ) {
@@ -66,7 +66,7 @@ pub(crate) fn drop_points(tracking: &mut TrackingState, settings: &Settings, rep
 pub(crate) fn add_points(
     tracking: &mut TrackingState,
     points: &[PointObservation],
-    camera: &Camera,
+    camera: &dyn CameraModel,
     settings: &Settings,
 ) -> usize {
     let before = tracking.tracks.len();

@@ -4,7 +4,7 @@ use super::estimator::Estimator;
 use super::frontend::patch::Patch;
 use super::landmarks;
 use super::settings::PatchSettings;
-use crate::{Camera, Imu, Stamp};
+use crate::{CameraModel, Imu, Stamp};
 
 /// What is remembered of a landmark besides its state.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,8 +60,8 @@ impl TrackingState {
     }
 
     /// Process noise of the templates over some seconds.
-    pub(crate) fn drift_templates(&mut self, camera: &Camera, settings: &PatchSettings, elapsed: f64) {
-        let drift = settings.template_drift / camera.fx.min(camera.fy);
+    pub(crate) fn drift_templates(&mut self, camera: &dyn CameraModel, settings: &PatchSettings, elapsed: f64) {
+        let drift = settings.template_drift / camera.focal_length();
         self.estimator.inflate_bearings(drift * drift * elapsed);
     }
 

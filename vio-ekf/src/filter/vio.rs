@@ -1,6 +1,8 @@
 //! The odometry as its callers see it, and one image as the steps of the algorithm.
 
-use nalgebra::Vector2;
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Vector2};
 
 use super::divergence_monitor::DivergenceMonitor;
 use super::estimator::Estimator;
@@ -27,9 +29,12 @@ use super::stationary::zero_velocity::{inflate_undetected_motion, zero_velocity_
 use super::stereo::stereo_camera::StereoCamera;
 use super::stereo::stereo_points::{check_pairs, update_with_second_points};
 use super::tracking_state::TrackingState;
+use crate::camera::model::check_model;
 use crate::core::initial_state::InitialState;
 use crate::core::odometry::Odometry;
-use crate::{Camera, Error, ImageView, Imu, ImuNoise, Stamp};
+use crate::error::invalid;
+use crate::format::calibration::{CameraCalibration, ImuCalibration};
+use crate::{CameraModel, Error, ImageView, Imu, ImuNoise, Stamp};
 
 /// A measurement this much ahead of the inertial samples, in seconds, is waiting for data that does not come.
 const MAX_AHEAD: f64 = 0.1;
@@ -70,7 +75,7 @@ const MAX_AHEAD: f64 = 0.1;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Vio {
-    camera: Camera,
+    camera: Arc<dyn CameraModel>,
     noise: ImuNoise,
     settings: Settings,
     last_sample: Option<Imu>,
@@ -90,17 +95,22 @@ pub struct Vio {
 
 impl Vio {
     /// Refuses a camera, noise or settings that cannot be.
-    pub fn new(camera: Camera, noise: ImuNoise, settings: Settings) -> Result<Self, Error> {
-        camera.check()?;
+    pub fn new(camera: impl CameraModel + 'static, noise: ImuNoise, settings: Settings) -> Result<Self, Error> {
+        Self::mono(Arc::new(camera), noise, settings)
+    }
+
+    fn mono(camera: Arc<dyn CameraModel>, noise: ImuNoise, settings: Settings) -> Result<Self, Error> {
+        check_model(camera.as_ref())?;
         noise.check()?;
         settings.check()?;
+        let frontend = ImageFrontend::new(camera.as_ref(), &settings.patches);
         Ok(Self {
             camera,
             noise,
             settings,
             last_sample: None,
             tracking: None,
-            frontend: ImageFrontend::new(&camera, &settings.patches),
+            frontend,
             stereo: None,
             stationary: StationaryDetector::new(settings.stationary),
             was_stationary: false,
@@ -116,10 +126,46 @@ impl Vio {
     /// The pose of one camera against the other is taken as known; [`StereoSettings::pixel_sigma`](crate::StereoSettings::pixel_sigma)
     /// covers what is wrong with it. The pose that [`CalibrationSettings`](crate::CalibrationSettings) lets the filter estimate is that
     /// of the first camera on the body.
-    pub fn stereo(first: Camera, second: Camera, noise: ImuNoise, settings: Settings) -> Result<Self, Error> {
+    pub fn stereo(
+        first: impl CameraModel + 'static,
+        second: impl CameraModel + 'static,
+        noise: ImuNoise,
+        settings: Settings,
+    ) -> Result<Self, Error> {
         let mono = Self::new(first, noise, settings)?;
-        let stereo = StereoCamera::new(&first, second, &settings.patches)?;
+        let stereo = StereoCamera::new(mono.camera.as_ref(), Arc::new(second), &settings.patches)?;
         Ok(Self { stereo: Some(stereo), ..mono })
+    }
+
+    /// From a calibration as Kalibr and EuRoC folders give it, of one camera or two: the lenses, the noise of the inertial sensor,
+    /// and the time offset of the first camera (`timeshift_cam_imu`), which is added to
+    /// [`CalibrationSettings::time_offset_s`](crate::CalibrationSettings::time_offset_s). The filter's body is the inertial sensor:
+    /// where that is not the body of the calibration, the cameras are moved into its axes.
+    ///
+    /// Both images of a pair carry one stamp, that of the first camera's clock.
+    pub fn from_calibration(
+        cameras: &[CameraCalibration],
+        imu: &ImuCalibration,
+        mut settings: Settings,
+    ) -> Result<Self, Error> {
+        let on_imu = |calibration: &CameraCalibration| {
+            let mut camera = calibration.camera;
+            // An identity is left alone, so that its product does not change the last bits.
+            if imu.body_from_imu != Isometry3::identity() {
+                camera.body_from_camera = imu.body_from_imu.inverse() * camera.body_from_camera;
+            }
+            camera
+        };
+        let (first, second) = match cameras {
+            [first] => (first, None),
+            [first, second] => (first, Some(second)),
+            _ => return Err(invalid("cameras", cameras.len() as f64, "must be one or two")),
+        };
+        settings.calibration.time_offset_s += first.time_offset_s;
+        match second {
+            Some(second) => Self::stereo(on_imu(first), on_imu(second), imu.noise, settings),
+            None => Self::new(on_imu(first), imu.noise, settings),
+        }
     }
 
     /// Initialises, or initialises again, from a given state. There must be an inertial sample, and the state must not be before it.
@@ -129,7 +175,7 @@ impl Vio {
         };
         initial.check(sample.stamp)?;
         self.reset();
-        let estimator = Estimator::new(&self.camera, self.noise, &self.settings, initial, sample);
+        let estimator = Estimator::new(self.camera.as_ref(), self.noise, &self.settings, initial, sample);
         self.tracking = Some(TrackingState::new(estimator, self.settings.landmarks.max_count));
         Ok(())
     }
@@ -158,7 +204,7 @@ impl Vio {
     ///
     /// `stamp` is the middle of the exposure by the camera's clock. The image must be of the camera's size.
     pub fn image(&mut self, stamp: Stamp, image: &ImageView) -> Result<FrameReport, Error> {
-        let image = image.checked(&self.camera)?;
+        let image = image.checked(self.camera.image_size())?;
         if let Some(stereo) = &mut self.stereo {
             stereo.set_image(None);
         }
@@ -171,9 +217,9 @@ impl Vio {
     /// `stamp` is the middle of the exposure by the cameras' clock. Both images must be of their camera's size; a filter that was not
     /// made by [`stereo`](Self::stereo) refuses them.
     pub fn image_pair(&mut self, stamp: Stamp, first: &ImageView, second: &ImageView) -> Result<FrameReport, Error> {
-        let first = first.checked(&self.camera)?;
+        let first = first.checked(self.camera.image_size())?;
         let stereo = self.stereo.as_mut().ok_or(NO_SECOND_CAMERA)?;
-        stereo.set_image(Some(&second.checked(&stereo.rig.camera)?));
+        stereo.set_image(Some(&second.checked(stereo.rig.camera.image_size())?));
         self.process_image(stamp, &first)
     }
 
@@ -200,19 +246,19 @@ impl Vio {
             return Ok(report);
         };
         if !stationary {
-            tracking.drift_templates(camera, &settings.patches, elapsed);
+            tracking.drift_templates(camera.as_ref(), &settings.patches, elapsed);
             // Align patches and update, landmark by landmark.
-            align_and_update(tracking, &frontend.pyramid, camera, settings, &mut report);
+            align_and_update(tracking, &frontend.pyramid, camera.as_ref(), settings, &mut report);
             // Manage landmarks.
             drop_landmarks(tracking, settings, &mut report);
-            update_templates(tracking, &frontend.pyramid, camera, &settings.patches);
+            update_templates(tracking, &frontend.pyramid, camera.as_ref(), &settings.patches);
             if let Some(stereo) = stereo {
-                stereo.update_distances(&mut tracking.estimator, &frontend.pyramid, camera, settings);
+                stereo.update_distances(&mut tracking.estimator, &frontend.pyramid, camera.as_ref(), settings);
             }
         }
         let enough = settings.patches.start_detection_ratio * settings.landmarks.max_count as f64;
         if (tracking.tracks.len() as f64) < enough {
-            report.added = detect_landmarks(tracking, frontend, stereo.as_ref(), camera, settings);
+            report.added = detect_landmarks(tracking, frontend, stereo.as_ref(), camera.as_ref(), settings);
         }
         Ok(self.check_divergence(report))
     }
@@ -236,9 +282,9 @@ impl Vio {
         let Some(lost) = self.propagate_to_image(stamp, stationary)? else { return Ok(report) };
         report.removed = lost;
         if let Self { tracking: Some(tracking), camera, settings, .. } = self {
-            update_with_points(tracking, points, camera, settings, &mut report);
+            update_with_points(tracking, points, camera.as_ref(), settings, &mut report);
             drop_points(tracking, settings, &mut report);
-            report.added = add_points(tracking, points, camera, settings);
+            report.added = add_points(tracking, points, camera.as_ref(), settings);
         }
         Ok(self.check_divergence(report))
     }
@@ -297,7 +343,7 @@ impl Vio {
             // The drift of templates since the last image is counted from here on at the next one.
             if tracking.tracks.iter().any(|track| track.patch.is_some()) {
                 let elapsed = tracking.estimator.buffer.state_stamp().secs_since(before);
-                tracking.drift_templates(&self.camera, &self.settings.patches, elapsed);
+                tracking.drift_templates(self.camera.as_ref(), &self.settings.patches, elapsed);
             }
         }
         let used = gated_update(&mut tracking.estimator, measurement);
@@ -330,8 +376,8 @@ impl Vio {
     }
 
     /// The camera as it was given.
-    pub fn camera(&self) -> &Camera {
-        &self.camera
+    pub fn camera(&self) -> &dyn CameraModel {
+        self.camera.as_ref()
     }
 
     /// Propagates to the time of an image. `None` if the filter was initialised after the image; otherwise the number of landmarks
@@ -356,7 +402,7 @@ impl Vio {
             return Ok(Some(tracking.propagate_to(time)));
         }
         let settings = &self.settings.stationary;
-        let angle = self.stationary.undetected_angle(&self.camera);
+        let angle = self.stationary.undetected_angle(self.camera.as_ref());
         zero_velocity_propagate(&mut tracking.estimator, time, settings);
         if !was_stationary {
             inflate_undetected_motion(&mut tracking.estimator, angle);
@@ -390,7 +436,7 @@ impl Vio {
             return Ok(self.empty_report());
         };
         // The image that the initialization was made with has the first landmarks.
-        let added = detect_landmarks(tracking, frontend, stereo.as_ref(), camera, settings);
+        let added = detect_landmarks(tracking, frontend, stereo.as_ref(), camera.as_ref(), settings);
         let report = FrameReport { added, ..self.empty_report() };
         Ok(self.check_divergence(report))
     }
@@ -399,14 +445,14 @@ impl Vio {
     fn initialize_with_points(&mut self, stamp: Stamp, points: &[PointObservation]) -> Result<FrameReport, Error> {
         self.initialize_at_rest()?;
         if let Self { tracking: Some(tracking), camera, settings, .. } = self {
-            let added = add_points(tracking, points, camera, settings);
+            let added = add_points(tracking, points, camera.as_ref(), settings);
             let report = FrameReport { added, ..self.empty_report() };
             return Ok(self.check_divergence(report));
         }
         if self.settings.dynamic_initialization.enabled {
-            let (time, camera) = (self.unsynchronized_time(stamp), self.camera);
+            let (time, camera) = (self.unsynchronized_time(stamp), Arc::clone(&self.camera));
             let observed = points.iter().filter_map(|p| Some((p.id, camera.bearing(&p.pixel)?.into_inner())));
-            if let Some(motion) = self.dynamic_initializer.image(time, observed, &camera, self.settings.gravity) {
+            if let Some(motion) = self.dynamic_initializer.image(time, observed, camera.as_ref(), self.settings.gravity) {
                 let pixel = |id| points.iter().find(|p| p.id == id).map(|p| (p.pixel, None));
                 self.initialize_in_motion(time, &motion, pixel);
             }
@@ -425,7 +471,7 @@ impl Vio {
         let found = static_initializer::initial_state(&mut self.stationary, sample.stamp, &self.settings);
         let Some((initial, mean)) = found else { return Ok(()) };
         self.initialize(&initial)?;
-        let angle = self.stationary.undetected_angle(&self.camera);
+        let angle = self.stationary.undetected_angle(self.camera.as_ref());
         if let Some(tracking) = &mut self.tracking {
             stationary_update(&mut tracking.estimator, &mean, angle, &self.settings.stationary);
         }
@@ -438,9 +484,9 @@ impl Vio {
         let ImageFrontend { pyramid, detector, .. } = &mut self.frontend;
         let rotation = self.dynamic_initializer.rotation_since_image(time);
         let criteria = DetectionCriteria::from(&self.settings.patches);
-        self.klt_tracker.track(rotation, pyramid, (detector, &criteria), &self.camera);
+        self.klt_tracker.track(rotation, pyramid, (detector, &criteria), self.camera.as_ref());
         let observed = self.klt_tracker.observations();
-        let motion = self.dynamic_initializer.image(time, observed, &self.camera, self.settings.gravity);
+        let motion = self.dynamic_initializer.image(time, observed, self.camera.as_ref(), self.settings.gravity);
         if let Some(motion) = motion {
             // The reset of the initialization would clear it.
             let tracker = std::mem::take(&mut self.klt_tracker);
@@ -461,7 +507,7 @@ impl Vio {
         observe: impl FnMut(u64) -> Option<(Vector2<f64>, Option<Patch>)>,
     ) {
         let samples: Vec<Imu> = self.dynamic_initializer.samples().copied().collect();
-        let sensors = (&self.camera, self.noise, &self.settings);
+        let sensors = (self.camera.as_ref(), self.noise, &self.settings);
         let Some(tracking) = from_initialization(sensors, time, motion, &samples, observe) else { return };
         self.reset();
         let ids = tracking.tracks.iter().map(|track| track.id + 1);

@@ -7,7 +7,7 @@ use super::pose_measurement::PoseMeasurement;
 use crate::core::initial_state::InitialState;
 use crate::error::invalid;
 use crate::filter::{BodyPose, FrameReport, PointObservation, Settings, Status, Vio};
-use crate::{Camera, Error, ImageView, Imu, ImuNoise, Odometry, Stamp};
+use crate::{CameraModel, Error, ImageView, Imu, ImuNoise, Odometry, Stamp};
 
 /// Measurements in the delay buffer at most.
 const MAX_PENDING: usize = 64;
@@ -97,7 +97,7 @@ enum PendingMeasurement {
 
 impl UnifiedVio {
     /// Refuses a camera or settings that cannot be.
-    pub fn new(camera: Camera, vio: Settings, settings: UnifiedSettings) -> Result<Self, Error> {
+    pub fn new(camera: impl CameraModel + 'static, vio: Settings, settings: UnifiedSettings) -> Result<Self, Error> {
         if !(0.0..=1.0).contains(&settings.lag_s) {
             return Err(invalid("lag_s", settings.lag_s, "must be between 0 and 1 s"));
         }
@@ -158,7 +158,7 @@ impl UnifiedVio {
 
     /// Takes an image; see [`Vio::image`].
     pub fn image(&mut self, stamp: Stamp, image: &ImageView) -> Result<(), Error> {
-        let expected = (self.vio.camera().width, self.vio.camera().height);
+        let expected = self.vio.camera().image_size();
         if (image.width, image.height) != expected {
             return Err(Error::ImageSize { given: (image.width, image.height), expected });
         }
@@ -238,7 +238,7 @@ impl UnifiedVio {
         let Pending { measurement, .. } = self.pending.remove(0);
         let frame = match measurement {
             PendingMeasurement::Image(stamp, data) => {
-                let (width, height) = (self.vio.camera().width, self.vio.camera().height);
+                let (width, height) = self.vio.camera().image_size();
                 let report = self.vio.image(stamp, &ImageView { width, height, data: &data });
                 self.image_buffers.push(data);
                 report

@@ -4,7 +4,7 @@ use super::corner_detector::CornerDetector;
 use super::patch::LEVELS;
 use super::pyramid::Pyramid;
 use crate::filter::settings::PatchSettings;
-use crate::{Camera, ImageView};
+use crate::{CameraModel, ImageView};
 
 /// The current image and what is needed to detect corners in it.
 #[derive(Debug, Clone)]
@@ -16,8 +16,9 @@ pub(crate) struct ImageFrontend {
 }
 
 impl ImageFrontend {
-    pub(crate) fn new(camera: &Camera, settings: &PatchSettings) -> Self {
-        let pyramid = Pyramid::new(camera.width, camera.height, settings.first_level, LEVELS);
+    pub(crate) fn new(camera: &dyn CameraModel, settings: &PatchSettings) -> Self {
+        let (width, height) = camera.image_size();
+        let pyramid = Pyramid::new(width, height, settings.first_level, LEVELS);
         let detector = CornerDetector::new(pyramid.corner_level(), settings.fast_threshold);
         Self { pyramid, detector, next_id: 0 }
     }

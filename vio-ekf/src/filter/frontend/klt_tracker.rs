@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, UnitQuaternion, Vector2, Vector3};
 
-use crate::Camera;
+use crate::CameraModel;
 use crate::filter::frontend::corner_detector::{CornerDetector, DetectionCriteria};
 use crate::filter::frontend::patch::Patch;
 use crate::filter::frontend::pyramid::Pyramid;
@@ -46,11 +46,11 @@ impl KltTracker {
         rotation: Option<UnitQuaternion<f64>>,
         pyramid: &Pyramid,
         (detector, criteria): (&mut CornerDetector, &DetectionCriteria),
-        camera: &Camera,
+        camera: &dyn CameraModel,
     ) {
         match rotation {
             Some(rotation) => {
-                let attitude = camera.body_from_camera.rotation;
+                let attitude = camera.body_from_camera().rotation;
                 let rotation = attitude.inverse() * rotation.inverse() * attitude;
                 self.tracks.retain_mut(|track| track.track(&rotation, pyramid, camera).is_some());
             }
@@ -82,7 +82,7 @@ impl KltTracker {
 
 impl Track {
     /// Tracks the point into the next image, or gives it up.
-    fn track(&mut self, rotation: &UnitQuaternion<f64>, pyramid: &Pyramid, camera: &Camera) -> Option<()> {
+    fn track(&mut self, rotation: &UnitQuaternion<f64>, pyramid: &Pyramid, camera: &dyn CameraModel) -> Option<()> {
         let rotated = camera.project(&(rotation * self.direction))?;
         let predicted = rotated + self.flow;
         let moved = |x: f64, y: f64| {

@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::patch::{LEVELS, Patch};
 use super::pyramid::Pyramid;
-use crate::Camera;
+use crate::CameraModel;
 use crate::core::covariance::LinearizedMeasurement;
 use crate::core::iterated_update::Iteration;
 use crate::filter::estimator::Estimator;
@@ -39,7 +39,7 @@ pub(crate) fn align_patch(
     slot: usize,
     time_offset_error: f64,
     (patch, pyramid): (&Patch, &Pyramid),
-    camera: &Camera,
+    camera: &dyn CameraModel,
     settings: &Settings,
 ) -> PatchAlignment {
     let landmark = estimator.state.landmarks[slot];

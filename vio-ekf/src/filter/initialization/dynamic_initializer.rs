@@ -10,7 +10,7 @@ use super::dynamic::window::{BearingObservation, WindowInput};
 use crate::core::imu_buffer::ImuBuffer;
 use crate::core::preintegration::ImuPreintegration;
 use crate::filter::settings::DynamicInitializationSettings;
-use crate::{Camera, Imu, ImuNoise, Stamp};
+use crate::{CameraModel, Imu, ImuNoise, Stamp};
 
 /// Least number of observations of a point.
 const MIN_OBSERVATIONS: usize = 5;
@@ -79,7 +79,7 @@ impl DynamicInitializer {
         &mut self,
         stamp: Stamp,
         observed: impl Iterator<Item = (u64, Vector3<f64>)>,
-        camera: &Camera,
+        camera: &dyn CameraModel,
         gravity: f64,
     ) -> Option<Box<InitialMotion>> {
         let first = self.samples.front()?;
@@ -117,7 +117,7 @@ impl DynamicInitializer {
         self.points.retain(|point| !point.observations.is_empty());
     }
 
-    fn attempt(&mut self, camera: &Camera, gravity: f64) -> Option<Box<InitialMotion>> {
+    fn attempt(&mut self, camera: &dyn CameraModel, gravity: f64) -> Option<Box<InitialMotion>> {
         let long_enough = |point: &&Point| point.observations.len() >= MIN_OBSERVATIONS;
         let ids: Vec<u64> = self.points.iter().filter(long_enough).map(|point| point.id).collect();
         if ids.len() < MIN_POINTS {
@@ -128,8 +128,8 @@ impl DynamicInitializer {
         let points: Vec<Vec<BearingObservation>> = self.points.iter().filter(long_enough).map(local).collect();
         let input = WindowInput {
             points: &points,
-            camera: (camera.body_from_camera.translation.vector, camera.body_from_camera.rotation),
-            focal_length: camera.fx.min(camera.fy),
+            camera: (camera.body_from_camera().translation.vector, camera.body_from_camera().rotation),
+            focal_length: camera.focal_length(),
             gravity,
         };
         let buffer = self.buffer();

@@ -14,12 +14,12 @@ use crate::filter::state::bearing::Bearing;
 use crate::filter::state::error_state;
 use crate::filter::state::landmark::unproject;
 use crate::filter::tracking_state::{LandmarkTrack, TrackingState};
-use crate::{Camera, Imu, ImuNoise, Stamp};
+use crate::{CameraModel, Imu, ImuNoise, Stamp};
 
 /// A filter from the motion at the time of an image, and the samples until now. `observe` gives the pixel of a point, by its id,
 /// in that image, and its patch.
 pub(crate) fn from_initialization(
-    (camera, noise, settings): (&Camera, ImuNoise, &Settings),
+    (camera, noise, settings): (&dyn CameraModel, ImuNoise, &Settings),
     stamp: Stamp,
     motion: &InitialMotion,
     samples: &[Imu],

@@ -5,7 +5,7 @@ use std::cell::Cell;
 use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 
 use super::measurement::{Measurement, Trial};
-use crate::Camera;
+use crate::CameraModel;
 use crate::core::iterated_update::Linearization;
 use crate::filter::frontend::patch::{Comparison, Patch};
 use crate::filter::frontend::pyramid::Pyramid;
@@ -28,7 +28,7 @@ pub(crate) struct PatchMeasurement<'a> {
     pub(crate) rate: Vector2<f64>,
     /// Change of the time offset since the state was propagated to the image, s.
     pub(crate) time_offset_error: f64,
-    pub(crate) camera: &'a Camera,
+    pub(crate) camera: &'a dyn CameraModel,
     pub(crate) settings: &'a PatchSettings,
     /// Whether only the coarsest level is compared, which reaches farther.
     pub(crate) coarse: Cell<bool>,

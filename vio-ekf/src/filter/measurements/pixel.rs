@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Matrix2x3, Vector2};
 
 use super::measurement::{Measurement, Trial};
-use crate::Camera;
+use crate::CameraModel;
 use crate::core::iterated_update::Linearization;
 use crate::filter::settings::{LandmarkSettings, UpdateSettings};
 use crate::filter::state::error_state::bearing_and_time;
@@ -20,7 +20,7 @@ pub(crate) struct PixelMeasurement<'a> {
     pub(crate) rate: Vector2<f64>,
     /// Change of the time offset since the state was propagated to the image, s.
     pub(crate) time_offset_error: f64,
-    pub(crate) camera: &'a Camera,
+    pub(crate) camera: &'a dyn CameraModel,
     pub(crate) landmarks: &'a LandmarkSettings,
     pub(crate) update: &'a UpdateSettings,
 }

@@ -1,8 +1,7 @@
 //! Relative motion of the camera, and how landmarks move in its axes.
 
-use nalgebra::{Matrix2x3, Matrix3, SMatrix, Unit, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Isometry3, Matrix2x3, Matrix3, SMatrix, Unit, UnitQuaternion, Vector2, Vector3};
 
-use crate::Camera;
 use crate::filter::state::inverse_distance::InverseDistance;
 use crate::filter::state::landmark::Landmark;
 use crate::filter::state::vio_state::VioState;
@@ -62,9 +61,9 @@ impl CameraMotion {
         }
     }
 
-    /// From one camera of a rig to another: the extrinsics, known exactly.
-    pub(crate) fn between(first: &Camera, second: &Camera) -> Self {
-        let second_from_first = second.body_from_camera.inverse() * first.body_from_camera;
+    /// From one camera of a rig to another, by their poses on the body, which are known exactly.
+    pub(crate) fn between(first: &Isometry3<f64>, second: &Isometry3<f64>) -> Self {
+        let second_from_first = second.inverse() * first;
         Self {
             rotation: second_from_first.rotation,
             matrix: second_from_first.rotation.to_rotation_matrix().into_inner(),

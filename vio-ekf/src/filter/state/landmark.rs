@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::bearing::Bearing;
 use super::inverse_distance::InverseDistance;
-use crate::Camera;
+use crate::CameraModel;
 
 /// A point of the scene in the axes of the camera that sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,13 +17,13 @@ pub(crate) struct Landmark {
 }
 
 /// Pixel of a bearing and its derivative by the bearing's tangent coordinates.
-pub(crate) fn project(camera: &Camera, bearing: &Bearing) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+pub(crate) fn project(camera: &dyn CameraModel, bearing: &Bearing) -> Option<(Vector2<f64>, Matrix2<f64>)> {
     let (pixel, jacobian) = camera.project_with_jacobian(&bearing.direction())?;
     Some((pixel, jacobian * bearing.differential()))
 }
 
 /// Bearing of a pixel, and tangent coordinates by pixels there.
-pub(crate) fn unproject(camera: &Camera, pixel: &Vector2<f64>) -> Option<(Bearing, Matrix2<f64>)> {
+pub(crate) fn unproject(camera: &dyn CameraModel, pixel: &Vector2<f64>) -> Option<(Bearing, Matrix2<f64>)> {
     let bearing = Bearing::new(&camera.bearing(pixel)?);
     Some((bearing, project(camera, &bearing)?.1.try_inverse()?))
 }
@@ -31,6 +31,7 @@ pub(crate) fn unproject(camera: &Camera, pixel: &Vector2<f64>) -> Option<(Bearin
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Camera;
     use crate::sim::Rng;
     use crate::test_random::signed;
 

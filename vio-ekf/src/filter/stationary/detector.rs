@@ -8,7 +8,7 @@ use crate::filter::frontend::image_frontend::ImageFrontend;
 use crate::filter::frontend::patch::Patch;
 use crate::filter::point_observation::PointObservation;
 use crate::filter::settings::{PatchSettings, StationarySettings};
-use crate::{Camera, Imu, Stamp};
+use crate::{CameraModel, Imu, Stamp};
 
 /// Patches that are compared for parallax.
 const MAX_PATCHES: usize = 8;
@@ -152,8 +152,8 @@ impl StationaryDetector {
     }
 
     /// Standard deviation of a rotation that is not detected, rad.
-    pub(crate) fn undetected_angle(&self, camera: &Camera) -> f64 {
-        0.5 * self.tolerance / camera.fx.min(camera.fy)
+    pub(crate) fn undetected_angle(&self, camera: &dyn CameraModel) -> f64 {
+        0.5 * self.tolerance / camera.focal_length()
     }
 
     /// Whether nothing has moved for long enough.

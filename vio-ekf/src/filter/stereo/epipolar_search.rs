@@ -80,7 +80,7 @@ impl EpipolarSearch<'_> {
     ) -> Option<f64> {
         let middle = 0.5 * (low + high);
         let length = project(middle)?.by_inverse_distance.norm() * (high - low);
-        let count = (length / SPACING).ceil().clamp(1.0, self.rig.camera.width as f64) as u32;
+        let count = (length / SPACING).ceil().clamp(1.0, self.rig.camera.image_size().0 as f64) as u32;
         if count == 1 {
             return Some(middle);
         }

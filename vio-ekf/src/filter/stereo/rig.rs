@@ -1,15 +1,17 @@
 //! The second camera, fixed beside the first.
 
+use std::sync::Arc;
+
 use nalgebra::{Matrix2, Vector2};
 
-use crate::Camera;
+use crate::CameraModel;
 use crate::filter::propagation::camera_motion::CameraMotion;
 use crate::filter::state::landmark::{Landmark, project};
 
 /// The second camera and its extrinsics, which are taken as known.
 #[derive(Debug, Clone)]
 pub(crate) struct StereoRig {
-    pub(crate) camera: Camera,
+    pub(crate) camera: Arc<dyn CameraModel>,
     /// As if the first camera had moved to the second one's pose.
     second_from_first: CameraMotion,
 }
@@ -24,14 +26,15 @@ pub(crate) struct StereoProjection {
 }
 
 impl StereoRig {
-    pub(crate) fn new(first: &Camera, camera: Camera) -> Self {
-        Self { camera, second_from_first: CameraMotion::between(first, &camera) }
+    pub(crate) fn new(first: &dyn CameraModel, camera: Arc<dyn CameraModel>) -> Self {
+        let second_from_first = CameraMotion::between(&first.body_from_camera(), &camera.body_from_camera());
+        Self { camera, second_from_first }
     }
 
     /// Projects a landmark of the first camera into the second image.
     pub(crate) fn project(&self, landmark: &Landmark) -> Option<StereoProjection> {
         let (seen, transition) = self.second_from_first.transform(landmark)?;
-        let (pixel, by_bearing) = project(&self.camera, &seen.bearing)?;
+        let (pixel, by_bearing) = project(self.camera.as_ref(), &seen.bearing)?;
         let by_inverse_distance = by_bearing * transition.by_itself.fixed_view::<2, 1>(0, 2);
         Some(StereoProjection { pixel, warp: by_bearing * seen.warp, by_inverse_distance })
     }

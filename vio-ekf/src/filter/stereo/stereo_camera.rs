@@ -1,9 +1,12 @@
 //! The second camera: its current image, and what it measures of landmarks.
 
+use std::sync::Arc;
+
 use nalgebra::Matrix2;
 
 use super::epipolar_search::{EpipolarSearch, StereoDepth};
 use super::rig::StereoRig;
+use crate::camera::model::check_model;
 use crate::error::invalid;
 use crate::filter::estimator::Estimator;
 use crate::filter::frontend::patch::{LEVELS, Patch};
@@ -15,7 +18,7 @@ use crate::filter::settings::{PatchSettings, Settings};
 use crate::filter::state::bearing::Bearing;
 use crate::filter::state::error_state;
 use crate::filter::state::landmark::project;
-use crate::{Camera, Error, ImageView};
+use crate::{CameraModel, Error, ImageView};
 
 /// Two cameras that are nearer to each other, m, are one.
 const MIN_BASELINE: f64 = 1e-3;
@@ -35,13 +38,14 @@ pub(crate) struct StereoCamera {
 
 impl StereoCamera {
     /// Refuses a camera that cannot be, or is where the first one is.
-    pub(crate) fn new(first: &Camera, camera: Camera, patches: &PatchSettings) -> Result<Self, Error> {
-        camera.check()?;
-        let baseline = (camera.body_from_camera.translation.vector - first.body_from_camera.translation.vector).norm();
+    pub(crate) fn new(first: &dyn CameraModel, camera: Arc<dyn CameraModel>, patches: &PatchSettings) -> Result<Self, Error> {
+        check_model(camera.as_ref())?;
+        let baseline = (camera.body_from_camera().translation.vector - first.body_from_camera().translation.vector).norm();
         if baseline < MIN_BASELINE {
             return Err(invalid("baseline", baseline, "the cameras of a pair must be at least a millimetre apart"));
         }
-        let pyramid = Pyramid::new(camera.width, camera.height, patches.first_level, LEVELS);
+        let (width, height) = camera.image_size();
+        let pyramid = Pyramid::new(width, height, patches.first_level, LEVELS);
         Ok(Self { rig: StereoRig::new(first, camera), pyramid, has_image: false, points: Vec::new() })
     }
 
@@ -70,7 +74,7 @@ impl StereoCamera {
         &self,
         estimator: &mut Estimator,
         first: &Pyramid,
-        camera: &Camera,
+        camera: &dyn CameraModel,
         settings: &Settings,
     ) {
         if !self.has_image {

@@ -1,5 +1,7 @@
 //! What a pair of cameras measures, against closed forms.
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Matrix2, UnitQuaternion, Vector2, Vector3, Vector4};
 
 use super::epipolar_search::StereoDepth;
@@ -79,7 +81,7 @@ fn measured(
 ) -> Vec<(Option<StereoDepth>, f64)> {
     let [camera, other] = cameras();
     let first = picture(&camera, &look, 1.0, &mut noise);
-    let mut second = StereoCamera::new(&camera, other, &settings.patches).unwrap();
+    let mut second = StereoCamera::new(&camera, Arc::new(other), &settings.patches).unwrap();
     second.set_pyramid(picture(&other, &look, gain, &mut noise));
     let mut found = Vec::new();
     for y in 0..4 {
@@ -120,7 +122,7 @@ fn normal(rng: &mut Rng) -> f64 {
 #[test]
 fn a_landmark_is_where_the_other_camera_sees_its_point() {
     let [first, other] = [Camera::euroc(), Camera::euroc_right()];
-    let rig = StereoRig::new(&first, other);
+    let rig = StereoRig::new(&first, Arc::new(other));
     for k in 0..60 {
         let pixel = Vector2::new(120.0 + 9.0 * f64::from(k), 60.0 + 67.0 * f64::from(k % 6));
         let bearing = Bearing::new(&first.bearing(&pixel).unwrap());
@@ -210,7 +212,7 @@ fn nothing_is_found_where_it_is_not() {
     let [camera, other] = cameras();
     let settings = Settings::default();
     let first = picture(&camera, &irregular, 1.0, &mut || 0.0);
-    let second = StereoCamera::new(&camera, other, &settings.patches).unwrap();
+    let second = StereoCamera::new(&camera, Arc::new(other), &settings.patches).unwrap();
     let pixel = Vector2::new(80.0, 60.0);
     let bearing = Bearing::new(&camera.bearing(&pixel).unwrap());
     let warp = project(&camera, &bearing).unwrap().1.try_inverse().unwrap();
@@ -221,7 +223,7 @@ fn nothing_is_found_where_it_is_not() {
 #[test]
 fn pixels_of_the_second_camera_move_with_bearing_distance_and_clock() {
     let [first, other] = [Camera::euroc(), Camera::euroc_right()];
-    let rig = StereoRig::new(&first, other);
+    let rig = StereoRig::new(&first, Arc::new(other));
     let (rate, settings, state) = (Vector2::new(0.3, -0.5), Settings::default(), empty_state());
     for k in 0..40 {
         let pixel = Vector2::new(150.0 + 11.0 * f64::from(k), 80.0 + 61.0 * f64::from(k % 6));
