@@ -23,8 +23,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let blocks = blocks(&map)?;
     println!("{} blocks of {name} at 1 cm, 7168 bytes each", blocks.len());
-    let ours: Vec<Vec<u8>> = blocks.iter().map(|block| encoded(block)).collect();
-    let plain: Vec<Vec<u8>> = blocks.iter().map(|block| bytes(block)).collect();
+    let ours: Vec<Vec<u8>> = blocks.iter().map(encoded).collect();
+    let plain: Vec<Vec<u8>> = blocks.iter().map(bytes).collect();
     let sorted: Vec<Vec<u8>> = plain.iter().map(|bytes| by_significance(bytes)).collect();
     let report = |name: &str, packed: &[Vec<u8>], pack: &mut dyn FnMut(), unpack: &mut dyn FnMut()| {
         let mean = packed.iter().map(Vec::len).sum::<usize>() as f64 / packed.len() as f64;
@@ -40,7 +40,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             std::hint::black_box(&out);
         }
     };
-    let mut unpack = || ours.iter().for_each(|bytes| drop(std::hint::black_box(decode_block(bytes))));
+    let mut unpack = || {
+        for bytes in &ours {
+            std::hint::black_box(decode_block(bytes));
+        }
+    };
     report("tsdf-hash", &ours, &mut pack, &mut unpack);
     for (name, raw) in [("lz4_flex", &plain), ("lz4_flex, bytes sorted", &sorted)] {
         let packed: Vec<Vec<u8>> = raw.iter().map(|bytes| lz4_flex::block::compress(bytes)).collect();

@@ -6,8 +6,8 @@ use nalgebra::{Isometry3, Matrix2x3, Unit, Vector2, Vector3};
 
 use crate::Error;
 use crate::error::invalid;
-use model::{CameraModel, check_side};
 use crate::trajectory::is_finite;
+use model::{CameraModel, check_side};
 
 /// How a lens departs from a pinhole.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

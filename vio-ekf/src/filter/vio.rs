@@ -96,10 +96,7 @@ pub struct Vio {
 impl Vio {
     /// Refuses a camera, noise or settings that cannot be.
     pub fn new(camera: impl CameraModel + 'static, noise: ImuNoise, settings: Settings) -> Result<Self, Error> {
-        Self::mono(Arc::new(camera), noise, settings)
-    }
-
-    fn mono(camera: Arc<dyn CameraModel>, noise: ImuNoise, settings: Settings) -> Result<Self, Error> {
+        let camera: Arc<dyn CameraModel> = Arc::new(camera);
         check_model(camera.as_ref())?;
         noise.check()?;
         settings.check()?;
@@ -452,7 +449,8 @@ impl Vio {
         if self.settings.dynamic_initialization.enabled {
             let (time, camera) = (self.unsynchronized_time(stamp), Arc::clone(&self.camera));
             let observed = points.iter().filter_map(|p| Some((p.id, camera.bearing(&p.pixel)?.into_inner())));
-            if let Some(motion) = self.dynamic_initializer.image(time, observed, camera.as_ref(), self.settings.gravity) {
+            if let Some(motion) = self.dynamic_initializer.image(time, observed, camera.as_ref(), self.settings.gravity)
+            {
                 let pixel = |id| points.iter().find(|p| p.id == id).map(|p| (p.pixel, None));
                 self.initialize_in_motion(time, &motion, pixel);
             }

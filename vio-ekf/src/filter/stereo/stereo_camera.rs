@@ -38,9 +38,14 @@ pub(crate) struct StereoCamera {
 
 impl StereoCamera {
     /// Refuses a camera that cannot be, or is where the first one is.
-    pub(crate) fn new(first: &dyn CameraModel, camera: Arc<dyn CameraModel>, patches: &PatchSettings) -> Result<Self, Error> {
+    pub(crate) fn new(
+        first: &dyn CameraModel,
+        camera: Arc<dyn CameraModel>,
+        patches: &PatchSettings,
+    ) -> Result<Self, Error> {
         check_model(camera.as_ref())?;
-        let baseline = (camera.body_from_camera().translation.vector - first.body_from_camera().translation.vector).norm();
+        let baseline =
+            (camera.body_from_camera().translation.vector - first.body_from_camera().translation.vector).norm();
         if baseline < MIN_BASELINE {
             return Err(invalid("baseline", baseline, "the cameras of a pair must be at least a millimetre apart"));
         }
