@@ -45,7 +45,7 @@ impl Default for MissionSettings {
             texel: 0.0125,
             spot: 0.025,
             painter: PainterChoice::Feedback,
-            limits: Limits { along: 2, row_spacing: 3, min_volume: 0.01, ..Limits::default() },
+            limits: Limits { spray_spacing: 2, row_spacing: 3, min_volume: 0.01, ..Limits::default() },
             planner: planner_settings(),
             ptu: PtuSettings::default(),
             servo: ServoSettings::default(),
