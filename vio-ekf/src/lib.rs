@@ -41,6 +41,7 @@
 //! | iterated update | Bell and Cathey 1993 | [`UpdateSettings`] |
 //! | start in motion | gyroscope: Kneip and Lynen 2013; closed form: Martinelli 2014; refined: ours | [`DynamicInitializationSettings`] |
 //! | any other sensor: position, height, range, wheel | the update of the literature; the trait: ours | [`Measurement`], [`Vio::update`] |
+//! | a lens of the caller's own | ours | [`CameraModel`] |
 //! | noise that samples show | ours | [`ImuSettings`] |
 //! | inertial sensor and foreign poses | Weiss and Siegwart 2011; Lynen et al. 2013 (thesis, Paper II, section 4) | [`PoseFusion`] |
 //! | poses as measurements of the odometry | thesis, outlook: one estimator instead of two; ours | [`Vio::pose`], [`UnifiedVio`] |
@@ -115,6 +116,6 @@ pub use stamp::{InvalidStamp, Stamp};
 pub use trajectory::{Trajectory, interpolate, path_lengths};
 
 /// The recipe of the README, as a test.
-#[cfg(doctest)]
+#[cfg(all(doctest, feature = "yaml"))]
 #[doc = include_str!("../README.md")]
 pub struct Readme;

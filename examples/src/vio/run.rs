@@ -6,6 +6,7 @@ use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 
 use cpu_time::ThreadTime;
+use vio_ekf::calibration::{CameraCalibration, ImuCalibration};
 use vio_ekf::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use vio_ekf::{Calibration, Error, ImuNoise, Odometry, Settings, Stamp, Status, Trajectory, Vio};
 
@@ -122,13 +123,12 @@ struct FilterRunner<'a> {
 
 impl<'a> FilterRunner<'a> {
     fn new(recording: &'a Recording, settings: &RunSettings) -> Result<Self, VioError> {
-        let mut filter = settings.filter;
-        filter.calibration.time_offset_s += recording.camera.time_offset_s;
-        let (camera, noise) = (recording.camera.camera, settings.noise.unwrap_or(recording.imu.noise));
-        let vio = match &recording.second {
-            Some(second) => Vio::stereo(camera, second.camera, noise, filter)?,
-            None => Vio::new(camera, noise, filter)?,
-        };
+        let first = recording.camera;
+        // Both images of a pair carry one stamp.
+        let second = recording.second.as_ref().map(|second| CameraCalibration { camera: second.camera, ..first });
+        let cameras: Vec<CameraCalibration> = std::iter::once(first).chain(second).collect();
+        let imu = ImuCalibration { noise: settings.noise.unwrap_or(recording.imu.noise), ..recording.imu };
+        let vio = Vio::from_calibration(&cameras, &imu, settings.filter)?;
         Ok(Self {
             recording,
             vio,

@@ -8,7 +8,10 @@ use vio_ekf::calibration::{
     CameraCalibration, ImuCalibration, read_asl_camera, read_asl_imu, read_kalibr_cameras, read_kalibr_imu,
     write_asl_camera, write_asl_imu,
 };
-use vio_ekf::{Camera, Distortion, Imu, ImuNoise, Stamp, Trajectory, asl, euroc, kitti, tum};
+use vio_ekf::{
+    Camera, Distortion, Error, Imu, ImuNoise, InitialSigma, InitialState, Settings, Stamp, Trajectory, Vio, asl, euroc,
+    kitti, tum,
+};
 
 const KALIBR: &str = "%YAML:1.0
 cam0:
@@ -60,6 +63,40 @@ fn kalibr_chains_are_read() {
     .unwrap();
     let noise = ImuNoise { gyro_density: 1.7e-4, gyro_walk: 1.9e-5, accel_density: 2e-3, accel_walk: 3e-3 };
     assert_eq!((imu.noise, imu.rate_hz, imu.body_from_imu), (noise, 200.0, Isometry3::identity()));
+}
+
+#[test]
+fn kalibr_files_make_a_filter_in_one_call() {
+    let cameras = read_kalibr_cameras(KALIBR).unwrap();
+    let body_from_imu = Isometry3::new(Vector3::new(0.3, 0.0, -0.1), Vector3::new(0.0, 0.2, 0.0));
+    let imu = ImuCalibration { noise: ImuNoise::default(), rate_hz: 200.0, body_from_imu };
+    let mut settings = Settings::default();
+    settings.calibration.time_offset_s = 0.5;
+    let mut vio = Vio::from_calibration(&cameras[..1], &imu, settings).unwrap();
+    let stamp = Stamp::from_nanos(7);
+    vio.imu(&Imu { stamp, gyro: Vector3::zeros(), accel: Vector3::new(0.0, 0.0, 9.81) }).unwrap();
+    vio.initialize(&InitialState {
+        stamp,
+        world_from_body: Isometry3::identity(),
+        velocity_in_body: Vector3::zeros(),
+        gyro_bias: Vector3::zeros(),
+        accel_bias: Vector3::zeros(),
+        sigma: InitialSigma::default(),
+    })
+    .unwrap();
+    let found = vio.calibration().unwrap();
+    // The chain's -0.0125 s and the caller's own 0.5 s.
+    assert!((found.time_offset_s - 0.4875).abs() < 1e-15, "{}", found.time_offset_s);
+    // A point of the camera seen from the body and from the sensor on it.
+    let in_camera = nalgebra::Point3::new(0.4, -0.1, 2.0);
+    let in_body = cameras[0].camera.body_from_camera * in_camera;
+    assert!((body_from_imu * (found.body_from_camera * in_camera) - in_body).norm() < 1e-12);
+    for wrong in [&cameras[..0], &[cameras[0]; 3]] {
+        assert!(matches!(
+            Vio::from_calibration(wrong, &imu, settings),
+            Err(Error::InvalidSetting { name: "cameras", .. })
+        ));
+    }
 }
 
 #[test]
