@@ -99,15 +99,15 @@ pub use eval::stats::Stats;
 pub use eval::{Evaluation, EvaluationSettings, Segment, evaluate};
 pub use filter::{
     Bearing, BodyPose, Calibration, CalibrationSettings, DynamicInitializationSettings, FrameReport,
-    InitializationStatus, LandmarkSettings, Measurement, PatchSettings, PointObservation, PointPair, Settings,
-    StationarySettings, Status, StereoSettings, Trial, UpdateSettings, Vio, VioState, error_state,
+    InitializationStatus, LandmarkEstimate, LandmarkSettings, Measurement, PatchSettings, PointObservation, PointPair,
+    Settings, StationarySettings, Status, StereoSettings, Trial, UpdateSettings, Vio, VioState, error_state,
 };
 pub use format::{asl, calibration, euroc, kitti, tum};
 pub use fusion::{
     AlignmentSettings, ExtrinsicsSettings, FusionSettings, ImuPair, ImuPairSettings, MeasurementCounts, PoseFusion,
     PoseMeasurement, PoseSource, SourceEstimate, UnifiedSettings, UnifiedVio,
 };
-pub use imu_validation::{ImuValidation, validate_samples};
+pub use imu_validation::{ImuDoubt, ImuValidation, validate_samples};
 pub use lie::{se3, so3};
 pub use nalgebra;
 pub use samples::{ImageView, Imu, ImuNoise};

@@ -56,7 +56,7 @@ fn a_double_sphere_is_two_spheres_and_a_pinhole() {
 }
 
 /// Root mean square position error, and mean normalised squared error of the position, on points seen by a lens.
-fn on_points(lens: impl CameraModel + Clone + 'static) -> (f64, f64) {
+fn on_points<C: CameraModel + Clone + 'static>(lens: &C) -> (f64, f64) {
     let (mut square, mut nees, mut count) = (0.0, 0.0, 0.0);
     for seed in 1..=4 {
         let mut flight = Flight::new(seed, 12.0);
@@ -67,7 +67,7 @@ fn on_points(lens: impl CameraModel + Clone + 'static) -> (f64, f64) {
             if k == 0 {
                 vio.initialize(&start).unwrap();
             } else if k % 10 == 0 && stamp < flight.spline.span().1 {
-                let seen = flight.see_with(&lens, stamp);
+                let seen = flight.see_with(lens, stamp);
                 assert_eq!(vio.points(stamp, &seen).unwrap().status, Status::Tracking);
                 let odometry = vio.output().unwrap();
                 let error = flight.truth(stamp).world_from_body.translation.vector
@@ -93,7 +93,7 @@ fn a_lens_of_the_callers_own_flies_as_well_as_the_pinhole() {
         body_from_camera: pinhole.body_from_camera,
         ..tum_vi()
     };
-    let [(built_in, _), (own, nees)] = [on_points(pinhole), on_points(wide)];
+    let [(built_in, _), (own, nees)] = [on_points(&pinhole), on_points(&wide)];
     eprintln!("position error {built_in:.4} m with the pinhole, {own:.4} m with the double sphere, NEES {nees:.2}");
     assert!(own < 1.2 * built_in && own < 0.1, "{own} {built_in}");
     assert!((1.5..5.0).contains(&nees), "{nees}");

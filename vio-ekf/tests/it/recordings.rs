@@ -134,7 +134,19 @@ fn what_is_wrong_is_named() {
     };
     let spoilt = |from: &str, to: &str| read_kalibr_cameras(&KALIBR.replacen(from, to, 1)).unwrap_err();
     has(spoilt("[0.0, -1.0, 0.0, 0.25]", "[0.0, -1.1, 0.0, 0.25]"), &["cam0.T_cam_imu", "line 4", "rigid"]);
-    has(spoilt("pinhole", "omni"), &["camera_model", "pinhole"]);
+    has(spoilt("pinhole", "omni"), &["cam0.camera_model", "line 9", "`omni`", "pinhole", "CameraModel"]);
+    has(spoilt("T_cam_imu", "T_cn_cnm1"), &["cam0.T_cam_imu", "line 3", "camchain-imucam"]);
+    has(
+        spoilt("  rostopic: /cam0/image_raw#1\n  timeshift_cam_imu: -0.0125\n", "  timeshift_cam_imu: late\n"),
+        &["cam0.timeshift_cam_imu", "line 15", "`late`"],
+    );
+    // The wrong one of Kalibr's files.
+    has(
+        read_kalibr_cameras("rostopic: /imu0\nupdate_rate: 200\n").unwrap_err(),
+        &["cam0", "`rostopic`, `update_rate`"],
+    );
+    has(read_kalibr_cameras("camera_model: omni\n").unwrap_err(), &["no section `cam0:`", "`camera_model`"]);
+    has(read_kalibr_imu(KALIBR).unwrap_err(), &["cam0", "line 3", "inertial sensor"]);
     has(spoilt("equidistant", "fov"), &["distortion_model"]);
     has(spoilt("190.5", "nan"), &["intrinsics", "nan"]);
     has(spoilt("[512, 511]", "[512]"), &["resolution", "2 numbers", "1"]);
