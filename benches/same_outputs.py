@@ -16,6 +16,8 @@ TIME = re.compile(r"^planning_|^wall_|cpu|peak_rss|_(ms|us)(_|$)|per_second")
 TIME_LINE = re.compile(r"processor time|planning|wall clock|\bms\b|resident|took|computed in")
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 TEXT = {".json", ".md", ".txt", ".toml", ".yaml", ""}
+# Files that are called otherwise now: part of the former name, of the present one.
+RENAMED = [("film.png", "progress.png"), ("survey.", "scan_flight."), ("survey_", "scan_flight_")]
 
 
 def leaves(value, key=""):
@@ -81,16 +83,27 @@ def compare(base, head):
     return f"{len(one)} bytes became {len(two)}, or others", []
 
 
+def listing(root):
+    """Files below a folder by their present names."""
+    files = {}
+    for path in (p for p in root.rglob("*") if p.is_file() and p.name != "log"):
+        name = path.name
+        for former, present in RENAMED:
+            name = name.replace(former, present)
+        files[path.relative_to(root).with_name(name)] = path
+    return files
+
+
 def main():
-    base, head = map(Path, sys.argv[1:3])
-    listing = lambda root: {p.relative_to(root) for p in root.rglob("*") if p.is_file() and p.name != "log"}
-    files = listing(base), listing(head)
+    base, head = (listing(Path(root)) for root in sys.argv[1:3])
     counts = {"same": 0, "renamed": 0, "different": 0}
-    for name in sorted(files[0] ^ files[1]):
+    for name in sorted(base.keys() ^ head.keys()):
         counts["different"] += 1
-        print(f"{name}: only in {'the base' if name in files[0] else 'the head'}")
-    for name in sorted(files[0] & files[1]):
-        different, renamed = compare(base / name, head / name)
+        print(f"{name}: only in {'the base' if name in base else 'the head'}")
+    for name in sorted(base.keys() & head.keys()):
+        different, renamed = compare(base[name], head[name])
+        if base[name].name != head[name].name:
+            renamed.append(f"formerly {base[name].name}")
         kind = "different" if different else "renamed" if renamed else "same"
         counts[kind] += 1
         if different:

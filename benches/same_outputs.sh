@@ -35,7 +35,10 @@ run() {
                 "$bin/paint-image" --image picture.png --painter $painter --out $painter >>log 2>&1
             done
             "$bin/paint-image" --image picture.png --palette cmyk --out colour >>log 2>&1
-            "$bin/paint-image" --image picture.png --layers --largest-change 0.05 --out layers >>log 2>&1
+            # The option's former name, for a base that has it.
+            local slew=--slew-limit
+            "$bin/paint-image" --help | grep -q -- $slew || slew=--largest-change
+            "$bin/paint-image" --image picture.png --layers $slew 0.05 --out layers >>log 2>&1
             ;;
         scan)
             local sequence="${PAINTCOPTER_DATA:-}/rgbd/7scenes_redkitchen_sparse20"

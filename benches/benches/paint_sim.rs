@@ -107,7 +107,7 @@ fn flight(group: &mut Group, surface: &PaintSurface) -> Result<(), AnyError> {
     let targets = rock::stroke(surface, 300);
     let plan = OptimalPlanner::default().plan(&targets, &MeshSurface(&surface.world), &robot, &settings.planner)?;
     let stand_off = settings.planner.nozzle.stand_off;
-    let reference = Beginning(PlanReference { plan: &plan, chain: &robot.chain, stand_off });
+    let reference = Beginning(PlanReference { plan: &plan, chain: &robot.chain, gun_length: 0.12, stand_off });
     let mut gun = ServoPanTilt::new(robot.chain.clone(), settings.servo)?;
     let usual = FlightSettings::default();
     fly(&reference, &mut gun, &surface.world, &usual)?;

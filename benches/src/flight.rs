@@ -1,10 +1,8 @@
 //! A flight with two inertial sensors, a camera that sees points, and poses from a map that are late, noisy and drift.
 
-use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
-use vio_ekf::sim::ImuModel;
-use vio_ekf::{
-    Camera, Distortion, Error, Imu, ImuNoise, Motion, PointObservation, PoseMeasurement, Spline, Stamp, nalgebra, so3,
-};
+use nalgebra::{Isometry3, Point3, Translation3, Vector2, Vector3};
+use vio_ekf::sim::{ImuModel, forward_pinhole, observe_points, swaying_flight};
+use vio_ekf::{Camera, Error, Imu, ImuNoise, PointObservation, PoseMeasurement, Spline, Stamp, so3};
 
 use crate::Rng;
 
@@ -90,7 +88,7 @@ impl Flight {
         let second = ImuModel { noise, rate_hz: 250.0, body_from_imu, ..ImuModel::default() };
         let recorded = [first.record(&spline, GRAVITY, seed)?, second.record(&spline, GRAVITY, seed + 1_000_000)?];
         let mut rng = Rng::new(seed.wrapping_mul(7919));
-        let camera = camera();
+        let camera = forward_pinhole();
         let mut timed: Vec<(i64, Arrival)> = Vec::new();
         timed.extend(recorded[0].samples.iter().map(|s| (s.stamp.nanos(), Arrival::PrimaryImu(*s))));
         timed.extend(recorded[1].samples.iter().map(|s| (s.stamp.nanos(), Arrival::SecondaryImu(*s))));
@@ -98,7 +96,9 @@ impl Flight {
         let (begin, end) = spline.span();
         let points = points(&spline, &mut rng)?;
         for stamp in stamps(begin, end, IMAGES[0]) {
-            let seen = observe(&camera, &points, &spline.sample(stamp)?, &mut rng);
+            let pose = spline.sample(stamp)?.world_from_body;
+            let noise = || Vector2::new(normal(&mut rng), normal(&mut rng)) * PIXEL_SIGMA;
+            let seen = observe_points(&points, &camera, &pose, 0.0, noise);
             timed.push((stamp.nanos() + IMAGES[1], Arrival::Points(stamp, seen)));
         }
         let delay = (map.delay_s * 1e9) as i64;
@@ -138,19 +138,6 @@ fn normal(rng: &mut Rng) -> f64 {
     (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
 }
 
-/// A pinhole that looks along the body's x axis.
-fn camera() -> Camera {
-    let rotation = Rotation3::from_matrix_unchecked(nalgebra::Matrix3::new(
-        0.0, 0.0, 1.0, //
-        -1.0, 0.0, 0.0, //
-        0.0, -1.0, 0.0,
-    ));
-    let (fx, fy, cx, cy) = (460.0, 460.0, 376.0, 240.0);
-    let body_from_camera =
-        Isometry3::from_parts(Translation3::new(0.08, -0.03, 0.02), UnitQuaternion::from_rotation_matrix(&rotation));
-    Camera { width: 752, height: 480, fx, fy, cx, cy, distortion: Distortion::None, body_from_camera }
-}
-
 /// Sways and turns through about 8 m, never twice the same way.
 ///
 /// # Errors
@@ -158,24 +145,11 @@ fn camera() -> Camera {
 pub fn sway(seed: u64, seconds: f64) -> Result<Spline, Error> {
     let mut rng = Rng::new(seed);
     let phases: [Vector3<f64>; 4] = std::array::from_fn(|_| Vector3::from_fn(|_, _| rng.between(-3.2, 3.2)));
-    let knots = (0..(seconds / 0.1) as usize + 4).map(|k| {
-        let t = k as f64 * 0.1;
-        let wave = |amplitude: f64, hertz: f64, phase: &Vector3<f64>| {
-            Vector3::from_fn(|i, _| {
-                amplitude * (std::f64::consts::TAU * hertz * (1.0 + 0.13 * i as f64) * t + phase[i]).sin()
-            })
-        };
-        let position = wave(1.4, 0.11, &phases[0]) + wave(0.4, 0.31, &phases[1]);
-        let tilt = wave(0.25, 0.23, &phases[2]);
-        let yaw = 0.9 * (0.5 * t + phases[3].x).sin() + 0.4 * (0.21 * t).sin();
-        let rotation = so3::exp(&Vector3::new(0.0, 0.0, yaw)) * so3::exp(&Vector3::new(tilt.x, tilt.y, 0.0));
-        Isometry3::from_parts(position.into(), rotation)
-    });
-    Spline::new(Stamp::from_nanos(1_000_000_000), 100_000_000, knots.collect())
+    swaying_flight(&phases, seconds)
 }
 
 /// Points on the walls of a room around the motion.
-fn points(spline: &Spline, rng: &mut Rng) -> Result<Vec<Vector3<f64>>, Error> {
+fn points(spline: &Spline, rng: &mut Rng) -> Result<Vec<Point3<f64>>, Error> {
     let (begin, end) = spline.span();
     let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
     for stamp in stamps(begin, end, 200_000_000) {
@@ -188,21 +162,7 @@ fn points(spline: &Spline, rng: &mut Rng) -> Result<Vec<Vector3<f64>>, Error> {
             let mut point = Vector3::from_fn(|_, _| rng.between(-1.0, 1.0));
             let axis = (rng.unit() * 3.0) as usize;
             point[axis] = point[axis].signum();
-            middle + point.component_mul(&half)
+            Point3::from(middle + point.component_mul(&half))
         })
         .collect())
-}
-
-fn observe(camera: &Camera, points: &[Vector3<f64>], motion: &Motion, rng: &mut Rng) -> Vec<PointObservation> {
-    let camera_from_world = (motion.world_from_body * camera.body_from_camera).inverse();
-    let mut seen = Vec::new();
-    for (id, point) in (0..).zip(points) {
-        let noise = Vector2::new(normal(rng), normal(rng)) * PIXEL_SIGMA;
-        if let Some(pixel) = camera.project(&(camera_from_world * Point3::from(*point)).coords)
-            && camera.contains(&pixel, 0.0)
-        {
-            seen.push(PointObservation { id, pixel: pixel + noise });
-        }
-    }
-    seen
 }

@@ -117,7 +117,7 @@ fn limited(
     kernel: &SprayKernel,
     (share, along, order): (f64, usize, ScanOrder),
 ) -> Result<Value, paint_net::Error> {
-    let limits = Limits { along, ..Limits::default() };
+    let limits = Limits { spray_spacing: along, ..Limits::default() };
     let problem = PaintProblem::new(wanted).with_kernel(kernel);
     let free = Deconvolution::default().paint(&problem.with_limits(&limits))?;
     let (columns, rows) = (wanted.width().div_ceil(along), wanted.height().div_ceil(limits.row_spacing));

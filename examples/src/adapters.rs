@@ -132,6 +132,8 @@ pub struct PlanReference<'a, C = Ptu> {
     pub plan: &'a Plan,
     /// The chain it was made for.
     pub chain: &'a C,
+    /// Distance of the nozzle's tip from the axis about which the gun tilts, metres.
+    pub gun_length: f64,
     /// Distance at which the gun points at nothing in particular on flights between strokes, metres.
     pub stand_off: f64,
 }
@@ -147,14 +149,15 @@ impl<C: KinematicChain> Reference for PlanReference<'_, C> {
         let sample = setpoint.sample;
         let inside = (0.0..=duration).contains(&t);
         let still = |v: Vector3<f64>| if inside { v } else { Vector3::zeros() };
-        let aim = if setpoint.transit {
-            // Between strokes the planned joint angles are held: aim at the point ahead of the nozzle they give.
+        // Between strokes the planned joint angles are held: aim at the point ahead of the nozzle they give.
+        let (nozzle, aim) = if setpoint.transit {
             let joints = self.chain.point(setpoint.pan, setpoint.tilt);
             let hover = Hover { position: sample.position, heading: sample.heading, joints };
             let nozzle = self.chain.forward(&hover.world_from_body(), &hover.joints);
-            nozzle.tip + nozzle.direction.into_inner() * self.stand_off
+            let nozzle = NozzleState { position: nozzle.tip, direction: nozzle.direction };
+            (nozzle, nozzle.position + nozzle.direction.into_inner() * self.stand_off)
         } else {
-            setpoint.aim
+            (setpoint.nozzle, setpoint.aim)
         };
         ReferenceState {
             position: sample.position,
@@ -162,6 +165,7 @@ impl<C: KinematicChain> Reference for PlanReference<'_, C> {
             acceleration: still(sample.acceleration),
             heading: sample.heading,
             heading_rate: if inside { sample.heading_rate } else { 0.0 },
+            lever: nozzle.position - nozzle.direction.into_inner() * self.gun_length - sample.position,
             aim: Some(aim),
             nozzle_distance: (setpoint.aim - setpoint.nozzle.position).norm(),
             flow: if inside { setpoint.flow } else { 0.0 },

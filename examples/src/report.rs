@@ -58,6 +58,10 @@ pub struct Report {
     pub path_length_m: f64,
     /// Time in the air.
     pub flight_time_s: f64,
+    /// Share of the time in the air with the valve open.
+    pub valve_open_share: f64,
+    /// Estimated time of the transits between strokes, as their order was chosen by.
+    pub transit_s: f64,
     /// Paint that left the nozzle.
     pub paint_emitted_kg: f64,
     /// Paint that stayed on the surface.
@@ -225,13 +229,14 @@ impl Report {
 
     fn markdown(&self) -> String {
         let mut text = format!(
-            "# {} painted\n\n{} layers, {} strokes, {:.0} m flown in {:.0} min, {:.3} kg of paint on {:.1} m²; computed in \
-             {:.0} s. Seed {}, version {}.\n\n",
+            "# {} painted\n\n{} layer(s), {} strokes, {:.0} m flown in {:.0} min with the valve open {:.0} % of the time, {:.3} \
+             kg of paint on {:.1} m²; computed in {:.0} s. Seed {}, version {}.\n\n",
             self.surface,
             self.layers,
             self.strokes,
             self.path_length_m,
             self.flight_time_s / 60.0,
+            100.0 * self.valve_open_share,
             self.paint_deposited_kg,
             self.surface_area_m2,
             self.wall_s,

@@ -130,7 +130,7 @@ fn a_thousand_bare_walls_get_no_spray() {
             metric: if of(3) < 0.5 { ColourMetric::Ciede2000 } else { ColourMetric::Euclidean },
             ..ColourSeparation::default()
         };
-        let limits = Limits { along: whole(4, 1, 5), row_spacing: whole(5, 1, 5), ..Limits::default() };
+        let limits = Limits { spray_spacing: whole(4, 1, 5), row_spacing: whole(5, 1, 5), ..Limits::default() };
         let nozzle = SprayKernel::new(0.3 + 4.0 * of(6), 1.0 + 3.0 * of(7)).unwrap();
         let painting =
             painter.paint(&ColourProblem::new(&wanted, &palette).with_kernel(&nozzle).with_limits(&limits)).unwrap();

@@ -25,7 +25,7 @@ fn tiles_and_threads_change_no_bit() {
             Image::from_fn(width, height, |x, y| if x + y < 60 { 1.0 } else { lattice(4, x as i64, y as i64) });
         let paintable: Vec<bool> = (0..width * height).map(|k| k % width > 10).collect();
         let problem = PaintProblem::new(&wanted).with_canvas(&canvas).with_weight(&weight).with_paintable(&paintable);
-        let limits = Limits { along, row_spacing, min_volume: 0.005, ..Limits::default() };
+        let limits = Limits { spray_spacing: along, row_spacing, min_volume: 0.005, ..Limits::default() };
         let kernel = SprayKernel::new(2.0, 3.0).unwrap();
         let whole = Feedback { tile: 1000, ..Feedback::shipped().unwrap() };
         let expected = paint(&whole, &problem, &kernel, &limits);
@@ -61,7 +61,7 @@ fn blank_pictures_get_nothing_at_all() {
         let (width, height) = (1 + k % 41, 1 + (k * 7) % 37);
         let blank = Image::filled(width, height, 0.0);
         let before = Image::from_fn(width, height, |x, y| lattice(k as u64, x as i64, y as i64));
-        let limits = Limits { along: 1 + k % 3, row_spacing: 1 + (k / 3) % 3, ..Limits::default() };
+        let limits = Limits { spray_spacing: 1 + k % 3, row_spacing: 1 + (k / 3) % 3, ..Limits::default() };
         let problem = PaintProblem { canvas: (k % 2 == 1).then_some(&before), ..PaintProblem::new(&blank) };
         let painting = painter
             .paint(&problem.with_kernel(&nozzle()).with_saturation(&curves[k % 3]).with_limits(&limits))

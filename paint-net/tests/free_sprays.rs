@@ -50,7 +50,7 @@ fn free_places_are_worth_more_than_a_grid() {
         let problem = PaintProblem::new(&wanted);
         let quality = |p: &Painting| metrics::psnr(&p.ink, &wanted, None).unwrap();
         // 16 x 16 cells, and as many sprays of the same nozzle that may lie and open as they like.
-        let limits = Limits { along: 4, row_spacing: 4, ..Limits::default() };
+        let limits = Limits { spray_spacing: 4, row_spacing: 4, ..Limits::default() };
         let grid = Deconvolution::default().paint(&problem.with_kernel(&nozzle()).with_limits(&limits)).unwrap();
         let free = paint(&FreeSprays { sprays: 256, ..FreeSprays::default() }, &problem, &Limits::default());
         assert!(free.sprays.len() <= 256);

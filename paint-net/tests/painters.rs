@@ -69,7 +69,7 @@ fn a_thousand_empty_pictures_get_no_spray() {
         let canvas = (of(2) < 0.5).then_some(&before);
         let nozzle = SprayKernel::new(0.3 + 5.0 * of(3), 1.0 + 4.0 * of(4)).unwrap();
         let limits = Limits {
-            along: whole(5, 1, 6),
+            spray_spacing: whole(5, 1, 6),
             row_spacing: whole(6, 1, 6),
             max_volume: 0.01 + 5.0 * of(7),
             min_volume: 0.01 * of(8),
@@ -155,7 +155,7 @@ fn deconvolution_meets_the_optimality_conditions() {
 fn the_first_greedy_spray_is_the_best_single_spray() {
     let wanted = Texture::Glyph.image(9, 24);
     let one = MatchingPursuit { placements: 1, min_gain: 1e-12, refit: 0, ..MatchingPursuit::default() };
-    let limits = Limits { along: 1, row_spacing: 1, ..Limits::default() };
+    let limits = Limits { spray_spacing: 1, row_spacing: 1, ..Limits::default() };
     let painting = paint(&one, &PaintProblem::new(&wanted), &limits);
     let k = kernel();
     // On a bare wall the linearisation is exact at zero: the best cell maximises <g, y>² / <g, g>.
@@ -315,8 +315,8 @@ fn bad_input_is_named() {
     let nowhere = vec![false; 64];
     let task_nowhere = PaintProblem { paintable: Some(&nowhere), ..problem };
     assert!(matches!(run(&task_nowhere, &Limits::default()), Err(Error::EmptyProblem(_))));
-    let zero = Limits { along: 0, ..Limits::default() };
-    assert!(matches!(run(&problem, &zero), Err(Error::InvalidSetting { name: "along", .. })));
+    let zero = Limits { spray_spacing: 0, ..Limits::default() };
+    assert!(matches!(run(&problem, &zero), Err(Error::InvalidSetting { name: "spray_spacing", .. })));
     assert!(matches!(Image::new(2, 2, vec![0.0, 0.0, 0.0, f64::NAN]), Err(Error::Pixel { x: 1, y: 1, .. })));
     assert!(matches!(Image::new(2, 2, vec![0.0]), Err(Error::ImageSize { values: 1, .. })));
     assert!(matches!(SprayKernel::new(f64::NAN, 2.0), Err(Error::InvalidSetting { name: "sigma", .. })));

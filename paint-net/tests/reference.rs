@@ -76,7 +76,7 @@ fn deconvolution_reaches_scipys_optimum() {
 #[test]
 fn pursuit_reaches_the_greedy_baseline() {
     // numpy greedy on a grid of 1 px, 1600 placements: 22.99 dB, after a joint refit 26.12 dB.
-    let limits = Limits { along: 1, row_spacing: 1, ..Limits::default() };
+    let limits = Limits { spray_spacing: 1, row_spacing: 1, ..Limits::default() };
     let greedy = MatchingPursuit { placements: 1600, min_gain: 1e-12, refit: 0, ..MatchingPursuit::default() };
     close(mean_psnr(&greedy, &limits), 22.99, 0.15);
     let refitted = mean_psnr(&MatchingPursuit { refit: 200, ..greedy }, &limits);

@@ -141,7 +141,7 @@ fn the_valve_is_never_too_fast() {
     let problem = PaintProblem::new(&wanted);
     let mut last = f64::INFINITY;
     for (limit, along) in [(1.0, 2), (0.05, 2), (0.01, 2), (0.02, 1)] {
-        let limits = Limits { along, max_volume: 1.0, ..Limits::default() };
+        let limits = Limits { spray_spacing: along, max_volume: 1.0, ..Limits::default() };
         let painter = SlewLimited::new(Feedback::shipped().unwrap(), limit);
         let painting = painter.paint(&problem.with_limits(&limits)).unwrap();
         let waypoints = &painting.waypoints;

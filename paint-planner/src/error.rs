@@ -47,7 +47,7 @@ pub enum Error {
         /// Where the stretch after begins ("goal pose" or a target index).
         to: String,
     },
-    /// The final trajectory violations the surface although its waypoints do not.
+    /// The final trajectory touches the surface although its waypoints do not.
     #[error("the trajectory comes to {clearance:.3} m from the surface: raise `clearance` or lower `timing.tolerance`")]
     Collision {
         /// Distance between the collision body and the surface, m (negative: overlap).

@@ -52,6 +52,7 @@
 //! | VR paper, Eqs. (1)-(6) = thesis, Eqs. (7.1)-(7.6) | [`OptimalPlanner`] with [`Mode::PaperExact`]; [`Mode::Sequential`] is the default |
 //! | VR paper, Eq. (7) = thesis, Eq. (7.7) | [`HeadingSettings`], searched globally |
 //! | thesis, section 7.5, timing | [`TimingPolicy`] |
+//! | Held and Karp 1970, travelling salesman | [`order_strokes`], [`transit_lower_bound`] |
 //! | Richter et al., minimum snap | [`Trajectory::minimum_snap`] |
 //! | Paper II, section 6.2, LOWESS baseline | [`SmoothingPlanner`] |
 //! | VR paper, section V, deviation from the normal | [`normal_deviation`] |
@@ -69,6 +70,7 @@ mod plan;
 mod planner;
 mod route;
 mod settings;
+mod stroke_order;
 mod target;
 mod timing;
 mod trajectory;
@@ -83,6 +85,7 @@ pub use nozzle::{StageOneProgram, StandardForm};
 pub use plan::{Plan, PlanReport, Setpoint, Waypoint};
 pub use planner::{OptimalPlanner, Planner, SmoothingPlanner, plan};
 pub use settings::{HeadingSettings, LowessSettings, NozzleSettings, Settings, TimingPolicy, TimingSettings};
+pub use stroke_order::{OrderedStroke, StrokeEnds, StrokeOrder, order_strokes, transit_lower_bound};
 pub use target::{NozzleState, Target, normal_deviation};
 pub use trajectory::{Extrema, Sample, Trajectory};
 pub use world::{Hit, Surface, Tool, VehicleState};

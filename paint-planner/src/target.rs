@@ -44,6 +44,11 @@ pub(crate) fn check(targets: &[Target]) -> Result<(), Error> {
     if targets.len() < 2 {
         return Err(Error::TooFewTargets { count: targets.len() });
     }
+    check_each(targets)
+}
+
+/// Refuses targets that are no points of a surface.
+pub(crate) fn check_each(targets: &[Target]) -> Result<(), Error> {
     for (index, target) in targets.iter().enumerate() {
         let refuse = |what| Err(Error::Target { index, what });
         if !target.point.iter().all(|c| c.is_finite() && c.abs() < 1e6) {

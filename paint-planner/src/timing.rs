@@ -9,6 +9,7 @@ use crate::target::Target;
 use crate::trajectory::{Extrema, Trajectory};
 use nalgebra::Vector4;
 use speed_profile::SpeedProfile;
+pub(crate) use speed_profile::rest_to_rest;
 
 /// Metres of deviation that a radian of heading error counts as: about the lever of an arm.
 const HEADING_LEVER: f64 = 0.5;

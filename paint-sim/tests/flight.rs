@@ -34,6 +34,7 @@ impl Reference for Ellipse {
             heading: 0.0,
             heading_rate: 0.0,
             aim: Some(Point3::from(on_wall)),
+            lever: Vector3::zeros(),
             nozzle_distance: 0.1,
             flow: 5e-7,
         }
@@ -168,6 +169,32 @@ fn a_wrong_model_of_the_vehicle_is_forgiven() {
     let reference = Ellipse { duration: 40.0 };
     let figures = fly_with(&reference, &mut controller, &mut arm(), &wall(), &settings).unwrap().statistics();
     assert!(figures.hit_error_rms < 0.006 && figures.nozzle_distance_std < 0.012, "{figures:?}");
+}
+
+/// In a steady wind the body leans by `atan(drag v / g)`, and a gun on an arm would sink by its sine.
+#[test]
+fn the_gun_stays_in_its_place_when_the_body_leans_against_the_wind() {
+    let arm_length = 0.5;
+    let reference = ReferenceState { lever: Vector3::new(arm_length, 0.0, 0.0), ..still() };
+    let settings = FlightSettings {
+        wind: Wind { mean: Vector3::new(3.0, 0.0, 0.0), ..Wind::calm() },
+        localisation: Localisation::perfect(),
+        settle: 10.0,
+        ..FlightSettings::default()
+    };
+    let lean = (settings.airframe.drag[0] * 3.0 / 9.80665).atan();
+    let displaced = |lever: f64| {
+        let gains = ControllerSettings { lever, ..ControllerSettings::default() };
+        let mut controller = CascadedController::new(settings.airframe, gains);
+        let log = fly_with(&Still(reference), &mut controller, &mut arm(), &wall(), &settings).unwrap();
+        let gun = log.samples[0].world_from_body * Point3::new(arm_length, 0.0, 0.0);
+        gun - (reference.position + reference.lever)
+    };
+    let left = displaced(0.0);
+    // Headwind from behind: the nose rises.
+    assert!((left.z.abs() - arm_length * lean.sin()).abs() < 2e-3, "{left}");
+    let held = displaced(3.0);
+    assert!(held.norm() < 1e-3, "{held}");
 }
 
 #[test]

@@ -165,8 +165,8 @@ pub enum Error {
     },
     /// Accelerometer and gyroscope do not turn together.
     #[error(
-        "gravity test: accelerometer and gyroscope have different axes; they would agree if the accelerometer's \
-         (x, y, z) were read as {hint}: check axes and signs of both sensors"
+        "gravity test: accelerometer and gyroscope have different axes, or units; they would agree if the accelerometer's \
+         (x, y, z) were read as {hint}: check axes, signs and units of both sensors"
     )]
     SwappedAxes {
         /// The assignment that fits.

@@ -22,7 +22,7 @@ mod vio;
 pub use measurements::measurement::{Measurement, Trial};
 pub use measurements::pose::BodyPose;
 pub use point_observation::{PointObservation, PointPair};
-pub use report::{Calibration, FrameReport, InitializationStatus, Status};
+pub use report::{Calibration, FrameReport, InitializationStatus, LandmarkEstimate, Status};
 pub use settings::{
     CalibrationSettings, DynamicInitializationSettings, LandmarkSettings, PatchSettings, Settings, StationarySettings,
     StereoSettings, UpdateSettings,

@@ -1,26 +1,43 @@
+//! Whether inertial samples can be what they claim to be: order, rate, units, axes.
+
+use std::fmt;
+
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use crate::error::invalid;
 use crate::{Error, Imu, so3};
 
-/// Length of the pieces over which the gyroscope is integrated, s: short enough for one without calibration.
-const WINDOW_S: f64 = 8.0;
-/// Forces are averaged over this first, s: vibration and most of the acceleration of a flight cancel.
-const BLOCK_S: f64 = 2.6;
-/// The mean force may differ from gravity by this, m/s²: acceleration, and the bias.
-const GRAVITY_TOLERANCE: f64 = 2.0;
+/// Length of the windows over which the gyroscope is integrated, s: short enough for one without calibration.
+const WINDOW_S: f64 = 24.0;
+/// Forces are averaged over this first, s: vibration cancels, and so does the acceleration up to the change of speed.
+const BLOCK_S: f64 = 8.0;
+/// Beyond these multiples of gravity the mean force is in another unit: no flight floats or pulls for that long.
+const PLAUSIBLE_FORCE: [f64; 2] = [0.5, 3.0];
+/// A sensor that turns no faster, rad/s, and as steadily, over this time, s, is at rest, and reads its bias: over a window the bias
+/// would turn it by more than a radian.
+const REST: (f64, f64, f64) = (0.2, 0.02, 1.0);
+/// The mean force of a calm flight differs from gravity by less, m/s².
+const CALM: f64 = 2.0;
 /// Measured and claimed rate may differ by this share.
 const RATE_TOLERANCE: f64 = 0.2;
 /// Time between two samples, in units of the usual one, from which it counts as a gap.
 const GAP: f64 = 5.0;
-/// Another assignment of the axes is held to be the right one if it scatters gravity less by this factor...
-const CLEARER: f64 = 0.6;
-/// ... and if the one given scatters it by more than this, (m/s²)²: less is what changes of speed make, 5 m/s from block to
-/// block. A multirotor's force stays along its own axis: an assignment that turns about that axis smears nothing at all.
-const IMPLAUSIBLE: f64 = 3.5;
+/// Another reading of the sensors is named if it departs from gravity less by this factor in square...
+const CLEARER: f64 = 0.25;
+/// ... and the one given by more than this, (m/s²)²: changes of speed by 28 m/s from block to block.
+const IMPLAUSIBLE: f64 = 12.0;
+/// From here to there it is only a doubt: 13 m/s.
+const DOUBTFUL: f64 = 2.5;
+/// Mean rate from which rates may be degrees per second, rad/s. Slower ones would be no rotation at all then, and the force of a
+/// multirotor stays along its own axis: without rotation it would always seem to agree.
+const FAST: f64 = 3.0;
+/// Degrees in a radian, the other unit of rates.
+const RADIANS_PER_DEGREE: f64 = std::f64::consts::PI / 180.0;
+/// Rates that are read otherwise: as they are, negated, and both taken for degrees per second.
+const RATE_FACTORS: [f64; 4] = [1.0, -1.0, RADIANS_PER_DEGREE, -RADIANS_PER_DEGREE];
 
 /// What [`validate_samples`] found in samples that it did not refuse.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ImuValidation {
     /// One over the median time between samples, Hz.
     pub rate_hz: f64,
@@ -28,16 +45,57 @@ pub struct ImuValidation {
     pub gaps: usize,
     /// The longest time between two samples, s.
     pub longest_gap_s: f64,
+    /// What is unusual, and may be right: people should look at it.
+    pub doubts: Vec<ImuDoubt>,
+}
+
+/// What is unusual about inertial samples, with the evidence.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ImuDoubt {
+    /// The force is far from gravity: an aggressive flight, or a wrong scale.
+    Force {
+        /// Median over windows of the mean length of the specific force, m/s².
+        force: f64,
+        /// What was expected, m/s².
+        gravity: f64,
+    },
+    /// Another assignment of axes departs less from gravity: a flight that leans as it accelerates, or swapped axes.
+    Axes {
+        /// What the accelerometer's (x, y, z) and the gyroscope would have to be.
+        hint: String,
+        /// Root mean square departure from gravity with the axes as given, m/s².
+        departure: f64,
+        /// The same with those of the hint, m/s².
+        departure_of_hint: f64,
+    },
+}
+
+impl fmt::Display for ImuDoubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Force { force, gravity } => write!(
+                f,
+                "the accelerometer reads {force:.1} m/s² on average, gravity is {gravity:.2}: an aggressive flight, or a wrong scale"
+            ),
+            Self::Axes { hint, departure, departure_of_hint } => write!(
+                f,
+                "gravity is {departure:.1} m/s² off when the gyroscope's turns are taken out, and {departure_of_hint:.1} m/s² if \
+                 the accelerometer's (x, y, z) were {hint}: a flight that leans as it accelerates, or other axes"
+            ),
+        }
+    }
 }
 
 /// Whether inertial samples can be what they claim to be: finite, in order, as frequent as said, and with a force that
 /// averages to gravity when the gyroscope's turns are taken out.
 ///
-/// The last is a test of axes and units that needs no calibration and no camera. Piece by piece, 2.6 s each, the mean of
-/// `R_k f_k`, with `R_k` integrated from the gyroscope, is gravity up to the change of speed. If the axes of one sensor are swapped or
-/// mirrored against those of the other, gravity is smeared instead; the 24 rotations by quarters, each with both signs of
-/// the gyroscope, are tried, and one that does much better is named. Motion that
-/// hardly tilts the sensor tells nothing, and a mirror image of both sensors together shows only in the camera.
+/// The last is a test of axes and units that needs no calibration and no camera. Piece by piece, the mean of `R_k f_k`, with
+/// `R_k` integrated from the gyroscope, is gravity up to the change of speed. If the axes of one sensor are swapped or
+/// mirrored against those of the other, or rates are in degrees, gravity is smeared instead; the 24 rotations by quarters, each
+/// with both signs and both units of the gyroscope, are tried, and one that does much better is named. Only what no flight can do is
+/// refused: changes of speed by 28 m/s from piece to piece. The rest is a [doubt](ImuDoubt). Motion that
+/// hardly tilts the sensor tells nothing, nor does the force of a multirotor that leans about one axis only, and a mirror image of
+/// both sensors together shows only in the camera.
 pub fn validate_samples(samples: &[Imu], rate_hz: f64, gravity: f64) -> Result<ImuValidation, Error> {
     if samples.len() < 2 {
         return Err(Error::TooFew { what: "inertial samples", got: samples.len(), need: 2 });
@@ -60,20 +118,42 @@ pub fn validate_samples(samples: &[Imu], rate_hz: f64, gravity: f64) -> Result<I
         return Err(Error::SampleRate { measured_hz: measured, claimed_hz: rate_hz });
     }
     let gaps = steps.len() - steps.partition_point(|&step| step <= GAP * usual);
-    let windows = windows(samples, GAP * usual);
-    check_gravity(&windows, gravity)?;
-    Ok(ImuValidation { rate_hz: measured, gaps, longest_gap_s: steps[steps.len() - 1] })
+    let windows = windows(samples, GAP * usual, &bias_at_rest(samples));
+    let doubts = check_gravity(&windows, gravity)?;
+    Ok(ImuValidation { rate_hz: measured, gaps, longest_gap_s: steps[steps.len() - 1], doubts })
 }
 
-/// Forces of one window, turned into the axes of its first sample, with the gyroscope as it is and negated.
+/// Forces of one window, turned into the axes of its first sample, for each reading of the gyroscope.
 struct Window {
-    /// For each second: `mean R_k[i][j] f_k[l]` as one matrix (j, l) for each i.
-    turned: [Vec<[Matrix3<f64>; 3]>; 2],
+    /// For each block: `mean R_k[i][j] f_k[l]` as one matrix (j, l) for each i.
+    turned: [Vec<[Matrix3<f64>; 3]>; 4],
     /// Mean length of the force.
     force: f64,
+    /// Mean length of the rate.
+    rate: f64,
 }
 
-fn windows(samples: &[Imu], gap_s: f64) -> Vec<Window> {
+/// Mean rate of the steadiest second if the sensor was at rest, and zero if it never was.
+fn bias_at_rest(samples: &[Imu]) -> Vector3<f64> {
+    let (slow, steady, length) = REST;
+    let mut best = (f64::INFINITY, Vector3::zeros());
+    let mut first = 0;
+    while first < samples.len() {
+        let inside = |sample: &&Imu| sample.stamp.secs_since(samples[first].stamp) < length;
+        let second = &samples[first..first + samples[first..].iter().take_while(inside).count()];
+        let count = second.len() as f64;
+        let mean = second.iter().map(|sample| sample.gyro).sum::<Vector3<f64>>() / count;
+        let variance = second.iter().map(|sample| (sample.gyro - mean).norm_squared()).sum::<f64>() / count;
+        let whole = samples.get(first + second.len()).is_some();
+        if whole && variance < best.0 && variance < steady * steady && mean.norm() < slow {
+            best = (variance, mean);
+        }
+        first += second.len();
+    }
+    best.1
+}
+
+fn windows(samples: &[Imu], gap_s: f64, gyro_bias: &Vector3<f64>) -> Vec<Window> {
     let mut windows = Vec::new();
     let mut first = 0;
     while first + 1 < samples.len() {
@@ -82,23 +162,24 @@ fn windows(samples: &[Imu], gap_s: f64) -> Vec<Window> {
                 && pair[1].stamp.secs_since(pair[0].stamp) <= gap_s
         };
         let count = 1 + samples[first..].windows(2).take_while(|pair| inside(pair)).count();
-        windows.push(Window::new(&samples[first..first + count]));
+        windows.push(Window::new(&samples[first..first + count], gyro_bias));
         first += count;
     }
     windows
 }
 
 impl Window {
-    fn new(samples: &[Imu]) -> Self {
-        let force = samples.iter().map(|sample| sample.accel.norm()).sum::<f64>() / samples.len() as f64;
-        let turned = [1.0, -1.0].map(|sign| {
+    fn new(samples: &[Imu], gyro_bias: &Vector3<f64>) -> Self {
+        let mean = |length: fn(&Imu) -> f64| samples.iter().map(length).sum::<f64>() / samples.len() as f64;
+        let (force, rate) = (mean(|sample| sample.accel.norm()), mean(|sample| sample.gyro.norm()));
+        let turned = RATE_FACTORS.map(|factor| {
             let (mut means, mut sums, mut count) = (Vec::new(), [Matrix3::zeros(); 3], 0.0);
             let mut turn = Rotation3::identity();
             let mut began = samples[0].stamp;
             for (index, sample) in samples.iter().enumerate() {
                 if index > 0 {
                     let before = &samples[index - 1];
-                    let mean = (before.gyro + sample.gyro) * (0.5 * sign);
+                    let mean = ((before.gyro + sample.gyro) * 0.5 - gyro_bias) * factor;
                     turn *= so3::exp(&(mean * sample.stamp.secs_since(before.stamp))).to_rotation_matrix();
                 }
                 if sample.stamp.secs_since(began) >= BLOCK_S {
@@ -112,51 +193,61 @@ impl Window {
             }
             means
         });
-        Self { turned, force }
+        Self { turned, force, rate }
     }
 
-    /// Sum of the squared departures of the seconds' mean forces from their mean, if axis `l` of the accelerometer is
-    /// column `l` of `axes`; and how many seconds there are.
-    fn scatter(&self, axes: &Matrix3<f64>, sign: usize) -> (f64, f64) {
-        let (mut sum, mut square, mut count) = (Vector3::zeros(), 0.0, 0.0);
-        for block in &self.turned[sign] {
-            let force = Vector3::from_fn(|i, _| block[i].component_mul(axes).sum());
-            sum += force;
-            square += force.norm_squared();
-            count += 1.0;
-        }
-        if count < 2.0 { (0.0, 0.0) } else { (square - sum.norm_squared() / count, count) }
+    /// Sum over blocks of the squared departure of the mean force from a vector as long as gravity along the window's mean, if
+    /// axis `l` of the accelerometer is column `l` of `axes`; and how many blocks there are.
+    fn departure(&self, axes: &Matrix3<f64>, reading: usize, gravity: f64) -> (f64, f64) {
+        let block = |block: &[Matrix3<f64>; 3]| Vector3::from_fn(|i, _| block[i].component_mul(axes).sum());
+        let forces: Vec<Vector3<f64>> = self.turned[reading].iter().map(block).collect();
+        let sum: Vector3<f64> = forces.iter().sum();
+        let up = sum.try_normalize(0.0).unwrap_or_default() * gravity;
+        (forces.iter().map(|force| (force - up).norm_squared()).sum(), forces.len() as f64)
     }
 }
 
-fn check_gravity(windows: &[Window], gravity: f64) -> Result<(), Error> {
-    let median = |values: Vec<f64>| {
-        let mut sorted = values;
-        sorted.sort_unstable_by(f64::total_cmp);
-        sorted.get(sorted.len() / 2).copied()
-    };
-    let Some(force) = median(windows.iter().map(|window| window.force).collect()) else { return Ok(()) };
-    if (force - gravity).abs() > GRAVITY_TOLERANCE {
+fn check_gravity(windows: &[Window], gravity: f64) -> Result<Vec<ImuDoubt>, Error> {
+    let mut forces: Vec<f64> = windows.iter().map(|window| window.force).collect();
+    forces.sort_unstable_by(f64::total_cmp);
+    let mut doubts = Vec::new();
+    let Some(&force) = forces.get(forces.len() / 2) else { return Ok(doubts) };
+    let [least, most] = PLAUSIBLE_FORCE.map(|factor| factor * gravity);
+    if force < least || force > most {
         return Err(Error::NoGravity { force, gravity });
     }
-    let scatter = |axes: &Matrix3<f64>, sign: usize| {
-        let parts = windows.iter().map(|window| window.scatter(axes, sign));
+    if (force - gravity).abs() > CALM {
+        doubts.push(ImuDoubt::Force { force, gravity });
+    }
+    let departure = |axes: &Matrix3<f64>, reading: usize| {
+        let parts = windows.iter().map(|window| window.departure(axes, reading, gravity));
         let (sum, count) = parts.fold((0.0, 0.0), |(sum, count), part| (sum + part.0, count + part.1));
         sum / f64::max(count, 1.0)
     };
-    let as_given = scatter(&Matrix3::identity(), 0);
-    let best = quarter_turns()
-        .into_iter()
-        .flat_map(|axes| [(axes, 0), (axes, 1)])
-        .map(|(axes, sign)| (scatter(&axes, sign), axes, sign))
-        .min_by(|a, b| a.0.total_cmp(&b.0));
-    match best {
-        Some((least, axes, sign)) if least < CLEARER * as_given && as_given > IMPLAUSIBLE => {
-            let gyroscope = if sign == 0 { "" } else { ", and the gyroscope negated" };
-            Err(Error::SwappedAxes { hint: format!("{}{gyroscope}", names(&axes)) })
-        }
-        _ => Ok(()),
+    let as_given = departure(&Matrix3::identity(), 0);
+    let rate = windows.iter().map(|window| window.rate).sum::<f64>() / windows.len() as f64;
+    let factors = if rate > FAST { RATE_FACTORS.len() } else { 2 };
+    let readings = quarter_turns().into_iter().flat_map(|axes| (0..factors).map(move |k| (axes, k)));
+    let best =
+        readings.map(|(axes, reading)| (departure(&axes, reading), axes, reading)).min_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((least, axes, reading)) = best.filter(|(least, ..)| *least < CLEARER * as_given) else {
+        return Ok(doubts);
+    };
+    let gyroscope = [
+        "",
+        ", and the gyroscope negated",
+        ", and the gyroscope in degrees per second",
+        ", and the gyroscope in negated degrees per second",
+    ][reading];
+    let hint = format!("{}{gyroscope}", names(&axes));
+    if as_given > IMPLAUSIBLE {
+        return Err(Error::SwappedAxes { hint });
     }
+    if as_given > DOUBTFUL {
+        let [departure, departure_of_hint] = [as_given, least].map(f64::sqrt);
+        doubts.push(ImuDoubt::Axes { hint, departure, departure_of_hint });
+    }
+    Ok(doubts)
 }
 
 /// The 24 rotations that map axes to axes. Their mirror images scatter gravity alike: they turn the world upside down.
@@ -176,8 +267,10 @@ fn quarter_turns() -> Vec<Matrix3<f64>> {
     turns
 }
 
-/// What the accelerometer's three readings would have to be, in terms of those given.
+/// What the accelerometer's three readings would have to be, in terms of those given. With all signs turned it is the same world
+/// upside down: the one with fewer is the likelier mistake.
 fn names(axes: &Matrix3<f64>) -> String {
+    let axes = if axes.sum() < 0.0 { -axes } else { *axes };
     let row = |i: usize| {
         let column = (0..3).find(|&c| axes[(i, c)] != 0.0).unwrap_or(i);
         format!("{}{}", if axes[(i, column)] < 0.0 { "-" } else { "" }, ["x", "y", "z"][column])

@@ -41,6 +41,7 @@
 //! | iterated update | Bell and Cathey 1993 | [`UpdateSettings`] |
 //! | start in motion | gyroscope: Kneip and Lynen 2013; closed form: Martinelli 2014; refined: ours | [`DynamicInitializationSettings`] |
 //! | any other sensor: position, height, range, wheel | the update of the literature; the trait: ours | [`Measurement`], [`Vio::update`] |
+//! | a lens of the caller's own | ours | [`CameraModel`] |
 //! | noise that samples show | ours | [`ImuSettings`] |
 //! | inertial sensor and foreign poses | Weiss and Siegwart 2011; Lynen et al. 2013 (thesis, Paper II, section 4) | [`PoseFusion`] |
 //! | poses as measurements of the odometry | thesis, outlook: one estimator instead of two; ours | [`Vio::pose`], [`UnifiedVio`] |
@@ -98,15 +99,15 @@ pub use eval::stats::Stats;
 pub use eval::{Evaluation, EvaluationSettings, Segment, evaluate};
 pub use filter::{
     Bearing, BodyPose, Calibration, CalibrationSettings, DynamicInitializationSettings, FrameReport,
-    InitializationStatus, LandmarkSettings, Measurement, PatchSettings, PointObservation, PointPair, Settings,
-    StationarySettings, Status, StereoSettings, Trial, UpdateSettings, Vio, VioState, error_state,
+    InitializationStatus, LandmarkEstimate, LandmarkSettings, Measurement, PatchSettings, PointObservation, PointPair,
+    Settings, StationarySettings, Status, StereoSettings, Trial, UpdateSettings, Vio, VioState, error_state,
 };
 pub use format::{asl, calibration, euroc, kitti, tum};
 pub use fusion::{
     AlignmentSettings, ExtrinsicsSettings, FusionSettings, ImuPair, ImuPairSettings, MeasurementCounts, PoseFusion,
     PoseMeasurement, PoseSource, SourceEstimate, UnifiedSettings, UnifiedVio,
 };
-pub use imu_validation::{ImuValidation, validate_samples};
+pub use imu_validation::{ImuDoubt, ImuValidation, validate_samples};
 pub use lie::{se3, so3};
 pub use nalgebra;
 pub use samples::{ImageView, Imu, ImuNoise};
@@ -115,6 +116,6 @@ pub use stamp::{InvalidStamp, Stamp};
 pub use trajectory::{Trajectory, interpolate, path_lengths};
 
 /// The recipe of the README, as a test.
-#[cfg(doctest)]
+#[cfg(all(doctest, feature = "yaml"))]
 #[doc = include_str!("../README.md")]
 pub struct Readme;

@@ -40,6 +40,9 @@ struct Arguments {
     /// Who decides the sprays
     #[arg(long, default_value = "feedback")]
     painter: PainterName,
+    /// Paint in layers by intensity, a flight for each [default: one flight whose flow carries the picture]
+    #[arg(long)]
+    layers: bool,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/paintcopter")]
     out: PathBuf,
@@ -82,7 +85,8 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
     let folder = &arguments.out;
     std::fs::create_dir_all(folder)
         .map_err(|e| format!("{}: cannot be created ({e}): choose another --out", folder.display()))?;
-    let mut settings = MissionSettings { seed: arguments.seed, ..MissionSettings::default() };
+    let mut settings =
+        MissionSettings { seed: arguments.seed, layered: arguments.layers, ..MissionSettings::default() };
     if let Some(threads) = arguments.threads {
         settings.threads = threads.clamp(1, 1024);
     }

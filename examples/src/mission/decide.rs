@@ -54,23 +54,29 @@ pub(super) fn decide(
     let layers = match settings.painter {
         PainterChoice::Feedback => {
             let painter = Feedback { threads: settings.threads, ..Feedback::shipped()? };
-            layers(painter, &problem, &mut progress)
+            paint(painter, settings.layered, &problem, &mut progress)
         }
-        PainterChoice::Deconvolution => layers(Deconvolution::default(), &problem, &mut progress),
-        PainterChoice::Pursuit => layers(MatchingPursuit::default(), &problem, &mut progress),
+        PainterChoice::Deconvolution => paint(Deconvolution::default(), settings.layered, &problem, &mut progress),
+        PainterChoice::Pursuit => paint(MatchingPursuit::default(), settings.layered, &problem, &mut progress),
     }?;
     let sprays: usize = layers.iter().map(|l| l.sprays.len()).sum();
     if sprays == 0 {
         return Err(MissionError::NothingToPaint("no place of it is darker than the bare wall"));
     }
-    stage.done(&format!("{} layers, {sprays} sprays", layers.len()));
+    stage.done(&format!("{} layer(s), {sprays} sprays", layers.len()));
     Ok(layers)
 }
 
-fn layers<P: Painter>(
+/// One painting, or one for each layer.
+fn paint<P: Painter>(
     painter: P,
+    layered: bool,
     problem: &PaintProblem,
     progress: &mut dyn Observer,
 ) -> Result<Vec<Painting>, paint_net::Error> {
-    Layered::new(painter).paint_observed(problem, progress).map(Painting::into_layers)
+    if layered {
+        Layered::new(painter).paint_observed(problem, progress).map(Painting::into_layers)
+    } else {
+        painter.paint_observed(problem, progress).map(|painting| vec![painting])
+    }
 }

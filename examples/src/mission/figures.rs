@@ -65,6 +65,8 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         planning_per_flight_time: mission.planning / flight_time,
         path_length_m: path,
         flight_time_s: flight_time,
+        valve_open_share: mission.flights.iter().map(|f| open_time(&f.plan)).sum::<f64>() / flight_time,
+        transit_s: mission.flights.iter().map(|f| f.route.transit_s).sum(),
         paint_emitted_kg: kilograms(balance.emitted),
         paint_deposited_kg: kilograms(on_texels),
         paint_overspray_kg: kilograms(balance.overspray),
@@ -112,6 +114,12 @@ fn normal_deviations(mission: &Mission) -> Deviations {
         smoothing_mean: mean(smoothing.iter().copied()),
         unreachable: f64::from(out_of_reach) / f64::from(total.max(1)),
     }
+}
+
+/// Planned time with the valve open, s.
+fn open_time(plan: &Plan) -> f64 {
+    let open = plan.target_time.windows(2).zip(&plan.flow).filter(|(_, flow)| **flow > 0.0);
+    open.map(|(times, _)| times[1] - times[0]).sum()
 }
 
 /// Moments of a flight at which the robot overlaps the surface.

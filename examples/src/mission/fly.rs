@@ -100,7 +100,12 @@ pub(super) fn fly_three(
         FlightSettings { ptu_locked: true, ..usual },
     ];
     let one = |flight: &FlightSettings| -> Result<FlightLog, MissionError> {
-        let reference = PlanReference { plan, chain: &robot.chain, stand_off: settings.planner.nozzle.stand_off };
+        let reference = PlanReference {
+            plan,
+            chain: &robot.chain,
+            gun_length: settings.ptu.tilt_from_tip.norm(),
+            stand_off: settings.planner.nozzle.stand_off,
+        };
         let mut gun = ServoPanTilt::new(robot.chain.clone(), settings.servo)?;
         Ok(paint_sim::fly(&reference, &mut gun, &surface.world, flight)?)
     };

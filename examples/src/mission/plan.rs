@@ -37,7 +37,8 @@ pub(super) fn plan(
     for (k, layer) in layers.iter().enumerate() {
         stage.share(k as f64 / layers.len() as f64);
         let strokes = boustrophedon(&layer.sprays, &StrokeSettings::default())?;
-        let route = route(surface, &strokes, &kernel, settings.limits.along);
+        let from = planned.layers.last().and_then(|(route, ..)| route.targets.last().copied());
+        let route = route(surface, &strokes, &kernel, settings.limits.spray_spacing, from.as_ref(), &settings.planner)?;
         if route.targets.len() < 2 {
             planned.unreachable_paint += route.lost;
             continue;

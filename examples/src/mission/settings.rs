@@ -16,6 +16,9 @@ pub struct MissionSettings {
     pub spot: f64,
     /// Which painter decides.
     pub painter: PainterChoice,
+    /// Paint in layers by intensity, the base coat first, each with a flight of its own (Paper IV, section 3.3). Default: one
+    /// flight whose flow carries the picture, which is faster at an equal result (ours).
+    pub layered: bool,
     /// Where sprays may lie, in texels. Default: 2 along a row, rows 3 apart (ours).
     pub limits: Limits,
     /// The planner's settings.
@@ -45,7 +48,8 @@ impl Default for MissionSettings {
             texel: 0.0125,
             spot: 0.025,
             painter: PainterChoice::Feedback,
-            limits: Limits { along: 2, row_spacing: 3, min_volume: 0.01, ..Limits::default() },
+            layered: false,
+            limits: Limits { spray_spacing: 2, row_spacing: 3, min_volume: 0.01, ..Limits::default() },
             planner: planner_settings(),
             ptu: PtuSettings::default(),
             servo: ServoSettings::default(),

@@ -43,7 +43,7 @@ pub(super) struct Nozzle {
     pub(super) cut: f64,
     /// Distance between sprays along a row, pixels
     #[arg(long, default_value_t = 2)]
-    pub(super) along: usize,
+    pub(super) spray_spacing: usize,
     /// Distance between rows of sprays, pixels
     #[arg(long, default_value_t = 2)]
     pub(super) row_spacing: usize,
@@ -53,12 +53,12 @@ pub(super) struct Nozzle {
     /// Largest number of sprays, 0 for none at all [default: no limit]
     #[arg(long)]
     pub(super) max_sprays: Option<usize>,
-    /// Largest change of volume from one place of the path to the next [default: any]
+    /// Slew limit: largest change of volume from one place of the path to the next [default: any]
     #[arg(long)]
-    pub(super) largest_change: Option<f64>,
-    /// Path for which that holds: row by row, or along what is alike [default: rows]
+    pub(super) slew_limit: Option<f64>,
+    /// Path for which that holds: row by row, or first where the picture is alike [default: boustrophedon]
     #[arg(long)]
-    pub(super) route: Option<RouteName>,
+    pub(super) scan_order: Option<ScanOrderName>,
     /// Paint in layers by intensity, the base coat first: one plan cut into layers, or with "=sequential" a plan for each layer
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "joint")]
     pub(super) layers: Option<SharingName>,
@@ -151,9 +151,9 @@ pub(super) enum Preset {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-pub(super) enum RouteName {
-    Rows,
-    Alike,
+pub(super) enum ScanOrderName {
+    Boustrophedon,
+    ContextBased,
 }
 
 #[derive(Clone, Copy, ValueEnum)]

@@ -8,7 +8,7 @@ use paint_net::train::{ThesisSettings, TrainSettings};
 use paint_net::{Image, LayerPlanning, Limits, ScanOrder, SprayKernel};
 
 use super::colour::{Glazes, paint_colours, read_picture, save_colours};
-use super::command_line::{Arguments, Command, Nozzle, Preset, RouteName, SharingName, Training};
+use super::command_line::{Arguments, Command, Nozzle, Preset, ScanOrderName, SharingName, Training};
 use super::compare::{compare, table};
 use super::equal_sprays::{equal_sprays, print_equal_sprays};
 use super::error::PaintImageError;
@@ -57,8 +57,8 @@ fn only_for_one_paint(painter: Option<PainterKind>, nozzle: &Nozzle) -> Result<(
     let given = [
         ("--painter", painter.is_some()),
         ("--layers", nozzle.layers.is_some()),
-        ("--largest-change", nozzle.largest_change.is_some()),
-        ("--route", nozzle.route.is_some()),
+        ("--slew-limit", nozzle.slew_limit.is_some()),
+        ("--scan-order", nozzle.scan_order.is_some()),
         ("--passes", nozzle.passes.is_some()),
         ("--threads", nozzle.threads.is_some()),
         ("--weights", nozzle.weights.is_some()),
@@ -128,16 +128,16 @@ fn job(painter: PainterKind, nozzle: &Nozzle) -> Result<Job, PaintImageError> {
         passes: nozzle.passes.unwrap_or(6),
         kernel: SprayKernel::new(nozzle.sigma, nozzle.cut)?,
         limits: Limits {
-            along: nozzle.along,
+            spray_spacing: nozzle.spray_spacing,
             row_spacing: nozzle.row_spacing,
             min_volume: nozzle.min_volume,
             max_sprays: nozzle.max_sprays,
             ..Limits::default()
         },
-        slew_limit: nozzle.largest_change,
-        order: match nozzle.route {
-            Some(RouteName::Alike) => ScanOrder::ContextBased,
-            Some(RouteName::Rows) | None => ScanOrder::Boustrophedon,
+        slew_limit: nozzle.slew_limit,
+        order: match nozzle.scan_order {
+            Some(ScanOrderName::ContextBased) => ScanOrder::ContextBased,
+            Some(ScanOrderName::Boustrophedon) | None => ScanOrder::Boustrophedon,
         },
         layers: nozzle.layers.map(|sharing| match sharing {
             SharingName::Joint => LayerPlanning::Joint,

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use paint_sim::TriangleSurface;
 use tsdf_hash::{DepthData, DepthView, Map};
 use vio_ekf::sim::{RoomSettings, Scenario, Simulation};
-use vio_ekf::{ImuNoise, Stamp, Status, Trajectory, Vio};
+use vio_ekf::{ImuNoise, Stamp, Trajectory, Vio};
 
 use super::error::ScanFlightError;
 use super::evaluation::{ScanFlightFigures, figures};
@@ -66,7 +66,7 @@ impl ScanFlight {
             let truth = simulation.motion(stamp)?.world_from_body;
             let image = sensor.capture(k, &(truth * camera.body_from_camera))?;
             let report = vio.image(stamp, &image.grey())?;
-            let (Status::Tracking, Some(odometry)) = (report.status, vio.output()) else { continue };
+            let Some(odometry) = vio.output().filter(|_| report.status.has_estimate()) else { continue };
             let world_from_start =
                 *world_from_start.get_or_insert_with(|| yaw_alignment(&odometry.world_from_body, &truth));
             let pose = world_from_start * odometry.world_from_body;
@@ -84,7 +84,7 @@ impl ScanFlight {
             }
             stage.share(k as f64 / count as f64);
         }
-        if vio.status() != Status::Tracking {
+        if !vio.status().has_estimate() {
             return Err(ScanFlightError::Lost(vio.status()));
         }
         let mapped = map.mesh();

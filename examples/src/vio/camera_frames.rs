@@ -1,5 +1,8 @@
 //! The images of a recording, read one after the other.
 
+use std::iter::Peekable;
+use std::path::Path;
+
 use vio_ekf::{Error, Stamp};
 
 use super::grey_image::GreyImage;
@@ -21,31 +24,52 @@ pub struct CameraFrame {
 
 /// Reads the images one after the other, as they are asked for, each with that of the second camera.
 pub fn camera_frames(recording: &Recording) -> impl Iterator<Item = CameraFrame> + Send + '_ {
-    first_camera(&recording.images).map(|(stamp, picture)| {
-        let second = recording.second.as_ref().and_then(|camera| second_image(camera, stamp));
-        CameraFrame { stamp, picture, second }
+    let mut second = recording.second.as_ref().map(|second| (second, images(&second.images).peekable()));
+    images(&recording.images).map(move |(stamp, decode)| {
+        let second = second.as_mut().and_then(|(camera, images)| second_image(camera, images, stamp));
+        CameraFrame { stamp, picture: decode.decode(), second }
     })
 }
 
-fn first_camera(images: &Images) -> Box<dyn Iterator<Item = (Stamp, Result<GreyImage, String>)> + Send + '_> {
+/// An image that is not decoded yet.
+enum Encoded<'a> {
+    File(&'a Path),
+    Message(Result<GreyImage, String>),
+}
+
+impl Encoded<'_> {
+    fn decode(self) -> Result<GreyImage, String> {
+        match self {
+            Self::File(path) => GreyImage::read(path),
+            Self::Message(picture) => picture,
+        }
+    }
+}
+
+type EncodedImages<'a> = Box<dyn Iterator<Item = (Stamp, Encoded<'a>)> + Send + 'a>;
+
+fn images(images: &Images) -> EncodedImages<'_> {
     match images {
-        Images::Files(files) => Box::new(files.iter().map(|(stamp, path)| (*stamp, GreyImage::read(path)))),
-        Images::Mcap { path, topic, .. } => read_images(path.clone(), topic.clone()),
+        Images::Files(files) => Box::new(files.iter().map(|(stamp, path)| (*stamp, Encoded::File(path)))),
+        Images::Mcap { path, topic, .. } => Box::new(
+            read_images(path.clone(), topic.clone()).map(|(stamp, picture)| (stamp, Encoded::Message(picture))),
+        ),
     }
 }
 
 /// The image that the second camera took together with one of the first, or why it cannot be used; `None` if there is none.
-fn second_image(second: &SecondCamera, stamp: Stamp) -> Option<Result<GreyImage, String>> {
+fn second_image(
+    camera: &SecondCamera,
+    images: &mut Peekable<EncodedImages<'_>>,
+    stamp: Stamp,
+) -> Option<Result<GreyImage, String>> {
     let earliest = stamp.nanos().saturating_sub(MAX_STAMP_DIFFERENCE);
-    let next = second.images.partition_point(|(other, _)| other.nanos() < earliest);
-    let (other, path) = second.images.get(next)?;
-    (other.nanos() <= stamp.nanos().saturating_add(MAX_STAMP_DIFFERENCE)).then(|| {
-        let picture = GreyImage::read(path)?;
-        let (given, expected) = ((picture.width, picture.height), (second.camera.width, second.camera.height));
-        if given == expected {
-            Ok(picture)
-        } else {
-            Err(format!("{}: {}", path.display(), Error::ImageSize { given, expected }))
-        }
-    })
+    let latest = stamp.nanos().saturating_add(MAX_STAMP_DIFFERENCE);
+    while images.next_if(|(other, _)| other.nanos() < earliest).is_some() {}
+    let (other, encoded) = images.next_if(|(other, _)| other.nanos() <= latest)?;
+    let picture = encoded.decode().and_then(|picture| {
+        let (given, expected) = ((picture.width, picture.height), (camera.camera.width, camera.camera.height));
+        if given == expected { Ok(picture) } else { Err(Error::ImageSize { given, expected }.to_string()) }
+    });
+    Some(picture.map_err(|why| format!("second camera, image of {other} s: {why}")))
 }

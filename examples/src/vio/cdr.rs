@@ -32,7 +32,7 @@ pub(super) struct Image<'a> {
     pub(super) height: u32,
     pub(super) width: u32,
     pub(super) encoding: String,
-    _is_bigendian: u8,
+    pub(super) is_bigendian: u8,
     pub(super) step: u32,
     #[serde(borrow)]
     pub(super) data: &'a [u8],

@@ -46,15 +46,24 @@ pub(super) struct Track {
     /// True poses, TUM or EuRoC text, instead of the recording's own
     #[arg(long, value_name = "FILE")]
     pub(super) truth: Option<PathBuf>,
-    /// With the second camera of the folder, mav0/cam1
-    #[arg(long, requires = "euroc")]
+    /// With the second camera: mav0/cam1 of a folder, the second topic with images of an MCAP file
+    #[arg(long)]
     pub(super) stereo: bool,
-    /// Landmarks that are followed at once
-    #[arg(long, value_name = "NUMBER", default_value_t = 25)]
-    pub(super) features: usize,
+    /// Image of the size of the first camera's; nothing is tracked where it is black: propellers, legs
+    #[arg(long, value_name = "PNG")]
+    pub(super) mask: Option<PathBuf>,
+    /// Settings of the filter as TOML: any of those that a run writes to settings.toml; the others keep their defaults
+    #[arg(long, value_name = "TOML")]
+    pub(super) settings: Option<PathBuf>,
+    /// Landmarks that are followed at once [default: 25, or that of the settings]
+    #[arg(long, value_name = "NUMBER")]
+    pub(super) features: Option<usize>,
     /// Estimate the camera's place and clock as well, starting from the calibration
     #[arg(long)]
     pub(super) calibrate: bool,
+    /// Take the inertial samples as they are, though the test of gravity, axes or rate refuses them
+    #[arg(long)]
+    pub(super) accept_imu: bool,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/vio")]
     pub(super) out: PathBuf,
@@ -108,6 +117,15 @@ pub(super) struct Eval {
     pub(super) reference: PathBuf,
     /// Estimate, TUM or EuRoC text
     pub(super) estimate: PathBuf,
+    /// Largest time difference of a pair of poses, s
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.01)]
+    pub(super) max_difference: f64,
+    /// With the error after alignment of the scale as well
+    #[arg(long)]
+    pub(super) sim3: bool,
+    /// Lengths of path over which the relative error is taken, m
+    #[arg(long, value_name = "METRES", value_delimiter = ',', default_value = "8,16,24,32,40")]
+    pub(super) rpe: Vec<f64>,
     /// Folder for report.json as well
     #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,

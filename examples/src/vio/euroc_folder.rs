@@ -36,7 +36,17 @@ pub fn open_euroc(folder: &Path, overrides: &Overrides) -> Result<Recording, Vio
     let samples = asl::read_imu(&read_text(&table)?).map_err(|error| VioError::malformed(&table, &error))?;
     let name = folder.display().to_string();
     let truth = truth(&root, overrides)?;
-    Ok(Recording { name, camera, imu, samples, images: Images::Files(images), second: None, truth })
+    Ok(Recording {
+        name,
+        camera,
+        imu,
+        samples,
+        images: Images::Files(images),
+        second: None,
+        truth,
+        unused: Vec::new(),
+        mask: None,
+    })
 }
 
 /// The folder with the sensors: `mav0` below a folder, or itself.

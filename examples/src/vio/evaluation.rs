@@ -2,7 +2,8 @@
 
 use vio_ekf::nalgebra::{Isometry3, Matrix3, Vector3};
 use vio_ekf::{
-    Alignment, Association, Error, Odometry, PairsFrom, RpeSettings, Span, Stamp, Tolerance, apply, ate, rpe, so3,
+    Alignment, Association, Error, Odometry, PairsFrom, RpeSettings, Span, Stamp, Stats, Tolerance, apply, ate, rpe,
+    so3,
 };
 
 use super::error::VioError;
@@ -33,7 +34,7 @@ pub struct RunEvaluation {
     pub nees_attitude: f64,
     /// The same of the velocity, if that is known.
     pub nees_velocity: Option<f64>,
-    /// Share of the truth's duration for which there is an estimate.
+    /// Share of the time with truth and images for which there is an estimate.
     pub coverage: f64,
     /// Truth and estimate in the truth's world, aligned in position and yaw.
     pub aligned: Vec<AlignedPair>,
@@ -61,44 +62,66 @@ pub struct PoseError {
 /// # Errors
 /// [`VioError::Library`] if the poses cannot be aligned.
 pub fn evaluate_run(run: &Run, truth: &GroundTruth) -> Result<Option<RunEvaluation>, VioError> {
-    let estimate = run.trajectory()?;
     let association = Association { interpolate: true, ..Association::default() };
-    let pairs = match association.pair_up(&truth.trajectory, &estimate) {
-        Err(Error::NoMatches { .. }) => return Ok(None),
-        other => other?,
-    };
-    let error = |alignment| position_error(&pairs.reference, &pairs.estimate, alignment);
-    let (ate_yaw, onto) = error(Alignment::PosYaw)?;
-    let (ate_se3, _) = error(Alignment::Se3)?;
     let settings = RpeSettings {
         span: Span::Metres(RPE_LENGTH),
         all_pairs: true,
         tolerance: Tolerance::Metres(0.5),
         pairs_from: PairsFrom::Reference,
     };
-    let rpe_10m_median = match rpe(&pairs.reference, &pairs.estimate, &settings) {
-        Ok(rpe) => Some(rpe.translation.median),
-        Err(Error::NoPairs { .. }) => None,
-        Err(error) => return Err(error.into()),
+    // Each segment is in a world of its own, and aligned by itself.
+    let (mut se3, mut yaw, mut drift, mut aligned, mut covered) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), 0.0);
+    for estimate in run.trajectories()? {
+        let pairs = match association.pair_up(&truth.trajectory, &estimate) {
+            Err(Error::NoMatches { .. }) => continue,
+            other => other?,
+        };
+        let error = |alignment| position_error(&pairs.reference, &pairs.estimate, alignment);
+        let (ate_yaw, onto) = error(Alignment::PosYaw)?;
+        let (ate_se3, _) = error(Alignment::Se3)?;
+        yaw.push((ate_yaw, pairs.stamps.len()));
+        se3.push((ate_se3, pairs.stamps.len()));
+        match rpe(&pairs.reference, &pairs.estimate, &settings) {
+            Ok(rpe) => drift.extend(rpe.translation_errors),
+            Err(Error::NoPairs { .. }) => {}
+            Err(error) => return Err(error.into()),
+        }
+        covered += pairs.stamps[pairs.stamps.len() - 1].secs_since(pairs.stamps[0]);
+        aligned.extend(pairs.stamps.iter().zip(&pairs.reference).zip(onto).map(|((&s, &g), e)| (s, g, e)));
+    }
+    if aligned.is_empty() {
+        return Ok(None);
+    }
+    let both = match truth.trajectory.span() {
+        Some((first, last)) => last.min(run.images_span.1).secs_since(first.max(run.images_span.0)),
+        None => 0.0,
     };
-    let covered = pairs.stamps[pairs.stamps.len() - 1].secs_since(pairs.stamps[0]);
-    let coverage = if truth.trajectory.duration_s() > 0.0 { covered / truth.trajectory.duration_s() } else { 1.0 };
+    let coverage = if both > 0.0 { covered / both } else { 1.0 };
     let (mut errors, mut sums) = (Vec::new(), Sums::default());
     for segment in &run.segments {
         accumulate_errors(&segment.odometry, truth, &mut errors, &mut sums);
     }
     let count = (errors.len() as f64).max(1.0);
     Ok(Some(RunEvaluation {
-        ate_se3,
-        ate_yaw,
-        rpe_10m_median,
+        ate_se3: pooled(&se3),
+        ate_yaw: pooled(&yaw),
+        rpe_10m_median: Stats::of(&drift).map(|stats| stats.median),
         nees_position: sums.position / count,
         nees_attitude: sums.attitude / count,
         nees_velocity: (!truth.velocities_in_world.is_empty()).then(|| sums.velocity / count),
         coverage: coverage.min(1.0),
-        aligned: pairs.stamps.iter().zip(&pairs.reference).zip(onto).map(|((&s, &g), e)| (s, g, e)).collect(),
+        aligned,
         errors,
     }))
+}
+
+/// Root mean square over segments, from their own and their numbers of poses.
+fn pooled(segments: &[(f64, usize)]) -> f64 {
+    if let [(only, _)] = segments {
+        return *only;
+    }
+    let sum = |value: &dyn Fn(&(f64, usize)) -> f64| segments.iter().map(value).sum::<f64>();
+    (sum(&|(rms, count)| rms * rms * *count as f64) / sum(&|(_, count)| *count as f64)).sqrt()
 }
 
 /// Root mean square position error, and the estimate after alignment. Poses that do not tell a rotation, as at rest, are

@@ -1,5 +1,6 @@
 //! Recordings as MCAP: images as Foxglove or ROS 2 has them, inertial samples as ROS 2 has them.
 
+mod chunks;
 mod fields;
 mod pixels;
 
@@ -10,6 +11,7 @@ use std::path::{Path, PathBuf};
 use foxglove::Decode;
 use foxglove::messages::{self, FrameTransform, FrameTransforms, PoseInFrame};
 use mcap::Message;
+use mcap::sans_io::LinearReaderOptions;
 use vio_ekf::calibration::{self, CameraCalibration, ImuCalibration};
 use vio_ekf::nalgebra::Isometry3;
 use vio_ekf::{Camera, Distortion, Imu, ImuNoise, Stamp, Trajectory};
@@ -18,9 +20,10 @@ use super::error::{VioError, read_text};
 use super::euroc_folder::{Overrides, read_truth};
 use super::grey_image::GreyImage;
 use super::mcap_out::NOISE_SCHEMA;
-use super::recording::{GroundTruth, Images, Recording};
+use super::recording::{GroundTruth, Images, Recording, SecondCamera};
+use chunks::{Lz4, Zstd};
 use fields::{imu, isometry, noise, stamp};
-use pixels::{image, image_stamp};
+use pixels::{image, image_header};
 
 /// Opens an MCAP file: one pass for everything but the images, which are read later, one by one.
 ///
@@ -31,29 +34,62 @@ use pixels::{image, image_stamp};
 /// # Errors
 /// [`VioError`] names what the file lacks, or what cannot be read.
 pub fn open_mcap(path: &Path, overrides: &Overrides) -> Result<Recording, VioError> {
+    open(path, overrides, false)
+}
+
+/// As [`open_mcap`], with the second topic of images as a second camera. A chain of Kalibr must hold both, in this order.
+///
+/// # Errors
+/// [`VioError`] names what the file lacks, or what cannot be read.
+pub fn open_mcap_stereo(path: &Path, overrides: &Overrides) -> Result<Recording, VioError> {
+    open(path, overrides, true)
+}
+
+fn open(path: &Path, overrides: &Overrides, stereo: bool) -> Result<Recording, VioError> {
     let mut found = Found::default();
     for message in messages_of(path)? {
         found.take(&message.map_err(|error| broken(path, &error))?).map_err(|why| VioError::malformed(path, &why))?;
     }
     let lacks = |what: &str| VioError::malformed(path, &what);
-    let topic = found.image_topic.clone().ok_or_else(|| {
-        lacks(
+    if found.images.is_empty() {
+        return Err(lacks(
             "no topic with images: expected foxglove.RawImage, foxglove.CompressedImage, sensor_msgs/msg/Image or \
                sensor_msgs/msg/CompressedImage",
-        )
-    })?;
+        ));
+    }
+    if stereo && found.images.len() < 2 {
+        return Err(lacks(&format!("one topic with images only, `{}`: --stereo needs two", found.images[0].topic)));
+    }
     if found.samples.is_empty() {
         return Err(lacks("no topic with inertial samples: expected sensor_msgs/msg/Imu in CDR"));
     }
-    let (camera, imu) = found.calibrations(path, overrides)?;
+    let (cameras, imu) = found.calibrations(path, overrides, if stereo { 2 } else { 1 })?;
+    let unused = found.images.iter().skip(cameras.len()).map(|images| images.topic.clone()).collect();
+    let mut images = found.images.into_iter().map(|ImageTopic { topic, stamps, .. }| Images::Mcap {
+        path: path.to_path_buf(),
+        topic,
+        stamps,
+    });
     let truth = match &overrides.truth {
         Some(path) => Some(read_truth(path)?),
         None => (!found.truth.is_empty())
             .then_some(GroundTruth { trajectory: found.truth, velocities_in_world: Vec::new() }),
     };
-    let images = Images::Mcap { path: path.to_path_buf(), topic, stamps: found.image_stamps };
     let name = path.display().to_string();
-    Ok(Recording { name, camera, imu, samples: found.samples, images, second: None, truth })
+    let first = images.next().ok_or_else(|| lacks("no images"))?;
+    let second =
+        cameras.get(1).zip(images.next()).map(|(second, images)| SecondCamera { camera: second.camera, images });
+    Ok(Recording {
+        name,
+        camera: cameras[0],
+        imu,
+        samples: found.samples,
+        images: first,
+        second,
+        truth,
+        unused,
+        mask: None,
+    })
 }
 
 /// The images of a topic in the order of the file, with their stamps.
@@ -80,8 +116,16 @@ pub(super) fn read_images(
 fn messages_of(
     path: &Path,
 ) -> Result<impl Iterator<Item = mcap::McapResult<Message<'static>>> + Send + use<>, VioError> {
-    let file = File::open(path).map_err(|error| VioError::unreadable(path, &error))?;
-    Ok(mcap::io::MessageReader::new(BufReader::new(file)))
+    let unreadable = |error: std::io::Error| VioError::unreadable(path, &error);
+    let file = File::open(path).map_err(unreadable)?;
+    // A record that claims to be longer than the file asks for memory that is not there.
+    let most = usize::try_from(file.metadata().map_err(unreadable)?.len()).unwrap_or(usize::MAX);
+    let options = LinearReaderOptions::default().with_record_length_limit(most).with_validate_chunk_crcs(true);
+    let mut reader = mcap::io::MessageReader::new_with_options(BufReader::new(file), options);
+    let broken = |error| broken(path, &error);
+    reader.add_decompressor(Zstd::new()).map_err(broken)?;
+    reader.add_decompressor(Lz4::new()).map_err(broken)?;
+    Ok(reader)
 }
 
 fn broken(path: &Path, error: &mcap::McapError) -> VioError {
@@ -96,15 +140,23 @@ fn broken(path: &Path, error: &mcap::McapError) -> VioError {
     }
 }
 
+/// Images of one camera.
+struct ImageTopic {
+    topic: String,
+    frame: String,
+    stamps: Vec<Stamp>,
+}
+
 /// Everything but the images.
 #[derive(Default)]
 struct Found {
     samples: Vec<Imu>,
     imu_topic: Option<String>,
     imu_frame: String,
-    image_topic: Option<String>,
-    image_stamps: Vec<Stamp>,
-    camera: Option<messages::CameraCalibration>,
+    /// In the order in which they appear.
+    images: Vec<ImageTopic>,
+    /// One for each frame.
+    cameras: Vec<messages::CameraCalibration>,
     frames: Vec<FrameTransform>,
     noise: Option<(ImuNoise, f64, f64)>,
     truth: Trajectory,
@@ -127,13 +179,17 @@ impl Found {
             "foxglove.RawImage"
             | "foxglove.CompressedImage"
             | "sensor_msgs/msg/Image"
-            | "sensor_msgs/msg/CompressedImage"
-                if self.image_topic.get_or_insert_with(|| topic.clone()) == topic =>
-            {
-                self.image_stamps.extend(image_stamp(name, data));
+            | "sensor_msgs/msg/CompressedImage" => {
+                let Some((stamp, frame)) = image_header(name, data) else { return Ok(()) };
+                match self.images.iter_mut().find(|images| images.topic == *topic) {
+                    Some(images) => images.stamps.push(stamp),
+                    None => self.images.push(ImageTopic { topic: topic.clone(), frame, stamps: vec![stamp] }),
+                }
             }
             "foxglove.CameraCalibration" => {
-                self.camera = Some(messages::CameraCalibration::decode(data).map_err(|_| bad())?);
+                let camera = messages::CameraCalibration::decode(data).map_err(|_| bad())?;
+                self.cameras.retain(|other| other.frame_id != camera.frame_id);
+                self.cameras.push(camera);
             }
             "foxglove.FrameTransform" => self.frames.push(FrameTransform::decode(data).map_err(|_| bad())?),
             "foxglove.FrameTransforms" if self.frames.len() < 1000 => {
@@ -155,7 +211,8 @@ impl Found {
         &self,
         path: &Path,
         overrides: &Overrides,
-    ) -> Result<(CameraCalibration, ImuCalibration), VioError> {
+        count: usize,
+    ) -> Result<(Vec<CameraCalibration>, ImuCalibration), VioError> {
         let (noise, rate_hz, time_offset_s) = match &overrides.imu {
             Some(file) => {
                 let imu = calibration::read_kalibr_imu(&read_text(file)?);
@@ -171,18 +228,38 @@ impl Found {
         };
         let imu = ImuCalibration { noise, rate_hz, body_from_imu: Isometry3::identity() };
         if let Some(file) = &overrides.cameras {
-            let cameras = calibration::read_kalibr_cameras(&read_text(file)?);
-            return Ok((cameras.map_err(|error| VioError::malformed(file, &error))?[0], imu));
+            let chain = calibration::read_kalibr_cameras(&read_text(file)?);
+            let mut chain = chain.map_err(|error| VioError::malformed(file, &error))?;
+            if chain.len() < count {
+                return Err(VioError::malformed(file, &"holds one camera only"));
+            }
+            chain.truncate(count);
+            return Ok((chain, imu));
         }
-        let camera = self
-            .camera()
-            .map_err(|why| VioError::malformed(path, &format!("{why}: give Kalibr's camera chain with --cameras")))?;
-        camera.check()?;
-        Ok((CameraCalibration { camera, rate_hz: None, time_offset_s }, imu))
+        let read = |images: &ImageTopic| {
+            let camera = self.camera(images).map_err(|why| {
+                VioError::malformed(path, &format!("{why}: give Kalibr's camera chain with --cameras"))
+            })?;
+            camera.check()?;
+            // Through the same text as the calibration of a folder, so that the same camera is the same to the last bit.
+            let written = CameraCalibration { camera, rate_hz: None, time_offset_s: 0.0 };
+            let read = calibration::read_asl_camera(&calibration::write_asl_camera(&written))?;
+            Ok(CameraCalibration { time_offset_s, ..read })
+        };
+        let cameras = self.images.iter().take(count).map(read).collect::<Result<_, VioError>>()?;
+        Ok((cameras, imu))
     }
 
-    fn camera(&self) -> Result<Camera, String> {
-        let message = self.camera.as_ref().ok_or("holds no foxglove.CameraCalibration")?;
+    fn camera(&self, images: &ImageTopic) -> Result<Camera, String> {
+        let of_frame = self.cameras.iter().find(|camera| camera.frame_id == images.frame);
+        // A camera that is alone needs no name.
+        let message = of_frame.or(self.cameras.first().filter(|_| self.cameras.len() == 1 && self.images.len() == 1));
+        let message = message.ok_or_else(|| {
+            format!(
+                "holds no foxglove.CameraCalibration of the frame `{}`, that of topic {}",
+                images.frame, images.topic
+            )
+        })?;
         let place = |frame: &&FrameTransform| {
             frame.child_frame_id == message.frame_id && frame.parent_frame_id == self.imu_frame
         };

@@ -21,7 +21,8 @@ use super::grey_image::GreyImage;
 
 /// Frames of the sensors.
 pub(super) const IMU_FRAME: &str = "imu";
-const CAMERA_FRAME: &str = "camera";
+/// Frames of the cameras, and their topics: `/camera/image` and so on.
+const CAMERA_FRAMES: [&str; 2] = ["camera", "camera_right"];
 /// Name of the message that says what ROS has no message for.
 pub(super) const NOISE_SCHEMA: &str = "paintcopter.ImuCalibration";
 /// Definition of `sensor_msgs/msg/Imu` as ROS 2 recordings carry it.
@@ -68,17 +69,18 @@ pub(super) struct McapWriter {
     path: String,
     sequence: u32,
     imu: u16,
-    image: u16,
+    /// Of each camera.
+    images: Vec<u16>,
     truth: u16,
     noise: [f64; 2],
 }
 
 impl McapWriter {
-    /// Begins a file with what is known of the sensors. Images will all be raw, or all PNG.
+    /// Begins a file with what is known of the sensors: one camera or two. Images will all be raw, or all PNG.
     pub(super) fn create(
         path: &Path,
         began: Stamp,
-        camera: &CameraCalibration,
+        cameras: &[CameraCalibration],
         imu: &ImuCalibration,
         raw: bool,
     ) -> Result<Self, VioError> {
@@ -88,14 +90,17 @@ impl McapWriter {
         let writer = options.create(BufWriter::new(file)).map_err(failed)?;
         let white = [imu.noise.gyro_density, imu.noise.accel_density];
         let noise = white.map(|density| density * density * imu.rate_hz);
-        let mut out = Self { writer, path: path.display().to_string(), sequence: 0, imu: 0, image: 0, truth: 0, noise };
-        let calibration = out.channel::<messages::CameraCalibration>("/camera/calibration")?;
-        let place = out.channel::<FrameTransform>("/camera/place")?;
-        out.image = if raw {
-            out.channel::<RawImage>("/camera/image")?
-        } else {
-            out.channel::<CompressedImage>("/camera/image")?
-        };
+        let name = path.display().to_string();
+        let mut out = Self { writer, path: name, sequence: 0, imu: 0, images: Vec::new(), truth: 0, noise };
+        let mut describing = Vec::new();
+        for (frame, _) in CAMERA_FRAMES.iter().zip(cameras) {
+            let calibration = out.channel::<messages::CameraCalibration>(&format!("/{frame}/calibration"))?;
+            let place = out.channel::<FrameTransform>(&format!("/{frame}/place"))?;
+            describing.push((calibration, place));
+            let topic = format!("/{frame}/image");
+            let image = if raw { out.channel::<RawImage>(&topic)? } else { out.channel::<CompressedImage>(&topic)? };
+            out.images.push(image);
+        }
         out.truth = out.channel::<PoseInFrame>("/truth")?;
         let schema = out.writer.add_schema("sensor_msgs/msg/Imu", "ros2msg", IMU_DEFINITION.as_bytes());
         let schema = schema.map_err(failed)?;
@@ -103,15 +108,17 @@ impl McapWriter {
         let schema = out.writer.add_schema(NOISE_SCHEMA, "jsonschema", br#"{"type":"object"}"#).map_err(failed)?;
         let densities = out.writer.add_channel(schema, "/imu/calibration", "json", &BTreeMap::new()).map_err(failed)?;
 
-        out.message(calibration, began, &calibration_message(began, camera))?;
-        out.message(place, began, &place_message(began, &camera.camera.body_from_camera))?;
+        for ((frame, camera), (calibration, place)) in CAMERA_FRAMES.iter().zip(cameras).zip(describing) {
+            out.message(calibration, began, &calibration_message(began, frame, camera))?;
+            out.message(place, began, &place_message(began, frame, &camera.camera.body_from_camera))?;
+        }
         let text = serde_json::json!({
             "rate_hz": imu.rate_hz,
             "gyroscope_noise_density": imu.noise.gyro_density,
             "gyroscope_random_walk": imu.noise.gyro_walk,
             "accelerometer_noise_density": imu.noise.accel_density,
             "accelerometer_random_walk": imu.noise.accel_walk,
-            "timeshift_cam_imu": camera.time_offset_s,
+            "timeshift_cam_imu": cameras.first().map_or(0.0, |camera| camera.time_offset_s),
         });
         out.bytes(densities, began, text.to_string().as_bytes())?;
         Ok(out)
@@ -123,19 +130,20 @@ impl McapWriter {
         self.bytes(self.imu, sample.stamp, &bytes)
     }
 
-    /// An image; the stamp is the middle of the exposure.
-    pub(super) fn image(&mut self, stamp: Stamp, pixels: &Pixels) -> Result<(), VioError> {
-        let (timestamp, frame_id) = (Some(timestamp(stamp)), CAMERA_FRAME.to_string());
+    /// An image of camera `which`, which must be one of those described; the stamp is the middle of the exposure.
+    pub(super) fn image(&mut self, which: usize, stamp: Stamp, pixels: &Pixels) -> Result<(), VioError> {
+        let (timestamp, frame_id) = (Some(timestamp(stamp)), CAMERA_FRAMES[which].to_string());
+        let channel = self.images[which];
         match pixels {
             Pixels::Raw(grey) => {
                 let (width, height) = (grey.width as u32, grey.height as u32);
                 let (encoding, data) = ("mono8".into(), grey.data.clone().into());
                 let message = RawImage { timestamp, frame_id, width, height, encoding, step: width, data };
-                self.message(self.image, stamp, &message)
+                self.message(channel, stamp, &message)
             }
             Pixels::Png(bytes) => {
                 let (data, format) = (bytes.to_vec().into(), "png".into());
-                self.message(self.image, stamp, &CompressedImage { timestamp, frame_id, data, format })
+                self.message(channel, stamp, &CompressedImage { timestamp, frame_id, data, format })
             }
         }
     }
@@ -187,7 +195,7 @@ fn timestamp(stamp: Stamp) -> Timestamp {
     Timestamp::new((nanos / 1_000_000_000) as u32, (nanos % 1_000_000_000) as u32)
 }
 
-fn calibration_message(stamp: Stamp, calibration: &CameraCalibration) -> messages::CameraCalibration {
+fn calibration_message(stamp: Stamp, frame: &str, calibration: &CameraCalibration) -> messages::CameraCalibration {
     let camera = &calibration.camera;
     let (fx, fy, cx, cy) = (camera.fx, camera.fy, camera.cx, camera.cy);
     let (model, d) = match camera.distortion {
@@ -197,7 +205,7 @@ fn calibration_message(stamp: Stamp, calibration: &CameraCalibration) -> message
     };
     messages::CameraCalibration {
         timestamp: Some(timestamp(stamp)),
-        frame_id: CAMERA_FRAME.into(),
+        frame_id: frame.into(),
         width: camera.width as u32,
         height: camera.height as u32,
         distortion_model: model.into(),
@@ -208,11 +216,11 @@ fn calibration_message(stamp: Stamp, calibration: &CameraCalibration) -> message
     }
 }
 
-fn place_message(stamp: Stamp, body_from_camera: &Isometry3<f64>) -> FrameTransform {
+fn place_message(stamp: Stamp, frame: &str, body_from_camera: &Isometry3<f64>) -> FrameTransform {
     FrameTransform {
         timestamp: Some(timestamp(stamp)),
         parent_frame_id: IMU_FRAME.into(),
-        child_frame_id: CAMERA_FRAME.into(),
+        child_frame_id: frame.into(),
         translation: Some(vector(body_from_camera)),
         rotation: Some(quaternion(body_from_camera)),
     }

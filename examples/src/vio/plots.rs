@@ -14,12 +14,12 @@ const POINTS: usize = 3000;
 
 /// `trajectory.png`, `state.png` and, with a truth, `error.png` and `sigma.png`.
 pub(super) fn save(
-    trajectory: &Trajectory,
+    trajectories: &[Trajectory],
     run: &Run,
     evaluation: Option<&RunEvaluation>,
     folder: &Path,
 ) -> Result<(), VioError> {
-    save_path(trajectory, evaluation, &folder.join("trajectory.png"))?;
+    save_path(trajectories, evaluation, &folder.join("trajectory.png"))?;
     save_state(run, &folder.join("state.png"))?;
     if let Some(evaluation) = evaluation {
         save_errors(evaluation, &folder.join("error.png"))?;
@@ -30,10 +30,12 @@ pub(super) fn save(
 
 type Curve = Vec<(f64, f64)>;
 
-fn save_path(trajectory: &Trajectory, evaluation: Option<&RunEvaluation>, path: &Path) -> Result<(), VioError> {
-    let (estimate, truth): (Vec<Vector3<f64>>, Vec<Vector3<f64>>) = match evaluation {
-        Some(j) => j.aligned.iter().map(|(_, g, e)| (e.translation.vector, g.translation.vector)).unzip(),
-        None => (trajectory.poses().iter().map(|pose| pose.translation.vector).collect(), Vec::new()),
+fn save_path(trajectories: &[Trajectory], evaluation: Option<&RunEvaluation>, path: &Path) -> Result<(), VioError> {
+    let (estimate, truth): (Vec<Vector3<f64>>, Vec<Vector3<f64>>) = if let Some(j) = evaluation {
+        j.aligned.iter().map(|(_, g, e)| (e.translation.vector, g.translation.vector)).unzip()
+    } else {
+        let poses = trajectories.iter().flat_map(Trajectory::poses);
+        (poses.map(|pose| pose.translation.vector).collect(), Vec::new())
     };
     let panel = |label: [&'static str; 2], axes: [usize; 2]| {
         let curve = |points: &[Vector3<f64>]| -> Curve { points.iter().map(|p| (p[axes[0]], p[axes[1]])).collect() };

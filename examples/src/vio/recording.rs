@@ -6,6 +6,7 @@ use vio_ekf::calibration::{CameraCalibration, ImuCalibration};
 use vio_ekf::{Camera, Imu, ImuValidation, Stamp, Trajectory, nalgebra::Vector3, validate_samples};
 
 use super::error::VioError;
+use super::grey_image::GreyImage;
 
 /// A camera and an inertial sensor, recorded; the body is the inertial sensor.
 #[derive(Debug, Clone)]
@@ -24,6 +25,10 @@ pub struct Recording {
     pub second: Option<SecondCamera>,
     /// What is known of the true motion.
     pub truth: Option<GroundTruth>,
+    /// Topics with images that are not used.
+    pub unused: Vec<String>,
+    /// Of the size of the first camera's images: nothing is tracked where it is 0.
+    pub mask: Option<GreyImage>,
 }
 
 /// A second camera, recorded beside the first.
@@ -32,7 +37,7 @@ pub struct SecondCamera {
     /// The camera on the body.
     pub camera: Camera,
     /// Its images, by rising stamps.
-    pub(super) images: Vec<(Stamp, PathBuf)>,
+    pub images: Images,
 }
 
 /// The true motion of the body, as far as it was recorded.
@@ -87,15 +92,27 @@ impl Recording {
         let unusable = |why: String| VioError::Unusable { recording: self.name.clone(), why };
         let findings =
             validate_samples(&self.samples, self.imu.rate_hz, gravity).map_err(|error| unusable(error.to_string()))?;
+        self.check_clocks()?;
+        Ok(findings)
+    }
+
+    /// Refuses a recording whose images were taken at another time than its inertial samples.
+    ///
+    /// # Errors
+    /// [`VioError::Unusable`] names the recording and what is wrong.
+    pub fn check_clocks(&self) -> Result<(), VioError> {
+        let unusable = |why: String| VioError::Unusable { recording: self.name.clone(), why };
         let Some((first, last)) = self.images.span() else {
             return Err(unusable("there are no images".into()));
         };
-        let (began, ended) = (self.samples[0].stamp, self.samples[self.samples.len() - 1].stamp);
+        let [Some(began), Some(ended)] = [self.samples.first(), self.samples.last()].map(|s| s.map(|s| s.stamp)) else {
+            return Err(unusable("there are no inertial samples".into()));
+        };
         if last < began || first > ended {
             return Err(unusable(format!(
                 "the images span {first}..{last} s, the inertial samples {began}..{ended} s: both need the same clock"
             )));
         }
-        Ok(findings)
+        Ok(())
     }
 }

@@ -4,9 +4,10 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use serde::Serialize;
-use vio_ekf::{ImuValidation, so3, tum};
+use vio_ekf::{ImuValidation, Stamp, Trajectory, so3, tum};
 
 use super::error::write_file;
+use super::states::states_csv;
 use super::{Recording, Run, RunEvaluation, VioError, plots};
 use crate::report::save_figures;
 
@@ -22,13 +23,31 @@ pub struct VioReport {
     pub stereo_pairs: usize,
     /// Images that were left out.
     pub frames_skipped: usize,
+    /// Images that have a pose.
+    pub poses: usize,
+    /// Share of the recording's images that have a pose.
+    pub tracked_share: f64,
+    /// Poses that were taken back: of starts that turned out to be wrong, and those just before a divergence.
+    pub poses_withdrawn: usize,
+    /// Poses without a landmark: from inertial samples alone.
+    pub poses_dead_reckoned: usize,
+    /// Segments, each in a world of its own.
+    pub segments: usize,
+    /// Time of the first pose of each segment.
+    pub segment_first_s: Vec<f64>,
+    /// Time of the last pose of each segment.
+    pub segment_last_s: Vec<f64>,
     /// Inertial samples that it took.
     pub imu_samples: usize,
-    /// Gaps in the inertial samples.
-    pub imu_gaps: usize,
-    /// Time from the first to the last pose.
+    /// Gaps in the inertial samples; absent, as the next, if the samples failed their test and were taken all the same.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub imu_gaps: Option<usize>,
+    /// What is unusual about the inertial samples.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub imu_doubts: Option<Vec<String>>,
+    /// Time from the first to the last pose, summed over segments.
     pub duration_s: f64,
-    /// Length of the estimated path.
+    /// Length of the estimated path, summed over segments.
     pub path_length_m: f64,
     /// Root mean square position error after rigid alignment.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -48,7 +67,7 @@ pub struct VioReport {
     /// The same of the velocity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nees_velocity_mean: Option<f64>,
-    /// Share of the truth's duration for which there is an estimate.
+    /// Share of the time with truth and images for which there is an estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coverage: Option<f64>,
     /// Processor time of an image, median.
@@ -78,22 +97,33 @@ impl VioReport {
     /// [`VioError::Library`] if the filter gave poses that are not finite.
     pub fn new(
         recording: &Recording,
-        findings: &ImuValidation,
+        findings: Option<&ImuValidation>,
         run: &Run,
         evaluation: Option<&RunEvaluation>,
         threads: usize,
     ) -> Result<Self, VioError> {
-        let trajectory = run.trajectory()?;
+        let trajectories = run.trajectories()?;
+        let end = |last: fn(&Trajectory) -> Option<&Stamp>| {
+            trajectories.iter().filter_map(last).map(|stamp| stamp.nanos() as f64 * 1e-9).collect()
+        };
         let attitude = recording.camera.camera.body_from_camera.rotation;
         Ok(Self {
             version: env!("CARGO_PKG_VERSION"),
             frames: run.frames,
             stereo_pairs: run.pairs,
             frames_skipped: run.skipped.len(),
+            poses: run.poses(),
+            tracked_share: run.poses() as f64 / recording.images.count().max(1) as f64,
+            poses_withdrawn: run.withdrawn,
+            poses_dead_reckoned: run.dead_reckoned(),
+            segments: trajectories.len(),
+            segment_first_s: end(|trajectory| trajectory.stamps().first()),
+            segment_last_s: end(|trajectory| trajectory.stamps().last()),
             imu_samples: run.imu_samples,
-            imu_gaps: findings.gaps,
-            duration_s: trajectory.duration_s(),
-            path_length_m: trajectory.path_length(),
+            imu_gaps: findings.map(|findings| findings.gaps),
+            imu_doubts: findings.map(|findings| findings.doubts.iter().map(ToString::to_string).collect()),
+            duration_s: trajectories.iter().map(Trajectory::duration_s).sum(),
+            path_length_m: trajectories.iter().map(Trajectory::path_length).sum(),
             ate_se3_rmse_m: evaluation.map(|j| j.ate_se3),
             ate_yaw_rmse_m: evaluation.map(|j| j.ate_yaw),
             rpe_10m_median_m: evaluation.and_then(|j| j.rpe_10m_median),
@@ -125,7 +155,17 @@ impl VioReport {
             self.version
         );
         for (stamp, why) in &run.lost {
-            let _ = writeln!(text, "**Diverged at {stamp} s**: {why}. Restarted from there.\n");
+            let _ = writeln!(text, "**Diverged at {stamp} s**: {why}.\n");
+        }
+        if self.segments > 1 {
+            let count = self.segments;
+            let _ = writeln!(
+                text,
+                "**{count} segments, each in a world of its own**: place and heading begin anew with each.\n"
+            );
+        }
+        if self.poses_withdrawn > 0 {
+            let _ = writeln!(text, "{} poses were taken back.\n", self.poses_withdrawn);
         }
         let mut pictures =
             vec![("trajectory.png", "From above and from the side"), ("state.png", "State of the filter")];
@@ -153,6 +193,8 @@ impl VioReport {
         row("NEES of velocity", plain(self.nees_velocity_mean));
         row("share of the truth covered", self.coverage.map(|v| format!("{:.1} %", 100.0 * v)));
         row("initialization after", Some(format!("{:.2} s", self.initialization_time_s)));
+        row("share of the images with a pose", Some(format!("{:.1} %", 100.0 * self.tracked_share)));
+        row("poses from inertial samples alone", Some(self.poses_dead_reckoned.to_string()));
         row("resets", Some(self.resets.to_string()));
         let frame = format!("{:.2} / {:.2} ms", self.frame_cpu_ms_median, self.frame_cpu_ms_p99);
         row("processor time of an image, median / 99 %", Some(frame));
@@ -160,7 +202,10 @@ impl VioReport {
         let degrees = self.extrinsics_error_rad.to_degrees();
         row("camera's attitude, estimate against calibration", Some(format!("{degrees:.3} deg")));
         row("time offset, camera to IMU", Some(format!("{:.2} ms", 1e3 * self.time_offset_s)));
-        text.push_str("\nAll figures, in SI units, are in [report.json](report.json); poses in [trajectory.tum](trajectory.tum).\n");
+        text.push_str(
+            "\nAll figures, in SI units, are in [report.json](report.json); poses in [trajectory.tum](trajectory.tum), \
+                       velocities, biases and covariances in [states.csv](states.csv).\n",
+        );
         if !run.skipped.is_empty() {
             let _ = writeln!(text, "\nImages left out; the first of them:\n");
             for why in run.skipped.iter().take(10) {
@@ -171,7 +216,7 @@ impl VioReport {
     }
 }
 
-/// Writes `trajectory.tum`, the pictures, `report.md` and, last, `report.json` into a folder.
+/// Writes `trajectory.tum`, `states.csv`, the pictures, `report.md` and, last, `report.json` into a folder.
 ///
 /// # Errors
 /// [`VioError`] names the file that could not be written, or the figure that is not finite.
@@ -182,13 +227,24 @@ pub fn save(
     evaluation: Option<&RunEvaluation>,
     folder: &Path,
 ) -> Result<(), VioError> {
-    let trajectory = run.trajectory()?;
-    write_file(&folder.join("trajectory.tum"), tum::write(&trajectory).as_bytes())?;
-    plots::save(&trajectory, run, evaluation, folder)?;
+    let trajectories = run.trajectories()?;
+    write_file(&folder.join("trajectory.tum"), segmented_text(&trajectories).as_bytes())?;
+    write_file(&folder.join("states.csv"), states_csv(run).as_bytes())?;
+    plots::save(&trajectories, run, evaluation, folder)?;
     write_file(&folder.join("report.md"), report.markdown(recording, run, evaluation.is_some()).as_bytes())?;
     // Last, so that its presence means the folder is complete.
     save_figures(report, folder)?;
     Ok(())
+}
+
+/// TUM text; where there is more than one segment, a comment marks each.
+fn segmented_text(trajectories: &[Trajectory]) -> String {
+    let count = trajectories.len();
+    let segment = |(k, trajectory): (usize, &Trajectory)| match count {
+        1 => tum::write(trajectory),
+        _ => format!("# segment {} of {count}, in a world of its own\n{}", k + 1, tum::write(trajectory)),
+    };
+    trajectories.iter().enumerate().map(segment).collect()
 }
 
 /// The value below which a share of the values lies; 0 of none.

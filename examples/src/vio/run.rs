@@ -6,8 +6,9 @@ use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 
 use cpu_time::ThreadTime;
+use vio_ekf::calibration::{CameraCalibration, ImuCalibration};
 use vio_ekf::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use vio_ekf::{Calibration, Error, ImuNoise, Odometry, Settings, Stamp, Status, Trajectory, Vio};
+use vio_ekf::{Calibration, Error, FrameReport, ImuNoise, Odometry, Settings, Stamp, Status, Trajectory, Vio};
 
 use super::camera_frames::{CameraFrame, camera_frames};
 use super::error::VioError;
@@ -33,13 +34,16 @@ pub struct RunSettings {
     pub quiet: bool,
 }
 
-/// A stretch without interruption. After each interruption the filter starts anew, in a world of its own.
+/// A stretch without interruption. After each interruption the filter starts anew, in a world of its own: place and heading of
+/// one segment say nothing about those of another.
 #[derive(Debug, Clone, Default)]
 pub struct Segment {
     /// The estimate after each image, stamps strictly increasing.
     pub odometry: Vec<Odometry>,
     /// Landmarks used with each image.
     pub used: Vec<usize>,
+    /// Whether each estimate comes from inertial samples alone.
+    pub dead_reckoned: Vec<bool>,
 }
 
 /// What came of a recording.
@@ -47,6 +51,8 @@ pub struct Segment {
 pub struct Run {
     /// The stretches, in order; at least one, none of them empty.
     pub segments: Vec<Segment>,
+    /// First and last stamp of the recording's images.
+    pub images_span: (Stamp, Stamp),
     /// Images that the filter took.
     pub frames: usize,
     /// Those among them that came with one of the second camera.
@@ -59,6 +65,9 @@ pub struct Run {
     pub initialization_time_s: f64,
     /// Why and when it gave up, each time.
     pub lost: Vec<(Stamp, String)>,
+    /// Poses that were taken back, and are in no segment: of starts that turned out to be wrong, and those before a divergence with
+    /// which the measurements disagreed already.
+    pub withdrawn: usize,
     /// Whether it runs at the end.
     pub tracking_at_end: bool,
     /// The camera's calibration at the end.
@@ -96,8 +105,8 @@ pub fn run(recording: &Recording, settings: &RunSettings) -> Result<Run, VioErro
         })?;
     }
     let run = runner.finish()?;
-    let poses: usize = run.segments.iter().map(|segment| segment.odometry.len()).sum();
     if let Some(stage) = stage {
+        let poses = run.poses();
         stage.done(&format!("{poses} poses of {} images, {} left out", run.frames, run.skipped.len()));
     }
     Ok(run)
@@ -109,6 +118,9 @@ struct FilterRunner<'a> {
     /// Index of the next inertial sample.
     next: usize,
     segments: Vec<Segment>,
+    /// Whether the last segment goes on.
+    segment_open: bool,
+    withdrawn: usize,
     frames: usize,
     pairs: usize,
     skipped: Vec<String>,
@@ -122,18 +134,22 @@ struct FilterRunner<'a> {
 
 impl<'a> FilterRunner<'a> {
     fn new(recording: &'a Recording, settings: &RunSettings) -> Result<Self, VioError> {
-        let mut filter = settings.filter;
-        filter.calibration.time_offset_s += recording.camera.time_offset_s;
-        let (camera, noise) = (recording.camera.camera, settings.noise.unwrap_or(recording.imu.noise));
-        let vio = match &recording.second {
-            Some(second) => Vio::stereo(camera, second.camera, noise, filter)?,
-            None => Vio::new(camera, noise, filter)?,
-        };
+        let first = recording.camera;
+        // Both images of a pair carry one stamp.
+        let second = recording.second.as_ref().map(|second| CameraCalibration { camera: second.camera, ..first });
+        let cameras: Vec<CameraCalibration> = std::iter::once(first).chain(second).collect();
+        let imu = ImuCalibration { noise: settings.noise.unwrap_or(recording.imu.noise), ..recording.imu };
+        let mut vio = Vio::from_calibration(&cameras, &imu, settings.filter)?;
+        if let Some(mask) = &recording.mask {
+            vio.set_mask(&mask.view())?;
+        }
         Ok(Self {
             recording,
             vio,
             next: 0,
             segments: Vec::new(),
+            segment_open: false,
+            withdrawn: 0,
             frames: 0,
             pairs: 0,
             skipped: Vec::new(),
@@ -192,8 +208,18 @@ impl<'a> FilterRunner<'a> {
         self.first_image.get_or_insert(stamp);
         self.last_image = Some(stamp);
         match report.status {
-            Status::Tracking => self.record_estimate(report.used, elapsed),
-            Status::Diverged(excess) => self.end_segment(stamp, divergence_text(excess)),
+            Status::Tracking | Status::DeadReckoning => {
+                self.record_estimate(&report, elapsed);
+            }
+            Status::Diverged(cause) => {
+                self.withdraw(report.consecutive_outliers as usize);
+                self.end_segment(stamp, divergence_text(cause));
+            }
+            // The start in motion was wrong, and so is all that came of it.
+            Status::Uninitialised(_) if self.segment_open => {
+                self.withdraw(usize::MAX);
+                self.segment_open = false;
+            }
             Status::Uninitialised(_) => {}
         }
         Ok(())
@@ -232,23 +258,34 @@ impl<'a> FilterRunner<'a> {
     }
 
     /// Remembers the estimate.
-    fn record_estimate(&mut self, used: usize, elapsed: Duration) {
+    fn record_estimate(&mut self, report: &FrameReport, elapsed: Duration) {
         let Some(odometry) = self.vio.output() else { return };
-        // The first segment, and the first after each loss.
-        if self.segments.len() <= self.lost.len() {
-            self.segments.resize_with(self.lost.len() + 1, Segment::default);
+        if !std::mem::replace(&mut self.segment_open, true) {
+            self.segments.push(Segment::default());
         }
         let Some(segment) = self.segments.last_mut() else { return };
         if segment.odometry.last().is_none_or(|last| last.stamp < odometry.stamp) {
             segment.odometry.push(odometry);
-            segment.used.push(used);
+            segment.used.push(report.used);
+            segment.dead_reckoned.push(report.status == Status::DeadReckoning);
         }
         self.frame_s.push(elapsed.as_secs_f64());
         self.calibration = self.vio.calibration();
     }
 
+    /// Takes back the last poses of the open segment.
+    fn withdraw(&mut self, count: usize) {
+        let Some(segment) = self.segments.last_mut().filter(|_| self.segment_open) else { return };
+        let left = segment.odometry.len().saturating_sub(count);
+        self.withdrawn += segment.odometry.len() - left;
+        segment.odometry.truncate(left);
+        segment.used.truncate(left);
+        segment.dead_reckoned.truncate(left);
+    }
+
     fn end_segment(&mut self, stamp: Stamp, why: String) {
         self.lost.push((stamp, why));
+        self.segment_open = false;
         self.vio.reset();
     }
 
@@ -270,13 +307,15 @@ impl<'a> FilterRunner<'a> {
         };
         let began = self.first_image.unwrap_or(first.odometry[0].stamp);
         Ok(Run {
+            images_span: self.recording.images.span().unwrap_or((began, began)),
             initialization_time_s: first.odometry[0].stamp.secs_since(began).max(0.0),
             frames: self.frames,
             pairs: self.pairs,
             skipped: self.skipped,
             imu_samples: self.next,
             lost: self.lost,
-            tracking_at_end: self.vio.status() == Status::Tracking,
+            withdrawn: self.withdrawn,
+            tracking_at_end: self.vio.status().has_estimate(),
             calibration,
             frame_s: self.frame_s,
             imu_s: self.imu_s,
@@ -285,21 +324,37 @@ impl<'a> FilterRunner<'a> {
     }
 }
 
-impl Run {
-    /// All stretches in the world of the first: each begins at the place and heading where the one before it ended.
+impl Segment {
+    /// Its poses, in its own world.
     ///
     /// # Errors
     /// [`VioError::Library`] if the filter gave poses that are not finite.
     pub fn trajectory(&self) -> Result<Trajectory, VioError> {
-        let mut joined = Trajectory::default();
-        for segment in &self.segments {
-            let first = segment.odometry[0].world_from_body;
-            let onto = joined.poses().last().map_or_else(Isometry3::identity, |last| heading_onto(last, &first));
-            for odometry in &segment.odometry {
-                joined.push(odometry.stamp, onto * odometry.world_from_body)?;
-            }
+        let mut trajectory = Trajectory::default();
+        for odometry in &self.odometry {
+            trajectory.push(odometry.stamp, odometry.world_from_body)?;
         }
-        Ok(joined)
+        Ok(trajectory)
+    }
+}
+
+impl Run {
+    /// Poses of all segments.
+    pub fn poses(&self) -> usize {
+        self.segments.iter().map(|segment| segment.odometry.len()).sum()
+    }
+
+    /// Poses that come from inertial samples alone.
+    pub fn dead_reckoned(&self) -> usize {
+        self.segments.iter().flat_map(|segment| &segment.dead_reckoned).filter(|&&dead| dead).count()
+    }
+
+    /// The trajectories of the segments, each in its own world.
+    ///
+    /// # Errors
+    /// [`VioError::Library`] if the filter gave poses that are not finite.
+    pub fn trajectories(&self) -> Result<Vec<Trajectory>, VioError> {
+        self.segments.iter().map(Segment::trajectory).collect()
     }
 }
 

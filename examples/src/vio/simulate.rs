@@ -81,7 +81,9 @@ pub fn simulate(settings: &SimulationSettings, folder: &Path) -> Result<Simulate
         time_offset_s: 0.0,
     };
     let cameras: Vec<CameraCalibration> = settings.scenario.cameras.iter().map(calibrated).collect();
-    let camera = cameras.first().ok_or(vio_ekf::Error::NoSuch { what: "camera", index: 0, count: 0 })?;
+    if cameras.is_empty() {
+        return Err(vio_ekf::Error::NoSuch { what: "camera", index: 0, count: 0 }.into());
+    }
     let imu = ImuCalibration { noise: model.noise, rate_hz: model.rate_hz, body_from_imu: Isometry3::identity() };
 
     let root = folder.join("mav0");
@@ -102,7 +104,15 @@ pub fn simulate(settings: &SimulationSettings, folder: &Path) -> Result<Simulate
     let began = recording.samples.first().map_or(Stamp::from_nanos(FIRST), |sample| sample.stamp);
     let mcap = settings
         .mcap
-        .then(|| McapWriter::create(&folder.join("recording.mcap"), began, camera, &imu, settings.raw))
+        .then(|| {
+            McapWriter::create(
+                &folder.join("recording.mcap"),
+                began,
+                &cameras[..cameras.len().min(2)],
+                &imu,
+                settings.raw,
+            )
+        })
         .transpose()?;
     let out = Sink {
         root,
@@ -189,14 +199,14 @@ impl Sink<'_> {
         let name = format!("{}.png", frame.stamp.nanos());
         write_file(&self.root.join(format!("cam{}/data", frame.which)).join(&name), &frame.png)?;
         self.names[frame.which].push((frame.stamp, name));
-        // The MCAP file has the first camera only.
-        if frame.which > 0 {
+        // The MCAP file has two cameras at most.
+        if frame.which > 1 {
             return Ok(());
         }
         self.catch_up(frame.stamp)?;
         if let Some(mcap) = &mut self.mcap {
             let pixels = if self.raw { Pixels::Raw(&frame.grey) } else { Pixels::Png(&frame.png) };
-            mcap.image(frame.stamp, &pixels)?;
+            mcap.image(frame.which, frame.stamp, &pixels)?;
         }
         Ok(())
     }

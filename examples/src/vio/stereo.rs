@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::error::VioError;
 use super::euroc_folder::{Overrides, camera, images, inside, open_euroc};
-use super::recording::{Recording, SecondCamera};
+use super::recording::{Images, Recording, SecondCamera};
 
 /// As [`open_euroc`], with `mav0/cam1` as a second camera. A chain of Kalibr must hold both.
 ///
@@ -18,6 +18,6 @@ pub fn open_euroc_stereo(folder: &Path, overrides: &Overrides) -> Result<Recordi
         return Err(VioError::Unusable { recording: recording.name, why });
     }
     let camera = camera(&root, overrides, 1)?.camera;
-    let images = images(&root, 1)?;
+    let images = Images::Files(images(&root, 1)?);
     Ok(Recording { second: Some(SecondCamera { camera, images }), ..recording })
 }

@@ -4,14 +4,19 @@ use std::path::{Path, PathBuf};
 
 use vio_ekf::sim::{Scenario, SimulatedCamera};
 use vio_ekf::tune::TuneSettings;
-use vio_ekf::{CalibrationSettings, Camera, LandmarkSettings, Settings};
+use vio_ekf::{CalibrationSettings, Camera, ImuValidation, Settings};
 
 use super::command_line::{Arguments, Command, Eval, FlightName, Sim, Track, Tune};
+use super::error::{read_text, write_file};
 use super::{
-    Flight, Overrides, RunSettings, SimulationSettings, Tuning, TuningData, VioReport, compare, evaluate_run,
-    open_euroc, open_euroc_stereo, open_mcap, run, save, simulate, tune_noise,
+    CompareSettings, Flight, GreyImage, Overrides, Recording, Run, RunSettings, SimulationSettings, Tuning, TuningData,
+    VioError, VioReport, compare, diagnose, evaluate_run, open_euroc, open_euroc_stereo, open_mcap, open_mcap_stereo,
+    run, save, simulate, tune_noise,
 };
 use crate::report::save_figures;
+
+/// Share of the images that may be left out of a run that counts as a success.
+const MAX_LEFT_OUT: f64 = 0.1;
 
 type AnyError = Box<dyn std::error::Error>;
 
@@ -26,6 +31,23 @@ pub fn execute(arguments: &Arguments) -> Result<(), AnyError> {
         Some(Command::Eval(eval)) => evaluate(eval),
         Some(Command::Tune(tune)) => search(tune),
     }
+}
+
+/// The settings of the file, if there is one, changed by the options.
+fn filter_settings(arguments: &Track) -> Result<Settings, AnyError> {
+    let mut filter = match &arguments.settings {
+        Some(path) => toml::from_str(&read_text(path)?).map_err(|error| VioError::malformed(path, &error))?,
+        None => Settings::default(),
+    };
+    if let Some(features) = arguments.features {
+        filter.landmarks.max_count = features;
+    }
+    if arguments.calibrate {
+        let time_offset_s = filter.calibration.time_offset_s;
+        filter.calibration = CalibrationSettings { time_offset_s, ..rough_calibration() };
+    }
+    filter.check()?;
+    Ok(filter)
 }
 
 /// How far the calibration may be off with `--calibrate`: what a ruler and a guess leave.
@@ -43,27 +65,44 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
     make(folder)?;
     let overrides =
         Overrides { cameras: arguments.cameras.clone(), imu: arguments.imu.clone(), truth: arguments.truth.clone() };
-    let recording = match (&arguments.euroc, &arguments.mcap) {
+    let mut recording = match (&arguments.euroc, &arguments.mcap) {
         (Some(folder), _) if arguments.stereo => open_euroc_stereo(folder, &overrides)?,
         (Some(folder), _) => open_euroc(folder, &overrides)?,
+        (None, Some(file)) if arguments.stereo => open_mcap_stereo(file, &overrides)?,
         (None, Some(file)) => open_mcap(file, &overrides)?,
         (None, None) => return Err("name a recording with --euroc or --mcap".into()),
     };
-    let calibration = if arguments.calibrate { rough_calibration() } else { CalibrationSettings::default() };
-    let landmarks = LandmarkSettings { max_count: arguments.features, ..LandmarkSettings::default() };
-    let filter = Settings { landmarks, calibration, ..Settings::default() };
-    filter.check()?;
-    let findings = recording.check(filter.gravity)?;
-    eprintln!(
-        "{}: {} images, {} inertial samples at {:.0} Hz, {} gaps",
-        recording.name,
-        recording.images.count(),
-        recording.samples.len(),
-        findings.rate_hz,
-        findings.gaps
-    );
+    if let Some(path) = &arguments.mask {
+        let mask = GreyImage::read(path)?;
+        let (given, camera) = ((mask.width, mask.height), recording.camera.camera);
+        if given != (camera.width, camera.height) {
+            let expected = (camera.width, camera.height);
+            let why = vio_ekf::Error::ImageSize { given, expected };
+            return Err(VioError::malformed(path, &why).into());
+        }
+        recording.mask = Some(mask);
+    }
+    let filter = filter_settings(arguments)?;
+    let findings = check_samples(&recording, filter.gravity, arguments.accept_imu)?;
+    eprintln!("{}: {} images, {} inertial samples", recording.name, recording.images.count(), recording.samples.len());
+    if !recording.unused.is_empty() {
+        eprintln!(
+            "images that are not used: {} (a second camera goes along with --stereo)",
+            recording.unused.join(", ")
+        );
+    }
+    if let Some(findings) = &findings {
+        eprintln!("inertial sensor: {:.0} Hz, {} gaps", findings.rate_hz, findings.gaps);
+        findings.doubts.iter().for_each(|doubt| eprintln!("warning: {doubt}"));
+    }
     let threads = threads(arguments.threads);
-    let run = run(&recording, &RunSettings { filter, threads, ..RunSettings::default() })?;
+    let settings = RunSettings { filter, threads, ..RunSettings::default() };
+    let run = match run(&recording, &settings) {
+        Err(VioError::Unusable { recording: name, why }) => {
+            return Err(format!("{name}: {}", with_cause(why, &recording, &settings)).into());
+        }
+        other => other?,
+    };
     for why in run.skipped.iter().take(3) {
         eprintln!("left out: {why}");
     }
@@ -71,15 +110,58 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         eprintln!("diverged at {stamp} s: {why}");
     }
     let evaluation = recording.truth.as_ref().map(|truth| evaluate_run(&run, truth)).transpose()?.flatten();
-    let report = VioReport::new(&recording, &findings, &run, evaluation.as_ref(), threads)?;
+    write_file(&folder.join("settings.toml"), toml::to_string(&filter)?.as_bytes())?;
+    let report = VioReport::new(&recording, findings.as_ref(), &run, evaluation.as_ref(), threads)?;
     save(&report, &recording, &run, evaluation.as_ref(), folder)?;
     println!("{}", folder.join("report.md").display());
-    // The files are there to look at, but such a trajectory is not to be relied on.
-    if let Some((stamp, why)) = run.lost.last() {
-        let then = if run.tracking_at_end { "was restarted" } else { "was not restarted" };
-        return Err(format!("{}: the filter diverged at {stamp} s ({why}), and {then}", recording.name).into());
+    if run.segments.len() > 1 {
+        eprintln!("{} segments, each in a world of its own: see trajectory.tum and report.json", run.segments.len());
     }
-    Ok(())
+    if run.withdrawn > 0 {
+        eprintln!("{} poses were taken back: wrong starts, or contradicted before a divergence", run.withdrawn);
+    }
+    // The files are there to look at, but such a trajectory is not to be relied on.
+    usable(&recording, &run).map_err(|why| with_cause(why, &recording, &settings).into())
+}
+
+/// The test of the inertial samples; `None` if they are accepted though they fail it.
+fn check_samples(recording: &Recording, gravity: f64, accept: bool) -> Result<Option<ImuValidation>, AnyError> {
+    match recording.check(gravity) {
+        Err(VioError::Unusable { why, .. }) if accept => {
+            recording.check_clocks()?;
+            eprintln!("warning: {why}; taken as they are (--accept-imu)");
+            Ok(None)
+        }
+        other => Ok(other.map(Some)?),
+    }
+}
+
+/// Why a run failed and, if axes are the cause, which.
+fn with_cause(why: String, recording: &Recording, settings: &RunSettings) -> String {
+    eprintln!("looking for a cause: the inertial sensor is read with other axes");
+    match diagnose(recording, settings) {
+        Some(cause) => format!("{why}; it would go on if {cause}"),
+        None => why,
+    }
+}
+
+/// Whether a run did what was asked of it, or why not.
+fn usable(recording: &Recording, run: &Run) -> Result<(), String> {
+    let (name, images, poses) = (&recording.name, recording.images.count(), run.poses());
+    if let Some((stamp, why)) = run.lost.last().filter(|_| !run.tracking_at_end) {
+        return Err(format!("{name}: the filter diverged at {stamp} s ({why}), and was not restarted"));
+    }
+    if 2 * poses < images {
+        let why = run.skipped.first().or(run.lost.last().map(|(_, why)| why)).map_or("it started late", String::as_str);
+        return Err(format!("{name}: only {poses} of {images} images have a pose: {why}"));
+    }
+    let left_out = run.skipped.len();
+    match run.skipped.first() {
+        Some(first) if left_out as f64 > MAX_LEFT_OUT * images as f64 => {
+            Err(format!("{name}: {left_out} of {images} images were left out; the first: {first}"))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn render(arguments: &Sim) -> Result<(), AnyError> {
@@ -110,7 +192,12 @@ fn render(arguments: &Sim) -> Result<(), AnyError> {
 }
 
 fn evaluate(arguments: &Eval) -> Result<(), AnyError> {
-    let comparison = compare(&arguments.reference, &arguments.estimate)?;
+    let settings = CompareSettings {
+        max_difference_s: arguments.max_difference,
+        sim3: arguments.sim3,
+        rpe_lengths_m: arguments.rpe.clone(),
+    };
+    let comparison = compare(&arguments.reference, &arguments.estimate, &settings)?;
     print!("{}", comparison.table());
     if let Some(folder) = &arguments.out {
         make(folder)?;

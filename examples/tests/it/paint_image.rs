@@ -138,8 +138,8 @@ fn a_slow_valve_is_obeyed() {
     let out = scratch.path("out");
     let image = scratch.path("in.png");
     let mut quality = Vec::new();
-    for route in ["rows", "alike"] {
-        let output = run(&["--image", &image, "--largest-change", "0.01", "--route", route, "--out", &out]);
+    for order in ["boustrophedon", "context-based"] {
+        let output = run(&["--image", &image, "--slew-limit", "0.01", "--scan-order", order, "--out", &out]);
         assert!(output.status.success());
         let report = json(&format!("{out}/report.json"));
         assert_eq!(report["slew_violations"], 0);
@@ -332,9 +332,9 @@ fn what_cannot_be_painted_is_named() {
         (vec!["--image", &cut], "cut.png"),
         (vec!["--image", &good, "--sigma", "0"], "sigma"),
         (vec!["--image", &good, "--sigma", "nan"], "sigma"),
-        (vec!["--image", &good, "--along", "0"], "along"),
+        (vec!["--image", &good, "--spray-spacing", "0"], "spray_spacing"),
         (vec!["--image", &good, "--passes", "0"], "passes"),
-        (vec!["--image", &good, "--largest-change", "0"], "slew_limit"),
+        (vec!["--image", &good, "--slew-limit", "0"], "slew_limit"),
         (vec!["train", "--resume", &not], "not.png"),
     ] {
         assert_refused(&[&arguments[..], &["--out", &out]].concat(), &[word]);
@@ -388,7 +388,7 @@ fn absurd_settings_are_named() {
     for (setting, value, word) in [
         ("--sigma", "1e9", "`sigma`"),
         ("--cut", "-1", "`cut`"),
-        ("--along", "1000000000", "`along`"),
+        ("--spray-spacing", "1000000000", "`spray_spacing`"),
         ("--row-spacing", "18446744073709551615", "`row_spacing`"),
         ("--min-volume", "1e9", "`min_volume`"),
     ] {
@@ -402,11 +402,11 @@ fn absurd_settings_are_named() {
     }
     for setting in [
         "--layers",
-        "--largest-change=0.1",
+        "--slew-limit=0.1",
         "--painter=closed-loop",
         "--passes=3",
         "--threads=2",
-        "--route=rows",
+        "--scan-order=boustrophedon",
         "--weights=x",
     ] {
         let name = setting.split('=').next().unwrap();

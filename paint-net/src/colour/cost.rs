@@ -32,8 +32,9 @@ impl MixtureCost {
     pub(super) fn new(problem: &ColourProblem, metric: ColourMetric) -> Self {
         let ColourProblem { palette, kernel, limits, .. } = *problem;
         let (width, height) = (problem.wanted.width(), problem.wanted.height());
-        let (columns, rows) = (cells(width, limits.along), cells(height, limits.row_spacing));
-        let of_profile = |taps| FootprintOperator::new(taps, (limits.along, limits.row_spacing), (columns[0], rows[0]));
+        let (columns, rows) = (cells(width, limits.spray_spacing), cells(height, limits.row_spacing));
+        let of_profile =
+            |taps| FootprintOperator::new(taps, (limits.spray_spacing, limits.row_spacing), (columns[0], rows[0]));
         let (footprint, squared) = (of_profile(kernel.taps()), of_profile(kernel.squared().taps()));
         let cells = PaddedGrid::new(columns.len(), rows.len(), footprint.reach());
         let pixels = PaddedGrid::new(width, height, 0);
@@ -54,7 +55,7 @@ impl MixtureCost {
         }
         let mixture = Mixture::new(palette);
         Self {
-            scratch: footprint.scratch(&cells).planes(limits.along),
+            scratch: footprint.scratch(&cells).planes(limits.spray_spacing),
             paint: cells.planes(mixture.paints),
             depth: pixels.planes(mixture.paints),
             mixture,
@@ -187,7 +188,7 @@ mod tests {
     }
 
     fn nozzle() -> (SprayKernel, Limits) {
-        (SprayKernel::new(2.0, 2.0).unwrap(), Limits { along: 2, row_spacing: 3, ..Limits::default() })
+        (SprayKernel::new(2.0, 2.0).unwrap(), Limits { spray_spacing: 2, row_spacing: 3, ..Limits::default() })
     }
 
     #[test]
@@ -197,7 +198,7 @@ mod tests {
         let weight = Image::new(SIZE.0, SIZE.1, pixels(|k| 1e200 * of(k, 4))).unwrap();
         let heaviest = weight.data().iter().copied().fold(0.0, f64::max);
         let (kernel, limits) = nozzle();
-        let footprints = FootprintMatrix::new(&kernel, SIZE, limits.along, limits.row_spacing);
+        let footprints = FootprintMatrix::new(&kernel, SIZE, limits.spray_spacing, limits.row_spacing);
         let cells = footprints.cells();
         let depth_per_volume = kernel.mass() / 6.0;
         let values: Vec<f64> = (0..2 * cells).map(|k| 0.6 * of(k, 3)).collect();
@@ -247,7 +248,7 @@ mod tests {
         let problem = ColourProblem::new(&wanted, palette).with_kernel(&kernel).with_limits(&limits);
         let mut model = MixtureCost::new(&problem, ColourMetric::Euclidean);
         let squared = kernel.squared();
-        let footprints = FootprintMatrix::new(&squared, SIZE, limits.along, limits.row_spacing);
+        let footprints = FootprintMatrix::new(&squared, SIZE, limits.spray_spacing, limits.row_spacing);
         let cells = footprints.cells();
         let (found, curvatures) = model.start(3.0, squared.mass());
         // An odd number of columns and of rows.

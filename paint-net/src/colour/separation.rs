@@ -63,7 +63,7 @@ impl ColourSeparation {
         // What is wanted does not matter for where the cells are.
         let blank = Image::filled(width, height, 0.0);
         let grid = PaintGrid::new(&PaintProblem { weight, paintable, kernel, limits, ..PaintProblem::new(&blank) })?;
-        let depth_per_volume = kernel.mass() / (limits.along * limits.row_spacing) as f64;
+        let depth_per_volume = kernel.mass() / (limits.spray_spacing * limits.row_spacing) as f64;
         let mut model = MixtureCost::new(problem, self.metric);
         let (depths, curvatures) = model.start(limits.max_volume, kernel.squared().mass());
         let mut volumes: Vec<f64> = depths.iter().map(|depth| depth / depth_per_volume).collect();

@@ -53,6 +53,6 @@ fn uniform_start(problem: &PaintProblem, grid: &PaintGrid) -> Vec<f64> {
         }
     }
     let limits = problem.limits;
-    let volume = missing / pixels * (limits.along * limits.row_spacing) as f64 / problem.kernel.mass();
+    let volume = missing / pixels * (limits.spray_spacing * limits.row_spacing) as f64 / problem.kernel.mass();
     grid.upper_bounds.iter().map(|&upper| volume.min(upper)).collect()
 }

@@ -56,7 +56,7 @@ impl Painter for Feedback {
         let PaintProblem { reference, kernel, limits, .. } = *problem;
         let (columns, rows) = (&grid.footprints.columns, &grid.footprints.rows);
         let scaled = ScaledResponse::new(problem.saturation);
-        let stride = (limits.along, limits.row_spacing);
+        let stride = (limits.spray_spacing, limits.row_spacing);
         // Paint is measured by the depth that it gives where all cells have the same.
         let depth_per_volume = kernel.mass() / ((stride.0 * stride.1) as f64 * scaled.depth);
         let narrow = |image: &Image, gain: f64| image.data().iter().map(|&v| (v * gain) as f32).collect();

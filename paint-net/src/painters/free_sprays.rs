@@ -26,7 +26,7 @@ use reseed::reseed;
 /// spread is the smallest). The cost has many minima: the sprays start where there is detail, and between rounds of
 /// fitting those that do least are reseeded where one more would do most.
 ///
-/// `Limits::along` and `row_spacing` do not apply. The kernel's cut applies to every spray, in units of its own spread; with a
+/// `Limits::spray_spacing` and `row_spacing` do not apply. The kernel's cut applies to every spray, in units of its own spread; with a
 /// cut below about three deviations footprints have edges that the fit does not feel, and quality suffers.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]

@@ -96,7 +96,7 @@ impl<'a> Search<'a> {
             problem,
             grid,
             radius: kernel.radius(),
-            squared: FootprintMatrix::new(&kernel.squared(), size, limits.along, limits.row_spacing),
+            squared: FootprintMatrix::new(&kernel.squared(), size, limits.spray_spacing, limits.row_spacing),
             canvas: grid.initial.clone(),
             gradient: vec![0.0; pixels],
             curvature: vec![0.0; pixels],

@@ -7,7 +7,7 @@ use crate::error::{Error, require};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Limits {
     /// Distance between sprays along a row, 1 to 1000 pixels. Default 2 (σ of the thesis' nozzle).
-    pub along: usize,
+    pub spray_spacing: usize,
     /// Distance between rows, 1 to 1000 pixels. Default 2.
     pub row_spacing: usize,
     /// Largest depth of one spray. Default 3: beyond it ink no longer shows a difference.
@@ -26,11 +26,11 @@ impl Default for Limits {
 
 impl Limits {
     pub(super) const DEFAULT: Self =
-        Self { along: 2, row_spacing: 2, max_volume: 3.0, min_volume: 0.0, max_sprays: None };
+        Self { spray_spacing: 2, row_spacing: 2, max_volume: 3.0, min_volume: 0.0, max_sprays: None };
 
     pub(crate) fn check(&self) -> Result<(), Error> {
         // Work is done in whole cells: one far larger than the picture is only empty work.
-        for (name, spacing) in [("along", self.along), ("row_spacing", self.row_spacing)] {
+        for (name, spacing) in [("spray_spacing", self.spray_spacing), ("row_spacing", self.row_spacing)] {
             require(name, spacing as f64, (1..=1000).contains(&spacing), "it must lie in 1..=1000 pixels")?;
         }
         let max = self.max_volume;

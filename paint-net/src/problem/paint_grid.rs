@@ -20,7 +20,8 @@ impl PaintGrid {
     pub(crate) fn new(problem: &PaintProblem) -> Result<Self, Error> {
         problem.check()?;
         let (kernel, limits) = (problem.kernel, problem.limits);
-        let footprints = FootprintMatrix::new(kernel, problem.reference.size(), limits.along, limits.row_spacing);
+        let footprints =
+            FootprintMatrix::new(kernel, problem.reference.size(), limits.spray_spacing, limits.row_spacing);
         let width = problem.reference.width();
         // A spray that reaches no pixel of positive weight would only waste paint, and nothing would hold it down.
         let mut seen = vec![1.0; footprints.cells()];

@@ -85,8 +85,8 @@ const NEIGHBOURS: usize = 2;
 /// Clearance beyond which a target that still causes violations is given up, m.
 const MAX_CLEARANCE: f64 = 0.2;
 
-/// Asks for more clearance about a violation; targets that have had their chances, and those at the ends of a flight that
-/// violations, are given up.
+/// Asks for more clearance about a violation; targets that have had their chances, and those at the ends of a flight
+/// that comes too near, are given up.
 fn raise_clearance(plan: &Plan, violation: &ClearanceViolation, clearance: &mut [f64], nozzles: &mut Nozzles) {
     let before = plan.waypoints[..=violation.waypoint].iter().rev().find_map(|w| w.target);
     let after = plan.waypoints[violation.waypoint + 1..].iter().find_map(|w| w.target);

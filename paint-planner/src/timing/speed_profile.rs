@@ -101,7 +101,11 @@ impl SpeedProfile {
                     return min_duration;
                 }
                 let sum = speed[i] + speed[i + 1];
-                let moving = if sum > 1e-6 { 2.0 * self.travel[i] / sum } else { self.halt_to_halt(i, settings) };
+                let moving = if sum > 1e-6 {
+                    2.0 * self.travel[i] / sum
+                } else {
+                    rest_to_rest(self.travel[i], self.turn[i], settings)
+                };
                 moving.max(min_duration)
             })
             .collect()
@@ -134,15 +138,15 @@ impl SpeedProfile {
             }
         }
     }
+}
 
-    /// Time of an edge between two halts: the closed form of the minimum-snap polynomial.
-    fn halt_to_halt(&self, i: usize, settings: &TimingSettings) -> f64 {
-        let by_speed = PEAK_SPEED * self.travel[i] / settings.max_speed;
-        let by_turn = PEAK_SPEED * self.turn[i] / settings.max_heading_rate;
-        let by_acceleration = (PEAK_ACCELERATION * self.travel[i] / settings.max_acceleration).sqrt();
-        // The certificate may exceed the closed form in the last digits.
-        1.001 * by_speed.max(by_turn).max(by_acceleration)
-    }
+/// Time between two halts, s: the closed form of the minimum-snap polynomial over `travel` metres and `turn` radians.
+pub(crate) fn rest_to_rest(travel: f64, turn: f64, settings: &TimingSettings) -> f64 {
+    let by_speed = PEAK_SPEED * travel / settings.max_speed;
+    let by_turn = PEAK_SPEED * turn / settings.max_heading_rate;
+    let by_acceleration = (PEAK_ACCELERATION * travel / settings.max_acceleration).sqrt();
+    // The certificate may exceed the closed form in the last digits.
+    1.001 * by_speed.max(by_turn).max(by_acceleration)
 }
 
 /// Length of stroke on the surface between two route points, m, and the dose on it; zero on flights.

@@ -24,13 +24,15 @@ pub struct ControllerSettings {
     pub attitude: f64,
     /// Yaw rate per heading error, 1/s. Default 3.
     pub heading: f64,
+    /// How fast the body makes room for its own tilt, so that the gun stays in its place, 1/s. Default 3; 0 not at all.
+    pub lever: f64,
     /// The reference's jerk is the difference of its acceleration over this time, s. Default 0.1.
     pub jerk_window: f64,
 }
 
 impl Default for ControllerSettings {
     fn default() -> Self {
-        Self { position: 16.0, velocity: 8.0, attitude: 16.0, heading: 3.0, jerk_window: 0.1 }
+        Self { position: 16.0, velocity: 8.0, attitude: 16.0, heading: 3.0, lever: 3.0, jerk_window: 0.1 }
     }
 }
 
@@ -40,24 +42,40 @@ impl Default for ControllerSettings {
 pub struct CascadedController {
     airframe: Airframe,
     settings: ControllerSettings,
+    /// Where the body is wanted beside its reference, world frame, m, and since when.
+    shift: Vector3<f64>,
+    shift_time: Option<f64>,
 }
 
 impl CascadedController {
     /// A controller for a vehicle whose responses are known.
     pub fn new(airframe: Airframe, settings: ControllerSettings) -> Self {
-        Self { airframe, settings }
+        Self { airframe, settings, shift: Vector3::zeros(), shift_time: None }
+    }
+
+    /// Follows the displacement of the gun by roll and pitch with a lag: attitude is what the controller itself acts with, and
+    /// only its slow part, against wind and hose, must be made good.
+    fn make_room(&mut self, time: f64, lever: &Vector3<f64>, estimate: &Estimate) -> Vector3<f64> {
+        let [roll, pitch, yaw] = estimate.attitude;
+        let level = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw);
+        let displaced = Rotation3::from_euler_angles(roll, pitch, yaw) * level.inverse_transform_vector(lever) - lever;
+        let dt = self.shift_time.map_or(0.0, |before| (time - before).max(0.0));
+        self.shift_time = Some(time);
+        self.shift += (-displaced - self.shift) * -(-self.settings.lever * dt).exp_m1();
+        self.shift
     }
 }
 
 impl Controller for CascadedController {
     fn command(&mut self, time: f64, estimate: &Estimate, reference: &dyn Reference) -> Command {
-        let (frame, gains) = (&self.airframe, &self.settings);
         let wanted = reference.at(time);
+        let shift = self.make_room(time, &wanted.lever, estimate);
+        let (frame, gains) = (&self.airframe, &self.settings);
         let half = 0.5 * gains.jerk_window;
         let jerk = (reference.at(time + half).acceleration - reference.at(time - half).acceleration)
             / gains.jerk_window.max(1e-3);
 
-        let position_error = wanted.position - estimate.position;
+        let position_error = wanted.position + shift - estimate.position;
         let velocity_error = wanted.velocity - estimate.velocity;
         let acceleration = wanted.acceleration + gains.velocity * velocity_error + gains.position * position_error;
         // What the rotors have to give: the estimate's disturbance holds wind and hose, the drag of the own motion is

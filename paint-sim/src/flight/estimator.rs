@@ -24,7 +24,7 @@ pub struct Estimate {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct ObserverSettings {
-    /// Triple pole of position, velocity and disturbance, rad/s. Default 8.
+    /// Triple pole of position, velocity and disturbance, rad/s. Default 16.
     pub translation: f64,
     /// Pole of roll and pitch, double pole of yaw and yaw rate, rad/s. Default 12.
     pub attitude: f64,
@@ -32,7 +32,7 @@ pub struct ObserverSettings {
 
 impl Default for ObserverSettings {
     fn default() -> Self {
-        Self { translation: 8.0, attitude: 12.0 }
+        Self { translation: 16.0, attitude: 12.0 }
     }
 }
 

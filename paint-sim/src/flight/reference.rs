@@ -15,6 +15,9 @@ pub struct ReferenceState {
     pub heading: f64,
     /// Its rate, rad/s.
     pub heading_rate: f64,
+    /// From the body's centre to the point about which the gun turns, at a level attitude, world frame, m: that point is kept in
+    /// its place when the body tilts against wind and hose. Zero leaves it to the body.
+    pub lever: Vector3<f64>,
     /// The point on the surface that the spray shall hit; `None` sends the pan-tilt unit to rest.
     pub aim: Option<Point3<f64>>,
     /// Wanted distance from the nozzle to the surface along the spray, m.
@@ -27,7 +30,7 @@ impl ReferenceState {
     pub(crate) fn is_finite(&self) -> bool {
         let scalars = [self.heading, self.heading_rate, self.nozzle_distance, self.flow];
         let aim = self.aim.unwrap_or_else(Point3::origin);
-        let vectors = [self.position.coords, self.velocity, self.acceleration, aim.coords];
+        let vectors = [self.position.coords, self.velocity, self.acceleration, self.lever, aim.coords];
         scalars.iter().all(|v| v.is_finite()) && vectors.iter().flatten().all(|v| v.is_finite())
     }
 }

@@ -30,6 +30,11 @@ impl DivergenceMonitor {
         self.cause
     }
 
+    /// Images in a row that contradict the prediction.
+    pub(crate) fn consecutive_outliers(&self) -> u32 {
+        self.consecutive_outliers
+    }
+
     /// Checks the state after an image. True if the initialization was wrong: then no estimate is better than this one.
     #[must_use]
     pub(crate) fn check_image(

@@ -1,6 +1,6 @@
 //! What an image does to the filter: alignment and update landmark by landmark, then landmark management.
 
-use super::frontend::corner_detector::DetectionCriteria;
+use super::frontend::corner_detector::{CornerDetector, DetectionCriteria};
 use super::frontend::image_frontend::ImageFrontend;
 use super::frontend::patch::Patch;
 use super::frontend::patch_alignment::{PatchAlignment, align_patch};
@@ -43,6 +43,22 @@ pub(crate) fn align_and_update(
                 report.rejected += 1;
                 track.failures += 1;
             }
+        }
+    }
+}
+
+/// Drops landmarks that are seen where the image is masked.
+pub(crate) fn drop_masked(
+    tracking: &mut TrackingState,
+    detector: &CornerDetector,
+    camera: &dyn CameraModel,
+    report: &mut FrameReport,
+) {
+    for slot in (0..tracking.tracks.len()).rev() {
+        let direction = tracking.estimator.state.landmarks[slot].bearing.direction();
+        if camera.project(&direction).is_some_and(|pixel| detector.is_masked(&pixel)) {
+            tracking.remove(slot);
+            report.removed += 1;
         }
     }
 }

@@ -1,6 +1,6 @@
 //! What the filter reports about itself and about each image.
 
-use nalgebra::{Isometry3, SMatrix};
+use nalgebra::{Isometry3, SMatrix, Unit, Vector2, Vector3};
 
 use crate::core::divergence::DivergenceCause;
 
@@ -9,18 +9,23 @@ use crate::core::divergence::DivergenceCause;
 pub enum Status {
     /// Not initialised yet, and why.
     Uninitialised(InitializationStatus),
-    /// Running.
+    /// Running, on landmarks or at rest.
     Tracking,
+    /// Running on inertial samples alone: the last image followed no landmark, or there has been none for a while. The covariance
+    /// grows, and says how far the estimate can be used.
+    DeadReckoning,
     /// Given up, and why. Stays so until [`Vio::initialize`](crate::Vio::initialize) or [`Vio::reset`](crate::Vio::reset).
     Diverged(DivergenceCause),
 }
 
-/// What the initialization at rest waits for.
+/// What the initialization waits for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InitializationStatus {
     /// A second in which rate and force do not change.
     WaitingForSteadyImu,
-    /// Images with corners, and without parallax.
+    /// Images with corners: what the camera sees is dark, blurred or bare.
+    WaitingForFeatures,
+    /// Images without parallax: the inertial samples are at rest, the images move.
     WaitingForStationaryImages,
     /// The force read at rest is not gravity: axes, units or calibration of the accelerometer are wrong.
     GravityMismatch,
@@ -35,6 +40,23 @@ pub struct Calibration {
     pub time_offset_s: f64,
     /// Of the errors of, in this order: position (m), attitude as a rotation vector in **body** axes (rad), time offset (s).
     pub covariance: SMatrix<f64, 7, 7>,
+}
+
+/// A landmark as the filter estimates it at the last image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LandmarkEstimate {
+    /// Its number; that of the caller's point where the points are the caller's.
+    pub id: u64,
+    /// Direction in the axes of the first camera.
+    pub bearing_in_camera: Unit<Vector3<f64>>,
+    /// Where that is in the image; `None` where the lens has no pixel for it.
+    pub pixel: Option<Vector2<f64>>,
+    /// One over the distance from the camera, 1/m.
+    pub inverse_distance: f64,
+    /// Its standard deviation, 1/m.
+    pub inverse_distance_sigma: f64,
+    /// Images in a row that it could not be measured in.
+    pub failures: u32,
 }
 
 /// What one image, or one set of points, did.
@@ -52,11 +74,21 @@ pub struct FrameReport {
     pub removed: usize,
     /// Whether the body was taken to be stationary.
     pub stationary: bool,
+    /// Images in a row, this one included, in which most landmarks contradicted the prediction. What was estimated since the first
+    /// of them is in doubt.
+    pub consecutive_outliers: u32,
+}
+
+impl Status {
+    /// Whether there is an estimate: [`Tracking`](Self::Tracking) or [`DeadReckoning`](Self::DeadReckoning).
+    pub fn has_estimate(self) -> bool {
+        matches!(self, Self::Tracking | Self::DeadReckoning)
+    }
 }
 
 impl FrameReport {
     /// Nothing yet.
     pub(crate) fn empty(status: Status) -> Self {
-        Self { status, used: 0, rejected: 0, added: 0, removed: 0, stationary: false }
+        Self { status, used: 0, rejected: 0, added: 0, removed: 0, stationary: false, consecutive_outliers: 0 }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Vector2};
+use nalgebra::{Isometry3, Unit, Vector2};
 
 use super::divergence_monitor::DivergenceMonitor;
 use super::estimator::Estimator;
@@ -10,7 +10,7 @@ use super::frontend::corner_detector::DetectionCriteria;
 use super::frontend::image_frontend::ImageFrontend;
 use super::frontend::klt_tracker::KltTracker;
 use super::frontend::patch::Patch;
-use super::image_tracking::{align_and_update, detect_landmarks, drop_landmarks, update_templates};
+use super::image_tracking::{align_and_update, detect_landmarks, drop_landmarks, drop_masked, update_templates};
 use super::initialization::dynamic::result::InitialMotion;
 use super::initialization::dynamic_initializer::DynamicInitializer;
 use super::initialization::from_initialization::from_initialization;
@@ -21,7 +21,7 @@ use super::measurements::stationary::stationary_update;
 use super::measurements::update::gated_update;
 use super::point_observation::{PointObservation, PointPair};
 use super::point_tracking::{add_points, drop_points, update_with_points};
-use super::report::{Calibration, FrameReport, InitializationStatus, Status};
+use super::report::{Calibration, FrameReport, InitializationStatus, LandmarkEstimate, Status};
 use super::settings::Settings;
 use super::state::error_state;
 use super::stationary::detector::StationaryDetector;
@@ -38,6 +38,11 @@ use crate::{CameraModel, Error, ImageView, Imu, ImuNoise, Stamp};
 
 /// A measurement this much ahead of the inertial samples, in seconds, is waiting for data that does not come.
 const MAX_AHEAD: f64 = 0.1;
+
+/// Longest time without a landmark that is followed, s, before the estimate is called dead reckoning though no image says so.
+const MAX_UNAIDED: f64 = 0.5;
+/// Points without which nothing can be initialised.
+const MIN_FEATURES: usize = 5;
 
 /// A camera, maybe a second one beside it, and an inertial sensor.
 ///
@@ -61,12 +66,15 @@ const MAX_AHEAD: f64 = 0.1;
 ///     accel_bias: Vector3::zeros(),
 ///     sigma: InitialSigma::default(),
 /// })?;
-/// let picture: Vec<u8> = (0..752 * 480).map(|k| if (k % 752 / 40 + k / 752 / 40) % 2 == 0 { 60 } else { 180 }).collect();
+/// // Bright tiles on a dark wall; their corners are the landmarks.
+/// let bright = |k: usize| k % 752 % 60 < 30 && k / 752 % 60 < 30;
+/// let picture: Vec<u8> = (0..752 * 480).map(|k| if bright(k) { 180 } else { 60 }).collect();
 /// for k in 1..=20 {
 ///     vio.imu(&imu(5 * k))?;
 ///     if k % 10 == 0 {
 ///         let report = vio.image(at(5 * k), &ImageView::new(752, 480, &picture)?)?;
 ///         assert_eq!(report.status, Status::Tracking);
+///         assert!(report.used > 10 || k == 10, "the first image has nothing to compare with");
 ///     }
 /// }
 /// let odometry = vio.output().expect("it has been initialised");
@@ -91,6 +99,8 @@ pub struct Vio {
     klt_tracker: KltTracker,
     initialization: InitializationStatus,
     divergence: DivergenceMonitor,
+    /// When an image last followed landmarks, or saw the body at rest.
+    last_aided: Option<Stamp>,
 }
 
 impl Vio {
@@ -115,6 +125,7 @@ impl Vio {
             klt_tracker: KltTracker::default(),
             initialization: InitializationStatus::WaitingForSteadyImu,
             divergence: DivergenceMonitor::default(),
+            last_aided: None,
         })
     }
 
@@ -174,15 +185,24 @@ impl Vio {
         self.reset();
         let estimator = Estimator::new(self.camera.as_ref(), self.noise, &self.settings, initial, sample);
         self.tracking = Some(TrackingState::new(estimator, self.settings.landmarks.max_count));
+        self.last_aided = Some(initial.stamp);
         Ok(())
     }
 
     /// Drops the estimate. The filter tries to initialise itself from here on.
     pub fn reset(&mut self) {
         self.tracking = None;
+        self.last_aided = None;
         self.divergence = DivergenceMonitor::default();
         self.dynamic_initializer = DynamicInitializer::new(self.settings.dynamic_initialization);
         self.klt_tracker = KltTracker::default();
+    }
+
+    /// From here on no landmark of the first camera lies where the mask, of the size of its images, is 0: propellers, legs, the robot
+    /// itself.
+    pub fn set_mask(&mut self, mask: &ImageView) -> Result<(), Error> {
+        self.frontend.detector.set_mask(&mask.checked(self.camera.image_size())?);
+        Ok(())
     }
 
     /// Takes an inertial sample; stamps must increase.
@@ -244,6 +264,9 @@ impl Vio {
         };
         if !stationary {
             tracking.drift_templates(camera.as_ref(), &settings.patches, elapsed);
+            if frontend.detector.has_mask() {
+                drop_masked(tracking, &frontend.detector, camera.as_ref(), &mut report);
+            }
             // Align patches and update, landmark by landmark.
             align_and_update(tracking, &frontend.pyramid, camera.as_ref(), settings, &mut report);
             // Manage landmarks.
@@ -344,6 +367,9 @@ impl Vio {
             }
         }
         let used = gated_update(&mut tracking.estimator, measurement);
+        if used {
+            self.last_aided = Some(tracking.estimator.buffer.state_stamp());
+        }
         self.divergence.check_state(&tracking.estimator, &self.settings.divergence);
         tracking.estimator.update_prediction();
         Ok(used)
@@ -354,7 +380,11 @@ impl Vio {
         match (&self.tracking, self.divergence.cause()) {
             (None, _) => Status::Uninitialised(self.initialization),
             (Some(_), Some(cause)) => Status::Diverged(cause),
-            (Some(_), None) => Status::Tracking,
+            (Some(tracking), None) => {
+                let now = tracking.estimator.buffer.now();
+                let aided = |last: Stamp| now.secs_since(last) <= MAX_UNAIDED;
+                if self.last_aided.is_some_and(aided) { Status::Tracking } else { Status::DeadReckoning }
+            }
         }
     }
 
@@ -369,6 +399,25 @@ impl Vio {
             body_from_camera: estimator.state.body_from_camera(),
             time_offset_s: estimator.state.time_offset,
             covariance: estimator.covariance.block(error_state::CAMERA_POSITION, error_state::CAMERA_POSITION),
+        })
+    }
+
+    /// The landmarks that are followed, as they are estimated at the last image.
+    pub fn landmarks(&self) -> impl Iterator<Item = LandmarkEstimate> + '_ {
+        let tracking = self.tracking.iter();
+        tracking.flat_map(|TrackingState { estimator, tracks }| {
+            tracks.iter().enumerate().map(|(slot, track)| {
+                let landmark = &estimator.state.landmarks[slot];
+                let bearing_in_camera = landmark.bearing.direction();
+                LandmarkEstimate {
+                    id: track.id,
+                    bearing_in_camera: Unit::new_unchecked(bearing_in_camera),
+                    pixel: self.camera.project(&bearing_in_camera),
+                    inverse_distance: landmark.inverse_distance.value,
+                    inverse_distance_sigma: estimator.covariance.variance(error_state::landmark(slot) + 2).sqrt(),
+                    failures: track.failures,
+                }
+            })
         })
     }
 
@@ -414,7 +463,13 @@ impl Vio {
     fn check_divergence(&mut self, mut report: FrameReport) -> FrameReport {
         if let Some(tracking) = &mut self.tracking {
             let wrong = self.divergence.check_image(&tracking.estimator, &self.settings.divergence, &report);
+            report.consecutive_outliers = self.divergence.consecutive_outliers();
             tracking.estimator.update_prediction();
+            // New landmarks tell nothing yet, unless there are no others: then they are the first.
+            let first = report.added > 0 && report.added == tracking.tracks.len();
+            let aided = report.used > 0 || report.stationary || first;
+            // Not the time of the state: at rest that stays behind.
+            self.last_aided = aided.then(|| tracking.estimator.buffer.now());
             if wrong {
                 self.reset();
             }
@@ -428,6 +483,7 @@ impl Vio {
         self.initialize_at_rest()?;
         if self.tracking.is_none() && self.settings.dynamic_initialization.enabled {
             self.track_before_initialization(stamp);
+            self.count_features(self.klt_tracker.observations().count());
         }
         let Self { tracking: Some(tracking), frontend, stereo, camera, settings, .. } = self else {
             return Ok(self.empty_report());
@@ -455,8 +511,16 @@ impl Vio {
                 self.initialize_in_motion(time, &motion, pixel);
             }
         }
+        self.count_features(points.len());
         let added = self.tracking.as_ref().map_or(0, |tracking| tracking.tracks.len());
         Ok(FrameReport { added, ..self.empty_report() })
+    }
+
+    /// Too few points keep every initialization waiting, unless something else is wrong already.
+    fn count_features(&mut self, count: usize) {
+        if count < MIN_FEATURES && self.initialization != InitializationStatus::GravityMismatch {
+            self.initialization = InitializationStatus::WaitingForFeatures;
+        }
     }
 
     /// Initialises from the means of a stationary period.
@@ -513,6 +577,7 @@ impl Vio {
         let probation = time.plus_secs(self.settings.dynamic_initialization.probation_s);
         self.divergence = DivergenceMonitor::on_probation(probation);
         self.tracking = Some(tracking);
+        self.last_aided = Some(time);
     }
 
     /// Time of the latest sample; before the first that of an image.

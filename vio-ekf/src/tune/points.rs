@@ -4,7 +4,7 @@ use super::{NoisePoint, Score, with_factors};
 use crate::sim::{ImuModel, Rng};
 use crate::{
     Alignment, Camera, Error, Imu, ImuNoise, InitialSigma, InitialState, Motion, Odometry, PointObservation, Settings,
-    Spline, Stamp, Status, Vio, ate, so3,
+    Spline, Stamp, Vio, ate, so3,
 };
 
 /// Time between two images, ns.
@@ -71,7 +71,7 @@ impl PointRecording {
                 }
             }
             let report = vio.points(*stamp, seen)?;
-            let Some(odometry) = vio.output().filter(|_| report.status == Status::Tracking) else { break };
+            let Some(odometry) = vio.output().filter(|_| report.status.has_estimate()) else { break };
             reference.push(motion.world_from_body);
             estimate.push(odometry.world_from_body);
             for (sum, nees) in sums.iter_mut().zip(nees(&odometry, motion)) {

@@ -129,10 +129,7 @@ fn starts_only_from_a_rest_that_it_sees() {
     // Constant velocity feels like rest to the inertial sensor, but not to the camera.
     assert_ne!(run(1.0, 1, &boxes(2)), Status::Tracking);
     // Nothing to see, nothing to know.
-    assert_eq!(
-        run(1.0, 0, &vec![90; WIDTH * HEIGHT]),
-        Status::Uninitialised(InitializationStatus::WaitingForStationaryImages)
-    );
+    assert_eq!(run(1.0, 0, &vec![90; WIDTH * HEIGHT]), Status::Uninitialised(InitializationStatus::WaitingForFeatures));
     // Readings in units of g.
     assert_eq!(run(1.0 / GRAVITY, 0, &boxes(2)), Status::Uninitialised(InitializationStatus::GravityMismatch));
 }
@@ -164,7 +161,7 @@ fn light_that_changes_does_not_look_like_motion() {
             let dark = (200..300).contains(&sample);
             let data = seen(&picture, if dark { 0.0 } else { light }, 0, &mut still.rng);
             let report = vio.image(imu.stamp, &ImageView::new(WIDTH, HEIGHT, &data).unwrap()).unwrap();
-            assert_eq!(report.status, Status::Tracking);
+            assert_eq!(report.status, if dark { Status::DeadReckoning } else { Status::Tracking });
             if dark {
                 assert_eq!(report.used, 0, "seen in the dark");
             } else {
@@ -177,6 +174,52 @@ fn light_that_changes_does_not_look_like_motion() {
     assert!(used > 500 && rejected * 20 < used, "{used} used, {rejected} rejected");
     assert!(end.world_from_body.translation.vector.norm() < 0.03, "{}", end.world_from_body.translation.vector);
     assert!(so3::angle_between(&end.world_from_body.rotation, &still.attitude) < 0.005);
+}
+
+#[test]
+fn nothing_is_tracked_where_the_image_is_masked() {
+    // The left half of the image is hidden from the fifth of twenty images on, with landmarks in it by then.
+    let mut still = Still::new(5);
+    let stationary = vio_ekf::StationarySettings { min_duration_s: f64::INFINITY, ..Default::default() };
+    let mut vio = Vio::new(small_camera(), still.noise, Settings { stationary, ..Settings::default() }).unwrap();
+    let picture = boxes(8);
+    vio.imu(&still.imu(0)).unwrap();
+    vio.initialize(&vio_ekf::InitialState {
+        stamp: Stamp::from_nanos(0),
+        world_from_body: nalgebra::Isometry3::from_parts(Vector3::zeros().into(), still.attitude),
+        velocity_in_body: Vector3::zeros(),
+        gyro_bias: still.biases[0],
+        accel_bias: still.biases[1],
+        sigma: vio_ekf::InitialSigma::default(),
+    })
+    .unwrap();
+    for sample in 1..=200 {
+        let imu = still.imu(sample);
+        vio.imu(&imu).unwrap();
+        if sample % 10 != 0 {
+            continue;
+        }
+        if sample == 50 {
+            let mask: Vec<u8> = (0..WIDTH * HEIGHT).map(|k| if k % WIDTH < WIDTH / 2 { 0 } else { 255 }).collect();
+            vio.set_mask(&ImageView::new(WIDTH, HEIGHT, &mask).unwrap()).unwrap();
+        }
+        let data = seen(&picture, 1.0, 0, &mut still.rng);
+        vio.image(imu.stamp, &ImageView::new(WIDTH, HEIGHT, &data).unwrap()).unwrap();
+        let landmarks: Vec<_> = vio.landmarks().collect();
+        let hidden = landmarks.iter().filter(|landmark| landmark.pixel.unwrap().x < WIDTH as f64 / 2.0 - 0.5).count();
+        assert!(landmarks.len() >= 10, "image {sample}: {}", landmarks.len());
+        assert_eq!(hidden > 0, sample < 50, "image {sample}: {hidden} of {}", landmarks.len());
+        for landmark in landmarks {
+            // Nothing moves: all that is known of the distance is the prior.
+            let settings = Settings::default().landmarks;
+            assert!((landmark.inverse_distance - settings.inverse_distance).abs() < settings.inverse_distance);
+            assert!(landmark.inverse_distance_sigma > 0.1 * settings.inverse_distance, "{landmark:?}");
+            let pixel = small_camera().project(&landmark.bearing_in_camera).unwrap();
+            assert!((pixel - landmark.pixel.unwrap()).norm() < 1e-12);
+        }
+    }
+    let small = ImageView { width: 4, height: 4, data: &[0; 16] };
+    assert!(matches!(vio.set_mask(&small), Err(vio_ekf::Error::ImageSize { .. })));
 }
 
 /// The claimed deviation of the position after two seconds at rest, as if it were a hover, by the drift of templates.

@@ -170,14 +170,25 @@ fn a_start_that_is_contradicted_is_taken_back() {
             }
         }
         vio.points(stamp, &seen).unwrap();
-        if vio.status() == Status::Tracking {
+        let status = vio.status();
+        if status.has_estimate() {
             began.get_or_insert(frame);
         }
-        if statuses.last() != Some(&vio.status()) {
-            statuses.push(vio.status());
+        let same = |last: &Status| std::mem::discriminant(last) == std::mem::discriminant(&status);
+        if !statuses.last().is_some_and(same) {
+            statuses.push(status);
         }
     }
-    let [Status::Uninitialised(_), Status::Tracking, Status::Uninitialised(_), Status::Tracking] = statuses[..] else {
+    // Nothing of the first contradicting image can be used, and the third ends it.
+    let [
+        Status::Uninitialised(_),
+        Status::Tracking,
+        Status::DeadReckoning,
+        ..,
+        Status::Uninitialised(_),
+        Status::Tracking,
+    ] = statuses[..]
+    else {
         panic!("{statuses:?}");
     };
 }

@@ -1,10 +1,12 @@
 //! Samples that cannot be: real readings pass as they are, and are refused when spoilt in any of the usual ways.
 
+use std::fmt::Write as _;
+
 use crate::support::flight::{Flight, GRAVITY};
 use crate::support::recorded;
 use nalgebra::{Isometry3, Matrix3, Vector3};
 use vio_ekf::sim::ImuModel;
-use vio_ekf::{Error, Imu, Spline, Stamp, asl, nalgebra, validate_samples};
+use vio_ekf::{Error, Imu, ImuDoubt, ImuValidation, Spline, Stamp, asl, euroc, nalgebra, tum, validate_samples};
 
 /// A simulated flight that tilts by about 15 degrees, and real ones where they are there.
 fn recordings() -> Vec<(&'static str, Vec<Imu>)> {
@@ -23,6 +25,14 @@ fn with(samples: &[Imu], change: impl Fn(&Imu) -> Imu) -> Vec<Imu> {
     samples.iter().map(change).collect()
 }
 
+/// Whether axes or units are named, as a refusal or as a doubt.
+fn is_named(result: &Result<ImuValidation, Error>) -> bool {
+    match result {
+        Ok(validation) => validation.doubts.iter().any(|doubt| matches!(doubt, ImuDoubt::Axes { .. })),
+        Err(error) => matches!(error, Error::SwappedAxes { .. } | Error::NoGravity { .. }),
+    }
+}
+
 #[test]
 fn sound_samples_pass_and_swapped_axes_are_named() {
     for (name, samples) in recordings() {
@@ -39,7 +49,7 @@ fn sound_samples_pass_and_swapped_axes_are_named() {
                 with(&samples, |s| Imu { gyro: axes * s.gyro, ..*s }),
             ] {
                 let result = validate_samples(&spoilt, 200.0, GRAVITY);
-                assert!(matches!(result, Err(Error::SwappedAxes { .. })), "{name}: {axes} {result:?}");
+                assert!(is_named(&result), "{name}: {axes} {result:?}");
             }
         }
         // Another frame for both sensors, but the same: nothing is wrong with it.
@@ -48,10 +58,14 @@ fn sound_samples_pass_and_swapped_axes_are_named() {
         if name != "simulated" {
             continue;
         }
-        let Err(Error::SwappedAxes { hint }) =
-            validate_samples(&with(&samples, |s| Imu { accel: cycle * s.accel, ..*s }), 200.0, GRAVITY)
-        else {
-            panic!("cycled axes pass")
+        let result = validate_samples(&with(&samples, |s| Imu { accel: cycle * s.accel, ..*s }), 200.0, GRAVITY);
+        let hint = match result {
+            Err(Error::SwappedAxes { hint }) => hint,
+            Ok(ImuValidation { doubts, .. }) => match &doubts[..] {
+                [ImuDoubt::Axes { hint, .. }] => hint.clone(),
+                other => panic!("{other:?}"),
+            },
+            Err(other) => panic!("{other}"),
         };
         // x came from y, y from z, z from x.
         assert_eq!(hint, "(z, x, y)");
@@ -105,4 +119,77 @@ fn a_flight_that_leans_as_it_accelerates_is_no_swap_of_axes() {
     // It does: sideways forces are below a tenth of what the acceleration is.
     assert!(samples.iter().all(|sample| sample.accel.xy().norm() < 0.15));
     assert!(validate_samples(&samples, 200.0, GRAVITY).is_ok());
+}
+
+/// The motions of others that are there: name, and knots.
+fn motions() -> Vec<(String, Spline)> {
+    let files = [
+        "trajectories/euroc/MH_01_easy.txt.gz",
+        "trajectories/euroc/MH_03_medium.txt.gz",
+        "vio/euroc_imu_gt/MH_04_difficult/groundtruth_MH_04_difficult.csv.gz",
+        "vio/euroc_imu_gt/V1_02_medium/groundtruth_V1_02_medium.csv.gz",
+        "trajectories/tum_vi/dataset-room1_512_16.txt.gz",
+        "trajectories/tum_vi/dataset-room4_512_16.txt.gz",
+        "trajectories/uzhfpv/indoor_forward_3_snapdragon_with_gt.txt.gz",
+        "trajectories/uzhfpv/indoor_forward_5_snapdragon_with_gt.txt.gz",
+        "trajectories/uzhfpv/outdoor_forward_5_snapdragon_with_gt.txt.gz",
+        "trajectories/kaist_vio/circle_fast.txt.gz",
+        "trajectories/kaist_vio/infinite_fast.txt.gz",
+        "trajectories/kaist_vio/rotation.txt.gz",
+        "trajectories/kaist_vio/square_head.txt.gz",
+        "trajectories/evo/freiburg1_xyz-groundtruth.txt.gz",
+        "trajectories/evo/fr2_desk_groundtruth.txt.gz",
+    ];
+    let read = |file: &str| {
+        let text = recorded::text(file)?;
+        let whole =
+            if file.ends_with("csv.gz") { euroc::read(&text).unwrap().trajectory } else { tum::read(&text).unwrap() };
+        let name = file.rsplit('/').next().unwrap().split('.').next().unwrap().into();
+        Some((name, Spline::from_trajectory(&whole, 50_000_000).unwrap()))
+    };
+    files.iter().filter_map(|file| read(file)).collect()
+}
+
+type Fault = (&'static str, fn(&Imu) -> Imu);
+
+/// Ways to spoil samples; each leaves a sensor that is right but for its axes or its unit.
+const FAULTS: [Fault; 9] = [
+    ("gyroscope negated", |s| Imu { gyro: -s.gyro, ..*s }),
+    ("gyroscope in deg/s", |s| Imu { gyro: s.gyro * 180.0 / std::f64::consts::PI, ..*s }),
+    ("accelerometer in g", |s| Imu { accel: s.accel / GRAVITY, ..*s }),
+    ("accelerometer xy swapped", |s| Imu { accel: Vector3::new(s.accel.y, s.accel.x, s.accel.z), ..*s }),
+    ("accelerometer xz swapped", |s| Imu { accel: Vector3::new(s.accel.z, s.accel.y, s.accel.x), ..*s }),
+    ("accelerometer yz swapped", |s| Imu { accel: Vector3::new(s.accel.x, s.accel.z, s.accel.y), ..*s }),
+    ("accelerometer cycled", |s| Imu { accel: Vector3::new(s.accel.y, s.accel.z, s.accel.x), ..*s }),
+    ("accelerometer x flipped", |s| Imu { accel: Vector3::new(-s.accel.x, s.accel.y, s.accel.z), ..*s }),
+    ("accelerometer z flipped", |s| Imu { accel: Vector3::new(s.accel.x, s.accel.y, -s.accel.z), ..*s }),
+];
+
+/// No motion that somebody has flown is refused, whatever the seed of the sensor.
+#[test]
+fn no_correct_motion_is_refused() {
+    let motions = motions();
+    let mut caught = [[0; 2]; FAULTS.len()];
+    let mut runs = 0;
+    for (name, spline) in &motions {
+        for seed in 1..=3 {
+            let model = ImuModel::default();
+            let samples = model.record(spline, GRAVITY, seed).unwrap().samples;
+            let verdict = validate_samples(&samples, 200.0, GRAVITY);
+            let mut line = format!("{name} {seed}: {verdict:?}\n");
+            runs += 1;
+            for (k, (fault, change)) in FAULTS.iter().enumerate() {
+                let spoilt = validate_samples(&with(&samples, change), 200.0, GRAVITY);
+                caught[k][0] += usize::from(spoilt.is_err());
+                caught[k][1] += usize::from(is_named(&spoilt));
+                let text = spoilt.map_or_else(|e| e.to_string(), |v| format!("{:?}", v.doubts));
+                writeln!(line, "    {fault}: {text}").unwrap();
+            }
+            eprintln!("{line}");
+            assert!(verdict.is_ok() && !is_named(&verdict), "{name}, seed {seed}: {verdict:?}");
+        }
+    }
+    for ((fault, _), [refused, named]) in FAULTS.iter().zip(caught) {
+        eprintln!("{fault}: refused in {refused}, named in {named} of {runs}");
+    }
 }

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
 
 mod camera;
+mod camera_model;
 mod dead_reckoning;
 mod evaluation;
 mod evo;
@@ -11,6 +12,7 @@ mod filter_consistency;
 mod filter_images;
 mod filter_initialization;
 mod filter_points;
+mod filter_sensors;
 mod filter_stationary;
 mod filter_stereo;
 mod formats;

@@ -8,7 +8,10 @@ use vio_ekf::calibration::{
     CameraCalibration, ImuCalibration, read_asl_camera, read_asl_imu, read_kalibr_cameras, read_kalibr_imu,
     write_asl_camera, write_asl_imu,
 };
-use vio_ekf::{Camera, Distortion, Imu, ImuNoise, Stamp, Trajectory, asl, euroc, kitti, tum};
+use vio_ekf::{
+    Camera, Distortion, Error, Imu, ImuNoise, InitialSigma, InitialState, Settings, Stamp, Trajectory, Vio, asl, euroc,
+    kitti, tum,
+};
 
 const KALIBR: &str = "%YAML:1.0
 cam0:
@@ -63,6 +66,40 @@ fn kalibr_chains_are_read() {
 }
 
 #[test]
+fn kalibr_files_make_a_filter_in_one_call() {
+    let cameras = read_kalibr_cameras(KALIBR).unwrap();
+    let body_from_imu = Isometry3::new(Vector3::new(0.3, 0.0, -0.1), Vector3::new(0.0, 0.2, 0.0));
+    let imu = ImuCalibration { noise: ImuNoise::default(), rate_hz: 200.0, body_from_imu };
+    let mut settings = Settings::default();
+    settings.calibration.time_offset_s = 0.5;
+    let mut vio = Vio::from_calibration(&cameras[..1], &imu, settings).unwrap();
+    let stamp = Stamp::from_nanos(7);
+    vio.imu(&Imu { stamp, gyro: Vector3::zeros(), accel: Vector3::new(0.0, 0.0, 9.81) }).unwrap();
+    vio.initialize(&InitialState {
+        stamp,
+        world_from_body: Isometry3::identity(),
+        velocity_in_body: Vector3::zeros(),
+        gyro_bias: Vector3::zeros(),
+        accel_bias: Vector3::zeros(),
+        sigma: InitialSigma::default(),
+    })
+    .unwrap();
+    let found = vio.calibration().unwrap();
+    // The chain's -0.0125 s and the caller's own 0.5 s.
+    assert!((found.time_offset_s - 0.4875).abs() < 1e-15, "{}", found.time_offset_s);
+    // A point of the camera seen from the body and from the sensor on it.
+    let in_camera = nalgebra::Point3::new(0.4, -0.1, 2.0);
+    let in_body = cameras[0].camera.body_from_camera * in_camera;
+    assert!((body_from_imu * (found.body_from_camera * in_camera) - in_body).norm() < 1e-12);
+    for wrong in [&cameras[..0], &[cameras[0]; 3]] {
+        assert!(matches!(
+            Vio::from_calibration(wrong, &imu, settings),
+            Err(Error::InvalidSetting { name: "cameras", .. })
+        ));
+    }
+}
+
+#[test]
 fn what_is_written_is_read_back() {
     let body_from_camera =
         Isometry3::from_parts(Vector3::new(0.1, -0.2, 0.3).into(), UnitQuaternion::from_euler_angles(0.3, -1.0, 2.0));
@@ -97,7 +134,19 @@ fn what_is_wrong_is_named() {
     };
     let spoilt = |from: &str, to: &str| read_kalibr_cameras(&KALIBR.replacen(from, to, 1)).unwrap_err();
     has(spoilt("[0.0, -1.0, 0.0, 0.25]", "[0.0, -1.1, 0.0, 0.25]"), &["cam0.T_cam_imu", "line 4", "rigid"]);
-    has(spoilt("pinhole", "omni"), &["camera_model", "pinhole"]);
+    has(spoilt("pinhole", "omni"), &["cam0.camera_model", "line 9", "`omni`", "pinhole", "CameraModel"]);
+    has(spoilt("T_cam_imu", "T_cn_cnm1"), &["cam0.T_cam_imu", "line 3", "camchain-imucam"]);
+    has(
+        spoilt("  rostopic: /cam0/image_raw#1\n  timeshift_cam_imu: -0.0125\n", "  timeshift_cam_imu: late\n"),
+        &["cam0.timeshift_cam_imu", "line 15", "`late`"],
+    );
+    // The wrong one of Kalibr's files.
+    has(
+        read_kalibr_cameras("rostopic: /imu0\nupdate_rate: 200\n").unwrap_err(),
+        &["cam0", "`rostopic`, `update_rate`"],
+    );
+    has(read_kalibr_cameras("camera_model: omni\n").unwrap_err(), &["no section `cam0:`", "`camera_model`"]);
+    has(read_kalibr_imu(KALIBR).unwrap_err(), &["cam0", "line 3", "inertial sensor"]);
     has(spoilt("equidistant", "fov"), &["distortion_model"]);
     has(spoilt("190.5", "nan"), &["intrinsics", "nan"]);
     has(spoilt("[512, 511]", "[512]"), &["resolution", "2 numbers", "1"]);

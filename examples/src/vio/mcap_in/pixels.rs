@@ -9,12 +9,14 @@ use super::fields::stamp;
 use crate::vio::cdr;
 use crate::vio::grey_image::GreyImage;
 
-/// Time of an image; `None` if the message is none.
-pub(super) fn image_stamp(schema: &str, data: &[u8]) -> Option<Stamp> {
+/// Time and frame of an image; `None` if the message is none.
+pub(super) fn image_header(schema: &str, data: &[u8]) -> Option<(Stamp, String)> {
     match schema {
-        "foxglove.RawImage" => RawImage::decode(data).ok()?.timestamp.map(stamp),
-        "foxglove.CompressedImage" => CompressedImage::decode(data).ok()?.timestamp.map(stamp),
-        _ => cdr::decode::<cdr::Header>(data).map(|header| header.stamp()),
+        "foxglove.RawImage" => RawImage::decode(data).ok().and_then(|m| Some((stamp(m.timestamp?), m.frame_id))),
+        "foxglove.CompressedImage" => {
+            CompressedImage::decode(data).ok().and_then(|m| Some((stamp(m.timestamp?), m.frame_id)))
+        }
+        _ => cdr::decode::<cdr::Header>(data).map(|header| (header.stamp(), header.frame_id)),
     }
 }
 
@@ -25,7 +27,7 @@ pub(super) fn image(message: &Message) -> Option<(Stamp, Result<GreyImage, Strin
         "foxglove.RawImage" => {
             let raw = RawImage::decode(data).ok()?;
             let size = (raw.width as usize, raw.height as usize, raw.step as usize);
-            Some((stamp(raw.timestamp?), unpack(&raw.encoding, size, &raw.data)))
+            Some((stamp(raw.timestamp?), unpack(&raw.encoding, size, false, &raw.data)))
         }
         "foxglove.CompressedImage" => {
             let image = CompressedImage::decode(data).ok()?;
@@ -34,7 +36,7 @@ pub(super) fn image(message: &Message) -> Option<(Stamp, Result<GreyImage, Strin
         "sensor_msgs/msg/Image" => {
             let raw: cdr::Image = cdr::decode(data)?;
             let size = (raw.width as usize, raw.height as usize, raw.step as usize);
-            Some((raw.header.stamp(), unpack(&raw.encoding, size, raw.data)))
+            Some((raw.header.stamp(), unpack(&raw.encoding, size, raw.is_bigendian != 0, raw.data)))
         }
         "sensor_msgs/msg/CompressedImage" => {
             let image: cdr::CompressedImage = cdr::decode(data)?;
@@ -44,32 +46,88 @@ pub(super) fn image(message: &Message) -> Option<(Stamp, Result<GreyImage, Strin
     }
 }
 
+/// How a pixel lies in memory.
+enum Layout {
+    Grey8,
+    /// Two bytes; the lower one is dropped, as of 16-bit files.
+    Grey16,
+    /// Channels, and which of them is red; blue is the other of the first and third.
+    Colour(usize, usize),
+    /// One colour per pixel, green twice in each square of four.
+    Bayer8,
+}
+
 /// Pixels as they are in memory, row by row with padding, to grey.
-fn unpack(encoding: &str, (width, height, step): (usize, usize, usize), data: &[u8]) -> Result<GreyImage, String> {
-    let (channels, red) = match encoding {
-        "mono8" | "8UC1" => (1, 0),
-        "rgb8" => (3, 0),
-        "bgr8" | "8UC3" => (3, 2),
-        "rgba8" => (4, 0),
-        "bgra8" => (4, 2),
+fn unpack(
+    encoding: &str,
+    (width, height, step): (usize, usize, usize),
+    big_endian: bool,
+    data: &[u8],
+) -> Result<GreyImage, String> {
+    let layout = match encoding {
+        "mono8" | "8UC1" => Layout::Grey8,
+        "mono16" | "16UC1" => Layout::Grey16,
+        "rgb8" => Layout::Colour(3, 0),
+        "bgr8" | "8UC3" => Layout::Colour(3, 2),
+        "rgba8" => Layout::Colour(4, 0),
+        "bgra8" => Layout::Colour(4, 2),
+        "bayer_rggb8" | "bayer_bggr8" | "bayer_gbrg8" | "bayer_grbg8" => Layout::Bayer8,
         other => {
-            return Err(format!("pixels encoded as `{other}` are not read: record mono8, rgb8, bgr8, PNG or JPEG"));
+            return Err(format!(
+                "pixels encoded as `{other}` are not read: record mono8, mono16, rgb8, bgr8, bayer (8 bits), PNG or JPEG"
+            ));
         }
     };
-    let row = width.saturating_mul(channels);
-    if step < row || data.len() < step.saturating_mul(height) {
+    let bytes = match layout {
+        Layout::Grey8 | Layout::Bayer8 => 1,
+        Layout::Grey16 => 2,
+        Layout::Colour(channels, _) => channels,
+    };
+    let row = width.saturating_mul(bytes);
+    if row == 0 || height == 0 || step < row || data.len() < step.saturating_mul(height) {
         return Err(format!("{} bytes are too few for {width}x{height} pixels in rows of {step}", data.len()));
     }
-    let luma = |pixel: &[u8]| {
-        if channels == 1 {
-            return pixel[0];
+    let rows = data.chunks_exact(step).take(height).map(|r| &r[..row]);
+    let data = match layout {
+        Layout::Grey8 => rows.flatten().copied().collect(),
+        Layout::Grey16 => {
+            let upper = usize::from(!big_endian);
+            rows.flat_map(|r| r.chunks_exact(2).map(move |pixel| pixel[upper])).collect()
         }
-        // ITU-R BT.601, as the colour cameras' own conversion.
-        let (r, g, b) = (u32::from(pixel[red]), u32::from(pixel[1]), u32::from(pixel[2 - red]));
-        ((299 * r + 587 * g + 114 * b + 500) / 1000) as u8
+        Layout::Colour(channels, red) => {
+            // ITU-R BT.601, as the colour cameras' own conversion.
+            let luma = move |pixel: &[u8]| {
+                let (r, g, b) = (u32::from(pixel[red]), u32::from(pixel[1]), u32::from(pixel[2 - red]));
+                ((299 * r + 587 * g + 114 * b + 500) / 1000) as u8
+            };
+            rows.flat_map(|r| r.chunks_exact(channels).map(luma)).collect()
+        }
+        Layout::Bayer8 => bayer_to_grey(&rows.collect::<Vec<_>>(), width),
     };
-    let rows = data.chunks_exact(step.max(1)).take(height);
-    Ok(GreyImage { width, height, data: rows.flat_map(|r| r[..row].chunks_exact(channels).map(luma)).collect() })
+    Ok(GreyImage { width, height, data })
+}
+
+/// A binomial window of 3x3 pixels: wherever it lies on the mosaic it holds red and blue by a quarter each and green by a half, so
+/// that the order of the colours does not matter and nothing is shifted.
+fn bayer_to_grey(rows: &[&[u8]], width: usize) -> Vec<u8> {
+    // Mirrored at the edge, which keeps the colours of the mosaic in their places.
+    let mirrored = |k: usize, offset: usize, count: usize| match (k + offset).checked_sub(1) {
+        None => 1.min(count - 1),
+        Some(k) if k >= count => count.saturating_sub(2),
+        Some(k) => k,
+    };
+    let weights = [1, 2, 1];
+    let pixel = |y: usize, x: usize| {
+        let mut sum = 8;
+        for (dy, wy) in weights.iter().enumerate() {
+            let row = rows[mirrored(y, dy, rows.len())];
+            for (dx, wx) in weights.iter().enumerate() {
+                sum += wy * wx * u32::from(row[mirrored(x, dx, width)]);
+            }
+        }
+        (sum / 16) as u8
+    };
+    (0..rows.len()).flat_map(|y| (0..width).map(move |x| (y, x))).map(|(y, x)| pixel(y, x)).collect()
 }
 
 #[cfg(test)]
@@ -78,18 +136,38 @@ mod tests {
 
     #[test]
     fn pixels_are_unpacked_with_padding_and_colours_by_their_weight() {
-        let grey = |encoding: &str, size, data: &[u8]| unpack(encoding, size, data).map(|grey| grey.data);
+        let grey = |encoding: &str, size, data: &[u8]| unpack(encoding, size, false, data).map(|grey| grey.data);
         assert_eq!(grey("mono8", (2, 2, 3), &[1, 2, 99, 3, 4, 99]), Ok(vec![1, 2, 3, 4]));
         // Red, green and blue alone: 29.9, 58.7 and 11.4 per cent.
         let colours = [255, 0, 0, 0, 255, 0, 0, 0, 255];
         assert_eq!(grey("rgb8", (3, 1, 9), &colours), Ok(vec![76, 150, 29]));
         assert_eq!(grey("bgr8", (3, 1, 9), &colours), Ok(vec![29, 150, 76]));
         assert_eq!(grey("bgra8", (1, 1, 4), &[0, 0, 255, 7]), Ok(vec![76]));
-        for (encoding, size, data) in
-            [("mono8", (2, 2, 1), &[0; 9][..]), ("mono8", (2, 2, 2), &[0; 3]), ("mono16", (1, 1, 2), &[0; 2])]
-        {
+        for (encoding, size, data) in [
+            ("mono8", (2, 2, 1), &[0; 9][..]),
+            ("mono8", (2, 2, 2), &[0; 3]),
+            ("mono16", (1, 1, 2), &[0; 1]),
+            ("mono32", (1, 1, 4), &[0; 4]),
+        ] {
             assert!(grey(encoding, size, data).is_err(), "{encoding} {size:?}");
         }
-        assert!(unpack("rgb8", (usize::MAX, 1, usize::MAX), &[0; 4]).is_err());
+        assert!(unpack("rgb8", (usize::MAX, 1, usize::MAX), false, &[0; 4]).is_err());
+        // Two bytes in either order: the upper one counts.
+        assert_eq!(grey("mono16", (2, 1, 4), &[0xff, 7, 0, 9]), Ok(vec![7, 9]));
+        assert_eq!(unpack("mono16", (2, 1, 4), true, &[7, 0xff, 9, 0]).map(|grey| grey.data), Ok(vec![7, 9]));
+    }
+
+    /// Red 40, green 100, blue 200 everywhere: (40 + 2 100 + 200) / 4, at the edges too, whatever the order of the mosaic.
+    #[test]
+    fn a_mosaic_of_one_colour_is_one_grey() {
+        let [r, g, b] = [40, 100, 200];
+        let orders = [("rggb", [r, g, g, b]), ("bggr", [b, g, g, r]), ("gbrg", [g, b, r, g]), ("grbg", [g, r, b, g])];
+        for (name, square) in orders {
+            // Rows of seven with one byte of padding.
+            let data: Vec<u8> =
+                (0..5 * 8).map(|k| if k % 8 == 7 { 255 } else { square[k / 8 % 2 * 2 + k % 8 % 2] }).collect();
+            let grey = unpack(&format!("bayer_{name}8"), (7, 5, 8), false, &data).unwrap();
+            assert_eq!(grey.data, [110; 35], "{name}");
+        }
     }
 }

@@ -22,12 +22,15 @@ pub(super) fn initialization_text(status: Status) -> String {
             "there was no second of rest to start from, and no motion that tells the scale"
         }
         Status::Uninitialised(InitializationStatus::WaitingForStationaryImages) => {
-            "the images show nothing to hold on to, or move at rest"
+            "the images move while the inertial sensor is at rest: check that both are of the same flight and clock"
+        }
+        Status::Uninitialised(InitializationStatus::WaitingForFeatures) => {
+            "the images show nothing to track: they are dark, blurred or bare"
         }
         Status::Uninitialised(InitializationStatus::GravityMismatch) => {
             "gravity test: at rest the accelerometer does not read gravity; check its axes, unit and calibration"
         }
-        Status::Tracking | Status::Diverged(_) => "no image came after the start",
+        Status::Tracking | Status::DeadReckoning | Status::Diverged(_) => "no image came after the start",
     }
     .into()
 }

@@ -4,6 +4,7 @@ use nalgebra::Vector2;
 
 use super::patch::Patch;
 use super::pyramid::{Level, Pyramid};
+use crate::ImageView;
 use crate::filter::settings::PatchSettings;
 
 /// Corners are thinned to one per square of this many pixels of the level they are found on.
@@ -40,6 +41,9 @@ pub(crate) struct CornerDetector {
     candidates: Vec<Candidate>,
     offsets: [isize; 16],
     threshold: u8,
+    /// Of the size of the image: where it is 0 nothing is detected. Empty without one.
+    mask: Vec<u8>,
+    width: usize,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,7 +80,24 @@ impl CornerDetector {
         let cells = level.width.div_ceil(CELL) * level.height.div_ceil(CELL);
         let width = level.width as isize;
         let offsets = CIRCLE.map(|(x, y)| y * width + x);
-        Self { cells: vec![(0, 0, 0); cells], candidates: Vec::with_capacity(cells), offsets, threshold }
+        let candidates = Vec::with_capacity(cells);
+        Self { cells: vec![(0, 0, 0); cells], candidates, offsets, threshold, mask: Vec::new(), width: 0 }
+    }
+
+    /// Nothing is detected from here on where the mask is 0.
+    pub(crate) fn set_mask(&mut self, mask: &ImageView) {
+        (self.mask, self.width) = (mask.data.to_vec(), mask.width);
+    }
+
+    /// Whether there is a mask.
+    pub(crate) fn has_mask(&self) -> bool {
+        !self.mask.is_empty()
+    }
+
+    /// Whether a pixel of the image is masked.
+    pub(crate) fn is_masked(&self, pixel: &Vector2<f64>) -> bool {
+        let [x, y] = [pixel.x, pixel.y].map(|v| v.round().max(0.0) as usize);
+        x < self.width && self.mask.get(y * self.width + x) == Some(&0)
     }
 
     /// Finds corners and scores the patches around them; those near `present` pixels are left out.
@@ -94,6 +115,9 @@ impl CornerDetector {
                 continue;
             }
             let pixel = level.pixel(&Vector2::new(f64::from(x), f64::from(y)));
+            if self.is_masked(&pixel) {
+                continue;
+            }
             let distance = present.clone().map(|p| (p - pixel).norm_squared()).fold(f64::INFINITY, f64::min);
             if distance < criteria.min_distance * criteria.min_distance {
                 continue;
@@ -120,7 +144,7 @@ impl CornerDetector {
                 .reduce(|best, k| if value(&self.candidates[k]) > value(&self.candidates[best]) { k } else { best })?;
             let pixel = self.candidates.swap_remove(best).pixel;
             let Some((score, pixel, patch)) = refine_corner(pyramid, &pixel) else { continue };
-            if score < criteria.min_score {
+            if score < criteria.min_score || self.is_masked(&pixel) {
                 continue;
             }
             self.candidates.retain_mut(|c| {

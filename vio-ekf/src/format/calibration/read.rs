@@ -8,6 +8,12 @@ use super::types::{CameraCalibration, ImuCalibration};
 use crate::{Camera, Distortion, Error, ImuNoise};
 
 const WHOLE_FILE: Section = Section { prefix: "", line: 1 };
+/// Kalibr writes two chains, and the one of the cameras alone does not say where the inertial sensor is.
+const NO_IMU: &str = "is missing: this chain is of cameras alone, give the one that Kalibr's calibration with the inertial sensor \
+                      wrote (`camchain-imucam`)";
+/// What is open to lenses of other models.
+const ONLY_PINHOLE: &str =
+    "only `pinhole` is read from files: a lens of another model goes into the filter as a `CameraModel`";
 
 /// Reads the `sensor.yaml` of an EuRoC/ASL camera.
 pub fn read_asl_camera(text: &str) -> Result<CameraCalibration, Error> {
@@ -28,17 +34,21 @@ pub fn read_asl_imu(text: &str) -> Result<ImuCalibration, Error> {
 
 /// Reads the cameras `cam0`, `cam1` ... of a Kalibr camera chain, in the order of the file.
 pub fn read_kalibr_cameras(text: &str) -> Result<Vec<CameraCalibration>, Error> {
-    let CameraChain(sections) = parse(text)?;
+    let CameraChain { cameras: sections, others } = parse(text)?;
     if sections.is_empty() {
-        return Err(Error::TooFew { what: "cameras (`cam0:` ...) in the Kalibr text", got: 0, need: 1 });
+        let found = if others.is_empty() { "nothing".into() } else { format!("`{}`", others.join("`, `")) };
+        let what = format!("no section `cam0:`, found {found}: give the camera chain that Kalibr wrote");
+        return Err(WHOLE_FILE.refuse(WHOLE_FILE.line, "cam0", &what));
     }
     let read = |(name, section): &(String, serde_saphyr::Spanned<CameraSection>)| {
         let keys = &section.value;
         let at = Section { prefix: &format!("{name}."), line: section.referenced.line() };
-        let body_from_camera = if keys.camera_from_imu.is_some() {
+        let body_from_camera = if keys.imu_from_camera.is_some() {
+            at.pose("T_imu_cam", &keys.imu_from_camera)?
+        } else if keys.camera_from_imu.is_some() {
             at.pose("T_cam_imu", &keys.camera_from_imu)?.inverse()
         } else {
-            at.pose("T_imu_cam", &keys.imu_from_camera)?
+            return Err(at.refuse(at.line, "T_cam_imu", NO_IMU));
         };
         let camera = camera(&at, keys, "distortion_coeffs", body_from_camera)?;
         let time_offset_s = at.optional("timeshift_cam_imu", &keys.timeshift_cam_imu)?.unwrap_or(0.0);
@@ -49,7 +59,12 @@ pub fn read_kalibr_cameras(text: &str) -> Result<Vec<CameraCalibration>, Error> 
 
 /// Reads the inertial sensor of a Kalibr file: `imu0`, or the bare keys of its input file.
 pub fn read_kalibr_imu(text: &str) -> Result<ImuCalibration, Error> {
-    let (at, keys) = match parse::<ImuChain>(text)?.imu0 {
+    let chain = parse::<ImuChain>(text)?;
+    if let Some(camera) = &chain.cam0 {
+        let what = "is a section of a camera chain: give Kalibr's file of the inertial sensor";
+        return Err(WHOLE_FILE.refuse(camera.referenced.line(), "cam0", what));
+    }
+    let (at, keys) = match chain.imu0 {
         Some(section) => (Section { prefix: "imu0.", line: section.referenced.line() }, section.value),
         None => (WHOLE_FILE, parse(text)?),
     };
@@ -70,7 +85,7 @@ fn camera(
 ) -> Result<Camera, Error> {
     let (model, line) = at.required("camera_model", &keys.camera_model)?;
     if model != "pinhole" {
-        return Err(at.refuse(line, "camera_model", "only `pinhole` is known"));
+        return Err(at.refuse(line, "camera_model", &format!("is `{model}`, {ONLY_PINHOLE}")));
     }
     let [width, height] = at.numbers("resolution", &keys.resolution)?;
     let [fx, fy, cx, cy] = at.numbers("intrinsics", &keys.intrinsics)?;

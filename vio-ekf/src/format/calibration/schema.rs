@@ -60,10 +60,15 @@ pub(super) struct OpenCvMatrix {
 #[derive(Deserialize)]
 pub(super) struct ImuChain {
     pub(super) imu0: Field<ImuSection>,
+    /// There only in the wrong file.
+    pub(super) cam0: Field<IgnoredAny>,
 }
 
-/// The sections of a Kalibr chain whose names begin with `cam`, in the order of the file.
-pub(super) struct CameraChain(pub(super) Vec<(String, Spanned<CameraSection>)>);
+/// The sections of a Kalibr chain whose names begin with `cam`, in the order of the file, and the other keys.
+pub(super) struct CameraChain {
+    pub(super) cameras: Vec<(String, Spanned<CameraSection>)>,
+    pub(super) others: Vec<String>,
+}
 
 impl<'de> Deserialize<'de> for CameraChain {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -77,15 +82,17 @@ impl<'de> Deserialize<'de> for CameraChain {
             }
 
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<CameraChain, A::Error> {
-                let mut sections = Vec::new();
+                let (mut cameras, mut others) = (Vec::new(), Vec::new());
                 while let Some(name) = map.next_key::<String>()? {
-                    if name.starts_with("cam") {
-                        sections.push((name, map.next_value()?));
+                    // `camera_model` and the like are keys of a section, not sections.
+                    if name.strip_prefix("cam").is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit())) {
+                        cameras.push((name, map.next_value()?));
                     } else {
                         map.next_value::<IgnoredAny>()?;
+                        others.push(name);
                     }
                 }
-                Ok(CameraChain(sections))
+                Ok(CameraChain { cameras, others })
             }
         }
 

@@ -1,9 +1,10 @@
 //! A flight through a room full of points: exact motion, noisy inertial samples, noisy pixels, and filters run on them.
 
-use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, Vector2, Vector3};
+use vio_ekf::sim::{forward_pinhole, observe_points, swaying_flight};
 use vio_ekf::{
-    Camera, Distortion, Error, Imu, ImuNoise, InitialSigma, InitialState, Motion, Odometry, PointObservation, Settings,
-    Spline, Stamp, Vio, nalgebra, so3,
+    Camera, CameraModel, Error, Imu, ImuNoise, InitialSigma, InitialState, Motion, Odometry, PointObservation,
+    Settings, Spline, Stamp, Vio, nalgebra, so3,
 };
 
 use super::rng::Rng;
@@ -16,46 +17,24 @@ const IMAGES_EVERY: i64 = 10;
 
 /// A pinhole that looks along the body's x axis.
 pub(crate) fn camera() -> Camera {
-    let rotation = Rotation3::from_matrix_unchecked(nalgebra::Matrix3::new(
-        0.0, 0.0, 1.0, //
-        -1.0, 0.0, 0.0, //
-        0.0, -1.0, 0.0,
-    ));
-    let (fx, fy, cx, cy) = (460.0, 460.0, 376.0, 240.0);
-    let body_from_camera =
-        Isometry3::from_parts(Translation3::new(0.08, -0.03, 0.02), UnitQuaternion::from_rotation_matrix(&rotation));
-    Camera { width: 752, height: 480, fx, fy, cx, cy, distortion: Distortion::None, body_from_camera }
+    forward_pinhole()
 }
 
 /// Sways and turns through a room of about 8 m, never twice the same way.
 pub(crate) fn spline(seed: u64, seconds: f64) -> Spline {
     let mut rng = Rng::new(seed);
-    let phases: Vec<Vector3<f64>> = (0..4).map(|_| rng.vector() * std::f64::consts::PI).collect();
-    let knots = (0..(seconds / 0.1) as usize + 4).map(|k| {
-        let t = k as f64 * 0.1;
-        let wave = |amplitude: f64, hertz: f64, phase: &Vector3<f64>| {
-            Vector3::from_fn(|i, _| {
-                amplitude * (std::f64::consts::TAU * hertz * (1.0 + 0.13 * i as f64) * t + phase[i]).sin()
-            })
-        };
-        let position = wave(1.4, 0.11, &phases[0]) + wave(0.4, 0.31, &phases[1]);
-        let tilt = wave(0.25, 0.23, &phases[2]);
-        let yaw = 0.9 * (0.5 * t + phases[3].x).sin() + 0.4 * (0.21 * t).sin();
-        let rotation = so3::exp(&Vector3::new(0.0, 0.0, yaw)) * so3::exp(&Vector3::new(tilt.x, tilt.y, 0.0));
-        Isometry3::from_parts(position.into(), rotation)
-    });
-    Spline::new(Stamp::from_nanos(1_000_000_000), 100_000_000, knots.collect()).unwrap()
+    swaying_flight(&std::array::from_fn(|_| rng.vector() * std::f64::consts::PI), seconds).unwrap()
 }
 
 /// Points on the walls of a room of 9 m.
-pub(crate) fn points(seed: u64, count: usize) -> Vec<Vector3<f64>> {
+pub(crate) fn points(seed: u64, count: usize) -> Vec<Point3<f64>> {
     let mut rng = Rng::new(seed ^ 0x5555);
     (0..count)
         .map(|_| {
             let mut point = rng.vector();
             let axis = (rng.bits() % 3) as usize;
             point[axis] = point[axis].signum();
-            point.component_mul(&Vector3::new(4.5, 4.5, 3.0))
+            Point3::from(point.component_mul(&Vector3::new(4.5, 4.5, 3.0)))
         })
         .collect()
 }
@@ -64,7 +43,7 @@ pub(crate) fn points(seed: u64, count: usize) -> Vec<Vector3<f64>> {
 pub(crate) struct Flight {
     pub(crate) spline: Spline,
     pub(crate) camera: Camera,
-    pub(crate) points: Vec<Vector3<f64>>,
+    pub(crate) points: Vec<Point3<f64>>,
     pub(crate) noise: ImuNoise,
     pub(crate) pixel_sigma: f64,
     /// Nanoseconds that the camera's stamps lag: the stamp is the true time minus this.
@@ -115,18 +94,15 @@ impl Flight {
 
     /// What the camera sees at a time, in an order that changes slowly.
     pub(crate) fn see(&mut self, stamp: Stamp) -> Vec<PointObservation> {
-        let world_from_camera = self.truth(stamp).world_from_body * self.camera.body_from_camera;
-        let mut seen = Vec::new();
-        for (id, point) in self.points.iter().enumerate() {
-            let local = world_from_camera.inverse() * nalgebra::Point3::from(*point);
-            let noise = Vector2::new(self.rng.normal(), self.rng.normal()) * self.pixel_sigma;
-            if let Some(pixel) = self.camera.project(&local.coords)
-                && self.camera.contains(&pixel, 0.0)
-            {
-                seen.push(PointObservation { id: id as u64, pixel: pixel + noise });
-            }
-        }
-        seen
+        self.see_with(&self.camera.clone(), stamp)
+    }
+
+    /// The same with a camera of another lens.
+    pub(crate) fn see_with(&mut self, camera: &dyn CameraModel, stamp: Stamp) -> Vec<PointObservation> {
+        let world_from_body = self.truth(stamp).world_from_body;
+        let Self { points, rng, pixel_sigma, .. } = self;
+        let noise = || Vector2::new(rng.normal(), rng.normal()) * *pixel_sigma;
+        observe_points(points.iter(), camera, &world_from_body, 0.0, noise)
     }
 
     /// A start drawn around the truth; position and yaw exact, they are what is measured from.

@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 use vio_ekf::sim::{
-    ImuModel, ImuRecording, RoomSettings, Scenario, SimulatedCamera, Simulation, camera_ahead, painting_flight,
+    ImuModel, ImuRecording, RoomSettings, Scenario, SimulatedCamera, Simulation, camera_ahead, observe_points,
+    painting_flight,
 };
 use vio_ekf::{
     Camera, InitialSigma, InitialState, PointObservation, Spline, Stamp, Trajectory, euroc, nalgebra, so3, tum,
@@ -78,18 +79,9 @@ impl Sequence {
     /// What a tracker of points sees at a time; the noise comes from the time.
     pub(crate) fn see(&self, stamp: Stamp) -> Vec<PointObservation> {
         let mut rng = Rng::new(stamp.nanos() as u64);
-        let camera_from_world =
-            (self.simulation.motion(stamp).unwrap().world_from_body * self.camera.body_from_camera).inverse();
-        let mut seen = Vec::new();
-        for (id, point) in self.points.iter().enumerate() {
-            let noise = Vector2::new(rng.normal(), rng.normal()) * self.pixel_sigma;
-            if let Some(pixel) = self.camera.project(&(camera_from_world * point).coords)
-                && self.camera.contains(&pixel, 8.0)
-            {
-                seen.push(PointObservation { id: id as u64, pixel: pixel + noise });
-            }
-        }
-        seen
+        let world_from_body = self.simulation.motion(stamp).unwrap().world_from_body;
+        let noise = || Vector2::new(rng.normal(), rng.normal()) * self.pixel_sigma;
+        observe_points(&self.points, &self.camera, &world_from_body, 8.0, noise)
     }
 }
 

@@ -1,0 +1,253 @@
+//! A tour over oriented strokes: nearest neighbour, then 2-opt and Or-opt until neither helps.
+
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
+
+use super::OrderedStroke;
+use super::transit_cost::{End, TransitCost, other};
+
+/// Neighbours of every end that improvements are looked for among.
+const NEIGHBOURS: usize = 12;
+/// Longest run of strokes that Or-opt moves.
+const RUN: usize = 3;
+/// Most beginnings that are tried, and the number of distances that may cost.
+const MAX_BEGINNINGS: usize = 8;
+const GREEDY_EFFORT: usize = 4_000_000;
+/// Exchanges of stretches that are tried, and over how many strokes one reaches.
+const KICKS_PER_STROKE: usize = 10;
+const MAX_KICKS: usize = 6000;
+const KICK_LENGTH: usize = 50;
+/// Gains below this are rounding, s.
+const GAIN: f64 = 1e-9;
+
+/// Strokes in flying order, each by the end at which it is entered.
+pub(super) struct Tour {
+    entries: Vec<End>,
+}
+
+impl Tour {
+    /// Goes to the nearest end of a stroke that is left, from the best of some beginnings.
+    pub(super) fn greedy(cost: &TransitCost) -> Self {
+        let ends = 2 * cost.strokes();
+        // Every end would be O(n^3): some, spread over all.
+        let beginnings = (GREEDY_EFFORT / (ends * ends).max(1)).clamp(1, MAX_BEGINNINGS);
+        let stride = ends.div_ceil(beginnings).max(1);
+        let tours = (0..ends).step_by(stride).map(|first| Self::nearest_neighbour(first, cost));
+        let best = tours.min_by(|a, b| a.duration(cost).total_cmp(&b.duration(cost)));
+        best.unwrap_or(Self { entries: Vec::new() })
+    }
+
+    fn nearest_neighbour(first: End, cost: &TransitCost) -> Self {
+        let mut left: Vec<End> = (0..2 * cost.strokes()).filter(|&end| end / 2 != first / 2).collect();
+        let mut entries = vec![first];
+        let mut exit = other(first);
+        while let Some(&next) = left.iter().min_by(|a, b| cost.between(exit, **a).total_cmp(&cost.between(exit, **b))) {
+            entries.push(next);
+            exit = other(next);
+            left.retain(|end| end / 2 != next / 2);
+        }
+        Self { entries }
+    }
+
+    /// Seconds of all transits.
+    pub(super) fn duration(&self, cost: &TransitCost) -> f64 {
+        let first = self.entries.first().map_or(0.0, |&end| cost.first(end));
+        first + self.entries.windows(2).map(|pair| cost.between(other(pair[0]), pair[1])).sum::<f64>()
+    }
+
+    pub(super) fn into_strokes(self) -> Vec<OrderedStroke> {
+        self.entries.iter().map(|end| OrderedStroke { index: end / 2, reversed: end % 2 == 1 }).collect()
+    }
+
+    /// Improves until no neighbour offers a gain, then tries exchanges of nearby stretches, each followed by the same and kept
+    /// if it gains: iterated local search (Lourenco, Martin and Stutzle 2003).
+    pub(super) fn improve(&mut self, cost: &TransitCost) {
+        let count = self.entries.len();
+        let neighbours = neighbours(cost);
+        self.improve_around((0..count).collect(), &neighbours, cost);
+        if count < 4 {
+            return;
+        }
+        // Where stretches are exchanged decides only how soon a good order is found.
+        let mut random = SplitMix64::seed_from_u64(count as u64);
+        let mut best = self.duration(cost);
+        for _ in 0..(KICKS_PER_STROKE * count).min(MAX_KICKS) {
+            let before = self.entries.clone();
+            let touched = self.exchange_stretches(&mut random);
+            self.improve_around(touched, &neighbours, cost);
+            let now = self.duration(cost);
+            if now < best - GAIN {
+                best = now;
+            } else {
+                self.entries = before;
+            }
+        }
+    }
+
+    /// Double bridge over a short stretch of the flight; returns the strokes at its joints.
+    fn exchange_stretches(&mut self, random: &mut SplitMix64) -> Vec<usize> {
+        let count = self.entries.len();
+        let length = count.min(KICK_LENGTH);
+        let mut below = |bound: usize| (random.next_u64() % bound as u64) as usize;
+        let from = below(count - length + 1);
+        let mut cuts = [0; 3].map(|_| from + below(length + 1));
+        cuts.sort_unstable();
+        let [a, b, c] = cuts;
+        self.entries[a..c].rotate_left(b - a);
+        let joints = [a, a + (c - b), c];
+        let beside = joints.into_iter().flat_map(|joint| [joint.wrapping_sub(1), joint]);
+        beside.filter_map(|at| self.entries.get(at)).map(|end| end / 2).collect()
+    }
+
+    /// Improves about some strokes, and about what that changes.
+    fn improve_around(&mut self, mut strokes: Vec<usize>, neighbours: &[Vec<End>], cost: &TransitCost) {
+        let mut position = vec![0; self.entries.len()];
+        locate(&self.entries, &mut position);
+        while let Some(stroke) = strokes.pop() {
+            while let Some(joined) = self.improve_at(position[stroke], neighbours, &position, cost) {
+                locate(&self.entries, &mut position);
+                for at in [position[stroke], position[joined]] {
+                    let about = self.entries[at.saturating_sub(1)..].iter().take(3);
+                    strokes.extend(about.map(|end| end / 2));
+                }
+            }
+        }
+    }
+
+    /// Tries the moves that make the transit into the stroke at a position shorter, or the one out of it; returns the stroke
+    /// that it was joined to.
+    fn improve_at(
+        &mut self,
+        at: usize,
+        neighbours: &[Vec<End>],
+        position: &[usize],
+        cost: &TransitCost,
+    ) -> Option<usize> {
+        let (entry, exit) = (self.entries[at], other(self.entries[at]));
+        let transits = [(entry, self.into_position(at, entry, cost)), (exit, self.out_of(at, exit, cost))];
+        for (end, transit) in transits {
+            // A gain needs a new transit that is shorter than the one it replaces (Lin and Kernighan 1973).
+            for &near in neighbours[end].iter().take_while(|&&near| cost.between(end, near) < transit) {
+                let there = position[near / 2];
+                if self.reverse_to_join(at, there, cost) || self.move_run(at, there, cost) {
+                    return Some(near / 2);
+                }
+            }
+        }
+        None
+    }
+
+    /// 2-opt: reverses what lies between two positions, or from the one to an end of the flight, if that gains.
+    fn reverse_to_join(&mut self, a: usize, b: usize, cost: &TransitCost) -> bool {
+        let (low, high) = (a.min(b), a.max(b));
+        let last = self.entries.len() - 1;
+        let between = [(low, high), (low + 1, high), (low, high.saturating_sub(1))];
+        let to_an_end = [(low + 1, last), (high, last), (0, low), (0, high.saturating_sub(1))];
+        for (from, to) in between.into_iter().chain(to_an_end) {
+            if from > to || to > last {
+                continue;
+            }
+            let before =
+                self.into_position(from, self.entries[from], cost) + self.out_of(to, other(self.entries[to]), cost);
+            let after =
+                self.into_position(from, other(self.entries[to]), cost) + self.out_of(to, self.entries[from], cost);
+            if after < before - GAIN {
+                reverse(&mut self.entries[from..=to]);
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Or-opt: moves a run of strokes that begins or ends at `at` to before or behind `there`, either way round, if that gains.
+    fn move_run(&mut self, at: usize, there: usize, cost: &TransitCost) -> bool {
+        let count = self.entries.len();
+        for length in 1..=RUN.min(count.saturating_sub(1)) {
+            for from in [at, (at + 1).saturating_sub(length)] {
+                let to = from + length;
+                if to > count {
+                    continue;
+                }
+                let (first, last) = (self.entries[from], other(self.entries[to - 1]));
+                let closed = self.entries.get(to).map_or(0.0, |&next| self.into_position(from, next, cost));
+                let removed = self.into_position(from, first, cost) + self.out_of(to - 1, last, cost) - closed;
+                for slot in [there, there + 1].into_iter().filter(|slot| !(from..=to).contains(slot)) {
+                    let open = removed + self.gap(slot, cost) - GAIN;
+                    for (turned, first, last) in [(false, first, last), (true, last, first)] {
+                        let out = self.entries.get(slot).map_or(0.0, |&next| cost.between(last, next));
+                        if self.into_position(slot, first, cost) + out < open {
+                            self.shift(from, to, slot, turned);
+                            return true;
+                        }
+                    }
+                }
+            }
+        }
+        false
+    }
+
+    /// Moves the strokes `from..to` to before the one that is at `slot` now.
+    fn shift(&mut self, from: usize, to: usize, slot: usize, turned: bool) {
+        let length = to - from;
+        let at = if slot < from {
+            self.entries[slot..to].rotate_right(length);
+            slot
+        } else {
+            self.entries[from..slot].rotate_left(length);
+            slot - length
+        };
+        if turned {
+            reverse(&mut self.entries[at..at + length]);
+        }
+    }
+
+    /// Seconds of the transit before position `slot`; 0 behind the last stroke.
+    fn gap(&self, slot: usize, cost: &TransitCost) -> f64 {
+        self.entries.get(slot).map_or(0.0, |&entry| self.into_position(slot, entry, cost))
+    }
+
+    /// Seconds from what lies before a position to an end.
+    fn into_position(&self, position: usize, end: End, cost: &TransitCost) -> f64 {
+        match position.checked_sub(1) {
+            Some(before) => cost.between(other(self.entries[before]), end),
+            None => cost.first(end),
+        }
+    }
+
+    /// Seconds from an end to what lies behind a position.
+    fn out_of(&self, position: usize, end: End, cost: &TransitCost) -> f64 {
+        self.entries.get(position + 1).map_or(0.0, |&next| cost.between(end, next))
+    }
+}
+
+/// The other way round: last stroke first, each entered where it was left.
+fn reverse(run: &mut [End]) {
+    run.reverse();
+    for end in run {
+        *end = other(*end);
+    }
+}
+
+/// Position of every stroke.
+fn locate(entries: &[End], position: &mut [usize]) {
+    for (at, end) in entries.iter().enumerate() {
+        position[end / 2] = at;
+    }
+}
+
+/// The nearest ends of other strokes, nearest first.
+fn neighbours(cost: &TransitCost) -> Vec<Vec<End>> {
+    let ends = 2 * cost.strokes();
+    let of = |end: End| {
+        let mut near: Vec<(f64, End)> =
+            (0..ends).filter(|other| other / 2 != end / 2).map(|other| (cost.between(end, other), other)).collect();
+        let order = |a: &(f64, End), b: &(f64, End)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+        if near.len() > NEIGHBOURS {
+            near.select_nth_unstable_by(NEIGHBOURS, order);
+            near.truncate(NEIGHBOURS);
+        }
+        near.sort_unstable_by(order);
+        near.into_iter().map(|(_, end)| end).collect()
+    };
+    (0..ends).map(of).collect()
+}

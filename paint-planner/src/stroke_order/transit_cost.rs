@@ -1,0 +1,87 @@
+//! Estimated duration of a transit between two ends of strokes.
+
+use super::StrokeEnds;
+use crate::angle::wrap;
+use crate::settings::{Settings, TimingPolicy, TimingSettings};
+use crate::target::Target;
+use crate::timing::rest_to_rest;
+use nalgebra::Point3;
+
+/// Length of a unit normal seen from above below which it gives no heading.
+const MIN_LEVEL_NORMAL: f64 = 0.3;
+
+/// An end of a stroke: `2 k` where stroke `k` begins as drawn, `2 k + 1` where it ends.
+pub(super) type End = usize;
+
+/// The end at the other side of the same stroke.
+pub(super) fn other(end: End) -> End {
+    end ^ 1
+}
+
+/// Where the nozzle is at an end, and the way the surface faces there seen from above.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    nozzle: Point3<f64>,
+    /// Azimuth of the normal; `None` on floors and ceilings, where any heading will do.
+    facing: Option<f64>,
+}
+
+/// Durations between all ends, symmetric.
+pub(super) struct TransitCost {
+    places: Vec<Place>,
+    from: Option<Place>,
+    timing: TimingSettings,
+    break_length: f64,
+}
+
+impl TransitCost {
+    pub(super) fn new(strokes: &[StrokeEnds], from: Option<&Target>, settings: &Settings) -> Self {
+        let place = |target: &Target| {
+            let level = target.normal.xy();
+            Place {
+                nozzle: target.point + target.normal.into_inner() * settings.nozzle.stand_off,
+                facing: (level.norm() > MIN_LEVEL_NORMAL).then(|| level.y.atan2(level.x)),
+            }
+        };
+        Self {
+            places: strokes.iter().flat_map(|stroke| [place(&stroke.first), place(&stroke.last)]).collect(),
+            from: from.map(place),
+            timing: settings.timing.clone(),
+            break_length: settings.break_length,
+        }
+    }
+
+    /// Number of strokes.
+    pub(super) fn strokes(&self) -> usize {
+        self.places.len() / 2
+    }
+
+    /// Whether the flight has a place that it comes from.
+    pub(super) fn has_start(&self) -> bool {
+        self.from.is_some()
+    }
+
+    /// Seconds between two ends.
+    pub(super) fn between(&self, a: End, b: End) -> f64 {
+        self.duration(&self.places[a], &self.places[b])
+    }
+
+    /// Seconds to the first end of a flight; 0 where it may begin anywhere.
+    pub(super) fn first(&self, end: End) -> f64 {
+        self.from.map_or(0.0, |from| self.duration(&from, &self.places[end]))
+    }
+
+    fn duration(&self, a: &Place, b: &Place) -> f64 {
+        let travel = (b.nozzle - a.nozzle).norm();
+        let turn = a.facing.zip(b.facing).map_or(0.0, |(a, b)| wrap(b - a).abs());
+        if travel <= self.break_length {
+            // No flight of its own: the stroke goes on with the valve shut.
+            let speed = match self.timing.policy {
+                TimingPolicy::Uniform { speed } => speed.min(self.timing.max_speed),
+                TimingPolicy::GradientPreserving => self.timing.max_speed,
+            };
+            return (travel / speed).max(turn / self.timing.max_heading_rate);
+        }
+        rest_to_rest(travel, turn, &self.timing)
+    }
+}
