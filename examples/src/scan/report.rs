@@ -47,7 +47,8 @@ pub struct ScanReport {
     /// Processor time of tracking a frame, ray cast included, median.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracking_cpu_ms_median: Option<f64>,
-    /// Position error of the tracked poses against those recorded, rigidly aligned, root mean square.
+    /// Position error of the tracked poses against those recorded, rigidly aligned, root mean square; absent where there are no three, or all lie
+    /// on one line.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ate_se3_rmse_m: Option<f64>,
     /// Edge of a voxel.

@@ -283,7 +283,7 @@ impl<'a> Run<'a> {
         self.metrics.mesh_s = start.elapsed().as_secs_f64();
         stage.done(&format!("{} vertices, {} triangles", mesh.positions.len(), mesh.faces.len()));
         if let Some(odometry) = self.odometry {
-            self.metrics.ate_se3_rmse = tracked_error(self.sequence, &self.fused)?;
+            self.metrics.ate_se3_rmse = tracked_error(self.sequence, &self.fused);
             self.metrics.tracking = Some(odometry.metrics);
         }
         let (device, map) = (self.store.device(), self.store.into_map()?);
@@ -300,14 +300,11 @@ fn given_pose(frame: &FrameFiles) -> Result<Isometry3<f64>, ScanError> {
     }))
 }
 
-/// Of the frames that have a recorded pose; `None` below three.
-fn tracked_error(sequence: &Sequence, fused: &[(usize, Isometry3<f64>)]) -> Result<Option<f64>, ScanError> {
+/// Of the frames that have a recorded pose; `None` where these do not fix an alignment: below three, or on one line.
+fn tracked_error(sequence: &Sequence, fused: &[(usize, Isometry3<f64>)]) -> Option<f64> {
     let recorded = |(index, pose): &(usize, Isometry3<f64>)| Some((sequence.frames[*index].world_from_camera?, *pose));
     let (given, tracked): (Vec<_>, Vec<_>) = fused.iter().filter_map(recorded).unzip();
-    if given.len() < 3 {
-        return Ok(None);
-    }
-    Ok(Some(ate(&given, &tracked, Alignment::Se3)?.position.rmse))
+    ate(&given, &tracked, Alignment::Se3).ok().map(|found| found.position.rmse)
 }
 
 /// The map that the run starts with, and what an earlier run had done.

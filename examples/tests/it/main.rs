@@ -12,4 +12,5 @@ mod recorded;
 mod scan_flight;
 mod scratch;
 mod sequences;
+mod strange_recordings;
 mod vio;

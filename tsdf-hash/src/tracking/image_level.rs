@@ -59,10 +59,14 @@ impl ImageLevel {
             least.fill(0.0);
             for row in rows.chunks_exact(w) {
                 for (least, cell) in least.iter_mut().zip(row.chunks_exact(factor)) {
-                    cell.iter().for_each(|&omega| *least = if omega > *least { omega } else { *least });
+                    for &omega in cell {
+                        *least = if omega > *least { omega } else { *least };
+                    }
                 }
             }
-            least.iter_mut().for_each(|nearest| *nearest = of_nearest(*nearest, steepest));
+            for nearest in &mut least {
+                *nearest = of_nearest(*nearest, steepest);
+            }
             sum.fill(0.0);
             count.fill(0.0);
             for row in rows.chunks_exact(w) {

@@ -225,7 +225,7 @@ impl<'a> Task<'a> {
         run.add([turn[0], turn[1], turn[2], normal[0], normal[1], normal[2]], residual, weight);
 
         if self.of.photometric && !point.intensity.is_nan() {
-            self.add_intensity(point, arm, [x, y, inverse], [u, v], run, sums, all);
+            self.add_intensity(point, arm, [x, y, inverse, u, v], run, sums, all);
         }
     }
 
@@ -234,8 +234,7 @@ impl<'a> Task<'a> {
         &self,
         point: &ModelPoint,
         arm: [f32; 3],
-        [x, y, inverse]: [f32; 3],
-        [u, v]: [f32; 2],
+        [x, y, inverse, u, v]: [f32; 5],
         run: &mut Run,
         sums: &mut Sums,
         all: &mut Evaluation,

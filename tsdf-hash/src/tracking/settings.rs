@@ -9,9 +9,9 @@ use crate::settings::NoiseModel;
 pub struct TrackingSettings {
     /// Pixels in a row of the finest level, about (ours: 160): squares of whole pixels of the depth image are averaged to reach it.
     pub columns: usize,
-    /// Most iterations per level, coarse to fine; each level halves the pixels along each side (KinectFusion: 10, 5, 4).
+    /// Most iterations per level, coarse to fine; each level halves the pixels along each side (as in Newcombe et al. 2011: 10, 5, 4).
     pub iterations: [usize; 3],
-    /// Points of the model farther than this from the measured point are not its partners, metres (KinectFusion: 0.1).
+    /// Points of the model farther than this from the measured point are not its partners, metres (as there: 0.1).
     pub max_distance: f64,
     /// Whether intensities take part, where there is colour (Eq. (5.3)).
     pub photometric: bool,
