@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 use std::time::Instant;
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
 use paint_net::{Image, Painting};
 use paint_sim::Film;
 use paint_sim::flight::FlightSample;
-use ptu_kinematics::{Joints, Ptu};
+use ptu_kinematics::Ptu;
 
 use super::decide::decide;
 use super::error::MissionError;
@@ -63,7 +63,8 @@ impl Mission {
 
         let coverage = surface.coverage();
         // Nothing is wanted beside the surface, and no more than the paint can show.
-        let mut wanted = design.on_surface(&surface, mesh)?.map(|ink| ink.min(appearance.ink().max_ink()));
+        let wanted = design.on_surface(&surface, mesh, &settings.placement, settings.viewpoint)?;
+        let mut wanted = wanted.map(|ink| ink.min(appearance.ink().max_ink()));
         for (ink, covered) in wanted.data_mut().iter_mut().zip(coverage.data()) {
             *ink *= covered;
         }
@@ -134,10 +135,17 @@ impl Mission {
         if wanted > 0.0 { (1.0 - planned / wanted).max(0.0) } else { 0.0 }
     }
 
-    /// The pose of the nozzle at a sample: x along the spray.
-    pub(super) fn nozzle_pose(&self, sample: &FlightSample) -> Isometry3<f64> {
-        let joints = Joints { pan: sample.pan_tilt[0], tilt: sample.pan_tilt[1] };
-        self.robot.chain.world_from_nozzle(&sample.world_from_body, joints)
+    /// The arm at a sample: pan in the body's frame, tilt in pan's, the nozzle in tilt's (x along the spray).
+    pub(super) fn arm(&self, sample: &FlightSample) -> [Isometry3<f64>; 3] {
+        let ptu = self.robot.chain.settings();
+        let [pan, tilt] = sample.pan_tilt;
+        // Up is against a turn about y, which points left.
+        let raised = |angle: f64| Vector3::y() * -angle;
+        [
+            Isometry3::new(ptu.body_from_pan_axis, Vector3::z() * pan),
+            Isometry3::new(ptu.pan_from_tilt_axis, raised(tilt)),
+            Isometry3::new(ptu.tilt_from_tip, raised(ptu.gun_pitch)),
+        ]
     }
 }
 
