@@ -1,19 +1,27 @@
 //! Maps a recorded RGB-D sequence: reads it frame by frame, fuses it, and shows what became of it.
 
+mod checkpoint;
 mod decode;
 mod error;
 mod layouts;
 mod map_store;
+mod options;
+mod pose_source;
+mod quality;
 mod report;
 mod run;
 mod sequence;
 mod views;
 
+pub use checkpoint::CheckpointSettings;
 pub use decode::{Colour, Images};
 pub use error::{ScanError, SequenceError};
 pub use layouts::open_sequence;
 pub use map_store::Device;
+pub use options::{FrameRange, in_options, mebibytes, parse_intrinsics, parse_noise, read_colour_camera};
+pub use pose_source::{PoseSource, TrackingMetrics};
+pub use quality::Quality;
 pub use report::ScanReport;
 pub use run::{RayCastCheck, Scan, ScanMetrics, ScanSettings};
-pub use sequence::{FrameFiles, Sequence};
+pub use sequence::{ColourCamera, FrameFiles, Sequence};
 pub use views::save_views;

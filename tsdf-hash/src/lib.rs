@@ -74,6 +74,7 @@ mod report;
 mod rounding;
 mod settings;
 mod storage;
+mod tracking;
 mod tsdf_layer;
 
 /// The recipe of the README, as a test.
@@ -108,4 +109,7 @@ pub use report::{FrameReport, MemoryUsage};
 pub use settings::{MemoryLimits, NoiseModel, Settings};
 pub use storage::merge_policy::{MergeDecision, MergeImmediately, MergePolicy};
 pub use storage::reloaded::ReloadedBlocks;
+pub use tracking::outcome::{PosePrior, TrackingOutcome, TrackingStatus};
+pub use tracking::settings::TrackingSettings;
+pub use tracking::tracker::Tracker;
 pub use tsdf_layer::{BlockReader, TsdfLayer};

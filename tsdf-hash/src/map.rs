@@ -193,6 +193,7 @@ impl Map {
         Ok(FrameReport {
             valid_pixels: self.plane_image.valid,
             fused_pixels: self.plane_image.fused,
+            filled_pixels: self.plane_image.filled,
             voxels: change.voxels,
             blocks: change.blocks,
             blocks_added: change.added,

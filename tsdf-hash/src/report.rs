@@ -5,8 +5,11 @@
 pub struct FrameReport {
     /// Pixels with a depth between `min_depth` and `max_depth`.
     pub valid_pixels: usize,
-    /// Those of them on smooth patches, seen not too steeply: the ones that are fused.
+    /// Those of them that lie on a surface, seen not too steeply: the ones that are fused.
     pub fused_pixels: usize,
+    /// Gaps of one pixel that were filled from their neighbours and fused, as depth registered to another camera has them;
+    /// not among the valid ones.
+    pub filled_pixels: usize,
     /// Voxels that were updated.
     pub voxels: usize,
     /// Blocks with such voxels.

@@ -1,14 +1,17 @@
-//! Maps a recorded RGB-D sequence: depth and colour images with poses become a map and a mesh.
+//! Maps a recorded RGB-D sequence: depth and colour images, with poses or without, become a map and a mesh.
 
-use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::{Parser, ValueEnum};
 use paintcopter_examples::mesh_io::{PlyMesh, write_ply};
 use paintcopter_examples::report::save_figures;
-use paintcopter_examples::scan::{Device, Scan, ScanReport, ScanSettings, open_sequence, save_views};
-use tsdf_hash::MemoryLimits;
+use paintcopter_examples::scan::{
+    CheckpointSettings, Device, FrameRange, PoseSource, Scan, ScanReport, ScanSettings, Sequence, in_options,
+    mebibytes, open_sequence, parse_intrinsics, parse_noise, read_colour_camera, save_views,
+};
+use tsdf_hash::{Intrinsics, MemoryLimits, NoiseModel};
 
 /// Maps a recorded RGB-D sequence into a voxel-hashed distance field and its mesh.
 #[derive(Parser)]
@@ -23,6 +26,19 @@ struct Arguments {
     /// Edge of a voxel, metres
     #[arg(long, value_name = "METRES", default_value_t = 0.01)]
     voxel: f64,
+    /// Only these frames of the sequence, counted from 0; B is not included
+    #[arg(long, value_name = "A..B:STEP", value_parser = FrameRange::parse)]
+    frames: Option<FrameRange>,
+    /// Camera of the depth images, pixels [default: what the recording says]
+    #[arg(long, value_name = "FX,FY,CX,CY", value_parser = parse_intrinsics, allow_hyphen_values = true)]
+    intrinsics: Option<Intrinsics>,
+    /// Where the colour camera stands, if the images are not registered: the 4x4 matrix depth_from_colour, then, if it is another camera,
+    /// fx fy cx cy
+    #[arg(long, value_name = "FILE")]
+    depth_from_colour: Option<PathBuf>,
+    /// Noise of the depth camera, BASE + QUADRATIC (z - NEAREST)^2 metres
+    #[arg(long, value_name = "BASE,QUADRATIC,NEAREST", value_parser = parse_noise, default_value = "0.0012,0.0019,0.4")]
+    noise: NoiseModel,
     /// Units of the depth images per metre [default: the layout's]
     #[arg(long, value_name = "UNITS")]
     depth_scale: Option<f64>,
@@ -32,7 +48,8 @@ struct Arguments {
     /// How far in front of a surface space counts as free, metres: what has moved away is carved out of the map
     #[arg(long, value_name = "METRES", default_value_t = 0.0)]
     carve: f64,
-    /// A stored map to go on from; its voxel size, carving and depth range take the place of those given here
+    /// A stored map to go on from; its voxel size, carving, noise and depth range take the place of those given here. Frames of this
+    /// sequence that it holds already are not fused again
     #[arg(long, value_name = "MAP")]
     resume: Option<PathBuf>,
     /// What keeps the map
@@ -47,6 +64,9 @@ struct Arguments {
     /// Cap of the disk tier, MiB, a file in the folder for the results while the program runs; 0: none
     #[arg(long, value_name = "MIB", default_value_t = 0, requires = "host_mib")]
     disk_mib: u64,
+    /// Seconds between two times that the map is saved on the way, to be gone on from with --resume after a crash; 0: never
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
+    checkpoint: f64,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/scan")]
     out: PathBuf,
@@ -59,6 +79,8 @@ struct Arguments {
 enum Poses {
     /// As recorded with the sequence
     Given,
+    /// Found by the tracker, from the first recorded pose, or from the origin
+    Tracked,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -75,29 +97,26 @@ fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("scan: {error}");
+            eprintln!("scan: {}", in_options(&error.to_string()));
             ExitCode::FAILURE
         }
     }
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
-    let Poses::Given = arguments.poses;
     let folder = &arguments.out;
-    std::fs::create_dir_all(folder)
-        .map_err(|e| format!("{}: cannot be created ({e}): choose another --out", folder.display()))?;
-    let mut sequence = open_sequence(&arguments.sequence)?;
-    if let Some(scale) = arguments.depth_scale {
-        sequence.depth_scale = scale;
-    }
+    prepare(folder)?;
+    let sequence = sequence(arguments)?;
     eprintln!("{}: {} layout, {} frames", arguments.sequence.display(), sequence.layout, sequence.frames.len());
-    let settings = settings(arguments);
+    eprintln!("{:28} {}", "camera", sequence.description());
+    let settings = settings(arguments)?;
     let scan = Scan::run(&arguments.sequence, &sequence, &settings)?;
     for (_, why) in &scan.skipped {
-        eprintln!("left out: {why}");
+        eprintln!("left out: {}", in_options(why));
     }
-    save_views(&scan, &sequence, folder, settings.map.threads)?;
-    scan.map.save(&folder.join("map.tsdf"), Some(&scan.mesh), &BTreeMap::new())?;
+    // What cannot be made again comes first, pictures last.
+    let map = folder.join("map.tsdf");
+    scan.map.save(&map, Some(&scan.mesh), &scan.metadata(&arguments.sequence, &sequence))?;
     let ply = folder.join("mesh.ply");
     let tsdf_hash::Mesh { positions, normals, colours, faces, .. } = &scan.mesh;
     write_ply(&ply, &PlyMesh { positions, normals: Some(normals), colours, faces })
@@ -105,24 +124,63 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let tum = folder.join("trajectory.tum");
     std::fs::write(&tum, vio_ekf::tum::write(&scan.trajectory))
         .map_err(|e| format!("{}: cannot be written ({e})", tum.display()))?;
+    save_views(&scan, &sequence, folder, settings.map.threads)?;
     // Last, so that its presence means the folder is complete.
-    save_figures(&ScanReport::new(&scan), folder)?;
+    save_figures(&ScanReport::new(&scan, &sequence), folder)?;
     println!("{}", folder.join("mesh.ply").display());
+    scan.verdict(&sequence)?;
     Ok(())
 }
 
-fn settings(arguments: &Arguments) -> ScanSettings {
+/// Makes the folder, and tries it before any work is done.
+fn prepare(folder: &Path) -> Result<(), String> {
+    let refuse = |e: std::io::Error| format!("{}: cannot be written to ({e}): choose another --out", folder.display());
+    std::fs::create_dir_all(folder).map_err(refuse)?;
+    let probe = folder.join(".tried");
+    std::fs::write(&probe, b"").map_err(refuse)?;
+    std::fs::remove_file(&probe).map_err(refuse)?;
+    // A report of an earlier run would say that this one is complete.
+    match std::fs::remove_file(folder.join("report.json")) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(refuse(e)),
+        _ => Ok(()),
+    }
+}
+
+/// The recording, with what the command line knows better.
+fn sequence(arguments: &Arguments) -> Result<Sequence, Box<dyn std::error::Error>> {
+    let mut sequence = open_sequence(&arguments.sequence)?;
+    if let Some(scale) = arguments.depth_scale {
+        (sequence.depth_scale, sequence.scale_origin) = (scale, "--depth-scale".into());
+    }
+    if let Some(intrinsics) = arguments.intrinsics {
+        (sequence.intrinsics, sequence.camera_origin) = (intrinsics, "--intrinsics".into());
+    }
+    if let Some(path) = &arguments.depth_from_colour {
+        sequence.colour_camera = Some(read_colour_camera(path)?);
+    }
+    if let Some(range) = &arguments.frames {
+        let listed = sequence.frames.len();
+        sequence.frames = range.of(sequence.frames);
+        if sequence.frames.is_empty() {
+            return Err(format!("--frames: the sequence has {listed} frames, none of them is meant").into());
+        }
+    }
+    Ok(sequence)
+}
+
+fn settings(arguments: &Arguments) -> Result<ScanSettings, String> {
     let threads = arguments.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
     let memory = MemoryLimits {
-        host_bytes: arguments.host_mib << 20,
-        disk_bytes: arguments.disk_mib << 20,
+        host_bytes: mebibytes("--host-mib", arguments.host_mib)?,
+        disk_bytes: mebibytes("--disk-mib", usize::try_from(arguments.disk_mib).unwrap_or(usize::MAX))? as u64,
         ..MemoryLimits::default()
     };
     let map = tsdf_hash::Settings {
         voxel_size: arguments.voxel,
         max_depth: arguments.max_depth,
         carve: arguments.carve,
-        max_bytes: arguments.active_mib << 20,
+        max_bytes: mebibytes("--active-mib", arguments.active_mib)?,
+        noise: arguments.noise,
         threads: threads.clamp(1, 1024),
         memory,
         ..tsdf_hash::Settings::default()
@@ -134,5 +192,14 @@ fn settings(arguments: &Arguments) -> ScanSettings {
         DeviceName::Auto | DeviceName::Cpu => Device::Cpu,
     };
     let swap = (arguments.disk_mib > 0).then(|| arguments.out.join("map.swap"));
-    ScanSettings { map, device, swap, resume: arguments.resume.clone(), ..ScanSettings::default() }
+    let poses = match arguments.poses {
+        Poses::Given => PoseSource::Given,
+        Poses::Tracked => PoseSource::Tracked,
+    };
+    let interval = Duration::try_from_secs_f64(arguments.checkpoint)
+        .map_err(|e| format!("--checkpoint {}: {e}", arguments.checkpoint))?;
+    let checkpoint =
+        (!interval.is_zero()).then(|| CheckpointSettings { path: arguments.out.join("map.tsdf"), interval });
+    let resume = arguments.resume.clone();
+    Ok(ScanSettings { map, poses, device, swap, resume, checkpoint, ..ScanSettings::default() })
 }

@@ -73,6 +73,31 @@ pub enum ScanError {
     /// A device was asked for that this program was built without.
     #[error("--device gpu: this program was built without it: build with --features gpu, or use --device cpu")]
     NoGpu,
+    /// A frame is not what the camera takes.
+    #[error("the depth image is {found} pixels, the camera's are {expected}: its camera is not known")]
+    OtherSize {
+        /// Width x height of this image.
+        found: String,
+        /// Width x height of the camera's images.
+        expected: String,
+    },
+    /// No pose was recorded, and none is tracked.
+    #[error("{0}")]
+    NoPose(&'static str),
+    /// Tracking did not find the camera.
+    #[error("the camera is lost: {0}")]
+    Lost(String),
+    /// Less than half of the work was done.
+    #[error("{0}")]
+    Unusable(String),
+    /// A checkpoint cannot be used.
+    #[error("{path}: {why}")]
+    Checkpoint {
+        /// The file.
+        path: String,
+        /// What is wrong with it.
+        why: String,
+    },
     /// No frame could be fused.
     #[error("{folder}: none of the {frames} frames could be fused; the first: {first}")]
     NothingFused {

@@ -7,14 +7,14 @@
 //! | ICL-NUIM | `depth/N.png`, `color/N.png` | `pose.txt`, `x y z qx qy qz qw` | 5000 | 481.2, -480, 319.5, 239.5 |
 //! | Redwood | `depth/`, `color/` | `trajectory.log`, 4x4 | 1000 | the JSON file, else 525, 525, 319.5, 239.5 |
 //!
-//! All poses are `world_from_camera`. `intrinsics.txt` is one line, `width height fx fy cx cy units_per_metre`.
+//! All poses are `world_from_camera`; one with a number that is not finite means that the recorder had lost the camera. `intrinsics.txt` is one line, `width height fx fy cx cy units_per_metre`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 use tsdf_hash::Intrinsics;
-use vio_ekf::{Stamp, tum as tum_format};
+use vio_ekf::{Stamp, Trajectory, tum as tum_format};
 
 use super::error::SequenceError;
 use super::sequence::{FrameFiles, Sequence};
@@ -72,27 +72,40 @@ fn seven_scenes(folder: &Path) -> Result<Option<Sequence>> {
         };
         let colour = [".color.jpg", ".color.png"].map(beside).into_iter().find(|path| path.is_file());
         let pose = beside(".pose.txt");
-        let world_from_camera = if pose.is_file() {
+        let (world_from_camera, lost) = if pose.is_file() {
             let values = numbers(&pose, &read(&pose)?)?;
-            Some(pose_of_matrix(&values).map_err(|why| SequenceError::malformed(&pose, 0, why))?)
+            let found = pose_of_matrix(&values).map_err(|why| SequenceError::malformed(&pose, 0, why))?;
+            (found, found.is_none())
         } else {
-            None
+            (None, false)
         };
-        frames.push(FrameFiles { stamp: number as f64 / RATE, depth: path, colour, world_from_camera });
+        frames.push(FrameFiles { stamp: number as f64 / RATE, depth: path, colour, world_from_camera, lost });
     }
-    Ok(Some(Sequence { layout: "7-Scenes", intrinsics, depth_scale: 1000.0, frames }))
+    Ok(Some(Sequence {
+        layout: "7-Scenes",
+        intrinsics,
+        camera_origin: "camera-intrinsics.txt".into(),
+        image_size: None,
+        depth_scale: 1000.0,
+        scale_origin: "as 7-Scenes has it".into(),
+        colour_camera: None,
+        frames,
+    }))
 }
 
 fn tum(folder: &Path) -> Result<Sequence> {
-    let (intrinsics, depth_scale) = match folder.join("intrinsics.txt") {
+    let file = "intrinsics.txt";
+    let (intrinsics, image_size, depth_scale, origin) = match folder.join(file) {
         path if path.is_file() => match numbers(&path, &read(&path)?)?[..] {
-            [_, _, fx, fy, cx, cy, scale] => (Intrinsics { fx, fy, cx, cy }, scale),
+            [width, height, fx, fy, cx, cy, scale] => {
+                (Intrinsics { fx, fy, cx, cy }, Some([width as usize, height as usize]), scale, file)
+            }
             ref other => {
                 let why = format!("expected width height fx fy cx cy units_per_metre, found {} numbers", other.len());
                 return Err(SequenceError::malformed(&path, 1, why));
             }
         },
-        _ => (USUAL_CAMERA, 5000.0),
+        _ => (USUAL_CAMERA, None, 5000.0, "assumed: there is no intrinsics.txt"),
     };
     let depth = listed(&folder.join("depth.txt"))?;
     let colour = match folder.join("rgb.txt") {
@@ -100,19 +113,18 @@ fn tum(folder: &Path) -> Result<Sequence> {
         _ => Vec::new(),
     };
     let truth = match folder.join("groundtruth.txt") {
-        path if path.is_file() => {
-            Some(tum_format::read(&read(&path)?).map_err(|e| SequenceError::malformed(&path, 0, e.to_string()))?)
-        }
-        _ => None,
+        path if path.is_file() => tum_poses(&path)?,
+        _ => TumPoses::default(),
     };
     let mut frames = Vec::with_capacity(depth.len());
     for (stamp, path) in depth {
         let after = colour.partition_point(|(t, _)| *t < stamp);
         let near = [after.checked_sub(1), Some(after)].into_iter().flatten().filter_map(|k| colour.get(k));
         let nearest = near.min_by(|a, b| (a.0 - stamp).abs().total_cmp(&(b.0 - stamp).abs()));
-        let world_from_camera = match (&truth, Stamp::from_secs(stamp)) {
+        let lost = truth.is_lost(stamp);
+        let world_from_camera = match (&truth.found, Stamp::from_secs(stamp)) {
             // Outside the recorded poses there is none.
-            (Some(truth), Ok(at)) => truth.pose_at(at).ok(),
+            (Some(found), Ok(at)) if !lost => found.pose_at(at).ok(),
             _ => None,
         };
         frames.push(FrameFiles {
@@ -120,9 +132,57 @@ fn tum(folder: &Path) -> Result<Sequence> {
             depth: path,
             colour: nearest.filter(|(t, _)| (t - stamp).abs() <= NEAREST).map(|(_, path)| path.clone()),
             world_from_camera,
+            lost,
         });
     }
-    Ok(Sequence { layout: "TUM", intrinsics, depth_scale, frames })
+    Ok(Sequence {
+        layout: "TUM",
+        intrinsics,
+        camera_origin: origin.into(),
+        image_size,
+        depth_scale,
+        scale_origin: origin.into(),
+        colour_camera: None,
+        frames,
+    })
+}
+
+/// The rows of a file of poses.
+#[derive(Default)]
+struct TumPoses {
+    found: Option<Trajectory>,
+    /// Stamps of the rows that are poses, and of those that are not.
+    stamps: [Vec<f64>; 2],
+}
+
+impl TumPoses {
+    /// Whether the row nearest to a stamp is no pose.
+    fn is_lost(&self, stamp: f64) -> bool {
+        let [found, lost] = [0, 1].map(|k| {
+            let apart = self.stamps[k].iter().map(|t| (t - stamp).abs());
+            apart.fold(f64::INFINITY, f64::min)
+        });
+        lost < found
+    }
+}
+
+fn tum_poses(path: &Path) -> Result<TumPoses> {
+    let (mut poses, mut rows) = (TumPoses::default(), String::new());
+    for line in read(path)?.lines() {
+        let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+        let lost = numbers.len() == 8 && numbers[1..].iter().any(|x| !x.is_finite());
+        if let Some(&stamp) = numbers.first() {
+            poses.stamps[usize::from(lost)].push(stamp);
+        }
+        // A row that is left out stays as an empty line, so that errors name the right one.
+        rows.push_str(if lost { "" } else { line });
+        rows.push('\n');
+    }
+    if poses.stamps[0].is_empty() && !poses.stamps[1].is_empty() {
+        return Ok(poses);
+    }
+    poses.found = Some(tum_format::read(&rows).map_err(|e| SequenceError::malformed(path, 0, e.to_string()))?);
+    Ok(poses)
 }
 
 fn icl(folder: &Path) -> Result<Sequence> {
@@ -135,14 +195,27 @@ fn icl(folder: &Path) -> Result<Sequence> {
         let [x, y, z, i, j, k, w] = v[..] else {
             return Err(refuse(format!("expected x y z qx qy qz qw, found {} numbers", v.len())));
         };
+        if !v.iter().all(|x| x.is_finite()) {
+            poses.push(None);
+            continue;
+        }
         let q = Quaternion::new(w, i, j, k);
         if !(0.99..=1.01).contains(&q.norm()) {
             return Err(refuse(format!("the quaternion has length {}, not 1", q.norm())));
         }
-        poses.push(Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_quaternion(q)));
+        poses.push(Some(Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_quaternion(q))));
     }
     let frames = in_folders(folder, &poses)?;
-    Ok(Sequence { layout: "ICL-NUIM", intrinsics: ICL_CAMERA, depth_scale: 5000.0, frames })
+    Ok(Sequence {
+        layout: "ICL-NUIM",
+        intrinsics: ICL_CAMERA,
+        camera_origin: "as ICL-NUIM publishes it".into(),
+        image_size: None,
+        depth_scale: 5000.0,
+        scale_origin: "as ICL-NUIM has it".into(),
+        colour_camera: None,
+        frames,
+    })
 }
 
 fn redwood(folder: &Path) -> Result<Sequence> {
@@ -155,12 +228,24 @@ fn redwood(folder: &Path) -> Result<Sequence> {
         poses.push(pose.map_err(|why| SequenceError::malformed(&path, 5 * index + 1, why))?);
     }
     let camera = folder.join("camera_primesense.json");
-    let intrinsics = if camera.is_file() { json_camera(&camera)? } else { USUAL_CAMERA };
-    Ok(Sequence { layout: "Redwood", intrinsics, depth_scale: 1000.0, frames: in_folders(folder, &poses)? })
+    let (intrinsics, origin) = match camera.is_file() {
+        true => (json_camera(&camera)?, "camera_primesense.json"),
+        false => (USUAL_CAMERA, "assumed: there is no camera_primesense.json"),
+    };
+    Ok(Sequence {
+        layout: "Redwood",
+        intrinsics,
+        camera_origin: origin.into(),
+        image_size: None,
+        depth_scale: 1000.0,
+        scale_origin: "as Redwood has it".into(),
+        colour_camera: None,
+        frames: in_folders(folder, &poses)?,
+    })
 }
 
 /// Frames from `depth/N.png` and `color/N.{png,jpg}`, with the poses in the same order.
-fn in_folders(folder: &Path, poses: &[Isometry3<f64>]) -> Result<Vec<FrameFiles>> {
+fn in_folders(folder: &Path, poses: &[Option<Isometry3<f64>>]) -> Result<Vec<FrameFiles>> {
     let depth = numbered(&folder.join("depth"), |name| name.strip_suffix(".png"))?;
     let colour_folder = folder.join("color");
     let mut frames = Vec::with_capacity(depth.len());
@@ -171,7 +256,8 @@ fn in_folders(folder: &Path, poses: &[Isometry3<f64>]) -> Result<Vec<FrameFiles>
             stamp: index as f64 / RATE,
             depth: path,
             colour: colour.into_iter().find(|path| path.is_file()),
-            world_from_camera: poses.get(index).copied(),
+            world_from_camera: poses.get(index).copied().flatten(),
+            lost: poses.get(index).is_some_and(Option::is_none),
         });
     }
     Ok(frames)
@@ -213,7 +299,13 @@ fn listed(path: &Path) -> Result<Vec<(f64, PathBuf)>> {
 
 fn matrix_camera(path: &Path) -> Result<Intrinsics> {
     match numbers(path, &read(path)?)?[..] {
-        [fx, _, cx, _, fy, cy, _, _, _] => Ok(Intrinsics { fx, fy, cx, cy }),
+        [fx, _, cx, _, fy, cy, 0.0, 0.0, 1.0] => Ok(Intrinsics { fx, fy, cx, cy }),
+        [_, _, 0.0, _, _, 0.0, _, _, 1.0] => {
+            Err(SequenceError::malformed(path, 0, "the camera matrix is transposed: its last row must be 0 0 1"))
+        }
+        [_, _, _, _, _, _, _, _, _] => {
+            Err(SequenceError::malformed(path, 3, "the last row of the camera matrix must be 0 0 1"))
+        }
         ref other => Err(SequenceError::malformed(path, 0, format!("expected 3x3 numbers, found {}", other.len()))),
     }
 }
@@ -229,23 +321,21 @@ fn json_camera(path: &Path) -> Result<Intrinsics> {
     }
 }
 
-/// A rigid motion from 16 numbers, row by row.
-fn pose_of_matrix(values: &[f64]) -> std::result::Result<Isometry3<f64>, String> {
+/// A rigid motion from 16 numbers, row by row; `None` if one of them is not finite.
+fn pose_of_matrix(values: &[f64]) -> std::result::Result<Option<Isometry3<f64>>, String> {
     let Ok(m) = <[f64; 16]>::try_from(values) else {
         return Err(format!("expected 4x4 numbers, found {}", values.len()));
     };
+    if !m.iter().all(|x| x.is_finite()) {
+        return Ok(None);
+    }
     let rotation = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
     let error = (rotation * rotation.transpose() - Matrix3::identity()).norm();
-    // A comparison that a NaN fails.
-    if !(error < 1e-3 && rotation.determinant() > 0.0) {
+    if error > 1e-3 || rotation.determinant() < 0.0 {
         return Err("the upper left 3x3 is not a rotation".into());
     }
     let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&rotation));
-    let translation = Vector3::new(m[3], m[7], m[11]);
-    if !translation.iter().all(|x| x.is_finite()) {
-        return Err("the translation is not finite".into());
-    }
-    Ok(Isometry3::from_parts(translation.into(), rotation))
+    Ok(Some(Isometry3::from_parts(Vector3::new(m[3], m[7], m[11]).into(), rotation)))
 }
 
 fn read(path: &Path) -> Result<String> {

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::run::Scan;
+use super::sequence::Sequence;
 
 /// What `report.json` of a scan holds. Flat, SI units in the names; every number is finite.
 #[derive(Debug, Clone, Serialize)]
@@ -13,6 +14,42 @@ pub struct ScanReport {
     pub frames: usize,
     /// Frames that were left out.
     pub frames_skipped: usize,
+    /// Frames that a run before this one had fused or left out.
+    pub frames_resumed: usize,
+    /// Frames whose colour image could not be read.
+    pub frames_without_colour: usize,
+    /// `given` or `tracked`.
+    pub poses: &'static str,
+    /// Focal lengths and principal point of the depth camera, pixels.
+    pub camera_px: [f64; 4],
+    /// Where they are from.
+    pub camera_origin: String,
+    /// Units of the depth images per metre.
+    pub depth_units_per_m: f64,
+    /// Where that is from.
+    pub depth_scale_origin: String,
+    /// Share of the pixels with a depth in the range.
+    pub valid_share: f64,
+    /// Share of those that were fused.
+    pub fused_share: f64,
+    /// Gaps that were filled and fused, as a share of the valid pixels.
+    pub filled_share: f64,
+    /// Share of the depth that agrees with the map at the frame's pose before it is fused, median; absent where no frame sees what others
+    /// have seen, and for tracked poses.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub depth_agreement_median: Option<f64>,
+    /// Times that tracking lost the camera.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tracking_losses: Option<usize>,
+    /// Tracked frames that did not fix all six directions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tracking_degenerate_frames: Option<usize>,
+    /// Processor time of tracking a frame, ray cast included, median.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tracking_cpu_ms_median: Option<f64>,
+    /// Position error of the tracked poses against those recorded, rigidly aligned, root mean square.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ate_se3_rmse_m: Option<f64>,
     /// Edge of a voxel.
     pub voxel_m: f64,
     /// Processor time of one fusion, median.
@@ -54,13 +91,31 @@ pub struct ScanReport {
 
 impl ScanReport {
     /// The figures of a run.
-    pub fn new(scan: &Scan) -> Self {
+    pub fn new(scan: &Scan, sequence: &Sequence) -> Self {
         let (settings, metrics) = (scan.map.settings(), &scan.metrics);
+        let (quality, tracking) = (&metrics.quality, metrics.tracking.as_ref());
+        let share = |part: usize, whole: usize| part as f64 / whole.max(1) as f64;
+        let k = &sequence.intrinsics;
         let casts: Vec<f64> = metrics.ray_casts.iter().map(|cast| cast.seconds).collect();
         Self {
             version: env!("CARGO_PKG_VERSION"),
             frames: scan.fused.len(),
             frames_skipped: scan.skipped.len(),
+            frames_resumed: scan.resumed,
+            frames_without_colour: quality.without_colour,
+            poses: if tracking.is_some() { "tracked" } else { "given" },
+            camera_px: [k.fx, k.fy, k.cx, k.cy],
+            camera_origin: sequence.camera_origin.clone(),
+            depth_units_per_m: sequence.depth_scale,
+            depth_scale_origin: sequence.scale_origin.clone(),
+            valid_share: share(quality.valid, quality.pixels),
+            fused_share: quality.fused_share(),
+            filled_share: share(quality.filled, quality.valid),
+            depth_agreement_median: (!quality.agreement.is_empty()).then(|| quality.median_agreement()),
+            tracking_losses: tracking.map(|t| t.losses),
+            tracking_degenerate_frames: tracking.map(|t| t.degenerate),
+            tracking_cpu_ms_median: tracking.map(|t| 1e3 * median(&t.seconds)),
+            ate_se3_rmse_m: metrics.ate_se3_rmse,
             voxel_m: settings.voxel_size,
             integrate_cpu_ms_median: 1e3 * median(&metrics.integrate_s),
             raycast_cpu_ms_median: 1e3 * median(&casts),

@@ -5,12 +5,15 @@ use std::path::{Path, PathBuf};
 use cpu_time::ProcessTime;
 use nalgebra::Isometry3;
 use tsdf_hash::{IncrementalMesher, Map, MapFile, Mesh, RayCastSettings};
-use vio_ekf::{Stamp, Trajectory};
+use vio_ekf::{Alignment, Stamp, Trajectory, ate};
 
+use super::checkpoint::{CheckpointSettings, Checkpoints, Progress, metadata};
 use super::decode::Images;
 use super::error::ScanError;
 use super::map_store::{Device, MapStore};
-use super::sequence::Sequence;
+use super::pose_source::{Odometry, PoseSource, TrackingMetrics};
+use super::quality::Quality;
+use super::sequence::{FrameFiles, Sequence};
 use crate::progress::Stage;
 
 /// How a sequence is mapped.
@@ -18,20 +21,33 @@ use crate::progress::Stage;
 pub struct ScanSettings {
     /// The map.
     pub map: tsdf_hash::Settings,
-    /// Frames between two ray casts of the map from where the camera was.
+    /// Which poses are believed.
+    pub poses: PoseSource,
+    /// Frames between two ray casts of the map from where the camera was, and between two looks whether depth, camera and poses agree.
     pub ray_cast_every: usize,
     /// Where the map is kept.
     pub device: Device,
     /// File of the disk tier, if there is to be one.
     pub swap: Option<PathBuf>,
-    /// A stored map to go on from; its settings take the place of those here, but for memory and threads.
+    /// A stored map to go on from; its settings take the place of those here, but for memory and threads. If it was stored
+    /// by a run over the same sequence, its frames are not fused again.
     pub resume: Option<PathBuf>,
+    /// Where the map is saved on the way.
+    pub checkpoint: Option<CheckpointSettings>,
 }
 
 impl Default for ScanSettings {
     fn default() -> Self {
         let map = tsdf_hash::Settings::default();
-        Self { map, ray_cast_every: 10, device: Device::Cpu, swap: None, resume: None }
+        Self {
+            map,
+            poses: PoseSource::Given,
+            ray_cast_every: 10,
+            device: Device::Cpu,
+            swap: None,
+            resume: None,
+            checkpoint: None,
+        }
     }
 }
 
@@ -43,10 +59,12 @@ pub struct Scan {
     pub mesh: Mesh,
     /// Poses of the frames that were fused.
     pub trajectory: Trajectory,
-    /// Indices of the frames that were fused.
-    pub fused: Vec<usize>,
+    /// Indices of the frames that were fused in this run, and the poses they were fused at.
+    pub fused: Vec<(usize, Isometry3<f64>)>,
     /// Frames that could not be fused, with the reason.
     pub skipped: Vec<(usize, String)>,
+    /// Frames that a run before this one had done.
+    pub resumed: usize,
     /// What kept the map.
     pub device: String,
     /// What was measured on the way.
@@ -68,6 +86,12 @@ pub struct ScanMetrics {
     pub active_bytes_peak: usize,
     /// Largest number of bytes in the host tier.
     pub host_bytes_peak: usize,
+    /// What the pixels and poses were worth.
+    pub quality: Quality,
+    /// What became of tracking, if the poses were tracked.
+    pub tracking: Option<TrackingMetrics>,
+    /// Position error of the tracked poses against those recorded, rigidly aligned, root mean square, metres.
+    pub ate_se3_rmse: Option<f64>,
 }
 
 /// The map, seen from where a frame was taken, beside that frame.
@@ -82,105 +106,233 @@ pub struct RayCastCheck {
 }
 
 impl Scan {
-    /// Maps a sequence by its recorded poses. Frames that cannot be used are counted and left out.
+    /// Maps a sequence. Frames that cannot be used are counted and left out.
     pub fn run(folder: &Path, sequence: &Sequence, settings: &ScanSettings) -> Result<Self, ScanError> {
         let stage = Stage::start("fuse");
-        let mut store = MapStore::open(initial_map(settings)?, settings.device)?;
-        let (mut mesher, mut metrics) = (IncrementalMesher::new(), ScanMetrics::default());
-        let (mut fused, mut skipped) = (Vec::with_capacity(sequence.frames.len()), Vec::new());
-        let mut trajectory = Trajectory::default();
-        // What has left active memory is not seen by a ray: then each ray cast comes while its surroundings are still there.
-        let leaving = settings.map.memory.host_bytes > 0;
-        let due = |index: usize| index.is_multiple_of(settings.ray_cast_every.max(1));
-        for (index, frame) in sequence.frames.iter().enumerate() {
+        let (map, progress) = initial_map(folder, settings)?;
+        let mut run = Run::new(sequence, settings, map, progress)?;
+        let mut checkpoints = Checkpoints::new(settings.checkpoint.clone());
+        for index in run.resumed..sequence.frames.len() {
             stage.share(index as f64 / sequence.frames.len() as f64);
-            let Some(pose) = frame.world_from_camera else {
-                skipped.push((index, format!("{}: no pose was recorded for it", frame.depth.display())));
-                continue;
-            };
-            match fuse_frame(&mut store, &mut mesher, sequence, index, &pose, leaving && due(index), &mut metrics) {
-                Ok(()) => {
-                    fused.push(index);
-                    trajectory.push(Stamp::from_secs(frame.stamp).map_err(vio_ekf::Error::from)?, pose)?;
+            match run.frame(index) {
+                Ok(pose) => {
+                    run.fused.push((index, pose));
+                    let stamp = Stamp::from_secs(sequence.frames[index].stamp).map_err(vio_ekf::Error::from)?;
+                    run.trajectory.push(stamp, pose)?;
                 }
-                Err(why) => skipped.push((index, format!("{}: {why}", frame.depth.display()))),
+                Err(why) => {
+                    // What cannot be read names its file itself.
+                    let name = match why {
+                        ScanError::Sequence(_) => String::new(),
+                        _ => format!("{}: ", sequence.frames[index].depth.display()),
+                    };
+                    run.skipped.push((index, format!("{name}{why}")));
+                }
             }
+            checkpoints.save(run.store.map(), folder, index + 1, &run.trajectory)?;
         }
-        if fused.is_empty() {
-            let first = skipped.first().map_or_else(String::new, |(_, why)| why.clone());
+        if run.fused.is_empty() && run.resumed == 0 {
+            let first = run.skipped.first().map_or_else(String::new, |(_, why)| why.clone());
             let frames = sequence.frames.len();
             return Err(ScanError::NothingFused { folder: folder.display().to_string(), frames, first });
         }
-        let blocks = store.dense().blocks();
-        stage.done(&format!("{} frames, {} left out, {blocks} blocks", fused.len(), skipped.len()));
+        let blocks = run.store.dense().blocks();
+        stage.done(&format!("{} frames, {} left out, {blocks} blocks", run.fused.len(), run.skipped.len()));
+        run.finish()
+    }
 
-        if !leaving {
-            let stage = Stage::start("ray cast");
-            for &index in fused.iter().filter(|&&index| due(index)) {
-                stage.share(index as f64 / sequence.frames.len() as f64);
-                metrics.ray_casts.extend(ray_cast_check(&mut store, sequence, index)?);
-            }
-            stage.done(&format!("{} ray casts", metrics.ray_casts.len()));
-        }
+    /// What a later run over the same sequence needs to know, for [`Map::save`].
+    pub fn metadata(&self, folder: &Path, sequence: &Sequence) -> std::collections::BTreeMap<String, Vec<u8>> {
+        metadata(folder, sequence.frames.len(), &self.trajectory)
+    }
 
-        let stage = Stage::start("mesh");
-        let start = ProcessTime::now();
-        let mesh = store.dense().mesh()?;
-        metrics.mesh_s = start.elapsed().as_secs_f64();
-        stage.done(&format!("{} vertices, {} triangles", mesh.positions.len(), mesh.faces.len()));
-        let (device, map) = (store.device(), store.into_map()?);
-        Ok(Self { map, mesh, trajectory, fused, skipped, device, metrics })
+    /// Whether at least half of the work was done.
+    ///
+    /// # Errors
+    /// [`ScanError::Unusable`], with the reason.
+    pub fn verdict(&self, sequence: &Sequence) -> Result<(), ScanError> {
+        self.metrics.quality.verdict(self.fused.len() + self.resumed, sequence.frames.len())
     }
 }
 
-/// The map that the run starts with.
-fn initial_map(settings: &ScanSettings) -> Result<Map, ScanError> {
+/// A run under way.
+struct Run<'a> {
+    sequence: &'a Sequence,
+    settings: &'a ScanSettings,
+    store: MapStore,
+    mesher: IncrementalMesher,
+    odometry: Option<Odometry>,
+    size: Option<[usize; 2]>,
+    /// What has left active memory is not seen by a ray: then each ray cast comes while its surroundings are still there.
+    leaving: bool,
+    resumed: usize,
+    trajectory: Trajectory,
+    fused: Vec<(usize, Isometry3<f64>)>,
+    skipped: Vec<(usize, String)>,
+    metrics: ScanMetrics,
+}
+
+impl<'a> Run<'a> {
+    fn new(
+        sequence: &'a Sequence,
+        settings: &'a ScanSettings,
+        map: Map,
+        progress: Option<Progress>,
+    ) -> Result<Self, ScanError> {
+        let store = MapStore::open(map, settings.device)?;
+        let mut odometry = match settings.poses {
+            PoseSource::Given => None,
+            PoseSource::Tracked => Some(Odometry::new(store.settings())?),
+        };
+        let progress = progress.unwrap_or(Progress { frames_done: 0, trajectory: Trajectory::default() });
+        if let (Some(odometry), Some(last)) = (&mut odometry, progress.trajectory.poses().last()) {
+            odometry.start(*last);
+        }
+        Ok(Self {
+            sequence,
+            settings,
+            store,
+            mesher: IncrementalMesher::new(),
+            odometry,
+            size: sequence.image_size,
+            leaving: settings.map.memory.host_bytes > 0,
+            resumed: progress.frames_done.min(sequence.frames.len()),
+            trajectory: progress.trajectory,
+            fused: Vec::new(),
+            skipped: Vec::new(),
+            metrics: ScanMetrics::default(),
+        })
+    }
+
+    fn due(&self, index: usize) -> bool {
+        index.is_multiple_of(self.settings.ray_cast_every.max(1))
+    }
+
+    /// Reads, places and fuses a frame; returns its pose.
+    fn frame(&mut self, index: usize) -> Result<Isometry3<f64>, ScanError> {
+        let frame = &self.sequence.frames[index];
+        // Before the images are read: what has no pose costs no time.
+        let given = if self.odometry.is_none() { Some(given_pose(frame)?) } else { None };
+        let images = self.images(frame)?;
+        let (intrinsics, scale) = (self.sequence.intrinsics, self.sequence.depth_scale);
+        let (depth, colour) = (images.depth(intrinsics, scale), images.colour(intrinsics));
+        let name = frame.depth.display().to_string();
+        let pose = match (&mut self.odometry, given) {
+            (Some(odometry), _) => odometry.locate(&mut self.store, frame, &depth, colour.as_ref())?,
+            (None, Some(pose)) => pose,
+            (None, None) => given_pose(frame)?,
+        };
+        if given.is_some() && self.due(index) && self.store.dense().blocks() > 0 {
+            self.metrics.quality.check(&name, &mut self.store, &depth, &pose)?;
+        }
+        let start = ProcessTime::now();
+        let report = self.store.dense().integrate(&depth, colour.as_ref(), &pose)?;
+        let metrics = &mut self.metrics;
+        metrics.integrate_s.push(start.elapsed().as_secs_f64());
+        metrics.quality.count(&name, depth.width * depth.height, &report);
+        metrics.active_bytes_peak = metrics.active_bytes_peak.max(self.store.dense().bytes());
+        if let Some(map) = self.store.map() {
+            metrics.host_bytes_peak = metrics.host_bytes_peak.max(map.memory().host_bytes);
+            let start = ProcessTime::now();
+            self.mesher.update(map)?;
+            metrics.mesh_update_s.push(start.elapsed().as_secs_f64());
+        }
+        if self.leaving && self.due(index) {
+            self.metrics.ray_casts.extend(ray_cast_check(&mut self.store, self.sequence, &images, &pose)?);
+        }
+        Ok(pose)
+    }
+
+    /// The images of a frame, colour where the depth camera sees it.
+    fn images(&mut self, frame: &FrameFiles) -> Result<Images, ScanError> {
+        let mut images = Images::read(frame)?;
+        let found = [images.width(), images.height()];
+        let expected = *self.size.get_or_insert(found);
+        if found != expected {
+            let [found, expected] = [found, expected].map(|[width, height]| format!("{width} x {height}"));
+            return Err(ScanError::OtherSize { found, expected });
+        }
+        if let Some(why) = images.colour_fault.take() {
+            self.metrics.quality.without_colour += 1;
+            eprintln!("without colour: {}: {why}", frame.depth.display());
+        }
+        if let Some(camera) = &self.sequence.colour_camera {
+            images.register_colour(camera, self.sequence.intrinsics, self.sequence.depth_scale);
+        }
+        Ok(images)
+    }
+
+    fn finish(mut self) -> Result<Scan, ScanError> {
+        if !self.leaving {
+            let stage = Stage::start("ray cast");
+            let due: Vec<_> = self.fused.iter().copied().filter(|(index, _)| self.due(*index)).collect();
+            for (index, pose) in due {
+                stage.share(index as f64 / self.sequence.frames.len() as f64);
+                let images = Images::read(&self.sequence.frames[index])?;
+                self.metrics.ray_casts.extend(ray_cast_check(&mut self.store, self.sequence, &images, &pose)?);
+            }
+            stage.done(&format!("{} ray casts", self.metrics.ray_casts.len()));
+        }
+        let stage = Stage::start("mesh");
+        let start = ProcessTime::now();
+        let mesh = self.store.dense().mesh()?;
+        self.metrics.mesh_s = start.elapsed().as_secs_f64();
+        stage.done(&format!("{} vertices, {} triangles", mesh.positions.len(), mesh.faces.len()));
+        if let Some(odometry) = self.odometry {
+            self.metrics.ate_se3_rmse = tracked_error(self.sequence, &self.fused)?;
+            self.metrics.tracking = Some(odometry.metrics);
+        }
+        let (device, map) = (self.store.device(), self.store.into_map()?);
+        let Self { trajectory, fused, skipped, resumed, metrics, .. } = self;
+        Ok(Scan { map, mesh, trajectory, fused, skipped, resumed, device, metrics })
+    }
+}
+
+fn given_pose(frame: &FrameFiles) -> Result<Isometry3<f64>, ScanError> {
+    frame.world_from_camera.ok_or(ScanError::NoPose(if frame.lost {
+        "its recorded pose is not finite: the recorder had lost the camera"
+    } else {
+        "no pose was recorded for it; --poses tracked finds the poses itself"
+    }))
+}
+
+/// Of the frames that have a recorded pose; `None` below three.
+fn tracked_error(sequence: &Sequence, fused: &[(usize, Isometry3<f64>)]) -> Result<Option<f64>, ScanError> {
+    let recorded = |(index, pose): &(usize, Isometry3<f64>)| Some((sequence.frames[*index].world_from_camera?, *pose));
+    let (given, tracked): (Vec<_>, Vec<_>) = fused.iter().filter_map(recorded).unzip();
+    if given.len() < 3 {
+        return Ok(None);
+    }
+    Ok(Some(ate(&given, &tracked, Alignment::Se3)?.position.rmse))
+}
+
+/// The map that the run starts with, and what an earlier run had done.
+fn initial_map(folder: &Path, settings: &ScanSettings) -> Result<(Map, Option<Progress>), ScanError> {
     let Some(path) = &settings.resume else {
-        return Ok(match &settings.swap {
+        let map = match &settings.swap {
             Some(swap) => Map::with_swap(settings.map, swap)?,
             None => Map::new(settings.map)?,
-        });
+        };
+        return Ok((map, None));
     };
     let stored = |source| ScanError::Stored { path: path.display().to_string(), source };
     let file = MapFile::open(path).map_err(stored)?;
+    let progress = Progress::read(path, &file, folder)?;
+    if let Some(progress) = &progress {
+        eprintln!("{}: goes on after frame {}", path.display(), progress.frames_done);
+    }
     let tsdf_hash::Settings { max_bytes, threads, memory, .. } = settings.map;
     let continued = tsdf_hash::Settings { max_bytes, threads, memory, ..*file.settings() };
-    file.into_map(continued, settings.swap.as_deref()).map_err(stored)
-}
-
-/// Fuses a frame, updates the mesh and, if asked for, casts the map from where the frame was taken.
-fn fuse_frame(
-    store: &mut MapStore,
-    mesher: &mut IncrementalMesher,
-    sequence: &Sequence,
-    index: usize,
-    pose: &Isometry3<f64>,
-    ray_cast: bool,
-    metrics: &mut ScanMetrics,
-) -> Result<(), ScanError> {
-    let images = Images::read(&sequence.frames[index])?;
-    let depth = images.depth(sequence.intrinsics, sequence.depth_scale);
-    let start = ProcessTime::now();
-    store.dense().integrate(&depth, images.colour(sequence.intrinsics).as_ref(), pose)?;
-    metrics.integrate_s.push(start.elapsed().as_secs_f64());
-    metrics.active_bytes_peak = metrics.active_bytes_peak.max(store.dense().bytes());
-    if let Some(map) = store.map() {
-        metrics.host_bytes_peak = metrics.host_bytes_peak.max(map.memory().host_bytes);
-        let start = ProcessTime::now();
-        mesher.update(map)?;
-        metrics.mesh_update_s.push(start.elapsed().as_secs_f64());
-    }
-    if ray_cast {
-        metrics.ray_casts.extend(ray_cast_check(store, sequence, index)?);
-    }
-    Ok(())
+    Ok((file.into_map(continued, settings.swap.as_deref()).map_err(stored)?, progress))
 }
 
 /// `None` if the map has no surface where the frame has one.
-fn ray_cast_check(store: &mut MapStore, sequence: &Sequence, index: usize) -> Result<Option<RayCastCheck>, ScanError> {
-    let frame = &sequence.frames[index];
-    let Some(pose) = &frame.world_from_camera else { return Ok(None) };
-    let images = Images::read(frame)?;
+fn ray_cast_check(
+    store: &mut MapStore,
+    sequence: &Sequence,
+    images: &Images,
+    pose: &Isometry3<f64>,
+) -> Result<Option<RayCastCheck>, ScanError> {
     let depth = images.depth(sequence.intrinsics, sequence.depth_scale);
     let &tsdf_hash::Settings { min_depth, max_depth, threads, .. } = store.settings();
     let settings = RayCastSettings { min_depth, max_depth, colour: true, threads };

@@ -10,12 +10,41 @@ use tsdf_hash::Intrinsics;
 pub struct Sequence {
     /// How the folder is laid out: `7-Scenes`, `TUM`, `ICL-NUIM` or `Redwood`.
     pub layout: &'static str,
-    /// Camera of the depth images; colour images are taken as registered to it.
+    /// Camera of the depth images; colour images are taken as registered to it, unless there is a [`ColourCamera`].
     pub intrinsics: Intrinsics,
+    /// Where the camera is from, in words.
+    pub camera_origin: String,
+    /// Width and height of the camera's images, where a file says so; otherwise those of the first image.
+    pub image_size: Option<[usize; 2]>,
     /// Units of the depth images per metre.
     pub depth_scale: f64,
+    /// Where the scale is from, in words.
+    pub scale_origin: String,
+    /// A colour camera that stands elsewhere.
+    pub colour_camera: Option<ColourCamera>,
     /// The frames, by rising stamps.
     pub frames: Vec<FrameFiles>,
+}
+
+impl Sequence {
+    /// Camera, scale and where they are from, in one line.
+    pub fn description(&self) -> String {
+        let k = &self.intrinsics;
+        let size = self.image_size.map_or_else(String::new, |[w, h]| format!(", {w} x {h} pixels"));
+        format!(
+            "fx {} fy {} cx {} cy {}{size} ({}); {} units per metre ({})",
+            k.fx, k.fy, k.cx, k.cy, self.camera_origin, self.depth_scale, self.scale_origin
+        )
+    }
+}
+
+/// A colour camera beside the depth camera.
+#[derive(Debug, Clone, Copy)]
+pub struct ColourCamera {
+    /// Takes points of the colour camera into the depth camera.
+    pub depth_from_colour: Isometry3<f64>,
+    /// Its camera, if it is not the depth camera's.
+    pub intrinsics: Option<Intrinsics>,
 }
 
 /// One frame, not yet read.
@@ -29,4 +58,6 @@ pub struct FrameFiles {
     pub colour: Option<PathBuf>,
     /// Recorded pose of the camera: z forward, x right, y down.
     pub world_from_camera: Option<Isometry3<f64>>,
+    /// Whether a pose was recorded that is no number, as recorders write when they have lost the camera.
+    pub lost: bool,
 }

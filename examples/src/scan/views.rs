@@ -21,9 +21,8 @@ const SMOOTH: u32 = 2;
 
 /// Writes `views.png`, recorded picture, coloured mesh, shaded mesh and their overview, into a folder.
 pub fn save_views(scan: &Scan, sequence: &Sequence, folder: &Path, threads: usize) -> Result<(), ScanError> {
-    let middle = scan.fused[scan.fused.len() / 2];
+    let Some(&(middle, world_from_camera)) = scan.fused.get(scan.fused.len() / 2) else { return Ok(()) };
     let images = Images::read(&sequence.frames[middle])?;
-    let Some(world_from_camera) = sequence.frames[middle].world_from_camera else { return Ok(()) };
     let k = sequence.intrinsics;
     let (width, height) = (images.width() as u32, images.height() as u32);
     let here = Camera { fx: k.fx, fy: k.fy, cx: k.cx, cy: k.cy, width, height, world_from_camera };

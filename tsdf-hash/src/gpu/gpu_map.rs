@@ -189,6 +189,7 @@ impl GpuMap {
         Ok(FrameReport {
             valid_pixels: frame.plane_image.valid,
             fused_pixels: frame.plane_image.fused,
+            filled_pixels: frame.plane_image.filled,
             voxels: needed.iter().chain(&changed).map(|work| work.1.voxels()).sum(),
             blocks: needed.len() + changed.len(),
             blocks_added: needed.len(),

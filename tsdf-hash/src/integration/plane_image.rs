@@ -11,6 +11,7 @@ use crate::error::Error;
 use crate::images::{DepthView, Intrinsics};
 use crate::integration::block_selection::select_blocks;
 use crate::integration::inverse_depth_noise::InverseDepthNoise;
+use crate::integration::partial_window::PartialWindow;
 use crate::integration::plane::Plane;
 use crate::integration::plane_tile::{TILE, Tile, TileLine};
 use crate::integration::plane_windows::{BEND_VARIANCE, BENDING, COUNT, ROUGHNESS, Row, SPREAD, Windows};
@@ -39,6 +40,8 @@ pub(crate) struct PlaneImage {
     pub(crate) valid: usize,
     /// Those of them that are fused.
     pub(crate) fused: usize,
+    /// Gaps between them that are filled and fused.
+    pub(crate) filled: usize,
     /// The blocks that may hold a voxel within `μ` of a fused pixel, ascending.
     pub(crate) keys: Vec<BlockKey>,
 }
@@ -71,19 +74,20 @@ impl PlaneImage {
             .map(|(k, (planes, tiles))| Band { first: k * lines * TILE, planes, tiles })
             .collect();
         let found = in_chunks(&mut bands, settings.threads, |bands| {
-            let mut all = (0, 0, Ok(Vec::new()));
+            let mut all = ([0; 3], Ok(Vec::new()));
             for band in bands {
-                let [valid, fused] = band.fill(depth, settings);
+                let counts = band.fill(depth, settings);
                 let keys = select_blocks(band.first, band.planes, band.tiles, depth, world_from_camera, settings);
-                all = (all.0 + valid, all.1 + fused, keys);
+                all = ([0, 1, 2].map(|k| all.0[k] + counts[k]), keys);
             }
             all
         });
-        (self.valid, self.fused) = (0, 0);
+        (self.valid, self.fused, self.filled) = (0, 0, 0);
         self.keys.clear();
-        for (valid, fused, keys) in found {
+        for ([valid, fused, filled], keys) in found {
             self.valid += valid;
             self.fused += fused;
+            self.filled += filled;
             self.keys.extend(keys?);
         }
         self.keys.sort_unstable();
@@ -93,23 +97,27 @@ impl PlaneImage {
 }
 
 impl Band<'_> {
-    /// Returns how many pixels of the band have a depth in the range and how many of them are fused.
-    fn fill(&mut self, depth: &DepthView, settings: &Settings) -> [usize; 2] {
+    /// Returns how many pixels of the band have a depth in the range, how many of them are fused, and how many gaps are filled.
+    fn fill(&mut self, depth: &DepthView, settings: &Settings) -> [usize; 3] {
         let width = depth.width;
         let noise = InverseDepthNoise::new(settings);
         let per_metre = (f64::from(ONE) / settings.truncation()) as f32;
         let mut windows = Windows::new(depth, settings, self.first);
         let (mut columns, mut tile_line) = (Columns::new(width), TileLine::new(width));
-        let mut all = [0, 0];
+        let partial = PartialWindow::new(&depth.intrinsics, noise);
+        let mut all = [0; 3];
         let lines = self.planes.chunks_mut(TILE * width).zip(self.tiles.chunks_mut(width.div_ceil(TILE)));
         for (line, (planes, tiles)) in lines.enumerate() {
             for (row, planes) in planes.chunks_exact_mut(width).enumerate() {
                 let row = line * TILE + row;
                 let lens = Lens::new(&depth.intrinsics, self.first + row, per_metre);
-                let [valid, fused] = read_row(&windows.row(row), lens, noise, &mut columns);
+                let line = windows.row(row);
+                read_row(&line, lens, noise, &mut columns);
+                read_edges(&line, lens, noise, partial, &mut columns);
+                let counts = count(line.measured, &columns.omega);
                 columns.write(planes);
                 tile_line.push(&columns.omega);
-                all = [all[0] + valid as usize, all[1] + fused as usize];
+                all = [0, 1, 2].map(|k| all[k] + counts[k] as usize);
             }
             tile_line.finish(self.first + line * TILE, planes, tiles);
         }
@@ -138,9 +146,9 @@ impl Columns {
     }
 }
 
-/// Fits the planes of a row; returns the numbers of valid and of fused pixels. Structures of arrays, because the
+/// Fits the planes of a row. Structures of arrays, because the
 /// arithmetic then runs in vector registers.
-fn read_row(row: &Row, lens: Lens, noise: InverseDepthNoise, out: &mut Columns) -> [u32; 2] {
+fn read_row(row: &Row, lens: Lens, noise: InverseDepthNoise, out: &mut Columns) {
     // Slices of known length spare the loop its bounds checks.
     let width = out.omega.len();
     let (omegas, offsets) = (&mut out.omega[..width], &mut out.offset[..width]);
@@ -151,7 +159,6 @@ fn read_row(row: &Row, lens: Lens, noise: InverseDepthNoise, out: &mut Columns) 
     let (smooth, total, bend) = (&row.smooth[..width], &row.total[..width], &row.bend[..width]);
     let (along, down, rough) = (&row.slope[0][..width], &row.slope[1][..width], &row.roughness[..width]);
     let most_bend = (MOST_BEND * BENDING) * (MOST_BEND * BENDING) * BEND_VARIANCE;
-    let mut counts = [0, 0];
     for u in 0..width {
         let own = here[u + 1];
         let sigma = noise.sigma_inverse(own);
@@ -164,23 +171,60 @@ fn read_row(row: &Row, lens: Lens, noise: InverseDepthNoise, out: &mut Columns) 
         let omega = choose(is_plane, wide[0], narrow[0]);
         let slope_u = choose(is_plane, wide[1], narrow[1]);
         let slope_v = choose(is_plane, wide[2], narrow[2]);
-        let (offset, cosine) = lens.plane(u as i32 as f32, omega, slope_u, slope_v);
-        let ratio = noise.base * omega * omega / noise.sigma_inverse(omega);
-        let weight = MAX_WEIGHT * ratio * ratio * cosine;
-        let weight = if weight > 1.0 { weight } else { 1.0 };
-        let weight = if weight < MAX_WEIGHT { weight } else { MAX_WEIGHT };
-        // A NaN fails both comparisons.
-        let omega = if cosine >= LEAST_COSINE { omega } else { 0.0 };
-        let omega = if omega > 0.0 { omega } else { 0.0 };
-        let last = (offset * slope_v).to_bits() & !15 | (weight + ROUNDER).to_bits() & 15;
-        offsets[u] = offset;
-        omegas[u] = omega;
-        slopes_u[u] = offset * slope_u;
-        slopes_v[u] = f32::from_bits(last);
-        counts[0] += u32::from(own > 0.0);
-        counts[1] += u32::from(omega > 0.0);
+        let seen = observe(lens, noise, u, omega, [slope_u, slope_v]);
+        offsets[u] = seen.offset;
+        omegas[u] = seen.omega;
+        slopes_u[u] = seen.slope_u;
+        slopes_v[u] = seen.slope_v;
+    }
+}
+
+/// The pixels beside gaps and edges that [`read_row`] has left out.
+fn read_edges(row: &Row, lens: Lens, noise: InverseDepthNoise, partial: PartialWindow, out: &mut Columns) {
+    for u in 0..out.omega.len() {
+        if row.measured[u] > 0.0
+            && row.smooth[u].is_nan()
+            && let Some(slope) = partial.slopes(row.wide, u)
+        {
+            let seen = observe(lens, noise, u, row.measured[u], slope);
+            (out.offset[u], out.omega[u]) = (seen.offset, seen.omega);
+            (out.slope[0][u], out.slope[1][u]) = (seen.slope_u, seen.slope_v);
+        }
+    }
+}
+
+/// Pixels that were measured, those of them that are fused, and gaps that are filled.
+fn count(measured: &[f32], omega: &[f32]) -> [u32; 3] {
+    let mut counts = [0; 3];
+    for (&measured, &omega) in measured.iter().zip(omega) {
+        let (valid, fused) = (u32::from(measured > 0.0), u32::from(omega > 0.0));
+        counts[0] += valid;
+        counts[1] += valid & fused;
+        counts[2] += fused & !valid;
     }
     counts
+}
+
+/// A plane at a pixel, as [`Plane`] keeps it; with an inverse depth of 0 if it is seen too steeply, or is none.
+struct Observation {
+    offset: f32,
+    omega: f32,
+    slope_u: f32,
+    slope_v: f32,
+}
+
+#[inline(always)]
+fn observe(lens: Lens, noise: InverseDepthNoise, u: usize, omega: f32, [slope_u, slope_v]: [f32; 2]) -> Observation {
+    let (offset, cosine) = lens.plane(u as i32 as f32, omega, slope_u, slope_v);
+    let ratio = noise.base * omega * omega / noise.sigma_inverse(omega);
+    let weight = MAX_WEIGHT * ratio * ratio * cosine;
+    let weight = if weight > 1.0 { weight } else { 1.0 };
+    let weight = if weight < MAX_WEIGHT { weight } else { MAX_WEIGHT };
+    // A NaN fails both comparisons.
+    let omega = if cosine >= LEAST_COSINE { omega } else { 0.0 };
+    let omega = if omega > 0.0 { omega } else { 0.0 };
+    let last = (offset * slope_v).to_bits() & !15 | (weight + ROUNDER).to_bits() & 15;
+    Observation { offset, omega, slope_u: offset * slope_u, slope_v: f32::from_bits(last) }
 }
 
 /// One of two values, by a mask of all ones or zero: an `if` would become a branch, and the loop scalar.

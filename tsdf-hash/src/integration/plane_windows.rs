@@ -4,15 +4,16 @@
 //! a fixed order.
 
 use crate::images::{DepthData, DepthView};
+use crate::integration::gap_filling::GapFilling;
 use crate::integration::inverse_depth_noise::InverseDepthNoise;
 use crate::settings::Settings;
 
 /// Half the window of the fit: 7 x 7 pixels (ours; the noise of a pixel of a plane shrinks to a seventh, and the error
 /// of a normal at 2 m is about 6 degrees).
 const RADIUS: usize = 3;
-/// Pixels of context on each side of a row: the window, and one for the edge test.
-const HALO: usize = RADIUS + 1;
-/// Lines in a ring: from the first line of a window to the one that its last edge test needs.
+/// Pixels of context on each side of a row: the window, one for the edge test, and one for the filling of gaps.
+pub(crate) const HALO: usize = RADIUS + 2;
+/// Lines in a ring: from the first line of a window to the one that its last gap needs.
 const RING: usize = 2 * HALO;
 /// Values in the window.
 pub(crate) const COUNT: f32 = 49.0;
@@ -57,8 +58,13 @@ pub(crate) struct Windows<'a> {
     near: f32,
     far: f32,
     noise: InverseDepthNoise,
-    /// Inverse depth with `HALO` pixels on each side, NaN where there is none: arithmetic then spreads the gaps.
+    gaps: GapFilling,
+    /// Inverse depth as it was measured, NaN where there is none: arithmetic then spreads the gaps.
+    measured: Ring,
+    /// The same with gaps filled and with `HALO` pixels on each side.
     raw: Ring,
+    /// A line of it.
+    filled: Vec<f32>,
     /// The same with NaN at edges.
     smooth: Ring,
     /// Along the line, over the window: sum, first moment, second difference.
@@ -75,8 +81,12 @@ pub(crate) struct Windows<'a> {
 /// A row and its fits; slices of the image's width. The fits are NaN where the window has a gap or an edge.
 #[derive(Clone, Copy)]
 pub(crate) struct Row<'a> {
+    /// Inverse depth as it was measured, NaN where it was not.
+    pub(crate) measured: &'a [f32],
     /// Inverse depth of the row above, of the row and of the row below, with one pixel more on each side.
     pub(crate) around: [&'a [f32]; 3],
+    /// The same of five rows, with `HALO` pixels more on each side.
+    pub(crate) wide: [&'a [f32]; 5],
     /// The row with NaN at edges.
     pub(crate) smooth: &'a [f32],
     /// The mean over the window times [`COUNT`].
@@ -98,7 +108,10 @@ impl<'a> Windows<'a> {
             near: settings.min_depth as f32,
             far: settings.max_depth as f32,
             noise: InverseDepthNoise::new(settings),
+            gaps: GapFilling::new(&depth.intrinsics, settings),
+            measured: Ring::new(width),
             raw: Ring::new(padded),
+            filled: vec![f32::NAN; padded],
             smooth: Ring::new(padded),
             total: Ring::new(width),
             moment: Ring::new(width),
@@ -116,11 +129,14 @@ impl<'a> Windows<'a> {
         self.push(row + RING);
         let width = self.depth.width;
         let [total, along, down, bend, roughness] = &mut self.fits;
-        sum_lines(self.total.seven(row + 1), total, down, bend);
-        add_lines(self.moment.seven(row + 1), false, along);
-        add_lines(self.bend.seven(row + 1), true, bend);
-        add_lines(self.roughness.seven(row + 1), false, roughness);
+        let first = row + HALO - RADIUS;
+        sum_lines(self.total.seven(first), total, down, bend);
+        add_lines(self.moment.seven(first), false, along);
+        add_lines(self.bend.seven(first), true, bend);
+        add_lines(self.roughness.seven(first), false, roughness);
         Row {
+            measured: self.measured.line(row + HALO),
+            wide: [0, 1, 2, 3, 4].map(|k| self.raw.line(row + HALO - 2 + k)),
             around: [HALO - 1, HALO, HALO + 1].map(|k| &self.raw.line(row + k)[HALO - 1..][..width + 2]),
             smooth: &self.smooth.line(row + HALO)[HALO..][..width],
             total,
@@ -130,24 +146,35 @@ impl<'a> Windows<'a> {
         }
     }
 
-    /// Reads line `k` and finishes the line before it.
+    /// Reads line `k`, fills the gaps of the line before it, and finishes the one before that.
     fn push(&mut self, k: usize) {
         self.read(k);
+        let width = self.depth.width;
+        self.gaps.along(self.measured.line(k), &mut self.raw.line_mut(k)[HALO..][..width]);
         if k < 2 {
             return;
         }
-        let width = self.depth.width;
-        let around = [k - 2, k - 1, k].map(|k| self.raw.line(k));
-        let smooth = &mut self.smooth.line_mut(k - 1)[1..][..width + 2 * RADIUS];
+        let mut filled = std::mem::take(&mut self.filled);
+        filled.copy_from_slice(self.raw.line(k - 1));
+        let beside = [k - 2, k].map(|k| &self.raw.line(k)[HALO..][..width]);
+        self.gaps.across(beside, &mut filled[HALO..][..width]);
+        self.raw.line_mut(k - 1).copy_from_slice(&filled);
+        self.filled = filled;
+        if k < 3 {
+            return;
+        }
+        let line = k - 2;
+        let around = [k - 3, k - 2, k - 1].map(|k| &self.raw.line(k)[HALO - RADIUS - 1..][..width + 2 * RADIUS + 2]);
+        let smooth = &mut self.smooth.line_mut(line)[HALO - RADIUS..][..width + 2 * RADIUS];
         smooth_line(around, self.noise, smooth, &mut self.rough);
-        sum_line(smooth, self.total.line_mut(k - 1), self.moment.line_mut(k - 1), self.bend.line_mut(k - 1));
-        add_line(&self.rough, self.roughness.line_mut(k - 1));
+        sum_line(smooth, self.total.line_mut(line), self.moment.line_mut(line), self.bend.line_mut(line));
+        add_line(&self.rough, self.roughness.line_mut(line));
     }
 
     fn read(&mut self, k: usize) {
         let width = self.depth.width;
         let (near, far) = (self.near, self.far);
-        let out = &mut self.raw.line_mut(k)[HALO..][..width];
+        let out = &mut self.measured.line_mut(k)[..width];
         let Some(v) = (self.first + k).checked_sub(HALO).filter(|&v| v < self.depth.height) else {
             return out.fill(f32::NAN);
         };

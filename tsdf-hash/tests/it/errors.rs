@@ -69,9 +69,10 @@ fn views_that_make_no_sense_change_nothing() {
         let data = DepthData::F32 { data: &[value; 3072] };
         assert!(matches!(refuse(DepthView { data, ..good }, None, &pose), Error::NoDepth { valid: 0 }));
     }
-    // Every second column a metre behind the other: nothing but edges.
-    let comb: Vec<u16> = (0..3072).map(|k| 1000 + 1000 * (k % 2)).collect();
-    let data = DepthData::U16 { data: &comb, scale: 1000.0 };
+    // Thirteen depths, none more than three times in any window: nothing but edges.
+    let scattered = |k: usize| (500.0 * 1.2_f64.powi(((k % 64 + 5 * (k / 64)) % 13) as i32)) as u16;
+    let scattered: Vec<u16> = (0..3072).map(scattered).collect();
+    let data = DepthData::U16 { data: &scattered, scale: 1000.0 };
     assert!(matches!(refuse(DepthView { data, ..good }, None, &pose), Error::NoDepth { valid: 3072 }));
     let rgb8 = vec![0; 3 * 3072 - 1];
     let colour = ColourView { width: 64, height: 48, data: ColourData::Rgb8(&rgb8), intrinsics: good.intrinsics };

@@ -9,6 +9,7 @@ mod errors;
 mod eviction;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod holes;
 mod incremental;
 mod layers;
 mod map_file;
@@ -17,4 +18,5 @@ mod recorded;
 mod reversible;
 mod scene;
 mod topology;
+mod tracking;
 mod views;

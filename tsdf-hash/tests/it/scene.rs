@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 use tsdf_hash::{DepthData, DepthView, Intrinsics};
 
 /// A depth image in metres with the camera it was taken by; 0 where the ray hits nothing.
+#[derive(Clone)]
 pub(crate) struct Shot {
     pub(crate) width: usize,
     pub(crate) height: usize,

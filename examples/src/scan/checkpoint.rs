@@ -1,0 +1,89 @@
+//! What a run has done so far, kept in the file of its map: after a crash the run goes on from there.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use tsdf_hash::{Map, MapFile};
+use vio_ekf::{Trajectory, tum};
+
+use super::error::ScanError;
+
+/// Name of the metadata: the folder, the number of frames that are done, and the trajectory.
+const KEYS: [&str; 3] = ["scan.sequence", "scan.frames_done", "scan.trajectory"];
+/// Saving takes no larger share of the time than this.
+const LARGEST_SHARE: f64 = 0.1;
+
+/// Where and how often a run is saved.
+#[derive(Debug, Clone)]
+pub struct CheckpointSettings {
+    /// The map file.
+    pub path: PathBuf,
+    /// Time between two of them; longer where saving takes longer.
+    pub interval: Duration,
+}
+
+/// What a stored run had done.
+pub(super) struct Progress {
+    /// Frames of the sequence that need not be looked at again.
+    pub(super) frames_done: usize,
+    /// The poses of those that were fused.
+    pub(super) trajectory: Trajectory,
+}
+
+impl Progress {
+    /// What the run that saved a map had done with this sequence; nothing if it was another one.
+    pub(super) fn read(path: &Path, file: &MapFile, sequence: &Path) -> Result<Option<Self>, ScanError> {
+        let fault = |why: String| ScanError::Checkpoint { path: path.display().to_string(), why };
+        let metadata = file.metadata().map_err(|e| fault(e.to_string()))?;
+        let text = |key: &str| metadata.get(key).map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+        let [Some(of), Some(done), Some(rows)] = KEYS.map(text) else { return Ok(None) };
+        if of != name(sequence) {
+            return Ok(None);
+        }
+        let frames_done = done.parse().map_err(|_| fault(format!("its frame count is \"{done}\"")))?;
+        let trajectory = if rows.is_empty() { Trajectory::default() } else { tum::read(&rows)? };
+        Ok(Some(Self { frames_done, trajectory }))
+    }
+}
+
+/// The metadata of a run.
+pub(super) fn metadata(sequence: &Path, frames_done: usize, trajectory: &Trajectory) -> BTreeMap<String, Vec<u8>> {
+    let values = [name(sequence), frames_done.to_string(), tum::write(trajectory)];
+    KEYS.iter().map(|key| (*key).to_string()).zip(values.map(String::into_bytes)).collect()
+}
+
+fn name(sequence: &Path) -> String {
+    std::fs::canonicalize(sequence).unwrap_or_else(|_| sequence.to_path_buf()).display().to_string()
+}
+
+/// Saves a run from time to time.
+pub(super) struct Checkpoints {
+    settings: Option<CheckpointSettings>,
+    next: Instant,
+}
+
+impl Checkpoints {
+    pub(super) fn new(settings: Option<CheckpointSettings>) -> Self {
+        let interval = settings.as_ref().map_or(Duration::ZERO, |s| s.interval);
+        Self { settings, next: Instant::now() + interval }
+    }
+
+    /// Saves if it is time.
+    pub(super) fn save(
+        &mut self,
+        map: Option<&Map>,
+        sequence: &Path,
+        frames_done: usize,
+        trajectory: &Trajectory,
+    ) -> Result<(), ScanError> {
+        let (Some(settings), Some(map)) = (&self.settings, map) else { return Ok(()) };
+        let start = Instant::now();
+        if start < self.next {
+            return Ok(());
+        }
+        map.save(&settings.path, None, &metadata(sequence, frames_done, trajectory))?;
+        self.next = Instant::now() + settings.interval.max(start.elapsed().div_f64(LARGEST_SHARE));
+        Ok(())
+    }
+}

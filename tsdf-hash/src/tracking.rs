@@ -1,0 +1,13 @@
+//! Where the camera is: the new frame against the map, as the last pose sees it (thesis Paper I, section 4.1).
+
+pub(crate) mod directions;
+pub(crate) mod image_level;
+pub(crate) mod model_points;
+pub(crate) mod normal_equations;
+pub(crate) mod outcome;
+pub(crate) mod pose;
+pub(crate) mod registration;
+pub(crate) mod residual_scale;
+pub(crate) mod residuals;
+pub(crate) mod settings;
+pub(crate) mod tracker;

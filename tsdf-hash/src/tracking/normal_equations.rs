@@ -1,0 +1,56 @@
+//! Sums of the Gauss-Newton step: `H = Σ w J Jᵀ` and `b = Σ w J r`.
+
+use nalgebra::{Matrix6, Vector6};
+
+/// Terms summed in single precision before they join the double sums.
+pub(crate) const RUN: usize = 512;
+
+/// A few hundred terms, in single precision, so that they are added in vector registers.
+#[derive(Clone, Copy)]
+pub(crate) struct Run {
+    /// Row `k`: `Σ w J_k (J, r, 0)`.
+    rows: [[f32; 8]; 6],
+}
+
+impl Run {
+    pub(crate) const ZERO: Self = Self { rows: [[0.0; 8]; 6] };
+
+    #[inline(always)]
+    pub(crate) fn add(&mut self, jacobian: [f32; 6], residual: f32, weight: f32) {
+        let [a, b, c, d, e, f] = jacobian;
+        let term = [a, b, c, d, e, f, residual, 0.0];
+        for (row, j) in self.rows.iter_mut().zip(jacobian) {
+            let scaled = weight * j;
+            for (sum, t) in row.iter_mut().zip(term) {
+                *sum += scaled * t;
+            }
+        }
+    }
+}
+
+/// The sums.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NormalEquations {
+    pub(crate) h: Matrix6<f64>,
+    pub(crate) b: Vector6<f64>,
+}
+
+impl NormalEquations {
+    pub(crate) fn zero() -> Self {
+        Self { h: Matrix6::zeros(), b: Vector6::zeros() }
+    }
+
+    pub(crate) fn add_run(&mut self, run: &Run) {
+        for (k, row) in run.rows.iter().enumerate() {
+            for (n, &value) in row[..6].iter().enumerate() {
+                self.h[(k, n)] += f64::from(value);
+            }
+            self.b[k] += f64::from(row[6]);
+        }
+    }
+
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.h += other.h;
+        self.b += other.b;
+    }
+}
