@@ -103,13 +103,8 @@ fn hang(facing: &Vector3<f64>) -> Rotation3<f64> {
 
 /// Sum of the area vectors over the sum of their lengths: length 1 for a plane, 0 for a closed surface.
 pub(crate) fn mean_normal(mesh: &TriangleMesh) -> Vector3<f64> {
-    let (mut sum, mut total) = (Vector3::zeros(), 0.0);
-    for face in &mesh.faces {
-        let [a, b, c] = face.map(|i| Vector3::from(mesh.positions[i as usize].map(f64::from)));
-        let area = (b - a).cross(&(c - a));
-        sum += area;
-        total += area.norm();
-    }
+    let (sum, total) =
+        mesh.area_vectors().fold((Vector3::zeros(), 0.0), |(sum, total), area| (sum + area, total + area.norm()));
     if total > 0.0 { sum / total } else { sum }
 }
 

@@ -56,6 +56,9 @@ struct Arguments {
     /// Seed of the world, the wind and the errors
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Memory that the mission may need by estimate, GiB
+    #[arg(long, value_name = "GIB", value_parser = positive, default_value_t = 8.0)]
+    memory_gib: f64,
     /// Worker threads, 1 to 1024 [default: all cores]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -192,6 +195,7 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
         .map_err(|e| format!("{}: cannot be created ({e}): choose another --out", folder.display()))?;
     let mut settings =
         MissionSettings { seed: arguments.seed, layered: arguments.layers, ..MissionSettings::default() };
+    settings.memory_gib = arguments.memory_gib;
     arguments.nozzle.apply(&mut settings);
     settings.placement = arguments.placement.picture()?;
     settings.viewpoint = arguments.placement.project;

@@ -24,6 +24,9 @@ use crate::surface::PaintSurface;
 /// A mission is given up when more of the wanted paint than this is out of reach.
 const MAX_UNREACHABLE_SHARE: f64 = 0.9;
 
+/// Flight logs are most of what a mission keeps: the built-in wall of 10.6 m² takes 200 MB with texels of 1.25 cm.
+const BYTES_PER_SQUARE_METRE: f64 = 2e7;
+
 /// Everything a mission made; what the report, the pictures and the recording are drawn from.
 pub struct Mission {
     pub(super) settings: MissionSettings,
@@ -57,6 +60,7 @@ impl Mission {
         let robot = Robot::new(ptu);
         let appearance = Appearance::charcoal_on_sandstone()?;
 
+        check_memory(mesh, &settings)?;
         let stage = Stage::start("unwrap");
         let surface = PaintSurface::new(mesh, settings.texel, &|s| stage.share(s))?;
         stage.done(&describe(&surface));
@@ -147,6 +151,16 @@ impl Mission {
             Isometry3::new(ptu.tilt_from_tip, raised(ptu.gun_pitch)),
         ]
     }
+}
+
+/// Refuses a surface whose flight would not fit: before anything is computed, since nothing could be said afterwards.
+fn check_memory(mesh: &TriangleMesh, settings: &MissionSettings) -> Result<(), MissionError> {
+    let area = mesh.area();
+    let need_gib = area * BYTES_PER_SQUARE_METRE / f64::from(1 << 30);
+    if need_gib > settings.memory_gib {
+        return Err(MissionError::TooLarge { area, need_gib, limit_gib: settings.memory_gib });
+    }
+    Ok(())
 }
 
 fn describe(surface: &PaintSurface) -> String {

@@ -21,6 +21,8 @@ pub struct MissionSettings {
     pub placement: PicturePlacement,
     /// From where the design is thrown onto the surface; `None` lays it over the chart.
     pub viewpoint: Option<Viewpoint>,
+    /// Memory that a mission may need by estimate, GiB. Default 8.
+    pub memory_gib: f64,
     /// Which painter decides.
     pub painter: PainterChoice,
     /// Paint in layers by intensity, the base coat first, each with a flight of its own (Paper IV, section 3.3). Default: one
@@ -54,6 +56,7 @@ impl Default for MissionSettings {
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             texel: 0.0125,
             spot: 0.025,
+            memory_gib: 8.0,
             placement: PicturePlacement::default(),
             viewpoint: None,
             painter: PainterChoice::Feedback,
