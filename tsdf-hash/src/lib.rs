@@ -43,14 +43,15 @@
 //! | mesh | thesis Paper I, section 4.6, by marching cubes; case table derived: ours | [`Map::mesh`], [`write_ply`] |
 //! | the same bytes on a GPU | ours | `GpuMap` (feature `gpu`) |
 //! | the mesh of a growing map, evicted blocks included | thesis Paper I, section 4.6 | [`IncrementalMesher`] |
-//! | a surface seen from a pose | thesis Paper I, section 4.1 | [`Map::ray_cast`], [`View`] |
+//! | a surface seen from a pose | thesis Paper I, section 4.1 | [`Map::ray_cast`], [`View`], [`Map::cast`] |
+//! | tracking: Eqs. (5.2) and (5.3), coarse to fine; degenerate directions: ours | thesis Paper I, section 4.1 | [`Tracker`], [`TrackingOutcome`] |
 //! | `R(v) = α n/n_max + β (1 − abs(sdf)/μ)`, Eqs. (5.4)-(5.6) | thesis Paper I, section 4.4, corrected | [`IncrementalRayCast`] |
 //! | forward projection of a view between ray casts | thesis Paper I, section 6.2 | [`View::warped`] |
 //! | distance queries | thesis, outlook | [`Map::distance`], [`Map::distance_and_gradient`] |
 //! | distances for planners, far from surfaces | thesis, outlook; branch and bound over sites: ours | [`DistanceField`] |
 //!
 //! Frames: the camera's z looks forward, `x` to the right and `y` down in its image; the world is the caller's. Distances
-//! are positive on the camera's side of a surface. Metres. Tracking is not part of this crate yet.
+//! are positive on the camera's side of a surface. Metres.
 
 mod blocks;
 mod changes;
@@ -104,11 +105,13 @@ pub use mesh::triangle_mesh::Mesh;
 pub use nalgebra;
 pub use ray_cast::incremental::{IncrementalRayCast, IncrementalRayCastSettings};
 pub use ray_cast::settings::RayCastSettings;
+pub use ray_cast::single_ray::SurfaceHit;
 pub use ray_cast::view::View;
 pub use report::{FrameReport, MemoryUsage};
 pub use settings::{MemoryLimits, NoiseModel, Settings};
 pub use storage::merge_policy::{MergeDecision, MergeImmediately, MergePolicy};
 pub use storage::reloaded::ReloadedBlocks;
+pub use tracking::keyframes::KeyframeIndex;
 pub use tracking::outcome::{PosePrior, TrackingOutcome, TrackingStatus};
 pub use tracking::settings::TrackingSettings;
 pub use tracking::tracker::Tracker;

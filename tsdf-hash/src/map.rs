@@ -20,6 +20,7 @@ use crate::mesh::triangle_mesh::Mesh;
 use crate::ray_cast::camera::Camera;
 use crate::ray_cast::caster;
 use crate::ray_cast::settings::RayCastSettings;
+use crate::ray_cast::single_ray::{self, SurfaceHit};
 use crate::ray_cast::view::View;
 use crate::report::{FrameReport, MemoryUsage};
 use crate::settings::{MemoryLimits, Settings};
@@ -331,6 +332,12 @@ impl Map {
     pub fn distance_and_gradient(&self, point_in_world: &Point3<f64>) -> Option<(f64, Vector3<f64>)> {
         let cell = self.cell_around(point_in_world)?;
         Some((cell.distance(), cell.gradient() / self.settings.voxel_size))
+    }
+
+    /// Where a ray from `origin` along `direction`, of any length, first meets the surface in active memory within `max_distance` metres;
+    /// `None` if it meets none there, or the solid from a side that was never seen. [`ray_cast`](Self::ray_cast) is for images.
+    pub fn cast(&self, origin: &Point3<f64>, direction: &Vector3<f64>, max_distance: f64) -> Option<SurfaceHit> {
+        single_ray::cast(&self.settings, |key| self.storage.active.get(key), origin, direction, max_distance)
     }
 
     fn cell_around(&self, point_in_world: &Point3<f64>) -> Option<TrilinearCell> {

@@ -9,6 +9,7 @@ pub(crate) mod lanes;
 pub(crate) mod march;
 pub(crate) mod pixel;
 pub(crate) mod settings;
+pub(crate) mod single_ray;
 mod splat;
 pub(crate) mod tiles;
 pub(crate) mod unpacked;

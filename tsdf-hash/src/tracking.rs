@@ -2,6 +2,7 @@
 
 pub(crate) mod directions;
 pub(crate) mod image_level;
+pub(crate) mod keyframes;
 pub(crate) mod model_points;
 pub(crate) mod normal_equations;
 pub(crate) mod outcome;

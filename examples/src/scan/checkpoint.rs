@@ -9,8 +9,8 @@ use vio_ekf::{Trajectory, tum};
 
 use super::error::ScanError;
 
-/// Name of the metadata: the folder, the number of frames that are done, and the trajectory.
-const KEYS: [&str; 3] = ["scan.sequence", "scan.frames_done", "scan.trajectory"];
+/// Names of the metadata: the folder, the stamp of the last frame that is done, and the trajectory.
+const KEYS: [&str; 3] = ["scan.sequence", "scan.last_stamp", "scan.trajectory"];
 /// Saving takes no larger share of the time than this.
 const LARGEST_SHARE: f64 = 0.1;
 
@@ -25,8 +25,8 @@ pub struct CheckpointSettings {
 
 /// What a stored run had done.
 pub(super) struct Progress {
-    /// Frames of the sequence that need not be looked at again.
-    pub(super) frames_done: usize,
+    /// Seconds; frames up to this one need not be looked at again.
+    pub(super) last_stamp: f64,
     /// The poses of those that were fused.
     pub(super) trajectory: Trajectory,
 }
@@ -41,15 +41,15 @@ impl Progress {
         if of != name(sequence) {
             return Ok(None);
         }
-        let frames_done = done.parse().map_err(|_| fault(format!("its frame count is \"{done}\"")))?;
+        let last_stamp = done.parse().map_err(|_| fault(format!("its last stamp is \"{done}\"")))?;
         let trajectory = if rows.is_empty() { Trajectory::default() } else { tum::read(&rows)? };
-        Ok(Some(Self { frames_done, trajectory }))
+        Ok(Some(Self { last_stamp, trajectory }))
     }
 }
 
 /// The metadata of a run.
-pub(super) fn metadata(sequence: &Path, frames_done: usize, trajectory: &Trajectory) -> BTreeMap<String, Vec<u8>> {
-    let values = [name(sequence), frames_done.to_string(), tum::write(trajectory)];
+pub(super) fn metadata(sequence: &Path, last_stamp: f64, trajectory: &Trajectory) -> BTreeMap<String, Vec<u8>> {
+    let values = [name(sequence), last_stamp.to_string(), tum::write(trajectory)];
     KEYS.iter().map(|key| (*key).to_string()).zip(values.map(String::into_bytes)).collect()
 }
 
@@ -74,7 +74,7 @@ impl Checkpoints {
         &mut self,
         map: Option<&Map>,
         sequence: &Path,
-        frames_done: usize,
+        last_stamp: f64,
         trajectory: &Trajectory,
     ) -> Result<(), ScanError> {
         let (Some(settings), Some(map)) = (&self.settings, map) else { return Ok(()) };
@@ -82,7 +82,7 @@ impl Checkpoints {
         if start < self.next {
             return Ok(());
         }
-        map.save(&settings.path, None, &metadata(sequence, frames_done, trajectory))?;
+        map.save(&settings.path, None, &metadata(sequence, last_stamp, trajectory))?;
         self.next = Instant::now() + settings.interval.max(start.elapsed().div_f64(LARGEST_SHARE));
         Ok(())
     }

@@ -2,7 +2,9 @@
 
 use cpu_time::ProcessTime;
 use nalgebra::Isometry3;
-use tsdf_hash::{ColourView, DepthView, PosePrior, Tracker, TrackingOutcome, TrackingSettings, TrackingStatus};
+use tsdf_hash::{
+    ColourView, DepthView, KeyframeIndex, PosePrior, Tracker, TrackingOutcome, TrackingSettings, TrackingStatus,
+};
 
 use super::error::ScanError;
 use super::map_store::MapStore;
@@ -34,6 +36,7 @@ pub(super) struct Odometry {
     last: Option<Isometry3<f64>>,
     before: Option<Isometry3<f64>>,
     lost: bool,
+    keyframes: KeyframeIndex,
     pub(super) metrics: TrackingMetrics,
 }
 
@@ -41,7 +44,14 @@ impl Odometry {
     pub(super) fn new(map: &tsdf_hash::Settings) -> Result<Self, ScanError> {
         let settings = TrackingSettings { noise: map.noise, threads: map.threads, ..TrackingSettings::default() };
         let tracker = Tracker::new(settings)?;
-        Ok(Self { tracker, last: None, before: None, lost: false, metrics: TrackingMetrics::default() })
+        Ok(Self {
+            tracker,
+            last: None,
+            before: None,
+            lost: false,
+            keyframes: KeyframeIndex::new(),
+            metrics: TrackingMetrics::default(),
+        })
     }
 
     /// Goes on from a pose.
@@ -60,6 +70,7 @@ impl Odometry {
         let Some(last) = self.last else {
             let first = frame.world_from_camera.unwrap_or_else(Isometry3::identity);
             self.start(first);
+            self.keyframes.add(depth, colour, &first)?;
             return Ok(first);
         };
         let start = ProcessTime::now();
@@ -69,13 +80,22 @@ impl Odometry {
             // The camera may have stopped.
             outcome = self.track(store, depth, colour, last)?;
         }
+        if !outcome.is_tracked()
+            && let Some(found) = self.tracker.relocalise(store.dense(), depth, colour, &mut self.keyframes)?
+        {
+            outcome = found;
+            self.before = None;
+            self.last = None;
+        }
         self.metrics.seconds.push(start.elapsed().as_secs_f64());
         self.note(frame, &outcome);
         if !outcome.is_tracked() {
             self.before = None;
             return Err(ScanError::Lost(reason(&outcome)));
         }
-        (self.before, self.last) = (Some(last), Some(outcome.world_from_camera));
+        // After a jump the last two poses are no motion.
+        (self.before, self.last) = (self.last, Some(outcome.world_from_camera));
+        self.keyframes.add(depth, colour, &outcome.world_from_camera)?;
         Ok(outcome.world_from_camera)
     }
 

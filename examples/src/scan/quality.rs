@@ -76,7 +76,7 @@ impl Quality {
         if outcome.overlap >= OVERLAP {
             self.agreement.push(outcome.agreement);
         }
-        if self.agreement.len() >= 3
+        if self.agreement.len() >= 2
             && self.median_agreement() < LOW_AGREEMENT
             && !std::mem::replace(&mut self.warned[1], true)
         {

@@ -129,7 +129,7 @@ impl Scan {
                     run.skipped.push((index, format!("{name}{why}")));
                 }
             }
-            checkpoints.save(run.store.map(), folder, index + 1, &run.trajectory)?;
+            checkpoints.save(run.store.map(), folder, sequence.frames[index].stamp, &run.trajectory)?;
         }
         if run.fused.is_empty() && run.resumed == 0 {
             let first = run.skipped.first().map_or_else(String::new, |(_, why)| why.clone());
@@ -143,7 +143,8 @@ impl Scan {
 
     /// What a later run over the same sequence needs to know, for [`Map::save`].
     pub fn metadata(&self, folder: &Path, sequence: &Sequence) -> std::collections::BTreeMap<String, Vec<u8>> {
-        metadata(folder, sequence.frames.len(), &self.trajectory)
+        let last = sequence.frames.last().map_or(f64::NEG_INFINITY, |frame| frame.stamp);
+        metadata(folder, last, &self.trajectory)
     }
 
     /// Whether at least half of the work was done.
@@ -184,7 +185,8 @@ impl<'a> Run<'a> {
             PoseSource::Given => None,
             PoseSource::Tracked => Some(Odometry::new(store.settings())?),
         };
-        let progress = progress.unwrap_or(Progress { frames_done: 0, trajectory: Trajectory::default() });
+        let progress =
+            progress.unwrap_or(Progress { last_stamp: f64::NEG_INFINITY, trajectory: Trajectory::default() });
         if let (Some(odometry), Some(last)) = (&mut odometry, progress.trajectory.poses().last()) {
             odometry.start(*last);
         }
@@ -196,7 +198,7 @@ impl<'a> Run<'a> {
             odometry,
             size: sequence.image_size,
             leaving: settings.map.memory.host_bytes > 0,
-            resumed: progress.frames_done.min(sequence.frames.len()),
+            resumed: sequence.frames.partition_point(|frame| frame.stamp <= progress.last_stamp),
             trajectory: progress.trajectory,
             fused: Vec::new(),
             skipped: Vec::new(),
@@ -222,7 +224,9 @@ impl<'a> Run<'a> {
             (None, Some(pose)) => pose,
             (None, None) => given_pose(frame)?,
         };
-        if given.is_some() && self.due(index) && self.store.dense().blocks() > 0 {
+        // Twice as often as the map is cast: what is wrong is to be said early.
+        let looked_at = index.is_multiple_of((self.settings.ray_cast_every / 2).max(1));
+        if given.is_some() && looked_at && self.store.dense().blocks() > 0 {
             self.metrics.quality.check(&name, &mut self.store, &depth, &pose)?;
         }
         let start = ProcessTime::now();
@@ -319,7 +323,7 @@ fn initial_map(folder: &Path, settings: &ScanSettings) -> Result<(Map, Option<Pr
     let file = MapFile::open(path).map_err(stored)?;
     let progress = Progress::read(path, &file, folder)?;
     if let Some(progress) = &progress {
-        eprintln!("{}: goes on after frame {}", path.display(), progress.frames_done);
+        eprintln!("{}: goes on after the frame of {} s", path.display(), progress.last_stamp);
     }
     let tsdf_hash::Settings { max_bytes, threads, memory, .. } = settings.map;
     let continued = tsdf_hash::Settings { max_bytes, threads, memory, ..*file.settings() };

@@ -40,32 +40,66 @@ impl ImageLevel {
         let (near, far) = (near as f32, far as f32);
         let invert = |z: f32| if z >= near && z <= far { 1.0 / z } else { 0.0 };
         let (w, width) = (depth.width, self.width);
-        let mut cell = Vec::with_capacity(factor * factor);
+        // Whole rows at a time, because the arithmetic then runs in vector registers.
+        let mut rows = vec![0.0; w * factor];
+        let (mut least, mut sum, mut count) = (vec![0.0; width], vec![0.0; width], vec![0.0; width]);
         for v in 0..self.height {
-            for u in 0..width {
-                cell.clear();
-                for y in v * factor..(v + 1) * factor {
-                    let row = y * w + u * factor..y * w + (u + 1) * factor;
-                    match depth.data {
-                        DepthData::U16 { data, scale } => {
-                            let metres = (1.0 / scale) as f32;
-                            let invert = |d: u16| if d == u16::MAX { 0.0 } else { invert(f32::from(d) * metres) };
-                            cell.extend(data[row].iter().map(|&d| invert(d)));
-                        }
-                        DepthData::F32 { data } => cell.extend(data[row].iter().map(|&z| invert(z))),
+            let from = v * factor * w;
+            match depth.data {
+                DepthData::U16 { data, scale } => {
+                    let metres = (1.0 / scale) as f32;
+                    for (out, &d) in rows.iter_mut().zip(&data[from..]) {
+                        *out = if d == u16::MAX { 0.0 } else { invert(f32::from(d) * metres) };
                     }
                 }
-                self.omega[v * width + u] = nearest_surface(&cell, steepest);
+                DepthData::F32 { data } => {
+                    rows.iter_mut().zip(&data[from..]).for_each(|(out, &z)| *out = invert(z));
+                }
+            }
+            least.fill(0.0);
+            for row in rows.chunks_exact(w) {
+                for (least, cell) in least.iter_mut().zip(row.chunks_exact(factor)) {
+                    cell.iter().for_each(|&omega| *least = if omega > *least { omega } else { *least });
+                }
+            }
+            least.iter_mut().for_each(|nearest| *nearest = of_nearest(*nearest, steepest));
+            sum.fill(0.0);
+            count.fill(0.0);
+            for row in rows.chunks_exact(w) {
+                let sums = sum.iter_mut().zip(&mut count).zip(&least);
+                for (((sum, count), &least), cell) in sums.zip(row.chunks_exact(factor)) {
+                    for &omega in cell {
+                        let taken = if omega >= least { 1.0 } else { 0.0 };
+                        *sum += taken * omega;
+                        *count += taken;
+                    }
+                }
+            }
+            let out = &mut self.omega[v * width..][..width];
+            for ((out, sum), count) in out.iter_mut().zip(&sum).zip(&count) {
+                *out = if *count > 0.0 { sum / count } else { 0.0 };
             }
         }
         self.intensity.clear();
         if let Some(colour) = colour {
-            self.read_intensity(depth, colour, factor);
+            match colour.data {
+                ColourData::Rgb8(data) => self.read_intensity(depth, colour, factor, |at| f32::from(data[at])),
+                ColourData::Rgb16(data) => {
+                    self.read_intensity(depth, colour, factor, |at| f32::from(data[at]) * (255.0 / 65535.0));
+                }
+            }
         }
         self.differentiate();
     }
 
-    fn read_intensity(&mut self, depth: &DepthView, colour: &ColourView, factor: usize) {
+    /// `channel` looks up a value of the colour image, 0..=255.
+    fn read_intensity(
+        &mut self,
+        depth: &DepthView,
+        colour: &ColourView,
+        factor: usize,
+        channel: impl Fn(usize) -> f32,
+    ) {
         // From pixels of the depth image to those of the colour image.
         let (d, c) = (&depth.intrinsics, &colour.intrinsics);
         let columns: Vec<Option<usize>> =
@@ -77,12 +111,17 @@ impl ImageLevel {
             let line = &mut self.intensity[start..];
             for y in v * factor..(v + 1) * factor {
                 let row = nearest((y as f64 - d.cy) / d.fy * c.fy + c.cy, colour.height);
-                for (u, column) in columns.iter().enumerate() {
-                    // Where the colour camera does not look there is no intensity: a NaN spreads.
-                    line[u / factor] += match (row, column) {
-                        (Some(row), Some(column)) => share * luma(&colour.data, 3 * (row * colour.width + column)),
-                        _ => f32::NAN,
-                    };
+                for (out, columns) in line.iter_mut().zip(columns.chunks_exact(factor)) {
+                    for &column in columns {
+                        // Where the colour camera does not look there is no intensity: a NaN spreads.
+                        *out += match (row, column) {
+                            (Some(row), Some(column)) => {
+                                let at = 3 * (row * colour.width + column);
+                                share * grey([channel(at), channel(at + 1), channel(at + 2)])
+                            }
+                            _ => f32::NAN,
+                        };
+                    }
                 }
             }
         }
@@ -139,16 +178,17 @@ impl ImageLevel {
     }
 }
 
-/// The mean inverse depth of the nearest surface in a cell: a mean across an edge would be of no surface.
+/// The least inverse depth that can be of the nearest surface in a cell: a mean across an edge would be of no surface.
+fn of_nearest(nearest: f32, steepest: f32) -> f32 {
+    (nearest * (1.0 - steepest) - 1e-6).max(f32::MIN_POSITIVE)
+}
+
+/// The mean inverse depth of the nearest surface.
 fn nearest_surface(cell: &[f32], steepest: f32) -> f32 {
-    let nearest = cell.iter().fold(0.0_f32, |a, &b| a.max(b));
-    let least = nearest * (1.0 - steepest) - 1e-6;
+    let least = of_nearest(cell.iter().fold(0.0_f32, |a, &b| a.max(b)), steepest);
     let (mut sum, mut count) = (0.0, 0.0);
-    for &omega in cell {
-        if omega >= least && omega > 0.0 {
-            sum += omega;
-            count += 1.0;
-        }
+    for &omega in cell.iter().filter(|omega| **omega >= least) {
+        (sum, count) = (sum + omega, count + 1.0);
     }
     if count > 0.0 { sum / count } else { 0.0 }
 }
@@ -158,16 +198,7 @@ fn nearest(at: f64, size: usize) -> Option<usize> {
     (at >= 0.0 && at < size as f64).then_some(at as usize)
 }
 
-/// Rec. 601 luma of a pixel, 0..=255.
-fn luma(data: &ColourData, at: usize) -> f32 {
-    let channel = |k: usize| match data {
-        ColourData::Rgb8(data) => f32::from(data[at + k]),
-        ColourData::Rgb16(data) => f32::from(data[at + k]) * (255.0 / 65535.0),
-    };
-    grey([channel(0), channel(1), channel(2)])
-}
-
-/// Rec. 601.
+/// Rec. 601 luma.
 pub(crate) fn grey([r, g, b]: [f32; 3]) -> f32 {
     0.299 * r + 0.587 * g + 0.114 * b
 }

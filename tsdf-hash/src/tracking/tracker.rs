@@ -10,6 +10,7 @@ use crate::ray_cast::settings::RayCastSettings;
 use crate::ray_cast::view::View;
 use crate::tracking::directions::{Directions, LEAST_SHARE};
 use crate::tracking::image_level::{ImageLevel, reduced};
+use crate::tracking::keyframes::KeyframeIndex;
 use crate::tracking::model_points::{ModelPoint, model_points};
 use crate::tracking::outcome::{PosePrior, TrackingOutcome, TrackingStatus};
 use crate::tracking::pose::{moved, step};
@@ -20,6 +21,8 @@ use crate::tracking::settings::TrackingSettings;
 /// Chi-squared of six degrees of freedom, 99 %.
 const CHI_SQUARED: f64 = 16.81;
 const LEVELS: usize = 3;
+/// Keyframes that a lost camera is tracked from (ours).
+const CANDIDATES: usize = 5;
 /// Directions with less than this share of the information of the best known one wait for a finer level (ours): what the
 /// coarse ones know of them are the rims of things, which are a pixel off.
 const LEAST_SHARES: [f64; LEVELS] = [LEAST_SHARE, 1e-3, 2e-3];
@@ -77,6 +80,37 @@ impl Tracker {
         self.track_view(&view, map.settings().voxel_size, depth, colour, prior)
     }
 
+    /// Finds a lost camera: the frame is tracked from the poses of the keyframes that look most like it, and the pose that agrees best with
+    /// the map is taken, if it agrees by [`TrackingSettings::relocalise_agreement`] and is fixed in all directions.
+    ///
+    /// # Errors
+    /// As [`track`](Self::track).
+    pub fn relocalise(
+        &mut self,
+        map: &mut dyn DenseMap,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        keyframes: &mut KeyframeIndex,
+    ) -> Result<Option<TrackingOutcome>, Error> {
+        let mut best: Option<TrackingOutcome> = None;
+        for pose in keyframes.candidates(depth, colour, CANDIDATES)? {
+            let mut outcome =
+                self.track(map, depth, colour, &PosePrior { world_from_camera: pose, covariance: None })?;
+            if outcome.is_tracked() {
+                // Once more from there: the first model was seen from the keyframe.
+                let prior = PosePrior { world_from_camera: outcome.world_from_camera, covariance: None };
+                outcome = self.track(map, depth, colour, &prior)?;
+            }
+            let sure = outcome.is_tracked()
+                && outcome.agreement >= self.settings.relocalise_agreement
+                && outcome.degenerate.is_empty();
+            if sure && best.as_ref().is_none_or(|best| outcome.agreement > best.agreement) {
+                best = Some(outcome);
+            }
+        }
+        Ok(best)
+    }
+
     /// The map as the tracker wants it, seen from a pose.
     ///
     /// # Errors
@@ -88,7 +122,7 @@ impl Tracker {
         colour: bool,
         world_from_camera: &Isometry3<f64>,
     ) -> Result<View, Error> {
-        let factor = self.settings.reduction;
+        let factor = self.settings.reduction(depth.width);
         let &crate::Settings { min_depth, max_depth, .. } = map.settings();
         let cast = RayCastSettings { min_depth, max_depth, colour, threads: self.settings.threads };
         let camera = reduced(&depth.intrinsics, factor);
@@ -123,7 +157,9 @@ impl Tracker {
             last = Some((search.refine(&comparison, most, LEAST_SHARES[level]), comparison));
         }
         let Some((last, comparison)) = last else { return Ok(lost(prior, TrackingStatus::NoOverlap)) };
-        Ok(self.outcome(&mut search, &last, &comparison, view, prior))
+        // The levels hold means of pixels: their noise is that much smaller.
+        let reduction = settings.reduction(depth.width) as f64;
+        Ok(self.outcome(&mut search, &last, &comparison, view, reduction, prior))
     }
 
     fn comparison<'a>(&'a self, view: &View, voxel_size: f64, level: usize) -> Comparison<'a> {
@@ -142,7 +178,7 @@ impl Tracker {
     fn read(&mut self, view: &View, depth: &DepthView, colour: Option<&ColourView>) {
         let range = [1e-3, 1e3];
         let [fine, middle, coarse] = &mut self.levels;
-        fine.read(depth, colour, self.settings.reduction, range);
+        fine.read(depth, colour, self.settings.reduction(depth.width), range);
         fine.halve(middle);
         middle.halve(coarse);
         // The finest level takes every other point: neighbours say nearly the same.
@@ -157,6 +193,7 @@ impl Tracker {
         last: &Evaluation,
         comparison: &Comparison,
         view: &View,
+        reduction: f64,
         prior: &PosePrior,
     ) -> TrackingOutcome {
         let share = |part: u32, whole: u32| f64::from(part) / f64::from(whole.max(1));
@@ -166,7 +203,7 @@ impl Tracker {
         let (Some(directions), true) = (found, last.partners > 0) else {
             return TrackingOutcome { overlap, agreement, ..lost(prior, TrackingStatus::NoOverlap) };
         };
-        let scatter = scatter(view, comparison, &self.settings, f64::from(search.scales.depth));
+        let scatter = scatter(view, comparison, reduction * f64::from(search.scales.depth));
         let mut all = Vec::new();
         let (scales, brightness) = (search.scales, search.brightness);
         let mut dense = |pose: &Isometry3<f64>| {
@@ -214,13 +251,11 @@ impl Tracker {
     }
 }
 
-/// Variance of the model's normals by the noise that was fused, radians squared: the weight of a voxel says how much noise is left.
-fn scatter(view: &View, comparison: &Comparison, settings: &TrackingSettings, scale: f64) -> f64 {
+/// Variance of the model's normals by the noise that was fused, radians squared, `scale` times that of the noise model: the weight of a voxel says how much noise is left.
+fn scatter(view: &View, comparison: &Comparison, scale: f64) -> f64 {
     let weights = view.weights.iter().filter(|w| **w > 0);
     let (sum, count) = weights.fold((0.0, 0.0), |(sum, count), w| (sum + 1.0 / f64::from(*w), count + 1.0_f64));
-    // The levels of the tracker hold means of as many pixels: their scale is that much smaller than that of a pixel.
-    let scale = scale * settings.reduction as f64;
-    let step = settings.noise.base * scale / (2.0 * f64::from(comparison.tolerance));
+    let step = comparison.noise.base * scale / (2.0 * f64::from(comparison.tolerance));
     f64::from(MAX_WEIGHT) * step * step * sum / count.max(1.0)
 }
 

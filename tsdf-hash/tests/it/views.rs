@@ -412,3 +412,38 @@ fn what_is_occluded_is_not_shown() {
     old.update(&map.reloaded_blocks(), &CAMERA, SIZE, &to).unwrap();
     check(old.view());
 }
+
+/// Every ray of an image one by one, against the closed form; along the axes, oblique, and from outside of all blocks.
+#[test]
+fn single_rays_meet_the_room_where_it_is() {
+    let mut map = Map::new(Settings { voxel_size: 0.02, ..Settings::default() }).unwrap();
+    for shot in room::tour(20, 2, &Isometry3::identity()) {
+        map.integrate(&shot.view(), None, &shot.world_from_camera).unwrap();
+    }
+    let (mut hits, mut errors) = (0, Vec::new());
+    for k in 0..400 {
+        let pose = room::pose(k, 400);
+        let origin = Point3::from(pose.translation.vector);
+        let aside = 0.4 * (f64::from(k as u32) * 0.7).sin();
+        let direction = pose.rotation * Vector3::new(aside, 0.1, 1.0) * 3.0;
+        let expected = room::hit(&origin, &direction) * direction.norm();
+        let Some(hit) = map.cast(&origin, &direction, 10.0) else { continue };
+        hits += 1;
+        errors.push((hit.distance - expected).abs());
+        assert!((hit.point - origin).norm() - hit.distance < 1e-9 && hit.normal.dot(&direction) < 0.0);
+        // A shorter ray ends before it.
+        assert!(map.cast(&origin, &direction, hit.distance - 0.05).is_none());
+    }
+    errors.sort_unstable_by(f64::total_cmp);
+    assert!(hits > 380, "{hits}");
+    assert!(
+        errors[hits / 2] < 0.5e-3 && errors[hits * 9 / 10] < 5e-3,
+        "{} {}",
+        errors[hits / 2],
+        errors[hits * 9 / 10]
+    );
+    let origin = Point3::new(0.0, 0.0, 1.5);
+    assert!(map.cast(&origin, &Vector3::zeros(), 10.0).is_none());
+    assert!(map.cast(&origin, &Vector3::x(), f64::NAN).is_none());
+    assert!(map.cast(&Point3::new(1e9, 0.0, 0.0), &Vector3::x(), 1.0).is_none());
+}
