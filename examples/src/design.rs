@@ -7,6 +7,8 @@ use paint_net::procedural::{fbm, value_noise};
 use uv_param::{Texture, luminance};
 
 use crate::mesh_io::TriangleMesh;
+use crate::picture_placement::PicturePlacement;
+use crate::projection::{Projection, Viewpoint};
 use crate::surface::PaintSurface;
 
 /// Largest ink asked for by the built-in designs: full black would need endless paint.
@@ -24,7 +26,7 @@ pub enum Design {
     Stripes,
     /// From bare wall on the left to dark on the right, with a ripple.
     Gradient,
-    /// A picture, stretched over the surface's box; dark means paint.
+    /// A picture where [`PicturePlacement`] puts it; dark means paint.
     Picture(Picture),
     /// A picture on the mesh's own texture coordinates; dark means paint.
     Texture(Picture),
@@ -72,8 +74,15 @@ impl Design {
         }
     }
 
-    /// Ink wanted on every texel of a surface made from `mesh`.
-    pub fn on_surface(&self, surface: &PaintSurface, mesh: &TriangleMesh) -> Result<Image, DesignError> {
+    /// Ink wanted on every texel of a surface made from `mesh`. Designs that do not lie on the mesh itself are laid over the
+    /// chart's box, or with a viewpoint over what is seen from there; a picture lies in that box as `placement` says.
+    pub fn on_surface(
+        &self,
+        surface: &PaintSurface,
+        mesh: &TriangleMesh,
+        placement: &PicturePlacement,
+        viewpoint: Option<Viewpoint>,
+    ) -> Result<Image, DesignError> {
         let (width, height) = (surface.width(), surface.height());
         let texture = match self {
             Self::Texture(picture) => {
@@ -90,11 +99,12 @@ impl Design {
                 Texture::from_vertices(&surface.texels, surface.disk(), &grey)?
             }
             _ => {
-                let texel = surface.texels.texel_m;
-                let extent = (width as f64 * texel, height as f64 * texel);
-                return Ok(Image::from_fn(width, height, |x, y| {
-                    self.ink((x as f64 + 0.5) * texel, (y as f64 + 0.5) * texel, extent)
-                }));
+                let (places, extent) = match viewpoint {
+                    None => chart_places(surface),
+                    Some(viewpoint) => projected_places(surface, viewpoint),
+                };
+                let ink = |place: &Option<[f64; 2]>| place.map_or(0.0, |at| self.ink(at, extent, placement));
+                return Ok(Image::new(width, height, places.iter().map(ink).collect())?);
             }
         };
         let ink = texture.texels.iter().map(|t| DARKEST * (1.0 - f64::from(t[0])).clamp(0.0, 1.0)).collect();
@@ -103,8 +113,8 @@ impl Design {
 
     /// Ink wanted at `(x, y)` metres from the top-left corner of a surface of the given width and height; none for designs
     /// that lie on the mesh itself.
-    fn ink(&self, x: f64, y: f64, (width, height): (f64, f64)) -> f64 {
-        let (u, v) = (x / width, y / height);
+    fn ink(&self, [x, y]: [f64; 2], extent: [f64; 2], placement: &PicturePlacement) -> f64 {
+        let (u, v) = (x / extent[0], y / extent[1]);
         match self {
             Self::Strata { seed } => strata(*seed, x, y, u, v),
             Self::Stripes => {
@@ -115,10 +125,43 @@ impl Design {
                 let ripple = 0.06 * (std::f64::consts::TAU * v * 3.0).sin() * (std::f64::consts::PI * u).sin();
                 (DARKEST * u + ripple).clamp(0.0, DARKEST)
             }
-            Self::Picture(picture) => DARKEST * f64::from(1.0 - picture.sample(u, v)),
+            Self::Picture(picture) => placement
+                .locate([x, y], extent, picture.aspect())
+                .map_or(0.0, |[u, v]| DARKEST * f64::from(1.0 - picture.sample(u, v))),
             Self::Texture(_) | Self::VertexColours => 0.0,
         }
     }
+}
+
+/// Metres from the upper left corner of the chart of every texel's middle, and the chart's width and height.
+fn chart_places(surface: &PaintSurface) -> (Vec<Option<[f64; 2]>>, [f64; 2]) {
+    let (width, texel) = (surface.width(), surface.texels.texel_m);
+    let place = |k: usize| Some([k % width, k / width].map(|c| (c as f64 + 0.5) * texel));
+    let extent = [width, surface.height()].map(|side| side as f64 * texel);
+    ((0..width * surface.height()).map(place).collect(), extent)
+}
+
+/// Metres from the upper left corner of what is seen from a viewpoint, for every texel that is seen, and its width and height.
+fn projected_places(surface: &PaintSurface, viewpoint: Viewpoint) -> (Vec<Option<[f64; 2]>>, [f64; 2]) {
+    let projection = Projection::new(viewpoint, surface);
+    let width = surface.width();
+    let seen = |k: usize| {
+        let on_surface = surface.texels.at(k % width, k / width)?;
+        let point = surface.chart.point(on_surface);
+        let at = projection.project(&point)?;
+        projection.sees(surface, &point, &surface.chart.face_normal(on_surface.face)).then_some(at)
+    };
+    let mut places: Vec<Option<[f64; 2]>> = (0..width * surface.height()).map(seen).collect();
+    let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
+    for at in places.iter().flatten() {
+        for c in 0..2 {
+            (low[c], high[c]) = (low[c].min(at[c]), high[c].max(at[c]));
+        }
+    }
+    for at in places.iter_mut().flatten() {
+        *at = [at[0] - low[0], high[1] - at[1]];
+    }
+    (places, [0, 1].map(|c| (high[c] - low[c]).max(f64::MIN_POSITIVE)))
 }
 
 /// Strata: a base coat that breathes, bands that dip and pinch, and a dark foot that fades upwards.
@@ -160,6 +203,11 @@ impl Picture {
         Ok(Self { grey })
     }
 
+    /// Width over height.
+    pub fn aspect(&self) -> f64 {
+        f64::from(self.grey.width()) / f64::from(self.grey.height())
+    }
+
     /// Bilinear grey value at `(u, v)` in `[0, 1]`, v down; clamped to the border.
     pub fn sample(&self, u: f64, v: f64) -> f32 {
         let (w, h) = (self.grey.width(), self.grey.height());
@@ -176,13 +224,14 @@ impl Picture {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::picture_placement::PlacementMode;
 
     #[test]
     fn ink_stays_between_bare_and_darkest() {
         for design in [Design::Strata { seed: 3 }, Design::Stripes, Design::Gradient] {
             for k in 0..2000 {
                 let (x, y) = (f64::from(k % 50) * 0.1, f64::from(k / 50) * 0.05);
-                let ink = design.ink(x, y, (5.0, 2.0));
+                let ink = design.ink([x, y], [5.0, 2.0], &PicturePlacement::default());
                 assert!((0.0..=DARKEST).contains(&ink), "{design:?} at {x}, {y}: {ink}");
             }
         }
@@ -192,9 +241,10 @@ mod tests {
     fn a_picture_is_dark_where_it_is_dark() {
         let grey = image::ImageBuffer::from_fn(4, 2, |x, _| image::Luma([x as f32 / 3.0]));
         let design = Design::Picture(Picture { grey });
-        assert!((design.ink(0.0, 0.5, (1.0, 1.0)) - DARKEST).abs() < 1e-6);
-        assert!(design.ink(1.0, 0.5, (1.0, 1.0)).abs() < 1e-6);
-        assert!((design.ink(0.5, 0.5, (1.0, 1.0)) - 0.5 * DARKEST).abs() < 1e-6);
+        let stretched = PicturePlacement { mode: PlacementMode::Stretch, ..PicturePlacement::default() };
+        assert!((design.ink([0.0, 0.5], [1.0, 1.0], &stretched) - DARKEST).abs() < 1e-6);
+        assert!(design.ink([1.0, 0.5], [1.0, 1.0], &stretched).abs() < 1e-6);
+        assert!((design.ink([0.5, 0.5], [1.0, 1.0], &stretched) - 0.5 * DARKEST).abs() < 1e-6);
     }
 
     #[test]

@@ -8,14 +8,17 @@ pub mod mesh_io;
 pub mod mesh_placement;
 pub mod mission;
 pub mod paint_image;
+pub mod picture_placement;
 pub mod pictures;
 pub mod progress;
+pub mod projection;
 pub mod recording;
 pub mod report;
 pub mod scan;
 pub mod scan_flight;
 pub mod surface;
 pub mod targets;
+pub mod textured_mesh;
 pub mod vio;
 pub mod world;
 

@@ -85,13 +85,16 @@ pub fn place_mesh(mesh: &mut TriangleMesh, placement: MeshPlacement) -> Result<P
     Ok(PlacementResult { scale, hung })
 }
 
-/// The rotation that makes a flat piece face -x: about z alone if it already stands, else tipped up first.
+/// The rotation that makes a flat piece face -x: about z alone if it already stands. One that lies is tipped up first, so that
+/// who looks at it from above with y up and x to the right sees it so on the wall.
 fn hang(facing: &Vector3<f64>) -> Rotation3<f64> {
     let flat = Vector3::new(facing.x, facing.y, 0.0);
     let tip = if flat.norm() > 0.7 * facing.norm() {
         Rotation3::identity()
     } else {
-        Rotation3::rotation_between(facing, &-Vector3::x()).unwrap_or_else(Rotation3::identity)
+        let hung = Rotation3::from_basis_unchecked(&[-Vector3::y(), Vector3::z(), -Vector3::x()]);
+        let straighten = Rotation3::rotation_between(&(hung * facing), &-Vector3::x());
+        straighten.unwrap_or_else(Rotation3::identity) * hung
     };
     let tipped = tip * facing;
     let about_z = std::f64::consts::PI - tipped.y.atan2(tipped.x);
@@ -100,13 +103,8 @@ fn hang(facing: &Vector3<f64>) -> Rotation3<f64> {
 
 /// Sum of the area vectors over the sum of their lengths: length 1 for a plane, 0 for a closed surface.
 pub(crate) fn mean_normal(mesh: &TriangleMesh) -> Vector3<f64> {
-    let (mut sum, mut total) = (Vector3::zeros(), 0.0);
-    for face in &mesh.faces {
-        let [a, b, c] = face.map(|i| Vector3::from(mesh.positions[i as usize].map(f64::from)));
-        let area = (b - a).cross(&(c - a));
-        sum += area;
-        total += area.norm();
-    }
+    let (sum, total) =
+        mesh.area_vectors().fold((Vector3::zeros(), 0.0), |(sum, total), area| (sum + area, total + area.norm()));
     if total > 0.0 { sum / total } else { sum }
 }
 
@@ -138,6 +136,31 @@ mod tests {
         let normal = mean_normal(&mesh);
         assert!((normal + Vector3::x()).norm() < 1e-6, "{normal}");
         assert!((bounds(&mesh).0.z - CLEAR_OF_GROUND).abs() < 1e-5);
+    }
+
+    /// A map lies on a table, north away from the viewer: on the wall north is up and east to the right of the robot, which
+    /// looks along x.
+    #[test]
+    fn what_lies_is_hung_as_it_is_looked_at() {
+        let map = |up: UpAxis| {
+            // Corners: south west, south east, north east, north west.
+            let flat = [[0.0_f32, 0.0], [3.0, 0.0], [3.0, 2.0], [0.0, 2.0]];
+            let mut mesh = square(flat.map(|[east, north]| match up {
+                UpAxis::Y => [east, 0.0, -north],
+                _ => [east, north, 0.0],
+            }));
+            place_mesh(&mut mesh, MeshPlacement { scale: Some(1.0), up }).unwrap();
+            mesh.positions
+        };
+        for up in [UpAxis::Y, UpAxis::Z] {
+            let [south_west, south_east, north_east, north_west] = map(up)[..] else { panic!("four corners") };
+            for (south, north) in [(south_west, north_west), (south_east, north_east)] {
+                assert!((north[2] - south[2] - 2.0).abs() < 1e-5, "{up:?}");
+            }
+            for (west, east) in [(south_west, south_east), (north_west, north_east)] {
+                assert!((west[1] - east[1] - 3.0).abs() < 1e-5, "{up:?}");
+            }
+        }
     }
 
     #[test]

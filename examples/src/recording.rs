@@ -20,8 +20,8 @@ pub struct RobotState {
     pub time: f64,
     /// Pose of the body.
     pub world_from_body: Isometry3<f64>,
-    /// Pose of the nozzle: x along the spray.
-    pub world_from_nozzle: Isometry3<f64>,
+    /// Along the arm: pan in the body's frame, tilt in pan's, the nozzle in tilt's (x along the spray).
+    pub arm: [Isometry3<f64>; 3],
     /// Pan and tilt, radians.
     pub joints: [f64; 2],
     /// Where the spray axis meets the surface.
@@ -83,14 +83,19 @@ pub fn save_recording(
             recorder.write(text, *time, &log_message(*time, message))?;
         }
         let stamp = Some(Timestamp::saturating_from_epoch_secs_f64(state.time));
-        let in_world = |child: &str, pose: &Isometry3<f64>| FrameTransform {
+        let frame = |parent: &str, child: &str, pose: &Isometry3<f64>| FrameTransform {
             timestamp: stamp,
-            parent_frame_id: "world".into(),
+            parent_frame_id: parent.into(),
             child_frame_id: child.into(),
             translation: Some(vector(pose)),
             rotation: Some(quaternion(pose)),
         };
-        let frames = vec![in_world("body", &state.world_from_body), in_world("nozzle", &state.world_from_nozzle)];
+        let frames = vec![
+            frame("world", "body", &state.world_from_body),
+            frame("body", "pan", &state.arm[0]),
+            frame("pan", "tilt", &state.arm[1]),
+            frame("tilt", "nozzle", &state.arm[2]),
+        ];
         recorder.write(transforms, state.time, &FrameTransforms { transforms: frames })?;
         let body = Some(Pose {
             position: Some(vector(&state.world_from_body)),
@@ -198,7 +203,7 @@ fn robot_scene() -> SceneUpdate {
 
 /// The arm from body to nozzle, and the spray ray: blue while the valve is open.
 fn spray_scene(state: &RobotState) -> SceneUpdate {
-    let tip = Point3::from(state.world_from_nozzle.translation.vector);
+    let tip = Point3::from((state.world_from_body * state.arm[0] * state.arm[1] * state.arm[2]).translation.vector);
     let end = state.hit.unwrap_or(tip);
     let body = Point3::from(state.world_from_body.translation.vector);
     let line = |a: Point3<f64>, b: Point3<f64>, thickness: f64, colour: [u8; 3]| LinePrimitive {
@@ -242,7 +247,7 @@ mod tests {
         let moment = |time: f64| RobotState {
             time,
             world_from_body: Isometry3::translation(1.0, 2.0, 3.0),
-            world_from_nozzle: Isometry3::translation(1.5, 2.0, 3.0),
+            arm: [Isometry3::translation(0.5, 0.0, 0.0), Isometry3::identity(), Isometry3::identity()],
             joints: [0.1, -0.2],
             hit: Some(Point3::new(1.6, 2.0, 3.0)),
             flow: 1e-7,

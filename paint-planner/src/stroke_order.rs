@@ -6,31 +6,15 @@
 
 mod local_search;
 mod lower_bound;
+mod stroke;
 mod transit_cost;
 
 use crate::error::Error;
 use crate::settings::Settings;
 use crate::target::{Target, check_each};
 use local_search::Tour;
+pub use stroke::{OrderedStroke, StrokeEnds};
 use transit_cost::TransitCost;
-
-/// Where a stroke begins and ends, in the direction in which it was drawn.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StrokeEnds {
-    /// Its first target.
-    pub first: Target,
-    /// Its last target.
-    pub last: Target,
-}
-
-/// A stroke in the order of the flight.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct OrderedStroke {
-    /// Index into the strokes that were given.
-    pub index: usize,
-    /// Flown from its last target to its first.
-    pub reversed: bool,
-}
 
 /// The order of a flight.
 #[derive(Debug, Clone, PartialEq)]

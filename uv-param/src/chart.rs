@@ -15,8 +15,8 @@ use locate::Grid;
 pub(crate) use locate::inside;
 pub use surface_point::SurfacePoint;
 
-/// The layout of a [`Disk`]: one uv point in metres per vertex, `0 <= u <= width`, `0 <= v <= height`, `width >=
-/// height`. Not mirrored: seen from the side the normals point to, u runs right and v runs up.
+/// The layout of a [`Disk`]: one uv point in metres per vertex, `0 <= u <= width`, `0 <= v <= height`. Not
+/// mirrored: seen from the side the normals point to, u runs right and v runs up.
 #[derive(Debug, Clone)]
 pub struct Chart {
     disk: Disk,
@@ -29,8 +29,8 @@ pub struct Chart {
 }
 
 impl Chart {
-    /// A chart from a layout of your own (metres, one point per disk vertex): it is turned into its smallest box, long
-    /// side horizontal, and its distortion is measured. `up` as in [`crate::Settings::up`]; `iterations` is only reported.
+    /// A chart from a layout of your own (metres, one point per disk vertex): it is turned upright or into its
+    /// smallest box, and its distortion is measured. `up` as in [`crate::Settings::up`]; `iterations` is only reported.
     ///
     /// # Errors
     /// [`Error::Length`], [`Error::NonFiniteValue`], or [`Error::FlatPoints`] for a layout on one line.

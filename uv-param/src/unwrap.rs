@@ -32,8 +32,8 @@ pub struct Settings {
     pub tolerance: f64,
     /// Energy. Default [`Method::Auto`].
     pub method: Method,
-    /// Direction in the input's frame that should point up (towards larger v) in the chart: of the two turns that keep
-    /// the long side of the box horizontal the one that obeys it better is taken. Default `None`: the smaller turn.
+    /// Direction in the input's frame that points up (towards larger v) in the chart, so that pictures stand upright. On a
+    /// surface that lies level on the whole, and by default (`None`), the long side of the smallest box is horizontal.
     pub up: Option<[f64; 3]>,
 }
 

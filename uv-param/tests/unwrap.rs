@@ -153,6 +153,38 @@ fn a_wall_stands_upright_and_is_not_mirrored() {
     }
 }
 
+/// Portrait, square and landscape pieces, turned in their own plane by any angle: the highest point of the surface is the
+/// highest point of the chart, and the box is no larger than it must be.
+#[test]
+fn charts_stand_upright_whatever_their_shape() {
+    for (width, height) in [(1.0, 3.0), (2.0, 2.0), (3.0, 1.0)] {
+        for degrees in [0.0_f64, 20.0, 45.0, 130.0, 250.0] {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let place = |s: f64, t: f64| {
+                let (x, z) = (width * (s - 0.5), height * (t - 0.5));
+                [cos * x - sin * z, 0.0, sin * x + cos * z]
+            };
+            let settings = Settings { up: Some([0.0, 0.0, 1.0]), ..exact(Method::Auto) };
+            let chart = lay_out(&grid(6, 6, place), &settings);
+            let lowest = chart.disk().positions().iter().map(|p| p[2]).fold(f64::MAX, f64::min);
+            for (uv, p) in chart.uv().iter().zip(chart.disk().positions()) {
+                assert!(
+                    (uv[1] - (p[2] - lowest)).abs() < 1e-9,
+                    "{width} x {height} at {degrees} degrees: {uv:?} {p:?}"
+                );
+            }
+        }
+    }
+}
+
+/// A floor has no upper side: its smallest box decides.
+#[test]
+fn a_level_chart_lies_along_its_long_side() {
+    let settings = Settings { up: Some([0.0, 0.0, 1.0]), ..exact(Method::Auto) };
+    let chart = lay_out(&grid(4, 8, |s, t| [s, 3.0 * t, 0.0]), &settings);
+    assert!((chart.width() - 3.0).abs() < 1e-9 && (chart.height() - 1.0).abs() < 1e-9);
+}
+
 #[test]
 fn the_flip_free_energy_is_stationary_where_it_stops() {
     // Moving any vertex a little from the result must not lower the energy: a check that knows nothing of the gradient.

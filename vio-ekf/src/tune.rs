@@ -10,8 +10,10 @@
 //! The logarithm keeps one bad recording from deciding; the second term fixes the level of all noise, of which the error
 //! alone knows the ratios only.
 
+mod cross_validation;
 mod points;
 
+pub use cross_validation::{HeldOut, penalty};
 pub use points::PointRecording;
 
 use bobyqa::{Bobyqa, Config, RestartConfig};

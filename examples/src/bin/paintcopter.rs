@@ -3,11 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{Parser, ValueEnum};
+use clap::{Args, Parser, ValueEnum};
+use paint_planner::TimingPolicy;
 use paintcopter_examples::design::{Design, Picture};
 use paintcopter_examples::mesh_io::{TriangleMesh, read_mesh};
 use paintcopter_examples::mesh_placement::{MeshPlacement, UpAxis, place_mesh};
 use paintcopter_examples::mission::{Mission, MissionSettings, PainterChoice, save};
+use paintcopter_examples::picture_placement::{PicturePlacement, PlacementMode};
+use paintcopter_examples::projection::Viewpoint;
 use paintcopter_examples::scan_flight::{ScanFlight, save as save_scan_flight};
 use paintcopter_examples::world::rock_wall;
 
@@ -34,6 +37,8 @@ struct Arguments {
     /// [default: strata on the rock wall, stripes on a mesh]
     #[arg(long)]
     design: Option<String>,
+    #[command(flatten)]
+    placement: Placement,
     /// Scan the surface first, with the robot's own camera, inertial sensor and depth camera, and paint what it has mapped
     #[arg(long, conflicts_with = "texture")]
     scan: bool,
@@ -43,15 +48,118 @@ struct Arguments {
     /// Paint in layers by intensity, a flight for each [default: one flight whose flow carries the picture]
     #[arg(long)]
     layers: bool,
+    #[command(flatten)]
+    nozzle: Nozzle,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/paintcopter")]
     out: PathBuf,
     /// Seed of the world, the wind and the errors
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Worker threads [default: all cores]
-    #[arg(long)]
-    threads: Option<usize>,
+    /// Memory that the mission may need by estimate, GiB
+    #[arg(long, value_name = "GIB", value_parser = positive, default_value_t = 8.0)]
+    memory_gib: f64,
+    /// Worker threads, 1 to 1024 [default: all cores]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+/// The spray and how it moves.
+#[derive(Args)]
+struct Nozzle {
+    /// Size of a texel, metres [default: 0.0125]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    texel: Option<f64>,
+    /// Standard deviation of a spray spot at the stand-off, metres [default: 0.025]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    spot: Option<f64>,
+    /// Distance of the nozzle from the surface, metres, within 0.05 to 0.15 [default: 0.1]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    stand_off: Option<f64>,
+    /// Speed of the spot over the surface, metres per second [default: 0.4]
+    #[arg(long, value_name = "M_PER_S", value_parser = positive)]
+    speed: Option<f64>,
+    /// Most that the valve gives, litres per minute [default: 0.12]
+    #[arg(long, value_name = "L_PER_MIN", value_parser = positive)]
+    max_flow: Option<f64>,
+}
+
+impl Nozzle {
+    fn apply(&self, settings: &mut MissionSettings) {
+        settings.texel = self.texel.unwrap_or(settings.texel);
+        settings.spot = self.spot.unwrap_or(settings.spot);
+        let planner = &mut settings.planner;
+        planner.nozzle.stand_off = self.stand_off.unwrap_or(planner.nozzle.stand_off);
+        if let Some(speed) = self.speed {
+            planner.timing.policy = TimingPolicy::Uniform { speed };
+            planner.timing.max_speed = planner.timing.max_speed.max(1.25 * speed);
+        }
+        planner.timing.max_flow = self.max_flow.map_or(planner.timing.max_flow, |flow| flow * 1e-3 / 60.0);
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|v: &f64| v.is_finite() && *v > 0.0);
+    value.ok_or_else(|| "give a positive number".to_owned())
+}
+
+/// Where a picture of --design lies.
+#[derive(Args)]
+struct Placement {
+    /// How large a picture becomes: whole within the surface, covering it, repeated, or stretched over it
+    #[arg(long, default_value = "fit")]
+    place: PlaceName,
+    /// Turn of the picture about its middle, degrees counter-clockwise
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    rotate: f64,
+    /// Where the middle of the picture lies beside that of the surface, metres to the right and up
+    #[arg(long, value_name = "X,Y", value_parser = numbers::<2>, default_value = "0,0", allow_hyphen_values = true)]
+    offset: [f64; 2],
+    /// Width of the picture, metres; its height follows [default: as --place says]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    size: Option<f64>,
+    /// Throw the design onto the surface like a slide: from the front, or from a point X,Y,Z (metres; the robot's side is -x, z
+    /// is up) [default: laid over the unwrapped surface]
+    #[arg(long, value_name = "front|X,Y,Z", value_parser = viewpoint, allow_hyphen_values = true)]
+    project: Option<Viewpoint>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum PlaceName {
+    Fit,
+    Fill,
+    Tile,
+    Stretch,
+}
+
+/// Finite numbers between commas.
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let parsed: Option<Vec<f64>> =
+        text.split(',').map(|part| part.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
+    parsed.and_then(|all| all.try_into().ok()).ok_or_else(|| format!("give {N} numbers with commas between them"))
+}
+
+fn viewpoint(text: &str) -> Result<Viewpoint, String> {
+    if text == "front" {
+        return Ok(Viewpoint::Front);
+    }
+    let point = numbers::<3>(text).map_err(|error| format!("{error}, or front"))?;
+    Ok(Viewpoint::Point(point.into()))
+}
+
+impl Placement {
+    fn picture(&self) -> Result<PicturePlacement, String> {
+        if !self.rotate.is_finite() {
+            return Err(format!("--rotate {}: give an angle in degrees", self.rotate));
+        }
+        let mode = match self.place {
+            PlaceName::Fit => PlacementMode::Fit,
+            PlaceName::Fill => PlacementMode::Fill,
+            PlaceName::Tile => PlacementMode::Tile,
+            PlaceName::Stretch => PlacementMode::Stretch,
+        };
+        Ok(PicturePlacement { mode, rotate: self.rotate.to_radians(), offset: self.offset, size: self.size })
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -87,8 +195,12 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
         .map_err(|e| format!("{}: cannot be created ({e}): choose another --out", folder.display()))?;
     let mut settings =
         MissionSettings { seed: arguments.seed, layered: arguments.layers, ..MissionSettings::default() };
+    settings.memory_gib = arguments.memory_gib;
+    arguments.nozzle.apply(&mut settings);
+    settings.placement = arguments.placement.picture()?;
+    settings.viewpoint = arguments.placement.project;
     if let Some(threads) = arguments.threads {
-        settings.threads = threads.clamp(1, 1024);
+        settings.threads = usize::from(threads);
     }
     settings.painter = match arguments.painter {
         PainterName::Feedback => PainterChoice::Feedback,

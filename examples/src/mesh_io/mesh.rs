@@ -1,5 +1,7 @@
 //! A triangle mesh as it stands in a file.
 
+use nalgebra::Vector3;
+
 /// A triangle mesh as it stands in a file: nothing welded, nothing repaired. Lengths in the file's unit.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TriangleMesh {
@@ -20,6 +22,21 @@ pub struct MeshUv {
     pub coordinates: Vec<[f32; 2]>,
     /// Indices into `coordinates`, three per triangle.
     pub faces: Vec<[u32; 3]>,
+}
+
+impl TriangleMesh {
+    /// Sum of the areas of its triangles, in the square of its unit; indices must be valid.
+    pub fn area(&self) -> f64 {
+        self.area_vectors().map(|vector| vector.norm()).sum()
+    }
+
+    /// Half the cross product of two sides of every triangle: along its normal, as long as its area.
+    pub(crate) fn area_vectors(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
+        self.faces.iter().map(|face| {
+            let [a, b, c] = face.map(|i| Vector3::from(self.positions[i as usize].map(f64::from)));
+            0.5 * (b - a).cross(&(c - a))
+        })
+    }
 }
 
 /// Splits a polygon into a fan of triangles about its first corner.

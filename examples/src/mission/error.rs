@@ -34,6 +34,19 @@ pub enum MissionError {
     /// The design asks for nothing that can be painted.
     #[error("the design leaves nothing to paint: {0}")]
     NothingToPaint(&'static str),
+    /// The flight would not fit into memory.
+    #[error(
+        "a surface of {area:.0} m² needs about {need_gib:.1} GiB of memory, more than --memory-gib {limit_gib}: paint it \
+         smaller (--scale), or allow more"
+    )]
+    TooLarge {
+        /// Area of the mesh, m².
+        area: f64,
+        /// Estimated need, GiB.
+        need_gib: f64,
+        /// What is allowed, GiB.
+        limit_gib: f64,
+    },
     /// Most of the wanted paint is out of reach.
     #[error(
         "{percent:.0} % of the wanted paint cannot be sprayed by any pose of the robot: turn the mesh (--up), change its \

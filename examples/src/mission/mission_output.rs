@@ -17,6 +17,7 @@ use crate::mesh_io::{PlyMesh, write_ply};
 use crate::pictures::{Panel, Polyline, Rgb, Scene, save_curves, save_error_map, save_scene};
 use crate::progress::Stage;
 use crate::recording::{ColouredMesh, RobotState, save_recording};
+use crate::textured_mesh::{TexturedMesh, with_gutter};
 
 /// Width and height of the rendered views, pixels.
 const VIEW: (u32, u32) = (1500, 940);
@@ -26,6 +27,8 @@ const BACKGROUND: [u8; 3] = [255, 255, 255];
 const FILL: f64 = 0.86;
 /// Seconds between two states of the recording.
 const RECORDING_STEP: f64 = 0.1;
+/// Seconds between two rows of the trajectory.
+const TRAJECTORY_STEP: f64 = 0.05;
 /// Points in a curve: more than the picture has columns shows nothing more.
 const CURVE_POINTS: usize = 2800;
 
@@ -45,6 +48,8 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
     save_views(mission, folder)?;
     stage.share(0.8);
     save_angles(mission, &folder.join("angles.png"))?;
+    save_trajectory(mission, &folder.join("trajectory.csv"))?;
+    save_textured_mesh(mission, folder)?;
     save_mcap(
         mission,
         folder,
@@ -215,7 +220,7 @@ fn save_mcap(mission: &Mission, folder: &Path, mesh: &ColouredMesh) -> Result<()
         states.extend(f.flight.samples.iter().step_by(stride).map(|s| RobotState {
             time: start + s.time,
             world_from_body: s.world_from_body,
-            world_from_nozzle: mission.nozzle_pose(s),
+            arm: mission.arm(s),
             joints: s.pan_tilt,
             hit: s.hit,
             flow: s.flow,
@@ -225,6 +230,55 @@ fn save_mcap(mission: &Mission, folder: &Path, mesh: &ColouredMesh) -> Result<()
     save_recording(&folder.join("mission.mcap"), mesh, &states, &log_lines)?;
     Ok(())
 }
+
+/// Plan and flight as a table, one row every [`TRAJECTORY_STEP`] seconds.
+fn save_trajectory(mission: &Mission, path: &Path) -> Result<(), MissionError> {
+    let mut text = String::from(
+        "time_s,x_m,y_m,z_m,heading_rad,pan_rad,tilt_rad,flow_m3_per_s,target_x_m,target_y_m,target_z_m,flown_x_m,flown_y_m,\
+         flown_z_m,flown_qx,flown_qy,flown_qz,flown_qw,flown_pan_rad,flown_tilt_rad\n",
+    );
+    let mut start = 0.0;
+    for f in &mission.flights {
+        let stride = (TRAJECTORY_STEP / f.flight.interval).round().max(1.0) as usize;
+        for s in f.flight.samples.iter().step_by(stride) {
+            let planned = f.plan.setpoint(s.time);
+            let (p, aim) = (planned.sample.position, planned.aim);
+            let (flown, q) = (s.world_from_body.translation, s.world_from_body.rotation.coords);
+            let row = [
+                [start + s.time, p.x, p.y, p.z, planned.sample.heading, planned.pan, planned.tilt].as_slice(),
+                &[planned.flow, aim.x, aim.y, aim.z, flown.x, flown.y, flown.z],
+                &[q.x, q.y, q.z, q.w, s.pan_tilt[0], s.pan_tilt[1]],
+            ]
+            .concat();
+            let numbers: Vec<String> = row.iter().map(|v| format!("{v:.9}")).collect();
+            text += &numbers.join(",");
+            text.push('\n');
+        }
+        start += f.plan.trajectory.duration();
+    }
+    write(path, &text)
+}
+
+/// The painted part of the surface with the paint as its texture: `painted.glb`, and `painted.obj` with its material.
+fn save_textured_mesh(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
+    let painted = mission.painted_depth();
+    let (width, height) = (painted.width(), painted.height());
+    let pixel = |k: usize| (mission.coverage.data()[k] > 0.0).then(|| mission.appearance.srgb(painted.data()[k]));
+    let extent = [width, height].map(|side| side as f64 * mission.settings.texel);
+    let mesh = TexturedMesh {
+        positions: mission.surface.disk().positions(),
+        faces: mission.surface.disk().faces(),
+        uv: mission.surface.chart.uv().iter().map(|uv| [uv[0] / extent[0], uv[1] / extent[1]]).collect(),
+        texture: with_gutter(width, height, (0..width * height).map(pixel).collect()),
+    };
+    mesh.save(folder, "painted")
+        .map_err(|source| MissionError::Unwritable { path: folder.join("painted.*").display().to_string(), source })
+}
+
+fn write(path: &Path, text: &str) -> Result<(), MissionError> {
+    std::fs::write(path, text).map_err(|source| MissionError::Unwritable { path: path.display().to_string(), source })
+}
+
 fn picture_of(frame: &Frame) -> Rgb {
     Rgb::from_pixels(frame.width as usize, frame.height as usize, frame.colour.iter().copied())
 }

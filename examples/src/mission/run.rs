@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 use std::time::Instant;
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
 use paint_net::{Image, Painting};
 use paint_sim::Film;
 use paint_sim::flight::FlightSample;
-use ptu_kinematics::{Joints, Ptu};
+use ptu_kinematics::Ptu;
 
 use super::decide::decide;
 use super::error::MissionError;
@@ -23,6 +23,9 @@ use crate::surface::PaintSurface;
 
 /// A mission is given up when more of the wanted paint than this is out of reach.
 const MAX_UNREACHABLE_SHARE: f64 = 0.9;
+
+/// Flight logs are most of what a mission keeps: the built-in wall of 10.6 m² takes 200 MB with texels of 1.25 cm.
+const BYTES_PER_SQUARE_METRE: f64 = 2e7;
 
 /// Everything a mission made; what the report, the pictures and the recording are drawn from.
 pub struct Mission {
@@ -57,13 +60,15 @@ impl Mission {
         let robot = Robot::new(ptu);
         let appearance = Appearance::charcoal_on_sandstone()?;
 
+        check_memory(mesh, &settings)?;
         let stage = Stage::start("unwrap");
         let surface = PaintSurface::new(mesh, settings.texel, &|s| stage.share(s))?;
         stage.done(&describe(&surface));
 
         let coverage = surface.coverage();
         // Nothing is wanted beside the surface, and no more than the paint can show.
-        let mut wanted = design.on_surface(&surface, mesh)?.map(|ink| ink.min(appearance.ink().max_ink()));
+        let wanted = design.on_surface(&surface, mesh, &settings.placement, settings.viewpoint)?;
+        let mut wanted = wanted.map(|ink| ink.min(appearance.ink().max_ink()));
         for (ink, covered) in wanted.data_mut().iter_mut().zip(coverage.data()) {
             *ink *= covered;
         }
@@ -134,11 +139,28 @@ impl Mission {
         if wanted > 0.0 { (1.0 - planned / wanted).max(0.0) } else { 0.0 }
     }
 
-    /// The pose of the nozzle at a sample: x along the spray.
-    pub(super) fn nozzle_pose(&self, sample: &FlightSample) -> Isometry3<f64> {
-        let joints = Joints { pan: sample.pan_tilt[0], tilt: sample.pan_tilt[1] };
-        self.robot.chain.world_from_nozzle(&sample.world_from_body, joints)
+    /// The arm at a sample: pan in the body's frame, tilt in pan's, the nozzle in tilt's (x along the spray).
+    pub(super) fn arm(&self, sample: &FlightSample) -> [Isometry3<f64>; 3] {
+        let ptu = self.robot.chain.settings();
+        let [pan, tilt] = sample.pan_tilt;
+        // Up is against a turn about y, which points left.
+        let raised = |angle: f64| Vector3::y() * -angle;
+        [
+            Isometry3::new(ptu.body_from_pan_axis, Vector3::z() * pan),
+            Isometry3::new(ptu.pan_from_tilt_axis, raised(tilt)),
+            Isometry3::new(ptu.tilt_from_tip, raised(ptu.gun_pitch)),
+        ]
     }
+}
+
+/// Refuses a surface whose flight would not fit: before anything is computed, since nothing could be said afterwards.
+fn check_memory(mesh: &TriangleMesh, settings: &MissionSettings) -> Result<(), MissionError> {
+    let area = mesh.area();
+    let need_gib = area * BYTES_PER_SQUARE_METRE / f64::from(1 << 30);
+    if need_gib > settings.memory_gib {
+        return Err(MissionError::TooLarge { area, need_gib, limit_gib: settings.memory_gib });
+    }
+    Ok(())
 }
 
 fn describe(surface: &PaintSurface) -> String {

@@ -3,6 +3,9 @@
 use paint_net::Limits;
 use ptu_kinematics::{PtuSettings, ServoSettings};
 
+use crate::picture_placement::PicturePlacement;
+use crate::projection::Viewpoint;
+
 /// Everything a mission can be told.
 #[derive(Debug, Clone)]
 pub struct MissionSettings {
@@ -14,6 +17,12 @@ pub struct MissionSettings {
     pub texel: f64,
     /// Standard deviation of a spray spot at the stand-off, metres. Default 2.5 cm (Paper IV: half the radius of 5 cm).
     pub spot: f64,
+    /// Where a picture lies.
+    pub placement: PicturePlacement,
+    /// From where the design is thrown onto the surface; `None` lays it over the chart.
+    pub viewpoint: Option<Viewpoint>,
+    /// Memory that a mission may need by estimate, GiB. Default 8.
+    pub memory_gib: f64,
     /// Which painter decides.
     pub painter: PainterChoice,
     /// Paint in layers by intensity, the base coat first, each with a flight of its own (Paper IV, section 3.3). Default: one
@@ -47,6 +56,9 @@ impl Default for MissionSettings {
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             texel: 0.0125,
             spot: 0.025,
+            memory_gib: 8.0,
+            placement: PicturePlacement::default(),
+            viewpoint: None,
             painter: PainterChoice::Feedback,
             layered: false,
             limits: Limits { spray_spacing: 2, row_spacing: 3, min_volume: 0.01, ..Limits::default() },

@@ -151,6 +151,9 @@ pub(super) struct Tune {
     /// Weight of inconsistent covariances (NEES off 3) beside position errors
     #[arg(long, value_name = "WEIGHT", default_value_t = 0.5)]
     pub(super) consistency: f64,
+    /// Cost of a factor of ten away from the data sheet, as a share of the error; a factor of a hundred costs four times as much
+    #[arg(long, value_name = "WEIGHT", default_value_t = 0.03)]
+    pub(super) regularization: f64,
     /// Compare with so many points drawn at random
     #[arg(long, value_name = "NUMBER", default_value_t = 0)]
     pub(super) random: usize,

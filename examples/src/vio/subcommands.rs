@@ -225,6 +225,7 @@ fn search(arguments: &Tune) -> Result<(), AnyError> {
         search: TuneSettings { evaluations: arguments.evaluations, ..TuneSettings::default() },
         start: factors.map(f64::log10),
         consistency_weight: arguments.consistency.max(0.0),
+        regularization: arguments.regularization.max(0.0),
         random: arguments.random,
         seed: arguments.seed,
         resume: arguments.resume,
@@ -235,6 +236,17 @@ fn search(arguments: &Tune) -> Result<(), AnyError> {
         "position error {:.4} m at the start, {:.4} m now; NEES {:.1}, now {:.1}",
         report.ate_start_m, report.ate_best_m, report.nees_start, report.nees_best
     );
+    match (report.held_out_error_data_sheet_m, report.held_out_error_tuned_m) {
+        (Some(given), Some(tuned)) => {
+            eprintln!(
+                "on recordings left out: {given:.4} m with the noise given, {tuned:.4} m with that of the others"
+            );
+        }
+        _ => eprintln!("one recording only: nothing says what the result is worth on others"),
+    }
+    if report.data_sheet_kept {
+        eprintln!("no gain on what was left out: noise.yaml has the noise given");
+    }
     if let Some(ratio) = report.ratio_to_random {
         let (worse, points, seconds) = (100.0 * (ratio - 1.0), report.random_samples, report.search_wall_s);
         eprintln!("{worse:+.1} % against the best of {points} random points, after {seconds:.1} s");

@@ -56,6 +56,7 @@ fn options_that_make_no_sense_are_refused() {
     };
     let square = file("square.obj", &format!("{SQUARE}f 1 2 3\nf 1 3 4\n"));
     refused(&s, &["--mesh", &square, "--scale", "-1"], &["--scale -1", "positive"]);
+    refused(&s, &["--mesh", &square, "--scale", "60"], &["3600 m²", "--scale", "--memory-gib"]);
     refused(&s, &["--mesh", &square, "--design", "zebra"], &["zebra", "stripes"]);
     refused(&s, &["--mesh", &square, "--design", "colours"], &["vertex colours"]);
     refused(&s, &["--mesh", &square, "--texture", "none.png"], &["texture coordinates"]);

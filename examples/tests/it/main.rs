@@ -8,6 +8,7 @@ mod meshes;
 mod mission;
 mod module_graph;
 mod paint_image;
+mod placement;
 mod recorded;
 mod scan_flight;
 mod scratch;

@@ -3,7 +3,7 @@
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 
-use super::OrderedStroke;
+use super::stroke::OrderedStroke;
 use super::transit_cost::{End, TransitCost, other};
 
 /// Neighbours of every end that improvements are looked for among.
@@ -124,7 +124,7 @@ impl Tour {
         cost: &TransitCost,
     ) -> Option<usize> {
         let (entry, exit) = (self.entries[at], other(self.entries[at]));
-        let transits = [(entry, self.into_position(at, entry, cost)), (exit, self.out_of(at, exit, cost))];
+        let transits = [(entry, self.way_into(at, entry, cost)), (exit, self.way_out_of(at, exit, cost))];
         for (end, transit) in transits {
             // A gain needs a new transit that is shorter than the one it replaces (Lin and Kernighan 1973).
             for &near in neighbours[end].iter().take_while(|&&near| cost.between(end, near) < transit) {
@@ -148,9 +148,9 @@ impl Tour {
                 continue;
             }
             let before =
-                self.into_position(from, self.entries[from], cost) + self.out_of(to, other(self.entries[to]), cost);
+                self.way_into(from, self.entries[from], cost) + self.way_out_of(to, other(self.entries[to]), cost);
             let after =
-                self.into_position(from, other(self.entries[to]), cost) + self.out_of(to, self.entries[from], cost);
+                self.way_into(from, other(self.entries[to]), cost) + self.way_out_of(to, self.entries[from], cost);
             if after < before - GAIN {
                 reverse(&mut self.entries[from..=to]);
                 return true;
@@ -169,13 +169,13 @@ impl Tour {
                     continue;
                 }
                 let (first, last) = (self.entries[from], other(self.entries[to - 1]));
-                let closed = self.entries.get(to).map_or(0.0, |&next| self.into_position(from, next, cost));
-                let removed = self.into_position(from, first, cost) + self.out_of(to - 1, last, cost) - closed;
+                let closed = self.entries.get(to).map_or(0.0, |&next| self.way_into(from, next, cost));
+                let removed = self.way_into(from, first, cost) + self.way_out_of(to - 1, last, cost) - closed;
                 for slot in [there, there + 1].into_iter().filter(|slot| !(from..=to).contains(slot)) {
                     let open = removed + self.gap(slot, cost) - GAIN;
                     for (turned, first, last) in [(false, first, last), (true, last, first)] {
                         let out = self.entries.get(slot).map_or(0.0, |&next| cost.between(last, next));
-                        if self.into_position(slot, first, cost) + out < open {
+                        if self.way_into(slot, first, cost) + out < open {
                             self.shift(from, to, slot, turned);
                             return true;
                         }
@@ -203,11 +203,11 @@ impl Tour {
 
     /// Seconds of the transit before position `slot`; 0 behind the last stroke.
     fn gap(&self, slot: usize, cost: &TransitCost) -> f64 {
-        self.entries.get(slot).map_or(0.0, |&entry| self.into_position(slot, entry, cost))
+        self.entries.get(slot).map_or(0.0, |&entry| self.way_into(slot, entry, cost))
     }
 
     /// Seconds from what lies before a position to an end.
-    fn into_position(&self, position: usize, end: End, cost: &TransitCost) -> f64 {
+    fn way_into(&self, position: usize, end: End, cost: &TransitCost) -> f64 {
         match position.checked_sub(1) {
             Some(before) => cost.between(other(self.entries[before]), end),
             None => cost.first(end),
@@ -215,7 +215,7 @@ impl Tour {
     }
 
     /// Seconds from an end to what lies behind a position.
-    fn out_of(&self, position: usize, end: End, cost: &TransitCost) -> f64 {
+    fn way_out_of(&self, position: usize, end: End, cost: &TransitCost) -> f64 {
         self.entries.get(position + 1).map_or(0.0, |&next| cost.between(end, next))
     }
 }

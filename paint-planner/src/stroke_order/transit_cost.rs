@@ -1,6 +1,6 @@
 //! Estimated duration of a transit between two ends of strokes.
 
-use super::StrokeEnds;
+use super::stroke::StrokeEnds;
 use crate::angle::wrap;
 use crate::settings::{Settings, TimingPolicy, TimingSettings};
 use crate::target::Target;

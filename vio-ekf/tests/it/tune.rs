@@ -2,7 +2,9 @@
 
 use crate::support::flight::{GRAVITY, camera, spline};
 use vio_ekf::sim::ImuModel;
-use vio_ekf::tune::{NoisePoint, PointRecording, Score, Trial, TuneSettings, cost, tune, with_factors};
+use vio_ekf::tune::{
+    HeldOut, NoisePoint, PointRecording, Score, Trial, TuneSettings, cost, penalty, tune, with_factors,
+};
 use vio_ekf::{Error, ImuNoise, Settings};
 
 /// A bent valley with its floor at (1, -1, 0.5, -0.5, 0).
@@ -52,6 +54,32 @@ fn the_cost_is_an_error_and_a_consistency_in_logarithms() {
     assert!((cost(&[overconfident], 0.5) - (0.1_f64.ln() + 0.5 * 4_f64.ln())).abs() < 1e-12);
     assert!(cost(&[Score { lost: 0.5, ..consistent }], 0.5) > cost(&[Score { lost: 0.25, ..consistent }], 0.5));
     assert!(cost(&[Score { ate: f64::MAX, nees: [f64::MAX; 3], lost: 1.0 }], 0.5).is_finite());
+}
+
+/// Three recordings and three points, all consistent: the logarithms of the errors are the costs.
+#[test]
+fn what_a_search_is_worth_is_judged_on_what_it_has_not_seen() {
+    let scores = |errors: [f64; 3]| errors.map(|ate| Score { ate, nees: [3.0; 3], lost: 0.0 }).to_vec();
+    let (sheet, one) = ([0.0; 5], [1.0, 0.0, 0.0, 0.0, 0.0]);
+    // Best for each pair, and worse for the third by more: what is learnt does not carry over.
+    let overfit = vec![
+        (sheet, scores([0.1, 0.1, 0.1])),
+        (one, scores([0.05, 0.05, 0.4])),
+        ([2.0, 0.0, 0.0, 0.0, 0.0], scores([0.4, 0.05, 0.05])),
+        ([0.0, 1.0, 0.0, 0.0, 0.0], scores([0.05, 0.4, 0.05])),
+    ];
+    let found = HeldOut::of(&overfit, 0.5, 0.0).unwrap();
+    assert!((found.data_sheet - 0.1_f64.ln()).abs() < 1e-12 && (found.tuned - 0.4_f64.ln()).abs() < 1e-12, "{found:?}");
+    // A penalty of more than ln 2 per power of ten keeps the data sheet.
+    let kept = HeldOut::of(&overfit, 0.5, 0.7).unwrap();
+    assert_eq!(kept.tuned, kept.data_sheet);
+    // Better for all by a factor of two: a gain on each.
+    let sound = [(sheet, scores([0.1, 0.2, 0.3])), (one, scores([0.05, 0.1, 0.15]))];
+    let found = HeldOut::of(&sound, 0.5, 0.03).unwrap();
+    assert!((found.tuned - found.data_sheet - 0.5_f64.ln()).abs() < 1e-12, "{found:?}");
+    assert_eq!(HeldOut::of(&sound[1..], 0.5, 0.0), None);
+    assert_eq!(HeldOut::of(&[(sheet, scores([0.1; 3])[..1].to_vec())], 0.5, 0.0), None);
+    assert!((penalty(&[2.0, 0.0, -1.0, 0.0, 0.0], 0.03) - 0.15).abs() < 1e-12);
 }
 
 #[test]

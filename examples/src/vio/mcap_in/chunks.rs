@@ -68,20 +68,23 @@ impl Decompressor for Lz4 {
 
     fn decompress(&mut self, src: &[u8], dst: &mut [u8]) -> McapResult<DecompressResult> {
         let mut consumed = 0;
-        if let Self::Collecting(frame) = self {
-            let before = frame.len();
-            frame.extend_from_slice(src);
-            let Some(end) = frame_end(frame) else { return Ok(DecompressResult { consumed: src.len(), wrote: 0 }) };
-            frame.truncate(end);
-            consumed = end.saturating_sub(before);
-            *self = Self::Reading(Box::new(Lz4Frame::new(Cursor::new(std::mem::take(frame)))));
-        }
-        let Self::Reading(frame) = self else { return Ok(DecompressResult { consumed, wrote: 0 }) };
-        let wrote = frame.read(dst).map_err(|error| McapError::DecompressionError(error.to_string()))?;
-        if wrote == 0 && !dst.is_empty() {
+        loop {
+            if let Self::Collecting(frame) = self {
+                let before = frame.len();
+                frame.extend_from_slice(&src[consumed..]);
+                let Some(end) = frame_end(frame) else { return Ok(DecompressResult { consumed: src.len(), wrote: 0 }) };
+                frame.truncate(end);
+                consumed += end.saturating_sub(before);
+                *self = Self::Reading(Box::new(Lz4Frame::new(Cursor::new(std::mem::take(frame)))));
+            }
+            let Self::Reading(frame) = self else { return Ok(DecompressResult { consumed, wrote: 0 }) };
+            let wrote = frame.read(dst).map_err(|error| McapError::DecompressionError(error.to_string()))?;
+            if wrote > 0 || dst.is_empty() {
+                return Ok(DecompressResult { consumed, wrote });
+            }
+            // The frame has ended; another one may follow.
             *self = Self::new();
         }
-        Ok(DecompressResult { consumed, wrote })
     }
 
     fn reset(&mut self) -> McapResult<()> {

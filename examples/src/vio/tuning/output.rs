@@ -14,7 +14,7 @@ use crate::pictures::{Panel, save_curves};
 use crate::report::save_figures;
 use crate::vio::error::{VioError, write_file};
 
-/// Writes `noise.yaml`, `tune.png`, `report.md` and `report.json`.
+/// Writes `noise.yaml`, `settings.toml`, `tune.png`, `report.md` and `report.json`.
 pub(super) fn save(
     report: &TuningReport,
     data: &TuningData,
@@ -53,6 +53,9 @@ pub(super) fn save(
         noise.gyro_density, noise.gyro_walk, noise.accel_density, noise.accel_walk, base.1
     );
     write_file(&folder.join("noise.yaml"), yaml.as_bytes())?;
+    let path = folder.join("settings.toml");
+    let text = toml::to_string(&settings).map_err(|error| VioError::unwritable(&path, &error))?;
+    write_file(&path, text.as_bytes())?;
     write_file(&folder.join("report.md"), markdown(report, tuning, best, &settings).as_bytes())?;
     save_figures(report, folder)?;
     Ok(())
@@ -80,11 +83,20 @@ fn markdown(report: &TuningReport, tuning: &Tuning, best: [f64; 5], settings: &S
             report.random_samples
         );
     }
+    if let (Some(given), Some(tuned)) = (report.held_out_error_data_sheet_m, report.held_out_error_tuned_m) {
+        let kept =
+            if report.data_sheet_kept { " That is no gain: the noise of the data sheet is handed on." } else { "" };
+        let _ = writeln!(
+            text,
+            "\nOn recordings that were left out, one after the other: {given:.4} m with the noise of the data sheet, {tuned:.4} m with \
+             that which is best for the others.{kept}"
+        );
+    }
     let (patches, landmarks) = (&settings.patches, &settings.landmarks);
     let _ = writeln!(
         text,
-        "\nThe inertial noise is in [noise.yaml](noise.yaml), for `vio --imu`. For images: `intensity_sigma` {:.3}, `pixel_sigma` \
-         {:.4} of patches and {:.4} of landmarks. Every point tried is in [trials.csv](trials.csv), all figures in \
+        "\nThe inertial noise is in [noise.yaml](noise.yaml), for `vio --imu`, that of images in [settings.toml](settings.toml), for \
+         `vio --settings`: `intensity_sigma` {:.3}, `pixel_sigma` {:.4} of patches and {:.4} of landmarks. Every point tried is in [trials.csv](trials.csv), all figures in \
          [report.json](report.json).",
         patches.intensity_sigma, patches.pixel_sigma, landmarks.pixel_sigma
     );

@@ -35,6 +35,14 @@ pub struct TuningReport {
     pub factor_accel_walk: f64,
     /// Factor on the noise in images.
     pub factor_image: f64,
+    /// Weighted error of recordings that were left out, each judged with the noise of the data sheet; absent with one recording.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out_error_data_sheet_m: Option<f64>,
+    /// The same with the noise that is best for the others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out_error_tuned_m: Option<f64>,
+    /// Whether the data sheet is handed on because the search does not help on what it has not seen.
+    pub data_sheet_kept: bool,
     /// Points drawn at random.
     pub random_samples: usize,
     /// Weighted error of the best of them.

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
-use vio_ekf::tune::{NoisePoint, Score, Trial, cost, tune};
+use vio_ekf::tune::{HeldOut, NoisePoint, Score, Trial, cost, penalty, tune};
 
 use super::data::TuningData;
 use super::output::save;
@@ -16,6 +16,9 @@ use super::settings::Tuning;
 use super::trial_log::{append, read_trials, trials_text};
 use crate::progress::Stage;
 use crate::vio::error::{VioError, write_file};
+
+/// The noise as it is given.
+const DATA_SHEET: NoisePoint = [0.0; 5];
 
 /// Scores of all recordings at one point, some at a time.
 fn scores(data: &TuningData, point: &NoisePoint, threads: usize) -> Result<Vec<Score>, VioError> {
@@ -57,9 +60,12 @@ pub fn tune_noise(data: &TuningData, tuning: &Tuning, folder: &Path) -> Result<T
     let started = Instant::now();
 
     let stage = Stage::start("tune");
-    let evaluate = |point: &NoisePoint| {
+    let mut scored: Vec<(NoisePoint, Vec<Score>)> = Vec::new();
+    let mut evaluate = |point: &NoisePoint| {
         let scores = scores(data, point, tuning.threads)?;
-        Ok::<_, VioError>(cost(&scores, tuning.consistency_weight))
+        let value = cost(&scores, tuning.consistency_weight) + penalty(point, tuning.regularization);
+        scored.push((*point, scores));
+        Ok::<_, VioError>(value)
     };
     let found = tune(&tuning.start, &tuning.search, &known, |point| {
         computed += 1;
@@ -91,13 +97,17 @@ pub fn tune_noise(data: &TuningData, tuning: &Tuning, folder: &Path) -> Result<T
         stage.done(&format!("{} evaluations", random.len()));
     }
 
-    let (start, best) =
-        (scores(data, &tuning.start, tuning.threads)?, scores(data, &found.best.point, tuning.threads)?);
+    // Judged on recordings that were left out; what does not help there is not handed on.
+    evaluate(&DATA_SHEET)?;
+    let held_out = HeldOut::of(&scored, tuning.consistency_weight, tuning.regularization);
+    let data_sheet_kept = held_out.is_some_and(|held_out| held_out.tuned >= held_out.data_sheet);
+    let chosen = if data_sheet_kept { DATA_SHEET } else { found.best.point };
+    let (start, best) = (scores(data, &tuning.start, tuning.threads)?, scores(data, &chosen, tuning.threads)?);
     let geometric =
         |scores: &[Score]| (scores.iter().map(|s| s.ate.max(1e-9).ln()).sum::<f64>() / scores.len() as f64).exp();
     let nees = |scores: &[Score]| scores.iter().flat_map(|s| s.nees).sum::<f64>() / (3.0 * scores.len() as f64);
     let least = random.iter().map(|trial| trial.cost).fold(f64::INFINITY, f64::min);
-    let factor = found.best.point.map(|power| 10_f64.powf(power));
+    let factor = chosen.map(|power| 10_f64.powf(power));
     let report = TuningReport {
         version: env!("CARGO_PKG_VERSION"),
         recordings: data.len(),
@@ -114,6 +124,9 @@ pub fn tune_noise(data: &TuningData, tuning: &Tuning, folder: &Path) -> Result<T
         factor_accel_white: factor[2],
         factor_accel_walk: factor[3],
         factor_image: factor[4],
+        held_out_error_data_sheet_m: held_out.map(|held_out| held_out.data_sheet.exp()),
+        held_out_error_tuned_m: held_out.map(|held_out| held_out.tuned.exp()),
+        data_sheet_kept,
         random_samples: random.len(),
         weighted_error_random_m: (!random.is_empty()).then(|| least.exp()),
         ratio_to_random: (!random.is_empty()).then(|| (found.best.cost - least).exp()),

@@ -15,6 +15,8 @@ pub struct Tuning {
     pub start: NoisePoint,
     /// Weight of inconsistent covariances (NEES off 3) beside position errors.
     pub consistency_weight: f64,
+    /// Cost of a squared power of ten away from the data sheet.
+    pub regularization: f64,
     /// Points drawn at random inside the same bounds, to compare with.
     pub random: usize,
     /// Seed of these.
