@@ -228,9 +228,10 @@ fn redwood(folder: &Path) -> Result<Sequence> {
         poses.push(pose.map_err(|why| SequenceError::malformed(&path, 5 * index + 1, why))?);
     }
     let camera = folder.join("camera_primesense.json");
-    let (intrinsics, origin) = match camera.is_file() {
-        true => (json_camera(&camera)?, "camera_primesense.json"),
-        false => (USUAL_CAMERA, "assumed: there is no camera_primesense.json"),
+    let (intrinsics, origin) = if camera.is_file() {
+        (json_camera(&camera)?, "camera_primesense.json")
+    } else {
+        (USUAL_CAMERA, "assumed: there is no camera_primesense.json")
     };
     Ok(Sequence {
         layout: "Redwood",
