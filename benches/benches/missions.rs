@@ -103,7 +103,7 @@ fn table(missions: &[(u64, Vec<Check>)]) -> String {
         // Nothing is worse than a NaN.
         let margin = |check: &Check| if check.value.is_nan() { f64::NEG_INFINITY } else { check.margin() };
         let worst = column.iter().copied().min_by(|a, b| margin(a).total_cmp(&margin(b)));
-        let mut row = vec![column[0].figure.to_string(), column[0].must_text()];
+        let mut row = vec![column[0].figure.to_string(), column[0].requirement_text()];
         row.extend(column.iter().map(|c| show(c)));
         row.push(worst.filter(|c| c.margin() != f64::INFINITY).map_or("-".into(), show));
         row.push(if column.iter().all(|c| c.holds()) { "yes".into() } else { "NO".into() });

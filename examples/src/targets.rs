@@ -40,9 +40,9 @@ pub fn route(
     let ends: Vec<StrokeEnds> =
         lifted.iter().map(|targets| StrokeEnds { first: targets[0], last: targets[targets.len() - 1] }).collect();
     let order = order_strokes(&ends, from, settings)?;
-    let flown = order.strokes.iter().map(|stroke| match stroke.reversed {
-        false => lifted[stroke.index].clone(),
-        true => reversed(&lifted[stroke.index]),
+    let flown = order.strokes.iter().map(|stroke| {
+        let targets = &lifted[stroke.index];
+        if stroke.reversed { reversed(targets) } else { targets.clone() }
     });
     Ok(Route { targets: flown.flatten().collect(), strokes: ends.len(), lost, transit_s: order.transit_time })
 }

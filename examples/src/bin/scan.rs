@@ -32,8 +32,8 @@ struct Arguments {
     /// Camera of the depth images, pixels [default: what the recording says]
     #[arg(long, value_name = "FX,FY,CX,CY", value_parser = parse_intrinsics, allow_hyphen_values = true)]
     intrinsics: Option<Intrinsics>,
-    /// Where the colour camera stands, if the images are not registered: the 4x4 matrix depth_from_colour, then, if it is another camera,
-    /// fx fy cx cy
+    /// Where the colour camera stands, if the images are not registered: the 4x4 matrix that takes points of the colour
+    /// camera to the depth camera, then, if it is another camera, fx fy cx cy
     #[arg(long, value_name = "FILE")]
     depth_from_colour: Option<PathBuf>,
     /// Noise of the depth camera, BASE + QUADRATIC (z - NEAREST)^2 metres

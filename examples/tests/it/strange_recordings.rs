@@ -87,7 +87,9 @@ impl Ran {
     }
 
     fn says(&self, words: &[&str]) {
-        words.iter().for_each(|word| assert!(self.said.contains(word), "\"{word}\" is missing in: {}", self.said));
+        for word in words {
+            assert!(self.said.contains(word), "\"{word}\" is missing in: {}", self.said);
+        }
     }
 }
 
