@@ -1,5 +1,8 @@
 //! Mehrotra's predictor-corrector interior-point method for [`QuadraticProgram`]: every step is one block-tridiagonal
 //! factorisation and two substitutions.
+//!
+//! Kept beside Clarabel, which solves the same program as a general sparse one, because it takes a thirtieth of the time: 9.6 ms for
+//! 287 on a stroke of the built-in wall, in one run (`cargo bench -p paintcopter-benches --bench paint_planner`).
 
 use super::quadratic_program::{QuadraticProgram, Row};
 use crate::block_tridiagonal::BlockTridiagonal;
