@@ -248,7 +248,7 @@ impl Report {
             ("wanted.png", "Wanted"),
             ("painted.png", "Painted"),
             ("error.png", "Difference"),
-            ("path.png", "Flown path of the base coat: vehicle orange, nozzle blue"),
+            ("path.png", "Flown path, of the base coat if there are layers: vehicle orange, nozzle blue"),
             ("angles.png", "Pan, tilt, distance and normal deviation over time"),
         ] {
             let _ = writeln!(text, "**{caption}**\n\n![{caption}]({file})\n");
@@ -263,8 +263,9 @@ impl Report {
             text,
             "\nThe figures asked for are for the built-in rock; on other surfaces they are for orientation. All of them, in SI \
              units, are in [report.json](report.json). The recording [mission.mcap](mission.mcap) opens in Foxglove and \
-             Rerun, the painted mesh [surface.ply](surface.ply) and the \
-             depth camera's map of it [scan.ply](scan.ply) in any mesh viewer."
+             Rerun, the painted mesh [painted.glb](painted.glb) and the \
+             depth camera's map of it [scan.ply](scan.ply) in any mesh viewer; [trajectory.csv](trajectory.csv) has plan and \
+             flight as a table."
         );
         text
     }

@@ -109,7 +109,7 @@ fn save_views(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
     let frame = view(mission, &camera(mission, &corners)?, &painted)?;
     picture_of(&frame).save(&folder.join("painted_view.png"))?;
 
-    // The base coat alone: all layers on top of each other hide the surface and one another.
+    // Of layers the base coat alone: all of them on top of each other hide the surface and one another.
     let Some(base) = mission.flights.first() else { return Ok(()) };
     let path = |of: &dyn Fn(&FlightSample) -> Point3<f64>| -> Vec<Point3<f64>> {
         base.flight.samples.iter().step_by(10).map(of).collect()

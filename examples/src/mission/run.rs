@@ -26,6 +26,10 @@ const MAX_UNREACHABLE_SHARE: f64 = 0.9;
 
 /// Flight logs are most of what a mission keeps: the built-in wall of 10.6 m² takes 200 MB with texels of 1.25 cm.
 const BYTES_PER_SQUARE_METRE: f64 = 2e7;
+/// As many times as much with layers, on the same wall.
+const LAYERED: f64 = 2.2;
+/// The size of a texel for that, metres.
+const USUAL_TEXEL: f64 = 0.0125;
 
 /// Everything a mission made; what the report, the pictures and the recording are drawn from.
 pub struct Mission {
@@ -156,7 +160,10 @@ impl Mission {
 /// Refuses a surface whose flight would not fit: before anything is computed, since nothing could be said afterwards.
 fn check_memory(mesh: &TriangleMesh, settings: &MissionSettings) -> Result<(), MissionError> {
     let area = mesh.area();
-    let need_gib = area * BYTES_PER_SQUARE_METRE / f64::from(1 << 30);
+    // The way over the surface grows with the rows, its texels with their square.
+    let finer = USUAL_TEXEL / settings.texel;
+    let layers = if settings.layered { LAYERED } else { 1.0 };
+    let need_gib = layers * area * BYTES_PER_SQUARE_METRE * finer.max(finer * finer) / f64::from(1 << 30);
     if need_gib > settings.memory_gib {
         return Err(MissionError::TooLarge { area, need_gib, limit_gib: settings.memory_gib });
     }

@@ -24,15 +24,16 @@ pub struct ControllerSettings {
     pub attitude: f64,
     /// Yaw rate per heading error, 1/s. Default 3.
     pub heading: f64,
-    /// How fast the body makes room for its own tilt, so that the gun stays in its place, 1/s. Default 3; 0 not at all.
-    pub lever: f64,
+    /// Bandwidth with which the body moves so that the end of [`ReferenceState::lever`](super::ReferenceState::lever) stays in its
+    /// place when it tilts, 1/s. Default 3; 0 leaves it.
+    pub lever_rate: f64,
     /// The reference's jerk is the difference of its acceleration over this time, s. Default 0.1.
     pub jerk_window: f64,
 }
 
 impl Default for ControllerSettings {
     fn default() -> Self {
-        Self { position: 16.0, velocity: 8.0, attitude: 16.0, heading: 3.0, lever: 3.0, jerk_window: 0.1 }
+        Self { position: 16.0, velocity: 8.0, attitude: 16.0, heading: 3.0, lever_rate: 3.0, jerk_window: 0.1 }
     }
 }
 
@@ -55,13 +56,13 @@ impl CascadedController {
 
     /// Follows the displacement of the gun by roll and pitch with a lag: attitude is what the controller itself acts with, and
     /// only its slow part, against wind and hose, must be made good.
-    fn make_room(&mut self, time: f64, lever: &Vector3<f64>, estimate: &Estimate) -> Vector3<f64> {
+    fn compensate_lever(&mut self, time: f64, lever: &Vector3<f64>, estimate: &Estimate) -> Vector3<f64> {
         let [roll, pitch, yaw] = estimate.attitude;
         let level = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw);
         let displaced = Rotation3::from_euler_angles(roll, pitch, yaw) * level.inverse_transform_vector(lever) - lever;
         let dt = self.shift_time.map_or(0.0, |before| (time - before).max(0.0));
         self.shift_time = Some(time);
-        self.shift += (-displaced - self.shift) * -(-self.settings.lever * dt).exp_m1();
+        self.shift += (-displaced - self.shift) * -(-self.settings.lever_rate * dt).exp_m1();
         self.shift
     }
 }
@@ -69,7 +70,7 @@ impl CascadedController {
 impl Controller for CascadedController {
     fn command(&mut self, time: f64, estimate: &Estimate, reference: &dyn Reference) -> Command {
         let wanted = reference.at(time);
-        let shift = self.make_room(time, &wanted.lever, estimate);
+        let shift = self.compensate_lever(time, &wanted.lever, estimate);
         let (frame, gains) = (&self.airframe, &self.settings);
         let half = 0.5 * gains.jerk_window;
         let jerk = (reference.at(time + half).acceleration - reference.at(time - half).acceleration)
