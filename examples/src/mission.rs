@@ -12,6 +12,7 @@ mod settings;
 mod shading;
 #[cfg(test)]
 mod test_panel;
+mod trajectory_table;
 
 pub use error::MissionError;
 pub use figures::report;

@@ -13,6 +13,7 @@ use super::figures::report;
 use super::inspect::inspect;
 use super::run::Mission;
 use super::shading::shading;
+use super::trajectory_table::trajectory_table;
 use crate::mesh_io::{PlyMesh, write_ply};
 use crate::pictures::{Panel, Polyline, Rgb, Scene, save_curves, save_error_map, save_scene};
 use crate::progress::Stage;
@@ -27,8 +28,6 @@ const BACKGROUND: [u8; 3] = [255, 255, 255];
 const FILL: f64 = 0.86;
 /// Seconds between two states of the recording.
 const RECORDING_STEP: f64 = 0.1;
-/// Seconds between two rows of the trajectory.
-const TRAJECTORY_STEP: f64 = 0.05;
 /// Points in a curve: more than the picture has columns shows nothing more.
 const CURVE_POINTS: usize = 2800;
 
@@ -43,12 +42,12 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
     let faces = mission.surface.disk().faces();
     let ply = folder.join("surface.ply");
     write_ply(&ply, &PlyMesh { positions: &positions, normals: None, colours: &colours, faces })
-        .map_err(|source| MissionError::Unwritable { path: ply.display().to_string(), source })?;
+        .map_err(unwritable(&ply))?;
     stage.share(0.4);
     save_views(mission, folder)?;
     stage.share(0.8);
     save_angles(mission, &folder.join("angles.png"))?;
-    save_trajectory(mission, &folder.join("trajectory.csv"))?;
+    write(&folder.join("trajectory.csv"), &trajectory_table(mission))?;
     save_textured_mesh(mission, folder)?;
     save_mcap(
         mission,
@@ -59,14 +58,12 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
 
     let stage = Stage::start("scan");
     let found = inspect(mission)?;
-    let unwritable = |path: &Path, source| MissionError::Unwritable { path: path.display().to_string(), source };
     let Mesh { positions, faces, colours, .. } = &found.mesh;
     let found_mesh = PlyMesh { positions, normals: None, colours, faces };
     let ply = folder.join("scan.ply");
-    write_ply(&ply, &found_mesh).map_err(|source| unwritable(&ply, source))?;
+    write_ply(&ply, &found_mesh).map_err(unwritable(&ply))?;
     for (name, trajectory) in [("flight_true.tum", &found.flown), ("flight_slam.tum", &found.estimated)] {
-        let path = folder.join(name);
-        std::fs::write(&path, vio_ekf::tum::write(trajectory)).map_err(|source| unwritable(&path, source))?;
+        write(&folder.join(name), &vio_ekf::tum::write(trajectory))?;
     }
     stage.done(&format!("{} faces, {:.2} mm off the surface", found.mesh.faces.len(), 1e3 * found.mesh_error));
     let figures = report(mission, &found)?;
@@ -231,34 +228,6 @@ fn save_mcap(mission: &Mission, folder: &Path, mesh: &ColouredMesh) -> Result<()
     Ok(())
 }
 
-/// Plan and flight as a table, one row every [`TRAJECTORY_STEP`] seconds.
-fn save_trajectory(mission: &Mission, path: &Path) -> Result<(), MissionError> {
-    let mut text = String::from(
-        "time_s,x_m,y_m,z_m,heading_rad,pan_rad,tilt_rad,flow_m3_per_s,target_x_m,target_y_m,target_z_m,flown_x_m,flown_y_m,\
-         flown_z_m,flown_qx,flown_qy,flown_qz,flown_qw,flown_pan_rad,flown_tilt_rad\n",
-    );
-    let mut start = 0.0;
-    for f in &mission.flights {
-        let stride = (TRAJECTORY_STEP / f.flight.interval).round().max(1.0) as usize;
-        for s in f.flight.samples.iter().step_by(stride) {
-            let planned = f.plan.setpoint(s.time);
-            let (p, aim) = (planned.sample.position, planned.aim);
-            let (flown, q) = (s.world_from_body.translation, s.world_from_body.rotation.coords);
-            let row = [
-                [start + s.time, p.x, p.y, p.z, planned.sample.heading, planned.pan, planned.tilt].as_slice(),
-                &[planned.flow, aim.x, aim.y, aim.z, flown.x, flown.y, flown.z],
-                &[q.x, q.y, q.z, q.w, s.pan_tilt[0], s.pan_tilt[1]],
-            ]
-            .concat();
-            let numbers: Vec<String> = row.iter().map(|v| format!("{v:.9}")).collect();
-            text += &numbers.join(",");
-            text.push('\n');
-        }
-        start += f.plan.trajectory.duration();
-    }
-    write(path, &text)
-}
-
 /// The painted part of the surface with the paint as its texture: `painted.glb`, and `painted.obj` with its material.
 fn save_textured_mesh(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
     let painted = mission.painted_depth();
@@ -271,12 +240,16 @@ fn save_textured_mesh(mission: &Mission, folder: &Path) -> Result<(), MissionErr
         uv: mission.surface.chart.uv().iter().map(|uv| [uv[0] / extent[0], uv[1] / extent[1]]).collect(),
         texture: with_gutter(width, height, (0..width * height).map(pixel).collect()),
     };
-    mesh.save(folder, "painted")
-        .map_err(|source| MissionError::Unwritable { path: folder.join("painted.*").display().to_string(), source })
+    mesh.save(folder, "painted").map_err(unwritable(&folder.join("painted.*")))
 }
 
 fn write(path: &Path, text: &str) -> Result<(), MissionError> {
-    std::fs::write(path, text).map_err(|source| MissionError::Unwritable { path: path.display().to_string(), source })
+    std::fs::write(path, text).map_err(unwritable(path))
+}
+
+fn unwritable(path: &Path) -> impl FnOnce(std::io::Error) -> MissionError {
+    let path = path.display().to_string();
+    |source| MissionError::Unwritable { path, source }
 }
 
 fn picture_of(frame: &Frame) -> Rgb {

@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 use std::time::Instant;
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Isometry3;
 use paint_net::{Image, Painting};
 use paint_sim::Film;
 use paint_sim::flight::FlightSample;
-use ptu_kinematics::Ptu;
+use ptu_kinematics::{Joints, Ptu};
 
 use super::decide::decide;
 use super::error::MissionError;
@@ -64,6 +64,7 @@ impl Mission {
         let robot = Robot::new(ptu);
         let appearance = Appearance::charcoal_on_sandstone()?;
 
+        design.check_movable(&settings.placement, settings.viewpoint)?;
         check_memory(mesh, &settings)?;
         let stage = Stage::start("unwrap");
         let surface = PaintSurface::new(mesh, settings.texel, &|s| stage.share(s))?;
@@ -143,17 +144,10 @@ impl Mission {
         if wanted > 0.0 { (1.0 - planned / wanted).max(0.0) } else { 0.0 }
     }
 
-    /// The arm at a sample: pan in the body's frame, tilt in pan's, the nozzle in tilt's (x along the spray).
+    /// The arm's links at a sample: pan in the body's frame, tilt in pan's, the nozzle in tilt's (x along the spray).
     pub(super) fn arm(&self, sample: &FlightSample) -> [Isometry3<f64>; 3] {
-        let ptu = self.robot.chain.settings();
         let [pan, tilt] = sample.pan_tilt;
-        // Up is against a turn about y, which points left.
-        let raised = |angle: f64| Vector3::y() * -angle;
-        [
-            Isometry3::new(ptu.body_from_pan_axis, Vector3::z() * pan),
-            Isometry3::new(ptu.pan_from_tilt_axis, raised(tilt)),
-            Isometry3::new(ptu.tilt_from_tip, raised(ptu.gun_pitch)),
-        ]
+        self.robot.chain.link_poses(Joints { pan, tilt })
     }
 }
 
