@@ -8,6 +8,7 @@ pub mod mesh_io;
 pub mod mesh_placement;
 pub mod mission;
 pub mod paint_image;
+pub mod picture_file;
 pub mod picture_placement;
 pub mod pictures;
 pub mod progress;

@@ -8,7 +8,7 @@ use paint_planner::TimingPolicy;
 use paintcopter_examples::design::{Design, Picture};
 use paintcopter_examples::mesh_io::{TriangleMesh, read_mesh};
 use paintcopter_examples::mesh_placement::{MeshPlacement, UpAxis, place_mesh};
-use paintcopter_examples::mission::{Mission, MissionSettings, PainterChoice, save};
+use paintcopter_examples::mission::{Decision, Mission, MissionSettings, PainterChoice, preview, save};
 use paintcopter_examples::picture_placement::{PicturePlacement, PlacementMode};
 use paintcopter_examples::projection::Viewpoint;
 use paintcopter_examples::scan_flight::{ScanFlight, save as save_scan_flight};
@@ -50,6 +50,9 @@ struct Arguments {
     layers: bool,
     #[command(flatten)]
     nozzle: Nozzle,
+    /// Show what it would look like and estimate time, paint and reach; plan and fly nothing
+    #[arg(long)]
+    preview: bool,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/paintcopter")]
     out: PathBuf,
@@ -207,11 +210,11 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
         PainterName::Deconvolution => PainterChoice::Deconvolution,
         PainterName::Pursuit => PainterChoice::Pursuit,
     };
-    let mission = match &arguments.mesh {
+    let decision = match &arguments.mesh {
         None => {
             let design = Design::from_name(arguments.design.as_deref().unwrap_or("strata"), arguments.seed)?;
             let wall = seen(rock_wall(arguments.seed), arguments, settings.threads)?;
-            Mission::run("Rock wall", &wall, &design, settings)?
+            Decision::make("Rock wall", &wall, &design, settings)?
         }
         Some(path) => {
             let in_file = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
@@ -221,9 +224,19 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
                 None => Design::from_name(arguments.design.as_deref().unwrap_or("stripes"), arguments.seed)?,
             };
             let name = path.file_stem().map_or("Mesh".into(), |s| s.to_string_lossy());
-            Mission::run(&name, &mesh, &design, settings).map_err(|e| in_file(&e))?
+            Decision::make(&name, &mesh, &design, settings).map_err(|e| in_file(&e))?
         }
     };
+    if arguments.preview {
+        let found = preview(&decision, folder)?;
+        eprintln!("{}", found.summary());
+        println!("{}", folder.join("preview.png").display());
+        return Ok(());
+    }
+    let mission = Mission::run(decision).map_err(|error| match &arguments.mesh {
+        Some(path) => format!("{}: {error}", path.display()),
+        None => error.to_string(),
+    })?;
     let report = save(&mission, folder)?;
     eprintln!("{}", report.summary());
     println!("{}", folder.join("report.md").display());
