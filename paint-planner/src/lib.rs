@@ -80,10 +80,9 @@ mod world;
 
 pub use error::Error;
 pub use nalgebra;
-pub use nozzle::Mode;
-#[cfg(feature = "measure")]
-#[doc(hidden)]
-pub use nozzle::{StageOneProgram, StandardForm};
+#[cfg(feature = "clarabel")]
+pub use nozzle::Clarabel;
+pub use nozzle::{InteriorPoint, Mode, QpOutcome, QpSolver, QuadraticProgram, StandardForm, stroke_program};
 pub use plan::{Plan, PlanReport, Setpoint, Waypoint};
 pub use planner::{OptimalPlanner, Planner, SmoothingPlanner, plan};
 pub use reach::reachable_targets;

@@ -4,7 +4,7 @@ use super::assemble::{ClearanceViolation, UntimedPlan, assemble_plan};
 use super::strategy::Planner;
 use crate::clearance::ClearanceChecker;
 use crate::error::Error;
-use crate::nozzle::{Mode, Nozzles, initial_states, optimise};
+use crate::nozzle::{InteriorPoint, Mode, Nozzles, QpSolver, initial_states, optimise};
 use crate::plan::Plan;
 use crate::settings::Settings;
 use crate::target::{Target, check, stroke_links};
@@ -13,13 +13,21 @@ use crate::world::{Surface, Tool};
 use crate::{heading, route};
 
 /// The planner of the VR paper.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct OptimalPlanner {
+#[derive(Debug, Clone, Copy)]
+pub struct OptimalPlanner<'a> {
     /// Formulation of stage 1.
     pub mode: Mode,
+    /// Who solves its quadratic programs.
+    pub solver: &'a dyn QpSolver,
 }
 
-impl Planner for OptimalPlanner {
+impl Default for OptimalPlanner<'static> {
+    fn default() -> Self {
+        Self { mode: Mode::default(), solver: &InteriorPoint }
+    }
+}
+
+impl Planner for OptimalPlanner<'_> {
     fn name(&self) -> &'static str {
         match self.mode {
             Mode::Sequential => "optimal",
@@ -38,7 +46,7 @@ impl Planner for OptimalPlanner {
     }
 }
 
-impl OptimalPlanner {
+impl OptimalPlanner<'_> {
     /// The same with a clearance of its own for every target, m, in the place of `settings.clearance`: what a rehearsal in wind
     /// has shown to be needed. A flight between two strokes keeps what both of its ends keep.
     ///
@@ -60,7 +68,7 @@ impl OptimalPlanner {
         }
         let linked = stroke_links(targets, settings.break_length);
         let initial_states = initial_states(targets, &settings.nozzle);
-        let mut nozzles = optimise(targets, &initial_states, &linked, self.mode, &settings.nozzle)?;
+        let mut nozzles = optimise(targets, &initial_states, &linked, self.mode, self.solver, &settings.nozzle)?;
         drop_hidden(targets, &mut nozzles.states, surface)?;
         let mut checker = ClearanceChecker::new(surface, tool);
         let mut clearance = clearance.to_vec();
