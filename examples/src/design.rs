@@ -67,6 +67,11 @@ pub enum DesignError {
 }
 
 impl Design {
+    /// Whether a name is that of a design that needs no file.
+    pub fn is_built_in(name: &str) -> bool {
+        ["strata", "stripes", "gradient", "colours"].contains(&name)
+    }
+
     /// From the command line: a built-in name or a file.
     pub fn from_name(name: &str, seed: u64) -> Result<Self, DesignError> {
         match name {

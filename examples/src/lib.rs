@@ -7,6 +7,7 @@ pub mod design;
 pub mod mesh_io;
 pub mod mesh_placement;
 pub mod mission;
+pub mod mission_file;
 pub mod paint_image;
 pub mod picture_file;
 pub mod picture_placement;

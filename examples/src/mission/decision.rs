@@ -53,6 +53,7 @@ impl Decision {
         let robot = Robot::new(Ptu::new(settings.ptu)?);
         let appearance = Appearance::charcoal_on_sandstone()?;
 
+        settings.check()?;
         design.check_movable(&settings.placement, settings.viewpoint)?;
         check_memory(mesh, &settings)?;
         let stage = Stage::start("unwrap");
