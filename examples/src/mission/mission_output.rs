@@ -18,7 +18,7 @@ use super::view::{camera, picture_of, view};
 use crate::mesh_io::{PlyMesh, write_ply};
 use crate::pictures::{Panel, Polyline, Rgb, Scene, save_curves, save_error_map, save_scene};
 use crate::progress::Stage;
-use crate::recording::{ColouredMesh, RobotState, save_recording};
+use crate::recording::{ColouredMesh, PaintStyle, RobotState, save_recording};
 use crate::textured_mesh::{TexturedMesh, with_gutter};
 
 /// Colour beside the surface in the texture pictures.
@@ -50,7 +50,7 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
     save_mcap(
         mission,
         folder,
-        &ColouredMesh { positions: &positions, faces: mission.decision.surface.disk().faces(), colours: &colours },
+        &ColouredMesh { positions: &positions, faces, colours: &colours, bare: mission.decision.appearance.srgb(0.0) },
     )?;
     stage.done(&folder.display().to_string());
 
@@ -187,7 +187,13 @@ fn save_mcap(mission: &Mission, folder: &Path, mesh: &ColouredMesh) -> Result<()
         }));
         start += f.plan.trajectory.duration();
     }
-    save_recording(&folder.join("mission.mcap"), mesh, &states, &log_lines)?;
+    let settings = &mission.decision.settings;
+    let paint = PaintStyle {
+        width: 2.0 * settings.spot,
+        max_flow: settings.planner.timing.max_flow,
+        colour: mission.decision.appearance.srgb(1.0),
+    };
+    save_recording(&folder.join("mission.mcap"), mesh, paint, &states, &log_lines)?;
     Ok(())
 }
 
