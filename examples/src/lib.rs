@@ -21,6 +21,7 @@ pub mod scan_flight;
 pub mod surface;
 pub mod targets;
 pub mod textured_mesh;
+pub mod unwrap;
 pub mod vio;
 pub mod world;
 

@@ -12,7 +12,7 @@ use crate::distortion::Quality;
 use crate::error::Error;
 use crate::triangle::Frame;
 use locate::Grid;
-pub(crate) use locate::inside;
+pub(crate) use locate::{inside, overlapping_pairs};
 pub use surface_point::SurfacePoint;
 
 /// The layout of a [`Disk`]: one uv point in metres per vertex, `0 <= u <= width`, `0 <= v <= height`. Not

@@ -39,17 +39,21 @@
 //! | thesis Eq. (8.1), `n`, `w_dir`, `w_pos` | [`nozzle_command`] |
 
 mod arap;
+mod atlas;
 mod chart;
 mod clip;
 mod cut;
 mod disk;
 mod distortion;
 mod error;
+mod half_edges;
 mod laplacian;
 mod linear;
 mod min_area_rectangle;
 mod nozzle;
 mod parametrizer;
+mod soup;
+mod surface;
 mod symmetric_dirichlet;
 mod texel;
 mod texture;
@@ -58,6 +62,10 @@ mod tutte;
 mod unwrap;
 
 pub use arap::Arap;
+pub use atlas::{
+    Atlas, AtlasQuality, AtlasSettings, ChartSettings, PackSettings, Page, PageTexels, Placement, TexelKind, Turns,
+    unwrap_atlas,
+};
 pub use chart::{Chart, SurfacePoint};
 pub use cut::{CutSettings, unwrap_with_cuts};
 pub use disk::{Disk, Repair, RepairReport, largest_disk, largest_disk_with};
@@ -67,6 +75,7 @@ pub use min_area_rectangle::{Rectangle, convex_hull, min_area_rectangle};
 pub use nalgebra;
 pub use nozzle::{NormalMode, NozzleCommand, NozzleSettings, nozzle_command};
 pub use parametrizer::{Layout, Parametrizer, Progress, Stage, StoppingCriterion};
+pub use surface::{Surface, SurfaceReport};
 pub use symmetric_dirichlet::SymmetricDirichlet;
 pub use texel::TexelMap;
 pub use texture::{Texture, linear_from_srgb, luminance};

@@ -15,4 +15,5 @@ mod scan_flight;
 mod scratch;
 mod sequences;
 mod strange_recordings;
+mod unwrap;
 mod vio;

@@ -1,7 +1,7 @@
 //! The checked surface: one orientable, manifold piece of genus 0 with a boundary, and cuts along its edges.
 
-use super::half_edges::{BORDER, boundary_loops, fans, half_edge};
 use crate::error::Error;
+use crate::half_edges::{BORDER, boundary_loops, fans, half_edge};
 use crate::triangle::{self, Frame};
 
 /// A triangle mesh that can be laid out in the plane: connected, manifold, consistently oriented, genus 0, at least one
@@ -87,6 +87,49 @@ impl Disk {
         let at = |v: u32| nalgebra::Vector3::from(self.positions[v as usize]);
         let next = vertices.iter().cycle().skip(1);
         vertices.iter().zip(next).map(|(&a, &b)| (at(a) - at(b)).norm()).sum()
+    }
+
+    /// Faces of a larger surface, neighbours (`twins`) and glued seams given, corners numbered as there; `None` unless they can
+    /// be laid out in the plane. Every fan of faces gets a vertex of its own.
+    pub(crate) fn from_chart(
+        positions: &[[f64; 3]],
+        corners: &[[u32; 3]],
+        twins: Vec<u32>,
+        glued: Vec<u32>,
+        face_source: Vec<u32>,
+        reversed: Vec<bool>,
+        source_faces: usize,
+    ) -> Option<Self> {
+        let (fan_of_corner, fan_source) = fans(corners, &twins);
+        let mut order: Vec<u32> = (0..fan_source.len() as u32).collect();
+        order.sort_unstable_by_key(|&fan| (fan_source[fan as usize], fan));
+        let mut rank = vec![0u32; order.len()];
+        for (new, &fan) in order.iter().enumerate() {
+            rank[fan as usize] = new as u32;
+        }
+        let renumbered = |f: usize| [0, 1, 2].map(|k| rank[fan_of_corner[3 * f + k] as usize]);
+        let faces: Vec<[u32; 3]> = (0..corners.len()).map(renumbered).collect();
+        let vertex_source: Vec<u32> = order.iter().map(|&fan| fan_source[fan as usize]).collect();
+        let loops = boundary_loops(vertex_source.len(), &faces, &twins);
+        let mut disk = Self {
+            positions: vertex_source.iter().map(|&v| positions[v as usize]).collect(),
+            faces,
+            vertex_source,
+            face_source,
+            reversed,
+            twins,
+            glued,
+            copies: Vec::new(),
+            cuts: 0,
+            loops,
+            source_vertices: positions.len(),
+            source_faces,
+        };
+        let planar = !disk.loops.is_empty() && disk.euler_characteristic() + disk.loops.len() as isize == 2;
+        planar.then(|| {
+            disk.sort_loops();
+            disk
+        })
     }
 
     pub(super) fn sort_loops(&mut self) {

@@ -1,5 +1,6 @@
 //! First and second derivatives of the symmetric Dirichlet energy of one triangle.
 
+use super::penalty::Penalty;
 use crate::triangle::{Frame, Jacobian};
 
 /// Derivatives of `A W` of one triangle. In the bases of the singular vectors (`J = U diag(s) V^T`) the Hessian is diagonal in
@@ -15,10 +16,14 @@ pub(super) struct Local {
     stretch: [f64; 2],
     /// Half the sum and half the difference of the flip and twist curvatures, times A.
     mixed: [f64; 2],
+    /// `A phi''` of the penalty over the squared area in `slope`.
+    rise: f64,
 }
 
 impl Local {
-    pub(super) fn new(frame: &Frame, j: Jacobian) -> Self {
+    pub(super) fn new(frame: &Frame, j: Jacobian, penalty: Penalty) -> Self {
+        let [_, first, second] = penalty.derivatives(j.symmetric_dirichlet());
+        let area = frame.area * first;
         let [s1, s2] = j.stretch();
         let sum = (j.c - j.b).atan2(j.a + j.d);
         let difference = (j.c + j.b).atan2(j.a - j.d);
@@ -31,9 +36,10 @@ impl Local {
         Self {
             turn: [cos_u, sin_u],
             hats,
-            slope: [s1, s2].map(|s| frame.area * 2.0 * (s - 1.0 / (s * s * s))),
-            stretch: [s1, s2].map(|s| frame.area * (2.0 + 6.0 / (s * s * s * s))),
-            mixed: [0.5 * frame.area * (flip + twist), 0.5 * frame.area * (flip - twist)],
+            slope: [s1, s2].map(|s| area * 2.0 * (s - 1.0 / (s * s * s))),
+            stretch: [s1, s2].map(|s| area * (2.0 + 6.0 / (s * s * s * s))),
+            mixed: [0.5 * area * (flip + twist), 0.5 * area * (flip - twist)],
+            rise: second / (first * first * frame.area),
         }
     }
 
@@ -48,10 +54,11 @@ impl Local {
     pub(super) fn block(&self, k: usize, l: usize) -> [[f64; 2]; 2] {
         let (hk, hl) = (self.hats[k], self.hats[l]);
         let [even, odd] = self.mixed;
-        let xx = self.stretch[0] * hk[0] * hl[0] + even * hk[1] * hl[1];
-        let yy = self.stretch[1] * hk[1] * hl[1] + even * hk[0] * hl[0];
-        let xy = odd * hk[1] * hl[0];
-        let yx = odd * hk[0] * hl[1];
+        let [gk, gl] = [hk, hl].map(|h| [self.slope[0] * h[0], self.slope[1] * h[1]]);
+        let xx = self.stretch[0] * hk[0] * hl[0] + even * hk[1] * hl[1] + self.rise * gk[0] * gl[0];
+        let yy = self.stretch[1] * hk[1] * hl[1] + even * hk[0] * hl[0] + self.rise * gk[1] * gl[1];
+        let xy = odd * hk[1] * hl[0] + self.rise * gk[0] * gl[1];
+        let yx = odd * hk[0] * hl[1] + self.rise * gk[1] * gl[0];
         // U K U^T.
         let [c, s] = self.turn;
         let [left_x, left_y] = [[c * xx - s * yx, c * xy - s * yy], [s * xx + c * yx, s * xy + c * yy]];
@@ -62,13 +69,15 @@ impl Local {
 
 #[cfg(test)]
 mod tests {
-    use super::Local;
+    use super::{Local, Penalty};
     use crate::triangle::Frame;
+
+    const STEEP: Penalty = Penalty { bound: 0.3, power: 3.0 };
 
     const CORNERS: [[f64; 3]; 3] = [[0.1, 0.2, 0.0], [1.3, 0.1, 0.4], [0.4, 0.9, -0.2]];
 
     fn energy(frame: &Frame, uv: [[f64; 2]; 3]) -> f64 {
-        frame.area * frame.jacobian(uv).symmetric_dirichlet()
+        frame.area * STEEP.derivatives(frame.jacobian(uv).symmetric_dirichlet())[0]
     }
 
     fn moved(mut uv: [[f64; 2]; 3], corner: usize, axis: usize, by: f64) -> [[f64; 2]; 3] {
@@ -80,7 +89,7 @@ mod tests {
     fn the_gradient_is_the_difference_quotient() {
         let frame = Frame::new(CORNERS);
         for uv in [[[0.0, 0.0], [1.9, 0.3], [0.2, 1.1]], [[0.0, 0.0], [0.4, -0.2], [0.3, 0.5]]] {
-            let local = Local::new(&frame, frame.jacobian(uv));
+            let local = Local::new(&frame, frame.jacobian(uv), STEEP);
             for k in 0..3 {
                 for axis in 0..2 {
                     let h = 1e-6;
@@ -97,7 +106,7 @@ mod tests {
         // Enlarged by about 2: the twist curvature is positive.
         let frame = Frame::new(CORNERS);
         let uv = [[0.0, 0.0], [2.6, 0.4], [0.3, 2.2]];
-        let local = Local::new(&frame, frame.jacobian(uv));
+        let local = Local::new(&frame, frame.jacobian(uv), STEEP);
         let h = 1e-4;
         for (k, l) in [(0, 0), (1, 1), (2, 2), (1, 0), (2, 1), (0, 2), (0, 1)] {
             for i in 0..2 {
@@ -115,7 +124,7 @@ mod tests {
         let frame = Frame::new(CORNERS);
         // Shrunk: the twist curvature is negative before the projection.
         let uv = [[0.0, 0.0], [0.3, 0.05], [0.1, 0.2]];
-        let local = Local::new(&frame, frame.jacobian(uv));
+        let local = Local::new(&frame, frame.jacobian(uv), STEEP);
         for n in 0..64 {
             let d: Vec<f64> = (0..6).map(|i| if n >> i & 1 == 1 { 1.0 } else { -0.7 }).collect();
             let mut along = 0.0;
