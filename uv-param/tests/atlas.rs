@@ -331,7 +331,7 @@ fn soups_do_no_harm() {
             positions[0][1] = f64::NAN;
         }
         let mut faces: Vec<[u32; 3]> =
-            (0..1 + rng.below(24)).map(|_| [0; 3].map(|_: i32| rng.below(vertices) as u32)).collect();
+            (0..=rng.below(24)).map(|_| [0; 3].map(|_: i32| rng.below(vertices) as u32)).collect();
         if rng.below(20) == 0 {
             faces[0][2] = 99;
         }
