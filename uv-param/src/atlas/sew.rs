@@ -10,7 +10,7 @@ use crate::min_area_rectangle::min_area_rectangle;
 use crate::parametrizer::Parametrizer;
 
 /// Longest side of a chart that sewing may make, relative to the square root of the area: longer ones waste the page.
-const MAX_EXTENT: f64 = 2.5;
+const MAX_EXTENT: f64 = 1.3;
 /// Share of an arc's length by which its two sides differ in shape at which closing it is half as attractive.
 const MISFIT: f64 = 0.03;
 /// Misfit beyond which it is not tried.
