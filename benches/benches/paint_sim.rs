@@ -106,8 +106,8 @@ fn flight(group: &mut Group, surface: &PaintSurface) -> Result<(), AnyError> {
     let robot = Robot::new(Ptu::new(settings.ptu)?);
     let targets = rock::stroke(surface, 300);
     let plan = OptimalPlanner::default().plan(&targets, &MeshSurface(&surface.world), &robot, &settings.planner)?;
-    let stand_off = settings.planner.nozzle.stand_off;
-    let reference = Beginning(PlanReference { plan: &plan, chain: &robot.chain, gun_length: 0.12, stand_off });
+    let (stand_off, gun_length) = (settings.planner.nozzle.stand_off, settings.ptu.tilt_from_tip.norm());
+    let reference = Beginning(PlanReference { plan: &plan, chain: &robot.chain, gun_length, stand_off });
     let mut gun = ServoPanTilt::new(robot.chain.clone(), settings.servo)?;
     let usual = FlightSettings::default();
     fly(&reference, &mut gun, &surface.world, &usual)?;

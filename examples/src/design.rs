@@ -7,6 +7,7 @@ use paint_net::procedural::{fbm, value_noise};
 use uv_param::{Texture, luminance};
 
 use crate::mesh_io::TriangleMesh;
+use crate::picture_file::open_upright;
 use crate::picture_placement::PicturePlacement;
 use crate::projection::{Projection, Viewpoint};
 use crate::surface::PaintSurface;
@@ -54,6 +55,9 @@ pub enum DesignError {
     /// The mesh lacks what the design lies on.
     #[error("the mesh has no {0}: use --design instead")]
     Missing(&'static str),
+    /// Told to lie where it cannot.
+    #[error("{0}")]
+    NotMovable(&'static str),
     /// The mesh's texture cannot be read.
     #[error("texture of the mesh: {0}")]
     Texture(#[from] uv_param::Error),
@@ -63,6 +67,11 @@ pub enum DesignError {
 }
 
 impl Design {
+    /// Whether a name is that of a design that needs no file.
+    pub fn is_built_in(name: &str) -> bool {
+        ["strata", "stripes", "gradient", "colours"].contains(&name)
+    }
+
     /// From the command line: a built-in name or a file.
     pub fn from_name(name: &str, seed: u64) -> Result<Self, DesignError> {
         match name {
@@ -83,6 +92,7 @@ impl Design {
         placement: &PicturePlacement,
         viewpoint: Option<Viewpoint>,
     ) -> Result<Image, DesignError> {
+        self.check_movable(placement, viewpoint)?;
         let (width, height) = (surface.width(), surface.height());
         let texture = match self {
             Self::Texture(picture) => {
@@ -109,6 +119,22 @@ impl Design {
         };
         let ink = texture.texels.iter().map(|t| DARKEST * (1.0 - f64::from(t[0])).clamp(0.0, 1.0)).collect();
         Ok(Image::new(width, height, ink)?)
+    }
+
+    /// Refuses a placement or a viewpoint that this design would leave unused.
+    pub fn check_movable(&self, placement: &PicturePlacement, viewpoint: Option<Viewpoint>) -> Result<(), DesignError> {
+        let lies_on_mesh = matches!(self, Self::Texture(_) | Self::VertexColours);
+        if lies_on_mesh && viewpoint.is_some() {
+            return Err(DesignError::NotMovable(
+                "--project throws a design onto the surface, but textures and colours of the mesh lie on it already: leave it out",
+            ));
+        }
+        if !matches!(self, Self::Picture(_)) && *placement != PicturePlacement::default() {
+            return Err(DesignError::NotMovable(
+                "--place, --size, --rotate and --offset move a picture, but the design is none: give --design a PNG or JPEG file",
+            ));
+        }
+        Ok(())
     }
 
     /// Ink wanted at `(x, y)` metres from the top-left corner of a surface of the given width and height; none for designs
@@ -191,7 +217,7 @@ impl Picture {
     pub fn open(path: &Path) -> Result<Self, DesignError> {
         let name = PathBuf::from(path).display().to_string();
         let unusable = |why: String| DesignError::Unusable { name: name.clone(), why };
-        let picture = image::open(path).map_err(|e| unusable(format!("cannot be read as a picture ({e})")))?;
+        let picture = open_upright(path).map_err(|e| unusable(format!("cannot be read as a picture ({e})")))?;
         if picture.width() < 2 || picture.height() < 2 {
             return Err(unusable(format!("is only {} x {} pixels", picture.width(), picture.height())));
         }

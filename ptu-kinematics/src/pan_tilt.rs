@@ -1,6 +1,6 @@
 //! The pan-tilt unit: closed forms for everything.
 
-use nalgebra::{Isometry3, Matrix6, Matrix6xX, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector3};
+use nalgebra::{Isometry3, Matrix6, Matrix6xX, Point3, UnitQuaternion, UnitVector3, Vector3};
 
 use crate::aim::{Aim, aim_in_body};
 use crate::angle::{elevation_rotation, wrap};
@@ -89,10 +89,20 @@ impl Ptu {
 
     /// Pose of the nozzle frame: origin at the tip, x along the spray, y left.
     pub fn world_from_nozzle(&self, world_from_body: &Isometry3<f64>, joints: Joints) -> Isometry3<f64> {
-        let body_from_nozzle = Rotation3::from_axis_angle(&Vector3::z_axis(), joints.pan)
-            * elevation_rotation(joints.tilt + self.settings.gun_pitch);
-        let rotation = world_from_body.rotation * UnitQuaternion::from_rotation_matrix(&body_from_nozzle);
-        Isometry3::from_parts(self.forward(world_from_body, joints).tip.into(), rotation)
+        self.link_poses(joints).iter().fold(*world_from_body, |pose, link| pose * link)
+    }
+
+    /// The links one after the other, each in the frame of the one before: `body_from_pan`, `pan_from_tilt`,
+    /// `tilt_from_nozzle`. The nozzle's x axis is the spray axis.
+    pub fn link_poses(&self, joints: Joints) -> [Isometry3<f64>; 3] {
+        let s = &self.settings;
+        let raised = |angle| UnitQuaternion::from_rotation_matrix(&elevation_rotation(angle));
+        let panned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), joints.pan);
+        [
+            Isometry3::from_parts(s.body_from_pan_axis.into(), panned),
+            Isometry3::from_parts(s.pan_from_tilt_axis.into(), raised(joints.tilt)),
+            Isometry3::from_parts(s.tilt_from_tip.into(), raised(s.gun_pitch)),
+        ]
     }
 
     /// Inverse kinematics in hover: the one body position and the joint angles that bring the nozzle tip to `tip`

@@ -83,6 +83,7 @@ impl Atlas {
         parametrizer: Option<&dyn Parametrizer>,
         mut progress: impl FnMut(Progress),
     ) -> Result<Self, Error> {
+        pack::check(&settings.pack, surface.area())?;
         let (charts, members) = charting::charts(&surface, seams, &settings.charts, parametrizer, &mut progress)?;
         let (placements, pages) = pack::pack(&charts, &settings.pack)?;
         let mut place_of_face = vec![[0; 2]; surface.faces().len()];

@@ -6,6 +6,7 @@ mod five_joint_arm;
 mod independence;
 mod meshes;
 mod mission;
+mod mission_file;
 mod module_graph;
 mod paint_image;
 mod placement;

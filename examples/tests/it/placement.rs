@@ -178,3 +178,18 @@ fn a_picture_is_thrown_from_a_viewpoint() {
     assert!(right.iter().all(|&i| i > 0.5) && !right.is_empty());
     assert!(shade.iter().all(|&i| i == 0.0) && !shade.is_empty());
 }
+
+/// Told where to lie, a design that covers the surface or lies on the mesh refuses instead of ignoring it.
+#[test]
+fn designs_that_cannot_be_moved_say_so() {
+    let refusal = |design: &Design, placement: &PicturePlacement, eye: Option<Viewpoint>| {
+        design.check_movable(placement, eye).err().map(|error| error.to_string()).unwrap_or_default()
+    };
+    let (usual, turned) =
+        (PicturePlacement::default(), PicturePlacement { rotate: 0.1, ..PicturePlacement::default() });
+    assert_eq!(refusal(&Design::Stripes, &usual, Some(Viewpoint::Front)), "");
+    assert!(refusal(&Design::Stripes, &turned, None).contains("--rotate"));
+    assert_eq!(refusal(&Design::VertexColours, &usual, None), "");
+    assert!(refusal(&Design::VertexColours, &usual, Some(Viewpoint::Front)).contains("--project"));
+    assert_eq!(refusal(&Design::Picture(picture(4, 4)), &turned, Some(Viewpoint::Front)), "");
+}

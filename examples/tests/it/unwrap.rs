@@ -115,4 +115,7 @@ fn what_cannot_be_done_is_said() {
     assert!(refused(&["--texel", "0"]).contains("texel_m"));
     assert!(refused(&["--page", "3,3", "--texel", "0.01"]).contains("use a larger texel"));
     assert!(refused(&["--max-stretch", "0.5"]).contains("max_stretch"));
+    // Millimetres taken for metres: before anything is cut, let alone allocated.
+    assert!(refused(&["--scale", "1000"]).contains("use a larger texel"));
+    assert!(refused(&["--page", "9000,9000"]).contains("use a larger texel"));
 }

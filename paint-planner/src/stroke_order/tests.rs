@@ -2,14 +2,13 @@
 
 use super::*;
 use nalgebra::{Point3, Vector3};
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-/// Uniform numbers in [0, 1) from a linear congruence, good enough to scatter strokes.
+/// Uniform numbers in [0, 1).
 fn uniform(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1_u64 << 53) as f64
-    }
+    let mut random = SplitMix64::seed_from_u64(seed);
+    move || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 fn target(y: f64, z: f64) -> Target {

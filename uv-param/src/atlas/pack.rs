@@ -12,6 +12,8 @@ const FINE_CELLS: f64 = 450.0;
 const ORDERS: usize = 48;
 /// How far the size of a chart may be misjudged in these: a factor, as a power of two.
 const SHUFFLE: f64 = 1.5;
+/// Most texels of a page: 8192 x 8192, which take 2.7 GB as points of the surface.
+const MAX_TEXELS: usize = 1 << 26;
 /// Smallest side of a page, relative to that of a square of the charts' area, and how much larger the next one is.
 const SIDES: [f64; 2] = [1.02, 1.012];
 
@@ -96,7 +98,6 @@ struct Shape {
 /// # Errors
 /// [`Error::Setting`]; [`Error::TooManyTexels`] where a chart is larger than a page.
 pub(super) fn pack(charts: &[Chart], settings: &PackSettings) -> Result<(Vec<Placement>, Vec<Page>), Error> {
-    check(settings)?;
     let area: f64 = charts.iter().map(|c| c.quality().area_m2).sum();
     let side = area.sqrt() / settings.texel_m;
     let scale = |cells: f64| (side / cells).ceil().max(1.0) as usize;
@@ -136,7 +137,8 @@ pub(super) fn pack(charts: &[Chart], settings: &PackSettings) -> Result<(Vec<Pla
     Ok((placements, pages))
 }
 
-fn check(settings: &PackSettings) -> Result<(), Error> {
+/// Refuses what could not be packed, before anything is cut: `area_m2` is that of the whole surface.
+pub(super) fn check(settings: &PackSettings, area_m2: f64) -> Result<(), Error> {
     if !(settings.texel_m.is_finite() && settings.texel_m > 0.0) {
         return Err(Error::Setting { name: "texel_m", value: settings.texel_m, must_be: "positive" });
     }
@@ -144,6 +146,11 @@ fn check(settings: &PackSettings) -> Result<(), Error> {
         && page.contains(&0)
     {
         return Err(Error::Setting { name: "page", value: 0.0, must_be: "at least 1 x 1 texels" });
+    }
+    let side = area_m2.sqrt() / settings.texel_m;
+    let [width, height] = settings.page.map_or([side; 2], |page| page.map(|side| side as f64));
+    if side * side > MAX_TEXELS as f64 || width * height > MAX_TEXELS as f64 {
+        return Err(Error::TooManyTexels { texel_m: settings.texel_m, width, height, limit: MAX_TEXELS });
     }
     Ok(())
 }

@@ -134,13 +134,10 @@ fn starts_only_from_a_rest_that_it_sees() {
     assert_eq!(run(1.0 / GRAVITY, 0, &boxes(2)), Status::Uninitialised(InitializationStatus::GravityMismatch));
 }
 
-#[test]
-fn light_that_changes_does_not_look_like_motion() {
-    let mut still = Still::new(11);
-    // Standing still is not recognised here: every image is measured.
+/// A filter that knows its state, and that measures every image because standing still is not recognised.
+fn initialized(still: &mut Still, settings: &Settings) -> Vio {
     let stationary = vio_ekf::StationarySettings { min_duration_s: f64::INFINITY, ..Default::default() };
-    let mut vio = Vio::new(small_camera(), still.noise, Settings { stationary, ..Settings::default() }).unwrap();
-    let picture = boxes(3);
+    let mut vio = Vio::new(small_camera(), still.noise, Settings { stationary, ..*settings }).unwrap();
     vio.imu(&still.imu(0)).unwrap();
     vio.initialize(&vio_ekf::InitialState {
         stamp: Stamp::from_nanos(0),
@@ -151,6 +148,14 @@ fn light_that_changes_does_not_look_like_motion() {
         sigma: vio_ekf::InitialSigma::default(),
     })
     .unwrap();
+    vio
+}
+
+#[test]
+fn light_that_changes_does_not_look_like_motion() {
+    let mut still = Still::new(11);
+    let mut vio = initialized(&mut still, &Settings::default());
+    let picture = boxes(3);
     let (mut used, mut rejected) = (0, 0);
     for sample in 1..400 {
         let imu = still.imu(sample);
@@ -180,19 +185,8 @@ fn light_that_changes_does_not_look_like_motion() {
 fn nothing_is_tracked_where_the_image_is_masked() {
     // The left half of the image is hidden from the fifth of twenty images on, with landmarks in it by then.
     let mut still = Still::new(5);
-    let stationary = vio_ekf::StationarySettings { min_duration_s: f64::INFINITY, ..Default::default() };
-    let mut vio = Vio::new(small_camera(), still.noise, Settings { stationary, ..Settings::default() }).unwrap();
+    let mut vio = initialized(&mut still, &Settings::default());
     let picture = boxes(8);
-    vio.imu(&still.imu(0)).unwrap();
-    vio.initialize(&vio_ekf::InitialState {
-        stamp: Stamp::from_nanos(0),
-        world_from_body: nalgebra::Isometry3::from_parts(Vector3::zeros().into(), still.attitude),
-        velocity_in_body: Vector3::zeros(),
-        gyro_bias: still.biases[0],
-        accel_bias: still.biases[1],
-        sigma: vio_ekf::InitialSigma::default(),
-    })
-    .unwrap();
     for sample in 1..=200 {
         let imu = still.imu(sample);
         vio.imu(&imu).unwrap();
@@ -225,21 +219,9 @@ fn nothing_is_tracked_where_the_image_is_masked() {
 /// The claimed deviation of the position after two seconds at rest, as if it were a hover, by the drift of templates.
 fn deviation_at_rest(drift: f64) -> f64 {
     let mut still = Still::new(11);
-    let stationary = vio_ekf::StationarySettings { min_duration_s: f64::INFINITY, ..Default::default() };
     let patches = vio_ekf::PatchSettings { template_drift: drift, ..Default::default() };
-    let mut vio =
-        Vio::new(small_camera(), still.noise, Settings { stationary, patches, ..Settings::default() }).unwrap();
+    let mut vio = initialized(&mut still, &Settings { patches, ..Settings::default() });
     let picture = boxes(3);
-    vio.imu(&still.imu(0)).unwrap();
-    vio.initialize(&vio_ekf::InitialState {
-        stamp: Stamp::from_nanos(0),
-        world_from_body: nalgebra::Isometry3::from_parts(Vector3::zeros().into(), still.attitude),
-        velocity_in_body: Vector3::zeros(),
-        gyro_bias: still.biases[0],
-        accel_bias: still.biases[1],
-        sigma: vio_ekf::InitialSigma::default(),
-    })
-    .unwrap();
     for sample in 1..400 {
         let imu = still.imu(sample);
         vio.imu(&imu).unwrap();

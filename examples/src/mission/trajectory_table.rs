@@ -1,0 +1,34 @@
+//! Plan and flight of a mission as a table (CSV).
+
+use super::run::Mission;
+
+/// Seconds between two rows.
+const TRAJECTORY_STEP: f64 = 0.05;
+
+/// One row every [`TRAJECTORY_STEP`] seconds: what was planned, then what was flown.
+pub(super) fn trajectory_table(mission: &Mission) -> String {
+    let mut text = String::from(
+        "time_s,x_m,y_m,z_m,heading_rad,pan_rad,tilt_rad,flow_m3_per_s,target_x_m,target_y_m,target_z_m,flown_x_m,flown_y_m,\
+         flown_z_m,flown_qx,flown_qy,flown_qz,flown_qw,flown_pan_rad,flown_tilt_rad\n",
+    );
+    let mut start = 0.0;
+    for f in &mission.flights {
+        let stride = (TRAJECTORY_STEP / f.flight.interval).round().max(1.0) as usize;
+        for s in f.flight.samples.iter().step_by(stride) {
+            let planned = f.plan.setpoint(s.time);
+            let (p, aim) = (planned.sample.position, planned.aim);
+            let (flown, q) = (s.world_from_body.translation, s.world_from_body.rotation.coords);
+            let row = [
+                [start + s.time, p.x, p.y, p.z, planned.sample.heading, planned.pan, planned.tilt].as_slice(),
+                &[planned.flow, aim.x, aim.y, aim.z, flown.x, flown.y, flown.z],
+                &[q.x, q.y, q.z, q.w, s.pan_tilt[0], s.pan_tilt[1]],
+            ]
+            .concat();
+            let numbers: Vec<String> = row.iter().map(|v| format!("{v:.9}")).collect();
+            text += &numbers.join(",");
+            text.push('\n');
+        }
+        start += f.plan.trajectory.duration();
+    }
+    text
+}
