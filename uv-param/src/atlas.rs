@@ -22,7 +22,7 @@ mod texels;
 use crate::chart::{Chart, SurfacePoint};
 use crate::error::Error;
 use crate::parametrizer::{Parametrizer, Progress};
-use crate::surface::{Surface, SurfaceReport};
+use crate::surface::{FaceLookup, Surface, SurfaceReport};
 pub use charting::ChartSettings;
 pub use pack::{PackSettings, Page, Placement, Turns};
 pub use quality::AtlasQuality;
@@ -142,5 +142,28 @@ impl Atlas {
         let placement = &self.placements[chart];
         let uv = self.charts[chart].uv_of(SurfacePoint { face: local as u32, ..at });
         (placement.page, placement.apply(uv))
+    }
+
+    /// All charts of a page as one, where they lie on it: for everything that works on a single chart, texels and nozzle commands
+    /// included. [`Disk::across_seam`](crate::Disk::across_seam) leads from chart to chart, and smooth normals go on there.
+    /// `None` for a page that does not exist.
+    pub fn page_chart(&self, page: usize) -> Option<Chart> {
+        let size = self.pages.get(page)?.map(|texels| texels as f64 * self.texel_m);
+        let on_page = |f: &u32| self.placements[self.place_of_face[*f as usize][0] as usize].page == page;
+        let faces: Vec<u32> = (0..self.surface.faces().len() as u32).filter(on_page).collect();
+        let is_seam = |h: usize| {
+            let (chart, local) = self.chart_of_face(h / 3);
+            self.charts[chart].disk().twin(3 * local + h % 3).is_none()
+        };
+        let disk = self.surface.piece(&faces, is_seam, &mut FaceLookup::new(&self.surface));
+        let mut uv = vec![[0.0; 2]; disk.positions().len()];
+        for (corners, &f) in disk.faces().iter().zip(&faces) {
+            let (chart, local) = self.chart_of_face(f as usize);
+            let there = self.charts[chart].disk().faces()[local];
+            for (&v, &w) in corners.iter().zip(&there) {
+                uv[v as usize] = self.placements[chart].apply(self.charts[chart].uv()[w as usize]);
+            }
+        }
+        Some(Chart::placed(disk, uv, size, 0))
     }
 }

@@ -154,6 +154,11 @@ impl Surface {
     /// Some faces as a surface of their own, open along the half-edges for which `seam` holds; `None` unless they can be laid
     /// out in the plane (in one piece, without handles, with a boundary).
     pub(crate) fn disk(&self, faces: &[u32], seam: impl Fn(usize) -> bool, lookup: &mut FaceLookup) -> Option<Disk> {
+        Some(self.piece(faces, seam, lookup)).filter(Disk::is_planar)
+    }
+
+    /// The same, whatever its shape.
+    pub(crate) fn piece(&self, faces: &[u32], seam: impl Fn(usize) -> bool, lookup: &mut FaceLookup) -> Disk {
         lookup.set(faces);
         let mut twins = vec![BORDER; 3 * faces.len()];
         let mut glued = twins.clone();
@@ -173,7 +178,7 @@ impl Surface {
         let reversed = faces.iter().map(|&f| self.reversed[f as usize]).collect();
         let source = faces.iter().map(|&f| self.face_source[f as usize]).collect();
         let corners: Vec<[u32; 3]> = faces.iter().map(|&f| self.faces[f as usize]).collect();
-        Disk::from_chart(&self.positions, &corners, twins, glued, source, reversed, self.source_faces)
+        Disk::from_faces(&self.positions, &corners, twins, glued, source, reversed, self.source_faces)
     }
 }
 

@@ -50,10 +50,10 @@ pub(crate) fn minimise_symmetric_dirichlet(
     stopping: &StoppingCriterion,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<usize, Error> {
-    minimise_penalty(disk, frames, uv, Penalty::NONE, stopping, progress)
+    minimise_penalty(disk, frames, uv, Penalty::NONE, stopping, progress, &mut |_| false)
 }
 
-/// The same with a penalty on the worst faces.
+/// The same with a penalty on the worst faces; stops as well when a layout is `enough`.
 pub(crate) fn minimise_penalty(
     disk: &Disk,
     frames: &[Frame],
@@ -61,6 +61,7 @@ pub(crate) fn minimise_penalty(
     penalty: Penalty,
     stopping: &StoppingCriterion,
     progress: &mut dyn FnMut(Progress),
+    enough: &mut dyn FnMut(&[[f64; 2]]) -> bool,
 ) -> Result<usize, Error> {
     let faces = flips(uv, &disk.faces);
     if faces > 0 {
@@ -76,7 +77,7 @@ pub(crate) fn minimise_penalty(
         let (before, now) = (last / area / 4.0, next / area / 4.0);
         last = next;
         progress(Progress { stage: Stage::SymmetricDirichlet, iteration, energy: now });
-        if before - now <= stopping.tolerance * (before - 1.0).max(0.0) + f64::EPSILON {
+        if before - now <= stopping.tolerance * (before - 1.0).max(0.0) + f64::EPSILON || enough(uv) {
             return Ok(iteration);
         }
     }
@@ -201,7 +202,7 @@ impl Newton {
                 below.extend([(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)]);
             }
         }
-        let spd = Spd::new(2 * disk.positions.len(), &below, SupernodalThreshold::AUTO)?;
+        let spd = Spd::new(2 * disk.positions.len(), &below, SupernodalThreshold::FORCE_SUPERNODAL)?;
         let places = disk
             .faces
             .iter()

@@ -72,6 +72,17 @@ impl Jacobian {
         [s1, if s1 > 0.0 { self.det() / s1 } else { 0.0 }]
     }
 
+    /// `max(s1, 1 / s2)`, infinite where the triangle is not positive.
+    pub(crate) fn largest_stretch(&self) -> f64 {
+        let det = self.det();
+        if det <= 0.0 {
+            return f64::INFINITY;
+        }
+        let half = 0.5 * (self.a * self.a + self.b * self.b + self.c * self.c + self.d * self.d);
+        let s1 = (half + (half * half - det * det).max(0.0).sqrt()).sqrt();
+        s1.max(s1 / det)
+    }
+
     /// Cosine and sine of the nearest rotation; `None` when every rotation is equally near.
     pub(crate) fn nearest_rotation(&self) -> Option<[f64; 2]> {
         let (p, q) = (self.a + self.d, self.c - self.b);

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Parser;
 use paintcopter_examples::mesh_io::read_mesh;
+use paintcopter_examples::surface::PaintSurface;
 use paintcopter_examples::unwrap::{Arguments, UnwrapError, run};
 
 use super::scratch::Scratch;
@@ -83,6 +84,27 @@ fn a_texture_is_carried_over() {
     let (red, blue) = (count([200, 10, 10]), count([10, 10, 200]));
     // 4 m² in texels of 2 cm are 10000; a band about each middle line is mixed.
     assert!(red > 4000.0 && blue > 4000.0 && (red / blue - 1.0).abs() < 0.1, "{red} {blue}");
+}
+
+/// A closed box and three sheets at one edge are surfaces to paint: every side of them is on the page, once.
+#[test]
+fn what_is_no_disk_is_painted_all_around() {
+    let scratch = Scratch::new("all-around");
+    let fin = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 0 -1 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\n";
+    for (text, sides, area) in [(BOX, 12, 4.0), (fin, 3, 1.5)] {
+        let mesh = read_mesh(&write(&scratch, "mesh.obj", text)).unwrap();
+        let surface = PaintSurface::new(&mesh, 0.02, &|_| ()).unwrap();
+        assert_eq!(surface.disk().faces().len(), sides);
+        let (texels, pixels) = surface.film_texels();
+        assert!((texels.iter().map(|t| t.area).sum::<f64>() - area).abs() < 1e-9);
+        // The robot's targets lie where the texels are.
+        for (texel, &pixel) in texels.iter().zip(&pixels).step_by(97) {
+            let (x, y) = ((pixel % surface.width()) as f64, (pixel / surface.width()) as f64);
+            if let Some((point, _)) = surface.lift(x, y) {
+                assert!((point - texel.point).norm() < 0.03);
+            }
+        }
+    }
 }
 
 #[test]

@@ -210,6 +210,7 @@ fn finish(
                 Penalty::beyond(bounds.stretch, POWER),
                 &stopping,
                 &mut |_| (),
+                &mut |_| false,
             )
             .is_ok()
                 && Distortion::measure(&disk, &frames, &better, bounds).within(bounds)

@@ -22,8 +22,12 @@ const NEWTON_ITERATIONS: usize = 10;
 const HOPELESS: f64 = 0.4;
 /// The same after the local/global iterations.
 const NEARLY: f64 = 0.2;
+/// An iteration that leaves more than this share of the faces beyond the bound, and most of what there was, is the last.
+const SLOW_BEYOND: f64 = 0.02;
+/// Most, in this sense.
+const SLOW_GAIN: f64 = 0.8;
 /// Power of the penalty on faces beyond the bound.
-pub(super) const POWER: f64 = 5.0;
+pub(super) const POWER: i32 = 5;
 /// Relative gain below which iterations stop.
 const TOLERANCE: f64 = 1e-3;
 
@@ -48,8 +52,7 @@ impl Distortion {
     pub(super) fn measure(disk: &Disk, frames: &[Frame], uv: &[[f64; 2]], bounds: Bounds) -> Self {
         let (mut count, mut beyond_area, mut area, mut worst) = (0, 0.0, 0.0, 1.0_f64);
         for (face, frame) in disk.faces.iter().zip(frames) {
-            let [s1, s2] = frame.jacobian(face.map(|v| uv[v as usize])).stretch();
-            let stretch = if s2 > 0.0 { s1.max(1.0 / s2) } else { f64::INFINITY };
+            let stretch = frame.jacobian(face.map(|v| uv[v as usize])).largest_stretch();
             worst = worst.max(stretch);
             area += frame.area;
             if stretch > bounds.stretch {
@@ -104,8 +107,14 @@ pub(super) fn fit(
         }
         let stopping = StoppingCriterion { iterations: NEWTON_ITERATIONS, tolerance: TOLERANCE };
         let penalty = Penalty::beyond(bounds.stretch, POWER);
-        minimise_penalty(disk, &frames, &mut uv, penalty, &stopping, &mut silent).ok()?;
-        distortion = Distortion::measure(disk, &frames, &uv, bounds);
+        let mut last = distortion.beyond;
+        let mut done = |uv: &[[f64; 2]]| {
+            distortion = Distortion::measure(disk, &frames, uv, bounds);
+            let hopeless = distortion.beyond > SLOW_BEYOND && distortion.beyond > SLOW_GAIN * last;
+            last = distortion.beyond;
+            hopeless || distortion.within(bounds)
+        };
+        minimise_penalty(disk, &frames, &mut uv, penalty, &stopping, &mut silent, &mut done).ok()?;
     }
     good(&uv, &distortion).then_some(uv)
 }

@@ -6,8 +6,11 @@ use super::fit::{Bounds, fit};
 use super::layout::Charts;
 use super::motion::motion;
 use super::seams::{Arc, arcs};
+use crate::min_area_rectangle::min_area_rectangle;
 use crate::parametrizer::Parametrizer;
 
+/// Longest side of a chart that sewing may make, relative to the square root of the area: longer ones waste the page.
+const MAX_EXTENT: f64 = 1.3;
 /// Share of an arc's length by which its two sides differ in shape at which closing it is half as attractive.
 const MISFIT: f64 = 0.03;
 /// Misfit beyond which it is not tried.
@@ -204,11 +207,12 @@ impl<'a, 'b> Sewing<'a, 'b> {
             self.charts.cut[h] = false;
         }
         let to_left = motion(self.charts, half_edges, same);
+        let longest = MAX_EXTENT * surface.area().sqrt();
         let laid_out = self.charts.disk(&faces).and_then(|disk| {
             let chart = &self.charts.chart;
             let moved = |f: usize, at| if !same && chart[f] == right { to_left.apply(at) } else { at };
             let start = self.charts.vertex_uv(&faces, &disk, moved);
-            fit(&disk, start, self.bounds, self.parametrizer).map(|uv| (disk, uv))
+            fit(&disk, start, self.bounds, self.parametrizer).filter(|uv| extent(uv) < longest).map(|uv| (disk, uv))
         });
         let Some((disk, uv)) = laid_out else {
             for h in half_edges.iter().flat_map(|&h| both(h)) {
@@ -246,6 +250,11 @@ impl<'a, 'b> Sewing<'a, 'b> {
             .flatten()
             .collect()
     }
+}
+
+/// Longer side of the smallest rectangle around a layout, metres.
+fn extent(uv: &[[f64; 2]]) -> f64 {
+    min_area_rectangle(uv).map_or(f64::INFINITY, |rectangle| rectangle.width.max(rectangle.height))
 }
 
 fn key(half_edges: &[u32]) -> (u32, u32) {

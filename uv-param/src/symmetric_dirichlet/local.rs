@@ -72,7 +72,7 @@ mod tests {
     use super::{Local, Penalty};
     use crate::triangle::Frame;
 
-    const STEEP: Penalty = Penalty { bound: 0.3, power: 3.0 };
+    const STEEP: Penalty = Penalty { bound: 0.3, power: 3 };
 
     const CORNERS: [[f64; 3]; 3] = [[0.1, 0.2, 0.0], [1.3, 0.1, 0.4], [0.4, 0.9, -0.2]];
 

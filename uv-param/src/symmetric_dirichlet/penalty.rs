@@ -7,15 +7,15 @@ pub(crate) struct Penalty {
     /// `W / 4 - 1` from which the power rules; infinite for W alone.
     pub(crate) bound: f64,
     /// The power, above 2.
-    pub(crate) power: f64,
+    pub(crate) power: i32,
 }
 
 impl Penalty {
     /// W alone.
-    pub(crate) const NONE: Self = Self { bound: f64::INFINITY, power: 3.0 };
+    pub(crate) const NONE: Self = Self { bound: f64::INFINITY, power: 3 };
 
     /// For faces that are not to be stretched by more than `stretch` in one direction.
-    pub(crate) fn beyond(stretch: f64, power: f64) -> Self {
+    pub(crate) fn beyond(stretch: f64, power: i32) -> Self {
         let square = stretch * stretch;
         Self { bound: (square + 1.0 / square + 2.0) / 4.0 - 1.0, power }
     }
@@ -26,7 +26,11 @@ impl Penalty {
             return [w, 1.0, 0.0];
         }
         let e = ((w / 4.0 - 1.0) / self.bound).max(0.0);
-        let low = e.powf(self.power - 2.0);
-        [w + 4.0 * self.bound * low * e * e / self.power, 1.0 + low * e, (self.power - 1.0) * low / (4.0 * self.bound)]
+        let low = e.powi(self.power - 2);
+        [
+            w + 4.0 * self.bound * low * e * e / f64::from(self.power),
+            1.0 + low * e,
+            f64::from(self.power - 1) * low / (4.0 * self.bound),
+        ]
     }
 }
