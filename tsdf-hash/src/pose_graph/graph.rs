@@ -36,8 +36,9 @@ use crate::pose_graph::levenberg_marquardt::{PoseGraphReport, PoseGraphSettings,
 /// }
 /// let report = graph.optimise(&PoseGraphSettings::default())?;
 /// assert!(report.converged && report.cost < report.initial_cost);
-/// // The odd side gives way to the one opposite.
-/// assert!((graph.poses[1].translation.vector.norm() - 1.0).abs() < 1e-6);
+/// // The odd side gives way towards the one opposite.
+/// let odd = (graph.poses[2].translation.vector - graph.poses[1].translation.vector).norm();
+/// assert!((1.0..1.04).contains(&odd), "{odd} m");
 /// # Ok::<(), tsdf_hash::Error>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
