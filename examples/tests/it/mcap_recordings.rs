@@ -103,7 +103,9 @@ fn ros_transform(stamp: Stamp, parent: &str, child: &str, numbers: [f64; 7]) -> 
     put(&mut bytes, ((stamp.nanos() % 1_000_000_000) as u32).to_le_bytes());
     put_blob(&mut bytes, &[parent.as_bytes(), &[0]].concat());
     put_blob(&mut bytes, &[child.as_bytes(), &[0]].concat());
-    numbers.into_iter().for_each(|v| put(&mut bytes, v.to_le_bytes()));
+    for v in numbers {
+        put(&mut bytes, v.to_le_bytes());
+    }
     bytes
 }
 
