@@ -66,8 +66,8 @@ const NARROWING: f64 = 4.0;
 const NEARBY: f64 = 0.5;
 /// And within this angle, radians.
 const ALIKE_ANGLE: f64 = 0.6;
-/// Errors of odometry add up in one direction in the worst case: that many deviations of each step are believed (ours).
-const WORST: f64 = 2.0;
+/// So many standard deviations of the gathered error are believed (ours).
+const WORST: f64 = 3.0;
 /// Least overlap of a frame with the map of an old visit: with less, little is compared.
 const LEAST_OVERLAP: f64 = 0.4;
 
@@ -179,10 +179,13 @@ impl LoopCloser {
         if let Some(drift) =
             self.compare(depth, present, before.saturating_sub(self.settings.window)..present, world_from_camera)?
         {
-            // Odometry again, as the depth has it.
+            // Odometry again, as the depth has it; where both contradict each other, the depth was mistaken.
             let again = LoopClosure { old: before, present, drift };
-            let factor = BetweenFactor { kernel: RobustKernel::Huber(STEP_KERNEL), ..self.measured(&again) };
-            self.graph.betweens.push(factor);
+            let [turn, shift] = self.deviations(&(self.graph.poses[before].inverse() * world_from_camera));
+            if again.drift.angle() <= WORST * turn && again.drift.distance(world_from_camera) <= WORST * shift {
+                let factor = BetweenFactor { kernel: RobustKernel::Huber(STEP_KERNEL), ..self.measured(&again) };
+                self.graph.betweens.push(factor);
+            }
         }
         report.loops = self.loops(depth, colour, present, &mut report.compared)?;
         for found in &report.loops {
@@ -285,6 +288,10 @@ impl LoopCloser {
                 found.push(LoopClosure { old, present, drift });
             }
         }
+        if !found.is_empty() {
+            let refined = self.refined()?;
+            found.retain(|found| self.is_plausible(&refined, found));
+        }
         Ok(found)
     }
 
@@ -297,29 +304,45 @@ impl LoopCloser {
     ) -> Result<Option<Drift>, Error> {
         let LoopSettings { voxel_size, noise, threads, .. } = self.settings;
         let settings = Settings { voxel_size, threads, noise, ..Settings::default() };
-        let last = visit.end.saturating_sub(1);
         let mut map = self.keyframes.map_of(visit, settings)?;
         let pose = self.graph.poses[present];
         let drift = self.tracker.drift(&mut map, depth, None, &pose, None, &[*start])?;
-        let [turn, shift] = self.plausible(last, present);
-        let plausible = |drift: &Drift| drift.angle() <= turn && drift.distance(&pose) <= shift;
-        Ok(drift.filter(|drift| drift.outcome.overlap >= LEAST_OVERLAP && plausible(drift)))
+        Ok(drift.filter(|drift| drift.outcome.overlap >= LEAST_OVERLAP))
     }
 
-    /// The largest drift, radians and metres, that odometry can have gathered between two keyframes: places that look alike but are
-    /// farther apart are others.
-    fn plausible(&self, old: usize, present: usize) -> [f64; 2] {
-        let poses = &self.graph.poses[old..=present];
-        let [mut turn, mut shift] = LOOP_FLOOR.map(|s| 3.0 * s);
-        for pair in poses.windows(2) {
-            let step = pair[0].inverse() * pair[1];
-            let deviations = self.deviations(&step);
+    /// Whether a registration is where the motions measured so far allow it to be: places that look alike but are farther apart are others.
+    fn is_plausible(&self, refined: &[Isometry3<f64>], found: &LoopClosure) -> bool {
+        let measured = self.graph.poses[found.old].inverse() * found.drift.outcome.world_from_camera;
+        let off = (refined[found.old].inverse() * refined[found.present]).inverse() * measured;
+        let [turn, shift] = self.largest_error(refined, found.old, found.present);
+        off.rotation.angle() <= turn && off.translation.vector.norm() <= shift
+    }
+
+    /// The poses as the motions and loops measured so far have them.
+    fn refined(&self) -> Result<Vec<Isometry3<f64>>, Error> {
+        let mut graph = self.graph.clone();
+        graph.optimise(&PoseGraphSettings::default())?;
+        Ok(graph.poses)
+    }
+
+    /// The largest error, radians and metres, that the motions between two keyframes can have gathered.
+    fn largest_error(&self, poses: &[Isometry3<f64>], old: usize, present: usize) -> [f64; 2] {
+        let is_registered = |k: usize| {
+            self.graph.betweens.iter().any(|f| f.first == k && f.second == k + 1 && f.kernel != RobustKernel::Squared)
+        };
+        let [mut turn, mut shift] = [0.0_f64; 2];
+        for k in old..present {
+            let deviations = if is_registered(k) {
+                LOOP_FLOOR.map(|s| 3.0 * s)
+            } else {
+                self.deviations(&(poses[k].inverse() * poses[k + 1]))
+            };
             // A turn moves all that comes after it.
-            let arm = (poses[poses.len() - 1].translation.vector - pair[1].translation.vector).norm();
-            turn += WORST * deviations[0];
-            shift += WORST * (deviations[1] + deviations[0] * arm);
+            let arm = (poses[present].translation.vector - poses[k + 1].translation.vector).norm();
+            turn += deviations[0].powi(2);
+            shift += deviations[1].powi(2) + (deviations[0] * arm).powi(2);
         }
-        [turn, shift]
+        [turn, shift].map(|variance| WORST * variance.sqrt())
     }
 
     /// Standard deviations of the turn and the shift of a measured motion.

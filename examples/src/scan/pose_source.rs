@@ -10,6 +10,9 @@ use super::error::ScanError;
 use super::map_store::MapStore;
 use super::sequence::FrameFiles;
 
+/// Least share of a frame that a map must account for where it does not grow (ours).
+const LEAST_COVERAGE: f64 = 0.4;
+
 /// Which poses a run believes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PoseSource {
@@ -40,14 +43,24 @@ pub(super) struct Odometry {
     lost: bool,
     /// Where the camera is at first is looked for, too.
     found_first: bool,
+    /// Nothing is fused.
+    fixed_map: bool,
     pub(super) metrics: TrackingMetrics,
 }
 
 impl Odometry {
-    pub(super) fn new(map: &tsdf_hash::Settings, found_first: bool) -> Result<Self, ScanError> {
+    pub(super) fn new(map: &tsdf_hash::Settings, found_first: bool, fixed_map: bool) -> Result<Self, ScanError> {
         let settings = TrackingSettings { noise: map.noise, threads: map.threads, ..TrackingSettings::default() };
         let tracker = Tracker::new(settings)?;
-        Ok(Self { tracker, last: None, before: None, lost: false, found_first, metrics: TrackingMetrics::default() })
+        Ok(Self {
+            tracker,
+            last: None,
+            before: None,
+            lost: false,
+            found_first,
+            fixed_map,
+            metrics: TrackingMetrics::default(),
+        })
     }
 
     /// Goes on from a pose.
@@ -118,7 +131,12 @@ impl Odometry {
         guess: Isometry3<f64>,
     ) -> Result<TrackingOutcome, ScanError> {
         let prior = PosePrior { world_from_camera: guess, covariance: None };
-        Ok(self.tracker.track(store.dense(), depth, colour, &prior)?)
+        let mut outcome = self.tracker.track(store.dense(), depth, colour, &prior)?;
+        // A map that does not grow is left sooner or later: what little of it is in view then leads anywhere.
+        if self.fixed_map && (outcome.coverage < LEAST_COVERAGE || !outcome.degenerate.is_empty()) {
+            outcome.status = TrackingStatus::NoOverlap;
+        }
+        Ok(outcome)
     }
 
     /// Counts, and says what changed.
@@ -148,7 +166,12 @@ impl Odometry {
 fn reason(outcome: &TrackingOutcome) -> String {
     let (overlap, agreement) = (100.0 * outcome.overlap, 100.0 * outcome.agreement);
     match outcome.status {
-        TrackingStatus::NoOverlap => format!("only {overlap:.0} % of the map in view were measured"),
+        TrackingStatus::NoOverlap => {
+            let coverage = 100.0 * outcome.coverage;
+            format!(
+                "{overlap:.0} % of the map in view were measured, {coverage:.0} % of the frame are in the map: too little"
+            )
+        }
         TrackingStatus::Disagreement => format!("only {agreement:.0} % of the pixels agree with the map"),
         TrackingStatus::Rejected => "the motion is not plausible".into(),
         TrackingStatus::Tracked => "it is not".into(),

@@ -204,7 +204,9 @@ impl<'a> Run<'a> {
         let store = MapStore::open(map, settings.device)?;
         let mut odometry = match settings.poses {
             PoseSource::Given => None,
-            PoseSource::Tracked => Some(Odometry::new(store.settings(), settings.relocalise.is_some())?),
+            PoseSource::Tracked => {
+                Some(Odometry::new(store.settings(), settings.relocalise.is_some(), !settings.fuse)?)
+            }
         };
         let progress =
             progress.unwrap_or(Progress { last_stamp: f64::NEG_INFINITY, trajectory: Trajectory::default() });

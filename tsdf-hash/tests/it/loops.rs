@@ -217,3 +217,62 @@ fn keyframes_survive_their_bytes_and_damage_is_named() {
     assert!(small.map_of(7..8, settings).unwrap().blocks() > 0);
     assert_eq!(small.map_of(1..2, settings).unwrap().blocks(), 0);
 }
+
+/// Frames from anywhere near the tour, and frames of another room: `(right, wrong, nowhere)` of those in it, and found of those
+/// elsewhere.
+fn relocalised(inside: usize, elsewhere: usize) -> ([usize; 3], usize) {
+    let mut random = Random::new(31);
+    let settings = Settings { voxel_size: 0.02, ..Settings::default() };
+    let (mut map, mut keyframes) = (Map::new(settings).unwrap(), KeyframeIndex::new());
+    for k in 0..120 {
+        let shot = seen(room::pose(k, 120), &mut random);
+        map.integrate(&shot.view(), None, &shot.world_from_camera).unwrap();
+        keyframes.add(&shot.view(), None, &shot.world_from_camera).unwrap();
+    }
+    let mut tracker = Tracker::new(TrackingSettings::default()).unwrap();
+    let mut places = [0; 3];
+    for _ in 0..inside {
+        let near = room::pose((360.0 * random.uniform()) as usize, 360);
+        let offset =
+            Isometry3::new(unit(&mut random) * 0.1 * random.uniform(), unit(&mut random) * 0.15 * random.uniform());
+        let truth = near * offset;
+        let found = tracker.relocalise(&mut map, &seen(truth, &mut random).view(), None, &keyframes).unwrap();
+        let place = found.map(|found| apart(&found.world_from_camera, &truth));
+        places[match place {
+            Some((metres, radians)) if metres < 5e-3 && radians < 0.3_f64.to_radians() => 0,
+            Some(_) => 1,
+            None => 2,
+        }] += 1;
+    }
+    let mut false_places = 0;
+    for _ in 0..elsewhere {
+        // A larger room, of which another corner is up.
+        let pose = room::pose((360.0 * random.uniform()) as usize, 360);
+        let turned = |v: &Vector3<f64>| Vector3::new(v.z, v.x, v.y);
+        let clean = Shot::take((320, 240), [262.5; 2], pose, |o, d| {
+            let inside = Point3::from(turned(&o.coords) * 0.7 + Vector3::new(-0.6, 0.3, 0.9));
+            Some(room::hit(&inside, &(turned(d) * 0.7)))
+        });
+        let depth = noisy(&clean, &mut random);
+        let found = tracker.relocalise(&mut map, &Shot { depth, ..clean }.view(), None, &keyframes).unwrap();
+        false_places += usize::from(found.is_some());
+    }
+    (places, false_places)
+}
+
+#[test]
+fn a_camera_is_found_in_the_room_and_not_in_another() {
+    let ([right, wrong, nowhere], elsewhere) = relocalised(20, 8);
+    eprintln!("{right} right, {wrong} wrong, {nowhere} not found; {elsewhere} found elsewhere");
+    assert!(right >= 12 && wrong <= 2 && elsewhere == 0);
+}
+
+/// 200 poses, 30 of them in another room.
+#[test]
+#[ignore = "prints figures, takes a minute"]
+fn relocalisation_figures() {
+    let ([right, wrong, nowhere], elsewhere) = relocalised(170, 30);
+    eprintln!(
+        "of 170: {right} right, {wrong} off by more than 5 mm or 0.3 deg, {nowhere} not found; of 30 elsewhere {elsewhere} found"
+    );
+}
