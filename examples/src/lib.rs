@@ -4,6 +4,7 @@
 pub mod adapters;
 pub mod appearance;
 pub mod design;
+mod mcap_messages;
 pub mod mesh_io;
 pub mod mesh_placement;
 pub mod mission;

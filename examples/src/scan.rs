@@ -1,11 +1,15 @@
 //! Maps a recorded RGB-D sequence: reads it frame by frame, fuses it, and shows what became of it.
 
 mod checkpoint;
+mod correction;
 mod decode;
 mod error;
+mod image_source;
 mod layouts;
 mod map_store;
+mod mcap_in;
 mod options;
+mod pairing;
 mod pose_source;
 mod quality;
 mod report;
@@ -14,8 +18,10 @@ mod sequence;
 mod views;
 
 pub use checkpoint::CheckpointSettings;
+pub use correction::LoopMetrics;
 pub use decode::{Colour, Images};
 pub use error::{ScanError, SequenceError};
+pub use image_source::{ImageSource, ImageTopic};
 pub use layouts::open_sequence;
 pub use map_store::Device;
 pub use options::{FrameRange, in_options, mebibytes, parse_intrinsics, parse_noise, read_colour_camera};

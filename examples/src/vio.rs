@@ -1,7 +1,6 @@
 //! Runs the odometry over recordings, evaluates the trajectories, and makes recordings to run it on.
 
 mod camera_frames;
-mod cdr;
 mod command_line;
 mod compare;
 mod diagnosis;

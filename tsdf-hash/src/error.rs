@@ -169,6 +169,46 @@ pub enum Error {
         /// Block coordinates (one of those that do not contain it).
         block: [i32; 3],
     },
+    /// A factor of a pose graph makes no sense.
+    #[cfg(feature = "pose-graph")]
+    #[error("{factor} factor {index} of the pose graph: {what}")]
+    InvalidFactor {
+        /// `"between"` or `"prior"`.
+        factor: &'static str,
+        /// Which of them.
+        index: usize,
+        /// What is wrong with it.
+        what: &'static str,
+    },
+    /// Nothing fixes a pose of a graph.
+    #[cfg(feature = "pose-graph")]
+    #[error("pose {pose} of the graph is not constrained: {why}")]
+    UnconstrainedPose {
+        /// Its index.
+        pose: usize,
+        /// Why.
+        why: &'static str,
+    },
+    /// The factors of a pose graph leave a direction open.
+    #[cfg(feature = "pose-graph")]
+    #[error("the pose graph has no unique minimum: some information is singular; add factors or a prior")]
+    SingularGraph,
+    /// A pose graph does not fit into memory.
+    #[cfg(feature = "pose-graph")]
+    #[error("a graph of {poses} free poses is too large to be factorised")]
+    GraphTooLarge {
+        /// Poses that are not fixed.
+        poses: usize,
+    },
+    /// A line of g2o's text makes no sense.
+    #[cfg(feature = "pose-graph")]
+    #[error("g2o text, line {line}: {why}")]
+    MalformedG2o {
+        /// Counted from 1.
+        line: usize,
+        /// What was expected, and found.
+        why: String,
+    },
     /// No GPU can be used; [`Map`](crate::Map) works without one.
     #[cfg(feature = "gpu")]
     #[error("no GPU: {reason}")]

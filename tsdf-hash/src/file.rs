@@ -15,7 +15,7 @@
 
 mod attachments;
 mod block_index;
-mod byte_reader;
+pub(crate) mod byte_reader;
 mod checksum;
 pub(crate) mod contents;
 mod header;

@@ -47,6 +47,7 @@
 //! | tracking: Eqs. (5.2) and (5.3), coarse to fine; degenerate directions: ours | thesis Paper I, section 4.1 | [`Tracker`], [`TrackingOutcome`] |
 //! | `R(v) = α n/n_max + β (1 − abs(sdf)/μ)`, Eqs. (5.4)-(5.6) | thesis Paper I, section 4.4, corrected | [`IncrementalRayCast`] |
 //! | forward projection of a view between ray casts | thesis Paper I, section 6.2 | [`View::warped`] |
+//! | pose graph: Levenberg-Marquardt on SE(3) | thesis Paper I, section 4.6 | `PoseGraph` (feature `pose-graph`) |
 //! | distance queries | thesis, outlook | [`Map::distance`], [`Map::distance_and_gradient`] |
 //! | distances for planners, far from surfaces | thesis, outlook; branch and bound over sites: ours | [`DistanceField`] |
 //!
@@ -67,9 +68,14 @@ mod gpu;
 mod hashing;
 mod images;
 mod integration;
+mod keyframes;
+#[cfg(feature = "pose-graph")]
+mod loop_closure;
 mod map;
 mod mesh;
 mod parallel;
+#[cfg(feature = "pose-graph")]
+mod pose_graph;
 mod ray_cast;
 mod report;
 mod rounding;
@@ -97,12 +103,23 @@ pub use gpu::gpu_map::{GpuMap, gpu_or_cpu_map};
 #[cfg(feature = "gpu")]
 pub use gpu::options::GpuOptions;
 pub use images::{ColourData, ColourView, DepthData, DepthView, Intrinsics};
+pub use keyframes::index::{KeyframeIndex, KeyframeMatch};
+#[cfg(feature = "pose-graph")]
+pub use loop_closure::{LoopCloser, LoopClosure, LoopReport, LoopSettings};
 pub use map::Map;
 pub use mesh::incremental::IncrementalMesher;
 pub use mesh::obj::write_obj;
 pub use mesh::ply::write_ply;
 pub use mesh::triangle_mesh::Mesh;
 pub use nalgebra;
+#[cfg(feature = "pose-graph")]
+pub use pose_graph::factors::{BetweenFactor, PriorFactor};
+#[cfg(feature = "pose-graph")]
+pub use pose_graph::graph::PoseGraph;
+#[cfg(feature = "pose-graph")]
+pub use pose_graph::levenberg_marquardt::{PoseGraphReport, PoseGraphSettings};
+#[cfg(feature = "pose-graph")]
+pub use pose_graph::robust_kernel::RobustKernel;
 pub use ray_cast::incremental::{IncrementalRayCast, IncrementalRayCastSettings};
 pub use ray_cast::settings::RayCastSettings;
 pub use ray_cast::single_ray::SurfaceHit;
@@ -111,7 +128,7 @@ pub use report::{FrameReport, MemoryUsage};
 pub use settings::{MemoryLimits, NoiseModel, Settings};
 pub use storage::merge_policy::{MergeDecision, MergeImmediately, MergePolicy};
 pub use storage::reloaded::ReloadedBlocks;
-pub use tracking::keyframes::KeyframeIndex;
+pub use tracking::drift::Drift;
 pub use tracking::outcome::{PosePrior, TrackingOutcome, TrackingStatus};
 pub use tracking::settings::TrackingSettings;
 pub use tracking::tracker::Tracker;

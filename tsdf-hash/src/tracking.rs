@@ -1,8 +1,8 @@
 //! Where the camera is: the new frame against the map, as the last pose sees it (thesis Paper I, section 4.1).
 
 pub(crate) mod directions;
+pub(crate) mod drift;
 pub(crate) mod image_level;
-pub(crate) mod keyframes;
 pub(crate) mod model_points;
 pub(crate) mod normal_equations;
 pub(crate) mod outcome;

@@ -11,7 +11,7 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 use paint_sim::ciede2000;
 use paint_sim::colour::BANDS;
 use paintcopter_benches::cpu::{CpuTimer, median_seconds};
-use paintcopter_benches::{Rng, colours, films, motion, painting, room};
+use paintcopter_benches::{Rng, colours, films, motion, painting, pose_graphs, room};
 use paintcopter_examples::mesh_io::read_mesh;
 use paintcopter_examples::world::rock_wall;
 use serde_json::json;
@@ -103,6 +103,19 @@ enum Job {
         /// Folder to write into
         folder: PathBuf,
     },
+    /// Writes two pose graphs as g2o text, for `graph` and `pose_graph_peers.py`
+    GraphWorlds {
+        /// Folder to write into
+        folder: PathBuf,
+    },
+    /// Optimises a pose graph, as `pose_graph_peers.py` does
+    Graph {
+        /// g2o text
+        file: PathBuf,
+        /// Runs of which the median is printed
+        #[arg(long, default_value_t = 5)]
+        runs: usize,
+    },
     /// Errors of a TUM trajectory against another, as `trajectory_peers.py` does
     Ate {
         /// TUM text
@@ -126,6 +139,8 @@ fn main() -> ExitCode {
             tsdf(&stream, voxel, frames, threads.into(), !no_colour, out.as_deref())
         }
         Job::Pair { folder } => pair(&folder),
+        Job::GraphWorlds { folder } => pose_graphs::write(&folder),
+        Job::Graph { file, runs } => pose_graphs::run(&file, runs),
         Job::Ate { reference, estimate, runs } => trajectory_errors(&reference, &estimate, runs),
     };
     match done {

@@ -17,8 +17,8 @@ use tsdf_hash::{Intrinsics, MemoryLimits, NoiseModel};
 #[derive(Parser)]
 #[command(version, after_help = "Example:\n  scan --sequence recordings/kitchen --voxel 0.01 --out out/kitchen")]
 struct Arguments {
-    /// Folder in the layout of 7-Scenes, TUM, ICL-NUIM or Redwood
-    #[arg(long, value_name = "DIR")]
+    /// Folder in the layout of 7-Scenes, TUM, ICL-NUIM or Redwood, or an MCAP file
+    #[arg(long, value_name = "PATH")]
     sequence: PathBuf,
     /// Where the poses come from
     #[arg(long, default_value = "given")]
@@ -52,6 +52,15 @@ struct Arguments {
     /// sequence that it holds already are not fused again
     #[arg(long, value_name = "MAP")]
     resume: Option<PathBuf>,
+    /// A stored map to find the camera in, by the keyframes that were stored with it, and to track it in; the map stays as it is
+    #[arg(long, value_name = "MAP", conflicts_with = "resume")]
+    relocalise: Option<PathBuf>,
+    /// With --relocalise: fuse the frames as well, once the camera is found
+    #[arg(long, requires = "relocalise")]
+    extend: bool,
+    /// Look for places that were seen before, measure the drift since then, and correct poses and map
+    #[arg(long, conflicts_with = "relocalise")]
+    loops: bool,
     /// What keeps the map
     #[arg(long, default_value = "auto")]
     device: DeviceName,
@@ -193,13 +202,27 @@ fn settings(arguments: &Arguments) -> Result<ScanSettings, String> {
     };
     let swap = (arguments.disk_mib > 0).then(|| arguments.out.join("map.swap"));
     let poses = match arguments.poses {
-        Poses::Given => PoseSource::Given,
-        Poses::Tracked => PoseSource::Tracked,
+        // Recorded poses are in another world than that of the stored map.
+        Poses::Given if arguments.relocalise.is_none() => PoseSource::Given,
+        Poses::Given | Poses::Tracked => PoseSource::Tracked,
     };
     let interval = Duration::try_from_secs_f64(arguments.checkpoint)
         .map_err(|e| format!("--checkpoint {}: {e}", arguments.checkpoint))?;
     let checkpoint =
         (!interval.is_zero()).then(|| CheckpointSettings { path: arguments.out.join("map.tsdf"), interval });
-    let resume = arguments.resume.clone();
-    Ok(ScanSettings { map, poses, device, swap, resume, checkpoint, ..ScanSettings::default() })
+    let (resume, relocalise) = (arguments.resume.clone(), arguments.relocalise.clone());
+    let (fuse, loops) = (relocalise.is_none() || arguments.extend, arguments.loops);
+    let checkpoint = checkpoint.filter(|_| fuse);
+    Ok(ScanSettings {
+        map,
+        poses,
+        device,
+        swap,
+        resume,
+        relocalise,
+        fuse,
+        loops,
+        checkpoint,
+        ..ScanSettings::default()
+    })
 }

@@ -4,13 +4,15 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use tsdf_hash::{Map, MapFile};
+use tsdf_hash::{KeyframeIndex, Map, MapFile};
 use vio_ekf::{Trajectory, tum};
 
 use super::error::ScanError;
 
 /// Names of the metadata: the folder, the stamp of the last frame that is done, and the trajectory.
 const KEYS: [&str; 3] = ["scan.sequence", "scan.last_stamp", "scan.trajectory"];
+/// And of the keyframes.
+const KEYFRAMES: &str = "scan.keyframes";
 /// Saving takes no larger share of the time than this.
 const LARGEST_SHARE: f64 = 0.1;
 
@@ -47,10 +49,25 @@ impl Progress {
     }
 }
 
+/// The keyframes that were stored with a map; none in maps of runs before there were any.
+pub(super) fn stored_keyframes(path: &Path, file: &MapFile) -> Result<Option<KeyframeIndex>, ScanError> {
+    let fault = |source| ScanError::Stored { path: path.display().to_string(), source };
+    let metadata = file.metadata().map_err(fault)?;
+    metadata.get(KEYFRAMES).map(|bytes| KeyframeIndex::from_bytes(bytes).map_err(fault)).transpose()
+}
+
 /// The metadata of a run.
-pub(super) fn metadata(sequence: &Path, last_stamp: f64, trajectory: &Trajectory) -> BTreeMap<String, Vec<u8>> {
+pub(super) fn metadata(
+    sequence: &Path,
+    last_stamp: f64,
+    trajectory: &Trajectory,
+    keyframes: &KeyframeIndex,
+) -> BTreeMap<String, Vec<u8>> {
     let values = [name(sequence), last_stamp.to_string(), tum::write(trajectory)];
-    KEYS.iter().map(|key| (*key).to_string()).zip(values.map(String::into_bytes)).collect()
+    let mut metadata: BTreeMap<String, Vec<u8>> =
+        KEYS.iter().map(|key| (*key).to_string()).zip(values.map(String::into_bytes)).collect();
+    metadata.insert(KEYFRAMES.into(), keyframes.to_bytes());
+    metadata
 }
 
 fn name(sequence: &Path) -> String {
@@ -76,13 +93,14 @@ impl Checkpoints {
         sequence: &Path,
         last_stamp: f64,
         trajectory: &Trajectory,
+        keyframes: &KeyframeIndex,
     ) -> Result<(), ScanError> {
         let (Some(settings), Some(map)) = (&self.settings, map) else { return Ok(()) };
         let start = Instant::now();
         if start < self.next {
             return Ok(());
         }
-        map.save(&settings.path, None, &metadata(sequence, last_stamp, trajectory))?;
+        map.save(&settings.path, None, &metadata(sequence, last_stamp, trajectory, keyframes))?;
         self.next = Instant::now() + settings.interval.max(start.elapsed().div_f64(LARGEST_SHARE));
         Ok(())
     }

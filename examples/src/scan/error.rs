@@ -8,7 +8,7 @@ pub enum SequenceError {
     /// The folder follows none of the layouts.
     #[error(
         "{folder}: no sequence found: expected frame-*.depth.png (7-Scenes), depth.txt (TUM), depth/ with pose.txt \
-         (ICL-NUIM) or depth/ with trajectory.log (Redwood)"
+         (ICL-NUIM) or depth/ with trajectory.log (Redwood), or an MCAP file"
     )]
     UnknownLayout {
         /// The folder.
@@ -37,6 +37,10 @@ pub enum SequenceError {
 impl SequenceError {
     pub(super) fn malformed(path: &Path, line: usize, why: impl Into<String>) -> Self {
         Self::Malformed { path: path.display().to_string(), line, why: why.into() }
+    }
+
+    pub(super) fn unreadable_image(image: &dyn std::fmt::Display, why: &dyn std::fmt::Display) -> Self {
+        Self::Unreadable { path: image.to_string(), why: why.to_string() }
     }
 
     pub(super) fn unreadable(path: &Path, why: &dyn std::fmt::Display) -> Self {

@@ -5,6 +5,7 @@
 //! | 7-Scenes, 3DMatch | `frame-N.depth.png`, `frame-N.color.{jpg,png}` | `frame-N.pose.txt`, 4x4 | 1000 | `camera-intrinsics.txt`, 3x3, there or one folder up |
 //! | TUM | `depth.txt`, `rgb.txt` | `groundtruth.txt`, `t x y z qx qy qz qw` | 5000, or `intrinsics.txt` | `intrinsics.txt`, else 525, 525, 319.5, 239.5 |
 //! | ICL-NUIM | `depth/N.png`, `color/N.png` | `pose.txt`, `x y z qx qy qz qw` | 5000 | 481.2, -480, 319.5, 239.5 |
+//! | MCAP | topics of depth and colour images, of ROS 2 or Foxglove | transforms to the depth camera's frame | 1000, or metres | `CameraInfo` or `CameraCalibration` |
 //! | Redwood | `depth/`, `color/` | `trajectory.log`, 4x4 | 1000 | the JSON file, else 525, 525, 319.5, 239.5 |
 //!
 //! All poses are `world_from_camera`; one with a number that is not finite means that the recorder had lost the camera. `intrinsics.txt` is one line, `width height fx fy cx cy units_per_metre`.
@@ -17,6 +18,9 @@ use tsdf_hash::Intrinsics;
 use vio_ekf::{Stamp, Trajectory, tum as tum_format};
 
 use super::error::SequenceError;
+use super::image_source::ImageSource;
+use super::mcap_in::open_mcap;
+use super::pairing::{NEAREST, nearest};
 use super::sequence::{FrameFiles, Sequence};
 
 type Result<T> = std::result::Result<T, SequenceError>;
@@ -27,15 +31,15 @@ const RATE: f64 = 30.0;
 const USUAL_CAMERA: Intrinsics = Intrinsics { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5 };
 /// The published camera of ICL-NUIM; its y points up.
 const ICL_CAMERA: Intrinsics = Intrinsics { fx: 481.2, fy: -480.0, cx: 319.5, cy: 239.5 };
-/// Colour belongs to the depth image within this time, seconds (the TUM tools' value).
-const NEAREST: f64 = 0.02;
 
-/// Recognises the layout of a folder and lists its frames.
+/// Recognises the layout of a folder, or a recording in one file, and lists its frames.
 ///
 /// # Errors
 /// [`SequenceError`]; images themselves are read later, by [`Images::read`](super::Images::read).
 pub fn open_sequence(folder: &Path) -> Result<Sequence> {
-    let sequence = if folder.join("depth.txt").is_file() {
+    let sequence = if folder.is_file() {
+        open_mcap(folder)?
+    } else if folder.join("depth.txt").is_file() {
         tum(folder)?
     } else if folder.join("trajectory.log").is_file() {
         redwood(folder)?
@@ -79,7 +83,13 @@ fn seven_scenes(folder: &Path) -> Result<Option<Sequence>> {
         } else {
             (None, false)
         };
-        frames.push(FrameFiles { stamp: number as f64 / RATE, depth: path, colour, world_from_camera, lost });
+        frames.push(FrameFiles {
+            stamp: number as f64 / RATE,
+            depth: ImageSource::File(path),
+            colour: colour.map(ImageSource::File),
+            world_from_camera,
+            lost,
+        });
     }
     Ok(Some(Sequence {
         layout: "7-Scenes",
@@ -112,15 +122,14 @@ fn tum(folder: &Path) -> Result<Sequence> {
         path if path.is_file() => listed(&path)?,
         _ => Vec::new(),
     };
+    let colour_stamps: Vec<f64> = colour.iter().map(|(t, _)| *t).collect();
     let truth = match folder.join("groundtruth.txt") {
         path if path.is_file() => tum_poses(&path)?,
         _ => TumPoses::default(),
     };
     let mut frames = Vec::with_capacity(depth.len());
     for (stamp, path) in depth {
-        let after = colour.partition_point(|(t, _)| *t < stamp);
-        let near = [after.checked_sub(1), Some(after)].into_iter().flatten().filter_map(|k| colour.get(k));
-        let nearest = near.min_by(|a, b| (a.0 - stamp).abs().total_cmp(&(b.0 - stamp).abs()));
+        let paired = nearest(&colour_stamps, stamp, NEAREST);
         let lost = truth.is_lost(stamp);
         let world_from_camera = match (&truth.found, Stamp::from_secs(stamp)) {
             // Outside the recorded poses there is none.
@@ -129,8 +138,8 @@ fn tum(folder: &Path) -> Result<Sequence> {
         };
         frames.push(FrameFiles {
             stamp,
-            depth: path,
-            colour: nearest.filter(|(t, _)| (t - stamp).abs() <= NEAREST).map(|(_, path)| path.clone()),
+            depth: ImageSource::File(path),
+            colour: paired.map(|k| ImageSource::File(colour[k].1.clone())),
             world_from_camera,
             lost,
         });
@@ -255,8 +264,8 @@ fn in_folders(folder: &Path, poses: &[Option<Isometry3<f64>>]) -> Result<Vec<Fra
         let colour = ["png", "jpg"].map(|ending| colour_folder.join(format!("{stem}.{ending}")));
         frames.push(FrameFiles {
             stamp: index as f64 / RATE,
-            depth: path,
-            colour: colour.into_iter().find(|path| path.is_file()),
+            depth: ImageSource::File(path),
+            colour: colour.into_iter().find(|path| path.is_file()).map(ImageSource::File),
             world_from_camera: poses.get(index).copied().flatten(),
             lost: poses.get(index).is_some_and(Option::is_none),
         });

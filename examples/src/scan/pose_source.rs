@@ -28,6 +28,8 @@ pub struct TrackingMetrics {
     pub degenerate: usize,
     /// Times that the camera was lost.
     pub losses: usize,
+    /// Times that it was found by keyframes.
+    pub relocalisations: usize,
 }
 
 /// Poses from the tracker: each frame against the map, from where the last two poses lead.
@@ -36,22 +38,16 @@ pub(super) struct Odometry {
     last: Option<Isometry3<f64>>,
     before: Option<Isometry3<f64>>,
     lost: bool,
-    keyframes: KeyframeIndex,
+    /// Where the camera is at first is looked for, too.
+    found_first: bool,
     pub(super) metrics: TrackingMetrics,
 }
 
 impl Odometry {
-    pub(super) fn new(map: &tsdf_hash::Settings) -> Result<Self, ScanError> {
+    pub(super) fn new(map: &tsdf_hash::Settings, found_first: bool) -> Result<Self, ScanError> {
         let settings = TrackingSettings { noise: map.noise, threads: map.threads, ..TrackingSettings::default() };
         let tracker = Tracker::new(settings)?;
-        Ok(Self {
-            tracker,
-            last: None,
-            before: None,
-            lost: false,
-            keyframes: KeyframeIndex::new(),
-            metrics: TrackingMetrics::default(),
-        })
+        Ok(Self { tracker, last: None, before: None, lost: false, found_first, metrics: TrackingMetrics::default() })
     }
 
     /// Goes on from a pose.
@@ -59,35 +55,51 @@ impl Odometry {
         (self.last, self.before) = (Some(pose), None);
     }
 
+    /// The map and all in it have moved.
+    pub(super) fn move_by(&mut self, correction: &Isometry3<f64>) {
+        for pose in [&mut self.last, &mut self.before].into_iter().flatten() {
+            *pose = correction * *pose;
+        }
+    }
+
     /// The pose of a frame.
     pub(super) fn locate(
         &mut self,
         store: &mut MapStore,
+        keyframes: &KeyframeIndex,
         frame: &FrameFiles,
         depth: &DepthView,
         colour: Option<&ColourView>,
     ) -> Result<Isometry3<f64>, ScanError> {
-        let Some(last) = self.last else {
+        if self.last.is_none() && !self.found_first {
             let first = frame.world_from_camera.unwrap_or_else(Isometry3::identity);
             self.start(first);
-            self.keyframes.add(depth, colour, &first)?;
             return Ok(first);
-        };
-        let start = ProcessTime::now();
-        let onwards = self.before.map_or(last, |before| last * (before.inverse() * last));
-        let mut outcome = self.track(store, depth, colour, onwards)?;
-        if !outcome.is_tracked() && self.before.is_some() {
-            // The camera may have stopped.
-            outcome = self.track(store, depth, colour, last)?;
         }
-        if !outcome.is_tracked()
-            && let Some(found) = self.tracker.relocalise(store.dense(), depth, colour, &mut self.keyframes)?
+        let start = ProcessTime::now();
+        let mut outcome = None;
+        if let Some(last) = self.last {
+            let onwards = self.before.map_or(last, |before| last * (before.inverse() * last));
+            let mut tracked = self.track(store, depth, colour, onwards)?;
+            if !tracked.is_tracked() && self.before.is_some() {
+                // The camera may have stopped.
+                tracked = self.track(store, depth, colour, last)?;
+            }
+            outcome = Some(tracked);
+        }
+        if outcome.as_ref().is_none_or(|outcome| !outcome.is_tracked())
+            && let Some(found) = self.tracker.relocalise(store.dense(), depth, colour, keyframes)?
         {
-            outcome = found;
+            self.metrics.relocalisations += 1;
+            outcome = Some(found);
             self.before = None;
             self.last = None;
         }
         self.metrics.seconds.push(start.elapsed().as_secs_f64());
+        let Some(outcome) = outcome else {
+            self.metrics.losses += usize::from(!std::mem::replace(&mut self.lost, true));
+            return Err(ScanError::Lost("no keyframe of the map agrees with what it sees".into()));
+        };
         self.note(frame, &outcome);
         if !outcome.is_tracked() {
             self.before = None;
@@ -95,7 +107,6 @@ impl Odometry {
         }
         // After a jump the last two poses are no motion.
         (self.before, self.last) = (self.last, Some(outcome.world_from_camera));
-        self.keyframes.add(depth, colour, &outcome.world_from_camera)?;
         Ok(outcome.world_from_camera)
     }
 
@@ -112,7 +123,7 @@ impl Odometry {
 
     /// Counts, and says what changed.
     fn note(&mut self, frame: &FrameFiles, outcome: &TrackingOutcome) {
-        let name = frame.depth.display();
+        let name = &frame.depth;
         if outcome.is_tracked() && !outcome.degenerate.is_empty() {
             self.metrics.degenerate += 1;
             if self.metrics.degenerate == 1 {

@@ -47,6 +47,23 @@ pub struct ScanReport {
     /// Processor time of tracking a frame, ray cast included, median.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracking_cpu_ms_median: Option<f64>,
+    /// Times that a camera was found by keyframes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tracking_relocalisations: Option<usize>,
+    /// Keyframes that are stored with the map.
+    pub keyframes: usize,
+    /// Loops that were found; absent where they were not looked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loops: Option<usize>,
+    /// Corrections of the trajectory.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loop_corrections: Option<usize>,
+    /// Frames that were de-integrated and integrated anew, over all corrections.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loop_frames_reintegrated: Option<usize>,
+    /// Largest drift that was measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loop_drift_max_m: Option<f64>,
     /// Position error of the tracked poses against those recorded, rigidly aligned, root mean square; absent where there are no three, or all lie
     /// on one line.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -116,6 +133,12 @@ impl ScanReport {
             tracking_losses: tracking.map(|t| t.losses),
             tracking_degenerate_frames: tracking.map(|t| t.degenerate),
             tracking_cpu_ms_median: tracking.map(|t| 1e3 * median(&t.seconds)),
+            tracking_relocalisations: tracking.map(|t| t.relocalisations),
+            keyframes: scan.keyframes.len(),
+            loops: metrics.loops.map(|l| l.loops),
+            loop_corrections: metrics.loops.map(|l| l.corrections),
+            loop_frames_reintegrated: metrics.loops.map(|l| l.refused),
+            loop_drift_max_m: metrics.loops.map(|l| l.largest_drift),
             ate_se3_rmse_m: metrics.ate_se3_rmse,
             voxel_m: settings.voxel_size,
             integrate_cpu_ms_median: 1e3 * median(&metrics.integrate_s),

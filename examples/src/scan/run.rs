@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use cpu_time::ProcessTime;
 use nalgebra::Isometry3;
-use tsdf_hash::{IncrementalMesher, Map, MapFile, Mesh, RayCastSettings};
+use tsdf_hash::{ColourView, DepthView, IncrementalMesher, KeyframeIndex, Map, MapFile, Mesh, RayCastSettings};
 use vio_ekf::{Alignment, Stamp, Trajectory, ate};
 
-use super::checkpoint::{CheckpointSettings, Checkpoints, Progress, metadata};
+use super::checkpoint::{CheckpointSettings, Checkpoints, Progress, metadata, stored_keyframes};
+use super::correction::{Correction, LoopMetrics, Loops};
 use super::decode::Images;
 use super::error::ScanError;
 use super::map_store::{Device, MapStore};
@@ -32,6 +33,12 @@ pub struct ScanSettings {
     /// A stored map to go on from; its settings take the place of those here, but for memory and threads. If it was stored
     /// by a run over the same sequence, its frames are not fused again.
     pub resume: Option<PathBuf>,
+    /// A stored map in which the camera is looked for, and tracked; in place of `resume`.
+    pub relocalise: Option<PathBuf>,
+    /// Whether frames are fused; without, a stored map stays as it is.
+    pub fuse: bool,
+    /// Whether loops are looked for, and the map follows the corrected poses.
+    pub loops: bool,
     /// Where the map is saved on the way.
     pub checkpoint: Option<CheckpointSettings>,
 }
@@ -46,6 +53,9 @@ impl Default for ScanSettings {
             device: Device::Cpu,
             swap: None,
             resume: None,
+            relocalise: None,
+            fuse: true,
+            loops: false,
             checkpoint: None,
         }
     }
@@ -59,7 +69,9 @@ pub struct Scan {
     pub mesh: Mesh,
     /// Poses of the frames that were fused.
     pub trajectory: Trajectory,
-    /// Indices of the frames that were fused in this run, and the poses they were fused at.
+    /// Keyframes, to find a camera in the map by.
+    pub keyframes: KeyframeIndex,
+    /// Indices of the frames that were fused (or only found) in this run, and their poses.
     pub fused: Vec<(usize, Isometry3<f64>)>,
     /// Frames that could not be fused, with the reason.
     pub skipped: Vec<(usize, String)>,
@@ -90,6 +102,8 @@ pub struct ScanMetrics {
     pub quality: Quality,
     /// What became of tracking, if the poses were tracked.
     pub tracking: Option<TrackingMetrics>,
+    /// What became of the loops, if they were looked for.
+    pub loops: Option<LoopMetrics>,
     /// Position error of the tracked poses against those recorded, rigidly aligned, root mean square, metres.
     pub ate_se3_rmse: Option<f64>,
 }
@@ -109,27 +123,33 @@ impl Scan {
     /// Maps a sequence. Frames that cannot be used are counted and left out.
     pub fn run(folder: &Path, sequence: &Sequence, settings: &ScanSettings) -> Result<Self, ScanError> {
         let stage = Stage::start("fuse");
-        let (map, progress) = initial_map(folder, settings)?;
-        let mut run = Run::new(sequence, settings, map, progress)?;
+        let start = Start::open(folder, settings)?;
+        let mut run = Run::new(sequence, settings, start)?;
         let mut checkpoints = Checkpoints::new(settings.checkpoint.clone());
         for index in run.resumed..sequence.frames.len() {
             stage.share(index as f64 / sequence.frames.len() as f64);
             match run.frame(index) {
-                Ok(pose) => {
-                    run.fused.push((index, pose));
-                    let stamp = Stamp::from_secs(sequence.frames[index].stamp).map_err(vio_ekf::Error::from)?;
-                    run.trajectory.push(stamp, pose)?;
+                Ok(correction) => {
+                    if let Some(correction) = correction {
+                        run.correct(&correction)?;
+                    }
                 }
                 Err(why) => {
                     // What cannot be read names its file itself.
                     let name = match why {
                         ScanError::Sequence(_) => String::new(),
-                        _ => format!("{}: ", sequence.frames[index].depth.display()),
+                        _ => format!("{}: ", sequence.frames[index].depth),
                     };
                     run.skipped.push((index, format!("{name}{why}")));
                 }
             }
-            checkpoints.save(run.store.map(), folder, sequence.frames[index].stamp, &run.trajectory)?;
+            checkpoints.save(
+                run.store.map(),
+                folder,
+                sequence.frames[index].stamp,
+                &run.trajectory,
+                run.keyframes(),
+            )?;
         }
         if run.fused.is_empty() && run.resumed == 0 {
             let first = run.skipped.first().map_or_else(String::new, |(_, why)| why.clone());
@@ -144,7 +164,7 @@ impl Scan {
     /// What a later run over the same sequence needs to know, for [`Map::save`].
     pub fn metadata(&self, folder: &Path, sequence: &Sequence) -> std::collections::BTreeMap<String, Vec<u8>> {
         let last = sequence.frames.last().map_or(f64::NEG_INFINITY, |frame| frame.stamp);
-        metadata(folder, last, &self.trajectory)
+        metadata(folder, last, &self.trajectory, &self.keyframes)
     }
 
     /// Whether at least half of the work was done.
@@ -163,6 +183,11 @@ struct Run<'a> {
     store: MapStore,
     mesher: IncrementalMesher,
     odometry: Option<Odometry>,
+    /// Without loops; with them, the loops keep them.
+    keyframes: KeyframeIndex,
+    loops: Option<Loops>,
+    /// From the world of the recorded poses to that of the map.
+    correction: Isometry3<f64>,
     size: Option<[usize; 2]>,
     /// What has left active memory is not seen by a ray: then each ray cast comes while its surroundings are still there.
     leaving: bool,
@@ -174,28 +199,28 @@ struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    fn new(
-        sequence: &'a Sequence,
-        settings: &'a ScanSettings,
-        map: Map,
-        progress: Option<Progress>,
-    ) -> Result<Self, ScanError> {
+    fn new(sequence: &'a Sequence, settings: &'a ScanSettings, start: Start) -> Result<Self, ScanError> {
+        let Start { map, progress, keyframes } = start;
         let store = MapStore::open(map, settings.device)?;
         let mut odometry = match settings.poses {
             PoseSource::Given => None,
-            PoseSource::Tracked => Some(Odometry::new(store.settings())?),
+            PoseSource::Tracked => Some(Odometry::new(store.settings(), settings.relocalise.is_some())?),
         };
         let progress =
             progress.unwrap_or(Progress { last_stamp: f64::NEG_INFINITY, trajectory: Trajectory::default() });
         if let (Some(odometry), Some(last)) = (&mut odometry, progress.trajectory.poses().last()) {
             odometry.start(*last);
         }
+        let loops = if settings.loops { Some(Loops::new(store.settings())?) } else { None };
         Ok(Self {
             sequence,
             settings,
             store,
             mesher: IncrementalMesher::new(),
             odometry,
+            keyframes,
+            loops,
+            correction: Isometry3::identity(),
             size: sequence.image_size,
             leaving: settings.map.memory.host_bytes > 0,
             resumed: sequence.frames.partition_point(|frame| frame.stamp <= progress.last_stamp),
@@ -206,22 +231,29 @@ impl<'a> Run<'a> {
         })
     }
 
+    fn keyframes(&self) -> &KeyframeIndex {
+        self.loops.as_ref().map_or(&self.keyframes, Loops::keyframes)
+    }
+
     fn due(&self, index: usize) -> bool {
         index.is_multiple_of(self.settings.ray_cast_every.max(1))
     }
 
-    /// Reads, places and fuses a frame; returns its pose.
-    fn frame(&mut self, index: usize) -> Result<Isometry3<f64>, ScanError> {
+    /// Reads, places and fuses a frame; returns how the frames have to move, if a loop was found.
+    fn frame(&mut self, index: usize) -> Result<Option<Correction>, ScanError> {
         let frame = &self.sequence.frames[index];
         // Before the images are read: what has no pose costs no time.
         let given = if self.odometry.is_none() { Some(given_pose(frame)?) } else { None };
         let images = self.images(frame)?;
         let (intrinsics, scale) = (self.sequence.intrinsics, self.sequence.depth_scale);
         let (depth, colour) = (images.depth(intrinsics, scale), images.colour(intrinsics));
-        let name = frame.depth.display().to_string();
+        let name = frame.depth.to_string();
         let pose = match (&mut self.odometry, given) {
-            (Some(odometry), _) => odometry.locate(&mut self.store, frame, &depth, colour.as_ref())?,
-            (None, Some(pose)) => pose,
+            (Some(odometry), _) => {
+                let keyframes = self.loops.as_ref().map_or(&self.keyframes, Loops::keyframes);
+                odometry.locate(&mut self.store, keyframes, frame, &depth, colour.as_ref())?
+            }
+            (None, Some(pose)) => self.correction * pose,
             (None, None) => given_pose(frame)?,
         };
         // Twice as often as the map is cast: what is wrong is to be said early.
@@ -229,11 +261,36 @@ impl<'a> Run<'a> {
         if given.is_some() && looked_at && self.store.dense().blocks() > 0 {
             self.metrics.quality.check(&name, &mut self.store, &depth, &pose)?;
         }
+        if self.settings.fuse {
+            self.fuse(&name, &depth, colour.as_ref(), &pose)?;
+        }
+        self.fused.push((index, pose));
+        self.trajectory.push(Stamp::from_secs(frame.stamp).map_err(vio_ekf::Error::from)?, pose)?;
+        if self.leaving && self.due(index) {
+            self.metrics.ray_casts.extend(ray_cast_check(&mut self.store, self.sequence, &images, &pose)?);
+        }
+        match &mut self.loops {
+            Some(loops) => loops.add(&name, &depth, colour.as_ref(), &pose),
+            None if self.settings.fuse => {
+                self.keyframes.add(&depth, colour.as_ref(), &pose)?;
+                Ok(None)
+            }
+            None => Ok(None),
+        }
+    }
+
+    fn fuse(
+        &mut self,
+        name: &str,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        pose: &Isometry3<f64>,
+    ) -> Result<(), ScanError> {
         let start = ProcessTime::now();
-        let report = self.store.dense().integrate(&depth, colour.as_ref(), &pose)?;
+        let report = self.store.dense().integrate(depth, colour, pose)?;
         let metrics = &mut self.metrics;
         metrics.integrate_s.push(start.elapsed().as_secs_f64());
-        metrics.quality.count(&name, depth.width * depth.height, &report);
+        metrics.quality.count(name, depth.width * depth.height, &report);
         metrics.active_bytes_peak = metrics.active_bytes_peak.max(self.store.dense().bytes());
         if let Some(map) = self.store.map() {
             metrics.host_bytes_peak = metrics.host_bytes_peak.max(map.memory().host_bytes);
@@ -241,10 +298,46 @@ impl<'a> Run<'a> {
             self.mesher.update(map)?;
             metrics.mesh_update_s.push(start.elapsed().as_secs_f64());
         }
-        if self.leaving && self.due(index) {
-            self.metrics.ray_casts.extend(ray_cast_check(&mut self.store, self.sequence, &images, &pose)?);
+        Ok(())
+    }
+
+    /// Moves the frames to their corrected poses: each that moves by enough is de-integrated and integrated anew, to the bit as if it
+    /// had been there from the start.
+    fn correct(&mut self, correction: &Correction) -> Result<(), ScanError> {
+        let voxel_size = self.store.settings().voxel_size;
+        let mut anew = 0;
+        for k in 0..self.fused.len() {
+            let (index, old) = self.fused[k];
+            let Some(pose) = correction.moved(k, &old, voxel_size) else { continue };
+            let mut images = Images::read(&self.sequence.frames[index])?;
+            if let Some(camera) = &self.sequence.colour_camera {
+                images.register_colour(camera, self.sequence.intrinsics, self.sequence.depth_scale);
+            }
+            let depth = images.depth(self.sequence.intrinsics, self.sequence.depth_scale);
+            let colour = images.colour(self.sequence.intrinsics);
+            self.store.dense().deintegrate(&depth, colour.as_ref(), &old)?;
+            self.store.dense().integrate(&depth, colour.as_ref(), &pose)?;
+            self.fused[k].1 = pose;
+            anew += 1;
         }
-        Ok(pose)
+        // Stamps do not change.
+        let earlier = self.trajectory.poses().len() - self.fused.len();
+        let mut poses = self.trajectory.poses()[..earlier].to_vec();
+        poses.extend(self.fused.iter().map(|(_, pose)| *pose));
+        let stamps = self.trajectory.stamps().to_vec();
+        self.trajectory = Trajectory::default();
+        for (stamp, pose) in stamps.into_iter().zip(poses) {
+            self.trajectory.push(stamp, pose)?;
+        }
+        let present = correction.present;
+        self.correction = present * self.correction;
+        if let Some(odometry) = &mut self.odometry {
+            odometry.move_by(&present);
+        }
+        if let Some(loops) = &mut self.loops {
+            loops.metrics.refused += anew;
+        }
+        Ok(())
     }
 
     /// The images of a frame, colour where the depth camera sees it.
@@ -258,7 +351,7 @@ impl<'a> Run<'a> {
         }
         if let Some(why) = images.colour_fault.take() {
             self.metrics.quality.without_colour += 1;
-            eprintln!("without colour: {}: {why}", frame.depth.display());
+            eprintln!("without colour: {}: {why}", frame.depth);
         }
         if let Some(camera) = &self.sequence.colour_camera {
             images.register_colour(camera, self.sequence.intrinsics, self.sequence.depth_scale);
@@ -282,13 +375,15 @@ impl<'a> Run<'a> {
         let mesh = self.store.dense().mesh()?;
         self.metrics.mesh_s = start.elapsed().as_secs_f64();
         stage.done(&format!("{} vertices, {} triangles", mesh.positions.len(), mesh.faces.len()));
-        if let Some(odometry) = self.odometry {
+        if let Some(odometry) = &self.odometry {
             self.metrics.ate_se3_rmse = tracked_error(self.sequence, &self.fused);
-            self.metrics.tracking = Some(odometry.metrics);
+            self.metrics.tracking = Some(odometry.metrics.clone());
         }
+        self.metrics.loops = self.loops.as_ref().map(|loops| loops.metrics);
+        let keyframes = self.keyframes().clone();
         let (device, map) = (self.store.device(), self.store.into_map()?);
         let Self { trajectory, fused, skipped, resumed, metrics, .. } = self;
-        Ok(Scan { map, mesh, trajectory, fused, skipped, resumed, device, metrics })
+        Ok(Scan { map, mesh, trajectory, keyframes, fused, skipped, resumed, device, metrics })
     }
 }
 
@@ -307,24 +402,46 @@ fn tracked_error(sequence: &Sequence, fused: &[(usize, Isometry3<f64>)]) -> Opti
     ate(&given, &tracked, Alignment::Se3).ok().map(|found| found.position.rmse)
 }
 
-/// The map that the run starts with, and what an earlier run had done.
-fn initial_map(folder: &Path, settings: &ScanSettings) -> Result<(Map, Option<Progress>), ScanError> {
-    let Some(path) = &settings.resume else {
-        let map = match &settings.swap {
-            Some(swap) => Map::with_swap(settings.map, swap)?,
-            None => Map::new(settings.map)?,
+/// What a run starts with.
+struct Start {
+    map: Map,
+    /// What an earlier run over the same sequence had done.
+    progress: Option<Progress>,
+    keyframes: KeyframeIndex,
+}
+
+impl Start {
+    fn open(folder: &Path, settings: &ScanSettings) -> Result<Self, ScanError> {
+        let Some(path) = settings.resume.as_ref().or(settings.relocalise.as_ref()) else {
+            let map = match &settings.swap {
+                Some(swap) => Map::with_swap(settings.map, swap)?,
+                None => Map::new(settings.map)?,
+            };
+            return Ok(Self { map, progress: None, keyframes: KeyframeIndex::new() });
         };
-        return Ok((map, None));
-    };
-    let stored = |source| ScanError::Stored { path: path.display().to_string(), source };
-    let file = MapFile::open(path).map_err(stored)?;
-    let progress = Progress::read(path, &file, folder)?;
-    if let Some(progress) = &progress {
-        eprintln!("{}: goes on after the frame of {} s", path.display(), progress.last_stamp);
+        let stored = |source| ScanError::Stored { path: path.display().to_string(), source };
+        let file = MapFile::open(path).map_err(stored)?;
+        let keyframes = stored_keyframes(path, &file)?;
+        let mut progress = None;
+        if settings.relocalise.is_some() {
+            if keyframes.as_ref().is_none_or(KeyframeIndex::is_empty) {
+                return Err(ScanError::Checkpoint {
+                    path: path.display().to_string(),
+                    why: "no keyframes were stored with the map, by which a camera could be found in it: scan it again"
+                        .into(),
+                });
+            }
+        } else {
+            progress = Progress::read(path, &file, folder)?;
+        }
+        if let Some(progress) = &progress {
+            eprintln!("{}: goes on after the frame of {} s", path.display(), progress.last_stamp);
+        }
+        let tsdf_hash::Settings { max_bytes, threads, memory, .. } = settings.map;
+        let continued = tsdf_hash::Settings { max_bytes, threads, memory, ..*file.settings() };
+        let map = file.into_map(continued, settings.swap.as_deref()).map_err(stored)?;
+        Ok(Self { map, progress, keyframes: keyframes.unwrap_or_default() })
     }
-    let tsdf_hash::Settings { max_bytes, threads, memory, .. } = settings.map;
-    let continued = tsdf_hash::Settings { max_bytes, threads, memory, ..*file.settings() };
-    Ok((file.into_map(continued, settings.swap.as_deref()).map_err(stored)?, progress))
 }
 
 /// `None` if the map has no surface where the frame has one.

@@ -1,14 +1,14 @@
 //! A recorded sequence: which images, from where, through which camera.
 
-use std::path::PathBuf;
-
 use nalgebra::Isometry3;
 use tsdf_hash::Intrinsics;
+
+use super::image_source::ImageSource;
 
 /// A sequence of depth images, with colour and poses where they were recorded.
 #[derive(Debug, Clone)]
 pub struct Sequence {
-    /// How the folder is laid out: `7-Scenes`, `TUM`, `ICL-NUIM` or `Redwood`.
+    /// How the folder is laid out: `7-Scenes`, `TUM`, `ICL-NUIM`, `Redwood` or `MCAP`.
     pub layout: &'static str,
     /// Camera of the depth images; colour images are taken as registered to it, unless there is a [`ColourCamera`].
     pub intrinsics: Intrinsics,
@@ -52,10 +52,10 @@ pub struct ColourCamera {
 pub struct FrameFiles {
     /// Seconds.
     pub stamp: f64,
-    /// 16-bit PNG.
-    pub depth: PathBuf,
-    /// PNG or JPEG.
-    pub colour: Option<PathBuf>,
+    /// Depth: 16 bits of units, or floating-point metres.
+    pub depth: ImageSource,
+    /// Colour or grey.
+    pub colour: Option<ImageSource>,
     /// Recorded pose of the camera: z forward, x right, y down.
     pub world_from_camera: Option<Isometry3<f64>>,
     /// Whether a pose was recorded that is no number, as recorders write when they have lost the camera.

@@ -1,17 +1,13 @@
 //! Recordings as MCAP: images as Foxglove or ROS 2 has them, inertial samples as ROS 2 has them.
 
-mod chunks;
 mod fields;
 mod pixels;
 
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use foxglove::Decode;
 use foxglove::messages::{self, FrameTransform, FrameTransforms, PoseInFrame};
 use mcap::Message;
-use mcap::sans_io::LinearReaderOptions;
 use vio_ekf::calibration::{self, CameraCalibration, ImuCalibration};
 use vio_ekf::nalgebra::Isometry3;
 use vio_ekf::{Camera, Distortion, Imu, ImuNoise, Stamp, Trajectory};
@@ -21,9 +17,11 @@ use super::euroc_folder::{Overrides, read_truth};
 use super::grey_image::GreyImage;
 use super::mcap_out::NOISE_SCHEMA;
 use super::recording::{GroundTruth, Images, Recording, SecondCamera};
-use chunks::{Lz4, Zstd};
-use fields::{imu, isometry, noise, stamp};
-use pixels::{image, image_header};
+use crate::mcap_messages::fields::{isometry, stamp};
+use crate::mcap_messages::images::image_header;
+use crate::mcap_messages::{MessagesFault, messages_of, schema_of};
+use fields::{imu, noise};
+use pixels::image;
 
 /// Opens an MCAP file: one pass for everything but the images, which are read later, one by one.
 ///
@@ -47,8 +45,8 @@ pub fn open_mcap_stereo(path: &Path, overrides: &Overrides) -> Result<Recording,
 
 fn open(path: &Path, overrides: &Overrides, stereo: bool) -> Result<Recording, VioError> {
     let mut found = Found::default();
-    for message in messages_of(path)? {
-        found.take(&message.map_err(|error| broken(path, &error))?).map_err(|why| VioError::malformed(path, &why))?;
+    for message in messages_of(path).map_err(|why| fault(path, &why))? {
+        found.take(&message.map_err(|why| fault(path, &why))?).map_err(|why| VioError::malformed(path, &why))?;
     }
     let lacks = |what: &str| VioError::malformed(path, &what);
     if found.images.is_empty() {
@@ -100,7 +98,7 @@ pub(super) fn read_images(
     let failed = |why: String| (Stamp::default(), Err(why));
     let messages = match messages_of(&path) {
         Ok(messages) => messages,
-        Err(error) => return Box::new(std::iter::once(failed(error.to_string()))),
+        Err(why) => return Box::new(std::iter::once(failed(fault(&path, &why).to_string()))),
     };
     Box::new(messages.filter_map(move |message| match message {
         Ok(message) if message.channel.topic == topic => Some(match image(&message) {
@@ -108,35 +106,14 @@ pub(super) fn read_images(
             None => failed("a message on the images' topic that is no image".into()),
         }),
         Ok(_) => None,
-        Err(error) => Some(failed(broken(&path, &error).to_string())),
+        Err(why) => Some(failed(fault(&path, &why).to_string())),
     }))
 }
 
-/// Streams a file's messages; memory does not grow with the file.
-fn messages_of(
-    path: &Path,
-) -> Result<impl Iterator<Item = mcap::McapResult<Message<'static>>> + Send + use<>, VioError> {
-    let unreadable = |error: std::io::Error| VioError::unreadable(path, &error);
-    let file = File::open(path).map_err(unreadable)?;
-    // A record that claims to be longer than the file asks for memory that is not there.
-    let most = usize::try_from(file.metadata().map_err(unreadable)?.len()).unwrap_or(usize::MAX);
-    let options = LinearReaderOptions::default().with_record_length_limit(most).with_validate_chunk_crcs(true);
-    let mut reader = mcap::io::MessageReader::new_with_options(BufReader::new(file), options);
-    let broken = |error| broken(path, &error);
-    reader.add_decompressor(Zstd::new()).map_err(broken)?;
-    reader.add_decompressor(Lz4::new()).map_err(broken)?;
-    Ok(reader)
-}
-
-fn broken(path: &Path, error: &mcap::McapError) -> VioError {
-    match error {
-        mcap::McapError::UnsupportedCompression(name) => VioError::malformed(
-            path,
-            &format!(
-                "its chunks are compressed with {name}, which is not read here: rewrite it with `mcap compress --compression none`"
-            ),
-        ),
-        error => VioError::malformed(path, &format!("no sound MCAP file ({error}): `mcap recover` may help")),
+fn fault(path: &Path, fault: &MessagesFault) -> VioError {
+    match fault {
+        MessagesFault::Unreadable(why) => VioError::unreadable(path, why),
+        MessagesFault::Malformed(why) => VioError::malformed(path, why),
     }
 }
 
@@ -165,7 +142,7 @@ struct Found {
 impl Found {
     fn take(&mut self, message: &Message) -> Result<(), String> {
         let (topic, data) = (&message.channel.topic, message.data.as_ref());
-        let name = message.channel.schema.as_ref().map_or("", |schema| schema.name.as_str());
+        let name = schema_of(message);
         let bad = || format!("topic {topic}: a {name} that cannot be decoded");
         match name {
             "sensor_msgs/msg/Imu" if self.imu_topic.get_or_insert_with(|| topic.clone()) == topic => {

@@ -15,9 +15,9 @@ use vio_ekf::calibration::{CameraCalibration, ImuCalibration};
 use vio_ekf::nalgebra::Isometry3;
 use vio_ekf::{Distortion, Imu, Stamp};
 
-use super::cdr;
 use super::error::VioError;
 use super::grey_image::GreyImage;
+use crate::mcap_messages::cdr;
 
 /// Frames of the sensors.
 pub(super) const IMU_FRAME: &str = "imu";

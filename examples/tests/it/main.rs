@@ -2,8 +2,10 @@
 #![allow(clippy::unwrap_used)]
 
 mod bad_input;
+mod bags;
 mod five_joint_arm;
 mod independence;
+mod mcap_recordings;
 mod meshes;
 mod mission;
 mod mission_file;
@@ -14,6 +16,7 @@ mod recorded;
 mod scan_flight;
 mod scratch;
 mod sequences;
+mod stored_maps;
 mod strange_recordings;
 mod unwrap;
 mod vio;

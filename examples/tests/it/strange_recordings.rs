@@ -9,13 +9,13 @@ use paintcopter_examples::scan::FrameRange;
 
 use crate::scratch::Scratch;
 
-const SIZE: (u32, u32) = (160, 120);
+pub(crate) const SIZE: (u32, u32) = (160, 120);
 /// Focal length and centre of the pictures.
-const CAMERA: [f64; 4] = [130.0, 130.0, 79.5, 59.5];
-const FRAMES: usize = 12;
+pub(crate) const CAMERA: [f64; 4] = [130.0, 130.0, 79.5, 59.5];
+pub(crate) const FRAMES: usize = 12;
 
 /// Poses on a short arc before a corner of a room.
-fn pose(k: usize) -> Isometry3<f64> {
+pub(crate) fn pose(k: usize) -> Isometry3<f64> {
     let t = k as f64 / FRAMES as f64;
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.05 * t, 0.25 * t, 0.02));
     Isometry3::from_parts(Vector3::new(0.2 * t, 0.05 * (4.0 * t).sin(), 0.1 * t * t).into(), turn)
@@ -41,7 +41,7 @@ fn depth(world_from_camera: &Isometry3<f64>, u: f64, v: f64) -> f64 {
 }
 
 /// A recording in the layout of TUM.
-fn recording(name: &str) -> Scratch {
+pub(crate) fn recording(name: &str) -> Scratch {
     let s = Scratch::new(name);
     for folder in ["depth", "rgb"] {
         std::fs::create_dir_all(s.0.join(folder)).unwrap();
@@ -75,25 +75,25 @@ fn recording(name: &str) -> Scratch {
 }
 
 /// What a run of `scan` said and wrote.
-struct Ran {
-    ok: bool,
-    said: String,
-    report: serde_json::Value,
+pub(crate) struct Ran {
+    pub(crate) ok: bool,
+    pub(crate) said: String,
+    pub(crate) report: serde_json::Value,
 }
 
 impl Ran {
-    fn figure(&self, name: &str) -> f64 {
+    pub(crate) fn figure(&self, name: &str) -> f64 {
         self.report[name].as_f64().unwrap_or_else(|| panic!("no {name} in {}: {}", self.report, self.said))
     }
 
-    fn says(&self, words: &[&str]) {
+    pub(crate) fn says(&self, words: &[&str]) {
         for word in words {
             assert!(self.said.contains(word), "\"{word}\" is missing in: {}", self.said);
         }
     }
 }
 
-fn scan(s: &Scratch, options: &[&str]) -> Ran {
+pub(crate) fn scan(s: &Scratch, options: &[&str]) -> Ran {
     let out = s.path("out");
     let mut command = Command::new(env!("CARGO_BIN_EXE_scan"));
     command.args(["--sequence", s.0.to_str().unwrap(), "--out", &out, "--voxel", "0.02", "--threads", "1"]);

@@ -8,6 +8,8 @@ use crate::tracking::residuals::Evaluation;
 /// Directions with less than this share of the information of the best known one are degenerate without a second look (ours): normals
 /// that scatter by a degree.
 pub(crate) const LEAST_SHARE: f64 = 4e-4;
+/// Of the information of a direction at least this share is believed (ours).
+const LEAST_LEFT: f64 = 0.02;
 /// Directions with a share below so many times the scatter of the normals get a second look (ours).
 const MARGIN: f64 = 1.0;
 /// The cost must rise by this share of what the linear system says when the pose is moved (ours); with the robust cost a perfect
@@ -17,6 +19,7 @@ const LEAST_RISE: f64 = 0.25;
 const DEVIATIONS: f64 = 8.0;
 
 /// Principal directions of the information on `(mean depth · ω, v)`: turns and shifts are then both metres at the surface.
+#[derive(Clone)]
 pub(crate) struct Directions {
     /// Orthonormal columns.
     pub(crate) axes: Matrix6<f64>,
@@ -48,6 +51,13 @@ impl Directions {
             inverse += axis * axis.transpose() / (self.information[k] + damping);
         }
         Matrix6::from_fn(|r, c| inverse[(r, c)] / (self.scale[r] * self.scale[c]))
+    }
+
+    /// [`inverse`](Self::inverse) of what is left of the information when the noise of the normals has feigned some of it, 1/m²: never
+    /// less than a share.
+    pub(crate) fn honest_inverse(&self, kept: impl Fn(usize) -> bool, feigned: f64) -> Matrix6<f64> {
+        let left = self.information.map(|information| (information - feigned).max(LEAST_LEFT * information));
+        Self { information: left, ..self.clone() }.inverse(kept, 0.0)
     }
 
     /// `(ω, v)` of a unit step along a direction.

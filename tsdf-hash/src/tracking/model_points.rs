@@ -15,20 +15,48 @@ pub(crate) struct ModelPoint {
     pub(crate) intensity: f32,
 }
 
+/// Points along each side of a tile.
+const TILE: usize = 8;
+
+/// The points of a view, tile by tile: what is wrong with the map is alike within a tile.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Model {
+    pub(crate) points: Vec<ModelPoint>,
+    /// Where each tile ends.
+    ends: Vec<usize>,
+}
+
+impl Model {
+    pub(crate) fn tiles(&self) -> impl Iterator<Item = &[ModelPoint]> {
+        let starts = std::iter::once(&0).chain(&self.ends);
+        starts.zip(&self.ends).map(|(from, to)| &self.points[*from..*to])
+    }
+}
+
 /// The points of every `stride`-th pixel of a view along each side; intensities are means over `2 radius + 1` pixels along each
 /// side.
-pub(crate) fn model_points(view: &View, stride: usize, radius: usize, out: &mut Vec<ModelPoint>) {
-    out.clear();
+pub(crate) fn model_points(view: &View, stride: usize, radius: usize, out: &mut Model) {
+    out.points.clear();
+    out.ends.clear();
     let Some(k) = view.intrinsics else { return };
     let rotation = view.world_from_camera.rotation.to_rotation_matrix().into_inner();
-    for v in (stride / 2..view.height).step_by(stride) {
-        for u in (stride / 2..view.width).step_by(stride) {
-            let at = v * view.width + u;
-            let z = f64::from(view.depth[at]);
-            if z > 0.0 {
-                let ray = Vector3::new((u as f64 - k.cx) / k.fx, (v as f64 - k.cy) / k.fy, 1.0);
-                let position = (rotation * ray * z).cast::<f32>().into();
-                out.push(ModelPoint { position, normal: view.normals[at], intensity: intensity(view, u, v, radius) });
+    let side = TILE * stride;
+    for row in (0..view.height).step_by(side) {
+        for column in (0..view.width).step_by(side) {
+            for v in (row + stride / 2..view.height.min(row + side)).step_by(stride) {
+                for u in (column + stride / 2..view.width.min(column + side)).step_by(stride) {
+                    let at = v * view.width + u;
+                    let z = f64::from(view.depth[at]);
+                    if z > 0.0 {
+                        let ray = Vector3::new((u as f64 - k.cx) / k.fx, (v as f64 - k.cy) / k.fy, 1.0);
+                        let position = (rotation * ray * z).cast::<f32>().into();
+                        let intensity = intensity(view, u, v, radius);
+                        out.points.push(ModelPoint { position, normal: view.normals[at], intensity });
+                    }
+                }
+            }
+            if out.ends.last().copied().unwrap_or(0) < out.points.len() {
+                out.ends.push(out.points.len());
             }
         }
     }

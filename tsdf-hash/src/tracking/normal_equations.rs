@@ -2,13 +2,10 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-/// Terms summed in single precision before they join the double sums.
-pub(crate) const RUN: usize = 512;
-
-/// A few hundred terms, in single precision, so that they are added in vector registers.
+/// The terms of a tile, in single precision, so that they are added in vector registers.
 #[derive(Clone, Copy)]
 pub(crate) struct Run {
-    /// Row `k`: `Σ w J_k (J, r, 0)`.
+    /// Row `k`: `Σ w J_k (J, r, s)`.
     rows: [[f32; 8]; 6],
 }
 
@@ -16,9 +13,9 @@ impl Run {
     pub(crate) const ZERO: Self = Self { rows: [[0.0; 8]; 6] };
 
     #[inline(always)]
-    pub(crate) fn add(&mut self, jacobian: [f32; 6], residual: f32, weight: f32) {
+    pub(crate) fn add(&mut self, jacobian: [f32; 6], residual: f32, weight: f32, shared: f32) {
         let [a, b, c, d, e, f] = jacobian;
-        let term = [a, b, c, d, e, f, residual, 0.0];
+        let term = [a, b, c, d, e, f, residual, shared];
         for (row, j) in self.rows.iter_mut().zip(jacobian) {
             let scaled = weight * j;
             for (sum, t) in row.iter_mut().zip(term) {
@@ -31,13 +28,15 @@ impl Run {
 /// The sums.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NormalEquations {
+    /// `Σ (Σ w J s) (Σ w J s)ᵀ` over runs: what an error of one `s` adds to the variance of `b` that all terms of a run share.
+    pub(crate) shared: Matrix6<f64>,
     pub(crate) h: Matrix6<f64>,
     pub(crate) b: Vector6<f64>,
 }
 
 impl NormalEquations {
     pub(crate) fn zero() -> Self {
-        Self { h: Matrix6::zeros(), b: Vector6::zeros() }
+        Self { shared: Matrix6::zeros(), h: Matrix6::zeros(), b: Vector6::zeros() }
     }
 
     pub(crate) fn add_run(&mut self, run: &Run) {
@@ -47,9 +46,12 @@ impl NormalEquations {
             }
             self.b[k] += f64::from(row[6]);
         }
+        let pull = Vector6::from(run.rows.map(|row| f64::from(row[7])));
+        self.shared += pull * pull.transpose();
     }
 
     pub(crate) fn add(&mut self, other: &Self) {
+        self.shared += other.shared;
         self.h += other.h;
         self.b += other.b;
     }

@@ -39,7 +39,9 @@ pub struct TrackingOutcome {
     pub degenerate: Vec<Vector6<f64>>,
     /// Share of the model's points for which the frame has a measurement.
     pub overlap: f64,
-    /// Share of those that agree with it, within three standard deviations and half a voxel.
+    /// Share of the frame's measurements that the model accounts for, about: where it is small, the rest of the frame has no say.
+    pub coverage: f64,
+    /// Share of the model's measured points that agree with the frame, within three standard deviations and half a voxel.
     pub agreement: f64,
     /// Standard deviation of the distances between partners, as a multiple of the noise model's.
     pub depth_scale: f64,

@@ -19,12 +19,23 @@ pub(crate) struct Registration {
     pub(crate) scales: Scales,
     pub(crate) brightness: f32,
     pub(crate) iterations: usize,
+    /// What more steps like the last ones would have added.
+    pub(crate) remainder: Vector6<f64>,
 }
+
+/// Steps that shrink by less than this are taken to shrink by it.
+const SLOWEST: f64 = 0.95;
 
 impl Registration {
     pub(crate) fn new(pose: Isometry3<f64>) -> Self {
         // The median is taken before the first step; until then, what a stranger's camera may have.
-        Self { pose, scales: Scales { depth: 1.0, intensity: 10.0 }, brightness: 0.0, iterations: 0 }
+        Self {
+            pose,
+            scales: Scales { depth: 1.0, intensity: 10.0 },
+            brightness: 0.0,
+            iterations: 0,
+            remainder: Vector6::zeros(),
+        }
     }
 
     /// Minimises the cost at one level, along the directions that have `least_share` of the information of the best known one, and
@@ -36,6 +47,8 @@ impl Registration {
         // Means, because the partners change with the pose.
         let share = here.share();
         let mut damping = 1e-6;
+        let mut step_before = f64::INFINITY;
+        self.remainder = Vector6::zeros();
         for _ in 0..most {
             self.iterations += 1;
             let Some(delta) = solve(&here, damping, least_share) else { break };
@@ -45,6 +58,9 @@ impl Registration {
                 self.pose = candidate;
                 here = there;
                 damping *= 0.1;
+                let shrunk = (delta.norm() / step_before).min(SLOWEST);
+                step_before = delta.norm();
+                self.remainder = delta * (shrunk / (1.0 - shrunk));
                 if delta.amax() < LEAST_STEP {
                     break;
                 }

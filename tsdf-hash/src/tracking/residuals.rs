@@ -5,14 +5,16 @@ use nalgebra::{Isometry3, Vector3};
 use crate::parallel::in_chunks;
 use crate::settings::NoiseModel;
 use crate::tracking::image_level::ImageLevel;
-use crate::tracking::model_points::ModelPoint;
-use crate::tracking::normal_equations::{NormalEquations, RUN, Run};
+use crate::tracking::model_points::{Model, ModelPoint};
+use crate::tracking::normal_equations::{NormalEquations, Run};
 use crate::tracking::residual_scale::ResidualHistogram;
 
 /// Huber's constant: 95 % efficiency on normal residuals.
 const HUBER: f32 = 1.345;
 /// Cost of a point without a partner: that of a residual of ten standard deviations.
 const OUTLIER: f32 = HUBER * (10.0 - 0.5 * HUBER);
+/// Tiles with fewer distances say nothing about what is shared.
+const LEAST_TERMS: u32 = 16;
 /// Depth residuals are counted up to so many standard deviations of the noise model.
 const MOST_DEVIATIONS: f32 = 32.0;
 /// Intensity residuals are counted up to so many grey levels.
@@ -33,7 +35,7 @@ pub(crate) struct Scales {
 #[derive(Clone, Copy)]
 pub(crate) struct Comparison<'a> {
     pub(crate) level: &'a ImageLevel,
-    pub(crate) points: &'a [ModelPoint],
+    pub(crate) model: &'a Model,
     /// The camera that the positions of the points are relative to.
     pub(crate) origin: Vector3<f64>,
     pub(crate) noise: NoiseModel,
@@ -57,6 +59,8 @@ pub(crate) struct Evaluation {
     pub(crate) partners: u32,
     /// Those that agree with it.
     pub(crate) agreeing: u32,
+    /// Of tiles: how many, and the sums of `m² − 1/Σw`, the mean distance of a tile squared beyond what independent noise makes.
+    pub(crate) tiles: [f64; 2],
     /// Sum of the partners' depths, metres.
     pub(crate) depth_sum: f64,
     pub(crate) depth: ResidualHistogram,
@@ -73,6 +77,7 @@ impl Evaluation {
             in_view: 0,
             partners: 0,
             agreeing: 0,
+            tiles: [0.0; 2],
             depth_sum: 0.0,
             depth: ResidualHistogram::new(MOST_DEVIATIONS),
             intensity: ResidualHistogram::new(MOST_LEVELS),
@@ -86,6 +91,7 @@ impl Evaluation {
         self.in_view += other.in_view;
         self.partners += other.partners;
         self.agreeing += other.agreeing;
+        (0..2).for_each(|k| self.tiles[k] += other.tiles[k]);
         self.depth_sum += other.depth_sum;
         self.depth.merge(&other.depth);
         self.intensity.merge(&other.intensity);
@@ -106,6 +112,11 @@ impl Evaluation {
         f64::from(self.intensity.total) / f64::from(self.in_view.max(1))
     }
 
+    /// Variance that the distances of a tile share beyond independent noise, square metres.
+    pub(crate) fn excess(&self) -> f64 {
+        (self.tiles[1] / self.tiles[0].max(1.0)).max(0.0)
+    }
+
     /// Mean depth of the partners, metres.
     pub(crate) fn mean_depth(&self) -> f64 {
         self.depth_sum / f64::from(self.partners.max(1))
@@ -121,8 +132,8 @@ impl Comparison<'_> {
     /// Compares at a pose; `brightness` is what the frame is brighter than the model, grey levels.
     pub(crate) fn evaluate(&self, pose: &Isometry3<f64>, scales: Scales, brightness: f32) -> Evaluation {
         let task = Task::new(self, pose, scales, brightness);
-        // Runs of fixed length, added in their order: the sums do not depend on the number of threads.
-        let mut runs: Vec<&[ModelPoint]> = self.points.chunks(RUN).collect();
+        // Tiles, added in their order: the sums do not depend on the number of threads.
+        let mut runs: Vec<&[ModelPoint]> = self.model.tiles().collect();
         let parts = in_chunks(&mut runs, self.threads, |runs| {
             let (mut sums, mut all) = (Vec::with_capacity(runs.len()), Evaluation::new());
             for run in runs.iter() {
@@ -140,6 +151,12 @@ impl Comparison<'_> {
                 total.equations.add_run(&terms);
                 (0..2).for_each(|k| total.cost[k] += f64::from(sum.cost[k]));
                 total.depth_sum += f64::from(sum.depth);
+                if sum.terms >= LEAST_TERMS {
+                    let [weight, pull] = sum.weighted.map(f64::from);
+                    let mean = pull / weight;
+                    total.tiles[0] += 1.0;
+                    total.tiles[1] += mean * mean - 1.0 / weight;
+                }
                 (0..3).for_each(|k| total.grey[k] += f64::from(sum.grey[k]));
             }
         }
@@ -151,6 +168,9 @@ impl Comparison<'_> {
 struct Sums {
     cost: [f32; 2],
     depth: f32,
+    /// Distances, and the sums of their weights and of the weighted distances.
+    terms: u32,
+    weighted: [f32; 2],
     grey: [f32; 3],
 }
 
@@ -221,8 +241,11 @@ impl<'a> Task<'a> {
         let (weight, cost) = huber(own / self.scales.depth);
         sums.cost[0] += cost;
         let weight = weight / (sigma * self.scales.depth * sigma * self.scales.depth);
+        sums.terms += 1;
+        sums.weighted[0] += weight;
+        sums.weighted[1] += weight * residual;
         let turn = cross(measured, normal);
-        run.add([turn[0], turn[1], turn[2], normal[0], normal[1], normal[2]], residual, weight);
+        run.add([turn[0], turn[1], turn[2], normal[0], normal[1], normal[2]], residual, weight, 1.0);
 
         if self.of.photometric && !point.intensity.is_nan() {
             self.add_intensity(point, arm, [x, y, inverse, u, v], run, sums, all);
@@ -271,7 +294,7 @@ impl<'a> Task<'a> {
         let g = combine(self.rotation, [gx, gy, gz]);
         let turn = cross(g, arm);
         let weight = weight / (self.scales.intensity * self.scales.intensity);
-        run.add([turn[0], turn[1], turn[2], -g[0], -g[1], -g[2]], residual, weight);
+        run.add([turn[0], turn[1], turn[2], -g[0], -g[1], -g[2]], residual, weight, 0.0);
     }
 }
 

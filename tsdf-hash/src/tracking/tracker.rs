@@ -6,12 +6,12 @@ use crate::blocks::voxel_block::MAX_WEIGHT;
 use crate::dense_map::DenseMap;
 use crate::error::Error;
 use crate::images::{ColourView, DepthView, check_pose};
+use crate::keyframes::index::KeyframeIndex;
 use crate::ray_cast::settings::RayCastSettings;
 use crate::ray_cast::view::View;
 use crate::tracking::directions::{Directions, LEAST_SHARE};
 use crate::tracking::image_level::{ImageLevel, reduced};
-use crate::tracking::keyframes::KeyframeIndex;
-use crate::tracking::model_points::{ModelPoint, model_points};
+use crate::tracking::model_points::{Model, model_points};
 use crate::tracking::outcome::{PosePrior, TrackingOutcome, TrackingStatus};
 use crate::tracking::pose::{moved, step};
 use crate::tracking::registration::Registration;
@@ -22,7 +22,21 @@ use crate::tracking::settings::TrackingSettings;
 const CHI_SQUARED: f64 = 16.81;
 const LEVELS: usize = 3;
 /// Keyframes that a lost camera is tracked from (ours).
-const CANDIDATES: usize = 5;
+const CANDIDATES: usize = 8;
+/// The information of all directions that the noise of the normals feigns, as a share of its variance and of the information of the best
+/// known direction (ours, from runs with known poses).
+const FEIGNED: f64 = 0.2;
+/// What a tile of the map is off, beyond what its noise makes: voxels, and deviations of the noise model next to the camera (ours, from
+/// runs with known poses).
+const MAP_ERROR: [f64; 2] = [0.015, 0.15];
+/// The finest level takes a point of the model for every so many pixels along each side.
+const FINE_STRIDE: usize = 2;
+/// Least coverage of a frame that is believed to be found.
+const LEAST_COVERAGE: f64 = 0.5;
+/// Largest distances of partners, one search after the other, as multiples of the setting (ours).
+const REACHES: [f64; 10] = [4.0, 2.0, 1.0, 1.0, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5];
+/// A search that moves by less, radians and metres, is not repeated.
+const SETTLED: f64 = 1e-4;
 /// Directions with less than this share of the information of the best known one wait for a finer level (ours): what the
 /// coarse ones know of them are the rims of things, which are a pixel off.
 const LEAST_SHARES: [f64; LEVELS] = [LEAST_SHARE, 1e-3, 2e-3];
@@ -47,7 +61,7 @@ pub struct Tracker {
     settings: TrackingSettings,
     /// Fine to coarse.
     levels: [ImageLevel; LEVELS],
-    points: [Vec<ModelPoint>; LEVELS],
+    models: [Model; LEVELS],
 }
 
 impl Tracker {
@@ -57,7 +71,7 @@ impl Tracker {
     /// [`Error::InvalidSetting`].
     pub fn new(settings: TrackingSettings) -> Result<Self, Error> {
         settings.check()?;
-        Ok(Self { settings, levels: Default::default(), points: Default::default() })
+        Ok(Self { settings, levels: Default::default(), models: Default::default() })
     }
 
     /// The settings given to [`new`](Self::new).
@@ -90,25 +104,58 @@ impl Tracker {
         map: &mut dyn DenseMap,
         depth: &DepthView,
         colour: Option<&ColourView>,
-        keyframes: &mut KeyframeIndex,
+        keyframes: &KeyframeIndex,
     ) -> Result<Option<TrackingOutcome>, Error> {
+        let starts = keyframes.candidates(depth, colour, CANDIDATES, |_| true)?;
         let mut best: Option<TrackingOutcome> = None;
-        for pose in keyframes.candidates(depth, colour, CANDIDATES)? {
-            let mut outcome =
-                self.track(map, depth, colour, &PosePrior { world_from_camera: pose, covariance: None })?;
-            if outcome.is_tracked() {
-                // Once more from there: the first model was seen from the keyframe.
-                let prior = PosePrior { world_from_camera: outcome.world_from_camera, covariance: None };
-                outcome = self.track(map, depth, colour, &prior)?;
-            }
-            let sure = outcome.is_tracked()
-                && outcome.agreement >= self.settings.relocalise_agreement
-                && outcome.degenerate.is_empty();
-            if sure && best.as_ref().is_none_or(|best| outcome.agreement > best.agreement) {
-                best = Some(outcome);
+        for start in starts {
+            let found = self.settle(map, depth, colour, &start.world_from_camera)?;
+            if let Some(found) = found
+                && best.as_ref().is_none_or(|best| found.agreement > best.agreement)
+            {
+                best = Some(found);
             }
         }
         Ok(best)
+    }
+
+    /// Tracks from a pose that may be off by more than a frame's motion: with distant partners first, then again from where that led,
+    /// because the first model was seen from elsewhere. `None` unless the result is sure: tracked, agreeing by
+    /// [`TrackingSettings::relocalise_agreement`], of half of the frame at least, fixed in all directions.
+    pub(crate) fn settle(
+        &mut self,
+        map: &mut dyn DenseMap,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        start: &Isometry3<f64>,
+    ) -> Result<Option<TrackingOutcome>, Error> {
+        let (near, least) = (self.settings.max_distance, self.settings.min_agreement);
+        let mut pose = *start;
+        let mut last = None;
+        for reach in REACHES {
+            self.settings.max_distance = reach * near;
+            // From afar little agrees at first.
+            self.settings.min_agreement = if reach > 1.0 { 0.0 } else { least };
+            let prior = PosePrior { world_from_camera: pose, covariance: None };
+            let outcome = self.track(map, depth, colour, &prior);
+            (self.settings.max_distance, self.settings.min_agreement) = (near, least);
+            let outcome = outcome?;
+            if !outcome.is_tracked() {
+                return Ok(None);
+            }
+            let moved = step(&pose, &outcome.world_from_camera).amax();
+            pose = outcome.world_from_camera;
+            last = Some(outcome);
+            if reach < 1.0 && moved < SETTLED {
+                break;
+            }
+        }
+        let sure = |outcome: &TrackingOutcome| {
+            outcome.agreement >= self.settings.relocalise_agreement
+                && outcome.coverage >= LEAST_COVERAGE
+                && outcome.degenerate.is_empty()
+        };
+        Ok(last.filter(sure))
     }
 
     /// The map as the tracker wants it, seen from a pose.
@@ -165,7 +212,7 @@ impl Tracker {
     fn comparison<'a>(&'a self, view: &View, voxel_size: f64, level: usize) -> Comparison<'a> {
         Comparison {
             level: &self.levels[level],
-            points: &self.points[level],
+            model: &self.models[level],
             origin: view.world_from_camera.translation.vector,
             noise: self.settings.noise,
             max_distance: self.settings.max_distance as f32,
@@ -182,8 +229,8 @@ impl Tracker {
         fine.halve(middle);
         middle.halve(coarse);
         // The finest level takes every other point: neighbours say nearly the same.
-        for (points, (stride, radius)) in self.points.iter_mut().zip([(2, 0), (2, 1), (4, 2)]) {
-            model_points(view, stride, radius, points);
+        for (model, (stride, radius)) in self.models.iter_mut().zip([(FINE_STRIDE, 0), (2, 1), (4, 2)]) {
+            model_points(view, stride, radius, model);
         }
     }
 
@@ -197,20 +244,24 @@ impl Tracker {
         prior: &PosePrior,
     ) -> TrackingOutcome {
         let share = |part: u32, whole: u32| f64::from(part) / f64::from(whole.max(1));
-        let points = self.points[0].len() as u32;
+        let points = self.models[0].points.len() as u32;
         let (overlap, agreement) = (share(last.in_view, points), share(last.agreeing, last.in_view));
+        // The model has one point for so many pixels.
+        let cell = (FINE_STRIDE * FINE_STRIDE) as f64;
+        let measured = comparison.level.omega.iter().filter(|omega| **omega > 0.0).count();
+        let coverage = (cell * f64::from(last.in_view) / measured.max(1) as f64).min(1.0);
         let found = Directions::new(&last.equations.h, last.mean_depth());
         let (Some(directions), true) = (found, last.partners > 0) else {
-            return TrackingOutcome { overlap, agreement, ..lost(prior, TrackingStatus::NoOverlap) };
+            return TrackingOutcome { overlap, coverage, agreement, ..lost(prior, TrackingStatus::NoOverlap) };
         };
         let scatter = scatter(view, comparison, reduction * f64::from(search.scales.depth));
-        let mut all = Vec::new();
+        let mut all = Model::default();
         let (scales, brightness) = (search.scales, search.brightness);
         let mut dense = |pose: &Isometry3<f64>| {
-            if all.is_empty() {
+            if all.points.is_empty() {
                 model_points(view, 1, 0, &mut all);
             }
-            Comparison { points: &all, ..*comparison }.evaluate(pose, scales, brightness)
+            Comparison { model: &all, ..*comparison }.evaluate(pose, scales, brightness)
         };
         let unknown = directions.degenerate(&mut dense, &search.pose, scatter);
         // Along what the frame does not fix, back to the prior, if it is more than a guess.
@@ -222,7 +273,13 @@ impl Tracker {
         let onto = Matrix6::from_columns(&std::array::from_fn::<_, 6, _>(|c| {
             directions.part(&Matrix6::identity().column(c).into_owned(), |k| unknown[k])
         }));
-        let covariance = directions.inverse(|k| !unknown[k], 0.0) + onto * prior_covariance * onto.transpose();
+        let shared = last.excess() + map_variance(comparison);
+        let own = directions.honest_inverse(|k| !unknown[k], FEIGNED * scatter * directions.information.max());
+        let left = directions.part(&search.remainder, |k| !unknown[k]);
+        let covariance = own
+            + own * last.equations.shared * own * shared
+            + left * left.transpose()
+            + onto * prior_covariance * onto.transpose();
         let off = step(&prior.world_from_camera, &search.pose);
         let far = prior
             .covariance
@@ -243,12 +300,19 @@ impl Tracker {
             covariance,
             degenerate: (0..6).filter(|&k| unknown[k]).map(|k| directions.axes.column(k).into_owned()).collect(),
             overlap,
+            coverage,
             agreement,
             depth_scale: f64::from(search.scales.depth),
             intensity_scale: if last.intensity.total > 0 { f64::from(search.scales.intensity) } else { 0.0 },
             iterations: search.iterations,
         }
     }
+}
+
+/// Variance of what a tile of the map is off, square metres.
+fn map_variance(comparison: &Comparison) -> f64 {
+    let voxel = 2.0 * f64::from(comparison.tolerance);
+    (MAP_ERROR[0] * voxel).powi(2) + (MAP_ERROR[1] * comparison.noise.base).powi(2)
 }
 
 /// Variance of the model's normals by the noise that was fused, radians squared, `scale` times that of the noise model: the weight of a voxel says how much noise is left.
@@ -266,6 +330,7 @@ fn lost(prior: &PosePrior, status: TrackingStatus) -> TrackingOutcome {
         covariance: prior.covariance.unwrap_or_else(Matrix6::identity),
         degenerate: Vec::new(),
         overlap: 0.0,
+        coverage: 0.0,
         agreement: 0.0,
         depth_scale: 0.0,
         intensity_scale: 0.0,

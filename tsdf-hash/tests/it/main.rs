@@ -4,6 +4,7 @@
 
 mod accuracy;
 mod carve;
+mod consistency;
 mod distance_field;
 mod errors;
 mod eviction;
@@ -12,7 +13,11 @@ mod gpu;
 mod holes;
 mod incremental;
 mod layers;
+#[cfg(feature = "pose-graph")]
+mod loops;
 mod map_file;
+#[cfg(feature = "pose-graph")]
+mod pose_graph;
 mod random;
 mod recorded;
 mod reversible;

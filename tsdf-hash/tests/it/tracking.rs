@@ -33,7 +33,7 @@ fn map_of(shots: &[Shot], voxel_size: f64) -> Map {
 }
 
 /// Noise of the model on every pixel: a sum of four uniform numbers of unit variance.
-fn noisy(shot: &Shot, random: &mut Random) -> Vec<f32> {
+pub(crate) fn noisy(shot: &Shot, random: &mut Random) -> Vec<f32> {
     let noise = |z: f64, random: &mut Random| {
         let sum: f64 = (0..4).map(|_| random.uniform()).sum();
         3.0_f64.sqrt() * (sum - 2.0) * (FREE.base + FREE.quadratic * (z - FREE.nearest).powi(2))
@@ -196,7 +196,7 @@ fn a_lost_camera_is_found_by_keyframes_and_nowhere_else() {
         pose.translation.vector += Vector3::new(0.03, -0.03, 0.03);
         let shot = Shot::take((160, 120), [131.25; 2], pose, |o, d| Some(room::hit(o, d)));
         asked += 1;
-        let Some(outcome) = tracker.relocalise(&mut map, &shot.view(), None, &mut keyframes).unwrap() else { continue };
+        let Some(outcome) = tracker.relocalise(&mut map, &shot.view(), None, &keyframes).unwrap() else { continue };
         let (metres, radians) = apart(&outcome.world_from_camera, &pose);
         assert!(metres < 0.02 && radians < 0.02, "a wrong place: {metres} m, {radians} rad");
         found += 1;
@@ -207,6 +207,6 @@ fn a_lost_camera_is_found_by_keyframes_and_nowhere_else() {
         let ball = crate::scene::hit_sphere(0.4 + 0.1 * f64::from(k));
         let pose = look_at(Point3::new(2.0, 0.0, 0.1 * f64::from(k)), Point3::origin());
         let shot = Shot::take((160, 120), [131.25; 2], pose, ball);
-        assert!(tracker.relocalise(&mut map, &shot.view(), None, &mut keyframes).unwrap().is_none());
+        assert!(tracker.relocalise(&mut map, &shot.view(), None, &keyframes).unwrap().is_none());
     }
 }

@@ -1,20 +1,8 @@
-//! Times, poses, inertial samples and noise out of messages.
+//! Inertial samples and noise out of messages.
 
-use foxglove::messages::{self, Timestamp};
-use vio_ekf::nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
-use vio_ekf::{Imu, ImuNoise, Stamp};
+use vio_ekf::{Imu, ImuNoise};
 
-use crate::vio::cdr;
-
-pub(super) fn stamp(time: Timestamp) -> Stamp {
-    Stamp::from_nanos(i64::from(time.sec()) * 1_000_000_000 + i64::from(time.nsec()))
-}
-
-pub(super) fn isometry(t: Option<messages::Vector3>, q: Option<messages::Quaternion>) -> Option<Isometry3<f64>> {
-    let (t, q) = (t?, q?);
-    let rotation = UnitQuaternion::try_new(Quaternion::new(q.w, q.x, q.y, q.z), 0.5)?;
-    Some(Isometry3::from_parts(Translation3::new(t.x, t.y, t.z), rotation))
-}
+use crate::mcap_messages::cdr;
 
 /// A sample of `sensor_msgs/Imu`, and its frame.
 pub(super) fn imu(data: &[u8]) -> Option<(Imu, String)> {

@@ -1,49 +1,19 @@
-//! Images as messages: Foxglove's and those of ROS 2, packed or compressed.
+//! Images in messages, to grey.
 
-use foxglove::Decode;
-use foxglove::messages::{CompressedImage, RawImage};
 use mcap::Message;
 use vio_ekf::Stamp;
 
-use super::fields::stamp;
-use crate::vio::cdr;
+use crate::mcap_messages::images::{self, ImageData, RawPixels};
 use crate::vio::grey_image::GreyImage;
-
-/// Time and frame of an image; `None` if the message is none.
-pub(super) fn image_header(schema: &str, data: &[u8]) -> Option<(Stamp, String)> {
-    match schema {
-        "foxglove.RawImage" => RawImage::decode(data).ok().and_then(|m| Some((stamp(m.timestamp?), m.frame_id))),
-        "foxglove.CompressedImage" => {
-            CompressedImage::decode(data).ok().and_then(|m| Some((stamp(m.timestamp?), m.frame_id)))
-        }
-        _ => cdr::decode::<cdr::Header>(data).map(|header| (header.stamp(), header.frame_id)),
-    }
-}
 
 /// Time and pixels of an image; `None` if the message is none.
 pub(super) fn image(message: &Message) -> Option<(Stamp, Result<GreyImage, String>)> {
-    let data = message.data.as_ref();
-    match message.channel.schema.as_ref()?.name.as_str() {
-        "foxglove.RawImage" => {
-            let raw = RawImage::decode(data).ok()?;
-            let size = (raw.width as usize, raw.height as usize, raw.step as usize);
-            Some((stamp(raw.timestamp?), unpack(&raw.encoding, size, false, &raw.data)))
-        }
-        "foxglove.CompressedImage" => {
-            let image = CompressedImage::decode(data).ok()?;
-            Some((stamp(image.timestamp?), GreyImage::decode(&image.data)))
-        }
-        "sensor_msgs/msg/Image" => {
-            let raw: cdr::Image = cdr::decode(data)?;
-            let size = (raw.width as usize, raw.height as usize, raw.step as usize);
-            Some((raw.header.stamp(), unpack(&raw.encoding, size, raw.is_bigendian != 0, raw.data)))
-        }
-        "sensor_msgs/msg/CompressedImage" => {
-            let image: cdr::CompressedImage = cdr::decode(data)?;
-            Some((image.header.stamp(), GreyImage::decode(image.data)))
-        }
-        _ => None,
-    }
+    let (stamp, data) = images::image(message)?;
+    let grey = match data {
+        ImageData::Raw(pixels) => unpack(&pixels),
+        ImageData::Compressed { bytes, .. } => GreyImage::decode(&bytes),
+    };
+    Some((stamp, grey))
 }
 
 /// How a pixel lies in memory.
@@ -58,13 +28,9 @@ enum Layout {
 }
 
 /// Pixels as they are in memory, row by row with padding, to grey.
-fn unpack(
-    encoding: &str,
-    (width, height, step): (usize, usize, usize),
-    big_endian: bool,
-    data: &[u8],
-) -> Result<GreyImage, String> {
-    let layout = match encoding {
+fn unpack(pixels: &RawPixels) -> Result<GreyImage, String> {
+    let &RawPixels { width, height, big_endian, .. } = pixels;
+    let layout = match pixels.encoding.as_str() {
         "mono8" | "8UC1" => Layout::Grey8,
         "mono16" | "16UC1" => Layout::Grey16,
         "rgb8" => Layout::Colour(3, 0),
@@ -83,11 +49,7 @@ fn unpack(
         Layout::Grey16 => 2,
         Layout::Colour(channels, _) => channels,
     };
-    let row = width.saturating_mul(bytes);
-    if row == 0 || height == 0 || step < row || data.len() < step.saturating_mul(height) {
-        return Err(format!("{} bytes are too few for {width}x{height} pixels in rows of {step}", data.len()));
-    }
-    let rows = data.chunks_exact(step).take(height).map(|r| &r[..row]);
+    let rows = pixels.rows(bytes)?;
     let data = match layout {
         Layout::Grey8 => rows.flatten().copied().collect(),
         Layout::Grey16 => {
@@ -132,11 +94,20 @@ fn bayer_to_grey(rows: &[&[u8]], width: usize) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
-    use super::unpack;
+    use super::*;
+
+    fn unpacked(
+        encoding: &str,
+        (width, height, step): (usize, usize, usize),
+        big_endian: bool,
+        data: &[u8],
+    ) -> Result<GreyImage, String> {
+        unpack(&RawPixels { encoding: encoding.into(), width, height, step, big_endian, data: data.to_vec() })
+    }
 
     #[test]
     fn pixels_are_unpacked_with_padding_and_colours_by_their_weight() {
-        let grey = |encoding: &str, size, data: &[u8]| unpack(encoding, size, false, data).map(|grey| grey.data);
+        let grey = |encoding: &str, size, data: &[u8]| unpacked(encoding, size, false, data).map(|grey| grey.data);
         assert_eq!(grey("mono8", (2, 2, 3), &[1, 2, 99, 3, 4, 99]), Ok(vec![1, 2, 3, 4]));
         // Red, green and blue alone: 29.9, 58.7 and 11.4 per cent.
         let colours = [255, 0, 0, 0, 255, 0, 0, 0, 255];
@@ -151,10 +122,10 @@ mod tests {
         ] {
             assert!(grey(encoding, size, data).is_err(), "{encoding} {size:?}");
         }
-        assert!(unpack("rgb8", (usize::MAX, 1, usize::MAX), false, &[0; 4]).is_err());
+        assert!(unpacked("rgb8", (usize::MAX, 1, usize::MAX), false, &[0; 4]).is_err());
         // Two bytes in either order: the upper one counts.
         assert_eq!(grey("mono16", (2, 1, 4), &[0xff, 7, 0, 9]), Ok(vec![7, 9]));
-        assert_eq!(unpack("mono16", (2, 1, 4), true, &[7, 0xff, 9, 0]).map(|grey| grey.data), Ok(vec![7, 9]));
+        assert_eq!(unpacked("mono16", (2, 1, 4), true, &[7, 0xff, 9, 0]).map(|grey| grey.data), Ok(vec![7, 9]));
     }
 
     /// Red 40, green 100, blue 200 everywhere: (40 + 2 100 + 200) / 4, at the edges too, whatever the order of the mosaic.
@@ -166,7 +137,7 @@ mod tests {
             // Rows of seven with one byte of padding.
             let data: Vec<u8> =
                 (0..5 * 8).map(|k| if k % 8 == 7 { 255 } else { square[k / 8 % 2 * 2 + k % 8 % 2] }).collect();
-            let grey = unpack(&format!("bayer_{name}8"), (7, 5, 8), false, &data).unwrap();
+            let grey = unpacked(&format!("bayer_{name}8"), (7, 5, 8), false, &data).unwrap();
             assert_eq!(grey.data, [110; 35], "{name}");
         }
     }

@@ -1,4 +1,4 @@
-//! ROS 2 messages in CDR: images and inertial samples, read in either byte order, written in little endian.
+//! ROS 2 messages in CDR: images, cameras, transforms and inertial samples, read in either byte order, written in little endian.
 
 use byteorder::{BigEndian, LittleEndian};
 use cdr_encoding::{from_bytes, to_writer};
@@ -7,61 +7,83 @@ use vio_ekf::Stamp;
 
 /// `std_msgs/Header`.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Header {
+pub(crate) struct Header {
     seconds: i32,
     nanos: u32,
-    pub(super) frame_id: String,
+    pub(crate) frame_id: String,
 }
 
 impl Header {
-    pub(super) fn new(stamp: Stamp, frame_id: &str) -> Self {
+    pub(crate) fn new(stamp: Stamp, frame_id: &str) -> Self {
         let nanos = stamp.nanos();
         let (seconds, nanos) = (nanos.div_euclid(1_000_000_000) as i32, nanos.rem_euclid(1_000_000_000) as u32);
         Self { seconds, nanos, frame_id: frame_id.into() }
     }
 
-    pub(super) fn stamp(&self) -> Stamp {
+    pub(crate) fn stamp(&self) -> Stamp {
         Stamp::from_nanos(i64::from(self.seconds) * 1_000_000_000 + i64::from(self.nanos))
     }
 }
 
 /// `sensor_msgs/Image`.
 #[derive(Deserialize)]
-pub(super) struct Image<'a> {
-    pub(super) header: Header,
-    pub(super) height: u32,
-    pub(super) width: u32,
-    pub(super) encoding: String,
-    pub(super) is_bigendian: u8,
-    pub(super) step: u32,
+pub(crate) struct Image<'a> {
+    pub(crate) header: Header,
+    pub(crate) height: u32,
+    pub(crate) width: u32,
+    pub(crate) encoding: String,
+    pub(crate) is_bigendian: u8,
+    pub(crate) step: u32,
     #[serde(borrow)]
-    pub(super) data: &'a [u8],
+    pub(crate) data: &'a [u8],
 }
 
 /// `sensor_msgs/CompressedImage`.
 #[derive(Deserialize)]
-pub(super) struct CompressedImage<'a> {
-    pub(super) header: Header,
-    _format: String,
+pub(crate) struct CompressedImage<'a> {
+    pub(crate) header: Header,
+    pub(crate) format: String,
     #[serde(borrow)]
-    pub(super) data: &'a [u8],
+    pub(crate) data: &'a [u8],
+}
+
+/// The first fields of `sensor_msgs/CameraInfo`.
+#[derive(Deserialize)]
+pub(crate) struct CameraInfo {
+    pub(crate) header: Header,
+    pub(crate) height: u32,
+    pub(crate) width: u32,
+    pub(crate) _distortion_model: String,
+    pub(crate) d: Vec<f64>,
+    /// Row by row.
+    pub(crate) k: [f64; 9],
+}
+
+/// `geometry_msgs/TransformStamped`.
+#[derive(Deserialize)]
+pub(crate) struct TransformStamped {
+    pub(crate) header: Header,
+    pub(crate) child_frame_id: String,
+    pub(crate) translation: [f64; 3],
+    /// x, y, z, w.
+    pub(crate) rotation: [f64; 4],
 }
 
 /// `sensor_msgs/Imu`; covariances row by row.
 #[derive(Serialize, Deserialize)]
-pub(super) struct Imu {
-    pub(super) header: Header,
+pub(crate) struct Imu {
+    pub(crate) header: Header,
     /// x, y, z, w.
-    pub(super) orientation: [f64; 4],
-    pub(super) orientation_covariance: [f64; 9],
-    pub(super) angular_velocity: [f64; 3],
-    pub(super) angular_velocity_covariance: [f64; 9],
-    pub(super) linear_acceleration: [f64; 3],
-    pub(super) linear_acceleration_covariance: [f64; 9],
+    pub(crate) orientation: [f64; 4],
+    pub(crate) orientation_covariance: [f64; 9],
+    pub(crate) angular_velocity: [f64; 3],
+    pub(crate) angular_velocity_covariance: [f64; 9],
+    pub(crate) linear_acceleration: [f64; 3],
+    pub(crate) linear_acceleration_covariance: [f64; 9],
 }
 
 /// A message of these bytes; `None` if they end too early, or are encoded otherwise than in plain CDR.
-pub(super) fn decode<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Option<T> {
+pub(crate) fn decode<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Option<T> {
     // The encapsulation header: plain CDR in big (0) or little endian (1), two bytes of options. Alignment counts after it.
     let (head, body) = bytes.split_first_chunk::<4>()?;
     let message = match head[..2] {
@@ -73,7 +95,7 @@ pub(super) fn decode<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Option<T> {
 }
 
 /// The bytes of a message.
-pub(super) fn encode(message: &impl Serialize) -> cdr_encoding::Result<Vec<u8>> {
+pub(crate) fn encode(message: &impl Serialize) -> cdr_encoding::Result<Vec<u8>> {
     let mut bytes = vec![0, 1, 0, 0];
     to_writer::<_, LittleEndian, _>(&mut bytes, message)?;
     Ok(bytes)

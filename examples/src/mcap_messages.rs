@@ -1,0 +1,52 @@
+//! Messages of MCAP recordings: a stream of them, and what images and times in them are, as Foxglove or ROS 2 has them.
+
+pub(crate) mod cdr;
+mod chunks;
+pub(crate) mod fields;
+pub(crate) mod images;
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use mcap::Message;
+use mcap::sans_io::LinearReaderOptions;
+
+use chunks::{Lz4, Zstd};
+
+/// Why a file gives no messages.
+#[derive(Debug)]
+pub(crate) enum MessagesFault {
+    /// The system refused.
+    Unreadable(std::io::Error),
+    /// It is no sound recording.
+    Malformed(String),
+}
+
+/// Streams a file's messages; memory does not grow with the file.
+pub(crate) fn messages_of(
+    path: &Path,
+) -> Result<impl Iterator<Item = Result<Message<'static>, MessagesFault>> + Send + use<>, MessagesFault> {
+    let file = File::open(path).map_err(MessagesFault::Unreadable)?;
+    // A record that claims to be longer than the file asks for memory that is not there.
+    let most = usize::try_from(file.metadata().map_err(MessagesFault::Unreadable)?.len()).unwrap_or(usize::MAX);
+    let options = LinearReaderOptions::default().with_record_length_limit(most).with_validate_chunk_crcs(true);
+    let mut reader = mcap::io::MessageReader::new_with_options(BufReader::new(file), options);
+    reader.add_decompressor(Zstd::new()).map_err(|e| broken(&e))?;
+    reader.add_decompressor(Lz4::new()).map_err(|e| broken(&e))?;
+    Ok(reader.map(|message| message.map_err(|e| broken(&e))))
+}
+
+fn broken(error: &mcap::McapError) -> MessagesFault {
+    MessagesFault::Malformed(match error {
+        mcap::McapError::UnsupportedCompression(name) => format!(
+            "its chunks are compressed with {name}, which is not read here: rewrite it with `mcap compress --compression none`"
+        ),
+        error => format!("no sound MCAP file ({error}): `mcap recover` may help"),
+    })
+}
+
+/// Name of a message's schema; empty without one.
+pub(crate) fn schema_of<'a>(message: &'a Message) -> &'a str {
+    message.channel.schema.as_ref().map_or("", |schema| schema.name.as_str())
+}

@@ -1,0 +1,7 @@
+//! Keyframes: what a place looked like, to find it again, and its depth, to see how far off the present is.
+
+pub(crate) mod bit_stream;
+pub(crate) mod compressed_depth;
+pub(crate) mod index;
+mod keyframe;
+mod small_image;

@@ -1,0 +1,245 @@
+//! All keyframes of a scan.
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+use crate::error::Error;
+use crate::file::byte_reader::ByteReader;
+use crate::images::{ColourView, DepthData, DepthView, check_pose};
+use crate::keyframes::compressed_depth::CompressedDepth;
+use crate::keyframes::keyframe::Keyframe;
+use crate::keyframes::small_image::{Likeness, SmallImage};
+use crate::map::Map;
+use crate::settings::Settings;
+use crate::tracking::image_level::ImageLevel;
+
+/// Pixels of the small image along a row.
+const WIDTH: usize = 40;
+/// Pixels of the stored depth along a row.
+const DEPTH_WIDTH: usize = 320;
+/// A keyframe is added this far from all others, metres and radians (ours): tracking starts well from half of it.
+const SPACING: [f64; 2] = [0.2, 0.2];
+/// Bytes of depth that are kept where nothing else is said.
+const BUDGET: usize = 64 << 20;
+const MAGIC: &[u8; 8] = b"KEYFRAM1";
+
+/// Keyframes of a scan: small images with the poses that they were taken from, to find a lost camera or a loop by, and compressed
+/// depth, to see a place again as it was.
+///
+/// Depth images that exceed the budget make room, every other one of the older half first; their small images stay.
+#[derive(Clone, Debug)]
+pub struct KeyframeIndex {
+    keyframes: Vec<Keyframe>,
+    max_bytes: usize,
+    bytes: usize,
+    thinned: usize,
+}
+
+impl Default for KeyframeIndex {
+    fn default() -> Self {
+        Self::with_budget(BUDGET)
+    }
+}
+
+/// A keyframe that looks like a frame.
+#[derive(Clone, Copy, Debug)]
+pub struct KeyframeMatch {
+    /// Which keyframe.
+    pub keyframe: usize,
+    /// Where the frame was taken, if from the keyframe's place: its orientation follows from the shift between the images.
+    pub world_from_camera: Isometry3<f64>,
+    /// Correlation of the small images, `-1..=1`.
+    pub correlation: f64,
+}
+
+impl KeyframeIndex {
+    /// Without keyframes, for 64 MiB of them.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Without keyframes; all together take at most about `max_bytes`.
+    pub fn with_budget(max_bytes: usize) -> Self {
+        Self { keyframes: Vec::new(), max_bytes, bytes: 0, thinned: 0 }
+    }
+
+    /// Number of keyframes.
+    pub fn len(&self) -> usize {
+        self.keyframes.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.keyframes.is_empty()
+    }
+
+    /// Bytes in memory, about.
+    pub fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// Keyframes whose depth had to make room.
+    pub fn without_depth(&self) -> usize {
+        self.thinned
+    }
+
+    /// Where a keyframe was taken from, `world_from_camera`.
+    pub fn pose(&self, keyframe: usize) -> Option<&Isometry3<f64>> {
+        self.keyframes.get(keyframe).map(|keyframe| &keyframe.world_from_camera)
+    }
+
+    /// Moves the keyframes, for instance to where a pose graph has them; poses that are missing or too many are not heeded.
+    ///
+    /// # Errors
+    /// [`Error::InvalidPose`]; the poses are then as they were.
+    pub fn set_poses(&mut self, world_from_camera: &[Isometry3<f64>]) -> Result<(), Error> {
+        world_from_camera.iter().try_for_each(check_pose)?;
+        self.keyframes.iter_mut().zip(world_from_camera).for_each(|(k, pose)| k.world_from_camera = *pose);
+        Ok(())
+    }
+
+    /// Keeps a frame if no keyframe was taken from near its pose (20 cm and 11 degrees). Returns whether it is kept.
+    ///
+    /// # Errors
+    /// Views or pose that make no sense.
+    pub fn add(
+        &mut self,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        world_from_camera: &Isometry3<f64>,
+    ) -> Result<bool, Error> {
+        check_pose(world_from_camera)?;
+        let taken = self.keyframes.iter().any(|keyframe| is_near(&keyframe.world_from_camera, world_from_camera));
+        if !taken {
+            self.push(depth, colour, world_from_camera)?;
+        }
+        Ok(!taken)
+    }
+
+    /// Keeps a frame, and returns its number.
+    ///
+    /// # Errors
+    /// Views or pose that make no sense.
+    pub fn push(
+        &mut self,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        world_from_camera: &Isometry3<f64>,
+    ) -> Result<usize, Error> {
+        check_pose(world_from_camera)?;
+        let image = small_image(depth, colour)?;
+        let mut level = ImageLevel::default();
+        level.read(depth, None, depth.width.div_ceil(DEPTH_WIDTH).min(depth.height), [1e-3, 1e3]);
+        let compressed = CompressedDepth::new(&level);
+        let keyframe = Keyframe { world_from_camera: *world_from_camera, image, depth: Some(compressed) };
+        self.bytes += keyframe.bytes();
+        self.keyframes.push(keyframe);
+        self.make_room();
+        Ok(self.keyframes.len() - 1)
+    }
+
+    /// The keyframes most like a frame, the likest first: at most `count`. Only those that `wanted` says are looked at.
+    ///
+    /// # Errors
+    /// Views that make no sense.
+    pub fn candidates(
+        &self,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        count: usize,
+        wanted: impl Fn(usize) -> bool,
+    ) -> Result<Vec<KeyframeMatch>, Error> {
+        let image = small_image(depth, colour)?;
+        let alike = self.keyframes.iter().enumerate().filter(|(k, _)| wanted(*k));
+        let mut ranked: Vec<(Likeness, usize)> = alike.map(|(k, other)| (image.likeness(&other.image), k)).collect();
+        ranked.sort_by(|a, b| b.0.correlation.total_cmp(&a.0.correlation).then(a.1.cmp(&b.1)));
+        let found = ranked.into_iter().take(count).map(|(likeness, keyframe)| {
+            let [x, y] = [0, 1].map(|k| f64::from(likeness.shift[k] / image.focal[k]));
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), x.atan())
+                * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -y.atan());
+            let turn = Isometry3::from_parts(Translation3::identity(), turn);
+            let world_from_camera = self.keyframes[keyframe].world_from_camera * turn;
+            KeyframeMatch { keyframe, world_from_camera, correlation: f64::from(likeness.correlation) }
+        });
+        Ok(found.collect())
+    }
+
+    /// The surface as some keyframes saw it: a map of their stored depth at their poses, of those that still have it.
+    ///
+    /// # Errors
+    /// As [`Map::new`] and [`Map::integrate`]. A keyframe of which nothing can be fused is left out.
+    pub fn map_of(&self, keyframes: std::ops::Range<usize>, settings: Settings) -> Result<Map, Error> {
+        let mut map = Map::new(settings)?;
+        for keyframe in self.keyframes.get(keyframes).unwrap_or_default() {
+            let Some(depth) = &keyframe.depth else { continue };
+            let Some(metres) = depth.metres() else { continue };
+            let data = DepthData::F32 { data: &metres };
+            let view = DepthView { width: depth.width, height: depth.height, data, intrinsics: depth.intrinsics };
+            match map.integrate(&view, None, &keyframe.world_from_camera) {
+                Ok(_) | Err(Error::NoDepth { .. }) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(map)
+    }
+
+    /// All keyframes as bytes, for instance for the metadata of [`Map::save`].
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut out = MAGIC.to_vec();
+        out.extend_from_slice(&(self.keyframes.len() as u64).to_le_bytes());
+        self.keyframes.iter().for_each(|keyframe| keyframe.write(&mut out));
+        out
+    }
+
+    /// Reads what [`to_bytes`](Self::to_bytes) wrote.
+    ///
+    /// # Errors
+    /// [`Error::CorruptFile`], with the byte.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
+        let mut input = ByteReader::new(bytes, 0, "the keyframes");
+        if input.array()? != *MAGIC {
+            return Err(input.bad());
+        }
+        let mut index = Self::default();
+        for _ in 0..input.u64()? {
+            let keyframe = Keyframe::read(&mut input)?;
+            index.bytes += keyframe.bytes();
+            index.thinned += usize::from(keyframe.depth.is_none());
+            index.keyframes.push(keyframe);
+        }
+        input.end()?;
+        index.make_room();
+        Ok(index)
+    }
+
+    fn make_room(&mut self) {
+        while self.bytes > self.max_bytes {
+            // Of the older half every other one, then of those that are left.
+            let with: Vec<usize> = (0..self.keyframes.len()).filter(|k| self.keyframes[*k].depth.is_some()).collect();
+            let older = &with[..with.len().div_ceil(2)];
+            if older.is_empty() {
+                return;
+            }
+            for &k in older.iter().skip(usize::from(older.len() > 1)).step_by(2) {
+                let keyframe = &mut self.keyframes[k];
+                self.bytes -= keyframe.depth.take().map_or(0, |depth| depth.bytes.len());
+                self.thinned += 1;
+            }
+        }
+    }
+}
+
+fn small_image(depth: &DepthView, colour: Option<&ColourView>) -> Result<SmallImage, Error> {
+    depth.check()?;
+    if let Some(colour) = colour {
+        colour.check()?;
+    }
+    let mut level = ImageLevel::default();
+    level.read(depth, colour, depth.width.div_ceil(WIDTH).min(depth.height), [1e-3, 1e3]);
+    Ok(SmallImage::new(&level))
+}
+
+/// Whether a keyframe at one pose makes another one needless.
+pub(crate) fn is_near(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
+    let apart = a.inverse() * b;
+    apart.translation.vector.norm() < SPACING[0] && apart.rotation.angle() < SPACING[1]
+}

@@ -1,0 +1,93 @@
+//! One keyframe, in memory and as bytes.
+
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+
+use crate::error::Error;
+use crate::file::byte_reader::ByteReader;
+use crate::images::Intrinsics;
+use crate::keyframes::compressed_depth::CompressedDepth;
+use crate::keyframes::small_image::SmallImage;
+
+/// A place: where it was seen from, what it looks like, how deep it is.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Keyframe {
+    pub(crate) world_from_camera: Isometry3<f64>,
+    pub(crate) image: SmallImage,
+    /// `None` once it had to make room.
+    pub(crate) depth: Option<CompressedDepth>,
+}
+
+/// No image of a keyframe has more pixels along a side.
+const LARGEST: u32 = 4096;
+
+impl Keyframe {
+    /// Bytes in memory, about.
+    pub(crate) fn bytes(&self) -> usize {
+        let image: usize = self.image.channels.iter().map(|channel| 4 * channel.len()).sum();
+        size_of::<Self>() + image + self.depth.as_ref().map_or(0, |depth| depth.bytes.len())
+    }
+
+    pub(crate) fn write(&self, out: &mut Vec<u8>) {
+        let mut f64s = |numbers: &[f64]| numbers.iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes()));
+        f64s(self.world_from_camera.translation.vector.as_slice());
+        f64s(self.world_from_camera.rotation.coords.as_slice());
+        let mut u32s = |numbers: &[u32]| numbers.iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes()));
+        u32s(&[self.image.width as u32]);
+        u32s(&self.image.focal.map(f32::to_bits));
+        for channel in &self.image.channels {
+            u32s(&[channel.len() as u32]);
+            u32s(&channel.iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+        }
+        let Some(depth) = &self.depth else {
+            u32s(&[0, 0]);
+            return;
+        };
+        u32s(&[depth.width as u32, depth.height as u32, depth.most.to_bits(), depth.bytes.len() as u32]);
+        let Intrinsics { fx, fy, cx, cy } = depth.intrinsics;
+        out.extend([fx, fy, cx, cy].into_iter().flat_map(f64::to_le_bytes));
+        out.extend_from_slice(&depth.bytes);
+    }
+
+    pub(crate) fn read(input: &mut ByteReader) -> Result<Self, Error> {
+        let mut pose = [0.0; 7];
+        for number in &mut pose {
+            *number = input.f64()?;
+        }
+        let [x, y, z, i, j, k, w] = pose;
+        let rotation = UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k));
+        let world_from_camera = Isometry3::from_parts(Translation3::new(x, y, z), rotation);
+        crate::images::check_pose(&world_from_camera).map_err(|_| input.bad())?;
+        let width = input.u32()?;
+        let focal = [f32::from_bits(input.u32()?), f32::from_bits(input.u32()?)];
+        let mut channels = [Vec::new(), Vec::new()];
+        for channel in &mut channels {
+            let length = input.u32()?;
+            if width == 0 || width > LARGEST || !length.is_multiple_of(width) || length / width > LARGEST {
+                return Err(input.bad());
+            }
+            let bytes = input.take(4 * length as usize)?;
+            let values = bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b));
+            *channel = values.collect();
+            if channel.iter().any(|v| !v.is_finite()) {
+                return Err(input.bad());
+            }
+        }
+        let image = SmallImage { width: width as usize, focal, channels };
+        let (width, height) = (input.u32()?, input.u32()?);
+        if width == 0 && height == 0 {
+            return Ok(Self { world_from_camera, image, depth: None });
+        }
+        if width.max(height) > LARGEST || width.min(height) == 0 {
+            return Err(input.bad());
+        }
+        let (most, length) = (f32::from_bits(input.u32()?), input.u32()?);
+        let [fx, fy, cx, cy] = [input.f64()?, input.f64()?, input.f64()?, input.f64()?];
+        let bytes = input.take(length as usize)?.to_vec();
+        let intrinsics = Intrinsics { fx, fy, cx, cy };
+        let depth = CompressedDepth { width: width as usize, height: height as usize, intrinsics, most, bytes };
+        if !(most > 0.0 && most.is_finite()) || depth.metres().is_none() {
+            return Err(input.bad());
+        }
+        Ok(Self { world_from_camera, image, depth: Some(depth) })
+    }
+}

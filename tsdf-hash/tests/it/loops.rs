@@ -1,0 +1,219 @@
+//! Drift that was put in is measured, loops are found, and what was mapped on the way is corrected.
+
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use tsdf_hash::{Error, KeyframeIndex, LoopCloser, LoopSettings, Map, Settings, Tracker, TrackingSettings};
+
+use crate::random::Random;
+use crate::scene::{Shot, room};
+use crate::tracking::noisy;
+
+fn apart(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
+    ((a.translation.vector - b.translation.vector).norm(), (a.rotation.inverse() * b.rotation).angle())
+}
+
+fn unit(random: &mut Random) -> Vector3<f64> {
+    Vector3::from_fn(|_, _| random.uniform() - 0.5).normalize()
+}
+
+fn shot(pose: Isometry3<f64>) -> Shot {
+    Shot::take((320, 240), [262.5; 2], pose, |o, d| Some(room::hit(o, d)))
+}
+
+/// A frame with the noise of the depth camera.
+fn seen(pose: Isometry3<f64>, random: &mut Random) -> Shot {
+    let clean = shot(pose);
+    Shot { depth: noisy(&clean, random), ..clean }
+}
+
+/// 10 to 100 mm and 0.5 to 3 degrees in any direction, between the visit of the keyframes and a frame from there.
+#[test]
+fn injected_drift_is_measured() {
+    let mut random = Random::new(17);
+    let mut tracker = Tracker::new(TrackingSettings::default()).unwrap();
+    let (mut worst, mut found, mut asked, mut good) = ([0.0_f64; 2], 0, 0, 0);
+    for k in 0..36_usize {
+        let around = 10 * k;
+        let mut keyframes = KeyframeIndex::new();
+        for n in 0..7 {
+            let pose = room::pose(around + 2 * n, 360);
+            keyframes.push(&seen(pose, &mut random).view(), None, &pose).unwrap();
+        }
+        let mut old = keyframes.map_of(0..7, Settings { voxel_size: 0.02, ..Settings::default() }).unwrap();
+        let truth = room::pose(around + 7, 360);
+        let share = (k % 6) as f64 / 5.0;
+        let (distance, angle) = (0.01 + 0.09 * share, (0.5 + 2.5 * share).to_radians());
+        let drift = Isometry3::from_parts(
+            (unit(&mut random) * distance).into(),
+            UnitQuaternion::from_scaled_axis(unit(&mut random) * angle),
+        );
+        let drifted = Isometry3::from_parts(
+            (truth.translation.vector + drift.translation.vector).into(),
+            drift.rotation * truth.rotation,
+        );
+        asked += 1;
+        let measured =
+            tracker.drift(&mut old, &seen(truth, &mut random).view(), None, &drifted, None, &[drifted]).unwrap();
+        // A view that does not fix the pose is told, not guessed.
+        let Some(measured) = measured else { continue };
+        found += 1;
+        assert!(measured.is_significant(), "{distance} m, {angle} rad: {}", measured.chi_squared);
+        let (metres, radians) = apart(&measured.outcome.world_from_camera, &truth);
+        let exact = metres < 2e-3 && radians < 0.1_f64.to_radians();
+        good += usize::from(exact);
+        // What is less exact says so.
+        let covariance = &measured.outcome.covariance;
+        let stated = covariance.fixed_view::<3, 3>(3, 3).trace().sqrt();
+        assert!(exact || metres < 4.0 * stated, "{metres} m, stated {stated} m");
+        worst = [worst[0].max(metres), worst[1].max(radians)];
+        let corrected = measured.corrected_from_drifted * drifted;
+        assert!(apart(&corrected, &measured.outcome.world_from_camera).0 < 1e-9);
+    }
+    eprintln!(
+        "{found} of {asked} fix the pose, {good} are measured to 2 mm and 0.1 deg; worst {:.2} mm, {:.3} deg",
+        1e3 * worst[0],
+        worst[1].to_degrees()
+    );
+    assert!(2 * found > asked, "{found} of {asked}");
+    assert!(10 * good > 9 * found && worst[0] < 8e-3, "{good} of {found}, {worst:?}");
+}
+
+/// Twice around the room by odometry that turns and shifts a little with every step.
+fn drifting_tour(steps: usize, turns: usize) -> Vec<(Isometry3<f64>, Isometry3<f64>)> {
+    let error = Isometry3::new(Vector3::new(1.2e-3, -0.8e-3, 0.6e-3), Vector3::new(2e-4, 7e-4, -3e-4));
+    let mut believed = room::pose(0, steps);
+    (0..steps * turns)
+        .map(|k| {
+            let truth = room::pose(k, steps);
+            if k > 0 {
+                believed *= room::pose(k - 1, steps).inverse() * truth * error;
+            }
+            (truth, believed)
+        })
+        .collect()
+}
+
+/// Mean distance of the mesh from the true surface, metres, where the surface was seen well.
+fn surface_error(map: &Map) -> f64 {
+    let mesh = map.mesh();
+    let sum: f64 = mesh.positions.iter().map(|p| room::sdf(&Point3::from(p.map(f64::from))).abs().min(0.05)).sum();
+    sum / mesh.positions.len() as f64
+}
+
+#[test]
+fn a_loop_is_found_and_the_map_is_corrected() {
+    let mut random = Random::new(23);
+    let tour = drifting_tour(72, 2);
+    let shots: Vec<Shot> = tour[..90].iter().map(|(truth, _)| seen(*truth, &mut random)).collect();
+    let settings = Settings { voxel_size: 0.02, ..Settings::default() };
+    let mut reference = Map::new(settings).unwrap();
+    for (shot, (truth, _)) in shots.iter().zip(&tour) {
+        reference.integrate(&shot.view(), None, truth).unwrap();
+    }
+    let mut map = Map::new(settings).unwrap();
+    let mut closer = LoopCloser::new(LoopSettings::default()).unwrap();
+    // Where each frame is in the map, and the keyframe that it belongs to.
+    let mut fused: Vec<(Isometry3<f64>, usize)> = Vec::new();
+    let mut correction = Isometry3::identity();
+    let (mut corrections, mut loops, mut drifted_error) = (0, 0, 0.0);
+    for (shot, (truth, believed)) in shots.iter().zip(&tour) {
+        let pose = correction * believed;
+        map.integrate(&shot.view(), None, &pose).unwrap();
+        let report = closer.add(&shot.view(), None, &pose).unwrap();
+        fused.push((pose, closer.poses().len() - 1));
+        for found in &report.loops {
+            loops += 1;
+            // Against the truth: the old keyframe's frame is at most a few centimetres off, the measurement relative to it is exact.
+            let measured = closer.graph().betweens.iter().find(|f| f.first == found.old && f.second == found.present);
+            assert!(measured.is_some() && found.drift.outcome.agreement > 0.85);
+        }
+        if let Some(before) = report.corrected_from {
+            if corrections == 0 {
+                drifted_error = surface_error(&map);
+                assert!(apart(&pose, truth).0 > 0.04, "the drift is worth measuring");
+            }
+            corrections += 1;
+            for (shot, (pose, keyframe)) in shots.iter().zip(&mut fused) {
+                let moved = closer.poses()[*keyframe] * before[*keyframe].inverse() * *pose;
+                map.deintegrate(&shot.view(), None, pose).unwrap();
+                map.integrate(&shot.view(), None, &moved).unwrap();
+                *pose = moved;
+            }
+            correction = fused[fused.len() - 1].0 * believed.inverse();
+        }
+    }
+    let (clean, corrected) = (surface_error(&reference), surface_error(&map));
+    let worst = fused.iter().zip(&tour).map(|((pose, _), (truth, _))| apart(pose, truth).0).fold(0.0, f64::max);
+    eprintln!(
+        "{loops} loops, {corrections} corrections; surface {:.2} mm drifting, {:.2} mm corrected, {:.2} mm without drift; worst pose {:.1} mm",
+        1e3 * drifted_error,
+        1e3 * corrected,
+        1e3 * clean,
+        1e3 * worst
+    );
+    assert!(corrections > 0 && loops > 0);
+    assert!(corrected < 0.6 * drifted_error, "{corrected} {drifted_error}");
+    // Reversible: the map is that of its frames at their corrected poses.
+    let mut anew = Map::new(settings).unwrap();
+    for (shot, (pose, _)) in shots.iter().zip(&fused) {
+        anew.integrate(&shot.view(), None, pose).unwrap();
+    }
+    assert_eq!(anew.hash(), map.hash());
+}
+
+#[test]
+fn without_drift_nothing_is_corrected() {
+    let mut closer = LoopCloser::new(LoopSettings::default()).unwrap();
+    let (mut loops, mut compared) = (0, 0);
+    for k in 0..80 {
+        let pose = room::pose(k, 72);
+        let report = closer.add(&shot(pose).view(), None, &pose).unwrap();
+        compared += report.compared;
+        loops += report.loops.len();
+        for found in &report.loops {
+            let off = found.drift.distance(&pose);
+            assert!(off < 4e-3 && found.drift.angle() < 3e-3, "{off} m");
+        }
+    }
+    assert!(loops > 2 && compared >= loops, "{loops} of {compared}");
+    for (k, pose) in closer.poses().iter().enumerate() {
+        let nearest = (0..80).map(|n| apart(pose, &room::pose(n, 72)).0).fold(f64::INFINITY, f64::min);
+        assert!(nearest < 5e-3, "keyframe {k} has moved by {nearest} m");
+    }
+}
+
+#[test]
+fn keyframes_survive_their_bytes_and_damage_is_named() {
+    let mut index = KeyframeIndex::new();
+    for k in 0..4 {
+        let pose = room::pose(10 * k, 72);
+        index.push(&shot(pose).view(), None, &pose).unwrap();
+    }
+    let bytes = index.to_bytes();
+    let again = KeyframeIndex::from_bytes(&bytes).unwrap();
+    assert_eq!((again.len(), again.bytes(), again.to_bytes()), (4, index.bytes(), bytes.clone()));
+    let view = shot(room::pose(10, 72));
+    let best = again.candidates(&view.view(), None, 1, |_| true).unwrap();
+    assert!(best[0].keyframe == 1 && best[0].correlation > 0.999, "{best:?}");
+    assert!(apart(&best[0].world_from_camera, &view.world_from_camera).1 < 1e-6);
+    for cut in [0, 7, 12, 40, bytes.len() / 2, bytes.len() - 1] {
+        assert!(matches!(KeyframeIndex::from_bytes(&bytes[..cut]), Err(Error::CorruptFile { .. })), "{cut}");
+    }
+    let mut random = Random::new(1);
+    for _ in 0..300 {
+        let mut damaged = bytes.clone();
+        let at = (random.uniform() * damaged.len() as f64) as usize;
+        damaged[at] ^= 1 << (8.0 * random.uniform()) as u8;
+        let _ = KeyframeIndex::from_bytes(&damaged);
+    }
+    // A budget for one and a half depth images: the rest makes room, the newest stays.
+    let each = index.bytes() / 4;
+    let mut small = KeyframeIndex::with_budget(4 * each);
+    for k in 0..8 {
+        let pose = room::pose(10 * k, 72);
+        small.push(&shot(pose).view(), None, &pose).unwrap();
+    }
+    assert!(small.bytes() <= 4 * each && small.len() == 8 && small.without_depth() >= 3, "{}", small.bytes());
+    let settings = Settings { voxel_size: 0.02, ..Settings::default() };
+    assert!(small.map_of(7..8, settings).unwrap().blocks() > 0);
+    assert_eq!(small.map_of(1..2, settings).unwrap().blocks(), 0);
+}
