@@ -1,7 +1,7 @@
 //! First and second derivatives of the symmetric Dirichlet energy of one triangle.
 
 use super::penalty::Penalty;
-use crate::triangle::{Frame, Jacobian};
+use crate::triangle::{Frame, Jacobian, length};
 
 /// Derivatives of `A W` of one triangle. In the bases of the singular vectors (`J = U diag(s) V^T`) the Hessian is diagonal in
 /// four modes: the two stretches, the flip and the twist; only the twist can be negative.
@@ -24,11 +24,15 @@ impl Local {
     pub(super) fn new(frame: &Frame, j: Jacobian, penalty: Penalty) -> Self {
         let [_, first, second] = penalty.derivatives(j.symmetric_dirichlet());
         let area = frame.area * first;
-        let [s1, s2] = j.stretch();
-        let sum = (j.c - j.b).atan2(j.a + j.d);
-        let difference = (j.c + j.b).atan2(j.a - j.d);
-        let (sin_u, cos_u) = (0.5 * (sum + difference)).sin_cos();
-        let (sin_v, cos_v) = (0.5 * (sum - difference)).sin_cos();
+        let (sum, p) = direction(j.a + j.d, j.c - j.b);
+        let (difference, r) = direction(j.a - j.d, j.c + j.b);
+        let s1 = 0.5 * (p + r);
+        // det / s1 keeps the digits of a small s2, which the difference would lose.
+        let s2 = j.det() / s1;
+        // U turns by half the sum of the two angles, V by what is left of the first.
+        let [cos_u, sin_u] =
+            half([sum[0] * difference[0] - sum[1] * difference[1], sum[1] * difference[0] + sum[0] * difference[1]]);
+        let [cos_v, sin_v] = [sum[0] * cos_u + sum[1] * sin_u, sum[1] * cos_u - sum[0] * sin_u];
         let hats = frame.g.map(|g| [cos_v * g[0] - sin_v * g[1], sin_v * g[0] + cos_v * g[1]]);
         let cube = (s1 * s2).powi(3);
         let flip = 2.0 + 2.0 * (s1 * s1 + s1 * s2 + s2 * s2) / cube;
@@ -64,6 +68,23 @@ impl Local {
         let [left_x, left_y] = [[c * xx - s * yx, c * xy - s * yy], [s * xx + c * yx, s * xy + c * yy]];
         let back = |row: [f64; 2]| [row[0] * c - row[1] * s, row[0] * s + row[1] * c];
         [back(left_x), back(left_y)]
+    }
+}
+
+/// Cosine and sine of the direction of a vector, and its length; the x axis for none.
+fn direction(x: f64, y: f64) -> ([f64; 2], f64) {
+    let length = length(x, y);
+    if length > 0.0 { ([x / length, y / length], length) } else { ([1.0, 0.0], 0.0) }
+}
+
+/// Cosine and sine of half an angle.
+fn half([cos, sin]: [f64; 2]) -> [f64; 2] {
+    if cos >= 0.0 {
+        let half_cos = (0.5 * (1.0 + cos)).sqrt();
+        [half_cos, 0.5 * sin / half_cos]
+    } else {
+        let half_sin = (0.5 * (1.0 - cos)).sqrt();
+        [0.5 * sin / half_sin, half_sin]
     }
 }
 
