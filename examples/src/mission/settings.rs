@@ -87,11 +87,44 @@ impl MissionSettings {
     }
 }
 
-/// The planner's defaults with a weaker pull between neighbours: the normals are averaged over a footprint already.
+/// The planner's defaults with a weaker pull between neighbours, as the normals are averaged over a footprint already, and a strong
+/// one to the stand-off: where the tilt joint ends, a nozzle off the normal would come near to be less far off it, and its spot
+/// shrink to a dark dot.
 fn planner_settings() -> paint_planner::Settings {
     let defaults = paint_planner::Settings::default();
     paint_planner::Settings {
-        nozzle: paint_planner::NozzleSettings { ca: 0.1, cb: 0.002, ..defaults.nozzle },
+        nozzle: paint_planner::NozzleSettings { ca: 0.1, cb: 0.002, distance: 1.0, ..defaults.nozzle },
         ..defaults
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::super::test_panel;
+    use super::*;
+    use crate::adapters::{MeshSurface, Robot};
+    use nalgebra::{UnitVector3, Vector3};
+    use ptu_kinematics::Ptu;
+
+    #[test]
+    fn spots_keep_their_size_where_the_tilt_joint_ends() {
+        let settings = MissionSettings::default();
+        let surface = test_panel::surface();
+        let robot = Robot::new(Ptu::new(settings.ptu).unwrap());
+        // Normals that rise to 60 degrees below the horizon, where the joint has 44.
+        let steep = |k: usize| (60.0_f64 * (k as f64 / 39.0)).to_radians().sin_cos();
+        let normal = |k| UnitVector3::new_normalize(Vector3::new(-steep(k).1, 0.0, -steep(k).0));
+        let targets: Vec<_> = test_panel::targets()
+            .iter()
+            .enumerate()
+            .map(|(k, t)| paint_planner::Target { normal: normal(k), ..*t })
+            .collect();
+        let plan = paint_planner::plan(&targets, &MeshSurface(&surface.world), &robot, &settings.planner).unwrap();
+        assert!(plan.reachable.iter().all(|reached| *reached));
+        for (target, nozzle) in targets.iter().zip(&plan.nozzle) {
+            let distance = (target.point - nozzle.position).norm();
+            assert!((0.09..0.12).contains(&distance), "{distance} m");
+        }
     }
 }
