@@ -93,7 +93,7 @@ impl MissionSettings {
 fn planner_settings() -> paint_planner::Settings {
     let defaults = paint_planner::Settings::default();
     paint_planner::Settings {
-        nozzle: paint_planner::NozzleSettings { ca: 0.1, cb: 0.002, distance: 1.0, ..defaults.nozzle },
+        nozzle: paint_planner::NozzleSettings { ca: 0.1, cb: 0.002, distance: 0.3, ..defaults.nozzle },
         ..defaults
     }
 }
