@@ -52,7 +52,7 @@ def main():
     parser.add_argument("names", nargs="*")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--seconds", type=float, default=1.0)
-    arguments = parser.parse_args()
+    arguments = parser.parse_intermixed_args()
     with tempfile.TemporaryDirectory() as scratch:
         before = Path(scratch) / "before"
         git = lambda *words: subprocess.run(["git", "-C", str(ROOT), "worktree", *words], check=True, capture_output=True)

@@ -3,10 +3,10 @@
 use std::error::Error;
 use std::f64::consts::TAU;
 
-use clarabel::algebra::CscMatrix;
-use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT};
 use nalgebra::Vector4;
-use paint_planner::{OptimalPlanner, Planner, SmoothingPlanner, StageOneProgram, StandardForm, Trajectory};
+use paint_planner::{
+    Clarabel, InteriorPoint, OptimalPlanner, Planner, QpSolver, SmoothingPlanner, Trajectory, stroke_program,
+};
 use paintcopter_benches::{criterion, rock};
 use paintcopter_examples::adapters::{MeshSurface, Robot};
 use paintcopter_examples::mission::MissionSettings;
@@ -33,18 +33,22 @@ fn main() -> Result<(), Box<dyn Error>> {
         });
     }
 
-    // The first program of stage 1: block-tridiagonal by the crate's own method, and as a general sparse one.
-    let program = StageOneProgram::new(&targets, &settings.nozzle);
-    let own = program.solve()?;
-    group.bench_function("nozzle program, own interior point", |b| b.iter(|| program.solve()));
-    let form = program.standard_form();
-    let general = by_clarabel(&form)?;
-    for (k, value) in general.iter().enumerate() {
-        if (own[k / 5][k % 5] - value).abs() > 1e-5 {
-            return Err("the two solvers disagree".into());
-        }
+    // The first program of stage 1: with the structure of its Hessian, and as a general sparse one at Clarabel's own tolerance.
+    let (program, start) = stroke_program(&targets, &settings.nozzle);
+    let general = Clarabel { tolerance: 1e-8, ..Clarabel::default() };
+    let solvers: [(&str, &dyn QpSolver); 2] = [("own interior point", &InteriorPoint), ("Clarabel", &general)];
+    let mut answers = Vec::new();
+    for (name, solver) in solvers {
+        let mut states = start.clone();
+        solver.solve(&program, &mut states)?;
+        answers.push(states);
+        group.bench_function(format!("nozzle program, {name}"), |b| {
+            b.iter(|| solver.solve(&program, &mut start.clone()));
+        });
     }
-    group.bench_function("nozzle program, Clarabel", |b| b.iter(|| by_clarabel(&form)));
+    if answers[0].iter().zip(&answers[1]).any(|(own, other)| (own - other).amax() > 1e-5) {
+        return Err("the two solvers disagree".into());
+    }
 
     // A helix at half a metre per second.
     let knot = |k: usize| {
@@ -62,18 +66,4 @@ fn main() -> Result<(), Box<dyn Error>> {
     group.finish();
     criterion.final_summary();
     Ok(())
-}
-
-/// Clarabel at its own tolerances, from the triplets: what a caller would wait for.
-fn by_clarabel(form: &StandardForm) -> Result<Vec<f64>, Box<dyn Error>> {
-    let matrix = |rows: usize, triplets: &[(usize, usize, f64)]| {
-        let (r, (c, v)): (Vec<usize>, (Vec<usize>, Vec<f64>)) = triplets.iter().map(|&(r, c, v)| (r, (c, v))).unzip();
-        CscMatrix::new_from_triplets(rows, form.variables, r, c, v)
-    };
-    let (p, a) = (matrix(form.variables, &form.p), matrix(form.b.len(), &form.a));
-    let cones = [NonnegativeConeT(form.b.len())];
-    let settings = DefaultSettings { verbose: false, ..DefaultSettings::default() };
-    let mut solver = DefaultSolver::new(&p, &form.q, &a, &form.b, &cones, settings)?;
-    solver.solve();
-    Ok(solver.solution.x[..form.states].to_vec())
 }

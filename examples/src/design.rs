@@ -7,6 +7,7 @@ use paint_net::procedural::{fbm, value_noise};
 use uv_param::{Texture, luminance};
 
 use crate::mesh_io::TriangleMesh;
+use crate::picture_file::open_upright;
 use crate::picture_placement::PicturePlacement;
 use crate::projection::{Projection, Viewpoint};
 use crate::surface::PaintSurface;
@@ -66,6 +67,11 @@ pub enum DesignError {
 }
 
 impl Design {
+    /// Whether a name is that of a design that needs no file.
+    pub fn is_built_in(name: &str) -> bool {
+        ["strata", "stripes", "gradient", "colours"].contains(&name)
+    }
+
     /// From the command line: a built-in name or a file.
     pub fn from_name(name: &str, seed: u64) -> Result<Self, DesignError> {
         match name {
@@ -211,7 +217,7 @@ impl Picture {
     pub fn open(path: &Path) -> Result<Self, DesignError> {
         let name = PathBuf::from(path).display().to_string();
         let unusable = |why: String| DesignError::Unusable { name: name.clone(), why };
-        let picture = image::open(path).map_err(|e| unusable(format!("cannot be read as a picture ({e})")))?;
+        let picture = open_upright(path).map_err(|e| unusable(format!("cannot be read as a picture ({e})")))?;
         if picture.width() < 2 || picture.height() < 2 {
             return Err(unusable(format!("is only {} x {} pixels", picture.width(), picture.height())));
         }

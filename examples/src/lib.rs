@@ -8,7 +8,9 @@ mod mcap_messages;
 pub mod mesh_io;
 pub mod mesh_placement;
 pub mod mission;
+pub mod mission_file;
 pub mod paint_image;
+pub mod picture_file;
 pub mod picture_placement;
 pub mod pictures;
 pub mod progress;
@@ -20,6 +22,7 @@ pub mod scan_flight;
 pub mod surface;
 pub mod targets;
 pub mod textured_mesh;
+pub mod unwrap;
 pub mod vio;
 pub mod world;
 

@@ -1,6 +1,7 @@
 //! A mesh from a file stands somewhere, in some unit, lying or upright: brings it in front of the robot.
 
 use nalgebra::{Rotation3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use crate::mesh_io::TriangleMesh;
 
@@ -10,7 +11,8 @@ const CLEAR_OF_GROUND: f64 = 1.5;
 const RELIEF: f64 = 0.5;
 
 /// Which axis of the file points up.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum UpAxis {
     /// x up.
     X,

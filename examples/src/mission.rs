@@ -1,23 +1,31 @@
 //! The main job: a mesh and a design in, a painted surface and its figures out.
 
 mod decide;
+mod decision;
 mod error;
 mod figures;
 mod fly;
 mod inspect;
 mod mission_output;
 mod plan;
+mod preview;
+mod reach;
+mod rehearse;
 mod run;
 mod settings;
 mod shading;
+mod simulated_flight;
 #[cfg(test)]
 mod test_panel;
 mod trajectory_table;
+mod view;
 
+pub use decision::Decision;
 pub use error::MissionError;
 pub use figures::report;
 pub use fly::LayerFlight;
 pub use inspect::{Inspection, inspect};
 pub use mission_output::save;
+pub use preview::{Preview, preview};
 pub use run::Mission;
 pub use settings::{MissionSettings, PainterChoice};

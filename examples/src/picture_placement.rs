@@ -1,7 +1,10 @@
 //! Where a picture lies on the plane it is painted on: size, turn and place, its own proportions kept.
 
+use serde::{Deserialize, Serialize};
+
 /// How large a picture becomes where no size is given.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum PlacementMode {
     /// As large as fits, whole; bare beside it.
     #[default]
@@ -15,7 +18,8 @@ pub enum PlacementMode {
 }
 
 /// Size, turn and place of a picture.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct PicturePlacement {
     /// How large it becomes without [`size`](Self::size), and whether it is repeated.
     pub mode: PlacementMode,

@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use paint_sim::Surface as _;
+use serde::{Deserialize, Serialize};
 
 use crate::surface::PaintSurface;
 
@@ -9,7 +10,8 @@ use crate::surface::PaintSurface;
 const OWN_SURFACE: f64 = 0.01;
 
 /// From where a picture is thrown.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Viewpoint {
     /// From far away in front, level: along the mean normal.
     Front,

@@ -1,5 +1,7 @@
 //! The mission as an MCAP file with Foxglove's well-known schemas: opens in Foxglove and Rerun as it is.
 
+mod paint_traces;
+
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
@@ -12,6 +14,9 @@ use foxglove::messages::{
     line_primitive, log,
 };
 use nalgebra::{Isometry3, Point3};
+
+pub use paint_traces::PaintStyle;
+use paint_traces::{PaintTraces, point};
 
 /// The robot at one moment of the flight.
 #[derive(Debug, Clone, Copy)]
@@ -30,14 +35,16 @@ pub struct RobotState {
     pub flow: f64,
 }
 
-/// A mesh with one sRGB colour per vertex.
+/// A mesh with one sRGB colour per vertex when it is painted, and one for all before.
 pub struct ColouredMesh<'a> {
     /// Vertices, metres.
     pub positions: &'a [[f32; 3]],
     /// Triangles.
     pub faces: &'a [[u32; 3]],
-    /// Colours.
+    /// Colours in the end.
     pub colours: &'a [[u8; 3]],
+    /// Colour of all of it in the beginning.
+    pub bare: [u8; 3],
 }
 
 /// What is wrong with writing a recording.
@@ -56,10 +63,12 @@ pub enum RecordingError {
     Encoding(String),
 }
 
-/// Writes the recording: the mesh and the log once, everything else once per state.
+/// Writes the recording: the bare mesh first, then robot, spray and log as they come with the paint as traces, the painted mesh
+/// in the end.
 pub fn save_recording(
     path: &Path,
     mesh: &ColouredMesh,
+    paint: PaintStyle,
     states: &[RobotState],
     log_lines: &[(f64, String)],
 ) -> Result<(), RecordingError> {
@@ -72,12 +81,14 @@ pub fn save_recording(
     let joints = recorder.channel::<JointStates>("/joint_states")?;
     let surface = recorder.channel::<SceneUpdate>("/surface")?;
     let spray = recorder.channel::<SceneUpdate>("/spray")?;
+    let traces = recorder.channel::<SceneUpdate>("/paint")?;
     let text = recorder.channel::<Log>("/log")?;
 
     let start = states.first().map_or(0.0, |m| m.time);
-    recorder.write(surface, start, &mesh_scene(mesh))?;
+    recorder.write(surface, start, &mesh_scene(mesh, None))?;
     recorder.write(spray, start, &robot_scene())?;
     let mut log_lines = log_lines.iter().peekable();
+    let mut paint = PaintTraces::new(paint);
     for state in states {
         while let Some((time, message)) = log_lines.next_if(|(time, _)| *time <= state.time) {
             recorder.write(text, *time, &log_message(*time, message))?;
@@ -112,7 +123,13 @@ pub fn save_recording(
         let states = vec![joint("pan", state.joints[0]), joint("tilt", state.joints[1])];
         recorder.write(joints, state.time, &JointStates { timestamp: stamp, joints: states })?;
         recorder.write(spray, state.time, &spray_scene(state))?;
+        if let Some(trace) = paint.push(state.time, state.hit, state.flow) {
+            recorder.write(traces, state.time, &trace)?;
+        }
     }
+    let end = states.last().map_or(start, |state| state.time);
+    recorder.write(traces, end, &PaintTraces::clear())?;
+    recorder.write(surface, end, &mesh_scene(mesh, Some(mesh.colours)))?;
     recorder.writer.finish().map_err(failed)?;
     Ok(())
 }
@@ -156,11 +173,6 @@ fn quaternion(pose: &Isometry3<f64>) -> Quaternion {
     Quaternion { x: q.i, y: q.j, z: q.k, w: q.w }
 }
 
-fn point(p: impl Into<[f64; 3]>) -> foxglove::messages::Point3 {
-    let [x, y, z] = p.into();
-    foxglove::messages::Point3 { x, y, z }
-}
-
 fn rgb([r, g, b]: [u8; 3]) -> Color {
     Color { r: f64::from(r) / 255.0, g: f64::from(g) / 255.0, b: f64::from(b) / 255.0, a: 1.0 }
 }
@@ -169,12 +181,13 @@ fn scene(entities: Vec<SceneEntity>) -> SceneUpdate {
     SceneUpdate { deletions: Vec::new(), entities }
 }
 
-fn mesh_scene(mesh: &ColouredMesh) -> SceneUpdate {
+/// The mesh in the colours of its vertices, or bare.
+fn mesh_scene(mesh: &ColouredMesh, colours: Option<&[[u8; 3]]>) -> SceneUpdate {
     let triangles = TriangleListPrimitive {
         pose: None,
         points: mesh.positions.iter().map(|p| point(p.map(f64::from))).collect(),
-        color: None,
-        colors: mesh.colours.iter().map(|&c| rgb(c)).collect(),
+        color: colours.is_none().then(|| rgb(mesh.bare)),
+        colors: colours.unwrap_or_default().iter().map(|&c| rgb(c)).collect(),
         indices: mesh.faces.iter().flatten().copied().collect(),
     };
     scene(vec![SceneEntity {
@@ -240,6 +253,7 @@ fn log_message(time: f64, message: &str) -> Log {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use foxglove::Decode as _;
 
     #[test]
     fn the_recording_reads_back() {
@@ -256,9 +270,14 @@ mod tests {
             positions: &[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             faces: &[[0, 1, 2]],
             colours: &[[255, 0, 0]; 3],
+            bare: [200, 180, 150],
         };
-        let states: Vec<RobotState> = (0..5).map(|k| moment(f64::from(k) * 0.5)).collect();
-        save_recording(&path, &mesh, &states, &[(0.0, "take-off".into()), (1.0, "layer 1".into())]).unwrap();
+        let paint = PaintStyle { width: 0.05, max_flow: 2e-7, colour: [40, 30, 20] };
+        // The valve is shut at the fourth of five moments.
+        let flow = |k: i32| if k == 3 { 0.0 } else { 1e-7 };
+        let states: Vec<RobotState> =
+            (0..5).map(|k| RobotState { flow: flow(k), ..moment(f64::from(k) * 0.5) }).collect();
+        save_recording(&path, &mesh, paint, &states, &[(0.0, "take-off".into()), (1.0, "layer 1".into())]).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         std::fs::remove_file(&path).unwrap();
         let mut count = BTreeMap::new();
@@ -268,8 +287,26 @@ mod tests {
             assert!(schema.starts_with("foxglove."), "{schema}");
             *count.entry(message.channel.topic.clone()).or_insert(0) += 1;
         }
-        let expected =
-            [("/joint_states", 5), ("/log", 2), ("/spray", 6), ("/surface", 1), ("/tf", 5), ("/vehicle/pose", 5)];
+        let expected = [
+            ("/joint_states", 5),
+            ("/log", 2),
+            ("/paint", 2),
+            ("/spray", 6),
+            ("/surface", 2),
+            ("/tf", 5),
+            ("/vehicle/pose", 5),
+        ];
         assert_eq!(count, expected.map(|(t, n)| (t.to_string(), n)).into());
+        // One trace of three points, half transparent, then its removal.
+        let of = |topic: &str| -> Vec<SceneUpdate> {
+            let stream = mcap::MessageStream::new(&bytes).unwrap().map(|message| message.unwrap());
+            stream.filter(|m| m.channel.topic == topic).map(|m| SceneUpdate::decode(&*m.data).unwrap()).collect()
+        };
+        let (traces, surfaces) = (of("/paint"), of("/surface"));
+        let line = &traces[0].entities[0].lines[0];
+        assert_eq!((line.points.len(), line.colors.len(), line.colors[0].a), (3, 3, 0.5));
+        assert!(traces[1].entities.is_empty() && traces[1].deletions.len() == 1);
+        let coloured: Vec<usize> = surfaces.iter().map(|s| s.entities[0].triangles[0].colors.len()).collect();
+        assert_eq!(coloured, [0, 3]);
     }
 }

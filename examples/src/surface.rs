@@ -3,7 +3,10 @@
 use nalgebra::{Point3, UnitVector3, Vector3};
 use paint_net::Image;
 use paint_sim::{Texel, TriangleSurface};
-use uv_param::{Chart, CutSettings, Disk, NormalMode, NozzleSettings, RepairReport, Settings, TexelMap};
+use uv_param::{
+    AtlasSettings, Chart, ChartSettings, CutSettings, Disk, Error, NormalMode, NozzleSettings, PackSettings,
+    RepairReport, Settings, TexelMap, Turns,
+};
 
 use crate::mesh_io::TriangleMesh;
 
@@ -22,6 +25,8 @@ pub struct PaintSurface {
     pub world: TriangleSurface,
     /// What was left out of the disk.
     pub repair_report: RepairReport,
+    /// Charts that `chart` consists of: 1 for a disk, more for a surface that is painted all around.
+    pub charts: usize,
 }
 
 /// What is wrong with a mesh as a surface to paint.
@@ -36,11 +41,24 @@ pub enum SurfaceError {
 }
 
 impl PaintSurface {
-    /// Unwraps the largest part of a mesh (metres, z up) into texels of `texel` metres. `progress` is told the share done.
+    /// Unwraps the largest part of a mesh (metres, z up) into texels of `texel` metres; where that is no disk, all parts into several
+    /// charts. `progress` is told the share done.
     pub fn new(mesh: &TriangleMesh, texel: f64, progress: &dyn Fn(f64)) -> Result<Self, SurfaceError> {
         let positions: Vec<[f64; 3]> = mesh.positions.iter().map(|p| p.map(f64::from)).collect();
         let repair = uv_param::Repair { weld: true, split_vertices: true };
-        let (disk, repair_report) = uv_param::largest_disk_with(&positions, &mesh.faces, repair)?;
+        let (disk, repair_report) = match uv_param::largest_disk_with(&positions, &mesh.faces, repair) {
+            Ok(found) => found,
+            // What is no disk is painted all around, in several charts.
+            Err(
+                Error::Closed { .. }
+                | Error::HigherGenus { .. }
+                | Error::NonManifoldEdge { .. }
+                | Error::NotOrientable { .. },
+            ) => {
+                return Self::all_around(&positions, mesh, texel);
+            }
+            Err(error) => return Err(error.into()),
+        };
         let settings = Settings { up: Some([0.0, 0.0, 1.0]), ..Settings::default() };
         let cuts = CutSettings { max_stretch: MAX_STRETCH, ..CutSettings::default() };
         let chart = uv_param::unwrap_with_cuts(&disk, &settings, &cuts, |p| {
@@ -49,7 +67,31 @@ impl PaintSurface {
         })?;
         let texels = TexelMap::new(&chart, texel)?;
         let world = world(&disk, mesh)?;
-        Ok(Self { chart, texels, world, repair_report })
+        Ok(Self { chart, texels, world, repair_report, charts: 1 })
+    }
+
+    /// All parts of a mesh of any topology, as upright charts on one page.
+    fn all_around(positions: &[[f64; 3]], mesh: &TriangleMesh, texel: f64) -> Result<Self, SurfaceError> {
+        let charts = ChartSettings { up: Some([0.0, 0.0, 1.0]), ..ChartSettings::default() };
+        // The footprint of a spray must not reach from chart to chart across the page.
+        let gutter = (2.0 * FOOTPRINT / texel).ceil() as usize;
+        let pack = PackSettings { texel_m: texel, gutter, page: None, turns: Turns::None };
+        let atlas = uv_param::unwrap_atlas(positions, &mesh.faces, &[], &AtlasSettings { charts, pack }, |_| ())?;
+        let chart = atlas.page_chart(0).ok_or(Error::ZeroArea)?;
+        let texels = TexelMap::new(&chart, texel)?;
+        let world = world(chart.disk(), mesh)?;
+        let found = atlas.report();
+        let repair_report = RepairReport {
+            // Nothing is left out.
+            components: 1,
+            unreferenced_vertices: found.unreferenced_vertices,
+            degenerate_faces_dropped: found.degenerate_faces_dropped,
+            duplicate_faces_dropped: found.duplicate_faces_dropped,
+            welded_vertices: found.welded_vertices,
+            reversed_faces: found.reversed_faces,
+            ..RepairReport::default()
+        };
+        Ok(Self { texels, world, repair_report, charts: atlas.charts().len(), chart })
     }
 
     /// The part of the mesh that is painted.

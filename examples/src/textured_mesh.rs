@@ -51,10 +51,9 @@ impl TexturedMesh<'_> {
     /// # Errors
     /// What the file system says.
     pub fn save(&self, folder: &Path, name: &str) -> io::Result<()> {
-        let mut png = Vec::new();
-        self.texture.write_to(&mut io::Cursor::new(&mut png), image::ImageFormat::Png).map_err(io::Error::other)?;
+        let png = self.png()?;
         std::fs::write(folder.join(format!("{name}_texture.png")), &png)?;
-        std::fs::write(folder.join(format!("{name}.glb")), self.glb(&png)?)?;
+        std::fs::write(folder.join(format!("{name}.glb")), self.glb_with(&png)?)?;
         std::fs::write(folder.join(format!("{name}.obj")), self.obj(name))?;
         std::fs::write(
             folder.join(format!("{name}.mtl")),
@@ -76,8 +75,22 @@ impl TexturedMesh<'_> {
         text
     }
 
+    fn png(&self) -> io::Result<Vec<u8>> {
+        let mut png = Vec::new();
+        self.texture.write_to(&mut io::Cursor::new(&mut png), image::ImageFormat::Png).map_err(io::Error::other)?;
+        Ok(png)
+    }
+
+    /// The mesh as a glTF 2.0 binary with the texture in it.
+    ///
+    /// # Errors
+    /// What the encoder says.
+    pub fn glb(&self) -> io::Result<Vec<u8>> {
+        self.glb_with(&self.png()?)
+    }
+
     /// glTF 2.0: y up, the first row of the texture at v = 0.
-    fn glb(&self, png: &[u8]) -> io::Result<Vec<u8>> {
+    fn glb_with(&self, png: &[u8]) -> io::Result<Vec<u8>> {
         let positions: Vec<[f32; 3]> = self.positions.iter().map(|[x, y, z]| [*x, *z, -*y].map(|c| c as f32)).collect();
         let uv: Vec<[f32; 2]> = self.uv.iter().map(|[u, v]| [*u as f32, (1.0 - v) as f32]).collect();
         let (low, high) = positions.iter().fold(([f32::MAX; 3], [f32::MIN; 3]), |(low, high), p| {

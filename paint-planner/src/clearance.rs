@@ -1,5 +1,7 @@
 //! Distance between a moving collision body and the surface, with as few queries as the triangle inequality permits.
 
+use crate::error::Error;
+use crate::target::NozzleState;
 use crate::world::{Surface, Tool, VehicleState};
 use nalgebra::Point3;
 
@@ -20,30 +22,61 @@ pub(crate) struct DistanceCache {
     spheres: Vec<CachedDistance>,
 }
 
-/// Collision checks of one tool against one surface.
+/// Collision checks of one tool against one surface. What a caller's surface or tool answers is checked here: the first answer
+/// that cannot be is kept, and told by [`check_answers`](Self::check_answers).
 pub(crate) struct ClearanceChecker<'a> {
     surface: &'a dyn Surface,
     tool: &'a dyn Tool,
     spheres: Vec<(Point3<f64>, f64)>,
+    fault: Option<Error>,
 }
 
 impl<'a> ClearanceChecker<'a> {
     pub(crate) fn new(surface: &'a dyn Surface, tool: &'a dyn Tool) -> Self {
-        Self { surface, tool, spheres: Vec::new() }
+        Self { surface, tool, spheres: Vec::new(), fault: None }
+    }
+
+    /// The tool's answer for a nozzle state and a heading.
+    pub(crate) fn vehicle(&mut self, nozzle: &NozzleState, heading: f64) -> Option<VehicleState> {
+        let vehicle = self.tool.vehicle(nozzle, heading)?;
+        let [x, y, z] = vehicle.position.into();
+        if [x, y, z, vehicle.heading, vehicle.pan, vehicle.tilt].iter().all(|v| v.is_finite()) {
+            return Some(vehicle);
+        }
+        let at = nozzle.position.into();
+        self.fault.get_or_insert(Error::World { what: "the tool's vehicle state has numbers that are not finite", at });
+        None
+    }
+
+    /// Fails if the surface or the tool has answered what cannot be.
+    pub(crate) fn check_answers(&self) -> Result<(), Error> {
+        self.fault.clone().map_or(Ok(()), Err)
+    }
+
+    /// Distance from a sphere's centre to the surface. What is no distance counts as a touch.
+    fn distance(&mut self, centre: &Point3<f64>, max: f64) -> f64 {
+        let distance = self.surface.distance(centre, max);
+        if distance >= 0.0 {
+            return distance;
+        }
+        let what = "the distance to the surface is negative or not a number";
+        self.fault.get_or_insert(Error::World { what, at: (*centre).into() });
+        0.0
     }
 
     /// Whether every sphere keeps `clearance` from the surface.
     pub(crate) fn is_clear(&mut self, state: &VehicleState, clearance: f64, cache: &mut DistanceCache) -> bool {
         self.spheres.clear();
         self.tool.spheres(state, &mut self.spheres);
-        for (k, &(centre, radius)) in self.spheres.iter().enumerate() {
+        for k in 0..self.spheres.len() {
+            let (centre, radius) = self.spheres[k];
             let need = radius + clearance;
             match cache.spheres.get(k) {
                 Some(last) if last.distance - (centre - last.centre).norm() >= need => continue,
                 Some(last) if last.distance + (centre - last.centre).norm() < need => return false,
                 _ => {}
             }
-            let distance = self.surface.distance(&centre, need + QUERY_MARGIN);
+            let distance = self.distance(&centre, need + QUERY_MARGIN);
             let fresh = CachedDistance { centre, distance };
             if k < cache.spheres.len() {
                 cache.spheres[k] = fresh;
@@ -62,12 +95,13 @@ impl<'a> ClearanceChecker<'a> {
         self.spheres.clear();
         self.tool.spheres(state, &mut self.spheres);
         let mut least = below;
-        for (k, &(centre, radius)) in self.spheres.iter().enumerate() {
+        for k in 0..self.spheres.len() {
+            let (centre, radius) = self.spheres[k];
             if cache.spheres.get(k).is_some_and(|last| last.distance - (centre - last.centre).norm() - radius >= least)
             {
                 continue;
             }
-            let distance = self.surface.distance(&centre, radius + below.max(0.0) + QUERY_MARGIN);
+            let distance = self.distance(&centre, radius + below.max(0.0) + QUERY_MARGIN);
             let fresh = CachedDistance { centre, distance };
             if k < cache.spheres.len() {
                 cache.spheres[k] = fresh;

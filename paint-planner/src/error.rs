@@ -30,6 +30,14 @@ pub enum Error {
         /// The range it has to be in.
         requirement: &'static str,
     },
+    /// The caller's surface or tool answers what cannot be.
+    #[error("{what} (asked at {:.3}, {:.3}, {:.3} m)", .at[0], .at[1], .at[2])]
+    World {
+        /// What is wrong with the answer.
+        what: &'static str,
+        /// The point of the world that was asked about, m.
+        at: [f64; 3],
+    },
     /// No target can be served by this tool on this surface.
     #[error(
         "none of the {count} targets is reachable: check the direction of the normals, the joint limits and the clearance"

@@ -7,7 +7,7 @@ mod viterbi;
 use crate::clearance::{ClearanceChecker, DistanceCache};
 use crate::settings::HeadingSettings;
 use crate::target::NozzleState;
-use crate::world::{Tool, VehicleState};
+use crate::world::VehicleState;
 
 pub(crate) use graph::HeadingGraph;
 
@@ -26,19 +26,18 @@ pub(crate) struct Headings {
 pub(crate) fn choose_headings(
     nozzles: &[Option<NozzleState>],
     linked: &[bool],
-    tool: &dyn Tool,
     checker: &mut ClearanceChecker<'_>,
     clearance: &[f64],
     settings: &HeadingSettings,
 ) -> Headings {
-    let graph = HeadingGraph::build(nozzles, tool, checker, clearance, settings.bins);
+    let graph = HeadingGraph::build(nozzles, checker, clearance, settings.bins);
     let path = viterbi::search(&graph, linked, settings);
     let mut vehicle: Vec<Option<VehicleState>> = vec![None; nozzles.len()];
     let mut joined = vec![false; nozzles.len().saturating_sub(1)];
     for run in path.runs() {
         let on_grid: Vec<f64> = run.clone().map(|i| graph.heading(path.bins[i].unwrap_or(0))).collect();
         let states: Vec<NozzleState> = run.clone().filter_map(|i| nozzles[i]).collect();
-        let smoothed = smooth_off_grid(&states, &on_grid, tool, checker, &clearance[run.clone()], settings);
+        let smoothed = smooth_off_grid(&states, &on_grid, checker, &clearance[run.clone()], settings);
         for (i, state) in run.clone().zip(smoothed) {
             vehicle[i] = state;
         }
@@ -51,7 +50,6 @@ pub(crate) fn choose_headings(
 fn smooth_off_grid(
     states: &[NozzleState],
     on_grid: &[f64],
-    tool: &dyn Tool,
     checker: &mut ClearanceChecker<'_>,
     clearance: &[f64],
     settings: &HeadingSettings,
@@ -69,7 +67,7 @@ fn smooth_off_grid(
             .zip(&headings)
             .zip(clearance)
             .map(|((nozzle, &heading), &clearance)| {
-                tool.vehicle(nozzle, heading).filter(|v| checker.is_clear(v, clearance, &mut cache))
+                checker.vehicle(nozzle, heading).filter(|v| checker.is_clear(v, clearance, &mut cache))
             })
             .collect();
         if vehicles.iter().all(Option::is_some) {
@@ -81,5 +79,5 @@ fn smooth_off_grid(
             }
         }
     }
-    states.iter().zip(&grid).map(|(nozzle, &heading)| tool.vehicle(nozzle, heading)).collect()
+    states.iter().zip(&grid).map(|(nozzle, &heading)| checker.vehicle(nozzle, heading)).collect()
 }

@@ -68,22 +68,24 @@ mod minimum_snap;
 mod nozzle;
 mod plan;
 mod planner;
+mod reach;
 mod route;
 mod settings;
 mod stroke_order;
 mod target;
 mod timing;
 mod trajectory;
+mod visibility;
 mod world;
 
 pub use error::Error;
 pub use nalgebra;
-pub use nozzle::Mode;
-#[cfg(feature = "measure")]
-#[doc(hidden)]
-pub use nozzle::{StageOneProgram, StandardForm};
+#[cfg(feature = "clarabel")]
+pub use nozzle::Clarabel;
+pub use nozzle::{InteriorPoint, Mode, QpOutcome, QpSolver, QuadraticProgram, StandardForm, stroke_program};
 pub use plan::{Plan, PlanReport, Setpoint, Waypoint};
 pub use planner::{OptimalPlanner, Planner, SmoothingPlanner, plan};
+pub use reach::reachable_targets;
 pub use settings::{HeadingSettings, LowessSettings, NozzleSettings, Settings, TimingPolicy, TimingSettings};
 pub use stroke_order::{OrderedStroke, StrokeEnds, StrokeOrder, order_strokes, transit_lower_bound};
 pub use target::{NozzleState, Target, normal_deviation};

@@ -1,14 +1,14 @@
 //! Stage 1: where the nozzle should be for every target (VR paper, Eqs. (1)-(6)).
 
+#[cfg(any(test, feature = "clarabel"))]
+mod clarabel_solver;
 mod initial_state;
 mod interior_point;
-#[cfg(feature = "measure")]
-mod measure;
 mod paper_exact;
+mod qp_solver;
 mod quadratic_program;
 mod sequential;
 mod solution;
-#[cfg(any(test, feature = "measure"))]
 mod standard_form;
 #[cfg(test)]
 mod tests;
@@ -17,11 +17,14 @@ use crate::error::Error;
 use crate::settings::NozzleSettings;
 use crate::target::Target;
 
+#[cfg(feature = "clarabel")]
+pub use clarabel_solver::Clarabel;
 pub(crate) use initial_state::{InitialState, initial_states};
-#[cfg(feature = "measure")]
-pub use measure::StageOneProgram;
+pub use interior_point::InteriorPoint;
+pub use qp_solver::{QpOutcome, QpSolver};
+pub use quadratic_program::QuadraticProgram;
+pub use sequential::stroke_program;
 pub(crate) use solution::Nozzles;
-#[cfg(feature = "measure")]
 pub use standard_form::StandardForm;
 
 /// Which formulation stage 1 solves.
@@ -42,10 +45,11 @@ pub(crate) fn optimise(
     initial_states: &[Option<InitialState>],
     linked: &[bool],
     mode: Mode,
+    solver: &dyn QpSolver,
     settings: &NozzleSettings,
 ) -> Result<Nozzles, Error> {
     match mode {
-        Mode::Sequential => sequential::optimise(targets, initial_states, linked, settings),
-        Mode::PaperExact => paper_exact::optimise(targets, initial_states, linked, settings),
+        Mode::Sequential => sequential::optimise(targets, initial_states, linked, solver, settings),
+        Mode::PaperExact => paper_exact::optimise(targets, initial_states, linked, solver, settings),
     }
 }

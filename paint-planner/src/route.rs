@@ -25,8 +25,8 @@ pub(crate) struct RoutePoint {
     pub(crate) rest: bool,
 }
 
-/// Chains the vehicle states of all targets. `joined[i]`: states i and i+1 follow each other without a flight. With no
-/// checker the flights are straight and unchecked.
+/// Chains the vehicle states of all targets. `joined[i]`: states i and i+1 follow each other without a flight. A flight keeps
+/// the clearance that both of its ends keep; with no checker the flights are straight and unchecked.
 ///
 /// A stroke that no flight leads to is dropped from `vehicle`; an error means that none is left, or that the goal pose
 /// cannot be reached.
@@ -34,6 +34,7 @@ pub(crate) fn build(
     vehicle: &mut [Option<VehicleState>],
     joined: &[bool],
     mut checker: Option<&mut ClearanceChecker<'_>>,
+    clearance: &[f64],
     settings: &Settings,
 ) -> Result<Vec<RoutePoint>, Error> {
     let mut route: Vec<RoutePoint> = Vec::with_capacity(vehicle.len());
@@ -54,7 +55,9 @@ pub(crate) fn build(
         dropping &= follows;
         if let Some(last) = route.last().copied().filter(|_| !(dropping || on_route && follows)) {
             let to = format!("target {i}");
-            match add_transit(&mut route, &last.state, &state, checker.as_deref_mut(), settings, (&name, &to)) {
+            let both = last.target.map_or(clearance[i], |before| clearance[before].min(clearance[i]));
+            let keep = both.max(settings.clearance);
+            match add_transit(&mut route, &last.state, &state, checker.as_deref_mut(), keep, settings, (&name, &to)) {
                 Ok(halts) => rest = halts,
                 Err(error) => (refused, dropping) = (Some(error), true),
             }
@@ -71,7 +74,7 @@ pub(crate) fn build(
         return Err(error);
     }
     if let (Some(state), Some(last)) = (settings.goal, route.last().copied()) {
-        add_transit(&mut route, &last.state, &state, checker, settings, (&name, "the goal pose"))?;
+        add_transit(&mut route, &last.state, &state, checker, settings.clearance, settings, (&name, "the goal pose"))?;
         push(&mut route, state, None, true);
     }
     Ok(route)
@@ -92,6 +95,7 @@ fn add_transit(
     from: &VehicleState,
     to: &VehicleState,
     checker: Option<&mut ClearanceChecker<'_>>,
+    clearance: f64,
     settings: &Settings,
     names: (&str, &str),
 ) -> Result<bool, Error> {
@@ -99,7 +103,7 @@ fn add_transit(
         add_straight(route, from, to, settings.timing.knot_spacing);
         return Ok(false);
     };
-    if legs_are_clear(checker, &[*from, *to], settings.clearance) {
+    if legs_are_clear(checker, &[*from, *to], clearance) {
         add_straight(route, from, to, settings.timing.knot_spacing);
         return Ok(false);
     }
@@ -112,7 +116,7 @@ fn add_transit(
     for retreat in RETREAT_DISTANCES {
         for forward in retreats {
             let corners = [*from, back(from, forward, retreat), back(to, forward, retreat), *to];
-            if legs_are_clear(checker, &corners, settings.clearance) {
+            if legs_are_clear(checker, &corners, clearance) {
                 add_detour(route, &corners);
                 return Ok(true);
             }
@@ -129,7 +133,7 @@ fn add_transit(
                 };
                 let (out, home) = (back(from, forward, retreat), back(to, forward, retreat));
                 let corners = [*from, out, over(from), over(to), home, *to];
-                if legs_are_clear(checker, &corners, settings.clearance) {
+                if legs_are_clear(checker, &corners, clearance) {
                     add_detour(route, &corners);
                     return Ok(true);
                 }

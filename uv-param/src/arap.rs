@@ -38,8 +38,25 @@ pub(crate) fn minimise_arap(
     stopping: &StoppingCriterion,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<usize, Error> {
-    let pinned = disk.loops[0][0] as usize;
-    laplacian.factorize_cotangent(disk, frames, pinned as u32)?;
+    laplacian.factorize_cotangent(disk, frames, pin(disk))?;
+    Ok(iterate_arap(disk, frames, laplacian, uv, stopping, progress))
+}
+
+/// The vertex that stays at the origin.
+fn pin(disk: &Disk) -> u32 {
+    disk.loops[0][0]
+}
+
+/// The iterations of [`minimise_arap`] once the cotangent Laplacian is factorised: they may be gone on with.
+pub(crate) fn iterate_arap(
+    disk: &Disk,
+    frames: &[Frame],
+    laplacian: &mut Laplacian,
+    uv: &mut [[f64; 2]],
+    stopping: &StoppingCriterion,
+    progress: &mut dyn FnMut(Progress),
+) -> usize {
+    let pinned = pin(disk) as usize;
     let area: f64 = frames.iter().map(|f| f.area).sum();
     let size = laplacian.size();
     let mut rotations = vec![[1.0, 0.0]; frames.len()];
@@ -83,7 +100,7 @@ pub(crate) fn minimise_arap(
     for (v, at) in uv.iter_mut().enumerate() {
         *at = [best[v], best[size + v]];
     }
-    Ok(iterations)
+    iterations
 }
 
 /// Nearest rotation of every face, the right-hand side they make, and the energy of `x` (all u, then all v).

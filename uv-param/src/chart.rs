@@ -12,7 +12,7 @@ use crate::distortion::Quality;
 use crate::error::Error;
 use crate::triangle::Frame;
 use locate::Grid;
-pub(crate) use locate::inside;
+pub(crate) use locate::{inside, overlapping_pairs};
 pub use surface_point::SurfacePoint;
 
 /// The layout of a [`Disk`]: one uv point in metres per vertex, `0 <= u <= width`, `0 <= v <= height`. Not
@@ -38,11 +38,16 @@ impl Chart {
         if uv.len() != disk.positions.len() {
             return Err(Error::Length { what: "uv", expected: disk.positions.len(), found: uv.len() });
         }
-        let [width, height] = placement::place(&disk, &mut uv, up)?;
+        let size = placement::place(&disk, &mut uv, up)?;
+        Ok(Self::placed(disk, uv, size, iterations))
+    }
+
+    /// A chart that lies where it is to lie, in a box of this size.
+    pub(crate) fn placed(disk: Disk, uv: Vec<[f64; 2]>, [width, height]: [f64; 2], iterations: usize) -> Self {
         let grid = Grid::new(&uv, &disk.faces, [width, height]);
         let quality = Quality::measure(&disk, &uv, grid.overlap(&uv, &disk.faces), iterations);
         let vertex_normals = normals::vertex_normals(&disk);
-        Ok(Self { disk, uv, width, height, quality, vertex_normals, grid })
+        Self { disk, uv, width, height, quality, vertex_normals, grid }
     }
 
     /// The surface.

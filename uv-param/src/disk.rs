@@ -1,6 +1,5 @@
 //! The checked input: one orientable, manifold, genus-0 surface with a boundary.
 
-mod half_edges;
 mod repair;
 mod surface;
 

@@ -27,6 +27,8 @@ pub struct Quality {
     /// of faces, exact up to rounding. What lies there twice cannot be told apart in a picture; 0 = none. Flipped faces do
     /// not count.
     pub overlap_share: f64,
+    /// Pairs of faces that lie on each other (exact predicate).
+    pub overlap_pairs: usize,
     /// Number of cuts the surface was opened by.
     pub cuts: usize,
     /// Length of the seams they left, on the surface, metres; both sides count once.
@@ -38,7 +40,12 @@ pub struct Quality {
 }
 
 impl Quality {
-    pub(crate) fn measure(disk: &Disk, uv: &[[f64; 2]], overlap: f64, iterations: usize) -> Self {
+    pub(crate) fn measure(
+        disk: &Disk,
+        uv: &[[f64; 2]],
+        (overlap_pairs, overlap): (usize, f64),
+        iterations: usize,
+    ) -> Self {
         let (mut area, mut flat_area, mut arap, mut dirichlet, mut error) = (0.0, 0.0, 0.0, 0.0, 0.0);
         let mut stretches = Vec::with_capacity(disk.faces.len());
         let mut errors = Vec::with_capacity(disk.faces.len());
@@ -69,6 +76,7 @@ impl Quality {
             length_err_mean: error / area,
             length_err_p99: weighted_percentile(&errors, 0.99 * area),
             overlap_share: if flat_area > 0.0 { overlap / flat_area } else { 0.0 },
+            overlap_pairs,
             cuts: disk.cuts(),
             seam_length_m: disk.seam_length(),
             area_m2: area,

@@ -80,6 +80,14 @@ pub enum Error {
         /// What is wrong there and what would be right.
         problem: &'static str,
     },
+    /// A seam that the caller wants runs along no edge.
+    #[error("seam {index} ({}-{}) is no edge of the mesh; list pairs of neighbouring vertices", edge[0], edge[1])]
+    Seam {
+        /// Index into the list of seams.
+        index: usize,
+        /// The two vertices.
+        edge: [u32; 2],
+    },
     /// The flip-free minimiser needs an injective start, and rounding destroyed it.
     #[error("{faces} triangles collapse in the start layout (a long tube?); cut the surface open along the tube")]
     CollapsedStart {

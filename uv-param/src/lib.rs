@@ -6,7 +6,8 @@
 //!
 //! over the uv points `u` and one rotation `R_t` per triangle, where `J_t` is the 2x2 map from the triangle's own plane to the
 //! chart; where that energy folds triangles over, the symmetric Dirichlet energy takes its place, which cannot. Surfaces too
-//! far from flat for one piece, such as busts, are cut open where the distortion is high ([`unwrap_with_cuts`]).
+//! far from flat for one piece, such as busts, are cut open where the distortion is high ([`unwrap_with_cuts`]); surfaces of any
+//! topology are taken apart into few charts, each within a bound of stretch ([`unwrap_atlas`]).
 //!
 //! ```
 //! use uv_param::{Settings, NozzleSettings, TexelMap, largest_disk, nozzle_command, unwrap};
@@ -31,6 +32,7 @@
 //! | Peng et al. 2018, Anderson acceleration of the iteration | [`Arap`] |
 //! | Smith and Schaefer 2015, symmetric Dirichlet energy | [`SymmetricDirichlet`] |
 //! | thesis 8, "cuts along high distortion areas"; Gu et al. 2002, cut to the worst distortion | [`unwrap_with_cuts`], [`Disk::cut`] |
+//! | Cohen-Steiner et al. 2004, regions of similar normals; sewn together within a bound of stretch (ours) | [`unwrap_atlas`] |
 //! | Tutte 1963, barycentric layout | [`Tutte`] |
 //! | a map of your own | [`Parametrizer`], [`unwrap_by`] |
 //! | thesis 8.3.1, box of smallest area by rotating calipers | [`min_area_rectangle`], [`Chart::new`] |
@@ -39,17 +41,21 @@
 //! | thesis Eq. (8.1), `n`, `w_dir`, `w_pos` | [`nozzle_command`] |
 
 mod arap;
+mod atlas;
 mod chart;
 mod clip;
 mod cut;
 mod disk;
 mod distortion;
 mod error;
+mod half_edges;
 mod laplacian;
 mod linear;
 mod min_area_rectangle;
 mod nozzle;
 mod parametrizer;
+mod soup;
+mod surface;
 mod symmetric_dirichlet;
 mod texel;
 mod texture;
@@ -58,6 +64,10 @@ mod tutte;
 mod unwrap;
 
 pub use arap::Arap;
+pub use atlas::{
+    Atlas, AtlasQuality, AtlasSettings, ChartSettings, PackSettings, Page, PageTexels, Placement, TexelKind, Turns,
+    unwrap_atlas,
+};
 pub use chart::{Chart, SurfacePoint};
 pub use cut::{CutSettings, unwrap_with_cuts};
 pub use disk::{Disk, Repair, RepairReport, largest_disk, largest_disk_with};
@@ -67,6 +77,7 @@ pub use min_area_rectangle::{Rectangle, convex_hull, min_area_rectangle};
 pub use nalgebra;
 pub use nozzle::{NormalMode, NozzleCommand, NozzleSettings, nozzle_command};
 pub use parametrizer::{Layout, Parametrizer, Progress, Stage, StoppingCriterion};
+pub use surface::{Surface, SurfaceReport};
 pub use symmetric_dirichlet::SymmetricDirichlet;
 pub use texel::TexelMap;
 pub use texture::{Texture, linear_from_srgb, luminance};

@@ -43,7 +43,12 @@ impl Spd {
             cursor[column as usize] += 1;
         }
         for j in 0..size {
-            rows[columns[j] as usize..columns[j + 1] as usize].sort_unstable();
+            let column = &mut rows[columns[j] as usize..columns[j + 1] as usize];
+            column.sort_unstable();
+            // Two edges between the same two vertices: no triangle can lie between them in a plane.
+            if column.windows(2).any(|pair| pair[0] == pair[1]) {
+                return Err(Error::Singular);
+            }
         }
         let pattern = SymbolicSparseColMatRef::new_checked(size, size, &columns, None, &rows);
         let params = CholeskySymbolicParams { supernodal_flop_ratio_threshold: threshold, ..Default::default() };

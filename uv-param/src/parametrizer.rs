@@ -63,6 +63,8 @@ pub enum Stage {
     Arap,
     /// A cut was made by [`crate::unwrap_with_cuts`]; the iteration is the number of cuts so far.
     Cut,
+    /// A chart of an atlas is finished; the iteration is its number.
+    Chart,
     /// Newton iterations on the symmetric Dirichlet energy.
     SymmetricDirichlet,
 }

@@ -4,6 +4,7 @@
 //! steps past the first collapse keeps none.
 
 mod local;
+mod penalty;
 
 use faer::sparse::linalg::SupernodalThreshold;
 
@@ -14,6 +15,7 @@ use crate::parametrizer::{Layout, Parametrizer, Progress, Stage, StoppingCriteri
 use crate::triangle::{Frame, Jacobian, flips};
 use crate::tutte::tutte_layout;
 use local::Local;
+pub(crate) use penalty::Penalty;
 
 /// Fraction of the step to the first collapse that is tried.
 const COLLAPSE_MARGIN: f64 = 0.9;
@@ -48,21 +50,34 @@ pub(crate) fn minimise_symmetric_dirichlet(
     stopping: &StoppingCriterion,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<usize, Error> {
+    minimise_penalty(disk, frames, uv, Penalty::NONE, stopping, progress, &mut |_| false)
+}
+
+/// The same with a penalty on the worst faces; stops as well when a layout is `enough`.
+pub(crate) fn minimise_penalty(
+    disk: &Disk,
+    frames: &[Frame],
+    uv: &mut Vec<[f64; 2]>,
+    penalty: Penalty,
+    stopping: &StoppingCriterion,
+    progress: &mut dyn FnMut(Progress),
+    enough: &mut dyn FnMut(&[[f64; 2]]) -> bool,
+) -> Result<usize, Error> {
     let faces = flips(uv, &disk.faces);
     if faces > 0 {
         return Err(Error::CollapsedStart { faces });
     }
     let area: f64 = frames.iter().map(|f| f.area).sum();
     let mut system = Newton::new(disk)?;
-    let mut last = energy(disk, frames, uv);
+    let mut last = energy(disk, frames, uv, penalty);
     for iteration in 1..=stopping.iterations {
-        let step = system.step(disk, frames, uv)?;
-        let Some(next) = line_search(disk, frames, uv, &step, last) else { return Ok(iteration - 1) };
+        let step = system.step(disk, frames, uv, penalty)?;
+        let Some(next) = line_search(disk, frames, uv, penalty, &step, last) else { return Ok(iteration - 1) };
         // Over 4, so that an isometry reads 1; progress is measured against what is above it.
         let (before, now) = (last / area / 4.0, next / area / 4.0);
         last = next;
         progress(Progress { stage: Stage::SymmetricDirichlet, iteration, energy: now });
-        if before - now <= stopping.tolerance * (before - 1.0).max(0.0) + f64::EPSILON {
+        if before - now <= stopping.tolerance * (before - 1.0).max(0.0) + f64::EPSILON || enough(uv) {
             return Ok(iteration);
         }
     }
@@ -71,7 +86,14 @@ pub(crate) fn minimise_symmetric_dirichlet(
 
 /// Moves `uv` along a step that lowers the energy enough and flips nothing; returns the new energy, or `None` where rounding
 /// leaves no such step.
-fn line_search(disk: &Disk, frames: &[Frame], uv: &mut Vec<[f64; 2]>, step: &Step, last: f64) -> Option<f64> {
+fn line_search(
+    disk: &Disk,
+    frames: &[Frame],
+    uv: &mut Vec<[f64; 2]>,
+    penalty: Penalty,
+    step: &Step,
+    last: f64,
+) -> Option<f64> {
     let limit = COLLAPSE_MARGIN * first_collapse(disk, uv, &step.direction);
     let moved = |length: f64| -> Vec<[f64; 2]> {
         let along = |(at, d): (&[f64; 2], &[f64])| [at[0] + length * d[0], at[1] + length * d[1]];
@@ -79,7 +101,7 @@ fn line_search(disk: &Disk, frames: &[Frame], uv: &mut Vec<[f64; 2]>, step: &Ste
     };
     // The energy is evaluated in floating point; only the exact predicate promises that nothing flipped.
     let lowers = |trial: &[[f64; 2]], length: f64| {
-        let next = energy(disk, frames, trial);
+        let next = energy(disk, frames, trial, penalty);
         (next <= last + ARMIJO * length * step.slope && flips(trial, &disk.faces) == 0).then_some(next)
     };
     let mut length = limit.min(1.0);
@@ -106,9 +128,11 @@ fn line_search(disk: &Disk, frames: &[Frame], uv: &mut Vec<[f64; 2]>, step: &Ste
     Some(next)
 }
 
-/// `sum A W`.
-fn energy(disk: &Disk, frames: &[Frame], uv: &[[f64; 2]]) -> f64 {
-    disk.faces.iter().zip(frames).map(|(f, frame)| frame.area * jacobian(frame, f, uv).symmetric_dirichlet()).sum()
+/// `sum A phi(W)`.
+fn energy(disk: &Disk, frames: &[Frame], uv: &[[f64; 2]], penalty: Penalty) -> f64 {
+    let density = |w: f64| penalty.derivatives(w)[0];
+    let of_face = |(f, frame): (&[u32; 3], &Frame)| frame.area * density(jacobian(frame, f, uv).symmetric_dirichlet());
+    disk.faces.iter().zip(frames).map(of_face).sum()
 }
 
 fn jacobian(frame: &Frame, face: &[u32; 3], uv: &[[f64; 2]]) -> Jacobian {
@@ -178,7 +202,7 @@ impl Newton {
                 below.extend([(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)]);
             }
         }
-        let spd = Spd::new(2 * disk.positions.len(), &below, SupernodalThreshold::AUTO)?;
+        let spd = Spd::new(2 * disk.positions.len(), &below, SupernodalThreshold::FORCE_SUPERNODAL)?;
         let places = disk
             .faces
             .iter()
@@ -196,11 +220,11 @@ impl Newton {
     }
 
     /// Solves `H p = -gradient` with every triangle's Hessian projected to be semi-definite.
-    fn step(&mut self, disk: &Disk, frames: &[Frame], uv: &[[f64; 2]]) -> Result<Step, Error> {
+    fn step(&mut self, disk: &Disk, frames: &[Frame], uv: &[[f64; 2]], penalty: Penalty) -> Result<Step, Error> {
         self.spd.values.fill(0.0);
         let mut gradient = vec![0.0; 2 * uv.len()];
         for ((face, frame), places) in disk.faces.iter().zip(frames).zip(&self.places) {
-            let local = Local::new(frame, jacobian(frame, face, uv));
+            let local = Local::new(frame, jacobian(frame, face, uv), penalty);
             for (k, &v) in face.iter().enumerate() {
                 let g = local.gradient(k);
                 gradient[2 * v as usize] += g[0];

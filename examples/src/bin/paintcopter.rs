@@ -1,26 +1,50 @@
 //! Paints a surface end to end: unwrap, decide, plan, fly, spray, report.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, ValueEnum};
 use paint_planner::TimingPolicy;
-use paintcopter_examples::design::{Design, Picture};
-use paintcopter_examples::mesh_io::{TriangleMesh, read_mesh};
-use paintcopter_examples::mesh_placement::{MeshPlacement, UpAxis, place_mesh};
-use paintcopter_examples::mission::{Mission, MissionSettings, PainterChoice, save};
+use paintcopter_examples::mesh_placement::UpAxis;
+use paintcopter_examples::mission::{Mission, MissionSettings, PainterChoice, preview, save};
+use paintcopter_examples::mission_file::MissionFile;
 use paintcopter_examples::picture_placement::{PicturePlacement, PlacementMode};
 use paintcopter_examples::projection::Viewpoint;
-use paintcopter_examples::scan_flight::{ScanFlight, save as save_scan_flight};
-use paintcopter_examples::world::rock_wall;
 
 type AnyError = Box<dyn std::error::Error>;
+
+/// What stands in a mission file.
+const MISSION: [&str; 20] = [
+    "mesh",
+    "texture",
+    "scale",
+    "up",
+    "design",
+    "scan",
+    "painter",
+    "layers",
+    "seed",
+    "memory_gib",
+    "texel",
+    "spot",
+    "stand_off",
+    "speed",
+    "max_flow",
+    "place",
+    "rotate",
+    "offset",
+    "size",
+    "project",
+];
 
 /// Paints a surface with a simulated flying robot: unwraps it, decides what to spray, plans and flies the strokes, and shows
 /// what the paint looks like. Without arguments it paints a built-in rock wall.
 #[derive(Parser)]
 #[command(version, after_help = "Example:\n  paintcopter --mesh bust.obj --design stripes --out out/bust")]
 struct Arguments {
+    /// Fly a mission again: mission.toml of an earlier run, or one of your own
+    #[arg(long, value_name = "FILE", conflicts_with_all = MISSION)]
+    mission: Option<PathBuf>,
     /// Surface to paint, OBJ, PLY or OFF; the built-in rock wall if not given
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
@@ -50,6 +74,9 @@ struct Arguments {
     layers: bool,
     #[command(flatten)]
     nozzle: Nozzle,
+    /// Show what it would look like and estimate time, paint and reach; plan and fly nothing
+    #[arg(long)]
+    preview: bool,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/paintcopter")]
     out: PathBuf,
@@ -191,81 +218,60 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), AnyError> {
     let folder = &arguments.out;
+    let mut mission_file = match &arguments.mission {
+        Some(path) => MissionFile::read(path)?,
+        None => arguments.mission_file()?,
+    };
+    if let Some(threads) = arguments.threads {
+        mission_file.settings.threads = usize::from(threads);
+    }
     std::fs::create_dir_all(folder)
         .map_err(|e| format!("{}: cannot be created ({e}): choose another --out", folder.display()))?;
-    let mut settings =
-        MissionSettings { seed: arguments.seed, layered: arguments.layers, ..MissionSettings::default() };
-    settings.memory_gib = arguments.memory_gib;
-    arguments.nozzle.apply(&mut settings);
-    settings.placement = arguments.placement.picture()?;
-    settings.viewpoint = arguments.placement.project;
-    if let Some(threads) = arguments.threads {
-        settings.threads = usize::from(threads);
+    mission_file.write(&folder.join("mission.toml"))?;
+    let decision = mission_file.decide(folder)?;
+    if arguments.preview {
+        let found = preview(&decision, folder)?;
+        eprintln!("{}", found.summary());
+        println!("{}", folder.join("preview.png").display());
+        return Ok(());
     }
-    settings.painter = match arguments.painter {
-        PainterName::Feedback => PainterChoice::Feedback,
-        PainterName::Deconvolution => PainterChoice::Deconvolution,
-        PainterName::Pursuit => PainterChoice::Pursuit,
-    };
-    let mission = match &arguments.mesh {
-        None => {
-            let design = Design::from_name(arguments.design.as_deref().unwrap_or("strata"), arguments.seed)?;
-            let wall = seen(rock_wall(arguments.seed), arguments, settings.threads)?;
-            Mission::run("Rock wall", &wall, &design, settings)?
-        }
-        Some(path) => {
-            let in_file = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
-            let mesh = seen(load(path, arguments)?, arguments, settings.threads).map_err(|e| in_file(&e))?;
-            let design = match &arguments.texture {
-                Some(texture) => Design::Texture(Picture::open(texture)?),
-                None => Design::from_name(arguments.design.as_deref().unwrap_or("stripes"), arguments.seed)?,
-            };
-            let name = path.file_stem().map_or("Mesh".into(), |s| s.to_string_lossy());
-            Mission::run(&name, &mesh, &design, settings).map_err(|e| in_file(&e))?
-        }
-    };
+    let mission = Mission::run(decision).map_err(|error| mission_file.in_mesh(error))?;
     let report = save(&mission, folder)?;
     eprintln!("{}", report.summary());
     println!("{}", folder.join("report.md").display());
     Ok(())
 }
 
-/// The mesh that is painted: the true one, or what the robot finds of it.
-fn seen(mesh: TriangleMesh, arguments: &Arguments, threads: usize) -> Result<TriangleMesh, AnyError> {
-    if !arguments.scan {
-        return Ok(mesh);
+impl Arguments {
+    /// What the options say, as a mission.
+    fn mission_file(&self) -> Result<MissionFile, AnyError> {
+        let mut settings = MissionSettings {
+            seed: self.seed,
+            layered: self.layers,
+            memory_gib: self.memory_gib,
+            placement: self.placement.picture()?,
+            viewpoint: self.placement.project,
+            painter: match self.painter {
+                PainterName::Feedback => PainterChoice::Feedback,
+                PainterName::Deconvolution => PainterChoice::Deconvolution,
+                PainterName::Pursuit => PainterChoice::Pursuit,
+            },
+            ..MissionSettings::default()
+        };
+        self.nozzle.apply(&mut settings);
+        let up = self.up.map(|up| match up {
+            Up::X => UpAxis::X,
+            Up::Y => UpAxis::Y,
+            Up::Z => UpAxis::Z,
+        });
+        Ok(MissionFile {
+            mesh: self.mesh.clone(),
+            scale: self.scale,
+            up,
+            design: self.design.clone(),
+            texture: self.texture.clone(),
+            scan: self.scan,
+            settings,
+        })
     }
-    let scan_flight = ScanFlight::fly(&mesh, arguments.seed, threads)?;
-    save_scan_flight(&scan_flight, &arguments.out)?;
-    Ok(scan_flight.mesh)
-}
-
-/// Reads and places a mesh.
-fn load(path: &Path, arguments: &Arguments) -> Result<TriangleMesh, AnyError> {
-    let mut mesh = read_mesh(path)?;
-    if arguments.texture.is_some() && mesh.uv.is_none() {
-        return Err(format!(
-            "{}: has no texture coordinates for --texture; leave it out or use --design",
-            path.display()
-        )
-        .into());
-    }
-    let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
-    let up = match arguments.up {
-        Some(Up::X) => UpAxis::X,
-        Some(Up::Z) => UpAxis::Z,
-        Some(Up::Y) => UpAxis::Y,
-        None => {
-            if is_obj {
-                UpAxis::Y
-            } else {
-                UpAxis::Z
-            }
-        }
-    };
-    let placed = place_mesh(&mut mesh, MeshPlacement { scale: arguments.scale, up })
-        .map_err(|e| format!("{}: {e}", path.display()))?;
-    let hung = if placed.hung { ", hung like a wall" } else { "" };
-    eprintln!("{}: {} faces, scale {:.4}{hung}", path.display(), mesh.faces.len(), placed.scale);
-    Ok(mesh)
 }

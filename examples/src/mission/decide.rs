@@ -8,7 +8,6 @@ use super::error::MissionError;
 use super::settings::{MissionSettings, PainterChoice};
 use crate::appearance::Appearance;
 use crate::progress::Stage;
-use crate::surface::PaintSurface;
 
 /// Weight of texels out of reach against those in reach.
 const UNPAINTABLE_WEIGHT: f64 = 0.02;
@@ -20,24 +19,15 @@ pub(super) fn kernel(settings: &MissionSettings) -> Result<SprayKernel, paint_ne
     SprayKernel::new(settings.spot / settings.texel, SPRAY_CUT)
 }
 
-/// Layers of sprays for the wanted picture.
+/// Layers of sprays for the wanted picture; no spray lies where `paintable` is false.
 pub(super) fn decide(
-    surface: &PaintSurface,
     wanted: &Image,
     coverage: &Image,
+    paintable: &[bool],
     appearance: &Appearance,
     settings: &MissionSettings,
 ) -> Result<Vec<Painting>, MissionError> {
     let stage = Stage::start("decide");
-    let tilt = settings.ptu.tilt_limits.min.abs().min(settings.ptu.tilt_limits.max);
-    // The planner may lean the spray by its incidence angle to reach what the tilt servo alone cannot.
-    let paintable =
-        surface.paintable((tilt + 0.8 * settings.planner.nozzle.incidence).min(std::f64::consts::FRAC_PI_2));
-    if !paintable.contains(&true) {
-        return Err(MissionError::NothingToPaint(
-            "the surface looks up or down everywhere, or its chart is stretched too far",
-        ));
-    }
     // What nobody can spray must not pull paint from its neighbours; a little weight keeps overspray off it.
     let weight = Image::from_fn(coverage.width(), coverage.height(), |x, y| {
         let share = if paintable[y * coverage.width() + x] { 1.0 } else { UNPAINTABLE_WEIGHT };
@@ -46,7 +36,7 @@ pub(super) fn decide(
     let kernel = kernel(settings)?;
     let problem = PaintProblem::new(wanted)
         .with_weight(&weight)
-        .with_paintable(&paintable)
+        .with_paintable(paintable)
         .with_kernel(&kernel)
         .with_saturation(appearance.ink())
         .with_limits(&settings.limits);

@@ -10,6 +10,14 @@ use crate::surface::SurfaceError;
 /// Why a mission could not be finished.
 #[derive(Debug, thiserror::Error)]
 pub enum MissionError {
+    /// A size that is none.
+    #[error("setting {name} = {value}: it must be a positive number")]
+    Setting {
+        /// The field of the settings.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+    },
     /// The mesh is not a surface that can be painted.
     #[error(transparent)]
     Surface(#[from] SurfaceError),

@@ -5,12 +5,12 @@ use paint_planner::{Plan, normal_deviation};
 use paint_sim::flight::{FlightSample, FlightStatistics};
 use paint_sim::spray::QUANTUM;
 use paint_sim::{FlightLog, TriangleSurface};
-use ptu_kinematics::Joints;
 
 use super::error::MissionError;
 use super::fly::LayerFlight;
 use super::inspect::Inspection;
 use super::plan::path_length;
+use super::rehearse::gap;
 use super::run::Mission;
 use super::settings::MissionSettings;
 use crate::adapters::Robot;
@@ -24,7 +24,7 @@ const LIMIT_STEP: f64 = 0.02;
 
 /// All figures, with those of the inspection.
 pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, MissionError> {
-    let quality = mission.surface.chart.quality();
+    let quality = mission.decision.surface.chart.quality();
     let deviations = normal_deviations(mission);
     let flown = statistics(&mission.flights, |f| &f.flight);
     let slam = statistics(&mission.flights, |f| &f.slam);
@@ -37,22 +37,25 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
     let kilograms = |quanta: u64| quanta as f64 * QUANTUM * DENSITY;
     let unaccounted = (i128::from(balance.emitted) - i128::from(on_texels) - i128::from(balance.overspray)).abs();
 
-    let canvas = mission.layers.last().map_or(&mission.wanted, |l| &l.ink);
-    let filtered = ideal(&mission.wanted, mission.settings.spot / mission.settings.texel)?;
+    let canvas = mission.decision.layers.last().map_or(&mission.decision.wanted, |l| &l.ink);
+    let filtered = ideal(&mission.decision.wanted, mission.decision.settings.spot / mission.decision.settings.texel)?;
     let painted = mission.painted_ink();
-    let weight = Some(&mission.coverage);
+    let weight = Some(&mission.decision.coverage);
+    let in_reach = mission.decision.coverage_in_reach();
+    let in_reach = Some(&in_reach);
     Ok(Report {
         version: env!("CARGO_PKG_VERSION"),
-        surface: mission.name.clone(),
-        seed: mission.settings.seed,
-        surface_area_m2: mission.surface.disk().area(),
-        faces: mission.surface.disk().faces().len(),
+        surface: mission.decision.name.clone(),
+        seed: mission.decision.settings.seed,
+        surface_area_m2: mission.decision.surface.disk().area(),
+        faces: mission.decision.surface.disk().faces().len(),
         uv_flips: quality.flips,
         uv_symmetric_dirichlet: quality.symmetric_dirichlet,
         normal_deviation_mean_m: deviations.mean,
         normal_deviation_max_m: deviations.max,
         smoothing_normal_deviation_mean_m: deviations.smoothing_mean,
         unreachable_normal_share: deviations.unreachable,
+        reach_share: mission.decision.share_in_reach(),
         unreachable_paint_share: mission.share_out_of_reach(),
         hit_error_rms_m: flown.hit_error_rms,
         hit_error_p95_m: flown.hit_error_p95,
@@ -71,19 +74,29 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         paint_deposited_kg: kilograms(on_texels),
         paint_overspray_kg: kilograms(balance.overspray),
         mass_balance_relative: unaccounted as f64 / balance.emitted.max(1) as f64,
-        psnr_canvas_db: metrics::psnr(canvas, &mission.wanted, weight)?,
-        psnr_ideal_db: metrics::psnr(&filtered, &mission.wanted, weight)?,
-        psnr_painted_db: metrics::psnr(&painted, &mission.wanted, weight)?,
-        ssim_canvas: metrics::ssim(canvas, &mission.wanted, weight)?,
-        ssim_painted: metrics::ssim(&painted, &mission.wanted, weight)?,
+        psnr_canvas_db: metrics::psnr(canvas, &mission.decision.wanted, weight)?,
+        psnr_ideal_db: metrics::psnr(&filtered, &mission.decision.wanted, weight)?,
+        psnr_canvas_in_reach_db: metrics::psnr(canvas, &mission.decision.wanted, in_reach)?,
+        psnr_ideal_in_reach_db: metrics::psnr(&filtered, &mission.decision.wanted, in_reach)?,
+        psnr_painted_db: metrics::psnr(&painted, &mission.decision.wanted, weight)?,
+        ssim_canvas: metrics::ssim(canvas, &mission.decision.wanted, weight)?,
+        ssim_painted: metrics::ssim(&painted, &mission.decision.wanted, weight)?,
         ciede2000_mean: mean(mission.colour_difference().into_iter().flatten()),
-        collisions: mission.flights.iter().map(|f| collisions(&mission.robot, &mission.surface.world, &f.flight)).sum(),
-        limit_violations: mission.flights.iter().map(|f| limit_violations(&f.plan, &f.flight, &mission.settings)).sum(),
+        collisions: mission
+            .flights
+            .iter()
+            .map(|f| collisions(&mission.decision.robot, &mission.decision.surface.world, &f.flight))
+            .sum(),
+        limit_violations: mission
+            .flights
+            .iter()
+            .map(|f| limit_violations(&f.plan, &f.flight, &mission.decision.settings))
+            .sum(),
         scan_error_mean_m: inspection.mesh_error,
         slam_ate_rms_m: inspection.slam_ate,
-        layers: mission.layers.len(),
+        layers: mission.decision.layers.len(),
         strokes: mission.flights.iter().map(|f| f.route.strokes).sum(),
-        wall_s: mission.started.elapsed().as_secs_f64(),
+        wall_s: mission.decision.started.elapsed().as_secs_f64(),
         peak_rss_bytes: peak_resident_bytes(),
     })
 }
@@ -94,9 +107,9 @@ fn normal_deviations(mission: &Mission) -> Deviations {
         for (k, target) in f.route.targets.iter().enumerate().filter(|(_, t)| t.dose > 0.0) {
             total += 1;
             let heading = 0.0;
-            let joints = mission.robot.chain.inverse_unlimited(&target.point, &-target.normal, heading).joints;
+            let joints = mission.decision.robot.chain.inverse_unlimited(&target.point, &-target.normal, heading).joints;
             // Any heading will do: only the tilt is decided by the normal.
-            if !mission.settings.ptu.tilt_limits.contains(joints.tilt) {
+            if !mission.decision.settings.ptu.tilt_limits.contains(joints.tilt) {
                 out_of_reach += 1;
                 continue;
             }
@@ -124,14 +137,7 @@ fn open_time(plan: &Plan) -> f64 {
 
 /// Moments of a flight at which the robot overlaps the surface.
 fn collisions(robot: &Robot, surface: &TriangleSurface, log: &FlightLog) -> usize {
-    let mut spheres = Vec::new();
-    let touches = |sample: &&FlightSample| {
-        spheres.clear();
-        let joints = Joints { pan: sample.pan_tilt[0], tilt: sample.pan_tilt[1] };
-        robot.spheres_at(&sample.world_from_body, &joints, &mut spheres);
-        spheres.iter().any(|(centre, radius)| paint_sim::Surface::distance(surface, centre, *radius) < *radius)
-    };
-    log.samples.iter().step_by(COLLISION_STRIDE).filter(touches).count()
+    log.samples.iter().step_by(COLLISION_STRIDE).filter(|sample| gap(robot, surface, sample, 0.0) < 0.0).count()
 }
 
 /// Moments at which the plan exceeds speed or acceleration, or the flown gun its joint limits.

@@ -1,15 +1,15 @@
 //! Flying it, and what the paint does meanwhile.
 
-use nalgebra::{Point3, Vector3};
 use paint_planner::Plan;
-use paint_sim::flight::{HoseModel, Localisation};
+use paint_sim::flight::Localisation;
 use paint_sim::{Film, FlightLog, FlightSettings, SprayModel};
 
 use super::decide::SPRAY_CUT;
 use super::error::MissionError;
 use super::plan::Planned;
 use super::settings::MissionSettings;
-use crate::adapters::{PlanReference, Robot, ServoPanTilt};
+use super::simulated_flight::{flight_settings, fly_plan};
+use crate::adapters::Robot;
 use crate::progress::Stage;
 use crate::surface::PaintSurface;
 use crate::targets::Route;
@@ -89,26 +89,13 @@ pub(super) fn fly_three(
     settings: &MissionSettings,
     layer: u64,
 ) -> Result<[FlightLog; 3], MissionError> {
-    let usual = FlightSettings {
-        hose: Some(hose(plan)),
-        seed: settings.seed.wrapping_mul(0x9E37_79B9).wrapping_add(layer),
-        ..FlightSettings::default()
-    };
+    let usual = flight_settings(plan, settings.seed.wrapping_mul(0x9E37_79B9).wrapping_add(layer));
     let variants = [
         usual,
         FlightSettings { localisation: Localisation::slam_7cm(), ..usual },
         FlightSettings { ptu_locked: true, ..usual },
     ];
-    let one = |flight: &FlightSettings| -> Result<FlightLog, MissionError> {
-        let reference = PlanReference {
-            plan,
-            chain: &robot.chain,
-            gun_length: settings.ptu.tilt_from_tip.norm(),
-            stand_off: settings.planner.nozzle.stand_off,
-        };
-        let mut gun = ServoPanTilt::new(robot.chain.clone(), settings.servo)?;
-        Ok(paint_sim::fly(&reference, &mut gun, &surface.world, flight)?)
-    };
+    let one = |flight: &FlightSettings| fly_plan(plan, surface, robot, settings, flight);
     if settings.threads < 2 {
         let [a, b, c] = variants.map(|v| one(&v));
         return Ok([a?, b?, c?]);
@@ -118,23 +105,6 @@ pub(super) fn fly_three(
         let [a, b, c] = handles.map(|h| h.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
         Ok([a?, b?, c?])
     })
-}
-
-/// The paint hose: from the ground behind the middle of the flight, long enough for all of it.
-fn hose(plan: &Plan) -> HoseModel {
-    let positions = || plan.waypoints.iter().map(|w| w.state.position);
-    let count = plan.waypoints.len() as f64;
-    let middle: Vector3<f64> = positions().map(|p| p.coords).sum::<Vector3<f64>>() / count;
-    let back: Vector3<f64> = plan
-        .waypoints
-        .iter()
-        .map(|w| Vector3::new(w.state.heading.cos(), w.state.heading.sin(), 0.0))
-        .sum::<Vector3<f64>>()
-        / count;
-    let base = Point3::new(middle.x - back.x, middle.y - back.y, 0.0);
-    let farthest = positions().map(|p| (p - base).norm()).fold(0.0, f64::max);
-    // A tenth of slack, and a metre for wind and overshoot.
-    HoseModel { base, length: 1.1 * farthest + 1.0, line_density: 0.12, base_on_floor: true }
 }
 
 #[cfg(test)]

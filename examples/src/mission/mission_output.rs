@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use nalgebra::{Point3, UnitVector3, Vector3};
+use nalgebra::Point3;
 use paint_planner::normal_deviation;
+use paint_sim::Hit;
 use paint_sim::flight::FlightSample;
-use paint_sim::{Camera, Frame, Hit, Lights, render};
 use tsdf_hash::Mesh;
 
 use super::error::MissionError;
@@ -14,18 +14,15 @@ use super::inspect::inspect;
 use super::run::Mission;
 use super::shading::shading;
 use super::trajectory_table::trajectory_table;
+use super::view::{camera, picture_of, view};
 use crate::mesh_io::{PlyMesh, write_ply};
 use crate::pictures::{Panel, Polyline, Rgb, Scene, save_curves, save_error_map, save_scene};
 use crate::progress::Stage;
-use crate::recording::{ColouredMesh, RobotState, save_recording};
+use crate::recording::{ColouredMesh, PaintStyle, RobotState, save_recording};
 use crate::textured_mesh::{TexturedMesh, with_gutter};
 
-/// Width and height of the rendered views, pixels.
-const VIEW: (u32, u32) = (1500, 940);
 /// Colour beside the surface in the texture pictures.
 const BACKGROUND: [u8; 3] = [255, 255, 255];
-/// Share of the view that the surface fills.
-const FILL: f64 = 0.86;
 /// Seconds between two states of the recording.
 const RECORDING_STEP: f64 = 0.1;
 /// Points in a curve: more than the picture has columns shows nothing more.
@@ -38,8 +35,9 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
     save_textures(mission, folder)?;
     stage.share(0.2);
     let colours = vertex_colours(mission);
-    let positions: Vec<[f32; 3]> = mission.surface.disk().positions().iter().map(|p| p.map(|c| c as f32)).collect();
-    let faces = mission.surface.disk().faces();
+    let positions: Vec<[f32; 3]> =
+        mission.decision.surface.disk().positions().iter().map(|p| p.map(|c| c as f32)).collect();
+    let faces = mission.decision.surface.disk().faces();
     let ply = folder.join("surface.ply");
     write_ply(&ply, &PlyMesh { positions: &positions, normals: None, colours: &colours, faces })
         .map_err(unwritable(&ply))?;
@@ -52,7 +50,7 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
     save_mcap(
         mission,
         folder,
-        &ColouredMesh { positions: &positions, faces: mission.surface.disk().faces(), colours: &colours },
+        &ColouredMesh { positions: &positions, faces, colours: &colours, bare: mission.decision.appearance.srgb(0.0) },
     )?;
     stage.done(&folder.display().to_string());
 
@@ -72,38 +70,50 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
 }
 
 fn save_textures(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
-    let (width, height) = (mission.wanted.width(), mission.wanted.height());
+    let (width, height) = (mission.decision.wanted.width(), mission.decision.wanted.height());
     let painted = mission.painted_depth();
     let picture = |depth: &dyn Fn(usize) -> f64| {
-        let pixels = (0..width * height)
-            .map(|k| if mission.coverage.data()[k] > 0.0 { mission.appearance.srgb(depth(k)) } else { BACKGROUND });
+        let pixels = (0..width * height).map(|k| {
+            if mission.decision.coverage.data()[k] > 0.0 {
+                mission.decision.appearance.srgb(depth(k))
+            } else {
+                BACKGROUND
+            }
+        });
         let picture = Rgb::from_pixels(width, height, pixels);
         picture.enlarged((1400 / width as u32).clamp(1, 8))
     };
-    let ink = mission.appearance.ink();
-    picture(&|k| ink.inverse(mission.wanted.data()[k])).save(&folder.join("wanted.png"))?;
+    let ink = mission.decision.appearance.ink();
+    picture(&|k| ink.inverse(mission.decision.wanted.data()[k])).save(&folder.join("wanted.png"))?;
     picture(&|k| painted.data()[k]).save(&folder.join("painted.png"))?;
-    save_error_map(&folder.join("error.png"), width, &mission.colour_difference(), (mission.settings.texel, "m"))?;
+    save_error_map(
+        &folder.join("error.png"),
+        width,
+        &mission.colour_difference(),
+        (mission.decision.settings.texel, "m"),
+    )?;
     Ok(())
 }
 
 /// Colour of every vertex of the disk: the paint on the texel below it.
 fn vertex_colours(mission: &Mission) -> Vec<[u8; 3]> {
     let painted = mission.painted_depth();
-    let texel = mission.settings.texel;
+    let texel = mission.decision.settings.texel;
     let (width, height) = (painted.width(), painted.height());
     let at = |uv: &[f64; 2]| {
         let x = ((uv[0] / texel) as usize).min(width - 1);
         let y = (((height as f64 * texel - uv[1]) / texel) as usize).min(height - 1);
-        mission.appearance.srgb(painted.at(x, y))
+        mission.decision.appearance.srgb(painted.at(x, y))
     };
-    mission.surface.chart.uv().iter().map(at).collect()
+    mission.decision.surface.chart.uv().iter().map(at).collect()
 }
 
 fn save_views(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
     let painted = mission.painted_depth();
-    let corners: Vec<Point3<f64>> = mission.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
-    let frame = view(mission, &camera(mission, &corners)?, &painted)?;
+    let corners: Vec<Point3<f64>> =
+        mission.decision.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
+    let shade = |hit: &Hit| shading(&mission.decision, &painted, hit);
+    let frame = view(&mission.decision, &camera(&mission.decision, &corners)?, &shade)?;
     picture_of(&frame).save(&folder.join("painted_view.png"))?;
 
     // Of layers the base coat alone: all of them on top of each other hide the surface and one another.
@@ -112,8 +122,8 @@ fn save_views(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
         base.flight.samples.iter().step_by(10).map(of).collect()
     };
     let vehicle = path(&|s| s.world_from_body.translation.vector.into());
-    let camera = camera(mission, &[corners, vehicle.clone()].concat())?;
-    let frame = view(mission, &camera, &painted)?;
+    let camera = camera(&mission.decision, &[corners, vehicle.clone()].concat())?;
+    let frame = view(&mission.decision, &camera, &shade)?;
     let project = |p: &Point3<f64>| {
         let c = camera.world_from_camera.inverse_transform_point(p);
         (c.z > 0.05).then(|| (camera.fx * c.x / c.z + camera.cx, camera.fy * c.y / c.z + camera.cy, c.z))
@@ -125,53 +135,6 @@ fn save_views(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
     let scene = Scene { picture: picture_of(&frame), depth: &frame.depth, project: &project };
     save_scene(&folder.join("path.png"), scene, &lines)?;
     Ok(())
-}
-
-/// The painted surface in the light of a sun behind the camera's shoulder.
-fn view(mission: &Mission, camera: &Camera, painted: &paint_net::Image) -> Result<Frame, MissionError> {
-    let away = -(camera.world_from_camera.rotation * Vector3::z());
-    let side = Vector3::z().cross(&away);
-    let lights = Lights {
-        towards_sun: UnitVector3::new_normalize(away + 0.75 * Vector3::z() + 0.35 * side),
-        sun: [0.95, 0.9, 0.8],
-        ambient: [0.28, 0.30, 0.34],
-        ..Lights::default()
-    };
-    let shade = |hit: &Hit| shading(mission, painted, hit);
-    Ok(render(&mission.surface.world, camera, &shade, &lights, 2, mission.settings.threads)?)
-}
-
-/// A camera on the surface's mean side that has all the points in view.
-fn camera(mission: &Mission, points: &[Point3<f64>]) -> Result<Camera, MissionError> {
-    let (low, high) = points
-        .iter()
-        .fold((Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)), |(l, h), p| (l.inf(&p.coords), h.sup(&p.coords)));
-    let centre = (low + high) / 2.0;
-    let facing = mission.surface.facing();
-    let flat = Vector3::new(facing.x, facing.y, 0.0);
-    let front: Vector3<f64> = flat.try_normalize(0.1).unwrap_or(-Vector3::x());
-    let side: Vector3<f64> = Vector3::z().cross(&front);
-    let direction = (front + side * 0.45 + Vector3::z() * 0.28).normalize();
-    let up = Vector3::z();
-    // Step back until everything fits, then look at the middle of what is seen.
-    let (mut target, mut distance) = (centre, 0.8 * (high - low).norm());
-    for _ in 0..40 {
-        let eye = Point3::from(target + direction * distance);
-        let camera = Camera::looking_at(&eye, &Point3::from(target), &up, 0.8, VIEW)?;
-        let seen = points.iter().map(|p| camera.world_from_camera.inverse_transform_point(p));
-        let (mut left, mut right, mut top, mut bottom) = (f64::MAX, f64::MIN, f64::MAX, f64::MIN);
-        for p in seen {
-            let (u, v) = (p.x / p.z.max(0.1), p.y / p.z.max(0.1));
-            (left, right) = (left.min(u), right.max(u));
-            (top, bottom) = (top.min(v), bottom.max(v));
-        }
-        let (half_width, half_height) = (camera.cx / camera.fx, camera.cy / camera.fy);
-        let fill = ((right - left) / (2.0 * half_width)).max((bottom - top) / (2.0 * half_height));
-        let shift = Vector3::new(0.5 * (left + right), 0.5 * (top + bottom), 0.0) * distance;
-        target += camera.world_from_camera.rotation * shift;
-        distance *= 1.0 + 0.7 * (fill / FILL - 1.0).clamp(-0.5, 0.5);
-    }
-    Ok(Camera::looking_at(&Point3::from(target + direction * distance), &Point3::from(target), &up, 0.8, VIEW)?)
 }
 
 fn save_angles(mission: &Mission, path: &Path) -> Result<(), MissionError> {
@@ -224,7 +187,13 @@ fn save_mcap(mission: &Mission, folder: &Path, mesh: &ColouredMesh) -> Result<()
         }));
         start += f.plan.trajectory.duration();
     }
-    save_recording(&folder.join("mission.mcap"), mesh, &states, &log_lines)?;
+    let settings = &mission.decision.settings;
+    let paint = PaintStyle {
+        width: 2.0 * settings.spot,
+        max_flow: settings.planner.timing.max_flow,
+        colour: mission.decision.appearance.srgb(1.0),
+    };
+    save_recording(&folder.join("mission.mcap"), mesh, paint, &states, &log_lines)?;
     Ok(())
 }
 
@@ -232,12 +201,14 @@ fn save_mcap(mission: &Mission, folder: &Path, mesh: &ColouredMesh) -> Result<()
 fn save_textured_mesh(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
     let painted = mission.painted_depth();
     let (width, height) = (painted.width(), painted.height());
-    let pixel = |k: usize| (mission.coverage.data()[k] > 0.0).then(|| mission.appearance.srgb(painted.data()[k]));
-    let extent = [width, height].map(|side| side as f64 * mission.settings.texel);
+    let pixel = |k: usize| {
+        (mission.decision.coverage.data()[k] > 0.0).then(|| mission.decision.appearance.srgb(painted.data()[k]))
+    };
+    let extent = [width, height].map(|side| side as f64 * mission.decision.settings.texel);
     let mesh = TexturedMesh {
-        positions: mission.surface.disk().positions(),
-        faces: mission.surface.disk().faces(),
-        uv: mission.surface.chart.uv().iter().map(|uv| [uv[0] / extent[0], uv[1] / extent[1]]).collect(),
+        positions: mission.decision.surface.disk().positions(),
+        faces: mission.decision.surface.disk().faces(),
+        uv: mission.decision.surface.chart.uv().iter().map(|uv| [uv[0] / extent[0], uv[1] / extent[1]]).collect(),
         texture: with_gutter(width, height, (0..width * height).map(pixel).collect()),
     };
     mesh.save(folder, "painted").map_err(unwritable(&folder.join("painted.*")))
@@ -250,8 +221,4 @@ fn write(path: &Path, text: &str) -> Result<(), MissionError> {
 fn unwritable(path: &Path) -> impl FnOnce(std::io::Error) -> MissionError {
     let path = path.display().to_string();
     |source| MissionError::Unwritable { path, source }
-}
-
-fn picture_of(frame: &Frame) -> Rgb {
-    Rgb::from_pixels(frame.width as usize, frame.height as usize, frame.colour.iter().copied())
 }

@@ -1,12 +1,11 @@
 //! How to fly it: strokes onto the surface, nozzle and vehicle along them.
 
-use std::time::Instant;
-
 use paint_net::{Painting, StrokeSettings, boustrophedon};
-use paint_planner::{Error, OptimalPlanner, Plan, Planner, Settings, SmoothingPlanner};
+use paint_planner::{Error, Plan, Planner, Settings, SmoothingPlanner, Target};
 
 use super::decide::kernel;
 use super::error::MissionError;
+use super::rehearse::rehearsed_plan;
 use super::settings::MissionSettings;
 use crate::adapters::{MeshSurface, Robot};
 use crate::progress::Stage;
@@ -21,6 +20,10 @@ pub(super) struct Planned {
     pub(super) seconds: f64,
     /// Paint of layers that no pose of the robot can spray at all, m³.
     pub(super) unreachable_paint: f64,
+    /// Targets that keep more clearance since the rehearsal in wind.
+    pub(super) kept_off: usize,
+    /// Targets given up in the rehearsal.
+    pub(super) left_bare: usize,
 }
 
 /// Plans every layer; each flight begins where the one before ends.
@@ -31,29 +34,35 @@ pub(super) fn plan(
     settings: &MissionSettings,
 ) -> Result<Planned, MissionError> {
     let stage = Stage::start("plan");
-    let kernel = kernel(settings)?;
     let wall = MeshSurface(&surface.world);
-    let mut planned = Planned { layers: Vec::with_capacity(layers.len()), seconds: 0.0, unreachable_paint: 0.0 };
+    let mut planned = Planned {
+        layers: Vec::with_capacity(layers.len()),
+        seconds: 0.0,
+        unreachable_paint: 0.0,
+        kept_off: 0,
+        left_bare: 0,
+    };
     for (k, layer) in layers.iter().enumerate() {
         stage.share(k as f64 / layers.len() as f64);
-        let strokes = boustrophedon(&layer.sprays, &StrokeSettings::default())?;
         let from = planned.layers.last().and_then(|(route, ..)| route.targets.last().copied());
-        let route = route(surface, &strokes, &kernel, settings.limits.spray_spacing, from.as_ref(), &settings.planner)?;
+        let route = layer_route(layer, surface, settings, from.as_ref())?;
         if route.targets.len() < 2 {
             planned.unreachable_paint += route.lost;
             continue;
         }
         let start = planned.layers.last().and_then(|(_, plan, _)| plan.waypoints.last()).map(|w| w.state);
         let here = Settings { start, ..settings.planner.clone() };
-        let clock = Instant::now();
-        let plan = match OptimalPlanner::default().plan(&route.targets, &wall, robot, &here) {
-            Err(Error::NothingReachable { .. }) => {
+        let rehearsed = match rehearsed_plan(&route.targets, surface, robot, settings, &here) {
+            Err(MissionError::Planner(Error::NothingReachable { .. })) => {
                 planned.unreachable_paint += route.paint() + route.lost;
                 continue;
             }
-            plan => plan?,
+            rehearsed => rehearsed?,
         };
-        planned.seconds += clock.elapsed().as_secs_f64();
+        planned.seconds += rehearsed.seconds;
+        planned.kept_off += rehearsed.kept_off;
+        planned.left_bare += rehearsed.left_bare;
+        let plan = rehearsed.plan;
         let smoothing = SmoothingPlanner.plan(&route.targets, &wall, robot, &settings.planner)?;
         planned.layers.push((route, plan, smoothing));
     }
@@ -61,8 +70,24 @@ pub(super) fn plan(
         return Err(MissionError::OutOfReach { percent: 100.0 });
     }
     let metres: f64 = planned.layers.iter().map(|(_, plan, _)| path_length(plan)).sum();
-    stage.done(&format!("{metres:.0} m of path, {:.1} ms per metre", 1e3 * planned.seconds / metres));
+    let rehearsed = match (planned.kept_off, planned.left_bare) {
+        (0, 0) => String::new(),
+        (kept, 0) => format!(", {kept} targets kept farther off after a rehearsal in wind"),
+        (kept, bare) => format!(", {kept} targets kept farther off after a rehearsal in wind, {bare} left bare"),
+    };
+    stage.done(&format!("{metres:.0} m of path, {:.1} ms per metre{rehearsed}", 1e3 * planned.seconds / metres));
     Ok(planned)
+}
+
+/// The strokes of a layer on the surface, in the order in which they are flown after `from`.
+pub(super) fn layer_route(
+    layer: &Painting,
+    surface: &PaintSurface,
+    settings: &MissionSettings,
+    from: Option<&Target>,
+) -> Result<Route, MissionError> {
+    let strokes = boustrophedon(&layer.sprays, &StrokeSettings::default())?;
+    Ok(route(surface, &strokes, &kernel(settings)?, settings.limits.spray_spacing, from, &settings.planner)?)
 }
 
 /// Length of the vehicle's trajectory, metres.

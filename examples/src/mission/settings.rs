@@ -2,16 +2,20 @@
 
 use paint_net::Limits;
 use ptu_kinematics::{PtuSettings, ServoSettings};
+use serde::{Deserialize, Serialize};
 
+use super::error::MissionError;
 use crate::picture_placement::PicturePlacement;
 use crate::projection::Viewpoint;
 
 /// Everything a mission can be told.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct MissionSettings {
     /// Seed of the design, the wind and the localisation errors.
     pub seed: u64,
-    /// Worker threads.
+    /// Worker threads. Not part of a mission file: results do not depend on it.
+    #[serde(skip)]
     pub threads: usize,
     /// Size of a texel, metres. Default 1.25 cm (Paper IV, section 4).
     pub texel: f64,
@@ -39,7 +43,8 @@ pub struct MissionSettings {
 }
 
 /// The painters to choose from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum PainterChoice {
     /// The network with feedback from its canvas.
     Feedback,
@@ -66,6 +71,19 @@ impl Default for MissionSettings {
             ptu: PtuSettings::default(),
             servo: ServoSettings::default(),
         }
+    }
+}
+
+impl MissionSettings {
+    /// Refuses sizes that are none. What belongs to a library, the library checks.
+    pub(super) fn check(&self) -> Result<(), MissionError> {
+        let sizes = [("texel", self.texel), ("spot", self.spot), ("memory_gib", self.memory_gib)];
+        for (name, value) in sizes.into_iter().chain(self.placement.size.map(|size| ("placement.size", size))) {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(MissionError::Setting { name, value });
+            }
+        }
+        Ok(())
     }
 }
 

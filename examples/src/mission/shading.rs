@@ -3,23 +3,36 @@
 use paint_sim::{Hit, Shading};
 use uv_param::SurfacePoint;
 
-use super::run::Mission;
+use super::decision::Decision;
 
 /// Shading of a point of the world: painted and smooth on the disk, grey elsewhere.
-pub(super) fn shading(mission: &Mission, painted: &paint_net::Image, hit: &Hit) -> Shading {
-    let Some(face) = mission.surface.disk().faces().get(hit.face as usize) else {
+pub(super) fn shading(decision: &Decision, painted: &paint_net::Image, hit: &Hit) -> Shading {
+    let Some(face) = decision.surface.disk().faces().get(hit.face as usize) else {
         return Shading { albedo: [0.4; 3], normal: hit.normal };
     };
-    let uv = mission.surface.chart.uv();
+    let [u, v] = place(decision, *face, hit).map(|m| m / decision.settings.texel);
+    let (x, y) = (u - 0.5, painted.height() as f64 - v - 0.5);
     let [a, b] = hit.barycentric;
-    let mix =
-        |k: usize| (1.0 - a - b) * uv[face[0] as usize][k] + a * uv[face[1] as usize][k] + b * uv[face[2] as usize][k];
-    let texel = mission.settings.texel;
-    let x = mix(0) / texel - 0.5;
-    let y = (painted.height() as f64 * texel - mix(1)) / texel - 0.5;
-    let albedo = mission.appearance.linear(bilinear(painted, x, y)).map(|c| c as f32);
+    let albedo = decision.appearance.linear(bilinear(painted, x, y)).map(|c| c as f32);
     let at = SurfacePoint { face: hit.face, barycentric: [1.0 - a - b, a, b] };
-    Shading { albedo, normal: mission.surface.chart.smooth_normal(at).into_inner() }
+    Shading { albedo, normal: decision.surface.chart.smooth_normal(at).into_inner() }
+}
+
+/// The texel that a ray hits; `None` beside the disk.
+pub(super) fn texel_at(decision: &Decision, hit: &Hit) -> Option<usize> {
+    let face = decision.surface.disk().faces().get(hit.face as usize)?;
+    let [u, v] = place(decision, *face, hit).map(|m| m / decision.settings.texel);
+    let (width, height) = (decision.surface.width(), decision.surface.height());
+    let (x, y) = ((u as usize).min(width - 1), ((height as f64 - v).max(0.0) as usize).min(height - 1));
+    Some(y * width + x)
+}
+
+/// Where on the chart a ray hits, metres from its lower left corner.
+fn place(decision: &Decision, face: [u32; 3], hit: &Hit) -> [f64; 2] {
+    let uv = decision.surface.chart.uv();
+    let [a, b] = hit.barycentric;
+    let [p, q, r] = face.map(|i| uv[i as usize]);
+    [0, 1].map(|k| (1.0 - a - b) * p[k] + a * q[k] + b * r[k])
 }
 
 fn bilinear(image: &paint_net::Image, x: f64, y: f64) -> f64 {

@@ -25,16 +25,20 @@ pub(super) fn surface() -> PaintSurface {
     PaintSurface::new(&mesh, 0.0125, &|_| ()).unwrap()
 }
 
-/// A plan for a wave of one metre, its normals tilted to both sides.
-pub(super) fn plan(surface: &PaintSurface, robot: &Robot, settings: &MissionSettings) -> Plan {
+/// A wave of one metre, its normals tilted to both sides.
+pub(super) fn targets() -> Vec<Target> {
     let target = |i: i32| {
         let s = 0.025 * f64::from(i);
         let normal = Vector3::new(-1.0, 0.4 * (5.0 * s).sin(), 0.3 * (4.0 * s).cos());
         let point = Point3::new(0.0, 0.5 - s, 2.0 + 0.1 * (3.0 * s).sin());
         Target { point, normal: UnitVector3::new_normalize(normal), dose: 1e-6, time: None }
     };
-    let targets: Vec<Target> = (0..40).map(target).collect();
-    paint_planner::plan(&targets, &MeshSurface(&surface.world), robot, &settings.planner).unwrap()
+    (0..40).map(target).collect()
+}
+
+/// A plan for the wave.
+pub(super) fn plan(surface: &PaintSurface, robot: &Robot, settings: &MissionSettings) -> Plan {
+    paint_planner::plan(&targets(), &MeshSurface(&surface.world), robot, &settings.planner).unwrap()
 }
 
 /// The plan, and its flight with motion capture.

@@ -16,6 +16,7 @@ use super::files::write_json;
 use super::ink::{ink_of, ssim};
 use super::job::Job;
 use super::progress_strip::save_progress_strip;
+use crate::picture_file::open_upright;
 use crate::pictures::{Rgb, save_error_map};
 use crate::report::check_finite;
 
@@ -86,7 +87,8 @@ pub struct ColourFigures {
 /// Reads a picture of any size and depth; transparency shows the white wall.
 pub fn read_picture(path: &Path) -> Result<ColourImage, PaintImageError> {
     let unreadable = |why: String| PaintImageError::Unreadable { path: path.display().to_string(), why };
-    let picture = image::open(path).map_err(|e| unreadable(format!("cannot be read as a picture ({e})")))?.to_rgba32f();
+    let picture =
+        open_upright(path).map_err(|e| unreadable(format!("cannot be read as a picture ({e})")))?.to_rgba32f();
     let over_white = |p: &image::Rgba<f32>| {
         let [r, g, b, a] = p.0.map(f64::from);
         [r, g, b].map(|v| (a * v + 1.0 - a).clamp(0.0, 1.0))

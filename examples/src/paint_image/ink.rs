@@ -5,12 +5,13 @@ use std::path::Path;
 use paint_net::{Error, Image, metrics};
 
 use super::error::PaintImageError;
+use crate::picture_file::open_upright;
 use crate::pictures::Rgb;
 
 /// Reads a picture of any size and depth as ink: dark is paint, transparency shows the white wall.
 pub fn read_ink(path: &Path) -> Result<Image, PaintImageError> {
     let unreadable = |why: String| PaintImageError::Unreadable { path: path.display().to_string(), why };
-    let picture = image::open(path).map_err(|e| unreadable(format!("cannot be read as a picture ({e})")))?;
+    let picture = open_upright(path).map_err(|e| unreadable(format!("cannot be read as a picture ({e})")))?;
     let rgba = picture.to_rgba32f();
     let ink = rgba.pixels().map(|p| {
         let [r, g, b, a] = p.0.map(f64::from);

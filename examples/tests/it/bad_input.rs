@@ -42,8 +42,6 @@ fn meshes_that_are_no_surface_are_refused() {
     mesh("nan.obj", &format!("{SQUARE}v nan 0 0\nf 1 2 3\nf 1 3 5\n"), &["not finite"]);
     mesh("point.obj", "v 1 1 1\nv 1 1 1\nv 1 1 1\nf 1 2 3\n", &["no extent"]);
     mesh("line.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", &["area"]);
-    mesh("fin.obj", &format!("{SQUARE}v 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 2 5\n"), &["edge"]);
-    mesh("closed.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n", &["closed"]);
     mesh("broken.ply", "ply\nformat ascii 1.0\nelement vertex 2\n", &["broken.ply"]);
 }
 

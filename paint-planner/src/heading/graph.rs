@@ -3,7 +3,6 @@
 use crate::angle::wrap;
 use crate::clearance::{ClearanceChecker, DistanceCache};
 use crate::target::NozzleState;
-use crate::world::Tool;
 use nalgebra::Point3;
 use std::f64::consts::TAU;
 
@@ -25,10 +24,9 @@ pub(crate) struct HeadingGraph {
 }
 
 impl HeadingGraph {
-    /// Asks the tool for every pair; state `i` has to keep `clearance[i]` from the surface, m. Neighbouring states of one bin share their distance queries.
+    /// Asks for every pair; state `i` has to keep `clearance[i]` from the surface, m. Neighbouring states of one bin share their distance queries.
     pub(crate) fn build(
         nozzles: &[Option<NozzleState>],
-        tool: &dyn Tool,
         checker: &mut ClearanceChecker<'_>,
         clearance: &[f64],
         bins: usize,
@@ -40,7 +38,9 @@ impl HeadingGraph {
             let heading = graph.heading(bin);
             let mut cache = DistanceCache::default();
             for (i, nozzle) in nozzles.iter().enumerate() {
-                let Some(vehicle) = nozzle.as_ref().and_then(|nozzle| tool.vehicle(nozzle, heading)) else { continue };
+                let Some(vehicle) = nozzle.as_ref().and_then(|nozzle| checker.vehicle(nozzle, heading)) else {
+                    continue;
+                };
                 if checker.is_clear(&vehicle, clearance[i], &mut cache) {
                     graph.nodes[i * bins + bin] = Some(Node { position: vehicle.position, pan: vehicle.pan });
                 }

@@ -6,7 +6,7 @@
 //! `sin psi1` vanishes.
 
 use super::initial_state::InitialState;
-use super::interior_point::solve;
+use super::qp_solver::QpSolver;
 use super::quadratic_program::QuadraticProgram;
 use super::solution::Nozzles;
 use crate::angle::nearest_equivalent;
@@ -24,6 +24,7 @@ pub(super) fn optimise(
     targets: &[Target],
     initial_states: &[Option<InitialState>],
     linked: &[bool],
+    solver: &dyn QpSolver,
     settings: &NozzleSettings,
 ) -> Result<Nozzles, Error> {
     let indices: Vec<usize> = (0..targets.len()).filter(|&i| initial_states[i].is_some()).collect();
@@ -42,7 +43,7 @@ pub(super) fn optimise(
     for _ in 0..settings.iterations {
         // Jacobi: every neighbour is the one of the previous iteration, so the states decouple.
         let program = build(&chosen, &states, &stroke_links, settings);
-        let outcome = solve(&program, &mut states)?;
+        let outcome = solver.solve(&program, &mut states)?;
         result.rounds += 1;
         result.steps += outcome.steps;
         result.slack = outcome.slack;

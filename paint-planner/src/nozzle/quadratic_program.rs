@@ -10,10 +10,12 @@ pub(crate) struct Row {
     pub(crate) b: f64,
 }
 
-/// `min 1/2 x'Hx + g'x` over states `x_i = (p_i, u_i)` in R^5, with H block tridiagonal, subject to hard rows on `p_i`
-/// and soft rows on `w_i = soft_map_i x_i` that may be exceeded at `penalty` per unit.
+/// `min 1/2 x'Hx + g'x` over states `x_i = (p_i, u_i)` in R^5, with H block tridiagonal, subject to hard rows on the positions
+/// `p_i` and soft rows on `w_i = soft_map_i x_i` (the aim beside the target) that may be exceeded at `penalty` per unit.
+///
+/// [`StandardForm`](crate::StandardForm) has its matrices.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct QuadraticProgram {
+pub struct QuadraticProgram {
     pub(crate) hessian: BlockTridiagonal<5>,
     pub(crate) gradient: Vec<Vector5<f64>>,
     pub(crate) soft_map: Vec<Matrix2x5<f64>>,

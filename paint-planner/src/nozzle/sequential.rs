@@ -1,7 +1,7 @@
 //! The whole path as one program, re-linearised a few times (ours, after VR paper, Eqs. (2)-(6)).
 
-use super::initial_state::{InitialState, tangents};
-use super::interior_point::solve;
+use super::initial_state::{InitialState, initial_states, tangents};
+use super::qp_solver::QpSolver;
 use super::quadratic_program::QuadraticProgram;
 use super::solution::Nozzles;
 use crate::error::Error;
@@ -49,6 +49,7 @@ pub(super) fn optimise(
     targets: &[Target],
     initial_states: &[Option<InitialState>],
     linked: &[bool],
+    solver: &dyn QpSolver,
     settings: &NozzleSettings,
 ) -> Result<Nozzles, Error> {
     let indices: Vec<usize> = (0..targets.len()).filter(|&i| initial_states[i].is_some()).collect();
@@ -62,7 +63,7 @@ pub(super) fn optimise(
     for round in 1..=settings.rounds {
         let program = build(&points, &stroke_links, settings);
         let mut x = start_of(&points);
-        let outcome = solve(&program, &mut x)?;
+        let outcome = solver.solve(&program, &mut x)?;
         result.rounds = round;
         result.steps += outcome.steps;
         result.slack = outcome.slack;
@@ -91,16 +92,13 @@ fn start_of(points: &[Linearisation]) -> Vec<Vector5<f64>> {
     points.iter().map(|c| Vector5::new(c.position.x, c.position.y, c.position.z, 0.0, 0.0)).collect()
 }
 
-/// The first of the programs that [`optimise`] solves for one stroke, and where it starts.
-#[cfg(any(test, feature = "measure"))]
-pub(super) fn first_program(
-    targets: &[Target],
-    initial_states: &[Option<InitialState>],
-    settings: &NozzleSettings,
-) -> (QuadraticProgram, Vec<Vector5<f64>>) {
+/// The first of the programs that stage 1 solves for one stroke, and where it starts: for measuring a [`QpSolver`] by itself.
+/// Targets that no permitted incidence reaches are left out.
+pub fn stroke_program(targets: &[Target], settings: &NozzleSettings) -> (QuadraticProgram, Vec<Vector5<f64>>) {
     let linearised =
         |(s, t): (&Option<InitialState>, &Target)| s.map(|s| Linearisation::new(*t, s.state.position, s.tangents));
-    let points: Vec<Linearisation> = initial_states.iter().zip(targets).filter_map(linearised).collect();
+    let points: Vec<Linearisation> =
+        initial_states(targets, settings).iter().zip(targets).filter_map(linearised).collect();
     let links = vec![true; points.len().saturating_sub(1)];
     (build(&points, &links, settings), start_of(&points))
 }

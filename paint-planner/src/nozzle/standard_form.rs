@@ -24,7 +24,8 @@ pub struct StandardForm {
 }
 
 impl StandardForm {
-    pub(super) fn new(program: &QuadraticProgram) -> Self {
+    /// The matrices of a program.
+    pub fn new(program: &QuadraticProgram) -> Self {
         let (count, hard, soft) = (program.gradient.len(), program.hard_rows, program.soft_rows);
         let (states, per_state) = (5 * count, hard + soft);
         let variables = states + soft * count;

@@ -1,12 +1,10 @@
 //! The interior-point method against Clarabel, and stage 1 against a known optimum.
 
-use super::quadratic_program::QuadraticProgram;
-use super::standard_form::StandardForm;
-use super::{Mode, initial_states, interior_point, optimise};
+use super::clarabel_solver::Clarabel;
+use super::quadratic_program::{QuadraticProgram, Row};
+use super::{InteriorPoint, Mode, QpSolver, initial_states, optimise};
 use crate::settings::NozzleSettings;
 use crate::target::{Target, normal_deviation};
-use clarabel::algebra::CscMatrix;
-use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT};
 use nalgebra::{Matrix2x5, Matrix5, Point3, UnitVector3, Vector2, Vector3, Vector5};
 
 /// Uniform numbers in [-1, 1).
@@ -43,28 +41,6 @@ fn random_program(count: usize, random: &mut Random) -> QuadraticProgram {
     program
 }
 
-/// Clarabel's answer to the same program.
-fn by_clarabel(program: &QuadraticProgram) -> Vec<f64> {
-    let form = StandardForm::new(program);
-    let matrix = |rows: usize, triplets: &[(usize, usize, f64)]| {
-        let (r, (c, v)): (Vec<usize>, (Vec<usize>, Vec<f64>)) = triplets.iter().map(|&(r, c, v)| (r, (c, v))).unzip();
-        CscMatrix::new_from_triplets(rows, form.variables, r, c, v)
-    };
-    let (p, a) = (matrix(form.variables, &form.p), matrix(form.b.len(), &form.a));
-    let cones = [NonnegativeConeT(form.b.len())];
-    let settings = DefaultSettings {
-        verbose: false,
-        tol_gap_abs: 1e-13,
-        tol_gap_rel: 1e-13,
-        tol_feas: 1e-12,
-        max_iter: 200,
-        ..DefaultSettings::default()
-    };
-    let mut solver = DefaultSolver::new(&p, &form.q, &a, &form.b, &cones, settings).unwrap();
-    solver.solve();
-    solver.solution.x[..form.states].to_vec()
-}
-
 #[test]
 fn the_interior_point_method_agrees_with_clarabel() {
     let mut random = Random(11);
@@ -73,11 +49,12 @@ fn the_interior_point_method_agrees_with_clarabel() {
         let count = 1 + 3 * round;
         let program = random_program(count, &mut random);
         let mut x = vec![Vector5::zeros(); count];
-        let outcome = interior_point::solve(&program, &mut x).unwrap();
+        let outcome = InteriorPoint.solve(&program, &mut x).unwrap();
         relaxed += usize::from(outcome.slack > 1e-3);
-        for (k, expected) in by_clarabel(&program).into_iter().enumerate() {
-            assert!((x[k / 5][k % 5] - expected).abs() < 1e-6, "round {round}");
-        }
+        let mut expected = vec![Vector5::zeros(); count];
+        let general = Clarabel::default().solve(&program, &mut expected).unwrap();
+        assert!((outcome.slack - general.slack).abs() < 1e-6, "round {round}");
+        assert!(x.iter().zip(&expected).all(|(x, expected)| (x - expected).amax() < 1e-6), "round {round}");
     }
     assert!(relaxed > 10);
 }
@@ -104,7 +81,7 @@ fn three_targets_of_known_optimum() {
         ..NozzleSettings::default()
     };
     let initial_states = initial_states(&targets, &settings);
-    let result = optimise(&targets, &initial_states, &[true; 2], Mode::Sequential, &settings).unwrap();
+    let result = optimise(&targets, &initial_states, &[true; 2], Mode::Sequential, &InteriorPoint, &settings).unwrap();
     let expected = [[-0.1, 0.0, 0.0111922], [-0.0905293, 0.0, 0.0559610], [-0.1, 0.0, 0.0271922]];
     let deviations = [0.011192, 0.017549, 0.007192];
     for i in 0..3 {
@@ -120,7 +97,7 @@ fn the_answer_is_a_minimum_of_the_cost_as_written() {
     let targets: Vec<Target> = (0..12).map(|i| target(0.025 * f64::from(i), 0.2 * random.next())).collect();
     let settings = NozzleSettings { cb: 0.0, cc: 1e-9, rounds: 10, ..NozzleSettings::default() };
     let initial_states = initial_states(&targets, &settings);
-    let result = optimise(&targets, &initial_states, &[true; 11], Mode::Sequential, &settings).unwrap();
+    let result = optimise(&targets, &initial_states, &[true; 11], Mode::Sequential, &InteriorPoint, &settings).unwrap();
     let p: Vec<Point3<f64>> = result.states.iter().map(|s| s.unwrap().position).collect();
     let cost = |p: &[Point3<f64>]| {
         let smooth: f64 = p.windows(2).map(|pair| settings.ca * (pair[1] - pair[0]).norm_squared()).sum();
@@ -146,10 +123,29 @@ fn cut_links_leave_the_strokes_alone() {
     let targets: Vec<Target> = (0..6).map(|i| target(if i < 3 { 0.02 } else { 1.0 } * f64::from(i), 0.1)).collect();
     let settings = NozzleSettings::default();
     let linked = [true, true, false, true, true];
-    let whole = optimise(&targets, &initial_states(&targets, &settings), &linked, Mode::Sequential, &settings).unwrap();
-    let part =
-        optimise(&targets[..3], &initial_states(&targets[..3], &settings), &[true; 2], Mode::Sequential, &settings);
+    let whole =
+        optimise(&targets, &initial_states(&targets, &settings), &linked, Mode::Sequential, &InteriorPoint, &settings)
+            .unwrap();
+    let part = optimise(
+        &targets[..3],
+        &initial_states(&targets[..3], &settings),
+        &[true; 2],
+        Mode::Sequential,
+        &InteriorPoint,
+        &settings,
+    );
     for (a, b) in whole.states[..3].iter().zip(part.unwrap().states) {
         assert!((a.unwrap().position - b.unwrap().position).norm() < 1e-6);
     }
+}
+
+#[test]
+fn programs_without_a_point_are_refused_by_both_solvers() {
+    let mut program = random_program(2, &mut Random(3));
+    // The first state shall lie on both sides of a plane.
+    program.rows[0] = Row { a: Vector3::x(), b: -1.0 };
+    program.rows[1] = Row { a: -Vector3::x(), b: -1.0 };
+    let mut states = vec![Vector5::zeros(); 2];
+    assert!(InteriorPoint.solve(&program, &mut states.clone()).is_err());
+    assert!(Clarabel::default().solve(&program, &mut states).is_err());
 }

@@ -4,25 +4,30 @@ use super::assemble::{ClearanceViolation, UntimedPlan, assemble_plan};
 use super::strategy::Planner;
 use crate::clearance::ClearanceChecker;
 use crate::error::Error;
-use crate::nozzle::{Mode, Nozzles, initial_states, optimise};
+use crate::nozzle::{InteriorPoint, Mode, Nozzles, QpSolver, initial_states, optimise};
 use crate::plan::Plan;
 use crate::settings::Settings;
 use crate::target::{Target, check, stroke_links};
+use crate::visibility::drop_hidden;
 use crate::world::{Surface, Tool};
 use crate::{heading, route};
 
-/// How much nearer than the target a ray from the nozzle may hit, m, before the target counts as hidden: surfaces are
-/// meshes, targets need not lie exactly on them.
-const OCCLUSION_TOLERANCE: f64 = 0.03;
-
 /// The planner of the VR paper.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct OptimalPlanner {
+#[derive(Debug, Clone, Copy)]
+pub struct OptimalPlanner<'a> {
     /// Formulation of stage 1.
     pub mode: Mode,
+    /// Who solves its quadratic programs.
+    pub solver: &'a dyn QpSolver,
 }
 
-impl Planner for OptimalPlanner {
+impl Default for OptimalPlanner<'static> {
+    fn default() -> Self {
+        Self { mode: Mode::default(), solver: &InteriorPoint }
+    }
+}
+
+impl Planner for OptimalPlanner<'_> {
     fn name(&self) -> &'static str {
         match self.mode {
             Mode::Sequential => "optimal",
@@ -37,22 +42,46 @@ impl Planner for OptimalPlanner {
         tool: &dyn Tool,
         settings: &Settings,
     ) -> Result<Plan, Error> {
+        self.plan_with_clearance(targets, &vec![settings.clearance; targets.len()], surface, tool, settings)
+    }
+}
+
+impl OptimalPlanner<'_> {
+    /// The same with a clearance of its own for every target, m, in the place of `settings.clearance`: what a rehearsal in wind
+    /// has shown to be needed. A flight between two strokes keeps what both of its ends keep.
+    ///
+    /// # Errors
+    /// As [`Planner::plan`]; [`Error::Target`] where a clearance is missing, negative or not a number.
+    pub fn plan_with_clearance(
+        &self,
+        targets: &[Target],
+        clearance: &[f64],
+        surface: &dyn Surface,
+        tool: &dyn Tool,
+        settings: &Settings,
+    ) -> Result<Plan, Error> {
         settings.check()?;
         check(targets)?;
+        let usable = |index: &usize| clearance.get(*index).is_some_and(|c| *c >= 0.0);
+        if let Some(index) = (0..targets.len()).find(|index| !usable(index)) {
+            return Err(Error::Target { index, what: "needs a clearance of its own that is not negative" });
+        }
         let linked = stroke_links(targets, settings.break_length);
         let initial_states = initial_states(targets, &settings.nozzle);
-        let mut nozzles = optimise(targets, &initial_states, &linked, self.mode, &settings.nozzle)?;
-        drop_occluded(targets, &mut nozzles, surface);
+        let mut nozzles = optimise(targets, &initial_states, &linked, self.mode, self.solver, &settings.nozzle)?;
+        drop_hidden(targets, &mut nozzles.states, surface)?;
         let mut checker = ClearanceChecker::new(surface, tool);
-        let mut clearance = vec![settings.clearance; targets.len()];
+        let mut clearance = clearance.to_vec();
         let mut attempt = 0;
         loop {
             let mut headings =
-                heading::choose_headings(&nozzles.states, &linked, tool, &mut checker, &clearance, &settings.heading);
+                heading::choose_headings(&nozzles.states, &linked, &mut checker, &clearance, &settings.heading);
+            checker.check_answers()?;
             if headings.vehicle.iter().all(Option::is_none) {
                 return Err(Error::NothingReachable { count: targets.len() });
             }
-            let route = route::build(&mut headings.vehicle, &headings.joined, Some(&mut checker), settings)?;
+            let route =
+                route::build(&mut headings.vehicle, &headings.joined, Some(&mut checker), &clearance, settings)?;
             let untimed =
                 UntimedPlan { nozzles: nozzles.clone(), vehicle: headings.vehicle, heading_cost: headings.cost, route };
             // A curve that cuts a corner its waypoints keep clear of is bound to every one of them.
@@ -60,6 +89,7 @@ impl Planner for OptimalPlanner {
             if attempt == 0 && !violations.is_empty() {
                 (plan, violations) = assemble_plan(&untimed, targets, &mut checker, settings, true)?;
             }
+            checker.check_answers()?;
             if violations.is_empty() {
                 return Ok(plan);
             }
@@ -97,20 +127,6 @@ fn raise_clearance(plan: &Plan, violation: &ClearanceViolation, clearance: &mut 
             if !on_stroke || clearance[neighbour] > MAX_CLEARANCE {
                 nozzles.states[neighbour] = None;
             }
-        }
-    }
-}
-
-/// Targets that something stands in front of are not served.
-fn drop_occluded(targets: &[Target], nozzles: &mut Nozzles, surface: &dyn Surface) {
-    for (target, state) in targets.iter().zip(&mut nozzles.states) {
-        let hidden = state.is_some_and(|nozzle| {
-            let distance = (target.point - nozzle.position).norm();
-            let hit = surface.cast(&nozzle.position, &nozzle.direction, distance);
-            hit.is_some_and(|hit| hit.distance < distance - OCCLUSION_TOLERANCE)
-        });
-        if hidden {
-            *state = None;
         }
     }
 }

@@ -44,7 +44,7 @@ impl Planner for SmoothingPlanner {
         if vehicle.iter().all(Option::is_none) {
             return Err(Error::NothingReachable { count: targets.len() });
         }
-        let route = route::build(&mut vehicle, &linked, None, settings)?;
+        let route = route::build(&mut vehicle, &linked, None, &vec![settings.clearance; targets.len()], settings)?;
         let states = nozzles.into_iter().zip(&vehicle).map(|(n, v)| v.map(|_| n)).collect();
         let nozzles = Nozzles { states, rounds: 0, steps: 0, slack: 0.0 };
         let untimed = UntimedPlan { nozzles, vehicle, heading_cost: 0.0, route };

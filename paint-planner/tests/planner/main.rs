@@ -2,3 +2,4 @@
 
 mod plans;
 mod walls;
+mod worlds;

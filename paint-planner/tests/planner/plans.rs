@@ -233,7 +233,9 @@ fn paper_exact_mode_depends_on_the_world_frame_and_the_sequential_mode_does_not(
     let plan = |mode: Mode, turn: f64| {
         let wall = Wall { turn, ..Wall::bumpy(0.1) };
         let targets = wall.rows(1.0, 1, 0.2);
-        let plan = OptimalPlanner { mode }.plan(&targets, &wall, &Arm::default(), &Settings::default()).unwrap();
+        let plan = OptimalPlanner { mode, ..OptimalPlanner::default() }
+            .plan(&targets, &wall, &Arm::default(), &Settings::default())
+            .unwrap();
         let back =
             Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -turn));
         let deviations = plan.nozzle.iter().zip(&targets).map(|(n, t)| normal_deviation(t, &n.position));
@@ -336,5 +338,19 @@ fn hidden_targets_are_not_served() {
         // Near the edge the nozzle may look past it.
         let edge = (target.point.y - 0.7).abs().min((target.point.y - 1.3).abs());
         assert!(edge < 0.06 || *reachable != before_the_board(&target.point), "{}", target.point);
+    }
+}
+
+#[cfg(feature = "clarabel")]
+#[test]
+fn plans_do_not_depend_on_who_solves_their_programs() {
+    use paint_planner::Clarabel;
+    let wall = Wall::bumpy(0.1);
+    let targets = wall.rows(1.0, 1, 0.2);
+    let general = OptimalPlanner { solver: &Clarabel::default(), ..OptimalPlanner::default() };
+    let own = optimal(&targets, &wall, &Settings::default()).unwrap();
+    let other = general.plan(&targets, &wall, &Arm::default(), &Settings::default()).unwrap();
+    for (a, b) in own.nozzle.iter().zip(&other.nozzle) {
+        assert!((a.position - b.position).norm() < 1e-6 && a.direction.angle(&b.direction) < 1e-5);
     }
 }

@@ -10,17 +10,30 @@ pub(super) struct Grid {
     columns: usize,
     rows: usize,
     cells_per_metre: f64,
+    /// Lower left corner of the cells.
+    corner: [f64; 2],
     starts: Vec<u32>,
     faces: Vec<u32>,
 }
 
 impl Grid {
     /// About as many cells as faces.
-    pub(super) fn new(uv: &[[f64; 2]], faces: &[[u32; 3]], [width, height]: [f64; 2]) -> Self {
-        let cells_per_metre = (faces.len() as f64 / (width * height)).sqrt().min(faces.len() as f64 / width);
+    pub(super) fn new(uv: &[[f64; 2]], faces: &[[u32; 3]], size: [f64; 2]) -> Self {
+        let mut grid = Self::sized(faces.len(), size);
+        grid.fill(uv, faces);
+        grid
+    }
+
+    fn sized(faces: usize, [width, height]: [f64; 2]) -> Self {
+        let cells_per_metre = (faces as f64 / (width * height)).sqrt().min(faces as f64 / width);
         let columns = (width * cells_per_metre).ceil().max(1.0) as usize;
         let rows = (height * cells_per_metre).ceil().max(1.0) as usize;
-        let mut grid = Self { columns, rows, cells_per_metre, starts: vec![0; columns * rows + 1], faces: Vec::new() };
+        let starts = vec![0; columns * rows + 1];
+        Self { columns, rows, cells_per_metre, corner: [0.0; 2], starts, faces: Vec::new() }
+    }
+
+    fn fill(&mut self, uv: &[[f64; 2]], faces: &[[u32; 3]]) {
+        let (columns, rows, grid) = (self.columns, self.rows, self);
         // A face that is not counter-clockwise covers nothing: where the chart folds, the faces around it lie there too.
         let upright: Vec<bool> = faces.iter().map(|f| orientation(f.map(|v| uv[v as usize])) > 0.0).collect();
         let boxes: Vec<[u32; 4]> = faces.iter().map(|f| grid.cell_box(f.map(|v| uv[v as usize]))).collect();
@@ -41,7 +54,6 @@ impl Grid {
                 cursor[cell] += 1;
             }
         }
-        grid
     }
 
     fn cell_box(&self, corners: [[f64; 2]; 3]) -> [u32; 4] {
@@ -52,14 +64,16 @@ impl Grid {
 
     /// Column and row of a point, the nearest cell for points outside.
     fn cell(&self, at: [f64; 2]) -> [usize; 2] {
-        let index = |x: f64, count: usize| ((x * self.cells_per_metre) as usize).min(count - 1);
-        [index(at[0], self.columns), index(at[1], self.rows)]
+        let index =
+            |k: usize, count: usize| (((at[k] - self.corner[k]) * self.cells_per_metre) as usize).min(count - 1);
+        [index(0, self.columns), index(1, self.rows)]
     }
 
-    /// Sum of the areas that pairs of faces without a common edge share: 0 for a chart that does not overlap itself.
-    pub(super) fn overlap(&self, uv: &[[f64; 2]], faces: &[[u32; 3]]) -> f64 {
+    /// How many pairs of faces without a common edge lie on each other, and the area that they share: 0 for a chart that does
+    /// not overlap itself.
+    pub(super) fn overlap(&self, uv: &[[f64; 2]], faces: &[[u32; 3]]) -> (usize, f64) {
         let corners = |f: u32| faces[f as usize].map(|v| uv[v as usize]);
-        let mut sum = 0.0;
+        let (mut pairs, mut sum) = (0, 0.0);
         for cell in 0..self.columns * self.rows {
             let here = &self.faces[self.starts[cell] as usize..self.starts[cell + 1] as usize];
             for (i, &f) in here.iter().enumerate() {
@@ -72,12 +86,13 @@ impl Grid {
                         self.cell([low(0), low(1)]) == [cell % self.columns, cell / self.columns]
                     };
                     if !edge_in_common && meet(a, b) && speaks() {
+                        pairs += 1;
                         sum += common_area(a, b);
                     }
                 }
             }
         }
-        sum
+        (pairs, sum)
     }
 
     pub(super) fn locate(&self, uv: &[[f64; 2]], faces: &[[u32; 3]], at: [f64; 2]) -> Option<SurfacePoint> {
@@ -91,6 +106,17 @@ impl Grid {
             inside(corners, at).map(|barycentric| SurfacePoint { face, barycentric })
         })
     }
+}
+
+/// How many pairs of faces of a layout without flips lie on each other.
+pub(crate) fn overlapping_pairs(uv: &[[f64; 2]], faces: &[[u32; 3]]) -> usize {
+    let bound = |k: usize, pick: fn(f64, f64) -> f64| uv.iter().map(|p| p[k]).reduce(pick).unwrap_or(0.0);
+    let low = [bound(0, f64::min), bound(1, f64::min)];
+    let size = [bound(0, f64::max) - low[0], bound(1, f64::max) - low[1]];
+    let mut grid = Grid::sized(faces.len(), size);
+    grid.corner = low;
+    grid.fill(uv, faces);
+    grid.overlap(uv, faces).0
 }
 
 fn cells_of([left, bottom, right, top]: [u32; 4], columns: usize) -> impl Iterator<Item = usize> {

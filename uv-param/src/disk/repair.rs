@@ -1,19 +1,10 @@
 //! From a triangle soup to a [`Disk`], with an account of what was left out.
 
-use super::half_edges::{BORDER, EdgeTable, boundary_loops, fans, half_edge};
 use super::surface::Disk;
 use crate::error::Error;
+use crate::half_edges::{BORDER, EdgeTable, boundary_loops, fans, half_edge};
+use crate::soup::{check, faces_with_shape, find_root, weld};
 use crate::triangle;
-
-/// A face whose height is below this fraction of its longest edge has no measurable shape: it is the relative rounding
-/// of the f32 coordinates that meshes are stored in.
-const FLAT: f64 = 1e-7;
-
-/// Beyond this products of lengths overflow; every f32 is below it.
-const MAX_COORDINATE: f64 = 1e40;
-
-/// Half-edges are counted in 32 bits.
-const MAX_COUNT: usize = (u32::MAX / 6) as usize;
 
 /// What [`largest_disk_with`] may change in the mesh.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -75,7 +66,9 @@ pub fn largest_disk_with(
     if repair.weld {
         report.welded_vertices = weld(positions, &mut soup);
     }
-    let mut kept = without_degenerate(positions, &soup, &mut report);
+    let shaped = faces_with_shape(positions, &soup);
+    (report.degenerate_faces_dropped, report.duplicate_faces_dropped) = (shaped.degenerate, shaped.duplicate);
+    let mut kept = shaped.kept;
     if kept.is_empty() {
         return Err(Error::ZeroArea);
     }
@@ -109,88 +102,20 @@ pub fn largest_disk_with(
     Ok((disk, report))
 }
 
-/// Refuses what no later step could name; returns the number of unreferenced vertices.
-fn check(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Result<usize, Error> {
-    if positions.is_empty() || faces.is_empty() {
-        return Err(Error::Empty);
-    }
-    let count = positions.len().max(faces.len());
-    if count > MAX_COUNT {
-        return Err(Error::TooLarge { count, limit: MAX_COUNT });
-    }
-    let mut used = vec![false; positions.len()];
-    for (face, corners) in faces.iter().enumerate() {
-        for &index in corners {
-            let slot = used.get_mut(index as usize);
-            *slot.ok_or(Error::IndexOutOfRange { face, index, vertices: positions.len() })? = true;
-        }
-    }
-    for (vertex, position) in positions.iter().enumerate() {
-        if used[vertex] && !position.iter().all(|x| x.abs() <= MAX_COORDINATE) {
-            return Err(Error::NonFinite { vertex });
-        }
-    }
-    Ok(used.iter().filter(|&&u| !u).count())
-}
-
-/// Points the faces to the first vertex at each position; returns how many vertices lost their faces.
-fn weld(positions: &[[f64; 3]], faces: &mut [[u32; 3]]) -> usize {
-    // Adding 0.0 makes -0.0 and 0.0 the same bits.
-    let key = |v: u32| positions[v as usize].map(|x| (x + 0.0).to_bits());
-    let mut order: Vec<u32> = faces.iter().flatten().copied().collect();
-    order.sort_unstable();
-    order.dedup();
-    order.sort_by_key(|&v| (key(v), v));
-    let mut first: Vec<u32> = (0..positions.len() as u32).collect();
-    let mut merged = 0;
-    for pair in order.windows(2) {
-        if key(pair[0]) == key(pair[1]) {
-            first[pair[1] as usize] = first[pair[0] as usize];
-            merged += 1;
-        }
-    }
-    for corner in faces.iter_mut().flatten() {
-        *corner = first[*corner as usize];
-    }
-    merged
-}
-
-/// Indices of the faces that have a shape and are not repeated.
-fn without_degenerate(positions: &[[f64; 3]], faces: &[[u32; 3]], report: &mut RepairReport) -> Vec<u32> {
-    let has_shape = |f: &u32| {
-        let corners = faces[*f as usize];
-        triangle::has_shape(corners.map(|v| positions[v as usize]), FLAT)
-    };
-    let mut kept: Vec<u32> = (0..faces.len() as u32).filter(has_shape).collect();
-    report.degenerate_faces_dropped = faces.len() - kept.len();
-
-    let sorted = |f: u32| {
-        let mut corners = faces[f as usize];
-        corners.sort_unstable();
-        corners
-    };
-    let shaped = kept.len();
-    kept.sort_by_cached_key(|&f| (sorted(f), f));
-    kept.dedup_by(|a, b| sorted(*a) == sorted(*b));
-    kept.sort_unstable();
-    report.duplicate_faces_dropped = shaped - kept.len();
-    kept
-}
-
 /// Faces of the edge-connected part with the largest area.
 fn largest_component(positions: &[[f64; 3]], faces: &[[u32; 3]], kept: &[u32], report: &mut RepairReport) -> Vec<u32> {
     let list: Vec<[u32; 3]> = kept.iter().map(|&f| faces[f as usize]).collect();
     let mut parent: Vec<u32> = (0..list.len() as u32).collect();
     for group in EdgeTable::new(positions.len(), &list).groups() {
         for &h in &group[1..] {
-            let (a, b) = (root(&mut parent, group[0] / 3), root(&mut parent, h / 3));
+            let (a, b) = (find_root(&mut parent, group[0] / 3), find_root(&mut parent, h / 3));
             parent[a.max(b) as usize] = a.min(b);
         }
     }
     let mut areas = vec![0.0; list.len()];
     for (f, corners) in list.iter().enumerate() {
         let area = 0.5 * triangle::cross(corners.map(|v| positions[v as usize])).norm();
-        areas[root(&mut parent, f as u32) as usize] += area;
+        areas[find_root(&mut parent, f as u32) as usize] += area;
     }
     // Roots are the smallest faces of their parts, so the first of equal areas is the part that comes first.
     let largest = (0..list.len()).fold(0, |best, f| if areas[f] > areas[best] { f } else { best });
@@ -198,17 +123,9 @@ fn largest_component(positions: &[[f64; 3]], faces: &[[u32; 3]], kept: &[u32], r
     report.area_in_other_components_m2 =
         areas.iter().enumerate().filter(|&(f, _)| f != largest).map(|(_, area)| area).sum();
     let chosen: Vec<u32> =
-        (0..list.len()).filter(|&f| root(&mut parent, f as u32) as usize == largest).map(|f| kept[f]).collect();
+        (0..list.len()).filter(|&f| find_root(&mut parent, f as u32) as usize == largest).map(|f| kept[f]).collect();
     report.faces_in_other_components = kept.len() - chosen.len();
     chosen
-}
-
-fn root(parent: &mut [u32], mut f: u32) -> u32 {
-    while parent[f as usize] != f {
-        parent[f as usize] = parent[parent[f as usize] as usize];
-        f = parent[f as usize];
-    }
-    f
 }
 
 /// Makes the winding consistent and pairs the half-edges: (twins, reversed).

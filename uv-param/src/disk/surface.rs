@@ -1,7 +1,7 @@
 //! The checked surface: one orientable, manifold piece of genus 0 with a boundary, and cuts along its edges.
 
-use super::half_edges::{BORDER, boundary_loops, fans, half_edge};
 use crate::error::Error;
+use crate::half_edges::{BORDER, boundary_loops, fans, half_edge};
 use crate::triangle::{self, Frame};
 
 /// A triangle mesh that can be laid out in the plane: connected, manifold, consistently oriented, genus 0, at least one
@@ -87,6 +87,63 @@ impl Disk {
         let at = |v: u32| nalgebra::Vector3::from(self.positions[v as usize]);
         let next = vertices.iter().cycle().skip(1);
         vertices.iter().zip(next).map(|(&a, &b)| (at(a) - at(b)).norm()).sum()
+    }
+
+    /// Faces of a larger surface, neighbours (`twins`) and glued seams given, corners numbered as there. Every fan of faces gets a
+    /// vertex of its own; those that seams parted from another stand at the end. Not asked: whether it is a disk.
+    pub(crate) fn from_faces(
+        positions: &[[f64; 3]],
+        corners: &[[u32; 3]],
+        twins: Vec<u32>,
+        glued: Vec<u32>,
+        face_source: Vec<u32>,
+        reversed: Vec<bool>,
+        source_faces: usize,
+    ) -> Self {
+        let (fan_of_corner, fan_source) = fans(corners, &twins);
+        // The fan that each fan is part of when seams are shut, and the first fan of each.
+        let (whole_of_corner, wholes) = fans(corners, &glued);
+        let mut first_fan = vec![BORDER; wholes.len()];
+        let mut whole_of_fan = vec![BORDER; fan_source.len()];
+        for (&fan, &whole) in fan_of_corner.iter().zip(&whole_of_corner) {
+            whole_of_fan[fan as usize] = whole;
+            let first = &mut first_fan[whole as usize];
+            *first = (*first).min(fan);
+        }
+        let is_copy = |fan: u32| first_fan[whole_of_fan[fan as usize] as usize] != fan;
+        let mut order: Vec<u32> = (0..fan_source.len() as u32).collect();
+        order.sort_unstable_by_key(|&fan| (is_copy(fan), fan_source[fan as usize], fan));
+        let mut rank = vec![0u32; order.len()];
+        for (new, &fan) in order.iter().enumerate() {
+            rank[fan as usize] = new as u32;
+        }
+        let original = |fan: u32| rank[first_fan[whole_of_fan[fan as usize] as usize] as usize];
+        let copies = order.iter().filter(|&&fan| is_copy(fan)).map(|&fan| original(fan)).collect();
+        let renumbered = |f: usize| [0, 1, 2].map(|k| rank[fan_of_corner[3 * f + k] as usize]);
+        let faces: Vec<[u32; 3]> = (0..corners.len()).map(renumbered).collect();
+        let vertex_source: Vec<u32> = order.iter().map(|&fan| fan_source[fan as usize]).collect();
+        let loops = boundary_loops(vertex_source.len(), &faces, &twins);
+        let mut disk = Self {
+            positions: vertex_source.iter().map(|&v| positions[v as usize]).collect(),
+            faces,
+            vertex_source,
+            face_source,
+            reversed,
+            twins,
+            glued,
+            copies,
+            cuts: 0,
+            loops,
+            source_vertices: positions.len(),
+            source_faces,
+        };
+        disk.sort_loops();
+        disk
+    }
+
+    /// Whether it can be laid out in the plane, if it is in one piece.
+    pub(crate) fn is_planar(&self) -> bool {
+        !self.loops.is_empty() && self.euler_characteristic() + self.loops.len() as isize == 2
     }
 
     pub(super) fn sort_loops(&mut self) {

@@ -4,7 +4,7 @@
 pub(crate) const BORDER: u32 = u32::MAX;
 
 /// Undirected edges of a triangle list with the half-edges along each, in a fixed order.
-pub(super) struct EdgeTable {
+pub(crate) struct EdgeTable {
     /// Half-edges, grouped by undirected edge.
     half_edges: Vec<u32>,
     /// Start of each group; one more than there are edges.
@@ -12,7 +12,7 @@ pub(super) struct EdgeTable {
 }
 
 impl EdgeTable {
-    pub(super) fn new(vertices: usize, faces: &[[u32; 3]]) -> Self {
+    pub(crate) fn new(vertices: usize, faces: &[[u32; 3]]) -> Self {
         // Counting sort by the smaller end, then a tiny sort inside each bucket: linear for meshes.
         let mut bucket = vec![0u32; vertices + 1];
         let ends = |h: usize| {
@@ -47,19 +47,19 @@ impl EdgeTable {
     }
 
     /// The half-edges along each undirected edge.
-    pub(super) fn groups(&self) -> impl Iterator<Item = &[u32]> {
+    pub(crate) fn groups(&self) -> impl Iterator<Item = &[u32]> {
         self.starts.windows(2).map(|w| &self.half_edges[w[0] as usize..w[1] as usize])
     }
 }
 
 /// Start and end vertex of half-edge `h`.
-pub(super) fn half_edge(faces: &[[u32; 3]], h: usize) -> (u32, u32) {
+pub(crate) fn half_edge(faces: &[[u32; 3]], h: usize) -> (u32, u32) {
     let face = faces[h / 3];
     (face[h % 3], face[(h + 1) % 3])
 }
 
 /// Boundary loops of a vertex-manifold, oriented mesh, in the direction of the faces, each from its smallest vertex.
-pub(super) fn boundary_loops(vertices: usize, faces: &[[u32; 3]], twins: &[u32]) -> Vec<Vec<u32>> {
+pub(crate) fn boundary_loops(vertices: usize, faces: &[[u32; 3]], twins: &[u32]) -> Vec<Vec<u32>> {
     let mut next = vec![BORDER; vertices];
     for (h, &twin) in twins.iter().enumerate() {
         if twin == BORDER {
@@ -85,7 +85,7 @@ pub(super) fn boundary_loops(vertices: usize, faces: &[[u32; 3]], twins: &[u32])
 
 /// The fans of faces around the vertices: the fan of every corner, and the vertex of every fan, fans in the order of their
 /// first corners. A vertex of a manifold has one fan.
-pub(super) fn fans(faces: &[[u32; 3]], twins: &[u32]) -> (Vec<u32>, Vec<u32>) {
+pub(crate) fn fans(faces: &[[u32; 3]], twins: &[u32]) -> (Vec<u32>, Vec<u32>) {
     let next = |h: usize| h / 3 * 3 + (h + 1) % 3;
     let previous = |h: usize| h / 3 * 3 + (h + 2) % 3;
     let corners = 3 * faces.len();

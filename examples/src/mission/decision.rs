@@ -1,0 +1,133 @@
+//! What is known before anything is planned: the surface, the picture on it, what the robot reaches, and the sprays.
+
+use std::fmt::Write as _;
+use std::time::Instant;
+
+use paint_net::{Image, Painting};
+use ptu_kinematics::Ptu;
+
+use super::decide::decide;
+use super::error::MissionError;
+use super::reach::texels_in_reach;
+use super::settings::MissionSettings;
+use crate::adapters::Robot;
+use crate::appearance::{Appearance, UNIT_THICKNESS};
+use crate::design::Design;
+use crate::mesh_io::TriangleMesh;
+use crate::progress::Stage;
+use crate::surface::PaintSurface;
+
+/// Flight logs are most of what a mission keeps: the built-in wall of 10.6 m² takes 200 MB with texels of 1.25 cm.
+const BYTES_PER_SQUARE_METRE: f64 = 2e7;
+/// As many times as much with layers, on the same wall.
+const LAYERED: f64 = 2.2;
+/// The size of a texel for that, metres.
+const USUAL_TEXEL: f64 = 0.0125;
+
+/// A surface with the picture wanted on it and the sprays that shall make it.
+pub struct Decision {
+    pub(super) settings: MissionSettings,
+    pub(super) name: String,
+    pub(super) surface: PaintSurface,
+    pub(super) appearance: Appearance,
+    pub(super) robot: Robot,
+    /// Ink wanted on every texel.
+    pub(super) wanted: Image,
+    /// 1 on texels of the surface, 0 beside it.
+    pub(super) coverage: Image,
+    /// Which texels the robot can serve.
+    pub(super) in_reach: Vec<bool>,
+    pub(super) layers: Vec<Painting>,
+    pub(super) started: Instant,
+}
+
+impl Decision {
+    /// Unwraps the surface, lays the design onto it and lets the painter decide. `name` is what the report calls the surface.
+    pub fn make(
+        name: &str,
+        mesh: &TriangleMesh,
+        design: &Design,
+        settings: MissionSettings,
+    ) -> Result<Self, MissionError> {
+        let started = Instant::now();
+        let robot = Robot::new(Ptu::new(settings.ptu)?);
+        let appearance = Appearance::charcoal_on_sandstone()?;
+
+        settings.check()?;
+        design.check_movable(&settings.placement, settings.viewpoint)?;
+        check_memory(mesh, &settings)?;
+        let stage = Stage::start("unwrap");
+        let surface = PaintSurface::new(mesh, settings.texel, &|s| stage.share(s))?;
+        stage.done(&describe(&surface));
+
+        let coverage = surface.coverage();
+        // Nothing is wanted beside the surface, and no more than the paint can show.
+        let wanted = design.on_surface(&surface, mesh, &settings.placement, settings.viewpoint)?;
+        let mut wanted = wanted.map(|ink| ink.min(appearance.ink().max_ink()));
+        for (ink, covered) in wanted.data_mut().iter_mut().zip(coverage.data()) {
+            *ink *= covered;
+        }
+        let stage = Stage::start("reach");
+        let in_reach = texels_in_reach(&surface, &robot, &settings)?;
+        stage.done(&format!("{:.1} % of the surface", 100.0 * share(&in_reach, &coverage)));
+        let layers = decide(&wanted, &coverage, &in_reach, &appearance, &settings)?;
+        let name = name.to_string();
+        Ok(Self { settings, name, surface, appearance, robot, wanted, coverage, in_reach, layers, started })
+    }
+
+    /// Share of the surface's texels that the robot can serve.
+    pub(super) fn share_in_reach(&self) -> f64 {
+        share(&self.in_reach, &self.coverage)
+    }
+
+    /// Paint that is wanted where the robot cannot paint, m³.
+    pub(super) fn wanted_out_of_reach(&self) -> f64 {
+        let wanted = self.wanted.data().iter().zip(&self.in_reach).zip(&self.surface.texels.area_m2);
+        let depth = |ink: f64| self.appearance.ink().inverse(ink) * UNIT_THICKNESS;
+        wanted.filter(|((_, reached), _)| !**reached).map(|((ink, _), area)| depth(*ink) * area).sum()
+    }
+
+    /// 1 on texels that the robot can serve, 0 elsewhere.
+    pub(super) fn coverage_in_reach(&self) -> Image {
+        let mut weight = self.coverage.clone();
+        for (weight, &reached) in weight.data_mut().iter_mut().zip(&self.in_reach) {
+            *weight *= f64::from(u8::from(reached));
+        }
+        weight
+    }
+}
+
+fn share(in_reach: &[bool], coverage: &Image) -> f64 {
+    let reached = in_reach.iter().filter(|&&reached| reached).count();
+    reached as f64 / coverage.data().iter().sum::<f64>().max(1.0)
+}
+
+/// Refuses a surface whose flight would not fit: before anything is computed, since nothing could be said afterwards.
+fn check_memory(mesh: &TriangleMesh, settings: &MissionSettings) -> Result<(), MissionError> {
+    let area = mesh.area();
+    // The way over the surface grows with the rows, its texels with their square.
+    let finer = USUAL_TEXEL / settings.texel;
+    let layers = if settings.layered { LAYERED } else { 1.0 };
+    let need_gib = layers * area * BYTES_PER_SQUARE_METRE * finer.max(finer * finer) / f64::from(1 << 30);
+    if need_gib > settings.memory_gib {
+        return Err(MissionError::TooLarge { area, need_gib, limit_gib: settings.memory_gib });
+    }
+    Ok(())
+}
+
+fn describe(surface: &PaintSurface) -> String {
+    let quality = surface.chart.quality();
+    let f = &surface.repair_report;
+    let mut text = format!(
+        "{} faces, {:.2} m², {} flips, stretch energy {:.4}",
+        surface.disk().faces().len(),
+        surface.disk().area(),
+        quality.flips,
+        quality.symmetric_dirichlet
+    );
+    if f.components > 1 {
+        let rest = f.area_in_other_components_m2;
+        let _ = write!(text, "; the largest of {} parts, {rest:.2} m² in the others stay bare", f.components);
+    }
+    text
+}

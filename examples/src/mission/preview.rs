@@ -1,0 +1,117 @@
+//! What a mission will look like, how long it takes and what it cannot reach: before anything is planned.
+
+use std::path::Path;
+
+use nalgebra::Point3;
+use paint_net::Image;
+use paint_planner::{Target, TimingPolicy};
+use paint_sim::{Hit, Shading};
+use serde::Serialize;
+
+use super::decision::Decision;
+use super::error::MissionError;
+use super::plan::layer_route;
+use super::shading::{shading, texel_at};
+use super::view::{camera, picture_of, view};
+use crate::appearance::DENSITY;
+use crate::progress::Stage;
+use crate::report::save_figures;
+
+/// Albedo of what the robot cannot paint, mixed in by half.
+const OUT_OF_REACH: [f32; 3] = [0.75, 0.05, 0.35];
+
+/// The figures of a preview. Flat, SI units in the names.
+#[derive(Debug, Clone, Serialize)]
+pub struct Preview {
+    /// Version of the program.
+    pub version: &'static str,
+    /// Surface that is to be painted.
+    pub surface: String,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Area of the painted chart.
+    pub surface_area_m2: f64,
+    /// Share of it that the robot can paint.
+    pub reach_share: f64,
+    /// Share of the wanted paint that lies there.
+    pub wanted_in_reach_share: f64,
+    /// Paint that leaves the nozzle.
+    pub paint_kg: f64,
+    /// Estimated time in the air: strokes at their speed, transits by the limits of the vehicle, obstacles left aside.
+    pub flight_time_s: f64,
+    /// Strokes over all layers.
+    pub strokes: usize,
+    /// Wall-clock time of the preview.
+    pub wall_s: f64,
+}
+
+/// Writes `preview.png` and `report.json` into an existing folder.
+pub fn preview(decision: &Decision, folder: &Path) -> Result<Preview, MissionError> {
+    let stage = Stage::start("preview");
+    let estimate = estimate(decision)?;
+    stage.share(0.5);
+    let painted = expected_depth(decision);
+    let shade = |hit: &Hit| -> Shading {
+        let plain = shading(decision, &painted, hit);
+        let bare = texel_at(decision, hit).is_some_and(|texel| !decision.in_reach[texel]);
+        let mixed = |c: usize| if bare { 0.5 * (plain.albedo[c] + OUT_OF_REACH[c]) } else { plain.albedo[c] };
+        Shading { albedo: [mixed(0), mixed(1), mixed(2)], ..plain }
+    };
+    let corners: Vec<Point3<f64>> = decision.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
+    picture_of(&view(decision, &camera(decision, &corners)?, &shade)?).save(&folder.join("preview.png"))?;
+    save_figures(&estimate, folder)?;
+    stage.done(&folder.join("preview.png").display().to_string());
+    Ok(estimate)
+}
+
+impl Preview {
+    /// One line for people.
+    pub fn summary(&self) -> String {
+        format!(
+            "about {:.0} min in the air, {:.2} kg of paint, {:.1} % of the surface and {:.1} % of the wanted paint in reach",
+            self.flight_time_s / 60.0,
+            self.paint_kg,
+            100.0 * self.reach_share,
+            100.0 * self.wanted_in_reach_share
+        )
+    }
+}
+
+fn estimate(decision: &Decision) -> Result<Preview, MissionError> {
+    let timing = &decision.settings.planner.timing;
+    let speed = match timing.policy {
+        TimingPolicy::Uniform { speed } => speed.min(timing.max_speed),
+        TimingPolicy::GradientPreserving => timing.max_speed,
+    };
+    let (mut time, mut volume, mut strokes, mut last) = (0.0, 0.0, 0, None::<Target>);
+    for layer in &decision.layers {
+        let route = layer_route(layer, &decision.surface, &decision.settings, last.as_ref())?;
+        let gap = decision.settings.planner.break_length;
+        let steps = route.targets.windows(2).map(|pair| (pair[1].point - pair[0].point).norm());
+        time += steps.filter(|step| *step <= gap).sum::<f64>() / speed + route.transit_s;
+        volume += route.paint();
+        strokes += route.strokes;
+        last = route.targets.last().copied().or(last);
+    }
+    let depth = decision.wanted.map(|ink| decision.appearance.ink().inverse(ink));
+    let wanted = |weight: &Image| depth.data().iter().zip(weight.data()).map(|(d, w)| d * w).sum::<f64>();
+    Ok(Preview {
+        version: env!("CARGO_PKG_VERSION"),
+        surface: decision.name.clone(),
+        seed: decision.settings.seed,
+        surface_area_m2: decision.surface.disk().area(),
+        reach_share: decision.share_in_reach(),
+        wanted_in_reach_share: wanted(&decision.coverage_in_reach())
+            / wanted(&decision.coverage).max(f64::MIN_POSITIVE),
+        paint_kg: volume * DENSITY,
+        flight_time_s: time,
+        strokes,
+        wall_s: decision.started.elapsed().as_secs_f64(),
+    })
+}
+
+/// Depth of paint on every texel when every spray lands where it is meant to.
+fn expected_depth(decision: &Decision) -> Image {
+    let ink = decision.layers.last().map_or(&decision.wanted, |layer| &layer.ink);
+    ink.map(|ink| decision.appearance.ink().inverse(ink))
+}

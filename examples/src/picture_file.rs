@@ -1,0 +1,44 @@
+//! Pictures as a viewer shows them.
+
+use std::path::Path;
+
+use image::{DynamicImage, ImageDecoder as _, ImageError, ImageReader};
+
+/// Reads a PNG or JPEG, whatever its file is called, and turns it as its EXIF orientation says: cameras and telephones store what
+/// their sensor saw and only note how they were held.
+pub fn open_upright(path: &Path) -> Result<DynamicImage, ImageError> {
+    let mut decoder = ImageReader::open(path)?.with_guessed_format()?.into_decoder()?;
+    // A picture whose EXIF block is broken is a picture still.
+    let orientation = decoder.orientation().ok();
+    let mut picture = DynamicImage::from_decoder(decoder)?;
+    if let Some(orientation) = orientation {
+        picture.apply_orientation(orientation);
+    }
+    Ok(picture)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use image::ImageEncoder as _;
+    use image::codecs::png::PngEncoder;
+
+    #[test]
+    fn a_picture_taken_on_its_side_stands() {
+        // As stored: 3 x 2, the top row dark. Held so that the sensor's left was up (EXIF 6), the dark row is the right column.
+        let stored = [0, 0, 0, 255, 255, 255_u8];
+        let exif = [b"II*\0\x08\0\0\0\x01\0".as_slice(), b"\x12\x01\x03\0\x01\0\0\0\x06\0\0\0", &[0; 4]].concat();
+        let mut bytes = Vec::new();
+        let mut encoder = PngEncoder::new(&mut bytes);
+        encoder.set_exif_metadata(exif).unwrap();
+        encoder.write_image(&stored, 3, 2, image::ExtendedColorType::L8).unwrap();
+        let path = std::env::temp_dir().join(format!("paintcopter-upright-{}.jpg", std::process::id()));
+        std::fs::write(&path, &bytes).unwrap();
+        let upright = open_upright(&path);
+        std::fs::remove_file(&path).unwrap();
+        let upright = upright.unwrap().to_luma8();
+        assert_eq!(upright.dimensions(), (2, 3));
+        assert_eq!(upright.into_raw(), [255, 0, 255, 0, 255, 0]);
+    }
+}

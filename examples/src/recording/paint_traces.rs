@@ -1,0 +1,93 @@
+//! Paint as it appears: what the spray has passed over, a few seconds at a time.
+
+use foxglove::messages::{Color, LinePrimitive, SceneEntity, SceneEntityDeletion, SceneUpdate};
+use foxglove::messages::{line_primitive, scene_entity_deletion};
+use nalgebra::Point3;
+
+/// Seconds of spraying in one trace at most.
+const LENGTH: f64 = 5.0;
+
+/// How paint looks that is on its way to the finished picture.
+#[derive(Debug, Clone, Copy)]
+pub struct PaintStyle {
+    /// Width of a trace, metres: that of the spot.
+    pub width: f64,
+    /// Flow at which a trace is opaque, m³/s.
+    pub max_flow: f64,
+    /// Its sRGB colour.
+    pub colour: [u8; 3],
+}
+
+/// Gathers hits with the valve open into lines on the surface.
+pub(super) struct PaintTraces {
+    style: PaintStyle,
+    points: Vec<(Point3<f64>, f64)>,
+    begin: f64,
+    count: usize,
+}
+
+impl PaintTraces {
+    pub(super) fn new(style: PaintStyle) -> Self {
+        Self { style, points: Vec::new(), begin: 0.0, count: 0 }
+    }
+
+    /// Takes where the spray met the surface at a time (s), with which flow; returns the trace that this ends.
+    pub(super) fn push(&mut self, time: f64, hit: Option<Point3<f64>>, flow: f64) -> Option<SceneUpdate> {
+        let hit = hit.filter(|_| flow > 0.0);
+        if self.points.is_empty() {
+            self.begin = time;
+        }
+        self.points.extend(hit.map(|hit| (hit, flow)));
+        let full = time - self.begin >= LENGTH;
+        if hit.is_some() && !full {
+            return None;
+        }
+        let trace = self.take();
+        // The next trace begins where this one ends.
+        if let (Some(hit), true) = (hit, full) {
+            (self.points, self.begin) = (vec![(hit, flow)], time);
+        }
+        trace
+    }
+
+    /// The trace so far; none below two points.
+    pub(super) fn take(&mut self) -> Option<SceneUpdate> {
+        let points = std::mem::take(&mut self.points);
+        if points.len() < 2 {
+            return None;
+        }
+        self.count += 1;
+        let PaintStyle { width, max_flow, colour } = self.style;
+        let [r, g, b] = colour.map(|c| f64::from(c) / 255.0);
+        let line = LinePrimitive {
+            r#type: line_primitive::Type::LineStrip as i32,
+            pose: None,
+            thickness: width,
+            scale_invariant: false,
+            points: points.iter().map(|(p, _)| point(*p)).collect(),
+            color: None,
+            colors: points.iter().map(|(_, flow)| Color { r, g, b, a: (flow / max_flow).clamp(0.05, 1.0) }).collect(),
+            indices: Vec::new(),
+        };
+        let entity = SceneEntity {
+            frame_id: "world".into(),
+            id: format!("trace-{}", self.count),
+            lines: vec![line],
+            ..SceneEntity::default()
+        };
+        Some(SceneUpdate { deletions: Vec::new(), entities: vec![entity] })
+    }
+
+    /// Takes all traces away again, when the finished picture takes their place.
+    pub(super) fn clear() -> SceneUpdate {
+        let deletion =
+            SceneEntityDeletion { timestamp: None, r#type: scene_entity_deletion::Type::All as i32, id: String::new() };
+        SceneUpdate { deletions: vec![deletion], entities: Vec::new() }
+    }
+}
+
+/// A point as a message.
+pub(super) fn point(p: impl Into<[f64; 3]>) -> foxglove::messages::Point3 {
+    let [x, y, z] = p.into();
+    foxglove::messages::Point3 { x, y, z }
+}

@@ -1,0 +1,62 @@
+//! The command line of `unwrap`.
+
+use std::path::PathBuf;
+
+use clap::Parser;
+
+/// Lays a mesh out in metres: cuts it into few charts that are hardly stretched, packs them onto pages, writes OBJ, glTF, a
+/// picture of the charts and a report.
+#[derive(Debug, Clone, Parser)]
+#[command(version, after_help = "Example:\n  unwrap --mesh statue.obj --texel 0.0125 --out out/statue")]
+pub struct Arguments {
+    /// Surface, OBJ, PLY or OFF
+    #[arg(long, value_name = "FILE")]
+    pub mesh: PathBuf,
+    /// Side of a texel on the surface, metres
+    #[arg(long, value_name = "METRES", default_value_t = 0.0125)]
+    pub texel: f64,
+    /// Metres per unit of the mesh file
+    #[arg(long, default_value_t = 1.0)]
+    pub scale: f64,
+    /// Stretch that 99 % of the faces may not exceed
+    #[arg(long, default_value_t = 1.15)]
+    pub max_stretch: f64,
+    /// Stretch that no face may exceed
+    #[arg(long, default_value_t = 1.5)]
+    pub worst_stretch: f64,
+    /// Edges that shall be seams: a text file with two vertex numbers, counted from 0, on each line
+    #[arg(long, value_name = "FILE")]
+    pub seams: Option<PathBuf>,
+    /// Picture on the mesh's own texture coordinates (OBJ): it is carried over to the new ones
+    #[arg(long, value_name = "PNG")]
+    pub texture: Option<PathBuf>,
+    /// Direction of the mesh file that points up in every chart; charts are not turned then
+    #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true)]
+    pub up: Option<[f64; 3]>,
+    /// Texels between two charts
+    #[arg(long, default_value_t = 4)]
+    pub gutter: usize,
+    /// Columns and rows of a page, texels [default: one square page, as small as was found]
+    #[arg(long, value_name = "W,H", value_parser = page)]
+    pub page: Option<[usize; 2]>,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/unwrap")]
+    pub out: PathBuf,
+}
+
+fn direction(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Vec<f64> =
+        text.split(',').filter_map(|w| w.trim().parse().ok()).filter(|x: &f64| x.is_finite()).collect();
+    match numbers[..] {
+        [x, y, z] if text.split(',').count() == 3 && numbers.iter().any(|&c| c != 0.0) => Ok([x, y, z]),
+        _ => Err("expected X,Y,Z, three finite numbers that are not all zero".into()),
+    }
+}
+
+fn page(text: &str) -> Result<[usize; 2], String> {
+    let sides: Vec<usize> = text.split(',').filter_map(|w| w.trim().parse().ok()).collect();
+    match sides[..] {
+        [width, height] if width > 0 && height > 0 && text.split(',').count() == 2 => Ok([width, height]),
+        _ => Err("expected W,H, two whole numbers above 0".into()),
+    }
+}

@@ -1,0 +1,118 @@
+//! From a mesh file to an atlas in a folder.
+
+use std::path::Path;
+use std::time::Instant;
+
+use cpu_time::ProcessTime;
+use uv_param::{Atlas, AtlasQuality, AtlasSettings, ChartSettings, PackSettings, PageTexels, Turns, unwrap_atlas};
+
+use super::arguments::Arguments;
+use super::error::UnwrapError;
+use super::files::{save, suffix};
+use super::page_picture::{carried_over, checkerboard};
+use super::report::UnwrapReport;
+use crate::mesh_io::{TriangleMesh, read_mesh};
+use crate::progress::Stage;
+use crate::report::save_figures;
+
+/// Does what the command line asks for.
+///
+/// # Errors
+/// [`UnwrapError`]; after [`UnwrapError::Broken`] the files are there, but not to be used.
+pub fn run(arguments: &Arguments) -> Result<(), UnwrapError> {
+    let (wall, folder) = (Instant::now(), arguments.out.as_path());
+    let mesh = read_mesh(&arguments.mesh)?;
+    if !(arguments.scale.is_finite() && arguments.scale > 0.0) {
+        let must_be = "a scale must be positive and finite";
+        return Err(UnwrapError::Option { option: "--scale", value: arguments.scale, must_be });
+    }
+    let seams = arguments.seams.as_deref().map(read_seams).transpose()?.unwrap_or_default();
+    let picture = arguments.texture.as_deref().map(|path| read_picture(path, &mesh, arguments)).transpose()?;
+    std::fs::create_dir_all(folder).map_err(|e| UnwrapError::unwritable(folder, &e))?;
+
+    let cpu = ProcessTime::try_now().ok();
+    let atlas = unwrap(&mesh, &seams, arguments)?;
+    let cpu_s = cpu.and_then(|start| start.try_elapsed().ok()).unwrap_or_default().as_secs_f64();
+
+    let stage = Stage::start("write");
+    let bounds = [arguments.max_stretch, arguments.worst_stretch];
+    // Half of the gutter belongs to each of two charts; a texel more does no harm where there is room.
+    let pages = PageTexels::of(&atlas, arguments.gutter.div_ceil(2).max(1));
+    let mut textures = Vec::with_capacity(pages.len());
+    for (page, texels) in pages.iter().enumerate() {
+        let board = checkerboard(&atlas, texels, bounds);
+        let path = folder.join(format!("charts{}.png", suffix(page)));
+        board.save(&path).map_err(|e| UnwrapError::unwritable(&path, &e))?;
+        textures.push(match (&picture, &mesh.uv) {
+            (Some(picture), Some(uv)) => carried_over(&atlas, texels, &mesh, uv, picture),
+            _ => board,
+        });
+    }
+    save(&atlas, &mesh, &textures, folder)?;
+    let report = UnwrapReport::new(&atlas, wall.elapsed().as_secs_f64(), cpu_s);
+    save_figures(&report, folder)?;
+    stage.done(&format!("{} page(s) of {} x {} texels", report.pages, report.page_width_px, report.page_height_px));
+    println!("{}", folder.join("atlas.obj").display());
+    if report.flips + report.flips_f32 + report.overlaps > 0 {
+        return Err(UnwrapError::Broken { flips: report.flips.max(report.flips_f32), overlaps: report.overlaps });
+    }
+    Ok(())
+}
+
+fn unwrap(mesh: &TriangleMesh, seams: &[[u32; 2]], arguments: &Arguments) -> Result<Atlas, UnwrapError> {
+    let positions: Vec<[f64; 3]> = mesh.positions.iter().map(|p| p.map(|c| f64::from(c) * arguments.scale)).collect();
+    let settings = AtlasSettings {
+        charts: ChartSettings {
+            max_stretch: arguments.max_stretch,
+            worst_stretch: arguments.worst_stretch,
+            up: arguments.up,
+            ..ChartSettings::default()
+        },
+        pack: PackSettings {
+            texel_m: arguments.texel,
+            gutter: arguments.gutter,
+            page: arguments.page,
+            turns: if arguments.up.is_some() { Turns::None } else { Turns::Any },
+        },
+    };
+    let stage = Stage::start("unwrap");
+    let atlas = unwrap_atlas(&positions, &mesh.faces, seams, &settings, |_| ())
+        .map_err(|source| UnwrapError::Atlas { path: arguments.mesh.clone(), source })?;
+    let quality = AtlasQuality::of(&atlas);
+    stage.done(&format!(
+        "{} charts of {} part(s), seams {:.2} m, stretch {:.3} (99 %), {:.3} (all), {:.0} % of the page used",
+        quality.charts,
+        atlas.report().parts,
+        quality.seam_length_m,
+        quality.stretch_p99,
+        quality.stretch_max,
+        100.0 * quality.utilisation
+    ));
+    Ok(atlas)
+}
+
+/// Pairs of vertex numbers, one on each line; what follows a `#` is passed over.
+fn read_seams(path: &Path) -> Result<Vec<[u32; 2]>, UnwrapError> {
+    let text = std::fs::read_to_string(path).map_err(|e| UnwrapError::unreadable(path, &e))?;
+    let mut seams = Vec::new();
+    for (k, line) in text.lines().enumerate() {
+        let words: Vec<&str> = line.split('#').next().unwrap_or("").split_whitespace().collect();
+        let numbers: Vec<u32> = words.iter().filter_map(|w| w.parse().ok()).collect();
+        match (words.len(), &numbers[..]) {
+            (0, _) => {}
+            (2, &[a, b]) => seams.push([a, b]),
+            _ => {
+                let why = format!("line {}: expected two vertex numbers, counted from 0, found \"{line}\"", k + 1);
+                return Err(UnwrapError::unreadable(path, &why));
+            }
+        }
+    }
+    Ok(seams)
+}
+
+fn read_picture(path: &Path, mesh: &TriangleMesh, arguments: &Arguments) -> Result<image::RgbImage, UnwrapError> {
+    if mesh.uv.is_none() {
+        return Err(UnwrapError::NoCoordinates(arguments.mesh.clone()));
+    }
+    Ok(image::open(path).map_err(|e| UnwrapError::unreadable(path, &e))?.to_rgb8())
+}

@@ -1,0 +1,97 @@
+//! Missions as files: written by every run, flown again from anywhere.
+
+use std::process::Command;
+
+use paint_planner::TimingPolicy;
+use paintcopter_examples::mesh_placement::UpAxis;
+use paintcopter_examples::mission::{MissionSettings, PainterChoice};
+use paintcopter_examples::mission_file::MissionFile;
+use paintcopter_examples::picture_placement::{PicturePlacement, PlacementMode};
+use paintcopter_examples::projection::Viewpoint;
+
+use crate::scratch::Scratch;
+
+#[test]
+fn a_mission_keeps_all_that_it_was_told() {
+    let s = Scratch::new("kept");
+    let mut settings = MissionSettings {
+        seed: 7,
+        texel: 0.02,
+        painter: PainterChoice::Pursuit,
+        layered: true,
+        viewpoint: Some(Viewpoint::Point([-1.0, 0.25, 2.0].into())),
+        placement: PicturePlacement { mode: PlacementMode::Tile, rotate: 0.1, offset: [0.2, -0.3], size: Some(0.4) },
+        ..MissionSettings::default()
+    };
+    settings.limits.max_sprays = Some(400);
+    settings.planner.timing.policy = TimingPolicy::GradientPreserving;
+    settings.ptu.pan_limits.max = 1.25;
+    settings.servo.dead_time = 0.07;
+    let told = MissionFile {
+        mesh: Some(s.0.join("a.obj")),
+        scale: Some(2.5),
+        up: Some(UpAxis::X),
+        design: Some(s.path("b.png")),
+        texture: Some(s.0.join("c.png")),
+        scan: true,
+        settings,
+    };
+    let path = s.0.join("mission.toml");
+    told.write(&path).unwrap();
+    assert_eq!(MissionFile::read(&path).unwrap(), told);
+    MissionFile::default().write(&path).unwrap();
+    assert_eq!(MissionFile::read(&path).unwrap(), MissionFile::default());
+}
+
+#[test]
+fn paths_begin_at_the_folder_of_the_file_and_mistakes_are_named() {
+    let s = Scratch::new("paths");
+    s.write("mission.toml", "mesh = \"part/wall.obj\"\ndesign = \"part/picture.png\"\n[settings]\nseed = 3\n");
+    let mission = MissionFile::read(&s.0.join("mission.toml")).unwrap();
+    assert_eq!(mission.mesh, Some(s.0.join("part/wall.obj")));
+    assert_eq!(mission.design, Some(s.path("part/picture.png")));
+    let expected = MissionSettings { seed: 3, ..MissionSettings::default() };
+    assert_eq!(mission.settings, expected);
+    s.write("mission.toml", "design = \"stripes\"\n[settings.planner]\nclearence = 0.1\n");
+    let error = MissionFile::read(&s.0.join("mission.toml")).unwrap_err().to_string();
+    assert!(error.contains("mission.toml") && error.contains("line 3") && error.contains("clearence"), "{error}");
+}
+
+#[test]
+fn a_run_can_be_repeated_from_the_file_that_it_leaves() {
+    let s = Scratch::new("again");
+    s.write("wall.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n");
+    let run = |arguments: &[&str], out: &str| {
+        let output = Command::new(env!("CARGO_BIN_EXE_paintcopter"))
+            .current_dir(&s.0)
+            .args(arguments)
+            .args(["--preview", "--out", out])
+            .output()
+            .unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let first = ["--mesh", "wall.obj", "--scale", "1.5", "--design", "gradient", "--seed", "5", "--speed", "0.3"];
+    assert_eq!(run(&first, "one").0, Some(0));
+    std::fs::create_dir(s.0.join("elsewhere")).unwrap();
+    std::fs::rename(s.0.join("one/mission.toml"), s.0.join("elsewhere/mission.toml")).unwrap();
+    let (code, text) = run(&["--mission", "elsewhere/mission.toml"], "two");
+    assert_eq!(code, Some(0), "{text}");
+    let read = |name: &str| std::fs::read(s.0.join(name)).unwrap();
+    assert!(read("one/preview.png") == read("two/preview.png"));
+    assert_eq!(read("elsewhere/mission.toml"), read("two/mission.toml"));
+    let figures = |name: &str| {
+        let mut json: serde_json::Value = serde_json::from_slice(&read(name)).unwrap();
+        json.as_object_mut().unwrap().remove("wall_s");
+        json
+    };
+    let one = figures("one/report.json");
+    assert_eq!(one, figures("two/report.json"));
+    // A wall of 2.25 m² that faces the robot, in rows 3.75 cm apart; its bright rim stays bare.
+    assert!((one["surface_area_m2"].as_f64().unwrap() - 2.25).abs() < 0.01);
+    assert!(
+        one["reach_share"].as_f64().unwrap() > 0.95
+            && one["flight_time_s"].as_f64().unwrap() > 0.9 * 2.25 / 0.0375 / 0.3
+    );
+    let (code, text) = run(&["--mission", "elsewhere/mission.toml", "--seed", "4"], "three");
+    assert!(code == Some(2) && text.contains("--seed") && text.contains("--mission"), "{text}");
+}

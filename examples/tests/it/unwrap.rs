@@ -1,0 +1,143 @@
+//! `unwrap` from outside: what it writes can be read back and is what it says.
+
+use std::path::{Path, PathBuf};
+
+use clap::Parser;
+use paintcopter_examples::mesh_io::read_mesh;
+use paintcopter_examples::surface::PaintSurface;
+use paintcopter_examples::unwrap::{Arguments, UnwrapError, run};
+
+use super::scratch::Scratch;
+
+/// A closed box of 1 x 1 x 0.5 m whose sides have coordinates of their own on a picture.
+const BOX: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 .5\nv 1 0 .5\nv 1 1 .5\nv 0 1 .5\nv 7 7 7
+vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1
+f 4/1 3/2 2/3 1/4\nf 5/1 6/2 7/3 8/4\nf 1/1 2/2 6/3 5/4\nf 2/1 3/2 7/3 6/4\nf 3/1 4/2 8/3 7/4\nf 4/1 1/2 5/3 8/4\n";
+
+fn arguments(mesh: &Path, out: &Path, more: &[&str]) -> Arguments {
+    let mut words = vec!["unwrap", "--mesh", mesh.to_str().unwrap(), "--out", out.to_str().unwrap()];
+    words.extend(more);
+    Arguments::try_parse_from(words).unwrap()
+}
+
+fn write(scratch: &Scratch, name: &str, text: &str) -> PathBuf {
+    let path = scratch.0.join(name);
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+fn figures(out: &Path) -> serde_json::Value {
+    serde_json::from_str(&std::fs::read_to_string(out.join("report.json")).unwrap()).unwrap()
+}
+
+#[test]
+fn a_box_is_unfolded_and_read_back() {
+    let scratch = Scratch::new("unwrap-box");
+    let mesh = write(&scratch, "box.obj", BOX);
+    let out = scratch.0.join("atlas");
+    run(&arguments(&mesh, &out, &["--texel", "0.02"])).unwrap();
+    let report = figures(&out);
+    // 2 + 2 m² of sides; an unfolded box is isometric.
+    assert!((report["area_m2"].as_f64().unwrap() - 4.0).abs() < 1e-6);
+    assert!(report["stretch_max"].as_f64().unwrap() < 1.0 + 1e-6);
+    assert_eq!(report["parts"], 1);
+    assert_eq!(report["repaired_unreferenced_vertices"], 1);
+    for zero in ["flips", "flips_f32", "overlaps", "repaired_non_manifold_edges", "repaired_degenerate_faces"] {
+        assert_eq!(report[zero], 0, "{zero}");
+    }
+    let (before, after) = (read_mesh(&mesh).unwrap(), read_mesh(&out.join("atlas.obj")).unwrap());
+    assert_eq!(after.positions, before.positions);
+    assert_eq!(after.faces.len(), before.faces.len());
+    let uv = after.uv.unwrap();
+    let side = report["page_width_px"].as_f64().unwrap() * 0.02;
+    for (corners, coordinates) in after.faces.iter().zip(&uv.faces) {
+        for k in 0..3 {
+            let distance =
+                |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>().sqrt();
+            let [p, q] = [k, (k + 1) % 3].map(|k| after.positions[corners[k] as usize]);
+            let [s, t] = [k, (k + 1) % 3].map(|k| uv.coordinates[coordinates[k] as usize]);
+            assert!((distance(&p, &q) - side * distance(&s, &t)).abs() < 1e-4);
+        }
+    }
+    let glb = gltf::Gltf::from_slice(&std::fs::read(out.join("atlas.glb")).unwrap()).unwrap();
+    assert_eq!(glb.images().count(), 1);
+    assert!(std::fs::read_to_string(out.join("atlas.mtl")).unwrap().contains("atlas_texture.png"));
+    let picture = image::open(out.join("charts.png")).unwrap().to_rgb8();
+    assert_eq!(u64::from(picture.width()), report["page_width_px"].as_u64().unwrap());
+    // No stretch: two greys of the checkerboard and the paper, nothing of the colours of stretch.
+    assert!(picture.pixels().all(|p| p.0[2] >= p.0[0]));
+}
+
+/// Every side of the box has the same picture: left half red, right half blue; so have the sides on the new page.
+#[test]
+fn a_texture_is_carried_over() {
+    let scratch = Scratch::new("unwrap-texture");
+    let mesh = write(&scratch, "box.obj", BOX);
+    let picture = scratch.0.join("picture.png");
+    image::RgbImage::from_fn(64, 64, |x, _| image::Rgb(if x < 32 { [200, 10, 10] } else { [10, 10, 200] }))
+        .save(&picture)
+        .unwrap();
+    let out = scratch.0.join("atlas");
+    run(&arguments(&mesh, &out, &["--texel", "0.02", "--texture", picture.to_str().unwrap()])).unwrap();
+    let texture = image::open(out.join("atlas_texture.png")).unwrap().to_rgb8();
+    let count = |wanted: [u8; 3]| texture.pixels().filter(|p| p.0 == wanted).count() as f64;
+    let (red, blue) = (count([200, 10, 10]), count([10, 10, 200]));
+    // 4 m² in texels of 2 cm are 10000; a band about each middle line is mixed.
+    assert!(red > 4000.0 && blue > 4000.0 && (red / blue - 1.0).abs() < 0.1, "{red} {blue}");
+}
+
+/// A closed box and three sheets at one edge are surfaces to paint: every side of them is on the page, once.
+#[test]
+fn what_is_no_disk_is_painted_all_around() {
+    let scratch = Scratch::new("all-around");
+    let fin = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 0 -1 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\n";
+    for (text, sides, area) in [(BOX, 12, 4.0), (fin, 3, 1.5)] {
+        let mesh = read_mesh(&write(&scratch, "mesh.obj", text)).unwrap();
+        let surface = PaintSurface::new(&mesh, 0.02, &|_| ()).unwrap();
+        assert_eq!(surface.disk().faces().len(), sides);
+        let (texels, pixels) = surface.film_texels();
+        assert!((texels.iter().map(|t| t.area).sum::<f64>() - area).abs() < 1e-9);
+        // The robot's targets lie where the texels are.
+        for (texel, &pixel) in texels.iter().zip(&pixels).step_by(97) {
+            let (x, y) = ((pixel % surface.width()) as f64, (pixel / surface.width()) as f64);
+            if let Some((point, _)) = surface.lift(x, y) {
+                assert!((point - texel.point).norm() < 0.03);
+            }
+        }
+    }
+}
+
+#[test]
+fn seams_from_a_file_and_what_is_wrong_with_them() {
+    let scratch = Scratch::new("unwrap-seams");
+    let mesh = write(&scratch, "box.obj", BOX);
+    let out = scratch.0.join("atlas");
+    // All twelve edges: six charts.
+    let all = "0 1\n1 2\n2 3\n3 0 # the bottom\n\n4 5\n5 6\n6 7\n7 4\n0 4\n1 5\n2 6\n3 7\n";
+    let seams = write(&scratch, "seams.txt", all);
+    run(&arguments(&mesh, &out, &["--seams", seams.to_str().unwrap()])).unwrap();
+    assert_eq!(figures(&out)["charts"], 6);
+    assert!((figures(&out)["seam_length_m"].as_f64().unwrap() - 10.0).abs() < 1e-6);
+    let bad = write(&scratch, "bad.txt", "0 1\n0 6\n0 8\n");
+    let refused = run(&arguments(&mesh, &out, &["--seams", bad.to_str().unwrap()])).unwrap_err();
+    assert!(matches!(refused, UnwrapError::Atlas { .. }) && refused.to_string().contains("no edge"), "{refused}");
+    let worse = write(&scratch, "worse.txt", "0 1\n0 x\n");
+    let refused = run(&arguments(&mesh, &out, &["--seams", worse.to_str().unwrap()])).unwrap_err().to_string();
+    assert!(refused.contains("line 2"), "{refused}");
+}
+
+#[test]
+fn what_cannot_be_done_is_said() {
+    let scratch = Scratch::new("unwrap-refusals");
+    let mesh = write(&scratch, "plain.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let out = scratch.0.join("atlas");
+    let refused = |more: &[&str]| run(&arguments(&mesh, &out, more)).unwrap_err().to_string();
+    assert!(refused(&["--texture", "any.png"]).contains("no texture coordinates"));
+    assert!(refused(&["--scale", "0"]).contains("--scale"));
+    assert!(refused(&["--texel", "0"]).contains("texel_m"));
+    assert!(refused(&["--page", "3,3", "--texel", "0.01"]).contains("use a larger texel"));
+    assert!(refused(&["--max-stretch", "0.5"]).contains("max_stretch"));
+    // Millimetres taken for metres: before anything is cut, let alone allocated.
+    assert!(refused(&["--scale", "1000"]).contains("use a larger texel"));
+    assert!(refused(&["--page", "9000,9000"]).contains("use a larger texel"));
+}

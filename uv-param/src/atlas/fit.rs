@@ -1,0 +1,130 @@
+//! Whether some faces can be one chart: they are really laid out, and the layout is measured.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::simple_boundary::boundary_is_simple;
+use crate::arap::iterate_arap;
+use crate::disk::Disk;
+use crate::laplacian::Laplacian;
+use crate::parametrizer::{Parametrizer, StoppingCriterion};
+use crate::symmetric_dirichlet::{Penalty, minimise_penalty};
+use crate::triangle::{Frame, flips};
+
+/// Share of the faces, and of the area, that may be stretched beyond the bound, up to the worst.
+pub(super) const SHARE_BEYOND: f64 = 0.01;
+/// Local/global iterations after which a hopeless layout is given up.
+const FIRST_ITERATIONS: usize = 4;
+/// The rest of them.
+const MORE_ITERATIONS: usize = 16;
+/// Newton iterations that may save a layout that is nearly good enough.
+const NEWTON_ITERATIONS: usize = 10;
+/// Share of faces beyond the bound above which neither will help.
+const HOPELESS: f64 = 0.25;
+/// The same after the local/global iterations.
+const NEARLY: f64 = 0.08;
+/// An iteration that leaves more than this share of the faces beyond the bound, and most of what there was, is the last.
+const SLOW_BEYOND: f64 = 0.02;
+/// Most, in this sense.
+const SLOW_GAIN: f64 = 0.8;
+/// Power of the penalty on faces beyond the bound.
+pub(super) const POWER: i32 = 5;
+/// Relative gain below which iterations stop.
+const TOLERANCE: f64 = 1e-3;
+
+/// How far a chart may be from isometric.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bounds {
+    /// Largest `max(s1, 1 / s2)` of all but [`SHARE_BEYOND`] of the faces and of the area.
+    pub(super) stretch: f64,
+    /// Largest of any face.
+    pub(super) worst: f64,
+}
+
+/// What a layout does to its faces.
+pub(super) struct Distortion {
+    /// Share of faces, or of the area if that is more, beyond the bound.
+    pub(super) beyond: f64,
+    /// Largest stretch; infinite where a face is flipped.
+    pub(super) worst: f64,
+}
+
+impl Distortion {
+    pub(super) fn measure(disk: &Disk, frames: &[Frame], uv: &[[f64; 2]], bounds: Bounds) -> Self {
+        let (mut count, mut beyond_area, mut area, mut worst) = (0, 0.0, 0.0, 1.0_f64);
+        for (face, frame) in disk.faces.iter().zip(frames) {
+            let stretch = frame.jacobian(face.map(|v| uv[v as usize])).largest_stretch();
+            worst = worst.max(stretch);
+            area += frame.area;
+            if stretch > bounds.stretch {
+                count += 1;
+                beyond_area += frame.area;
+            }
+        }
+        Self { beyond: (f64::from(count) / disk.faces.len() as f64).max(beyond_area / area), worst }
+    }
+
+    pub(super) fn within(&self, bounds: Bounds) -> bool {
+        self.beyond <= SHARE_BEYOND && self.worst <= bounds.worst
+    }
+}
+
+/// A layout of `disk` within the bounds, without flips, whose boundary does not cross itself; `None` if none was found.
+/// It begins at `start` (one point per vertex), which need not be good.
+pub(super) fn fit(
+    disk: &Disk,
+    start: Vec<[f64; 2]>,
+    bounds: Bounds,
+    parametrizer: Option<&dyn Parametrizer>,
+) -> Option<Vec<[f64; 2]>> {
+    if disk.faces.len() == 1 {
+        return Some(projection(disk));
+    }
+    let frames = disk.frames();
+    let mut silent = |_| ();
+    let good = |uv: &[[f64; 2]], distortion: &Distortion| {
+        distortion.within(bounds) && flips(uv, &disk.faces) == 0 && boundary_is_simple(disk, uv)
+    };
+    if let Some(parametrizer) = parametrizer {
+        let uv = parametrizer.parametrize(disk, &mut silent).ok()?.uv;
+        return (uv.len() == disk.positions.len() && good(&uv, &Distortion::measure(disk, &frames, &uv, bounds)))
+            .then_some(uv);
+    }
+    let mut uv = start;
+    let mut laplacian = Laplacian::new(disk).ok()?;
+    laplacian.factorize_cotangent(disk, &frames, disk.loops[0][0]).ok()?;
+    let mut distortion = Distortion { beyond: 1.0, worst: f64::INFINITY };
+    for (iterations, limit) in [(FIRST_ITERATIONS, HOPELESS), (MORE_ITERATIONS, NEARLY)] {
+        let stopping = StoppingCriterion { iterations, tolerance: TOLERANCE };
+        iterate_arap(disk, &frames, &mut laplacian, &mut uv, &stopping, &mut silent);
+        distortion = Distortion::measure(disk, &frames, &uv, bounds);
+        if distortion.beyond > limit {
+            return None;
+        }
+    }
+    if !distortion.within(bounds) {
+        if flips(&uv, &disk.faces) > 0 {
+            return None;
+        }
+        let stopping = StoppingCriterion { iterations: NEWTON_ITERATIONS, tolerance: TOLERANCE };
+        let penalty = Penalty::beyond(bounds.stretch, POWER);
+        let mut last = distortion.beyond;
+        let mut done = |uv: &[[f64; 2]]| {
+            distortion = Distortion::measure(disk, &frames, uv, bounds);
+            let hopeless = distortion.beyond > SLOW_BEYOND && distortion.beyond > SLOW_GAIN * last;
+            last = distortion.beyond;
+            hopeless || distortion.within(bounds)
+        };
+        minimise_penalty(disk, &frames, &mut uv, penalty, &stopping, &mut silent, &mut done).ok()?;
+    }
+    good(&uv, &distortion).then_some(uv)
+}
+
+/// The shadow of a piece of surface on the plane that its normals are nearest to: a start for pieces that are nearly flat.
+pub(super) fn projection(disk: &Disk) -> Vec<[f64; 2]> {
+    let normal: Vector3<f64> = (0..disk.faces.len()).map(|f| disk.face_cross(f)).sum();
+    let normal = normal.try_normalize(f64::MIN_POSITIVE).unwrap_or_else(Vector3::z);
+    let aside = Matrix3::identity().column(normal.iamin()).into_owned();
+    let x = aside.cross(&normal).normalize();
+    let y = normal.cross(&x);
+    disk.positions.iter().map(|&p| Vector3::from(p)).map(|p| [p.dot(&x), p.dot(&y)]).collect()
+}

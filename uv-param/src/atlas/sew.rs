@@ -1,0 +1,269 @@
+//! Seams are closed again, the most useful first, as long as what they join can still be laid out within the bounds.
+
+use std::collections::HashSet;
+
+use super::fit::{Bounds, fit};
+use super::layout::Charts;
+use super::motion::motion;
+use super::seams::{Arc, arcs};
+use crate::min_area_rectangle::min_area_rectangle;
+use crate::parametrizer::Parametrizer;
+
+/// Longest side of a chart that sewing may make, relative to the square root of the area: longer ones waste the page.
+const MAX_EXTENT: f64 = 1.3;
+/// Share of an arc's length by which its two sides differ in shape at which closing it is half as attractive.
+const MISFIT: f64 = 0.03;
+/// Misfit beyond which it is not tried.
+const MAX_MISFIT: f64 = 0.12;
+/// Rounds after which nothing much is left to do.
+const MAX_ROUNDS: usize = 60;
+/// Parts of an arc that are tried where the whole cannot be closed: first and last edge, as shares of its length.
+const PARTS: [[f64; 2]; 10] = [
+    [0.0, 0.8],
+    [0.2, 1.0],
+    [0.1, 0.9],
+    [0.0, 0.6],
+    [0.4, 1.0],
+    [0.2, 0.8],
+    [0.0, 0.4],
+    [0.6, 1.0],
+    [0.3, 0.7],
+    [0.0, 0.2],
+];
+/// How far an end of a part may move to a sharp vertex, as a share of the arc.
+const SNAP: f64 = 0.12;
+/// How many of them at most.
+const TRIED_PARTS: usize = 3;
+/// Length of a part below which closing it is not worth a layout, relative to the square root of the area.
+const MIN_PART: f64 = 0.06;
+
+/// Closes seams of charts within bounds.
+pub(super) struct Sewing<'a, 'b> {
+    pub(super) charts: &'b mut Charts<'a>,
+    pub(super) prices: &'b [f32],
+    pub(super) deficits: &'b [f64],
+    pub(super) bounds: Bounds,
+    pub(super) parametrizer: Option<&'b dyn Parametrizer>,
+    /// Arcs (first and last half-edge) that could not be closed.
+    refused: HashSet<(u32, u32)>,
+    /// The same, of which no part could.
+    refused_parts: HashSet<(u32, u32)>,
+}
+
+impl<'a, 'b> Sewing<'a, 'b> {
+    pub(super) fn new(
+        charts: &'b mut Charts<'a>,
+        prices: &'b [f32],
+        deficits: &'b [f64],
+        bounds: Bounds,
+        parametrizer: Option<&'b dyn Parametrizer>,
+    ) -> Self {
+        Self { charts, prices, deficits, bounds, parametrizer, refused: HashSet::new(), refused_parts: HashSet::new() }
+    }
+
+    /// Closes whole arcs until none can be closed any more.
+    pub(super) fn close_arcs(&mut self) {
+        for _ in 0..MAX_ROUNDS {
+            let mut candidates: Vec<(f64, Arc)> = arcs(self.charts)
+                .into_iter()
+                .filter(|arc| !self.refused.contains(&key(&arc.half_edges)))
+                .filter_map(|arc| self.score(&arc).map(|score| (score, arc)))
+                .collect();
+            candidates.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.half_edges[0].cmp(&b.1.half_edges[0])));
+            // The worst half waits: better arcs may come up when the best are closed.
+            let all = candidates.len() < 8;
+            let mut touched = HashSet::new();
+            let (mut closed, mut tried) = (0, 0);
+            let half = candidates.len() / 2;
+            for (i, (_, arc)) in candidates.into_iter().enumerate() {
+                if !all && i > half && closed > 0 {
+                    break;
+                }
+                if touched.contains(&arc.left) || touched.contains(&arc.right) {
+                    continue;
+                }
+                tried += 1;
+                if self.close(&arc.half_edges, arc.left, arc.right) {
+                    touched.extend([arc.left, arc.right]);
+                    closed += 1;
+                } else {
+                    self.refused.insert(key(&arc.half_edges));
+                }
+            }
+            if closed == 0 && tried == 0 {
+                break;
+            }
+        }
+    }
+
+    /// Closes parts of arcs, the longest first, until no more can be closed.
+    pub(super) fn close_parts(&mut self) {
+        let least = MIN_PART * self.charts.surface.area().sqrt();
+        for _ in 0..MAX_ROUNDS {
+            let mut candidates: Vec<(f64, Arc)> = arcs(self.charts)
+                .into_iter()
+                .filter(|arc| !self.charts.wanted[arc.half_edges[0] as usize])
+                .filter(|arc| !self.refused_parts.contains(&key(&arc.half_edges)))
+                .map(|arc| (self.price(&arc.half_edges), arc))
+                .filter(|(price, _)| *price > least)
+                .collect();
+            candidates.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.half_edges[0].cmp(&b.1.half_edges[0])));
+            let mut touched = HashSet::new();
+            let mut closed = 0;
+            for (_, arc) in candidates {
+                if touched.contains(&arc.left) || touched.contains(&arc.right) {
+                    continue;
+                }
+                if self.close_part(&arc, least) {
+                    touched.extend([arc.left, arc.right]);
+                    closed += 1;
+                } else {
+                    self.refused_parts.insert(key(&arc.half_edges));
+                }
+            }
+            if closed == 0 {
+                break;
+            }
+        }
+    }
+
+    /// Closes the longest part of an arc that can be closed.
+    fn close_part(&mut self, arc: &Arc, least: f64) -> bool {
+        let count = arc.half_edges.len();
+        // The seam that is left over ends inside a chart: at the sharpest vertex near.
+        let vertex = |i: usize| {
+            let h = arc.half_edges[i.min(count - 1)] as usize;
+            self.charts.surface.ends(h)[usize::from(i == count)]
+        };
+        let reach = (SNAP * count as f64).ceil() as usize;
+        let index = |t: f64| {
+            let middle = (t * count as f64).round() as usize;
+            if middle == 0 || middle == count {
+                return middle;
+            }
+            let near = middle.saturating_sub(reach).max(1)..=(middle + reach).min(count - 1);
+            near.max_by(|&a, &b| {
+                let deficit = |i: usize| self.deficits[vertex(i) as usize];
+                deficit(a).total_cmp(&deficit(b)).then(b.abs_diff(middle).cmp(&a.abs_diff(middle)))
+            })
+            .unwrap_or(middle)
+        };
+        let part = |[from, to]: [f64; 2]| index(from)..index(to);
+        let mut parts: Vec<(f64, std::ops::Range<usize>)> = PARTS
+            .iter()
+            .map(|&shares| part(shares))
+            .filter(|range| !range.is_empty() && range.len() < count)
+            .filter_map(|range| {
+                let edges = &arc.half_edges[range.clone()];
+                let misfit = motion(self.charts, edges, arc.left == arc.right).residual / self.length(edges);
+                let gain = self.price(edges);
+                (misfit < MAX_MISFIT && gain > least).then(|| (gain * (-misfit / MISFIT).exp2(), range))
+            })
+            .collect();
+        parts.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.start.cmp(&b.1.start)));
+        parts.into_iter().take(TRIED_PARTS).any(|(_, range)| self.close(&arc.half_edges[range], arc.left, arc.right))
+    }
+
+    fn price(&self, half_edges: &[u32]) -> f64 {
+        half_edges.iter().map(|&h| f64::from(self.prices[h as usize])).sum()
+    }
+
+    /// How much closing an arc would help; `None` if it cannot.
+    fn score(&self, arc: &Arc) -> Option<f64> {
+        if self.charts.wanted[arc.half_edges[0] as usize] {
+            return None;
+        }
+        let gain = self.price(&arc.half_edges);
+        let length = self.length(&arc.half_edges);
+        let misfit = motion(self.charts, &arc.half_edges, arc.left == arc.right).residual / length;
+        if misfit > MAX_MISFIT {
+            return None;
+        }
+        let area = self.charts.area(arc.left).min(self.charts.area(arc.right));
+        Some(gain / area.sqrt() * (-misfit / MISFIT).exp2())
+    }
+
+    fn length(&self, half_edges: &[u32]) -> f64 {
+        half_edges.iter().map(|&h| self.charts.surface.edge(h as usize).norm()).sum()
+    }
+
+    /// Closes the seam along some half-edges if that can be laid out.
+    fn close(&mut self, half_edges: &[u32], left: u32, right: u32) -> bool {
+        let surface = self.charts.surface;
+        let same = left == right;
+        let faces = if same {
+            self.charts.members[left as usize].clone()
+        } else {
+            merged(&self.charts.members[left as usize], &self.charts.members[right as usize])
+        };
+        let both = |h: u32| std::iter::once(h as usize).chain(surface.twin(h as usize));
+        // Between two charts every other common edge stays open.
+        let opened: Vec<usize> = if same { Vec::new() } else { self.common_edges(left, right) };
+        let before: Vec<bool> = opened.iter().map(|&h| self.charts.cut[h]).collect();
+        for &h in &opened {
+            self.charts.cut[h] = true;
+        }
+        for h in half_edges.iter().flat_map(|&h| both(h)) {
+            self.charts.cut[h] = false;
+        }
+        let to_left = motion(self.charts, half_edges, same);
+        let longest = MAX_EXTENT * surface.area().sqrt();
+        let laid_out = self.charts.disk(&faces).and_then(|disk| {
+            let chart = &self.charts.chart;
+            let moved = |f: usize, at| if !same && chart[f] == right { to_left.apply(at) } else { at };
+            let start = self.charts.vertex_uv(&faces, &disk, moved);
+            fit(&disk, start, self.bounds, self.parametrizer).filter(|uv| extent(uv) < longest).map(|uv| (disk, uv))
+        });
+        let Some((disk, uv)) = laid_out else {
+            for h in half_edges.iter().flat_map(|&h| both(h)) {
+                self.charts.cut[h] = same;
+            }
+            for (&h, before) in opened.iter().zip(before) {
+                self.charts.cut[h] = before;
+            }
+            return false;
+        };
+        self.charts.place(&faces, &disk, &uv);
+        if same {
+            return true;
+        }
+        for &f in &self.charts.members[right as usize] {
+            self.charts.chart[f as usize] = left;
+        }
+        self.charts.members[right as usize] = Vec::new();
+        self.charts.members[left as usize] = faces;
+        true
+    }
+
+    /// Half-edges, on both sides, between two charts.
+    fn common_edges(&self, left: u32, right: u32) -> Vec<usize> {
+        let surface = self.charts.surface;
+        let (one, other) = if self.charts.members[left as usize].len() <= self.charts.members[right as usize].len() {
+            (left, right)
+        } else {
+            (right, left)
+        };
+        let members = &self.charts.members[one as usize];
+        let around = members.iter().flat_map(|&f| 3 * f as usize..3 * f as usize + 3);
+        around
+            .filter_map(|h| surface.twin(h).filter(|&twin| self.charts.chart[twin / 3] == other).map(|twin| [h, twin]))
+            .flatten()
+            .collect()
+    }
+}
+
+/// Longer side of the smallest rectangle around a layout, metres.
+fn extent(uv: &[[f64; 2]]) -> f64 {
+    min_area_rectangle(uv).map_or(f64::INFINITY, |rectangle| rectangle.width.max(rectangle.height))
+}
+
+fn key(half_edges: &[u32]) -> (u32, u32) {
+    (half_edges[0], half_edges[half_edges.len() - 1])
+}
+
+/// Two ascending lists as one.
+fn merged(a: &[u32], b: &[u32]) -> Vec<u32> {
+    let mut all = [a, b].concat();
+    all.sort_unstable();
+    all
+}
