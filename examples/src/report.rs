@@ -38,6 +38,10 @@ pub struct Report {
     pub reach_share: f64,
     /// Share of the wanted paint that no pose of the robot can spray.
     pub unreachable_paint_share: f64,
+    /// Targets that keep more clearance since the rehearsal in wind.
+    pub targets_kept_off: usize,
+    /// Targets given up in the rehearsal.
+    pub targets_left_bare: usize,
     /// Distance between the point hit and the point meant, root mean square, valve open, preset `mocap`.
     pub hit_error_rms_m: f64,
     /// The same, 95th percentile.

@@ -57,6 +57,8 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         unreachable_normal_share: deviations.unreachable,
         reach_share: mission.decision.share_in_reach(),
         unreachable_paint_share: mission.share_out_of_reach(),
+        targets_kept_off: mission.kept_off,
+        targets_left_bare: mission.left_bare,
         hit_error_rms_m: flown.hit_error_rms,
         hit_error_p95_m: flown.hit_error_p95,
         hit_error_rms_slam_m: slam.hit_error_rms,

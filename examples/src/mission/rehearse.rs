@@ -42,7 +42,7 @@ pub(super) struct Rehearsed {
     pub(super) left_bare: usize,
 }
 
-/// Plans, flies, and plans again until no wind brings the robot too near.
+/// Plans, flies, and plans again until no wind brings the robot too near, [`ROUNDS`] times at most; then what still does is left bare.
 pub(super) fn rehearsed_plan(
     targets: &[Target],
     surface: &PaintSurface,

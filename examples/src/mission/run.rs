@@ -25,6 +25,9 @@ pub struct Mission {
     pub(super) planning: f64,
     /// Paint of layers that no pose of the robot can spray at all, m³.
     pub(super) unreachable_paint: f64,
+    /// Targets that keep more clearance since the rehearsal in wind, and those it gave up.
+    pub(super) kept_off: usize,
+    pub(super) left_bare: usize,
 }
 
 impl Mission {
@@ -33,9 +36,10 @@ impl Mission {
         let Decision { layers, surface, robot, settings, .. } = &decision;
         let planned = plan(layers, surface, robot, settings)?;
         let (planning, unreachable_paint) = (planned.seconds, planned.unreachable_paint);
+        let (kept_off, left_bare) = (planned.kept_off, planned.left_bare);
         let flights = fly(planned, surface, robot, settings)?;
         let (film, pixels) = spray(&flights, surface, settings)?;
-        let mission = Self { decision, flights, film, pixels, planning, unreachable_paint };
+        let mission = Self { decision, flights, film, pixels, planning, unreachable_paint, kept_off, left_bare };
         let share = mission.share_out_of_reach();
         if share > MAX_UNREACHABLE_SHARE {
             return Err(MissionError::OutOfReach { percent: 100.0 * share });

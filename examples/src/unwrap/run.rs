@@ -12,6 +12,7 @@ use super::files::{save, suffix};
 use super::page_picture::{carried_over, checkerboard};
 use super::report::UnwrapReport;
 use crate::mesh_io::{TriangleMesh, read_mesh};
+use crate::picture_file::open_upright;
 use crate::progress::Stage;
 use crate::report::save_figures;
 
@@ -114,5 +115,5 @@ fn read_picture(path: &Path, mesh: &TriangleMesh, arguments: &Arguments) -> Resu
     if mesh.uv.is_none() {
         return Err(UnwrapError::NoCoordinates(arguments.mesh.clone()));
     }
-    Ok(image::open(path).map_err(|e| UnwrapError::unreadable(path, &e))?.to_rgb8())
+    Ok(open_upright(path).map_err(|e| UnwrapError::unreadable(path, &e))?.to_rgb8())
 }

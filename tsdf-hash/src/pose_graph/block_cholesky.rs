@@ -149,3 +149,14 @@ impl Ordering {
         Ok(Self { forward: spread(&forward), inverse: spread(&inverse) })
     }
 }
+
+/// Number of the block of every pose that is free, and how many there are.
+pub(crate) fn free_blocks(fixed: &[bool]) -> (Vec<Option<usize>>, usize) {
+    let mut count = 0;
+    let number = |fixed: &bool| {
+        count += usize::from(!fixed);
+        (!fixed).then(|| count - 1)
+    };
+    let blocks = fixed.iter().map(number).collect();
+    (blocks, count)
+}

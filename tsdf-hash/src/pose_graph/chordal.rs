@@ -4,7 +4,7 @@
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use crate::error::Error;
-use crate::pose_graph::block_cholesky::BlockCholesky;
+use crate::pose_graph::block_cholesky::{BlockCholesky, free_blocks};
 use crate::pose_graph::factors::{BetweenFactor, PriorFactor};
 
 pub(crate) fn initialise(
@@ -13,14 +13,7 @@ pub(crate) fn initialise(
     betweens: &[BetweenFactor],
     priors: &[PriorFactor],
 ) -> Result<Vec<Isometry3<f64>>, Error> {
-    let mut count = 0;
-    let blocks: Vec<Option<usize>> = fixed
-        .iter()
-        .map(|fixed| {
-            count += usize::from(!fixed);
-            (!fixed).then(|| count - 1)
-        })
-        .collect();
+    let (blocks, count) = free_blocks(fixed);
     if count == 0 {
         return Ok(poses.to_vec());
     }

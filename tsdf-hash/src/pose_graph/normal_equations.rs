@@ -3,7 +3,7 @@
 use nalgebra::{DVector, Isometry3, Matrix6, Vector6};
 
 use crate::error::Error;
-use crate::pose_graph::block_cholesky::{BlockCholesky, Place};
+use crate::pose_graph::block_cholesky::{BlockCholesky, Place, free_blocks};
 use crate::pose_graph::factors::{BetweenFactor, PriorFactor};
 use crate::pose_graph::se3::right_jacobian_inverse;
 
@@ -20,14 +20,7 @@ pub(crate) struct NormalEquations {
 impl NormalEquations {
     /// With the pattern of a graph.
     pub(crate) fn new(fixed: &[bool], betweens: &[BetweenFactor]) -> Result<Self, Error> {
-        let mut count = 0;
-        let blocks: Vec<Option<usize>> = fixed
-            .iter()
-            .map(|fixed| {
-                count += usize::from(!fixed);
-                (!fixed).then(|| count - 1)
-            })
-            .collect();
+        let (blocks, count) = free_blocks(fixed);
         let pair = |f: &BetweenFactor| Some([blocks[f.first]?, blocks[f.second]?]);
         let h = BlockCholesky::new(count, 6, betweens.iter().filter_map(pair))?;
         let places = betweens.iter().map(|f| pair(f).map(|[a, b]| h.place(a, b))).collect();
