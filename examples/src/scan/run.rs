@@ -1,65 +1,24 @@
 //! The mapping run: every frame once, in order.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use cpu_time::ProcessTime;
 use nalgebra::Isometry3;
-use tsdf_hash::{ColourView, DepthView, IncrementalMesher, KeyframeIndex, Map, MapFile, Mesh, RayCastSettings};
+use tsdf_hash::{ColourView, DepthView, IncrementalMesher, KeyframeIndex, Map, Mesh};
 use vio_ekf::{Alignment, Stamp, Trajectory, ate};
 
-use super::checkpoint::{CheckpointSettings, Checkpoints, Progress, metadata, stored_keyframes};
+use super::checkpoint::{Checkpoints, Progress, metadata};
 use super::correction::{Correction, LoopMetrics, Loops};
 use super::decode::Images;
 use super::error::ScanError;
-use super::map_store::{Device, MapStore};
+use super::map_store::MapStore;
 use super::pose_source::{Odometry, PoseSource, TrackingMetrics};
 use super::quality::Quality;
+use super::ray_cast_check::{RayCastCheck, ray_cast_check};
 use super::sequence::{FrameFiles, Sequence};
+use super::settings::ScanSettings;
+use super::start::Start;
 use crate::progress::Stage;
-
-/// How a sequence is mapped.
-#[derive(Debug, Clone)]
-pub struct ScanSettings {
-    /// The map.
-    pub map: tsdf_hash::Settings,
-    /// Which poses are believed.
-    pub poses: PoseSource,
-    /// Frames between two ray casts of the map from where the camera was, and between two looks whether depth, camera and poses agree.
-    pub ray_cast_every: usize,
-    /// Where the map is kept.
-    pub device: Device,
-    /// File of the disk tier, if there is to be one.
-    pub swap: Option<PathBuf>,
-    /// A stored map to go on from; its settings take the place of those here, but for memory and threads. If it was stored
-    /// by a run over the same sequence, its frames are not fused again.
-    pub resume: Option<PathBuf>,
-    /// A stored map in which the camera is looked for, and tracked; in place of `resume`.
-    pub relocalise: Option<PathBuf>,
-    /// Whether frames are fused; without, a stored map stays as it is.
-    pub fuse: bool,
-    /// Whether loops are looked for, and the map follows the corrected poses.
-    pub loops: bool,
-    /// Where the map is saved on the way.
-    pub checkpoint: Option<CheckpointSettings>,
-}
-
-impl Default for ScanSettings {
-    fn default() -> Self {
-        let map = tsdf_hash::Settings::default();
-        Self {
-            map,
-            poses: PoseSource::Given,
-            ray_cast_every: 10,
-            device: Device::Cpu,
-            swap: None,
-            resume: None,
-            relocalise: None,
-            fuse: true,
-            loops: false,
-            checkpoint: None,
-        }
-    }
-}
 
 /// A mapped sequence.
 pub struct Scan {
@@ -106,17 +65,6 @@ pub struct ScanMetrics {
     pub loops: Option<LoopMetrics>,
     /// Position error of the tracked poses against those recorded, rigidly aligned, root mean square, metres.
     pub ate_se3_rmse: Option<f64>,
-}
-
-/// The map, seen from where a frame was taken, beside that frame.
-#[derive(Debug, Clone, Copy)]
-pub struct RayCastCheck {
-    /// Processor time of the ray cast, seconds.
-    pub seconds: f64,
-    /// Mean distance between the depth cast and the depth measured, over the pixels that have both, metres.
-    pub depth_error: f64,
-    /// Share of the measured pixels at which the map has a surface.
-    pub fill: f64,
 }
 
 impl Scan {
@@ -402,72 +350,4 @@ fn tracked_error(sequence: &Sequence, fused: &[(usize, Isometry3<f64>)]) -> Opti
     let recorded = |(index, pose): &(usize, Isometry3<f64>)| Some((sequence.frames[*index].world_from_camera?, *pose));
     let (given, tracked): (Vec<_>, Vec<_>) = fused.iter().filter_map(recorded).unzip();
     ate(&given, &tracked, Alignment::Se3).ok().map(|found| found.position.rmse)
-}
-
-/// What a run starts with.
-struct Start {
-    map: Map,
-    /// What an earlier run over the same sequence had done.
-    progress: Option<Progress>,
-    keyframes: KeyframeIndex,
-}
-
-impl Start {
-    fn open(folder: &Path, settings: &ScanSettings) -> Result<Self, ScanError> {
-        let Some(path) = settings.resume.as_ref().or(settings.relocalise.as_ref()) else {
-            let map = match &settings.swap {
-                Some(swap) => Map::with_swap(settings.map, swap)?,
-                None => Map::new(settings.map)?,
-            };
-            return Ok(Self { map, progress: None, keyframes: KeyframeIndex::new() });
-        };
-        let stored = |source| ScanError::Stored { path: path.display().to_string(), source };
-        let file = MapFile::open(path).map_err(stored)?;
-        let keyframes = stored_keyframes(path, &file)?;
-        let mut progress = None;
-        if settings.relocalise.is_some() {
-            if keyframes.as_ref().is_none_or(KeyframeIndex::is_empty) {
-                return Err(ScanError::Checkpoint {
-                    path: path.display().to_string(),
-                    why: "no keyframes were stored with the map, by which a camera could be found in it: scan it again"
-                        .into(),
-                });
-            }
-        } else {
-            progress = Progress::read(path, &file, folder)?;
-        }
-        if let Some(progress) = &progress {
-            eprintln!("{}: goes on after the frame of {} s", path.display(), progress.last_stamp);
-        }
-        let tsdf_hash::Settings { max_bytes, threads, memory, .. } = settings.map;
-        let continued = tsdf_hash::Settings { max_bytes, threads, memory, ..*file.settings() };
-        let map = file.into_map(continued, settings.swap.as_deref()).map_err(stored)?;
-        Ok(Self { map, progress, keyframes: keyframes.unwrap_or_default() })
-    }
-}
-
-/// `None` if the map has no surface where the frame has one.
-fn ray_cast_check(
-    store: &mut MapStore,
-    sequence: &Sequence,
-    images: &Images,
-    pose: &Isometry3<f64>,
-) -> Result<Option<RayCastCheck>, ScanError> {
-    let depth = images.depth(sequence.intrinsics, sequence.depth_scale);
-    let &tsdf_hash::Settings { min_depth, max_depth, threads, .. } = store.settings();
-    let settings = RayCastSettings { min_depth, max_depth, colour: true, threads };
-    let start = ProcessTime::now();
-    let view = store.dense().ray_cast(&depth.intrinsics, depth.width, depth.height, pose, &settings)?;
-    let seconds = start.elapsed().as_secs_f64();
-    let measured = images.metres(sequence.depth_scale).map(|z| Some(z).filter(|z| (min_depth..=max_depth).contains(z)));
-    let (mut pixels, mut hits, mut error) = (0_usize, 0_usize, 0.0);
-    for (z, seen) in measured.zip(&view.depth).filter_map(|(z, seen)| Some((z?, *seen))) {
-        pixels += 1;
-        if seen > 0.0 {
-            hits += 1;
-            error += (f64::from(seen) - z).abs();
-        }
-    }
-    let check = RayCastCheck { seconds, depth_error: error / hits as f64, fill: hits as f64 / pixels as f64 };
-    Ok(Some(check).filter(|_| hits > 0))
 }
