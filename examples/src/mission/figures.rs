@@ -10,15 +10,13 @@ use super::error::MissionError;
 use super::fly::LayerFlight;
 use super::inspect::Inspection;
 use super::plan::path_length;
-use super::rehearse::gap;
+use super::rehearse::{GAP_STRIDE, gap};
 use super::run::Mission;
 use super::settings::MissionSettings;
 use crate::adapters::Robot;
 use crate::appearance::DENSITY;
 use crate::report::{Report, peak_resident_bytes};
 
-/// Samples between two collision checks in a flight: 50 ms, 2.5 cm at full speed.
-const COLLISION_STRIDE: usize = 5;
 /// Step of the dense check of the planned limits, seconds; the certificates do not depend on it.
 const LIMIT_STEP: f64 = 0.02;
 
@@ -139,7 +137,7 @@ fn open_time(plan: &Plan) -> f64 {
 
 /// Moments of a flight at which the robot overlaps the surface.
 fn collisions(robot: &Robot, surface: &TriangleSurface, log: &FlightLog) -> usize {
-    log.samples.iter().step_by(COLLISION_STRIDE).filter(|sample| gap(robot, surface, sample, 0.0) < 0.0).count()
+    log.samples.iter().step_by(GAP_STRIDE).filter(|sample| gap(robot, surface, sample, 0.0) < 0.0).count()
 }
 
 /// Moments at which the plan exceeds speed or acceleration, or the flown gun its joint limits.
@@ -196,7 +194,7 @@ mod tests {
         let world = &test_panel::surface().world;
         let robot = Robot::new(Ptu::new(settings.ptu).unwrap());
         assert_eq!(collisions(&robot, world, &flight), 0);
-        let checked = flight.samples.len().div_ceil(COLLISION_STRIDE);
+        let checked = flight.samples.len().div_ceil(GAP_STRIDE);
         assert_eq!(collisions(&Robot { body_radius: 3.0, ..robot }, world, &flight), checked);
     }
 

@@ -26,8 +26,8 @@ const BEYOND: f64 = 0.01;
 const NEIGHBOURS: usize = 2;
 /// A clearance that no target has, metres.
 const BARE: f64 = 10.0;
-/// Samples between two looks: 50 ms, 2.5 cm at full speed.
-const STRIDE: usize = 5;
+/// Samples of a flight between two looks at the gap: 50 ms, 2.5 cm at full speed.
+pub(super) const GAP_STRIDE: usize = 5;
 /// Winds of the rehearsals are not that of the flight.
 const SALT: u64 = 0x5EED_0F4E;
 
@@ -89,7 +89,7 @@ fn missing_clearance(
     for wind in 0..WINDS {
         let seed = settings.seed ^ SALT.wrapping_add(wind);
         let log = fly_plan(plan, surface, robot, settings, &flight_settings(plan, seed))?;
-        for sample in log.samples.iter().step_by(STRIDE) {
+        for sample in log.samples.iter().step_by(GAP_STRIDE) {
             let short = MARGIN - gap(robot, &surface.world, sample, MARGIN);
             if short > 0.0 {
                 let at = plan.waypoints.partition_point(|w| w.time <= sample.time).clamp(1, plan.waypoints.len());
