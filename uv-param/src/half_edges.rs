@@ -13,43 +13,49 @@ pub(crate) struct EdgeTable {
 
 impl EdgeTable {
     pub(crate) fn new(vertices: usize, faces: &[[u32; 3]]) -> Self {
-        // Counting sort by the smaller end, then a tiny sort inside each bucket: linear for meshes.
-        let mut bucket = vec![0u32; vertices + 1];
-        let ends = |h: usize| {
+        // Buckets by the smaller end, then a tiny sort by the larger one inside each: linear for meshes.
+        let along = |h: usize| {
             let (a, b) = half_edge(faces, h);
-            (a.min(b), a.max(b))
+            (a.min(b), u64::from(a.max(b)) << 32 | h as u64)
         };
-        for h in 0..3 * faces.len() {
-            bucket[ends(h).0 as usize + 1] += 1;
-        }
-        for v in 0..vertices {
-            bucket[v + 1] += bucket[v];
-        }
-        let mut cursor = bucket.clone();
-        let mut half_edges = vec![0u32; 3 * faces.len()];
-        for h in 0..3 * faces.len() {
-            let slot = &mut cursor[ends(h).0 as usize];
-            half_edges[*slot as usize] = h as u32;
-            *slot += 1;
-        }
+        let (buckets, mut keys) = grouped(vertices, (0..3 * faces.len()).map(along));
         let mut starts = Vec::with_capacity(2 * faces.len());
-        for v in 0..vertices {
-            let (from, to) = (bucket[v] as usize, bucket[v + 1] as usize);
-            half_edges[from..to].sort_unstable_by_key(|&h| (ends(h as usize).1, h));
-            for i in from..to {
-                if i == from || ends(half_edges[i] as usize).1 != ends(half_edges[i - 1] as usize).1 {
-                    starts.push(i as u32);
-                }
-            }
+        for bucket in buckets.windows(2) {
+            let (from, to) = (bucket[0] as usize, bucket[1] as usize);
+            keys[from..to].sort_unstable();
+            starts.extend((from..to).filter(|&i| i == from || keys[i] >> 32 != keys[i - 1] >> 32).map(|i| i as u32));
         }
-        starts.push(half_edges.len() as u32);
-        Self { half_edges, starts }
+        starts.push(keys.len() as u32);
+        Self { half_edges: keys.into_iter().map(|key| key as u32).collect(), starts }
     }
 
     /// The half-edges along each undirected edge.
     pub(crate) fn groups(&self) -> impl Iterator<Item = &[u32]> {
         self.starts.windows(2).map(|w| &self.half_edges[w[0] as usize..w[1] as usize])
     }
+}
+
+/// Items in buckets by a number below `buckets`, in their order within each (counting sort): where each bucket starts, one
+/// more than there are, and the items.
+pub(crate) fn grouped<T: Copy + Default>(
+    buckets: usize,
+    items: impl ExactSizeIterator<Item = (u32, T)> + Clone,
+) -> (Vec<u32>, Vec<T>) {
+    let mut starts = vec![0u32; buckets + 1];
+    for (bucket, _) in items.clone() {
+        starts[bucket as usize + 1] += 1;
+    }
+    for bucket in 0..buckets {
+        starts[bucket + 1] += starts[bucket];
+    }
+    let mut cursor = starts.clone();
+    let mut sorted = vec![T::default(); items.len()];
+    for (bucket, item) in items {
+        let slot = &mut cursor[bucket as usize];
+        sorted[*slot as usize] = item;
+        *slot += 1;
+    }
+    (starts, sorted)
 }
 
 /// Start and end vertex of half-edge `h`.

@@ -1,6 +1,7 @@
 //! A triangle soup as files hold it: what is refused, welded and dropped before anything else is asked of it.
 
 use crate::error::Error;
+use crate::half_edges::grouped;
 use crate::triangle;
 
 /// A face whose height is below this fraction of its longest edge has no measurable shape: it is the relative rounding
@@ -76,17 +77,21 @@ pub(crate) fn faces_with_shape(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Sh
     };
     let mut kept: Vec<u32> = (0..faces.len() as u32).filter(has_shape).collect();
     let degenerate = faces.len() - kept.len();
-    let sorted = |f: u32| {
+    let by_corners = |&f: &u32| {
         let mut corners = faces[f as usize];
         corners.sort_unstable();
-        corners
+        (corners[0], [corners[1], corners[2], f])
     };
-    let shaped = kept.len();
-    kept.sort_by_cached_key(|&f| (sorted(f), f));
-    kept.dedup_by(|a, b| sorted(*a) == sorted(*b));
-    kept.sort_unstable();
-    let duplicate = shaped - kept.len();
-    ShapedFaces { kept, degenerate, duplicate }
+    let (buckets, mut rest) = grouped(positions.len(), kept.iter().map(by_corners));
+    let mut repeated = vec![];
+    for bucket in buckets.windows(2) {
+        let same = &mut rest[bucket[0] as usize..bucket[1] as usize];
+        same.sort_unstable();
+        repeated.extend(same.windows(2).filter(|pair| pair[0][..2] == pair[1][..2]).map(|pair| pair[1][2]));
+    }
+    repeated.sort_unstable();
+    kept.retain(|f| repeated.binary_search(f).is_err());
+    ShapedFaces { kept, degenerate, duplicate: repeated.len() }
 }
 
 /// The smallest member of the set that holds `f`, in a forest of parents that never point upwards.

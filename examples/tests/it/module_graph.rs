@@ -1,4 +1,4 @@
-//! Which source file of a crate imports which, read from the text: modules, items, `use` declarations and paths.
+//! Which source file of a crate imports which: modules, items, `use` declarations and paths, parsed by syn.
 //!
 //! Names are resolved through re-exports to the file that defines them, so `crate::Item` counts as an import of the item's own
 //! file, not of `lib.rs`. What does not count: a `mod` declaration, a re-export of a descendant (`pub use child::Item`) that
@@ -6,6 +6,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+
+use proc_macro2::{TokenStream, TokenTree};
+use syn::visit::{self, Visit};
+use syn::{Attribute, Item, ItemUse, Macro, UseTree, Visibility};
 
 /// Imports between the files of one crate root: from a file to another, with the names that it takes from there.
 pub(crate) type Imports = BTreeMap<(PathBuf, PathBuf), BTreeSet<String>>;
@@ -45,13 +49,12 @@ impl ModuleGraph {
     pub(crate) fn read(root: &Path) -> std::io::Result<Self> {
         let mut graph = Self { modules: Vec::new() };
         let folder = root.parent().unwrap_or(Path::new("")).to_path_buf();
-        let tokens = tokens(&std::fs::read_to_string(root)?);
-        graph.add(root, &folder, None, &tokens)?;
+        graph.add(root, &folder, None, &parse(root)?)?;
         Ok(graph)
     }
 
-    /// Adds the module of these tokens, and those below it; `folder` is where the files of its children lie.
-    fn add(&mut self, file: &Path, folder: &Path, parent: Option<usize>, tokens: &[String]) -> std::io::Result<usize> {
+    /// Adds the module of these items, and those below it; `folder` is where the files of its children lie.
+    fn add(&mut self, file: &Path, folder: &Path, parent: Option<usize>, items: &[Item]) -> std::io::Result<usize> {
         let index = self.modules.len();
         self.modules.push(Module {
             file: file.to_path_buf(),
@@ -61,77 +64,22 @@ impl ModuleGraph {
             uses: Vec::new(),
             paths: BTreeSet::new(),
         });
-        let (mut at, mut depth, mut explicit) = (0, 0_usize, None);
-        while at < tokens.len() {
-            let word = tokens[at].as_str();
-            let next = tokens.get(at + 1).map_or("", String::as_str);
-            match word {
-                "#" => {
-                    let end = attribute_end(tokens, at);
-                    let attribute = &tokens[at..end];
-                    if is_test_only(attribute) {
-                        at = item_end(tokens, end);
-                        continue;
-                    }
-                    // `#[path = "file.rs"]`: strings are kept with their quotes.
-                    if attribute.iter().any(|t| t == "path") {
-                        explicit =
-                            attribute.iter().find(|t| t.starts_with('"')).map(|t| t.trim_matches('"').to_owned());
-                    }
-                    at = end;
-                    continue;
-                }
-                "{" => depth += 1,
-                "}" => depth = depth.saturating_sub(1),
-                // Not the `use<...>` of a type.
-                "use" if next != "<" => {
-                    let end = tokens[at..].iter().position(|t| t == ";").map_or(tokens.len(), |k| at + k);
-                    let public = at > 0 && (tokens[at - 1] == "pub" || tokens[at - 1] == ")");
-                    use_tree(&tokens[at + 1..end], &[], public, &mut self.modules[index].uses);
-                    at = end;
-                }
-                "mod" if depth == 0 && is_name(next) => {
-                    let child = if tokens.get(at + 2).is_some_and(|t| t == "{") {
-                        let end = block_end(tokens, at + 2);
-                        let below = &tokens[at + 3..end - 1];
-                        at = end - 1;
-                        self.add(file, &folder.join(next), Some(index), below)?
-                    } else {
-                        let path = module_file(file, folder, next, explicit.take().as_deref());
-                        let is_mod_rs = path.file_name().is_some_and(|n| n == "mod.rs");
-                        let below = if is_mod_rs { path.with_file_name("") } else { path.with_extension("") };
-                        let text = std::fs::read_to_string(&path);
-                        let in_file =
-                            |e: std::io::Error| std::io::Error::new(e.kind(), format!("{}: {e}", path.display()));
-                        at += 1;
-                        self.add(&path, &below, Some(index), &self::tokens(&text.map_err(in_file)?))?
-                    };
-                    self.modules[index].children.insert(next.to_owned(), child);
-                }
-                "fn" | "struct" | "enum" | "trait" | "type" | "const" | "static"
-                    if depth == 0 && is_name(next) && !["fn", "unsafe", "extern", "mut", "_"].contains(&next) =>
-                {
-                    self.modules[index].items.insert(next.to_owned());
-                    at += 1;
-                }
-                "macro_rules" if next == "!" => {
-                    let name = tokens.get(at + 2).cloned().unwrap_or_default();
-                    self.modules[index].items.insert(name);
-                    at = block_end(tokens, at + 3) - 1;
-                }
-                "pub" if next == "(" => {
-                    // The place in `pub(in ...)` is no import; `use` asks for the bracket.
-                    at += tokens[at..].iter().position(|t| t == ")").unwrap_or(0);
-                }
-                _ if is_name(word) && !(at > 0 && (tokens[at - 1] == "." || tokens[at - 1] == "::")) => {
-                    let (path, end) = path_at(tokens, at);
-                    self.modules[index].paths.insert(path);
-                    at = end;
-                    continue;
-                }
-                _ => {}
-            }
-            at += 1;
+        for item in items.iter().filter(|item| !attributes(item).iter().any(is_test_only)) {
+            let Item::Mod(child) = item else {
+                self.modules[index].items.extend(name_of(item));
+                self.modules[index].visit_item(item);
+                continue;
+            };
+            let name = child.ident.to_string();
+            let below = if let Some((_, items)) = &child.content {
+                self.add(file, &folder.join(&name), Some(index), items)?
+            } else {
+                let path = module_file(file, folder, &name, &child.attrs);
+                let is_mod_rs = path.file_name().is_some_and(|n| n == "mod.rs");
+                let below = if is_mod_rs { path.with_file_name("") } else { path.with_extension("") };
+                self.add(&path, &below, Some(index), &parse(&path)?)?
+            };
+            self.modules[index].children.insert(name, below);
         }
         Ok(index)
     }
@@ -318,153 +266,126 @@ pub(crate) fn circles(imports: &Imports) -> Vec<BTreeSet<PathBuf>> {
     found
 }
 
-/// Words, numbers, strings with their quotes, `::` and single signs; comments left out.
-fn tokens(text: &str) -> Vec<String> {
-    let bytes = text.as_bytes();
-    let mut found = Vec::new();
-    let mut at = 0;
-    while at < bytes.len() {
-        let rest = &text[at..];
-        let c = bytes[at];
-        if rest.starts_with("//") {
-            at += rest.find('\n').unwrap_or(rest.len());
-        } else if rest.starts_with("/*") {
-            at += block_comment(rest);
-        } else if let Some(length) = raw_string(rest) {
-            found.push("\"\"".to_owned());
-            at += length;
-        } else if c == b'"' || rest.starts_with("b\"") || rest.starts_with("c\"") {
-            let start = at + usize::from(c != b'"');
-            let mut end = start + 1;
-            while end < bytes.len() && bytes[end] != b'"' {
-                end += 1 + usize::from(bytes[end] == b'\\');
-            }
-            end = (end + 1).min(bytes.len());
-            found.push(text.get(start..end).unwrap_or("\"\"").to_owned());
-            at = end;
-        } else if c == b'\'' {
-            at += quote(rest);
-        } else if c.is_ascii_alphanumeric() || c == b'_' {
-            let rest = rest.strip_prefix("r#").unwrap_or(rest);
-            at = text.len() - rest.len();
-            let length = rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len());
-            found.push(rest[..length].to_owned());
-            at += length;
-        } else if rest.starts_with("::") {
-            found.push("::".to_owned());
-            at += 2;
-        } else {
-            let length = rest.chars().next().map_or(1, char::len_utf8);
-            if !c.is_ascii_whitespace() {
-                found.push(rest[..length].to_owned());
-            }
-            at += length;
+/// What is read from the items of a module: their `use` declarations and paths, those within functions included.
+impl<'ast> Visit<'ast> for Module {
+    fn visit_item(&mut self, item: &'ast Item) {
+        if !attributes(item).iter().any(is_test_only) {
+            visit::visit_item(self, item);
         }
     }
-    found
-}
 
-fn block_comment(text: &str) -> usize {
-    let (mut depth, mut at) = (0_usize, 0);
-    let bytes = text.as_bytes();
-    while at + 1 < bytes.len() {
-        match &bytes[at..at + 2] {
-            b"/*" => (depth, at) = (depth + 1, at + 2),
-            b"*/" => {
-                (depth, at) = (depth - 1, at + 2);
-                if depth == 0 {
-                    return at;
-                }
-            }
-            _ => at += 1,
+    fn visit_item_use(&mut self, item: &'ast ItemUse) {
+        let public = !matches!(item.vis, Visibility::Inherited);
+        use_tree(&item.tree, &[], public, &mut self.uses);
+    }
+
+    fn visit_path(&mut self, path: &'ast syn::Path) {
+        self.paths.insert(path.segments.iter().map(|segment| name(&segment.ident)).collect());
+        visit::visit_path(self, path);
+    }
+
+    fn visit_macro(&mut self, call: &'ast Macro) {
+        self.visit_path(&call.path);
+        paths_in(call.tokens.clone(), &mut self.paths);
+    }
+
+    /// Neither documentation nor the place in `pub(in ...)` is an import.
+    fn visit_attribute(&mut self, _: &'ast Attribute) {}
+    fn visit_visibility(&mut self, _: &'ast Visibility) {}
+    /// What a macro of our own expands to is not followed.
+    fn visit_item_macro(&mut self, item: &'ast syn::ItemMacro) {
+        if item.ident.is_none() {
+            self.visit_macro(&item.mac);
         }
     }
-    bytes.len()
 }
 
-/// Length of a raw string that begins here.
-fn raw_string(text: &str) -> Option<usize> {
-    let start = ["r", "br", "cr"].iter().find_map(|prefix| text.strip_prefix(prefix))?;
-    let hashes = start.bytes().take_while(|b| *b == b'#').count();
-    let body = start[hashes..].strip_prefix('"')?;
-    let end = format!("\"{}", "#".repeat(hashes));
-    Some(text.len() - body.len() + body.find(&end)? + end.len())
+fn parse(file: &Path) -> std::io::Result<Vec<Item>> {
+    let in_file = |kind, e: &dyn std::fmt::Display| std::io::Error::new(kind, format!("{}: {e}", file.display()));
+    let text = std::fs::read_to_string(file).map_err(|e| in_file(e.kind(), &e))?;
+    Ok(syn::parse_file(&text).map_err(|e| in_file(std::io::ErrorKind::InvalidData, &e))?.items)
 }
 
-/// Length of a character or of the quote of a lifetime.
-fn quote(text: &str) -> usize {
-    let mut chars = text.char_indices().skip(1);
-    match chars.next() {
-        Some((_, '\\')) => text[2..].char_indices().skip(1).find(|(_, c)| *c == '\'').map_or(1, |(k, _)| k + 3),
-        Some((k, c)) if text[k + c.len_utf8()..].starts_with('\'') => k + c.len_utf8() + 1,
-        _ => 1,
+/// An identifier without the mark of a raw one.
+fn name(identifier: &proc_macro2::Ident) -> String {
+    identifier.to_string().trim_start_matches("r#").to_owned()
+}
+
+/// The name that an item gives to its module.
+fn name_of(item: &Item) -> Option<String> {
+    let identifier = match item {
+        Item::Const(item) => &item.ident,
+        Item::Enum(item) => &item.ident,
+        Item::Fn(item) => &item.sig.ident,
+        Item::Macro(item) => item.ident.as_ref()?,
+        Item::Static(item) => &item.ident,
+        Item::Struct(item) => &item.ident,
+        Item::Trait(item) => &item.ident,
+        Item::Type(item) => &item.ident,
+        _ => return None,
+    };
+    Some(name(identifier)).filter(|name| name != "_")
+}
+
+fn attributes(item: &Item) -> &[Attribute] {
+    match item {
+        Item::Const(syn::ItemConst { attrs, .. })
+        | Item::Enum(syn::ItemEnum { attrs, .. })
+        | Item::Fn(syn::ItemFn { attrs, .. })
+        | Item::Impl(syn::ItemImpl { attrs, .. })
+        | Item::Macro(syn::ItemMacro { attrs, .. })
+        | Item::Mod(syn::ItemMod { attrs, .. })
+        | Item::Static(syn::ItemStatic { attrs, .. })
+        | Item::Struct(syn::ItemStruct { attrs, .. })
+        | Item::Trait(syn::ItemTrait { attrs, .. })
+        | Item::Type(syn::ItemType { attrs, .. })
+        | Item::Use(ItemUse { attrs, .. }) => attrs,
+        _ => &[],
     }
-}
-
-fn is_name(word: &str) -> bool {
-    word.starts_with(|c: char| c.is_alphabetic() || c == '_')
-}
-
-/// A path that begins at a token, without generic arguments, and the token after it.
-fn path_at(tokens: &[String], mut at: usize) -> (Vec<String>, usize) {
-    let mut path = vec![tokens[at].clone()];
-    at += 1;
-    while at + 1 < tokens.len() && tokens[at] == "::" && is_name(&tokens[at + 1]) {
-        path.push(tokens[at + 1].clone());
-        at += 2;
-    }
-    (path, at)
-}
-
-fn attribute_end(tokens: &[String], at: usize) -> usize {
-    let start = tokens[at..].iter().position(|t| t == "[").map_or(tokens.len(), |k| at + k);
-    let mut depth = 0;
-    for (k, token) in tokens.iter().enumerate().skip(start) {
-        depth += i32::from(token == "[") - i32::from(token == "]");
-        if depth == 0 {
-            return k + 1;
-        }
-    }
-    tokens.len()
 }
 
 /// `#[cfg(test)]`, alone or as one of `all(...)`.
-fn is_test_only(attribute: &[String]) -> bool {
-    let has = |word: &str| attribute.iter().any(|t| t == word);
-    has("cfg") && has("test") && !has("not") && !has("any")
+fn is_test_only(attribute: &Attribute) -> bool {
+    let mut words = BTreeSet::new();
+    let Ok(condition) = attribute.meta.require_list() else { return false };
+    paths_in(condition.tokens.clone(), &mut words);
+    let has = |word: &str| words.contains(&vec![word.to_owned()]);
+    condition.path.is_ident("cfg") && has("test") && !has("not") && !has("any")
 }
 
-/// The token after the item that begins here, its own attributes included.
-fn item_end(tokens: &[String], mut at: usize) -> usize {
-    while tokens.get(at).is_some_and(|t| t == "#") {
-        at = attribute_end(tokens, at);
-    }
-    let is_use =
-        tokens[at..].iter().take(6).find(|t| *t == "use" || *t == "{" || *t == ";").is_some_and(|t| t == "use");
-    while at < tokens.len() {
-        match tokens[at].as_str() {
-            ";" => return at + 1,
-            "{" if !is_use => return block_end(tokens, at),
-            _ => at += 1,
+/// The paths among tokens that are not parsed, single words included; fields and methods are none.
+fn paths_in(tokens: TokenStream, paths: &mut BTreeSet<Vec<String>>) {
+    let mut path = Vec::new();
+    let mut before = String::new();
+    for token in tokens {
+        match &token {
+            TokenTree::Ident(word) if before == "." => before = name(word),
+            TokenTree::Ident(word) => {
+                if before != "::" {
+                    paths.extend(Some(std::mem::take(&mut path)).filter(|path: &Vec<String>| !path.is_empty()));
+                }
+                path.push(name(word));
+                before = "word".into();
+            }
+            TokenTree::Punct(sign) if sign.as_char() == ':' && before == ":" => before = "::".into(),
+            TokenTree::Punct(sign) => before = sign.to_string(),
+            TokenTree::Group(group) => {
+                paths_in(group.stream(), paths);
+                before.clear();
+            }
+            TokenTree::Literal(_) => before.clear(),
         }
     }
-    at
+    paths.extend(Some(path).filter(|path| !path.is_empty()));
 }
 
-/// The token after the block that begins at or after this one.
-fn block_end(tokens: &[String], at: usize) -> usize {
-    let mut depth = 0;
-    for (k, token) in tokens.iter().enumerate().skip(at) {
-        let change = i32::from(token == "{" || token == "(") - i32::from(token == "}" || token == ")");
-        depth += change;
-        if depth == 0 && change != 0 {
-            return k + 1;
+fn module_file(file: &Path, folder: &Path, name: &str, attributes: &[Attribute]) -> PathBuf {
+    let explicit = attributes.iter().find_map(|attribute| match &attribute.meta.require_name_value().ok()?.value {
+        syn::Expr::Lit(syn::ExprLit { lit: syn::Lit::Str(path), .. }) if attribute.path().is_ident("path") => {
+            Some(path.value())
         }
-    }
-    tokens.len()
-}
-
-fn module_file(file: &Path, folder: &Path, name: &str, explicit: Option<&str>) -> PathBuf {
+        _ => None,
+    });
     if let Some(path) = explicit {
         return file.parent().unwrap_or(Path::new("")).join(path);
     }
@@ -472,56 +393,25 @@ fn module_file(file: &Path, folder: &Path, name: &str, explicit: Option<&str>) -
     if flat.is_file() { flat } else { folder.join(name).join("mod.rs") }
 }
 
-/// The names of a `use` declaration, without the word and the semicolon.
-fn use_tree(tokens: &[String], prefix: &[String], public: bool, uses: &mut Vec<Use>) {
-    let mut path = prefix.to_vec();
-    let mut at = 0;
-    while at < tokens.len() {
-        match tokens[at].as_str() {
-            "::" => {}
-            "{" => {
-                let end = block_end(tokens, at) - 1;
-                for branch in split_branches(&tokens[at + 1..end]) {
-                    use_tree(branch, &path, public, uses);
-                }
-                return;
-            }
-            "*" => {
-                uses.push(Use { path, alias: "*".into(), public });
-                return;
-            }
-            "as" => {
-                let alias = tokens.get(at + 1).cloned().unwrap_or_default();
-                uses.push(Use { path, alias, public });
-                return;
-            }
-            // `use a::{self}` is `use a`.
-            "self" if !path.is_empty() => {}
-            name => path.push(name.to_owned()),
+/// The names that a `use` declaration brings in.
+fn use_tree(tree: &UseTree, prefix: &[String], public: bool, uses: &mut Vec<Use>) {
+    // `use a::{self}` is `use a`.
+    let below = |last: String| {
+        let last = Some(last).filter(|last| last != "self" || prefix.is_empty());
+        prefix.iter().cloned().chain(last).collect::<Vec<_>>()
+    };
+    match tree {
+        UseTree::Path(step) => use_tree(&step.tree, &below(name(&step.ident)), public, uses),
+        UseTree::Group(group) => group.items.iter().for_each(|branch| use_tree(branch, prefix, public, uses)),
+        UseTree::Glob(_) => uses.push(Use { path: prefix.to_vec(), alias: "*".into(), public }),
+        UseTree::Rename(new) => {
+            uses.push(Use { path: below(name(&new.ident)), alias: name(&new.rename), public });
         }
-        at += 1;
-    }
-    if let Some(alias) = path.last().cloned() {
-        uses.push(Use { path, alias, public });
-    }
-}
-
-fn split_branches(tokens: &[String]) -> Vec<&[String]> {
-    let (mut branches, mut start, mut depth) = (Vec::new(), 0, 0);
-    for (k, token) in tokens.iter().enumerate() {
-        match token.as_str() {
-            "{" => depth += 1,
-            "}" => depth -= 1,
-            "," if depth == 0 => {
-                branches.push(&tokens[start..k]);
-                start = k + 1;
-            }
-            _ => {}
+        UseTree::Name(leaf) => {
+            let path = below(name(&leaf.ident));
+            uses.extend(path.last().cloned().map(|alias| Use { path, alias, public }));
         }
     }
-    branches.push(&tokens[start..]);
-    branches.retain(|branch| !branch.is_empty());
-    branches
 }
 
 /// Files of a small crate, written, read and searched for circles.

@@ -72,9 +72,14 @@ pub fn largest_disk_with(
     if kept.is_empty() {
         return Err(Error::ZeroArea);
     }
-    kept = largest_component(positions, &soup, &kept, &mut report);
     let mut oriented: Vec<[u32; 3]> = kept.iter().map(|&f| soup[f as usize]).collect();
-    let table = EdgeTable::new(positions.len(), &oriented);
+    let mut table = EdgeTable::new(positions.len(), &oriented);
+    let chosen = largest_component(positions, &oriented, &table, &mut report);
+    if chosen.len() < kept.len() {
+        oriented = chosen.iter().map(|&f| oriented[f as usize]).collect();
+        kept = chosen.iter().map(|&f| kept[f as usize]).collect();
+        table = EdgeTable::new(positions.len(), &oriented);
+    }
     let (mut twins, reversed) = orient(positions, &mut oriented, &table, &kept)?;
     report.reversed_faces = reversed.iter().filter(|&&r| r).count();
     let vertex_source = separate_fans(&mut oriented, &twins, positions.len(), repair, &mut report)?;
@@ -103,28 +108,31 @@ pub fn largest_disk_with(
 }
 
 /// Faces of the edge-connected part with the largest area.
-fn largest_component(positions: &[[f64; 3]], faces: &[[u32; 3]], kept: &[u32], report: &mut RepairReport) -> Vec<u32> {
-    let list: Vec<[u32; 3]> = kept.iter().map(|&f| faces[f as usize]).collect();
-    let mut parent: Vec<u32> = (0..list.len() as u32).collect();
-    for group in EdgeTable::new(positions.len(), &list).groups() {
+fn largest_component(
+    positions: &[[f64; 3]],
+    faces: &[[u32; 3]],
+    table: &EdgeTable,
+    report: &mut RepairReport,
+) -> Vec<u32> {
+    let mut parent: Vec<u32> = (0..faces.len() as u32).collect();
+    for group in table.groups() {
         for &h in &group[1..] {
             let (a, b) = (find_root(&mut parent, group[0] / 3), find_root(&mut parent, h / 3));
             parent[a.max(b) as usize] = a.min(b);
         }
     }
-    let mut areas = vec![0.0; list.len()];
-    for (f, corners) in list.iter().enumerate() {
+    let mut areas = vec![0.0; faces.len()];
+    for (f, corners) in faces.iter().enumerate() {
         let area = 0.5 * triangle::cross(corners.map(|v| positions[v as usize])).norm();
         areas[find_root(&mut parent, f as u32) as usize] += area;
     }
     // Roots are the smallest faces of their parts, so the first of equal areas is the part that comes first.
-    let largest = (0..list.len()).fold(0, |best, f| if areas[f] > areas[best] { f } else { best });
+    let largest = (0..faces.len()).fold(0, |best, f| if areas[f] > areas[best] { f } else { best });
     report.components = areas.iter().filter(|&&a| a > 0.0).count();
     report.area_in_other_components_m2 =
         areas.iter().enumerate().filter(|&(f, _)| f != largest).map(|(_, area)| area).sum();
-    let chosen: Vec<u32> =
-        (0..list.len()).filter(|&f| find_root(&mut parent, f as u32) as usize == largest).map(|f| kept[f]).collect();
-    report.faces_in_other_components = kept.len() - chosen.len();
+    let chosen: Vec<u32> = (0..faces.len() as u32).filter(|&f| find_root(&mut parent, f) as usize == largest).collect();
+    report.faces_in_other_components = faces.len() - chosen.len();
     chosen
 }
 
