@@ -95,7 +95,7 @@ impl Chart {
     /// Position of a surface point in the frame of the mesh, metres (thesis Eq. (8.1), first line).
     pub fn point(&self, at: SurfacePoint) -> Point3<f64> {
         let corners = self.disk.corners(at.face as usize).map(Vector3::from);
-        Point3::from(at.barycentric.iter().zip(corners).map(|(b, corner)| *b * corner).sum::<Vector3<f64>>())
+        Point3::from(at.interpolate(corners))
     }
 
     /// Unit normal of a face.
@@ -106,8 +106,7 @@ impl Chart {
     /// Unit normal that changes continuously over the surface: vertex normals weighted by corner angle, interpolated.
     pub fn smooth_normal(&self, at: SurfacePoint) -> Unit<Vector3<f64>> {
         let corners = self.disk.faces[at.face as usize].map(|v| self.vertex_normals[v as usize]);
-        let mean: Vector3<f64> = at.barycentric.iter().zip(corners).map(|(b, n)| *b * n).sum();
-        Unit::try_new(mean, f64::EPSILON).unwrap_or_else(|| self.face_normal(at.face))
+        Unit::try_new(at.interpolate(corners), f64::EPSILON).unwrap_or_else(|| self.face_normal(at.face))
     }
 
     /// Unit normal averaged over the disc of `radius` metres around `at` in the chart: what a spray footprint sees of a
