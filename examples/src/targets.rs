@@ -47,17 +47,17 @@ pub fn route(
     Ok(Route { targets: flown.flatten().collect(), strokes: ends.len(), lost, transit_s: order.transit_time })
 }
 
-/// One stroke on the surface. A spray of depth `v` stands for the paint of one cell of its row, `spacing` pixels long: the
-/// targets are the borders of the cells, and the dose between them is the spray's volume `v · mass · texel² · unit` over the
-/// length on the surface. What finds no surface under it is added to `lost`.
+/// One stroke on the surface. A spray of depth `v` stands for the paint of one cell of its stroke, half the way to its
+/// neighbours and `spacing` pixels long where it has none: the targets are the borders of the cells, and the dose between
+/// them is the spray's volume `v · mass · texel² · unit` over the length on the surface. What finds no surface under it is
+/// added to `lost`.
 fn lift(surface: &PaintSurface, stroke: &Stroke, kernel: &SprayKernel, spacing: f64, lost: &mut f64) -> Vec<Target> {
     let texel = surface.texels.texel_m;
     let volume = |s: &Spray| s.volume * kernel.mass() * texel * texel * UNIT_THICKNESS;
-    let forward = stroke.sprays.len() < 2 || stroke.sprays[1].x > stroke.sprays[0].x;
-    let half = if forward { 0.5 } else { -0.5 } * spacing;
     let mut targets: Vec<Target> = Vec::new();
     for (k, spray) in stroke.sprays.iter().enumerate() {
-        let cell = border(surface, spray, -half).zip(border(surface, spray, half));
+        let [back, ahead] = half_cell(&stroke.sprays, k, spacing);
+        let cell = border(surface, spray, back).zip(border(surface, spray, ahead));
         let Some((start, end)) = cell.filter(|(start, end)| (end.point - start.point).norm() >= 1e-6) else {
             *lost += volume(spray);
             continue;
@@ -69,7 +69,9 @@ fn lift(surface: &PaintSurface, stroke: &Stroke, kernel: &SprayKernel, spacing: 
             _ => {
                 if k > 0 {
                     let before = &stroke.sprays[k - 1];
-                    bridge(surface, before.x + half, spray.x - half, spray.y, spacing, &mut targets);
+                    let [_, left] = half_cell(&stroke.sprays, k - 1, spacing);
+                    let from = [before.x + left[0], before.y + left[1]];
+                    bridge(surface, from, [spray.x + back[0], spray.y + back[1]], spacing, &mut targets);
                 }
                 targets.push(Target { dose, ..start });
             }
@@ -79,25 +81,42 @@ fn lift(surface: &PaintSurface, stroke: &Stroke, kernel: &SprayKernel, spacing: 
     targets
 }
 
+/// From a spray to the borders of its cell, backwards and forwards, pixels: half the way to a neighbour that is no farther than
+/// one and a half cells, else half a cell on in the direction of the stroke.
+fn half_cell(sprays: &[Spray], k: usize, spacing: f64) -> [[f64; 2]; 2] {
+    let half_way = |a: usize, b: usize| [0.5 * (sprays[b].x - sprays[a].x), 0.5 * (sprays[b].y - sprays[a].y)];
+    let half_step = |[x, y]: [f64; 2]| {
+        let stretch = 0.5 * spacing / x.hypot(y);
+        [x * stretch, y * stretch]
+    };
+    let negative = |[x, y]: [f64; 2]| [-x, -y];
+    let near = |[x, y]: &[f64; 2]| 2.0 * x.hypot(*y) <= 1.5 * spacing;
+    let (before, after) = ((k > 0).then(|| half_way(k - 1, k)), (k + 1 < sprays.len()).then(|| half_way(k, k + 1)));
+    let (touching, next) = (before.filter(near), after.filter(near));
+    let back = touching.or(next).or_else(|| before.or(after).map(half_step)).unwrap_or([0.5 * spacing, 0.0]);
+    let ahead = next.or(touching).or_else(|| after.or(before).map(half_step)).unwrap_or([0.5 * spacing, 0.0]);
+    [negative(back), ahead]
+}
+
 /// The same stroke flown from its end: a target's dose belongs to the way to the next one.
 fn reversed(stroke: &[Target]) -> Vec<Target> {
     let doses = stroke.iter().rev().skip(1).map(|target| target.dose).chain([0.0]);
     stroke.iter().rev().zip(doses).map(|(target, dose)| Target { dose, ..*target }).collect()
 }
 
-/// Targets with the valve shut between two places of a row, no farther apart than the others: a planner weighs steps.
-fn bridge(surface: &PaintSurface, from: f64, to: f64, y: f64, along: f64, targets: &mut Vec<Target>) {
-    let steps = ((to - from).abs() / along).ceil() as usize;
+/// Targets with the valve shut between two places of a stroke, no farther apart than the others: a planner weighs steps.
+fn bridge(surface: &PaintSurface, from: [f64; 2], to: [f64; 2], along: f64, targets: &mut Vec<Target>) {
+    let steps = ((to[0] - from[0]).hypot(to[1] - from[1]) / along).ceil() as usize;
     for k in 1..steps {
-        let x = from + (to - from) * k as f64 / steps as f64;
+        let [x, y] = [0, 1].map(|c| from[c] + (to[c] - from[c]) * k as f64 / steps as f64);
         targets.extend(surface.lift(x, y).map(|(point, normal)| Target { point, normal, dose: 0.0, time: None }));
     }
 }
 
-/// The target `offset` pixels along the row from a spray; drawn back to the spray where the surface ends before it.
-fn border(surface: &PaintSurface, spray: &Spray, offset: f64) -> Option<Target> {
+/// The target `offset` pixels from a spray; drawn back to the spray where the surface ends before it.
+fn border(surface: &PaintSurface, spray: &Spray, offset: [f64; 2]) -> Option<Target> {
     [1.0, 0.75, 0.5, 0.25, 0.0].iter().find_map(|share| {
-        let (point, normal) = surface.lift(spray.x + share * offset, spray.y)?;
+        let (point, normal) = surface.lift(spray.x + share * offset[0], spray.y + share * offset[1])?;
         Some(Target { point, normal, dose: 0.0, time: None })
     })
 }

@@ -35,6 +35,7 @@
 //! | Paper IV, 3.3: the "ideal", a Gaussian of the reference | [`ideal`] |
 //! | Paper IV, 3.3: the network with READ, PAINT and a learned stop | [`thesis::ThesisPainter`], [`thesis::Network`] |
 //! | non-negative deconvolution by projected L-BFGS | [`Deconvolution`] |
+//! | the same with strokes along lines (thinning: Zhang and Suen 1984) | [`Centrelines`] |
 //! | matching pursuit (Mallat and Zhang 1993) | [`MatchingPursuit`] |
 //! | few sprays at free positions, of free spreads | [`FreeSprays`] |
 //! | a feedback network (as Zamir et al. 2017), convolutional; ours: Paper IV paints one spray per step | [`Feedback`], [`Network`] |
@@ -74,8 +75,8 @@ pub use model::{MonotoneCurve, Saturation, Spray, SprayKernel};
 pub use network::{Architecture, Network};
 pub use painter::{Observer, Painter};
 pub use painters::{
-    ClosedLoopPainter, Deconvolution, Feedback, FreeSprays, LayerPlanning, Layered, MatchingPursuit, SlewLimited,
-    ThresholdSpacing, slew_violations,
+    Centrelines, ClosedLoopPainter, Deconvolution, Feedback, FreeSprays, LayerPlanning, Layered, MatchingPursuit,
+    SlewLimited, ThresholdSpacing, slew_violations,
 };
 pub use painting::Painting;
 pub use path::{ScanOrder, Stroke, StrokeSettings, boustrophedon};

@@ -1,5 +1,7 @@
-//! The painters: three that plan on a grid of cells, one network, one of free sprays, and three that wrap others.
+//! The painters: three that plan on a grid of cells, one that follows lines, one network, one of free sprays, and three that
+//! wrap others.
 
+mod centrelines;
 mod closed_loop;
 mod deconvolution;
 mod feedback;
@@ -9,6 +11,7 @@ mod layers;
 mod pursuit;
 mod slew;
 
+pub use centrelines::Centrelines;
 pub use closed_loop::ClosedLoopPainter;
 pub use deconvolution::Deconvolution;
 pub use feedback::Feedback;

@@ -2,6 +2,7 @@
 
 use crate::image::Image;
 use crate::model::{Saturation, Spray};
+use crate::path::Stroke;
 use crate::problem::PaintProblem;
 
 /// What a painter decided, and what painters that wrap others add to it.
@@ -19,6 +20,9 @@ pub struct Painting {
     /// The path of the nozzle over the cells, those where the valve is shut (volume 0) included; empty unless the painter
     /// plans one.
     pub waypoints: Vec<Spray>,
+    /// The strokes along which the sprays are to be flown; empty unless the painter plans them, as for rows
+    /// ([`boustrophedon`](crate::boustrophedon)).
+    pub strokes: Vec<Stroke>,
     /// Paint that came out over paint that was asked for, as a closed loop estimates it; 1 unless somebody measured.
     pub flow_gain: f64,
 }
@@ -27,7 +31,7 @@ impl Painting {
     /// A painting in one piece, from its sprays and the depth that they lead to.
     pub fn new(sprays: Vec<Spray>, canvas: Image, saturation: &Saturation) -> Self {
         let ink = canvas.map(|c| saturation.forward(c));
-        Self { sprays, canvas, ink, layers: Vec::new(), waypoints: Vec::new(), flow_gain: 1.0 }
+        Self { sprays, canvas, ink, layers: Vec::new(), waypoints: Vec::new(), strokes: Vec::new(), flow_gain: 1.0 }
     }
 
     /// A painting in one piece, rendered: every spray is stamped on the problem's canvas with the problem's kernel.

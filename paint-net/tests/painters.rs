@@ -3,7 +3,7 @@
 
 use paint_net::procedural::{Texture, lattice};
 use paint_net::{
-    ClosedLoopPainter, Deconvolution, Error, Feedback, FreeSprays, Image, LayerPlanning, Layered, Limits,
+    Centrelines, ClosedLoopPainter, Deconvolution, Error, Feedback, FreeSprays, Image, LayerPlanning, Layered, Limits,
     MatchingPursuit, MonotoneCurve, PaintProblem, Painter, Painting, Saturation, SprayKernel, StrokeSettings,
     ThresholdSpacing, boustrophedon, metrics,
 };
@@ -15,6 +15,7 @@ fn kernel() -> SprayKernel {
 fn painters() -> Vec<Box<dyn Painter>> {
     vec![
         Box::new(Deconvolution::default()),
+        Box::new(Centrelines::default()),
         Box::new(MatchingPursuit::default()),
         Box::new(Feedback::shipped().unwrap()),
         Box::new(FreeSprays { sprays: 100, ..FreeSprays::default() }),
@@ -295,6 +296,54 @@ fn strokes_keep_every_spray_and_alternate() {
     }
     let directions: Vec<bool> = direction_of_row.into_values().collect();
     assert!(directions.windows(2).filter(|d| d[0] != d[1]).count() * 2 > directions.len());
+}
+
+/// A ring, a stem and a dot, four pixels wide.
+fn line_art() -> Image {
+    let soft = |distance: f64| 0.85 / (1.0 + ((distance - 2.0) / 0.3).exp());
+    Image::from_fn(110, 70, |x, y| {
+        let (x, y) = (x as f64, y as f64);
+        let ring = ((x - 35.0).hypot(y - 35.0) - 20.0).abs();
+        let stem = (x - 75.0).hypot(y - y.clamp(15.0, 55.0));
+        let dot = (x - 95.0).hypot(y - 20.0);
+        soft(ring.min(stem).min(dot))
+    })
+}
+
+#[test]
+fn lines_become_strokes_along_them_and_nearer_to_the_drawing_than_rows() {
+    let wanted = line_art();
+    let limits = Limits { row_spacing: 3, min_volume: 0.01, ..Limits::default() };
+    let lines = paint(&Centrelines::default(), &PaintProblem::new(&wanted), &limits);
+    let rows = paint(&Deconvolution::default(), &PaintProblem::new(&wanted), &limits);
+    let psnr = |painting: &Painting| metrics::psnr(&painting.ink, &wanted, None).unwrap();
+    assert!(psnr(&lines) > psnr(&rows) + 0.5, "{} against {}", psnr(&lines), psnr(&rows));
+    // Every spray lies in one stroke, in order.
+    let flown: Vec<_> = lines.strokes.iter().flat_map(|stroke| stroke.sprays.iter().copied()).collect();
+    assert_eq!(flown, lines.sprays);
+    let in_rows = boustrophedon(&rows.sprays, &StrokeSettings::default()).unwrap();
+    assert!(rows.strokes.is_empty() && lines.strokes.len() <= 6, "{} strokes", lines.strokes.len());
+    assert!(in_rows.len() > 4 * lines.strokes.len(), "{} in rows", in_rows.len());
+    // The ring goes round once, on its middle, without a gap.
+    let ring = lines.strokes.iter().max_by_key(|stroke| stroke.sprays.len()).unwrap();
+    for pair in ring.sprays.windows(2) {
+        let radius = (pair[0].x - 35.0).hypot(pair[0].y - 35.0);
+        assert!((radius - 20.0).abs() < 1.0, "radius {radius}");
+        assert!((pair[1].x - pair[0].x).hypot(pair[1].y - pair[0].y) < 1.5 * limits.spray_spacing as f64);
+    }
+    let around = std::f64::consts::TAU * 20.0 / limits.spray_spacing as f64;
+    assert!((ring.sprays.len() as f64 / around - 1.0).abs() < 0.1, "{} sprays for {around}", ring.sprays.len());
+}
+
+#[test]
+fn a_picture_without_lines_is_painted_as_by_deconvolution() {
+    let wanted = Texture::Fbm.image(5, 40).map(|ink| 0.4 + 0.2 * ink);
+    let psnr = |painter: &dyn Painter| {
+        let painting = paint(painter, &PaintProblem::new(&wanted), &Limits::default());
+        metrics::psnr(&painting.ink, &wanted, None).unwrap()
+    };
+    let (lines, rows) = (psnr(&Centrelines::default()), psnr(&Deconvolution::default()));
+    assert!((lines - rows).abs() < 0.5, "{lines} against {rows}");
 }
 
 #[test]

@@ -202,6 +202,8 @@ enum PainterName {
     Feedback,
     /// The best plan for all sprays at once, by optimisation
     Deconvolution,
+    /// The same with strokes along the lines of the picture, for text and line art
+    Centrelines,
     /// One spray after the other
     Pursuit,
 }
@@ -254,6 +256,7 @@ impl Arguments {
             painter: match self.painter {
                 PainterName::Feedback => PainterChoice::Feedback,
                 PainterName::Deconvolution => PainterChoice::Deconvolution,
+                PainterName::Centrelines => PainterChoice::Centrelines,
                 PainterName::Pursuit => PainterChoice::Pursuit,
             },
             ..MissionSettings::default()

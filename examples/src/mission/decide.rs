@@ -1,7 +1,8 @@
 //! What to spray: the wanted picture into layers.
 
 use paint_net::{
-    Deconvolution, Feedback, Image, Layered, MatchingPursuit, Observer, PaintProblem, Painter, Painting, SprayKernel,
+    Centrelines, Deconvolution, Feedback, Image, Layered, MatchingPursuit, Observer, PaintProblem, Painter, Painting,
+    SprayKernel,
 };
 
 use super::error::MissionError;
@@ -47,6 +48,7 @@ pub(super) fn decide(
             paint(painter, settings.layered, &problem, &mut progress)
         }
         PainterChoice::Deconvolution => paint(Deconvolution::default(), settings.layered, &problem, &mut progress),
+        PainterChoice::Centrelines => paint(Centrelines::default(), settings.layered, &problem, &mut progress),
         PainterChoice::Pursuit => paint(MatchingPursuit::default(), settings.layered, &problem, &mut progress),
     }?;
     let sprays: usize = layers.iter().map(|l| l.sprays.len()).sum();

@@ -86,8 +86,14 @@ pub(super) fn layer_route(
     settings: &MissionSettings,
     from: Option<&Target>,
 ) -> Result<Route, MissionError> {
-    let strokes = boustrophedon(&layer.sprays, &StrokeSettings::default())?;
-    Ok(route(surface, &strokes, &kernel(settings)?, settings.limits.spray_spacing, from, &settings.planner)?)
+    let rows;
+    let strokes = if layer.strokes.is_empty() {
+        rows = boustrophedon(&layer.sprays, &StrokeSettings::default())?;
+        &rows
+    } else {
+        &layer.strokes
+    };
+    Ok(route(surface, strokes, &kernel(settings)?, settings.limits.spray_spacing, from, &settings.planner)?)
 }
 
 /// Length of the vehicle's trajectory, metres.

@@ -50,6 +50,8 @@ pub enum PainterChoice {
     Feedback,
     /// All sprays at once.
     Deconvolution,
+    /// The same with strokes along lines.
+    Centrelines,
     /// One spray after the other.
     Pursuit,
 }

@@ -5,6 +5,7 @@ mod bad_input;
 mod bags;
 mod five_joint_arm;
 mod independence;
+mod line_art;
 mod mcap_recordings;
 mod meshes;
 mod mission;

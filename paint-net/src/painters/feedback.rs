@@ -87,7 +87,7 @@ impl Painter for Feedback {
         };
         let mut volumes = vec![0.0; grid.footprints.cells()];
         run(&grid.upper_bounds, &mut volumes, 0..self.passes);
-        prune_with(&grid, limits, &mut volumes, &mut |upper_bounds, volumes| {
+        prune_with(&grid.upper_bounds, limits, &mut volumes, &mut |upper_bounds, volumes| {
             run(upper_bounds, volumes, self.passes..self.passes + PASSES_AFTER_PRUNING);
         });
         observer.progress(1.0);

@@ -41,14 +41,14 @@ pub(super) fn ink_cost(problem: &PaintProblem, saturation: &Saturation, canvas: 
 /// Drops sprays below the smallest volume and beyond the largest number, refitting the rest in between.
 pub(super) fn prune(problem: &PaintProblem, grid: &PaintGrid, volumes: &mut Vec<f64>, stop: &StoppingRule) {
     let stop = StoppingRule { iterations: stop.iterations.min(40), relative_decrease: stop.relative_decrease };
-    prune_with(grid, problem.limits, volumes, &mut |upper_bounds, volumes| {
+    prune_with(&grid.upper_bounds, problem.limits, volumes, &mut |upper_bounds, volumes| {
         fit(problem, grid, upper_bounds, volumes, &stop, &mut |_| ());
     });
 }
 
 /// The same for any way to refit the volumes under their upper bounds.
 pub(super) fn prune_with(
-    grid: &PaintGrid,
+    most: &[f64],
     limits: &Limits,
     volumes: &mut Vec<f64>,
     refit: &mut dyn FnMut(&[f64], &mut Vec<f64>),
@@ -58,9 +58,9 @@ pub(super) fn prune_with(
     for share in [0.25, 0.5, 1.0] {
         let threshold = share * limits.min_volume;
         let mut keep: Vec<bool> = volumes.iter().map(|&v| v > threshold).collect();
-        if let Some(most) = limits.max_sprays {
+        if let Some(count) = limits.max_sprays {
             let mut order: Vec<usize> = (0..volumes.len()).filter(|&k| keep[k]).collect();
-            let target = most + ((1.0 - share) * order.len().saturating_sub(most) as f64) as usize;
+            let target = count + ((1.0 - share) * order.len().saturating_sub(count) as f64) as usize;
             order.sort_by(|&a, &b| volumes[b].total_cmp(&volumes[a]).then(a.cmp(&b)));
             order.iter().skip(target).for_each(|&k| keep[k] = false);
         }
@@ -68,7 +68,7 @@ pub(super) fn prune_with(
             continue;
         }
         let upper_bounds: Vec<f64> =
-            grid.upper_bounds.iter().zip(&keep).map(|(&upper, &kept)| if kept { upper } else { 0.0 }).collect();
+            most.iter().zip(&keep).map(|(&upper, &kept)| if kept { upper } else { 0.0 }).collect();
         refit(&upper_bounds, volumes);
     }
     // The refit may have pushed a survivor below the threshold, which is a promise.

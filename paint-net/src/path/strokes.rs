@@ -3,7 +3,7 @@
 use crate::error::{Error, require};
 use crate::model::Spray;
 
-/// A run of sprays along one row, in flying order.
+/// A run of sprays along a row or a line, in flying order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stroke {
     /// Its sprays; never empty.
