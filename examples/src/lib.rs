@@ -8,6 +8,7 @@ mod mcap_messages;
 pub mod mesh_io;
 pub mod mesh_placement;
 pub mod mission;
+pub mod mission_arguments;
 pub mod mission_file;
 pub mod paint_image;
 pub mod picture_file;

@@ -42,6 +42,14 @@ pub enum MissionFileError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// The folder for the results.
+    #[error("{path}: cannot be created ({source}): choose another --out")]
+    Folder {
+        /// The folder.
+        path: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
     /// It is no mission.
     #[error("{path}: {why}")]
     Malformed {
@@ -123,6 +131,13 @@ impl MissionFile {
         let text = toml::to_string(&written)
             .map_err(|error| MissionFileError::Malformed { path: name(), why: error.to_string() })?;
         std::fs::write(path, text).map_err(|source| MissionFileError::File { path: name(), source })
+    }
+
+    /// Makes the folder of the results and leaves the mission there as `mission.toml`.
+    pub fn write_into(&self, folder: &Path) -> Result<(), MissionFileError> {
+        std::fs::create_dir_all(folder)
+            .map_err(|source| MissionFileError::Folder { path: folder.display().to_string(), source })?;
+        self.write(&folder.join("mission.toml"))
     }
 
     /// Reads the surface and the design, scans if asked to, and decides; what the scan leaves goes into `folder`.

@@ -3,209 +3,23 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, ValueEnum};
-use paint_planner::TimingPolicy;
-use paintcopter_examples::mesh_placement::UpAxis;
-use paintcopter_examples::mission::{Mission, MissionSettings, PainterChoice, preview, save};
-use paintcopter_examples::mission_file::MissionFile;
-use paintcopter_examples::picture_placement::{PicturePlacement, PlacementMode};
-use paintcopter_examples::projection::Viewpoint;
-
-type AnyError = Box<dyn std::error::Error>;
-
-/// What stands in a mission file.
-const MISSION: [&str; 20] = [
-    "mesh",
-    "texture",
-    "scale",
-    "up",
-    "design",
-    "scan",
-    "painter",
-    "layers",
-    "seed",
-    "memory_gib",
-    "texel",
-    "spot",
-    "stand_off",
-    "speed",
-    "max_flow",
-    "place",
-    "rotate",
-    "offset",
-    "size",
-    "project",
-];
+use clap::Parser;
+use paintcopter_examples::mission::{Mission, preview, save};
+use paintcopter_examples::mission_arguments::MissionArguments;
 
 /// Paints a surface with a simulated flying robot: unwraps it, decides what to spray, plans and flies the strokes, and shows
 /// what the paint looks like. Without arguments it paints a built-in rock wall.
 #[derive(Parser)]
 #[command(version, after_help = "Example:\n  paintcopter --mesh bust.obj --design stripes --out out/bust")]
 struct Arguments {
-    /// Fly a mission again: mission.toml of an earlier run, or one of your own
-    #[arg(long, value_name = "FILE", conflicts_with_all = MISSION)]
-    mission: Option<PathBuf>,
-    /// Surface to paint, OBJ, PLY or OFF; the built-in rock wall if not given
-    #[arg(long, value_name = "FILE")]
-    mesh: Option<PathBuf>,
-    /// Picture on the mesh's own texture coordinates (OBJ): it becomes the design
-    #[arg(long, value_name = "PNG", requires = "mesh", conflicts_with = "design")]
-    texture: Option<PathBuf>,
-    /// Metres per unit of the mesh file [default: the longest side becomes 3 m]
-    #[arg(long, requires = "mesh", allow_negative_numbers = true)]
-    scale: Option<f64>,
-    /// Axis of the mesh file that points up [default: y for OBJ, z otherwise]
-    #[arg(long, requires = "mesh")]
-    up: Option<Up>,
-    /// What to paint: strata, stripes, gradient, colours (of the mesh's vertices), or a PNG or JPEG file
-    /// [default: strata on the rock wall, stripes on a mesh]
-    #[arg(long)]
-    design: Option<String>,
     #[command(flatten)]
-    placement: Placement,
-    /// Scan the surface first, with the robot's own camera, inertial sensor and depth camera, and paint what it has mapped
-    #[arg(long, conflicts_with = "texture")]
-    scan: bool,
-    /// Who decides the sprays
-    #[arg(long, default_value = "feedback")]
-    painter: PainterName,
-    /// Paint in layers by intensity, a flight for each [default: one flight whose flow carries the picture]
-    #[arg(long)]
-    layers: bool,
-    #[command(flatten)]
-    nozzle: Nozzle,
+    mission: MissionArguments,
     /// Show what it would look like and estimate time, paint and reach; plan and fly nothing
     #[arg(long)]
     preview: bool,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/paintcopter")]
     out: PathBuf,
-    /// Seed of the world, the wind and the errors
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Memory that the mission may need by estimate, GiB
-    #[arg(long, value_name = "GIB", value_parser = positive, default_value_t = 8.0)]
-    memory_gib: f64,
-    /// Worker threads, 1 to 1024 [default: all cores]
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
-    threads: Option<u16>,
-}
-
-/// The spray and how it moves.
-#[derive(Args)]
-struct Nozzle {
-    /// Size of a texel, metres [default: 0.0125]
-    #[arg(long, value_name = "METRES", value_parser = positive)]
-    texel: Option<f64>,
-    /// Standard deviation of a spray spot at the stand-off, metres [default: 0.025]
-    #[arg(long, value_name = "METRES", value_parser = positive)]
-    spot: Option<f64>,
-    /// Distance of the nozzle from the surface, metres, within 0.05 to 0.15 [default: 0.1]
-    #[arg(long, value_name = "METRES", value_parser = positive)]
-    stand_off: Option<f64>,
-    /// Speed of the spot over the surface, metres per second [default: 0.4]
-    #[arg(long, value_name = "M_PER_S", value_parser = positive)]
-    speed: Option<f64>,
-    /// Most that the valve gives, litres per minute [default: 0.12]
-    #[arg(long, value_name = "L_PER_MIN", value_parser = positive)]
-    max_flow: Option<f64>,
-}
-
-impl Nozzle {
-    fn apply(&self, settings: &mut MissionSettings) {
-        settings.texel = self.texel.unwrap_or(settings.texel);
-        settings.spot = self.spot.unwrap_or(settings.spot);
-        let planner = &mut settings.planner;
-        planner.nozzle.stand_off = self.stand_off.unwrap_or(planner.nozzle.stand_off);
-        if let Some(speed) = self.speed {
-            planner.timing.policy = TimingPolicy::Uniform { speed };
-            planner.timing.max_speed = planner.timing.max_speed.max(1.25 * speed);
-        }
-        planner.timing.max_flow = self.max_flow.map_or(planner.timing.max_flow, |flow| flow * 1e-3 / 60.0);
-    }
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|v: &f64| v.is_finite() && *v > 0.0);
-    value.ok_or_else(|| "give a positive number".to_owned())
-}
-
-/// Where a picture of --design lies.
-#[derive(Args)]
-struct Placement {
-    /// How large a picture becomes: whole within the surface, covering it, repeated, or stretched over it
-    #[arg(long, default_value = "fit")]
-    place: PlaceName,
-    /// Turn of the picture about its middle, degrees counter-clockwise
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
-    rotate: f64,
-    /// Where the middle of the picture lies beside that of the surface, metres to the right and up
-    #[arg(long, value_name = "X,Y", value_parser = numbers::<2>, default_value = "0,0", allow_hyphen_values = true)]
-    offset: [f64; 2],
-    /// Width of the picture, metres; its height follows [default: as --place says]
-    #[arg(long, value_name = "METRES", value_parser = positive)]
-    size: Option<f64>,
-    /// Throw the design onto the surface like a slide: from the front, or from a point X,Y,Z (metres; the robot's side is -x, z
-    /// is up) [default: laid over the unwrapped surface]
-    #[arg(long, value_name = "front|X,Y,Z", value_parser = viewpoint, allow_hyphen_values = true)]
-    project: Option<Viewpoint>,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum PlaceName {
-    Fit,
-    Fill,
-    Tile,
-    Stretch,
-}
-
-/// Finite numbers between commas.
-fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    let parsed: Option<Vec<f64>> =
-        text.split(',').map(|part| part.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
-    parsed.and_then(|all| all.try_into().ok()).ok_or_else(|| format!("give {N} numbers with commas between them"))
-}
-
-fn viewpoint(text: &str) -> Result<Viewpoint, String> {
-    if text == "front" {
-        return Ok(Viewpoint::Front);
-    }
-    let point = numbers::<3>(text).map_err(|error| format!("{error}, or front"))?;
-    Ok(Viewpoint::Point(point.into()))
-}
-
-impl Placement {
-    fn picture(&self) -> Result<PicturePlacement, String> {
-        if !self.rotate.is_finite() {
-            return Err(format!("--rotate {}: give an angle in degrees", self.rotate));
-        }
-        let mode = match self.place {
-            PlaceName::Fit => PlacementMode::Fit,
-            PlaceName::Fill => PlacementMode::Fill,
-            PlaceName::Tile => PlacementMode::Tile,
-            PlaceName::Stretch => PlacementMode::Stretch,
-        };
-        Ok(PicturePlacement { mode, rotate: self.rotate.to_radians(), offset: self.offset, size: self.size })
-    }
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum Up {
-    X,
-    Y,
-    Z,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum PainterName {
-    /// The network with feedback from its canvas
-    Feedback,
-    /// The best plan for all sprays at once, by optimisation
-    Deconvolution,
-    /// The same with strokes along the lines of the picture, for text and line art
-    Centrelines,
-    /// One spray after the other
-    Pursuit,
 }
 
 fn main() -> ExitCode {
@@ -218,18 +32,10 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(arguments: &Arguments) -> Result<(), AnyError> {
+fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let folder = &arguments.out;
-    let mut mission_file = match &arguments.mission {
-        Some(path) => MissionFile::read(path)?,
-        None => arguments.mission_file()?,
-    };
-    if let Some(threads) = arguments.threads {
-        mission_file.settings.threads = usize::from(threads);
-    }
-    std::fs::create_dir_all(folder)
-        .map_err(|e| format!("{}: cannot be created ({e}): choose another --out", folder.display()))?;
-    mission_file.write(&folder.join("mission.toml"))?;
+    let mission_file = arguments.mission.mission_file()?;
+    mission_file.write_into(folder)?;
     let decision = mission_file.decide(folder)?;
     if arguments.preview {
         let found = preview(&decision, folder)?;
@@ -242,39 +48,4 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
     eprintln!("{}", report.summary());
     println!("{}", folder.join("report.md").display());
     Ok(())
-}
-
-impl Arguments {
-    /// What the options say, as a mission.
-    fn mission_file(&self) -> Result<MissionFile, AnyError> {
-        let mut settings = MissionSettings {
-            seed: self.seed,
-            layered: self.layers,
-            memory_gib: self.memory_gib,
-            placement: self.placement.picture()?,
-            viewpoint: self.placement.project,
-            painter: match self.painter {
-                PainterName::Feedback => PainterChoice::Feedback,
-                PainterName::Deconvolution => PainterChoice::Deconvolution,
-                PainterName::Centrelines => PainterChoice::Centrelines,
-                PainterName::Pursuit => PainterChoice::Pursuit,
-            },
-            ..MissionSettings::default()
-        };
-        self.nozzle.apply(&mut settings);
-        let up = self.up.map(|up| match up {
-            Up::X => UpAxis::X,
-            Up::Y => UpAxis::Y,
-            Up::Z => UpAxis::Z,
-        });
-        Ok(MissionFile {
-            mesh: self.mesh.clone(),
-            scale: self.scale,
-            up,
-            design: self.design.clone(),
-            texture: self.texture.clone(),
-            scan: self.scan,
-            settings,
-        })
-    }
 }

@@ -130,7 +130,7 @@ fn normal_deviations(mission: &Mission) -> Deviations {
 }
 
 /// Planned time with the valve open, s.
-fn open_time(plan: &Plan) -> f64 {
+pub(super) fn open_time(plan: &Plan) -> f64 {
     let open = plan.target_time.windows(2).zip(&plan.flow).filter(|(_, flow)| **flow > 0.0);
     open.map(|(times, _)| times[1] - times[0]).sum()
 }
@@ -175,7 +175,7 @@ fn statistics(flights: &[LayerFlight], of: impl Fn(&LayerFlight) -> &FlightLog) 
     FlightStatistics::of(&samples)
 }
 
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
+pub(super) fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
     if count > 0.0 { sum / count } else { 0.0 }
 }

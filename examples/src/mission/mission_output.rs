@@ -11,12 +11,13 @@ use tsdf_hash::Mesh;
 use super::error::MissionError;
 use super::figures::report;
 use super::inspect::inspect;
+use super::path_view::{save_path, vertex_colours};
 use super::run::Mission;
 use super::shading::shading;
 use super::trajectory_table::trajectory_table;
 use super::view::{camera, picture_of, view};
 use crate::mesh_io::{PlyMesh, write_ply};
-use crate::pictures::{Panel, Polyline, Rgb, Scene, save_curves, save_error_map, save_scene};
+use crate::pictures::{Panel, Rgb, save_curves, save_error_map};
 use crate::progress::Stage;
 use crate::recording::{ColouredMesh, PaintStyle, RobotState, save_recording};
 use crate::textured_mesh::{TexturedMesh, with_gutter};
@@ -24,7 +25,7 @@ use crate::textured_mesh::{TexturedMesh, with_gutter};
 /// Colour beside the surface in the texture pictures.
 const BACKGROUND: [u8; 3] = [255, 255, 255];
 /// Seconds between two states of the recording.
-const RECORDING_STEP: f64 = 0.1;
+pub(super) const RECORDING_STEP: f64 = 0.1;
 /// Points in a curve: more than the picture has columns shows nothing more.
 const CURVE_POINTS: usize = 2800;
 
@@ -34,7 +35,7 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
     let stage = Stage::start("pictures");
     save_textures(mission, folder)?;
     stage.share(0.2);
-    let colours = vertex_colours(mission);
+    let colours = vertex_colours(&mission.decision, &mission.painted_depth());
     let positions: Vec<[f32; 3]> =
         mission.decision.surface.disk().positions().iter().map(|p| p.map(|c| c as f32)).collect();
     let faces = mission.decision.surface.disk().faces();
@@ -95,19 +96,6 @@ fn save_textures(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
     Ok(())
 }
 
-/// Colour of every vertex of the disk: the paint on the texel below it.
-fn vertex_colours(mission: &Mission) -> Vec<[u8; 3]> {
-    let painted = mission.painted_depth();
-    let texel = mission.decision.settings.texel;
-    let (width, height) = (painted.width(), painted.height());
-    let at = |uv: &[f64; 2]| {
-        let x = ((uv[0] / texel) as usize).min(width - 1);
-        let y = (((height as f64 * texel - uv[1]) / texel) as usize).min(height - 1);
-        mission.decision.appearance.srgb(painted.at(x, y))
-    };
-    mission.decision.surface.chart.uv().iter().map(at).collect()
-}
-
 fn save_views(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
     let painted = mission.painted_depth();
     let corners: Vec<Point3<f64>> =
@@ -122,19 +110,8 @@ fn save_views(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
         base.flight.samples.iter().step_by(10).map(of).collect()
     };
     let vehicle = path(&|s| s.world_from_body.translation.vector.into());
-    let camera = camera(&mission.decision, &[corners, vehicle.clone()].concat())?;
-    let frame = view(&mission.decision, &camera, &shade)?;
-    let project = |p: &Point3<f64>| {
-        let c = camera.world_from_camera.inverse_transform_point(p);
-        (c.z > 0.05).then(|| (camera.fx * c.x / c.z + camera.cx, camera.fy * c.y / c.z + camera.cy, c.z))
-    };
-    let lines = [
-        Polyline { points: path(&|s| s.nozzle), colour: [0, 90, 200], radius: 0.5 },
-        Polyline { points: vehicle, colour: [230, 110, 20], radius: 0.7 },
-    ];
-    let scene = Scene { picture: picture_of(&frame), depth: &frame.depth, project: &project };
-    save_scene(&folder.join("path.png"), scene, &lines)?;
-    Ok(())
+    let nozzle = path(&|s| s.nozzle);
+    save_path(&mission.decision, &painted, nozzle, vehicle, &folder.join("path.png"))
 }
 
 fn save_angles(mission: &Mission, path: &Path) -> Result<(), MissionError> {
@@ -214,11 +191,11 @@ fn save_textured_mesh(mission: &Mission, folder: &Path) -> Result<(), MissionErr
     mesh.save(folder, "painted").map_err(unwritable(&folder.join("painted.*")))
 }
 
-fn write(path: &Path, text: &str) -> Result<(), MissionError> {
+pub(super) fn write(path: &Path, text: &str) -> Result<(), MissionError> {
     std::fs::write(path, text).map_err(unwritable(path))
 }
 
-fn unwritable(path: &Path) -> impl FnOnce(std::io::Error) -> MissionError {
+pub(super) fn unwritable(path: &Path) -> impl FnOnce(std::io::Error) -> MissionError {
     let path = path.display().to_string();
     |source| MissionError::Unwritable { path, source }
 }

@@ -111,7 +111,7 @@ fn estimate(decision: &Decision) -> Result<Preview, MissionError> {
 }
 
 /// Depth of paint on every texel when every spray lands where it is meant to.
-fn expected_depth(decision: &Decision) -> Image {
+pub(super) fn expected_depth(decision: &Decision) -> Image {
     let ink = decision.layers.last().map_or(&decision.wanted, |layer| &layer.ink);
     ink.map(|ink| decision.appearance.ink().inverse(ink))
 }

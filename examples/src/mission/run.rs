@@ -9,11 +9,8 @@ use ptu_kinematics::Joints;
 use super::decision::Decision;
 use super::error::MissionError;
 use super::fly::{LayerFlight, fly, spray};
-use super::plan::plan;
+use super::planned_mission::{PlannedMission, share_out_of_reach};
 use crate::appearance::UNIT_THICKNESS;
-
-/// A mission is given up when more of the wanted paint than this is out of reach.
-const MAX_UNREACHABLE_SHARE: f64 = 0.9;
 
 /// Everything a mission made; what the report, the pictures and the recording are drawn from.
 pub struct Mission {
@@ -33,18 +30,17 @@ pub struct Mission {
 impl Mission {
     /// Plans and flies what was decided, and sprays it onto the film.
     pub fn run(decision: Decision) -> Result<Self, MissionError> {
-        let Decision { layers, surface, robot, settings, .. } = &decision;
-        let planned = plan(layers, surface, robot, settings)?;
+        PlannedMission::new(decision).and_then(Self::fly)
+    }
+
+    /// Flies what is planned, and sprays it onto the film.
+    pub fn fly(mission: PlannedMission) -> Result<Self, MissionError> {
+        let PlannedMission { decision, planned } = mission;
         let (planning, unreachable_paint) = (planned.seconds, planned.unreachable_paint);
         let (kept_off, left_bare) = (planned.kept_off, planned.left_bare);
-        let flights = fly(planned, surface, robot, settings)?;
-        let (film, pixels) = spray(&flights, surface, settings)?;
-        let mission = Self { decision, flights, film, pixels, planning, unreachable_paint, kept_off, left_bare };
-        let share = mission.share_out_of_reach();
-        if share > MAX_UNREACHABLE_SHARE {
-            return Err(MissionError::OutOfReach { percent: 100.0 * share });
-        }
-        Ok(mission)
+        let flights = fly(planned, &decision.surface, &decision.robot, &decision.settings)?;
+        let (film, pixels) = spray(&flights, &decision.surface, &decision.settings)?;
+        Ok(Self { decision, flights, film, pixels, planning, unreachable_paint, kept_off, left_bare })
     }
 
     /// The layers, in the order in which they were flown.
@@ -75,14 +71,10 @@ impl Mission {
         (0..painted.data().len()).map(|k| (self.decision.coverage.data()[k] > 0.0).then(|| pixel(k))).collect()
     }
 
-    /// Share of the wanted paint that was not planned: no pose of the robot, or no surface below the spray.
+    /// Share of the wanted paint that was not planned.
     pub(super) fn share_out_of_reach(&self) -> f64 {
-        let (mut planned, mut wanted) = (0.0, self.unreachable_paint + self.decision.wanted_out_of_reach());
-        for f in &self.flights {
-            wanted += f.route.lost + f.route.paint();
-            planned += (0..f.route.targets.len()).map(|k| f.plan.volume(k)).sum::<f64>();
-        }
-        if wanted > 0.0 { (1.0 - planned / wanted).max(0.0) } else { 0.0 }
+        let layers = self.flights.iter().map(|f| (&f.route, &f.plan));
+        share_out_of_reach(&self.decision, self.unreachable_paint, layers)
     }
 
     /// The arm's links at a sample: pan in the body's frame, tilt in pan's, the nozzle in tilt's (x along the spray).

@@ -95,3 +95,45 @@ fn a_run_can_be_repeated_from_the_file_that_it_leaves() {
     let (code, text) = run(&["--mission", "elsewhere/mission.toml", "--seed", "4"], "three");
     assert!(code == Some(2) && text.contains("--seed") && text.contains("--mission"), "{text}");
 }
+
+/// Rows of a table by name of the column.
+fn columns(text: &str, names: &[&str]) -> Vec<Vec<f64>> {
+    let mut lines = text.lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let places: Vec<usize> = names.iter().map(|name| header.iter().position(|h| h == name).unwrap()).collect();
+    let row = |line: &str| {
+        let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+        places.iter().map(|&k| cells[k]).collect()
+    };
+    lines.map(row).collect()
+}
+
+#[test]
+fn what_plan_exports_is_what_is_flown() {
+    let s = Scratch::new("plan");
+    s.write("wall.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n");
+    let run = |program: &str, arguments: &[&str], out: &str| {
+        let output = Command::new(program).current_dir(&s.0).args(arguments).args(["--out", out]).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    };
+    let wall = ["--mesh", "wall.obj", "--scale", "0.6", "--design", "gradient", "--seed", "5"];
+    run(env!("CARGO_BIN_EXE_plan"), &wall, "planned");
+    run(env!("CARGO_BIN_EXE_paintcopter"), &["--mission", "planned/mission.toml"], "flown");
+    let read = |name: &str| String::from_utf8(std::fs::read(s.0.join(name)).unwrap()).unwrap();
+    let names = ["time_s", "x_m", "y_m", "z_m", "heading_rad", "pan_rad", "tilt_rad", "flow_m3_per_s", "target_y_m"];
+    let (planned, flown) = (columns(&read("planned/plan.csv"), &names), columns(&read("flown/trajectory.csv"), &names));
+    assert!(planned.len() > 100 && flown.len().abs_diff(planned.len()) <= 1, "{} {}", planned.len(), flown.len());
+    for (p, f) in planned.iter().zip(&flown) {
+        // Steps of the simulation are sums of 1 ms: where the valve opens, a row may lie on either side.
+        let same = p.iter().zip(f).filter(|(p, f)| (**p - **f).abs() < 1e-6).count();
+        assert!(same >= names.len() - 1, "planned {p:?}, flown {f:?}");
+    }
+    let [planned, flown] = ["planned/report.json", "flown/report.json"]
+        .map(|name| serde_json::from_str::<serde_json::Value>(&read(name)).unwrap());
+    for key in ["flight_time_s", "path_length_m", "valve_open_share", "strokes", "normal_deviation_max_m"] {
+        assert_eq!(planned[key], flown[key], "{key}");
+    }
+    for file in ["path.png", "plan.mcap"] {
+        assert!(std::fs::metadata(s.0.join("planned").join(file)).unwrap().len() > 1000, "{file}");
+    }
+}

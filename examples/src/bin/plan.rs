@@ -1,0 +1,46 @@
+//! Plans a mission and exports it: nothing is flown, nothing is sprayed.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Parser;
+use paintcopter_examples::mission::{PlannedMission, save_plan};
+use paintcopter_examples::mission_arguments::MissionArguments;
+
+/// Plans a painting mission without flying it: the trajectory with nozzle and valve as a table and as a recording, a picture of
+/// the way, and the figures. The mission.toml that it leaves is what `paintcopter --mission` flies.
+#[derive(Parser)]
+#[command(
+    name = "plan",
+    version,
+    after_help = "Example:\n  plan --mesh wall.obj --design text.png --painter centrelines --out out/text"
+)]
+struct Arguments {
+    #[command(flatten)]
+    mission: MissionArguments,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/plan")]
+    out: PathBuf,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("plan: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
+    let folder = &arguments.out;
+    let mission_file = arguments.mission.mission_file()?;
+    mission_file.write_into(folder)?;
+    let decision = mission_file.decide(folder)?;
+    let mission = PlannedMission::new(decision).map_err(|error| mission_file.in_mesh(error))?;
+    let figures = save_plan(&mission, folder)?;
+    eprintln!("{}", figures.summary());
+    println!("{}", folder.join("plan.csv").display());
+    Ok(())
+}

@@ -1,0 +1,48 @@
+//! The ways of nozzle and vehicle before the surface, as a picture.
+
+use std::path::Path;
+
+use nalgebra::Point3;
+use paint_net::Image;
+use paint_sim::Hit;
+
+use super::decision::Decision;
+use super::error::MissionError;
+use super::shading::shading;
+use super::view::{camera, picture_of, view};
+use crate::pictures::{Polyline, Scene, save_scene};
+
+/// Draws the nozzle's way (blue) and the vehicle's (orange) before the surface with `depth` of paint on its texels.
+pub(super) fn save_path(
+    decision: &Decision,
+    depth: &Image,
+    nozzle: Vec<Point3<f64>>,
+    vehicle: Vec<Point3<f64>>,
+    file: &Path,
+) -> Result<(), MissionError> {
+    let corners = decision.surface.disk().positions().iter().map(|p| Point3::from(*p));
+    let camera = camera(decision, &corners.chain(vehicle.iter().copied()).collect::<Vec<_>>())?;
+    let frame = view(decision, &camera, &|hit: &Hit| shading(decision, depth, hit))?;
+    let project = |p: &Point3<f64>| {
+        let c = camera.world_from_camera.inverse_transform_point(p);
+        (c.z > 0.05).then(|| (camera.fx * c.x / c.z + camera.cx, camera.fy * c.y / c.z + camera.cy, c.z))
+    };
+    let lines = [
+        Polyline { points: nozzle, colour: [0, 90, 200], radius: 0.5 },
+        Polyline { points: vehicle, colour: [230, 110, 20], radius: 0.7 },
+    ];
+    let scene = Scene { picture: picture_of(&frame), depth: &frame.depth, project: &project };
+    Ok(save_scene(file, scene, &lines)?)
+}
+
+/// Colour of every vertex of the disk with `depth` of paint on its texels.
+pub(super) fn vertex_colours(decision: &Decision, depth: &Image) -> Vec<[u8; 3]> {
+    let texel = decision.settings.texel;
+    let (width, height) = (depth.width(), depth.height());
+    let at = |uv: &[f64; 2]| {
+        let x = ((uv[0] / texel) as usize).min(width - 1);
+        let y = (((height as f64 * texel - uv[1]) / texel) as usize).min(height - 1);
+        decision.appearance.srgb(depth.at(x, y))
+    };
+    decision.surface.chart.uv().iter().map(at).collect()
+}

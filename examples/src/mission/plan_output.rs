@@ -1,0 +1,203 @@
+//! What a plan leaves in its folder: for people, for an autopilot, for a viewer.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use paint_planner::{Plan, Setpoint};
+use ptu_kinematics::Joints;
+use serde::Serialize;
+
+use super::decision::Decision;
+use super::error::MissionError;
+use super::figures::{mean, open_time};
+use super::mission_output::{RECORDING_STEP, write};
+use super::path_view::{save_path, vertex_colours};
+use super::plan::path_length;
+use super::planned_mission::{PlannedMission, share_out_of_reach};
+use super::preview::expected_depth;
+use crate::appearance::DENSITY;
+use crate::progress::Stage;
+use crate::recording::{ColouredMesh, PaintStyle, RobotState, save_recording};
+use crate::report::save_figures;
+
+/// Seconds between two rows of the table.
+const TABLE_STEP: f64 = 0.05;
+
+/// The figures of a plan. Flat, SI units in the names.
+#[derive(Debug, Clone, Serialize)]
+pub struct PlanFigures {
+    /// Version of the program.
+    pub version: &'static str,
+    /// Surface that is to be painted.
+    pub surface: String,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Flights: layers of paint.
+    pub layers: usize,
+    /// Strokes over all layers.
+    pub strokes: usize,
+    /// Targets on the surface.
+    pub targets: usize,
+    /// Targets that no permitted pose serves.
+    pub targets_not_served: usize,
+    /// Targets that keep more clearance since the rehearsal in wind.
+    pub targets_kept_off: usize,
+    /// Targets given up in the rehearsal.
+    pub targets_left_bare: usize,
+    /// Share of the wanted paint that is not planned.
+    pub unreachable_paint_share: f64,
+    /// Time in the air.
+    pub flight_time_s: f64,
+    /// Length of the vehicle's way.
+    pub path_length_m: f64,
+    /// Share of the time with the valve open.
+    pub valve_open_share: f64,
+    /// Paint that leaves the nozzle.
+    pub paint_kg: f64,
+    /// Mean deviation of the nozzle from the normal, `|n x (p - t)|`, over the targets that are served.
+    pub normal_deviation_mean_m: f64,
+    /// Largest such deviation.
+    pub normal_deviation_max_m: f64,
+    /// Certified bound of the vehicle's speed.
+    pub max_speed_m_per_s: f64,
+    /// Certified bound of its acceleration.
+    pub max_acceleration_m_per_s2: f64,
+    /// Planning time on one core.
+    pub planning_s: f64,
+    /// Wall-clock time of everything.
+    pub wall_s: f64,
+}
+
+impl PlanFigures {
+    /// One line for people.
+    pub fn summary(&self) -> String {
+        format!(
+            "{:.1} min in the air, {:.0} m, valve open {:.0} % of the time, {:.2} kg of paint; {} of {} targets not served",
+            self.flight_time_s / 60.0,
+            self.path_length_m,
+            100.0 * self.valve_open_share,
+            self.paint_kg,
+            self.targets_not_served,
+            self.targets
+        )
+    }
+}
+
+/// Writes `plan.csv`, `path.png`, `plan.mcap` and `report.json` into an existing folder; the report last.
+pub fn save_plan(mission: &PlannedMission, folder: &Path) -> Result<PlanFigures, MissionError> {
+    let stage = Stage::start("export");
+    let decision = &mission.decision;
+    write(&folder.join("plan.csv"), &table(mission))?;
+    stage.share(0.2);
+    let depth = expected_depth(decision);
+    if let Some((_, plan)) = mission.layers().next() {
+        let along =
+            |of: &dyn Fn(&Setpoint) -> Point3<f64>| setpoints(plan, RECORDING_STEP).map(|(_, s)| of(&s)).collect();
+        let (nozzle, vehicle) = (along(&|s| s.nozzle.position), along(&|s| s.sample.position));
+        save_path(decision, &depth, nozzle, vehicle, &folder.join("path.png"))?;
+    }
+    stage.share(0.7);
+    save_mcap(mission, &vertex_colours(decision, &depth), &folder.join("plan.mcap"))?;
+    let figures = figures(mission);
+    save_figures(&figures, folder)?;
+    stage.done(&folder.display().to_string());
+    Ok(figures)
+}
+
+/// References at equal steps of time, from the start of the plan on.
+fn setpoints(plan: &Plan, step: f64) -> impl Iterator<Item = (f64, Setpoint)> {
+    let steps = (plan.trajectory.duration() / step) as usize;
+    (0..=steps).map(move |k| (k as f64 * step, plan.setpoint(k as f64 * step)))
+}
+
+/// One row every [`TABLE_STEP`] seconds; layers follow each other.
+fn table(mission: &PlannedMission) -> String {
+    let mut text = String::from(
+        "time_s,layer,x_m,y_m,z_m,heading_rad,vx_m_per_s,vy_m_per_s,vz_m_per_s,pan_rad,tilt_rad,flow_m3_per_s,\
+         target_x_m,target_y_m,target_z_m\n",
+    );
+    let mut start = 0.0;
+    for (layer, (_, plan)) in mission.layers().enumerate() {
+        for (time, s) in setpoints(plan, TABLE_STEP) {
+            let (p, v) = (s.sample.position, s.sample.velocity);
+            let row =
+                [p.x, p.y, p.z, s.sample.heading, v.x, v.y, v.z, s.pan, s.tilt, s.flow, s.aim.x, s.aim.y, s.aim.z];
+            let numbers: Vec<String> = row.iter().map(|value| format!("{value:.9}")).collect();
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "{:.9},{layer},{}", start + time, numbers.join(","));
+        }
+        start += plan.trajectory.duration();
+    }
+    text
+}
+
+fn save_mcap(mission: &PlannedMission, colours: &[[u8; 3]], file: &Path) -> Result<(), MissionError> {
+    let decision = &mission.decision;
+    let positions: Vec<[f32; 3]> = decision.surface.disk().positions().iter().map(|p| p.map(|c| c as f32)).collect();
+    let (mut states, mut log, mut start) = (Vec::new(), Vec::new(), 0.0);
+    for (k, (route, plan)) in mission.layers().enumerate() {
+        log.push((start, format!("layer {}: {} strokes, as planned", k + 1, route.strokes)));
+        states.extend(setpoints(plan, RECORDING_STEP).map(|(time, s)| state(decision, start + time, &s)));
+        start += plan.trajectory.duration();
+    }
+    let settings = &decision.settings;
+    let paint = PaintStyle {
+        width: 2.0 * settings.spot,
+        max_flow: settings.planner.timing.max_flow,
+        colour: decision.appearance.srgb(1.0),
+    };
+    let faces = decision.surface.disk().faces();
+    let mesh = ColouredMesh { positions: &positions, faces, colours, bare: decision.appearance.srgb(0.0) };
+    Ok(save_recording(file, &mesh, paint, &states, &log)?)
+}
+
+/// The robot as the plan has it: level, with the pan and tilt of the reference.
+fn state(decision: &Decision, time: f64, s: &Setpoint) -> RobotState {
+    let heading = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), s.sample.heading);
+    RobotState {
+        time,
+        world_from_body: Isometry3::from_parts(Translation3::from(s.sample.position), heading),
+        arm: decision.robot.chain.link_poses(Joints { pan: s.pan, tilt: s.tilt }),
+        joints: [s.pan, s.tilt],
+        hit: Some(s.aim),
+        flow: s.flow,
+    }
+}
+
+fn figures(mission: &PlannedMission) -> PlanFigures {
+    let (decision, planned) = (&mission.decision, &mission.planned);
+    let sum = |of: &dyn Fn(&Plan) -> f64| mission.layers().map(|(_, plan)| of(plan)).sum::<f64>();
+    let most = |of: &dyn Fn(&Plan) -> f64| mission.layers().map(|(_, plan)| of(plan)).fold(0.0, f64::max);
+    let flight_time = sum(&|plan| plan.trajectory.duration());
+    let volume = sum(&|plan| (0..plan.flow.len()).map(|k| plan.volume(k)).sum());
+    let deviations: Vec<f64> = mission
+        .layers()
+        .flat_map(|(route, plan)| {
+            let served = route.targets.iter().enumerate().filter(|(k, t)| t.dose > 0.0 && plan.reachable[*k]);
+            served.map(|(k, target)| paint_planner::normal_deviation(target, &plan.nozzle[k].position))
+        })
+        .collect();
+    PlanFigures {
+        version: env!("CARGO_PKG_VERSION"),
+        surface: decision.name.clone(),
+        seed: decision.settings.seed,
+        layers: planned.layers.len(),
+        strokes: mission.layers().map(|(route, _)| route.strokes).sum(),
+        targets: mission.layers().map(|(route, _)| route.targets.len()).sum(),
+        targets_not_served: mission.layers().map(|(_, p)| p.reachable.iter().filter(|&&served| !served).count()).sum(),
+        targets_kept_off: planned.kept_off,
+        targets_left_bare: planned.left_bare,
+        unreachable_paint_share: share_out_of_reach(decision, planned.unreachable_paint, mission.layers()),
+        flight_time_s: flight_time,
+        path_length_m: sum(&path_length),
+        valve_open_share: sum(&open_time) / flight_time,
+        paint_kg: volume * DENSITY,
+        normal_deviation_mean_m: mean(deviations.iter().copied()),
+        normal_deviation_max_m: deviations.iter().fold(0.0, |most, &d| most.max(d)),
+        max_speed_m_per_s: most(&|plan| plan.report.extrema.speed),
+        max_acceleration_m_per_s2: most(&|plan| plan.report.extrema.acceleration),
+        planning_s: planned.seconds,
+        wall_s: decision.started.elapsed().as_secs_f64(),
+    }
+}
