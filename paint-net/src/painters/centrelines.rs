@@ -56,8 +56,14 @@ impl Painter for Centrelines {
         require("tolerance", self.tolerance, self.tolerance >= 0.0, "it must be 0 or more")?;
         let grid = PaintGrid::new(problem)?;
         let reach = half_width * problem.kernel.sigma();
-        let lines = trace(&dark(problem, &grid), problem.reference.width(), reach);
-        let placed = PlacedSprays::new(problem, &grid, &sampled(&lines, problem), &beside(&lines, problem, reach));
+        let missing = missing_ink(problem, &grid);
+        let darker_than = |share: f64| {
+            let least = share * missing.iter().fold(0.0_f64, |most, &m| most.max(m));
+            missing.iter().map(|&m| m > least).collect::<Vec<_>>()
+        };
+        let lines = trace(&darker_than(0.5), problem.reference.width(), reach);
+        let rest = left_over(&lines, &darker_than(LEFT_OVER), problem, reach);
+        let placed = PlacedSprays::new(problem, &grid, &sampled(&lines, problem), &rest);
 
         // In units of what the square of a volume costs on white paper.
         let stiffness = smoothness * std::f64::consts::PI * problem.kernel.sigma().powi(2);
@@ -93,14 +99,14 @@ impl Painter for Centrelines {
 /// Volume from which the fit starts: any that is not 0 will do.
 const START: f64 = 0.1;
 
-/// Where more than half of the darkest ink is missing.
-fn dark(problem: &PaintProblem, grid: &PaintGrid) -> Vec<bool> {
+/// Share of the darkest ink below which nothing is worth a row of its own beside lines.
+const LEFT_OVER: f64 = 0.02;
+
+/// Ink that is wanted and not there yet, 0 beside the surface.
+fn missing_ink(problem: &PaintProblem, grid: &PaintGrid) -> Vec<f64> {
     let there = grid.initial.data().iter().map(|&depth| problem.saturation.forward(depth));
     let wanted = problem.reference.data().iter().enumerate();
-    let missing: Vec<f64> =
-        wanted.zip(there).map(|((k, ink), there)| if problem.weight(k) > 0.0 { ink - there } else { 0.0 }).collect();
-    let half = 0.5 * missing.iter().fold(0.0_f64, |most, &m| most.max(m));
-    missing.iter().map(|&m| m > half).collect()
+    wanted.zip(there).map(|((k, ink), there)| if problem.weight(k) > 0.0 { ink - there } else { 0.0 }).collect()
 }
 
 /// Places of sprays along each line, as far apart as on the grid.
@@ -108,12 +114,19 @@ fn sampled(lines: &[Line], problem: &PaintProblem) -> Vec<Vec<[f64; 2]>> {
     lines.iter().map(|line| line.sampled(problem.limits.spray_spacing as f64)).collect()
 }
 
-/// Which pixels the strokes along the lines look after: those that are no farther from one than half the widest.
-fn beside(lines: &[Line], problem: &PaintProblem, reach: f64) -> Vec<bool> {
+/// The pixels from which cells of the grid may spray: those beside something dark that is farther from every line than half the
+/// widest. All of them where there is no line.
+fn left_over(lines: &[Line], dark: &[bool], problem: &PaintProblem, reach: f64) -> Vec<bool> {
+    if lines.is_empty() {
+        return vec![true; dark.len()];
+    }
     let width = problem.reference.width();
-    let mut on_line = vec![false; problem.reference.data().len()];
+    let mut on_line = vec![false; dark.len()];
     for [x, y] in lines.iter().flat_map(|line| &line.points) {
         on_line[y.round() as usize * width + x.round() as usize] = true;
     }
-    distances(&on_line, width).iter().map(|&d| d <= reach + 0.5).collect()
+    let from_line = distances(&on_line, width);
+    let rest: Vec<bool> = dark.iter().zip(&from_line).map(|(&dark, &from)| dark && from > reach + 0.5).collect();
+    let cell = problem.limits.spray_spacing.max(problem.limits.row_spacing) as f64;
+    distances(&rest, width).iter().zip(&from_line).map(|(&to, &from)| to <= cell && from > reach + 0.5).collect()
 }

@@ -37,8 +37,8 @@ impl Footprint {
 }
 
 impl PlacedSprays {
-    /// Sprays at the places along lines, and on all cells of the grid that no line looks after.
-    pub(super) fn new(problem: &PaintProblem, grid: &PaintGrid, lines: &[Vec<[f64; 2]>], beside: &[bool]) -> Self {
+    /// Sprays at the places along lines, and on the cells of the grid where `rest` says so.
+    pub(super) fn new(problem: &PaintProblem, grid: &PaintGrid, lines: &[Vec<[f64; 2]>], rest: &[bool]) -> Self {
         let (width, size) = (problem.reference.width(), problem.reference.size());
         let pixel = |[x, y]: [f64; 2]| y.round() as usize * width + x.round() as usize;
         let may =
@@ -48,7 +48,7 @@ impl PlacedSprays {
         for (cell, &upper) in grid.upper_bounds.iter().enumerate() {
             let spray = grid.spray(cell, 1.0);
             let at = [spray.x, spray.y];
-            if upper > 0.0 && !beside[pixel(at)] {
+            if upper > 0.0 && rest[pixel(at)] {
                 footprints.push(footprint(at, true));
             }
         }
