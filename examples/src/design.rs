@@ -45,7 +45,7 @@ pub struct Picture {
 #[derive(Debug, thiserror::Error)]
 pub enum DesignError {
     /// Neither a built-in name nor a readable picture.
-    #[error("design \"{name}\": {why}; give strata, stripes, gradient, colours or a PNG or JPEG file")]
+    #[error("design \"{name}\": {why}; give strata, stripes, gradient, colours or a PNG, JPEG or SVG file")]
     Unusable {
         /// What was given.
         name: String,
@@ -131,7 +131,7 @@ impl Design {
         }
         if !matches!(self, Self::Picture(_)) && *placement != PicturePlacement::default() {
             return Err(DesignError::NotMovable(
-                "--place, --size, --rotate and --offset move a picture, but the design is none: give --design a PNG or JPEG file",
+                "--place, --size, --rotate and --offset move a picture, but the design is none: give --design a PNG, JPEG or SVG file",
             ));
         }
         Ok(())
@@ -213,7 +213,7 @@ fn smoothstep(t: f64) -> f64 {
 }
 
 impl Picture {
-    /// Reads a PNG or JPEG; colours become grey by their Rec. 709 weights, transparency shows white.
+    /// Reads a PNG, JPEG or SVG; colours become grey by their Rec. 709 weights, transparency shows white.
     pub fn open(path: &Path) -> Result<Self, DesignError> {
         let name = PathBuf::from(path).display().to_string();
         let unusable = |why: String| DesignError::Unusable { name: name.clone(), why };

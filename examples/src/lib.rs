@@ -24,6 +24,7 @@ pub mod surface;
 pub mod targets;
 pub mod textured_mesh;
 pub mod unwrap;
+pub mod vector_drawing;
 pub mod vio;
 pub mod world;
 

@@ -55,7 +55,7 @@ pub struct MissionArguments {
     /// Axis of the mesh file that points up [default: y for OBJ, z otherwise]
     #[arg(long, requires = "mesh")]
     up: Option<Up>,
-    /// What to paint: strata, stripes, gradient, colours (of the mesh's vertices), or a PNG or JPEG file
+    /// What to paint: strata, stripes, gradient, colours (of the mesh's vertices), or a PNG, JPEG or SVG file
     /// [default: strata on the rock wall, stripes on a mesh]
     #[arg(long)]
     design: Option<String>,

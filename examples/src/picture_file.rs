@@ -4,9 +4,28 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageDecoder as _, ImageError, ImageReader};
 
+use crate::vector_drawing::{DrawingError, draw_svg};
+
+/// Why a picture cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum PictureFileError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    File(#[from] std::io::Error),
+    /// It is no PNG or JPEG.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// It is called `.svg` and cannot be drawn.
+    #[error(transparent)]
+    Drawing(#[from] DrawingError),
+}
+
 /// Reads a PNG or JPEG, whatever its file is called, and turns it as its EXIF orientation says: cameras and telephones store what
-/// their sensor saw and only note how they were held.
-pub fn open_upright(path: &Path) -> Result<DynamicImage, ImageError> {
+/// their sensor saw and only note how they were held. An SVG, told by its name, is drawn.
+pub fn open_upright(path: &Path) -> Result<DynamicImage, PictureFileError> {
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg")) {
+        return Ok(draw_svg(&std::fs::read_to_string(path)?)?);
+    }
     let mut decoder = ImageReader::open(path)?.with_guessed_format()?.into_decoder()?;
     // A picture whose EXIF block is broken is a picture still.
     let orientation = decoder.orientation().ok();

@@ -317,7 +317,7 @@ fn lines_become_strokes_along_them_and_nearer_to_the_drawing_than_rows() {
     let lines = paint(&Centrelines::default(), &PaintProblem::new(&wanted), &limits);
     let rows = paint(&Deconvolution::default(), &PaintProblem::new(&wanted), &limits);
     let psnr = |painting: &Painting| metrics::psnr(&painting.ink, &wanted, None).unwrap();
-    assert!(psnr(&lines) > psnr(&rows) + 0.5, "{} against {}", psnr(&lines), psnr(&rows));
+    assert!(psnr(&lines) > psnr(&rows) + 0.3, "{} against {}", psnr(&lines), psnr(&rows));
     // Every spray lies in one stroke, in order.
     let flown: Vec<_> = lines.strokes.iter().flat_map(|stroke| stroke.sprays.iter().copied()).collect();
     assert_eq!(flown, lines.sprays);

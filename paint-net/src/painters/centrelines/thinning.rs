@@ -11,7 +11,7 @@ pub(super) fn neighbour(k: usize, (dx, dy): (isize, isize), width: usize, pixels
 }
 
 /// Takes pixels off the borders of a mask until only lines are left that hold together as the mask did (Zhang and Suen 1984,
-/// with the condition of Lü and Wang 1986 that keeps diagonal lines of two pixels).
+/// with the condition of Lü and Wang 1986 that keeps diagonal lines of two pixels), and makes those one pixel wide.
 pub(super) fn thin(mask: &[bool], width: usize) -> Vec<bool> {
     let mut left = mask.to_vec();
     loop {
@@ -24,13 +24,29 @@ pub(super) fn thin(mask: &[bool], width: usize) -> Vec<bool> {
             }
         }
         if !changed {
-            return left;
+            break;
         }
     }
+    // What is left is two pixels wide on diagonals and at ends.
+    for k in 0..left.len() {
+        left[k] = left[k] && !is_spare(&left, k, width);
+    }
+    left
+}
+
+fn ring(mask: &[bool], k: usize, width: usize) -> [bool; 8] {
+    AROUND.map(|at| neighbour(k, at, width, mask.len()).is_some_and(|n| mask[n]))
+}
+
+/// Whether the neighbours of a pixel hold together without it, by sides or corners (Hilditch's crossing number), and it is no end.
+fn is_spare(mask: &[bool], k: usize, width: usize) -> bool {
+    let around = ring(mask, k, width);
+    let parts = [0, 2, 4, 6].iter().filter(|&&i| !around[i] && (around[i + 1] || around[(i + 2) % 8])).count();
+    parts == 1 && around.iter().filter(|&&set| set).count() >= 2
 }
 
 fn is_border(mask: &[bool], k: usize, width: usize, pass: usize) -> bool {
-    let around = AROUND.map(|at| neighbour(k, at, width, mask.len()).is_some_and(|n| mask[n]));
+    let around = ring(mask, k, width);
     let count = around.iter().filter(|&&set| set).count();
     let rises = (0..8).filter(|&i| !around[i] && around[(i + 1) % 8]).count();
     let [above, _, right, _, below, _, left, _] = around;

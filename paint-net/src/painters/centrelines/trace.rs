@@ -8,6 +8,9 @@ const SMOOTHING: usize = 4;
 /// Pixels back from the end of a line that its direction is taken from.
 const LOOK_BACK: usize = 4;
 
+/// Pixels at the end of a line that it cannot meet: its own last ones.
+const RECENT: usize = 6;
+
 /// The middle of a line.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Line {
@@ -89,24 +92,43 @@ impl Walker<'_> {
         paths
     }
 
+    /// Both ways from a pixel, or away from the line that it touches.
     fn walk(&mut self, start: usize) -> Option<Vec<usize>> {
         if self.visited[start] {
             return None;
         }
-        let mut path: Vec<usize> = self.visited_around(start).into_iter().chain([start]).collect();
-        let first = path.len() - 1;
+        let touched = self.visited_around(start);
         self.visited[start] = true;
-        let mut last = start;
-        while let Some(next) = self.straight_on(&path, last) {
+        let mut path: Vec<usize> = touched.into_iter().chain([start]).collect();
+        self.go_on(&mut path);
+        if touched.is_none() {
+            path.reverse();
+            self.go_on(&mut path);
+        }
+        let last = path[path.len() - 1];
+        if touched.is_none() && path.len() > RECENT && self.around(last, self.narrow).any(|n| n == path[0]) {
+            path.push(path[0]);
+            return Some(path);
+        }
+        path.extend(self.met(&path));
+        if touched.is_none() {
+            path.reverse();
+            path.extend(self.met(&path));
+        }
+        Some(path)
+    }
+
+    fn go_on(&mut self, path: &mut Vec<usize>) {
+        while let Some(next) = self.straight_on(path, path[path.len() - 1]) {
             self.visited[next] = true;
             path.push(next);
-            last = next;
         }
-        // Onto the line that it meets, or back to its own beginning.
-        let own = &path[path.len().saturating_sub(3)..];
-        let meets = self.around(last, self.narrow).filter(|n| !own.contains(n)).collect::<Vec<_>>();
-        path.extend(meets.iter().find(|&&n| n == path[first]).or(meets.first()).copied());
-        Some(path)
+    }
+
+    /// The pixel of another line, or of an earlier part of the same, that a path ends at.
+    fn met(&self, path: &[usize]) -> Option<usize> {
+        let recent = &path[path.len().saturating_sub(RECENT)..];
+        self.around(path[path.len() - 1], self.narrow).find(|n| !recent.contains(n))
     }
 
     /// The neighbour that was not visited and turns least.
@@ -178,6 +200,21 @@ mod tests {
         assert!((85.0..104.0).contains(&total), "{total}");
         // Straight on at the crossing: one of them goes from end to end.
         assert!(lines.iter().any(|line| length(line) > 40.0));
+    }
+
+    #[test]
+    fn a_curve_is_one_line_wherever_it_lies_between_the_pixels() {
+        for k in 0..64 {
+            let shift = [f64::from(k % 8) / 8.0, f64::from(k / 8) / 8.0];
+            let middle = |t: f64| [16.0 + 36.0 * t + shift[0], 30.0 + 3.0 * (6.0 * t).sin() + shift[1]];
+            let curve: Vec<[f64; 2]> = (0..=300).map(|i| middle(f64::from(i) / 300.0)).collect();
+            let mask = drawn(70, 60, |x, y| curve.iter().any(|&p| distance(p, [x, y]) < 2.0));
+            let lines = trace(&mask, 70, 4.0);
+            let long: Vec<f64> = lines.iter().map(length).filter(|&l| l > 4.0).collect();
+            assert_eq!(long.len(), 1, "{shift:?}: {long:?}");
+            let whole: f64 = curve.windows(2).map(|p| distance(p[0], p[1])).sum();
+            assert!((whole - long[0]).abs() < 4.0, "{shift:?}: {} of {whole}", long[0]);
+        }
     }
 
     #[test]

@@ -1,0 +1,95 @@
+//! Vector drawings (SVG) as pictures.
+
+use image::{DynamicImage, RgbaImage};
+use resvg::tiny_skia::{Color, Pixmap, Transform};
+use resvg::usvg::{Options, Tree, roxmltree};
+
+/// Longer side of the picture, pixels: a millimetre on a surface of 2 m.
+const SIDE: f32 = 2048.0;
+
+/// Why a drawing cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum DrawingError {
+    /// No XML.
+    #[error("no SVG: {0}")]
+    Xml(#[from] roxmltree::Error),
+    /// No drawing.
+    #[error("no SVG: {0}")]
+    Svg(#[from] resvg::usvg::Error),
+    /// What would be left out without a word.
+    #[error("line {line} has a <{element}>, which is not drawn: {advice}")]
+    Unsupported {
+        /// The element's name.
+        element: String,
+        /// Where it begins, from 1.
+        line: u32,
+        /// The way out.
+        advice: &'static str,
+    },
+    /// A size without area.
+    #[error("the drawing is {width} x {height}: give it a size (viewBox)")]
+    Empty {
+        /// Width, user units.
+        width: f32,
+        /// Height, user units.
+        height: f32,
+    },
+}
+
+/// Draws an SVG on white, 2048 pixels on its longer side.
+///
+/// # Errors
+/// What is no SVG, has no size, or holds text or embedded pictures.
+pub fn draw_svg(text: &str) -> Result<DynamicImage, DrawingError> {
+    let document = roxmltree::Document::parse(text)?;
+    for node in document.descendants().filter(roxmltree::Node::is_element) {
+        let advice = match node.tag_name().name() {
+            "text" => "turn text into paths before (Inkscape: Path, Object to Path)",
+            "image" => "give the picture itself to --design",
+            _ => continue,
+        };
+        let line = document.text_pos_at(node.range().start).row;
+        return Err(DrawingError::Unsupported { element: node.tag_name().name().into(), line, advice });
+    }
+    let tree = Tree::from_xmltree(&document, &Options::default())?;
+    let (width, height) = (tree.size().width(), tree.size().height());
+    let scale = SIDE / width.max(height);
+    let pixels = |length: f32| (length * scale).round().max(2.0) as u32;
+    let empty = || DrawingError::Empty { width, height };
+    let mut pixmap = Pixmap::new(pixels(width), pixels(height)).ok_or_else(empty)?;
+    pixmap.fill(Color::WHITE);
+    resvg::render(&tree, Transform::from_scale(scale, scale), &mut pixmap.as_mut());
+    let (width, height) = (pixmap.width(), pixmap.height());
+    // On white nothing is transparent, so that premultiplied colours are the colours.
+    RgbaImage::from_raw(width, height, pixmap.take()).map(DynamicImage::ImageRgba8).ok_or_else(empty)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stroke_lies_where_the_drawing_says() {
+        let svg = r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 20 10">
+            <g transform="translate(10 0)"><path d="M 2 5 H 8" stroke="#000" stroke-width="2" fill="none"/></g></svg>"##;
+        let picture = draw_svg(svg).unwrap().to_luma8();
+        assert_eq!(picture.dimensions(), (2048, 1024));
+        let at = |x: f32, y: f32| picture.get_pixel((x * 102.4) as u32, (y * 102.4) as u32).0[0];
+        assert_eq!([at(12.5, 5.0), at(17.5, 4.5), at(15.0, 5.8)], [0; 3]);
+        assert_eq!([at(11.5, 5.0), at(18.5, 5.0), at(15.0, 3.5), at(15.0, 6.5), at(5.0, 5.0)], [255; 5]);
+    }
+
+    #[test]
+    fn what_would_be_left_out_is_refused_with_its_line() {
+        let svg =
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 9 9\">\n<text x=\"1\" y=\"5\">hi</text></svg>";
+        let message = draw_svg(svg).unwrap_err().to_string();
+        assert!(message.contains("line 2") && message.contains("<text>") && message.contains("paths"), "{message}");
+        let svg = svg.replace("text", "image");
+        assert!(draw_svg(&svg).unwrap_err().to_string().contains("<image>"));
+        for broken in ["", "<svg", "<html/>", "no xml"] {
+            assert!(draw_svg(broken).is_err(), "{broken:?}");
+        }
+    }
+}
