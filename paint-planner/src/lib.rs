@@ -62,6 +62,7 @@ mod bernstein;
 mod block_tridiagonal;
 mod clearance;
 mod error;
+pub mod gantry;
 mod heading;
 mod lowess;
 mod minimum_snap;

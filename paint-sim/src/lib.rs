@@ -48,9 +48,11 @@
 //! | Paper II, Section 7.2 | hit error, distance error, angle errors | [`FlightStatistics`] |
 
 pub mod colour;
+pub mod droplets;
 mod error;
 pub mod film;
 pub mod flight;
+pub mod gantry_robot;
 pub mod km;
 pub mod paint;
 pub mod render;
