@@ -6,9 +6,12 @@
 
 mod candidate;
 mod cast;
+mod cone;
 mod coverage;
 mod density;
 mod directions;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod path_simulation;
 mod step;
 mod sweep;
@@ -17,6 +20,8 @@ mod texel_surface;
 pub use coverage::{Coverage, CoverageFigures};
 pub use density::{DensityPlace, DensitySettings, Flux, density_map};
 pub use directions::Droplets;
+#[cfg(feature = "gpu")]
+pub use gpu::{GpuDensity, GpuOptions};
 pub use path_simulation::{PathOutcome, PathSimulation, SimulatedSegment};
 pub use step::{DepositSettings, StepHits, StepOutcome};
 pub use sweep::{GantryGeometry, Nozzle, Sweep};

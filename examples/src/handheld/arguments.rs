@@ -31,7 +31,7 @@ pub struct Arguments {
     #[arg(long, value_name = "M3_PER_S", default_value_t = 0.5e-9)]
     pub flow: f64,
     /// Punishment of paint above the target
-    #[arg(long, default_value_t = 3.0)]
+    #[arg(long, default_value_t = 2.0)]
     pub punishment: f64,
     /// Thickness of a full coat, metres
     #[arg(long, value_name = "METRES", default_value_t = 20e-6)]

@@ -53,7 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<(), HandheldError> {
         ..HandheldReport::default()
     };
     if arguments.evaluate {
-        rank(arguments, device.as_mut(), &settings, &mut report)?;
+        rank(arguments, &object, device.as_mut(), &settings, &mut report)?;
     }
     let log = spray(arguments, &object, device.as_mut(), &settings)?;
     report.painted(&log);
@@ -172,6 +172,7 @@ fn open_device<'a>(
 /// The planner's figures on the built-in object.
 fn rank(
     arguments: &Arguments,
+    object: &PaintObject,
     device: &mut dyn DensityDevice,
     settings: &HandheldSettings,
     report: &mut HandheldReport,
@@ -181,19 +182,19 @@ fn rank(
         return Err(HandheldError::Option { option: "--evaluate", value: 1.0, must_be });
     }
     let stage = Stage::start("scenarios");
-    let (object, faces) = (object(arguments, &arguments.out)?, upper_faces());
+    let faces = upper_faces();
     let seeds = arguments.seed..arguments.seed + arguments.seeds;
     let scenarios = (arguments.scenarios, seeds);
-    let evaluation = evaluate(&object, &faces, device, settings, scenarios.clone(), &|share| stage.share(0.6 * share))?;
+    let evaluation = evaluate(object, &faces, device, settings, scenarios.clone(), &|share| stage.share(0.6 * share))?;
     report.evaluated(&evaluation);
     let literal = HandheldSettings { paper_literal: true, ..settings.clone() };
-    let printed = evaluate(&object, &faces, device, &literal, scenarios, &|share| stage.share(0.6 + 0.4 * share))?;
+    let printed = evaluate(object, &faces, device, &literal, scenarios, &|share| stage.share(0.6 + 0.4 * share))?;
     report.paper_literal_mean_rank_fraction = super::evaluation::mean(&printed.ranks);
     let long = HandheldSettings {
         planner: GantrySettings { horizon: 30, directions: 9, ..settings.planner },
         ..settings.clone()
     };
-    report.long_horizon_time_ratio = time_ratio(&object, &faces, device, [&long, settings], RATIO_SCENARIOS)?;
+    report.long_horizon_time_ratio = time_ratio(object, &faces, device, [&long, settings], RATIO_SCENARIOS)?;
     stage.done(&format!(
         "{} scenarios: {:.1} ms, rank {:.2} %, {:.0} % in the top 5 %; greedy {:.0} %, as printed {:.0} %; beam {:.2} %",
         report.scenarios,

@@ -26,8 +26,8 @@ pub struct GantrySettings {
     /// What the nozzle sprays per unit speed, `flow / w` or `flow / A` in Eq. (3); divided by the nozzle's speed it is compared with the
     /// density. Physically `flow` in m^3/s over the width `w` of the footprint at unit distance.
     pub flux_speed: f64,
-    /// Least share of the flux that the density must take for a movement to score (default 0.7: a punishment of 4 shuts the valve at 0.8 of
-    /// the mean over a step, which the lattice smooths; 1 in Eq. (4)).
+    /// Least share of the flux that the density must take for a movement to score (default 0.7: a punishment of 2 shuts the valve at two
+    /// thirds; 1 in Eq. (4)).
     pub least_use: f64,
     /// Whether the need of a ray is cut at the flux of the nozzle (default true; Eq. (1) does not).
     pub saturate: bool,

@@ -11,19 +11,19 @@ use crate::spray::QUANTUM;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct DepositSettings {
-    /// Paint per second with the valve open, m^3/s (default 1.2 mm^3/s: an airbrush with a fine needle; none is published).
+    /// Paint per second with the valve open, m^3/s (default 0.5 mm^3/s: an airbrush with a fine needle; none is published).
     pub flow: f64,
     /// Length of a time step, s (default 0.01: the valve is switched at its ends).
     pub step: f64,
     /// Droplets per time step, a multiple of 64 (default 256; the paper's `r`, not published).
     pub droplets: usize,
-    /// Punishment of paint above the target, the paper's `P` (default 4; not published).
+    /// Punishment of paint above the target, the paper's `P` (default 2; not published).
     pub punishment: f64,
 }
 
 impl Default for DepositSettings {
     fn default() -> Self {
-        Self { flow: 1.2e-9, step: 0.01, droplets: 256, punishment: 4.0 }
+        Self { flow: 0.5e-9, step: 0.01, droplets: 256, punishment: 2.0 }
     }
 }
 

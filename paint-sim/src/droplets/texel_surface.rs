@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, TraversalAction};
 
-use super::cast::Cone;
+use super::cone::Cone;
 use crate::error::{Error, check_positive};
 
 /// Meshes with at most this many faces are searched one by one: a hierarchy would cost more than it saves.
