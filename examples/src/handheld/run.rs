@@ -73,8 +73,13 @@ fn judge(log: &SessionLog, settings: &HandheldSettings, report: &HandheldReport)
         return Err(HandheldError::Unreachable { reach_m: settings.spray.range, seconds: log.duration() });
     }
     if report.paint_inside_fraction < 0.5 {
-        let lost = report.tracking_lost_s > 0.5 * report.painting_s;
-        let advice = if lost { "the markers were lost most of the time" } else { "give it more --seconds" };
+        let advice = if report.tracking_lost_s > 0.5 * report.painting_s {
+            "the markers were lost most of the time"
+        } else if report.held_decisions > report.decisions {
+            "the robot's place was not known well enough most of the time: lower --pose-noise"
+        } else {
+            "give it more --seconds"
+        };
         return Err(HandheldError::Unfinished { share: report.paint_inside_fraction, advice: advice.into() });
     }
     Ok(())
@@ -218,6 +223,8 @@ fn spray(
     let away = Vector3::new(1.0, -0.7, 0.4).normalize() * arguments.registration_error;
     let session = SessionSettings {
         pose_sensor: PoseSensorSettings { position_sigma: arguments.pose_noise, ..PoseSensorSettings::default() },
+        // What the filter reaches with each: a camera alone leaves the place less certain.
+        max_position_sigma: arguments.pose_noise * if arguments.no_inertial { 0.9 } else { 0.6 },
         inertial_sensor: (!arguments.no_inertial).then(InertialSensorSettings::default),
         filter: PoseFilterSettings { position_sigma: arguments.pose_noise, ..PoseFilterSettings::default() },
         registration: arguments.correct_registration.then(RegistrationSettings::default),

@@ -221,3 +221,13 @@ fn a_target_out_of_reach_is_said() {
     let log = session(&object, &settings, &SessionSettings::default(), &far, 2.0).unwrap();
     assert!(log.emitted == 0.0 && log.idle_decisions == log.decision_ms.len() && log.idle_decisions > 10);
 }
+
+#[test]
+fn a_camera_alone_paints_too() {
+    let scratch = Scratch::new("handheld-camera");
+    let painted = run(&arguments(&scratch, &["--no-inertial", "--seconds", "3"]));
+    assert!(matches!(painted, Err(HandheldError::Unfinished { .. })), "{painted:?}");
+    let report = report(&scratch.0.join("out"));
+    let figure = |name: &str| report[name].as_f64().unwrap();
+    assert!(figure("paint_inside_fraction") > 0.01 && figure("held_decisions") < 0.5 * figure("decisions"), "{report}");
+}
