@@ -16,7 +16,8 @@ use foxglove::messages::{
 use nalgebra::{Isometry3, Point3};
 
 pub use paint_traces::PaintStyle;
-use paint_traces::{PaintTraces, point};
+use paint_traces::PaintTraces;
+pub(crate) use paint_traces::point;
 
 /// The robot at one moment of the flight.
 #[derive(Debug, Clone, Copy)]
@@ -72,10 +73,7 @@ pub fn save_recording(
     states: &[RobotState],
     log_lines: &[(f64, String)],
 ) -> Result<(), RecordingError> {
-    let file =
-        File::create(path).map_err(|source| RecordingError::Unwritable { path: path.display().to_string(), source })?;
-    let options = mcap::WriteOptions::new().compression(None).library("paintcopter");
-    let mut recorder = Recorder { writer: options.create(BufWriter::new(file)).map_err(failed)?, sequence: 0 };
+    let mut recorder = Recorder::create(path)?;
     let transforms = recorder.channel::<FrameTransforms>("/tf")?;
     let pose = recorder.channel::<PoseInFrame>("/vehicle/pose")?;
     let joints = recorder.channel::<JointStates>("/joint_states")?;
@@ -130,17 +128,28 @@ pub fn save_recording(
     let end = states.last().map_or(start, |state| state.time);
     recorder.write(traces, end, &PaintTraces::clear())?;
     recorder.write(surface, end, &mesh_scene(mesh, Some(mesh.colours)))?;
-    recorder.writer.finish().map_err(failed)?;
-    Ok(())
+    recorder.finish()
 }
 
-struct Recorder {
+/// Writes messages with Foxglove's schemas, time stamps in seconds.
+pub(crate) struct Recorder {
     writer: mcap::Writer<BufWriter<File>>,
     sequence: u32,
 }
 
 impl Recorder {
-    fn channel<T: Encode>(&mut self, topic: &str) -> Result<u16, RecordingError> {
+    pub(crate) fn create(path: &Path) -> Result<Self, RecordingError> {
+        let file = File::create(path)
+            .map_err(|source| RecordingError::Unwritable { path: path.display().to_string(), source })?;
+        let options = mcap::WriteOptions::new().compression(None).library("paintcopter");
+        Ok(Self { writer: options.create(BufWriter::new(file)).map_err(failed)?, sequence: 0 })
+    }
+
+    pub(crate) fn finish(mut self) -> Result<(), RecordingError> {
+        self.writer.finish().map(|_| ()).map_err(failed)
+    }
+
+    pub(crate) fn channel<T: Encode>(&mut self, topic: &str) -> Result<u16, RecordingError> {
         let schema = match T::get_schema() {
             Some(s) => self.writer.add_schema(&s.name, &s.encoding, &s.data).map_err(failed)?,
             None => 0,
@@ -148,7 +157,7 @@ impl Recorder {
         self.writer.add_channel(schema, topic, &T::get_message_encoding(), &BTreeMap::new()).map_err(failed)
     }
 
-    fn write<T: Encode>(&mut self, channel_id: u16, time: f64, message: &T) -> Result<(), RecordingError> {
+    pub(crate) fn write<T: Encode>(&mut self, channel_id: u16, time: f64, message: &T) -> Result<(), RecordingError> {
         let mut data = Vec::with_capacity(message.encoded_len().unwrap_or(256));
         message.encode(&mut data).map_err(failed)?;
         let log_time = (time.max(0.0) * 1e9).round() as u64;
@@ -163,26 +172,26 @@ fn failed(error: impl std::fmt::Display) -> RecordingError {
     RecordingError::Encoding(error.to_string())
 }
 
-fn vector(pose: &Isometry3<f64>) -> FoxgloveVector3 {
+pub(crate) fn vector(pose: &Isometry3<f64>) -> FoxgloveVector3 {
     let t = pose.translation.vector;
     FoxgloveVector3 { x: t.x, y: t.y, z: t.z }
 }
 
-fn quaternion(pose: &Isometry3<f64>) -> Quaternion {
+pub(crate) fn quaternion(pose: &Isometry3<f64>) -> Quaternion {
     let q = pose.rotation.quaternion();
     Quaternion { x: q.i, y: q.j, z: q.k, w: q.w }
 }
 
-fn rgb([r, g, b]: [u8; 3]) -> Color {
+pub(crate) fn rgb([r, g, b]: [u8; 3]) -> Color {
     Color { r: f64::from(r) / 255.0, g: f64::from(g) / 255.0, b: f64::from(b) / 255.0, a: 1.0 }
 }
 
-fn scene(entities: Vec<SceneEntity>) -> SceneUpdate {
+pub(crate) fn scene(entities: Vec<SceneEntity>) -> SceneUpdate {
     SceneUpdate { deletions: Vec::new(), entities }
 }
 
 /// The mesh in the colours of its vertices, or bare.
-fn mesh_scene(mesh: &ColouredMesh, colours: Option<&[[u8; 3]]>) -> SceneUpdate {
+pub(crate) fn mesh_scene(mesh: &ColouredMesh, colours: Option<&[[u8; 3]]>) -> SceneUpdate {
     let triangles = TriangleListPrimitive {
         pose: None,
         points: mesh.positions.iter().map(|p| point(p.map(f64::from))).collect(),
@@ -239,7 +248,7 @@ fn spray_scene(state: &RobotState) -> SceneUpdate {
     }])
 }
 
-fn log_message(time: f64, message: &str) -> Log {
+pub(crate) fn log_message(time: f64, message: &str) -> Log {
     Log {
         timestamp: Some(Timestamp::saturating_from_epoch_secs_f64(time)),
         level: log::Level::Info as i32,

@@ -56,12 +56,14 @@
 //! | Richter et al., minimum snap | [`Trajectory::minimum_snap`] |
 //! | Paper II, section 6.2, LOWESS baseline | [`SmoothingPlanner`] |
 //! | VR paper, section V, deviation from the normal | [`normal_deviation`] |
+//! | handheld paper, section IV, Eqs. (1)-(5) | [`gantry`] |
 
 mod angle;
 mod bernstein;
 mod block_tridiagonal;
 mod clearance;
 mod error;
+pub mod gantry;
 mod heading;
 mod lowess;
 mod minimum_snap;

@@ -63,6 +63,12 @@ pub enum Error {
         /// Time in the flight, s.
         time: f64,
     },
+    /// There is no GPU that can be used, or it failed.
+    #[error("GPU: {what}; the processor does the same without it")]
+    Gpu {
+        /// What is wrong.
+        what: String,
+    },
     /// The vehicle ran away from its reference.
     #[error("the flight diverged at t = {time} s ({distance} m from the reference): soften the reference or the wind")]
     Diverged {

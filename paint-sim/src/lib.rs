@@ -36,6 +36,8 @@
 //! |---|---|---|
 //! | VR paper, Section IV (form ours) | conical Gaussian spray, per area and volume | [`SprayModel::density`] |
 //! | handheld paper, Section V (ours) | paint per texel, exact mass balance | [`Film::deposit`], [`MassBalance`] |
+//! | handheld paper, Eqs. (1), (6), (7) | required density, score of a step | [`droplets`] |
+//! | handheld paper, Section VI-B | hand, sensors, slide, valve | [`gantry_robot`] |
 //! | Kubelka 1948 | film of finite thickness on a ground | [`km::reflectance`] |
 //! | Kubelka-Munk 1931 | opaque film, Riccati equation | [`km::opaque_reflectance`], [`km::gradient`] |
 //! | Kubelka 1954 | layers on layers | [`km::Layer::over`] |
@@ -48,9 +50,11 @@
 //! | Paper II, Section 7.2 | hit error, distance error, angle errors | [`FlightStatistics`] |
 
 pub mod colour;
+pub mod droplets;
 mod error;
 pub mod film;
 pub mod flight;
+pub mod gantry_robot;
 pub mod km;
 pub mod paint;
 pub mod render;

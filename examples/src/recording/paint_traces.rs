@@ -87,7 +87,7 @@ impl PaintTraces {
 }
 
 /// A point as a message.
-pub(super) fn point(p: impl Into<[f64; 3]>) -> foxglove::messages::Point3 {
+pub(crate) fn point(p: impl Into<[f64; 3]>) -> foxglove::messages::Point3 {
     let [x, y, z] = p.into();
     foxglove::messages::Point3 { x, y, z }
 }

@@ -4,6 +4,7 @@
 mod bad_input;
 mod bags;
 mod five_joint_arm;
+mod handheld;
 mod independence;
 mod line_art;
 mod mcap_recordings;

@@ -1,5 +1,6 @@
 //! Whole plans on analytic worlds.
 
+mod gantry;
 mod plans;
 mod walls;
 mod worlds;

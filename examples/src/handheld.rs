@@ -1,0 +1,31 @@
+//! `handheld`: shared-control painting with a gantry robot that a person sweeps past an object (handheld paper).
+
+mod arguments;
+pub mod cube;
+mod error;
+mod evaluation;
+mod forecast;
+mod gpu;
+mod motion_file;
+mod object;
+mod pictures;
+mod recording;
+mod report;
+mod run;
+mod scenario;
+mod session;
+mod settings;
+mod target;
+mod views;
+
+pub use arguments::Arguments;
+pub use error::HandheldError;
+pub use evaluation::{Evaluation, evaluate, time_ratio};
+pub use forecast::{DensityDevice, Forecast, PaintJob, Processor};
+pub use object::{PaintObject, SurfaceSample};
+pub use report::HandheldReport;
+pub use run::run;
+pub use scenario::Scenario;
+pub use session::{SessionLog, SessionSettings, Tick, paint};
+pub use settings::HandheldSettings;
+pub use views::passes;

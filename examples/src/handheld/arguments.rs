@@ -1,0 +1,90 @@
+//! The command line of `handheld`.
+
+use std::path::PathBuf;
+
+use clap::Parser;
+
+/// Paints an object with a nozzle on a handheld gantry: a person sweeps it past, the program decides where the nozzle slides and when it
+/// sprays. Without a mesh: a cube of 60 mm on its corner, with a circle of 34 mm on each upper face.
+#[derive(Debug, Clone, Parser)]
+// Each is a switch of the command line.
+#[allow(clippy::struct_excessive_bools)]
+#[command(
+    version,
+    after_help = "Examples:\n  handheld\n  handheld --mesh bust.obj --scale 0.001 --target face.png --texel 0.002\n  handheld --evaluate"
+)]
+pub struct Arguments {
+    /// Object, OBJ, PLY or OFF, z up
+    #[arg(long, value_name = "FILE", requires = "target")]
+    pub mesh: Option<PathBuf>,
+    /// Wanted paint on the atlas of the mesh: black is a full coat, white is bare; as many pixels as the atlas has texels (a first run
+    /// without a fitting one writes atlas.png to paint on)
+    #[arg(long, value_name = "PNG", requires = "mesh")]
+    pub target: Option<PathBuf>,
+    /// Metres per unit of the mesh file
+    #[arg(long, default_value_t = 1.0)]
+    pub scale: f64,
+    /// Side of a texel on the surface, metres
+    #[arg(long, value_name = "METRES", default_value_t = 0.001)]
+    pub texel: f64,
+    /// Flow of the nozzle, cubic metres per second
+    #[arg(long, value_name = "M3_PER_S", default_value_t = 0.5e-9)]
+    pub flow: f64,
+    /// Punishment of paint above the target
+    #[arg(long, default_value_t = 2.0)]
+    pub punishment: f64,
+    /// Thickness of a full coat, metres
+    #[arg(long, value_name = "METRES", default_value_t = 20e-6)]
+    pub coat: f64,
+    /// Motion of the robot: an MCAP recording with poses (spray along x, slide along z), or `synthetic` sweeps
+    #[arg(long, value_name = "FILE|synthetic", default_value = "synthetic")]
+    pub motion: String,
+    /// Seconds before each side of the target [default: what the paint needs]
+    #[arg(long, value_name = "SECONDS")]
+    pub seconds: Option<f64>,
+    /// Speeds of the nozzle to choose from at each decision, odd
+    #[arg(long, default_value_t = 3)]
+    pub directions: usize,
+    /// Decisions of 0.1 s to look ahead
+    #[arg(long, default_value_t = 7)]
+    pub horizon: usize,
+    /// Beginnings kept by the beam search that simulates candidates; 0 takes the graph's best path
+    #[arg(long, default_value_t = 0)]
+    pub beam: usize,
+    /// Standard deviation of a measured coordinate of the robot's pose, metres
+    #[arg(long, value_name = "METRES", default_value_t = 0.002)]
+    pub pose_noise: f64,
+    /// The camera alone: no inertial sensor helps it
+    #[arg(long)]
+    pub no_inertial: bool,
+    /// How far the object stands from where its model says, metres
+    #[arg(long, value_name = "METRES", default_value_t = 0.0)]
+    pub registration_error: f64,
+    /// Correct the object's place by distances measured while painting
+    #[arg(long)]
+    pub correct_registration: bool,
+    /// The density and flux of the paper as they are printed
+    #[arg(long)]
+    pub paper_literal: bool,
+    /// Print the figures of the planner: 32 scenarios of each of 10 seeds, ranks among all 2187 paths, times
+    #[arg(long)]
+    pub evaluate: bool,
+    /// Scenarios of each seed
+    #[arg(long, default_value_t = 32)]
+    pub scenarios: usize,
+    /// Seeds of the scenarios
+    #[arg(long, default_value_t = 10)]
+    pub seeds: u64,
+    /// Compute the density on a GPU (needs the feature `gpu`)
+    #[arg(long)]
+    pub gpu: bool,
+    /// Threads; the results do not depend on it
+    #[arg(long, default_value_t = 2)]
+    pub threads: usize,
+    /// Seed of everything random
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/handheld")]
+    pub out: PathBuf,
+}

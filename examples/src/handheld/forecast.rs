@@ -1,0 +1,146 @@
+//! The simulator's droplets as the gantry planner's paint.
+
+use paint_planner::gantry::{GantrySample, PaintModel, Segment};
+use paint_sim::droplets::{
+    Coverage, DensityPlace, DensitySettings, Droplets, Flux, PathOutcome, PathSimulation, SimulatedSegment, Sweep,
+    TexelSurface, density_map,
+};
+use paint_sim::spray::QUANTUM;
+
+use super::error::HandheldError;
+use super::settings::HandheldSettings;
+
+/// Where densities are computed.
+pub trait DensityDevice {
+    /// Required density of a nozzle at each place.
+    ///
+    /// # Errors
+    /// What the device says.
+    fn density(&mut self, coverage: &Coverage, places: &[DensityPlace], flux: Flux) -> Result<Vec<f32>, HandheldError>;
+
+    /// Its name for the report.
+    fn name(&self) -> String;
+}
+
+/// The processor.
+pub struct Processor<'a> {
+    /// The object.
+    pub surface: &'a TexelSurface,
+    /// Rays of a sample.
+    pub droplets: Droplets,
+    /// Threads that share the samples.
+    pub threads: usize,
+}
+
+impl DensityDevice for Processor<'_> {
+    fn density(&mut self, coverage: &Coverage, places: &[DensityPlace], flux: Flux) -> Result<Vec<f32>, HandheldError> {
+        let settings = DensitySettings { flux, threads: self.threads };
+        Ok(density_map(self.surface, coverage, &self.droplets, places, &settings))
+    }
+
+    fn name(&self) -> String {
+        "processor".into()
+    }
+}
+
+/// What does not change from decision to decision.
+pub struct PaintJob<'a> {
+    /// The object.
+    pub surface: &'a TexelSurface,
+    /// Robot, spray, planner.
+    pub settings: &'a HandheldSettings,
+    /// Droplets of the time steps.
+    pub sets: Vec<Droplets>,
+}
+
+impl<'a> PaintJob<'a> {
+    /// With the droplets of these settings.
+    ///
+    /// # Errors
+    /// Settings out of range.
+    pub fn new(surface: &'a TexelSurface, settings: &'a HandheldSettings) -> Result<Self, HandheldError> {
+        Ok(Self { surface, settings, sets: settings.droplet_sets()? })
+    }
+}
+
+/// The paint as it would go on from one moment.
+pub struct Forecast<'a> {
+    simulation: PathSimulation<'a>,
+    coverage: &'a Coverage,
+    device: &'a mut dyn DensityDevice,
+    settings: &'a HandheldSettings,
+    sweep: Sweep,
+    flux: Flux,
+    /// The first fault of the device; densities after it are zero.
+    fault: Option<HandheldError>,
+}
+
+impl<'a> Forecast<'a> {
+    /// From the paint and the motion of the robot.
+    ///
+    /// # Errors
+    /// Settings out of range.
+    pub fn new(
+        job: &'a PaintJob,
+        coverage: &'a Coverage,
+        device: &'a mut dyn DensityDevice,
+        sweep: &Sweep,
+    ) -> Result<Self, HandheldError> {
+        let PaintJob { surface, sets, settings } = job;
+        let simulation = PathSimulation::new(surface, coverage, sets, &settings.deposit, &settings.geometry, sweep)?;
+        Ok(Self { simulation, coverage, device, settings, sweep: *sweep, flux: settings.flux(), fault: None })
+    }
+
+    /// What a path does, in full.
+    pub fn outcome(&mut self, path: &[Segment]) -> PathOutcome {
+        let segments: Vec<SimulatedSegment> = path.iter().map(simulated).collect();
+        self.simulation.simulate(&segments)
+    }
+
+    /// What went wrong with the device, if anything.
+    ///
+    /// # Errors
+    /// The device's first fault.
+    pub fn check(self) -> Result<(), HandheldError> {
+        self.fault.map_or(Ok(()), Err)
+    }
+}
+
+fn simulated(segment: &Segment) -> SimulatedSegment {
+    SimulatedSegment {
+        key: [segment.layer as i32, segment.cell, segment.speed],
+        start: segment.start,
+        duration: segment.duration,
+        from: segment.from,
+        to: segment.to,
+    }
+}
+
+impl PaintModel for Forecast<'_> {
+    fn required_density(&mut self, samples: &[GantrySample]) -> Vec<f32> {
+        let mut time = f64::NAN;
+        let mut pose = self.sweep.world_from_robot;
+        let places: Vec<DensityPlace> = samples
+            .iter()
+            .map(|sample| {
+                if sample.time != time {
+                    (time, pose) = (sample.time, self.sweep.at(sample.time));
+                }
+                let nozzle = self.settings.geometry.nozzle(&pose, sample.position);
+                DensityPlace { nozzle, saturation: sample.saturation as f32 }
+            })
+            .collect();
+        self.device.density(self.coverage, &places, self.flux).unwrap_or_else(|fault| {
+            self.fault.get_or_insert(fault);
+            vec![0.0; samples.len()]
+        })
+    }
+
+    fn cross_speed(&self, time: f64) -> f64 {
+        self.sweep.cross_speed(&self.settings.geometry, self.settings.stand_off, time)
+    }
+
+    fn simulate(&mut self, path: &[Segment]) -> f64 {
+        self.outcome(path).paint as f64 * QUANTUM
+    }
+}
