@@ -6,6 +6,7 @@ mod estimator;
 mod frontend;
 mod image_tracking;
 mod initialization;
+mod innovation_adaptation;
 mod landmarks;
 pub(crate) mod measurements;
 mod point_observation;
@@ -19,6 +20,7 @@ mod stereo;
 mod tracking_state;
 mod vio;
 
+pub use frontend::point_tracker::PointTracker;
 pub use measurements::measurement::{Measurement, Trial};
 pub use measurements::pose::BodyPose;
 pub use point_observation::{PointObservation, PointPair};

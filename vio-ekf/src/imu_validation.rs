@@ -5,7 +5,8 @@ use std::fmt;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use crate::error::invalid;
-use crate::{Error, Imu, so3};
+use crate::imu_rest::bias_at_rest;
+use crate::{AxesReading, Error, Imu, so3};
 
 /// Length of the windows over which the gyroscope is integrated, s: short enough for one without calibration.
 const WINDOW_S: f64 = 24.0;
@@ -13,9 +14,6 @@ const WINDOW_S: f64 = 24.0;
 const BLOCK_S: f64 = 8.0;
 /// Beyond these multiples of gravity the mean force is in another unit: no flight floats or pulls for that long.
 const PLAUSIBLE_FORCE: [f64; 2] = [0.5, 3.0];
-/// A sensor that turns no faster, rad/s, and as steadily, over this time, s, is at rest, and reads its bias: over a window the bias
-/// would turn it by more than a radian.
-const REST: (f64, f64, f64) = (0.2, 0.02, 1.0);
 /// The mean force of a calm flight differs from gravity by less, m/s².
 const CALM: f64 = 2.0;
 /// Measured and claimed rate may differ by this share.
@@ -68,6 +66,13 @@ pub enum ImuDoubt {
         /// The same with those of the hint, m/s².
         departure_of_hint: f64,
     },
+    /// The images agree with another reading ([`check_imu_axes`](crate::check_imu_axes)).
+    Images {
+        /// `"gyroscope"` or `"accelerometer"`.
+        sensor: &'static str,
+        /// The reading.
+        reading: AxesReading,
+    },
 }
 
 impl fmt::Display for ImuDoubt {
@@ -82,6 +87,15 @@ impl fmt::Display for ImuDoubt {
                 "gravity is {departure:.1} m/s² off when the gyroscope's turns are taken out, and {departure_of_hint:.1} m/s² if \
                  the accelerometer's (x, y, z) were {hint}: a flight that leans as it accelerates, or other axes"
             ),
+            Self::Images { sensor, reading } => {
+                let [given, read] = reading.unexplained;
+                write!(
+                    f,
+                    "the images agree with the {sensor} if its (x, y, z) are {reading}, which leaves {:.0} % of the contradictions: \
+                     check axes, signs and units",
+                    100.0 * read / given
+                )
+            }
         }
     }
 }
@@ -131,26 +145,6 @@ struct Window {
     force: f64,
     /// Mean length of the rate.
     rate: f64,
-}
-
-/// Mean rate of the steadiest second if the sensor was at rest, and zero if it never was.
-fn bias_at_rest(samples: &[Imu]) -> Vector3<f64> {
-    let (slow, steady, length) = REST;
-    let mut best = (f64::INFINITY, Vector3::zeros());
-    let mut first = 0;
-    while first < samples.len() {
-        let inside = |sample: &&Imu| sample.stamp.secs_since(samples[first].stamp) < length;
-        let second = &samples[first..first + samples[first..].iter().take_while(inside).count()];
-        let count = second.len() as f64;
-        let mean = second.iter().map(|sample| sample.gyro).sum::<Vector3<f64>>() / count;
-        let variance = second.iter().map(|sample| (sample.gyro - mean).norm_squared()).sum::<f64>() / count;
-        let whole = samples.get(first + second.len()).is_some();
-        if whole && variance < best.0 && variance < steady * steady && mean.norm() < slow {
-            best = (variance, mean);
-        }
-        first += second.len();
-    }
-    best.1
 }
 
 fn windows(samples: &[Imu], gap_s: f64, gyro_bias: &Vector3<f64>) -> Vec<Window> {

@@ -47,6 +47,7 @@
 //! | poses as measurements of the odometry | thesis, outlook: one estimator instead of two; ours | [`Vio::pose`], [`UnifiedVio`] |
 //! | two inertial sensors as one | ours | [`ImuPair`] |
 //! | axes and units of inertial samples | ours | [`validate_samples`] |
+//! | the same beside images | gyroscope: Kneip and Lynen 2013; accelerometer: after Martinelli 2014 | [`check_imu_axes`] |
 //! | one-call evaluation | ours | [`evaluate`] |
 //! | least-squares alignment | Umeyama 1991, Eqs. (40)-(42); Horn 1987 | [`align`] |
 //! | alignment of position and yaw | closed form, ours; Zhang and Scaramuzza 2018 for the choice of mode | [`Alignment::PosYaw`] |
@@ -68,6 +69,8 @@ mod eval;
 mod filter;
 mod format;
 mod fusion;
+mod imu_axes;
+mod imu_rest;
 mod imu_validation;
 mod lie;
 mod samples;
@@ -100,13 +103,15 @@ pub use eval::{Evaluation, EvaluationSettings, Segment, evaluate};
 pub use filter::{
     Bearing, BodyPose, Calibration, CalibrationSettings, DynamicInitializationSettings, FrameReport,
     InitializationStatus, LandmarkEstimate, LandmarkSettings, Measurement, PatchSettings, PointObservation, PointPair,
-    Settings, StationarySettings, Status, StereoSettings, Trial, UpdateSettings, Vio, VioState, error_state,
+    PointTracker, Settings, StationarySettings, Status, StereoSettings, Trial, UpdateSettings, Vio, VioState,
+    error_state,
 };
 pub use format::{asl, calibration, euroc, kitti, tum};
 pub use fusion::{
     AlignmentSettings, ExtrinsicsSettings, FusionSettings, ImuPair, ImuPairSettings, MeasurementCounts, PoseFusion,
     PoseMeasurement, PoseSource, SourceEstimate, UnifiedSettings, UnifiedVio,
 };
+pub use imu_axes::{AxesCheck, AxesReading, check_imu_axes};
 pub use imu_validation::{ImuDoubt, ImuValidation, validate_samples};
 pub use lie::{se3, so3};
 pub use nalgebra;

@@ -9,6 +9,9 @@ use crate::{Error, Stamp, Trajectory, so3};
 /// Six days at 50 ms: more is a mistaken unit, and would exhaust the memory.
 const MAX_SAMPLED_KNOTS: f64 = 1e7;
 
+/// What is left between poses and curve shrinks to two thirds or less each time: to a millionth.
+const THROUGH_ITERATIONS: usize = 35;
+
 /// A smooth motion with exact derivatives: a uniform cumulative cubic B-spline on `SO(3) × R³`.
 ///
 /// With `B_i(u)` the cumulative basis on a segment, `u ∈ [0, 1]`, and `d_i = Log(R_{i−1}ᵀ R_i)`,
@@ -23,6 +26,7 @@ pub struct Spline {
 
 /// Motion of the body at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Motion {
     /// Pose.
     pub world_from_body: Isometry3<f64>,
@@ -79,6 +83,25 @@ impl Spline {
             .take_while(|&nanos| nanos <= last.nanos());
         let knots = stamps.map(|nanos| trajectory.pose_at(Stamp::from_nanos(nanos))).collect::<Result<_, _>>()?;
         Self::new(first, interval_ns, knots)
+    }
+
+    /// The same through the sampled poses instead of near them: what the knots' interval can show of the motion keeps its size. The
+    /// knots are found by adding, again and again, what is left between pose and curve.
+    pub fn through_trajectory(trajectory: &Trajectory, interval_ns: i64) -> Result<Self, Error> {
+        let mut spline = Self::from_trajectory(trajectory, interval_ns)?;
+        let poses = spline.knots.clone();
+        for _ in 0..THROUGH_ITERATIONS {
+            let curve: Vec<Isometry3<f64>> =
+                spline.knots.windows(4).map(|knots| on_segment(knots, 0.0, 1.0).world_from_body).collect();
+            // The curve passes the second of four knots; the two ends stay as they are.
+            for (k, at) in curve.iter().enumerate() {
+                let (knot, pose) = (&mut spline.knots[k + 1], &poses[k + 1]);
+                knot.translation.vector += pose.translation.vector - at.translation.vector;
+                let left = pose.rotation * at.rotation.inverse();
+                knot.rotation = UnitQuaternion::new_normalize((left * knot.rotation).into_inner());
+            }
+        }
+        Ok(spline)
     }
 
     /// First and last time at which the spline is defined: from the second to the last but one knot.

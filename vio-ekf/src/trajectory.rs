@@ -15,9 +15,28 @@ use crate::{Error, Stamp, so3};
 /// # Ok::<(), vio_ekf::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "Columns"))]
 pub struct Trajectory {
     stamps: Vec<Stamp>,
     poses: Vec<Isometry3<f64>>,
+}
+
+/// A trajectory as it is read, before it has been checked.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Columns {
+    stamps: Vec<Stamp>,
+    poses: Vec<Isometry3<f64>>,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Columns> for Trajectory {
+    type Error = Error;
+
+    fn try_from(columns: Columns) -> Result<Self, Error> {
+        Self::new(columns.stamps, columns.poses)
+    }
 }
 
 impl Trajectory {

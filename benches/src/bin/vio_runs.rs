@@ -7,15 +7,15 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use cpu_time::ThreadTime;
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use paintcopter_benches::Rng;
 use paintcopter_benches::frames::Frames;
-use paintcopter_benches::sequences::{SEQUENCES, cameras, motion};
+use paintcopter_benches::sequences::{REAL_IMU, SEQUENCES, cameras, motion, real_samples};
 use serde_json::json;
 use vio_ekf::sim::{ImuModel, Scenario, SimulatedCamera, Simulation};
 use vio_ekf::{
     Alignment, Association, InitialSigma, InitialState, Odometry, Settings, Stamp, Status, Trajectory, Vio, ate, chi2,
-    nalgebra, so3, tum,
+    so3, tum,
 };
 
 type AnyError = Box<dyn Error>;
@@ -24,7 +24,8 @@ type AnyError = Box<dyn Error>;
 #[derive(Parser)]
 #[command(after_help = "Example: vio_runs --sequence MH_03 --seeds 5")]
 struct Arguments {
-    /// `MH_01`, `MH_03`, `MH_04`, `V1_02`, `paint_1`, `paint_2`; all of them if none is named. Several may be given
+    /// `MH_01`, `MH_03`, `MH_04`, `V1_02`, `paint_1`, `paint_2`; all of them if none is named. Several may be given. `V1_01_imu`,
+    /// `V1_02_imu` and `MH_04_imu` are flown with the recorded readings of the inertial sensor, from a start of the filter's own
     #[arg(long)]
     sequence: Vec<String>,
     /// Runs of each sequence, with seeds 1, 2, ...: another room, other noise
@@ -39,6 +40,12 @@ struct Arguments {
     /// With the second camera
     #[arg(long)]
     stereo: bool,
+    /// Error of the accelerometer's scale: it reads so much more, relative, on all axes
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    accel_scale: f64,
+    /// Angle by which the accelerometer's axes lean away from those of the body, degrees
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    accel_misalignment: f64,
     /// Settings of the filter that differ from the default, as JSON
     #[arg(long, default_value = "{}")]
     settings: String,
@@ -92,7 +99,8 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
             let count = if arguments.stereo { 2 } else { 1 };
             let model = |camera| SimulatedCamera { camera, ..SimulatedCamera::default() };
             let cameras = cameras(name)[..count].iter().copied().map(model).collect();
-            let simulation = Simulation::new(spline.clone(), Scenario { seed, cameras, ..Scenario::default() })?;
+            let imus = vec![ImuModel { accel_matrix: accel_matrix(arguments), ..ImuModel::default() }];
+            let simulation = Simulation::new(spline.clone(), Scenario { seed, cameras, imus, ..Scenario::default() })?;
             let mut outcome = follow(&simulation, name, seed, &settings, arguments)?;
             for _ in 1..arguments.repeats {
                 let again = follow(&simulation, name, seed, &settings, arguments)?;
@@ -154,17 +162,21 @@ fn follow(
     arguments: &Arguments,
 ) -> Result<Outcome, AnyError> {
     let imu = ImuModel::default();
+    let real = REAL_IMU.contains(&name);
     let recording = simulation.imu(0)?;
+    let read = if real { real_samples(&arguments.data, name, simulation.spline())? } else { recording.samples.clone() };
     let [left, right] = cameras(name);
     let mut vio = if arguments.stereo {
         Vio::stereo(left, right, imu.noise, *settings)?
     } else {
         Vio::new(left, imu.noise, *settings)?
     };
-    let mut samples = recording.samples.iter();
+    let mut samples = read.iter();
     let first = samples.next().ok_or("the sequence is too short")?;
     vio.imu(first)?;
-    vio.initialize(&start(simulation, first.stamp, &imu, seed)?)?;
+    if !real {
+        vio.initialize(&start(simulation, first.stamp, &imu, seed)?)?;
+    }
 
     let folder = |side: &str| arguments.cache.as_ref().map(|cache| cache.join(format!("{name}_{seed}{side}")));
     let first = Frames::new(simulation, 0, left, folder(""))?;
@@ -172,7 +184,7 @@ fn follow(
     let (mut truth, mut estimate) = (Trajectory::default(), Trajectory::default());
     let mut outcome =
         Outcome { se3: 0.0, yaw: 0.0, nees: Vec::new(), millis: Vec::new(), imu_micros: Vec::new(), diverged: false };
-    let mut next = samples.next();
+    let (mut next, mut moved) = (samples.next(), None);
     for index in 0..first.count() {
         let Some(frame) = first.get(index)? else { continue };
         let other = second.as_ref().map(|second| second.get(index)).transpose()?.flatten();
@@ -196,15 +208,31 @@ fn follow(
         if std::env::var_os("VIO_TRACE").is_some() {
             eprintln!("{} {report:?}", frame.stamp);
         }
-        let odometry = vio.output().ok_or("the filter is not running")?;
+        let Some(odometry) = vio.output() else {
+            if !real || moved.is_some() {
+                return Err("the filter is not running".into());
+            }
+            continue;
+        };
         if odometry.stamp > simulation.spline().span().1 {
             break;
         }
-        let motion = simulation.motion(odometry.stamp)?;
+        let mut motion = simulation.motion(odometry.stamp)?;
+        if real {
+            // Its world begins where it does.
+            let moved = *moved.get_or_insert_with(|| heading_onto(&odometry.world_from_body, &motion.world_from_body));
+            motion.world_from_body = moved * motion.world_from_body;
+            motion.velocity_in_world = moved * motion.velocity_in_world;
+        }
         truth.push(odometry.stamp, motion.world_from_body)?;
         estimate.push(odometry.stamp, odometry.world_from_body)?;
         let (gyro, accel) = recording.biases_at(odometry.stamp);
-        outcome.nees.push(nees(&odometry, &motion, [gyro, accel]));
+        let mut squares = nees(&odometry, &motion, [gyro, accel]);
+        if real {
+            // Nobody knows the biases.
+            squares[3..].fill(f64::NAN);
+        }
+        outcome.nees.push(squares);
     }
     let pairs = Association::default().pair_up(&truth, &estimate)?;
     outcome.se3 = ate(&pairs.reference, &pairs.estimate, Alignment::Se3)?.position.rmse;
@@ -215,6 +243,23 @@ fn follow(
         std::fs::write(folder.join(format!("{name}_{seed}.tum")), tum::write(&estimate))?;
     }
     Ok(outcome)
+}
+
+/// What the accelerometer reads of the specific force. Each axis leans towards the next and away from the other.
+fn accel_matrix(arguments: &Arguments) -> Matrix3<f64> {
+    let lean = arguments.accel_misalignment.to_radians().sin();
+    Matrix3::from_fn(|r, c| match (3 + c - r) % 3 {
+        0 => 1.0 + arguments.accel_scale,
+        1 => lean,
+        _ => -0.5 * lean,
+    })
+}
+
+/// The shift and the turn about the vertical that take one pose to the place and heading of another.
+fn heading_onto(target: &Isometry3<f64>, from: &Isometry3<f64>) -> Isometry3<f64> {
+    let q = (target.rotation * from.rotation.inverse()).into_inner();
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.0 * q.k.atan2(q.w));
+    Isometry3::from_parts(Translation3::from(target.translation.vector - turn * from.translation.vector), turn)
 }
 
 /// The truth, less errors drawn from what the start admits.
@@ -228,7 +273,7 @@ fn start(simulation: &Simulation, stamp: Stamp, imu: &ImuModel, seed: u64) -> Re
     let tilt = normals().component_mul(&Vector3::new(sigma.tilt, sigma.tilt, 0.0));
     Ok(InitialState {
         stamp,
-        world_from_body: nalgebra::Isometry3::from_parts(pose.translation, so3::exp(&-tilt) * pose.rotation),
+        world_from_body: Isometry3::from_parts(pose.translation, so3::exp(&-tilt) * pose.rotation),
         velocity_in_body: pose.rotation.inverse() * motion.velocity_in_world - normals() * sigma.velocity,
         // The simulator draws the biases around zero.
         gyro_bias: Vector3::zeros(),

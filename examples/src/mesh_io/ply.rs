@@ -14,6 +14,7 @@ use super::fault::Fault;
 use super::mesh::{TriangleMesh, fan};
 
 pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
+    check_counts(bytes)?;
     let ply = Parser::<DefaultElement>::new()
         .read_ply(&mut io::Cursor::new(bytes))
         .map_err(|e| Fault { place: "PLY".into(), what: e.to_string() })?;
@@ -44,6 +45,40 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
         mesh.colours = Some(colours);
     }
     Ok(mesh)
+}
+
+/// Refuses a header that promises more elements than the file has room for: elements without properties would be made until the memory
+/// is full.
+fn check_counts(bytes: &[u8]) -> Result<(), Fault> {
+    let header = Parser::<DefaultElement>::new()
+        .read_ply_header(&mut io::Cursor::new(bytes))
+        .map_err(|e| Fault { place: "PLY header".into(), what: e.to_string() })?;
+    for (name, element) in &header.elements {
+        let binary = |(_, property): (&String, &PropertyDef)| match &property.data_type {
+            PropertyType::Scalar(scalar) => size(scalar),
+            // An empty list is its length.
+            PropertyType::List(length, _) => size(length),
+        };
+        let least: usize = match header.encoding {
+            Encoding::Ascii => 1,
+            _ => element.properties.iter().map(binary).sum::<usize>().max(1),
+        };
+        if element.count.saturating_mul(least) > bytes.len() {
+            let what = format!("{} {name} elements do not fit into {} bytes", element.count, bytes.len());
+            return Err(Fault { place: "PLY header".into(), what });
+        }
+    }
+    Ok(())
+}
+
+/// Bytes of a number.
+fn size(scalar: &ScalarType) -> usize {
+    match scalar {
+        ScalarType::Char | ScalarType::UChar => 1,
+        ScalarType::Short | ScalarType::UShort => 2,
+        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
+        ScalarType::Double => 8,
+    }
 }
 
 /// A colour channel in `[0, 1]`: integers are scaled by their type's maximum.
@@ -143,4 +178,72 @@ pub fn write_ply(path: &Path, mesh: &PlyMesh) -> io::Result<()> {
         writer.write_little_endian_element(&mut out, &Face([index(a)?, index(b)?, index(c)?]), &face)?;
     }
     out.flush()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEADER: &str = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+                          element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+
+    fn files() -> [Vec<u8>; 2] {
+        let ascii = format!("ply\nformat ascii 1.0\n{HEADER}0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").into_bytes();
+        let mut binary = format!("ply\nformat binary_little_endian 1.0\n{HEADER}").into_bytes();
+        binary.extend([0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].iter().flat_map(|v| v.to_le_bytes()));
+        binary.push(3);
+        binary.extend([0_i32, 1, 2].iter().flat_map(|v| v.to_le_bytes()));
+        [ascii, binary]
+    }
+
+    #[test]
+    fn counts_that_cannot_be_are_refused() {
+        for file in files() {
+            assert!(parse(&file).is_ok());
+            let text = String::from_utf8_lossy(&file).into_owned();
+            for count in ["4000000000", "18446744073709551615"] {
+                let claimed = text.replace("element vertex 3", &format!("element vertex {count}"));
+                assert!(parse(claimed.as_bytes()).is_err());
+            }
+            let empty = format!("ply\n{}\nelement vertex 4000000000\nend_header\n", text.lines().nth(1).unwrap());
+            let what = parse(empty.as_bytes()).err().unwrap().what;
+            assert!(what.contains("4000000000 vertex elements do not fit"), "{what}");
+        }
+    }
+
+    /// `MUTATIONS` is how many (20000).
+    #[test]
+    fn mutated_files_never_panic() {
+        let count: u64 = std::env::var("MUTATIONS").map_or(20_000, |text| text.parse().unwrap());
+        let mut state = 11_u64;
+        let mut random = move |below: usize| {
+            // splitmix64.
+            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let mut z = state;
+            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((z ^ (z >> 31)) % below.max(1) as u64) as usize
+        };
+        let (originals, mut read) = (files(), 0);
+        for k in 0..count {
+            let mut bytes = originals[k as usize % 2].clone();
+            for _ in 0..=random(3) {
+                let at = random(bytes.len());
+                match random(5) {
+                    0 => bytes[at] = random(256) as u8,
+                    1 => bytes[at] ^= 1 << random(8),
+                    // Counts: some more digits.
+                    2 => drop(bytes.splice(at..at, *b"99999999")),
+                    3 => drop(bytes.drain(at..(at + 1 + random(16)).min(bytes.len()))),
+                    _ => bytes.truncate(at.max(1)),
+                }
+                if bytes.is_empty() {
+                    break;
+                }
+            }
+            read += u64::from(parse(&bytes).is_ok());
+        }
+        eprintln!("{read} of {count} are read");
+        assert!(read > 0 && read < count, "{read} of {count}");
+    }
 }

@@ -32,7 +32,7 @@ struct Reading {
 /// Another reading of the inertial sensor with which the images can be followed where they cannot be as it is; `None` if there is
 /// none, or if nothing is wrong there. Negated, mirrored, swapped and cycled axes of either sensor, or of both against the camera.
 pub fn diagnose(recording: &Recording, settings: &RunSettings) -> Option<String> {
-    let (from, until) = busiest_window(&recording.samples)?;
+    let (from, until) = busiest_window(&recording.samples, WINDOW_S)?;
     let frames: Vec<(Stamp, GreyImage)> = camera_frames(recording)
         .skip_while(|frame| frame.stamp < from)
         .take_while(|frame| frame.stamp <= until)
@@ -53,17 +53,17 @@ pub fn diagnose(recording: &Recording, settings: &RunSettings) -> Option<String>
 }
 
 /// The part of a recording that turns most; `None` if there are no samples.
-fn busiest_window(samples: &[Imu]) -> Option<(Stamp, Stamp)> {
+pub(super) fn busiest_window(samples: &[Imu], length_s: f64) -> Option<(Stamp, Stamp)> {
     let (first, last) = (samples.first()?.stamp, samples.last()?.stamp);
-    let starts = (0..).map(|k| first.plus_secs(f64::from(k))).take_while(|start| start.plus_secs(WINDOW_S) <= last);
+    let starts = (0..).map(|k| first.plus_secs(f64::from(k))).take_while(|start| start.plus_secs(length_s) <= last);
     let turning = |start: Stamp| {
-        let end = start.plus_secs(WINDOW_S);
+        let end = start.plus_secs(length_s);
         let inside = samples.iter().filter(|sample| (start..=end).contains(&sample.stamp));
         inside.map(|sample| sample.gyro.norm_squared()).sum::<f64>()
     };
     let best = starts.map(|start| (turning(start), start)).max_by(|a, b| a.0.total_cmp(&b.0));
     let start = best.map_or(first, |(_, start)| start);
-    Some((start, start.plus_secs(WINDOW_S).min(last)))
+    Some((start, start.plus_secs(length_s).min(last)))
 }
 
 /// Share of the images that the filter follows, from a start in motion, with the samples read in a given way.

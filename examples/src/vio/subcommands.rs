@@ -10,8 +10,8 @@ use super::command_line::{Arguments, Command, Eval, FlightName, Sim, Track, Tune
 use super::error::{read_text, write_file};
 use super::{
     CompareSettings, Flight, GreyImage, Overrides, Recording, Run, RunSettings, SimulationSettings, Tuning, TuningData,
-    VioError, VioReport, compare, diagnose, evaluate_run, open_euroc, open_euroc_stereo, open_mcap, open_mcap_stereo,
-    run, save, simulate, tune_noise,
+    VioError, VioReport, axes_doubts, compare, diagnose, evaluate_run, open_euroc, open_euroc_stereo, open_mcap,
+    open_mcap_stereo, run, save, simulate, tune_noise,
 };
 use crate::report::save_figures;
 
@@ -83,7 +83,7 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         recording.mask = Some(mask);
     }
     let filter = filter_settings(arguments)?;
-    let findings = check_samples(&recording, filter.gravity, arguments.accept_imu)?;
+    let mut findings = check_samples(&recording, filter.gravity, arguments.accept_imu)?;
     eprintln!("{}: {} images, {} inertial samples", recording.name, recording.images.count(), recording.samples.len());
     if !recording.unused.is_empty() {
         eprintln!(
@@ -91,7 +91,8 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
             recording.unused.join(", ")
         );
     }
-    if let Some(findings) = &findings {
+    if let Some(findings) = &mut findings {
+        findings.doubts.extend(axes_doubts(&recording, filter.gravity)?);
         eprintln!("inertial sensor: {:.0} Hz, {} gaps", findings.rate_hz, findings.gaps);
         findings.doubts.iter().for_each(|doubt| eprintln!("warning: {doubt}"));
     }

@@ -1,6 +1,6 @@
 //! The moving part of the state: pose, velocity and biases.
 
-use nalgebra::{SMatrix, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
 
 use super::covariance::Covariance;
 use super::error_state::{self, CORE};
@@ -23,6 +23,15 @@ pub struct CoreState {
     pub gyro_bias: Vector3<f64>,
     /// Bias of the accelerometer, m/s².
     pub accel_bias: Vector3<f64>,
+}
+
+/// What is taken out of inertial readings: rate `ω̃ − b_g`, specific force `A f̃ − b_a`.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct ImuCorrection {
+    pub(crate) gyro_bias: Vector3<f64>,
+    pub(crate) accel_bias: Vector3<f64>,
+    /// `None`, the identity, where it is not estimated.
+    pub(crate) accel_matrix: Option<Matrix3<f64>>,
 }
 
 impl From<&InitialState> for CoreState {
@@ -50,9 +59,9 @@ impl CoreState {
         }
     }
 
-    /// Biases of gyroscope and accelerometer.
-    pub(crate) fn biases(&self) -> [Vector3<f64>; 2] {
-        [self.gyro_bias, self.accel_bias]
+    /// The biases, to be taken out of inertial readings.
+    pub(crate) fn imu_correction(&self) -> ImuCorrection {
+        ImuCorrection { gyro_bias: self.gyro_bias, accel_bias: self.accel_bias, accel_matrix: None }
     }
 }
 

@@ -15,18 +15,34 @@ pub(crate) struct LinearizedMeasurement<const M: usize, const C: usize> {
     pub(crate) noise: SMatrix<f64, M, M>,
 }
 
+/// Rows `u` of updates that may wait: enough that a pass over the covariance is arithmetic, not memory.
+const MAX_WAITING: usize = 16;
+/// Rows that one pass takes together.
+const TOGETHER: usize = 4;
+
 /// The covariance of the error state: dense, symmetric, without gaps, in memory that is claimed once.
+///
+/// A series of updates ([`update_in_series`](Self::update_in_series)) leaves `P − Σ uᵀu` undone for some `u` and works on the lower triangle
+/// alone; [`variance`](Self::variance), [`block`](Self::block) and [`marginal`](Self::marginal) know of it. Everything else
+/// comes after [`end_updates`](Self::end_updates).
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Covariance {
     size: usize,
     stride: usize,
     values: Vec<f64>,
+    /// Rows `u`, one after the other.
+    waiting: Vec<f64>,
+    waiting_count: usize,
+    /// One row of it, whole.
+    gathered: Vec<f64>,
 }
 
 impl Covariance {
     /// Zero, of `size` rows, with room for `capacity`.
     pub(crate) fn new(size: usize, capacity: usize) -> Self {
-        Self { size, stride: capacity, values: vec![0.0; capacity * capacity] }
+        let values = vec![0.0; capacity * capacity];
+        let (waiting, gathered) = (vec![0.0; MAX_WAITING * capacity], vec![0.0; capacity]);
+        Self { size, stride: capacity, values, waiting, waiting_count: 0, gathered }
     }
 
     /// Becomes equal to another of the same capacity, without claiming memory.
@@ -57,7 +73,16 @@ impl Covariance {
     }
 
     pub(crate) fn variance(&self, row: usize) -> f64 {
-        self.values[row * self.stride + row]
+        self.at(row, row)
+    }
+
+    /// An entry, with the updates that wait.
+    fn at(&self, row: usize, column: usize) -> f64 {
+        let mut value = self.values[row.max(column) * self.stride + row.min(column)];
+        for u in self.waiting.chunks_exact(self.stride).take(self.waiting_count) {
+            value -= u[row] * u[column];
+        }
+        value
     }
 
     pub(crate) fn inflate(&mut self, row: usize, variance: f64) {
@@ -95,7 +120,7 @@ impl Covariance {
 
     /// Any block, from given first rows.
     pub(crate) fn block<const R: usize, const C: usize>(&self, row: usize, column: usize) -> SMatrix<f64, R, C> {
-        SMatrix::from_fn(|r, c| self.values[(row + r) * self.stride + column + c])
+        SMatrix::from_fn(|r, c| self.at(row + r, column + c))
     }
 
     /// Sets a block on the diagonal.
@@ -112,12 +137,16 @@ impl Covariance {
         self.set_block3(row, &Matrix3::from_diagonal(&Vector3::from(sigma.map(|s| s * s))));
     }
 
-    /// Copies the lower triangle onto the upper one.
+    /// Copies the lower triangle onto the upper one, tile by tile: each stays in the cache.
     pub(crate) fn mirror(&mut self) {
-        for row in 1..self.size {
-            let (above, from) = self.values.split_at_mut(row * self.stride);
-            for (column, &value) in from[..row].iter().enumerate() {
-                above[column * self.stride + row] = value;
+        const TILE: usize = 16;
+        for first in (0..self.size).step_by(TILE) {
+            for left in (0..=first).step_by(TILE) {
+                for row in first..(first + TILE).min(self.size) {
+                    for column in left..(left + TILE).min(row) {
+                        self.values[column * self.stride + row] = self.values[row * self.stride + column];
+                    }
+                }
             }
         }
     }
@@ -155,53 +184,103 @@ impl Covariance {
 
     /// The covariance of a few rows marginal themselves.
     pub(crate) fn marginal<const C: usize>(&self, rows: &[usize; C]) -> SMatrix<f64, C, C> {
-        SMatrix::from_fn(|r, c| self.values[rows[r] * self.stride + rows[c]])
+        SMatrix::from_fn(|r, c| self.at(rows[r], rows[c]))
     }
 
     /// The update: `δ = P Hᵀ (H P Hᵀ + S)⁻¹ y` into `delta`, and `P ← P − P Hᵀ (H P Hᵀ + S)⁻¹ H P`.
     ///
-    /// `scratch` needs `M` times the size. Returns false and changes nothing if the innovation covariance is not
-    /// positive definite.
+    /// Returns false and changes nothing if the innovation covariance is not positive definite. `M` is at most 16.
     pub(crate) fn update<const M: usize, const C: usize>(
         &mut self,
         m: &LinearizedMeasurement<M, C>,
         delta: &mut [f64],
-        scratch: &mut [f64],
+    ) -> bool {
+        let updated = self.update_in_series(m, delta);
+        self.end_updates();
+        updated
+    }
+
+    /// The same as one of a series.
+    pub(crate) fn update_in_series<const M: usize, const C: usize>(
+        &mut self,
+        m: &LinearizedMeasurement<M, C>,
+        delta: &mut [f64],
     ) -> bool {
         let Some(factor) = self.innovation(m).cholesky() else { return false };
         let factor = factor.l();
         let Some(whitened) = factor.solve_lower_triangular(&m.residual) else { return false };
         // With S = L Lᵀ: L⁻¹ H P, row by row. P ← P − Uᵀ U is then symmetric to the last bit.
         let Some(jacobian) = factor.solve_lower_triangular(&m.jacobian) else { return false };
-        let n = self.size;
-        for k in 0..M {
-            let u = &mut scratch[k * n..(k + 1) * n];
-            u.fill(0.0);
-            for (c, &row) in m.rows.iter().enumerate() {
-                let weight = jacobian[(k, c)];
-                for (u, p) in u.iter_mut().zip(self.row(row)) {
-                    *u += weight * p;
-                }
+        if self.waiting_count + M > MAX_WAITING {
+            self.apply_waiting();
+        }
+        let (n, stride) = (self.size, self.stride);
+        let (before, rest) = self.waiting.split_at_mut(self.waiting_count * stride);
+        rest[..M * stride].fill(0.0);
+        for (c, &row) in m.rows.iter().enumerate() {
+            self.gathered[..=row].copy_from_slice(&self.values[row * stride..=row * stride + row]);
+            for (column, value) in self.gathered[..n].iter_mut().enumerate().skip(row + 1) {
+                *value = self.values[column * stride + row];
+            }
+            for (k, u) in rest.chunks_exact_mut(stride).take(M).enumerate() {
+                subtract(&mut u[..n], -jacobian[(k, c)], &self.gathered);
+            }
+        }
+        for waiting in before.chunks_exact(stride) {
+            let seen = jacobian * SVector::<f64, C>::from_fn(|c, _| waiting[m.rows[c]]);
+            for (u, weight) in rest.chunks_exact_mut(stride).zip(seen.iter()) {
+                subtract(&mut u[..n], *weight, waiting);
             }
         }
         let delta = &mut delta[..n];
         delta.fill(0.0);
-        for k in 0..M {
-            for (d, u) in delta.iter_mut().zip(&scratch[k * n..(k + 1) * n]) {
-                *d += whitened[k] * u;
+        for (u, residual) in rest.chunks_exact(stride).zip(whitened.iter()) {
+            for (d, u) in delta.iter_mut().zip(u) {
+                *d += residual * u;
             }
         }
-        for row in 0..n {
-            let target = &mut self.values[row * self.stride..][..n];
-            for k in 0..M {
-                let u = &scratch[k * n..(k + 1) * n];
-                let weight = u[row];
-                for (p, u) in target.iter_mut().zip(u) {
-                    *p -= weight * u;
+        self.waiting_count += M;
+        true
+    }
+
+    /// `P ← P − Σ uᵀu`, lower triangle.
+    fn apply_waiting(&mut self) {
+        let (n, stride) = (self.size, self.stride);
+        for some in self.waiting[..self.waiting_count * stride].chunks(TOGETHER * stride) {
+            for row in 0..n {
+                let target = &mut self.values[row * stride..=row * stride + row];
+                if some.len() < TOGETHER * stride {
+                    some.chunks_exact(stride).for_each(|u| subtract(target, u[row], u));
+                    continue;
+                }
+                let u: [&[f64]; TOGETHER] = std::array::from_fn(|k| &some[k * stride..=k * stride + row]);
+                let weights = u.map(|u| u[row]);
+                // Rows of what is not estimated are zero.
+                if weights == [0.0; TOGETHER] {
+                    continue;
+                }
+                let [a, b, c, d] = u;
+                for ((((p, a), b), c), d) in target.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+                    *p = (((*p - weights[0] * a) - weights[1] * b) - weights[2] * c) - weights[3] * d;
                 }
             }
         }
-        true
+        self.waiting_count = 0;
+    }
+
+    /// Ends a series of updates.
+    pub(crate) fn end_updates(&mut self) {
+        if self.waiting_count > 0 {
+            self.apply_waiting();
+            self.mirror();
+        }
+    }
+}
+
+/// `target −= weight · row`.
+fn subtract(target: &mut [f64], weight: f64, row: &[f64]) {
+    for (target, value) in target.iter_mut().zip(row) {
+        *target -= weight * value;
     }
 }
 
@@ -252,15 +331,38 @@ mod tests {
         let correction = &gain * DVector::from_column_slice(residual.as_slice());
 
         let mut covariance = filled(&prior);
-        let (mut delta, mut scratch) = (vec![0.0; n], vec![0.0; 2 * n]);
-        assert!(covariance.update(
-            &LinearizedMeasurement { rows, residual, jacobian, noise },
-            &mut delta,
-            &mut scratch
-        ));
+        let mut delta = vec![0.0; n];
+        assert!(covariance.update(&LinearizedMeasurement { rows, residual, jacobian, noise }, &mut delta));
         assert!((dense(&covariance) - expected).amax() < 1e-11);
         assert!((DVector::from_vec(delta) - correction).amax() < 1e-12);
         assert_eq!(dense(&covariance), dense(&covariance).transpose());
+    }
+
+    #[test]
+    fn a_series_of_updates_is_one_after_the_other() {
+        let mut rng = Rng::new(9);
+        let n = 40;
+        let prior = random_covariance(&mut rng, n);
+        let (mut series, mut single) = (filled(&prior), filled(&prior));
+        let (mut delta, mut expected) = (vec![0.0; n], vec![0.0; n]);
+        // More than may wait, and not a multiple of what is taken together.
+        for k in 0..21 {
+            let measurement = LinearizedMeasurement {
+                rows: [k, (7 * k + 3) % n, 39],
+                residual: Vector2::new(signed(&mut rng), signed(&mut rng)),
+                jacobian: SMatrix::<f64, 2, 3>::from_fn(|_, _| signed(&mut rng)),
+                noise: Matrix2::identity(),
+            };
+            assert!(series.update_in_series(&measurement, &mut delta));
+            assert!(single.update(&measurement, &mut expected));
+            let apart = delta.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(apart < 1e-11, "{k}: {apart}");
+            assert!((series.variance(k) - single.variance(k)).abs() < 1e-11);
+            assert!((series.marginal(&[39, 2, k]) - single.marginal(&[39, 2, k])).amax() < 1e-11);
+        }
+        series.end_updates();
+        assert!((dense(&series) - dense(&single)).amax() < 1e-11);
+        assert_eq!(dense(&series), dense(&series).transpose());
     }
 
     #[test]

@@ -34,6 +34,7 @@ impl Default for DivergenceSettings {
 
 /// Which limit of [`DivergenceSettings`] was exceeded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum DivergenceCause {
     /// The speed, or a number that is not finite.
     Speed,

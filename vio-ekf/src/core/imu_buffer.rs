@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use nalgebra::Vector3;
 
+use super::core_state::ImuCorrection;
 use super::imu_noise_estimator::{ImuNoiseEstimator, ImuSettings, SampleNoise};
 use super::preintegration::ImuPreintegration;
 use crate::{Imu, ImuNoise, Stamp};
@@ -17,6 +18,8 @@ pub(crate) struct ImuBuffer {
     noises: VecDeque<SampleNoise>,
     sensor: Option<ImuSettings>,
     estimator: ImuNoiseEstimator,
+    /// On the densities of gyroscope and accelerometer.
+    noise_factors: [f64; 2],
     capacity: usize,
     state_stamp: Stamp,
     started: Stamp,
@@ -34,6 +37,7 @@ impl ImuBuffer {
             noises,
             sensor: None,
             estimator: ImuNoiseEstimator::new(sample),
+            noise_factors: [1.0; 2],
             capacity,
             state_stamp,
             started: state_stamp,
@@ -43,6 +47,11 @@ impl ImuBuffer {
     /// The same with adaptive noise: saturated and vibrating samples get a larger one.
     pub(crate) fn with_noise_estimation(self, sensor: ImuSettings) -> Self {
         Self { sensor: Some(sensor), ..self }
+    }
+
+    /// From here on the noise of gyroscope and accelerometer is so many times as large.
+    pub(crate) fn set_noise_factors(&mut self, factors: [f64; 2]) {
+        self.noise_factors = factors;
     }
 
     /// Time of the state.
@@ -87,8 +96,11 @@ impl ImuBuffer {
 
     /// Densities of the white noise between two neighbours, the first of which has this index.
     fn densities(&self, index: usize, noise: &ImuNoise) -> [[f64; 3]; 2] {
-        let Some(sensor) = &self.sensor else { return [[noise.gyro_density; 3], [noise.accel_density; 3]] };
-        self.noises[index + 1].densities(&self.noises[index], noise, sensor)
+        let densities = match &self.sensor {
+            Some(sensor) => self.noises[index + 1].densities(&self.noises[index], noise, sensor),
+            None => [[noise.gyro_density; 3], [noise.accel_density; 3]],
+        };
+        [0, 1].map(|k| densities[k].map(|density| density * self.noise_factors[k]))
     }
 
     /// Moves the time of the state forward and drops the samples before it.
@@ -120,8 +132,8 @@ impl ImuBuffer {
     }
 
     /// Preintegrates from the state until a time. Between samples rate and force are linear; after the last one they stay.
-    pub(crate) fn preintegrate(&self, until: Stamp, biases: &[Vector3<f64>; 2], noise: &ImuNoise) -> ImuPreintegration {
-        self.preintegrate_between(self.state_stamp, until, biases, noise)
+    pub(crate) fn preintegrate(&self, until: Stamp, correction: &ImuCorrection, noise: &ImuNoise) -> ImuPreintegration {
+        self.preintegrate_between(self.state_stamp, until, correction, noise)
     }
 
     /// The same from a time after the state.
@@ -129,11 +141,11 @@ impl ImuBuffer {
         &self,
         from: Stamp,
         until: Stamp,
-        biases: &[Vector3<f64>; 2],
+        correction: &ImuCorrection,
         noise: &ImuNoise,
     ) -> ImuPreintegration {
         let mut preintegration = ImuPreintegration::default();
-        self.continue_preintegration(&mut preintegration, (from, until), biases, noise);
+        self.continue_preintegration(&mut preintegration, (from, until), correction, noise);
         preintegration
     }
 
@@ -142,7 +154,7 @@ impl ImuBuffer {
         &self,
         preintegration: &mut ImuPreintegration,
         (mut from, until): (Stamp, Stamp),
-        biases: &[Vector3<f64>; 2],
+        correction: &ImuCorrection,
         noise: &ImuNoise,
     ) {
         let first = self.samples.partition_point(|sample| sample.stamp <= from).saturating_sub(1);
@@ -157,7 +169,7 @@ impl ImuBuffer {
                 before,
                 after,
                 (from, to),
-                biases,
+                correction,
                 (noise, &self.densities(index, noise)),
             );
             from = to;
@@ -169,7 +181,7 @@ impl ImuBuffer {
                 last,
                 last,
                 (from, until),
-                biases,
+                correction,
                 (noise, &[[noise.gyro_density; 3], [noise.accel_density; 3]]),
             );
         }
@@ -179,7 +191,7 @@ impl ImuBuffer {
     pub(crate) fn continue_to_latest(
         &self,
         preintegration: &mut ImuPreintegration,
-        biases: &[Vector3<f64>; 2],
+        correction: &ImuCorrection,
         noise: &ImuNoise,
     ) {
         let count = self.samples.len();
@@ -187,7 +199,7 @@ impl ImuBuffer {
         let from = before.stamp.max(self.state_stamp);
         if after.stamp > from {
             let densities = self.densities(count - 2, noise);
-            integrate_segment(preintegration, before, after, (from, after.stamp), biases, (noise, &densities));
+            integrate_segment(preintegration, before, after, (from, after.stamp), correction, (noise, &densities));
         }
     }
 }
@@ -198,14 +210,19 @@ fn integrate_segment(
     before: &Imu,
     after: &Imu,
     (from, to): (Stamp, Stamp),
-    [gyro_bias, accel_bias]: &[Vector3<f64>; 2],
+    correction: &ImuCorrection,
     (noise, densities): (&ImuNoise, &[[f64; 3]; 2]),
 ) {
     let gap = after.stamp.secs_since(before.stamp);
     let dt = to.secs_since(from);
     let fraction = if gap > 0.0 { (from.secs_since(before.stamp) + 0.5 * dt) / gap } else { 0.0 };
-    let mean = |a: &Vector3<f64>, b: &Vector3<f64>, bias: &Vector3<f64>| a + (b - a) * fraction - bias;
-    let rate = mean(&before.gyro, &after.gyro, gyro_bias);
-    let force = mean(&before.accel, &after.accel, accel_bias);
-    preintegration.integrate_with_densities(&rate, &force, dt, noise, densities);
+    let mean = |a: &Vector3<f64>, b: &Vector3<f64>| a + (b - a) * fraction;
+    let rate = mean(&before.gyro, &after.gyro) - correction.gyro_bias;
+    let reading = mean(&before.accel, &after.accel);
+    let Some(matrix) = &correction.accel_matrix else {
+        preintegration.integrate_with_densities(&rate, &(reading - correction.accel_bias), dt, noise, densities);
+        return;
+    };
+    preintegration.advance_by_accel_matrix(&rate, (&reading, &(matrix * reading - correction.accel_bias)), dt);
+    preintegration.integrate_with_densities(&rate, &(matrix * reading - correction.accel_bias), dt, noise, densities);
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::error::{all_positive, invalid};
+use crate::error::{all_not_negative, all_positive, invalid};
 use crate::{Error, Imu, ImuNoise};
 
 /// How an inertial sensor may be worse than its data sheet, and how many of its samples are kept.
@@ -16,20 +16,49 @@ pub struct ImuSettings {
     /// Noise that is estimated from the samples replaces that of the data sheet where it exceeds it by this factor; 4, ours.
     /// Vibration is noise: in full for the gyroscope, for the accelerometer its integrated part.
     pub noise_inflation: f64,
+    /// The noise of each sensor grows up to this factor while images correct velocity and attitude by more than it explains
+    /// (innovation-based adaptive estimation); 30, ours. 1 to believe the readings.
+    pub max_innovation_inflation: f64,
+    /// Standard deviation of the accelerometer's scale on each axis, relative; ours: 0, known exactly and not estimated. A cheap
+    /// sensor without calibration: 0.03.
+    pub accel_scale_sigma: f64,
+    /// Standard deviation of the angles between the accelerometer's axes and those of the body, rad; ours: 0. A cheap sensor without
+    /// calibration: 0.02.
+    pub accel_misalignment_sigma: f64,
     /// Inertial samples that are kept for measurements that arrive late; ours: 256, which is 1.3 s at 200 Hz.
     pub buffer_samples: usize,
 }
 
 impl Default for ImuSettings {
     fn default() -> Self {
-        Self { gyro_range: 17.45, accel_range: 176.5, noise_inflation: 4.0, buffer_samples: 256 }
+        Self {
+            gyro_range: 17.45,
+            accel_range: 176.5,
+            noise_inflation: 4.0,
+            max_innovation_inflation: 30.0,
+            accel_scale_sigma: 0.0,
+            accel_misalignment_sigma: 0.0,
+            buffer_samples: 256,
+        }
     }
 }
 
 impl ImuSettings {
+    /// Whether the accelerometer's matrix is estimated.
+    pub(crate) fn estimates_accel_matrix(&self) -> bool {
+        self.accel_scale_sigma > 0.0 || self.accel_misalignment_sigma > 0.0
+    }
+
     /// Refuses values that no sensor can have.
     pub(crate) fn check(&self) -> Result<(), Error> {
         check_buffer("imu.buffer_samples", self.buffer_samples)?;
+        all_not_negative(&[
+            ("accel_scale_sigma", self.accel_scale_sigma),
+            ("accel_misalignment_sigma", self.accel_misalignment_sigma),
+        ])?;
+        if self.max_innovation_inflation.is_nan() || self.max_innovation_inflation < 1.0 {
+            return Err(invalid("max_innovation_inflation", self.max_innovation_inflation, "must be at least 1"));
+        }
         all_positive(&[
             ("gyro_range", self.gyro_range),
             ("accel_range", self.accel_range),

@@ -4,11 +4,12 @@ use nalgebra::{Isometry3, SMatrix, Vector3};
 
 use super::core_state::{CoreCovariance, CoreState};
 use super::imu_buffer::ImuBuffer;
-use super::preintegration::ImuPreintegration;
+use super::preintegration::{ImuPreintegration, StateTransition};
 use crate::Stamp;
 
 /// An estimate of the body's motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Odometry {
     /// Its time, by the inertial sensor's clock.
     pub stamp: Stamp,
@@ -36,6 +37,15 @@ impl Odometry {
         gravity: f64,
     ) -> Self {
         let transition = prediction.transition(&core.velocity, &core.attitude, gravity);
+        Self::at_end(core, &transition.propagate_covariance(covariance), (buffer, &transition))
+    }
+
+    /// The state at the end of a transition, with its covariance there.
+    pub(crate) fn at_end(
+        core: &CoreState,
+        covariance: &CoreCovariance,
+        (buffer, transition): (&ImuBuffer, &StateTransition),
+    ) -> Self {
         Self {
             stamp: buffer.now(),
             world_from_body: transition.end(&core.position, &core.attitude),
@@ -43,7 +53,7 @@ impl Odometry {
             rate_in_body: buffer.latest().gyro - core.gyro_bias,
             gyro_bias: core.gyro_bias,
             accel_bias: core.accel_bias,
-            covariance: transition.propagate_covariance(covariance),
+            covariance: *covariance,
         }
     }
 

@@ -8,6 +8,8 @@ use crate::{ImuNoise, so3};
 
 /// Rows of the relative motion: rotation, velocity, position.
 const MOTION: usize = 9;
+/// Entries of the accelerometer's matrix.
+const MATRIX: usize = 9;
 
 /// Motion between two times as the inertial samples tell it, independent of the state at the first (Forster et al. 2017).
 ///
@@ -22,6 +24,8 @@ pub(crate) struct ImuPreintegration {
     position: Vector3<f64>,
     /// Derivative by the biases of gyroscope and accelerometer.
     bias_jacobian: SMatrix<f64, MOTION, 6>,
+    /// Derivative by the entries of the accelerometer's matrix, row by row; zero where that is not estimated.
+    matrix_jacobian: SMatrix<f64, MOTION, MATRIX>,
     /// Of the motion's errors, from noise.
     covariance: SMatrix<f64, MOTION, MOTION>,
     /// Between the motion's errors and the walk of the biases.
@@ -38,6 +42,7 @@ impl Default for ImuPreintegration {
             velocity: Vector3::zeros(),
             position: Vector3::zeros(),
             bias_jacobian: SMatrix::zeros(),
+            matrix_jacobian: SMatrix::zeros(),
             covariance: SMatrix::zeros(),
             walk_covariance: SMatrix::zeros(),
             walk: [0.0; 2],
@@ -124,6 +129,36 @@ impl ImuPreintegration {
         self.velocity += acceleration * dt;
         self.rotation = UnitQuaternion::new_normalize((self.rotation * so3::exp(&(rate * dt))).into_inner());
         self.duration += dt;
+    }
+
+    /// The derivative by the accelerometer's matrix over `dt` seconds with this mean rate, reading and force; before the
+    /// integration over that time.
+    pub(crate) fn advance_by_accel_matrix(
+        &mut self,
+        rate: &Vector3<f64>,
+        (reading, force): (&Vector3<f64>, &Vector3<f64>),
+        dt: f64,
+    ) {
+        let middle = (self.rotation * so3::exp(&(rate * (0.5 * dt)))).to_rotation_matrix().into_inner();
+        advance(&mut self.matrix_jacobian, &(middle * force), dt);
+        for row in 0..3 {
+            for column in 0..3 {
+                let driven = middle.column(row) * (reading[column] * dt);
+                for axis in 0..3 {
+                    self.matrix_jacobian[(3 + axis, 3 * row + column)] += driven[axis];
+                    self.matrix_jacobian[(6 + axis, 3 * row + column)] += 0.5 * dt * driven[axis];
+                }
+            }
+        }
+    }
+
+    /// Derivatives by the accelerometer's matrix: of the core at the end, and of the motion (position, rotation on the start's
+    /// side) from start to end.
+    pub(crate) fn by_accel_matrix(
+        &self,
+        transition: &StateTransition,
+    ) -> (SMatrix<f64, { error_state::CORE }, MATRIX>, SMatrix<f64, 6, MATRIX>) {
+        (transition.compose * self.matrix_jacobian, reordered(&self.matrix_jacobian))
     }
 
     /// The transition of the core from a start with this velocity and attitude, which is all that it depends on.

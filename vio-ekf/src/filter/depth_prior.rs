@@ -25,7 +25,7 @@ pub(crate) fn reset_to_mean(state: &mut VioState, covariance: &mut Covariance, s
     for slot in 0..count {
         covariance.add_row(error_state::DEPTH_PRIOR, share, error_state::landmark(slot) + 2);
     }
-    covariance.inflate(error_state::DEPTH_PRIOR, (settings.inverse_distance_sigma * mean).powi(2) * share);
+    covariance.inflate(error_state::DEPTH_PRIOR, settings.own_variance(mean) * share);
 }
 
 /// Rescales the covariance of inverse distances that have become smaller: the errors of what is far away are relative to it.

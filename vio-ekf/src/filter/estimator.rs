@@ -1,6 +1,6 @@
 //! State, covariance and delay buffer of the odometry.
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::depth_prior;
 use super::propagation::propagate::{Workspace, propagate};
@@ -16,9 +16,6 @@ use crate::core::initial_state::InitialState;
 use crate::core::odometry::Odometry;
 use crate::core::preintegration::ImuPreintegration;
 use crate::{CameraModel, Imu, ImuNoise, Stamp};
-
-/// Most residuals of one update.
-pub(crate) const MAX_RESIDUALS: usize = 6;
 
 /// State and covariance at the time of the last measurement, and the prediction from there until now.
 ///
@@ -37,7 +34,8 @@ pub(crate) struct Estimator {
     pub(crate) rate: Vector3<f64>,
     workspace: Workspace,
     delta: Vec<f64>,
-    scratch: Vec<f64>,
+    /// Corrections of a series of updates that bearings have not had yet.
+    owed: Vec<f64>,
 }
 
 impl Estimator {
@@ -55,6 +53,7 @@ impl Estimator {
             camera_attitude: camera.body_from_camera().rotation,
             time_offset: settings.calibration.time_offset_s,
             depth_prior: InverseDistance::new(settings.landmarks.inverse_distance),
+            accel_matrix: settings.imu.estimates_accel_matrix().then(Matrix3::identity),
             landmarks: Vec::with_capacity(settings.landmarks.max_count),
         };
         let mut covariance = Covariance::new(error_state::FIRST_LANDMARK, capacity);
@@ -65,6 +64,11 @@ impl Estimator {
         covariance.reset_row(error_state::TIME_OFFSET, calibration.time_offset_sigma_s.powi(2));
         let shared = settings.landmarks.shared_sigma * settings.landmarks.inverse_distance;
         covariance.reset_row(error_state::DEPTH_PRIOR, shared * shared);
+        for entry in 0..error_state::MATRIX_SIZE {
+            let imu = &settings.imu;
+            let sigma = if entry % 4 == 0 { imu.accel_scale_sigma } else { imu.accel_misalignment_sigma };
+            covariance.reset_row(error_state::ACCEL_MATRIX + entry, sigma * sigma);
+        }
         Self {
             rate: sample.gyro - state.core.gyro_bias,
             buffer: ImuBuffer::new(sample, initial.stamp, settings.imu.buffer_samples)
@@ -75,7 +79,7 @@ impl Estimator {
             landmarks: settings.landmarks,
             workspace: Workspace::new(capacity),
             delta: vec![0.0; capacity],
-            scratch: vec![0.0; capacity * MAX_RESIDUALS],
+            owed: vec![0.0; capacity],
             state,
             covariance,
         }
@@ -84,7 +88,7 @@ impl Estimator {
     /// Takes one more sample; its stamp must be after all others.
     pub(crate) fn imu(&mut self, sample: Imu) {
         self.buffer.push(sample);
-        self.buffer.continue_to_latest(&mut self.prediction, &self.state.core.biases(), &self.noise);
+        self.buffer.continue_to_latest(&mut self.prediction, &self.state.imu_correction(), &self.noise);
     }
 
     /// Preintegrates and propagates to a later time; `dropped` is told the slots of landmarks that are lost on the way.
@@ -93,7 +97,7 @@ impl Estimator {
         depth_prior::rescale_covariance(&mut self.state, &mut self.covariance);
         let elapsed = until.secs_since(self.buffer.state_stamp());
         depth_prior::propagate(&self.state, &mut self.covariance, &self.landmarks, elapsed);
-        let preintegration = self.buffer.preintegrate(until, &self.state.core.biases(), &self.noise);
+        let preintegration = self.buffer.preintegrate(until, &self.state.imu_correction(), &self.noise);
         let input = (&preintegration, self.gravity);
         propagate(&mut self.state, &mut self.covariance, input, &mut self.workspace, dropped);
         self.buffer.advance(until);
@@ -108,17 +112,52 @@ impl Estimator {
 
     /// The Kalman update of the whole state. False, and nothing changed, if the numbers do not allow it.
     pub(crate) fn update<const M: usize, const C: usize>(&mut self, measurement: &LinearizedMeasurement<M, C>) -> bool {
-        if !self.covariance.update(measurement, &mut self.delta, &mut self.scratch) {
+        let updated = self.update_in_series(measurement);
+        self.end_updates();
+        updated
+    }
+
+    /// The same as one of a series. Until its end a landmark must be [settled](Self::settle) before it is used, and of the covariance
+    /// only single variances and blocks may be.
+    pub(crate) fn update_in_series<const M: usize, const C: usize>(
+        &mut self,
+        measurement: &LinearizedMeasurement<M, C>,
+    ) -> bool {
+        if !self.covariance.update_in_series(measurement, &mut self.delta) {
             return false;
         }
-        self.state.correct(&self.delta[..self.covariance.size()]);
+        let delta = &self.delta[..self.covariance.size()];
+        self.state.correct_head(delta);
+        // Distances at once: a step back after a step away is not the sum of both.
+        for (landmark, delta) in self.state.landmarks.iter_mut().zip(landmark_rows(delta)) {
+            landmark.inverse_distance.correct(delta[2]);
+        }
+        self.owed.iter_mut().zip(delta).for_each(|(owed, delta)| *owed += delta);
         true
+    }
+
+    /// Corrects a landmark's bearing by what the series has found so far.
+    pub(crate) fn settle(&mut self, slot: usize) {
+        let owed = &mut self.owed[error_state::landmark(slot)..][..error_state::LANDMARK_SIZE];
+        if owed[0] != 0.0 || owed[1] != 0.0 {
+            let bearing = &mut self.state.landmarks[slot].bearing;
+            *bearing = bearing.boxplus(&Vector2::new(owed[0], owed[1]));
+        }
+        owed.fill(0.0);
+    }
+
+    /// Ends a series of updates.
+    pub(crate) fn end_updates(&mut self) {
+        for slot in 0..self.state.landmarks.len() {
+            self.settle(slot);
+        }
+        self.covariance.end_updates();
     }
 
     /// Brings the prediction up to date with a changed state.
     pub(crate) fn update_prediction(&mut self) {
         let until = self.buffer.now();
-        self.prediction = self.buffer.preintegrate(until, &self.state.core.biases(), &self.noise);
+        self.prediction = self.buffer.preintegrate(until, &self.state.imu_correction(), &self.noise);
     }
 
     /// Gives the next image a time offset of its own, with the deviation of a stamp.
@@ -148,6 +187,28 @@ impl Estimator {
     /// The estimate now, with covariance.
     pub(crate) fn odometry(&self) -> Odometry {
         let prior = self.covariance.block::<{ error_state::CORE }, { error_state::CORE }>(0, 0);
-        Odometry::predict(&self.state.core, &prior, (&self.buffer, &self.prediction), self.gravity)
+        let core = &self.state.core;
+        if self.state.accel_matrix.is_none() {
+            return Odometry::predict(core, &prior, (&self.buffer, &self.prediction), self.gravity);
+        }
+        let transition = self.prediction.transition(&core.velocity, &core.attitude, self.gravity);
+        let (by_matrix, _) = self.prediction.by_accel_matrix(&transition);
+        let own = self.covariance.block::<{ error_state::MATRIX_SIZE }, { error_state::MATRIX_SIZE }>(
+            error_state::ACCEL_MATRIX,
+            error_state::ACCEL_MATRIX,
+        );
+        let with_core =
+            self.covariance.block::<{ error_state::CORE }, { error_state::MATRIX_SIZE }>(0, error_state::ACCEL_MATRIX);
+        let crossed = transition.transition * with_core * by_matrix.transpose();
+        let covariance = transition.propagate_covariance(&prior)
+            + by_matrix * own * by_matrix.transpose()
+            + crossed
+            + crossed.transpose();
+        Odometry::at_end(core, &((covariance + covariance.transpose()) * 0.5), (&self.buffer, &transition))
     }
+}
+
+/// The three rows of each landmark.
+fn landmark_rows(delta: &[f64]) -> impl Iterator<Item = &[f64]> {
+    delta[error_state::FIRST_LANDMARK..].chunks_exact(error_state::LANDMARK_SIZE)
 }

@@ -1,5 +1,6 @@
 //! What an image does to the filter: alignment and update landmark by landmark, then landmark management.
 
+use super::estimator::Estimator;
 use super::frontend::corner_detector::{CornerDetector, DetectionCriteria};
 use super::frontend::image_frontend::ImageFrontend;
 use super::frontend::patch::Patch;
@@ -8,6 +9,7 @@ use super::frontend::pyramid::Pyramid;
 use super::landmarks;
 use super::report::FrameReport;
 use super::settings::{PatchSettings, Settings};
+use super::state::error_state;
 use super::state::landmark::{project, unproject};
 use super::stereo::stereo_camera::StereoCamera;
 use super::tracking_state::{LandmarkTrack, TrackingState};
@@ -16,7 +18,7 @@ use crate::CameraModel;
 /// Inverse distance beyond which a landmark is too near to be tracked, 1/m.
 const MAX_INVERSE_DISTANCE: f64 = 20.0;
 
-/// Aligns the patches of all landmarks and updates with those that pass the gates. One after the other, not all at once: each
+/// Aligns the patches of landmarks and updates with those that pass the gates. One after the other, not all at once: each
 /// alignment begins from what the landmarks before it have corrected.
 pub(crate) fn align_and_update(
     tracking: &mut TrackingState,
@@ -25,16 +27,22 @@ pub(crate) fn align_and_update(
     settings: &Settings,
     report: &mut FrameReport,
 ) {
-    let TrackingState { estimator, tracks } = tracking;
+    choose(tracking, settings.landmarks.max_measured);
+    let TrackingState { estimator, tracks, .. } = tracking;
     let offset = estimator.state.time_offset;
     for (slot, track) in tracks.iter_mut().enumerate() {
         let time_offset_error = estimator.state.time_offset - offset;
+        estimator.settle(slot);
+        if !track.chosen {
+            track.in_view = is_in_view(estimator, slot, track, (pyramid, camera));
+            continue;
+        }
         track.in_view = true;
         let alignment = track.patch.as_ref().map_or(PatchAlignment::OutOfView, |patch| {
             align_patch(estimator, slot, time_offset_error, (patch, pyramid), camera, settings)
         });
         match alignment {
-            PatchAlignment::Converged(measurement) if estimator.update(&measurement) => {
+            PatchAlignment::Converged(measurement) if estimator.update_in_series(&measurement) => {
                 report.used += 1;
                 track.failures = 0;
             }
@@ -45,6 +53,39 @@ pub(crate) fn align_and_update(
             }
         }
     }
+    estimator.end_updates();
+}
+
+/// Chooses the landmarks that the image measures: those whose bearings are known least, which are the new ones and those that have
+/// waited.
+fn choose(tracking: &mut TrackingState, most: usize) {
+    let TrackingState { estimator, tracks, ranking, .. } = tracking;
+    let variance = |slot: usize| {
+        let row = error_state::landmark(slot);
+        estimator.covariance.variance(row) + estimator.covariance.variance(row + 1)
+    };
+    ranking.clear();
+    ranking.extend((0..tracks.len()).map(variance));
+    let least = match tracks.len().checked_sub(most) {
+        Some(others) if others > 0 => *ranking.select_nth_unstable_by(others, f64::total_cmp).1,
+        _ => f64::NEG_INFINITY,
+    };
+    for (slot, track) in tracks.iter_mut().enumerate() {
+        track.chosen = variance(slot) >= least;
+    }
+}
+
+/// Whether the image holds all of a landmark's patch.
+fn is_in_view(
+    estimator: &Estimator,
+    slot: usize,
+    track: &LandmarkTrack,
+    (pyramid, camera): (&Pyramid, &dyn CameraModel),
+) -> bool {
+    let landmark = &estimator.state.landmarks[slot];
+    let seen = project(camera, &landmark.bearing);
+    track.patch.is_some()
+        && seen.is_some_and(|(pixel, by_bearing)| Patch::is_inside(pyramid, &pixel, &(by_bearing * landmark.warp)))
 }
 
 /// Drops landmarks that are seen where the image is masked.
@@ -84,7 +125,7 @@ pub(crate) fn update_templates(
     camera: &dyn CameraModel,
     settings: &PatchSettings,
 ) {
-    let TrackingState { estimator, tracks } = tracking;
+    let TrackingState { estimator, tracks, .. } = tracking;
     for (slot, track) in tracks.iter_mut().enumerate() {
         if track.failures > 0 {
             continue;
@@ -114,7 +155,7 @@ pub(crate) fn detect_landmarks(
     settings: &Settings,
 ) -> usize {
     let ImageFrontend { pyramid, detector, next_id } = frontend;
-    let TrackingState { estimator, tracks } = tracking;
+    let TrackingState { estimator, tracks, .. } = tracking;
     let criteria = DetectionCriteria::from(&settings.patches);
     let present = estimator.state.landmarks.iter().filter_map(|l| camera.project(&l.bearing.direction()));
     detector.detect(pyramid, &present, &criteria);

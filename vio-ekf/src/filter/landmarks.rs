@@ -15,7 +15,7 @@ use super::state::landmark::Landmark;
 pub(crate) fn add(estimator: &mut Estimator, bearing: Bearing, warp: Matrix2<f64>, covariance: &Matrix2<f64>) {
     let expected = estimator.state.depth_prior.value;
     let row = estimator.covariance.size() + 2;
-    let variance = (estimator.landmarks.inverse_distance_sigma * expected).powi(2);
+    let variance = estimator.landmarks.own_variance(expected);
     insert(estimator, bearing, warp, covariance, (expected, variance));
     // The error of the prior is an error of the landmark, so that all of them share it.
     estimator.covariance.add_row(row, 1.0, error_state::DEPTH_PRIOR);
@@ -34,7 +34,7 @@ pub(crate) fn add_with_distance(
         row: error_state::DEPTH_PRIOR,
         predicted: expected,
         measured: inverse_distance,
-        variance: variance + (estimator.landmarks.inverse_distance_sigma * expected).powi(2),
+        variance: variance + estimator.landmarks.own_variance(expected),
         gate: f64::INFINITY,
     };
     ungated_update(estimator, &prior);
@@ -93,7 +93,7 @@ mod tests {
     use nalgebra::{Isometry3, Vector3};
 
     use super::*;
-    use crate::{Camera, Imu, ImuNoise, InitialSigma, InitialState, Settings, Stamp};
+    use crate::{Camera, Imu, ImuNoise, InitialSigma, InitialState, LandmarkSettings, Settings, Stamp};
 
     #[test]
     fn landmarks_share_the_error_of_the_depth_prior() {
@@ -121,6 +121,9 @@ mod tests {
             let expected = shared + if one == other { own } else { 0.0 };
             assert!((estimator.covariance.row(row(one))[row(other)] - expected).abs() < 1e-12, "{one}, {other}");
         }
+        // However many there are, they tell no more of the prior than the independent ones: the mean's variance stays.
+        let of_mean = |count: usize| LandmarkSettings { max_count: count, ..prior }.own_variance(1.0) / count as f64;
+        assert!((of_mean(200) - of_mean(25)).abs() < 1e-15 && (of_mean(5) - 5.0 * of_mean(25)).abs() < 1e-12);
         // A landmark measured exactly measures the prior with its own deviation from it.
         add_with_distance(&mut estimator, bearing, Matrix2::identity(), &Matrix2::identity(), (0.4, 0.0));
         let gain = shared / (shared + own);

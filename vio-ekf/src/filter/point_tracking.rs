@@ -24,7 +24,7 @@ pub(crate) fn update_with_points(
     }
     for point in points {
         let Some(slot) = tracking.slot_of(point.id) else { continue };
-        let TrackingState { estimator, tracks } = tracking;
+        let TrackingState { estimator, tracks, .. } = tracking;
         let track = &mut tracks[slot];
         track.in_view = true;
         if report.stationary {

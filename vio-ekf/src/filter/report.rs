@@ -1,11 +1,12 @@
 //! What the filter reports about itself and about each image.
 
-use nalgebra::{Isometry3, SMatrix, Unit, Vector2, Vector3};
+use nalgebra::{Isometry3, Matrix3, SMatrix, Unit, Vector2, Vector3};
 
 use crate::core::divergence::DivergenceCause;
 
 /// Whether the estimate can be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Status {
     /// Not initialised yet, and why.
     Uninitialised(InitializationStatus),
@@ -20,6 +21,7 @@ pub enum Status {
 
 /// What the initialization waits for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum InitializationStatus {
     /// A second in which rate and force do not change.
     WaitingForSteadyImu,
@@ -31,8 +33,9 @@ pub enum InitializationStatus {
     GravityMismatch,
 }
 
-/// The camera's calibration as the filter estimates it.
+/// The calibration of camera and accelerometer as the filter estimates it.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Calibration {
     /// Pose of the camera on the body.
     pub body_from_camera: Isometry3<f64>,
@@ -40,10 +43,16 @@ pub struct Calibration {
     pub time_offset_s: f64,
     /// Of the errors of, in this order: position (m), attitude as a rotation vector in **body** axes (rad), time offset (s).
     pub covariance: SMatrix<f64, 7, 7>,
+    /// The matrix `A` of the accelerometer, which reads `A⁻¹` of the specific force; the identity where it is not estimated
+    /// ([`ImuSettings::accel_scale_sigma`](crate::ImuSettings::accel_scale_sigma)).
+    pub accel_matrix: Matrix3<f64>,
+    /// Standard deviation of each of its entries.
+    pub accel_matrix_sigma: Matrix3<f64>,
 }
 
 /// A landmark as the filter estimates it at the last image.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LandmarkEstimate {
     /// Its number; that of the caller's point where the points are the caller's.
     pub id: u64,
@@ -61,6 +70,7 @@ pub struct LandmarkEstimate {
 
 /// What one image, or one set of points, did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FrameReport {
     /// Whether the estimate can be used.
     pub status: Status,

@@ -2,6 +2,7 @@
 
 use super::estimator::Estimator;
 use super::frontend::patch::Patch;
+use super::innovation_adaptation::{BeforeImage, InnovationAdaptation};
 use super::landmarks;
 use super::settings::PatchSettings;
 use crate::{CameraModel, Imu, Stamp};
@@ -12,6 +13,8 @@ pub(crate) struct LandmarkTrack {
     pub(crate) id: u64,
     /// Failures in a row.
     pub(crate) failures: u32,
+    /// Whether the current image is to measure it.
+    pub(crate) chosen: bool,
     /// Whether the current image, or set of points, sees it.
     pub(crate) in_view: bool,
     /// Its template; none for a point of the caller's own.
@@ -22,7 +25,7 @@ impl LandmarkTrack {
     // The track keeps the patch: a reference would be copied.
     #[allow(clippy::large_types_passed_by_value)]
     pub(crate) fn new(id: u64, patch: Option<Patch>) -> Self {
-        Self { id, failures: 0, in_view: true, patch }
+        Self { id, failures: 0, chosen: true, in_view: true, patch }
     }
 }
 
@@ -31,16 +34,24 @@ impl LandmarkTrack {
 pub(crate) struct TrackingState {
     pub(crate) estimator: Estimator,
     pub(crate) tracks: Vec<LandmarkTrack>,
+    innovations: InnovationAdaptation,
+    /// Memory for ordering landmarks.
+    pub(crate) ranking: Vec<f64>,
 }
 
 impl TrackingState {
     pub(crate) fn new(estimator: Estimator, max_count: usize) -> Self {
-        Self { estimator, tracks: Vec::with_capacity(max_count) }
+        Self {
+            estimator,
+            tracks: Vec::with_capacity(max_count),
+            innovations: InnovationAdaptation::default(),
+            ranking: Vec::with_capacity(max_count),
+        }
     }
 
     /// Takes an inertial sample.
     pub(crate) fn imu(&mut self, sample: &Imu) {
-        let Self { estimator, tracks } = self;
+        let Self { estimator, tracks, .. } = self;
         if estimator.buffer.is_full() {
             estimator.free_buffer(|slot| {
                 tracks.swap_remove(slot);
@@ -51,12 +62,18 @@ impl TrackingState {
 
     /// Propagates to a later time; returns how many landmarks were lost on the way.
     pub(crate) fn propagate_to(&mut self, until: Stamp) -> usize {
-        let Self { estimator, tracks } = self;
+        let Self { estimator, tracks, .. } = self;
         let before = tracks.len();
         estimator.propagate_to(until, |slot| {
             tracks.swap_remove(slot);
         });
         before - tracks.len()
+    }
+
+    /// Lets the noise of the inertial sensor follow what an image has corrected.
+    pub(crate) fn adapt_imu_noise(&mut self, before: &BeforeImage, max_factor: f64) {
+        self.innovations.update(before, &self.estimator, max_factor);
+        self.estimator.buffer.set_noise_factors(self.innovations.factors());
     }
 
     /// Process noise of the templates over some seconds.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Unit, Vector2};
+use nalgebra::{Isometry3, Matrix3, Unit, Vector2};
 
 use super::divergence_monitor::DivergenceMonitor;
 use super::estimator::Estimator;
@@ -15,6 +15,7 @@ use super::initialization::dynamic::result::InitialMotion;
 use super::initialization::dynamic_initializer::DynamicInitializer;
 use super::initialization::from_initialization::from_initialization;
 use super::initialization::static_initializer;
+use super::innovation_adaptation::BeforeImage;
 use super::measurements::measurement::Measurement;
 use super::measurements::pose::BodyPose;
 use super::measurements::stationary::stationary_update;
@@ -267,6 +268,7 @@ impl Vio {
             if frontend.detector.has_mask() {
                 drop_masked(tracking, &frontend.detector, camera.as_ref(), &mut report);
             }
+            let before = BeforeImage::new(&tracking.estimator);
             // Align patches and update, landmark by landmark.
             align_and_update(tracking, &frontend.pyramid, camera.as_ref(), settings, &mut report);
             // Manage landmarks.
@@ -274,6 +276,9 @@ impl Vio {
             update_templates(tracking, &frontend.pyramid, camera.as_ref(), &settings.patches);
             if let Some(stereo) = stereo {
                 stereo.update_distances(&mut tracking.estimator, &frontend.pyramid, camera.as_ref(), settings);
+            }
+            if report.used > 0 {
+                tracking.adapt_imu_noise(&before, settings.imu.max_innovation_inflation);
             }
         }
         let enough = settings.patches.start_detection_ratio * settings.landmarks.max_count as f64;
@@ -393,19 +398,23 @@ impl Vio {
         self.tracking.as_ref().map(|tracking| tracking.estimator.odometry())
     }
 
-    /// The camera's calibration at the last image; `None` before the initialization.
+    /// The calibration of camera and accelerometer at the last image; `None` before the initialization.
     pub fn calibration(&self) -> Option<Calibration> {
         self.tracking.as_ref().map(|TrackingState { estimator, .. }| Calibration {
             body_from_camera: estimator.state.body_from_camera(),
             time_offset_s: estimator.state.time_offset,
             covariance: estimator.covariance.block(error_state::CAMERA_POSITION, error_state::CAMERA_POSITION),
+            accel_matrix: estimator.state.accel_matrix(),
+            accel_matrix_sigma: Matrix3::from_fn(|r, c| {
+                estimator.covariance.variance(error_state::ACCEL_MATRIX + 3 * r + c).max(0.0).sqrt()
+            }),
         })
     }
 
     /// The landmarks that are followed, as they are estimated at the last image.
     pub fn landmarks(&self) -> impl Iterator<Item = LandmarkEstimate> + '_ {
         let tracking = self.tracking.iter();
-        tracking.flat_map(|TrackingState { estimator, tracks }| {
+        tracking.flat_map(|TrackingState { estimator, tracks, .. }| {
             tracks.iter().enumerate().map(|(slot, track)| {
                 let landmark = &estimator.state.landmarks[slot];
                 let bearing_in_camera = landmark.bearing.direction();
@@ -424,6 +433,11 @@ impl Vio {
     /// The camera as it was given.
     pub fn camera(&self) -> &dyn CameraModel {
         self.camera.as_ref()
+    }
+
+    /// The second camera as it was given; refused where there is none.
+    pub(crate) fn second_camera(&self) -> Result<&dyn CameraModel, Error> {
+        self.stereo.as_ref().map(|stereo| stereo.rig.camera.as_ref()).ok_or(NO_SECOND_CAMERA)
     }
 
     /// Propagates to the time of an image. `None` if the filter was initialised after the image; otherwise the number of landmarks

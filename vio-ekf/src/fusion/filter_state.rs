@@ -15,9 +15,6 @@ use crate::core::iterated_update::{Iteration, iterate, mahalanobis};
 use crate::core::preintegration::StateTransition;
 use crate::{Imu, Stamp};
 
-/// Residuals of a pose.
-const POSE: usize = 6;
-
 /// State and covariance at one time.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FilterState {
@@ -34,13 +31,12 @@ pub(crate) struct FilterState {
 #[derive(Debug, Clone)]
 pub(crate) struct Workspace {
     delta: Vec<f64>,
-    scratch: Vec<f64>,
 }
 
 impl Workspace {
     pub(crate) fn new(sources: usize) -> Self {
         let size = first_row(sources);
-        Self { delta: vec![0.0; size], scratch: vec![0.0; POSE * size] }
+        Self { delta: vec![0.0; size] }
     }
 }
 
@@ -172,7 +168,7 @@ impl FilterState {
         });
         let used = measurement.is_some_and(|measurement| {
             mahalanobis(&self.covariance, &measurement).is_some_and(|distance| distance <= settings.max_mahalanobis)
-                && self.covariance.update(&measurement, &mut workspace.delta, &mut workspace.scratch)
+                && self.covariance.update(&measurement, &mut workspace.delta)
         });
         if !used {
             self.consecutive_outliers += 1;

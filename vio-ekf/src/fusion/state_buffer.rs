@@ -108,8 +108,8 @@ impl StateBuffer {
             self.repropagate(self.reached, context);
         } else {
             let core = &self.latest().core;
-            let biases = core.biases();
-            self.samples.continue_to_latest(&mut self.prediction, &biases, &context.noise);
+            let correction = core.imu_correction();
+            self.samples.continue_to_latest(&mut self.prediction, &correction, &context.noise);
         }
     }
 
@@ -154,8 +154,8 @@ impl StateBuffer {
             let event = &mut rest[0];
             event.after.assign(before);
             let until = event.order.0;
-            let biases = before.core.biases();
-            let preintegration = self.samples.preintegrate_between(before.stamp, until, &biases, &context.noise);
+            let correction = before.core.imu_correction();
+            let preintegration = self.samples.preintegrate_between(before.stamp, until, &correction, &context.noise);
             let transition =
                 preintegration.transition(&before.core.velocity, &before.core.attitude, context.settings.gravity);
             event.after.propagate(&transition, preintegration.duration, until, &context.sources);
@@ -167,8 +167,8 @@ impl StateBuffer {
         }
         self.reached = self.events.partition_point(|event| event.order.0 <= now);
         let latest = self.latest();
-        let biases = latest.core.biases();
-        self.prediction = self.samples.preintegrate_between(latest.stamp, now, &biases, &context.noise);
+        let correction = latest.core.imu_correction();
+        self.prediction = self.samples.preintegrate_between(latest.stamp, now, &correction, &context.noise);
     }
 
     /// Makes the first event the oldest state.

@@ -1,12 +1,12 @@
 //! The odometry with one or two inertial sensors and with poses from a map, in order of time.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector2};
 
 use super::imu_pair::{ImuPair, ImuPairSettings};
 use super::pose_measurement::PoseMeasurement;
 use crate::core::initial_state::InitialState;
 use crate::error::invalid;
-use crate::filter::{BodyPose, FrameReport, PointObservation, Settings, Status, Vio};
+use crate::filter::{BodyPose, FrameReport, PointObservation, PointPair, Settings, Status, Vio};
 use crate::{CameraModel, Error, ImageView, Imu, ImuNoise, Odometry, Stamp};
 
 /// Measurements in the delay buffer at most.
@@ -63,12 +63,14 @@ pub struct UnifiedVio {
     pending: Vec<Pending>,
     image_buffers: Vec<Vec<u8>>,
     point_buffers: Vec<Vec<PointObservation>>,
+    pair_buffers: Vec<Vec<PointPair>>,
     frame: Option<FrameReport>,
     counts: MeasurementCounts,
 }
 
 /// Counts of measurements by their outcome.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MeasurementCounts {
     /// Images, or sets of points, that the filter has taken.
     pub images: usize,
@@ -91,13 +93,33 @@ struct Pending {
 #[allow(clippy::large_enum_variant, reason = "a box would claim memory for every pose")]
 enum PendingMeasurement {
     Image(Stamp, Vec<u8>),
+    ImagePair(Stamp, [Vec<u8>; 2]),
     Points(Stamp, Vec<PointObservation>),
+    PointPairs(Stamp, Vec<PointPair>),
     Pose(BodyPose),
 }
 
 impl UnifiedVio {
     /// Refuses a camera or settings that cannot be.
     pub fn new(camera: impl CameraModel + 'static, vio: Settings, settings: UnifiedSettings) -> Result<Self, Error> {
+        Self::around(|noise| Vio::new(camera, noise, vio), &vio, &settings)
+    }
+
+    /// The same with a second camera fixed beside the first; see [`Vio::stereo`].
+    pub fn stereo(
+        first: impl CameraModel + 'static,
+        second: impl CameraModel + 'static,
+        vio: Settings,
+        settings: UnifiedSettings,
+    ) -> Result<Self, Error> {
+        Self::around(|noise| Vio::stereo(first, second, noise, vio), &vio, &settings)
+    }
+
+    fn around(
+        filter: impl FnOnce(ImuNoise) -> Result<Vio, Error>,
+        vio: &Settings,
+        settings: &UnifiedSettings,
+    ) -> Result<Self, Error> {
         if !(0.0..=1.0).contains(&settings.lag_s) {
             return Err(invalid("lag_s", settings.lag_s, "must be between 0 and 1 s"));
         }
@@ -114,13 +136,14 @@ impl UnifiedVio {
         let pair = settings.imu_pair.map(ImuPair::new).transpose()?;
         let noise = pair.as_ref().map_or(settings.imu, ImuPair::noise);
         Ok(Self {
-            vio: Vio::new(camera, noise, vio)?,
+            vio: filter(noise)?,
             pair,
-            settings,
+            settings: *settings,
             camera_offset: nanos(vio.calibration.time_offset_s),
             pending: Vec::with_capacity(MAX_PENDING + 1),
             image_buffers: Vec::new(),
             point_buffers: Vec::new(),
+            pair_buffers: Vec::new(),
             frame: None,
             counts: MeasurementCounts::default(),
         })
@@ -158,16 +181,40 @@ impl UnifiedVio {
 
     /// Takes an image; see [`Vio::image`].
     pub fn image(&mut self, stamp: Stamp, image: &ImageView) -> Result<(), Error> {
-        let expected = self.vio.camera().image_size();
-        if (image.width, image.height) != expected {
-            return Err(Error::ImageSize { given: (image.width, image.height), expected });
+        let copy = self.copy(&image.checked(self.vio.camera().image_size())?);
+        self.enqueue((plus_nanos(stamp, self.camera_offset), false), PendingMeasurement::Image(stamp, copy));
+        Ok(())
+    }
+
+    /// Takes the images that both cameras took at the same moment; see [`Vio::image_pair`].
+    pub fn image_pair(&mut self, stamp: Stamp, first: &ImageView, second: &ImageView) -> Result<(), Error> {
+        let expected = self.vio.second_camera()?.image_size();
+        let copies =
+            [self.copy(&first.checked(self.vio.camera().image_size())?), self.copy(&second.checked(expected)?)];
+        self.enqueue((plus_nanos(stamp, self.camera_offset), false), PendingMeasurement::ImagePair(stamp, copies));
+        Ok(())
+    }
+
+    /// Takes points that both cameras have seen; see [`Vio::point_pairs`].
+    pub fn point_pairs(&mut self, stamp: Stamp, pairs: &[PointPair]) -> Result<(), Error> {
+        self.vio.second_camera()?;
+        let wrong = |pixel: &Vector2<f64>| pixel.iter().any(|v| !v.is_finite());
+        if let Some(index) = pairs.iter().position(|p| wrong(&p.first.pixel) || p.second.as_ref().is_some_and(wrong)) {
+            return Err(Error::NonFinite { what: "pair of points", index });
         }
-        let image = ImageView::new(image.width, image.height, image.data)?;
+        let mut copy = self.pair_buffers.pop().unwrap_or_default();
+        copy.clear();
+        copy.extend_from_slice(pairs);
+        self.enqueue((plus_nanos(stamp, self.camera_offset), false), PendingMeasurement::PointPairs(stamp, copy));
+        Ok(())
+    }
+
+    /// A copy of an image in memory that has been used before.
+    fn copy(&mut self, image: &ImageView) -> Vec<u8> {
         let mut copy = self.image_buffers.pop().unwrap_or_default();
         copy.clear();
         copy.extend_from_slice(image.data);
-        self.enqueue((plus_nanos(stamp, self.camera_offset), false), PendingMeasurement::Image(stamp, copy));
-        Ok(())
+        copy
     }
 
     /// Takes the points of a tracker of the caller's own; see [`Vio::points`].
@@ -243,6 +290,16 @@ impl UnifiedVio {
                 self.image_buffers.push(data);
                 report
             }
+            PendingMeasurement::ImagePair(stamp, [first, second]) => {
+                let report = self.process_pair(stamp, &first, &second);
+                self.image_buffers.extend([first, second]);
+                report
+            }
+            PendingMeasurement::PointPairs(stamp, pairs) => {
+                let report = self.vio.point_pairs(stamp, &pairs);
+                self.pair_buffers.push(pairs);
+                report
+            }
             PendingMeasurement::Points(stamp, points) => {
                 let report = self.vio.points(stamp, &points);
                 self.point_buffers.push(points);
@@ -265,6 +322,13 @@ impl UnifiedVio {
             // All else was checked when it came.
             Err(_) => self.counts.too_late += 1,
         }
+    }
+
+    fn process_pair(&mut self, stamp: Stamp, first: &[u8], second: &[u8]) -> Result<FrameReport, Error> {
+        let sizes = [self.vio.camera().image_size(), self.vio.second_camera()?.image_size()];
+        let [first, second] =
+            [(first, sizes[0]), (second, sizes[1])].map(|(data, (width, height))| ImageView { width, height, data });
+        self.vio.image_pair(stamp, &first, &second)
     }
 }
 

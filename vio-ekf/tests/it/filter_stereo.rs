@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Vector2, Vector3};
 use vio_ekf::sim::{RoomSettings, Scenario, SimulatedCamera, Simulation, camera_ahead, camera_ahead_right};
 use vio_ekf::{
     Camera, Error, ImageView, ImuNoise, InitialSigma, InitialState, Odometry, PointObservation, PointPair, Settings,
-    Spline, Stamp, Status, Vio, nalgebra,
+    Spline, Stamp, Status, UnifiedSettings, UnifiedVio, Vio, nalgebra,
 };
 
 /// End of the rest, s; a second later the body moves at 1 m/s.
@@ -130,6 +130,44 @@ fn the_scale_is_known_at_take_off() {
             assert!((scale - 1.0).abs() < 0.03 && sigma < 0.02, "wall at {wall} m, every {every}: {scale}, {sigma}");
         }
     }
+}
+
+/// Pairs through the estimator that puts measurements in order: late by half of what it waits, or not, nothing changes.
+#[test]
+fn pairs_that_arrive_late_change_no_bit() {
+    let fly = |late: usize| {
+        let mut flight = Flight::new(3, 3.0);
+        let start = flight.drawn_start(InitialSigma::default());
+        let mut right = flight.camera;
+        right.body_from_camera.translation.y -= 0.11;
+        let settings = UnifiedSettings { imu: flight.noise, ..UnifiedSettings::default() };
+        let mut vio = UnifiedVio::stereo(flight.camera, right, Settings::default(), settings).unwrap();
+        let mut waiting: Vec<(usize, Stamp, Vec<PointPair>)> = Vec::new();
+        let last = flight.spline.span().1;
+        for (k, stamp) in flight.stamps().enumerate() {
+            vio.imu(&flight.imu(stamp)).unwrap();
+            if k == 0 {
+                vio.initialize(&start).unwrap();
+            } else if k % 10 == 0 && stamp < last {
+                let camera_from_world = (flight.truth(stamp).world_from_body * right.body_from_camera).inverse();
+                let seen = flight.see(stamp);
+                let pair = |first: PointObservation| {
+                    let local = camera_from_world * nalgebra::Point3::from(flight.points[first.id as usize]);
+                    PointPair { first, second: right.project(&local.coords) }
+                };
+                waiting.push((k + late, stamp, seen.into_iter().map(pair).collect()));
+            }
+            for (_, stamp, pairs) in waiting.extract_if(.., |(due, ..)| *due <= k) {
+                vio.point_pairs(stamp, &pairs).unwrap();
+            }
+        }
+        assert!(vio.last_frame().unwrap().used > 10 && vio.counts().too_late == 0, "{:?}", vio.counts());
+        vio.output().unwrap()
+    };
+    assert_eq!(fly(0), fly(10));
+    let forward = vio_ekf::sim::forward_pinhole();
+    let mut alone = UnifiedVio::new(forward, Settings::default(), UnifiedSettings::default()).unwrap();
+    assert!(matches!(alone.point_pairs(Stamp::default(), &[]), Err(Error::NoSuch { what: "camera", index: 1, .. })));
 }
 
 /// Mean squared error of a flight through a room of points, each with a pixel of noise in both images.

@@ -4,9 +4,13 @@ use std::fmt::Write as _;
 
 use crate::support::flight::{Flight, GRAVITY};
 use crate::support::recorded;
-use nalgebra::{Isometry3, Matrix3, Vector3};
-use vio_ekf::sim::ImuModel;
-use vio_ekf::{Error, Imu, ImuDoubt, ImuValidation, Spline, Stamp, asl, euroc, nalgebra, tum, validate_samples};
+use crate::support::rng::Rng;
+use nalgebra::{Isometry3, Matrix3, Point3, Vector2, Vector3};
+use vio_ekf::sim::{ImuModel, observe_points};
+use vio_ekf::{
+    Camera, Error, Imu, ImuDoubt, ImuValidation, PointObservation, Spline, Stamp, asl, check_imu_axes, euroc, nalgebra,
+    tum, validate_samples,
+};
 
 /// A simulated flight that tilts by about 15 degrees, and real ones where they are there.
 fn recordings() -> Vec<(&'static str, Vec<Imu>)> {
@@ -164,6 +168,71 @@ const FAULTS: [Fault; 9] = [
     ("accelerometer x flipped", |s| Imu { accel: Vector3::new(-s.accel.x, s.accel.y, s.accel.z), ..*s }),
     ("accelerometer z flipped", |s| Imu { accel: Vector3::new(s.accel.x, s.accel.y, -s.accel.z), ..*s }),
 ];
+
+/// Points on the walls of a room around a motion, and what the camera sees of them ten times a second.
+fn tracked_points(spline: &Spline, seed: u64) -> Vec<(Stamp, Vec<PointObservation>)> {
+    let (first, last) = spline.span();
+    let stamps = (1..).map(|k| first.plus_secs(0.1 * f64::from(k))).take_while(|stamp| *stamp < last);
+    let stamps: Vec<Stamp> = stamps.collect();
+    let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    for stamp in &stamps {
+        let position = spline.sample(*stamp).unwrap().world_from_body.translation.vector;
+        (low, high) = (low.inf(&position), high.sup(&position));
+    }
+    let mut rng = Rng::new(seed);
+    let (middle, half) = ((low + high) * 0.5, (high - low) * 0.5 + Vector3::repeat(2.0));
+    let points: Vec<Point3<f64>> = (0..600)
+        .map(|_| {
+            let mut point = rng.vector();
+            let axis = (rng.bits() % 3) as usize;
+            point[axis] = point[axis].signum();
+            Point3::from(middle + point.component_mul(&half))
+        })
+        .collect();
+    let mut see = |stamp: Stamp| {
+        let pose = spline.sample(stamp).unwrap().world_from_body;
+        let noise = || Vector2::new(rng.normal(), rng.normal()) * 0.5;
+        (stamp, observe_points(points.iter(), &Camera::euroc(), &pose, 0.0, noise))
+    };
+    stamps.into_iter().map(&mut see).collect()
+}
+
+/// With the points that a camera follows, what is spoilt is named on every motion that shows it, and nothing else is.
+#[test]
+fn images_name_what_is_spoilt() {
+    let (mut named, mut runs, mut missed) = ([0; FAULTS.len()], 0, String::new());
+    for (name, spline) in &motions() {
+        for seed in 1..=3 {
+            let samples = ImuModel::default().record(spline, GRAVITY, seed).unwrap().samples;
+            let images = tracked_points(spline, seed);
+            let check = |samples: &[Imu]| check_imu_axes(samples, &images, &Camera::euroc(), (GRAVITY, 0.0)).unwrap();
+            let sound = check(&samples);
+            assert!(sound.gyro.is_none() && sound.accel.is_none(), "{name}, seed {seed}: {sound:?}");
+            runs += 1;
+            for (k, (fault, change)) in FAULTS.iter().enumerate() {
+                let spoilt = with(&samples, change);
+                let found = check(&spoilt);
+                // A unit is named by the size of the force, without images.
+                let is_named = found.gyro.is_some()
+                    || found.accel.is_some()
+                    || is_named(&validate_samples(&spoilt, 200.0, GRAVITY));
+                // What is spoilt is one sensor: the other one must not be blamed.
+                let blamed = if k < 2 { found.accel } else { found.gyro };
+                assert!(blamed.is_none(), "{name}, seed {seed}, {fault}: {found:?}");
+                named[k] += usize::from(is_named);
+                if !is_named {
+                    writeln!(missed, "    {name} {seed}: {fault} {found:?}").unwrap();
+                }
+            }
+        }
+    }
+    let (all, of) = (named.iter().sum::<usize>(), runs * FAULTS.len());
+    eprintln!(
+        "named {all} of {of}; of {runs} each: {:?}\n{missed}",
+        FAULTS.iter().map(|f| f.0).zip(named).collect::<Vec<_>>()
+    );
+    assert!(runs == 0 || all as f64 >= 0.95 * of as f64, "named {all} of {of}");
+}
 
 /// No motion that somebody has flown is refused, whatever the seed of the sensor.
 #[test]

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
 
+mod accel_matrix;
 mod camera;
 mod camera_model;
 mod dead_reckoning;

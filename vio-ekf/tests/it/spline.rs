@@ -108,6 +108,29 @@ fn follows_a_recorded_flight() {
 }
 
 #[test]
+fn a_curve_through_its_poses_keeps_the_size_of_fast_motion() {
+    // 2 cm and 3 degrees to and fro at 3 Hz, 20 poses a second.
+    let wave = |t: f64| (std::f64::consts::TAU * 3.0 * t).sin();
+    let poses = (0..100).map(|k| {
+        let t = 0.05 * f64::from(k);
+        Isometry3::new(Vector3::new(0.02 * wave(t), t, 0.0), Vector3::new(0.0, 0.05 * wave(t), 0.3 * t))
+    });
+    let stamps = (0..100).map(|k| nanos(50_000_000 * k)).collect();
+    let trajectory = Trajectory::new(stamps, poses.collect()).unwrap();
+    let apart = |spline: &Spline| {
+        let inner = trajectory.iter().skip(10).take(80);
+        let errors = inner.map(|(stamp, pose)| {
+            let at = spline.sample(stamp).unwrap().world_from_body;
+            (at.translation.vector - pose.translation.vector).norm() + at.rotation.angle_to(&pose.rotation)
+        });
+        errors.fold(0.0, f64::max)
+    };
+    let near = apart(&Spline::from_trajectory(&trajectory, 50_000_000).unwrap());
+    let through = apart(&Spline::through_trajectory(&trajectory, 50_000_000).unwrap());
+    assert!(near > 5e-3 && through < 1e-6, "{near} {through}");
+}
+
+#[test]
 fn refuses_what_it_cannot_sample() {
     let knots = vec![Isometry3::identity(); 4];
     assert!(matches!(Spline::new(nanos(0), 0, knots.clone()), Err(Error::InvalidSetting { .. })));

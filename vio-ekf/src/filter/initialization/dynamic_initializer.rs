@@ -7,6 +7,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use super::dynamic::result::{DynamicOutcome, InitialMotion};
 use super::dynamic::solver::{MIN_POINTS, solve};
 use super::dynamic::window::{BearingObservation, WindowInput};
+use crate::core::core_state::ImuCorrection;
 use crate::core::imu_buffer::ImuBuffer;
 use crate::core::preintegration::ImuPreintegration;
 use crate::filter::settings::DynamicInitializationSettings;
@@ -69,7 +70,8 @@ impl DynamicInitializer {
         let mut preintegration = ImuPreintegration::default();
         let mut buffer = ImuBuffer::new(sample, from, self.samples.len());
         self.samples.iter().skip(1).for_each(|sample| buffer.push(*sample));
-        buffer.continue_preintegration(&mut preintegration, (from, until), &[Vector3::zeros(); 2], &ImuNoise::ZERO);
+        let correction = ImuCorrection::default();
+        buffer.continue_preintegration(&mut preintegration, (from, until), &correction, &ImuNoise::ZERO);
         Some(preintegration.rotation)
     }
 
@@ -153,10 +155,10 @@ impl DynamicInitializer {
 
     /// Preintegrates from the first image to each.
     fn preintegrations(&self, buffer: &ImuBuffer, gyro_bias: &Vector3<f64>) -> Vec<ImuPreintegration> {
-        let (biases, mut preintegration, mut from) =
-            ([*gyro_bias, Vector3::zeros()], ImuPreintegration::default(), self.images[0]);
+        let correction = ImuCorrection { gyro_bias: *gyro_bias, ..ImuCorrection::default() };
+        let (mut preintegration, mut from) = (ImuPreintegration::default(), self.images[0]);
         let each = self.images.iter().map(|&until| {
-            buffer.continue_preintegration(&mut preintegration, (from, until), &biases, &ImuNoise::ZERO);
+            buffer.continue_preintegration(&mut preintegration, (from, until), &correction, &ImuNoise::ZERO);
             from = until;
             preintegration.clone()
         });

@@ -36,10 +36,11 @@ pub(crate) fn from_initialization(
         sigma: InitialSigma::default(),
     };
     let estimator = Estimator::new(camera, noise, settings, &initial, *before);
-    let TrackingState { mut estimator, mut tracks } = TrackingState::new(estimator, settings.landmarks.max_count);
+    let mut tracking = TrackingState::new(estimator, settings.landmarks.max_count);
+    let TrackingState { estimator, tracks, .. } = &mut tracking;
     let pixel_sigma = settings.dynamic_initialization.pixel_sigma;
-    set_core_covariance(&mut estimator, motion);
-    insert_landmarks(&mut estimator, motion, |id| {
+    set_core_covariance(estimator, motion);
+    insert_landmarks(estimator, motion, |id| {
         let (pixel, patch) = observe(id)?;
         let (bearing, warp) = unproject(camera, &pixel)?;
         tracks.push(LandmarkTrack::new(id, patch));
@@ -49,7 +50,7 @@ pub(crate) fn from_initialization(
     for sample in &samples[after..] {
         estimator.imu(*sample);
     }
-    Some(TrackingState { estimator, tracks })
+    Some(tracking)
 }
 
 /// The covariance of the window's solution, and the samples' own noise over the window, which that took for none.

@@ -36,21 +36,30 @@ struct MeanForce {
     variance: f64,
 }
 
-impl Measurement<3, 6> for MeanForce {
-    fn rows(&self) -> [usize; 6] {
-        std::array::from_fn(|k| if k < 3 { error_state::ATTITUDE + k } else { error_state::ACCEL_BIAS + k - 3 })
+impl Measurement<3, 15> for MeanForce {
+    fn rows(&self) -> [usize; 15] {
+        std::array::from_fn(|k| match k {
+            0..3 => error_state::ATTITUDE + k,
+            3..6 => error_state::ACCEL_BIAS + k - 3,
+            _ => error_state::ACCEL_MATRIX + k - 6,
+        })
     }
 
-    fn linearize(&self, trial: &Trial<'_, 6>) -> Option<Linearization<3, 6>> {
+    /// `A f̃ = Rᵀ(0, 0, g) + b_a`; where the matrix is not estimated its rows have no variance.
+    fn linearize(&self, trial: &Trial<'_, 15>) -> Option<Linearization<3, 15>> {
         let core = trial.core();
         let up = Vector3::new(0.0, 0.0, self.gravity);
         let body_from_world = core.attitude.inverse();
-        let mut jacobian = SMatrix::<f64, 3, 6>::zeros();
+        let mut jacobian = SMatrix::<f64, 3, 15>::zeros();
         // d(Rᵀ a)/dθ = Rᵀ hat(a) for the world-side error.
         let tilt = body_from_world.to_rotation_matrix().into_inner() * up.cross_matrix();
         jacobian.fixed_columns_mut::<3>(0).copy_from(&tilt);
-        jacobian.fixed_columns_mut::<3>(3).fill_with_identity();
-        let residual = self.force - body_from_world * up - core.accel_bias;
+        jacobian.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
+        for axis in 0..3 {
+            jacobian.fixed_view_mut::<1, 3>(axis, 6 + 3 * axis).copy_from(&-self.force.transpose());
+        }
+        let force = trial.state().accel_matrix.map_or(self.force, |matrix| matrix * self.force);
+        let residual = force - body_from_world * up - core.accel_bias;
         Some(Linearization { residual, jacobian, noise: Matrix3::identity() * self.variance })
     }
 }

@@ -1,7 +1,8 @@
 //! Covariance propagation that uses the structure of the transition.
 
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::{SMatrix, Vector3};
 
+use crate::core::core_state::CoreCovariance;
 use crate::core::covariance::Covariance;
 use crate::core::preintegration::{ImuPreintegration, StateTransition};
 use crate::filter::propagation::camera_motion::{CameraMotion, LandmarkTransition};
@@ -12,35 +13,48 @@ use crate::filter::state::vio_state::VioState;
 /// Rows of the camera's motion.
 const MOTION: usize = 6;
 
-/// Memory of [`propagate`], claimed once.
+/// Rows before the first landmark.
+const HEAD: usize = error_state::FIRST_LANDMARK;
+
+/// Memory of [`propagate`], claimed once: six rows each of the size of the covariance.
 #[derive(Debug, Clone)]
 pub(crate) struct Workspace {
-    /// `F P`, of the size of the covariance.
-    product: Vec<f64>,
     stride: usize,
-    /// The camera's motion errors against all others: `Ξ P`.
+    /// The camera's motion errors against all others, before: `Ξ P`.
     motion: Vec<f64>,
+    /// Against the landmarks as they turn, `W_j = (Ξ P)_j J_jᵀ`, and with what they have of the motion, `V_j = W_j + B D_jᵀ`.
+    turned: Vec<f64>,
+    moved: Vec<f64>,
+    /// `D_jᵀ`.
+    by_motion: Vec<f64>,
+    /// Three rows of a landmark.
+    rows: Vec<f64>,
     transitions: Vec<LandmarkTransition>,
     second_order: SecondOrderTerms,
 }
 
 impl Workspace {
     pub(crate) fn new(capacity: usize) -> Self {
+        let landmarks = (capacity - HEAD) / error_state::LANDMARK_SIZE;
+        let six = || vec![0.0; MOTION * capacity];
         Self {
-            product: vec![0.0; capacity * capacity],
             stride: capacity,
-            motion: vec![0.0; MOTION * capacity],
-            transitions: Vec::with_capacity((capacity - error_state::FIRST_LANDMARK) / error_state::LANDMARK_SIZE),
-            second_order: SecondOrderTerms::new((capacity - error_state::FIRST_LANDMARK) / error_state::LANDMARK_SIZE),
+            motion: six(),
+            turned: six(),
+            moved: six(),
+            by_motion: six(),
+            rows: vec![0.0; error_state::LANDMARK_SIZE * capacity],
+            transitions: Vec::with_capacity(landmarks),
+            second_order: SecondOrderTerms::new(landmarks),
         }
     }
 }
 
 /// Propagates state and covariance over an interval: `P ← F P Fᵀ + N`.
 ///
-/// The landmarks depend on the core only through the six errors `ξ = (ψ, τ)` of the camera's motion, so their rows of `F P`
-/// are `D_i (Ξ P) + J_i P_i` with a 6-row product that all of them share. A landmark that the camera runs into is dropped;
-/// `dropped` is told its slot, from the last to the first.
+/// The landmarks depend on the core only through the six errors `ξ = (ψ, τ)` of the camera's motion. With `B` the covariance of
+/// these, `P'_ij = D_i (B D_jᵀ + W_j) + W_iᵀ D_jᵀ + J_i P_ij J_jᵀ`: twelve rows that all landmarks share, and a block each.
+/// A landmark that the camera runs into is dropped; `dropped` is told its slot, from the last to the first.
 pub(crate) fn propagate(
     state: &mut VioState,
     covariance: &mut Covariance,
@@ -73,123 +87,185 @@ pub(crate) fn propagate(
     let mut xi = SMatrix::<f64, MOTION, { error_state::TIME_OFFSET }>::zeros();
     xi.fixed_columns_mut::<{ error_state::CORE }>(0).copy_from(&(camera.by_motion * body.motion()));
     xi.fixed_columns_mut::<6>(error_state::CAMERA_POSITION).copy_from(&camera.by_calibration);
+    let by_matrix = state.accel_matrix.map(|_| {
+        let (core, motion) = preintegration.by_accel_matrix(body);
+        ByAccelMatrix { core, xi: camera.by_motion * motion }
+    });
     // Noise of the core and of ξ.
     let (core_noise, noise) = (&body.noise, preintegration.noise(body));
     let xi_core = camera.by_motion * noise.motion_core;
     let xi_xi = camera.by_motion * noise.motion * camera.by_motion.transpose();
 
-    left_product(covariance, body, &xi, workspace);
-    let translation = translation(&xi, &xi_xi, workspace);
+    let head = HeadTransition { body, by_matrix: by_matrix.as_ref() };
+    motion_product(covariance, (&xi, by_matrix.as_ref()), workspace);
+    let motion_covariance = motion_covariance((&xi, by_matrix.as_ref()), workspace) + xi_xi;
+    let translation = motion_covariance.fixed_view::<3, 3>(3, 3).into_owned();
     let correlation_factor = correlation_factor(covariance, &start_from_world, preintegration.duration);
     workspace
         .second_order
         .record(covariance, |row| Vector3::from_fn(|k, _| workspace.motion[(3 + k) * workspace.stride + row]));
 
-    // P' = (F P) Fᵀ row by row, lower triangle, with the noise on the way.
-    for row in 0..covariance.size() {
-        let from = &workspace.product[row * workspace.stride..][..covariance.size()];
-        let to = covariance.row_mut(row);
-        let mut along = [0.0; MOTION];
-        for (along, weights) in along.iter_mut().zip(xi.row_iter()) {
-            *along = weights.iter().zip(from).map(|(w, p)| w * p).sum();
-        }
-        for (r, to) in to[..error_state::CORE.min(row + 1)].iter_mut().enumerate() {
-            *to = body.transition.row(r).iter().zip(from).map(|(w, p)| w * p).sum();
-        }
-        if row < error_state::CORE {
-            for c in 0..=row {
-                to[c] += core_noise[(row, c)];
-            }
-            continue;
-        }
-        if row < error_state::FIRST_LANDMARK {
-            to[error_state::CORE..=row].copy_from_slice(&from[error_state::CORE..=row]);
-            continue;
-        }
-        to[error_state::CORE..error_state::FIRST_LANDMARK]
-            .copy_from_slice(&from[error_state::CORE..error_state::FIRST_LANDMARK]);
-        let (slot, component) = (
-            (row - error_state::FIRST_LANDMARK) / error_state::LANDMARK_SIZE,
-            (row - error_state::FIRST_LANDMARK) % error_state::LANDMARK_SIZE,
-        );
-        let own = workspace.transitions[slot].by_motion.row(component);
-        let (noise, noise_core) = (own * xi_xi, own * xi_core);
-        for (to, noise) in to.iter_mut().zip(noise_core.iter()) {
-            *to += noise;
-        }
-        for (along, noise) in along.iter_mut().zip(noise.iter()) {
-            *along += noise;
-        }
-        for (other, transition) in workspace.transitions[..=slot].iter().enumerate() {
-            let at = error_state::landmark(other);
-            let old = [from[at], from[at + 1], from[at + 2]];
-            for c in 0..error_state::LANDMARK_SIZE {
-                let mut value = 0.0;
-                for (k, along) in along.iter().enumerate() {
-                    value += transition.by_motion[(c, k)] * along;
-                }
-                for (k, old) in old.iter().enumerate() {
-                    value += transition.by_itself[(c, k)] * old;
-                }
-                to[at + c] = value;
-            }
-        }
-    }
+    turn_motion_product(&motion_covariance, workspace);
+    propagate_head(covariance, &head, core_noise);
+    propagate_landmarks(covariance, &head, &xi_core, workspace);
     workspace.second_order.apply(state, covariance, (&translation, correlation_factor), &workspace.transitions);
     covariance.mirror();
 }
 
-/// Covariance of the camera's translation.
-fn translation(
-    xi: &SMatrix<f64, MOTION, { error_state::TIME_OFFSET }>,
-    noise: &SMatrix<f64, MOTION, MOTION>,
-    workspace: &Workspace,
-) -> Matrix3<f64> {
-    let mut translation = noise.fixed_view::<3, 3>(3, 3).into_owned();
-    for r in 0..3 {
-        for c in 0..3 {
-            let row = &workspace.motion[(3 + r) * workspace.stride..][..error_state::TIME_OFFSET];
-            translation[(r, c)] += xi.row(3 + c).iter().zip(row).map(|(w, p)| w * p).sum::<f64>();
-        }
-    }
-    translation
+/// The transition of the rows before the landmarks: of the core; the others stay.
+struct HeadTransition<'a> {
+    body: &'a StateTransition,
+    by_matrix: Option<&'a ByAccelMatrix>,
 }
 
-/// `F P` into the workspace.
-fn left_product(
-    covariance: &Covariance,
-    body: &StateTransition,
-    xi: &SMatrix<f64, MOTION, { error_state::TIME_OFFSET }>,
+impl HeadTransition<'_> {
+    /// `F x`, for the core, of a column of errors before.
+    fn core(&self, before: &[f64]) -> [f64; error_state::CORE] {
+        let transition = &self.body.transition;
+        let mut after = [0.0; error_state::CORE];
+        for (column, &value) in transition.column_iter().zip(before) {
+            after.iter_mut().zip(column.iter()).for_each(|(after, weight)| *after += weight * value);
+        }
+        if let Some(by_matrix) = self.by_matrix {
+            for (column, &value) in by_matrix.core.column_iter().zip(&before[error_state::ACCEL_MATRIX..]) {
+                after.iter_mut().zip(column.iter()).for_each(|(after, weight)| *after += weight * value);
+            }
+        }
+        after
+    }
+}
+
+/// `F P Fᵀ + N` of the rows before the landmarks.
+fn propagate_head(covariance: &mut Covariance, head: &HeadTransition, core_noise: &CoreCovariance) {
+    let mut product = SMatrix::<f64, HEAD, HEAD>::zeros();
+    for column in 0..HEAD {
+        let before = &covariance.row(column)[..HEAD];
+        let mut after = product.column_mut(column);
+        after.as_mut_slice().copy_from_slice(before);
+        after.as_mut_slice()[..error_state::CORE].copy_from_slice(&head.core(before));
+    }
+    for row in 0..HEAD {
+        let mut from = [0.0; HEAD];
+        from.iter_mut().zip(product.row(row).iter()).for_each(|(from, value)| *from = *value);
+        let core = head.core(&from);
+        from[..error_state::CORE].copy_from_slice(&core);
+        if row < error_state::CORE {
+            from.iter_mut().zip(core_noise.row(row).iter()).for_each(|(from, noise)| *from += noise);
+        }
+        covariance.row_mut(row)[..=row].copy_from_slice(&from[..=row]);
+    }
+}
+
+/// The rows of the landmarks, lower triangle: a block needs what was in its own place.
+fn propagate_landmarks(
+    covariance: &mut Covariance,
+    head: &HeadTransition,
+    xi_core: &SMatrix<f64, MOTION, { error_state::CORE }>,
     workspace: &mut Workspace,
 ) {
-    let (n, stride) = (covariance.size(), workspace.stride);
-    for r in 0..error_state::CORE {
-        let target = &mut workspace.product[r * stride..][..n];
-        target.fill(0.0);
-        for c in 0..error_state::CORE {
-            add(target, body.transition[(r, c)], covariance.row(c));
+    const SIZE: usize = error_state::LANDMARK_SIZE;
+    let Workspace { stride, motion, turned, moved, by_motion, rows, transitions, .. } = workspace;
+    let stride = *stride;
+    for (slot, transition) in transitions.iter().enumerate() {
+        let at = error_state::landmark(slot);
+        let count = at + SIZE;
+        // J_i P_i.
+        for r in 0..SIZE {
+            let target = &mut rows[r * stride..][..count];
+            let weights: [f64; SIZE] = std::array::from_fn(|k| transition.by_itself[(r, k)]);
+            let [a, b, c]: [&[f64]; SIZE] = std::array::from_fn(|k| &covariance.row(at + k)[..count]);
+            for (((target, a), b), c) in target.iter_mut().zip(a).zip(b).zip(c) {
+                *target = weights[0] * a + weights[1] * b + weights[2] * c;
+            }
+        }
+        let noise = transition.by_motion * xi_core;
+        for r in 0..SIZE {
+            let from = &mut rows[r * stride..][..count];
+            for k in 0..MOTION {
+                add(&mut from[..HEAD], transition.by_motion[(r, k)], &motion[k * stride..][..HEAD]);
+            }
+            let core = head.core(&from[..HEAD]);
+            from[..error_state::CORE].copy_from_slice(&core);
+            from.iter_mut().zip(noise.row(r).iter()).for_each(|(from, noise)| *from += noise);
+            for (other, own) in from[HEAD..].chunks_exact_mut(SIZE).zip(transitions.iter()) {
+                let j = &own.by_itself;
+                let old = [other[0], other[1], other[2]];
+                for c in 0..SIZE {
+                    other[c] = j[(c, 0)] * old[0] + j[(c, 1)] * old[1] + j[(c, 2)] * old[2];
+                }
+            }
+            for k in (0..MOTION).step_by(2) {
+                let [a, b] =
+                    [0, 1].map(|i| (transition.by_motion[(r, k + i)], &moved[(k + i) * stride..][HEAD..count]));
+                let [c, d] =
+                    [0, 1].map(|i| (turned[(k + i) * stride + at + r], &by_motion[(k + i) * stride..][HEAD..count]));
+                let others = a.1.iter().zip(b.1).zip(c.1).zip(d.1);
+                for (target, (((va, vb), vc), vd)) in from[HEAD..].iter_mut().zip(others) {
+                    *target += (a.0 * va + b.0 * vb) + (c.0 * vc + d.0 * vd);
+                }
+            }
+        }
+        for r in 0..SIZE {
+            covariance.row_mut(at + r)[..=at + r].copy_from_slice(&rows[r * stride..][..=at + r]);
         }
     }
-    for r in error_state::CORE..error_state::FIRST_LANDMARK {
-        workspace.product[r * stride..][..n].copy_from_slice(covariance.row(r));
-    }
-    workspace.motion.fill(0.0);
+}
+
+/// Derivatives by the accelerometer's matrix.
+struct ByAccelMatrix {
+    /// Of the core at the end.
+    core: SMatrix<f64, { error_state::CORE }, { error_state::MATRIX_SIZE }>,
+    /// Of the camera's motion.
+    xi: SMatrix<f64, MOTION, { error_state::MATRIX_SIZE }>,
+}
+
+/// Covariance of the camera's motion, `Ξ P Ξᵀ`.
+fn motion_covariance(
+    (xi, by_matrix): (&SMatrix<f64, MOTION, { error_state::TIME_OFFSET }>, Option<&ByAccelMatrix>),
+    workspace: &Workspace,
+) -> SMatrix<f64, MOTION, MOTION> {
+    SMatrix::from_fn(|r, c| {
+        let row = &workspace.motion[r * workspace.stride..][..HEAD];
+        let by_head: f64 = xi.row(c).iter().zip(row).map(|(w, p)| w * p).sum();
+        let matrix_rows = &row[error_state::ACCEL_MATRIX..];
+        by_head + by_matrix.map_or(0.0, |by| by.xi.row(c).iter().zip(matrix_rows).map(|(w, p)| w * p).sum())
+    })
+}
+
+/// `Ξ P` into the workspace.
+fn motion_product(
+    covariance: &Covariance,
+    (xi, by_matrix): (&SMatrix<f64, MOTION, { error_state::TIME_OFFSET }>, Option<&ByAccelMatrix>),
+    workspace: &mut Workspace,
+) {
+    let n = covariance.size();
     for r in 0..MOTION {
-        let target = &mut workspace.motion[r * stride..][..n];
+        let target = &mut workspace.motion[r * workspace.stride..][..n];
+        target.fill(0.0);
         for c in 0..error_state::TIME_OFFSET {
             add(target, xi[(r, c)], covariance.row(c));
         }
-    }
-    for (slot, transition) in workspace.transitions.iter().enumerate() {
-        let at = error_state::landmark(slot);
-        for r in 0..error_state::LANDMARK_SIZE {
-            let target = &mut workspace.product[(at + r) * stride..][..n];
-            target.fill(0.0);
-            for c in 0..MOTION {
-                add(target, transition.by_motion[(r, c)], &workspace.motion[c * stride..][..n]);
+        if let Some(by_matrix) = by_matrix {
+            for c in 0..error_state::MATRIX_SIZE {
+                add(target, by_matrix.xi[(r, c)], covariance.row(error_state::ACCEL_MATRIX + c));
             }
-            for c in 0..error_state::LANDMARK_SIZE {
-                add(target, transition.by_itself[(r, c)], covariance.row(at + c));
+        }
+    }
+}
+
+/// The rows that all landmarks share.
+fn turn_motion_product(motion_covariance: &SMatrix<f64, MOTION, MOTION>, workspace: &mut Workspace) {
+    let Workspace { stride, motion, turned, moved, by_motion, transitions, .. } = workspace;
+    for (slot, transition) in transitions.iter().enumerate() {
+        let at = error_state::landmark(slot);
+        let before = SMatrix::<f64, MOTION, 3>::from_fn(|r, c| motion[r * *stride + at + c]);
+        let w = before * transition.by_itself.transpose();
+        let v = w + motion_covariance * transition.by_motion.transpose();
+        for r in 0..MOTION {
+            for c in 0..3 {
+                turned[r * *stride + at + c] = w[(r, c)];
+                moved[r * *stride + at + c] = v[(r, c)];
+                by_motion[r * *stride + at + c] = transition.by_motion[(c, r)];
             }
         }
     }

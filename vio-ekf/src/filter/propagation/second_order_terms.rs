@@ -10,6 +10,9 @@ use crate::filter::state::vio_state::VioState;
 /// Least correlation time of the velocity's error, s; ours.
 pub(super) const MIN_CORRELATION_S: f64 = 0.1;
 
+/// Variance of a bearing, rad², that is none: a ten-thousandth of a pixel, squared.
+const NEGLIGIBLE: f64 = 1e-13;
+
 /// The second-order terms of the bearings, which matter while velocity and distances are not known: the products `τ δρ` and `δρ²` of
 /// the errors of the camera's translation and of the inverse distances.
 ///
@@ -57,6 +60,12 @@ impl SecondOrderTerms {
             *bearing = bearing.boxplus(&(own.mixed * cross + own.curvature * (0.5 * distances[slot])));
             let spread = own.mixed * translation;
             for (column, (other, shared)) in transitions.iter().zip(distances).enumerate() {
+                // Most landmarks are known well enough for their products to be nothing.
+                let most = (translation.trace() * shared.abs() + cross.norm() * self.cross[column].norm())
+                    * correlation_factor;
+                if most + shared * shared < NEGLIGIBLE {
+                    continue;
+                }
                 let crossed = (own.mixed * self.cross[column]) * (other.mixed * cross).transpose();
                 let product = (spread * other.mixed.transpose() * *shared + crossed) * correlation_factor
                     + own.curvature * other.curvature.transpose() * (0.5 * shared * shared);

@@ -9,6 +9,12 @@ use crate::error::{all_not_negative, all_positive, invalid};
 pub struct LandmarkSettings {
     /// Landmarks in the state at most, up to 200; 25 as in ROVIO (Bloesch et al. 2017).
     pub max_count: usize,
+    /// Landmarks that one image measures at most, those first whose bearings are known least; 30, ours. Successive measurements of one
+    /// patch repeat each other's errors, and an update costs time.
+    pub max_measured: usize,
+    /// So many landmarks have independent distances; ours: 25. What is seen at once lies on the same few surfaces: more landmarks
+    /// than this tell no more of how far away they all are.
+    pub independent_count: usize,
     /// The shared depth prior: inverse distance expected of landmarks at the start, 1/m; ours, ROVIO has 0.5. From then on it is
     /// estimated.
     pub inverse_distance: f64,
@@ -27,6 +33,8 @@ impl Default for LandmarkSettings {
     fn default() -> Self {
         Self {
             max_count: 25,
+            max_measured: 30,
+            independent_count: 25,
             inverse_distance: 0.3,
             shared_sigma: 0.4,
             shared_walk: 0.3,
@@ -37,9 +45,23 @@ impl Default for LandmarkSettings {
 }
 
 impl LandmarkSettings {
+    /// Variance of a new landmark's inverse distance from the shared depth prior: were more of them than are independent taken as
+    /// such, their mean would seem to be known.
+    pub(crate) fn own_variance(&self, expected: f64) -> f64 {
+        let dependent = (self.max_count as f64 / self.independent_count as f64).max(1.0);
+        (self.inverse_distance_sigma * expected).powi(2) * dependent
+    }
+
     pub(super) fn check(&self) -> Result<(), Error> {
         if !(1..=200).contains(&self.max_count) {
             return Err(invalid("landmarks.max_count", self.max_count as f64, "must be between 1 and 200"));
+        }
+        for (name, count) in
+            [("landmarks.max_measured", self.max_measured), ("landmarks.independent_count", self.independent_count)]
+        {
+            if count == 0 {
+                return Err(invalid(name, 0.0, "must be at least 1"));
+            }
         }
         all_positive(&[
             ("inverse_distance", self.inverse_distance),

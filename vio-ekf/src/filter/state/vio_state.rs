@@ -1,11 +1,11 @@
 //! The nominal state.
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 
 use super::error_state;
 use super::inverse_distance::InverseDistance;
 use super::landmark::Landmark;
-use crate::core::core_state::{CoreState, block, rotated};
+use crate::core::core_state::{CoreState, ImuCorrection, block, rotated};
 
 /// The state of the odometry: core, calibration of the camera, landmarks in the camera's axes (Bloesch et al. 2017).
 #[derive(Debug, Clone, PartialEq)]
@@ -21,6 +21,8 @@ pub struct VioState {
     /// The shared depth prior, 1/m: the inverse distance of a new landmark is this plus an error of its own, so that all landmarks
     /// together know no more of the scale than the prior does.
     pub(crate) depth_prior: InverseDistance,
+    /// Specific force by the accelerometer's reading; `None`, the identity, where it is not estimated.
+    pub(crate) accel_matrix: Option<Matrix3<f64>>,
     pub(crate) landmarks: Vec<Landmark>,
 }
 
@@ -40,17 +42,38 @@ impl VioState {
         self.time_offset
     }
 
+    /// The matrix `A` of the accelerometer: with a reading `f̃` the specific force is `A f̃ − b_a`. The identity where it is not
+    /// estimated ([`ImuSettings::accel_scale_sigma`](crate::ImuSettings::accel_scale_sigma)).
+    pub fn accel_matrix(&self) -> Matrix3<f64> {
+        self.accel_matrix.unwrap_or_else(Matrix3::identity)
+    }
+
+    /// What has to be taken out of inertial readings.
+    pub(crate) fn imu_correction(&self) -> ImuCorrection {
+        ImuCorrection { accel_matrix: self.accel_matrix, ..self.core.imu_correction() }
+    }
+
     /// `x ← x ⊞ δ`.
+    #[cfg(test)]
     pub(crate) fn correct(&mut self, delta: &[f64]) {
+        self.correct_head(delta);
+        let landmark_errors = delta[error_state::FIRST_LANDMARK..].chunks_exact(error_state::LANDMARK_SIZE);
+        for (landmark, d) in self.landmarks.iter_mut().zip(landmark_errors) {
+            landmark.bearing = landmark.bearing.boxplus(&nalgebra::Vector2::new(d[0], d[1]));
+            landmark.inverse_distance.correct(d[2]);
+        }
+    }
+
+    /// The same for all but the landmarks.
+    pub(crate) fn correct_head(&mut self, delta: &[f64]) {
         self.core = self.core.corrected(delta);
         self.camera_position += block(delta, error_state::CAMERA_POSITION);
         self.camera_attitude = rotated(&block(delta, error_state::CAMERA_ATTITUDE), &self.camera_attitude);
         self.time_offset += delta[error_state::TIME_OFFSET];
         self.depth_prior.correct(delta[error_state::DEPTH_PRIOR]);
-        let landmark_errors = delta[error_state::FIRST_LANDMARK..].chunks_exact(error_state::LANDMARK_SIZE);
-        for (landmark, d) in self.landmarks.iter_mut().zip(landmark_errors) {
-            landmark.bearing = landmark.bearing.boxplus(&Vector2::new(d[0], d[1]));
-            landmark.inverse_distance.correct(d[2]);
+        if let Some(matrix) = &mut self.accel_matrix {
+            let rows = &delta[error_state::ACCEL_MATRIX..][..error_state::MATRIX_SIZE];
+            *matrix += Matrix3::from_row_slice(rows);
         }
     }
 }

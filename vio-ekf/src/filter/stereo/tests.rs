@@ -110,6 +110,7 @@ fn empty_state() -> VioState {
         camera_attitude: identity,
         time_offset: 0.0,
         depth_prior: InverseDistance::new(1.0),
+        accel_matrix: None,
         landmarks: Vec::new(),
     }
 }

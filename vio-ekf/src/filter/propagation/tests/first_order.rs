@@ -1,6 +1,6 @@
 //! Transition, noise and gauge freedom of the propagation.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix3};
 
 use super::support::{
     GRAVITY, dense, difference, filled, integrate, model, random_covariance, readings, state, transition,
@@ -10,6 +10,7 @@ use crate::core::covariance::Covariance;
 use crate::filter::propagation::propagate::{Workspace, propagate};
 use crate::filter::state::error_state;
 use crate::sim::Rng;
+use crate::test_random::signed;
 
 const SMALL: f64 = 1e-13;
 
@@ -17,7 +18,8 @@ const SMALL: f64 = 1e-13;
 fn covariance_moves_with_the_transition_of_the_whole_state() {
     let mut rng = Rng::new(1);
     for _ in 0..5 {
-        let (state, readings) = (state(&mut rng, 4), readings(&mut rng, 10));
+        let (mut state, readings) = (state(&mut rng, 4), readings(&mut rng, 10));
+        state.accel_matrix = Some(Matrix3::identity() + Matrix3::from_fn(|_, _| 0.05 * signed(&mut rng)));
         let f = transition(&readings, &state);
         // Small, so that the products of errors, which are quadratic in it, do not show.
         let prior = random_covariance(&mut rng, f.nrows()) * SMALL;

@@ -30,6 +30,7 @@ pub(super) fn state(rng: &mut Rng, landmarks: usize) -> VioState {
         camera_attitude: so3::exp(&(vector(rng) * 2.0)),
         time_offset: 0.01,
         depth_prior: InverseDistance::new(0.3),
+        accel_matrix: None,
         landmarks: (0..landmarks)
             .map(|_| Landmark {
                 bearing: Bearing::new(&Unit::new_normalize(Vector3::new(signed(rng), signed(rng), 1.0))),
@@ -48,7 +49,10 @@ pub(super) fn readings(rng: &mut Rng, count: usize) -> Vec<[Vector3<f64>; 2]> {
 pub(super) fn integrate(readings: &[[Vector3<f64>; 2]], state: &VioState, noise: &ImuNoise) -> ImuPreintegration {
     let mut preintegration = ImuPreintegration::default();
     for [gyro, accel] in readings {
-        preintegration.integrate(&(gyro - state.core.gyro_bias), &(accel - state.core.accel_bias), 0.005, noise);
+        let rate = gyro - state.core.gyro_bias;
+        let force = state.accel_matrix() * accel - state.core.accel_bias;
+        preintegration.advance_by_accel_matrix(&rate, (accel, &force), 0.005);
+        preintegration.integrate(&rate, &force, 0.005, noise);
     }
     preintegration
 }
@@ -78,6 +82,8 @@ pub(super) fn difference(a: &VioState, b: &VioState) -> DVector<f64> {
     d.fixed_rows_mut::<3>(error_state::CAMERA_ATTITUDE).copy_from(&rotation(&a.camera_attitude, &b.camera_attitude));
     d[error_state::TIME_OFFSET] = a.time_offset - b.time_offset;
     d[error_state::DEPTH_PRIOR] = a.depth_prior.value - b.depth_prior.value;
+    let matrix = (a.accel_matrix() - b.accel_matrix()).transpose();
+    d.rows_mut(error_state::ACCEL_MATRIX, error_state::MATRIX_SIZE).copy_from_slice(matrix.as_slice());
     for (slot, (a, b)) in a.landmarks.iter().zip(&b.landmarks).enumerate() {
         d.fixed_rows_mut::<2>(error_state::landmark(slot)).copy_from(&a.bearing.boxminus(&b.bearing));
         d[error_state::landmark(slot) + 2] = a.inverse_distance.value - b.inverse_distance.value;
