@@ -5,7 +5,7 @@ mod sprays;
 mod thinning;
 mod trace;
 
-use super::fitting::{ink_cost, prune_with};
+use super::fitting::{ink_cost, prune_with, uniform_volume};
 use crate::error::{Error, require};
 use crate::optimise::{StoppingRule, minimise};
 use crate::painter::{Observer, Painter};
@@ -79,8 +79,9 @@ impl Painter for Centrelines {
             };
             minimise(volumes, upper_bounds, &stop, &mut cost, progress);
         };
+        let start = uniform_volume(problem, &grid);
         let upper_bounds = placed.upper_bounds(problem.limits.max_volume);
-        let mut volumes: Vec<f64> = upper_bounds.iter().map(|upper| upper.min(START)).collect();
+        let mut volumes: Vec<f64> = upper_bounds.iter().map(|upper| upper.min(start)).collect();
         fit(&upper_bounds, &mut volumes, &mut |share| observer.progress(share));
         prune_with(&upper_bounds, problem.limits, &mut volumes, &mut |upper_bounds, volumes| {
             fit(upper_bounds, volumes, &mut |_| ());
@@ -95,9 +96,6 @@ impl Painter for Centrelines {
         Ok(Painting { strokes, ..Painting::render(problem, sprays) })
     }
 }
-
-/// Volume from which the fit starts: any that is not 0 will do.
-const START: f64 = 0.1;
 
 /// Share of the darkest ink below which nothing is worth a row of its own beside lines.
 const LEFT_OVER: f64 = 0.02;

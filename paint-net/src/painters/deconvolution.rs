@@ -1,6 +1,6 @@
 //! Non-negative deconvolution on the grid.
 
-use super::fitting::{fit, prune};
+use super::fitting::{fit, prune, uniform_volume};
 use crate::error::{Error, require};
 use crate::optimise::StoppingRule;
 use crate::painter::{Observer, Painter};
@@ -34,25 +34,12 @@ impl Painter for Deconvolution {
     fn paint_observed(&self, problem: &PaintProblem, observer: &mut dyn Observer) -> Result<Painting, Error> {
         require("tolerance", self.tolerance, self.tolerance >= 0.0, "it must be 0 or more")?;
         let grid = PaintGrid::new(problem)?;
-        let mut volumes = uniform_start(problem, &grid);
+        let start = uniform_volume(problem, &grid);
+        let mut volumes: Vec<f64> = grid.upper_bounds.iter().map(|&upper| start.min(upper)).collect();
         let stop = StoppingRule { iterations: self.iterations, relative_decrease: self.tolerance };
         fit(problem, &grid, &grid.upper_bounds, &mut volumes, &stop, &mut |share| observer.progress(share));
         prune(problem, &grid, &mut volumes, &stop);
         observer.progress(1.0);
         Ok(Painting::new(grid.sprays(&volumes), grid.canvas(&volumes), problem.saturation))
     }
-}
-
-/// Every paintable cell gets the volume that would give the mean missing depth everywhere.
-fn uniform_start(problem: &PaintProblem, grid: &PaintGrid) -> Vec<f64> {
-    let (mut missing, mut pixels) = (0.0, 0.0);
-    for (k, (&ink, &depth)) in problem.reference.data().iter().zip(grid.initial.data()).enumerate() {
-        if problem.weight(k) > 0.0 {
-            missing += (problem.saturation.inverse(ink) - depth).max(0.0);
-            pixels += 1.0;
-        }
-    }
-    let limits = problem.limits;
-    let volume = missing / pixels * (limits.spray_spacing * limits.row_spacing) as f64 / problem.kernel.mass();
-    grid.upper_bounds.iter().map(|&upper| volume.min(upper)).collect()
 }

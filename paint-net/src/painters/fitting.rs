@@ -74,3 +74,16 @@ pub(super) fn prune_with(
     // The refit may have pushed a survivor below the threshold, which is a promise.
     volumes.iter_mut().filter(|v| **v < limits.min_volume).for_each(|v| *v = 0.0);
 }
+
+/// The volume of every cell that would give the mean missing depth everywhere: where a fit starts.
+pub(super) fn uniform_volume(problem: &PaintProblem, grid: &PaintGrid) -> f64 {
+    let (mut missing, mut pixels) = (0.0, 0.0);
+    for (k, (&ink, &depth)) in problem.reference.data().iter().zip(grid.initial.data()).enumerate() {
+        if problem.weight(k) > 0.0 {
+            missing += (problem.saturation.inverse(ink) - depth).max(0.0);
+            pixels += 1.0;
+        }
+    }
+    let limits = problem.limits;
+    missing / pixels * (limits.spray_spacing * limits.row_spacing) as f64 / problem.kernel.mass()
+}
