@@ -211,10 +211,10 @@ fn paths_are_simulated_with_the_paint_that_they_place() {
     assert!((all.paint as f64 / expected - 1.0).abs() < 1e-4 && all.valve == vec![true; 40]);
     assert_eq!(all.useful, all.paint);
     // One that is thinner than a pass leaves the valve shut part of the time; a bare one never opens it.
-    let some = run(1e-6);
+    let some = run(3e-7);
     assert!(some.paint < all.paint && some.useful <= some.paint && some.valve.iter().any(|open| !open));
     // Spraying for real places the same.
-    let mut coverage = Coverage::new(&wall, &vec![1e-6; SIDE * SIDE]).unwrap();
+    let mut coverage = Coverage::new(&wall, &vec![3e-7; SIDE * SIDE]).unwrap();
     let mut placed = 0;
     for k in 0..40 {
         let nozzle = gantry.nozzle(&sweep().at((f64::from(k) + 0.5) * 0.01), 0.05);
