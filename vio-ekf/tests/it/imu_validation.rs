@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::support::flight::{Flight, GRAVITY};
 use crate::support::recorded;
 use crate::support::rng::Rng;
-use nalgebra::{Isometry3, Matrix3, Point3, Vector2, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Vector2, Vector3};
 use vio_ekf::sim::{ImuModel, observe_points};
 use vio_ekf::{
     Camera, Error, Imu, ImuDoubt, ImuValidation, PointObservation, Spline, Stamp, asl, check_imu_axes, euroc, nalgebra,
@@ -74,6 +74,46 @@ fn sound_samples_pass_and_swapped_axes_are_named() {
         // x came from y, y from z, z from x.
         assert_eq!(hint, "(z, x, y)");
     }
+}
+
+/// A body that rests for three seconds and then rocks about two axes on the spot, in closed form; its gyroscope has a bias.
+fn rocking(gyro_bias: Vector3<f64>) -> Vec<Imu> {
+    let sample = |k: u32| {
+        let time = f64::from(k) / 200.0;
+        let since = (time - 3.0).max(0.0);
+        let moving = f64::from(u8::from(time > 3.0));
+        let (roll, pitch) = (0.9 * (0.5 * since).sin(), 0.7 * (0.8 * since).sin());
+        let (roll_rate, pitch_rate) = (0.45 * (0.5 * since).cos() * moving, 0.56 * (0.8 * since).cos() * moving);
+        let about_x = Rotation3::from_axis_angle(&Vector3::x_axis(), roll);
+        let about_y = Rotation3::from_axis_angle(&Vector3::y_axis(), pitch);
+        let gyro = about_y.inverse() * Vector3::new(roll_rate, 0.0, 0.0) + Vector3::new(0.0, pitch_rate, 0.0);
+        let accel = (about_x * about_y).inverse() * Vector3::new(0.0, 0.0, GRAVITY);
+        Imu { stamp: Stamp::from_secs(time).unwrap(), gyro: gyro + gyro_bias, accel }
+    };
+    (0..12_000).map(sample).collect()
+}
+
+#[test]
+fn a_gyroscope_with_a_bias_is_sound_and_its_axes_are_found_all_the_same() {
+    let samples = rocking(Vector3::new(0.08, -0.07, 0.1));
+    let sound = validate_samples(&samples, 200.0, GRAVITY).unwrap();
+    assert!(sound.doubts.is_empty(), "{sound:?}");
+    let cycle = Matrix3::new(0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0);
+    let spoilt = validate_samples(&with(&samples, |s| Imu { accel: cycle * s.accel, ..*s }), 200.0, GRAVITY);
+    assert!(is_named(&spoilt), "{spoilt:?}");
+}
+
+/// A level body carried round a circle: 12.7 m/s² all the time.
+#[test]
+fn a_hard_turn_is_flown_and_not_refused() {
+    let sample = |k: u32| {
+        let angle = 2.0 * f64::from(k) / 200.0;
+        let accel = Vector3::new(8.0 * angle.cos(), 8.0 * angle.sin(), GRAVITY);
+        Imu { stamp: Stamp::from_secs(f64::from(k) / 200.0).unwrap(), gyro: Vector3::zeros(), accel }
+    };
+    let samples: Vec<Imu> = (0..12_000).map(sample).collect();
+    let found = validate_samples(&samples, 200.0, GRAVITY).unwrap();
+    assert!(matches!(found.doubts[..], [ImuDoubt::Force { .. }]), "{found:?}");
 }
 
 #[test]
