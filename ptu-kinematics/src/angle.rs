@@ -7,7 +7,7 @@ use nalgebra::{Rotation3, Vector3};
 /// ```
 /// use std::f64::consts::PI;
 /// assert!((ptu_kinematics::wrap(1.5 * PI) + 0.5 * PI).abs() < 1e-15);
-/// assert_eq!(ptu_kinematics::wrap(-PI), PI);
+/// assert_eq!((ptu_kinematics::wrap(-PI), ptu_kinematics::wrap(PI)), (PI, PI));
 /// ```
 pub fn wrap(angle: f64) -> f64 {
     let turns = (angle / std::f64::consts::TAU).round();
