@@ -157,6 +157,11 @@ impl PaintSurface {
         Some((command.point, -command.direction))
     }
 
+    /// Vertices of the disk, metres, as files and recordings hold them.
+    pub fn vertices(&self) -> Vec<[f32; 3]> {
+        self.disk().positions().iter().map(|p| p.map(|c| c as f32)).collect()
+    }
+
     /// Mean normal over the chart: the side from which a picture of it is taken. Short for surfaces that close in.
     pub fn facing(&self) -> Vector3<f64> {
         let normals = self

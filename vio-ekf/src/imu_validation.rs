@@ -6,6 +6,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use crate::error::invalid;
 use crate::imu_rest::bias_at_rest;
+use crate::signed_axes::{RADIANS_PER_DEGREE, axis_names, signed_permutations};
 use crate::{AxesReading, Error, Imu, so3};
 
 /// Length of the windows over which the gyroscope is integrated, s: short enough for one without calibration.
@@ -29,8 +30,6 @@ const DOUBTFUL: f64 = 2.5;
 /// Mean rate from which rates may be degrees per second, rad/s. Slower ones would be no rotation at all then, and the force of a
 /// multirotor stays along its own axis: without rotation it would always seem to agree.
 const FAST: f64 = 3.0;
-/// Degrees in a radian, the other unit of rates.
-const RADIANS_PER_DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// Rates that are read otherwise: as they are, negated, and both taken for degrees per second.
 const RATE_FACTORS: [f64; 4] = [1.0, -1.0, RADIANS_PER_DEGREE, -RADIANS_PER_DEGREE];
 
@@ -221,7 +220,7 @@ fn check_gravity(windows: &[Window], gravity: f64) -> Result<Vec<ImuDoubt>, Erro
     let as_given = departure(&Matrix3::identity(), 0);
     let rate = windows.iter().map(|window| window.rate).sum::<f64>() / windows.len() as f64;
     let factors = if rate > FAST { RATE_FACTORS.len() } else { 2 };
-    let readings = quarter_turns().into_iter().flat_map(|axes| (0..factors).map(move |k| (axes, k)));
+    let readings = quarter_turns().flat_map(|axes| (0..factors).map(move |k| (axes, k)));
     let best =
         readings.map(|(axes, reading)| (departure(&axes, reading), axes, reading)).min_by(|a, b| a.0.total_cmp(&b.0));
     let Some((least, axes, reading)) = best.filter(|(least, ..)| *least < CLEARER * as_given) else {
@@ -245,29 +244,13 @@ fn check_gravity(windows: &[Window], gravity: f64) -> Result<Vec<ImuDoubt>, Erro
 }
 
 /// The 24 rotations that map axes to axes. Their mirror images scatter gravity alike: they turn the world upside down.
-fn quarter_turns() -> Vec<Matrix3<f64>> {
-    let mut turns = Vec::with_capacity(24);
-    for permutation in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
-        for signs in 0..8_u8 {
-            let mut axes = Matrix3::zeros();
-            for (column, row) in permutation.into_iter().enumerate() {
-                axes[(row, column)] = if signs >> column & 1 == 0 { 1.0 } else { -1.0 };
-            }
-            if axes.determinant() > 0.0 {
-                turns.push(axes);
-            }
-        }
-    }
-    turns
+fn quarter_turns() -> impl Iterator<Item = Matrix3<f64>> {
+    signed_permutations().filter(|axes| axes.determinant() > 0.0)
 }
 
 /// What the accelerometer's three readings would have to be, in terms of those given. With all signs turned it is the same world
 /// upside down: the one with fewer is the likelier mistake.
 fn names(axes: &Matrix3<f64>) -> String {
     let axes = if axes.sum() < 0.0 { -axes } else { *axes };
-    let row = |i: usize| {
-        let column = (0..3).find(|&c| axes[(i, c)] != 0.0).unwrap_or(i);
-        format!("{}{}", if axes[(i, column)] < 0.0 { "-" } else { "" }, ["x", "y", "z"][column])
-    };
-    format!("({}, {}, {})", row(0), row(1), row(2))
+    axis_names(&axes)
 }

@@ -74,6 +74,7 @@ mod imu_rest;
 mod imu_validation;
 mod lie;
 mod samples;
+mod signed_axes;
 pub mod sim;
 mod spline;
 mod stamp;

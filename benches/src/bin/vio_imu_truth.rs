@@ -8,6 +8,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use nalgebra::{DMatrix, DVector, Vector3};
 use paintcopter_benches::sequences::{REAL_IMU, motion, real_samples};
+use paintcopter_examples::exit::exit_code;
 use serde_json::json;
 use vio_ekf::{Imu, Motion, Spline, so3};
 
@@ -24,13 +25,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code("vio_imu_truth", run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {

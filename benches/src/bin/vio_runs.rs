@@ -11,6 +11,7 @@ use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use paintcopter_benches::Rng;
 use paintcopter_benches::frames::Frames;
 use paintcopter_benches::sequences::{REAL_IMU, SEQUENCES, cameras, motion, real_samples};
+use paintcopter_examples::exit::exit_code;
 use serde_json::json;
 use vio_ekf::sim::{ImuModel, Scenario, SimulatedCamera, Simulation};
 use vio_ekf::{
@@ -64,13 +65,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code("vio_runs", run(&Arguments::parse()))
 }
 
 /// Squared errors in units of the claimed covariance: position, attitude, velocity, both biases.

@@ -3,14 +3,9 @@
 use std::process::ExitCode;
 
 use clap::Parser;
+use paintcopter_examples::exit::exit_code;
 use paintcopter_examples::handheld::{Arguments, run};
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("handheld: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code("handheld", run(&Arguments::parse()))
 }

@@ -3,14 +3,9 @@
 use std::process::ExitCode;
 
 use clap::Parser;
+use paintcopter_examples::exit::exit_code;
 use paintcopter_examples::paint_image::{Arguments, run};
 
 fn main() -> ExitCode {
-    match run(Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("paint-image: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code("paint-image", run(Arguments::parse()))
 }

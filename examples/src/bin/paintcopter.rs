@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
+use paintcopter_examples::exit::exit_code;
 use paintcopter_examples::mission::{Mission, preview, save};
 use paintcopter_examples::mission_arguments::MissionArguments;
 
@@ -23,13 +24,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("paintcopter: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code("paintcopter", run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
+use paintcopter_examples::exit::exit_code;
 use paintcopter_examples::mission::{PlannedMission, save_plan};
 use paintcopter_examples::mission_arguments::MissionArguments;
 
@@ -24,13 +25,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("plan: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code("plan", run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {

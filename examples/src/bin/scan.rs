@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::{Parser, ValueEnum};
+use paintcopter_examples::exit::exit_code;
 use paintcopter_examples::mesh_io::{PlyMesh, write_ply};
 use paintcopter_examples::report::save_figures;
 use paintcopter_examples::scan::{
@@ -103,13 +104,7 @@ enum DeviceName {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("scan: {}", in_options(&error.to_string()));
-            ExitCode::FAILURE
-        }
-    }
+    exit_code("scan", run(&Arguments::parse()).map_err(|error| in_options(&error.to_string())))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {

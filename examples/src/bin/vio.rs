@@ -3,14 +3,9 @@
 use std::process::ExitCode;
 
 use clap::Parser;
+use paintcopter_examples::exit::exit_code;
 use paintcopter_examples::vio::{Arguments, execute};
 
 fn main() -> ExitCode {
-    match execute(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("vio: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code("vio", execute(&Arguments::parse()))
 }

@@ -1,138 +1,31 @@
 //! The loop: poses a hundred times a second, a decision ten times a second, and the true paint beside the believed one (handheld paper,
 //! Section VI-B).
 
+mod log;
+mod settings;
+
 use std::collections::VecDeque;
 use std::time::Instant;
 
 use nalgebra::{Isometry3, Point3};
 use paint_planner::gantry::{
-    GantryPlan, GantryState, PoseFilter, PoseFilterSettings, RangeReading, Registration, RegistrationSettings,
-    RobotMotion, RoundedPath, Segment, plan_gantry, refine,
+    GantryState, PoseFilter, RangeReading, Registration, RobotMotion, RoundedPath, Segment, plan_gantry, refine,
 };
 use paint_sim::droplets::{Coverage, Droplets, StepHits, Sweep};
-use paint_sim::gantry_robot::{
-    InertialSensor, InertialSensorSettings, PoseSensor, PoseSensorSettings, RangeSensor, RangeSensorSettings, Stepper,
-    StepperSettings, Valve, ValveSettings,
-};
+use paint_sim::gantry_robot::{InertialSensor, PoseSensor, RangeSensor, Stepper, Valve};
 use paint_sim::spray::QUANTUM;
 
 use super::error::HandheldError;
 use super::forecast::{DensityDevice, Forecast, PaintJob};
 use super::object::PaintObject;
 use crate::adapters::MeshSurface;
+pub use log::{SessionLog, Tick};
+pub use settings::SessionSettings;
 
 /// Number of the first set of droplets that falls on the true object: the believed ones have their own.
 const TRUE_SETS: u64 = 1000;
 /// Parts of a tick in which the true nozzle is simulated.
 const PARTS: usize = 2;
-
-/// Sensors, actuators and what is wrong with them.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SessionSettings {
-    /// Marker tracking.
-    pub pose_sensor: PoseSensorSettings,
-    /// Inertial sensor; `None`: the camera alone, as in the paper.
-    pub inertial_sensor: Option<InertialSensorSettings>,
-    /// What the filter believes of them.
-    pub filter: PoseFilterSettings,
-    /// Largest standard deviation of the believed place at which the valve may open, m.
-    pub max_position_sigma: f64,
-    /// Beams towards the object.
-    pub range_sensor: RangeSensorSettings,
-    /// Correction of the object's place by them; `None` believes the model.
-    pub registration: Option<RegistrationSettings>,
-    /// Where the object stands against where the model says.
-    pub world_from_model: Isometry3<f64>,
-    /// The slide.
-    pub stepper: StepperSettings,
-    /// Acceleration of the rounded corners, m/s^2.
-    pub corner_acceleration: f64,
-    /// The valve.
-    pub valve: ValveSettings,
-    /// Seed of all noise.
-    pub seed: u64,
-}
-
-impl Default for SessionSettings {
-    fn default() -> Self {
-        Self {
-            pose_sensor: PoseSensorSettings::default(),
-            inertial_sensor: Some(InertialSensorSettings::default()),
-            filter: PoseFilterSettings::default(),
-            max_position_sigma: 1.2e-3,
-            range_sensor: RangeSensorSettings::default(),
-            registration: Some(RegistrationSettings::default()),
-            world_from_model: Isometry3::identity(),
-            stepper: StepperSettings::default(),
-            corner_acceleration: 5.0,
-            valve: ValveSettings::default(),
-            seed: 1,
-        }
-    }
-}
-
-/// The robot at one moment.
-#[derive(Debug, Clone, Copy)]
-pub struct Tick {
-    /// Seconds since the start.
-    pub time: f64,
-    /// True pose of the robot.
-    pub world_from_robot: Isometry3<f64>,
-    /// True position of the nozzle on its slide, m.
-    pub position: f64,
-    /// Share of the tick in which paint flies.
-    pub open: f64,
-    /// Whether the pose was measured.
-    pub tracked: bool,
-    /// Where the spray axis meets the object.
-    pub hit: Option<Point3<f64>>,
-}
-
-/// What happened.
-pub struct SessionLog {
-    /// Every hundredth of a second.
-    pub ticks: Vec<Tick>,
-    /// Messages with their times, s.
-    pub messages: Vec<(f64, String)>,
-    /// The paint on the true object.
-    pub truth: Coverage,
-    /// The paint as the robot believes it to be.
-    pub belief: Coverage,
-    /// Paint that left the nozzle, m^3.
-    pub emitted: f64,
-    /// Decisions, wall-clock ms.
-    pub decision_ms: Vec<f64>,
-    /// Decisions in which nothing could be painted within the horizon.
-    pub idle_decisions: usize,
-    /// Decisions that fell out because the robot was not tracked.
-    pub held_decisions: usize,
-    /// Ticks without a pose.
-    pub lost_ticks: usize,
-    /// Longest time between the loss of the markers and a shut valve's command, s.
-    pub shut_after_loss: f64,
-    /// Times that the nozzle ran into a limit switch.
-    pub limit_hits: usize,
-    /// Times that the valve was switched.
-    pub valve_switches: usize,
-    /// Error of the believed place of the object at the end, m.
-    pub registration_error: f64,
-    /// Root mean square error of the believed position of the robot while tracked, m.
-    pub position_error_rms: f64,
-    /// The decision with the largest score, with the paint as it was.
-    pub best_plan: Option<GantryPlan>,
-}
-
-impl SessionLog {
-    /// Time from one moment of the log to the next, s.
-    pub fn tick(&self) -> f64 {
-        self.ticks.get(1).map_or(0.0, |second| second.time - self.ticks[0].time)
-    }
-
-    /// Length of the painting, s.
-    pub fn duration(&self) -> f64 {
-        self.tick() * self.ticks.len() as f64
-    }
-}
 
 /// The robot's software and hardware while it paints.
 struct Session<'a> {

@@ -183,6 +183,8 @@ pub fn write_ply(path: &Path, mesh: &PlyMesh) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand_xoshiro::SplitMix64;
+    use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 
     const HEADER: &str = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
                           element face 1\nproperty list uchar int vertex_indices\nend_header\n";
@@ -215,15 +217,8 @@ mod tests {
     #[test]
     fn mutated_files_never_panic() {
         let count: u64 = std::env::var("MUTATIONS").map_or(20_000, |text| text.parse().unwrap());
-        let mut state = 11_u64;
-        let mut random = move |below: usize| {
-            // splitmix64.
-            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut z = state;
-            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            ((z ^ (z >> 31)) % below.max(1) as u64) as usize
-        };
+        let mut generator = SplitMix64::seed_from_u64(11);
+        let mut random = move |below: usize| (generator.next_u64() % below.max(1) as u64) as usize;
         let (originals, mut read) = (files(), 0);
         for k in 0..count {
             let mut bytes = originals[k as usize % 2].clone();

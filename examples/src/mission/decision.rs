@@ -15,6 +15,7 @@ use crate::appearance::{Appearance, UNIT_THICKNESS};
 use crate::design::Design;
 use crate::mesh_io::TriangleMesh;
 use crate::progress::Stage;
+use crate::recording::PaintStyle;
 use crate::surface::PaintSurface;
 
 /// Flight logs are most of what a mission keeps: the built-in wall of 10.6 m² takes 200 MB with texels of 1.25 cm.
@@ -85,6 +86,15 @@ impl Decision {
         let wanted = self.wanted.data().iter().zip(&self.in_reach).zip(&self.surface.texels.area_m2);
         let depth = |ink: f64| self.appearance.ink().inverse(ink) * UNIT_THICKNESS;
         wanted.filter(|((_, reached), _)| !**reached).map(|((ink, _), area)| depth(*ink) * area).sum()
+    }
+
+    /// How the paint is drawn in a recording.
+    pub(super) fn paint_style(&self) -> PaintStyle {
+        PaintStyle {
+            width: 2.0 * self.settings.spot,
+            max_flow: self.settings.planner.timing.max_flow,
+            colour: self.appearance.srgb(1.0),
+        }
     }
 
     /// 1 on texels that the robot can serve, 0 elsewhere.

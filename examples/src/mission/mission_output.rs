@@ -11,15 +11,15 @@ use tsdf_hash::Mesh;
 use super::error::MissionError;
 use super::figures::report;
 use super::inspect::inspect;
-use super::path_view::{save_path, vertex_colours};
+use super::path_view::save_path;
 use super::run::Mission;
-use super::shading::shading;
+use super::shading::{shading, vertex_colours};
 use super::trajectory_table::trajectory_table;
 use super::view::{camera, picture_of, view};
 use crate::mesh_io::{PlyMesh, write_ply};
 use crate::pictures::{Panel, Rgb, save_curves, save_error_map};
 use crate::progress::Stage;
-use crate::recording::{ColouredMesh, PaintStyle, RobotState, save_recording};
+use crate::recording::{ColouredMesh, RobotState, save_recording};
 use crate::textured_mesh::{TexturedMesh, with_gutter};
 
 /// Colour beside the surface in the texture pictures.
@@ -36,8 +36,7 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
     save_textures(mission, folder)?;
     stage.share(0.2);
     let colours = vertex_colours(&mission.decision, &mission.painted_depth());
-    let positions: Vec<[f32; 3]> =
-        mission.decision.surface.disk().positions().iter().map(|p| p.map(|c| c as f32)).collect();
+    let positions = mission.decision.surface.vertices();
     let faces = mission.decision.surface.disk().faces();
     let ply = folder.join("surface.ply");
     write_ply(&ply, &PlyMesh { positions: &positions, normals: None, colours: &colours, faces })
@@ -164,13 +163,7 @@ fn save_mcap(mission: &Mission, folder: &Path, mesh: &ColouredMesh) -> Result<()
         }));
         start += f.plan.trajectory.duration();
     }
-    let settings = &mission.decision.settings;
-    let paint = PaintStyle {
-        width: 2.0 * settings.spot,
-        max_flow: settings.planner.timing.max_flow,
-        colour: mission.decision.appearance.srgb(1.0),
-    };
-    save_recording(&folder.join("mission.mcap"), mesh, paint, &states, &log_lines)?;
+    save_recording(&folder.join("mission.mcap"), mesh, mission.decision.paint_style(), &states, &log_lines)?;
     Ok(())
 }
 

@@ -34,15 +34,3 @@ pub(super) fn save_path(
     let scene = Scene { picture: picture_of(&frame), depth: &frame.depth, project: &project };
     Ok(save_scene(file, scene, &lines)?)
 }
-
-/// Colour of every vertex of the disk with `depth` of paint on its texels.
-pub(super) fn vertex_colours(decision: &Decision, depth: &Image) -> Vec<[u8; 3]> {
-    let texel = decision.settings.texel;
-    let (width, height) = (depth.width(), depth.height());
-    let at = |uv: &[f64; 2]| {
-        let x = ((uv[0] / texel) as usize).min(width - 1);
-        let y = (((height as f64 * texel - uv[1]) / texel) as usize).min(height - 1);
-        decision.appearance.srgb(depth.at(x, y))
-    };
-    decision.surface.chart.uv().iter().map(at).collect()
-}

@@ -12,17 +12,16 @@ use super::decision::Decision;
 use super::error::MissionError;
 use super::figures::{mean, open_time};
 use super::mission_output::{RECORDING_STEP, write};
-use super::path_view::{save_path, vertex_colours};
+use super::path_view::save_path;
 use super::plan::path_length;
 use super::planned_mission::{PlannedMission, share_out_of_reach};
 use super::preview::expected_depth;
+use super::shading::vertex_colours;
+use super::trajectory_table::{TRAJECTORY_STEP, cells};
 use crate::appearance::DENSITY;
 use crate::progress::Stage;
-use crate::recording::{ColouredMesh, PaintStyle, RobotState, save_recording};
+use crate::recording::{ColouredMesh, RobotState, save_recording};
 use crate::report::save_figures;
-
-/// Seconds between two rows of the table.
-const TABLE_STEP: f64 = 0.05;
 
 /// The figures of a plan. Flat, SI units in the names.
 #[derive(Debug, Clone, Serialize)]
@@ -111,7 +110,7 @@ fn setpoints(plan: &Plan, step: f64) -> impl Iterator<Item = (f64, Setpoint)> {
     (0..=steps).map(move |k| (k as f64 * step, plan.setpoint(k as f64 * step)))
 }
 
-/// One row every [`TABLE_STEP`] seconds; layers follow each other.
+/// One row every [`TRAJECTORY_STEP`] seconds; layers follow each other.
 fn table(mission: &PlannedMission) -> String {
     let mut text = String::from(
         "time_s,layer,x_m,y_m,z_m,heading_rad,vx_m_per_s,vy_m_per_s,vz_m_per_s,pan_rad,tilt_rad,flow_m3_per_s,\
@@ -119,13 +118,12 @@ fn table(mission: &PlannedMission) -> String {
     );
     let mut start = 0.0;
     for (layer, (_, plan)) in mission.layers().enumerate() {
-        for (time, s) in setpoints(plan, TABLE_STEP) {
+        for (time, s) in setpoints(plan, TRAJECTORY_STEP) {
             let (p, v) = (s.sample.position, s.sample.velocity);
             let row =
                 [p.x, p.y, p.z, s.sample.heading, v.x, v.y, v.z, s.pan, s.tilt, s.flow, s.aim.x, s.aim.y, s.aim.z];
-            let numbers: Vec<String> = row.iter().map(|value| format!("{value:.9}")).collect();
             // Writing to a string cannot fail.
-            let _ = writeln!(text, "{:.9},{layer},{}", start + time, numbers.join(","));
+            let _ = writeln!(text, "{},{layer},{}", cells(&[start + time]), cells(&row));
         }
         start += plan.trajectory.duration();
     }
@@ -134,22 +132,16 @@ fn table(mission: &PlannedMission) -> String {
 
 fn save_mcap(mission: &PlannedMission, colours: &[[u8; 3]], file: &Path) -> Result<(), MissionError> {
     let decision = &mission.decision;
-    let positions: Vec<[f32; 3]> = decision.surface.disk().positions().iter().map(|p| p.map(|c| c as f32)).collect();
+    let positions = decision.surface.vertices();
     let (mut states, mut log, mut start) = (Vec::new(), Vec::new(), 0.0);
     for (k, (route, plan)) in mission.layers().enumerate() {
         log.push((start, format!("layer {}: {} strokes, as planned", k + 1, route.strokes)));
         states.extend(setpoints(plan, RECORDING_STEP).map(|(time, s)| state(decision, start + time, &s)));
         start += plan.trajectory.duration();
     }
-    let settings = &decision.settings;
-    let paint = PaintStyle {
-        width: 2.0 * settings.spot,
-        max_flow: settings.planner.timing.max_flow,
-        colour: decision.appearance.srgb(1.0),
-    };
     let faces = decision.surface.disk().faces();
     let mesh = ColouredMesh { positions: &positions, faces, colours, bare: decision.appearance.srgb(0.0) };
-    Ok(save_recording(file, &mesh, paint, &states, &log)?)
+    Ok(save_recording(file, &mesh, decision.paint_style(), &states, &log)?)
 }
 
 /// The robot as the plan has it: level, with the pan and tilt of the reference.

@@ -1,4 +1,4 @@
-//! How the painted surface looks where a ray hits it.
+//! How the painted surface looks: where a ray hits it, and at its vertices.
 
 use paint_sim::{Hit, Shading};
 use uv_param::SurfacePoint;
@@ -16,6 +16,18 @@ pub(super) fn shading(decision: &Decision, painted: &paint_net::Image, hit: &Hit
     let albedo = decision.appearance.linear(bilinear(painted, x, y)).map(|c| c as f32);
     let at = SurfacePoint { face: hit.face, barycentric: [1.0 - a - b, a, b] };
     Shading { albedo, normal: decision.surface.chart.smooth_normal(at).into_inner() }
+}
+
+/// Colour of every vertex of the disk with `depth` of paint on its texels.
+pub(super) fn vertex_colours(decision: &Decision, depth: &paint_net::Image) -> Vec<[u8; 3]> {
+    let texel = decision.settings.texel;
+    let (width, height) = (depth.width(), depth.height());
+    let at = |uv: &[f64; 2]| {
+        let x = ((uv[0] / texel) as usize).min(width - 1);
+        let y = (((height as f64 * texel - uv[1]) / texel) as usize).min(height - 1);
+        decision.appearance.srgb(depth.at(x, y))
+    };
+    decision.surface.chart.uv().iter().map(at).collect()
 }
 
 /// The texel that a ray hits; `None` beside the disk.

@@ -3,7 +3,7 @@
 use super::run::Mission;
 
 /// Seconds between two rows.
-const TRAJECTORY_STEP: f64 = 0.05;
+pub(super) const TRAJECTORY_STEP: f64 = 0.05;
 
 /// One row every [`TRAJECTORY_STEP`] seconds: what was planned, then what was flown.
 pub(super) fn trajectory_table(mission: &Mission) -> String {
@@ -24,11 +24,16 @@ pub(super) fn trajectory_table(mission: &Mission) -> String {
                 &[q.x, q.y, q.z, q.w, s.pan_tilt[0], s.pan_tilt[1]],
             ]
             .concat();
-            let numbers: Vec<String> = row.iter().map(|v| format!("{v:.9}")).collect();
-            text += &numbers.join(",");
+            text += &cells(&row);
             text.push('\n');
         }
         start += f.plan.trajectory.duration();
     }
     text
+}
+
+/// Numbers between commas, to the nanometre and the nanosecond.
+pub(super) fn cells(row: &[f64]) -> String {
+    let numbers: Vec<String> = row.iter().map(|value| format!("{value:.9}")).collect();
+    numbers.join(",")
 }

@@ -63,21 +63,23 @@ impl SprayKernel {
     /// Adds a spray to a canvas: `v exp(-|p - μ|²/2σ²)` with the spray's own `σ`, wherever it lies, cut at `±cut·σ`. What
     /// falls beside the canvas is lost.
     pub fn stamp(&self, spray: &Spray, canvas: &mut Image) {
-        let reach = self.cut * spray.sigma;
-        let profile = |centre: f64, n: usize| -> (usize, Vec<f64>) {
-            let first = (centre - reach).ceil().max(0.0) as usize;
-            let end = ((centre + reach).floor() + 1.0).clamp(0.0, n as f64) as usize;
-            let tap = |p: usize| (-(p as f64 - centre).powi(2) / (2.0 * spray.sigma * spray.sigma)).exp();
-            (first, (first..end).map(tap).collect())
-        };
-        let (x0, across) = profile(spray.x, canvas.width());
-        let (y0, down) = profile(spray.y, canvas.height());
+        let (x0, across) = self.profile(spray.x, spray.sigma, canvas.width());
+        let (y0, down) = self.profile(spray.y, spray.sigma, canvas.height());
         let width = canvas.width();
         for (y, tap) in (y0..).zip(down) {
             for (depth, t) in canvas.data_mut()[y * width..].iter_mut().skip(x0).zip(&across) {
                 *depth += spray.volume * tap * t;
             }
         }
+    }
+
+    /// Profile along an axis of `n` pixels of a spray of deviation `sigma`: its first pixel, and its value there and on.
+    pub(crate) fn profile(&self, centre: f64, sigma: f64, n: usize) -> (usize, Vec<f64>) {
+        let reach = self.cut * sigma;
+        let first = (centre - reach).ceil().max(0.0) as usize;
+        let end = ((centre + reach).floor() + 1.0).clamp(0.0, n as f64) as usize;
+        let tap = |p: usize| (-(p as f64 - centre).powi(2) / (2.0 * sigma * sigma)).exp();
+        (first, (first..end).map(tap).collect())
     }
 
     /// The profile squared, for sums over squared footprints.

@@ -16,6 +16,9 @@ use distance::distances;
 use sprays::PlacedSprays;
 use trace::{Line, trace};
 
+/// Share of the darkest ink below which nothing is worth a row of its own beside lines.
+const LEFT_OVER: f64 = 0.02;
+
 /// Non-negative deconvolution whose sprays lie along the lines of the picture: what is thin and dark is painted in strokes along
 /// its middle, everything else in rows as by [`Deconvolution`](crate::Deconvolution). Ours.
 ///
@@ -96,9 +99,6 @@ impl Painter for Centrelines {
         Ok(Painting { strokes, ..Painting::render(problem, sprays) })
     }
 }
-
-/// Share of the darkest ink below which nothing is worth a row of its own beside lines.
-const LEFT_OVER: f64 = 0.02;
 
 /// Ink that is wanted and not there yet, 0 beside the surface.
 fn missing_ink(problem: &PaintProblem, grid: &PaintGrid) -> Vec<f64> {

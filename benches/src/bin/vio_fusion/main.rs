@@ -12,18 +12,13 @@ use clap::Parser;
 use estimator::{Estimator, Way};
 use nalgebra::{Isometry3, Matrix3, Vector3};
 use paintcopter_benches::flight::{Flight, MapErrors, sway};
+use paintcopter_examples::exit::exit_code;
 use vio_ekf::{Odometry, nalgebra, so3};
 
 type AnyError = Box<dyn Error>;
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code("vio_fusion", run(&Arguments::parse()))
 }
 
 /// What is compared.

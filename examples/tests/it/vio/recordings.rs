@@ -6,6 +6,8 @@ use paintcopter_examples::vio::{
     Images, Overrides, Recording, RunSettings, SimulationSettings, camera_frames, evaluate_run, open_euroc,
     open_euroc_stereo, open_mcap, open_mcap_stereo, run, simulate,
 };
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 use vio_ekf::sim::SimulatedCamera;
 use vio_ekf::{Camera, Distortion, Stamp};
 
@@ -127,15 +129,8 @@ fn mutated_recordings_never_panic() {
         recompress(&s.0.join("recording.mcap"), &s.0.join("packed.mcap"), compression);
         originals.push(std::fs::read(s.0.join("packed.mcap")).unwrap());
     }
-    let mut state = 7_u64;
-    let mut random = move |below: usize| {
-        // splitmix64.
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % below.max(1) as u64) as usize
-    };
+    let mut generator = SplitMix64::seed_from_u64(7);
+    let mut random = move |below: usize| (generator.next_u64() % below.max(1) as u64) as usize;
     let file = s.0.join("mutated.mcap");
     let (mut read, mut images, mut slowest) = (0, 0, std::time::Duration::ZERO);
     for k in 0..count {

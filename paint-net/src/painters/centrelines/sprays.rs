@@ -21,17 +21,10 @@ struct Footprint {
 }
 
 impl Footprint {
-    /// `kernel.stamp` as a product of profiles.
     fn new(kernel: &SprayKernel, [x, y]: [f64; 2], (width, height): (usize, usize), allowed: bool) -> Self {
-        let (sigma, reach) = (kernel.sigma(), kernel.cut() * kernel.sigma());
-        let profile = |centre: f64, n: usize| {
-            let first = (centre - reach).ceil().max(0.0) as usize;
-            let end = ((centre + reach).floor() + 1.0).clamp(0.0, n as f64) as usize;
-            let tap = |p: usize| (-(p as f64 - centre).powi(2) / (2.0 * sigma * sigma)).exp();
-            (first, (first..end).map(tap).collect())
-        };
-        let (left, across) = profile(x, width);
-        let (top, down) = profile(y, height);
+        let sigma = kernel.sigma();
+        let (left, across) = kernel.profile(x, sigma, width);
+        let (top, down) = kernel.profile(y, sigma, height);
         Self { spray: Spray { x, y, volume: 1.0, sigma }, allowed, corner: [left, top], across, down }
     }
 }
