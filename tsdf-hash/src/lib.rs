@@ -105,7 +105,11 @@ pub use gpu::options::GpuOptions;
 pub use images::{ColourData, ColourView, DepthData, DepthView, Intrinsics};
 pub use keyframes::index::{KeyframeIndex, KeyframeMatch};
 #[cfg(feature = "pose-graph")]
-pub use loop_closure::{LoopCloser, LoopClosure, LoopReport, LoopSettings};
+pub use loop_closure::closer::LoopCloser;
+#[cfg(feature = "pose-graph")]
+pub use loop_closure::report::{LoopClosure, LoopReport};
+#[cfg(feature = "pose-graph")]
+pub use loop_closure::settings::LoopSettings;
 pub use map::Map;
 pub use mesh::incremental::IncrementalMesher;
 pub use mesh::obj::write_obj;
@@ -130,6 +134,7 @@ pub use storage::merge_policy::{MergeDecision, MergeImmediately, MergePolicy};
 pub use storage::reloaded::ReloadedBlocks;
 pub use tracking::drift::Drift;
 pub use tracking::outcome::{PosePrior, TrackingOutcome, TrackingStatus};
+pub use tracking::relocaliser::{Relocalisation, Relocaliser};
 pub use tracking::settings::TrackingSettings;
 pub use tracking::tracker::Tracker;
 pub use tsdf_layer::{BlockReader, TsdfLayer};

@@ -3,11 +3,13 @@
 pub(crate) mod directions;
 pub(crate) mod drift;
 pub(crate) mod image_level;
+pub(crate) mod likeness;
 pub(crate) mod model_points;
 pub(crate) mod normal_equations;
 pub(crate) mod outcome;
 pub(crate) mod pose;
 pub(crate) mod registration;
+pub(crate) mod relocaliser;
 pub(crate) mod residual_scale;
 pub(crate) mod residuals;
 pub(crate) mod settings;

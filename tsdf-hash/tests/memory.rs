@@ -6,6 +6,7 @@
 #![allow(unsafe_code, reason = "the counting allocator; see above")]
 #![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
 
+#[allow(dead_code, reason = "the scenes of the other tests, of which these need a part")]
 #[path = "it/scene.rs"]
 mod scene;
 

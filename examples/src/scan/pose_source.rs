@@ -3,7 +3,8 @@
 use cpu_time::ProcessTime;
 use nalgebra::Isometry3;
 use tsdf_hash::{
-    ColourView, DepthView, KeyframeIndex, PosePrior, Tracker, TrackingOutcome, TrackingSettings, TrackingStatus,
+    ColourView, DepthView, KeyframeIndex, PosePrior, Relocaliser, Tracker, TrackingOutcome, TrackingSettings,
+    TrackingStatus,
 };
 
 use super::error::ScanError;
@@ -35,9 +36,17 @@ pub struct TrackingMetrics {
     pub relocalisations: usize,
 }
 
+/// Where a frame was taken.
+pub(super) struct Located {
+    pub(super) world_from_camera: Isometry3<f64>,
+    /// Where the lost frames before it were taken, the latest last: as many as are sure now.
+    pub(super) earlier: Vec<Isometry3<f64>>,
+}
+
 /// Poses from the tracker: each frame against the map, from where the last two poses lead.
 pub(super) struct Odometry {
     tracker: Tracker,
+    relocaliser: Relocaliser,
     last: Option<Isometry3<f64>>,
     before: Option<Isometry3<f64>>,
     lost: bool,
@@ -51,9 +60,9 @@ pub(super) struct Odometry {
 impl Odometry {
     pub(super) fn new(map: &tsdf_hash::Settings, found_first: bool, fixed_map: bool) -> Result<Self, ScanError> {
         let settings = TrackingSettings { noise: map.noise, threads: map.threads, ..TrackingSettings::default() };
-        let tracker = Tracker::new(settings)?;
         Ok(Self {
-            tracker,
+            tracker: Tracker::new(settings)?,
+            relocaliser: Relocaliser::new(settings)?,
             last: None,
             before: None,
             lost: false,
@@ -83,44 +92,68 @@ impl Odometry {
         frame: &FrameFiles,
         depth: &DepthView,
         colour: Option<&ColourView>,
-    ) -> Result<Isometry3<f64>, ScanError> {
+    ) -> Result<Located, ScanError> {
         if self.last.is_none() && !self.found_first {
             let first = frame.world_from_camera.unwrap_or_else(Isometry3::identity);
             self.start(first);
-            return Ok(first);
+            return Ok(Located { world_from_camera: first, earlier: Vec::new() });
         }
         let start = ProcessTime::now();
-        let mut outcome = None;
-        if let Some(last) = self.last {
-            let onwards = self.before.map_or(last, |before| last * (before.inverse() * last));
-            let mut tracked = self.track(store, depth, colour, onwards)?;
-            if !tracked.is_tracked() && self.before.is_some() {
-                // The camera may have stopped.
-                tracked = self.track(store, depth, colour, last)?;
+        let tracked = self.follow(store, depth, colour)?;
+        let (outcome, earlier) = match tracked {
+            Some(outcome) if outcome.is_tracked() => {
+                self.relocaliser.reset();
+                (Some(outcome), Vec::new())
             }
-            outcome = Some(tracked);
-        }
-        if outcome.as_ref().is_none_or(|outcome| !outcome.is_tracked())
-            && let Some(found) = self.tracker.relocalise(store.dense(), depth, colour, keyframes)?
-        {
-            self.metrics.relocalisations += 1;
-            outcome = Some(found);
-            self.before = None;
-            self.last = None;
-        }
+            tracked => match self.relocaliser.add(store.dense(), depth, colour, keyframes)? {
+                Some(found) => {
+                    self.metrics.relocalisations += 1;
+                    self.last = None;
+                    (Some(found.outcome), found.earlier)
+                }
+                None => (tracked, Vec::new()),
+            },
+        };
         self.metrics.seconds.push(start.elapsed().as_secs_f64());
         let Some(outcome) = outcome else {
             self.metrics.losses += usize::from(!std::mem::replace(&mut self.lost, true));
-            return Err(ScanError::Lost("no keyframe of the map agrees with what it sees".into()));
+            return Err(ScanError::Lost(self.search_state().into()));
         };
         self.note(frame, &outcome);
         if !outcome.is_tracked() {
             self.before = None;
-            return Err(ScanError::Lost(reason(&outcome)));
+            return Err(ScanError::Lost(format!("{}; {}", reason(&outcome), self.search_state())));
         }
-        // After a jump the last two poses are no motion.
-        (self.before, self.last) = (self.last, Some(outcome.world_from_camera));
-        Ok(outcome.world_from_camera)
+        // After a jump the last two poses are no motion, but what led to the place where it is found is one.
+        self.before = earlier.last().copied().or(self.last);
+        self.last = Some(outcome.world_from_camera);
+        Ok(Located { world_from_camera: outcome.world_from_camera, earlier })
+    }
+
+    /// How far the search for a lost camera has come.
+    fn search_state(&self) -> &'static str {
+        match self.relocaliser.places() {
+            0 => "no keyframe of the map agrees with what it sees",
+            1 => "a place agrees; more frames, from other poses, must confirm it",
+            _ => "several places agree; more frames must tell them apart",
+        }
+    }
+
+    /// Tracks a frame from where the last two lead; `None` before the first.
+    fn follow(
+        &mut self,
+        store: &mut MapStore,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+    ) -> Result<Option<TrackingOutcome>, ScanError> {
+        let Some(last) = self.last else { return Ok(None) };
+        let onwards = self.before.map_or(last, |before| last * (before.inverse() * last));
+        let mut tracked = self.track(store, depth, colour, onwards)?;
+        if !tracked.is_tracked() && self.before.is_some() {
+            // The camera may have stopped.
+            tracked = self.track(store, depth, colour, last)?;
+        }
+        Ok(Some(tracked))
     }
 
     fn track(
@@ -135,6 +168,10 @@ impl Odometry {
         // A map that does not grow is left sooner or later: what little of it is in view then leads anywhere.
         if self.fixed_map && (outcome.coverage < LEAST_COVERAGE || !outcome.degenerate.is_empty()) {
             outcome.status = TrackingStatus::NoOverlap;
+        }
+        // A lost camera has moved, nobody knows where: what would do from one frame to the next is not enough.
+        if self.lost && outcome.agreement < self.tracker.settings().relocalise_agreement {
+            outcome.status = TrackingStatus::Disagreement;
         }
         Ok(outcome)
     }

@@ -76,20 +76,9 @@ impl Scan {
         let mut checkpoints = Checkpoints::new(settings.checkpoint.clone());
         for index in run.resumed..sequence.frames.len() {
             stage.share(index as f64 / sequence.frames.len() as f64);
-            match run.frame(index) {
-                Ok(correction) => {
-                    if let Some(correction) = correction {
-                        run.correct(&correction)?;
-                    }
-                }
-                Err(why) => {
-                    // What cannot be read names its file itself.
-                    let name = match why {
-                        ScanError::Sequence(_) => String::new(),
-                        _ => format!("{}: ", sequence.frames[index].depth),
-                    };
-                    run.skipped.push((index, format!("{name}{why}")));
-                }
+            match run.locate(index) {
+                Ok(placed) => run.take_all(placed)?,
+                Err(why) => run.skip(index, &why),
             }
             checkpoints.save(
                 run.store.map(),
@@ -124,6 +113,14 @@ impl Scan {
     }
 }
 
+/// A frame and where it was taken.
+struct Placed {
+    index: usize,
+    pose: Isometry3<f64>,
+    /// Of the present frame; those of earlier ones are read again.
+    images: Option<Images>,
+}
+
 /// A run under way.
 struct Run<'a> {
     sequence: &'a Sequence,
@@ -143,6 +140,8 @@ struct Run<'a> {
     trajectory: Trajectory,
     fused: Vec<(usize, Isometry3<f64>)>,
     skipped: Vec<(usize, String)>,
+    /// Frames since the camera was lost.
+    lost: Vec<usize>,
     metrics: ScanMetrics,
 }
 
@@ -177,6 +176,7 @@ impl<'a> Run<'a> {
             trajectory: progress.trajectory,
             fused: Vec::new(),
             skipped: Vec::new(),
+            lost: Vec::new(),
             metrics: ScanMetrics::default(),
         })
     }
@@ -189,28 +189,79 @@ impl<'a> Run<'a> {
         index.is_multiple_of(self.settings.ray_cast_every.max(1))
     }
 
-    /// Reads, places and fuses a frame; returns how the frames have to move, if a loop was found.
-    fn frame(&mut self, index: usize) -> Result<Option<Correction>, ScanError> {
+    /// Reads and places a frame, and those before it that have their poses only now; the latest last.
+    fn locate(&mut self, index: usize) -> Result<Vec<Placed>, ScanError> {
         let frame = &self.sequence.frames[index];
         // Before the images are read: what has no pose costs no time.
-        let given = if self.odometry.is_none() { Some(given_pose(frame)?) } else { None };
+        let given = if self.odometry.is_none() { Some(self.correction * given_pose(frame)?) } else { None };
         let images = self.images(frame)?;
         let (intrinsics, scale) = (self.sequence.intrinsics, self.sequence.depth_scale);
         let (depth, colour) = (images.depth(intrinsics, scale), images.colour(intrinsics));
-        let name = frame.depth.to_string();
+        let mut placed = Vec::new();
         let pose = match (&mut self.odometry, given) {
             (Some(odometry), _) => {
                 let keyframes = self.loops.as_ref().map_or(&self.keyframes, Loops::keyframes);
-                odometry.locate(&mut self.store, keyframes, frame, &depth, colour.as_ref())?
+                let found = odometry.locate(&mut self.store, keyframes, frame, &depth, colour.as_ref());
+                if matches!(found, Err(ScanError::Lost(_))) {
+                    self.lost.push(index);
+                }
+                let found = found?;
+                let lost = std::mem::take(&mut self.lost);
+                let known = &lost[lost.len().saturating_sub(found.earlier.len())..];
+                placed.extend(known.iter().zip(found.earlier).map(|(&index, pose)| Placed {
+                    index,
+                    pose,
+                    images: None,
+                }));
+                found.world_from_camera
             }
-            (None, Some(pose)) => self.correction * pose,
+            (None, Some(pose)) => pose,
             (None, None) => given_pose(frame)?,
         };
         // Twice as often as the map is cast: what is wrong is to be said early.
         let looked_at = index.is_multiple_of((self.settings.ray_cast_every / 2).max(1));
         if given.is_some() && looked_at && self.store.dense().blocks() > 0 {
-            self.metrics.quality.check(&name, &mut self.store, &depth, &pose)?;
+            self.metrics.quality.check(&frame.depth.to_string(), &mut self.store, &depth, &pose)?;
         }
+        placed.push(Placed { index, pose, images: Some(images) });
+        Ok(placed)
+    }
+
+    /// Takes frames one after the other, and corrects the map where one closes a loop. What fails halfway in a correction ends the run.
+    fn take_all(&mut self, placed: Vec<Placed>) -> Result<(), ScanError> {
+        let mut moved = Isometry3::identity();
+        for mut frame in placed {
+            let index = frame.index;
+            frame.pose = moved * frame.pose;
+            self.skipped.retain(|(skipped, _)| *skipped != index);
+            match self.take(frame) {
+                Ok(None) => {}
+                Ok(Some(correction)) => {
+                    self.correct(&correction)?;
+                    moved = correction.present * moved;
+                }
+                Err(why) => self.skip(index, &why),
+            }
+        }
+        Ok(())
+    }
+
+    fn skip(&mut self, index: usize, why: &ScanError) {
+        // What cannot be read names its file itself.
+        let name = match why {
+            ScanError::Sequence(_) => String::new(),
+            _ => format!("{}: ", self.sequence.frames[index].depth),
+        };
+        self.skipped.push((index, format!("{name}{why}")));
+    }
+
+    /// Fuses a frame, keeps its pose, and looks for loops; returns how the frames have to move, if one was found.
+    fn take(&mut self, Placed { index, pose, images }: Placed) -> Result<Option<Correction>, ScanError> {
+        let frame = &self.sequence.frames[index];
+        let images = images.map_or_else(|| self.images(frame), Ok)?;
+        let (intrinsics, scale) = (self.sequence.intrinsics, self.sequence.depth_scale);
+        let (depth, colour) = (images.depth(intrinsics, scale), images.colour(intrinsics));
+        let name = frame.depth.to_string();
         if self.settings.fuse {
             self.fuse(&name, &depth, colour.as_ref(), &pose)?;
         }

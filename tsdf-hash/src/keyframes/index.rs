@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::error::Error;
 use crate::file::byte_reader::ByteReader;
-use crate::images::{ColourView, DepthData, DepthView, check_pose};
-use crate::keyframes::compressed_depth::CompressedDepth;
+use crate::images::{ColourData, ColourView, DepthData, DepthView, check_pose};
+use crate::keyframes::compressed_frame::CompressedFrame;
 use crate::keyframes::keyframe::Keyframe;
 use crate::keyframes::small_image::{Likeness, SmallImage};
 use crate::map::Map;
@@ -14,18 +14,18 @@ use crate::tracking::image_level::ImageLevel;
 
 /// Pixels of the small image along a row.
 const WIDTH: usize = 40;
-/// Pixels of the stored depth along a row.
-const DEPTH_WIDTH: usize = 320;
+/// Pixels of the stored frame along a row.
+const FRAME_WIDTH: usize = 320;
 /// A keyframe is added this far from all others, metres and radians (ours): tracking starts well from half of it.
 const SPACING: [f64; 2] = [0.2, 0.2];
-/// Bytes of depth that are kept where nothing else is said.
+/// Bytes of frames that are kept where nothing else is said.
 const BUDGET: usize = 64 << 20;
-const MAGIC: &[u8; 8] = b"KEYFRAM1";
+const MAGIC: &[u8; 8] = b"KEYFRAM2";
 
 /// Keyframes of a scan: small images with the poses that they were taken from, to find a lost camera or a loop by, and compressed
-/// depth, to see a place again as it was.
+/// depth and grey, to see a place again as it was.
 ///
-/// Depth images that exceed the budget make room, every other one of the older half first; their small images stay.
+/// Frames that exceed the budget make room, every other one of the older half first; their small images stay.
 #[derive(Clone, Debug)]
 pub struct KeyframeIndex {
     keyframes: Vec<Keyframe>,
@@ -77,7 +77,7 @@ impl KeyframeIndex {
         self.bytes
     }
 
-    /// Keyframes whose depth had to make room.
+    /// Keyframes whose frames had to make room.
     pub fn without_depth(&self) -> usize {
         self.thinned
     }
@@ -128,9 +128,9 @@ impl KeyframeIndex {
         check_pose(world_from_camera)?;
         let image = small_image(depth, colour)?;
         let mut level = ImageLevel::default();
-        level.read(depth, None, depth.width.div_ceil(DEPTH_WIDTH).min(depth.height), [1e-3, 1e3]);
-        let compressed = CompressedDepth::new(&level);
-        let keyframe = Keyframe { world_from_camera: *world_from_camera, image, depth: Some(compressed) };
+        level.read(depth, colour, depth.width.div_ceil(FRAME_WIDTH).min(depth.height), [1e-3, 1e3]);
+        let frame = Some(CompressedFrame::new(&level));
+        let keyframe = Keyframe { world_from_camera: *world_from_camera, image, frame };
         self.bytes += keyframe.bytes();
         self.keyframes.push(keyframe);
         self.make_room();
@@ -163,18 +163,25 @@ impl KeyframeIndex {
         Ok(found.collect())
     }
 
-    /// The surface as some keyframes saw it: a map of their stored depth at their poses, of those that still have it.
+    /// The surface as some keyframes saw it: a map of their stored depth and grey, of those that still have it, at the poses that
+    /// all keyframes have in `world_from_camera`.
     ///
     /// # Errors
-    /// As [`Map::new`] and [`Map::integrate`]. A keyframe of which nothing can be fused is left out.
-    pub fn map_of(&self, keyframes: std::ops::Range<usize>, settings: Settings) -> Result<Map, Error> {
+    /// As [`Map::new`] and [`Map::integrate`]. A keyframe of which nothing can be fused, or that has no pose, is left out.
+    pub fn map_of(
+        &self,
+        keyframes: std::ops::Range<usize>,
+        world_from_camera: &[Isometry3<f64>],
+        settings: Settings,
+    ) -> Result<Map, Error> {
         let mut map = Map::new(settings)?;
-        for keyframe in self.keyframes.get(keyframes).unwrap_or_default() {
-            let Some(depth) = &keyframe.depth else { continue };
-            let Some(metres) = depth.metres() else { continue };
-            let data = DepthData::F32 { data: &metres };
-            let view = DepthView { width: depth.width, height: depth.height, data, intrinsics: depth.intrinsics };
-            match map.integrate(&view, None, &keyframe.world_from_camera) {
+        for (keyframe, pose) in self.keyframes.iter().zip(world_from_camera).take(keyframes.end).skip(keyframes.start) {
+            let Some(frame) = &keyframe.frame else { continue };
+            let (Some(metres), Some(rgb)) = (frame.metres(), frame.rgb()) else { continue };
+            let &CompressedFrame { width, height, intrinsics, .. } = frame;
+            let view = DepthView { width, height, data: DepthData::F32 { data: &metres }, intrinsics };
+            let colour = ColourView { width, height, data: ColourData::Rgb8(&rgb), intrinsics };
+            match map.integrate(&view, (!rgb.is_empty()).then_some(&colour), pose) {
                 Ok(_) | Err(Error::NoDepth { .. }) => {}
                 Err(error) => return Err(error),
             }
@@ -203,7 +210,7 @@ impl KeyframeIndex {
         for _ in 0..input.u64()? {
             let keyframe = Keyframe::read(&mut input)?;
             index.bytes += keyframe.bytes();
-            index.thinned += usize::from(keyframe.depth.is_none());
+            index.thinned += usize::from(keyframe.frame.is_none());
             index.keyframes.push(keyframe);
         }
         input.end()?;
@@ -214,14 +221,14 @@ impl KeyframeIndex {
     fn make_room(&mut self) {
         while self.bytes > self.max_bytes {
             // Of the older half every other one, then of those that are left.
-            let with: Vec<usize> = (0..self.keyframes.len()).filter(|k| self.keyframes[*k].depth.is_some()).collect();
+            let with: Vec<usize> = (0..self.keyframes.len()).filter(|k| self.keyframes[*k].frame.is_some()).collect();
             let older = &with[..with.len().div_ceil(2)];
             if older.is_empty() {
                 return;
             }
             for &k in older.iter().skip(usize::from(older.len() > 1)).step_by(2) {
                 let keyframe = &mut self.keyframes[k];
-                self.bytes -= keyframe.depth.take().map_or(0, |depth| depth.bytes.len());
+                self.bytes -= keyframe.frame.take().map_or(0, |frame| frame.bytes());
                 self.thinned += 1;
             }
         }

@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use crate::error::Error;
 use crate::file::byte_reader::ByteReader;
 use crate::images::Intrinsics;
-use crate::keyframes::compressed_depth::CompressedDepth;
+use crate::keyframes::compressed_frame::CompressedFrame;
 use crate::keyframes::small_image::SmallImage;
 
 /// A place: where it was seen from, what it looks like, how deep it is.
@@ -13,8 +13,8 @@ use crate::keyframes::small_image::SmallImage;
 pub(crate) struct Keyframe {
     pub(crate) world_from_camera: Isometry3<f64>,
     pub(crate) image: SmallImage,
-    /// `None` once it had to make room.
-    pub(crate) depth: Option<CompressedDepth>,
+    /// What it saw; `None` once it had to make room.
+    pub(crate) frame: Option<CompressedFrame>,
 }
 
 /// No image of a keyframe has more pixels along a side.
@@ -24,7 +24,7 @@ impl Keyframe {
     /// Bytes in memory, about.
     pub(crate) fn bytes(&self) -> usize {
         let image: usize = self.image.channels.iter().map(|channel| 4 * channel.len()).sum();
-        size_of::<Self>() + image + self.depth.as_ref().map_or(0, |depth| depth.bytes.len())
+        size_of::<Self>() + image + self.frame.as_ref().map_or(0, CompressedFrame::bytes)
     }
 
     pub(crate) fn write(&self, out: &mut Vec<u8>) {
@@ -38,14 +38,16 @@ impl Keyframe {
             u32s(&[channel.len() as u32]);
             u32s(&channel.iter().map(|v| v.to_bits()).collect::<Vec<_>>());
         }
-        let Some(depth) = &self.depth else {
+        let Some(frame) = &self.frame else {
             u32s(&[0, 0]);
             return;
         };
-        u32s(&[depth.width as u32, depth.height as u32, depth.most.to_bits(), depth.bytes.len() as u32]);
-        let Intrinsics { fx, fy, cx, cy } = depth.intrinsics;
+        let lengths = [frame.depth.len() as u32, frame.grey.len() as u32];
+        u32s(&[frame.width as u32, frame.height as u32, frame.most.to_bits(), lengths[0], lengths[1]]);
+        let Intrinsics { fx, fy, cx, cy } = frame.intrinsics;
         out.extend([fx, fy, cx, cy].into_iter().flat_map(f64::to_le_bytes));
-        out.extend_from_slice(&depth.bytes);
+        out.extend_from_slice(&frame.depth);
+        out.extend_from_slice(&frame.grey);
     }
 
     pub(crate) fn read(input: &mut ByteReader) -> Result<Self, Error> {
@@ -75,19 +77,20 @@ impl Keyframe {
         let image = SmallImage { width: width as usize, focal, channels };
         let (width, height) = (input.u32()?, input.u32()?);
         if width == 0 && height == 0 {
-            return Ok(Self { world_from_camera, image, depth: None });
+            return Ok(Self { world_from_camera, image, frame: None });
         }
         if width.max(height) > LARGEST || width.min(height) == 0 {
             return Err(input.bad());
         }
-        let (most, length) = (f32::from_bits(input.u32()?), input.u32()?);
+        let (most, lengths) = (f32::from_bits(input.u32()?), [input.u32()?, input.u32()?]);
         let [fx, fy, cx, cy] = [input.f64()?, input.f64()?, input.f64()?, input.f64()?];
-        let bytes = input.take(length as usize)?.to_vec();
+        let depth = input.take(lengths[0] as usize)?.to_vec();
+        let grey = input.take(lengths[1] as usize)?.to_vec();
         let intrinsics = Intrinsics { fx, fy, cx, cy };
-        let depth = CompressedDepth { width: width as usize, height: height as usize, intrinsics, most, bytes };
-        if !(most > 0.0 && most.is_finite()) || depth.metres().is_none() {
+        let frame = CompressedFrame { width: width as usize, height: height as usize, intrinsics, most, depth, grey };
+        if !(most > 0.0 && most.is_finite()) || frame.metres().is_none() || frame.rgb().is_none() {
             return Err(input.bad());
         }
-        Ok(Self { world_from_camera, image, depth: Some(depth) })
+        Ok(Self { world_from_camera, image, frame: Some(frame) })
     }
 }

@@ -29,6 +29,19 @@ impl Drift {
         self.chi_squared > CHI_SQUARED
     }
 
+    /// The same in a world that `there` leads to.
+    #[cfg(feature = "pose-graph")]
+    pub(crate) fn seen_from(mut self, there: &Isometry3<f64>) -> Self {
+        self.outcome.world_from_camera = there * self.outcome.world_from_camera;
+        let turn = there.rotation.to_rotation_matrix().into_inner();
+        let mut axes = Matrix6::zeros();
+        axes.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
+        axes.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
+        self.outcome.covariance = axes * self.outcome.covariance * axes.transpose();
+        self.corrected_from_drifted = there * self.corrected_from_drifted * there.inverse();
+        self
+    }
+
     /// Metres between the present camera and the corrected one.
     pub fn distance(&self, present: &Isometry3<f64>) -> f64 {
         (self.outcome.world_from_camera.translation.vector - present.translation.vector).norm()

@@ -47,6 +47,8 @@ pub struct TrackingOutcome {
     pub depth_scale: f64,
     /// Standard deviation of the intensities of partners, grey levels of 255; 0 if none were compared.
     pub intensity_scale: f64,
+    /// Correlation of the intensities of map and frame, `-1..=1`; `None` without colour, or where the map is of one grey.
+    pub likeness: Option<f64>,
     /// Iterations over all levels.
     pub iterations: usize,
 }

@@ -6,11 +6,11 @@ use crate::blocks::voxel_block::MAX_WEIGHT;
 use crate::dense_map::DenseMap;
 use crate::error::Error;
 use crate::images::{ColourView, DepthView, check_pose};
-use crate::keyframes::index::KeyframeIndex;
 use crate::ray_cast::settings::RayCastSettings;
 use crate::ray_cast::view::View;
 use crate::tracking::directions::{Directions, LEAST_SHARE};
 use crate::tracking::image_level::{ImageLevel, reduced};
+use crate::tracking::likeness::intensity_correlation;
 use crate::tracking::model_points::{Model, model_points};
 use crate::tracking::outcome::{PosePrior, TrackingOutcome, TrackingStatus};
 use crate::tracking::pose::{moved, step};
@@ -21,8 +21,6 @@ use crate::tracking::settings::TrackingSettings;
 /// Chi-squared of six degrees of freedom, 99 %.
 const CHI_SQUARED: f64 = 16.81;
 const LEVELS: usize = 3;
-/// Keyframes that a lost camera is tracked from (ours).
-const CANDIDATES: usize = 8;
 /// The information of all directions that the noise of the normals feigns, as a share of its variance and of the information of the best
 /// known direction (ours, from runs with known poses).
 const FEIGNED: f64 = 0.2;
@@ -33,8 +31,12 @@ const MAP_ERROR: [f64; 2] = [0.015, 0.15];
 const FINE_STRIDE: usize = 2;
 /// Least coverage of a frame that is believed to be found.
 const LEAST_COVERAGE: f64 = 0.5;
+/// Least correlation of its intensities with those of the map, where both have colour (ours).
+const LEAST_LIKENESS: f64 = 0.5;
 /// Largest distances of partners, one search after the other, as multiples of the setting (ours).
 const REACHES: [f64; 10] = [4.0, 2.0, 1.0, 1.0, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5];
+/// Least agreement after each of these searches; what is below leads nowhere (ours).
+const PROGRESS: [f64; 10] = [0.0, 0.3, 0.4, 0.5, 0.6, 0.6, 0.6, 0.6, 0.6, 0.6];
 /// A search that moves by less, radians and metres, is not repeated.
 const SETTLED: f64 = 1e-4;
 /// Directions with less than this share of the information of the best known one wait for a finer level (ours): what the
@@ -94,34 +96,9 @@ impl Tracker {
         self.track_view(&view, map.settings().voxel_size, depth, colour, prior)
     }
 
-    /// Finds a lost camera: the frame is tracked from the poses of the keyframes that look most like it, and the pose that agrees best with
-    /// the map is taken, if it agrees by [`TrackingSettings::relocalise_agreement`] and is fixed in all directions.
-    ///
-    /// # Errors
-    /// As [`track`](Self::track).
-    pub fn relocalise(
-        &mut self,
-        map: &mut dyn DenseMap,
-        depth: &DepthView,
-        colour: Option<&ColourView>,
-        keyframes: &KeyframeIndex,
-    ) -> Result<Option<TrackingOutcome>, Error> {
-        let starts = keyframes.candidates(depth, colour, CANDIDATES, |_| true)?;
-        let mut best: Option<TrackingOutcome> = None;
-        for start in starts {
-            let found = self.settle(map, depth, colour, &start.world_from_camera)?;
-            if let Some(found) = found
-                && best.as_ref().is_none_or(|best| found.agreement > best.agreement)
-            {
-                best = Some(found);
-            }
-        }
-        Ok(best)
-    }
-
     /// Tracks from a pose that may be off by more than a frame's motion: with distant partners first, then again from where that led,
     /// because the first model was seen from elsewhere. `None` unless the result is sure: tracked, agreeing by
-    /// [`TrackingSettings::relocalise_agreement`], of half of the frame at least, fixed in all directions.
+    /// [`TrackingSettings::relocalise_agreement`], of half of the frame at least, alike in colour, fixed in all directions.
     pub(crate) fn settle(
         &mut self,
         map: &mut dyn DenseMap,
@@ -132,7 +109,7 @@ impl Tracker {
         let (near, least) = (self.settings.max_distance, self.settings.min_agreement);
         let mut pose = *start;
         let mut last = None;
-        for reach in REACHES {
+        for (reach, progress) in REACHES.into_iter().zip(PROGRESS) {
             self.settings.max_distance = reach * near;
             // From afar little agrees at first.
             self.settings.min_agreement = if reach > 1.0 { 0.0 } else { least };
@@ -140,7 +117,7 @@ impl Tracker {
             let outcome = self.track(map, depth, colour, &prior);
             (self.settings.max_distance, self.settings.min_agreement) = (near, least);
             let outcome = outcome?;
-            if !outcome.is_tracked() {
+            if !outcome.is_tracked() || outcome.agreement < progress {
                 return Ok(None);
             }
             let moved = step(&pose, &outcome.world_from_camera).amax();
@@ -150,12 +127,24 @@ impl Tracker {
                 break;
             }
         }
-        let sure = |outcome: &TrackingOutcome| {
-            outcome.agreement >= self.settings.relocalise_agreement
-                && outcome.coverage >= LEAST_COVERAGE
-                && outcome.degenerate.is_empty()
-        };
-        Ok(last.filter(sure))
+        Ok(last.filter(|outcome| self.is_sure(outcome)))
+    }
+
+    /// Whether an outcome is believed where nothing was known before.
+    pub(crate) fn is_sure(&self, outcome: &TrackingOutcome) -> bool {
+        outcome.is_tracked()
+            && outcome.agreement >= self.settings.relocalise_agreement
+            && outcome.coverage >= LEAST_COVERAGE
+            && outcome.likeness.is_none_or(|likeness| likeness >= LEAST_LIKENESS)
+            && outcome.degenerate.is_empty()
+    }
+
+    /// Whether an outcome says that the camera is elsewhere: enough of the map was in view, and it is another one.
+    pub(crate) fn contradicts(&self, outcome: &TrackingOutcome) -> bool {
+        let unlike = outcome.likeness.is_some_and(|likeness| likeness < LEAST_LIKENESS);
+        outcome.overlap >= self.settings.min_overlap
+            && outcome.coverage >= LEAST_COVERAGE
+            && (outcome.agreement < self.settings.relocalise_agreement || unlike)
     }
 
     /// The map as the tracker wants it, seen from a pose.
@@ -304,6 +293,7 @@ impl Tracker {
             agreement,
             depth_scale: f64::from(search.scales.depth),
             intensity_scale: if last.intensity.total > 0 { f64::from(search.scales.intensity) } else { 0.0 },
+            likeness: intensity_correlation(comparison, &search.pose),
             iterations: search.iterations,
         }
     }
@@ -334,6 +324,7 @@ fn lost(prior: &PosePrior, status: TrackingStatus) -> TrackingOutcome {
         agreement: 0.0,
         depth_scale: 0.0,
         intensity_scale: 0.0,
+        likeness: None,
         iterations: 0,
     }
 }

@@ -63,7 +63,7 @@ fn carving_depends_on_no_order_and_leaves_nothing_behind() {
     let settings = Settings { voxel_size: 0.03, carve: 10.0, ..Settings::default() };
     let shots = shots(3, 4);
     let mut map = fused(settings, &shots);
-    let turned: Vec<_> = shots.iter().rev().map(|shot| Shot { depth: shot.depth.clone(), ..*shot }).collect();
+    let turned: Vec<_> = shots.iter().rev().cloned().collect();
     let memory = MemoryLimits { host_bytes: 4 << 20, ..MemoryLimits::default() };
     let capped = fused(Settings { max_bytes: 1 << 20, threads: 2, memory, ..settings }, &turned);
     assert!(capped.memory().host_blocks > 0);

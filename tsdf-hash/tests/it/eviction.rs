@@ -127,7 +127,7 @@ fn a_frame_that_was_not_integrated_is_noticed_wherever_blocks_are() {
         }
         let before = contents(&map);
         // Never fused; fused from half a voxel elsewhere; fused without colour.
-        let mut moved = Shot { depth: shots[2].depth.clone(), ..shots[2] };
+        let mut moved = shots[2].clone();
         moved.world_from_camera.translation.vector.x += 0.01;
         for shot in [&shots[10], &moved] {
             assert!(matches!(take_out(&mut map, shot).unwrap_err(), Error::NotIntegrated { .. }));

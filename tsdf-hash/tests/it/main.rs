@@ -20,6 +20,7 @@ mod map_file;
 mod pose_graph;
 mod random;
 mod recorded;
+mod relocalisation;
 mod reversible;
 mod scene;
 mod topology;

@@ -1,7 +1,7 @@
 //! Scenes with a known distance and a known first hit, and a camera that looks at them.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use tsdf_hash::{DepthData, DepthView, Intrinsics};
+use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics};
 
 /// A depth image in metres with the camera it was taken by; 0 where the ray hits nothing.
 #[derive(Clone)]
@@ -11,6 +11,8 @@ pub(crate) struct Shot {
     pub(crate) depth: Vec<f32>,
     pub(crate) intrinsics: Intrinsics,
     pub(crate) world_from_camera: Isometry3<f64>,
+    /// R, G, B of each pixel; empty in the dark.
+    pub(crate) rgb: Vec<u8>,
 }
 
 impl Shot {
@@ -30,12 +32,29 @@ impl Shot {
                 hit(&origin, &(world_from_camera.rotation * Vector3::new(ray[0], ray[1], 1.0))).unwrap_or(0.0) as f32
             })
             .collect();
-        Self { width, height, depth, intrinsics, world_from_camera }
+        Self { width, height, depth, intrinsics, world_from_camera, rgb: Vec::new() }
     }
 
     pub(crate) fn view(&self) -> DepthView<'_> {
         let data = DepthData::F32 { data: &self.depth };
         DepthView { width: self.width, height: self.height, data, intrinsics: self.intrinsics }
+    }
+
+    /// Paints what is seen; `colour` is asked with points of the world.
+    pub(crate) fn painted(mut self, colour: impl Fn(&Point3<f64>) -> [u8; 3]) -> Self {
+        let k = self.intrinsics;
+        let pixel = |at: usize| {
+            let (u, v, z) = ((at % self.width) as f64, (at / self.width) as f64, f64::from(self.depth[at]));
+            colour(&(self.world_from_camera * Point3::new((u - k.cx) / k.fx * z, (v - k.cy) / k.fy * z, z)))
+        };
+        self.rgb = (0..self.depth.len()).flat_map(pixel).collect();
+        self
+    }
+
+    pub(crate) fn colour(&self) -> Option<ColourView<'_>> {
+        let data = ColourData::Rgb8(&self.rgb);
+        let view = ColourView { width: self.width, height: self.height, data, intrinsics: self.intrinsics };
+        (!self.rgb.is_empty()).then_some(view)
     }
 }
 
@@ -102,6 +121,27 @@ pub(crate) mod room {
             t = super::hit_sphere(s[3])(&to, d).filter(|s| *s > 1e-6).map_or(t, |s| t.min(s));
         }
         t
+    }
+
+    /// Plaster and posters: patches of 25 cm and grain of 6 cm, of some greys; `seed` makes another room of it.
+    pub(crate) fn colour(p: &Point3<f64>, seed: f64) -> [u8; 3] {
+        let grain = |cell: f64| {
+            let [x, y, z] = [0, 1, 2].map(|k| p[k] / cell + seed * [0.37, 0.61, 0.83][k]);
+            let corner = |dx: f64, dy: f64, dz: f64| {
+                let at = (x.floor() + dx) * 12.9898 + (y.floor() + dy) * 78.233 + (z.floor() + dz) * 37.719;
+                let value = (at.sin() * 43758.5453).rem_euclid(1.0);
+                let weight = |t: f64, d: f64| if d > 0.0 { t - t.floor() } else { 1.0 - (t - t.floor()) };
+                value * weight(x, dx) * weight(y, dy) * weight(z, dz)
+            };
+            let corners = [0.0, 1.0];
+            corners
+                .iter()
+                .flat_map(|a| corners.map(|b| (*a, b)))
+                .map(|(a, b)| corner(a, b, 0.0) + corner(a, b, 1.0))
+                .sum::<f64>()
+        };
+        let grey = 40.0 + 110.0 * grain(0.25) + 70.0 * grain(0.06);
+        [grey as u8, (0.9 * grey) as u8, (0.8 * grey) as u8]
     }
 
     /// Pose `k` of `n` on an ellipse, looking outward.

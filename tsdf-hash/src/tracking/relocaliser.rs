@@ -1,0 +1,240 @@
+//! Finds a lost camera by a few frames (thesis Paper II, section 6.3).
+
+use nalgebra::Isometry3;
+
+use crate::dense_map::DenseMap;
+use crate::error::Error;
+use crate::images::{ColourView, DepthView};
+use crate::keyframes::index::KeyframeIndex;
+use crate::map::Map;
+use crate::settings::{MemoryLimits, Settings};
+use crate::tracking::outcome::{PosePrior, TrackingOutcome};
+use crate::tracking::pose::step;
+use crate::tracking::settings::TrackingSettings;
+use crate::tracking::tracker::Tracker;
+
+/// Keyframes that a frame is tracked from (ours).
+const CANDIDATES: usize = 8;
+/// Frames that must agree about a place (ours).
+const FRAMES: usize = 3;
+/// The reserve map begins anew after so many frames: what it drifts must not matter.
+const LONGEST: usize = 60;
+/// Places nearer to each other are one: radians, metres.
+const SAME: [f64; 2] = [0.04, 0.04];
+/// Without colour, a frame counts beside others that it was taken at least so far from: radians, metres (ours).
+const ANOTHER: [f64; 2] = [0.02, 0.02];
+
+/// Finds a lost camera in a map.
+///
+/// One frame is not enough: a corner of a room looks like another corner. So the frames since the camera was lost are tracked in a
+/// reserve map of their own, which says how they are placed to each other. Where a frame is found in the old map by the keyframes that look
+/// most like it, the frames after it must be found where the reserve map has them, or the place is dropped. It is believed when three
+/// frames agree and no other place is left; without colour these must have been taken from different poses.
+///
+/// ```
+/// # use tsdf_hash::{DenseMap, DepthView, Error, KeyframeIndex, Relocaliser, TrackingSettings};
+/// # fn search(map: &mut dyn DenseMap, keyframes: &KeyframeIndex, lost: &[DepthView]) -> Result<(), Error> {
+/// let mut relocaliser = Relocaliser::new(TrackingSettings::default())?;
+/// for depth in lost {
+///     if let Some(found) = relocaliser.add(map, depth, None, keyframes)? {
+///         println!("at {}; before: {:?}", found.outcome.world_from_camera, found.earlier);
+///         break;
+///     }
+/// }
+/// # Ok(())
+/// # }
+/// ```
+pub struct Relocaliser {
+    tracker: Tracker,
+    reserve: Option<Reserve>,
+    places: Vec<Place>,
+}
+
+/// Where a lost camera is.
+#[derive(Clone, Debug)]
+pub struct Relocalisation {
+    /// The frame that settled it.
+    pub outcome: TrackingOutcome,
+    /// Poses in the old map of the frames before it, the latest last: as many as are sure.
+    pub earlier: Vec<Isometry3<f64>>,
+}
+
+/// The frames since the camera was lost, placed to each other.
+struct Reserve {
+    map: Map,
+    poses: Vec<Isometry3<f64>>,
+}
+
+/// A place where the camera may be.
+struct Place {
+    world_from_reserve: Isometry3<f64>,
+    /// Frames of the reserve that agree.
+    agreeing: Vec<usize>,
+    /// The latest frame, if it agrees.
+    latest: Option<TrackingOutcome>,
+}
+
+impl Relocaliser {
+    /// A search without frames.
+    ///
+    /// # Errors
+    /// [`Error::InvalidSetting`].
+    pub fn new(settings: TrackingSettings) -> Result<Self, Error> {
+        Ok(Self { tracker: Tracker::new(settings)?, reserve: None, places: Vec::new() })
+    }
+
+    /// Forgets the frames: the camera is no longer lost.
+    pub fn reset(&mut self) {
+        self.reserve = None;
+        self.places.clear();
+    }
+
+    /// Number of places where the camera may be, as far as the frames say.
+    pub fn places(&self) -> usize {
+        self.places.len()
+    }
+
+    /// Takes the next frame of a lost camera. When its place is found, the search is reset.
+    ///
+    /// # Errors
+    /// Views that make no sense, and those of [`DenseMap::ray_cast`].
+    pub fn add(
+        &mut self,
+        map: &mut dyn DenseMap,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        keyframes: &KeyframeIndex,
+    ) -> Result<Option<Relocalisation>, Error> {
+        let present = self.follow(map.settings(), depth, colour)?;
+        self.test(map, depth, colour, &present)?;
+        if self.places.iter().all(|place| place.latest.is_none()) {
+            self.search(map, depth, colour, keyframes, &present)?;
+        }
+        let [place] = &mut self.places[..] else { return Ok(None) };
+        let Some(reserve) = &self.reserve else { return Ok(None) };
+        let agreeing = if colour.is_some() && place.latest.as_ref().is_some_and(|l| l.likeness.is_some()) {
+            place.agreeing.len()
+        } else {
+            different(place.agreeing.iter().map(|k| &reserve.poses[*k]))
+        };
+        let (true, Some(outcome)) = (agreeing >= FRAMES, place.latest.take()) else { return Ok(None) };
+        let world_from_reserve = outcome.world_from_camera * present.inverse();
+        let before = &reserve.poses[..reserve.poses.len() - 1];
+        let earlier = before.iter().map(|pose| world_from_reserve * pose).collect();
+        self.reset();
+        Ok(Some(Relocalisation { outcome, earlier }))
+    }
+
+    /// Places the frame in the reserve map; where it cannot be followed, or the map is old, another one begins.
+    fn follow(
+        &mut self,
+        settings: &Settings,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+    ) -> Result<Isometry3<f64>, Error> {
+        if let Some(reserve) = self.reserve.as_mut().filter(|reserve| reserve.poses.len() < LONGEST)
+            && let Some(pose) = reserve.place(&mut self.tracker, depth, colour)?
+        {
+            return Ok(pose);
+        }
+        self.places.clear();
+        let mut map = Map::new(Settings { memory: MemoryLimits::default(), ..*settings })?;
+        map.integrate(depth, colour, &Isometry3::identity())?;
+        self.reserve = Some(Reserve { map, poses: vec![Isometry3::identity()] });
+        Ok(Isometry3::identity())
+    }
+
+    /// Asks the frame about each place: whether the old map is seen from there.
+    fn test(
+        &mut self,
+        map: &mut dyn DenseMap,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        present: &Isometry3<f64>,
+    ) -> Result<(), Error> {
+        let frame = self.reserve.as_ref().map_or(0, |reserve| reserve.poses.len() - 1);
+        let mut left: Vec<Place> = Vec::new();
+        for mut place in std::mem::take(&mut self.places) {
+            let expected = place.world_from_reserve * present;
+            let prior = PosePrior { world_from_camera: expected, covariance: None };
+            let outcome = self.tracker.track(map, depth, colour, &prior)?;
+            let agrees = self.tracker.is_sure(&outcome) && is_same(&expected, &outcome.world_from_camera);
+            place.latest = agrees.then(|| outcome.clone());
+            if agrees {
+                place.agreeing.push(frame);
+                place.world_from_reserve = outcome.world_from_camera * present.inverse();
+            } else if self.tracker.contradicts(&outcome) {
+                continue;
+            }
+            if !left.iter().any(|other| is_same(&other.world_from_reserve, &place.world_from_reserve)) {
+                left.push(place);
+            }
+        }
+        self.places = left;
+        Ok(())
+    }
+
+    /// Looks for the frame in the old map.
+    fn search(
+        &mut self,
+        map: &mut dyn DenseMap,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        keyframes: &KeyframeIndex,
+        present: &Isometry3<f64>,
+    ) -> Result<(), Error> {
+        let frame = self.reserve.as_ref().map_or(0, |reserve| reserve.poses.len() - 1);
+        for start in keyframes.candidates(depth, colour, CANDIDATES, |_| true)? {
+            let Some(found) = self.tracker.settle(map, depth, colour, &start.world_from_camera)? else { continue };
+            let world_from_reserve = found.world_from_camera * present.inverse();
+            if !self.places.iter().any(|place| is_same(&place.world_from_reserve, &world_from_reserve)) {
+                self.places.push(Place { world_from_reserve, agreeing: vec![frame], latest: Some(found) });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Reserve {
+    /// Follows the camera from where its last two poses lead, and fuses the frame; `None` if it is lost here, too.
+    fn place(
+        &mut self,
+        tracker: &mut Tracker,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+    ) -> Result<Option<Isometry3<f64>>, Error> {
+        let Some(last) = self.poses.last().copied() else { return Ok(None) };
+        let before = self.poses.len().checked_sub(2).map_or(last, |k| self.poses[k]);
+        for guess in [last * (before.inverse() * last), last] {
+            let prior = PosePrior { world_from_camera: guess, covariance: None };
+            let outcome = tracker.track(&mut self.map, depth, colour, &prior)?;
+            if tracker.is_sure(&outcome) {
+                let pose = outcome.world_from_camera;
+                self.map.integrate(depth, colour, &pose)?;
+                self.poses.push(pose);
+                return Ok(Some(pose));
+            }
+        }
+        Ok(None)
+    }
+}
+
+fn is_same(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
+    within(a, b, SAME)
+}
+
+fn within(a: &Isometry3<f64>, b: &Isometry3<f64>, [turn, shift]: [f64; 2]) -> bool {
+    let apart = step(a, b);
+    apart.fixed_rows::<3>(0).norm() <= turn && apart.fixed_rows::<3>(3).norm() <= shift
+}
+
+/// How many of some poses are apart from all that were counted before.
+fn different<'a>(poses: impl Iterator<Item = &'a Isometry3<f64>>) -> usize {
+    let mut counted: Vec<&Isometry3<f64>> = Vec::new();
+    for pose in poses {
+        if !counted.iter().any(|other| within(other, pose, ANOTHER)) {
+            counted.push(pose);
+        }
+    }
+    counted.len()
+}
