@@ -21,8 +21,8 @@ pub use coverage::{Coverage, CoverageFigures};
 pub use density::{DensityPlace, DensitySettings, Flux, density_map};
 pub use directions::Droplets;
 #[cfg(feature = "gpu")]
-pub use gpu::{GpuDensity, GpuOptions};
+pub use gpu::{GpuDensity, GpuHits, GpuOptions};
 pub use path_simulation::{PathOutcome, PathSimulation, SimulatedSegment};
-pub use step::{DepositSettings, StepHits, StepOutcome};
+pub use step::{DepositSettings, StepCast, StepHits, StepOutcome};
 pub use sweep::{GantryGeometry, Nozzle, Sweep};
 pub use texel_surface::{TexelFace, TexelSurface};

@@ -253,7 +253,8 @@ fn figures_count_paint_inside_outside_and_above() {
     }
     let figures = coverage.figures();
     assert_eq!((figures.inside, figures.outside, figures.above), (2.5 / 4.0, 0.5 / 4.0, 0.2 / 4.0));
-    assert_eq!(figures.overdosed, 2.0 / (SIDE * SIDE) as f64);
+    let one = 1.0 / (SIDE * SIDE) as f64;
+    assert_eq!((figures.overdosed_wanted, figures.overdosed_bare, figures.overdosed()), (one, one, 2.0 * one));
 }
 
 #[test]
@@ -374,4 +375,68 @@ fn the_gpu_gives_the_same_density() {
         assert!(mean <= 1e-4 * f64::from(most), "{mean} of {most}");
     }
     assert!(!gpu.name().is_empty());
+}
+
+/// Droplets cast on the GPU land where the processor's do, and a path simulated from them does the same.
+#[cfg(feature = "gpu")]
+#[test]
+fn a_path_simulated_with_the_hits_of_a_gpu_is_that_of_the_processor() {
+    use paint_sim::droplets::{GpuHits, GpuOptions, StepCast};
+    let mut faces = wall_at(0.06);
+    for _ in 0..3 {
+        faces = faces.iter().flat_map(quartered).collect();
+    }
+    let wall = surface(&faces);
+    let thickness: Vec<f64> =
+        (0..SIDE * SIDE).map(|k| if (k / SIDE + k % SIDE) % 17 < 9 { 5e-6 } else { 0.0 }).collect();
+    let coverage = Coverage::new(&wall, &thickness).unwrap();
+    let (deposit, gantry) = (DepositSettings::default(), GantryGeometry::default());
+    let sets = Droplets::sets(&spray(), deposit.droplets, 16).unwrap();
+    let options = GpuOptions { software: true, ..GpuOptions::default() };
+    assert!(matches!(GpuHits::new(&[], &options), Err(Error::Empty { .. })));
+    let gpu = match GpuHits::new(&sets, &options) {
+        Ok(gpu) => gpu,
+        Err(error) => {
+            assert!(std::env::var_os("PAINTCOPTER_REQUIRE_GPU").is_none_or(|v| v != "1"), "{error}");
+            eprintln!("skipped: {error}");
+            return;
+        }
+    };
+    let segment =
+        |k: i32, to: f64| SimulatedSegment { key: [k, 0, 0], start: 0.1 * f64::from(k), duration: 0.1, from: 0.05, to };
+    let path: Vec<_> = (0..20).map(|k| segment(k, if k % 3 == 0 { 0.055 } else { 0.045 })).collect();
+    let new = || PathSimulation::new(&wall, &coverage, &sets, &deposit, &gantry, &sweep()).unwrap();
+    let (mut alone, mut helped) = (new(), new());
+    let (mut droplets, mut elsewhere) = (0, 0);
+    for segment in &path {
+        let steps = helped.missing(segment);
+        let found = gpu.cast(&wall, &steps).unwrap();
+        assert_eq!((steps.len(), found.len()), (10, 10));
+        for (step, hits) in steps.iter().zip(&found) {
+            let expected = StepHits::cast(&wall, &step.nozzle, &sets[step.set]);
+            let count = |hits: &StepHits| {
+                let mut counts = vec![0_i64; SIDE * SIDE + 1];
+                hits.texels.iter().for_each(|&(texel, n)| counts[texel as usize] += i64::from(n));
+                counts[SIDE * SIDE] = i64::from(hits.missed);
+                counts
+            };
+            droplets += deposit.droplets;
+            elsewhere += count(&expected).iter().zip(count(hits)).map(|(a, b)| (a - b).unsigned_abs()).sum::<u64>() / 2;
+        }
+        // Another number of steps is refused; what is kept is not asked for again.
+        assert!(helped.keep(segment, found[1..].to_vec()).is_err());
+        helped.keep(segment, found).unwrap();
+        assert!(helped.missing(segment).is_empty());
+    }
+    assert!(elsewhere as f64 <= 1e-3 * droplets as f64, "{elsewhere} of {droplets}");
+    let (a, b) = (alone.simulate(&path), helped.simulate(&path));
+    let open = a.valve.iter().filter(|open| **open).count();
+    assert!(open > 20 && open < a.valve.len(), "{open}");
+    assert!((a.useful as f64 / b.useful as f64 - 1.0).abs() < 2e-3, "{} {}", a.useful, b.useful);
+    let other = a.valve.iter().zip(&b.valve).filter(|(a, b)| a != b).count();
+    assert!(other <= 2, "{other}");
+    assert!(matches!(
+        gpu.cast(&wall, &[StepCast { set: 16, ..alone.missing(&segment(99, 0.05))[0] }]),
+        Err(Error::OutOfRange { .. })
+    ));
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Parser;
+use clap::{Parser, ValueEnum};
 
 /// Paints an object with a nozzle on a handheld gantry: a person sweeps it past, the program decides where the nozzle slides and when it
 /// sprays. Without a mesh: a cube of 60 mm on its corner, with a circle of 34 mm on each upper face.
@@ -30,15 +30,27 @@ pub struct Arguments {
     /// Flow of the nozzle, cubic metres per second
     #[arg(long, value_name = "M3_PER_S", default_value_t = 0.5e-9)]
     pub flow: f64,
+    /// Distance from the nozzle to the object that the person keeps, metres
+    #[arg(long, value_name = "METRES", default_value_t = 0.06)]
+    pub stand_off: f64,
     /// Punishment of paint above the target
-    #[arg(long, default_value_t = 2.0)]
+    #[arg(long, default_value_t = 3.0)]
     pub punishment: f64,
     /// Thickness of a full coat, metres
     #[arg(long, value_name = "METRES", default_value_t = 20e-6)]
     pub coat: f64,
-    /// Motion of the robot: an MCAP recording with poses (spray along x, slide along z), or `synthetic` sweeps
+    /// Motion of the robot: recorded poses (MCAP, TUM or EuRoC text; spray along x, slide along z), or `synthetic` sweeps
     #[arg(long, value_name = "FILE|synthetic", default_value = "synthetic")]
     pub motion: String,
+    /// Metres per unit of the recorded motion
+    #[arg(long, default_value_t = 1.0)]
+    pub motion_scale: f64,
+    /// Axes of the recorded motion
+    #[arg(long, value_enum, default_value_t = MotionAxes::Robot)]
+    pub motion_axes: MotionAxes,
+    /// Move the recorded motion so that its middle is before the largest side of the target
+    #[arg(long)]
+    pub place_motion: bool,
     /// Seconds before each side of the target [default: what the paint needs]
     #[arg(long, value_name = "SECONDS")]
     pub seconds: Option<f64>,
@@ -75,7 +87,7 @@ pub struct Arguments {
     /// Seeds of the scenarios
     #[arg(long, default_value_t = 10)]
     pub seeds: u64,
-    /// Compute the density on a GPU (needs the feature `gpu`)
+    /// Compute the density and cast the droplets of path simulation on a GPU (needs the feature `gpu`)
     #[arg(long)]
     pub gpu: bool,
     /// Threads; the results do not depend on it
@@ -87,4 +99,13 @@ pub struct Arguments {
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/handheld")]
     pub out: PathBuf,
+}
+
+/// Which way the axes of recorded poses point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MotionAxes {
+    /// The spray along x, the slide along z
+    Robot,
+    /// A camera that looks along z, with y downwards
+    Camera,
 }

@@ -49,10 +49,13 @@ pub enum HandheldError {
     },
     /// Nothing of the target came within the nozzle's reach.
     #[error(
-        "no spray within {reach_m} m of the nozzle meets the target in the {seconds:.0} s of the motion: move the robot closer, \
-         point its x axis at the target, or check the unit of mesh and motion (metres)"
+        "no spray within {reach_m} m of the nozzle meets the target in the {seconds:.0} s of the motion, which comes no nearer to it than \
+         {nearest_m:.3} m: move the robot closer, point its x axis at the target, check the unit of mesh and motion (metres), or give \
+         --place-motion"
     )]
     Unreachable {
+        /// Shortest distance of the robot from the target, m.
+        nearest_m: f64,
         /// How far paint flies, m.
         reach_m: f64,
         /// Duration of the motion, s.
@@ -74,6 +77,14 @@ pub enum HandheldError {
         /// The file.
         path: PathBuf,
         /// Why.
+        why: String,
+    },
+    /// A recorded motion moves no robot.
+    #[error("--motion {}: {why}", path.display())]
+    Motion {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and the way out.
         why: String,
     },
     /// The results cannot be written.

@@ -8,7 +8,7 @@ use paint_planner::gantry::{
 };
 
 use super::error::HandheldError;
-use super::forecast::{DensityDevice, Forecast, PaintJob};
+use super::forecast::{Forecast, PaintDevice, PaintJob};
 use super::object::{PaintObject, SurfaceSample};
 use super::scenario::Scenario;
 use super::settings::HandheldSettings;
@@ -83,7 +83,7 @@ fn decide(
 pub fn evaluate(
     object: &PaintObject,
     faces: &[SurfaceSample],
-    device: &mut dyn DensityDevice,
+    device: &mut dyn PaintDevice,
     settings: &HandheldSettings,
     (scenarios, seeds): (usize, std::ops::Range<u64>),
     progress: &dyn Fn(f64),
@@ -108,7 +108,7 @@ pub fn evaluate(
 pub fn time_ratio(
     object: &PaintObject,
     faces: &[SurfaceSample],
-    device: &mut dyn DensityDevice,
+    device: &mut dyn PaintDevice,
     [other, settings]: [&HandheldSettings; 2],
     count: usize,
 ) -> Result<f64, HandheldError> {
@@ -130,7 +130,7 @@ impl Evaluation {
     fn add(
         &mut self,
         job: &PaintJob,
-        device: &mut dyn DensityDevice,
+        device: &mut dyn PaintDevice,
         scenario: &Scenario,
         seed: u64,
     ) -> Result<(), HandheldError> {

@@ -2,21 +2,29 @@
 
 use paint_planner::gantry::{GantrySample, PaintModel, Segment};
 use paint_sim::droplets::{
-    Coverage, DensityPlace, DensitySettings, Droplets, Flux, PathOutcome, PathSimulation, SimulatedSegment, Sweep,
-    TexelSurface, density_map,
+    Coverage, DensityPlace, DensitySettings, Droplets, Flux, PathOutcome, PathSimulation, SimulatedSegment, StepCast,
+    StepHits, Sweep, TexelSurface, density_map,
 };
 use paint_sim::spray::QUANTUM;
 
 use super::error::HandheldError;
 use super::settings::HandheldSettings;
 
-/// Where densities are computed.
-pub trait DensityDevice {
+/// Where densities are computed and droplets are cast.
+pub trait PaintDevice {
     /// Required density of a nozzle at each place.
     ///
     /// # Errors
     /// What the device says.
     fn density(&mut self, coverage: &Coverage, places: &[DensityPlace], flux: Flux) -> Result<Vec<f32>, HandheldError>;
+
+    /// Hits of steps of path simulation; `None` leaves them to the simulation.
+    ///
+    /// # Errors
+    /// What the device says.
+    fn hits(&mut self, _steps: &[StepCast]) -> Result<Option<Vec<StepHits>>, HandheldError> {
+        Ok(None)
+    }
 
     /// Its name for the report.
     fn name(&self) -> String;
@@ -32,7 +40,7 @@ pub struct Processor<'a> {
     pub threads: usize,
 }
 
-impl DensityDevice for Processor<'_> {
+impl PaintDevice for Processor<'_> {
     fn density(&mut self, coverage: &Coverage, places: &[DensityPlace], flux: Flux) -> Result<Vec<f32>, HandheldError> {
         let settings = DensitySettings { flux, threads: self.threads };
         Ok(density_map(self.surface, coverage, &self.droplets, places, &settings))
@@ -67,11 +75,11 @@ impl<'a> PaintJob<'a> {
 pub struct Forecast<'a> {
     simulation: PathSimulation<'a>,
     coverage: &'a Coverage,
-    device: &'a mut dyn DensityDevice,
+    device: &'a mut dyn PaintDevice,
     settings: &'a HandheldSettings,
     sweep: Sweep,
     flux: Flux,
-    /// The first fault of the device; densities after it are zero.
+    /// The first fault of the device; densities after it are zero, and the processor casts.
     fault: Option<HandheldError>,
 }
 
@@ -83,7 +91,7 @@ impl<'a> Forecast<'a> {
     pub fn new(
         job: &'a PaintJob,
         coverage: &'a Coverage,
-        device: &'a mut dyn DensityDevice,
+        device: &'a mut dyn PaintDevice,
         sweep: &Sweep,
     ) -> Result<Self, HandheldError> {
         let PaintJob { surface, sets, settings } = job;
@@ -94,7 +102,25 @@ impl<'a> Forecast<'a> {
     /// What a path does, in full.
     pub fn outcome(&mut self, path: &[Segment]) -> PathOutcome {
         let segments: Vec<SimulatedSegment> = path.iter().map(simulated).collect();
+        if let Err(fault) = self.cast(&segments) {
+            self.fault.get_or_insert(fault);
+        }
         self.simulation.simulate(&segments)
+    }
+
+    /// Has the device cast the steps that are not known yet, all at once.
+    fn cast(&mut self, segments: &[SimulatedSegment]) -> Result<(), HandheldError> {
+        let missing: Vec<Vec<StepCast>> = segments.iter().map(|segment| self.simulation.missing(segment)).collect();
+        let steps = missing.concat();
+        if steps.is_empty() {
+            return Ok(());
+        }
+        let Some(mut hits) = self.device.hits(&steps)? else { return Ok(()) };
+        // From the last segment on, whose hits stand at the end.
+        for (segment, steps) in segments.iter().zip(&missing).rev().filter(|(_, steps)| !steps.is_empty()) {
+            self.simulation.keep(segment, hits.split_off(hits.len().saturating_sub(steps.len())))?;
+        }
+        Ok(())
     }
 
     /// What went wrong with the device, if anything.

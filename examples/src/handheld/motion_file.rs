@@ -1,4 +1,4 @@
-//! A recorded motion of the robot: poses from an MCAP file.
+//! Poses of a recorded motion from a file: MCAP, or text as TUM and EuRoC write it.
 
 use std::path::Path;
 
@@ -7,14 +7,15 @@ use foxglove::messages::{FrameTransform, PoseInFrame};
 use mcap::Message;
 use nalgebra::Isometry3;
 use serde::Deserialize;
-use vio_ekf::{Stamp, Trajectory};
+use vio_ekf::{Stamp, Trajectory, euroc, tum};
 
 use super::error::HandheldError;
 use crate::mcap_messages::fields::{isometry, isometry_of, stamp};
 use crate::mcap_messages::{MessagesFault, cdr, messages_of, schema_of};
 
-/// Longest time between two poses over which the motion is interpolated, s.
-const LONGEST_GAP: f64 = 0.5;
+/// First bytes of an MCAP file, and of one that gzip has packed.
+const MCAP: &[u8] = b"\x89MCAP";
+const GZIP: &[u8] = &[0x1f, 0x8b];
 
 /// `geometry_msgs/msg/PoseStamped`.
 #[derive(Deserialize)]
@@ -25,58 +26,69 @@ struct PoseStamped {
     orientation: [f64; 4],
 }
 
-/// A recorded motion.
-pub(super) struct RecordedMotion {
-    /// Topic that it comes from.
-    pub(super) topic: String,
-    poses: Trajectory,
-    start: Stamp,
-    /// Its duration, s.
-    pub(super) duration: f64,
+/// Poses as they are in the file.
+pub(super) struct RecordedPoses {
+    /// Topic or format.
+    pub(super) source: String,
+    /// World from whatever moved.
+    pub(super) poses: Trajectory,
+    /// Poses that were left out: their stamps repeat others or go back.
+    pub(super) left_out: usize,
 }
 
-impl RecordedMotion {
-    /// Reads the first topic with poses: `foxglove.PoseInFrame`, `foxglove.FrameTransform` or `geometry_msgs/msg/PoseStamped`.
-    pub(super) fn read(path: &Path) -> Result<Self, HandheldError> {
-        let fault = |why: MessagesFault| match why {
-            MessagesFault::Unreadable(why) => HandheldError::unreadable(path, &why),
-            MessagesFault::Malformed(why) => HandheldError::unreadable(path, &why),
-        };
-        let mut topic: Option<String> = None;
-        let mut poses = Trajectory::default();
-        for message in messages_of(path).map_err(fault)? {
-            let message = message.map_err(fault)?;
-            if topic.as_ref().is_some_and(|topic| *topic != message.channel.topic) {
-                continue;
-            }
-            let Some(found) = pose(&message) else { continue };
-            let (at, pose) = found.map_err(|why| HandheldError::unreadable(path, &why))?;
-            topic.get_or_insert_with(|| message.channel.topic.clone());
-            // Poses that repeat a stamp, or go back, say nothing new.
-            let _ = poses.push(at, pose);
-        }
-        let (Some(topic), Some((start, end))) = (topic, poses.span().filter(|_| poses.len() > 1)) else {
-            let why =
-                "no two poses: expected foxglove.PoseInFrame, foxglove.FrameTransform or geometry_msgs/msg/PoseStamped";
-            return Err(HandheldError::unreadable(path, &why));
-        };
-        let gap = poses.stamps().windows(2).map(|pair| pair[1].as_secs() - pair[0].as_secs()).fold(0.0, f64::max);
-        if gap > LONGEST_GAP {
-            let why = format!("the poses of {topic} have a gap of {gap:.2} s: record them at 10 Hz or faster");
-            return Err(HandheldError::unreadable(path, &why));
-        }
-        let duration = end.as_secs() - start.as_secs();
-        Ok(Self { topic, poses, start, duration })
+/// Reads the poses of a file.
+///
+/// # Errors
+/// [`HandheldError::Unreadable`] with what is wrong, and where.
+pub(super) fn read_poses(path: &Path) -> Result<RecordedPoses, HandheldError> {
+    let unreadable = |why: &dyn std::fmt::Display| HandheldError::unreadable(path, why);
+    let bytes = std::fs::read(path).map_err(|e| unreadable(&e))?;
+    if bytes.starts_with(GZIP) {
+        return Err(unreadable(&"packed by gzip: unpack it with gunzip"));
     }
+    if bytes.starts_with(MCAP) || path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap")) {
+        return from_mcap(path);
+    }
+    let text = String::from_utf8(bytes)
+        .map_err(|_| unreadable(&"neither MCAP nor text: expected poses as MCAP, TUM or EuRoC text"))?;
+    let is_data = |line: &&str| !line.trim().is_empty() && !line.starts_with(['#', '\u{feff}']);
+    let commas = text.lines().find(is_data).is_some_and(|line| line.contains(','));
+    let (source, poses) = if commas {
+        ("EuRoC text", euroc::read(&text).map(|states| states.trajectory))
+    } else {
+        ("TUM text", tum::read(&text))
+    };
+    let poses = poses.map_err(|e| unreadable(&e))?;
+    let lines = text.lines().filter(is_data).count();
+    Ok(RecordedPoses { source: source.into(), left_out: lines.saturating_sub(poses.len()), poses })
+}
 
-    /// The robot at a time after the first pose, s.
-    pub(super) fn at(&self, time: f64) -> Isometry3<f64> {
-        let nanos = (time.clamp(0.0, self.duration) * 1e9) as i64;
-        let stamp = Stamp::from_nanos(self.start.nanos() + nanos);
-        // Inside the span every stamp has a pose; its very end may be lost to rounding.
-        let last = self.poses.poses().last().copied().unwrap_or_else(Isometry3::identity);
-        self.poses.pose_at(stamp).unwrap_or(last)
+/// The first topic with poses: `foxglove.PoseInFrame`, `foxglove.FrameTransform` or `geometry_msgs/msg/PoseStamped`.
+fn from_mcap(path: &Path) -> Result<RecordedPoses, HandheldError> {
+    let fault = |why: MessagesFault| match why {
+        MessagesFault::Unreadable(why) => HandheldError::unreadable(path, &why),
+        MessagesFault::Malformed(why) => HandheldError::unreadable(path, &why),
+    };
+    let mut topic: Option<String> = None;
+    let (mut poses, mut left_out) = (Trajectory::default(), 0);
+    for message in messages_of(path).map_err(fault)? {
+        let message = message.map_err(fault)?;
+        if topic.as_ref().is_some_and(|topic| *topic != message.channel.topic) {
+            continue;
+        }
+        let Some(found) = pose(&message) else { continue };
+        let (at, pose) = found.map_err(|why| HandheldError::unreadable(path, &why))?;
+        topic.get_or_insert_with(|| message.channel.topic.clone());
+        match poses.push(at, pose) {
+            Err(why @ vio_ekf::Error::NonFinite { .. }) => return Err(HandheldError::unreadable(path, &why)),
+            pushed => left_out += usize::from(pushed.is_err()),
+        }
     }
+    let Some(topic) = topic else {
+        let why = "no poses: expected foxglove.PoseInFrame, foxglove.FrameTransform or geometry_msgs/msg/PoseStamped";
+        return Err(HandheldError::unreadable(path, &why));
+    };
+    Ok(RecordedPoses { source: format!("topic {topic}"), poses, left_out })
 }
 
 /// `None`: no pose.

@@ -51,6 +51,10 @@ pub struct HandheldReport {
     pub paint_above_fraction: f64,
     /// Texels of the surface with more than their target and a tenth of a full coat, over all texels of the surface.
     pub overdosed_texels_fraction: f64,
+    /// Those of them where paint is wanted, over all texels of the surface.
+    pub overdosed_wanted_texels_fraction: f64,
+    /// Those of them where none is wanted, over all texels of the surface.
+    pub overdosed_bare_texels_fraction: f64,
     /// As the robot believes it to be.
     pub believed_inside_fraction: f64,
     /// As the robot believes it to be.
@@ -65,6 +69,8 @@ pub struct HandheldReport {
     pub held_decisions: usize,
     /// Time without a measured pose.
     pub tracking_lost_s: f64,
+    /// Measured poses so far from the expected ones that the filter started anew.
+    pub pose_jumps: usize,
     /// Longest time from a loss of the markers to the command that shuts the valve.
     pub valve_shut_after_loss_s: f64,
     /// Times that the nozzle ran into a limit switch.
@@ -103,7 +109,9 @@ impl HandheldReport {
         self.paint_inside_fraction = truth.inside;
         self.paint_outside_fraction = truth.outside;
         self.paint_above_fraction = truth.above;
-        self.overdosed_texels_fraction = truth.overdosed;
+        self.overdosed_texels_fraction = truth.overdosed();
+        self.overdosed_wanted_texels_fraction = truth.overdosed_wanted;
+        self.overdosed_bare_texels_fraction = truth.overdosed_bare;
         self.believed_inside_fraction = belief.inside;
         self.believed_outside_fraction = belief.outside;
         self.emitted_m3 = log.emitted;
@@ -111,6 +119,7 @@ impl HandheldReport {
         self.idle_decisions = log.idle_decisions;
         self.held_decisions = log.held_decisions;
         self.tracking_lost_s = log.lost_ticks as f64 * log.tick();
+        self.pose_jumps = log.pose_jumps;
         self.valve_shut_after_loss_s = log.shut_after_loss;
         self.limit_switch_hits = log.limit_hits;
         self.valve_switches = log.valve_switches;

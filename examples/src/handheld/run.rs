@@ -12,13 +12,14 @@ use super::arguments::Arguments;
 use super::cube::{cube, cube_edges, in_circle, upper_faces};
 use super::error::HandheldError;
 use super::evaluation::{evaluate, time_ratio};
-use super::forecast::{DensityDevice, PaintJob, Processor};
-use super::motion_file::RecordedMotion;
+use super::forecast::{PaintDevice, PaintJob, Processor};
+use super::motion_file::read_poses;
 use super::object::{PaintObject, SurfaceSample};
 use super::pictures::{save_plan, save_textures};
+use super::recorded_motion::{MotionFrame, RecordedMotion};
 use super::recording;
 use super::report::HandheldReport;
-use super::session::{SessionLog, SessionSettings, paint};
+use super::session::{HandPoses, SessionLog, SessionSettings, paint};
 use super::settings::HandheldSettings;
 use super::target::read_target;
 use super::views::passes;
@@ -26,6 +27,8 @@ use crate::mesh_io::read_mesh;
 use crate::progress::Stage;
 use crate::report::save_figures;
 
+/// Standard deviation of the believed place with which any robot may spray, m.
+const GOOD_ENOUGH: f64 = 0.3e-3;
 /// Scenarios over which the time of a long horizon is compared.
 const RATIO_SCENARIOS: usize = 9;
 
@@ -64,19 +67,28 @@ pub fn run(arguments: &Arguments) -> Result<(), HandheldError> {
     recording::save(&object, &settings.geometry, &log, &folder.join("handheld.mcap"))?;
     save_figures(&report, folder)?;
     println!("{}", folder.join("painted.png").display());
-    judge(&log, &settings, &report)
+    judge(&object, &log, &settings, &report, arguments.motion != "synthetic")
 }
 
 /// Whether the result is usable.
-fn judge(log: &SessionLog, settings: &HandheldSettings, report: &HandheldReport) -> Result<(), HandheldError> {
+fn judge(
+    object: &PaintObject,
+    log: &SessionLog,
+    settings: &HandheldSettings,
+    report: &HandheldReport,
+    recorded: bool,
+) -> Result<(), HandheldError> {
     if log.emitted == 0.0 && log.held_decisions < log.decision_ms.len() {
-        return Err(HandheldError::Unreachable { reach_m: settings.spray.range, seconds: log.duration() });
+        let (reach_m, seconds) = (settings.spray.range, log.duration());
+        return Err(HandheldError::Unreachable { nearest_m: nearest(object, log), reach_m, seconds });
     }
     if report.paint_inside_fraction < 0.5 {
         let advice = if report.tracking_lost_s > 0.5 * report.painting_s {
             "the markers were lost most of the time"
         } else if report.held_decisions > report.decisions {
             "the robot's place was not known well enough most of the time: lower --pose-noise"
+        } else if recorded {
+            "the recorded motion is too short, or too seldom before the target"
         } else {
             "give it more --seconds"
         };
@@ -85,12 +97,25 @@ fn judge(log: &SessionLog, settings: &HandheldSettings, report: &HandheldReport)
     Ok(())
 }
 
+/// Shortest distance of the robot from the target, m.
+fn nearest(object: &PaintObject, log: &SessionLog) -> f64 {
+    // A target has thousands of texels and a motion thousands of moments: some of each will do for a message.
+    let wanted: Vec<_> = object.wanted_points().map(|(sample, _)| sample.point).collect();
+    let some = |count: usize| (count / 200).max(1);
+    let places = log.ticks.iter().step_by(some(log.ticks.len())).map(|tick| tick.world_from_robot.translation.vector);
+    let distances = places
+        .flat_map(|place| wanted.iter().step_by(some(wanted.len())).map(move |point| (point.coords - place).norm()));
+    distances.fold(f64::INFINITY, f64::min)
+}
+
 fn check(arguments: &Arguments) -> Result<(), HandheldError> {
     let positive = [
         ("--scale", arguments.scale),
+        ("--motion-scale", arguments.motion_scale),
         ("--texel", arguments.texel),
         ("--coat", arguments.coat),
         ("--flow", arguments.flow),
+        ("--stand-off", arguments.stand_off),
         ("--seconds", arguments.seconds.unwrap_or(1.0)),
         ("--pose-noise", arguments.pose_noise),
     ];
@@ -128,6 +153,7 @@ fn settings(arguments: &Arguments) -> HandheldSettings {
             punishment: arguments.punishment,
             ..DepositSettings::default()
         },
+        stand_off: arguments.stand_off,
         paper_literal: arguments.paper_literal,
         threads: arguments.threads,
         ..HandheldSettings::default()
@@ -166,10 +192,10 @@ fn open_device<'a>(
     arguments: &Arguments,
     object: &'a PaintObject,
     settings: &HandheldSettings,
-) -> Result<Box<dyn DensityDevice + 'a>, HandheldError> {
+) -> Result<Box<dyn PaintDevice + 'a>, HandheldError> {
     let droplets = settings.density_droplets()?;
     if arguments.gpu {
-        return super::gpu::open(&object.surface, &droplets);
+        return super::gpu::open(&object.surface, &droplets, &settings.droplet_sets()?);
     }
     Ok(Box::new(Processor { surface: &object.surface, droplets, threads: settings.threads }))
 }
@@ -178,7 +204,7 @@ fn open_device<'a>(
 fn rank(
     arguments: &Arguments,
     object: &PaintObject,
-    device: &mut dyn DensityDevice,
+    device: &mut dyn PaintDevice,
     settings: &HandheldSettings,
     report: &mut HandheldReport,
 ) -> Result<(), HandheldError> {
@@ -213,10 +239,25 @@ fn rank(
     Ok(())
 }
 
+fn recorded_motion(
+    arguments: &Arguments,
+    object: &PaintObject,
+    settings: &HandheldSettings,
+) -> Result<RecordedMotion, HandheldError> {
+    let path = Path::new(&arguments.motion);
+    let first = if arguments.place_motion { passes(object, settings, Some(1.0)).first().copied() } else { None };
+    let frame = MotionFrame {
+        scale: arguments.motion_scale,
+        axes: arguments.motion_axes,
+        middle: first.map(|pass| pass.middle),
+    };
+    RecordedMotion::new(read_poses(path)?, path, &frame)
+}
+
 fn spray(
     arguments: &Arguments,
     object: &PaintObject,
-    device: &mut dyn DensityDevice,
+    device: &mut dyn PaintDevice,
     settings: &HandheldSettings,
 ) -> Result<SessionLog, HandheldError> {
     let job = PaintJob::new(&object.surface, settings)?;
@@ -224,7 +265,7 @@ fn spray(
     let session = SessionSettings {
         pose_sensor: PoseSensorSettings { position_sigma: arguments.pose_noise, ..PoseSensorSettings::default() },
         // What the filter reaches with each: a camera alone leaves the place less certain.
-        max_position_sigma: arguments.pose_noise * if arguments.no_inertial { 0.9 } else { 0.6 },
+        max_position_sigma: (arguments.pose_noise * if arguments.no_inertial { 0.9 } else { 0.6 }).max(GOOD_ENOUGH),
         inertial_sensor: (!arguments.no_inertial).then(InertialSensorSettings::default),
         filter: PoseFilterSettings { position_sigma: arguments.pose_noise, ..PoseFilterSettings::default() },
         registration: arguments.correct_registration.then(RegistrationSettings::default),
@@ -237,11 +278,14 @@ fn spray(
     let log = if arguments.motion == "synthetic" {
         let passes = passes(object, settings, arguments.seconds);
         let hand = HandMotion::new(&passes, HandSettings::default(), arguments.seed)?;
-        paint(object, &job, device, &session, (&|time| hand.at(time), hand.duration()), &share)?
+        let motion = HandPoses { pose: &|time| hand.at(time), tracked: &|_| true, duration: hand.duration() };
+        paint(object, &job, device, &session, &motion, &share)?
     } else {
-        let recorded = RecordedMotion::read(Path::new(&arguments.motion))?;
-        eprintln!("motion from topic {}, {:.1} s", recorded.topic, recorded.duration);
-        paint(object, &job, device, &session, (&|time| recorded.at(time), recorded.duration), &share)?
+        let recorded = recorded_motion(arguments, object, settings)?;
+        recorded.remarks.iter().for_each(|remark| eprintln!("{remark}"));
+        let (pose, tracked) = (|time| recorded.at(time), |time| recorded.tracked(time));
+        let motion = HandPoses { pose: &pose, tracked: &tracked, duration: recorded.duration };
+        paint(object, &job, device, &session, &motion, &share)?
     };
     let figures = log.truth.figures();
     stage.done(&format!(
@@ -249,7 +293,7 @@ fn spray(
         log.duration(),
         100.0 * figures.inside,
         100.0 * figures.outside,
-        100.0 * figures.overdosed,
+        100.0 * figures.overdosed(),
         log.lost_ticks as f64 * log.tick()
     ));
     Ok(log)

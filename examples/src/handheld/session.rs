@@ -1,6 +1,7 @@
 //! The loop: poses a hundred times a second, a decision ten times a second, and the true paint beside the believed one (handheld paper,
 //! Section VI-B).
 
+mod booking;
 mod log;
 mod settings;
 
@@ -16,9 +17,11 @@ use paint_sim::gantry_robot::{InertialSensor, PoseSensor, RangeSensor, Stepper, 
 use paint_sim::spray::QUANTUM;
 
 use super::error::HandheldError;
-use super::forecast::{DensityDevice, Forecast, PaintJob};
+use super::forecast::{Forecast, PaintDevice, PaintJob};
 use super::object::PaintObject;
+use super::settings::HandheldSettings;
 use crate::adapters::MeshSurface;
+use booking::Booking;
 pub use log::{SessionLog, Tick};
 pub use settings::SessionSettings;
 
@@ -33,6 +36,7 @@ struct Session<'a> {
     job: &'a PaintJob<'a>,
     settings: &'a SessionSettings,
     filter: PoseFilter,
+    booking: Booking,
     registration: Option<Registration>,
     stepper: Stepper,
     valve: Valve,
@@ -45,21 +49,33 @@ struct Session<'a> {
     began: f64,
     commanded_open: bool,
     lost_since: Option<f64>,
+    /// Jumps of the pose that were said.
+    restarts: usize,
     squared_error: f64,
     tracked_ticks: usize,
     log: SessionLog,
 }
 
-/// Paints while `motion` (pose of the robot at a time) goes on for `duration` seconds; `progress` is told the share done.
+/// How a person holds the robot.
+pub struct HandPoses<'a> {
+    /// Pose of the robot at a time, s.
+    pub pose: &'a dyn Fn(f64) -> Isometry3<f64>,
+    /// Whether markers can be seen at that time at all.
+    pub tracked: &'a dyn Fn(f64) -> bool,
+    /// How long, s.
+    pub duration: f64,
+}
+
+/// Paints while the hand moves; `progress` is told the share done.
 ///
 /// # Errors
 /// Settings that simulator or planner refuse, or a device that fails.
 pub fn paint(
     object: &PaintObject,
     job: &PaintJob,
-    device: &mut dyn DensityDevice,
+    device: &mut dyn PaintDevice,
     settings: &SessionSettings,
-    (motion, duration): (&dyn Fn(f64) -> Isometry3<f64>, f64),
+    hand: &HandPoses,
     progress: &dyn Fn(f64),
 ) -> Result<SessionLog, HandheldError> {
     let mut session = Session::new(object, job, settings)?;
@@ -71,22 +87,25 @@ pub fn paint(
         .map(|number| Droplets::new(&job.settings.spray, job.settings.deposit.droplets, number))
         .collect::<Result<Vec<_>, _>>()?;
     let dt = job.settings.deposit.step;
-    let ticks = (duration / dt).round() as usize;
-    let per_decision = ((job.settings.planner.interval / dt).round() as usize).max(1);
+    let motion = hand.pose;
+    let ticks = (hand.duration / dt).round() as usize;
+    let per_decision = per_decision(job.settings);
     for tick in 0..ticks {
         let time = tick as f64 * dt;
         let pose = motion(time);
-        let measured = pose_sensor.measure(&pose, time, dt);
+        let measured = pose_sensor.measure(&pose, time, dt).filter(|_| (hand.tracked)(time));
         session.filter.update(measured.as_ref(), dt);
         if let Some(sensor) = &mut inertial_sensor {
             let reading = sensor.measure(motion, time);
             session.filter.inertial(&reading.specific_force, &reading.angular_velocity);
         }
+        session.booking.observe(&session.filter);
         session.note_tracking(time, &pose, measured.is_some());
         if measured.is_some() {
             session.register(&pose, &mut range_sensor, dt);
         }
         if tick % per_decision == 0 {
+            session.book(tick);
             session.decide(time, device)?;
         }
         session.command_valve(time, tick);
@@ -112,12 +131,13 @@ impl<'a> Session<'a> {
             ticks: Vec::new(),
             messages: Vec::new(),
             truth: bare.clone(),
-            belief: bare,
+            belief: bare.clone(),
             emitted: 0.0,
             decision_ms: Vec::new(),
             idle_decisions: 0,
             held_decisions: 0,
             lost_ticks: 0,
+            pose_jumps: 0,
             shut_after_loss: 0.0,
             limit_hits: 0,
             valve_switches: 0,
@@ -130,6 +150,7 @@ impl<'a> Session<'a> {
             job,
             settings,
             filter: PoseFilter::new(settings.filter)?,
+            booking: Booking::new(bare, per_decision(job.settings)),
             registration,
             stepper: Stepper::new(settings.stepper, middle)?,
             valve: Valve::new(settings.valve)?,
@@ -139,6 +160,7 @@ impl<'a> Session<'a> {
             began: 0.0,
             commanded_open: false,
             lost_since: None,
+            restarts: 0,
             squared_error: 0.0,
             tracked_ticks: 0,
             log,
@@ -161,6 +183,10 @@ impl<'a> Session<'a> {
             }
             _ => {}
         }
+        if self.filter.restarts() > self.restarts {
+            self.restarts = self.filter.restarts();
+            self.say(time, "the measured pose jumped: the filter starts anew".into());
+        }
         self.log.lost_ticks += usize::from(!tracked);
         if let Some(motion) = self.filter.motion().filter(|_| tracked) {
             let error = motion.world_from_robot.translation.vector - truth.translation.vector;
@@ -181,12 +207,15 @@ impl<'a> Session<'a> {
         }
     }
 
+    fn model_from_world(&self) -> Isometry3<f64> {
+        self.registration.as_ref().map_or_else(Isometry3::identity, Registration::correction).inverse()
+    }
+
     /// Motion of the robot as seen from the model's place; `None` while it is not known well enough to spray.
     fn motion_at_model(&self) -> Option<RobotMotion> {
         let known = self.lost_since.is_none() && self.filter.position_sigma() <= self.settings.max_position_sigma;
         let motion = self.filter.motion().filter(|_| known)?;
-        let model_from_world =
-            self.registration.as_ref().map_or_else(Isometry3::identity, Registration::correction).inverse();
+        let model_from_world = self.model_from_world();
         Some(RobotMotion {
             world_from_robot: model_from_world * motion.world_from_robot,
             velocity: model_from_world.rotation * motion.velocity,
@@ -194,8 +223,14 @@ impl<'a> Session<'a> {
         })
     }
 
+    /// The belief of the paint with what is known by now of where the robot was.
+    fn book(&mut self, tick: usize) {
+        let model_from_world = self.model_from_world();
+        self.log.belief = self.booking.belief(self.job, &model_from_world, tick);
+    }
+
     /// The next movement is decided while the running one goes on.
-    fn decide(&mut self, time: f64, device: &mut dyn DensityDevice) -> Result<(), HandheldError> {
+    fn decide(&mut self, time: f64, device: &mut dyn PaintDevice) -> Result<(), HandheldError> {
         let planner = self.job.settings.planner();
         let finished = self.queue.pop_front();
         self.entry_speed = finished.map_or(0.0, |segment| (segment.to - segment.from) / segment.duration);
@@ -218,7 +253,7 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    fn plan(&mut self, motion: &RobotMotion, device: &mut dyn DensityDevice) -> Result<(), HandheldError> {
+    fn plan(&mut self, motion: &RobotMotion, device: &mut dyn PaintDevice) -> Result<(), HandheldError> {
         let job = self.job;
         let planner = job.settings.planner();
         let running = self.queue[0];
@@ -276,6 +311,7 @@ impl<'a> Session<'a> {
         let (settings, model_from_world) = (self.job.settings, self.settings.world_from_model.inverse());
         let part = settings.deposit.step / PARTS as f64;
         let mut open = 0.0;
+        let begin = self.stepper.position();
         for k in 0..PARTS {
             let (from, to) = (time + k as f64 * part, time + (k + 1) as f64 * part);
             let before = self.stepper.position();
@@ -296,6 +332,9 @@ impl<'a> Session<'a> {
             let droplet = volume / (settings.deposit.droplets as f64 * QUANTUM);
             self.log.truth.spray(&hits, droplet.round() as u64);
         }
+        if open > 0.0 {
+            self.booking.sprayed(tick, 0.5 * (begin + self.stepper.position()), open);
+        }
         let pose = motion(time);
         let nozzle = settings.geometry.nozzle(&pose, self.stepper.position());
         let at_model = settings.geometry.nozzle(&(model_from_world * pose), self.stepper.position());
@@ -315,11 +354,17 @@ impl<'a> Session<'a> {
         let believed = self.registration.as_ref().map_or_else(Isometry3::identity, Registration::correction);
         let middle = self.object.middle();
         log.registration_error = (believed * middle - self.settings.world_from_model * middle).norm();
+        log.pose_jumps = self.restarts;
         log.position_error_rms = (self.squared_error / self.tracked_ticks.max(1) as f64).sqrt();
         log.limit_hits = self.stepper.limit_hits;
         log.valve_switches = self.valve.switched;
         log
     }
+}
+
+/// Ticks from one decision to the next.
+fn per_decision(settings: &HandheldSettings) -> usize {
+    ((settings.planner.interval / settings.deposit.step).round() as usize).max(1)
 }
 
 /// The paint after the running movement, as it is expected to go.

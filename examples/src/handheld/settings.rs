@@ -61,10 +61,13 @@ impl HandheldSettings {
         // Width, or area, over which a Gaussian of this spread is even for its own droplets: one over the integral of its square.
         let width = 2.0 * std::f64::consts::PI.sqrt() * spread;
         let area = 4.0 * std::f64::consts::PI * spread * spread;
+        let punishment = self.deposit.punishment;
         let over = if self.paper_literal { area } else { width };
         GantrySettings {
             flux_speed: self.deposit.flow / over,
             travel: self.geometry.travel,
+            // Where the punishment shuts the valve: nothing is gained by going where it stays shut.
+            least_use: if self.paper_literal { self.planner.least_use } else { punishment / (1.0 + punishment) },
             saturate: self.planner.saturate && !self.paper_literal,
             ..self.planner
         }

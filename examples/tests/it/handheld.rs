@@ -8,8 +8,8 @@ use nalgebra::Isometry3;
 use paint_sim::gantry_robot::{HandMotion, HandSettings, PoseSensorSettings};
 use paintcopter_examples::handheld::cube::{cube, cube_edges, in_circle, upper_faces};
 use paintcopter_examples::handheld::{
-    Arguments, HandheldError, HandheldSettings, PaintJob, PaintObject, Processor, SessionLog, SessionSettings,
-    evaluate, paint, passes, run,
+    Arguments, HandPoses, HandheldError, HandheldSettings, PaintJob, PaintObject, Processor, SessionLog,
+    SessionSettings, evaluate, paint, passes, run,
 };
 
 use crate::scratch::Scratch;
@@ -30,11 +30,12 @@ fn session(
     let droplets = settings.density_droplets()?;
     let mut device = Processor { surface: &object.surface, droplets, threads: settings.threads };
     let job = PaintJob::new(&object.surface, settings)?;
-    paint(object, &job, &mut device, session, (pose, seconds), &|_| ())
+    let hand = HandPoses { pose, tracked: &|_| true, duration: seconds };
+    paint(object, &job, &mut device, session, &hand, &|_| ())
 }
 
 /// To and fro before the first circle, without tremor.
-fn sweeps(object: &PaintObject, settings: &HandheldSettings) -> impl Fn(f64) -> Isometry3<f64> {
+fn sweeps(object: &PaintObject, settings: &HandheldSettings) -> impl Fn(f64) -> Isometry3<f64> + use<> {
     let middle = passes(object, settings, None)[0].middle;
     move |t: f64| middle * Isometry3::translation(0.0, -0.025 * (4.0 * t).cos(), 0.0)
 }
@@ -210,6 +211,95 @@ fn bad_input_is_refused_in_one_line() {
     assert!(line(&["--motion", &scratch.path("no.mcap")]).contains("no sound MCAP file"));
     let mesh = broken_mesh(&scratch);
     assert!(line(&["--mesh", &mesh, "--target", "none.png"]).contains("none.png: cannot be read"));
+}
+
+/// A motion as TUM text: poses at `rate` Hz for `seconds`, in units of `unit`
+/// metres.
+fn tum_text(pose: &dyn Fn(f64) -> Isometry3<f64>, rate: f64, seconds: f64, unit: f64) -> String {
+    let mut text = String::from("# timestamp tx ty tz qx qy qz qw\n");
+    for k in 0..=(seconds * rate) as usize {
+        let t = k as f64 / rate;
+        let pose = pose(t);
+        let (p, q) = (pose.translation.vector / unit, pose.rotation.coords);
+        let _ = writeln!(text, "{} {} {} {} {} {} {} {}", 1000.0 + t, p.x, p.y, p.z, q.x, q.y, q.z, q.w);
+    }
+    text
+}
+
+#[test]
+fn recorded_motions_of_any_rate_unit_and_frame_move_the_robot() {
+    let scratch = Scratch::new("handheld-motion");
+    let object = painted_cube();
+    let hand = sweeps(&object, &HandheldSettings::default());
+    let figures = |text: &str, more: &[&str]| {
+        scratch.write("motion.txt", text);
+        let motion = scratch.path("motion.txt");
+        let words = [&["--motion", motion.as_str(), "--flow", "2e-9"], more].concat();
+        let done = run(&arguments(&scratch, &words));
+        assert!(matches!(done, Err(HandheldError::Unfinished { .. })), "{done:?}");
+        let report = report(&scratch.0.join("out"));
+        ["paint_inside_fraction", "tracking_lost_s", "pose_jumps", "painting_s"]
+            .map(|key| report[key].as_f64().unwrap())
+    };
+    let slow = figures(&tum_text(&hand, 20.0, 4.0, 1.0), &[]);
+    let fast = figures(&tum_text(&hand, 1000.0, 4.0, 1.0), &[]);
+    assert!(fast[0] > 0.05 && (slow[0] / fast[0] - 1.0).abs() < 0.2, "{slow:?} {fast:?}");
+    assert!((slow[3] - 4.0).abs() < 0.2 && (fast[3] - 4.0).abs() < 0.2);
+    // A camera, in millimetres, of a world that lies elsewhere and is turned.
+    let robot_from_camera = nalgebra::Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
+    let camera = nalgebra::UnitQuaternion::from_matrix(&robot_from_camera);
+    let other = Isometry3::new(nalgebra::Vector3::new(7.0, -3.0, 1.0), nalgebra::Vector3::new(0.3, -1.0, 2.0));
+    let filmed = tum_text(&|t| other * hand(t) * camera, 100.0, 4.0, 1e-3);
+    let placed = figures(&filmed, &["--motion-scale", "0.001", "--motion-axes", "camera", "--place-motion"]);
+    assert!((placed[0] / fast[0] - 1.0).abs() < 0.35, "{placed:?} {fast:?}");
+    // Half a second without poses, and a tracker that is 0.4 m off for a while: no paint meanwhile, and both are said.
+    let astray =
+        |t: f64| if (2.0..2.5).contains(&t) { Isometry3::translation(0.0, 0.4, 0.0) * hand(t) } else { hand(t) };
+    let whole = tum_text(&astray, 100.0, 4.0, 1.0);
+    let holed: Vec<&str> =
+        whole.lines().filter(|line| !(line.starts_with("1001.2") || line.starts_with("1001.3"))).collect();
+    let holed = figures(&holed.join("\n"), &[]);
+    assert!(holed[1] >= 0.2 && holed[2] >= 1.0 && holed[0] > 0.02, "{holed:?}");
+}
+
+#[test]
+fn a_motion_that_moves_no_robot_is_refused_with_the_way_out() {
+    let scratch = Scratch::new("handheld-no-motion");
+    let hand = sweeps(&painted_cube(), &HandheldSettings::default());
+    let line = |name: &str, bytes: &[u8], more: &[&str]| {
+        scratch.write(name, bytes);
+        let motion = scratch.path(name);
+        let words = [&["--motion", motion.as_str()], more].concat();
+        run(&arguments(&scratch, &words)).unwrap_err().to_string()
+    };
+    let good = tum_text(&hand, 50.0, 2.0, 1.0);
+    let nan = good.replacen(" 0", " NaN", 1);
+    assert!(line("nan.txt", nan.as_bytes(), &[]).contains("not a finite number"));
+    assert!(line("packed.txt", &[0x1f, 0x8b, 8, 0], &[]).contains("gunzip"));
+    assert!(line("binary.txt", &[0xff, 0xfe, 0, 1], &[]).contains("neither MCAP nor text"));
+    assert!(line("kitti.txt", b"1 0 0 0 0 1 0 0 0 0 1 0\n", &[]).contains("expected 8"));
+    assert!(line("one.txt", b"1 0 0 0 0 0 0 1\n", &[]).contains("fewer than two poses"));
+    assert!(line("few.txt", b"1 0 0 0 0 0 0 1\n1.02 0 0 0 0 0 0 1\n", &[]).contains("knots"));
+    assert!(line("slow.txt", tum_text(&hand, 2.0, 10.0, 1.0).as_bytes(), &[]).contains("record it at 10 Hz"));
+    assert!(line("mm.txt", tum_text(&hand, 50.0, 2.0, 1e-3).as_bytes(), &[]).contains("--motion-scale"));
+    let turned = line("back.txt", good.replace("\n1000.5 ", "\n900 ").as_bytes(), &[]);
+    assert!(turned.contains("line"), "{turned}");
+    // Far away: how far is said.
+    let far = tum_text(&|t| Isometry3::translation(2.0, 0.0, 0.0) * hand(t), 50.0, 2.0, 1.0);
+    let far = line("far.txt", far.as_bytes(), &[]);
+    assert!(far.contains("no nearer to it than 1.9") || far.contains("no nearer to it than 2.0"), "{far}");
+    assert!(
+        line("scale.txt", good.as_bytes(), &["--motion-scale", "0"]).contains("--motion-scale 0: must be positive")
+    );
+}
+
+#[test]
+fn holes_and_thin_faces_of_a_mesh_are_said() {
+    let scratch = Scratch::new("handheld-remarks");
+    let mesh = paintcopter_examples::mesh_io::read_mesh(Path::new(&broken_mesh(&scratch))).unwrap();
+    let object = PaintObject::new(&mesh, &[], 2e-3, &mut |_| 20e-6).unwrap();
+    let said = |what: &str| object.remarks.iter().any(|remark| remark.contains(what));
+    assert!(said("thinner than 1 : 100") && said("have no area") && said("one face only"), "{:?}", object.remarks);
 }
 
 #[test]

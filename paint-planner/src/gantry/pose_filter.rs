@@ -1,12 +1,16 @@
 //! Pose and velocity of the robot from noisy poses and, where there is one, an inertial sensor: Kalman filters of constant acceleration, one for the place and one for the
 //! rotation. One of constant velocity would lag behind a hand that turns round, by the same way in each sweep.
 
-use nalgebra::{Isometry3, Matrix4, Translation3, UnitQuaternion, Vector3, Vector4};
+use nalgebra::{Isometry3, Matrix4, Vector3, Vector4};
 
+use super::filter_state::{FilterState, measure};
+use super::robot_motion::RobotMotion;
 use crate::error::Error;
 
 /// Part of its standard deviation by which a bias walks in a second: it turns with the robot.
 const BIAS_WALK: f64 = 0.2;
+/// Standard deviations that no noise exceeds.
+const JUMP: f64 = 10.0;
 /// Standard gravity, m/s^2.
 const GRAVITY: f64 = 9.80665;
 
@@ -48,30 +52,22 @@ impl Default for PoseFilterSettings {
     }
 }
 
-/// Pose and velocities as they are believed to be.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RobotMotion {
-    /// Pose.
-    pub world_from_robot: Isometry3<f64>,
-    /// Velocity of the robot's origin in the world, m/s.
-    pub velocity: Vector3<f64>,
-    /// Angular velocity in the world, rad/s.
-    pub angular_velocity: Vector3<f64>,
+/// One step of the filter: what it expected, and what it believes with the measurements.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FilterStep {
+    pub(super) dt: f64,
+    /// Whether it begins anew: nothing is known of the step before.
+    pub(super) begins: bool,
+    pub(super) predicted: FilterState,
+    pub(super) filtered: FilterState,
 }
 
 /// The filter. It starts with the first measurement.
 #[derive(Debug, Clone)]
 pub struct PoseFilter {
     settings: PoseFilterSettings,
-    motion: Option<RobotMotion>,
-    acceleration: Vector3<f64>,
-    angular_acceleration: Vector3<f64>,
-    /// Biases of the inertial sensor, in the world.
-    force_bias: Vector3<f64>,
-    rate_bias: Vector3<f64>,
-    /// Covariances of (value, rate, acceleration, bias of the inertial sensor), the same for each axis.
-    position: Matrix4<f64>,
-    rotation: Matrix4<f64>,
+    step: Option<FilterStep>,
+    restarts: usize,
 }
 
 impl PoseFilter {
@@ -94,99 +90,95 @@ impl PoseFilter {
                 return Err(Error::Setting { name, value, requirement: "finite and greater than 0" });
             }
         }
-        let (zero, unknown) = (Vector3::zeros(), Matrix4::zeros());
-        Ok(Self {
-            settings,
-            motion: None,
-            acceleration: zero,
-            angular_acceleration: zero,
-            force_bias: zero,
-            rate_bias: zero,
-            position: unknown,
-            rotation: unknown,
-        })
+        Ok(Self { settings, step: None, restarts: 0 })
     }
 
     /// Pose and velocities; `None` before the first measurement.
     pub fn motion(&self) -> Option<&RobotMotion> {
-        self.motion.as_ref()
+        self.step.as_ref().map(|step| &step.filtered.motion)
     }
 
     /// Standard deviation of each coordinate of the place, m; infinite before the first measurement.
     pub fn position_sigma(&self) -> f64 {
-        self.motion.map_or(f64::INFINITY, |_| self.position[(0, 0)].sqrt())
+        self.step.map_or(f64::INFINITY, |step| step.filtered.position[(0, 0)].sqrt())
+    }
+
+    /// How often it began anew because a pose was farther from the expected one than ten of its standard deviations: the tracking jumped.
+    pub fn restarts(&self) -> usize {
+        self.restarts
+    }
+
+    /// The latest step, if there was one.
+    pub(super) fn step(&self) -> Option<&FilterStep> {
+        self.step.as_ref()
     }
 
     /// Lets `dt` seconds pass, then takes in a pose; `None` while the markers are lost.
     pub fn update(&mut self, measured: Option<&Isometry3<f64>>, dt: f64) {
-        if let Some(motion) = &mut self.motion {
-            // Half of the change of a velocity acts over the step.
-            motion.velocity += self.acceleration * (0.5 * dt);
-            motion.angular_velocity += self.angular_acceleration * (0.5 * dt);
-            motion.world_from_robot = motion.after(dt);
-            motion.velocity += self.acceleration * (0.5 * dt);
-            motion.angular_velocity += self.angular_acceleration * (0.5 * dt);
-            self.position =
-                predicted(&self.position, self.settings.acceleration_walk, BIAS_WALK * self.settings.force_bias, dt);
-            self.rotation = predicted(
-                &self.rotation,
-                self.settings.angular_acceleration_walk,
-                BIAS_WALK * self.settings.rate_bias,
-                dt,
-            );
-        }
-        let Some(pose) = measured else { return };
-        let Some(motion) = &mut self.motion else {
-            // A hand is slower than a metre and than three radians per second, and takes no second to get there.
-            let (p, r) = (self.settings.position_sigma, self.settings.rotation_sigma);
-            self.position = Matrix4::from_diagonal(&Vector4::new(p * p, 1.0, 4.0, self.settings.force_bias.powi(2)));
-            self.rotation = Matrix4::from_diagonal(&Vector4::new(r * r, 9.0, 36.0, self.settings.rate_bias.powi(2)));
-            (self.acceleration, self.angular_acceleration) = (Vector3::zeros(), Vector3::zeros());
-            (self.force_bias, self.rate_bias) = (Vector3::zeros(), Vector3::zeros());
-            let (velocity, angular_velocity) = (Vector3::zeros(), Vector3::zeros());
-            self.motion = Some(RobotMotion { world_from_robot: *pose, velocity, angular_velocity });
+        let settings = &self.settings;
+        let begin = |pose: &Isometry3<f64>| {
+            let first = settings.first(pose);
+            FilterStep { dt, begins: true, predicted: first, filtered: first }
+        };
+        let Some(step) = &mut self.step else {
+            self.step = measured.map(begin);
             return;
         };
-        let gain = measure(&mut self.position, &VALUE, self.settings.position_sigma);
-        let error = pose.translation.vector - motion.world_from_robot.translation.vector;
-        let place = motion.world_from_robot.translation.vector + error * gain.x;
-        motion.velocity += error * gain.y;
-        self.acceleration += error * gain.z;
-        self.force_bias += error * gain.w;
-        let gain = measure(&mut self.rotation, &VALUE, self.settings.rotation_sigma);
-        let error = (pose.rotation * motion.world_from_robot.rotation.inverse()).scaled_axis();
-        let rotation = UnitQuaternion::from_scaled_axis(error * gain.x) * motion.world_from_robot.rotation;
-        motion.angular_velocity += error * gain.y;
-        self.angular_acceleration += error * gain.z;
-        self.rate_bias += error * gain.w;
-        motion.world_from_robot = Isometry3::from_parts(Translation3::from(place), rotation);
+        let predicted = step.filtered.predicted(settings.walks(), dt);
+        *step = FilterStep { dt, begins: false, predicted, filtered: predicted };
+        let Some(pose) = measured else { return };
+        if settings.jumped(&predicted, pose) {
+            *step = begin(pose);
+            self.restarts += 1;
+            return;
+        }
+        let state = &mut step.filtered;
+        let believed = state.motion.world_from_robot;
+        let gain = measure(&mut state.position, &VALUE, settings.position_sigma);
+        state.shift(&(gain * (pose.translation.vector - believed.translation.vector).transpose()));
+        let gain = measure(&mut state.rotation, &VALUE, settings.rotation_sigma);
+        state.turn(&(gain * (pose.rotation * believed.rotation.inverse()).scaled_axis().transpose()));
     }
 
     /// Takes in what an inertial sensor at the robot's origin says, in the robot's frame: specific force, m/s^2, and angular velocity, rad/s.
     pub fn inertial(&mut self, specific_force: &Vector3<f64>, angular_velocity: &Vector3<f64>) {
-        let Some(motion) = &mut self.motion else { return };
-        let attitude = motion.world_from_robot.rotation;
-        let gain = measure(&mut self.position, &FORCE, self.settings.accelerometer_sigma);
-        let error = attitude * specific_force - Vector3::z() * GRAVITY - self.acceleration - self.force_bias;
-        motion.world_from_robot.translation.vector += error * gain.x;
-        motion.velocity += error * gain.y;
-        self.acceleration += error * gain.z;
-        self.force_bias += error * gain.w;
-        let gain = measure(&mut self.rotation, &RATE, self.settings.gyroscope_sigma);
-        let error = attitude * angular_velocity - motion.angular_velocity - self.rate_bias;
-        motion.world_from_robot.rotation = UnitQuaternion::from_scaled_axis(error * gain.x) * attitude;
-        motion.angular_velocity += error * gain.y;
-        self.angular_acceleration += error * gain.z;
-        self.rate_bias += error * gain.w;
+        let Some(FilterStep { filtered: state, .. }) = &mut self.step else { return };
+        let attitude = state.motion.world_from_robot.rotation;
+        let gain = measure(&mut state.position, &FORCE, self.settings.accelerometer_sigma);
+        let error = attitude * specific_force - Vector3::z() * GRAVITY - state.acceleration - state.force_bias;
+        state.shift(&(gain * error.transpose()));
+        let gain = measure(&mut state.rotation, &RATE, self.settings.gyroscope_sigma);
+        let error = attitude * angular_velocity - state.motion.angular_velocity - state.rate_bias;
+        state.turn(&(gain * error.transpose()));
     }
 }
 
-impl RobotMotion {
-    /// Pose after `time` seconds at these velocities.
-    pub fn after(&self, time: f64) -> Isometry3<f64> {
-        let turned = UnitQuaternion::from_scaled_axis(self.angular_velocity * time) * self.world_from_robot.rotation;
-        let place = self.world_from_robot.translation.vector + self.velocity * time;
-        Isometry3::from_parts(Translation3::from(place), turned)
+impl PoseFilterSettings {
+    /// What is believed after the first pose.
+    fn first(&self, pose: &Isometry3<f64>) -> FilterState {
+        // A hand is slower than a metre and than three radians per second, and takes no second to get there.
+        let squares = |[value, rate, acceleration, bias]: [f64; 4]| {
+            Matrix4::from_diagonal(&Vector4::new(value, rate, acceleration, bias).map(|sigma| sigma * sigma))
+        };
+        let position = squares([self.position_sigma, 1.0, 2.0, self.force_bias]);
+        FilterState::still(pose, position, squares([self.rotation_sigma, 3.0, 6.0, self.rate_bias]))
+    }
+
+    /// Whether no noise explains how far a pose is from the expected one.
+    fn jumped(&self, expected: &FilterState, pose: &Isometry3<f64>) -> bool {
+        let believed = &expected.motion.world_from_robot;
+        let far = |error: f64, variance: f64, sigma: f64| error > JUMP * (variance + sigma * sigma).sqrt();
+        let place = (pose.translation.vector - believed.translation.vector).norm();
+        far(place, expected.position[(0, 0)], self.position_sigma)
+            || far(pose.rotation.angle_to(&believed.rotation), expected.rotation[(0, 0)], self.rotation_sigma)
+    }
+
+    /// Random walks of acceleration and bias, of the place and of the rotation.
+    fn walks(&self) -> [[f64; 2]; 2] {
+        [
+            [self.acceleration_walk, BIAS_WALK * self.force_bias],
+            [self.angular_acceleration_walk, BIAS_WALK * self.rate_bias],
+        ]
     }
 }
 
@@ -194,21 +186,3 @@ impl RobotMotion {
 const VALUE: Vector4<f64> = Vector4::new(1.0, 0.0, 0.0, 0.0);
 const FORCE: Vector4<f64> = Vector4::new(0.0, 0.0, 1.0, 1.0);
 const RATE: Vector4<f64> = Vector4::new(0.0, 1.0, 0.0, 1.0);
-
-/// Covariance after `dt` seconds in which acceleration and bias walk at random.
-fn predicted(covariance: &Matrix4<f64>, walk: f64, bias_walk: f64, dt: f64) -> Matrix4<f64> {
-    let mut step = Matrix4::identity();
-    (step[(0, 1)], step[(0, 2)], step[(1, 2)]) = (dt, 0.5 * dt * dt, dt);
-    let mut after = step * covariance * step.transpose();
-    after[(2, 2)] += walk * walk * dt;
-    after[(3, 3)] += bias_walk * bias_walk * dt;
-    after
-}
-
-/// Takes a measurement of the states summed by `row` into the covariance and returns the gain.
-fn measure(covariance: &mut Matrix4<f64>, row: &Vector4<f64>, sigma: f64) -> Vector4<f64> {
-    let projected = *covariance * row;
-    let gain = projected / (row.dot(&projected) + sigma * sigma);
-    *covariance -= gain * projected.transpose();
-    gain
-}

@@ -3,8 +3,8 @@
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use paint_planner::gantry::{
     BeamSettings, DensityMap, GantrySample, GantrySettings, GantryState, Lattice, PaintModel, PoseFilter,
-    PoseFilterSettings, RangeReading, Registration, RegistrationSettings, RoundedPath, Segment, all_paths, greedy_path,
-    plan_gantry, random_path, rank, refine,
+    PoseFilterSettings, PoseSmoother, RangeReading, Registration, RegistrationSettings, RoundedPath, Segment,
+    all_paths, greedy_path, plan_gantry, random_path, rank, refine,
 };
 use paint_planner::{Error, Hit, Surface};
 use rand_xoshiro::SplitMix64;
@@ -223,6 +223,67 @@ fn the_filter_follows_a_swinging_hand_and_knows_how_well() {
         assert!(filter.position_sigma() > 2.0 * before);
     }
     assert!(errors[0] < 1.4e-3 && errors[1] < 0.7 * errors[0], "{errors:?}");
+}
+
+/// Half a second of later poses halves the error: the smoother's variance is a quarter of the filter's where a double integrator driven by
+/// white noise is measured in white noise.
+#[test]
+fn the_smoother_knows_twice_as_well_where_the_robot_was() {
+    let place = |t: f64| Vector3::new(0.0, 0.027 * (3.7 * t).sin(), 0.5);
+    let force = |t: f64| Vector3::new(0.0, -0.027 * 3.7 * 3.7 * (3.7 * t).sin(), 9.80665);
+    let tilt = |t: f64| UnitQuaternion::from_scaled_axis(Vector3::z() * 0.05 * (2.0 * t).sin());
+    let rate = |t: f64| Vector3::z() * 0.1 * (2.0 * t).cos();
+    let mut random = SplitMix64::seed_from_u64(6);
+    let mut filter = PoseFilter::new(PoseFilterSettings::default()).unwrap();
+    let mut smoother = PoseSmoother::new(61);
+    // Passed over: the filter has seen nothing.
+    smoother.push(&filter);
+    assert!(smoother.latest_first().is_empty());
+    let mut errors = [[0.0; 2]; 2];
+    for k in 0..3000 {
+        let t = f64::from(k) * 0.01;
+        let mut noise = |sigma: f64| Vector3::from_fn(|_, _| sigma * normal(&mut random));
+        let turned = UnitQuaternion::from_scaled_axis(noise(3.5e-3)) * tilt(t);
+        let pose = Isometry3::from_parts(Translation3::from(place(t) + noise(2e-3)), turned);
+        filter.update(Some(&pose), 0.01);
+        filter.inertial(&(tilt(t).inverse() * force(t) + noise(0.05)), &(rate(t) + noise(5e-3)));
+        smoother.push(&filter);
+        let motions = smoother.latest_first();
+        assert_eq!(motions[0], *filter.motion().unwrap());
+        if k < 500 {
+            continue;
+        }
+        for (age, [position, rotation]) in [0, 50].into_iter().zip(&mut errors) {
+            let (pose, then) = (motions[age].world_from_robot, t - 0.01 * age as f64);
+            *position += (pose.translation.vector - place(then)).norm_squared();
+            *rotation += pose.rotation.angle_to(&tilt(then)).powi(2);
+        }
+    }
+    let ratio = |k: usize| (errors[1][k] / errors[0][k]).sqrt();
+    assert!((0.4..0.65).contains(&ratio(0)) && (0.3..0.8).contains(&ratio(1)), "{} {}", ratio(0), ratio(1));
+    assert_eq!(filter.restarts(), 0);
+}
+
+#[test]
+fn a_pose_that_jumps_starts_the_filter_anew() {
+    let mut filter = PoseFilter::new(PoseFilterSettings::default()).unwrap();
+    let mut smoother = PoseSmoother::new(20);
+    let mut step = |x: f64| {
+        filter.update(Some(&Isometry3::translation(x, 0.0, 0.0)), 0.01);
+        smoother.push(&filter);
+        (filter.restarts(), filter.position_sigma(), smoother.latest_first())
+    };
+    for _ in 0..100 {
+        assert_eq!(step(0.0).0, 0);
+    }
+    let (restarts, sigma, _) = step(0.3);
+    assert!(restarts == 1 && (sigma - 2e-3).abs() < 1e-12);
+    // What comes after a jump says nothing about what was before.
+    let (_, _, motions) = (0..5).map(|_| step(0.3)).last().unwrap();
+    for (age, motion) in motions.iter().enumerate() {
+        let expected = if age <= 5 { 0.3 } else { 0.0 };
+        assert!((motion.world_from_robot.translation.x - expected).abs() < 1e-9, "{age}");
+    }
 }
 
 /// A corner of three planes, seen from inside the positive octant.

@@ -29,8 +29,18 @@ pub struct CoverageFigures {
     pub outside: f64,
     /// Paint above the target where some is wanted.
     pub above: f64,
-    /// Share of the surface's texels that have more than their target by a tenth of the largest thickness wanted.
-    pub overdosed: f64,
+    /// Share of the surface's texels where paint is wanted and which have more than their target by a tenth of the largest thickness
+    /// wanted.
+    pub overdosed_wanted: f64,
+    /// The same of the texels where none is wanted, over all of the surface too.
+    pub overdosed_bare: f64,
+}
+
+impl CoverageFigures {
+    /// Share of all of the surface's texels that have more than their target by a tenth of the largest thickness wanted.
+    pub fn overdosed(&self) -> f64 {
+        self.overdosed_wanted + self.overdosed_bare
+    }
 }
 
 impl Coverage {
@@ -115,7 +125,7 @@ impl Coverage {
     /// How the painting stands.
     pub fn figures(&self) -> CoverageFigures {
         let (mut wanted, mut inside, mut outside, mut above) = (0, 0, 0, 0);
-        let (mut texels, mut overdosed) = (0_usize, 0_usize);
+        let (mut texels, mut overdosed) = (0_usize, [0_usize; 2]);
         for (texel, (&target, &current)) in self.target.iter().zip(&self.current).enumerate() {
             wanted += target;
             if target == 0 {
@@ -125,14 +135,15 @@ impl Coverage {
                 above += current.saturating_sub(target);
             }
             texels += usize::from(self.thickness[texel] > 0.0);
-            overdosed += usize::from(f64::from(-self.deficit[texel]) > 0.1 * self.full);
+            overdosed[usize::from(target == 0)] += usize::from(f64::from(-self.deficit[texel]) > 0.1 * self.full);
         }
         let share = |part: u64| part as f64 / wanted as f64;
         CoverageFigures {
             inside: share(inside),
             outside: share(outside),
             above: share(above),
-            overdosed: overdosed as f64 / texels as f64,
+            overdosed_wanted: overdosed[0] as f64 / texels as f64,
+            overdosed_bare: overdosed[1] as f64 / texels as f64,
         }
     }
 }

@@ -39,7 +39,8 @@ impl Default for DensitySettings {
 pub struct DensityPlace {
     /// Where it would be.
     pub nozzle: Nozzle,
-    /// The most that one ray counts, in the unit of the flux: what the nozzle can place in one pass. Infinite in Eq. (1).
+    /// The most that one ray counts, in the unit of the flux: what the nozzle can place in one pass. A ray to a texel with too much then
+    /// counts as nothing, like one beside the target: paint does the same harm on both. Infinite in Eq. (1), where it counts as negative.
     pub saturation: f32,
 }
 
@@ -81,13 +82,14 @@ fn sample(
     flux: Flux,
 ) -> f32 {
     let (nozzle, most) = (&place.nozzle, place.saturation);
+    let least = if most.is_finite() { 0.0 } else { f32::NEG_INFINITY };
     let (deficit, mut sum) = (coverage.deficit(), 0.0);
     match flux {
         Flux::Physical => caster.cast(surface, nozzle, droplets, |hit: &DropletHit| {
-            sum += (deficit[hit.texel as usize] * hit.distance_squared / hit.height).min(most);
+            sum += (deficit[hit.texel as usize] * hit.distance_squared / hit.height).min(most).max(least);
         }),
         Flux::PaperLiteral => caster.cast(surface, nozzle, droplets, |hit: &DropletHit| {
-            sum += (deficit[hit.texel as usize] / hit.distance_squared).min(most);
+            sum += (deficit[hit.texel as usize] / hit.distance_squared).min(most).max(least);
         }),
     }
     sum / droplets.len() as f32

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::cast::Caster;
 use super::coverage::Coverage;
 use super::directions::Droplets;
-use super::step::{DepositSettings, StepHits};
+use super::step::{DepositSettings, StepCast, StepHits};
 use super::sweep::{GantryGeometry, Sweep};
 use super::texel_surface::TexelSurface;
 use crate::error::Error;
@@ -93,8 +93,9 @@ impl<'a> PathSimulation<'a> {
         let mut outcome = PathOutcome::default();
         for segment in path {
             if !self.hits.contains_key(&segment.key) {
-                let hits = self.cast(segment);
-                self.hits.insert(segment.key, hits);
+                let (steps, caster) = (self.steps(segment), &mut self.caster);
+                let cast = |s: &StepCast| StepHits::cast_with(caster, self.surface, &s.nozzle, &self.sets[s.set]);
+                self.hits.insert(segment.key, steps.iter().map(cast).collect());
             }
             let droplet = self.deposit.droplet();
             for step in &self.hits[&segment.key] {
@@ -120,17 +121,45 @@ impl<'a> PathSimulation<'a> {
         outcome
     }
 
-    /// Hits of every step of a segment, from the middle of the step.
-    fn cast(&mut self, segment: &SimulatedSegment) -> Vec<StepHits> {
-        let steps = (segment.duration / self.deposit.step).round().max(1.0) as usize;
+    /// The steps of a segment whose hits are not kept yet: none of one that is known. Who casts them elsewhere hands them back with
+    /// [`Self::keep`].
+    pub fn missing(&self, segment: &SimulatedSegment) -> Vec<StepCast> {
+        if self.hits.contains_key(&segment.key) { Vec::new() } else { self.steps(segment) }
+    }
+
+    /// Keeps the hits of a segment, one for each of its steps, that were cast elsewhere.
+    ///
+    /// # Errors
+    /// Another number of hits than the segment has steps, or texels beside the texture.
+    pub fn keep(&mut self, segment: &SimulatedSegment, hits: Vec<StepHits>) -> Result<(), Error> {
+        if hits.len() != self.step_count(segment) {
+            let (value, allowed) = (hits.len() as f64, "one for each step of the segment");
+            return Err(Error::OutOfRange { what: "number of hits of a segment", value, allowed });
+        }
+        let texels = || hits.iter().flat_map(|step| &step.texels).map(|(texel, _)| *texel);
+        if let Some(texel) = texels().find(|texel| *texel as usize >= self.remaining.len()) {
+            let (value, allowed) = (f64::from(texel), "below the number of texels");
+            return Err(Error::OutOfRange { what: "texel of a hit", value, allowed });
+        }
+        self.hits.insert(segment.key, hits);
+        Ok(())
+    }
+
+    fn step_count(&self, segment: &SimulatedSegment) -> usize {
+        (segment.duration / self.deposit.step).round().max(1.0) as usize
+    }
+
+    /// Every step of a segment, in its middle.
+    fn steps(&self, segment: &SimulatedSegment) -> Vec<StepCast> {
+        let steps = self.step_count(segment);
         (0..steps)
             .map(|k| {
                 let share = (k as f64 + 0.5) / steps as f64;
                 let time = segment.start + share * segment.duration;
                 let position = segment.from + share * (segment.to - segment.from);
                 let nozzle = self.gantry.nozzle(&self.sweep.at(time), position);
-                let number = (time / self.deposit.step).floor().max(0.0) as usize % self.sets.len();
-                StepHits::cast_with(&mut self.caster, self.surface, &nozzle, &self.sets[number])
+                let set = (time / self.deposit.step).floor().max(0.0) as usize % self.sets.len();
+                StepCast { nozzle, set }
             })
             .collect()
     }

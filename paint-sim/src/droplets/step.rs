@@ -44,6 +44,15 @@ impl DepositSettings {
     }
 }
 
+/// One time step to be cast.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepCast {
+    /// The nozzle in the middle of the step.
+    pub nozzle: Nozzle,
+    /// Which set of droplets, counted from 0.
+    pub set: usize,
+}
+
 /// Droplets per texel of one time step.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct StepHits {
@@ -62,7 +71,12 @@ impl StepHits {
     pub(super) fn cast_with(caster: &mut Caster, surface: &TexelSurface, nozzle: &Nozzle, droplets: &Droplets) -> Self {
         let mut found = Vec::with_capacity(droplets.len());
         caster.cast(surface, nozzle, droplets, |hit| found.push(hit.texel));
-        let missed = (droplets.len() - found.len()) as u32;
+        Self::of_texels(found, droplets.len())
+    }
+
+    /// From the texels of all droplets of a set of so many that met one.
+    pub(super) fn of_texels(mut found: Vec<u32>, droplets: usize) -> Self {
+        let missed = (droplets - found.len()) as u32;
         found.sort_unstable();
         let texels = found.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as u32)).collect();
         Self { texels, missed }

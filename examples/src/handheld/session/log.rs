@@ -41,6 +41,8 @@ pub struct SessionLog {
     pub held_decisions: usize,
     /// Ticks without a pose.
     pub lost_ticks: usize,
+    /// Measured poses so far from the expected ones that the filter started anew.
+    pub pose_jumps: usize,
     /// Longest time between the loss of the markers and a shut valve's command, s.
     pub shut_after_loss: f64,
     /// Times that the nozzle ran into a limit switch.

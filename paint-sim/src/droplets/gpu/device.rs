@@ -10,8 +10,10 @@ use wgpu::BufferUsages;
 use super::options::GpuOptions;
 use crate::error::Error;
 
-/// Storage buffers of the program: its inputs and its result.
+/// Storage buffers of a program: its inputs and its result.
 const STORAGE: u32 = 5;
+/// Work groups of one dispatch, as every adapter offers.
+pub(super) const MOST_GROUPS: usize = 65_535;
 
 /// An adapter with the program on it.
 pub(super) struct Device {
@@ -74,14 +76,25 @@ impl Device {
         }
     }
 
-    /// Runs the program on a uniform and its inputs, `groups` work groups with one float of the result each.
-    pub(super) fn run(&self, uniform: &[u8], inputs: &[Vec<u8>], groups: usize) -> Result<Vec<f32>, Error> {
+    /// The most work groups whose results, `words` for each, fit into one buffer; at least one.
+    pub(super) fn most_groups(&self, words: usize) -> usize {
+        ((self.most_bytes / (4 * words.max(1) as u64)) as usize).max(1)
+    }
+
+    /// Runs the program on a uniform and its inputs in `groups` work groups, and returns its `words` words of result.
+    pub(super) fn run(
+        &self,
+        uniform: &[u8],
+        inputs: &[&Vec<u8>],
+        groups: usize,
+        words: usize,
+    ) -> Result<Vec<u32>, Error> {
         let input = BufferUsages::STORAGE | BufferUsages::COPY_DST;
         let mut buffers = vec![self.filled(uniform, BufferUsages::UNIFORM | BufferUsages::COPY_DST)?];
         for bytes in inputs {
             buffers.push(self.filled(bytes, input)?);
         }
-        let size = 4 * groups as u64;
+        let size = 4 * words as u64;
         buffers.push(self.buffer(size, BufferUsages::STORAGE | BufferUsages::COPY_SRC)?);
         let staging = self.buffer(size, BufferUsages::MAP_READ | BufferUsages::COPY_DST)?;
         let entries: Vec<_> = (0..)
@@ -107,7 +120,7 @@ impl Device {
         self.handle.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| failed(error.to_string()))?;
         self.check()?;
         let view = slice.get_mapped_range().map_err(|error| failed(error.to_string()))?;
-        Ok(view.as_chunks::<4>().0.iter().map(|bytes| f32::from_ne_bytes(*bytes)).collect())
+        Ok(view.as_chunks::<4>().0.iter().map(|bytes| u32::from_ne_bytes(*bytes)).collect())
     }
 
     fn buffer(&self, size: u64, usage: BufferUsages) -> Result<wgpu::Buffer, Error> {
