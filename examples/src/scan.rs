@@ -13,6 +13,7 @@ mod pairing;
 mod pose_source;
 mod quality;
 mod ray_cast_check;
+mod recent_map;
 mod report;
 mod run;
 mod sequence;

@@ -9,6 +9,7 @@ use tsdf_hash::{
 
 use super::error::ScanError;
 use super::map_store::MapStore;
+use super::recent_map::RecentMap;
 use super::sequence::FrameFiles;
 
 /// Least share of a frame that a map must account for where it does not grow (ours).
@@ -47,6 +48,8 @@ pub(super) struct Located {
 pub(super) struct Odometry {
     tracker: Tracker,
     relocaliser: Relocaliser,
+    /// Tracked against instead of the whole map, where loops are looked for.
+    recent: Option<RecentMap>,
     last: Option<Isometry3<f64>>,
     before: Option<Isometry3<f64>>,
     lost: bool,
@@ -58,11 +61,17 @@ pub(super) struct Odometry {
 }
 
 impl Odometry {
-    pub(super) fn new(map: &tsdf_hash::Settings, found_first: bool, fixed_map: bool) -> Result<Self, ScanError> {
+    pub(super) fn new(
+        map: &tsdf_hash::Settings,
+        found_first: bool,
+        fixed_map: bool,
+        loops: bool,
+    ) -> Result<Self, ScanError> {
         let settings = TrackingSettings { noise: map.noise, threads: map.threads, ..TrackingSettings::default() };
         Ok(Self {
             tracker: Tracker::new(settings)?,
             relocaliser: Relocaliser::new(settings)?,
+            recent: loops.then(|| RecentMap::new(map)),
             last: None,
             before: None,
             lost: false,
@@ -77,8 +86,23 @@ impl Odometry {
         (self.last, self.before) = (Some(pose), None);
     }
 
+    /// A frame was fused, when the run had so many keyframes.
+    pub(super) fn fused(
+        &mut self,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        pose: &Isometry3<f64>,
+        keyframes: usize,
+    ) -> Result<(), ScanError> {
+        let Some(recent) = &mut self.recent else { return Ok(()) };
+        Ok(recent.fuse(depth, colour, pose, keyframes)?)
+    }
+
     /// The map and all in it have moved.
     pub(super) fn move_by(&mut self, correction: &Isometry3<f64>) {
+        if let Some(recent) = &mut self.recent {
+            recent.move_by(correction);
+        }
         for pose in [&mut self.last, &mut self.before].into_iter().flatten() {
             *pose = correction * *pose;
         }
@@ -109,6 +133,7 @@ impl Odometry {
                 Some(found) => {
                     self.metrics.relocalisations += 1;
                     self.last = None;
+                    self.recent.iter_mut().for_each(RecentMap::forget);
                     (Some(found.outcome), found.earlier)
                 }
                 None => (tracked, Vec::new()),
@@ -163,8 +188,11 @@ impl Odometry {
         colour: Option<&ColourView>,
         guess: Isometry3<f64>,
     ) -> Result<TrackingOutcome, ScanError> {
-        let prior = PosePrior { world_from_camera: guess, covariance: None };
-        let mut outcome = self.tracker.track(store.dense(), depth, colour, &prior)?;
+        let recent = self.recent.as_mut().and_then(RecentMap::older);
+        let (map, world_from_map) = recent.unwrap_or_else(|| (store.dense(), Isometry3::identity()));
+        let prior = PosePrior { world_from_camera: world_from_map.inverse() * guess, covariance: None };
+        let mut outcome = self.tracker.track(map, depth, colour, &prior)?;
+        outcome.world_from_camera = world_from_map * outcome.world_from_camera;
         // A map that does not grow is left sooner or later: what little of it is in view then leads anywhere.
         if self.fixed_map && (outcome.coverage < LEAST_COVERAGE || !outcome.degenerate.is_empty()) {
             outcome.status = TrackingStatus::NoOverlap;

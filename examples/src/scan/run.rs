@@ -151,9 +151,12 @@ impl<'a> Run<'a> {
         let store = MapStore::open(map, settings.device)?;
         let mut odometry = match settings.poses {
             PoseSource::Given => None,
-            PoseSource::Tracked => {
-                Some(Odometry::new(store.settings(), settings.relocalise.is_some(), !settings.fuse)?)
-            }
+            PoseSource::Tracked => Some(Odometry::new(
+                store.settings(),
+                settings.relocalise.is_some(),
+                !settings.fuse,
+                settings.loops && settings.fuse,
+            )?),
         };
         let progress =
             progress.unwrap_or(Progress { last_stamp: f64::NEG_INFINITY, trajectory: Trajectory::default() });
@@ -264,6 +267,10 @@ impl<'a> Run<'a> {
         let name = frame.depth.to_string();
         if self.settings.fuse {
             self.fuse(&name, &depth, colour.as_ref(), &pose)?;
+            if let Some(odometry) = &mut self.odometry {
+                let keyframes = self.loops.as_ref().map_or(0, |loops| loops.keyframes().len());
+                odometry.fused(&depth, colour.as_ref(), &pose, keyframes)?;
+            }
         }
         self.fused.push((index, pose));
         self.trajectory.push(Stamp::from_secs(frame.stamp).map_err(vio_ekf::Error::from)?, pose)?;
