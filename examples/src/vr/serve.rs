@@ -194,6 +194,8 @@ impl Desk {
 
     fn end(&mut self, session: &mut Session, arguments: &Arguments, counts: &TrafficCounts) -> Result<(), VrError> {
         session.finish()?;
+        self.missed = [true; 2];
+        self.shown = None;
         self.show(session);
         let saved = self.save(session, arguments, counts);
         // Time for the last words to reach the page.

@@ -178,6 +178,8 @@ impl Session {
         if let Some(recorder) = self.recorder.take() {
             recorder.finish()?;
         }
+        // The pictures show what has been flown now.
+        self.take_patches();
         Ok(())
     }
 

@@ -57,6 +57,14 @@ fn a_session_is_flown_as_it_was_seen_and_replays_bit_for_bit() {
         assert!(s.0.join("first").join(file).metadata().is_ok_and(|found| found.len() > 100), "{file}");
     }
 
+    // The pictures are those of the end: as much of the wall is dark in both.
+    let dark = |name: &str| {
+        let picture = image::open(s.0.join("first").join(name)).unwrap().to_luma8();
+        picture.pixels().filter(|pixel| pixel.0[0] < 120).count() as f64
+    };
+    let (seen, flown) = (dark("seen.png"), dark("flown.png"));
+    assert!(seen > 500.0 && (flown / seen - 1.0).abs() < 0.04, "{seen} pixels seen, {flown} flown");
+
     let recording = format!("{first}/session.mcap");
     let output = vr(&["--replay", &recording, "--out", &second]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

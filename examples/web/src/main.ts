@@ -14,6 +14,8 @@ import { Robot } from "./robot";
 import { Tools } from "./tools";
 import { Wall } from "./wall";
 
+// Time without a movement after which a pointer rests, milliseconds.
+const STILL = 60;
 // Radius of the eraser, metres.
 const ERASER = 0.06;
 
@@ -41,8 +43,14 @@ camera.add(banner.sign);
 const robot = new Robot();
 const gun = new Gun();
 scene.add(robot.group, gun.group);
+// When the pointer has last painted, milliseconds.
+let moved = 0;
 // A slow picture must not make strokes coarse: the pointer's own events are states as well.
-const pointer = new Pointer(canvas, cradle, (time) => wall && !headset.presenting && publish(wall, time));
+const pointer = new Pointer(canvas, cradle, (time) => {
+  if (!wall || headset.presenting) return;
+  moved = performance.now();
+  publish(wall, time);
+});
 const headset = new Headset(renderer, cradle);
 const caster = new THREE.Raycaster();
 
@@ -191,7 +199,10 @@ renderer.setAnimationLoop((time) => {
   cradle.move(Math.min(clock.getDelta(), 0.1));
   if (!headset.presenting) camera.rotation.set(pointer.pitch, 0, 0);
   scene.updateMatrixWorld();
-  if (wall) wall.project(publish(wall, performance.now()) === "viewing" ? robot.camera : null);
+  // A pointer that moves speaks for itself: a frame between two of its places would hold it still, and the stroke would be dots.
+  const now = performance.now();
+  const moving = !headset.presenting && now - moved < STILL;
+  if (wall && !moving) wall.project(publish(wall, now) === "viewing" ? robot.camera : null);
   renderer.render(scene, camera);
   if (!headset.presenting) quality.frame(time);
   if (sprayed > 0 && fresh) {
@@ -204,4 +215,4 @@ void Headset.available().then((available) => tools.headset(available));
 navigator.xr?.addEventListener("devicechange", () => void Headset.available().then((found) => tools.headset(found)));
 
 // For tests in a browser: what the page knows, and a way to lose the connection.
-Object.assign(window, { paintcopter: { connection, headset, cradle, camera, delays, wall: () => wall } });
+Object.assign(window, { paintcopter: { connection, headset, cradle, camera, delays, renderer, wall: () => wall } });

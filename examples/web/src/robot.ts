@@ -12,12 +12,12 @@ export class Robot {
   private readonly arm: THREE.Line;
   private readonly spray: THREE.Line;
   private readonly joint: THREE.Mesh;
-  private readonly skin = new THREE.MeshLambertMaterial({ color: BODY, transparent: true, opacity: 0.45 });
+  private readonly skin = new THREE.MeshLambertMaterial({ color: BODY, transparent: true, opacity: 0.35 });
 
   constructor() {
     const hull = new THREE.Mesh(new THREE.BoxGeometry(0.26, 0.26, 0.09), this.skin);
     this.body.add(hull);
-    const ring = new THREE.TorusGeometry(0.12, 0.012, 8, 28);
+    const ring = new THREE.TorusGeometry(0.12, 0.006, 6, 28);
     for (let k = 0; k < 6; k++) {
       const rotor = new THREE.Mesh(ring, this.skin);
       const turn = (Math.PI / 3) * (k + 0.5);
@@ -54,6 +54,6 @@ export class Robot {
 
   /** Rule (d): a robot that is far behind is seen better. */
   set shown(on: boolean) {
-    this.skin.opacity = on ? 0.95 : 0.45;
+    this.skin.opacity = on ? 0.9 : 0.35;
   }
 }
