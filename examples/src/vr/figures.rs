@@ -46,6 +46,7 @@ pub(super) struct VrFigures {
     pub(super) planning_median_ms: f64,
     pub(super) planning_max_ms: f64,
     pub(super) latency_time_min_s: f64,
+    pub(super) latency_time_median_s: f64,
     pub(super) latency_time_max_s: f64,
     pub(super) latency_distance_max_m: f64,
     pub(super) paint_seen_ml: f64,
@@ -63,8 +64,6 @@ pub(super) fn figures(session: &Session, traffic: &Traffic, appearance: &Appeara
     let (counts, queue, clock) = session.counts();
     let curves = session.curves();
     let [seen, flown] = session.canvases();
-    let mut planning = curves.planning.clone();
-    planning.sort_by(f64::total_cmp);
     let times = || curves.time.iter().map(|(_, latency)| *latency);
     Ok(VrFigures {
         surface: session.world().name.clone(),
@@ -92,9 +91,10 @@ pub(super) fn figures(session: &Session, traffic: &Traffic, appearance: &Appeara
         refused_paint: counts.refused_paint,
         targets: counts.targets,
         targets_served: counts.targets_served,
-        planning_median_ms: 1e3 * planning.get(planning.len() / 2).copied().unwrap_or(0.0),
-        planning_max_ms: 1e3 * planning.last().copied().unwrap_or(0.0),
+        planning_median_ms: 1e3 * median(curves.planning.clone()),
+        planning_max_ms: 1e3 * curves.planning.iter().copied().fold(0.0, f64::max),
         latency_time_min_s: times().reduce(f64::min).unwrap_or(0.0),
+        latency_time_median_s: median(times().collect()),
         latency_time_max_s: times().reduce(f64::max).unwrap_or(0.0),
         latency_distance_max_m: curves.distance.iter().map(|(_, lag)| *lag).fold(0.0, f64::max),
         paint_seen_ml: 1e6 * seen.volume(),
@@ -124,6 +124,12 @@ fn likeness(session: &Session, appearance: &Appearance) -> Result<Option<f64>, V
     };
     let weight = Image::new(columns, rows, weight)?;
     Ok(Some(paint_net::metrics::ssim(&ink(flown)?, &ink(seen)?, Some(&weight))?))
+}
+
+/// The middle of some numbers; 0 of none.
+fn median(mut numbers: Vec<f64>) -> f64 {
+    numbers.sort_by(f64::total_cmp);
+    numbers.get(numbers.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// A mask with `by` pixels more on every side, diagonals included.

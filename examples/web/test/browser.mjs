@@ -1,8 +1,8 @@
 // The page in a real browser: mouse, an emulated headset, a lost connection, a stranger.
 //
-//   node test/browser.mjs PATH_OF_VR [FOLDER_FOR_SCREENSHOTS]
+//   node test/browser.mjs PATH_OF_VR [FOLDER]      the folder gets screenshots and the headset's recorded session
 import { spawn } from "node:child_process";
-import { mkdtemp, mkdir, readFile, rm } from "node:fs/promises";
+import { copyFile, mkdtemp, mkdir, readFile, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import assert from "node:assert/strict";
@@ -235,6 +235,7 @@ async function headset(browser) {
   await page.evaluate(() => window.device.activeSession?.end());
   await page.waitForTimeout(300);
   await end(page, server);
+  if (pictures) await copyFile(join(server.out, "session.mcap"), join(pictures, "headset.mcap"));
   const figures = await report(server);
   assert.ok(figures.paint_tasks >= 1 && figures.paint_flown_ml > 0.5 * figures.paint_seen_ml, JSON.stringify(figures));
   assert.ok(before.every(Number.isFinite));
