@@ -38,12 +38,9 @@ pub enum AppearanceError {
 }
 
 impl Appearance {
-    /// Charcoal paint (ours: strong, almost flat absorption, little scattering) on sandstone (ours: reflectance rising from
-    /// 0.38 in the blue to 0.74 in the red).
+    /// [`charcoal`] on [`sandstone`].
     pub fn charcoal_on_sandstone() -> Result<Self, AppearanceError> {
-        let band = |f: &dyn Fn(f64) -> f64| -> Spectrum { std::array::from_fn(|k| f(wavelength(k))) };
-        let wall = Substrate::new(band(&|l| 0.38 + 0.36 / (1.0 + (-(l - 530.0) / 45.0).exp())))?;
-        let paint = Paint::new(&band(&|l| 1.5 - 0.0002 * (l - 380.0)), &[0.08; BANDS], UNIT_THICKNESS)?;
+        let (wall, paint) = (sandstone()?, charcoal()?);
         let at = |depth: f64| paint.over(depth * UNIT_THICKNESS, &wall);
 
         let grey = |s: &Substrate| encode(xyz(s.reflectance())[1]);
@@ -88,6 +85,21 @@ impl Appearance {
         let (a, b, t) = (of(&self.table[k]), of(&self.table[k + 1]), at - k as f64);
         std::array::from_fn(|i| a[i] + t * (b[i] - a[i]))
     }
+}
+
+/// Sandstone (ours): reflectance rising from 0.38 in the blue to 0.74 in the red.
+pub fn sandstone() -> Result<Substrate, paint_sim::Error> {
+    Substrate::new(spectrum(|l| 0.38 + 0.36 / (1.0 + (-(l - 530.0) / 45.0).exp())))
+}
+
+/// Charcoal paint (ours): strong, almost flat absorption, little scattering.
+pub fn charcoal() -> Result<Paint, paint_sim::Error> {
+    Paint::new(&spectrum(|l| 1.5 - 0.0002 * (l - 380.0)), &[0.08; BANDS], UNIT_THICKNESS)
+}
+
+/// A spectrum by formula of the wavelength, nm.
+pub(crate) fn spectrum(of_wavelength: impl Fn(f64) -> f64) -> Spectrum {
+    std::array::from_fn(|k| of_wavelength(wavelength(k)))
 }
 
 /// The transfer curve of sRGB, unquantised.

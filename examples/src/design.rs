@@ -13,7 +13,7 @@ use crate::projection::{Projection, Viewpoint};
 use crate::surface::PaintSurface;
 
 /// Largest ink asked for by the built-in designs: full black would need endless paint.
-const DARKEST: f64 = 0.85;
+pub(crate) const DARKEST: f64 = 0.85;
 
 /// What to paint.
 #[derive(Debug, Clone)]

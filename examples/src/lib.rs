@@ -28,6 +28,7 @@ pub mod textured_mesh;
 pub mod unwrap;
 pub mod vector_drawing;
 pub mod vio;
+pub mod vr;
 pub mod world;
 
 /// The code in the README and in the book compiles.

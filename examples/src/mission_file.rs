@@ -143,13 +143,7 @@ impl MissionFile {
     /// Reads the surface and the design, scans if asked to, and decides; what the scan leaves goes into `folder`.
     pub fn decide(&self, folder: &Path) -> Result<Decision, MissionFileError> {
         let settings = self.settings.clone();
-        let (name, mesh) = match &self.mesh {
-            None => ("Rock wall".to_owned(), rock_wall(settings.seed)),
-            Some(path) => {
-                let name = path.file_stem().map_or("Mesh".into(), |s| s.to_string_lossy());
-                (name.into_owned(), self.load(path)?)
-            }
-        };
+        let (name, mesh) = self.read_surface()?;
         let mesh = if self.scan {
             let scan_flight = ScanFlight::fly(&mesh, settings.seed, settings.threads)
                 .map_err(|source| MissionFileError::Scan { surface: self.mesh_prefix(), source })?;
@@ -164,6 +158,17 @@ impl MissionFile {
             None => Design::from_name(self.design.as_deref().unwrap_or(usual), settings.seed)?,
         };
         Decision::make(&name, &mesh, &design, settings).map_err(|source| self.in_mesh(source))
+    }
+
+    /// Name and mesh of the surface, placed before the robot.
+    pub fn read_surface(&self) -> Result<(String, TriangleMesh), MissionFileError> {
+        Ok(match &self.mesh {
+            None => ("Rock wall".to_owned(), rock_wall(self.settings.seed)),
+            Some(path) => {
+                let name = path.file_stem().map_or("Mesh".into(), |s| s.to_string_lossy());
+                (name.into_owned(), self.load(path)?)
+            }
+        })
     }
 
     /// An error of the mission with the name of the mesh before it.

@@ -157,14 +157,33 @@ impl Recorder {
         self.writer.add_channel(schema, topic, &T::get_message_encoding(), &BTreeMap::new()).map_err(failed)
     }
 
+    /// A channel of JSON messages of our own, with the schema that describes them.
+    pub(crate) fn json_channel(&mut self, topic: &str, name: &str, schema: &str) -> Result<u16, RecordingError> {
+        let schema = self.writer.add_schema(name, "jsonschema", schema.as_bytes()).map_err(failed)?;
+        self.writer.add_channel(schema, topic, "json", &BTreeMap::new()).map_err(failed)
+    }
+
+    pub(crate) fn write_json(
+        &mut self,
+        channel_id: u16,
+        time: f64,
+        message: &impl serde::Serialize,
+    ) -> Result<(), RecordingError> {
+        self.write_bytes(channel_id, time, &serde_json::to_vec(message).map_err(failed)?)
+    }
+
     pub(crate) fn write<T: Encode>(&mut self, channel_id: u16, time: f64, message: &T) -> Result<(), RecordingError> {
         let mut data = Vec::with_capacity(message.encoded_len().unwrap_or(256));
         message.encode(&mut data).map_err(failed)?;
+        self.write_bytes(channel_id, time, &data)
+    }
+
+    fn write_bytes(&mut self, channel_id: u16, time: f64, data: &[u8]) -> Result<(), RecordingError> {
         let log_time = (time.max(0.0) * 1e9).round() as u64;
         self.sequence += 1;
         let header =
             mcap::records::MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time: log_time };
-        self.writer.write_to_known_channel(&header, &data).map_err(failed)
+        self.writer.write_to_known_channel(&header, data).map_err(failed)
     }
 }
 

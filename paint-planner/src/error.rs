@@ -69,6 +69,14 @@ pub enum Error {
         /// What is wrong.
         what: &'static str,
     },
+    /// A state of a VR session that no headset sends.
+    #[error("VR state {sequence}: {what}")]
+    VrState {
+        /// Sequence number of the state.
+        sequence: u64,
+        /// What is wrong and what is asked for.
+        what: &'static str,
+    },
     /// A linear system lost positive definiteness; the input is scaled beyond f64.
     #[error("{stage} became numerically singular: check units (metres, seconds) and weights")]
     Numerical {

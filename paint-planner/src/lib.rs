@@ -57,6 +57,7 @@
 //! | Paper II, section 6.2, LOWESS baseline | [`SmoothingPlanner`] |
 //! | VR paper, section V, deviation from the normal | [`normal_deviation`] |
 //! | handheld paper, section IV, Eqs. (1)-(5) | [`gantry`] |
+//! | VR paper, Algorithm 1, rules (a)-(e), latencies | [`session`] |
 
 mod angle;
 mod bernstein;
@@ -72,6 +73,7 @@ mod plan;
 mod planner;
 mod reach;
 mod route;
+pub mod session;
 mod settings;
 mod stroke_order;
 mod target;

@@ -47,6 +47,14 @@ pub enum Error {
     /// More paint than the mass balance can count.
     #[error("the paint would exceed 2^64 femtolitres (18 cubic metres): check the unit of the shot volumes (m^3)")]
     MassOverflow,
+    /// Paint is to be taken back that was not deposited.
+    #[error(
+        "texel {texel} holds less paint than is to be taken back: give the shots, settings and surface of the deposit"
+    )]
+    NotDeposited {
+        /// The texel.
+        texel: u32,
+    },
     /// The hose cannot reach the vehicle.
     #[error("a hose of {length} m cannot span {distance} m: lengthen it or move its base")]
     HoseTooShort {

@@ -107,9 +107,24 @@ impl Film {
         threads: usize,
         progress: &mut dyn FnMut(usize, usize),
     ) -> Result<MassBalance, Error> {
-        spray.check()?;
-        check_range("threads", threads as f64, 1.0, 1024.0, "between 1 and 1024")?;
-        let emitted = count_quanta(shots)?;
+        self.deposit_observed(shots, spray, surface, threads, &mut |_| (), progress)
+    }
+
+    /// The same, and tells `touched` every texel that receives paint, some of them more than once: what a live picture has to draw
+    /// again.
+    ///
+    /// # Errors
+    /// As [`Film::deposit`].
+    pub fn deposit_observed(
+        &mut self,
+        shots: &[Shot],
+        spray: &SprayModel,
+        surface: &dyn Surface,
+        threads: usize,
+        touched: &mut dyn FnMut(u32),
+        progress: &mut dyn FnMut(usize, usize),
+    ) -> Result<MassBalance, Error> {
+        let emitted = check_call(shots, spray, threads)?;
         self.mass_balance.emitted.checked_add(emitted).ok_or(Error::MassOverflow)?;
 
         let mut deposited = 0;
@@ -117,6 +132,7 @@ impl Film {
             for (texel, quanta) in deposit_batch(&self.index, batch, spray, surface, threads) {
                 self.volumes[texel as usize] += quanta;
                 deposited += quanta;
+                touched(texel);
             }
             progress(number * SHOTS_PER_BATCH + batch.len(), shots.len());
         }
@@ -126,6 +142,50 @@ impl Film {
         self.mass_balance.overspray += call.overspray;
         Ok(call)
     }
+
+    /// Takes back what [`Film::deposit`] has put onto the film for the same shots, settings and surface, to the last femtolitre: where
+    /// each shot lands depends on nothing else. Tells `touched` every texel that loses paint.
+    ///
+    /// # Errors
+    /// As [`Film::deposit`], and [`Error::NotDeposited`] where the film holds less than is to be taken back; it is then unchanged.
+    pub fn withdraw(
+        &mut self,
+        shots: &[Shot],
+        spray: &SprayModel,
+        surface: &dyn Surface,
+        threads: usize,
+        touched: &mut dyn FnMut(u32),
+    ) -> Result<(), Error> {
+        let emitted = check_call(shots, spray, threads)?;
+        let mut volumes = self.volumes.clone();
+        let mut deposited = 0;
+        let mut hits = Vec::new();
+        for batch in shots.chunks(SHOTS_PER_BATCH) {
+            for (texel, quanta) in deposit_batch(&self.index, batch, spray, surface, threads) {
+                let volume = &mut volumes[texel as usize];
+                *volume = volume.checked_sub(quanta).ok_or(Error::NotDeposited { texel })?;
+                deposited += quanta;
+                hits.push(texel);
+            }
+        }
+        let balance = &mut self.mass_balance;
+        let left = |total: u64, part: u64| total.checked_sub(part).ok_or(Error::NotDeposited { texel: 0 });
+        *balance = MassBalance {
+            emitted: left(balance.emitted, emitted)?,
+            deposited: left(balance.deposited, deposited)?,
+            overspray: left(balance.overspray, emitted - deposited)?,
+        };
+        self.volumes = volumes;
+        hits.into_iter().for_each(touched);
+        Ok(())
+    }
+}
+
+/// Refuses settings out of range; the quanta that the shots emit.
+fn check_call(shots: &[Shot], spray: &SprayModel, threads: usize) -> Result<u64, Error> {
+    spray.check()?;
+    check_range("threads", threads as f64, 1.0, 1024.0, "between 1 and 1024")?;
+    count_quanta(shots)
 }
 
 /// Sprays `shots` onto bare `texels` in one call; the mass balance is [`Film::mass_balance`]. See [`Film::deposit`] for

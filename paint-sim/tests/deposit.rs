@@ -326,3 +326,27 @@ fn no_shot_loses_or_invents_paint() {
         assert_eq!(again.volumes(), film.volumes());
     }
 }
+
+#[test]
+fn what_was_deposited_can_be_taken_back_to_the_last_femtolitre() {
+    let surface = far_plate();
+    let mut film = Film::new(tilted_plane(0.3, 0.1, 2e-3, 0.05)).unwrap();
+    let model = SprayModel::default();
+    let kept = [shot(0.01, 0.0, 3e-10), shot(0.0, 0.01, 1e-10)];
+    let undone: Vec<Shot> = (0..20).map(|k| shot(1e-3 * f64::from(k), -0.005, 2.1e-10)).collect();
+    spray(&mut film, &kept, &model, &surface, 1);
+    let before = (film.volumes().to_vec(), film.mass_balance());
+    let mut touched = Vec::new();
+    let add = &mut |texel| touched.push(texel);
+    film.deposit_observed(&undone, &model, &surface, 2, add, &mut |_, _| {}).unwrap();
+    let changed = |texel: usize, film: &Film| film.volumes()[texel] != before.0[texel];
+    assert!((0..film.volumes().len()).all(|k| !changed(k, &film) || touched.contains(&(k as u32))));
+    let mut lost = Vec::new();
+    film.withdraw(&undone, &model, &surface, 1, &mut |texel| lost.push(texel)).unwrap();
+    assert_eq!((film.volumes().to_vec(), film.mass_balance()), before);
+    assert_eq!((lost.len(), touched.is_empty()), (touched.len(), false));
+    // Shots that were never fired.
+    let refused = film.withdraw(&[shot(0.0, 0.0, 1e-8)], &model, &surface, 1, &mut |_| ());
+    assert!(matches!(refused, Err(Error::NotDeposited { .. })), "{refused:?}");
+    assert_eq!((film.volumes().to_vec(), film.mass_balance()), before);
+}

@@ -22,3 +22,4 @@ mod stored_maps;
 mod strange_recordings;
 mod unwrap;
 mod vio;
+mod vr;

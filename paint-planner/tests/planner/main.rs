@@ -2,5 +2,6 @@
 
 mod gantry;
 mod plans;
+mod session;
 mod walls;
 mod worlds;

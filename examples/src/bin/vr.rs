@@ -1,0 +1,11 @@
+//! Painting by hand in a headset or a browser tab; the simulated robot follows.
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use paintcopter_examples::exit::exit_code;
+use paintcopter_examples::vr::{Arguments, run};
+
+fn main() -> ExitCode {
+    exit_code("vr", run(&Arguments::parse()))
+}

@@ -1,0 +1,38 @@
+//! Painting by hand in a headset or a browser tab, while the robot follows (VR paper).
+//!
+//! One process simulates the paint that the person sees, plans and flies what the person paints, and simulates the paint of the robot.
+//! [`Session`] is all of that without a network, a function of the events that come in; a server hands it those of the page, a replay
+//! those of a recording.
+
+mod arguments;
+mod canvas;
+mod connection;
+mod counters;
+mod error;
+mod event;
+mod experiment;
+mod figures;
+mod front_door;
+mod hand;
+mod message;
+mod mission_export;
+mod output;
+mod palette;
+mod protocol;
+mod recording;
+mod run;
+mod seat;
+mod serve;
+mod session;
+mod settings;
+mod vehicle;
+mod web_files;
+mod world;
+
+pub use arguments::Arguments;
+pub use error::VrError;
+pub use event::{Command, Event};
+pub use run::run;
+pub use session::Session;
+pub use settings::{Timing, VrSettings};
+pub use world::VrWorld;

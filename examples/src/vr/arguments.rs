@@ -1,0 +1,104 @@
+//! The command line of `vr`.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use clap::{Parser, ValueEnum};
+
+use super::settings::{Timing, VrSettings};
+use crate::mesh_placement::UpAxis;
+
+/// Serves a page on which a person paints a surface by hand, in a headset or with mouse, keyboard or touch; the simulated robot
+/// follows at once or flies the session later. Without a mesh: the built-in rock wall.
+#[derive(Debug, Clone, Parser)]
+#[command(
+    version,
+    after_help = "Examples:\n  vr\n  vr --mesh bust.obj --offline --out out/bust\n  vr --listen 0.0.0.0:8090\n  vr --replay out/vr/session.mcap --out out/again"
+)]
+pub struct Arguments {
+    /// Surface to paint, OBJ, PLY or OFF; the built-in rock wall if not given
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["map", "replay"])]
+    mesh: Option<PathBuf>,
+    /// A stored map of `scan` instead of a mesh
+    #[arg(long, value_name = "FILE", conflicts_with = "replay")]
+    map: Option<PathBuf>,
+    /// Metres per unit of the mesh file [default: the longest side becomes 3 m]
+    #[arg(long, requires = "mesh")]
+    scale: Option<f64>,
+    /// Axis of the mesh file that points up [default: y for OBJ, z otherwise]
+    #[arg(long, requires = "mesh")]
+    up: Option<Up>,
+    /// Size of a texel, metres
+    #[arg(long, value_name = "METRES", default_value_t = 0.005)]
+    texel: f64,
+    /// Standard deviation of a spray spot from 10 cm, metres
+    #[arg(long, value_name = "METRES", default_value_t = 0.015)]
+    spot: f64,
+    /// Length of the segments that the robot flies live, metres
+    #[arg(long, value_name = "METRES", default_value_t = 0.2)]
+    segment: f64,
+    /// How fast the robot paints what the hand has painted
+    #[arg(long, default_value = "dose")]
+    timing: Timing,
+    /// The robot does not follow at once: it flies when it is told to
+    #[arg(long)]
+    offline: bool,
+    /// Address to serve; anything but loopback is served only to who knows the token that is printed
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8090")]
+    pub(super) listen: SocketAddr,
+    /// Paint a recorded session again, serve nothing, and check that the plans are the same
+    #[arg(long, value_name = "FILE")]
+    pub(super) replay: Option<PathBuf>,
+    /// Let a simulated hand paint, serve nothing: the experiments of the VR paper
+    #[arg(long, conflicts_with = "replay")]
+    pub(super) experiment: Option<Experiment>,
+    /// Speed of that hand, metres per second
+    #[arg(long, value_name = "M_PER_S", default_value_t = 0.08, requires = "experiment")]
+    pub(super) hand_speed: f64,
+    /// Seed of the rock, the wind and the errors
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/vr")]
+    pub(super) out: PathBuf,
+}
+
+/// What a simulated hand paints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Experiment {
+    /// Rows of 7.75 m in all (VR paper, Section VI-B)
+    AreaFill,
+    /// A closed contour with a trembling hand (VR paper, Section VI-A)
+    Contour,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Up {
+    X,
+    Y,
+    Z,
+}
+
+impl Arguments {
+    /// What a new session is made with.
+    pub(super) fn settings(&self) -> VrSettings {
+        let mut settings = VrSettings {
+            mesh: self.mesh.clone(),
+            scale: self.scale,
+            up: self.up.map(|up| match up {
+                Up::X => UpAxis::X,
+                Up::Y => UpAxis::Y,
+                Up::Z => UpAxis::Z,
+            }),
+            map: self.map.clone(),
+            seed: self.seed,
+            texel: self.texel,
+            spot: self.spot,
+            timing: self.timing,
+            live: !self.offline,
+            ..VrSettings::default()
+        };
+        settings.session.segment = self.segment;
+        settings
+    }
+}

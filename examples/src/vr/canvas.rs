@@ -1,0 +1,151 @@
+//! Paint on the surface as a picture that changes: films of every paint, wet in wet, and the pixels that have to be drawn again.
+
+use paint_sim::colour::{BANDS, spectrum_srgb8};
+use paint_sim::{Film, Shot, SprayModel, Surface, km};
+
+use super::palette::PaletteEntry;
+use super::world::VrWorld;
+
+/// A rectangle of the atlas, sRGB.
+pub(super) struct Patch {
+    pub(super) left: u16,
+    pub(super) top: u16,
+    pub(super) width: u16,
+    pub(super) height: u16,
+    pub(super) rgb: Vec<u8>,
+}
+
+/// The films and their picture.
+pub(super) struct Canvas {
+    films: Vec<Film>,
+    /// Pixel of every texel of the films.
+    pixels: Vec<u32>,
+    columns: usize,
+    rows: usize,
+    rgb: Vec<u8>,
+    /// Texels whose colour is out of date, and a mark for each so that none is listed twice.
+    stale: Vec<u32>,
+    marked: Vec<bool>,
+}
+
+impl Canvas {
+    /// A bare surface.
+    pub(super) fn new(world: &VrWorld) -> Result<Self, paint_sim::Error> {
+        let (texels, pixels) = world.surface.film_texels();
+        let first = Film::new(texels)?;
+        let mut films: Vec<Film> = (1..world.palette.len()).map(|_| first.layer()).collect();
+        films.push(first);
+        let (columns, rows) = (world.surface.width(), world.surface.height());
+        let bare = world.ground.srgb().rgb;
+        Ok(Self {
+            marked: vec![false; pixels.len()],
+            pixels: pixels.into_iter().map(|pixel| pixel as u32).collect(),
+            films,
+            columns,
+            rows,
+            rgb: std::iter::repeat_n(bare, columns * rows).flatten().collect(),
+            stale: Vec::new(),
+        })
+    }
+
+    /// Sprays a paint.
+    pub(super) fn spray(
+        &mut self,
+        paint: u8,
+        shots: &[Shot],
+        model: &SprayModel,
+        surface: &dyn Surface,
+    ) -> Result<(), paint_sim::Error> {
+        let Self { films, stale, marked, .. } = self;
+        let touched = &mut |texel| mark(texel, stale, marked);
+        film(films, paint).deposit_observed(shots, model, surface, 1, touched, &mut |_, _| ()).map(|_| ())
+    }
+
+    /// Takes a paint back that was sprayed before.
+    pub(super) fn withdraw(
+        &mut self,
+        paint: u8,
+        shots: &[Shot],
+        model: &SprayModel,
+        surface: &dyn Surface,
+    ) -> Result<(), paint_sim::Error> {
+        let Self { films, stale, marked, .. } = self;
+        film(films, paint).withdraw(shots, model, surface, 1, &mut |texel| mark(texel, stale, marked))
+    }
+
+    /// Draws what has changed since the last call and returns the rectangle about it.
+    pub(super) fn take_patch(&mut self, world: &VrWorld) -> Option<Patch> {
+        let stale = std::mem::take(&mut self.stale);
+        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+        for texel in stale {
+            self.marked[texel as usize] = false;
+            let pixel = self.pixels[texel as usize] as usize;
+            let colour = self.colour(texel as usize, world);
+            self.rgb[3 * pixel..3 * pixel + 3].copy_from_slice(&colour);
+            let place = [pixel % self.columns, pixel / self.columns];
+            for k in 0..2 {
+                (low[k], high[k]) = (low[k].min(place[k]), high[k].max(place[k]));
+            }
+        }
+        (low[0] <= high[0]).then(|| self.patch(low, [high[0] - low[0] + 1, high[1] - low[1] + 1]))
+    }
+
+    /// All of the picture.
+    pub(super) fn whole(&self) -> Patch {
+        self.patch([0, 0], [self.columns, self.rows])
+    }
+
+    /// Paint on the surface, m^3.
+    pub(super) fn volume(&self) -> f64 {
+        self.films.iter().map(|film| film.mass_balance().deposited as f64).sum::<f64>() * paint_sim::spray::QUANTUM
+    }
+
+    /// Thickness of all paints together on every pixel, m; 0 beside the surface.
+    pub(super) fn thickness(&self) -> Vec<f64> {
+        let mut thickness = vec![0.0; self.columns * self.rows];
+        for (texel, &pixel) in self.pixels.iter().enumerate() {
+            thickness[pixel as usize] = self.films.iter().map(|film| film.thickness(texel)).sum();
+        }
+        thickness
+    }
+
+    /// Wet in wet: absorption and scattering add up by thickness (Duncan 1940), over the bare surface.
+    fn colour(&self, texel: usize, world: &VrWorld) -> [u8; 3] {
+        let (mut absorption, mut scattering) = ([0.0; BANDS], [0.0; BANDS]);
+        for (number, PaletteEntry { paint, .. }) in world.palette.iter().enumerate() {
+            let thickness = self.films[number].thickness(texel);
+            if thickness > 0.0 {
+                for band in 0..BANDS {
+                    absorption[band] += thickness * paint.absorption()[band];
+                    scattering[band] += thickness * paint.scattering()[band];
+                }
+            }
+        }
+        let ground = world.ground.reflectance();
+        let band = |k: usize| km::reflectance(absorption[k], scattering[k], 1.0, ground[k]);
+        spectrum_srgb8(&std::array::from_fn(band)).rgb
+    }
+
+    fn patch(&self, [left, top]: [usize; 2], [width, height]: [usize; 2]) -> Patch {
+        let row = |y: usize| &self.rgb[3 * (y * self.columns + left)..3 * (y * self.columns + left + width)];
+        Patch {
+            left: left as u16,
+            top: top as u16,
+            width: width as u16,
+            height: height as u16,
+            rgb: (top..top + height).flat_map(row).copied().collect(),
+        }
+    }
+}
+
+/// The film of a paint; one that is not on the palette is the last.
+fn film(films: &mut [Film], paint: u8) -> &mut Film {
+    let last = films.len() - 1;
+    &mut films[usize::from(paint).min(last)]
+}
+
+fn mark(texel: u32, stale: &mut Vec<u32>, marked: &mut [bool]) {
+    if !std::mem::replace(&mut marked[texel as usize], true) {
+        stale.push(texel);
+    }
+}

@@ -1,0 +1,156 @@
+//! One WebSocket: messages in within size and rate, whatever the session says out.
+
+use std::net::TcpStream;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError};
+use std::time::{Duration, Instant};
+
+use tungstenite::protocol::{Role, WebSocketConfig};
+use tungstenite::{Error, Message, WebSocket};
+
+use super::event::Event;
+use super::protocol::ClientMessage;
+use super::seat::Seat;
+
+/// Longest message, bytes: half a minute of states.
+const LONGEST_MESSAGE: usize = 1 << 20;
+/// Messages per second in the long run, and at once.
+const MESSAGES_PER_SECOND: f64 = 200.0;
+const BURST: f64 = 400.0;
+/// How long the socket waits for a message before what the session says is sent.
+const TURN: Duration = Duration::from_millis(2);
+/// A client that takes nothing for so long is gone.
+const WRITE_TIME: Duration = Duration::from_secs(5);
+
+/// Counts of all connections.
+#[derive(Debug, Default)]
+pub(super) struct TrafficCounts {
+    /// Messages that are none of the protocol, oversized ones among them.
+    pub(super) malformed: AtomicU64,
+    /// Messages dropped for their rate.
+    pub(super) too_many: AtomicU64,
+    /// Connections that were not let in.
+    pub(super) refused: AtomicU64,
+}
+
+/// What a connection has to tell the session.
+pub(super) enum Inbound {
+    /// It has the seat.
+    Join { connection: u64, key: String, outbox: SyncSender<Outgoing> },
+    /// Events of the person.
+    Events { connection: u64, events: Vec<Event> },
+    /// A message was dropped: the person's page has to hear what has arrived.
+    Dropped { connection: u64 },
+    /// It is over.
+    Leave { connection: u64 },
+}
+
+/// What the session has to say.
+pub(super) enum Outgoing {
+    Text(String),
+    Binary(Vec<u8>),
+}
+
+/// Allows a rate, and a burst.
+struct Bucket {
+    left: f64,
+    filled: Instant,
+}
+
+impl Bucket {
+    fn new() -> Self {
+        Self { left: BURST, filled: Instant::now() }
+    }
+
+    fn take(&mut self) -> bool {
+        let now = Instant::now();
+        self.left = (self.left + MESSAGES_PER_SECOND * (now - self.filled).as_secs_f64()).min(BURST);
+        self.filled = now;
+        let allowed = self.left >= 1.0;
+        self.left -= f64::from(u8::from(allowed));
+        allowed
+    }
+}
+
+/// Serves a connection that has the seat until it ends.
+pub(super) fn serve_connection(
+    stream: TcpStream,
+    rest: Vec<u8>,
+    connection: u64,
+    seat: &Seat,
+    inbox: &SyncSender<Inbound>,
+    outbox: &Receiver<Outgoing>,
+    counts: &TrafficCounts,
+) {
+    let timeouts = stream.set_read_timeout(Some(TURN)).and_then(|()| stream.set_write_timeout(Some(WRITE_TIME)));
+    // Small messages must not wait for larger ones.
+    if timeouts.and_then(|()| stream.set_nodelay(true)).is_ok() {
+        let config =
+            WebSocketConfig::default().max_message_size(Some(LONGEST_MESSAGE)).max_frame_size(Some(LONGEST_MESSAGE));
+        let mut socket = WebSocket::from_partially_read(stream, rest, Role::Server, Some(config));
+        let mut bucket = Bucket::new();
+        while seat.holds(connection) && turn(&mut socket, connection, &mut bucket, inbox, outbox, counts) {}
+        let _ = socket.close(None);
+        let _ = socket.flush();
+    }
+    seat.leave(connection);
+    let _ = inbox.send(Inbound::Leave { connection });
+}
+
+/// Sends what there is, then reads one message; whether the connection goes on.
+fn turn(
+    socket: &mut WebSocket<TcpStream>,
+    connection: u64,
+    bucket: &mut Bucket,
+    inbox: &SyncSender<Inbound>,
+    outbox: &Receiver<Outgoing>,
+    counts: &TrafficCounts,
+) -> bool {
+    loop {
+        let message = match outbox.try_recv() {
+            Ok(Outgoing::Text(text)) => Message::text(text),
+            Ok(Outgoing::Binary(bytes)) => Message::binary(bytes),
+            Err(TryRecvError::Empty) => break,
+            Err(TryRecvError::Disconnected) => return false,
+        };
+        if socket.write(message).is_err() {
+            return false;
+        }
+    }
+    if socket.flush().is_err() {
+        return false;
+    }
+    let message = match socket.read() {
+        Ok(message) => message,
+        Err(Error::Io(error)) => {
+            return matches!(error.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut);
+        }
+        Err(Error::ConnectionClosed | Error::AlreadyClosed) => return false,
+        // Oversized or broken frames: nothing after them can be trusted.
+        Err(_) => {
+            counts.malformed.fetch_add(1, Ordering::Relaxed);
+            return false;
+        }
+    };
+    let events = match &message {
+        Message::Text(text) => serde_json::from_str::<ClientMessage>(text).ok().map(|message| message.events),
+        Message::Ping(_) | Message::Pong(_) => return true,
+        Message::Close(_) => return false,
+        Message::Binary(_) | Message::Frame(_) => None,
+    };
+    let dropped = if events.is_none() {
+        Some(&counts.malformed)
+    } else if bucket.take() {
+        None
+    } else {
+        Some(&counts.too_many)
+    };
+    let inbound = match (dropped, events) {
+        (None, Some(events)) => Inbound::Events { connection, events },
+        (counter, _) => {
+            counter.unwrap_or(&counts.malformed).fetch_add(1, Ordering::Relaxed);
+            Inbound::Dropped { connection }
+        }
+    };
+    inbox.send(inbound).is_ok()
+}

@@ -1,0 +1,73 @@
+//! What the person does: states and commands, in one sequence.
+
+use nalgebra::Point3;
+use paint_planner::session::VrState;
+use serde::{Deserialize, Serialize};
+
+/// A button of the page.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Command {
+    /// Whether the robot follows at once.
+    Live {
+        /// Whether it does.
+        on: bool,
+    },
+    /// Take the last stroke back that is not flown yet.
+    Undo,
+    /// Take back what is painted within a radius and not flown yet.
+    Erase {
+        /// Centre in the world, m.
+        point: Point3<f64>,
+        /// Radius, m.
+        radius: f64,
+    },
+    /// Fly what was painted while the robot did not follow.
+    Fly,
+    /// Write the results and go on.
+    Save,
+    /// Write the results and end.
+    End,
+}
+
+/// One entry of a session. States and commands share one sequence without gaps, so that nothing is lost or done twice.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Event {
+    /// What the hand does.
+    State(VrState),
+    /// What a button does.
+    Command {
+        /// Its place in the sequence.
+        sequence: u64,
+        /// The button.
+        command: Command,
+    },
+}
+
+impl Event {
+    /// Place in the sequence.
+    pub fn sequence(&self) -> u64 {
+        match self {
+            Self::State(state) => state.sequence,
+            Self::Command { sequence, .. } => *sequence,
+        }
+    }
+
+    /// Refuses numbers that no page sends.
+    ///
+    /// # Errors
+    /// As [`VrState::check`].
+    pub fn check(&self) -> Result<(), paint_planner::Error> {
+        match self {
+            Self::State(state) => state.check(),
+            Self::Command { sequence, command: Command::Erase { point, radius } }
+                if !(point.iter().all(|c| c.is_finite()) && (0.0..=1.0).contains(radius)) =>
+            {
+                let what = "an eraser needs a finite point and a radius of at most a metre";
+                Err(paint_planner::Error::VrState { sequence: *sequence, what })
+            }
+            Self::Command { .. } => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,22 @@
+//! What the person is told, beside pictures.
+
+use paint_planner::session::Feedback;
+use serde::Serialize;
+
+/// A message of the session.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub enum Notice {
+    /// Feedback of the rules.
+    Feedback(Feedback),
+    /// A line to read.
+    Text {
+        /// The line.
+        text: String,
+    },
+    /// The session is over; the results are written.
+    Ended {
+        /// Where.
+        folder: String,
+    },
+}

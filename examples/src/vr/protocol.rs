@@ -1,0 +1,138 @@
+//! What page and server say to each other: text is JSON, binary is geometry and pixels, little-endian.
+
+use serde::{Deserialize, Serialize};
+
+use super::canvas::Patch;
+use super::event::Event;
+use super::message::Notice;
+use super::session::Session;
+use super::world::VrWorld;
+
+/// Version of everything below; the page reloads itself where it differs.
+pub(super) const PROTOCOL: u32 = 1;
+
+/// From the page.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ClientMessage {
+    /// Events in their order; those that were not acknowledged come again after a lost connection.
+    pub(super) events: Vec<Event>,
+}
+
+/// To the page.
+#[derive(Debug, Serialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub(super) enum ServerMessage {
+    /// The first message.
+    Welcome {
+        protocol: u32,
+        /// Who shows this key comes back to the session after a lost connection.
+        key: String,
+        next_sequence: u64,
+        /// Time of the latest state, s: the clock of a page goes on from there.
+        clock: f64,
+        name: String,
+        atlas: [usize; 2],
+        palette: Vec<Paint>,
+        live: bool,
+        cradle: [f64; 3],
+        heading: f64,
+        /// Distance from which painting is refused, m.
+        far: f64,
+        /// Nearest and farthest stand-off that the brush size stands for, m.
+        stand_off: [f64; 2],
+    },
+    /// All events before this one are part of the session.
+    Ack { next_sequence: u64 },
+    /// The robot and the latencies.
+    Robot {
+        position: [f64; 3],
+        /// x y z w.
+        rotation: [f64; 4],
+        pan_tilt: [f64; 2],
+        nozzle: [f64; 3],
+        aim: [f64; 3],
+        spraying: bool,
+        /// Latency in distance, m, and in time at the latest plan, s.
+        lag: f64,
+        latency: f64,
+        waiting: bool,
+        live: bool,
+    },
+    /// For the person.
+    Notice { notice: Notice },
+}
+
+/// A paint on the palette.
+#[derive(Debug, Serialize)]
+pub(super) struct Paint {
+    name: &'static str,
+    srgb: [u8; 3],
+}
+
+/// The first message of a session.
+pub(super) fn welcome(session: &Session, key: &str) -> ServerMessage {
+    let world = session.world();
+    ServerMessage::Welcome {
+        protocol: PROTOCOL,
+        key: key.into(),
+        next_sequence: session.next_sequence(),
+        clock: session.clock(),
+        name: world.name.clone(),
+        atlas: [world.surface.width(), world.surface.height()],
+        palette: world.palette.iter().map(|entry| Paint { name: entry.name, srgb: entry.srgb }).collect(),
+        live: session.is_live(),
+        cradle: world.stand.coords.into(),
+        heading: world.home.heading,
+        far: session.settings().session.far,
+        stand_off: super::settings::STAND_OFF,
+    }
+}
+
+/// Where the robot is.
+pub(super) fn robot(session: &Session) -> ServerMessage {
+    let view = session.vehicle();
+    let q = view.world_from_body.rotation.quaternion();
+    ServerMessage::Robot {
+        position: view.world_from_body.translation.vector.into(),
+        rotation: [q.i, q.j, q.k, q.w],
+        pan_tilt: view.pan_tilt,
+        nozzle: view.nozzle.coords.into(),
+        aim: view.aim.coords.into(),
+        spraying: view.flow > 0.0,
+        lag: session.lag(),
+        latency: session.curves().time.last().map_or(0.0, |(_, latency)| *latency),
+        waiting: session.is_waiting(),
+        live: session.is_live(),
+    }
+}
+
+/// The surface: `1 0 0 0`, vertices and faces as counts (u32), then positions, texture coordinates (f32) and corners (u32).
+pub(super) fn surface(world: &VrWorld) -> Vec<u8> {
+    let surface = &world.surface;
+    let (positions, faces) = (surface.vertices(), surface.disk().faces());
+    let extent = [surface.width(), surface.height()].map(|side| side as f64 * surface.texels.texel_m);
+    let mut bytes = vec![1, 0, 0, 0];
+    let mut word = |word: [u8; 4]| bytes.extend_from_slice(&word);
+    word((positions.len() as u32).to_le_bytes());
+    word((faces.len() as u32).to_le_bytes());
+    positions.iter().flatten().for_each(|c| word(c.to_le_bytes()));
+    for [u, v] in surface.chart.uv() {
+        word(((u / extent[0]) as f32).to_le_bytes());
+        // Row 0 of the atlas is its upper one.
+        word(((1.0 - v / extent[1]) as f32).to_le_bytes());
+    }
+    faces.iter().flatten().for_each(|corner| word(corner.to_le_bytes()));
+    bytes
+}
+
+/// A rectangle of a picture: `2`, its number (0 what the person sees, 1 what the robot has sprayed), `0 0`, left, top, width, height
+/// (u16), then three bytes per pixel.
+pub(super) fn patch(picture: u8, patch: &Patch) -> Vec<u8> {
+    let mut bytes = vec![2, picture, 0, 0];
+    for side in [patch.left, patch.top, patch.width, patch.height] {
+        bytes.extend_from_slice(&side.to_le_bytes());
+    }
+    bytes.extend_from_slice(&patch.rgb);
+    bytes
+}

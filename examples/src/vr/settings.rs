@@ -1,0 +1,127 @@
+//! What a session is made with; a recording carries it, so that a replay needs no options.
+
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+use paint_planner::session::{SessionSettings, TargetSettings};
+use paint_planner::{NozzleSettings, Settings, TimingPolicy};
+use paint_sim::SprayModel;
+use serde::{Deserialize, Serialize};
+
+use super::error::VrError;
+use crate::mesh_placement::UpAxis;
+use crate::mission::MissionSettings;
+
+/// How fast the robot paints what the hand has painted (VR paper, Section V-A).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum Timing {
+    /// At the robot's own speed; the valve gives every place what the hand gave it (ours)
+    Dose,
+    /// At the robot's own speed with an even coat along each segment
+    Uniform,
+    /// At the hand's speed, slower by one factor where the robot cannot follow
+    Gradient,
+}
+
+/// Everything that a session is made with.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct VrSettings {
+    /// Surface, OBJ, PLY or OFF; the built-in rock wall if there is none.
+    pub mesh: Option<PathBuf>,
+    /// Metres per unit of the mesh file.
+    pub scale: Option<f64>,
+    /// Axis of the mesh file that points up.
+    pub up: Option<UpAxis>,
+    /// A stored map of `scan` instead of a mesh file.
+    pub map: Option<PathBuf>,
+    /// Seed of the rock, the wind and the errors.
+    pub seed: u64,
+    /// Size of a texel, metres. Default 5 mm.
+    pub texel: f64,
+    /// Standard deviation of a spray spot at the stand-off, metres. Default 1.5 cm.
+    pub spot: f64,
+    /// How fast the robot paints.
+    pub timing: Timing,
+    /// Whether the robot follows at once; otherwise it flies when it is told to.
+    pub live: bool,
+    /// Thresholds of the session.
+    pub session: SessionSettings,
+}
+
+impl Default for VrSettings {
+    fn default() -> Self {
+        Self {
+            mesh: None,
+            scale: None,
+            up: None,
+            map: None,
+            seed: 1,
+            texel: 0.005,
+            spot: 0.015,
+            timing: Timing::Dose,
+            live: true,
+            session: SessionSettings::default(),
+        }
+    }
+}
+
+/// Nearest and farthest stand-off that the brush size stands for, metres: inside what the planner permits.
+pub(super) const STAND_OFF: [f64; 2] = [0.06, 0.14];
+/// Distance at which the robot looks at the surface, metres.
+pub(super) const VIEW_DISTANCE: f64 = 0.8;
+/// Where the cone of the spray ends, in deviations.
+const SPRAY_CUT: f64 = 3.5;
+/// Paint that has met nothing after this way is overspray, metres.
+const SPRAY_RANGE: f64 = 0.35;
+
+impl VrSettings {
+    /// Refuses sizes that are none.
+    pub(super) fn check(&self) -> Result<(), VrError> {
+        let sizes = [
+            ("--texel", self.texel, 1e-4..=0.1, "give metres from 0.0001 to 0.1"),
+            ("--spot", self.spot, 1e-3..=0.05, "give metres from 0.001 to 0.05"),
+            ("--segment", self.session.segment, 0.02..=10.0, "give metres from 0.02 to 10"),
+        ];
+        for (option, value, range, must_be) in sizes {
+            if !range.contains(&value) {
+                return Err(VrError::Option { option, value, must_be });
+            }
+        }
+        Ok(())
+    }
+
+    /// The nozzle in the simulation.
+    pub(super) fn spray(&self) -> SprayModel {
+        let sigma = (self.spot / NozzleSettings::default().stand_off).atan();
+        SprayModel { sigma, cut: SPRAY_CUT, range: SPRAY_RANGE, ..SprayModel::default() }
+    }
+
+    /// How segments become targets: normals averaged over the spot.
+    pub(super) fn targets(&self) -> TargetSettings {
+        TargetSettings { footprint: self.spot, ..TargetSettings::default() }
+    }
+
+    /// The planner for paint from a stand-off, metres.
+    pub(super) fn painting(&self, stand_off: f64) -> Settings {
+        let usual = MissionSettings::default().planner;
+        let mut settings = Settings { nozzle: NozzleSettings { stand_off, ..usual.nozzle.clone() }, ..usual };
+        if self.timing == Timing::Gradient {
+            settings.timing.policy = TimingPolicy::GradientPreserving;
+        }
+        settings
+    }
+}
+
+/// The planner for looking at the surface with the gun shut.
+pub(super) fn viewing() -> Settings {
+    let usual = MissionSettings::default().planner;
+    let nozzle = NozzleSettings {
+        stand_off: VIEW_DISTANCE,
+        min: 0.75 * VIEW_DISTANCE,
+        max: 1.25 * VIEW_DISTANCE,
+        ..usual.nozzle.clone()
+    };
+    Settings { nozzle, ..usual }
+}

@@ -1,0 +1,18 @@
+//! The page, built from `examples/web` and part of the program.
+
+/// A file of the page.
+pub(super) struct WebFile {
+    pub(super) kind: &'static str,
+    pub(super) bytes: &'static [u8],
+}
+
+/// The file of a path.
+pub(super) fn web_file(path: &str) -> Option<WebFile> {
+    let (kind, bytes): (&str, &[u8]) = match path {
+        "/" => ("text/html; charset=utf-8", include_bytes!("../../web/dist/index.html")),
+        "/app.js" => ("text/javascript; charset=utf-8", include_bytes!("../../web/dist/app.js")),
+        "/style.css" => ("text/css; charset=utf-8", include_bytes!("../../web/dist/style.css")),
+        _ => return None,
+    };
+    Some(WebFile { kind, bytes })
+}

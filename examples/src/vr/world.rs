@@ -1,0 +1,129 @@
+//! The surface before which the person stands.
+
+use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
+use paint_planner::VehicleState;
+use paint_planner::session::PaintHit;
+use paint_sim::{Substrate, Surface};
+use ptu_kinematics::{Ptu, PtuSettings};
+use tsdf_hash::Map;
+use uv_param::SurfacePoint;
+
+use super::error::VrError;
+use super::palette::{PaletteEntry, palette};
+use super::settings::VrSettings;
+use crate::adapters::Robot;
+use crate::appearance::sandstone;
+use crate::mesh_io::TriangleMesh;
+use crate::mission_file::MissionFile;
+use crate::progress::Stage;
+use crate::surface::PaintSurface;
+
+/// The gun's ray ends here, m.
+const RAY: f64 = 30.0;
+/// Largest side of the atlas, texels: what every headset's GPU takes.
+const LARGEST_ATLAS: usize = 4096;
+/// Where the person stands in the beginning, metres before the surface.
+const STAND: f64 = 1.8;
+/// Where the robot waits beside the person's view: metres before the surface, to the person's right, and up.
+const WAIT: [f64; 3] = [1.2, 0.75, 0.3];
+
+/// Surface, paints and robot.
+pub struct VrWorld {
+    pub(super) name: String,
+    pub(super) surface: PaintSurface,
+    pub(super) ground: Substrate,
+    pub(super) palette: Vec<PaletteEntry>,
+    pub(super) robot: Robot,
+    pub(super) ptu: PtuSettings,
+    /// Where the robot is in the beginning.
+    pub(super) home: VehicleState,
+    /// Where the person stands in the beginning: before the middle, looking along the same heading.
+    pub(super) stand: Point3<f64>,
+}
+
+impl VrWorld {
+    /// Reads the surface and lays it out in texels.
+    ///
+    /// # Errors
+    /// Files that cannot be read, surfaces that cannot be laid out or whose atlas is too large.
+    pub fn new(settings: &VrSettings) -> Result<Self, VrError> {
+        settings.check()?;
+        let (name, mesh) = read_mesh(settings)?;
+        let stage = Stage::start("unwrap");
+        let refused = |source| VrError::Surface { name: name.clone(), source };
+        let surface = PaintSurface::new(&mesh, settings.texel, &|share| stage.share(share)).map_err(refused)?;
+        stage.done(&format!(
+            "{} faces, {} x {} texels",
+            surface.disk().faces().len(),
+            surface.width(),
+            surface.height()
+        ));
+        let largest = surface.width().max(surface.height());
+        if largest > LARGEST_ATLAS {
+            return Err(VrError::AtlasTooLarge { side: largest, most: LARGEST_ATLAS });
+        }
+        let ptu = PtuSettings::default();
+        let (home, stand) = beginning(&surface);
+        Ok(Self {
+            name,
+            surface,
+            ground: sandstone()?,
+            palette: palette()?,
+            robot: Robot::new(Ptu::new(ptu)?),
+            ptu,
+            home,
+            stand,
+        })
+    }
+
+    /// Where the gun's ray (x of the nozzle) meets the part of the surface that is painted, with its smooth normal.
+    pub(super) fn hit(&self, nozzle: &Isometry3<f64>) -> Option<PaintHit> {
+        let origin = Point3::from(nozzle.translation.vector);
+        self.cast(&origin, &(nozzle.rotation * Vector3::x_axis()))
+    }
+
+    /// The same for any ray.
+    pub(super) fn cast(&self, origin: &Point3<f64>, direction: &UnitVector3<f64>) -> Option<PaintHit> {
+        let hit = self.surface.world.cast(origin, direction, RAY)?;
+        // The back of the surface and what stands beside it are not painted.
+        if hit.face as usize >= self.surface.disk().faces().len() || hit.normal.dot(direction) >= 0.0 {
+            return None;
+        }
+        let [a, b] = hit.barycentric;
+        let at = SurfacePoint { face: hit.face, barycentric: [1.0 - a - b, a, b] };
+        let normal = self.surface.chart.smooth_normal(at);
+        Some(PaintHit { point: origin + direction.into_inner() * hit.distance, normal })
+    }
+}
+
+/// The mesh file, the map or the rock.
+fn read_mesh(settings: &VrSettings) -> Result<(String, TriangleMesh), VrError> {
+    let Some(path) = &settings.map else {
+        let mut file = MissionFile {
+            mesh: settings.mesh.clone(),
+            scale: settings.scale,
+            up: settings.up,
+            ..MissionFile::default()
+        };
+        file.settings.seed = settings.seed;
+        return Ok(file.read_surface()?);
+    };
+    let mesh = Map::open(path).map_err(|source| VrError::Map { path: path.clone(), source })?.mesh();
+    let name = path.file_stem().map_or("Map".into(), |stem| stem.to_string_lossy().into_owned());
+    Ok((name, TriangleMesh { positions: mesh.positions, faces: mesh.faces, ..TriangleMesh::default() }))
+}
+
+/// Where robot and person are in the beginning, looking at the surface.
+fn beginning(surface: &PaintSurface) -> (VehicleState, Point3<f64>) {
+    let points = || surface.disk().positions().iter().map(|p| Vector3::from(*p));
+    let (low, high) =
+        points().fold((Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)), |(l, h), p| (l.inf(&p), h.sup(&p)));
+    let facing = surface.facing();
+    let front: Vector3<f64> = Vector3::new(facing.x, facing.y, 0.0).try_normalize(0.1).unwrap_or(-Vector3::x());
+    let middle = (low + high) / 2.0;
+    let depth = 0.5 * front.abs().dot(&(high - low));
+    let right = Vector3::z().cross(&front);
+    let position = Point3::from(middle + front * (depth + WAIT[0]) + right * WAIT[1] + Vector3::z() * WAIT[2]);
+    let home = VehicleState { position, heading: (-front.y).atan2(-front.x), pan: 0.0, tilt: 0.0 };
+    (home, Point3::from(middle + front * (depth + STAND)))
+}

@@ -1,0 +1,286 @@
+//! The binary `vr`: a simulated hand and its replay, the server against clients that behave and clients that do not.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use tungstenite::{Message, WebSocket};
+
+use crate::scratch::Scratch;
+
+/// A wall of 2.6 metres by 1.4, facing -x.
+const WALL: &str = "v 0 1.3 1\nv 0 -1.3 1\nv 0 -1.3 2.4\nv 0 1.3 2.4\nf 1 2 3\nf 1 3 4\n";
+
+fn vr(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_vr")).args(arguments).output().unwrap()
+}
+
+fn report(folder: &str) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(format!("{folder}/report.json")).unwrap()).unwrap()
+}
+
+fn wall(scratch: &Scratch) -> [String; 5] {
+    scratch.write("wall.obj", WALL);
+    ["--mesh".into(), scratch.path("wall.obj"), "--up".into(), "z".into(), "--scale=1".into()]
+}
+
+#[test]
+fn a_session_is_flown_as_it_was_seen_and_replays_bit_for_bit() {
+    let s = Scratch::new("vr");
+    let (first, second) = (s.path("first"), s.path("second"));
+    let mesh = wall(&s);
+    let mut arguments: Vec<&str> = mesh.iter().map(String::as_str).collect();
+    arguments.extend([
+        "--experiment",
+        "contour",
+        "--hand-speed",
+        "0.4",
+        "--segment",
+        "0.5",
+        "--texel",
+        "0.01",
+        "--out",
+        &first,
+    ]);
+    let output = vr(&arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let figures = report(&first);
+    assert!(figures["ssim_flown_seen"].as_f64().unwrap() > 0.9, "{figures:#}");
+    let (seen, flown) = (figures["paint_seen_ml"].as_f64().unwrap(), figures["paint_flown_ml"].as_f64().unwrap());
+    assert!(seen > 1.0 && (flown / seen - 1.0).abs() < 0.03, "{seen} ml seen, {flown} ml flown");
+    assert_eq!(figures["targets"], figures["targets_served"]);
+    for file in
+        ["session.mcap", "plan.csv", "seen.png", "flown.png", "latency.png", "mission.toml", "mission_paint.png"]
+    {
+        assert!(s.0.join("first").join(file).metadata().is_ok_and(|found| found.len() > 100), "{file}");
+    }
+
+    // The pictures are those of the end: as much of the wall is dark in both.
+    let dark = |name: &str| {
+        let picture = image::open(s.0.join("first").join(name)).unwrap().to_luma8();
+        picture.pixels().filter(|pixel| pixel.0[0] < 120).count() as f64
+    };
+    let (seen, flown) = (dark("seen.png"), dark("flown.png"));
+    assert!(seen > 500.0 && (flown / seen - 1.0).abs() < 0.04, "{seen} pixels seen, {flown} flown");
+
+    let recording = format!("{first}/session.mcap");
+    let output = vr(&["--replay", &recording, "--out", &second]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let plan = |folder: &str| std::fs::read(format!("{folder}/plan.csv")).unwrap();
+    assert!(plan(&first) == plan(&second), "the plans differ");
+
+    // A recording of another surface is told from its plans, and a file that is none by its name.
+    s.write("wall.obj", WALL.replace("v 0 1.3 2.4", "v 0.4 1.3 2.4"));
+    let output = vr(&["--replay", &recording, "--out", &s.path("third")]);
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(1) && text.contains("plans differ"), "{text}");
+    let output = vr(&["--replay", &recording, "--out", &first]);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("overwrite"));
+    let output = vr(&["--replay", &s.path("wall.obj"), "--out", &second]);
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(1) && text.contains("wall.obj"), "{text}");
+}
+
+/// A running server; ended if a test fails.
+struct Server {
+    child: Child,
+    address: String,
+    query: String,
+}
+
+impl Server {
+    fn start(arguments: &[&str]) -> Self {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_vr"))
+            .args(arguments)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
+        let (address, query) = line.trim().trim_start_matches("http://").split_once('/').unwrap();
+        Self { child, address: address.replace("0.0.0.0", "127.0.0.1"), query: query.into() }
+    }
+
+    /// The status line of a request.
+    fn get(&self, path: &str, headers: &str) -> String {
+        let mut stream = TcpStream::connect(&self.address).unwrap();
+        let host = if headers.contains("Host:") { String::new() } else { format!("Host: {}\r\n", self.address) };
+        stream.write_all(format!("GET {path} HTTP/1.1\r\n{host}{headers}\r\n").as_bytes()).unwrap();
+        let mut answer = Vec::new();
+        let _ = stream.read_to_end(&mut answer);
+        String::from_utf8_lossy(&answer).lines().next().unwrap_or("").to_owned()
+    }
+
+    fn connect(&self, key: &str) -> Result<Client, String> {
+        let stream = TcpStream::connect(&self.address).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        let address =
+            format!("ws://{}/session{}&key={key}", self.address, if self.query.is_empty() { "?" } else { &self.query });
+        let (socket, _) = tungstenite::client(&address, stream).map_err(|error| error.to_string())?;
+        let mut client = Client { socket, key: String::new(), next: 0 };
+        let welcome = client.until("welcome");
+        client.key = welcome["key"].as_str().unwrap().into();
+        client.next = welcome["next_sequence"].as_u64().unwrap();
+        Ok(client)
+    }
+
+    fn finish(mut self) -> bool {
+        let begun = Instant::now();
+        while begun.elapsed() < Duration::from_mins(1) {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                return status.success();
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        false
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+    }
+}
+
+struct Client {
+    socket: WebSocket<TcpStream>,
+    key: String,
+    next: u64,
+}
+
+impl Client {
+    /// The next message of a type.
+    fn until(&mut self, kind: &str) -> Value {
+        loop {
+            if let Message::Text(text) = self.socket.read().unwrap() {
+                let message: Value = serde_json::from_str(&text).unwrap();
+                if message["type"] == kind {
+                    return message;
+                }
+            }
+        }
+    }
+
+    fn send(&mut self, events: &[Value]) -> u64 {
+        self.socket.send(Message::text(json!({ "events": events }).to_string())).unwrap();
+        self.until("ack")["next_sequence"].as_u64().unwrap()
+    }
+
+    /// States of a gun before the wall, in the order of `sequence`; they paint between 10 and 40.
+    fn states(from: u64, to: u64) -> Vec<Value> {
+        let state = |k: u64| {
+            let mode = if (10..40).contains(&k) { "painting" } else { "idle" };
+            let at = json!([-0.1, 0.2 - 0.005 * k as f64, 2.2]);
+            json!({"state": {"version": 1, "sequence": k, "time": k as f64 / 90.0, "mode": mode,
+                "nozzle": {"translation": at, "rotation": [0.0, 0.0, 0.0, 1.0]},
+                "cradle": {"position": [-1.0, 0.0, 2.2], "heading": 0.0}, "colour": 0, "flow": 4e-7}})
+        };
+        (from..to).map(state).collect()
+    }
+}
+
+#[test]
+fn nothing_is_lost_or_done_twice_over_lost_connections() {
+    let s = Scratch::new("vr-server");
+    let out = s.path("out");
+    let mesh = wall(&s);
+    let mut arguments: Vec<&str> = mesh.iter().map(String::as_str).collect();
+    arguments.extend(["--listen", "127.0.0.1:0", "--texel", "0.01", "--out", &out]);
+    let server = Server::start(&arguments);
+    assert!(server.get("/", "").contains("200") && server.get("/app.js", "").contains("200"));
+    assert!(server.get("/../Cargo.toml", "").contains("404") && server.get("/session", "").contains("426"));
+    assert!(server.get("/", "Host: evil.example\r\n").contains("403"), "a name that is led here by an attacker");
+    let foreign = format!("Host: {}\r\nOrigin: http://evil.example\r\n", server.address);
+    assert!(server.get("/session", &foreign).contains("403"), "another page's script");
+
+    let mut client = server.connect("").unwrap();
+    assert_eq!(client.send(&Client::states(0, 20)), 20);
+    assert!(server.connect("").is_err() && server.connect("guessed").is_err(), "another person is painting");
+    // A gap: what follows it is not taken.
+    assert_eq!(client.send(&Client::states(25, 30)), 20);
+    // The connection is lost; what had arrived comes again with the rest.
+    let key = client.key.clone();
+    let mut client = server.connect(&key).unwrap();
+    assert_eq!((client.next, client.key.as_str()), (20, key.as_str()));
+    assert_eq!(client.send(&Client::states(10, 60)), 60);
+    client
+        .socket
+        .send(Message::text(json!({"events": [{"command": {"sequence": 60, "command": {"do": "end"}}}]}).to_string()))
+        .unwrap();
+    client.until("notice");
+    assert!(server.finish());
+    let figures = report(&out);
+    let count = |name: &str| figures[name].as_u64().unwrap();
+    assert_eq!((count("events"), count("states"), count("repeated_events")), (61, 60, 10));
+    assert_eq!((count("event_gaps"), count("missing_ticks"), count("connections")), (1, 0, 2));
+    assert_eq!(count("refused_connections"), 5);
+    // Thirty ticks of 0.4 ml/s, seen and flown.
+    let seen = figures["paint_seen_ml"].as_f64().unwrap();
+    assert!((seen - 0.4 * 30.0 / 90.0).abs() < 0.002, "{seen}");
+    assert!(figures["paint_flown_ml"].as_f64().unwrap() > 0.9 * seen);
+}
+
+#[test]
+fn ten_thousand_bad_messages_are_counted_and_the_session_goes_on() {
+    let s = Scratch::new("vr-hostile");
+    let out = s.path("out");
+    let mesh = wall(&s);
+    let mut arguments: Vec<&str> = mesh.iter().map(String::as_str).collect();
+    arguments.extend(["--listen", "0.0.0.0:0", "--texel", "0.02", "--out", &out]);
+    let server = Server::start(&arguments);
+    assert!(server.query.starts_with("?token=") && server.query.len() == 39, "{}", server.query);
+    assert!(server.get("/", "").contains("403") && server.get("/?token=0123", "").contains("403"));
+    assert!(server.get(&format!("/{}", server.query), "").contains("200"));
+
+    let mut client = server.connect("").unwrap();
+    let key = client.key.clone();
+    let sound = json!({"events": Client::states(0, 1)}).to_string();
+    let mut sent = 0_u64;
+    let mut send = |client: &mut Client, message: Message| {
+        client.socket.write(message).unwrap();
+        sent += 1;
+        // The server answers each of them; unread answers would fill the line.
+        if sent.is_multiple_of(50) {
+            client.socket.flush().unwrap();
+            for _ in 0..50 {
+                client.until("ack");
+            }
+        }
+    };
+    for k in 0..9_950_usize {
+        let message = match k % 5 {
+            0 => Message::text(&sound[..k % sound.len()]),
+            1 => Message::binary(vec![k as u8; k % 300]),
+            2 => Message::text(format!("{{\"events\":[{{\"state\":{k}}}]}}")),
+            3 => Message::text("[".repeat(k % 400)),
+            _ => Message::text(json!({"events": [], "more": k}).to_string()),
+        };
+        send(&mut client, message);
+    }
+    // Sound messages with numbers that no headset sends are events that are refused.
+    let odd = json!({"events": [{"state": {"version": 1, "sequence": 0, "time": 1e300, "mode": "painting",
+        "nozzle": {"translation": [1e30, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 9.0]},
+        "cradle": {"position": [0.0, 0.0, 0.0], "heading": 0.0}, "colour": 200, "flow": 9.0}}]});
+    client.socket.send(Message::text(odd.to_string())).unwrap();
+    assert_eq!(client.until("ack")["next_sequence"], 1);
+    // Oversized ones end the connection, not the session.
+    for _ in 0..50 {
+        let _ = client.socket.send(Message::text("x".repeat(1_500_000)));
+        client = server.connect(&key).unwrap();
+    }
+    assert_eq!(client.send(&Client::states(1, 60)), 60);
+    client
+        .socket
+        .send(Message::text(json!({"events": [{"command": {"sequence": 60, "command": {"do": "end"}}}]}).to_string()))
+        .unwrap();
+    client.until("notice");
+    assert!(server.finish());
+    let figures = report(&out);
+    let count = |name: &str| figures[name].as_u64().unwrap();
+    assert_eq!(count("malformed_messages"), 10_000);
+    assert_eq!((count("refused_events"), count("states")), (1, 59));
+}

@@ -1,0 +1,29 @@
+// Builds the page into dist/, or with --check says whether dist/ is what the sources build to.
+import { build } from "esbuild";
+import { readFile, writeFile, mkdir } from "node:fs/promises";
+
+const options = { bundle: true, minify: true, format: "esm", target: "es2022", legalComments: "none", write: false };
+const script = await build({ ...options, entryPoints: ["src/main.ts"] });
+const files = {
+  "app.js": Buffer.from(script.outputFiles[0].contents),
+  "index.html": await readFile("src/index.html"),
+  "style.css": await readFile("src/style.css"),
+};
+let size = 0;
+let stale = [];
+await mkdir("dist", { recursive: true });
+for (const [name, contents] of Object.entries(files)) {
+  size += contents.length;
+  if (process.argv.includes("--check")) {
+    const shipped = await readFile(`dist/${name}`).catch(() => Buffer.alloc(0));
+    if (!shipped.equals(contents)) stale.push(name);
+  } else {
+    await writeFile(`dist/${name}`, contents);
+  }
+}
+console.log(`${(size / 1e6).toFixed(2)} MB`);
+if (size > 1.5e6) throw new Error("the page must not be larger than 1.5 MB");
+if (stale.length > 0) {
+  console.error(`dist/ is not what the sources build to (${stale.join(", ")}): run \`npm run build\` and commit it`);
+  process.exit(1);
+}

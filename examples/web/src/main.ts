@@ -1,0 +1,218 @@
+// The page of `vr`: a wall to paint, a gun, a robot that follows.
+import * as THREE from "three";
+import { Atlas } from "./atlas";
+import { Banner } from "./banner";
+import { Connection } from "./connection";
+import { Cradle } from "./cradle";
+import { Gun } from "./gun";
+import { Headset } from "./headset";
+import { Pointer } from "./pointer";
+import { PROTOCOL, STATE_VERSION, readPatch, readSurface } from "./protocol";
+import type { Mode, Notice, ServerMessage } from "./protocol";
+import { Quality, drawsInSoftware } from "./quality";
+import { Robot } from "./robot";
+import { Tools } from "./tools";
+import { Wall } from "./wall";
+
+// Time without a movement after which a pointer rests, milliseconds.
+const STILL = 60;
+// Radius of the eraser, metres.
+const ERASER = 0.06;
+
+const canvas = document.getElementById("scene") as HTMLCanvasElement;
+const renderer = new THREE.WebGLRenderer({ canvas, antialias: !drawsInSoftware() });
+const quality = new Quality(renderer);
+const scene = new THREE.Scene();
+scene.background = new THREE.Color(0xdfe7ec);
+scene.fog = new THREE.Fog(0xdfe7ec, 12, 40);
+scene.add(new THREE.HemisphereLight(0xf4f8ff, 0x8d7f70, 1.9));
+const sun = new THREE.DirectionalLight(0xfff1dd, 1.7);
+scene.add(sun, sun.target);
+const ground = new THREE.Mesh(new THREE.CircleGeometry(30, 64), new THREE.MeshLambertMaterial({ color: 0xb9c2c6 }));
+scene.add(ground);
+const grid = new THREE.GridHelper(30, 30, 0x9aa7ae, 0xa9b4ba);
+grid.rotateX(Math.PI / 2).translateY(0.002);
+scene.add(grid);
+
+const camera = new THREE.PerspectiveCamera(62, 1, 0.03, 60);
+const cradle = new Cradle();
+cradle.group.add(camera);
+scene.add(cradle.group);
+const banner = new Banner(document.getElementById("notice") as HTMLElement);
+camera.add(banner.sign);
+const robot = new Robot();
+const gun = new Gun();
+scene.add(robot.group, gun.group);
+// When the pointer has last painted, milliseconds.
+let moved = 0;
+// A slow picture must not make strokes coarse: the pointer's own events are states as well.
+const pointer = new Pointer(canvas, cradle, (time) => {
+  if (!wall || headset.presenting) return;
+  moved = performance.now();
+  publish(wall, time);
+});
+const headset = new Headset(renderer, cradle);
+const caster = new THREE.Raycaster();
+
+let atlas: Atlas | null = null;
+let wall: Wall | null = null;
+let placed = false;
+// When the hand painted what is not on the screen yet, whether its paint has come, and how long it took, milliseconds.
+let sprayed = 0;
+let fresh = false;
+const delays: number[] = [];
+// The session's clock goes on where it was when the page came.
+let begun = 0;
+
+const tools = new Tools((name, on) => {
+  switch (name) {
+    case "live":
+      return connection.command({ do: "live", on });
+    case "flown":
+      if (wall) wall.flown = on;
+      return;
+    case "hands":
+      headset.swapped = !headset.swapped;
+      return tools.hands(headset.swapped);
+    case "enter":
+      return void headset.enter();
+    case "undo":
+    case "fly":
+    case "save":
+    case "end":
+      return connection.command({ do: name });
+  }
+});
+
+const connection = new Connection({ message, binary, connected: (open) => tools.connected(open, connection.waiting) });
+
+function message(message: ServerMessage): void {
+  switch (message.type) {
+    case "welcome":
+      if (message.protocol !== PROTOCOL) return location.reload();
+      document.title = `PaintCopter: ${message.name}`;
+      tools.welcome(message);
+      atlas ??= new Atlas(...message.atlas);
+      if (!placed) {
+        begun = message.clock + 0.01 - performance.now() / 1000;
+        cradle.place(message.cradle, message.heading);
+        const back = new THREE.Vector3(-Math.cos(message.heading), -Math.sin(message.heading), 0);
+        sun.position.copy(back).multiplyScalar(4).add(new THREE.Vector3(0, 0, 7)).addScaledVector(new THREE.Vector3(-back.y, back.x, 0), 3);
+        placed = true;
+      }
+      return;
+    case "robot":
+      robot.update(message);
+      return tools.robot(message);
+    case "notice":
+      return notice(message.notice);
+  }
+}
+
+function notice(notice: Notice): void {
+  const say = (text: string) => banner.say(text, headset.presenting);
+  if (notice.type === "text") return say(notice.text);
+  if (notice.type === "ended") return say(`results in ${notice.folder}`);
+  switch (notice.say) {
+    case "move_closer":
+      return say("Move closer to the surface");
+    case "wait":
+      return say("Wait: the robot is catching up");
+    case "ready":
+      return say("Go on");
+    case "show_vehicle":
+      robot.shown = true;
+      return say("Slower: the robot is behind");
+    case "hide_vehicle":
+      robot.shown = false;
+      return;
+    case "queue_full":
+      return say("The queue is full: wait for the robot");
+  }
+}
+
+function binary(data: ArrayBuffer): void {
+  const kind = new Uint8Array(data, 0, 1)[0];
+  if (kind === 1 && atlas && !wall) {
+    wall = new Wall(readSurface(data), atlas);
+    scene.add(wall.mesh);
+  } else if (kind === 2) {
+    const patch = readPatch(data);
+    atlas?.update(patch);
+    fresh ||= patch.picture === 0;
+  }
+}
+
+addEventListener("keydown", (event) => {
+  if (event.code === "KeyZ" && !event.repeat) connection.command({ do: "undo" });
+  cradle.keys.add(event.code);
+});
+addEventListener("keyup", (event) => cradle.keys.delete(event.code));
+addEventListener("blur", () => cradle.keys.clear());
+
+function resize(): void {
+  if (headset.presenting) return;
+  renderer.setSize(innerWidth, innerHeight, false);
+  camera.aspect = innerWidth / innerHeight;
+  camera.updateProjectionMatrix();
+}
+addEventListener("resize", resize);
+resize();
+
+/** Where the gun is and what it does. */
+function aim(wall: Wall): Mode {
+  if (headset.presenting) {
+    gun.visible = headset.update();
+    gun.hold(headset.origin, headset.direction, wall);
+    return headset.mode;
+  }
+  caster.setFromCamera(new THREE.Vector2(pointer.at.x, pointer.at.y), camera);
+  gun.point(caster.ray.origin, caster.ray.direction, wall, tools.distance);
+  gun.visible = gun.hit !== null;
+  if (pointer.viewing || cradle.keys.has("KeyV")) return "viewing";
+  return pointer.painting ? "painting" : "idle";
+}
+
+/** Sends what the hand does at a time, milliseconds; what it does. */
+function publish(wall: Wall, time: number): Mode {
+  let mode = aim(wall);
+  if (mode === "painting" && tools.erasing) {
+    if (gun.hit) connection.command({ do: "erase", point: gun.hit.point.toArray(), radius: ERASER });
+    mode = "idle";
+  }
+  if (mode === "painting" && gun.hit && sprayed === 0) [sprayed, fresh] = [performance.now(), false];
+  connection.state({
+    version: STATE_VERSION,
+    time: begun + time / 1000,
+    mode,
+    nozzle: gun.pose,
+    cradle: { position: cradle.group.position.toArray(), heading: cradle.heading },
+    colour: tools.colour,
+    flow: tools.flow,
+  });
+  return mode;
+}
+
+const clock = new THREE.Timer();
+renderer.setAnimationLoop((time) => {
+  clock.update(time);
+  cradle.move(Math.min(clock.getDelta(), 0.1));
+  if (!headset.presenting) camera.rotation.set(pointer.pitch, 0, 0);
+  scene.updateMatrixWorld();
+  // A pointer that moves speaks for itself: a frame between two of its places would hold it still, and the stroke would be dots.
+  const now = performance.now();
+  const moving = !headset.presenting && now - moved < STILL;
+  if (wall && !moving) wall.project(publish(wall, now) === "viewing" ? robot.camera : null);
+  renderer.render(scene, camera);
+  if (!headset.presenting) quality.frame(time);
+  if (sprayed > 0 && fresh) {
+    if (delays.push(performance.now() - sprayed) > 2000) delays.shift();
+    sprayed = 0;
+  }
+});
+
+void Headset.available().then((available) => tools.headset(available));
+navigator.xr?.addEventListener("devicechange", () => void Headset.available().then((found) => tools.headset(found)));
+
+// For tests in a browser: what the page knows, and a way to lose the connection.
+Object.assign(window, { paintcopter: { connection, headset, cradle, camera, delays, renderer, wall: () => wall } });

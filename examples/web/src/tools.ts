@@ -1,0 +1,80 @@
+// The panel: palette, sliders, buttons, read-outs.
+import type { RobotState, Welcome } from "./protocol";
+
+// Flow of the open valve, m^3/s.
+const MOST_FLOW = 1e-6;
+
+const element = <T extends HTMLElement>(id: string) => document.getElementById(id) as T;
+
+export class Tools {
+  colour = 0;
+  erasing = false;
+  private standOff: [number, number] = [0.06, 0.14];
+
+  /** Calls `act` with the name of a button that is pressed. */
+  constructor(act: (name: string, on: boolean) => void) {
+    for (const name of ["live", "fly", "undo", "erase", "flown", "hands", "save", "end", "enter"]) {
+      const button = element<HTMLButtonElement>(name);
+      button.addEventListener("click", () => {
+        const toggles = button.hasAttribute("aria-pressed");
+        const on = toggles && button.getAttribute("aria-pressed") !== "true";
+        if (toggles) button.setAttribute("aria-pressed", String(on));
+        if (name === "erase") this.erasing = on;
+        // The next key is meant for the scene.
+        button.blur();
+        act(name, on);
+      });
+    }
+  }
+
+  welcome(welcome: Welcome): void {
+    this.standOff = welcome.stand_off;
+    element("live").setAttribute("aria-pressed", String(welcome.live));
+    const palette = element("palette");
+    palette.replaceChildren(
+      ...welcome.palette.map((paint, number) => {
+        const button = document.createElement("button");
+        button.style.background = `rgb(${paint.srgb.join(",")})`;
+        button.title = paint.name;
+        button.setAttribute("role", "radio");
+        button.setAttribute("aria-label", paint.name);
+        button.setAttribute("aria-checked", String(number === this.colour));
+        button.addEventListener("click", () => {
+          this.colour = number;
+          for (const [k, other] of [...palette.children].entries()) other.setAttribute("aria-checked", String(k === number));
+        });
+        return button;
+      }),
+    );
+  }
+
+  /** Flow, m^3/s. */
+  get flow(): number {
+    return MOST_FLOW * element<HTMLInputElement>("flow").valueAsNumber;
+  }
+
+  /** Distance of the gun from the surface, metres: what the brush size stands for. */
+  get distance(): number {
+    const [near, far] = this.standOff;
+    return near + (far - near) * element<HTMLInputElement>("brush").valueAsNumber;
+  }
+
+  connected(open: boolean, waiting: number): void {
+    element("dot").classList.toggle("on", open);
+    element("connection").textContent = open ? "connected" : `connection lost, ${waiting} states kept`;
+  }
+
+  robot(state: RobotState): void {
+    element("lag").textContent = `${state.lag.toFixed(2)} m`;
+    element("latency").textContent = state.latency > 0 ? `${state.latency.toFixed(1)} s` : "–";
+  }
+
+  hands(swapped: boolean): void {
+    element("hands").textContent = swapped ? "paint: trigger" : "paint: touchpad";
+  }
+
+  headset(available: boolean): void {
+    element("enter").hidden = !available;
+    element("hands").hidden = !available;
+  }
+}

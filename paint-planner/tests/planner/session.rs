@@ -1,0 +1,405 @@
+//! VR sessions: Algorithm 1 and its rules on sequences worked by hand, segments, the clock, targets.
+
+#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
+
+use paint_planner::nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
+use paint_planner::session::{
+    CradlePose, FarReference, Feedback, LagIndicator, LiveQueue, PaintHit, RATE, Resampler, Segment, SessionSettings,
+    TargetSettings, Task, VERSION, VrMode, VrState, latency_in_time, segments, targets,
+};
+use paint_planner::{Error, OptimalPlanner, Planner, Settings, TimingPolicy};
+
+use crate::walls::{Arm, Wall};
+
+/// Where the vehicle stands unless a test says otherwise.
+const VEHICLE: Point3<f64> = Point3::new(-0.7, 0.0, 2.0);
+
+/// The `k`-th state of a hand 10 cm before the wall x = 0 that is at `y`.
+fn state(k: u64, mode: VrMode, y: f64) -> VrState {
+    VrState {
+        version: VERSION,
+        sequence: k,
+        time: k as f64 / RATE,
+        mode,
+        nozzle: Isometry3::translation(-0.1, y, 2.0),
+        cradle: CradlePose { position: VEHICLE, heading: 0.0 },
+        hit: (mode == VrMode::Painting).then(|| hit(y)),
+        colour: 0,
+        flow: 1e-6,
+    }
+}
+
+fn hit(y: f64) -> PaintHit {
+    PaintHit { point: Point3::new(0.0, y, 2.0), normal: -Vector3::x_axis() }
+}
+
+fn settings(segment: f64) -> SessionSettings {
+    SessionSettings { segment, longest: segment, ..SessionSettings::default() }
+}
+
+/// Pushes everything, then lets the algorithm run until nothing is left.
+fn run(queue: &mut LiveQueue, states: &[VrState]) -> Vec<Task> {
+    for state in states {
+        queue.push(*state);
+    }
+    let now = states.last().unwrap().time;
+    let mut tasks = Vec::new();
+    while let Some(task) = queue.next_task(now, &VEHICLE) {
+        tasks.push(task);
+    }
+    tasks
+}
+
+/// Sequence numbers of the states of each task; a task of one state says which rule it is.
+fn summary(tasks: &[Task]) -> Vec<String> {
+    let one = |task: &Task| match task {
+        Task::Approach(state) => format!("approach {}", state.sequence),
+        Task::Seek(state) => format!("seek {}", state.sequence),
+        Task::Segment(segment) => {
+            let (first, last) = (segment.states[0].sequence, segment.states[segment.states.len() - 1].sequence);
+            format!("{:?} {first}..{last} {:.3} m", segment.mode, segment.length)
+        }
+    };
+    tasks.iter().map(one).collect()
+}
+
+#[test]
+fn a_stroke_is_approached_cut_at_the_threshold_and_flushed_at_the_release() {
+    // Steps of 3 cm, a threshold of 10 cm: full after the states 4 and 8, the state that fills a segment begins the next.
+    let mut states = vec![state(0, VrMode::Idle, 0.0)];
+    states.extend((0..10).map(|k| state(k + 1, VrMode::Painting, 0.03 * k as f64)));
+    states.push(state(11, VrMode::Idle, 0.27));
+    let mut queue = LiveQueue::new(settings(0.1));
+    let tasks = run(&mut queue, &states);
+    let expected = ["approach 1", "Painting 1..5 0.120 m", "Painting 5..9 0.120 m", "Painting 9..10 0.030 m"];
+    assert_eq!(summary(&tasks), expected);
+    let starts: Vec<f64> =
+        tasks[1..].iter().map(|task| if let Task::Segment(s) = task { s.start } else { -1.0 }).collect();
+    assert!(starts.iter().zip([0.0, 0.12, 0.24]).all(|(a, b)| (a - b).abs() < 1e-12), "{starts:?}");
+    assert!(queue.is_empty() && (queue.painted_length() - 0.27).abs() < 1e-12);
+}
+
+#[test]
+fn a_stroke_that_ends_on_the_threshold_leaves_no_stub() {
+    let mut states: Vec<VrState> = (0..5).map(|k| state(k, VrMode::Painting, 0.025 * k as f64)).collect();
+    states.push(state(5, VrMode::Idle, 0.1));
+    let mut queue = LiveQueue::new(settings(0.0999));
+    assert_eq!(summary(&run(&mut queue, &states)), ["approach 0", "Painting 0..4 0.100 m"]);
+    // A dab of one state afterwards is a stroke of its own.
+    let dab = [state(6, VrMode::Painting, 0.3), state(7, VrMode::Idle, 0.3)];
+    assert_eq!(summary(&run(&mut queue, &dab)), ["approach 6", "Painting 6..6 0.000 m"]);
+}
+
+#[test]
+fn a_vehicle_that_is_behind_takes_longer_segments() {
+    let mut states: Vec<VrState> = (0..20).map(|k| state(k, VrMode::Painting, 0.03 * k as f64)).collect();
+    states.push(state(20, VrMode::Idle, 0.57));
+    let mut queue = LiveQueue::new(SessionSettings { longest: 0.25, ..settings(0.1) });
+    let expected = ["approach 0", "Painting 0..9 0.270 m", "Painting 9..18 0.270 m", "Painting 18..19 0.030 m"];
+    assert_eq!(summary(&run(&mut queue, &states)), expected);
+}
+
+#[test]
+fn an_empty_queue_in_the_middle_of_a_stroke_waits_for_the_timeout() {
+    let mut queue = LiveQueue::new(settings(1.0));
+    let states: Vec<VrState> = (0..4).map(|k| state(k, VrMode::Painting, 0.02 * k as f64)).collect();
+    assert_eq!(summary(&run(&mut queue, &states)), ["approach 0"]);
+    let last = states[3].time;
+    assert!(queue.step(last + 0.29, &VEHICLE).is_none());
+    assert_eq!(summary(&[queue.step(last + 0.31, &VEHICLE).unwrap()]), ["Painting 0..3 0.060 m"]);
+}
+
+#[test]
+fn the_release_makes_the_person_wait_until_the_queue_is_empty() {
+    let mut queue = LiveQueue::new(settings(0.1));
+    for k in 0..4 {
+        queue.push(state(k, VrMode::Painting, 0.02 * k as f64));
+    }
+    queue.push(state(4, VrMode::Idle, 0.06));
+    assert_eq!(queue.take_feedback(), [Feedback::Wait { states: 5 }]);
+    // Pressed again at once: refused, and said so once.
+    queue.push(state(5, VrMode::Painting, 0.5));
+    queue.push(state(6, VrMode::Painting, 0.51));
+    assert_eq!(queue.take_feedback(), [Feedback::Wait { states: 5 }]);
+    assert_eq!(queue.counts().refused_waiting, 2);
+    assert_eq!(summary(&run(&mut queue, &[state(7, VrMode::Painting, 0.52)])), ["approach 0", "Painting 0..3 0.060 m"]);
+    assert_eq!(queue.take_feedback(), [Feedback::Ready]);
+    // The stroke goes on from where the queue was empty.
+    let states = [state(8, VrMode::Painting, 0.53), state(9, VrMode::Painting, 0.54), state(10, VrMode::Idle, 0.54)];
+    assert_eq!(summary(&run(&mut queue, &states)), ["approach 8", "Painting 8..9 0.010 m"]);
+    assert_eq!((queue.counts().accepted, queue.counts().refused_waiting), (6, 3));
+}
+
+#[test]
+fn painting_from_afar_is_refused_and_what_was_near_is_kept() {
+    let far = |k, y| VrState { nozzle: Isometry3::translation(-1.2, y, 2.0), ..state(k, VrMode::Painting, y) };
+    let states = [
+        state(0, VrMode::Painting, 0.0),
+        state(1, VrMode::Painting, 0.02),
+        far(2, 0.03),
+        far(3, 0.04),
+        state(4, VrMode::Painting, 0.05),
+        state(5, VrMode::Idle, 0.05),
+    ];
+    let mut queue = LiveQueue::new(settings(1.0));
+    let tasks = run(&mut queue, &states);
+    assert_eq!(summary(&tasks), ["approach 0", "Painting 0..1 0.020 m", "approach 4", "Painting 4..4 0.000 m"]);
+    let closer: Vec<Feedback> =
+        queue.take_feedback().into_iter().filter(|f| matches!(f, Feedback::MoveCloser { .. })).collect();
+    assert_eq!(closer, [Feedback::MoveCloser { distance: 1.2 }]);
+    assert_eq!(queue.counts().far, 2);
+    // As printed, the distance is the vehicle's, which is 70 cm from the wall here and would not mind.
+    let printed = SessionSettings { far_reference: FarReference::Vehicle, ..settings(1.0) };
+    let mut queue = LiveQueue::new(printed);
+    assert_eq!(summary(&run(&mut queue, &states)), ["approach 0", "Painting 0..4 0.050 m"]);
+}
+
+#[test]
+fn the_vehicle_seeks_a_cradle_that_is_a_metre_away() {
+    let at = |k, x: f64| VrState {
+        cradle: CradlePose { position: VEHICLE + Vector3::new(x, 0.0, 0.0), heading: 0.0 },
+        ..state(k, VrMode::Idle, 0.0)
+    };
+    let mut queue = LiveQueue::new(settings(1.0));
+    assert!(run(&mut queue, &[at(0, -0.99)]).is_empty());
+    assert_eq!(
+        summary(&run(&mut queue, &[at(1, -1.2), at(2, -1.01)])),
+        ["seek 2"],
+        "of a pause its latest state counts"
+    );
+}
+
+#[test]
+fn viewing_is_measured_at_the_nozzle_and_a_change_of_mode_flushes() {
+    let mut states: Vec<VrState> = (0..3).map(|k| state(k, VrMode::Viewing, 0.1 * k as f64)).collect();
+    states.extend((3..5).map(|k| state(k, VrMode::Painting, 0.01 * k as f64)));
+    states.push(state(5, VrMode::Idle, 0.0));
+    let mut queue = LiveQueue::new(settings(0.5));
+    let expected = ["approach 0", "Viewing 0..2 0.200 m", "approach 3", "Painting 3..4 0.010 m"];
+    assert_eq!(summary(&run(&mut queue, &states)), expected);
+}
+
+#[test]
+fn a_full_queue_refuses_and_says_so_once() {
+    let mut queue = LiveQueue::new(SessionSettings { capacity: 3, ..settings(1.0) });
+    for k in 0..6 {
+        queue.push(state(k, VrMode::Painting, 0.01 * k as f64));
+    }
+    assert_eq!((queue.len(), queue.counts().refused_full), (3, 3));
+    assert_eq!(queue.take_feedback(), [Feedback::QueueFull { capacity: 3 }]);
+}
+
+#[test]
+fn offline_segments_run_from_press_to_release_and_break_at_jumps() {
+    let p = VrMode::Painting;
+    let turned = PaintHit { normal: -Vector3::y_axis(), ..hit(0.12) };
+    let states = [
+        state(0, VrMode::Idle, 0.0),
+        state(1, p, 0.0),
+        state(2, p, 0.02),
+        VrState { hit: None, ..state(3, p, 0.0) }, // within 50 ms: the stroke goes on
+        state(4, p, 0.04),
+        state(5, p, 0.1), // a jump of 6 cm
+        VrState { hit: Some(turned), ..state(6, p, 0.0) },
+        VrState { hit: Some(turned), colour: 1, ..state(7, p, 0.0) },
+        state(8, VrMode::Viewing, 0.0),
+        state(9, VrMode::Viewing, 0.3),
+        state(10, VrMode::Idle, 0.0),
+        state(11, p, 0.0),
+        state(17, p, 0.01), // 67 ms without a state
+    ];
+    let found: Vec<Task> = segments(states, &SessionSettings::default()).into_iter().map(Task::Segment).collect();
+    let expected = [
+        "Painting 1..4 0.040 m",
+        "Painting 5..5 0.000 m",
+        "Painting 6..6 0.000 m",
+        "Painting 7..7 0.000 m",
+        "Viewing 8..9 0.300 m",
+        "Painting 11..11 0.000 m",
+        "Painting 17..17 0.000 m",
+    ];
+    assert_eq!(summary(&found), expected);
+}
+
+/// The protocol of the VR paper, Section VI-B: the hand paints 7.75 m; a segment is planned when the nozzle has finished the one before
+/// it. Returns least and greatest latency in distance (m, from the first flight until the hand stops) and in time (s, at each plan).
+fn latencies(segment: f64, hand: f64, planning: f64, nozzle: f64) -> ([f64; 2], [f64; 2]) {
+    let mut queue = LiveQueue::new(settings(segment));
+    let (mut free, mut flying): (f64, Option<(f64, Segment)>) = (0.0, None);
+    let (mut distance, mut time) = ([f64::MAX, 0.0], [f64::MAX, 0.0_f64]);
+    let widen = |range: &mut [f64; 2], value: f64| *range = [range[0].min(value), range[1].max(value)];
+    for k in 0..=(7.75 / hand * RATE) as u64 {
+        let now = k as f64 / RATE;
+        queue.push(state(k, VrMode::Painting, hand * now));
+        while now >= free {
+            match queue.next_task(now, &VEHICLE) {
+                Some(Task::Segment(segment)) => {
+                    widen(&mut time, latency_in_time(now + planning, &segment));
+                    free = now + planning + segment.length / nozzle;
+                    flying = Some((now + planning, segment));
+                }
+                Some(_) => {}
+                None => break,
+            }
+        }
+        if let Some((begin, segment)) = flying.as_ref().filter(|(begin, _)| now >= *begin) {
+            let flown = segment.start + ((now - begin) * nozzle).min(segment.length);
+            widen(&mut distance, queue.painted_length() - flown);
+        }
+    }
+    (distance, time)
+}
+
+#[test]
+fn the_latencies_of_the_paper_come_out_of_its_protocol() {
+    // Worked out in closed form: segment k is complete at k D/v, and the nozzle is as fast as the hand or faster.
+    let near = |[low, high]: [f64; 2], wanted: [f64; 2], tolerance: f64| {
+        assert!(
+            (low - wanted[0]).abs() < tolerance && (high - wanted[1]).abs() < tolerance,
+            "{low} {high}, {wanted:?}"
+        );
+    };
+    let (distance, time) = latencies(1.0, 0.08, 0.356, 0.08);
+    near(distance, [1.03, 1.20], 0.01);
+    near(time, [12.9, 15.0], 0.1);
+    // With a faster nozzle every wait ends before the next segment is complete.
+    let (distance, time) = latencies(0.5, 0.08, 0.189, 0.15);
+    near(distance, [0.28, 0.52], 0.01);
+    near(time, [6.4, 6.5], 0.1);
+}
+
+#[test]
+fn the_vehicle_is_shown_while_it_lags() {
+    let mut indicator = LagIndicator::default();
+    let mut told = |lag| indicator.update(lag, &SessionSettings::default());
+    assert_eq!(told(0.5), None);
+    assert_eq!(told(0.51), Some(Feedback::ShowVehicle { lag: 0.51 }));
+    assert_eq!(told(0.3), None);
+    assert_eq!(told(0.25), Some(Feedback::HideVehicle));
+    assert_eq!(told(0.3), None);
+}
+
+#[test]
+fn states_at_any_rate_become_ninety_a_second() {
+    // 60 Hz on a clock of its own, the hand at 0.3 m/s.
+    let raw = |k: u64, mode| {
+        let seconds = k as f64 / 60.0;
+        VrState { sequence: k, time: 1000.0 + seconds, ..state(k, mode, 0.3 * seconds) }
+    };
+    let mut resampler = Resampler::new(SessionSettings::default());
+    let mut ticks = Vec::new();
+    for k in 0..=120 {
+        resampler.push(raw(k, VrMode::Painting), &mut ticks);
+    }
+    assert_eq!(ticks.len(), 181);
+    for (k, tick) in ticks.iter().enumerate() {
+        let seconds = k as f64 / RATE;
+        assert_eq!((tick.sequence, tick.time), (k as u64, seconds));
+        assert!((tick.hit.unwrap().point.y - 0.3 * seconds).abs() < 1e-9, "{k}");
+        assert!((tick.nozzle_position().y - 0.3 * seconds).abs() < 1e-9, "{k}");
+    }
+    // Out of order, then a gap: nothing is invented.
+    resampler.push(raw(119, VrMode::Painting), &mut ticks);
+    resampler.push(raw(240, VrMode::Painting), &mut ticks);
+    assert_eq!(ticks.len(), 181);
+    let counts = resampler.counts();
+    assert_eq!((counts.states, counts.not_later, counts.missing_ticks), (123, 1, 179));
+    // A press counts from its own tick on: it is not drawn out to the idle state before it.
+    let mut resampler = Resampler::new(SessionSettings::default());
+    let mut ticks = Vec::new();
+    for (k, mode) in [(0, VrMode::Idle), (1, VrMode::Painting), (2, VrMode::Painting)] {
+        resampler.push(raw(k, mode), &mut ticks);
+    }
+    let modes: Vec<VrMode> = ticks.iter().map(|tick| tick.mode).collect();
+    assert_eq!(modes, [VrMode::Idle, VrMode::Idle, VrMode::Painting, VrMode::Painting]);
+}
+
+#[test]
+fn targets_keep_volume_gradient_and_time() {
+    // Half a second standing, then 30 cm at 0.3 m/s, then 30 cm at 0.6 m/s, always 1 ml/s.
+    let mut states: Vec<VrState> = (0..45).map(|k| state(k, VrMode::Painting, 0.0)).collect();
+    states.extend((0..90).map(|k| state(45 + k, VrMode::Painting, 0.3 / RATE * k as f64)));
+    states.extend((0..=45).map(|k| state(135 + k, VrMode::Painting, 0.3 + 0.6 / RATE * k as f64)));
+    let segment = Segment { mode: VrMode::Painting, states, start: 0.0, length: 0.6 };
+    let found = targets(&segment, &Wall::flat(), &TargetSettings::default());
+    assert_eq!(found.len(), 61);
+    let volume: f64 = found.windows(2).map(|pair| pair[0].dose * (pair[1].point - pair[0].point).norm()).sum();
+    assert!((volume - 1e-6 * 2.0).abs() < 1e-14, "{volume}");
+    for (k, target) in found.iter().enumerate() {
+        assert!((target.point.y - 0.01 * k as f64).abs() < 1e-9);
+        assert!(target.normal.dot(&-Vector3::x()) > 1.0 - 1e-12);
+        // Flow over speed, except where the pause went.
+        let dose = if k >= 30 { 1e-6 / 0.6 } else { 1e-6 / 0.3 };
+        assert!(k == 0 || k == 29 || k == 60 || (target.dose - dose).abs() < 1e-10, "{k}: {}", target.dose);
+    }
+    assert!(found[0].dose > 10.0 * found[1].dose && found[60].dose == 0.0);
+    assert!((found[40].time.unwrap() - (1.5 + 0.1 / 0.6)).abs() < 1e-6);
+    assert!(found.windows(2).all(|pair| pair[0].time < pair[1].time));
+    // The planner takes them as they are.
+    let timing =
+        paint_planner::TimingSettings { policy: TimingPolicy::GradientPreserving, ..Settings::default().timing };
+    let settings = Settings { timing, ..Settings::default() };
+    let plan = OptimalPlanner::default().plan(&found, &Wall::flat(), &Arm::default(), &settings).unwrap();
+    let flown: f64 = (0..found.len()).map(|k| plan.volume(k)).sum();
+    assert!((flown - volume).abs() < 1e-9 * volume);
+}
+
+#[test]
+fn normals_are_those_of_the_footprint() {
+    // A hit on one facet of a ridge that points up at 45 degrees: the mean is that of both sides.
+    struct Ridge;
+    impl paint_planner::Surface for Ridge {
+        fn cast(&self, o: &Point3<f64>, _: &UnitVector3<f64>, _: f64) -> Option<paint_planner::Hit> {
+            let side = if o.z > 2.0 { 1.0 } else { -1.0 };
+            let normal = UnitVector3::new_normalize(Vector3::new(-1.0, 0.0, side));
+            Some(paint_planner::Hit { point: *o, normal, distance: 0.05 })
+        }
+        fn distance(&self, _: &Point3<f64>, max: f64) -> f64 {
+            max
+        }
+    }
+    let at = |y: f64| PaintHit { point: Point3::new(0.0, y, 2.0), normal: -Vector3::x_axis() };
+    let states =
+        (0..2).map(|k| VrState { hit: Some(at(0.02 * k as f64)), ..state(k, VrMode::Painting, 0.0) }).collect();
+    let segment = Segment { mode: VrMode::Painting, states, start: 0.0, length: 0.02 };
+    let found = targets(&segment, &Ridge, &TargetSettings::default());
+    // One normal of the hit, two in six exactly on the ridge, which count as below.
+    let up = found[0].normal.z / -found[0].normal.x;
+    assert!(up.abs() < 0.35, "{up}");
+}
+
+#[test]
+fn a_dab_is_two_targets_with_its_paint() {
+    let dab = Segment {
+        mode: VrMode::Painting,
+        states: (0..9).map(|k| state(k, VrMode::Painting, 0.4)).collect(),
+        start: 0.0,
+        length: 0.0,
+    };
+    let found = targets(&dab, &Wall::flat(), &TargetSettings::default());
+    assert_eq!(found.len(), 2);
+    let way = (found[1].point - found[0].point).norm();
+    assert!((way - 0.005).abs() < 1e-12 && (found[0].dose * way - 8.0 / RATE * 1e-6).abs() < 1e-15);
+    let nothing = Segment { states: Vec::new(), ..dab };
+    assert!(targets(&nothing, &Wall::flat(), &TargetSettings::default()).is_empty());
+}
+
+#[test]
+fn states_that_no_headset_sends_are_refused_by_name() {
+    let good = state(7, VrMode::Painting, 0.0);
+    good.check().unwrap();
+    let refused = |bad: VrState, word: &str| {
+        let Err(Error::VrState { sequence: 7, what }) = bad.check() else { panic!("{word}: {:?}", bad.check()) };
+        assert!(what.contains(word), "{what}");
+    };
+    let mut bad = good;
+    bad.nozzle.rotation = UnitQuaternion::new_unchecked(bad.nozzle.rotation.into_inner() * 2.0);
+    refused(bad, "quaternion");
+    refused(VrState { version: 2, ..good }, "version");
+    refused(VrState { time: f64::NAN, ..good }, "time");
+    refused(VrState { nozzle: Isometry3::translation(f64::INFINITY, 0.0, 0.0), ..good }, "nozzle");
+    refused(VrState { cradle: CradlePose { heading: f64::NAN, ..good.cradle }, ..good }, "cradle");
+    let point = Point3::new(1e9, 0.0, 0.0);
+    refused(VrState { hit: Some(PaintHit { point, ..hit(0.0) }), ..good }, "hit");
+    refused(VrState { flow: -1.0, ..good }, "flow");
+}
