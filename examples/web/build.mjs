@@ -2,12 +2,23 @@
 import { build } from "esbuild";
 import { readFile, writeFile, mkdir } from "node:fs/promises";
 
-const options = { bundle: true, minify: true, format: "esm", target: "es2022", legalComments: "none", write: false };
+const options = { bundle: true, minify: true, format: "esm", target: "es2022", legalComments: "none", write: false, metafile: true };
 const script = await build({ ...options, entryPoints: ["src/main.ts"] });
+// The page holds code of other projects: their licences go with it.
+const packages = new Set(
+  Object.keys(script.metafile.inputs).flatMap((path) => path.match(/^node_modules\/((?:@[^/]+\/)?[^/]+)/)?.[1] ?? []),
+);
+const licences = await Promise.all(
+  [...packages].sort().map(async (name) => {
+    const { version } = JSON.parse(await readFile(`node_modules/${name}/package.json`, "utf8"));
+    return `${name} ${version}\n\n${(await readFile(`node_modules/${name}/LICENSE`, "utf8")).trim()}\n`;
+  }),
+);
 const files = {
   "app.js": Buffer.from(script.outputFiles[0].contents),
   "index.html": await readFile("src/index.html"),
   "style.css": await readFile("src/style.css"),
+  "licences.txt": Buffer.from(licences.join("\n\n")),
 };
 let size = 0;
 let stale = [];

@@ -12,6 +12,7 @@ pub(super) fn web_file(path: &str) -> Option<WebFile> {
         "/" => ("text/html; charset=utf-8", include_bytes!("../../web/dist/index.html")),
         "/app.js" => ("text/javascript; charset=utf-8", include_bytes!("../../web/dist/app.js")),
         "/style.css" => ("text/css; charset=utf-8", include_bytes!("../../web/dist/style.css")),
+        "/licences.txt" => ("text/plain; charset=utf-8", include_bytes!("../../web/dist/licences.txt")),
         _ => return None,
     };
     Some(WebFile { kind, bytes })
