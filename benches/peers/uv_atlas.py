@@ -48,8 +48,10 @@ def run(command):
     return done.stdout, done.stderr.strip(), done.returncode
 
 
-def row(mesh, tool, seconds, path, utilisation, metres=None):
-    e = evaluation.evaluate(*evaluation.read_obj(path), metres)
+def row(mesh, tool, seconds, path, utilisation, metres=None, aspect=1.0):
+    """`aspect` is the height of a page over its width: v is in units of the height."""
+    positions, coordinates, faces, coordinate_faces = evaluation.read_obj(path)
+    e = evaluation.evaluate(positions, coordinates * [1.0, aspect], faces, coordinate_faces, metres)
     cells = [
         f"{mesh} ({e['faces']})",
         tool,
@@ -88,7 +90,8 @@ def main():
             else:
                 report = json.load(open(os.path.join(out, "report.json")))
                 metres = report["page_width_px"] * report["texel_m"]
-                row(stem, "unwrap", report["cpu_s"], os.path.join(out, "atlas.obj"), report["utilisation"], metres)
+                aspect = report["page_height_px"] / report["page_width_px"]
+                row(stem, "unwrap", report["cpu_s"], os.path.join(out, "atlas.obj"), report["utilisation"], metres, aspect)
             if o.without_peers:
                 continue
             peers = [sys.executable, os.path.join(HERE, "uv_peers.py"), "closed", path, "--runs", "1"]

@@ -24,6 +24,7 @@ use crate::error::Error;
 use crate::parametrizer::{Parametrizer, Progress};
 use crate::surface::{FaceLookup, Surface, SurfaceReport};
 pub use charting::ChartSettings;
+use pack::Piece;
 pub use pack::{PackSettings, Page, Placement, Turns};
 pub use quality::AtlasQuality;
 pub use texels::{PageTexels, TexelKind};
@@ -85,7 +86,8 @@ impl Atlas {
     ) -> Result<Self, Error> {
         pack::check(&settings.pack, surface.area())?;
         let (charts, members) = charting::charts(&surface, seams, &settings.charts, parametrizer, &mut progress)?;
-        let (placements, pages) = pack::pack(&charts, &settings.pack)?;
+        let pieces: Vec<Piece> = charts.iter().map(|c| Piece { uv: c.uv(), faces: c.disk().faces() }).collect();
+        let (placements, pages) = pack::pack(&pieces, &settings.pack)?;
         let mut place_of_face = vec![[0; 2]; surface.faces().len()];
         for (chart, faces) in members.iter().enumerate() {
             for (local, &f) in faces.iter().enumerate() {

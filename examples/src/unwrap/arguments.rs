@@ -36,7 +36,7 @@ pub struct Arguments {
     /// Texels between two charts
     #[arg(long, default_value_t = 4)]
     pub gutter: usize,
-    /// Columns and rows of a page, texels [default: one square page, as small as was found]
+    /// Columns and rows of a page, texels [default: one page, the smallest rectangle that was found]
     #[arg(long, value_name = "W,H", value_parser = page)]
     pub page: Option<[usize; 2]>,
     /// Folder for the results

@@ -49,14 +49,15 @@ fn a_box_is_unfolded_and_read_back() {
     assert_eq!(after.positions, before.positions);
     assert_eq!(after.faces.len(), before.faces.len());
     let uv = after.uv.unwrap();
-    let side = report["page_width_px"].as_f64().unwrap() * 0.02;
+    let sides = ["page_width_px", "page_height_px"].map(|side| report[side].as_f64().unwrap() * 0.02);
     for (corners, coordinates) in after.faces.iter().zip(&uv.faces) {
         for k in 0..3 {
-            let distance =
-                |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>().sqrt();
-            let [p, q] = [k, (k + 1) % 3].map(|k| after.positions[corners[k] as usize]);
-            let [s, t] = [k, (k + 1) % 3].map(|k| uv.coordinates[coordinates[k] as usize]);
-            assert!((distance(&p, &q) - side * distance(&s, &t)).abs() < 1e-4);
+            let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+            let [p, q] = [k, (k + 1) % 3].map(|k| after.positions[corners[k] as usize].map(f64::from));
+            let [s, t] = [k, (k + 1) % 3]
+                .map(|k| uv.coordinates[coordinates[k] as usize])
+                .map(|uv| [sides[0] * f64::from(uv[0]), sides[1] * f64::from(uv[1])]);
+            assert!((distance(&p, &q) - distance(&s, &t)).abs() < 1e-4);
         }
     }
     let glb = gltf::Gltf::from_slice(&std::fs::read(out.join("atlas.glb")).unwrap()).unwrap();

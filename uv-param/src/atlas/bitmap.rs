@@ -2,6 +2,9 @@
 
 const BITS: usize = 64;
 
+/// Runs of cells with their rows: what of a shape can touch something first.
+pub(super) type Outline = Vec<(u32, [usize; 2])>;
+
 /// Rows of bits; row 0 is the lowest.
 #[derive(Debug, Clone)]
 pub(super) struct Bitmap {
@@ -75,6 +78,11 @@ impl Bitmap {
         }
     }
 
+    /// Marked cells.
+    pub(super) fn count(&self) -> usize {
+        self.bits.iter().map(|word| word.count_ones() as usize).sum()
+    }
+
     /// The map with every cell spread by `by` cells to all sides, on a map that is larger by as much on each side.
     pub(super) fn dilated(&self, by: usize) -> Self {
         let mut wide = Self::new(self.columns + 2 * by, self.rows + 2 * by);
@@ -89,7 +97,7 @@ impl Bitmap {
     }
 
     /// Runs of cells with an empty neighbour above, below or beside, by row: what can touch something first.
-    pub(super) fn outline(&self) -> Vec<(u32, [usize; 2])> {
+    pub(super) fn outline(&self) -> Outline {
         let mut found = Vec::new();
         for row in 0..self.rows {
             let here = self.row(row);
@@ -126,16 +134,18 @@ impl Bitmap {
         }
     }
 
-    /// The lowest place, and there the leftmost, at which an outline of this width and height meets no marked cell.
+    /// The lowest place, and there the leftmost, at which an outline of this width and height meets no marked cell, and how many
+    /// words were looked at.
     pub(super) fn lowest_place(
         &self,
         outline: &[(u32, [usize; 2])],
         [width, height]: [usize; 2],
         below: usize,
-    ) -> Option<[usize; 2]> {
+    ) -> (Option<[usize; 2]>, u64) {
         if width > self.columns || height > self.rows {
-            return None;
+            return (None, 0);
         }
+        let mut work = 0;
         let places = self.columns - width + 1;
         let words = places.div_ceil(BITS);
         let mut taken = vec![0u64; words];
@@ -147,6 +157,7 @@ impl Bitmap {
             }
             let full = |taken: &[u64]| taken.iter().all(|&w| w == u64::MAX);
             for (i, &(r, [from, to])) in outline.iter().enumerate() {
+                work += words as u64;
                 spread_down(self.row(row + r as usize), to - from, &mut spread);
                 let (skip, shift) = (from / BITS, from % BITS);
                 for (w, slot) in taken.iter_mut().enumerate() {
@@ -160,10 +171,10 @@ impl Bitmap {
                 }
             }
             if let Some(w) = taken.iter().position(|&w| w != u64::MAX) {
-                return Some([w * BITS + taken[w].trailing_ones() as usize, row]);
+                return (Some([w * BITS + taken[w].trailing_ones() as usize, row]), work);
             }
         }
-        None
+        (None, work)
     }
 }
 
@@ -259,7 +270,7 @@ mod tests {
             let all: Vec<_> = (0..shape.rows)
                 .flat_map(|r| runs(shape.row(r), shape.columns).map(move |run| (r as u32, run)).collect::<Vec<_>>())
                 .collect();
-            assert_eq!(page.lowest_place(&all, [shape.columns, shape.rows], usize::MAX), expected);
+            assert_eq!(page.lowest_place(&all, [shape.columns, shape.rows], usize::MAX).0, expected);
         }
     }
 

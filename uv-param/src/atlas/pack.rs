@@ -1,119 +1,64 @@
-//! Charts onto pages: bottom-left on bitmaps, the largest first, holes filled by the small ones.
+//! Charts onto pages: bottom-left on bitmaps, holes filled by the small ones, improved by local search.
 
-use super::bitmap::Bitmap;
-use crate::chart::Chart;
+mod bottom_left;
+mod search;
+mod settings;
+mod shape;
+
 use crate::error::Error;
+use search::{Goal, Packed, Plan, Stages, carry_out, carry_out_unlimited, search};
+pub(super) use settings::check;
+pub use settings::{PackSettings, Page, Placement, Turns};
+pub(super) use shape::Piece;
+use shape::Shapes;
 
-/// Cells along the side of a page whose area is that of the charts while its size is searched for.
-const COARSE_CELLS: f64 = 150.0;
-/// The same for the final places; finer does not fit more.
-const FINE_CELLS: f64 = 450.0;
-/// Orders of the charts that are tried: the first by size, the others near it.
-const ORDERS: usize = 48;
-/// How far the size of a chart may be misjudged in these: a factor, as a power of two.
-const SHUFFLE: f64 = 1.5;
-/// Most texels of a page: 8192 x 8192, which take 2.7 GB as points of the surface.
-const MAX_TEXELS: usize = 1 << 26;
-/// Smallest side of a page, relative to that of a square of the charts' area, and how much larger the next one is.
-const SIDES: [f64; 2] = [1.02, 1.012];
+/// Cells along the side of a page whose area is that of the charts while the arrangement is searched for.
+const COARSE_CELLS: f64 = 110.0;
+/// The same for the final places: texels up to a page of this side.
+const FINE_CELLS: f64 = 1100.0;
+/// Words of bitmaps that the search looks at, a tenth of a second of work, and the same per chart.
+const BUDGET: [u64; 2] = [30_000_000, 100_000];
+/// Widths that are tried for the final places, relative to that of the search.
+const FINE_WIDTHS: [f64; 5] = [0.98, 0.99, 1.0, 1.01, 1.02];
 
-/// Which turns the packer may try.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Turns {
-    /// None: charts stand as they are.
-    None,
-    /// Quarters of a circle.
-    Quarter,
-    /// Sixteenths of a circle.
-    #[default]
-    Any,
-}
-
-impl Turns {
-    fn count(self) -> usize {
-        match self {
-            Self::None => 1,
-            Self::Quarter => 4,
-            Self::Any => 16,
-        }
-    }
-}
-
-/// How charts are laid onto pages.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
-pub struct PackSettings {
-    /// Side of a texel on the surface, metres. Default 0.0125 (thesis, 8.3.1).
-    pub texel_m: f64,
-    /// Texels that stay free between two charts. Default 2.
-    pub gutter: usize,
-    /// Columns and rows of a page, texels. `None` (default): one square page, as small as was found.
-    pub page: Option<[usize; 2]>,
-    /// Turns that may be tried. Default [`Turns::Any`]; [`Turns::None`] keeps upright charts upright.
-    pub turns: Turns,
-}
-
-impl Default for PackSettings {
-    fn default() -> Self {
-        Self { texel_m: 0.0125, gutter: 2, page: None, turns: Turns::default() }
-    }
-}
-
-/// Where a chart lies.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Placement {
-    /// Page, from 0.
-    pub page: usize,
-    /// Cosine and sine of the turn.
-    pub turn: [f64; 2],
-    /// What is added after the turn, metres.
-    pub shift: [f64; 2],
-}
-
-impl Placement {
-    /// Place on the page, metres from its lower left corner, of a point of the chart.
-    pub fn apply(&self, [u, v]: [f64; 2]) -> [f64; 2] {
-        let [c, s] = self.turn;
-        [c * u - s * v + self.shift[0], s * u + c * v + self.shift[1]]
-    }
-}
-
-/// Columns and rows of a page, texels.
-pub type Page = [usize; 2];
-
-/// A chart in one of its turns, as cells.
-struct Shape {
-    turn: [f64; 2],
-    /// Lower left corner of the turned chart.
-    corner: [f64; 2],
-    size: [usize; 2],
-    outline: Vec<(u32, [usize; 2])>,
-    /// With the gutter around it.
-    wide: Bitmap,
-}
-
-/// A place for every chart, and the pages.
+/// A place for every piece, and the pages.
 ///
 /// # Errors
-/// [`Error::Setting`]; [`Error::TooManyTexels`] where a chart is larger than a page.
-pub(super) fn pack(charts: &[Chart], settings: &PackSettings) -> Result<(Vec<Placement>, Vec<Page>), Error> {
-    let area: f64 = charts.iter().map(|c| c.quality().area_m2).sum();
-    let side = area.sqrt() / settings.texel_m;
-    let scale = |cells: f64| (side / cells).ceil().max(1.0) as usize;
-    let texels_per_cell = scale(FINE_CELLS);
-    let fine = shapes(charts, settings, texels_per_cell);
-    let packed = if let Some(page) = settings.page {
-        on_pages(&fine, &orders(charts)[0], page.map(|texels| texels / texels_per_cell), usize::MAX)
-    } else {
-        let coarse = shapes(charts, settings, scale(COARSE_CELLS));
-        let by_area = orders(charts);
-        let (order, _) = smallest_square(&coarse, &by_area, side / scale(COARSE_CELLS) as f64);
-        smallest_square(&fine, &[order], side / texels_per_cell as f64).1
+/// [`Error::TooManyTexels`] where a piece is larger than a page.
+pub(super) fn pack(pieces: &[Piece], settings: &PackSettings) -> Result<(Vec<Placement>, Vec<Page>), Error> {
+    if pieces.is_empty() {
+        return Ok((Vec::new(), Vec::new()));
+    }
+    let areas: Vec<f64> = pieces.iter().map(area).collect();
+    let mut order: Vec<usize> = (0..pieces.len()).collect();
+    order.sort_by(|&a, &b| areas[b].total_cmp(&areas[a]).then(a.cmp(&b)));
+    let square = areas.iter().sum::<f64>().sqrt() / settings.texel_m;
+    let side = settings.page.map_or(square, |page| square.min(page[0].min(page[1]) as f64));
+    let texels_per_cell = |cells: f64| (side / cells).ceil().max(1.0) as usize;
+    let (coarse, fine) = (texels_per_cell(COARSE_CELLS), texels_per_cell(FINE_CELLS));
+    let goal = |per_cell: usize| {
+        settings.page.map_or(Goal::Smallest, |page| Goal::Pages(page.map(|texels| texels / per_cell)))
     };
-    let shapes = fine.turned;
-    let cell = settings.texel_m * texels_per_cell as f64;
-    let Some(packed) = packed else {
+
+    let all = |_| (0..settings.turns.count()).collect();
+    let shapes = Shapes::new(pieces, settings, coarse, all);
+    let budget = BUDGET[0] + BUDGET[1] * pieces.len() as u64;
+    let found = search(&shapes, &order, goal(coarse), budget).and_then(|(plan, _)| {
+        let mut turns = vec![0; pieces.len()];
+        for &(chart, turn) in &plan.steps {
+            turns[chart] = turn.unwrap_or(0);
+        }
+        let shapes = Shapes::new(pieces, settings, fine, |chart| vec![turns[chart]]);
+        let (plan, packed) = finer(&shapes, &plan, goal(fine), coarse as f64 / fine as f64)?;
+        Some((shapes, plan, packed))
+    });
+    let found = found.or_else(|| {
+        // The cells of the search may be too large for what just fits.
+        let shapes = Shapes::new(pieces, settings, fine, all);
+        let (plan, packed) = search(&shapes, &order, goal(fine), 0)?;
+        Some((shapes, plan, packed))
+    });
+    let Some((shapes, plan, packed)) = found else {
         let [width, height] = settings.page.unwrap_or_default();
         return Err(Error::TooManyTexels {
             texel_m: settings.texel_m,
@@ -122,179 +67,168 @@ pub(super) fn pack(charts: &[Chart], settings: &PackSettings) -> Result<(Vec<Pla
             limit: width * height,
         });
     };
-    let placements = packed
-        .places
-        .iter()
-        .zip(&shapes)
-        .map(|(&(page, turn, [column, row]), turns)| {
-            let shape = &turns[turn];
-            let shift = [column as f64 * cell - shape.corner[0], row as f64 * cell - shape.corner[1]];
-            Placement { page, turn: shape.turn, shift }
-        })
-        .collect();
-    let square = |used: &[usize; 2]| [used[0].max(used[1]) * texels_per_cell; 2];
-    let pages = packed.used.iter().map(|used| settings.page.unwrap_or_else(|| square(used))).collect();
-    Ok((placements, pages))
-}
 
-/// Refuses what could not be packed, before anything is cut: `area_m2` is that of the whole surface.
-pub(super) fn check(settings: &PackSettings, area_m2: f64) -> Result<(), Error> {
-    if !(settings.texel_m.is_finite() && settings.texel_m > 0.0) {
-        return Err(Error::Setting { name: "texel_m", value: settings.texel_m, must_be: "positive" });
+    let cell = settings.texel_m * fine as f64;
+    let mut placements = vec![Placement { page: 0, turn: [1.0, 0.0], shift: [0.0; 2] }; pieces.len()];
+    for (&(chart, _), &(page, turn, [column, row])) in plan.steps.iter().zip(&packed.places) {
+        let shape = &shapes.turned[chart][turn];
+        let shift = [column as f64 * cell - shape.corner[0], row as f64 * cell - shape.corner[1]];
+        placements[chart] = Placement { page, turn: shape.turn, shift };
     }
-    if let Some(page) = settings.page
-        && page.contains(&0)
-    {
-        return Err(Error::Setting { name: "page", value: 0.0, must_be: "at least 1 x 1 texels" });
-    }
-    let side = area_m2.sqrt() / settings.texel_m;
-    let [width, height] = settings.page.map_or([side; 2], |page| page.map(|side| side as f64));
-    if side * side > MAX_TEXELS as f64 || width * height > MAX_TEXELS as f64 {
-        return Err(Error::TooManyTexels { texel_m: settings.texel_m, width, height, limit: MAX_TEXELS });
-    }
-    Ok(())
+    let page = |used: &[usize; 2]| settings.page.unwrap_or_else(|| used.map(|cells| cells * fine));
+    Ok((placements, packed.used.iter().map(page).collect()))
 }
 
-fn shape(chart: &Chart, k: usize, turns: Turns, cell: f64, gutter: usize) -> Shape {
-    let angle = std::f64::consts::TAU * k as f64 / turns.count() as f64;
-    // Quarters must not round.
-    let exact = |x: f64| if x.abs() < 1e-9 || x.abs() > 1.0 - 1e-9 { x.round() } else { x };
-    let turn = [exact(angle.cos()), exact(angle.sin())];
-    let turned: Vec<[f64; 2]> =
-        chart.uv().iter().map(|&[u, v]| [turn[0] * u - turn[1] * v, turn[1] * u + turn[0] * v]).collect();
-    let extreme = |k: usize, pick: fn(f64, f64) -> f64| turned.iter().map(|p| p[k]).reduce(pick).unwrap_or(0.0);
-    let corner = [extreme(0, f64::min), extreme(1, f64::min)];
-    let size = [extreme(0, f64::max) - corner[0], extreme(1, f64::max) - corner[1]];
-    let corners = chart
-        .disk()
-        .faces()
-        .iter()
-        .map(|face| face.map(|v| turned[v as usize]).map(|p| [p[0] - corner[0], p[1] - corner[1]]));
-    let cells = Bitmap::of_triangles(corners, size, cell);
-    Shape { turn, corner, size: [cells.columns, cells.rows], outline: cells.outline(), wide: cells.dilated(gutter) }
-}
-
-struct Packed {
-    /// Page, turn, column and row of every chart.
-    places: Vec<(usize, usize, [usize; 2])>,
-    /// Columns and rows that are used of every page.
-    used: Vec<[usize; 2]>,
-}
-
-/// All charts in all turns.
-struct Shapes {
-    turned: Vec<Vec<Shape>>,
-    gutter: usize,
-}
-
-fn shapes(charts: &[Chart], settings: &PackSettings, texels_per_cell: usize) -> Shapes {
-    let cell = settings.texel_m * texels_per_cell as f64;
-    let gutter = settings.gutter.div_ceil(texels_per_cell);
-    let turned = charts
-        .iter()
-        .map(|chart| (0..settings.turns.count()).map(|k| shape(chart, k, settings.turns, cell, gutter)).collect())
-        .collect();
-    Shapes { turned, gutter }
-}
-
-/// Orders in which charts are placed: by area, and with areas misjudged at random, the same for the same charts.
-fn orders(charts: &[Chart]) -> Vec<Vec<usize>> {
-    let mut state = 0_u64;
-    let mut random = || {
-        // splitmix64
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ (z >> 31)) as f64 / u64::MAX as f64
-    };
-    let count = if charts.len() < 2 { 1 } else { ORDERS };
-    (0..count)
-        .map(|trial| {
-            let misjudged = |chart: &Chart, by: f64| chart.quality().area_m2 * (SHUFFLE * by).exp2();
-            let size: Vec<f64> = charts.iter().map(|c| misjudged(c, if trial == 0 { 0.0 } else { random() })).collect();
-            let mut order: Vec<usize> = (0..charts.len()).collect();
-            order.sort_by(|&a, &b| size[b].total_cmp(&size[a]).then(a.cmp(&b)));
-            order
-        })
-        .collect()
-}
-
-/// The smallest square page that one of the orders fits on, and that order.
-fn smallest_square(shapes: &Shapes, orders: &[Vec<usize>], side: f64) -> (Vec<usize>, Option<Packed>) {
-    let mut best = (orders[0].clone(), None);
-    let mut limit = f64::INFINITY;
-    for order in orders {
-        // From below for the first, then only what beats the best so far.
-        let mut cells = (SIDES[0] * side).ceil();
-        if limit.is_finite() {
-            cells = limit - 1.0;
+/// The plan of the search carried out on finer cells, `scale` of which make a cell of the search; each chart has one turn left.
+fn finer(shapes: &Shapes, plan: &Plan, goal: Goal, scale: f64) -> Option<(Plan, Packed)> {
+    let steps: Vec<_> = plan.steps.iter().map(|&(chart, _)| (chart, Some(0))).collect();
+    let mut best: Option<(Plan, Packed)> = None;
+    for factor in FINE_WIDTHS {
+        let width = (plan.width as f64 * scale * factor).round() as usize;
+        let plan = Plan { steps: steps.clone(), width: width.max(shapes.narrowest()) };
+        let packed = match &best {
+            None => carry_out_unlimited(shapes, &plan, goal, Stages::Drop),
+            Some((_, least)) => carry_out(shapes, &plan, goal, least.cost - 1, Stages::Drop, &mut 0),
+        };
+        if let Some(packed) = packed {
+            best = Some((plan, packed));
         }
-        loop {
-            if let Some(packed) = on_pages(shapes, order, [cells as usize; 2], 1) {
-                limit = packed.used[0].iter().copied().max().unwrap_or(1) as f64;
-                best = (order.clone(), Some(packed));
-                if cells <= (SIDES[0] * side).ceil() {
-                    return best;
-                }
-                if orders.len() == 1 {
-                    break;
-                }
-                cells = limit - 1.0;
-            } else if best.1.is_none() {
-                cells = (cells * SIDES[1]).ceil().max(cells + 1.0);
-            } else {
-                break;
-            }
+        if matches!(goal, Goal::Pages(_)) {
+            break;
         }
     }
     best
 }
 
-/// The charts on pages of this size, at most so many.
-fn on_pages(shapes: &Shapes, order: &[usize], size: [usize; 2], most: usize) -> Option<Packed> {
-    let gutter = shapes.gutter as isize;
-    let mut pages: Vec<Bitmap> = Vec::new();
-    let mut packed = Packed { places: vec![(0, 0, [0; 2]); order.len()], used: Vec::new() };
-    for &chart in order {
-        let mut page = 0;
-        let (turn, [column, row]) = loop {
-            let fresh = page == pages.len();
-            if page == most {
-                return None;
-            }
-            if fresh {
-                pages.push(Bitmap::new(size[0], size[1]));
-                packed.used.push([0; 2]);
-            }
-            if let Some(place) = best_place(&pages[page], &shapes.turned[chart]) {
-                break place;
-            }
-            if fresh {
-                return None;
-            }
-            page += 1;
-        };
-        let shape = &shapes.turned[chart][turn];
-        pages[page].stamp(&shape.wide, column as isize - gutter, row as isize - gutter);
-        packed.places[chart] = (page, turn, [column, row]);
-        let used = &mut packed.used[page];
-        *used = [used[0].max(column + shape.size[0]), used[1].max(row + shape.size[1])];
-    }
-    Some(packed)
+/// Area of a piece in the plane, m^2.
+fn area(piece: &Piece) -> f64 {
+    let of = |face: &[u32; 3]| {
+        let [a, b, c] = face.map(|v| piece.uv[v as usize]);
+        0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs()
+    };
+    piece.faces.iter().map(of).sum()
 }
 
-/// The turn and place with the lowest upper edge; of equals the lowest, then the leftmost.
-fn best_place(page: &Bitmap, turns: &[Shape]) -> Option<(usize, [usize; 2])> {
-    let mut best: Option<([usize; 3], usize, [usize; 2])> = None;
-    for (turn, shape) in turns.iter().enumerate() {
-        let below = best.map_or(usize::MAX, |(key, ..)| key[0].saturating_sub(shape.size[1]));
-        if let Some(place) = page.lowest_place(&shape.outline, shape.size, below) {
-            let key = [place[1] + shape.size[1], place[1], place[0]];
-            if best.is_none_or(|(least, ..)| key < least) {
-                best = Some((key, turn, place));
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    type Mesh = (Vec<[f64; 2]>, Vec<[u32; 3]>);
+
+    /// Rectangles: lower left corner and size, texels.
+    fn piece_of(rectangles: &[[f64; 4]]) -> Mesh {
+        let mut mesh = (Vec::new(), Vec::new());
+        for &[x, y, width, height] in rectangles {
+            let n = mesh.0.len() as u32;
+            mesh.0.extend([[x, y], [x + width, y], [x + width, y + height], [x, y + height]]);
+            mesh.1.extend([[n, n + 1, n + 2], [n, n + 2, n + 3]]);
+        }
+        mesh
+    }
+
+    fn packed(meshes: &[Mesh], settings: &PackSettings) -> Result<(Vec<Placement>, Vec<Page>), Error> {
+        let pieces: Vec<Piece> = meshes.iter().map(|(uv, faces)| Piece { uv, faces }).collect();
+        let result = pack(&pieces, settings)?;
+        assert_eq!(result, pack(&pieces, settings)?, "packed otherwise the second time");
+        // Texels of every chart by points on a grid that is finer than they are.
+        let (gutter, mut owners) = (settings.gutter as isize, std::collections::HashMap::new());
+        for (number, ((uv, faces), placement)) in meshes.iter().zip(&result.0).enumerate() {
+            for corners in faces.iter().map(|face| face.map(|v| placement.apply(uv[v as usize]))) {
+                let longest = (0..3).map(|k| {
+                    let (p, q) = (corners[k], corners[(k + 1) % 3]);
+                    (p[0] - q[0]).abs().max((p[1] - q[1]).abs())
+                });
+                let steps = (2.5 * longest.fold(1.0, f64::max)) as usize;
+                for (i, j) in (0..=steps).flat_map(|i| (0..=steps - i).map(move |j| (i, j))) {
+                    // Just inside, so that lines between texels belong to one of them.
+                    let [s, t] = [i, j].map(|x| 1e-7 + (1.0 - 3e-7) * x as f64 / steps as f64);
+                    let at = [0, 1].map(|k| {
+                        corners[0][k] + s * (corners[1][k] - corners[0][k]) + t * (corners[2][k] - corners[0][k])
+                    });
+                    let size = result.1[placement.page];
+                    assert!((0..2).all(|k| at[k] > -1e-9 && at[k] < size[k] as f64 + 1e-9), "{at:?} off {size:?}");
+                    owners.insert((placement.page, at.map(|x| x as isize)), number);
+                }
             }
         }
+        for (&(page, [x, y]), &owner) in &owners {
+            for (dx, dy) in (-gutter..=gutter).flat_map(|dx| (-gutter..=gutter).map(move |dy| (dx, dy))) {
+                let other = owners.get(&(page, [x + dx, y + dy]));
+                assert!(other.is_none_or(|&other| other == owner), "{owner} and {other:?} are too near");
+            }
+        }
+        Ok(result)
     }
-    best.map(|(_, turn, place)| (turn, place))
+
+    fn settings(turns: Turns, gutter: usize) -> PackSettings {
+        PackSettings { texel_m: 1.0, gutter, page: None, turns }
+    }
+
+    /// A frame with a hole of 60 x 60: what fits into it needs no page of its own.
+    #[test]
+    fn small_charts_go_into_the_hole_of_a_large_one() {
+        let frame =
+            [[0.0, 0.0, 100.0, 20.0], [0.0, 80.0, 100.0, 20.0], [0.0, 20.0, 20.0, 60.0], [80.0, 20.0, 20.0, 60.0]];
+        let mut meshes = vec![piece_of(&frame)];
+        meshes.extend((0..16).map(|_| piece_of(&[[0.0, 0.0, 12.0, 12.0]])));
+        for turns in [Turns::None, Turns::Quarter, Turns::Any] {
+            let (_, pages) = packed(&meshes, &settings(turns, 2)).unwrap();
+            assert_eq!(pages, [[100, 100]], "{turns:?}");
+        }
+    }
+
+    #[test]
+    fn tiny_charts_fill_the_page() {
+        let meshes: Vec<_> = (0..500).map(|k| piece_of(&[[0.0, 0.0, f64::from(2 + k % 3), 3.0]])).collect();
+        let (_, pages) = packed(&meshes, &settings(Turns::Quarter, 0)).unwrap();
+        let share = 500.0 * 9.0 / (pages[0][0] * pages[0][1]) as f64;
+        assert!(share > 0.9, "{share} of {pages:?}");
+    }
+
+    #[test]
+    fn needles_and_charts_without_area_are_packed() {
+        let needle = (vec![[0.0, 0.0], [90.0, 0.001], [90.0, 0.002]], vec![[0, 1, 2]]);
+        let point = (vec![[3.0, 3.0]; 3], vec![[0, 1, 2]]);
+        let meshes = vec![needle.clone(), point.clone(), piece_of(&[[0.0, 0.0, 30.0, 10.0]]), needle, point];
+        packed(&meshes, &settings(Turns::Any, 1)).unwrap();
+        packed(&meshes[1..2], &settings(Turns::Any, 1)).unwrap();
+    }
+
+    /// Two charts of 50 x 50 fit on a page of 110 x 60 and three do not; one of 70 x 70 never does.
+    #[test]
+    fn pages_are_filled_one_after_the_other() {
+        let pages = PackSettings { page: Some([110, 60]), ..settings(Turns::None, 3) };
+        let squares = |side: f64| vec![piece_of(&[[0.0, 0.0, side, side]]); 5];
+        let (placements, sizes) = packed(&squares(50.0), &pages).unwrap();
+        assert_eq!(sizes, [[110, 60]; 3]);
+        for page in 0..3 {
+            assert_eq!(placements.iter().filter(|p| p.page == page).count(), [2, 2, 1][page]);
+        }
+        assert!(matches!(packed(&squares(70.0), &pages), Err(Error::TooManyTexels { .. })));
+    }
+
+    /// Ls of 60 x 60 with arms of 20: two of them nest into 60 x 80, while their boxes take 60 x 120. Inner edges that lie on a
+    /// line between texels count for both.
+    #[test]
+    fn concave_charts_nest() {
+        let l = piece_of(&[[0.0, 0.0, 60.0, 20.0], [0.0, 20.0, 20.0, 40.0]]);
+        let (_, pages) = packed(&[l.clone(), l], &settings(Turns::Quarter, 0)).unwrap();
+        assert!(pages[0][0] * pages[0][1] <= 62 * 82, "{pages:?}");
+    }
+
+    /// What the local search is for: it does better than the largest first.
+    #[test]
+    fn the_search_improves_on_the_largest_first() {
+        let meshes: Vec<_> = (0..12)
+            .map(|k| 8.0 + f64::from(k * 5 % 12))
+            .map(|size| piece_of(&[[0.0, 0.0, 2.0 * size, size / 2.0], [0.0, size / 2.0, size / 2.0, size]]))
+            .collect();
+        let pieces: Vec<Piece> = meshes.iter().map(|(uv, faces)| Piece { uv, faces }).collect();
+        let shapes = Shapes::new(&pieces, &settings(Turns::Quarter, 1), 1, |_| (0..4).collect());
+        let order: Vec<usize> = (0..12).collect();
+        let [start, found] = [0, 10_000_000]
+            .map(|budget| search(&shapes, &order, Goal::Smallest, budget).map(|(_, packed)| packed.cost).unwrap());
+        assert!(found < start, "{found} after {start}");
+    }
 }

@@ -1,0 +1,82 @@
+//! A chart as cells, in each of its turns.
+
+use super::settings::PackSettings;
+use crate::atlas::bitmap::{Bitmap, Outline};
+
+/// What is packed: triangles in the plane, metres.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::atlas) struct Piece<'a> {
+    pub(in crate::atlas) uv: &'a [[f64; 2]],
+    pub(in crate::atlas) faces: &'a [[u32; 3]],
+}
+
+/// A chart in one of its turns.
+pub(super) struct Shape {
+    /// Cosine and sine.
+    pub(super) turn: [f64; 2],
+    /// Lower left corner of the turned chart, metres.
+    pub(super) corner: [f64; 2],
+    /// Columns and rows that it covers.
+    pub(super) size: [usize; 2],
+    pub(super) outline: Outline,
+    /// With the gutter around it.
+    pub(super) wide: Bitmap,
+}
+
+/// All charts in some turns, at one size of cells.
+pub(super) struct Shapes {
+    pub(super) turned: Vec<Vec<Shape>>,
+    /// Cells that stay free around each.
+    pub(super) gutter: usize,
+    /// Cells that the charts cover with half of their gutter, each in its first turn.
+    pub(super) cells: usize,
+}
+
+impl Shapes {
+    /// Every piece in every turn that `wanted` lists for it.
+    pub(super) fn new(
+        pieces: &[Piece],
+        settings: &PackSettings,
+        texels_per_cell: usize,
+        wanted: impl Fn(usize) -> Vec<usize>,
+    ) -> Self {
+        let cell = settings.texel_m * texels_per_cell as f64;
+        let gutter = settings.gutter.div_ceil(texels_per_cell);
+        let count = settings.turns.count();
+        let turned: Vec<Vec<Shape>> = pieces
+            .iter()
+            .enumerate()
+            .map(|(k, piece)| wanted(k).into_iter().map(|turn| shape(piece, turn, count, cell, gutter)).collect())
+            .collect();
+        let cells = turned.iter().filter_map(|turns| turns.first()).map(|shape| shape.wide.count()).sum();
+        Self { turned, gutter, cells }
+    }
+
+    /// Columns that the widest chart needs at least.
+    pub(super) fn narrowest(&self) -> usize {
+        let least = |turns: &Vec<Shape>| turns.iter().map(|shape| shape.size[0]).min().unwrap_or(1);
+        self.turned.iter().map(least).max().unwrap_or(1)
+    }
+
+    /// Rows that all charts take, one above the other.
+    pub(super) fn pile(&self) -> usize {
+        let tallest = |turns: &Vec<Shape>| turns.iter().map(|shape| shape.size[1]).max().unwrap_or(1);
+        self.turned.iter().map(|turns| tallest(turns) + self.gutter).sum()
+    }
+}
+
+fn shape(piece: &Piece, k: usize, count: usize, cell: f64, gutter: usize) -> Shape {
+    let angle = std::f64::consts::TAU * k as f64 / count as f64;
+    // Quarters must not round.
+    let exact = |x: f64| if x.abs() < 1e-9 || x.abs() > 1.0 - 1e-9 { x.round() } else { x };
+    let turn = [exact(angle.cos()), exact(angle.sin())];
+    let turned: Vec<[f64; 2]> =
+        piece.uv.iter().map(|&[u, v]| [turn[0] * u - turn[1] * v, turn[1] * u + turn[0] * v]).collect();
+    let extreme = |k: usize, pick: fn(f64, f64) -> f64| turned.iter().map(|p| p[k]).reduce(pick).unwrap_or(0.0);
+    let corner = [extreme(0, f64::min), extreme(1, f64::min)];
+    let size = [extreme(0, f64::max) - corner[0], extreme(1, f64::max) - corner[1]];
+    let corners =
+        piece.faces.iter().map(|face| face.map(|v| turned[v as usize]).map(|p| [p[0] - corner[0], p[1] - corner[1]]));
+    let cells = Bitmap::of_triangles(corners, size, cell);
+    Shape { turn, corner, size: [cells.columns, cells.rows], outline: cells.outline(), wide: cells.dilated(gutter) }
+}
