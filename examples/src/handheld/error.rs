@@ -50,8 +50,8 @@ pub enum HandheldError {
     /// Nothing of the target came within the nozzle's reach.
     #[error(
         "no spray within {reach_m} m of the nozzle meets the target in the {seconds:.0} s of the motion, which comes no nearer to it than \
-         {nearest_m:.3} m: move the robot closer, point its x axis at the target, check the unit of mesh and motion (metres), or give \
-         --place-motion"
+         {nearest_m:.3} m: move the robot closer, point its x axis at the target, check the units of mesh and motion (--motion-scale), the \
+         axes of the motion (--motion-axes) and its place (--place-motion)"
     )]
     Unreachable {
         /// Shortest distance of the robot from the target, m.

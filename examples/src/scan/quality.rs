@@ -90,11 +90,13 @@ impl Quality {
     }
 
     /// An error if less than half of the work was done.
-    pub(super) fn verdict(&self, fused: usize, frames: usize) -> Result<(), ScanError> {
+    pub(super) fn verdict(&self, taken: usize, frames: usize) -> Result<(), ScanError> {
         let percent = |share: f64| 100.0 * share;
         let unusable = |why: String| Err(ScanError::Unusable(format!("the result is written, but not usable: {why}")));
-        if 2 * fused < frames {
-            return unusable(format!("only {fused} of {frames} frames were fused"));
+        if 2 * taken < frames {
+            // A map that only locates the camera takes nothing in.
+            let done = if self.valid == 0 { "found in the map" } else { "fused" };
+            return unusable(format!("only {taken} of {frames} frames were {done}"));
         }
         if self.fused_share() < LOW {
             let share = percent(self.fused_share());

@@ -67,6 +67,22 @@ fn a_camera_elsewhere_is_not_found() {
     assert!(!ran.ok && ran.said.contains("none.tsdf"), "{}", ran.said);
 }
 
+/// Four frames of the mapped place, then a staircase that never was in the map.
+#[test]
+fn a_camera_that_leaves_the_map_is_said_to_be_lost() {
+    let s = recording("leaves");
+    assert!(scan(&s, &[]).ok);
+    let map = copied(&s, "stored.tsdf");
+    for k in 4..FRAMES as u32 {
+        let image =
+            ImageBuffer::from_fn(SIZE.0, SIZE.1, |u, v| Luma([1100 + 100 * ((v + k) / 15) as u16 + (u / 4) as u16]));
+        image.save(s.0.join(format!("depth/{k}.png"))).unwrap();
+    }
+    let ran = scan(&s, &["--relocalise", &map]);
+    assert!(!ran.ok && (ran.figure("frames"), ran.figure("tracking_relocalisations")) == (4.0, 1.0), "{}", ran.said);
+    ran.says(&["only 4 of 12 frames were found in the map", "the camera is lost"]);
+}
+
 #[test]
 fn keyframes_survive_a_resumed_run() {
     let s = recording("keyframes");
