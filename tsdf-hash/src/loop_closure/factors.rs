@@ -6,6 +6,7 @@ use crate::loop_closure::error_growth::deviations;
 use crate::pose_graph::factors::BetweenFactor;
 use crate::pose_graph::robust_kernel::RobustKernel;
 use crate::tracking::outcome::TrackingOutcome;
+use crate::tracking::pose::rotated;
 
 /// Standard deviations that every registration has at least, radians and metres.
 const FLOOR: [f64; 2] = [2e-4, 4e-4];
@@ -30,11 +31,8 @@ pub(crate) fn registered(
 ) -> BetweenFactor {
     let registered = outcome.world_from_camera;
     // From the axes of the world to those of the camera.
-    let turn = registered.rotation.inverse().to_rotation_matrix().into_inner();
-    let mut axes = Matrix6::zeros();
-    axes.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
-    axes.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
-    let covariance = axes * outcome.covariance * axes.transpose() + diagonal(FLOOR.map(|s| s.powi(2)));
+    let own = rotated(&outcome.covariance, &registered.rotation.inverse());
+    let covariance = own + diagonal(FLOOR.map(|s| s.powi(2)));
     let information = covariance.try_inverse().unwrap_or_else(Matrix6::zeros);
     let kernel =
         if is_loop { RobustKernel::DynamicCovarianceScaling(LOOP_KERNEL) } else { RobustKernel::Huber(STEP_KERNEL) };

@@ -6,6 +6,8 @@ use crate::dense_map::DenseMap;
 use crate::error::Error;
 use crate::images::{ColourView, DepthView};
 use crate::tracking::outcome::TrackingOutcome;
+#[cfg(feature = "pose-graph")]
+use crate::tracking::pose::rotated;
 use crate::tracking::pose::step;
 use crate::tracking::tracker::Tracker;
 
@@ -33,11 +35,7 @@ impl Drift {
     #[cfg(feature = "pose-graph")]
     pub(crate) fn seen_from(mut self, there: &Isometry3<f64>) -> Self {
         self.outcome.world_from_camera = there * self.outcome.world_from_camera;
-        let turn = there.rotation.to_rotation_matrix().into_inner();
-        let mut axes = Matrix6::zeros();
-        axes.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
-        axes.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
-        self.outcome.covariance = axes * self.outcome.covariance * axes.transpose();
+        self.outcome.covariance = rotated(&self.outcome.covariance, &there.rotation);
         self.corrected_from_drifted = there * self.corrected_from_drifted * there.inverse();
         self
     }

@@ -1,5 +1,7 @@
 //! Small changes of a pose: a turn and a shift about the camera, along the axes of the world.
 
+#[cfg(feature = "pose-graph")]
+use nalgebra::Matrix6;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
 
 /// `(exp(ω) R, t + v)`, of unit length however often it is done.
@@ -17,6 +19,16 @@ pub(crate) fn step(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector6<f64> {
     let turn = (to.rotation * from.rotation.inverse()).scaled_axis();
     let shift = to.translation.vector - from.translation.vector;
     Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z)
+}
+
+/// The covariance of a step along other axes.
+#[cfg(feature = "pose-graph")]
+pub(crate) fn rotated(covariance: &Matrix6<f64>, to_from: &UnitQuaternion<f64>) -> Matrix6<f64> {
+    let turn = to_from.to_rotation_matrix().into_inner();
+    let mut axes = Matrix6::zeros();
+    axes.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
+    axes.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
+    axes * covariance * axes.transpose()
 }
 
 #[cfg(test)]
