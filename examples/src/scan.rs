@@ -11,6 +11,7 @@ mod mcap_in;
 mod options;
 mod pairing;
 mod pose_source;
+mod prediction;
 mod quality;
 mod ray_cast_check;
 mod recent_map;
@@ -28,8 +29,11 @@ pub use error::{ScanError, SequenceError};
 pub use image_source::{ImageSource, ImageTopic};
 pub use layouts::open_sequence;
 pub use map_store::Device;
-pub use options::{FrameRange, in_options, mebibytes, parse_intrinsics, parse_noise, read_colour_camera};
+pub use options::{
+    FrameRange, in_options, mebibytes, parse_intrinsics, parse_noise, parse_odometry_error, read_colour_camera,
+};
 pub use pose_source::{PoseSource, TrackingMetrics};
+pub use prediction::OdometryError;
 pub use quality::Quality;
 pub use ray_cast_check::RayCastCheck;
 pub use report::ScanReport;

@@ -9,8 +9,9 @@ use paintcopter_examples::exit::exit_code;
 use paintcopter_examples::mesh_io::{PlyMesh, write_ply};
 use paintcopter_examples::report::save_figures;
 use paintcopter_examples::scan::{
-    CheckpointSettings, Device, FrameRange, PoseSource, Scan, ScanReport, ScanSettings, Sequence, in_options,
-    mebibytes, open_sequence, parse_intrinsics, parse_noise, read_colour_camera, save_views,
+    CheckpointSettings, Device, FrameRange, OdometryError, PoseSource, Scan, ScanReport, ScanSettings, Sequence,
+    in_options, mebibytes, open_sequence, parse_intrinsics, parse_noise, parse_odometry_error, read_colour_camera,
+    save_views,
 };
 use tsdf_hash::{Intrinsics, MemoryLimits, NoiseModel};
 
@@ -24,6 +25,10 @@ struct Arguments {
     /// Where the poses come from
     #[arg(long, default_value = "given")]
     poses: Poses,
+    /// With --poses odometry: standard deviations of the recorded motion from one frame to the next, of the turn about each axis and of
+    /// the shift along it
+    #[arg(long, value_name = "DEGREES,METRES", value_parser = parse_odometry_error, default_value = "0.5,0.01")]
+    odometry_error: [f64; 2],
     /// Edge of a voxel, metres
     #[arg(long, value_name = "METRES", default_value_t = 0.01)]
     voxel: f64,
@@ -91,6 +96,8 @@ enum Poses {
     Given,
     /// Found by the tracker, from the first recorded pose, or from the origin
     Tracked,
+    /// Found by the tracker, led by the recorded poses as by an odometry: motions from frame to frame, with an error
+    Odometry,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -113,7 +120,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let sequence = sequence(arguments)?;
     eprintln!("{}: {} layout, {} frames", arguments.sequence.display(), sequence.layout, sequence.frames.len());
     eprintln!("{:28} {}", "camera", sequence.description());
-    let settings = settings(arguments)?;
+    let settings = settings(arguments, &sequence)?;
     let scan = Scan::run(&arguments.sequence, &sequence, &settings)?;
     for (_, why) in &scan.skipped {
         eprintln!("left out: {}", in_options(why));
@@ -172,7 +179,7 @@ fn sequence(arguments: &Arguments) -> Result<Sequence, Box<dyn std::error::Error
     Ok(sequence)
 }
 
-fn settings(arguments: &Arguments) -> Result<ScanSettings, String> {
+fn settings(arguments: &Arguments, sequence: &Sequence) -> Result<ScanSettings, String> {
     let threads = arguments.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
     let memory = MemoryLimits {
         host_bytes: mebibytes("--host-mib", arguments.host_mib)?,
@@ -200,6 +207,9 @@ fn settings(arguments: &Arguments) -> Result<ScanSettings, String> {
         // Recorded poses are in another world than that of the stored map.
         Poses::Given if arguments.relocalise.is_none() => PoseSource::Given,
         Poses::Given | Poses::Tracked => PoseSource::Tracked,
+        Poses::Odometry => {
+            PoseSource::Odometry(OdometryError { deviations: arguments.odometry_error, interval: sequence.interval() })
+        }
     };
     let interval = Duration::try_from_secs_f64(arguments.checkpoint)
         .map_err(|e| format!("--checkpoint {}: {e}", arguments.checkpoint))?;

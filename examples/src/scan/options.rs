@@ -29,6 +29,18 @@ pub fn parse_noise(text: &str) -> Result<NoiseModel, String> {
     Ok(NoiseModel { base, quadratic, nearest })
 }
 
+/// `DEGREES,METRES`: standard deviations of the motion from one frame to the next; in radians and metres.
+///
+/// # Errors
+/// What was expected.
+pub fn parse_odometry_error(text: &str) -> Result<[f64; 2], String> {
+    let [degrees, metres] = numbers(text, "DEGREES,METRES")?;
+    if degrees <= 0.0 || metres <= 0.0 {
+        return Err("standard deviations must be above 0".into());
+    }
+    Ok([degrees.to_radians(), metres])
+}
+
 fn numbers<const N: usize>(text: &str, expected: &str) -> Result<[f64; N], String> {
     let words: Vec<&str> = text.split(',').collect();
     let found: Vec<f64> = words.iter().filter_map(|w| w.trim().parse().ok()).filter(|x: &f64| x.is_finite()).collect();

@@ -9,6 +9,7 @@ use tsdf_hash::{
 
 use super::error::ScanError;
 use super::map_store::MapStore;
+use super::prediction::{OdometryError, Prediction};
 use super::recent_map::RecentMap;
 use super::sequence::FrameFiles;
 
@@ -16,12 +17,14 @@ use super::sequence::FrameFiles;
 const LEAST_COVERAGE: f64 = 0.4;
 
 /// Which poses a run believes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PoseSource {
     /// Those recorded with the sequence.
     Given,
     /// Those that the tracker finds, from the first one that was recorded, or from the origin.
     Tracked,
+    /// Those that the tracker finds, led from frame to frame by the motion between those recorded.
+    Odometry(OdometryError),
 }
 
 /// What became of tracking.
@@ -44,14 +47,13 @@ pub(super) struct Located {
     pub(super) earlier: Vec<Isometry3<f64>>,
 }
 
-/// Poses from the tracker: each frame against the map, from where the last two poses lead.
-pub(super) struct Odometry {
+/// Poses from the tracker: each frame against the map, from where the poses before lead.
+pub(super) struct CameraTracker {
     tracker: Tracker,
     relocaliser: Relocaliser,
     /// Tracked against instead of the whole map, where loops are looked for.
     recent: Option<RecentMap>,
-    last: Option<Isometry3<f64>>,
-    before: Option<Isometry3<f64>>,
+    prediction: Prediction,
     lost: bool,
     /// Where the camera is at first is looked for, too.
     found_first: bool,
@@ -60,9 +62,10 @@ pub(super) struct Odometry {
     pub(super) metrics: TrackingMetrics,
 }
 
-impl Odometry {
+impl CameraTracker {
     pub(super) fn new(
         map: &tsdf_hash::Settings,
+        odometry: Option<OdometryError>,
         found_first: bool,
         fixed_map: bool,
         loops: bool,
@@ -72,8 +75,7 @@ impl Odometry {
             tracker: Tracker::new(settings)?,
             relocaliser: Relocaliser::new(settings)?,
             recent: loops.then(|| RecentMap::new(map)),
-            last: None,
-            before: None,
+            prediction: Prediction::new(odometry),
             lost: false,
             found_first,
             fixed_map,
@@ -83,7 +85,7 @@ impl Odometry {
 
     /// Goes on from a pose.
     pub(super) fn start(&mut self, pose: Isometry3<f64>) {
-        (self.last, self.before) = (Some(pose), None);
+        self.prediction.start(pose, None);
     }
 
     /// A frame was fused, when the run had so many keyframes.
@@ -103,9 +105,7 @@ impl Odometry {
         if let Some(recent) = &mut self.recent {
             recent.move_by(correction);
         }
-        for pose in [&mut self.last, &mut self.before].into_iter().flatten() {
-            *pose = correction * *pose;
-        }
+        self.prediction.move_by(correction);
     }
 
     /// The pose of a frame.
@@ -117,13 +117,13 @@ impl Odometry {
         depth: &DepthView,
         colour: Option<&ColourView>,
     ) -> Result<Located, ScanError> {
-        if self.last.is_none() && !self.found_first {
+        if self.prediction.is_empty() && !self.found_first {
             let first = frame.world_from_camera.unwrap_or_else(Isometry3::identity);
-            self.start(first);
+            self.prediction.start(first, Some(frame));
             return Ok(Located { world_from_camera: first, earlier: Vec::new() });
         }
         let start = ProcessTime::now();
-        let tracked = self.follow(store, depth, colour)?;
+        let tracked = self.follow(store, frame, depth, colour)?;
         let (outcome, earlier) = match tracked {
             Some(outcome) if outcome.is_tracked() => {
                 self.relocaliser.reset();
@@ -132,7 +132,7 @@ impl Odometry {
             tracked => match self.relocaliser.add(store.dense(), depth, colour, keyframes)? {
                 Some(found) => {
                     self.metrics.relocalisations += 1;
-                    self.last = None;
+                    self.prediction.forget();
                     self.recent.iter_mut().for_each(RecentMap::forget);
                     (Some(found.outcome), found.earlier)
                 }
@@ -146,12 +146,11 @@ impl Odometry {
         };
         self.note(frame, &outcome);
         if !outcome.is_tracked() {
-            self.before = None;
+            self.prediction.lost(frame);
             return Err(ScanError::Lost(format!("{}; {}", reason(&outcome), self.search_state())));
         }
         // After a jump the last two poses are no motion, but what led to the place where it is found is one.
-        self.before = earlier.last().copied().or(self.last);
-        self.last = Some(outcome.world_from_camera);
+        self.prediction.found(&outcome, earlier.last().copied(), frame);
         Ok(Located { world_from_camera: outcome.world_from_camera, earlier })
     }
 
@@ -164,21 +163,24 @@ impl Odometry {
         }
     }
 
-    /// Tracks a frame from where the last two lead; `None` before the first.
+    /// Tracks a frame from where the poses before lead; `None` before the first.
     fn follow(
         &mut self,
         store: &mut MapStore,
+        frame: &FrameFiles,
         depth: &DepthView,
         colour: Option<&ColourView>,
     ) -> Result<Option<TrackingOutcome>, ScanError> {
-        let Some(last) = self.last else { return Ok(None) };
-        let onwards = self.before.map_or(last, |before| last * (before.inverse() * last));
-        let mut tracked = self.track(store, depth, colour, onwards)?;
-        if !tracked.is_tracked() && self.before.is_some() {
-            // The camera may have stopped.
-            tracked = self.track(store, depth, colour, last)?;
+        let mut tracked = None;
+        for prior in self.prediction.priors(frame) {
+            let outcome = self.track(store, depth, colour, &prior)?;
+            let found = outcome.is_tracked();
+            tracked = Some(outcome);
+            if found {
+                break;
+            }
         }
-        Ok(Some(tracked))
+        Ok(tracked)
     }
 
     fn track(
@@ -186,19 +188,18 @@ impl Odometry {
         store: &mut MapStore,
         depth: &DepthView,
         colour: Option<&ColourView>,
-        guess: Isometry3<f64>,
+        prior: &PosePrior,
     ) -> Result<TrackingOutcome, ScanError> {
         let recent = self.recent.as_mut().and_then(RecentMap::older);
         let (map, world_from_map) = recent.unwrap_or_else(|| (store.dense(), Isometry3::identity()));
-        let prior = PosePrior { world_from_camera: world_from_map.inverse() * guess, covariance: None };
-        let mut outcome = self.tracker.track(map, depth, colour, &prior)?;
-        outcome.world_from_camera = world_from_map * outcome.world_from_camera;
+        let there = prior.seen_from(&world_from_map.inverse());
+        let mut outcome = self.tracker.track(map, depth, colour, &there)?.seen_from(&world_from_map);
         // A map that does not grow is left sooner or later: what little of it is in view then leads anywhere.
         if self.fixed_map && (outcome.coverage < LEAST_COVERAGE || !outcome.degenerate.is_empty()) {
             outcome.status = TrackingStatus::NoOverlap;
         }
-        // A lost camera has moved, nobody knows where: what would do from one frame to the next is not enough.
-        if self.lost && outcome.agreement < self.tracker.settings().relocalise_agreement {
+        // A lost camera has moved, nobody knows where, unless odometry does: what would do from one frame to the next is not enough.
+        if self.lost && prior.covariance.is_none() && outcome.agreement < self.tracker.settings().relocalise_agreement {
             outcome.status = TrackingStatus::Disagreement;
         }
         Ok(outcome)

@@ -12,7 +12,7 @@ use super::correction::{Correction, LoopMetrics, Loops};
 use super::decode::Images;
 use super::error::ScanError;
 use super::map_store::MapStore;
-use super::pose_source::{Odometry, PoseSource, TrackingMetrics};
+use super::pose_source::{CameraTracker, PoseSource, TrackingMetrics};
 use super::quality::Quality;
 use super::ray_cast_check::{RayCastCheck, ray_cast_check};
 use super::sequence::{FrameFiles, Sequence};
@@ -127,7 +127,7 @@ struct Run<'a> {
     settings: &'a ScanSettings,
     store: MapStore,
     mesher: IncrementalMesher,
-    odometry: Option<Odometry>,
+    tracker: Option<CameraTracker>,
     /// Without loops; with them, the loops keep them.
     keyframes: KeyframeIndex,
     loops: Option<Loops>,
@@ -149,19 +149,19 @@ impl<'a> Run<'a> {
     fn new(sequence: &'a Sequence, settings: &'a ScanSettings, start: Start) -> Result<Self, ScanError> {
         let Start { map, progress, keyframes } = start;
         let store = MapStore::open(map, settings.device)?;
-        let mut odometry = match settings.poses {
+        let tracker = |odometry| {
+            let loops = settings.loops && settings.fuse;
+            CameraTracker::new(store.settings(), odometry, settings.relocalise.is_some(), !settings.fuse, loops)
+        };
+        let mut tracker = match settings.poses {
             PoseSource::Given => None,
-            PoseSource::Tracked => Some(Odometry::new(
-                store.settings(),
-                settings.relocalise.is_some(),
-                !settings.fuse,
-                settings.loops && settings.fuse,
-            )?),
+            PoseSource::Tracked => Some(tracker(None)?),
+            PoseSource::Odometry(error) => Some(tracker(Some(error))?),
         };
         let progress =
             progress.unwrap_or(Progress { last_stamp: f64::NEG_INFINITY, trajectory: Trajectory::default() });
-        if let (Some(odometry), Some(last)) = (&mut odometry, progress.trajectory.poses().last()) {
-            odometry.start(*last);
+        if let (Some(tracker), Some(last)) = (&mut tracker, progress.trajectory.poses().last()) {
+            tracker.start(*last);
         }
         let loops = if settings.loops { Some(Loops::new(store.settings())?) } else { None };
         Ok(Self {
@@ -169,7 +169,7 @@ impl<'a> Run<'a> {
             settings,
             store,
             mesher: IncrementalMesher::new(),
-            odometry,
+            tracker,
             keyframes,
             loops,
             correction: Isometry3::identity(),
@@ -196,15 +196,15 @@ impl<'a> Run<'a> {
     fn locate(&mut self, index: usize) -> Result<Vec<Placed>, ScanError> {
         let frame = &self.sequence.frames[index];
         // Before the images are read: what has no pose costs no time.
-        let given = if self.odometry.is_none() { Some(self.correction * given_pose(frame)?) } else { None };
+        let given = if self.tracker.is_none() { Some(self.correction * given_pose(frame)?) } else { None };
         let images = self.images(frame)?;
         let (intrinsics, scale) = (self.sequence.intrinsics, self.sequence.depth_scale);
         let (depth, colour) = (images.depth(intrinsics, scale), images.colour(intrinsics));
         let mut placed = Vec::new();
-        let pose = match (&mut self.odometry, given) {
-            (Some(odometry), _) => {
+        let pose = match (&mut self.tracker, given) {
+            (Some(tracker), _) => {
                 let keyframes = self.loops.as_ref().map_or(&self.keyframes, Loops::keyframes);
-                let found = odometry.locate(&mut self.store, keyframes, frame, &depth, colour.as_ref());
+                let found = tracker.locate(&mut self.store, keyframes, frame, &depth, colour.as_ref());
                 if matches!(found, Err(ScanError::Lost(_))) {
                     self.lost.push(index);
                 }
@@ -267,9 +267,9 @@ impl<'a> Run<'a> {
         let name = frame.depth.to_string();
         if self.settings.fuse {
             self.fuse(&name, &depth, colour.as_ref(), &pose)?;
-            if let Some(odometry) = &mut self.odometry {
+            if let Some(tracker) = &mut self.tracker {
                 let keyframes = self.loops.as_ref().map_or(0, |loops| loops.keyframes().len());
-                odometry.fused(&depth, colour.as_ref(), &pose, keyframes)?;
+                tracker.fused(&depth, colour.as_ref(), &pose, keyframes)?;
             }
         }
         self.fused.push((index, pose));
@@ -339,8 +339,8 @@ impl<'a> Run<'a> {
         }
         let present = correction.present;
         self.correction = present * self.correction;
-        if let Some(odometry) = &mut self.odometry {
-            odometry.move_by(&present);
+        if let Some(tracker) = &mut self.tracker {
+            tracker.move_by(&present);
         }
         if let Some(loops) = &mut self.loops {
             loops.metrics.refused += anew;
@@ -383,9 +383,9 @@ impl<'a> Run<'a> {
         let mesh = self.store.dense().mesh()?;
         self.metrics.mesh_s = start.elapsed().as_secs_f64();
         stage.done(&format!("{} vertices, {} triangles", mesh.positions.len(), mesh.faces.len()));
-        if let Some(odometry) = &self.odometry {
+        if let Some(tracker) = &self.tracker {
             self.metrics.ate_se3_rmse = tracked_error(self.sequence, &self.fused);
-            self.metrics.tracking = Some(odometry.metrics.clone());
+            self.metrics.tracking = Some(tracker.metrics.clone());
         }
         self.metrics.loops = self.loops.as_ref().map(|loops| loops.metrics);
         let keyframes = self.keyframes().clone();

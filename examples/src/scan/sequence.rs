@@ -27,6 +27,13 @@ pub struct Sequence {
 }
 
 impl Sequence {
+    /// Seconds from one frame to the next, the median; a thirtieth of one frame alone.
+    pub fn interval(&self) -> f64 {
+        let mut steps: Vec<f64> = self.frames.windows(2).map(|pair| pair[1].stamp - pair[0].stamp).collect();
+        steps.sort_by(f64::total_cmp);
+        steps.get(steps.len() / 2).copied().filter(|step| *step > 0.0).unwrap_or(1.0 / 30.0)
+    }
+
     /// Camera, scale and where they are from, in one line.
     pub fn description(&self) -> String {
         let k = &self.intrinsics;

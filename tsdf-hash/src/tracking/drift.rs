@@ -6,8 +6,6 @@ use crate::dense_map::DenseMap;
 use crate::error::Error;
 use crate::images::{ColourView, DepthView};
 use crate::tracking::outcome::TrackingOutcome;
-#[cfg(feature = "pose-graph")]
-use crate::tracking::pose::rotated;
 use crate::tracking::pose::step;
 use crate::tracking::tracker::Tracker;
 
@@ -34,8 +32,7 @@ impl Drift {
     /// The same in a world that `there` leads to.
     #[cfg(feature = "pose-graph")]
     pub(crate) fn seen_from(mut self, there: &Isometry3<f64>) -> Self {
-        self.outcome.world_from_camera = there * self.outcome.world_from_camera;
-        self.outcome.covariance = rotated(&self.outcome.covariance, &there.rotation);
+        self.outcome = self.outcome.seen_from(there);
         self.corrected_from_drifted = there * self.corrected_from_drifted * there.inverse();
         self
     }

@@ -2,6 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
+use crate::tracking::pose::rotated;
+
 /// What is believed about a pose before the frame is looked at.
 #[derive(Clone, Copy, Debug)]
 pub struct PosePrior {
@@ -10,6 +12,34 @@ pub struct PosePrior {
     /// Its covariance, in the order and frame of [`TrackingOutcome::covariance`]: a pose too far from the prior is rejected, and along
     /// degenerate directions the prior is kept. `None` for a guess, as of constant velocity: then neither is done.
     pub covariance: Option<Matrix6<f64>>,
+}
+
+impl PosePrior {
+    /// The prediction by odometry (thesis Paper I, Eq. (5.1)): where a camera that was here is after it has moved by
+    /// `before_from_now`, whose turn and shift have these standard deviations about and along each axis, radians and metres. Without a
+    /// covariance of the pose before, that one is taken as exact.
+    #[must_use]
+    pub fn after(&self, before_from_now: &Isometry3<f64>, [turn, shift]: [f64; 2]) -> Self {
+        let arm = self.world_from_camera.rotation * before_from_now.translation.vector;
+        let mut world_from_camera = self.world_from_camera * before_from_now;
+        world_from_camera.rotation.renormalize();
+        // A turn before the motion moves its end.
+        let mut carried = Matrix6::identity();
+        carried.fixed_view_mut::<3, 3>(3, 0).copy_from(&-arm.cross_matrix());
+        let before = self.covariance.unwrap_or_else(Matrix6::zeros);
+        let own = Vector6::new(turn, turn, turn, shift, shift, shift).map(|deviation| deviation * deviation);
+        let covariance = carried * before * carried.transpose() + Matrix6::from_diagonal(&own);
+        Self { world_from_camera, covariance: Some(covariance) }
+    }
+
+    /// The same in a world that `there` leads to.
+    #[must_use]
+    pub fn seen_from(&self, there: &Isometry3<f64>) -> Self {
+        Self {
+            world_from_camera: there * self.world_from_camera,
+            covariance: self.covariance.map(|covariance| rotated(&covariance, &there.rotation)),
+        }
+    }
 }
 
 /// Whether the pose can be believed.
@@ -57,5 +87,52 @@ impl TrackingOutcome {
     /// Whether the pose can be believed.
     pub fn is_tracked(&self) -> bool {
         self.status == TrackingStatus::Tracked
+    }
+
+    /// The same in a world that `there` leads to.
+    #[must_use]
+    pub fn seen_from(mut self, there: &Isometry3<f64>) -> Self {
+        self.world_from_camera = there * self.world_from_camera;
+        self.covariance = rotated(&self.covariance, &there.rotation);
+        let turn = there.rotation;
+        for direction in &mut self.degenerate {
+            let [about, along] = [0, 3].map(|first| turn * direction.fixed_rows::<3>(first).into_owned());
+            direction.fixed_rows_mut::<3>(0).copy_from(&about);
+            direction.fixed_rows_mut::<3>(3).copy_from(&along);
+        }
+        self
+    }
+
+    /// The pose and its covariance, to predict the next one from; a pose that is not tracked has that of the prior.
+    pub fn pose(&self) -> PosePrior {
+        PosePrior { world_from_camera: self.world_from_camera, covariance: Some(self.covariance) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::tracking::pose::{moved, step};
+
+    #[test]
+    fn a_motion_carries_the_covariance_on() {
+        let pose = Isometry3::new(Vector3::new(1.0, -2.0, 0.5), Vector3::new(0.3, 0.9, -0.4));
+        let motion = Isometry3::new(Vector3::new(0.4, 0.1, -0.7), Vector3::new(-0.2, 0.1, 0.3));
+        // A covariance of one direction: the true pose is off along it, before and after.
+        let off = 1e-4 * Vector6::new(1.0, -2.0, 0.5, 0.3, 1.5, -1.0);
+        let before = PosePrior { world_from_camera: pose, covariance: Some(off * off.transpose()) };
+        let after = before.after(&motion, [0.0; 2]);
+        let moved_off = step(&after.world_from_camera, &(moved(&pose, &off) * motion));
+        assert!((after.covariance.unwrap() - moved_off * moved_off.transpose()).amax() < 1e-11);
+        // And in another world.
+        let there = Isometry3::new(Vector3::new(0.0, 3.0, 1.0), Vector3::new(0.0, 1.2, 0.7));
+        let elsewhere = after.seen_from(&there);
+        let off_there = step(&elsewhere.world_from_camera, &(there * moved(&pose, &off) * motion));
+        assert!((elsewhere.covariance.unwrap() - off_there * off_there.transpose()).amax() < 1e-11);
+        // What the motion adds.
+        let noisy = before.after(&motion, [0.01, 0.02]).covariance.unwrap() - after.covariance.unwrap();
+        assert!((noisy.diagonal() - Vector6::new(1e-4, 1e-4, 1e-4, 4e-4, 4e-4, 4e-4)).amax() < 1e-15);
     }
 }

@@ -1,8 +1,6 @@
 //! Small changes of a pose: a turn and a shift about the camera, along the axes of the world.
 
-#[cfg(feature = "pose-graph")]
-use nalgebra::Matrix6;
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
 
 /// `(exp(ω) R, t + v)`, of unit length however often it is done.
 pub(crate) fn moved(pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {
@@ -22,7 +20,6 @@ pub(crate) fn step(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector6<f64> {
 }
 
 /// The covariance of a step along other axes.
-#[cfg(feature = "pose-graph")]
 pub(crate) fn rotated(covariance: &Matrix6<f64>, to_from: &UnitQuaternion<f64>) -> Matrix6<f64> {
     let turn = to_from.to_rotation_matrix().into_inner();
     let mut axes = Matrix6::zeros();

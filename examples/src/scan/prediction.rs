@@ -1,0 +1,90 @@
+//! Where the camera is believed to be before a frame is looked at.
+
+use nalgebra::Isometry3;
+use tsdf_hash::{PosePrior, TrackingOutcome};
+
+use super::sequence::FrameFiles;
+
+/// The error of recorded odometry.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OdometryError {
+    /// Standard deviations of the turn, radians, and of the shift, metres, from one frame to the next, about and along each axis.
+    pub deviations: [f64; 2],
+    /// Seconds between two frames; a longer gap has the error of as many.
+    pub interval: f64,
+}
+
+/// The last pose, and how it goes on from there: by odometry where it was recorded, else at constant velocity.
+#[derive(Debug, Default)]
+pub(super) struct Prediction {
+    odometry: Option<OdometryError>,
+    last: Option<PosePrior>,
+    /// The pose before the last one.
+    before: Option<Isometry3<f64>>,
+    /// Stamp and recorded pose of the frame that `last` belongs to.
+    recorded: Option<(f64, Isometry3<f64>)>,
+}
+
+impl Prediction {
+    pub(super) fn new(odometry: Option<OdometryError>) -> Self {
+        Self { odometry, ..Self::default() }
+    }
+
+    /// Goes on from a pose that is known.
+    pub(super) fn start(&mut self, pose: Isometry3<f64>, frame: Option<&FrameFiles>) {
+        self.last = Some(PosePrior { world_from_camera: pose, covariance: None });
+        (self.before, self.recorded) = (None, frame.and_then(recorded));
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.last.is_none()
+    }
+
+    /// Where a frame was taken, as far as what came before it says, the likelier first; empty before the first frame.
+    pub(super) fn priors(&self, frame: &FrameFiles) -> Vec<PosePrior> {
+        let Some(last) = &self.last else { return Vec::new() };
+        if let Some(prior) = self.by_odometry(last, frame) {
+            return vec![prior];
+        }
+        let stopped = last.world_from_camera;
+        let onwards = self.before.map(|before| stopped * (before.inverse() * stopped));
+        let guess = |world_from_camera| PosePrior { world_from_camera, covariance: None };
+        onwards.into_iter().chain([stopped]).map(guess).collect()
+    }
+
+    fn by_odometry(&self, last: &PosePrior, frame: &FrameFiles) -> Option<PosePrior> {
+        let OdometryError { deviations, interval } = self.odometry?;
+        let ((then, from), (now, to)) = (self.recorded?, recorded(frame)?);
+        let frames = ((now - then) / interval).round().max(1.0);
+        Some(last.after(&(from.inverse() * to), deviations.map(|deviation| deviation * frames.sqrt())))
+    }
+
+    /// A frame was found; `earlier` is where the frame before it was taken, if that is known only now.
+    pub(super) fn found(&mut self, outcome: &TrackingOutcome, earlier: Option<Isometry3<f64>>, frame: &FrameFiles) {
+        self.before = earlier.or(self.last.map(|last| last.world_from_camera));
+        (self.last, self.recorded) = (Some(outcome.pose()), recorded(frame));
+    }
+
+    /// A frame was not found: odometry leads on, velocity does not.
+    pub(super) fn lost(&mut self, frame: &FrameFiles) {
+        self.before = None;
+        if let Some(prior) = self.last.as_ref().and_then(|last| self.by_odometry(last, frame)) {
+            (self.last, self.recorded) = (Some(prior), recorded(frame));
+        }
+    }
+
+    /// The camera has been somewhere else.
+    pub(super) fn forget(&mut self) {
+        (self.last, self.before, self.recorded) = (None, None, None);
+    }
+
+    /// The map and all in it have moved.
+    pub(super) fn move_by(&mut self, correction: &Isometry3<f64>) {
+        self.last = self.last.map(|last| last.seen_from(correction));
+        self.before = self.before.map(|before| correction * before);
+    }
+}
+
+fn recorded(frame: &FrameFiles) -> Option<(f64, Isometry3<f64>)> {
+    Some((frame.stamp, frame.world_from_camera?))
+}
