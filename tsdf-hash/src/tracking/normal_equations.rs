@@ -25,34 +25,58 @@ impl Run {
     }
 }
 
-/// The sums.
+/// The sums of one kind of residuals.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct NormalEquations {
-    /// `Σ (Σ w J s) (Σ w J s)ᵀ` over runs: what an error of one `s` adds to the variance of `b` that all terms of a run share.
-    pub(crate) shared: Matrix6<f64>,
+pub(crate) struct Sums {
     pub(crate) h: Matrix6<f64>,
     pub(crate) b: Vector6<f64>,
 }
 
-impl NormalEquations {
-    pub(crate) fn zero() -> Self {
-        Self { shared: Matrix6::zeros(), h: Matrix6::zeros(), b: Vector6::zeros() }
+impl Sums {
+    fn zero() -> Self {
+        Self { h: Matrix6::zeros(), b: Vector6::zeros() }
     }
 
-    pub(crate) fn add_run(&mut self, run: &Run) {
+    fn add_run(&mut self, run: &Run) {
         for (k, row) in run.rows.iter().enumerate() {
             for (n, &value) in row[..6].iter().enumerate() {
                 self.h[(k, n)] += f64::from(value);
             }
             self.b[k] += f64::from(row[6]);
         }
-        let pull = Vector6::from(run.rows.map(|row| f64::from(row[7])));
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.h += other.h;
+        self.b += other.b;
+    }
+}
+
+/// The sums of distances and of intensities apart: what noise feigns in the one it does not in the other.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NormalEquations {
+    pub(crate) distances: Sums,
+    pub(crate) intensities: Sums,
+    /// `Σ (Σ w J s) (Σ w J s)ᵀ` over runs of distances: what an error of one `s` adds to the variance of `b` that all terms of a run
+    /// share.
+    pub(crate) shared: Matrix6<f64>,
+}
+
+impl NormalEquations {
+    pub(crate) fn zero() -> Self {
+        Self { distances: Sums::zero(), intensities: Sums::zero(), shared: Matrix6::zeros() }
+    }
+
+    pub(crate) fn add_runs(&mut self, distances: &Run, intensities: &Run) {
+        self.distances.add_run(distances);
+        self.intensities.add_run(intensities);
+        let pull = Vector6::from(distances.rows.map(|row| f64::from(row[7])));
         self.shared += pull * pull.transpose();
     }
 
     pub(crate) fn add(&mut self, other: &Self) {
+        self.distances.add(&other.distances);
+        self.intensities.add(&other.intensities);
         self.shared += other.shared;
-        self.h += other.h;
-        self.b += other.b;
     }
 }

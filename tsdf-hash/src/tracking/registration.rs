@@ -86,9 +86,6 @@ impl Registration {
 
 /// The damped step; `None` where nothing constrains it.
 fn solve(here: &Evaluation, damping: f64, least_share: f64) -> Option<Vector6<f64>> {
-    let directions = Directions::new(&here.equations.h, here.mean_depth())?;
-    let most = directions.information.max();
-    let kept = |k: usize| directions.information[k] > least_share * most;
-    let delta = -(directions.inverse(kept, damping * most) * here.equations.b);
+    let delta = Directions::new(&here.equations, here.mean_depth(), least_share)?.gauss_newton(damping);
     delta.iter().all(|x| x.is_finite()).then_some(delta)
 }

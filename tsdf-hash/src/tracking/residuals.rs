@@ -21,6 +21,8 @@ const MOST_DEVIATIONS: f32 = 32.0;
 const MOST_LEVELS: f32 = 128.0;
 /// Slopes of the intensity below so many of its standard deviations per pixel are noise (ours).
 const LEAST_GRADIENT: f32 = 1.0;
+/// No camera has more noise than so many grey levels (ours).
+const MOST_NOISE: f32 = 4.0;
 
 /// Standard deviations that residuals are measured in.
 #[derive(Clone, Copy, Debug)]
@@ -137,7 +139,7 @@ impl Comparison<'_> {
         let parts = in_chunks(&mut runs, self.threads, |runs| {
             let (mut sums, mut all) = (Vec::with_capacity(runs.len()), Evaluation::new());
             for run in runs.iter() {
-                let mut terms = Run::ZERO;
+                let mut terms = [Run::ZERO; 2];
                 let mut sum = Sums::default();
                 run.iter().for_each(|point| task.add(point, &mut terms, &mut sum, &mut all));
                 sums.push((terms, sum));
@@ -148,7 +150,7 @@ impl Comparison<'_> {
         for (sums, counts) in parts {
             total = total.merge(&counts);
             for (terms, sum) in sums {
-                total.equations.add_run(&terms);
+                total.equations.add_runs(&terms[0], &terms[1]);
                 (0..2).for_each(|k| total.cost[k] += f64::from(sum.cost[k]));
                 total.depth_sum += f64::from(sum.depth);
                 if sum.terms >= LEAST_TERMS {
@@ -194,7 +196,8 @@ impl<'a> Task<'a> {
     }
 
     #[inline(always)]
-    fn add(&self, point: &ModelPoint, run: &mut Run, sums: &mut Sums, all: &mut Evaluation) {
+    fn add(&self, point: &ModelPoint, runs: &mut [Run; 2], sums: &mut Sums, all: &mut Evaluation) {
+        let [distances, intensities] = runs;
         let level = self.of.level;
         let arm = sub(point.position, self.translation);
         let [x, y, z] = self.rotation.map(|column| dot(column, arm));
@@ -245,10 +248,10 @@ impl<'a> Task<'a> {
         sums.weighted[0] += weight;
         sums.weighted[1] += weight * residual;
         let turn = cross(measured, normal);
-        run.add([turn[0], turn[1], turn[2], normal[0], normal[1], normal[2]], residual, weight, 1.0);
+        distances.add([turn[0], turn[1], turn[2], normal[0], normal[1], normal[2]], residual, weight, 1.0);
 
         if self.of.photometric && !point.intensity.is_nan() {
-            self.add_intensity(point, arm, [x, y, inverse, u, v], run, sums, all);
+            self.add_intensity(point, arm, [x, y, inverse, u, v], intensities, sums, all);
         }
     }
 
@@ -276,9 +279,9 @@ impl<'a> Task<'a> {
         let seen = mix(a, b, c, d);
         let [a, b, c, d] = corners.map(|k| level.gradient[k]);
         let (gu, gv) = (mix(a[0], b[0], c[0], d[0]), mix(a[1], b[1], c[1], d[1]));
-        // A NaN, on the rim or without colour, fails.
-        let steep =
-            gu * gu + gv * gv >= LEAST_GRADIENT * LEAST_GRADIENT * self.scales.intensity * self.scales.intensity;
+        // A NaN, on the rim or without colour, fails. Far from the right pose the residuals are no noise.
+        let least = LEAST_GRADIENT * self.scales.intensity.min(MOST_NOISE);
+        let steep = gu * gu + gv * gv >= least * least;
         if !steep || seen.is_nan() {
             return;
         }

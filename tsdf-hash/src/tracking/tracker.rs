@@ -32,7 +32,7 @@ const FINE_STRIDE: usize = 2;
 /// Least coverage of a frame that is believed to be found.
 const LEAST_COVERAGE: f64 = 0.5;
 /// Least correlation of its intensities with those of the map, where both have colour (ours).
-const LEAST_LIKENESS: f64 = 0.5;
+const LEAST_LIKENESS: f64 = 0.75;
 /// Largest distances of partners, one search after the other, as multiples of the setting (ours).
 const REACHES: [f64; 10] = [4.0, 2.0, 1.0, 1.0, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5];
 /// Least agreement after each of these searches; what is below leads nowhere (ours).
@@ -239,7 +239,7 @@ impl Tracker {
         let cell = (FINE_STRIDE * FINE_STRIDE) as f64;
         let measured = comparison.level.omega.iter().filter(|omega| **omega > 0.0).count();
         let coverage = (cell * f64::from(last.in_view) / measured.max(1) as f64).min(1.0);
-        let found = Directions::new(&last.equations.h, last.mean_depth());
+        let found = Directions::new(&last.equations, last.mean_depth(), LEAST_SHARE);
         let (Some(directions), true) = (found, last.partners > 0) else {
             return TrackingOutcome { overlap, coverage, agreement, ..lost(prior, TrackingStatus::NoOverlap) };
         };
@@ -263,7 +263,7 @@ impl Tracker {
             directions.part(&Matrix6::identity().column(c).into_owned(), |k| unknown[k])
         }));
         let shared = last.excess() + map_variance(comparison);
-        let own = directions.honest_inverse(|k| !unknown[k], FEIGNED * scatter * directions.information.max());
+        let own = directions.honest_covariance(|k| !unknown[k], FEIGNED * scatter * directions.information.max());
         let left = directions.part(&search.remainder, |k| !unknown[k]);
         let covariance = own
             + own * last.equations.shared * own * shared
