@@ -3,6 +3,7 @@
 
     python3 synth_rgbd.py OUT --preset loop            60 frames, full loop, clean depth
     python3 synth_rgbd.py OUT --frames 4 --noise       any length, Kinect-like axial noise
+    python3 synth_rgbd.py OUT --preset loop --odometry 2 0.03 1    and an odometry that is off by 2 deg and 3 cm per frame
 
 Scene (metres, z up): the inside of the box [-3,3] x [-2,2] x [0,3], four spheres, four axis-aligned boxes. `sdf(p)` is the exact distance
 near the surfaces (a lower bound deep inside objects), `cast(o, d)` the exact first hit: together they are the ground truth of a map.
@@ -186,6 +187,20 @@ def write_png(path, img):
         )
 
 
+def with_errors(poses, deg, metres, seed):
+    """Motions between world_from_camera matrices, each with an error on its right side, put together again."""
+    random, out = np.random.default_rng(int(seed)), [poses[0]]
+    for before, now in zip(poses, poses[1:]):
+        w, t = random.normal(0, math.radians(deg), 3), random.normal(0, metres, 3)
+        a = np.linalg.norm(w)
+        K = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]]) / a
+        E = np.eye(4)
+        E[:3, :3] = np.eye(3) + math.sin(a) * K + (1 - math.cos(a)) * K @ K
+        E[:3, 3] = t
+        out.append(out[-1] @ np.linalg.inv(before) @ now @ E)
+    return out
+
+
 def main():
     a = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     a.add_argument("out")
@@ -195,6 +210,10 @@ def main():
     a.add_argument("--noise", action="store_true")
     a.add_argument("--no-colour", action="store_true", help="skip rgb/ (four times faster)")
     a.add_argument("--depth-scale", type=float, default=1000.0)
+    a.add_argument(
+        "--odometry", type=float, nargs=3, metavar=("DEG", "METRES", "SEED"),
+        help="also odometry.txt: the motions of groundtruth.txt with normal errors about and along each axis",
+    )
     a.add_argument("--world", type=float, nargs=4, default=[0, 0, 0, 0], metavar=("X", "Y", "Z", "YAW_DEG"))
     o = a.parse_args()
     if o.preset:
@@ -224,14 +243,21 @@ def main():
                 f"{o.out}/rgb/{i:04d}.png",
                 (colour(c + t[:, None] * d, ident) * 255 + 0.5).astype(np.uint8).reshape(H, W, 3),
             )
-        poses.append(
-            f"{i / 30:.6f} " + " ".join(f"{x:.9f}" for x in [*(M[:3, :3] @ c + M[:3, 3]), *quat(M[:3, :3] @ R)])
-        )
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = M[:3, :3] @ R, M[:3, :3] @ c + M[:3, 3]
+        poses.append(T)
+
+    def tum(poses):
+        return [
+            f"{i / 30:.6f} " + " ".join(f"{x:.9f}" for x in [*T[:3, 3], *quat(T[:3, :3])]) for i, T in enumerate(poses)
+        ]
 
     def text(name, lines):
         open(f"{o.out}/{name}", "w").write("\n".join(lines) + "\n")
 
-    text("groundtruth.txt", poses)
+    text("groundtruth.txt", tum(poses))
+    if o.odometry:
+        text("odometry.txt", tum(with_errors(poses, *o.odometry)))
     text("intrinsics.txt", [f"{W} {H} {FX} {FY} {CX} {CY} {o.depth_scale:g}"])
     text("world.txt", [" ".join(f"{x:.9g}" for x in o.world)])
     text("checksum.txt", [sha.hexdigest()])

@@ -6,10 +6,12 @@ mod decode;
 mod error;
 mod image_source;
 mod layouts;
+mod live;
 mod map_store;
 mod mcap_in;
 mod options;
 mod pairing;
+mod pose_file;
 mod pose_source;
 mod prediction;
 mod quality;
@@ -28,10 +30,13 @@ pub use decode::{Colour, Images};
 pub use error::{ScanError, SequenceError};
 pub use image_source::{ImageSource, ImageTopic};
 pub use layouts::open_sequence;
+pub use live::LiveSettings;
 pub use map_store::Device;
 pub use options::{
-    FrameRange, in_options, mebibytes, parse_intrinsics, parse_noise, parse_odometry_error, read_colour_camera,
+    FrameRange, in_options, mebibytes, parse_intrinsics, parse_noise, parse_odometry_error, read_body_from_camera,
+    read_colour_camera,
 };
+pub use pose_file::take_poses;
 pub use pose_source::{PoseSource, TrackingMetrics};
 pub use prediction::OdometryError;
 pub use quality::Quality;

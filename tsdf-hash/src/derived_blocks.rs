@@ -37,6 +37,8 @@ pub(crate) struct Derived<T> {
 pub(crate) struct Followed {
     pub(crate) version: MapVersion,
     pub(crate) is_new_map: bool,
+    /// Blocks of the map that was followed before, if this is another one.
+    pub(crate) left_behind: Vec<BlockKey>,
     pub(crate) removed: Vec<BlockKey>,
     pub(crate) changed: usize,
 }
@@ -59,7 +61,9 @@ impl<T: Default> DerivedBlocks<T> {
     /// Marks what depends on blocks that have changed or gone. [`commit`](Self::commit) follows when all is derived.
     pub(crate) fn follow<L: TsdfLayer + ?Sized>(&mut self, layer: &L) -> Followed {
         let changes = layer.changes_since(self.version);
+        let mut left_behind = Vec::new();
         if changes.is_new_map {
+            left_behind.extend_from_slice(self.blocks.keys());
             self.blocks = BlockTable::new();
             self.dirty.clear();
         }
@@ -75,7 +79,7 @@ impl<T: Default> DerivedBlocks<T> {
         }
         let changed = changes.changed.len();
         self.mark_changed(changes.changed.into_iter().filter_map(BlockKey::new));
-        Followed { version: changes.version, is_new_map: changes.is_new_map, removed, changed }
+        Followed { version: changes.version, is_new_map: changes.is_new_map, left_behind, removed, changed }
     }
 
     pub(crate) fn commit(&mut self, version: MapVersion) {

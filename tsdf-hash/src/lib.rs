@@ -113,6 +113,7 @@ pub use loop_closure::settings::LoopSettings;
 pub use map::Map;
 pub use mesh::incremental::IncrementalMesher;
 pub use mesh::obj::write_obj;
+pub use mesh::patches::PatchKey;
 pub use mesh::ply::write_ply;
 pub use mesh::triangle_mesh::Mesh;
 pub use nalgebra;

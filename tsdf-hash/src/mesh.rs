@@ -7,6 +7,7 @@ pub(crate) mod incremental;
 mod lattice;
 mod marching_cubes;
 pub(crate) mod obj;
+pub(crate) mod patches;
 pub(crate) mod ply;
 #[cfg(test)]
 mod tests;

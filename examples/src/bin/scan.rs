@@ -1,17 +1,19 @@
 //! Maps a recorded RGB-D sequence: depth and colour images, with poses or without, become a map and a mesh.
 
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::{Parser, ValueEnum};
+use nalgebra::Isometry3;
 use paintcopter_examples::exit::exit_code;
 use paintcopter_examples::mesh_io::{PlyMesh, write_ply};
 use paintcopter_examples::report::save_figures;
 use paintcopter_examples::scan::{
-    CheckpointSettings, Device, FrameRange, OdometryError, PoseSource, Scan, ScanReport, ScanSettings, Sequence,
-    in_options, mebibytes, open_sequence, parse_intrinsics, parse_noise, parse_odometry_error, read_colour_camera,
-    save_views,
+    CheckpointSettings, Device, FrameRange, LiveSettings, OdometryError, PoseSource, Scan, ScanReport, ScanSettings,
+    Sequence, in_options, mebibytes, open_sequence, parse_intrinsics, parse_noise, parse_odometry_error,
+    read_body_from_camera, read_colour_camera, save_views, take_poses,
 };
 use tsdf_hash::{Intrinsics, MemoryLimits, NoiseModel};
 
@@ -25,6 +27,12 @@ struct Arguments {
     /// Where the poses come from
     #[arg(long, default_value = "given")]
     poses: Poses,
+    /// Poses of a TUM file on the clock of the images, as of an odometry, in place of those recorded
+    #[arg(long, value_name = "FILE")]
+    pose_file: Option<PathBuf>,
+    /// With --pose-file: where the camera is on what the file follows, the 4x4 matrix `body_from_camera` [default: the file follows the camera]
+    #[arg(long, value_name = "FILE", requires = "pose_file")]
+    body_from_camera: Option<PathBuf>,
     /// With --poses odometry: standard deviations of the recorded motion from one frame to the next, of the turn about each axis and of
     /// the shift along it
     #[arg(long, value_name = "DEGREES,METRES", value_parser = parse_odometry_error, default_value = "0.5,0.01")]
@@ -82,6 +90,12 @@ struct Arguments {
     /// Seconds between two times that the map is saved on the way, to be gone on from with --resume after a crash; 0: never
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
     checkpoint: f64,
+    /// Show the run as it goes over Foxglove's WebSocket protocol: to this machine alone, unless an address says otherwise
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8765")]
+    live: Option<SocketAddr>,
+    /// Write what --live shows into scan.mcap in the folder for the results
+    #[arg(long)]
+    record: bool,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/scan")]
     out: PathBuf,
@@ -169,6 +183,11 @@ fn sequence(arguments: &Arguments) -> Result<Sequence, Box<dyn std::error::Error
     if let Some(path) = &arguments.depth_from_colour {
         sequence.colour_camera = Some(read_colour_camera(path)?);
     }
+    if let Some(path) = &arguments.pose_file {
+        let camera = arguments.body_from_camera.as_deref().map(read_body_from_camera).transpose()?;
+        let found = take_poses(&mut sequence, path, &camera.unwrap_or_else(Isometry3::identity))?;
+        eprintln!("{}: poses of {found} of {} frames", path.display(), sequence.frames.len());
+    }
     if let Some(range) = &arguments.frames {
         let listed = sequence.frames.len();
         sequence.frames = range.of(sequence.frames);
@@ -196,9 +215,12 @@ fn settings(arguments: &Arguments, sequence: &Sequence) -> Result<ScanSettings, 
         memory,
         ..tsdf_hash::Settings::default()
     };
+    let live =
+        LiveSettings { listen: arguments.live, record: arguments.record.then(|| arguments.out.join("scan.mcap")) };
+    let shown = live != LiveSettings::default();
     let device = match arguments.device {
-        // Eviction is done by the map on the processor only.
-        DeviceName::Auto if arguments.host_mib == 0 => Device::Auto,
+        // Eviction and the growing mesh are there for the map on the processor only.
+        DeviceName::Auto if arguments.host_mib == 0 && !shown => Device::Auto,
         DeviceName::Gpu => Device::Gpu,
         DeviceName::Auto | DeviceName::Cpu => Device::Cpu,
     };
@@ -228,6 +250,7 @@ fn settings(arguments: &Arguments, sequence: &Sequence) -> Result<ScanSettings, 
         fuse,
         loops,
         checkpoint,
+        live,
         ..ScanSettings::default()
     })
 }

@@ -94,6 +94,25 @@ pub enum ScanError {
     /// Less than half of the work was done.
     #[error("{0}")]
     Unusable(String),
+    /// A recording of the run cannot be written.
+    #[error("{path}: cannot be written ({why}): check that the folder exists and is writable")]
+    Unwritable {
+        /// The file.
+        path: String,
+        /// What the system said.
+        why: String,
+    },
+    /// Viewers cannot connect.
+    #[error("--live {address}: cannot be listened on ({why}): choose another address or port")]
+    Listen {
+        /// The address.
+        address: std::net::SocketAddr,
+        /// What the system said.
+        why: String,
+    },
+    /// Messages cannot be described.
+    #[error("the live view could not be opened: {0}")]
+    Recording(String),
     /// A checkpoint cannot be used.
     #[error("{path}: {why}")]
     Checkpoint {

@@ -87,25 +87,50 @@ impl FrameRange {
 /// # Errors
 /// [`SequenceError`].
 pub fn read_colour_camera(path: &Path) -> Result<ColourCamera, SequenceError> {
+    let numbers = read_numbers(path)?;
+    let expected = "the 16 numbers of depth_from_colour and, if need be, fx fy cx cy";
+    let (depth_from_colour, rest) = isometry(path, &numbers, expected)?;
+    let intrinsics = match *rest {
+        [] => None,
+        [fx, fy, cx, cy] => Some(Intrinsics { fx, fy, cx, cy }),
+        _ => return Err(unexpected(path, expected, numbers.len())),
+    };
+    Ok(ColourCamera { depth_from_colour, intrinsics })
+}
+
+/// Reads where a camera is on a body: 16 numbers of the matrix `body_from_camera`, row by row.
+///
+/// # Errors
+/// [`SequenceError`].
+pub fn read_body_from_camera(path: &Path) -> Result<Isometry3<f64>, SequenceError> {
+    let numbers = read_numbers(path)?;
+    let expected = "the 16 numbers of body_from_camera";
+    let (body_from_camera, rest) = isometry(path, &numbers, expected)?;
+    if rest.is_empty() { Ok(body_from_camera) } else { Err(unexpected(path, expected, numbers.len())) }
+}
+
+fn read_numbers(path: &Path) -> Result<Vec<f64>, SequenceError> {
     let text = std::fs::read_to_string(path).map_err(|e| SequenceError::unreadable(path, &e))?;
-    let words: Vec<&str> = text.split_whitespace().collect();
-    let m: Vec<f64> = words.iter().filter_map(|w| w.parse().ok()).filter(|x: &f64| x.is_finite()).collect();
-    if m.len() != words.len() || (m.len() != 16 && m.len() != 20) {
-        let why =
-            format!("expected the 16 numbers of depth_from_colour and, if need be, fx fy cx cy, found {}", m.len());
-        return Err(SequenceError::malformed(path, 0, why));
-    }
+    let number = |word: &str| {
+        let found = word.parse().ok().filter(|x: &f64| x.is_finite());
+        found.ok_or_else(|| SequenceError::malformed(path, 0, format!("\"{word}\" is no finite number")))
+    };
+    text.split_whitespace().map(number).collect()
+}
+
+/// A 4x4 matrix, row by row, and the numbers after it.
+fn isometry<'a>(path: &Path, numbers: &'a [f64], expected: &str) -> Result<(Isometry3<f64>, &'a [f64]), SequenceError> {
+    let (m, rest) = numbers.split_at_checked(16).ok_or_else(|| unexpected(path, expected, numbers.len()))?;
     let rotation = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
     if (rotation * rotation.transpose() - Matrix3::identity()).norm() > 1e-3 || rotation.determinant() < 0.0 {
         return Err(SequenceError::malformed(path, 0, "the upper left 3x3 is not a rotation"));
     }
     let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&rotation));
-    let depth_from_colour = Isometry3::from_parts(Vector3::new(m[3], m[7], m[11]).into(), rotation);
-    let intrinsics = m.get(16..).and_then(|k| match k {
-        &[fx, fy, cx, cy] => Some(Intrinsics { fx, fy, cx, cy }),
-        _ => None,
-    });
-    Ok(ColourCamera { depth_from_colour, intrinsics })
+    Ok((Isometry3::from_parts(Vector3::new(m[3], m[7], m[11]).into(), rotation), rest))
+}
+
+fn unexpected(path: &Path, expected: &str, found: usize) -> SequenceError {
+    SequenceError::malformed(path, 0, format!("expected {expected}, found {found} numbers"))
 }
 
 /// Bytes of so many MiB.

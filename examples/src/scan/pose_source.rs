@@ -59,6 +59,8 @@ pub(super) struct CameraTracker {
     found_first: bool,
     /// Nothing is fused.
     fixed_map: bool,
+    /// Of the present frame; `None` before the first one that was tracked.
+    pub(super) outcome: Option<TrackingOutcome>,
     pub(super) metrics: TrackingMetrics,
 }
 
@@ -79,6 +81,7 @@ impl CameraTracker {
             lost: false,
             found_first,
             fixed_map,
+            outcome: None,
             metrics: TrackingMetrics::default(),
         })
     }
@@ -145,6 +148,7 @@ impl CameraTracker {
             return Err(ScanError::Lost(self.search_state().into()));
         };
         self.note(frame, &outcome);
+        self.outcome = Some(outcome.clone());
         if !outcome.is_tracked() {
             self.prediction.lost(frame);
             return Err(ScanError::Lost(format!("{}; {}", reason(&outcome), self.search_state())));

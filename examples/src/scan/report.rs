@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::pose_source::PoseSource;
 use super::run::Scan;
 use super::sequence::Sequence;
 
@@ -18,7 +19,7 @@ pub struct ScanReport {
     pub frames_resumed: usize,
     /// Frames whose colour image could not be read.
     pub frames_without_colour: usize,
-    /// `given` or `tracked`.
+    /// `given`, `tracked` or `odometry`.
     pub poses: &'static str,
     /// Focal lengths and principal point of the depth camera, pixels.
     pub camera_px: [f64; 4],
@@ -121,7 +122,11 @@ impl ScanReport {
             frames_skipped: scan.skipped.len(),
             frames_resumed: scan.resumed,
             frames_without_colour: quality.without_colour,
-            poses: if tracking.is_some() { "tracked" } else { "given" },
+            poses: match scan.poses {
+                PoseSource::Given => "given",
+                PoseSource::Tracked => "tracked",
+                PoseSource::Odometry(_) => "odometry",
+            },
             camera_px: [k.fx, k.fy, k.cx, k.cy],
             camera_origin: sequence.camera_origin.clone(),
             depth_units_per_m: sequence.depth_scale,

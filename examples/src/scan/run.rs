@@ -11,6 +11,7 @@ use super::checkpoint::{Checkpoints, Progress, metadata};
 use super::correction::{Correction, LoopMetrics, Loops};
 use super::decode::Images;
 use super::error::ScanError;
+use super::live::Live;
 use super::map_store::MapStore;
 use super::pose_source::{CameraTracker, PoseSource, TrackingMetrics};
 use super::quality::Quality;
@@ -36,6 +37,8 @@ pub struct Scan {
     pub skipped: Vec<(usize, String)>,
     /// Frames that a run before this one had done.
     pub resumed: usize,
+    /// Which poses were believed.
+    pub poses: PoseSource,
     /// What kept the map.
     pub device: String,
     /// What was measured on the way.
@@ -76,7 +79,9 @@ impl Scan {
         let mut checkpoints = Checkpoints::new(settings.checkpoint.clone());
         for index in run.resumed..sequence.frames.len() {
             stage.share(index as f64 / sequence.frames.len() as f64);
-            match run.locate(index) {
+            let located = run.locate(index);
+            run.tell_tracking(index);
+            match located {
                 Ok(placed) => run.take_all(placed)?,
                 Err(why) => run.skip(index, &why),
             }
@@ -143,6 +148,7 @@ struct Run<'a> {
     /// Frames since the camera was lost.
     lost: Vec<usize>,
     metrics: ScanMetrics,
+    live: Option<Live>,
 }
 
 impl<'a> Run<'a> {
@@ -181,6 +187,7 @@ impl<'a> Run<'a> {
             skipped: Vec::new(),
             lost: Vec::new(),
             metrics: ScanMetrics::default(),
+            live: Live::open(&settings.live)?,
         })
     }
 
@@ -249,13 +256,24 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
+    fn tell_tracking(&mut self, index: usize) {
+        let outcome = self.tracker.as_mut().and_then(|tracker| tracker.outcome.take());
+        if let (Some(live), Some(outcome)) = (&mut self.live, outcome) {
+            live.tracking(self.sequence.frames[index].stamp, &outcome);
+        }
+    }
+
     fn skip(&mut self, index: usize, why: &ScanError) {
         // What cannot be read names its file itself.
         let name = match why {
             ScanError::Sequence(_) => String::new(),
             _ => format!("{}: ", self.sequence.frames[index].depth),
         };
-        self.skipped.push((index, format!("{name}{why}")));
+        let why = format!("{name}{why}");
+        if let Some(live) = &self.live {
+            live.say(self.sequence.frames[index].stamp, &format!("left out: {why}"));
+        }
+        self.skipped.push((index, why));
     }
 
     /// Fuses a frame, keeps its pose, and looks for loops; returns how the frames have to move, if one was found.
@@ -271,6 +289,9 @@ impl<'a> Run<'a> {
                 let keyframes = self.loops.as_ref().map_or(0, |loops| loops.keyframes().len());
                 tracker.fused(&depth, colour.as_ref(), &pose, keyframes)?;
             }
+        }
+        if let Some(live) = &mut self.live {
+            live.frame(frame.stamp, &pose, colour.as_ref(), &mut self.mesher);
         }
         self.fused.push((index, pose));
         self.trajectory.push(Stamp::from_secs(frame.stamp).map_err(vio_ekf::Error::from)?, pose)?;
@@ -345,6 +366,9 @@ impl<'a> Run<'a> {
         if let Some(loops) = &mut self.loops {
             loops.metrics.refused += anew;
         }
+        if let (Some(live), Some((index, _))) = (&mut self.live, self.fused.last()) {
+            live.corrected(self.sequence.frames[*index].stamp, self.trajectory.poses());
+        }
         Ok(())
     }
 
@@ -378,20 +402,28 @@ impl<'a> Run<'a> {
             }
             stage.done(&format!("{} ray casts", self.metrics.ray_casts.len()));
         }
+        if let (Some(live), Some((index, _)), Some(map)) = (&self.live, self.fused.last(), self.store.map()) {
+            self.mesher.update(map)?;
+            live.mesh(self.sequence.frames[*index].stamp, &mut self.mesher);
+        }
         let stage = Stage::start("mesh");
         let start = ProcessTime::now();
         let mesh = self.store.dense().mesh()?;
         self.metrics.mesh_s = start.elapsed().as_secs_f64();
         stage.done(&format!("{} vertices, {} triangles", mesh.positions.len(), mesh.faces.len()));
         if let Some(tracker) = &self.tracker {
-            self.metrics.ate_se3_rmse = tracked_error(self.sequence, &self.fused);
+            // Odometry is no truth to measure against.
+            if self.settings.poses == PoseSource::Tracked {
+                self.metrics.ate_se3_rmse = tracked_error(self.sequence, &self.fused);
+            }
             self.metrics.tracking = Some(tracker.metrics.clone());
         }
         self.metrics.loops = self.loops.as_ref().map(|loops| loops.metrics);
         let keyframes = self.keyframes().clone();
         let (device, map) = (self.store.device(), self.store.into_map()?);
-        let Self { trajectory, fused, skipped, resumed, metrics, .. } = self;
-        Ok(Scan { map, mesh, trajectory, keyframes, fused, skipped, resumed, device, metrics })
+        let Self { settings, trajectory, fused, skipped, resumed, metrics, .. } = self;
+        let poses = settings.poses;
+        Ok(Scan { map, mesh, trajectory, keyframes, fused, skipped, resumed, poses, device, metrics })
     }
 }
 

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::checkpoint::CheckpointSettings;
+use super::live::LiveSettings;
 use super::map_store::Device;
 use super::pose_source::PoseSource;
 
@@ -30,6 +31,8 @@ pub struct ScanSettings {
     pub loops: bool,
     /// Where the map is saved on the way.
     pub checkpoint: Option<CheckpointSettings>,
+    /// Who is told how it goes.
+    pub live: LiveSettings,
 }
 
 impl Default for ScanSettings {
@@ -46,6 +49,7 @@ impl Default for ScanSettings {
             fuse: true,
             loops: false,
             checkpoint: None,
+            live: LiveSettings::default(),
         }
     }
 }

@@ -10,6 +10,7 @@ use crate::derived_blocks::{DerivedBlocks, UpdateReport};
 use crate::error::Error;
 use crate::mesh::block_mesh::{BlockMesh, BlockMesher, MeshScale};
 use crate::mesh::marching_cubes::CASES;
+use crate::mesh::patches::{ChangedPatches, PatchKey, patch, patches_of};
 use crate::mesh::triangle_mesh::Mesh;
 use crate::mesh::weld::weld;
 use crate::tsdf_layer::{BlockReader, TsdfLayer};
@@ -44,6 +45,7 @@ const SOURCES: [[i32; 3]; 8] = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 
 /// ```
 pub struct IncrementalMesher {
     meshes: DerivedBlocks<BlockMesh>,
+    changed: ChangedPatches,
     mesher: BlockMesher,
     /// To add up copies in: a block and those above it.
     sums: Vec<VoxelBlock>,
@@ -51,7 +53,12 @@ pub struct IncrementalMesher {
 
 impl Default for IncrementalMesher {
     fn default() -> Self {
-        Self { meshes: DerivedBlocks::new(&SOURCES), mesher: BlockMesher::new(), sums: vec![VoxelBlock::ZERO; 8] }
+        Self {
+            meshes: DerivedBlocks::new(&SOURCES),
+            changed: ChangedPatches::default(),
+            mesher: BlockMesher::new(),
+            sums: vec![VoxelBlock::ZERO; 8],
+        }
     }
 }
 
@@ -68,6 +75,7 @@ impl IncrementalMesher {
     /// is then up to date in part, and the next call goes on.
     pub fn update<L: TsdfLayer + ?Sized>(&mut self, map: &L) -> Result<UpdateReport, Error> {
         let followed = self.meshes.follow(map);
+        followed.left_behind.iter().chain(&followed.removed).for_each(|key| self.changed.add(*key));
         let scale = MeshScale::new(map.settings());
         self.meshes.sort_dirty();
         let mut rebuilt = 0;
@@ -82,6 +90,21 @@ impl IncrementalMesher {
     /// The mesh, welded: one vertex per cut voxel edge, in the order of [`Map::mesh`](crate::Map::mesh).
     pub fn mesh(&self) -> Mesh {
         weld(&self.meshes.blocks)
+    }
+
+    /// The patches that the updates since the last call have changed, in their order; those of which nothing is left included.
+    pub fn take_changed_patches(&mut self) -> Vec<PatchKey> {
+        self.changed.take()
+    }
+
+    /// All patches of the map, in their order.
+    pub fn patches(&self) -> Vec<PatchKey> {
+        patches_of(self.meshes.blocks.keys().iter())
+    }
+
+    /// The mesh of a patch; empty where there is no surface. It is not welded: blocks have vertices of their own where they meet.
+    pub fn patch(&self, key: PatchKey) -> Mesh {
+        patch(&self.meshes.blocks, key)
     }
 
     /// The mesh of a layer as it is.
@@ -110,6 +133,7 @@ impl IncrementalMesher {
     fn rebuild<S: Source + ?Sized>(&mut self, left: usize, source: &S, scale: &MeshScale) -> Result<usize, S::Error> {
         let mut rebuilt = 0;
         while let Some(key) = self.meshes.next_dirty(left) {
+            self.changed.add(key);
             rebuilt += usize::from(self.rebuild_block(key, source, scale)?);
             self.meshes.done();
         }

@@ -57,13 +57,13 @@ fn owners(meshes: &BlockTable<Derived<BlockMesh>>, key: BlockKey, slot: u32) -> 
     owners
 }
 
-fn unit(v: [f32; 3]) -> Option<[f32; 3]> {
+pub(crate) fn unit(v: [f32; 3]) -> Option<[f32; 3]> {
     let norm = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
     (norm > 1e-20).then(|| v.map(|c| c / norm))
 }
 
 /// The unit vector along an edge, towards its free end.
-fn along(outward: u8) -> [f32; 3] {
+pub(crate) fn along(outward: u8) -> [f32; 3] {
     let mut unit = [0.0; 3];
     unit[usize::from(outward & 3)] = if outward & 4 == 0 { -1.0 } else { 1.0 };
     unit

@@ -35,6 +35,8 @@ const LEAST_COVERAGE: f64 = 0.5;
 const LEAST_LIKENESS: f64 = 0.75;
 /// Largest distances of partners, one search after the other, as multiples of the setting (ours).
 const REACHES: [f64; 10] = [4.0, 2.0, 1.0, 1.0, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5];
+/// Partners are looked for within so many standard deviations of the prior (ours).
+const SPREAD: f64 = 3.0;
 /// Least agreement after each of these searches; what is below leads nowhere (ours).
 const PROGRESS: [f64; 10] = [0.0, 0.3, 0.4, 0.5, 0.6, 0.6, 0.6, 0.6, 0.6, 0.6];
 /// A search that moves by less, radians and metres, is not repeated.
@@ -187,8 +189,12 @@ impl Tracker {
         let settings = &self.settings;
         let mut search = Registration::new(prior.world_from_camera);
         let mut last = None;
+        let spread = prior.covariance.map_or(0.0, |covariance| SPREAD * spread(&covariance, view));
+        let widest = spread.clamp(settings.max_distance, settings.max_distance * REACHES[0]);
         for level in (0..LEVELS).rev() {
-            let comparison = self.comparison(view, voxel_size, level);
+            // Where little is known of the pose, partners are far apart at first.
+            let reach = if level == 0 { settings.max_distance } else { widest };
+            let comparison = self.comparison(view, voxel_size, level, reach);
             let most = settings.iterations[LEVELS - 1 - level];
             last = Some((search.refine(&comparison, most, LEAST_SHARES[level]), comparison));
         }
@@ -198,13 +204,13 @@ impl Tracker {
         Ok(self.outcome(&mut search, &last, &comparison, view, reduction, prior))
     }
 
-    fn comparison<'a>(&'a self, view: &View, voxel_size: f64, level: usize) -> Comparison<'a> {
+    fn comparison<'a>(&'a self, view: &View, voxel_size: f64, level: usize, reach: f64) -> Comparison<'a> {
         Comparison {
             level: &self.levels[level],
             model: &self.models[level],
             origin: view.world_from_camera.translation.vector,
             noise: self.settings.noise,
-            max_distance: self.settings.max_distance as f32,
+            max_distance: reach as f32,
             tolerance: (0.5 * voxel_size) as f32,
             photometric: self.settings.photometric && !self.levels[level].intensity.is_empty(),
             threads: self.settings.threads,
@@ -297,6 +303,15 @@ impl Tracker {
             iterations: search.iterations,
         }
     }
+}
+
+/// Standard deviation of where a prior puts the surface in view, metres: along the worst direction.
+fn spread(covariance: &Matrix6<f64>, view: &View) -> f64 {
+    let seen = view.depth.iter().filter(|z| **z > 0.0);
+    let (sum, count) = seen.fold((0.0, 0.0_f64), |(sum, count), z| (sum + f64::from(*z), count + 1.0));
+    let depth = sum / count.max(1.0);
+    let largest = |first: usize| covariance.fixed_view::<3, 3>(first, first).symmetric_eigenvalues().max().max(0.0);
+    (largest(3) + depth * depth * largest(0)).sqrt()
 }
 
 /// Variance of what a tile of the map is off, square metres.

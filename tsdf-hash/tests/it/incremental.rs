@@ -1,7 +1,9 @@
 //! A mesh that follows its map is the mesh of the map.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Isometry3;
-use tsdf_hash::{IncrementalMesher, Map, MemoryLimits, Mesh, Settings, write_obj};
+use tsdf_hash::{IncrementalMesher, Map, MemoryLimits, Mesh, PatchKey, Settings, write_obj};
 
 use crate::eviction::{FREE, add, take_out};
 use crate::scene::room;
@@ -33,6 +35,44 @@ fn frames_put_in_and_taken_out() {
         .sum();
     assert!(removed > 1000 && map.blocks() == 0);
     assert_eq!(mesher.mesh(), Mesh::default());
+}
+
+/// A viewer that draws again what is said to have changed has the whole surface: frames in and out, another map, nothing.
+#[test]
+fn changed_patches_are_all_that_has_changed() {
+    fn triangles<'a>(meshes: impl IntoIterator<Item = &'a Mesh>) -> Vec<[[u32; 3]; 3]> {
+        let corners = |mesh: &Mesh, face: &[u32; 3]| face.map(|v| mesh.positions[v as usize].map(f32::to_bits));
+        let mut all: Vec<_> =
+            meshes.into_iter().flat_map(|mesh| mesh.faces.iter().map(move |face| corners(mesh, face))).collect();
+        all.sort_unstable();
+        all
+    }
+    fn draw(viewer: &mut BTreeMap<PatchKey, Mesh>, mesher: &mut IncrementalMesher) -> usize {
+        let changed = mesher.take_changed_patches();
+        for &key in &changed {
+            viewer.insert(key, mesher.patch(key));
+        }
+        assert_eq!(triangles(viewer.values()), triangles([&mesher.mesh()]));
+        changed.len()
+    }
+    let shots = room::tour(12, 3, &Isometry3::identity());
+    let (mut map, mut mesher, mut viewer) = (Map::new(FREE).unwrap(), IncrementalMesher::new(), BTreeMap::new());
+    for shot in &shots {
+        add(&mut map, shot).unwrap();
+        mesher.update(&map).unwrap();
+        let drawn = draw(&mut viewer, &mut mesher);
+        assert!(drawn > 0);
+    }
+    assert!(draw(&mut viewer, &mut mesher) == 0);
+    let all = mesher.patches();
+    assert!(all.len() > 20 && all.iter().all(|key| viewer.contains_key(key)));
+    take_out(&mut map, &shots[0]).unwrap();
+    mesher.update(&map).unwrap();
+    assert!(draw(&mut viewer, &mut mesher) < all.len());
+    let mut other = Map::new(FREE).unwrap();
+    add(&mut other, &shots[6]).unwrap();
+    mesher.update(&other).unwrap();
+    draw(&mut viewer, &mut mesher);
 }
 
 /// Blocks are evicted after half a second of frames and reloaded, and some frames go to evicted memory at once.
