@@ -10,13 +10,14 @@ use crate::mesh_io::TriangleMesh;
 use super::parts::neighbours;
 
 /// Rounds of smoothing: scans are rough at the size of their faces.
-const ROUNDS: usize = 12;
+const ROUNDS: usize = 4;
 /// How different neighbouring normals may be and still be averaged (Zheng et al. 2011, Eq. (3): sigma of the normals).
 const SIGMA: f64 = 0.35;
-/// Cosine of the angle between a face and what lies before it on the way, above which there is a crease: 30 degrees.
-const CREASE: f64 = 0.866;
-/// Way over which "what lies before" is averaged, metres: maps of a few centimetres round their creases.
-pub(super) const MEMORY: f64 = 0.08;
+/// Cosine of the angle between a face and what lies before it on the way, above which there is a crease: 25 degrees.
+const CREASE: f64 = 0.906;
+/// Way over which "what lies before" is averaged, metres: maps round their creases by a few centimetres. A pillar thinner than half a
+/// metre has no end of creases then.
+pub(super) const MEMORY: f64 = 0.12;
 
 /// A face that can be reached, the nearest first.
 #[derive(PartialEq)]
