@@ -11,6 +11,7 @@ use std::time::Instant;
 use clap::Parser;
 use paintcopter_examples::design::Design;
 use paintcopter_examples::mission::{Decision, Mission, MissionSettings, inspect, report, save};
+use paintcopter_examples::region::Scene;
 use paintcopter_examples::report::Check;
 use paintcopter_examples::world::rock_wall;
 
@@ -83,7 +84,8 @@ fn checks(seed: u64, threads: Option<u16>, folder: Option<&Path>) -> Result<Vec<
     if let Some(folder) = folder {
         std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}; choose another --out", folder.display()))?;
     }
-    let mission = Mission::run(Decision::make("Rock wall", &rock_wall(seed), &Design::Strata { seed }, settings)?)?;
+    let mission =
+        Mission::run(Decision::make("Rock wall", &Scene::whole(rock_wall(seed)), &Design::Strata { seed }, settings)?)?;
     let report = match folder {
         Some(folder) => save(&mission, folder)?,
         None => report(&mission, &inspect(&mission)?)?,

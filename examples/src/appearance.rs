@@ -4,6 +4,8 @@ use paint_net::{MonotoneCurve, Saturation};
 use paint_sim::colour::{BANDS, Spectrum, spectrum_lab, wavelength, xyz};
 use paint_sim::{Paint, Substrate};
 
+use crate::srgb::srgb;
+
 /// Film thickness that the painter calls a depth of 1, metres.
 pub const UNIT_THICKNESS: f64 = 20e-6;
 /// Density of the paint, kg/m³: an acrylic.
@@ -43,7 +45,7 @@ impl Appearance {
         let (wall, paint) = (sandstone()?, charcoal()?);
         let at = |depth: f64| paint.over(depth * UNIT_THICKNESS, &wall);
 
-        let grey = |s: &Substrate| encode(xyz(s.reflectance())[1]);
+        let grey = |s: &Substrate| srgb(xyz(s.reflectance())[1]);
         let bare = grey(&wall);
         // Ten times the deepest knot is opaque to rounding.
         let darkest = grey(&at(10.0 * DEEPEST)?);
@@ -100,11 +102,6 @@ pub fn charcoal() -> Result<Paint, paint_sim::Error> {
 /// A spectrum by formula of the wavelength, nm.
 pub(crate) fn spectrum(of_wavelength: impl Fn(f64) -> f64) -> Spectrum {
     std::array::from_fn(|k| of_wavelength(wavelength(k)))
-}
-
-/// The transfer curve of sRGB, unquantised.
-fn encode(linear: f64) -> f64 {
-    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use paint_net::Image;
 use paint_net::procedural::{fbm, value_noise};
 use uv_param::{Texture, luminance};
 
-use crate::mesh_io::TriangleMesh;
+use crate::mesh_io::{MaterialError, MeshMaterials, TriangleMesh};
 use crate::picture_file::open_upright;
 use crate::picture_placement::PicturePlacement;
 use crate::projection::{Projection, Viewpoint};
@@ -14,6 +14,9 @@ use crate::surface::PaintSurface;
 
 /// Largest ink asked for by the built-in designs: full black would need endless paint.
 pub(crate) const DARKEST: f64 = 0.85;
+
+/// Name of the design that is the mesh's own materials.
+pub(crate) const MATERIALS: &str = "materials";
 
 /// What to paint.
 #[derive(Debug, Clone)]
@@ -31,6 +34,8 @@ pub enum Design {
     Picture(Picture),
     /// A picture on the mesh's own texture coordinates; dark means paint.
     Texture(Picture),
+    /// A picture for every material of the mesh, on its own texture coordinates; dark means paint.
+    Materials(Vec<Picture>),
     /// The colours of the mesh's vertices; dark means paint.
     VertexColours,
 }
@@ -45,7 +50,7 @@ pub struct Picture {
 #[derive(Debug, thiserror::Error)]
 pub enum DesignError {
     /// Neither a built-in name nor a readable picture.
-    #[error("design \"{name}\": {why}; give strata, stripes, gradient, colours or a PNG, JPEG or SVG file")]
+    #[error("design \"{name}\": {why}; give strata, stripes, gradient, colours, materials or a PNG, JPEG or SVG file")]
     Unusable {
         /// What was given.
         name: String,
@@ -58,6 +63,9 @@ pub enum DesignError {
     /// Told to lie where it cannot.
     #[error("{0}")]
     NotMovable(&'static str),
+    /// A picture of the mesh's materials cannot be read.
+    #[error(transparent)]
+    Material(#[from] MaterialError),
     /// The mesh's texture cannot be read.
     #[error("texture of the mesh: {0}")]
     Texture(#[from] uv_param::Error),
@@ -69,7 +77,7 @@ pub enum DesignError {
 impl Design {
     /// Whether a name is that of a design that needs no file.
     pub fn is_built_in(name: &str) -> bool {
-        ["strata", "stripes", "gradient", "colours"].contains(&name)
+        ["strata", "stripes", "gradient", "colours", MATERIALS].contains(&name)
     }
 
     /// From the command line: a built-in name or a file.
@@ -81,6 +89,12 @@ impl Design {
             "colours" => Ok(Self::VertexColours),
             file => Picture::open(Path::new(file)).map(Self::Picture),
         }
+    }
+
+    /// The base colours that the mesh's own file names.
+    pub fn from_materials(materials: &MeshMaterials) -> Result<Self, DesignError> {
+        let pictures = materials.materials.iter().map(|m| Picture::from_rgba(&m.picture()?.into()));
+        Ok(Self::Materials(pictures.collect::<Result<_, DesignError>>()?))
     }
 
     /// Ink wanted on every texel of a surface made from `mesh`. Designs that do not lie on the mesh itself are laid over the
@@ -96,12 +110,12 @@ impl Design {
         let (width, height) = (surface.width(), surface.height());
         let texture = match self {
             Self::Texture(picture) => {
-                let uv = mesh.uv.as_ref().ok_or(DesignError::Missing("texture coordinates"))?;
-                let corners: Vec<[[f32; 2]; 3]> =
-                    uv.faces.iter().map(|f| f.map(|i| uv.coordinates[i as usize])).collect();
-                // The top row of an image is v = 1; textures repeat outside [0, 1].
-                let grey = |uv: [f64; 2]| [picture.sample(uv[0].rem_euclid(1.0), 1.0 - uv[1].rem_euclid(1.0))];
-                Texture::from_image(&surface.texels, surface.disk(), &corners, grey)?
+                Texture::from_image(&surface.texels, surface.disk(), &corner_uv(mesh)?, |_, uv| [picture.repeated(uv)])?
+            }
+            Self::Materials(pictures) => {
+                let materials = mesh.materials.as_ref().ok_or(DesignError::Missing("materials"))?;
+                let grey = |face: u32, uv| [pictures[materials.faces[face as usize] as usize].repeated(uv)];
+                Texture::from_image(&surface.texels, surface.disk(), &corner_uv(mesh)?, grey)?
             }
             Self::VertexColours => {
                 let colours = mesh.colours.as_ref().ok_or(DesignError::Missing("vertex colours"))?;
@@ -123,7 +137,7 @@ impl Design {
 
     /// Refuses a placement or a viewpoint that this design would leave unused.
     pub fn check_movable(&self, placement: &PicturePlacement, viewpoint: Option<Viewpoint>) -> Result<(), DesignError> {
-        let lies_on_mesh = matches!(self, Self::Texture(_) | Self::VertexColours);
+        let lies_on_mesh = matches!(self, Self::Texture(_) | Self::Materials(_) | Self::VertexColours);
         if lies_on_mesh && viewpoint.is_some() {
             return Err(DesignError::NotMovable(
                 "--project throws a design onto the surface, but textures and colours of the mesh lie on it already: leave it out",
@@ -154,9 +168,15 @@ impl Design {
             Self::Picture(picture) => placement
                 .locate([x, y], extent, picture.aspect())
                 .map_or(0.0, |[u, v]| DARKEST * f64::from(1.0 - picture.sample(u, v))),
-            Self::Texture(_) | Self::VertexColours => 0.0,
+            Self::Texture(_) | Self::Materials(_) | Self::VertexColours => 0.0,
         }
     }
+}
+
+/// Texture coordinates of the corners of every face.
+fn corner_uv(mesh: &TriangleMesh) -> Result<Vec<[[f32; 2]; 3]>, DesignError> {
+    let uv = mesh.uv.as_ref().ok_or(DesignError::Missing("texture coordinates"))?;
+    Ok(uv.faces.iter().map(|face| face.map(|i| uv.coordinates[i as usize])).collect())
 }
 
 /// Metres from the upper left corner of the chart of every texel's middle, and the chart's width and height.
@@ -218,8 +238,17 @@ impl Picture {
         let name = PathBuf::from(path).display().to_string();
         let unusable = |why: String| DesignError::Unusable { name: name.clone(), why };
         let picture = open_upright(path).map_err(|e| unusable(format!("cannot be read as a picture ({e})")))?;
+        Self::from_rgba(&picture).map_err(|error| match error {
+            DesignError::Unusable { why, .. } => unusable(why),
+            other => other,
+        })
+    }
+
+    /// The same from a picture in memory.
+    fn from_rgba(picture: &image::DynamicImage) -> Result<Self, DesignError> {
         if picture.width() < 2 || picture.height() < 2 {
-            return Err(unusable(format!("is only {} x {} pixels", picture.width(), picture.height())));
+            let why = format!("is only {} x {} pixels", picture.width(), picture.height());
+            return Err(DesignError::Unusable { name: "texture of the mesh".into(), why });
         }
         let rgba = picture.to_rgba32f();
         let grey = image::ImageBuffer::from_fn(rgba.width(), rgba.height(), |x, y| {
@@ -232,6 +261,11 @@ impl Picture {
     /// Width over height.
     pub fn aspect(&self) -> f64 {
         f64::from(self.grey.width()) / f64::from(self.grey.height())
+    }
+
+    /// The same where the picture repeats and v runs up: its top row is v = 1.
+    fn repeated(&self, [u, v]: [f64; 2]) -> f32 {
+        self.sample(u.rem_euclid(1.0), 1.0 - v.rem_euclid(1.0))
     }
 
     /// Bilinear grey value at `(u, v)` in `[0, 1]`, v down; clamped to the border.

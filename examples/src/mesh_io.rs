@@ -1,14 +1,18 @@
-//! Triangle meshes from files: OBJ (with or without texture coordinates), PLY (all encodings, vertex colours), OFF; and
+//! Triangle meshes from files: OBJ (with texture coordinates and materials), glTF, PLY (all encodings, vertex colours), OFF; and
 //! the painted surface back out as PLY.
 
 mod fault;
+mod gltf;
+mod material;
 mod mesh;
+mod mtl;
 mod obj;
 mod off;
 mod ply;
 
 use std::path::{Path, PathBuf};
 
+pub use material::{MaterialError, MeshMaterial, MeshMaterials, TextureSource};
 pub use mesh::{MeshUv, TriangleMesh};
 pub use ply::{PlyMesh, write_ply};
 
@@ -26,7 +30,7 @@ pub enum MeshError {
         source: std::io::Error,
     },
     /// The extension is not one of ours.
-    #[error("{path}: extension is not .obj, .ply or .off: convert the mesh to one of these")]
+    #[error("{path}: extension is not .obj, .glb, .gltf, .ply or .off: convert the mesh to one of these")]
     UnknownExtension {
         /// The file.
         path: PathBuf,
@@ -54,15 +58,20 @@ pub enum MeshError {
 /// Reads a mesh; the extension decides the format.
 pub fn read_mesh(path: &Path) -> Result<TriangleMesh, MeshError> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
-    let parse = match extension.as_str() {
+    let parse: fn(&[u8], &Path) -> Result<TriangleMesh, Fault> = match extension.as_str() {
+        "glb" | "gltf" => gltf::parse,
         "obj" => obj::parse,
-        "off" => off::parse,
-        "ply" => ply::parse,
+        "off" => |bytes, _| off::parse(bytes),
+        "ply" => |bytes, _| ply::parse(bytes),
         _ => return Err(MeshError::UnknownExtension { path: path.into() }),
     };
     let bytes = std::fs::read(path).map_err(|source| MeshError::Unreadable { path: path.into(), source })?;
-    let mesh =
-        parse(&bytes).map_err(|Fault { place, what }| MeshError::Malformed { path: path.into(), place, what })?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mesh = parse(&bytes, folder).map_err(|Fault { place, what }| MeshError::Malformed {
+        path: path.into(),
+        place,
+        what,
+    })?;
     if mesh.faces.is_empty() {
         return Err(MeshError::Empty { path: path.into(), vertices: mesh.positions.len() });
     }

@@ -1,25 +1,40 @@
 //! A mesh from a file stands somewhere, in some unit, lying or upright: brings it in front of the robot.
 
+use std::path::Path;
+
 use nalgebra::{Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::mesh_io::TriangleMesh;
+use crate::region::Scene;
 
 /// Height of the lowest vertex above the ground after placement, metres: room for the robot below its gun.
 const CLEAR_OF_GROUND: f64 = 1.5;
 /// A mesh whose normals agree more than this (mean normal, 1 = a plane) is a relief and is hung like a wall.
 const RELIEF: f64 = 0.5;
+/// Painted parts with a shorter level mean normal have no front.
+const FACING: f64 = 0.1;
 
 /// Which axis of the file points up.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum UpAxis {
     /// x up.
     X,
-    /// y up, as most OBJ files have it.
+    /// y up, as most OBJ files and all of glTF have it.
     Y,
     /// z up.
     Z,
+    /// Any direction: the opposite of gravity in a scan.
+    Direction([f64; 3]),
+}
+
+impl UpAxis {
+    /// What programs usually mean by a file of this name: y for OBJ, y by definition for glTF, z otherwise.
+    pub fn of_file(path: &Path) -> Self {
+        let is = |usual: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(usual));
+        if ["obj", "glb", "gltf"].into_iter().any(is) { Self::Y } else { Self::Z }
+    }
 }
 
 /// How to place a mesh.
@@ -43,6 +58,9 @@ pub enum PlacementError {
     /// All vertices are at one place.
     #[error("the mesh has no extent: all its vertices are at one point")]
     NoExtent,
+    /// The direction is none.
+    #[error("--up: give three finite numbers that are not all zero")]
+    Up,
     /// The scale is not a positive number.
     #[error("--scale {0}: a scale must be positive and finite")]
     Scale(f64),
@@ -60,23 +78,9 @@ pub struct PlacementResult {
 /// Scales the mesh, turns its up axis to z, turns flat pieces upright like a wall that faces -x, and puts it over the origin clear
 /// of the ground.
 pub fn place_mesh(mesh: &mut TriangleMesh, placement: MeshPlacement) -> Result<PlacementResult, PlacementError> {
-    if let Some(k) = mesh.positions.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
-        return Err(PlacementError::NotFinite(k));
-    }
-    let (low, high) = bounds(mesh);
-    let longest = (high - low).max();
-    if longest.is_nan() || longest <= 0.0 {
-        return Err(PlacementError::NoExtent);
-    }
-    let scale = placement.scale.unwrap_or(LONGEST_SIDE / longest);
-    if !(scale.is_finite() && scale > 0.0) {
-        return Err(PlacementError::Scale(scale));
-    }
-    let upright = match placement.up {
-        UpAxis::X => Rotation3::from_axis_angle(&Vector3::y_axis(), -std::f64::consts::FRAC_PI_2),
-        UpAxis::Y => Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2),
-        UpAxis::Z => Rotation3::identity(),
-    };
+    let (low, high) = checked_bounds(mesh)?;
+    let scale = checked_scale(placement.scale.unwrap_or(LONGEST_SIDE / (high - low).max()))?;
+    let upright = upright(placement.up)?;
     let facing = upright * mean_normal(mesh);
     let hung = facing.norm() > RELIEF;
     let turn = if hung { hang(&facing) * upright } else { upright };
@@ -85,6 +89,66 @@ pub fn place_mesh(mesh: &mut TriangleMesh, placement: MeshPlacement) -> Result<P
     let lift = CLEAR_OF_GROUND - bounds(mesh).0.z;
     transform(mesh, |p| p + Vector3::new(0.0, 0.0, lift));
     Ok(PlacementResult { scale, hung })
+}
+
+/// Scales a place of which a part is painted (metres, unless the placement says otherwise), turns its up axis to z, turns it about z
+/// so that the painted part faces -x, and puts it over the origin. Nothing is hung: what stands beside it tells how it stands.
+pub fn place_scene(scene: &mut Scene, placement: MeshPlacement) -> Result<PlacementResult, PlacementError> {
+    checked_bounds(&scene.canvas)?;
+    let scale = checked_scale(placement.scale.unwrap_or(1.0))?;
+    let upright = upright(placement.up)?;
+    let facing = upright * mean_normal(&scene.canvas);
+    let turn = if facing.xy().norm() > FACING { turn_to_robot(&facing) * upright } else { upright };
+    let everything = [&mut scene.canvas, &mut scene.obstacles];
+    // Both hold all vertices.
+    let (low, high) = bounds(everything[0]);
+    let middle = (low + high) / 2.0;
+    let mut lowest = f64::INFINITY;
+    for mesh in everything {
+        transform(mesh, |p| turn * (p - middle) * scale);
+        lowest = lowest.min(bounds(mesh).0.z);
+    }
+    for mesh in [&mut scene.canvas, &mut scene.obstacles] {
+        transform(mesh, |p| p + Vector3::new(0.0, 0.0, CLEAR_OF_GROUND - lowest));
+    }
+    Ok(PlacementResult { scale, hung: false })
+}
+
+fn checked_bounds(mesh: &TriangleMesh) -> Result<(Vector3<f64>, Vector3<f64>), PlacementError> {
+    if let Some(k) = mesh.positions.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
+        return Err(PlacementError::NotFinite(k));
+    }
+    let (low, high) = bounds(mesh);
+    let longest = (high - low).max();
+    if longest.is_nan() || longest <= 0.0 {
+        return Err(PlacementError::NoExtent);
+    }
+    Ok((low, high))
+}
+
+fn checked_scale(scale: f64) -> Result<f64, PlacementError> {
+    if scale.is_finite() && scale > 0.0 { Ok(scale) } else { Err(PlacementError::Scale(scale)) }
+}
+
+/// The rotation that turns a file's up axis to z.
+fn upright(up: UpAxis) -> Result<Rotation3<f64>, PlacementError> {
+    Ok(match up {
+        UpAxis::X => Rotation3::from_axis_angle(&Vector3::y_axis(), -std::f64::consts::FRAC_PI_2),
+        UpAxis::Y => Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2),
+        UpAxis::Z => Rotation3::identity(),
+        UpAxis::Direction(up) => {
+            let up = Vector3::from(up).try_normalize(0.0).filter(|up| up.iter().all(|c| c.is_finite()));
+            let up = up.ok_or(PlacementError::Up)?;
+            // Straight down has no nearest rotation: any half turn will do.
+            let half_turn = || Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+            Rotation3::rotation_between(&up, &Vector3::z()).unwrap_or_else(half_turn)
+        }
+    })
+}
+
+/// The rotation about z that makes a level direction -x.
+fn turn_to_robot(facing: &Vector3<f64>) -> Rotation3<f64> {
+    Rotation3::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI - facing.y.atan2(facing.x))
 }
 
 /// The rotation that makes a flat piece face -x: about z alone if it already stands. One that lies is tipped up first, so that
@@ -98,9 +162,7 @@ fn hang(facing: &Vector3<f64>) -> Rotation3<f64> {
         let straighten = Rotation3::rotation_between(&(hung * facing), &-Vector3::x());
         straighten.unwrap_or_else(Rotation3::identity) * hung
     };
-    let tipped = tip * facing;
-    let about_z = std::f64::consts::PI - tipped.y.atan2(tipped.x);
-    Rotation3::from_axis_angle(&Vector3::z_axis(), about_z) * tip
+    turn_to_robot(&(tip * facing)) * tip
 }
 
 /// Sum of the area vectors over the sum of their lengths: length 1 for a plane, 0 for a closed surface.

@@ -10,15 +10,17 @@ use crate::mission::{MissionSettings, PainterChoice};
 use crate::mission_file::MissionFile;
 use crate::picture_placement::{PicturePlacement, PlacementMode};
 use crate::projection::Viewpoint;
+use crate::region::Region;
 
 type AnyError = Box<dyn std::error::Error>;
 
 /// What stands in a mission file.
-const MISSION: [&str; 20] = [
+const MISSION: [&str; 21] = [
     "mesh",
     "texture",
     "scale",
     "up",
+    "region",
     "design",
     "scan",
     "painter",
@@ -43,20 +45,26 @@ pub struct MissionArguments {
     /// Fly a mission again: mission.toml of an earlier run, or one of your own
     #[arg(long, value_name = "FILE", conflicts_with_all = MISSION)]
     mission: Option<PathBuf>,
-    /// Surface to paint, OBJ, PLY or OFF; the built-in rock wall if not given
+    /// Surface to paint, OBJ, glTF (.glb, .gltf), PLY or OFF; the built-in rock wall if not given
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
-    /// Picture on the mesh's own texture coordinates (OBJ): it becomes the design
+    /// Picture on the mesh's own texture coordinates (OBJ, glTF): it becomes the design
     #[arg(long, value_name = "PNG", requires = "mesh", conflicts_with = "design")]
     texture: Option<PathBuf>,
     /// Metres per unit of the mesh file [default: the longest side becomes 3 m]
     #[arg(long, requires = "mesh", allow_negative_numbers = true)]
     scale: Option<f64>,
-    /// Axis of the mesh file that points up [default: y for OBJ, z otherwise]
-    #[arg(long, requires = "mesh")]
-    up: Option<Up>,
-    /// What to paint: strata, stripes, gradient, colours (of the mesh's vertices), or a PNG, JPEG or SVG file
-    /// [default: strata on the rock wall, stripes on a mesh]
+    /// Axis of the mesh file that points up: x, y, z, or any direction X,Y,Z [default: y for OBJ and glTF, z otherwise]
+    #[arg(long, requires = "mesh", value_name = "x|y|z|X,Y,Z", value_parser = up_axis, allow_hyphen_values = true)]
+    up: Option<UpAxis>,
+    /// Paint only a part of the mesh; the rest stays in the way. In the coordinates of the mesh file: box:x0,y0,z0,x1,y1,z1,
+    /// plane:px,py,pz,nx,ny,nz,RADIUS, pick:px,py,pz (as far as no crease), or mask:PNG on its texture coordinates. The mesh is a
+    /// place in metres then, unless --scale says otherwise
+    #[arg(long, requires = "mesh", conflicts_with = "scan")]
+    region: Option<Region>,
+    /// What to paint: strata, stripes, gradient, colours (of the mesh's vertices), materials (the pictures
+    /// that the mesh file or its MTL names), or a PNG, JPEG or SVG file
+    /// [default: strata on the rock wall, materials on a mesh that has pictures, else stripes]
     #[arg(long)]
     design: Option<String>,
     #[command(flatten)]
@@ -158,6 +166,15 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     parsed.and_then(|all| all.try_into().ok()).ok_or_else(|| format!("give {N} numbers with commas between them"))
 }
 
+fn up_axis(text: &str) -> Result<UpAxis, String> {
+    Ok(match text {
+        "x" => UpAxis::X,
+        "y" => UpAxis::Y,
+        "z" => UpAxis::Z,
+        direction => UpAxis::Direction(numbers(direction).map_err(|error| format!("{error}, or x, y, z"))?),
+    })
+}
+
 fn viewpoint(text: &str) -> Result<Viewpoint, String> {
     if text == "front" {
         return Ok(Viewpoint::Front);
@@ -179,13 +196,6 @@ impl Placement {
         };
         Ok(PicturePlacement { mode, rotate: self.rotate.to_radians(), offset: self.offset, size: self.size })
     }
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum Up {
-    X,
-    Y,
-    Z,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -229,15 +239,11 @@ impl MissionArguments {
             ..MissionSettings::default()
         };
         self.nozzle.apply(&mut settings);
-        let up = self.up.map(|up| match up {
-            Up::X => UpAxis::X,
-            Up::Y => UpAxis::Y,
-            Up::Z => UpAxis::Z,
-        });
         Ok(MissionFile {
             mesh: self.mesh.clone(),
             scale: self.scale,
-            up,
+            up: self.up,
+            region: self.region.clone(),
             design: self.design.clone(),
             texture: self.texture.clone(),
             scan: self.scan,

@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::design::{Design, DesignError, Picture};
+use crate::design::{Design, DesignError, MATERIALS, Picture};
 use crate::mesh_io::{MeshError, TriangleMesh, read_mesh};
-use crate::mesh_placement::{MeshPlacement, PlacementError, UpAxis, place_mesh};
+use crate::mesh_placement::{MeshPlacement, PlacementError, UpAxis, place_mesh, place_scene};
 use crate::mission::{Decision, MissionError, MissionSettings};
+use crate::region::{Region, RegionError, Scene};
 use crate::scan_flight::{ScanFlight, ScanFlightError, save as save_scan_flight};
 use crate::world::rock_wall;
 
@@ -15,18 +16,21 @@ use crate::world::rock_wall;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MissionFile {
-    /// Surface to paint, OBJ, PLY or OFF; the built-in rock wall if there is none. Relative paths begin at the file's folder.
+    /// Surface to paint, OBJ, glTF, PLY or OFF; the built-in rock wall if there is none. Relative paths begin at the file's folder.
     pub mesh: Option<PathBuf>,
     /// Metres per unit of the mesh file; without it the longest side becomes 3 m.
     pub scale: Option<f64>,
-    /// Axis of the mesh file that points up; y for OBJ and z otherwise.
+    /// Axis of the mesh file that points up; y for OBJ and glTF, z otherwise.
     pub up: Option<UpAxis>,
-    /// What to paint: `strata`, `stripes`, `gradient`, `colours` or a picture file; strata on the rock wall, stripes on a mesh.
+    /// What to paint: `strata`, `stripes`, `gradient`, `colours`, `materials` or a picture file; strata on the rock wall; on a mesh
+    /// the textures that its file names, stripes without.
     pub design: Option<String>,
     /// Picture on the mesh's own texture coordinates instead.
     pub texture: Option<PathBuf>,
     /// Scan the surface first and paint what was mapped.
     pub scan: bool,
+    /// The part that is painted, in the coordinates of the mesh file; all of it without.
+    pub region: Option<Region>,
     /// All numbers.
     pub settings: MissionSettings,
 }
@@ -69,6 +73,34 @@ pub enum MissionFileError {
         /// What is wrong.
         source: PlacementError,
     },
+    /// The region holds nothing, or cannot be read.
+    #[error("{path}: {source}")]
+    Region {
+        /// The mesh.
+        path: String,
+        /// What is wrong.
+        source: RegionError,
+    },
+    /// No pose of the robot paints anything of the region.
+    #[error(
+        "{path}: --region {region}: no pose of the robot can paint any of it: something stands before it, it faces up or down, or it faces \
+         away; the mesh reaches from {low:?} to {high:?} in the coordinates of its file (--up says which way is up, now {up:?})"
+    )]
+    RegionOutOfReach {
+        /// The mesh.
+        path: String,
+        /// The region.
+        region: String,
+        /// Least coordinates of the mesh.
+        low: [f32; 3],
+        /// Largest.
+        high: [f32; 3],
+        /// What points up.
+        up: UpAxis,
+    },
+    /// A region of what is not known yet.
+    #[error("region: a surface that the robot scans first has no coordinates yet; leave out the region or the scan")]
+    RegionBeforeScan,
     /// The mesh lacks what the mission asks of it.
     #[error("{path}: has no texture coordinates for --texture; leave it out or use --design")]
     NoTextureCoordinates {
@@ -109,6 +141,7 @@ impl MissionFile {
         for file in [&mut mission.mesh, &mut mission.texture].into_iter().flatten() {
             *file = folder.join(&*file);
         }
+        mission.region = mission.region.map(|region| region.in_folder(folder));
         if let Some(picture) = mission.design.as_mut().filter(|design| !Design::is_built_in(design)) {
             *picture = folder.join(&*picture).display().to_string();
         }
@@ -125,6 +158,7 @@ impl MissionFile {
             mesh: self.mesh.as_ref().map(absolute),
             texture: self.texture.as_ref().map(absolute),
             design: self.design.as_ref().map(picture),
+            region: self.region.clone().map(Region::absolute),
             ..self.clone()
         };
         let name = || path.display().to_string();
@@ -143,27 +177,40 @@ impl MissionFile {
     /// Reads the surface and the design, scans if asked to, and decides; what the scan leaves goes into `folder`.
     pub fn decide(&self, folder: &Path) -> Result<Decision, MissionFileError> {
         let settings = self.settings.clone();
-        let (name, mesh) = self.read_surface()?;
-        let mesh = if self.scan {
-            let scan_flight = ScanFlight::fly(&mesh, settings.seed, settings.threads)
+        let (name, scene) = self.read_surface()?;
+        let scene = if self.scan {
+            if self.region.is_some() {
+                return Err(MissionFileError::RegionBeforeScan);
+            }
+            let scan_flight = ScanFlight::fly(&scene.canvas, settings.seed, settings.threads)
                 .map_err(|source| MissionFileError::Scan { surface: self.mesh_prefix(), source })?;
             save_scan_flight(&scan_flight, folder).map_err(|source| self.in_mesh(source))?;
-            scan_flight.mesh
+            Scene::whole(scan_flight.mesh)
         } else {
-            mesh
+            scene
         };
-        let usual = if self.mesh.is_some() { "stripes" } else { "strata" };
-        let design = match &self.texture {
-            Some(texture) => Design::Texture(Picture::open(texture)?),
-            None => Design::from_name(self.design.as_deref().unwrap_or(usual), settings.seed)?,
+        let mesh = &scene.canvas;
+        let materials = mesh.materials.as_ref().filter(|materials| materials.textured() && mesh.uv.is_some());
+        let design = match (&self.texture, &self.design, materials) {
+            (Some(texture), ..) => Design::Texture(Picture::open(texture)?),
+            (None, Some(name), _) if name != MATERIALS => Design::from_name(name, settings.seed)?,
+            (None, _, Some(materials)) => {
+                eprintln!("{}wanted is the texture that the file names", self.mesh_prefix());
+                Design::from_materials(materials)?
+            }
+            (None, Some(_), None) => {
+                return Err(DesignError::Missing("textures of its own (OBJ with MTL, glTF)").into());
+            }
+            (None, None, None) if self.mesh.is_some() => Design::Stripes,
+            (None, None, None) => Design::Strata { seed: settings.seed },
         };
-        Decision::make(&name, &mesh, &design, settings).map_err(|source| self.in_mesh(source))
+        Decision::make(&name, &scene, &design, settings).map_err(|source| self.in_mesh(source))
     }
 
-    /// Name and mesh of the surface, placed before the robot.
-    pub fn read_surface(&self) -> Result<(String, TriangleMesh), MissionFileError> {
+    /// Name and mesh of the surface, placed before the robot, with what stands in its way.
+    pub fn read_surface(&self) -> Result<(String, Scene), MissionFileError> {
         Ok(match &self.mesh {
-            None => ("Rock wall".to_owned(), rock_wall(self.settings.seed)),
+            None => ("Rock wall".to_owned(), self.select("rock wall", rock_wall(self.settings.seed), 1.0)?),
             Some(path) => {
                 let name = path.file_stem().map_or("Mesh".into(), |s| s.to_string_lossy());
                 (name.into_owned(), self.load(path)?)
@@ -173,6 +220,14 @@ impl MissionFile {
 
     /// An error of the mission with the name of the mesh before it.
     pub fn in_mesh(&self, source: MissionError) -> MissionFileError {
+        if let (MissionError::OutOfReach { .. }, Some(region), Some(path)) = (&source, &self.region, &self.mesh)
+            && let Ok(mesh) = read_mesh(path)
+        {
+            let (low, high) = mesh.bounds();
+            let up = self.up.unwrap_or_else(|| UpAxis::of_file(path));
+            let (path, region) = (path.display().to_string(), region.to_string());
+            return MissionFileError::RegionOutOfReach { path, region, low, high, up };
+        }
         MissionFileError::Mission { surface: self.mesh_prefix(), source }
     }
 
@@ -180,19 +235,40 @@ impl MissionFile {
         self.mesh.as_ref().map_or_else(String::new, |path| format!("{}: ", path.display()))
     }
 
-    /// Reads and places a mesh.
-    fn load(&self, path: &Path) -> Result<TriangleMesh, MissionFileError> {
+    /// The part of a mesh that is painted, and the rest.
+    fn select(&self, name: &str, mesh: TriangleMesh, unit: f64) -> Result<Scene, MissionFileError> {
+        let Some(region) = &self.region else { return Ok(Scene::whole(mesh)) };
+        let all = mesh.faces.len();
+        let scene = region
+            .split(mesh, self.settings.texel / unit, unit)
+            .map_err(|source| MissionFileError::Region { path: name.to_owned(), source })?;
+        scene.canvas.notes.iter().for_each(|note| eprintln!("{name}: {note}"));
+        eprintln!("{name}: {} of {all} faces lie in the region {region}", scene.canvas.faces.len());
+        Ok(scene)
+    }
+
+    /// Reads and places a mesh. With a region it is a place in metres, without it an object.
+    fn load(&self, path: &Path) -> Result<Scene, MissionFileError> {
         let mut mesh = read_mesh(path)?;
         let name = path.display().to_string();
         if self.texture.is_some() && mesh.uv.is_none() {
             return Err(MissionFileError::NoTextureCoordinates { path: name });
         }
-        let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
-        let up = self.up.unwrap_or(if is_obj { UpAxis::Y } else { UpAxis::Z });
-        let placed = place_mesh(&mut mesh, MeshPlacement { scale: self.scale, up })
-            .map_err(|source| MissionFileError::Placement { path: name.clone(), source })?;
+        let up = self.up.unwrap_or_else(|| UpAxis::of_file(path));
+        let placement = MeshPlacement { scale: self.scale, up };
+        let (scene, placed) = if self.region.is_some() {
+            let unit = self.scale.filter(|s| s.is_finite() && *s > 0.0).unwrap_or(1.0);
+            let mut scene = self.select(&name, mesh, unit)?;
+            let placed = place_scene(&mut scene, placement);
+            (scene, placed)
+        } else {
+            mesh.notes.iter().for_each(|note| eprintln!("{name}: {note}"));
+            let placed = place_mesh(&mut mesh, placement);
+            (Scene::whole(mesh), placed)
+        };
+        let placed = placed.map_err(|source| MissionFileError::Placement { path: name.clone(), source })?;
         let hung = if placed.hung { ", hung like a wall" } else { "" };
-        eprintln!("{name}: {} faces, scale {:.4}{hung}", mesh.faces.len(), placed.scale);
-        Ok(mesh)
+        eprintln!("{name}: {} faces, scale {:.4}{hung}", scene.canvas.faces.len(), placed.scale);
+        Ok(scene)
     }
 }

@@ -1,5 +1,6 @@
 //! Pictures as a viewer shows them.
 
+use std::io::{BufRead, Cursor, Seek};
 use std::path::Path;
 
 use image::{DynamicImage, ImageDecoder as _, ImageError, ImageReader};
@@ -26,7 +27,16 @@ pub fn open_upright(path: &Path) -> Result<DynamicImage, PictureFileError> {
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg")) {
         return Ok(draw_svg(&std::fs::read_to_string(path)?)?);
     }
-    let mut decoder = ImageReader::open(path)?.with_guessed_format()?.into_decoder()?;
+    upright(ImageReader::open(path)?)
+}
+
+/// The same from the bytes of a PNG or JPEG.
+pub fn read_upright(bytes: &[u8]) -> Result<DynamicImage, PictureFileError> {
+    upright(ImageReader::new(Cursor::new(bytes)))
+}
+
+fn upright(reader: ImageReader<impl BufRead + Seek>) -> Result<DynamicImage, PictureFileError> {
+    let mut decoder = reader.with_guessed_format()?.into_decoder()?;
     // A picture whose EXIF block is broken is a picture still.
     let orientation = decoder.orientation().ok();
     let mut picture = DynamicImage::from_decoder(decoder)?;

@@ -90,6 +90,10 @@ pub struct Report {
     pub ssim_canvas: f64,
     /// Structural similarity of the painted surface.
     pub ssim_painted: f64,
+    /// The same two where the robot can paint.
+    pub ssim_canvas_in_reach: f64,
+    /// As above.
+    pub ssim_painted_in_reach: f64,
     /// Mean CIEDE2000 between painted and wanted.
     pub ciede2000_mean: f64,
     /// Moments at which the flown robot touched the surface.

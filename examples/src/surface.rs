@@ -9,6 +9,7 @@ use uv_param::{
 };
 
 use crate::mesh_io::TriangleMesh;
+use crate::region::Scene;
 
 /// A chart is stretched too much to paint where a length changes by more than this factor: spots would be ellipses.
 const MAX_STRETCH: f64 = 1.6;
@@ -44,9 +45,27 @@ impl PaintSurface {
     /// Unwraps the largest part of a mesh (metres, z up) into texels of `texel` metres; where that is no disk, all parts into several
     /// charts. `progress` is told the share done.
     pub fn new(mesh: &TriangleMesh, texel: f64, progress: &dyn Fn(f64)) -> Result<Self, SurfaceError> {
+        Self::of_parts(mesh, &TriangleMesh::default(), texel, progress)
+    }
+
+    /// The same for a place of which a part is painted: all of its pieces, and the rest is there to be hit.
+    pub fn of_scene(scene: &Scene, texel: f64, progress: &dyn Fn(f64)) -> Result<Self, SurfaceError> {
+        Self::of_parts(&scene.canvas, &scene.obstacles, texel, progress)
+    }
+
+    fn of_parts(
+        mesh: &TriangleMesh,
+        obstacles: &TriangleMesh,
+        texel: f64,
+        progress: &dyn Fn(f64),
+    ) -> Result<Self, SurfaceError> {
         let positions: Vec<[f64; 3]> = mesh.positions.iter().map(|p| p.map(f64::from)).collect();
         let repair = uv_param::Repair { weld: true, split_vertices: true };
         let (disk, repair_report) = match uv_param::largest_disk_with(&positions, &mesh.faces, repair) {
+            // A region is painted in all of its pieces.
+            Ok((_, report)) if report.components > 1 && !obstacles.faces.is_empty() => {
+                return Self::all_around(&positions, mesh, obstacles, texel);
+            }
             Ok(found) => found,
             // What is no disk is painted all around, in several charts.
             Err(
@@ -55,7 +74,7 @@ impl PaintSurface {
                 | Error::NonManifoldEdge { .. }
                 | Error::NotOrientable { .. },
             ) => {
-                return Self::all_around(&positions, mesh, texel);
+                return Self::all_around(&positions, mesh, obstacles, texel);
             }
             Err(error) => return Err(error.into()),
         };
@@ -66,12 +85,17 @@ impl PaintSurface {
             progress(if p.stage == uv_param::Stage::Cut { 0.0 } else { share });
         })?;
         let texels = TexelMap::new(&chart, texel)?;
-        let world = world(&disk, mesh)?;
+        let world = world(&disk, [mesh, obstacles])?;
         Ok(Self { chart, texels, world, repair_report, charts: 1 })
     }
 
     /// All parts of a mesh of any topology, as upright charts on one page.
-    fn all_around(positions: &[[f64; 3]], mesh: &TriangleMesh, texel: f64) -> Result<Self, SurfaceError> {
+    fn all_around(
+        positions: &[[f64; 3]],
+        mesh: &TriangleMesh,
+        obstacles: &TriangleMesh,
+        texel: f64,
+    ) -> Result<Self, SurfaceError> {
         let charts = ChartSettings { up: Some([0.0, 0.0, 1.0]), ..ChartSettings::default() };
         // The footprint of a spray must not reach from chart to chart across the page.
         let gutter = (2.0 * FOOTPRINT / texel).ceil() as usize;
@@ -79,7 +103,7 @@ impl PaintSurface {
         let atlas = uv_param::unwrap_atlas(positions, &mesh.faces, &[], &AtlasSettings { charts, pack }, |_| ())?;
         let chart = atlas.page_chart(0).ok_or(Error::ZeroArea)?;
         let texels = TexelMap::new(&chart, texel)?;
-        let world = world(chart.disk(), mesh)?;
+        let world = world(chart.disk(), [mesh, obstacles])?;
         let found = atlas.report();
         let repair_report = RepairReport {
             // Nothing is left out.
@@ -179,8 +203,8 @@ impl PaintSurface {
     }
 }
 
-/// The disk's faces, then the faces that are not in it.
-fn world(disk: &Disk, mesh: &TriangleMesh) -> Result<TriangleSurface, SurfaceError> {
+/// The disk's faces, then the faces of its mesh that are not in it, then the obstacles.
+fn world(disk: &Disk, [mesh, obstacles]: [&TriangleMesh; 2]) -> Result<TriangleSurface, SurfaceError> {
     let mut positions: Vec<[f32; 3]> = disk.positions().iter().map(|p| p.map(|c| c as f32)).collect();
     let mut faces = disk.faces().to_vec();
     let offset = positions.len() as u32;
@@ -190,5 +214,8 @@ fn world(disk: &Disk, mesh: &TriangleMesh) -> Result<TriangleSurface, SurfaceErr
     }
     positions.extend_from_slice(&mesh.positions);
     faces.extend(mesh.faces.iter().zip(in_disk).filter(|(_, inside)| !inside).map(|(f, _)| f.map(|i| i + offset)));
+    let offset = positions.len() as u32;
+    positions.extend_from_slice(&obstacles.positions);
+    faces.extend(obstacles.faces.iter().map(|f| f.map(|i| i + offset)));
     Ok(TriangleSurface::new(&positions, &faces)?)
 }

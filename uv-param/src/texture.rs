@@ -51,7 +51,7 @@ impl<const CHANNELS: usize> Texture<CHANNELS> {
     }
 
     /// Reads an image that the INPUT mesh already carries: `corner_uv` holds the uv of the three corners of every input
-    /// face (in whatever convention `image` understands), `image` is asked once per covered texel.
+    /// face (in whatever convention `image` understands), `image` is asked with an input face and a uv, once per covered texel.
     ///
     /// # Errors
     /// [`Error::Length`] unless there is one entry per input face; [`Error::NonFiniteValue`].
@@ -59,7 +59,7 @@ impl<const CHANNELS: usize> Texture<CHANNELS> {
         map: &TexelMap,
         disk: &Disk,
         corner_uv: &[[[f32; 2]; 3]],
-        image: impl Fn([f64; 2]) -> [f32; CHANNELS],
+        image: impl Fn(u32, [f64; 2]) -> [f32; CHANNELS],
     ) -> Result<Self, Error> {
         if corner_uv.len() != disk.source_face_count() {
             return Err(Error::Length {
@@ -73,14 +73,15 @@ impl<const CHANNELS: usize> Texture<CHANNELS> {
         }
         Ok(Self::from_sampler(map, |at| {
             let face = at.face as usize;
-            let source = corner_uv[disk.face_source()[face] as usize];
+            let input = disk.face_source()[face];
+            let source = corner_uv[input as usize];
             let mut uv = [0.0; 2];
             for (k, b) in at.barycentric.iter().enumerate() {
                 let corner = source[disk.source_corner(face, k)];
                 uv[0] += b * f64::from(corner[0]);
                 uv[1] += b * f64::from(corner[1]);
             }
-            image(uv)
+            image(input, uv)
         }))
     }
 

@@ -157,13 +157,13 @@ fn an_image_on_another_layout_is_carried_over() {
     assert_eq!(report.reversed_faces, 12);
     let chart = unwrap(&disk, &Settings::default(), |_| ()).unwrap();
     let map = TexelMap::new(&chart, 0.05).unwrap();
-    let texture = Texture::from_image(&map, &disk, &corner_uv, |[u, v]| [u as f32, v as f32]).unwrap();
+    let texture = Texture::from_image(&map, &disk, &corner_uv, |_, [u, v]| [u as f32, v as f32]).unwrap();
     for (cell, value) in map.cells.iter().zip(&texture.texels) {
         let p = chart.point(cell.unwrap());
         assert!((value[0] - p.z as f32).abs() < 1e-6 && (value[1] - p.x as f32).abs() < 1e-6);
     }
     assert!(matches!(
-        Texture::<2>::from_image(&map, &disk, &corner_uv[1..], |_| [0.0; 2]),
+        Texture::<2>::from_image(&map, &disk, &corner_uv[1..], |_, _| [0.0; 2]),
         Err(Error::Length { what: "corner_uv", .. })
     ));
 }

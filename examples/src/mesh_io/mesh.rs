@@ -2,6 +2,8 @@
 
 use nalgebra::Vector3;
 
+use super::material::MeshMaterials;
+
 /// A triangle mesh as it stands in a file: nothing welded, nothing repaired. Lengths in the file's unit.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TriangleMesh {
@@ -13,9 +15,13 @@ pub struct TriangleMesh {
     pub colours: Option<Vec<[f32; 3]>>,
     /// Texture coordinates with indices of their own, where the file has them.
     pub uv: Option<MeshUv>,
+    /// Colours and pictures that the file names for its faces, where it does.
+    pub materials: Option<MeshMaterials>,
+    /// What was assumed or left aside while the file was read, to be told.
+    pub notes: Vec<String>,
 }
 
-/// Texture coordinates of an OBJ: indices separate from the vertices'.
+/// Texture coordinates: indices separate from the vertices'.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct MeshUv {
     /// Coordinates; v = 1 is the top row of the image.
@@ -28,6 +34,14 @@ impl TriangleMesh {
     /// Sum of the areas of its triangles, in the square of its unit; indices must be valid.
     pub fn area(&self) -> f64 {
         self.area_vectors().map(|vector| vector.norm()).sum()
+    }
+
+    /// Least and largest coordinates of the vertices that faces use.
+    pub fn bounds(&self) -> ([f32; 3], [f32; 3]) {
+        let used = self.faces.iter().flatten().map(|&i| self.positions[i as usize]);
+        used.fold(([f32::MAX; 3], [f32::MIN; 3]), |(low, high), p| {
+            ([0, 1, 2].map(|c| low[c].min(p[c])), [0, 1, 2].map(|c| high[c].max(p[c])))
+        })
     }
 
     /// Half the cross product of two sides of every triangle: along its normal, as long as its area.

@@ -1,19 +1,25 @@
-//! Wavefront OBJ: v (with optional colour), vt, f. Groups, normals and materials are passed over.
+//! Wavefront OBJ: v (with optional colour), vt, f, mtllib, usemtl. Groups and normals are passed over.
 //!
 //! Read here and not by `tobj` (4.0.5): that tears a mesh at every group, numbers the vertices anew, gives corners without
 //! texture coordinates those of the corner before, names no line in its errors, and overflows on `f 1/-9`. `obj` and `obj-rs`
 //! know no vertex colours.
 
-use super::fault::{Fault, number};
-use super::mesh::{MeshUv, TriangleMesh, fan};
+use std::collections::HashMap;
+use std::path::Path;
 
-pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
+use super::fault::{Fault, number};
+use super::material::{MeshMaterial, MeshMaterials};
+use super::mesh::{MeshUv, TriangleMesh, fan};
+use super::mtl;
+
+pub(super) fn parse(bytes: &[u8], folder: &Path) -> Result<TriangleMesh, Fault> {
     let text = String::from_utf8_lossy(bytes);
     let mut mesh = TriangleMesh::default();
     let mut colours: Vec<[f32; 3]> = Vec::new();
     let mut uv = MeshUv::default();
     let mut corners: Vec<(u32, Option<u32>)> = Vec::new();
-    let mut every_corner_has_uv = true;
+    let mut faces_without_uv = 0;
+    let mut used = UsedMaterials::default();
     for (k, line) in text.lines().enumerate() {
         let k = k + 1;
         let mut words = line.split_whitespace();
@@ -30,6 +36,12 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
                 }
             }
             Some("vt") => uv.coordinates.push([number(&mut words, k, "u")?, number(&mut words, k, "v")?]),
+            Some("mtllib") => {
+                let name = line.trim().trim_start_matches("mtllib").trim();
+                used.library.extend(mtl::read(&folder.join(name.replace('\\', "/")), &mut mesh.notes));
+            }
+            // Names of materials may have spaces in them.
+            Some("usemtl") => used.set(line.trim().trim_start_matches("usemtl").trim()),
             Some("f") => {
                 corners.clear();
                 for word in words {
@@ -40,10 +52,11 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
                 }
                 fan(&corners, |triangle| {
                     mesh.faces.push(triangle.map(|c| c.0));
+                    used.add_face();
                     if let [(_, Some(a)), (_, Some(b)), (_, Some(c))] = triangle {
                         uv.faces.push([a, b, c]);
                     } else {
-                        every_corner_has_uv = false;
+                        faces_without_uv += 1;
                     }
                 });
             }
@@ -53,10 +66,42 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
     if colours.len() == mesh.positions.len() && !colours.is_empty() {
         mesh.colours = Some(colours);
     }
-    if every_corner_has_uv && !uv.faces.is_empty() {
+    if faces_without_uv == 0 && !uv.faces.is_empty() {
         mesh.uv = Some(uv);
+    } else if !uv.faces.is_empty() {
+        let faces = mesh.faces.len();
+        mesh.notes.push(format!("texture coordinates left aside: {faces_without_uv} of {faces} faces have none"));
     }
+    mesh.materials = (!used.library.is_empty()).then_some(used.materials);
     Ok(mesh)
+}
+
+/// The materials that faces have had so far.
+#[derive(Default)]
+struct UsedMaterials {
+    library: HashMap<String, MeshMaterial>,
+    numbers: HashMap<String, u32>,
+    current: Option<u32>,
+    materials: MeshMaterials,
+}
+
+impl UsedMaterials {
+    /// The material of the faces that follow; white where no library has it.
+    fn set(&mut self, name: &str) {
+        let next = self.materials.materials.len() as u32;
+        let number = *self.numbers.entry(name.to_owned()).or_insert(next);
+        if number == next {
+            self.materials.materials.push(self.library.get(name).cloned().unwrap_or_default());
+        }
+        self.current = Some(number);
+    }
+
+    fn add_face(&mut self) {
+        if self.current.is_none() {
+            self.set("");
+        }
+        self.materials.faces.extend(self.current);
+    }
 }
 
 /// One face corner `v`, `v/vt`, `v//vn` or `v/vt/vn`; negative indices count back from the last.

@@ -16,6 +16,7 @@ use crate::design::Design;
 use crate::mesh_io::TriangleMesh;
 use crate::progress::Stage;
 use crate::recording::PaintStyle;
+use crate::region::Scene;
 use crate::surface::PaintSurface;
 
 /// Flight logs are most of what a mission keeps: the built-in wall of 10.6 m² takes 200 MB with texels of 1.25 cm.
@@ -44,26 +45,21 @@ pub struct Decision {
 
 impl Decision {
     /// Unwraps the surface, lays the design onto it and lets the painter decide. `name` is what the report calls the surface.
-    pub fn make(
-        name: &str,
-        mesh: &TriangleMesh,
-        design: &Design,
-        settings: MissionSettings,
-    ) -> Result<Self, MissionError> {
+    pub fn make(name: &str, scene: &Scene, design: &Design, settings: MissionSettings) -> Result<Self, MissionError> {
         let started = Instant::now();
         let robot = Robot::new(Ptu::new(settings.ptu)?);
         let appearance = Appearance::charcoal_on_sandstone()?;
 
         settings.check()?;
         design.check_movable(&settings.placement, settings.viewpoint)?;
-        check_memory(mesh, &settings)?;
+        check_memory(&scene.canvas, &settings)?;
         let stage = Stage::start("unwrap");
-        let surface = PaintSurface::new(mesh, settings.texel, &|s| stage.share(s))?;
+        let surface = PaintSurface::of_scene(scene, settings.texel, &|s| stage.share(s))?;
         stage.done(&describe(&surface));
 
         let coverage = surface.coverage();
         // Nothing is wanted beside the surface, and no more than the paint can show.
-        let wanted = design.on_surface(&surface, mesh, &settings.placement, settings.viewpoint)?;
+        let wanted = design.on_surface(&surface, &scene.canvas, &settings.placement, settings.viewpoint)?;
         let mut wanted = wanted.map(|ink| ink.min(appearance.ink().max_ink()));
         for (ink, covered) in wanted.data_mut().iter_mut().zip(coverage.data()) {
             *ink *= covered;

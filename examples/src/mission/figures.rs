@@ -81,6 +81,8 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         psnr_painted_db: metrics::psnr(&painted, &mission.decision.wanted, weight)?,
         ssim_canvas: metrics::ssim(canvas, &mission.decision.wanted, weight)?,
         ssim_painted: metrics::ssim(&painted, &mission.decision.wanted, weight)?,
+        ssim_canvas_in_reach: metrics::ssim(canvas, &mission.decision.wanted, in_reach)?,
+        ssim_painted_in_reach: metrics::ssim(&painted, &mission.decision.wanted, in_reach)?,
         ciede2000_mean: mean(mission.colour_difference().into_iter().flatten()),
         collisions: mission
             .flights

@@ -1,7 +1,7 @@
 //! Pictures of the surface as somebody standing before it sees it.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
-use paint_sim::{Camera, Frame, Hit, Lights, Shading, render};
+use paint_sim::{Camera, Frame, Hit, Lights, Shading, Surface as _, render};
 
 use super::decision::Decision;
 use super::error::MissionError;
@@ -11,6 +11,13 @@ use crate::pictures::Rgb;
 const VIEW: (u32, u32) = (1500, 940);
 /// Share of the view that the surface fills.
 const FILL: f64 = 0.86;
+/// Directions of the camera beside the usual one, in lengths to the side and up for one forward.
+const OTHER_SIDES: [[f64; 2]; 8] =
+    [[-0.45, 0.28], [0.0, 0.28], [0.9, 0.28], [-0.9, 0.28], [0.0, 0.8], [0.6, 0.8], [-0.6, 0.8], [0.0, 0.0]];
+/// Places on the surface that are asked whether they are seen.
+const LOOKED_AT: usize = 500;
+/// Hits as near as this to a place are the place itself, metres.
+const OWN_SURFACE: f64 = 0.01;
 
 /// The surface in the light of a sun behind the camera's shoulder.
 pub(super) fn view(
@@ -29,17 +36,52 @@ pub(super) fn view(
     Ok(render(&decision.surface.world, camera, shade, &lights, 2, decision.settings.threads)?)
 }
 
+fn extent(points: &[Point3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
+    let none = (Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN));
+    points.iter().fold(none, |(l, h), p| (l.inf(&p.coords), h.sup(&p.coords)))
+}
+
 /// A camera on the surface's mean side that has all the points in view.
 pub(super) fn camera(decision: &Decision, points: &[Point3<f64>]) -> Result<Camera, MissionError> {
-    let (low, high) = points
-        .iter()
-        .fold((Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN)), |(l, h), p| (l.inf(&p.coords), h.sup(&p.coords)));
+    let (low, high) = extent(points);
     let centre = (low + high) / 2.0;
     let facing = decision.surface.facing();
     let flat = Vector3::new(facing.x, facing.y, 0.0);
     let front: Vector3<f64> = flat.try_normalize(0.1).unwrap_or(-Vector3::x());
     let side: Vector3<f64> = Vector3::z().cross(&front);
-    let direction = (front + side * 0.45 + Vector3::z() * 0.28).normalize();
+    let from =
+        |to_side: f64, above: f64| fitted(points, centre, (front + side * to_side + Vector3::z() * above).normalize());
+    let usual = from(0.45, 0.28)?;
+    // In a room a wall may stand between: then from where most is seen.
+    let seen = |camera: &Camera| visible(decision, camera);
+    let mut best = (2 * seen(&usual), usual);
+    for [to_side, above] in OTHER_SIDES {
+        let camera = from(to_side, above)?;
+        let count = seen(&camera);
+        if count > best.0 {
+            best = (count, camera);
+        }
+    }
+    Ok(best.1)
+}
+
+/// How many of some points of the surface the camera sees.
+fn visible(decision: &Decision, camera: &Camera) -> usize {
+    let disk = decision.surface.disk();
+    let eye = Point3::from(camera.world_from_camera.translation.vector);
+    let sees = |face: &usize| {
+        let corners = disk.faces()[*face].map(|v| Vector3::from(disk.positions()[v as usize]));
+        let way = corners.iter().sum::<Vector3<f64>>() / 3.0 - eye.coords;
+        let Some(direction) = UnitVector3::try_new(way, 1e-9) else { return false };
+        let hit = decision.surface.world.cast(&eye, &direction, way.norm() + OWN_SURFACE);
+        hit.is_some_and(|hit| hit.distance > way.norm() - OWN_SURFACE)
+    };
+    (0..disk.faces().len()).step_by((disk.faces().len() / LOOKED_AT).max(1)).filter(sees).count()
+}
+
+/// A camera in a direction from the middle of points that has all of them in view.
+fn fitted(points: &[Point3<f64>], centre: Vector3<f64>, direction: Vector3<f64>) -> Result<Camera, MissionError> {
+    let (low, high) = extent(points);
     let up = Vector3::z();
     // Step back until everything fits, then look at the middle of what is seen.
     let (mut target, mut distance) = (centre, 0.8 * (high - low).norm());

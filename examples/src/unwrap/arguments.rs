@@ -4,12 +4,14 @@ use std::path::PathBuf;
 
 use clap::Parser;
 
+use crate::region::Region;
+
 /// Lays a mesh out in metres: cuts it into few charts that are hardly stretched, packs them onto pages, writes OBJ, glTF, a
 /// picture of the charts and a report.
 #[derive(Debug, Clone, Parser)]
 #[command(version, after_help = "Example:\n  unwrap --mesh statue.obj --texel 0.0125 --out out/statue")]
 pub struct Arguments {
-    /// Surface, OBJ, PLY or OFF
+    /// Surface, OBJ, glTF (.glb, .gltf), PLY or OFF
     #[arg(long, value_name = "FILE")]
     pub mesh: PathBuf,
     /// Side of a texel on the surface, metres
@@ -27,12 +29,17 @@ pub struct Arguments {
     /// Edges that shall be seams: a text file with two vertex numbers, counted from 0, on each line
     #[arg(long, value_name = "FILE")]
     pub seams: Option<PathBuf>,
-    /// Picture on the mesh's own texture coordinates (OBJ): it is carried over to the new ones
+    /// Picture on the mesh's own texture coordinates (OBJ, glTF): it is carried over to the new ones [default: the pictures that
+    /// the mesh file or its MTL names]
     #[arg(long, value_name = "PNG")]
     pub texture: Option<PathBuf>,
     /// Direction of the mesh file that points up in every chart; charts are not turned then
     #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true)]
     pub up: Option<[f64; 3]>,
+    /// Lay out only a part of the mesh, in the coordinates of its file: box:x0,y0,z0,x1,y1,z1, plane:px,py,pz,nx,ny,nz,RADIUS,
+    /// pick:px,py,pz (as far as no crease), or mask:PNG on its texture coordinates
+    #[arg(long)]
+    pub region: Option<Region>,
     /// Texels between two charts
     #[arg(long, default_value_t = 4)]
     pub gutter: usize,

@@ -8,6 +8,17 @@ pub enum UnwrapError {
     /// The mesh file is not one.
     #[error(transparent)]
     Mesh(#[from] crate::mesh_io::MeshError),
+    /// A picture that the mesh file names cannot be read.
+    #[error(transparent)]
+    Material(#[from] crate::mesh_io::MaterialError),
+    /// The region holds nothing, or cannot be read.
+    #[error("{}: {source}", path.display())]
+    Region {
+        /// The mesh file.
+        path: PathBuf,
+        /// What is wrong.
+        source: crate::region::RegionError,
+    },
     /// The mesh cannot be laid out.
     #[error("{}: {source}", path.display())]
     Atlas {

@@ -7,15 +7,17 @@ use uv_param::Atlas;
 
 use super::error::UnwrapError;
 use crate::mesh_io::TriangleMesh;
+use crate::mesh_placement::UpAxis;
 use crate::textured_mesh::TexturedMesh;
 
 /// Writes `atlas.obj`, `atlas.mtl`, `atlas_texture[_N].png` and `atlas[_N].glb`.
 ///
 /// The OBJ keeps every vertex of the mesh at its place and number (`mesh` in the unit of its file); texture coordinates have
-/// indices of their own. Faces that were left out are not in it.
+/// indices of their own. Faces that were left out are not in it. `up` points up in the file; y in a glTF.
 pub(super) fn save(
     atlas: &Atlas,
     mesh: &TriangleMesh,
+    up: UpAxis,
     textures: &[image::RgbImage],
     folder: &Path,
 ) -> Result<(), UnwrapError> {
@@ -26,7 +28,10 @@ pub(super) fn save(
     for (page, texture) in textures.iter().enumerate() {
         let path = folder.join(format!("atlas_texture{}.png", suffix(page)));
         texture.save(&path).map_err(|e| UnwrapError::unwritable(&path, &e))?;
-        let part = page_mesh(atlas, page);
+        let mut part = page_mesh(atlas, page);
+        if up == UpAxis::Y {
+            part.positions.iter_mut().for_each(|[_, y, z]| (*y, *z) = (-*z, *y));
+        }
         let textured =
             TexturedMesh { positions: &part.positions, faces: &part.faces, uv: part.uv, texture: texture.clone() };
         let glb = textured.glb().map_err(|e| UnwrapError::unwritable(folder, &e))?;

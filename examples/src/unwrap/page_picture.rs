@@ -2,7 +2,8 @@
 
 use uv_param::{Atlas, PageTexels, SurfacePoint, TexelKind, linear_from_srgb};
 
-use crate::mesh_io::{MeshUv, TriangleMesh};
+use crate::mesh_io::MeshUv;
+use crate::srgb::srgb_byte;
 
 /// Texels along a square of the checkerboard.
 const SQUARE: usize = 8;
@@ -51,30 +52,36 @@ fn shade(stretch: f64, [bound, worst]: [f64; 2], dark: bool) -> [u8; 3] {
     [0, 1, 2].map(|c| (light * (from[c] + t * (to[c] - from[c]))) as u8)
 }
 
-/// The picture that the mesh carries on coordinates of its own, on a page of the atlas.
+/// Pictures that a mesh carries on coordinates of its own.
+pub(super) struct CarriedPictures {
+    pub(super) pictures: Vec<image::RgbImage>,
+    /// Picture of every face of the mesh.
+    pub(super) faces: Vec<u32>,
+}
+
+/// The pictures that the mesh carries, on a page of the atlas.
 pub(super) fn carried_over(
     atlas: &Atlas,
     texels: &PageTexels,
-    mesh: &TriangleMesh,
     uv: &MeshUv,
-    picture: &image::RgbImage,
+    carried: &CarriedPictures,
 ) -> image::RgbImage {
-    debug_assert_eq!(mesh.faces.len(), uv.faces.len());
     let linear: Vec<f32> = (0..=255_u8).map(|c| linear_from_srgb(f32::from(c) / 255.0)).collect();
     let sample = |point: SurfacePoint| {
         let face = point.face as usize;
-        let corners = uv.faces[atlas.surface().face_source()[face] as usize];
+        let input = atlas.surface().face_source()[face] as usize;
+        let corners = uv.faces[input];
         let mut at = [0.0; 2];
         for (k, weight) in point.barycentric.iter().enumerate() {
             let corner = uv.coordinates[corners[atlas.surface().source_corner(face, k)] as usize];
             at = [at[0] + weight * f64::from(corner[0]), at[1] + weight * f64::from(corner[1])];
         }
-        bilinear(picture, at, &linear)
+        bilinear(&carried.pictures[carried.faces[input] as usize], at, &linear)
     };
     let colours = texels.fill(None, |point| Some(sample(point)));
     image::RgbImage::from_fn(texels.width as u32, texels.height as u32, |x, y| {
         let colour = colours[y as usize * texels.width + x as usize];
-        image::Rgb(colour.map_or(PAPER, |linear| linear.map(encoded)))
+        image::Rgb(colour.map_or(PAPER, |linear| linear.map(srgb_byte)))
     })
 }
 
@@ -90,10 +97,4 @@ fn bilinear(picture: &image::RgbImage, [u, v]: [f64; 2], linear: &[f32]) -> [f32
     };
     let [a, b, c, d] = [pixel(0.0, 0.0), pixel(1.0, 0.0), pixel(0.0, 1.0), pixel(1.0, 1.0)];
     [0, 1, 2].map(|k| (1.0 - ty) * ((1.0 - tx) * a[k] + tx * b[k]) + ty * ((1.0 - tx) * c[k] + tx * d[k]))
-}
-
-/// sRGB byte of a linear value (IEC 61966-2-1).
-fn encoded(linear: f32) -> u8 {
-    let value = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
-    (255.0 * value.clamp(0.0, 1.0)).round() as u8
 }

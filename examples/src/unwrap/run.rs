@@ -9,9 +9,10 @@ use uv_param::{Atlas, AtlasQuality, AtlasSettings, ChartSettings, PackSettings, 
 use super::arguments::Arguments;
 use super::error::UnwrapError;
 use super::files::{save, suffix};
-use super::page_picture::{carried_over, checkerboard};
+use super::page_picture::{CarriedPictures, carried_over, checkerboard};
 use super::report::UnwrapReport;
 use crate::mesh_io::{TriangleMesh, read_mesh};
+use crate::mesh_placement::UpAxis;
 use crate::picture_file::open_upright;
 use crate::progress::Stage;
 use crate::report::save_figures;
@@ -22,13 +23,19 @@ use crate::report::save_figures;
 /// [`UnwrapError`]; after [`UnwrapError::Broken`] the files are there, but not to be used.
 pub fn run(arguments: &Arguments) -> Result<(), UnwrapError> {
     let (wall, folder) = (Instant::now(), arguments.out.as_path());
-    let mesh = read_mesh(&arguments.mesh)?;
     if !(arguments.scale.is_finite() && arguments.scale > 0.0) {
         let must_be = "a scale must be positive and finite";
         return Err(UnwrapError::Option { option: "--scale", value: arguments.scale, must_be });
     }
+    let mut mesh = read_mesh(&arguments.mesh)?;
+    if let Some(region) = &arguments.region {
+        let finest = arguments.texel / arguments.scale;
+        let scene = region.split(mesh, finest, arguments.scale);
+        mesh = scene.map_err(|source| UnwrapError::Region { path: arguments.mesh.clone(), source })?.canvas;
+    }
     let seams = arguments.seams.as_deref().map(read_seams).transpose()?.unwrap_or_default();
-    let picture = arguments.texture.as_deref().map(|path| read_picture(path, &mesh, arguments)).transpose()?;
+    mesh.notes.iter().for_each(|note| eprintln!("{}: {note}", arguments.mesh.display()));
+    let carried = read_pictures(&mesh, arguments)?;
     std::fs::create_dir_all(folder).map_err(|e| UnwrapError::unwritable(folder, &e))?;
 
     let cpu = ProcessTime::try_now().ok();
@@ -44,12 +51,12 @@ pub fn run(arguments: &Arguments) -> Result<(), UnwrapError> {
         let board = checkerboard(&atlas, texels, bounds);
         let path = folder.join(format!("charts{}.png", suffix(page)));
         board.save(&path).map_err(|e| UnwrapError::unwritable(&path, &e))?;
-        textures.push(match (&picture, &mesh.uv) {
-            (Some(picture), Some(uv)) => carried_over(&atlas, texels, &mesh, uv, picture),
+        textures.push(match (&carried, &mesh.uv) {
+            (Some(carried), Some(uv)) => carried_over(&atlas, texels, uv, carried),
             _ => board,
         });
     }
-    save(&atlas, &mesh, &textures, folder)?;
+    save(&atlas, &mesh, UpAxis::of_file(&arguments.mesh), &textures, folder)?;
     let report = UnwrapReport::new(&atlas, wall.elapsed().as_secs_f64(), cpu_s);
     save_figures(&report, folder)?;
     stage.done(&format!("{} page(s) of {} x {} texels", report.pages, report.page_width_px, report.page_height_px));
@@ -111,9 +118,19 @@ fn read_seams(path: &Path) -> Result<Vec<[u32; 2]>, UnwrapError> {
     Ok(seams)
 }
 
-fn read_picture(path: &Path, mesh: &TriangleMesh, arguments: &Arguments) -> Result<image::RgbImage, UnwrapError> {
-    if mesh.uv.is_none() {
-        return Err(UnwrapError::NoCoordinates(arguments.mesh.clone()));
+/// The picture of `--texture`, else those that the mesh file names.
+fn read_pictures(mesh: &TriangleMesh, arguments: &Arguments) -> Result<Option<CarriedPictures>, UnwrapError> {
+    if let Some(path) = arguments.texture.as_deref() {
+        if mesh.uv.is_none() {
+            return Err(UnwrapError::NoCoordinates(arguments.mesh.clone()));
+        }
+        let picture = open_upright(path).map_err(|e| UnwrapError::unreadable(path, &e))?.to_rgb8();
+        return Ok(Some(CarriedPictures { pictures: vec![picture], faces: vec![0; mesh.faces.len()] }));
     }
-    Ok(open_upright(path).map_err(|e| UnwrapError::unreadable(path, &e))?.to_rgb8())
+    let Some(materials) = mesh.materials.as_ref().filter(|m| m.textured() && mesh.uv.is_some()) else {
+        return Ok(None);
+    };
+    let rgb = |picture| image::DynamicImage::ImageRgba8(picture).to_rgb8();
+    let pictures = materials.materials.iter().map(|m| m.picture().map(rgb)).collect::<Result<_, _>>()?;
+    Ok(Some(CarriedPictures { pictures, faces: materials.faces.clone() }))
 }

@@ -106,7 +106,8 @@ fn read_mesh(settings: &VrSettings) -> Result<(String, TriangleMesh), VrError> {
             ..MissionFile::default()
         };
         file.settings.seed = settings.seed;
-        return Ok(file.read_surface()?);
+        let (name, scene) = file.read_surface()?;
+        return Ok((name, scene.canvas));
     };
     let mesh = Map::open(path).map_err(|source| VrError::Map { path: path.clone(), source })?.mesh();
     let name = path.file_stem().map_or("Map".into(), |stem| stem.to_string_lossy().into_owned());

@@ -3,6 +3,7 @@
 use paintcopter_examples::design::{Design, Picture};
 use paintcopter_examples::mesh_io::TriangleMesh;
 use paintcopter_examples::mission::{Decision, Mission, MissionSettings, PainterChoice, save};
+use paintcopter_examples::region::Scene;
 use paintcopter_examples::report::Report;
 
 use crate::scratch::Scratch;
@@ -34,7 +35,7 @@ fn painted(painter: PainterChoice) -> Report {
     let s = Scratch::new("line_art");
     let settings = MissionSettings { painter, ..MissionSettings::default() };
     let design = Design::Picture(letters(&s));
-    let mission = Decision::make("wall", &wall(), &design, settings).and_then(Mission::run).unwrap();
+    let mission = Decision::make("wall", &Scene::whole(wall()), &design, settings).and_then(Mission::run).unwrap();
     save(&mission, &s.0).unwrap()
 }
 

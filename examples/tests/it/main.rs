@@ -4,6 +4,7 @@
 mod bad_input;
 mod bags;
 mod five_joint_arm;
+mod gltf_meshes;
 mod handheld;
 mod independence;
 mod line_art;
@@ -17,6 +18,7 @@ mod odometry_prior;
 mod paint_image;
 mod placement;
 mod recorded;
+mod regions;
 mod scan_flight;
 mod scratch;
 mod sequences;

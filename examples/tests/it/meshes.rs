@@ -8,6 +8,7 @@ use paintcopter_examples::surface::PaintSurface;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 
+use crate::gltf_meshes::triangle_glb;
 use crate::recorded::recorded;
 
 fn write(name: &str, bytes: &[u8]) -> PathBuf {
@@ -88,7 +89,9 @@ fn damaged_files_are_errors_and_never_a_panic() {
     let off = b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec();
     let mut random = SplitMix64::seed_from_u64(1);
     let mut below = move |n: usize| (random.next_u64() % n as u64) as usize;
-    for (name, whole) in [("ascii.ply", ascii), ("binary.ply", binary), ("f.obj", obj), ("f.off", off)] {
+    for (name, whole) in
+        [("ascii.ply", ascii), ("binary.ply", binary), ("f.obj", obj), ("f.off", off), ("f.glb", triangle_glb())]
+    {
         assert_eq!(read(name, &whole).unwrap().faces, [[0, 1, 2]], "{name}");
         let mut refused = 0;
         for k in 0..1000 {

@@ -7,6 +7,7 @@ use std::sync::OnceLock;
 use paintcopter_examples::design::{Design, Picture};
 use paintcopter_examples::mesh_io::{MeshUv, TriangleMesh, read_mesh};
 use paintcopter_examples::mission::{Decision, Mission, MissionSettings, save};
+use paintcopter_examples::region::Scene;
 use paintcopter_examples::report::Report;
 
 use crate::scratch::Scratch;
@@ -74,8 +75,9 @@ fn paint(threads: usize) -> Painted {
     let s = Scratch::new("mission");
     let mut settings = MissionSettings { seed: 3, threads, ..MissionSettings::default() };
     settings.planner.timing.max_flow = MAX_FLOW;
-    let mission =
-        Decision::make("panel", &panel(), &Design::Texture(picture(&s)), settings).and_then(Mission::run).unwrap();
+    let mission = Decision::make("panel", &Scene::whole(panel()), &Design::Texture(picture(&s)), settings)
+        .and_then(Mission::run)
+        .unwrap();
     let report = save(&mission, &s.0).unwrap();
     let read = |name: &'static str| (name, std::fs::read(s.0.join(name)).unwrap());
     let files = FILES.into_iter().chain(["report.json"]).map(read).collect();

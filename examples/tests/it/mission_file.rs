@@ -8,6 +8,7 @@ use paintcopter_examples::mission::{MissionSettings, PainterChoice};
 use paintcopter_examples::mission_file::MissionFile;
 use paintcopter_examples::picture_placement::{PicturePlacement, PlacementMode};
 use paintcopter_examples::projection::Viewpoint;
+use paintcopter_examples::region::Region;
 
 use crate::scratch::Scratch;
 
@@ -34,6 +35,7 @@ fn a_mission_keeps_all_that_it_was_told() {
         design: Some(s.path("b.png")),
         texture: Some(s.0.join("c.png")),
         scan: true,
+        region: Some(Region::Mask(s.0.join("d.png"))),
         settings,
     };
     let path = s.0.join("mission.toml");

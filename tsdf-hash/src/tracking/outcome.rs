@@ -121,7 +121,7 @@ mod tests {
         let pose = Isometry3::new(Vector3::new(1.0, -2.0, 0.5), Vector3::new(0.3, 0.9, -0.4));
         let motion = Isometry3::new(Vector3::new(0.4, 0.1, -0.7), Vector3::new(-0.2, 0.1, 0.3));
         // A covariance of one direction: the true pose is off along it, before and after.
-        let off = 1e-4 * Vector6::new(1.0, -2.0, 0.5, 0.3, 1.5, -1.0);
+        let off: Vector6<f64> = 1e-4 * Vector6::new(1.0, -2.0, 0.5, 0.3, 1.5, -1.0);
         let before = PosePrior { world_from_camera: pose, covariance: Some(off * off.transpose()) };
         let after = before.after(&motion, [0.0; 2]);
         let moved_off = step(&after.world_from_camera, &(moved(&pose, &off) * motion));

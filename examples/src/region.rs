@@ -1,0 +1,283 @@
+//! The part of a mesh that is painted; all the rest stays in the way of the robot and of the spray.
+
+mod creases;
+mod parts;
+mod refine;
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use nalgebra::{Point3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::mesh_io::TriangleMesh;
+use crate::picture_file::open_upright;
+use creases::{MEMORY, grow_to_creases};
+use parts::drop_small_parts;
+use refine::{Sample, refine, samples_of_face};
+
+/// A plane's region reaches as far off the plane as this share of its radius.
+const OFF_PLANE: f64 = 0.1;
+/// Cosine of the angle between a plane's normal and those of its faces: 45 degrees.
+const SAME_SIDE: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// A picked point farther from the mesh than this share of the diagonal of its box was meant for another mesh.
+const PICKED: f64 = 0.1;
+/// Parts of a region with less area cannot be painted: the footprint of a spray, m².
+const SMALLEST_PART: f64 = 0.008;
+
+/// Which part of a mesh is painted. Lengths and axes are those of the mesh file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub enum Region {
+    /// `box:x0,y0,z0,x1,y1,z1`: what lies in a box; its corners in any order.
+    Box([f64; 6]),
+    /// `plane:px,py,pz,nx,ny,nz,RADIUS`: what lies within the radius of a point, near the plane through it, and faces the side of its
+    /// normal.
+    Plane([f64; 7]),
+    /// `pick:px,py,pz`: the face nearest to a point and all that goes on from it without a crease.
+    Pick([f64; 3]),
+    /// `mask:PNG`: where a picture on the mesh's own texture coordinates is bright; for an atlas of `unwrap` a mask on its page.
+    Mask(PathBuf),
+}
+
+/// What is wrong with a region.
+#[derive(Debug, thiserror::Error)]
+pub enum RegionError {
+    /// Nothing of the mesh lies in it.
+    #[error(
+        "--region {region}: holds nothing of the mesh{hint}; the mesh reaches from {low:?} to {high:?} in the coordinates of its file"
+    )]
+    Empty {
+        /// The region.
+        region: String,
+        /// What may be wrong.
+        hint: String,
+        /// Least coordinates of the mesh.
+        low: [f32; 3],
+        /// Largest.
+        high: [f32; 3],
+    },
+    /// A mask without texture coordinates to lie on.
+    #[error("--region {0}: the mesh has no texture coordinates; unwrap it first, and give the atlas.obj as the mesh")]
+    NoCoordinates(String),
+    /// The mask cannot be read.
+    #[error("--region {region}: cannot be read as a picture ({why})")]
+    Mask {
+        /// The region.
+        region: String,
+        /// Why.
+        why: String,
+    },
+    /// A vertex is not finite.
+    #[error("vertex {0} is not finite: repair the mesh")]
+    NotFinite(usize),
+}
+
+/// A mesh of which a part is painted.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Scene {
+    /// What is painted.
+    pub canvas: TriangleMesh,
+    /// What stands in the way, with vertices of its own.
+    pub obstacles: TriangleMesh,
+}
+
+impl Scene {
+    /// A mesh that is painted everywhere.
+    pub fn whole(canvas: TriangleMesh) -> Self {
+        Self { canvas, obstacles: TriangleMesh::default() }
+    }
+}
+
+impl Region {
+    /// Splits a mesh. Faces across the border of the region are divided there until their sides are at most `finest` (units of the
+    /// file); parts smaller than the footprint of a spray become obstacles, which is noted. `unit`: metres per unit of the file.
+    ///
+    /// # Errors
+    /// [`RegionError`].
+    pub fn split(&self, mut mesh: TriangleMesh, finest: f64, unit: f64) -> Result<Scene, RegionError> {
+        if let Some(k) = mesh.positions.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
+            return Err(RegionError::NotFinite(k));
+        }
+        // A texel that is none is refused by those who lay it out.
+        let finest = if finest > 0.0 { finest } else { f64::INFINITY };
+        let before = mesh.faces.len();
+        let mut hint = String::new();
+        let mut inside = match self {
+            Self::Pick(point) => self.picked(&mesh, Point3::from(*point), finest, MEMORY / unit)?,
+            Self::Box(corners) => {
+                let (low, high) = sides(corners);
+                refine(&mut mesh, finest, &|s| (0..3).all(|c| (low[c]..=high[c]).contains(&s.point[c])))
+            }
+            Self::Plane([px, py, pz, nx, ny, nz, radius]) => {
+                let (centre, normal) = (Point3::new(*px, *py, *pz), Vector3::new(*nx, *ny, *nz).normalize());
+                let near = |s: &Sample| {
+                    let way = s.point - centre;
+                    way.norm() <= *radius && way.dot(&normal).abs() <= OFF_PLANE * radius
+                };
+                let behind = |s: &Sample| near(s) && s.normal.dot(&normal) <= -SAME_SIDE;
+                if (0..mesh.faces.len()).any(|f| samples_of_face(&mesh, f, finest).iter().any(behind)) {
+                    hint = " on the side of its normal, but something on the other: turn the normal about".into();
+                }
+                refine(&mut mesh, finest, &|s| near(s) && s.normal.dot(&normal) >= SAME_SIDE)
+            }
+            Self::Mask(path) => {
+                if mesh.uv.is_none() {
+                    return Err(RegionError::NoCoordinates(self.to_string()));
+                }
+                let picture = open_upright(path)
+                    .map_err(|e| RegionError::Mask { region: self.to_string(), why: e.to_string() })?
+                    .to_luma8();
+                let side = |c: f64, n: u32| ((c.rem_euclid(1.0) * f64::from(n)) as u32).min(n - 1);
+                refine(&mut mesh, finest, &|s| {
+                    let [u, v] = s.uv;
+                    picture.get_pixel(side(u, picture.width()), side(1.0 - v, picture.height())).0[0] > 127
+                })
+            }
+        };
+        let divided = mesh.faces.len() - before;
+        if divided > 0 {
+            mesh.notes.push(format!("{divided} faces more where the border of the region divides them"));
+        }
+        let small = drop_small_parts(&mesh, &mut inside, SMALLEST_PART / (unit * unit));
+        if small.parts > 0 {
+            mesh.notes.push(format!(
+                "{} parts of the region ({} faces) are smaller than a spray and stay bare",
+                small.parts, small.faces
+            ));
+        }
+        if !inside.contains(&true) {
+            if small.parts > 0 {
+                hint = format!(" but {} parts smaller than a spray", small.parts);
+            }
+            return Err(self.empty(&mesh, hint));
+        }
+        Ok(separated(mesh, &inside))
+    }
+
+    /// Paths in a region, from another folder.
+    #[must_use]
+    pub fn in_folder(self, folder: &Path) -> Self {
+        match self {
+            Self::Mask(path) => Self::Mask(folder.join(path)),
+            other => other,
+        }
+    }
+
+    /// Paths in a region from the root.
+    #[must_use]
+    pub fn absolute(self) -> Self {
+        match self {
+            Self::Mask(path) => Self::Mask(std::path::absolute(&path).unwrap_or(path)),
+            other => other,
+        }
+    }
+
+    fn picked(
+        &self,
+        mesh: &TriangleMesh,
+        point: Point3<f64>,
+        finest: f64,
+        memory: f64,
+    ) -> Result<Vec<bool>, RegionError> {
+        let mut nearest = (f64::INFINITY, 0);
+        for face in 0..mesh.faces.len() {
+            for sample in samples_of_face(mesh, face, finest) {
+                let distance = (sample.point - point).norm();
+                if distance < nearest.0 {
+                    nearest = (distance, face);
+                }
+            }
+        }
+        let (low, high) = mesh.bounds();
+        let diagonal = (Vector3::from(high) - Vector3::from(low)).cast::<f64>().norm();
+        if nearest.0 > PICKED * diagonal {
+            return Err(self.empty(mesh, format!(", the nearest point is {:.3} units away", nearest.0)));
+        }
+        Ok(grow_to_creases(mesh, nearest.1, memory))
+    }
+
+    fn empty(&self, mesh: &TriangleMesh, hint: String) -> RegionError {
+        let (low, high) = mesh.bounds();
+        RegionError::Empty { region: self.to_string(), hint, low, high }
+    }
+}
+
+fn sides(corners: &[f64; 6]) -> ([f64; 3], [f64; 3]) {
+    let pick = |choose: fn(f64, f64) -> f64| [0, 1, 2].map(|c| choose(corners[c], corners[c + 3]));
+    (pick(f64::min), pick(f64::max))
+}
+
+/// The two halves; both keep all vertices, so that what belongs to vertices needs no new numbers.
+fn separated(mut mesh: TriangleMesh, inside: &[bool]) -> Scene {
+    let keep = |list: &mut Vec<[u32; 3]>, wanted: bool| {
+        let mut k = 0..;
+        list.retain(|_| k.next().is_some_and(|k: usize| inside[k] == wanted));
+    };
+    let mut obstacles =
+        TriangleMesh { positions: mesh.positions.clone(), faces: mesh.faces.clone(), ..TriangleMesh::default() };
+    keep(&mut obstacles.faces, false);
+    keep(&mut mesh.faces, true);
+    if let Some(uv) = &mut mesh.uv {
+        keep(&mut uv.faces, true);
+    }
+    if let Some(materials) = &mut mesh.materials {
+        let mut k = 0..;
+        materials.faces.retain(|_| k.next().is_some_and(|k: usize| inside[k]));
+    }
+    Scene { canvas: mesh, obstacles }
+}
+
+const USAGE: &str = "give box:x0,y0,z0,x1,y1,z1, plane:px,py,pz,nx,ny,nz,RADIUS, pick:px,py,pz or mask:PNG, in the coordinates of the \
+                     mesh file";
+
+impl FromStr for Region {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let usage = || format!("region \"{text}\": {USAGE}");
+        let (kind, rest) = text.split_once(':').ok_or_else(usage)?;
+        if kind == "mask" && !rest.is_empty() {
+            return Ok(Self::Mask(rest.into()));
+        }
+        let numbers: Option<Vec<f64>> =
+            rest.split(',').map(|word| word.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
+        let numbers = numbers.ok_or_else(usage)?;
+        match (kind, &numbers[..]) {
+            ("box", &[a, b, c, d, e, f]) => Ok(Self::Box([a, b, c, d, e, f])),
+            ("plane", &[px, py, pz, nx, ny, nz, radius])
+                if radius > 0.0 && Vector3::new(nx, ny, nz).try_normalize(0.0).is_some() =>
+            {
+                Ok(Self::Plane([px, py, pz, nx, ny, nz, radius]))
+            }
+            ("pick", &[x, y, z]) => Ok(Self::Pick([x, y, z])),
+            _ => Err(usage()),
+        }
+    }
+}
+
+impl TryFrom<String> for Region {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+impl From<Region> for String {
+    fn from(region: Region) -> Self {
+        region.to_string()
+    }
+}
+
+impl std::fmt::Display for Region {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let list = |numbers: &[f64]| numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+        match self {
+            Self::Box(numbers) => write!(f, "box:{}", list(numbers)),
+            Self::Plane(numbers) => write!(f, "plane:{}", list(numbers)),
+            Self::Pick(numbers) => write!(f, "pick:{}", list(numbers)),
+            Self::Mask(path) => write!(f, "mask:{}", path.display()),
+        }
+    }
+}
