@@ -21,6 +21,7 @@ mod simulated_flight;
 #[cfg(test)]
 mod test_panel;
 mod trajectory_table;
+mod true_surface;
 mod view;
 
 pub use decision::Decision;

@@ -178,16 +178,17 @@ impl MissionFile {
     pub fn decide(&self, folder: &Path) -> Result<Decision, MissionFileError> {
         let settings = self.settings.clone();
         let (name, scene) = self.read_surface()?;
-        let scene = if self.scan {
+        // The surface itself and, where the robot scans it first, its map.
+        let (scene, truth) = if self.scan {
             if self.region.is_some() {
                 return Err(MissionFileError::RegionBeforeScan);
             }
             let scan_flight = ScanFlight::fly(&scene.canvas, settings.seed, settings.threads)
                 .map_err(|source| MissionFileError::Scan { surface: self.mesh_prefix(), source })?;
             save_scan_flight(&scan_flight, folder).map_err(|source| self.in_mesh(source))?;
-            Scene::whole(scan_flight.mesh)
+            (Scene::whole(scan_flight.mesh), Some(scene.canvas))
         } else {
-            scene
+            (scene, None)
         };
         let mesh = &scene.canvas;
         let materials = mesh.materials.as_ref().filter(|materials| materials.textured() && mesh.uv.is_some());
@@ -204,7 +205,12 @@ impl MissionFile {
             (None, None, None) if self.mesh.is_some() => Design::Stripes,
             (None, None, None) => Design::Strata { seed: settings.seed },
         };
-        Decision::make(&name, &scene, &design, settings).map_err(|source| self.in_mesh(source))
+        let decision = Decision::make(&name, &scene, &design, settings);
+        let decision = decision.and_then(|decision| match &truth {
+            Some(truth) => decision.before(truth),
+            None => Ok(decision),
+        });
+        decision.map_err(|source| self.in_mesh(source))
     }
 
     /// Name and mesh of the surface, placed before the robot, with what stands in its way.

@@ -4,6 +4,7 @@
 mod error;
 mod evaluation;
 mod fly;
+mod localiser;
 mod output;
 mod route;
 mod sensors;

@@ -4,12 +4,14 @@ use std::fmt::Write as _;
 use std::time::Instant;
 
 use paint_net::{Image, Painting};
+use paint_sim::{Texel, TriangleSurface};
 use ptu_kinematics::Ptu;
 
 use super::decide::decide;
 use super::error::MissionError;
 use super::reach::texels_in_reach;
 use super::settings::MissionSettings;
+use super::true_surface::moved_onto;
 use crate::adapters::Robot;
 use crate::appearance::{Appearance, UNIT_THICKNESS};
 use crate::design::Design;
@@ -41,6 +43,8 @@ pub struct Decision {
     pub(super) in_reach: Vec<bool>,
     pub(super) layers: Vec<Painting>,
     pub(super) started: Instant,
+    /// What is really there, if `surface` is a map of it.
+    truth: Option<TriangleSurface>,
 }
 
 impl Decision {
@@ -69,7 +73,42 @@ impl Decision {
         stage.done(&format!("{:.1} % of the surface", 100.0 * share(&in_reach, &coverage)));
         let layers = decide(&wanted, &coverage, &in_reach, &appearance, &settings)?;
         let name = name.to_string();
-        Ok(Self { settings, name, surface, appearance, robot, wanted, coverage, in_reach, layers, started })
+        Ok(Self {
+            settings,
+            name,
+            surface,
+            appearance,
+            robot,
+            wanted,
+            coverage,
+            in_reach,
+            layers,
+            started,
+            truth: None,
+        })
+    }
+
+    /// What was decided about a map, flown and sprayed before the surface that was mapped, of which planning knows nothing.
+    ///
+    /// # Errors
+    /// A mesh without faces.
+    pub fn before(self, truth: &TriangleMesh) -> Result<Self, MissionError> {
+        let truth = TriangleSurface::new(&truth.positions, &truth.faces)?;
+        Ok(Self { truth: Some(truth), ..self })
+    }
+
+    /// What the robot and its paint meet.
+    pub(super) fn met(&self) -> &TriangleSurface {
+        self.truth.as_ref().unwrap_or(&self.surface.world)
+    }
+
+    /// The texels that paint falls on, with the pixel of each.
+    pub(super) fn film_texels(&self) -> (Vec<Texel>, Vec<usize>) {
+        let (texels, pixels) = self.surface.film_texels();
+        match &self.truth {
+            Some(truth) => (moved_onto(truth, texels), pixels),
+            None => (texels, pixels),
+        }
     }
 
     /// Share of the surface's texels that the robot can serve.

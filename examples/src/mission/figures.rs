@@ -87,7 +87,7 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         collisions: mission
             .flights
             .iter()
-            .map(|f| collisions(&mission.decision.robot, &mission.decision.surface.world, &f.flight))
+            .map(|f| collisions(&mission.decision.robot, mission.decision.met(), &f.flight))
             .sum(),
         limit_violations: mission
             .flights

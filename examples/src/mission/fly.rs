@@ -2,16 +2,16 @@
 
 use paint_planner::Plan;
 use paint_sim::flight::Localisation;
-use paint_sim::{Film, FlightLog, FlightSettings, SprayModel};
+use paint_sim::{Film, FlightLog, FlightSettings, SprayModel, TriangleSurface};
 
 use super::decide::SPRAY_CUT;
+use super::decision::Decision;
 use super::error::MissionError;
 use super::plan::Planned;
 use super::settings::MissionSettings;
 use super::simulated_flight::{flight_settings, fly_plan};
 use crate::adapters::Robot;
 use crate::progress::Stage;
-use crate::surface::PaintSurface;
 use crate::targets::Route;
 
 /// Motion of the nozzle that one shot stands for, metres: widens the spot by less than a percent.
@@ -37,18 +37,13 @@ pub struct LayerFlight {
 }
 
 /// Flies every layer three times.
-pub(super) fn fly(
-    planned: Planned,
-    surface: &PaintSurface,
-    robot: &Robot,
-    settings: &MissionSettings,
-) -> Result<Vec<LayerFlight>, MissionError> {
+pub(super) fn fly(planned: Planned, decision: &Decision) -> Result<Vec<LayerFlight>, MissionError> {
     let stage = Stage::start("fly");
     let count = planned.layers.len();
     let mut flights = Vec::with_capacity(count);
     for (k, (route, plan, smoothing)) in planned.layers.into_iter().enumerate() {
         stage.share(k as f64 / count as f64);
-        let [flight, slam, locked] = fly_three(&plan, surface, robot, settings, k as u64)?;
+        let [flight, slam, locked] = fly_three(&plan, decision.met(), &decision.robot, &decision.settings, k as u64)?;
         flights.push(LayerFlight { route, plan, smoothing, flight, slam, locked });
     }
     let seconds: f64 = flights.iter().map(|f| f.plan.trajectory.duration()).sum();
@@ -57,18 +52,20 @@ pub(super) fn fly(
 }
 
 /// Puts the paint of the flights with motion capture onto the texels; returns the film and the pixel of each of its texels.
-pub(super) fn spray(
-    flights: &[LayerFlight],
-    surface: &PaintSurface,
-    settings: &MissionSettings,
-) -> Result<(Film, Vec<usize>), MissionError> {
+pub(super) fn spray(flights: &[LayerFlight], decision: &Decision) -> Result<(Film, Vec<usize>), MissionError> {
     let stage = Stage::start("spray");
-    let (texels, pixels) = surface.film_texels();
+    let (texels, pixels) = decision.film_texels();
     let mut film = Film::new(texels)?;
     let shots: Vec<_> = flights.iter().flat_map(|f| f.flight.shots(SHOT_STEP)).collect();
-    film.deposit(&shots, &spray_model(settings), &surface.world, settings.threads, &mut |done, total| {
-        stage.share(done as f64 / total as f64);
-    })?;
+    film.deposit(
+        &shots,
+        &spray_model(&decision.settings),
+        decision.met(),
+        decision.settings.threads,
+        &mut |done, total| {
+            stage.share(done as f64 / total as f64);
+        },
+    )?;
     let balance = film.mass_balance();
     let share = 100.0 * balance.deposited as f64 / balance.emitted.max(1) as f64;
     stage.done(&format!("{share:.1} % of the paint on the surface"));
@@ -84,7 +81,7 @@ fn spray_model(settings: &MissionSettings) -> SprayModel {
 /// The same plan with motion capture, with a drifting localisation, and with the pan-tilt unit locked.
 pub(super) fn fly_three(
     plan: &Plan,
-    surface: &PaintSurface,
+    world: &TriangleSurface,
     robot: &Robot,
     settings: &MissionSettings,
     layer: u64,
@@ -95,7 +92,7 @@ pub(super) fn fly_three(
         FlightSettings { localisation: Localisation::slam_7cm(), ..usual },
         FlightSettings { ptu_locked: true, ..usual },
     ];
-    let one = |flight: &FlightSettings| fly_plan(plan, surface, robot, settings, flight);
+    let one = |flight: &FlightSettings| fly_plan(plan, world, robot, settings, flight);
     if settings.threads < 2 {
         let [a, b, c] = variants.map(|v| one(&v));
         return Ok([a?, b?, c?]);
@@ -121,7 +118,7 @@ mod tests {
         let plan = test_panel::plan(&surface, &robot, &settings);
         let fly = |seed, layer| {
             let settings = MissionSettings { seed, ..settings.clone() };
-            fly_three(&plan, &surface, &robot, &settings, layer).unwrap()
+            fly_three(&plan, &surface.world, &robot, &settings, layer).unwrap()
         };
         let (usual, again, other, next) = (fly(1, 0), fly(1, 0), fly(2, 0), fly(1, 1));
         for k in 0..3 {

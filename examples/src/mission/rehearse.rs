@@ -88,7 +88,7 @@ fn missing_clearance(
     let mut missing = vec![0.0_f64; targets];
     for wind in 0..WINDS {
         let seed = settings.seed ^ SALT.wrapping_add(wind);
-        let log = fly_plan(plan, surface, robot, settings, &flight_settings(plan, seed))?;
+        let log = fly_plan(plan, &surface.world, robot, settings, &flight_settings(plan, seed))?;
         for sample in log.samples.iter().step_by(GAP_STRIDE) {
             let short = MARGIN - gap(robot, &surface.world, sample, MARGIN);
             if short > 0.0 {

@@ -38,8 +38,8 @@ impl Mission {
         let PlannedMission { decision, planned } = mission;
         let (planning, unreachable_paint) = (planned.seconds, planned.unreachable_paint);
         let (kept_off, left_bare) = (planned.kept_off, planned.left_bare);
-        let flights = fly(planned, &decision.surface, &decision.robot, &decision.settings)?;
-        let (film, pixels) = spray(&flights, &decision.surface, &decision.settings)?;
+        let flights = fly(planned, &decision)?;
+        let (film, pixels) = spray(&flights, &decision)?;
         Ok(Self { decision, flights, film, pixels, planning, unreachable_paint, kept_off, left_bare })
     }
 

@@ -3,12 +3,11 @@
 use nalgebra::{Point3, Vector3};
 use paint_planner::Plan;
 use paint_sim::flight::HoseModel;
-use paint_sim::{FlightLog, FlightSettings};
+use paint_sim::{FlightLog, FlightSettings, TriangleSurface};
 
 use super::error::MissionError;
 use super::settings::MissionSettings;
 use crate::adapters::{PlanReference, Robot, ServoPanTilt};
-use crate::surface::PaintSurface;
 
 /// The usual wind, hose and localisation.
 pub(super) fn flight_settings(plan: &Plan, seed: u64) -> FlightSettings {
@@ -18,7 +17,7 @@ pub(super) fn flight_settings(plan: &Plan, seed: u64) -> FlightSettings {
 /// Flies a plan with the robot's own servos.
 pub(super) fn fly_plan(
     plan: &Plan,
-    surface: &PaintSurface,
+    world: &TriangleSurface,
     robot: &Robot,
     settings: &MissionSettings,
     flight: &FlightSettings,
@@ -30,7 +29,7 @@ pub(super) fn fly_plan(
         stand_off: settings.planner.nozzle.stand_off,
     };
     let mut gun = ServoPanTilt::new(robot.chain.clone(), settings.servo)?;
-    Ok(paint_sim::fly(&reference, &mut gun, &surface.world, flight)?)
+    Ok(paint_sim::fly(&reference, &mut gun, world, flight)?)
 }
 
 /// The paint hose: from the ground behind the middle of the flight, long enough for all of it.

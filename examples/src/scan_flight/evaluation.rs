@@ -17,10 +17,12 @@ pub struct ScanFlightFigures {
     pub duration_s: f64,
     /// Way flown meanwhile.
     pub path_length_m: f64,
-    /// Position error of the odometry after rigid alignment, root mean square.
+    /// Position error in the map after rigid alignment, root mean square.
     pub ate_se3_rmse_m: f64,
-    /// Position error as flown, without any alignment: largest.
+    /// Position error in the map, without any alignment: largest.
     pub position_error_max_m: f64,
+    /// The same of odometry alone.
+    pub odometry_error_max_m: f64,
     /// Distance of the map's vertices from the true surface: mean.
     pub mesh_error_mean_m: f64,
     /// The same: 95th percentile.
@@ -36,9 +38,10 @@ pub struct ScanFlightFigures {
 impl ScanFlightFigures {
     pub(super) fn summary(&self) -> String {
         format!(
-            "{:.0} m flown, {:.1} cm of drift at most; {} triangles, {:.1} mm off in the mean, {:.1} % of the surface",
+            "{:.0} m flown, {:.1} cm off at most ({:.1} cm by odometry alone); {} triangles, {:.1} mm off in the mean, {:.1} % of the surface",
             self.path_length_m,
             100.0 * self.position_error_max_m,
+            100.0 * self.odometry_error_max_m,
             self.triangles,
             1e3 * self.mesh_error_mean_m,
             100.0 * self.covered_share
@@ -51,6 +54,7 @@ pub(super) fn figures(
     mesh: &TriangleMesh,
     scanned: &TriangleMesh,
     flown: &Trajectory,
+    by_odometry: &Trajectory,
     estimated: &Trajectory,
 ) -> Result<ScanFlightFigures, ScanFlightError> {
     let distances = |points: &[[f32; 3]], to: &TriangleSurface| -> Vec<f64> {
@@ -61,11 +65,13 @@ pub(super) fn figures(
     let map = TriangleSurface::new(&scanned.positions, &scanned.faces)?;
     let near = distances(&mesh.positions, &map).into_iter().filter(|d| *d <= NEAR).count();
     let apart = |(a, b): (&Isometry3<f64>, &Isometry3<f64>)| (a.translation.vector - b.translation.vector).norm();
+    let worst = |of: &Trajectory| flown.poses().iter().zip(of.poses()).map(apart).fold(0.0, f64::max);
     Ok(ScanFlightFigures {
         duration_s: flown.duration_s(),
         path_length_m: flown.path_length(),
         ate_se3_rmse_m: ate(flown.poses(), estimated.poses(), Alignment::Se3)?.position.rmse,
-        position_error_max_m: flown.poses().iter().zip(estimated.poses()).map(apart).fold(0.0, f64::max),
+        position_error_max_m: worst(estimated),
+        odometry_error_max_m: worst(by_odometry),
         mesh_error_mean_m: off.iter().sum::<f64>() / off.len().max(1) as f64,
         mesh_error_p95_m: off.get(off.len() * 95 / 100).copied().unwrap_or(0.0),
         covered_share: near as f64 / mesh.positions.len().max(1) as f64,

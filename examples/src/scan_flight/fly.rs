@@ -2,12 +2,13 @@
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use paint_sim::TriangleSurface;
-use tsdf_hash::{DepthData, DepthView, Map};
+use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Map};
 use vio_ekf::sim::{RoomSettings, Scenario, Simulation};
 use vio_ekf::{ImuNoise, Stamp, Trajectory, Vio};
 
 use super::error::ScanFlightError;
 use super::evaluation::{ScanFlightFigures, figures};
+use super::localiser::Localiser;
 use super::route::along;
 use super::sensors::{FRAMES_PER_SECOND, SimulatedCamera};
 use crate::mesh_io::TriangleMesh;
@@ -33,8 +34,9 @@ pub struct ScanFlight {
 impl ScanFlight {
     /// Flies along `mesh` (metres, z up), which the robot only sees through its sensors.
     ///
-    /// The robot starts at rest at a place that is known, as at a charging station: position and heading of the first
-    /// estimate are set to the truth. Everything after that is its own.
+    /// The robot starts at rest on a place that is known, as on a charging station: the pose of the first estimate is set to the
+    /// truth. Everything after that is its own: odometry leads from image to image, and the map that grows
+    /// says where it is.
     pub fn fly(mesh: &TriangleMesh, seed: u64, threads: usize) -> Result<Self, ScanFlightError> {
         let stage = Stage::start("scan flight");
         let surface = TriangleSurface::new(&mesh.positions, &mesh.faces)?;
@@ -45,8 +47,11 @@ impl ScanFlight {
         let mut samples = simulation.imu(0)?.samples.into_iter().peekable();
         let mut map = Map::new(tsdf_hash::Settings { voxel_size: VOXEL, threads, ..tsdf_hash::Settings::default() })?;
 
+        let mut localiser = Localiser::new(threads)?;
         let mut world_from_start = None;
-        let (mut flown, mut estimated) = (Trajectory::default(), Trajectory::default());
+        // From where odometry takes the robot to be to where the map does.
+        let mut correction = None;
+        let [mut flown, mut drifting, mut estimated] = [(); 3].map(|()| Trajectory::default());
         let (first, last) = simulation.spline().span();
         let count = (last.secs_since(first) * FRAMES_PER_SECOND) as usize;
         let mut vio = {
@@ -69,19 +74,30 @@ impl ScanFlight {
             let Some(odometry) = vio.output().filter(|_| report.status.has_estimate()) else { continue };
             let world_from_start =
                 *world_from_start.get_or_insert_with(|| yaw_alignment(&odometry.world_from_body, &truth));
-            let pose = world_from_start * odometry.world_from_body;
-            flown.push(stamp, truth)?;
-            estimated.push(stamp, pose)?;
-            if k % FUSE_EVERY == 0 {
-                let data = DepthData::F32 { data: &image.depth };
-                let view =
-                    DepthView { width: camera.width, height: camera.height, data, intrinsics: sensor.intrinsics() };
-                match map.integrate(&view, None, &(pose * camera.body_from_camera)) {
-                    // Past the edge of the surface there is nothing to fuse.
-                    Ok(_) | Err(tsdf_hash::Error::NoDepth { .. }) => {}
-                    Err(error) => return Err(error.into()),
+            let by_odometry = world_from_start * odometry.world_from_body;
+            // The odometry takes gravity for the vertical, as wrong as its accelerometer is at rest; the station stands as it stands.
+            let correction = correction.get_or_insert_with(|| truth * by_odometry.inverse());
+            // Past the edge of the surface there is nothing to see.
+            if image.distance().is_some() {
+                let (width, height, intrinsics) = (camera.width, camera.height, sensor.intrinsics());
+                let depth = DepthView { width, height, data: DepthData::F32 { data: &image.depth }, intrinsics };
+                let rgb = image.colour();
+                let colour = ColourView { width, height, data: ColourData::Rgb8(&rgb), intrinsics };
+                let by_odometry = by_odometry * camera.body_from_camera;
+                let start = *correction * by_odometry;
+                let world_from_camera = localiser.place(&mut map, &depth, &colour, &by_odometry, &start)?;
+                // The first image is what the others are tracked against.
+                if k % FUSE_EVERY == 0 || map.blocks() == 0 {
+                    match map.integrate(&depth, Some(&colour), &world_from_camera) {
+                        Ok(_) | Err(tsdf_hash::Error::NoDepth { .. }) => {}
+                        Err(error) => return Err(error.into()),
+                    }
                 }
+                *correction = world_from_camera * by_odometry.inverse();
             }
+            flown.push(stamp, truth)?;
+            drifting.push(stamp, by_odometry)?;
+            estimated.push(stamp, *correction * by_odometry)?;
             stage.share(k as f64 / count as f64);
         }
         if !vio.status().has_estimate() {
@@ -89,7 +105,7 @@ impl ScanFlight {
         }
         let mapped = map.mesh();
         let scanned = TriangleMesh { positions: mapped.positions, faces: mapped.faces, ..TriangleMesh::default() };
-        let figures = figures(&surface, mesh, &scanned, &flown, &estimated)?;
+        let figures = figures(&surface, mesh, &scanned, &flown, &drifting, &estimated)?;
         stage.done(&figures.summary());
         Ok(Self { mesh: scanned, figures, flown, estimated })
     }

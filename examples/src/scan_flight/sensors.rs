@@ -43,6 +43,11 @@ impl SimulatedImage {
         ImageView { width: IMAGE.0, height: IMAGE.1, data: &self.grey }
     }
 
+    /// The same, as the map wants it.
+    pub(super) fn colour(&self) -> Vec<u8> {
+        self.grey.iter().flat_map(|grey| [*grey; 3]).collect()
+    }
+
     /// The middle one of all depths, metres; `None` of nothing but sky.
     pub(super) fn distance(&self) -> Option<f64> {
         let mut depths: Vec<f32> = self.depth.iter().copied().filter(|depth| *depth > 0.0).collect();

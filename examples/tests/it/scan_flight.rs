@@ -18,8 +18,8 @@ fn a_wall_is_mapped_by_the_robots_own_senses_whatever_the_threads() {
     let scan = ScanFlight::fly(&small_wall(), 1, 2).unwrap();
     let figures = &scan.figures;
     println!("{figures:?}");
-    assert!(figures.position_error_max_m < 0.15 && figures.ate_se3_rmse_m < 0.05);
-    assert!(figures.mesh_error_mean_m < 0.006 && figures.covered_share > 0.97);
+    assert!(figures.position_error_max_m < 0.01 && figures.ate_se3_rmse_m < 0.005);
+    assert!(figures.mesh_error_mean_m < 0.003 && figures.covered_share > 0.97);
     assert!(figures.path_length_m > 1.5 && figures.duration_s > 3.0);
     let again = ScanFlight::fly(&small_wall(), 1, 1).unwrap();
     assert!(again.mesh.positions == scan.mesh.positions && again.mesh.faces == scan.mesh.faces);

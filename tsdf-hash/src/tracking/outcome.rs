@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
-use crate::tracking::pose::rotated;
+use crate::tracking::pose::{moved, rotated, step};
 
 /// What is believed about a pose before the frame is looked at.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +30,24 @@ impl PosePrior {
         let own = Vector6::new(turn, turn, turn, shift, shift, shift).map(|deviation| deviation * deviation);
         let covariance = carried * before * carried.transpose() + Matrix6::from_diagonal(&own);
         Self { world_from_camera, covariance: Some(covariance) }
+    }
+
+    /// What prior and frame say together: their mean by information. The prior alone of a frame that is not tracked; the outcome alone
+    /// without a covariance of the prior, and where a frame leaves directions open, because along these it is the prior already.
+    #[must_use]
+    pub fn fused(&self, outcome: &TrackingOutcome) -> Self {
+        if !outcome.is_tracked() {
+            return *self;
+        }
+        let information = |covariance: &Matrix6<f64>| covariance.cholesky().map(|c| c.inverse());
+        let own = self.covariance.as_ref().and_then(information);
+        let (Some(own), Some(seen), true) = (own, information(&outcome.covariance), outcome.degenerate.is_empty())
+        else {
+            return outcome.pose();
+        };
+        let Some(covariance) = information(&(own + seen)) else { return outcome.pose() };
+        let way = covariance * (seen * step(&self.world_from_camera, &outcome.world_from_camera));
+        Self { world_from_camera: moved(&self.world_from_camera, &way), covariance: Some(covariance) }
     }
 
     /// The same in a world that `there` leads to.
@@ -114,7 +132,6 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::tracking::pose::{moved, step};
 
     #[test]
     fn a_motion_carries_the_covariance_on() {
@@ -134,5 +151,32 @@ mod tests {
         // What the motion adds.
         let noisy = before.after(&motion, [0.01, 0.02]).covariance.unwrap() - after.covariance.unwrap();
         assert!((noisy.diagonal() - Vector6::new(1e-4, 1e-4, 1e-4, 4e-4, 4e-4, 4e-4)).amax() < 1e-15);
+    }
+
+    #[test]
+    fn prior_and_frame_meet_by_their_information() {
+        let pose = Isometry3::new(Vector3::new(1.0, -2.0, 0.5), Vector3::new(0.3, 0.9, -0.4));
+        let prior = PosePrior { world_from_camera: pose, covariance: Some(Matrix6::identity() * 3e-6) };
+        let way = 1e-3 * Vector6::new(1.0, -2.0, 0.5, 0.3, 1.5, -1.0);
+        let outcome = TrackingOutcome {
+            status: TrackingStatus::Tracked,
+            world_from_camera: moved(&pose, &way),
+            covariance: Matrix6::identity() * 1e-6,
+            degenerate: Vec::new(),
+            overlap: 1.0,
+            coverage: 1.0,
+            agreement: 1.0,
+            depth_scale: 1.0,
+            intensity_scale: 1.0,
+            likeness: None,
+            iterations: 1,
+        };
+        let fused = prior.fused(&outcome);
+        assert!((step(&pose, &fused.world_from_camera) - 0.75 * way).amax() < 1e-9);
+        assert!((fused.covariance.unwrap() - Matrix6::identity() * 0.75e-6).amax() < 1e-15);
+        let open = TrackingOutcome { degenerate: vec![Vector6::x()], ..outcome.clone() };
+        assert_eq!(prior.fused(&open).world_from_camera, outcome.world_from_camera);
+        let lost = TrackingOutcome { status: TrackingStatus::NoOverlap, ..outcome };
+        assert_eq!(prior.fused(&lost).world_from_camera, pose);
     }
 }
