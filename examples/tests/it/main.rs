@@ -12,6 +12,7 @@ mod meshes;
 mod mission;
 mod mission_file;
 mod module_graph;
+mod mutations;
 mod paint_image;
 mod placement;
 mod recorded;
