@@ -4,6 +4,7 @@ pub(crate) mod cdr;
 mod chunks;
 pub(crate) mod fields;
 pub(crate) mod images;
+mod records;
 
 use std::fs::File;
 use std::io::BufReader;
@@ -13,6 +14,7 @@ use mcap::Message;
 use mcap::sans_io::LinearReaderOptions;
 
 use chunks::{Lz4, Zstd};
+use records::Messages;
 
 /// Why a file gives no messages.
 #[derive(Debug)]
@@ -31,7 +33,7 @@ pub(crate) fn messages_of(
     // A record that claims to be longer than the file asks for memory that is not there.
     let most = usize::try_from(file.metadata().map_err(MessagesFault::Unreadable)?.len()).unwrap_or(usize::MAX);
     let options = LinearReaderOptions::default().with_record_length_limit(most).with_validate_chunk_crcs(true);
-    let mut reader = mcap::io::MessageReader::new_with_options(BufReader::new(file), options);
+    let mut reader = Messages::new(BufReader::new(file), options);
     reader.add_decompressor(Zstd::new()).map_err(|e| broken(&e))?;
     reader.add_decompressor(Lz4::new()).map_err(|e| broken(&e))?;
     Ok(reader.map(|message| message.map_err(|e| broken(&e))))

@@ -9,6 +9,7 @@ mod euroc_folder;
 mod evaluation;
 mod grey_image;
 mod image_axes;
+mod inertial;
 mod mcap_in;
 mod mcap_out;
 mod plots;

@@ -62,6 +62,7 @@ mod path;
 mod problem;
 pub mod procedural;
 pub mod thesis;
+mod trace;
 #[cfg(feature = "train")]
 pub mod train;
 

@@ -5,6 +5,7 @@ use crate::image::Image;
 use crate::model::Spray;
 use crate::painting::Painting;
 use crate::problem::PaintProblem;
+use crate::trace::{event, span};
 
 /// Decides what to spray where.
 ///
@@ -19,7 +20,10 @@ pub trait Painter {
 
     /// Solves a problem that nobody watches.
     fn paint(&self, problem: &PaintProblem) -> Result<Painting, Error> {
-        self.paint_observed(problem, &mut ())
+        span!("paint");
+        let painting = self.paint_observed(problem, &mut ())?;
+        event!(debug, painter = self.name(), sprays = painting.sprays.len(), "painted");
+        Ok(painting)
     }
 }
 

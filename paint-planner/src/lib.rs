@@ -78,6 +78,7 @@ mod settings;
 mod stroke_order;
 mod target;
 mod timing;
+mod trace;
 mod trajectory;
 mod visibility;
 mod world;

@@ -1,5 +1,6 @@
 //! The paint on the surface, texel by texel, counted in whole femtolitres.
 
+use crate::trace::{event, span};
 use std::sync::Arc;
 
 use crate::error::{Error, check_positive, check_range};
@@ -124,6 +125,7 @@ impl Film {
         touched: &mut dyn FnMut(u32),
         progress: &mut dyn FnMut(usize, usize),
     ) -> Result<MassBalance, Error> {
+        span!("deposit");
         let emitted = check_call(shots, spray, threads)?;
         self.mass_balance.emitted.checked_add(emitted).ok_or(Error::MassOverflow)?;
 
@@ -137,6 +139,7 @@ impl Film {
             progress(number * SHOTS_PER_BATCH + batch.len(), shots.len());
         }
         let call = MassBalance { emitted, deposited, overspray: emitted - deposited };
+        event!(debug, shots = shots.len(), emitted, deposited, overspray = call.overspray, "deposited");
         self.mass_balance.emitted += call.emitted;
         self.mass_balance.deposited += call.deposited;
         self.mass_balance.overspray += call.overspray;

@@ -1,5 +1,6 @@
 //! The flight that paints: vehicle, wind, hose, pan-tilt unit and controller in a closed loop at 1 kHz.
 
+use crate::trace::{event, span};
 use nalgebra::{Isometry3, Vector3};
 
 use crate::error::{Error, check_range};
@@ -75,6 +76,7 @@ pub fn fly_with(
     surface: &dyn Surface,
     settings: &FlightSettings,
 ) -> Result<FlightLog, Error> {
+    span!("fly");
     settings.check()?;
     let duration = reference.duration();
     check_range("duration of the reference", duration, 0.0, MAX_DURATION, "between 0 and a day")?;
@@ -104,6 +106,7 @@ pub fn fly_with(
             let wanted = checked(&hover, time)?;
             let distance = (vehicle.position - wanted.position).norm();
             if distance.is_nan() || distance > DIVERGENCE_DISTANCE {
+                event!(warn, time, distance, "vehicle diverged from its reference");
                 return Err(Error::Diverged { time, distance });
             }
             if step > first {

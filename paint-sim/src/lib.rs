@@ -61,6 +61,7 @@ pub mod render;
 mod rng;
 pub mod spray;
 pub mod surface;
+mod trace;
 
 pub use nalgebra;
 

@@ -1,5 +1,6 @@
 //! A small ray caster: colour, depth, face ids and normals of a painted surface from any pinhole camera.
 
+use crate::trace::span;
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 
 use crate::colour::encode_srgb8;
@@ -140,6 +141,7 @@ pub fn render(
     supersampling: u32,
     threads: usize,
 ) -> Result<Frame, Error> {
+    span!("render");
     camera.check()?;
     check_range("supersampling", f64::from(supersampling), 1.0, 16.0, "between 1 and 16")?;
     check_range("threads", threads as f64, 1.0, 1024.0, "between 1 and 1024")?;

@@ -1,5 +1,6 @@
 //! Identification of the hardware constants from measured nozzle poses.
 
+use crate::trace::span;
 use nalgebra::{DMatrix, DVector, Point3, UnitVector3, Vector3};
 
 use crate::angle::elevation_rotation;
@@ -38,6 +39,7 @@ pub struct Calibration {
 /// move hides more; along all of these the answer stays at `prior` (minimum-norm correction). The gun pitch is the mean
 /// elevation of the measured directions in the tilted frame.
 pub fn calibrate(prior: &PtuSettings, observations: &[Observation]) -> Result<Calibration, Error> {
+    span!("calibrate");
     if observations.len() < 3 {
         let got = format!("{} observations", observations.len());
         return Err(Error::Calibration { need: "at least 3 observations", got });

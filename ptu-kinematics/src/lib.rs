@@ -52,6 +52,7 @@ mod pan_tilt_urdf;
 mod serial_arm;
 mod servo;
 mod settings;
+mod trace;
 #[cfg(feature = "urdf")]
 mod urdf;
 

@@ -1,5 +1,8 @@
 //! The pan-tilt unit: closed forms for everything.
 
+use crate::trace::event;
+#[cfg(feature = "urdf")]
+use crate::trace::span;
 use nalgebra::{Isometry3, Matrix6, Matrix6xX, Point3, UnitQuaternion, UnitVector3, Vector3};
 
 use crate::aim::{Aim, aim_in_body};
@@ -44,6 +47,7 @@ impl Ptu {
     /// else must be fixed. Limits come from the joints' `<limit lower= upper=>`; a continuous joint keeps ±π (pan).
     #[cfg(feature = "urdf")]
     pub fn from_urdf(text: &str, nozzle_link: &str) -> Result<(Self, UrdfJointSigns), Error> {
+        span!("from_urdf");
         let (settings, signs) = read_settings(text, nozzle_link)?;
         Ok((Self::new(settings)?, signs))
     }
@@ -64,6 +68,7 @@ impl Ptu {
             [("pan", joints.pan, self.settings.pan_limits), ("tilt", joints.tilt, self.settings.tilt_limits)]
         {
             if !range.contains(value) {
+                event!(debug, joint, value, "outside the limits");
                 return Err(Error::OutOfLimits { joint, value, min: range.min, max: range.max });
             }
         }

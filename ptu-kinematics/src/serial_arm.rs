@@ -1,5 +1,7 @@
 //! A serial arm with any number of revolute joints; its inverse is numeric.
 
+#[cfg(feature = "urdf")]
+use crate::trace::span;
 use nalgebra::{Isometry3, Matrix3, Matrix3xX, Matrix6xX, Point3, UnitQuaternion, UnitVector3, Vector3};
 
 use crate::angle::elevation_rotation;
@@ -89,6 +91,7 @@ impl SerialArm {
     /// [`Error::Urdf`] for a file that cannot be read as such a chain.
     #[cfg(feature = "urdf")]
     pub fn from_urdf(text: &str, nozzle_link: &str) -> Result<Self, Error> {
+        span!("from_urdf");
         let mut joints: Vec<SerialJoint> = Vec::new();
         let mut fixed = Isometry3::identity();
         for joint in crate::urdf::read_chain(text, nozzle_link)? {

@@ -81,6 +81,7 @@ mod report;
 mod rounding;
 mod settings;
 mod storage;
+mod trace;
 mod tracking;
 mod tsdf_layer;
 

@@ -1,5 +1,6 @@
 //! The map: fuse, take out, look, mesh, ask, store.
 
+use crate::trace::{event, span};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -183,6 +184,7 @@ impl Map {
         world_from_camera: &Isometry3<f64>,
         time: f64,
     ) -> Result<FrameReport, Error> {
+        span!("apply_frame");
         let frame = Frame::read(&mut self.plane_image, depth, colour, world_from_camera, &self.settings)?;
         let camera = world_from_camera.translation.vector / self.settings.block_size();
         let job = FrameJob { frame: &frame, operation, time, camera: camera.into(), threads: self.settings.threads };
@@ -191,6 +193,15 @@ impl Map {
             Operation::Integrate => self.storage.transfer(&change.touched, time),
             Operation::Deintegrate => Transfers::default(),
         };
+        event!(
+            debug,
+            valid = self.plane_image.valid,
+            fused = self.plane_image.fused,
+            added = change.added,
+            evicted = transfers.evicted,
+            timed_out = transfers.timed_out,
+            "frame applied"
+        );
         Ok(FrameReport {
             valid_pixels: self.plane_image.valid,
             fused_pixels: self.plane_image.fused,
@@ -318,6 +329,7 @@ impl Map {
     /// Vertices and faces come in the order of the block coordinates, so equal maps give equal meshes. The sign test is
     /// "solid where the distance is below zero". Every edge has at most two faces.
     pub fn mesh(&self) -> Mesh {
+        span!("mesh");
         IncrementalMesher::of_active(&self.storage.active, &MeshScale::new(&self.settings))
     }
 

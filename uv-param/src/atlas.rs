@@ -23,6 +23,7 @@ use crate::chart::{Chart, SurfacePoint};
 use crate::error::Error;
 use crate::parametrizer::{Parametrizer, Progress};
 use crate::surface::{FaceLookup, Surface, SurfaceReport};
+use crate::trace::{event, span};
 pub use charting::ChartSettings;
 use pack::Piece;
 pub use pack::{PackSettings, Page, Placement, Turns};
@@ -84,6 +85,14 @@ impl Atlas {
         parametrizer: Option<&dyn Parametrizer>,
         mut progress: impl FnMut(Progress),
     ) -> Result<Self, Error> {
+        span!("atlas");
+        event!(
+            debug,
+            degenerate_faces_dropped = report.degenerate_faces_dropped,
+            duplicate_faces_dropped = report.duplicate_faces_dropped,
+            non_manifold_edges_opened = report.non_manifold_edges_opened,
+            "surface checked"
+        );
         pack::check(&settings.pack, surface.area())?;
         let (charts, members) = charting::charts(&surface, seams, &settings.charts, parametrizer, &mut progress)?;
         let pieces: Vec<Piece> = charts.iter().map(|c| Piece { uv: c.uv(), faces: c.disk().faces() }).collect();

@@ -7,6 +7,7 @@ use crate::chart::Chart;
 use crate::disk::Disk;
 use crate::error::Error;
 use crate::parametrizer::{Layout, Progress, Stage};
+use crate::trace::span;
 use crate::unwrap::{Method, Settings, parametrize, relax};
 use paths::BoundaryPaths;
 
@@ -65,6 +66,7 @@ pub fn unwrap_with_cuts(
     cuts: &CutSettings,
     mut progress: impl FnMut(Progress),
 ) -> Result<Chart, Error> {
+    span!("unwrap_with_cuts");
     settings.check()?;
     check_cuts(cuts)?;
     let progress: &mut dyn FnMut(Progress) = &mut progress;

@@ -59,6 +59,7 @@ mod surface;
 mod symmetric_dirichlet;
 mod texel;
 mod texture;
+mod trace;
 mod triangle;
 mod tutte;
 mod unwrap;

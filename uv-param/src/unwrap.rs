@@ -6,6 +6,7 @@ use crate::disk::Disk;
 use crate::error::Error;
 use crate::parametrizer::{Layout, Parametrizer, Progress, StoppingCriterion};
 use crate::symmetric_dirichlet::minimise_symmetric_dirichlet;
+use crate::trace::{event, span};
 use crate::triangle::flips;
 use crate::tutte::tutte_layout;
 
@@ -87,6 +88,7 @@ pub(crate) fn parametrize(
     settings: &Settings,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Layout, Error> {
+    span!("parametrize");
     let frames = disk.frames();
     let stopping = settings.stopping();
     let (mut laplacian, start) = tutte_layout(disk, progress)?;
@@ -95,6 +97,9 @@ pub(crate) fn parametrize(
         layout.iterations += minimise_arap(disk, &frames, &mut laplacian, &mut layout.uv, &stopping, progress)?;
     }
     let flipped = settings.method == Method::Auto && flips(&layout.uv, disk.faces()) > 0;
+    if flipped {
+        event!(debug, "triangles turned over: starts again with symmetric Dirichlet energy");
+    }
     if flipped || settings.method == Method::SymmetricDirichlet {
         layout.uv = start;
         layout.iterations += minimise_symmetric_dirichlet(disk, &frames, &mut layout.uv, &stopping, progress)?;

@@ -1,6 +1,7 @@
 mod distortion;
 mod fisheye;
 pub(crate) mod model;
+mod sphere_models;
 
 use nalgebra::{Isometry3, Matrix2x3, Unit, Vector2, Vector3};
 
@@ -8,6 +9,7 @@ use crate::Error;
 use crate::error::invalid;
 use crate::trajectory::is_finite;
 use model::{CameraModel, check_side};
+use sphere_models::{double_sphere, eucm, omni};
 
 /// How a lens departs from a pinhole.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -20,6 +22,46 @@ pub enum Distortion {
     RadTan([f64; 4]),
     /// `k1 .. k4`: polynomial of the angle off the axis (Kannala and Brandt 2006; `equidistant` of Kalibr).
     Equidistant([f64; 4]),
+    /// The unified omnidirectional model with a radial-tangential polynomial after it (Mei and Rives 2007; `omni` of Kalibr).
+    Omni {
+        /// Distance of the pinhole behind the sphere's centre, in its radius; not negative.
+        xi: f64,
+        /// `k1, k2, p1, p2`.
+        radtan: [f64; 4],
+    },
+    /// `ξ, α` of the double sphere (Usenko, Demmel and Cremers 2018; `ds` of Kalibr); `ξ` above -1 up to 1, `α` from 0 to 1.
+    #[cfg_attr(feature = "serde", serde(rename = "ds"))]
+    DoubleSphere([f64; 2]),
+    /// `α, β` of the enhanced unified model (Khomutenko, Garcia and Martinet 2016; `eucm` of Kalibr); `α` from 0 to 1, `β` positive.
+    Eucm([f64; 2]),
+}
+
+impl Distortion {
+    /// Refuses parameters that no lens has.
+    fn check(&self) -> Result<(), Error> {
+        let polynomial = match self {
+            Self::RadTan(k) | Self::Equidistant(k) | Self::Omni { radtan: k, .. } => k,
+            _ => &[0.0; 4],
+        };
+        if let Some(&bad) = polynomial.iter().find(|k| !k.is_finite()) {
+            return Err(invalid("distortion", bad, "must be finite"));
+        }
+        match *self {
+            Self::Omni { xi, .. } if !(0.0..1e3).contains(&xi) => {
+                Err(invalid("xi", xi, "must be at least 0, and finite"))
+            }
+            Self::DoubleSphere([xi, _]) if !(xi > -1.0 && xi <= 1.0) => {
+                Err(invalid("xi", xi, "must be above -1 and at most 1"))
+            }
+            Self::DoubleSphere([_, alpha]) | Self::Eucm([alpha, _]) if !(0.0..=1.0).contains(&alpha) => {
+                Err(invalid("alpha", alpha, "must be from 0 to 1"))
+            }
+            Self::Eucm([_, beta]) if !(beta > 0.0 && beta.is_finite()) => {
+                Err(invalid("beta", beta, "must be positive and finite"))
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 /// A camera: image size, lens, and where it sits on the body.
@@ -107,11 +149,7 @@ impl Camera {
                 return Err(invalid(name, value, "must be finite, in pixels"));
             }
         }
-        if let Distortion::RadTan(k) | Distortion::Equidistant(k) = self.distortion
-            && let Some(&bad) = k.iter().find(|k| !k.is_finite())
-        {
-            return Err(invalid("distortion", bad, "must be finite"));
-        }
+        self.distortion.check()?;
         if is_finite(&self.body_from_camera) {
             Ok(())
         } else {
@@ -119,13 +157,16 @@ impl Camera {
         }
     }
 
-    /// Pixel of a point in camera axes, which may lie outside the image; `None` behind the camera (for a fisheye: on the
-    /// negative axis) and outside the range in which the lens model is one to one.
+    /// Pixel of a point in camera axes, which may lie outside the image; `None` behind the camera (for a wide lens: beyond its field
+    /// of view) and outside the range in which the lens model is one to one.
     pub fn project(&self, point_in_camera: &Vector3<f64>) -> Option<Vector2<f64>> {
         let distorted = match &self.distortion {
             Distortion::Equidistant(k) => fisheye::project(k, point_in_camera)?,
             Distortion::RadTan(k) => distortion::distort(k, &normalised(point_in_camera)?)?,
             Distortion::None => normalised(point_in_camera)?,
+            Distortion::Omni { xi, radtan } => distortion::distort(radtan, &omni::project(*xi, point_in_camera)?.0)?,
+            Distortion::DoubleSphere(k) => double_sphere::project(*k, point_in_camera)?.0,
+            Distortion::Eucm(k) => eucm::project(*k, point_in_camera)?.0,
         };
         Some(self.pixel(&distorted))
     }
@@ -143,6 +184,12 @@ impl Camera {
                 let m = normalised(point_in_camera)?;
                 (m, perspective_jacobian(&m, point_in_camera.z))
             }
+            Distortion::Omni { xi, radtan } => {
+                let (m, by_point) = omni::project(*xi, point_in_camera)?;
+                (distortion::distort(radtan, &m)?, distortion::jacobian(radtan, &m) * by_point)
+            }
+            Distortion::DoubleSphere(k) => double_sphere::project(*k, point_in_camera)?,
+            Distortion::Eucm(k) => eucm::project(*k, point_in_camera)?,
         };
         for column in 0..3 {
             jacobian[(0, column)] *= self.fx;
@@ -161,6 +208,9 @@ impl Camera {
             Distortion::Equidistant(k) => fisheye::direction(k, &distorted)?,
             Distortion::RadTan(k) => distortion::undistort(k, &distorted)?.push(1.0),
             Distortion::None => distorted.push(1.0),
+            Distortion::Omni { xi, radtan } => omni::direction(*xi, &distortion::undistort(radtan, &distorted)?)?,
+            Distortion::DoubleSphere(k) => double_sphere::direction(*k, &distorted)?,
+            Distortion::Eucm(k) => eucm::direction(*k, &distorted)?,
         };
         Some(Unit::new_normalize(direction))
     }
@@ -198,7 +248,12 @@ impl CameraModel for Camera {
     }
 
     fn focal_length(&self) -> f64 {
-        self.fx.min(self.fy)
+        // The unified models put a sphere in between.
+        let on_axis = match self.distortion {
+            Distortion::Omni { xi, .. } | Distortion::DoubleSphere([xi, _]) => 1.0 + xi,
+            _ => 1.0,
+        };
+        self.fx.min(self.fy) / on_axis
     }
 
     fn check(&self) -> Result<(), Error> {

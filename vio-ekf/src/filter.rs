@@ -1,5 +1,6 @@
 //! The odometry: a camera, maybe a second one, an inertial sensor, and an iterated extended Kalman filter around the body.
 
+mod accel_matrix_selection;
 mod depth_prior;
 mod divergence_monitor;
 mod estimator;

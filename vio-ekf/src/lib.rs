@@ -72,6 +72,7 @@ mod fusion;
 mod imu_axes;
 mod imu_rest;
 mod imu_validation;
+mod inertial;
 mod lie;
 mod samples;
 mod signed_axes;
@@ -80,6 +81,7 @@ mod spline;
 mod stamp;
 #[cfg(test)]
 mod test_random;
+mod trace;
 mod trajectory;
 #[cfg(feature = "tune")]
 pub mod tune;
@@ -88,7 +90,7 @@ pub use camera::model::CameraModel;
 pub use camera::{Camera, Distortion};
 pub use core::core_state::{CoreCovariance, CoreState};
 pub use core::divergence::{DivergenceCause, DivergenceSettings};
-pub use core::imu_noise_estimator::ImuSettings;
+pub use core::imu_noise_estimator::{AccelMatrixEstimation, ImuSettings};
 pub use core::initial_state::{InitialSigma, InitialState};
 pub use core::iterated_update::Linearization;
 pub use core::odometry::Odometry;
@@ -114,6 +116,7 @@ pub use fusion::{
 };
 pub use imu_axes::{AxesCheck, AxesReading, check_imu_axes};
 pub use imu_validation::{ImuDoubt, ImuValidation, validate_samples};
+pub use inertial::InertialOdometry;
 pub use lie::{se3, so3};
 pub use nalgebra;
 pub use samples::{ImageView, Imu, ImuNoise};

@@ -15,8 +15,8 @@ use paintcopter_examples::exit::exit_code;
 use serde_json::json;
 use vio_ekf::sim::{ImuModel, Scenario, SimulatedCamera, Simulation};
 use vio_ekf::{
-    Alignment, Association, InitialSigma, InitialState, Odometry, Settings, Stamp, Status, Trajectory, Vio, ate, chi2,
-    so3, tum,
+    Alignment, Association, Camera, InitialSigma, InitialState, Odometry, Settings, Stamp, Status, Trajectory, Vio,
+    ate, chi2, so3, tum,
 };
 
 type AnyError = Box<dyn Error>;
@@ -47,6 +47,10 @@ struct Arguments {
     /// Angle by which the accelerometer's axes lean away from those of the body, degrees
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     accel_misalignment: f64,
+    /// Rolling shutter of the rendered camera: seconds from the first row until the last. The filter is told by
+    /// `calibration.row_time_s` of the settings, or not
+    #[arg(long, default_value_t = 0.0)]
+    readout: f64,
     /// Settings of the filter that differ from the default, as JSON
     #[arg(long, default_value = "{}")]
     settings: String,
@@ -92,7 +96,11 @@ fn run(arguments: &Arguments) -> Result<(), AnyError> {
         let mut squares = Vec::new();
         for seed in arguments.first_seed..arguments.first_seed + arguments.seeds {
             let count = if arguments.stereo { 2 } else { 1 };
-            let model = |camera| SimulatedCamera { camera, ..SimulatedCamera::default() };
+            let model = |camera: Camera| SimulatedCamera {
+                camera,
+                row_time_s: arguments.readout / camera.height as f64,
+                ..SimulatedCamera::default()
+            };
             let cameras = cameras(name)[..count].iter().copied().map(model).collect();
             let imus = vec![ImuModel { accel_matrix: accel_matrix(arguments), ..ImuModel::default() }];
             let simulation = Simulation::new(spline.clone(), Scenario { seed, cameras, imus, ..Scenario::default() })?;

@@ -23,6 +23,8 @@ pub struct Arguments {
 pub(super) enum Command {
     /// Renders a flight as an EuRoC folder that any odometry can run, and as MCAP
     Sim(Sim),
+    /// Dead reckoning: inertial samples alone, no images, from a state that is given
+    Inertial(Inertial),
     /// Compares an estimated trajectory with a reference
     Eval(Eval),
     /// Finds the noise settings with which recordings are followed best
@@ -92,6 +94,18 @@ pub(super) struct Sim {
     /// With a second camera, 0.11 m beside the first, in the folder
     #[arg(long)]
     pub(super) stereo: bool,
+    /// Kalibr's camera chain with the lenses to see through, instead of EuRoC's: one camera, with --stereo two
+    #[arg(long, value_name = "YAML")]
+    pub(super) cameras: Option<PathBuf>,
+    /// Rolling shutter: seconds from the first row of an image until the last
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 0.0,
+        allow_negative_numbers = true,
+        conflicts_with = "stereo"
+    )]
+    pub(super) readout: f64,
     /// Seed of the room, the biases and the noise
     #[arg(long, default_value_t = 1)]
     pub(super) seed: u64,
@@ -109,6 +123,29 @@ pub(super) enum FlightName {
     Room,
     /// Rows along a wall, as a painting robot flies
     Wall,
+}
+
+#[derive(Args)]
+pub(super) struct Inertial {
+    /// Folder in the layout of EuRoC/ASL; mav0/imu0 is all that is needed of it
+    #[arg(long, value_name = "DIR")]
+    pub(super) euroc: PathBuf,
+    /// The state to start from, EuRoC text: time, position, quaternion (scalar first), velocity in the world and, if known, biases of
+    /// gyroscope and accelerometer; the first row that the samples cover counts [default: the recording's truth]
+    #[arg(long, value_name = "CSV")]
+    pub(super) start: Option<PathBuf>,
+    /// Kalibr's file of the inertial sensor, instead of the recording's own
+    #[arg(long, value_name = "YAML")]
+    pub(super) imu: Option<PathBuf>,
+    /// Seconds after the start
+    #[arg(long, default_value_t = 10.0)]
+    pub(super) seconds: f64,
+    /// Magnitude of gravity, m/s²
+    #[arg(long, default_value_t = 9.81)]
+    pub(super) gravity: f64,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "out/vio-inertial")]
+    pub(super) out: PathBuf,
 }
 
 #[derive(Args)]

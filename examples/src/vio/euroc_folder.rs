@@ -56,7 +56,7 @@ pub(super) fn inside(folder: &Path) -> PathBuf {
 }
 
 /// The inertial sensor. The pose that it is given is that of the folder's body.
-fn imu(root: &Path, overrides: &Overrides) -> Result<ImuCalibration, VioError> {
+pub(super) fn imu(root: &Path, overrides: &Overrides) -> Result<ImuCalibration, VioError> {
     if let Some(path) = &overrides.imu {
         return calibration::read_kalibr_imu(&read_text(path)?).map_err(|error| VioError::malformed(path, &error));
     }

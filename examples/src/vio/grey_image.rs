@@ -1,9 +1,15 @@
 //! Grey images from files and messages.
 
+use std::io::Cursor;
 use std::path::Path;
 
-use image::{DynamicImage, ImageReader};
+use image::{DynamicImage, ImageError, ImageReader, Limits};
 use vio_ekf::ImageView;
+
+/// Deflate makes no more than so many bytes of one; pictures of one colour come near it.
+const MOST_BYTES_OF_A_BYTE: u64 = 1032;
+/// What a decoder may claim besides.
+const DECODER_BYTES: u64 = 1 << 20;
 
 /// A grey image with 8 bits per pixel.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,15 +24,27 @@ pub struct GreyImage {
 
 impl GreyImage {
     /// Reads a PNG or JPEG file; colours become grey, 16 bits become 8.
-    pub(super) fn read(path: &Path) -> Result<Self, String> {
+    ///
+    /// # Errors
+    /// The file and what is wrong with it.
+    pub fn read(path: &Path) -> Result<Self, String> {
         let in_file = |why: &dyn std::fmt::Display| format!("{}: cannot be read ({why})", path.display());
-        let reader = ImageReader::open(path).map_err(|error| in_file(&error))?;
-        reader.decode().map(Self::from_image).map_err(|error| in_file(&error))
+        let bytes = std::fs::read(path).map_err(|error| in_file(&error))?;
+        Self::decoded(&bytes).map_err(|error| in_file(&error))
     }
 
     /// Decodes PNG or JPEG bytes.
     pub(super) fn decode(bytes: &[u8]) -> Result<Self, String> {
-        image::load_from_memory(bytes).map(Self::from_image).map_err(|error| format!("no PNG or JPEG image ({error})"))
+        Self::decoded(bytes).map_err(|error| format!("no PNG or JPEG image ({error})"))
+    }
+
+    fn decoded(bytes: &[u8]) -> Result<Self, ImageError> {
+        let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
+        // A file that claims more pixels than its bytes can hold asks for no memory.
+        let mut limits = Limits::default();
+        limits.max_alloc = Some(MOST_BYTES_OF_A_BYTE * bytes.len() as u64 + DECODER_BYTES);
+        reader.limits(limits);
+        reader.decode().map(Self::from_image)
     }
 
     fn from_image(image: DynamicImage) -> Self {

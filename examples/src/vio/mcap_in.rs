@@ -219,7 +219,7 @@ impl Found {
             })?;
             camera.check()?;
             // Through the same text as the calibration of a folder, so that the same camera is the same to the last bit.
-            let written = CameraCalibration { camera, rate_hz: None, time_offset_s: 0.0 };
+            let written = CameraCalibration { camera, rate_hz: None, time_offset_s: 0.0, row_time_s: 0.0 };
             let read = calibration::read_asl_camera(&calibration::write_asl_camera(&written))?;
             Ok(CameraCalibration { time_offset_s, ..read })
         };
@@ -250,10 +250,18 @@ impl Found {
         let k: [f64; 9] = message.k.as_slice().try_into().map_err(|_| "its camera matrix has not nine numbers")?;
         let four =
             |d: &[f64]| d.get(..4).and_then(|d| <[f64; 4]>::try_from(d).ok()).ok_or("too few distortion parameters");
+        let two = |d: &[f64]| <[f64; 2]>::try_from(d).map_err(|_| "its model has two distortion parameters");
         let distortion = match message.distortion_model.as_str() {
             "" => Distortion::None,
             "plumb_bob" if message.d.iter().skip(4).all(|&k3| k3 == 0.0) => Distortion::RadTan(four(&message.d)?),
             "kannala_brandt" | "equidistant" => Distortion::Equidistant(four(&message.d)?),
+            // Not names of Foxglove: those of Kalibr, with the parameters in its order.
+            "omni" => {
+                let (xi, radtan) = message.d.split_first().ok_or("too few distortion parameters")?;
+                Distortion::Omni { xi: *xi, radtan: four(radtan)? }
+            }
+            "ds" => Distortion::DoubleSphere(two(&message.d)?),
+            "eucm" => Distortion::Eucm(two(&message.d)?),
             model => return Err(format!("its distortion model `{model}` is not known (or has a third radial term)")),
         };
         let (width, height) = (message.width as usize, message.height as usize);

@@ -202,6 +202,10 @@ fn calibration_message(stamp: Stamp, frame: &str, calibration: &CameraCalibratio
         Distortion::None => ("plumb_bob", vec![0.0; 5]),
         Distortion::RadTan(k) => ("plumb_bob", k.into_iter().chain([0.0]).collect()),
         Distortion::Equidistant(k) => ("kannala_brandt", k.to_vec()),
+        // Foxglove has no names for these: those of Kalibr.
+        Distortion::Omni { xi, radtan } => ("omni", [&[xi][..], &radtan].concat()),
+        Distortion::DoubleSphere(k) => ("ds", k.to_vec()),
+        Distortion::Eucm(k) => ("eucm", k.to_vec()),
     };
     messages::CameraCalibration {
         timestamp: Some(timestamp(stamp)),

@@ -86,6 +86,10 @@ pub struct VioReport {
     pub extrinsics_error_rad: f64,
     /// Estimated time to add to the camera's stamps to get the inertial sensor's.
     pub time_offset_s: f64,
+    /// Matrix of the accelerometer at the end, row by row: force by reading, without the bias. Absent where the sensor was found to be
+    /// calibrated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accel_matrix: Option<Vec<f64>>,
     /// Worker threads.
     pub threads: usize,
 }
@@ -139,6 +143,7 @@ impl VioReport {
             initialization_time_s: run.initialization_time_s,
             extrinsics_error_rad: so3::angle_between(&attitude, &run.calibration.body_from_camera.rotation),
             time_offset_s: run.calibration.time_offset_s,
+            accel_matrix: run.accel_matrix().map(|matrix| matrix.transpose().iter().copied().collect()),
             threads,
         })
     }
@@ -229,7 +234,7 @@ pub fn save(
 ) -> Result<(), VioError> {
     let trajectories = run.trajectories()?;
     write_file(&folder.join("trajectory.tum"), segmented_text(&trajectories).as_bytes())?;
-    write_file(&folder.join("states.csv"), states_csv(run).as_bytes())?;
+    write_file(&folder.join("states.csv"), states_csv(&run.segments).as_bytes())?;
     plots::save(&trajectories, run, evaluation, folder)?;
     write_file(&folder.join("report.md"), report.markdown(recording, run, evaluation.is_some()).as_bytes())?;
     // Last, so that its presence means the folder is complete.

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use cpu_time::ThreadTime;
 use vio_ekf::calibration::{CameraCalibration, ImuCalibration};
-use vio_ekf::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use vio_ekf::nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use vio_ekf::{Calibration, Error, FrameReport, ImuNoise, Odometry, Settings, Stamp, Status, Trajectory, Vio};
 
 use super::camera_frames::{CameraFrame, camera_frames};
@@ -347,6 +347,12 @@ impl Run {
     /// Poses that come from inertial samples alone.
     pub fn dead_reckoned(&self) -> usize {
         self.segments.iter().flat_map(|segment| &segment.dead_reckoned).filter(|&&dead| dead).count()
+    }
+
+    /// The matrix of the accelerometer at the end, if it was estimated: the sensor is not calibrated, or has not shown yet that it is.
+    pub fn accel_matrix(&self) -> Option<Matrix3<f64>> {
+        let is_estimated = self.calibration.accel_matrix_sigma.amax() > 0.0;
+        is_estimated.then_some(self.calibration.accel_matrix)
     }
 
     /// The trajectories of the segments, each in its own world.

@@ -79,6 +79,7 @@ pub fn simulate(settings: &SimulationSettings, folder: &Path) -> Result<Simulate
         camera: model.camera,
         rate_hz: Some(model.rate_hz),
         time_offset_s: 0.0,
+        row_time_s: model.row_time_s,
     };
     let cameras: Vec<CameraCalibration> = settings.scenario.cameras.iter().map(calibrated).collect();
     if cameras.is_empty() {

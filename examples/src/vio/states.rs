@@ -2,15 +2,15 @@
 
 use std::fmt::Write as _;
 
-use super::Run;
+use super::Segment;
 
 /// The parts of the error state, three rows each, in the order of the covariance.
 const PARTS: [&str; 5] = ["p", "v", "r", "bg", "ba"];
 
-/// One row per image: time, segment, landmarks used, whether inertial samples alone tell it, pose (world from body, scalar last),
+/// One row per image, or sample where there are no images: time, segment, landmarks used, whether inertial samples alone tell it, pose (world from body, scalar last),
 /// velocity in body axes, biases of gyroscope and accelerometer, and the upper triangle of the covariance, row by row: errors of
 /// position (world axes), velocity (body axes), attitude (rotation vector in world axes) and biases. SI units.
-pub(super) fn states_csv(run: &Run) -> String {
+pub(super) fn states_csv(segments: &[Segment]) -> String {
     let mut text = String::from("t,segment,used,dead_reckoned,px,py,pz,qx,qy,qz,qw,vx,vy,vz,bgx,bgy,bgz,bax,bay,baz");
     let name = |row: usize| format!("{}{}", PARTS[row / 3], ["x", "y", "z"][row % 3]);
     for row in 0..3 * PARTS.len() {
@@ -20,7 +20,7 @@ pub(super) fn states_csv(run: &Run) -> String {
         }
     }
     text.push('\n');
-    for (number, segment) in run.segments.iter().enumerate() {
+    for (number, segment) in segments.iter().enumerate() {
         for (k, o) in segment.odometry.iter().enumerate() {
             let _ =
                 write!(text, "{},{},{},{}", o.stamp, number + 1, segment.used[k], u8::from(segment.dead_reckoned[k]));

@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use vio_ekf::calibration::read_kalibr_cameras;
 use vio_ekf::sim::{Scenario, SimulatedCamera};
 use vio_ekf::tune::TuneSettings;
 use vio_ekf::{CalibrationSettings, Camera, ImuValidation, Settings};
 
 use super::command_line::{Arguments, Command, Eval, FlightName, Sim, Track, Tune};
 use super::error::{read_text, write_file};
+use super::inertial::dead_reckon;
 use super::{
     CompareSettings, Flight, GreyImage, Overrides, Recording, Run, RunSettings, SimulationSettings, Tuning, TuningData,
     VioError, VioReport, axes_doubts, compare, diagnose, evaluate_run, open_euroc, open_euroc_stereo, open_mcap,
@@ -28,6 +30,12 @@ pub fn execute(arguments: &Arguments) -> Result<(), AnyError> {
     match &arguments.command {
         None => track(&arguments.track),
         Some(Command::Sim(sim)) => render(sim),
+        Some(Command::Inertial(inertial)) => {
+            make(&inertial.out)?;
+            eprintln!("{}", dead_reckon(inertial)?.summary());
+            println!("{}", inertial.out.display());
+            Ok(())
+        }
         Some(Command::Eval(eval)) => evaluate(eval),
         Some(Command::Tune(tune)) => search(tune),
     }
@@ -107,6 +115,13 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
     for why in run.skipped.iter().take(3) {
         eprintln!("left out: {why}");
     }
+    if let Some(matrix) = run.accel_matrix() {
+        let scale = [0, 1, 2].map(|axis| 100.0 * (matrix[(axis, axis)].recip() - 1.0));
+        let [x, y, z] = scale.map(|percent| format!("{percent:+.1}"));
+        eprintln!(
+            "the accelerometer was not found to be calibrated: it reads {x}, {y}, {z} % on its axes (accel_matrix in report.json)"
+        );
+    }
     for (stamp, why) in &run.lost {
         eprintln!("diverged at {stamp} s: {why}");
     }
@@ -172,9 +187,7 @@ fn render(arguments: &Sim) -> Result<(), AnyError> {
         (None, FlightName::Room) => Flight::Room,
         (None, FlightName::Wall) => Flight::Wall,
     };
-    let second =
-        arguments.stereo.then(|| SimulatedCamera { camera: Camera::euroc_right(), ..SimulatedCamera::default() });
-    let cameras = std::iter::once(SimulatedCamera::default()).chain(second).collect();
+    let cameras = simulated_cameras(arguments)?;
     let settings = SimulationSettings {
         flight,
         seconds: arguments.seconds,
@@ -190,6 +203,27 @@ fn render(arguments: &Sim) -> Result<(), AnyError> {
     );
     println!("{}", arguments.out.display());
     Ok(())
+}
+
+/// The cameras of EuRoC, or those of a file.
+fn simulated_cameras(arguments: &Sim) -> Result<Vec<SimulatedCamera>, AnyError> {
+    let count = if arguments.stereo { 2 } else { 1 };
+    let cameras = match &arguments.cameras {
+        None => vec![Camera::euroc(), Camera::euroc_right()],
+        Some(path) => {
+            let chain = read_kalibr_cameras(&read_text(path)?).map_err(|error| VioError::malformed(path, &error))?;
+            if chain.len() < count {
+                return Err(VioError::malformed(path, &"holds one camera only").into());
+            }
+            chain.iter().map(|calibration| calibration.camera).collect()
+        }
+    };
+    let simulated = |camera: Camera| SimulatedCamera {
+        camera,
+        row_time_s: arguments.readout / camera.height as f64,
+        ..SimulatedCamera::default()
+    };
+    Ok(cameras.into_iter().take(count).map(simulated).collect())
 }
 
 fn evaluate(arguments: &Eval) -> Result<(), AnyError> {

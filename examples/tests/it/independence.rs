@@ -31,6 +31,25 @@ fn the_libraries_do_not_know_each_other() {
     assert_eq!(seen, LIBRARIES.len());
 }
 
+/// What a library can tell a subscriber of `tracing` costs nobody else a dependency.
+#[test]
+fn tracing_is_asked_for() {
+    for library in LIBRARIES {
+        let tree = |features: &[&str]| {
+            let output = Command::new(env!("CARGO"))
+                .args(["tree", "--offline", "--edges", "normal", "--prefix", "none", "--package", library])
+                .args(features)
+                .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+                .output()
+                .unwrap();
+            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+            String::from_utf8(output.stdout).unwrap()
+        };
+        assert!(!tree(&[]).contains("tracing"), "{library} has it by default");
+        assert!(tree(&["--features", "tracing"]).contains("tracing-core"), "{library} has no feature of that name");
+    }
+}
+
 /// The root files of a package's targets.
 fn crate_roots(package: &Path) -> Vec<PathBuf> {
     let mut roots: Vec<PathBuf> = ["src/lib.rs", "src/main.rs"].map(|name| package.join(name)).into();

@@ -14,6 +14,7 @@ mod meshes;
 mod mission;
 mod mission_file;
 mod module_graph;
+mod mutations;
 mod odometry_prior;
 mod paint_image;
 mod placement;

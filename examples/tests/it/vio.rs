@@ -1,5 +1,5 @@
 //! The odometry as people run it.
 
-mod fixtures;
+pub(crate) mod fixtures;
 mod recordings;
 mod runs;

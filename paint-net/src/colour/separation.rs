@@ -11,6 +11,7 @@ use crate::model::Spray;
 use crate::optimise::{StoppingRule, minimise};
 use crate::painter::Observer;
 use crate::problem::{Limits, PaintGrid, PaintProblem};
+use crate::trace::span;
 
 /// Colour separation and deconvolution in one: the volumes of all paints on all cells at once. Ours.
 ///
@@ -57,6 +58,7 @@ impl ColourSeparation {
         problem: &ColourProblem,
         observer: &mut dyn Observer,
     ) -> Result<ColourPainting, Error> {
+        span!("separate_colours");
         require("iterations", self.iterations as f64, self.iterations <= 100_000, "it must be at most 100,000")?;
         let ColourProblem { wanted, palette, weight, paintable, kernel, limits } = *problem;
         let (width, height) = (wanted.width(), wanted.height());

@@ -8,6 +8,7 @@ use super::lattice::{GantryState, Lattice, Segment};
 use super::model::PaintModel;
 use super::settings::GantrySettings;
 use crate::error::Error;
+use crate::trace::{event, span};
 
 /// A decision and what it was made from.
 pub struct GantryPlan {
@@ -38,11 +39,13 @@ pub fn plan_gantry(
     state: GantryState,
     settings: &GantrySettings,
 ) -> Result<GantryPlan, Error> {
+    span!("plan_gantry");
     let lattice = Lattice::new(state, settings)?;
     let density = DensityMap::sample(model, state.position, settings)?; // IV-A
     let scores = EdgeScores::new(&lattice, &density, model, settings); // IV-B, IV-C
     let values = ValueSweep::new(&lattice, &scores); // IV-D
     let score = values.value(0, 0, lattice.start_speed());
+    event!(debug, score, "gantry planned");
     let speeds = if score > 0.0 { values.complete(&[], lattice.start_speed()) } else { brake(&lattice) };
     Ok(GantryPlan { lattice, density, speeds, score, values })
 }

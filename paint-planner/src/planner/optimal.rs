@@ -8,6 +8,7 @@ use crate::nozzle::{InteriorPoint, Mode, Nozzles, QpSolver, initial_states, opti
 use crate::plan::Plan;
 use crate::settings::Settings;
 use crate::target::{Target, check, stroke_links};
+use crate::trace::{event, span};
 use crate::visibility::drop_hidden;
 use crate::world::{Surface, Tool};
 use crate::{heading, route};
@@ -60,6 +61,7 @@ impl OptimalPlanner<'_> {
         tool: &dyn Tool,
         settings: &Settings,
     ) -> Result<Plan, Error> {
+        span!("plan");
         settings.check()?;
         check(targets)?;
         let usable = |index: &usize| clearance.get(*index).is_some_and(|c| *c >= 0.0);
@@ -70,6 +72,12 @@ impl OptimalPlanner<'_> {
         let initial_states = initial_states(targets, &settings.nozzle);
         let mut nozzles = optimise(targets, &initial_states, &linked, self.mode, self.solver, &settings.nozzle)?;
         drop_hidden(targets, &mut nozzles.states, surface)?;
+        event!(
+            debug,
+            targets = targets.len(),
+            hidden = nozzles.states.iter().filter(|state| state.is_none()).count(),
+            "targets that cannot be seen are left out"
+        );
         let mut checker = ClearanceChecker::new(surface, tool);
         let mut clearance = clearance.to_vec();
         let mut attempt = 0;
@@ -94,6 +102,7 @@ impl OptimalPlanner<'_> {
                 return Ok(plan);
             }
             attempt += 1;
+            event!(warn, attempt, violations = violations.len(), "plan refused: too near to the surface");
             if attempt == MAX_ATTEMPTS {
                 return if plan.report.clearance > 0.0 {
                     Ok(plan)

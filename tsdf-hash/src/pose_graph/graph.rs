@@ -1,5 +1,6 @@
 //! A pose graph.
 
+use crate::trace::span;
 use nalgebra::Isometry3;
 
 use crate::error::Error;
@@ -65,6 +66,7 @@ impl PoseGraph {
     /// [`Error::InvalidFactor`], [`Error::InvalidPose`], [`Error::UnconstrainedPose`] where a pose is not joined to what is known,
     /// [`Error::SingularGraph`], [`Error::GraphTooLarge`]. The poses are then as they were.
     pub fn optimise(&mut self, settings: &PoseGraphSettings) -> Result<PoseGraphReport, Error> {
+        span!("optimise");
         let fixed = self.anchors()?;
         let mut poses = self.poses.clone();
         let report = minimise(&mut poses, &fixed, &self.betweens, &self.priors, settings)?;

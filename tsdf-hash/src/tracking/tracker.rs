@@ -1,5 +1,6 @@
 //! The tracker: one frame against the map.
 
+use crate::trace::{event, span};
 use nalgebra::{Isometry3, Matrix6};
 
 use crate::blocks::voxel_block::MAX_WEIGHT;
@@ -180,6 +181,7 @@ impl Tracker {
         colour: Option<&ColourView>,
         prior: &PosePrior,
     ) -> Result<TrackingOutcome, Error> {
+        span!("track");
         depth.check()?;
         if let Some(colour) = colour {
             colour.check()?;
@@ -201,7 +203,11 @@ impl Tracker {
         let Some((last, comparison)) = last else { return Ok(lost(prior, TrackingStatus::NoOverlap)) };
         // The levels hold means of pixels: their noise is that much smaller.
         let reduction = settings.reduction(depth.width) as f64;
-        Ok(self.outcome(&mut search, &last, &comparison, view, reduction, prior))
+        let outcome = self.outcome(&mut search, &last, &comparison, view, reduction, prior);
+        if !outcome.is_tracked() {
+            event!(warn, status = ?outcome.status, agreement = outcome.agreement, "camera lost");
+        }
+        Ok(outcome)
     }
 
     fn comparison<'a>(&'a self, view: &View, voxel_size: f64, level: usize, reach: f64) -> Comparison<'a> {

@@ -5,6 +5,20 @@ use nalgebra::Vector3;
 use crate::error::{all_not_negative, all_positive, invalid};
 use crate::{Error, Imu, ImuNoise};
 
+/// When scale and axes of the accelerometer are estimated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+pub enum AccelMatrixEstimation {
+    /// Never: the sensor is calibrated.
+    Never,
+    /// From when on the corrections of images fit an error of scale or axes and not the noise of the sensor. A calibrated sensor stays
+    /// as it is: nine more unknowns cost accuracy on motions that excite them little.
+    #[default]
+    WhenNeeded,
+    /// From the start.
+    Always,
+}
+
 /// How an inertial sensor may be worse than its data sheet, and how many of its samples are kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
@@ -19,11 +33,13 @@ pub struct ImuSettings {
     /// The noise of each sensor grows up to this factor while images correct velocity and attitude by more than it explains
     /// (innovation-based adaptive estimation); 30, ours. 1 to believe the readings.
     pub max_innovation_inflation: f64,
-    /// Standard deviation of the accelerometer's scale on each axis, relative; ours: 0, known exactly and not estimated. A cheap
-    /// sensor without calibration: 0.03.
+    /// Whether scale and axes of the accelerometer are estimated; ours: when the images ask for it.
+    pub accel_matrix: AccelMatrixEstimation,
+    /// Standard deviation of the accelerometer's scale on each axis, relative, where it is estimated; ours: 0.0375, a cheap
+    /// sensor without calibration.
     pub accel_scale_sigma: f64,
-    /// Standard deviation of the angles between the accelerometer's axes and those of the body, rad; ours: 0. A cheap sensor without
-    /// calibration: 0.02.
+    /// Standard deviation of the angles between the accelerometer's axes and those of the body, rad, where they are estimated; ours:
+    /// 0.025, a cheap sensor without calibration.
     pub accel_misalignment_sigma: f64,
     /// Inertial samples that are kept for measurements that arrive late; ours: 256, which is 1.3 s at 200 Hz.
     pub buffer_samples: usize,
@@ -36,17 +52,18 @@ impl Default for ImuSettings {
             accel_range: 176.5,
             noise_inflation: 4.0,
             max_innovation_inflation: 30.0,
-            accel_scale_sigma: 0.0,
-            accel_misalignment_sigma: 0.0,
+            accel_matrix: AccelMatrixEstimation::WhenNeeded,
+            accel_scale_sigma: 0.0375,
+            accel_misalignment_sigma: 0.025,
             buffer_samples: 256,
         }
     }
 }
 
 impl ImuSettings {
-    /// Whether the accelerometer's matrix is estimated.
-    pub(crate) fn estimates_accel_matrix(&self) -> bool {
-        self.accel_scale_sigma > 0.0 || self.accel_misalignment_sigma > 0.0
+    /// Standard deviation of an entry of the accelerometer's matrix, counted row by row.
+    pub(crate) fn accel_matrix_sigma(&self, entry: usize) -> f64 {
+        if entry.is_multiple_of(4) { self.accel_scale_sigma } else { self.accel_misalignment_sigma }
     }
 
     /// Refuses values that no sensor can have.

@@ -161,6 +161,11 @@ impl ImuPreintegration {
         (transition.compose * self.matrix_jacobian, reordered(&self.matrix_jacobian))
     }
 
+    /// Specific force integrated over the time, in the body axes of the end, m/s.
+    pub(crate) fn impulse(&self) -> Vector3<f64> {
+        self.rotation.inverse() * self.velocity
+    }
+
     /// The transition of the core from a start with this velocity and attitude, which is all that it depends on.
     pub(crate) fn transition(
         &self,

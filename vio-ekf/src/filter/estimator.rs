@@ -1,6 +1,6 @@
 //! State, covariance and delay buffer of the odometry.
 
-use nalgebra::{Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
 
 use super::depth_prior;
 use super::propagation::propagate::{Workspace, propagate};
@@ -32,6 +32,8 @@ pub(crate) struct Estimator {
     pub(crate) landmarks: LandmarkSettings,
     /// Rate of the body at the time of the state.
     pub(crate) rate: Vector3<f64>,
+    /// Specific force integrated over the last propagation, in the body axes of its end, m/s, and over how many seconds.
+    pub(crate) impulse: (Vector3<f64>, f64),
     workspace: Workspace,
     delta: Vec<f64>,
     /// Corrections of a series of updates that bearings have not had yet.
@@ -53,7 +55,7 @@ impl Estimator {
             camera_attitude: camera.body_from_camera().rotation,
             time_offset: settings.calibration.time_offset_s,
             depth_prior: InverseDistance::new(settings.landmarks.inverse_distance),
-            accel_matrix: settings.imu.estimates_accel_matrix().then(Matrix3::identity),
+            accel_matrix: None,
             landmarks: Vec::with_capacity(settings.landmarks.max_count),
         };
         let mut covariance = Covariance::new(error_state::FIRST_LANDMARK, capacity);
@@ -64,11 +66,6 @@ impl Estimator {
         covariance.reset_row(error_state::TIME_OFFSET, calibration.time_offset_sigma_s.powi(2));
         let shared = settings.landmarks.shared_sigma * settings.landmarks.inverse_distance;
         covariance.reset_row(error_state::DEPTH_PRIOR, shared * shared);
-        for entry in 0..error_state::MATRIX_SIZE {
-            let imu = &settings.imu;
-            let sigma = if entry % 4 == 0 { imu.accel_scale_sigma } else { imu.accel_misalignment_sigma };
-            covariance.reset_row(error_state::ACCEL_MATRIX + entry, sigma * sigma);
-        }
         Self {
             rate: sample.gyro - state.core.gyro_bias,
             buffer: ImuBuffer::new(sample, initial.stamp, settings.imu.buffer_samples)
@@ -80,8 +77,60 @@ impl Estimator {
             workspace: Workspace::new(capacity),
             delta: vec![0.0; capacity],
             owed: vec![0.0; capacity],
+            impulse: (Vector3::zeros(), 0.0),
             state,
             covariance,
+        }
+    }
+
+    /// Begins to estimate the accelerometer's matrix. Until now its bias has taken the blame: `A f − b_a` stays as well known as it is
+    /// at the mean reading `f` so far, though neither part is.
+    pub(crate) fn estimate_accel_matrix(
+        &mut self,
+        sigma: &SVector<f64, { error_state::MATRIX_SIZE }>,
+        mean_reading: &Vector3<f64>,
+    ) {
+        self.state.accel_matrix = Some(Matrix3::identity());
+        for (entry, sigma) in sigma.iter().enumerate() {
+            let row = error_state::ACCEL_MATRIX + entry;
+            self.covariance.reset_row(row, sigma * sigma);
+            self.covariance.add_row(error_state::ACCEL_BIAS + entry / 3, mean_reading[entry % 3], row);
+        }
+    }
+
+    /// Admits that the prior of the matrix was too narrow: the bias has taken the blame here as well.
+    pub(crate) fn inflate_accel_matrix(
+        &mut self,
+        sigma: &SVector<f64, { error_state::MATRIX_SIZE }>,
+        mean_reading: &Vector3<f64>,
+    ) {
+        for (entry, sigma) in sigma.iter().enumerate() {
+            let (row, bias) = (error_state::ACCEL_MATRIX + entry, error_state::ACCEL_BIAS + entry / 3);
+            let reading = mean_reading[entry % 3];
+            // As if the reading times an error of the matrix had been added to the bias: `(b, a) ← (b + f e, a + e)`.
+            self.covariance.add_row(bias, -reading, row);
+            self.covariance.inflate(row, sigma * sigma);
+            self.covariance.add_row(bias, reading, row);
+        }
+    }
+
+    /// Ends that: the whole estimate is conditioned on the identity.
+    pub(crate) fn fix_accel_matrix(&mut self) {
+        const SIZE: usize = error_state::MATRIX_SIZE;
+        let error = (Matrix3::identity() - self.state.accel_matrix()).transpose();
+        let known = LinearizedMeasurement::<SIZE, SIZE> {
+            rows: std::array::from_fn(|k| error_state::ACCEL_MATRIX + k),
+            residual: SVector::from_iterator(error.iter().copied()),
+            jacobian: SMatrix::identity(),
+            // Far below any prior, far above the rounding of a variance.
+            noise: SMatrix::identity() * 1e-12,
+        };
+        if !self.update(&known) {
+            return;
+        }
+        self.state.accel_matrix = None;
+        for entry in 0..SIZE {
+            self.covariance.reset_row(error_state::ACCEL_MATRIX + entry, 0.0);
         }
     }
 
@@ -100,6 +149,7 @@ impl Estimator {
         let preintegration = self.buffer.preintegrate(until, &self.state.imu_correction(), &self.noise);
         let input = (&preintegration, self.gravity);
         propagate(&mut self.state, &mut self.covariance, input, &mut self.workspace, dropped);
+        self.impulse = (preintegration.impulse(), preintegration.duration);
         self.buffer.advance(until);
         self.rate = self.buffer.rate_at_state() - self.state.core.gyro_bias;
     }

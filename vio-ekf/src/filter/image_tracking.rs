@@ -8,12 +8,14 @@ use super::frontend::patch_alignment::{PatchAlignment, align_patch};
 use super::frontend::pyramid::Pyramid;
 use super::landmarks;
 use super::report::FrameReport;
-use super::settings::{PatchSettings, Settings};
+use super::settings::Settings;
 use super::state::error_state;
-use super::state::landmark::{project, unproject};
+use super::state::landmark::unproject;
+use super::state::rolling_shutter::RollingShutter;
 use super::stereo::stereo_camera::StereoCamera;
 use super::tracking_state::{LandmarkTrack, TrackingState};
 use crate::CameraModel;
+use crate::trace::span;
 
 /// Inverse distance beyond which a landmark is too near to be tracked, 1/m.
 const MAX_INVERSE_DISTANCE: f64 = 20.0;
@@ -27,14 +29,16 @@ pub(crate) fn align_and_update(
     settings: &Settings,
     report: &mut FrameReport,
 ) {
+    span!("align_and_update");
     choose(tracking, settings.landmarks.max_measured);
     let TrackingState { estimator, tracks, .. } = tracking;
     let offset = estimator.state.time_offset;
+    let shutter = RollingShutter::new(camera, settings);
     for (slot, track) in tracks.iter_mut().enumerate() {
         let time_offset_error = estimator.state.time_offset - offset;
         estimator.settle(slot);
         if !track.chosen {
-            track.in_view = is_in_view(estimator, slot, track, (pyramid, camera));
+            track.in_view = is_in_view(estimator, slot, track, (pyramid, camera, &shutter));
             continue;
         }
         track.in_view = true;
@@ -80,10 +84,10 @@ fn is_in_view(
     estimator: &Estimator,
     slot: usize,
     track: &LandmarkTrack,
-    (pyramid, camera): (&Pyramid, &dyn CameraModel),
+    (pyramid, camera, shutter): (&Pyramid, &dyn CameraModel, &RollingShutter),
 ) -> bool {
     let landmark = &estimator.state.landmarks[slot];
-    let seen = project(camera, &landmark.bearing);
+    let seen = shutter.project(camera, &landmark.bearing, &estimator.bearing_rate(landmark));
     track.patch.is_some()
         && seen.is_some_and(|(pixel, by_bearing)| Patch::is_inside(pyramid, &pixel, &(by_bearing * landmark.warp)))
 }
@@ -123,15 +127,18 @@ pub(crate) fn update_templates(
     tracking: &mut TrackingState,
     pyramid: &Pyramid,
     camera: &dyn CameraModel,
-    settings: &PatchSettings,
+    settings: &Settings,
 ) {
     let TrackingState { estimator, tracks, .. } = tracking;
+    let shutter = RollingShutter::new(camera, settings);
+    let settings = &settings.patches;
     for (slot, track) in tracks.iter_mut().enumerate() {
         if track.failures > 0 {
             continue;
         }
         let landmark = estimator.state.landmarks[slot];
-        let Some((pixel, by_bearing)) = project(camera, &landmark.bearing) else { continue };
+        let rate = estimator.bearing_rate(&landmark);
+        let Some((pixel, by_bearing)) = shutter.project(camera, &landmark.bearing, &rate) else { continue };
         let area = (by_bearing * landmark.warp).determinant();
         if (1.0 / settings.max_area_change..=settings.max_area_change).contains(&area) {
             continue;
@@ -154,9 +161,11 @@ pub(crate) fn detect_landmarks(
     camera: &dyn CameraModel,
     settings: &Settings,
 ) -> usize {
+    span!("detect_landmarks");
     let ImageFrontend { pyramid, detector, next_id } = frontend;
     let TrackingState { estimator, tracks, .. } = tracking;
     let criteria = DetectionCriteria::from(&settings.patches);
+    let shutter = RollingShutter::new(camera, settings);
     let present = estimator.state.landmarks.iter().filter_map(|l| camera.project(&l.bearing.direction()));
     detector.detect(pyramid, &present, &criteria);
     let before = tracks.len();
@@ -164,6 +173,8 @@ pub(crate) fn detect_landmarks(
         let Some((pixel, patch)) = detector.take_best(pyramid, &criteria) else { break };
         let Some((bearing, warp)) = unproject(camera, &pixel) else { continue };
         let covariance = warp * warp.transpose() * settings.patches.pixel_sigma.powi(2);
+        let (bearing, delayed) = landmarks::at_stamp(estimator, bearing, warp, shutter.delay(&pixel), None);
+        let covariance = covariance + delayed;
         match stereo.and_then(|stereo| stereo.initial_distance(&patch, (&bearing, &warp), settings)) {
             Some(measured) => landmarks::add_with_distance(estimator, bearing, warp, &covariance, measured),
             None => landmarks::add(estimator, bearing, warp, &covariance),

@@ -34,24 +34,35 @@ pub(crate) struct BeforeImage {
     attitude: Matrix3<f64>,
 }
 
+/// What an image has corrected, each with the covariance `P⁻ − P⁺` that it has if all is as modelled.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Correction {
+    pub(crate) attitude: (Vector3<f64>, Matrix3<f64>),
+    pub(crate) velocity: (Vector3<f64>, Matrix3<f64>),
+}
+
 impl BeforeImage {
     pub(crate) fn new(estimator: &Estimator) -> Self {
         let [velocity, attitude] = blocks(estimator);
         Self { core: estimator.state.core, velocity, attitude }
     }
+
+    /// What has been corrected since.
+    pub(crate) fn correction(&self, estimator: &Estimator) -> Correction {
+        let now = &estimator.state.core;
+        let [velocity, attitude] = blocks(estimator);
+        let turned = so3::log(&(now.attitude * self.core.attitude.inverse()));
+        Correction {
+            attitude: (turned, self.attitude - attitude),
+            velocity: (now.velocity - self.core.velocity, self.velocity - velocity),
+        }
+    }
 }
 
 impl InnovationAdaptation {
     /// Learns from the corrections of an image; `max_factor` bounds the factors.
-    pub(crate) fn update(&mut self, before: &BeforeImage, estimator: &Estimator, max_factor: f64) {
-        let now = &estimator.state.core;
-        let [velocity, attitude] = blocks(estimator);
-        let turned = so3::log(&(now.attitude * before.core.attitude.inverse()));
-        let ratios = [
-            squared_length(&turned, &(before.attitude - attitude)),
-            squared_length(&(now.velocity - before.core.velocity), &(before.velocity - velocity)),
-        ];
-        self.learn(ratios, max_factor);
+    pub(crate) fn update(&mut self, correction: &Correction, max_factor: f64) {
+        self.learn([&correction.attitude, &correction.velocity].map(squared_length), max_factor);
     }
 
     /// From the squared lengths of the corrections of attitude and velocity, in units of their covariance.
@@ -75,7 +86,7 @@ fn blocks(estimator: &Estimator) -> [Matrix3<f64>; 2] {
 }
 
 /// `dᵀ G⁻¹ d`; `None` where an image corrected nothing.
-fn squared_length(d: &Vector3<f64>, gain: &Matrix3<f64>) -> Option<f64> {
+fn squared_length((d, gain): &(Vector3<f64>, Matrix3<f64>)) -> Option<f64> {
     let length = d.dot(&gain.cholesky()?.solve(d));
     length.is_finite().then_some(length)
 }

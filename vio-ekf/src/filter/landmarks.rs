@@ -21,6 +21,30 @@ pub(crate) fn add(estimator: &mut Estimator, bearing: Bearing, warp: Matrix2<f64
     estimator.covariance.add_row(row, 1.0, error_state::DEPTH_PRIOR);
 }
 
+/// The bearing at the time of an image's stamp of what was seen some seconds later, in a row of its own, and what not knowing the distance
+/// adds to its covariance. `distance` is the inverse distance and its variance, those of a new landmark if it is not known.
+pub(crate) fn at_stamp(
+    estimator: &Estimator,
+    bearing: Bearing,
+    warp: Matrix2<f64>,
+    delay: f64,
+    distance: Option<(f64, f64)>,
+) -> (Bearing, Matrix2<f64>) {
+    if delay == 0.0 {
+        return (bearing, Matrix2::zeros());
+    }
+    let (value, variance) = distance.unwrap_or_else(|| {
+        let expected = estimator.state.depth_prior.value;
+        let shared = estimator.covariance.variance(error_state::DEPTH_PRIOR);
+        (expected, estimator.landmarks.own_variance(expected) + shared)
+    });
+    let at =
+        |value: f64| estimator.bearing_rate(&Landmark { bearing, inverse_distance: InverseDistance::new(value), warp });
+    let (rate, by_distance) = (at(value), (at(value) - at(0.0)) / value.max(f64::MIN_POSITIVE));
+    let shift = by_distance * delay;
+    (bearing.boxplus(&(rate * -delay)), shift * shift.transpose() * variance)
+}
+
 /// Adds a landmark whose inverse distance has been measured, with a variance, which is a measurement of the shared depth prior too.
 pub(crate) fn add_with_distance(
     estimator: &mut Estimator,

@@ -7,6 +7,7 @@ use super::point_observation::PointObservation;
 use super::report::FrameReport;
 use super::settings::Settings;
 use super::state::landmark::unproject;
+use super::state::rolling_shutter::RollingShutter;
 use super::tracking_state::{LandmarkTrack, TrackingState};
 use crate::CameraModel;
 
@@ -19,6 +20,7 @@ pub(crate) fn update_with_points(
     report: &mut FrameReport,
 ) {
     let offset = tracking.estimator.state.time_offset;
+    let shutter = RollingShutter::new(camera, settings);
     for track in &mut tracking.tracks {
         track.in_view = false;
     }
@@ -37,6 +39,7 @@ pub(crate) fn update_with_points(
             landmark,
             rate: estimator.bearing_rate(&landmark),
             time_offset_error: estimator.state.time_offset - offset,
+            delay: shutter.delay(&point.pixel),
             camera,
             landmarks: &settings.landmarks,
             update: &settings.update,
@@ -70,6 +73,7 @@ pub(crate) fn add_points(
     settings: &Settings,
 ) -> usize {
     let before = tracking.tracks.len();
+    let shutter = RollingShutter::new(camera, settings);
     for point in points {
         if tracking.tracks.len() == settings.landmarks.max_count {
             break;
@@ -79,7 +83,9 @@ pub(crate) fn add_points(
         }
         let Some((bearing, warp)) = unproject(camera, &point.pixel) else { continue };
         let covariance = warp * warp.transpose() * settings.landmarks.pixel_sigma.powi(2);
-        landmarks::add(&mut tracking.estimator, bearing, warp, &covariance);
+        let (bearing, delayed) =
+            landmarks::at_stamp(&tracking.estimator, bearing, warp, shutter.delay(&point.pixel), None);
+        landmarks::add(&mut tracking.estimator, bearing, warp, &(covariance + delayed));
         tracking.tracks.push(LandmarkTrack::new(point.id, None));
     }
     tracking.tracks.len() - before

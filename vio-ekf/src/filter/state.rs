@@ -4,4 +4,5 @@ pub(crate) mod bearing;
 pub mod error_state;
 pub(crate) mod inverse_distance;
 pub(crate) mod landmark;
+pub(crate) mod rolling_shutter;
 pub(crate) mod vio_state;

@@ -1,10 +1,14 @@
 //! A filter that has been initialised: the estimator, and what is remembered of each landmark besides its state.
 
+use nalgebra::Vector3;
+
+use super::accel_matrix_selection::{AccelMatrixSelection, prior_sigma};
 use super::estimator::Estimator;
 use super::frontend::patch::Patch;
 use super::innovation_adaptation::{BeforeImage, InnovationAdaptation};
 use super::landmarks;
 use super::settings::PatchSettings;
+use crate::core::imu_noise_estimator::{AccelMatrixEstimation, ImuSettings};
 use crate::{CameraModel, Imu, Stamp};
 
 /// What is remembered of a landmark besides its state.
@@ -35,16 +39,24 @@ pub(crate) struct TrackingState {
     pub(crate) estimator: Estimator,
     pub(crate) tracks: Vec<LandmarkTrack>,
     innovations: InnovationAdaptation,
+    accel_matrix_selection: AccelMatrixSelection,
+    /// Whether the body has been at rest since the initialization.
+    pub(crate) rested: bool,
     /// Memory for ordering landmarks.
     pub(crate) ranking: Vec<f64>,
 }
 
 impl TrackingState {
-    pub(crate) fn new(estimator: Estimator, max_count: usize) -> Self {
+    pub(crate) fn new(mut estimator: Estimator, max_count: usize, imu: &ImuSettings) -> Self {
+        if imu.accel_matrix == AccelMatrixEstimation::Always {
+            estimator.estimate_accel_matrix(&prior_sigma(imu, 1.0), &Vector3::zeros());
+        }
         Self {
             estimator,
             tracks: Vec::with_capacity(max_count),
             innovations: InnovationAdaptation::default(),
+            accel_matrix_selection: AccelMatrixSelection::Waiting,
+            rested: false,
             ranking: Vec::with_capacity(max_count),
         }
     }
@@ -70,10 +82,22 @@ impl TrackingState {
         before - tracks.len()
     }
 
-    /// Lets the noise of the inertial sensor follow what an image has corrected.
-    pub(crate) fn adapt_imu_noise(&mut self, before: &BeforeImage, max_factor: f64) {
-        self.innovations.update(before, &self.estimator, max_factor);
-        self.estimator.buffer.set_noise_factors(self.innovations.factors());
+    /// Lets noise and matrix of the inertial sensor follow what an image has corrected.
+    pub(crate) fn adapt_imu(&mut self, before: &BeforeImage, settings: &ImuSettings) {
+        let Self { estimator, innovations, .. } = self;
+        innovations.update(&before.correction(estimator), settings.max_innovation_inflation);
+        estimator.buffer.set_noise_factors(innovations.factors());
+        self.select_accel_matrix(before, settings);
+    }
+
+    /// The matrix alone.
+    pub(crate) fn select_accel_matrix(&mut self, before: &BeforeImage, settings: &ImuSettings) {
+        let Self { estimator, innovations, accel_matrix_selection, rested, .. } = self;
+        let correction = before.correction(estimator);
+        if settings.accel_matrix == AccelMatrixEstimation::WhenNeeded {
+            let evidence = (innovations.factors()[1], *rested);
+            accel_matrix_selection.update(&correction, evidence, estimator, settings);
+        }
     }
 
     /// Process noise of the templates over some seconds.

@@ -1,8 +1,9 @@
 //! The odometry as its callers see it, and one image as the steps of the algorithm.
 
+use crate::trace::{event, span};
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Unit, Vector2};
+use nalgebra::{Isometry3, Matrix3, Unit, Vector2, Vector3};
 
 use super::divergence_monitor::DivergenceMonitor;
 use super::estimator::Estimator;
@@ -25,6 +26,7 @@ use super::point_tracking::{add_points, drop_points, update_with_points};
 use super::report::{Calibration, FrameReport, InitializationStatus, LandmarkEstimate, Status};
 use super::settings::Settings;
 use super::state::error_state;
+use super::state::rolling_shutter::RollingShutter;
 use super::stationary::detector::StationaryDetector;
 use super::stationary::zero_velocity::{inflate_undetected_motion, zero_velocity_propagate};
 use super::stereo::stereo_camera::StereoCamera;
@@ -35,7 +37,7 @@ use crate::core::initial_state::InitialState;
 use crate::core::odometry::Odometry;
 use crate::error::invalid;
 use crate::format::calibration::{CameraCalibration, ImuCalibration};
-use crate::{CameraModel, Error, ImageView, Imu, ImuNoise, Stamp};
+use crate::{CameraModel, Error, ImageView, Imu, ImuNoise, Stamp, so3};
 
 /// A measurement this much ahead of the inertial samples, in seconds, is waiting for data that does not come.
 const MAX_AHEAD: f64 = 0.1;
@@ -142,13 +144,18 @@ impl Vio {
         settings: Settings,
     ) -> Result<Self, Error> {
         let mono = Self::new(first, noise, settings)?;
+        if settings.calibration.row_time_s != 0.0 {
+            let rule = "must be 0 with a second camera: rolling shutters are known of one camera alone";
+            return Err(invalid("row_time_s", settings.calibration.row_time_s, rule));
+        }
         let stereo = StereoCamera::new(mono.camera.as_ref(), Arc::new(second), &settings.patches)?;
         Ok(Self { stereo: Some(stereo), ..mono })
     }
 
     /// From a calibration as Kalibr and EuRoC folders give it, of one camera or two: the lenses, the noise of the inertial sensor,
     /// and the time offset of the first camera (`timeshift_cam_imu`), which is added to
-    /// [`CalibrationSettings::time_offset_s`](crate::CalibrationSettings::time_offset_s). The filter's body is the inertial sensor:
+    /// [`CalibrationSettings::time_offset_s`](crate::CalibrationSettings::time_offset_s), as the time of a row of its shutter
+    /// (`line_delay`) is to [`row_time_s`](crate::CalibrationSettings::row_time_s). The filter's body is the inertial sensor:
     /// where that is not the body of the calibration, the cameras are moved into its axes.
     ///
     /// Both images of a pair carry one stamp, that of the first camera's clock.
@@ -171,6 +178,7 @@ impl Vio {
             _ => return Err(invalid("cameras", cameras.len() as f64, "must be one or two")),
         };
         settings.calibration.time_offset_s += first.time_offset_s;
+        settings.calibration.row_time_s += first.row_time_s;
         match second {
             Some(second) => Self::stereo(on_imu(first), on_imu(second), imu.noise, settings),
             None => Self::new(on_imu(first), imu.noise, settings),
@@ -183,9 +191,10 @@ impl Vio {
             return Err(Error::TooFew { what: "inertial samples before the initialization", got: 0, need: 1 });
         };
         initial.check(sample.stamp)?;
+        event!(info, stamp = %initial.stamp, "initialised");
         self.reset();
         let estimator = Estimator::new(self.camera.as_ref(), self.noise, &self.settings, initial, sample);
-        self.tracking = Some(TrackingState::new(estimator, self.settings.landmarks.max_count));
+        self.tracking = Some(TrackingState::new(estimator, self.settings.landmarks.max_count, &self.settings.imu));
         self.last_aided = Some(initial.stamp);
         Ok(())
     }
@@ -208,7 +217,10 @@ impl Vio {
 
     /// Takes an inertial sample; stamps must increase.
     pub fn imu(&mut self, sample: &Imu) -> Result<Status, Error> {
-        sample.check_after(self.last_sample.as_ref())?;
+        if let Err(error) = sample.check_after(self.last_sample.as_ref()) {
+            event!(warn, %error, "inertial sample refused");
+            return Err(error);
+        }
         self.last_sample = Some(*sample);
         self.stationary.imu(sample);
         match &mut self.tracking {
@@ -243,6 +255,7 @@ impl Vio {
 
     /// The filter's algorithm for one image.
     fn process_image(&mut self, stamp: Stamp, image: &ImageView) -> Result<FrameReport, Error> {
+        span!("image");
         self.frontend.set_image(image);
         let now = self.now_or(stamp);
         if self.stationary.is_imu_stationary(now) {
@@ -273,12 +286,12 @@ impl Vio {
             align_and_update(tracking, &frontend.pyramid, camera.as_ref(), settings, &mut report);
             // Manage landmarks.
             drop_landmarks(tracking, settings, &mut report);
-            update_templates(tracking, &frontend.pyramid, camera.as_ref(), &settings.patches);
+            update_templates(tracking, &frontend.pyramid, camera.as_ref(), settings);
             if let Some(stereo) = stereo {
                 stereo.update_distances(&mut tracking.estimator, &frontend.pyramid, camera.as_ref(), settings);
             }
             if report.used > 0 {
-                tracking.adapt_imu_noise(&before, settings.imu.max_innovation_inflation);
+                tracking.adapt_imu(&before, &settings.imu);
             }
         }
         let enough = settings.patches.start_detection_ratio * settings.landmarks.max_count as f64;
@@ -307,7 +320,11 @@ impl Vio {
         let Some(lost) = self.propagate_to_image(stamp, stationary)? else { return Ok(report) };
         report.removed = lost;
         if let Self { tracking: Some(tracking), camera, settings, .. } = self {
+            let before = BeforeImage::new(&tracking.estimator);
             update_with_points(tracking, points, camera.as_ref(), settings, &mut report);
+            if report.used > 0 {
+                tracking.select_accel_matrix(&before, &settings.imu);
+            }
             drop_points(tracking, settings, &mut report);
             report.added = add_points(tracking, points, camera.as_ref(), settings);
         }
@@ -454,13 +471,16 @@ impl Vio {
             return Ok(None);
         }
         if time <= state_stamp {
+            event!(warn, %time, now = %state_stamp, "image refused: it is too late");
             return Err(Error::Late { what: "image", stamp: time, now: state_stamp });
         }
         check_time(&tracking.estimator, time, "image")?;
+        span!("propagate");
         let was_stationary = std::mem::replace(&mut self.was_stationary, stationary);
         if !stationary {
             return Ok(Some(tracking.propagate_to(time)));
         }
+        tracking.rested = true;
         let settings = &self.settings.stationary;
         let angle = self.stationary.undetected_angle(self.camera.as_ref());
         zero_velocity_propagate(&mut tracking.estimator, time, settings);
@@ -484,7 +504,16 @@ impl Vio {
             let aided = report.used > 0 || report.stationary || first;
             // Not the time of the state: at rest that stays behind.
             self.last_aided = aided.then(|| tracking.estimator.buffer.now());
+            event!(
+                debug,
+                used = report.used,
+                rejected = report.rejected,
+                removed = report.removed,
+                added = report.added,
+                "image done"
+            );
             if wrong {
+                event!(warn, "start in motion taken back");
                 self.reset();
             }
         }
@@ -549,6 +578,7 @@ impl Vio {
         self.initialize(&initial)?;
         let angle = self.stationary.undetected_angle(self.camera.as_ref());
         if let Some(tracking) = &mut self.tracking {
+            tracking.rested = true;
             stationary_update(&mut tracking.estimator, &mean, angle, &self.settings.stationary);
         }
         Ok(())
@@ -561,7 +591,16 @@ impl Vio {
         let rotation = self.dynamic_initializer.rotation_since_image(time);
         let criteria = DetectionCriteria::from(&self.settings.patches);
         self.klt_tracker.track(rotation, pyramid, (detector, &criteria), self.camera.as_ref());
-        let observed = self.klt_tracker.observations();
+        let shutter = RollingShutter::new(self.camera.as_ref(), &self.settings);
+        let turn =
+            self.camera.body_from_camera().rotation.inverse() * self.last_sample.map_or(Vector3::zeros(), |s| s.gyro);
+        // Each back to the time of the stamp, as far as the gyroscope tells.
+        let observed = self.klt_tracker.observations().map(|(id, direction)| {
+            match self.klt_tracker.pixel(id).map(|pixel| shutter.delay(&pixel)) {
+                Some(delay) if delay != 0.0 => (id, so3::exp(&(turn * delay)) * direction),
+                _ => (id, direction),
+            }
+        });
         let motion = self.dynamic_initializer.image(time, observed, self.camera.as_ref(), self.settings.gravity);
         if let Some(motion) = motion {
             // The reset of the initialization would clear it.
@@ -585,6 +624,7 @@ impl Vio {
         let samples: Vec<Imu> = self.dynamic_initializer.samples().copied().collect();
         let sensors = (self.camera.as_ref(), self.noise, &self.settings);
         let Some(tracking) = from_initialization(sensors, time, motion, &samples, observe) else { return };
+        event!(info, stamp = %time, landmarks = tracking.tracks.len(), "initialised in motion");
         self.reset();
         let ids = tracking.tracks.iter().map(|track| track.id + 1);
         self.frontend.next_id = ids.fold(self.frontend.next_id, u64::max);

@@ -21,6 +21,9 @@ pub struct SimulatedCamera {
     pub time_offset_s: f64,
     /// Standard deviation of the error of a stamp, s; 0. Cut to 0.49 of the interval.
     pub stamp_jitter_s: f64,
+    /// Time from the exposure of a row until that of the row below, s: rolling shutter. 0, a global shutter. The stamp is that of the
+    /// middle row.
+    pub row_time_s: f64,
     /// Chance that a frame is lost; 0.
     pub drop_probability: f64,
 }
@@ -33,6 +36,7 @@ impl Default for SimulatedCamera {
             photometry: Photometry::default(),
             time_offset_s: 0.0,
             stamp_jitter_s: 0.0,
+            row_time_s: 0.0,
             drop_probability: 0.0,
         }
     }
@@ -61,6 +65,11 @@ impl Frame {
 }
 
 impl SimulatedCamera {
+    /// Time from the first to the last row, s.
+    fn readout_s(&self) -> f64 {
+        self.row_time_s.abs() * self.camera.height as f64
+    }
+
     /// Refuses a camera that cannot be, with the field that says so.
     pub fn check(&self) -> Result<(), Error> {
         self.camera.check()?;
@@ -73,6 +82,13 @@ impl SimulatedCamera {
         }
         if self.photometry.exposure_s * self.rate_hz > 1.0 {
             return Err(invalid("exposure_s", self.photometry.exposure_s, "must not exceed the time between frames"));
+        }
+        if self.row_time_s.is_nan() || self.readout_s() * self.rate_hz > 1.0 {
+            return Err(invalid(
+                "row_time_s",
+                self.row_time_s,
+                "must be finite, and all rows shorter than the time between frames",
+            ));
         }
         if self.time_offset_s.is_nan() || self.time_offset_s.abs() >= 1e6 {
             return Err(invalid("time_offset_s", self.time_offset_s, "must be finite and below a million seconds"));
@@ -101,7 +117,7 @@ pub(super) struct Renderer {
 impl Renderer {
     pub(super) fn new(model: SimulatedCamera, spline: &Spline, seed: u64) -> Result<Self, Error> {
         model.check()?;
-        let half_exposure = (model.photometry.exposure_s * 0.5e9).ceil() as i64;
+        let half_exposure = ((model.photometry.exposure_s + model.readout_s()) * 0.5e9).ceil() as i64;
         let (start, end) = spline.span();
         let first = Stamp::from_nanos(start.nanos() + half_exposure);
         let last = Stamp::from_nanos(end.nanos() - half_exposure);
@@ -146,20 +162,30 @@ impl Renderer {
         let since = middle.secs_since(spline.span().0);
         let poses = self.model.photometry.poses;
         let occluder = room.occluder_at(since);
-        let mut views = Vec::with_capacity(poses);
-        for k in 0..poses {
-            let share = (k as f64 + 0.5) / poses as f64 - 0.5;
-            let stamp = middle.nanos() + (share * self.model.photometry.exposure_s * 1e9) as i64;
-            let world_from_camera: Isometry3<f64> =
-                spline.sample(Stamp::from_nanos(stamp))?.world_from_body * body_from_camera;
-            views.push(View::new(room, occluder.as_ref(), &world_from_camera, k, poses));
-        }
+        let views_at = |delay: f64| -> Result<Vec<View>, Error> {
+            let view = |k: usize| {
+                let share = (k as f64 + 0.5) / poses as f64 - 0.5;
+                let stamp = middle.nanos() + ((share * self.model.photometry.exposure_s + delay) * 1e9) as i64;
+                let motion = spline.sample(Stamp::from_nanos(stamp))?;
+                let rate = body_from_camera.rotation.inverse() * motion.rate_in_body;
+                let world_from_camera: Isometry3<f64> = motion.world_from_body * body_from_camera;
+                // Within a tile the rows are a turn apart.
+                let turn_per_row = rate * self.model.row_time_s;
+                Ok(View::new(room, occluder.as_ref(), (&world_from_camera, &turn_per_row), k, poses))
+            };
+            (0..poses).map(view).collect()
+        };
+        let mut views = views_at(0.0)?;
         let sensor: Sensor = self.model.photometry.sensor(since, derive(self.seed, 2 * index as u64 + 1));
         let (columns, _) = tiling(&self.model.camera);
         data.clear();
         data.resize(width * height, 0);
         for (tile, (rays, light)) in self.tiles.iter().enumerate() {
             let mut radiance = [0.0; TILE];
+            if self.model.row_time_s != 0.0 && tile % columns == 0 {
+                let row = (tile / columns * TILE_HEIGHT) as f64 + 0.5 * (TILE_HEIGHT as f64 - 1.0);
+                views = views_at((row - 0.5 * (height as f64 - 1.0)) * self.model.row_time_s)?;
+            }
             for view in &views {
                 view.add_tile(rays, &mut radiance);
             }

@@ -81,6 +81,8 @@ struct Body<'a> {
 /// A room seen from one pose.
 pub(super) struct View<'a> {
     world_from_camera: Matrix3<f32>,
+    /// By how much the camera turns from row to row, in its own axes; zero with a global shutter.
+    turn_per_row: Vector3<f32>,
     /// The walls, then everything in them.
     bodies: Vec<Body<'a>>,
     /// Where in the pixel this pose samples, pixels from its centre.
@@ -94,7 +96,7 @@ impl<'a> View<'a> {
     pub(super) fn new(
         room: &'a Room,
         moving: Option<&Cuboid>,
-        world_from_camera: &Isometry3<f64>,
+        (world_from_camera, turn_per_row): (&Isometry3<f64>, &Vector3<f64>),
         index: usize,
         count: usize,
     ) -> Self {
@@ -107,6 +109,7 @@ impl<'a> View<'a> {
         let place = |cell: usize| ((cell as f64 + 0.5) * share - 0.5) as f32;
         Self {
             world_from_camera: world_from_camera.rotation.to_rotation_matrix().into_inner().cast(),
+            turn_per_row: turn_per_row.cast(),
             bodies,
             offset: Vector2::new(place(index), place(row)),
             dither: (index as f32 * share as f32, share as f32),
@@ -124,7 +127,17 @@ impl<'a> View<'a> {
 
     fn in_world(&self, rays: &TileRays) -> [[f32; TILE]; 3] {
         let shift = rays.per_column * self.offset.x + rays.per_row * self.offset.y;
-        let [x, y, z] = &rays.directions;
+        let mut directions = rays.directions;
+        if self.turn_per_row != Vector3::zeros() {
+            let [xs, ys, zs] = &mut directions;
+            for (i, ((x, y), z)) in xs.iter_mut().zip(ys).zip(zs).enumerate() {
+                let rows = (i / TILE_WIDTH) as f32 - 0.5 * (TILE_HEIGHT as f32 - 1.0);
+                let d = Vector3::new(*x, *y, *z);
+                let turned = d + self.turn_per_row.cross(&d) * rows;
+                (*x, *y, *z) = (turned.x, turned.y, turned.z);
+            }
+        }
+        let [x, y, z] = &directions;
         std::array::from_fn(|axis| {
             let r = self.world_from_camera.row(axis);
             let (r0, r1, r2) = (r[0], r[1], r[2]);

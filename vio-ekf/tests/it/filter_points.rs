@@ -124,6 +124,7 @@ fn finds_the_cameras_place_and_clock() {
             time_offset_s: 0.0,
             time_offset_sigma_s: 0.01,
             stamp_jitter_s: 0.0,
+            ..CalibrationSettings::default()
         };
         let vio =
             flight.run_with(assumed, &Settings { calibration, ..Settings::default() }, &start, |_, _, _| ()).unwrap();

@@ -22,12 +22,18 @@ mod fusion_input;
 mod imu_pair;
 mod imu_validation;
 mod lie;
+mod max_measured;
 mod memory;
 #[cfg(feature = "yaml")]
 mod recordings;
+mod rolling_shutter;
 mod sim;
+#[cfg(feature = "yaml")]
+mod sphere_models;
 mod spline;
 mod support;
+#[cfg(feature = "tracing")]
+mod tracing;
 #[cfg(feature = "tune")]
 mod tune;
 mod unified;

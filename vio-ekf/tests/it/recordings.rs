@@ -106,7 +106,7 @@ fn what_is_written_is_read_back() {
     for distortion in [Distortion::RadTan([-0.28, 0.07, 1.9e-4, 1.7e-5]), Distortion::Equidistant([0.1, 0.2, 0.3, 0.4])]
     {
         let camera = Camera { distortion, body_from_camera, ..Camera::euroc() };
-        let calibration = CameraCalibration { camera, rate_hz: Some(20.0), time_offset_s: 0.0 };
+        let calibration = CameraCalibration { camera, rate_hz: Some(20.0), time_offset_s: 0.0, row_time_s: 0.0 };
         let back = read_asl_camera(&write_asl_camera(&calibration)).unwrap();
         assert_eq!((back.camera.distortion, back.camera.fx, back.rate_hz), (distortion, camera.fx, Some(20.0)));
         let error = back.camera.body_from_camera.inverse() * body_from_camera;
@@ -134,7 +134,7 @@ fn what_is_wrong_is_named() {
     };
     let spoilt = |from: &str, to: &str| read_kalibr_cameras(&KALIBR.replacen(from, to, 1)).unwrap_err();
     has(spoilt("[0.0, -1.0, 0.0, 0.25]", "[0.0, -1.1, 0.0, 0.25]"), &["cam0.T_cam_imu", "line 4", "rigid"]);
-    has(spoilt("pinhole", "omni"), &["cam0.camera_model", "line 9", "`omni`", "pinhole", "CameraModel"]);
+    has(spoilt("pinhole", "scaramuzza"), &["cam0.camera_model", "line 9", "`scaramuzza`", "pinhole", "CameraModel"]);
     has(spoilt("T_cam_imu", "T_cn_cnm1"), &["cam0.T_cam_imu", "line 3", "camchain-imucam"]);
     has(
         spoilt("  rostopic: /cam0/image_raw#1\n  timeshift_cam_imu: -0.0125\n", "  timeshift_cam_imu: late\n"),
@@ -262,7 +262,8 @@ fn folders_of_our_own_are_read() {
         .iter()
         .map(|stamp| Imu { stamp: *stamp, gyro: Vector3::z() * 0.5, accel: Vector3::new(0.0, 0.5, 9.81) })
         .collect();
-    let camera = CameraCalibration { camera: Camera::euroc(), rate_hz: Some(20.0), time_offset_s: 0.0 };
+    let camera =
+        CameraCalibration { camera: Camera::euroc(), rate_hz: Some(20.0), time_offset_s: 0.0, row_time_s: 0.0 };
     let imu = ImuCalibration { noise: ImuNoise::default(), rate_hz: 50.0, body_from_imu: Isometry3::identity() };
     put("mav0/cam0/sensor.yaml", &write_asl_camera(&camera));
     put("mav0/cam0/data.csv", &asl::write_images(truth.stamps().iter().map(|stamp| (*stamp, "0.png"))));

@@ -8,7 +8,7 @@ use vio_ekf::Camera;
 use vio_ekf::sim::{RoomSettings, Scenario, SimulatedCamera};
 
 /// A flight seen by a small camera, so that the tests stay short.
-pub(super) fn flight(seconds: f64, raw: bool) -> SimulationSettings {
+pub(crate) fn flight(seconds: f64, raw: bool) -> SimulationSettings {
     let euroc = Camera::euroc();
     let camera = Camera { width: 376, height: 240, fx: 229.3, fy: 228.6, cx: 183.4, cy: 123.9, ..euroc };
     let room = RoomSettings { texture_size: 512, ..RoomSettings::default() };

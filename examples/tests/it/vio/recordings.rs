@@ -6,13 +6,11 @@ use paintcopter_examples::vio::{
     Images, Overrides, Recording, RunSettings, SimulationSettings, camera_frames, evaluate_run, open_euroc,
     open_euroc_stereo, open_mcap, open_mcap_stereo, run, simulate,
 };
-use rand_xoshiro::SplitMix64;
-use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 use vio_ekf::sim::SimulatedCamera;
-use vio_ekf::{Camera, Distortion, Stamp};
+use vio_ekf::{Camera, Stamp};
 
 use super::fixtures::{edit, flight, vio};
-use crate::bags::{put, put_blob, recompress, ros_header};
+use crate::bags::{recompress, write_kalibr_files, write_ros2_bag};
 use crate::scratch::Scratch;
 
 fn follow(recording: &Recording, threads: usize) -> String {
@@ -108,59 +106,6 @@ fn a_second_camera_in_mcap_is_that_of_the_folder() {
     assert!(error.contains("--stereo needs two") && error.contains("/camera/image"), "{error}");
 }
 
-/// Files with bytes changed, cut out, cut off and put in are read or refused, and nothing else: `MUTATIONS` is how many (500); a
-/// million with `MUTATIONS=1000000 cargo test --release -p paintcopter-examples --all-features --test it mutated_recordings`.
-#[test]
-fn mutated_recordings_never_panic() {
-    let count: u64 = std::env::var("MUTATIONS").map_or(500, |text| text.parse().unwrap());
-    let s = Scratch::new("mutated");
-    let tiny = |raw: bool| {
-        let mut settings = flight(1.0, raw);
-        let model = &mut settings.scenario.cameras[0];
-        model.camera = Camera { width: 32, height: 24, fx: 20.0, fy: 20.0, cx: 15.5, cy: 11.5, ..model.camera };
-        // Few of both, so that a mutation meets every kind of record.
-        model.rate_hz = 4.0;
-        settings.scenario.imus[0].rate_hz = 20.0;
-        simulate(&settings, &s.0).unwrap();
-        std::fs::read(s.0.join("recording.mcap")).unwrap()
-    };
-    let mut originals = vec![tiny(true), tiny(false)];
-    for compression in ["lz4", "zstd"] {
-        recompress(&s.0.join("recording.mcap"), &s.0.join("packed.mcap"), compression);
-        originals.push(std::fs::read(s.0.join("packed.mcap")).unwrap());
-    }
-    let mut generator = SplitMix64::seed_from_u64(7);
-    let mut random = move |below: usize| (generator.next_u64() % below.max(1) as u64) as usize;
-    let file = s.0.join("mutated.mcap");
-    let (mut read, mut images, mut slowest) = (0, 0, std::time::Duration::ZERO);
-    for k in 0..count {
-        let mut bytes = originals[k as usize % originals.len()].clone();
-        for _ in 0..=random(3) {
-            let at = random(bytes.len());
-            match random(5) {
-                0 => bytes[at] = random(256) as u8,
-                1 => bytes[at] ^= 1 << random(8),
-                // Lengths and counts: eight bytes of ones.
-                2 => bytes.iter_mut().skip(at).take(8).for_each(|byte| *byte = 0xff),
-                3 => drop(bytes.drain(at..(at + 1 + random(16)).min(bytes.len()))),
-                _ => bytes.truncate(at.max(1)),
-            }
-            if bytes.is_empty() {
-                break;
-            }
-        }
-        std::fs::write(&file, &bytes).unwrap();
-        let began = std::time::Instant::now();
-        if let Ok(recording) = open_mcap(&file, &Overrides::default()) {
-            read += 1;
-            images += camera_frames(&recording).take(100).filter(|frame| frame.picture.is_ok()).count();
-        }
-        slowest = slowest.max(began.elapsed());
-    }
-    eprintln!("{read} of {count} are read, with {images} images; the slowest took {slowest:?}");
-    assert!(read > 0 && read < count, "{read} of {count}");
-}
-
 /// A record that claims to be longer than any file asks for no memory.
 #[test]
 fn lengths_that_cannot_be_are_refused() {
@@ -194,81 +139,11 @@ fn a_bag_of_ros_2_is_read_like_the_folder() {
     let frames: Vec<_> = camera_frames(&folder).collect();
     assert_eq!(frames.len(), simulated.frames);
     let camera = folder.camera.camera;
-    let t = camera.body_from_camera.inverse().to_homogeneous();
-    let rows: Vec<String> = t.row_iter().map(|r| format!("  - [{}, {}, {}, {}]", r[0], r[1], r[2], r[3])).collect();
-    let Distortion::RadTan([k1, k2, p1, p2]) = camera.distortion else { panic!("another camera") };
-    let yaml = format!(
-        "cam0:\n  T_cam_imu:\n{}\n  camera_model: pinhole\n  distortion_model: radtan\n  distortion_coeffs: [{k1}, {k2}, {p1}, \
-         {p2}]\n  intrinsics: [{}, {}, {}, {}]\n  resolution: [{}, {}]\n  timeshift_cam_imu: 0.004\n",
-        rows.join("\n"),
-        camera.fx,
-        camera.fy,
-        camera.cx,
-        camera.cy,
-        camera.width,
-        camera.height
-    );
-    s.write("cameras.yaml", yaml);
-    let noise = folder.imu.noise;
-    s.write(
-        "imu.yaml",
-        format!(
-            "rostopic: /imu\nupdate_rate: 200.0\ngyroscope_noise_density: {}\ngyroscope_random_walk: {}\n\
-             accelerometer_noise_density: {}\naccelerometer_random_walk: {}\n",
-            noise.gyro_density, noise.gyro_walk, noise.accel_density, noise.accel_walk
-        ),
-    );
+    write_kalibr_files(&s, &folder);
     let overrides = Overrides { cameras: Some(s.0.join("cameras.yaml")), imu: Some(s.0.join("imu.yaml")), truth: None };
     for compressed in [false, true] {
         let file = s.0.join("bag_0.mcap");
-        let mut writer = mcap::WriteOptions::new()
-            .compression(None)
-            .profile("ros2")
-            .create(std::io::BufWriter::new(std::fs::File::create(&file).unwrap()))
-            .unwrap();
-        let name = if compressed { "sensor_msgs/msg/CompressedImage" } else { "sensor_msgs/msg/Image" };
-        let mut channel = |topic: &str, schema: &str| {
-            let schema = writer.add_schema(schema, "ros2msg", b"").unwrap();
-            writer.add_channel(schema, topic, "cdr", &std::collections::BTreeMap::new()).unwrap()
-        };
-        let channels = [channel("/imu/data", "sensor_msgs/msg/Imu"), channel("/camera/image", name)];
-        let mut write = |channel: usize, stamp: Stamp, data: &[u8]| {
-            let time = stamp.nanos() as u64;
-            let header = mcap::records::MessageHeader {
-                channel_id: channels[channel],
-                sequence: 0,
-                log_time: time,
-                publish_time: time,
-            };
-            writer.write_to_known_channel(&header, data).unwrap();
-        };
-        for sample in &folder.samples {
-            let mut bytes = ros_header(sample.stamp, "imu_link");
-            let numbers = [&[0.0; 13][..], sample.gyro.as_slice(), &[0.0; 9], sample.accel.as_slice(), &[0.0; 9]];
-            numbers.iter().flat_map(|part| part.iter()).for_each(|v| put(&mut bytes, v.to_le_bytes()));
-            write(0, sample.stamp, &bytes);
-        }
-        for frame in &frames {
-            let grey = frame.picture.as_ref().unwrap();
-            let mut bytes = ros_header(frame.stamp, "camera");
-            if compressed {
-                let mut png = std::io::Cursor::new(Vec::new());
-                let image =
-                    image::GrayImage::from_raw(grey.width as u32, grey.height as u32, grey.data.clone()).unwrap();
-                image.write_to(&mut png, image::ImageFormat::Png).unwrap();
-                put_blob(&mut bytes, b"png\0");
-                put_blob(&mut bytes, png.get_ref());
-            } else {
-                put(&mut bytes, (grey.height as u32).to_le_bytes());
-                put(&mut bytes, (grey.width as u32).to_le_bytes());
-                put_blob(&mut bytes, b"mono8\0");
-                bytes.push(0);
-                put(&mut bytes, (grey.width as u32).to_le_bytes());
-                put_blob(&mut bytes, &grey.data);
-            }
-            write(1, frame.stamp, &bytes);
-        }
-        writer.finish().unwrap();
+        write_ros2_bag(&file, &folder.samples, &frames, compressed);
         let bag = open_mcap(&file, &overrides).unwrap();
         assert_eq!((&bag.samples, bag.images.count()), (&folder.samples, frames.len()));
         assert_eq!(bag.camera.time_offset_s, 0.004);

@@ -326,3 +326,67 @@ fn real_images_at_rest_do_not_drift() {
         assert!(nees < 16.3, "{nees}");
     }
 }
+
+/// A double-sphere lens, from Kalibr's file into the rendered recording and from there into the filter; and a rolling shutter.
+#[test]
+fn a_wide_lens_with_a_rolling_shutter_is_rendered_and_followed() {
+    let s = Scratch::new("wide");
+    s.write(
+        "ds.yaml",
+        "cam0:\n  camera_model: ds\n  intrinsics: [-0.172, 0.593, 120.0, 120.0, 187.5, 119.5]\n  distortion_model: none\n  \
+         distortion_coeffs: []\n  resolution: [376, 240]\n  T_cam_imu:\n  - [0.0, 1.0, 0.0, 0.0]\n  - [-1.0, 0.0, 0.0, 0.0]\n  \
+         - [0.0, 0.0, 1.0, 0.0]\n  - [0.0, 0.0, 0.0, 1.0]\n",
+    );
+    let (out, chain) = (s.path("sim"), s.path("ds.yaml"));
+    let sim = vio(&["sim", "--cameras", &chain, "--readout", "0.02", "--seconds", "8"], Path::new(&out));
+    assert!(sim.status.success(), "{}", String::from_utf8_lossy(&sim.stderr));
+    let recording = open_euroc(Path::new(&out), &Overrides::default()).unwrap();
+    assert_eq!(recording.camera.camera.distortion, vio_ekf::Distortion::DoubleSphere([-0.172, 0.593]));
+    assert!((recording.camera.row_time_s - 0.02 / 240.0).abs() < 1e-12);
+    let follow = |recording| {
+        let run = run(recording, &RunSettings { quiet: true, ..RunSettings::default() }).unwrap();
+        evaluate_run(&run, recording.truth.as_ref().unwrap()).unwrap().unwrap().ate_se3
+    };
+    let known = follow(&recording);
+    let mut ignored = recording.clone();
+    ignored.camera.row_time_s = 0.0;
+    let ignored = follow(&ignored);
+    assert!(known < 0.03 && ignored > 1.5 * known, "{known} {ignored}");
+}
+
+/// Dead reckoning, with no image in the folder.
+#[test]
+fn inertial_samples_alone_are_carried_on_and_said_to_be() {
+    let s = Scratch::new("inertial");
+    simulate(&flight(6.0, false), &s.0).unwrap();
+    std::fs::remove_dir_all(s.0.join("mav0/cam0")).unwrap();
+    let folder = s.0.to_str().unwrap();
+    let out = s.0.join("out");
+    let ran = vio(&["inertial", "--euroc", folder, "--seconds", "4"], &out);
+    let said = String::from_utf8_lossy(&ran.stderr).into_owned();
+    assert!(ran.status.success() && said.contains("dead reckoning, inertial samples alone"), "{said}");
+    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(out.join("report.json")).unwrap()).unwrap();
+    let figure = |name: &str| report[name].as_f64().unwrap();
+    assert_eq!(report["mode"], "dead reckoning");
+    assert!((figure("duration_s") - 4.0).abs() < 0.02, "{report}");
+    // A start that is 5 cm/s and 0.1 m/s² off admits 1.5 m after four seconds; this one is exact.
+    assert!(figure("position_error_end_m") < 0.1 && (0.5..2.0).contains(&figure("position_sigma_end_m")), "{report}");
+    let poses = vio_ekf::tum::read(&std::fs::read_to_string(out.join("trajectory.tum")).unwrap()).unwrap();
+    let states = std::fs::read_to_string(out.join("states.csv")).unwrap();
+    assert_eq!((poses.len(), states.lines().count()), (800, 801));
+
+    // A start of one's own; one without velocity, and one from another day.
+    let row = std::fs::read_to_string(s.0.join("mav0/state_groundtruth_estimate0/data.csv")).unwrap();
+    let row = row.lines().nth(300).unwrap().split(',').collect::<Vec<_>>();
+    s.write("start.csv", row[..11].join(","));
+    let start = |name: &str| {
+        let ran = vio(&["inertial", "--euroc", folder, "--start", &s.path(name)], &out);
+        (ran.status.code(), String::from_utf8_lossy(&ran.stderr).into_owned())
+    };
+    assert_eq!(start("start.csv").0, Some(0));
+    s.write("pose.csv", row[..8].join(","));
+    assert!(start("pose.csv").1.contains("has no velocity"));
+    s.write("early.csv", format!("1{}", &row[..11].join(",")[2..]));
+    let (code, said) = start("early.csv");
+    assert!(code == Some(1) && said.contains("between the first and the last inertial sample"), "{said}");
+}

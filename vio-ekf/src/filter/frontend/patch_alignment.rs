@@ -14,6 +14,7 @@ use crate::filter::measurements::patch::PatchMeasurement;
 use crate::filter::measurements::update::{linearize_iterated, passes_gate};
 use crate::filter::settings::Settings;
 use crate::filter::state::error_state;
+use crate::filter::state::rolling_shutter::RollingShutter;
 
 /// Spacing of the initial guesses, in pixels of the patch's coarsest level: half of the alignment's region of convergence.
 const GUESS_SPACING: f64 = 1.0;
@@ -54,6 +55,7 @@ pub(crate) fn align_patch(
         rate,
         time_offset_error,
         camera,
+        shutter: RollingShutter::new(camera, settings),
         settings: &settings.patches,
         coarse: Cell::new(true),
         last_step: Cell::default(),

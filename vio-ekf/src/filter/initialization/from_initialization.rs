@@ -36,7 +36,7 @@ pub(crate) fn from_initialization(
         sigma: InitialSigma::default(),
     };
     let estimator = Estimator::new(camera, noise, settings, &initial, *before);
-    let mut tracking = TrackingState::new(estimator, settings.landmarks.max_count);
+    let mut tracking = TrackingState::new(estimator, settings.landmarks.max_count, &settings.imu);
     let TrackingState { estimator, tracks, .. } = &mut tracking;
     let pixel_sigma = settings.dynamic_initialization.pixel_sigma;
     set_core_covariance(estimator, motion);

@@ -11,7 +11,8 @@ use crate::filter::frontend::patch::{Comparison, Patch};
 use crate::filter::frontend::pyramid::Pyramid;
 use crate::filter::settings::PatchSettings;
 use crate::filter::state::error_state::bearing_and_time;
-use crate::filter::state::landmark::{Landmark, project};
+use crate::filter::state::landmark::Landmark;
+use crate::filter::state::rolling_shutter::RollingShutter;
 
 /// A patch in an image. The residual is whitened by the square root of the normal matrix of its alignment, so that the 72 pixels of
 /// both levels become two values, whatever the warp.
@@ -29,6 +30,7 @@ pub(crate) struct PatchMeasurement<'a> {
     /// Change of the time offset since the state was propagated to the image, s.
     pub(crate) time_offset_error: f64,
     pub(crate) camera: &'a dyn CameraModel,
+    pub(crate) shutter: RollingShutter,
     pub(crate) settings: &'a PatchSettings,
     /// Whether only the coarsest level is compared, which reaches farther.
     pub(crate) coarse: Cell<bool>,
@@ -41,7 +43,7 @@ impl PatchMeasurement<'_> {
     /// Pixel after a trial step, and its derivative by tangent coordinates.
     pub(crate) fn project(&self, delta: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
         let step = Vector2::new(delta[0], delta[1]) + self.rate * (self.time_offset_error + delta[2]);
-        project(self.camera, &self.landmark.bearing.boxplus(&step))
+        self.shutter.project(self.camera, &self.landmark.bearing.boxplus(&step), &self.rate)
     }
 
     /// Compares the coarsest level after a trial step.

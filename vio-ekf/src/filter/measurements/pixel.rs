@@ -20,6 +20,8 @@ pub(crate) struct PixelMeasurement<'a> {
     pub(crate) rate: Vector2<f64>,
     /// Change of the time offset since the state was propagated to the image, s.
     pub(crate) time_offset_error: f64,
+    /// From the stamp of the image until the row of the pixel is exposed, s.
+    pub(crate) delay: f64,
     pub(crate) camera: &'a dyn CameraModel,
     pub(crate) landmarks: &'a LandmarkSettings,
     pub(crate) update: &'a UpdateSettings,
@@ -32,7 +34,7 @@ impl Measurement<2, 3> for PixelMeasurement<'_> {
 
     fn linearize(&self, trial: &Trial<'_, 3>) -> Option<Linearization<2, 3>> {
         let delta = trial.delta;
-        let step = Vector2::new(delta[0], delta[1]) + self.rate * (self.time_offset_error + delta[2]);
+        let step = Vector2::new(delta[0], delta[1]) + self.rate * (self.time_offset_error + self.delay + delta[2]);
         let (pixel, by_bearing) = project(self.camera, &self.landmark.bearing.boxplus(&step))?;
         let mut jacobian = Matrix2x3::zeros();
         jacobian.fixed_columns_mut::<2>(0).copy_from(&by_bearing);

@@ -18,12 +18,23 @@ pub struct CalibrationSettings {
     /// Standard deviation of the stamp of each image, s; ours: 0. With it every image has an offset of its own, found with the
     /// landmarks that it sees, and the mean offset is taken as known.
     pub stamp_jitter_s: f64,
+    /// Time from the exposure of a row until that of the row below, s: rolling shutter. 0, a global shutter. The stamp of an image is
+    /// then that of its middle row. One camera only.
+    pub row_time_s: f64,
 }
 
 impl CalibrationSettings {
     pub(super) fn check(&self) -> Result<(), Error> {
         if self.time_offset_s.is_nan() || self.time_offset_s.abs() > 10.0 {
             return Err(invalid("time_offset_s", self.time_offset_s, "must be below 10 s"));
+        }
+        // From the bottom to the top is possible; a whole read-out longer than a second is not.
+        if self.row_time_s.is_nan() || self.row_time_s.abs() > 1e-3 {
+            return Err(invalid(
+                "row_time_s",
+                self.row_time_s,
+                "must be below 0.001 s: a read-out of 30 ms over 480 rows is 6.25e-5",
+            ));
         }
         all_not_negative(&[
             ("camera_position_sigma_m", self.camera_position_sigma_m),

@@ -12,8 +12,8 @@ const WHOLE_FILE: Section = Section { prefix: "", line: 1 };
 const NO_IMU: &str = "is missing: this chain is of cameras alone, give the one that Kalibr's calibration with the inertial sensor \
                       wrote (`camchain-imucam`)";
 /// What is open to lenses of other models.
-const ONLY_PINHOLE: &str =
-    "only `pinhole` is read from files: a lens of another model goes into the filter as a `CameraModel`";
+const KNOWN_MODELS: &str = "only `pinhole`, `omni`, `ds` and `eucm` are read from files: a lens of another model goes into the filter as \
+                            a `CameraModel`";
 
 /// Reads the `sensor.yaml` of an EuRoC/ASL camera.
 pub fn read_asl_camera(text: &str) -> Result<CameraCalibration, Error> {
@@ -21,7 +21,12 @@ pub fn read_asl_camera(text: &str) -> Result<CameraCalibration, Error> {
     let at = WHOLE_FILE;
     let body_from_camera = at.asl_pose(keys.body_from_sensor.as_ref())?;
     let camera = camera(&at, &keys, "distortion_coefficients", body_from_camera)?;
-    Ok(CameraCalibration { camera, rate_hz: at.optional("rate_hz", &keys.rate_hz)?, time_offset_s: 0.0 })
+    Ok(CameraCalibration {
+        camera,
+        rate_hz: at.optional("rate_hz", &keys.rate_hz)?,
+        time_offset_s: 0.0,
+        row_time_s: row_time(&at, &keys)?,
+    })
 }
 
 /// Reads the `sensor.yaml` of an EuRoC/ASL inertial sensor.
@@ -52,7 +57,7 @@ pub fn read_kalibr_cameras(text: &str) -> Result<Vec<CameraCalibration>, Error> 
         };
         let camera = camera(&at, keys, "distortion_coeffs", body_from_camera)?;
         let time_offset_s = at.optional("timeshift_cam_imu", &keys.timeshift_cam_imu)?.unwrap_or(0.0);
-        Ok(CameraCalibration { camera, rate_hz: None, time_offset_s })
+        Ok(CameraCalibration { camera, rate_hz: None, time_offset_s, row_time_s: row_time(&at, keys)? })
     };
     sections.iter().map(read).collect()
 }
@@ -84,22 +89,21 @@ fn camera(
     body_from_camera: Isometry3<f64>,
 ) -> Result<Camera, Error> {
     let (model, line) = at.required("camera_model", &keys.camera_model)?;
-    if model != "pinhole" {
-        return Err(at.refuse(line, "camera_model", &format!("is `{model}`, {ONLY_PINHOLE}")));
-    }
-    let [width, height] = at.numbers("resolution", &keys.resolution)?;
-    let [fx, fy, cx, cy] = at.numbers("intrinsics", &keys.intrinsics)?;
-    let four = || at.numbers(coefficients, &keys.distortion_coefficients);
-    let (model, line) = at.required("distortion_model", &keys.distortion_model)?;
-    let distortion = match model.as_str() {
-        "radtan" | "radial-tangential" | "plumb_bob" => Distortion::RadTan(four()?),
-        "equidistant" => Distortion::Equidistant(four()?),
-        "none" => Distortion::None,
-        _ => {
-            let known = "only `radtan`, `radial-tangential`, `equidistant`, `none` are known";
-            return Err(at.refuse(line, "distortion_model", known));
+    // What the model has of its own stands before the focal lengths.
+    let (own, [fx, fy, cx, cy]) = match model.as_str() {
+        "pinhole" => ([0.0; 2], at.numbers("intrinsics", &keys.intrinsics)?),
+        "omni" => {
+            let [xi, fx, fy, cx, cy] = at.numbers("intrinsics", &keys.intrinsics)?;
+            ([xi, 0.0], [fx, fy, cx, cy])
         }
+        "ds" | "eucm" => {
+            let [a, b, fx, fy, cx, cy] = at.numbers("intrinsics", &keys.intrinsics)?;
+            ([a, b], [fx, fy, cx, cy])
+        }
+        _ => return Err(at.refuse(line, "camera_model", &format!("is `{model}`, {KNOWN_MODELS}"))),
     };
+    let [width, height] = at.numbers("resolution", &keys.resolution)?;
+    let distortion = distortion((at, coefficients), keys, model, own)?;
     if !(1.0..=32768.0).contains(&width) || !(1.0..=32768.0).contains(&height) {
         let (_, line) = at.required("resolution", &keys.resolution)?;
         return Err(at.refuse(line, "resolution", "must be between 1 and 32768 pixels"));
@@ -108,6 +112,40 @@ fn camera(
     let camera = Camera { width, height, fx, fy, cx, cy, distortion, body_from_camera };
     camera.check()?;
     Ok(camera)
+}
+
+/// Kalibr's calibration of rolling shutters calls it line delay.
+fn row_time(at: &Section, keys: &CameraSection) -> Result<f64, Error> {
+    Ok(at.optional("line_delay", &keys.line_delay)?.unwrap_or(0.0))
+}
+
+/// The lens: of the models that have their own form of it, or the polynomial of a pinhole.
+fn distortion(
+    (at, coefficients): (&Section, &str),
+    keys: &CameraSection,
+    projection: &str,
+    own: [f64; 2],
+) -> Result<Distortion, Error> {
+    let four = || at.numbers(coefficients, &keys.distortion_coefficients);
+    let (model, line) = at.required("distortion_model", &keys.distortion_model)?;
+    let polynomial = matches!(model.as_str(), "radtan" | "radial-tangential" | "plumb_bob");
+    match (projection, model.as_str()) {
+        ("ds", "none") => Ok(Distortion::DoubleSphere(own)),
+        ("eucm", "none") => Ok(Distortion::Eucm(own)),
+        ("omni", "none") => Ok(Distortion::Omni { xi: own[0], radtan: [0.0; 4] }),
+        ("omni", _) if polynomial => Ok(Distortion::Omni { xi: own[0], radtan: four()? }),
+        ("pinhole", _) if polynomial => Ok(Distortion::RadTan(four()?)),
+        ("pinhole", "equidistant") => Ok(Distortion::Equidistant(four()?)),
+        ("pinhole", "none") => Ok(Distortion::None),
+        (_, other) => {
+            let known = match projection {
+                "pinhole" => "only `radtan`, `radial-tangential`, `equidistant`, `none` are known",
+                "omni" => "only `radtan`, `radial-tangential`, `none` go with `omni`",
+                _ => "only `none` goes with `ds` and `eucm`",
+            };
+            Err(at.refuse(line, "distortion_model", &format!("is `{other}`, {known}")))
+        }
+    }
 }
 
 fn imu(at: &Section, keys: &ImuSection, rate_hz: f64, body_from_imu: Isometry3<f64>) -> Result<ImuCalibration, Error> {

@@ -33,6 +33,7 @@ pub(super) struct CameraSection {
     pub(super) distortion_coefficients: Field<Numbers>,
     pub(super) rate_hz: Field<Numbers>,
     pub(super) timeshift_cam_imu: Field<Numbers>,
+    pub(super) line_delay: Field<Numbers>,
 }
 
 /// An inertial sensor of either format.

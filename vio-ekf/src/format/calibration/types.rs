@@ -14,6 +14,8 @@ pub struct CameraCalibration {
     /// What is added to a stamp of the camera to get the inertial sensor's time (`timeshift_cam_imu`), s; 0 where the
     /// file does not say.
     pub time_offset_s: f64,
+    /// Time from the exposure of a row until that of the row below (`line_delay`), s; 0, a global shutter, where the file does not say.
+    pub row_time_s: f64,
 }
 
 /// An inertial sensor with its noise.

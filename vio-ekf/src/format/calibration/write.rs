@@ -8,26 +8,28 @@ use crate::Distortion;
 /// The `sensor.yaml` of an EuRoC/ASL camera. `Distortion::None` becomes a polynomial of zeros, which it equals.
 pub fn write_asl_camera(calibration: &CameraCalibration) -> String {
     let camera = &calibration.camera;
-    let (model, k) = match camera.distortion {
-        Distortion::None => ("radial-tangential", [0.0; 4]),
-        Distortion::RadTan(k) => ("radial-tangential", k),
-        Distortion::Equidistant(k) => ("equidistant", k),
+    let (projection, own, model, k): (&str, &[f64], &str, &[f64]) = match &camera.distortion {
+        Distortion::None => ("pinhole", &[], "radial-tangential", &[0.0; 4]),
+        Distortion::RadTan(k) => ("pinhole", &[], "radial-tangential", k),
+        Distortion::Equidistant(k) => ("pinhole", &[], "equidistant", k),
+        Distortion::Omni { xi, radtan } => ("omni", std::slice::from_ref(xi), "radial-tangential", radtan),
+        Distortion::DoubleSphere(k) => ("ds", k, "none", &[]),
+        Distortion::Eucm(k) => ("eucm", k, "none", &[]),
     };
     let rate = calibration.rate_hz.map_or(String::new(), |rate| format!("rate_hz: {rate}\n"));
+    let row_time = match calibration.row_time_s {
+        0.0 => String::new(),
+        seconds => format!("line_delay: {seconds}\n"),
+    };
+    let list = |numbers: &[f64]| numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+    let intrinsics = list(&[own, &[camera.fx, camera.fy, camera.cx, camera.cy]].concat());
     format!(
-        "%YAML:1.0\nsensor_type: camera\n{}{rate}resolution: [{}, {}]\ncamera_model: pinhole\n\
-         intrinsics: [{}, {}, {}, {}]\ndistortion_model: {model}\ndistortion_coefficients: [{}, {}, {}, {}]\n",
+        "%YAML:1.0\nsensor_type: camera\n{}{rate}resolution: [{}, {}]\ncamera_model: {projection}\n\
+         intrinsics: [{intrinsics}]\ndistortion_model: {model}\ndistortion_coefficients: [{}]\n{row_time}",
         pose_text(&camera.body_from_camera),
         camera.width,
         camera.height,
-        camera.fx,
-        camera.fy,
-        camera.cx,
-        camera.cy,
-        k[0],
-        k[1],
-        k[2],
-        k[3]
+        list(k)
     )
 }
 
