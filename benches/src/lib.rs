@@ -7,6 +7,7 @@ pub mod flight;
 pub mod frames;
 pub mod motion;
 pub mod painting;
+pub mod planner;
 pub mod pose_graphs;
 pub mod rock;
 pub mod room;

@@ -26,6 +26,11 @@ pub enum Design {
         /// Which one.
         seed: u64,
     },
+    /// The same ink everywhere.
+    Even {
+        /// How much.
+        ink: f64,
+    },
     /// Eleven vertical stripes of rising darkness.
     Stripes,
     /// From bare wall on the left to dark on the right, with a ripple.
@@ -156,6 +161,7 @@ impl Design {
     fn ink(&self, [x, y]: [f64; 2], extent: [f64; 2], placement: &PicturePlacement) -> f64 {
         let (u, v) = (x / extent[0], y / extent[1]);
         match self {
+            Self::Even { ink } => *ink,
             Self::Strata { seed } => strata(*seed, x, y, u, v),
             Self::Stripes => {
                 let stripe = (u * 11.0).floor().clamp(0.0, 10.0);

@@ -2,6 +2,7 @@
 
 mod decide;
 mod decision;
+mod dose_correction;
 mod error;
 mod figures;
 mod fly;

@@ -15,13 +15,14 @@ use crate::region::Region;
 type AnyError = Box<dyn std::error::Error>;
 
 /// What stands in a mission file.
-const MISSION: [&str; 21] = [
+const MISSION: [&str; 22] = [
     "mesh",
     "texture",
     "scale",
     "up",
     "region",
     "design",
+    "fill",
     "scan",
     "painter",
     "layers",
@@ -67,14 +68,17 @@ pub struct MissionArguments {
     /// [default: strata on the rock wall, materials on a mesh that has pictures, else stripes]
     #[arg(long)]
     design: Option<String>,
+    /// Cover all that is in reach with a coat of this thickness, micrometres from 1 to 60
+    #[arg(long, value_name = "MICROMETRES", value_parser = positive, conflicts_with_all = ["design", "texture"])]
+    fill: Option<f64>,
     #[command(flatten)]
     placement: Placement,
     /// Scan the surface first, with the robot's own camera, inertial sensor and depth camera, and paint what it has mapped
     #[arg(long, conflicts_with = "texture")]
     scan: bool,
-    /// Who decides the sprays
-    #[arg(long, default_value = "feedback")]
-    painter: PainterName,
+    /// Who decides the sprays [default: feedback; fill with --fill]
+    #[arg(long)]
+    painter: Option<PainterName>,
     /// Paint in layers by intensity, a flight for each [default: one flight whose flow carries the picture]
     #[arg(long)]
     layers: bool,
@@ -206,6 +210,8 @@ enum PainterName {
     Deconvolution,
     /// The same with strokes along the lines of the picture, for text and line art
     Centrelines,
+    /// Rows that cover whole regions, as few as the spray allows, with doses corrected for the surface
+    Fill,
     /// One spray after the other
     Pursuit,
 }
@@ -230,10 +236,15 @@ impl MissionArguments {
             memory_gib: self.memory_gib,
             placement: self.placement.picture()?,
             viewpoint: self.placement.project,
-            painter: match self.painter {
+            painter: match self.painter.unwrap_or(if self.fill.is_some() {
+                PainterName::Fill
+            } else {
+                PainterName::Feedback
+            }) {
                 PainterName::Feedback => PainterChoice::Feedback,
                 PainterName::Deconvolution => PainterChoice::Deconvolution,
                 PainterName::Centrelines => PainterChoice::Centrelines,
+                PainterName::Fill => PainterChoice::Fill,
                 PainterName::Pursuit => PainterChoice::Pursuit,
             },
             ..MissionSettings::default()
@@ -245,6 +256,7 @@ impl MissionArguments {
             up: self.up,
             region: self.region.clone(),
             design: self.design.clone(),
+            fill: self.fill.map(|micrometres| 1e-6 * micrometres),
             texture: self.texture.clone(),
             scan: self.scan,
             settings,

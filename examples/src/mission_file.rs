@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::appearance::{Appearance, UNIT_THICKNESS};
 use crate::design::{Design, DesignError, MATERIALS, Picture};
 use crate::mesh_io::{MeshError, TriangleMesh, read_mesh};
 use crate::mesh_placement::{MeshPlacement, PlacementError, UpAxis, place_mesh, place_scene};
@@ -11,6 +12,9 @@ use crate::mission::{Decision, MissionError, MissionSettings};
 use crate::region::{Region, RegionError, Scene};
 use crate::scan_flight::{ScanFlight, ScanFlightError, save as save_scan_flight};
 use crate::world::rock_wall;
+
+/// Thickness of an even coat, metres: what paint is thicker does not show.
+const COAT: std::ops::RangeInclusive<f64> = 0.999e-6..=60.001e-6;
 
 /// What to paint on what, and how. TOML; a field that is left out has its default, one that is not known is an error.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -25,6 +29,8 @@ pub struct MissionFile {
     /// What to paint: `strata`, `stripes`, `gradient`, `colours`, `materials` or a picture file; strata on the rock wall; on a mesh
     /// the textures that its file names, stripes without.
     pub design: Option<String>,
+    /// A coat of this thickness, metres, over all that is in reach, instead of a design.
+    pub fill: Option<f64>,
     /// Picture on the mesh's own texture coordinates instead.
     pub texture: Option<PathBuf>,
     /// Scan the surface first and paint what was mapped.
@@ -107,6 +113,9 @@ pub enum MissionFileError {
         /// The mesh.
         path: String,
     },
+    /// A coat that cannot be asked for.
+    #[error("fill: {0}")]
+    Fill(&'static str),
     /// The design cannot be used.
     #[error(transparent)]
     Design(#[from] DesignError),
@@ -193,6 +202,7 @@ impl MissionFile {
         let mesh = &scene.canvas;
         let materials = mesh.materials.as_ref().filter(|materials| materials.textured() && mesh.uv.is_some());
         let design = match (&self.texture, &self.design, materials) {
+            _ if self.fill.is_some() => self.coat()?,
             (Some(texture), ..) => Design::Texture(Picture::open(texture)?),
             (None, Some(name), _) if name != MATERIALS => Design::from_name(name, settings.seed)?,
             (None, _, Some(materials)) => {
@@ -211,6 +221,19 @@ impl MissionFile {
             None => Ok(decision),
         });
         decision.map_err(|source| self.in_mesh(source))
+    }
+
+    /// The design of an even coat.
+    fn coat(&self) -> Result<Design, MissionFileError> {
+        if self.texture.is_some() || self.design.is_some() {
+            return Err(MissionFileError::Fill(
+                "takes the place of a design or a texture: leave them out, or the coat",
+            ));
+        }
+        let thickness = self.fill.filter(|thickness| COAT.contains(thickness));
+        let thickness = thickness.ok_or(MissionFileError::Fill("give a thickness from 1 to 60 micrometres"))?;
+        let paint = Appearance::charcoal_on_sandstone().map_err(|error| self.in_mesh(error.into()))?;
+        Ok(Design::Even { ink: paint.ink().forward(thickness / UNIT_THICKNESS) })
     }
 
     /// Name and mesh of the surface, placed before the robot, with what stands in its way.

@@ -104,6 +104,18 @@ pub struct Report {
     pub scan_error_mean_m: f64,
     /// Position error of the drifting localisation after rigid alignment, root mean square (ATE).
     pub slam_ate_rms_m: f64,
+    /// Painter `fill`: share of what can be reached and shall have paint, by area, whose thickness is 50 % to 150 % of the wanted one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fill_coverage_share: Option<f64>,
+    /// Its share with less.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fill_thin_share: Option<f64>,
+    /// Standard deviation of thickness over wanted thickness there, over its mean.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fill_deviation: Option<f64>,
+    /// That mean.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fill_mean_ratio: Option<f64>,
     /// Layers of paint.
     pub layers: usize,
     /// Strokes over all layers.
@@ -158,7 +170,13 @@ impl Report {
         let beside = |check: Check, unit: Unit, value: f64| Check { detail: Some(unit.show(value)), ..check };
         let smoothing = self.smoothing_normal_deviation_mean_m;
         let locked = self.ptu_locked_hit_error_rms_m;
-        vec![
+        let fill = self.fill_coverage_share.zip(self.fill_deviation).map(|(covered, deviation)| {
+            [
+                check("Filled within 50 to 150 % of the thickness", covered, Percent, AtLeast(0.99), NOT_REPORTED),
+                check("Thickness, deviation over mean", deviation, Percent, AtMost(0.1), NOT_REPORTED),
+            ]
+        });
+        let mut checks = vec![
             check("Nozzle off the normal, mean", self.normal_deviation_mean_m, Centimetres, AtMost(0.004), "0.4 cm"),
             check("Nozzle off the normal, largest", self.normal_deviation_max_m, Centimetres, AtMost(0.02), "2 cm"),
             beside(
@@ -227,7 +245,9 @@ impl Report {
             check("Mean colour difference, CIEDE2000", self.ciede2000_mean, Index, Open, NOT_REPORTED),
             check("Collisions", self.collisions as f64, Count, AtMost(0.0), NOT_REPORTED),
             check("Limit violations", self.limit_violations as f64, Count, AtMost(0.0), NOT_REPORTED),
-        ]
+        ];
+        checks.extend(fill.into_iter().flatten());
+        checks
     }
 
     /// The main figures on a few lines.

@@ -76,8 +76,8 @@ pub use model::{MonotoneCurve, Saturation, Spray, SprayKernel};
 pub use network::{Architecture, Network};
 pub use painter::{Observer, Painter};
 pub use painters::{
-    Centrelines, ClosedLoopPainter, Deconvolution, Feedback, FreeSprays, LayerPlanning, Layered, MatchingPursuit,
-    SlewLimited, ThresholdSpacing, slew_violations,
+    AreaFill, Centrelines, ClosedLoopPainter, Deconvolution, Feedback, FreeSprays, LayerPlanning, Layered,
+    MatchingPursuit, SlewLimited, ThresholdSpacing, slew_violations,
 };
 pub use painting::Painting;
 pub use path::{ScanOrder, Stroke, StrokeSettings, boustrophedon};

@@ -1,16 +1,22 @@
-//! The painters: three that plan on a grid of cells, one that follows lines, one network, one of free sprays, and three that
+//! The painters: three that plan on a grid of cells, one that follows lines, one that fills regions, one network, one of free sprays, and three that
 //! wrap others.
 
+mod area_fill;
 mod centrelines;
 mod closed_loop;
 mod deconvolution;
+mod distance;
 mod feedback;
 mod fitting;
 mod free_sprays;
 mod layers;
+mod placed_sprays;
 mod pursuit;
 mod slew;
+mod thinning;
+mod trace;
 
+pub use area_fill::AreaFill;
 pub use centrelines::Centrelines;
 pub use closed_loop::ClosedLoopPainter;
 pub use deconvolution::Deconvolution;

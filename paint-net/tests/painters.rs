@@ -3,9 +3,9 @@
 
 use paint_net::procedural::{Texture, lattice};
 use paint_net::{
-    Centrelines, ClosedLoopPainter, Deconvolution, Error, Feedback, FreeSprays, Image, LayerPlanning, Layered, Limits,
-    MatchingPursuit, MonotoneCurve, PaintProblem, Painter, Painting, Saturation, SprayKernel, StrokeSettings,
-    ThresholdSpacing, boustrophedon, metrics,
+    AreaFill, Centrelines, ClosedLoopPainter, Deconvolution, Error, Feedback, FreeSprays, Image, LayerPlanning,
+    Layered, Limits, MatchingPursuit, MonotoneCurve, PaintProblem, Painter, Painting, Saturation, SprayKernel,
+    StrokeSettings, ThresholdSpacing, boustrophedon, metrics,
 };
 
 fn kernel() -> SprayKernel {
@@ -16,6 +16,7 @@ fn painters() -> Vec<Box<dyn Painter>> {
     vec![
         Box::new(Deconvolution::default()),
         Box::new(Centrelines::default()),
+        Box::new(AreaFill::default()),
         Box::new(MatchingPursuit::default()),
         Box::new(Feedback::shipped().unwrap()),
         Box::new(FreeSprays { sprays: 100, ..FreeSprays::default() }),

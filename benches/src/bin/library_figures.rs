@@ -11,7 +11,7 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 use paint_sim::ciede2000;
 use paint_sim::colour::BANDS;
 use paintcopter_benches::cpu::{CpuTimer, median_seconds};
-use paintcopter_benches::{Rng, colours, films, motion, painting, pose_graphs, room};
+use paintcopter_benches::{Rng, colours, films, motion, painting, planner, pose_graphs, room};
 use paintcopter_examples::mesh_io::read_mesh;
 use paintcopter_examples::world::rock_wall;
 use serde_json::json;
@@ -116,6 +116,17 @@ enum Job {
         #[arg(long, default_value_t = 5)]
         runs: usize,
     },
+    /// Writes the planner's programs as `NumPy` arrays, for `planner_peers.py`
+    PlannerInstances {
+        /// Folder to write into
+        folder: PathBuf,
+    },
+    /// Plans: time and quality of the programs as `planner_peers.py` has them, and of the rest
+    Planner {
+        /// Runs of which the median is printed
+        #[arg(long, default_value_t = 5)]
+        runs: usize,
+    },
     /// Errors of a TUM trajectory against another, as `trajectory_peers.py` does
     Ate {
         /// TUM text
@@ -141,6 +152,8 @@ fn main() -> ExitCode {
         Job::Pair { folder } => pair(&folder),
         Job::GraphWorlds { folder } => pose_graphs::write(&folder),
         Job::Graph { file, runs } => pose_graphs::run(&file, runs),
+        Job::PlannerInstances { folder } => planner::write(&folder),
+        Job::Planner { runs } => planner::run(runs),
         Job::Ate { reference, estimate, runs } => trajectory_errors(&reference, &estimate, runs),
     };
     match done {

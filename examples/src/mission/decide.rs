@@ -1,9 +1,10 @@
 //! What to spray: the wanted picture into layers.
 
 use paint_net::{
-    Centrelines, Deconvolution, Feedback, Image, Layered, MatchingPursuit, Observer, PaintProblem, Painter, Painting,
-    SprayKernel,
+    AreaFill, Centrelines, Deconvolution, Feedback, Image, Layered, MatchingPursuit, Observer, PaintProblem, Painter,
+    Painting, SprayKernel,
 };
+use paint_sim::SprayModel;
 
 use super::error::MissionError;
 use super::settings::{MissionSettings, PainterChoice};
@@ -11,13 +12,21 @@ use crate::appearance::Appearance;
 use crate::progress::Stage;
 
 /// Weight of texels out of reach against those in reach.
-const UNPAINTABLE_WEIGHT: f64 = 0.02;
+pub(super) const UNPAINTABLE_WEIGHT: f64 = 0.02;
 /// Where the cone of the spray ends, in deviations: all but 0.2 % of the paint lies inside.
-pub(super) const SPRAY_CUT: f64 = 3.5;
+const SPRAY_CUT: f64 = 3.5;
+/// Paint that has met nothing after this way is overspray, metres: what lies behind the edge of a surface stays clean.
+const SPRAY_RANGE: f64 = 0.35;
 
 /// The footprint of the nozzle in texels, with all of its tails.
 pub(super) fn kernel(settings: &MissionSettings) -> Result<SprayKernel, paint_net::Error> {
     SprayKernel::new(settings.spot / settings.texel, SPRAY_CUT)
+}
+
+/// The same nozzle in the simulation.
+pub(super) fn spray_model(settings: &MissionSettings) -> SprayModel {
+    let sigma = (settings.spot / settings.planner.nozzle.stand_off).atan();
+    SprayModel { sigma, cut: SPRAY_CUT, range: SPRAY_RANGE, ..SprayModel::default() }
 }
 
 /// Layers of sprays for the wanted picture; no spray lies where `paintable` is false.
@@ -49,6 +58,7 @@ pub(super) fn decide(
         }
         PainterChoice::Deconvolution => paint(Deconvolution::default(), settings.layered, &problem, &mut progress),
         PainterChoice::Centrelines => paint(Centrelines::default(), settings.layered, &problem, &mut progress),
+        PainterChoice::Fill => paint(AreaFill::default(), settings.layered, &problem, &mut progress),
         PainterChoice::Pursuit => paint(MatchingPursuit::default(), settings.layered, &problem, &mut progress),
     }?;
     let sprays: usize = layers.iter().map(|l| l.sprays.len()).sum();

@@ -6,19 +6,23 @@ use paint_sim::flight::{FlightSample, FlightStatistics};
 use paint_sim::spray::QUANTUM;
 use paint_sim::{FlightLog, TriangleSurface};
 
+use super::decision::Decision;
 use super::error::MissionError;
 use super::fly::LayerFlight;
 use super::inspect::Inspection;
 use super::plan::path_length;
 use super::rehearse::{GAP_STRIDE, gap};
 use super::run::Mission;
-use super::settings::MissionSettings;
+use super::settings::{MissionSettings, PainterChoice};
 use crate::adapters::Robot;
-use crate::appearance::DENSITY;
+use crate::appearance::{DENSITY, UNIT_THICKNESS};
 use crate::report::{Report, peak_resident_bytes};
 
 /// Step of the dense check of the planned limits, seconds; the certificates do not depend on it.
 const LIMIT_STEP: f64 = 0.02;
+
+/// Thickness below which nothing is wanted, metres: ink is given to a few digits.
+const LEAST_COAT: f64 = 0.5e-6;
 
 /// All figures, with those of the inspection.
 pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, MissionError> {
@@ -41,6 +45,7 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
     let weight = Some(&mission.decision.coverage);
     let in_reach = mission.decision.coverage_in_reach();
     let in_reach = Some(&in_reach);
+    let fill = (mission.decision.settings.painter == PainterChoice::Fill).then(|| evenness(mission));
     Ok(Report {
         version: env!("CARGO_PKG_VERSION"),
         surface: mission.decision.name.clone(),
@@ -96,11 +101,48 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
             .sum(),
         scan_error_mean_m: inspection.mesh_error,
         slam_ate_rms_m: inspection.slam_ate,
+        fill_coverage_share: fill.as_ref().map(|f| f.covered),
+        fill_thin_share: fill.as_ref().map(|f| f.thin),
+        fill_deviation: fill.as_ref().map(|f| f.deviation),
+        fill_mean_ratio: fill.as_ref().map(|f| f.mean),
         layers: mission.decision.layers.len(),
         strokes: mission.flights.iter().map(|f| f.route.strokes).sum(),
         wall_s: mission.decision.started.elapsed().as_secs_f64(),
         peak_rss_bytes: peak_resident_bytes(),
     })
+}
+
+/// How even a coat is where it is wanted and can be reached, by area.
+struct Evenness {
+    /// Share within 50 % to 150 % of the wanted thickness.
+    covered: f64,
+    /// Share below.
+    thin: f64,
+    /// Mean of thickness over wanted thickness.
+    mean: f64,
+    /// Its standard deviation over its mean.
+    deviation: f64,
+}
+
+fn evenness(mission: &Mission) -> Evenness {
+    let Decision { wanted, in_reach, appearance, .. } = &mission.decision;
+    let (mut area, mut covered, mut thin, mut sum, mut squares) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for (k, (&pixel, texel)) in mission.pixels.iter().zip(mission.film.texels()).enumerate() {
+        let asked = appearance.ink().inverse(wanted.data()[pixel]) * UNIT_THICKNESS;
+        if !in_reach[pixel] || asked < LEAST_COAT {
+            continue;
+        }
+        let ratio = mission.film.thickness(k) / asked;
+        area += texel.area;
+        covered += if (0.5..=1.5).contains(&ratio) { texel.area } else { 0.0 };
+        thin += if ratio < 0.5 { texel.area } else { 0.0 };
+        sum += texel.area * ratio;
+        squares += texel.area * ratio * ratio;
+    }
+    let all = f64::max(area, f64::MIN_POSITIVE);
+    let mean = sum / all;
+    let deviation = (squares / all - mean * mean).max(0.0).sqrt() / mean.max(f64::MIN_POSITIVE);
+    Evenness { covered: covered / all, thin: thin / all, mean, deviation }
 }
 
 fn normal_deviations(mission: &Mission) -> Deviations {

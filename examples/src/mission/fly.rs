@@ -2,9 +2,9 @@
 
 use paint_planner::Plan;
 use paint_sim::flight::Localisation;
-use paint_sim::{Film, FlightLog, FlightSettings, SprayModel, TriangleSurface};
+use paint_sim::{Film, FlightLog, FlightSettings, TriangleSurface};
 
-use super::decide::SPRAY_CUT;
+use super::decide::spray_model;
 use super::decision::Decision;
 use super::error::MissionError;
 use super::plan::Planned;
@@ -16,9 +16,6 @@ use crate::targets::Route;
 
 /// Motion of the nozzle that one shot stands for, metres: widens the spot by less than a percent.
 const SHOT_STEP: f64 = 0.01;
-
-/// Paint that has met nothing after this way is overspray, metres: what lies behind the edge of a surface stays clean.
-const SPRAY_RANGE: f64 = 0.35;
 
 /// One layer of paint, decided, planned and flown.
 pub struct LayerFlight {
@@ -70,12 +67,6 @@ pub(super) fn spray(flights: &[LayerFlight], decision: &Decision) -> Result<(Fil
     let share = 100.0 * balance.deposited as f64 / balance.emitted.max(1) as f64;
     stage.done(&format!("{share:.1} % of the paint on the surface"));
     Ok((film, pixels))
-}
-
-/// The painter's nozzle in the simulation.
-fn spray_model(settings: &MissionSettings) -> SprayModel {
-    let sigma = (settings.spot / settings.planner.nozzle.stand_off).atan();
-    SprayModel { sigma, cut: SPRAY_CUT, range: SPRAY_RANGE, ..SprayModel::default() }
 }
 
 /// The same plan with motion capture, with a drifting localisation, and with the pan-tilt unit locked.

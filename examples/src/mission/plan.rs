@@ -1,13 +1,17 @@
 //! How to fly it: strokes onto the surface, nozzle and vehicle along them.
 
+use std::time::Instant;
+
 use paint_net::{Painting, StrokeSettings, boustrophedon};
-use paint_planner::{Error, Plan, Planner, Settings, SmoothingPlanner, Target};
+use paint_planner::{Error, OptimalPlanner, Plan, Planner, Settings, SmoothingPlanner, Target};
 
 use super::decide::kernel;
+use super::decision::Decision;
+use super::dose_correction::correct_doses;
 use super::error::MissionError;
 use super::rehearse::rehearsed_plan;
-use super::settings::MissionSettings;
-use crate::adapters::{MeshSurface, Robot};
+use super::settings::{MissionSettings, PainterChoice};
+use crate::adapters::MeshSurface;
 use crate::progress::Stage;
 use crate::surface::PaintSurface;
 use crate::targets::{Route, route};
@@ -27,12 +31,8 @@ pub(super) struct Planned {
 }
 
 /// Plans every layer; each flight begins where the one before ends.
-pub(super) fn plan(
-    layers: &[Painting],
-    surface: &PaintSurface,
-    robot: &Robot,
-    settings: &MissionSettings,
-) -> Result<Planned, MissionError> {
+pub(super) fn plan(decision: &Decision) -> Result<Planned, MissionError> {
+    let Decision { layers, surface, robot, settings, .. } = decision;
     let stage = Stage::start("plan");
     let wall = MeshSurface(&surface.world);
     let mut planned = Planned {
@@ -45,13 +45,22 @@ pub(super) fn plan(
     for (k, layer) in layers.iter().enumerate() {
         stage.share(k as f64 / layers.len() as f64);
         let from = planned.layers.last().and_then(|(route, ..)| route.targets.last().copied());
-        let route = layer_route(layer, surface, settings, from.as_ref())?;
+        let mut route = layer_route(layer, surface, settings, from.as_ref())?;
         if route.targets.len() < 2 {
             planned.unreachable_paint += route.lost;
             continue;
         }
         let start = planned.layers.last().and_then(|(_, plan, _)| plan.waypoints.last()).map(|w| w.state);
         let here = Settings { start, ..settings.planner.clone() };
+        if settings.painter == PainterChoice::Fill {
+            // Doses change the speed of the spot at most: nozzles and headings of the first plan are those of the last.
+            let clock = Instant::now();
+            match OptimalPlanner::default().plan(&route.targets, &wall, robot, &here) {
+                Err(Error::NothingReachable { .. }) => {}
+                first => correct_doses(&mut route.targets, &first?, decision),
+            }
+            planned.seconds += clock.elapsed().as_secs_f64();
+        }
         let rehearsed = match rehearsed_plan(&route.targets, surface, robot, settings, &here) {
             Err(MissionError::Planner(Error::NothingReachable { .. })) => {
                 planned.unreachable_paint += route.paint() + route.lost;

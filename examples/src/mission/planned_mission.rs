@@ -19,8 +19,7 @@ pub struct PlannedMission {
 impl PlannedMission {
     /// Plans what was decided. An error where nearly all of the paint is out of reach.
     pub fn new(decision: Decision) -> Result<Self, MissionError> {
-        let Decision { layers, surface, robot, settings, .. } = &decision;
-        let planned = plan(layers, surface, robot, settings)?;
+        let planned = plan(&decision)?;
         let mission = Self { decision, planned };
         let share = share_out_of_reach(&mission.decision, mission.planned.unreachable_paint, mission.layers());
         if share > MAX_UNREACHABLE_SHARE {

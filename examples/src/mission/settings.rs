@@ -52,6 +52,8 @@ pub enum PainterChoice {
     Deconvolution,
     /// The same with strokes along lines.
     Centrelines,
+    /// Rows over whole regions, with doses corrected for the surface.
+    Fill,
     /// One spray after the other.
     Pursuit,
 }

@@ -5,8 +5,8 @@ use std::path::Path;
 use clap::ValueEnum;
 use paint_net::thesis::{Network, ThesisPainter};
 use paint_net::{
-    ClosedLoopPainter, Deconvolution, Feedback, FreeSprays, Image, LayerPlanning, Layered, Limits, MatchingPursuit,
-    PaintProblem, Painter, Painting, ScanOrder, SlewLimited, SprayKernel, metrics, slew_violations,
+    Centrelines, ClosedLoopPainter, Deconvolution, Feedback, FreeSprays, Image, LayerPlanning, Layered, Limits,
+    MatchingPursuit, PaintProblem, Painter, Painting, ScanOrder, SlewLimited, SprayKernel, metrics, slew_violations,
 };
 use serde::Serialize;
 
@@ -27,6 +27,8 @@ pub enum PainterKind {
     ClosedLoop,
     /// Projected L-BFGS.
     Deconvolution,
+    /// The same with strokes along the lines of the picture.
+    Centrelines,
     /// Greedy matching pursuit.
     Pursuit,
     /// Few sprays at free places, of free spreads.
@@ -36,7 +38,7 @@ pub enum PainterKind {
 }
 
 impl PainterKind {
-    /// All that need no weights.
+    /// Those for any picture that need no weights.
     pub const WITHOUT_WEIGHTS: [Self; 5] =
         [Self::Feedback, Self::ClosedLoop, Self::Deconvolution, Self::Pursuit, Self::FreeSprays];
 
@@ -45,6 +47,7 @@ impl PainterKind {
             Self::Feedback => "feedback",
             Self::ClosedLoop => "closed-loop",
             Self::Deconvolution => "deconvolution",
+            Self::Centrelines => "centrelines",
             Self::Pursuit => "pursuit",
             Self::FreeSprays => "free-sprays",
             Self::Thesis => "thesis",
@@ -120,6 +123,7 @@ impl Job {
             PainterKind::Feedback => Box::new(feedback()?),
             PainterKind::ClosedLoop => Box::new(ClosedLoopPainter::new(feedback()?)),
             PainterKind::Deconvolution => Box::new(Deconvolution::default()),
+            PainterKind::Centrelines => Box::new(Centrelines::default()),
             PainterKind::Pursuit => Box::new(MatchingPursuit::default()),
             PainterKind::FreeSprays => Box::new(FreeSprays {
                 sprays: self.limits.max_sprays.unwrap_or(FreeSprays::default().sprays),
@@ -139,6 +143,12 @@ impl Job {
 
     /// Decides the sprays for a wanted picture of ink.
     pub fn paint(&self, wanted: &Image, progress: &mut dyn FnMut(f64)) -> Result<(Painting, Figures), PaintImageError> {
+        if self.painter == PainterKind::Centrelines && self.slew_limit.is_some() {
+            // The slow valve follows the cells of a grid, on which strokes along lines do not lie.
+            let why =
+                "--slew-limit: its path leads over a grid, the strokes of centrelines do not; choose another painter";
+            return Err(PaintImageError::Settings(why.to_string()));
+        }
         let painter = self.painter()?;
         let timer = CpuTimer::start(self.threads);
         let problem = PaintProblem::new(wanted).with_kernel(&self.kernel).with_limits(&self.limits);
@@ -155,7 +165,11 @@ impl Job {
         let cpu_ms = timer.milliseconds();
         let passes = match self.painter {
             PainterKind::Feedback | PainterKind::ClosedLoop => self.passes,
-            PainterKind::Deconvolution | PainterKind::Pursuit | PainterKind::FreeSprays | PainterKind::Thesis => 0,
+            PainterKind::Deconvolution
+            | PainterKind::Centrelines
+            | PainterKind::Pursuit
+            | PainterKind::FreeSprays
+            | PainterKind::Thesis => 0,
         };
         let figures = Figures {
             painter: self.name(),

@@ -1,6 +1,7 @@
 //! The binaries and what they share, from outside: one test binary, so that everything is linked once.
 #![allow(clippy::unwrap_used)]
 
+mod area_fill;
 mod bad_input;
 mod bags;
 mod five_joint_arm;

@@ -33,6 +33,7 @@ fn a_mission_keeps_all_that_it_was_told() {
         scale: Some(2.5),
         up: Some(UpAxis::X),
         design: Some(s.path("b.png")),
+        fill: Some(2e-5),
         texture: Some(s.0.join("c.png")),
         scan: true,
         region: Some(Region::Mask(s.0.join("d.png"))),

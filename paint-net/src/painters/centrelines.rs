@@ -1,20 +1,15 @@
 //! Strokes along the lines of line art, rows for the rest.
 
-mod distance;
-mod sprays;
-mod thinning;
-mod trace;
-
-use super::fitting::{ink_cost, prune_with, uniform_volume};
+use super::distance::distances;
+use super::fitting::{ink_cost, missing_ink, prune_with, uniform_volume};
+use super::placed_sprays::PlacedSprays;
+use super::trace::{Line, trace};
 use crate::error::{Error, require};
 use crate::optimise::{StoppingRule, minimise};
 use crate::painter::{Observer, Painter};
 use crate::painting::Painting;
 use crate::path::{Stroke, StrokeSettings, boustrophedon};
 use crate::problem::{PaintGrid, PaintProblem};
-use distance::distances;
-use sprays::PlacedSprays;
-use trace::{Line, trace};
 
 /// Share of the darkest ink below which nothing is worth a row of its own beside lines.
 const LEFT_OVER: f64 = 0.02;
@@ -98,13 +93,6 @@ impl Painter for Centrelines {
         let sprays = strokes.iter().flat_map(|stroke| stroke.sprays.iter().copied()).collect();
         Ok(Painting { strokes, ..Painting::render(problem, sprays) })
     }
-}
-
-/// Ink that is wanted and not there yet, 0 beside the surface.
-fn missing_ink(problem: &PaintProblem, grid: &PaintGrid) -> Vec<f64> {
-    let there = grid.initial.data().iter().map(|&depth| problem.saturation.forward(depth));
-    let wanted = problem.reference.data().iter().enumerate();
-    wanted.zip(there).map(|((k, ink), there)| if problem.weight(k) > 0.0 { ink - there } else { 0.0 }).collect()
 }
 
 /// Places of sprays along each line, as far apart as on the grid.

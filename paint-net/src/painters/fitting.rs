@@ -87,3 +87,10 @@ pub(super) fn uniform_volume(problem: &PaintProblem, grid: &PaintGrid) -> f64 {
     let limits = problem.limits;
     missing / pixels * (limits.spray_spacing * limits.row_spacing) as f64 / problem.kernel.mass()
 }
+
+/// Ink that is wanted and not there yet, 0 beside the surface.
+pub(super) fn missing_ink(problem: &PaintProblem, grid: &PaintGrid) -> Vec<f64> {
+    let there = grid.initial.data().iter().map(|&depth| problem.saturation.forward(depth));
+    let wanted = problem.reference.data().iter().enumerate();
+    wanted.zip(there).map(|((k, ink), there)| if problem.weight(k) > 0.0 { ink - there } else { 0.0 }).collect()
+}

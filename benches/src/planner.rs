@@ -1,0 +1,257 @@
+//! The planner beside general solvers: its programs in a form that they read, and its own figures.
+
+// The tests' wall stands for itself.
+#[path = "../../paint-planner/tests/planner/walls.rs"]
+#[allow(dead_code)]
+mod walls;
+
+use std::error::Error;
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3, Vector4, Vector5};
+use paint_planner::{
+    Clarabel, InteriorPoint, NozzleSettings, OptimalPlanner, Plan, Planner, QpSolver, Settings, StandardForm, Target,
+    Trajectory, stroke_program,
+};
+use paintcopter_examples::adapters::{MeshSurface, Robot};
+use paintcopter_examples::mission::MissionSettings;
+use ptu_kinematics::Ptu;
+use serde_json::json;
+
+use crate::cpu::median_seconds;
+use crate::{Rng, rock};
+use walls::{Arm, Wall};
+
+/// States of the paths; the shortest is for solvers of dense programs.
+const STATES: [usize; 3] = [20, 2000, 20_000];
+/// Distance of the targets, metres, and the spread of their normals.
+const SPACING: f64 = 0.01;
+const NORMAL_NOISE: f64 = 0.12;
+/// Knots of the bare trajectory.
+const KNOTS: usize = 1000;
+/// Turns of the scene, and paths over the rock.
+const TURNS: usize = 200;
+const PATHS: usize = 1000;
+
+type AnyError = Box<dyn Error>;
+
+/// A long stroke over a displaced wall, its normals noisy.
+fn targets(count: usize) -> Vec<Target> {
+    let mut rng = Rng::new(count as u64);
+    let mut noise = || NORMAL_NOISE * (rng.unit() + rng.unit() + rng.unit() - 1.5) * 2.0;
+    let mut target = |k: usize| {
+        let s = SPACING * k as f64;
+        let point = Point3::new(0.05 * (TAU * s / 1.6).sin(), s, 2.0 + 0.2 * (TAU * s / 2.3).cos());
+        let normal = UnitVector3::new_normalize(Vector3::new(-1.0, noise(), noise()));
+        Target { point, normal, dose: 2e-6, time: None }
+    };
+    (0..count).map(&mut target).collect()
+}
+
+/// Writes the programs of stage 1 as `NumPy` arrays: the upper triangle of P and A as rows, columns and values, q, b, the number of
+/// states' variables and the penalty.
+///
+/// # Errors
+/// Files that cannot be written.
+pub fn write(folder: &Path) -> Result<(), AnyError> {
+    for count in STATES {
+        let folder = folder.join(format!("path_{count}"));
+        std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+        let (program, _) = stroke_program(&targets(count), &NozzleSettings::default());
+        let form = StandardForm::new(&program);
+        for (name, triplets) in [("p", &form.p), ("a", &form.a)] {
+            save(&folder, &format!("{name}_row"), triplets.iter().map(|t| t.0 as f64))?;
+            save(&folder, &format!("{name}_column"), triplets.iter().map(|t| t.1 as f64))?;
+            save(&folder, &format!("{name}_value"), triplets.iter().map(|t| t.2))?;
+        }
+        save(&folder, "q", form.q.iter().copied())?;
+        save(&folder, "b", form.b.iter().copied())?;
+        save(&folder, "states", std::iter::once(form.states as f64))?;
+    }
+    Ok(())
+}
+
+/// One array of doubles in `NumPy`'s format 1.0.
+fn save(folder: &Path, name: &str, values: impl Iterator<Item = f64>) -> Result<(), AnyError> {
+    let values: Vec<f64> = values.collect();
+    let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({},), }}", values.len());
+    // Magic, version and length take ten bytes; the data begin at a multiple of 64.
+    let length = (10 + header.len() + 1).next_multiple_of(64) - 10;
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((length as u16).to_le_bytes());
+    bytes.extend(format!("{header:<width$}\n", width = length - 1).bytes());
+    bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
+    let path = folder.join(format!("{name}.npy"));
+    std::fs::write(&path, bytes).map_err(|e| format!("{}: {e}", path.display()).into())
+}
+
+/// Prints our figures on the same programs, and those of the rest of a plan.
+///
+/// # Errors
+/// What the planner refuses.
+pub fn run(runs: usize) -> Result<(), AnyError> {
+    for count in STATES {
+        path(count, runs)?;
+    }
+    trajectory(runs)?;
+    whole_plan(runs)?;
+    turned_scenes()?;
+    random_paths()
+}
+
+fn path(count: usize, runs: usize) -> Result<(), AnyError> {
+    let (program, start) = stroke_program(&targets(count), &NozzleSettings::default());
+    let form = StandardForm::new(&program);
+    let solved = |solver: &dyn QpSolver| -> Result<Vec<Vector5<f64>>, paint_planner::Error> {
+        let mut states = start.clone();
+        solver.solve(&program, &mut states)?;
+        Ok(states)
+    };
+    let own = solved(&InteriorPoint)?;
+    let exact = solved(&Clarabel::default())?;
+    let off = own.iter().zip(&exact).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max);
+    let (objective, violation) = quality(&form, &own);
+    let cpu_ms = 1e3 * median_seconds(runs, || solved(&InteriorPoint));
+    println!(
+        "{}",
+        json!({
+            "fig": format!("path_{count}"), "peer": "paint-planner", "cpu_ms": cpu_ms, "objective": objective,
+            "violation": violation, "off_clarabel_1e-12": off,
+        })
+    );
+    Ok(())
+}
+
+/// Cost with every soft row relaxed as far as it is exceeded, and the largest excess of a hard one.
+fn quality(form: &StandardForm, states: &[Vector5<f64>]) -> (f64, f64) {
+    let x: Vec<f64> = states.iter().flat_map(|s| s.iter().copied()).collect();
+    let mut excess: Vec<f64> = form.b.iter().map(|b| -b).collect();
+    let mut relaxation = vec![None; form.b.len()];
+    for &(row, column, value) in &form.a {
+        match x.get(column) {
+            Some(x) => excess[row] += value * x,
+            None => relaxation[row] = Some(column),
+        }
+    }
+    let rows = excess.len() - (form.variables - form.states);
+    let mut objective: f64 = form.q.iter().zip(&x).map(|(q, x)| q * x).sum();
+    for &(row, column, value) in &form.p {
+        objective += if row == column { 0.5 } else { 1.0 } * value * x[row] * x[column];
+    }
+    let mut violation = 0.0_f64;
+    for (excess, relaxation) in excess[..rows].iter().zip(&relaxation) {
+        match relaxation {
+            Some(column) => objective += form.q[*column] * excess.max(0.0),
+            None => violation = violation.max(*excess),
+        }
+    }
+    (objective, violation)
+}
+
+fn trajectory(runs: usize) -> Result<(), AnyError> {
+    // A helix at half a metre per second.
+    let knot = |k: usize| {
+        let turn = TAU * k as f64 / 100.0;
+        Vector4::new(turn.cos(), turn.sin(), 0.01 * k as f64, turn)
+    };
+    let knots: Vec<Vector4<f64>> = (0..KNOTS).map(knot).collect();
+    let durations: Vec<f64> = knots.windows(2).map(|w| (w[1].xyz() - w[0].xyz()).norm() / 0.5).collect();
+    let rest: Vec<bool> = (0..KNOTS).map(|k| k == 0 || k == KNOTS - 1).collect();
+    Trajectory::minimum_snap(&knots, &durations, &rest)?;
+    let cpu_ms = 1e3 * median_seconds(runs, || Trajectory::minimum_snap(&knots, &durations, &rest));
+    println!("{}", json!({ "fig": "minimum_snap_1000_knots_4_axes", "peer": "paint-planner", "cpu_ms": cpu_ms }));
+    Ok(())
+}
+
+fn whole_plan(runs: usize) -> Result<(), AnyError> {
+    let MissionSettings { planner: settings, ptu, .. } = MissionSettings::default();
+    let surface = rock::rock()?;
+    let targets = rock::stroke(&surface, 1000);
+    let (robot, wall) = (Robot::new(Ptu::new(ptu)?), MeshSurface(&surface.world));
+    OptimalPlanner::default().plan(&targets, &wall, &robot, &settings)?;
+    let cpu_ms = 1e3 * median_seconds(runs, || OptimalPlanner::default().plan(&targets, &wall, &robot, &settings));
+    println!("{}", json!({ "fig": "plan_of_1000_targets", "peer": "paint-planner", "cpu_ms": cpu_ms }));
+    Ok(())
+}
+
+/// The same scene turned about the vertical: how far the plans, turned back, lie apart.
+fn turned_scenes() -> Result<(), AnyError> {
+    let plan = |turn: f64| {
+        let wall = Wall { turn, ..Wall::bumpy(0.12) };
+        OptimalPlanner::default().plan(&wall.rows(1.0, 2, 0.2), &wall, &Arm::default(), &Settings::default())
+    };
+    let mut rng = Rng::new(7);
+    let straight = plan(0.0)?;
+    let mut apart = 0.0_f64;
+    for _ in 0..TURNS {
+        let turn = rng.between(0.0, TAU);
+        let back = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -turn);
+        let back = Isometry3::from_parts(Translation3::identity(), back);
+        let turned = plan(turn)?;
+        for (a, b) in straight.nozzle.iter().zip(&turned.nozzle) {
+            apart = apart.max((back * b.position - a.position).norm());
+            apart = apart.max((back * b.direction.into_inner() - a.direction.into_inner()).norm());
+        }
+    }
+    println!(
+        "{}",
+        json!({ "fig": "turned_scenes", "peer": "paint-planner", "turns": TURNS, "largest_difference_m": apart })
+    );
+    Ok(())
+}
+
+/// Random walks over the rock: moments at which a sampled trajectory exceeds a limit, and time against that at the speed asked for.
+fn random_paths() -> Result<(), AnyError> {
+    let MissionSettings { planner: settings, ptu, .. } = MissionSettings::default();
+    let surface = rock::rock()?;
+    let (robot, wall) = (Robot::new(Ptu::new(ptu)?), MeshSurface(&surface.world));
+    let mut rng = Rng::new(11);
+    let (mut planned, mut refused, mut moments, mut violations) = (0, 0, 0_u64, 0_u64);
+    for _ in 0..PATHS {
+        let mut at =
+            [rng.between(20.0, surface.width() as f64 - 20.0), rng.between(20.0, surface.height() as f64 - 20.0)];
+        let mut course = rng.between(0.0, TAU);
+        let mut targets = Vec::new();
+        for _ in 0..40 {
+            targets.extend(surface.lift(at[0], at[1]).map(|(point, normal)| Target {
+                point,
+                normal,
+                dose: rock::DOSE,
+                time: None,
+            }));
+            course += rng.between(-0.6, 0.6);
+            at = [at[0] + 2.0 * course.cos(), at[1] + 2.0 * course.sin()];
+        }
+        match OptimalPlanner::default().plan(&targets, &wall, &robot, &settings) {
+            Ok(plan) => {
+                let (all, beyond) = beyond_limits(&plan, &settings);
+                planned += 1;
+                moments += all;
+                violations += beyond;
+            }
+            Err(_) => refused += 1,
+        }
+    }
+    println!(
+        "{}",
+        json!({
+            "fig": "limits_over_random_paths", "peer": "paint-planner", "planned": planned, "nothing_reachable": refused,
+            "moments": moments, "violations": violations,
+        })
+    );
+    Ok(())
+}
+
+/// Moments looked at, every 5 ms, and those beyond a limit of speed, acceleration or heading rate.
+fn beyond_limits(plan: &Plan, settings: &Settings) -> (u64, u64) {
+    let timing = &settings.timing;
+    let steps = (plan.trajectory.duration() / 0.005) as u64;
+    let beyond = |k: &u64| {
+        let s = plan.trajectory.sample(*k as f64 * 0.005);
+        s.velocity.norm() > timing.max_speed * (1.0 + 1e-9)
+            || s.acceleration.norm() > timing.max_acceleration * (1.0 + 1e-9)
+            || s.heading_rate.abs() > timing.max_heading_rate * (1.0 + 1e-9)
+    };
+    (steps + 1, (0..=steps).filter(beyond).count() as u64)
+}
