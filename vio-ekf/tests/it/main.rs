@@ -32,8 +32,6 @@ mod sim;
 mod sphere_models;
 mod spline;
 mod support;
-#[cfg(feature = "tracing")]
-mod tracing;
 #[cfg(feature = "tune")]
 mod tune;
 mod unified;

@@ -1,4 +1,7 @@
-//! What a subscriber hears: the steps of an image, and what is refused.
+//! What a subscriber hears: the steps of an image, and what is refused. A program of its own: tests beside it that have no subscriber
+//! would take part in what `tracing` remembers about who listens.
+#![cfg(feature = "tracing")]
+#![allow(clippy::unwrap_used)]
 
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicU64, Ordering};
