@@ -3,27 +3,9 @@
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use tsdf_hash::{Error, KeyframeIndex, LoopCloser, LoopSettings, Map, Settings, Tracker, TrackingSettings};
 
+use crate::noisy_room::{apart, seen, shot, unit};
 use crate::random::Random;
 use crate::scene::{Shot, room};
-use crate::tracking::noisy;
-
-pub(crate) fn apart(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
-    ((a.translation.vector - b.translation.vector).norm(), (a.rotation.inverse() * b.rotation).angle())
-}
-
-pub(crate) fn unit(random: &mut Random) -> Vector3<f64> {
-    Vector3::from_fn(|_, _| random.uniform() - 0.5).normalize()
-}
-
-pub(crate) fn shot(pose: Isometry3<f64>) -> Shot {
-    Shot::take((320, 240), [262.5; 2], pose, |o, d| Some(room::hit(o, d)))
-}
-
-/// A frame with the noise of the depth camera.
-pub(crate) fn seen(pose: Isometry3<f64>, random: &mut Random) -> Shot {
-    let clean = shot(pose);
-    Shot { depth: noisy(&clean, random), ..clean }
-}
 
 /// What became of drift that was put in.
 #[derive(Debug, Default)]

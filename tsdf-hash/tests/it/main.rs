@@ -16,6 +16,7 @@ mod layers;
 #[cfg(feature = "pose-graph")]
 mod loops;
 mod map_file;
+mod noisy_room;
 #[cfg(feature = "pose-graph")]
 mod pose_graph;
 mod random;

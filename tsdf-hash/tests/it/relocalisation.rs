@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use tsdf_hash::{KeyframeIndex, Map, Relocaliser, Settings, TrackingSettings};
 
-use crate::loops::{apart, seen, unit};
+use crate::noisy_room::{apart, seen, unit};
 use crate::random::Random;
 use crate::scene::{Shot, look_at, room};
 use crate::tracking::noisy;
