@@ -1,12 +1,11 @@
 //! Planning a stroke of 1000 targets on the rock, its quadratic program by two solvers, and the trajectory alone.
 
 use std::error::Error;
-use std::f64::consts::TAU;
 
-use nalgebra::Vector4;
 use paint_planner::{
     Clarabel, InteriorPoint, OptimalPlanner, Planner, QpSolver, SmoothingPlanner, Trajectory, stroke_program,
 };
+use paintcopter_benches::planner::helix;
 use paintcopter_benches::{criterion, rock};
 use paintcopter_examples::adapters::{MeshSurface, Robot};
 use paintcopter_examples::mission::MissionSettings;
@@ -50,14 +49,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("the two solvers disagree".into());
     }
 
-    // A helix at half a metre per second.
-    let knot = |k: usize| {
-        let turn = TAU * k as f64 / 100.0;
-        Vector4::new(turn.cos(), turn.sin(), 0.01 * k as f64, turn)
-    };
-    let knots: Vec<Vector4<f64>> = (0..KNOTS).map(knot).collect();
-    let durations: Vec<f64> = knots.windows(2).map(|w| (w[1].xyz() - w[0].xyz()).norm() / 0.5).collect();
-    let rest: Vec<bool> = (0..KNOTS).map(|k| k == 0 || k == KNOTS - 1).collect();
+    let (knots, durations, rest) = helix(KNOTS);
     let trajectory = Trajectory::minimum_snap(&knots, &durations, &rest)?;
     group.bench_function(format!("minimum snap through {KNOTS} knots"), |b| {
         b.iter(|| Trajectory::minimum_snap(&knots, &durations, &rest));

@@ -149,15 +149,19 @@ fn quality(form: &StandardForm, states: &[Vector5<f64>]) -> (f64, f64) {
     (objective, violation)
 }
 
-fn trajectory(runs: usize) -> Result<(), AnyError> {
-    // A helix at half a metre per second.
+/// A helix at half a metre per second: knots (metres, and the heading in radians), seconds between them, and where it rests.
+pub fn helix(count: usize) -> (Vec<Vector4<f64>>, Vec<f64>, Vec<bool>) {
     let knot = |k: usize| {
         let turn = TAU * k as f64 / 100.0;
         Vector4::new(turn.cos(), turn.sin(), 0.01 * k as f64, turn)
     };
-    let knots: Vec<Vector4<f64>> = (0..KNOTS).map(knot).collect();
-    let durations: Vec<f64> = knots.windows(2).map(|w| (w[1].xyz() - w[0].xyz()).norm() / 0.5).collect();
-    let rest: Vec<bool> = (0..KNOTS).map(|k| k == 0 || k == KNOTS - 1).collect();
+    let knots: Vec<Vector4<f64>> = (0..count).map(knot).collect();
+    let durations = knots.windows(2).map(|w| (w[1].xyz() - w[0].xyz()).norm() / 0.5).collect();
+    (knots, durations, (0..count).map(|k| k == 0 || k + 1 == count).collect())
+}
+
+fn trajectory(runs: usize) -> Result<(), AnyError> {
+    let (knots, durations, rest) = helix(KNOTS);
     Trajectory::minimum_snap(&knots, &durations, &rest)?;
     let cpu_ms = 1e3 * median_seconds(runs, || Trajectory::minimum_snap(&knots, &durations, &rest));
     println!("{}", json!({ "fig": "minimum_snap_1000_knots_4_axes", "peer": "paint-planner", "cpu_ms": cpu_ms }));

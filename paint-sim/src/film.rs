@@ -1,11 +1,11 @@
 //! The paint on the surface, texel by texel, counted in whole femtolitres.
 
-use crate::trace::{event, span};
 use std::sync::Arc;
 
 use crate::error::{Error, check_positive, check_range};
 use crate::spray::{QUANTUM, Shot, SprayModel};
 use crate::surface::Surface;
+use crate::trace::{event, span};
 
 mod ball_tree;
 mod deposit;

@@ -1,10 +1,10 @@
 //! The flight that paints: vehicle, wind, hose, pan-tilt unit and controller in a closed loop at 1 kHz.
 
-use crate::trace::{event, span};
 use nalgebra::{Isometry3, Vector3};
 
 use crate::error::{Error, check_range};
 use crate::surface::Surface;
+use crate::trace::{event, span};
 
 mod airframe;
 mod controller;

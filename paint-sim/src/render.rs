@@ -1,11 +1,11 @@
 //! A small ray caster: colour, depth, face ids and normals of a painted surface from any pinhole camera.
 
-use crate::trace::span;
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 
 use crate::colour::encode_srgb8;
 use crate::error::{Error, check_positive, check_range};
 use crate::surface::{Hit, Surface};
+use crate::trace::span;
 
 /// Rays end here, m: beyond it there is only background.
 const MAX_RAY_LENGTH: f64 = 1e4;

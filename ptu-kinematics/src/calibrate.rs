@@ -1,6 +1,5 @@
 //! Identification of the hardware constants from measured nozzle poses.
 
-use crate::trace::span;
 use nalgebra::{DMatrix, DVector, Point3, UnitVector3, Vector3};
 
 use crate::angle::elevation_rotation;
@@ -9,6 +8,7 @@ use crate::hover::Nozzle;
 use crate::joints::Joints;
 use crate::pan_tilt::Ptu;
 use crate::settings::PtuSettings;
+use crate::trace::span;
 
 /// One measured nozzle pose, in body axes, with the joint angles at that moment.
 #[derive(Debug, Clone, Copy, PartialEq)]

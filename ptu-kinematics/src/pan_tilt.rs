@@ -1,8 +1,5 @@
 //! The pan-tilt unit: closed forms for everything.
 
-use crate::trace::event;
-#[cfg(feature = "urdf")]
-use crate::trace::span;
 use nalgebra::{Isometry3, Matrix6, Matrix6xX, Point3, UnitQuaternion, UnitVector3, Vector3};
 
 use crate::aim::{Aim, aim_in_body};
@@ -14,6 +11,9 @@ use crate::joints::{Joints, Range};
 #[cfg(feature = "urdf")]
 use crate::pan_tilt_urdf::{UrdfJointSigns, read_settings};
 use crate::settings::PtuSettings;
+use crate::trace::event;
+#[cfg(feature = "urdf")]
+use crate::trace::span;
 
 /// `∂(p, h) / ∂(r, ψ, θ₁, θ₂)`: rows are tip (3) and direction (3), columns position (3), heading, pan, tilt.
 pub type Jacobian = Matrix6<f64>;

@@ -1,7 +1,5 @@
 //! A serial arm with any number of revolute joints; its inverse is numeric.
 
-#[cfg(feature = "urdf")]
-use crate::trace::span;
 use nalgebra::{Isometry3, Matrix3, Matrix3xX, Matrix6xX, Point3, UnitQuaternion, UnitVector3, Vector3};
 
 use crate::angle::elevation_rotation;
@@ -9,6 +7,8 @@ use crate::chain::KinematicChain;
 use crate::error::{Error, finite};
 use crate::hover::{Hover, Nozzle};
 use crate::joints::Range;
+#[cfg(feature = "urdf")]
+use crate::trace::span;
 
 /// Steps of the inverse; from the rest posture about ten are needed.
 const MAX_STEPS: usize = 200;

@@ -1,6 +1,5 @@
 //! The map: fuse, take out, look, mesh, ask, store.
 
-use crate::trace::{event, span};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -30,6 +29,7 @@ use crate::storage::frame_update::{FrameJob, apply_frame};
 use crate::storage::merge_policy::{MergeDecision, MergePolicy};
 use crate::storage::reloaded::ReloadedBlocks;
 use crate::storage::swap_file::SwapFile;
+use crate::trace::{event, span};
 
 /// A truncated signed distance field in hashed blocks of 8³ voxels.
 ///

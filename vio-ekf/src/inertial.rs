@@ -51,7 +51,10 @@ pub struct InertialOdometry {
 }
 
 impl InertialOdometry {
-    /// From a state at the time of a sample or after it. Refuses what cannot be.
+    /// From a state at the time of a sample or after it; `gravity` in m/s².
+    ///
+    /// # Errors
+    /// [`Error`]: a state before the sample, numbers that are not finite, noise, settings or a gravity out of range.
     pub fn new(
         initial: &InitialState,
         sample: Imu,
@@ -77,7 +80,10 @@ impl InertialOdometry {
         })
     }
 
-    /// Takes an inertial sample; stamps must increase. Samples until the initial state move nothing.
+    /// Takes an inertial sample. Samples until the initial state move nothing.
+    ///
+    /// # Errors
+    /// [`Error`]: a stamp that is not after the one before, numbers that are not finite. The sample is then left out.
     pub fn imu(&mut self, sample: &Imu) -> Result<(), Error> {
         sample.check_after(Some(self.buffer.latest()))?;
         self.buffer.push(*sample);
@@ -95,7 +101,7 @@ impl InertialOdometry {
         Ok(())
     }
 
-    /// The estimate at the time of the latest sample.
+    /// The estimate at the time of the latest sample, in the world of the initial state; covariance as [`Odometry::covariance`] has it.
     pub fn output(&self) -> Odometry {
         let here = ImuPreintegration::default();
         Odometry::predict(&self.core, &self.covariance, (&self.buffer, &here), self.gravity)

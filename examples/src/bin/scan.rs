@@ -34,9 +34,9 @@ struct Arguments {
     #[arg(long, value_name = "FILE", requires = "pose_file")]
     body_from_camera: Option<PathBuf>,
     /// With --poses odometry: standard deviations of the recorded motion from one frame to the next, of the turn about each axis and of
-    /// the shift along it
-    #[arg(long, value_name = "DEGREES,METRES", value_parser = parse_odometry_error, default_value = "0.5,0.01")]
-    odometry_error: [f64; 2],
+    /// the shift along it [default: 0.5,0.01]
+    #[arg(long, value_name = "DEGREES,METRES", value_parser = parse_odometry_error)]
+    odometry_error: Option<[f64; 2]>,
     /// Edge of a voxel, metres
     #[arg(long, value_name = "METRES", default_value_t = 0.01)]
     voxel: f64,
@@ -225,12 +225,16 @@ fn settings(arguments: &Arguments, sequence: &Sequence) -> Result<ScanSettings, 
         DeviceName::Auto | DeviceName::Cpu => Device::Cpu,
     };
     let swap = (arguments.disk_mib > 0).then(|| arguments.out.join("map.swap"));
+    if arguments.odometry_error.is_some() && !matches!(arguments.poses, Poses::Odometry) {
+        return Err("--odometry-error: goes with --poses odometry".into());
+    }
     let poses = match arguments.poses {
         // Recorded poses are in another world than that of the stored map.
         Poses::Given if arguments.relocalise.is_none() => PoseSource::Given,
         Poses::Given | Poses::Tracked => PoseSource::Tracked,
         Poses::Odometry => {
-            PoseSource::Odometry(OdometryError { deviations: arguments.odometry_error, interval: sequence.interval() })
+            let deviations = arguments.odometry_error.unwrap_or([0.5_f64.to_radians(), 0.01]);
+            PoseSource::Odometry(OdometryError { deviations, interval: sequence.interval() })
         }
     };
     let interval = Duration::try_from_secs_f64(arguments.checkpoint)

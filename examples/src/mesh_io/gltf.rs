@@ -42,9 +42,7 @@ pub(super) fn parse(bytes: &[u8], folder: &Path) -> Result<TriangleMesh, Fault> 
     joined.read_materials(&document, folder)?;
     match document.default_scene().or_else(|| document.scenes().next()) {
         Some(scene) => {
-            for node in scene.nodes() {
-                joined.add_node(&node, &Matrix4::identity())?;
-            }
+            joined.add_nodes(scene.nodes().collect())?;
             let others = document.scenes().count() - 1;
             if others > 0 {
                 joined.notes.push(format!("{others} other scene(s) of the file left aside"));
@@ -138,21 +136,27 @@ impl Joined {
         Ok(())
     }
 
-    fn add_node(&mut self, node: &Node, world_from_parent: &Matrix4<f64>) -> Result<(), Fault> {
-        // A node with two parents, or its own ancestor, would be walked for ever.
-        if std::mem::replace(&mut self.visited[node.index()], true) {
-            let what = "has more than one parent: export it again".to_owned();
-            return Err(Fault { place: format!("node {}", node.index()), what });
-        }
-        let world_from_node =
-            world_from_parent * Matrix4::from(node.transform().matrix().map(|column| column.map(f64::from)));
-        if let Some(mesh) = node.mesh() {
-            for primitive in mesh.primitives() {
-                self.posed += usize::from(node.skin().is_some() || primitive.morph_targets().next().is_some());
-                self.add_primitive(&primitive, &world_from_node)?;
+    /// Nodes and what hangs below them, each before its children. Without recursion: a file may nest as deep as it likes.
+    fn add_nodes(&mut self, roots: Vec<Node>) -> Result<(), Fault> {
+        let mut open: Vec<(Node, Matrix4<f64>)> = roots.into_iter().rev().map(|n| (n, Matrix4::identity())).collect();
+        while let Some((node, world_from_parent)) = open.pop() {
+            // A node with two parents, or its own ancestor, would be walked for ever.
+            if std::mem::replace(&mut self.visited[node.index()], true) {
+                let what = "has more than one parent: export it again".to_owned();
+                return Err(Fault { place: format!("node {}", node.index()), what });
             }
+            let world_from_node =
+                world_from_parent * Matrix4::from(node.transform().matrix().map(|column| column.map(f64::from)));
+            if let Some(mesh) = node.mesh() {
+                for primitive in mesh.primitives() {
+                    self.posed += usize::from(node.skin().is_some() || primitive.morph_targets().next().is_some());
+                    self.add_primitive(&primitive, &world_from_node)?;
+                }
+            }
+            let children: Vec<Node> = node.children().collect();
+            open.extend(children.into_iter().rev().map(|child| (child, world_from_node)));
         }
-        node.children().try_for_each(|child| self.add_node(&child, &world_from_node))
+        Ok(())
     }
 
     fn add_primitive(&mut self, primitive: &Primitive, world_from_node: &Matrix4<f64>) -> Result<(), Fault> {

@@ -248,13 +248,7 @@ impl Live {
             colors: Vec::new(),
             indices: Vec::new(),
         };
-        let entity = SceneEntity {
-            timestamp: Some(timestamp(stamp)),
-            frame_id: "world".into(),
-            id: format!("trajectory {number}"),
-            lines: vec![line],
-            ..SceneEntity::default()
-        };
+        let entity = SceneEntity { lines: vec![line], ..entity(stamp, format!("trajectory {number}")) };
         self.trajectory.log_with_meta(&scene(vec![entity]), at(stamp));
     }
 }
@@ -272,6 +266,11 @@ fn at(stamp: f64) -> PartialMetadata {
     PartialMetadata { log_time: Some((stamp.max(0.0) * 1e9).round() as u64) }
 }
 
+/// Something in the world that takes the place of what had its name before.
+fn entity(stamp: f64, id: String) -> SceneEntity {
+    SceneEntity { timestamp: Some(timestamp(stamp)), frame_id: "world".into(), id, ..SceneEntity::default() }
+}
+
 /// A patch takes the place of what it was before.
 fn patch_scene(stamp: f64, key: PatchKey, mesher: &IncrementalMesher) -> SceneUpdate {
     let mesh = mesher.patch(key);
@@ -283,13 +282,7 @@ fn patch_scene(stamp: f64, key: PatchKey, mesher: &IncrementalMesher) -> SceneUp
         colors: mesh.colours.iter().map(|colour| rgb(*colour)).collect(),
         indices: mesh.faces.into_flattened(),
     };
-    let entity = SceneEntity {
-        timestamp: Some(timestamp(stamp)),
-        frame_id: "world".into(),
-        id: format!("patch {x} {y} {z}"),
-        triangles: vec![triangles],
-        ..SceneEntity::default()
-    };
+    let entity = SceneEntity { triangles: vec![triangles], ..entity(stamp, format!("patch {x} {y} {z}")) };
     scene(vec![entity])
 }
 

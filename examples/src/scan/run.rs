@@ -169,6 +169,10 @@ impl<'a> Run<'a> {
         if let (Some(tracker), Some(last)) = (&mut tracker, progress.trajectory.poses().last()) {
             tracker.start(*last);
         }
+        let live = Live::open(&settings.live)?;
+        if live.is_some() && store.map().is_none() {
+            eprintln!("warning: the mesh of a map on a GPU is not shown while it grows: use --device cpu");
+        }
         let loops = if settings.loops { Some(Loops::new(store.settings())?) } else { None };
         Ok(Self {
             sequence,
@@ -187,7 +191,7 @@ impl<'a> Run<'a> {
             skipped: Vec::new(),
             lost: Vec::new(),
             metrics: ScanMetrics::default(),
-            live: Live::open(&settings.live)?,
+            live,
         })
     }
 

@@ -137,6 +137,20 @@ fn nodes_move_turn_and_mirror() {
 }
 
 /// Quantised positions, sparse changes, a strip, 16-bit indices, vertex colours, and a primitive without coordinates.
+/// Two hundred thousand nodes, each the only child of the one before, a millimetre up: deeper than any stack.
+#[test]
+fn nodes_may_nest_as_deep_as_they_like() {
+    const DEEP: usize = 200_000;
+    let mut d = Document::square();
+    let node = |k: usize| json!({"children": [k + 1], "translation": [0.0, 0.001, 0.0]});
+    let mut nodes: Vec<Value> = (0..DEEP).map(node).collect();
+    nodes.push(json!({"mesh": 0}));
+    d.json["nodes"] = nodes.into();
+    let mesh = read(&d.glb()).unwrap();
+    let low = mesh.bounds().0;
+    assert!((f64::from(low[1]) - 200.0).abs() < 1e-3, "{low:?}");
+}
+
 #[test]
 fn encodings_and_joined_primitives() {
     let mut d = Document::square();

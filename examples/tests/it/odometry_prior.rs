@@ -84,6 +84,9 @@ fn an_error_of_nothing_is_refused() {
         assert!(!ran.ok, "{wrong}");
         ran.says(&["--odometry-error"]);
     }
+    let ran = scan(&s, &["--poses", "tracked", "--odometry-error", "1,0.01"]);
+    assert!(!ran.ok);
+    ran.says(&["--odometry-error: goes with --poses odometry"]);
 }
 
 /// A file beside the recording, of a body that the camera sits on, at other stamps than the images'.

@@ -1,6 +1,5 @@
 //! A pose graph.
 
-use crate::trace::span;
 use nalgebra::Isometry3;
 
 use crate::error::Error;
@@ -8,6 +7,7 @@ use crate::images::check_pose;
 use crate::pose_graph::chordal;
 use crate::pose_graph::factors::{BetweenFactor, PriorFactor};
 use crate::pose_graph::levenberg_marquardt::{PoseGraphReport, PoseGraphSettings, cost, minimise};
+use crate::trace::span;
 
 /// Poses and what was measured about them; [`optimise`](Self::optimise) finds the poses that fit best:
 ///

@@ -1,6 +1,5 @@
 //! The tracker: one frame against the map.
 
-use crate::trace::{event, span};
 use nalgebra::{Isometry3, Matrix6};
 
 use crate::blocks::voxel_block::MAX_WEIGHT;
@@ -9,6 +8,7 @@ use crate::error::Error;
 use crate::images::{ColourView, DepthView, check_pose};
 use crate::ray_cast::settings::RayCastSettings;
 use crate::ray_cast::view::View;
+use crate::trace::{event, span};
 use crate::tracking::directions::{Directions, LEAST_SHARE};
 use crate::tracking::image_level::{ImageLevel, reduced};
 use crate::tracking::likeness::intensity_correlation;
@@ -205,7 +205,7 @@ impl Tracker {
         let reduction = settings.reduction(depth.width) as f64;
         let outcome = self.outcome(&mut search, &last, &comparison, view, reduction, prior);
         if !outcome.is_tracked() {
-            event!(warn, status = ?outcome.status, agreement = outcome.agreement, "camera lost");
+            event!(debug, status = ?outcome.status, agreement = outcome.agreement, "not tracked from this prior");
         }
         Ok(outcome)
     }

@@ -1,12 +1,12 @@
 //! Whether the accelerometer is calibrated: estimates its matrix at first, and goes on with it only if it is not the identity.
 
-use crate::trace::event;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::estimator::Estimator;
 use super::innovation_adaptation::Correction;
 use super::state::error_state::{ACCEL_MATRIX, MATRIX_SIZE};
 use crate::core::imu_noise_estimator::ImuSettings;
+use crate::trace::event;
 
 /// The matrix, row by row.
 pub(crate) type Entries = SVector<f64, MATRIX_SIZE>;

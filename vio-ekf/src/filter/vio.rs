@@ -1,6 +1,5 @@
 //! The odometry as its callers see it, and one image as the steps of the algorithm.
 
-use crate::trace::{event, span};
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Unit, Vector2, Vector3};
@@ -37,6 +36,7 @@ use crate::core::initial_state::InitialState;
 use crate::core::odometry::Odometry;
 use crate::error::invalid;
 use crate::format::calibration::{CameraCalibration, ImuCalibration};
+use crate::trace::{event, span};
 use crate::{CameraModel, Error, ImageView, Imu, ImuNoise, Stamp, so3};
 
 /// A measurement this much ahead of the inertial samples, in seconds, is waiting for data that does not come.
