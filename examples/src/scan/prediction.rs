@@ -88,3 +88,43 @@ impl Prediction {
 fn recorded(frame: &FrameFiles) -> Option<(f64, Isometry3<f64>)> {
     Some((frame.stamp, frame.world_from_camera?))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scan::ImageSource;
+
+    fn frame(stamp: f64, x: f64) -> FrameFiles {
+        let depth = ImageSource::File("depth.png".into());
+        FrameFiles {
+            stamp,
+            depth,
+            colour: None,
+            world_from_camera: Some(Isometry3::translation(x, 0.0, 0.0)),
+            lost: false,
+        }
+    }
+
+    /// Variances of errors that do not know of each other add: over a gap of three frames, three of them; and of a frame that was lost.
+    #[test]
+    fn the_error_of_odometry_grows_over_a_gap() {
+        let error = OdometryError { deviations: [0.01, 0.02], interval: 0.1 };
+        let mut prediction = Prediction::new(Some(error));
+        prediction.start(Isometry3::identity(), Some(&frame(5.0, 1.0)));
+        let variance = |prediction: &Prediction, frame: &FrameFiles| {
+            let prior = prediction.priors(frame)[0];
+            assert!(
+                (prior.world_from_camera.translation.x - (frame.world_from_camera.unwrap().translation.x - 1.0)).abs()
+                    < 1e-12
+            );
+            prior.covariance.unwrap()[(3, 3)]
+        };
+        assert!((variance(&prediction, &frame(5.1, 1.5)) - 4e-4).abs() < 1e-12);
+        assert!((variance(&prediction, &frame(5.3, 1.5)) - 12e-4).abs() < 1e-12);
+        prediction.lost(&frame(5.1, 1.5));
+        assert!((variance(&prediction, &frame(5.2, 1.7)) - 8e-4).abs() < 1e-12);
+        // Without a recorded pose the motion before is all there is: none here.
+        let unrecorded = FrameFiles { world_from_camera: None, ..frame(5.2, 0.0) };
+        assert!(prediction.priors(&unrecorded)[0].covariance.is_none());
+    }
+}

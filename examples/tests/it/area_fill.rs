@@ -17,14 +17,14 @@ const COAT: f64 = 25e-6;
 /// Cells of the wall, 5 cm each.
 const CELLS: (u32, u32) = (32, 20);
 
-/// A wall of 1.6 x 1.0 m that faces -x and swells by 12 cm in its middle, with a window of 0.4 x 0.3 m beside that.
+/// A wall of 1.6 x 1.0 m that faces -x and swells by 35 cm in its middle, with a window of 0.4 x 0.3 m beside that.
 fn wall() -> TriangleMesh {
     let (columns, rows) = CELLS;
     let mut mesh = TriangleMesh::default();
     for row in 0..=rows {
         for column in 0..=columns {
             let (s, t) = (f64::from(column) / f64::from(columns), f64::from(row) / f64::from(rows));
-            let swelling = 0.12 * (PI * s).sin() * (PI * t).sin();
+            let swelling = 0.35 * (PI * s).sin() * (PI * t).sin();
             mesh.positions.push([-swelling, 0.8 - 1.6 * s, 2.0 + t].map(|c| c as f32));
         }
     }
@@ -63,7 +63,8 @@ fn a_wall_with_a_window_gets_an_even_coat() {
         report.paint_deposited_kg
     );
     assert!(covered >= 0.99, "{covered}");
-    assert!(deviation <= 0.1, "{deviation}");
+    // 8.7 % with the doses of the plane.
+    assert!(deviation <= 0.075, "{deviation}");
     // The paint that it takes, from the area alone.
     assert!((report.paint_deposited_kg / asked - 1.0).abs() < 0.04, "{} of {asked} kg", report.paint_deposited_kg);
     assert_eq!((report.collisions, report.limit_violations), (0, 0));

@@ -12,13 +12,14 @@ fn small_wall() -> paintcopter_examples::mesh_io::TriangleMesh {
     mesh
 }
 
-/// The floors are what a person would call a useful scan, several times what is reached.
+/// The floors are twice and more what is reached; by odometry alone the robot would be off by 7 to 10 mm.
 #[test]
 fn a_wall_is_mapped_by_the_robots_own_senses_whatever_the_threads() {
     let scan = ScanFlight::fly(&small_wall(), 1, 2).unwrap();
     let figures = &scan.figures;
     println!("{figures:?}");
-    assert!(figures.position_error_max_m < 0.01 && figures.ate_se3_rmse_m < 0.005);
+    assert!(figures.position_error_max_m < 0.004 && figures.ate_se3_rmse_m < 0.002);
+    assert!(figures.position_error_max_m < 0.7 * figures.odometry_error_max_m);
     assert!(figures.mesh_error_mean_m < 0.003 && figures.covered_share > 0.97);
     assert!(figures.path_length_m > 1.5 && figures.duration_s > 3.0);
     let again = ScanFlight::fly(&small_wall(), 1, 1).unwrap();
