@@ -35,7 +35,7 @@ pub struct ImuSettings {
     pub max_innovation_inflation: f64,
     /// Whether scale and axes of the accelerometer are estimated; ours: when the images ask for it.
     pub accel_matrix: AccelMatrixEstimation,
-    /// Standard deviation of the accelerometer's scale on each axis, relative, where it is estimated; ours: 0.0375, a cheap
+    /// Standard deviation of the accelerometer's scale on each axis, relative, where it is estimated; ours: 0.05, a cheap
     /// sensor without calibration.
     pub accel_scale_sigma: f64,
     /// Standard deviation of the angles between the accelerometer's axes and those of the body, rad, where they are estimated; ours:
@@ -53,7 +53,7 @@ impl Default for ImuSettings {
             noise_inflation: 4.0,
             max_innovation_inflation: 30.0,
             accel_matrix: AccelMatrixEstimation::WhenNeeded,
-            accel_scale_sigma: 0.0375,
+            accel_scale_sigma: 0.05,
             accel_misalignment_sigma: 0.025,
             buffer_samples: 256,
         }

@@ -14,11 +14,9 @@ type Information = SMatrix<f64, MATRIX_SIZE, MATRIX_SIZE>;
 
 /// Seconds of motion before the identity is chosen.
 const TRIAL_S: f64 = 2.0;
-/// Share of the prior deviations that a trial begins with: what is calibrated loses no accuracy.
-const TRIAL_PRIOR: f64 = 0.4;
-/// Logarithm of the density ratio below which they are inadequate.
-const INADEQUATE: f64 = -2.0;
-/// The same above which the identity is chosen once it has been doubted.
+/// Logarithm of the density ratio above which the identity is chosen at first.
+const MORE_PROBABLE: f64 = 0.0;
+/// The same once it has been chosen, and contradicted.
 const CONVINCING: f64 = 3.0;
 /// Factor on the accelerometer's noise from which on errors of the matrix do not explain what is corrected.
 const UNEXPLAINED: f64 = 3.0;
@@ -29,20 +27,20 @@ const CONTRADICTION: f64 = 30.0;
 
 /// Chooses between two models of the accelerometer, `A = I` and `A` with its prior `Σ₀`.
 ///
-/// Once the body moves the second one is on trial, with a part of the prior. Once the identity is more probable than it was (the
-/// Savage-Dickey density ratio; Dickey 1971) it is chosen: the estimate is conditioned on `A = I`, which leaves what a filter would
-/// have found that had known it from the start. Once it is a good deal less probable, all of the prior is admitted. After the
-/// choice of the identity a score test (Rao 1948) watches the corrections, and a contradiction reopens the case.
+/// Once the body moves the second one is on trial. Once the identity is more probable than it was (the Savage-Dickey density ratio;
+/// Dickey 1971) it is chosen: the estimate is conditioned on `A = I`, which leaves what a filter would have found that had known it
+/// from the start. A trial with a narrower prior would cost no less on a calibrated sensor, and leave errors behind on another. After
+/// the choice of the identity a score test (Rao 1948) watches the corrections, and a contradiction reopens the case.
 // No allocation while the filter runs, so no box.
 #[allow(clippy::large_enum_variant)]
 #[derive(Debug, Clone)]
 pub(crate) enum AccelMatrixSelection {
     /// Nothing has moved yet.
     Waiting,
-    /// Estimated for so many seconds of motion, with a share of the prior deviations.
+    /// Estimated for so many seconds of motion, until the density ratio is above `enough`.
     Estimated {
         duration: f64,
-        share: f64,
+        enough: f64,
     },
     Identity(ScoreTest),
 }
@@ -61,39 +59,33 @@ impl AccelMatrixSelection {
             Self::Waiting => {
                 // What was measured at rest is the bias that goes with `A = I`.
                 let reading = if rested { estimator.impulse.0 / estimator.impulse.1 } else { Vector3::zeros() };
-                estimator.estimate_accel_matrix(&prior_sigma(settings, TRIAL_PRIOR), &reading);
-                *self = Self::Estimated { duration: 0.0, share: TRIAL_PRIOR };
+                estimator.estimate_accel_matrix(&prior_sigma(settings), &reading);
+                *self = Self::Estimated { duration: 0.0, enough: MORE_PROBABLE };
             }
-            Self::Estimated { duration, share } => {
+            Self::Estimated { duration, enough } => {
                 *duration += estimator.impulse.1;
-                let Some(ratio) = log_density_ratio(estimator, &prior_sigma(settings, *share)) else { return };
-                let enough = if *share < 1.0 { 0.0 } else { CONVINCING };
-                if *duration >= TRIAL_S && (ratio > enough || noise_factor > UNEXPLAINED) {
+                let Some(ratio) = log_density_ratio(estimator, &prior_sigma(settings)) else { return };
+                if *duration >= TRIAL_S && (ratio > *enough || noise_factor > UNEXPLAINED) {
                     event!(debug, ratio, noise_factor, "accelerometer taken as calibrated");
                     estimator.fix_accel_matrix();
                     *self = Self::Identity(ScoreTest::default());
-                } else if ratio < INADEQUATE && *share < 1.0 {
-                    event!(info, ratio, "accelerometer is not calibrated: scale and axes are estimated");
-                    let mean_reading = estimator.impulse.0 / estimator.impulse.1;
-                    estimator.inflate_accel_matrix(&prior_sigma(settings, 1.0), &mean_reading);
-                    (*duration, *share) = (0.0, 1.0);
                 }
             }
             Self::Identity(test) => {
-                let prior = prior_sigma(settings, 1.0);
+                let prior = prior_sigma(settings);
                 if let Some(mean_reading) = test.update(&correction.velocity, &estimator.impulse, &prior) {
                     event!(info, "accelerometer is not calibrated any more: scale and axes are estimated");
                     estimator.estimate_accel_matrix(&prior, &mean_reading);
-                    *self = Self::Estimated { duration: 0.0, share: 1.0 };
+                    *self = Self::Estimated { duration: 0.0, enough: CONVINCING };
                 }
             }
         }
     }
 }
 
-/// Deviations of the entries, times a factor; one that is known exactly hardly counts.
-pub(crate) fn prior_sigma(settings: &ImuSettings, factor: f64) -> Entries {
-    Entries::from_fn(|k, _| (factor * settings.accel_matrix_sigma(k)).max(1e-9))
+/// Deviations of the entries; one that is known exactly hardly counts.
+pub(crate) fn prior_sigma(settings: &ImuSettings) -> Entries {
+    Entries::from_fn(|k, _| settings.accel_matrix_sigma(k).max(1e-9))
 }
 
 /// Logarithm of the posterior over the prior density of `A = I`.

@@ -98,22 +98,6 @@ impl Estimator {
         }
     }
 
-    /// Admits that the prior of the matrix was too narrow: the bias has taken the blame here as well.
-    pub(crate) fn inflate_accel_matrix(
-        &mut self,
-        sigma: &SVector<f64, { error_state::MATRIX_SIZE }>,
-        mean_reading: &Vector3<f64>,
-    ) {
-        for (entry, sigma) in sigma.iter().enumerate() {
-            let (row, bias) = (error_state::ACCEL_MATRIX + entry, error_state::ACCEL_BIAS + entry / 3);
-            let reading = mean_reading[entry % 3];
-            // As if the reading times an error of the matrix had been added to the bias: `(b, a) ← (b + f e, a + e)`.
-            self.covariance.add_row(bias, -reading, row);
-            self.covariance.inflate(row, sigma * sigma);
-            self.covariance.add_row(bias, reading, row);
-        }
-    }
-
     /// Ends that: the whole estimate is conditioned on the identity.
     pub(crate) fn fix_accel_matrix(&mut self) {
         const SIZE: usize = error_state::MATRIX_SIZE;

@@ -49,7 +49,7 @@ pub(crate) struct TrackingState {
 impl TrackingState {
     pub(crate) fn new(mut estimator: Estimator, max_count: usize, imu: &ImuSettings) -> Self {
         if imu.accel_matrix == AccelMatrixEstimation::Always {
-            estimator.estimate_accel_matrix(&prior_sigma(imu, 1.0), &Vector3::zeros());
+            estimator.estimate_accel_matrix(&prior_sigma(imu), &Vector3::zeros());
         }
         Self {
             estimator,
