@@ -47,6 +47,10 @@ pub(super) struct Located {
     pub(super) earlier: Vec<Isometry3<f64>>,
 }
 
+/// Least agreement of a frame with a map that stays as it is (ours): of real recordings, frames that were placed within seven
+/// centimetres agreed by 83 % or more, those that were off by more by 77 % or less.
+const FIXED_MAP_AGREEMENT: f64 = 0.8;
+
 /// Poses from the tracker: each frame against the map, from where the poses before lead.
 pub(super) struct CameraTracker {
     tracker: Tracker,
@@ -73,8 +77,10 @@ impl CameraTracker {
         loops: bool,
     ) -> Result<Self, ScanError> {
         let settings = TrackingSettings { noise: map.noise, threads: map.threads, ..TrackingSettings::default() };
+        // What is not fused does not grow the map: a camera that leaves it agrees less and less, and is led astray by what is left.
+        let min_agreement = if fixed_map { FIXED_MAP_AGREEMENT } else { settings.min_agreement };
         Ok(Self {
-            tracker: Tracker::new(settings)?,
+            tracker: Tracker::new(TrackingSettings { min_agreement, ..settings })?,
             relocaliser: Relocaliser::new(settings)?,
             recent: loops.then(|| RecentMap::new(map)),
             prediction: Prediction::new(odometry),

@@ -6,7 +6,7 @@ use image::{ImageBuffer, Luma};
 use vio_ekf::tum;
 
 use crate::scratch::Scratch;
-use crate::strange_recordings::{FRAMES, SIZE, pose, recording, scan};
+use crate::strange_recordings::{FRAMES, SIZE, change, pose, recording, scan};
 
 fn copied(s: &Scratch, name: &str) -> String {
     let map = s.path(name);
@@ -65,6 +65,22 @@ fn a_camera_elsewhere_is_not_found() {
     s.write("none.tsdf", "");
     let ran = scan(&s, &["--relocalise", &s.path("none.tsdf")]);
     assert!(!ran.ok && ran.said.contains("none.tsdf"), "{}", ran.said);
+}
+
+/// A third of what is seen has come nearer by 15 cm: too much to be believed where the map cannot learn, and no matter where it does.
+#[test]
+fn a_stored_map_is_not_believed_where_much_has_changed() {
+    let s = recording("changed");
+    assert!(scan(&s, &[]).ok);
+    let map = copied(&s, "stored.tsdf");
+    for k in 6..FRAMES {
+        change(&s, k, |u, _, depth| if u < SIZE.0 / 3 { depth - 150 } else { depth });
+    }
+    let ran = scan(&s, &["--relocalise", &map]);
+    assert_eq!(ran.figure("frames"), 6.0, "{}", ran.said);
+    ran.says(&["the camera is lost", "of the pixels agree with the map"]);
+    let ran = scan(&s, &["--relocalise", &map, "--extend"]);
+    assert!(ran.ok && ran.figure("frames") == FRAMES as f64, "{}", ran.said);
 }
 
 /// Four frames of the mapped place, then a staircase that never was in the map.

@@ -105,7 +105,7 @@ pub(crate) fn scan(s: &Scratch, options: &[&str]) -> Ran {
 }
 
 /// Changes the pixels of a depth image.
-fn change(s: &Scratch, k: usize, f: impl Fn(u32, u32, u16) -> u16) {
+pub(crate) fn change(s: &Scratch, k: usize, f: impl Fn(u32, u32, u16) -> u16) {
     let path = s.0.join(format!("depth/{k}.png"));
     let mut image = image::open(&path).unwrap().into_luma16();
     image.enumerate_pixels_mut().for_each(|(u, v, pixel)| pixel.0 = [f(u, v, pixel.0[0])]);
