@@ -35,4 +35,4 @@ pub use plan_output::{PlanFigures, save_plan};
 pub use planned_mission::PlannedMission;
 pub use preview::{Preview, preview};
 pub use run::Mission;
-pub use settings::{MissionSettings, PainterChoice};
+pub use settings::{ControllerChoice, MissionSettings, PainterChoice};

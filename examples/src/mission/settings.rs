@@ -40,6 +40,19 @@ pub struct MissionSettings {
     pub ptu: PtuSettings,
     /// The servos of its pan-tilt unit.
     pub servo: ServoSettings,
+    /// Who flies it.
+    pub controller: ControllerChoice,
+}
+
+/// The flight controllers to choose from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ControllerChoice {
+    /// `paint_sim::flight::CascadedController`: the better aim in a light wind.
+    #[default]
+    Cascade,
+    /// `paint_planner::control::TrackingMpc`: keeps the distance better, above all in strong gusts.
+    Mpc,
 }
 
 /// The painters to choose from.
@@ -74,6 +87,7 @@ impl Default for MissionSettings {
             planner: planner_settings(),
             ptu: PtuSettings::default(),
             servo: ServoSettings::default(),
+            controller: ControllerChoice::default(),
         }
     }
 }
