@@ -6,6 +6,7 @@ mod dose_correction;
 mod error;
 mod figures;
 mod fly;
+mod given_up;
 mod inspect;
 mod mission_output;
 mod path_view;

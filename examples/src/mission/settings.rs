@@ -107,11 +107,13 @@ impl MissionSettings {
 
 /// The planner's defaults with a weaker pull between neighbours, as the normals are averaged over a footprint already, and a strong
 /// one to the stand-off: where the tilt joint ends, a nozzle off the normal would come near to be less far off it, and its spot
-/// shrink to a dark dot.
+/// shrink to a dark dot. The spray rises to 40 degrees, not to the 45 of the joint: the body leans against the wind, and a joint at its
+/// end misses by a centimetre and more.
 fn planner_settings() -> paint_planner::Settings {
     let defaults = paint_planner::Settings::default();
+    let max_elevation = 40.0_f64.to_radians();
     paint_planner::Settings {
-        nozzle: paint_planner::NozzleSettings { ca: 0.1, cb: 0.002, distance: 0.3, ..defaults.nozzle },
+        nozzle: paint_planner::NozzleSettings { ca: 0.1, cb: 0.002, distance: 0.3, max_elevation, ..defaults.nozzle },
         ..defaults
     }
 }
