@@ -1,6 +1,7 @@
 //! What the benches share: scenes of the size of the built-in world, seeded and built in memory, and criterion's settings.
 
 pub mod colours;
+pub mod control;
 pub mod cpu;
 pub mod films;
 pub mod flight;

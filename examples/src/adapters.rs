@@ -2,7 +2,11 @@
 //! gives it.
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
+use paint_planner::control::{
+    AttitudeResponse, ControlReference, ControlState, MpcSettings, TrackingMpc, VehicleModel,
+};
 use paint_planner::{NozzleState, Plan, Tool, VehicleState};
+use paint_sim::flight::{Airframe, Command, Controller, Estimate, GRAVITY};
 use paint_sim::{PanTilt, Reference, ReferenceState, TriangleSurface};
 use ptu_kinematics::{Hover, Joints, KinematicChain, Ptu, Servo};
 
@@ -169,6 +173,57 @@ impl<C: KinematicChain> Reference for PlanReference<'_, C> {
             aim: Some(aim),
             nozzle_distance: (setpoint.aim - setpoint.nozzle.position).norm(),
             flow: if inside { setpoint.flow } else { 0.0 },
+        }
+    }
+}
+
+/// The planner's controller in the simulator.
+pub struct MpcController {
+    mpc: TrackingMpc,
+    mass: f64,
+}
+
+impl MpcController {
+    /// A controller that knows the responses of the vehicle.
+    pub fn new(airframe: &Airframe, settings: MpcSettings) -> Result<Self, paint_planner::Error> {
+        let [forward, left, up] = airframe.drag;
+        let vehicle = VehicleModel {
+            roll: AttitudeResponse { gain: airframe.roll_gain, time_constant: airframe.roll_time_constant },
+            pitch: AttitudeResponse { gain: airframe.pitch_gain, time_constant: airframe.pitch_time_constant },
+            drag: [0.5 * (forward + left), up],
+            tilt_limit: airframe.tilt_limit,
+            // Those of the simulator's own controller.
+            thrust: [0.2 * GRAVITY, 2.0 * GRAVITY],
+        };
+        Ok(Self { mpc: TrackingMpc::new(vehicle, settings)?, mass: airframe.mass })
+    }
+}
+
+impl Controller for MpcController {
+    fn command(&mut self, time: f64, estimate: &Estimate, reference: &dyn Reference) -> Command {
+        let state = ControlState {
+            position: estimate.position,
+            velocity: estimate.velocity,
+            attitude: estimate.attitude,
+            disturbance: estimate.disturbance,
+        };
+        let wanted = |t: f64| {
+            let r = reference.at(t);
+            ControlReference {
+                position: r.position,
+                velocity: r.velocity,
+                acceleration: r.acceleration,
+                heading: r.heading,
+                heading_rate: r.heading_rate,
+                lever: r.lever,
+            }
+        };
+        let command = self.mpc.command(time, &state, &wanted);
+        Command {
+            roll: command.roll,
+            pitch: command.pitch,
+            yaw_rate: command.yaw_rate,
+            thrust: command.thrust * self.mass,
         }
     }
 }

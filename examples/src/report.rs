@@ -66,6 +66,8 @@ pub struct Report {
     pub flight_time_s: f64,
     /// Share of the time in the air with the valve open.
     pub valve_open_share: f64,
+    /// Share of the time in which the plan asks for paint for which the interlock kept the valve shut.
+    pub valve_held_share: f64,
     /// Estimated time of the transits between strokes, as their order was chosen by.
     pub transit_s: f64,
     /// Paint that left the nozzle.

@@ -19,6 +19,22 @@ pub struct Route {
 }
 
 impl Route {
+    /// Strokes of at least two targets each, in the order and the directions in which they are flown soonest after `from`.
+    pub fn ordered(
+        strokes: &[Vec<Target>],
+        from: Option<&Target>,
+        settings: &Settings,
+    ) -> Result<Self, paint_planner::Error> {
+        let ends: Vec<StrokeEnds> =
+            strokes.iter().map(|targets| StrokeEnds { first: targets[0], last: targets[targets.len() - 1] }).collect();
+        let order = order_strokes(&ends, from, settings)?;
+        let flown = order.strokes.iter().map(|stroke| {
+            let targets = &strokes[stroke.index];
+            if stroke.reversed { reversed(targets) } else { targets.clone() }
+        });
+        Ok(Self { targets: flown.flatten().collect(), strokes: ends.len(), lost: 0.0, transit_s: order.transit_time })
+    }
+
     /// Paint that the targets ask for, m³.
     pub fn paint(&self) -> f64 {
         self.targets.windows(2).map(|pair| pair[0].dose * (pair[1].point - pair[0].point).norm()).sum()
@@ -37,14 +53,7 @@ pub fn route(
     let mut lost = 0.0;
     let lifted = strokes.iter().map(|stroke| lift(surface, stroke, kernel, spray_spacing as f64, &mut lost));
     let lifted: Vec<Vec<Target>> = lifted.filter(|targets| targets.len() > 1).collect();
-    let ends: Vec<StrokeEnds> =
-        lifted.iter().map(|targets| StrokeEnds { first: targets[0], last: targets[targets.len() - 1] }).collect();
-    let order = order_strokes(&ends, from, settings)?;
-    let flown = order.strokes.iter().map(|stroke| {
-        let targets = &lifted[stroke.index];
-        if stroke.reversed { reversed(targets) } else { targets.clone() }
-    });
-    Ok(Route { targets: flown.flatten().collect(), strokes: ends.len(), lost, transit_s: order.transit_time })
+    Ok(Route { lost, ..Route::ordered(&lifted, from, settings)? })
 }
 
 /// One stroke on the surface. A spray of depth `v` stands for the paint of one cell of its stroke, half the way to its

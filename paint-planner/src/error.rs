@@ -38,6 +38,12 @@ pub enum Error {
         /// The point of the world that was asked about, m.
         at: [f64; 3],
     },
+    /// A recording of the attitude tells nothing.
+    #[error("no response can be identified from this recording: {what}")]
+    Recording {
+        /// What is wrong with it.
+        what: &'static str,
+    },
     /// No target can be served by this tool on this surface.
     #[error(
         "none of the {count} targets is reachable: check the direction of the normals, the joint limits and the clearance"

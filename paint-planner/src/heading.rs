@@ -21,17 +21,17 @@ pub(crate) struct Headings {
     pub(crate) cost: f64,
 }
 
-/// Chooses headings for `nozzles` (in path order), each keeping its own `clearance` from the surface. `linked[i]`: i and i+1
-/// belong to one stroke.
+/// Chooses headings for `nozzles` (in path order) from their `graph`, each keeping its own `clearance` from the surface. `linked[i]`:
+/// i and i+1 belong to one stroke.
 pub(crate) fn choose_headings(
+    graph: &HeadingGraph,
     nozzles: &[Option<NozzleState>],
     linked: &[bool],
     checker: &mut ClearanceChecker<'_>,
     clearance: &[f64],
     settings: &HeadingSettings,
 ) -> Headings {
-    let graph = HeadingGraph::build(nozzles, checker, clearance, settings.bins);
-    let path = viterbi::search(&graph, linked, settings);
+    let path = viterbi::search(graph, linked, settings);
     let mut vehicle: Vec<Option<VehicleState>> = vec![None; nozzles.len()];
     let mut joined = vec![false; nozzles.len().saturating_sub(1)];
     for run in path.runs() {

@@ -55,6 +55,7 @@
 //! | Held and Karp 1970, travelling salesman | [`order_strokes`], [`transit_lower_bound`] |
 //! | Richter et al., minimum snap | [`Trajectory::minimum_snap`] |
 //! | Paper II, section 6.2, LOWESS baseline | [`SmoothingPlanner`] |
+//! | Paper II, section 5.2, first-order attitude | [`control::TrackingMpc`], [`control::identify_attitude`] |
 //! | VR paper, section V, deviation from the normal | [`normal_deviation`] |
 //! | handheld paper, section IV, Eqs. (1)-(5) | [`gantry`] |
 //! | VR paper, Algorithm 1, rules (a)-(e), latencies | [`session`] |
@@ -63,6 +64,7 @@ mod angle;
 mod bernstein;
 mod block_tridiagonal;
 mod clearance;
+pub mod control;
 mod error;
 pub mod gantry;
 mod heading;

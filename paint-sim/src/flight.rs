@@ -9,7 +9,9 @@ use crate::trace::{event, span};
 mod airframe;
 mod controller;
 mod estimator;
+mod faults;
 mod hose;
+mod interlock;
 mod log;
 mod noise;
 mod pan_tilt;
@@ -22,7 +24,9 @@ mod vehicle;
 pub use airframe::{Airframe, Command, GRAVITY};
 pub use controller::{CascadedController, Controller, ControllerSettings};
 pub use estimator::{Estimate, Estimator, ObserverSettings};
+pub use faults::{Faults, Gust};
 pub use hose::{Catenary, HoseModel};
+pub use interlock::Interlock;
 pub use log::FlightLog;
 pub use pan_tilt::{IdealPanTilt, PanTilt};
 pub use reference::{Reference, ReferenceState};
@@ -31,6 +35,7 @@ pub use settings::{FlightSettings, Localisation, Valve, Wind};
 pub use statistics::FlightStatistics;
 pub use vehicle::Vehicle;
 
+use interlock::{InterlockState, Known};
 use noise::{PoseSensor, WindModel};
 
 /// Steps of the physics per second.
@@ -64,7 +69,8 @@ pub fn fly(
 /// 100 Hz. Controller and pan-tilt unit see the reported pose, never the truth.
 ///
 /// The vehicle starts at rest at the reference's first position and hovers there for `settings.settle` seconds. The
-/// pan-tilt unit is commanded for the pose and the aim that are expected when the command takes effect.
+/// pan-tilt unit is commanded for the pose and the aim that are expected when the command takes effect. The valve follows the
+/// reference, while its [`Interlock`] permits it if it has one.
 ///
 /// # Errors
 /// Settings out of range, values that are not finite from the reference, the controller or the pan-tilt unit, a hose
@@ -93,6 +99,11 @@ pub fn fly_with(
     let mut aim = [0.0; 2];
     let mut pan_tilt = [0.0; 2];
     ptu.reset(aim);
+    // A locked unit is flown to see what it is worth: all of its paint counts.
+    let mut interlock = InterlockState::new(
+        settings.valve.interlock.filter(|_| !settings.ptu_locked),
+        [ptu.delay(), settings.valve.dead_time].map(|delay| delay / CONTROL_STEP),
+    );
 
     let log_steps = i64::from(RATE / settings.log_rate);
     let first = -(settings.settle / CONTROL_STEP).round() as i64 * CONTROL_STEPS;
@@ -109,8 +120,15 @@ pub fn fly_with(
                 event!(warn, time, distance, "vehicle diverged from its reference");
                 return Err(Error::Diverged { time, distance });
             }
+            let lost = settings.faults.pose_lost(time);
             if step > first {
-                estimator.update(&sensor.measure(&vehicle), CONTROL_STEP);
+                // The sensor's noise goes on, so that a fault changes nothing before it.
+                let measured = sensor.measure(&vehicle);
+                if lost {
+                    estimator.coast(CONTROL_STEP);
+                } else {
+                    estimator.update(&measured, CONTROL_STEP);
+                }
             }
             command = controller.command(time, estimator.estimate(), &hover);
             if ![command.roll, command.pitch, command.yaw_rate, command.thrust].iter().all(|v| v.is_finite()) {
@@ -124,13 +142,23 @@ pub fn fly_with(
             let ahead = ptu.delay() + 0.5 * CONTROL_STEP;
             let target = checked(&hover, time + ahead)?.aim.filter(|_| !settings.ptu_locked);
             aim = target.map_or([0.0; 2], |point| ptu.command(&estimator.predict(ahead), &point));
+            let ahead = settings.valve.dead_time + 0.5 * CONTROL_STEP;
+            let later = checked(&hover, time + ahead)?;
+            let estimator = (!lost).then_some(&estimator);
+            let known = Known { estimator, angles: pan_tilt, command: aim, now: &wanted, later: &later, ahead };
+            interlock.decide(ptu, &known);
         }
         if step >= 0 && step % log_steps == 0 {
             let scene = SampleContext { reference, ptu, surface, settings };
-            samples.push(scene.sample(time, &vehicle, pan_tilt, estimator.estimate())?);
+            let given = step - (settings.valve.dead_time / STEP).round() as i64;
+            let open = interlock.open((given - first).div_euclid(CONTROL_STEPS));
+            samples.push(scene.sample(time, &vehicle, pan_tilt, estimator.estimate(), open)?);
         }
-        vehicle.step(&settings.airframe, &command, &wind.step(), &hose_force, STEP);
-        pan_tilt = ptu.step(aim, STEP);
+        let air = wind.step() + settings.faults.gust(time);
+        vehicle.step(&settings.airframe, &command, &air, &hose_force, STEP);
+        if !settings.faults.servos_stuck(time) {
+            pan_tilt = ptu.step(aim, STEP);
+        }
         if !pan_tilt.iter().all(|v| v.is_finite()) {
             return Err(Error::BadCallback { who: "the pan-tilt unit", time });
         }
@@ -178,8 +206,10 @@ impl SampleContext<'_> {
         vehicle: &Vehicle,
         pan_tilt: [f64; 2],
         estimate: &Estimate,
+        open: bool,
     ) -> Result<FlightSample, Error> {
         let wanted = checked(self.reference, time)?;
+        let flow = self.flow(time)?;
         let world_from_body: Isometry3<f64> = vehicle.world_from_body();
         let (nozzle, axis) = self.ptu.nozzle(&world_from_body, pan_tilt);
         if !nozzle.iter().chain(axis.iter()).all(|v| v.is_finite()) {
@@ -202,7 +232,8 @@ impl SampleContext<'_> {
             hit: distance.map(|d| nozzle + axis.as_ref() * d),
             distance: distance.unwrap_or(f64::INFINITY),
             wanted_distance: wanted.nozzle_distance,
-            flow: self.flow(time)?,
+            flow: if open { flow } else { 0.0 },
+            held: flow > 0.0 && !open,
         })
     }
 

@@ -11,7 +11,7 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 use paint_sim::ciede2000;
 use paint_sim::colour::BANDS;
 use paintcopter_benches::cpu::{CpuTimer, median_seconds};
-use paintcopter_benches::{Rng, colours, films, motion, painting, planner, pose_graphs, room};
+use paintcopter_benches::{Rng, colours, control, films, motion, painting, planner, pose_graphs, room};
 use paintcopter_examples::mesh_io::read_mesh;
 use paintcopter_examples::world::rock_wall;
 use serde_json::json;
@@ -127,6 +127,13 @@ enum Job {
         #[arg(long, default_value_t = 5)]
         runs: usize,
     },
+    /// Flies a stroke over the rock in gusts and with faults: errors of the spray, what a control step takes, and the valve
+    Control,
+    /// Identifies how the attitude follows its commands in a recording
+    Attitude {
+        /// CSV with a header: time (s), commanded and measured angle (rad)
+        file: PathBuf,
+    },
     /// Errors of a TUM trajectory against another, as `trajectory_peers.py` does
     Ate {
         /// TUM text
@@ -154,6 +161,8 @@ fn main() -> ExitCode {
         Job::Graph { file, runs } => pose_graphs::run(&file, runs),
         Job::PlannerInstances { folder } => planner::write(&folder),
         Job::Planner { runs } => planner::run(runs),
+        Job::Control => control::run(),
+        Job::Attitude { file } => control::attitude(&file),
         Job::Ate { reference, estimate, runs } => trajectory_errors(&reference, &estimate, runs),
     };
     match done {

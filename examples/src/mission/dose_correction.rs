@@ -22,9 +22,10 @@ const ROUNDS: usize = 300;
 /// Largest dose in medians of all: what would run is left thin instead, and shows in the report.
 const MAX_DOSE: f64 = 4.0;
 
-/// Changes the doses of all that `plan` sprays so that the thickness comes as near the wanted one as it can: least squares with
-/// positive doses, by the image space reconstruction algorithm (Daube-Witherspoon and Muehllehner 1986).
-pub(super) fn correct_doses(targets: &mut [Target], plan: &Plan, decision: &Decision) {
+/// Changes the doses of all that the flights spray so that the thickness comes as near the wanted one as it can: least squares with
+/// positive doses, by the image space reconstruction algorithm (Daube-Witherspoon and Muehllehner 1986). Each flight is its targets
+/// with their plan.
+pub(super) fn correct_doses(flights: &mut [(&mut [Target], &Plan)], decision: &Decision) {
     let (texels, pixels) = decision.surface.film_texels();
     let ink = decision.appearance.ink();
     let wanted: Vec<f64> = pixels.iter().map(|&k| ink.inverse(decision.wanted.data()[k]) * UNIT_THICKNESS).collect();
@@ -33,13 +34,16 @@ pub(super) fn correct_doses(targets: &mut [Target], plan: &Plan, decision: &Deci
         .zip(&texels)
         .map(|(&k, texel)| texel.area * if decision.in_reach[k] { 1.0 } else { UNPAINTABLE_WEIGHT })
         .collect();
-    let ways: Vec<Way> = (0..targets.len().saturating_sub(1))
-        .filter(|&k| plan.flow[k] > 0.0)
-        .map(|k| Way::new(k, targets, plan))
-        .collect();
+    let mut ways: Vec<Way> = Vec::new();
+    let mut doses: Vec<f64> = Vec::new();
+    for (flight, (targets, plan)) in flights.iter().enumerate() {
+        for k in (0..targets.len().saturating_sub(1)).filter(|&k| plan.flow[k] > 0.0) {
+            ways.push(Way::new(flight, k, targets, plan));
+            doses.push(targets[k].dose);
+        }
+    }
     let response = Response::new(&ways, &texels, &spray_model(&decision.settings), &decision.surface.world);
-    let mut volumes: Vec<f64> = ways.iter().map(|way| targets[way.target].dose * way.length).collect();
-    let mut doses: Vec<f64> = ways.iter().map(|way| targets[way.target].dose).collect();
+    let mut volumes: Vec<f64> = ways.iter().zip(&doses).map(|(way, dose)| dose * way.length).collect();
     doses.sort_unstable_by(f64::total_cmp);
     let most = MAX_DOSE * doses.get(doses.len() / 2).copied().unwrap_or_default();
 
@@ -54,12 +58,13 @@ pub(super) fn correct_doses(targets: &mut [Target], plan: &Plan, decision: &Deci
         }
     }
     for (way, volume) in ways.iter().zip(volumes) {
-        targets[way.target].dose = volume / way.length;
+        flights[way.flight].0[way.target].dose = volume / way.length;
     }
 }
 
 /// The way from a target to the next with the valve open.
 struct Way {
+    flight: usize,
     target: usize,
     length: f64,
     /// Nozzle and spray direction at a quarter and three quarters of it.
@@ -69,7 +74,7 @@ struct Way {
 }
 
 impl Way {
-    fn new(target: usize, targets: &[Target], plan: &Plan) -> Self {
+    fn new(flight: usize, target: usize, targets: &[Target], plan: &Plan) -> Self {
         let (a, b) = (&plan.nozzle[target], &plan.nozzle[target + 1]);
         let (p, q) = (&targets[target].point, &targets[target + 1].point);
         let between = |a: &Point3<f64>, b: &Point3<f64>, share: f64| a + (b - a) * share;
@@ -79,6 +84,7 @@ impl Way {
             (nozzle, UnitVector3::try_new(direction, 1e-12).unwrap_or(a.direction))
         };
         Self {
+            flight,
             target,
             length: (q - p).norm(),
             sprays: [spray(0.25), spray(0.75)],
@@ -158,7 +164,7 @@ mod tests {
         let surface = test_panel::surface();
         let robot = Robot::new(Ptu::new(settings.ptu).unwrap());
         let (targets, plan) = (test_panel::targets(), test_panel::plan(&surface, &robot, &settings));
-        let ways: Vec<Way> = (0..targets.len() - 1).map(|k| Way::new(k, &targets, &plan)).collect();
+        let ways: Vec<Way> = (0..targets.len() - 1).map(|k| Way::new(0, k, &targets, &plan)).collect();
         let (texels, _) = surface.film_texels();
         let spray = spray_model(&settings);
         let response = Response::new(&ways, &texels, &spray, &surface.world);

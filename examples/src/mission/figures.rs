@@ -74,6 +74,7 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         path_length_m: path,
         flight_time_s: flight_time,
         valve_open_share: mission.flights.iter().map(|f| open_time(&f.plan)).sum::<f64>() / flight_time,
+        valve_held_share: share_held(mission),
         transit_s: mission.flights.iter().map(|f| f.route.transit_s).sum(),
         paint_emitted_kg: kilograms(balance.emitted),
         paint_deposited_kg: kilograms(on_texels),
@@ -177,6 +178,13 @@ fn normal_deviations(mission: &Mission) -> Deviations {
 pub(super) fn open_time(plan: &Plan) -> f64 {
     let open = plan.target_time.windows(2).zip(&plan.flow).filter(|(_, flow)| **flow > 0.0);
     open.map(|(times, _)| times[1] - times[0]).sum()
+}
+
+/// Share of the samples with paint asked for in which the interlock kept the valve shut.
+fn share_held(mission: &Mission) -> f64 {
+    let samples = || mission.flights.iter().flat_map(|f| &f.flight.samples);
+    let held = samples().filter(|s| s.held).count();
+    held as f64 / samples().filter(|s| s.held || s.flow > 0.0).count().max(1) as f64
 }
 
 /// Moments of a flight at which the robot overlaps the surface.

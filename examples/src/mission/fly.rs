@@ -1,7 +1,7 @@
 //! Flying it, and what the paint does meanwhile.
 
 use paint_planner::Plan;
-use paint_sim::flight::Localisation;
+use paint_sim::flight::{Interlock, Localisation, Valve};
 use paint_sim::{Film, FlightLog, FlightSettings, TriangleSurface};
 
 use super::decide::spray_model;
@@ -78,8 +78,12 @@ pub(super) fn fly_three(
     layer: u64,
 ) -> Result<[FlightLog; 3], MissionError> {
     let usual = flight_settings(plan, settings.seed.wrapping_mul(0x9E37_79B9).wrapping_add(layer));
+    // Paint that misses by less than the spot is wide is better than none. The flights beside it are flown to see what they miss by, so
+    // nothing shuts their valve.
+    let interlock = Interlock { miss: settings.spot, ..Interlock::default() };
+    let valve = Valve { interlock: Some(interlock), ..usual.valve };
     let variants = [
-        usual,
+        FlightSettings { valve, ..usual },
         FlightSettings { localisation: Localisation::slam_7cm(), ..usual },
         FlightSettings { ptu_locked: true, ..usual },
     ];

@@ -1,15 +1,14 @@
 //! How to fly it: strokes onto the surface, nozzle and vehicle along them.
 
-use std::time::Instant;
-
 use paint_net::{Painting, StrokeSettings, boustrophedon};
-use paint_planner::{Error, OptimalPlanner, Plan, Planner, Settings, SmoothingPlanner, Target};
+use paint_planner::{Error, Plan, Planner, Settings, SmoothingPlanner, Target, VehicleState};
 
 use super::decide::kernel;
 use super::decision::Decision;
 use super::dose_correction::correct_doses;
 use super::error::MissionError;
-use super::rehearse::rehearsed_plan;
+use super::given_up::take_given_up;
+use super::rehearse::{Rehearsed, rehearsed_plan};
 use super::settings::{MissionSettings, PainterChoice};
 use crate::adapters::MeshSurface;
 use crate::progress::Stage;
@@ -30,6 +29,54 @@ pub(super) struct Planned {
     pub(super) left_bare: usize,
 }
 
+/// Flights of a layer: the first gives stretches up that a pose reaches, since all of a stroke is one program; those become strokes
+/// of the next.
+const FLIGHTS: usize = 3;
+/// Weights between neighbours of what is flown once more, against those of the first flight: nozzles stay nearer to their normals.
+const LOOSER: f64 = 0.1;
+
+/// A flight of a layer, rehearsed.
+struct Flight {
+    route: Route,
+    settings: Settings,
+    rehearsed: Rehearsed,
+}
+
+/// Where a flight ends: the vehicle, and the last target.
+type FlightEnd = (Option<VehicleState>, Option<Target>);
+
+impl Flight {
+    /// Plans and rehearses; `None` where nothing can be reached. What is flown once more (`again`) may also lie where no flight leads to.
+    fn plan(
+        again: bool,
+        route: Route,
+        clearance: Vec<f64>,
+        settings: Settings,
+        decision: &Decision,
+        planned: &mut Planned,
+    ) -> Result<Option<Self>, MissionError> {
+        let Decision { surface, robot, settings: mission, .. } = decision;
+        let rehearsed = if route.targets.len() < 2 {
+            None
+        } else {
+            match rehearsed_plan(&route.targets, clearance, surface, robot, mission, &settings) {
+                Err(MissionError::Planner(Error::NoTransit { .. } | Error::Collision { .. })) if again => None,
+                rehearsed => rehearsed?,
+            }
+        };
+        let Some(rehearsed) = rehearsed else {
+            planned.unreachable_paint += route.paint() + route.lost;
+            return Ok(None);
+        };
+        planned.seconds += rehearsed.seconds;
+        Ok(Some(Self { route, settings, rehearsed }))
+    }
+
+    fn end(&self) -> FlightEnd {
+        (self.rehearsed.plan.waypoints.last().map(|w| w.state), self.route.targets.last().copied())
+    }
+}
+
 /// Plans every layer; each flight begins where the one before ends.
 pub(super) fn plan(decision: &Decision) -> Result<Planned, MissionError> {
     let Decision { layers, surface, robot, settings, .. } = decision;
@@ -42,38 +89,21 @@ pub(super) fn plan(decision: &Decision) -> Result<Planned, MissionError> {
         kept_off: 0,
         left_bare: 0,
     };
+    let mut start: FlightEnd = (None, None);
     for (k, layer) in layers.iter().enumerate() {
         stage.share(k as f64 / layers.len() as f64);
-        let from = planned.layers.last().and_then(|(route, ..)| route.targets.last().copied());
-        let mut route = layer_route(layer, surface, settings, from.as_ref())?;
-        if route.targets.len() < 2 {
-            planned.unreachable_paint += route.lost;
-            continue;
-        }
-        let start = planned.layers.last().and_then(|(_, plan, _)| plan.waypoints.last()).map(|w| w.state);
-        let here = Settings { start, ..settings.planner.clone() };
+        let route = layer_route(layer, surface, settings, start.1.as_ref())?;
+        let mut flights = layer_flights(route, start, decision, &mut planned)?;
         if settings.painter == PainterChoice::Fill {
-            // Doses change the speed of the spot at most: nozzles and headings of the first plan are those of the last.
-            let clock = Instant::now();
-            match OptimalPlanner::default().plan(&route.targets, &wall, robot, &here) {
-                Err(Error::NothingReachable { .. }) => {}
-                first => correct_doses(&mut route.targets, &first?, decision),
-            }
-            planned.seconds += clock.elapsed().as_secs_f64();
+            flights = evened(flights, start, decision, &mut planned)?;
         }
-        let rehearsed = match rehearsed_plan(&route.targets, surface, robot, settings, &here) {
-            Err(MissionError::Planner(Error::NothingReachable { .. })) => {
-                planned.unreachable_paint += route.paint() + route.lost;
-                continue;
-            }
-            rehearsed => rehearsed?,
-        };
-        planned.seconds += rehearsed.seconds;
-        planned.kept_off += rehearsed.kept_off;
-        planned.left_bare += rehearsed.left_bare;
-        let plan = rehearsed.plan;
-        let smoothing = SmoothingPlanner.plan(&route.targets, &wall, robot, &settings.planner)?;
-        planned.layers.push((route, plan, smoothing));
+        start = flights.last().map_or(start, Flight::end);
+        for Flight { route, rehearsed, .. } in flights {
+            planned.kept_off += rehearsed.kept_off;
+            planned.left_bare += rehearsed.left_bare;
+            let smoothing = SmoothingPlanner.plan(&route.targets, &wall, robot, &settings.planner)?;
+            planned.layers.push((route, rehearsed.plan, smoothing));
+        }
     }
     if planned.layers.is_empty() {
         return Err(MissionError::OutOfReach { percent: 100.0 });
@@ -84,8 +114,62 @@ pub(super) fn plan(decision: &Decision) -> Result<Planned, MissionError> {
         (kept, 0) => format!(", {kept} targets kept farther off after a rehearsal in wind"),
         (kept, bare) => format!(", {kept} targets kept farther off after a rehearsal in wind, {bare} left bare"),
     };
-    stage.done(&format!("{metres:.0} m of path, {:.1} ms per metre{rehearsed}", 1e3 * planned.seconds / metres));
+    let again = match planned.layers.len().saturating_sub(layers.len()) {
+        0 => String::new(),
+        more => format!(", {more} of {} flights for what another gave up", planned.layers.len()),
+    };
+    stage.done(&format!("{metres:.0} m of path, {:.1} ms per metre{again}{rehearsed}", 1e3 * planned.seconds / metres));
     Ok(planned)
+}
+
+/// The flights of a layer: its route, and what is given up there once more by itself.
+fn layer_flights(
+    route: Route,
+    mut start: FlightEnd,
+    decision: &Decision,
+    planned: &mut Planned,
+) -> Result<Vec<Flight>, MissionError> {
+    let Decision { surface, robot, settings, .. } = decision;
+    let planner = &settings.planner;
+    let mut flights: Vec<Flight> = Vec::new();
+    let mut next = Some(route);
+    while let Some(route) = next.take() {
+        let mut here = Settings { start: start.0, ..planner.clone() };
+        if !flights.is_empty() {
+            (here.nozzle.ca, here.nozzle.cb) = (LOOSER * planner.nozzle.ca, LOOSER * planner.nozzle.cb);
+        }
+        let clearance = vec![planner.clearance; route.targets.len()];
+        let Some(mut flight) = Flight::plan(!flights.is_empty(), route, clearance, here, decision, planned)? else {
+            break;
+        };
+        start = flight.end();
+        if flights.len() + 1 < FLIGHTS {
+            let Flight { route, rehearsed, .. } = &mut flight;
+            next = take_given_up(&mut route.targets, &rehearsed.plan, start.1.as_ref(), surface, robot, settings)?;
+        }
+        flights.push(flight);
+    }
+    Ok(flights)
+}
+
+/// The same flights with doses for an even coat. Doses change the speed of the spot at most, so they are corrected for nozzles and
+/// clearances that have been rehearsed.
+fn evened(
+    mut flights: Vec<Flight>,
+    start: FlightEnd,
+    decision: &Decision,
+    planned: &mut Planned,
+) -> Result<Vec<Flight>, MissionError> {
+    let mut parts: Vec<(&mut [Target], &Plan)> =
+        flights.iter_mut().map(|f| (f.route.targets.as_mut_slice(), &f.rehearsed.plan)).collect();
+    correct_doses(&mut parts, decision);
+    let mut even: Vec<Flight> = Vec::with_capacity(flights.len());
+    for Flight { route, settings, rehearsed } in flights {
+        let from = even.last().map_or(start, Flight::end);
+        let here = Settings { start: from.0, ..settings };
+        even.extend(Flight::plan(!even.is_empty(), route, rehearsed.clearance, here, decision, planned)?);
+    }
+    Ok(even)
 }
 
 /// The strokes of a layer on the surface, in the order in which they are flown after `from`.

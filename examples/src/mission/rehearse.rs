@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use paint_planner::{OptimalPlanner, Plan, Target};
+use paint_planner::{Error, OptimalPlanner, Plan, Target};
 use paint_sim::TriangleSurface;
 use paint_sim::flight::FlightSample;
 use ptu_kinematics::Joints;
@@ -40,17 +40,21 @@ pub(super) struct Rehearsed {
     pub(super) kept_off: usize,
     /// Targets given up because of near misses.
     pub(super) left_bare: usize,
+    /// Clearance of each target, metres.
+    pub(super) clearance: Vec<f64>,
 }
 
 /// Plans, flies, and plans again until no wind brings the robot too near, [`ROUNDS`] times at most; then what still does is left bare.
+///
+/// `clearance` of each target to begin with, metres. `None` where nothing can be reached.
 pub(super) fn rehearsed_plan(
     targets: &[Target],
+    mut clearance: Vec<f64>,
     surface: &PaintSurface,
     robot: &Robot,
     settings: &MissionSettings,
     planner: &paint_planner::Settings,
-) -> Result<Rehearsed, MissionError> {
-    let mut clearance = vec![planner.clearance; targets.len()];
+) -> Result<Option<Rehearsed>, MissionError> {
     let mut seconds = 0.0;
     let mut plan_with = |clearance: &[f64]| {
         let clock = Instant::now();
@@ -59,7 +63,10 @@ pub(super) fn rehearsed_plan(
         seconds += clock.elapsed().as_secs_f64();
         plan
     };
-    let mut plan = plan_with(&clearance)?;
+    let mut plan = match plan_with(&clearance) {
+        Err(Error::NothingReachable { .. }) => return Ok(None),
+        plan => plan?,
+    };
     for round in 0..=ROUNDS {
         let missing = missing_clearance(&plan, surface, robot, settings, targets.len())?;
         if missing.iter().all(|missing| *missing == 0.0) {
@@ -71,10 +78,13 @@ pub(super) fn rehearsed_plan(
                 *c = if round < ROUNDS { *c + missing[k] + BEYOND } else { BARE };
             });
         }
-        plan = plan_with(&clearance)?;
+        plan = match plan_with(&clearance) {
+            Err(Error::NothingReachable { .. }) => return Ok(None),
+            plan => plan?,
+        };
     }
     let count = |bare: bool| clearance.iter().filter(|c| **c > planner.clearance && (**c >= BARE) == bare).count();
-    Ok(Rehearsed { plan, seconds, kept_off: count(false), left_bare: count(true) })
+    Ok(Some(Rehearsed { plan, seconds, kept_off: count(false), left_bare: count(true), clearance }))
 }
 
 /// How much nearer than [`MARGIN`] the robot comes about each target in the worst of the winds, metres.
@@ -124,7 +134,10 @@ mod tests {
         let settings = MissionSettings { threads: 1, ..MissionSettings::default() };
         let (surface, targets) = (test_panel::surface(), test_panel::targets());
         let planner = paint_planner::Settings { clearance: 0.0, ..settings.planner.clone() };
-        let rehearse = |robot: &Robot| rehearsed_plan(&targets, &surface, robot, &settings, &planner).unwrap();
+        let rehearse = |robot: &Robot| {
+            let clearance = vec![planner.clearance; targets.len()];
+            rehearsed_plan(&targets, clearance, &surface, robot, &settings, &planner).unwrap().unwrap()
+        };
         let mut robot = Robot::new(Ptu::new(settings.ptu).unwrap());
         let roomy = rehearse(&robot);
         assert_eq!((roomy.kept_off, roomy.left_bare), (0, 0));

@@ -2,19 +2,20 @@
 
 use nalgebra::{Point3, Vector3};
 use paint_planner::Plan;
-use paint_sim::flight::HoseModel;
+use paint_planner::control::MpcSettings;
+use paint_sim::flight::{CascadedController, Controller, ControllerSettings, HoseModel, fly_with};
 use paint_sim::{FlightLog, FlightSettings, TriangleSurface};
 
 use super::error::MissionError;
-use super::settings::MissionSettings;
-use crate::adapters::{PlanReference, Robot, ServoPanTilt};
+use super::settings::{ControllerChoice, MissionSettings};
+use crate::adapters::{MpcController, PlanReference, Robot, ServoPanTilt};
 
 /// The usual wind, hose and localisation.
 pub(super) fn flight_settings(plan: &Plan, seed: u64) -> FlightSettings {
     FlightSettings { hose: Some(hose(plan)), seed, ..FlightSettings::default() }
 }
 
-/// Flies a plan with the robot's own servos.
+/// Flies a plan with the robot's own servos and the controller that was chosen.
 pub(super) fn fly_plan(
     plan: &Plan,
     world: &TriangleSurface,
@@ -29,7 +30,11 @@ pub(super) fn fly_plan(
         stand_off: settings.planner.nozzle.stand_off,
     };
     let mut gun = ServoPanTilt::new(robot.chain.clone(), settings.servo)?;
-    Ok(paint_sim::fly(&reference, &mut gun, world, flight)?)
+    let mut controller: Box<dyn Controller> = match settings.controller {
+        ControllerChoice::Cascade => Box::new(CascadedController::new(flight.airframe, ControllerSettings::default())),
+        ControllerChoice::Mpc => Box::new(MpcController::new(&flight.airframe, MpcSettings::default())?),
+    };
+    Ok(fly_with(&reference, controller.as_mut(), &mut gun, world, flight)?)
 }
 
 /// The paint hose: from the ground behind the middle of the flight, long enough for all of it.
@@ -47,4 +52,33 @@ fn hose(plan: &Plan) -> HoseModel {
     let farthest = positions().map(|p| (p - base).norm()).fold(0.0, f64::max);
     // A tenth of slack, and a metre for wind and overshoot.
     HoseModel { base, length: 1.1 * farthest + 1.0, line_density: 0.12, base_on_floor: true }
+}
+
+#[cfg(test)]
+mod tests {
+    use paint_sim::flight::Wind;
+    use ptu_kinematics::Ptu;
+
+    use super::super::test_panel;
+    use super::*;
+
+    #[test]
+    fn in_strong_gusts_the_predictive_controller_keeps_the_distance_better() {
+        let settings = MissionSettings { threads: 1, ..MissionSettings::default() };
+        let surface = test_panel::surface();
+        let robot = Robot::new(Ptu::new(settings.ptu).unwrap());
+        let plan = test_panel::plan(&surface, &robot, &settings);
+        let distance = |controller| {
+            let settings = MissionSettings { controller, ..settings.clone() };
+            let wind = Wind { mean: Vector3::zeros(), gust_sigma: 3.0, ..Wind::default() };
+            let spread = (0..12).map(|seed| {
+                let flight = FlightSettings { wind, ..flight_settings(&plan, seed) };
+                let log = fly_plan(&plan, &surface.world, &robot, &settings, &flight).unwrap();
+                log.statistics().nozzle_distance_std.powi(2)
+            });
+            (spread.sum::<f64>() / 12.0).sqrt()
+        };
+        let (cascade, mpc) = (distance(ControllerChoice::Cascade), distance(ControllerChoice::Mpc));
+        assert!(mpc < 0.7 * cascade, "{mpc} m, {cascade} m by the cascade");
+    }
 }

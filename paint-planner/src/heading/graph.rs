@@ -24,7 +24,7 @@ pub(crate) struct HeadingGraph {
 }
 
 impl HeadingGraph {
-    /// Asks for every pair; state `i` has to keep `clearance[i]` from the surface, m. Neighbouring states of one bin share their distance queries.
+    /// Asks for every pair; state `i` has to keep `clearance[i]` from the surface, m.
     pub(crate) fn build(
         nozzles: &[Option<NozzleState>],
         checker: &mut ClearanceChecker<'_>,
@@ -34,19 +34,29 @@ impl HeadingGraph {
         let first = nozzles.iter().flatten().next();
         let origin = first.map_or(0.0, |nozzle| nozzle.direction.y.atan2(nozzle.direction.x));
         let mut graph = Self { bins, nodes: vec![None; nozzles.len() * bins], origin };
-        for bin in 0..bins {
-            let heading = graph.heading(bin);
+        let all: Vec<usize> = (0..nozzles.len()).collect();
+        graph.update(nozzles, checker, clearance, &all);
+        graph
+    }
+
+    /// Asks again about some states, whose nozzle or clearance is another. Neighbouring ones of one bin share their distance queries.
+    pub(crate) fn update(
+        &mut self,
+        nozzles: &[Option<NozzleState>],
+        checker: &mut ClearanceChecker<'_>,
+        clearance: &[f64],
+        states: &[usize],
+    ) {
+        for bin in 0..self.bins {
+            let heading = self.heading(bin);
             let mut cache = DistanceCache::default();
-            for (i, nozzle) in nozzles.iter().enumerate() {
-                let Some(vehicle) = nozzle.as_ref().and_then(|nozzle| checker.vehicle(nozzle, heading)) else {
-                    continue;
-                };
-                if checker.is_clear(&vehicle, clearance[i], &mut cache) {
-                    graph.nodes[i * bins + bin] = Some(Node { position: vehicle.position, pan: vehicle.pan });
-                }
+            for &i in states {
+                let vehicle = nozzles[i].as_ref().and_then(|nozzle| checker.vehicle(nozzle, heading));
+                let clear = vehicle.filter(|vehicle| checker.is_clear(vehicle, clearance[i], &mut cache));
+                self.nodes[i * self.bins + bin] =
+                    clear.map(|vehicle| Node { position: vehicle.position, pan: vehicle.pan });
             }
         }
-        graph
     }
 
     /// States in the graph.
@@ -67,5 +77,64 @@ impl HeadingGraph {
     #[cfg(test)]
     pub(crate) fn from_nodes(bins: usize, nodes: Vec<Option<Node>>) -> Self {
         Self { bins, nodes, origin: 0.0 }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use nalgebra::{UnitVector3, Vector3};
+
+    use super::*;
+    use crate::world::{Hit, Surface, Tool, VehicleState};
+
+    /// The plane x = 0.
+    struct Plane;
+
+    impl Surface for Plane {
+        fn cast(&self, _: &Point3<f64>, _: &UnitVector3<f64>, _: f64) -> Option<Hit> {
+            None
+        }
+
+        fn distance(&self, point: &Point3<f64>, max: f64) -> f64 {
+            point.x.abs().min(max)
+        }
+    }
+
+    /// A body half a metre behind the nozzle, turned about it.
+    struct Boom;
+
+    impl Tool for Boom {
+        fn vehicle(&self, nozzle: &NozzleState, heading: f64) -> Option<VehicleState> {
+            let back = Vector3::new(heading.cos(), heading.sin(), 0.0) * 0.5;
+            Some(VehicleState { position: nozzle.position - back, heading, pan: -heading, tilt: 0.0 })
+        }
+
+        fn spheres(&self, vehicle: &VehicleState, out: &mut Vec<(Point3<f64>, f64)>) {
+            out.push((vehicle.position, 0.3));
+        }
+    }
+
+    #[test]
+    fn an_update_is_as_good_as_a_new_graph() {
+        let nozzle = |k: usize| {
+            let position = Point3::new(-0.1 - 0.01 * (k % 7) as f64, 0.02 * k as f64, 1.0);
+            Some(NozzleState { position, direction: Vector3::x_axis() })
+        };
+        let mut nozzles: Vec<Option<NozzleState>> = (0..40).map(nozzle).collect();
+        let mut clearance = vec![0.03; 40];
+        let mut checker = ClearanceChecker::new(&Plane, &Boom);
+        let mut graph = HeadingGraph::build(&nozzles, &mut checker, &clearance, 72);
+        let possible = |graph: &HeadingGraph| graph.nodes.iter().map(Option::is_some).collect::<Vec<bool>>();
+        let before = possible(&graph);
+        let changed = [3, 4, 5, 20, 33];
+        for &k in &changed {
+            clearance[k] = 0.15;
+        }
+        nozzles[20] = None;
+        graph.update(&nozzles, &mut checker, &clearance, &changed);
+        let again = HeadingGraph::build(&nozzles, &mut checker, &clearance, 72);
+        assert_eq!(possible(&graph), possible(&again));
+        assert_ne!(possible(&graph), before);
     }
 }

@@ -4,6 +4,7 @@ use super::assemble::{ClearanceViolation, UntimedPlan, assemble_plan};
 use super::strategy::Planner;
 use crate::clearance::ClearanceChecker;
 use crate::error::Error;
+use crate::heading::HeadingGraph;
 use crate::nozzle::{InteriorPoint, Mode, Nozzles, QpSolver, initial_states, optimise};
 use crate::plan::Plan;
 use crate::settings::Settings;
@@ -80,10 +81,11 @@ impl OptimalPlanner<'_> {
         );
         let mut checker = ClearanceChecker::new(surface, tool);
         let mut clearance = clearance.to_vec();
+        let mut graph = HeadingGraph::build(&nozzles.states, &mut checker, &clearance, settings.heading.bins);
         let mut attempt = 0;
         loop {
             let mut headings =
-                heading::choose_headings(&nozzles.states, &linked, &mut checker, &clearance, &settings.heading);
+                heading::choose_headings(&graph, &nozzles.states, &linked, &mut checker, &clearance, &settings.heading);
             checker.check_answers()?;
             if headings.vehicle.iter().all(Option::is_none) {
                 return Err(Error::NothingReachable { count: targets.len() });
@@ -110,9 +112,12 @@ impl OptimalPlanner<'_> {
                     Err(Error::Collision { clearance: plan.report.clearance })
                 };
             }
+            let before = clearance.clone();
             for violation in violations {
                 raise_clearance(&plan, &violation, &mut clearance, &mut nozzles);
             }
+            let raised: Vec<usize> = (0..clearance.len()).filter(|&i| clearance[i] > before[i]).collect();
+            graph.update(&nozzles.states, &mut checker, &clearance, &raised);
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Whole plans on analytic worlds.
 
+mod control;
 mod gantry;
 mod plans;
 mod session;

@@ -96,6 +96,11 @@ impl Estimator {
         self.estimate = next;
     }
 
+    /// Lets `dt` seconds pass without a pose.
+    pub fn coast(&mut self, dt: f64) {
+        self.estimate = self.after(dt);
+    }
+
     /// The pose that the model expects `horizon` seconds from now under the present command.
     pub fn predict(&self, horizon: f64) -> Isometry3<f64> {
         let next = self.after(horizon);

@@ -38,4 +38,6 @@ pub struct FlightSample {
     pub wanted_distance: f64,
     /// Flow that leaves the nozzle, m^3/s.
     pub flow: f64,
+    /// Whether the interlock keeps the valve shut although the reference asks for paint.
+    pub held: bool,
 }

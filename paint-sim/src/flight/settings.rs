@@ -3,7 +3,9 @@
 use nalgebra::Vector3;
 
 use super::airframe::Airframe;
+use super::faults::Faults;
 use super::hose::HoseModel;
+use super::interlock::Interlock;
 use crate::error::{Error, check_not_negative, check_positive, check_range};
 
 /// Wind as a mean and gusts; each axis of the gusts is an Ornstein-Uhlenbeck process.
@@ -91,11 +93,13 @@ pub struct Valve {
     pub dead_time: f64,
     /// How much earlier than the reference says the command is given, s. Default 50 ms: the dead time is known.
     pub lead: f64,
+    /// What keeps it shut although the reference asks for paint; `None` (default) follows the reference alone.
+    pub interlock: Option<Interlock>,
 }
 
 impl Default for Valve {
     fn default() -> Self {
-        Self { dead_time: 0.05, lead: 0.05 }
+        Self { dead_time: 0.05, lead: 0.05, interlock: None }
     }
 }
 
@@ -113,6 +117,8 @@ pub struct FlightSettings {
     pub localisation: Localisation,
     /// The valve.
     pub valve: Valve,
+    /// What goes wrong. Default nothing.
+    pub faults: Faults,
     /// Keeps pan and tilt at zero. Default false.
     pub ptu_locked: bool,
     /// Hover at the start before the reference begins, s; the observer learns wind and hose. Default 5.
@@ -131,6 +137,7 @@ impl Default for FlightSettings {
             hose: None,
             localisation: Localisation::default(),
             valve: Valve::default(),
+            faults: Faults::default(),
             ptu_locked: false,
             settle: 5.0,
             log_rate: 100,
@@ -177,8 +184,12 @@ impl FlightSettings {
         ] {
             check_not_negative(what, value)?;
         }
+        self.valve.interlock.map_or(Ok(()), |interlock| interlock.check())?;
+        self.faults.check()?;
         check_range("airframe.tilt_limit", tilt_limit, 0.01, 1.2, "between 0.01 and 1.2 rad")?;
-        check_range("wind.mean", self.wind.mean.amax(), 0.0, 100.0, "below 100 m/s")?;
+        for speed in &self.wind.mean {
+            check_range("wind.mean", *speed, -100.0, 100.0, "below 100 m/s")?;
+        }
         check_range("settle", self.settle, 0.0, 3600.0, "between 0 and an hour")?;
         let divides = self.log_rate > 0 && 1000 % self.log_rate == 0;
         if divides {

@@ -11,6 +11,8 @@ pub struct FlightStatistics {
     pub open_samples: usize,
     /// Those of them in which the spray's axis missed the surface; they count in nothing below.
     pub missed_samples: usize,
+    /// Samples for which the interlock kept the valve shut; they count in nothing below but the extremes.
+    pub held_samples: usize,
     /// RMS distance between hit and aim at the same time, m.
     pub hit_error_rms: f64,
     /// The distance that 95 % of the samples do not exceed (nearest rank), m.
@@ -53,6 +55,7 @@ impl FlightStatistics {
         Self {
             open_samples: open().count(),
             missed_samples: open().count() - errors.len(),
+            held_samples: samples.iter().filter(|s| s.held).count(),
             hit_error_rms: mean(errors.iter().map(|e| e * e)).sqrt(),
             hit_error_p95: errors.get(rank.saturating_sub(1)).copied().unwrap_or(0.0),
             hit_error_max: errors.last().copied().unwrap_or(0.0),

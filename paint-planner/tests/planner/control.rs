@@ -1,0 +1,199 @@
+//! Tracking control, and the identification of what it knows of the vehicle.
+#![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
+
+use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
+use paint_planner::Error;
+use paint_planner::control::*;
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
+
+const GRAVITY: f64 = 9.80665;
+
+/// An ellipse before a wall, the gun half a metre ahead and below the centre.
+fn ellipse(t: f64) -> ControlReference {
+    let (a, b, rate) = (0.6, 0.3, 0.7);
+    let (s, c) = (rate * t).sin_cos();
+    ControlReference {
+        position: Point3::new(0.1 * s, a * s, 2.0 + b * c),
+        velocity: Vector3::new(0.1 * rate * c, a * rate * c, -b * rate * s),
+        acceleration: Vector3::new(-0.1 * rate * rate * s, -a * rate * rate * s, -b * rate * rate * c),
+        heading: 0.3 * s,
+        heading_rate: 0.3 * rate * c,
+        lever: Vector3::new(0.5, 0.1, -0.15),
+    }
+}
+
+/// The vehicle of the model, in steps of a millisecond, and the lever's end in the world.
+struct Flown {
+    state: ControlState,
+    yaw_rate: f64,
+}
+
+impl Flown {
+    fn step(&mut self, vehicle: &VehicleModel, command: &ControlCommand, disturbance: &Vector3<f64>) {
+        let dt = 1e-3;
+        let ControlState { position, velocity, attitude, .. } = &mut self.state;
+        let follow =
+            |x: &mut f64, r: &AttitudeResponse, u: f64| *x += (r.gain * u - *x) * (1.0 - (-dt / r.time_constant).exp());
+        follow(&mut attitude[0], &vehicle.roll, command.roll);
+        follow(&mut attitude[1], &vehicle.pitch, command.pitch);
+        self.yaw_rate += (command.yaw_rate - self.yaw_rate) * (1.0 - (-dt / 0.15_f64).exp());
+        attitude[2] += self.yaw_rate * dt;
+        let rotation = Rotation3::from_euler_angles(attitude[0], attitude[1], attitude[2]);
+        let drag = rotation
+            * Vector3::new(vehicle.drag[0], vehicle.drag[0], vehicle.drag[1])
+                .component_mul(&(rotation.inverse() * *velocity));
+        let acceleration =
+            rotation * Vector3::new(0.0, 0.0, command.thrust) - Vector3::new(0.0, 0.0, GRAVITY) - drag + disturbance;
+        *velocity += acceleration * dt;
+        *position += *velocity * dt;
+    }
+
+    fn lever_error(&self, wanted: &ControlReference) -> f64 {
+        let [roll, pitch, yaw] = self.state.attitude;
+        let level = Rotation3::from_euler_angles(0.0, 0.0, yaw);
+        let lever = level.inverse() * wanted.lever;
+        let end = self.state.position + Rotation3::from_euler_angles(roll, pitch, yaw) * lever;
+        (end - (wanted.position + wanted.lever)).norm()
+    }
+}
+
+/// Flies the ellipse under a disturbance that is known: largest error of the lever's end and largest command since a time.
+fn fly(since: f64, settings: MpcSettings, disturbance: impl Fn(f64) -> Vector3<f64>) -> (f64, f64, TrackingMpc) {
+    let vehicle = VehicleModel::default();
+    let mut mpc = TrackingMpc::new(vehicle, settings).unwrap();
+    let begin = ellipse(0.0);
+    let still = Vector3::zeros();
+    let state =
+        ControlState { position: begin.position, velocity: begin.velocity, attitude: [0.0; 3], disturbance: still };
+    let mut flown = Flown { state, yaw_rate: begin.heading_rate };
+    let (mut worst, mut most) = (0.0_f64, 0.0_f64);
+    for k in 0..1200 {
+        let time = 0.01 * f64::from(k);
+        flown.state.disturbance = disturbance(time);
+        let command = mpc.command(time, &flown.state, &ellipse);
+        if time > since {
+            most = most.max(command.roll.abs()).max(command.pitch.abs());
+        }
+        for _ in 0..10 {
+            flown.step(&vehicle, &command, &disturbance(time));
+        }
+        if time > since {
+            worst = worst.max(flown.lever_error(&ellipse(time + 0.01)));
+        }
+    }
+    (worst, most, mpc)
+}
+
+#[test]
+fn the_end_of_the_lever_stays_on_its_trajectory_in_a_steady_wind() {
+    // Leaning against 1.5 m/s² moves the end of the lever by 8 cm; a controller of the body's centre leaves it there.
+    let (worst, most, mpc) = fly(2.0, MpcSettings::default(), |_| Vector3::new(-1.5, 0.8, -0.3));
+    assert!(worst < 0.006, "{worst} m");
+    assert!(most > 0.1 && most < 25.0_f64.to_radians());
+    // The start from a level body saturates.
+    assert!(mpc.unsettled() <= 1, "{}", mpc.unsettled());
+}
+
+#[test]
+fn commands_keep_their_limits_in_a_wind_beyond_them() {
+    // 6 m/s² ask for 31 degrees, 25 are permitted (and pitch gives 0.789 of its command): the vehicle is blown away, within its limits.
+    let (lost, most, _) =
+        fly(0.0, MpcSettings::default(), |t| Vector3::new(if t < 4.0 { -0.5 } else { -6.0 }, 0.0, 0.0));
+    assert!(most <= 25.0_f64.to_radians() + 1e-12, "{most}");
+    assert!(most > 24.9_f64.to_radians() && lost > 1.0, "{most} {lost}");
+    // A gust that passes is survived: eight seconds later nothing of it is left.
+    let gust = |t: f64| Vector3::new(if (0.5..1.0).contains(&t) { -6.0 } else { 0.0 }, 0.0, 0.0);
+    let (back, _, _) = fly(9.0, MpcSettings::default(), gust);
+    assert!(back < 0.006, "{back}");
+}
+
+#[test]
+fn a_controller_out_of_range_is_refused() {
+    let refused = |vehicle, settings| matches!(TrackingMpc::new(vehicle, settings), Err(Error::Setting { .. }));
+    let (vehicle, settings) = (VehicleModel::default(), MpcSettings::default());
+    assert!(refused(VehicleModel { tilt_limit: 2.0, ..vehicle }, settings));
+    assert!(refused(VehicleModel { thrust: [5.0, 4.0], ..vehicle }, settings));
+    assert!(refused(VehicleModel { drag: [f64::NAN, 0.0], ..vehicle }, settings));
+    assert!(refused(vehicle, MpcSettings { steps: 1, ..settings }));
+    assert!(refused(vehicle, MpcSettings { tilt: 0.0, ..settings }));
+}
+
+fn normal(random: &mut SplitMix64) -> f64 {
+    let mut unit = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+    let radius = (-2.0 * (1.0 - unit()).ln()).sqrt();
+    radius * (std::f64::consts::TAU * unit()).cos()
+}
+
+/// Random steps of the command; the answer to each in closed form, `K (1 - exp(-(t - t_i - delay)/tau))`, added up.
+fn recording(truth: [f64; 4], noise: f64, seed: u64) -> Vec<AttitudeSample> {
+    let [gain, tau, delay, offset] = truth;
+    let mut random = SplitMix64::seed_from_u64(seed);
+    let step = |k: usize| 30 * (k / 30);
+    let levels: Vec<f64> = (0..1500).map(|_| 0.15 * normal(&mut random)).collect();
+    // Nothing before the first sample was commanded that differs from its command.
+    let command = |k: usize| levels[step(k)];
+    (0..1500)
+        .map(|k| {
+            let time = 0.01 * k as f64;
+            let mut angle = gain * levels[0] + offset;
+            for i in (30..=k).step_by(30) {
+                let since = time - 0.01 * i as f64 - delay;
+                if since > 0.0 {
+                    angle += gain * (levels[i] - levels[i - 30]) * (1.0 - (-since / tau).exp());
+                }
+            }
+            AttitudeSample { time, commanded: command(k), measured: angle + noise * normal(&mut random) }
+        })
+        .collect()
+}
+
+#[test]
+fn gain_lag_and_delay_are_found_without_noise() {
+    for truth in [[1.017, 0.1847, 0.0, 0.0], [0.789, 0.175, 0.053, 0.02], [0.6, 0.04, 0.21, -0.1]] {
+        let fit = identify_attitude(&recording(truth, 0.0, 4)).unwrap();
+        let found = [fit.response.gain, fit.response.time_constant, fit.delay, fit.offset];
+        for (found, truth) in found.iter().zip(truth) {
+            assert!((found - truth).abs() < 1e-5, "{found} for {truth}");
+        }
+    }
+}
+
+/// The covariance is that of the errors: their normalised square is 3 in the mean.
+#[test]
+fn errors_are_as_large_as_their_covariance_says() {
+    let truth = [0.789, 0.175, 0.053, 0.02];
+    let (mut sum, count) = (0.0, 60);
+    for seed in 0..count {
+        let fit = identify_attitude(&recording(truth, 0.01, seed)).unwrap();
+        let error =
+            Vector3::new(fit.response.gain - truth[0], fit.response.time_constant - truth[1], fit.delay - truth[2]);
+        assert!(error.amax() < 0.02, "{error}");
+        let inverse: Matrix3<f64> = fit.covariance.try_inverse().unwrap();
+        sum += error.dot(&(inverse * error));
+        assert!((fit.residual - 0.01).abs() < 0.001);
+    }
+    let mean = sum / count as f64;
+    // Chi-square of 3 degrees: the mean of 60 deviates by 0.32.
+    assert!((mean - 3.0).abs() < 1.2, "{mean}");
+}
+
+#[test]
+fn recordings_that_tell_nothing_are_refused() {
+    let good = recording([1.0, 0.2, 0.0, 0.0], 0.001, 1);
+    let refused = |samples: &[AttitudeSample]| matches!(identify_attitude(samples), Err(Error::Recording { .. }));
+    assert!(refused(&good[..20]));
+    let still: Vec<_> = good.iter().map(|s| AttitudeSample { commanded: 0.1, ..*s }).collect();
+    assert!(refused(&still));
+    let mut random = SplitMix64::seed_from_u64(8);
+    let noise: Vec<_> = good.iter().map(|s| AttitudeSample { measured: 0.1 * normal(&mut random), ..*s }).collect();
+    assert!(refused(&noise));
+    let drift: Vec<_> = good.iter().map(|s| AttitudeSample { measured: 0.01 * s.time, ..*s }).collect();
+    assert!(refused(&drift));
+    let mut twice = good.clone();
+    twice[7].time = twice[6].time;
+    assert!(refused(&twice));
+    let mut holed = good;
+    holed[3].measured = f64::NAN;
+    assert!(refused(&holed));
+}

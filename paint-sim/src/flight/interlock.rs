@@ -1,0 +1,104 @@
+//! The interlock of the valve: paint leaves only while the spray is expected to meet its aim.
+
+use nalgebra::{Isometry3, Point3};
+
+use super::estimator::Estimator;
+use super::pan_tilt::PanTilt;
+use super::reference::ReferenceState;
+use crate::error::{Error, check_positive};
+
+/// When the valve is kept shut although the reference asks for paint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
+pub struct Interlock {
+    /// Largest distance of the aim from the spray's axis, m. Default 1.5 cm.
+    pub miss: f64,
+    /// Largest error of the distance from nozzle to aim, m. Default 5 cm: with a stand-off of 10 cm the 5 to 15 cm of Paper II,
+    /// section 7.1.
+    pub distance: f64,
+}
+
+impl Default for Interlock {
+    fn default() -> Self {
+        Self { miss: 0.015, distance: 0.05 }
+    }
+}
+
+impl Interlock {
+    pub(super) fn check(&self) -> Result<(), Error> {
+        check_positive("valve.interlock.miss", self.miss)?;
+        check_positive("valve.interlock.distance", self.distance)
+    }
+
+    /// Whether paint may leave a nozzle at a reported pose and reported angles.
+    fn permits(
+        &self,
+        ptu: &dyn PanTilt,
+        world_from_body: &Isometry3<f64>,
+        angles: [f64; 2],
+        wanted: &ReferenceState,
+    ) -> bool {
+        // Without an aim there is nothing to judge by.
+        wanted.aim.is_none_or(|aim: Point3<f64>| {
+            let (nozzle, axis) = ptu.nozzle(world_from_body, angles);
+            let ray = aim - nozzle;
+            let along = ray.dot(&axis);
+            let off = (ray - axis.into_inner() * along).norm();
+            along > 0.0 && off <= self.miss && (along - wanted.nozzle_distance).abs() <= self.distance
+        })
+    }
+}
+
+/// The interlock at work: one decision for each control step.
+pub(super) struct InterlockState {
+    settings: Option<Interlock>,
+    /// Control steps from a command of the joints to its effect, and from one of the valve.
+    delays: [usize; 2],
+    commands: Vec<[f64; 2]>,
+    open: Vec<bool>,
+}
+
+/// What is known when a control step begins.
+pub(super) struct Known<'a> {
+    /// `None` while no pose arrives.
+    pub(super) estimator: Option<&'a Estimator>,
+    /// The joints as they report themselves, and as they are commanded now.
+    pub(super) angles: [f64; 2],
+    pub(super) command: [f64; 2],
+    /// The reference now, and when the valve will have followed, `ahead` seconds later.
+    pub(super) now: &'a ReferenceState,
+    pub(super) later: &'a ReferenceState,
+    pub(super) ahead: f64,
+}
+
+impl InterlockState {
+    /// `None` leaves the valve to the reference. Delays of joints and valve in control steps.
+    pub(super) fn new(settings: Option<Interlock>, delays: [f64; 2]) -> Self {
+        let delays = delays.map(|steps| steps.round() as usize);
+        Self { settings, delays, commands: Vec::new(), open: Vec::new() }
+    }
+
+    /// Decides for the control step that begins: the spray must meet its aim now and when the valve will have followed; without a
+    /// pose the valve is shut. The joints will then be where they were commanded to, but for what they are off now.
+    pub(super) fn decide(&mut self, ptu: &dyn PanTilt, known: &Known) {
+        self.commands.push(known.command);
+        let [joints, valve] = self.delays;
+        let commanded = |ago: usize| self.commands[self.commands.len().saturating_sub(1 + ago)];
+        let (now, later) = (commanded(joints), commanded(joints.saturating_sub(valve)));
+        let expected = [0, 1].map(|k| later[k] + known.angles[k] - now[k]);
+        let permits = |interlock: &Interlock, estimator: &Estimator| {
+            interlock.permits(ptu, &estimator.predict(0.0), known.angles, known.now)
+                && interlock.permits(ptu, &estimator.predict(known.ahead), expected, known.later)
+        };
+        self.open.push(match (&self.settings, known.estimator) {
+            (None, _) => true,
+            (Some(_), None) => false,
+            (Some(interlock), Some(estimator)) => permits(interlock, estimator),
+        });
+    }
+
+    /// The decision of a control step, counted from the first; before it nothing was forbidden.
+    pub(super) fn open(&self, control_step: i64) -> bool {
+        usize::try_from(control_step).ok().and_then(|k| self.open.get(k)).copied().unwrap_or(true)
+    }
+}
