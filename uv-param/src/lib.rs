@@ -68,8 +68,8 @@ mod unwrap;
 
 pub use arap::Arap;
 pub use atlas::{
-    Atlas, AtlasQuality, AtlasSettings, ChartSettings, PackSettings, Page, PageTexels, Placement, TexelKind, Turns,
-    unwrap_atlas,
+    Atlas, AtlasLayout, AtlasQuality, AtlasSettings, AtlasUpdate, ChartSettings, PackSettings, Page, PageTexels,
+    Placement, TexelKind, Turns, unwrap_atlas, update_atlas,
 };
 pub use chart::{Chart, SurfacePoint};
 pub use cut::{CutSettings, unwrap_with_cuts};
