@@ -412,7 +412,7 @@ impl Halves {
     }
 
     /// The picture put together again.
-    fn joined(&self, image: &Image) -> Image {
+    fn joined(image: &Image) -> Image {
         Image::from_fn(2 * HALF, image.height(), |x, y| image.at(if x < HALF { x } else { x + APART }, y))
     }
 }
@@ -447,12 +447,12 @@ fn a_seam_is_no_border_for_a_painter() {
         let cut = paint(painter, &halves.problem(), &limits);
         let name = painter.name();
         // What it expects is what lands, and its ghosts show it.
-        let (expected, real) = (halves.joined(&seamless.canvas), wall(&seamless));
+        let (expected, real) = (Halves::joined(&seamless.canvas), wall(&seamless));
         assert!(error(&expected, &real) < sure, "{name}: expects another wall, {}", error(&expected, &real));
         let mut shown = seamless.canvas.clone();
         halves.ghosts.gather(shown.data_mut());
         assert_eq!(shown, seamless.canvas, "{name}");
-        assert!(error(&halves.joined(&cut.canvas), &wall(&cut)) > 0.05, "{name}: nothing crosses the cut");
+        assert!(error(&Halves::joined(&cut.canvas), &wall(&cut)) > 0.05, "{name}: nothing crosses the cut");
         // And what lands is as near to the picture as if there were no cut.
         let psnr = |canvas: &Image| metrics::psnr(&canvas.map(f64::tanh), &whole, None).unwrap();
         let (best, got, without) = (psnr(&at_once.canvas), psnr(&real), psnr(&wall(&cut)));

@@ -406,7 +406,7 @@ fn a_straight_line_goes_on_over_seams() {
             folds += 1;
         }
         let reached = page.straight_on(from, offset).expect("a cube has no border");
-        assert!((page.point(reached).coords - point).norm() < 1e-9, "{:?} from {:?} by {offset:?}", reached, from);
+        assert!((page.point(reached).coords - point).norm() < 1e-9, "{reached:?} from {from:?} by {offset:?}");
         assert!((point - middle).amax() < 0.5 + 1e-9);
         crossed += usize::from(folds > 0);
         let flat = page.uv_of(from);

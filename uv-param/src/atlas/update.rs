@@ -286,9 +286,11 @@ fn spread(charts: &Charts, faces: &[u32], disk: &Disk, old: &[Option<(u32, usize
         }
     }
     let free: Vec<usize> = (0..uv.len()).filter(|&v| !known[v]).collect();
-    let count = faces.len().max(1) as f64;
-    let middle = [0, 1].map(|k| uv.iter().zip(&known).filter(|(_, k)| **k).map(|(p, _)| p[k]).sum::<f64>() / count);
-    free.iter().for_each(|&v| uv[v] = middle);
+    let placed = (uv.len() - free.len()).max(1) as f64;
+    let middle = [0, 1].map(|k| uv.iter().map(|p| p[k]).sum::<f64>() / placed);
+    for &v in &free {
+        uv[v] = middle;
+    }
     for _ in 0..SWEEPS {
         for &v in &free {
             let count = neighbours[v].len() as f64;
