@@ -21,6 +21,7 @@ pub fn run(first: u64, count: u64) -> Result<(), Box<dyn std::error::Error>> {
     let settings =
         AtlasSettings { pack: PackSettings { texel_m: 0.02, ..PackSettings::default() }, ..AtlasSettings::default() };
     let (mut laid_out, mut panics, mut broken, mut not_finite, mut in_f32) = (0_u64, 0_u64, 0_u64, 0_u64, 0_u64);
+    let mut largest_overlap = 0.0_f64;
     let mut refused: BTreeMap<String, u64> = BTreeMap::new();
     let (mut longest, mut longest_seed, mut faces) = (0.0_f64, 0, 0);
     for seed in first..first.saturating_add(count) {
@@ -42,11 +43,12 @@ pub fn run(first: u64, count: u64) -> Result<(), Box<dyn std::error::Error>> {
                 laid_out += 1;
                 not_finite += u64::from(!finite(&atlas));
                 let q = AtlasQuality::of(&atlas);
+                largest_overlap = largest_overlap.max(q.overlap_share);
                 in_f32 += u64::from(q.flips_f32 > 0);
                 if q.flips + q.overlap_pairs > 0 || q.stretch_max > settings.charts.worst_stretch {
+                    let (flips, overlaps, share, stretch) = (q.flips, q.overlap_pairs, q.overlap_share, q.stretch_max);
                     eprintln!(
-                        "seed {seed}: {} flips, {} overlaps, stretch {}",
-                        q.flips, q.overlap_pairs, q.stretch_max
+                        "seed {seed}: {flips} flips, {overlaps} overlaps, {share:e} of the area, stretch {stretch}"
                     );
                     broken += 1;
                 }
@@ -57,7 +59,8 @@ pub fn run(first: u64, count: u64) -> Result<(), Box<dyn std::error::Error>> {
         "{}",
         json!({
             "fig": "uv-param_fuzz", "meshes": count, "faces": faces, "laid_out": laid_out, "refused": refused, "panics": panics,
-            "not_finite": not_finite, "broken": broken, "flips_in_f32": in_f32, "longest_s": longest, "longest_seed": longest_seed,
+            "not_finite": not_finite, "broken": broken, "flips_in_f32": in_f32,
+            "largest_overlap_share": largest_overlap, "longest_s": longest, "longest_seed": longest_seed,
         })
     );
     if panics + not_finite + broken > 0 { Err("an atlas breaks what it promises".into()) } else { Ok(()) }
