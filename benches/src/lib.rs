@@ -6,6 +6,7 @@ pub mod cpu;
 pub mod films;
 pub mod flight;
 pub mod frames;
+pub mod fuzzed_meshes;
 pub mod motion;
 pub mod painting;
 pub mod planner;

@@ -17,6 +17,7 @@ mod preview;
 mod reach;
 mod rehearse;
 mod run;
+mod seams;
 mod settings;
 mod shading;
 mod simulated_flight;

@@ -118,6 +118,14 @@ pub struct Report {
     /// That mean.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fill_mean_ratio: Option<f64>,
+    /// Length of all seams on the surface.
+    pub seam_length_m: f64,
+    /// Structural similarity of the painted surface within 3 cm of a seam, where the robot can paint; windows go on beyond the seams.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ssim_painted_at_seams: Option<f64>,
+    /// The same farther from the seams.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ssim_painted_off_seams: Option<f64>,
     /// Layers of paint.
     pub layers: usize,
     /// Strokes over all layers.

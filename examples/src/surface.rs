@@ -1,10 +1,10 @@
 //! A mesh made ready for painting: unwrapped, cut into texels, searchable for rays.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
-use paint_net::Image;
+use paint_net::{GhostPixels, Image};
 use paint_sim::{Texel, TriangleSurface};
 use uv_param::{
-    AtlasSettings, Chart, ChartSettings, CutSettings, Disk, Error, NormalMode, NozzleSettings, PackSettings,
+    AtlasSettings, Chart, ChartSettings, CutSettings, Disk, Error, Gutter, NormalMode, NozzleSettings, PackSettings,
     RepairReport, Settings, TexelMap, Turns,
 };
 
@@ -22,6 +22,8 @@ pub struct PaintSurface {
     pub chart: Chart,
     /// Texel to surface.
     pub texels: TexelMap,
+    /// Texels beside the charts that show where the surface goes on beyond a seam, as far as a spray reaches.
+    pub beyond_seams: GhostPixels,
     /// Everything there is to hit: the disk's faces first, in their order, then the rest of the mesh.
     pub world: TriangleSurface,
     /// What was left out of the disk.
@@ -36,6 +38,9 @@ pub enum SurfaceError {
     /// It cannot be unwrapped.
     #[error(transparent)]
     Unwrap(#[from] uv_param::Error),
+    /// Its seams do not fit together in the plane.
+    #[error(transparent)]
+    Seams(#[from] paint_net::Error),
     /// It cannot be hit.
     #[error(transparent)]
     World(#[from] paint_sim::Error),
@@ -85,8 +90,9 @@ impl PaintSurface {
             progress(if p.stage == uv_param::Stage::Cut { 0.0 } else { share });
         })?;
         let texels = TexelMap::new(&chart, texel)?;
+        let beyond_seams = beyond_seams(&chart, &texels)?;
         let world = world(&disk, [mesh, obstacles])?;
-        Ok(Self { chart, texels, world, repair_report, charts: 1 })
+        Ok(Self { chart, texels, beyond_seams, world, repair_report, charts: 1 })
     }
 
     /// All parts of a mesh of any topology, as upright charts on one page.
@@ -97,12 +103,14 @@ impl PaintSurface {
         texel: f64,
     ) -> Result<Self, SurfaceError> {
         let charts = ChartSettings { up: Some([0.0, 0.0, 1.0]), ..ChartSettings::default() };
-        // The footprint of a spray must not reach from chart to chart across the page.
-        let gutter = (2.0 * FOOTPRINT / texel).ceil() as usize;
+        // The footprint of a spray must not reach from chart to chart across the page, and what it puts beyond its own seam must not
+        // lie where another chart's does.
+        let gutter = 2 * reach(texel);
         let pack = PackSettings { texel_m: texel, gutter, page: None, turns: Turns::None };
         let atlas = uv_param::unwrap_atlas(positions, &mesh.faces, &[], &AtlasSettings { charts, pack }, |_| ())?;
         let chart = atlas.page_chart(0).ok_or(Error::ZeroArea)?;
         let texels = TexelMap::new(&chart, texel)?;
+        let beyond_seams = beyond_seams(&chart, &texels)?;
         let world = world(chart.disk(), [mesh, obstacles])?;
         let found = atlas.report();
         let repair_report = RepairReport {
@@ -115,7 +123,7 @@ impl PaintSurface {
             reversed_faces: found.reversed_faces,
             ..RepairReport::default()
         };
-        Ok(Self { texels, world, repair_report, charts: atlas.charts().len(), chart })
+        Ok(Self { texels, beyond_seams, world, repair_report, charts: atlas.charts().len(), chart })
     }
 
     /// The part of the mesh that is painted.
@@ -181,6 +189,14 @@ impl PaintSurface {
         Some((command.point, -command.direction))
     }
 
+    /// The same `offset` pixels on from a place of the picture: beyond a seam the surface goes on in another chart.
+    pub fn lift_from(&self, [x, y]: [f64; 2], offset: [f64; 2]) -> Option<(Point3<f64>, UnitVector3<f64>)> {
+        let texel = self.texels.texel_m;
+        let from = self.chart.locate([(x + 0.5) * texel, (self.height() as f64 - y - 0.5) * texel])?;
+        let point = self.chart.straight_on(from, [offset[0] * texel, -offset[1] * texel])?;
+        Some((self.chart.point(point), self.chart.footprint_normal(point, FOOTPRINT)))
+    }
+
     /// Vertices of the disk, metres, as files and recordings hold them.
     pub fn vertices(&self) -> Vec<[f32; 3]> {
         self.disk().positions().iter().map(|p| p.map(|c| c as f32)).collect()
@@ -201,6 +217,18 @@ impl PaintSurface {
         let width = self.width();
         (0..width * self.height()).map(move |k| (k % width, k / width))
     }
+}
+
+/// How far a spray reaches, texels: all but a ten-thousandth of its paint.
+fn reach(texel: f64) -> usize {
+    (2.0 * FOOTPRINT / texel).ceil() as usize
+}
+
+/// What lies beyond the seams of a chart, for the painter.
+fn beyond_seams(chart: &Chart, texels: &TexelMap) -> Result<GhostPixels, paint_net::Error> {
+    let gutter = Gutter::new(chart, texels, reach(texels.texel_m));
+    let ghosts = gutter.texels.into_iter().map(|t| (t.texel, t.sources)).collect();
+    GhostPixels::new(ghosts, gutter.rim, (texels.width, texels.height))
 }
 
 /// The disk's faces, then the faces of its mesh that are not in it, then the obstacles.

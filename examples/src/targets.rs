@@ -122,10 +122,13 @@ fn bridge(surface: &PaintSurface, from: [f64; 2], to: [f64; 2], along: f64, targ
     }
 }
 
-/// The target `offset` pixels from a spray; drawn back to the spray where the surface ends before it.
+/// The target `offset` pixels from a spray, beyond a seam where one lies between; drawn back to the spray where the surface ends before it.
 fn border(surface: &PaintSurface, spray: &Spray, offset: [f64; 2]) -> Option<Target> {
     [1.0, 0.75, 0.5, 0.25, 0.0].iter().find_map(|share| {
-        let (point, normal) = surface.lift(spray.x + share * offset[0], spray.y + share * offset[1])?;
+        let offset = offset.map(|o| share * o);
+        let (point, normal) = surface
+            .lift(spray.x + offset[0], spray.y + offset[1])
+            .or_else(|| surface.lift_from([spray.x, spray.y], offset))?;
         Some(Target { point, normal, dose: 0.0, time: None })
     })
 }

@@ -4,6 +4,7 @@ mod arguments;
 mod error;
 mod files;
 mod page_picture;
+mod previous;
 mod report;
 mod run;
 

@@ -59,6 +59,14 @@ pub enum Error {
     /// A file of weights is not one, or not of this network.
     #[error("weights: {0}; give a safetensors file written by this crate")]
     Weights(String),
+    /// A ghost pixel shows what it cannot.
+    #[error("ghost pixel {pixel} {why}")]
+    Ghost {
+        /// Its index.
+        pixel: usize,
+        /// What is wrong.
+        why: &'static str,
+    },
     /// There is no place to spray, or nothing to look at.
     #[error("{0}: the problem leaves nothing to do; check the masks")]
     EmptyProblem(&'static str),

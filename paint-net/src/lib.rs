@@ -81,7 +81,7 @@ pub use painters::{
 };
 pub use painting::Painting;
 pub use path::{ScanOrder, Stroke, StrokeSettings, boustrophedon};
-pub use problem::{Limits, PaintProblem};
+pub use problem::{GhostPixels, Limits, PaintProblem, WeightedPixels};
 
 /// Paints an image in one call: wanted ink in `[0, 1]`, by the feedback network with its shipped weights, on a bare wall, with
 /// the thesis' nozzle and `tanh`.

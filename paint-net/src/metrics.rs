@@ -35,7 +35,12 @@ pub fn binary_cross_entropy(picture: &Image, reference: &Image) -> Result<f64, E
 /// Structural similarity with a uniform 7x7 window and sample covariance (Wang et al. 2004; K₁ = 0.01, K₂ = 0.03), mean over
 /// the pixels whose window lies inside the picture and on pixels of positive weight.
 pub fn ssim(picture: &Image, reference: &Image, weight: Option<&Image>) -> Result<f64, Error> {
-    windowed_ssim(picture, reference, weight, &[1.0 / 7.0; 7], 49.0 / 48.0)
+    windowed_ssim(picture, reference, weight, None, &[1.0 / 7.0; 7], 49.0 / 48.0)
+}
+
+/// [`ssim`] as the mean over the windows about some pixels only.
+pub fn ssim_at(picture: &Image, reference: &Image, weight: Option<&Image>, centres: &[bool]) -> Result<f64, Error> {
+    windowed_ssim(picture, reference, weight, Some(centres), &[1.0 / 7.0; 7], 49.0 / 48.0)
 }
 
 /// Structural similarity with an 11x11 Gaussian window of σ = 1.5 and population covariance.
@@ -43,18 +48,22 @@ pub fn ssim_gaussian(picture: &Image, reference: &Image, weight: Option<&Image>)
     let taps: Vec<f64> = (-5..=5).map(|d: i32| (-f64::from(d * d) / 4.5).exp()).collect();
     let total: f64 = taps.iter().sum();
     let taps: Vec<f64> = taps.iter().map(|t| t / total).collect();
-    windowed_ssim(picture, reference, weight, &taps, 1.0)
+    windowed_ssim(picture, reference, weight, None, &taps, 1.0)
 }
 
 fn windowed_ssim(
     picture: &Image,
     reference: &Image,
     weight: Option<&Image>,
+    centres: Option<&[bool]>,
     taps: &[f64],
     covariance_scale: f64,
 ) -> Result<f64, Error> {
     check(picture, reference, weight)?;
     let (width, height) = picture.size();
+    if let Some(centres) = centres.filter(|centres| centres.len() != width * height) {
+        return Err(Error::Mismatch { what: "centres", found: (centres.len(), 1), expected: (width, height) });
+    }
     let n = taps.len();
     if width < n || height < n {
         return Err(Error::Mismatch {
@@ -93,7 +102,9 @@ fn windowed_ssim(
     let (c1, c2) = (0.01_f64.powi(2), 0.03_f64.powi(2));
     let (mut sum, mut count) = (0.0, 0.0);
     for k in 0..mean_x.len() {
-        if left_out.as_ref().is_some_and(|l| l[k] > 1e-12) {
+        let columns = width - n + 1;
+        let centre = (k / columns + n / 2) * width + k % columns + n / 2;
+        if left_out.as_ref().is_some_and(|l| l[k] > 1e-12) || centres.is_some_and(|centres| !centres[centre]) {
             continue;
         }
         let (mx, my) = (mean_x[k], mean_y[k]);

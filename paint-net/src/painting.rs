@@ -36,10 +36,12 @@ impl Painting {
 
     /// A painting in one piece, rendered: every spray is stamped on the problem's canvas with the problem's kernel.
     pub fn render(problem: &PaintProblem, sprays: Vec<Spray>) -> Self {
-        let mut canvas = problem.initial_canvas();
+        let initial = problem.initial_canvas();
+        let mut canvas = initial.clone();
         for spray in &sprays {
             problem.kernel.stamp(spray, &mut canvas);
         }
+        problem.settle(initial.data(), canvas.data_mut());
         Self::new(sprays, canvas, problem.saturation)
     }
 

@@ -18,6 +18,7 @@ mod sew;
 mod simple_boundary;
 mod straighten;
 mod texels;
+mod update;
 
 use crate::chart::{Chart, SurfacePoint};
 use crate::error::Error;
@@ -29,6 +30,7 @@ use pack::Piece;
 pub use pack::{PackSettings, Page, Placement, Turns};
 pub use quality::AtlasQuality;
 pub use texels::{PageTexels, TexelKind};
+pub use update::{AtlasLayout, AtlasUpdate, update_atlas};
 
 /// How a mesh becomes an atlas.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -97,13 +99,26 @@ impl Atlas {
         let (charts, members) = charting::charts(&surface, seams, &settings.charts, parametrizer, &mut progress)?;
         let pieces: Vec<Piece> = charts.iter().map(|c| Piece { uv: c.uv(), faces: c.disk().faces() }).collect();
         let (placements, pages) = pack::pack(&pieces, &settings.pack)?;
+        Ok(Self::of_parts(surface, report, charts, members, placements, pages, settings.pack.texel_m))
+    }
+
+    /// Charts with their faces, and where they lie.
+    fn of_parts(
+        surface: Surface,
+        report: SurfaceReport,
+        charts: Vec<Chart>,
+        members: Vec<Vec<u32>>,
+        placements: Vec<Placement>,
+        pages: Vec<Page>,
+        texel_m: f64,
+    ) -> Self {
         let mut place_of_face = vec![[0; 2]; surface.faces().len()];
         for (chart, faces) in members.iter().enumerate() {
             for (local, &f) in faces.iter().enumerate() {
                 place_of_face[f as usize] = [chart as u32, local as u32];
             }
         }
-        Ok(Self { surface, report, charts, place_of_face, members, placements, pages, texel_m: settings.pack.texel_m })
+        Self { surface, report, charts, place_of_face, members, placements, pages, texel_m }
     }
 
     /// The surface that was laid out.

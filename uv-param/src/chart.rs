@@ -3,6 +3,7 @@
 mod locate;
 mod normals;
 mod placement;
+mod straight;
 mod surface_point;
 
 use nalgebra::{Point3, Unit, Vector3};
@@ -110,11 +111,11 @@ impl Chart {
     }
 
     /// Unit normal averaged over the disc of `radius` metres around `at` in the chart: what a spray footprint sees of a
-    /// rough surface. Parts of the disc outside the chart do not count.
+    /// rough surface. The disc goes on beyond seams; what lies beyond open borders does not count.
     pub fn footprint_normal(&self, at: SurfacePoint, radius: f64) -> Unit<Vector3<f64>> {
         let centre = self.uv_of(at);
         let mean: Vector3<f64> = normals::disc(radius)
-            .filter_map(|[u, v]| self.locate([centre[0] + u, centre[1] + v]))
+            .filter_map(|[u, v]| self.locate([centre[0] + u, centre[1] + v]).or_else(|| self.straight_on(at, [u, v])))
             .map(|sample| self.face_normal(sample.face).into_inner())
             .sum();
         Unit::try_new(mean, f64::EPSILON).unwrap_or_else(|| self.smooth_normal(at))

@@ -48,6 +48,7 @@ mod cut;
 mod disk;
 mod distortion;
 mod error;
+mod gutter;
 mod half_edges;
 mod laplacian;
 mod linear;
@@ -62,18 +63,20 @@ mod texture;
 mod trace;
 mod triangle;
 mod tutte;
+mod unfold;
 mod unwrap;
 
 pub use arap::Arap;
 pub use atlas::{
-    Atlas, AtlasQuality, AtlasSettings, ChartSettings, PackSettings, Page, PageTexels, Placement, TexelKind, Turns,
-    unwrap_atlas,
+    Atlas, AtlasLayout, AtlasQuality, AtlasSettings, AtlasUpdate, ChartSettings, PackSettings, Page, PageTexels,
+    Placement, TexelKind, Turns, unwrap_atlas, update_atlas,
 };
 pub use chart::{Chart, SurfacePoint};
 pub use cut::{CutSettings, unwrap_with_cuts};
 pub use disk::{Disk, Repair, RepairReport, largest_disk, largest_disk_with};
 pub use distortion::Quality;
 pub use error::Error;
+pub use gutter::{Gutter, GutterTexel, WeightedTexels};
 pub use min_area_rectangle::{Rectangle, convex_hull, min_area_rectangle};
 pub use nalgebra;
 pub use nozzle::{NormalMode, NozzleCommand, NozzleSettings, nozzle_command};

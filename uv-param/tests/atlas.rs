@@ -4,9 +4,10 @@
 mod common;
 
 use common::{Mesh, Rng, fixture, grid};
+use uv_param::nalgebra::Vector3;
 use uv_param::{
-    Atlas, AtlasQuality, AtlasSettings, ChartSettings, Error, PackSettings, PageTexels, Parametrizer, Settings,
-    Surface, SurfacePoint, TexelKind, TexelMap, Turns, Tutte, largest_disk_with, unwrap, unwrap_atlas,
+    Atlas, AtlasQuality, AtlasSettings, ChartSettings, Error, Gutter, PackSettings, PageTexels, Parametrizer, Settings,
+    Surface, SurfacePoint, TexelKind, TexelMap, Turns, Tutte, largest_disk_with, unwrap, unwrap_atlas, update_atlas,
 };
 
 fn atlas(mesh: &Mesh, texel_m: f64) -> Atlas {
@@ -352,6 +353,237 @@ fn a_page_is_a_chart_of_charts() {
         seams += 1;
     }
     assert!(seams > 20);
+}
+
+/// Straight on from a point of a cube, computed on the cube itself: over an edge the way turns by a right angle.
+#[test]
+fn a_straight_line_goes_on_over_seams() {
+    let found = atlas(&cube(4), 0.02);
+    let page = found.page_chart(0).unwrap();
+    let mut random = Rng(5);
+    let (mut crossed, mut seams) = (0, 0);
+    for _ in 0..2000 {
+        let from = SurfacePoint {
+            face: random.below(page.disk().faces().len()) as u32,
+            barycentric: {
+                let (a, b) = (random.unit(), random.unit());
+                if a + b < 1.0 { [a, b, 1.0 - a - b] } else { [1.0 - a, 1.0 - b, a + b - 1.0] }
+            },
+        };
+        let (angle, length) = (6.3 * random.unit(), 0.1 + 0.8 * random.unit());
+        let offset = [length * angle.cos(), length * angle.sin()];
+        // The direction in space, by the corners of the face.
+        let corners = page.disk().faces()[from.face as usize];
+        let place = |k: usize| Vector3::from(page.disk().positions()[corners[k] as usize]);
+        let uv = |k: usize| page.uv()[corners[k] as usize];
+        let [[a, b], [c, d]] = [1, 2].map(|k| [uv(k)[0] - uv(0)[0], uv(k)[1] - uv(0)[1]]);
+        let det = a * d - b * c;
+        let (s, t) = ((offset[0] * d - offset[1] * c) / det, (a * offset[1] - b * offset[0]) / det);
+        let mut way = s * (place(1) - place(0)) + t * (place(2) - place(0));
+        assert!((way.norm() - length).abs() < 1e-9, "a cube is laid out without stretch");
+        let mut point = page.point(from).coords;
+        let mut normal = page.face_normal(from.face).into_inner();
+        let middle = Vector3::repeat(0.5);
+        let mut folds = 0;
+        loop {
+            // How far to the next edge of this side of the cube, and over which.
+            let to_edge = |k: usize| {
+                let room = if way[k] > 0.0 { 1.0 - point[k] } else { -point[k] };
+                if normal[k].abs() > 0.5 || way[k].abs() < 1e-12 { f64::INFINITY } else { room / way[k] }
+            };
+            let first = (0..3).min_by(|&i, &j| to_edge(i).total_cmp(&to_edge(j))).unwrap();
+            let share = to_edge(first);
+            if share >= 1.0 {
+                point += way;
+                break;
+            }
+            point += share * way;
+            let mut out = Vector3::zeros();
+            out[first] = way[first].signum();
+            let rest = (1.0 - share) * way;
+            way = rest - rest.dot(&out) * out - rest.dot(&out) * normal;
+            normal = out;
+            folds += 1;
+        }
+        let reached = page.straight_on(from, offset).expect("a cube has no border");
+        assert!((page.point(reached).coords - point).norm() < 1e-9, "{reached:?} from {from:?} by {offset:?}");
+        assert!((point - middle).amax() < 0.5 + 1e-9);
+        crossed += usize::from(folds > 0);
+        let flat = page.uv_of(from);
+        seams += usize::from(page.locate([flat[0] + offset[0], flat[1] + offset[1]]) != Some(reached));
+    }
+    assert!(crossed > 500 && seams > 100, "{crossed} crossed an edge of the cube, {seams} a seam");
+}
+
+/// A gutter texel of a cube lies on another side of it, as far from the seam as on the page; and what it interpolates is that place.
+#[test]
+fn the_gutter_is_the_other_side_of_the_seam() {
+    let texel = 0.02;
+    let found = atlas(&cube(4), texel);
+    let page = found.page_chart(0).unwrap();
+    let map = TexelMap::new(&page, texel).unwrap();
+    let gutter = Gutter::new(&page, &map, 3);
+    let open: Vec<usize> = (0..3 * page.disk().faces().len()).filter(|&h| page.disk().twin(h).is_none()).collect();
+    let corner = |h: usize| page.disk().faces()[h / 3][h % 3] as usize;
+    let mut checked = 0;
+    for gutter in &gutter.texels {
+        let centre = map.uv_of_texel(gutter.texel % map.width, gutter.texel / map.width);
+        assert!(page.locate(centre).is_none());
+        // The nearest point of the rim, in the plane and on the cube.
+        let nearest = open.iter().map(|&h| {
+            let ends = [h, h / 3 * 3 + (h + 1) % 3].map(corner);
+            let [a, b] = ends.map(|v| page.uv()[v]);
+            let edge = [b[0] - a[0], b[1] - a[1]];
+            let along = ((centre[0] - a[0]) * edge[0] + (centre[1] - a[1]) * edge[1]) / edge[0].hypot(edge[1]).powi(2);
+            let along = along.clamp(0.0, 1.0);
+            let distance = (a[0] + along * edge[0] - centre[0]).hypot(a[1] + along * edge[1] - centre[1]);
+            let [p, q] = ends.map(|v| Vector3::from(page.disk().positions()[v]));
+            (distance, p + along * (q - p))
+        });
+        let (distance, rim) = nearest.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+        // Off the corners of the cube, where nothing unfolds, and off its other edges, where the way would bend again.
+        let to_edge = rim.map(|x| x.min(1.0 - x));
+        let bends = to_edge.iter().any(|x| (1e-9..0.08).contains(x)) || to_edge.iter().all(|x| *x < 1e-9);
+        if bends {
+            continue;
+        }
+        let point = page.point(gutter.point).coords;
+        assert!(((point - rim).norm() - distance).abs() < 1e-9, "{point} beyond {rim}, {distance} m");
+        let sum: f64 = gutter.sources.iter().map(|s| s.1).sum();
+        assert!((sum - 1.0).abs() < 1e-12);
+        let shown: Vector3<f64> =
+            gutter.sources.iter().map(|&(k, weight)| weight * page.point(map.cells[k].unwrap()).coords).sum();
+        // A texel that straddles the edge of the cube has its middle on one of the sides.
+        assert!((shown - point).norm() < texel, "shows {shown} for {point}");
+        checked += 1;
+    }
+    assert!(checked > 500, "{checked}");
+}
+
+/// A dent in a sphere of many charts: what is away from it stays to the bit, what is near is laid out again within the bounds.
+#[test]
+fn charts_that_a_change_does_not_touch_stay_to_the_bit() {
+    let mesh = sphere(24);
+    let options = settings(0.02);
+    let before = atlas(&mesh, 0.02);
+    assert!(before.charts().len() > 1);
+    // In the middle of the first chart: as far as can be from the faces of the others.
+    let middle = |f: u32| mesh.1[f as usize].iter().map(|&v| Vector3::from(mesh.0[v as usize])).sum::<Vector3<f64>>();
+    let others: Vec<Vector3<f64>> = before.chart_faces(1).iter().map(|&f| middle(f)).collect();
+    let distance = |f: u32| others.iter().map(|p| (p - middle(f)).norm_squared()).fold(f64::INFINITY, f64::min);
+    let faces = before.chart_faces(0).iter().copied();
+    let centre = middle(faces.max_by(|&f, &g| distance(f).total_cmp(&distance(g))).unwrap()).normalize();
+    let dent = |p: [f64; 3], depth: f64| {
+        let near = (Vector3::from(p).dot(&centre) - 0.96).max(0.0) / 0.04;
+        p.map(|x| x * (1.0 - depth * near))
+    };
+    let dented = |depth| mesh.0.iter().map(|&p| dent(p, depth)).collect::<Vec<_>>();
+    let moved = dented(0.01);
+    let same = |f: &[u32; 3]| f.iter().all(|&v| mesh.0[v as usize] == moved[v as usize]);
+    let kept_faces = mesh.1.iter().filter(|f| same(f)).count();
+    assert!((0.95..0.99).contains(&(kept_faces as f64 / mesh.1.len() as f64)), "{kept_faces} of {}", mesh.1.len());
+
+    let (after, update) = update_atlas(&before.layout(), &moved, &mesh.1, &[], &options, |_| ()).unwrap();
+    assert_sound(&after);
+    assert_eq!(update.kept_faces, kept_faces);
+    assert!(update.kept_charts > 0 && update.changed_charts > 0, "{update:?}");
+    assert_eq!(update.kept_charts + update.changed_charts + update.new_charts, after.charts().len());
+    let bits = |atlas: &Atlas, f: usize| {
+        let (chart, local) = atlas.chart_of_face(f);
+        let uv = atlas.charts()[chart].disk().faces()[local].map(|v| atlas.charts()[chart].uv()[v as usize]);
+        (uv.map(|p| p.map(f64::to_bits)), atlas.placements()[chart])
+    };
+    let untouched = |chart: usize| before.chart_faces(chart).iter().all(|&f| same(&mesh.1[f as usize]));
+    let (mut stayed, mut charts) = (0, 0);
+    for chart in (0..before.charts().len()).filter(|&c| untouched(c)) {
+        for &f in before.chart_faces(chart) {
+            assert_eq!(bits(&before, f as usize), bits(&after, f as usize));
+            stayed += 1;
+        }
+        charts += 1;
+    }
+    assert!(stayed > 0);
+    assert_eq!(charts, update.kept_charts);
+    // The page grows to the right alone: rows are counted from its top.
+    assert!(after.pages()[0][1] == before.pages()[0][1] && after.pages()[0][0] >= before.pages()[0][0]);
+    assert_eq!(after.pages()[0][0] - before.pages()[0][0], update.added_columns);
+    assert_eq!(apart(&after, options.pack.gutter), 0);
+    let (again, _) = update_atlas(&before.layout(), &moved, &mesh.1, &[], &options, |_| ()).unwrap();
+    assert_eq!(again.layout(), after.layout());
+    // One too deep to be laid out with the rest of its chart: that stays where it is, with a hole.
+    let (deep, update) = update_atlas(&before.layout(), &dented(0.2), &mesh.1, &[], &options, |_| ()).unwrap();
+    assert_sound(&deep);
+    assert!(update.changed_charts == 1 && update.new_charts > 0, "{update:?}");
+    // All but what the dent cuts off from the rest.
+    let as_before = (0..mesh.1.len()).filter(|&f| same(&mesh.1[f]) && bits(&before, f) == bits(&deep, f)).count();
+    assert!(as_before * 20 > 19 * kept_faces, "{as_before} of {kept_faces}");
+    assert_eq!(apart(&deep, options.pack.gutter), 0);
+    // Nothing changed: the same atlas. Nothing left: as if there had been none.
+    let (same, update) = update_atlas(&before.layout(), &mesh.0, &mesh.1, &[], &options, |_| ()).unwrap();
+    assert_eq!(same.layout(), before.layout());
+    assert_eq!((update.kept_charts, update.changed_charts, update.new_charts), (before.charts().len(), 0, 0));
+    let grown: Vec<[f64; 3]> = mesh.0.iter().map(|p| p.map(|x| 1.5 * x)).collect();
+    let (anew, update) = update_atlas(&before.layout(), &grown, &mesh.1, &[], &options, |_| ()).unwrap();
+    assert_eq!(anew.layout(), unwrap_atlas(&grown, &mesh.1, &[], &options, |_| ()).unwrap().layout());
+    assert_eq!(update.kept_charts, 0);
+}
+
+/// Faces that go, and faces that come: a hole cut into a sphere, a box set on it, and both files in any order of faces.
+#[test]
+fn what_comes_and_goes_is_laid_out_again() {
+    let mesh = sphere(24);
+    let before = atlas(&mesh, 0.02);
+    let hole = |f: &[u32; 3]| f.iter().all(|&v| mesh.0[v as usize][0] > 0.97);
+    let mut faces: Vec<[u32; 3]> = mesh.1.iter().filter(|f| !hole(f)).copied().collect();
+    faces.reverse();
+    let (after, update) = update_atlas(&before.layout(), &mesh.0, &faces, &[], &settings(0.02), |_| ()).unwrap();
+    assert_sound(&after);
+    assert_eq!((update.kept_faces, update.new_charts), (faces.len(), 0));
+    assert_eq!(apart(&after, 2), 0);
+
+    let (mut positions, mut faces) = mesh.clone();
+    let first = positions.len() as u32;
+    let (more, box_faces) = cube(6);
+    positions.extend(more.iter().map(|p| [0.3 * p[0] + 2.0, 0.3 * p[1], 0.3 * p[2]]));
+    faces.extend(box_faces.iter().map(|f| f.map(|v| v + first)));
+    let (after, update) = update_atlas(&before.layout(), &positions, &faces, &[], &settings(0.02), |_| ()).unwrap();
+    assert_sound(&after);
+    assert_eq!((update.kept_charts, update.changed_charts), (before.charts().len(), 0));
+    assert!(update.new_charts > 0 && update.new_charts < 7, "{update:?}");
+    assert_eq!(apart(&after, 2), 0);
+    // A layout of another scale, or one that is none, is refused.
+    let other = update_atlas(&before.layout(), &positions, &faces, &[], &settings(0.03), |_| ());
+    assert!(matches!(other, Err(Error::Setting { name: "texel_m", .. })));
+    let mut broken = before.layout();
+    broken.chart.pop();
+    let broken = update_atlas(&broken, &positions, &faces, &[], &settings(0.02), |_| ());
+    assert!(matches!(broken, Err(Error::Length { .. })));
+    let mut broken = before.layout();
+    broken.chart[0] = 1000;
+    let broken = update_atlas(&broken, &positions, &faces, &[], &settings(0.02), |_| ());
+    assert!(matches!(broken, Err(Error::Setting { name: "chart", .. })));
+}
+
+/// Pairs of texels of different charts that are nearer to each other than a gutter, by texels whose centres charts cover.
+fn apart(atlas: &Atlas, gutter: usize) -> usize {
+    let mut too_near = 0;
+    for (page, texels) in PageTexels::of(atlas, 0).iter().enumerate() {
+        let [width, height] = atlas.pages()[page];
+        let owner = |x: usize, y: usize| {
+            let k = y * width + x;
+            (texels.kinds[k] == TexelKind::Inside)
+                .then(|| atlas.chart_of_face(texels.points[k].unwrap().face as usize).0)
+        };
+        for y in 0..height {
+            for x in 0..width {
+                let Some(here) = owner(x, y) else { continue };
+                for (i, j) in (0..=gutter).flat_map(|i| (0..=gutter).map(move |j| (x + i, y + j))) {
+                    too_near += usize::from(i < width && j < height && owner(i, j).is_some_and(|o| o != here));
+                }
+            }
+        }
+    }
+    too_near
 }
 
 /// Whatever soup comes: an atlas that is sound, or an error; never a panic, never a NaN.

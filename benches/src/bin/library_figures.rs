@@ -11,7 +11,7 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 use paint_sim::ciede2000;
 use paint_sim::colour::BANDS;
 use paintcopter_benches::cpu::{CpuTimer, median_seconds};
-use paintcopter_benches::{Rng, colours, control, films, motion, painting, planner, pose_graphs, room};
+use paintcopter_benches::{Rng, colours, control, films, fuzzed_meshes, motion, painting, planner, pose_graphs, room};
 use paintcopter_examples::mesh_io::read_mesh;
 use paintcopter_examples::world::rock_wall;
 use serde_json::json;
@@ -47,6 +47,15 @@ enum Job {
         /// Folder for OBJ files with texture coordinates, for `uv_evaluation.py`
         #[arg(long, value_name = "DIR")]
         save: Option<PathBuf>,
+    },
+    /// Lays out broken meshes of all kinds as atlases, and counts what should not be
+    Fuzz {
+        /// Seed of the first mesh
+        #[arg(long, default_value_t = 0)]
+        first: u64,
+        /// Meshes
+        #[arg(long, default_value_t = 10_000)]
+        count: u64,
     },
     /// Paints pictures with every painter, as `paint_baselines.py painters slew noise` does
     Paint {
@@ -150,6 +159,7 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().job {
         Job::Rock { file, seed } => rock(&file, seed),
         Job::Uv { mesh, runs, save } => uv(&mesh, runs, save.as_deref()),
+        Job::Fuzz { first, count } => fuzzed_meshes::run(first, count),
         Job::Paint { image, size, runs } => painting::run(&image, size.into(), runs),
         Job::Colour { image, runs } => colours::run(&image, runs),
         Job::Sim { count, runs } => sim(count as usize, runs),

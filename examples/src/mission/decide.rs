@@ -1,8 +1,8 @@
 //! What to spray: the wanted picture into layers.
 
 use paint_net::{
-    AreaFill, Centrelines, Deconvolution, Feedback, Image, Layered, MatchingPursuit, Observer, PaintProblem, Painter,
-    Painting, SprayKernel,
+    AreaFill, Centrelines, Deconvolution, Feedback, GhostPixels, Image, Layered, MatchingPursuit, Observer,
+    PaintProblem, Painter, Painting, SprayKernel,
 };
 use paint_sim::SprayModel;
 
@@ -29,24 +29,29 @@ pub(super) fn spray_model(settings: &MissionSettings) -> SprayModel {
     SprayModel { sigma, cut: SPRAY_CUT, range: SPRAY_RANGE, ..SprayModel::default() }
 }
 
-/// Layers of sprays for the wanted picture; no spray lies where `paintable` is false.
+/// Layers of sprays for the wanted picture; no spray lies where `paintable` is false. Paint that falls beyond a seam counts where it lies.
 pub(super) fn decide(
     wanted: &Image,
     coverage: &Image,
+    beyond_seams: &GhostPixels,
     paintable: &[bool],
     appearance: &Appearance,
     settings: &MissionSettings,
 ) -> Result<Vec<Painting>, MissionError> {
     let stage = Stage::start("decide");
     // What nobody can spray must not pull paint from its neighbours; a little weight keeps overspray off it.
-    let weight = Image::from_fn(coverage.width(), coverage.height(), |x, y| {
+    let mut weight = Image::from_fn(coverage.width(), coverage.height(), |x, y| {
         let share = if paintable[y * coverage.width() + x] { 1.0 } else { UNPAINTABLE_WEIGHT };
         share * coverage.at(x, y)
     });
+    for (ghost, _) in beyond_seams.ghosts() {
+        weight.data_mut()[*ghost] = 0.0;
+    }
     let kernel = kernel(settings)?;
     let problem = PaintProblem::new(wanted)
         .with_weight(&weight)
         .with_paintable(paintable)
+        .with_ghosts(beyond_seams)
         .with_kernel(&kernel)
         .with_saturation(appearance.ink())
         .with_limits(&settings.limits);

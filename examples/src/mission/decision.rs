@@ -71,7 +71,7 @@ impl Decision {
         let stage = Stage::start("reach");
         let in_reach = texels_in_reach(&surface, &robot, &settings)?;
         stage.done(&format!("{:.1} % of the surface", 100.0 * share(&in_reach, &coverage)));
-        let layers = decide(&wanted, &coverage, &in_reach, &appearance, &settings)?;
+        let layers = decide(&wanted, &coverage, &surface.beyond_seams, &in_reach, &appearance, &settings)?;
         let name = name.to_string();
         Ok(Self {
             settings,

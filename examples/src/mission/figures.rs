@@ -13,6 +13,7 @@ use super::inspect::Inspection;
 use super::plan::path_length;
 use super::rehearse::{GAP_STRIDE, gap};
 use super::run::Mission;
+use super::seams::likeness;
 use super::settings::{MissionSettings, PainterChoice};
 use crate::adapters::Robot;
 use crate::appearance::{DENSITY, UNIT_THICKNESS};
@@ -46,6 +47,7 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
     let in_reach = mission.decision.coverage_in_reach();
     let in_reach = Some(&in_reach);
     let fill = (mission.decision.settings.painter == PainterChoice::Fill).then(|| evenness(mission));
+    let seams = likeness(mission)?;
     Ok(Report {
         version: env!("CARGO_PKG_VERSION"),
         surface: mission.decision.name.clone(),
@@ -106,6 +108,9 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         fill_thin_share: fill.as_ref().map(|f| f.thin),
         fill_deviation: fill.as_ref().map(|f| f.deviation),
         fill_mean_ratio: fill.as_ref().map(|f| f.mean),
+        seam_length_m: mission.decision.surface.disk().seam_length(),
+        ssim_painted_at_seams: seams.as_ref().map(|s| s.near),
+        ssim_painted_off_seams: seams.as_ref().map(|s| s.far),
         layers: mission.decision.layers.len(),
         strokes: mission.flights.iter().map(|f| f.route.strokes).sum(),
         wall_s: mission.decision.started.elapsed().as_secs_f64(),

@@ -40,6 +40,9 @@ pub struct Arguments {
     /// pick:px,py,pz (as far as no crease), or mask:PNG on its texture coordinates
     #[arg(long)]
     pub region: Option<Region>,
+    /// Folder that an earlier state of the mesh was laid out to: charts that did not change stay as they are, at the same texels
+    #[arg(long, value_name = "DIR")]
+    pub previous: Option<PathBuf>,
     /// Texels between two charts
     #[arg(long, default_value_t = 4)]
     pub gutter: usize,

@@ -1,7 +1,7 @@
 //! The figures of an atlas.
 
 use serde::Serialize;
-use uv_param::{Atlas, AtlasQuality};
+use uv_param::{Atlas, AtlasQuality, AtlasUpdate};
 
 /// What `report.json` of `unwrap` holds. Flat, SI units in the names; every number is finite.
 #[derive(Debug, Clone, Serialize)]
@@ -60,6 +60,18 @@ pub struct UnwrapReport {
     pub repaired_one_sided_edges: usize,
     /// Faces whose winding was turned to agree with their part.
     pub repaired_windings: usize,
+    /// With `--previous`: faces that were there before.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kept_faces: Option<usize>,
+    /// Charts that are the same to the bit, at the same texels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kept_charts: Option<usize>,
+    /// Charts that lost or won faces.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub changed_charts: Option<usize>,
+    /// Charts that were not there before.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub new_charts: Option<usize>,
     /// Wall-clock time of the run.
     pub wall_s: f64,
     /// Processor time of cutting, laying out and packing.
@@ -67,7 +79,7 @@ pub struct UnwrapReport {
 }
 
 impl UnwrapReport {
-    pub(super) fn new(atlas: &Atlas, wall_s: f64, cpu_s: f64) -> Self {
+    pub(super) fn new(atlas: &Atlas, update: Option<AtlasUpdate>, wall_s: f64, cpu_s: f64) -> Self {
         let (quality, repairs) = (AtlasQuality::of(atlas), atlas.report());
         let [page_width_px, page_height_px] = atlas.pages()[0];
         Self {
@@ -98,6 +110,10 @@ impl UnwrapReport {
             repaired_non_manifold_edges: repairs.non_manifold_edges_opened,
             repaired_one_sided_edges: repairs.one_sided_edges_opened,
             repaired_windings: repairs.reversed_faces,
+            kept_faces: update.map(|u| u.kept_faces),
+            kept_charts: update.map(|u| u.kept_charts),
+            changed_charts: update.map(|u| u.changed_charts),
+            new_charts: update.map(|u| u.new_charts),
             wall_s,
             cpu_s,
         }

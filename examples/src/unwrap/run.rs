@@ -4,12 +4,16 @@ use std::path::Path;
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
-use uv_param::{Atlas, AtlasQuality, AtlasSettings, ChartSettings, PackSettings, PageTexels, Turns, unwrap_atlas};
+use uv_param::{
+    Atlas, AtlasLayout, AtlasQuality, AtlasSettings, AtlasUpdate, ChartSettings, PackSettings, PageTexels, Turns,
+    unwrap_atlas, update_atlas,
+};
 
 use super::arguments::Arguments;
 use super::error::UnwrapError;
 use super::files::{save, suffix};
 use super::page_picture::{CarriedPictures, carried_over, checkerboard};
+use super::previous;
 use super::report::UnwrapReport;
 use crate::mesh_io::{TriangleMesh, read_mesh};
 use crate::mesh_placement::UpAxis;
@@ -36,10 +40,11 @@ pub fn run(arguments: &Arguments) -> Result<(), UnwrapError> {
     let seams = arguments.seams.as_deref().map(read_seams).transpose()?.unwrap_or_default();
     mesh.notes.iter().for_each(|note| eprintln!("{}: {note}", arguments.mesh.display()));
     let carried = read_pictures(&mesh, arguments)?;
+    let earlier = arguments.previous.as_deref().map(previous::read).transpose()?;
     std::fs::create_dir_all(folder).map_err(|e| UnwrapError::unwritable(folder, &e))?;
 
     let cpu = ProcessTime::try_now().ok();
-    let atlas = unwrap(&mesh, &seams, arguments)?;
+    let (atlas, update) = unwrap(&mesh, &seams, arguments, earlier.as_ref())?;
     let cpu_s = cpu.and_then(|start| start.try_elapsed().ok()).unwrap_or_default().as_secs_f64();
 
     let stage = Stage::start("write");
@@ -57,7 +62,8 @@ pub fn run(arguments: &Arguments) -> Result<(), UnwrapError> {
         });
     }
     save(&atlas, &mesh, UpAxis::of_file(&arguments.mesh), &textures, folder)?;
-    let report = UnwrapReport::new(&atlas, wall.elapsed().as_secs_f64(), cpu_s);
+    previous::write(&atlas.layout(), folder)?;
+    let report = UnwrapReport::new(&atlas, update, wall.elapsed().as_secs_f64(), cpu_s);
     save_figures(&report, folder)?;
     stage.done(&format!("{} page(s) of {} x {} texels", report.pages, report.page_width_px, report.page_height_px));
     println!("{}", folder.join("atlas.obj").display());
@@ -67,7 +73,12 @@ pub fn run(arguments: &Arguments) -> Result<(), UnwrapError> {
     Ok(())
 }
 
-fn unwrap(mesh: &TriangleMesh, seams: &[[u32; 2]], arguments: &Arguments) -> Result<Atlas, UnwrapError> {
+fn unwrap(
+    mesh: &TriangleMesh,
+    seams: &[[u32; 2]],
+    arguments: &Arguments,
+    earlier: Option<&AtlasLayout>,
+) -> Result<(Atlas, Option<AtlasUpdate>), UnwrapError> {
     let positions: Vec<[f64; 3]> = mesh.positions.iter().map(|p| p.map(|c| f64::from(c) * arguments.scale)).collect();
     let settings = AtlasSettings {
         charts: ChartSettings {
@@ -84,8 +95,12 @@ fn unwrap(mesh: &TriangleMesh, seams: &[[u32; 2]], arguments: &Arguments) -> Res
         },
     };
     let stage = Stage::start("unwrap");
-    let atlas = unwrap_atlas(&positions, &mesh.faces, seams, &settings, |_| ())
-        .map_err(|source| UnwrapError::Atlas { path: arguments.mesh.clone(), source })?;
+    let laid_out = match earlier {
+        None => unwrap_atlas(&positions, &mesh.faces, seams, &settings, |_| ()).map(|atlas| (atlas, None)),
+        Some(earlier) => update_atlas(earlier, &positions, &mesh.faces, seams, &settings, |_| ())
+            .map(|(atlas, update)| (atlas, Some(update))),
+    };
+    let (atlas, update) = laid_out.map_err(|source| UnwrapError::Atlas { path: arguments.mesh.clone(), source })?;
     let quality = AtlasQuality::of(&atlas);
     stage.done(&format!(
         "{} charts of {} part(s), seams {:.2} m, stretch {:.3} (99 %), {:.3} (all), {:.0} % of the page used",
@@ -96,7 +111,17 @@ fn unwrap(mesh: &TriangleMesh, seams: &[[u32; 2]], arguments: &Arguments) -> Res
         quality.stretch_max,
         100.0 * quality.utilisation
     ));
-    Ok(atlas)
+    if let Some(update) = &update {
+        println!(
+            "{} of {} faces as before; {} charts kept, {} changed, {} new",
+            update.kept_faces,
+            atlas.surface().faces().len(),
+            update.kept_charts,
+            update.changed_charts,
+            update.new_charts
+        );
+    }
+    Ok((atlas, update))
 }
 
 /// Pairs of vertex numbers, one on each line; what follows a `#` is passed over.

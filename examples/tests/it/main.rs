@@ -23,6 +23,7 @@ mod recorded;
 mod regions;
 mod scan_flight;
 mod scratch;
+mod seams;
 mod sequences;
 mod stored_maps;
 mod strange_recordings;

@@ -127,6 +127,43 @@ fn seams_from_a_file_and_what_is_wrong_with_them() {
     assert!(refused.contains("line 2"), "{refused}");
 }
 
+/// Two boxes; then the second one is another. The first one's lines of the OBJ are the same, and so are its texels.
+#[test]
+fn what_did_not_change_keeps_its_texels() {
+    let scratch = Scratch::new("unwrap-previous");
+    let two = |height: &str| {
+        let level = |z: &str| ["0 0", "1 0", "1 1", "0 1"].map(|corner| format!("v {corner} {z}\n")).concat();
+        let sides = [[4, 3, 2, 1], [5, 6, 7, 8], [1, 2, 6, 5], [2, 3, 7, 6], [3, 4, 8, 7], [4, 1, 5, 8]];
+        let faces = |first: i32| {
+            sides.map(|side| side.map(|v| (v + first).to_string()).join(" ")).map(|side| format!("f {side}\n")).concat()
+        };
+        [level("0"), level(".5"), level("5"), level(height), faces(0), faces(8)].concat()
+    };
+    let (old, new) = (write(&scratch, "old.obj", &two("5.5")), write(&scratch, "new.obj", &two("5.8")));
+    let (first, second) = (scratch.0.join("first"), scratch.0.join("second"));
+    run(&arguments(&old, &first, &["--texel", "0.02"])).unwrap();
+    run(&arguments(&new, &second, &["--texel", "0.02", "--previous", first.to_str().unwrap()])).unwrap();
+    let report = figures(&second);
+    // The box that changed keeps its bottom: less of it is new than of the mesh.
+    assert_eq!(report["kept_faces"], 14);
+    assert!(report["kept_charts"].as_u64().unwrap() > 0, "{report}");
+    let places = |out: &Path| {
+        let (mesh, sides) = (read_mesh(&out.join("atlas.obj")).unwrap(), figures(out));
+        let sides = ["page_width_px", "page_height_px"].map(|side| sides[side].as_f64().unwrap());
+        let uv = mesh.uv.unwrap();
+        let texels =
+            move |f: usize| uv.faces[f].map(|i| [0, 1].map(|k| sides[k] * f64::from(uv.coordinates[i as usize][k])));
+        (0..12).map(texels).collect::<Vec<_>>()
+    };
+    for (a, b) in places(&first).iter().flatten().flatten().zip(places(&second).iter().flatten().flatten()) {
+        assert!((a - b).abs() < 1e-2, "{a} texels, now {b}");
+    }
+    let refused = run(&arguments(&new, &second, &["--previous", scratch.0.to_str().unwrap()])).unwrap_err().to_string();
+    assert!(refused.contains("atlas.layout") && refused.contains("--previous"), "{refused}");
+    let other = run(&arguments(&new, &second, &["--texel", "0.03", "--previous", first.to_str().unwrap()]));
+    assert!(other.unwrap_err().to_string().contains("texel_m"));
+}
+
 #[test]
 fn what_cannot_be_done_is_said() {
     let scratch = Scratch::new("unwrap-refusals");

@@ -64,7 +64,8 @@ impl ColourSeparation {
         let (width, height) = (wanted.width(), wanted.height());
         // What is wanted does not matter for where the cells are.
         let blank = Image::filled(width, height, 0.0);
-        let grid = PaintGrid::new(&PaintProblem { weight, paintable, kernel, limits, ..PaintProblem::new(&blank) })?;
+        let places = PaintProblem { weight, paintable, kernel, limits, ..PaintProblem::new(&blank) };
+        let grid = PaintGrid::new(&places)?;
         let depth_per_volume = kernel.mass() / (limits.spray_spacing * limits.row_spacing) as f64;
         let mut model = MixtureCost::new(problem, self.metric);
         let (depths, curvatures) = model.start(limits.max_volume, kernel.squared().mass());
@@ -89,7 +90,7 @@ impl ColourSeparation {
         }
         volumes.iter_mut().filter(|v| **v < limits.min_volume).for_each(|v| *v = 0.0);
         let each = || volumes.chunks_exact(grid.footprints.cells());
-        let canvases: Vec<Image> = each().map(|volumes| grid.canvas(volumes)).collect();
+        let canvases: Vec<Image> = each().map(|volumes| grid.canvas(&places, volumes)).collect();
         let colour_at = |k: usize| {
             let mut depths = [0.0; MAX_PAINTS];
             depths.iter_mut().zip(&canvases).for_each(|(depth, canvas)| *depth = canvas.data()[k]);

@@ -81,7 +81,9 @@ impl Painter for AreaFill {
             let mut cost = |v: &[f64], gradient: &mut [f64]| {
                 canvas.copy_from_slice(grid.initial.data());
                 placed.deposit(v, &mut canvas);
+                problem.settle(grid.initial.data(), &mut canvas);
                 let value = depth_cost(problem, &wanted, &mut canvas);
+                problem.settle_adjoint(&mut canvas);
                 placed.adjoint(&canvas, gradient);
                 value + placed.roughness(v, stiffness, gradient)
             };

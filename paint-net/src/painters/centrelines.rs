@@ -71,7 +71,9 @@ impl Painter for Centrelines {
             let mut cost = |v: &[f64], gradient: &mut [f64]| {
                 canvas.copy_from_slice(grid.initial.data());
                 placed.deposit(v, &mut canvas);
+                problem.settle(grid.initial.data(), &mut canvas);
                 let value = ink_cost(problem, problem.saturation, &mut canvas);
+                problem.settle_adjoint(&mut canvas);
                 placed.adjoint(&canvas, gradient);
                 value + placed.roughness(v, stiffness, gradient)
             };

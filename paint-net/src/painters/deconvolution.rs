@@ -40,6 +40,6 @@ impl Painter for Deconvolution {
         fit(problem, &grid, &grid.upper_bounds, &mut volumes, &stop, &mut |share| observer.progress(share));
         prune(problem, &grid, &mut volumes, &stop);
         observer.progress(1.0);
-        Ok(Painting::new(grid.sprays(&volumes), grid.canvas(&volumes), problem.saturation))
+        Ok(Painting::new(grid.sprays(&volumes), grid.canvas(problem, &volumes), problem.saturation))
     }
 }

@@ -59,16 +59,23 @@ impl Painter for Feedback {
         let stride = (limits.spray_spacing, limits.row_spacing);
         // Paint is measured by the depth that it gives where all cells have the same.
         let depth_per_volume = kernel.mass() / ((stride.0 * stride.1) as f64 * scaled.depth);
-        let narrow = |image: &Image, gain: f64| image.data().iter().map(|&v| (v * gain) as f32).collect();
+        let narrow = |values: &[f64], gain: f64| values.iter().map(|&v| (v * gain) as f32).collect::<Vec<f32>>();
+        let shown = |image: &Image| {
+            let mut values = image.data().to_vec();
+            if let Some(ghosts) = problem.ghosts {
+                ghosts.gather(&mut values);
+            }
+            values
+        };
         let network = self.network.packed();
         let mut tiles = Tiles {
             network: &network,
             footprint: FootprintOperator::new(kernel.taps(), stride, (columns[0], rows[0])),
             cells: (columns.len(), rows.len()),
             size: reference.size(),
-            wanted: reference.data().iter().map(|&ink| (ink / scaled.ink).min(1.0) as f32).collect(),
-            before: problem.canvas.map(|canvas| narrow(canvas, 1.0 / scaled.depth)),
-            weight: problem.weight.map(|weight| narrow(weight, 1.0)),
+            wanted: shown(reference).iter().map(|&ink| (ink / scaled.ink).min(1.0) as f32).collect(),
+            before: problem.canvas.map(|_| narrow(grid.initial.data(), 1.0 / scaled.depth)),
+            weight: problem.weight.map(|weight| narrow(&shown(weight), 1.0)),
             upper_bounds: Vec::new(),
             response: scaled.response,
             tile: self.tile,
@@ -79,7 +86,17 @@ impl Painter for Feedback {
             let paint = volumes.iter().map(|&v| (v * depth_per_volume) as f32);
             let mut state = State::new(paint.zip(&tiles.upper_bounds).map(|(v, &upper)| v.min(upper)).collect());
             let (first, count) = (stages.start, stages.len() as f64);
-            tiles.run(stages, &mut state, &mut |stage| observer.progress((stage - first) as f64 / count));
+            let mut told = |stage| observer.progress((stage - first) as f64 / count);
+            if problem.ghosts.is_none() {
+                tiles.run(stages, &mut state, &mut told);
+            } else {
+                // What comes over the seams changes with every pass: for each pixel it is paint that was there before.
+                for stage in stages {
+                    let volumes: Vec<f64> = state.paint.iter().map(|&v| f64::from(v) / depth_per_volume).collect();
+                    tiles.before = Some(narrow(&beside_own(problem, &grid, &volumes), 1.0 / scaled.depth));
+                    tiles.run(stage..stage + 1, &mut state, &mut told);
+                }
+            }
             volumes.clear();
             volumes.extend(
                 state.paint.iter().zip(upper_bounds).map(|(&v, &upper)| (f64::from(v) / depth_per_volume).min(upper)),
@@ -91,6 +108,15 @@ impl Painter for Feedback {
             run(upper_bounds, volumes, self.passes..self.passes + PASSES_AFTER_PRUNING);
         });
         observer.progress(1.0);
-        Ok(Painting::new(grid.sprays(&volumes), grid.canvas(&volumes), problem.saturation))
+        Ok(Painting::new(grid.sprays(&volumes), grid.canvas(problem, &volumes), problem.saturation))
     }
+}
+
+/// Depth of every pixel without what the sprays put there on the plane itself: paint from before, and from beyond the seams.
+fn beside_own(problem: &PaintProblem, grid: &PaintGrid, volumes: &[f64]) -> Vec<f64> {
+    let mut own = vec![0.0; grid.initial.data().len()];
+    grid.footprints.deposit(volumes, &mut own);
+    let mut all: Vec<f64> = own.iter().zip(grid.initial.data()).map(|(own, before)| own + before).collect();
+    problem.settle(grid.initial.data(), &mut all);
+    all.iter().zip(own).map(|(all, own)| all - own).collect()
 }

@@ -17,7 +17,9 @@ pub(super) fn fit(
     let mut cost = |v: &[f64], gradient: &mut [f64]| {
         canvas.copy_from_slice(grid.initial.data());
         grid.footprints.deposit(v, &mut canvas);
+        problem.settle(grid.initial.data(), &mut canvas);
         let value = ink_cost(problem, problem.saturation, &mut canvas);
+        problem.settle_adjoint(&mut canvas);
         grid.footprints.adjoint(&canvas, gradient);
         value
     };

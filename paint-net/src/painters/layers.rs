@@ -133,7 +133,8 @@ impl<P: Painter> Painter for Layered<P> {
 /// depths of its thresholds. The shares of a spray add up to it.
 fn split_at_thresholds(whole: &Painting, thresholds: &[f64], problem: &PaintProblem) -> Vec<Painting> {
     let saturation = problem.saturation;
-    let mut canvas = problem.initial_canvas();
+    let initial = problem.initial_canvas();
+    let mut canvas = initial.clone();
     let mut lower = 0.0;
     let mut layers = Vec::with_capacity(thresholds.len());
     for (k, &top) in thresholds.iter().enumerate() {
@@ -149,7 +150,9 @@ fn split_at_thresholds(whole: &Painting, thresholds: &[f64], problem: &PaintProb
                 sprays.push(spray);
             }
         }
-        layers.push(Painting::new(sprays, canvas.clone(), saturation));
+        let mut so_far = canvas.clone();
+        problem.settle(initial.data(), so_far.data_mut());
+        layers.push(Painting::new(sprays, so_far, saturation));
         lower = upper;
     }
     layers

@@ -67,7 +67,7 @@ impl Painter for MatchingPursuit {
         }
         prune(problem, &grid, &mut volumes, &stop);
         observer.progress(1.0);
-        Ok(Painting::new(grid.sprays(&volumes), grid.canvas(&volumes), problem.saturation))
+        Ok(Painting::new(grid.sprays(&volumes), grid.canvas(problem, &volumes), problem.saturation))
     }
 }
 

@@ -84,7 +84,7 @@ impl<P: Painter> Painter for SlewLimited<P> {
         observer.progress(1.0);
         let waypoints: Vec<Spray> = path.iter().map(|&cell| grid.spray(cell, volumes[cell])).collect();
         let sprays = waypoints.iter().copied().filter(|s| s.volume > 0.0).collect();
-        Ok(Painting { waypoints, ..Painting::new(sprays, grid.canvas(&volumes), problem.saturation) })
+        Ok(Painting { waypoints, ..Painting::new(sprays, grid.canvas(problem, &volumes), problem.saturation) })
     }
 }
 
@@ -111,7 +111,9 @@ impl SlewFit<'_> {
             let mut cost = |v: &[f64], gradient: &mut [f64]| {
                 canvas.copy_from_slice(self.grid.initial.data());
                 self.grid.footprints.deposit(v, &mut canvas);
+                self.problem.settle(self.grid.initial.data(), &mut canvas);
                 let value = ink_cost(self.problem, self.problem.saturation, &mut canvas);
+                self.problem.settle_adjoint(&mut canvas);
                 self.grid.footprints.adjoint(&canvas, gradient);
                 value + self.penalty(v, penalty, &multipliers, gradient)
             };

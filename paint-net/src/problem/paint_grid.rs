@@ -26,7 +26,9 @@ impl PaintGrid {
         // A spray that reaches no pixel of positive weight would only waste paint, and nothing would hold it down.
         let mut seen = vec![1.0; footprints.cells()];
         if let Some(weight) = problem.weight {
-            footprints.adjoint(weight.data(), &mut seen);
+            let mut weight = weight.data().to_vec();
+            problem.settle_adjoint(&mut weight);
+            footprints.adjoint(&weight, &mut seen);
         }
         let allowed = |x: usize, y: usize| problem.paintable.is_none_or(|mask| mask[y * width + x]);
         let upper_bounds = footprints
@@ -40,9 +42,10 @@ impl PaintGrid {
     }
 
     /// The canvas after spraying `volumes`.
-    pub(crate) fn canvas(&self, volumes: &[f64]) -> Image {
+    pub(crate) fn canvas(&self, problem: &PaintProblem, volumes: &[f64]) -> Image {
         let mut canvas = self.initial.clone();
         self.footprints.deposit(volumes, canvas.data_mut());
+        problem.settle(self.initial.data(), canvas.data_mut());
         canvas
     }
 

@@ -1,6 +1,7 @@
 //! The painting problem: what is wanted, what is there, and with what it is painted.
 
 use super::defaults::{KERNEL, LIMITS, SATURATION};
+use super::ghost_pixels::GhostPixels;
 use super::limits::Limits;
 use crate::error::Error;
 use crate::image::Image;
@@ -30,6 +31,10 @@ pub struct PaintProblem<'a> {
     pub weight: Option<&'a Image>,
     /// Pixels over which the nozzle may spray, row by row; `None`: everywhere.
     pub paintable: Option<&'a [bool]>,
+    /// Pixels that show others, beyond the seams of the surface; `None`: none. Their weight must be 0, and their reference and canvas
+    /// are those of what they show. Paint on them counts where it lies. [`MatchingPursuit`](crate::MatchingPursuit) and
+    /// [`FreeSprays`](crate::FreeSprays) choose places without them.
+    pub ghosts: Option<&'a GhostPixels>,
     /// Footprint of a spray. Default: the thesis' nozzle, σ = 2 px cut at 4 px.
     pub kernel: &'a SprayKernel,
     /// How ink grows with depth. Default: `tanh`.
@@ -46,6 +51,7 @@ impl<'a> PaintProblem<'a> {
             canvas: None,
             weight: None,
             paintable: None,
+            ghosts: None,
             kernel: &KERNEL,
             saturation: &SATURATION,
             limits: &LIMITS,
@@ -68,6 +74,12 @@ impl<'a> PaintProblem<'a> {
     #[must_use]
     pub fn with_paintable(self, paintable: &'a [bool]) -> Self {
         Self { paintable: Some(paintable), ..self }
+    }
+
+    /// The same with pixels that show what lies beyond seams.
+    #[must_use]
+    pub fn with_ghosts(self, ghosts: &'a GhostPixels) -> Self {
+        Self { ghosts: Some(ghosts), ..self }
     }
 
     /// The same with another nozzle.
@@ -113,13 +125,47 @@ impl<'a> PaintProblem<'a> {
         if self.weight.is_some_and(|w| w.data().iter().all(|&v| v == 0.0)) {
             return Err(Error::EmptyProblem("every pixel has weight 0"));
         }
+        if let Some(ghosts) = self.ghosts.filter(|ghosts| !ghosts.ghosts().is_empty()) {
+            if ghosts.size() != expected {
+                return Err(Error::Mismatch { what: "picture of the ghosts", found: ghosts.size(), expected });
+            }
+            if let Some(&(pixel, _)) = ghosts.ghosts().iter().find(|(pixel, _)| self.weight(*pixel) > 0.0) {
+                return Err(Error::Ghost {
+                    pixel,
+                    why: "has a weight: what it shows counts already, give it weight 0",
+                });
+            }
+        }
         self.limits.check()?;
         self.saturation.check()
     }
 
-    /// Paint depth before painting: the canvas, or a bare wall.
+    /// Paint depth before painting: the canvas, or a bare wall. Ghosts are bare, since what they show lies elsewhere.
     pub fn initial_canvas(&self) -> Image {
-        self.canvas.cloned().unwrap_or_else(|| self.reference.map(|_| 0.0))
+        let mut canvas = self.canvas.cloned().unwrap_or_else(|| self.reference.map(|_| 0.0));
+        if let Some(ghosts) = self.ghosts {
+            ghosts.clear(canvas.data_mut());
+        }
+        canvas
+    }
+
+    /// Turns a canvas that the plane's sprays were added to, over `initial`, into that of the surface: what they put beyond a seam lies at the
+    /// rim of the other side, and ghosts show what lies there.
+    pub(crate) fn settle(&self, initial: &[f64], canvas: &mut [f64]) {
+        if let Some(ghosts) = self.ghosts {
+            let deposit: Vec<f64> = canvas.iter().zip(initial).map(|(after, before)| after - before).collect();
+            for (pixel, depth) in ghosts.spill(&deposit) {
+                canvas[pixel] += depth;
+            }
+            ghosts.gather(canvas);
+        }
+    }
+
+    /// The transpose of [`Self::settle`] for a field that is 0 on ghosts: what lies beyond a seam counts for the rim there.
+    pub(crate) fn settle_adjoint(&self, field: &mut [f64]) {
+        if let Some(ghosts) = self.ghosts {
+            ghosts.spill_adjoint(field);
+        }
     }
 
     /// The weight of pixel `k`.

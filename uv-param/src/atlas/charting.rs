@@ -1,5 +1,7 @@
 //! From a surface to charts.
 
+use std::collections::HashMap;
+
 use super::fit::{Bounds, Distortion, POWER, fit, projection};
 use super::layout::Charts;
 use super::price::{angle_deficits, seam_prices};
@@ -43,7 +45,7 @@ impl Default for ChartSettings {
 }
 
 impl ChartSettings {
-    fn check(&self) -> Result<(), Error> {
+    pub(super) fn check(&self) -> Result<(), Error> {
         if !(self.max_stretch.is_finite() && self.max_stretch > 1.0) {
             return Err(Error::Setting { name: "max_stretch", value: self.max_stretch, must_be: "above 1" });
         }
@@ -57,7 +59,7 @@ impl ChartSettings {
         Settings { up: self.up, ..Settings::default() }.check()
     }
 
-    fn bounds(&self) -> Bounds {
+    pub(super) fn bounds(&self) -> Bounds {
         Bounds { stretch: self.max_stretch, worst: self.worst_stretch }
     }
 }
@@ -106,7 +108,7 @@ pub(super) fn charts(
             straighten(&mut charts, &prices, bounds, parametrizer);
         }
     }
-    finish(charts, &whole, settings, parametrizer, progress)
+    finish(charts, &Kept { whole: &whole, sizes: &HashMap::new() }, settings, parametrizer, progress)
 }
 
 /// The layout that [`crate::unwrap`] makes, if it keeps the bounds.
@@ -123,7 +125,12 @@ fn whole_part(disk: &Disk, bounds: Bounds, parametrizer: Option<&dyn Parametrize
 }
 
 /// A region as one chart, or, as long as it cannot be laid out, its halves. A single face always can.
-fn add_region(charts: &mut Charts, faces: Vec<u32>, bounds: Bounds, parametrizer: Option<&dyn Parametrizer>) {
+pub(super) fn add_region(
+    charts: &mut Charts,
+    faces: Vec<u32>,
+    bounds: Bounds,
+    parametrizer: Option<&dyn Parametrizer>,
+) {
     let mut stack = vec![faces];
     while let Some(faces) = stack.pop() {
         let laid_out = charts.disk(&faces).and_then(|disk| {
@@ -148,7 +155,7 @@ fn add_region(charts: &mut Charts, faces: Vec<u32>, bounds: Bounds, parametrizer
 }
 
 /// Lists of faces by number, in the order of the numbers; `u32::MAX` stands for none.
-fn by_number(numbers: &[u32]) -> Vec<Vec<u32>> {
+pub(super) fn by_number(numbers: &[u32]) -> Vec<Vec<u32>> {
     let count = numbers.iter().filter(|&&n| n != u32::MAX).max().map_or(0, |&n| n as usize + 1);
     let mut lists = vec![Vec::new(); count];
     for (f, &n) in numbers.iter().enumerate().filter(|(_, n)| **n != u32::MAX) {
@@ -159,7 +166,7 @@ fn by_number(numbers: &[u32]) -> Vec<Vec<u32>> {
 }
 
 /// Half-edges, on both sides, of the seams that the caller wants.
-fn wanted_seams(surface: &Surface, seams: &[[u32; 2]]) -> Result<Vec<bool>, Error> {
+pub(super) fn wanted_seams(surface: &Surface, seams: &[[u32; 2]]) -> Result<Vec<bool>, Error> {
     let mut wanted = vec![false; 3 * surface.faces().len()];
     if seams.is_empty() {
         return Ok(wanted);
@@ -183,10 +190,18 @@ fn wanted_seams(surface: &Surface, seams: &[[u32; 2]]) -> Result<Vec<bool>, Erro
     }
 }
 
-/// Every chart in its last layout. Those in `whole` have it already.
-fn finish(
+/// Charts that are not laid out once more.
+pub(super) struct Kept<'a> {
+    /// Those in their last layout already.
+    pub(super) whole: &'a [u32],
+    /// Those that are not even turned, with their width and height.
+    pub(super) sizes: &'a HashMap<u32, [f64; 2]>,
+}
+
+/// Every chart in its last layout.
+pub(super) fn finish(
     mut charts: Charts,
-    whole: &[u32],
+    kept: &Kept,
     settings: &ChartSettings,
     parametrizer: Option<&dyn Parametrizer>,
     progress: &mut dyn FnMut(Progress),
@@ -199,11 +214,11 @@ fn finish(
         let faces = charts.members[name as usize].clone();
         let Some(disk) = charts.disk(&faces) else { continue };
         let mut uv = charts.uv(&faces, &disk);
-        if parametrizer.is_none() && !whole.contains(&name) {
+        if parametrizer.is_none() && !kept.whole.contains(&name) && !kept.sizes.contains_key(&name) {
             let mut better = uv.clone();
             let frames = disk.frames();
             let stopping = StoppingCriterion { iterations: LAST_ITERATIONS, tolerance: LAST_TOLERANCE };
-            let kept = minimise_penalty(
+            let within = minimise_penalty(
                 &disk,
                 &frames,
                 &mut better,
@@ -215,11 +230,14 @@ fn finish(
             .is_ok()
                 && Distortion::measure(&disk, &frames, &better, bounds).within(bounds)
                 && super::simple_boundary::boundary_is_simple(&disk, &better);
-            if kept {
+            if within {
                 uv = better;
             }
         }
-        let chart = Chart::new(disk, uv, 0, settings.up)?;
+        let chart = match kept.sizes.get(&name) {
+            Some(&size) => Chart::placed(disk, uv, size, 0),
+            None => Chart::new(disk, uv, 0, settings.up)?,
+        };
         progress(Progress {
             stage: Stage::Chart,
             iteration: done.0.len() + 1,

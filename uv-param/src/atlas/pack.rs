@@ -1,11 +1,13 @@
 //! Charts onto pages: bottom-left on bitmaps, holes filled by the small ones, improved by local search.
 
+mod add;
 mod bottom_left;
 mod search;
 mod settings;
 mod shape;
 
 use crate::error::Error;
+pub(super) use add::add_to;
 use search::{Goal, Packed, Plan, Stages, carry_out, carry_out_unlimited, search};
 pub(super) use settings::check;
 pub use settings::{PackSettings, Page, Placement, Turns};

@@ -44,6 +44,8 @@ pub(super) struct Sewing<'a, 'b> {
     pub(super) deficits: &'b [f64],
     pub(super) bounds: Bounds,
     pub(super) parametrizer: Option<&'b dyn Parametrizer>,
+    /// Charts that must stay as they are, and the first of those that are new; `None`: all are. Only seams of new ones are closed.
+    pub(super) only: Option<(HashSet<u32>, u32)>,
     /// Arcs (first and last half-edge) that could not be closed.
     refused: HashSet<(u32, u32)>,
     /// The same, of which no part could.
@@ -58,7 +60,8 @@ impl<'a, 'b> Sewing<'a, 'b> {
         bounds: Bounds,
         parametrizer: Option<&'b dyn Parametrizer>,
     ) -> Self {
-        Self { charts, prices, deficits, bounds, parametrizer, refused: HashSet::new(), refused_parts: HashSet::new() }
+        let (refused, refused_parts) = (HashSet::new(), HashSet::new());
+        Self { charts, prices, deficits, bounds, parametrizer, only: None, refused, refused_parts }
     }
 
     /// Closes whole arcs until none can be closed any more.
@@ -66,7 +69,7 @@ impl<'a, 'b> Sewing<'a, 'b> {
         for _ in 0..MAX_ROUNDS {
             let mut candidates: Vec<(f64, Arc)> = arcs(self.charts)
                 .into_iter()
-                .filter(|arc| !self.refused.contains(&key(&arc.half_edges)))
+                .filter(|arc| self.may_change(arc) && !self.refused.contains(&key(&arc.half_edges)))
                 .filter_map(|arc| self.score(&arc).map(|score| (score, arc)))
                 .collect();
             candidates.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.half_edges[0].cmp(&b.1.half_edges[0])));
@@ -94,6 +97,13 @@ impl<'a, 'b> Sewing<'a, 'b> {
                 break;
             }
         }
+    }
+
+    fn may_change(&self, arc: &Arc) -> bool {
+        self.only.as_ref().is_none_or(|(kept, first_new)| {
+            let sides = [arc.left, arc.right];
+            sides.iter().all(|side| !kept.contains(side)) && sides.iter().any(|side| side >= first_new)
+        })
     }
 
     /// Closes parts of arcs, the longest first, until no more can be closed.

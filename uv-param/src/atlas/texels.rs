@@ -1,12 +1,8 @@
 //! Texels of the pages: which point of the surface each one is, in the gutters as well.
 
-use nalgebra::Vector2;
-
 use super::Atlas;
 use crate::chart::{SurfacePoint, inside};
-
-/// Farther than this beyond a seam nothing is looked up, in sides of a texel; filtering reaches half as far.
-const MAX_REACH: usize = 64;
+use crate::unfold::{MAX_REACH, Nearest, across, for_texels, note_edge};
 
 /// What a texel of a page is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,16 +44,6 @@ impl PageTexels {
     }
 }
 
-/// Where the nearest point of a chart lies from a gutter texel.
-#[derive(Clone, Copy)]
-struct Nearest {
-    distance: f64,
-    /// Face of the surface and its edge.
-    half_edge: u32,
-    /// Where on the edge, from its start (0) to its end (1).
-    along: f64,
-}
-
 /// The texels of one page.
 fn texels_of_page(atlas: &Atlas, page: usize, gutter: usize) -> PageTexels {
     let [width, height] = atlas.pages()[page];
@@ -82,14 +68,8 @@ fn texels_of_page(atlas: &Atlas, page: usize, gutter: usize) -> PageTexels {
                 }
             });
             for k in (0..3).filter(|&k| chart.disk().twin(3 * local + k).is_none()) {
-                let (a, b) = (corners[k], corners[(k + 1) % 3]);
-                for_texels([a, b, b], gutter, [width, height], |texel, centre| {
-                    let (along, distance) = on_segment(a, b, centre);
-                    let nearer = nearest[texel].is_none_or(|found| distance < found.distance);
-                    if distance <= gutter as f64 + 1.0 && nearer {
-                        nearest[texel] = Some(Nearest { distance, half_edge: 3 * f + k as u32, along });
-                    }
-                });
+                let ends = [corners[k], corners[(k + 1) % 3]];
+                note_edge(ends, 3 * f + k as u32, gutter, [width, height], &mut nearest);
             }
         }
     }
@@ -117,47 +97,15 @@ fn beyond(atlas: &Atlas, nearest: Nearest, at: [f64; 2]) -> SurfacePoint {
     let corner = |h: usize| {
         let (chart, local) = atlas.chart_of_face(h / 3);
         let v = atlas.charts()[chart].disk().faces()[local][h % 3];
-        Vector2::from(atlas.charts()[chart].uv()[v as usize])
+        atlas.charts()[chart].uv()[v as usize]
     };
     let placed = |h: usize| {
         let (chart, _) = atlas.chart_of_face(h / 3);
-        Vector2::from(atlas.placements()[chart].apply(corner(h).into()))
+        atlas.placements()[chart].apply(corner(h))
     };
-    // Along the edge both sides are measured by its own length, so that they agree on it whatever their stretch.
-    let (here, there) = ([placed(h), placed(next(h))], [corner(next(twin)), corner(twin)]);
-    let (edge, other) = (here[1] - here[0], there[1] - there[0]);
-    let offset = Vector2::from(at) - here[0];
-    let along = offset.dot(&edge) / edge.norm_squared();
-    let beyond = edge.perp(&offset) / edge.norm();
-    let place = there[0] + along * other + beyond * Vector2::new(-other.y, other.x).normalize();
+    let place = across([placed(h), placed(next(h))], [corner(next(twin)), corner(twin)], at);
     let (chart, _) = atlas.chart_of_face(twin / 3);
     atlas.charts()[chart]
-        .locate(place.into())
+        .locate(place)
         .map_or_else(clamped, |found| SurfacePoint { face: atlas.chart_faces(chart)[found.face as usize], ..found })
-}
-
-/// Calls `visit` with every texel (index, centre in texels) of the box of three points, widened by `margin`.
-fn for_texels(
-    corners: [[f64; 2]; 3],
-    margin: usize,
-    [width, height]: [usize; 2],
-    mut visit: impl FnMut(usize, [f64; 2]),
-) {
-    let range = |k: usize, count: usize| {
-        let low = corners[0][k].min(corners[1][k]).min(corners[2][k]) - margin as f64 - 0.5;
-        let high = corners[0][k].max(corners[1][k]).max(corners[2][k]) + margin as f64 - 0.5;
-        (low.ceil().max(0.0) as usize)..((high.floor() + 1.0).clamp(0.0, count as f64) as usize)
-    };
-    for level in range(1, height) {
-        for column in range(0, width) {
-            visit((height - 1 - level) * width + column, [column as f64 + 0.5, level as f64 + 0.5]);
-        }
-    }
-}
-
-/// Place along a segment (0 to 1) of the point nearest to `at`, and the distance.
-fn on_segment(a: [f64; 2], b: [f64; 2], at: [f64; 2]) -> (f64, f64) {
-    let (a, b, at) = (Vector2::from(a), Vector2::from(b), Vector2::from(at));
-    let along = ((at - a).dot(&(b - a)) / (b - a).norm_squared()).clamp(0.0, 1.0);
-    (along, (a + along * (b - a) - at).norm())
 }
