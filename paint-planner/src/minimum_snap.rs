@@ -106,7 +106,7 @@ mod tests {
     #[test]
     fn a_curve_that_begins_in_motion_has_the_least_snap() {
         let points: Vec<Vector4<f64>> =
-            (0..4).map(|i| Vector4::from_fn(|r, _| (0.8 * i as f64 + r as f64).sin())).collect();
+            (0..4).map(|i| Vector4::from_fn(|r, _| (0.8 * f64::from(i) + r as f64).sin())).collect();
         let durations = [0.5, 0.8, 0.6];
         let start = KnotDerivatives::from_fn(|r, axis| 0.4 - 0.3 * r as f64 + 0.2 * axis as f64);
         let y = knot_derivatives(&points, &durations, &start).unwrap();
