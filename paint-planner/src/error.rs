@@ -83,6 +83,12 @@ pub enum Error {
         /// What is wrong and what is asked for.
         what: &'static str,
     },
+    /// A plan in flight cannot go on with the next segment.
+    #[error("the plan in flight cannot be continued: {what}; let it halt and plan from there")]
+    Continuation {
+        /// Why not.
+        what: &'static str,
+    },
     /// A linear system lost positive definiteness; the input is scaled beyond f64.
     #[error("{stage} became numerically singular: check units (metres, seconds) and weights")]
     Numerical {

@@ -26,12 +26,18 @@ fn cost(row: usize, column: usize, t: f64) -> f64 {
 /// Velocity, acceleration and jerk (rows) of four axes (columns) at one knot.
 pub(crate) type KnotDerivatives = SMatrix<f64, 3, 4>;
 
-/// Optimal derivatives at the knots of a curve that starts and ends at rest. `None` when the system is singular.
+/// Optimal derivatives at the knots of a curve that begins with the derivatives `start` and ends at rest. `None` when the system
+/// is singular.
 ///
 /// One factorisation of a block-tridiagonal system with 3x3 blocks serves all axes.
-pub(crate) fn knot_derivatives(points: &[Vector4<f64>], durations: &[f64]) -> Option<Vec<KnotDerivatives>> {
+pub(crate) fn knot_derivatives(
+    points: &[Vector4<f64>],
+    durations: &[f64],
+    start: &KnotDerivatives,
+) -> Option<Vec<KnotDerivatives>> {
     let knots = points.len();
     let mut all = vec![KnotDerivatives::zeros(); knots];
+    all[0] = *start;
     if knots <= 2 {
         return Some(all);
     }
@@ -50,6 +56,7 @@ pub(crate) fn knot_derivatives(points: &[Vector4<f64>], durations: &[f64]) -> Op
         let out_of = Vector3::from_fn(|r, _| cost(1 + r, 4, durations[i]));
         all[i] = -(into * before.transpose() + out_of * after.transpose());
     }
+    all[1] -= block(5, 1, durations[0]) * start;
     if !system.factor() {
         return None;
     }
@@ -89,7 +96,7 @@ mod tests {
         // Solved by hand: knots 0, 1, 3 at times 0, 1, 3.
         let points = [0.0, 1.0, 3.0].map(|x| Vector4::new(x, 0.0, 0.0, 0.0));
         let durations = [1.0, 2.0];
-        let y = knot_derivatives(&points, &durations).unwrap();
+        let y = knot_derivatives(&points, &durations, &KnotDerivatives::zeros()).unwrap();
         for (r, expected) in [2.37654321, 1.29629630, -9.23611111].into_iter().enumerate() {
             assert!((y[1][(r, 0)] - expected).abs() < 5e-9);
         }
@@ -97,9 +104,30 @@ mod tests {
     }
 
     #[test]
+    fn a_curve_that_begins_in_motion_has_the_least_snap() {
+        let points: Vec<Vector4<f64>> =
+            (0..4).map(|i| Vector4::from_fn(|r, _| (0.8 * f64::from(i) + r as f64).sin())).collect();
+        let durations = [0.5, 0.8, 0.6];
+        let start = KnotDerivatives::from_fn(|r, axis| 0.4 - 0.3 * r as f64 + 0.2 * axis as f64);
+        let y = knot_derivatives(&points, &durations, &start).unwrap();
+        assert_eq!((y[0], y[3]), (start, KnotDerivatives::zeros()));
+        // Whichever derivative is moved either way, the snap grows, and by as much: the optimum of a quadratic.
+        let least = total_cost(&points, &y, &durations);
+        for (knot, r, axis) in (1..3).flat_map(|k| (0..3).flat_map(move |r| (0..4).map(move |a| (k, r, a)))) {
+            let moved = |by: f64| {
+                let mut other = y.clone();
+                other[knot][(r, axis)] += by;
+                total_cost(&points, &other, &durations) - least
+            };
+            let (up, down) = (moved(0.01), moved(-0.01));
+            assert!(up > 0.0 && (up / down - 1.0).abs() < 1e-4, "knot {knot}, {r}, {axis}: {up} {down}");
+        }
+    }
+
+    #[test]
     fn rest_to_rest_cost_is_exact() {
         let points = [Vector4::zeros(), Vector4::new(0.0, 2.0, 0.0, 0.0)];
-        let cost = total_cost(&points, &knot_derivatives(&points, &[3.0]).unwrap(), &[3.0]);
+        let cost = total_cost(&points, &knot_derivatives(&points, &[3.0], &KnotDerivatives::zeros()).unwrap(), &[3.0]);
         assert!((cost / (100800.0 * 4.0 / 3.0_f64.powi(7)) - 1.0).abs() < 1e-12);
     }
 
@@ -109,7 +137,7 @@ mod tests {
         let durations: Vec<f64> = (0..count - 1).map(|i| 0.2 + 0.15 * ((i * i) as f64).sin().abs()).collect();
         let points: Vec<Vector4<f64>> =
             (0..count).map(|i| Vector4::from_fn(|r, _| (0.4 * i as f64 * (r + 1) as f64).sin())).collect();
-        let y = knot_derivatives(&points, &durations).unwrap();
+        let y = knot_derivatives(&points, &durations, &KnotDerivatives::zeros()).unwrap();
         // Dense: minimise over all interior derivatives at once, columns ordered knot by knot.
         let size = 3 * (count - 2);
         let place = |knot: usize, r: usize| (knot > 0 && knot < count - 1).then(|| 3 * (knot - 1) + r);

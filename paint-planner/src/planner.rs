@@ -11,6 +11,7 @@ use crate::settings::Settings;
 use crate::target::Target;
 use crate::world::{Surface, Tool};
 
+pub(crate) use assemble::{UntimedPlan, assemble_plan};
 pub use optimal::OptimalPlanner;
 pub use smoothing::SmoothingPlanner;
 pub use strategy::Planner;

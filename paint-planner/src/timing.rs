@@ -3,6 +3,7 @@
 pub(crate) mod speed_profile;
 
 use crate::error::Error;
+use crate::minimum_snap::KnotDerivatives;
 use crate::route::RoutePoint;
 use crate::settings::{TimingPolicy, TimingSettings};
 use crate::target::Target;
@@ -33,21 +34,24 @@ pub(crate) struct TimedTrajectory {
 ///
 /// Rounds of: speed profile, minimum snap through the knots, exact extrema. Route points that the curve misses become knots,
 /// segments that break a limit are slowed. Whatever is left is repaired by one global stretch, which is exact because
-/// the path does not depend on it.
+/// the path does not depend on it. A route that is entered with the motion `start` cannot be stretched: it is refused.
 pub(crate) fn schedule(
+    start: &KnotDerivatives,
     route: &[RoutePoint],
     targets: &[Target],
     settings: &TimingSettings,
     dense: bool,
 ) -> Result<TimedTrajectory, Error> {
-    let profile = SpeedProfile::new(route, targets, settings);
+    let moving = *start != KnotDerivatives::zeros();
+    let mut profile = SpeedProfile::new(route, targets, settings);
+    profile.enter_with(start.fixed_view::<1, 3>(0, 0).norm());
     let local = matches!(settings.policy, TimingPolicy::Uniform { .. });
     let mut knots = first_knots(route, settings, dense);
     let mut slowdown = vec![1.0; route.len() - 1];
     let mut best: Option<TimedTrajectory> = None;
     for round in 0..=settings.rounds {
         let durations = profile.durations(&slowdown, settings);
-        let attempt = fit(route, &knots, &durations)?;
+        let attempt = fit(start, route, &knots, &durations)?;
         let mut most = Extrema::default();
         let mut ratios = vec![1.0; knots.len() - 1];
         for (i, worst) in ratios.iter_mut().enumerate() {
@@ -63,7 +67,8 @@ pub(crate) fn schedule(
             (now && !then) || (now == then && attempt.duration() * stretch < other.trajectory.duration())
         };
         // Before the curve follows the route points, the latest attempt is the one to keep.
-        if best.as_ref().is_none_or(|other| better(other) || other.deviation > settings.tolerance) {
+        let possible = !moving || stretch == 1.0;
+        if possible && best.as_ref().is_none_or(|other| better(other) || other.deviation > settings.tolerance) {
             best = Some(stretched(attempt, times, most, deviation, stretch));
         }
         let done = missed.is_empty() && (stretch == 1.0 || !local);
@@ -76,7 +81,8 @@ pub(crate) fn schedule(
         knots.extend(missed);
         knots.sort_unstable();
     }
-    let mut timed = best.ok_or(Error::Numerical { stage: "the time allocation" })?;
+    let usable = |timed: &TimedTrajectory| !moving || timed.deviation <= settings.tolerance;
+    let mut timed = best.filter(usable).ok_or(Error::Numerical { stage: "the time allocation" })?;
     timed.stretch *= profile.factor;
     Ok(timed)
 }
@@ -127,11 +133,11 @@ fn first_knots(route: &[RoutePoint], settings: &TimingSettings, dense: bool) -> 
     knots
 }
 
-fn fit(route: &[RoutePoint], knots: &[usize], durations: &[f64]) -> Result<Trajectory, Error> {
+fn fit(start: &KnotDerivatives, route: &[RoutePoint], knots: &[usize], durations: &[f64]) -> Result<Trajectory, Error> {
     let points: Vec<Vector4<f64>> = knots.iter().map(|&i| coordinates(&route[i])).collect();
     let rest: Vec<bool> = knots.iter().map(|&i| route[i].rest).collect();
     let own: Vec<f64> = knots.windows(2).map(|pair| durations[pair[0]..pair[1]].iter().sum()).collect();
-    Trajectory::minimum_snap(&points, &own, &rest)
+    Trajectory::minimum_snap_from(start, &points, &own, &rest)
 }
 
 fn coordinates(point: &RoutePoint) -> Vector4<f64> {

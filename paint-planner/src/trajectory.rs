@@ -43,7 +43,8 @@ impl Extrema {
     }
 }
 
-/// A piecewise polynomial of degree 7 in x, y, z and heading, at rest at both ends, with continuous snap between.
+/// A piecewise polynomial of degree 7 in x, y, z and heading, with continuous snap between its knots. It ends at rest; it begins at
+/// rest as well, unless it continues another in flight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     /// Times of the knots, s, from 0.
@@ -56,6 +57,16 @@ impl Trajectory {
     /// The curve through `points` (x, y, z in m, unwrapped heading in rad) that minimises the integrated squared snap of
     /// all four axes for the given segment durations in s. `rest[i]` stops it at knot i; both ends always rest.
     pub fn minimum_snap(points: &[Vector4<f64>], durations: &[f64], rest: &[bool]) -> Result<Self, Error> {
+        Self::minimum_snap_from(&KnotDerivatives::zeros(), points, durations, rest)
+    }
+
+    /// The same with velocity, acceleration and jerk at the first knot.
+    pub(crate) fn minimum_snap_from(
+        start: &KnotDerivatives,
+        points: &[Vector4<f64>],
+        durations: &[f64],
+        rest: &[bool],
+    ) -> Result<Self, Error> {
         if points.len() < 2 || durations.len() + 1 != points.len() || rest.len() != points.len() {
             return Err(Error::Knot { index: points.len(), what: "give at least two knots, one duration per segment" });
         }
@@ -72,8 +83,9 @@ impl Trajectory {
                 continue;
             }
             let (stretch, own) = (&points[first..=last], &durations[first..last]);
+            let begin = if first == 0 { *start } else { KnotDerivatives::zeros() };
             let derivatives =
-                knot_derivatives(stretch, own).ok_or(Error::Numerical { stage: "the minimum-snap system" })?;
+                knot_derivatives(stretch, own, &begin).ok_or(Error::Numerical { stage: "the minimum-snap system" })?;
             for (i, &t) in own.iter().enumerate() {
                 segments.push(hermite(&stretch[i], &derivatives[i], &stretch[i + 1], &derivatives[i + 1], t));
             }
@@ -99,10 +111,7 @@ impl Trajectory {
 
     /// The vehicle at time `t`, clamped to the duration.
     pub fn sample(&self, t: f64) -> Sample {
-        let t = if t.is_finite() { t.clamp(0.0, self.duration()) } else { 0.0 };
-        let i = self.times.partition_point(|&knot| knot <= t).clamp(1, self.segments.len()) - 1;
-        let length = self.times[i + 1] - self.times[i];
-        let s = ((t - self.times[i]) / length).clamp(0.0, 1.0);
+        let (i, s, length) = self.locate(t);
         let (mut value, mut rate, mut second) = (Vector4::zeros(), Vector4::zeros(), Vector4::zeros());
         for (axis, curve) in self.segments[i].iter().enumerate() {
             let first = curve.derivative();
@@ -117,6 +126,28 @@ impl Trajectory {
             heading: value.w,
             heading_rate: rate.w,
         }
+    }
+
+    /// Velocity, acceleration and jerk at time `t`, clamped to the duration: what a trajectory that continues this one begins with.
+    pub(crate) fn motion(&self, t: f64) -> KnotDerivatives {
+        let (i, s, length) = self.locate(t);
+        let mut motion = KnotDerivatives::zeros();
+        for (axis, curve) in self.segments[i].iter().enumerate() {
+            let first = curve.derivative();
+            let second = first.derivative();
+            motion[(0, axis)] = first.value(s) / length;
+            motion[(1, axis)] = second.value(s) / length.powi(2);
+            motion[(2, axis)] = second.derivative().value(s) / length.powi(3);
+        }
+        motion
+    }
+
+    /// Segment of time `t`, the share of it that has passed, and its length, s.
+    fn locate(&self, t: f64) -> (usize, f64, f64) {
+        let t = if t.is_finite() { t.clamp(0.0, self.duration()) } else { 0.0 };
+        let i = self.times.partition_point(|&knot| knot <= t).clamp(1, self.segments.len()) - 1;
+        let length = self.times[i + 1] - self.times[i];
+        (i, ((t - self.times[i]) / length).clamp(0.0, 1.0), length)
     }
 
     /// Certified extrema of segment `i`, by subdivision of the Bernstein form of `|v|^2`, `|a|^2` and the heading rate.
@@ -224,6 +255,30 @@ mod tests {
             assert!((before.acceleration - after.acceleration).norm() < 1e-6);
             let slope = (curve.sample(knot + h).velocity - curve.sample(knot - h).velocity) / (2.0 * h);
             assert!((slope - curve.sample(*knot).acceleration).norm() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn a_curve_continues_another_without_a_jump_of_any_derivative_up_to_the_jerk() {
+        let before = wavy(6);
+        let at = 0.6 * before.duration();
+        let here = before.sample(at);
+        let first = Vector4::new(here.position.x, here.position.y, here.position.z, here.heading);
+        let points = [first, first + Vector4::repeat(0.2), first + Vector4::new(0.3, 0.5, 0.1, 0.2)];
+        for knots in [2, 3] {
+            let rest = vec![false; knots];
+            let after =
+                Trajectory::minimum_snap_from(&before.motion(at), &points[..knots], &[0.7, 0.9][..knots - 1], &rest)
+                    .unwrap();
+            assert!((after.sample(0.0).velocity - here.velocity).norm() < 1e-12);
+            assert!((after.sample(0.0).acceleration - here.acceleration).norm() < 1e-10);
+            assert!((after.sample(0.0).heading_rate - here.heading_rate).abs() < 1e-12);
+            // The jerk on either side, as slopes of the accelerations there.
+            let h = 1e-6;
+            let out = (after.sample(h).acceleration - after.sample(0.0).acceleration) / h;
+            let into = (before.sample(at).acceleration - before.sample(at - h).acceleration) / h;
+            assert!((out - into).norm() < 1e-3 * into.norm(), "{out} {into}");
+            assert!(after.motion(after.duration()).norm() < 1e-9);
         }
     }
 

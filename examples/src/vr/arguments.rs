@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Parser, ValueEnum};
 
+use super::hand::Way;
 use super::settings::{Timing, VrSettings};
 use crate::mesh_placement::UpAxis;
 
@@ -35,7 +36,7 @@ pub struct Arguments {
     #[arg(long, value_name = "METRES", default_value_t = 0.015)]
     spot: f64,
     /// Length of the segments that the robot flies live, metres
-    #[arg(long, value_name = "METRES", default_value_t = 0.2)]
+    #[arg(long, value_name = "METRES", default_value_t = 0.1)]
     segment: f64,
     /// How fast the robot paints what the hand has painted
     #[arg(long, default_value = "dose")]
@@ -49,9 +50,12 @@ pub struct Arguments {
     /// Paint a recorded session again, serve nothing, and check that the plans are the same
     #[arg(long, value_name = "FILE")]
     pub(super) replay: Option<PathBuf>,
-    /// Let a simulated hand paint, serve nothing: the experiments of the VR paper
+    /// Serve nothing, make an experiment of the VR paper: a simulated hand paints, or layers of paint are compared
     #[arg(long, conflicts_with = "replay")]
     pub(super) experiment: Option<Experiment>,
+    /// Folder of measured pigments, for `--experiment layers`
+    #[arg(long, value_name = "DIR", required_if_eq("experiment", "layers"), requires = "experiment")]
+    pub(super) pigments: Option<PathBuf>,
     /// Speed of that hand, metres per second
     #[arg(long, value_name = "M_PER_S", default_value_t = 0.08, requires = "experiment")]
     pub(super) hand_speed: f64,
@@ -63,13 +67,26 @@ pub struct Arguments {
     pub(super) out: PathBuf,
 }
 
-/// What a simulated hand paints.
+/// An experiment of the VR paper.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Experiment {
     /// Rows of 7.75 m in all (VR paper, Section VI-B)
     AreaFill,
     /// A closed contour with a trembling hand (VR paper, Section VI-A)
     Contour,
+    /// Layers of one paint, predicted and measured; needs `--pigments` (VR paper, Section VI-D)
+    Layers,
+}
+
+impl Experiment {
+    /// What the hand paints; `None` where none is needed.
+    pub(super) fn way(self) -> Option<Way> {
+        match self {
+            Self::AreaFill => Some(Way::AreaFill),
+            Self::Contour => Some(Way::Contour),
+            Self::Layers => None,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]

@@ -17,6 +17,8 @@ pub(super) struct SessionCounts {
     pub plans: u64,
     /// Plans for painting.
     pub paint_tasks: u64,
+    /// Those that took over in flight, without a halt.
+    pub continued: u64,
     /// Plans that the planner refused.
     pub refused_tasks: u64,
     /// Plans for painting that it refused.

@@ -44,6 +44,14 @@ pub enum VrError {
         /// What is accepted.
         must_be: &'static str,
     },
+    /// A table of pigments cannot be used.
+    #[error("{}: {why}; --pigments wants the folder that has the tables", path.display())]
+    Pigments {
+        /// The table.
+        path: PathBuf,
+        /// What is wrong.
+        why: String,
+    },
     /// The simulator refuses.
     #[error(transparent)]
     Simulation(#[from] paint_sim::Error),
@@ -86,6 +94,14 @@ pub enum VrError {
         share: f64,
         /// What to do.
         advice: &'static str,
+    },
+    /// The way of the simulated hand leads past the surface.
+    #[error(
+        "{name}: the simulated hand has met no surface: its way is 1.8 m wide and 0.9 m high (contour) or 1.35 by 1 m (area-fill); choose a larger --scale, or another --up"
+    )]
+    NothingPainted {
+        /// The surface.
+        name: String,
     },
     /// The results cannot be written.
     #[error("{}: cannot be written ({source}): choose another --out", path.display())]

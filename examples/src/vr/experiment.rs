@@ -5,9 +5,8 @@ use std::path::Path;
 use nalgebra::Point3;
 use serde::Serialize;
 
-use super::arguments::Experiment;
 use super::error::VrError;
-use super::hand::{place, way};
+use super::hand::{Way, place, way};
 use super::session::Session;
 use crate::appearance::UNIT_THICKNESS;
 use crate::pictures::Rgb;
@@ -33,7 +32,7 @@ struct ContourFigures {
 pub(super) fn save_contour(session: &Session, folder: &Path) -> Result<(), VrError> {
     let world = session.world();
     let contour: Vec<Point3<f64>> =
-        fine(&way(Experiment::Contour)).into_iter().filter_map(|at| place(world, at)).map(|hit| hit.point).collect();
+        fine(&way(Way::Contour)).into_iter().filter_map(|at| place(world, at)).map(|hit| hit.point).collect();
     let length = contour.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum();
     let surface = &world.surface;
     let flown = session.canvases()[1];

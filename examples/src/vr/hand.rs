@@ -7,7 +7,6 @@ use paint_planner::session::{CradlePose, PaintHit, RATE, VERSION, VrMode, VrStat
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-use super::arguments::Experiment;
 use super::event::Event;
 use super::world::VrWorld;
 
@@ -27,9 +26,18 @@ const PAUSE: f64 = 10.0;
 /// Waves of a hand beside its way: size, m, and rate, Hz.
 const WOBBLE: [(f64, f64); 3] = [(0.004, 0.3), (0.002, 0.8), (0.001, 1.7)];
 
-/// The states of a hand that paints `experiment` at `speed` metres per second.
-pub(super) fn hand(world: &VrWorld, experiment: Experiment, speed: f64, seed: u64) -> Vec<Event> {
-    let way = way(experiment);
+/// What a hand paints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Way {
+    /// Rows of 7.75 m in all.
+    AreaFill,
+    /// A closed contour with a trembling hand.
+    Contour,
+}
+
+/// The states of a hand that paints `what` at `speed` metres per second.
+pub(super) fn hand(world: &VrWorld, what: Way, speed: f64, seed: u64) -> Vec<Event> {
+    let way = way(what);
     let length: f64 = way.windows(2).map(|pair| step(pair[0], pair[1])).sum();
     let painting = (length / speed * RATE).ceil() as u64;
     let (tap, pause) = ((TAP * RATE) as u64, (PAUSE * RATE) as u64);
@@ -41,9 +49,9 @@ pub(super) fn hand(world: &VrWorld, experiment: Experiment, speed: f64, seed: u6
         let pressed = (1..=tap).contains(&tick) || (pause..pause + painting).contains(&tick);
         let mode = if pressed { VrMode::Painting } else { VrMode::Idle };
         let [right, up] = along(&way, painted.min(length));
-        let [aside, over] = match experiment {
-            Experiment::Contour => wobble(&phases, tick as f64 / RATE),
-            Experiment::AreaFill => [0.0; 2],
+        let [aside, over] = match what {
+            Way::Contour => wobble(&phases, tick as f64 / RATE),
+            Way::AreaFill => [0.0; 2],
         };
         state(world, tick, mode, [right + aside, up + over])
     };
@@ -51,9 +59,9 @@ pub(super) fn hand(world: &VrWorld, experiment: Experiment, speed: f64, seed: u6
 }
 
 /// The way in a picture before the middle of the surface: metres to the right and up.
-pub(super) fn way(experiment: Experiment) -> Vec<[f64; 2]> {
-    match experiment {
-        Experiment::AreaFill => {
+pub(super) fn way(what: Way) -> Vec<[f64; 2]> {
+    match what {
+        Way::AreaFill => {
             let (rows, width, height) = ROWS;
             let row = |k: usize| {
                 let up = height * ((rows - 1) as f64 / 2.0 - k as f64);
@@ -62,7 +70,7 @@ pub(super) fn way(experiment: Experiment) -> Vec<[f64; 2]> {
             };
             (0..rows).flat_map(row).collect()
         }
-        Experiment::Contour => {
+        Way::Contour => {
             let [wide, high] = CONTOUR;
             let at = |k: u32| {
                 let turn = TAU * f64::from(k) / 400.0;

@@ -65,6 +65,7 @@ fn save_latency(session: &Session, folder: &Path) -> Result<(), VrError> {
     if curves.time.is_empty() {
         return Ok(());
     }
+    save_latency_table(session, &folder.join("latency.csv"))?;
     // A plan's latency holds until the next plan.
     let mut steps = Vec::new();
     for pair in curves.time.windows(2) {
@@ -77,6 +78,16 @@ fn save_latency(session: &Session, folder: &Path) -> Result<(), VrError> {
     ];
     let title = format!("Latency, segments of {} m", session.settings().session.segment);
     Ok(save_curves(&folder.join("latency.png"), &title, "time [s]", &panels)?)
+}
+
+/// The same as rows: `time` at each plan for paint, s, `distance` every tenth of a second, m.
+fn save_latency_table(session: &Session, path: &Path) -> Result<(), VrError> {
+    let curves = session.curves();
+    let mut table = String::from("time_s,latency,value\n");
+    for (name, curve) in [("time_s", &curves.time), ("distance_m", &curves.distance)] {
+        table.extend(curve.iter().map(|(time, value)| format!("{time:.3},{name},{value:.4}\n")));
+    }
+    std::fs::write(path, table).map_err(VrError::unwritable(path))
 }
 
 /// The surface in its paint as the person sees it from the start.

@@ -7,7 +7,8 @@ use super::counters::Traffic;
 use super::error::VrError;
 use super::event::{Command, Event};
 use super::experiment::save_contour;
-use super::hand::hand;
+use super::hand::{Way, hand};
+use super::layers::save_layers;
 use super::output::save;
 use super::recording::{RECORDING, RecordedSession, SessionRecorder, for_each_event};
 use super::serve::serve;
@@ -26,18 +27,23 @@ pub fn run(arguments: &Arguments) -> Result<(), VrError> {
     if let Some(path) = &arguments.replay {
         return replay(path, folder);
     }
+    if let Some(pigments) =
+        arguments.pigments.as_ref().filter(|_| arguments.experiment.is_some_and(|e| e.way().is_none()))
+    {
+        return save_layers(pigments, folder);
+    }
     let settings = arguments.settings();
     let world = VrWorld::new(&settings)?;
     let recorder = SessionRecorder::create(folder, &settings)?;
-    if let Some(experiment) = arguments.experiment {
-        let events = hand(&world, experiment, arguments.hand_speed, settings.seed);
-        return perform(experiment, &events, Session::new(settings, world, Some(recorder))?, folder);
+    if let Some(way) = arguments.experiment.and_then(Experiment::way) {
+        let events = hand(&world, way, arguments.hand_speed, settings.seed);
+        return perform(way, &events, Session::new(settings, world, Some(recorder))?, folder);
     }
     serve(arguments, Session::new(settings, world, Some(recorder))?)
 }
 
 /// Lets a simulated hand paint.
-fn perform(experiment: Experiment, events: &[Event], mut session: Session, folder: &Path) -> Result<(), VrError> {
+fn perform(way: Way, events: &[Event], mut session: Session, folder: &Path) -> Result<(), VrError> {
     let stage = Stage::start("paint");
     let mut traffic = Traffic::default();
     for (number, event) in events.iter().enumerate() {
@@ -51,7 +57,10 @@ fn perform(experiment: Experiment, events: &[Event], mut session: Session, folde
     tell(&mut session);
     stage.done(&format!("{:.0} s", session.time()));
     save(&session, &traffic, folder)?;
-    if experiment == Experiment::Contour { save_contour(&session, folder) } else { Ok(()) }
+    if session.canvases()[0].volume() == 0.0 {
+        return Err(VrError::NothingPainted { name: session.world().name.clone() });
+    }
+    if way == Way::Contour { save_contour(&session, folder) } else { Ok(()) }
 }
 
 /// Paints a recorded session again and compares the plans.
@@ -74,10 +83,10 @@ fn replay(path: &Path, folder: &Path) -> Result<(), VrError> {
             return session.handle(&event).map(|_| ());
         }
         let begun = cpu_time::ThreadTime::now();
+        // Nobody looks on: the pictures are drawn once, at the end.
         if session.handle(&event)? == Handled::Gap {
             return Err(VrError::recording(path, "events are missing in it"));
         }
-        session.take_patches();
         traffic.work(begun.elapsed().as_secs_f64(), 1);
         Ok(())
     })?;

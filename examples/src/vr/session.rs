@@ -295,8 +295,21 @@ impl Session {
         (hit - tick.nozzle_position()).norm() < self.settings.session.far
     }
 
-    /// Gives the vehicle its next task when it is free: first what was painted offline, then what the queue has.
+    /// Gives the vehicle its next task when it is free: first what was painted offline, then what the queue has. While it paints live
+    /// it is given the next piece of the stroke before it halts.
     fn start_tasks(&mut self, now: f64) -> Result<(), VrError> {
+        if self.tasks.is_empty() && self.vehicle.is_continuable(now) {
+            let position = self.vehicle.position();
+            if let Some(segment) = self.queue.next_continuation(now, &position) {
+                match self.vehicle.go_on(&segment, now, &self.world, &self.settings)? {
+                    Some(planned) => {
+                        self.counts.continued += 1;
+                        self.planned(&planned)?;
+                    }
+                    None => self.tasks.push_back(Task::Segment(segment)),
+                }
+            }
+        }
         while self.vehicle.is_free() {
             let position = self.vehicle.position();
             let Some(task) = self.tasks.pop_front().or_else(|| self.queue.next_task(now, &position)) else { break };

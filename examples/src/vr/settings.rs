@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 use paint_planner::session::{SessionSettings, TargetSettings};
-use paint_planner::{NozzleSettings, Settings, TimingPolicy};
+use paint_planner::{NozzleSettings, Settings, TimingPolicy, TimingSettings};
 use paint_sim::SprayModel;
 use serde::{Deserialize, Serialize};
 
@@ -106,7 +106,11 @@ impl VrSettings {
     /// The planner for paint from a stand-off, metres.
     pub(super) fn painting(&self, stand_off: f64) -> Settings {
         let usual = MissionSettings::default().planner;
-        let mut settings = Settings { nozzle: NozzleSettings { stand_off, ..usual.nozzle.clone() }, ..usual };
+        // Who follows a hand has no time for every bend of the surface: a stronger pull between neighbours, and a trajectory that may
+        // pass its waypoints at a third of the spot's deviation.
+        let nozzle = NozzleSettings { stand_off, ca: 1.0, cb: 0.01, ..usual.nozzle.clone() };
+        let timing = TimingSettings { tolerance: 0.005, ..usual.timing.clone() };
+        let mut settings = Settings { nozzle, timing, ..usual };
         if self.timing == Timing::Gradient {
             settings.timing.policy = TimingPolicy::GradientPreserving;
         }

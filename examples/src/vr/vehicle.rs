@@ -3,24 +3,29 @@
 use std::time::Instant;
 
 use nalgebra::{Isometry3, Point3};
-use paint_planner::session::{RATE, Segment, Task, VrMode, VrState, latency_in_time, targets};
+use paint_planner::session::{
+    Continuation, RATE, Segment, Task, VrMode, VrState, continue_plan, latency_in_time, targets,
+};
 use paint_planner::{NozzleState, Plan, Settings, Target, Tool, VehicleState, plan};
 use paint_sim::flight::{FlightSample, Localisation};
 use paint_sim::{FlightLog, FlightSettings, Shot};
 use ptu_kinematics::{Hover, Joints, ServoSettings};
 
 use super::error::VrError;
+use super::run_up::{RUN_UP, RunUp};
 use super::settings::{STAND_OFF, Timing, VrSettings, viewing};
 use super::world::VrWorld;
 use crate::adapters::{MeshSurface, PlanReference, Robot, ServoPanTilt};
 
 /// Time that planning takes on the session's clock, s: one tick. The measured time is reported, but must not change what is flown.
 const PLANNING: f64 = 1.0 / RATE;
+/// Time before its end in which a flight may be continued, s: the next segment is planned as late as the vehicle need not slow down.
+const CONTINUE: f64 = 1.5;
 /// Motion of the nozzle that one shot stands for, m.
 const SHOT_STEP: f64 = 0.005;
-/// Turn that counts as none, rad, a little more than half a bin of the planner's headings; and the pan up to which the heading is held.
-const HELD: f64 = 0.05;
-const HELD_PAN: f64 = 0.7;
+/// How far the vehicle may turn in a segment, and the pan that may be needed for it, rad, the first that serves all targets: none, which
+/// is a little more than half a bin of the planner's headings; a little; whatever it takes.
+const TURNS: [[f64; 2]; 3] = [[0.05, 0.5], [0.2, 0.7], [f64::INFINITY, f64::INFINITY]];
 /// Way between the two targets of a place that is only flown to, m.
 const SIDESTEP: f64 = 0.005;
 
@@ -57,13 +62,36 @@ pub(super) struct VehicleView {
 /// A task in the air.
 struct Flight {
     begin: f64,
-    duration: f64,
+    plan: Plan,
+    targets: Vec<Target>,
     log: FlightLog,
     /// Samples whose paint has landed.
     landed: usize,
     colour: u8,
-    /// The part of the pattern that it paints: where it begins, its length, m, and when each target is passed, s.
-    pattern: Option<(f64, f64, Vec<f64>)>,
+    /// The part of the pattern that it paints: where it begins and its length, m.
+    pattern: Option<[f64; 2]>,
+}
+
+impl Flight {
+    fn end(&self) -> f64 {
+        self.begin + self.plan.trajectory.duration()
+    }
+
+    /// Where on the pattern it is at a time, m; only while it paints.
+    fn painted(&self, now: f64) -> Option<f64> {
+        let [start, length] = self.pattern?;
+        Some(start + length * share_passed(&self.plan.target_time, now - self.begin))
+    }
+
+    /// Flies on until `now`, the samples at `now` themselves left out where another flight takes over there.
+    fn advance(&mut self, now: f64, inclusive: bool) -> Vec<FlightSample> {
+        let elapsed = (now - self.begin) / self.log.interval;
+        let reached = if inclusive { elapsed.floor() + 1.0 } else { elapsed.ceil() };
+        let reached = (reached.max(0.0) as usize).min(self.log.samples.len());
+        let passed = self.log.samples[self.landed.min(reached)..reached].to_vec();
+        self.landed = self.landed.max(reached);
+        passed
+    }
 }
 
 /// The vehicle.
@@ -72,6 +100,8 @@ pub(super) struct Vehicle {
     state: VehicleState,
     view: VehicleView,
     flight: Option<Flight>,
+    /// What takes over from it before it halts.
+    successor: Option<Flight>,
     count: u64,
     /// Length of the pattern that its nozzle has painted, m.
     painted: f64,
@@ -81,7 +111,7 @@ impl Vehicle {
     /// At rest before the surface.
     pub(super) fn new(world: &VrWorld) -> Self {
         let state = world.home;
-        Self { state, view: at_rest(&state, world), flight: None, count: 0, painted: 0.0 }
+        Self { state, view: at_rest(&state, world), flight: None, successor: None, count: 0, painted: 0.0 }
     }
 
     /// Position of its body, m.
@@ -96,6 +126,12 @@ impl Vehicle {
     /// Whether it can take a task.
     pub(super) fn is_free(&self) -> bool {
         self.flight.is_none()
+    }
+
+    /// Whether it paints, and could go on without a halt if there were more.
+    pub(super) fn is_continuable(&self, now: f64) -> bool {
+        let soon = |flight: &Flight| flight.pattern.is_some() && flight.end() - now <= CONTINUE;
+        self.successor.is_none() && self.flight.as_ref().is_some_and(soon)
     }
 
     /// Length of the pattern that its nozzle has painted, m.
@@ -136,7 +172,17 @@ impl Vehicle {
         };
         self.count += 1;
         if let Some(plan) = &record.plan {
-            self.take_off(plan, painted, &planner, now + PLANNING, world, settings)?;
+            let log = self.fly(plan, &planner, 0.0, world, settings)?;
+            self.arrive(plan);
+            self.flight = Some(Flight {
+                begin: now + PLANNING,
+                plan: plan.clone(),
+                targets,
+                log,
+                landed: 0,
+                colour: painted.and_then(|segment| segment.states.first()).map_or(0, |state| state.colour),
+                pattern: painted.map(|segment| [segment.start, segment.length]),
+            });
         } else if let Some(segment) = painted {
             // What cannot be flown is not caught up with either.
             self.painted = segment.start + segment.length;
@@ -144,26 +190,82 @@ impl Vehicle {
         Ok(Some(record))
     }
 
-    /// Plans with the heading that the vehicle has, if that serves every target: segments that follow each other are then flown without
-    /// a turn in between, which would cost more than the segment itself.
-    fn plan(&self, targets: &[Target], world: &VrWorld, planner: &Settings) -> Result<Plan, paint_planner::Error> {
-        let wall = MeshSurface(&world.surface.world);
-        let held = HeldHeading { robot: &world.robot, heading: self.state.heading };
-        match plan(targets, &wall, &held, planner) {
-            Ok(plan) if plan.report.served == targets.len() => Ok(plan),
-            _ => plan(targets, &wall, &world.robot, planner),
-        }
-    }
-
-    fn take_off(
+    /// Plans a segment that goes on where the flight in the air ends, and lets it take over before the vehicle slows down. `None` where
+    /// it cannot: the vehicle halts then, and the segment is a task like any other.
+    pub(super) fn go_on(
         &mut self,
-        plan: &Plan,
-        painted: Option<&Segment>,
-        planner: &Settings,
-        begin: f64,
+        segment: &Segment,
+        now: f64,
         world: &VrWorld,
         settings: &VrSettings,
-    ) -> Result<(), VrError> {
+    ) -> Result<Option<PlannedTask>, VrError> {
+        let Some(flying) = &self.flight else { return Ok(None) };
+        let started = Instant::now();
+        let (_, next, planner) = self.assignment(&Task::Segment(segment.clone()), world, settings);
+        let joins = segment.states.first().is_some_and(|first| first.colour == flying.colour);
+        let near = |a: &Target, b: &Target| (a.point - b.point).norm() <= settings.session.hit_jump;
+        if !joins || next.len() < 2 || !flying.targets.last().is_some_and(|last| near(last, &next[0])) {
+            return Ok(None);
+        }
+        let earliest = now + PLANNING - flying.begin;
+        let heading = flying.plan.trajectory.sample(earliest).heading;
+        let wall = MeshSurface(&world.surface.world);
+        let continued = TURNS[..2].iter().find_map(|&turn| {
+            let held = HeldHeading { robot: &world.robot, heading, turn };
+            continue_plan(&flying.plan, &flying.targets, earliest, &next, &wall, &held, &planner).ok()
+        });
+        let Some(Continuation { at, targets, remaining, plan }) = continued else { return Ok(None) };
+        let begin = flying.begin + at;
+        // From a vehicle that brakes hard already a curve within the limits may be longer than a halt.
+        let halting = self.plan(&next, world, &planner).map_or(f64::INFINITY, |plan| plan.trajectory.duration());
+        if begin + plan.trajectory.duration() > flying.end() + PLANNING + halting {
+            return Ok(None);
+        }
+        let start = flying.painted(begin).unwrap_or(segment.start);
+        let record = PlannedTask {
+            number: self.count,
+            time: begin,
+            kind: "paint",
+            seconds: started.elapsed().as_secs_f64(),
+            // The vehicle comes to the segment when it has flown what was left.
+            latency: Some(latency_in_time(begin + plan.target_time[remaining], segment)),
+            targets: [next.len(), next.len()],
+            plan: Some(plan.clone()),
+            refused: None,
+        };
+        self.count += 1;
+        let colour = flying.colour;
+        let log = self.fly(&plan, &planner, RUN_UP, world, settings)?;
+        self.arrive(&plan);
+        let pattern = Some([start, segment.start + segment.length - start]);
+        self.successor = Some(Flight { begin, plan, targets, log, landed: 0, colour, pattern });
+        Ok(Some(record))
+    }
+
+    /// Plans with the heading that the vehicle has, or nearly, if that serves every target: segments that follow each other are then flown
+    /// without a turn in between, which would cost more than the segment itself.
+    fn plan(&self, targets: &[Target], world: &VrWorld, planner: &Settings) -> Result<Plan, paint_planner::Error> {
+        let wall = MeshSurface(&world.surface.world);
+        let mut planned = Err(paint_planner::Error::NothingReachable { count: targets.len() });
+        for turn in TURNS {
+            let held = HeldHeading { robot: &world.robot, heading: self.state.heading, turn };
+            planned = plan(targets, &wall, &held, planner);
+            if planned.as_ref().is_ok_and(|plan| plan.report.served == targets.len()) {
+                break;
+            }
+        }
+        planned
+    }
+
+    /// The simulated flight along a plan; one that begins in motion is entered with a run-up of that many seconds.
+    fn fly(
+        &self,
+        plan: &Plan,
+        planner: &Settings,
+        run_up: f64,
+        world: &VrWorld,
+        settings: &VrSettings,
+    ) -> Result<FlightLog, VrError> {
         let reference = PlanReference {
             plan,
             chain: &world.robot.chain,
@@ -176,41 +278,37 @@ impl Vehicle {
             ..FlightSettings::default()
         };
         let mut gun = ServoPanTilt::new(world.robot.chain.clone(), ServoSettings::default())?;
-        let log = paint_sim::fly(&reference, &mut gun, &world.surface.world, &flight)?;
+        let entered = RunUp { plan: &reference, seconds: run_up };
+        let log = paint_sim::fly(&entered, &mut gun, &world.surface.world, &flight)?;
+        Ok(entered.without(log))
+    }
+
+    /// Remembers where the plan ends.
+    fn arrive(&mut self, plan: &Plan) {
         if let Some(last) = plan.waypoints.last() {
             self.state = last.state;
         }
-        self.flight = Some(Flight {
-            begin,
-            duration: plan.trajectory.duration(),
-            log,
-            landed: 0,
-            colour: painted.and_then(|segment| segment.states.first()).map_or(0, |state| state.colour),
-            pattern: painted.map(|segment| (segment.start, segment.length, plan.target_time.clone())),
-        });
-        Ok(())
     }
 
     /// Flies on until `now`; the paint that has left the nozzle since, and which.
     pub(super) fn advance(&mut self, now: f64) -> (u8, Vec<Shot>) {
         let Some(flight) = &mut self.flight else { return (0, Vec::new()) };
-        let elapsed = now - flight.begin;
-        let reached = ((elapsed / flight.log.interval).floor().max(-1.0) as i64 + 1) as usize;
-        let reached = reached.min(flight.log.samples.len());
-        let passed = flight.log.samples[flight.landed.min(reached)..reached].to_vec();
-        flight.landed = flight.landed.max(reached);
+        let colour = flight.colour;
+        let interval = flight.log.interval;
+        let takes_over = self.successor.take_if(|next| next.begin <= now);
+        let mut passed = flight.advance(takes_over.as_ref().map_or(now, |next| next.begin), takes_over.is_none());
+        if let Some(next) = takes_over {
+            *flight = next;
+            passed.extend(flight.advance(now, true));
+        }
         if let Some(sample) = passed.last() {
             self.view = seen(sample);
         }
-        if let Some((start, length, times)) = &flight.pattern {
-            self.painted = self.painted.max(start + length * share_passed(times, elapsed));
-        }
-        let shots = FlightLog { samples: passed, interval: flight.log.interval }.shots(SHOT_STEP);
-        let colour = flight.colour;
-        if elapsed >= flight.duration {
+        self.painted = self.painted.max(flight.painted(now).unwrap_or(0.0));
+        if now >= flight.end() {
             self.flight = None;
         }
-        (colour, shots)
+        (colour, FlightLog { samples: passed, interval }.shots(SHOT_STEP))
     }
 
     /// What kind of task it is, its targets, and how they are served from where the vehicle is.
@@ -250,16 +348,19 @@ impl Vehicle {
     }
 }
 
-/// The robot as long as it need not turn.
+/// The robot as long as it need not turn by more than `turn[0]` from a heading, nor pan by more than `turn[1]`, rad.
 struct HeldHeading<'a> {
     robot: &'a Robot,
     heading: f64,
+    turn: [f64; 2],
 }
 
 impl Tool for HeldHeading<'_> {
     fn vehicle(&self, nozzle: &NozzleState, heading: f64) -> Option<VehicleState> {
         let turned = (heading - self.heading).sin().atan2((heading - self.heading).cos());
-        self.robot.vehicle(nozzle, heading).filter(|state| turned.abs() <= HELD && state.pan.abs() <= HELD_PAN)
+        self.robot
+            .vehicle(nozzle, heading)
+            .filter(|state| turned.abs() <= self.turn[0] && state.pan.abs() <= self.turn[1])
     }
 
     fn spheres(&self, vehicle: &VehicleState, out: &mut Vec<(Point3<f64>, f64)>) {

@@ -2,6 +2,7 @@
 
 use crate::clearance::{ClearanceChecker, DistanceCache};
 use crate::error::Error;
+use crate::minimum_snap::KnotDerivatives;
 use crate::nozzle::Nozzles;
 use crate::plan::{Plan, PlanReport, Waypoint};
 use crate::route::{RoutePoint, between};
@@ -17,16 +18,18 @@ const CLEARANCE_STEP: f64 = 0.02;
 const MAX_CLEARANCE: f64 = 1.0;
 
 /// A path with its vehicle states, not timed yet.
-pub(super) struct UntimedPlan {
-    pub(super) nozzles: Nozzles,
-    pub(super) vehicle: Vec<Option<VehicleState>>,
-    pub(super) heading_cost: f64,
-    pub(super) route: Vec<RoutePoint>,
+pub(crate) struct UntimedPlan {
+    pub(crate) nozzles: Nozzles,
+    pub(crate) vehicle: Vec<Option<VehicleState>>,
+    pub(crate) heading_cost: f64,
+    pub(crate) route: Vec<RoutePoint>,
+    /// Motion at the first point of the route; zero: it is left from rest.
+    pub(crate) start: KnotDerivatives,
 }
 
 /// Where the trajectory comes nearer to the surface than half the clearance its waypoints keep: between two waypoints.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct ClearanceViolation {
+pub(crate) struct ClearanceViolation {
     /// Index of the waypoint before.
     pub(super) waypoint: usize,
     /// How much clearance is missing, m.
@@ -35,7 +38,7 @@ pub(super) struct ClearanceViolation {
 
 /// Times the route and gathers the plan, with the places where it comes too near the surface. `dense` binds the trajectory to
 /// every waypoint.
-pub(super) fn assemble_plan(
+pub(crate) fn assemble_plan(
     untimed: &UntimedPlan,
     targets: &[Target],
     checker: &mut ClearanceChecker<'_>,
@@ -48,7 +51,7 @@ pub(super) fn assemble_plan(
         // One state to hold: a trajectory still needs two knots.
         route.push(RoutePoint { target: None, ..only });
     }
-    let timed = schedule(&route, targets, &settings.timing, dense)?;
+    let timed = schedule(&untimed.start, &route, targets, &settings.timing, dense)?;
     let waypoints: Vec<Waypoint> = route
         .iter()
         .zip(&timed.times)

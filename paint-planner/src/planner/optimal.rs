@@ -5,6 +5,7 @@ use super::strategy::Planner;
 use crate::clearance::ClearanceChecker;
 use crate::error::Error;
 use crate::heading::HeadingGraph;
+use crate::minimum_snap::KnotDerivatives;
 use crate::nozzle::{InteriorPoint, Mode, Nozzles, QpSolver, initial_states, optimise};
 use crate::plan::Plan;
 use crate::settings::Settings;
@@ -92,8 +93,13 @@ impl OptimalPlanner<'_> {
             }
             let route =
                 route::build(&mut headings.vehicle, &headings.joined, Some(&mut checker), &clearance, settings)?;
-            let untimed =
-                UntimedPlan { nozzles: nozzles.clone(), vehicle: headings.vehicle, heading_cost: headings.cost, route };
+            let untimed = UntimedPlan {
+                nozzles: nozzles.clone(),
+                vehicle: headings.vehicle,
+                heading_cost: headings.cost,
+                route,
+                start: KnotDerivatives::zeros(),
+            };
             // A curve that cuts a corner its waypoints keep clear of is bound to every one of them.
             let (mut plan, mut violations) = assemble_plan(&untimed, targets, &mut checker, settings, attempt > 0)?;
             if attempt == 0 && !violations.is_empty() {

@@ -5,6 +5,7 @@ use super::strategy::Planner;
 use crate::clearance::ClearanceChecker;
 use crate::error::Error;
 use crate::lowess::lowess;
+use crate::minimum_snap::KnotDerivatives;
 use crate::nozzle::Nozzles;
 use crate::plan::Plan;
 use crate::route;
@@ -47,7 +48,7 @@ impl Planner for SmoothingPlanner {
         let route = route::build(&mut vehicle, &linked, None, &vec![settings.clearance; targets.len()], settings)?;
         let states = nozzles.into_iter().zip(&vehicle).map(|(n, v)| v.map(|_| n)).collect();
         let nozzles = Nozzles { states, rounds: 0, steps: 0, slack: 0.0 };
-        let untimed = UntimedPlan { nozzles, vehicle, heading_cost: 0.0, route };
+        let untimed = UntimedPlan { nozzles, vehicle, heading_cost: 0.0, route, start: KnotDerivatives::zeros() };
         Ok(assemble_plan(&untimed, targets, &mut ClearanceChecker::new(surface, tool), settings, false)?.0)
     }
 }

@@ -123,6 +123,17 @@ impl LiveQueue {
         self.step(now, vehicle)
     }
 
+    /// The next piece of the stroke that the vehicle is painting, if it is complete: for a vehicle that goes on without a halt. Unlike
+    /// [`LiveQueue::next_task`] it may be asked for while the vehicle is busy, and never begins anything else.
+    pub fn next_continuation(&mut self, now: f64, vehicle: &Point3<f64>) -> Option<Segment> {
+        while !self.queue.is_empty() && self.segment.last().is_some_and(|last| last.mode == VrMode::Painting) {
+            if let Some(Task::Segment(segment)) = self.step(now, vehicle) {
+                return Some(segment);
+            }
+        }
+        None
+    }
+
     /// One run of Algorithm 1 at the session's time `now` (s): takes the oldest state, and returns a task where one is complete.
     /// `vehicle` is the vehicle's position `r`, m. To be called while the vehicle can take a task.
     pub fn step(&mut self, now: f64, vehicle: &Point3<f64>) -> Option<Task> {

@@ -14,7 +14,7 @@ pub enum FarReference {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct SessionSettings {
-    /// Length of a live segment, m: `Delta_seg`. Default 0.2 (ours; the paper flies 1 and 0.5 m, which costs latency).
+    /// Length of a live segment, m: `Delta_seg`. Default 0.1 (ours; the paper flies 1 and 0.5 m, which costs latency).
     pub segment: f64,
     /// Length up to which a segment takes all that waits, m: a vehicle that is behind halts less often. Default 1 (ours); that of
     /// `segment` cuts as the paper does.
@@ -42,7 +42,7 @@ pub struct SessionSettings {
 impl Default for SessionSettings {
     fn default() -> Self {
         Self {
-            segment: 0.2,
+            segment: 0.1,
             longest: 1.0,
             seek: 1.0,
             far: 1.0,

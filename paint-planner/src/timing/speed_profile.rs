@@ -79,6 +79,11 @@ impl SpeedProfile {
         profile
     }
 
+    /// Lets the route begin at a speed, m/s, instead of at rest.
+    pub(crate) fn enter_with(&mut self, speed: f64) {
+        self.speed_limit[0] = speed;
+    }
+
     /// Durations of all edges; `slowdown[i] >= 1` lowers the speed of edge i.
     pub(crate) fn durations(&self, slowdown: &[f64], settings: &TimingSettings) -> Vec<f64> {
         let edges = self.travel.len();
