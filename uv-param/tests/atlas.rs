@@ -562,6 +562,10 @@ fn what_comes_and_goes_is_laid_out_again() {
     broken.chart[0] = 1000;
     let broken = update_atlas(&broken, &positions, &faces, &[], &settings(0.02), |_| ());
     assert!(matches!(broken, Err(Error::Setting { name: "chart", .. })));
+    let mut vast = before.layout();
+    vast.pages[0] = [1 << 40, 1 << 40];
+    let vast = update_atlas(&vast, &positions, &faces, &[], &settings(0.02), |_| ());
+    assert!(matches!(vast, Err(Error::TooManyTexels { .. })), "pages are not believed before they are counted");
 }
 
 /// Pairs of texels of different charts that are nearer to each other than a gutter, by texels whose centres charts cover.

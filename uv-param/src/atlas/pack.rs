@@ -9,8 +9,8 @@ mod shape;
 use crate::error::Error;
 pub(super) use add::add_to;
 use search::{Goal, Packed, Plan, Stages, carry_out, carry_out_unlimited, search};
-pub(super) use settings::check;
 pub use settings::{PackSettings, Page, Placement, Turns};
+pub(super) use settings::{check, check_pages};
 pub(super) use shape::Piece;
 use shape::Shapes;
 

@@ -91,6 +91,7 @@ impl AtlasLayout {
             let must_be = "a chart or a page of the previous layout";
             return Err(Error::Setting { name: "chart", value: value as f64, must_be });
         }
+        pack::check_pages(&self.pages, self.texel_m)?;
         if self.texel_m.to_bits() != settings.pack.texel_m.to_bits() {
             let must_be = "that of the previous layout, whose texels are to stay";
             return Err(Error::Setting { name: "texel_m", value: settings.pack.texel_m, must_be });

@@ -87,3 +87,16 @@ pub(in crate::atlas) fn check(settings: &PackSettings, area_m2: f64) -> Result<(
     }
     Ok(())
 }
+
+/// Refuses pages of an earlier layout that no atlas can have.
+pub(in crate::atlas) fn check_pages(pages: &[Page], texel_m: f64) -> Result<(), Error> {
+    let mut texels = 0_usize;
+    for &[width, height] in pages {
+        texels = texels.saturating_add(width.saturating_mul(height));
+        if texels > MAX_TEXELS {
+            let [width, height] = [width as f64, height as f64];
+            return Err(Error::TooManyTexels { texel_m, width, height, limit: MAX_TEXELS });
+        }
+    }
+    Ok(())
+}
