@@ -1,6 +1,7 @@
-//! Progress of the long stages: bars on a terminal, one plain line per stage otherwise.
+//! Progress of the long stages: bars on a terminal, otherwise a plain line per stage, and one every ten seconds of it.
 
 use std::io::IsTerminal;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -10,7 +11,12 @@ pub struct Stage {
     name: String,
     bar: Option<ProgressBar>,
     started: Instant,
+    /// Plain lines so far.
+    told: AtomicU64,
 }
+
+/// Seconds between plain lines.
+const INTERVAL_S: u64 = 10;
 
 impl Stage {
     /// Announces a stage.
@@ -23,13 +29,20 @@ impl Stage {
             bar.set_message(name.to_string());
             bar
         });
-        Self { name: name.to_string(), bar, started: Instant::now() }
+        Self { name: name.to_string(), bar, started: Instant::now(), told: AtomicU64::new(0) }
     }
 
     /// Moves the bar to a share in `[0, 1]`.
     pub fn share(&self, share: f64) {
-        if let Some(bar) = &self.bar {
-            bar.set_position((1000.0 * share.clamp(0.0, 1.0)) as u64);
+        let share = share.clamp(0.0, 1.0);
+        match &self.bar {
+            Some(bar) => bar.set_position((1000.0 * share) as u64),
+            None => {
+                let seconds = self.started.elapsed().as_secs();
+                if self.told.fetch_max(seconds / INTERVAL_S, Ordering::Relaxed) < seconds / INTERVAL_S {
+                    eprintln!("{:28} {:.0} % ({seconds} s)", self.name, 100.0 * share);
+                }
+            }
         }
     }
 

@@ -280,7 +280,7 @@ fn search(arguments: &Tune) -> Result<(), AnyError> {
         _ => eprintln!("one recording only: nothing says what the result is worth on others"),
     }
     if report.data_sheet_kept {
-        eprintln!("no gain on what was left out: noise.yaml has the noise given");
+        eprintln!("no gain on what was left out, or worse positions: noise.yaml has the noise given");
     }
     if let Some(ratio) = report.ratio_to_random {
         let (worse, points, seconds) = (100.0 * (ratio - 1.0), report.random_samples, report.search_wall_s);

@@ -109,7 +109,9 @@ fn read_mesh(settings: &VrSettings) -> Result<(String, TriangleMesh), VrError> {
         let (name, scene) = file.read_surface()?;
         return Ok((name, scene.canvas));
     };
+    let stage = Stage::start("map");
     let mesh = Map::open(path).map_err(|source| VrError::Map { path: path.clone(), source })?.mesh();
+    stage.done(&format!("{} faces", mesh.faces.len()));
     let name = path.file_stem().map_or("Map".into(), |stem| stem.to_string_lossy().into_owned());
     Ok((name, TriangleMesh { positions: mesh.positions, faces: mesh.faces, ..TriangleMesh::default() }))
 }

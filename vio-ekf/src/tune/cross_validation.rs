@@ -15,9 +15,19 @@ pub struct HeldOut {
     pub data_sheet: f64,
     /// With the noise that is best for the others.
     pub tuned: f64,
+    /// The part of position errors alone in the first: what counts where the covariance is not used.
+    pub data_sheet_position: f64,
+    /// And in the second.
+    pub tuned_position: f64,
 }
 
 impl HeldOut {
+    /// Whether the noise that was found is worth more than the data sheet on what it has not seen, and positions are no worse: accuracy is not
+    /// sold for consistency.
+    pub fn is_gain(&self) -> bool {
+        self.tuned < self.data_sheet && self.tuned_position <= self.data_sheet_position
+    }
+
     /// Leave-one-out cross-validation (Stone 1974) over points that were tried: each recording in turn is judged with the point that
     /// costs least on the others, penalty included. `None` with fewer than two recordings, or if the data sheet, the point of zeros,
     /// was not tried.
@@ -30,7 +40,8 @@ impl HeldOut {
             return None;
         }
         let alone = |scores: &[Score], k: usize| cost(&scores[k..=k], consistency_weight);
-        let mut sums = [0.0; 2];
+        let position = |scores: &[Score], k: usize| cost(&scores[k..=k], 0.0);
+        let mut sums = [0.0; 4];
         for k in 0..count {
             let of_others = |(point, scores): &&(NoisePoint, Vec<Score>)| {
                 let sum: f64 = (0..count).filter(|other| *other != k).map(|other| alone(scores, other)).sum();
@@ -39,8 +50,10 @@ impl HeldOut {
             let best = trials.iter().min_by(|a, b| of_others(a).total_cmp(&of_others(b)))?;
             sums[0] += alone(data_sheet, k);
             sums[1] += alone(&best.1, k);
+            sums[2] += position(data_sheet, k);
+            sums[3] += position(&best.1, k);
         }
-        let [data_sheet, tuned] = sums.map(|sum| sum / count as f64);
-        Some(Self { data_sheet, tuned })
+        let [data_sheet, tuned, data_sheet_position, tuned_position] = sums.map(|sum| sum / count as f64);
+        Some(Self { data_sheet, tuned, data_sheet_position, tuned_position })
     }
 }

@@ -77,6 +77,12 @@ fn what_a_search_is_worth_is_judged_on_what_it_has_not_seen() {
     let sound = [(sheet, scores([0.1, 0.2, 0.3])), (one, scores([0.05, 0.1, 0.15]))];
     let found = HeldOut::of(&sound, 0.5, 0.03).unwrap();
     assert!((found.tuned - found.data_sheet - 0.5_f64.ln()).abs() < 1e-12, "{found:?}");
+    assert!(found.is_gain());
+    // More consistent by more than positions are worse: a gain of the cost, and none that is handed on.
+    let score = |ate, nees| vec![Score { ate, nees: [nees; 3], lost: 0.0 }; 3];
+    let sold = HeldOut::of(&[(sheet, score(0.1, 0.75)), (one, score(0.11, 3.0))], 0.5, 0.0).unwrap();
+    assert!((sold.tuned_position - sold.data_sheet_position - 1.1_f64.ln()).abs() < 1e-12, "{sold:?}");
+    assert!(sold.tuned < sold.data_sheet && !sold.is_gain(), "{sold:?}");
     assert_eq!(HeldOut::of(&sound[1..], 0.5, 0.0), None);
     assert_eq!(HeldOut::of(&[(sheet, scores([0.1; 3])[..1].to_vec())], 0.5, 0.0), None);
     assert!((penalty(&[2.0, 0.0, -1.0, 0.0, 0.0], 0.03) - 0.15).abs() < 1e-12);

@@ -83,13 +83,15 @@ fn markdown(report: &TuningReport, tuning: &Tuning, best: [f64; 5], settings: &S
             report.random_samples
         );
     }
-    if let (Some(given), Some(tuned)) = (report.held_out_error_data_sheet_m, report.held_out_error_tuned_m) {
+    let weighted = report.held_out_error_data_sheet_m.zip(report.held_out_error_tuned_m);
+    let position = report.held_out_ate_data_sheet_m.zip(report.held_out_ate_tuned_m);
+    if let Some(((given, tuned), (given_ate, tuned_ate))) = weighted.zip(position) {
         let kept =
             if report.data_sheet_kept { " That is no gain: the noise of the data sheet is handed on." } else { "" };
         let _ = writeln!(
             text,
             "\nOn recordings that were left out, one after the other: {given:.4} m with the noise of the data sheet, {tuned:.4} m with \
-             that which is best for the others.{kept}"
+             that which is best for the others; positions alone {given_ate:.4} and {tuned_ate:.4} m.{kept}"
         );
     }
     let (patches, landmarks) = (&settings.patches, &settings.landmarks);

@@ -41,7 +41,13 @@ pub struct TuningReport {
     /// The same with the noise that is best for the others.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out_error_tuned_m: Option<f64>,
-    /// Whether the data sheet is handed on because the search does not help on what it has not seen.
+    /// Position error of them, geometric mean, with the noise of the data sheet.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out_ate_data_sheet_m: Option<f64>,
+    /// The same with the noise that is best for the others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out_ate_tuned_m: Option<f64>,
+    /// Whether the data sheet is handed on because the search does not help on what it has not seen, or makes positions worse there.
     pub data_sheet_kept: bool,
     /// Points drawn at random.
     pub random_samples: usize,

@@ -100,7 +100,7 @@ pub fn tune_noise(data: &TuningData, tuning: &Tuning, folder: &Path) -> Result<T
     // Judged on recordings that were left out; what does not help there is not handed on.
     evaluate(&DATA_SHEET)?;
     let held_out = HeldOut::of(&scored, tuning.consistency_weight, tuning.regularization);
-    let data_sheet_kept = held_out.is_some_and(|held_out| held_out.tuned >= held_out.data_sheet);
+    let data_sheet_kept = held_out.is_some_and(|held_out| !held_out.is_gain());
     let chosen = if data_sheet_kept { DATA_SHEET } else { found.best.point };
     let (start, best) = (scores(data, &tuning.start, tuning.threads)?, scores(data, &chosen, tuning.threads)?);
     let geometric =
@@ -126,6 +126,8 @@ pub fn tune_noise(data: &TuningData, tuning: &Tuning, folder: &Path) -> Result<T
         factor_image: factor[4],
         held_out_error_data_sheet_m: held_out.map(|held_out| held_out.data_sheet.exp()),
         held_out_error_tuned_m: held_out.map(|held_out| held_out.tuned.exp()),
+        held_out_ate_data_sheet_m: held_out.map(|held_out| held_out.data_sheet_position.exp()),
+        held_out_ate_tuned_m: held_out.map(|held_out| held_out.tuned_position.exp()),
         data_sheet_kept,
         random_samples: random.len(),
         weighted_error_random_m: (!random.is_empty()).then(|| least.exp()),
