@@ -35,14 +35,13 @@ impl Stage {
     /// Moves the bar to a share in `[0, 1]`.
     pub fn share(&self, share: f64) {
         let share = share.clamp(0.0, 1.0);
-        match &self.bar {
-            Some(bar) => bar.set_position((1000.0 * share) as u64),
-            None => {
-                let seconds = self.started.elapsed().as_secs();
-                if self.told.fetch_max(seconds / INTERVAL_S, Ordering::Relaxed) < seconds / INTERVAL_S {
-                    eprintln!("{:28} {:.0} % ({seconds} s)", self.name, 100.0 * share);
-                }
-            }
+        if let Some(bar) = &self.bar {
+            bar.set_position((1000.0 * share) as u64);
+            return;
+        }
+        let seconds = self.started.elapsed().as_secs();
+        if self.told.fetch_max(seconds / INTERVAL_S, Ordering::Relaxed) < seconds / INTERVAL_S {
+            eprintln!("{:28} {:.0} % ({seconds} s)", self.name, 100.0 * share);
         }
     }
 
