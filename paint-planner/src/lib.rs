@@ -67,6 +67,7 @@ mod clearance;
 pub mod control;
 mod error;
 pub mod gantry;
+mod gravity;
 mod heading;
 mod lowess;
 mod minimum_snap;

@@ -27,9 +27,7 @@ pub fn run(arguments: &Arguments) -> Result<(), VrError> {
     if let Some(path) = &arguments.replay {
         return replay(path, folder);
     }
-    if let Some(pigments) =
-        arguments.pigments.as_ref().filter(|_| arguments.experiment.is_some_and(|e| e.way().is_none()))
-    {
+    if let (Some(Experiment::Layers), Some(pigments)) = (arguments.experiment, &arguments.pigments) {
         return save_layers(pigments, folder);
     }
     let settings = arguments.settings();

@@ -6,9 +6,7 @@ use super::axis::{AxisModel, AxisProgram, AxisStage, AxisWeights};
 use super::vehicle::{ControlCommand, ControlReference, ControlState, VehicleModel};
 use crate::angle::wrap;
 use crate::error::Error;
-
-/// Standard gravity, m/s².
-const GRAVITY: f64 = 9.80665;
+use crate::gravity::GRAVITY;
 
 /// Settings of [`TrackingMpc`]. The seeds print none; all are ours.
 #[derive(Debug, Clone, Copy, PartialEq)]

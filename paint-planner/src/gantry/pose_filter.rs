@@ -6,13 +6,12 @@ use nalgebra::{Isometry3, Matrix4, Vector3, Vector4};
 use super::filter_state::{FilterState, measure};
 use super::robot_motion::RobotMotion;
 use crate::error::Error;
+use crate::gravity::GRAVITY;
 
 /// Part of its standard deviation by which a bias walks in a second: it turns with the robot.
 const BIAS_WALK: f64 = 0.2;
 /// Standard deviations that no noise exceeds.
 const JUMP: f64 = 10.0;
-/// Standard gravity, m/s^2.
-const GRAVITY: f64 = 9.80665;
 
 /// Noise of the measurements and of the hand.
 #[derive(Debug, Clone, Copy, PartialEq)]

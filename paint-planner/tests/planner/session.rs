@@ -5,9 +5,9 @@
 use paint_planner::nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
 use paint_planner::session::{
     CradlePose, FarReference, Feedback, LagIndicator, LiveQueue, PaintHit, RATE, Resampler, Segment, SessionSettings,
-    TargetSettings, Task, VERSION, VrMode, VrState, continue_plan, latency_in_time, segments, targets,
+    TargetSettings, Task, VERSION, VrMode, VrState, latency_in_time, segments, targets,
 };
-use paint_planner::{Error, OptimalPlanner, Plan, Planner, Settings, Target, TimingPolicy, VehicleState};
+use paint_planner::{Error, OptimalPlanner, Planner, Settings, TimingPolicy};
 
 use crate::walls::{Arm, Wall};
 
@@ -402,70 +402,6 @@ fn states_that_no_headset_sends_are_refused_by_name() {
     let point = Point3::new(1e9, 0.0, 0.0);
     refused(VrState { hit: Some(PaintHit { point, ..hit(0.0) }), ..good }, "hit");
     refused(VrState { flow: -1.0, ..good }, "flow");
-}
-
-/// A plan along the wall from `from` to `to` metres, and its targets, one centimetre apart.
-fn along_the_wall(from: f64, to: f64, start: Option<VehicleState>) -> (Vec<Target>, Plan) {
-    let count = ((to - from) / 0.01_f64).round() as usize;
-    let target = |k: usize| Wall::flat().target(from + 0.01 * k as f64, 2.0, if k < count { 1e-6 } else { 0.0 });
-    let targets: Vec<Target> = (0..=count).map(target).collect();
-    let plan = OptimalPlanner::default().plan(
-        &targets,
-        &Wall::flat(),
-        &Arm::default(),
-        &Settings { start, ..Settings::default() },
-    );
-    (targets, plan.unwrap())
-}
-
-#[test]
-fn a_plan_that_goes_on_in_flight_keeps_state_limits_and_paint() {
-    let (targets, flying) = along_the_wall(0.0, 0.5, None);
-    let (next, halting) = along_the_wall(0.5, 1.0, flying.waypoints.last().map(|w| w.state));
-    let settings = Settings::default();
-    let earliest = flying.trajectory.duration() - 1.2;
-    let on = continue_plan(&flying, &targets, earliest, &next, &Wall::flat(), &Arm::default(), &settings).unwrap();
-    assert!(on.at >= earliest && on.at < earliest + 0.1, "{} {earliest}", on.at);
-    // Position, velocity, acceleration and heading go on; the vehicle is in motion.
-    let (before, after) = (flying.trajectory.sample(on.at), on.plan.trajectory.sample(0.0));
-    assert!(before.velocity.norm() > 0.1);
-    assert!((before.position - after.position).norm() < 1e-12 && (before.velocity - after.velocity).norm() < 1e-9);
-    assert!((before.acceleration - after.acceleration).norm() < 1e-9 && (before.heading - after.heading).abs() < 1e-12);
-    // Within the limits everywhere, at rest at the end, and there sooner than over a halt.
-    let extrema = on.plan.trajectory.extrema();
-    assert!(extrema.speed <= settings.timing.max_speed && extrema.acceleration <= settings.timing.max_acceleration);
-    let end = on.plan.trajectory.duration();
-    assert!(on.plan.trajectory.sample(end).velocity.norm() < 1e-9);
-    let least =
-        (0..100).map(|k| on.plan.trajectory.sample(0.006 * end * f64::from(k)).velocity.norm()).fold(1.0, f64::min);
-    assert!(least > 0.05, "{least} m/s");
-    let over_a_halt = flying.trajectory.duration() - on.at + halting.trajectory.duration();
-    assert!(end < over_a_halt - 0.5, "{end} s, over a halt {over_a_halt} s");
-    // What was left of the first plan and all of the second one: the paint of every centimetre is given once.
-    let first = targets.len() - 1 - on.remaining;
-    assert_eq!((on.targets.len(), on.targets[0]), (on.remaining + next.len(), targets[first]));
-    assert!(on.targets.windows(2).all(|pair| ((pair[1].point - pair[0].point).norm() - 0.01).abs() < 1e-9));
-    let volume: f64 = (0..on.targets.len()).map(|k| on.plan.volume(k)).sum();
-    let expected = 1e-8 * (on.targets.len() - 1) as f64;
-    assert!((volume / expected - 1.0).abs() < 1e-9, "{volume} m^3 of {expected}");
-    // It can be continued in its turn.
-    let (more, _) = along_the_wall(1.0, 1.3, None);
-    let again =
-        continue_plan(&on.plan, &on.targets, end - 1.2, &more, &Wall::flat(), &Arm::default(), &settings).unwrap();
-    assert_eq!(again.targets.last().unwrap().point.y, more.last().unwrap().point.y);
-}
-
-#[test]
-fn a_plan_that_cannot_go_on_says_so() {
-    let (targets, flying) = along_the_wall(0.0, 0.3, None);
-    let (next, _) = along_the_wall(0.3, 0.6, None);
-    let on = |earliest, next: &[Target]| {
-        continue_plan(&flying, &targets, earliest, next, &Wall::flat(), &Arm::default(), &Settings::default())
-    };
-    // Too late; a corner at full speed; a place behind the wall.
-    assert!(matches!(on(flying.trajectory.duration(), &next), Err(Error::Continuation { .. })));
-    let hidden: Vec<Target> = next.iter().map(|t| Target { normal: -t.normal, ..*t }).collect();
-    assert!(on(flying.trajectory.duration() - 1.0, &hidden).is_err());
 }
 
 #[test]

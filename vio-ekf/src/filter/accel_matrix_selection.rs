@@ -29,8 +29,8 @@ const CONTRADICTION: f64 = 30.0;
 ///
 /// Once the body moves the second one is on trial. Once the identity is more probable than it was (the Savage-Dickey density ratio;
 /// Dickey 1971) it is chosen: the estimate is conditioned on `A = I`, which leaves what a filter would have found that had known it
-/// from the start. A trial with a narrower prior would cost no less on a calibrated sensor, and leave errors behind on another. After
-/// the choice of the identity a score test (Rao 1948) watches the corrections, and a contradiction reopens the case.
+/// from the start. After the choice of the identity a score test (Rao 1948) watches the corrections, and a contradiction reopens the
+/// case.
 // No allocation while the filter runs, so no box.
 #[allow(clippy::large_enum_variant)]
 #[derive(Debug, Clone)]
