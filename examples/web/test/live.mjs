@@ -8,8 +8,8 @@ import { mkdir, mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { createInterface } from "node:readline";
-import { deflateSync } from "node:zlib";
 import foxglove from "@foxglove/ws-protocol";
+import { PNG } from "pngjs";
 import protobuf from "protobufjs";
 import descriptor from "protobufjs/ext/descriptor/index.js";
 import WebSocket from "ws";
@@ -20,38 +20,15 @@ const FRAMES = 12;
 /// Points of the wall: z = DISTANCE + SLOPE x, metres.
 const [DISTANCE, SLOPE] = [1.5, 0.3];
 
-function crc32(bytes) {
-  let crc = ~0;
-  for (const byte of bytes) {
-    crc ^= byte;
-    for (let bit = 0; bit < 8; bit++) crc = (crc >>> 1) ^ (crc & 1 ? 0xedb88320 : 0);
-  }
-  return ~crc >>> 0;
-}
-
-function chunk(name, data) {
-  const body = Buffer.concat([Buffer.from(name), data]);
-  const [length, check] = [Buffer.alloc(4), Buffer.alloc(4)];
-  length.writeUInt32BE(data.length);
-  check.writeUInt32BE(crc32(body));
-  return Buffer.concat([length, body, check]);
-}
-
 /// The wall from x = `shift`: a PNG of 16 bits, millimetres along the optical axis.
 function depthPng(shift) {
-  const rows = Buffer.alloc(HEIGHT * (1 + 2 * WIDTH));
-  for (let v = 0; v < HEIGHT; v++)
-    for (let u = 0; u < WIDTH; u++) {
-      const slant = (u - (WIDTH - 1) / 2) / FOCAL;
-      const z = (DISTANCE + SLOPE * shift) / (1 - SLOPE * slant);
-      rows.writeUInt16BE(Math.round(1000 * z), v * (1 + 2 * WIDTH) + 1 + 2 * u);
-    }
-  const head = Buffer.alloc(13);
-  head.writeUInt32BE(WIDTH, 0);
-  head.writeUInt32BE(HEIGHT, 4);
-  head.set([16, 0, 0, 0, 0], 8);
-  const signature = Buffer.from([0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a]);
-  return Buffer.concat([signature, chunk("IHDR", head), chunk("IDAT", deflateSync(rows)), chunk("IEND", Buffer.alloc(0))]);
+  const depth = new Uint16Array(WIDTH * HEIGHT);
+  for (let k = 0; k < depth.length; k++) {
+    const slant = ((k % WIDTH) - (WIDTH - 1) / 2) / FOCAL;
+    depth[k] = Math.round((1000 * (DISTANCE + SLOPE * shift)) / (1 - SLOPE * slant));
+  }
+  const grey = { colorType: 0, inputColorType: 0, inputHasAlpha: false, bitDepth: 16 };
+  return PNG.sync.write({ width: WIDTH, height: HEIGHT, data: Buffer.from(depth.buffer) }, grey);
 }
 
 /// A recording in TUM's layout, there and back again until the viewer has surely come.
