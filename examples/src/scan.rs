@@ -17,6 +17,7 @@ mod prediction;
 mod quality;
 mod ray_cast_check;
 mod recent_map;
+mod reintegration;
 mod report;
 mod run;
 mod sequence;

@@ -47,6 +47,7 @@
 //! | tracking: Eqs. (5.2) and (5.3), coarse to fine; degenerate directions: ours | thesis Paper I, section 4.1 | [`Tracker`], [`TrackingOutcome`] |
 //! | `R(v) = α n/n_max + β (1 − abs(sdf)/μ)`, Eqs. (5.4)-(5.6) | thesis Paper I, section 4.4, corrected | [`IncrementalRayCast`] |
 //! | forward projection of a view between ray casts | thesis Paper I, section 6.2 | [`View::warped`] |
+//! | places found again by binary features and a vocabulary tree | thesis Paper I, section 4.5 | [`KeyframeIndex::recognise`], [`Vocabulary`] |
 //! | pose graph: Levenberg-Marquardt on SE(3) | thesis Paper I, section 4.6 | `PoseGraph` (feature `pose-graph`) |
 //! | distance queries | thesis, outlook | [`Map::distance`], [`Map::distance_and_gradient`] |
 //! | distances for planners, far from surfaces | thesis, outlook; branch and bound over sites: ours | [`DistanceField`] |
@@ -74,6 +75,7 @@ mod loop_closure;
 mod map;
 mod mesh;
 mod parallel;
+mod place_recognition;
 #[cfg(feature = "pose-graph")]
 mod pose_graph;
 mod ray_cast;
@@ -104,7 +106,7 @@ pub use gpu::gpu_map::{GpuMap, gpu_or_cpu_map};
 #[cfg(feature = "gpu")]
 pub use gpu::options::GpuOptions;
 pub use images::{ColourData, ColourView, DepthData, DepthView, Intrinsics};
-pub use keyframes::index::{KeyframeIndex, KeyframeMatch};
+pub use keyframes::index::{KeyframeIndex, KeyframeMatch, RecognisedPlace};
 #[cfg(feature = "pose-graph")]
 pub use loop_closure::closer::LoopCloser;
 #[cfg(feature = "pose-graph")]
@@ -118,6 +120,7 @@ pub use mesh::patches::PatchKey;
 pub use mesh::ply::write_ply;
 pub use mesh::triangle_mesh::Mesh;
 pub use nalgebra;
+pub use place_recognition::vocabulary::Vocabulary;
 #[cfg(feature = "pose-graph")]
 pub use pose_graph::factors::{BetweenFactor, PriorFactor};
 #[cfg(feature = "pose-graph")]

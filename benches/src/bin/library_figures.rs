@@ -11,7 +11,9 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 use paint_sim::ciede2000;
 use paint_sim::colour::BANDS;
 use paintcopter_benches::cpu::{CpuTimer, median_seconds};
-use paintcopter_benches::{Rng, colours, control, films, fuzzed_meshes, motion, painting, planner, pose_graphs, room};
+use paintcopter_benches::{
+    Rng, colours, control, films, fuzzed_meshes, motion, painting, planner, pose_graphs, room, vocabulary,
+};
 use paintcopter_examples::mesh_io::read_mesh;
 use paintcopter_examples::world::rock_wall;
 use serde_json::json;
@@ -125,6 +127,14 @@ enum Job {
         #[arg(long, default_value_t = 5)]
         runs: usize,
     },
+    /// Trains the visual words that `tsdf-hash` comes with, on rendered rooms
+    Vocabulary {
+        /// File to write: `tsdf-hash/src/place_recognition/vocabulary.bin`
+        file: PathBuf,
+        /// Which rooms
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+    },
     /// Writes the planner's programs as `NumPy` arrays, for `planner_peers.py`
     PlannerInstances {
         /// Folder to write into
@@ -169,6 +179,7 @@ fn main() -> ExitCode {
         Job::Pair { folder } => pair(&folder),
         Job::GraphWorlds { folder } => pose_graphs::write(&folder),
         Job::Graph { file, runs } => pose_graphs::run(&file, runs),
+        Job::Vocabulary { file, seed } => vocabulary::run(&file, seed),
         Job::PlannerInstances { folder } => planner::write(&folder),
         Job::Planner { runs } => planner::run(runs),
         Job::Control => control::run(),

@@ -86,7 +86,12 @@ impl Checkpoints {
         Self { settings, next: Instant::now() + interval }
     }
 
-    /// Saves if it is time.
+    /// Whether it is time for the next one.
+    pub(super) fn are_due(&self) -> bool {
+        self.settings.is_some() && Instant::now() >= self.next
+    }
+
+    /// Saves; a map on a GPU is not saved before the end.
     pub(super) fn save(
         &mut self,
         map: Option<&Map>,
@@ -97,9 +102,6 @@ impl Checkpoints {
     ) -> Result<(), ScanError> {
         let (Some(settings), Some(map)) = (&self.settings, map) else { return Ok(()) };
         let start = Instant::now();
-        if start < self.next {
-            return Ok(());
-        }
         map.save(&settings.path, None, &metadata(sequence, last_stamp, trajectory, keyframes))?;
         self.next = Instant::now() + settings.interval.max(start.elapsed().div_f64(LARGEST_SHARE));
         Ok(())

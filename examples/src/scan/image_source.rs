@@ -31,12 +31,13 @@ impl std::fmt::Display for ImageSource {
 
 type Messages = Box<dyn Iterator<Item = Result<mcap::Message<'static>, MessagesFault>> + Send>;
 
-/// The images of a topic. A recording is read in its order: an earlier image than the last one is looked for from the start.
+/// The images of a topic. A recording is read in its order, at two places: one for the present, one for frames that are looked at again. An image
+/// before both is looked for from the start.
 pub struct ImageTopic {
     path: PathBuf,
     topic: String,
-    /// The stream, and the messages of the topic that it has passed.
-    cursor: Mutex<Option<(Messages, usize)>>,
+    /// Streams, and the messages of the topic that each has passed.
+    cursors: Mutex<Vec<(Messages, usize)>>,
 }
 
 impl std::fmt::Debug for ImageTopic {
@@ -47,17 +48,23 @@ impl std::fmt::Debug for ImageTopic {
 
 impl ImageTopic {
     pub(super) fn new(path: &Path, topic: &str) -> Self {
-        Self { path: path.to_path_buf(), topic: topic.into(), cursor: Mutex::new(None) }
+        Self { path: path.to_path_buf(), topic: topic.into(), cursors: Mutex::default() }
     }
 
     /// The pixels of a message.
     pub(super) fn read(&self, index: usize) -> Result<ImageData, String> {
         // A reader that panicked leaves a stream that the next one can go on with, or begin anew.
-        let mut cursor = self.cursor.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let (mut messages, mut passed) = match cursor.take() {
-            Some((messages, passed)) if passed <= index => (messages, passed),
-            _ => (Box::new(messages_of(&self.path).map_err(reason)?) as Messages, 0),
+        let mut cursors = self.cursors.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let nearest = (0..cursors.len()).filter(|k| cursors[*k].1 <= index).max_by_key(|k| cursors[*k].1);
+        let (mut messages, mut passed) = match nearest {
+            Some(nearest) => cursors.swap_remove(nearest),
+            None => (Box::new(messages_of(&self.path).map_err(reason)?) as Messages, 0),
         };
+        // The one that is farthest stays.
+        if cursors.len() > 1 {
+            let nearer = usize::from(cursors[1].1 < cursors[0].1);
+            drop(cursors.remove(nearer));
+        }
         for message in &mut messages {
             let message = message.map_err(reason)?;
             if message.channel.topic != self.topic {
@@ -66,7 +73,7 @@ impl ImageTopic {
             passed += 1;
             if passed == index + 1 {
                 let found = image(&message).map(|(_, data)| data);
-                *cursor = Some((messages, passed));
+                cursors.push((messages, passed));
                 return found.ok_or_else(|| "the message is no image".into());
             }
         }

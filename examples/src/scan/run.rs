@@ -16,10 +16,14 @@ use super::map_store::MapStore;
 use super::pose_source::{CameraTracker, PoseSource, TrackingMetrics};
 use super::quality::Quality;
 use super::ray_cast_check::{RayCastCheck, ray_cast_check};
+use super::reintegration::Reintegration;
 use super::sequence::{FrameFiles, Sequence};
 use super::settings::ScanSettings;
 use super::start::Start;
 use crate::progress::Stage;
+
+/// Frames that follow a correction with each new one (ours): a loop of a minute is in the map after a few seconds.
+const REINTEGRATED: usize = 4;
 
 /// A mapped sequence.
 pub struct Scan {
@@ -85,14 +89,15 @@ impl Scan {
                 Ok(placed) => run.take_all(placed)?,
                 Err(why) => run.skip(index, &why),
             }
-            checkpoints.save(
-                run.store.map(),
-                folder,
-                sequence.frames[index].stamp,
-                &run.trajectory,
-                run.keyframes(),
-            )?;
+            let is_due = checkpoints.are_due();
+            // A stored map must fit the poses that are stored with it.
+            run.reintegrate(if is_due { usize::MAX } else { REINTEGRATED })?;
+            if is_due {
+                let stamp = sequence.frames[index].stamp;
+                checkpoints.save(run.store.map(), folder, stamp, &run.trajectory, run.keyframes())?;
+            }
         }
+        run.reintegrate(usize::MAX)?;
         if run.fused.is_empty() && run.resumed == 0 {
             let first = run.skipped.first().map_or_else(String::new, |(_, why)| why.clone());
             let frames = sequence.frames.len();
@@ -144,6 +149,7 @@ struct Run<'a> {
     resumed: usize,
     trajectory: Trajectory,
     fused: Vec<(usize, Isometry3<f64>)>,
+    reintegration: Reintegration,
     skipped: Vec<(usize, String)>,
     /// Frames since the camera was lost.
     lost: Vec<usize>,
@@ -188,6 +194,7 @@ impl<'a> Run<'a> {
             resumed: sequence.frames.partition_point(|frame| frame.stamp <= progress.last_stamp),
             trajectory: progress.trajectory,
             fused: Vec::new(),
+            reintegration: Reintegration::default(),
             skipped: Vec::new(),
             lost: Vec::new(),
             metrics: ScanMetrics::default(),
@@ -334,24 +341,13 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Moves the frames to their corrected poses: each that moves by enough is de-integrated and integrated anew, to the bit as if it
-    /// had been there from the start.
+    /// Moves the frames to their corrected poses; the map follows with the next frames.
     fn correct(&mut self, correction: &Correction) -> Result<(), ScanError> {
         let voxel_size = self.store.settings().voxel_size;
-        let mut anew = 0;
-        for k in 0..self.fused.len() {
-            let (index, old) = self.fused[k];
-            let Some(pose) = correction.moved(k, &old, voxel_size) else { continue };
-            let mut images = Images::read(&self.sequence.frames[index])?;
-            if let Some(camera) = &self.sequence.colour_camera {
-                images.register_colour(camera, self.sequence.intrinsics, self.sequence.depth_scale);
+        for (k, (_, old)) in self.fused.iter_mut().enumerate() {
+            if let Some(pose) = correction.moved(k, old, voxel_size) {
+                self.reintegration.moved(k, std::mem::replace(old, pose));
             }
-            let depth = images.depth(self.sequence.intrinsics, self.sequence.depth_scale);
-            let colour = images.colour(self.sequence.intrinsics);
-            self.store.dense().deintegrate(&depth, colour.as_ref(), &old)?;
-            self.store.dense().integrate(&depth, colour.as_ref(), &pose)?;
-            self.fused[k].1 = pose;
-            anew += 1;
         }
         // Stamps do not change.
         let earlier = self.trajectory.poses().len() - self.fused.len();
@@ -367,11 +363,17 @@ impl<'a> Run<'a> {
         if let Some(tracker) = &mut self.tracker {
             tracker.move_by(&present);
         }
-        if let Some(loops) = &mut self.loops {
-            loops.metrics.refused += anew;
-        }
         if let (Some(live), Some((index, _))) = (&mut self.live, self.fused.last()) {
             live.corrected(self.sequence.frames[*index].stamp, self.trajectory.poses());
+        }
+        Ok(())
+    }
+
+    /// Lets the map follow by at most so many frames.
+    fn reintegrate(&mut self, most: usize) -> Result<(), ScanError> {
+        let anew = self.reintegration.work(&mut self.store, self.sequence, &self.fused, most)?;
+        if let Some(loops) = &mut self.loops {
+            loops.metrics.refused += anew;
         }
         Ok(())
     }

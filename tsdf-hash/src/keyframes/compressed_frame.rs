@@ -57,6 +57,15 @@ impl CompressedFrame {
         values.into_iter().map(|v| u8::try_from(v).ok()).flat_map(|v| [v; 3]).collect()
     }
 
+    /// The image that it was made of, as far as it was kept; `None` if the bytes are no image of this size.
+    pub(crate) fn level(&self) -> Option<ImageLevel> {
+        let &Self { width, height, intrinsics: Intrinsics { fx, fy, cx, cy }, .. } = self;
+        let omega = self.metres()?.into_iter().map(|z| if z > 0.0 { 1.0 / z } else { 0.0 }).collect();
+        let intensity = self.rgb()?.chunks_exact(3).map(|rgb| f32::from(rgb[0])).collect();
+        let (focal, centre) = ([fx as f32, fy as f32], [cx as f32, cy as f32]);
+        Some(ImageLevel { width, height, focal, centre, omega, intensity, gradient: Vec::new() })
+    }
+
     /// Bytes of both.
     pub(crate) fn bytes(&self) -> usize {
         self.depth.len() + self.grey.len()

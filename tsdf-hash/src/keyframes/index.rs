@@ -1,5 +1,7 @@
 //! All keyframes of a scan.
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::error::Error;
@@ -9,6 +11,11 @@ use crate::keyframes::compressed_frame::CompressedFrame;
 use crate::keyframes::keyframe::Keyframe;
 use crate::keyframes::small_image::{Likeness, SmallImage};
 use crate::map::Map;
+use crate::place_recognition::alignment::align;
+use crate::place_recognition::descriptor::Descriptor;
+use crate::place_recognition::features::features;
+use crate::place_recognition::inverse_index::{InverseIndex, words};
+use crate::place_recognition::vocabulary::Vocabulary;
 use crate::settings::Settings;
 use crate::tracking::image_level::ImageLevel;
 
@@ -20,15 +27,19 @@ const FRAME_WIDTH: usize = 320;
 const SPACING: [f64; 2] = [0.2, 0.2];
 /// Bytes of frames that are kept where nothing else is said.
 const BUDGET: usize = 64 << 20;
-const MAGIC: &[u8; 8] = b"KEYFRAM2";
+const MAGIC: &[u8; 8] = b"KEYFRAM3";
+/// Before there were features.
+const OLD_MAGIC: &[u8; 8] = b"KEYFRAM2";
 
-/// Keyframes of a scan: small images with the poses that they were taken from, to find a lost camera or a loop by, and compressed
-/// depth and grey, to see a place again as it was.
+/// Keyframes of a scan with the poses that they were taken from: binary features in an inverse index and small images, to find a lost camera
+/// or a loop by, and compressed depth and grey, to see a place again as it was.
 ///
-/// Frames that exceed the budget make room, every other one of the older half first; their small images stay.
+/// Frames that exceed the budget make room, every other one of the older half first; their features and small images stay.
 #[derive(Clone, Debug)]
 pub struct KeyframeIndex {
     keyframes: Vec<Keyframe>,
+    vocabulary: Arc<Vocabulary>,
+    words: InverseIndex,
     max_bytes: usize,
     bytes: usize,
     thinned: usize,
@@ -38,6 +49,17 @@ impl Default for KeyframeIndex {
     fn default() -> Self {
         Self::with_budget(BUDGET)
     }
+}
+
+/// A keyframe of which a frame shows features.
+#[derive(Clone, Copy, Debug)]
+pub struct RecognisedPlace {
+    /// Which keyframe.
+    pub keyframe: usize,
+    /// Where the frame was taken, as the features say, to a centimetre or two.
+    pub world_from_camera: Isometry3<f64>,
+    /// Features that agree about it.
+    pub agreeing: usize,
 }
 
 /// A keyframe that looks like a frame.
@@ -59,7 +81,25 @@ impl KeyframeIndex {
 
     /// Without keyframes; all together take at most about `max_bytes`.
     pub fn with_budget(max_bytes: usize) -> Self {
-        Self { keyframes: Vec::new(), max_bytes, bytes: 0, thinned: 0 }
+        let (vocabulary, words) = (Vocabulary::shipped(), InverseIndex::default());
+        Self { keyframes: Vec::new(), vocabulary, words, max_bytes, bytes: 0, thinned: 0 }
+    }
+
+    /// The same keyframes, found again by the words of another vocabulary. It is not written with them.
+    #[must_use]
+    pub fn with_vocabulary(mut self, vocabulary: Vocabulary) -> Self {
+        self.vocabulary = Arc::new(vocabulary);
+        self.words = InverseIndex::default();
+        for keyframe in &self.keyframes {
+            self.words.push(&words(&self.vocabulary, &keyframe.features));
+        }
+        self
+    }
+
+    /// Words for pictures such as these: clusters of the descriptors of all keyframes.
+    pub fn train_vocabulary(&self, seed: u64) -> Vocabulary {
+        let features = self.keyframes.iter().flat_map(|keyframe| &keyframe.features);
+        Vocabulary::train(&features.map(|feature| feature.descriptor).collect::<Vec<Descriptor>>(), seed)
     }
 
     /// Number of keyframes.
@@ -127,14 +167,47 @@ impl KeyframeIndex {
     ) -> Result<usize, Error> {
         check_pose(world_from_camera)?;
         let image = small_image(depth, colour)?;
-        let mut level = ImageLevel::default();
-        level.read(depth, colour, depth.width.div_ceil(FRAME_WIDTH).min(depth.height), [1e-3, 1e3]);
+        let level = reduced_to(FRAME_WIDTH, depth, colour);
         let frame = Some(CompressedFrame::new(&level));
-        let keyframe = Keyframe { world_from_camera: *world_from_camera, image, frame };
-        self.bytes += keyframe.bytes();
-        self.keyframes.push(keyframe);
+        self.take(Keyframe { world_from_camera: *world_from_camera, image, frame, features: features(&level) });
         self.make_room();
         Ok(self.keyframes.len() - 1)
+    }
+
+    fn take(&mut self, keyframe: Keyframe) {
+        self.bytes += keyframe.bytes();
+        self.thinned += usize::from(keyframe.frame.is_none());
+        self.words.push(&words(&self.vocabulary, &keyframe.features));
+        self.keyframes.push(keyframe);
+    }
+
+    /// The keyframes that show what a frame shows, those with the most agreeing features first: of the `count` with the most words in common those
+    /// that at least twelve features place the frame beside. From any distance and direction from which corners look alike. Only
+    /// those that `wanted` says are looked at; nothing is recognised without colour.
+    ///
+    /// # Errors
+    /// Views that make no sense.
+    pub fn recognise(
+        &self,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        count: usize,
+        wanted: impl Fn(usize) -> bool,
+    ) -> Result<Vec<RecognisedPlace>, Error> {
+        check(depth, colour)?;
+        let seen = features(&reduced_to(FRAME_WIDTH, depth, colour));
+        let alike = self.words.query(&words(&self.vocabulary, &seen), count, wanted);
+        let mut places: Vec<RecognisedPlace> = alike
+            .into_iter()
+            .filter_map(|keyframe| {
+                let there = &self.keyframes[keyframe];
+                let found = align(&seen, &there.features)?;
+                let world_from_camera = there.world_from_camera * found.keyframe_from_frame;
+                Some(RecognisedPlace { keyframe, world_from_camera, agreeing: found.agreeing })
+            })
+            .collect();
+        places.sort_by_key(|place| (std::cmp::Reverse(place.agreeing), place.keyframe));
+        Ok(places)
     }
 
     /// The keyframes most like a frame, the likest first: at most `count`. Only those that `wanted` says are looked at.
@@ -203,15 +276,13 @@ impl KeyframeIndex {
     /// [`Error::CorruptFile`], with the byte.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
         let mut input = ByteReader::new(bytes, 0, "the keyframes");
-        if input.array()? != *MAGIC {
+        let magic: [u8; 8] = input.array()?;
+        if magic != *MAGIC && magic != *OLD_MAGIC {
             return Err(input.bad());
         }
         let mut index = Self::default();
         for _ in 0..input.u64()? {
-            let keyframe = Keyframe::read(&mut input)?;
-            index.bytes += keyframe.bytes();
-            index.thinned += usize::from(keyframe.frame.is_none());
-            index.keyframes.push(keyframe);
+            index.take(Keyframe::read(&mut input, magic == *MAGIC)?);
         }
         input.end()?;
         index.make_room();
@@ -235,14 +306,21 @@ impl KeyframeIndex {
     }
 }
 
-fn small_image(depth: &DepthView, colour: Option<&ColourView>) -> Result<SmallImage, Error> {
+fn check(depth: &DepthView, colour: Option<&ColourView>) -> Result<(), Error> {
     depth.check()?;
-    if let Some(colour) = colour {
-        colour.check()?;
-    }
+    colour.map_or(Ok(()), ColourView::check)
+}
+
+fn small_image(depth: &DepthView, colour: Option<&ColourView>) -> Result<SmallImage, Error> {
+    check(depth, colour)?;
+    Ok(SmallImage::new(&reduced_to(WIDTH, depth, colour)))
+}
+
+/// The frame with at most so many columns.
+fn reduced_to(columns: usize, depth: &DepthView, colour: Option<&ColourView>) -> ImageLevel {
     let mut level = ImageLevel::default();
-    level.read(depth, colour, depth.width.div_ceil(WIDTH).min(depth.height), [1e-3, 1e3]);
-    Ok(SmallImage::new(&level))
+    level.read(depth, colour, depth.width.div_ceil(columns).min(depth.height), [1e-3, 1e3]);
+    level
 }
 
 /// Whether a keyframe at one pose makes another one needless.

@@ -7,6 +7,8 @@ use crate::file::byte_reader::ByteReader;
 use crate::images::Intrinsics;
 use crate::keyframes::compressed_frame::CompressedFrame;
 use crate::keyframes::small_image::SmallImage;
+use crate::place_recognition::descriptor::Descriptor;
+use crate::place_recognition::features::{Feature, features as found_in};
 
 /// A place: where it was seen from, what it looks like, how deep it is.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,6 +17,8 @@ pub(crate) struct Keyframe {
     pub(crate) image: SmallImage,
     /// What it saw; `None` once it had to make room.
     pub(crate) frame: Option<CompressedFrame>,
+    /// Corners that it can be recognised by.
+    pub(crate) features: Vec<Feature>,
 }
 
 /// No image of a keyframe has more pixels along a side.
@@ -24,7 +28,8 @@ impl Keyframe {
     /// Bytes in memory, about.
     pub(crate) fn bytes(&self) -> usize {
         let image: usize = self.image.channels.iter().map(|channel| 4 * channel.len()).sum();
-        size_of::<Self>() + image + self.frame.as_ref().map_or(0, CompressedFrame::bytes)
+        let features = self.features.len() * size_of::<Feature>();
+        size_of::<Self>() + image + features + self.frame.as_ref().map_or(0, CompressedFrame::bytes)
     }
 
     pub(crate) fn write(&self, out: &mut Vec<u8>) {
@@ -38,6 +43,11 @@ impl Keyframe {
             u32s(&[channel.len() as u32]);
             u32s(&channel.iter().map(|v| v.to_bits()).collect::<Vec<_>>());
         }
+        u32s(&[self.features.len() as u32]);
+        for feature in &self.features {
+            u32s(&feature.point.map(f32::to_bits));
+            u32s(&feature.descriptor.0.map(|word| [word as u32, (word >> 32) as u32]).concat());
+        }
         let Some(frame) = &self.frame else {
             u32s(&[0, 0]);
             return;
@@ -50,7 +60,8 @@ impl Keyframe {
         out.extend_from_slice(&frame.grey);
     }
 
-    pub(crate) fn read(input: &mut ByteReader) -> Result<Self, Error> {
+    /// Of a file with features, or of one from before there were any: they are then found in what the keyframe saw.
+    pub(crate) fn read(input: &mut ByteReader, with_features: bool) -> Result<Self, Error> {
         let mut pose = [0.0; 7];
         for number in &mut pose {
             *number = input.f64()?;
@@ -75,9 +86,14 @@ impl Keyframe {
             }
         }
         let image = SmallImage { width: width as usize, focal, channels };
+        let mut features = Vec::new();
+        let count = if with_features { input.u32()? } else { 0 };
+        for _ in 0..count {
+            features.push(read_feature(input)?);
+        }
         let (width, height) = (input.u32()?, input.u32()?);
         if width == 0 && height == 0 {
-            return Ok(Self { world_from_camera, image, frame: None });
+            return Ok(Self { world_from_camera, image, frame: None, features });
         }
         if width.max(height) > LARGEST || width.min(height) == 0 {
             return Err(input.bad());
@@ -88,9 +104,26 @@ impl Keyframe {
         let grey = input.take(lengths[1] as usize)?.to_vec();
         let intrinsics = Intrinsics { fx, fy, cx, cy };
         let frame = CompressedFrame { width: width as usize, height: height as usize, intrinsics, most, depth, grey };
-        if !(most > 0.0 && most.is_finite()) || frame.metres().is_none() || frame.rgb().is_none() {
-            return Err(input.bad());
+        let level = if most > 0.0 && most.is_finite() { frame.level() } else { None };
+        let level = level.ok_or_else(|| input.bad())?;
+        if !with_features {
+            features = found_in(&level);
         }
-        Ok(Self { world_from_camera, image, frame: Some(frame) })
+        Ok(Self { world_from_camera, image, frame: Some(frame), features })
     }
+}
+
+fn read_feature(input: &mut ByteReader) -> Result<Feature, Error> {
+    let mut point = [0.0; 3];
+    for number in &mut point {
+        *number = f32::from_bits(input.u32()?);
+    }
+    let mut descriptor = Descriptor::default();
+    for word in &mut descriptor.0 {
+        *word = input.u64()?;
+    }
+    if point.iter().any(|number| !number.is_finite()) {
+        return Err(input.bad());
+    }
+    Ok(Feature { point, descriptor })
 }

@@ -179,7 +179,7 @@ impl LoopCloser {
         }
     }
 
-    /// Of old keyframes: those that look like the present one or were taken from near by, as far as the present agrees with what they saw.
+    /// Of old keyframes: those that show what the present one shows, look like it, or were taken from near by, as far as the present agrees with what they saw.
     fn loops(&mut self, frame: &Frame, compared: &mut usize) -> Result<Vec<LoopClosure>, Error> {
         let LoopSettings { recent, window, .. } = self.settings;
         let Some(end) = frame.present.checked_sub(recent) else { return Ok(Vec::new()) };
@@ -206,12 +206,13 @@ impl LoopCloser {
         Ok(found)
     }
 
-    /// Old keyframes before `end` that the present one may have come back to, and where it is if it has.
+    /// Old keyframes before `end` that the present one may have come back to, and where it is if it has: those that share features first.
     fn starts(&self, frame: &Frame, end: usize) -> Result<Vec<(usize, Isometry3<f64>)>, Error> {
         let LoopSettings { candidates, min_correlation, .. } = self.settings;
         let pose = self.graph.poses[frame.present];
         let alike = self.keyframes.candidates(frame.depth, frame.colour, candidates, |k| k < end)?;
         let alike = alike.into_iter().filter(|found| found.correlation >= min_correlation);
+        let recognised = self.keyframes.recognise(frame.depth, frame.colour, candidates, |k| k < end)?;
         let mut nearby: Vec<(f64, usize)> = (0..end)
             .filter_map(|k| {
                 let apart = self.graph.poses[k].inverse() * pose;
@@ -221,7 +222,8 @@ impl LoopCloser {
             .collect();
         nearby.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let nearby = nearby.into_iter().take(candidates).map(|(_, k)| (k, pose));
-        Ok(alike.map(|found| (found.keyframe, found.world_from_camera)).chain(nearby).collect())
+        let recognised = recognised.into_iter().map(|found| (found.keyframe, found.world_from_camera));
+        Ok(recognised.chain(alike.map(|found| (found.keyframe, found.world_from_camera))).chain(nearby).collect())
     }
 
     /// Registers a frame that is believed to be at `present` against what some keyframes saw, both in the world of the registered poses.

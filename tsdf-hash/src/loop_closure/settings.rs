@@ -10,7 +10,7 @@ pub struct LoopSettings {
     pub max_bytes: usize,
     /// Keyframes before the present one that are no old visit (10).
     pub recent: usize,
-    /// Keyframes that look alike that are tried for each new one (3), and as many of those that were taken from near by.
+    /// Old keyframes that are tried for each new one because they share features (3), as many because they look alike or were taken from near by.
     pub candidates: usize,
     /// Least correlation of the small images of those that look alike (0.5).
     pub min_correlation: f64,

@@ -13,23 +13,27 @@ use crate::tracking::pose::step;
 use crate::tracking::settings::TrackingSettings;
 use crate::tracking::tracker::Tracker;
 
-/// Keyframes that a frame is tracked from (ours).
-const CANDIDATES: usize = 8;
-/// Frames that must agree about a place (ours).
-const FRAMES: usize = 3;
+/// Keyframes that a frame is tracked from where it looks like them (ours): in the dark, and in colour, where features have not found it.
+const CANDIDATES: [usize; 2] = [8, 3];
+/// Keyframes of the most common words that a frame is compared with, feature by feature (ours).
+const RECOGNISED: usize = 5;
+/// Frames that must agree about a place (ours): by what they look like, and where features agree, too.
+const FRAMES: [usize; 2] = [3, 2];
 /// The reserve map begins anew after so many frames: what it drifts must not matter.
 const LONGEST: usize = 60;
 /// Places nearer to each other are one: radians, metres.
 const SAME: [f64; 2] = [0.04, 0.04];
+/// Starts nearer to each other are one: radians, metres.
+const ONE_START: [f64; 2] = [0.05, 0.05];
 /// Without colour, a frame counts beside others that it was taken at least so far from: radians, metres (ours).
 const ANOTHER: [f64; 2] = [0.02, 0.02];
 
 /// Finds a lost camera in a map.
 ///
 /// One frame is not enough: a corner of a room looks like another corner. So the frames since the camera was lost are tracked in a
-/// reserve map of their own, which says how they are placed to each other. Where a frame is found in the old map by the keyframes that look
-/// most like it, the frames after it must be found where the reserve map has them, or the place is dropped. It is believed when three
-/// frames agree and no other place is left; without colour these must have been taken from different poses.
+/// reserve map of their own, which says how they are placed to each other. Where a frame is found in the old map, by the features that it has in
+/// common with keyframes or near those that look most like it, the frames after it must be found where the reserve map has them, or the place is dropped. It is believed when three
+/// frames agree, or two where features led to it, and no other place is left; without colour these must have been taken from different poses.
 ///
 /// ```
 /// # use tsdf_hash::{DenseMap, DepthView, Error, KeyframeIndex, Relocaliser, TrackingSettings};
@@ -70,6 +74,8 @@ struct Place {
     world_from_reserve: Isometry3<f64>,
     /// Frames of the reserve that agree.
     agreeing: Vec<usize>,
+    /// Whether features led to it.
+    recognised: bool,
     /// The latest frame, if it agrees.
     latest: Option<TrackingOutcome>,
 }
@@ -117,7 +123,9 @@ impl Relocaliser {
         } else {
             different(place.agreeing.iter().map(|k| &reserve.poses[*k]))
         };
-        let (true, Some(outcome)) = (agreeing >= FRAMES, place.latest.take()) else { return Ok(None) };
+        let (true, Some(outcome)) = (agreeing >= FRAMES[usize::from(place.recognised)], place.latest.take()) else {
+            return Ok(None);
+        };
         let world_from_reserve = outcome.world_from_camera * present.inverse();
         let before = &reserve.poses[..reserve.poses.len() - 1];
         let earlier = before.iter().map(|pose| world_from_reserve * pose).collect();
@@ -174,7 +182,7 @@ impl Relocaliser {
         Ok(())
     }
 
-    /// Looks for the frame in the old map.
+    /// Looks for the frame in the old map: where features say that it is; if they do not, near keyframes that it looks like.
     fn search(
         &mut self,
         map: &mut dyn DenseMap,
@@ -183,15 +191,35 @@ impl Relocaliser {
         keyframes: &KeyframeIndex,
         present: &Isometry3<f64>,
     ) -> Result<(), Error> {
-        let frame = self.reserve.as_ref().map_or(0, |reserve| reserve.poses.len() - 1);
-        for start in keyframes.candidates(depth, colour, CANDIDATES, |_| true)? {
-            let Some(found) = self.tracker.settle(map, depth, colour, &start.world_from_camera)? else { continue };
-            let world_from_reserve = found.world_from_camera * present.inverse();
-            if !self.places.iter().any(|place| is_same(&place.world_from_reserve, &world_from_reserve)) {
-                self.places.push(Place { world_from_reserve, agreeing: vec![frame], latest: Some(found) });
+        let mut tried: Vec<Isometry3<f64>> = Vec::new();
+        for start in keyframes.recognise(depth, colour, RECOGNISED, |_| true)? {
+            let start = start.world_from_camera;
+            // Neighbouring keyframes say the same.
+            if !tried.iter().any(|other| within(other, &start, ONE_START)) {
+                if let Some(found) = self.tracker.settle_near(map, depth, colour, &start)? {
+                    self.suspect(found, present, true);
+                }
+                tried.push(start);
+            }
+        }
+        if !self.places.is_empty() {
+            return Ok(());
+        }
+        for start in keyframes.candidates(depth, colour, CANDIDATES[usize::from(colour.is_some())], |_| true)? {
+            if let Some(found) = self.tracker.settle(map, depth, colour, &start.world_from_camera)? {
+                self.suspect(found, present, false);
             }
         }
         Ok(())
+    }
+
+    /// The present frame is seen from here, as well.
+    fn suspect(&mut self, found: TrackingOutcome, present: &Isometry3<f64>, recognised: bool) {
+        let frame = self.reserve.as_ref().map_or(0, |reserve| reserve.poses.len() - 1);
+        let world_from_reserve = found.world_from_camera * present.inverse();
+        if !self.places.iter().any(|place| is_same(&place.world_from_reserve, &world_from_reserve)) {
+            self.places.push(Place { world_from_reserve, agreeing: vec![frame], recognised, latest: Some(found) });
+        }
     }
 }
 

@@ -34,12 +34,22 @@ const FINE_STRIDE: usize = 2;
 const LEAST_COVERAGE: f64 = 0.5;
 /// Least correlation of its intensities with those of the map, where both have colour (ours).
 const LEAST_LIKENESS: f64 = 0.75;
-/// Largest distances of partners, one search after the other, as multiples of the setting (ours).
-const REACHES: [f64; 10] = [4.0, 2.0, 1.0, 1.0, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5];
+/// Largest distances of partners, one search after the other, as multiples of the setting, and the least agreement after each of them: what is
+/// below leads nowhere (ours).
+const REACHES: [(f64, f64); 10] = [
+    (4.0, 0.0),
+    (2.0, 0.3),
+    (1.0, 0.4),
+    (1.0, 0.5),
+    (0.5, 0.6),
+    (0.5, 0.6),
+    (0.5, 0.6),
+    (0.5, 0.6),
+    (0.5, 0.6),
+    (0.5, 0.6),
+];
 /// Partners are looked for within so many standard deviations of the prior (ours).
 const SPREAD: f64 = 3.0;
-/// Least agreement after each of these searches; what is below leads nowhere (ours).
-const PROGRESS: [f64; 10] = [0.0, 0.3, 0.4, 0.5, 0.6, 0.6, 0.6, 0.6, 0.6, 0.6];
 /// A search that moves by less, radians and metres, is not repeated.
 const SETTLED: f64 = 1e-4;
 /// Directions with less than this share of the information of the best known one wait for a finer level (ours): what the
@@ -109,10 +119,33 @@ impl Tracker {
         colour: Option<&ColourView>,
         start: &Isometry3<f64>,
     ) -> Result<Option<TrackingOutcome>, Error> {
+        self.settle_within(map, depth, colour, start, &REACHES)
+    }
+
+    /// The same from a pose that is right to a few centimetres.
+    pub(crate) fn settle_near(
+        &mut self,
+        map: &mut dyn DenseMap,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        start: &Isometry3<f64>,
+    ) -> Result<Option<TrackingOutcome>, Error> {
+        let near = REACHES.iter().position(|reach| reach.0 <= 1.0).unwrap_or(0);
+        self.settle_within(map, depth, colour, start, &REACHES[near..])
+    }
+
+    fn settle_within(
+        &mut self,
+        map: &mut dyn DenseMap,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        start: &Isometry3<f64>,
+        reaches: &[(f64, f64)],
+    ) -> Result<Option<TrackingOutcome>, Error> {
         let (near, least) = (self.settings.max_distance, self.settings.min_agreement);
         let mut pose = *start;
         let mut last = None;
-        for (reach, progress) in REACHES.into_iter().zip(PROGRESS) {
+        for &(reach, progress) in reaches {
             self.settings.max_distance = reach * near;
             // From afar little agrees at first.
             self.settings.min_agreement = if reach > 1.0 { 0.0 } else { least };
@@ -192,7 +225,7 @@ impl Tracker {
         let mut search = Registration::new(prior.world_from_camera);
         let mut last = None;
         let spread = prior.covariance.map_or(0.0, |covariance| SPREAD * spread(&covariance, view));
-        let widest = spread.clamp(settings.max_distance, settings.max_distance * REACHES[0]);
+        let widest = spread.clamp(settings.max_distance, settings.max_distance * REACHES[0].0);
         for level in (0..LEVELS).rev() {
             // Where little is known of the pose, partners are far apart at first.
             let reach = if level == 0 { settings.max_distance } else { widest };

@@ -20,6 +20,7 @@ mod noisy_room;
 #[cfg(feature = "pose-graph")]
 mod pose_graph;
 mod random;
+mod recognition;
 mod recorded;
 mod relocalisation;
 mod reversible;

@@ -23,8 +23,8 @@ struct Tally {
     nowhere: usize,
     elsewhere: usize,
     frames: usize,
-    /// Processor time of the searches, seconds.
-    seconds: f64,
+    /// Processor time of the searches inside and elsewhere, seconds, and their frames.
+    cost: [(f64, usize); 2],
     worst: [f64; 2],
 }
 
@@ -80,7 +80,8 @@ fn sweeps(inside: usize, elsewhere: usize, light: bool) -> Tally {
             tally.frames += 1;
             let start = cpu_time::ProcessTime::now();
             let answer = relocaliser.add(&mut map, &shot.view(), shot.colour().as_ref(), &keyframes).unwrap();
-            tally.seconds += start.elapsed().as_secs_f64();
+            let cost = &mut tally.cost[usize::from(!is_inside)];
+            *cost = (cost.0 + start.elapsed().as_secs_f64(), cost.1 + 1);
             if let Some(answer) = answer {
                 found = Some(apart(&answer.outcome.world_from_camera, &truth));
                 break;
@@ -112,14 +113,14 @@ fn a_camera_is_found_in_the_room_and_not_in_another() {
 #[ignore = "prints figures, takes minutes"]
 fn relocalisation_figures() {
     for (light, name) in [(true, "with colour"), (false, "in the dark")] {
-        let Tally { right, wrong, nowhere, elsewhere, frames, seconds, worst } = sweeps(170, 30, light);
+        let Tally { right, wrong, nowhere, elsewhere, frames, cost, worst } = sweeps(170, 30, light);
+        let [inside, outside] = cost.map(|(seconds, frames)| 1e3 * seconds / frames as f64);
         eprintln!(
             "{name}: of 170 {right} right, {wrong} off by more than 5 mm or 0.3 deg (worst {:.1} mm, {:.2} deg), {nowhere} not found; \
-             of 30 elsewhere {elsewhere} found; {:.1} frames each, {:.0} CPU-ms a frame",
+             of 30 elsewhere {elsewhere} found; {:.1} frames each, {inside:.0} CPU-ms a frame, {outside:.0} elsewhere",
             1e3 * worst[0],
             worst[1].to_degrees(),
             frames as f64 / 200.0,
-            1e3 * seconds / frames as f64
         );
     }
 }
@@ -136,7 +137,7 @@ fn earlier_frames_are_placed_too() {
         let shot = lit(seen(truth, &mut random), true, 0.0);
         let found = relocaliser.add(&mut map, &shot.view(), shot.colour().as_ref(), &keyframes).unwrap();
         if let Some(found) = found {
-            assert!(found.earlier.len() == truths.len() && truths.len() >= 2, "{}", found.earlier.len());
+            assert!(found.earlier.len() == truths.len() && !truths.is_empty(), "{}", found.earlier.len());
             for (pose, truth) in found.earlier.iter().zip(&truths) {
                 let (metres, radians) = apart(pose, truth);
                 assert!(metres < 8e-3 && radians < 6e-3, "{metres} m, {radians} rad");
