@@ -11,15 +11,16 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3, Vector4, Vector5};
 use paint_planner::{
-    Clarabel, InteriorPoint, NozzleSettings, OptimalPlanner, Plan, Planner, QpSolver, Settings, StandardForm, Target,
-    Trajectory, stroke_program,
+    Clarabel, InteriorPoint, NozzleSettings, OptimalPlanner, Plan, Planner, QpSolver, Settings, StandardForm,
+    StrokeEnds, Target, TimingPolicy, Trajectory, order_strokes, stroke_program, transit_lower_bound,
 };
+use paint_sim::TriangleSurface;
 use paintcopter_examples::adapters::{MeshSurface, Robot};
 use paintcopter_examples::mission::MissionSettings;
 use ptu_kinematics::Ptu;
 use serde_json::json;
 
-use crate::cpu::median_seconds;
+use crate::cpu::{median_seconds, seconds};
 use crate::{Rng, rock};
 use walls::{Arm, Wall};
 
@@ -33,6 +34,12 @@ const KNOTS: usize = 1000;
 /// Turns of the scene, and paths over the rock.
 const TURNS: usize = 200;
 const PATHS: usize = 1000;
+/// Quads of the large mesh along its sides, and metres of each side.
+const QUADS: [usize; 2] = [1000, 500];
+const SIDES: [f64; 2] = [10.0, 5.0];
+/// Segments planned on it, and sets of strokes ordered.
+const SEGMENTS: usize = 200;
+const ORDERS: u64 = 20;
 
 type AnyError = Box<dyn Error>;
 
@@ -96,6 +103,11 @@ pub fn run(runs: usize) -> Result<(), AnyError> {
     }
     trajectory(runs)?;
     whole_plan(runs)?;
+    stroke_orders()?;
+    preserved_gradients()?;
+    for length in [0.5, 1.0] {
+        segments(length)?;
+    }
     turned_scenes()?;
     random_paths()
 }
@@ -179,6 +191,134 @@ fn whole_plan(runs: usize) -> Result<(), AnyError> {
     Ok(())
 }
 
+/// Strokes of up to a metre on a wall of five: time of the transits over the lower bound of any order.
+fn stroke_orders() -> Result<(), AnyError> {
+    let settings = Settings::default();
+    let mut over = Vec::new();
+    for seed in 0..ORDERS {
+        let mut rng = Rng::new(seed);
+        let end = |y: f64, z: f64| Target {
+            point: Point3::new(0.0, y, z),
+            normal: -Vector3::x_axis(),
+            dose: 0.0,
+            time: None,
+        };
+        let stroke = |_| {
+            let (y, z) = (rng.between(0.0, 5.0), rng.between(0.0, 5.0));
+            StrokeEnds { first: end(y, z), last: end(y + rng.unit(), z + rng.unit() - 0.5) }
+        };
+        let strokes: Vec<StrokeEnds> = (0..120).map(stroke).collect();
+        let order = order_strokes(&strokes, None, &settings)?;
+        over.push(order.transit_time / transit_lower_bound(&strokes, None, &settings, 300)?);
+    }
+    let (mean, largest) = (over.iter().sum::<f64>() / over.len() as f64, over.iter().copied().fold(0.0, f64::max));
+    println!(
+        "{}",
+        json!({
+            "fig": "transits_over_lower_bound", "peer": "paint-planner", "orders": ORDERS, "strokes": 120, "mean": mean,
+            "largest": largest,
+        })
+    );
+    Ok(())
+}
+
+/// Time stamps up to four times too fast: how far the volume on a millimetre of the stroke is from the dose.
+fn preserved_gradients() -> Result<(), AnyError> {
+    let MissionSettings { planner: mut settings, ptu, .. } = MissionSettings::default();
+    settings.timing.policy = TimingPolicy::GradientPreserving;
+    let surface = rock::rock()?;
+    let (robot, wall) = (Robot::new(Ptu::new(ptu)?), MeshSurface(&surface.world));
+    for speed in [0.3, 0.5, 0.75, 1.0] {
+        let mut time = 0.0;
+        let mut targets = rock::stroke(&surface, 100);
+        for k in 0..targets.len() {
+            targets[k].time = Some(time);
+            let step = targets.get(k + 1).map_or(0.0, |next| (next.point - targets[k].point).norm());
+            time += step / (speed * (1.0 + 0.3 * (0.2 * k as f64).sin()));
+        }
+        let plan = OptimalPlanner::default().plan(&targets, &wall, &robot, &settings)?;
+        let (mut worst, mut length, mut volume) = (0.0_f64, 0.0, 0.0);
+        let steps = (plan.trajectory.duration() / 2e-5) as usize;
+        let mut before = plan.setpoint(0.0);
+        for k in 1..=steps {
+            let here = plan.setpoint(k as f64 * 2e-5);
+            length += (here.aim - before.aim).norm();
+            volume += 0.5 * (here.flow + before.flow) * 2e-5;
+            if length >= 1e-3 {
+                worst = worst.max((volume / (rock::DOSE * length) - 1.0).abs());
+                (length, volume) = (0.0, 0.0);
+            }
+            before = here;
+        }
+        println!(
+            "{}",
+            json!({
+                "fig": "volume_per_mm", "peer": "paint-planner", "asked_m_s": speed, "slowdown": plan.report.stretch,
+                "largest_error": worst,
+            })
+        );
+    }
+    Ok(())
+}
+
+/// A wall with bumps of five centimetres, a million triangles.
+fn large_mesh() -> Result<TriangleSurface, AnyError> {
+    let [columns, rows] = QUADS.map(|quads| quads + 1);
+    let mut positions = Vec::with_capacity(columns * rows);
+    for j in 0..rows {
+        for i in 0..columns {
+            let [y, z] = [SIDES[0] * i as f64 / QUADS[0] as f64, SIDES[1] * j as f64 / QUADS[1] as f64];
+            positions.push([bump(y, z), y, z].map(|c| c as f32));
+        }
+    }
+    let mut faces = Vec::with_capacity(2 * QUADS[0] * QUADS[1]);
+    for j in 0..QUADS[1] {
+        for i in 0..QUADS[0] {
+            let corner = |i: usize, j: usize| (j * columns + i) as u32;
+            let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+            faces.extend([[a, c, b], [a, d, c]]);
+        }
+    }
+    Ok(TriangleSurface::new(&positions, &faces)?)
+}
+
+fn bump(y: f64, z: f64) -> f64 {
+    0.05 * (3.9 * y).sin() * (2.7 * z + 0.4).cos()
+}
+
+/// Straight segments on the large mesh, targets a centimetre apart: all stages of a plan.
+fn segments(length: f64) -> Result<(), AnyError> {
+    let MissionSettings { planner: settings, ptu, .. } = MissionSettings::default();
+    let mesh = large_mesh()?;
+    let (robot, wall) = (Robot::new(Ptu::new(ptu)?), MeshSurface(&mesh));
+    let mut rng = Rng::new(5);
+    let (mut times, mut served, mut asked) = (Vec::new(), 0, 0);
+    for _ in 0..SEGMENTS {
+        let (y, z) = (rng.between(1.5, SIDES[0] - 1.5), rng.between(1.5, SIDES[1] - 1.5));
+        let (sin, cos) = rng.between(0.0, TAU).sin_cos();
+        let target = |k: usize| {
+            let (y, z) = (y + SPACING * k as f64 * cos, z + SPACING * k as f64 * sin);
+            let slope = |h: [f64; 2]| (bump(y + h[0], z + h[1]) - bump(y - h[0], z - h[1])) / 2e-5;
+            let normal = UnitVector3::new_normalize(Vector3::new(-1.0, slope([1e-5, 0.0]), slope([0.0, 1e-5])));
+            Target { point: Point3::new(bump(y, z), y, z), normal, dose: rock::DOSE, time: None }
+        };
+        let targets: Vec<Target> = (0..=(length / SPACING).round() as usize).map(target).collect();
+        let (plan, time) = seconds(|| OptimalPlanner::default().plan(&targets, &wall, &robot, &settings));
+        (served, asked) = (served + plan?.report.served, asked + targets.len());
+        times.push(1e3 * time);
+    }
+    times.sort_unstable_by(f64::total_cmp);
+    let at = |share: f64| times[(share * (times.len() - 1) as f64) as usize];
+    println!(
+        "{}",
+        json!({
+            "fig": format!("segment_of_{length}_m_on_a_million_triangles"), "peer": "paint-planner", "segments": SEGMENTS,
+            "served_share": f64::from(served as u32) / f64::from(asked as u32), "cpu_ms_median": at(0.5), "cpu_ms_p99": at(0.99),
+        })
+    );
+    Ok(())
+}
+
 /// The same scene turned about the vertical: how far the plans, turned back, lie apart.
 fn turned_scenes() -> Result<(), AnyError> {
     let plan = |turn: f64| {
@@ -212,6 +352,7 @@ fn random_paths() -> Result<(), AnyError> {
     let (robot, wall) = (Robot::new(Ptu::new(ptu)?), MeshSurface(&surface.world));
     let mut rng = Rng::new(11);
     let (mut planned, mut refused, mut moments, mut violations) = (0, 0, 0_u64, 0_u64);
+    let mut ratios = Vec::new();
     for _ in 0..PATHS {
         let mut at =
             [rng.between(20.0, surface.width() as f64 - 20.0), rng.between(20.0, surface.height() as f64 - 20.0)];
@@ -233,6 +374,7 @@ fn random_paths() -> Result<(), AnyError> {
                 planned += 1;
                 moments += all;
                 violations += beyond;
+                ratios.extend(against_uniform_scaling(&plan, &settings)?);
             }
             Err(_) => refused += 1,
         }
@@ -241,10 +383,38 @@ fn random_paths() -> Result<(), AnyError> {
         "{}",
         json!({
             "fig": "limits_over_random_paths", "peer": "paint-planner", "planned": planned, "nothing_reachable": refused,
-            "moments": moments, "violations": violations,
+            "moments": moments, "violations": violations, "time_over_uniform_scaling": ratios.iter().sum::<f64>() / ratios.len() as f64,
+            "compared": ratios.len(),
         })
     );
     Ok(())
+}
+
+/// Time of a plan over that of its path at one speed, all times stretched by one factor until the limits hold (thesis, section 7.5).
+/// `None` where the plan flies between strokes.
+fn against_uniform_scaling(plan: &Plan, settings: &Settings) -> Result<Option<f64>, AnyError> {
+    let timing = &settings.timing;
+    let TimingPolicy::Uniform { speed } = timing.policy else { return Ok(None) };
+    if plan.waypoints.iter().any(|w| w.target.is_none()) {
+        return Ok(None);
+    }
+    let mut knots: Vec<Vector4<f64>> = Vec::new();
+    for (k, waypoint) in plan.waypoints.iter().enumerate() {
+        let p = waypoint.state.position;
+        let here = Vector4::new(p.x, p.y, p.z, waypoint.state.heading);
+        let far = knots.last().is_none_or(|last| (here.xyz() - last.xyz()).norm() >= timing.knot_spacing);
+        if far || k + 1 == plan.waypoints.len() {
+            knots.push(here);
+        }
+    }
+    let durations: Vec<f64> = knots.windows(2).map(|w| ((w[1].xyz() - w[0].xyz()).norm() / speed).max(1e-2)).collect();
+    let curve = Trajectory::minimum_snap(&knots, &durations, &vec![false; knots.len()])?;
+    let most = curve.extrema();
+    let factor = (most.speed / timing.max_speed)
+        .max((most.acceleration / timing.max_acceleration).sqrt())
+        .max(most.heading_rate / timing.max_heading_rate)
+        .max(1.0);
+    Ok(Some(plan.trajectory.duration() / (factor * curve.duration())))
 }
 
 /// Moments looked at, every 5 ms, and those beyond a limit of speed, acceleration or heading rate.

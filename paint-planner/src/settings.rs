@@ -39,6 +39,9 @@ pub struct NozzleSettings {
     pub cone: f64,
     /// Greatest angle between the normal and the line from target to nozzle, rad (default 25 degrees).
     pub incidence: f64,
+    /// Greatest normal deviation where the tilt joint reaches the normal, sequential mode, m (default 0.02: the VR paper, section V,
+    /// always stayed below); larger than `min` times the tangent of `incidence` has no effect.
+    pub deviation: f64,
     /// Greatest elevation of the spray axis, rad (default 44 degrees, one inside the +-45 of the pan-tilt unit).
     pub max_elevation: f64,
     /// Weight `c_a` of position differences between neighbours (default 0.5).
@@ -147,6 +150,7 @@ impl Default for NozzleSettings {
             max: 0.15,
             cone: 16_f64.to_radians(),
             incidence: 25_f64.to_radians(),
+            deviation: 0.02,
             max_elevation: 44_f64.to_radians(),
             ca: 0.5,
             cb: 0.005,
@@ -198,6 +202,7 @@ impl Settings {
             ("nozzle.min", nozzle.min),
             ("nozzle.cone", nozzle.cone),
             ("nozzle.incidence", nozzle.incidence),
+            ("nozzle.deviation", nozzle.deviation),
             ("nozzle.max_elevation", nozzle.max_elevation),
             ("nozzle.cc", nozzle.cc),
             ("nozzle.facet", nozzle.facet),

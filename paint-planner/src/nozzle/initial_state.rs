@@ -7,12 +7,17 @@ use nalgebra::{UnitVector3, Vector3};
 /// Room kept between a start and the hard rows of the program, rad: interior-point methods need an inside.
 const MARGIN: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
+/// Share of the greatest deviation at which a leaning start is still inside the octagon of rows.
+const INSIDE: f64 = 0.8;
+
 /// A start strictly inside the hard rows, and the tangent frame of its target.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct InitialState {
     pub(crate) state: NozzleState,
     /// Tangent directions; the first points uphill where the surface has an uphill.
     pub(crate) tangents: [Vector3<f64>; 2],
+    /// Greatest normal deviation, m; `None` where the spray must lean so far that only the incidence bounds it.
+    pub(crate) deviation: Option<f64>,
 }
 
 /// Eq. (1) with the spray axis clamped into the elevations the tilt joint has. `None` where that asks for more than the
@@ -38,7 +43,10 @@ fn start(target: &Target, settings: &NozzleSettings) -> Option<InitialState> {
     };
     let position = target.point - direction * (settings.stand_off / tilted.cos());
     let state = NozzleState { position, direction: UnitVector3::new_normalize(direction) };
-    Some(InitialState { state, tangents: tangents(&n, &Vector3::z()) })
+    // A cylinder about the normal that lies inside the cone of the incidence down to the least distance.
+    let deviation = settings.deviation.min(settings.min * settings.incidence.tan());
+    let deviation = (settings.stand_off * tilted.tan() < INSIDE * deviation).then_some(deviation);
+    Some(InitialState { state, tangents: tangents(&n, &Vector3::z()), deviation })
 }
 
 /// An orthonormal pair perpendicular to `axis`; the first is the part of `up` that is.

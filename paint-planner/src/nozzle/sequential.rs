@@ -30,17 +30,18 @@ struct Linearisation {
     beta: f64,
     /// `E`, two directions perpendicular to the axis.
     basis: Matrix2x3<f64>,
-    tangents: [Vector3<f64>; 2],
+    /// The target's, with the greatest deviation.
+    start: InitialState,
 }
 
 impl Linearisation {
-    fn new(target: Target, position: Point3<f64>, tangents_of_target: [Vector3<f64>; 2]) -> Self {
+    fn new(target: Target, position: Point3<f64>, start: InitialState) -> Self {
         let line = target.point - position;
         let beta = line.norm();
         let axis = line / beta;
         let [e1, e2] = tangents(&axis, &Vector3::z());
         let basis = Matrix2x3::from_rows(&[e1.transpose(), e2.transpose()]);
-        Self { target, position, axis, beta, basis, tangents: tangents_of_target }
+        Self { target, position, axis, beta, basis, start }
     }
 }
 
@@ -56,7 +57,7 @@ pub(super) fn optimise(
     let mut points: Vec<Linearisation> = initial_states
         .iter()
         .zip(targets)
-        .filter_map(|(s, t)| s.map(|s| Linearisation::new(*t, s.state.position, s.tangents)))
+        .filter_map(|(s, t)| s.map(|s| Linearisation::new(*t, s.state.position, s)))
         .collect();
     let stroke_links: Vec<bool> = indices.windows(2).map(|pair| pair[1] == pair[0] + 1 && linked[pair[0]]).collect();
     let mut result = Nozzles { states: vec![None; targets.len()], rounds: 0, steps: 0, slack: 0.0 };
@@ -76,7 +77,7 @@ pub(super) fn optimise(
             moved = moved.max(change.norm() * share);
             let position = point.position + change * share;
             let axis = point.axis + point.basis.tr_mul(&Vector2::new(x[3], x[4])) * share;
-            *point = Linearisation::new(point.target, position, point.tangents);
+            *point = Linearisation::new(point.target, position, point.start);
             let direction = clamp_to_cone(&axis, &point.axis, settings.cone / 2.0);
             result.states[index] = Some(NozzleState { position, direction });
         }
@@ -95,8 +96,7 @@ fn start_of(points: &[Linearisation]) -> Vec<Vector5<f64>> {
 /// The first of the programs that stage 1 solves for one stroke, and where it starts: for measuring a [`QpSolver`] by itself.
 /// Targets that no permitted incidence reaches are left out.
 pub fn stroke_program(targets: &[Target], settings: &NozzleSettings) -> (QuadraticProgram, Vec<Vector5<f64>>) {
-    let linearised =
-        |(s, t): (&Option<InitialState>, &Target)| s.map(|s| Linearisation::new(*t, s.state.position, s.tangents));
+    let linearised = |(s, t): (&Option<InitialState>, &Target)| s.map(|s| Linearisation::new(*t, s.state.position, s));
     let points: Vec<Linearisation> =
         initial_states(targets, settings).iter().zip(targets).filter_map(linearised).collect();
     let links = vec![true; points.len().saturating_sub(1)];
@@ -190,12 +190,16 @@ fn push_hard_rows(program: &mut QuadraticProgram, c: &Linearisation, settings: &
     // Eq. (2), distances.
     program.push_hard(-n, -(settings.min + n.dot(&t)));
     program.push_hard(n, settings.max + n.dot(&t));
-    // Incidence as an octagon inscribed in the circle, a corner of it uphill, where tilted starts sit.
-    let spread = settings.incidence.tan() * FRAC_PI_8.cos();
+    // Incidence (a cone) or deviation (a cylinder) as an octagon inscribed in the circle, a corner of it uphill, where tilted starts
+    // sit.
+    let (spread, width) = match c.start.deviation {
+        None => (settings.incidence.tan() * FRAC_PI_8.cos(), 0.0),
+        Some(deviation) => (0.0, deviation * FRAC_PI_8.cos()),
+    };
     for k in 0..8 {
         let (sin, cos) = (FRAC_PI_8 + f64::from(k) * FRAC_PI_4).sin_cos();
-        let a = c.tangents[0] * cos + c.tangents[1] * sin - n * spread;
-        program.push_hard(a, a.dot(&t));
+        let a = c.start.tangents[0] * cos + c.start.tangents[1] * sin - n * spread;
+        program.push_hard(a, width + a.dot(&t));
     }
     // Elevation of the line from nozzle to target. |horizontal part| >= m . (t - p) for every unit m, so the flat row
     // lies inside the true cone.

@@ -57,6 +57,39 @@ fn bumpy_wall_meets_the_published_deviations() {
 }
 
 #[test]
+fn no_nozzle_is_farther_off_a_normal_in_reach_than_permitted() {
+    // Normals that change by more than the nozzles can follow smoothly.
+    let wall = Wall::flat();
+    let mut targets = wall.rows(1.0, 1, 0.2);
+    for (i, target) in targets.iter_mut().enumerate() {
+        let lean = if i % 2 == 0 { 0.3 } else { -0.3 };
+        target.normal = UnitVector3::new_normalize(Vector3::new(-1.0, lean, 0.0));
+    }
+    let with = |deviation: f64| {
+        let mut settings = Settings::default();
+        settings.nozzle.deviation = deviation;
+        settings.nozzle.ca = 5.0;
+        optimal(&targets, &wall, &settings).unwrap().report
+    };
+    assert!(with(1.0).normal_deviation_max > 0.021);
+    for deviation in [0.02, 0.015] {
+        let report = with(deviation);
+        assert_eq!(report.served, targets.len());
+        assert!(report.normal_deviation_max <= deviation, "{}", report.normal_deviation_max);
+    }
+    // Where the tilt joint ends, the incidence is the bound.
+    let steep: Vec<Target> = wall
+        .rows(1.0, 1, 0.2)
+        .iter()
+        .map(|t| {
+            let (sin, cos) = 62_f64.to_radians().sin_cos();
+            Target { normal: UnitVector3::new_normalize(Vector3::new(-cos, 0.0, -sin)), ..*t }
+        })
+        .collect();
+    assert_eq!(optimal(&steep, &wall, &Settings::default()).unwrap().report.served, steep.len());
+}
+
+#[test]
 fn rough_rock_with_overhangs_is_served_where_the_joints_allow() {
     let wall = Wall { bumps: 0.2, wavelength: 1.1, turn: 0.0 };
     let targets = wall.rows(2.5, 8, 0.1);
