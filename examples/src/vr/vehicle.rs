@@ -208,7 +208,9 @@ impl Vehicle {
             return Ok(None);
         }
         let earliest = now + PLANNING - flying.begin;
-        let heading = flying.plan.trajectory.sample(earliest).heading;
+        let env = |name: &str, or: f64| std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(or);
+        let (drift, gain) = (env("DRIFT", 0.0), env("GAIN", 1.0));
+        let heading = flying.plan.trajectory.sample(earliest).heading + (gain * self.state.pan).clamp(-drift, drift);
         let wall = MeshSurface(&world.surface.world);
         let continued = TURNS[..2].iter().find_map(|&turn| {
             let held = HeldHeading { robot: &world.robot, heading, turn };
@@ -247,8 +249,11 @@ impl Vehicle {
     fn plan(&self, targets: &[Target], world: &VrWorld, planner: &Settings) -> Result<Plan, paint_planner::Error> {
         let wall = MeshSurface(&world.surface.world);
         let mut planned = Err(paint_planner::Error::NothingReachable { count: targets.len() });
+        let env = |name: &str, or: f64| std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(or);
+        let (drift, gain) = (env("HDRIFT", 0.0), env("HGAIN", 1.0));
         for turn in TURNS {
-            let held = HeldHeading { robot: &world.robot, heading: self.state.heading, turn };
+            let heading = self.state.heading + (gain * self.state.pan).clamp(-drift, drift);
+            let held = HeldHeading { robot: &world.robot, heading, turn };
             planned = plan(targets, &wall, &held, planner);
             if planned.as_ref().is_ok_and(|plan| plan.report.served == targets.len()) {
                 break;

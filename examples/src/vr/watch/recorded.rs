@@ -1,0 +1,89 @@
+//! A recording that plays at the speed at which it was made.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use mcap::Message;
+
+use super::super::error::VrError;
+use super::feed::{Feed, FeedMessage, Heard};
+use crate::mcap_messages::{MessagesFault, messages_of, schema_of};
+
+type Messages = Box<dyn Iterator<Item = Result<Message<'static>, MessagesFault>>>;
+
+/// A recording and where it is played.
+pub(super) struct Recorded {
+    path: PathBuf,
+    messages: Option<Messages>,
+    next: Option<Message<'static>>,
+    /// Log time of its first message, ns.
+    first: Option<u64>,
+    /// What was played so far, s, and when that was.
+    elapsed: f64,
+    looked: Option<Instant>,
+}
+
+impl Recorded {
+    /// Begins to read it.
+    pub(super) fn open(path: &Path) -> Result<Self, VrError> {
+        let mut messages = messages_of(path).map_err(|fault| VrError::recording(path, why(fault)))?;
+        let next = messages.next().transpose().map_err(|fault| VrError::recording(path, why(fault)))?;
+        let first = next.as_ref().map(|message| message.log_time);
+        if first.is_none() {
+            return Err(VrError::recording(path, "there is no message in it"));
+        }
+        Ok(Self { path: path.into(), messages: Some(Box::new(messages)), next, first, elapsed: 0.0, looked: None })
+    }
+
+    /// Reads the message after the one that is taken.
+    fn advance(&mut self) -> Option<String> {
+        match self.messages.as_mut()?.next() {
+            Some(Ok(message)) => self.next = Some(message),
+            end => {
+                self.messages = None;
+                return Some(match end {
+                    Some(Err(fault)) => format!("the recording breaks off: {}", why(fault)),
+                    _ => "the recording is over".into(),
+                });
+            }
+        }
+        None
+    }
+}
+
+impl Feed for Recorded {
+    fn take(&mut self, playing: bool) -> Option<Heard> {
+        let now = Instant::now();
+        let before = self.looked.replace(now);
+        if playing && self.messages.is_some() {
+            self.elapsed += before.map_or(0.0, |before| (now - before).as_secs_f64());
+        }
+        let Some(message) = &self.next else {
+            return self.advance().map(Heard::Over);
+        };
+        let at = message.log_time.saturating_sub(self.first.unwrap_or(0)) as f64 * 1e-9;
+        if !playing || at > self.elapsed {
+            return None;
+        }
+        let message = self.next.take()?;
+        // Schemas of Foxglove in another encoding are none that are read here.
+        let protobuf = message.channel.message_encoding == "protobuf";
+        let schema = if protobuf { schema_of(&message).to_owned() } else { String::new() };
+        Some(Heard::Message(FeedMessage { topic: message.channel.topic.clone(), schema, data: message.data.into_owned() }))
+    }
+
+    fn name(&self) -> String {
+        self.path.display().to_string()
+    }
+
+    fn elapsed(&self) -> Option<f64> {
+        Some(self.elapsed)
+    }
+}
+
+fn why(fault: MessagesFault) -> String {
+    match fault {
+        MessagesFault::Unreadable(why) => format!("cannot be read ({why})"),
+        MessagesFault::Malformed(why) => why,
+    }
+}
