@@ -75,7 +75,9 @@ pub enum VrError {
         why: String,
     },
     /// Nothing of what was watched could be shown.
-    #[error("{from}: said nothing that could be shown (scenes, frames, pictures and log lines of Foxglove's schemas are)")]
+    #[error(
+        "{from}: said nothing that could be shown (scenes, frames, pictures and log lines of Foxglove's schemas are)"
+    )]
     NothingToWatch {
         /// Address or file.
         from: String,
@@ -92,7 +94,9 @@ pub enum VrError {
         seconds: f64,
     },
     /// An option that belongs to another experiment.
-    #[error("--pigments: belongs to --experiment layers, and would be ignored here: leave it out, or choose that experiment")]
+    #[error(
+        "--pigments: belongs to --experiment layers, and would be ignored here: leave it out, or choose that experiment"
+    )]
     PigmentsUnused,
     /// The system gives no random numbers for a token.
     #[error("no random token from the operating system ({0}): only loopback can be served here")]

@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use mcap::Message;
 use foxglove::messages::{Pose, PoseInFrame, Timestamp};
+use mcap::Message;
 use paint_planner::Plan;
 use serde::{Deserialize, Serialize};
 

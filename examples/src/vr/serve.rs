@@ -124,7 +124,8 @@ impl Desk {
         self.shown = None;
         self.show(session);
         let saved = self.save(session, arguments, counts);
-        self.client.say(&ServerMessage::Notice { notice: Notice::Ended { folder: arguments.out.display().to_string() } });
+        self.client
+            .say(&ServerMessage::Notice { notice: Notice::Ended { folder: arguments.out.display().to_string() } });
         // Time for the last words to reach the page.
         std::thread::sleep(Duration::from_millis(200));
         saved

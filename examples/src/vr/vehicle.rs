@@ -24,8 +24,9 @@ const CONTINUE: f64 = 1.5;
 /// Motion of the nozzle that one shot stands for, m.
 const SHOT_STEP: f64 = 0.005;
 /// How far the vehicle may turn in a segment, and the pan that may be needed for it, rad, the first that serves all targets: none, which
-/// is a little more than half a bin of the planner's headings; a little; whatever it takes.
-const TURNS: [[f64; 2]; 3] = [[0.05, 0.5], [0.2, 0.7], [f64::INFINITY, f64::INFINITY]];
+/// is a little more than half a bin of the planner's headings; a little; whatever it takes. The pan joint ends at 1.57, and a turn costs
+/// more than the segment itself: nearly all of the joint is used before the vehicle turns.
+const TURNS: [[f64; 2]; 3] = [[0.05, 0.9], [0.2, 1.1], [f64::INFINITY, f64::INFINITY]];
 /// Way between the two targets of a place that is only flown to, m.
 const SIDESTEP: f64 = 0.005;
 
@@ -208,9 +209,7 @@ impl Vehicle {
             return Ok(None);
         }
         let earliest = now + PLANNING - flying.begin;
-        let env = |name: &str, or: f64| std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(or);
-        let (drift, gain) = (env("DRIFT", 0.0), env("GAIN", 1.0));
-        let heading = flying.plan.trajectory.sample(earliest).heading + (gain * self.state.pan).clamp(-drift, drift);
+        let heading = flying.plan.trajectory.sample(earliest).heading;
         let wall = MeshSurface(&world.surface.world);
         let continued = TURNS[..2].iter().find_map(|&turn| {
             let held = HeldHeading { robot: &world.robot, heading, turn };
@@ -249,11 +248,8 @@ impl Vehicle {
     fn plan(&self, targets: &[Target], world: &VrWorld, planner: &Settings) -> Result<Plan, paint_planner::Error> {
         let wall = MeshSurface(&world.surface.world);
         let mut planned = Err(paint_planner::Error::NothingReachable { count: targets.len() });
-        let env = |name: &str, or: f64| std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(or);
-        let (drift, gain) = (env("HDRIFT", 0.0), env("HGAIN", 1.0));
         for turn in TURNS {
-            let heading = self.state.heading + (gain * self.state.pan).clamp(-drift, drift);
-            let held = HeldHeading { robot: &world.robot, heading, turn };
+            let held = HeldHeading { robot: &world.robot, heading: self.state.heading, turn };
             planned = plan(targets, &wall, &held, planner);
             if planned.as_ref().is_ok_and(|plan| plan.report.served == targets.len()) {
                 break;

@@ -259,7 +259,10 @@ impl Show {
         )?;
         let lost = counts.malformed + counts.not_drawn;
         if lost > 0 {
-            eprintln!("{source}: {} messages or parts of them could not be read, {} are of kinds that are not drawn", counts.malformed, counts.not_drawn);
+            eprintln!(
+                "{source}: {} messages or parts of them could not be read, {} are of kinds that are not drawn",
+                counts.malformed, counts.not_drawn
+            );
         }
         // Time for the last words to reach the page.
         std::thread::sleep(Duration::from_millis(200));

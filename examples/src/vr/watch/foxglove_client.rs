@@ -7,6 +7,7 @@ use std::time::Duration;
 use serde::Deserialize;
 use serde_json::json;
 use tungstenite::client::IntoClientRequest as _;
+use tungstenite::error::ProtocolError;
 use tungstenite::http::HeaderValue;
 use tungstenite::protocol::WebSocketConfig;
 use tungstenite::{Message, WebSocket};
@@ -141,7 +142,14 @@ fn hear(mut socket: WebSocket<TcpStream>, said: &SyncSender<Heard>) -> Result<St
                 Ok(ServerText::Other) | Err(_) => None,
             },
             Ok(Message::Binary(bytes)) => message_of(&bytes, &channels).map(Heard::Message),
-            Ok(Message::Close(_)) | Err(tungstenite::Error::ConnectionClosed) => return Ok("the run is over".into()),
+            // Some programs end without a goodbye.
+            Ok(Message::Close(_))
+            | Err(
+                tungstenite::Error::ConnectionClosed
+                | tungstenite::Error::Protocol(ProtocolError::ResetWithoutClosingHandshake),
+            ) => {
+                return Ok("the run is over".into());
+            }
             Ok(_) => None,
             Err(error) => return Err(error),
         };

@@ -69,7 +69,11 @@ impl Feed for Recorded {
         // Schemas of Foxglove in another encoding are none that are read here.
         let protobuf = message.channel.message_encoding == "protobuf";
         let schema = if protobuf { schema_of(&message).to_owned() } else { String::new() };
-        Some(Heard::Message(FeedMessage { topic: message.channel.topic.clone(), schema, data: message.data.into_owned() }))
+        Some(Heard::Message(FeedMessage {
+            topic: message.channel.topic.clone(),
+            schema,
+            data: message.data.into_owned(),
+        }))
     }
 
     fn name(&self) -> String {

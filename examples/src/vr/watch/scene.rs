@@ -207,7 +207,12 @@ mod tests {
             translation: Some(Vector3 { x, y: 0.0, z: 0.0 }),
             rotation: Some(Quaternion { x: 0.0, y: 0.0, z: 1.0, w: 0.0 }),
         };
-        let transforms = vec![frame("world", "body", 1.0), frame("body", "nozzle", 0.25), frame("b", "a", 0.0), frame("a", "b", 0.0)];
+        let transforms = vec![
+            frame("world", "body", 1.0),
+            frame("body", "nozzle", 0.25),
+            frame("b", "a", 0.0),
+            frame("a", "b", 0.0),
+        ];
         let mut scene = Scene::default();
         scene.take(&message("/tf", TRANSFORMS, |data| FrameTransforms { transforms }.encode(data).unwrap()));
         let frames: Vec<(&str, f64)> = scene.frames().map(|(name, pose)| (name, pose.translation.x)).collect();

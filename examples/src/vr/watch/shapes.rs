@@ -112,11 +112,8 @@ fn segments(line: &LinePrimitive) -> Option<Part> {
         pairs.extend([*last, *first]);
     }
     let of = |k: &u32| *k as usize;
-    let part = part(
-        pairs.iter().map(|k| points[of(k)]).collect(),
-        pairs.iter().map(|k| colours[of(k)]).collect(),
-        Vec::new(),
-    );
+    let part =
+        part(pairs.iter().map(|k| points[of(k)]).collect(), pairs.iter().map(|k| colours[of(k)]).collect(), Vec::new());
     let thickness = if line.thickness.is_finite() { line.thickness.max(0.0) } else { return None };
     Some(Part { lines: true, thickness, pixels: line.scale_invariant, ..part })
 }
@@ -173,7 +170,12 @@ mod tests {
     }
 
     fn line(kind: i32) -> LinePrimitive {
-        LinePrimitive { r#type: kind, thickness: 0.1, points: (0..4).map(|k| at(f64::from(k))).collect(), ..LinePrimitive::default() }
+        LinePrimitive {
+            r#type: kind,
+            thickness: 0.1,
+            points: (0..4).map(|k| at(f64::from(k))).collect(),
+            ..LinePrimitive::default()
+        }
     }
 
     #[test]
@@ -197,7 +199,8 @@ mod tests {
 
     #[test]
     fn what_contradicts_itself_is_counted_and_left_out() {
-        let sound = TriangleListPrimitive { points: vec![at(0.0), at(1.0), at(2.0)], ..TriangleListPrimitive::default() };
+        let sound =
+            TriangleListPrimitive { points: vec![at(0.0), at(1.0), at(2.0)], ..TriangleListPrimitive::default() };
         let entity = SceneEntity {
             triangles: vec![
                 sound.clone(),

@@ -21,7 +21,8 @@ impl FromStr for WatchSource {
         }
         let bare = text.strip_prefix("ws://").map(|rest| rest.trim_end_matches('/'));
         let named = bare.unwrap_or(text);
-        let port = named.rsplit_once(':').filter(|(host, _)| !host.is_empty()).and_then(|(_, port)| port.parse::<u16>().ok());
+        let port =
+            named.rsplit_once(':').filter(|(host, _)| !host.is_empty()).and_then(|(_, port)| port.parse::<u16>().ok());
         match (bare, port) {
             (_, Some(_)) => Ok(Self::Address(named.into())),
             (Some(_), None) => Err("give host and port: ws://127.0.0.1:8765".into()),
