@@ -89,11 +89,16 @@ struct Show {
     begun: bool,
     paused: bool,
     place: Option<ServerMessage>,
-    /// What the page has not got yet; a slow one gets the latest of each.
+    missing: Missing,
+    shown: Option<Instant>,
+}
+
+/// What the page has not got yet; a slow one gets the latest of each.
+#[derive(Default)]
+struct Missing {
     things: BTreeSet<String>,
     frames: bool,
     picture: bool,
-    shown: Option<Instant>,
 }
 
 impl Show {
@@ -106,9 +111,7 @@ impl Show {
             begun: false,
             paused: false,
             place: None,
-            things: BTreeSet::new(),
-            frames: false,
-            picture: false,
+            missing: Missing::default(),
             shown: None,
         }
     }
@@ -125,8 +128,7 @@ impl Show {
                 if let Some(place) = &self.place {
                     self.client.say(place);
                 }
-                self.things.extend(self.scene.keys().cloned());
-                (self.frames, self.picture) = (true, true);
+                self.missing = Missing { things: self.scene.keys().cloned().collect(), frames: true, picture: true };
             }
             Inbound::Events { connection, events } if self.client.is(connection) => {
                 let ended = events.iter().any(|event| self.handle(event));
@@ -187,10 +189,10 @@ impl Show {
     fn changed(&mut self, change: Change) {
         match change {
             Change::Entity(key) => {
-                self.things.insert(key);
+                self.missing.things.insert(key);
             }
-            Change::Frames => self.frames = true,
-            Change::Picture => self.picture = true,
+            Change::Frames => self.missing.frames = true,
+            Change::Picture => self.missing.picture = true,
             Change::Text(text) => self.say(text),
         }
     }
@@ -217,22 +219,22 @@ impl Show {
     }
 
     fn send(&mut self) {
-        while let Some(key) = self.things.pop_first() {
+        while let Some(key) = self.missing.things.pop_first() {
             if !self.client.send(Outgoing::Binary(self.scene.entity(&key))) {
-                self.things.insert(key);
+                self.missing.things.insert(key);
                 return;
             }
         }
-        if std::mem::take(&mut self.frames) {
+        if std::mem::take(&mut self.missing.frames) {
             let pose = |(name, pose): (&str, nalgebra::Isometry3<f64>)| {
                 let q = pose.rotation.coords;
                 Frame { name: name.into(), position: pose.translation.vector.into(), rotation: [q.x, q.y, q.z, q.w] }
             };
             let frames = self.scene.frames().map(pose).collect();
-            self.frames = !self.client.say(&ServerMessage::Frames { frames });
+            self.missing.frames = !self.client.say(&ServerMessage::Frames { frames });
         }
-        if std::mem::take(&mut self.picture) && !self.scene.picture().is_empty() {
-            self.picture = !self.client.send(Outgoing::Binary(self.scene.picture().to_vec()));
+        if std::mem::take(&mut self.missing.picture) && !self.scene.picture().is_empty() {
+            self.missing.picture = !self.client.send(Outgoing::Binary(self.scene.picture().to_vec()));
         }
     }
 
