@@ -22,6 +22,8 @@ async function open(browser, server) {
   });
   await page.goto(server.address);
   await page.waitForFunction(() => window.paintcopter?.watch() && document.getElementById("dot").classList.contains("on"));
+  // What is said comes and goes before the scene, and its pixels are not the scene's.
+  await page.evaluate(() => (document.getElementById("notice").style.visibility = "hidden"));
   return page;
 }
 
@@ -79,13 +81,14 @@ async function mission(browser) {
   // The robot flies at the speed at which it flew, and stands still in a pause.
   await page.waitForTimeout(2000);
   await page.keyboard.press("p");
-  await page.waitForTimeout(400);
+  await page.waitForTimeout(1000);
   const [held, before] = [await shot(page, CLIP), await counts(page)];
   const flown = await changed(page, bare, held);
   assert.ok(flown > 200, `the robot moves: ${flown} pixels changed`);
   await page.waitForTimeout(1200);
   assert.deepEqual(await counts(page), before, "nothing comes in a pause");
-  assert.ok((await changed(page, held, await shot(page, CLIP))) < 20, "nothing moves in a pause");
+  const moved = await changed(page, held, await shot(page, CLIP));
+  assert.ok(moved < 20, `nothing moves in a pause: ${moved} pixels changed`);
   const clock = () => page.evaluate(() => parseFloat(document.getElementById("played").textContent));
   await page.keyboard.press("p");
   await page.waitForTimeout(500);

@@ -35,7 +35,7 @@ impl Recorded {
         Ok(Self { path: path.into(), messages: Some(Box::new(messages)), next, first, elapsed: 0.0, looked: None })
     }
 
-    /// Reads the message after the one that is taken.
+    /// Reads the message after the one that is taken; how the recording ends where there is none.
     fn advance(&mut self) -> Option<String> {
         match self.messages.as_mut()?.next() {
             Some(Ok(message)) => self.next = Some(message),
@@ -58,9 +58,12 @@ impl Feed for Recorded {
         if playing && self.messages.is_some() {
             self.elapsed += before.map_or(0.0, |before| (now - before).as_secs_f64());
         }
-        let Some(message) = &self.next else {
-            return self.advance().map(Heard::Over);
-        };
+        if self.next.is_none()
+            && let Some(end) = self.advance()
+        {
+            return Some(Heard::Over(end));
+        }
+        let message = self.next.as_ref()?;
         let at = message.log_time.saturating_sub(self.first.unwrap_or(0)) as f64 * 1e-9;
         if !playing || at > self.elapsed {
             return None;
@@ -89,5 +92,38 @@ fn why(fault: MessagesFault) -> String {
     match fault {
         MessagesFault::Unreadable(why) => format!("cannot be read ({why})"),
         MessagesFault::Malformed(why) => why,
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::super::feed::LOG;
+    use super::*;
+    use crate::recording::{Recorder, log_message};
+
+    #[test]
+    fn all_that_is_due_comes_at_once_and_nothing_in_a_pause() {
+        let path = std::env::temp_dir().join(format!("paintcopter-watched-{}.mcap", std::process::id()));
+        let mut recorder = Recorder::create(&path).unwrap();
+        let channel = recorder.channel::<foxglove::messages::Log>("/log").unwrap();
+        // Four at the beginning, one an hour later.
+        for time in [5.0, 5.0, 5.0, 5.0, 3605.0] {
+            recorder.write(channel, time, &log_message(time, "said")).unwrap();
+        }
+        recorder.finish().unwrap();
+        let mut recorded = Recorded::open(&path).unwrap();
+        assert!(recorded.take(false).is_none());
+        for _ in 0..4 {
+            let Some(Heard::Message(message)) = recorded.take(true) else { panic!("it is due") };
+            assert_eq!((message.topic.as_str(), message.schema.as_str()), ("/log", LOG));
+        }
+        assert!(recorded.take(true).is_none());
+        recorded.elapsed = 3600.0;
+        assert!(recorded.take(false).is_none());
+        assert!(matches!(recorded.take(true), Some(Heard::Message(_))));
+        assert!(matches!(recorded.take(true), Some(Heard::Over(_))));
+        assert!(recorded.take(true).is_none());
+        std::fs::remove_file(&path).unwrap();
     }
 }
