@@ -145,7 +145,7 @@ impl Recorder {
         Ok(Self { writer: options.create(BufWriter::new(file)).map_err(failed)?, sequence: 0 })
     }
 
-    pub(crate) fn finish(mut self) -> Result<(), RecordingError> {
+    pub(crate) fn finish(&mut self) -> Result<(), RecordingError> {
         self.writer.finish().map(|_| ()).map_err(failed)
     }
 
@@ -169,22 +169,26 @@ impl Recorder {
         time: f64,
         message: &impl serde::Serialize,
     ) -> Result<(), RecordingError> {
-        self.write_bytes(channel_id, time, &serde_json::to_vec(message).map_err(failed)?)
+        self.write_bytes(channel_id, nanoseconds(time), &serde_json::to_vec(message).map_err(failed)?)
     }
 
     pub(crate) fn write<T: Encode>(&mut self, channel_id: u16, time: f64, message: &T) -> Result<(), RecordingError> {
         let mut data = Vec::with_capacity(message.encoded_len().unwrap_or(256));
         message.encode(&mut data).map_err(failed)?;
-        self.write_bytes(channel_id, time, &data)
+        self.write_bytes(channel_id, nanoseconds(time), &data)
     }
 
-    fn write_bytes(&mut self, channel_id: u16, time: f64, data: &[u8]) -> Result<(), RecordingError> {
-        let log_time = (time.max(0.0) * 1e9).round() as u64;
+    /// A message that is encoded already, `log_time` in nanoseconds.
+    pub(crate) fn write_bytes(&mut self, channel_id: u16, log_time: u64, data: &[u8]) -> Result<(), RecordingError> {
         self.sequence += 1;
         let header =
             mcap::records::MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time: log_time };
         self.writer.write_to_known_channel(&header, data).map_err(failed)
     }
+}
+
+fn nanoseconds(time: f64) -> u64 {
+    (time.max(0.0) * 1e9).round() as u64
 }
 
 fn failed(error: impl std::fmt::Display) -> RecordingError {

@@ -6,6 +6,7 @@
 
 mod arguments;
 mod canvas;
+mod client;
 mod connection;
 mod counters;
 mod error;
@@ -15,6 +16,7 @@ mod figures;
 mod front_door;
 mod hand;
 mod layers;
+mod listener;
 mod message;
 mod mission_export;
 mod output;
@@ -28,6 +30,7 @@ mod serve;
 mod session;
 mod settings;
 mod vehicle;
+mod watch;
 mod web_files;
 mod world;
 

@@ -7,6 +7,7 @@ use clap::{Parser, ValueEnum};
 
 use super::hand::Way;
 use super::settings::{Timing, VrSettings};
+use super::watch::WatchSource;
 use crate::mesh_placement::UpAxis;
 
 /// Serves a page on which a person paints a surface by hand, in a headset or with mouse, keyboard or touch; the simulated robot
@@ -14,7 +15,7 @@ use crate::mesh_placement::UpAxis;
 #[derive(Debug, Clone, Parser)]
 #[command(
     version,
-    after_help = "Examples:\n  vr\n  vr --mesh bust.obj --offline --out out/bust\n  vr --listen 0.0.0.0:8090\n  vr --replay out/vr/session.mcap --out out/again"
+    after_help = "Examples:\n  vr\n  vr --mesh bust.obj --offline --out out/bust\n  vr --listen 0.0.0.0:8090\n  vr --watch 127.0.0.1:8765\n  vr --watch out/paintcopter/mission.mcap\n  vr --replay out/vr/session.mcap --out out/again"
 )]
 pub struct Arguments {
     /// Surface to paint, OBJ, PLY or OFF; the built-in rock wall if not given
@@ -50,6 +51,9 @@ pub struct Arguments {
     /// Paint a recorded session again, serve nothing, and check that the plans are the same
     #[arg(long, value_name = "FILE")]
     pub(super) replay: Option<PathBuf>,
+    /// Show on the page what others do: host and port of a running `scan --live`, or a recording (mission.mcap of `paintcopter`, scan.mcap)
+    #[arg(long, value_name = "ADDRESS|FILE", conflicts_with_all = ["mesh", "map", "offline", "replay", "experiment"])]
+    pub(super) watch: Option<WatchSource>,
     /// Serve nothing, make an experiment of the VR paper: a simulated hand paints, or layers of paint are compared
     #[arg(long, conflicts_with = "replay")]
     pub(super) experiment: Option<Experiment>,

@@ -66,6 +66,38 @@ pub enum VrError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// What shall be watched does not answer.
+    #[error("{address}: {why}: is `scan --live {address}` running there?")]
+    Watch {
+        /// Host and port.
+        address: String,
+        /// What is wrong.
+        why: String,
+    },
+    /// Nothing of what was watched could be shown.
+    #[error(
+        "{from}: said nothing that could be shown (scenes, frames, pictures and log lines of Foxglove's schemas are)"
+    )]
+    NothingToWatch {
+        /// Address or file.
+        from: String,
+    },
+    /// The robot did not follow the hand.
+    #[error(
+        "the robot never caught up: it was {lag:.1} m behind when the hand stopped, and flew on for {seconds:.0} s; paint slower, wait for it, \
+         or choose a surface that it can stay before; the results are written all the same"
+    )]
+    NeverCaughtUp {
+        /// Latency in distance at the last state, m.
+        lag: f64,
+        /// Time that the robot flew on, s.
+        seconds: f64,
+    },
+    /// An option that belongs to another experiment.
+    #[error(
+        "--pigments: belongs to --experiment layers, and would be ignored here: leave it out, or choose that experiment"
+    )]
+    PigmentsUnused,
     /// The system gives no random numbers for a token.
     #[error("no random token from the operating system ({0}): only loopback can be served here")]
     Token(getrandom::Error),

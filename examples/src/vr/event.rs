@@ -13,6 +13,11 @@ pub enum Command {
         /// Whether it does.
         on: bool,
     },
+    /// What the hand does is left out of the session until it goes on; the robot finishes what it has and hovers.
+    Pause {
+        /// Whether it is.
+        on: bool,
+    },
     /// Take the last stroke back that is not flown yet.
     Undo,
     /// Take back what is painted within a radius and not flown yet.
@@ -24,7 +29,7 @@ pub enum Command {
     },
     /// Fly what was painted while the robot did not follow.
     Fly,
-    /// Write the results and go on.
+    /// Write recording and results so far, and go on.
     Save,
     /// Write the results and end.
     End,

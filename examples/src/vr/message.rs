@@ -14,6 +14,11 @@ pub enum Notice {
         /// The line.
         text: String,
     },
+    /// Recording and results so far are written.
+    Saved {
+        /// The recording.
+        path: String,
+    },
     /// The session is over; the results are written.
     Ended {
         /// Where.

@@ -24,6 +24,9 @@ const VIEW: (u32, u32) = (900, 560);
 const ANGLE: f64 = 0.9;
 /// A robot that could fly less than this share of what was painted is no result.
 const LEAST_FLOWN: f64 = 0.5;
+/// A robot that is farther behind than this when the hand stops, m, and needs longer than this for it, s, has not followed.
+const LOST: f64 = 1.0;
+const LOST_TIME: f64 = 30.0;
 
 /// Writes pictures, mission and report; the report last.
 pub(super) fn save(session: &Session, traffic: &Traffic, folder: &Path) -> Result<(), VrError> {
@@ -56,7 +59,10 @@ pub(super) fn save(session: &Session, traffic: &Traffic, folder: &Path) -> Resul
         let advice = "paint where the robot can stand before the surface, or choose another mesh";
         return Err(VrError::Unreachable { share: flown, advice });
     }
-    Ok(())
+    match session.behind() {
+        Some([lag, seconds]) if lag > LOST && seconds > LOST_TIME => Err(VrError::NeverCaughtUp { lag, seconds }),
+        _ => Ok(()),
+    }
 }
 
 /// Latency in time and in distance over the session's time (VR paper, Fig. 6).

@@ -9,7 +9,7 @@ use super::session::Session;
 use super::world::VrWorld;
 
 /// Version of everything below; the page reloads itself where it differs.
-pub(super) const PROTOCOL: u32 = 1;
+pub(super) const PROTOCOL: u32 = 2;
 
 /// From the page.
 #[derive(Debug, Deserialize)]
@@ -35,6 +35,7 @@ pub(super) enum ServerMessage {
         atlas: [usize; 2],
         palette: Vec<Paint>,
         live: bool,
+        paused: bool,
         cradle: [f64; 3],
         heading: f64,
         /// Distance from which painting is refused, m.
@@ -42,6 +43,20 @@ pub(super) enum ServerMessage {
         /// Nearest and farthest stand-off that the brush size stands for, m.
         stand_off: [f64; 2],
     },
+    /// The first message where nobody paints, but a run or a recording is watched.
+    Watching { protocol: u32, key: String, next_sequence: u64, name: String, paused: bool },
+    /// Where the watched scene lies on the page, and from where it is looked at.
+    Place {
+        position: [f64; 3],
+        /// x y z w.
+        rotation: [f64; 4],
+        cradle: [f64; 3],
+        heading: f64,
+    },
+    /// Where the frames of the watched scene are.
+    Frames { frames: Vec<Frame> },
+    /// How far a recording is played, s; none of a run.
+    Playback { elapsed: Option<f64>, paused: bool },
     /// All events before this one are part of the session.
     Ack { next_sequence: u64 },
     /// The robot and the latencies.
@@ -58,9 +73,19 @@ pub(super) enum ServerMessage {
         latency: f64,
         waiting: bool,
         live: bool,
+        paused: bool,
     },
     /// For the person.
     Notice { notice: Notice },
+}
+
+/// A frame in the watched scene.
+#[derive(Debug, Serialize)]
+pub(super) struct Frame {
+    pub(super) name: String,
+    pub(super) position: [f64; 3],
+    /// x y z w.
+    pub(super) rotation: [f64; 4],
 }
 
 /// A paint on the palette.
@@ -82,6 +107,7 @@ pub(super) fn welcome(session: &Session, key: &str) -> ServerMessage {
         atlas: [world.surface.width(), world.surface.height()],
         palette: world.palette.iter().map(|entry| Paint { name: entry.name, srgb: entry.srgb }).collect(),
         live: session.is_live(),
+        paused: session.is_paused(),
         cradle: world.stand.coords.into(),
         heading: world.home.heading,
         far: session.settings().session.far,
@@ -104,6 +130,7 @@ pub(super) fn robot(session: &Session) -> ServerMessage {
         latency: session.curves().time.last().map_or(0.0, |(_, latency)| *latency),
         waiting: session.is_waiting(),
         live: session.is_live(),
+        paused: session.is_paused(),
     }
 }
 

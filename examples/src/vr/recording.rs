@@ -5,6 +5,7 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use foxglove::messages::{Pose, PoseInFrame, Timestamp};
+use mcap::Message;
 use paint_planner::Plan;
 use serde::{Deserialize, Serialize};
 
@@ -17,9 +18,12 @@ use crate::recording::{Recorder, quaternion, vector};
 
 /// Name of the recording in the folder of the results.
 pub(super) const RECORDING: &str = "session.mcap";
+/// Its name as long as it is not whole.
+const PART: &str = "session.mcap.part";
 const SETTINGS_TOPIC: &str = "/vr/settings";
 const EVENT_TOPIC: &str = "/vr/event";
 const PLAN_TOPIC: &str = "/vr/plan";
+const VEHICLE_TOPIC: &str = "/vehicle/pose";
 /// The schemas say no more than that these are objects: the types are documented in the book.
 const SCHEMA: &str = r#"{"type":"object"}"#;
 
@@ -62,12 +66,45 @@ fn plan_hash(plan: &Plan) -> u64 {
     hash
 }
 
-/// Writes a session as it goes.
-pub struct SessionRecorder {
+/// A recording and its channels.
+struct Tape {
     recorder: Recorder,
+    settings: u16,
     events: u16,
     plans: u16,
     vehicle: u16,
+}
+
+impl Tape {
+    fn create(path: &Path) -> Result<Self, VrError> {
+        let mut recorder = Recorder::create(path)?;
+        let settings = recorder.json_channel(SETTINGS_TOPIC, "paintcopter.VrSettings", SCHEMA)?;
+        let events = recorder.json_channel(EVENT_TOPIC, "paintcopter.VrEvent", SCHEMA)?;
+        let plans = recorder.json_channel(PLAN_TOPIC, "paintcopter.VrPlan", SCHEMA)?;
+        let vehicle = recorder.channel::<PoseInFrame>(VEHICLE_TOPIC)?;
+        Ok(Self { recorder, settings, events, plans, vehicle })
+    }
+
+    /// Everything of another recording, as it is.
+    fn copy(&mut self, path: &Path) -> Result<(), VrError> {
+        for_each_message(path, |message| {
+            let channel = match message.channel.topic.as_str() {
+                SETTINGS_TOPIC => self.settings,
+                EVENT_TOPIC => self.events,
+                PLAN_TOPIC => self.plans,
+                _ => self.vehicle,
+            };
+            Ok(self.recorder.write_bytes(channel, message.log_time, &message.data)?)
+        })
+    }
+}
+
+/// Writes a session as it goes, beside its final name: what has that name is whole.
+pub struct SessionRecorder {
+    tape: Tape,
+    /// The recording when it is whole, and while it is not.
+    path: PathBuf,
+    part: PathBuf,
     /// The plans as a table.
     table: BufWriter<File>,
     table_path: PathBuf,
@@ -79,26 +116,38 @@ impl SessionRecorder {
     /// # Errors
     /// Files that cannot be written.
     pub fn create(folder: &Path, settings: &VrSettings) -> Result<Self, VrError> {
-        let mut recorder = Recorder::create(&folder.join(RECORDING))?;
+        let (path, part) = (folder.join(RECORDING), folder.join(PART));
+        let mut tape = Tape::create(&part)?;
         let table_path = folder.join("plan.csv");
         let mut table = File::create(&table_path).map(BufWriter::new).map_err(VrError::unwritable(&table_path))?;
         writeln!(table, "task,kind,time_s,x_m,y_m,z_m,heading_rad,pan_rad,tilt_rad,target")
             .map_err(VrError::unwritable(&table_path))?;
-        let first = recorder.json_channel(SETTINGS_TOPIC, "paintcopter.VrSettings", SCHEMA)?;
-        let events = recorder.json_channel(EVENT_TOPIC, "paintcopter.VrEvent", SCHEMA)?;
-        let plans = recorder.json_channel(PLAN_TOPIC, "paintcopter.VrPlan", SCHEMA)?;
-        let vehicle = recorder.channel::<PoseInFrame>("/vehicle/pose")?;
-        recorder.write_json(first, 0.0, settings)?;
-        Ok(Self { recorder, events, plans, vehicle, table, table_path })
+        tape.recorder.write_json(tape.settings, 0.0, settings)?;
+        Ok(Self { tape, path, part, table, table_path })
+    }
+
+    /// Makes what is recorded so far a whole file, and goes on in another that begins with the same: a finished MCAP file has its index
+    /// at its end. Its path.
+    pub(super) fn save(&mut self) -> Result<PathBuf, VrError> {
+        self.close()?;
+        self.tape = Tape::create(&self.part)?;
+        self.tape.copy(&self.path)?;
+        Ok(self.path.clone())
+    }
+
+    fn close(&mut self) -> Result<(), VrError> {
+        self.table.flush().map_err(VrError::unwritable(&self.table_path))?;
+        self.tape.recorder.finish()?;
+        std::fs::rename(&self.part, &self.path).map_err(VrError::unwritable(&self.path))
     }
 
     pub(super) fn event(&mut self, time: f64, event: &Event) -> Result<(), VrError> {
-        Ok(self.recorder.write_json(self.events, time, event)?)
+        Ok(self.tape.recorder.write_json(self.tape.events, time, event)?)
     }
 
     pub(super) fn plan(&mut self, planned: &PlannedTask, mark: &PlanMark) -> Result<(), VrError> {
         self.write_table(planned).map_err(VrError::unwritable(&self.table_path))?;
-        Ok(self.recorder.write_json(self.plans, planned.time, mark)?)
+        Ok(self.tape.recorder.write_json(self.tape.plans, planned.time, mark)?)
     }
 
     /// The waypoints of a plan as rows; numbers have the digits that tell them apart.
@@ -119,12 +168,11 @@ impl SessionRecorder {
         let pose = Some(Pose { position: Some(vector(body)), orientation: Some(quaternion(body)) });
         let timestamp = Some(Timestamp::saturating_from_epoch_secs_f64(time));
         let message = PoseInFrame { timestamp, frame_id: "world".into(), pose };
-        Ok(self.recorder.write(self.vehicle, time, &message)?)
+        Ok(self.tape.recorder.write(self.tape.vehicle, time, &message)?)
     }
 
     pub(super) fn finish(mut self) -> Result<(), VrError> {
-        self.table.flush().map_err(VrError::unwritable(&self.table_path))?;
-        Ok(self.recorder.finish()?)
+        self.close()
     }
 }
 
@@ -138,7 +186,8 @@ impl RecordedSession {
     /// Reads settings and plans; the events are streamed by [`for_each_event`].
     pub(super) fn open(path: &Path) -> Result<Self, VrError> {
         let (mut settings, mut plans) = (None, Vec::new());
-        for_each_message(path, |topic, data| {
+        for_each_message(path, |message| {
+            let (topic, data) = (message.channel.topic.as_str(), &message.data[..]);
             match topic {
                 SETTINGS_TOPIC => settings = Some(parsed(path, topic, data)?),
                 PLAN_TOPIC => plans.push(parsed(path, topic, data)?),
@@ -155,17 +204,19 @@ impl RecordedSession {
 
 /// Hands out the events of a recording in their order; memory does not grow with the file.
 pub(super) fn for_each_event(path: &Path, mut take: impl FnMut(Event) -> Result<(), VrError>) -> Result<(), VrError> {
-    for_each_message(path, |topic, data| if topic == EVENT_TOPIC { take(parsed(path, topic, data)?) } else { Ok(()) })
+    for_each_message(path, |message| match message.channel.topic.as_str() {
+        topic @ EVENT_TOPIC => take(parsed(path, topic, &message.data)?),
+        _ => Ok(()),
+    })
 }
 
-fn for_each_message(path: &Path, mut take: impl FnMut(&str, &[u8]) -> Result<(), VrError>) -> Result<(), VrError> {
+fn for_each_message(path: &Path, mut take: impl FnMut(&Message) -> Result<(), VrError>) -> Result<(), VrError> {
     let fault = |fault: MessagesFault| match fault {
         MessagesFault::Unreadable(why) => VrError::recording(path, format!("cannot be read ({why})")),
         MessagesFault::Malformed(why) => VrError::recording(path, why),
     };
     for message in messages_of(path).map_err(fault)? {
-        let message = message.map_err(fault)?;
-        take(&message.channel.topic, &message.data)?;
+        take(&message.map_err(fault)?)?;
     }
     Ok(())
 }

@@ -14,6 +14,7 @@ use super::recording::{RECORDING, RecordedSession, SessionRecorder, for_each_eve
 use super::serve::serve;
 use super::session::{Handled, Session};
 use super::settings::VrSettings;
+use super::watch::watch;
 use super::world::VrWorld;
 use crate::progress::Stage;
 
@@ -26,6 +27,12 @@ pub fn run(arguments: &Arguments) -> Result<(), VrError> {
     std::fs::create_dir_all(folder).map_err(VrError::unwritable(folder))?;
     if let Some(path) = &arguments.replay {
         return replay(path, folder);
+    }
+    if arguments.pigments.is_some() && arguments.experiment != Some(Experiment::Layers) {
+        return Err(VrError::PigmentsUnused);
+    }
+    if let Some(source) = &arguments.watch {
+        return watch(source, arguments);
     }
     if let (Some(Experiment::Layers), Some(pigments)) = (arguments.experiment, &arguments.pigments) {
         return save_layers(pigments, folder);

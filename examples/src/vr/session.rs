@@ -1,6 +1,7 @@
 //! A session without a network: events in, paint, plans and notices out. It knows no clock but that of the events.
 
 use std::collections::VecDeque;
+use std::path::PathBuf;
 
 use nalgebra::Point3;
 use nalgebra::UnitVector3;
@@ -64,6 +65,8 @@ pub struct Session {
     vehicle: Vehicle,
     lag: LagIndicator,
     live: bool,
+    /// The latest tick before a pause: all that the recording knows of the hand until it ends.
+    paused: Option<VrState>,
     /// Paint as the person sees it, and as the robot has sprayed it.
     seen: Canvas,
     flown: Canvas,
@@ -79,6 +82,8 @@ pub struct Session {
     too_far: bool,
     notices: Vec<Notice>,
     curves: LatencyCurves,
+    /// Once it is finished: how far the robot was behind at the last state, m, and how long it flew on, s.
+    behind: Option<[f64; 2]>,
     plans: Vec<PlanMark>,
     counts: SessionCounts,
     recorder: Option<SessionRecorder>,
@@ -96,6 +101,7 @@ impl Session {
             vehicle: Vehicle::new(&world),
             lag: LagIndicator::default(),
             live: settings.live,
+            paused: None,
             seen: Canvas::new(&world)?,
             flown: Canvas::new(&world)?,
             strokes: Vec::new(),
@@ -107,6 +113,7 @@ impl Session {
             too_far: false,
             notices: Vec::new(),
             curves: LatencyCurves::default(),
+            behind: None,
             plans: Vec::new(),
             counts: SessionCounts::default(),
             recorder,
@@ -135,6 +142,7 @@ impl Session {
             return Ok(Handled::Refused);
         }
         self.counts.events += 1;
+        let event = &self.without_hand(event);
         let time = self.time();
         if let Some(recorder) = &mut self.recorder {
             recorder.event(time, event)?;
@@ -144,6 +152,17 @@ impl Session {
             Event::Command { command, .. } => return self.command(*command),
         }
         Ok(Handled::Done)
+    }
+
+    /// While the session is paused a state is only the clock: the hand rests where it was.
+    fn without_hand(&self, event: &Event) -> Event {
+        match (event, &self.paused) {
+            (Event::State(state), Some(held)) => {
+                let (nozzle, cradle) = (held.nozzle, held.cradle);
+                Event::State(VrState { mode: VrMode::Idle, hit: None, nozzle, cradle, ..*state })
+            }
+            _ => *event,
+        }
     }
 
     /// Sequence number of the event that is expected next.
@@ -168,19 +187,28 @@ impl Session {
     pub fn finish(&mut self) -> Result<(), VrError> {
         let Some(last) = self.last_tick else { return Ok(()) };
         self.fly_strokes();
-        let end = last.time + LONGEST_FINISH;
+        let (lag, end) = (self.lag(), last.time + LONGEST_FINISH);
         let mut tick = VrState { mode: VrMode::Idle, hit: None, ..last };
         while !(self.queue.is_empty() && self.tasks.is_empty() && self.vehicle.is_free()) && tick.time < end {
             tick.sequence += 1;
             tick.time = tick.sequence as f64 / RATE;
             self.tick(tick)?;
         }
+        self.behind = Some([if self.live { lag } else { 0.0 }, self.time() - last.time]);
         if let Some(recorder) = self.recorder.take() {
             recorder.finish()?;
         }
         // The pictures show what has been flown now.
         self.take_patches();
         Ok(())
+    }
+
+    /// Makes the recording so far a whole file, and goes on recording; its path, where there is a recording.
+    ///
+    /// # Errors
+    /// Files that cannot be written.
+    pub(super) fn save_recording(&mut self) -> Result<Option<PathBuf>, VrError> {
+        self.recorder.as_mut().map(SessionRecorder::save).transpose()
     }
 
     /// What the person is to be told since the last call.
@@ -215,6 +243,10 @@ impl Session {
         self.live
     }
 
+    pub(super) fn is_paused(&self) -> bool {
+        self.paused.is_some()
+    }
+
     pub(super) fn is_waiting(&self) -> bool {
         self.queue.is_waiting()
     }
@@ -222,6 +254,12 @@ impl Session {
     /// Latency in distance now, m.
     pub(super) fn lag(&self) -> f64 {
         (self.queue.painted_length() - self.vehicle.painted_length()).max(0.0)
+    }
+
+    /// How far the robot was behind at the last state, m (0 where it does not follow), and how long it flew on after it, s; `None` before
+    /// [`Session::finish`].
+    pub(super) fn behind(&self) -> Option<[f64; 2]> {
+        self.behind
     }
 
     /// Latencies so far.
@@ -370,6 +408,7 @@ impl Session {
     fn command(&mut self, command: Command) -> Result<Handled, VrError> {
         match command {
             Command::Live { on } => self.live = on,
+            Command::Pause { on } => self.pause(on),
             Command::Undo => self.undo()?,
             Command::Erase { point, radius } => self.erase(&point, radius)?,
             Command::Fly => self.fly_strokes(),
@@ -377,6 +416,11 @@ impl Session {
             Command::End => return Ok(Handled::Results { end: true }),
         }
         Ok(Handled::Done)
+    }
+
+    fn pause(&mut self, on: bool) {
+        // Before the first state there is no hand to hold still, and nothing to leave out.
+        self.paused = self.last_tick.filter(|_| on);
     }
 
     /// The last stroke, from its press to its release.

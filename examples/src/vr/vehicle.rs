@@ -24,8 +24,9 @@ const CONTINUE: f64 = 1.5;
 /// Motion of the nozzle that one shot stands for, m.
 const SHOT_STEP: f64 = 0.005;
 /// How far the vehicle may turn in a segment, and the pan that may be needed for it, rad, the first that serves all targets: none, which
-/// is a little more than half a bin of the planner's headings; a little; whatever it takes.
-const TURNS: [[f64; 2]; 3] = [[0.05, 0.5], [0.2, 0.7], [f64::INFINITY, f64::INFINITY]];
+/// is a little more than half a bin of the planner's headings; a little; whatever it takes. The pan joint ends at 1.57, and a turn costs
+/// more than the segment itself: 0.9 of it are used before the vehicle turns at all, and 1.1 before it turns far.
+const TURNS: [[f64; 2]; 3] = [[0.05, 0.9], [0.2, 1.1], [f64::INFINITY, f64::INFINITY]];
 /// Way between the two targets of a place that is only flown to, m.
 const SIDESTEP: f64 = 0.005;
 

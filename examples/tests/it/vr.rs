@@ -369,3 +369,23 @@ fn a_hand_that_meets_no_surface_is_no_result() {
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.code() == Some(1) && text.contains("met no surface") && text.contains("--scale"), "{text}");
 }
+
+#[test]
+fn options_that_would_be_ignored_and_sources_that_say_nothing_are_refused() {
+    let s = Scratch::new("vr-refused");
+    s.write("none.mcap", "no recording");
+    let out = s.path("out");
+    let refused = |arguments: &[&str], word: &str| {
+        let arguments: Vec<&str> = arguments.iter().copied().chain(["--out", &out]).collect();
+        let output = vr(&arguments);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code().is_some_and(|code| code != 0) && text.contains(word), "{arguments:?}: {text}");
+    };
+    refused(&["--experiment", "contour", "--pigments", &out], "--experiment layers");
+    refused(&["--watch", &s.path("none.mcap")], "none.mcap");
+    refused(&["--watch", &s.path("missing.mcap")], "missing.mcap");
+    // Nobody listens on a port that was free a moment ago.
+    let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    refused(&["--watch", &free], "scan --live");
+    refused(&["--watch", "wss://127.0.0.1:1"], "ws://");
+}

@@ -76,7 +76,7 @@ export class Connection {
   }
 
   private take(message: ServerMessage): void {
-    if (message.type === "welcome") {
+    if (message.type === "welcome" || message.type === "watching") {
       // A page that is new goes on where the session is; one that comes back drops what has arrived.
       if (this.key === "") this.next = message.next_sequence;
       else if (this.key !== message.key) location.reload();

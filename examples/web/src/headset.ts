@@ -9,10 +9,21 @@ const SQUEEZE = 1;
 const TOUCHPAD = 2;
 const THUMBSTICK = 3;
 
+// Where the browser keeps which button paints.
+const KEPT = "paintcopter.paint-button";
+
+function kept(): string | null {
+  try {
+    return localStorage.getItem(KEPT);
+  } catch {
+    return null;
+  }
+}
+
 export class Headset {
   mode: Mode = "idle";
   /** As in the paper, the touchpad paints and the trigger views; swapped, the other way round. */
-  swapped = false;
+  swapped = kept() === "trigger";
   readonly origin = new THREE.Vector3();
   readonly direction = new THREE.Vector3();
   private readonly renderer: THREE.WebGLRenderer;
@@ -32,6 +43,16 @@ export class Headset {
       cradle.group.add(hand);
       return hand;
     });
+  }
+
+  /** Lets the other button paint, now and whenever this browser comes back. */
+  swap(): void {
+    this.swapped = !this.swapped;
+    try {
+      localStorage.setItem(KEPT, this.swapped ? "trigger" : "touchpad");
+    } catch {
+      // A browser that keeps nothing: the choice holds as long as the page.
+    }
   }
 
   get presenting(): boolean {

@@ -7,12 +7,13 @@ import { Cradle } from "./cradle";
 import { Gun } from "./gun";
 import { Headset } from "./headset";
 import { Pointer } from "./pointer";
-import { PROTOCOL, STATE_VERSION, readPatch, readSurface } from "./protocol";
-import type { Mode, Notice, ServerMessage } from "./protocol";
+import { PROTOCOL, STATE_VERSION, readEntity, readPatch, readPicture, readSurface } from "./protocol";
+import type { Mode, Notice, ServerMessage, Triple } from "./protocol";
 import { Quality, drawsInSoftware } from "./quality";
 import { Robot } from "./robot";
 import { Tools } from "./tools";
 import { Wall } from "./wall";
+import { Watch } from "./watch";
 
 // Time without a movement after which a pointer rests, milliseconds.
 const STILL = 60;
@@ -56,6 +57,7 @@ const caster = new THREE.Raycaster();
 
 let atlas: Atlas | null = null;
 let wall: Wall | null = null;
+let watch: Watch | null = null;
 let placed = false;
 // When the hand painted what is not on the screen yet, whether its paint has come, and how long it took, milliseconds.
 let sprayed = 0;
@@ -71,8 +73,11 @@ const tools = new Tools((name, on) => {
     case "flown":
       if (wall) wall.flown = on;
       return;
+    case "record":
+    case "pause":
+      return pause((name === "pause") === on);
     case "hands":
-      headset.swapped = !headset.swapped;
+      headset.swap();
       return tools.hands(headset.swapped);
     case "enter":
       return void headset.enter();
@@ -83,6 +88,11 @@ const tools = new Tools((name, on) => {
       return connection.command({ do: name });
   }
 });
+
+function pause(on: boolean): void {
+  tools.paused(on);
+  connection.command({ do: "pause", on });
+}
 
 const connection = new Connection({ message, binary, connected: (open) => tools.connected(open, connection.waiting) });
 
@@ -95,12 +105,29 @@ function message(message: ServerMessage): void {
       atlas ??= new Atlas(...message.atlas);
       if (!placed) {
         begun = message.clock + 0.01 - performance.now() / 1000;
-        cradle.place(message.cradle, message.heading);
-        const back = new THREE.Vector3(-Math.cos(message.heading), -Math.sin(message.heading), 0);
-        sun.position.copy(back).multiplyScalar(4).add(new THREE.Vector3(0, 0, 7)).addScaledVector(new THREE.Vector3(-back.y, back.x, 0), 3);
-        placed = true;
+        stand(message.cradle, message.heading);
       }
       return;
+    case "watching":
+      if (message.protocol !== PROTOCOL) return location.reload();
+      document.title = `PaintCopter: ${message.name}`;
+      tools.watching(true);
+      tools.paused(message.paused);
+      // A page that comes back is told of everything again.
+      if (watch) scene.remove(watch.group);
+      watch = new Watch();
+      scene.add(watch.group);
+      robot.group.visible = gun.visible = false;
+      return;
+    case "place":
+      watch?.place(message);
+      if (!placed) stand(message.cradle, message.heading);
+      return;
+    case "frames":
+      return watch?.move(message.frames);
+    case "playback":
+      tools.paused(message.paused);
+      return tools.playback(message.elapsed);
     case "robot":
       robot.update(message);
       return tools.robot(message);
@@ -109,9 +136,18 @@ function message(message: ServerMessage): void {
   }
 }
 
+/** Puts the person there, with the sun behind. */
+function stand(at: Triple, heading: number): void {
+  cradle.place(at, heading);
+  const back = new THREE.Vector3(-Math.cos(heading), -Math.sin(heading), 0);
+  sun.position.copy(back).multiplyScalar(4).add(new THREE.Vector3(0, 0, 7)).addScaledVector(new THREE.Vector3(-back.y, back.x, 0), 3);
+  placed = true;
+}
+
 function notice(notice: Notice): void {
   const say = (text: string) => banner.say(text, headset.presenting);
   if (notice.type === "text") return say(notice.text);
+  if (notice.type === "saved") return say(`saved: ${notice.path}`);
   if (notice.type === "ended") return say(`results in ${notice.folder}`);
   switch (notice.say) {
     case "move_closer":
@@ -140,12 +176,40 @@ function binary(data: ArrayBuffer): void {
     const patch = readPatch(data);
     atlas?.update(patch);
     fresh ||= patch.picture === 0;
+  } else if (kind === 3) {
+    watch?.update(readEntity(data));
+  } else if (kind === 4) {
+    void watch?.show(readPicture(data));
   }
 }
 
+/** What a key does beside moving; whether it does anything. */
+function press(event: KeyboardEvent): boolean {
+  if (event.repeat) return event.ctrlKey;
+  const name = `${event.ctrlKey || event.metaKey ? "Ctrl " : ""}${event.code}`;
+  switch (name) {
+    case "KeyZ":
+      if (wall) connection.command({ do: "undo" });
+      return true;
+    case "KeyP":
+      pause(!tools.isPaused);
+      return true;
+    case "KeyR":
+      if (wall) pause(!tools.isPaused);
+      return true;
+    case "Ctrl KeyS":
+      if (wall) connection.command({ do: "save" });
+      return true;
+    case "Ctrl Enter":
+      connection.command({ do: "end" });
+      return true;
+  }
+  return false;
+}
+
 addEventListener("keydown", (event) => {
-  if (event.code === "KeyZ" && !event.repeat) connection.command({ do: "undo" });
-  cradle.keys.add(event.code);
+  if (press(event)) event.preventDefault();
+  else if (!event.ctrlKey && !event.metaKey) cradle.keys.add(event.code);
 });
 addEventListener("keyup", (event) => cradle.keys.delete(event.code));
 addEventListener("blur", () => cradle.keys.clear());
@@ -202,6 +266,7 @@ renderer.setAnimationLoop((time) => {
   // A pointer that moves speaks for itself: a frame between two of its places would hold it still, and the stroke would be dots.
   const now = performance.now();
   const moving = !headset.presenting && now - moved < STILL;
+  if (watch && headset.presenting) headset.update();
   if (wall && !moving) wall.project(publish(wall, now) === "viewing" ? robot.camera : null);
   renderer.render(scene, camera);
   if (!headset.presenting) quality.frame(time);
@@ -211,8 +276,9 @@ renderer.setAnimationLoop((time) => {
   }
 });
 
+tools.hands(headset.swapped);
 void Headset.available().then((available) => tools.headset(available));
 navigator.xr?.addEventListener("devicechange", () => void Headset.available().then((found) => tools.headset(found)));
 
 // For tests in a browser: what the page knows, and a way to lose the connection.
-Object.assign(window, { paintcopter: { connection, headset, cradle, camera, delays, renderer, wall: () => wall } });
+Object.assign(window, { paintcopter: { connection, headset, cradle, camera, delays, renderer, wall: () => wall, watch: () => watch } });

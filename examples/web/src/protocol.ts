@@ -1,6 +1,6 @@
 // What page and server say to each other; see examples/src/vr/protocol.rs.
 
-export const PROTOCOL = 1;
+export const PROTOCOL = 2;
 export const STATE_VERSION = 1;
 
 export type Mode = "idle" | "painting" | "viewing";
@@ -18,7 +18,7 @@ export interface State {
 }
 
 export type Command =
-  | { do: "live"; on: boolean }
+  | { do: "live" | "pause"; on: boolean }
   | { do: "undo" | "fly" | "save" | "end" }
   | { do: "erase"; point: Triple; radius: number };
 
@@ -34,6 +34,7 @@ export interface Welcome {
   atlas: [number, number];
   palette: { name: string; srgb: Triple }[];
   live: boolean;
+  paused: boolean;
   cradle: Triple;
   heading: number;
   far: number;
@@ -52,15 +53,47 @@ export interface RobotState {
   latency: number;
   waiting: boolean;
   live: boolean;
+  paused: boolean;
 }
 
 export type Notice =
   | { type: "feedback"; say: string; distance?: number; lag?: number }
   | { type: "text"; text: string }
+  | { type: "saved"; path: string }
   | { type: "ended"; folder: string };
+
+export type Quadruple = [number, number, number, number];
+
+/** The first message where a run or a recording is watched. */
+export interface Watching {
+  type: "watching";
+  protocol: number;
+  key: string;
+  next_sequence: number;
+  name: string;
+  paused: boolean;
+}
+
+export interface Place {
+  type: "place";
+  position: Triple;
+  rotation: Quadruple;
+  cradle: Triple;
+  heading: number;
+}
+
+export interface Frame {
+  name: string;
+  position: Triple;
+  rotation: Quadruple;
+}
 
 export type ServerMessage =
   | Welcome
+  | Watching
+  | Place
+  | { type: "frames"; frames: Frame[] }
+  | { type: "playback"; elapsed: number | null; paused: boolean }
   | RobotState
   | { type: "ack"; next_sequence: number }
   | { type: "notice"; notice: Notice };
@@ -103,4 +136,50 @@ export function readSurface(data: ArrayBuffer): Surface {
     uv: new Float32Array(data, uv, 2 * vertices),
     faces: new Uint32Array(data, uv + 8 * vertices, 3 * faces),
   };
+}
+
+export interface EntityPart {
+  /** Points in pairs, not corners of triangles. */
+  lines: boolean;
+  thickness: number;
+  pixels: boolean;
+  vertices: number;
+  corners: number;
+  positions: Float32Array;
+  colours: Uint8Array;
+  indices: Uint32Array;
+}
+
+export interface Entity {
+  key: string;
+  frame: string;
+  parts: EntityPart[];
+}
+
+export interface Picture {
+  frame: string;
+  format: string;
+  data: Uint8Array<ArrayBuffer>;
+}
+
+function readHead(data: ArrayBuffer): [unknown, number] {
+  const end = 8 + new DataView(data).getUint32(4, true);
+  return [JSON.parse(new TextDecoder().decode(new Uint8Array(data, 8, end - 8))), end];
+}
+
+export function readEntity(data: ArrayBuffer): Entity {
+  const [head, end] = readHead(data) as [Entity, number];
+  let at = end;
+  for (const part of head.parts) {
+    part.positions = new Float32Array(data, at, 3 * part.vertices);
+    part.colours = new Uint8Array(data, at + 12 * part.vertices, 4 * part.vertices);
+    part.indices = new Uint32Array(data, at + 16 * part.vertices, part.corners);
+    at += 16 * part.vertices + 4 * part.corners;
+  }
+  return head;
+}
+
+export function readPicture(data: ArrayBuffer): Picture {
+  const [head, end] = readHead(data) as [{ frame: string; format: string }, number];
+  return { ...head, data: new Uint8Array(data, end) };
 }

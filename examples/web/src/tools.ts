@@ -13,7 +13,7 @@ export class Tools {
 
   /** Calls `act` with the name of a button that is pressed. */
   constructor(act: (name: string, on: boolean) => void) {
-    for (const name of ["live", "fly", "undo", "erase", "flown", "hands", "save", "end", "enter"]) {
+    for (const name of ["record", "pause", "live", "fly", "undo", "erase", "flown", "hands", "save", "end", "enter"]) {
       const button = element<HTMLButtonElement>(name);
       button.addEventListener("click", () => {
         const toggles = button.hasAttribute("aria-pressed");
@@ -30,6 +30,7 @@ export class Tools {
   welcome(welcome: Welcome): void {
     this.standOff = welcome.stand_off;
     element("live").setAttribute("aria-pressed", String(welcome.live));
+    this.paused(welcome.paused);
     const palette = element("palette");
     palette.replaceChildren(
       ...welcome.palette.map((paint, number) => {
@@ -59,12 +60,32 @@ export class Tools {
     return near + (far - near) * element<HTMLInputElement>("brush").valueAsNumber;
   }
 
+  /** Shows what a session or a recording does, and hides what it cannot do. */
+  watching(on: boolean): void {
+    document.body.classList.toggle("watching", on);
+    element("pause").title = on ? "Hold the picture; a recording stops (P)" : "Leave out what your hand does (P)";
+  }
+
+  get isPaused(): boolean {
+    return element("pause").getAttribute("aria-pressed") === "true";
+  }
+
+  paused(on: boolean): void {
+    element("pause").setAttribute("aria-pressed", String(on));
+    element("record").setAttribute("aria-pressed", String(!on));
+  }
+
+  playback(elapsed: number | null): void {
+    element("played").textContent = elapsed === null ? "live" : `${elapsed.toFixed(1)} s`;
+  }
+
   connected(open: boolean, waiting: number): void {
     element("dot").classList.toggle("on", open);
     element("connection").textContent = open ? "connected" : `connection lost, ${waiting} states kept`;
   }
 
   robot(state: RobotState): void {
+    this.paused(state.paused);
     element("lag").textContent = `${state.lag.toFixed(2)} m`;
     element("latency").textContent = state.latency > 0 ? `${state.latency.toFixed(1)} s` : "–";
   }

@@ -1,34 +1,18 @@
 // The page in a real browser: mouse, an emulated headset, a lost connection, a stranger.
 //
 //   node test/browser.mjs PATH_OF_VR [FOLDER]      the folder gets screenshots and the headset's recorded session
-import { spawn } from "node:child_process";
 import { copyFile, mkdtemp, mkdir, readFile, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
+import { spawn } from "node:child_process";
 import assert from "node:assert/strict";
-import { chromium } from "playwright-core";
+import { launch, serve as start } from "./page.mjs";
 
 const [program, pictures] = process.argv.slice(2);
 const scratch = await mkdtemp(join(tmpdir(), "paintcopter-browser-"));
 if (pictures) await mkdir(pictures, { recursive: true });
 const headsetScript = await readFile(new URL("../node_modules/iwer/build/iwer.min.js", import.meta.url), "utf8");
-const ARGUMENTS = [
-  "--no-sandbox", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic",
-  "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync",
-];
-
-/** Starts `vr`; resolves when it has printed its address. */
-function serve(name, ...more) {
-  const out = join(scratch, name);
-  const child = spawn(program, ["--listen", "127.0.0.1:0", "--out", out, ...more], { stdio: ["ignore", "pipe", "pipe"] });
-  let said = "";
-  child.stderr.on("data", (data) => (said += data));
-  const ended = new Promise((resolve) => child.on("exit", resolve));
-  return new Promise((resolve, reject) => {
-    child.stdout.once("data", (data) => resolve({ address: String(data).trim(), out, child, ended }));
-    child.on("exit", (code) => reject(new Error(`vr ended with ${code}: ${said}`)));
-  });
-}
+const serve = (name, ...more) => start(program, join(scratch, name), ...more);
 
 const report = async (server) => JSON.parse(await readFile(join(server.out, "report.json"), "utf8"));
 
@@ -166,6 +150,53 @@ async function lost(browser) {
   return `lost connection: ${figures.states} states, ${figures.repeated_events} came twice and counted once, none is missing`;
 }
 
+/** Buttons of the recording, by mouse and by keyboard. */
+async function buttons(browser) {
+  const server = await serve("buttons", "--offline");
+  const page = await open(browser, server);
+  const aside = [520, 330];
+  await page.mouse.move(...aside);
+  const bare = await colour(page, 300, 200);
+  const pressed = (id) => page.evaluate((id) => document.getElementById(id).getAttribute("aria-pressed"), id);
+  await page.click("#pause");
+  await page.waitForTimeout(300);
+  assert.deepEqual([await pressed("pause"), await pressed("record")], ["true", "false"], "it is paused");
+  await stroke(page, [220, 200], [380, 200]);
+  await page.mouse.move(...aside);
+  await settled(page);
+  assert.ok(difference(bare, await colour(page, 300, 200)) < 6, "a hand during a pause paints nothing");
+  await page.keyboard.press("r");
+  await page.waitForTimeout(300);
+  assert.deepEqual([await pressed("pause"), await pressed("record")], ["false", "true"], "it records again");
+  await stroke(page, [220, 200], [380, 200]);
+  await page.mouse.move(...aside);
+  await settled(page);
+  assert.ok(difference(bare, await colour(page, 300, 200)) > 40, "afterwards it paints");
+  await page.keyboard.press("Control+s");
+  await page.waitForFunction(() => /saved: /.test(document.getElementById("notice").textContent), null, { timeout: 60000 });
+  const path = (await page.textContent("#notice")).slice("saved: ".length);
+  assert.equal(path, join(server.out, "session.mcap"));
+  const saved = await readFile(path);
+  const magic = Buffer.from([0x89, ...Buffer.from("MCAP0\r\n")]);
+  assert.ok(saved.subarray(-8).equals(magic), "what is saved is a whole file");
+  const first = await report(server);
+  assert.ok(first.paint_seen_ml > 0 && first.events > 50);
+  await page.keyboard.press("p");
+  await page.waitForTimeout(200);
+  assert.equal(await pressed("pause"), "true");
+  await page.keyboard.press("Control+Enter");
+  assert.equal(await server.ended, 0, "vr ends well");
+  const last = await report(server);
+  assert.ok(last.events > first.events && last.paint_flown_ml > 0.9 * last.paint_seen_ml, JSON.stringify(last));
+  assert.ok((await readFile(path)).length > saved.length, "the recording went on");
+  await page.close();
+  // The recorded session is whole, the pause in it: it paints the same again.
+  const replay = spawn(program, ["--replay", path, "--out", join(scratch, "again")], { stdio: "ignore" });
+  assert.equal(await new Promise((resolve) => replay.on("exit", resolve)), 0, "the replay makes the same plans");
+  assert.ok(Math.abs(JSON.parse(await readFile(join(scratch, "again", "report.json"))).paint_seen_ml - last.paint_seen_ml) < 1e-9);
+  return `buttons: saved after ${first.events} of ${last.events} events, paused twice, replayed the same`;
+}
+
 // A headset with controllers like the wands of the paper: trigger, squeeze, touchpad.
 const installHeadset = `(() => {
   const pad = { id: "touchpad", type: "binary" };
@@ -234,6 +265,11 @@ async function headset(browser) {
   await page.waitForTimeout(300);
   await page.evaluate(() => window.device.activeSession?.end());
   await page.waitForTimeout(300);
+  // Which button paints is kept by the browser.
+  await page.evaluate(() => document.getElementById("hands").click());
+  await page.reload();
+  await page.waitForFunction(() => window.paintcopter?.wall() && document.getElementById("dot").classList.contains("on"));
+  assert.equal(await page.textContent("#hands"), "paint: trigger");
   await end(page, server);
   if (pictures) await copyFile(join(server.out, "session.mcap"), join(pictures, "headset.mcap"));
   const figures = await report(server);
@@ -243,9 +279,9 @@ async function headset(browser) {
   return `headset: ${pixels} pixels painted, ${figures.paint_tasks} segments flown live`;
 }
 
-const browser = await chromium.launch({ executablePath: "/usr/bin/chromium", headless: true, args: ARGUMENTS });
+const browser = await launch();
 let failed = false;
-for (const test of [mouse, lost, headset]) {
+for (const test of [mouse, lost, buttons, headset]) {
   try {
     console.log(`ok    ${await test(browser)}`);
   } catch (error) {

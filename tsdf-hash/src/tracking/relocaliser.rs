@@ -13,12 +13,12 @@ use crate::tracking::pose::step;
 use crate::tracking::settings::TrackingSettings;
 use crate::tracking::tracker::Tracker;
 
-/// Keyframes that a frame is tracked from where it looks like them (ours): in the dark, and in colour, where features have not found it.
-const CANDIDATES: [usize; 2] = [8, 3];
+/// Keyframes that a frame is tracked from because it looks like them, where features have not found it (ours).
+const CANDIDATES: usize = 8;
 /// Keyframes of the most common words that a frame is compared with, feature by feature (ours).
 const RECOGNISED: usize = 5;
-/// Frames that must agree about a place (ours): by what they look like, and where features agree, too.
-const FRAMES: [usize; 2] = [3, 2];
+/// Frames that must agree about a place (ours).
+const FRAMES: usize = 3;
 /// The reserve map begins anew after so many frames: what it drifts must not matter.
 const LONGEST: usize = 60;
 /// Places nearer to each other are one: radians, metres.
@@ -33,7 +33,7 @@ const ANOTHER: [f64; 2] = [0.02, 0.02];
 /// One frame is not enough: a corner of a room looks like another corner. So the frames since the camera was lost are tracked in a
 /// reserve map of their own, which says how they are placed to each other. Where a frame is found in the old map, by the features that it has in
 /// common with keyframes or near those that look most like it, the frames after it must be found where the reserve map has them, or the place is dropped. It is believed when three
-/// frames agree, or two where features led to it, and no other place is left; without colour these must have been taken from different poses.
+/// frames agree and no other place is left; without colour these must have been taken from different poses.
 ///
 /// ```
 /// # use tsdf_hash::{DenseMap, DepthView, Error, KeyframeIndex, Relocaliser, TrackingSettings};
@@ -74,8 +74,6 @@ struct Place {
     world_from_reserve: Isometry3<f64>,
     /// Frames of the reserve that agree.
     agreeing: Vec<usize>,
-    /// Whether features led to it.
-    recognised: bool,
     /// The latest frame, if it agrees.
     latest: Option<TrackingOutcome>,
 }
@@ -123,7 +121,7 @@ impl Relocaliser {
         } else {
             different(place.agreeing.iter().map(|k| &reserve.poses[*k]))
         };
-        let (true, Some(outcome)) = (agreeing >= FRAMES[usize::from(place.recognised)], place.latest.take()) else {
+        let (true, Some(outcome)) = (agreeing >= FRAMES, place.latest.take()) else {
             return Ok(None);
         };
         let world_from_reserve = outcome.world_from_camera * present.inverse();
@@ -197,7 +195,7 @@ impl Relocaliser {
             // Neighbouring keyframes say the same.
             if !tried.iter().any(|other| within(other, &start, ONE_START)) {
                 if let Some(found) = self.tracker.settle_near(map, depth, colour, &start)? {
-                    self.suspect(found, present, true);
+                    self.suspect(found, present);
                 }
                 tried.push(start);
             }
@@ -205,20 +203,20 @@ impl Relocaliser {
         if !self.places.is_empty() {
             return Ok(());
         }
-        for start in keyframes.candidates(depth, colour, CANDIDATES[usize::from(colour.is_some())], |_| true)? {
+        for start in keyframes.candidates(depth, colour, CANDIDATES, |_| true)? {
             if let Some(found) = self.tracker.settle(map, depth, colour, &start.world_from_camera)? {
-                self.suspect(found, present, false);
+                self.suspect(found, present);
             }
         }
         Ok(())
     }
 
     /// The present frame is seen from here, as well.
-    fn suspect(&mut self, found: TrackingOutcome, present: &Isometry3<f64>, recognised: bool) {
+    fn suspect(&mut self, found: TrackingOutcome, present: &Isometry3<f64>) {
         let frame = self.reserve.as_ref().map_or(0, |reserve| reserve.poses.len() - 1);
         let world_from_reserve = found.world_from_camera * present.inverse();
         if !self.places.iter().any(|place| is_same(&place.world_from_reserve, &world_from_reserve)) {
-            self.places.push(Place { world_from_reserve, agreeing: vec![frame], recognised, latest: Some(found) });
+            self.places.push(Place { world_from_reserve, agreeing: vec![frame], latest: Some(found) });
         }
     }
 }
