@@ -49,7 +49,10 @@ pub(super) fn regions(surface: &Surface, barrier: &[bool]) -> Vec<u32> {
         if round + 1 == MAX_ROUNDS + FINAL_ROUNDS || final_rounds == FINAL_ROUNDS {
             break;
         }
-        seeds = best.iter().map(|&(_, f)| f).collect();
+        // A seed in the middle of another region's plane may have lost even its own face to it.
+        let held: Vec<usize> = (0..count).filter(|&r| best[r].1 != NONE).collect();
+        seeds = held.iter().map(|&r| best[r].1).collect();
+        proxies = held.iter().map(|&r| proxies[r]).collect();
         let limit = (2.0 * (0.5 * MAX_DEVIATION).sin()).powi(2);
         if round < MAX_ROUNDS {
             for &(found, f) in worst.iter().filter(|(found, _)| *found > limit) {
@@ -60,7 +63,7 @@ pub(super) fn regions(surface: &Surface, barrier: &[bool]) -> Vec<u32> {
                 }
             }
         }
-        if seeds.len() == count {
+        if seeds.len() == held.len() {
             final_rounds += 1;
         }
     }
