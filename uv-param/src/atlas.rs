@@ -25,6 +25,7 @@ use crate::error::Error;
 use crate::parametrizer::{Parametrizer, Progress};
 use crate::surface::{FaceLookup, Surface, SurfaceReport};
 use crate::trace::{event, span};
+use crate::triangle;
 pub use charting::ChartSettings;
 use pack::Piece;
 pub use pack::{PackSettings, Page, Placement, Turns};
@@ -62,7 +63,7 @@ pub struct Atlas {
 ///
 /// # Errors
 /// As [`Surface::new`]; [`Error::Setting`]; [`Error::Seam`] for a seam that is no edge; [`Error::TooManyTexels`] where a chart is
-/// larger than a page.
+/// larger than a page; [`Error::CollapsedOnPage`] where parts are so much smaller than the page that rounding flips faces.
 pub fn unwrap_atlas(
     positions: &[[f64; 3]],
     faces: &[[u32; 3]],
@@ -99,10 +100,13 @@ impl Atlas {
         let (charts, members) = charting::charts(&surface, seams, &settings.charts, parametrizer, &mut progress)?;
         let pieces: Vec<Piece> = charts.iter().map(|c| Piece { uv: c.uv(), faces: c.disk().faces() }).collect();
         let (placements, pages) = pack::pack(&pieces, &settings.pack)?;
-        Ok(Self::of_parts(surface, report, charts, members, placements, pages, settings.pack.texel_m))
+        Self::of_parts(surface, report, charts, members, placements, pages, settings.pack.texel_m)
     }
 
     /// Charts with their faces, and where they lie.
+    ///
+    /// # Errors
+    /// [`Error::CollapsedOnPage`].
     fn of_parts(
         surface: Surface,
         report: SurfaceReport,
@@ -111,14 +115,23 @@ impl Atlas {
         placements: Vec<Placement>,
         pages: Vec<Page>,
         texel_m: f64,
-    ) -> Self {
+    ) -> Result<Self, Error> {
+        // Charts were asked before, but a page that is far larger than a chart rounds its coordinates away.
+        let collapsed = |(chart, placement): (&Chart, &Placement)| {
+            let on_page: Vec<[f64; 2]> = chart.uv().iter().map(|&uv| placement.apply(uv)).collect();
+            triangle::flips(&on_page, chart.disk().faces())
+        };
+        let faces: usize = charts.iter().zip(&placements).map(collapsed).sum();
+        if faces > 0 {
+            return Err(Error::CollapsedOnPage { faces });
+        }
         let mut place_of_face = vec![[0; 2]; surface.faces().len()];
         for (chart, faces) in members.iter().enumerate() {
             for (local, &f) in faces.iter().enumerate() {
                 place_of_face[f as usize] = [chart as u32, local as u32];
             }
         }
-        Self { surface, report, charts, place_of_face, members, placements, pages, texel_m }
+        Ok(Self { surface, report, charts, place_of_face, members, placements, pages, texel_m })
     }
 
     /// The surface that was laid out.

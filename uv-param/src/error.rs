@@ -119,6 +119,14 @@ pub enum Error {
         /// Largest product accepted.
         limit: usize,
     },
+    /// Faces of an atlas that have no area on their page, whose coordinates are too coarse for them.
+    #[error(
+        "{faces} triangles are so small beside their page that double precision flattens them; lay parts of such different sizes out one by one"
+    )]
+    CollapsedOnPage {
+        /// Triangles that are not strictly counter-clockwise there.
+        faces: usize,
+    },
     /// A slice has the wrong length.
     #[error("{what}: {found} given, {expected} expected (one per vertex or face of the mesh handed in)")]
     Length {

@@ -49,7 +49,10 @@ pub(super) fn regions(surface: &Surface, barrier: &[bool]) -> Vec<u32> {
         if round + 1 == MAX_ROUNDS + FINAL_ROUNDS || final_rounds == FINAL_ROUNDS {
             break;
         }
-        seeds = best.iter().map(|&(_, f)| f).collect();
+        // A seed in the middle of another region's plane may have lost even its own face to it.
+        let held: Vec<usize> = (0..count).filter(|&r| best[r].1 != NONE).collect();
+        seeds = held.iter().map(|&r| best[r].1).collect();
+        proxies = held.iter().map(|&r| proxies[r]).collect();
         let limit = (2.0 * (0.5 * MAX_DEVIATION).sin()).powi(2);
         if round < MAX_ROUNDS {
             for &(found, f) in worst.iter().filter(|(found, _)| *found > limit) {
@@ -60,7 +63,7 @@ pub(super) fn regions(surface: &Surface, barrier: &[bool]) -> Vec<u32> {
                 }
             }
         }
-        if seeds.len() == count {
+        if seeds.len() == held.len() {
             final_rounds += 1;
         }
     }
@@ -141,18 +144,18 @@ fn means(region: &[u32], normals: &[Vector3<f64>], areas: &[f64], count: usize) 
     sums.iter().map(|n: &Vector3<f64>| n.try_normalize(0.0).unwrap_or_else(Vector3::z)).collect()
 }
 
-/// Two connected halves of a connected set of faces: what is nearer to one of its two ends, measured along the surface.
-/// `joined` tells whether a half-edge leads to another face of the set.
+/// Two connected halves, none of them empty, of a connected set of two faces or more: what is nearer to one of its two ends, measured
+/// along the surface. `joined` tells whether a half-edge leads to another face of the set.
 pub(super) fn halves(surface: &Surface, faces: &[u32], joined: impl Fn(usize) -> bool) -> [Vec<u32>; 2] {
     let from = |start: u32| distances(surface, &[start], &joined);
-    let farthest = |found: &[(u32, u64, u8)]| {
-        found.iter().max_by_key(|&&(f, distance, _)| (distance, Reverse(f))).map_or(faces[0], |&(f, ..)| f)
+    let farthest = |found: &[Reached]| {
+        found.iter().max_by_key(|at| (at.distance, at.steps, Reverse(at.face))).map_or(faces[0], |at| at.face)
     };
     let one = farthest(&from(faces[0]));
     let other = farthest(&from(one));
     let mut split = [Vec::new(), Vec::new()];
-    for (f, _, side) in distances(surface, &[one, other], &joined) {
-        split[usize::from(side)].push(f);
+    for at in distances(surface, &[one, other], &joined) {
+        split[usize::from(at.side)].push(at.face);
     }
     for half in &mut split {
         half.sort_unstable();
@@ -160,30 +163,59 @@ pub(super) fn halves(surface: &Surface, faces: &[u32], joined: impl Fn(usize) ->
     split
 }
 
-/// Faces by their distance from the starts (over face centres): face, bits of the distance, start.
-fn distances(surface: &Surface, starts: &[u32], joined: &impl Fn(usize) -> bool) -> Vec<(u32, u64, u8)> {
+/// A face on the way from the starts, the nearest first.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Reached {
+    /// Bits of the distance over face centres: those of floats that are not negative sort like the floats.
+    distance: u64,
+    /// Edges that were passed: the centres of two faces can be the same, and then only this tells them apart.
+    steps: u32,
+    face: u32,
+    /// The start that it was reached from.
+    side: u8,
+}
+
+/// All faces that can be reached from the starts, by their distance.
+fn distances(surface: &Surface, starts: &[u32], joined: &impl Fn(usize) -> bool) -> Vec<Reached> {
     let centre = |f: usize| surface.corners(f).map(Vector3::from).iter().sum::<Vector3<f64>>() / 3.0;
     let mut done = std::collections::HashSet::new();
     let mut found = Vec::new();
     let mut queue = BinaryHeap::new();
-    for (side, &f) in starts.iter().enumerate() {
-        queue.push(Reverse((0_u64, f, side as u8)));
+    for (side, &face) in starts.iter().enumerate() {
+        queue.push(Reverse(Reached { distance: 0, steps: 0, face, side: side as u8 }));
     }
-    while let Some(Reverse((bits, f, side))) = queue.pop() {
-        if !done.insert(f) {
+    while let Some(Reverse(at)) = queue.pop() {
+        if !done.insert(at.face) {
             continue;
         }
-        found.push((f, bits, side));
-        let here = centre(f as usize);
-        for h in 3 * f as usize..3 * f as usize + 3 {
+        found.push(at);
+        let here = centre(at.face as usize);
+        for h in 3 * at.face as usize..3 * at.face as usize + 3 {
             if let Some(twin) = surface.twin(h)
                 && joined(h)
                 && !done.contains(&((twin / 3) as u32))
             {
-                let distance = f64::from_bits(bits) + (centre(twin / 3) - here).norm();
-                queue.push(Reverse((distance.to_bits(), (twin / 3) as u32, side)));
+                let distance = (f64::from_bits(at.distance) + (centre(twin / 3) - here).norm()).to_bits();
+                queue.push(Reverse(Reached { distance, steps: at.steps + 1, face: (twin / 3) as u32, side: at.side }));
             }
         }
     }
     found
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// Two faces that differ in one corner only, by less than the rounding of their centres.
+    #[test]
+    fn faces_with_the_same_centre_are_halved() {
+        let positions = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0 + f64::EPSILON, 1.0, 0.0]];
+        let (surface, _) = Surface::new(&positions, &[[0, 1, 2], [1, 0, 3]], true).unwrap();
+        assert_eq!(surface.faces().len(), 2);
+        let mut found = halves(&surface, &[0, 1], |_| true);
+        found.sort_unstable();
+        assert_eq!(found, [[0], [1]]);
+    }
 }

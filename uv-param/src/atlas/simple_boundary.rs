@@ -1,4 +1,5 @@
-//! Whether the boundary of a layout crosses itself: a layout without flips whose boundary does not is injective.
+//! Whether the boundary of a layout crosses itself: a layout without flips whose boundary does not, and whose holes are not turned
+//! inside out, is injective.
 
 use crate::chart::overlapping_pairs;
 use crate::disk::Disk;
@@ -73,8 +74,17 @@ pub(super) fn boundary_is_simple(disk: &Disk, uv: &[[f64; 2]]) -> bool {
             }
         }
     }
-    // What only touches may still pass through a corner: then the faces are asked.
-    !touches || overlapping_pairs(uv, &disk.faces) == 0
+    // What only touches may still pass through a corner, and a hole that is turned inside out lies under the faces around it: only
+    // the outer loop may run counter-clockwise. Otherwise the faces are asked.
+    let outer = disk.loops.iter().filter(|vertices| doubled_area(vertices, uv) > 0.0).count();
+    (!touches && outer == 1) || overlapping_pairs(uv, &disk.faces) == 0
+}
+
+/// Twice the area inside a closed line, positive if it runs counter-clockwise.
+fn doubled_area(vertices: &[u32], uv: &[[f64; 2]]) -> f64 {
+    let from_first = |v: u32| [0, 1].map(|k| uv[v as usize][k] - uv[vertices[0] as usize][k]);
+    let pairs = vertices.windows(2).map(|pair| [from_first(pair[0]), from_first(pair[1])]);
+    pairs.map(|[p, q]| p[0] * q[1] - p[1] * q[0]).sum()
 }
 
 /// What two edges have in common beside an end.
@@ -107,5 +117,30 @@ fn contact([a, b]: [u32; 2], [c, d]: [u32; 2], uv: &[[f64; 2]]) -> Contact {
         Contact::Touch
     } else {
         Contact::None
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::surface::{FaceLookup, Surface};
+    use crate::triangle::flips;
+
+    /// A square with a triangular hole, of which one corner is pulled over the opposite side: no face flips and no edges cross, but
+    /// the faces at that corner lie on the face beyond the side.
+    #[test]
+    fn a_hole_turned_inside_out_is_seen() {
+        let flat = |height: f64| {
+            vec![[-3.0, -3.0], [3.0, -3.0], [3.0, 3.0], [-3.0, 3.0], [-1.0, 0.0], [1.0, 0.0], [0.0, height]]
+        };
+        let faces = [[0, 1, 5], [0, 5, 4], [1, 2, 5], [5, 2, 6], [2, 3, 6], [3, 4, 6], [3, 0, 4]];
+        let positions: Vec<[f64; 3]> = flat(0.5).iter().map(|&[x, y]| [x, y, 0.0]).collect();
+        let (surface, _) = Surface::new(&positions, &faces, true).unwrap();
+        let all: Vec<u32> = (0..7).collect();
+        let disk = surface.disk(&all, |_| false, &mut FaceLookup::new(&surface)).unwrap();
+        assert!(boundary_is_simple(&disk, &flat(0.5)));
+        assert_eq!(flips(&flat(-0.3), &disk.faces), 0);
+        assert!(!boundary_is_simple(&disk, &flat(-0.3)));
     }
 }

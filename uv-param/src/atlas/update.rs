@@ -181,7 +181,7 @@ pub fn update_atlas(
         new_charts: old_charts.iter().filter(|c| **c >= first_new).count(),
         added_columns: pages[0][0].saturating_sub(previous.pages.first().map_or(0, |page| page[0])),
     };
-    Ok((Atlas::of_parts(surface, report, done, members, placements, pages, settings.pack.texel_m), update))
+    Ok((Atlas::of_parts(surface, report, done, members, placements, pages, settings.pack.texel_m)?, update))
 }
 
 /// For every face of the surface the face of the layout at the same place, and which of its corners is the first.

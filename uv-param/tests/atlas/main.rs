@@ -249,6 +249,20 @@ fn a_page_that_is_too_small_is_refused() {
 }
 
 /// The same shape in other units is cut the same.
+/// Beside a square of 100 m doubles are 1.4e-14 m apart: two of the corners of a triangle of 1e-15 m become one.
+#[test]
+fn a_part_that_is_finer_than_the_numbers_of_its_page_is_refused() {
+    let mesh_with = |side: f64| {
+        let square = [[0.0; 3], [100.0, 0.0, 0.0], [100.0, 100.0, 0.0], [0.0, 100.0, 0.0]];
+        let triangle = [[0.0; 3], [side, 0.0, 0.0], [0.0, side, 0.0]].map(|[x, y, z]| [x, y, z + 1e-20]);
+        ([&square[..], &triangle[..]].concat(), vec![[0, 1, 2], [0, 2, 3], [4, 5, 6]])
+    };
+    assert_sound(&atlas(&mesh_with(1e-3), 1.0));
+    let (positions, faces) = mesh_with(1e-15);
+    let found = unwrap_atlas(&positions, &faces, &[], &settings(1.0), |_| ());
+    assert_eq!(found.err(), Some(Error::CollapsedOnPage { faces: 1 }));
+}
+
 #[test]
 fn the_unit_of_length_changes_nothing() {
     let mesh = sphere(8);
