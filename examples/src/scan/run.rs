@@ -89,7 +89,7 @@ impl Scan {
                 Ok(placed) => run.take_all(placed)?,
                 Err(why) => run.skip(index, &why),
             }
-            let is_due = checkpoints.are_due();
+            let is_due = run.store.map().is_some() && checkpoints.are_due();
             // A stored map must fit the poses that are stored with it.
             run.reintegrate(if is_due { usize::MAX } else { REINTEGRATED })?;
             if is_due {

@@ -127,3 +127,43 @@ fn read_feature(input: &mut ByteReader) -> Result<Feature, Error> {
     }
     Ok(Feature { point, descriptor })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tracking::image_level::ImageLevel;
+
+    /// Squares on a wall at two metres.
+    fn keyframe() -> Keyframe {
+        let (width, height) = (160, 120);
+        let grey = |k: usize| if (k % width / 17 + k / width / 13).is_multiple_of(2) { 40.0 } else { 200.0 };
+        let level = ImageLevel {
+            width,
+            height,
+            focal: [150.0; 2],
+            centre: [79.5, 59.5],
+            omega: vec![0.5; width * height],
+            intensity: (0..width * height).map(grey).collect(),
+            gradient: Vec::new(),
+        };
+        let (image, frame) = (SmallImage::new(&level), Some(CompressedFrame::new(&level)));
+        Keyframe { world_from_camera: Isometry3::identity(), image, frame, features: found_in(&level) }
+    }
+
+    /// A file from before there were features: they are found in what was stored.
+    #[test]
+    fn an_old_keyframe_gets_its_features() {
+        let new = keyframe();
+        assert!(new.features.len() > 20, "{}", new.features.len());
+        let mut bytes = Vec::new();
+        new.write(&mut bytes);
+        let begin = 56 + 12 + new.image.channels.iter().map(|channel| 4 + 4 * channel.len()).sum::<usize>();
+        bytes.drain(begin..begin + 4 + 44 * new.features.len());
+        let old = Keyframe::read(&mut ByteReader::new(&bytes, 0, "the keyframes"), false).unwrap();
+        assert_eq!(old.features.len(), new.features.len());
+        for (old, new) in old.features.iter().zip(&new.features) {
+            assert_eq!(old.descriptor, new.descriptor);
+            assert!(old.point.iter().zip(&new.point).all(|(a, b)| (a - b).abs() < 1e-4), "{old:?} {new:?}");
+        }
+    }
+}

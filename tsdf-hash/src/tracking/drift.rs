@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::images::{ColourView, DepthView};
 use crate::tracking::outcome::TrackingOutcome;
 use crate::tracking::pose::step;
-use crate::tracking::tracker::Tracker;
+use crate::tracking::tracker::{FROM_AFAR, Tracker};
 
 /// Chi-squared of six degrees of freedom, 99 %.
 const CHI_SQUARED: f64 = 16.81;
@@ -67,7 +67,7 @@ impl Tracker {
     ) -> Result<Option<Drift>, Error> {
         let mut best: Option<TrackingOutcome> = None;
         for start in starts {
-            if let Some(found) = self.settle(old, depth, colour, start)?
+            if let Some(found) = self.settle(old, depth, colour, start, &FROM_AFAR)?
                 && best.as_ref().is_none_or(|best| found.agreement > best.agreement)
             {
                 best = Some(found);

@@ -11,7 +11,7 @@ use crate::settings::{MemoryLimits, Settings};
 use crate::tracking::outcome::{PosePrior, TrackingOutcome};
 use crate::tracking::pose::step;
 use crate::tracking::settings::TrackingSettings;
-use crate::tracking::tracker::Tracker;
+use crate::tracking::tracker::{FROM_AFAR, FROM_NEAR, Tracker};
 
 /// Keyframes that a frame is tracked from because it looks like them, where features have not found it (ours).
 const CANDIDATES: usize = 8;
@@ -31,9 +31,9 @@ const ANOTHER: [f64; 2] = [0.02, 0.02];
 /// Finds a lost camera in a map.
 ///
 /// One frame is not enough: a corner of a room looks like another corner. So the frames since the camera was lost are tracked in a
-/// reserve map of their own, which says how they are placed to each other. Where a frame is found in the old map, by the features that it has in
-/// common with keyframes or near those that look most like it, the frames after it must be found where the reserve map has them, or the place is dropped. It is believed when three
-/// frames agree and no other place is left; without colour these must have been taken from different poses.
+/// reserve map of their own, which says how they are placed to each other. Where a frame is found in the old map, by the features that it
+/// has in common with keyframes or near those that look most like it, the frames after it must be found where the reserve map has them,
+/// or the place is dropped. It is believed when three frames agree and no other place is left; without colour these must have been taken from different poses.
 ///
 /// ```
 /// # use tsdf_hash::{DenseMap, DepthView, Error, KeyframeIndex, Relocaliser, TrackingSettings};
@@ -121,9 +121,7 @@ impl Relocaliser {
         } else {
             different(place.agreeing.iter().map(|k| &reserve.poses[*k]))
         };
-        let (true, Some(outcome)) = (agreeing >= FRAMES, place.latest.take()) else {
-            return Ok(None);
-        };
+        let (true, Some(outcome)) = (agreeing >= FRAMES, place.latest.take()) else { return Ok(None) };
         let world_from_reserve = outcome.world_from_camera * present.inverse();
         let before = &reserve.poses[..reserve.poses.len() - 1];
         let earlier = before.iter().map(|pose| world_from_reserve * pose).collect();
@@ -194,7 +192,7 @@ impl Relocaliser {
             let start = start.world_from_camera;
             // Neighbouring keyframes say the same.
             if !tried.iter().any(|other| within(other, &start, ONE_START)) {
-                if let Some(found) = self.tracker.settle_near(map, depth, colour, &start)? {
+                if let Some(found) = self.tracker.settle(map, depth, colour, &start, FROM_NEAR)? {
                     self.suspect(found, present);
                 }
                 tried.push(start);
@@ -204,7 +202,7 @@ impl Relocaliser {
             return Ok(());
         }
         for start in keyframes.candidates(depth, colour, CANDIDATES, |_| true)? {
-            if let Some(found) = self.tracker.settle(map, depth, colour, &start.world_from_camera)? {
+            if let Some(found) = self.tracker.settle(map, depth, colour, &start.world_from_camera, &FROM_AFAR)? {
                 self.suspect(found, present);
             }
         }

@@ -34,9 +34,9 @@ const FINE_STRIDE: usize = 2;
 const LEAST_COVERAGE: f64 = 0.5;
 /// Least correlation of its intensities with those of the map, where both have colour (ours).
 const LEAST_LIKENESS: f64 = 0.75;
-/// Largest distances of partners, one search after the other, as multiples of the setting, and the least agreement after each of them: what is
-/// below leads nowhere (ours).
-const REACHES: [(f64, f64); 10] = [
+/// Searches from a pose that may be off by half a metre: largest distances of partners, one search after the other, as multiples of the
+/// setting, and the least agreement after each of them: what is below leads nowhere (ours).
+pub(crate) const FROM_AFAR: [(f64, f64); 10] = [
     (4.0, 0.0),
     (2.0, 0.3),
     (1.0, 0.4),
@@ -48,6 +48,8 @@ const REACHES: [(f64, f64); 10] = [
     (0.5, 0.6),
     (0.5, 0.6),
 ];
+/// From one that is right to a few centimetres: without the distant partners.
+pub(crate) const FROM_NEAR: &[(f64, f64)] = FROM_AFAR.split_at(2).1;
 /// Partners are looked for within so many standard deviations of the prior (ours).
 const SPREAD: f64 = 3.0;
 /// A search that moves by less, radians and metres, is not repeated.
@@ -109,32 +111,10 @@ impl Tracker {
         self.track_view(&view, map.settings().voxel_size, depth, colour, prior)
     }
 
-    /// Tracks from a pose that may be off by more than a frame's motion: with distant partners first, then again from where that led,
+    /// Tracks from a pose that may be off by more than a frame's motion, by the given searches: with distant partners first, then again from where that led,
     /// because the first model was seen from elsewhere. `None` unless the result is sure: tracked, agreeing by
     /// [`TrackingSettings::relocalise_agreement`], of half of the frame at least, alike in colour, fixed in all directions.
     pub(crate) fn settle(
-        &mut self,
-        map: &mut dyn DenseMap,
-        depth: &DepthView,
-        colour: Option<&ColourView>,
-        start: &Isometry3<f64>,
-    ) -> Result<Option<TrackingOutcome>, Error> {
-        self.settle_within(map, depth, colour, start, &REACHES)
-    }
-
-    /// The same from a pose that is right to a few centimetres.
-    pub(crate) fn settle_near(
-        &mut self,
-        map: &mut dyn DenseMap,
-        depth: &DepthView,
-        colour: Option<&ColourView>,
-        start: &Isometry3<f64>,
-    ) -> Result<Option<TrackingOutcome>, Error> {
-        let near = REACHES.iter().position(|reach| reach.0 <= 1.0).unwrap_or(0);
-        self.settle_within(map, depth, colour, start, &REACHES[near..])
-    }
-
-    fn settle_within(
         &mut self,
         map: &mut dyn DenseMap,
         depth: &DepthView,
@@ -225,7 +205,7 @@ impl Tracker {
         let mut search = Registration::new(prior.world_from_camera);
         let mut last = None;
         let spread = prior.covariance.map_or(0.0, |covariance| SPREAD * spread(&covariance, view));
-        let widest = spread.clamp(settings.max_distance, settings.max_distance * REACHES[0].0);
+        let widest = spread.clamp(settings.max_distance, settings.max_distance * FROM_AFAR[0].0);
         for level in (0..LEVELS).rev() {
             // Where little is known of the pose, partners are far apart at first.
             let reach = if level == 0 { settings.max_distance } else { widest };
