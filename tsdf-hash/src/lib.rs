@@ -56,6 +56,8 @@
 //! are positive on the camera's side of a surface. Metres.
 
 mod blocks;
+#[cfg(feature = "pose-graph")]
+mod bundle_adjustment;
 mod changes;
 mod codec;
 mod dense_map;
@@ -93,6 +95,10 @@ mod tsdf_layer;
 pub struct Readme;
 
 pub use blocks::voxel_block::VoxelBlock;
+#[cfg(feature = "pose-graph")]
+pub use bundle_adjustment::adjust::{BundleAdjustmentReport, bundle_adjust};
+#[cfg(feature = "pose-graph")]
+pub use bundle_adjustment::settings::BundleAdjustmentSettings;
 pub use changes::{BlockChanges, MapVersion};
 pub use codec::{decode_block, encode_block};
 pub use dense_map::DenseMap;

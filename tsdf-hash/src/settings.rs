@@ -17,6 +17,13 @@ pub struct NoiseModel {
     pub nearest: f64,
 }
 
+impl NoiseModel {
+    /// Standard deviation at a depth, metres.
+    pub(crate) fn deviation(&self, depth: f64) -> f64 {
+        self.base + self.quadratic * (depth - self.nearest).powi(2)
+    }
+}
+
 impl Default for NoiseModel {
     fn default() -> Self {
         Self { base: 0.0012, quadratic: 0.0019, nearest: 0.4 }

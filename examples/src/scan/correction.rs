@@ -17,6 +17,8 @@ pub struct LoopMetrics {
     pub loops: usize,
     /// Corrections of the trajectory.
     pub corrections: usize,
+    /// Corrections whose bundle adjustment was not taken: it made keyframes agree less.
+    pub adjustments_refused: usize,
     /// Frames that were fused anew, over all corrections.
     pub refused: usize,
     /// Largest drift that was measured, metres.
@@ -66,6 +68,12 @@ impl Loops {
     }
 
     fn note(&mut self, name: &str, pose: &Isometry3<f64>, report: &LoopReport) {
+        if report.adjustment.is_some_and(|adjustment| !adjustment.taken) {
+            self.metrics.adjustments_refused += 1;
+            eprintln!(
+                "{name}: the keyframes agree less after a bundle adjustment: the poses stay as the pose graph has them"
+            );
+        }
         for found in &report.loops {
             self.metrics.loops += 1;
             let drift = found.drift.distance(pose);

@@ -59,6 +59,9 @@ pub struct ScanReport {
     /// Corrections of the trajectory.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loop_corrections: Option<usize>,
+    /// Corrections whose bundle adjustment was not taken.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loop_adjustments_refused: Option<usize>,
     /// Frames that were de-integrated and integrated anew, over all corrections.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loop_frames_reintegrated: Option<usize>,
@@ -142,6 +145,7 @@ impl ScanReport {
             keyframes: scan.keyframes.len(),
             loops: metrics.loops.map(|l| l.loops),
             loop_corrections: metrics.loops.map(|l| l.corrections),
+            loop_adjustments_refused: metrics.loops.map(|l| l.adjustments_refused),
             loop_frames_reintegrated: metrics.loops.map(|l| l.refused),
             loop_drift_max_m: metrics.loops.map(|l| l.largest_drift),
             ate_se3_rmse_m: metrics.ate_se3_rmse,

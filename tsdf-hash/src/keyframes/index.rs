@@ -262,6 +262,23 @@ impl KeyframeIndex {
         Ok(map)
     }
 
+    /// Whether a keyframe still has what it saw.
+    #[cfg(feature = "pose-graph")]
+    pub(crate) fn has_frame(&self, keyframe: usize) -> bool {
+        self.keyframes[keyframe].frame.is_some()
+    }
+
+    /// What the keyframes saw, with slopes; `None` of those without depth.
+    #[cfg(feature = "pose-graph")]
+    pub(crate) fn levels(&self) -> Vec<Option<ImageLevel>> {
+        let level = |keyframe: &Keyframe| {
+            let mut level = keyframe.frame.as_ref()?.level()?;
+            level.differentiate();
+            Some(level)
+        };
+        self.keyframes.iter().map(level).collect()
+    }
+
     /// All keyframes as bytes, for instance for the metadata of [`Map::save`].
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = MAGIC.to_vec();

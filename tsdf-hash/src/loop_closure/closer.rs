@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use nalgebra::Isometry3;
 
+use crate::bundle_adjustment::adjust::{BundleAdjustmentReport, bundle_adjust};
+use crate::bundle_adjustment::settings::BundleAdjustmentSettings;
 use crate::error::Error;
 use crate::images::{ColourView, DepthView, check_pose};
 use crate::keyframes::index::{KeyframeIndex, is_near};
@@ -28,6 +30,8 @@ const NEARBY: f64 = 0.5;
 const ALIKE_ANGLE: f64 = 0.6;
 /// Least overlap of a frame with the map of an old visit: with less, little is compared.
 const LEAST_OVERLAP: f64 = 0.4;
+/// The map of all keyframes has voxels of this edge at most, metres.
+const MOST_VOXEL: f64 = 0.2;
 /// A keyframe is registered against the ones so many before it, too: an error then spans several steps, not one (ours).
 const BASELINES: [usize; 6] = [1, 2, 3, 4, 5, 6];
 
@@ -117,6 +121,7 @@ impl LoopCloser {
         if report.loops.iter().any(|found| found.drift.is_significant()) {
             report.corrected_from = Some(self.graph.poses.clone());
             self.optimise()?;
+            report.adjustment = self.adjust()?;
             self.keyframes.set_poses(&self.graph.poses)?;
             self.registered.clone_from(&self.graph.poses);
         }
@@ -204,6 +209,25 @@ impl LoopCloser {
             found.retain(|found| self.is_plausible(&refined.poses, found));
         }
         Ok(found)
+    }
+
+    /// What the registrations between two keyframes each leave open, from all keyframes at once. Only factors that are not made from the
+    /// images take part, and those of keyframes whose images had to make room.
+    fn adjust(&mut self) -> Result<Option<BundleAdjustmentReport>, Error> {
+        let LoopSettings { bundle_adjust: true, noise, threads, .. } = self.settings else { return Ok(None) };
+        let mut settings = BundleAdjustmentSettings { noise, threads, ..BundleAdjustmentSettings::default() };
+        let mut graph = self.graph.clone();
+        let seen = |k: usize| self.keyframes.has_frame(k);
+        graph.betweens.retain(|f| f.kernel == RobustKernel::Squared || !seen(f.first) || !seen(f.second));
+        let report = loop {
+            match bundle_adjust(&self.keyframes, &mut graph, &settings) {
+                // A large map: its surface is needed, not its details.
+                Err(Error::OutOfBudget { .. }) if settings.voxel_size < MOST_VOXEL => settings.voxel_size *= 2.0,
+                other => break other?,
+            }
+        };
+        self.graph.poses = graph.poses;
+        Ok(Some(report))
     }
 
     /// Old keyframes before `end` that the present one may have come back to, and where it is if it has: those that share features first.

@@ -2,6 +2,7 @@
 
 use nalgebra::Isometry3;
 
+use crate::bundle_adjustment::adjust::BundleAdjustmentReport;
 use crate::tracking::drift::Drift;
 
 /// A loop that was found.
@@ -26,4 +27,6 @@ pub struct LoopReport {
     pub loops: Vec<LoopClosure>,
     /// Where the keyframes were before the correction, if there was one; where they are now says [`LoopCloser::poses`](crate::LoopCloser::poses).
     pub corrected_from: Option<Vec<Isometry3<f64>>>,
+    /// The dense bundle adjustment after it.
+    pub adjustment: Option<BundleAdjustmentReport>,
 }

@@ -20,6 +20,8 @@ pub struct LoopSettings {
     pub voxel_size: f64,
     /// Error of the motion between two keyframes as a share of it (0.01), beside 2 mm and 1 mrad.
     pub odometry_error: f64,
+    /// Whether a dense bundle adjustment of all keyframes follows the pose graph (true).
+    pub bundle_adjust: bool,
     /// Noise of the depth camera.
     pub noise: NoiseModel,
     /// Threads used inside one call; results do not depend on it.
@@ -36,6 +38,7 @@ impl Default for LoopSettings {
             window: 3,
             voxel_size: 0.02,
             odometry_error: 0.01,
+            bundle_adjust: true,
             noise: NoiseModel::default(),
             threads: 1,
         }

@@ -93,7 +93,7 @@ impl PoseGraph {
     }
 
     /// Which poses stay; every other one must be joined to one of them, or to a prior.
-    fn anchors(&self) -> Result<Vec<bool>, Error> {
+    pub(crate) fn anchors(&self) -> Result<Vec<bool>, Error> {
         self.check()?;
         let mut fixed = vec![false; self.poses.len()];
         for &pose in &self.fixed {

@@ -62,7 +62,7 @@ pub(crate) fn minimise(
     priors: &[PriorFactor],
     settings: &PoseGraphSettings,
 ) -> Result<PoseGraphReport, Error> {
-    let mut equations = NormalEquations::new(fixed, betweens)?;
+    let mut equations = NormalEquations::new(fixed, betweens, &[])?;
     let initial_cost = cost(poses, betweens, priors);
     let mut report = PoseGraphReport { initial_cost, cost: initial_cost, iterations: 0, converged: false };
     if equations.b.is_empty() {

@@ -18,11 +18,12 @@ pub(crate) struct NormalEquations {
 }
 
 impl NormalEquations {
-    /// With the pattern of a graph.
-    pub(crate) fn new(fixed: &[bool], betweens: &[BetweenFactor]) -> Result<Self, Error> {
+    /// With the pattern of a graph, and of more pairs of poses.
+    pub(crate) fn new(fixed: &[bool], betweens: &[BetweenFactor], more: &[[usize; 2]]) -> Result<Self, Error> {
         let (blocks, count) = free_blocks(fixed);
         let pair = |f: &BetweenFactor| Some([blocks[f.first]?, blocks[f.second]?]);
-        let h = BlockCholesky::new(count, 6, betweens.iter().filter_map(pair))?;
+        let more = more.iter().filter_map(|&[a, b]| Some([blocks[a]?, blocks[b]?]));
+        let h = BlockCholesky::new(count, 6, betweens.iter().filter_map(pair).chain(more))?;
         let places = betweens.iter().map(|f| pair(f).map(|[a, b]| h.place(a, b))).collect();
         Ok(Self { h, b: DVector::zeros(6 * count), blocks, places })
     }

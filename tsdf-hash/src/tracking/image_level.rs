@@ -166,7 +166,7 @@ impl ImageLevel {
     }
 
     /// Central differences; NaN on the rim.
-    fn differentiate(&mut self) {
+    pub(crate) fn differentiate(&mut self) {
         self.gradient.clear();
         self.gradient.resize(self.intensity.len(), [f32::NAN; 2]);
         let width = self.width;

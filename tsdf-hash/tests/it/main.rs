@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
 
 mod accuracy;
+#[cfg(feature = "pose-graph")]
+mod bundle_adjustment;
 mod carve;
 mod consistency;
 mod distance_field;

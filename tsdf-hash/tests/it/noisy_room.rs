@@ -26,3 +26,20 @@ pub(crate) fn seen(pose: Isometry3<f64>, random: &mut Random) -> Shot {
     let clean = shot(pose);
     Shot { depth: noisy(&clean, random), ..clean }
 }
+
+/// What takes poses to where they lie best over the true ones.
+pub(crate) fn alignment(poses: &[Isometry3<f64>], truth: &[Isometry3<f64>]) -> Isometry3<f64> {
+    let mut found = Isometry3::identity();
+    // About the origin turns and shifts are not independent: again until nothing is left.
+    for _ in 0..50 {
+        let (mut turn, mut shift) = (Vector3::zeros(), Vector3::zeros());
+        for (pose, truth) in poses.iter().zip(truth) {
+            let pose = found * pose;
+            turn += (truth.rotation * pose.rotation.inverse()).scaled_axis();
+            shift += truth.translation.vector - pose.translation.vector;
+        }
+        let count = poses.len() as f64;
+        found = Isometry3::new(shift / count, turn / count) * found;
+    }
+    found
+}
