@@ -20,7 +20,6 @@ mod listener;
 mod message;
 mod mission_export;
 mod output;
-mod palette;
 mod protocol;
 mod recording;
 mod run;

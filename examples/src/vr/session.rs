@@ -344,7 +344,10 @@ impl Session {
                         self.counts.continued += 1;
                         self.planned(&planned)?;
                     }
-                    None => self.tasks.push_back(Task::Segment(segment)),
+                    None => {
+                        self.queue.give_back(segment);
+                        self.vehicle.let_halt();
+                    }
                 }
             }
         }

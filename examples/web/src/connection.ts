@@ -11,6 +11,8 @@ export interface Listener {
   message(message: ServerMessage): void;
   binary(data: ArrayBuffer): void;
   connected(open: boolean): void;
+  /** Events before this one are on their way. */
+  sent(before: number): void;
 }
 
 export class Connection {
@@ -35,8 +37,11 @@ export class Connection {
     setInterval(() => this.flush(), SEND_STEP);
   }
 
-  state(state: Omit<State, "sequence">): void {
-    if (this.key !== "" && !this.ended) this.unsent.push({ state: { ...state, sequence: this.next++ } });
+  /** Its number; -1 where nothing is taken any more. */
+  state(state: Omit<State, "sequence">): number {
+    if (this.key === "" || this.ended) return -1;
+    this.unsent.push({ state: { ...state, sequence: this.next } });
+    return this.next++;
   }
 
   command(command: Command): void {
@@ -121,5 +126,6 @@ export class Connection {
     this.sent += events.length;
     this.answers++;
     this.left.push(performance.now());
+    this.listener.sent(this.next - this.unsent.length + this.sent);
   }
 }

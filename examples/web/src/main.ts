@@ -4,6 +4,7 @@ import { Atlas } from "./atlas";
 import { Banner } from "./banner";
 import { Connection } from "./connection";
 import { Cradle } from "./cradle";
+import { Delays, rasterised } from "./delays";
 import { Gun } from "./gun";
 import { Headset } from "./headset";
 import { Pointer } from "./pointer";
@@ -59,10 +60,9 @@ let atlas: Atlas | null = null;
 let wall: Wall | null = null;
 let watch: Watch | null = null;
 let placed = false;
-// When the hand painted what is not on the screen yet, whether its paint has come, and how long it took, milliseconds.
-let sprayed = 0;
-let fresh = false;
-const delays: number[] = [];
+const delays = new Delays();
+// When the surface has come, and when it was first seen, milliseconds after the page was asked for.
+const first = { surface: 0, drawn: 0 };
 // The session's clock goes on where it was when the page came.
 let begun = 0;
 
@@ -94,7 +94,8 @@ function pause(on: boolean): void {
   connection.command({ do: "pause", on });
 }
 
-const connection = new Connection({ message, binary, connected: (open) => tools.connected(open, connection.waiting) });
+const sent = (before: number) => delays.sent(before);
+const connection = new Connection({ message, binary, sent, connected: (open) => tools.connected(open, connection.waiting) });
 
 function message(message: ServerMessage): void {
   switch (message.type) {
@@ -119,6 +120,8 @@ function message(message: ServerMessage): void {
       scene.add(watch.group);
       robot.group.visible = gun.visible = false;
       return;
+    case "ack":
+      return delays.answered(message.next_sequence);
     case "place":
       watch?.place(message);
       if (!placed) stand(message.cradle, message.heading);
@@ -172,10 +175,11 @@ function binary(data: ArrayBuffer): void {
   if (kind === 1 && atlas && !wall) {
     wall = new Wall(readSurface(data), atlas);
     scene.add(wall.mesh);
+    first.surface = performance.now();
   } else if (kind === 2) {
     const patch = readPatch(data);
     atlas?.update(patch);
-    fresh ||= patch.picture === 0;
+    if (patch.picture === 0) delays.texels();
   } else if (kind === 3) {
     watch?.update(readEntity(data));
   } else if (kind === 4) {
@@ -244,8 +248,7 @@ function publish(wall: Wall, time: number): Mode {
     if (gun.hit) connection.command({ do: "erase", point: gun.hit.point.toArray(), radius: ERASER });
     mode = "idle";
   }
-  if (mode === "painting" && gun.hit && sprayed === 0) [sprayed, fresh] = [performance.now(), false];
-  connection.state({
+  const sequence = connection.state({
     version: STATE_VERSION,
     time: begun + time / 1000,
     mode,
@@ -254,6 +257,7 @@ function publish(wall: Wall, time: number): Mode {
     colour: tools.colour,
     flow: tools.flow,
   });
+  if (mode === "painting" && gun.hit && sequence >= 0) delays.hand(sequence, time);
   return mode;
 }
 
@@ -270,9 +274,11 @@ renderer.setAnimationLoop((time) => {
   if (wall && !moving) wall.project(publish(wall, now) === "viewing" ? robot.camera : null);
   renderer.render(scene, camera);
   if (!headset.presenting) quality.frame(time);
-  if (sprayed > 0 && fresh) {
-    if (delays.push(performance.now() - sprayed) > 2000) delays.shift();
-    sprayed = 0;
+  const gl = renderer.getContext() as WebGL2RenderingContext;
+  delays.drawn(gl);
+  if (wall && first.drawn === 0) {
+    first.drawn = -1;
+    void rasterised(gl).then((now) => (first.drawn = now));
   }
 });
 
@@ -281,4 +287,4 @@ void Headset.available().then((available) => tools.headset(available));
 navigator.xr?.addEventListener("devicechange", () => void Headset.available().then((found) => tools.headset(found)));
 
 // For tests in a browser: what the page knows, and a way to lose the connection.
-Object.assign(window, { paintcopter: { connection, headset, cradle, camera, delays, renderer, wall: () => wall, watch: () => watch } });
+Object.assign(window, { paintcopter: { connection, headset, cradle, camera, delays, first, renderer, wall: () => wall, watch: () => watch } });

@@ -89,7 +89,7 @@ async function mouse(browser) {
   const [screen, answer] = await page.evaluate(() => {
     const rank = (times, share) => times.toSorted((a, b) => a - b)[Math.min(times.length - 1, Math.floor(share * times.length))] ?? NaN;
     const { delays, connection } = window.paintcopter;
-    return [rank(delays, 0.95), rank(connection.roundTrips, 0.99)];
+    return [rank(delays.stages["hand to screen"], 0.95), rank(connection.roundTrips, 0.99)];
   });
   await page.click("#undo");
   await page.mouse.move(...aside);
