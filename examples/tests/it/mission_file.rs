@@ -40,7 +40,12 @@ fn a_mission_keeps_all_that_it_was_told() {
         scan: true,
         region: Some(Region::Mask(s.0.join("d.png"))),
         settings,
-        paints: vec![MissionPaint { name: PaintName::Green, design: None, texture: Some(s.0.join("e.png")), fill: None }],
+        paints: vec![MissionPaint {
+            name: PaintName::Green,
+            design: None,
+            texture: Some(s.0.join("e.png")),
+            fill: None,
+        }],
     };
     let path = s.0.join("mission.toml");
     told.write(&path).unwrap();

@@ -13,6 +13,9 @@ use crate::scratch::Scratch;
 /// A wall of 2.6 metres by 1.4, facing -x.
 const WALL: &str = "v 0 1.3 1\nv 0 -1.3 1\nv 0 -1.3 2.4\nv 0 1.3 2.4\nf 1 2 3\nf 1 3 4\n";
 
+/// Flow of the strokes in two colours, m^3/s: thin enough for the scale of ink.
+const FLOW: f64 = 1.5e-7;
+
 fn vr(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_vr")).args(arguments).output().unwrap()
 }
@@ -174,14 +177,14 @@ impl Client {
     /// States of a gun before the wall, in the order of `sequence`; they paint between 10 and 40.
     fn states(from: u64, to: u64) -> Vec<Value> {
         let mode = |k| if (10..40).contains(&k) { "painting" } else { "idle" };
-        (from..to).map(|k| Self::state(k, mode(k), [0.2 - 0.005 * k as f64, 2.2], 0)).collect()
+        (from..to).map(|k| Self::state(k, mode(k), [0.2 - 0.005 * k as f64, 2.2], (0, 4e-7))).collect()
     }
 
     /// A gun 10 cm before the wall, at `y` and `z`.
-    fn state(k: u64, mode: &str, [y, z]: [f64; 2], colour: u8) -> Value {
+    fn state(k: u64, mode: &str, [y, z]: [f64; 2], (colour, flow): (u8, f64)) -> Value {
         json!({"state": {"version": 1, "sequence": k, "time": k as f64 / 90.0, "mode": mode,
             "nozzle": {"translation": [-0.1, y, z], "rotation": [0.0, 0.0, 0.0, 1.0]},
-            "cradle": {"position": [-1.0, 0.0, 2.2], "heading": 0.0}, "colour": colour, "flow": 4e-7}})
+            "cradle": {"position": [-1.0, 0.0, 2.2], "heading": 0.0}, "colour": colour, "flow": flow}})
     }
 }
 
@@ -254,7 +257,7 @@ fn a_session_in_two_colours_is_flown_as_a_mission_of_two_paints() {
     for (first, colour, y, z) in strokes {
         let along = |k: u64| y - 0.3 * (k.clamp(10, 130) - 10) as f64 / 120.0;
         let mode = |k: u64| if (10..=130).contains(&k) { "painting" } else { "idle" };
-        events.extend((0..150).map(|k| Client::state(first + k, mode(k), [along(k), z], colour)));
+        events.extend((0..150).map(|k| Client::state(first + k, mode(k), [along(k), z], (colour, FLOW))));
     }
     events.push(json!({"command": {"sequence": 300, "command": {"do": "end"}}}));
     client.socket.send(Message::text(json!({ "events": events }).to_string())).unwrap();
@@ -272,8 +275,8 @@ fn a_session_in_two_colours_is_flown_as_a_mission_of_two_paints() {
     let figures = report(&flown);
     assert_eq!(figures["paints"], json!(["blue", "red"]));
     for (paint, kilograms) in figures["paint_deposited_kg_by_paint"].as_array().unwrap().iter().enumerate() {
-        // 121 ticks of 0.4 ml/s, 1.2 kg/l.
-        let asked = 1.2e-3 * 0.4 * 121.0 / 90.0;
+        // 121 ticks, 1.2 kg/l.
+        let asked = 1200.0 * FLOW * 121.0 / 90.0;
         let ratio = kilograms.as_f64().unwrap() / asked;
         assert!((ratio - 1.0).abs() < 0.15, "paint {paint}: {ratio} of what the hand gave");
     }

@@ -19,24 +19,30 @@ export function rasterised(gl: WebGL2RenderingContext): Promise<number> {
 }
 
 export class Delays {
-  /** Times of each stage, milliseconds; the last two are sums. */
+  /** Times of each stage, milliseconds; then the sum to the server's texels on the screen, and to the page's own guess. */
   stages: Record<string, number[]> = {};
   private sequence = -1;
   private times: number[] = [];
+  private guess = 0;
 
   constructor() {
     this.clear();
   }
 
   clear(): void {
-    this.stages = { "hand to sent": [], "sent to answer": [], "answer to texels": [], "texels to picture": [], "hand to screen": [] };
-    this.sequence = -1;
+    this.stages = { "hand to sent": [], "sent to answer": [], "answer to texels": [], "texels to picture": [], "hand to screen": [], "hand to guess": [] };
+    [this.sequence, this.guess] = [-1, 0];
   }
 
   /** The hand paints with a state; followed if none is on its way. */
   hand(sequence: number, now: number): void {
     if (this.sequence >= 0 && now - (this.times[0] ?? 0) < LOST) return;
     [this.sequence, this.times] = [sequence, [now]];
+  }
+
+  /** The paint of a hand at a time is shown before the server has it. */
+  guessed(time: number): void {
+    if (this.guess === 0) this.guess = time;
   }
 
   /** States before this one have left. */
@@ -56,10 +62,14 @@ export class Delays {
 
   /** A picture is drawn; `gl` tells when it is there. */
   drawn(gl: WebGL2RenderingContext): void {
-    if (this.times.length !== 4 || this.sequence < 0) return;
-    const times = this.times;
-    this.sequence = -1;
+    const guess = this.guess;
+    const times = this.times.length === 4 && this.sequence >= 0 ? this.times : [];
+    if (times.length === 0 && guess === 0) return;
+    this.guess = 0;
+    if (times.length > 0) this.sequence = -1;
     void rasterised(gl).then((now) => {
+      if (guess > 0) this.keep(5, now - guess);
+      if (times.length === 0) return;
       [...times.slice(1), now].forEach((time, k) => this.keep(k, time - (times[k] ?? 0)));
       this.keep(4, now - (times[0] ?? 0));
     });
