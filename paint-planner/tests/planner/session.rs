@@ -427,7 +427,7 @@ fn the_next_piece_of_a_stroke_may_be_asked_for_in_flight_and_nothing_else() {
 
 #[test]
 fn a_piece_that_is_given_back_grows_until_the_vehicle_asks_for_a_task() {
-    let mut queue = LiveQueue::new(settings(0.1));
+    let mut queue = LiveQueue::new(SessionSettings { longest: 1.0, ..settings(0.1) });
     queue.push(state(0, VrMode::Painting, 0.0));
     assert!(matches!(queue.next_task(0.0, &VEHICLE), Some(Task::Approach(_))));
     (1..6).for_each(|k| queue.push(state(k, VrMode::Painting, 0.03 * k as f64)));
