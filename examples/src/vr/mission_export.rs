@@ -12,13 +12,26 @@ use crate::mission_paint::MissionPaint;
 use crate::picture_placement::{PicturePlacement, PlacementMode};
 use crate::pictures::Rgb;
 
+/// A share of the paint that is said.
+const SAID: f64 = 0.01;
+
 /// Writes `mission.toml` and a picture for every paint, `mission_NAME.png`: its thickness as ink. Paints lie in the order in which they were
-/// first used. A session on a map has no mesh file to name, and one without paint nothing to fly: then none is written.
-pub(super) fn write_mission(session: &Session, appearance: &Appearance, folder: &Path) -> Result<(), VrError> {
+/// first used. A session on a map has no mesh file to name, and one without paint nothing to fly: then none is written. The share of the paint
+/// that is too thick for the scale of ink, and is left out.
+pub(super) fn write_mission(session: &Session, appearance: &Appearance, folder: &Path) -> Result<f64, VrError> {
     let (settings, world) = (session.settings(), session.world());
     let films = session.canvases()[0].paints();
     if settings.map.is_some() || films.is_empty() {
-        return Ok(());
+        return Ok(0.0);
+    }
+    let thickest = UNIT_THICKNESS * appearance.ink().inverse(DARKEST);
+    let sum = |of: &dyn Fn(f64) -> f64| films.iter().flat_map(|(_, film)| film).map(|t| of(*t)).sum::<f64>();
+    let left_out = sum(&|t| (t - thickest).max(0.0)) / sum(&|t| t);
+    if left_out > SAID {
+        let (percent, micrometres) = (100.0 * left_out, 1e6 * thickest);
+        eprintln!(
+            "mission.toml: {percent:.0} % of the paint is left out: it lies thicker than {micrometres:.0} micrometres"
+        );
     }
     let grey = |thickness: f64| {
         let ink = appearance.ink().forward(thickness / UNIT_THICKNESS);
@@ -46,5 +59,6 @@ pub(super) fn write_mission(session: &Session, appearance: &Appearance, folder: 
     } else {
         mission.paints = paints;
     }
-    Ok(mission.write(&folder.join("mission.toml"))?)
+    mission.write(&folder.join("mission.toml"))?;
+    Ok(left_out)
 }

@@ -331,4 +331,4 @@ void Headset.available().then((available) => tools.headset(available));
 navigator.xr?.addEventListener("devicechange", () => void Headset.available().then((found) => tools.headset(found)));
 
 // For tests in a browser: what the page knows, and a way to lose the connection.
-Object.assign(window, { paintcopter: { connection, headset, cradle, camera, delays, first, renderer, wall: () => wall, watch: () => watch } });
+Object.assign(window, { paintcopter: { connection, headset, cradle, camera, delays, first, renderer, atlas: () => atlas, wall: () => wall, watch: () => watch } });
