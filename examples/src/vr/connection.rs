@@ -91,7 +91,15 @@ pub(super) fn serve_connection(
             WebSocketConfig::default().max_message_size(Some(LONGEST_MESSAGE)).max_frame_size(Some(LONGEST_MESSAGE));
         let mut socket = WebSocket::from_partially_read(stream, rest, Role::Server, Some(config));
         let mut bucket = Bucket::new();
-        while seat.holds(connection) && turn(&mut socket, connection, &mut bucket, inbox, outbox, counts) {}
+        let mut turn = || turn(&mut socket, connection, &mut bucket, inbox, outbox, counts);
+        let mut open = true;
+        while open && seat.holds(connection) {
+            open = turn();
+        }
+        // What had come before another connection took the seat is counted all the same.
+        if open {
+            turn();
+        }
         let _ = socket.close(None);
         let _ = socket.flush();
     }

@@ -47,11 +47,14 @@ pub(super) fn write_mission(session: &Session, appearance: &Appearance, folder: 
         paints.push(MissionPaint { name, design, texture: None, fill: None });
     }
     let placement = PicturePlacement { mode: PlacementMode::Stretch, ..PicturePlacement::default() };
+    // The session's nozzle, with as many texels to its spot as a mission has.
+    let defaults = MissionSettings::default();
+    let texel = defaults.texel * settings.spot / defaults.spot;
     let mut mission = MissionFile {
         mesh: settings.mesh.clone(),
         scale: settings.scale,
         up: settings.up,
-        settings: MissionSettings { seed: settings.seed, placement, ..MissionSettings::default() },
+        settings: MissionSettings { seed: settings.seed, placement, spot: settings.spot, texel, ..defaults },
         ..MissionFile::default()
     };
     if let [MissionPaint { name, design, .. }] = &paints[..] {
