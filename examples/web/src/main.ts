@@ -144,7 +144,7 @@ function message(message: ServerMessage): void {
       tools.paused(message.paused);
       return tools.playback(message.elapsed);
     case "robot":
-      stale ||= robot.update(message);
+      if (robot.update(message)) stale = true;
       return tools.robot(message);
     case "notice":
       return notice(message.notice);
@@ -305,7 +305,7 @@ renderer.setAnimationLoop((time) => {
   const moving = !headset.presenting && now - moved < STILL;
   if (watch && headset.presenting) headset.update();
   if (wall && !moving) wall.project(publish(wall, now) === "viewing" ? robot.camera : null);
-  stale ||= echo?.tidy() === true;
+  if (echo?.tidy()) stale = true;
   if (drawing || !(stale || watch || headset.presenting)) return;
   stale = false;
   atlas?.upload(renderer);
@@ -317,7 +317,7 @@ renderer.setAnimationLoop((time) => {
     const begun = performance.now();
     void rasterised(gl).then((now) => {
       drawing = false;
-      stale ||= quality.took(now - begun);
+      if (quality.took(now - begun)) stale = true;
     });
   }
   if (wall && first.drawn === 0) {
