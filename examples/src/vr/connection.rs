@@ -130,7 +130,9 @@ fn turn(
             TryRecvError::Disconnected => RecvTimeoutError::Disconnected,
         });
     }
-    if matches!(next, Err(RecvTimeoutError::Disconnected)) || socket.flush().is_err() {
+    // A session that has nothing more to say to it still hears what has come.
+    let dismissed = matches!(next, Err(RecvTimeoutError::Disconnected));
+    if socket.flush().is_err() {
         return false;
     }
     for _ in 0..AT_ONCE {
@@ -149,7 +151,7 @@ fn turn(
             }
         }
     }
-    true
+    !dismissed
 }
 
 /// The next message if it is there. Only reading does not wait: writing has a time limit of its own.
