@@ -117,24 +117,20 @@ fn turn(
     counts: &TrafficCounts,
 ) -> bool {
     let mut next = outbox.recv_timeout(TURN);
-    while let Ok(outgoing) = next {
+    let mut sent = true;
+    while let (true, Ok(outgoing)) = (sent, next) {
         let message = match outgoing {
             Outgoing::Text(text) => Message::text(text),
             Outgoing::Binary(bytes) => Message::binary(bytes),
         };
-        if socket.write(message).is_err() {
-            return false;
-        }
+        sent = socket.write(message).is_ok();
         next = outbox.try_recv().map_err(|error| match error {
             TryRecvError::Empty => RecvTimeoutError::Timeout,
             TryRecvError::Disconnected => RecvTimeoutError::Disconnected,
         });
     }
-    // A session that has nothing more to say to it still hears what has come.
-    let dismissed = matches!(next, Err(RecvTimeoutError::Disconnected));
-    if socket.flush().is_err() {
-        return false;
-    }
+    // Whoever takes nothing more, or is told nothing more, is still heard: what has come has come.
+    let open = sent && socket.flush().is_ok() && !matches!(next, Err(RecvTimeoutError::Disconnected));
     for _ in 0..AT_ONCE {
         match read_now(socket) {
             Ok(Some(message)) => {
@@ -151,7 +147,7 @@ fn turn(
             }
         }
     }
-    !dismissed
+    open
 }
 
 /// The next message if it is there. Only reading does not wait: writing has a time limit of its own.
