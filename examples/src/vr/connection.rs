@@ -116,21 +116,8 @@ fn turn(
     outbox: &Receiver<Outgoing>,
     counts: &TrafficCounts,
 ) -> bool {
-    let mut next = outbox.recv_timeout(TURN);
-    let mut sent = true;
-    while let (true, Ok(outgoing)) = (sent, next) {
-        let message = match outgoing {
-            Outgoing::Text(text) => Message::text(text),
-            Outgoing::Binary(bytes) => Message::binary(bytes),
-        };
-        sent = socket.write(message).is_ok();
-        next = outbox.try_recv().map_err(|error| match error {
-            TryRecvError::Empty => RecvTimeoutError::Timeout,
-            TryRecvError::Disconnected => RecvTimeoutError::Disconnected,
-        });
-    }
     // Whoever takes nothing more, or is told nothing more, is still heard: what has come has come.
-    let open = sent && socket.flush().is_ok() && !matches!(next, Err(RecvTimeoutError::Disconnected));
+    let open = send(socket, outbox).is_some();
     for _ in 0..AT_ONCE {
         match read_now(socket) {
             Ok(Some(message)) => {
@@ -148,6 +135,24 @@ fn turn(
         }
     }
     open
+}
+
+/// Waits for something to send, and sends all there is; `None` where there is nobody to send or to take it any more.
+fn send(socket: &mut WebSocket<TcpStream>, outbox: &Receiver<Outgoing>) -> Option<()> {
+    let mut next = outbox.recv_timeout(TURN);
+    while let Ok(outgoing) = next {
+        let message = match outgoing {
+            Outgoing::Text(text) => Message::text(text),
+            Outgoing::Binary(bytes) => Message::binary(bytes),
+        };
+        socket.write(message).ok()?;
+        next = outbox.try_recv().map_err(|error| match error {
+            TryRecvError::Empty => RecvTimeoutError::Timeout,
+            TryRecvError::Disconnected => RecvTimeoutError::Disconnected,
+        });
+    }
+    socket.flush().ok()?;
+    next.is_err_and(|error| error == RecvTimeoutError::Timeout).then_some(())
 }
 
 /// The next message if it is there. Only reading does not wait: writing has a time limit of its own.
