@@ -1,4 +1,4 @@
-//! From paint thickness to ink and colour: one dark paint on sandstone, by Kubelka-Munk in 36 bands.
+//! From paint thickness to ink and colour: a paint on sandstone, by Kubelka-Munk in 36 bands.
 
 use paint_net::{MonotoneCurve, Saturation};
 use paint_sim::colour::{BANDS, Spectrum, spectrum_lab, wavelength, xyz};
@@ -42,19 +42,25 @@ pub enum AppearanceError {
 impl Appearance {
     /// [`charcoal`] on [`sandstone`].
     pub fn charcoal_on_sandstone() -> Result<Self, AppearanceError> {
-        let (wall, paint) = (sandstone()?, charcoal()?);
-        let at = |depth: f64| paint.over(depth * UNIT_THICKNESS, &wall);
+        Self::on_sandstone(&charcoal()?)
+    }
+
+    /// A paint on [`sandstone`]. Ink is a scale of thickness, that of [`charcoal`] for every paint: the grey of a coloured or white paint
+    /// need not fall with its thickness.
+    pub fn on_sandstone(paint: &Paint) -> Result<Self, AppearanceError> {
+        let (wall, scale) = (sandstone()?, charcoal()?);
+        let at = |paint: &Paint, depth: f64| paint.over(depth * UNIT_THICKNESS, &wall);
 
         let grey = |s: &Substrate| srgb(xyz(s.reflectance())[1]);
         let bare = grey(&wall);
         // Ten times the deepest knot is opaque to rounding.
-        let darkest = grey(&at(10.0 * DEEPEST)?);
+        let darkest = grey(&at(&scale, 10.0 * DEEPEST)?);
         let mut knots = Vec::with_capacity(KNOTS);
         let mut table = Vec::with_capacity(KNOTS);
         for k in 0..KNOTS {
             let depth = DEEPEST * k as f64 / (KNOTS - 1) as f64;
-            let film = at(depth)?;
-            knots.push((depth, if k == 0 { 0.0 } else { (bare - grey(&film)) / (bare - darkest) }));
+            knots.push((depth, if k == 0 { 0.0 } else { (bare - grey(&at(&scale, depth)?)) / (bare - darkest) }));
+            let film = at(paint, depth)?;
             let linear = paint_sim::colour::spectrum_linear_srgb(film.reflectance());
             table.push(Shade { linear, lab: spectrum_lab(film.reflectance()) });
         }

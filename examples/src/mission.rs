@@ -1,5 +1,7 @@
 //! The main job: a mesh and a design in, a painted surface and its figures out.
 
+mod coats;
+mod coats_output;
 mod decide;
 mod decision;
 mod dose_correction;
@@ -27,6 +29,8 @@ mod trajectory_table;
 mod true_surface;
 mod view;
 
+pub use coats::{Coat, Coats};
+pub use coats_output::{CoatsFigures, save_coats};
 pub use decision::Decision;
 pub use error::MissionError;
 pub use figures::report;

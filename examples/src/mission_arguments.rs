@@ -260,6 +260,7 @@ impl MissionArguments {
             texture: self.texture.clone(),
             scan: self.scan,
             settings,
+            paints: Vec::new(),
         })
     }
 }

@@ -1,5 +1,7 @@
 //! A mission as a file: all that is needed to fly it again.
 
+mod paints;
+
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -9,6 +11,7 @@ use crate::design::{Design, DesignError, MATERIALS, Picture};
 use crate::mesh_io::{MeshError, TriangleMesh, read_mesh};
 use crate::mesh_placement::{MeshPlacement, PlacementError, UpAxis, place_mesh, place_scene};
 use crate::mission::{Decision, MissionError, MissionSettings};
+use crate::mission_paint::{MissionPaint, absolute, file_of_design};
 use crate::region::{Region, RegionError, Scene};
 use crate::scan_flight::{ScanFlight, ScanFlightError, save as save_scan_flight};
 use crate::world::rock_wall;
@@ -39,6 +42,9 @@ pub struct MissionFile {
     pub region: Option<Region>,
     /// All numbers.
     pub settings: MissionSettings,
+    /// Several paints, each with what it paints, in the order in which they are flown; one paint with the design above without.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub paints: Vec<MissionPaint>,
 }
 
 /// What is wrong with a mission.
@@ -113,6 +119,9 @@ pub enum MissionFileError {
         /// The mesh.
         path: String,
     },
+    /// Paints that cannot be flown as the file has them.
+    #[error("paints: {0}")]
+    Paints(String),
     /// A coat that cannot be asked for.
     #[error("fill: {0}")]
     Fill(&'static str),
@@ -137,6 +146,13 @@ pub enum MissionFileError {
     },
 }
 
+/// The surface itself with its name and, where the robot scans it first, what is really there.
+struct Place {
+    name: String,
+    scene: Scene,
+    truth: Option<TriangleMesh>,
+}
+
 impl MissionFile {
     /// Reads a mission; paths in it begin at its folder.
     pub fn read(path: &Path) -> Result<Self, MissionFileError> {
@@ -151,23 +167,19 @@ impl MissionFile {
             *file = folder.join(&*file);
         }
         mission.region = mission.region.map(|region| region.in_folder(folder));
-        if let Some(picture) = mission.design.as_mut().filter(|design| !Design::is_built_in(design)) {
-            *picture = folder.join(&*picture).display().to_string();
-        }
+        mission.design = mission.design.map(|design| file_of_design(design, |file| folder.join(file)));
+        mission.paints = mission.paints.into_iter().map(|paint| paint.in_folder(folder)).collect();
         Ok(mission)
     }
 
     /// Writes the mission, with the files it names as absolute paths and every number that it had.
     pub fn write(&self, path: &Path) -> Result<(), MissionFileError> {
-        let absolute = |file: &PathBuf| std::path::absolute(file).unwrap_or_else(|_| file.clone());
-        let picture = |design: &String| {
-            if Design::is_built_in(design) { design.clone() } else { absolute(&design.into()).display().to_string() }
-        };
         let written = Self {
-            mesh: self.mesh.as_ref().map(absolute),
-            texture: self.texture.as_ref().map(absolute),
-            design: self.design.as_ref().map(picture),
+            mesh: self.mesh.clone().map(absolute),
+            texture: self.texture.clone().map(absolute),
+            design: self.design.clone().map(|design| file_of_design(design, absolute)),
             region: self.region.clone().map(Region::absolute),
+            paints: self.paints.iter().map(MissionPaint::absolute).collect(),
             ..self.clone()
         };
         let name = || path.display().to_string();
@@ -184,21 +196,34 @@ impl MissionFile {
     }
 
     /// Reads the surface and the design, scans if asked to, and decides; what the scan leaves goes into `folder`.
+    ///
+    /// # Errors
+    /// A file with several paints among others: see [`MissionFile::decide_coats`].
     pub fn decide(&self, folder: &Path) -> Result<Decision, MissionFileError> {
-        let settings = self.settings.clone();
+        if !self.paints.is_empty() {
+            return Err(MissionFileError::Paints("several paints are several decisions".into()));
+        }
+        self.decide_on(&self.place(folder)?)
+    }
+
+    /// Reads the surface and scans it if asked to.
+    fn place(&self, folder: &Path) -> Result<Place, MissionFileError> {
         let (name, scene) = self.read_surface()?;
-        // The surface itself and, where the robot scans it first, its map.
-        let (scene, truth) = if self.scan {
-            if self.region.is_some() {
-                return Err(MissionFileError::RegionBeforeScan);
-            }
-            let scan_flight = ScanFlight::fly(&scene.canvas, settings.seed, settings.threads)
-                .map_err(|source| MissionFileError::Scan { surface: self.mesh_prefix(), source })?;
-            save_scan_flight(&scan_flight, folder).map_err(|source| self.in_mesh(source))?;
-            (Scene::whole(scan_flight.mesh), Some(scene.canvas))
-        } else {
-            (scene, None)
-        };
+        if !self.scan {
+            return Ok(Place { name, scene, truth: None });
+        }
+        if self.region.is_some() {
+            return Err(MissionFileError::RegionBeforeScan);
+        }
+        let scan_flight = ScanFlight::fly(&scene.canvas, self.settings.seed, self.settings.threads)
+            .map_err(|source| MissionFileError::Scan { surface: self.mesh_prefix(), source })?;
+        save_scan_flight(&scan_flight, folder).map_err(|source| self.in_mesh(source))?;
+        Ok(Place { name, scene: Scene::whole(scan_flight.mesh), truth: Some(scene.canvas) })
+    }
+
+    /// Reads the design and decides.
+    fn decide_on(&self, Place { name, scene, truth }: &Place) -> Result<Decision, MissionFileError> {
+        let settings = self.settings.clone();
         let mesh = &scene.canvas;
         let materials = mesh.materials.as_ref().filter(|materials| materials.textured() && mesh.uv.is_some());
         let design = match (&self.texture, &self.design, materials) {
@@ -215,8 +240,8 @@ impl MissionFile {
             (None, None, None) if self.mesh.is_some() => Design::Stripes,
             (None, None, None) => Design::Strata { seed: settings.seed },
         };
-        let decision = Decision::make(&name, &scene, &design, settings);
-        let decision = decision.and_then(|decision| match &truth {
+        let decision = Decision::make(name, scene, &design, settings);
+        let decision = decision.and_then(|decision| match truth {
             Some(truth) => decision.before(truth),
             None => Ok(decision),
         });
@@ -232,6 +257,7 @@ impl MissionFile {
         }
         let thickness = self.fill.filter(|thickness| COAT.contains(thickness));
         let thickness = thickness.ok_or(MissionFileError::Fill("give a thickness from 1 to 60 micrometres"))?;
+        // Ink is on the scale of charcoal, whatever the paint.
         let paint = Appearance::charcoal_on_sandstone().map_err(|error| self.in_mesh(error.into()))?;
         Ok(Design::Even { ink: paint.ink().forward(thickness / UNIT_THICKNESS) })
     }

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use paintcopter_examples::exit::exit_code;
-use paintcopter_examples::mission::{Mission, preview, save};
+use paintcopter_examples::mission::{Coats, preview, save, save_coats};
 use paintcopter_examples::mission_arguments::MissionArguments;
 
 /// Paints a surface with a simulated flying robot: unwraps it, decides what to spray, plans and flies the strokes, and shows
@@ -31,16 +31,21 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let folder = &arguments.out;
     let mission_file = arguments.mission.mission_file()?;
     mission_file.write_into(folder)?;
-    let decision = mission_file.decide(folder)?;
+    let coats = mission_file.decide_coats(folder)?;
     if arguments.preview {
-        let found = preview(&decision, folder)?;
-        eprintln!("{}", found.summary());
-        println!("{}", folder.join("preview.png").display());
+        for coat in coats {
+            let found = preview(&coat.decision, &coat.folder)?;
+            eprintln!("{}", found.summary());
+            println!("{}", coat.folder.join("preview.png").display());
+        }
         return Ok(());
     }
-    let mission = Mission::run(decision).map_err(|error| mission_file.in_mesh(error))?;
-    let report = save(&mission, folder)?;
-    eprintln!("{}", report.summary());
+    let coats = Coats::run(coats).map_err(|error| mission_file.in_mesh(error))?;
+    let summary = match coats.missions().next() {
+        Some((_, mission)) if mission_file.paints.is_empty() => save(mission, folder)?.summary(),
+        _ => save_coats(&coats, folder)?.summary(),
+    };
+    eprintln!("{summary}");
     println!("{}", folder.join("report.md").display());
     Ok(())
 }

@@ -32,10 +32,11 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let folder = &arguments.out;
     let mission_file = arguments.mission.mission_file()?;
     mission_file.write_into(folder)?;
-    let decision = mission_file.decide(folder)?;
-    let mission = PlannedMission::new(decision).map_err(|error| mission_file.in_mesh(error))?;
-    let figures = save_plan(&mission, folder)?;
-    eprintln!("{}", figures.summary());
-    println!("{}", folder.join("plan.csv").display());
+    for coat in mission_file.decide_coats(folder)? {
+        let mission = PlannedMission::new(coat.decision).map_err(|error| mission_file.in_mesh(error))?;
+        let figures = save_plan(&mission, &coat.folder)?;
+        eprintln!("{}", figures.summary());
+        println!("{}", coat.folder.join("plan.csv").display());
+    }
     Ok(())
 }

@@ -52,7 +52,7 @@ impl Decision {
     pub fn make(name: &str, scene: &Scene, design: &Design, settings: MissionSettings) -> Result<Self, MissionError> {
         let started = Instant::now();
         let robot = Robot::new(Ptu::new(settings.ptu)?);
-        let appearance = Appearance::charcoal_on_sandstone()?;
+        let appearance = Appearance::on_sandstone(&settings.paint.paint()?)?;
 
         settings.check()?;
         design.check_movable(&settings.placement, settings.viewpoint)?;

@@ -2,6 +2,7 @@
 
 use crate::appearance::AppearanceError;
 use crate::design::DesignError;
+use crate::palette::PaintName;
 use crate::pictures::PictureError;
 use crate::recording::RecordingError;
 use crate::report::ReportError;
@@ -39,6 +40,14 @@ pub enum MissionError {
     /// The paint.
     #[error("paint: {0}")]
     Appearance(#[from] AppearanceError),
+    /// One of several paints.
+    #[error("{paint}: {source}")]
+    OfPaint {
+        /// The paint.
+        paint: &'static str,
+        /// What is wrong.
+        source: Box<MissionError>,
+    },
     /// The design asks for nothing that can be painted.
     #[error("the design leaves nothing to paint: {0}")]
     NothingToPaint(&'static str),
@@ -87,4 +96,12 @@ pub enum MissionError {
         /// What the system said.
         source: std::io::Error,
     },
+}
+
+impl MissionError {
+    /// The same with the paint whose mission it is.
+    #[must_use]
+    pub fn in_paint(self, paint: PaintName) -> Self {
+        Self::OfPaint { paint: paint.as_str(), source: Box::new(self) }
+    }
 }

@@ -57,6 +57,11 @@ impl Mission {
         depth
     }
 
+    /// Paint depth per pixel as it is wanted.
+    pub(super) fn wanted_depth(&self) -> Image {
+        self.decision.wanted.map(|ink| self.decision.appearance.ink().inverse(ink))
+    }
+
     pub(super) fn painted_ink(&self) -> Image {
         self.painted_depth().map(|d| self.decision.appearance.ink().forward(d))
     }

@@ -5,6 +5,7 @@ use ptu_kinematics::{PtuSettings, ServoSettings};
 use serde::{Deserialize, Serialize};
 
 use super::error::MissionError;
+use crate::palette::PaintName;
 use crate::picture_placement::PicturePlacement;
 use crate::projection::Viewpoint;
 
@@ -21,6 +22,8 @@ pub struct MissionSettings {
     pub texel: f64,
     /// Standard deviation of a spray spot at the stand-off, metres. Default 2.5 cm (Paper IV: half the radius of 5 cm).
     pub spot: f64,
+    /// What is in the tank. Default charcoal.
+    pub paint: PaintName,
     /// Where a picture lies.
     pub placement: PicturePlacement,
     /// From where the design is thrown onto the surface; `None` lays it over the chart.
@@ -78,6 +81,7 @@ impl Default for MissionSettings {
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             texel: 0.0125,
             spot: 0.025,
+            paint: PaintName::default(),
             memory_gib: 8.0,
             placement: PicturePlacement::default(),
             viewpoint: None,

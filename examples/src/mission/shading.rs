@@ -1,25 +1,36 @@
 //! How the painted surface looks: where a ray hits it, and at its vertices.
 
+use paint_net::Image;
 use paint_sim::{Hit, Shading};
 use uv_param::SurfacePoint;
 
 use super::decision::Decision;
 
 /// Shading of a point of the world: painted and smooth on the disk, grey elsewhere.
-pub(super) fn shading(decision: &Decision, painted: &paint_net::Image, hit: &Hit) -> Shading {
+pub(super) fn shading(decision: &Decision, painted: &Image, hit: &Hit) -> Shading {
+    shading_by(decision, hit, &|x, y| decision.appearance.linear(bilinear(painted, x, y)))
+}
+
+/// The same where the three pictures are the linear sRGB of the surface.
+pub(super) fn shading_of_colours(decision: &Decision, linear: &[Image; 3], hit: &Hit) -> Shading {
+    shading_by(decision, hit, &|x, y| linear.each_ref().map(|channel| bilinear(channel, x, y)))
+}
+
+/// `colour` gives linear sRGB at a place of the chart, in pixels.
+fn shading_by(decision: &Decision, hit: &Hit, colour: &dyn Fn(f64, f64) -> [f64; 3]) -> Shading {
     let Some(face) = decision.surface.disk().faces().get(hit.face as usize) else {
         return Shading { albedo: [0.4; 3], normal: hit.normal };
     };
     let [u, v] = place(decision, *face, hit).map(|m| m / decision.settings.texel);
-    let (x, y) = (u - 0.5, painted.height() as f64 - v - 0.5);
+    let (x, y) = (u - 0.5, decision.surface.height() as f64 - v - 0.5);
     let [a, b] = hit.barycentric;
-    let albedo = decision.appearance.linear(bilinear(painted, x, y)).map(|c| c as f32);
+    let albedo = colour(x, y).map(|c| c as f32);
     let at = SurfacePoint { face: hit.face, barycentric: [1.0 - a - b, a, b] };
     Shading { albedo, normal: decision.surface.chart.smooth_normal(at).into_inner() }
 }
 
 /// Colour of every vertex of the disk with `depth` of paint on its texels.
-pub(super) fn vertex_colours(decision: &Decision, depth: &paint_net::Image) -> Vec<[u8; 3]> {
+pub(super) fn vertex_colours(decision: &Decision, depth: &Image) -> Vec<[u8; 3]> {
     let texel = decision.settings.texel;
     let (width, height) = (depth.width(), depth.height());
     let at = |uv: &[f64; 2]| {
@@ -47,7 +58,7 @@ fn place(decision: &Decision, face: [u32; 3], hit: &Hit) -> [f64; 2] {
     [0, 1].map(|k| (1.0 - a - b) * p[k] + a * q[k] + b * r[k])
 }
 
-fn bilinear(image: &paint_net::Image, x: f64, y: f64) -> f64 {
+fn bilinear(image: &Image, x: f64, y: f64) -> f64 {
     let (w, h) = (image.width(), image.height());
     let (x, y) = (x.clamp(0.0, (w - 1) as f64), y.clamp(0.0, (h - 1) as f64));
     let (x0, y0) = (x as usize, y as usize);

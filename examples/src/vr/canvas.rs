@@ -3,8 +3,8 @@
 use paint_sim::colour::{BANDS, spectrum_srgb8};
 use paint_sim::{Film, Shot, SprayModel, Surface, km};
 
-use super::palette::PaletteEntry;
 use super::world::VrWorld;
+use crate::palette::PaletteEntry;
 
 /// A rectangle of the atlas, sRGB.
 pub(super) struct Patch {
@@ -18,6 +18,8 @@ pub(super) struct Patch {
 /// The films and their picture.
 pub(super) struct Canvas {
     films: Vec<Film>,
+    /// The paints in the order in which they were first sprayed.
+    order: Vec<usize>,
     /// Pixel of every texel of the films.
     pixels: Vec<u32>,
     columns: usize,
@@ -41,6 +43,7 @@ impl Canvas {
             marked: vec![false; pixels.len()],
             pixels: pixels.into_iter().map(|pixel| pixel as u32).collect(),
             films,
+            order: Vec::new(),
             columns,
             rows,
             rgb: std::iter::repeat_n(bare, columns * rows).flatten().collect(),
@@ -56,9 +59,13 @@ impl Canvas {
         model: &SprayModel,
         surface: &dyn Surface,
     ) -> Result<(), paint_sim::Error> {
-        let Self { films, stale, marked, .. } = self;
+        let Self { films, order, stale, marked, .. } = self;
         let touched = &mut |texel| mark(texel, stale, marked);
-        film(films, paint).deposit_observed(shots, model, surface, 1, touched, &mut |_, _| ()).map(|_| ())
+        let paint = usize::from(paint).min(films.len() - 1);
+        if !order.contains(&paint) {
+            order.push(paint);
+        }
+        films[paint].deposit_observed(shots, model, surface, 1, touched, &mut |_, _| ()).map(|_| ())
     }
 
     /// Takes a paint back that was sprayed before.
@@ -70,7 +77,8 @@ impl Canvas {
         surface: &dyn Surface,
     ) -> Result<(), paint_sim::Error> {
         let Self { films, stale, marked, .. } = self;
-        film(films, paint).withdraw(shots, model, surface, 1, &mut |texel| mark(texel, stale, marked))
+        let paint = usize::from(paint).min(films.len() - 1);
+        films[paint].withdraw(shots, model, surface, 1, &mut |texel| mark(texel, stale, marked))
     }
 
     /// Draws what has changed since the last call and returns the rectangle about it.
@@ -102,9 +110,19 @@ impl Canvas {
 
     /// Thickness of all paints together on every pixel, m; 0 beside the surface.
     pub(super) fn thickness(&self) -> Vec<f64> {
+        self.thickness_of(&self.films)
+    }
+
+    /// The paints that are on the surface, in the order in which they were first sprayed, each with its thickness on every pixel, m.
+    pub(super) fn paints(&self) -> Vec<(usize, Vec<f64>)> {
+        let on_wall = |paint: &&usize| self.films[**paint].volumes().iter().any(|volume| *volume > 0);
+        self.order.iter().filter(on_wall).map(|&k| (k, self.thickness_of(&self.films[k..=k]))).collect()
+    }
+
+    fn thickness_of(&self, films: &[Film]) -> Vec<f64> {
         let mut thickness = vec![0.0; self.columns * self.rows];
         for (texel, &pixel) in self.pixels.iter().enumerate() {
-            thickness[pixel as usize] = self.films.iter().map(|film| film.thickness(texel)).sum();
+            thickness[pixel as usize] = films.iter().map(|film| film.thickness(texel)).sum();
         }
         thickness
     }
@@ -136,12 +154,6 @@ impl Canvas {
             rgb: (top..top + height).flat_map(row).copied().collect(),
         }
     }
-}
-
-/// The film of a paint; one that is not on the palette is the last.
-fn film(films: &mut [Film], paint: u8) -> &mut Film {
-    let last = films.len() - 1;
-    &mut films[usize::from(paint).min(last)]
 }
 
 fn mark(texel: u32, stale: &mut Vec<u32>, marked: &mut [bool]) {

@@ -2,7 +2,7 @@
 
 use std::net::TcpStream;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TryRecvError};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError};
 use std::time::{Duration, Instant};
 
 use tungstenite::protocol::{Role, WebSocketConfig};
@@ -17,8 +17,11 @@ const LONGEST_MESSAGE: usize = 1 << 20;
 /// Messages per second in the long run, and at once.
 const MESSAGES_PER_SECOND: f64 = 200.0;
 const BURST: f64 = 400.0;
-/// How long the socket waits for a message before what the session says is sent.
-const TURN: Duration = Duration::from_millis(2);
+/// How long the connection waits for what the session says before it looks for messages. The other way round an answer would wait for the
+/// socket's time limit, which systems round up to several milliseconds.
+const TURN: Duration = Duration::from_millis(1);
+/// Messages that are read before the session has the word again.
+const AT_ONCE: usize = 64;
 /// A client that takes nothing for so long is gone.
 const WRITE_TIME: Duration = Duration::from_secs(5);
 
@@ -82,14 +85,21 @@ pub(super) fn serve_connection(
     outbox: &Receiver<Outgoing>,
     counts: &TrafficCounts,
 ) {
-    let timeouts = stream.set_read_timeout(Some(TURN)).and_then(|()| stream.set_write_timeout(Some(WRITE_TIME)));
     // Small messages must not wait for larger ones.
-    if timeouts.and_then(|()| stream.set_nodelay(true)).is_ok() {
+    if stream.set_write_timeout(Some(WRITE_TIME)).and_then(|()| stream.set_nodelay(true)).is_ok() {
         let config =
             WebSocketConfig::default().max_message_size(Some(LONGEST_MESSAGE)).max_frame_size(Some(LONGEST_MESSAGE));
         let mut socket = WebSocket::from_partially_read(stream, rest, Role::Server, Some(config));
         let mut bucket = Bucket::new();
-        while seat.holds(connection) && turn(&mut socket, connection, &mut bucket, inbox, outbox, counts) {}
+        let mut turn = || turn(&mut socket, connection, &mut bucket, inbox, outbox, counts);
+        let mut open = true;
+        while open && seat.holds(connection) {
+            open = turn();
+        }
+        // What had come before another connection took the seat is counted all the same.
+        if open {
+            turn();
+        }
         let _ = socket.close(None);
         let _ = socket.flush();
     }
@@ -97,7 +107,7 @@ pub(super) fn serve_connection(
     let _ = inbox.send(Inbound::Leave { connection });
 }
 
-/// Sends what there is, then reads one message; whether the connection goes on.
+/// Sends what there is, then reads what has come; whether the connection goes on.
 fn turn(
     socket: &mut WebSocket<TcpStream>,
     connection: u64,
@@ -106,33 +116,65 @@ fn turn(
     outbox: &Receiver<Outgoing>,
     counts: &TrafficCounts,
 ) -> bool {
-    loop {
-        let message = match outbox.try_recv() {
-            Ok(Outgoing::Text(text)) => Message::text(text),
-            Ok(Outgoing::Binary(bytes)) => Message::binary(bytes),
-            Err(TryRecvError::Empty) => break,
-            Err(TryRecvError::Disconnected) => return false,
+    // Whoever takes nothing more, or is told nothing more, is still heard: what has come has come.
+    let open = send(socket, outbox).is_some();
+    for _ in 0..AT_ONCE {
+        match read_now(socket) {
+            Ok(Some(message)) => {
+                if !take(&message, connection, bucket, inbox, counts) {
+                    return false;
+                }
+            }
+            Ok(None) => break,
+            Err(error) => {
+                // Oversized or broken frames: nothing after them can be trusted.
+                let broken = !matches!(error, Error::Io(_) | Error::ConnectionClosed | Error::AlreadyClosed);
+                counts.malformed.fetch_add(u64::from(broken), Ordering::Relaxed);
+                return false;
+            }
+        }
+    }
+    open
+}
+
+/// Waits for something to send, and sends all there is; `None` where there is nobody to send or to take it any more.
+fn send(socket: &mut WebSocket<TcpStream>, outbox: &Receiver<Outgoing>) -> Option<()> {
+    let mut next = outbox.recv_timeout(TURN);
+    while let Ok(outgoing) = next {
+        let message = match outgoing {
+            Outgoing::Text(text) => Message::text(text),
+            Outgoing::Binary(bytes) => Message::binary(bytes),
         };
-        if socket.write(message).is_err() {
-            return false;
-        }
+        socket.write(message).ok()?;
+        next = outbox.try_recv().map_err(|error| match error {
+            TryRecvError::Empty => RecvTimeoutError::Timeout,
+            TryRecvError::Disconnected => RecvTimeoutError::Disconnected,
+        });
     }
-    if socket.flush().is_err() {
-        return false;
+    socket.flush().ok()?;
+    next.is_err_and(|error| error == RecvTimeoutError::Timeout).then_some(())
+}
+
+/// The next message if it is there. Only reading does not wait: writing has a time limit of its own.
+fn read_now(socket: &mut WebSocket<TcpStream>) -> Result<Option<Message>, Error> {
+    socket.get_ref().set_nonblocking(true)?;
+    let read = socket.read();
+    socket.get_ref().set_nonblocking(false)?;
+    match read {
+        Err(Error::Io(error)) if error.kind() == std::io::ErrorKind::WouldBlock => Ok(None),
+        read => read.map(Some),
     }
-    let message = match socket.read() {
-        Ok(message) => message,
-        Err(Error::Io(error)) => {
-            return matches!(error.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut);
-        }
-        Err(Error::ConnectionClosed | Error::AlreadyClosed) => return false,
-        // Oversized or broken frames: nothing after them can be trusted.
-        Err(_) => {
-            counts.malformed.fetch_add(1, Ordering::Relaxed);
-            return false;
-        }
-    };
-    let events = match &message {
+}
+
+/// Hands a message to the session; whether the connection goes on.
+fn take(
+    message: &Message,
+    connection: u64,
+    bucket: &mut Bucket,
+    inbox: &SyncSender<Inbound>,
+    counts: &TrafficCounts,
+) -> bool {
+    let events = match message {
         Message::Text(text) => serde_json::from_str::<ClientMessage>(text).ok().map(|message| message.events),
         Message::Ping(_) | Message::Pong(_) => return true,
         Message::Close(_) => return false,

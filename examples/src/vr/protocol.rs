@@ -105,7 +105,7 @@ pub(super) fn welcome(session: &Session, key: &str) -> ServerMessage {
         clock: session.clock(),
         name: world.name.clone(),
         atlas: [world.surface.width(), world.surface.height()],
-        palette: world.palette.iter().map(|entry| Paint { name: entry.name, srgb: entry.srgb }).collect(),
+        palette: world.palette.iter().map(|entry| Paint { name: entry.name.as_str(), srgb: entry.srgb }).collect(),
         live: session.is_live(),
         paused: session.is_paused(),
         cradle: world.stand.coords.into(),

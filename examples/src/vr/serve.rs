@@ -17,16 +17,18 @@ use super::output::save;
 use super::protocol::{ServerMessage, patch, robot, surface, welcome};
 use super::session::{Handled, Session};
 
-/// Time between two changes of the picture, and between two poses of the robot.
-const PICTURE_STEP: Duration = Duration::from_millis(11);
+/// Time between two changes of what the person paints, and between two of the robot and of what it has sprayed.
+const HAND_STEP: Duration = Duration::from_millis(5);
 const ROBOT_STEP: Duration = Duration::from_millis(33);
+/// How long the session waits for events before it looks whether the robot is to be shown.
+const WAIT: Duration = Duration::from_millis(11);
 
 /// Serves a session until the person ends it.
 pub(super) fn serve(arguments: &Arguments, mut session: Session) -> Result<(), VrError> {
     let listening = listen(arguments.listen, "mouse, keyboard and touch paint")?;
     let mut desk = Desk::default();
     loop {
-        let ended = match listening.inbox.recv_timeout(PICTURE_STEP) {
+        let ended = match listening.inbox.recv_timeout(WAIT) {
             Ok(inbound) => desk.take(inbound, &mut session, arguments, &listening.counts)?,
             Err(RecvTimeoutError::Timeout) => false,
             Err(RecvTimeoutError::Disconnected) => true,
@@ -44,7 +46,8 @@ struct Desk {
     client: Client,
     /// Pictures that the page has missed because it was slow: they are sent whole when it takes them.
     missed: [bool; 2],
-    shown: Option<Instant>,
+    /// When each of the pictures was sent, and the robot.
+    shown: [Option<Instant>; 2],
     robot_shown: Option<Instant>,
     traffic: Traffic,
 }
@@ -95,25 +98,24 @@ impl Desk {
         for notice in session.take_notices() {
             self.client.say(&ServerMessage::Notice { notice });
         }
-        let due = |last: &mut Option<Instant>, step: Duration| {
-            let due = last.is_none_or(|last| last.elapsed() >= step);
-            if due {
-                *last = Some(Instant::now());
+        let due = |last: Option<Instant>, step: Duration| last.is_none_or(|last| last.elapsed() >= step);
+        for (number, step) in [HAND_STEP, ROBOT_STEP].into_iter().enumerate() {
+            if !due(self.shown[number], step) {
+                continue;
             }
-            due
-        };
-        if due(&mut self.shown, PICTURE_STEP) {
             let begun = ThreadTime::now();
-            let patches = session.take_patches();
+            let changed = session.take_patch(number);
             self.traffic.work(begun.elapsed().as_secs_f64(), 0);
-            for (number, changed) in patches.into_iter().enumerate() {
-                let whole = std::mem::take(&mut self.missed[number]);
-                let shown = if whole { Some(session.canvases()[number].whole()) } else { changed };
-                let sent = shown.is_none_or(|shown| self.client.send(Outgoing::Binary(patch(number as u8, &shown))));
-                self.missed[number] = !sent;
-            }
+            let whole = std::mem::take(&mut self.missed[number]);
+            let Some(shown) = (if whole { Some(session.canvases()[number].whole()) } else { changed }) else {
+                continue;
+            };
+            // Only what was sent counts: the first change after a pause goes out at once.
+            self.shown[number] = Some(Instant::now());
+            self.missed[number] = !self.client.send(Outgoing::Binary(patch(number as u8, &shown)));
         }
-        if due(&mut self.robot_shown, ROBOT_STEP) {
+        if due(self.robot_shown, ROBOT_STEP) {
+            self.robot_shown = Some(Instant::now());
             self.client.say(&robot(session));
         }
     }
@@ -121,7 +123,7 @@ impl Desk {
     fn end(&mut self, session: &mut Session, arguments: &Arguments, counts: &TrafficCounts) -> Result<(), VrError> {
         session.finish()?;
         self.missed = [true; 2];
-        self.shown = None;
+        self.shown = [None; 2];
         self.show(session);
         let saved = self.save(session, arguments, counts);
         self.client

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use nalgebra::Point3;
 use nalgebra::UnitVector3;
 use paint_planner::session::{
-    Feedback, LagIndicator, LiveQueue, QueueCounts, RATE, ResampleCounts, Resampler, Task, VrMode, VrState, segments,
+    Feedback, LagIndicator, LiveQueue, QueueCounts, RATE, ResampleCounts, Resampler, Task, VrMode, VrState,
 };
 use paint_sim::Shot;
 
@@ -14,9 +14,11 @@ use super::canvas::{Canvas, Patch};
 use super::counters::SessionCounts;
 use super::error::VrError;
 use super::event::{Command, Event};
+use super::latency::LatencyCurves;
 use super::message::Notice;
 use super::recording::{PlanMark, SessionRecorder};
 use super::settings::VrSettings;
+use super::strokes::Strokes;
 use super::vehicle::{PlannedTask, Vehicle, VehicleView, stand_off};
 use super::world::VrWorld;
 
@@ -45,17 +47,6 @@ pub enum Handled {
     },
 }
 
-/// Latencies over the session's time.
-#[derive(Debug, Clone, Default)]
-pub struct LatencyCurves {
-    /// Time and latency in distance, s and m, while the person paints or the robot lags.
-    pub distance: Vec<(f64, f64)>,
-    /// Time and latency in time at each plan, s.
-    pub time: Vec<(f64, f64)>,
-    /// Time that planning took, s of wall clock.
-    pub planning: Vec<f64>,
-}
-
 /// One person's session on one surface.
 pub struct Session {
     settings: VrSettings,
@@ -70,8 +61,8 @@ pub struct Session {
     /// Paint as the person sees it, and as the robot has sprayed it.
     seen: Canvas,
     flown: Canvas,
-    /// What was painted while the robot did not follow; idle states between the strokes.
-    strokes: Vec<VrState>,
+    /// What was painted while the robot did not follow.
+    strokes: Strokes,
     tasks: VecDeque<Task>,
     next_sequence: u64,
     /// Time of the latest state on the page's clock, s.
@@ -104,7 +95,7 @@ impl Session {
             paused: None,
             seen: Canvas::new(&world)?,
             flown: Canvas::new(&world)?,
-            strokes: Vec::new(),
+            strokes: Strokes::default(),
             tasks: VecDeque::new(),
             next_sequence: 0,
             page_time: 0.0,
@@ -220,7 +211,13 @@ impl Session {
 
     /// Changed parts of the two pictures: what the person sees, what the robot has sprayed.
     pub(super) fn take_patches(&mut self) -> [Option<Patch>; 2] {
-        [self.seen.take_patch(&self.world), self.flown.take_patch(&self.world)]
+        [0, 1].map(|number| self.take_patch(number))
+    }
+
+    /// The same of one of them.
+    pub(super) fn take_patch(&mut self, number: usize) -> Option<Patch> {
+        let canvas = if number == 0 { &mut self.seen } else { &mut self.flown };
+        canvas.take_patch(&self.world)
     }
 
     pub(super) fn canvases(&self) -> [&Canvas; 2] {
@@ -312,15 +309,13 @@ impl Session {
 
     fn push_offline(&mut self, tick: VrState) -> bool {
         let Some(hit) = tick.hit.filter(|_| tick.mode == VrMode::Painting) else {
-            if self.strokes.last().is_some_and(|last| last.mode != VrMode::Idle) {
-                self.strokes.push(VrState { mode: VrMode::Idle, hit: None, ..tick });
-            }
+            self.strokes.rest(tick);
             self.too_far = false;
             return false;
         };
         let near = self.near(&tick, &hit.point);
         if near {
-            self.strokes.push(tick);
+            self.strokes.paint(tick);
         } else if !self.too_far {
             let distance = (hit.point - tick.nozzle_position()).norm();
             self.notices.push(Notice::Feedback(Feedback::MoveCloser { distance }));
@@ -339,12 +334,12 @@ impl Session {
         if self.tasks.is_empty() && self.vehicle.is_continuable(now) {
             let position = self.vehicle.position();
             if let Some(segment) = self.queue.next_continuation(now, &position) {
-                match self.vehicle.go_on(&segment, now, &self.world, &self.settings)? {
-                    Some(planned) => {
-                        self.counts.continued += 1;
-                        self.planned(&planned)?;
-                    }
-                    None => self.tasks.push_back(Task::Segment(segment)),
+                if let Some(planned) = self.vehicle.go_on(&segment, now, &self.world, &self.settings)? {
+                    self.counts.continued += 1;
+                    self.planned(&planned)?;
+                } else {
+                    self.queue.give_back(segment);
+                    self.vehicle.let_halt();
                 }
             }
         }
@@ -410,7 +405,10 @@ impl Session {
             Command::Live { on } => self.live = on,
             Command::Pause { on } => self.pause(on),
             Command::Undo => self.undo()?,
-            Command::Erase { point, radius } => self.erase(&point, radius)?,
+            Command::Erase { point, radius } => {
+                let erased = self.strokes.erase(&point, radius);
+                self.withdraw(&erased)?;
+            }
             Command::Fly => self.fly_strokes(),
             Command::Save => return Ok(Handled::Results { end: false }),
             Command::End => return Ok(Handled::Results { end: true }),
@@ -423,31 +421,12 @@ impl Session {
         self.paused = self.last_tick.filter(|_| on);
     }
 
-    /// The last stroke, from its press to its release.
     fn undo(&mut self) -> Result<(), VrError> {
-        while self.strokes.last().is_some_and(|last| last.mode == VrMode::Idle) {
-            self.strokes.pop();
-        }
-        let begin = self.strokes.iter().rposition(|state| state.mode == VrMode::Idle).map_or(0, |idle| idle + 1);
-        let stroke = self.strokes.split_off(begin);
+        let stroke = self.strokes.undo();
         if stroke.is_empty() {
             self.say("nothing to take back: what the robot follows at once is on the wall".into());
         }
         self.withdraw(&stroke)
-    }
-
-    fn erase(&mut self, point: &Point3<f64>, radius: f64) -> Result<(), VrError> {
-        let inside = |state: &VrState| state.hit.is_some_and(|hit| (hit.point - point).norm() <= radius);
-        let mut erased = Vec::new();
-        for state in &mut self.strokes {
-            if inside(state) {
-                erased.push(*state);
-                // A pause where the stroke was: what is left of it are two.
-                *state = VrState { mode: VrMode::Idle, hit: None, ..*state };
-            }
-        }
-        self.strokes.dedup_by(|b, a| a.mode == VrMode::Idle && b.mode == VrMode::Idle);
-        self.withdraw(&erased)
     }
 
     fn withdraw(&mut self, states: &[VrState]) -> Result<(), VrError> {
@@ -461,8 +440,7 @@ impl Session {
     }
 
     fn fly_strokes(&mut self) {
-        let strokes = std::mem::take(&mut self.strokes);
-        self.tasks.extend(segments(strokes, &self.settings.session).into_iter().map(Task::Segment));
+        self.tasks.extend(self.strokes.take(&self.settings.session).into_iter().map(Task::Segment));
     }
 
     fn say(&mut self, text: String) {

@@ -71,6 +71,8 @@ struct Flight {
     colour: u8,
     /// The part of the pattern that it paints: where it begins and its length, m.
     pattern: Option<[f64; 2]>,
+    /// Whether what follows waits for its end.
+    halts: bool,
 }
 
 impl Flight {
@@ -131,8 +133,15 @@ impl Vehicle {
 
     /// Whether it paints, and could go on without a halt if there were more.
     pub(super) fn is_continuable(&self, now: f64) -> bool {
-        let soon = |flight: &Flight| flight.pattern.is_some() && flight.end() - now <= CONTINUE;
+        let soon = |flight: &Flight| flight.pattern.is_some() && !flight.halts && flight.end() - now <= CONTINUE;
         self.successor.is_none() && self.flight.as_ref().is_some_and(soon)
+    }
+
+    /// What it has in the air ends in a halt: it has been asked to go on, and cannot.
+    pub(super) fn let_halt(&mut self) {
+        if let Some(flight) = &mut self.flight {
+            flight.halts = true;
+        }
     }
 
     /// Length of the pattern that its nozzle has painted, m.
@@ -183,6 +192,7 @@ impl Vehicle {
                 landed: 0,
                 colour: painted.and_then(|segment| segment.states.first()).map_or(0, |state| state.colour),
                 pattern: painted.map(|segment| [segment.start, segment.length]),
+                halts: false,
             });
         } else if let Some(segment) = painted {
             // What cannot be flown is not caught up with either.
@@ -239,7 +249,7 @@ impl Vehicle {
         let log = self.fly(&plan, &planner, RUN_UP, world, settings)?;
         self.arrive(&plan);
         let pattern = Some([start, segment.start + segment.length - start]);
-        self.successor = Some(Flight { begin, plan, targets, log, landed: 0, colour, pattern });
+        self.successor = Some(Flight { begin, plan, targets, log, landed: 0, colour, pattern, halts: false });
         Ok(Some(record))
     }
 

@@ -9,12 +9,12 @@ use tsdf_hash::Map;
 use uv_param::SurfacePoint;
 
 use super::error::VrError;
-use super::palette::{PaletteEntry, palette};
 use super::settings::VrSettings;
 use crate::adapters::Robot;
 use crate::appearance::sandstone;
 use crate::mesh_io::TriangleMesh;
 use crate::mission_file::MissionFile;
+use crate::palette::{PaletteEntry, palette};
 use crate::progress::Stage;
 use crate::surface::PaintSurface;
 

@@ -6,6 +6,8 @@ use paint_planner::TimingPolicy;
 use paintcopter_examples::mesh_placement::UpAxis;
 use paintcopter_examples::mission::{MissionSettings, PainterChoice};
 use paintcopter_examples::mission_file::MissionFile;
+use paintcopter_examples::mission_paint::MissionPaint;
+use paintcopter_examples::palette::PaintName;
 use paintcopter_examples::picture_placement::{PicturePlacement, PlacementMode};
 use paintcopter_examples::projection::Viewpoint;
 use paintcopter_examples::region::Region;
@@ -38,6 +40,12 @@ fn a_mission_keeps_all_that_it_was_told() {
         scan: true,
         region: Some(Region::Mask(s.0.join("d.png"))),
         settings,
+        paints: vec![MissionPaint {
+            name: PaintName::Green,
+            design: None,
+            texture: Some(s.0.join("e.png")),
+            fill: None,
+        }],
     };
     let path = s.0.join("mission.toml");
     told.write(&path).unwrap();
@@ -97,6 +105,28 @@ fn a_run_can_be_repeated_from_the_file_that_it_leaves() {
     );
     let (code, text) = run(&["--mission", "elsewhere/mission.toml", "--seed", "4"], "three");
     assert!(code == Some(2) && text.contains("--seed") && text.contains("--mission"), "{text}");
+}
+
+#[test]
+fn several_paints_are_read_checked_and_written() {
+    let s = Scratch::new("paints");
+    let read = |text: &str| {
+        s.write("mission.toml", text);
+        MissionFile::read(&s.0.join("mission.toml"))
+    };
+    let paints = "[[paints]]\nname = \"red\"\ndesign = \"part/red.png\"\n[[paints]]\nname = \"white\"\nfill = 2e-5\n";
+    let mission = read(paints).unwrap();
+    assert_eq!(mission.paints.len(), 2);
+    assert_eq!(mission.paints[0].design.as_deref(), s.0.join("part/red.png").to_str());
+    mission.write(&s.0.join("again.toml")).unwrap();
+    assert_eq!(MissionFile::read(&s.0.join("again.toml")).unwrap(), mission);
+
+    let refused = |text: String| read(&text).unwrap().decide_coats(&s.0).map(|_| ()).unwrap_err().to_string();
+    assert!(refused(format!("design = \"stripes\"\n{paints}")).contains("leave out"));
+    assert!(refused("[[paints]]\nname = \"green\"\n".into()).contains("green: give a design"));
+    assert!(refused(paints.into()).contains("red.png"), "a picture that is not there is named");
+    let error = read(&paints.replace("white", "mauve")).unwrap_err().to_string();
+    assert!(error.contains("mauve") && error.contains("charcoal"), "{error}");
 }
 
 /// Rows of a table by name of the column.

@@ -13,6 +13,9 @@ use crate::scratch::Scratch;
 /// A wall of 2.6 metres by 1.4, facing -x.
 const WALL: &str = "v 0 1.3 1\nv 0 -1.3 1\nv 0 -1.3 2.4\nv 0 1.3 2.4\nf 1 2 3\nf 1 3 4\n";
 
+/// Flow of the strokes in two colours, m^3/s: thin enough for the scale of ink.
+const FLOW: f64 = 1.5e-7;
+
 fn vr(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_vr")).args(arguments).output().unwrap()
 }
@@ -53,7 +56,7 @@ fn a_session_is_flown_as_it_was_seen_and_replays_bit_for_bit() {
     assert_eq!(figures["targets"], figures["targets_served"]);
     assert!(figures["continued_tasks"].as_u64().unwrap() >= 3, "{figures:#}");
     for file in
-        ["session.mcap", "plan.csv", "seen.png", "flown.png", "latency.png", "mission.toml", "mission_paint.png"]
+        ["session.mcap", "plan.csv", "seen.png", "flown.png", "latency.png", "mission.toml", "mission_charcoal.png"]
     {
         assert!(s.0.join("first").join(file).metadata().is_ok_and(|found| found.len() > 100), "{file}");
     }
@@ -173,14 +176,15 @@ impl Client {
 
     /// States of a gun before the wall, in the order of `sequence`; they paint between 10 and 40.
     fn states(from: u64, to: u64) -> Vec<Value> {
-        let state = |k: u64| {
-            let mode = if (10..40).contains(&k) { "painting" } else { "idle" };
-            let at = json!([-0.1, 0.2 - 0.005 * k as f64, 2.2]);
-            json!({"state": {"version": 1, "sequence": k, "time": k as f64 / 90.0, "mode": mode,
-                "nozzle": {"translation": at, "rotation": [0.0, 0.0, 0.0, 1.0]},
-                "cradle": {"position": [-1.0, 0.0, 2.2], "heading": 0.0}, "colour": 0, "flow": 4e-7}})
-        };
-        (from..to).map(state).collect()
+        let mode = |k| if (10..40).contains(&k) { "painting" } else { "idle" };
+        (from..to).map(|k| Self::state(k, mode(k), [0.2 - 0.005 * k as f64, 2.2], (0, 4e-7))).collect()
+    }
+
+    /// A gun 10 cm before the wall, at `y` and `z`.
+    fn state(k: u64, mode: &str, [y, z]: [f64; 2], (colour, flow): (u8, f64)) -> Value {
+        json!({"state": {"version": 1, "sequence": k, "time": k as f64 / 90.0, "mode": mode,
+            "nozzle": {"translation": [-0.1, y, z], "rotation": [0.0, 0.0, 0.0, 1.0]},
+            "cradle": {"position": [-1.0, 0.0, 2.2], "heading": 0.0}, "colour": colour, "flow": flow}})
     }
 }
 
@@ -223,6 +227,78 @@ fn nothing_is_lost_or_done_twice_over_lost_connections() {
     let seen = figures["paint_seen_ml"].as_f64().unwrap();
     assert!((seen - 0.4 * 30.0 / 90.0).abs() < 0.002, "{seen}");
     assert!(figures["paint_flown_ml"].as_f64().unwrap() > 0.9 * seen);
+}
+
+/// Middle of the pixels of a colour, as shares of width and height, and how many there are as a share of all.
+fn middle(picture: &str, is: impl Fn([u8; 3]) -> bool) -> ([f64; 2], f64) {
+    let picture = image::open(picture).unwrap().to_rgb8();
+    let (width, height) = picture.dimensions();
+    let places: Vec<[f64; 2]> = picture
+        .enumerate_pixels()
+        .filter(|(_, _, pixel)| is(pixel.0))
+        .map(|(x, y, _)| [(f64::from(x) + 0.5) / f64::from(width), (f64::from(y) + 0.5) / f64::from(height)])
+        .collect();
+    let count = places.len() as f64;
+    ([0, 1].map(|k| places.iter().map(|place| place[k]).sum::<f64>() / count), count / f64::from(width * height))
+}
+
+#[test]
+fn a_session_in_two_colours_is_flown_as_a_mission_of_two_paints() {
+    let s = Scratch::new("vr-colours");
+    let (out, flown) = (s.path("out"), s.path("flown"));
+    let mesh = wall(&s);
+    let mut arguments: Vec<&str> = mesh.iter().map(String::as_str).collect();
+    arguments.extend(["--listen", "127.0.0.1:0", "--offline", "--texel", "0.01", "--out", &out]);
+    let server = Server::start(&arguments);
+    let mut client = server.connect("").unwrap();
+    // Blue first, then red: the strokes are 0.3 m long, their middles at y = 0.65 and -0.45, z = 2.6 and 1.8.
+    let strokes = [(0, 4, 0.8, 2.6), (150, 1, -0.3, 1.8)];
+    let mut events = Vec::new();
+    for (first, colour, y, z) in strokes {
+        let along = |k: u64| y - 0.3 * (k.clamp(10, 130) - 10) as f64 / 120.0;
+        let mode = |k: u64| if (10..=130).contains(&k) { "painting" } else { "idle" };
+        events.extend((0..150).map(|k| Client::state(first + k, mode(k), [along(k), z], (colour, FLOW))));
+    }
+    events.push(json!({"command": {"sequence": 300, "command": {"do": "end"}}}));
+    client.socket.send(Message::text(json!({ "events": events }).to_string())).unwrap();
+    client.until("notice");
+    assert!(server.finish());
+
+    let mission = std::fs::read_to_string(format!("{out}/mission.toml")).unwrap();
+    let [blue, red] = ["\"blue\"", "\"red\""].map(|name| mission.find(name).expect("both paints are saved"));
+    assert!(blue < red, "in the order in which they were used: {mission}");
+    let output = Command::new(env!("CARGO_BIN_EXE_paintcopter"))
+        .args(["--mission", &format!("{out}/mission.toml"), "--out", &flown])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let figures = report(&flown);
+    assert_eq!(figures["paints"], json!(["blue", "red"]));
+    for (paint, kilograms) in figures["paint_deposited_kg_by_paint"].as_array().unwrap().iter().enumerate() {
+        // 121 ticks, 1.2 kg/l.
+        let asked = 1200.0 * FLOW * 121.0 / 90.0;
+        let ratio = kilograms.as_f64().unwrap() / asked;
+        assert!((ratio - 1.0).abs() < 0.15, "paint {paint}: {ratio} of what the hand gave");
+    }
+    // The wall is hung: y from 1.3 to -1.3 to the right, z from 2.9 to 1.5 downwards.
+    let is_blue = |[r, _, b]: [u8; 3]| b > r;
+    let is_red = |[r, g, b]: [u8; 3]| f64::from(r) > 1.6 * f64::from(g) && r > b;
+    for (name, place, is) in [
+        ("blue", [0.65 / 2.6, 0.3 / 1.4], &is_blue as &dyn Fn([u8; 3]) -> bool),
+        ("red", [1.75 / 2.6, 1.1 / 1.4], &is_red),
+    ] {
+        for picture in [format!("{out}/seen.png"), format!("{flown}/painted.png")] {
+            let (found, share) = middle(&picture, is);
+            let off = [0, 1].map(|k| (found[k] - place[k]).abs());
+            assert!(off[0] < 0.02 && off[1] < 0.02, "{name} of {picture}: {found:?}, asked for {place:?}");
+            // A stroke of 0.3 m, a few centimetres wide.
+            assert!((0.002..0.012).contains(&share), "{name} of {picture}: {share}");
+        }
+    }
+    // Each paint alone has a complete mission.
+    for file in ["1_blue/report.md", "2_red/mission.mcap", "2_red/mission.toml", "painted_view.png", "report.md"] {
+        assert!(s.0.join("flown").join(file).metadata().is_ok_and(|found| found.len() > 100), "{file}");
+    }
 }
 
 #[test]

@@ -4,13 +4,15 @@ import type { Command, Event, ServerMessage, State } from "./protocol";
 // Events in one message: small enough for the server's limit after a long time without a connection.
 const MOST_EVENTS = 500;
 // Time between two messages, and before another attempt, milliseconds.
-const SEND_STEP = 16;
+const SEND_STEP = 8;
 const RETRY = 500;
 
 export interface Listener {
   message(message: ServerMessage): void;
   binary(data: ArrayBuffer): void;
   connected(open: boolean): void;
+  /** Events before this one are on their way. */
+  sent(before: number): void;
 }
 
 export class Connection {
@@ -23,6 +25,8 @@ export class Connection {
   private answers = 0;
   /** When the messages left that are not answered yet, and how long the answers took, milliseconds. */
   private left: number[] = [];
+  private latest = 0;
+  private due = false;
   readonly roundTrips: number[] = [];
   private stalled = false;
   private welcomed = false;
@@ -35,8 +39,19 @@ export class Connection {
     setInterval(() => this.flush(), SEND_STEP);
   }
 
-  state(state: Omit<State, "sequence">): void {
-    if (this.key !== "" && !this.ended) this.unsent.push({ state: { ...state, sequence: this.next++ } });
+  /** Its number; -1 where nothing is taken any more. */
+  state(state: Omit<State, "sequence">): number {
+    if (this.key === "" || this.ended) return -1;
+    this.unsent.push({ state: { ...state, sequence: this.next } });
+    this.soon();
+    return this.next++;
+  }
+
+  // What the hand does now leaves with this task, not with the next tick of a clock; the server's limit of messages holds all the same.
+  private soon(): void {
+    if (this.due || performance.now() - this.latest < SEND_STEP) return;
+    this.due = true;
+    queueMicrotask(() => this.flush());
   }
 
   command(command: Command): void {
@@ -109,6 +124,7 @@ export class Connection {
   }
 
   private flush(): void {
+    this.due = false;
     const socket = this.socket;
     if (!this.welcomed || !socket || socket.readyState !== WebSocket.OPEN) {
       this.answers = 0;
@@ -120,6 +136,8 @@ export class Connection {
     socket.send(JSON.stringify({ events }));
     this.sent += events.length;
     this.answers++;
-    this.left.push(performance.now());
+    this.latest = performance.now();
+    this.left.push(this.latest);
+    this.listener.sent(this.next - this.unsent.length + this.sent);
   }
 }

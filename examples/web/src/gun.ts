@@ -47,6 +47,11 @@ export class Gun {
     this.draw(this.position, 0.15 * distance);
   }
 
+  /** How far it is from what it hits, metres. */
+  get distance(): number {
+    return this.hit ? this.position.distanceTo(this.hit.point) : Infinity;
+  }
+
   set visible(on: boolean) {
     this.group.visible = on;
   }

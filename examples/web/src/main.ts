@@ -4,15 +4,19 @@ import { Atlas } from "./atlas";
 import { Banner } from "./banner";
 import { Connection } from "./connection";
 import { Cradle } from "./cradle";
+import { Delays, rasterised } from "./delays";
+import { Echo } from "./echo";
 import { Gun } from "./gun";
 import { Headset } from "./headset";
+import { sky, sun } from "./light";
 import { Pointer } from "./pointer";
 import { PROTOCOL, STATE_VERSION, readEntity, readPatch, readPicture, readSurface } from "./protocol";
-import type { Mode, Notice, ServerMessage, Triple } from "./protocol";
+import type { Mode, Notice, ServerMessage, State, Triple } from "./protocol";
 import { Quality, drawsInSoftware } from "./quality";
 import { Robot } from "./robot";
 import { Tools } from "./tools";
 import { Wall } from "./wall";
+import type { Hit } from "./wall";
 import { Watch } from "./watch";
 
 // Time without a movement after which a pointer rests, milliseconds.
@@ -21,14 +25,18 @@ const STILL = 60;
 const ERASER = 0.06;
 
 const canvas = document.getElementById("scene") as HTMLCanvasElement;
-const renderer = new THREE.WebGLRenderer({ canvas, antialias: !drawsInSoftware() });
+const software = drawsInSoftware();
+const renderer = new THREE.WebGLRenderer({ canvas, antialias: !software });
+// Where the processor draws, a picture that waits behind another is late: one at a time.
+let drawing = false;
+// Whether anything differs from what is drawn, and what the hand was drawn like.
+let stale = true;
+let held = "";
 const quality = new Quality(renderer);
 const scene = new THREE.Scene();
 scene.background = new THREE.Color(0xdfe7ec);
 scene.fog = new THREE.Fog(0xdfe7ec, 12, 40);
-scene.add(new THREE.HemisphereLight(0xf4f8ff, 0x8d7f70, 1.9));
-const sun = new THREE.DirectionalLight(0xfff1dd, 1.7);
-scene.add(sun, sun.target);
+scene.add(sky, sun, sun.target);
 const ground = new THREE.Mesh(new THREE.CircleGeometry(30, 64), new THREE.MeshLambertMaterial({ color: 0xb9c2c6 }));
 scene.add(ground);
 const grid = new THREE.GridHelper(30, 30, 0x9aa7ae, 0xa9b4ba);
@@ -56,13 +64,13 @@ const headset = new Headset(renderer, cradle);
 const caster = new THREE.Raycaster();
 
 let atlas: Atlas | null = null;
+let echo: Echo | null = null;
 let wall: Wall | null = null;
 let watch: Watch | null = null;
 let placed = false;
-// When the hand painted what is not on the screen yet, whether its paint has come, and how long it took, milliseconds.
-let sprayed = 0;
-let fresh = false;
-const delays: number[] = [];
+const delays = new Delays();
+// When the surface has come, and when it was first seen, milliseconds after the page was asked for.
+const first = { surface: 0, drawn: 0 };
 // The session's clock goes on where it was when the page came.
 let begun = 0;
 
@@ -71,6 +79,7 @@ const tools = new Tools((name, on) => {
     case "live":
       return connection.command({ do: "live", on });
     case "flown":
+      stale = true;
       if (wall) wall.flown = on;
       return;
     case "record":
@@ -94,15 +103,18 @@ function pause(on: boolean): void {
   connection.command({ do: "pause", on });
 }
 
-const connection = new Connection({ message, binary, connected: (open) => tools.connected(open, connection.waiting) });
+const sent = (before: number) => delays.sent(before);
+const connection = new Connection({ message, binary, sent, connected: (open) => tools.connected(open, connection.waiting) });
 
 function message(message: ServerMessage): void {
+  stale ||= message.type !== "ack" && message.type !== "robot";
   switch (message.type) {
     case "welcome":
       if (message.protocol !== PROTOCOL) return location.reload();
       document.title = `PaintCopter: ${message.name}`;
       tools.welcome(message);
       atlas ??= new Atlas(...message.atlas);
+      echo ??= new Echo(atlas.pictures[0]);
       if (!placed) {
         begun = message.clock + 0.01 - performance.now() / 1000;
         stand(message.cradle, message.heading);
@@ -119,6 +131,9 @@ function message(message: ServerMessage): void {
       scene.add(watch.group);
       robot.group.visible = gun.visible = false;
       return;
+    case "ack":
+      echo?.answer(message.next_sequence);
+      return delays.answered(message.next_sequence);
     case "place":
       watch?.place(message);
       if (!placed) stand(message.cradle, message.heading);
@@ -129,7 +144,7 @@ function message(message: ServerMessage): void {
       tools.paused(message.paused);
       return tools.playback(message.elapsed);
     case "robot":
-      robot.update(message);
+      if (robot.update(message)) stale = true;
       return tools.robot(message);
     case "notice":
       return notice(message.notice);
@@ -168,14 +183,19 @@ function notice(notice: Notice): void {
 }
 
 function binary(data: ArrayBuffer): void {
+  stale = true;
   const kind = new Uint8Array(data, 0, 1)[0];
   if (kind === 1 && atlas && !wall) {
     wall = new Wall(readSurface(data), atlas);
     scene.add(wall.mesh);
+    first.surface = performance.now();
   } else if (kind === 2) {
     const patch = readPatch(data);
     atlas?.update(patch);
-    fresh ||= patch.picture === 0;
+    if (patch.picture === 0) {
+      echo?.texels();
+      delays.texels();
+    }
   } else if (kind === 3) {
     watch?.update(readEntity(data));
   } else if (kind === 4) {
@@ -215,6 +235,7 @@ addEventListener("keyup", (event) => cradle.keys.delete(event.code));
 addEventListener("blur", () => cradle.keys.clear());
 
 function resize(): void {
+  stale = true;
   if (headset.presenting) return;
   renderer.setSize(innerWidth, innerHeight, false);
   camera.aspect = innerWidth / innerHeight;
@@ -244,17 +265,33 @@ function publish(wall: Wall, time: number): Mode {
     if (gun.hit) connection.command({ do: "erase", point: gun.hit.point.toArray(), radius: ERASER });
     mode = "idle";
   }
-  if (mode === "painting" && gun.hit && sprayed === 0) [sprayed, fresh] = [performance.now(), false];
-  connection.state({
+  const nozzle = gun.pose;
+  const here: State["cradle"] = { position: cradle.group.position.toArray(), heading: cradle.heading };
+  const hand = JSON.stringify([mode, nozzle, here, pointer.pitch]);
+  stale ||= hand !== held;
+  held = hand;
+  const sequence = connection.state({
     version: STATE_VERSION,
     time: begun + time / 1000,
     mode,
-    nozzle: gun.pose,
-    cradle: { position: cradle.group.position.toArray(), heading: cradle.heading },
+    nozzle,
+    cradle: here,
     colour: tools.colour,
     flow: tools.flow,
   });
+  if (mode === "painting" && gun.hit && sequence >= 0) {
+    delays.hand(sequence, time);
+    spray(wall, gun.hit, sequence, time);
+  }
   return mode;
+}
+
+/** Shows the paint of a state before the server has it. */
+function spray(wall: Wall, { uv }: Hit, sequence: number, time: number): void {
+  const distance = tools.paintsFrom(gun.distance);
+  if (distance === null || !echo) return;
+  echo.spray({ sequence, time, uv, texel: wall.texel, distance, colour: tools.paint, flow: tools.flow });
+  delays.guessed(time);
 }
 
 const clock = new THREE.Timer();
@@ -268,11 +305,24 @@ renderer.setAnimationLoop((time) => {
   const moving = !headset.presenting && now - moved < STILL;
   if (watch && headset.presenting) headset.update();
   if (wall && !moving) wall.project(publish(wall, now) === "viewing" ? robot.camera : null);
+  if (echo?.tidy()) stale = true;
+  if (drawing || !(stale || watch || headset.presenting)) return;
+  stale = false;
+  atlas?.upload(renderer);
   renderer.render(scene, camera);
-  if (!headset.presenting) quality.frame(time);
-  if (sprayed > 0 && fresh) {
-    if (delays.push(performance.now() - sprayed) > 2000) delays.shift();
-    sprayed = 0;
+  const gl = renderer.getContext() as WebGL2RenderingContext;
+  delays.drawn(gl);
+  if (!headset.presenting && (software || quality.due())) {
+    drawing = software;
+    const begun = performance.now();
+    void rasterised(gl).then((now) => {
+      drawing = false;
+      if (quality.took(now - begun)) stale = true;
+    });
+  }
+  if (wall && first.drawn === 0) {
+    first.drawn = -1;
+    void rasterised(gl).then((now) => (first.drawn = now));
   }
 });
 
@@ -281,4 +331,4 @@ void Headset.available().then((available) => tools.headset(available));
 navigator.xr?.addEventListener("devicechange", () => void Headset.available().then((found) => tools.headset(found)));
 
 // For tests in a browser: what the page knows, and a way to lose the connection.
-Object.assign(window, { paintcopter: { connection, headset, cradle, camera, delays, renderer, wall: () => wall, watch: () => watch } });
+Object.assign(window, { paintcopter: { connection, headset, cradle, camera, delays, first, renderer, atlas: () => atlas, wall: () => wall, watch: () => watch } });

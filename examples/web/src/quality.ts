@@ -1,9 +1,10 @@
 // How fine the picture is: what a machine without a graphics processor can draw in time is coarser.
 import type { WebGLRenderer } from "three";
 
-// Frames between two looks at the time, and the time of a frame that is too long, milliseconds.
-const FRAMES = 20;
-const SLOW = 45;
+// Pictures whose time is looked at before it is judged, every how many of them is, and the time of one that is too long, milliseconds.
+const PICTURES = 20;
+const EVERY = 4;
+const SLOW = 25;
 const COARSEST = 0.5;
 
 /** Whether the browser draws on the processor. */
@@ -16,8 +17,9 @@ export function drawsInSoftware(): boolean {
 }
 
 export class Quality {
-  private frames = 0;
-  private since = 0;
+  private drawn = 0;
+  private looked = 0;
+  private sum = 0;
   private readonly renderer: WebGLRenderer;
 
   constructor(renderer: WebGLRenderer) {
@@ -25,13 +27,20 @@ export class Quality {
     renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
   }
 
-  /** Told of every frame, with its time in milliseconds; makes the picture coarser while frames take too long. */
-  frame(time: number): void {
-    if (++this.frames < FRAMES) return;
-    const each = (time - this.since) / this.frames;
+  /** Whether the time of the picture that is drawn now should be told. */
+  due(): boolean {
+    return ++this.drawn % EVERY === 0;
+  }
+
+  /** Told how long a picture took, milliseconds; makes them coarser while they take too long. Whether it has. */
+  took(time: number): boolean {
+    this.sum += time;
+    if (++this.looked < PICTURES) return false;
+    const each = this.sum / this.looked;
+    [this.looked, this.sum] = [0, 0];
     const ratio = this.renderer.getPixelRatio();
-    if (this.since > 0 && each > SLOW && ratio > COARSEST) this.renderer.setPixelRatio(Math.max(COARSEST, 0.75 * ratio));
-    this.frames = 0;
-    this.since = time;
+    if (each <= SLOW || ratio <= COARSEST) return false;
+    this.renderer.setPixelRatio(Math.max(COARSEST, 0.75 * ratio));
+    return true;
   }
 }

@@ -8,6 +8,7 @@ export class Robot {
   readonly group = new THREE.Group();
   /** The robot's camera: it looks along the spray. */
   readonly camera = new THREE.PerspectiveCamera(50, 4 / 3, 0.05, 20);
+  private latest = "";
   private readonly body = new THREE.Group();
   private readonly arm: THREE.Line;
   private readonly spray: THREE.Line;
@@ -37,7 +38,12 @@ export class Robot {
     this.camera.up.set(0, 0, 1);
   }
 
-  update(state: RobotState): void {
+  /** Whether it looks otherwise than before. */
+  update(state: RobotState): boolean {
+    const { position, rotation, nozzle, aim, spraying } = state;
+    const before = this.latest;
+    this.latest = JSON.stringify([position, rotation, nozzle, aim, spraying]);
+    if (this.latest === before) return false;
     this.body.position.set(...state.position);
     this.body.quaternion.set(...state.rotation);
     this.joint.position.set(...state.nozzle);
@@ -50,6 +56,7 @@ export class Robot {
     this.camera.position.set(...state.nozzle);
     this.camera.lookAt(...state.aim);
     this.camera.updateMatrixWorld();
+    return true;
   }
 
   /** Rule (d): a robot that is far behind is seen better. */

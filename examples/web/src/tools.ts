@@ -1,5 +1,5 @@
 // The panel: palette, sliders, buttons, read-outs.
-import type { RobotState, Welcome } from "./protocol";
+import type { RobotState, Triple, Welcome } from "./protocol";
 
 // Flow of the open valve, m^3/s.
 const MOST_FLOW = 1e-6;
@@ -9,7 +9,10 @@ const element = <T extends HTMLElement>(id: string) => document.getElementById(i
 export class Tools {
   colour = 0;
   erasing = false;
+  private paints: Triple[] = [];
   private standOff: [number, number] = [0.06, 0.14];
+  private far = 0;
+  private waiting = false;
 
   /** Calls `act` with the name of a button that is pressed. */
   constructor(act: (name: string, on: boolean) => void) {
@@ -29,6 +32,8 @@ export class Tools {
 
   welcome(welcome: Welcome): void {
     this.standOff = welcome.stand_off;
+    this.far = welcome.far;
+    this.paints = welcome.palette.map((paint) => paint.srgb);
     element("live").setAttribute("aria-pressed", String(welcome.live));
     this.paused(welcome.paused);
     const palette = element("palette");
@@ -49,6 +54,11 @@ export class Tools {
     );
   }
 
+  /** Colour of a thick coat of the paint, sRGB. */
+  get paint(): Triple {
+    return this.paints[this.colour] ?? [0, 0, 0];
+  }
+
   /** Flow, m^3/s. */
   get flow(): number {
     return MOST_FLOW * element<HTMLInputElement>("flow").valueAsNumber;
@@ -58,6 +68,12 @@ export class Tools {
   get distance(): number {
     const [near, far] = this.standOff;
     return near + (far - near) * element<HTMLInputElement>("brush").valueAsNumber;
+  }
+
+  /** Distance that a gun at `distance` paints from, metres; `null` where it paints nothing now. */
+  paintsFrom(distance: number): number | null {
+    if (this.isPaused || this.waiting || distance >= this.far) return null;
+    return Math.min(this.standOff[1], Math.max(this.standOff[0], distance));
   }
 
   /** Shows what a session or a recording does, and hides what it cannot do. */
@@ -86,6 +102,7 @@ export class Tools {
 
   robot(state: RobotState): void {
     this.paused(state.paused);
+    this.waiting = state.waiting;
     element("lag").textContent = `${state.lag.toFixed(2)} m`;
     element("latency").textContent = state.latency > 0 ? `${state.latency.toFixed(1)} s` : "–";
   }

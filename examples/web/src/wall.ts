@@ -2,15 +2,54 @@
 import * as THREE from "three";
 import { MeshBVH, acceleratedRaycast } from "three-mesh-bvh";
 import type { Atlas } from "./atlas";
+import { BRIGHTEST, baked } from "./light";
 import type { Surface } from "./protocol";
+
+const vertexShader = `
+  attribute vec3 light;
+  varying vec2 vUv;
+  varying vec3 vLight;
+  varying vec3 vWorld;
+  void main() {
+    vUv = uv;
+    vLight = ${BRIGHTEST} * light;
+    vWorld = position;
+    gl_Position = projectionMatrix * (modelViewMatrix * vec4(position, 1.0));
+  }`;
+
+// Pictures are what the display shall show, and so is the light: nothing is decoded and encoded again for every pixel.
+const fragmentShader = `
+  uniform sampler2D map;
+  uniform sampler2D flownMap;
+  uniform float flownShare;
+  uniform float robotView;
+  uniform mat4 viewFromWorld;
+  varying vec2 vUv;
+  varying vec3 vLight;
+  varying vec3 vWorld;
+  void main() {
+    vec3 colour = texture2D(map, vUv).rgb;
+    if (flownShare + robotView > 0.0) {
+      // What the robot's camera sees is thrown back onto the surface, with a frame about it.
+      vec4 seenBy = viewFromWorld * vec4(vWorld, 1.0);
+      vec2 inView = abs(seenBy.xy / seenBy.w);
+      float inside = robotView * float(seenBy.w > 0.0 && max(inView.x, inView.y) < 1.0);
+      colour = mix(colour, texture2D(flownMap, vUv).rgb, max(flownShare, inside));
+      colour = mix(colour, vec3(0.35, 0.70, 0.95), inside * step(0.96, max(inView.x, inView.y)));
+    }
+    gl_FragColor = vec4(colour * vLight, 1.0);
+  }`;
 
 export interface Hit {
   point: THREE.Vector3;
   normal: THREE.Vector3;
+  uv: THREE.Vector2;
 }
 
 export class Wall {
   readonly mesh: THREE.Mesh;
+  /** Metres of a texel. */
+  readonly texel: number;
   private readonly caster = new THREE.Raycaster();
   private readonly uniforms: Record<string, THREE.IUniform>;
 
@@ -21,45 +60,22 @@ export class Wall {
     // The hierarchy sorts the corners; they must be its own.
     geometry.setIndex(new THREE.BufferAttribute(surface.faces.slice(), 1));
     geometry.computeVertexNormals();
-    geometry.boundsTree = new MeshBVH(geometry);
-    const material = new THREE.MeshLambertMaterial({ map: atlas.textures[0], side: THREE.DoubleSide });
+    geometry.boundsTree = new MeshBVH(geometry, { indirect: true });
+    geometry.setAttribute("light", baked(geometry.attributes.normal as THREE.BufferAttribute));
+    geometry.deleteAttribute("normal");
     this.uniforms = {
-      flownMap: { value: atlas.textures[1] },
+      map: { value: atlas.pictures[0].texture },
+      flownMap: { value: atlas.pictures[1].texture },
       flownShare: { value: 0 },
       robotView: { value: 0 },
       viewFromWorld: { value: new THREE.Matrix4() },
     };
-    material.onBeforeCompile = (shader) => {
-      Object.assign(shader.uniforms, this.uniforms);
-      shader.vertexShader = shader.vertexShader
-        .replace("#include <common>", "#include <common>\nvarying vec3 vWorld;")
-        .replace("#include <begin_vertex>", "#include <begin_vertex>\nvWorld = (modelMatrix * vec4(position, 1.0)).xyz;");
-      shader.fragmentShader = shader.fragmentShader
-        .replace(
-          "#include <common>",
-          `#include <common>
-          varying vec3 vWorld;
-          uniform sampler2D flownMap;
-          uniform float flownShare;
-          uniform float robotView;
-          uniform mat4 viewFromWorld;`,
-        )
-        .replace(
-          "#include <map_fragment>",
-          // What the robot's camera sees is thrown back onto the surface, with a frame about it.
-          `#include <map_fragment>
-          vec4 seenBy = viewFromWorld * vec4(vWorld, 1.0);
-          vec2 inView = abs(seenBy.xy / seenBy.w);
-          float inside = robotView * float(seenBy.w > 0.0 && max(inView.x, inView.y) < 1.0);
-          float share = max(flownShare, inside);
-          diffuseColor.rgb = mix(diffuseColor.rgb, texture2D(flownMap, vMapUv).rgb, share);
-          float frame = inside * step(0.96, max(inView.x, inView.y));
-          diffuseColor.rgb = mix(diffuseColor.rgb, vec3(0.1, 0.45, 0.9), frame);`,
-        );
-    };
+    const material = new THREE.ShaderMaterial({ uniforms: this.uniforms, vertexShader, fragmentShader, side: THREE.DoubleSide });
     this.mesh = new THREE.Mesh(geometry, material);
     this.mesh.raycast = acceleratedRaycast;
     this.caster.firstHitOnly = true;
+    const { width, height } = atlas.pictures[0];
+    this.texel = Math.sqrt(areas(surface) / (width * height));
   }
 
   /** Shows all of the robot's own paint, or not. */
@@ -81,6 +97,20 @@ export class Wall {
     const found = this.caster.intersectObject(this.mesh, false)[0];
     if (!found?.face) return null;
     const normal = found.normal ?? found.face.normal;
-    return { point: found.point, normal: normal.clone().normalize() };
+    return { point: found.point, normal: normal.clone().normalize(), uv: found.uv ?? new THREE.Vector2() };
   }
+}
+
+/** Area of the surface over that of its texture coordinates. */
+function areas({ positions, uv, faces }: Surface): number {
+  const [a, b] = [new THREE.Vector3(), new THREE.Vector3()];
+  let [surface, texture] = [0, 0];
+  const side = (out: THREE.Vector3, data: Float32Array, items: number, from: number, to: number) =>
+    out.set(...[0, 1, 2].map((k) => (k < items ? (data[items * to + k] ?? 0) - (data[items * from + k] ?? 0) : 0)) as [number, number, number]);
+  for (let k = 0; k < faces.length; k += 3) {
+    const [p, q, r] = [faces[k] ?? 0, faces[k + 1] ?? 0, faces[k + 2] ?? 0];
+    surface += side(a, positions, 3, p, q).cross(side(b, positions, 3, p, r)).length();
+    texture += side(a, uv, 2, p, q).cross(side(b, uv, 2, p, r)).length();
+  }
+  return surface / texture;
 }

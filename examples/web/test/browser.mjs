@@ -86,10 +86,18 @@ async function mouse(browser) {
   assert.ok(difference(bare, painted) > 40, `the stroke is seen: ${bare} became ${painted}`);
   assert.ok(difference(bare, await colour(page, 300, 120)) < 60, "beside it the wall is bare");
   if (pictures) await page.screenshot({ path: join(pictures, "mouse.png") });
-  const [screen, answer] = await page.evaluate(() => {
+  // The page has shown its own guess of the paint, and nothing of it is left when the server's has come.
+  const guess = await page.evaluate(() => {
+    const { shown, truth } = window.paintcopter.atlas().pictures[0];
+    const different = shown.reduce((count, byte, k) => count + (byte === truth[k] ? 0 : 1), 0);
+    return { different, shown: window.paintcopter.delays.stages["hand to guess"].length };
+  });
+  assert.ok(guess.shown > 0 && guess.different === 0, `a guess is shown and replaced: ${JSON.stringify(guess)}`);
+  const [screen, guessed, answer] = await page.evaluate(() => {
     const rank = (times, share) => times.toSorted((a, b) => a - b)[Math.min(times.length - 1, Math.floor(share * times.length))] ?? NaN;
     const { delays, connection } = window.paintcopter;
-    return [rank(delays, 0.95), rank(connection.roundTrips, 0.99)];
+    const { stages } = delays;
+    return [rank(stages["hand to screen"], 0.95), rank(stages["hand to guess"], 0.95), rank(connection.roundTrips, 0.99)];
   });
   await page.click("#undo");
   await page.mouse.move(...aside);
@@ -114,7 +122,7 @@ async function mouse(browser) {
   assert.ok(figures.paint_tasks >= 1 && figures.paint_flown_ml > 0.9 * figures.paint_seen_ml, JSON.stringify(figures));
   assert.equal(figures.refused_events, 0);
   await page.close();
-  return `mouse: ${figures.states} states, SSIM of flown and seen ${figures.ssim_flown_seen.toFixed(3)}; hand to screen ${screen.toFixed(0)} ms (p95), state to answer ${answer.toFixed(1)} ms (p99)`;
+  return `mouse: ${figures.states} states, SSIM of flown and seen ${figures.ssim_flown_seen.toFixed(3)}; hand to screen ${screen.toFixed(0)} ms, to the guess ${guessed.toFixed(0)} ms (p95), state to answer ${answer.toFixed(1)} ms (p99)`;
 }
 
 async function lost(browser) {

@@ -134,6 +134,15 @@ impl LiveQueue {
         None
     }
 
+    /// Takes back what [`LiveQueue::next_continuation`] has just given, where the vehicle must halt before it: it takes all that comes
+    /// until the vehicle asks for a task, as the vehicle is farther behind then.
+    pub fn give_back(&mut self, segment: Segment) {
+        self.start = segment.start;
+        self.length = segment.length;
+        self.segment = segment.states;
+        self.carried = false;
+    }
+
     /// One run of Algorithm 1 at the session's time `now` (s): takes the oldest state, and returns a task where one is complete.
     /// `vehicle` is the vehicle's position `r`, m. To be called while the vehicle can take a task.
     pub fn step(&mut self, now: f64, vehicle: &Point3<f64>) -> Option<Task> {
@@ -143,7 +152,8 @@ impl LiveQueue {
                 self.waiting = false;
                 self.feedback.push(Feedback::Ready);
             }
-            return if silent { self.flush() } else { None };
+            // What was given back is full already.
+            return if silent || self.length >= self.settings.segment { self.flush() } else { None };
         };
         // Whatever ends the segment leaves its state in the queue for the next run, which then finds the segment empty.
         if self.ends_segment(&state, vehicle) {

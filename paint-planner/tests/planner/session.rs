@@ -424,3 +424,29 @@ fn the_next_piece_of_a_stroke_may_be_asked_for_in_flight_and_nothing_else() {
     assert_eq!(queue.next_continuation(0.2, &VEHICLE), None);
     assert_eq!(queue.len(), 1);
 }
+
+#[test]
+fn a_piece_that_is_given_back_grows_until_the_vehicle_asks_for_a_task() {
+    let mut queue = LiveQueue::new(SessionSettings { longest: 1.0, ..settings(0.1) });
+    queue.push(state(0, VrMode::Painting, 0.0));
+    assert!(matches!(queue.next_task(0.0, &VEHICLE), Some(Task::Approach(_))));
+    (1..6).for_each(|k| queue.push(state(k, VrMode::Painting, 0.03 * k as f64)));
+    let before = queue.painted_length();
+    let piece = queue.next_continuation(0.1, &VEHICLE).unwrap();
+    queue.give_back(piece);
+    assert!((queue.painted_length() - before).abs() < 1e-12);
+    // What has come since is part of it, and every state is in it once.
+    (6..11).for_each(|k| queue.push(state(k, VrMode::Painting, 0.03 * k as f64)));
+    let Some(Task::Segment(whole)) = queue.next_task(0.2, &VEHICLE) else { panic!("it is full") };
+    let sequences: Vec<u64> = whole.states.iter().map(|state| state.sequence).collect();
+    assert_eq!(sequences, (0..11).collect::<Vec<_>>());
+    assert!(whole.start == 0.0 && (whole.length - 0.3).abs() < 1e-12, "{}", whole.length);
+    // Where nothing more has come it need not wait for the end of the stroke.
+    (11..16).for_each(|k| queue.push(state(k, VrMode::Painting, 0.03 * k as f64)));
+    let piece = queue.next_continuation(0.2, &VEHICLE).unwrap();
+    assert_eq!(queue.next_continuation(0.2, &VEHICLE), None);
+    let (start, length) = (piece.start, piece.length);
+    queue.give_back(piece);
+    let Some(Task::Segment(again)) = queue.next_task(0.2, &VEHICLE) else { panic!("it is full") };
+    assert!(again.start == start && again.length >= length && (start - 0.3).abs() < 1e-12);
+}

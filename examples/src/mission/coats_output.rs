@@ -1,0 +1,178 @@
+//! What a mission with several paints leaves beside the results of each: pictures of all paints over each other, and the sums.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use nalgebra::Point3;
+use paint_net::Image;
+use paint_sim::colour::spectrum_lab;
+use paint_sim::{Hit, Substrate, ciede2000};
+use serde::Serialize;
+
+use super::coats::{Coats, linear};
+use super::error::MissionError;
+use super::figures::mean;
+use super::mission_output::{save, write};
+use super::run::Mission;
+use super::shading::shading_of_colours;
+use super::view::{camera, picture_of, view};
+use crate::pictures::Rgb;
+use crate::progress::Stage;
+use crate::report::{Report, save_figures};
+
+/// Colour beside the surface in the texture pictures.
+const BACKGROUND: [u8; 3] = [255, 255, 255];
+/// Depth from which a paint counts as wanted.
+const WANTED: f64 = 0.05;
+
+/// The figures of all paints together. Flat, SI units in the names.
+#[derive(Debug, Clone, Serialize)]
+pub struct CoatsFigures {
+    /// Version of the program.
+    pub version: &'static str,
+    /// Surface that was painted.
+    pub surface: String,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// The paints in flying order.
+    pub paints: Vec<&'static str>,
+    /// Folder of each one's results.
+    pub folders: Vec<String>,
+    /// Time in the air of each.
+    pub flight_time_s_by_paint: Vec<f64>,
+    /// Paint of each that stayed on the surface.
+    pub paint_deposited_kg_by_paint: Vec<f64>,
+    /// Share of what is wanted of each that was not planned.
+    pub unreachable_paint_share_by_paint: Vec<f64>,
+    /// Structural similarity of each one's film to what is wanted of it.
+    pub ssim_painted_by_paint: Vec<f64>,
+    /// Time in the air.
+    pub flight_time_s: f64,
+    /// Length of the vehicle's paths.
+    pub path_length_m: f64,
+    /// Paint that stayed on the surface.
+    pub paint_deposited_kg: f64,
+    /// Strokes of all.
+    pub strokes: usize,
+    /// Moments at which the flown robot touched the surface.
+    pub collisions: usize,
+    /// Moments at which a plan exceeds a limit.
+    pub limit_violations: usize,
+    /// Mean CIEDE2000 between what is on the wall and what is wanted, all paints over each other.
+    pub ciede2000_mean: f64,
+    /// The same where paint is wanted.
+    pub ciede2000_mean_where_wanted: f64,
+}
+
+impl CoatsFigures {
+    /// A line for each paint, and one for all.
+    pub fn summary(&self) -> String {
+        let mut text = String::new();
+        for (k, paint) in self.paints.iter().enumerate() {
+            let (minutes, kilograms) = (self.flight_time_s_by_paint[k] / 60.0, self.paint_deposited_kg_by_paint[k]);
+            let (missing, ssim) = (100.0 * self.unreachable_paint_share_by_paint[k], self.ssim_painted_by_paint[k]);
+            let _ = writeln!(
+                text,
+                "  {paint:10} {minutes:6.1} min, {kilograms:.3} kg, {missing:.1} % not planned, SSIM {ssim:.3}"
+            );
+        }
+        let (minutes, difference) = (self.flight_time_s / 60.0, self.ciede2000_mean_where_wanted);
+        let _ = writeln!(text, "  all        {minutes:6.1} min, CIEDE2000 {difference:.2} where paint is wanted");
+        text
+    }
+
+    fn markdown(&self) -> String {
+        let mut text = format!(
+            "# {} painted in {} paints\n\n![The painted surface](painted_view.png)\n\n**Wanted**\n\n![Wanted](wanted.png)\n\n**Painted**\n\n\
+             ![Painted](painted.png)\n\nMean CIEDE2000 {:.2}, {:.2} where paint is wanted; {} collisions, {} limit violations.\n\n\
+             | paint | results | minutes | kg | not planned | SSIM |\n|---|---|---|---|---|---|\n",
+            self.surface,
+            self.paints.len(),
+            self.ciede2000_mean,
+            self.ciede2000_mean_where_wanted,
+            self.collisions,
+            self.limit_violations
+        );
+        for (k, (paint, folder)) in self.paints.iter().zip(&self.folders).enumerate() {
+            let (minutes, kilograms) = (self.flight_time_s_by_paint[k] / 60.0, self.paint_deposited_kg_by_paint[k]);
+            let (missing, ssim) = (100.0 * self.unreachable_paint_share_by_paint[k], self.ssim_painted_by_paint[k]);
+            let _ = writeln!(
+                text,
+                "| {paint} | [{folder}]({folder}/report.md) | {minutes:.1} | {kilograms:.3} | {missing:.1} % | {ssim:.3} |"
+            );
+        }
+        text
+    }
+}
+
+/// Writes the results of every paint into its folder, those of all into `folder`; the report last.
+pub fn save_coats(coats: &Coats, folder: &Path) -> Result<CoatsFigures, MissionError> {
+    let mut reports = Vec::new();
+    for (folder, mission) in coats.missions() {
+        reports.push(save(mission, folder)?);
+    }
+    let stage = Stage::start("all paints");
+    let painted = coats.walls(Mission::painted_depth)?;
+    let wanted = coats.walls(Mission::wanted_depth)?;
+    save_pictures(coats, &wanted, &painted, folder)?;
+    let figures = figures(coats, &reports, &wanted, &painted);
+    write(&folder.join("report.md"), &figures.markdown())?;
+    save_figures(&figures, folder)?;
+    stage.done(&folder.display().to_string());
+    Ok(figures)
+}
+
+fn save_pictures(
+    coats: &Coats,
+    wanted: &[Option<Substrate>],
+    painted: &[Option<Substrate>],
+    folder: &Path,
+) -> Result<(), MissionError> {
+    let Some((_, mission)) = coats.missions().next() else { return Ok(()) };
+    let decision = &mission.decision;
+    let (width, height) = (decision.wanted.width(), decision.wanted.height());
+    for (walls, name) in [(wanted, "wanted.png"), (painted, "painted.png")] {
+        let pixels = walls.iter().map(|wall| wall.as_ref().map_or(BACKGROUND, |wall| wall.srgb().rgb));
+        let picture = Rgb::from_pixels(width, height, pixels);
+        picture.enlarged((1400 / width as u32).clamp(1, 8)).save(&folder.join(name))?;
+    }
+    let colours: [Image; 3] = linear(painted, width, height)?;
+    let corners: Vec<Point3<f64>> = decision.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
+    let shade = |hit: &Hit| shading_of_colours(decision, &colours, hit);
+    let frame = view(decision, &camera(decision, &corners)?, &shade)?;
+    Ok(picture_of(&frame).save(&folder.join("painted_view.png"))?)
+}
+
+fn figures(
+    coats: &Coats,
+    reports: &[Report],
+    wanted: &[Option<Substrate>],
+    painted: &[Option<Substrate>],
+) -> CoatsFigures {
+    let of = |value: fn(&Report) -> f64| reports.iter().map(value).collect::<Vec<f64>>();
+    let sum = |value: fn(&Report) -> f64| reports.iter().map(value).sum::<f64>();
+    let depths: Vec<Image> = coats.missions().map(|(_, mission)| mission.wanted_depth()).collect();
+    let is_wanted = |k: usize| depths.iter().any(|depth| depth.data()[k] > WANTED);
+    let lab = |walls: &[Option<Substrate>], k: usize| Some(spectrum_lab(walls[k].as_ref()?.reflectance()));
+    let difference = |k: usize| Some(ciede2000(lab(painted, k)?, lab(wanted, k)?));
+    let name = |folder: &Path| folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    CoatsFigures {
+        version: env!("CARGO_PKG_VERSION"),
+        surface: reports.first().map_or_else(String::new, |report| report.surface.clone()),
+        seed: reports.first().map_or(0, |report| report.seed),
+        paints: coats.missions().map(|(_, mission)| mission.decision.settings.paint.as_str()).collect(),
+        folders: coats.missions().map(|(folder, _)| name(folder)).collect(),
+        flight_time_s_by_paint: of(|r| r.flight_time_s),
+        paint_deposited_kg_by_paint: of(|r| r.paint_deposited_kg),
+        unreachable_paint_share_by_paint: of(|r| r.unreachable_paint_share),
+        ssim_painted_by_paint: of(|r| r.ssim_painted),
+        flight_time_s: sum(|r| r.flight_time_s),
+        path_length_m: sum(|r| r.path_length_m),
+        paint_deposited_kg: sum(|r| r.paint_deposited_kg),
+        strokes: reports.iter().map(|r| r.strokes).sum(),
+        collisions: reports.iter().map(|r| r.collisions).sum(),
+        limit_violations: reports.iter().map(|r| r.limit_violations).sum(),
+        ciede2000_mean: mean((0..wanted.len()).filter_map(difference)),
+        ciede2000_mean_where_wanted: mean((0..wanted.len()).filter(|k| is_wanted(*k)).filter_map(difference)),
+    }
+}
