@@ -89,11 +89,15 @@ mod visibility;
 mod world;
 
 pub use error::Error;
+pub use heading::{HeadingPath, HeadingTable};
 pub use keep_out::{KeepOutVolume, WithKeepOut};
 pub use nalgebra;
 #[cfg(feature = "clarabel")]
 pub use nozzle::Clarabel;
-pub use nozzle::{InteriorPoint, Mode, QpOutcome, QpSolver, QuadraticProgram, StandardForm, stroke_program};
+pub use nozzle::{
+    GaussSeidel, InteriorPoint, Mode, QpOutcome, QpSolver, QuadraticProgram, StandardForm, state_programs,
+    stroke_program,
+};
 pub use plan::{Plan, PlanReport, Setpoint, Waypoint};
 pub use planner::{OptimalPlanner, Planner, SmoothingPlanner, plan};
 pub use reach::reachable_targets;

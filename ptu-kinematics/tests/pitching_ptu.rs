@@ -62,7 +62,7 @@ fn it_stays_level_where_the_tilt_joint_reaches_and_takes_the_least_pitch_beyond(
     let unit = Ptu::new(PtuSettings { gun_pitch: 0.05, ..PtuSettings::default() }).unwrap();
     let limits = unit.settings().tilt_limits;
     for k in 0..=300 {
-        let elevation = -1.57 + 3.14 * f64::from(k) / 300.0;
+        let elevation = std::f64::consts::FRAC_PI_2 * (f64::from(k) / 150.0 - 1.0) * 0.999;
         for azimuth in [-0.8, 0.0, 0.5] {
             let wanted = direction(azimuth, elevation);
             let level = unit.inverse(&Point3::origin(), &wanted, 0.0);

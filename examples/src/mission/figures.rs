@@ -6,7 +6,6 @@ use paint_sim::FlightLog;
 use paint_sim::flight::{FlightSample, FlightStatistics};
 use paint_sim::spray::QUANTUM;
 
-use super::decision::Decision;
 use super::error::MissionError;
 use super::fly::LayerFlight;
 use super::inspect::Inspection;
@@ -16,14 +15,11 @@ use super::run::Mission;
 use super::seams::likeness;
 use super::settings::{MissionSettings, PainterChoice};
 use crate::adapters::{MeshSurface, Robot};
-use crate::appearance::{DENSITY, UNIT_THICKNESS};
+use crate::appearance::DENSITY;
 use crate::report::{Report, peak_resident_bytes};
 
 /// Step of the dense check of the planned limits, seconds; the certificates do not depend on it.
 const LIMIT_STEP: f64 = 0.02;
-
-/// Thickness below which nothing is wanted, metres: ink is given to a few digits.
-const LEAST_COAT: f64 = 0.5e-6;
 
 /// All figures, with those of the inspection.
 pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, MissionError> {
@@ -130,14 +126,10 @@ struct Evenness {
 }
 
 fn evenness(mission: &Mission) -> Evenness {
-    let Decision { wanted, in_reach, appearance, .. } = &mission.decision;
+    let ratios = mission.thickness_ratio();
     let (mut area, mut covered, mut thin, mut sum, mut squares) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for (k, (&pixel, texel)) in mission.pixels.iter().zip(mission.film.texels()).enumerate() {
-        let asked = appearance.ink().inverse(wanted.data()[pixel]) * UNIT_THICKNESS;
-        if !in_reach[pixel] || asked < LEAST_COAT {
-            continue;
-        }
-        let ratio = mission.film.thickness(k) / asked;
+    for (&pixel, texel) in mission.pixels.iter().zip(mission.film.texels()) {
+        let Some(ratio) = ratios[pixel] else { continue };
         area += texel.area;
         covered += if (0.5..=1.5).contains(&ratio) { texel.area } else { 0.0 };
         thin += if ratio < 0.5 { texel.area } else { 0.0 };
