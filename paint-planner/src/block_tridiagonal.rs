@@ -24,6 +24,7 @@ impl<const N: usize> BlockTridiagonal<N> {
     }
 
     /// Factorises block `i`; those before must be factorised.
+    #[inline]
     pub(crate) fn factor_block(&mut self, i: usize) -> bool {
         if i > 0 {
             let below = &self.lower[i - 1];
@@ -48,6 +49,7 @@ impl<const N: usize> BlockTridiagonal<N> {
     }
 
     /// Block `i` of the forward substitution; block `i` must be factorised, the blocks of `b` before substituted.
+    #[inline]
     pub(crate) fn forward_block<const K: usize>(&self, i: usize, b: &mut [SMatrix<f64, N, K>]) {
         if i > 0 {
             let carried = self.lower[i - 1] * b[i - 1];
@@ -57,6 +59,7 @@ impl<const N: usize> BlockTridiagonal<N> {
     }
 
     /// Block `i` of the backward substitution, which goes from the last to the first.
+    #[inline]
     pub(crate) fn backward_block<const K: usize>(&self, i: usize, b: &mut [SMatrix<f64, N, K>]) {
         if i + 1 < b.len() {
             let carried = self.lower[i].tr_mul(&b[i + 1]);
@@ -67,6 +70,7 @@ impl<const N: usize> BlockTridiagonal<N> {
 }
 
 /// Lower Cholesky factor in place, its diagonal inverted so that the substitutions multiply.
+#[inline]
 fn cholesky<const N: usize>(m: &mut SMatrix<f64, N, N>) -> bool {
     for j in 0..N {
         let mut pivot = m[(j, j)];
@@ -91,6 +95,7 @@ fn cholesky<const N: usize>(m: &mut SMatrix<f64, N, N>) -> bool {
 }
 
 /// `B L^-T` in place, column by column.
+#[inline]
 fn over_transposed<const N: usize>(l: &SMatrix<f64, N, N>, b: &mut SMatrix<f64, N, N>) {
     for c in 0..N {
         for k in 0..c {
@@ -105,6 +110,7 @@ fn over_transposed<const N: usize>(l: &SMatrix<f64, N, N>, b: &mut SMatrix<f64, 
     }
 }
 
+#[inline]
 fn forward<const N: usize, const K: usize>(l: &SMatrix<f64, N, N>, b: &mut SMatrix<f64, N, K>) {
     for column in 0..K {
         for i in 0..N {
@@ -117,6 +123,7 @@ fn forward<const N: usize, const K: usize>(l: &SMatrix<f64, N, N>, b: &mut SMatr
     }
 }
 
+#[inline]
 fn backward<const N: usize, const K: usize>(l: &SMatrix<f64, N, N>, b: &mut SMatrix<f64, N, K>) {
     for column in 0..K {
         for i in (0..N).rev() {

@@ -191,7 +191,7 @@ mod tests {
             let (bins, layers) = (6, 5);
             let nodes = (0..bins * layers)
                 .map(|_| {
-                    let position = Point3::new(random(), random(), random()) * 0.05;
+                    let position = Point3::new(random(), random(), random()) * 0.15;
                     (random() < 0.7).then(|| Node { position, pan: random() - 0.5 })
                 })
                 .collect();
