@@ -3,12 +3,15 @@
 
   pip install clarabel osqp piqp daqp
   cargo run --release -p paintcopter-benches --bin library_figures -- planner-instances DIR   writes DIR/path_2000, DIR/path_20000
-  python3 planner_peers.py DIR/path_2000
+  python3 planner_peers.py DIR/path_2000 DIR/states
   cargo run --release -p paintcopter-benches --bin library_figures -- planner                 same names, same rules
 
 min 1/2 x'Px + q'x subject to A x <= b; the variables after the first `states` relax one row each. cpu_ms = median of the runs, CPU time
 of one thread for setup and solution, matrices already in the solver's format. objective and violation are taken from the states alone:
-relaxations are as large as the states make them. DAQP takes dense matrices and is left out above 500 variables."""
+relaxations are as large as the states make them. DAQP takes dense matrices and is left out above 500 variables.
+
+DIR/states holds the programs of single states, five variables and nine rows, those whose rows can all be held. cpu_us = median time of one;
+solver_us = what the solver itself says, where it does. off = largest difference from our state."""
 
 import argparse
 import json
@@ -97,12 +100,50 @@ def quality(x, p, q, a, b, states):
     return float(objective), float(max(0.0, excess[~soft].max(initial=0.0)))
 
 
+def single_states(folder, count):
+    arrays = {name: np.load(Path(folder) / f"{name}.npy") for name in ("h", "g", "rows", "bounds", "x")}
+    n = len(arrays["g"]) // 5
+    h, g, a, b, x = (arrays[k].reshape(n, *s) for k, s in (("h", (5, 5)), ("g", (5,)), ("rows", (9, 5)), ("bounds", (9,)), ("x", (5,))))
+    chosen = range(0, n, max(1, n // count))
+
+    def daqp_one(i):
+        import daqp
+        from ctypes import c_int
+
+        found, _, _, info = daqp.solve(h[i], g[i], a[i], b[i], np.full(9, -1e30), np.zeros(9, dtype=c_int))
+        return found, info.get("solve_time", 0) + info.get("setup_time", 0)
+
+    def clarabel_one(i):
+        solve = clarabel_solver(sparse.csc_matrix(np.triu(h[i])), g[i], sparse.csc_matrix(a[i]), b[i])
+        return solve(), None
+
+    for name, one in (("daqp", daqp_one), ("clarabel", clarabel_one)):
+        times, inside, off = [], [], 0.0
+        try:
+            for i in chosen:
+                began = time.thread_time()
+                found, own = one(i)
+                times.append(time.thread_time() - began)
+                inside += [] if own is None else [own]
+                off = max(off, float(np.abs(found - x[i]).max()))
+        except ImportError as error:
+            print(json.dumps(dict(fig="state_programs", peer=name, failed=str(error))))
+            continue
+        figures = dict(fig="state_programs", peer=name, programs=len(times), cpu_us=round(1e6 * statistics.median(times), 3), off=off)
+        if inside:
+            figures["solver_us"] = round(1e6 * statistics.median(inside), 3)
+        print(json.dumps(figures), flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", nargs="+")
     parser.add_argument("--runs", type=int, default=5)
     a = parser.parse_args()
     for folder in a.folder:
+        if (Path(folder) / "h.npy").exists():
+            single_states(folder, 2000)
+            continue
         try:
             p, q, rows, b, states = read(folder)
         except (OSError, KeyError) as error:

@@ -8,12 +8,14 @@ pub mod flight;
 pub mod frames;
 pub mod fuzzed_meshes;
 pub mod motion;
+pub mod npy;
 pub mod painting;
 pub mod planner;
 pub mod pose_graphs;
 pub mod rock;
 pub mod room;
 pub mod sequences;
+pub mod state_programs;
 pub mod vocabulary;
 
 use std::time::Duration;

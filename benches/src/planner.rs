@@ -11,8 +11,9 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3, Vector4, Vector5};
 use paint_planner::{
-    Clarabel, InteriorPoint, NozzleSettings, OptimalPlanner, Plan, Planner, QpSolver, Settings, StandardForm,
-    StrokeEnds, Target, TimingPolicy, Trajectory, order_strokes, stroke_program, transit_lower_bound,
+    Clarabel, HeadingSettings, HeadingTable, InteriorPoint, NozzleSettings, OptimalPlanner, Plan, Planner, QpSolver,
+    Settings, StandardForm, StrokeEnds, Target, TimingPolicy, Trajectory, order_strokes, stroke_program,
+    transit_lower_bound,
 };
 use paint_sim::TriangleSurface;
 use paintcopter_examples::adapters::{MeshSurface, Robot};
@@ -21,7 +22,8 @@ use ptu_kinematics::Ptu;
 use serde_json::json;
 
 use crate::cpu::{median_seconds, seconds};
-use crate::{Rng, rock};
+use crate::npy::save;
+use crate::{Rng, rock, state_programs};
 use walls::{Arm, Wall};
 
 /// States of the paths; the shortest is for solvers of dense programs.
@@ -42,6 +44,8 @@ const SEGMENTS: usize = 200;
 const ORDERS: u64 = 20;
 
 type AnyError = Box<dyn Error>;
+/// Measures a figure and prints it.
+type Figure<'a> = dyn Fn() -> Result<(), AnyError> + 'a;
 
 /// A long stroke over a displaced wall, its normals noisy.
 fn targets(count: usize) -> Vec<Target> {
@@ -76,59 +80,49 @@ pub fn write(folder: &Path) -> Result<(), AnyError> {
         save(&folder, "b", form.b.iter().copied())?;
         save(&folder, "states", std::iter::once(form.states as f64))?;
     }
-    Ok(())
+    state_programs::write(&folder.join("states"))
 }
 
-/// One array of doubles in `NumPy`'s format 1.0.
-fn save(folder: &Path, name: &str, values: impl Iterator<Item = f64>) -> Result<(), AnyError> {
-    let values: Vec<f64> = values.collect();
-    let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({},), }}", values.len());
-    // Magic, version and length take ten bytes; the data begin at a multiple of 64.
-    let length = (10 + header.len() + 1).next_multiple_of(64) - 10;
-    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-    bytes.extend((length as u16).to_le_bytes());
-    bytes.extend(format!("{header:<width$}\n", width = length - 1).bytes());
-    bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
-    let path = folder.join(format!("{name}.npy"));
-    std::fs::write(&path, bytes).map_err(|e| format!("{}: {e}", path.display()).into())
-}
-
-/// Prints our figures on the same programs, and those of the rest of a plan.
+/// Prints our figures on the same programs, and those of the rest of a plan: those whose name contains `only`.
 ///
 /// # Errors
 /// What the planner refuses.
-pub fn run(runs: usize) -> Result<(), AnyError> {
-    for count in STATES {
-        path(count, runs)?;
-    }
-    trajectory(runs)?;
-    whole_plan(runs)?;
-    stroke_orders()?;
-    preserved_gradients()?;
-    for length in [0.5, 1.0] {
-        segments(length)?;
-    }
-    turned_scenes()?;
-    random_paths()
+pub fn run(runs: usize, only: &str) -> Result<(), AnyError> {
+    let figures: [(&str, &Figure<'_>); 13] = [
+        ("state_programs", &|| state_programs::run(runs)),
+        ("path_20", &|| path(STATES[0], runs)),
+        ("path_2000", &|| path(STATES[1], runs)),
+        ("path_20000", &|| path(STATES[2], runs)),
+        ("heading_by_dp", &|| headings(runs)),
+        ("minimum_snap", &|| trajectory(runs)),
+        ("plan_of_1000_targets", &|| whole_plan(runs)),
+        ("transits_over_lower_bound", &stroke_orders),
+        ("volume_per_mm", &preserved_gradients),
+        ("segment_of_0.5_m", &|| segments(0.5)),
+        ("segment_of_1_m", &|| segments(1.0)),
+        ("turned_scenes", &turned_scenes),
+        ("limits_over_random_paths", &random_paths),
+    ];
+    figures.into_iter().filter(|(name, _)| name.contains(only)).try_for_each(|(_, figure)| figure())
 }
 
 fn path(count: usize, runs: usize) -> Result<(), AnyError> {
     let (program, start) = stroke_program(&targets(count), &NozzleSettings::default());
     let form = StandardForm::new(&program);
-    let solved = |solver: &dyn QpSolver| -> Result<Vec<Vector5<f64>>, paint_planner::Error> {
+    let solved = |solver: &dyn QpSolver| -> Result<(Vec<Vector5<f64>>, usize), paint_planner::Error> {
         let mut states = start.clone();
-        solver.solve(&program, &mut states)?;
-        Ok(states)
+        let outcome = solver.solve(&program, &mut states)?;
+        Ok((states, outcome.steps))
     };
-    let own = solved(&InteriorPoint)?;
-    let exact = solved(&Clarabel::default())?;
+    let (own, steps) = solved(&InteriorPoint)?;
+    let (exact, _) = solved(&Clarabel::default())?;
     let off = own.iter().zip(&exact).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max);
     let (objective, violation) = quality(&form, &own);
     let cpu_ms = 1e3 * median_seconds(runs, || solved(&InteriorPoint));
     println!(
         "{}",
         json!({
-            "fig": format!("path_{count}"), "peer": "paint-planner", "cpu_ms": cpu_ms, "objective": objective,
+            "fig": format!("path_{count}"), "peer": "paint-planner", "cpu_ms": cpu_ms, "steps": steps, "objective": objective,
             "violation": violation, "off_clarabel_1e-12": off,
         })
     );
@@ -170,6 +164,33 @@ pub fn helix(count: usize) -> (Vec<Vector4<f64>>, Vec<f64>, Vec<bool>) {
     let knots: Vec<Vector4<f64>> = (0..count).map(knot).collect();
     let durations = knots.windows(2).map(|w| (w[1].xyz() - w[0].xyz()).norm() / 0.5).collect();
     (knots, durations, (0..count).map(|k| k == 0 || k + 1 == count).collect())
+}
+
+/// Headings of 2000 nozzle states over the rock in steps of a degree: the optimum, and the paper's choice one after the other.
+fn headings(runs: usize) -> Result<(), AnyError> {
+    let MissionSettings { planner: settings, ptu, .. } = MissionSettings::default();
+    let surface = rock::rock()?;
+    let (robot, wall) = (Robot::new(Ptu::new(ptu)?), MeshSurface(&surface.world));
+    let targets = rock::stroke(&surface, 2000);
+    let nozzles = OptimalPlanner::default().plan(&targets, &wall, &robot, &settings)?.nozzle;
+    // As wide a window as with bins of five degrees.
+    let heading = HeadingSettings { bins: 360, window: 5 * settings.heading.window, ..settings.heading };
+    let table = HeadingTable::new(&nozzles, &wall, &robot, settings.clearance, heading.bins)?;
+    let (best, greedy) = (table.optimum(&heading), table.one_after_the_other(&heading));
+    let mut never = true;
+    for from in (0..nozzles.len() - 40).step_by(40) {
+        let part = HeadingTable::new(&nozzles[from..from + 40], &wall, &robot, settings.clearance, heading.bins)?;
+        never &= part.optimum(&heading).cost <= part.one_after_the_other(&heading).cost;
+    }
+    let cpu_ms = 1e3 * median_seconds(runs, || Ok::<_, paint_planner::Error>(table.optimum(&heading)));
+    println!(
+        "{}",
+        json!({
+            "fig": "heading_by_dp", "peer": "paint-planner", "states": nozzles.len(), "bins": heading.bins, "cpu_ms": cpu_ms,
+            "cost": best.cost, "cost_one_after_the_other": greedy.cost, "never_costlier": never && best.cost <= greedy.cost,
+        })
+    );
+    Ok(())
 }
 
 fn trajectory(runs: usize) -> Result<(), AnyError> {

@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use paint_planner::control::{
     AttitudeResponse, ControlReference, ControlState, MpcSettings, TrackingMpc, VehicleModel,
 };
-use paint_planner::{NozzleState, Plan, Tool, VehicleState};
+use paint_planner::{NozzleState, Plan, Tether, Tool, VehicleState};
 use paint_sim::flight::{Airframe, Command, Controller, Estimate, GRAVITY};
 use paint_sim::{PanTilt, Reference, ReferenceState, TriangleSurface};
 use ptu_kinematics::{Hover, Joints, KinematicChain, Ptu, Servo};
@@ -31,6 +31,7 @@ impl paint_planner::Surface for MeshSurface<'_> {
 }
 
 /// A kinematic chain, with the room it takes, as the planner's tool.
+#[derive(Debug, Clone)]
 pub struct Robot<C = Ptu> {
     /// The chain.
     pub chain: C,
@@ -38,12 +39,14 @@ pub struct Robot<C = Ptu> {
     pub body_radius: f64,
     /// Radius of the arm and the gun, metres.
     pub arm_radius: f64,
+    /// The hose or tether that it keeps behind it.
+    pub tether: Option<Tether>,
 }
 
 impl<C: KinematicChain> Robot<C> {
     /// The chain with its limits, a body of 35 cm radius and an arm 5 cm thick.
     pub fn new(chain: C) -> Self {
-        Self { chain, body_radius: 0.35, arm_radius: 0.025 }
+        Self { chain, body_radius: 0.35, arm_radius: 0.025, tether: None }
     }
 
     /// Spheres that cover the robot in any pose of the body: rotors, arm, gun without its last centimetres.
@@ -82,6 +85,10 @@ impl<C: KinematicChain> Tool for Robot<C> {
         let joints = self.chain.point(vehicle.pan, vehicle.tilt);
         let hover = Hover { position: vehicle.position, heading: vehicle.heading, joints };
         self.spheres_at(&hover.world_from_body(), &hover.joints, out);
+    }
+
+    fn permits(&self, vehicle: &VehicleState) -> bool {
+        self.tether.is_none_or(|tether| tether.permits(vehicle))
     }
 }
 

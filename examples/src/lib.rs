@@ -5,6 +5,7 @@ pub mod adapters;
 pub mod appearance;
 pub mod design;
 pub mod exit;
+pub mod flight_constraints;
 pub mod handheld;
 mod mcap_messages;
 pub mod mesh_io;

@@ -17,7 +17,7 @@ use plotters::style::{FontStyle, register_font};
 pub use contact_sheet::{Tile, save_contact_sheet};
 pub use curves::{Panel, save_curves};
 pub use density::{DensityPicture, save_density};
-pub use error_map::save_error_map;
+pub use error_map::{COLOUR_DIFFERENCE, ErrorScale, save_error_map};
 pub use paths::{PathPanel, save_paths};
 pub use scene::{Polyline, Projection, Scene, save_scene};
 

@@ -36,6 +36,9 @@ pub struct Report {
     pub unreachable_normal_share: f64,
     /// Share of the surface that the robot can paint.
     pub reach_share: f64,
+    /// Share of the surface that it could paint but for keep-out volumes and tether.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lost_to_constraints_share: Option<f64>,
     /// Share of the wanted paint that no pose of the robot can spray.
     pub unreachable_paint_share: f64,
     /// Targets that keep more clearance since the rehearsal in wind.

@@ -14,50 +14,63 @@ pub(crate) struct BlockTridiagonal<const N: usize> {
 impl<const N: usize> BlockTridiagonal<N> {
     /// Factorises; false when the matrix is not positive definite.
     pub(crate) fn factor(&mut self) -> bool {
-        for i in 0..self.diagonal.len() {
-            if i > 0 {
-                let below = self.lower[i - 1];
-                let diagonal = &mut self.diagonal[i];
-                // Only the lower triangle is read.
-                for c in 0..N {
-                    for k in 0..N {
-                        let factor = below[(c, k)];
-                        for r in c..N {
-                            diagonal[(r, c)] -= below[(r, k)] * factor;
-                        }
-                    }
-                }
-            }
-            if !cholesky(&mut self.diagonal[i]) {
-                return false;
-            }
-            if let Some(below) = self.lower.get_mut(i) {
-                *below = forward(&self.diagonal[i], below.transpose()).transpose();
-            }
-        }
-        true
+        (0..self.diagonal.len()).all(|i| self.factor_block(i))
     }
 
     /// Solves `M x = b` in place for `K` right-hand sides; call after [`factor`](Self::factor).
     pub(crate) fn solve<const K: usize>(&self, b: &mut [SMatrix<f64, N, K>]) {
-        for i in 0..b.len() {
-            if i > 0 {
-                let carried = self.lower[i - 1] * b[i - 1];
-                b[i] -= carried;
+        (0..b.len()).for_each(|i| self.forward_block(i, b));
+        (0..b.len()).rev().for_each(|i| self.backward_block(i, b));
+    }
+
+    /// Factorises block `i`; those before must be factorised.
+    #[inline]
+    pub(crate) fn factor_block(&mut self, i: usize) -> bool {
+        if i > 0 {
+            let below = &self.lower[i - 1];
+            let diagonal = &mut self.diagonal[i];
+            // Only the lower triangle is read.
+            for c in 0..N {
+                for k in 0..N {
+                    let factor = below[(c, k)];
+                    for r in c..N {
+                        diagonal[(r, c)] -= below[(r, k)] * factor;
+                    }
+                }
             }
-            b[i] = forward(&self.diagonal[i], b[i]);
         }
-        for i in (0..b.len()).rev() {
-            if i + 1 < b.len() {
-                let carried = self.lower[i].tr_mul(&b[i + 1]);
-                b[i] -= carried;
-            }
-            b[i] = backward(&self.diagonal[i], b[i]);
+        if !cholesky(&mut self.diagonal[i]) {
+            return false;
         }
+        if let Some(below) = self.lower.get_mut(i) {
+            over_transposed(&self.diagonal[i], below);
+        }
+        true
+    }
+
+    /// Block `i` of the forward substitution; block `i` must be factorised, the blocks of `b` before substituted.
+    #[inline]
+    pub(crate) fn forward_block<const K: usize>(&self, i: usize, b: &mut [SMatrix<f64, N, K>]) {
+        if i > 0 {
+            let carried = self.lower[i - 1] * b[i - 1];
+            b[i] -= carried;
+        }
+        forward(&self.diagonal[i], &mut b[i]);
+    }
+
+    /// Block `i` of the backward substitution, which goes from the last to the first.
+    #[inline]
+    pub(crate) fn backward_block<const K: usize>(&self, i: usize, b: &mut [SMatrix<f64, N, K>]) {
+        if i + 1 < b.len() {
+            let carried = self.lower[i].tr_mul(&b[i + 1]);
+            b[i] -= carried;
+        }
+        backward(&self.diagonal[i], &mut b[i]);
     }
 }
 
 /// Lower Cholesky factor in place, its diagonal inverted so that the substitutions multiply.
+#[inline]
 fn cholesky<const N: usize>(m: &mut SMatrix<f64, N, N>) -> bool {
     for j in 0..N {
         let mut pivot = m[(j, j)];
@@ -81,7 +94,24 @@ fn cholesky<const N: usize>(m: &mut SMatrix<f64, N, N>) -> bool {
     true
 }
 
-fn forward<const N: usize, const K: usize>(l: &SMatrix<f64, N, N>, mut b: SMatrix<f64, N, K>) -> SMatrix<f64, N, K> {
+/// `B L^-T` in place, column by column.
+#[inline]
+fn over_transposed<const N: usize>(l: &SMatrix<f64, N, N>, b: &mut SMatrix<f64, N, N>) {
+    for c in 0..N {
+        for k in 0..c {
+            let factor = l[(c, k)];
+            for r in 0..N {
+                b[(r, c)] -= b[(r, k)] * factor;
+            }
+        }
+        for r in 0..N {
+            b[(r, c)] *= l[(c, c)];
+        }
+    }
+}
+
+#[inline]
+fn forward<const N: usize, const K: usize>(l: &SMatrix<f64, N, N>, b: &mut SMatrix<f64, N, K>) {
     for column in 0..K {
         for i in 0..N {
             let mut value = b[(i, column)];
@@ -91,10 +121,10 @@ fn forward<const N: usize, const K: usize>(l: &SMatrix<f64, N, N>, mut b: SMatri
             b[(i, column)] = value * l[(i, i)];
         }
     }
-    b
 }
 
-fn backward<const N: usize, const K: usize>(l: &SMatrix<f64, N, N>, mut b: SMatrix<f64, N, K>) -> SMatrix<f64, N, K> {
+#[inline]
+fn backward<const N: usize, const K: usize>(l: &SMatrix<f64, N, N>, b: &mut SMatrix<f64, N, K>) {
     for column in 0..K {
         for i in (0..N).rev() {
             let mut value = b[(i, column)];
@@ -104,7 +134,6 @@ fn backward<const N: usize, const K: usize>(l: &SMatrix<f64, N, N>, mut b: SMatr
             b[(i, column)] = value * l[(i, i)];
         }
     }
-    b
 }
 
 #[cfg(test)]

@@ -64,8 +64,11 @@ impl<'a> ClearanceChecker<'a> {
         0.0
     }
 
-    /// Whether every sphere keeps `clearance` from the surface.
+    /// Whether the tool permits the state and every sphere keeps `clearance` from the surface.
     pub(crate) fn is_clear(&mut self, state: &VehicleState, clearance: f64, cache: &mut DistanceCache) -> bool {
+        if !self.tool.permits(state) {
+            return false;
+        }
         self.spheres.clear();
         self.tool.spheres(state, &mut self.spheres);
         for k in 0..self.spheres.len() {

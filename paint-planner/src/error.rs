@@ -96,3 +96,8 @@ pub enum Error {
         stage: &'static str,
     },
 }
+
+/// Refuses a setting that does not hold.
+pub(crate) fn ensure(name: &'static str, value: f64, holds: bool, requirement: &'static str) -> Result<(), Error> {
+    if holds { Ok(()) } else { Err(Error::Setting { name, value, requirement }) }
+}

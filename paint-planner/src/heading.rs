@@ -2,6 +2,7 @@
 
 mod graph;
 mod smooth;
+mod table;
 mod viterbi;
 
 use crate::clearance::{ClearanceChecker, DistanceCache};
@@ -10,6 +11,7 @@ use crate::target::NozzleState;
 use crate::world::VehicleState;
 
 pub(crate) use graph::HeadingGraph;
+pub use table::{HeadingPath, HeadingTable};
 
 /// Vehicle states of the nozzle states that have an admissible heading.
 pub(crate) struct Headings {
@@ -21,17 +23,50 @@ pub(crate) struct Headings {
     pub(crate) cost: f64,
 }
 
+/// Searches that look for collisions along their path only; then all of the graph is looked at.
+const LAZY_SEARCHES: usize = 8;
+
+/// The best path through a graph on which nothing collides.
+///
+/// A path that is best among all that the joints allow, and free of collisions, is also best among those free of collisions: so only the
+/// nodes of the path are looked at, all headings of the states that collide there, and the search begins anew (lazy shortest path, Dellin
+/// and Srinivasa 2016).
+fn best_path(
+    graph: &mut HeadingGraph,
+    nozzles: &[Option<NozzleState>],
+    linked: &[bool],
+    checker: &mut ClearanceChecker<'_>,
+    clearance: &[f64],
+    settings: &HeadingSettings,
+) -> viterbi::Path {
+    let (bins, mut searches) = (graph.bins, 0);
+    loop {
+        let path = viterbi::search(graph, linked, settings);
+        let on_path = path.bins.iter().enumerate().filter_map(|(i, bin)| bin.map(|bin| (i, bin)));
+        let mut lost = graph.check(on_path, nozzles, checker, clearance);
+        if lost.is_empty() {
+            return path;
+        }
+        searches += 1;
+        if searches == LAZY_SEARCHES {
+            lost = (0..nozzles.len()).collect();
+        }
+        let headings = (0..bins).flat_map(|bin| lost.iter().map(move |&i| (i, bin)));
+        graph.check(headings, nozzles, checker, clearance);
+    }
+}
+
 /// Chooses headings for `nozzles` (in path order) from their `graph`, each keeping its own `clearance` from the surface. `linked[i]`:
 /// i and i+1 belong to one stroke.
 pub(crate) fn choose_headings(
-    graph: &HeadingGraph,
+    graph: &mut HeadingGraph,
     nozzles: &[Option<NozzleState>],
     linked: &[bool],
     checker: &mut ClearanceChecker<'_>,
     clearance: &[f64],
     settings: &HeadingSettings,
 ) -> Headings {
-    let path = viterbi::search(graph, linked, settings);
+    let path = best_path(graph, nozzles, linked, checker, clearance, settings);
     let mut vehicle: Vec<Option<VehicleState>> = vec![None; nozzles.len()];
     let mut joined = vec![false; nozzles.len().saturating_sub(1)];
     for run in path.runs() {
@@ -80,4 +115,66 @@ fn smooth_off_grid(
         }
     }
     states.iter().zip(&grid).map(|(nozzle, &heading)| checker.vehicle(nozzle, heading)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Point3, UnitVector3, Vector3};
+
+    use super::*;
+    use crate::world::{Hit, Surface, Tool};
+
+    /// Posts in a row before the nozzles.
+    struct Posts;
+
+    impl Surface for Posts {
+        fn cast(&self, _: &Point3<f64>, _: &UnitVector3<f64>, _: f64) -> Option<Hit> {
+            None
+        }
+
+        fn distance(&self, point: &Point3<f64>, max: f64) -> f64 {
+            let post = |k: i32| (point.xy() - nalgebra::Point2::new(-0.6, 0.13 + 0.4 * f64::from(k))).norm();
+            (-2..6).map(post).fold(max, f64::min)
+        }
+    }
+
+    /// A body half a metre behind the nozzle, turned about it.
+    struct Boom;
+
+    impl Tool for Boom {
+        fn vehicle(&self, nozzle: &NozzleState, heading: f64) -> Option<VehicleState> {
+            let back = Vector3::new(heading.cos(), heading.sin(), 0.0) * 0.5;
+            let within = heading.cos() > 0.2;
+            within.then(|| VehicleState { position: nozzle.position - back, heading, pan: -heading, tilt: 0.0 })
+        }
+
+        fn spheres(&self, vehicle: &VehicleState, out: &mut Vec<(Point3<f64>, f64)>) {
+            out.push((vehicle.position, 0.08));
+        }
+    }
+
+    #[test]
+    fn looking_for_collisions_where_the_path_leads_finds_the_path_of_the_whole_table() {
+        let nozzle = |k: usize| NozzleState {
+            position: Point3::new(-0.1 - 0.02 * (0.3 * k as f64).sin(), 0.02 * k as f64, 1.0),
+            direction: Vector3::x_axis(),
+        };
+        let nozzles: Vec<Option<NozzleState>> = (0..80).map(|k| (k != 33).then(|| nozzle(k))).collect();
+        let linked: Vec<bool> = (0..79).map(|k| k != 50).collect();
+        for (window, clearance) in [(3, 0.01), (1, 0.01), (3, 0.06), (6, 0.1)] {
+            let settings = HeadingSettings { window, ..HeadingSettings::default() };
+            let clearance = vec![clearance; 80];
+            let mut checker = ClearanceChecker::new(&Posts, &Boom);
+            let mut whole = HeadingGraph::build(&nozzles, &mut checker, settings.bins);
+            let all = (0..settings.bins).flat_map(|bin| (0..80).map(move |i| (i, bin)));
+            whole.check(all, &nozzles, &mut checker, &clearance);
+            let expected = viterbi::search(&whole, &linked, &settings);
+            let mut lazy = HeadingGraph::build(&nozzles, &mut checker, settings.bins);
+            let free = viterbi::search(&lazy, &linked, &settings);
+            let found = best_path(&mut lazy, &nozzles, &linked, &mut checker, &clearance, &settings);
+            assert_eq!((&found.bins, &found.joined), (&expected.bins, &expected.joined));
+            assert_eq!(found.cost, expected.cost);
+            assert_ne!(free.bins, expected.bins, "the posts are not in the way");
+        }
+    }
 }

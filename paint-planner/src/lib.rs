@@ -69,6 +69,7 @@ mod error;
 pub mod gantry;
 mod gravity;
 mod heading;
+mod keep_out;
 mod lowess;
 mod minimum_snap;
 mod nozzle;
@@ -80,6 +81,7 @@ pub mod session;
 mod settings;
 mod stroke_order;
 mod target;
+mod tether;
 mod timing;
 mod trace;
 mod trajectory;
@@ -87,16 +89,22 @@ mod visibility;
 mod world;
 
 pub use error::Error;
+pub use heading::{HeadingPath, HeadingTable};
+pub use keep_out::{KeepOutVolume, WithKeepOut};
 pub use nalgebra;
 #[cfg(feature = "clarabel")]
 pub use nozzle::Clarabel;
-pub use nozzle::{InteriorPoint, Mode, QpOutcome, QpSolver, QuadraticProgram, StandardForm, stroke_program};
+pub use nozzle::{
+    GaussSeidel, InteriorPoint, Mode, QpOutcome, QpSolver, QuadraticProgram, StandardForm, state_programs,
+    stroke_program,
+};
 pub use plan::{Plan, PlanReport, Setpoint, Waypoint};
 pub use planner::{OptimalPlanner, Planner, SmoothingPlanner, plan};
 pub use reach::reachable_targets;
 pub use settings::{HeadingSettings, LowessSettings, NozzleSettings, Settings, TimingPolicy, TimingSettings};
 pub use stroke_order::{OrderedStroke, StrokeEnds, StrokeOrder, order_strokes, transit_lower_bound};
 pub use target::{NozzleState, Target, normal_deviation};
+pub use tether::Tether;
 pub use trajectory::{Extrema, Sample, Trajectory};
 pub use world::{Hit, Surface, Tool, VehicleState};
 

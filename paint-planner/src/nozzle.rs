@@ -2,11 +2,15 @@
 
 #[cfg(any(test, feature = "clarabel"))]
 mod clarabel_solver;
+mod dual_active_set;
+mod gauss_seidel;
 mod initial_state;
 mod interior_point;
+mod lanes;
 mod paper_exact;
 mod qp_solver;
 mod quadratic_program;
+mod row_group;
 mod sequential;
 mod solution;
 mod standard_form;
@@ -19,8 +23,10 @@ use crate::target::Target;
 
 #[cfg(feature = "clarabel")]
 pub use clarabel_solver::Clarabel;
+pub use gauss_seidel::GaussSeidel;
 pub(crate) use initial_state::{InitialState, initial_states};
 pub use interior_point::InteriorPoint;
+pub use paper_exact::state_programs;
 pub use qp_solver::{QpOutcome, QpSolver};
 pub use quadratic_program::QuadraticProgram;
 pub use sequential::stroke_program;

@@ -1,6 +1,6 @@
 //! All numbers of the planners. `Default` holds the published values; where the papers print none, an engineering value.
 
-use crate::error::Error;
+use crate::error::{Error, ensure};
 use crate::world::VehicleState;
 
 /// Settings of both planners.
@@ -252,8 +252,4 @@ impl Settings {
         }
         Ok(())
     }
-}
-
-fn ensure(name: &'static str, value: f64, holds: bool, requirement: &'static str) -> Result<(), Error> {
-    if holds { Ok(()) } else { Err(Error::Setting { name, value, requirement }) }
 }

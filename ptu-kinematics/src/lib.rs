@@ -32,6 +32,7 @@
 //! | forward kinematics | not printed; from Fig. 6.3 | [`Ptu::forward`] |
 //! | inverse kinematics in hover | not printed; from Fig. 6.3 | [`Ptu::inverse`] |
 //! | any arm in place of the pan-tilt unit | not in the thesis | [`KinematicChain`] |
+//! | pan-tilt unit on a vehicle that hovers pitched | not in the thesis | [`PitchingPtu`] |
 //! | serial arm, inverse by damped least squares | Wampler 1986; Nakamura and Hanafusa 1986 | [`SerialArm`] |
 //! | pointing at a target | Eq. (6.1), of which only the symbols survive | [`Ptu::aim`] |
 //! | servo (AX-12A) | Paper II, section 3 | [`Servo`] |
@@ -49,6 +50,7 @@ mod joints;
 mod pan_tilt;
 #[cfg(feature = "urdf")]
 mod pan_tilt_urdf;
+mod pitching_ptu;
 mod serial_arm;
 mod servo;
 mod settings;
@@ -67,6 +69,7 @@ pub use nalgebra;
 pub use pan_tilt::{Jacobian, Ptu};
 #[cfg(feature = "urdf")]
 pub use pan_tilt_urdf::UrdfJointSigns;
+pub use pitching_ptu::{PitchingJoints, PitchingPtu};
 pub use serial_arm::{SerialArm, SerialJoint};
 pub use servo::{Servo, ServoSettings};
 pub use settings::PtuSettings;

@@ -145,6 +145,9 @@ enum Job {
         /// Runs of which the median is printed
         #[arg(long, default_value_t = 5)]
         runs: usize,
+        /// Only figures whose name contains this
+        #[arg(long)]
+        only: Option<String>,
     },
     /// Flies a stroke over the rock in gusts and with faults: errors of the spray, what a control step takes, and the valve
     Control,
@@ -181,7 +184,7 @@ fn main() -> ExitCode {
         Job::Graph { file, runs } => pose_graphs::run(&file, runs),
         Job::Vocabulary { file, seed } => vocabulary::run(&file, seed),
         Job::PlannerInstances { folder } => planner::write(&folder),
-        Job::Planner { runs } => planner::run(runs),
+        Job::Planner { runs, only } => planner::run(runs, only.as_deref().unwrap_or("")),
         Job::Control => control::run(),
         Job::Attitude { file } => control::attitude(&file),
         Job::Ate { reference, estimate, runs } => trajectory_errors(&reference, &estimate, runs),

@@ -9,7 +9,7 @@ use ptu_kinematics::Ptu;
 
 use super::decide::decide;
 use super::error::MissionError;
-use super::reach::texels_in_reach;
+use super::reach::{texels_in_reach, texels_lost_to_constraints};
 use super::settings::MissionSettings;
 use super::true_surface::moved_onto;
 use crate::adapters::Robot;
@@ -41,6 +41,8 @@ pub struct Decision {
     pub(super) coverage: Image,
     /// Which texels the robot can serve.
     pub(super) in_reach: Vec<bool>,
+    /// Which texels it could serve but for keep-out volumes and tether.
+    pub(super) lost_to_constraints: Vec<bool>,
     pub(super) layers: Vec<Painting>,
     pub(super) started: Instant,
     /// What is really there, if `surface` is a map of it.
@@ -51,7 +53,7 @@ impl Decision {
     /// Unwraps the surface, lays the design onto it and lets the painter decide. `name` is what the report calls the surface.
     pub fn make(name: &str, scene: &Scene, design: &Design, settings: MissionSettings) -> Result<Self, MissionError> {
         let started = Instant::now();
-        let robot = Robot::new(Ptu::new(settings.ptu)?);
+        let robot = Robot { tether: settings.constraints.tether, ..Robot::new(Ptu::new(settings.ptu)?) };
         let appearance = Appearance::on_sandstone(&settings.paint.paint()?)?;
 
         settings.check()?;
@@ -70,7 +72,19 @@ impl Decision {
         }
         let stage = Stage::start("reach");
         let in_reach = texels_in_reach(&surface, &robot, &settings)?;
-        stage.done(&format!("{:.1} % of the surface", 100.0 * share(&in_reach, &coverage)));
+        let lost = texels_lost_to_constraints(&in_reach, &surface, &robot, &settings)?;
+        let percent = |texels: &[bool]| 100.0 * share(texels, &coverage);
+        if !in_reach.contains(&true) {
+            return Err(match percent(&lost) {
+                0.0 => MissionError::OutOfReach { percent: 100.0 },
+                percent => MissionError::Constrained { percent },
+            });
+        }
+        let constrained = match percent(&lost) {
+            _ if settings.constraints.is_empty() => String::new(),
+            lost => format!(", {lost:.1} % lost to keep-out volumes and tether"),
+        };
+        stage.done(&format!("{:.1} % of the surface{constrained}", percent(&in_reach)));
         let layers = decide(&wanted, &coverage, &surface.beyond_seams, &in_reach, &appearance, &settings)?;
         let name = name.to_string();
         Ok(Self {
@@ -82,6 +96,7 @@ impl Decision {
             wanted,
             coverage,
             in_reach,
+            lost_to_constraints: lost,
             layers,
             started,
             truth: None,
@@ -114,6 +129,11 @@ impl Decision {
     /// Share of the surface's texels that the robot can serve.
     pub(super) fn share_in_reach(&self) -> f64 {
         share(&self.in_reach, &self.coverage)
+    }
+
+    /// Share of the surface's texels that it could serve but for keep-out volumes and tether; `None` where there are none.
+    pub(super) fn share_lost_to_constraints(&self) -> Option<f64> {
+        (!self.settings.constraints.is_empty()).then(|| share(&self.lost_to_constraints, &self.coverage))
     }
 
     /// Paint that is wanted where the robot cannot paint, m³.

@@ -25,7 +25,9 @@ const MAX_DOSE: f64 = 4.0;
 /// Changes the doses of all that the flights spray so that the thickness comes as near the wanted one as it can: least squares with
 /// positive doses, by the image space reconstruction algorithm (Daube-Witherspoon and Muehllehner 1986). Each flight is its targets
 /// with their plan.
-pub(super) fn correct_doses(flights: &mut [(&mut [Target], &Plan)], decision: &Decision) {
+///
+/// Returns the deviation over the mean of the thickness that is then expected where the robot can paint.
+pub(super) fn correct_doses(flights: &mut [(&mut [Target], &Plan)], decision: &Decision) -> f64 {
     let (texels, pixels) = decision.surface.film_texels();
     let ink = decision.appearance.ink();
     let wanted: Vec<f64> = pixels.iter().map(|&k| ink.inverse(decision.wanted.data()[k]) * UNIT_THICKNESS).collect();
@@ -57,9 +59,19 @@ pub(super) fn correct_doses(flights: &mut [(&mut [Target], &Plan)], decision: &D
             }
         }
     }
+    let thickness = response.thickness(&volumes, texels.len());
     for (way, volume) in ways.iter().zip(volumes) {
         flights[way.flight].0[way.target].dose = volume / way.length;
     }
+    let reached = (0..texels.len()).filter(|&k| decision.in_reach[pixels[k]] && wanted[k] > 0.0);
+    let (mut area, mut sum, mut squares) = (0.0, 0.0, 0.0);
+    for k in reached {
+        let ratio = thickness[k] / wanted[k];
+        area += texels[k].area;
+        sum += texels[k].area * ratio;
+        squares += texels[k].area * ratio * ratio;
+    }
+    (squares * area / (sum * sum) - 1.0).max(0.0).sqrt()
 }
 
 /// The way from a target to the next with the valve open.

@@ -73,6 +73,15 @@ pub enum MissionError {
         /// Share out of reach.
         percent: f64,
     },
+    /// Keep-out volumes and tether leave nothing.
+    #[error(
+        "keep-out volumes and tether leave no pose of the robot that paints anything; {percent:.0} % of the surface would be in reach \
+         without them: change `settings.constraints` of the mission file"
+    )]
+    Constrained {
+        /// Share of the surface in reach without them.
+        percent: f64,
+    },
     /// The map of the painted surface.
     #[error("scan: {0}")]
     Scan(#[from] tsdf_hash::Error),

@@ -1,12 +1,11 @@
 //! The figures of a mission.
 
 use paint_net::{ideal, metrics};
-use paint_planner::{Plan, normal_deviation};
+use paint_planner::{Plan, Surface, normal_deviation};
+use paint_sim::FlightLog;
 use paint_sim::flight::{FlightSample, FlightStatistics};
 use paint_sim::spray::QUANTUM;
-use paint_sim::{FlightLog, TriangleSurface};
 
-use super::decision::Decision;
 use super::error::MissionError;
 use super::fly::LayerFlight;
 use super::inspect::Inspection;
@@ -15,15 +14,12 @@ use super::rehearse::{GAP_STRIDE, gap};
 use super::run::Mission;
 use super::seams::likeness;
 use super::settings::{MissionSettings, PainterChoice};
-use crate::adapters::Robot;
-use crate::appearance::{DENSITY, UNIT_THICKNESS};
+use crate::adapters::{MeshSurface, Robot};
+use crate::appearance::DENSITY;
 use crate::report::{Report, peak_resident_bytes};
 
 /// Step of the dense check of the planned limits, seconds; the certificates do not depend on it.
 const LIMIT_STEP: f64 = 0.02;
-
-/// Thickness below which nothing is wanted, metres: ink is given to a few digits.
-const LEAST_COAT: f64 = 0.5e-6;
 
 /// All figures, with those of the inspection.
 pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, MissionError> {
@@ -48,6 +44,8 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
     let in_reach = Some(&in_reach);
     let fill = (mission.decision.settings.painter == PainterChoice::Fill).then(|| evenness(mission));
     let seams = likeness(mission)?;
+    let met = MeshSurface(mission.decision.met());
+    let obstacles = mission.decision.settings.constraints.around(&met);
     Ok(Report {
         version: env!("CARGO_PKG_VERSION"),
         surface: mission.decision.name.clone(),
@@ -61,6 +59,7 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         smoothing_normal_deviation_mean_m: deviations.smoothing_mean,
         unreachable_normal_share: deviations.unreachable,
         reach_share: mission.decision.share_in_reach(),
+        lost_to_constraints_share: mission.decision.share_lost_to_constraints(),
         unreachable_paint_share: mission.share_out_of_reach(),
         targets_kept_off: mission.kept_off,
         targets_left_bare: mission.left_bare,
@@ -92,11 +91,7 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         ssim_canvas_in_reach: metrics::ssim(canvas, &mission.decision.wanted, in_reach)?,
         ssim_painted_in_reach: metrics::ssim(&painted, &mission.decision.wanted, in_reach)?,
         ciede2000_mean: mean(mission.colour_difference().into_iter().flatten()),
-        collisions: mission
-            .flights
-            .iter()
-            .map(|f| collisions(&mission.decision.robot, mission.decision.met(), &f.flight))
-            .sum(),
+        collisions: mission.flights.iter().map(|f| collisions(&mission.decision.robot, &obstacles, &f.flight)).sum(),
         limit_violations: mission
             .flights
             .iter()
@@ -131,14 +126,10 @@ struct Evenness {
 }
 
 fn evenness(mission: &Mission) -> Evenness {
-    let Decision { wanted, in_reach, appearance, .. } = &mission.decision;
+    let ratios = mission.thickness_ratio();
     let (mut area, mut covered, mut thin, mut sum, mut squares) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for (k, (&pixel, texel)) in mission.pixels.iter().zip(mission.film.texels()).enumerate() {
-        let asked = appearance.ink().inverse(wanted.data()[pixel]) * UNIT_THICKNESS;
-        if !in_reach[pixel] || asked < LEAST_COAT {
-            continue;
-        }
-        let ratio = mission.film.thickness(k) / asked;
+    for (&pixel, texel) in mission.pixels.iter().zip(mission.film.texels()) {
+        let Some(ratio) = ratios[pixel] else { continue };
         area += texel.area;
         covered += if (0.5..=1.5).contains(&ratio) { texel.area } else { 0.0 };
         thin += if ratio < 0.5 { texel.area } else { 0.0 };
@@ -192,9 +183,9 @@ fn share_held(mission: &Mission) -> f64 {
     held as f64 / samples().filter(|s| s.held || s.flow > 0.0).count().max(1) as f64
 }
 
-/// Moments of a flight at which the robot overlaps the surface.
-fn collisions(robot: &Robot, surface: &TriangleSurface, log: &FlightLog) -> usize {
-    log.samples.iter().step_by(GAP_STRIDE).filter(|sample| gap(robot, surface, sample, 0.0) < 0.0).count()
+/// Moments of a flight at which the robot overlaps the surface or is in a keep-out volume.
+fn collisions(robot: &Robot, obstacles: &dyn Surface, log: &FlightLog) -> usize {
+    log.samples.iter().step_by(GAP_STRIDE).filter(|sample| gap(robot, obstacles, sample, 0.0) < 0.0).count()
 }
 
 /// Moments at which the plan exceeds speed or acceleration, or the flown gun its joint limits.
@@ -248,7 +239,8 @@ mod tests {
     fn collisions_are_counted() {
         let settings = MissionSettings::default();
         let (_, flight) = test_panel::flown(&settings);
-        let world = &test_panel::surface().world;
+        let surface = test_panel::surface();
+        let world = &MeshSurface(&surface.world);
         let robot = Robot::new(Ptu::new(settings.ptu).unwrap());
         assert_eq!(collisions(&robot, world, &flight), 0);
         let checked = flight.samples.len().div_ceil(GAP_STRIDE);

@@ -77,7 +77,7 @@ pub(super) fn fly_three(
     settings: &MissionSettings,
     layer: u64,
 ) -> Result<[FlightLog; 3], MissionError> {
-    let usual = flight_settings(plan, settings.seed.wrapping_mul(0x9E37_79B9).wrapping_add(layer));
+    let usual = flight_settings(plan, robot.tether, settings.seed.wrapping_mul(0x9E37_79B9).wrapping_add(layer));
     // Paint that misses by less than the spot is wide is better than none. The flights beside it are flown to see what they miss by, so
     // nothing shuts their valve.
     let interlock = Interlock { miss: settings.spot, ..Interlock::default() };

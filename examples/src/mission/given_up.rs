@@ -28,7 +28,8 @@ pub(super) fn take_given_up(
     if asked.is_empty() {
         return Ok(None);
     }
-    let reached = reachable_targets(&asked, &MeshSurface(&surface.world), robot, &settings.planner)?;
+    let mesh = MeshSurface(&surface.world);
+    let reached = reachable_targets(&asked, &settings.constraints.around(&mesh), robot, &settings.planner)?;
     let mut runs: Vec<Range<usize>> = Vec::new();
     for (&k, _) in lost.iter().zip(reached.chunks(2)).filter(|(_, ends)| ends.iter().all(|reached| *reached)) {
         match runs.last_mut().filter(|run| run.end == k) {

@@ -13,11 +13,12 @@ use super::figures::report;
 use super::inspect::inspect;
 use super::path_view::save_path;
 use super::run::Mission;
+use super::settings::PainterChoice;
 use super::shading::{shading, vertex_colours};
 use super::trajectory_table::trajectory_table;
 use super::view::{camera, picture_of, view};
 use crate::mesh_io::{PlyMesh, write_ply};
-use crate::pictures::{Panel, Rgb, save_curves, save_error_map};
+use crate::pictures::{COLOUR_DIFFERENCE, ErrorScale, Panel, Rgb, save_curves, save_error_map};
 use crate::progress::Stage;
 use crate::recording::{ColouredMesh, RobotState, save_recording};
 use crate::textured_mesh::{TexturedMesh, with_gutter};
@@ -28,6 +29,13 @@ const BACKGROUND: [u8; 3] = [255, 255, 255];
 pub(super) const RECORDING_STEP: f64 = 0.1;
 /// Points in a curve: more than the picture has columns shows nothing more.
 const CURVE_POINTS: usize = 2800;
+
+/// How far a coat is off its thickness.
+const COAT: ErrorScale<'static> = ErrorScale {
+    title: "Thickness of the coat, off the wanted one",
+    label: "percent (50 and above share a colour)",
+    ceiling: 50.0,
+};
 
 /// Writes pictures, mesh, recording and report into an existing folder; the report last, so that its presence means the
 /// folder is complete.
@@ -91,7 +99,13 @@ fn save_textures(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
         width,
         &mission.colour_difference(),
         (mission.decision.settings.texel, "m"),
+        &COLOUR_DIFFERENCE,
     )?;
+    if mission.decision.settings.painter == PainterChoice::Fill {
+        let off = mission.thickness_ratio().into_iter().map(|ratio| ratio.map(|ratio| 100.0 * (ratio - 1.0).abs()));
+        let texel = (mission.decision.settings.texel, "m");
+        save_error_map(&folder.join("coat.png"), width, &off.collect::<Vec<_>>(), texel, &COAT)?;
+    }
     Ok(())
 }
 

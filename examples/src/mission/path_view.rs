@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use paint_net::Image;
-use paint_sim::Hit;
+use paint_sim::{Camera, Frame, Hit};
 
 use super::decision::Decision;
 use super::error::MissionError;
@@ -23,14 +23,29 @@ pub(super) fn save_path(
     let corners = decision.surface.disk().positions().iter().map(|p| Point3::from(*p));
     let camera = camera(decision, &corners.chain(vehicle.iter().copied()).collect::<Vec<_>>())?;
     let frame = view(decision, &camera, &|hit: &Hit| shading(decision, depth, hit))?;
+    let lines = vec![
+        Polyline { points: nozzle, colour: [0, 90, 200], radius: 0.5 },
+        Polyline { points: vehicle, colour: [230, 110, 20], radius: 0.7 },
+    ];
+    save_lines(decision, &camera, &frame, lines, file)
+}
+
+/// Draws lines and the outlines of the mission's constraints into a view of the surface.
+pub(super) fn save_lines(
+    decision: &Decision,
+    camera: &Camera,
+    frame: &Frame,
+    mut lines: Vec<Polyline>,
+    file: &Path,
+) -> Result<(), MissionError> {
+    let corners = decision.surface.disk().positions().iter().map(|p| Vector3::from(*p));
+    let none = (Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN));
+    let (low, high) = corners.fold(none, |(low, high), p| (low.inf(&p), high.sup(&p)));
+    lines.extend(decision.settings.constraints.outlines(&low, &high));
     let project = |p: &Point3<f64>| {
         let c = camera.world_from_camera.inverse_transform_point(p);
         (c.z > 0.05).then(|| (camera.fx * c.x / c.z + camera.cx, camera.fy * c.y / c.z + camera.cy, c.z))
     };
-    let lines = [
-        Polyline { points: nozzle, colour: [0, 90, 200], radius: 0.5 },
-        Polyline { points: vehicle, colour: [230, 110, 20], radius: 0.7 },
-    ];
-    let scene = Scene { picture: picture_of(&frame), depth: &frame.depth, project: &project };
+    let scene = Scene { picture: picture_of(frame), depth: &frame.depth, project: &project };
     Ok(save_scene(file, scene, &lines)?)
 }

@@ -162,7 +162,11 @@ fn evened(
 ) -> Result<Vec<Flight>, MissionError> {
     let mut parts: Vec<(&mut [Target], &Plan)> =
         flights.iter_mut().map(|f| (f.route.targets.as_mut_slice(), &f.rehearsed.plan)).collect();
-    correct_doses(&mut parts, decision);
+    let expected = correct_doses(&mut parts, decision);
+    eprintln!(
+        "coat: doses corrected on the surface, expected to be even within {:.1} % (deviation over mean)",
+        100.0 * expected
+    );
     let mut even: Vec<Flight> = Vec::with_capacity(flights.len());
     for Flight { route, settings, rehearsed } in flights {
         let from = even.last().map_or(start, Flight::end);

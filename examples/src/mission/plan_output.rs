@@ -44,6 +44,9 @@ pub struct PlanFigures {
     pub targets_kept_off: usize,
     /// Targets given up in the rehearsal.
     pub targets_left_bare: usize,
+    /// Share of the surface in reach but for keep-out volumes and tether.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lost_to_constraints_share: Option<f64>,
     /// Share of the wanted paint that is not planned.
     pub unreachable_paint_share: f64,
     /// Time in the air.
@@ -180,6 +183,7 @@ fn figures(mission: &PlannedMission) -> PlanFigures {
         targets_not_served: mission.layers().map(|(_, p)| p.reachable.iter().filter(|&&served| !served).count()).sum(),
         targets_kept_off: planned.kept_off,
         targets_left_bare: planned.left_bare,
+        lost_to_constraints_share: decision.share_lost_to_constraints(),
         unreachable_paint_share: share_out_of_reach(decision, planned.unreachable_paint, mission.layers()),
         flight_time_s: flight_time,
         path_length_m: sum(&path_length),

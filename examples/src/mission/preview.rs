@@ -10,16 +10,19 @@ use serde::Serialize;
 
 use super::decision::Decision;
 use super::error::MissionError;
+use super::path_view::save_lines;
 use super::plan::layer_route;
 use super::seams::deposit_error;
 use super::shading::{shading, texel_at};
-use super::view::{camera, picture_of, view};
+use super::view::{camera, view};
 use crate::appearance::DENSITY;
 use crate::progress::Stage;
 use crate::report::save_figures;
 
 /// Albedo of what the robot cannot paint, mixed in by half.
 const OUT_OF_REACH: [f32; 3] = [0.75, 0.05, 0.35];
+/// The same for what only keep-out volumes and tether keep it from.
+const CONSTRAINED: [f32; 3] = [0.9, 0.45, 0.0];
 
 /// The figures of a preview. Flat, SI units in the names.
 #[derive(Debug, Clone, Serialize)]
@@ -34,6 +37,9 @@ pub struct Preview {
     pub surface_area_m2: f64,
     /// Share of it that the robot can paint.
     pub reach_share: f64,
+    /// Share of it that the robot could paint but for keep-out volumes and tether.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lost_to_constraints_share: Option<f64>,
     /// Share of the wanted paint that lies there.
     pub wanted_in_reach_share: f64,
     /// Paint that leaves the nozzle.
@@ -64,12 +70,14 @@ pub fn preview(decision: &Decision, folder: &Path) -> Result<Preview, MissionErr
     let painted = expected_depth(decision);
     let shade = |hit: &Hit| -> Shading {
         let plain = shading(decision, &painted, hit);
-        let bare = texel_at(decision, hit).is_some_and(|texel| !decision.in_reach[texel]);
-        let mixed = |c: usize| if bare { 0.5 * (plain.albedo[c] + OUT_OF_REACH[c]) } else { plain.albedo[c] };
+        let bare = texel_at(decision, hit).filter(|&texel| !decision.in_reach[texel]);
+        let why = bare.map(|texel| if decision.lost_to_constraints[texel] { CONSTRAINED } else { OUT_OF_REACH });
+        let mixed = |c: usize| why.map_or(plain.albedo[c], |why| 0.5 * (plain.albedo[c] + why[c]));
         Shading { albedo: [mixed(0), mixed(1), mixed(2)], ..plain }
     };
     let corners: Vec<Point3<f64>> = decision.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
-    picture_of(&view(decision, &camera(decision, &corners)?, &shade)?).save(&folder.join("preview.png"))?;
+    let camera = camera(decision, &corners)?;
+    save_lines(decision, &camera, &view(decision, &camera, &shade)?, Vec::new(), &folder.join("preview.png"))?;
     save_figures(&estimate, folder)?;
     stage.done(&folder.join("preview.png").display().to_string());
     Ok(estimate)
@@ -113,6 +121,7 @@ fn estimate(decision: &Decision) -> Result<Preview, MissionError> {
         seed: decision.settings.seed,
         surface_area_m2: decision.surface.disk().area(),
         reach_share: decision.share_in_reach(),
+        lost_to_constraints_share: decision.share_lost_to_constraints(),
         wanted_in_reach_share: wanted(&decision.coverage_in_reach())
             / wanted(&decision.coverage).max(f64::MIN_POSITIVE),
         paint_kg: volume * DENSITY,

@@ -5,6 +5,7 @@ use paint_planner::{Target, reachable_targets};
 use super::error::MissionError;
 use super::settings::MissionSettings;
 use crate::adapters::{MeshSurface, Robot};
+use crate::flight_constraints::FlightConstraints;
 use crate::surface::PaintSurface;
 
 /// Texels between two places that are asked about, along both axes: less than a spot is wide.
@@ -32,7 +33,8 @@ pub(super) fn texels_in_reach(
     };
     let (cells, targets): (Vec<usize>, Vec<Target>) =
         (0..columns * rows).filter_map(|cell| Some((cell, place(cell)?))).unzip();
-    let reached = reachable_targets(&targets, &MeshSurface(&surface.world), robot, &settings.planner)?;
+    let mesh = MeshSurface(&surface.world);
+    let reached = reachable_targets(&targets, &settings.constraints.around(&mesh), robot, &settings.planner)?;
     let mut in_reach = vec![false; columns * rows];
     for (cell, reached) in cells.into_iter().zip(reached) {
         in_reach[cell] = reached;
@@ -44,8 +46,22 @@ pub(super) fn texels_in_reach(
     for (k, paintable) in paintable.iter_mut().enumerate() {
         *paintable &= in_reach[k / width / STRIDE * columns + k % width / STRIDE];
     }
-    if !paintable.contains(&true) {
-        return Err(MissionError::OutOfReach { percent: 100.0 });
-    }
     Ok(paintable)
+}
+
+/// The texels that would be in reach but for keep-out volumes and tether.
+pub(super) fn texels_lost_to_constraints(
+    in_reach: &[bool],
+    surface: &PaintSurface,
+    robot: &Robot,
+    settings: &MissionSettings,
+) -> Result<Vec<bool>, MissionError> {
+    if settings.constraints.is_empty() {
+        return Ok(vec![false; in_reach.len()]);
+    }
+    let free = MissionSettings { constraints: FlightConstraints::default(), ..settings.clone() };
+    let unbound = Robot { tether: None, ..robot.clone() };
+    let mut lost = texels_in_reach(surface, &unbound, &free)?;
+    lost.iter_mut().zip(in_reach).for_each(|(lost, reached)| *lost &= !reached);
+    Ok(lost)
 }

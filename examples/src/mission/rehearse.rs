@@ -3,8 +3,7 @@
 
 use std::time::Instant;
 
-use paint_planner::{Error, OptimalPlanner, Plan, Target};
-use paint_sim::TriangleSurface;
+use paint_planner::{Error, OptimalPlanner, Plan, Surface, Target};
 use paint_sim::flight::FlightSample;
 use ptu_kinematics::Joints;
 
@@ -58,8 +57,9 @@ pub(super) fn rehearsed_plan(
     let mut seconds = 0.0;
     let mut plan_with = |clearance: &[f64]| {
         let clock = Instant::now();
-        let wall = MeshSurface(&surface.world);
-        let plan = OptimalPlanner::default().plan_with_clearance(targets, clearance, &wall, robot, planner);
+        let mesh = MeshSurface(&surface.world);
+        let obstacles = settings.constraints.around(&mesh);
+        let plan = OptimalPlanner::default().plan_with_clearance(targets, clearance, &obstacles, robot, planner);
         seconds += clock.elapsed().as_secs_f64();
         plan
     };
@@ -96,11 +96,13 @@ fn missing_clearance(
     targets: usize,
 ) -> Result<Vec<f64>, MissionError> {
     let mut missing = vec![0.0_f64; targets];
+    let mesh = MeshSurface(&surface.world);
+    let obstacles = settings.constraints.around(&mesh);
     for wind in 0..WINDS {
         let seed = settings.seed ^ SALT.wrapping_add(wind);
-        let log = fly_plan(plan, &surface.world, robot, settings, &flight_settings(plan, seed))?;
+        let log = fly_plan(plan, &surface.world, robot, settings, &flight_settings(plan, robot.tether, seed))?;
         for sample in log.samples.iter().step_by(GAP_STRIDE) {
-            let short = MARGIN - gap(robot, &surface.world, sample, MARGIN);
+            let short = MARGIN - gap(robot, &obstacles, sample, MARGIN);
             if short > 0.0 {
                 let at = plan.waypoints.partition_point(|w| w.time <= sample.time).clamp(1, plan.waypoints.len());
                 let before = plan.waypoints[..at].iter().rev().find_map(|w| w.target);
@@ -114,12 +116,12 @@ fn missing_clearance(
     Ok(missing)
 }
 
-/// Least distance between the robot and the surface at a moment of a flight, metres; at most `below`, negative where they overlap.
-pub(super) fn gap(robot: &Robot, surface: &TriangleSurface, sample: &FlightSample, below: f64) -> f64 {
+/// Least distance between the robot and what is in its way at a moment of a flight, metres; at most `below`, negative where they overlap.
+pub(super) fn gap(robot: &Robot, obstacles: &dyn Surface, sample: &FlightSample, below: f64) -> f64 {
     let joints = Joints { pan: sample.pan_tilt[0], tilt: sample.pan_tilt[1] };
     let mut spheres = Vec::new();
     robot.spheres_at(&sample.world_from_body, &joints, &mut spheres);
-    let gap = |(centre, radius): &(_, f64)| paint_sim::Surface::distance(surface, centre, radius + below) - radius;
+    let gap = |(centre, radius): &(_, f64)| obstacles.distance(centre, radius + below) - radius;
     spheres.iter().map(gap).fold(below, f64::min)
 }
 

@@ -12,6 +12,9 @@ use super::fly::{LayerFlight, fly, spray};
 use super::planned_mission::{PlannedMission, share_out_of_reach};
 use crate::appearance::UNIT_THICKNESS;
 
+/// Thickness below which nothing is wanted, metres: ink is given to a few digits.
+const LEAST_COAT: f64 = 0.5e-6;
+
 /// Everything a mission made; what the report, the pictures and the recording are drawn from.
 pub struct Mission {
     pub(super) decision: Decision,
@@ -74,6 +77,19 @@ impl Mission {
             paint_sim::ciede2000(self.decision.appearance.lab(painted.data()[k]), self.decision.appearance.lab(wanted))
         };
         (0..painted.data().len()).map(|k| (self.decision.coverage.data()[k] > 0.0).then(|| pixel(k))).collect()
+    }
+
+    /// Thickness over wanted thickness per pixel, `None` where the robot cannot paint or nothing is wanted.
+    pub(super) fn thickness_ratio(&self) -> Vec<Option<f64>> {
+        let Decision { wanted, in_reach, appearance, .. } = &self.decision;
+        let mut ratio = vec![None; in_reach.len()];
+        for (k, &pixel) in self.pixels.iter().enumerate() {
+            let asked = appearance.ink().inverse(wanted.data()[pixel]) * UNIT_THICKNESS;
+            if in_reach[pixel] && asked >= LEAST_COAT {
+                ratio[pixel] = Some(self.film.thickness(k) / asked);
+            }
+        }
+        ratio
     }
 
     /// Share of the wanted paint that was not planned.

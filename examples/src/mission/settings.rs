@@ -5,6 +5,7 @@ use ptu_kinematics::{PtuSettings, ServoSettings};
 use serde::{Deserialize, Serialize};
 
 use super::error::MissionError;
+use crate::flight_constraints::FlightConstraints;
 use crate::palette::PaintName;
 use crate::picture_placement::PicturePlacement;
 use crate::projection::Viewpoint;
@@ -45,6 +46,9 @@ pub struct MissionSettings {
     pub servo: ServoSettings,
     /// Who flies it.
     pub controller: ControllerChoice,
+    /// Where it may not fly, and where its hose hangs.
+    #[serde(skip_serializing_if = "FlightConstraints::is_empty")]
+    pub constraints: FlightConstraints,
 }
 
 /// The flight controllers to choose from.
@@ -92,6 +96,7 @@ impl Default for MissionSettings {
             ptu: PtuSettings::default(),
             servo: ServoSettings::default(),
             controller: ControllerChoice::default(),
+            constraints: FlightConstraints::default(),
         }
     }
 }
@@ -105,7 +110,7 @@ impl MissionSettings {
                 return Err(MissionError::Setting { name, value });
             }
         }
-        Ok(())
+        Ok(self.constraints.check()?)
     }
 }
 

@@ -1,8 +1,8 @@
 //! A plan in the flight simulator: wind, hose, localisation, servos.
 
 use nalgebra::{Point3, Vector3};
-use paint_planner::Plan;
 use paint_planner::control::MpcSettings;
+use paint_planner::{Plan, Tether};
 use paint_sim::flight::{CascadedController, Controller, ControllerSettings, HoseModel, fly_with};
 use paint_sim::{FlightLog, FlightSettings, TriangleSurface};
 
@@ -11,8 +11,8 @@ use super::settings::{ControllerChoice, MissionSettings};
 use crate::adapters::{MpcController, PlanReference, Robot, ServoPanTilt};
 
 /// The usual wind, hose and localisation.
-pub(super) fn flight_settings(plan: &Plan, seed: u64) -> FlightSettings {
-    FlightSettings { hose: Some(hose(plan)), seed, ..FlightSettings::default() }
+pub(super) fn flight_settings(plan: &Plan, tether: Option<Tether>, seed: u64) -> FlightSettings {
+    FlightSettings { hose: Some(hose(plan, tether)), seed, ..FlightSettings::default() }
 }
 
 /// Flies a plan with the robot's own servos and the controller that was chosen.
@@ -37,8 +37,8 @@ pub(super) fn fly_plan(
     Ok(fly_with(&reference, controller.as_mut(), &mut gun, world, flight)?)
 }
 
-/// The paint hose: from the ground behind the middle of the flight, long enough for all of it.
-fn hose(plan: &Plan) -> HoseModel {
+/// The paint hose: from its anchor, or from the ground behind the middle of the flight, long enough for all of it.
+fn hose(plan: &Plan, tether: Option<Tether>) -> HoseModel {
     let positions = || plan.waypoints.iter().map(|w| w.state.position);
     let count = plan.waypoints.len() as f64;
     let middle: Vector3<f64> = positions().map(|p| p.coords).sum::<Vector3<f64>>() / count;
@@ -48,10 +48,10 @@ fn hose(plan: &Plan) -> HoseModel {
         .map(|w| Vector3::new(w.state.heading.cos(), w.state.heading.sin(), 0.0))
         .sum::<Vector3<f64>>()
         / count;
-    let base = Point3::new(middle.x - back.x, middle.y - back.y, 0.0);
+    let base = tether.map_or_else(|| Point3::new(middle.x - back.x, middle.y - back.y, 0.0), |tether| tether.anchor);
     let farthest = positions().map(|p| (p - base).norm()).fold(0.0, f64::max);
     // A tenth of slack, and a metre for wind and overshoot.
-    HoseModel { base, length: 1.1 * farthest + 1.0, line_density: 0.12, base_on_floor: true }
+    HoseModel { base, length: 1.1 * farthest + 1.0, line_density: 0.12, base_on_floor: base.z <= 0.0 }
 }
 
 #[cfg(test)]
@@ -72,7 +72,7 @@ mod tests {
             let settings = MissionSettings { controller, ..settings.clone() };
             let wind = Wind { mean: Vector3::zeros(), gust_sigma: 3.0, ..Wind::default() };
             let spread = (0..12).map(|seed| {
-                let flight = FlightSettings { wind, ..flight_settings(&plan, seed) };
+                let flight = FlightSettings { wind, ..flight_settings(&plan, None, seed) };
                 let log = fly_plan(&plan, &surface.world, &robot, &settings, &flight).unwrap();
                 log.statistics().nozzle_distance_std.powi(2)
             });

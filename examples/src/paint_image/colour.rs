@@ -17,7 +17,7 @@ use super::ink::{ink_of, ssim};
 use super::job::Job;
 use super::progress_strip::save_progress_strip;
 use crate::picture_file::open_upright;
-use crate::pictures::{Rgb, save_error_map};
+use crate::pictures::{COLOUR_DIFFERENCE, Rgb, save_error_map};
 use crate::report::check_finite;
 
 /// Which glazes are in the guns, on a white wall.
@@ -193,7 +193,7 @@ pub fn save_colours(
     write_json(&folder.join("report.json"), figures)?;
     rgb(&painting.image).save(&folder.join("rendered.png"))?;
     let map: Vec<_> = differences(&painting.image, wanted).into_iter().map(Some).collect();
-    save_error_map(&folder.join("error.png"), figures.width, &map, (1.0, "px"))?;
+    save_error_map(&folder.join("error.png"), figures.width, &map, (1.0, "px"), &COLOUR_DIFFERENCE)?;
     let paints: Vec<&[Spray]> = painting.sprays.iter().map(Vec::as_slice).collect();
     let show = |depths: &[f64]| palette.colour(depths).map(byte);
     save_progress_strip(&folder.join("progress.png"), rgb(wanted), &paints, &job.kernel, &show)

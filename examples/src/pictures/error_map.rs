@@ -7,16 +7,31 @@ use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
 
 use super::{PictureError, draw};
 
-/// Colour differences above this share one colour: 20 is a plainly different colour.
-const CEILING: f64 = 20.0;
+/// What a map of errors shows.
+pub struct ErrorScale<'a> {
+    /// Title of the picture.
+    pub title: &'a str,
+    /// Label of the colour bar.
+    pub label: &'a str,
+    /// Errors above this share one colour.
+    pub ceiling: f64,
+}
 
-/// Saves a map of CIEDE2000 differences over the texture with its colour bar. `difference` holds one value per texel, row 0 at
+/// CIEDE2000: 20 is a plainly different colour.
+pub const COLOUR_DIFFERENCE: ErrorScale<'static> = ErrorScale {
+    title: "Colour difference, painted against wanted",
+    label: "CIEDE2000 (20 and above share a colour)",
+    ceiling: 20.0,
+};
+
+/// Saves a map of errors over the texture with its colour bar. `difference` holds one value per texel, row 0 at
 /// the top; `None` where there is no surface. `texel` is the side of one in the unit of the axes, which is named.
 pub fn save_error_map(
     path: &Path,
     width: usize,
     difference: &[Option<f64>],
     (texel, unit): (f64, &str),
+    scale: &ErrorScale,
 ) -> Result<(), PictureError> {
     let height = difference.len() / width.max(1);
     let zoom = (1200.0 / width as f64).min(900.0 / height as f64);
@@ -24,7 +39,7 @@ pub fn save_error_map(
     let picture = draw(map_width + 260, map_height + 130, |area| {
         let (left, right) = area.split_horizontally(map_width + 120);
         let mut chart = ChartBuilder::on(&left)
-            .caption("Colour difference, painted against wanted", ("sans-serif", 28))
+            .caption(scale.title, ("sans-serif", 28))
             .margin(10)
             .x_label_area_size(50)
             .y_label_area_size(70)
@@ -44,7 +59,7 @@ pub fn save_error_map(
                 let column = (px - columns.start) as usize * width / (columns.end - columns.start) as usize;
                 let row = (py - rows.start) as usize * height / (rows.end - rows.start) as usize;
                 if let Some(value) = difference.get(row * width + column).copied().flatten() {
-                    left.draw_pixel((px, py - left.get_base_pixel().1), &colour(value / CEILING))?;
+                    left.draw_pixel((px, py - left.get_base_pixel().1), &colour(value / scale.ceiling))?;
                 }
             }
         }
@@ -53,17 +68,17 @@ pub fn save_error_map(
             .margin_top(60)
             .margin_bottom(58)
             .y_label_area_size(70)
-            .build_cartesian_2d(0.0..1.0, 0.0..CEILING)?;
+            .build_cartesian_2d(0.0..1.0, 0.0..scale.ceiling)?;
         bar.configure_mesh()
             .disable_mesh()
             .disable_x_axis()
-            .y_desc("CIEDE2000 (20 and above share a colour)")
+            .y_desc(scale.label)
             .label_style(("sans-serif", 18))
             .axis_desc_style(("sans-serif", 20))
             .draw()?;
         bar.draw_series((0..200).map(|k| {
             let (low, high) = (f64::from(k) / 200.0, f64::from(k + 1) / 200.0);
-            Rectangle::new([(0.0, low * CEILING), (1.0, high * CEILING)], colour(low).filled())
+            Rectangle::new([(0.0, low * scale.ceiling), (1.0, high * scale.ceiling)], colour(low).filled())
         }))?;
         Ok(())
     })?;

@@ -5,6 +5,7 @@ mod area_fill;
 mod bad_input;
 mod bags;
 mod five_joint_arm;
+mod flight_constraints;
 mod gltf_meshes;
 mod handheld;
 mod independence;

@@ -15,48 +15,68 @@ pub(crate) struct Node {
     pub(crate) pan: f64,
 }
 
-/// States x heading bins; `None` where joint limits or collisions forbid the heading.
+/// States x heading bins; `None` where joint limits or collisions forbid the heading. Collisions cost most and most nodes lie on no path
+/// worth taking, so they are looked for where a search has led: until then a node that the joints allow counts as possible.
 pub(crate) struct HeadingGraph {
     pub(crate) bins: usize,
     pub(crate) nodes: Vec<Option<Node>>,
+    /// Whether collisions were looked for at each node.
+    checked: Vec<bool>,
     /// Heading of bin 0: the azimuth of the first spray axis, so that a plan turns with the world it is made in.
     origin: f64,
 }
 
 impl HeadingGraph {
-    /// Asks for every pair; state `i` has to keep `clearance[i]` from the surface, m.
-    pub(crate) fn build(
-        nozzles: &[Option<NozzleState>],
-        checker: &mut ClearanceChecker<'_>,
-        clearance: &[f64],
-        bins: usize,
-    ) -> Self {
+    /// Asks the joints about every pair.
+    pub(crate) fn build(nozzles: &[Option<NozzleState>], checker: &mut ClearanceChecker<'_>, bins: usize) -> Self {
         let first = nozzles.iter().flatten().next();
         let origin = first.map_or(0.0, |nozzle| nozzle.direction.y.atan2(nozzle.direction.x));
-        let mut graph = Self { bins, nodes: vec![None; nozzles.len() * bins], origin };
-        let all: Vec<usize> = (0..nozzles.len()).collect();
-        graph.update(nozzles, checker, clearance, &all);
+        let count = nozzles.len() * bins;
+        let mut graph = Self { bins, nodes: vec![None; count], checked: vec![false; count], origin };
+        graph.update(nozzles, checker, &(0..nozzles.len()).collect::<Vec<usize>>());
         graph
     }
 
-    /// Asks again about some states, whose nozzle or clearance is another. Neighbouring ones of one bin share their distance queries.
+    /// Asks again about some states, whose nozzle or clearance is another.
     pub(crate) fn update(
         &mut self,
         nozzles: &[Option<NozzleState>],
         checker: &mut ClearanceChecker<'_>,
-        clearance: &[f64],
         states: &[usize],
     ) {
         for bin in 0..self.bins {
             let heading = self.heading(bin);
-            let mut cache = DistanceCache::default();
             for &i in states {
                 let vehicle = nozzles[i].as_ref().and_then(|nozzle| checker.vehicle(nozzle, heading));
-                let clear = vehicle.filter(|vehicle| checker.is_clear(vehicle, clearance[i], &mut cache));
                 self.nodes[i * self.bins + bin] =
-                    clear.map(|vehicle| Node { position: vehicle.position, pan: vehicle.pan });
+                    vehicle.map(|vehicle| Node { position: vehicle.position, pan: vehicle.pan });
+                self.checked[i * self.bins + bin] = false;
             }
         }
+    }
+
+    /// Looks for collisions at some nodes, given as (state, bin); state `i` has to keep `clearance[i]` from the surface, m. Returns the
+    /// states that lost one. Neighbours in the list share their distance queries.
+    pub(crate) fn check(
+        &mut self,
+        nodes: impl Iterator<Item = (usize, usize)>,
+        nozzles: &[Option<NozzleState>],
+        checker: &mut ClearanceChecker<'_>,
+        clearance: &[f64],
+    ) -> Vec<usize> {
+        let (mut cache, mut lost) = (DistanceCache::default(), Vec::new());
+        for (i, bin) in nodes {
+            let node = i * self.bins + bin;
+            if std::mem::replace(&mut self.checked[node], true) || self.nodes[node].is_none() {
+                continue;
+            }
+            let vehicle = nozzles[i].as_ref().and_then(|nozzle| checker.vehicle(nozzle, self.heading(bin)));
+            if !vehicle.is_some_and(|vehicle| checker.is_clear(&vehicle, clearance[i], &mut cache)) {
+                self.nodes[node] = None;
+                lost.push(i);
+            }
+        }
+        lost
     }
 
     /// States in the graph.
@@ -76,7 +96,7 @@ impl HeadingGraph {
 
     #[cfg(test)]
     pub(crate) fn from_nodes(bins: usize, nodes: Vec<Option<Node>>) -> Self {
-        Self { bins, nodes, origin: 0.0 }
+        Self { bins, checked: vec![true; nodes.len()], nodes, origin: 0.0 }
     }
 }
 
@@ -124,17 +144,22 @@ mod tests {
         let mut nozzles: Vec<Option<NozzleState>> = (0..40).map(nozzle).collect();
         let mut clearance = vec![0.03; 40];
         let mut checker = ClearanceChecker::new(&Plane, &Boom);
-        let mut graph = HeadingGraph::build(&nozzles, &mut checker, &clearance, 72);
-        let possible = |graph: &HeadingGraph| graph.nodes.iter().map(Option::is_some).collect::<Vec<bool>>();
-        let before = possible(&graph);
+        let mut graph = HeadingGraph::build(&nozzles, &mut checker, 72);
+        let possible = |graph: &mut HeadingGraph, nozzles: &[Option<NozzleState>], clearance: &[f64]| {
+            let all = (0..72).flat_map(|bin| (0..40).map(move |i| (i, bin)));
+            graph.check(all, nozzles, &mut ClearanceChecker::new(&Plane, &Boom), clearance);
+            graph.nodes.iter().map(Option::is_some).collect::<Vec<bool>>()
+        };
+        let before = possible(&mut graph, &nozzles, &clearance);
         let changed = [3, 4, 5, 20, 33];
         for &k in &changed {
             clearance[k] = 0.15;
         }
         nozzles[20] = None;
-        graph.update(&nozzles, &mut checker, &clearance, &changed);
-        let again = HeadingGraph::build(&nozzles, &mut checker, &clearance, 72);
-        assert_eq!(possible(&graph), possible(&again));
-        assert_ne!(possible(&graph), before);
+        graph.update(&nozzles, &mut checker, &changed);
+        let mut again = HeadingGraph::build(&nozzles, &mut checker, 72);
+        let after = possible(&mut graph, &nozzles, &clearance);
+        assert_eq!(after, possible(&mut again, &nozzles, &clearance));
+        assert_ne!(after, before);
     }
 }

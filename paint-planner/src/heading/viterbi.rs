@@ -36,7 +36,7 @@ impl Path {
 }
 
 /// Cost of one edge, Eq. (7) with the squared distance the text asks for: `dpsi^2 / D^2 + c_e D^2`.
-fn edge(from: &Node, to: &Node, turn: f64, ce: f64) -> f64 {
+pub(super) fn edge(from: &Node, to: &Node, turn: f64, ce: f64) -> f64 {
     let distance = (to.position - from.position).norm_squared();
     turn * turn / (distance + MIN_SQUARED_STEP) + ce * distance
 }
@@ -45,17 +45,18 @@ fn edge(from: &Node, to: &Node, turn: f64, ce: f64) -> f64 {
 /// or the strokes are not linked, any bin may follow any other: the flight between is planned separately.
 pub(crate) fn search(graph: &HeadingGraph, linked: &[bool], settings: &HeadingSettings) -> Path {
     let bins = graph.bins;
-    let window = settings.window.min(bins / 2 - 1) as isize;
+    let least: Vec<f64> = (0..=bins / 2).map(|k| least_edge(k as f64 * TAU / bins as f64, settings.ce)).collect();
+    let window = &least[..=settings.window.min(bins / 2 - 1)];
     let mut parents = vec![NO_PARENT; graph.nodes.len()];
     let mut joined = vec![false; graph.len().saturating_sub(1)];
-    let mut best = vec![f64::INFINITY; bins];
+    let (mut best, mut next) = (vec![f64::INFINITY; bins], vec![0.0; bins]);
     let mut previous: Option<usize> = None;
     for i in 0..graph.len() {
         let layer = graph.layer(i);
         if layer.iter().all(Option::is_none) {
             continue;
         }
-        let mut next = vec![0.0; bins];
+        next.fill(0.0);
         if let Some(before) = previous {
             let parent = &mut parents[i * bins..(i + 1) * bins];
             let old = graph.layer(before);
@@ -65,45 +66,62 @@ pub(crate) fn search(graph: &HeadingGraph, linked: &[bool], settings: &HeadingSe
                 joined[before] = next.iter().any(|cost| cost.is_finite());
             }
             if next.iter().all(|cost| cost.is_infinite()) {
-                relax((old, &best), (layer, &mut next), parent, (bins / 2) as isize, settings.ce);
+                relax((old, &best), (layer, &mut next), parent, &least, settings.ce);
             }
         }
         for (cost, node) in next.iter_mut().zip(layer) {
             *cost += node.map_or(f64::INFINITY, |node| settings.pan * node.pan * node.pan);
         }
-        best = next;
+        std::mem::swap(&mut best, &mut next);
         previous = Some(i);
     }
     trace(graph, &parents, joined, &best, previous)
 }
 
-/// Cheapest ways from one layer to the next over turns of at most `reach` bins.
+/// The least that a turn costs, whatever the distance flown meanwhile.
+fn least_edge(turn: f64, ce: f64) -> f64 {
+    // The minimum over D^2 lies at D^2 + MIN_SQUARED_STEP = turn / sqrt(ce). Rounding must not make it too large.
+    let root = ce.sqrt();
+    let least = if turn > root * MIN_SQUARED_STEP {
+        2.0 * turn * root - ce * MIN_SQUARED_STEP
+    } else {
+        turn * turn / MIN_SQUARED_STEP
+    };
+    (1.0 - 1e-9) * least
+}
+
+/// Cheapest ways from one layer to the next over turns of at most `least.len() - 1` bins, `least` being the least cost of each. Turns
+/// that cost too much at any distance are not looked at.
 fn relax(
     (old, best): (&[Option<Node>], &[f64]),
     (layer, next): (&[Option<Node>], &mut [f64]),
     parent: &mut [u32],
-    reach: isize,
+    least: &[f64],
     ce: f64,
 ) {
+    let bins = layer.len();
+    let cheapest = best.iter().copied().fold(f64::INFINITY, f64::min);
     for (bin, node) in layer.iter().enumerate() {
         let Some(node) = node else { continue };
-        for (from, turn) in candidates(bin, layer.len(), reach) {
-            let Some(start) = old[from].as_ref().filter(|_| best[from].is_finite()) else { continue };
-            let cost = best[from] + edge(start, node, turn, ce);
-            if cost < next[bin] || (cost == next[bin] && (from as u32) < parent[bin]) {
-                next[bin] = cost;
-                parent[bin] = from as u32;
+        for (shift, least) in least.iter().enumerate() {
+            if cheapest + least > next[bin] {
+                break;
+            }
+            let turn = shift as f64 * TAU / bins as f64;
+            let (left, right) = ((bin + bins - shift) % bins, (bin + shift) % bins);
+            for from in [left, right].into_iter().take(if left == right { 1 } else { 2 }) {
+                if !best[from].is_finite() || best[from] + least > next[bin] {
+                    continue;
+                }
+                let Some(start) = &old[from] else { continue };
+                let cost = best[from] + edge(start, node, turn, ce);
+                if cost < next[bin] || (cost == next[bin] && (from as u32) < parent[bin]) {
+                    next[bin] = cost;
+                    parent[bin] = from as u32;
+                }
             }
         }
     }
-}
-
-/// Bins within `reach` of `bin`, with the turn from them to it, in rad.
-fn candidates(bin: usize, bins: usize, reach: isize) -> impl Iterator<Item = (usize, f64)> {
-    (-reach..=reach).map(move |shift| {
-        let from = (bin as isize + shift).rem_euclid(bins as isize) as usize;
-        (from, -(shift as f64) * TAU / bins as f64)
-    })
 }
 
 fn trace(graph: &HeadingGraph, parents: &[u32], joined: Vec<bool>, best: &[f64], last: Option<usize>) -> Path {
@@ -173,7 +191,7 @@ mod tests {
             let (bins, layers) = (6, 5);
             let nodes = (0..bins * layers)
                 .map(|_| {
-                    let position = Point3::new(random(), random(), random()) * 0.05;
+                    let position = Point3::new(random(), random(), random()) * 0.15;
                     (random() < 0.7).then(|| Node { position, pan: random() - 0.5 })
                 })
                 .collect();

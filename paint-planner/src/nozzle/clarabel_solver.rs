@@ -26,7 +26,10 @@ impl Default for Clarabel {
 impl QpSolver for Clarabel {
     fn solve(&self, program: &QuadraticProgram, states: &mut [Vector5<f64>]) -> Result<QpOutcome, Error> {
         let failed = Error::Numerical { stage: "the nozzle program, solved by Clarabel," };
-        let form = StandardForm::new(program);
+        let mut form = StandardForm::new(program);
+        // Its tolerances are relative to the objective, and that of states far from the origin is large: they count from where they start.
+        let start: Vec<f64> = states.iter().flat_map(|state| state.iter().copied()).collect();
+        form.move_to(&start);
         let matrix = |rows: usize, triplets: &[(usize, usize, f64)]| {
             let (r, (c, v)): (Vec<usize>, (Vec<usize>, Vec<f64>)) =
                 triplets.iter().map(|&(r, c, v)| (r, (c, v))).unzip();
@@ -51,7 +54,7 @@ impl QpSolver for Clarabel {
         }
         let (found, relaxations) = solution.x.split_at(form.states);
         for (state, found) in states.iter_mut().zip(found.chunks_exact(5)) {
-            state.copy_from_slice(found);
+            *state += Vector5::from_column_slice(found);
         }
         let slack = relaxations.iter().copied().fold(0.0, f64::max);
         Ok(QpOutcome { steps: solution.iterations as usize, slack })

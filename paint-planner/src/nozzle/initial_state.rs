@@ -36,10 +36,12 @@ fn start(target: &Target, settings: &NozzleSettings) -> Option<InitialState> {
     let direction = if tilted == 0.0 {
         ideal
     } else {
-        if tilted > settings.incidence - MARGIN || flat.norm() < 1e-9 {
+        if tilted > settings.incidence - MARGIN {
             return None;
         }
-        flat.normalize() * limit.cos() + Vector3::z() * limit.sin().copysign(elevation)
+        // Below a level ceiling every side serves; there the plan depends on the world's x axis, as its tangents do.
+        flat.try_normalize(1e-9).unwrap_or_else(Vector3::x) * limit.cos()
+            + Vector3::z() * limit.sin().copysign(elevation)
     };
     let position = target.point - direction * (settings.stand_off / tilted.cos());
     let state = NozzleState { position, direction: UnitVector3::new_normalize(direction) };

@@ -5,7 +5,7 @@
 //! differences are squared, and the heading rows are soft, because Eq. (5) rejects even the initial state where
 //! `sin psi1` vanishes.
 
-use super::initial_state::InitialState;
+use super::initial_state::{InitialState, tangents};
 use super::qp_solver::QpSolver;
 use super::quadratic_program::QuadraticProgram;
 use super::solution::Nozzles;
@@ -61,6 +61,20 @@ fn initial(target: &Target, stand_off: f64) -> Vector5<f64> {
     let n = &target.normal;
     let p = target.point + n.into_inner() * stand_off;
     Vector5::new(p.x, p.y, p.z, (-n.y).atan2(-n.x).rem_euclid(TAU), (-n.z).clamp(-1.0, 1.0).acos())
+}
+
+/// The programs of one Jacobi iteration of the paper-exact mode, one for each target and independent of each other, about given states (position,
+/// azimuth, polar angle): for measuring a [`QpSolver`] by itself. All targets are one stroke; as many states as targets.
+pub fn state_programs(
+    targets: &[Target],
+    states: &[Vector5<f64>],
+    settings: &NozzleSettings,
+) -> (QuadraticProgram, Vec<Vector5<f64>>) {
+    let count = targets.len().min(states.len());
+    let chosen: Vec<(Target, [Vector3<f64>; 2])> =
+        targets[..count].iter().map(|target| (*target, tangents(&target.normal, &Vector3::z()))).collect();
+    let program = build(&chosen, &states[..count], &vec![true; count.saturating_sub(1)], settings);
+    (program, states[..count].to_vec())
 }
 
 fn build(

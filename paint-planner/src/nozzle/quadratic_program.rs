@@ -51,22 +51,20 @@ impl QuadraticProgram {
         self.rows.push(Row { a: Vector3::new(a.x, a.y, 0.0), b });
     }
 
-    /// `H x + g`.
-    pub(crate) fn slope(&self, x: &[Vector5<f64>], out: &mut [Vector5<f64>]) {
-        for (i, slope) in out.iter_mut().enumerate() {
-            *slope = self.hessian.diagonal[i] * x[i] + self.gradient[i];
-            if i > 0 {
-                *slope += self.hessian.lower[i - 1] * x[i - 1];
-            }
-            if i + 1 < x.len() {
-                *slope += self.hessian.lower[i].tr_mul(&x[i + 1]);
-            }
+    /// `H x` at the coordinates of state `i`.
+    pub(crate) fn curvature_times(&self, x: &[Vector5<f64>], i: usize) -> Vector5<f64> {
+        let mut slope = self.hessian.diagonal[i] * x[i];
+        if i > 0 {
+            slope += self.hessian.lower[i - 1] * x[i - 1];
         }
+        if i + 1 < x.len() {
+            slope += self.hessian.lower[i].tr_mul(&x[i + 1]);
+        }
+        slope
     }
 
-    /// Position and mapped coordinate of a state, both as 3-vectors so that every row is one dot product.
-    pub(crate) fn views(&self, i: usize, x: &Vector5<f64>) -> [Vector3<f64>; 2] {
-        let w = self.soft_map[i] * x;
-        [Vector3::new(x[0], x[1], x[2]), Vector3::new(w.x, w.y, 0.0)]
+    /// Position and mapped coordinate of a state.
+    pub(crate) fn views(&self, i: usize, x: &Vector5<f64>) -> (Vector3<f64>, Vector2<f64>) {
+        (Vector3::new(x[0], x[1], x[2]), self.soft_map[i] * x)
     }
 }

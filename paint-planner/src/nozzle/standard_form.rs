@@ -66,4 +66,17 @@ impl StandardForm {
         }
         Self { variables, states, p, q, a, b }
     }
+
+    /// Counts the states from `start`: `x = start + y` with the new variables `y`; a constant of the objective is dropped.
+    pub fn move_to(&mut self, start: &[f64]) {
+        for &(r, c, v) in self.p.iter().filter(|(r, c, _)| *r < start.len() && *c < start.len()) {
+            self.q[r] += v * start[c];
+            if r != c {
+                self.q[c] += v * start[r];
+            }
+        }
+        for &(row, column, v) in self.a.iter().filter(|(_, column, _)| *column < start.len()) {
+            self.b[row] -= v * start[column];
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::clarabel_solver::Clarabel;
 use super::quadratic_program::{QuadraticProgram, Row};
-use super::{InteriorPoint, Mode, QpSolver, initial_states, optimise};
+use super::{GaussSeidel, InteriorPoint, Mode, QpSolver, initial_states, optimise};
 use crate::settings::NozzleSettings;
 use crate::target::{Target, normal_deviation};
 use nalgebra::{Matrix2x5, Matrix5, Point3, UnitVector3, Vector2, Vector3, Vector5};
@@ -57,6 +57,29 @@ fn the_interior_point_method_agrees_with_clarabel() {
         assert!(x.iter().zip(&expected).all(|(x, expected)| (x - expected).amax() < 1e-6), "round {round}");
     }
     assert!(relaxed > 10);
+}
+
+#[test]
+fn state_after_state_agrees_with_clarabel() {
+    let mut random = Random(23);
+    let (mut relaxed, mut alone) = (0, 0);
+    for round in 0..300 {
+        let count = 1 + round % 7;
+        let mut program = random_program(count, &mut random);
+        if round % 3 == 0 {
+            // Uncoupled: one sweep.
+            program.hessian.lower.iter_mut().for_each(|block| block.fill(0.0));
+        }
+        let mut x = vec![Vector5::zeros(); count];
+        let outcome = GaussSeidel::default().solve(&program, &mut x).unwrap();
+        alone += usize::from(outcome.steps == 1);
+        relaxed += usize::from(outcome.slack > 1e-3);
+        let mut expected = vec![Vector5::zeros(); count];
+        let general = Clarabel::default().solve(&program, &mut expected).unwrap();
+        assert!((outcome.slack - general.slack).abs() < 1e-6, "round {round}: {} {}", outcome.slack, general.slack);
+        assert!(x.iter().zip(&expected).all(|(x, expected)| (x - expected).amax() < 1e-6), "round {round}");
+    }
+    assert!(relaxed > 150 && alone >= 100, "{relaxed} {alone}");
 }
 
 /// The wall x = 0 seen from smaller x; `normal_z` tilts the normal in the xz plane.
@@ -140,12 +163,13 @@ fn cut_links_leave_the_strokes_alone() {
 }
 
 #[test]
-fn programs_without_a_point_are_refused_by_both_solvers() {
+fn programs_without_a_point_are_refused_by_all_solvers() {
     let mut program = random_program(2, &mut Random(3));
     // The first state shall lie on both sides of a plane.
     program.rows[0] = Row { a: Vector3::x(), b: -1.0 };
     program.rows[1] = Row { a: -Vector3::x(), b: -1.0 };
     let mut states = vec![Vector5::zeros(); 2];
     assert!(InteriorPoint.solve(&program, &mut states.clone()).is_err());
+    assert!(GaussSeidel::default().solve(&program, &mut states.clone()).is_err());
     assert!(Clarabel::default().solve(&program, &mut states).is_err());
 }

@@ -82,11 +82,17 @@ impl OptimalPlanner<'_> {
         );
         let mut checker = ClearanceChecker::new(surface, tool);
         let mut clearance = clearance.to_vec();
-        let mut graph = HeadingGraph::build(&nozzles.states, &mut checker, &clearance, settings.heading.bins);
+        let mut graph = HeadingGraph::build(&nozzles.states, &mut checker, settings.heading.bins);
         let mut attempt = 0;
         loop {
-            let mut headings =
-                heading::choose_headings(&graph, &nozzles.states, &linked, &mut checker, &clearance, &settings.heading);
+            let mut headings = heading::choose_headings(
+                &mut graph,
+                &nozzles.states,
+                &linked,
+                &mut checker,
+                &clearance,
+                &settings.heading,
+            );
             checker.check_answers()?;
             if headings.vehicle.iter().all(Option::is_none) {
                 return Err(Error::NothingReachable { count: targets.len() });
@@ -123,7 +129,7 @@ impl OptimalPlanner<'_> {
                 raise_clearance(&plan, &violation, &mut clearance, &mut nozzles);
             }
             let raised: Vec<usize> = (0..clearance.len()).filter(|&i| clearance[i] > before[i]).collect();
-            graph.update(&nozzles.states, &mut checker, &clearance, &raised);
+            graph.update(&nozzles.states, &mut checker, &raised);
         }
     }
 }

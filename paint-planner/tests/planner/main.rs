@@ -1,5 +1,6 @@
 //! Whole plans on analytic worlds.
 
+mod constraints;
 mod continuation;
 mod control;
 mod gantry;
