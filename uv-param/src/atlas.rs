@@ -11,6 +11,7 @@ mod charting;
 mod fit;
 mod layout;
 mod levels;
+mod mend;
 mod motion;
 mod pack;
 mod price;

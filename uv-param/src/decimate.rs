@@ -299,7 +299,7 @@ impl<'a> Mesh<'a> {
                 if let Some(twin) = twins[k] {
                     self.twins[twin as usize] = twins[1 - k].unwrap_or(BORDER);
                     // The side that does not touch the vertex that goes tells what the edge is.
-                    let stays = if self.start(sides[0]) == v || self.start(next(sides[0])) == v { 1 } else { 0 };
+                    let stays = usize::from(self.start(sides[0]) == v || self.start(next(sides[0])) == v);
                     if k != stays {
                         self.half_edge_source[twin as usize] = self.half_edge_source[sides[stays] as usize];
                     }

@@ -5,8 +5,9 @@ use std::collections::{BTreeMap, HashSet};
 use super::add_region::add_region;
 use super::fit::Bounds;
 use super::layout::Charts;
+use super::mend::mend;
 use super::motion::motion;
-use super::refine::{is_small, keep, mend, pieces};
+use super::refine::{is_small, keep, pieces};
 use super::seams::{Arc, arcs};
 
 /// Share of a seam's length by which its two sides may differ in shape.
