@@ -14,6 +14,7 @@ pub mod pose_graphs;
 pub mod rock;
 pub mod room;
 pub mod sequences;
+pub mod split_meshes;
 pub mod vocabulary;
 
 use std::time::Duration;
