@@ -20,7 +20,7 @@ const PAGE: f64 = 1024.0;
 /// Of reading and of the atlas.
 pub fn run(file: &Path, splits: u32) -> Result<(), Box<dyn std::error::Error>> {
     let read = read_mesh(file)?;
-    let mut mesh: Mesh = (read.positions, read.faces);
+    let mut mesh: Mesh = (read.positions.iter().map(|p| p.map(f64::from)).collect(), read.faces);
     for split in 0..=splits {
         if split > 0 {
             mesh = split_into_four(&mesh);
@@ -59,7 +59,9 @@ fn split_into_four(mesh: &Mesh) -> Mesh {
     for &face in &mesh.1 {
         let [a, b, c] = corners(mesh, face);
         let cross = (b - a).cross(&(c - a));
-        face.iter().for_each(|&v| normals[v as usize] += cross);
+        for v in face {
+            normals[v as usize] += cross;
+        }
     }
     let normals: Vec<Vector3<f64>> =
         normals.iter().map(|n: &Vector3<f64>| n.try_normalize(0.0).unwrap_or_else(Vector3::zeros)).collect();
