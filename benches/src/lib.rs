@@ -15,6 +15,7 @@ pub mod pose_graphs;
 pub mod rock;
 pub mod room;
 pub mod sequences;
+pub mod split_meshes;
 pub mod state_programs;
 pub mod vocabulary;
 

@@ -6,7 +6,7 @@ use crate::disk::Disk;
 use crate::error::Error;
 use crate::laplacian::Laplacian;
 use crate::parametrizer::{Layout, Parametrizer, Progress, Stage, StoppingCriterion};
-use crate::triangle::Frame;
+use crate::triangle::{Frame, Jacobian};
 use crate::tutte::tutte_layout;
 use anderson::Anderson;
 
@@ -101,6 +101,27 @@ pub(crate) fn iterate_arap(
         *at = [best[v], best[size + v]];
     }
     iterations
+}
+
+/// The layout whose Jacobians are nearest to given ones, by area (a Poisson problem); the Laplacian is factorised.
+pub(crate) fn fit_jacobians(
+    disk: &Disk,
+    frames: &[Frame],
+    jacobians: &[Jacobian],
+    laplacian: &mut Laplacian,
+) -> Vec<[f64; 2]> {
+    let size = laplacian.size();
+    let mut right = vec![0.0; 2 * size];
+    for ((face, frame), j) in disk.faces.iter().zip(frames).zip(jacobians) {
+        for (&v, g) in face.iter().zip(frame.g) {
+            right[v as usize] += frame.area * (j.a * g[0] + j.b * g[1]);
+            right[size + v as usize] += frame.area * (j.c * g[0] + j.d * g[1]);
+        }
+    }
+    let pinned = pin(disk) as usize;
+    (right[pinned], right[size + pinned]) = (0.0, 0.0);
+    laplacian.solve(&mut right);
+    (0..disk.positions.len()).map(|v| [right[v], right[size + v]]).collect()
 }
 
 /// Nearest rotation of every face, the right-hand side they make, and the energy of `x` (all u, then all v).

@@ -4,14 +4,19 @@
 //! 2. The rest is taken apart into regions of similar normals, more than are needed, each of which is laid out.
 //! 3. Seams are closed again, the most useful first, as long as what they join can really be laid out within the bounds.
 
+mod absorb;
+mod add_region;
 mod bitmap;
 mod charting;
 mod fit;
 mod layout;
+mod levels;
+mod mend;
 mod motion;
 mod pack;
 mod price;
 mod quality;
+mod refine;
 mod regions;
 mod seams;
 mod sew;

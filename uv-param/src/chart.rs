@@ -13,7 +13,7 @@ use crate::distortion::Quality;
 use crate::error::Error;
 use crate::triangle::Frame;
 use locate::Grid;
-pub(crate) use locate::{inside, overlapping_pairs};
+pub(crate) use locate::{inside, overlapping_faces, overlapping_pairs};
 pub use surface_point::SurfacePoint;
 
 /// The layout of a [`Disk`]: one uv point in metres per vertex, `0 <= u <= width`, `0 <= v <= height`. Not

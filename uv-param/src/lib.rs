@@ -45,6 +45,7 @@ mod atlas;
 mod chart;
 mod clip;
 mod cut;
+mod decimate;
 mod disk;
 mod distortion;
 mod error;

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use crate::decimate::decimate;
 use crate::disk::Disk;
 use crate::error::Error;
 use crate::half_edges::{BORDER, EdgeTable, half_edge};
@@ -151,6 +152,30 @@ impl Surface {
         [a, b]
     }
 
+    /// A surface of about `target` faces whose vertices are some of these, with the same topology; edges for which `kept` holds stay. Also, for
+    /// every half-edge of it, one of this surface for which `kept` is the same, and for every vertex the one onto which it went.
+    pub(crate) fn coarser(&self, kept: impl Fn(usize) -> bool, target: usize) -> (Self, Vec<u32>, Vec<u32>) {
+        let mut pinned = vec![false; self.positions.len()];
+        for h in (0..self.twins.len()).filter(|&h| kept(h)) {
+            for v in self.ends(h) {
+                pinned[v as usize] = true;
+            }
+        }
+        let found = decimate(&self.positions, &self.faces, &self.twins, pinned, target);
+        let count = found.faces.len();
+        let surface = Self {
+            positions: self.positions.clone(),
+            face_source: (0..count as u32).collect(),
+            reversed: vec![false; count],
+            part: (0..count).map(|f| self.part[found.half_edge_source[3 * f] as usize / 3]).collect(),
+            parts: self.parts,
+            source_faces: count,
+            faces: found.faces,
+            twins: found.twins,
+        };
+        (surface, found.half_edge_source, found.root)
+    }
+
     /// Some faces as a surface of their own, open along the half-edges for which `seam` holds; `None` unless they can be laid
     /// out in the plane (in one piece, without handles, with a boundary).
     pub(crate) fn disk(&self, faces: &[u32], seam: impl Fn(usize) -> bool, lookup: &mut FaceLookup) -> Option<Disk> {
@@ -293,4 +318,53 @@ fn parts_of(twins: &[u32]) -> (Vec<u32>, usize) {
         })
         .collect();
     (part, count as usize)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// Steps around a torus, both ways.
+    const STEPS: u32 = 40;
+
+    fn torus() -> Surface {
+        let at = |i: u32, j: u32| (i % STEPS) * STEPS + j % STEPS;
+        let (mut positions, mut faces) = (Vec::new(), Vec::new());
+        for (i, j) in (0..STEPS * STEPS).map(|k| (k / STEPS, k % STEPS)) {
+            let [u, v] = [i, j].map(|k| f64::from(k) * std::f64::consts::TAU / f64::from(STEPS));
+            positions.push([(2.0 + v.cos()) * u.cos(), (2.0 + v.cos()) * u.sin(), v.sin()]);
+            faces.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            faces.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+        Surface::new(&positions, &faces, true).unwrap().0
+    }
+
+    #[test]
+    fn a_coarser_torus_is_a_torus_with_the_wanted_edges() {
+        let fine = torus();
+        let around = |h: usize| fine.ends(h).iter().all(|v| v / STEPS == 5);
+        let (coarse, sources, roots) = fine.coarser(around, 700);
+        let count = coarse.faces().len();
+        assert!((500..=700).contains(&count), "{count}");
+        // Every edge has two faces that run along it in opposite directions.
+        for h in 0..3 * count {
+            let twin = coarse.twin(h).unwrap();
+            assert_eq!(coarse.twin(twin), Some(h));
+            let [a, b] = coarse.ends(h);
+            assert_eq!(coarse.ends(twin), [b, a]);
+        }
+        // One handle: V - E + F = 0.
+        let mut used: Vec<u32> = coarse.faces().iter().flatten().copied().collect();
+        used.sort_unstable();
+        used.dedup();
+        assert_eq!(used.len() + count, 3 * count / 2);
+        assert!(roots.iter().all(|root| used.binary_search(root).is_ok()));
+        let kept = (0..3 * count).filter(|&h| around(sources[h] as usize)).collect::<Vec<_>>();
+        assert_eq!(kept.len(), 2 * STEPS as usize);
+        assert!(kept.iter().all(|&h| coarse.ends(h).iter().all(|v| v / STEPS == 5)));
+        // A torus of these radii; the coarse one is inscribed.
+        let exact = 8.0 * std::f64::consts::PI.powi(2);
+        assert!(coarse.area() < exact && coarse.area() > 0.93 * exact, "{}", coarse.area() / exact);
+    }
 }

@@ -50,18 +50,22 @@ pub(crate) fn minimise_symmetric_dirichlet(
     stopping: &StoppingCriterion,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<usize, Error> {
-    minimise_penalty(disk, frames, uv, Penalty::NONE, stopping, progress, &mut |_| false)
+    let mut heard = |at: Progress, _: &[[f64; 2]]| {
+        progress(at);
+        false
+    };
+    minimise_penalty(disk, frames, uv, Penalty::NONE, &[], stopping, &mut heard)
 }
 
-/// The same with a penalty on the worst faces; stops as well when a layout is `enough`.
+/// The same with a penalty on the worst faces; stops as well when a layout is `enough`. Vertices for which `fixed` holds stay; empty: none.
 pub(crate) fn minimise_penalty(
     disk: &Disk,
     frames: &[Frame],
     uv: &mut Vec<[f64; 2]>,
     penalty: Penalty,
+    fixed: &[bool],
     stopping: &StoppingCriterion,
-    progress: &mut dyn FnMut(Progress),
-    enough: &mut dyn FnMut(&[[f64; 2]]) -> bool,
+    enough: &mut dyn FnMut(Progress, &[[f64; 2]]) -> bool,
 ) -> Result<usize, Error> {
     let faces = flips(uv, &disk.faces);
     if faces > 0 {
@@ -71,13 +75,13 @@ pub(crate) fn minimise_penalty(
     let mut system = Newton::new(disk)?;
     let mut last = energy(disk, frames, uv, penalty);
     for iteration in 1..=stopping.iterations {
-        let step = system.step(disk, frames, uv, penalty)?;
+        let step = system.step(disk, frames, uv, penalty, fixed)?;
         let Some(next) = line_search(disk, frames, uv, penalty, &step, last) else { return Ok(iteration - 1) };
         // Over 4, so that an isometry reads 1; progress is measured against what is above it.
         let (before, now) = (last / area / 4.0, next / area / 4.0);
         last = next;
-        progress(Progress { stage: Stage::SymmetricDirichlet, iteration, energy: now });
-        if before - now <= stopping.tolerance * (before - 1.0).max(0.0) + f64::EPSILON || enough(uv) {
+        let is_enough = enough(Progress { stage: Stage::SymmetricDirichlet, iteration, energy: now }, uv);
+        if is_enough || before - now <= stopping.tolerance * (before - 1.0).max(0.0) + f64::EPSILON {
             return Ok(iteration);
         }
     }
@@ -220,17 +224,29 @@ impl Newton {
     }
 
     /// Solves `H p = -gradient` with every triangle's Hessian projected to be semi-definite.
-    fn step(&mut self, disk: &Disk, frames: &[Frame], uv: &[[f64; 2]], penalty: Penalty) -> Result<Step, Error> {
+    fn step(
+        &mut self,
+        disk: &Disk,
+        frames: &[Frame],
+        uv: &[[f64; 2]],
+        penalty: Penalty,
+        fixed: &[bool],
+    ) -> Result<Step, Error> {
+        let stays = |v: u32| fixed.get(v as usize) == Some(&true);
         self.spd.values.fill(0.0);
         let mut gradient = vec![0.0; 2 * uv.len()];
         for ((face, frame), places) in disk.faces.iter().zip(frames).zip(&self.places) {
             let local = Local::new(frame, jacobian(frame, face, uv), penalty);
-            for (k, &v) in face.iter().enumerate() {
+            for (k, &v) in face.iter().enumerate().filter(|(_, v)| !stays(**v)) {
                 let g = local.gradient(k);
                 gradient[2 * v as usize] += g[0];
                 gradient[2 * v as usize + 1] += g[1];
             }
             for ((k, l), place) in PAIRS.into_iter().zip(places) {
+                // What stays has no equations but those of its diagonal.
+                if k != l && (stays(face[k]) || stays(face[l])) {
+                    continue;
+                }
                 // The block of the larger vertex's rows and the smaller one's columns.
                 let (k, l) = if face[k] >= face[l] { (k, l) } else { (l, k) };
                 let [[uu, uv], [vu, vv]] = local.block(k, l);

@@ -12,7 +12,7 @@ use paint_sim::ciede2000;
 use paint_sim::colour::BANDS;
 use paintcopter_benches::cpu::{CpuTimer, median_seconds};
 use paintcopter_benches::{
-    Rng, colours, control, films, fuzzed_meshes, motion, painting, planner, pose_graphs, room, vocabulary,
+    Rng, colours, control, films, fuzzed_meshes, motion, painting, planner, pose_graphs, room, split_meshes, vocabulary,
 };
 use paintcopter_examples::mesh_io::read_mesh;
 use paintcopter_examples::world::rock_wall;
@@ -58,6 +58,14 @@ enum Job {
         /// Meshes
         #[arg(long, default_value_t = 10_000)]
         count: u64,
+    },
+    /// Lays out a mesh as an atlas, and again with its faces split into four
+    Split {
+        /// OBJ, PLY or OFF
+        mesh: PathBuf,
+        /// Times that faces are split
+        #[arg(long, default_value_t = 2)]
+        splits: u32,
     },
     /// Paints pictures with every painter, as `paint_baselines.py painters slew noise` does
     Paint {
@@ -173,6 +181,7 @@ fn main() -> ExitCode {
         Job::Rock { file, seed } => rock(&file, seed),
         Job::Uv { mesh, runs, save } => uv(&mesh, runs, save.as_deref()),
         Job::Fuzz { first, count } => fuzzed_meshes::run(first, count),
+        Job::Split { mesh, splits } => split_meshes::run(&mesh, splits),
         Job::Paint { image, size, runs } => painting::run(&image, size.into(), runs),
         Job::Colour { image, runs } => colours::run(&image, runs),
         Job::Sim { count, runs } => sim(count as usize, runs),

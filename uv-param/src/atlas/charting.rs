@@ -1,13 +1,17 @@
 //! From a surface to charts.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
-use super::fit::{Bounds, Distortion, POWER, fit, projection};
+use super::absorb::absorb;
+use super::add_region::add_region;
+use super::fit::{Bounds, Distortion, POWER, fit};
 use super::layout::Charts;
+use super::levels::transfer;
 use super::price::{angle_deficits, seam_prices};
-use super::regions::{halves, regions};
+use super::refine::{is_small, refine};
+use super::regions::regions;
 use super::sew::Sewing;
-use super::straighten::straighten;
+use super::straighten::{straighten, straighten_unlaid};
 use crate::chart::Chart;
 use crate::disk::Disk;
 use crate::error::Error;
@@ -19,8 +23,17 @@ use crate::unwrap::{Settings, parametrize};
 
 /// Rounds of closing and straightening seams; parts of seams are closed in the later ones, when seams are straight.
 const ROUNDS: usize = 2;
-/// Newton iterations of the last layout of every chart.
+/// Surfaces of more faces are cut on a coarser one: below, the seams that are found without it are shorter and take no longer.
+const COARSE_FROM: usize = 40_000;
+/// Faces of that one: so many, and a part of all, but no more than the last.
+const COARSE_TO: [usize; 3] = [5_000, 40, 14_000];
+/// Stretch beyond 1 that is allowed there, as a share of the bound.
+const COARSE_SHARE: f64 = 0.9;
+/// Faces that may be laid out in trials to sew small charts of a fine surface: so many, and a part of all.
+const SEWING_WORK: [usize; 2] = [100_000, 4];
+/// Newton iterations of the last layout of every chart, at most, and those times all faces.
 const LAST_ITERATIONS: usize = 12;
+const LAST_WORK: usize = 1_000_000;
 /// Relative gain at which they stop.
 const LAST_TOLERANCE: f64 = 1e-4;
 
@@ -75,40 +88,94 @@ pub(super) fn charts(
     settings.check()?;
     let bounds = settings.bounds();
     let mut charts = Charts::new(surface, wanted_seams(surface, seams)?);
-    let region = regions(surface, &charts.wanted);
+    let whole = if surface.faces().len() > COARSE_FROM && parametrizer.is_none() {
+        by_coarse(&mut charts, bounds)
+    } else {
+        cut_open(&mut charts, bounds, parametrizer)
+    };
+    finish(charts, &Kept { whole: &whole, sizes: &HashMap::new() }, settings, parametrizer, progress)
+}
+
+/// Every face in a chart within the bounds. Returns the charts that are whole parts, in the layout that [`crate::unwrap`] makes.
+fn cut_open(charts: &mut Charts, bounds: Bounds, parametrizer: Option<&dyn Parametrizer>) -> Vec<u32> {
+    let surface = charts.surface;
+    let mut region = regions(surface, &charts.wanted);
+    let whole = whole_parts(charts, bounds, parametrizer, |_| true);
+    for (number, _) in region.iter_mut().zip(&charts.chart).filter(|(_, chart)| **chart != u32::MAX) {
+        *number = u32::MAX;
+    }
+    let lists = by_number(&region);
+    if lists.is_empty() {
+        return whole;
+    }
+    for faces in lists {
+        add_region(charts, faces, bounds, parametrizer);
+    }
+    let (prices, deficits) = (seam_prices(surface), angle_deficits(surface));
+    for round in 0..ROUNDS {
+        let mut sewing = Sewing::new(charts, &prices, &deficits, bounds, parametrizer);
+        sewing.close_arcs();
+        if round > 0 {
+            sewing.close_parts();
+        }
+        straighten(charts, &prices, &|disk, start| fit(disk, start, bounds, parametrizer));
+    }
+    whole
+}
+
+/// Charts for those of the wanted parts that can be laid out as they are.
+fn whole_parts(
+    charts: &mut Charts,
+    bounds: Bounds,
+    parametrizer: Option<&dyn Parametrizer>,
+    wanted: impl Fn(usize) -> bool,
+) -> Vec<u32> {
+    let surface = charts.surface;
     let mut whole = Vec::new();
-    let mut pending = Vec::new();
-    for faces in by_number(&(0..region.len()).map(|f| surface.part(f) as u32).collect::<Vec<_>>()) {
-        if let Some(disk) = charts.disk(&faces)
+    for faces in by_number(&(0..surface.faces().len()).map(|f| surface.part(f) as u32).collect::<Vec<_>>()) {
+        if wanted(surface.part(faces[0] as usize))
+            && let Some(disk) = charts.disk(&faces)
             && let Some(uv) = whole_part(&disk, bounds, parametrizer)
         {
             whole.push(charts.add(faces, &disk, &uv));
-        } else {
-            pending.push(faces);
         }
     }
-    let is_pending: Vec<bool> = charts.chart.iter().map(|&c| c == u32::MAX).collect();
-    if !pending.is_empty() {
-        let mut numbers = region;
-        for (number, pending) in numbers.iter_mut().zip(&is_pending) {
-            if !pending {
-                *number = u32::MAX;
-            }
-        }
-        for faces in by_number(&numbers) {
-            add_region(&mut charts, faces, bounds, parametrizer);
-        }
-        let (prices, deficits) = (seam_prices(surface), angle_deficits(surface));
-        for round in 0..ROUNDS {
-            let mut sewing = Sewing::new(&mut charts, &prices, &deficits, bounds, parametrizer);
-            sewing.close_arcs();
-            if round > 0 {
-                sewing.close_parts();
-            }
-            straighten(&mut charts, &prices, bounds, parametrizer);
-        }
+    whole
+}
+
+/// As [`cut_open`] for surfaces of many faces: seams are found on a coarser one, and the charts laid out anew on the fine one.
+fn by_coarse(charts: &mut Charts, bounds: Bounds) -> Vec<u32> {
+    let surface = charts.surface;
+    let [least, part, most] = COARSE_TO;
+    let target = (least + surface.faces().len() / part).min(most);
+    let (coarse, half_edges, roots) = surface.coarser(|h| charts.wanted[h], target);
+    let wanted = half_edges.iter().map(|&h| charts.wanted[h as usize]).collect();
+    let mut model = Charts::new(&coarse, wanted);
+    // What is finer than the coarse faces bends the charts as well.
+    let stricter = Bounds { stretch: 1.0 + COARSE_SHARE * (bounds.stretch - 1.0), worst: bounds.worst };
+    let whole = cut_open(&mut model, stricter, None);
+    let flat: HashSet<usize> = whole.iter().map(|&c| coarse.part(model.members[c as usize][0] as usize)).collect();
+    let whole = whole_parts(charts, bounds, None, |part| flat.contains(&part));
+
+    let prices = seam_prices(surface);
+    let first = charts.members.len();
+    transfer(&model, &roots, charts);
+    let faces_per_edge = (surface.faces().len() as f64 / coarse.faces().len() as f64).sqrt();
+    straighten_unlaid(charts, &prices, faces_per_edge.ceil() as usize);
+    let found = charts.members.split_off(first);
+    let left: Vec<Vec<u32>> = found.iter().flat_map(|faces| refine(charts, faces, bounds)).collect();
+    for faces in left {
+        add_region(charts, faces, bounds, None);
     }
-    finish(charts, &Kept { whole: &whole, sizes: &HashMap::new() }, settings, parametrizer, progress)
+    let is_large = |c: &u32| !is_small(charts, charts.members[*c as usize].len());
+    let kept: HashSet<u32> = (0..charts.members.len() as u32).filter(is_large).chain(whole.iter().copied()).collect();
+    let deficits = angle_deficits(surface);
+    let mut sewing = Sewing::new(charts, &prices, &deficits, bounds, None);
+    sewing.only = Some((kept, 0));
+    sewing.work = SEWING_WORK[0] + surface.faces().len() / SEWING_WORK[1];
+    sewing.close_arcs();
+    absorb(charts, &prices, bounds, &whole.iter().copied().collect());
+    whole
 }
 
 /// The layout that [`crate::unwrap`] makes, if it keeps the bounds.
@@ -122,36 +189,6 @@ fn whole_part(disk: &Disk, bounds: Bounds, parametrizer: Option<&dyn Parametrize
     let kept = Distortion::measure(disk, &disk.frames(), &usual, bounds).within(bounds)
         && super::simple_boundary::boundary_is_simple(disk, &usual);
     Some(if kept { usual } else { quick })
-}
-
-/// A region as one chart, or, as long as it cannot be laid out, its halves. A single face always can.
-pub(super) fn add_region(
-    charts: &mut Charts,
-    faces: Vec<u32>,
-    bounds: Bounds,
-    parametrizer: Option<&dyn Parametrizer>,
-) {
-    let mut stack = vec![faces];
-    while let Some(faces) = stack.pop() {
-        let laid_out = charts.disk(&faces).and_then(|disk| {
-            let flat = fit(&disk, projection(&disk), bounds, parametrizer);
-            flat.or_else(|| {
-                let (_, start) = tutte_layout(&disk, &mut |_| ()).ok()?;
-                fit(&disk, start, bounds, parametrizer)
-            })
-            .map(|uv| (disk, uv))
-        });
-        if let Some((disk, uv)) = laid_out {
-            charts.add(faces, &disk, &uv);
-        } else {
-            let member: std::collections::HashSet<u32> = faces.iter().copied().collect();
-            let surface = charts.surface;
-            let joined = |h: usize| {
-                !charts.wanted[h] && surface.twin(h).is_some_and(|twin| member.contains(&((twin / 3) as u32)))
-            };
-            stack.extend(halves(surface, &faces, joined));
-        }
-    }
 }
 
 /// Lists of faces by number, in the order of the numbers; `u32::MAX` stands for none.
@@ -207,6 +244,7 @@ pub(super) fn finish(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<(Vec<Chart>, Vec<Vec<u32>>), Error> {
     let bounds = settings.bounds();
+    let iterations = (LAST_WORK / charts.surface.faces().len()).min(LAST_ITERATIONS);
     let names: Vec<u32> =
         (0..charts.members.len() as u32).filter(|&c| !charts.members[c as usize].is_empty()).collect();
     let mut done = (Vec::with_capacity(names.len()), Vec::with_capacity(names.len()));
@@ -214,18 +252,18 @@ pub(super) fn finish(
         let faces = charts.members[name as usize].clone();
         let Some(disk) = charts.disk(&faces) else { continue };
         let mut uv = charts.uv(&faces, &disk);
-        if parametrizer.is_none() && !kept.whole.contains(&name) && !kept.sizes.contains_key(&name) {
+        if parametrizer.is_none() && iterations > 0 && !kept.whole.contains(&name) && !kept.sizes.contains_key(&name) {
             let mut better = uv.clone();
             let frames = disk.frames();
-            let stopping = StoppingCriterion { iterations: LAST_ITERATIONS, tolerance: LAST_TOLERANCE };
+            let stopping = StoppingCriterion { iterations, tolerance: LAST_TOLERANCE };
             let within = minimise_penalty(
                 &disk,
                 &frames,
                 &mut better,
                 Penalty::beyond(bounds.stretch, POWER),
+                &[],
                 &stopping,
-                &mut |_| (),
-                &mut |_| false,
+                &mut |_, _| false,
             )
             .is_ok()
                 && Distortion::measure(&disk, &frames, &better, bounds).within(bounds)

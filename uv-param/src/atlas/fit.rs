@@ -51,8 +51,7 @@ pub(super) struct Distortion {
 impl Distortion {
     pub(super) fn measure(disk: &Disk, frames: &[Frame], uv: &[[f64; 2]], bounds: Bounds) -> Self {
         let (mut count, mut beyond_area, mut area, mut worst) = (0, 0.0, 0.0, 1.0_f64);
-        for (face, frame) in disk.faces.iter().zip(frames) {
-            let stretch = frame.jacobian(face.map(|v| uv[v as usize])).largest_stretch();
+        for (frame, stretch) in frames.iter().zip(stretches(disk, frames, uv)) {
             worst = worst.max(stretch);
             area += frame.area;
             if stretch > bounds.stretch {
@@ -66,6 +65,12 @@ impl Distortion {
     pub(super) fn within(&self, bounds: Bounds) -> bool {
         self.beyond <= SHARE_BEYOND && self.worst <= bounds.worst
     }
+}
+
+/// Largest stretch of every face; infinite for flipped ones.
+pub(super) fn stretches(disk: &Disk, frames: &[Frame], uv: &[[f64; 2]]) -> Vec<f64> {
+    let faces = disk.faces.iter().zip(frames);
+    faces.map(|(face, frame)| frame.jacobian(face.map(|v| uv[v as usize])).largest_stretch()).collect()
 }
 
 /// A layout of `disk` within the bounds, without flips, whose boundary does not cross itself; `None` if none was found.
@@ -108,13 +113,13 @@ pub(super) fn fit(
         let stopping = StoppingCriterion { iterations: NEWTON_ITERATIONS, tolerance: TOLERANCE };
         let penalty = Penalty::beyond(bounds.stretch, POWER);
         let mut last = distortion.beyond;
-        let mut done = |uv: &[[f64; 2]]| {
+        let mut done = |_, uv: &[[f64; 2]]| {
             distortion = Distortion::measure(disk, &frames, uv, bounds);
             let hopeless = distortion.beyond > SLOW_BEYOND && distortion.beyond > SLOW_GAIN * last;
             last = distortion.beyond;
             hopeless || distortion.within(bounds)
         };
-        minimise_penalty(disk, &frames, &mut uv, penalty, &stopping, &mut silent, &mut done).ok()?;
+        minimise_penalty(disk, &frames, &mut uv, penalty, &[], &stopping, &mut done).ok()?;
     }
     good(&uv, &distortion).then_some(uv)
 }

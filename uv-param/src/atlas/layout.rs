@@ -102,6 +102,21 @@ impl<'a> Charts<'a> {
         sums.iter().map(|&[x, y, count]| [x / count, y / count]).collect()
     }
 
+    /// Puts the corners of the face of half-edge `h` where they lie when it is unfolded over that edge from the face of the twin.
+    pub(super) fn unfold(&mut self, h: usize, twin: usize) {
+        let next = |h: usize| h / 3 * 3 + (h + 1) % 3;
+        let (edge, side) = (self.surface.edge(h), -self.surface.edge(next(next(h))));
+        let length = edge.norm();
+        let (foot, height) = (edge.dot(&side) / length, edge.cross(&side).norm() / length);
+        let (from, to) = (self.corner_uv[next(twin)], self.corner_uv[twin]);
+        let (x, y) = (to[0] - from[0], to[1] - from[1]);
+        let scale = 1.0 / x.hypot(y).max(f64::MIN_POSITIVE);
+        let (x, y) = (x * scale, y * scale);
+        self.corner_uv[h] = from;
+        self.corner_uv[next(h)] = [from[0] + length * x, from[1] + length * y];
+        self.corner_uv[next(next(h))] = [from[0] + foot * x - height * y, from[1] + foot * y + height * x];
+    }
+
     /// Area of a chart, m^2.
     pub(super) fn area(&self, chart: u32) -> f64 {
         self.members[chart as usize].iter().map(|&f| self.surface.face_area(f as usize)).sum()

@@ -18,6 +18,8 @@ use shape::Shapes;
 const COARSE_CELLS: f64 = 110.0;
 /// The same for the final places: texels up to a page of this side.
 const FINE_CELLS: f64 = 1100.0;
+/// Cells along the longest piece, relative to those along the side of a page, at most.
+const LONGEST: f64 = 8.0;
 /// Words of bitmaps that the search looks at, a tenth of a second of work, and the same per chart.
 const BUDGET: [u64; 2] = [30_000_000, 100_000];
 /// Widths that are tried for the final places, relative to that of the search.
@@ -36,8 +38,8 @@ pub(super) fn pack(pieces: &[Piece], settings: &PackSettings) -> Result<(Vec<Pla
     order.sort_by(|&a, &b| areas[b].total_cmp(&areas[a]).then(a.cmp(&b)));
     let square = areas.iter().sum::<f64>().sqrt() / settings.texel_m;
     let side = settings.page.map_or(square, |page| square.min(page[0].min(page[1]) as f64));
-    let texels_per_cell = |cells: f64| (side / cells).ceil().max(1.0) as usize;
-    let (coarse, fine) = (texels_per_cell(COARSE_CELLS), texels_per_cell(FINE_CELLS));
+    let longest = pieces.iter().map(extent).fold(0.0, f64::max) / settings.texel_m;
+    let (coarse, fine) = (texels_per_cell(side, longest, COARSE_CELLS), texels_per_cell(side, longest, FINE_CELLS));
     let goal = |per_cell: usize| {
         settings.page.map_or(Goal::Smallest, |page| Goal::Pages(page.map(|texels| texels / per_cell)))
     };
@@ -100,6 +102,21 @@ fn finer(shapes: &Shapes, plan: &Plan, goal: Goal, scale: f64) -> Option<(Plan, 
         }
     }
     best
+}
+
+/// Texels along a cell, so that a page of this side has about so many cells, and the longest piece, however thin, not many times more: its bitmap
+/// is as large as its box in every turn.
+fn texels_per_cell(side: f64, longest: f64, cells: f64) -> usize {
+    (side / cells).max(longest / (LONGEST * cells)).ceil().max(1.0) as usize
+}
+
+/// Diagonal of the box around a piece, metres.
+fn extent(piece: &Piece) -> f64 {
+    let size = [0, 1].map(|k| {
+        let along = || piece.uv.iter().map(|uv| uv[k]);
+        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
+    });
+    size[0].hypot(size[1])
 }
 
 /// Area of a piece in the plane, m^2.
@@ -168,6 +185,21 @@ mod tests {
     }
 
     /// A frame with a hole of 60 x 60: what fits into it needs no page of its own.
+    #[test]
+    fn a_long_needle_takes_no_more_cells_than_other_charts() {
+        // Cells of one texel would take 30,000 x 30,000 of them in the slanting turns.
+        let settings = PackSettings { texel_m: 1.0, gutter: 2, ..PackSettings::default() };
+        let meshes = [[30_000.0, 0.5], [100.0, 100.0]].map(|[width, height]| piece_of(&[[0.0, 0.0, width, height]]));
+        let pieces: Vec<Piece> = meshes.iter().map(|(uv, faces)| Piece { uv, faces }).collect();
+        let (placements, pages) = pack(&pieces, &settings).unwrap();
+        assert_eq!(placements.len(), 2);
+        assert!(pages.len() == 1 && pages[0].iter().any(|&texels| texels >= 30_000), "{pages:?}");
+        for cells in [COARSE_CELLS, FINE_CELLS] {
+            let longest = 30_000.0 / texels_per_cell(123.0, 30_000.0, cells) as f64;
+            assert!(longest <= LONGEST * cells, "{longest}");
+        }
+    }
+
     #[test]
     fn small_charts_go_into_the_hole_of_a_large_one() {
         let frame =

@@ -46,6 +46,10 @@ pub(super) struct Sewing<'a, 'b> {
     pub(super) parametrizer: Option<&'b dyn Parametrizer>,
     /// Charts that must stay as they are, and the first of those that are new; `None`: all are. Only seams of new ones are closed.
     pub(super) only: Option<(HashSet<u32>, u32)>,
+    /// Faces that may still be laid out for trials.
+    pub(super) work: usize,
+    /// Longest side of a chart, metres.
+    longest: f64,
     /// Arcs (first and last half-edge) that could not be closed.
     refused: HashSet<(u32, u32)>,
     /// The same, of which no part could.
@@ -60,8 +64,20 @@ impl<'a, 'b> Sewing<'a, 'b> {
         bounds: Bounds,
         parametrizer: Option<&'b dyn Parametrizer>,
     ) -> Self {
+        let longest = MAX_EXTENT * charts.surface.area().sqrt();
         let (refused, refused_parts) = (HashSet::new(), HashSet::new());
-        Self { charts, prices, deficits, bounds, parametrizer, only: None, refused, refused_parts }
+        Self {
+            charts,
+            prices,
+            deficits,
+            bounds,
+            parametrizer,
+            only: None,
+            work: usize::MAX,
+            longest,
+            refused,
+            refused_parts,
+        }
     }
 
     /// Closes whole arcs until none can be closed any more.
@@ -206,6 +222,8 @@ impl<'a, 'b> Sewing<'a, 'b> {
         } else {
             merged(&self.charts.members[left as usize], &self.charts.members[right as usize])
         };
+        let Some(work) = self.work.checked_sub(faces.len()) else { return false };
+        self.work = work;
         let both = |h: u32| std::iter::once(h as usize).chain(surface.twin(h as usize));
         // Between two charts every other common edge stays open.
         let opened: Vec<usize> = if same { Vec::new() } else { self.common_edges(left, right) };
@@ -217,12 +235,13 @@ impl<'a, 'b> Sewing<'a, 'b> {
             self.charts.cut[h] = false;
         }
         let to_left = motion(self.charts, half_edges, same);
-        let longest = MAX_EXTENT * surface.area().sqrt();
         let laid_out = self.charts.disk(&faces).and_then(|disk| {
             let chart = &self.charts.chart;
             let moved = |f: usize, at| if !same && chart[f] == right { to_left.apply(at) } else { at };
             let start = self.charts.vertex_uv(&faces, &disk, moved);
-            fit(&disk, start, self.bounds, self.parametrizer).filter(|uv| extent(uv) < longest).map(|uv| (disk, uv))
+            fit(&disk, start, self.bounds, self.parametrizer)
+                .filter(|uv| extent(uv) < self.longest)
+                .map(|uv| (disk, uv))
         });
         let Some((disk, uv)) = laid_out else {
             for h in half_edges.iter().flat_map(|&h| both(h)) {

@@ -3,25 +3,45 @@
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap, HashSet};
 
-use super::fit::{Bounds, fit};
 use super::layout::Charts;
 use super::motion::motion;
 use super::seams::{Arc, arcs};
 use crate::disk::Disk;
-use crate::parametrizer::Parametrizer;
 
 /// A path must be cheaper than the seam by this share to be worth a layout.
 const MIN_GAIN: f64 = 0.01;
 /// How far from a seam its new path may run, in faces per edge of the seam, and at least.
 const REACH: [usize; 2] = [5, 4];
 
-/// Tries every seam once, the dearest first; returns how many moved.
-pub(super) fn straighten(
-    charts: &mut Charts,
-    prices: &[f32],
-    bounds: Bounds,
-    parametrizer: Option<&dyn Parametrizer>,
-) -> usize {
+/// A layout of a chart from a start, if there is one that will do.
+pub(super) type Layout<'a> = &'a dyn Fn(&Disk, Vec<[f64; 2]>) -> Option<Vec<[f64; 2]>>;
+
+/// Tries every seam once, the dearest first.
+pub(super) fn straighten(charts: &mut Charts, prices: &[f32], layout: Layout) {
+    for (price, arc) in dearest_first(charts, prices) {
+        let rings = (arc.half_edges.len() / REACH[0]).max(REACH[1]);
+        if let Some(detour) = Detour::new(charts, prices, price, &arc, rings) {
+            detour.take(charts, layout);
+        }
+    }
+}
+
+/// The same without layouts, within some rings of faces from each seam: what lies between a seam and its path changes sides as it is, corner by
+/// corner, and nothing else moves.
+pub(super) fn straighten_unlaid(charts: &mut Charts, prices: &[f32], rings: usize) {
+    for (price, arc) in dearest_first(charts, prices) {
+        if let Some(detour) = Detour::new(charts, prices, price, &arc, rings) {
+            detour.take_unlaid(charts);
+        }
+    }
+    charts.members.iter_mut().for_each(Vec::clear);
+    for (f, &chart) in charts.chart.iter().enumerate() {
+        charts.members[chart as usize].push(f as u32);
+    }
+}
+
+/// All seams that the caller does not want, with their prices.
+fn dearest_first(charts: &Charts, prices: &[f32]) -> Vec<(f64, Arc)> {
     let price = |half_edges: &[u32]| half_edges.iter().map(|&h| f64::from(prices[h as usize])).sum::<f64>();
     let mut candidates: Vec<(f64, Arc)> = arcs(charts)
         .into_iter()
@@ -29,12 +49,7 @@ pub(super) fn straighten(
         .map(|arc| (price(&arc.half_edges), arc))
         .collect();
     candidates.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.half_edges[0].cmp(&b.1.half_edges[0])));
-    let mut moved = 0;
-    for (price, arc) in candidates {
-        let Some(detour) = Detour::new(charts, prices, price, &arc) else { continue };
-        moved += usize::from(detour.take(charts, bounds, parametrizer));
-    }
-    moved
+    candidates
 }
 
 /// A cheaper path for a seam, and what would change its side.
@@ -48,7 +63,7 @@ struct Detour<'a> {
 }
 
 impl<'a> Detour<'a> {
-    fn new(charts: &Charts, prices: &[f32], price: f64, arc: &'a Arc) -> Option<Self> {
+    fn new(charts: &Charts, prices: &[f32], price: f64, arc: &'a Arc, rings: usize) -> Option<Self> {
         let surface = charts.surface;
         let [first, _] = surface.ends(arc.half_edges[0] as usize);
         let [_, last] = surface.ends(arc.half_edges[arc.half_edges.len() - 1] as usize);
@@ -59,7 +74,8 @@ impl<'a> Detour<'a> {
             edges.iter().flat_map(|&h| std::iter::once(h).chain(surface.twin(h as usize).map(|t| t as u32))).collect()
         };
         let old = both(&arc.half_edges);
-        let path = cheapest_path(charts, prices, arc, &old, [first, last], (1.0 - MIN_GAIN) * price)?;
+        let path =
+            cheapest_path(charts, prices, band(charts, arc, rings), &old, [first, last], (1.0 - MIN_GAIN) * price)?;
         let mut detour = Self { arc, new: both(&path), old, lenses: [HashSet::new(), HashSet::new()] };
         for &h in arc.half_edges.iter().filter(|h| !detour.new.contains(h)) {
             let twin = surface.twin(h as usize)?;
@@ -99,8 +115,37 @@ impl<'a> Detour<'a> {
         Some(lens)
     }
 
+    /// Moves the seam, and what lies between: each face is unfolded over an edge into the plane of the side that it comes to.
+    fn take_unlaid(&self, charts: &mut Charts) {
+        let surface = charts.surface;
+        let twin = |h: u32| surface.twin(h as usize).map_or(h, |twin| twin as u32);
+        let [left, right] = &self.lenses;
+        let sides = [(left, self.arc.right, false), (right, self.arc.left, true)];
+        for (lens, side, from_left) in sides {
+            let mut waiting = lens.clone();
+            let along = self.arc.half_edges.iter().map(|&h| if from_left { twin(h) } else { h });
+            let mut front: std::collections::VecDeque<u32> = along.filter(|h| lens.contains(&(h / 3))).collect();
+            while let Some(h) = front.pop_front() {
+                let f = h / 3;
+                if !waiting.remove(&f) {
+                    continue;
+                }
+                charts.chart[f as usize] = side;
+                charts.unfold(h as usize, twin(h) as usize);
+                front.extend(
+                    (3 * f..3 * f + 3).map(twin).filter(|&h| lens.contains(&(h / 3)) && !self.old.contains(&h)),
+                );
+            }
+        }
+        if self.arc.left == self.arc.right {
+            for &h in self.old.union(&self.new) {
+                charts.cut[h as usize] = self.new.contains(&h);
+            }
+        }
+    }
+
     /// Moves the seam if both sides can be laid out then.
-    fn take(&self, charts: &mut Charts, bounds: Bounds, parametrizer: Option<&dyn Parametrizer>) -> bool {
+    fn take(&self, charts: &mut Charts, layout: Layout) {
         let Arc { left, right, .. } = *self.arc;
         let to_left = motion(charts, &self.arc.half_edges, false);
         let moved = |f: usize, at| match self.lenses.each_ref().map(|lens| lens.contains(&(f as u32))) {
@@ -114,14 +159,14 @@ impl<'a> Detour<'a> {
                 charts.cut[h] = self.new.contains(&(h as u32));
             }
             let faces = charts.members[left as usize].clone();
-            let Some((disk, uv)) = laid_out(charts, &faces, moved, bounds, parametrizer) else {
+            let Some((disk, uv)) = laid_out(charts, &faces, moved, layout) else {
                 for &h in &edges {
                     charts.cut[h] = self.old.contains(&(h as u32));
                 }
-                return false;
+                return;
             };
             charts.place(&faces, &disk, &uv);
-            return true;
+            return;
         }
         let without = |name: u32, out: &HashSet<u32>, more: &HashSet<u32>| {
             let stay = charts.members[name as usize].iter().copied().filter(|f| !out.contains(f));
@@ -131,8 +176,8 @@ impl<'a> Detour<'a> {
         };
         let [from_left, from_right] = &self.lenses;
         let sides = [without(left, from_left, from_right), without(right, from_right, from_left)];
-        let layouts = sides.each_ref().map(|faces| laid_out(charts, faces, moved, bounds, parametrizer));
-        let [Some(one), Some(other)] = layouts else { return false };
+        let layouts = sides.each_ref().map(|faces| laid_out(charts, faces, moved, layout));
+        let [Some(one), Some(other)] = layouts else { return };
         for ((name, faces), (disk, uv)) in [left, right].into_iter().zip(sides).zip([one, other]) {
             charts.place(&faces, &disk, &uv);
             for &f in &faces {
@@ -140,7 +185,6 @@ impl<'a> Detour<'a> {
             }
             charts.members[name as usize] = faces;
         }
-        true
     }
 }
 
@@ -148,16 +192,15 @@ fn laid_out(
     charts: &mut Charts,
     faces: &[u32],
     moved: impl Fn(usize, [f64; 2]) -> [f64; 2],
-    bounds: Bounds,
-    parametrizer: Option<&dyn Parametrizer>,
+    layout: Layout,
 ) -> Option<(Disk, Vec<[f64; 2]>)> {
     let disk = charts.disk(faces)?;
     let start = charts.vertex_uv(faces, &disk, moved);
-    fit(&disk, start, bounds, parametrizer).map(|uv| (disk, uv))
+    layout(&disk, start).map(|uv| (disk, uv))
 }
 
 /// Faces near a seam, in its two charts.
-fn band(charts: &Charts, arc: &Arc) -> HashSet<u32> {
+fn band(charts: &Charts, arc: &Arc, rings: usize) -> HashSet<u32> {
     let surface = charts.surface;
     let mut found = HashSet::new();
     let mut front: Vec<u32> = arc
@@ -166,7 +209,7 @@ fn band(charts: &Charts, arc: &Arc) -> HashSet<u32> {
         .flat_map(|&h| std::iter::once(h / 3).chain(surface.twin(h as usize).map(|t| t as u32 / 3)))
         .collect();
     found.extend(front.iter().copied());
-    for _ in 0..(arc.half_edges.len() / REACH[0]).max(REACH[1]) {
+    for _ in 0..rings {
         let mut next = Vec::new();
         for h in front.iter().flat_map(|&f| 3 * f..3 * f + 3).filter(|&h| !charts.is_seam(h as usize)) {
             if let Some(twin) = surface.twin(h as usize)
@@ -184,13 +227,13 @@ fn band(charts: &Charts, arc: &Arc) -> HashSet<u32> {
 fn cheapest_path(
     charts: &Charts,
     prices: &[f32],
-    arc: &Arc,
+    band: HashSet<u32>,
     old: &HashSet<u32>,
     [first, last]: [u32; 2],
     limit: f64,
 ) -> Option<Vec<u32>> {
     let surface = charts.surface;
-    let mut near: Vec<u32> = band(charts, arc).into_iter().collect();
+    let mut near: Vec<u32> = band.into_iter().collect();
     near.sort_unstable();
     let mut edges_at: HashMap<u32, Vec<u32>> = HashMap::new();
     let mut barred: HashSet<u32> = HashSet::new();

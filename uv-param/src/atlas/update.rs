@@ -2,7 +2,8 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::charting::{Kept, add_region, by_number, finish, wanted_seams};
+use super::add_region::add_region;
+use super::charting::{Kept, by_number, finish, wanted_seams};
 use super::fit::fit;
 use super::layout::Charts;
 use super::pack::{self, Page, Piece, Placement};

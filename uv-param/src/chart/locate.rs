@@ -74,6 +74,16 @@ impl Grid {
     pub(super) fn overlap(&self, uv: &[[f64; 2]], faces: &[[u32; 3]]) -> (usize, f64) {
         let corners = |f: u32| faces[f as usize].map(|v| uv[v as usize]);
         let (mut pairs, mut sum) = (0, 0.0);
+        self.each_overlap(uv, faces, |f, g| {
+            pairs += 1;
+            sum += common_area(corners(f), corners(g));
+        });
+        (pairs, sum)
+    }
+
+    /// The pairs of faces without a common edge that lie on each other, each once.
+    fn each_overlap(&self, uv: &[[f64; 2]], faces: &[[u32; 3]], mut found: impl FnMut(u32, u32)) {
+        let corners = |f: u32| faces[f as usize].map(|v| uv[v as usize]);
         for cell in 0..self.columns * self.rows {
             let here = &self.faces[self.starts[cell] as usize..self.starts[cell + 1] as usize];
             for (i, &f) in here.iter().enumerate() {
@@ -86,13 +96,11 @@ impl Grid {
                         self.cell([low(0), low(1)]) == [cell % self.columns, cell / self.columns]
                     };
                     if !edge_in_common && meet(a, b) && speaks() {
-                        pairs += 1;
-                        sum += common_area(a, b);
+                        found(f, g);
                     }
                 }
             }
         }
-        (pairs, sum)
     }
 
     pub(super) fn locate(&self, uv: &[[f64; 2]], faces: &[[u32; 3]], at: [f64; 2]) -> Option<SurfacePoint> {
@@ -110,13 +118,26 @@ impl Grid {
 
 /// How many pairs of faces of a layout without flips lie on each other.
 pub(crate) fn overlapping_pairs(uv: &[[f64; 2]], faces: &[[u32; 3]]) -> usize {
+    let mut pairs = 0;
+    grid_around(uv, faces).each_overlap(uv, faces, |_, _| pairs += 1);
+    pairs
+}
+
+/// These pairs.
+pub(crate) fn overlapping_faces(uv: &[[f64; 2]], faces: &[[u32; 3]]) -> Vec<[u32; 2]> {
+    let mut pairs = Vec::new();
+    grid_around(uv, faces).each_overlap(uv, faces, |f, g| pairs.push([f, g]));
+    pairs
+}
+
+fn grid_around(uv: &[[f64; 2]], faces: &[[u32; 3]]) -> Grid {
     let bound = |k: usize, pick: fn(f64, f64) -> f64| uv.iter().map(|p| p[k]).reduce(pick).unwrap_or(0.0);
     let low = [bound(0, f64::min), bound(1, f64::min)];
     let size = [bound(0, f64::max) - low[0], bound(1, f64::max) - low[1]];
     let mut grid = Grid::sized(faces.len(), size);
     grid.corner = low;
     grid.fill(uv, faces);
-    grid.overlap(uv, faces).0
+    grid
 }
 
 fn cells_of([left, bottom, right, top]: [u32; 4], columns: usize) -> impl Iterator<Item = usize> {

@@ -141,6 +141,26 @@ impl Disk {
         disk
     }
 
+    /// Some of its faces, in any number of pieces; sources of vertices and faces are those of the whole.
+    pub(crate) fn part(&self, wanted: &[bool]) -> Self {
+        let faces: Vec<usize> = (0..wanted.len()).filter(|&f| wanted[f]).collect();
+        let mut local = vec![BORDER; wanted.len()];
+        for (i, &f) in faces.iter().enumerate() {
+            local[f] = i as u32;
+        }
+        let half_edges = faces.iter().flat_map(|&f| 3 * f..3 * f + 3);
+        let twin = |h: usize| match self.twins[h] {
+            BORDER => BORDER,
+            twin if local[twin as usize / 3] == BORDER => BORDER,
+            twin => 3 * local[twin as usize / 3] + twin % 3,
+        };
+        let twins: Vec<u32> = half_edges.map(twin).collect();
+        let corners: Vec<[u32; 3]> = faces.iter().map(|&f| self.faces[f]).collect();
+        let source = faces.iter().map(|&f| f as u32).collect();
+        let reversed = faces.iter().map(|&f| self.reversed[f]).collect();
+        Self::from_faces(&self.positions, &corners, twins.clone(), twins, source, reversed, wanted.len())
+    }
+
     /// Whether it can be laid out in the plane, if it is in one piece.
     pub(crate) fn is_planar(&self) -> bool {
         !self.loops.is_empty() && self.euler_characteristic() + self.loops.len() as isize == 2

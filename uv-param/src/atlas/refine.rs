@@ -1,0 +1,115 @@
+//! Charts that were found on a coarser surface, laid out on the fine one. Faces at which a layout breaks the bounds are parted from it.
+
+use std::collections::{HashMap, HashSet};
+
+use super::fit::{Bounds, Distortion};
+use super::layout::Charts;
+use super::mend::{Parted, mend};
+use super::regions::halves;
+use super::simple_boundary::boundary_is_simple;
+use crate::arap::fit_jacobians;
+use crate::disk::Disk;
+use crate::laplacian::Laplacian;
+use crate::triangle::flips;
+
+/// Times that a chart is halved before it is charted anew.
+const MAX_ROUNDS: usize = 3;
+
+/// Faces of a small chart at most, as a share of all.
+const SMALL: f64 = 0.01;
+
+/// Whether a chart of so many faces is small.
+pub(super) fn is_small(charts: &Charts, faces: usize) -> bool {
+    faces as f64 <= SMALL * charts.surface.faces().len() as f64
+}
+
+/// Lays out the faces of a chart so that every one comes near the shape that `charts.corner_uv` has for it on its own. Adds charts for what
+/// can be laid out; returns the rest as connected lists of faces.
+pub(super) fn refine(charts: &mut Charts, faces: &[u32], bounds: Bounds) -> Vec<Vec<u32>> {
+    let mut left = Vec::new();
+    let together = vec![false; faces.len()];
+    let mut stack: Vec<_> = pieces(charts, faces, &together).into_iter().map(|(piece, _)| (piece, 0)).collect();
+    while let Some((faces, round)) = stack.pop() {
+        let laid_out = charts.disk(&faces).and_then(|disk| {
+            let targets: Vec<[[f64; 2]; 3]> =
+                faces.iter().map(|&f| [0, 1, 2].map(|k| charts.corner_uv[3 * f as usize + k])).collect();
+            let layout = lay_out(&disk, &targets, bounds)?;
+            charts.place(&faces, &disk, &layout.uv);
+            Some(layout.parted)
+        });
+        match laid_out {
+            Some(parted) => {
+                let pieces = pieces(charts, &faces, &parted);
+                left.extend(keep(charts, pieces, bounds));
+            }
+            None if round < MAX_ROUNDS && !is_small(charts, faces.len()) => {
+                let member: HashSet<u32> = faces.iter().copied().collect();
+                let joined = |h: usize| {
+                    let twin = charts.surface.twin(h);
+                    !charts.wanted[h]
+                        && !charts.cut[h]
+                        && twin.is_some_and(|twin| member.contains(&((twin / 3) as u32)))
+                };
+                stack.extend(halves(charts.surface, &faces, joined).map(|half| (half, round + 1)));
+            }
+            None => left.push(faces),
+        }
+    }
+    left
+}
+
+/// Adds charts for those pieces of layouts, of which some were parted, that keep the bounds where they lie; returns the others.
+pub(super) fn keep(charts: &mut Charts, pieces: Vec<(Vec<u32>, bool)>, bounds: Bounds) -> Vec<Vec<u32>> {
+    let mut left = Vec::new();
+    for (piece, is_parted) in pieces {
+        let disk = charts.disk(&piece).filter(|_| !is_parted);
+        match disk.map(|disk| (charts.uv(&piece, &disk), disk)) {
+            Some((uv, disk)) if keeps(&disk, &uv, bounds) => {
+                charts.add(piece, &disk, &uv);
+            }
+            _ => left.push(piece),
+        }
+    }
+    left
+}
+
+/// Whether a layout keeps the bounds, without flips or overlaps.
+fn keeps(disk: &Disk, uv: &[[f64; 2]], bounds: Bounds) -> bool {
+    Distortion::measure(disk, &disk.frames(), uv, bounds).within(bounds)
+        && flips(uv, &disk.faces) == 0
+        && boundary_is_simple(disk, uv)
+}
+
+/// A layout from the shapes that its faces should have.
+fn lay_out(disk: &Disk, targets: &[[[f64; 2]; 3]], bounds: Bounds) -> Option<Parted> {
+    let frames = disk.frames();
+    let mut laplacian = Laplacian::new(disk).ok()?;
+    laplacian.factorize_cotangent(disk, &frames, disk.loops[0][0]).ok()?;
+    let jacobians: Vec<_> = frames.iter().zip(targets).map(|(frame, &uv)| frame.jacobian(uv)).collect();
+    let start = fit_jacobians(disk, &frames, &jacobians, &mut laplacian);
+    mend(disk, start, &vec![false; frames.len()], bounds)
+}
+
+/// Connected pieces of some faces, each all parted or all kept.
+pub(super) fn pieces(charts: &Charts, faces: &[u32], bad: &[bool]) -> Vec<(Vec<u32>, bool)> {
+    let state: HashMap<u32, bool> = faces.iter().copied().zip(bad.iter().copied()).collect();
+    let mut seen = HashSet::new();
+    let mut found = Vec::new();
+    for (&start, &is_bad) in faces.iter().zip(bad) {
+        if !seen.insert(start) {
+            continue;
+        }
+        let mut piece = vec![start];
+        let mut next = 0;
+        while let Some(&f) = piece.get(next) {
+            next += 1;
+            for h in (3 * f as usize..3 * f as usize + 3).filter(|&h| !charts.cut[h] && !charts.wanted[h]) {
+                let other = charts.surface.twin(h).map(|twin| (twin / 3) as u32);
+                piece.extend(other.filter(|g| state.get(g) == Some(&is_bad) && seen.insert(*g)));
+            }
+        }
+        piece.sort_unstable();
+        found.push((piece, is_bad));
+    }
+    found
+}
