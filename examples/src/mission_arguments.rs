@@ -14,6 +14,8 @@ use crate::region::Region;
 
 type AnyError = Box<dyn std::error::Error>;
 
+/// What an even coat keeps of the tilt joint's range beyond what every mission does: three degrees, in radians.
+const COAT_MARGIN: f64 = 3.0 * std::f64::consts::PI / 180.0;
 /// What stands in a mission file.
 const MISSION: [&str; 22] = [
     "mesh",
@@ -249,6 +251,10 @@ impl MissionArguments {
             },
             ..MissionSettings::default()
         };
+        if self.fill.is_some() {
+            // An even coat shows where the valve was shut because the body leaned beyond the tilt joint's end: three degrees more are kept for it.
+            settings.planner.nozzle.max_elevation -= COAT_MARGIN;
+        }
         self.nozzle.apply(&mut settings);
         Ok(MissionFile {
             mesh: self.mesh.clone(),

@@ -120,6 +120,7 @@ pub use loop_closure::report::{LoopClosure, LoopReport};
 #[cfg(feature = "pose-graph")]
 pub use loop_closure::settings::LoopSettings;
 pub use map::Map;
+pub use mesh::deformation::EmbeddedDeformation;
 pub use mesh::incremental::IncrementalMesher;
 pub use mesh::obj::write_obj;
 pub use mesh::patches::PatchKey;

@@ -11,8 +11,8 @@ use paintcopter_examples::exit::exit_code;
 use paintcopter_examples::mesh_io::{PlyMesh, write_ply};
 use paintcopter_examples::report::save_figures;
 use paintcopter_examples::scan::{
-    CheckpointSettings, Device, FrameRange, LiveSettings, OdometryError, PoseSource, Scan, ScanReport, ScanSettings,
-    Sequence, in_options, mebibytes, open_sequence, parse_intrinsics, parse_noise, parse_odometry_error,
+    CheckpointSettings, Device, FrameRange, Gyroscope, LiveSettings, OdometryError, PoseSource, Scan, ScanReport,
+    ScanSettings, Sequence, in_options, mebibytes, open_sequence, parse_intrinsics, parse_noise, parse_odometry_error,
     read_body_from_camera, read_colour_camera, save_views, take_poses,
 };
 use tsdf_hash::{Intrinsics, MemoryLimits, NoiseModel};
@@ -30,8 +30,11 @@ struct Arguments {
     /// Poses of a TUM file on the clock of the images, as of an odometry, in place of those recorded
     #[arg(long, value_name = "FILE")]
     pose_file: Option<PathBuf>,
-    /// With --pose-file: where the camera is on what the file follows, the 4x4 matrix `body_from_camera` [default: the file follows the camera]
-    #[arg(long, value_name = "FILE", requires = "pose_file")]
+    /// Samples of an inertial unit on the clock of the images (`imu0/data.csv` of the EuRoC layout): between frames the camera is taken to turn as its gyroscope says
+    #[arg(long, value_name = "FILE")]
+    imu: Option<PathBuf>,
+    /// With --pose-file or --imu: where the camera is on what the file follows, the 4x4 matrix `body_from_camera` [default: the file follows the camera]
+    #[arg(long, value_name = "FILE")]
     body_from_camera: Option<PathBuf>,
     /// With --poses odometry: standard deviations of the recorded motion from one frame to the next, of the turn about each axis and of
     /// the shift along it [default: 0.5,0.01]
@@ -183,9 +186,20 @@ fn sequence(arguments: &Arguments) -> Result<Sequence, Box<dyn std::error::Error
     if let Some(path) = &arguments.depth_from_colour {
         sequence.colour_camera = Some(read_colour_camera(path)?);
     }
+    if arguments.body_from_camera.is_some() && arguments.pose_file.is_none() && arguments.imu.is_none() {
+        return Err("--body-from-camera: goes with --pose-file or --imu".into());
+    }
+    let camera = arguments.body_from_camera.as_deref().map(read_body_from_camera).transpose()?;
+    let camera = camera.unwrap_or_else(Isometry3::identity);
+    if let Some(path) = &arguments.imu {
+        if matches!(arguments.poses, Poses::Given) && arguments.relocalise.is_none() {
+            return Err("--imu: goes with --poses tracked or odometry, or --relocalise".into());
+        }
+        let span = sequence.frames.first().zip(sequence.frames.last()).map_or([0.0; 2], |(a, b)| [a.stamp, b.stamp]);
+        sequence.gyroscope = Some(Gyroscope::read(path, &camera.rotation, span)?);
+    }
     if let Some(path) = &arguments.pose_file {
-        let camera = arguments.body_from_camera.as_deref().map(read_body_from_camera).transpose()?;
-        let found = take_poses(&mut sequence, path, &camera.unwrap_or_else(Isometry3::identity))?;
+        let found = take_poses(&mut sequence, path, &camera)?;
         eprintln!("{}: poses of {found} of {} frames", path.display(), sequence.frames.len());
     }
     if let Some(range) = &arguments.frames {

@@ -1,12 +1,15 @@
 //! Loops of a run: found keyframe by keyframe, and the map that follows the corrected poses.
 
-use nalgebra::Isometry3;
-use tsdf_hash::{ColourView, DepthView, LoopCloser, LoopReport, LoopSettings};
+use nalgebra::{Isometry3, Point3};
+use tsdf_hash::{ColourView, DepthData, DepthView, EmbeddedDeformation, LoopCloser, LoopReport, LoopSettings};
 
 use super::error::ScanError;
 
 /// Frames that move by less are not fused anew: a share of a voxel, and radians.
 const LEAST_MOTION: [f64; 2] = [0.25, 8.7e-4];
+
+/// What is farther away is no depth, metres: 16 bits say so where nothing was measured.
+const FARTHEST: f64 = 30.0;
 
 /// What became of the loops of a run.
 #[derive(Debug, Clone, Copy, Default)]
@@ -30,13 +33,20 @@ pub(super) struct Loops {
     closer: LoopCloser,
     /// For each fused frame of the run: the keyframe that it belongs to, and where it is from there.
     owners: Vec<(usize, Isometry3<f64>)>,
+    /// What each keyframe looks at, from there.
+    sights: Vec<Point3<f64>>,
     pub(super) metrics: LoopMetrics,
 }
 
 impl Loops {
     pub(super) fn new(map: &tsdf_hash::Settings) -> Result<Self, ScanError> {
         let settings = LoopSettings { noise: map.noise, threads: map.threads, ..LoopSettings::default() };
-        Ok(Self { closer: LoopCloser::new(settings)?, owners: Vec::new(), metrics: LoopMetrics::default() })
+        Ok(Self {
+            closer: LoopCloser::new(settings)?,
+            owners: Vec::new(),
+            sights: Vec::new(),
+            metrics: LoopMetrics::default(),
+        })
     }
 
     pub(super) fn keyframes(&self) -> &tsdf_hash::KeyframeIndex {
@@ -53,6 +63,7 @@ impl Loops {
     ) -> Result<Option<Correction>, ScanError> {
         let report = self.closer.add(depth, colour, pose)?;
         self.metrics.keyframes = self.closer.poses().len();
+        self.sights.resize(self.metrics.keyframes, sight(depth));
         self.note(name, pose, &report);
         let (poses, owner) = (self.closer.poses(), self.closer.poses().len().saturating_sub(1));
         let then = report.corrected_from.as_deref().unwrap_or(poses);
@@ -64,7 +75,13 @@ impl Loops {
             pose.rotation.renormalize();
             pose
         });
-        Ok(Some(Correction { frames: frames.collect(), present: poses[owner] * before[owner].inverse() }))
+        let places = self.sights.iter().zip(before).zip(poses);
+        let places = places.map(|((sight, before), after)| (before * sight, after * before.inverse()));
+        Ok(Some(Correction {
+            frames: frames.collect(),
+            present: poses[owner] * before[owner].inverse(),
+            deformation: EmbeddedDeformation::new(places.collect()),
+        }))
     }
 
     fn note(&mut self, name: &str, pose: &Isometry3<f64>, report: &LoopReport) {
@@ -91,6 +108,18 @@ pub(super) struct Correction {
     frames: Vec<Isometry3<f64>>,
     /// What the present moves by.
     pub(super) present: Isometry3<f64>,
+    /// What the mesh does at once; the map follows frame by frame.
+    pub(super) deformation: EmbeddedDeformation,
+}
+
+/// The point in the middle of the picture, as deep as what is seen is in the mean.
+fn sight(depth: &DepthView) -> Point3<f64> {
+    let metres: Vec<f64> = match depth.data {
+        DepthData::U16 { data, scale } => data.iter().map(|d| f64::from(*d) / scale).collect(),
+        DepthData::F32 { data } => data.iter().map(|d| f64::from(*d)).collect(),
+    };
+    let seen = || metres.iter().filter(|z| z.is_finite() && **z > 0.0 && **z < FARTHEST);
+    Point3::new(0.0, 0.0, seen().sum::<f64>() / seen().count().max(1) as f64)
 }
 
 impl Correction {

@@ -17,7 +17,7 @@ use foxglove::{Channel, Context, Encode, FoxgloveError, McapWriterHandle, Partia
 use image::codecs::jpeg::JpegEncoder;
 use nalgebra::{Isometry3, Point3};
 use serde::Serialize;
-use tsdf_hash::{ColourData, ColourView, IncrementalMesher, PatchKey, TrackingOutcome};
+use tsdf_hash::{ColourData, ColourView, EmbeddedDeformation, IncrementalMesher, Mesh, PatchKey, TrackingOutcome};
 
 use super::error::ScanError;
 use crate::recording::{log_message, point, quaternion, rgb, scene, vector};
@@ -73,6 +73,8 @@ pub(super) struct Live {
     /// The trajectory in lines of so many poses: those that are complete are sent once.
     lines: Vec<Vec<Point3<f64>>>,
     lost: bool,
+    /// A correction has bent the mesh that viewers see.
+    bent: bool,
     frames: usize,
     /// Kept open as long as the run goes on.
     _context: Arc<Context>,
@@ -132,6 +134,7 @@ impl Live {
             newcomer,
             lines: Vec::new(),
             lost: false,
+            bent: false,
             frames: 0,
             _context: context,
             _recording: recording,
@@ -176,13 +179,34 @@ impl Live {
     }
 
     /// What has changed of the mesh.
-    pub(super) fn mesh(&self, stamp: f64, mesher: &mut IncrementalMesher) {
+    fn mesh(&self, stamp: f64, mesher: &mut IncrementalMesher) {
         let changed = mesher.take_changed_patches();
         self.draw_patches(stamp, &changed, mesher);
     }
 
-    /// All frames have moved.
-    pub(super) fn corrected(&mut self, stamp: f64, poses: &[Isometry3<f64>]) {
+    /// The mesh is as it stays.
+    pub(super) fn finished(&self, stamp: f64, mesher: &mut IncrementalMesher) {
+        self.mesh(stamp, mesher);
+        if self.bent {
+            // What no frame that moved had seen is still shown bent.
+            self.draw_patches(stamp, &mesher.patches(), mesher);
+        }
+    }
+
+    /// All frames have moved: the mesh is bent after them until the map has followed.
+    pub(super) fn corrected(
+        &mut self,
+        stamp: f64,
+        poses: &[Isometry3<f64>],
+        deformation: &EmbeddedDeformation,
+        mesher: &IncrementalMesher,
+    ) {
+        self.bent = true;
+        for patch in mesher.patches() {
+            let mut mesh = mesher.patch(patch);
+            deformation.apply(&mut mesh);
+            self.map.log_with_meta(&patch_scene(stamp, patch, mesh), at(stamp));
+        }
         self.lines.clear();
         for pose in poses {
             self.extend(Point3::from(pose.translation.vector));
@@ -193,7 +217,7 @@ impl Live {
 
     fn draw_patches(&self, stamp: f64, patches: &[PatchKey], mesher: &IncrementalMesher) {
         for patch in patches {
-            self.map.log_with_meta(&patch_scene(stamp, *patch, mesher), at(stamp));
+            self.map.log_with_meta(&patch_scene(stamp, *patch, mesher.patch(*patch)), at(stamp));
         }
     }
 
@@ -272,8 +296,7 @@ fn entity(stamp: f64, id: String) -> SceneEntity {
 }
 
 /// A patch takes the place of what it was before.
-fn patch_scene(stamp: f64, key: PatchKey, mesher: &IncrementalMesher) -> SceneUpdate {
-    let mesh = mesher.patch(key);
+fn patch_scene(stamp: f64, key: PatchKey, mesh: Mesh) -> SceneUpdate {
     let PatchKey([x, y, z]) = key;
     let triangles = TriangleListPrimitive {
         pose: None,

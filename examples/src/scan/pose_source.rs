@@ -8,6 +8,7 @@ use tsdf_hash::{
 };
 
 use super::error::ScanError;
+use super::gyroscope::Gyroscope;
 use super::map_store::MapStore;
 use super::prediction::{OdometryError, Prediction};
 use super::recent_map::RecentMap;
@@ -63,6 +64,8 @@ pub(super) struct CameraTracker {
     found_first: bool,
     /// Nothing is fused.
     fixed_map: bool,
+    /// Seconds from frame to frame.
+    interval: f64,
     /// Of the present frame; `None` before the first one that was tracked.
     pub(super) outcome: Option<TrackingOutcome>,
     pub(super) metrics: TrackingMetrics,
@@ -72,9 +75,11 @@ impl CameraTracker {
     pub(super) fn new(
         map: &tsdf_hash::Settings,
         odometry: Option<OdometryError>,
+        gyroscope: Option<Gyroscope>,
         found_first: bool,
         fixed_map: bool,
         loops: bool,
+        interval: f64,
     ) -> Result<Self, ScanError> {
         let settings = TrackingSettings { noise: map.noise, threads: map.threads, ..TrackingSettings::default() };
         // What is not fused does not grow the map: a camera that leaves it agrees less and less, and is led astray by what is left.
@@ -83,10 +88,11 @@ impl CameraTracker {
             tracker: Tracker::new(TrackingSettings { min_agreement, ..settings })?,
             relocaliser: Relocaliser::new(settings)?,
             recent: loops.then(|| RecentMap::new(map)),
-            prediction: Prediction::new(odometry),
+            prediction: Prediction::new(odometry, gyroscope),
             lost: false,
             found_first,
             fixed_map,
+            interval,
             outcome: None,
             metrics: TrackingMetrics::default(),
         })
@@ -182,8 +188,9 @@ impl CameraTracker {
         colour: Option<&ColourView>,
     ) -> Result<Option<TrackingOutcome>, ScanError> {
         let mut tracked = None;
+        let is_guess = self.lost || self.prediction.is_gap(frame, self.interval);
         for prior in self.prediction.priors(frame) {
-            let outcome = self.track(store, depth, colour, &prior)?;
+            let outcome = self.track(store, depth, colour, &prior, is_guess)?;
             let found = outcome.is_tracked();
             tracked = Some(outcome);
             if found {
@@ -199,6 +206,7 @@ impl CameraTracker {
         depth: &DepthView,
         colour: Option<&ColourView>,
         prior: &PosePrior,
+        is_guess: bool,
     ) -> Result<TrackingOutcome, ScanError> {
         let recent = self.recent.as_mut().and_then(RecentMap::older);
         let (map, world_from_map) = recent.unwrap_or_else(|| (store.dense(), Isometry3::identity()));
@@ -208,8 +216,8 @@ impl CameraTracker {
         if self.fixed_map && (outcome.coverage < LEAST_COVERAGE || !outcome.degenerate.is_empty()) {
             outcome.status = TrackingStatus::NoOverlap;
         }
-        // A lost camera has moved, nobody knows where, unless odometry does: what would do from one frame to the next is not enough.
-        if self.lost && prior.covariance.is_none() && outcome.agreement < self.tracker.settings().relocalise_agreement {
+        // A lost camera has moved, nobody knows where, unless odometry does, and one that skipped frames: what would do from one frame to the next is not enough.
+        if is_guess && prior.covariance.is_none() && outcome.agreement < self.tracker.settings().relocalise_agreement {
             outcome.status = TrackingStatus::Disagreement;
         }
         Ok(outcome)

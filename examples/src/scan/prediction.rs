@@ -1,8 +1,9 @@
 //! Where the camera is believed to be before a frame is looked at.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3, UnitQuaternion};
 use tsdf_hash::{PosePrior, TrackingOutcome};
 
+use super::gyroscope::Gyroscope;
 use super::sequence::FrameFiles;
 
 /// The error of recorded odometry.
@@ -14,10 +15,20 @@ pub struct OdometryError {
     pub interval: f64,
 }
 
-/// The last pose, and how it goes on from there: by odometry where it was recorded, else at constant velocity.
+/// Frames farther apart than so many intervals have others missing between them (ours).
+const LONGEST_STEP: f64 = 3.5;
+/// Standard deviations of a turn by the gyroscope, radians, and of a shift at constant velocity, metres, from one frame to the next (ours).
+const LED_BY_GYROSCOPE: [f64; 2] = [5e-3, 0.1];
+
+/// The last pose, and how it goes on from there: by odometry where it was recorded, else at constant velocity, turned as the gyroscope says where there is one.
 #[derive(Debug, Default)]
 pub(super) struct Prediction {
     odometry: Option<OdometryError>,
+    gyroscope: Option<Gyroscope>,
+    /// When `last` was.
+    stamp: Option<f64>,
+    /// Frames since `last` was tracked were not: where the camera has gone since then no gyroscope knows.
+    adrift: bool,
     last: Option<PosePrior>,
     /// The pose before the last one.
     before: Option<Isometry3<f64>>,
@@ -26,14 +37,20 @@ pub(super) struct Prediction {
 }
 
 impl Prediction {
-    pub(super) fn new(odometry: Option<OdometryError>) -> Self {
-        Self { odometry, ..Self::default() }
+    pub(super) fn new(odometry: Option<OdometryError>, gyroscope: Option<Gyroscope>) -> Self {
+        Self { odometry, gyroscope, ..Self::default() }
     }
 
     /// Goes on from a pose that is known.
     pub(super) fn start(&mut self, pose: Isometry3<f64>, frame: Option<&FrameFiles>) {
         self.last = Some(PosePrior { world_from_camera: pose, covariance: None });
         (self.before, self.recorded) = (None, frame.and_then(recorded));
+        (self.stamp, self.adrift) = (frame.map(|frame| frame.stamp), false);
+    }
+
+    /// Whether frames are missing between the last one and this.
+    pub(super) fn is_gap(&self, frame: &FrameFiles, interval: f64) -> bool {
+        self.stamp.is_some_and(|stamp| frame.stamp - stamp > LONGEST_STEP * interval)
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -47,9 +64,26 @@ impl Prediction {
             return vec![prior];
         }
         let stopped = last.world_from_camera;
+        if let Some(turn) = self.turn(frame) {
+            let onwards = self.before.map(|before| {
+                stopped.inverse_transform_point(&Point3::from(
+                    2.0 * stopped.translation.vector - before.translation.vector,
+                ))
+            });
+            let led = |to: Point3<f64>| {
+                let prior = last.after(&Isometry3::from_parts(to.into(), turn), LED_BY_GYROSCOPE);
+                PosePrior { covariance: prior.covariance.filter(|_| !self.adrift), ..prior }
+            };
+            return onwards.into_iter().chain([Point3::origin()]).map(led).collect();
+        }
         let onwards = self.before.map(|before| stopped * (before.inverse() * stopped));
         let guess = |world_from_camera| PosePrior { world_from_camera, covariance: None };
         onwards.into_iter().chain([stopped]).map(guess).collect()
+    }
+
+    /// Of the camera since the last pose, by the gyroscope.
+    fn turn(&self, frame: &FrameFiles) -> Option<UnitQuaternion<f64>> {
+        self.gyroscope.as_ref()?.turn(self.stamp?, frame.stamp)
     }
 
     fn by_odometry(&self, last: &PosePrior, frame: &FrameFiles) -> Option<PosePrior> {
@@ -61,21 +95,31 @@ impl Prediction {
 
     /// A frame was found; `earlier` is where the frame before it was taken, if that is known only now.
     pub(super) fn found(&mut self, outcome: &TrackingOutcome, earlier: Option<Isometry3<f64>>, frame: &FrameFiles) {
+        if let (Some(gyroscope), Some(then), Some(last), None, true) =
+            (&mut self.gyroscope, self.stamp, &self.last, earlier, outcome.degenerate.is_empty() && !self.adrift)
+        {
+            let turn = last.world_from_camera.rotation.inverse() * outcome.world_from_camera.rotation;
+            gyroscope.learn(then, frame.stamp, &turn);
+        }
         self.before = earlier.or(self.last.map(|last| last.world_from_camera));
         (self.last, self.recorded) = (Some(outcome.pose()), recorded(frame));
+        (self.stamp, self.adrift) = (Some(frame.stamp), false);
     }
 
-    /// A frame was not found: odometry leads on, velocity does not.
+    /// A frame was not found: odometry leads on, velocity does not; a gyroscope still knows the turn.
     pub(super) fn lost(&mut self, frame: &FrameFiles) {
         self.before = None;
         if let Some(prior) = self.last.as_ref().and_then(|last| self.by_odometry(last, frame)) {
             (self.last, self.recorded) = (Some(prior), recorded(frame));
+        } else if let (Some(turn), Some(last)) = (self.turn(frame), &mut self.last) {
+            last.world_from_camera.rotation *= turn;
+            (self.stamp, self.adrift) = (Some(frame.stamp), true);
         }
     }
 
     /// The camera has been somewhere else.
     pub(super) fn forget(&mut self) {
-        (self.last, self.before, self.recorded) = (None, None, None);
+        (self.last, self.before, self.recorded, self.stamp, self.adrift) = (None, None, None, None, false);
     }
 
     /// The map and all in it have moved.
@@ -109,7 +153,7 @@ mod tests {
     #[test]
     fn the_error_of_odometry_grows_over_a_gap() {
         let error = OdometryError { deviations: [0.01, 0.02], interval: 0.1 };
-        let mut prediction = Prediction::new(Some(error));
+        let mut prediction = Prediction::new(Some(error), None);
         prediction.start(Isometry3::identity(), Some(&frame(5.0, 1.0)));
         let variance = |prediction: &Prediction, frame: &FrameFiles| {
             let prior = prediction.priors(frame)[0];

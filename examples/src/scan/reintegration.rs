@@ -81,6 +81,7 @@ mod tests {
             depth_scale: 1000.0,
             scale_origin: String::new(),
             colour_camera: None,
+            gyroscope: None,
             frames: (0..FRAMES).map(frame).collect(),
         }
     }

@@ -163,7 +163,16 @@ impl<'a> Run<'a> {
         let store = MapStore::open(map, settings.device)?;
         let tracker = |odometry| {
             let loops = settings.loops && settings.fuse;
-            CameraTracker::new(store.settings(), odometry, settings.relocalise.is_some(), !settings.fuse, loops)
+            let gyroscope = sequence.gyroscope.clone();
+            CameraTracker::new(
+                store.settings(),
+                odometry,
+                gyroscope,
+                settings.relocalise.is_some(),
+                !settings.fuse,
+                loops,
+                sequence.interval(),
+            )
         };
         let mut tracker = match settings.poses {
             PoseSource::Given => None,
@@ -364,7 +373,8 @@ impl<'a> Run<'a> {
             tracker.move_by(&present);
         }
         if let (Some(live), Some((index, _))) = (&mut self.live, self.fused.last()) {
-            live.corrected(self.sequence.frames[*index].stamp, self.trajectory.poses());
+            let stamp = self.sequence.frames[*index].stamp;
+            live.corrected(stamp, self.trajectory.poses(), &correction.deformation, &self.mesher);
         }
         Ok(())
     }
@@ -410,7 +420,7 @@ impl<'a> Run<'a> {
         }
         if let (Some(live), Some((index, _)), Some(map)) = (&self.live, self.fused.last(), self.store.map()) {
             self.mesher.update(map)?;
-            live.mesh(self.sequence.frames[*index].stamp, &mut self.mesher);
+            live.finished(self.sequence.frames[*index].stamp, &mut self.mesher);
         }
         let stage = Stage::start("mesh");
         let start = ProcessTime::now();

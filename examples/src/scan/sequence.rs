@@ -3,6 +3,7 @@
 use nalgebra::Isometry3;
 use tsdf_hash::Intrinsics;
 
+use super::gyroscope::Gyroscope;
 use super::image_source::ImageSource;
 
 /// A sequence of depth images, with colour and poses where they were recorded.
@@ -22,6 +23,8 @@ pub struct Sequence {
     pub scale_origin: String,
     /// A colour camera that stands elsewhere.
     pub colour_camera: Option<ColourCamera>,
+    /// A gyroscope on the camera.
+    pub gyroscope: Option<Gyroscope>,
     /// The frames, by rising stamps.
     pub frames: Vec<FrameFiles>,
 }

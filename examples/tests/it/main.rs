@@ -7,6 +7,7 @@ mod bags;
 mod five_joint_arm;
 mod flight_constraints;
 mod gltf_meshes;
+mod gyroscope;
 mod handheld;
 mod independence;
 mod line_art;
