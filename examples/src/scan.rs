@@ -9,6 +9,7 @@ mod image_source;
 mod layouts;
 mod live;
 mod map_store;
+mod mapped;
 mod mcap_in;
 mod options;
 mod pairing;
@@ -35,6 +36,7 @@ pub use image_source::{ImageSource, ImageTopic};
 pub use layouts::open_sequence;
 pub use live::LiveSettings;
 pub use map_store::Device;
+pub use mapped::{Scan, ScanMetrics};
 pub use options::{
     FrameRange, in_options, mebibytes, parse_intrinsics, parse_noise, parse_odometry_error, read_body_from_camera,
     read_colour_camera,
@@ -45,7 +47,6 @@ pub use prediction::OdometryError;
 pub use quality::Quality;
 pub use ray_cast_check::RayCastCheck;
 pub use report::ScanReport;
-pub use run::{Scan, ScanMetrics};
 pub use sequence::{ColourCamera, FrameFiles, Sequence};
 pub use settings::ScanSettings;
 pub use views::save_views;

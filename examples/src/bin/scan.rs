@@ -137,7 +137,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let sequence = sequence(arguments)?;
     eprintln!("{}: {} layout, {} frames", arguments.sequence.display(), sequence.layout, sequence.frames.len());
     eprintln!("{:28} {}", "camera", sequence.description());
-    let settings = settings(arguments, &sequence)?;
+    let settings = settings(arguments)?;
     let scan = Scan::run(&arguments.sequence, &sequence, &settings)?;
     for (_, why) in &scan.skipped {
         eprintln!("left out: {}", in_options(why));
@@ -212,7 +212,7 @@ fn sequence(arguments: &Arguments) -> Result<Sequence, Box<dyn std::error::Error
     Ok(sequence)
 }
 
-fn settings(arguments: &Arguments, sequence: &Sequence) -> Result<ScanSettings, String> {
+fn settings(arguments: &Arguments) -> Result<ScanSettings, String> {
     let threads = arguments.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
     let memory = MemoryLimits {
         host_bytes: mebibytes("--host-mib", arguments.host_mib)?,
@@ -248,7 +248,7 @@ fn settings(arguments: &Arguments, sequence: &Sequence) -> Result<ScanSettings, 
         Poses::Given | Poses::Tracked => PoseSource::Tracked,
         Poses::Odometry => {
             let deviations = arguments.odometry_error.unwrap_or([0.5_f64.to_radians(), 0.01]);
-            PoseSource::Odometry(OdometryError { deviations, interval: sequence.interval() })
+            PoseSource::Odometry(OdometryError { deviations })
         }
     };
     let interval = Duration::try_from_secs_f64(arguments.checkpoint)

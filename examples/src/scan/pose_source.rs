@@ -64,8 +64,6 @@ pub(super) struct CameraTracker {
     found_first: bool,
     /// Nothing is fused.
     fixed_map: bool,
-    /// Seconds from frame to frame.
-    interval: f64,
     /// Of the present frame; `None` before the first one that was tracked.
     pub(super) outcome: Option<TrackingOutcome>,
     pub(super) metrics: TrackingMetrics,
@@ -88,11 +86,10 @@ impl CameraTracker {
             tracker: Tracker::new(TrackingSettings { min_agreement, ..settings })?,
             relocaliser: Relocaliser::new(settings)?,
             recent: loops.then(|| RecentMap::new(map)),
-            prediction: Prediction::new(odometry, gyroscope),
+            prediction: Prediction::new(odometry, gyroscope, interval),
             lost: false,
             found_first,
             fixed_map,
-            interval,
             outcome: None,
             metrics: TrackingMetrics::default(),
         })
@@ -159,6 +156,7 @@ impl CameraTracker {
             self.metrics.losses += usize::from(!std::mem::replace(&mut self.lost, true));
             return Err(ScanError::Lost(self.search_state().into()));
         };
+        let was_lost = self.lost;
         self.note(frame, &outcome);
         self.outcome = Some(outcome.clone());
         if !outcome.is_tracked() {
@@ -166,7 +164,7 @@ impl CameraTracker {
             return Err(ScanError::Lost(format!("{}; {}", reason(&outcome), self.search_state())));
         }
         // After a jump the last two poses are no motion, but what led to the place where it is found is one.
-        self.prediction.found(&outcome, earlier.last().copied(), frame);
+        self.prediction.found(&outcome, earlier.last().copied(), frame, was_lost);
         Ok(Located { world_from_camera: outcome.world_from_camera, earlier })
     }
 
@@ -188,7 +186,9 @@ impl CameraTracker {
         colour: Option<&ColourView>,
     ) -> Result<Option<TrackingOutcome>, ScanError> {
         let mut tracked = None;
-        let is_guess = self.lost || self.prediction.is_gap(frame, self.interval);
+        // A lost camera has moved, nobody knows where, unless odometry does, and one that skipped frames: what would do from one frame to the
+        // next is not enough.
+        let is_guess = (self.lost && !self.prediction.is_led(frame)) || self.prediction.is_gap(frame);
         for prior in self.prediction.priors(frame) {
             let outcome = self.track(store, depth, colour, &prior, is_guess)?;
             let found = outcome.is_tracked();
@@ -216,8 +216,7 @@ impl CameraTracker {
         if self.fixed_map && (outcome.coverage < LEAST_COVERAGE || !outcome.degenerate.is_empty()) {
             outcome.status = TrackingStatus::NoOverlap;
         }
-        // A lost camera has moved, nobody knows where, unless odometry does, and one that skipped frames: what would do from one frame to the next is not enough.
-        if is_guess && prior.covariance.is_none() && outcome.agreement < self.tracker.settings().relocalise_agreement {
+        if is_guess && outcome.agreement < self.tracker.settings().relocalise_agreement {
             outcome.status = TrackingStatus::Disagreement;
         }
         Ok(outcome)

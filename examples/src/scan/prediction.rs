@@ -1,6 +1,6 @@
 //! Where the camera is believed to be before a frame is looked at.
 
-use nalgebra::{Isometry3, Point3, UnitQuaternion};
+use nalgebra::{Isometry3, Vector3};
 use tsdf_hash::{PosePrior, TrackingOutcome};
 
 use super::gyroscope::Gyroscope;
@@ -11,8 +11,6 @@ use super::sequence::FrameFiles;
 pub struct OdometryError {
     /// Standard deviations of the turn, radians, and of the shift, metres, from one frame to the next, about and along each axis.
     pub deviations: [f64; 2],
-    /// Seconds between two frames; a longer gap has the error of as many.
-    pub interval: f64,
 }
 
 /// Frames farther apart than so many intervals have others missing between them (ours).
@@ -20,106 +18,124 @@ const LONGEST_STEP: f64 = 3.5;
 /// Standard deviations of a turn by the gyroscope, radians, and of a shift at constant velocity, metres, from one frame to the next (ours).
 const LED_BY_GYROSCOPE: [f64; 2] = [5e-3, 0.1];
 
-/// The last pose, and how it goes on from there: by odometry where it was recorded, else at constant velocity, turned as the gyroscope says where there is one.
-#[derive(Debug, Default)]
+/// The last pose, and how it goes on from there: by odometry where it was recorded, else at constant velocity, turned as the gyroscope says
+/// where there is one.
+#[derive(Debug)]
 pub(super) struct Prediction {
     odometry: Option<OdometryError>,
     gyroscope: Option<Gyroscope>,
-    /// When `last` was.
-    stamp: Option<f64>,
-    /// Frames since `last` was tracked were not: where the camera has gone since then no gyroscope knows.
-    adrift: bool,
+    /// Seconds from frame to frame.
+    interval: f64,
     last: Option<PosePrior>,
-    /// The pose before the last one.
-    before: Option<Isometry3<f64>>,
     /// Stamp and recorded pose of the frame that `last` belongs to.
-    recorded: Option<(f64, Isometry3<f64>)>,
+    then: Option<(f64, Option<Isometry3<f64>>)>,
+    /// The pose before the last one; `None` where the last one was not found.
+    before: Option<Isometry3<f64>>,
 }
 
 impl Prediction {
-    pub(super) fn new(odometry: Option<OdometryError>, gyroscope: Option<Gyroscope>) -> Self {
-        Self { odometry, gyroscope, ..Self::default() }
+    pub(super) fn new(odometry: Option<OdometryError>, gyroscope: Option<Gyroscope>, interval: f64) -> Self {
+        Self { odometry, gyroscope, interval, last: None, then: None, before: None }
     }
 
     /// Goes on from a pose that is known.
     pub(super) fn start(&mut self, pose: Isometry3<f64>, frame: Option<&FrameFiles>) {
         self.last = Some(PosePrior { world_from_camera: pose, covariance: None });
-        (self.before, self.recorded) = (None, frame.and_then(recorded));
-        (self.stamp, self.adrift) = (frame.map(|frame| frame.stamp), false);
-    }
-
-    /// Whether frames are missing between the last one and this.
-    pub(super) fn is_gap(&self, frame: &FrameFiles, interval: f64) -> bool {
-        self.stamp.is_some_and(|stamp| frame.stamp - stamp > LONGEST_STEP * interval)
+        (self.before, self.then) = (None, frame.map(recorded));
     }
 
     pub(super) fn is_empty(&self) -> bool {
         self.last.is_none()
     }
 
+    /// Whether frames are missing before this one, and no odometry says where the camera has gone.
+    pub(super) fn is_gap(&self, frame: &FrameFiles) -> bool {
+        self.steps(frame).is_some_and(|steps| steps > LONGEST_STEP) && !self.is_led(frame)
+    }
+
+    /// Whether odometry says where the camera is.
+    pub(super) fn is_led(&self, frame: &FrameFiles) -> bool {
+        self.by_odometry(frame).is_some()
+    }
+
     /// Where a frame was taken, as far as what came before it says, the likelier first; empty before the first frame.
     pub(super) fn priors(&self, frame: &FrameFiles) -> Vec<PosePrior> {
         let Some(last) = &self.last else { return Vec::new() };
-        if let Some(prior) = self.by_odometry(last, frame) {
+        if let Some(prior) = self.by_odometry(frame) {
             return vec![prior];
         }
         let stopped = last.world_from_camera;
-        if let Some(turn) = self.turn(frame) {
-            let onwards = self.before.map(|before| {
-                stopped.inverse_transform_point(&Point3::from(
-                    2.0 * stopped.translation.vector - before.translation.vector,
-                ))
-            });
-            let led = |to: Point3<f64>| {
-                let prior = last.after(&Isometry3::from_parts(to.into(), turn), LED_BY_GYROSCOPE);
-                PosePrior { covariance: prior.covariance.filter(|_| !self.adrift), ..prior }
-            };
-            return onwards.into_iter().chain([Point3::origin()]).map(led).collect();
+        let before = self.before.as_ref();
+        if self.gyroscope.is_some() {
+            let shift = before.map(|before| stopped.translation.vector - before.translation.vector);
+            let led: Vec<PosePrior> = shift
+                .into_iter()
+                .chain([Vector3::zeros()])
+                .filter_map(|shift| self.by_gyroscope(frame, shift))
+                .collect();
+            if !led.is_empty() {
+                return led;
+            }
         }
-        let onwards = self.before.map(|before| stopped * (before.inverse() * stopped));
+        let onwards = before.map(|before| stopped * (before.inverse() * stopped));
         let guess = |world_from_camera| PosePrior { world_from_camera, covariance: None };
         onwards.into_iter().chain([stopped]).map(guess).collect()
     }
 
-    /// Of the camera since the last pose, by the gyroscope.
-    fn turn(&self, frame: &FrameFiles) -> Option<UnitQuaternion<f64>> {
-        self.gyroscope.as_ref()?.turn(self.stamp?, frame.stamp)
+    /// Intervals since the last frame.
+    fn steps(&self, frame: &FrameFiles) -> Option<f64> {
+        Some((frame.stamp - self.then?.0) / self.interval)
     }
 
-    fn by_odometry(&self, last: &PosePrior, frame: &FrameFiles) -> Option<PosePrior> {
-        let OdometryError { deviations, interval } = self.odometry?;
-        let ((then, from), (now, to)) = (self.recorded?, recorded(frame)?);
-        let frames = ((now - then) / interval).round().max(1.0);
-        Some(last.after(&(from.inverse() * to), deviations.map(|deviation| deviation * frames.sqrt())))
+    /// On by a motion, whose error per frame grows with the frames that are missing.
+    fn on_by(&self, frame: &FrameFiles, motion: &Isometry3<f64>, deviations: [f64; 2]) -> Option<PosePrior> {
+        let steps = self.steps(frame)?.round().max(1.0);
+        Some(self.last?.after(motion, deviations.map(|deviation| deviation * steps.sqrt())))
     }
 
-    /// A frame was found; `earlier` is where the frame before it was taken, if that is known only now.
-    pub(super) fn found(&mut self, outcome: &TrackingOutcome, earlier: Option<Isometry3<f64>>, frame: &FrameFiles) {
-        if let (Some(gyroscope), Some(then), Some(last), None, true) =
-            (&mut self.gyroscope, self.stamp, &self.last, earlier, outcome.degenerate.is_empty() && !self.adrift)
+    fn by_odometry(&self, frame: &FrameFiles) -> Option<PosePrior> {
+        let OdometryError { deviations } = self.odometry?;
+        let (from, to) = (self.then?.1?, frame.world_from_camera?);
+        self.on_by(frame, &(from.inverse() * to), deviations)
+    }
+
+    /// Turned as the gyroscope says, and shifted by so much from each frame to the next, in the world.
+    fn by_gyroscope(&self, frame: &FrameFiles, shift: Vector3<f64>) -> Option<PosePrior> {
+        let turn = self.gyroscope.as_ref()?.turn(self.then?.0, frame.stamp)?;
+        let along = self.last?.world_from_camera.rotation.inverse() * shift * self.steps(frame)?;
+        self.on_by(frame, &Isometry3::from_parts(along.into(), turn), LED_BY_GYROSCOPE)
+    }
+
+    /// A frame was found; `earlier` is where the frame before it was taken, if that is known only now. `lost`: the one before it was not found.
+    pub(super) fn found(
+        &mut self,
+        outcome: &TrackingOutcome,
+        earlier: Option<Isometry3<f64>>,
+        frame: &FrameFiles,
+        lost: bool,
+    ) {
+        if let (Some(gyroscope), Some((then, _)), Some(last)) = (&mut self.gyroscope, self.then, &self.last)
+            && !lost
+            && outcome.degenerate.is_empty()
         {
             let turn = last.world_from_camera.rotation.inverse() * outcome.world_from_camera.rotation;
             gyroscope.learn(then, frame.stamp, &turn);
         }
         self.before = earlier.or(self.last.map(|last| last.world_from_camera));
-        (self.last, self.recorded) = (Some(outcome.pose()), recorded(frame));
-        (self.stamp, self.adrift) = (Some(frame.stamp), false);
+        (self.last, self.then) = (Some(outcome.pose()), Some(recorded(frame)));
     }
 
     /// A frame was not found: odometry leads on, velocity does not; a gyroscope still knows the turn.
     pub(super) fn lost(&mut self, frame: &FrameFiles) {
         self.before = None;
-        if let Some(prior) = self.last.as_ref().and_then(|last| self.by_odometry(last, frame)) {
-            (self.last, self.recorded) = (Some(prior), recorded(frame));
-        } else if let (Some(turn), Some(last)) = (self.turn(frame), &mut self.last) {
-            last.world_from_camera.rotation *= turn;
-            (self.stamp, self.adrift) = (Some(frame.stamp), true);
+        if let Some(prior) = self.by_odometry(frame).or_else(|| self.by_gyroscope(frame, Vector3::zeros())) {
+            (self.last, self.then) = (Some(prior), Some(recorded(frame)));
         }
     }
 
     /// The camera has been somewhere else.
     pub(super) fn forget(&mut self) {
-        (self.last, self.before, self.recorded, self.stamp, self.adrift) = (None, None, None, None, false);
+        (self.last, self.then, self.before) = (None, None, None);
     }
 
     /// The map and all in it have moved.
@@ -129,8 +145,8 @@ impl Prediction {
     }
 }
 
-fn recorded(frame: &FrameFiles) -> Option<(f64, Isometry3<f64>)> {
-    Some((frame.stamp, frame.world_from_camera?))
+fn recorded(frame: &FrameFiles) -> (f64, Option<Isometry3<f64>>) {
+    (frame.stamp, frame.world_from_camera)
 }
 
 #[cfg(test)]
@@ -152,8 +168,8 @@ mod tests {
     /// Variances of errors that do not know of each other add: over a gap of three frames, three of them; and of a frame that was lost.
     #[test]
     fn the_error_of_odometry_grows_over_a_gap() {
-        let error = OdometryError { deviations: [0.01, 0.02], interval: 0.1 };
-        let mut prediction = Prediction::new(Some(error), None);
+        let error = OdometryError { deviations: [0.01, 0.02] };
+        let mut prediction = Prediction::new(Some(error), None, 0.1);
         prediction.start(Isometry3::identity(), Some(&frame(5.0, 1.0)));
         let variance = |prediction: &Prediction, frame: &FrameFiles| {
             let prior = prediction.priors(frame)[0];

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
+use super::mapped::Scan;
 use super::pose_source::PoseSource;
-use super::run::Scan;
 use super::sequence::Sequence;
 
 /// What `report.json` of a scan holds. Flat, SI units in the names; every number is finite.

@@ -4,18 +4,18 @@ use std::path::Path;
 
 use cpu_time::ProcessTime;
 use nalgebra::Isometry3;
-use tsdf_hash::{ColourView, DepthView, IncrementalMesher, KeyframeIndex, Map, Mesh};
+use tsdf_hash::{ColourView, DepthView, IncrementalMesher, KeyframeIndex};
 use vio_ekf::{Alignment, Stamp, Trajectory, ate};
 
-use super::checkpoint::{Checkpoints, Progress, metadata};
-use super::correction::{Correction, LoopMetrics, Loops};
+use super::checkpoint::{Checkpoints, Progress};
+use super::correction::{Correction, Loops};
 use super::decode::Images;
 use super::error::ScanError;
 use super::live::Live;
 use super::map_store::MapStore;
-use super::pose_source::{CameraTracker, PoseSource, TrackingMetrics};
-use super::quality::Quality;
-use super::ray_cast_check::{RayCastCheck, ray_cast_check};
+use super::mapped::{Scan, ScanMetrics};
+use super::pose_source::{CameraTracker, PoseSource};
+use super::ray_cast_check::ray_cast_check;
 use super::reintegration::Reintegration;
 use super::sequence::{FrameFiles, Sequence};
 use super::settings::ScanSettings;
@@ -24,55 +24,6 @@ use crate::progress::Stage;
 
 /// Frames that follow a correction with each new one (ours): a loop of a minute is in the map after a few seconds.
 const REINTEGRATED: usize = 4;
-
-/// A mapped sequence.
-pub struct Scan {
-    /// The map.
-    pub map: Map,
-    /// Its mesh.
-    pub mesh: Mesh,
-    /// Poses of the frames that were fused.
-    pub trajectory: Trajectory,
-    /// Keyframes, to find a camera in the map by.
-    pub keyframes: KeyframeIndex,
-    /// Indices of the frames that were fused (or only found) in this run, and their poses.
-    pub fused: Vec<(usize, Isometry3<f64>)>,
-    /// Frames that could not be fused, with the reason.
-    pub skipped: Vec<(usize, String)>,
-    /// Frames that a run before this one had done.
-    pub resumed: usize,
-    /// Which poses were believed.
-    pub poses: PoseSource,
-    /// What kept the map.
-    pub device: String,
-    /// What was measured on the way.
-    pub metrics: ScanMetrics,
-}
-
-/// What was measured while the map grew.
-#[derive(Debug, Clone, Default)]
-pub struct ScanMetrics {
-    /// Processor time of each fusion, seconds.
-    pub integrate_s: Vec<f64>,
-    /// Processor time of the incremental mesh update after each fusion, seconds; empty for a map on a GPU.
-    pub mesh_update_s: Vec<f64>,
-    /// Ray casts of the map: of the finished one, or, if blocks leave active memory, on the way.
-    pub ray_casts: Vec<RayCastCheck>,
-    /// Processor time of the mesh from nothing, seconds.
-    pub mesh_s: f64,
-    /// Largest number of bytes in active memory.
-    pub active_bytes_peak: usize,
-    /// Largest number of bytes in the host tier.
-    pub host_bytes_peak: usize,
-    /// What the pixels and poses were worth.
-    pub quality: Quality,
-    /// What became of tracking, if the poses were tracked.
-    pub tracking: Option<TrackingMetrics>,
-    /// What became of the loops, if they were looked for.
-    pub loops: Option<LoopMetrics>,
-    /// Position error of the tracked poses against those recorded, rigidly aligned, root mean square, metres.
-    pub ate_se3_rmse: Option<f64>,
-}
 
 impl Scan {
     /// Maps a sequence. Frames that cannot be used are counted and left out.
@@ -106,20 +57,6 @@ impl Scan {
         let blocks = run.store.dense().blocks();
         stage.done(&format!("{} frames, {} left out, {blocks} blocks", run.fused.len(), run.skipped.len()));
         run.finish()
-    }
-
-    /// What a later run over the same sequence needs to know, for [`Map::save`].
-    pub fn metadata(&self, folder: &Path, sequence: &Sequence) -> std::collections::BTreeMap<String, Vec<u8>> {
-        let last = sequence.frames.last().map_or(f64::NEG_INFINITY, |frame| frame.stamp);
-        metadata(folder, last, &self.trajectory, &self.keyframes)
-    }
-
-    /// Whether at least half of the work was done.
-    ///
-    /// # Errors
-    /// [`ScanError::Unusable`], with the reason.
-    pub fn verdict(&self, sequence: &Sequence) -> Result<(), ScanError> {
-        self.metrics.quality.verdict(self.fused.len() + self.resumed, sequence.frames.len())
     }
 }
 

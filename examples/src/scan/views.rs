@@ -8,7 +8,7 @@ use tsdf_hash::Mesh;
 
 use super::decode::Images;
 use super::error::ScanError;
-use super::run::Scan;
+use super::mapped::Scan;
 use super::sequence::Sequence;
 use crate::pictures::Rgb;
 

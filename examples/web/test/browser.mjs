@@ -1,12 +1,12 @@
 // The page in a real browser: mouse, an emulated headset, a lost connection, a stranger.
 //
 //   node test/browser.mjs PATH_OF_VR [FOLDER]      the folder gets screenshots and the headset's recorded session
-import { copyFile, mkdtemp, mkdir, readFile, rm } from "node:fs/promises";
+import { copyFile, mkdtemp, mkdir, readFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { spawn } from "node:child_process";
 import assert from "node:assert/strict";
-import { launch, serve as start } from "./page.mjs";
+import { runAll, serve as start } from "./page.mjs";
 
 const [program, pictures] = process.argv.slice(2);
 const scratch = await mkdtemp(join(tmpdir(), "paintcopter-browser-"));
@@ -287,16 +287,4 @@ async function headset(browser) {
   return `headset: ${pixels} pixels painted, ${figures.paint_tasks} segments flown live`;
 }
 
-const browser = await launch();
-let failed = false;
-for (const test of [mouse, lost, buttons, headset]) {
-  try {
-    console.log(`ok    ${await test(browser)}`);
-  } catch (error) {
-    failed = true;
-    console.error(`FAIL  ${test.name}: ${error.stack}`);
-  }
-}
-await browser.close();
-await rm(scratch, { recursive: true, force: true });
-process.exit(failed ? 1 : 0);
+await runAll([mouse, lost, buttons, headset], scratch);

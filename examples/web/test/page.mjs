@@ -1,5 +1,6 @@
 // What the tests in a browser share: Chromium that draws in software, a running `vr`, pictures of the screen.
 import { spawn } from "node:child_process";
+import { rm } from "node:fs/promises";
 import { join } from "node:path";
 import { chromium } from "playwright-core";
 
@@ -40,3 +41,20 @@ export const changed = (page, before, after, least = 30) =>
     for (let k = 0; k < a.length; k += 4) count += [0, 1, 2].some((c) => Math.abs(a[k + c] - b[k + c]) > least) ? 1 : 0;
     return count;
   }, { pictures: [before, after], least });
+
+/** Runs tests one after the other in one browser; each returns a line of what it saw. Ends the process with 1 if one failed. */
+export async function runAll(tests, scratch) {
+  const browser = await launch();
+  let failed = false;
+  for (const test of tests) {
+    try {
+      console.log(`ok    ${await test(browser)}`);
+    } catch (error) {
+      failed = true;
+      console.error(`FAIL  ${test.name}: ${error.stack}`);
+    }
+  }
+  await browser.close();
+  await rm(scratch, { recursive: true, force: true });
+  process.exit(failed ? 1 : 0);
+}

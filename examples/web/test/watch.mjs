@@ -3,10 +3,10 @@
 //   node test/watch.mjs FOLDER_OF_BINARIES [FOLDER]      the folder gets screenshots
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
-import { mkdir, mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
+import { mkdir, mkdtemp, readFile, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
-import { changed, launch, serve, shot } from "./page.mjs";
+import { changed, runAll, serve, shot } from "./page.mjs";
 import { liveAddress, record } from "./wall_recording.mjs";
 
 const [binaries, pictures] = process.argv.slice(2);
@@ -107,16 +107,4 @@ async function mission(browser) {
   return `mission.mcap: ${painted} pixels changed, ${traces} traces of paint, at ${speed.toFixed(2)} times the speed`;
 }
 
-const browser = await launch();
-let failed = false;
-for (const test of [scan, mission]) {
-  try {
-    console.log(`ok    ${await test(browser)}`);
-  } catch (error) {
-    failed = true;
-    console.error(`FAIL  ${test.name}: ${error.stack}`);
-  }
-}
-await browser.close();
-await rm(scratch, { recursive: true, force: true });
-process.exit(failed ? 1 : 0);
+await runAll([scan, mission], scratch);

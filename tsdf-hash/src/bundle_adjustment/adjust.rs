@@ -144,7 +144,7 @@ fn fewer(seen: Vec<Observation>, number: usize) -> Vec<Observation> {
     }
     // The k-th of them lies in the k-th of equal parts.
     let place = |k: usize| (k * count + number % count) / MOST_OBSERVERS;
-    (0..MOST_OBSERVERS).map(|k| seen[place(k).min(count - 1)]).collect()
+    (0..MOST_OBSERVERS).map(|k| seen[place(k)]).collect()
 }
 
 /// Pairs of keyframes that see a point in common.

@@ -26,7 +26,10 @@ impl EmbeddedDeformation {
     pub fn point(&self, point: &Point3<f64>) -> Point3<f64> {
         let mut near: Vec<(f64, &Isometry3<f64>)> =
             self.places.iter().map(|(place, motion)| ((place - point).norm(), motion)).collect();
-        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // The nearest ones and the first that has no say, not all in order.
+        if near.len() > NEAREST {
+            near.select_nth_unstable_by(NEAREST, |a, b| a.0.total_cmp(&b.0));
+        }
         let farthest = near.get(NEAREST).map_or(f64::INFINITY, |(distance, _)| *distance);
         let weight = |distance: f64| if farthest.is_finite() { (1.0 - distance / farthest).powi(2) } else { 1.0 };
         let near = &near[..near.len().min(NEAREST)];

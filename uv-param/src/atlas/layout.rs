@@ -34,6 +34,20 @@ impl<'a> Charts<'a> {
         }
     }
 
+    /// The faces that hang together with one, across no seam: those that `takes` takes when it is first asked.
+    pub(super) fn piece(&self, start: u32, mut takes: impl FnMut(u32) -> bool) -> Vec<u32> {
+        let mut piece = vec![start];
+        let mut next = 0;
+        while let Some(&f) = piece.get(next) {
+            next += 1;
+            for h in (3 * f as usize..3 * f as usize + 3).filter(|&h| !self.cut[h] && !self.wanted[h]) {
+                let other = self.surface.twin(h).map(|twin| (twin / 3) as u32);
+                piece.extend(other.filter(|g| takes(*g)));
+            }
+        }
+        piece
+    }
+
     /// Whether the two sides of an inner edge are apart in the plane.
     pub(super) fn is_seam(&self, h: usize) -> bool {
         self.cut[h]

@@ -99,15 +99,7 @@ pub(super) fn pieces(charts: &Charts, faces: &[u32], bad: &[bool]) -> Vec<(Vec<u
         if !seen.insert(start) {
             continue;
         }
-        let mut piece = vec![start];
-        let mut next = 0;
-        while let Some(&f) = piece.get(next) {
-            next += 1;
-            for h in (3 * f as usize..3 * f as usize + 3).filter(|&h| !charts.cut[h] && !charts.wanted[h]) {
-                let other = charts.surface.twin(h).map(|twin| (twin / 3) as u32);
-                piece.extend(other.filter(|g| state.get(g) == Some(&is_bad) && seen.insert(*g)));
-            }
-        }
+        let mut piece = charts.piece(start, |g| state.get(&g) == Some(&is_bad) && seen.insert(g));
         piece.sort_unstable();
         found.push((piece, is_bad));
     }

@@ -310,15 +310,7 @@ fn largest_piece(charts: &Charts, old: &[Option<(u32, usize)>], faces: &[u32]) -
         if !free.remove(&start) {
             continue;
         }
-        let mut piece = vec![start];
-        let mut next = 0;
-        while let Some(&f) = piece.get(next) {
-            next += 1;
-            for h in (3 * f as usize..3 * f as usize + 3).filter(|&h| !charts.cut[h] && !charts.wanted[h]) {
-                let other = charts.surface.twin(h).map(|twin| (twin / 3) as u32);
-                piece.extend(other.filter(|g| free.remove(g)));
-            }
-        }
+        let piece = charts.piece(start, |g| free.remove(&g));
         if piece.len() > largest.len() {
             largest = piece;
         }
