@@ -8,6 +8,7 @@ mod dose_correction;
 mod error;
 mod figures;
 mod fly;
+mod footprints;
 mod given_up;
 mod inspect;
 mod mission_output;

@@ -40,6 +40,7 @@
 //! | few sprays at free positions, of free spreads | [`FreeSprays`] |
 //! | a feedback network (as Zamir et al. 2017), convolutional; ours: Paper IV paints one spray per step | [`Feedback`], [`Network`] |
 //! | closed loop: coats, and a measurement after each; ours: Paper IV paints open loop | [`ClosedLoopPainter`] |
+//! | volumes fitted to what sprays leave on the surface itself, curved, stretched and cut; ours | [`OnSurface`] |
 //! | a valve of limited slew rate (augmented Lagrangian), on a context-based path (Dafner et al. 2000) | [`SlewLimited`], [`ScanOrder`] |
 //! | several paints that mix (Kubelka and Munk 1931) | [`Palette`], [`ColourSeparation`] |
 //! | strokes a robot can fly | [`boustrophedon`] |
@@ -77,7 +78,7 @@ pub use network::{Architecture, Network};
 pub use painter::{Observer, Painter};
 pub use painters::{
     AreaFill, Centrelines, ClosedLoopPainter, Deconvolution, Feedback, FreeSprays, LayerPlanning, Layered,
-    MatchingPursuit, SlewLimited, ThresholdSpacing, slew_violations,
+    MatchingPursuit, OnSurface, SlewLimited, SurfaceFootprint, ThresholdSpacing, slew_violations,
 };
 pub use painting::Painting;
 pub use path::{ScanOrder, Stroke, StrokeSettings, boustrophedon};

@@ -1,4 +1,4 @@
-//! The painters: three that plan on a grid of cells, one that follows lines, one that fills regions, one network, one of free sprays, and three that
+//! The painters: three that plan on a grid of cells, one that follows lines, one that fills regions, one network, one of free sprays, and four that
 //! wrap others.
 
 mod area_fill;
@@ -10,6 +10,7 @@ mod feedback;
 mod fitting;
 mod free_sprays;
 mod layers;
+mod on_surface;
 mod placed_sprays;
 mod pursuit;
 mod slew;
@@ -23,5 +24,6 @@ pub use deconvolution::Deconvolution;
 pub use feedback::Feedback;
 pub use free_sprays::FreeSprays;
 pub use layers::{LayerPlanning, Layered, ThresholdSpacing};
+pub use on_surface::{OnSurface, SurfaceFootprint};
 pub use pursuit::MatchingPursuit;
 pub use slew::{SlewLimited, slew_violations};

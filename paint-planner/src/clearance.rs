@@ -53,8 +53,22 @@ impl<'a> ClearanceChecker<'a> {
         self.fault.clone().map_or(Ok(()), Err)
     }
 
-    /// Distance from a sphere's centre to the surface. What is no distance counts as a touch.
-    fn distance(&mut self, centre: &Point3<f64>, max: f64) -> f64 {
+    /// Whether the tool permits a state, collisions aside.
+    pub(crate) fn permits(&self, state: &VehicleState) -> bool {
+        self.tool.permits(state)
+    }
+
+    /// Radius of a ball about the body's origin that holds the vehicle in all of some states, m.
+    pub(crate) fn radius(&mut self, states: impl Iterator<Item = VehicleState>) -> f64 {
+        states.fold(0.0, |most, state| {
+            self.spheres.clear();
+            self.tool.spheres(&state, &mut self.spheres);
+            self.spheres.iter().map(|(centre, radius)| (centre - state.position).norm() + radius).fold(most, f64::max)
+        })
+    }
+
+    /// Distance from a point to the surface, clipped at `max`, m. What is no distance counts as a touch.
+    pub(crate) fn distance(&mut self, centre: &Point3<f64>, max: f64) -> f64 {
         let distance = self.surface.distance(centre, max);
         if distance >= 0.0 {
             return distance;

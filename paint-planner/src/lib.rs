@@ -70,6 +70,7 @@ pub mod gantry;
 mod gravity;
 mod heading;
 mod keep_out;
+mod lattice;
 mod lowess;
 mod minimum_snap;
 mod nozzle;
@@ -85,6 +86,7 @@ mod tether;
 mod timing;
 mod trace;
 mod trajectory;
+mod transit;
 mod visibility;
 mod world;
 

@@ -1,6 +1,6 @@
 //! What a planner returns.
 
-use crate::route::between;
+use crate::transit::between;
 use crate::target::{NozzleState, Target};
 use crate::trajectory::{Extrema, Sample, Trajectory};
 use crate::world::VehicleState;

@@ -17,7 +17,7 @@ pub use mass_balance::MassBalance;
 pub use texel::Texel;
 
 use ball_tree::BallTree;
-use deposit::{SHOTS_PER_BATCH, count_quanta, deposit_batch};
+use deposit::{SHOTS_PER_BATCH, count_quanta, deposit_batch, shot_shares};
 use texel::check_unit;
 use texel_index::TexelIndex;
 
@@ -181,6 +181,23 @@ impl Film {
         self.volumes = volumes;
         hits.into_iter().for_each(touched);
         Ok(())
+    }
+
+    /// For every shot the texels that catch some of it, with their shares of its volume: what [`Film::deposit`] puts there before it rounds to
+    /// femtolitres. With volumes to be found these are the columns of the matrix by which paint is planned on the surface itself.
+    ///
+    /// # Errors
+    /// As [`Film::deposit`].
+    pub fn shares(
+        &self,
+        shots: &[Shot],
+        spray: &SprayModel,
+        surface: &dyn Surface,
+        threads: usize,
+    ) -> Result<Vec<Vec<(u32, f64)>>, Error> {
+        span!("shares");
+        check_call(shots, spray, threads)?;
+        Ok(shot_shares(&self.index, shots, spray, surface, threads))
     }
 }
 

@@ -1,15 +1,17 @@
 //! What to spray: the wanted picture into layers.
 
 use paint_net::{
-    AreaFill, Centrelines, Deconvolution, Feedback, GhostPixels, Image, Layered, MatchingPursuit, Observer,
-    PaintProblem, Painter, Painting, SprayKernel,
+    AreaFill, Centrelines, Deconvolution, Feedback, Image, Layered, MatchingPursuit, Observer, OnSurface, PaintProblem,
+    Painter, Painting, Spray, SprayKernel,
 };
 use paint_sim::SprayModel;
 
 use super::error::MissionError;
+use super::footprints::Footprints;
 use super::settings::{MissionSettings, PainterChoice};
 use crate::appearance::Appearance;
 use crate::progress::Stage;
+use crate::surface::PaintSurface;
 
 /// Weight of texels out of reach against those in reach.
 pub(super) const UNPAINTABLE_WEIGHT: f64 = 0.02;
@@ -29,11 +31,12 @@ pub(super) fn spray_model(settings: &MissionSettings) -> SprayModel {
     SprayModel { sigma, cut: SPRAY_CUT, range: SPRAY_RANGE, ..SprayModel::default() }
 }
 
-/// Layers of sprays for the wanted picture; no spray lies where `paintable` is false. Paint that falls beyond a seam counts where it lies.
+/// Layers of sprays for the wanted picture; no spray lies where `paintable` is false. Paint that falls beyond a seam counts where it lies,
+/// and volumes are those for what every spray leaves on the surface.
 pub(super) fn decide(
     wanted: &Image,
     coverage: &Image,
-    beyond_seams: &GhostPixels,
+    surface: &PaintSurface,
     paintable: &[bool],
     appearance: &Appearance,
     settings: &MissionSettings,
@@ -44,27 +47,31 @@ pub(super) fn decide(
         let share = if paintable[y * coverage.width() + x] { 1.0 } else { UNPAINTABLE_WEIGHT };
         share * coverage.at(x, y)
     });
-    for (ghost, _) in beyond_seams.ghosts() {
+    for (ghost, _) in surface.beyond_seams.ghosts() {
         weight.data_mut()[*ghost] = 0.0;
     }
     let kernel = kernel(settings)?;
     let problem = PaintProblem::new(wanted)
         .with_weight(&weight)
         .with_paintable(paintable)
-        .with_ghosts(beyond_seams)
+        .with_ghosts(&surface.beyond_seams)
         .with_kernel(&kernel)
         .with_saturation(appearance.ink())
         .with_limits(&settings.limits);
     let mut progress = |share: f64| stage.share(share);
+    let painter: Box<dyn Painter> = match settings.painter {
+        PainterChoice::Feedback => Box::new(Feedback { threads: settings.threads, ..Feedback::shipped()? }),
+        PainterChoice::Deconvolution => Box::new(Deconvolution::default()),
+        PainterChoice::Centrelines => Box::new(Centrelines::default()),
+        PainterChoice::Fill => Box::new(AreaFill::default()),
+        PainterChoice::Pursuit => Box::new(MatchingPursuit::default()),
+    };
+    let footprints = Footprints::new(surface, settings)?;
+    let footprints = |sprays: &[Spray]| footprints.of(sprays);
     let layers = match settings.painter {
-        PainterChoice::Feedback => {
-            let painter = Feedback { threads: settings.threads, ..Feedback::shipped()? };
-            paint(painter, settings.layered, &problem, &mut progress)
-        }
-        PainterChoice::Deconvolution => paint(Deconvolution::default(), settings.layered, &problem, &mut progress),
-        PainterChoice::Centrelines => paint(Centrelines::default(), settings.layered, &problem, &mut progress),
-        PainterChoice::Fill => paint(AreaFill::default(), settings.layered, &problem, &mut progress),
-        PainterChoice::Pursuit => paint(MatchingPursuit::default(), settings.layered, &problem, &mut progress),
+        // The doses of a coat are corrected when the nozzle's poses are known.
+        PainterChoice::Fill => paint(painter, settings.layered, &problem, &mut progress),
+        _ => paint(OnSurface::new(painter, &footprints), settings.layered, &problem, &mut progress),
     }?;
     let sprays: usize = layers.iter().map(|l| l.sprays.len()).sum();
     if sprays == 0 {

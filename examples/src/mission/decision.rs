@@ -85,7 +85,7 @@ impl Decision {
             lost => format!(", {lost:.1} % lost to keep-out volumes and tether"),
         };
         stage.done(&format!("{:.1} % of the surface{constrained}", percent(&in_reach)));
-        let layers = decide(&wanted, &coverage, &surface.beyond_seams, &in_reach, &appearance, &settings)?;
+        let layers = decide(&wanted, &coverage, &surface, &in_reach, &appearance, &settings)?;
         let name = name.to_string();
         Ok(Self {
             settings,

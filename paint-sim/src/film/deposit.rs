@@ -58,13 +58,18 @@ pub(super) fn deposit_batch(
         }
         scratch.hits
     };
-    if threads == 1 {
-        return work(batch);
+    in_chunks(batch, threads, &work)
+}
+
+/// The results of `work` on parts of the shots, one for each thread, joined in their order.
+fn in_chunks<T: Send>(shots: &[Shot], threads: usize, work: &(dyn Fn(&[Shot]) -> Vec<T> + Sync)) -> Vec<T> {
+    if threads == 1 || shots.len() < 2 {
+        return work(shots);
     }
     std::thread::scope(|scope| {
-        let chunks = batch.chunks(batch.len().div_ceil(threads));
+        let chunks = shots.chunks(shots.len().div_ceil(threads));
         let workers: Vec<_> = chunks.map(|chunk| scope.spawn(move || work(chunk))).collect();
-        let join = |worker: std::thread::ScopedJoinHandle<'_, Vec<(u32, u64)>>| {
+        let join = |worker: std::thread::ScopedJoinHandle<'_, Vec<T>>| {
             worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
         };
         workers.into_iter().flat_map(join).collect()
@@ -82,12 +87,46 @@ struct Scratch {
 
 fn deposit_shot(texels: &TexelIndex, shot: &Shot, spray: &SprayModel, surface: &dyn Surface, scratch: &mut Scratch) {
     let emitted = quanta(shot.volume);
-    if emitted == 0 {
-        return;
+    if emitted > 0 {
+        let Scratch { stack, shares, .. } = scratch;
+        find_shares(texels, shot, spray, surface, stack, shares);
+        round_shot(emitted, spray.efficiency, scratch);
     }
+}
+
+/// The shares of each shot's paint that texels catch; texels that catch none are left out.
+pub(super) fn shot_shares(
+    texels: &TexelIndex,
+    shots: &[Shot],
+    spray: &SprayModel,
+    surface: &dyn Surface,
+    threads: usize,
+) -> Vec<Vec<(u32, f64)>> {
+    let work = |shots: &[Shot]| -> Vec<Vec<(u32, f64)>> {
+        let mut stack = Vec::new();
+        let one = |shot: &Shot| {
+            let mut shares = Vec::new();
+            find_shares(texels, shot, spray, surface, &mut stack, &mut shares);
+            let scale = kept(&shares, spray.efficiency);
+            shares.iter_mut().for_each(|(_, share)| *share *= scale);
+            shares
+        };
+        shots.iter().map(one).collect()
+    };
+    in_chunks(shots, threads, &work)
+}
+
+/// Texels in the cone and out of the shadow, with the share of the paint that each claims.
+fn find_shares(
+    texels: &TexelIndex,
+    shot: &Shot,
+    spray: &SprayModel,
+    surface: &dyn Surface,
+    stack: &mut Vec<u32>,
+    shares: &mut Vec<(u32, f64)>,
+) {
     let cone = Cone::new(spray, &shot.origin, &shot.axis);
     let clearance = surface.distance(&shot.origin, spray.range) * (1.0 - 1e-9);
-    let Scratch { stack, shares, .. } = scratch;
     shares.clear();
     texels.tree.for_each(&cone, stack, |index| {
         let texel = &texels.texels[index as usize];
@@ -96,7 +135,12 @@ fn deposit_shot(texels: &TexelIndex, shot: &Shot, spray: &SprayModel, surface: &
             shares.push((index, share));
         }
     });
-    round_shot(emitted, spray.efficiency, scratch);
+}
+
+/// What is left of every claim where all of them together claim more than the cone keeps.
+fn kept(shares: &[(u32, f64)], efficiency: f64) -> f64 {
+    let claimed: f64 = shares.iter().map(|(_, share)| share).sum();
+    if claimed > efficiency { efficiency / claimed } else { 1.0 }
 }
 
 /// Share of the shot that the texel catches if nothing stands before it.
@@ -159,7 +203,7 @@ fn round_shot(emitted: u64, efficiency: f64, scratch: &mut Scratch) {
     if claimed <= 0.0 {
         return;
     }
-    let scale = emitted as f64 * if claimed > efficiency { efficiency / claimed } else { 1.0 };
+    let scale = emitted as f64 * kept(shares, efficiency);
     let total = ((claimed * scale).round() as u64).min(emitted);
     remainders.clear();
     let first = hits.len();

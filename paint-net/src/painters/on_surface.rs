@@ -1,0 +1,137 @@
+//! Volumes for what sprays really leave: on a surface that is curved, stretched and cut to become a picture.
+
+use super::fitting::{ink_cost, prune_with};
+use crate::error::{Error, require};
+use crate::image::Image;
+use crate::model::Spray;
+use crate::optimise::{StoppingRule, minimise};
+use crate::painter::{Observer, Painter, PartialProgress};
+use crate::painting::Painting;
+use crate::path::Stroke;
+use crate::problem::PaintProblem;
+
+/// What a spray leaves: pixels, none of them a ghost, and the depth on each per unit of the spray's volume.
+pub type SurfaceFootprint = Vec<(u32, f32)>;
+
+/// The plan of another painter with its volumes fitted anew to what every spray leaves on the surface itself. Ours.
+///
+/// On the plane of a chart every spray is one round spot. On the surface a chart is stretched here and shrunk there, it bends away under the
+/// cone, and goes on beyond a seam in another chart. Whoever knows the surface gives the footprint of every spray; the volumes then minimise
+///
+/// ```text
+/// ½ Σ w (f(c₀ + S v) - y)²    subject to  0 ≤ v ≤ v_max
+/// ```
+///
+/// from the painter's own, with the footprints as columns of `S`. Places, order and strokes stay; a spray that leaves nothing is dropped, as
+/// are those below [`Limits::min_volume`](crate::Limits::min_volume). The canvas is that of the surface.
+pub struct OnSurface<'a, P> {
+    /// The painter that plans on the plane.
+    pub inner: P,
+    /// The footprint of each spray, in their order.
+    pub footprints: &'a dyn Fn(&[Spray]) -> Vec<SurfaceFootprint>,
+    /// Largest number of iterations. Default 60, ours.
+    pub iterations: usize,
+    /// Stop when the cost falls by less than this share per iteration, three times in a row. Default 1e-4, ours.
+    pub tolerance: f64,
+}
+
+/// Share of the progress that the plan on the plane stands for.
+const PLAN_SHARE: f64 = 0.7;
+
+impl<'a, P: Painter> OnSurface<'a, P> {
+    /// With the default fit.
+    pub fn new(inner: P, footprints: &'a dyn Fn(&[Spray]) -> Vec<SurfaceFootprint>) -> Self {
+        Self { inner, footprints, iterations: 60, tolerance: 1e-4 }
+    }
+}
+
+impl<P: Painter> Painter for OnSurface<'_, P> {
+    fn name(&self) -> &'static str {
+        "on surface"
+    }
+
+    fn paint_observed(&self, problem: &PaintProblem, observer: &mut dyn Observer) -> Result<Painting, Error> {
+        require("tolerance", self.tolerance, self.tolerance >= 0.0, "it must be 0 or more")?;
+        let plan =
+            self.inner.paint_observed(problem, &mut PartialProgress { observer, from: 0.0, share: PLAN_SHARE })?;
+        let footprints = self.checked_footprints(&plan.sprays, problem)?;
+        let initial = problem.initial_canvas();
+        let most = problem.limits.max_volume;
+        let upper_bounds: Vec<f64> = footprints.iter().map(|f| if f.is_empty() { 0.0 } else { most }).collect();
+        let stop = StoppingRule { iterations: self.iterations, relative_decrease: self.tolerance };
+        let fit = |upper_bounds: &[f64], volumes: &mut Vec<f64>, progress: &mut dyn FnMut(f64)| {
+            let mut canvas = initial.data().to_vec();
+            let mut cost = |v: &[f64], gradient: &mut [f64]| {
+                canvas.copy_from_slice(initial.data());
+                deposit(&footprints, v, &mut canvas);
+                let value = ink_cost(problem, problem.saturation, &mut canvas);
+                for (slot, footprint) in gradient.iter_mut().zip(&footprints) {
+                    *slot = footprint.iter().map(|&(k, depth)| f64::from(depth) * canvas[k as usize]).sum();
+                }
+                value
+            };
+            minimise(volumes, upper_bounds, &stop, &mut cost, progress);
+        };
+        let mut volumes: Vec<f64> = plan.sprays.iter().map(|spray| spray.volume).collect();
+        let rest = 1.0 - PLAN_SHARE;
+        fit(&upper_bounds, &mut volumes, &mut |share| observer.progress(PLAN_SHARE + rest * share));
+        prune_with(&upper_bounds, problem.limits, &mut volumes, &mut |upper_bounds, volumes| {
+            fit(upper_bounds, volumes, &mut |_| ());
+        });
+        observer.progress(1.0);
+
+        let mut canvas = initial;
+        deposit(&footprints, &volumes, canvas.data_mut());
+        if let Some(ghosts) = problem.ghosts {
+            ghosts.gather(canvas.data_mut());
+        }
+        Ok(with_volumes(&plan, &volumes, canvas, problem))
+    }
+}
+
+impl<P> OnSurface<'_, P> {
+    fn checked_footprints(&self, sprays: &[Spray], problem: &PaintProblem) -> Result<Vec<SurfaceFootprint>, Error> {
+        let footprints = (self.footprints)(sprays);
+        if footprints.len() != sprays.len() {
+            let (found, expected) = ((footprints.len(), 1), (sprays.len(), 1));
+            return Err(Error::Mismatch { what: "list of footprints", found, expected });
+        }
+        let (width, pixels) = (problem.reference.width(), problem.reference.data().len());
+        for &(k, depth) in footprints.iter().flatten() {
+            if k as usize >= pixels || !(depth >= 0.0 && depth.is_finite()) {
+                let (x, y) = (k as usize % width, k as usize / width);
+                let range = "pixels of the picture and a depth of 0 or more";
+                return Err(Error::Pixel { what: "footprint", x, y, value: f64::from(depth), range });
+            }
+        }
+        Ok(footprints)
+    }
+}
+
+/// `canvas += S v`.
+fn deposit(footprints: &[SurfaceFootprint], volumes: &[f64], canvas: &mut [f64]) {
+    for (footprint, &volume) in footprints.iter().zip(volumes).filter(|(_, volume)| **volume > 0.0) {
+        for &(k, depth) in footprint {
+            canvas[k as usize] += volume * f64::from(depth);
+        }
+    }
+}
+
+/// The same sprays with other volumes; those of 0 are dropped.
+fn with_volumes(plan: &Painting, volumes: &[f64], canvas: Image, problem: &PaintProblem) -> Painting {
+    let spray = |(spray, &volume): (&Spray, &f64)| Spray { volume, ..*spray };
+    let open = |sprays: &mut Vec<Spray>| sprays.retain(|spray| spray.volume > 0.0);
+    let mut sprays: Vec<Spray> = plan.sprays.iter().zip(volumes).map(spray).collect();
+    // A painter that plans strokes gives its sprays stroke by stroke.
+    let mut rest = sprays.as_slice();
+    let mut strokes = Vec::with_capacity(plan.strokes.len());
+    for stroke in &plan.strokes {
+        let (own, after) = rest.split_at(stroke.sprays.len().min(rest.len()));
+        let mut own = own.to_vec();
+        open(&mut own);
+        strokes.extend((!own.is_empty()).then_some(Stroke { sprays: own }));
+        rest = after;
+    }
+    open(&mut sprays);
+    Painting { strokes, ..Painting::new(sprays, canvas, problem.saturation) }
+}

@@ -1,0 +1,207 @@
+//! Flights between strokes: straight where that is clear, else backed off from the surface, else around whatever is in the way.
+
+use std::collections::HashMap;
+
+use nalgebra::{Point3, Rotation3, Vector3};
+
+use crate::angle::nearest_equivalent;
+use crate::clearance::{ClearanceChecker, DistanceCache};
+use crate::lattice::{Cell, shortest_way};
+use crate::world::VehicleState;
+
+/// Greatest motion between two collision checks of a flight, m and (scaled by one metre) rad.
+const CHECK_STEP: f64 = 0.05;
+/// Retreats tried, m.
+const RETREAT_DISTANCES: [f64; 4] = [0.15, 0.3, 0.6, 1.2];
+/// Edge of the cells in which a way from the surface to the open is looked for, m.
+const ESCAPE_STEP: f64 = 0.1;
+/// Cells looked at for that.
+const ESCAPE_CELLS: usize = 2000;
+/// Edge of the cells in the open, m.
+const OPEN_STEP: f64 = 0.15;
+/// Half the longest step between two cells, in edges; a point lies no farther from the nearest cell either.
+const HALF_DIAGONAL: f64 = 0.866_025_403_784_438_7;
+/// Cells looked at in the open.
+const OPEN_CELLS: usize = 30_000;
+/// Distances beyond this are not resolved, m.
+const FAR: f64 = 50.0;
+/// Headings tried on either side where a tool does not permit one, by 5 degrees.
+const TURNS: i32 = 36;
+
+/// Plans flights. What it learns about the room is kept from one flight to the next.
+pub(crate) struct TransitPlanner {
+    /// Axes of the cells in the open: those of the first vehicle, so that a plan turns with the world it is made in.
+    origin: Point3<f64>,
+    axes: Rotation3<f64>,
+    /// Distance of the middles of cells from the surface.
+    distances: HashMap<Cell, f64>,
+}
+
+impl TransitPlanner {
+    /// With cells that lie about a vehicle.
+    pub(crate) fn new(at: &VehicleState) -> Self {
+        Self { origin: at.position, axes: axes(at), distances: HashMap::new() }
+    }
+
+    /// The corners of a flight that keeps `clearance`, both ends included: two where it is straight. `None` where none is found.
+    pub(crate) fn corners(
+        &mut self,
+        from: &VehicleState,
+        to: &VehicleState,
+        checker: &mut ClearanceChecker<'_>,
+        clearance: f64,
+    ) -> Option<Vec<VehicleState>> {
+        if legs_are_clear(checker, &[*from, *to], clearance) {
+            return Some(vec![*from, *to]);
+        }
+        backed_off(from, to, checker, clearance).or_else(|| self.around(from, to, checker, clearance))
+    }
+
+    /// Out to where a ball about the body holds the robot in any pose, around in the open, and back in.
+    fn around(
+        &mut self,
+        from: &VehicleState,
+        to: &VehicleState,
+        checker: &mut ClearanceChecker<'_>,
+        clearance: f64,
+    ) -> Option<Vec<VehicleState>> {
+        let radius = checker.radius((0..=8).map(|k| between(from, to, f64::from(k) / 8.0)));
+        // On the way between two cells, and to the first one, the surface may be that much nearer.
+        let slack = HALF_DIAGONAL * OPEN_STEP;
+        let open = radius + clearance + slack;
+        let out = escape(from, checker, clearance, open + slack)?;
+        let home = escape(to, checker, clearance, open + slack)?;
+        let (gate, end) = (out[out.len() - 1], home[home.len() - 1]);
+        let goal = self.cell(&end.position);
+        let way = shortest_way(
+            self.cell(&gate.position),
+            OPEN_CELLS,
+            &mut |cell| f64::from((0..3).map(|k| (goal[k] - cell[k]).pow(2)).sum::<i32>()).sqrt(),
+            &mut |_, next| self.distance(next, checker) >= open,
+        )?;
+        let turned = |(k, cell): (usize, &Cell)| {
+            let share = k as f64 / (way.len() - 1).max(1) as f64;
+            permitted(VehicleState { position: self.middle(*cell), ..between(&gate, &end, share) }, checker)
+        };
+        let inner: Vec<VehicleState> = way.iter().enumerate().map(turned).collect::<Option<_>>()?;
+        let corners: Vec<VehicleState> = out.into_iter().chain(inner).chain(home.into_iter().rev()).collect();
+        shortened(&corners, checker, clearance)
+    }
+
+    fn cell(&self, point: &Point3<f64>) -> Cell {
+        let offset = self.axes.inverse_transform_vector(&(point - self.origin)) / OPEN_STEP;
+        [offset.x, offset.y, offset.z].map(|c| c.round() as i32)
+    }
+
+    fn middle(&self, cell: Cell) -> Point3<f64> {
+        self.origin + self.axes * Vector3::from(cell.map(f64::from)) * OPEN_STEP
+    }
+
+    fn distance(&mut self, cell: Cell, checker: &mut ClearanceChecker<'_>) -> f64 {
+        let middle = self.middle(cell);
+        *self.distances.entry(cell).or_insert_with(|| checker.distance(&middle, FAR))
+    }
+}
+
+/// Back off from the surface on both sides, along with the spray or with the body.
+fn backed_off(
+    from: &VehicleState,
+    to: &VehicleState,
+    checker: &mut ClearanceChecker<'_>,
+    clearance: f64,
+) -> Option<Vec<VehicleState>> {
+    // Against the spray; or against the heading, along which the body came in.
+    let directions: [fn(&VehicleState) -> Vector3<f64>; 2] = [VehicleState::spray_azimuth, VehicleState::forward];
+    let back = |state: &VehicleState, direction: Vector3<f64>, distance: f64| VehicleState {
+        position: state.position - direction * distance,
+        ..*state
+    };
+    for retreat in RETREAT_DISTANCES {
+        for forward in directions {
+            let corners = vec![*from, back(from, forward(from), retreat), back(to, forward(to), retreat), *to];
+            if legs_are_clear(checker, &corners, clearance) {
+                return Some(corners);
+            }
+        }
+    }
+    None
+}
+
+/// The shortest way that a vehicle can be shifted, as it is turned, to where its middle is as far as `open` from the surface.
+fn escape(
+    state: &VehicleState,
+    checker: &mut ClearanceChecker<'_>,
+    clearance: f64,
+    open: f64,
+) -> Option<Vec<VehicleState>> {
+    let axes = axes(state);
+    let shifted = |cell: Cell| VehicleState {
+        position: state.position + axes * Vector3::from(cell.map(f64::from)) * ESCAPE_STEP,
+        ..*state
+    };
+    let shared = std::cell::RefCell::new(checker);
+    let way = shortest_way(
+        [0; 3],
+        ESCAPE_CELLS,
+        // A distance grows no faster than the way.
+        &mut |cell| (open - shared.borrow_mut().distance(&shifted(cell).position, open)) / ESCAPE_STEP,
+        &mut |a, b| legs_are_clear(&mut shared.borrow_mut(), &[shifted(a), shifted(b)], clearance),
+    )?;
+    Some(way.into_iter().map(shifted).collect())
+}
+
+/// The state, turned no more than it must be for the tool to permit it.
+fn permitted(state: VehicleState, checker: &ClearanceChecker<'_>) -> Option<VehicleState> {
+    let turned = |k: i32| VehicleState { heading: state.heading + f64::from(k) * 5.0_f64.to_radians(), ..state };
+    (0..=TURNS).flat_map(|k| [turned(k), turned(-k)]).find(|state| checker.permits(state))
+}
+
+/// The same way with corners left out where the straight leg past them is clear; `None` where a leg is not.
+fn shortened(
+    corners: &[VehicleState],
+    checker: &mut ClearanceChecker<'_>,
+    clearance: f64,
+) -> Option<Vec<VehicleState>> {
+    let (mut kept, mut at) = (vec![corners[0]], 0);
+    while at + 1 < corners.len() {
+        let mut ahead = corners.len() - 1 - at;
+        while !legs_are_clear(checker, &[corners[at], corners[at + ahead]], clearance) {
+            if ahead == 1 {
+                return None;
+            }
+            ahead /= 2;
+        }
+        at += ahead;
+        kept.push(corners[at]);
+    }
+    Some(kept)
+}
+
+/// Forwards, to the left, up.
+fn axes(state: &VehicleState) -> Rotation3<f64> {
+    Rotation3::from_axis_angle(&Vector3::z_axis(), state.heading)
+}
+
+/// State between two, every coordinate linear, the heading by the shorter way.
+pub(crate) fn between(from: &VehicleState, to: &VehicleState, share: f64) -> VehicleState {
+    let mix = |a: f64, b: f64| a + (b - a) * share;
+    VehicleState {
+        position: from.position + (to.position - from.position) * share,
+        heading: mix(from.heading, nearest_equivalent(to.heading, from.heading)),
+        pan: mix(from.pan, to.pan),
+        tilt: mix(from.tilt, to.tilt),
+    }
+}
+
+/// Whether the body keeps clear along the straight legs between the corners.
+fn legs_are_clear(checker: &mut ClearanceChecker<'_>, corners: &[VehicleState], clearance: f64) -> bool {
+    let mut cache = DistanceCache::default();
+    corners.windows(2).all(|leg| {
+        let turn = nearest_equivalent(leg[1].heading, leg[0].heading) - leg[0].heading;
+        let joints = Vector3::new(turn, leg[1].pan - leg[0].pan, leg[1].tilt - leg[0].tilt);
+        let motion = (leg[1].position - leg[0].position).norm() + joints.abs().sum();
+        let steps = (motion / CHECK_STEP).ceil().clamp(1.0, 1e5) as usize;
+        (0..=steps)
+            .all(|k| checker.is_clear(&between(&leg[0], &leg[1], k as f64 / steps as f64), clearance, &mut cache))
+    })
+}
