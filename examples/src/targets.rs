@@ -65,9 +65,7 @@ fn lift(surface: &PaintSurface, stroke: &Stroke, kernel: &SprayKernel, spacing: 
     let volume = |s: &Spray| s.volume * kernel.mass() * texel * texel * UNIT_THICKNESS;
     let mut targets: Vec<Target> = Vec::new();
     for (k, spray) in stroke.sprays.iter().enumerate() {
-        let [back, ahead] = half_cell(&stroke.sprays, k, spacing);
-        let cell = border(surface, spray, back).zip(border(surface, spray, ahead));
-        let Some((start, end)) = cell.filter(|(start, end)| (end.point - start.point).norm() >= 1e-6) else {
+        let Some([start, end]) = cell(surface, &stroke.sprays, k, spacing) else {
             *lost += volume(spray);
             continue;
         };
@@ -79,6 +77,7 @@ fn lift(surface: &PaintSurface, stroke: &Stroke, kernel: &SprayKernel, spacing: 
                 if k > 0 {
                     let before = &stroke.sprays[k - 1];
                     let [_, left] = half_cell(&stroke.sprays, k - 1, spacing);
+                    let [back, _] = half_cell(&stroke.sprays, k, spacing);
                     let from = [before.x + left[0], before.y + left[1]];
                     bridge(surface, from, [spray.x + back[0], spray.y + back[1]], spacing, &mut targets);
                 }
@@ -88,6 +87,12 @@ fn lift(surface: &PaintSurface, stroke: &Stroke, kernel: &SprayKernel, spacing: 
         targets.push(end);
     }
     targets
+}
+
+/// Where the paint of a spray of a stroke begins and ends, on the surface; `None` where there is none under it.
+pub(crate) fn cell(surface: &PaintSurface, stroke: &[Spray], k: usize, spacing: f64) -> Option<[Target; 2]> {
+    let [start, end] = half_cell(stroke, k, spacing).map(|offset| border(surface, &stroke[k], offset));
+    start.zip(end).filter(|(start, end)| (end.point - start.point).norm() >= 1e-6).map(|(start, end)| [start, end])
 }
 
 /// From a spray to the borders of its cell, backwards and forwards, pixels: half the way to a neighbour that is no farther than

@@ -52,8 +52,7 @@ pub enum Error {
         /// Number of targets given.
         count: usize,
     },
-    /// No stroke, or not the goal pose, can be reached by straight, retracted or climbing flight. (Single strokes that
-    /// cannot are marked as not reachable instead.)
+    /// No flight is found to any stroke, or to the goal pose. (Single strokes to which there is none are marked as not reachable instead.)
     #[error("no collision-free way from {from} to {to}: split the path there, or lower the clearance")]
     NoTransit {
         /// Where the stretch before ends ("start pose" or a target index).

@@ -34,23 +34,26 @@ struct Reached {
     done: bool,
 }
 
-/// The cells of the shortest way from `start` to a cell with nothing left to go, both included. `left` bounds the way that is left from a cell
-/// from below, in cells, and is 0 at a goal; `passable` says whether a step between two neighbours can be taken. `None` where no way
-/// leads to a goal, or none is found before `most` cells were looked at.
-pub(crate) fn shortest_way(
-    start: Cell,
-    most: usize,
-    left: &mut dyn FnMut(Cell) -> f64,
-    passable: &mut dyn FnMut(Cell, Cell) -> bool,
-) -> Option<Vec<Cell>> {
+/// Where a way is looked for.
+pub(crate) trait Space {
+    /// Bounds the way that is left from a cell from below, in cells; 0 or less at a goal, and only there.
+    fn left(&mut self, cell: Cell) -> f64;
+
+    /// Whether a step between two neighbours can be taken.
+    fn passable(&mut self, from: Cell, to: Cell) -> bool;
+}
+
+/// The cells of the shortest way from `start` to a goal, both included. `None` where no way leads to one, or none is found before `most` cells
+/// were looked at.
+pub(crate) fn shortest_way(start: Cell, most: usize, space: &mut dyn Space) -> Option<Vec<Cell>> {
     let mut reached = HashMap::from([(start, Reached { length: 0.0, from: start, done: false })]);
-    let mut open = BinaryHeap::from([Reverse(Open { estimate: left(start), cell: start })]);
+    let mut open = BinaryHeap::from([Reverse(Open { estimate: space.left(start), cell: start })]);
     let mut looked_at = 0;
     while let Some(Reverse(Open { cell, .. })) = open.pop() {
         let Some(here) = reached.get_mut(&cell).filter(|here| !here.done) else { continue };
         here.done = true;
         let length = here.length;
-        if left(cell) <= 0.0 {
+        if space.left(cell) <= 0.0 {
             return Some(way_to(cell, &reached));
         }
         looked_at += 1;
@@ -60,11 +63,11 @@ pub(crate) fn shortest_way(
         for step in steps() {
             let next = [cell[0] + step[0], cell[1] + step[1], cell[2] + step[2]];
             let longer = length + f64::from(step.iter().map(|d| d * d).sum::<i32>()).sqrt();
-            if reached.get(&next).is_some_and(|known| known.length <= longer) || !passable(cell, next) {
+            if reached.get(&next).is_some_and(|known| known.length <= longer) || !space.passable(cell, next) {
                 continue;
             }
             reached.insert(next, Reached { length: longer, from: cell, done: false });
-            open.push(Reverse(Open { estimate: longer + left(next), cell: next }));
+            open.push(Reverse(Open { estimate: longer + space.left(next), cell: next }));
         }
     }
     None
@@ -95,6 +98,19 @@ mod tests {
         way.windows(2).map(step).sum()
     }
 
+    /// A space of two functions.
+    struct Functions<L, P>(L, P);
+
+    impl<L: Fn(Cell) -> f64, P: Fn(Cell) -> bool> Space for Functions<L, P> {
+        fn left(&mut self, cell: Cell) -> f64 {
+            self.0(cell)
+        }
+
+        fn passable(&mut self, _: Cell, to: Cell) -> bool {
+            self.1(to)
+        }
+    }
+
     /// Against Bellman and Ford in a box with walls at random.
     #[test]
     fn ways_are_the_shortest() {
@@ -112,7 +128,7 @@ mod tests {
             let free = |c: Cell| inside(c) && (index(c) == 0 || !walls[index(c)]);
             let goal = [N - 1; 3];
             let left = |c: Cell| f64::from((0..3).map(|k| (goal[k] - c[k]).pow(2)).sum::<i32>()).sqrt();
-            let way = shortest_way([0; 3], 1000, &mut { left }, &mut |_, to| free(to));
+            let way = shortest_way([0; 3], 1000, &mut Functions(left, free));
             let mut least = vec![f64::INFINITY; walls.len()];
             least[0] = 0.0;
             for _ in 0..walls.len() {
@@ -140,6 +156,6 @@ mod tests {
 
     #[test]
     fn a_search_without_end_is_given_up() {
-        assert!(shortest_way([0; 3], 500, &mut |_| 1.0, &mut |_, _| true).is_none());
+        assert!(shortest_way([0; 3], 500, &mut Functions(|_| 1.0, |_| true)).is_none());
     }
 }

@@ -1,8 +1,8 @@
 //! What a planner returns.
 
-use crate::transit::between;
 use crate::target::{NozzleState, Target};
 use crate::trajectory::{Extrema, Sample, Trajectory};
+use crate::transit::between;
 use crate::world::VehicleState;
 use nalgebra::{Point3, UnitVector3};
 

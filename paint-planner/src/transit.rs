@@ -6,7 +6,7 @@ use nalgebra::{Point3, Rotation3, Vector3};
 
 use crate::angle::nearest_equivalent;
 use crate::clearance::{ClearanceChecker, DistanceCache};
-use crate::lattice::{Cell, shortest_way};
+use crate::lattice::{Cell, Space, shortest_way};
 use crate::world::VehicleState;
 
 /// Greatest motion between two collision checks of a flight, m and (scaled by one metre) rad.
@@ -16,7 +16,7 @@ const RETREAT_DISTANCES: [f64; 4] = [0.15, 0.3, 0.6, 1.2];
 /// Edge of the cells in which a way from the surface to the open is looked for, m.
 const ESCAPE_STEP: f64 = 0.1;
 /// Cells looked at for that.
-const ESCAPE_CELLS: usize = 2000;
+const ESCAPE_CELLS: usize = 1000;
 /// Edge of the cells in the open, m.
 const OPEN_STEP: f64 = 0.15;
 /// Half the longest step between two cells, in edges; a point lies no farther from the nearest cell either.
@@ -72,13 +72,8 @@ impl TransitPlanner {
         let out = escape(from, checker, clearance, open + slack)?;
         let home = escape(to, checker, clearance, open + slack)?;
         let (gate, end) = (out[out.len() - 1], home[home.len() - 1]);
-        let goal = self.cell(&end.position);
-        let way = shortest_way(
-            self.cell(&gate.position),
-            OPEN_CELLS,
-            &mut |cell| f64::from((0..3).map(|k| (goal[k] - cell[k]).pow(2)).sum::<i32>()).sqrt(),
-            &mut |_, next| self.distance(next, checker) >= open,
-        )?;
+        let (start, goal) = (self.cell(&gate.position), self.cell(&end.position));
+        let way = shortest_way(start, OPEN_CELLS, &mut Open { planner: self, checker, goal, least: open })?;
         let turned = |(k, cell): (usize, &Cell)| {
             let share = k as f64 / (way.len() - 1).max(1) as f64;
             permitted(VehicleState { position: self.middle(*cell), ..between(&gate, &end, share) }, checker)
@@ -127,27 +122,81 @@ fn backed_off(
     None
 }
 
-/// The shortest way that a vehicle can be shifted, as it is turned, to where its middle is as far as `open` from the surface.
+/// The shortest way that a vehicle can be shifted, as it is turned, to where its middle is as far as `open` from the surface. The legs between its
+/// corners are not looked at yet.
 fn escape(
     state: &VehicleState,
     checker: &mut ClearanceChecker<'_>,
     clearance: f64,
     open: f64,
 ) -> Option<Vec<VehicleState>> {
-    let axes = axes(state);
-    let shifted = |cell: Cell| VehicleState {
-        position: state.position + axes * Vector3::from(cell.map(f64::from)) * ESCAPE_STEP,
-        ..*state
+    let mut space = Escape {
+        state,
+        axes: axes(state),
+        checker,
+        clearance,
+        open,
+        clear: HashMap::new(),
+        cache: DistanceCache::default(),
     };
-    let shared = std::cell::RefCell::new(checker);
-    let way = shortest_way(
-        [0; 3],
-        ESCAPE_CELLS,
+    let way = shortest_way([0; 3], ESCAPE_CELLS, &mut space)?;
+    Some(way.into_iter().map(|cell| space.shifted(cell)).collect())
+}
+
+/// The room about a vehicle that is shifted as it is turned, away from the surface.
+struct Escape<'a, 'b> {
+    state: &'a VehicleState,
+    axes: Rotation3<f64>,
+    checker: &'a mut ClearanceChecker<'b>,
+    clearance: f64,
+    /// Distance of the body's middle from the surface at a goal.
+    open: f64,
+    /// What is known of cells.
+    clear: HashMap<Cell, bool>,
+    cache: DistanceCache,
+}
+
+impl Escape<'_, '_> {
+    fn shifted(&self, cell: Cell) -> VehicleState {
+        let shift = self.axes * Vector3::from(cell.map(f64::from)) * ESCAPE_STEP;
+        VehicleState { position: self.state.position + shift, ..*self.state }
+    }
+}
+
+impl Space for Escape<'_, '_> {
+    fn left(&mut self, cell: Cell) -> f64 {
         // A distance grows no faster than the way.
-        &mut |cell| (open - shared.borrow_mut().distance(&shifted(cell).position, open)) / ESCAPE_STEP,
-        &mut |a, b| legs_are_clear(&mut shared.borrow_mut(), &[shifted(a), shifted(b)], clearance),
-    )?;
-    Some(way.into_iter().map(shifted).collect())
+        (self.open - self.checker.distance(&self.shifted(cell).position, self.open)) / ESCAPE_STEP
+    }
+
+    fn passable(&mut self, _: Cell, to: Cell) -> bool {
+        if let Some(clear) = self.clear.get(&to) {
+            return *clear;
+        }
+        let state = self.shifted(to);
+        let clear = self.checker.is_clear(&state, self.clearance, &mut self.cache);
+        self.clear.insert(to, clear);
+        clear
+    }
+}
+
+/// The room in which a ball about the body fits, with the way to a goal in it.
+struct Open<'a, 'b> {
+    planner: &'a mut TransitPlanner,
+    checker: &'a mut ClearanceChecker<'b>,
+    goal: Cell,
+    /// Least distance of a cell from the surface.
+    least: f64,
+}
+
+impl Space for Open<'_, '_> {
+    fn left(&mut self, cell: Cell) -> f64 {
+        f64::from((0..3).map(|k| (self.goal[k] - cell[k]).pow(2)).sum::<i32>()).sqrt()
+    }
+
+    fn passable(&mut self, _: Cell, to: Cell) -> bool {
+        self.planner.distance(to, self.checker) >= self.least
+    }
 }
 
 /// The state, turned no more than it must be for the tool to permit it.

@@ -350,3 +350,34 @@ fn what_was_deposited_can_be_taken_back_to_the_last_femtolitre() {
     assert!(matches!(refused, Err(Error::NotDeposited { .. })), "{refused:?}");
     assert_eq!((film.volumes().to_vec(), film.mass_balance()), before);
 }
+
+#[test]
+fn shares_are_what_a_deposit_rounds() {
+    // A shelf shades a part of a tilted plane; near the nozzle texels claim more than was sprayed.
+    let (positions, faces) = plate(0.06, 0.01, 1.0);
+    let shelf = TriangleSurface::new(&positions, &faces).unwrap();
+    for (step, efficiency) in [(0.004, 1.0), (0.03, 0.7)] {
+        let model = SprayModel { efficiency, ..SprayModel::default() };
+        let shots: Vec<Shot> =
+            (0..7).map(|k| shot(0.02 * f64::from(k) - 0.06, 0.01, 1e-12 * f64::from(k + 1))).collect();
+        let mut film = Film::new(tilted_plane(0.4, 0.1, step, 0.1)).unwrap();
+        let shares = film.shares(&shots, &model, &shelf, 1).unwrap();
+        assert_eq!(shares, film.shares(&shots, &model, &shelf, 3).unwrap());
+        assert_eq!(film.mass_balance(), MassBalance::default());
+        let mut expected = vec![0.0; film.texels().len()];
+        for (shot, shares) in shots.iter().zip(&shares) {
+            assert!(shares.iter().map(|(_, share)| share).sum::<f64>() <= efficiency + 1e-12);
+            for &(texel, share) in shares {
+                expected[texel as usize] += share * shot.volume / QUANTUM;
+            }
+        }
+        spray(&mut film, &shots, &model, &shelf, 1);
+        let alike = expected.iter().zip(film.volumes()).all(|(expected, &volume)| {
+            let off = (expected - volume as f64).abs();
+            off <= shots.len() as f64
+        });
+        assert!(alike && film.mass_balance().overspray > 0, "step {step}");
+        let wrong = SprayModel { efficiency: 1.5, ..model };
+        assert!(matches!(film.shares(&shots, &wrong, &shelf, 1), Err(Error::OutOfRange { .. })));
+    }
+}

@@ -2,7 +2,7 @@
 
 use paint_net::{
     AreaFill, Centrelines, Deconvolution, Feedback, Image, Layered, MatchingPursuit, Observer, OnSurface, PaintProblem,
-    Painter, Painting, Spray, SprayKernel,
+    Painter, Painting, SprayKernel, Stroke,
 };
 use paint_sim::SprayModel;
 
@@ -67,7 +67,7 @@ pub(super) fn decide(
         PainterChoice::Pursuit => Box::new(MatchingPursuit::default()),
     };
     let footprints = Footprints::new(surface, settings)?;
-    let footprints = |sprays: &[Spray]| footprints.of(sprays);
+    let footprints = |strokes: &[Stroke]| footprints.of(strokes);
     let layers = match settings.painter {
         // The doses of a coat are corrected when the nozzle's poses are known.
         PainterChoice::Fill => paint(painter, settings.layered, &problem, &mut progress),

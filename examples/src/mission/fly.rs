@@ -15,7 +15,7 @@ use crate::progress::Stage;
 use crate::targets::Route;
 
 /// Motion of the nozzle that one shot stands for, metres: widens the spot by less than a percent.
-const SHOT_STEP: f64 = 0.01;
+pub(super) const SHOT_STEP: f64 = 0.01;
 
 /// One layer of paint, decided, planned and flown.
 pub struct LayerFlight {

@@ -1,6 +1,8 @@
 //! What sprays leave on the surface itself: painters plan on the plane of its charts.
 
-use paint_net::{Spray, SprayKernel, SurfaceFootprint};
+use nalgebra::UnitVector3;
+use paint_net::{SprayKernel, Stroke, SurfaceFootprint};
+use paint_planner::Target;
 use paint_sim::{Film, Shot, SprayModel};
 
 use super::decide::{kernel, spray_model};
@@ -8,8 +10,12 @@ use super::error::MissionError;
 use super::settings::MissionSettings;
 use crate::appearance::UNIT_THICKNESS;
 use crate::surface::PaintSurface;
+use crate::targets::cell;
 
-/// The simulated nozzle before the surface, upright over the place of every spray.
+/// Gauss points of order two on -1/2..1/2: `+- 1/sqrt(12)`.
+const GAUSS: f64 = 0.288_675_134_594_812_9;
+
+/// The simulated nozzle before the surface, upright over the way through the cell of every spray.
 pub(super) struct Footprints<'a> {
     surface: &'a PaintSurface,
     film: Film,
@@ -30,27 +36,36 @@ impl<'a> Footprints<'a> {
         Ok(Self { surface, film, pixels, kernel, model, settings })
     }
 
-    /// Depth on each pixel per unit of a spray's volume; nothing for a spray that finds no surface under it.
-    pub(super) fn of(&self, sprays: &[Spray]) -> Vec<SurfaceFootprint> {
+    /// Depth on each pixel per unit of a spray's volume, stroke by stroke; nothing for a spray that finds no surface under it. A spray is the way
+    /// through its cell: two shots at the Gauss points spread as far.
+    pub(super) fn of(&self, strokes: &[Stroke]) -> Vec<SurfaceFootprint> {
         let texel = self.settings.texel;
         let volume = self.kernel.mass() * texel * texel;
         let stand_off = self.settings.planner.nozzle.stand_off;
-        let shot = |spray: &Spray| {
-            let (point, normal) = self.surface.lift(spray.x, spray.y)?;
-            let volume = volume * UNIT_THICKNESS;
-            Some(Shot { origin: point + normal.into_inner() * stand_off, axis: -normal, volume })
+        let shot = |[start, end]: &[Target; 2], share: f64| {
+            let point = start.point + (end.point - start.point) * share;
+            let normal = start.normal.lerp(&end.normal, share);
+            let normal = UnitVector3::try_new(normal, 1e-9).unwrap_or(start.normal);
+            let origin = point + normal.into_inner() * stand_off;
+            Shot { origin, axis: -normal, volume: 0.5 * volume * UNIT_THICKNESS }
         };
-        let shots: Vec<Option<Shot>> = sprays.iter().map(shot).collect();
-        let found: Vec<Shot> = shots.iter().flatten().copied().collect();
-        let shares = self.film.shares(&found, &self.model, &self.surface.world, self.settings.threads);
-        let mut shares = shares.unwrap_or_default().into_iter();
-        let depth = |(k, share): (u32, f64)| {
-            (self.pixels[k as usize] as u32, (share * volume / self.film.texels()[k as usize].area) as f32)
+        let spacing = self.settings.limits.spray_spacing as f64;
+        let on_surface = |stroke: &Stroke, k: usize| cell(self.surface, &stroke.sprays, k, spacing);
+        let cells: Vec<Option<[Target; 2]>> =
+            strokes.iter().flat_map(|stroke| (0..stroke.sprays.len()).map(move |k| on_surface(stroke, k))).collect();
+        let shots: Vec<Shot> =
+            cells.iter().flatten().flat_map(|cell| [0.5 - GAUSS, 0.5 + GAUSS].map(|share| shot(cell, share))).collect();
+        let shares = self.film.shares(&shots, &self.model, &self.surface.world, self.settings.threads);
+        let shares = shares.unwrap_or_default();
+        let mut of_cells = shares.chunks(2);
+        let depth = |&(k, share): &(u32, f64)| {
+            let k = k as usize;
+            (self.pixels[k] as u32, (0.5 * share * volume / self.film.texels()[k].area) as f32)
         };
-        let footprint = |shot: Option<Shot>| {
-            let own = shot.and_then(|_| shares.next()).unwrap_or_default();
-            own.into_iter().map(depth).collect()
+        let footprint = |cell: &Option<[Target; 2]>| {
+            let own = cell.as_ref().and_then(|_| of_cells.next()).unwrap_or_default();
+            own.iter().flatten().map(depth).collect()
         };
-        shots.into_iter().map(footprint).collect()
+        cells.iter().map(footprint).collect()
     }
 }

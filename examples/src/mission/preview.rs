@@ -48,7 +48,7 @@ pub struct Preview {
     pub flight_time_s: f64,
     /// Strokes over all layers.
     pub strokes: usize,
-    /// Expected thickness beside what the simulated spray deposits when every spray stands upright and hits, mean difference over mean
+    /// Expected thickness beside what the simulated spray deposits along the strokes when it stands upright and hits, mean difference over mean
     /// thickness, within 3 cm of a seam.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub deposit_error_at_seams: Option<f64>,

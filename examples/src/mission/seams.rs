@@ -1,12 +1,17 @@
 //! How good the painting is at seams: where the plane of the picture is cut, and the surface is not.
 
+use nalgebra::UnitVector3;
 use paint_net::{Image, metrics};
+use paint_planner::Target;
 use paint_sim::{Film, Shot};
 
 use super::decide::{kernel, spray_model};
 use super::decision::Decision;
 use super::error::MissionError;
+use super::fly::SHOT_STEP;
+use super::plan::layer_route;
 use super::run::Mission;
+use super::settings::MissionSettings;
 use crate::appearance::UNIT_THICKNESS;
 
 /// Half the width of the band about the seams, metres.
@@ -20,8 +25,8 @@ pub(super) struct SeamLikeness {
     pub(super) far: f64,
 }
 
-/// What the painter expects beside what the simulator's spray deposits when every spray stands upright and hits. Means of the difference of
-/// thickness over the mean thickness, by area.
+/// What the painter expects beside what the simulator's spray deposits along the strokes when it stands upright and hits. Means of the difference
+/// of thickness over the mean thickness, by area.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct DepositError {
     /// In a band of 3 cm about the seams.
@@ -60,15 +65,10 @@ pub(super) fn deposit_error(decision: &Decision) -> Result<Option<DepositError>,
     let kernel = kernel(settings)?;
     let mut naive = decision.wanted.map(|_| 0.0);
     let mut shots = Vec::new();
-    let stand_off = settings.planner.nozzle.stand_off;
-    for spray in decision.layers.iter().flat_map(|layer| &layer.sprays) {
-        kernel.stamp(spray, &mut naive);
-        let volume = spray.volume * kernel.mass() * settings.texel * settings.texel * UNIT_THICKNESS;
-        shots.extend(surface.lift(spray.x, spray.y).map(|(point, normal)| Shot {
-            origin: point + normal.into_inner() * stand_off,
-            axis: -normal,
-            volume,
-        }));
+    for layer in &decision.layers {
+        layer.sprays.iter().for_each(|spray| kernel.stamp(spray, &mut naive));
+        let targets = layer_route(layer, surface, settings, None)?.targets;
+        shots.extend(targets.windows(2).flat_map(|pair| upright(&pair[0], &pair[1], settings)));
     }
     let (texels, pixels) = surface.film_texels();
     let mut film = Film::new(texels)?;
@@ -90,6 +90,20 @@ pub(super) fn deposit_error(decision: &Decision) -> Result<Option<DepositError>,
         naive: error(&naive, true),
         far: error(&last.canvas, false),
     }))
+}
+
+/// The way from a target to the next with the nozzle upright all along, in steps that widen the spot by less than a percent.
+fn upright(from: &Target, to: &Target, settings: &MissionSettings) -> impl Iterator<Item = Shot> {
+    let way = to.point - from.point;
+    let steps = if from.dose > 0.0 { (way.norm() / SHOT_STEP).ceil() } else { 0.0 };
+    let volume = from.dose * way.norm() / steps;
+    let (from, to, stand_off) = (*from, *to, settings.planner.nozzle.stand_off);
+    (0..steps as usize).map(move |k| {
+        let share = (k as f64 + 0.5) / steps;
+        let normal = from.normal.lerp(&to.normal, share);
+        let normal = UnitVector3::try_new(normal, 1e-9).unwrap_or(from.normal);
+        Shot { origin: from.point + way * share + normal.into_inner() * stand_off, axis: -normal, volume }
+    })
 }
 
 /// Texels of the surface that show nothing else.

@@ -2,12 +2,11 @@
 
 use super::fitting::{ink_cost, prune_with};
 use crate::error::{Error, require};
-use crate::image::Image;
 use crate::model::Spray;
 use crate::optimise::{StoppingRule, minimise};
 use crate::painter::{Observer, Painter, PartialProgress};
 use crate::painting::Painting;
-use crate::path::Stroke;
+use crate::path::{Stroke, StrokeSettings, boustrophedon};
 use crate::problem::PaintProblem;
 
 /// What a spray leaves: pixels, none of them a ghost, and the depth on each per unit of the spray's volume.
@@ -27,8 +26,8 @@ pub type SurfaceFootprint = Vec<(u32, f32)>;
 pub struct OnSurface<'a, P> {
     /// The painter that plans on the plane.
     pub inner: P,
-    /// The footprint of each spray, in their order.
-    pub footprints: &'a dyn Fn(&[Spray]) -> Vec<SurfaceFootprint>,
+    /// The footprint of each spray, stroke by stroke. Sprays of a painter without strokes are given row by row, as by [`boustrophedon`].
+    pub footprints: &'a dyn Fn(&[Stroke]) -> Vec<SurfaceFootprint>,
     /// Largest number of iterations. Default 60, ours.
     pub iterations: usize,
     /// Stop when the cost falls by less than this share per iteration, three times in a row. Default 1e-4, ours.
@@ -40,7 +39,7 @@ const PLAN_SHARE: f64 = 0.7;
 
 impl<'a, P: Painter> OnSurface<'a, P> {
     /// With the default fit.
-    pub fn new(inner: P, footprints: &'a dyn Fn(&[Spray]) -> Vec<SurfaceFootprint>) -> Self {
+    pub fn new(inner: P, footprints: &'a dyn Fn(&[Stroke]) -> Vec<SurfaceFootprint>) -> Self {
         Self { inner, footprints, iterations: 60, tolerance: 1e-4 }
     }
 }
@@ -54,7 +53,15 @@ impl<P: Painter> Painter for OnSurface<'_, P> {
         require("tolerance", self.tolerance, self.tolerance >= 0.0, "it must be 0 or more")?;
         let plan =
             self.inner.paint_observed(problem, &mut PartialProgress { observer, from: 0.0, share: PLAN_SHARE })?;
-        let footprints = self.checked_footprints(&plan.sprays, problem)?;
+        let rows;
+        let strokes = if plan.strokes.is_empty() {
+            rows = boustrophedon(&plan.sprays, &StrokeSettings::default())?;
+            &rows
+        } else {
+            &plan.strokes
+        };
+        let sprays: Vec<Spray> = strokes.iter().flat_map(|stroke| stroke.sprays.iter().copied()).collect();
+        let footprints = self.checked_footprints(strokes, sprays.len(), problem)?;
         let initial = problem.initial_canvas();
         let most = problem.limits.max_volume;
         let upper_bounds: Vec<f64> = footprints.iter().map(|f| if f.is_empty() { 0.0 } else { most }).collect();
@@ -72,7 +79,7 @@ impl<P: Painter> Painter for OnSurface<'_, P> {
             };
             minimise(volumes, upper_bounds, &stop, &mut cost, progress);
         };
-        let mut volumes: Vec<f64> = plan.sprays.iter().map(|spray| spray.volume).collect();
+        let mut volumes: Vec<f64> = sprays.iter().map(|spray| spray.volume).collect();
         let rest = 1.0 - PLAN_SHARE;
         fit(&upper_bounds, &mut volumes, &mut |share| observer.progress(PLAN_SHARE + rest * share));
         prune_with(&upper_bounds, problem.limits, &mut volumes, &mut |upper_bounds, volumes| {
@@ -85,15 +92,24 @@ impl<P: Painter> Painter for OnSurface<'_, P> {
         if let Some(ghosts) = problem.ghosts {
             ghosts.gather(canvas.data_mut());
         }
-        Ok(with_volumes(&plan, &volumes, canvas, problem))
+        let sprays: Vec<Spray> =
+            sprays.iter().zip(&volumes).map(|(spray, &volume)| Spray { volume, ..*spray }).collect();
+        let strokes = cut(&sprays, &plan.strokes);
+        let sprays = sprays.into_iter().filter(|spray| spray.volume > 0.0).collect();
+        Ok(Painting { strokes, ..Painting::new(sprays, canvas, problem.saturation) })
     }
 }
 
 impl<P> OnSurface<'_, P> {
-    fn checked_footprints(&self, sprays: &[Spray], problem: &PaintProblem) -> Result<Vec<SurfaceFootprint>, Error> {
-        let footprints = (self.footprints)(sprays);
-        if footprints.len() != sprays.len() {
-            let (found, expected) = ((footprints.len(), 1), (sprays.len(), 1));
+    fn checked_footprints(
+        &self,
+        strokes: &[Stroke],
+        sprays: usize,
+        problem: &PaintProblem,
+    ) -> Result<Vec<SurfaceFootprint>, Error> {
+        let footprints = (self.footprints)(strokes);
+        if footprints.len() != sprays {
+            let (found, expected) = ((footprints.len(), 1), (sprays, 1));
             return Err(Error::Mismatch { what: "list of footprints", found, expected });
         }
         let (width, pixels) = (problem.reference.width(), problem.reference.data().len());
@@ -117,21 +133,9 @@ fn deposit(footprints: &[SurfaceFootprint], volumes: &[f64], canvas: &mut [f64])
     }
 }
 
-/// The same sprays with other volumes; those of 0 are dropped.
-fn with_volumes(plan: &Painting, volumes: &[f64], canvas: Image, problem: &PaintProblem) -> Painting {
-    let spray = |(spray, &volume): (&Spray, &f64)| Spray { volume, ..*spray };
-    let open = |sprays: &mut Vec<Spray>| sprays.retain(|spray| spray.volume > 0.0);
-    let mut sprays: Vec<Spray> = plan.sprays.iter().zip(volumes).map(spray).collect();
-    // A painter that plans strokes gives its sprays stroke by stroke.
-    let mut rest = sprays.as_slice();
-    let mut strokes = Vec::with_capacity(plan.strokes.len());
-    for stroke in &plan.strokes {
-        let (own, after) = rest.split_at(stroke.sprays.len().min(rest.len()));
-        let mut own = own.to_vec();
-        open(&mut own);
-        strokes.extend((!own.is_empty()).then_some(Stroke { sprays: own }));
-        rest = after;
-    }
-    open(&mut sprays);
-    Painting { strokes, ..Painting::new(sprays, canvas, problem.saturation) }
+/// Sprays cut as they were before, those of no volume left out.
+fn cut(sprays: &[Spray], before: &[Stroke]) -> Vec<Stroke> {
+    let mut rest = sprays.iter().copied();
+    let open = |stroke: &Stroke| rest.by_ref().take(stroke.sprays.len()).filter(|spray| spray.volume > 0.0).collect();
+    before.iter().map(open).map(|sprays| Stroke { sprays }).filter(|stroke| !stroke.sprays.is_empty()).collect()
 }

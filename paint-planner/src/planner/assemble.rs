@@ -6,11 +6,11 @@ use crate::minimum_snap::KnotDerivatives;
 use crate::nozzle::Nozzles;
 use crate::plan::{Plan, PlanReport, Waypoint};
 use crate::route::RoutePoint;
-use crate::transit::between;
 use crate::settings::{Settings, TimingPolicy};
 use crate::target::{NozzleState, Target, normal_deviation};
 use crate::timing::speed_profile::stroke_between;
 use crate::timing::{TimedTrajectory, schedule};
+use crate::transit::between;
 use crate::world::VehicleState;
 
 /// Greatest motion between two samples at the clearance of the trajectory, m.

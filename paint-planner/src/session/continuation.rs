@@ -7,9 +7,9 @@ use crate::nozzle::Nozzles;
 use crate::plan::Plan;
 use crate::planner::{OptimalPlanner, Planner, UntimedPlan, assemble_plan};
 use crate::route::RoutePoint;
-use crate::transit::between;
 use crate::settings::Settings;
 use crate::target::{NozzleState, Target};
+use crate::transit::between;
 use crate::world::{Surface, Tool, VehicleState};
 use nalgebra::UnitVector3;
 

@@ -6,5 +6,6 @@ mod control;
 mod gantry;
 mod plans;
 mod session;
+mod transits;
 mod walls;
 mod worlds;
