@@ -11,8 +11,8 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3, Vector4, Vector5};
 use paint_planner::{
-    Clarabel, HeadingSettings, HeadingTable, InteriorPoint, NozzleSettings, OptimalPlanner, Plan, Planner, QpSolver,
-    Settings, StandardForm, StrokeEnds, Target, TimingPolicy, Trajectory, order_strokes, stroke_program,
+    Clarabel, HeadingSettings, HeadingTable, NozzleSettings, OptimalPlanner, Plan, Planner, PrimalDualActiveSet,
+    QpSolver, Settings, StandardForm, StrokeEnds, Target, TimingPolicy, Trajectory, order_strokes, stroke_program,
     transit_lower_bound,
 };
 use paint_sim::TriangleSurface;
@@ -114,11 +114,11 @@ fn path(count: usize, runs: usize) -> Result<(), AnyError> {
         let outcome = solver.solve(&program, &mut states)?;
         Ok((states, outcome.steps))
     };
-    let (own, steps) = solved(&InteriorPoint)?;
+    let (own, steps) = solved(&PrimalDualActiveSet)?;
     let (exact, _) = solved(&Clarabel::default())?;
     let off = own.iter().zip(&exact).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max);
     let (objective, violation) = quality(&form, &own);
-    let cpu_ms = 1e3 * median_seconds(runs, || solved(&InteriorPoint));
+    let cpu_ms = 1e3 * median_seconds(runs, || solved(&PrimalDualActiveSet));
     println!(
         "{}",
         json!({

@@ -95,8 +95,8 @@ pub use nalgebra;
 #[cfg(feature = "clarabel")]
 pub use nozzle::Clarabel;
 pub use nozzle::{
-    GaussSeidel, InteriorPoint, Mode, QpOutcome, QpSolver, QuadraticProgram, StandardForm, state_programs,
-    stroke_program,
+    GaussSeidel, InteriorPoint, Mode, PrimalDualActiveSet, QpOutcome, QpSolver, QuadraticProgram, StandardForm,
+    state_programs, stroke_program,
 };
 pub use plan::{Plan, PlanReport, Setpoint, Waypoint};
 pub use planner::{OptimalPlanner, Planner, SmoothingPlanner, plan};

@@ -33,7 +33,7 @@ pub struct PlanReport {
     pub slack: f64,
     /// Rounds or Jacobi iterations of stage 1.
     pub rounds: usize,
-    /// Interior-point steps of stage 1, all rounds together.
+    /// Steps of the solver in stage 1, all rounds together.
     pub steps: usize,
     /// Optimal cost of the heading search.
     pub heading_cost: f64,

@@ -6,7 +6,7 @@ use crate::clearance::ClearanceChecker;
 use crate::error::Error;
 use crate::heading::HeadingGraph;
 use crate::minimum_snap::KnotDerivatives;
-use crate::nozzle::{InteriorPoint, Mode, Nozzles, QpSolver, initial_states, optimise};
+use crate::nozzle::{Mode, Nozzles, PrimalDualActiveSet, QpSolver, initial_states, optimise};
 use crate::plan::Plan;
 use crate::settings::Settings;
 use crate::target::{Target, check, stroke_links};
@@ -26,7 +26,7 @@ pub struct OptimalPlanner<'a> {
 
 impl Default for OptimalPlanner<'static> {
     fn default() -> Self {
-        Self { mode: Mode::default(), solver: &InteriorPoint }
+        Self { mode: Mode::default(), solver: &PrimalDualActiveSet }
     }
 }
 

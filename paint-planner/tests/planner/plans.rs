@@ -75,7 +75,8 @@ fn no_nozzle_is_farther_off_a_normal_in_reach_than_permitted() {
     for deviation in [0.02, 0.015] {
         let report = with(deviation);
         assert_eq!(report.served, targets.len());
-        assert!(report.normal_deviation_max <= deviation, "{}", report.normal_deviation_max);
+        // Nozzles lie on the bound to rounding.
+        assert!(report.normal_deviation_max <= deviation + 1e-9, "{}", report.normal_deviation_max);
     }
     // Where the tilt joint ends, the incidence is the bound.
     let steep: Vec<Target> = wall
