@@ -2,6 +2,7 @@
 
 use std::error::Error;
 
+use nalgebra::Vector5;
 use paint_planner::{
     Clarabel, InteriorPoint, OptimalPlanner, Planner, PrimalDualActiveSet, QpSolver, SmoothingPlanner, Trajectory,
     stroke_program,

@@ -372,7 +372,7 @@ fn random_paths() -> Result<(), AnyError> {
     let surface = rock::rock()?;
     let (robot, wall) = (Robot::new(Ptu::new(ptu)?), MeshSurface(&surface.world));
     let mut rng = Rng::new(11);
-    let (mut planned, mut refused, mut moments, mut violations) = (0, 0, 0_u64, 0_u64);
+    let (mut planned, mut refused, mut moments, mut violations, mut joint_rate) = (0, 0, 0_u64, 0_u64, 0.0_f64);
     let mut ratios = Vec::new();
     for _ in 0..PATHS {
         let mut at =
@@ -395,6 +395,7 @@ fn random_paths() -> Result<(), AnyError> {
                 planned += 1;
                 moments += all;
                 violations += beyond;
+                joint_rate = joint_rate.max(plan.report.joint_rate);
                 ratios.extend(against_uniform_scaling(&plan, &settings)?);
             }
             Err(_) => refused += 1,
@@ -404,7 +405,7 @@ fn random_paths() -> Result<(), AnyError> {
         "{}",
         json!({
             "fig": "limits_over_random_paths", "peer": "paint-planner", "planned": planned, "nothing_reachable": refused,
-            "moments": moments, "violations": violations, "time_over_uniform_scaling": ratios.iter().sum::<f64>() / ratios.len() as f64,
+            "moments": moments, "violations": violations, "joint_rate": joint_rate, "time_over_uniform_scaling": ratios.iter().sum::<f64>() / ratios.len() as f64,
             "compared": ratios.len(),
         })
     );
@@ -438,15 +439,17 @@ fn against_uniform_scaling(plan: &Plan, settings: &Settings) -> Result<Option<f6
     Ok(Some(plan.trajectory.duration() / (factor * curve.duration())))
 }
 
-/// Moments looked at, every 5 ms, and those beyond a limit of speed, acceleration or heading rate.
+/// Moments looked at, every 5 ms, and those beyond a limit of speed, acceleration, heading rate or joint rate.
 fn beyond_limits(plan: &Plan, settings: &Settings) -> (u64, u64) {
     let timing = &settings.timing;
     let steps = (plan.trajectory.duration() / 0.005) as u64;
     let beyond = |k: &u64| {
-        let s = plan.trajectory.sample(*k as f64 * 0.005);
+        let (setpoint, next) = (plan.setpoint(*k as f64 * 0.005), plan.setpoint((*k + 1) as f64 * 0.005));
+        let (s, joints) = (setpoint.sample, (next.pan - setpoint.pan).abs().max((next.tilt - setpoint.tilt).abs()));
         s.velocity.norm() > timing.max_speed * (1.0 + 1e-9)
             || s.acceleration.norm() > timing.max_acceleration * (1.0 + 1e-9)
             || s.heading_rate.abs() > timing.max_heading_rate * (1.0 + 1e-9)
+            || joints > 0.005 * timing.max_joint_rate * (1.0 + 1e-9)
     };
     (steps + 1, (0..=steps).filter(beyond).count() as u64)
 }

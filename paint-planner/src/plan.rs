@@ -39,6 +39,8 @@ pub struct PlanReport {
     pub heading_cost: f64,
     /// Certified extrema of the trajectory.
     pub extrema: Extrema,
+    /// Greatest rate of pan or tilt, rad/s; exact, as planned joints are linear in time between waypoints.
+    pub joint_rate: f64,
     /// Factor by which all times were stretched in the end to meet the limits; with gradient-preserving timing the
     /// factor k of thesis section 7.5.
     pub stretch: f64,

@@ -65,6 +65,8 @@ pub struct PlanFigures {
     pub max_speed_m_per_s: f64,
     /// Certified bound of its acceleration.
     pub max_acceleration_m_per_s2: f64,
+    /// Greatest planned rate of pan or tilt.
+    pub max_joint_rate_rad_per_s: f64,
     /// Planning time on one core.
     pub planning_s: f64,
     /// Wall-clock time of everything.
@@ -193,6 +195,7 @@ fn figures(mission: &PlannedMission) -> PlanFigures {
         normal_deviation_max_m: deviations.iter().fold(0.0, |most, &d| most.max(d)),
         max_speed_m_per_s: most(&|plan| plan.report.extrema.speed),
         max_acceleration_m_per_s2: most(&|plan| plan.report.extrema.acceleration),
+        max_joint_rate_rad_per_s: most(&|plan| plan.report.joint_rate),
         planning_s: planned.seconds,
         wall_s: decision.started.elapsed().as_secs_f64(),
     }

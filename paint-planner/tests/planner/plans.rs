@@ -17,11 +17,16 @@ fn assert_sound(plan: &Plan, targets: &[Target], settings: &Settings) {
     assert!(e.speed <= settings.timing.max_speed);
     assert!(e.acceleration <= settings.timing.max_acceleration);
     assert!(e.heading_rate <= settings.timing.max_heading_rate);
+    assert!(plan.report.joint_rate <= settings.timing.max_joint_rate);
     assert!(plan.report.clearance > 0.0);
     assert!(plan.report.path_deviation <= settings.timing.tolerance);
     let steps = (plan.trajectory.duration() / 0.01).ceil();
+    let mut before = plan.setpoint(0.0);
     for k in 0..=steps as usize {
         let setpoint = plan.setpoint(plan.trajectory.duration() * k as f64 / steps);
+        let joints = (setpoint.pan - before.pan).abs().max((setpoint.tilt - before.tilt).abs());
+        assert!(joints <= settings.timing.max_joint_rate * 0.01 + 1e-9);
+        before = setpoint;
         assert!(setpoint.sample.velocity.norm() <= settings.timing.max_speed);
         assert!(setpoint.sample.acceleration.norm() <= settings.timing.max_acceleration);
         assert!((0.0..=settings.timing.max_flow * (1.0 + 1e-9)).contains(&setpoint.flow));
@@ -341,6 +346,32 @@ fn the_greatest_heading_rate_slows_a_turn() {
     assert!(free > 0.02, "the wall must ask for a turn: {free}");
     let (held, slow) = with_limit(limit);
     assert!(held <= limit && held > 0.6 * limit, "{held} of {limit}");
+    assert!(slow > 1.2 * quick, "{slow} after {quick}");
+}
+
+#[test]
+fn the_greatest_joint_rate_slows_what_the_gun_has_to_turn() {
+    let wall = Wall::bumpy(0.15);
+    // Two rows far apart: the joints move on the strokes, and on the flight between them.
+    let targets = wall.rows(2.0, 2, 0.8);
+    let with_limit = |rate: f64| {
+        let mut settings = Settings::default();
+        settings.timing.max_joint_rate = rate;
+        let plan = optimal(&targets, &wall, &settings).unwrap();
+        assert_sound(&plan, &targets, &settings);
+        let at = |k: i32| plan.setpoint(plan.trajectory.duration() * f64::from(k) / 20_000.0);
+        let step = plan.trajectory.duration() / 20_000.0;
+        let rates = (0..20_000).map(|k| {
+            let (a, b) = (at(k), at(k + 1));
+            (b.pan - a.pan).abs().max((b.tilt - a.tilt).abs()) / step
+        });
+        (rates.fold(0.0, f64::max), plan.report.joint_rate, plan.trajectory.duration())
+    };
+    let (free, certified, quick) = with_limit(100.0);
+    assert!(free > 0.2 && free <= certified * (1.0 + 1e-9) && free > 0.9 * certified, "{free} of {certified}");
+    let limit = 0.25 * free;
+    let (held, _, slow) = with_limit(limit);
+    assert!(held <= limit * (1.0 + 1e-9) && held > 0.9 * limit, "{held} of {limit}");
     assert!(slow > 1.2 * quick, "{slow} after {quick}");
 }
 
