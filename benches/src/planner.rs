@@ -36,6 +36,8 @@ const KNOTS: usize = 1000;
 /// Turns of the scene, and paths over the rock.
 const TURNS: usize = 200;
 const PATHS: usize = 1000;
+/// A limit of the joints' rates that most of these paths would exceed, rad/s.
+const SLOW_JOINTS: f64 = 0.2;
 /// Quads of the large mesh along its sides, and metres of each side.
 const QUADS: [usize; 2] = [1000, 500];
 const SIDES: [f64; 2] = [10.0, 5.0];
@@ -366,13 +368,18 @@ fn turned_scenes() -> Result<(), AnyError> {
     Ok(())
 }
 
-/// Random walks over the rock: moments at which a sampled trajectory exceeds a limit, and time against that at the speed asked for.
+/// Random walks over the rock: moments at which a sampled trajectory exceeds a limit, and time against that at the speed asked for. Each is
+/// planned once more for slow joints, whose limit binds.
 fn random_paths() -> Result<(), AnyError> {
     let MissionSettings { planner: settings, ptu, .. } = MissionSettings::default();
     let surface = rock::rock()?;
     let (robot, wall) = (Robot::new(Ptu::new(ptu)?), MeshSurface(&surface.world));
     let mut rng = Rng::new(11);
-    let (mut planned, mut refused, mut moments, mut violations, mut joint_rate) = (0, 0, 0_u64, 0_u64, 0.0_f64);
+    let mut slow = settings.clone();
+    slow.timing.max_joint_rate = SLOW_JOINTS;
+    let (mut planned, mut refused) = (0, 0);
+    // As usual, and with slow joints.
+    let (mut moments, mut violations, mut joint_rate) = ([0_u64; 2], [0_u64; 2], [0.0_f64; 2]);
     let mut ratios = Vec::new();
     for _ in 0..PATHS {
         let mut at =
@@ -389,23 +396,26 @@ fn random_paths() -> Result<(), AnyError> {
             course += rng.between(-0.6, 0.6);
             at = [at[0] + 2.0 * course.cos(), at[1] + 2.0 * course.sin()];
         }
-        match OptimalPlanner::default().plan(&targets, &wall, &robot, &settings) {
-            Ok(plan) => {
-                let (all, beyond) = beyond_limits(&plan, &settings);
-                planned += 1;
-                moments += all;
-                violations += beyond;
-                joint_rate = joint_rate.max(plan.report.joint_rate);
-                ratios.extend(against_uniform_scaling(&plan, &settings)?);
-            }
-            Err(_) => refused += 1,
+        let plan = |settings: &Settings| OptimalPlanner::default().plan(&targets, &wall, &robot, settings);
+        let (Ok(usual), Ok(slowed)) = (plan(&settings), plan(&slow)) else {
+            refused += 1;
+            continue;
+        };
+        planned += 1;
+        for (k, (plan, settings)) in [(&usual, &settings), (&slowed, &slow)].into_iter().enumerate() {
+            let (all, beyond) = beyond_limits(plan, settings);
+            moments[k] += all;
+            violations[k] += beyond;
+            joint_rate[k] = joint_rate[k].max(plan.report.joint_rate);
         }
+        ratios.extend(against_uniform_scaling(&usual, &settings)?);
     }
     println!(
         "{}",
         json!({
             "fig": "limits_over_random_paths", "peer": "paint-planner", "planned": planned, "nothing_reachable": refused,
-            "moments": moments, "violations": violations, "joint_rate": joint_rate, "time_over_uniform_scaling": ratios.iter().sum::<f64>() / ratios.len() as f64,
+            "moments": moments[0], "violations": violations[0], "joint_rate": joint_rate[0], "moments_slow_joints": moments[1],
+            "violations_slow_joints": violations[1], "joint_rate_slow_joints": joint_rate[1], "time_over_uniform_scaling": ratios.iter().sum::<f64>() / ratios.len() as f64,
             "compared": ratios.len(),
         })
     );

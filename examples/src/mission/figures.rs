@@ -61,6 +61,8 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         reach_share: mission.decision.share_in_reach(),
         lost_to_constraints_share: mission.decision.share_lost_to_constraints(),
         unreachable_paint_share: mission.share_out_of_reach(),
+        targets: mission.service.targets,
+        targets_not_served: mission.service.not_served(),
         targets_kept_off: mission.kept_off,
         targets_left_bare: mission.left_bare,
         hit_error_rms_m: flown.hit_error_rms,

@@ -4,7 +4,7 @@ use crate::clearance::{ClearanceChecker, DistanceCache};
 use crate::error::Error;
 use crate::minimum_snap::KnotDerivatives;
 use crate::nozzle::Nozzles;
-use crate::plan::{Plan, PlanReport, Waypoint};
+use crate::plan::{NotServed, Plan, PlanReport, Waypoint};
 use crate::route::{RoutePoint, between};
 use crate::settings::{Settings, TimingPolicy};
 use crate::target::{NozzleState, Target, normal_deviation};
@@ -21,6 +21,8 @@ const MAX_CLEARANCE: f64 = 1.0;
 pub(crate) struct UntimedPlan {
     pub(crate) nozzles: Nozzles,
     pub(crate) vehicle: Vec<Option<VehicleState>>,
+    /// Why a target has none.
+    pub(crate) not_served: Vec<Option<NotServed>>,
     pub(crate) heading_cost: f64,
     pub(crate) route: Vec<RoutePoint>,
     /// Motion at the first point of the route; zero: it is left from rest.
@@ -84,6 +86,7 @@ pub(crate) fn assemble_plan(
         vehicle: fill(&untimed.vehicle, &waypoints),
         target_time: target_times(targets.len(), &waypoints),
         reachable,
+        not_served: untimed.not_served.clone(),
         flow,
         trajectory: timed.trajectory,
         waypoints,

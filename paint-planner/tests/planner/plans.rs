@@ -3,8 +3,8 @@
 use crate::walls::{Arm, Wall};
 use paint_planner::nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use paint_planner::{
-    Error, Hit, Mode, NozzleState, OptimalPlanner, Plan, Planner, Settings, SmoothingPlanner, Surface, Target,
-    TimingPolicy, Tool, VehicleState, normal_deviation,
+    Error, Hit, Mode, NotServed, NozzleState, OptimalPlanner, Plan, Planner, Settings, SmoothingPlanner, Surface,
+    Target, TimingPolicy, Tool, VehicleState, normal_deviation,
 };
 
 fn optimal(targets: &[Target], wall: &Wall, settings: &Settings) -> Result<Plan, Error> {
@@ -32,6 +32,7 @@ fn assert_sound(plan: &Plan, targets: &[Target], settings: &Settings) {
         assert!((0.0..=settings.timing.max_flow * (1.0 + 1e-9)).contains(&setpoint.flow));
         assert!(setpoint.pan.abs() <= 90_f64.to_radians() && setpoint.tilt.abs() <= 45_f64.to_radians());
     }
+    assert!((0..targets.len()).all(|i| plan.reachable[i] == plan.not_served[i].is_none()));
     let arm = Arm::default();
     for i in (0..targets.len()).filter(|&i| plan.reachable[i]) {
         let sample = plan.trajectory.sample(plan.target_time[i]);
@@ -220,6 +221,7 @@ fn a_stroke_without_a_way_to_it_is_dropped() {
     assert_sound(&plan, &targets, &settings);
     for (i, reachable) in plan.reachable.iter().enumerate() {
         assert_eq!(*reachable, !(20..40).contains(&i));
+        assert_eq!(plan.not_served[i], (!reachable).then_some(NotServed::NoTransit));
     }
 }
 
@@ -234,6 +236,7 @@ fn unreachable_targets_are_skipped_not_fatal() {
     let plan = optimal(&targets, &wall, &settings).unwrap();
     assert_sound(&plan, &targets, &settings);
     assert_eq!(plan.report.served, targets.len() - 4);
+    assert_eq!(plan.not_served[18..22], [Some(NotServed::OutOfReach); 4]);
     assert!(plan.reachable[17] && !plan.reachable[18] && !plan.reachable[21] && plan.reachable[22]);
     assert!(plan.flow[17..22].iter().all(|flow| *flow == 0.0));
     assert!(plan.target_time.windows(2).all(|pair| pair[1] > pair[0]));
@@ -404,6 +407,7 @@ fn hidden_targets_are_not_served() {
         let edge = (target.point.y - 0.7).abs().min((target.point.y - 1.3).abs());
         assert!(edge < 0.06 || *reachable != before_the_board(&target.point), "{}", target.point);
     }
+    assert_eq!(plan.not_served[40], Some(NotServed::Hidden));
 }
 
 #[cfg(feature = "clarabel")]
