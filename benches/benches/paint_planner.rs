@@ -2,8 +2,10 @@
 
 use std::error::Error;
 
+use nalgebra::Vector5;
 use paint_planner::{
-    Clarabel, InteriorPoint, OptimalPlanner, Planner, QpSolver, SmoothingPlanner, Trajectory, stroke_program,
+    Clarabel, InteriorPoint, OptimalPlanner, Planner, PrimalDualActiveSet, QpSolver, SmoothingPlanner, Trajectory,
+    stroke_program,
 };
 use paintcopter_benches::planner::helix;
 use paintcopter_benches::{criterion, rock};
@@ -35,7 +37,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     // The first program of stage 1: with the structure of its Hessian, and as a general sparse one at Clarabel's own tolerance.
     let (program, start) = stroke_program(&targets, &settings.nozzle);
     let general = Clarabel { tolerance: 1e-8, ..Clarabel::default() };
-    let solvers: [(&str, &dyn QpSolver); 2] = [("own interior point", &InteriorPoint), ("Clarabel", &general)];
+    let solvers: [(&str, &dyn QpSolver); 3] =
+        [("active set", &PrimalDualActiveSet), ("interior point", &InteriorPoint), ("Clarabel", &general)];
     let mut answers = Vec::new();
     for (name, solver) in solvers {
         let mut states = start.clone();
@@ -45,8 +48,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             b.iter(|| solver.solve(&program, &mut start.clone()));
         });
     }
-    if answers[0].iter().zip(&answers[1]).any(|(own, other)| (own - other).amax() > 1e-5) {
-        return Err("the two solvers disagree".into());
+    let apart = |others: &Vec<Vector5<f64>>| answers[0].iter().zip(others).any(|(a, b)| (a - b).amax() > 1e-5);
+    if answers[1..].iter().any(apart) {
+        return Err("the solvers disagree".into());
     }
 
     let (knots, durations, rest) = helix(KNOTS);

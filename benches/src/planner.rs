@@ -11,8 +11,8 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3, Vector4, Vector5};
 use paint_planner::{
-    Clarabel, HeadingSettings, HeadingTable, InteriorPoint, NozzleSettings, OptimalPlanner, Plan, Planner, QpSolver,
-    Settings, StandardForm, StrokeEnds, Target, TimingPolicy, Trajectory, order_strokes, stroke_program,
+    Clarabel, HeadingSettings, HeadingTable, NozzleSettings, OptimalPlanner, Plan, Planner, PrimalDualActiveSet,
+    QpSolver, Settings, StandardForm, StrokeEnds, Target, TimingPolicy, Trajectory, order_strokes, stroke_program,
     transit_lower_bound,
 };
 use paint_sim::TriangleSurface;
@@ -36,6 +36,8 @@ const KNOTS: usize = 1000;
 /// Turns of the scene, and paths over the rock.
 const TURNS: usize = 200;
 const PATHS: usize = 1000;
+/// A limit of the joints' rates that most of these paths would exceed, rad/s.
+const SLOW_JOINTS: f64 = 0.2;
 /// Quads of the large mesh along its sides, and metres of each side.
 const QUADS: [usize; 2] = [1000, 500];
 const SIDES: [f64; 2] = [10.0, 5.0];
@@ -114,11 +116,11 @@ fn path(count: usize, runs: usize) -> Result<(), AnyError> {
         let outcome = solver.solve(&program, &mut states)?;
         Ok((states, outcome.steps))
     };
-    let (own, steps) = solved(&InteriorPoint)?;
+    let (own, steps) = solved(&PrimalDualActiveSet)?;
     let (exact, _) = solved(&Clarabel::default())?;
     let off = own.iter().zip(&exact).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max);
     let (objective, violation) = quality(&form, &own);
-    let cpu_ms = 1e3 * median_seconds(runs, || solved(&InteriorPoint));
+    let cpu_ms = 1e3 * median_seconds(runs, || solved(&PrimalDualActiveSet));
     println!(
         "{}",
         json!({
@@ -366,13 +368,18 @@ fn turned_scenes() -> Result<(), AnyError> {
     Ok(())
 }
 
-/// Random walks over the rock: moments at which a sampled trajectory exceeds a limit, and time against that at the speed asked for.
+/// Random walks over the rock: moments at which a sampled trajectory exceeds a limit, and time against that at the speed asked for. Each is
+/// planned once more for slow joints, whose limit binds.
 fn random_paths() -> Result<(), AnyError> {
     let MissionSettings { planner: settings, ptu, .. } = MissionSettings::default();
     let surface = rock::rock()?;
     let (robot, wall) = (Robot::new(Ptu::new(ptu)?), MeshSurface(&surface.world));
     let mut rng = Rng::new(11);
-    let (mut planned, mut refused, mut moments, mut violations) = (0, 0, 0_u64, 0_u64);
+    let mut slow = settings.clone();
+    slow.timing.max_joint_rate = SLOW_JOINTS;
+    let (mut planned, mut refused) = (0, 0);
+    // As usual, and with slow joints.
+    let (mut moments, mut violations, mut joint_rate) = ([0_u64; 2], [0_u64; 2], [0.0_f64; 2]);
     let mut ratios = Vec::new();
     for _ in 0..PATHS {
         let mut at =
@@ -389,22 +396,26 @@ fn random_paths() -> Result<(), AnyError> {
             course += rng.between(-0.6, 0.6);
             at = [at[0] + 2.0 * course.cos(), at[1] + 2.0 * course.sin()];
         }
-        match OptimalPlanner::default().plan(&targets, &wall, &robot, &settings) {
-            Ok(plan) => {
-                let (all, beyond) = beyond_limits(&plan, &settings);
-                planned += 1;
-                moments += all;
-                violations += beyond;
-                ratios.extend(against_uniform_scaling(&plan, &settings)?);
-            }
-            Err(_) => refused += 1,
+        let plan = |settings: &Settings| OptimalPlanner::default().plan(&targets, &wall, &robot, settings);
+        let (Ok(usual), Ok(slowed)) = (plan(&settings), plan(&slow)) else {
+            refused += 1;
+            continue;
+        };
+        planned += 1;
+        for (k, (plan, settings)) in [(&usual, &settings), (&slowed, &slow)].into_iter().enumerate() {
+            let (all, beyond) = beyond_limits(plan, settings);
+            moments[k] += all;
+            violations[k] += beyond;
+            joint_rate[k] = joint_rate[k].max(plan.report.joint_rate);
         }
+        ratios.extend(against_uniform_scaling(&usual, &settings)?);
     }
     println!(
         "{}",
         json!({
             "fig": "limits_over_random_paths", "peer": "paint-planner", "planned": planned, "nothing_reachable": refused,
-            "moments": moments, "violations": violations, "time_over_uniform_scaling": ratios.iter().sum::<f64>() / ratios.len() as f64,
+            "moments": moments[0], "violations": violations[0], "joint_rate": joint_rate[0], "moments_slow_joints": moments[1],
+            "violations_slow_joints": violations[1], "joint_rate_slow_joints": joint_rate[1], "time_over_uniform_scaling": ratios.iter().sum::<f64>() / ratios.len() as f64,
             "compared": ratios.len(),
         })
     );
@@ -438,15 +449,17 @@ fn against_uniform_scaling(plan: &Plan, settings: &Settings) -> Result<Option<f6
     Ok(Some(plan.trajectory.duration() / (factor * curve.duration())))
 }
 
-/// Moments looked at, every 5 ms, and those beyond a limit of speed, acceleration or heading rate.
+/// Moments looked at, every 5 ms, and those beyond a limit of speed, acceleration, heading rate or joint rate.
 fn beyond_limits(plan: &Plan, settings: &Settings) -> (u64, u64) {
     let timing = &settings.timing;
     let steps = (plan.trajectory.duration() / 0.005) as u64;
     let beyond = |k: &u64| {
-        let s = plan.trajectory.sample(*k as f64 * 0.005);
+        let (setpoint, next) = (plan.setpoint(*k as f64 * 0.005), plan.setpoint((*k + 1) as f64 * 0.005));
+        let (s, joints) = (setpoint.sample, (next.pan - setpoint.pan).abs().max((next.tilt - setpoint.tilt).abs()));
         s.velocity.norm() > timing.max_speed * (1.0 + 1e-9)
             || s.acceleration.norm() > timing.max_acceleration * (1.0 + 1e-9)
             || s.heading_rate.abs() > timing.max_heading_rate * (1.0 + 1e-9)
+            || joints > 0.005 * timing.max_joint_rate * (1.0 + 1e-9)
     };
     (steps + 1, (0..=steps).filter(beyond).count() as u64)
 }

@@ -21,6 +21,7 @@ mod reach;
 mod rehearse;
 mod run;
 mod seams;
+mod service;
 mod settings;
 mod shading;
 mod simulated_flight;

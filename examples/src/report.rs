@@ -41,6 +41,10 @@ pub struct Report {
     pub lost_to_constraints_share: Option<f64>,
     /// Share of the wanted paint that no pose of the robot can spray.
     pub unreachable_paint_share: f64,
+    /// Targets with paint. What is flown once more counts once.
+    pub targets: usize,
+    /// Those of them that are not served.
+    pub targets_not_served: usize,
     /// Targets that keep more clearance since the rehearsal in wind.
     pub targets_kept_off: usize,
     /// Targets given up in the rehearsal.

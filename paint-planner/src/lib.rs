@@ -97,10 +97,10 @@ pub use nalgebra;
 #[cfg(feature = "clarabel")]
 pub use nozzle::Clarabel;
 pub use nozzle::{
-    GaussSeidel, InteriorPoint, Mode, QpOutcome, QpSolver, QuadraticProgram, StandardForm, state_programs,
-    stroke_program,
+    GaussSeidel, InteriorPoint, Mode, PrimalDualActiveSet, QpOutcome, QpSolver, QuadraticProgram, StandardForm,
+    state_programs, stroke_program,
 };
-pub use plan::{Plan, PlanReport, Setpoint, Waypoint};
+pub use plan::{NotServed, Plan, PlanReport, Setpoint, Waypoint};
 pub use planner::{OptimalPlanner, Planner, SmoothingPlanner, plan};
 pub use reach::reachable_targets;
 pub use settings::{HeadingSettings, LowessSettings, NozzleSettings, Settings, TimingPolicy, TimingSettings};

@@ -17,6 +17,22 @@ pub struct Waypoint {
     pub target: Option<usize>,
 }
 
+/// Why a target is not served.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+pub enum NotServed {
+    /// The joints reach no permitted incidence.
+    OutOfReach,
+    /// Something stands between nozzle and target.
+    Hidden,
+    /// At every heading the vehicle comes too near something, or joints or tool forbid it.
+    NoHeading,
+    /// The trajectory came too near something there, whatever clearance its targets were given.
+    TooNear,
+    /// No flight leads there from the rest.
+    NoTransit,
+}
+
 /// Figures of a plan.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -33,12 +49,14 @@ pub struct PlanReport {
     pub slack: f64,
     /// Rounds or Jacobi iterations of stage 1.
     pub rounds: usize,
-    /// Interior-point steps of stage 1, all rounds together.
+    /// Steps of the solver in stage 1, all rounds together.
     pub steps: usize,
     /// Optimal cost of the heading search.
     pub heading_cost: f64,
     /// Certified extrema of the trajectory.
     pub extrema: Extrema,
+    /// Greatest rate of pan or tilt, rad/s; exact, as planned joints are linear in time between waypoints.
+    pub joint_rate: f64,
     /// Factor by which all times were stretched in the end to meet the limits; with gradient-preserving timing the
     /// factor k of thesis section 7.5.
     pub stretch: f64,
@@ -57,6 +75,8 @@ pub struct Plan {
     pub vehicle: Vec<VehicleState>,
     /// Which targets are served.
     pub reachable: Vec<bool>,
+    /// Why the others are not.
+    pub not_served: Vec<Option<NotServed>>,
     /// When each target is passed, s; for targets not served a time between their neighbours'.
     pub target_time: Vec<f64>,
     /// Flow from each target to the next, m^3/s; 0 for the last, on flights, and next to targets not served.

@@ -107,6 +107,9 @@ pub struct TimingSettings {
     pub max_acceleration: f64,
     /// Greatest heading rate, rad/s (default 1).
     pub max_heading_rate: f64,
+    /// Greatest rate of pan and tilt, rad/s (default 3: half the speed of an AX-12A servo without load, as the joints also answer for the
+    /// lean of the body).
+    pub max_joint_rate: f64,
     /// Greatest flow of paint, m^3/s (default 2e-6).
     pub max_flow: f64,
     /// Distance between trajectory knots where the path is smooth, m (default 0.1).
@@ -178,6 +181,7 @@ impl Default for TimingSettings {
             max_speed: 0.5,
             max_acceleration: 1.0,
             max_heading_rate: 1.0,
+            max_joint_rate: 3.0,
             max_flow: 2e-6,
             knot_spacing: 0.1,
             tolerance: 0.002,
@@ -209,6 +213,7 @@ impl Settings {
             ("timing.max_speed", timing.max_speed),
             ("timing.max_acceleration", timing.max_acceleration),
             ("timing.max_heading_rate", timing.max_heading_rate),
+            ("timing.max_joint_rate", timing.max_joint_rate),
             ("timing.max_flow", timing.max_flow),
             ("timing.knot_spacing", timing.knot_spacing),
             ("timing.tolerance", timing.tolerance),

@@ -19,6 +19,16 @@ pub enum MissionError {
         /// Its value.
         value: f64,
     },
+    /// A plan may ask for more than the servos do.
+    #[error(
+        "setting planner.timing.max_joint_rate = {planned} rad/s: the servos turn by {servo} rad/s at most (servo.max_rate); plan slower ones"
+    )]
+    JointRate {
+        /// What plans may ask for, rad/s.
+        planned: f64,
+        /// What the servos do, rad/s.
+        servo: f64,
+    },
     /// The mesh is not a surface that can be painted.
     #[error(transparent)]
     Surface(#[from] SurfaceError),

@@ -61,6 +61,8 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         reach_share: mission.decision.share_in_reach(),
         lost_to_constraints_share: mission.decision.share_lost_to_constraints(),
         unreachable_paint_share: mission.share_out_of_reach(),
+        targets: mission.service.targets,
+        targets_not_served: mission.service.not_served(),
         targets_kept_off: mission.kept_off,
         targets_left_bare: mission.left_bare,
         hit_error_rms_m: flown.hit_error_rms,
@@ -188,15 +190,20 @@ fn collisions(robot: &Robot, obstacles: &dyn Surface, log: &FlightLog) -> usize 
     log.samples.iter().step_by(GAP_STRIDE).filter(|sample| gap(robot, obstacles, sample, 0.0) < 0.0).count()
 }
 
-/// Moments at which the plan exceeds speed or acceleration, or the flown gun its joint limits.
+/// Moments at which the plan exceeds a limit of speed, acceleration, heading rate or joint rate, or the flown gun its joint limits.
 fn limit_violations(plan: &Plan, flight: &FlightLog, settings: &MissionSettings) -> usize {
     let timing = &settings.planner.timing;
     let slack = 1.0 + 1e-9;
     let steps = (plan.trajectory.duration() / LIMIT_STEP) as usize;
     let planned = (0..=steps)
-        .map(|k| plan.trajectory.sample(k as f64 * LIMIT_STEP))
-        .filter(|s| {
-            s.velocity.norm() > timing.max_speed * slack || s.acceleration.norm() > timing.max_acceleration * slack
+        .map(|k| (plan.setpoint(k as f64 * LIMIT_STEP), plan.setpoint((k + 1) as f64 * LIMIT_STEP)))
+        .filter(|(here, next)| {
+            let s = &here.sample;
+            let joints = (next.pan - here.pan).abs().max((next.tilt - here.tilt).abs());
+            s.velocity.norm() > timing.max_speed * slack
+                || s.acceleration.norm() > timing.max_acceleration * slack
+                || s.heading_rate.abs() > timing.max_heading_rate * slack
+                || joints > LIMIT_STEP * timing.max_joint_rate * slack
         })
         .count();
     let ptu = &settings.ptu;
@@ -265,6 +272,9 @@ mod tests {
         let mut slow = settings.clone();
         slow.planner.timing.max_speed = 0.5 * plan.report.extrema.speed;
         assert!(limit_violations(&plan, &flight, &slow) > 0);
+        let mut stiff = settings.clone();
+        stiff.planner.timing.max_joint_rate = 0.5 * plan.report.joint_rate;
+        assert!(limit_violations(&plan, &flight, &stiff) > 0);
         let mut gentle = settings;
         gentle.planner.timing.max_acceleration = 0.1 * plan.report.extrema.acceleration;
         assert!(limit_violations(&plan, &flight, &gentle) > 0);

@@ -1,7 +1,7 @@
 //! How to fly it: strokes onto the surface, nozzle and vehicle along them.
 
 use paint_net::{Painting, StrokeSettings, boustrophedon};
-use paint_planner::{Error, Plan, Planner, Settings, SmoothingPlanner, Target, VehicleState};
+use paint_planner::{Error, NotServed, Plan, Planner, Settings, SmoothingPlanner, Target, VehicleState};
 
 use super::decide::kernel;
 use super::decision::Decision;
@@ -9,6 +9,7 @@ use super::dose_correction::correct_doses;
 use super::error::MissionError;
 use super::given_up::take_given_up;
 use super::rehearse::{Rehearsed, rehearsed_plan};
+use super::service::Service;
 use super::settings::{MissionSettings, PainterChoice};
 use crate::adapters::MeshSurface;
 use crate::progress::Stage;
@@ -27,6 +28,8 @@ pub(super) struct Planned {
     pub(super) kept_off: usize,
     /// Targets given up in the rehearsal.
     pub(super) left_bare: usize,
+    /// Which targets are served.
+    pub(super) service: Service,
 }
 
 /// Flights of a layer: the first gives stretches up that a pose reaches, since all of a stroke is one program; those become strokes
@@ -57,16 +60,21 @@ impl Flight {
     ) -> Result<Option<Self>, MissionError> {
         let Decision { surface, robot, settings: mission, .. } = decision;
         let rehearsed = if route.targets.len() < 2 {
-            None
+            Err(NotServed::OutOfReach)
         } else {
             match rehearsed_plan(&route.targets, clearance, surface, robot, mission, &settings) {
-                Err(MissionError::Planner(Error::NoTransit { .. } | Error::Collision { .. })) if again => None,
-                rehearsed => rehearsed?,
+                Err(MissionError::Planner(Error::NoTransit { .. })) if again => Err(NotServed::NoTransit),
+                Err(MissionError::Planner(Error::Collision { .. })) if again => Err(NotServed::TooNear),
+                rehearsed => rehearsed?.ok_or(NotServed::NoHeading),
             }
         };
-        let Some(rehearsed) = rehearsed else {
-            planned.unreachable_paint += route.paint() + route.lost;
-            return Ok(None);
+        let rehearsed = match rehearsed {
+            Ok(rehearsed) => rehearsed,
+            Err(why) => {
+                planned.unreachable_paint += route.paint() + route.lost;
+                planned.service.add_refused(&route.targets, why);
+                return Ok(None);
+            }
         };
         planned.seconds += rehearsed.seconds;
         Ok(Some(Self { route, settings, rehearsed }))
@@ -88,6 +96,7 @@ pub(super) fn plan(decision: &Decision) -> Result<Planned, MissionError> {
         unreachable_paint: 0.0,
         kept_off: 0,
         left_bare: 0,
+        service: Service::default(),
     };
     let mut start: FlightEnd = (None, None);
     for (k, layer) in layers.iter().enumerate() {
@@ -101,6 +110,7 @@ pub(super) fn plan(decision: &Decision) -> Result<Planned, MissionError> {
         for Flight { route, rehearsed, .. } in flights {
             planned.kept_off += rehearsed.kept_off;
             planned.left_bare += rehearsed.left_bare;
+            planned.service.add_flight(&route.targets, &rehearsed.plan, &rehearsed.clearance);
             let smoothing = SmoothingPlanner.plan(&route.targets, &wall, robot, &settings.planner)?;
             planned.layers.push((route, rehearsed.plan, smoothing));
         }

@@ -16,6 +16,7 @@ use super::path_view::save_path;
 use super::plan::path_length;
 use super::planned_mission::{PlannedMission, share_out_of_reach};
 use super::preview::expected_depth;
+use super::service::Service;
 use super::shading::vertex_colours;
 use super::trajectory_table::{TRAJECTORY_STEP, cells};
 use crate::appearance::DENSITY;
@@ -36,10 +37,22 @@ pub struct PlanFigures {
     pub layers: usize,
     /// Strokes over all layers.
     pub strokes: usize,
-    /// Targets on the surface.
+    /// Targets with paint. What is flown once more counts once.
     pub targets: usize,
-    /// Targets that no permitted pose serves.
+    /// Those of them that are not served; the reasons follow, and the sum of these is that number.
     pub targets_not_served: usize,
+    /// The joints do not reach their normal.
+    pub targets_out_of_reach: usize,
+    /// Something stands in front of them.
+    pub targets_hidden: usize,
+    /// The robot fits at no heading, or cannot go on to the next from any.
+    pub targets_without_heading: usize,
+    /// The trajectory came too near something there.
+    pub targets_too_near: usize,
+    /// No flight to them was found.
+    pub targets_without_transit: usize,
+    /// The rehearsal in wind left them bare.
+    pub targets_left_in_wind: usize,
     /// Targets that keep more clearance since the rehearsal in wind.
     pub targets_kept_off: usize,
     /// Targets given up in the rehearsal.
@@ -65,23 +78,26 @@ pub struct PlanFigures {
     pub max_speed_m_per_s: f64,
     /// Certified bound of its acceleration.
     pub max_acceleration_m_per_s2: f64,
+    /// Greatest planned rate of pan or tilt.
+    pub max_joint_rate_rad_per_s: f64,
     /// Planning time on one core.
     pub planning_s: f64,
     /// Wall-clock time of everything.
     pub wall_s: f64,
+    #[serde(skip)]
+    service: Service,
 }
 
 impl PlanFigures {
     /// One line for people.
     pub fn summary(&self) -> String {
         format!(
-            "{:.1} min in the air, {:.0} m, valve open {:.0} % of the time, {:.2} kg of paint; {} of {} targets not served",
+            "{:.1} min in the air, {:.0} m, valve open {:.0} % of the time, {:.2} kg of paint; {}",
             self.flight_time_s / 60.0,
             self.path_length_m,
             100.0 * self.valve_open_share,
             self.paint_kg,
-            self.targets_not_served,
-            self.targets
+            self.service.summary()
         )
     }
 }
@@ -162,6 +178,7 @@ fn state(decision: &Decision, time: f64, s: &Setpoint) -> RobotState {
 
 fn figures(mission: &PlannedMission) -> PlanFigures {
     let (decision, planned) = (&mission.decision, &mission.planned);
+    let service = planned.service;
     let sum = |of: &dyn Fn(&Plan) -> f64| mission.layers().map(|(_, plan)| of(plan)).sum::<f64>();
     let most = |of: &dyn Fn(&Plan) -> f64| mission.layers().map(|(_, plan)| of(plan)).fold(0.0, f64::max);
     let flight_time = sum(&|plan| plan.trajectory.duration());
@@ -179,8 +196,14 @@ fn figures(mission: &PlannedMission) -> PlanFigures {
         seed: decision.settings.seed,
         layers: planned.layers.len(),
         strokes: mission.layers().map(|(route, _)| route.strokes).sum(),
-        targets: mission.layers().map(|(route, _)| route.targets.len()).sum(),
-        targets_not_served: mission.layers().map(|(_, p)| p.reachable.iter().filter(|&&served| !served).count()).sum(),
+        targets: service.targets,
+        targets_not_served: service.not_served(),
+        targets_out_of_reach: service.out_of_reach,
+        targets_hidden: service.hidden,
+        targets_without_heading: service.without_heading,
+        targets_too_near: service.too_near,
+        targets_without_transit: service.without_transit,
+        targets_left_in_wind: service.left_in_wind,
         targets_kept_off: planned.kept_off,
         targets_left_bare: planned.left_bare,
         lost_to_constraints_share: decision.share_lost_to_constraints(),
@@ -193,7 +216,9 @@ fn figures(mission: &PlannedMission) -> PlanFigures {
         normal_deviation_max_m: deviations.iter().fold(0.0, |most, &d| most.max(d)),
         max_speed_m_per_s: most(&|plan| plan.report.extrema.speed),
         max_acceleration_m_per_s2: most(&|plan| plan.report.extrema.acceleration),
+        max_joint_rate_rad_per_s: most(&|plan| plan.report.joint_rate),
         planning_s: planned.seconds,
         wall_s: decision.started.elapsed().as_secs_f64(),
+        service,
     }
 }

@@ -24,7 +24,7 @@ const BEYOND: f64 = 0.01;
 /// Targets on either side of a near miss that are kept farther off.
 const NEIGHBOURS: usize = 2;
 /// A clearance that no target has, metres.
-const BARE: f64 = 10.0;
+pub(super) const BARE: f64 = 10.0;
 /// Samples of a flight between two looks at the gap: 50 ms, 2.5 cm at full speed.
 pub(super) const GAP_STRIDE: usize = 5;
 /// Winds of the rehearsals are not that of the flight.

@@ -10,6 +10,7 @@ use super::decision::Decision;
 use super::error::MissionError;
 use super::fly::{LayerFlight, fly, spray};
 use super::planned_mission::{PlannedMission, share_out_of_reach};
+use super::service::Service;
 use crate::appearance::UNIT_THICKNESS;
 
 /// Thickness below which nothing is wanted, metres: ink is given to a few digits.
@@ -28,6 +29,8 @@ pub struct Mission {
     /// Targets that keep more clearance since the rehearsal in wind, and those it gave up.
     pub(super) kept_off: usize,
     pub(super) left_bare: usize,
+    /// Which targets the flights serve.
+    pub(super) service: Service,
 }
 
 impl Mission {
@@ -40,10 +43,10 @@ impl Mission {
     pub fn fly(mission: PlannedMission) -> Result<Self, MissionError> {
         let PlannedMission { decision, planned } = mission;
         let (planning, unreachable_paint) = (planned.seconds, planned.unreachable_paint);
-        let (kept_off, left_bare) = (planned.kept_off, planned.left_bare);
+        let (kept_off, left_bare, service) = (planned.kept_off, planned.left_bare, planned.service);
         let flights = fly(planned, &decision)?;
         let (film, pixels) = spray(&flights, &decision)?;
-        Ok(Self { decision, flights, film, pixels, planning, unreachable_paint, kept_off, left_bare })
+        Ok(Self { decision, flights, film, pixels, planning, unreachable_paint, kept_off, left_bare, service })
     }
 
     /// The layers, in the order in which they were flown.

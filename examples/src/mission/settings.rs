@@ -110,6 +110,10 @@ impl MissionSettings {
                 return Err(MissionError::Setting { name, value });
             }
         }
+        let (planned, servo) = (self.planner.timing.max_joint_rate, self.servo.max_rate);
+        if planned > servo {
+            return Err(MissionError::JointRate { planned, servo });
+        }
         Ok(self.constraints.check()?)
     }
 }
@@ -135,6 +139,14 @@ mod tests {
     use crate::adapters::{MeshSurface, Robot};
     use nalgebra::{UnitVector3, Vector3};
     use ptu_kinematics::Ptu;
+
+    #[test]
+    fn plans_that_ask_too_much_of_the_servos_are_refused() {
+        let mut settings = MissionSettings::default();
+        settings.check().unwrap();
+        settings.servo.max_rate = 0.9 * settings.planner.timing.max_joint_rate;
+        assert!(matches!(settings.check(), Err(MissionError::JointRate { .. })));
+    }
 
     #[test]
     fn spots_keep_their_size_where_the_tilt_joint_ends() {

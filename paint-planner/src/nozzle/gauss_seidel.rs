@@ -8,7 +8,7 @@ use nalgebra::Vector5;
 
 /// Block Gauss-Seidel: the states in turn, each by a dual active-set method (Goldfarb and Idnani 1983) with its neighbours where they are.
 /// Programs whose states do not couple, as those of [`Mode::PaperExact`](crate::Mode::PaperExact), are solved by one sweep, to rounding; those of
-/// a whole stroke take the more sweeps the stronger the smoothness, and [`InteriorPoint`](crate::InteriorPoint) is the faster there.
+/// a whole stroke take the more sweeps the stronger the smoothness, and [`PrimalDualActiveSet`](crate::PrimalDualActiveSet) is the faster there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GaussSeidel {
     /// Greatest change of a coordinate in the last sweep. Default 1e-11.

@@ -1,8 +1,8 @@
 //! Mehrotra's predictor-corrector interior-point method for [`QuadraticProgram`]: every step is one block-tridiagonal
 //! factorisation and two substitutions, fused with the work on the rows into four passes over the states.
 //!
-//! Kept beside Clarabel, which solves the same program as a general sparse one: `library_figures planner` measures it, and
-//! `planner_peers.py` other solvers on the same programs.
+//! It gets where the guesses of the active set go round in circles. Kept beside Clarabel, which solves the same program as a general
+//! sparse one at twenty times the price (`library_figures planner`).
 
 use super::lanes::{LANES, Lanes};
 use super::qp_solver::{QpOutcome, QpSolver};
@@ -25,7 +25,7 @@ const INITIAL_MU: f64 = 1e-4;
 /// Share of the way to the boundary that a step goes: every product stays positive.
 const INSIDE: f64 = 0.9995;
 
-/// The crate's own solver: Mehrotra's method with the structure of the programs in its factorisation.
+/// Mehrotra's method with the structure of the programs in its factorisation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct InteriorPoint;
 

@@ -9,7 +9,7 @@ pub(crate) struct Nozzles {
     pub(crate) states: Vec<Option<NozzleState>>,
     /// Rounds (sequential) or Jacobi iterations (paper-exact) done.
     pub(crate) rounds: usize,
-    /// Interior-point steps, summed.
+    /// Steps of the solver, summed.
     pub(crate) steps: usize,
     /// Greatest relaxation of a soft cone row in the last round.
     pub(crate) slack: f64,

@@ -1,8 +1,10 @@
-//! The interior-point method against Clarabel, and stage 1 against a known optimum.
+//! The solvers against Clarabel, and stage 1 against a known optimum.
 
 use super::clarabel_solver::Clarabel;
 use super::quadratic_program::{QuadraticProgram, Row};
-use super::{GaussSeidel, InteriorPoint, Mode, QpSolver, initial_states, optimise};
+use super::{
+    GaussSeidel, InteriorPoint, Mode, PrimalDualActiveSet, QpSolver, initial_states, optimise, stroke_program,
+};
 use crate::settings::NozzleSettings;
 use crate::target::{Target, normal_deviation};
 use nalgebra::{Matrix2x5, Matrix5, Point3, UnitVector3, Vector2, Vector3, Vector5};
@@ -42,21 +44,78 @@ fn random_program(count: usize, random: &mut Random) -> QuadraticProgram {
 }
 
 #[test]
-fn the_interior_point_method_agrees_with_clarabel() {
+fn the_solvers_of_whole_paths_agree_with_clarabel() {
     let mut random = Random(11);
-    let mut relaxed = 0;
-    for round in 0..20 {
-        let count = 1 + 3 * round;
+    let (mut relaxed, mut settled, mut handed_on) = (0, 0, 0);
+    for round in 0..40 {
+        let count = 1 + 3 * (round % 20);
         let program = random_program(count, &mut random);
-        let mut x = vec![Vector5::zeros(); count];
-        let outcome = InteriorPoint.solve(&program, &mut x).unwrap();
-        relaxed += usize::from(outcome.slack > 1e-3);
         let mut expected = vec![Vector5::zeros(); count];
         let general = Clarabel::default().solve(&program, &mut expected).unwrap();
-        assert!((outcome.slack - general.slack).abs() < 1e-6, "round {round}");
-        assert!(x.iter().zip(&expected).all(|(x, expected)| (x - expected).amax() < 1e-6), "round {round}");
+        let mut steps = [0; 2];
+        let solvers: [&dyn QpSolver; 2] = [&InteriorPoint, &PrimalDualActiveSet];
+        for (solver, steps) in solvers.into_iter().zip(&mut steps) {
+            let mut x = vec![Vector5::zeros(); count];
+            let outcome = solver.solve(&program, &mut x).unwrap();
+            *steps = outcome.steps;
+            relaxed += usize::from(outcome.slack > 1e-3);
+            assert!((outcome.slack - general.slack).abs() < 1e-6, "round {round}");
+            assert!(x.iter().zip(&expected).all(|(x, expected)| (x - expected).amax() < 1e-6), "round {round}");
+        }
+        // Rounds that did not settle, and the steps of the interior-point method on top of them.
+        settled += usize::from(steps[1] < steps[0]);
+        handed_on += usize::from(steps[1] > steps[0] + 10);
     }
-    assert!(relaxed > 10);
+    assert!(relaxed > 40 && settled > 10 && handed_on > 0, "{relaxed} {settled} {handed_on}");
+}
+
+#[test]
+fn the_rows_that_bind_on_a_rough_stroke_are_found_at_once() {
+    let mut random = Random(4);
+    let mut noise = || 0.3 * (random.next() + random.next() + random.next());
+    let mut target = |k: u32| {
+        let s = 0.01 * f64::from(k);
+        let normal = UnitVector3::new_normalize(Vector3::new(-1.0, noise(), noise()));
+        Target {
+            point: Point3::new(0.05 * (4.0 * s).sin(), s, 2.0 + 0.2 * (3.0 * s).cos()),
+            normal,
+            dose: 0.0,
+            time: None,
+        }
+    };
+    let targets: Vec<Target> = (0..300).map(&mut target).collect();
+    let (program, start) = stroke_program(&targets, &NozzleSettings::default());
+    let mut expected = start.clone();
+    Clarabel::default().solve(&program, &mut expected).unwrap();
+    let solve = |solver: &dyn QpSolver, most: usize| {
+        let mut x = start.clone();
+        let outcome = solver.solve(&program, &mut x).unwrap();
+        assert!(outcome.steps <= most, "{solver:?}: {}", outcome.steps);
+        assert!(x.iter().zip(&expected).all(|(x, expected)| (x - expected).amax() < 1e-6), "{solver:?}");
+        x
+    };
+    solve(&InteriorPoint, 20);
+    let x = solve(&PrimalDualActiveSet, 8);
+    // The conditions of the optimum, from the program as it stands: no row is exceeded, and the slope is held by rows that bind.
+    let (mut bound, mut free) = (0, 0);
+    for i in 0..x.len() {
+        let slope = program.curvature_times(&x, i) + program.gradient[i];
+        let (p, w) = program.views(i, &x[i]);
+        let rows =
+            &program.rows[i * (program.hard_rows + program.soft_rows)..][..program.hard_rows + program.soft_rows];
+        let (hard, soft) = rows.split_at(program.hard_rows);
+        let excess =
+            hard.iter().map(|row| row.a.dot(&p) - row.b).chain(soft.iter().map(|row| row.a.xy().dot(&w) - row.b));
+        let most = excess.fold(f64::NEG_INFINITY, f64::max);
+        assert!(most < 1e-9, "state {i}: {most}");
+        if most < -1e-9 {
+            assert!(slope.amax() < 1e-9, "state {i}: {slope}");
+            free += 1;
+        } else {
+            bound += 1;
+        }
+    }
+    assert!(bound > 30 && free > 30, "{bound} {free}");
 }
 
 #[test]
@@ -104,7 +163,8 @@ fn three_targets_of_known_optimum() {
         ..NozzleSettings::default()
     };
     let initial_states = initial_states(&targets, &settings);
-    let result = optimise(&targets, &initial_states, &[true; 2], Mode::Sequential, &InteriorPoint, &settings).unwrap();
+    let result =
+        optimise(&targets, &initial_states, &[true; 2], Mode::Sequential, &PrimalDualActiveSet, &settings).unwrap();
     let expected = [[-0.1, 0.0, 0.0111922], [-0.0905293, 0.0, 0.0559610], [-0.1, 0.0, 0.0271922]];
     let deviations = [0.011192, 0.017549, 0.007192];
     for i in 0..3 {
@@ -120,7 +180,8 @@ fn the_answer_is_a_minimum_of_the_cost_as_written() {
     let targets: Vec<Target> = (0..12).map(|i| target(0.025 * f64::from(i), 0.2 * random.next())).collect();
     let settings = NozzleSettings { cb: 0.0, cc: 1e-9, rounds: 10, ..NozzleSettings::default() };
     let initial_states = initial_states(&targets, &settings);
-    let result = optimise(&targets, &initial_states, &[true; 11], Mode::Sequential, &InteriorPoint, &settings).unwrap();
+    let result =
+        optimise(&targets, &initial_states, &[true; 11], Mode::Sequential, &PrimalDualActiveSet, &settings).unwrap();
     let p: Vec<Point3<f64>> = result.states.iter().map(|s| s.unwrap().position).collect();
     let cost = |p: &[Point3<f64>]| {
         let smooth: f64 = p.windows(2).map(|pair| settings.ca * (pair[1] - pair[0]).norm_squared()).sum();
@@ -146,15 +207,21 @@ fn cut_links_leave_the_strokes_alone() {
     let targets: Vec<Target> = (0..6).map(|i| target(if i < 3 { 0.02 } else { 1.0 } * f64::from(i), 0.1)).collect();
     let settings = NozzleSettings::default();
     let linked = [true, true, false, true, true];
-    let whole =
-        optimise(&targets, &initial_states(&targets, &settings), &linked, Mode::Sequential, &InteriorPoint, &settings)
-            .unwrap();
+    let whole = optimise(
+        &targets,
+        &initial_states(&targets, &settings),
+        &linked,
+        Mode::Sequential,
+        &PrimalDualActiveSet,
+        &settings,
+    )
+    .unwrap();
     let part = optimise(
         &targets[..3],
         &initial_states(&targets[..3], &settings),
         &[true; 2],
         Mode::Sequential,
-        &InteriorPoint,
+        &PrimalDualActiveSet,
         &settings,
     );
     for (a, b) in whole.states[..3].iter().zip(part.unwrap().states) {
@@ -170,6 +237,7 @@ fn programs_without_a_point_are_refused_by_all_solvers() {
     program.rows[1] = Row { a: -Vector3::x(), b: -1.0 };
     let mut states = vec![Vector5::zeros(); 2];
     assert!(InteriorPoint.solve(&program, &mut states.clone()).is_err());
+    assert!(PrimalDualActiveSet.solve(&program, &mut states.clone()).is_err());
     assert!(GaussSeidel::default().solve(&program, &mut states.clone()).is_err());
     assert!(Clarabel::default().solve(&program, &mut states).is_err());
 }

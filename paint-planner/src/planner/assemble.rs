@@ -4,11 +4,11 @@ use crate::clearance::{ClearanceChecker, DistanceCache};
 use crate::error::Error;
 use crate::minimum_snap::KnotDerivatives;
 use crate::nozzle::Nozzles;
-use crate::plan::{Plan, PlanReport, Waypoint};
+use crate::plan::{NotServed, Plan, PlanReport, Waypoint};
 use crate::route::RoutePoint;
 use crate::settings::{Settings, TimingPolicy};
 use crate::target::{NozzleState, Target, normal_deviation};
-use crate::timing::speed_profile::stroke_between;
+use crate::timing::speed_profile::{joint_motion, stroke_between};
 use crate::timing::{TimedTrajectory, schedule};
 use crate::transit::between;
 use crate::world::VehicleState;
@@ -22,6 +22,8 @@ const MAX_CLEARANCE: f64 = 1.0;
 pub(crate) struct UntimedPlan {
     pub(crate) nozzles: Nozzles,
     pub(crate) vehicle: Vec<Option<VehicleState>>,
+    /// Why a target has none.
+    pub(crate) not_served: Vec<Option<NotServed>>,
     pub(crate) heading_cost: f64,
     pub(crate) route: Vec<RoutePoint>,
     /// Motion at the first point of the route; zero: it is left from rest.
@@ -79,12 +81,13 @@ pub(crate) fn assemble_plan(
         .map(|(state, target)| state.unwrap_or_else(|| ideal(target)))
         .collect();
     let (clearance, violations) = least_clearance(&timed, &waypoints, checker, 0.5 * settings.clearance);
-    let report = report(untimed, targets, &nozzle, &timed, clearance);
+    let report = report(untimed, targets, &nozzle, &timed, joint_rate(&waypoints), clearance);
     let plan = Plan {
         nozzle,
         vehicle: fill(&untimed.vehicle, &waypoints),
         target_time: target_times(targets.len(), &waypoints),
         reachable,
+        not_served: untimed.not_served.clone(),
         flow,
         trajectory: timed.trajectory,
         waypoints,
@@ -115,6 +118,7 @@ fn report(
     targets: &[Target],
     nozzle: &[NozzleState],
     timed: &TimedTrajectory,
+    joint_rate: f64,
     clearance: f64,
 ) -> PlanReport {
     let deviation = |i: usize| match untimed.vehicle[i] {
@@ -133,10 +137,17 @@ fn report(
         steps: untimed.nozzles.steps,
         heading_cost: untimed.heading_cost,
         extrema: timed.extrema,
+        joint_rate,
         stretch: timed.stretch,
         path_deviation: timed.deviation,
         clearance,
     }
+}
+
+/// Greatest rate of a joint between two waypoints, rad/s.
+fn joint_rate(waypoints: &[Waypoint]) -> f64 {
+    let rate = |pair: &[Waypoint]| joint_motion(&pair[0].state, &pair[1].state) / (pair[1].time - pair[0].time);
+    waypoints.windows(2).map(rate).fold(0.0, f64::max)
 }
 
 /// Flies the trajectory with the planned joints and measures the distance to the surface: the least of all, and where it

@@ -6,8 +6,8 @@ use crate::clearance::ClearanceChecker;
 use crate::error::Error;
 use crate::heading::HeadingGraph;
 use crate::minimum_snap::KnotDerivatives;
-use crate::nozzle::{InteriorPoint, Mode, Nozzles, QpSolver, initial_states, optimise};
-use crate::plan::Plan;
+use crate::nozzle::{Mode, Nozzles, PrimalDualActiveSet, QpSolver, initial_states, optimise};
+use crate::plan::{NotServed, Plan};
 use crate::settings::Settings;
 use crate::target::{Target, check, stroke_links};
 use crate::trace::{event, span};
@@ -26,7 +26,7 @@ pub struct OptimalPlanner<'a> {
 
 impl Default for OptimalPlanner<'static> {
     fn default() -> Self {
-        Self { mode: Mode::default(), solver: &InteriorPoint }
+        Self { mode: Mode::default(), solver: &PrimalDualActiveSet }
     }
 }
 
@@ -72,8 +72,11 @@ impl OptimalPlanner<'_> {
         }
         let linked = stroke_links(targets, settings.break_length);
         let initial_states = initial_states(targets, &settings.nozzle);
+        let mut not_served = vec![None; targets.len()];
+        explain(&mut not_served, &initial_states, NotServed::OutOfReach);
         let mut nozzles = optimise(targets, &initial_states, &linked, self.mode, self.solver, &settings.nozzle)?;
         drop_hidden(targets, &mut nozzles.states, surface)?;
+        explain(&mut not_served, &nozzles.states, NotServed::Hidden);
         event!(
             debug,
             targets = targets.len(),
@@ -97,11 +100,15 @@ impl OptimalPlanner<'_> {
             if headings.vehicle.iter().all(Option::is_none) {
                 return Err(Error::NothingReachable { count: targets.len() });
             }
+            let mut not_served_here = not_served.clone();
+            explain(&mut not_served_here, &headings.vehicle, NotServed::NoHeading);
             let route =
                 route::build(&mut headings.vehicle, &headings.joined, Some(&mut checker), &clearance, settings)?;
+            explain(&mut not_served_here, &headings.vehicle, NotServed::NoTransit);
             let untimed = UntimedPlan {
                 nozzles: nozzles.clone(),
                 vehicle: headings.vehicle,
+                not_served: not_served_here,
                 heading_cost: headings.cost,
                 route,
                 start: KnotDerivatives::zeros(),
@@ -128,9 +135,17 @@ impl OptimalPlanner<'_> {
             for violation in violations {
                 raise_clearance(&plan, &violation, &mut clearance, &mut nozzles);
             }
+            explain(&mut not_served, &nozzles.states, NotServed::TooNear);
             let raised: Vec<usize> = (0..clearance.len()).filter(|&i| clearance[i] > before[i]).collect();
             graph.update(&nozzles.states, &mut checker, &raised);
         }
+    }
+}
+
+/// Notes why targets have no state, for those that had one so far.
+fn explain<T>(not_served: &mut [Option<NotServed>], states: &[Option<T>], why: NotServed) {
+    for (reason, _) in not_served.iter_mut().zip(states).filter(|(reason, state)| reason.is_none() && state.is_none()) {
+        *reason = Some(why);
     }
 }
 

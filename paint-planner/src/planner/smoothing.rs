@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::lowess::lowess;
 use crate::minimum_snap::KnotDerivatives;
 use crate::nozzle::Nozzles;
-use crate::plan::Plan;
+use crate::plan::{NotServed, Plan};
 use crate::route;
 use crate::settings::Settings;
 use crate::target::{NozzleState, Target, check, stroke_links};
@@ -46,9 +46,11 @@ impl Planner for SmoothingPlanner {
             return Err(Error::NothingReachable { count: targets.len() });
         }
         let route = route::build(&mut vehicle, &linked, None, &vec![settings.clearance; targets.len()], settings)?;
+        let not_served = vehicle.iter().map(|v| v.is_none().then_some(NotServed::OutOfReach)).collect();
         let states = nozzles.into_iter().zip(&vehicle).map(|(n, v)| v.map(|_| n)).collect();
         let nozzles = Nozzles { states, rounds: 0, steps: 0, slack: 0.0 };
-        let untimed = UntimedPlan { nozzles, vehicle, heading_cost: 0.0, route, start: KnotDerivatives::zeros() };
+        let start = KnotDerivatives::zeros();
+        let untimed = UntimedPlan { nozzles, vehicle, not_served, heading_cost: 0.0, route, start };
         Ok(assemble_plan(&untimed, targets, &mut ClearanceChecker::new(surface, tool), settings, false)?.0)
     }
 }

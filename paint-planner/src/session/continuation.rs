@@ -83,6 +83,7 @@ pub fn continue_plan(
             slack: anew.report.slack,
         },
         vehicle: states.iter().copied().map(Some).collect(),
+        not_served: vec![None; states.len()],
         heading_cost: anew.report.heading_cost,
         route: route.collect(),
         start: flying.trajectory.motion(at),

@@ -3,6 +3,7 @@
 use crate::route::RoutePoint;
 use crate::settings::{TimingPolicy, TimingSettings};
 use crate::target::Target;
+use crate::world::VehicleState;
 
 /// Share of the acceleration limit left to speeding up and slowing down; the rest is for curves and for the overshoot
 /// of polynomials.
@@ -12,6 +13,9 @@ const NORMAL: f64 = 0.7;
 /// Peak speed and acceleration of the rest-to-rest polynomial of unit length and duration.
 const PEAK_SPEED: f64 = 2.1875;
 const PEAK_ACCELERATION: f64 = 7.513_188_404;
+/// Planned joints are linear in time between route points, so the time of an edge certifies their rate; times are sums, and this covers
+/// what a sum rounds.
+const ROUNDING: f64 = 1.0 + 1e-9;
 /// No edge takes less, s.
 const MIN_DURATION: f64 = 1e-3;
 
@@ -21,7 +25,7 @@ pub(crate) struct SpeedProfile {
     travel: Vec<f64>,
     /// Turn of the body, rad.
     turn: Vec<f64>,
-    /// Least duration by spot speed, flow, speed and heading rate, s.
+    /// Least duration by spot speed, flow, speed, heading rate and joint rate, s.
     min_duration: Vec<f64>,
     /// Greatest speed at a route point by curvature, m/s; 0 where the vehicle halts.
     speed_limit: Vec<f64>,
@@ -46,7 +50,10 @@ impl SpeedProfile {
             let travel = (pair[1].state.position - pair[0].state.position).norm();
             let turn = (pair[1].state.heading - pair[0].state.heading).abs();
             let (length, dose) = stroke_between(pair, targets);
-            let vehicle = (travel / settings.max_speed).max(turn / settings.max_heading_rate);
+            let joints = joint_motion(&pair[0].state, &pair[1].state) * ROUNDING;
+            let vehicle = (travel / settings.max_speed)
+                .max(turn / settings.max_heading_rate)
+                .max(joints / settings.max_joint_rate);
             let stamp = stamp(pair, targets, settings);
             let spot = match settings.policy {
                 TimingPolicy::Uniform { speed } => length / speed,
@@ -145,6 +152,11 @@ impl SpeedProfile {
     }
 }
 
+/// How far the joint that moves more of pan and tilt has to move, rad.
+pub(crate) fn joint_motion(from: &VehicleState, to: &VehicleState) -> f64 {
+    (to.pan - from.pan).abs().max((to.tilt - from.tilt).abs())
+}
+
 /// Time between two halts, s: the closed form of the minimum-snap polynomial over `travel` metres and `turn` radians.
 pub(crate) fn rest_to_rest(travel: f64, turn: f64, settings: &TimingSettings) -> f64 {
     let by_speed = PEAK_SPEED * travel / settings.max_speed;
@@ -187,7 +199,6 @@ fn curvature(route: &[RoutePoint], i: usize, scale: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::world::VehicleState;
     use nalgebra::{Point3, Vector3};
 
     /// A metre of straight stroke in steps of 0.1 m that turns by `turn` radians per step.
@@ -223,6 +234,16 @@ mod tests {
         assert!((middle(0.5, 0.0, &settings) - 0.5).abs() < 1e-12);
         assert!((middle(-0.5, 0.0, &settings) - 0.5).abs() < 1e-12);
         assert!((middle(0.0, 1e-5, &settings) - 0.5).abs() < 1e-12);
+        // Either joint: 0.2 rad at 0.25 rad/s.
+        for (pan, tilt) in [(0.2, 0.0), (0.1, -0.2)] {
+            let (mut route, targets) = stroke(0.0, 0.0);
+            for (i, point) in route.iter_mut().enumerate() {
+                (point.state.pan, point.state.tilt) = (pan * i as f64, tilt * i as f64);
+            }
+            let slow = TimingSettings { max_joint_rate: 0.25, ..settings.clone() };
+            let duration = SpeedProfile::new(&route, &targets, &slow).durations(&[1.0; 10], &slow)[5];
+            assert!((duration - 0.8).abs() < 1e-8, "{duration}");
+        }
         // `slowdown` stretches.
         let (route, targets) = stroke(0.0, 0.0);
         let slowed = SpeedProfile::new(&route, &targets, &settings).durations(&[2.0; 10], &settings);

@@ -108,7 +108,9 @@ pub(super) fn shot_shares(
             let mut shares = Vec::new();
             find_shares(texels, shot, spray, surface, &mut stack, &mut shares);
             let scale = kept(&shares, spray.efficiency);
-            shares.iter_mut().for_each(|(_, share)| *share *= scale);
+            for (_, share) in &mut shares {
+                *share *= scale;
+            }
             shares
         };
         shots.iter().map(one).collect()
