@@ -7,7 +7,7 @@ use super::add_region::add_region;
 use super::fit::{Bounds, Distortion, POWER, fit};
 use super::layout::Charts;
 use super::levels::transfer;
-use super::price::{angle_deficits, seam_prices};
+use super::price::{SeamPrices, angle_deficits};
 use super::refine::{is_small, refine};
 use super::regions::regions;
 use super::sew::Sewing;
@@ -25,8 +25,8 @@ use crate::unwrap::{Settings, parametrize};
 const ROUNDS: usize = 2;
 /// Surfaces of more faces are cut on a coarser one: below, the seams that are found without it are shorter and take no longer.
 const COARSE_FROM: usize = 40_000;
-/// Faces of that one: so many, and a part of all, but no more than the last.
-const COARSE_TO: [usize; 3] = [5_000, 40, 14_000];
+/// Faces of that one.
+const COARSE_TO: usize = 8_000;
 /// Stretch beyond 1 that is allowed there, as a share of the bound.
 const COARSE_SHARE: f64 = 0.9;
 /// Faces that may be laid out in trials to sew small charts of a fine surface: so many, and a part of all.
@@ -111,12 +111,12 @@ fn cut_open(charts: &mut Charts, bounds: Bounds, parametrizer: Option<&dyn Param
     for faces in lists {
         add_region(charts, faces, bounds, parametrizer);
     }
-    let (prices, deficits) = (seam_prices(surface), angle_deficits(surface));
+    let (prices, deficits) = (SeamPrices::new(surface), angle_deficits(surface));
     for round in 0..ROUNDS {
-        let mut sewing = Sewing::new(charts, &prices, &deficits, bounds, parametrizer);
+        let mut sewing = Sewing::new(charts, &prices, bounds, parametrizer);
         sewing.close_arcs();
         if round > 0 {
-            sewing.close_parts();
+            sewing.close_parts(&deficits);
         }
         straighten(charts, &prices, &|disk, start| fit(disk, start, bounds, parametrizer));
     }
@@ -146,9 +146,7 @@ fn whole_parts(
 /// As [`cut_open`] for surfaces of many faces: seams are found on a coarser one, and the charts laid out anew on the fine one.
 fn by_coarse(charts: &mut Charts, bounds: Bounds) -> Vec<u32> {
     let surface = charts.surface;
-    let [least, part, most] = COARSE_TO;
-    let target = (least + surface.faces().len() / part).min(most);
-    let (coarse, half_edges, roots) = surface.coarser(|h| charts.wanted[h], target);
+    let (coarse, half_edges, roots) = surface.coarser(|h| charts.wanted[h], COARSE_TO);
     let wanted = half_edges.iter().map(|&h| charts.wanted[h as usize]).collect();
     let mut model = Charts::new(&coarse, wanted);
     // What is finer than the coarse faces bends the charts as well.
@@ -157,7 +155,7 @@ fn by_coarse(charts: &mut Charts, bounds: Bounds) -> Vec<u32> {
     let flat: HashSet<usize> = whole.iter().map(|&c| coarse.part(model.members[c as usize][0] as usize)).collect();
     let whole = whole_parts(charts, bounds, None, |part| flat.contains(&part));
 
-    let prices = seam_prices(surface);
+    let prices = SeamPrices::new(surface);
     let first = charts.members.len();
     transfer(&model, &roots, charts);
     let faces_per_edge = (surface.faces().len() as f64 / coarse.faces().len() as f64).sqrt();
@@ -169,8 +167,7 @@ fn by_coarse(charts: &mut Charts, bounds: Bounds) -> Vec<u32> {
     }
     let is_large = |c: &u32| !is_small(charts, charts.members[*c as usize].len());
     let kept: HashSet<u32> = (0..charts.members.len() as u32).filter(is_large).chain(whole.iter().copied()).collect();
-    let deficits = angle_deficits(surface);
-    let mut sewing = Sewing::new(charts, &prices, &deficits, bounds, None);
+    let mut sewing = Sewing::new(charts, &prices, bounds, None);
     sewing.only = Some((kept, 0));
     sewing.work = SEWING_WORK[0] + surface.faces().len() / SEWING_WORK[1];
     sewing.close_arcs();

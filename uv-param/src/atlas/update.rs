@@ -7,7 +7,7 @@ use super::charting::{Kept, by_number, finish, wanted_seams};
 use super::fit::fit;
 use super::layout::Charts;
 use super::pack::{self, Page, Piece, Placement};
-use super::price::{angle_deficits, seam_prices};
+use super::price::SeamPrices;
 use super::sew::Sewing;
 use super::{Atlas, AtlasSettings, unwrap_atlas};
 use crate::disk::Disk;
@@ -162,8 +162,8 @@ pub fn update_atlas(
         add_region(&mut charts, faces, bounds, None);
     }
     if charts.members.len() as u32 > first_new {
-        let (prices, deficits) = (seam_prices(&surface), angle_deficits(&surface));
-        let mut sewing = Sewing::new(&mut charts, &prices, &deficits, bounds, None);
+        let prices = SeamPrices::new(&surface);
+        let mut sewing = Sewing::new(&mut charts, &prices, bounds, None);
         sewing.only = Some((stay.clone(), first_new));
         sewing.close_arcs();
     }
@@ -171,7 +171,7 @@ pub fn update_atlas(
         (0..charts.members.len() as u32).filter(|&c| !charts.members[c as usize].is_empty()).collect();
     let sizes: HashMap<u32, [f64; 2]> = stay.iter().map(|&c| (c, previous.sizes[c as usize])).collect();
     let (done, members) = finish(charts, &Kept { whole: &[], sizes: &sizes }, &settings.charts, None, &mut progress)?;
-    let pieces: Vec<Piece> = done.iter().map(|c| Piece { uv: c.uv(), faces: c.disk().faces() }).collect();
+    let pieces: Vec<Piece> = done.iter().map(|c| Piece::new(c.uv(), c.disk().faces())).collect();
     let place = |c: &u32| stay.contains(c).then(|| previous.placements[*c as usize]);
     let places: Vec<Option<Placement>> = old_charts.iter().map(place).collect();
     let (placements, pages) = pack::add_to(&pieces, &places, &previous.pages, &settings.pack)?;

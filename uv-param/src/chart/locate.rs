@@ -86,16 +86,17 @@ impl Grid {
         let corners = |f: u32| faces[f as usize].map(|v| uv[v as usize]);
         for cell in 0..self.columns * self.rows {
             let here = &self.faces[self.starts[cell] as usize..self.starts[cell + 1] as usize];
+            let here_is = [cell % self.columns, cell / self.columns];
             for (i, &f) in here.iter().enumerate() {
                 for &g in &here[i + 1..] {
+                    if faces[f as usize].iter().filter(|v| faces[g as usize].contains(v)).count() > 1 {
+                        continue;
+                    }
                     let (a, b) = (corners(f), corners(g));
-                    let edge_in_common = faces[f as usize].iter().filter(|v| faces[g as usize].contains(v)).count() > 1;
                     // A pair may meet in many cells; the one that holds the lower left corner of both boxes speaks.
-                    let speaks = || {
-                        let low = |k: usize| low(a, k).max(low(b, k));
-                        self.cell([low(0), low(1)]) == [cell % self.columns, cell / self.columns]
-                    };
-                    if !edge_in_common && meet(a, b) && speaks() {
+                    let low = [0, 1].map(|k| low(a, k).max(low(b, k)));
+                    let high = [0, 1].map(|k| high(a, k).min(high(b, k)));
+                    if low[0] < high[0] && low[1] < high[1] && self.cell(low) == here_is && meet(a, b) {
                         found(f, g);
                     }
                 }
@@ -152,12 +153,12 @@ fn high([a, b, c]: [[f64; 2]; 3], k: usize) -> f64 {
     a[k].max(b[k]).max(c[k])
 }
 
-/// Whether two counter-clockwise triangles share more than a boundary point: no side of one has the other beyond it.
+/// Whether two counter-clockwise triangles, whose boxes overlap, share more than a boundary point: no side of one has the other beyond it.
 fn meet(a: [[f64; 2]; 3], b: [[f64; 2]; 3]) -> bool {
     let apart = |a: [[f64; 2]; 3], b: [[f64; 2]; 3]| {
         (0..3).any(|k| b.iter().all(|&p| orientation([a[k], a[(k + 1) % 3], p]) <= 0.0))
     };
-    (0..2).all(|k| low(a, k) < high(b, k) && low(b, k) < high(a, k)) && !apart(a, b) && !apart(b, a)
+    !apart(a, b) && !apart(b, a)
 }
 
 /// Area that two counter-clockwise triangles share.
