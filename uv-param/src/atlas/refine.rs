@@ -29,8 +29,9 @@ pub(super) fn is_small(charts: &Charts, faces: usize) -> bool {
 }
 
 /// Lays out the faces of a chart so that every one comes near the shape that `charts.corner_uv` has for it on its own. Adds charts for what
-/// can be laid out; returns the rest as connected lists of faces.
-pub(super) fn refine(charts: &mut Charts, faces: &[u32], bounds: Bounds) -> Vec<Vec<u32>> {
+/// can be laid out; returns the rest as connected lists of faces. `heard` is called
+/// after every layout.
+pub(super) fn refine(charts: &mut Charts, faces: &[u32], bounds: Bounds, heard: &mut dyn FnMut()) -> Vec<Vec<u32>> {
     let mut left = Vec::new();
     let together = vec![false; faces.len()];
     let mut stack: Vec<_> = charts.pieces(faces, &together).into_iter().map(|(piece, _)| (piece, 0)).collect();
@@ -42,6 +43,7 @@ pub(super) fn refine(charts: &mut Charts, faces: &[u32], bounds: Bounds) -> Vec<
             charts.place(&faces, &disk, &layout.uv);
             Some(layout.parted)
         });
+        heard();
         match laid_out {
             Some(parted) => {
                 let pieces = charts.pieces(&faces, &parted);

@@ -8,7 +8,7 @@ use super::motion::motion;
 use super::price::SeamPrices;
 use super::seams::{Arc, arcs};
 use crate::min_area_rectangle::min_area_rectangle;
-use crate::parametrizer::Parametrizer;
+use crate::parametrizer::{Parametrizer, Progress, Stage};
 
 /// Longest side of a chart that sewing may make, relative to the square root of the area: longer ones waste the page.
 const MAX_EXTENT: f64 = 1.3;
@@ -44,10 +44,13 @@ pub(super) struct Sewing<'a, 'b> {
     pub(super) prices: &'b SeamPrices<'b>,
     pub(super) bounds: Bounds,
     pub(super) parametrizer: Option<&'b dyn Parametrizer>,
+    progress: &'b mut dyn FnMut(Progress),
     /// Charts that must stay as they are, and the first of those that are new; `None`: all are. Only seams of new ones are closed.
     pub(super) only: Option<(HashSet<u32>, u32)>,
     /// Faces that may still be laid out for trials.
     pub(super) work: usize,
+    /// Seams that were tried.
+    tried: usize,
     /// Longest side of a chart, metres.
     longest: f64,
     /// Arcs (first and last half-edge) that could not be closed.
@@ -62,10 +65,12 @@ impl<'a, 'b> Sewing<'a, 'b> {
         prices: &'b SeamPrices<'b>,
         bounds: Bounds,
         parametrizer: Option<&'b dyn Parametrizer>,
+        progress: &'b mut dyn FnMut(Progress),
     ) -> Self {
         let longest = MAX_EXTENT * charts.surface.area().sqrt();
         let (refused, refused_parts) = (HashSet::new(), HashSet::new());
-        Self { charts, prices, bounds, parametrizer, only: None, work: usize::MAX, longest, refused, refused_parts }
+        let (only, work, tried) = (None, usize::MAX, 0);
+        Self { charts, prices, bounds, parametrizer, progress, only, work, tried, longest, refused, refused_parts }
     }
 
     /// Closes whole arcs until none can be closed any more.
@@ -214,6 +219,8 @@ impl<'a, 'b> Sewing<'a, 'b> {
         };
         let Some(work) = self.work.checked_sub(faces.len()) else { return false };
         self.work = work;
+        self.tried += 1;
+        (self.progress)(Progress { stage: Stage::Seam, iteration: self.tried, energy: 0.0 });
         let both = |h: u32| std::iter::once(h as usize).chain(surface.twin(h as usize));
         // Between two charts every other common edge stays open.
         let opened: Vec<usize> = if same { Vec::new() } else { self.common_edges(left, right) };

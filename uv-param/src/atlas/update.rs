@@ -163,7 +163,7 @@ pub fn update_atlas(
     }
     if charts.members.len() as u32 > first_new {
         let prices = SeamPrices::new(&surface);
-        let mut sewing = Sewing::new(&mut charts, &prices, bounds, None);
+        let mut sewing = Sewing::new(&mut charts, &prices, bounds, None, &mut progress);
         sewing.only = Some((stay.clone(), first_new));
         sewing.close_arcs();
     }
