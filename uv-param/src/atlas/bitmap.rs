@@ -95,6 +95,11 @@ impl Bitmap {
         }
     }
 
+    /// Whether a cell is marked on both maps, which have the same size.
+    pub(super) fn meets(&self, other: &Self) -> bool {
+        self.bits.iter().zip(&other.bits).any(|(a, b)| a & b != 0)
+    }
+
     /// Marked cells.
     pub(super) fn count(&self) -> usize {
         self.bits.iter().map(|word| word.count_ones() as usize).sum()

@@ -1,6 +1,7 @@
 //! Charts onto pages: bottom-left on bitmaps, holes filled by the small ones, improved by local search.
 
 mod add;
+mod back;
 mod bottom_left;
 mod search;
 mod settings;
@@ -8,6 +9,7 @@ mod shape;
 
 use crate::error::Error;
 pub(super) use add::add_to;
+pub(super) use back::{Home, back};
 use search::{Goal, Packed, Plan, Stages, carry_out, carry_out_unlimited, search};
 pub use settings::{PackSettings, Page, Placement, Turns};
 pub(super) use settings::{check, check_pages};

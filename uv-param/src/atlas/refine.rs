@@ -81,7 +81,7 @@ pub(super) fn keep(charts: &mut Charts, pieces: Vec<(Vec<u32>, bool)>, bounds: B
 }
 
 /// Whether a layout keeps the bounds, without flips or overlaps.
-fn keeps(disk: &Disk, uv: &[[f64; 2]], bounds: Bounds) -> bool {
+pub(super) fn keeps(disk: &Disk, uv: &[[f64; 2]], bounds: Bounds) -> bool {
     Distortion::measure(disk, &disk.frames(), uv, bounds).within(bounds)
         && flips(uv, &disk.faces) == 0
         && boundary_is_simple(disk, uv)

@@ -4,6 +4,10 @@ use super::surface_point::SurfacePoint;
 use crate::clip::Polygon;
 use crate::triangle::orientation;
 
+/// Area that two faces may share, relative to the squared diagonal of their chart: a strip as long as the chart and a few roundings of a coordinate
+/// wide. The two sides of a slit in a flat piece touch, and when a chart is turned, each of their points is rounded on its own.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
 /// Faces by grid cell, in compressed rows.
 #[derive(Debug, Clone)]
 pub(super) struct Grid {
@@ -69,14 +73,19 @@ impl Grid {
         [index(0, self.columns), index(1, self.rows)]
     }
 
-    /// How many pairs of faces without a common edge lie on each other, and the area that they share: 0 for a chart that does
-    /// not overlap itself.
+    /// How many pairs of faces without a common edge lie on each other, by more than rounding can make, and the area that they share: 0 for a chart
+    /// that does not overlap itself.
     pub(super) fn overlap(&self, uv: &[[f64; 2]], faces: &[[u32; 3]]) -> (usize, f64) {
         let corners = |f: u32| faces[f as usize].map(|v| uv[v as usize]);
         let (mut pairs, mut sum) = (0, 0.0);
+        let size = [self.columns, self.rows].map(|cells| cells as f64 / self.cells_per_metre);
+        let rounding = ROUNDING * (size[0] * size[0] + size[1] * size[1]);
         self.each_overlap(uv, faces, |f, g| {
-            pairs += 1;
-            sum += common_area(corners(f), corners(g));
+            let area = common_area(corners(f), corners(g));
+            if area > rounding {
+                pairs += 1;
+                sum += area;
+            }
         });
         (pairs, sum)
     }
@@ -177,4 +186,23 @@ pub(crate) fn inside([a, b, c]: [[f64; 2]; 3], at: [f64; 2]) -> Option<[f64; 3]>
     }
     let sum = wa + wb + wc;
     (sum > 0.0).then(|| [wa / sum, wb / sum, wc / sum])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two squares of side 1, the second moved over the first by a little.
+    #[test]
+    fn overlaps_count_from_what_rounding_cannot_make() {
+        let faces = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
+        for (over, expected) in [(-0.1, 0), (0.0, 0), (1e-15, 0), (1e-12, 1), (0.1, 2)] {
+            let square = |x: f64| [[x, 0.0], [x + 1.0, 0.0], [x + 1.0, 1.0], [x, 1.0]];
+            let uv: Vec<[f64; 2]> = square(0.0).into_iter().chain(square(1.0 - over)).collect();
+            let (pairs, area) = Grid::new(&uv, &faces, [2.0, 1.0]).overlap(&uv, &faces);
+            assert!(pairs >= expected && (pairs > 0) == (expected > 0), "{over}: {pairs}");
+            let exact = if expected > 0 { over } else { 0.0 };
+            assert!((area - exact).abs() <= 1e-3 * exact, "{over}: {area}");
+        }
+    }
 }
