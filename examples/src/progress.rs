@@ -39,9 +39,25 @@ impl Stage {
             bar.set_position((1000.0 * share) as u64);
             return;
         }
+        self.line(&format!("{:.0} %", 100.0 * share));
+    }
+
+    /// Says what is being done where nobody knows how much of it is left.
+    pub fn tell(&self, what: &str) {
+        match &self.bar {
+            Some(bar) => {
+                bar.set_message(format!("{}: {what}", self.name));
+                bar.tick();
+            }
+            None => self.line(what),
+        }
+    }
+
+    /// A plain line, if none was printed for a while.
+    fn line(&self, what: &str) {
         let seconds = self.started.elapsed().as_secs();
         if self.told.fetch_max(seconds / INTERVAL_S, Ordering::Relaxed) < seconds / INTERVAL_S {
-            eprintln!("{:28} {:.0} % ({seconds} s)", self.name, 100.0 * share);
+            eprintln!("{:28} {what} ({seconds} s)", self.name);
         }
     }
 

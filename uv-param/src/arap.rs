@@ -124,6 +124,29 @@ pub(crate) fn fit_jacobians(
     (0..disk.positions.len()).map(|v| [right[v], right[size + v]]).collect()
 }
 
+/// Local/global iterations towards the nearest layout in which no length is changed by more than the factor `stretch`: every face asks for its
+/// own Jacobian, its singular values brought between `1 / stretch` and `stretch`. Faces within stay as they are, so that few iterations do where
+/// few faces are beyond. The Laplacian is factorised; it stops when a layout is `enough`.
+pub(crate) fn iterate_bounded(
+    disk: &Disk,
+    frames: &[Frame],
+    laplacian: &mut Laplacian,
+    uv: &mut Vec<[f64; 2]>,
+    stretch: f64,
+    iterations: usize,
+    enough: &mut dyn FnMut(&[[f64; 2]]) -> bool,
+) {
+    for _ in 0..iterations {
+        if enough(uv) {
+            return;
+        }
+        let jacobian =
+            |(face, frame): (&[u32; 3], &Frame)| frame.jacobian(face.map(|v| uv[v as usize])).bounded(stretch);
+        let jacobians: Vec<Jacobian> = disk.faces.iter().zip(frames).map(jacobian).collect();
+        *uv = fit_jacobians(disk, frames, &jacobians, laplacian);
+    }
+}
+
 /// Nearest rotation of every face, the right-hand side they make, and the energy of `x` (all u, then all v).
 fn local_step(disk: &Disk, frames: &[Frame], x: &[f64], rotations: &mut [[f64; 2]], right: &mut [f64]) -> f64 {
     let size = right.len() / 2;

@@ -103,7 +103,7 @@ impl Atlas {
         );
         pack::check(&settings.pack, surface.area())?;
         let (charts, members) = charting::charts(&surface, seams, &settings.charts, parametrizer, &mut progress)?;
-        let pieces: Vec<Piece> = charts.iter().map(|c| Piece { uv: c.uv(), faces: c.disk().faces() }).collect();
+        let pieces: Vec<Piece> = charts.iter().map(|c| Piece::new(c.uv(), c.disk().faces())).collect();
         let (placements, pages) = pack::pack(&pieces, &settings.pack)?;
         Self::of_parts(surface, report, charts, members, placements, pages, settings.pack.texel_m)
     }

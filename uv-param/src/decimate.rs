@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use crate::half_edges::BORDER;
 
 /// Share of the vertices that may go in one round: the cheapest.
-const SHARE: f64 = 0.5;
+const SHARE: f64 = 0.65;
 /// A round that removes less than this share of the faces is the last.
 const LEAST_GAIN: f64 = 0.01;
 /// Weight of the length of an edge against the distance from the old planes: vertices stay evenly spread.
@@ -39,29 +39,32 @@ pub(crate) fn decimate(
     let mut mesh = Mesh::new(positions, faces, twins, pinned);
     let mut alive = faces.len();
     let mut touched = vec![0_u32; positions.len()];
+    let mut left: Vec<u32> = (0..positions.len() as u32).collect();
     for round in 1.. {
         if alive <= target {
             break;
         }
-        let mut costs: Vec<f64> = vec![f64::INFINITY; positions.len()];
-        for v in 0..positions.len() as u32 {
-            costs[v as usize] = mesh.best(v).map_or(f64::INFINITY, |(cost, _)| cost);
-        }
-        let mut sorted: Vec<f64> = costs.iter().copied().filter(|cost| cost.is_finite()).collect();
+        left.retain(|&v| mesh.root[v as usize] == v);
+        // Whether the topology allows a collapse is asked of those that are taken: of few, and it takes as long as all the rest.
+        let found: Vec<Option<(f64, u32)>> = left.iter().map(|&v| mesh.best(v, false)).collect();
+        let mut sorted: Vec<f64> = found.iter().flatten().map(|(cost, _)| *cost).collect();
         if sorted.is_empty() {
             break;
         }
         let place = ((SHARE * sorted.len() as f64) as usize).min(sorted.len() - 1);
         let limit = *sorted.select_nth_unstable_by(place, f64::total_cmp).1;
         let before = alive;
-        for v in 0..positions.len() as u32 {
+        for (&v, found) in left.iter().zip(found) {
             if alive <= target {
                 break;
             }
-            if costs[v as usize] > limit || touched[v as usize] == round {
+            let Some((cost, onto)) = found else { continue };
+            if cost > limit || touched[v as usize] == round {
                 continue;
             }
-            let Some((_, onto)) = mesh.best(v) else { continue };
+            // Nothing around it has changed since; where the first choice is barred, the next ones are asked.
+            let onto = if mesh.is_sound(v, onto) { Some(onto) } else { mesh.best(v, true).map(|(_, onto)| onto) };
+            let Some(onto) = onto else { continue };
             for &h in &mesh.ring {
                 for corner in mesh.faces[h as usize / 3] {
                     touched[corner as usize] = round;
@@ -95,12 +98,17 @@ struct Mesh<'a> {
     dead: Vec<bool>,
     /// A half-edge that leaves each vertex.
     out: Vec<u32>,
+    /// Faces around each vertex, and whether it lies on the border.
+    count: Vec<u32>,
+    on_border: Vec<bool>,
     pinned: Vec<bool>,
     quadrics: Vec<Quadric>,
     root: Vec<u32>,
     /// The half-edges that leave the vertex that was looked at last.
     ring: Vec<u32>,
     other_ring: Vec<u32>,
+    /// Collapses of that vertex and what they cost.
+    candidates: Vec<(f64, u32)>,
     marks: Vec<u32>,
     mark: u32,
 }
@@ -139,23 +147,26 @@ impl<'a> Mesh<'a> {
             half_edge_source,
             dead: vec![false; faces.len()],
             out,
+            count,
+            on_border: vec![false; positions.len()],
             pinned: Vec::new(),
             quadrics,
             root,
             ring: Vec::new(),
             other_ring: Vec::new(),
+            candidates: Vec::new(),
             marks: vec![0; positions.len()],
             mark: 0,
         };
         // Where several fans of faces meet in a vertex nothing moves.
         for v in 0..positions.len() {
-            if count[v] == 0 {
+            if mesh.count[v] == 0 {
                 pinned[v] = true;
                 continue;
             }
             let mut ring = std::mem::take(&mut mesh.ring);
-            mesh.fan(v as u32, &mut ring);
-            pinned[v] |= ring.len() as u32 != count[v];
+            mesh.on_border[v] = mesh.fan(v as u32, &mut ring);
+            pinned[v] |= ring.len() as u32 != mesh.count[v];
             mesh.ring = ring;
         }
         mesh.pinned = pinned;
@@ -195,17 +206,18 @@ impl<'a> Mesh<'a> {
         true
     }
 
-    /// The cheapest collapse of a vertex that changes no topology: its cost, and the half-edge along which it goes, from either end.
-    /// The ring is that of the vertex afterwards.
-    fn best(&mut self, v: u32) -> Option<(f64, u32)> {
+    /// The cheapest collapse of a vertex that turns no face over, and, if `sound`, changes no topology: its cost, and the half-edge along
+    /// which it goes, from either end. The ring is that of the vertex afterwards.
+    fn best(&mut self, v: u32, sound: bool) -> Option<(f64, u32)> {
         if self.pinned[v as usize] || self.root[v as usize] != v {
             return None;
         }
         let mut ring = std::mem::take(&mut self.ring);
+        let mut candidates = std::mem::take(&mut self.candidates);
+        candidates.clear();
         let border = self.fan(v, &mut ring);
         let here = self.position(v);
         let area: f64 = ring.iter().map(|&h| self.doubled_area(h / 3)).sum();
-        let mut candidates: Vec<(f64, u32)> = Vec::with_capacity(ring.len());
         let mut offer = |h: u32, w: u32| {
             let there = self.position(w);
             let error = distance(&self.quadrics[v as usize], there) + distance(&self.quadrics[w as usize], there);
@@ -219,10 +231,27 @@ impl<'a> Mesh<'a> {
                 offer(previous(h), self.start(previous(h)));
             }
         }
-        candidates.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let found = candidates.into_iter().find(|&(_, h)| self.allowed(v, h, &ring, border));
-        self.ring = ring;
+        let mut found = None;
+        while found.is_none() && !candidates.is_empty() {
+            let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+            let least = (1..candidates.len())
+                .fold(0, |least, i| if order(&candidates[i], &candidates[least]).is_lt() { i } else { least });
+            let candidate = candidates.swap_remove(least);
+            let allowed = self.keeps_shapes(v, candidate.1, &ring)
+                && (!sound || self.keeps_topology(v, candidate.1, &ring, border));
+            found = allowed.then_some(candidate);
+        }
+        (self.ring, self.candidates) = (ring, candidates);
         found
+    }
+
+    /// Whether a collapse changes no topology. The ring is that of the vertex afterwards.
+    fn is_sound(&mut self, v: u32, onto: u32) -> bool {
+        let mut ring = std::mem::take(&mut self.ring);
+        let border = self.fan(v, &mut ring);
+        let sound = self.keeps_topology(v, onto, &ring, border);
+        self.ring = ring;
+        sound
     }
 
     fn doubled_area(&self, face: u32) -> f64 {
@@ -235,12 +264,17 @@ impl<'a> Mesh<'a> {
         if self.start(h) == v { self.start(next(h)) } else { self.start(h) }
     }
 
-    fn allowed(&mut self, v: u32, onto: u32, ring: &[u32], border: bool) -> bool {
+    /// The faces that go with a half-edge.
+    fn gone(&self, onto: u32) -> [Option<u32>; 2] {
+        [Some(onto / 3), self.twin(onto).map(|twin| twin / 3)]
+    }
+
+    fn keeps_topology(&mut self, v: u32, onto: u32, ring: &[u32], border: bool) -> bool {
         let w = self.end(onto, v);
         if self.pinned[w as usize] && self.out[w as usize] == BORDER {
             return false;
         }
-        let gone = [Some(onto / 3), self.twin(onto).map(|twin| twin / 3)];
+        let gone = self.gone(onto);
         if border && ring.len() < 2 {
             return false;
         }
@@ -268,19 +302,23 @@ impl<'a> Mesh<'a> {
         let faces = gone.iter().flatten().count();
         let mut sound = common == faces + 2;
         for h in [Some(onto), self.twin(onto)].into_iter().flatten() {
-            let on_border = self.fan(self.start(previous(h)), &mut other);
-            sound &= other.len() > if on_border { 1 } else { 3 };
+            let apex = self.start(previous(h)) as usize;
+            sound &= self.count[apex] > if self.on_border[apex] { 1 } else { 3 };
         }
         self.other_ring = other;
-        let there = self.position(w);
         sound
-            && ring.iter().filter(|&&h| !gone.contains(&Some(h / 3))).all(|&h| {
-                let [a, b] = [self.start(next(h)), self.start(previous(h))].map(|v| self.position(v));
-                let old = (a - self.position(v)).cross(&(b - self.position(v)));
-                let new = (a - there).cross(&(b - there));
-                let longest = (a - there).norm_squared().max((b - there).norm_squared()).max((b - a).norm_squared());
-                new.norm() > LEAST_SHAPE * longest && new.dot(&old) > MAX_TURN * new.norm() * old.norm()
-            })
+    }
+
+    fn keeps_shapes(&self, v: u32, onto: u32, ring: &[u32]) -> bool {
+        let gone = self.gone(onto);
+        let (here, there) = (self.position(v), self.position(self.end(onto, v)));
+        ring.iter().filter(|&&h| !gone.contains(&Some(h / 3))).all(|&h| {
+            let [a, b] = [self.start(next(h)), self.start(previous(h))].map(|v| self.position(v));
+            let old = (a - here).cross(&(b - here));
+            let new = (a - there).cross(&(b - there));
+            let longest = (a - there).norm_squared().max((b - there).norm_squared()).max((b - a).norm_squared());
+            new.norm() > LEAST_SHAPE * longest && new.dot(&old) > MAX_TURN * new.norm() * old.norm()
+        })
     }
 
     /// Takes a vertex, whose ring is at hand, along a half-edge; returns the number of faces that go.
@@ -295,6 +333,7 @@ impl<'a> Mesh<'a> {
             let sides = [next(h), previous(h)];
             let twins = sides.map(|side| self.twin(side));
             let apex = self.start(previous(h));
+            self.count[apex as usize] -= 1;
             for k in 0..2 {
                 if let Some(twin) = twins[k] {
                     self.twins[twin as usize] = twins[1 - k].unwrap_or(BORDER);
@@ -317,6 +356,9 @@ impl<'a> Mesh<'a> {
             self.faces[h as usize / 3][h as usize % 3] = w;
             self.out[w as usize] = h;
         }
+        // The faces that go had been around both.
+        self.count[w as usize] += ring.len() as u32;
+        self.count[w as usize] -= 2 * gone as u32;
         let quadric = self.quadrics[v as usize];
         add(&mut self.quadrics[w as usize], &quadric);
         self.root[v as usize] = w;

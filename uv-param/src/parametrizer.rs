@@ -63,6 +63,10 @@ pub enum Stage {
     Arap,
     /// A cut was made by [`crate::unwrap_with_cuts`]; the iteration is the number of cuts so far.
     Cut,
+    /// Closing a seam of an atlas was tried; the iteration counts them, energy 0.
+    Seam,
+    /// Seams that were found on a coarse surface: a chart of the fine one was laid out, or could not be; the iteration counts them, energy 0.
+    Level,
     /// A chart of an atlas is finished; the iteration is its number.
     Chart,
     /// Newton iterations on the symmetric Dirichlet energy.

@@ -215,19 +215,19 @@ impl FaceLookup {
         Self(vec![BORDER; surface.faces.len()])
     }
 
-    fn set(&mut self, faces: &[u32]) {
+    pub(crate) fn set(&mut self, faces: &[u32]) {
         for (local, &f) in faces.iter().enumerate() {
             self.0[f as usize] = local as u32;
         }
     }
 
-    fn clear(&mut self, faces: &[u32]) {
+    pub(crate) fn clear(&mut self, faces: &[u32]) {
         for &f in faces {
             self.0[f as usize] = BORDER;
         }
     }
 
-    fn get(&self, face: usize) -> Option<usize> {
+    pub(crate) fn get(&self, face: usize) -> Option<usize> {
         (self.0[face] != BORDER).then(|| self.0[face] as usize)
     }
 }

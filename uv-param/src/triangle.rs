@@ -90,6 +90,24 @@ impl Jacobian {
         (length > 0.0).then(|| [p / length, q / length])
     }
 
+    /// The nearest map whose singular values lie between `1 / stretch` and `stretch`: never a mirrored one.
+    pub(crate) fn bounded(self, stretch: f64) -> Self {
+        let [s1, s2] = self.stretch();
+        let (low, high) = (1.0 / stretch, stretch);
+        if s2 >= low && s1 <= high {
+            return self;
+        }
+        // In the basis of sums and differences a map is a rotation times (s1 + s2) / 2 and a reflection times (s1 - s2) / 2.
+        let [t1, t2] = [s1.clamp(low, high), s2.clamp(low, high)];
+        let part = |x: f64, y: f64, wanted: f64| {
+            let length = length(x, y);
+            if length > 0.0 { [x * wanted / length, y * wanted / length] } else { [wanted, 0.0] }
+        };
+        let [p, q] = part(self.a + self.d, self.c - self.b, t1 + t2);
+        let [r, s] = part(self.a - self.d, self.c + self.b, t1 - t2);
+        Self { a: 0.5 * (p + r), b: 0.5 * (s - q), c: 0.5 * (s + q), d: 0.5 * (p - r) }
+    }
+
     /// `|J - R|^2 = (s1 - 1)^2 + (s2 - 1)^2` for the nearest rotation R.
     pub(crate) fn rigidity(&self) -> f64 {
         let [p, q] = self.nearest_rotation().unwrap_or([1.0, 0.0]);
@@ -130,4 +148,40 @@ pub(crate) fn orientation(uv: [[f64; 2]; 3]) -> f64 {
 /// Number of triangles that are not strictly counter-clockwise, by the exact predicate.
 pub(crate) fn flips(uv: &[[f64; 2]], faces: &[[u32; 3]]) -> usize {
     faces.iter().filter(|face| orientation(face.map(|v| uv[v as usize])) <= 0.0).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn turned(angle: f64) -> [[f64; 2]; 2] {
+        [[angle.cos(), -angle.sin()], [angle.sin(), angle.cos()]]
+    }
+
+    /// Two turns around a stretch.
+    fn map(left: f64, [s1, s2]: [f64; 2], right: f64) -> Jacobian {
+        let (u, v) = (turned(left), turned(right));
+        let entry = |i: usize, j: usize| u[i][0] * s1 * v[0][j] + u[i][1] * s2 * v[1][j];
+        Jacobian { a: entry(0, 0), b: entry(0, 1), c: entry(1, 0), d: entry(1, 1) }
+    }
+
+    #[test]
+    fn a_bounded_map_keeps_its_directions() {
+        // Singular values, and what becomes of them within a factor of 1.25; the last map is mirrored.
+        let cases = [
+            ([1.1, 0.9], [1.1, 0.9]),
+            ([1.7, 0.9], [1.25, 0.9]),
+            ([1.1, 0.3], [1.1, 0.8]),
+            ([0.5, 0.2], [0.8, 0.8]),
+            ([1.4, -0.2], [1.25, 0.8]),
+        ];
+        for (found, expected) in cases {
+            for (left, right) in [(0.3, -1.2), (2.0, 0.7), (-2.9, 3.0)] {
+                let [got, wanted] = [map(left, found, right).bounded(1.25), map(left, expected, right)];
+                for (x, y) in [(got.a, wanted.a), (got.b, wanted.b), (got.c, wanted.c), (got.d, wanted.d)] {
+                    assert!((x - y).abs() < 1e-12, "{got:?} {wanted:?}");
+                }
+            }
+        }
+    }
 }

@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use uv_param::{
-    Atlas, AtlasLayout, AtlasQuality, AtlasSettings, AtlasUpdate, ChartSettings, PackSettings, PageTexels, Turns,
-    unwrap_atlas, update_atlas,
+    Atlas, AtlasLayout, AtlasQuality, AtlasSettings, AtlasUpdate, ChartSettings, PackSettings, PageTexels, Progress,
+    Turns, unwrap_atlas, update_atlas,
 };
 
 use super::arguments::Arguments;
@@ -95,9 +95,15 @@ fn unwrap(
         },
     };
     let stage = Stage::start("unwrap");
+    let progress = |at: Progress| match at.stage {
+        uv_param::Stage::Seam => stage.tell(&format!("{} seams tried", at.iteration)),
+        uv_param::Stage::Level => stage.tell(&format!("{} charts of the fine surface tried", at.iteration)),
+        uv_param::Stage::Chart => stage.tell(&format!("{} charts finished", at.iteration)),
+        _ => {}
+    };
     let laid_out = match earlier {
-        None => unwrap_atlas(&positions, &mesh.faces, seams, &settings, |_| ()).map(|atlas| (atlas, None)),
-        Some(earlier) => update_atlas(earlier, &positions, &mesh.faces, seams, &settings, |_| ())
+        None => unwrap_atlas(&positions, &mesh.faces, seams, &settings, progress).map(|atlas| (atlas, None)),
+        Some(earlier) => update_atlas(earlier, &positions, &mesh.faces, seams, &settings, progress)
             .map(|(atlas, update)| (atlas, Some(update))),
     };
     let (atlas, update) = laid_out.map_err(|source| UnwrapError::Atlas { path: arguments.mesh.clone(), source })?;

@@ -7,7 +7,8 @@ use super::fit::Bounds;
 use super::layout::Charts;
 use super::mend::mend;
 use super::motion::motion;
-use super::refine::{is_small, keep, pieces};
+use super::price::SeamPrices;
+use super::refine::{is_small, keep};
 use super::seams::{Arc, arcs};
 
 /// Share of a seam's length by which its two sides may differ in shape.
@@ -17,7 +18,7 @@ const ROUNDS: usize = 2;
 
 /// Offers every small chart to the large one with which it has the longest seam, then to the next; charts for which `stays` holds are not
 /// touched.
-pub(super) fn absorb(charts: &mut Charts, prices: &[f32], bounds: Bounds, stays: &HashSet<u32>) {
+pub(super) fn absorb(charts: &mut Charts, prices: &SeamPrices, bounds: Bounds, stays: &HashSet<u32>) {
     // First face of the guest, and host.
     let mut refused: HashSet<(u32, u32)> = HashSet::new();
     for _ in 0..ROUNDS {
@@ -35,7 +36,7 @@ pub(super) fn absorb(charts: &mut Charts, prices: &[f32], bounds: Bounds, stays:
 /// For every host the guests, and the seams (half-edges of the host) that are to close.
 fn invitations(
     charts: &Charts,
-    prices: &[f32],
+    prices: &SeamPrices,
     stays: &HashSet<u32>,
     refused: &HashSet<(u32, u32)>,
 ) -> BTreeMap<u32, Vec<(u32, Vec<u32>)>> {
@@ -45,7 +46,7 @@ fn invitations(
         if left == right || charts.wanted[half_edges[0] as usize] || stays.contains(&left) || stays.contains(&right) {
             continue;
         }
-        let price: f64 = half_edges.iter().map(|&h| f64::from(prices[h as usize])).sum();
+        let price = prices.sum(&half_edges);
         for (guest, host) in [(left, right), (right, left)] {
             let known = best.get(&guest).is_some_and(|(found, ..)| *found >= price);
             let barred = refused.contains(&(charts.members[guest as usize][0], host));
@@ -84,7 +85,7 @@ fn take(charts: &mut Charts, host: u32, guests: &[(u32, Vec<u32>)], bounds: Boun
         let start = charts.vertex_uv(&faces, &disk, |_, at| at);
         let is_guest: Vec<bool> = faces.iter().map(|f| coming.contains(f)).collect();
         let found = mend(&disk, start, &is_guest, bounds)?;
-        let pieces = pieces(charts, &faces, &found.parted);
+        let pieces = charts.pieces(&faces, &found.parted);
         // As many charts as before are no gain.
         (pieces.len() <= guests.len()).then(|| charts.place(&faces, &disk, &found.uv)).map(|()| pieces)
     });

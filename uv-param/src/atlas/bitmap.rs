@@ -44,38 +44,60 @@ impl Bitmap {
         }
     }
 
-    /// The cells that the triangles touch, each side `cell` long, from the lower left corner of the coordinates.
-    pub(super) fn of_triangles(corners: impl Iterator<Item = [[f64; 2]; 3]>, size: [f64; 2], cell: f64) -> Self {
+    /// The cells that a shape touches, each side `cell` long, from the lower left corner of the coordinates. The edges run around it, in any order;
+    /// parts that they run around more than once, or the other way round, count as well.
+    pub(super) fn within(edges: impl Iterator<Item = [[f64; 2]; 2]>, size: [f64; 2], cell: f64) -> Self {
         let count = |length: f64| ((length / cell).ceil() as usize).max(1);
         let mut map = Self::new(count(size[0]), count(size[1]));
-        for triangle in corners {
-            map.add_triangle(triangle.map(|p| p.map(|x| x / cell)));
+        // Where edges cross the middles of the rows: row, column, and whether upwards.
+        let mut crossings: Vec<(usize, f64, i32)> = Vec::new();
+        for [p, q] in edges.map(|edge| edge.map(|p| p.map(|x| x / cell))) {
+            map.add_edge(p, q);
+            let (low, high, way) = if p[1] < q[1] { (p, q, 1) } else { (q, p, -1) };
+            let from = (low[1] - 0.5).ceil().max(0.0) as usize;
+            let rows = (from..map.rows).take_while(|&row| row as f64 + 0.5 < high[1]);
+            crossings.extend(rows.map(|row| {
+                let along = (row as f64 + 0.5 - low[1]) / (high[1] - low[1]);
+                (row, low[0] + along * (high[0] - low[0]), way)
+            }));
+        }
+        crossings.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+        let mut around = 0;
+        for pair in crossings.windows(2) {
+            around += pair[0].2;
+            if around != 0 && pair[0].0 == pair[1].0 {
+                let [from, to] = [pair[0].1, pair[1].1].map(|x| last(map.columns, x));
+                map.set(from, to, pair[0].0);
+            }
         }
         map
     }
 
-    fn add_triangle(&mut self, corners: [[f64; 2]; 3]) {
-        let last = |count: usize, x: f64| (x.max(0.0) as usize).min(count - 1);
-        let [low, high] = [f64::min, f64::max].map(|pick| pick(pick(corners[0][1], corners[1][1]), corners[2][1]));
-        for row in last(self.rows, low)..=last(self.rows, high) {
+    /// Marks the cells that an edge touches.
+    fn add_edge(&mut self, p: [f64; 2], q: [f64; 2]) {
+        for row in last(self.rows, p[1].min(q[1]))..=last(self.rows, p[1].max(q[1])) {
             let (bottom, top) = (row as f64, row as f64 + 1.0);
             let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
             let mut reach = |x: f64| (left, right) = (left.min(x), right.max(x));
-            for k in 0..3 {
-                let (p, q) = (corners[k], corners[(k + 1) % 3]);
-                if (bottom..=top).contains(&p[1]) {
-                    reach(p[0]);
+            for end in [p, q] {
+                if (bottom..=top).contains(&end[1]) {
+                    reach(end[0]);
                 }
-                for line in [bottom, top] {
-                    if (p[1] < line) != (q[1] < line) {
-                        reach(p[0] + (line - p[1]) / (q[1] - p[1]) * (q[0] - p[0]));
-                    }
+            }
+            for line in [bottom, top] {
+                if (p[1] < line) != (q[1] < line) {
+                    reach(p[0] + (line - p[1]) / (q[1] - p[1]) * (q[0] - p[0]));
                 }
             }
             if left <= right {
                 self.set(last(self.columns, left), last(self.columns, right), row);
             }
         }
+    }
+
+    /// Whether a cell is marked on both maps, which have the same size.
+    pub(super) fn meets(&self, other: &Self) -> bool {
+        self.bits.iter().zip(&other.bits).any(|(a, b)| a & b != 0)
     }
 
     /// Marked cells.
@@ -178,6 +200,11 @@ impl Bitmap {
     }
 }
 
+/// The cell of a coordinate, the nearest one outside.
+fn last(count: usize, x: f64) -> usize {
+    (x.max(0.0) as usize).min(count - 1)
+}
+
 /// Bit `i` of the result: whether one of the bits `i..=i + by` of the row is set.
 fn spread_down(row: &[u64], by: usize, out: &mut Vec<u64>) {
     out.clear();
@@ -276,13 +303,27 @@ mod tests {
 
     #[test]
     fn a_thin_triangle_marks_every_cell_that_it_crosses() {
-        let triangle = [[0.1, 0.1], [9.9, 4.9], [9.8, 4.95]];
-        let map = Bitmap::of_triangles(std::iter::once(triangle), [10.0, 5.0], 1.0);
+        let [a, b, c] = [[0.1, 0.1], [9.9, 4.9], [9.8, 4.95]];
+        let map = Bitmap::within([[a, b], [b, c], [c, a]].into_iter(), [10.0, 5.0], 1.0);
         for i in 0..1000 {
             let t = f64::from(i) / 999.0;
             let at = [0.1 + t * 9.8, 0.1 + t * 4.8];
             assert!(map.get(at[0] as usize, at[1] as usize), "{at:?}");
         }
         assert!(!map.get(0, 4) && !map.get(9, 0));
+    }
+
+    /// A frame, its corners at odd places: every cell by points on a fine grid.
+    #[test]
+    fn cells_inside_are_marked_and_holes_are_not() {
+        let square = |low: f64, high: f64| [[low, low], [high, low], [high, high], [low, high]];
+        let around = |corners: [[f64; 2]; 4]| (0..4).map(move |k| [corners[k], corners[(k + 1) % 4]]);
+        let mut hole = square(5.3, 12.6);
+        hole.reverse();
+        let map = Bitmap::within(around(square(0.2, 17.5)).chain(around(hole)), [18.0, 18.0], 1.0);
+        for (column, row) in (0..18).flat_map(|column| (0..18).map(move |row| (column, row))) {
+            let free = |k: usize| (6..12).contains(&k);
+            assert_eq!(map.get(column, row), !(free(column) && free(row)), "{column} {row}");
+        }
     }
 }

@@ -7,7 +7,7 @@ use super::add_region::add_region;
 use super::fit::{Bounds, Distortion, POWER, fit};
 use super::layout::Charts;
 use super::levels::transfer;
-use super::price::{angle_deficits, seam_prices};
+use super::price::{SeamPrices, angle_deficits};
 use super::refine::{is_small, refine};
 use super::regions::regions;
 use super::sew::Sewing;
@@ -25,8 +25,8 @@ use crate::unwrap::{Settings, parametrize};
 const ROUNDS: usize = 2;
 /// Surfaces of more faces are cut on a coarser one: below, the seams that are found without it are shorter and take no longer.
 const COARSE_FROM: usize = 40_000;
-/// Faces of that one: so many, and a part of all, but no more than the last.
-const COARSE_TO: [usize; 3] = [5_000, 40, 14_000];
+/// Faces of that one.
+const COARSE_TO: usize = 8_000;
 /// Stretch beyond 1 that is allowed there, as a share of the bound.
 const COARSE_SHARE: f64 = 0.9;
 /// Faces that may be laid out in trials to sew small charts of a fine surface: so many, and a part of all.
@@ -89,15 +89,20 @@ pub(super) fn charts(
     let bounds = settings.bounds();
     let mut charts = Charts::new(surface, wanted_seams(surface, seams)?);
     let whole = if surface.faces().len() > COARSE_FROM && parametrizer.is_none() {
-        by_coarse(&mut charts, bounds)
+        by_coarse(&mut charts, bounds, progress)
     } else {
-        cut_open(&mut charts, bounds, parametrizer)
+        cut_open(&mut charts, bounds, parametrizer, progress)
     };
     finish(charts, &Kept { whole: &whole, sizes: &HashMap::new() }, settings, parametrizer, progress)
 }
 
 /// Every face in a chart within the bounds. Returns the charts that are whole parts, in the layout that [`crate::unwrap`] makes.
-fn cut_open(charts: &mut Charts, bounds: Bounds, parametrizer: Option<&dyn Parametrizer>) -> Vec<u32> {
+fn cut_open(
+    charts: &mut Charts,
+    bounds: Bounds,
+    parametrizer: Option<&dyn Parametrizer>,
+    progress: &mut dyn FnMut(Progress),
+) -> Vec<u32> {
     let surface = charts.surface;
     let mut region = regions(surface, &charts.wanted);
     let whole = whole_parts(charts, bounds, parametrizer, |_| true);
@@ -111,12 +116,12 @@ fn cut_open(charts: &mut Charts, bounds: Bounds, parametrizer: Option<&dyn Param
     for faces in lists {
         add_region(charts, faces, bounds, parametrizer);
     }
-    let (prices, deficits) = (seam_prices(surface), angle_deficits(surface));
+    let (prices, deficits) = (SeamPrices::new(surface), angle_deficits(surface));
     for round in 0..ROUNDS {
-        let mut sewing = Sewing::new(charts, &prices, &deficits, bounds, parametrizer);
+        let mut sewing = Sewing::new(charts, &prices, bounds, parametrizer, progress);
         sewing.close_arcs();
         if round > 0 {
-            sewing.close_parts();
+            sewing.close_parts(&deficits);
         }
         straighten(charts, &prices, &|disk, start| fit(disk, start, bounds, parametrizer));
     }
@@ -144,33 +149,35 @@ fn whole_parts(
 }
 
 /// As [`cut_open`] for surfaces of many faces: seams are found on a coarser one, and the charts laid out anew on the fine one.
-fn by_coarse(charts: &mut Charts, bounds: Bounds) -> Vec<u32> {
+fn by_coarse(charts: &mut Charts, bounds: Bounds, progress: &mut dyn FnMut(Progress)) -> Vec<u32> {
     let surface = charts.surface;
-    let [least, part, most] = COARSE_TO;
-    let target = (least + surface.faces().len() / part).min(most);
-    let (coarse, half_edges, roots) = surface.coarser(|h| charts.wanted[h], target);
+    let (coarse, half_edges, roots) = surface.coarser(|h| charts.wanted[h], COARSE_TO);
     let wanted = half_edges.iter().map(|&h| charts.wanted[h as usize]).collect();
     let mut model = Charts::new(&coarse, wanted);
     // What is finer than the coarse faces bends the charts as well.
     let stricter = Bounds { stretch: 1.0 + COARSE_SHARE * (bounds.stretch - 1.0), worst: bounds.worst };
-    let whole = cut_open(&mut model, stricter, None);
+    let whole = cut_open(&mut model, stricter, None, progress);
     let flat: HashSet<usize> = whole.iter().map(|&c| coarse.part(model.members[c as usize][0] as usize)).collect();
     let whole = whole_parts(charts, bounds, None, |part| flat.contains(&part));
 
-    let prices = seam_prices(surface);
+    let prices = SeamPrices::new(surface);
     let first = charts.members.len();
     transfer(&model, &roots, charts);
     let faces_per_edge = (surface.faces().len() as f64 / coarse.faces().len() as f64).sqrt();
     straighten_unlaid(charts, &prices, faces_per_edge.ceil() as usize);
     let found = charts.members.split_off(first);
-    let left: Vec<Vec<u32>> = found.iter().flat_map(|faces| refine(charts, faces, bounds)).collect();
+    let mut laid_out = 0;
+    let mut heard = || {
+        laid_out += 1;
+        progress(Progress { stage: Stage::Level, iteration: laid_out, energy: 0.0 });
+    };
+    let left: Vec<Vec<u32>> = found.iter().flat_map(|faces| refine(charts, faces, bounds, &mut heard)).collect();
     for faces in left {
         add_region(charts, faces, bounds, None);
     }
     let is_large = |c: &u32| !is_small(charts, charts.members[*c as usize].len());
     let kept: HashSet<u32> = (0..charts.members.len() as u32).filter(is_large).chain(whole.iter().copied()).collect();
-    let deficits = angle_deficits(surface);
-    let mut sewing = Sewing::new(charts, &prices, &deficits, bounds, None);
+    let mut sewing = Sewing::new(charts, &prices, bounds, None, progress);
     sewing.only = Some((kept, 0));
     sewing.work = SEWING_WORK[0] + surface.faces().len() / SEWING_WORK[1];
     sewing.close_arcs();

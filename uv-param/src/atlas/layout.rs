@@ -48,6 +48,28 @@ impl<'a> Charts<'a> {
         piece
     }
 
+    /// Connected pieces of some faces, each all marked or all not; every piece ascending.
+    pub(super) fn pieces(&mut self, faces: &[u32], marked: &[bool]) -> Vec<(Vec<u32>, bool)> {
+        self.lookup.set(faces);
+        let mut seen = vec![false; faces.len()];
+        let mut found = Vec::new();
+        for (local, &start) in faces.iter().enumerate() {
+            if std::mem::replace(&mut seen[local], true) {
+                continue;
+            }
+            let mark = marked[local];
+            let takes = |g: u32| {
+                let local = self.lookup.get(g as usize).filter(|&local| marked[local] == mark);
+                local.is_some_and(|local| !std::mem::replace(&mut seen[local], true))
+            };
+            let mut piece = self.piece(start, takes);
+            piece.sort_unstable();
+            found.push((piece, mark));
+        }
+        self.lookup.clear(faces);
+        found
+    }
+
     /// Whether the two sides of an inner edge are apart in the plane.
     pub(super) fn is_seam(&self, h: usize) -> bool {
         self.cut[h]

@@ -19,6 +19,7 @@ pub(super) fn transfer(coarse: &Charts, roots: &[u32], fine: &mut Charts) {
     let surface = fine.surface;
     let planes: Vec<Plane> = (0..coarse.surface.faces().len()).map(|f| Plane::new(coarse, f)).collect();
     let around = Around::new(coarse);
+    let prisms: Vec<Prism> = (0..planes.len()).map(|f| Prism::new(coarse, f)).collect();
     let free: Vec<bool> = fine.chart.iter().map(|&c| c == NONE).collect();
     let mut nearest: Vec<u32> = (0..free.len())
         .map(|f| {
@@ -26,31 +27,35 @@ pub(super) fn transfer(coarse: &Charts, roots: &[u32], fine: &mut Charts) {
                 return NONE;
             }
             let [a, b, c] = surface.corners(f).map(Vector3::from);
-            around.nearest(coarse, roots[surface.faces()[f][0] as usize], (a + b + c) / 3.0)
+            around.nearest(coarse, &prisms, roots[surface.faces()[f][0] as usize], (a + b + c) / 3.0)
         })
         .collect();
     let edges = 3 * planes.len();
     let length = (0..edges).map(|h| coarse.surface.edge(h).norm()).sum::<f64>() / edges as f64;
     let first = fine.members.len() as u32;
+    let mut changed: Vec<usize> = (0..free.len()).filter(|&f| free[f]).collect();
     for _ in 0..ROUNDS {
-        for (f, &near) in nearest.iter().enumerate().filter(|(_, near)| **near != NONE) {
-            fine.chart[f] = first + coarse.chart[near as usize];
-            let unfolded = planes[near as usize].unfold(surface.corners(f).map(Vector3::from));
+        for &f in &changed {
+            let near = nearest[f] as usize;
+            fine.chart[f] = first + coarse.chart[near];
+            let unfolded = planes[near].unfold(surface.corners(f).map(Vector3::from));
             fine.corner_uv[3 * f..3 * f + 3].copy_from_slice(&unfolded);
         }
         let next = |h: usize| h / 3 * 3 + (h + 1) % 3;
-        for h in (0..3 * free.len()).filter(|h| free[h / 3]) {
+        for h in changed.iter().flat_map(|&f| 3 * f..3 * f + 3) {
             let Some(twin) = surface.twin(h) else { continue };
             let sides = [nearest[h / 3], nearest[twin / 3]];
-            fine.cut[h] = fine.chart[h / 3] == fine.chart[twin / 3]
+            let cut = fine.chart[h / 3] == fine.chart[twin / 3]
                 && parted(coarse, sides).unwrap_or_else(|| {
                     let uv = &fine.corner_uv;
                     let middle = |h: usize| [0, 1].map(|k| 0.5 * (uv[h][k] + uv[next(h)][k]));
                     let (one, other) = (middle(h), middle(twin));
                     (one[0] - other[0]).hypot(one[1] - other[1]) > APART * length
                 });
+            (fine.cut[h], fine.cut[twin]) = (cut, cut);
         }
-        if adopt(fine, &free, &mut nearest) == 0 {
+        changed = adopt(fine, &free, &mut nearest);
+        if changed.is_empty() {
             break;
         }
     }
@@ -94,8 +99,8 @@ fn parted(coarse: &Charts, [f, g]: [u32; 2]) -> Option<bool> {
     [walk(true), walk(false)].into_iter().flatten().min().map(|(_, crossed)| crossed)
 }
 
-/// Gives what is cut off from the largest piece of its chart to the piece beside it; returns the number of faces.
-fn adopt(charts: &Charts, free: &[bool], nearest: &mut [u32]) -> usize {
+/// Gives what is cut off from the largest piece of its chart to the piece beside it; returns these faces.
+fn adopt(charts: &Charts, free: &[bool], nearest: &mut [u32]) -> Vec<usize> {
     let surface = charts.surface;
     let mut piece = vec![NONE; free.len()];
     let mut sizes: Vec<(u32, u32)> = Vec::new();
@@ -130,7 +135,7 @@ fn adopt(charts: &Charts, free: &[bool], nearest: &mut [u32]) -> usize {
     let stays = |f: usize| largest[charts.chart[f] as usize].1 == piece[f];
     let mut settled: Vec<bool> = (0..free.len()).map(|f| free[f] && stays(f)).collect();
     let mut front: Vec<usize> = (0..free.len()).filter(|&f| settled[f]).collect();
-    let (mut at, mut count) = (0, 0);
+    let (mut at, mut adopted) = (0, Vec::new());
     while let Some(&f) = front.get(at) {
         at += 1;
         for h in 3 * f..3 * f + 3 {
@@ -141,11 +146,11 @@ fn adopt(charts: &Charts, free: &[bool], nearest: &mut [u32]) -> usize {
                 settled[other] = true;
                 nearest[other] = nearest[f];
                 front.push(other);
-                count += 1;
+                adopted.push(other);
             }
         }
     }
-    count
+    adopted
 }
 
 /// The plane of a coarse face, and where it lies in its chart.
@@ -215,15 +220,14 @@ impl Around {
     }
 
     /// The face nearest to a point, going downhill from those around a vertex.
-    fn nearest(&self, charts: &Charts, start: u32, point: Vector3<f64>) -> u32 {
-        let distance = |f: u32| squared_distance(charts.surface.corners(f as usize).map(Vector3::from), point);
+    fn nearest(&self, charts: &Charts, prisms: &[Prism], start: u32, point: Vector3<f64>) -> u32 {
         let mut best = (f64::INFINITY, NONE);
         let mut from = [start; 3];
         loop {
             let before = best.1;
             for v in from {
                 for &f in self.of(v).iter().filter(|&&f| f != before) {
-                    let found = distance(f);
+                    let found = prisms[f as usize].squared_distance(point, best.0);
                     if found < best.0 || found <= best.0 && f < best.1 {
                         best = (found, f);
                     }
@@ -237,18 +241,36 @@ impl Around {
     }
 }
 
-/// Squared distance of a point from a triangle.
-fn squared_distance([a, b, c]: [Vector3<f64>; 3], point: Vector3<f64>) -> f64 {
-    let normal = (b - a).cross(&(c - a));
-    let corners = [a, b, c];
-    let inside = |k: usize| (corners[(k + 1) % 3] - corners[k]).cross(&(point - corners[k])).dot(&normal) >= 0.0;
-    if (0..3).all(inside) {
-        return (point - a).dot(&normal).powi(2) / normal.norm_squared().max(f64::MIN_POSITIVE);
+/// A triangle and what lies above and below it.
+struct Prism {
+    corners: [Vector3<f64>; 3],
+    normal: Vector3<f64>,
+    /// Unit normals of the sides, inwards.
+    inwards: [Vector3<f64>; 3],
+}
+
+impl Prism {
+    fn new(charts: &Charts, f: usize) -> Self {
+        let corners = charts.surface.corners(f).map(Vector3::from);
+        let normal = unit((corners[1] - corners[0]).cross(&(corners[2] - corners[0])));
+        let inwards = [0, 1, 2].map(|k| unit(normal.cross(&(corners[(k + 1) % 3] - corners[k]))));
+        Self { corners, normal, inwards }
     }
-    let to_edge = |k: usize| {
-        let edge = corners[(k + 1) % 3] - corners[k];
-        let t = ((point - corners[k]).dot(&edge) / edge.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        (point - corners[k] - t * edge).norm_squared()
-    };
-    to_edge(0).min(to_edge(1)).min(to_edge(2))
+
+    /// Squared distance of a point from the triangle, or something not below `limit` if it is not below that.
+    fn squared_distance(&self, point: Vector3<f64>, limit: f64) -> f64 {
+        let height = (point - self.corners[0]).dot(&self.normal);
+        let outside = [0, 1, 2].map(|k| self.inwards[k].dot(&(self.corners[k] - point)));
+        let farthest = outside[0].max(outside[1]).max(outside[2]).max(0.0);
+        let least = height * height + farthest * farthest;
+        if farthest == 0.0 || least >= limit {
+            return least;
+        }
+        let to_edge = |k: usize| {
+            let edge = self.corners[(k + 1) % 3] - self.corners[k];
+            let t = ((point - self.corners[k]).dot(&edge) / edge.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            (point - self.corners[k] - t * edge).norm_squared()
+        };
+        to_edge(0).min(to_edge(1)).min(to_edge(2))
+    }
 }

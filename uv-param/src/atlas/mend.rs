@@ -16,15 +16,18 @@ const SWEEPS: usize = 40;
 /// Rings of faces around stretched ones that are laid out anew, one after the other, and Newton iterations for them.
 const MENDED_RINGS: [usize; 2] = [4, 10];
 const MENDING_ITERATIONS: usize = 10;
-/// Newton iterations of a whole chart, and their relative gain below which they stop.
+/// Rings of faces around guests that are laid out anew with them, relative to the square root of their number, and at least.
+const GUEST_RINGS: f64 = 0.5;
+const LEAST_RINGS: usize = 10;
+/// Newton iterations for these, and their relative gain below which they stop.
 const ITERATIONS: usize = 4;
 const TOLERANCE: f64 = 1e-3;
 /// They are given up unless each leaves at most this share of the faces beyond the bound.
 const SLOW_GAIN: f64 = 0.8;
 /// Rings of faces that are parted together with one that is stretched too much.
 const PARTED_RINGS: usize = 2;
-/// Times that faces which lie on others are taken away.
-const OVERLAP_ROUNDS: usize = 4;
+/// Cells along the side of a layout in which faces that lie on others are looked for.
+const CELLS: usize = 256;
 /// Share of a chart that may be parted from it.
 const MAX_PARTED: f64 = 0.2;
 
@@ -34,75 +37,104 @@ pub(super) struct Parted {
     pub(super) parted: Vec<bool>,
 }
 
-/// Makes good what is wrong in few places of a layout. Where two faces lie on each other, one for which `goes` holds is parted first.
-/// `None` where too much would have to be parted.
-pub(super) fn mend(disk: &Disk, mut uv: Vec<[f64; 2]>, goes: &[bool], bounds: Bounds) -> Option<Parted> {
+/// Makes good what is wrong in few places of a layout. Faces for which `guest` holds have just come to the others, which keep the bounds and lie on
+/// none: only what is near guests is laid out anew, and where two faces lie on each other, a guest is parted first. Without guests all faces are
+/// looked at. `None` where too much would have to be parted.
+pub(super) fn mend(disk: &Disk, mut uv: Vec<[f64; 2]>, guest: &[bool], bounds: Bounds) -> Option<Parted> {
     let frames = disk.frames();
+    let guests = guest.iter().filter(|guest| **guest).count();
+    let rings = (GUEST_RINGS * (guests as f64).sqrt()) as usize;
+    let near_guests = if guests > 0 { dilated(disk, guest, rings.max(LEAST_RINGS)) } else { vec![true; guest.len()] };
     untangle(disk, &mut uv);
     let count = |parted: &[bool]| parted.iter().filter(|parted| **parted).count() as f64;
     let most = MAX_PARTED * disk.faces.len() as f64;
     let mut parted = flipped(disk, &uv);
-    if count(&parted) > 0.0 {
-        parted = with_neighbours(disk, &parted);
+    if parted.contains(&true) {
+        parted = dilated(disk, &parted, 1);
     }
     for rings in MENDED_RINGS {
         let limit = if is_beyond(disk, &frames, &uv, &parted, bounds) { bounds.stretch } else { bounds.worst };
-        let mut near: Vec<bool> = stretches(disk, &frames, &uv).iter().map(|&stretch| stretch > limit).collect();
-        for _ in 0..rings {
-            near = with_neighbours(disk, &near);
-        }
-        near.iter_mut().zip(&parted).for_each(|(near, parted)| *near &= !parted);
+        let broken: Vec<bool> = stretches(disk, &frames, &uv).iter().map(|&stretch| stretch > limit).collect();
+        let mut near = dilated(disk, &broken, rings);
+        near.iter_mut().zip(&parted).zip(&near_guests).for_each(|((near, parted), guest)| *near &= !parted && *guest);
         if count(&near) > most {
             break;
         }
         let is_enough = |distortion: &Distortion| distortion.worst <= limit;
         relax(disk, &near, &mut uv, bounds, MENDING_ITERATIONS, is_enough);
     }
-    if is_beyond(disk, &frames, &uv, &parted, bounds) {
+    if guests > 0 && is_beyond(disk, &frames, &uv, &parted, bounds) {
         let mut last = f64::INFINITY;
         let is_enough = |distortion: &Distortion| {
             let slow = distortion.beyond > SLOW_GAIN * std::mem::replace(&mut last, distortion.beyond);
             slow || distortion.within(bounds)
         };
-        let all: Vec<bool> = parted.iter().map(|parted| !parted).collect();
-        relax(disk, &all, &mut uv, bounds, ITERATIONS, is_enough);
+        let near: Vec<bool> = near_guests.iter().zip(&parted).map(|(near, parted)| *near && !parted).collect();
+        relax(disk, &near, &mut uv, bounds, ITERATIONS, is_enough);
     }
-    let mut broken: Vec<bool> = stretches(disk, &frames, &uv).iter().map(|&stretch| stretch > bounds.worst).collect();
-    for _ in 0..PARTED_RINGS {
-        broken = with_neighbours(disk, &broken);
-    }
-    parted.iter_mut().zip(broken).for_each(|(parted, broken)| *parted |= broken);
-    if is_beyond(disk, &frames, &uv, &parted, bounds) {
+    let broken: Vec<bool> = stretches(disk, &frames, &uv).iter().map(|&stretch| stretch > bounds.worst).collect();
+    parted.iter_mut().zip(dilated(disk, &broken, PARTED_RINGS)).for_each(|(parted, broken)| *parted |= broken);
+    if count(&parted) > most || is_beyond(disk, &frames, &uv, &parted, bounds) {
         return None;
     }
-    for _ in 0..OVERLAP_ROUNDS {
-        if count(&parted) > most {
-            return None;
-        }
-        if count(&parted) == 0.0 && boundary_is_simple(disk, &uv) {
-            break;
-        }
-        let kept: Vec<usize> = (0..parted.len()).filter(|&f| !parted[f]).collect();
-        let faces: Vec<[u32; 3]> = kept.iter().map(|&f| disk.faces[f]).collect();
-        let mut over = vec![false; parted.len()];
-        for [f, g] in overlapping_faces(&uv, &faces) {
-            let (f, g) = (kept[f as usize], kept[g as usize]);
-            over[if goes[f] == goes[g] {
-                f.max(g)
-            } else if goes[f] {
-                f
-            } else {
-                g
-            }] = true;
-        }
-        if count(&over) == 0.0 {
-            break;
-        }
-        for (parted, over) in parted.iter_mut().zip(with_neighbours(disk, &over)) {
-            *parted |= over;
+    if parted.contains(&true) || !boundary_is_simple(disk, &uv) {
+        let over = covered(disk, &uv, &parted, guest, &near_guests);
+        parted.iter_mut().zip(dilated(disk, &over, 1)).for_each(|(parted, over)| *parted |= over);
+    }
+    (count(&parted) <= most).then_some(Parted { uv, parted })
+}
+
+/// One of every two faces, none of them parted, that lie on each other: a guest if one is, else the later. Both are only looked for where a face lies
+/// for which `near` holds.
+fn covered(disk: &Disk, uv: &[[f64; 2]], parted: &[bool], guest: &[bool], near: &[bool]) -> Vec<bool> {
+    let mut cells = Cells::new(uv);
+    let corners = |f: usize| disk.faces[f].map(|v| uv[v as usize]);
+    (0..near.len()).filter(|&f| near[f] && !parted[f]).for_each(|f| cells.mark(corners(f)));
+    let kept: Vec<usize> = (0..parted.len()).filter(|&f| !parted[f] && cells.is_marked(corners(f))).collect();
+    let faces: Vec<[u32; 3]> = kept.iter().map(|&f| disk.faces[f]).collect();
+    let mut over = vec![false; parted.len()];
+    for [f, g] in overlapping_faces(uv, &faces) {
+        let (f, g) = (kept[f as usize], kept[g as usize]);
+        let later = if guest[f] == guest[g] { f.max(g) } else { [g, f][usize::from(guest[f])] };
+        over[later] = true;
+    }
+    over
+}
+
+/// Places in the plane, by cells of a grid.
+struct Cells {
+    low: [f64; 2],
+    per_metre: [f64; 2],
+    marked: Vec<bool>,
+}
+
+impl Cells {
+    fn new(uv: &[[f64; 2]]) -> Self {
+        let bound = |k: usize, pick: fn(f64, f64) -> f64| uv.iter().map(|p| p[k]).reduce(pick).unwrap_or(0.0);
+        let low = [0, 1].map(|k| bound(k, f64::min));
+        let size = [0, 1].map(|k| bound(k, f64::max) - low[k]);
+        let per_metre = size.map(|size| CELLS as f64 / size.max(f64::MIN_POSITIVE));
+        Self { low, per_metre, marked: vec![false; CELLS * CELLS] }
+    }
+
+    fn covering(&self, corners: [[f64; 2]; 3]) -> impl Iterator<Item = usize> + use<> {
+        let [across, up] = [0, 1].map(|k| {
+            let cell = |x: f64| (((x - self.low[k]) * self.per_metre[k]) as usize).min(CELLS - 1);
+            let [a, b, c] = corners.map(|p| p[k]);
+            cell(a.min(b).min(c))..=cell(a.max(b).max(c))
+        });
+        up.flat_map(move |row| across.clone().map(move |column| row * CELLS + column))
+    }
+
+    fn mark(&mut self, corners: [[f64; 2]; 3]) {
+        for cell in self.covering(corners) {
+            self.marked[cell] = true;
         }
     }
-    Some(Parted { uv, parted })
+
+    fn is_marked(&self, corners: [[f64; 2]; 3]) -> bool {
+        self.covering(corners).any(|cell| self.marked[cell])
+    }
 }
 
 /// Whether more faces than may be, of those that are not parted, are stretched beyond the bound.
@@ -163,20 +195,18 @@ fn untangle(disk: &Disk, uv: &mut [[f64; 2]]) {
         outer[v as usize] = true;
     }
     for rings in UNTANGLED_RINGS {
-        let mut near = flipped(disk, uv);
-        if !near.contains(&true) {
+        let flipped = flipped(disk, uv);
+        if !flipped.contains(&true) {
             return;
         }
-        for _ in 0..rings {
-            near = with_neighbours(disk, &near);
-        }
+        let near = dilated(disk, &flipped, rings);
         let faces: Vec<[u32; 3]> =
             disk.faces.iter().zip(&near).filter(|(_, near)| **near).map(|(face, _)| *face).collect();
         let mut moving: Vec<u32> = faces.iter().flatten().copied().filter(|&v| !outer[v as usize]).collect();
         moving.sort_unstable();
         moving.dedup();
         // All faces of a vertex that moves are neighbours of faces near.
-        let around = with_neighbours(disk, &with_neighbours(disk, &near));
+        let around = dilated(disk, &near, 2);
         let around = disk.faces.iter().zip(&around).filter(|(_, near)| **near).map(|(face, _)| face);
         let pairs = around.flat_map(|face| (0..3).map(|k| (face[k], [face[(k + 1) % 3], face[(k + 2) % 3]])));
         let pairs: Vec<(u32, [u32; 2])> =
@@ -192,7 +222,17 @@ fn untangle(disk: &Disk, uv: &mut [[f64; 2]]) {
     }
 }
 
-fn with_neighbours(disk: &Disk, faces: &[bool]) -> Vec<bool> {
-    let beside = |f: usize| disk.twins[3 * f..3 * f + 3].iter().any(|&twin| twin != BORDER && faces[twin as usize / 3]);
-    (0..faces.len()).map(|f| faces[f] || beside(f)).collect()
+/// Faces, and those around them, so many rings far.
+fn dilated(disk: &Disk, faces: &[bool], rings: usize) -> Vec<bool> {
+    let mut near = faces.to_vec();
+    let mut front: Vec<u32> = (0..faces.len() as u32).filter(|&f| faces[f as usize]).collect();
+    for _ in 0..rings {
+        let mut next = Vec::new();
+        for &f in &front {
+            let beside = disk.twins[3 * f as usize..3 * f as usize + 3].iter().filter(|twin| **twin != BORDER);
+            next.extend(beside.map(|twin| twin / 3).filter(|&g| !std::mem::replace(&mut near[g as usize], true)));
+        }
+        front = next;
+    }
+    near
 }

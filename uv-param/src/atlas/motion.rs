@@ -30,7 +30,6 @@ impl Motion {
 pub(super) fn motion(charts: &Charts, half_edges: &[u32], same: bool) -> Motion {
     let surface = charts.surface;
     let next = |h: usize| h / 3 * 3 + (h + 1) % 3;
-    let mut sums = [0.0; 5];
     let mut pairs = Vec::with_capacity(2 * half_edges.len());
     for &h in half_edges {
         let h = h as usize;
@@ -40,7 +39,13 @@ pub(super) fn motion(charts: &Charts, half_edges: &[u32], same: bool) -> Motion 
             pairs.push((weight, charts.corner_uv[left], charts.corner_uv[right]));
         }
     }
-    for &(w, p, q) in &pairs {
+    nearest_motion(&pairs, same)
+}
+
+/// The rigid motion that brings the second points nearest to the first ones, by their weights; none if they are `same`.
+pub(super) fn nearest_motion(pairs: &[(f64, [f64; 2], [f64; 2])], same: bool) -> Motion {
+    let mut sums = [0.0; 5];
+    for &(w, p, q) in pairs {
         for (sum, value) in sums.iter_mut().zip([w, w * p[0], w * p[1], w * q[0], w * q[1]]) {
             *sum += value;
         }
@@ -48,7 +53,7 @@ pub(super) fn motion(charts: &Charts, half_edges: &[u32], same: bool) -> Motion 
     let [weight, px, py, qx, qy] = sums;
     let (p0, q0) = ([px / weight, py / weight], [qx / weight, qy / weight]);
     let (mut cos, mut sin) = (0.0, 0.0);
-    for &(w, p, q) in &pairs {
+    for &(w, p, q) in pairs {
         let (a, b) = ([p[0] - p0[0], p[1] - p0[1]], [q[0] - q0[0], q[1] - q0[1]]);
         cos += w * (a[0] * b[0] + a[1] * b[1]);
         sin += w * (a[1] * b[0] - a[0] * b[1]);

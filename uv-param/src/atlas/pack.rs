@@ -1,6 +1,7 @@
 //! Charts onto pages: bottom-left on bitmaps, holes filled by the small ones, improved by local search.
 
 mod add;
+mod back;
 mod bottom_left;
 mod search;
 mod settings;
@@ -8,6 +9,7 @@ mod shape;
 
 use crate::error::Error;
 pub(super) use add::add_to;
+pub(super) use back::{Home, back};
 use search::{Goal, Packed, Plan, Stages, carry_out, carry_out_unlimited, search};
 pub use settings::{PackSettings, Page, Placement, Turns};
 pub(super) use settings::{check, check_pages};
@@ -113,7 +115,7 @@ fn texels_per_cell(side: f64, longest: f64, cells: f64) -> usize {
 /// Diagonal of the box around a piece, metres.
 fn extent(piece: &Piece) -> f64 {
     let size = [0, 1].map(|k| {
-        let along = || piece.uv.iter().map(|uv| uv[k]);
+        let along = || piece.rim.iter().map(|[from, _]| from[k]);
         along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
     });
     size[0].hypot(size[1])
@@ -121,11 +123,12 @@ fn extent(piece: &Piece) -> f64 {
 
 /// Area of a piece in the plane, m^2.
 fn area(piece: &Piece) -> f64 {
-    let of = |face: &[u32; 3]| {
-        let [a, b, c] = face.map(|v| piece.uv[v as usize]);
-        0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs()
+    let origin = piece.rim.first().map_or([0.0; 2], |edge| edge[0]);
+    let of = |edge: &[[f64; 2]; 2]| {
+        let [p, q] = edge.map(|at| [0, 1].map(|k| at[k] - origin[k]));
+        0.5 * (p[0] * q[1] - p[1] * q[0])
     };
-    piece.faces.iter().map(of).sum()
+    piece.rim.iter().map(of).sum::<f64>().abs()
 }
 
 #[cfg(test)]
@@ -147,7 +150,7 @@ mod tests {
     }
 
     fn packed(meshes: &[Mesh], settings: &PackSettings) -> Result<(Vec<Placement>, Vec<Page>), Error> {
-        let pieces: Vec<Piece> = meshes.iter().map(|(uv, faces)| Piece { uv, faces }).collect();
+        let pieces: Vec<Piece> = meshes.iter().map(|(uv, faces)| Piece::new(uv, faces)).collect();
         let result = pack(&pieces, settings)?;
         assert_eq!(result, pack(&pieces, settings)?, "packed otherwise the second time");
         // Texels of every chart by points on a grid that is finer than they are.
@@ -190,7 +193,7 @@ mod tests {
         // Cells of one texel would take 30,000 x 30,000 of them in the slanting turns.
         let settings = PackSettings { texel_m: 1.0, gutter: 2, ..PackSettings::default() };
         let meshes = [[30_000.0, 0.5], [100.0, 100.0]].map(|[width, height]| piece_of(&[[0.0, 0.0, width, height]]));
-        let pieces: Vec<Piece> = meshes.iter().map(|(uv, faces)| Piece { uv, faces }).collect();
+        let pieces: Vec<Piece> = meshes.iter().map(|(uv, faces)| Piece::new(uv, faces)).collect();
         let (placements, pages) = pack(&pieces, &settings).unwrap();
         assert_eq!(placements.len(), 2);
         assert!(pages.len() == 1 && pages[0].iter().any(|&texels| texels >= 30_000), "{pages:?}");
@@ -258,7 +261,7 @@ mod tests {
             .map(|k| 8.0 + f64::from(k * 5 % 12))
             .map(|size| piece_of(&[[0.0, 0.0, 2.0 * size, size / 2.0], [0.0, size / 2.0, size / 2.0, size]]))
             .collect();
-        let pieces: Vec<Piece> = meshes.iter().map(|(uv, faces)| Piece { uv, faces }).collect();
+        let pieces: Vec<Piece> = meshes.iter().map(|(uv, faces)| Piece::new(uv, faces)).collect();
         let shapes = Shapes::new(&pieces, &settings(Turns::Quarter, 1), 1, |_| (0..4).collect());
         let order: Vec<usize> = (0..12).collect();
         let [start, found] = [0, 10_000_000]

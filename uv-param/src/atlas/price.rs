@@ -1,5 +1,6 @@
 //! What a seam costs: its length, dear on ridges that are seen, cheap in creases; and where one may end.
 
+use std::cell::Cell;
 use std::f64::consts::TAU;
 
 use crate::surface::Surface;
@@ -9,12 +10,33 @@ const CREASE_FACTOR: f64 = 0.5;
 /// Length over which bending counts as sharp, relative to the square root of the area.
 const CREASE_LENGTH: f64 = 0.05;
 
-/// Price of every edge as a seam, metres for flat surfaces, by half-edge; infinite on the border.
-pub(super) fn seam_prices(surface: &Surface) -> Vec<f32> {
-    let sharp = CREASE_LENGTH * surface.area().sqrt();
-    (0..3 * surface.faces().len())
-        .map(|h| surface.twin(h).map_or(f32::INFINITY, |twin| price(surface, h, twin, sharp) as f32))
-        .collect()
+/// Prices of edges as seams. Most edges of a large surface are never asked for: each is worked out once it is.
+pub(super) struct SeamPrices<'a> {
+    surface: &'a Surface,
+    sharp: f64,
+    known: Vec<Cell<f32>>,
+}
+
+impl<'a> SeamPrices<'a> {
+    pub(super) fn new(surface: &'a Surface) -> Self {
+        let sharp = CREASE_LENGTH * surface.area().sqrt();
+        Self { surface, sharp, known: vec![Cell::new(f32::NAN); 3 * surface.faces().len()] }
+    }
+
+    /// Of a half-edge's edge, metres for flat surfaces; infinite on the border.
+    pub(super) fn of(&self, h: u32) -> f64 {
+        let h = h as usize;
+        if self.known[h].get().is_nan() {
+            let found = self.surface.twin(h).map_or(f64::INFINITY, |twin| price(self.surface, h, twin, self.sharp));
+            self.known[h].set(found as f32);
+        }
+        f64::from(self.known[h].get())
+    }
+
+    /// Of all edges of a line.
+    pub(super) fn sum(&self, half_edges: &[u32]) -> f64 {
+        half_edges.iter().map(|&h| self.of(h)).sum()
+    }
 }
 
 /// Bending is measured per length, so that the price does not depend on how finely the surface is meshed.

@@ -22,7 +22,8 @@ pub struct AtlasQuality {
     pub flips_f32: usize,
     /// Area of charts that lies on other parts of the same chart, as a share of the whole.
     pub overlap_share: f64,
-    /// Pairs of faces that lie on each other (exact predicate).
+    /// Pairs of faces that lie on each other (exact predicate), by more than rounding can make: a few `f64::EPSILON` of the squared diagonal of the
+    /// chart.
     pub overlap_pairs: usize,
     /// Area-weighted mean of `max(|s1 - 1|, ||s2| - 1|)`.
     pub length_err_mean: f64,

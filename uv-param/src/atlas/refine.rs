@@ -1,19 +1,24 @@
 //! Charts that were found on a coarser surface, laid out on the fine one. Faces at which a layout breaks the bounds are parted from it.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
-use super::fit::{Bounds, Distortion};
+use super::fit::{Bounds, Distortion, SHARE_BEYOND};
 use super::layout::Charts;
 use super::mend::{Parted, mend};
 use super::regions::halves;
 use super::simple_boundary::boundary_is_simple;
-use crate::arap::fit_jacobians;
+use crate::arap::{fit_jacobians, iterate_bounded};
 use crate::disk::Disk;
 use crate::laplacian::Laplacian;
 use crate::triangle::flips;
 
 /// Times that a chart is halved before it is charted anew.
 const MAX_ROUNDS: usize = 3;
+
+/// Local/global iterations that bring faces nearer to this share of the bound, and the share of the faces that may be beyond it after them.
+const BOUNDED_ITERATIONS: usize = 20;
+const BOUNDED_STRETCH: f64 = 0.9;
+const BOUNDED_SHARE: f64 = 0.9;
 
 /// Faces of a small chart at most, as a share of all.
 const SMALL: f64 = 0.01;
@@ -24,11 +29,12 @@ pub(super) fn is_small(charts: &Charts, faces: usize) -> bool {
 }
 
 /// Lays out the faces of a chart so that every one comes near the shape that `charts.corner_uv` has for it on its own. Adds charts for what
-/// can be laid out; returns the rest as connected lists of faces.
-pub(super) fn refine(charts: &mut Charts, faces: &[u32], bounds: Bounds) -> Vec<Vec<u32>> {
+/// can be laid out; returns the rest as connected lists of faces. `heard` is called
+/// after every layout.
+pub(super) fn refine(charts: &mut Charts, faces: &[u32], bounds: Bounds, heard: &mut dyn FnMut()) -> Vec<Vec<u32>> {
     let mut left = Vec::new();
     let together = vec![false; faces.len()];
-    let mut stack: Vec<_> = pieces(charts, faces, &together).into_iter().map(|(piece, _)| (piece, 0)).collect();
+    let mut stack: Vec<_> = charts.pieces(faces, &together).into_iter().map(|(piece, _)| (piece, 0)).collect();
     while let Some((faces, round)) = stack.pop() {
         let laid_out = charts.disk(&faces).and_then(|disk| {
             let targets: Vec<[[f64; 2]; 3]> =
@@ -37,9 +43,10 @@ pub(super) fn refine(charts: &mut Charts, faces: &[u32], bounds: Bounds) -> Vec<
             charts.place(&faces, &disk, &layout.uv);
             Some(layout.parted)
         });
+        heard();
         match laid_out {
             Some(parted) => {
-                let pieces = pieces(charts, &faces, &parted);
+                let pieces = charts.pieces(&faces, &parted);
                 left.extend(keep(charts, pieces, bounds));
             }
             None if round < MAX_ROUNDS && !is_small(charts, faces.len()) => {
@@ -74,7 +81,7 @@ pub(super) fn keep(charts: &mut Charts, pieces: Vec<(Vec<u32>, bool)>, bounds: B
 }
 
 /// Whether a layout keeps the bounds, without flips or overlaps.
-fn keeps(disk: &Disk, uv: &[[f64; 2]], bounds: Bounds) -> bool {
+pub(super) fn keeps(disk: &Disk, uv: &[[f64; 2]], bounds: Bounds) -> bool {
     Distortion::measure(disk, &disk.frames(), uv, bounds).within(bounds)
         && flips(uv, &disk.faces) == 0
         && boundary_is_simple(disk, uv)
@@ -86,22 +93,10 @@ fn lay_out(disk: &Disk, targets: &[[[f64; 2]; 3]], bounds: Bounds) -> Option<Par
     let mut laplacian = Laplacian::new(disk).ok()?;
     laplacian.factorize_cotangent(disk, &frames, disk.loops[0][0]).ok()?;
     let jacobians: Vec<_> = frames.iter().zip(targets).map(|(frame, &uv)| frame.jacobian(uv)).collect();
-    let start = fit_jacobians(disk, &frames, &jacobians, &mut laplacian);
-    mend(disk, start, &vec![false; frames.len()], bounds)
-}
-
-/// Connected pieces of some faces, each all parted or all kept.
-pub(super) fn pieces(charts: &Charts, faces: &[u32], bad: &[bool]) -> Vec<(Vec<u32>, bool)> {
-    let state: HashMap<u32, bool> = faces.iter().copied().zip(bad.iter().copied()).collect();
-    let mut seen = HashSet::new();
-    let mut found = Vec::new();
-    for (&start, &is_bad) in faces.iter().zip(bad) {
-        if !seen.insert(start) {
-            continue;
-        }
-        let mut piece = charts.piece(start, |g| state.get(&g) == Some(&is_bad) && seen.insert(g));
-        piece.sort_unstable();
-        found.push((piece, is_bad));
-    }
-    found
+    let mut uv = fit_jacobians(disk, &frames, &jacobians, &mut laplacian);
+    let mut enough =
+        |uv: &[[f64; 2]]| Distortion::measure(disk, &frames, uv, bounds).beyond <= BOUNDED_SHARE * SHARE_BEYOND;
+    let stretch = 1.0 + BOUNDED_STRETCH * (bounds.stretch - 1.0);
+    iterate_bounded(disk, &frames, &mut laplacian, &mut uv, stretch, BOUNDED_ITERATIONS, &mut enough);
+    mend(disk, uv, &vec![false; frames.len()], bounds)
 }

@@ -5,9 +5,10 @@ use std::collections::HashSet;
 use super::fit::{Bounds, fit};
 use super::layout::Charts;
 use super::motion::motion;
+use super::price::SeamPrices;
 use super::seams::{Arc, arcs};
 use crate::min_area_rectangle::min_area_rectangle;
-use crate::parametrizer::Parametrizer;
+use crate::parametrizer::{Parametrizer, Progress, Stage};
 
 /// Longest side of a chart that sewing may make, relative to the square root of the area: longer ones waste the page.
 const MAX_EXTENT: f64 = 1.3;
@@ -40,14 +41,16 @@ const MIN_PART: f64 = 0.06;
 /// Closes seams of charts within bounds.
 pub(super) struct Sewing<'a, 'b> {
     pub(super) charts: &'b mut Charts<'a>,
-    pub(super) prices: &'b [f32],
-    pub(super) deficits: &'b [f64],
+    pub(super) prices: &'b SeamPrices<'b>,
     pub(super) bounds: Bounds,
     pub(super) parametrizer: Option<&'b dyn Parametrizer>,
+    progress: &'b mut dyn FnMut(Progress),
     /// Charts that must stay as they are, and the first of those that are new; `None`: all are. Only seams of new ones are closed.
     pub(super) only: Option<(HashSet<u32>, u32)>,
     /// Faces that may still be laid out for trials.
     pub(super) work: usize,
+    /// Seams that were tried.
+    tried: usize,
     /// Longest side of a chart, metres.
     longest: f64,
     /// Arcs (first and last half-edge) that could not be closed.
@@ -59,25 +62,15 @@ pub(super) struct Sewing<'a, 'b> {
 impl<'a, 'b> Sewing<'a, 'b> {
     pub(super) fn new(
         charts: &'b mut Charts<'a>,
-        prices: &'b [f32],
-        deficits: &'b [f64],
+        prices: &'b SeamPrices<'b>,
         bounds: Bounds,
         parametrizer: Option<&'b dyn Parametrizer>,
+        progress: &'b mut dyn FnMut(Progress),
     ) -> Self {
         let longest = MAX_EXTENT * charts.surface.area().sqrt();
         let (refused, refused_parts) = (HashSet::new(), HashSet::new());
-        Self {
-            charts,
-            prices,
-            deficits,
-            bounds,
-            parametrizer,
-            only: None,
-            work: usize::MAX,
-            longest,
-            refused,
-            refused_parts,
-        }
+        let (only, work, tried) = (None, usize::MAX, 0);
+        Self { charts, prices, bounds, parametrizer, progress, only, work, tried, longest, refused, refused_parts }
     }
 
     /// Closes whole arcs until none can be closed any more.
@@ -122,8 +115,10 @@ impl<'a, 'b> Sewing<'a, 'b> {
         })
     }
 
-    /// Closes parts of arcs, the longest first, until no more can be closed.
-    pub(super) fn close_parts(&mut self) {
+    /// Closes parts of arcs, the longest first, until no more can be closed; `deficits` are the [`angle_deficits`].
+    ///
+    /// [`angle_deficits`]: super::price::angle_deficits
+    pub(super) fn close_parts(&mut self, deficits: &[f64]) {
         let least = MIN_PART * self.charts.surface.area().sqrt();
         for _ in 0..MAX_ROUNDS {
             let mut candidates: Vec<(f64, Arc)> = arcs(self.charts)
@@ -140,7 +135,7 @@ impl<'a, 'b> Sewing<'a, 'b> {
                 if touched.contains(&arc.left) || touched.contains(&arc.right) {
                     continue;
                 }
-                if self.close_part(&arc, least) {
+                if self.close_part(&arc, deficits, least) {
                     touched.extend([arc.left, arc.right]);
                     closed += 1;
                 } else {
@@ -154,7 +149,7 @@ impl<'a, 'b> Sewing<'a, 'b> {
     }
 
     /// Closes the longest part of an arc that can be closed.
-    fn close_part(&mut self, arc: &Arc, least: f64) -> bool {
+    fn close_part(&mut self, arc: &Arc, deficits: &[f64], least: f64) -> bool {
         let count = arc.half_edges.len();
         // The seam that is left over ends inside a chart: at the sharpest vertex near.
         let vertex = |i: usize| {
@@ -169,7 +164,7 @@ impl<'a, 'b> Sewing<'a, 'b> {
             }
             let near = middle.saturating_sub(reach).max(1)..=(middle + reach).min(count - 1);
             near.max_by(|&a, &b| {
-                let deficit = |i: usize| self.deficits[vertex(i) as usize];
+                let deficit = |i: usize| deficits[vertex(i) as usize];
                 deficit(a).total_cmp(&deficit(b)).then(b.abs_diff(middle).cmp(&a.abs_diff(middle)))
             })
             .unwrap_or(middle)
@@ -191,7 +186,7 @@ impl<'a, 'b> Sewing<'a, 'b> {
     }
 
     fn price(&self, half_edges: &[u32]) -> f64 {
-        half_edges.iter().map(|&h| f64::from(self.prices[h as usize])).sum()
+        self.prices.sum(half_edges)
     }
 
     /// How much closing an arc would help; `None` if it cannot.
@@ -224,6 +219,8 @@ impl<'a, 'b> Sewing<'a, 'b> {
         };
         let Some(work) = self.work.checked_sub(faces.len()) else { return false };
         self.work = work;
+        self.tried += 1;
+        (self.progress)(Progress { stage: Stage::Seam, iteration: self.tried, energy: 0.0 });
         let both = |h: u32| std::iter::once(h as usize).chain(surface.twin(h as usize));
         // Between two charts every other common edge stays open.
         let opened: Vec<usize> = if same { Vec::new() } else { self.common_edges(left, right) };

@@ -5,6 +5,7 @@ use std::collections::{BinaryHeap, HashMap, HashSet};
 
 use super::layout::Charts;
 use super::motion::motion;
+use super::price::SeamPrices;
 use super::seams::{Arc, arcs};
 use crate::disk::Disk;
 
@@ -17,7 +18,7 @@ const REACH: [usize; 2] = [5, 4];
 pub(super) type Layout<'a> = &'a dyn Fn(&Disk, Vec<[f64; 2]>) -> Option<Vec<[f64; 2]>>;
 
 /// Tries every seam once, the dearest first.
-pub(super) fn straighten(charts: &mut Charts, prices: &[f32], layout: Layout) {
+pub(super) fn straighten(charts: &mut Charts, prices: &SeamPrices, layout: Layout) {
     for (price, arc) in dearest_first(charts, prices) {
         let rings = (arc.half_edges.len() / REACH[0]).max(REACH[1]);
         if let Some(detour) = Detour::new(charts, prices, price, &arc, rings) {
@@ -28,7 +29,7 @@ pub(super) fn straighten(charts: &mut Charts, prices: &[f32], layout: Layout) {
 
 /// The same without layouts, within some rings of faces from each seam: what lies between a seam and its path changes sides as it is, corner by
 /// corner, and nothing else moves.
-pub(super) fn straighten_unlaid(charts: &mut Charts, prices: &[f32], rings: usize) {
+pub(super) fn straighten_unlaid(charts: &mut Charts, prices: &SeamPrices, rings: usize) {
     for (price, arc) in dearest_first(charts, prices) {
         if let Some(detour) = Detour::new(charts, prices, price, &arc, rings) {
             detour.take_unlaid(charts);
@@ -41,12 +42,11 @@ pub(super) fn straighten_unlaid(charts: &mut Charts, prices: &[f32], rings: usiz
 }
 
 /// All seams that the caller does not want, with their prices.
-fn dearest_first(charts: &Charts, prices: &[f32]) -> Vec<(f64, Arc)> {
-    let price = |half_edges: &[u32]| half_edges.iter().map(|&h| f64::from(prices[h as usize])).sum::<f64>();
+fn dearest_first(charts: &Charts, prices: &SeamPrices) -> Vec<(f64, Arc)> {
     let mut candidates: Vec<(f64, Arc)> = arcs(charts)
         .into_iter()
         .filter(|arc| !charts.wanted[arc.half_edges[0] as usize])
-        .map(|arc| (price(&arc.half_edges), arc))
+        .map(|arc| (prices.sum(&arc.half_edges), arc))
         .collect();
     candidates.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.half_edges[0].cmp(&b.1.half_edges[0])));
     candidates
@@ -63,7 +63,7 @@ struct Detour<'a> {
 }
 
 impl<'a> Detour<'a> {
-    fn new(charts: &Charts, prices: &[f32], price: f64, arc: &'a Arc, rings: usize) -> Option<Self> {
+    fn new(charts: &Charts, prices: &SeamPrices, price: f64, arc: &'a Arc, rings: usize) -> Option<Self> {
         let surface = charts.surface;
         let [first, _] = surface.ends(arc.half_edges[0] as usize);
         let [_, last] = surface.ends(arc.half_edges[arc.half_edges.len() - 1] as usize);
@@ -226,7 +226,7 @@ fn band(charts: &Charts, arc: &Arc, rings: usize) -> HashSet<u32> {
 /// The edges (as half-edges, one of each) of the cheapest path near the seam that touches no other.
 fn cheapest_path(
     charts: &Charts,
-    prices: &[f32],
+    prices: &SeamPrices,
     band: HashSet<u32>,
     old: &HashSet<u32>,
     [first, last]: [u32; 2],
@@ -263,7 +263,7 @@ fn cheapest_path(
             if other != last && barred.contains(&other) {
                 continue;
             }
-            let through = distance + f64::from(prices[h as usize]);
+            let through = distance + prices.of(h);
             if through < limit && best.get(&other).is_none_or(|(found, _)| through < *found) {
                 best.insert(other, (through, h));
                 queue.push(Reverse((through.to_bits(), other)));

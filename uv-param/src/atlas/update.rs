@@ -1,13 +1,16 @@
 //! An atlas after its surface has changed in places: what was not touched stays, to the bit, so that what is painted there survives.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::add_region::add_region;
 use super::charting::{Kept, by_number, finish, wanted_seams};
-use super::fit::fit;
+use super::fit::{Bounds, fit};
 use super::layout::Charts;
-use super::pack::{self, Page, Piece, Placement};
-use super::price::{angle_deficits, seam_prices};
+use super::mend::mend;
+use super::motion::nearest_motion;
+use super::pack::{self, Home, PackSettings, Page, Piece, Placement};
+use super::price::SeamPrices;
+use super::refine::keeps;
 use super::sew::Sewing;
 use super::{Atlas, AtlasSettings, unwrap_atlas};
 use crate::disk::Disk;
@@ -44,7 +47,8 @@ pub struct AtlasUpdate {
     pub kept_faces: usize,
     /// Charts that are the same to the bit, on the same place.
     pub kept_charts: usize,
-    /// Charts that lost or won faces: they were laid out and placed again with what came instead, or are where they were, with a hole.
+    /// Charts that lost or won faces: they were laid out again with what came instead, and lie where they were if they still fit there, or they are
+    /// where they were, with a hole.
     pub changed_charts: usize,
     /// Charts that were not there before.
     pub new_charts: usize,
@@ -140,7 +144,10 @@ pub fn update_atlas(
         let refitted = touched[c]
             && charts.disk(&faces).is_some_and(|disk| {
                 let start = spread(&charts, &faces, &disk, &old);
-                fit(&disk, start, bounds, None).map(|uv| charts.place(&faces, &disk, &uv)).is_some()
+                let is_new: Vec<bool> = faces.iter().map(|&f| old[f as usize].is_none()).collect();
+                // What came and little around it, so that all else stays to the bit; everything where that does not do.
+                let uv = mended(&disk, start.clone(), &is_new, bounds).or_else(|| fit(&disk, start, bounds, None));
+                uv.map(|uv| charts.place(&faces, &disk, &uv)).is_some()
             });
         let left = if refitted { faces.clone() } else { largest_piece(&charts, &old, &faces) };
         let holds = !left.is_empty() && (refitted || charts.disk(&left).is_some());
@@ -162,18 +169,18 @@ pub fn update_atlas(
         add_region(&mut charts, faces, bounds, None);
     }
     if charts.members.len() as u32 > first_new {
-        let (prices, deficits) = (seam_prices(&surface), angle_deficits(&surface));
-        let mut sewing = Sewing::new(&mut charts, &prices, &deficits, bounds, None);
+        let prices = SeamPrices::new(&surface);
+        let mut sewing = Sewing::new(&mut charts, &prices, bounds, None, &mut progress);
         sewing.only = Some((stay.clone(), first_new));
         sewing.close_arcs();
     }
     let old_charts: Vec<u32> =
         (0..charts.members.len() as u32).filter(|&c| !charts.members[c as usize].is_empty()).collect();
-    let sizes: HashMap<u32, [f64; 2]> = stay.iter().map(|&c| (c, previous.sizes[c as usize])).collect();
+    let homes = settle(previous, &old, &mut charts, &stay, &settings.pack);
+    let sizes: HashMap<u32, [f64; 2]> = homes.iter().map(|(&c, &(size, _))| (c, size)).collect();
     let (done, members) = finish(charts, &Kept { whole: &[], sizes: &sizes }, &settings.charts, None, &mut progress)?;
-    let pieces: Vec<Piece> = done.iter().map(|c| Piece { uv: c.uv(), faces: c.disk().faces() }).collect();
-    let place = |c: &u32| stay.contains(c).then(|| previous.placements[*c as usize]);
-    let places: Vec<Option<Placement>> = old_charts.iter().map(place).collect();
+    let pieces: Vec<Piece> = done.iter().map(|c| Piece::new(c.uv(), c.disk().faces())).collect();
+    let places: Vec<Option<Placement>> = old_charts.iter().map(|c| homes.get(c).map(|&(_, place)| place)).collect();
     let (placements, pages) = pack::add_to(&pieces, &places, &previous.pages, &settings.pack)?;
     let update = AtlasUpdate {
         kept_faces,
@@ -183,6 +190,85 @@ pub fn update_atlas(
         added_columns: pages[0][0].saturating_sub(previous.pages.first().map_or(0, |page| page[0])),
     };
     Ok((Atlas::of_parts(surface, report, done, members, placements, pages, settings.pack.texel_m)?, update))
+}
+
+/// A layout of old faces, and of new ones around which alone it may change.
+fn mended(disk: &Disk, start: Vec<[f64; 2]>, is_new: &[bool], bounds: Bounds) -> Option<Vec<[f64; 2]>> {
+    let found = mend(disk, start, is_new, bounds)?;
+    (!found.parted.contains(&true) && keeps(disk, &found.uv, bounds)).then_some(found.uv)
+}
+
+/// Old charts that stay, or were laid out again and fit where they were: width and height, and place. Those that were laid out again are moved so that
+/// what is left of them lies as near to where it was as a rigid motion can bring it.
+fn settle(
+    previous: &AtlasLayout,
+    old: &[Option<(u32, usize)>],
+    charts: &mut Charts,
+    stay: &HashSet<u32>,
+    settings: &PackSettings,
+) -> BTreeMap<u32, ([f64; 2], Placement)> {
+    let mut names: Vec<u32> =
+        (0..previous.sizes.len() as u32).filter(|&c| !charts.members[c as usize].is_empty()).collect();
+    names.sort_by_key(|&c| std::cmp::Reverse(charts.members[c as usize].len()));
+    let mut sizes = Vec::with_capacity(names.len());
+    let mut pieces = Vec::with_capacity(names.len());
+    for &c in &names {
+        let place = previous.placements[c as usize];
+        let (size, home) = if stay.contains(&c) {
+            (previous.sizes[c as usize], Home::Taken(place))
+        } else {
+            let (size, low) = move_back(previous, old, charts, c);
+            let zero = Placement { shift: [0.0; 2], ..place }.apply(low);
+            let shift = [0, 1].map(|k| place.shift[k] + zero[k]);
+            (size, Home::Wanted(Placement { shift, ..place }))
+        };
+        sizes.push(size);
+        let faces: Vec<usize> = charts.members[c as usize].iter().map(|&f| f as usize).collect();
+        // Every edge in the plane once from each side: what has no other side is the rim.
+        let edges = |f: usize| (0..3).map(move |k| [3 * f + k, 3 * f + (k + 1) % 3]);
+        let is_rim = |[h, _]: &[usize; 2]| {
+            charts.is_seam(*h) || charts.surface.twin(*h).is_none_or(|twin| charts.chart[twin / 3] != c)
+        };
+        let rim = faces.iter().flat_map(|&f| edges(f)).filter(is_rim).map(|ends| ends.map(|h| charts.corner_uv[h]));
+        pieces.push((Piece { rim: rim.collect() }, home));
+    }
+    let places = pack::back(&pieces, &previous.pages, settings);
+    let settled = names.into_iter().zip(sizes).zip(places);
+    settled.filter_map(|((c, size), place)| place.map(|place| (c, (size, place)))).collect()
+}
+
+/// Moves a chart that was laid out again, its box to the origin; returns the box, and where its lower left corner had been.
+fn move_back(
+    previous: &AtlasLayout,
+    old: &[Option<(u32, usize)>],
+    charts: &mut Charts,
+    name: u32,
+) -> ([f64; 2], [f64; 2]) {
+    let faces: Vec<usize> = charts.members[name as usize].iter().map(|&f| f as usize).collect();
+    let mut pairs = Vec::new();
+    for &f in &faces {
+        if let Some((o, turn)) = old[f].filter(|(o, _)| previous.chart[*o as usize] == name) {
+            let there = |k: usize| previous.corner_uv[o as usize][(k + turn) % 3];
+            pairs.extend((0..3).map(|k| (1.0, there(k), charts.corner_uv[3 * f + k])));
+        }
+    }
+    // Most of it was not touched: then nothing is turned, which would round.
+    let same = 2 * pairs.iter().filter(|(_, there, here)| there == here).count() >= pairs.len();
+    let motion = nearest_motion(&pairs, same);
+    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for h in faces.iter().flat_map(|&f| 3 * f..3 * f + 3) {
+        if !same {
+            charts.corner_uv[h] = motion.apply(charts.corner_uv[h]);
+        }
+        for k in 0..2 {
+            low[k] = low[k].min(charts.corner_uv[h][k]);
+            high[k] = high[k].max(charts.corner_uv[h][k]);
+        }
+    }
+    for h in faces.iter().flat_map(|&f| 3 * f..3 * f + 3) {
+        charts.corner_uv[h] = [0, 1].map(|k| charts.corner_uv[h][k] - low[k]);
+    }
+    ([0, 1].map(|k| high[k] - low[k]), low)
 }
 
 /// For every face of the surface the face of the layout at the same place, and which of its corners is the first.

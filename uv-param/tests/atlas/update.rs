@@ -73,6 +73,49 @@ fn charts_that_a_change_does_not_touch_stay_to_the_bit() {
     assert_eq!(update.kept_charts, 0);
 }
 
+/// A small dent in every chart of a box: each is laid out again, and lies on its old texels all the same; the page does not grow.
+#[test]
+fn charts_that_are_laid_out_again_keep_their_places() {
+    let mesh = sphere(40);
+    let before = atlas(&mesh, 0.01);
+    let options = settings(0.01);
+    // One vertex in the middle of each chart moves inwards.
+    let inner = |chart: usize| {
+        let disk = before.charts()[chart].disk();
+        let rim: Vec<[f64; 2]> = (0..3 * disk.faces().len())
+            .filter(|&h| disk.twin(h).is_none())
+            .map(|h| before.charts()[chart].uv()[disk.faces()[h / 3][h % 3] as usize])
+            .collect();
+        let room = |p: [f64; 2]| rim.iter().map(|q| (p[0] - q[0]).hypot(p[1] - q[1])).fold(f64::INFINITY, f64::min);
+        let uv = before.charts()[chart].uv();
+        let deepest = (0..uv.len()).max_by(|&a, &b| room(uv[a]).total_cmp(&room(uv[b]))).unwrap();
+        disk.vertex_source()[deepest] as usize
+    };
+    let mut moved = mesh.0.clone();
+    for v in (0..before.charts().len()).map(inner) {
+        moved[v] = moved[v].map(|x| 0.985 * x);
+    }
+    let (after, update) = update_atlas(&before.layout(), &moved, &mesh.1, &[], &options, |_| ()).unwrap();
+    assert_sound(&after);
+    assert_eq!((update.changed_charts, update.kept_charts, update.new_charts), (before.charts().len(), 0, 0));
+    assert_eq!(after.pages(), before.pages());
+    assert_eq!(apart(&after, options.pack.gutter), 0);
+    // All but the faces around the dents lie where they were, most of them to the bit.
+    let corners = |atlas: &Atlas, f: usize| {
+        let (chart, local) = atlas.chart_of_face(f);
+        let uv = atlas.charts()[chart].disk().faces()[local].map(|v| atlas.charts()[chart].uv()[v as usize]);
+        uv.map(|at| atlas.placements()[chart].apply(at))
+    };
+    let mut same = 0;
+    for f in 0..mesh.1.len() {
+        let (there, here) = (corners(&before, f), corners(&after, f));
+        let off = (0..3).map(|k| (there[k][0] - here[k][0]).hypot(there[k][1] - here[k][1])).fold(0.0, f64::max);
+        assert!(off < 3.0 * 0.01, "face {f} moved by {off} m");
+        same += usize::from(there == here);
+    }
+    assert!(10 * same > 6 * mesh.1.len(), "{same} of {}", mesh.1.len());
+}
+
 /// Faces that go, and faces that come: a hole cut into a sphere, a box set on it, and both files in any order of faces.
 #[test]
 fn what_comes_and_goes_is_laid_out_again() {

@@ -38,10 +38,10 @@ fn add(
         .map(|page| {
             let there =
                 pieces.iter().zip(places).filter_map(|(piece, place)| Some((piece, place.filter(|p| p.page == page)?)));
-            let corners = there.flat_map(|(piece, place)| {
-                piece.faces.iter().map(move |face| face.map(|v| place.apply(piece.uv[v as usize]).map(|x| x / cell)))
+            let rims = there.flat_map(|(piece, place)| {
+                piece.rim.iter().map(move |edge| edge.map(|at| place.apply(at).map(|x| x / cell)))
             });
-            Filled::new(pages[page].map(|texels| texels / texels_per_cell), corners, shapes.gutter)
+            Filled::new(pages[page].map(|texels| texels / texels_per_cell), rims, shapes.gutter)
         })
         .collect();
     let mut pages: Vec<Page> = pages.to_vec();
@@ -95,9 +95,9 @@ struct Filled {
 }
 
 impl Filled {
-    /// A page of some cells that triangles (in cells) lie on.
-    fn new(size: [usize; 2], triangles: impl Iterator<Item = [[f64; 2]; 3]>, gutter: usize) -> Self {
-        let there = Bitmap::of_triangles(triangles, size.map(|cells| cells as f64), 1.0).dilated(gutter);
+    /// A page of some cells on which shapes lie that these edges (in cells) run around.
+    fn new(size: [usize; 2], rims: impl Iterator<Item = [[f64; 2]; 2]>, gutter: usize) -> Self {
+        let there = Bitmap::within(rims, size.map(|cells| cells as f64), 1.0).dilated(gutter);
         let gutter = gutter as isize;
         let mut filled = Self { gutter, map: Bitmap::new(size[0], size[1]), stamps: vec![(there, [-gutter; 2])] };
         filled.grow(size);

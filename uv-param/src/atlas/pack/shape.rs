@@ -2,12 +2,22 @@
 
 use super::settings::PackSettings;
 use crate::atlas::bitmap::{Bitmap, Outline};
+use crate::half_edges::{EdgeTable, half_edge};
 
-/// What is packed: triangles in the plane, metres.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::atlas) struct Piece<'a> {
-    pub(in crate::atlas) uv: &'a [[f64; 2]],
-    pub(in crate::atlas) faces: &'a [[u32; 3]],
+/// What is packed: a shape in the plane, metres.
+#[derive(Debug, Clone)]
+pub(in crate::atlas) struct Piece {
+    /// The edges around it, which lies left of them.
+    pub(in crate::atlas) rim: Vec<[[f64; 2]; 2]>,
+}
+
+impl Piece {
+    /// The union of triangles, of which each edge has one or two.
+    pub(in crate::atlas) fn new(uv: &[[f64; 2]], faces: &[[u32; 3]]) -> Self {
+        let table = EdgeTable::new(uv.len(), faces);
+        let single = table.groups().filter(|group| group.len() == 1).map(|group| half_edge(faces, group[0] as usize));
+        Self { rim: single.map(|(a, b)| [uv[a as usize], uv[b as usize]]).collect() }
+    }
 }
 
 /// A chart in one of its turns.
@@ -70,13 +80,11 @@ fn shape(piece: &Piece, k: usize, count: usize, cell: f64, gutter: usize) -> Sha
     // Quarters must not round.
     let exact = |x: f64| if x.abs() < 1e-9 || x.abs() > 1.0 - 1e-9 { x.round() } else { x };
     let turn = [exact(angle.cos()), exact(angle.sin())];
-    let turned: Vec<[f64; 2]> =
-        piece.uv.iter().map(|&[u, v]| [turn[0] * u - turn[1] * v, turn[1] * u + turn[0] * v]).collect();
-    let extreme = |k: usize, pick: fn(f64, f64) -> f64| turned.iter().map(|p| p[k]).reduce(pick).unwrap_or(0.0);
+    let turned =
+        || piece.rim.iter().map(|edge| edge.map(|[u, v]| [turn[0] * u - turn[1] * v, turn[1] * u + turn[0] * v]));
+    let extreme = |k: usize, pick: fn(f64, f64) -> f64| turned().map(|[from, _]| from[k]).reduce(pick).unwrap_or(0.0);
     let corner = [extreme(0, f64::min), extreme(1, f64::min)];
     let size = [extreme(0, f64::max) - corner[0], extreme(1, f64::max) - corner[1]];
-    let corners =
-        piece.faces.iter().map(|face| face.map(|v| turned[v as usize]).map(|p| [p[0] - corner[0], p[1] - corner[1]]));
-    let cells = Bitmap::of_triangles(corners, size, cell);
+    let cells = Bitmap::within(turned().map(|edge| edge.map(|p| [p[0] - corner[0], p[1] - corner[1]])), size, cell);
     Shape { turn, corner, size: [cells.columns, cells.rows], outline: cells.outline(), wide: cells.dilated(gutter) }
 }
