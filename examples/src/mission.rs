@@ -12,6 +12,7 @@ mod footprints;
 mod given_up;
 mod inspect;
 mod mission_output;
+mod nozzle;
 mod path_view;
 mod plan;
 mod plan_output;

@@ -16,7 +16,7 @@ const RETREAT_DISTANCES: [f64; 4] = [0.15, 0.3, 0.6, 1.2];
 /// Edge of the cells in which a way from the surface to the open is looked for, m.
 const ESCAPE_STEP: f64 = 0.1;
 /// Cells looked at for that.
-const ESCAPE_CELLS: usize = 1000;
+const ESCAPE_CELLS: usize = 500;
 /// Edge of the cells in the open, m.
 const OPEN_STEP: f64 = 0.15;
 /// Half the longest step between two cells, in edges; a point lies no farther from the nearest cell either.
@@ -35,12 +35,14 @@ pub(crate) struct TransitPlanner {
     axes: Rotation3<f64>,
     /// Distance of the middles of cells from the surface.
     distances: HashMap<Cell, f64>,
+    /// The last state from which there was no way to the open, and the clearance that it was to keep.
+    stuck: Option<(VehicleState, f64)>,
 }
 
 impl TransitPlanner {
     /// With cells that lie about a vehicle.
     pub(crate) fn new(at: &VehicleState) -> Self {
-        Self { origin: at.position, axes: axes(at), distances: HashMap::new() }
+        Self { origin: at.position, axes: axes(at), distances: HashMap::new(), stuck: None }
     }
 
     /// The corners of a flight that keeps `clearance`, both ends included: two where it is straight. `None` where none is found.
@@ -69,7 +71,13 @@ impl TransitPlanner {
         // On the way between two cells, and to the first one, the surface may be that much nearer.
         let slack = HALF_DIAGONAL * OPEN_STEP;
         let open = radius + clearance + slack;
-        let out = escape(from, checker, clearance, open + slack)?;
+        if self.stuck.is_some_and(|(state, kept)| state == *from && clearance >= kept) {
+            return None;
+        }
+        let Some(out) = escape(from, checker, clearance, open + slack) else {
+            self.stuck = Some((*from, clearance));
+            return None;
+        };
         let home = escape(to, checker, clearance, open + slack)?;
         let (gate, end) = (out[out.len() - 1], home[home.len() - 1]);
         let (start, goal) = (self.cell(&gate.position), self.cell(&end.position));

@@ -2,12 +2,12 @@
 
 use paint_net::{
     AreaFill, Centrelines, Deconvolution, Feedback, Image, Layered, MatchingPursuit, Observer, OnSurface, PaintProblem,
-    Painter, Painting, SprayKernel, Stroke,
+    Painter, Painting, Stroke,
 };
-use paint_sim::SprayModel;
 
 use super::error::MissionError;
 use super::footprints::Footprints;
+use super::nozzle::kernel;
 use super::settings::{MissionSettings, PainterChoice};
 use crate::appearance::Appearance;
 use crate::progress::Stage;
@@ -15,22 +15,6 @@ use crate::surface::PaintSurface;
 
 /// Weight of texels out of reach against those in reach.
 pub(super) const UNPAINTABLE_WEIGHT: f64 = 0.02;
-/// Where the cone of the spray ends, in deviations: all but 0.2 % of the paint lies inside.
-const SPRAY_CUT: f64 = 3.5;
-/// Paint that has met nothing after this way is overspray, metres: what lies behind the edge of a surface stays clean.
-const SPRAY_RANGE: f64 = 0.35;
-
-/// The footprint of the nozzle in texels, with all of its tails.
-pub(super) fn kernel(settings: &MissionSettings) -> Result<SprayKernel, paint_net::Error> {
-    SprayKernel::new(settings.spot / settings.texel, SPRAY_CUT)
-}
-
-/// The same nozzle in the simulation.
-pub(super) fn spray_model(settings: &MissionSettings) -> SprayModel {
-    let sigma = (settings.spot / settings.planner.nozzle.stand_off).atan();
-    SprayModel { sigma, cut: SPRAY_CUT, range: SPRAY_RANGE, ..SprayModel::default() }
-}
-
 /// Layers of sprays for the wanted picture; no spray lies where `paintable` is false. Paint that falls beyond a seam counts where it lies,
 /// and volumes are those for what every spray leaves on the surface.
 pub(super) fn decide(

@@ -7,8 +7,9 @@ use nalgebra::{Point3, UnitVector3};
 use paint_planner::{Plan, Target};
 use paint_sim::{SprayModel, Surface, Texel};
 
-use super::decide::{UNPAINTABLE_WEIGHT, spray_model};
+use super::decide::UNPAINTABLE_WEIGHT;
 use super::decision::Decision;
+use super::nozzle::spray_model;
 use crate::appearance::UNIT_THICKNESS;
 
 /// Edge of a cell of the search for texels, metres: no less than the reach of a spray at the stand-off.

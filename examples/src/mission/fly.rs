@@ -4,9 +4,9 @@ use paint_planner::Plan;
 use paint_sim::flight::{Interlock, Localisation, Valve};
 use paint_sim::{Film, FlightLog, FlightSettings, TriangleSurface};
 
-use super::decide::spray_model;
 use super::decision::Decision;
 use super::error::MissionError;
+use super::nozzle::spray_model;
 use super::plan::Planned;
 use super::settings::MissionSettings;
 use super::simulated_flight::{flight_settings, fly_plan};

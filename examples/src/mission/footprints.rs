@@ -5,8 +5,8 @@ use paint_net::{SprayKernel, Stroke, SurfaceFootprint};
 use paint_planner::Target;
 use paint_sim::{Film, Shot, SprayModel};
 
-use super::decide::{kernel, spray_model};
 use super::error::MissionError;
+use super::nozzle::{kernel, spray_model};
 use super::settings::MissionSettings;
 use crate::appearance::UNIT_THICKNESS;
 use crate::surface::PaintSurface;

@@ -3,11 +3,11 @@
 use paint_net::{Painting, StrokeSettings, boustrophedon};
 use paint_planner::{Error, NotServed, Plan, Planner, Settings, SmoothingPlanner, Target, VehicleState};
 
-use super::decide::kernel;
 use super::decision::Decision;
 use super::dose_correction::correct_doses;
 use super::error::MissionError;
 use super::given_up::take_given_up;
+use super::nozzle::kernel;
 use super::rehearse::{Rehearsed, rehearsed_plan};
 use super::service::Service;
 use super::settings::{MissionSettings, PainterChoice};

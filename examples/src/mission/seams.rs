@@ -5,10 +5,10 @@ use paint_net::{Image, metrics};
 use paint_planner::Target;
 use paint_sim::{Film, Shot};
 
-use super::decide::{kernel, spray_model};
 use super::decision::Decision;
 use super::error::MissionError;
 use super::fly::SHOT_STEP;
+use super::nozzle::{kernel, spray_model};
 use super::plan::layer_route;
 use super::run::Mission;
 use super::settings::MissionSettings;

@@ -150,8 +150,11 @@ fn split_at_thresholds(whole: &Painting, thresholds: &[f64], problem: &PaintProb
                 sprays.push(spray);
             }
         }
-        let mut so_far = canvas.clone();
-        problem.settle(initial.data(), so_far.data_mut());
+        // All together are the whole plan, whose painter knows its canvas best.
+        let mut so_far = if last { whole.canvas.clone() } else { canvas.clone() };
+        if !last {
+            problem.settle(initial.data(), so_far.data_mut());
+        }
         layers.push(Painting::new(sprays, so_far, saturation));
         lower = upper;
     }

@@ -1,6 +1,6 @@
 //! Volumes for what sprays really leave: on a surface that is curved, stretched and cut to become a picture.
 
-use super::fitting::{ink_cost, prune_with};
+use super::fitting::ink_cost;
 use crate::error::{Error, require};
 use crate::model::Spray;
 use crate::optimise::{StoppingRule, minimise};
@@ -18,17 +18,20 @@ pub type SurfaceFootprint = Vec<(u32, f32)>;
 /// cone, and goes on beyond a seam in another chart. Whoever knows the surface gives the footprint of every spray; the volumes then minimise
 ///
 /// ```text
-/// ½ Σ w (f(c₀ + S v) - y)²    subject to  0 ≤ v ≤ v_max
+/// ½ Σ w (f(c₀ + S v) - y)² + ½ ρ π σ² Σ (v - v_painter)²    subject to  v_min ≤ v ≤ v_max
 /// ```
 ///
-/// from the painter's own, with the footprints as columns of `S`. Places, order and strokes stay; a spray that leaves nothing is dropped, as
-/// are those below [`Limits::min_volume`](crate::Limits::min_volume). The canvas is that of the surface.
+/// with the footprints as columns of `S` and the `ρ` of [`Self::proximity`]. Places, order and strokes stay, as gaps would shut the valve on the
+/// way; only a spray that leaves nothing is dropped. The canvas is that of the surface. For painters in one piece: layers are made of the result.
 pub struct OnSurface<'a, P> {
     /// The painter that plans on the plane.
     pub inner: P,
     /// The footprint of each spray, stroke by stroke. Sprays of a painter without strokes are given row by row, as by [`boustrophedon`].
     pub footprints: &'a dyn Fn(&[Stroke]) -> Vec<SurfaceFootprint>,
-    /// Largest number of iterations. Default 60, ours.
+    /// Weight of the differences from the painter's own volumes against the ink. Default 1, ours: what the surface does not ask to be changed
+    /// stays, above all differences between neighbours that hardly show and that a flight cannot repeat.
+    pub proximity: f64,
+    /// Largest number of iterations. Default 25, ours.
     pub iterations: usize,
     /// Stop when the cost falls by less than this share per iteration, three times in a row. Default 1e-4, ours.
     pub tolerance: f64,
@@ -40,7 +43,7 @@ const PLAN_SHARE: f64 = 0.7;
 impl<'a, P: Painter> OnSurface<'a, P> {
     /// With the default fit.
     pub fn new(inner: P, footprints: &'a dyn Fn(&[Stroke]) -> Vec<SurfaceFootprint>) -> Self {
-        Self { inner, footprints, iterations: 60, tolerance: 1e-4 }
+        Self { inner, footprints, proximity: 1.0, iterations: 25, tolerance: 1e-4 }
     }
 }
 
@@ -51,6 +54,7 @@ impl<P: Painter> Painter for OnSurface<'_, P> {
 
     fn paint_observed(&self, problem: &PaintProblem, observer: &mut dyn Observer) -> Result<Painting, Error> {
         require("tolerance", self.tolerance, self.tolerance >= 0.0, "it must be 0 or more")?;
+        require("proximity", self.proximity, (0.0..=1e6).contains(&self.proximity), "it must lie in [0, 1000000]")?;
         let plan =
             self.inner.paint_observed(problem, &mut PartialProgress { observer, from: 0.0, share: PLAN_SHARE })?;
         let rows;
@@ -62,29 +66,35 @@ impl<P: Painter> Painter for OnSurface<'_, P> {
         };
         let sprays: Vec<Spray> = strokes.iter().flat_map(|stroke| stroke.sprays.iter().copied()).collect();
         let footprints = self.checked_footprints(strokes, sprays.len(), problem)?;
+        // A spray that the painter wants stays one that is worth opening the valve for: what is sought is how much more it gets.
+        let least: Vec<f64> =
+            footprints.iter().map(|f| if f.is_empty() { 0.0 } else { problem.limits.min_volume }).collect();
+        let room = problem.limits.max_volume - problem.limits.min_volume;
+        let most: Vec<f64> = footprints.iter().map(|f| if f.is_empty() { 0.0 } else { room }).collect();
         let initial = problem.initial_canvas();
-        let most = problem.limits.max_volume;
-        let upper_bounds: Vec<f64> = footprints.iter().map(|f| if f.is_empty() { 0.0 } else { most }).collect();
-        let stop = StoppingRule { iterations: self.iterations, relative_decrease: self.tolerance };
-        let fit = |upper_bounds: &[f64], volumes: &mut Vec<f64>, progress: &mut dyn FnMut(f64)| {
-            let mut canvas = initial.data().to_vec();
-            let mut cost = |v: &[f64], gradient: &mut [f64]| {
-                canvas.copy_from_slice(initial.data());
-                deposit(&footprints, v, &mut canvas);
-                let value = ink_cost(problem, problem.saturation, &mut canvas);
-                for (slot, footprint) in gradient.iter_mut().zip(&footprints) {
-                    *slot = footprint.iter().map(|&(k, depth)| f64::from(depth) * canvas[k as usize]).sum();
-                }
-                value
-            };
-            minimise(volumes, upper_bounds, &stop, &mut cost, progress);
+        let mut base = initial.data().to_vec();
+        deposit(&footprints, &least, &mut base);
+        let planned: Vec<f64> = sprays.iter().zip(&least).map(|(spray, least)| spray.volume - least).collect();
+        // In units of what the square of a volume costs on white paper.
+        let stiffness = self.proximity * std::f64::consts::PI * problem.kernel.sigma().powi(2);
+        let mut canvas = base.clone();
+        let mut cost = |more: &[f64], gradient: &mut [f64]| {
+            canvas.copy_from_slice(&base);
+            deposit(&footprints, more, &mut canvas);
+            let mut value = ink_cost(problem, problem.saturation, &mut canvas);
+            for (k, slot) in gradient.iter_mut().enumerate() {
+                let change = more[k] - planned[k];
+                value += 0.5 * stiffness * change * change;
+                let missed = footprints[k].iter().map(|&(pixel, depth)| f64::from(depth) * canvas[pixel as usize]);
+                *slot = missed.sum::<f64>() + stiffness * change;
+            }
+            value
         };
-        let mut volumes: Vec<f64> = sprays.iter().map(|spray| spray.volume).collect();
-        let rest = 1.0 - PLAN_SHARE;
-        fit(&upper_bounds, &mut volumes, &mut |share| observer.progress(PLAN_SHARE + rest * share));
-        prune_with(&upper_bounds, problem.limits, &mut volumes, &mut |upper_bounds, volumes| {
-            fit(upper_bounds, volumes, &mut |_| ());
-        });
+        let stop = StoppingRule { iterations: self.iterations, relative_decrease: self.tolerance };
+        let mut volumes = planned.clone();
+        let mut progress = |share: f64| observer.progress(PLAN_SHARE + (1.0 - PLAN_SHARE) * share);
+        minimise(&mut volumes, &most, &stop, &mut cost, &mut progress);
+        volumes.iter_mut().zip(&least).for_each(|(volume, least)| *volume += least);
         observer.progress(1.0);
 
         let mut canvas = initial;
