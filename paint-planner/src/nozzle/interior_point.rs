@@ -2,7 +2,7 @@
 //! factorisation and two substitutions, fused with the work on the rows into four passes over the states.
 //!
 //! It gets where the guesses of the active set go round in circles. Kept beside Clarabel, which solves the same program as a general
-//! sparse one at ten times the price (`library_figures planner`). Rows are taken one at a time: four side by side, by types of our own or the crate
+//! sparse one at twenty times the price (`library_figures planner`). Rows are taken one at a time: four side by side, by types of our own or the crate
 //! `wide`, would save a quarter of the time of a method that seldom runs, at the price of a dependency or a hundred lines.
 
 use super::inequality_row::{HardRow, Reach, Residuals, SoftRow, Step, Sums};
