@@ -11,9 +11,9 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3, Vector4, Vector5};
 use paint_planner::{
-    Clarabel, HeadingSettings, HeadingTable, NozzleSettings, OptimalPlanner, Plan, Planner, PrimalDualActiveSet,
-    QpSolver, Settings, StandardForm, StrokeEnds, Target, TimingPolicy, Trajectory, order_strokes, stroke_program,
-    transit_lower_bound,
+    Clarabel, HeadingSettings, HeadingTable, InteriorPoint, NozzleSettings, OptimalPlanner, Plan, Planner,
+    PrimalDualActiveSet, QpSolver, Settings, StandardForm, StrokeEnds, Target, TimingPolicy, Trajectory, order_strokes,
+    stroke_program, transit_lower_bound,
 };
 use paint_sim::TriangleSurface;
 use paintcopter_examples::adapters::{MeshSurface, Robot};
@@ -117,15 +117,18 @@ fn path(count: usize, runs: usize) -> Result<(), AnyError> {
         Ok((states, outcome.steps))
     };
     let (own, steps) = solved(&PrimalDualActiveSet)?;
+    let (_, interior_steps) = solved(&InteriorPoint)?;
     let (exact, _) = solved(&Clarabel::default())?;
     let off = own.iter().zip(&exact).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max);
     let (objective, violation) = quality(&form, &own);
     let cpu_ms = 1e3 * median_seconds(runs, || solved(&PrimalDualActiveSet));
+    let interior_ms = 1e3 * median_seconds(runs, || solved(&InteriorPoint));
     println!(
         "{}",
         json!({
             "fig": format!("path_{count}"), "peer": "paint-planner", "cpu_ms": cpu_ms, "steps": steps, "objective": objective,
-            "violation": violation, "off_clarabel_1e-12": off,
+            "violation": violation, "off_clarabel_1e-12": off, "interior_point_cpu_ms": interior_ms,
+            "interior_point_steps": interior_steps,
         })
     );
     Ok(())

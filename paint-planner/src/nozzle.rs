@@ -4,14 +4,14 @@
 mod clarabel_solver;
 mod dual_active_set;
 mod gauss_seidel;
+mod inequality_row;
 mod initial_state;
 mod interior_point;
-mod lanes;
 mod paper_exact;
 mod primal_dual_active_set;
 mod qp_solver;
 mod quadratic_program;
-mod row_group;
+
 mod sequential;
 mod solution;
 mod standard_form;

@@ -107,8 +107,8 @@ pub struct TimingSettings {
     pub max_acceleration: f64,
     /// Greatest heading rate, rad/s (default 1).
     pub max_heading_rate: f64,
-    /// Greatest rate of pan and tilt, rad/s (default 3: half the speed of an AX-12A servo without load, as the joints also answer for the
-    /// lean of the body).
+    /// Greatest rate of pan and tilt, rad/s (default 6.1: just below the 59 rpm of an AX-12A servo without load, Paper II section 3; less
+    /// leaves more for the lean of the body, and slows strokes over rims).
     pub max_joint_rate: f64,
     /// Greatest flow of paint, m^3/s (default 2e-6).
     pub max_flow: f64,
@@ -181,7 +181,7 @@ impl Default for TimingSettings {
             max_speed: 0.5,
             max_acceleration: 1.0,
             max_heading_rate: 1.0,
-            max_joint_rate: 3.0,
+            max_joint_rate: 6.1,
             max_flow: 2e-6,
             knot_spacing: 0.1,
             tolerance: 0.002,

@@ -2,12 +2,12 @@
 //! factorisation and two substitutions, fused with the work on the rows into four passes over the states.
 //!
 //! It gets where the guesses of the active set go round in circles. Kept beside Clarabel, which solves the same program as a general
-//! sparse one at twenty times the price (`library_figures planner`).
+//! sparse one at twenty times the price (`library_figures planner`). Rows are taken one at a time: four side by side, by types of our own or the crate
+//! `wide`, would save a quarter of the time of a method that seldom runs, at the price of a dependency or a hundred lines.
 
-use super::lanes::{LANES, Lanes};
+use super::inequality_row::{HardRow, Reach, Residuals, SoftRow, Step, Sums};
 use super::qp_solver::{QpOutcome, QpSolver};
 use super::quadratic_program::QuadraticProgram;
-use super::row_group::{HardRows, Reach, Residuals, SoftRows, Step, Sums};
 use crate::block_tridiagonal::BlockTridiagonal;
 use crate::error::Error;
 use nalgebra::{Matrix2, Vector2, Vector3, Vector5};
@@ -65,10 +65,10 @@ type RowSteps = (Step<Vector3<f64>>, Step<Vector2<f64>>);
 /// Rows and their multipliers, the factorised Newton system, and the step.
 struct Iterate<'a> {
     program: &'a QuadraticProgram,
-    hard: Vec<HardRows>,
-    soft: Vec<SoftRows>,
-    /// Groups of each kind that a state has.
-    groups: [usize; 2],
+    hard: Vec<HardRow>,
+    soft: Vec<SoftRow>,
+    /// Rows of each kind that a state has.
+    per_state: [usize; 2],
     system: BlockTridiagonal<5>,
     /// The states, counted from the start: far from the origin of the world their digits would not do. And the slope there.
     moved: Vec<Vector5<f64>>,
@@ -92,20 +92,21 @@ impl<'a> Iterate<'a> {
             (0..x.len()).map(|i| program.curvature_times(x, i) + program.gradient[i]).collect();
         let steepest = slope.iter().fold(0.0_f64, |most, slope| most.max(slope.amax()));
         let mu = (INITIAL_MU * steepest).max(1e-9);
-        let groups = [program.hard_rows.div_ceil(LANES), program.soft_rows.div_ceil(LANES)];
-        let (mut hard, mut soft) = (Vec::with_capacity(groups[0] * x.len()), Vec::with_capacity(groups[1] * x.len()));
+        let per_state = [program.hard_rows, program.soft_rows];
+        let (mut hard, mut soft) =
+            (Vec::with_capacity(per_state[0] * x.len()), Vec::with_capacity(per_state[1] * x.len()));
         for (i, rows) in program.rows.chunks_exact(program.hard_rows + program.soft_rows).enumerate() {
             let (p, w) = program.views(i, &x[i]);
             let (hard_rows, soft_rows) = rows.split_at(program.hard_rows);
-            hard.extend(hard_rows.chunks(LANES).map(|rows| HardRows::new(rows, &p, mu)));
-            soft.extend(soft_rows.chunks(LANES).map(|rows| SoftRows::new(rows, &w, mu, program.penalty)));
+            hard.extend(hard_rows.iter().map(|row| HardRow::new(row, &p, mu)));
+            soft.extend(soft_rows.iter().map(|row| SoftRow::new(row, &w, mu, program.penalty)));
         }
-        let products = ((hard.len() + 2 * soft.len()) * LANES).max(1) as f64;
+        let products = (hard.len() + 2 * soft.len()).max(1) as f64;
         Self {
             program,
             hard,
             soft,
-            groups,
+            per_state,
             system: program.hessian.clone(),
             moved: vec![Vector5::zeros(); x.len()],
             slope,
@@ -121,7 +122,7 @@ impl<'a> Iterate<'a> {
 
     /// Greatest relaxation of a soft row.
     fn slack(&self) -> f64 {
-        self.soft.iter().fold(0.0, |worst, rows| worst.max(rows.relaxation()))
+        self.soft.iter().fold(0.0, |worst, row| worst.max(row.relaxation()))
     }
 
     /// Goes the last step, factorises the Newton system there, and begins its solution. `None` where it is not positive definite.
@@ -136,21 +137,21 @@ impl<'a> Iterate<'a> {
             next = self.advance_state(i + 1);
             let (p, w) = program.views(i, &self.moved[i]);
             let (mut hard, mut soft) = (Sums::<3, 6>::zero(), Sums::<2, 3>::zero());
-            for rows in &mut self.hard[i * self.groups[0]..][..self.groups[0]] {
-                rows.advance(&hard_step, &p, &mut hard, &mut at);
+            for row in &mut self.hard[i * self.per_state[0]..][..self.per_state[0]] {
+                row.advance(&hard_step, &p, &mut hard, &mut at);
             }
-            for rows in &mut self.soft[i * self.groups[1]..][..self.groups[1]] {
-                rows.advance(&soft_step, penalty, &w, &mut soft, &mut at);
+            for row in &mut self.soft[i * self.per_state[1]..][..self.per_state[1]] {
+                row.advance(&soft_step, penalty, &w, &mut soft, &mut at);
             }
             let slope = program.curvature_times(&self.moved, i) + self.slope[i];
             dual = dual.max((slope + self.to_state(i, &hard.held, &soft.held)).amax());
             let soft_map = &program.soft_map[i];
-            let [xx, xy, yy] = soft.curvature.map(Lanes::sum);
+            let [xx, xy, yy] = soft.curvature;
             let mut block = program.hessian.diagonal[i] + soft_map.tr_mul(&(Matrix2::new(xx, xy, xy, yy) * soft_map));
             // Only the lower triangle is read.
             let places = [(0, 0), (1, 0), (2, 0), (1, 1), (2, 1), (2, 2)];
             for (place, curvature) in places.into_iter().zip(&hard.curvature) {
-                block[place] += curvature.sum();
+                block[place] += curvature;
             }
             self.system.diagonal[i] = block;
             if let Some(below) = program.hessian.lower.get(i) {
@@ -162,8 +163,8 @@ impl<'a> Iterate<'a> {
             self.step[i] = -slope - self.to_state(i, &hard.pull, &soft.pull);
             self.system.forward_block(i, &mut self.step);
         }
-        self.gap = at.gap.sum();
-        Some(Optimality { mu: self.gap / self.products, worst: at.worst.largest(), primal: at.primal.largest(), dual })
+        self.gap = at.gap;
+        Some(Optimality { mu: self.gap / self.products, worst: at.worst, primal: at.primal, dual })
     }
 
     /// Goes the last step with state `i`, if there is such, and returns it as its rows see it.
@@ -192,28 +193,28 @@ impl<'a> Iterate<'a> {
         for i in (0..self.moved.len()).rev() {
             self.system.backward_block(i, &mut self.step);
             let (hard_step, soft_step) = self.step_of(i);
-            for rows in &self.hard[i * self.groups[0]..][..self.groups[0]] {
-                rows.predict(&hard_step, &mut reach);
+            for row in &self.hard[i * self.per_state[0]..][..self.per_state[0]] {
+                row.predict(&hard_step, &mut reach);
             }
-            for rows in &self.soft[i * self.groups[1]..][..self.groups[1]] {
-                rows.predict(self.program.penalty, &soft_step, &mut reach);
+            for row in &self.soft[i * self.per_state[1]..][..self.per_state[1]] {
+                row.predict(self.program.penalty, &soft_step, &mut reach);
             }
         }
-        let length = 1.0 / reach.inverse.largest().max(1.0);
+        let length = 1.0 / reach.inverse.max(1.0);
         // Each product changes by minus itself, and by the product of the changes.
-        ((1.0 - length) * self.gap + length * length * reach.cross.sum()) / self.products
+        ((1.0 - length) * self.gap + length * length * reach.cross) / self.products
     }
 
     /// Begins the solution for what products of `target` and the second order add to the step.
     fn correct(&mut self) {
         for i in 0..self.moved.len() {
             let (hard_step, soft_step) = self.step_of(i);
-            let (mut hard, mut soft) = ([Lanes::default(); 3], [Lanes::default(); 2]);
-            for rows in &self.hard[i * self.groups[0]..][..self.groups[0]] {
-                rows.correct(&hard_step, &mut hard);
+            let (mut hard, mut soft) = ([0.0; 3], [0.0; 2]);
+            for row in &self.hard[i * self.per_state[0]..][..self.per_state[0]] {
+                row.correct(&hard_step, &mut hard);
             }
-            for rows in &self.soft[i * self.groups[1]..][..self.groups[1]] {
-                rows.correct(self.program.penalty, &soft_step, &mut soft);
+            for row in &self.soft[i * self.per_state[1]..][..self.per_state[1]] {
+                row.correct(self.program.penalty, &soft_step, &mut soft);
             }
             self.correction[i] = -self.to_state(i, &hard, &soft);
             self.system.forward_block(i, &mut self.correction);
@@ -222,24 +223,24 @@ impl<'a> Iterate<'a> {
 
     /// Finds it; returns the share of the whole step that keeps slacks, multipliers and relaxations positive.
     fn finish(&mut self) -> f64 {
-        let mut inverse = Lanes::default();
+        let mut inverse = 0.0;
         for i in (0..self.moved.len()).rev() {
             self.system.backward_block(i, &mut self.correction);
             let (hard_step, soft_step) = self.step_of(i);
-            for rows in &self.hard[i * self.groups[0]..][..self.groups[0]] {
-                rows.finish(&hard_step, &mut inverse);
+            for row in &self.hard[i * self.per_state[0]..][..self.per_state[0]] {
+                row.finish(&hard_step, &mut inverse);
             }
-            for rows in &self.soft[i * self.groups[1]..][..self.groups[1]] {
-                rows.finish(self.program.penalty, &soft_step, &mut inverse);
+            for row in &self.soft[i * self.per_state[1]..][..self.per_state[1]] {
+                row.finish(self.program.penalty, &soft_step, &mut inverse);
             }
         }
-        1.0 / inverse.largest().max(f64::MIN_POSITIVE)
+        1.0 / inverse.max(f64::MIN_POSITIVE)
     }
 
     /// Forces of hard and soft rows, back to the five coordinates of state `i`.
-    fn to_state(&self, i: usize, hard: &[Lanes; 3], soft: &[Lanes; 2]) -> Vector5<f64> {
-        let mut sum = self.program.soft_map[i].tr_mul(&Vector2::new(soft[0].sum(), soft[1].sum()));
-        let position = Vector3::from(hard.map(Lanes::sum));
+    fn to_state(&self, i: usize, hard: &[f64; 3], soft: &[f64; 2]) -> Vector5<f64> {
+        let mut sum = self.program.soft_map[i].tr_mul(&Vector2::from(*soft));
+        let position = Vector3::from(*hard);
         for k in 0..3 {
             sum[k] += position[k];
         }

@@ -1,7 +1,7 @@
 //! The primal-dual active-set method (Hintermueller, Ito and Kunisch 2003) for [`QuadraticProgram`]: every round is one
 //! block-tridiagonal factorisation with the rows that bind as equations.
 //!
-//! The interior-point method needs four to seven times as long on strokes: few of their rows bind, and a round is two passes over the
+//! The interior-point method needs three to thirteen times as long on strokes (`library_figures planner`): few of their rows bind, and a round is two passes over the
 //! states where a step of that method is four.
 
 use super::interior_point::InteriorPoint;
@@ -31,17 +31,20 @@ impl QpSolver for PrimalDualActiveSet {
     /// `steps` counts the rounds and, where they did not settle, the steps of the interior-point method as well. Fails as that does.
     fn solve(&self, program: &QuadraticProgram, states: &mut [Vector5<f64>]) -> Result<QpOutcome, Error> {
         let mut iterate = Iterate::new(program, states);
-        for steps in 0..MAX_ROUNDS {
-            let Some(at) = iterate.advance_and_factor() else { break };
+        let mut steps = 0;
+        while steps < MAX_ROUNDS
+            && let Some(at) = iterate.advance_and_factor()
+        {
             if at.primal <= PRIMAL && at.product <= PRODUCT && at.dual <= DUAL * (1.0 + iterate.steepest) {
                 let moved = iterate.moved;
                 states.iter_mut().zip(&moved).for_each(|(state, moved)| *state += moved);
                 return Ok(QpOutcome { steps, slack: at.slack });
             }
             iterate.finish();
+            steps += 1;
         }
         let outcome = InteriorPoint.solve(program, states)?;
-        Ok(QpOutcome { steps: MAX_ROUNDS + outcome.steps, ..outcome })
+        Ok(QpOutcome { steps: steps + outcome.steps, ..outcome })
     }
 }
 

@@ -1,15 +1,12 @@
-//! Inequality rows of the interior-point method in groups of four.
+//! One inequality row of the interior-point method.
 //!
 //! A hard row is `a.q + s = b` with slack `s` and multiplier `z`, `s z -> 0`. A soft one is `a.q - e + s = b` with the relaxation `e`,
 //! `e v -> 0` with `v = penalty - z`. Steps are written such that nothing small is a difference of large numbers: what a row sees of a
 //! step is added to what it sees of the state, as a slack may be as small as the last digit of a position.
 
-use super::lanes::Lanes;
 use super::quadratic_program::Row;
 use nalgebra::{Vector2, Vector3};
 
-/// A row that never binds, where a state has no multiple of four.
-const VOID: Row = Row { a: Vector3::new(0.0, 0.0, 0.0), b: 1.0 };
 /// Least slack of a start.
 const LEAST_SLACK: f64 = 1e-3;
 
@@ -17,28 +14,27 @@ const LEAST_SLACK: f64 = 1e-3;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sums<const N: usize, const M: usize> {
     /// `A' z`.
-    pub(super) held: [Lanes; N],
+    pub(super) held: [f64; N],
     /// What the rows put on the right-hand side of the step towards complementarity zero, `A' z` included.
-    pub(super) pull: [Lanes; N],
+    pub(super) pull: [f64; N],
     /// Lower triangle of the curvature, column by column.
-    pub(super) curvature: [Lanes; M],
+    pub(super) curvature: [f64; M],
 }
 
 impl<const N: usize, const M: usize> Sums<N, M> {
     pub(super) fn zero() -> Self {
-        let zero = Lanes::default();
-        Self { held: [zero; N], pull: [zero; N], curvature: [zero; M] }
+        Self { held: [0.0; N], pull: [0.0; N], curvature: [0.0; M] }
     }
 
     #[inline]
-    fn add(&mut self, a: &[Lanes; N], z: Lanes, pull: Lanes, stiffness: Lanes) {
+    fn add(&mut self, a: &[f64; N], z: f64, pull: f64, stiffness: f64) {
         let mut place = 0;
         for r in 0..N {
             self.held[r] += a[r] * z;
             self.pull[r] += a[r] * pull;
             let scaled = a[r] * stiffness;
             for other in &a[r..] {
-                self.curvature[place] += scaled * *other;
+                self.curvature[place] += scaled * other;
                 place += 1;
             }
         }
@@ -49,11 +45,11 @@ impl<const N: usize, const M: usize> Sums<N, M> {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Residuals {
     /// Products of slacks and multipliers.
-    pub(super) gap: Lanes,
+    pub(super) gap: f64,
     /// The greatest of them.
-    pub(super) worst: Lanes,
+    pub(super) worst: f64,
     /// Greatest violation of a row's equation.
-    pub(super) primal: Lanes,
+    pub(super) primal: f64,
 }
 
 /// A step of one state from `at`: `predicted` leads towards complementarity zero, the correction adds what leads to products of `target`
@@ -72,27 +68,25 @@ pub(super) struct Step<V> {
 /// How far a step may go (the inverse of the way to the boundary), and the products of its changes.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Reach {
-    pub(super) inverse: Lanes,
-    pub(super) cross: Lanes,
+    pub(super) inverse: f64,
+    pub(super) cross: f64,
 }
 
-/// Four hard rows, on the position.
+/// A hard row, on the position.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct HardRows {
-    a: [Lanes; 3],
-    b: Lanes,
-    s: Lanes,
-    z: Lanes,
+pub(super) struct HardRow {
+    a: [f64; 3],
+    b: f64,
+    s: f64,
+    z: f64,
 }
 
-impl HardRows {
-    /// At most four rows, their products at `mu` where the slack allows. Positions count from `p`.
-    pub(super) fn new(rows: &[Row], p: &Vector3<f64>, mu: f64) -> Self {
-        let row = |k: usize| rows.get(k).unwrap_or(&VOID);
-        let b = Lanes::from_fn(|k| row(k).b - row(k).a.dot(p));
-        let s = b.max(Lanes::splat(LEAST_SLACK));
-        let a = std::array::from_fn(|r| Lanes::from_fn(|k| row(k).a[r]));
-        Self { a, b, s, z: mu / s }
+impl HardRow {
+    /// Its product at `mu` where the slack allows. Positions count from `p`.
+    pub(super) fn new(row: &Row, p: &Vector3<f64>, mu: f64) -> Self {
+        let b = row.b - row.a.dot(p);
+        let s = b.max(LEAST_SLACK);
+        Self { a: row.a.into(), b, s, z: mu / s }
     }
 
     /// Goes the step at last, and adds the rows up at the position `p` where that ends.
@@ -125,37 +119,37 @@ impl HardRows {
 
     /// What the rows add to the right-hand side for products of `target` instead, second order included.
     #[inline]
-    pub(super) fn correct(&self, step: &Step<Vector3<f64>>, pull: &mut [Lanes; 3]) {
+    pub(super) fn correct(&self, step: &Step<Vector3<f64>>, pull: &mut [f64; 3]) {
         let inverse = 1.0 / self.s;
         let t = self.ahead(step) * inverse;
         let force = step.target * inverse + (1.0 + t) * self.z * t;
         for (pull, a) in pull.iter_mut().zip(&self.a) {
-            *pull += *a * force;
+            *pull += a * force;
         }
     }
 
     /// How far the corrected step may go.
     #[inline]
-    pub(super) fn finish(&self, step: &Step<Vector3<f64>>, reach: &mut Lanes) {
+    pub(super) fn finish(&self, step: &Step<Vector3<f64>>, reach: &mut f64) {
         let inverse = 1.0 / self.s;
         let [ds, dz] = self.change(step, inverse);
         *reach = reach.max((-ds * inverse).max(-dz / self.z));
     }
 
     #[inline]
-    fn along(&self, p: &Vector3<f64>) -> Lanes {
+    fn along(&self, p: &Vector3<f64>) -> f64 {
         self.a[0] * p.x + self.a[1] * p.y + self.a[2] * p.z
     }
 
     /// `a.q - b` where the step towards zero ends.
     #[inline]
-    fn ahead(&self, step: &Step<Vector3<f64>>) -> Lanes {
+    fn ahead(&self, step: &Step<Vector3<f64>>) -> f64 {
         self.along(&step.at) - self.b + self.along(&step.predicted)
     }
 
     /// Changes of slack and multiplier.
     #[inline]
-    fn change(&self, step: &Step<Vector3<f64>>, inverse: Lanes) -> [Lanes; 2] {
+    fn change(&self, step: &Step<Vector3<f64>>, inverse: f64) -> [f64; 2] {
         let t = self.ahead(step) * inverse;
         let moved = self.along(&step.correction);
         let rest = 1.0 + t;
@@ -163,45 +157,43 @@ impl HardRows {
     }
 }
 
-/// Four soft rows, on the mapped coordinate.
+/// A soft row, on the mapped coordinate.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct SoftRows {
-    a: [Lanes; 2],
-    b: Lanes,
-    s: Lanes,
-    z: Lanes,
-    e: Lanes,
+pub(super) struct SoftRow {
+    a: [f64; 2],
+    b: f64,
+    s: f64,
+    z: f64,
+    e: f64,
 }
 
 /// The step of soft rows towards complementarity zero.
 struct Predicted {
     /// Change of the multiplier as a share of it, and of what is left to the penalty.
-    t: Lanes,
-    q: Lanes,
-    ds: Lanes,
-    dz: Lanes,
-    de: Lanes,
+    t: f64,
+    q: f64,
+    ds: f64,
+    dz: f64,
+    de: f64,
     /// `1 / (s v + e z)`.
-    inverse: Lanes,
+    inverse: f64,
 }
 
-impl SoftRows {
-    /// At most four rows; coordinates count from `w`.
-    pub(super) fn new(rows: &[Row], w: &Vector2<f64>, mu: f64, penalty: f64) -> Self {
-        let row = |k: usize| rows.get(k).unwrap_or(&VOID);
-        let b = Lanes::from_fn(|k| row(k).b - row(k).a.xy().dot(w));
-        let s = b.max(Lanes::splat(LEAST_SLACK));
-        let z = Lanes(s.0.map(|s| (mu / s).min(0.5 * penalty)));
-        let a = std::array::from_fn(|r| Lanes::from_fn(|k| row(k).a[r]));
-        Self { a, b, s, z, e: mu / (penalty - z) }
+impl SoftRow {
+    /// Coordinates count from `w`.
+    pub(super) fn new(row: &Row, w: &Vector2<f64>, mu: f64, penalty: f64) -> Self {
+        let b = row.b - row.a.xy().dot(w);
+        let s = b.max(LEAST_SLACK);
+        let z = (mu / s).min(0.5 * penalty);
+        Self { a: row.a.xy().into(), b, s, z, e: mu / (penalty - z) }
     }
 
-    /// Greatest relaxation.
+    /// The relaxation.
     pub(super) fn relaxation(&self) -> f64 {
-        self.e.largest()
+        self.e
     }
 
-    /// As [`HardRows::advance`], at the coordinate `w`.
+    /// As [`HardRow::advance`], at the coordinate `w`.
     #[inline]
     pub(super) fn advance(
         &mut self,
@@ -223,7 +215,7 @@ impl SoftRows {
         sums.add(&self.a, z, z + stiffness * y, stiffness);
     }
 
-    /// As [`HardRows::predict`].
+    /// As [`HardRow::predict`].
     #[inline]
     pub(super) fn predict(&self, penalty: f64, step: &Step<Vector2<f64>>, reach: &mut Reach) {
         let Predicted { t, q, ds, dz, de, .. } = self.towards_zero(step, penalty);
@@ -231,25 +223,25 @@ impl SoftRows {
         reach.cross += (ds - de) * dz;
     }
 
-    /// As [`HardRows::correct`].
+    /// As [`HardRow::correct`].
     #[inline]
-    pub(super) fn correct(&self, penalty: f64, step: &Step<Vector2<f64>>, pull: &mut [Lanes; 2]) {
+    pub(super) fn correct(&self, penalty: f64, step: &Step<Vector2<f64>>, pull: &mut [f64; 2]) {
         let Predicted { ds, dz, de, inverse, .. } = self.towards_zero(step, penalty);
         let force = ((penalty - self.z) * (step.target - ds * dz) - self.z * (step.target + de * dz)) * inverse;
         for (pull, a) in pull.iter_mut().zip(&self.a) {
-            *pull += *a * force;
+            *pull += a * force;
         }
     }
 
-    /// As [`HardRows::finish`].
+    /// As [`HardRow::finish`].
     #[inline]
-    pub(super) fn finish(&self, penalty: f64, step: &Step<Vector2<f64>>, reach: &mut Lanes) {
+    pub(super) fn finish(&self, penalty: f64, step: &Step<Vector2<f64>>, reach: &mut f64) {
         let [ds, dz, de] = self.change(step, penalty);
         *reach = reach.max((-ds / self.s).max(-dz / self.z)).max((-de / self.e).max(dz / (penalty - self.z)));
     }
 
     #[inline]
-    fn along(&self, w: &Vector2<f64>) -> Lanes {
+    fn along(&self, w: &Vector2<f64>) -> f64 {
         self.a[0] * w.x + self.a[1] * w.y
     }
 
@@ -265,7 +257,7 @@ impl SoftRows {
 
     /// Changes of slack, multiplier and relaxation.
     #[inline]
-    fn change(&self, step: &Step<Vector2<f64>>, penalty: f64) -> [Lanes; 3] {
+    fn change(&self, step: &Step<Vector2<f64>>, penalty: f64) -> [f64; 3] {
         let v = penalty - self.z;
         let Predicted { ds, dz, de, inverse, .. } = self.towards_zero(step, penalty);
         let moved = self.along(&step.correction);
