@@ -40,15 +40,11 @@ pub(super) fn refine(charts: &mut Charts, faces: &[u32], bounds: Bounds, heard: 
             let targets: Vec<[[f64; 2]; 3]> =
                 faces.iter().map(|&f| [0, 1, 2].map(|k| charts.corner_uv[3 * f as usize + k])).collect();
             let layout = lay_out(&disk, &targets, bounds)?;
-            charts.place(&faces, &disk, &layout.uv);
-            Some(layout.parted)
+            Some((disk, layout))
         });
         heard();
         match laid_out {
-            Some(parted) => {
-                let pieces = charts.pieces(&faces, &parted);
-                left.extend(keep(charts, pieces, bounds));
-            }
+            Some((disk, layout)) => left.extend(keep(charts, faces, &disk, &layout, bounds)),
             None if round < MAX_ROUNDS && !is_small(charts, faces.len()) => {
                 let member: HashSet<u32> = faces.iter().copied().collect();
                 let joined = |h: usize| {
@@ -65,10 +61,21 @@ pub(super) fn refine(charts: &mut Charts, faces: &[u32], bounds: Bounds, heard: 
     left
 }
 
-/// Adds charts for those pieces of layouts, of which some were parted, that keep the bounds where they lie; returns the others.
-pub(super) fn keep(charts: &mut Charts, pieces: Vec<(Vec<u32>, bool)>, bounds: Bounds) -> Vec<Vec<u32>> {
+/// Adds charts for those pieces of a layout that were not parted and keep the bounds where they lie; returns the others.
+pub(super) fn keep(
+    charts: &mut Charts,
+    faces: Vec<u32>,
+    disk: &Disk,
+    layout: &Parted,
+    bounds: Bounds,
+) -> Vec<Vec<u32>> {
+    if !layout.parted.contains(&true) && keeps(disk, &layout.uv, bounds) {
+        charts.add(faces, disk, &layout.uv);
+        return Vec::new();
+    }
+    charts.place(&faces, disk, &layout.uv);
     let mut left = Vec::new();
-    for (piece, is_parted) in pieces {
+    for (piece, is_parted) in charts.pieces(&faces, &layout.parted) {
         let disk = charts.disk(&piece).filter(|_| !is_parted);
         match disk.map(|disk| (charts.uv(&piece, &disk), disk)) {
             Some((uv, disk)) if keeps(&disk, &uv, bounds) => {
