@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Atlases by uv-param (the binary `unwrap`) and by xatlas on the same meshes in one run, both evaluated by uv_evaluation.py.
-Prints one Markdown row per mesh and tool.  Needs numpy, scipy, xatlas and a Rust toolchain.
+"""Atlases by uv-param (the binary `unwrap`), by xatlas and by uvunwrap on the same meshes in one run, all evaluated by
+uv_evaluation.py. Prints one Markdown row per mesh and tool.  Needs numpy, scipy, libigl, xatlas, uvunwrap and a Rust toolchain.
 
     python3 uv_atlas.py a.obj b.off ...
     python3 uv_atlas.py --unwrap target/release/unwrap --gutter 2 --page 1024 a.obj
 
 s is CPU time of one thread without reading and writing; charts in parentheses are mirrored; seam is relative to the square root
 of the area; p99 and max are of the stretch max(s1, 1/|s2|); util is the share of the page that charts cover; overlaps are
-pairs of faces. Ours is measured in metres, xatlas in the scale that keeps its area. The texel of ours is chosen so that a page of --page texels holds the surface when two thirds are used."""
+pairs of faces. Ours is measured in metres, the others in the scale that keeps their area. The texel of ours is chosen so that a page of --page texels holds the surface when two thirds are used."""
 
 import argparse
 import json
@@ -95,14 +95,16 @@ def main():
             if o.without_peers:
                 continue
             peers = [sys.executable, os.path.join(HERE, "uv_peers.py"), "closed", path, "--runs", "1"]
-            peers += ["--res", str(o.page), "--pad", str(o.gutter), "--only", "default", "--save", folder]
+            peers += ["--res", str(o.page), "--pad", str(o.gutter), "--only", "default,uvunwrap", "--save", folder]
             text, error, code = run(["taskset", "-c", "0", *peers])
             lines = [json.loads(line) for line in text.splitlines() if line.startswith("{")]
-            saved = os.path.join(folder, f"{stem}_xatlas_default.obj")
-            if code or not lines or not os.path.exists(saved):
-                print(f"{stem}: xatlas: {error[-300:]}", file=sys.stderr)
-            else:
-                row(stem, "xatlas", lines[-1]["s"], saved, lines[-1]["util_true"])
+            for tool, file in [("xatlas", f"{stem}_xatlas_default.obj"), ("uvunwrap", f"{stem}_uvunwrap.obj")]:
+                found = [line for line in lines if line.get("fig") == tool]
+                saved = os.path.join(folder, file)
+                if not found or not os.path.exists(saved):
+                    print(f"{stem}: {tool}: {error[-300:]}", file=sys.stderr)
+                else:
+                    row(stem, tool, found[-1]["s"], saved, found[-1]["util_true"])
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Peers of uv-param, timed and measured: libigl (harmonic, LSCM, ARAP, SLIM) and xatlas. One JSON line per figure.
+"""Peers of uv-param, timed and measured: libigl (harmonic, LSCM, ARAP, SLIM), xatlas and uvunwrap. One JSON line per figure.
 
-  pip install "libigl==2.6.3" "xatlas==0.0.11" numpy scipy
+  pip install "libigl==2.6.3" "xatlas==0.0.11" "uvunwrap==0.3.0" numpy scipy
   taskset -c 0 python uv_peers.py disk   mesh.obj --runs 3 --cap 30        a disk: harmonic, lscm, arap, slim
   taskset -c 0 python uv_peers.py disk   mesh.obj --cut --only arap        cut a sphere along its longest shortest path first
   taskset -c 0 python uv_peers.py disk   mesh.obj --loop 2                 Loop-subdivide twice first
-  taskset -c 0 python uv_peers.py closed mesh.obj --res 1024 --pad 2       xatlas: default, brute force, loose charts
+  taskset -c 0 python uv_peers.py closed mesh.obj --res 1024 --pad 2       xatlas: default, brute force, loose charts; uvunwrap
   ... --save DIR      also writes DIR/<mesh>_<figure>.obj with vt, ready for uv_evaluation.py
 
 On one core the clock is CPU time (says "clock":"cpu"), on several it is wall time. s = median over runs.
@@ -278,6 +278,19 @@ def closed(a):
             **measures(X, ix, u, metric=False, chart=np.asarray(comp)),
         )
         save(a, f"xatlas_{name}", V, vm[ix].astype(np.int64), u / wh.max(), ix)
+    if not a.only or "uvunwrap" in a.only.split(","):
+        import uvunwrap
+
+        mesh = uvunwrap.Mesh(X32, F32)
+        s, n, at = median_time(lambda: uvunwrap.generate([mesh], page_size=a.res, padding=a.pad), a.runs, a.cap)
+        out, wh = at.meshes[0], np.array([at.width, at.height], float)
+        ix = np.array(out.indices, dtype=np.int64).reshape(-1, 3)
+        u = np.array(out.uv, dtype=np.float64).reshape(-1, 2) * wh
+        q = u[ix]
+        (ax, ay), (bx, by) = (q[:, 1] - q[:, 0]).T, (q[:, 2] - q[:, 0]).T
+        util = float((0.5 * np.abs(ax * by - ay * bx)).sum() / wh.prod())
+        emit(a, fig="uvunwrap", s=s, runs=n, charts=int(at.chart_count), pages=int(at.page_count), util_true=util)
+        save(a, "uvunwrap", V, np.array(out.xref, dtype=np.int64)[ix], u / wh.max(), ix)
 
 
 def main():
@@ -288,7 +301,7 @@ def main():
     ap.add_argument("--cap", type=float, default=60, help="seconds per figure")
     ap.add_argument("--loop", type=int, default=0, help="Loop subdivisions before the start")
     ap.add_argument("--cut", action="store_true", help="cut a sphere-like mesh to a disk along a farthest pair")
-    ap.add_argument("--only", default="", help="comma list: harmonic,lscm,arap,slim or default,brute,loose")
+    ap.add_argument("--only", default="", help="comma list: harmonic,lscm,arap,slim or default,brute,loose,uvunwrap")
     ap.add_argument("--res", type=int, default=1024)
     ap.add_argument("--pad", type=int, default=2)
     ap.add_argument(

@@ -159,14 +159,14 @@ impl<'a> Mesh<'a> {
             mark: 0,
         };
         // Where several fans of faces meet in a vertex nothing moves.
-        for v in 0..positions.len() {
+        for (v, pinned) in pinned.iter_mut().enumerate() {
             if mesh.count[v] == 0 {
-                pinned[v] = true;
+                *pinned = true;
                 continue;
             }
             let mut ring = std::mem::take(&mut mesh.ring);
             mesh.on_border[v] = mesh.fan(v as u32, &mut ring);
-            pinned[v] |= ring.len() as u32 != mesh.count[v];
+            *pinned |= ring.len() as u32 != mesh.count[v];
             mesh.ring = ring;
         }
         mesh.pinned = pinned;

@@ -367,4 +367,33 @@ mod tests {
         let exact = 8.0 * std::f64::consts::PI.powi(2);
         assert!(coarse.area() < exact && coarse.area() > 0.93 * exact, "{}", coarse.area() / exact);
     }
+
+    /// A flat sheet with a hole of three edges: it must not shrink to two edges between the same vertices.
+    #[test]
+    fn a_hole_keeps_three_edges() {
+        let n = 12_u32;
+        let at = |i: u32, j: u32| i * (n + 1) + j;
+        let (mut positions, mut faces) = (Vec::new(), Vec::new());
+        for (i, j) in (0..=n).flat_map(|i| (0..=n).map(move |j| (i, j))) {
+            positions.push([f64::from(i), f64::from(j), 0.0]);
+            if i < n && j < n {
+                faces.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+                if (i, j) != (6, 5) {
+                    faces.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+                }
+            }
+        }
+        let (fine, _) = Surface::new(&positions, &faces, true).unwrap();
+        let (coarse, _, _) = fine.coarser(|_| false, 10);
+        assert!(coarse.faces().len() < 60, "{}", coarse.faces().len());
+        let mut border: Vec<[u32; 2]> = (0..3 * coarse.faces().len())
+            .filter(|&h| coarse.twin(h).is_none())
+            .map(|h| coarse.ends(h))
+            .map(|[a, b]| [a.min(b), a.max(b)])
+            .collect();
+        let count = border.len();
+        border.sort_unstable();
+        border.dedup();
+        assert!(border.len() == count && count >= 6, "{count} edges of the border, {} of them different", border.len());
+    }
 }

@@ -15,7 +15,7 @@ pub(crate) struct Nearest {
     pub(crate) along: f64,
 }
 
-/// Notes the edge from `a` to `b` (texels) at every texel within `reach` to which no other one is nearer.
+/// Notes the edge from `a` to `b` (texels) at every texel within `reach`, and one more, to which no other one is nearer.
 pub(crate) fn note_edge(
     [a, b]: [[f64; 2]; 2],
     half_edge: u32,
@@ -23,7 +23,8 @@ pub(crate) fn note_edge(
     size: [usize; 2],
     nearest: &mut [Option<Nearest>],
 ) {
-    for_texels([a, b, b], reach, size, |texel, centre| {
+    // A box that left some of them out would leave them to an edge that is farther away.
+    for_texels([a, b, b], reach + 1, size, |texel, centre| {
         let (along, distance) = on_segment(a, b, centre);
         if distance <= reach as f64 + 1.0 && nearest[texel].is_none_or(|found| distance < found.distance) {
             nearest[texel] = Some(Nearest { distance, half_edge, along });

@@ -85,11 +85,11 @@ fn take(charts: &mut Charts, host: u32, guests: &[(u32, Vec<u32>)], bounds: Boun
         let start = charts.vertex_uv(&faces, &disk, |_, at| at);
         let is_guest: Vec<bool> = faces.iter().map(|f| coming.contains(f)).collect();
         let found = mend(&disk, start, &is_guest, bounds)?;
-        let pieces = charts.pieces(&faces, &found.parted);
         // As many charts as before are no gain.
-        (pieces.len() <= guests.len()).then(|| charts.place(&faces, &disk, &found.uv)).map(|()| pieces)
+        let is_gain = !found.parted.contains(&true) || charts.pieces(&faces, &found.parted).len() <= guests.len();
+        is_gain.then_some((disk, found))
     });
-    let Some(pieces) = mended else {
+    let Some((disk, layout)) = mended else {
         for (f, uv) in before {
             charts.corner_uv[3 * f as usize..3 * f as usize + 3].copy_from_slice(&uv);
         }
@@ -99,7 +99,7 @@ fn take(charts: &mut Charts, host: u32, guests: &[(u32, Vec<u32>)], bounds: Boun
     for (guest, _) in guests {
         charts.members[*guest as usize].clear();
     }
-    for piece in keep(charts, pieces, bounds) {
+    for piece in keep(charts, faces, &disk, &layout, bounds) {
         add_region(charts, piece, bounds, None);
     }
 }

@@ -17,11 +17,11 @@ const FIRST_ITERATIONS: usize = 4;
 /// The rest of them.
 const MORE_ITERATIONS: usize = 16;
 /// Newton iterations that may save a layout that is nearly good enough.
-const NEWTON_ITERATIONS: usize = 10;
+const NEWTON_ITERATIONS: usize = 20;
 /// Share of faces beyond the bound above which neither will help.
 const HOPELESS: f64 = 0.25;
 /// The same after the local/global iterations.
-const NEARLY: f64 = 0.08;
+const NEARLY: f64 = 0.15;
 /// An iteration that leaves more than this share of the faces beyond the bound, and most of what there was, is the last.
 const SLOW_BEYOND: f64 = 0.02;
 /// Most, in this sense.

@@ -274,3 +274,48 @@ impl Prism {
         to_edge(0).min(to_edge(1)).min(to_edge(2))
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::surface::Surface;
+
+    /// A tube of 12 x 4 quads as one chart, cut open along a line, handed to itself: the cut is the same, and every face lies where it did.
+    #[test]
+    fn a_chart_that_meets_itself_at_a_cut_is_cut_on_the_fine_surface() {
+        let (around, along) = (12_u32, 4_u32);
+        let angle = |i: u32| std::f64::consts::TAU * f64::from(i) / f64::from(around);
+        let at = |i: u32, j: u32| j * around + i % around;
+        let (mut positions, mut faces) = (Vec::new(), Vec::new());
+        for (j, i) in (0..=along).flat_map(|j| (0..around).map(move |i| (j, i))) {
+            positions.push([angle(i).cos(), angle(i).sin(), 0.5 * f64::from(j)]);
+            if j < along {
+                faces.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+                faces.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+            }
+        }
+        let (surface, _) = Surface::new(&positions, &faces, true).unwrap();
+        let none = vec![false; 3 * faces.len()];
+        let (mut coarse, mut fine) = (Charts::new(&surface, none.clone()), Charts::new(&surface, none));
+        coarse.members = vec![(0..faces.len() as u32).collect()];
+        coarse.chart.fill(0);
+        let chord = 2.0 * (0.5 * angle(1)).sin();
+        for (f, face) in faces.iter().enumerate() {
+            let column = f as u32 / 2 % around;
+            for (k, &v) in face.iter().enumerate() {
+                let i = if v % around == column { column } else { column + 1 };
+                coarse.corner_uv[3 * f + k] = [chord * f64::from(i), positions[v as usize][2]];
+                let [a, b] = surface.ends(3 * f + k);
+                coarse.cut[3 * f + k] = a % around == 0 && b % around == 0 && surface.twin(3 * f + k).is_some();
+            }
+        }
+        assert_eq!(coarse.cut.iter().filter(|cut| **cut).count(), 2 * along as usize);
+        let roots: Vec<u32> = (0..positions.len() as u32).collect();
+        transfer(&coarse, &roots, &mut fine);
+        assert_eq!(fine.cut, coarse.cut);
+        for (here, there) in fine.corner_uv.iter().zip(&coarse.corner_uv) {
+            assert!((0..2).all(|k| (here[k] - there[k]).abs() < 1e-12), "{here:?} {there:?}");
+        }
+    }
+}

@@ -15,10 +15,11 @@ use crate::triangle::flips;
 /// Times that a chart is halved before it is charted anew.
 const MAX_ROUNDS: usize = 3;
 
-/// Local/global iterations that bring faces nearer to this share of the bound, and the share of the faces that may be beyond it after them.
+/// Local/global iterations that bring faces to this share of the bound, at most.
 const BOUNDED_ITERATIONS: usize = 20;
 const BOUNDED_STRETCH: f64 = 0.9;
-const BOUNDED_SHARE: f64 = 0.9;
+/// Share of the faces of a large chart beyond the bound above which the iterations would not do.
+const HOPELESS: f64 = 0.03;
 
 /// Faces of a small chart at most, as a share of all.
 const SMALL: f64 = 0.01;
@@ -39,16 +40,12 @@ pub(super) fn refine(charts: &mut Charts, faces: &[u32], bounds: Bounds, heard: 
         let laid_out = charts.disk(&faces).and_then(|disk| {
             let targets: Vec<[[f64; 2]; 3]> =
                 faces.iter().map(|&f| [0, 1, 2].map(|k| charts.corner_uv[3 * f as usize + k])).collect();
-            let layout = lay_out(&disk, &targets, bounds)?;
-            charts.place(&faces, &disk, &layout.uv);
-            Some(layout.parted)
+            let layout = lay_out(&disk, &targets, is_small(charts, faces.len()), bounds)?;
+            Some((disk, layout))
         });
         heard();
         match laid_out {
-            Some(parted) => {
-                let pieces = charts.pieces(&faces, &parted);
-                left.extend(keep(charts, pieces, bounds));
-            }
+            Some((disk, layout)) => left.extend(keep(charts, faces, &disk, &layout, bounds)),
             None if round < MAX_ROUNDS && !is_small(charts, faces.len()) => {
                 let member: HashSet<u32> = faces.iter().copied().collect();
                 let joined = |h: usize| {
@@ -65,10 +62,21 @@ pub(super) fn refine(charts: &mut Charts, faces: &[u32], bounds: Bounds, heard: 
     left
 }
 
-/// Adds charts for those pieces of layouts, of which some were parted, that keep the bounds where they lie; returns the others.
-pub(super) fn keep(charts: &mut Charts, pieces: Vec<(Vec<u32>, bool)>, bounds: Bounds) -> Vec<Vec<u32>> {
+/// Adds charts for those pieces of a layout that were not parted and keep the bounds where they lie; returns the others.
+pub(super) fn keep(
+    charts: &mut Charts,
+    faces: Vec<u32>,
+    disk: &Disk,
+    layout: &Parted,
+    bounds: Bounds,
+) -> Vec<Vec<u32>> {
+    if !layout.parted.contains(&true) && keeps(disk, &layout.uv, bounds) {
+        charts.add(faces, disk, &layout.uv);
+        return Vec::new();
+    }
+    charts.place(&faces, disk, &layout.uv);
     let mut left = Vec::new();
-    for (piece, is_parted) in pieces {
+    for (piece, is_parted) in charts.pieces(&faces, &layout.parted) {
         let disk = charts.disk(&piece).filter(|_| !is_parted);
         match disk.map(|disk| (charts.uv(&piece, &disk), disk)) {
             Some((uv, disk)) if keeps(&disk, &uv, bounds) => {
@@ -87,15 +95,18 @@ pub(super) fn keeps(disk: &Disk, uv: &[[f64; 2]], bounds: Bounds) -> bool {
         && boundary_is_simple(disk, uv)
 }
 
-/// A layout from the shapes that its faces should have.
-fn lay_out(disk: &Disk, targets: &[[[f64; 2]; 3]], bounds: Bounds) -> Option<Parted> {
+/// A layout from the shapes that its faces should have. A large chart that begins with too many faces beyond the bound is given up.
+fn lay_out(disk: &Disk, targets: &[[[f64; 2]; 3]], is_small: bool, bounds: Bounds) -> Option<Parted> {
     let frames = disk.frames();
     let mut laplacian = Laplacian::new(disk).ok()?;
     laplacian.factorize_cotangent(disk, &frames, disk.loops[0][0]).ok()?;
     let jacobians: Vec<_> = frames.iter().zip(targets).map(|(frame, &uv)| frame.jacobian(uv)).collect();
     let mut uv = fit_jacobians(disk, &frames, &jacobians, &mut laplacian);
-    let mut enough =
-        |uv: &[[f64; 2]]| Distortion::measure(disk, &frames, uv, bounds).beyond <= BOUNDED_SHARE * SHARE_BEYOND;
+    let start = Distortion::measure(disk, &frames, &uv, bounds).beyond;
+    if start > HOPELESS && !is_small {
+        return None;
+    }
+    let mut enough = |uv: &[[f64; 2]]| Distortion::measure(disk, &frames, uv, bounds).beyond <= SHARE_BEYOND;
     let stretch = 1.0 + BOUNDED_STRETCH * (bounds.stretch - 1.0);
     iterate_bounded(disk, &frames, &mut laplacian, &mut uv, stretch, BOUNDED_ITERATIONS, &mut enough);
     mend(disk, uv, &vec![false; frames.len()], bounds)

@@ -16,8 +16,10 @@ const MAX_EXTENT: f64 = 1.3;
 const MISFIT: f64 = 0.03;
 /// Misfit beyond which it is not tried.
 const MAX_MISFIT: f64 = 0.12;
+/// Faces from which on looking for seams takes so long that half of what was found is tried before they are looked for again.
+const BATCHES_FROM: usize = 40_000;
 /// Rounds after which nothing much is left to do.
-const MAX_ROUNDS: usize = 60;
+const MAX_ROUNDS: usize = 1000;
 /// Parts of an arc that are tried where the whole cannot be closed: first and last edge, as shares of its length.
 const PARTS: [[f64; 2]; 10] = [
     [0.0, 0.8],
@@ -36,7 +38,7 @@ const SNAP: f64 = 0.12;
 /// How many of them at most.
 const TRIED_PARTS: usize = 3;
 /// Length of a part below which closing it is not worth a layout, relative to the square root of the area.
-const MIN_PART: f64 = 0.06;
+const MIN_PART: f64 = 0.03;
 
 /// Closes seams of charts within bounds.
 pub(super) struct Sewing<'a, 'b> {
@@ -82,13 +84,12 @@ impl<'a, 'b> Sewing<'a, 'b> {
                 .filter_map(|arc| self.score(&arc).map(|score| (score, arc)))
                 .collect();
             candidates.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.half_edges[0].cmp(&b.1.half_edges[0])));
-            // The worst half waits: better arcs may come up when the best are closed.
-            let all = candidates.len() < 8;
+            // Once one is closed others wait: better ones may have come up.
+            let enough = if self.charts.surface.faces().len() > BATCHES_FROM { candidates.len() / 2 } else { 0 };
             let mut touched = HashSet::new();
             let (mut closed, mut tried) = (0, 0);
-            let half = candidates.len() / 2;
             for (i, (_, arc)) in candidates.into_iter().enumerate() {
-                if !all && i > half && closed > 0 {
+                if i > enough && closed > 0 {
                     break;
                 }
                 if touched.contains(&arc.left) || touched.contains(&arc.right) {
