@@ -19,7 +19,7 @@ fn footprint(spray: &Spray) -> SurfaceFootprint {
     let stretch = 0.8 + 0.45 * spray.x / SIDE as f64;
     let at = |k: usize| {
         let (x, y) = ((k % SIDE) as f64, (k / SIDE) as f64);
-        let hidden = spray.x < 20.0 && x >= 20.0 && x < 23.0;
+        let hidden = spray.x < 20.0 && (20.0..23.0).contains(&x);
         let squared = ((x - spray.x) * stretch).powi(2) + (y - spray.y).powi(2);
         (!hidden && squared < 64.0).then(|| (k as u32, (-squared / 8.0).exp() as f32))
     };

@@ -114,12 +114,12 @@ mod tests {
     /// Against Bellman and Ford in a box with walls at random.
     #[test]
     fn ways_are_the_shortest() {
+        const N: i32 = 7;
         let mut state = 11_u64;
         let mut random = move || {
             state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (state >> 33) as f64 / f64::from(1_u32 << 31)
         };
-        const N: i32 = 7;
         let mut found = 0;
         for _ in 0..30 {
             let walls: Vec<bool> = (0..N.pow(3)).map(|_| random() < 0.62).collect();

@@ -51,12 +51,11 @@ pub(crate) fn build(
             let keep = both.max(settings.clearance);
             let ends = [&last.state, &state];
             let transits = planner.get_or_insert_with(|| TransitPlanner::new(&last.state));
-            match add_transit(&mut route, ends, checker.as_deref_mut(), transits, keep, settings) {
-                Some(halts) => rest = halts,
-                None => {
-                    refused = Some(Error::NoTransit { from: name.clone(), to: format!("target {i}") });
-                    dropping = true;
-                }
+            if let Some(halts) = add_transit(&mut route, ends, checker.as_deref_mut(), transits, keep, settings) {
+                rest = halts;
+            } else {
+                refused = Some(Error::NoTransit { from: name.clone(), to: format!("target {i}") });
+                dropping = true;
             }
         }
         on_route = !dropping;
