@@ -28,7 +28,7 @@ pub struct OnSurface<'a, P> {
     pub inner: P,
     /// The footprint of each spray, stroke by stroke. Sprays of a painter without strokes are given row by row, as by [`boustrophedon`].
     pub footprints: &'a dyn Fn(&[Stroke]) -> Vec<SurfaceFootprint>,
-    /// Weight of the differences from the painter's own volumes against the ink. Default 1, ours: what the surface does not ask to be changed
+    /// Weight of the differences from the painter's own volumes against the ink. Default 0.3, ours: what the surface does not ask to be changed
     /// stays, above all differences between neighbours that hardly show and that a flight cannot repeat.
     pub proximity: f64,
     /// Largest number of iterations. Default 25, ours.
@@ -43,7 +43,7 @@ const PLAN_SHARE: f64 = 0.7;
 impl<'a, P: Painter> OnSurface<'a, P> {
     /// With the default fit.
     pub fn new(inner: P, footprints: &'a dyn Fn(&[Stroke]) -> Vec<SurfaceFootprint>) -> Self {
-        Self { inner, footprints, proximity: 1.0, iterations: 25, tolerance: 1e-4 }
+        Self { inner, footprints, proximity: 0.3, iterations: 25, tolerance: 1e-4 }
     }
 }
 
