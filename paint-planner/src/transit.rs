@@ -23,6 +23,8 @@ const OPEN_STEP: f64 = 0.15;
 const HALF_DIAGONAL: f64 = 0.866_025_403_784_438_7;
 /// Cells looked at in the open.
 const OPEN_CELLS: usize = 30_000;
+/// Cells beyond this are not told apart: their numbers, and those of their neighbours, are integers of 32 bits.
+const FARTHEST_CELL: f64 = 1e9;
 /// Distances beyond this are not resolved, m.
 const FAR: f64 = 50.0;
 /// Headings tried on either side where a tool does not permit one, by 5 degrees.
@@ -93,7 +95,7 @@ impl TransitPlanner {
 
     fn cell(&self, point: &Point3<f64>) -> Cell {
         let offset = self.axes.inverse_transform_vector(&(point - self.origin)) / OPEN_STEP;
-        [offset.x, offset.y, offset.z].map(|c| c.round() as i32)
+        [offset.x, offset.y, offset.z].map(|c| c.round().clamp(-FARTHEST_CELL, FARTHEST_CELL) as i32)
     }
 
     fn middle(&self, cell: Cell) -> Point3<f64> {
@@ -199,7 +201,7 @@ struct Open<'a, 'b> {
 
 impl Space for Open<'_, '_> {
     fn left(&mut self, cell: Cell) -> f64 {
-        f64::from((0..3).map(|k| (self.goal[k] - cell[k]).pow(2)).sum::<i32>()).sqrt()
+        Vector3::from(self.goal.map(f64::from)).metric_distance(&Vector3::from(cell.map(f64::from)))
     }
 
     fn passable(&mut self, _: Cell, to: Cell) -> bool {

@@ -15,6 +15,7 @@ use crate::surface::PaintSurface;
 
 /// Weight of texels out of reach against those in reach.
 pub(super) const UNPAINTABLE_WEIGHT: f64 = 0.02;
+
 /// Layers of sprays for the wanted picture; no spray lies where `paintable` is false. Paint that falls beyond a seam counts where it lies,
 /// and volumes are those for what every spray leaves on the surface.
 pub(super) fn decide(

@@ -1,12 +1,11 @@
 //! What sprays leave on the surface itself: painters plan on the plane of its charts.
 
-use nalgebra::UnitVector3;
 use paint_net::{SprayKernel, Stroke, SurfaceFootprint};
 use paint_planner::Target;
 use paint_sim::{Film, Shot, SprayModel};
 
 use super::error::MissionError;
-use super::nozzle::{kernel, spray_model};
+use super::nozzle::{kernel, spray_model, upright_shot};
 use super::settings::MissionSettings;
 use crate::appearance::UNIT_THICKNESS;
 use crate::surface::PaintSurface;
@@ -43,11 +42,7 @@ impl<'a> Footprints<'a> {
         let volume = self.kernel.mass() * texel * texel;
         let stand_off = self.settings.planner.nozzle.stand_off;
         let shot = |[start, end]: &[Target; 2], share: f64| {
-            let point = start.point + (end.point - start.point) * share;
-            let normal = start.normal.lerp(&end.normal, share);
-            let normal = UnitVector3::try_new(normal, 1e-9).unwrap_or(start.normal);
-            let origin = point + normal.into_inner() * stand_off;
-            Shot { origin, axis: -normal, volume: 0.5 * volume * UNIT_THICKNESS }
+            upright_shot([start, end], share, stand_off, 0.5 * volume * UNIT_THICKNESS)
         };
         let spacing = self.settings.limits.spray_spacing as f64;
         let on_surface = |stroke: &Stroke, k: usize| cell(self.surface, &stroke.sprays, k, spacing);

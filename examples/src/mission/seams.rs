@@ -1,6 +1,5 @@
 //! How good the painting is at seams: where the plane of the picture is cut, and the surface is not.
 
-use nalgebra::UnitVector3;
 use paint_net::{Image, metrics};
 use paint_planner::Target;
 use paint_sim::{Film, Shot};
@@ -8,7 +7,7 @@ use paint_sim::{Film, Shot};
 use super::decision::Decision;
 use super::error::MissionError;
 use super::fly::SHOT_STEP;
-use super::nozzle::{kernel, spray_model};
+use super::nozzle::{kernel, spray_model, upright_shot};
 use super::plan::layer_route;
 use super::run::Mission;
 use super::settings::MissionSettings;
@@ -98,12 +97,7 @@ fn upright(from: &Target, to: &Target, settings: &MissionSettings) -> impl Itera
     let steps = if from.dose > 0.0 { (way.norm() / SHOT_STEP).ceil() } else { 0.0 };
     let volume = from.dose * way.norm() / steps;
     let (from, to, stand_off) = (*from, *to, settings.planner.nozzle.stand_off);
-    (0..steps as usize).map(move |k| {
-        let share = (k as f64 + 0.5) / steps;
-        let normal = from.normal.lerp(&to.normal, share);
-        let normal = UnitVector3::try_new(normal, 1e-9).unwrap_or(from.normal);
-        Shot { origin: from.point + way * share + normal.into_inner() * stand_off, axis: -normal, volume }
-    })
+    (0..steps as usize).map(move |k| upright_shot([&from, &to], (k as f64 + 0.5) / steps, stand_off, volume))
 }
 
 /// Texels of the surface that show nothing else.

@@ -150,11 +150,14 @@ fn split_at_thresholds(whole: &Painting, thresholds: &[f64], problem: &PaintProb
                 sprays.push(spray);
             }
         }
-        // All together are the whole plan, whose painter knows its canvas best.
-        let mut so_far = if last { whole.canvas.clone() } else { canvas.clone() };
-        if !last {
+        let so_far = if last {
+            // All together are the whole plan, whose painter knows its canvas best.
+            whole.canvas.clone()
+        } else {
+            let mut so_far = canvas.clone();
             problem.settle(initial.data(), so_far.data_mut());
-        }
+            so_far
+        };
         layers.push(Painting::new(sprays, so_far, saturation));
         lower = upper;
     }
