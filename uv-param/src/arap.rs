@@ -110,40 +110,60 @@ pub(crate) fn fit_jacobians(
     jacobians: &[Jacobian],
     laplacian: &mut Laplacian,
 ) -> Vec<[f64; 2]> {
-    let size = laplacian.size();
-    let mut right = vec![0.0; 2 * size];
+    let mut right = vec![0.0; 2 * laplacian.size()];
     for ((face, frame), j) in disk.faces.iter().zip(frames).zip(jacobians) {
-        for (&v, g) in face.iter().zip(frame.g) {
-            right[v as usize] += frame.area * (j.a * g[0] + j.b * g[1]);
-            right[size + v as usize] += frame.area * (j.c * g[0] + j.d * g[1]);
-        }
+        ask(face, frame, j, &mut right);
     }
+    solve_pinned(disk, laplacian, &mut right);
+    (0..disk.positions.len()).map(|v| [right[v], right[laplacian.size() + v]]).collect()
+}
+
+/// What a face that wants a Jacobian adds to the right-hand side (all u, then all v).
+fn ask(face: &[u32; 3], frame: &Frame, j: &Jacobian, right: &mut [f64]) {
+    let (right_u, right_v) = right.split_at_mut(right.len() / 2);
+    for (&v, g) in face.iter().zip(frame.g) {
+        right_u[v as usize] += frame.area * (j.a * g[0] + j.b * g[1]);
+        right_v[v as usize] += frame.area * (j.c * g[0] + j.d * g[1]);
+    }
+}
+
+/// Solves in place with the pin at the origin.
+fn solve_pinned(disk: &Disk, laplacian: &mut Laplacian, right: &mut [f64]) {
     let pinned = pin(disk) as usize;
-    (right[pinned], right[size + pinned]) = (0.0, 0.0);
-    laplacian.solve(&mut right);
-    (0..disk.positions.len()).map(|v| [right[v], right[size + v]]).collect()
+    (right[pinned], right[laplacian.size() + pinned]) = (0.0, 0.0);
+    laplacian.solve(right);
 }
 
 /// Local/global iterations towards the nearest layout in which no length is changed by more than the factor `stretch`: every face asks for its
 /// own Jacobian, its singular values brought between `1 / stretch` and `stretch`. Faces within stay as they are, so that few iterations do where
-/// few faces are beyond. The Laplacian is factorised; it stops when a layout is `enough`.
+/// few faces are beyond. The Laplacian is factorised; it stops where the stretches of the faces ([`Jacobian::largest_stretch`]) are `enough`.
 pub(crate) fn iterate_bounded(
     disk: &Disk,
     frames: &[Frame],
     laplacian: &mut Laplacian,
-    uv: &mut Vec<[f64; 2]>,
+    uv: &mut [[f64; 2]],
     stretch: f64,
     iterations: usize,
-    enough: &mut dyn FnMut(&[[f64; 2]]) -> bool,
+    enough: &mut dyn FnMut(&[f64]) -> bool,
 ) {
+    let size = laplacian.size();
+    let mut right = vec![0.0; 2 * size];
+    let mut stretches = vec![0.0; frames.len()];
     for _ in 0..iterations {
-        if enough(uv) {
+        right.fill(0.0);
+        for ((face, frame), found) in disk.faces.iter().zip(frames).zip(&mut stretches) {
+            let jacobian = frame.jacobian(face.map(|v| uv[v as usize]));
+            *found = jacobian.largest_stretch();
+            let wanted = if *found > stretch { jacobian.bounded(stretch) } else { jacobian };
+            ask(face, frame, &wanted, &mut right);
+        }
+        if enough(&stretches) {
             return;
         }
-        let jacobian =
-            |(face, frame): (&[u32; 3], &Frame)| frame.jacobian(face.map(|v| uv[v as usize])).bounded(stretch);
-        let jacobians: Vec<Jacobian> = disk.faces.iter().zip(frames).map(jacobian).collect();
-        *uv = fit_jacobians(disk, frames, &jacobians, laplacian);
+        solve_pinned(disk, laplacian, &mut right);
+        for (v, at) in uv.iter_mut().enumerate() {
+            *at = [right[v], right[size + v]];
+        }
     }
 }
 
@@ -158,7 +178,7 @@ fn local_step(disk: &Disk, frames: &[Frame], x: &[f64], rotations: &mut [[f64; 2
         // A face that has shrunk to a point keeps its last rotation.
         *rotation = jacobian.nearest_rotation().unwrap_or(*rotation);
         let [cos, sin] = *rotation;
-        energy += frame.area * jacobian.rigidity();
+        energy += frame.area * jacobian.rigidity(*rotation);
         for (&v, g) in face.iter().zip(frame.g) {
             right_u[v as usize] += frame.area * (cos * g[0] - sin * g[1]);
             right_v[v as usize] += frame.area * (sin * g[0] + cos * g[1]);

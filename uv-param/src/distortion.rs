@@ -56,7 +56,7 @@ impl Quality {
             let length_error = (s1 - 1.0).abs().max((s2.abs() - 1.0).abs());
             area += frame.area;
             flat_area += frame.area * jacobian.det().max(0.0);
-            arap += frame.area * jacobian.rigidity();
+            arap += frame.area * jacobian.rigidity(jacobian.nearest_rotation().unwrap_or([1.0, 0.0]));
             dirichlet += frame.area * jacobian.symmetric_dirichlet() / 4.0;
             error += frame.area * length_error;
             stretches.push(s1.max(1.0 / s2.abs()));

@@ -108,9 +108,8 @@ impl Jacobian {
         Self { a: 0.5 * (p + r), b: 0.5 * (s - q), c: 0.5 * (s + q), d: 0.5 * (p - r) }
     }
 
-    /// `|J - R|^2 = (s1 - 1)^2 + (s2 - 1)^2` for the nearest rotation R.
-    pub(crate) fn rigidity(&self) -> f64 {
-        let [p, q] = self.nearest_rotation().unwrap_or([1.0, 0.0]);
+    /// `|J - R|^2`; `(s1 - 1)^2 + (s2 - 1)^2` for the nearest rotation (cosine, sine).
+    pub(crate) fn rigidity(&self, [p, q]: [f64; 2]) -> f64 {
         (self.a - p).powi(2) + (self.b + q).powi(2) + (self.c - q).powi(2) + (self.d - p).powi(2)
     }
 

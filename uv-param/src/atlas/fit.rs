@@ -3,11 +3,10 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::simple_boundary::boundary_is_simple;
-use crate::arap::iterate_arap;
+use crate::arap::{iterate_arap, iterate_bounded};
 use crate::disk::Disk;
 use crate::laplacian::Laplacian;
 use crate::parametrizer::{Parametrizer, StoppingCriterion};
-use crate::symmetric_dirichlet::{Penalty, minimise_penalty};
 use crate::triangle::{Frame, flips};
 
 /// Share of the faces, and of the area, that may be stretched beyond the bound, up to the worst.
@@ -16,13 +15,15 @@ pub(super) const SHARE_BEYOND: f64 = 0.01;
 const FIRST_ITERATIONS: usize = 4;
 /// The rest of them.
 const MORE_ITERATIONS: usize = 16;
-/// Newton iterations that may save a layout that is nearly good enough.
-const NEWTON_ITERATIONS: usize = 20;
+/// Iterations that may save a layout that is nearly good enough, and the share of the bound's stretch that they bring faces to.
+const BOUNDED_ITERATIONS: usize = 12;
+const BOUNDED_SHARE: f64 = 0.95;
 /// Share of faces beyond the bound above which neither will help.
 const HOPELESS: f64 = 0.25;
 /// The same after the local/global iterations.
 const NEARLY: f64 = 0.15;
-/// An iteration that leaves more than this share of the faces beyond the bound, and most of what there was, is the last.
+/// So many iterations that leave more than this share of the faces beyond the bound, and most of what there was, are the last.
+const JUDGED_EVERY: usize = 2;
 const SLOW_BEYOND: f64 = 0.02;
 /// Most, in this sense.
 const SLOW_GAIN: f64 = 0.8;
@@ -50,8 +51,13 @@ pub(super) struct Distortion {
 
 impl Distortion {
     pub(super) fn measure(disk: &Disk, frames: &[Frame], uv: &[[f64; 2]], bounds: Bounds) -> Self {
+        Self::of(frames, &stretches(disk, frames, uv), bounds)
+    }
+
+    /// From the largest stretch of every face.
+    pub(super) fn of(frames: &[Frame], stretches: &[f64], bounds: Bounds) -> Self {
         let (mut count, mut beyond_area, mut area, mut worst) = (0, 0.0, 0.0, 1.0_f64);
-        for (frame, stretch) in frames.iter().zip(stretches(disk, frames, uv)) {
+        for (frame, &stretch) in frames.iter().zip(stretches) {
             worst = worst.max(stretch);
             area += frame.area;
             if stretch > bounds.stretch {
@@ -59,7 +65,7 @@ impl Distortion {
                 beyond_area += frame.area;
             }
         }
-        Self { beyond: (f64::from(count) / disk.faces.len() as f64).max(beyond_area / area), worst }
+        Self { beyond: (f64::from(count) / frames.len() as f64).max(beyond_area / area), worst }
     }
 
     pub(super) fn within(&self, bounds: Bounds) -> bool {
@@ -107,19 +113,20 @@ pub(super) fn fit(
         }
     }
     if !distortion.within(bounds) {
-        if flips(&uv, &disk.faces) > 0 {
-            return None;
-        }
-        let stopping = StoppingCriterion { iterations: NEWTON_ITERATIONS, tolerance: TOLERANCE };
-        let penalty = Penalty::beyond(bounds.stretch, POWER);
-        let mut last = distortion.beyond;
-        let mut done = |_, uv: &[[f64; 2]]| {
-            distortion = Distortion::measure(disk, &frames, uv, bounds);
-            let hopeless = distortion.beyond > SLOW_BEYOND && distortion.beyond > SLOW_GAIN * last;
-            last = distortion.beyond;
-            hopeless || distortion.within(bounds)
+        let (mut asked, mut last) = (0, distortion.beyond);
+        let mut done = |stretches: &[f64]| {
+            let found = Distortion::of(&frames, stretches, bounds);
+            asked += 1;
+            if asked % JUDGED_EVERY != 0 {
+                return found.within(bounds);
+            }
+            let hopeless = found.beyond > SLOW_BEYOND && found.beyond > SLOW_GAIN * last;
+            last = found.beyond;
+            hopeless || found.within(bounds)
         };
-        minimise_penalty(disk, &frames, &mut uv, penalty, &[], &stopping, &mut done).ok()?;
+        let stretch = 1.0 + BOUNDED_SHARE * (bounds.stretch - 1.0);
+        iterate_bounded(disk, &frames, &mut laplacian, &mut uv, stretch, BOUNDED_ITERATIONS, &mut done);
+        distortion = Distortion::measure(disk, &frames, &uv, bounds);
     }
     good(&uv, &distortion).then_some(uv)
 }

@@ -153,8 +153,8 @@ impl<'a> Charts<'a> {
         self.corner_uv[next(next(h))] = [from[0] + foot * x - height * y, from[1] + foot * y + height * x];
     }
 
-    /// Area of a chart, m^2.
-    pub(super) fn area(&self, chart: u32) -> f64 {
-        self.members[chart as usize].iter().map(|&f| self.surface.face_area(f as usize)).sum()
+    /// Areas of all charts, from those of the faces.
+    pub(super) fn areas(&self, face_areas: &[f64]) -> Vec<f64> {
+        self.members.iter().map(|faces| faces.iter().map(|&f| face_areas[f as usize]).sum()).collect()
     }
 }

@@ -106,7 +106,7 @@ fn lay_out(disk: &Disk, targets: &[[[f64; 2]; 3]], is_small: bool, bounds: Bound
     if start > HOPELESS && !is_small {
         return None;
     }
-    let mut enough = |uv: &[[f64; 2]]| Distortion::measure(disk, &frames, uv, bounds).beyond <= SHARE_BEYOND;
+    let mut enough = |stretches: &[f64]| Distortion::of(&frames, stretches, bounds).beyond <= SHARE_BEYOND;
     let stretch = 1.0 + BOUNDED_STRETCH * (bounds.stretch - 1.0);
     iterate_bounded(disk, &frames, &mut laplacian, &mut uv, stretch, BOUNDED_ITERATIONS, &mut enough);
     mend(disk, uv, &vec![false; frames.len()], bounds)

@@ -77,11 +77,14 @@ impl<'a, 'b> Sewing<'a, 'b> {
 
     /// Closes whole arcs until none can be closed any more.
     pub(super) fn close_arcs(&mut self) {
+        let face_areas: Vec<f64> =
+            (0..self.charts.surface.faces().len()).map(|f| self.charts.surface.face_area(f)).collect();
         for _ in 0..MAX_ROUNDS {
+            let areas = self.charts.areas(&face_areas);
             let mut candidates: Vec<(f64, Arc)> = arcs(self.charts)
                 .into_iter()
                 .filter(|arc| self.may_change(arc) && !self.refused.contains(&key(&arc.half_edges)))
-                .filter_map(|arc| self.score(&arc).map(|score| (score, arc)))
+                .filter_map(|arc| self.score(&arc, &areas).map(|score| (score, arc)))
                 .collect();
             candidates.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.half_edges[0].cmp(&b.1.half_edges[0])));
             // Once one is closed others wait: better ones may have come up.
@@ -191,7 +194,7 @@ impl<'a, 'b> Sewing<'a, 'b> {
     }
 
     /// How much closing an arc would help; `None` if it cannot.
-    fn score(&self, arc: &Arc) -> Option<f64> {
+    fn score(&self, arc: &Arc, areas: &[f64]) -> Option<f64> {
         if self.charts.wanted[arc.half_edges[0] as usize] {
             return None;
         }
@@ -201,7 +204,7 @@ impl<'a, 'b> Sewing<'a, 'b> {
         if misfit > MAX_MISFIT {
             return None;
         }
-        let area = self.charts.area(arc.left).min(self.charts.area(arc.right));
+        let area = areas[arc.left as usize].min(areas[arc.right as usize]);
         Some(gain / area.sqrt() * (-misfit / MISFIT).exp2())
     }
 
