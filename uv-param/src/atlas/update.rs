@@ -21,6 +21,10 @@ use crate::surface::Surface;
 /// Sweeps that spread the places of old vertices over new ones: a start for the layout, no more.
 const SWEEPS: usize = 200;
 
+/// Share of a chart's faces that are new from which on the whole chart is laid out again if need be: for fewer, the time that takes and the texels
+/// that move are out of proportion.
+const REFITTED: f64 = 0.25;
+
 /// What of an atlas is needed to keep it when its surface changes: which triangle lies where.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AtlasLayout {
@@ -145,8 +149,10 @@ pub fn update_atlas(
             && charts.disk(&faces).is_some_and(|disk| {
                 let start = spread(&charts, &faces, &disk, &old);
                 let is_new: Vec<bool> = faces.iter().map(|&f| old[f as usize].is_none()).collect();
-                // What came and little around it, so that all else stays to the bit; everything where that does not do.
-                let uv = mended(&disk, start.clone(), &is_new, bounds).or_else(|| fit(&disk, start, bounds, None));
+                // What came and little around it, so that all else stays to the bit; everything where that does not do, and much came.
+                let came = is_new.iter().filter(|is_new| **is_new).count();
+                let all = || (came as f64 >= REFITTED * faces.len() as f64).then(|| fit(&disk, start.clone(), bounds, None));
+                let uv = mended(&disk, start.clone(), &is_new, bounds).or_else(|| all().flatten());
                 uv.map(|uv| charts.place(&faces, &disk, &uv)).is_some()
             });
         let left = if refitted { faces.clone() } else { largest_piece(&charts, &old, &faces) };
