@@ -32,7 +32,7 @@ const COARSE_SHARE: f64 = 0.9;
 /// Faces that may be laid out in trials to sew small charts of a fine surface: so many, and a part of all.
 const SEWING_WORK: [usize; 2] = [100_000, 4];
 /// Newton iterations of the last layout of every chart, at most, and those times all faces.
-const LAST_ITERATIONS: usize = 12;
+const LAST_ITERATIONS: usize = 4;
 const LAST_WORK: usize = 1_000_000;
 /// Relative gain at which they stop.
 const LAST_TOLERANCE: f64 = 1e-4;
