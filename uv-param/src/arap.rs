@@ -12,6 +12,8 @@ use anderson::Anderson;
 
 /// Energies per area below this are rounding.
 const ZERO_ENERGY: f64 = 1e-28;
+/// How far projections go, over the way to what they project onto: below 2 they converge, and in a half of the iterations that 1 takes.
+const RELAXATION: f64 = 1.6;
 
 /// As-rigid-as-possible: the energy `sum A |J - R|^2`, from Tutte's layout. It may fold triangles over.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -136,7 +138,7 @@ fn solve_pinned(disk: &Disk, laplacian: &mut Laplacian, right: &mut [f64]) {
 
 /// Local/global iterations towards the nearest layout in which no length is changed by more than the factor `stretch`: every face asks for its
 /// own Jacobian, its singular values brought between `1 / stretch` and `stretch`. Faces within stay as they are, so that few iterations do where
-/// few faces are beyond. The Laplacian is factorised; it stops where the stretches of the faces ([`Jacobian::largest_stretch`]) are `enough`.
+/// few faces are beyond; the others ask for more than that, by [`Jacobian::beyond`]. The Laplacian is factorised; it stops where the stretches of the faces ([`Jacobian::largest_stretch`]) are `enough`.
 pub(crate) fn iterate_bounded(
     disk: &Disk,
     frames: &[Frame],
@@ -154,7 +156,8 @@ pub(crate) fn iterate_bounded(
         for ((face, frame), found) in disk.faces.iter().zip(frames).zip(&mut stretches) {
             let jacobian = frame.jacobian(face.map(|v| uv[v as usize]));
             *found = jacobian.largest_stretch();
-            let wanted = if *found > stretch { jacobian.bounded(stretch) } else { jacobian };
+            let wanted =
+                if *found > stretch { jacobian.beyond(RELAXATION, &jacobian.bounded(stretch)) } else { jacobian };
             ask(face, frame, &wanted, &mut right);
         }
         if enough(&stretches) {

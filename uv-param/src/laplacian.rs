@@ -9,6 +9,9 @@ use crate::error::Error;
 use crate::linear::Spd;
 use crate::triangle::Frame;
 
+/// Unknowns from which on the factor is kept in blocks.
+const BLOCKS_FROM: usize = 30_000;
+
 /// A graph Laplacian over the vertices of a disk plus one centre per hole. Fixed vertices keep their row as a unit row,
 /// so that every system has the same pattern and one symbolic analysis serves all of them.
 pub(crate) struct Laplacian {
@@ -39,8 +42,10 @@ impl Laplacian {
         for (hole, around) in holes.iter().enumerate() {
             below.extend(around.iter().map(|&v| ((vertices + hole) as u32, v)));
         }
-        // Few factorisations and many solves: the plain column factor is read faster than blocks.
-        let spd = Spd::new(size, &below, SupernodalThreshold::FORCE_SIMPLICIAL)?;
+        // Few factorisations and many solves: the plain column factor is read faster than blocks, until making it takes longer than they do.
+        let many = size > BLOCKS_FROM;
+        let kind = if many { SupernodalThreshold::FORCE_SUPERNODAL } else { SupernodalThreshold::FORCE_SIMPLICIAL };
+        let spd = Spd::new(size, &below, kind)?;
         let edges = below.iter().map(|&(i, j)| (i, j, spd.entry(i, j) as u32)).collect();
         Ok(Self { spd, vertices, size, edges, surface_edges })
     }

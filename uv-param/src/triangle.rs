@@ -108,6 +108,17 @@ impl Jacobian {
         Self { a: 0.5 * (p + r), b: 0.5 * (s - q), c: 0.5 * (s + q), d: 0.5 * (p - r) }
     }
 
+    /// What lies in the direction of another map, `factor` times as far away.
+    pub(crate) fn beyond(&self, factor: f64, other: &Self) -> Self {
+        let along = |from: f64, to: f64| from + factor * (to - from);
+        Self {
+            a: along(self.a, other.a),
+            b: along(self.b, other.b),
+            c: along(self.c, other.c),
+            d: along(self.d, other.d),
+        }
+    }
+
     /// `|J - R|^2`; `(s1 - 1)^2 + (s2 - 1)^2` for the nearest rotation (cosine, sine).
     pub(crate) fn rigidity(&self, [p, q]: [f64; 2]) -> f64 {
         (self.a - p).powi(2) + (self.b + q).powi(2) + (self.c - q).powi(2) + (self.d - p).powi(2)

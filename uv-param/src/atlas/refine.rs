@@ -15,9 +15,11 @@ use crate::triangle::flips;
 /// Times that a chart is halved before it is charted anew.
 const MAX_ROUNDS: usize = 3;
 
-/// Local/global iterations that bring faces to this share of the bound, at most.
+/// Local/global iterations that bring faces to this share of the bound, at most, and the share of the faces that may be beyond it in the end, over what may:
+/// what is mended afterwards takes some of it.
 const BOUNDED_ITERATIONS: usize = 20;
-const BOUNDED_STRETCH: f64 = 0.9;
+const BOUNDED_STRETCH: f64 = 0.7;
+const ENOUGH: f64 = 0.5;
 /// Share of the faces of a large chart beyond the bound above which the iterations would not do.
 const HOPELESS: f64 = 0.03;
 
@@ -106,7 +108,7 @@ fn lay_out(disk: &Disk, targets: &[[[f64; 2]; 3]], is_small: bool, bounds: Bound
     if start > HOPELESS && !is_small {
         return None;
     }
-    let mut enough = |stretches: &[f64]| Distortion::of(&frames, stretches, bounds).beyond <= SHARE_BEYOND;
+    let mut enough = |stretches: &[f64]| Distortion::of(&frames, stretches, bounds).beyond <= ENOUGH * SHARE_BEYOND;
     let stretch = 1.0 + BOUNDED_STRETCH * (bounds.stretch - 1.0);
     iterate_bounded(disk, &frames, &mut laplacian, &mut uv, stretch, BOUNDED_ITERATIONS, &mut enough);
     mend(disk, uv, &vec![false; frames.len()], bounds)
