@@ -138,7 +138,8 @@ fn solve_pinned(disk: &Disk, laplacian: &mut Laplacian, right: &mut [f64]) {
 
 /// Local/global iterations towards the nearest layout in which no length is changed by more than the factor `stretch`: every face asks for its
 /// own Jacobian, its singular values brought between `1 / stretch` and `stretch`. Faces within stay as they are, so that few iterations do where
-/// few faces are beyond; the others ask for more than that, by [`Jacobian::beyond`]. The Laplacian is factorised; it stops where the stretches of the faces ([`Jacobian::largest_stretch`]) are `enough`.
+/// few faces are beyond; the others ask for more than that (over-relaxed projections). The Laplacian is factorised; it stops where the stretches of
+/// the faces ([`Jacobian::largest_stretch`]) are `enough`.
 pub(crate) fn iterate_bounded(
     disk: &Disk,
     frames: &[Frame],

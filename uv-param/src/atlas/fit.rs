@@ -140,3 +140,47 @@ pub(super) fn projection(disk: &Disk) -> Vec<[f64; 2]> {
     let y = normal.cross(&x);
     disk.positions.iter().map(|&p| Vector3::from(p)).map(|p| [p.dot(&x), p.dot(&y)]).collect()
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::surface::{FaceLookup, Surface};
+    use crate::tutte::tutte_layout;
+
+    /// A square as seen from the centre of the unit sphere, up to 31 degrees aside.
+    fn patch() -> Disk {
+        let n = 16_u32;
+        let (mut positions, mut faces) = (Vec::new(), Vec::new());
+        for (j, i) in (0..=n).flat_map(|j| (0..=n).map(move |i| (j, i))) {
+            let [x, y] = [i, j].map(|k| 0.6 * (2.0 * f64::from(k) / f64::from(n) - 1.0));
+            positions.push((Vector3::new(x, y, 1.0).normalize()).into());
+            if i < n && j < n {
+                let v = j * (n + 1) + i;
+                faces.extend([[v, v + 1, v + n + 2], [v, v + n + 2, v + n + 1]]);
+            }
+        }
+        let (surface, _) = Surface::new(&positions, &faces, true).unwrap();
+        let all: Vec<u32> = (0..faces.len() as u32).collect();
+        surface.disk(&all, |_| false, &mut FaceLookup::new(&surface)).unwrap()
+    }
+
+    /// ARAP minimises the sum of squares: it leaves the corners of the patch beyond a bound that can be kept.
+    #[test]
+    fn what_arap_leaves_beyond_the_bound_is_brought_within() {
+        let disk = patch();
+        let frames = disk.frames();
+        let (mut laplacian, start) = tutte_layout(&disk, &mut |_| ()).unwrap();
+        let mut arap = start.clone();
+        laplacian.factorize_cotangent(&disk, &frames, disk.loops[0][0]).unwrap();
+        let stopping = StoppingCriterion { iterations: 200, tolerance: 0.0 };
+        iterate_arap(&disk, &frames, &mut laplacian, &mut arap, &stopping, &mut |_| ());
+        let bounds = Bounds { stretch: 1.056, worst: 1.5 };
+        let by_arap = Distortion::measure(&disk, &frames, &arap, bounds);
+        assert!(by_arap.beyond > 1.5 * SHARE_BEYOND, "{}", by_arap.beyond);
+        let uv = fit(&disk, start.clone(), bounds, None).unwrap();
+        assert!(Distortion::measure(&disk, &frames, &uv, bounds).within(bounds));
+        // Its curvature allows no less: a layout of all of it within this is none.
+        assert!(fit(&disk, start, Bounds { stretch: 1.01, worst: 1.5 }, None).is_none());
+    }
+}
