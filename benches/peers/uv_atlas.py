@@ -72,6 +72,7 @@ def main():
     a.add_argument("--unwrap", help="the binary `unwrap` (default: built here with cargo)")
     a.add_argument("--gutter", type=int, default=2)
     a.add_argument("--page", type=int, default=1024)
+    a.add_argument("--utilisation", help="that of `unwrap`: charts are cut until they fill this share of the page")
     a.add_argument("--without-peers", action="store_true")
     o = a.parse_args()
     unwrap = o.unwrap
@@ -84,7 +85,8 @@ def main():
             stem = os.path.splitext(os.path.basename(path))[0]
             out = os.path.join(folder, stem)
             texel = math.sqrt(1.5 * area_of(path)) / o.page
-            _, error, code = run([unwrap, "--mesh", path, "--texel", f"{texel:.6g}", "--gutter", str(o.gutter), "--out", out])
+            command = [unwrap, "--mesh", path, "--texel", f"{texel:.6g}", "--gutter", str(o.gutter), "--out", out]
+            _, error, code = run(command + (["--utilisation", o.utilisation] if o.utilisation else []))
             if code:
                 print(f"{stem}: unwrap: {error}", file=sys.stderr)
             else:

@@ -106,7 +106,7 @@ impl PaintSurface {
         // The footprint of a spray must not reach from chart to chart across the page, and what it puts beyond its own seam must not
         // lie where another chart's does.
         let gutter = 2 * reach(texel);
-        let pack = PackSettings { texel_m: texel, gutter, page: None, turns: Turns::None };
+        let pack = PackSettings { texel_m: texel, gutter, turns: Turns::None, ..PackSettings::default() };
         let atlas = uv_param::unwrap_atlas(positions, &mesh.faces, &[], &AtlasSettings { charts, pack }, |_| ())?;
         let chart = atlas.page_chart(0).ok_or(Error::ZeroArea)?;
         let texels = TexelMap::new(&chart, texel)?;

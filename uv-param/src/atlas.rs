@@ -14,6 +14,7 @@ mod levels;
 mod mend;
 mod motion;
 mod pack;
+mod page_cuts;
 mod price;
 mod quality;
 mod refine;
@@ -32,7 +33,6 @@ use crate::surface::{FaceLookup, Surface, SurfaceReport};
 use crate::trace::{event, span};
 use crate::triangle;
 pub use charting::ChartSettings;
-use pack::Piece;
 pub use pack::{PackSettings, Page, Placement, Turns};
 pub use quality::AtlasQuality;
 pub use texels::{PageTexels, TexelKind};
@@ -103,8 +103,9 @@ impl Atlas {
         );
         pack::check(&settings.pack, surface.area())?;
         let (charts, members) = charting::charts(&surface, seams, &settings.charts, parametrizer, &mut progress)?;
-        let pieces: Vec<Piece> = charts.iter().map(|c| Piece::new(c.uv(), c.disk().faces())).collect();
-        let (placements, pages) = pack::pack(&pieces, &settings.pack)?;
+        let turned = settings.charts.up.is_none() && settings.pack.turns != Turns::None;
+        let (charts, members, placements, pages) =
+            page_cuts::cut_and_pack(&surface, charts, members, &settings.pack, turned)?;
         Self::of_parts(surface, report, charts, members, placements, pages, settings.pack.texel_m)
     }
 

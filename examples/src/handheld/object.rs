@@ -65,7 +65,7 @@ impl PaintObject {
     ) -> Result<Self, HandheldError> {
         let positions: Vec<[f64; 3]> = mesh.positions.iter().map(|p| p.map(f64::from)).collect();
         let charts = ChartSettings { up: Some([0.0, 0.0, 1.0]), ..ChartSettings::default() };
-        let pack = PackSettings { texel_m: texel, gutter: GUTTER, page: None, turns: Turns::None };
+        let pack = PackSettings { texel_m: texel, gutter: GUTTER, turns: Turns::None, ..PackSettings::default() };
         let atlas = unwrap_atlas(&positions, &mesh.faces, seams, &AtlasSettings { charts, pack }, |_| ())?;
         let chart = atlas.page_chart(0).ok_or(uv_param::Error::ZeroArea)?;
         let texels = TexelMap::new(&chart, texel)?;

@@ -49,6 +49,10 @@ pub struct Arguments {
     /// Columns and rows of a page, texels [default: one page, the smallest rectangle that was found]
     #[arg(long, value_name = "W,H", value_parser = page)]
     pub page: Option<[usize; 2]>,
+    /// Share of the pages, above 0 and below 1, that charts shall fill: they are cut into pieces that lie closer together until they do, or no cut
+    /// gains enough [default: no chart is cut for the page]
+    #[arg(long, value_name = "SHARE")]
+    pub utilisation: Option<f64>,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/unwrap")]
     pub out: PathBuf,

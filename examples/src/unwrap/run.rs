@@ -92,6 +92,7 @@ fn unwrap(
             gutter: arguments.gutter,
             page: arguments.page,
             turns: if arguments.up.is_some() { Turns::None } else { Turns::Any },
+            utilisation: arguments.utilisation,
         },
     };
     let stage = Stage::start("unwrap");

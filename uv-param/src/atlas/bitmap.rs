@@ -180,13 +180,13 @@ impl Bitmap {
             let full = |taken: &[u64]| taken.iter().all(|&w| w == u64::MAX);
             for (i, &(r, [from, to])) in outline.iter().enumerate() {
                 work += words as u64;
-                spread_down(self.row(row + r as usize), to - from, &mut spread);
-                let (skip, shift) = (from / BITS, from % BITS);
-                for (w, slot) in taken.iter_mut().enumerate() {
-                    let low = spread.get(w + skip).copied().unwrap_or(0) >> shift;
-                    let high =
-                        if shift > 0 { spread.get(w + skip + 1).copied().unwrap_or(0) << (BITS - shift) } else { 0 };
-                    *slot |= low | high;
+                let marked = self.row(row + r as usize);
+                // Most runs are single cells.
+                if to == from {
+                    add_shifted(&mut taken, marked, from);
+                } else {
+                    spread_down(marked, to - from, &mut spread);
+                    add_shifted(&mut taken, &spread, from);
                 }
                 if i % 8 == 7 && full(&taken) {
                     break;
@@ -203,6 +203,23 @@ impl Bitmap {
 /// The cell of a coordinate, the nearest one outside.
 fn last(count: usize, x: f64) -> usize {
     (x.max(0.0) as usize).min(count - 1)
+}
+
+/// Adds the bits of a row, moved down by `by`.
+fn add_shifted(taken: &mut [u64], row: &[u64], by: usize) {
+    let (skip, shift) = (by / BITS, by % BITS);
+    for (w, slot) in taken.iter_mut().enumerate() {
+        let low = row.get(w + skip).copied().unwrap_or(0) >> shift;
+        let high = if shift > 0 { row.get(w + skip + 1).copied().unwrap_or(0) << (BITS - shift) } else { 0 };
+        *slot |= low | high;
+    }
+}
+
+/// An outline in another order: what comes next lies far from what came before, so that after a few runs most rows are known to be taken.
+pub(super) fn scattered(outline: &Outline) -> Outline {
+    let bits = usize::BITS - outline.len().leading_zeros();
+    let reversed = |k: usize| k.reverse_bits().checked_shr(usize::BITS - bits).unwrap_or(0);
+    (0..1_usize << bits).filter_map(|k| outline.get(reversed(k)).copied()).collect()
 }
 
 /// Bit `i` of the result: whether one of the bits `i..=i + by` of the row is set.

@@ -1,6 +1,7 @@
 //! Charts onto pages: bottom-left on bitmaps, holes filled by the small ones, improved by local search.
 
 mod add;
+mod arrange;
 mod back;
 mod bottom_left;
 mod search;
@@ -9,23 +10,20 @@ mod shape;
 
 use crate::error::Error;
 pub(super) use add::add_to;
+use arrange::{Arrangement, area};
 pub(super) use back::{Home, back};
-use search::{Goal, Packed, Plan, Stages, carry_out, carry_out_unlimited, search};
 pub use settings::{PackSettings, Page, Placement, Turns};
 pub(super) use settings::{check, check_pages};
 pub(super) use shape::Piece;
-use shape::Shapes;
 
-/// Cells along the side of a page whose area is that of the charts while the arrangement is searched for.
-const COARSE_CELLS: f64 = 110.0;
-/// The same for the final places: texels up to a page of this side.
+/// Cells along the side of a page whose area is that of the charts for the final places: texels up to a page of this side.
 const FINE_CELLS: f64 = 1100.0;
-/// Cells along the longest piece, relative to those along the side of a page, at most.
-const LONGEST: f64 = 8.0;
+/// The same for estimates.
+const ESTIMATE_CELLS: f64 = 400.0;
+/// One in so many turns is tried for them.
+const ESTIMATE_TURNS: usize = 4;
 /// Words of bitmaps that the search looks at, a tenth of a second of work, and the same per chart.
 const BUDGET: [u64; 2] = [30_000_000, 100_000];
-/// Widths that are tried for the final places, relative to that of the search.
-const FINE_WIDTHS: [f64; 5] = [0.98, 0.99, 1.0, 1.01, 1.02];
 
 /// A place for every piece, and the pages.
 ///
@@ -35,36 +33,10 @@ pub(super) fn pack(pieces: &[Piece], settings: &PackSettings) -> Result<(Vec<Pla
     if pieces.is_empty() {
         return Ok((Vec::new(), Vec::new()));
     }
-    let areas: Vec<f64> = pieces.iter().map(area).collect();
-    let mut order: Vec<usize> = (0..pieces.len()).collect();
-    order.sort_by(|&a, &b| areas[b].total_cmp(&areas[a]).then(a.cmp(&b)));
-    let square = areas.iter().sum::<f64>().sqrt() / settings.texel_m;
-    let side = settings.page.map_or(square, |page| square.min(page[0].min(page[1]) as f64));
-    let longest = pieces.iter().map(extent).fold(0.0, f64::max) / settings.texel_m;
-    let (coarse, fine) = (texels_per_cell(side, longest, COARSE_CELLS), texels_per_cell(side, longest, FINE_CELLS));
-    let goal = |per_cell: usize| {
-        settings.page.map_or(Goal::Smallest, |page| Goal::Pages(page.map(|texels| texels / per_cell)))
-    };
-
-    let all = |_| (0..settings.turns.count()).collect();
-    let shapes = Shapes::new(pieces, settings, coarse, all);
     let budget = BUDGET[0] + BUDGET[1] * pieces.len() as u64;
-    let found = search(&shapes, &order, goal(coarse), budget).and_then(|(plan, _)| {
-        let mut turns = vec![0; pieces.len()];
-        for &(chart, turn) in &plan.steps {
-            turns[chart] = turn.unwrap_or(0);
-        }
-        let shapes = Shapes::new(pieces, settings, fine, |chart| vec![turns[chart]]);
-        let (plan, packed) = finer(&shapes, &plan, goal(fine), coarse as f64 / fine as f64)?;
-        Some((shapes, plan, packed))
-    });
-    let found = found.or_else(|| {
-        // The cells of the search may be too large for what just fits.
-        let shapes = Shapes::new(pieces, settings, fine, all);
-        let (plan, packed) = search(&shapes, &order, goal(fine), 0)?;
-        Some((shapes, plan, packed))
-    });
-    let Some((shapes, plan, packed)) = found else {
+    let Some(Arrangement { shapes, plan, packed, texels_per_cell }) =
+        Arrangement::new(pieces, settings, FINE_CELLS, 1, budget)
+    else {
         let [width, height] = settings.page.unwrap_or_default();
         return Err(Error::TooManyTexels {
             texel_m: settings.texel_m,
@@ -74,66 +46,37 @@ pub(super) fn pack(pieces: &[Piece], settings: &PackSettings) -> Result<(Vec<Pla
         });
     };
 
-    let cell = settings.texel_m * fine as f64;
+    let cell = settings.texel_m * texels_per_cell as f64;
     let mut placements = vec![Placement { page: 0, turn: [1.0, 0.0], shift: [0.0; 2] }; pieces.len()];
     for (&(chart, _), &(page, turn, [column, row])) in plan.steps.iter().zip(&packed.places) {
         let shape = &shapes.turned[chart][turn];
         let shift = [column as f64 * cell - shape.corner[0], row as f64 * cell - shape.corner[1]];
         placements[chart] = Placement { page, turn: shape.turn, shift };
     }
-    let page = |used: &[usize; 2]| settings.page.unwrap_or_else(|| used.map(|cells| cells * fine));
+    let page = |used: &[usize; 2]| settings.page.unwrap_or_else(|| used.map(|cells| cells * texels_per_cell));
     Ok((placements, packed.used.iter().map(page).collect()))
 }
 
-/// The plan of the search carried out on finer cells, `scale` of which make a cell of the search; each chart has one turn left.
-fn finer(shapes: &Shapes, plan: &Plan, goal: Goal, scale: f64) -> Option<(Plan, Packed)> {
-    let steps: Vec<_> = plan.steps.iter().map(|&(chart, _)| (chart, Some(0))).collect();
-    let mut best: Option<(Plan, Packed)> = None;
-    for factor in FINE_WIDTHS {
-        let width = (plan.width as f64 * scale * factor).round() as usize;
-        let plan = Plan { steps: steps.clone(), width: width.max(shapes.narrowest()) };
-        let packed = match &best {
-            None => carry_out_unlimited(shapes, &plan, goal, Stages::Drop),
-            Some((_, least)) => carry_out(shapes, &plan, goal, least.cost - 1, Stages::Drop, &mut 0),
-        };
-        if let Some(packed) = packed {
-            best = Some((plan, packed));
-        }
-        if matches!(goal, Goal::Pages(_)) {
-            break;
-        }
-    }
-    best
+/// Share of the page that pieces would fill, found quickly: the largest first, without a search, on cells that are not the finest. Of the last of several
+/// pages only the rows that are used count. `None` where a piece is larger than a page.
+pub(super) fn estimate(pieces: &[Piece], settings: &PackSettings) -> Option<f64> {
+    let found = Arrangement::new(pieces, settings, ESTIMATE_CELLS, ESTIMATE_TURNS, 0)?;
+    let cell = settings.texel_m * found.texels_per_cell as f64;
+    Some(pieces.iter().map(area).sum::<f64>() / (found.packed.cost as f64 * cell * cell))
 }
 
-/// Texels along a cell, so that a page of this side has about so many cells, and the longest piece, however thin, not many times more: its bitmap
-/// is as large as its box in every turn.
-fn texels_per_cell(side: f64, longest: f64, cells: f64) -> usize {
-    (side / cells).max(longest / (LONGEST * cells)).ceil().max(1.0) as usize
-}
-
-/// Diagonal of the box around a piece, metres.
-fn extent(piece: &Piece) -> f64 {
-    let size = [0, 1].map(|k| {
-        let along = || piece.rim.iter().map(|[from, _]| from[k]);
-        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
-    });
-    size[0].hypot(size[1])
-}
-
-/// Area of a piece in the plane, m^2.
-fn area(piece: &Piece) -> f64 {
-    let origin = piece.rim.first().map_or([0.0; 2], |edge| edge[0]);
-    let of = |edge: &[[f64; 2]; 2]| {
-        let [p, q] = edge.map(|at| [0, 1].map(|k| at[k] - origin[k]));
-        0.5 * (p[0] * q[1] - p[1] * q[0])
-    };
-    piece.rim.iter().map(of).sum::<f64>().abs()
+/// Share of the pages that pieces fill.
+pub(super) fn utilisation(pieces: &[Piece], pages: &[Page], settings: &PackSettings) -> f64 {
+    let texels: f64 = pages.iter().map(|[width, height]| (width * height) as f64).sum();
+    pieces.iter().map(area).sum::<f64>() / (texels * settings.texel_m * settings.texel_m)
 }
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
+    use super::arrange::{COARSE_CELLS, LONGEST, texels_per_cell};
+    use super::search::{Goal, search};
+    use super::shape::Shapes;
     use super::*;
 
     type Mesh = (Vec<[f64; 2]>, Vec<[u32; 3]>);
@@ -184,7 +127,7 @@ mod tests {
     }
 
     fn settings(turns: Turns, gutter: usize) -> PackSettings {
-        PackSettings { texel_m: 1.0, gutter, page: None, turns }
+        PackSettings { texel_m: 1.0, gutter, turns, ..PackSettings::default() }
     }
 
     /// A frame with a hole of 60 x 60: what fits into it needs no page of its own.

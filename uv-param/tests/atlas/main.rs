@@ -4,6 +4,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod levels;
+mod page_cuts;
 mod seams;
 mod update;
 
@@ -191,6 +192,37 @@ fn another_parametrizer_decides_what_fits() {
 }
 
 /// Every texel that a chart touches is its own, and so are those around it.
+fn assert_distance(found: &Atlas, gutter: usize) {
+    let texel_m = found.texel_m();
+    // Just inside, so that lines between texels belong to one of them.
+    let inside = |k: i32| 1e-7 + (1.0 - 3e-7) * f64::from(k) / 12.0;
+    for (number, &[columns, rows]) in found.pages().iter().enumerate() {
+        let mut owner = vec![usize::MAX; columns * rows];
+        for (c, (chart, placement)) in found.charts().iter().zip(found.placements()).enumerate() {
+            for face in chart.disk().faces().iter().filter(|_| placement.page == number) {
+                let corners = face.map(|v| placement.apply(chart.uv()[v as usize]).map(|x| x / texel_m));
+                for (i, j) in (0..=12).flat_map(|i| (0..=12 - i).map(move |j| (inside(i), inside(j)))) {
+                    let at = [0, 1].map(|k| {
+                        corners[0][k] + i * (corners[1][k] - corners[0][k]) + j * (corners[2][k] - corners[0][k])
+                    });
+                    let cell = (at[1] as usize).min(rows - 1) * columns + (at[0] as usize).min(columns - 1);
+                    assert!(owner[cell] == usize::MAX || owner[cell] == c);
+                    owner[cell] = c;
+                }
+            }
+        }
+        for (cell, &c) in owner.iter().enumerate().filter(|(_, c)| **c != usize::MAX) {
+            let (x, y) = (cell % columns, cell / columns);
+            for row in y.saturating_sub(gutter)..(y + gutter + 1).min(rows) {
+                for column in x.saturating_sub(gutter)..(x + gutter + 1).min(columns) {
+                    let other = owner[row * columns + column];
+                    assert!(other == usize::MAX || other == c, "charts {c} and {other} are too near");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn charts_keep_their_distance() {
     let cases =
@@ -199,41 +231,13 @@ fn charts_keep_their_distance() {
         // Two squares of 50 x 50 texels fit on a page of 110 x 60.
         let mesh = if page.is_some() { squares(5) } else { sphere(10) };
         let settings = AtlasSettings {
-            pack: PackSettings { texel_m, gutter, page, turns },
+            pack: PackSettings { texel_m, gutter, page, turns, ..PackSettings::default() },
             charts: ChartSettings { max_stretch: 1.05, ..ChartSettings::default() },
         };
         let found = unwrap_atlas(&mesh.0, &mesh.1, &[], &settings, |_| ()).unwrap();
         assert_sound(&found);
         assert_eq!(found.pages().len(), if page.is_some() { 3 } else { 1 });
-        for (number, &[columns, rows]) in found.pages().iter().enumerate() {
-            let mut owner = vec![usize::MAX; columns * rows];
-            for (c, (chart, placement)) in found.charts().iter().zip(found.placements()).enumerate() {
-                for face in chart.disk().faces().iter().filter(|_| placement.page == number) {
-                    let corners = face.map(|v| placement.apply(chart.uv()[v as usize]).map(|x| x / texel_m));
-                    for (i, j) in
-                        (0..=12).flat_map(|i| (0..=12 - i).map(move |j| (f64::from(i) / 12.0, f64::from(j) / 12.0)))
-                    {
-                        // Just inside: charts begin on lines between texels, from which rounding may take them to either side.
-                        let [i, j] = [i, j].map(|x| 1e-7 + (1.0 - 3e-7) * x);
-                        let at = [0, 1].map(|k| {
-                            corners[0][k] + i * (corners[1][k] - corners[0][k]) + j * (corners[2][k] - corners[0][k])
-                        });
-                        let cell = (at[1] as usize).min(rows - 1) * columns + (at[0] as usize).min(columns - 1);
-                        assert!(owner[cell] == usize::MAX || owner[cell] == c);
-                        owner[cell] = c;
-                    }
-                }
-            }
-            for (cell, &c) in owner.iter().enumerate().filter(|(_, c)| **c != usize::MAX) {
-                let (x, y) = (cell % columns, cell / columns);
-                for row in y.saturating_sub(gutter)..(y + gutter + 1).min(rows) {
-                    for column in x.saturating_sub(gutter)..(x + gutter + 1).min(columns) {
-                        let other = owner[row * columns + column];
-                        assert!(other == usize::MAX || other == c, "charts {c} and {other} are too near");
-                    }
-                }
-            }
-        }
+        assert_distance(&found, gutter);
     }
 }
 

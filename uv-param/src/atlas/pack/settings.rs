@@ -40,11 +40,14 @@ pub struct PackSettings {
     pub page: Option<[usize; 2]>,
     /// Turns that may be tried. Default [`Turns::Any`]; [`Turns::None`] keeps upright charts upright.
     pub turns: Turns,
+    /// Share of the pages, above 0 and below 1, that charts shall fill: as long as they fill less, charts are cut along edges into pieces that lie closer
+    /// together, most room for the shortest seam first, until they do or no cut gains enough. `None` (default): no chart is cut for the page.
+    pub utilisation: Option<f64>,
 }
 
 impl Default for PackSettings {
     fn default() -> Self {
-        Self { texel_m: 0.0125, gutter: 2, page: None, turns: Turns::default() }
+        Self { texel_m: 0.0125, gutter: 2, page: None, turns: Turns::default(), utilisation: None }
     }
 }
 
@@ -79,6 +82,11 @@ pub(in crate::atlas) fn check(settings: &PackSettings, area_m2: f64) -> Result<(
         && page.contains(&0)
     {
         return Err(Error::Setting { name: "page", value: 0.0, must_be: "at least 1 x 1 texels" });
+    }
+    if let Some(value) = settings.utilisation
+        && !(value > 0.0 && value < 1.0)
+    {
+        return Err(Error::Setting { name: "utilisation", value, must_be: "above 0 and below 1" });
     }
     let side = area_m2.sqrt() / settings.texel_m;
     let [width, height] = settings.page.map_or([side; 2], |page| page.map(|side| side as f64));

@@ -1,7 +1,7 @@
 //! A chart as cells, in each of its turns.
 
 use super::settings::PackSettings;
-use crate::atlas::bitmap::{Bitmap, Outline};
+use crate::atlas::bitmap::{Bitmap, Outline, scattered};
 use crate::half_edges::{EdgeTable, half_edge};
 
 /// What is packed: a shape in the plane, metres.
@@ -60,6 +60,14 @@ impl Shapes {
             .collect();
         let cells = turned.iter().filter_map(|turns| turns.first()).map(|shape| shape.wide.count()).sum();
         Self { turned, gutter, cells }
+    }
+
+    /// The same with outlines in an order in which places are found sooner. They are the same places, but less work, by which the search is measured.
+    pub(super) fn quicker(mut self) -> Self {
+        for shape in self.turned.iter_mut().flatten() {
+            shape.outline = scattered(&shape.outline);
+        }
+        self
     }
 
     /// Columns that the widest chart needs at least.
