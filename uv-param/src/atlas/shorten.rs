@@ -267,7 +267,9 @@ mod tests {
             let square = f / 2;
             lists[square / n / block * count + square % n / block].push(f as u32);
         }
-        lists.into_iter().for_each(|faces| add_region(&mut charts, faces, BOUNDS, None));
+        for faces in lists {
+            add_region(&mut charts, faces, BOUNDS, None);
+        }
         charts
     }
 
