@@ -3,6 +3,7 @@
 //! 1. Every part that is a disk already and can be laid out within the bounds is one chart.
 //! 2. The rest is taken apart into regions of similar normals, more than are needed, each of which is laid out.
 //! 3. Seams are closed again, the most useful first, as long as what they join can really be laid out within the bounds.
+//! 4. Patches around seams change charts where that makes all seams together cheaper.
 
 mod absorb;
 mod add_region;
@@ -21,6 +22,7 @@ mod refine;
 mod regions;
 mod seams;
 mod sew;
+mod shorten;
 mod simple_boundary;
 mod straighten;
 mod texels;

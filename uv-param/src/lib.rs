@@ -56,6 +56,7 @@ mod linear;
 mod min_area_rectangle;
 mod nozzle;
 mod parametrizer;
+mod random;
 mod soup;
 mod surface;
 mod symmetric_dirichlet;

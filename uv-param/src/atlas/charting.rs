@@ -11,6 +11,7 @@ use super::price::{SeamPrices, angle_deficits};
 use super::refine::{is_small, refine};
 use super::regions::regions;
 use super::sew::Sewing;
+use super::shorten::{Tools, shorten};
 use super::straighten::{straighten, straighten_unlaid};
 use crate::chart::Chart;
 use crate::disk::Disk;
@@ -125,6 +126,8 @@ fn cut_open(
         }
         straighten(charts, &prices, &|disk, start| fit(disk, start, bounds, parametrizer));
     }
+    let tools = Tools { prices: &prices, deficits: &deficits, bounds, parametrizer };
+    shorten(charts, tools, &whole.iter().copied().collect(), progress);
     whole
 }
 

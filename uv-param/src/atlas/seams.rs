@@ -11,6 +11,13 @@ pub(super) struct Arc {
     pub(super) right: u32,
 }
 
+impl Arc {
+    /// First and last half-edge: what tells it from the others.
+    pub(super) fn key(&self) -> (u32, u32) {
+        (self.half_edges[0], self.half_edges[self.half_edges.len() - 1])
+    }
+}
+
 /// All arcs, in the order of their smallest half-edges.
 pub(super) fn arcs(charts: &Charts) -> Vec<Arc> {
     let surface = charts.surface;

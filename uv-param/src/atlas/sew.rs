@@ -75,6 +75,12 @@ impl<'a, 'b> Sewing<'a, 'b> {
         Self { charts, prices, bounds, parametrizer, progress, only, work, tried, longest, refused, refused_parts }
     }
 
+    /// Neither tries these arcs (first and last half-edge) nor parts of them.
+    pub(super) fn refuse(&mut self, arcs: &HashSet<(u32, u32)>) {
+        self.refused.extend(arcs);
+        self.refused_parts.extend(arcs);
+    }
+
     /// Closes whole arcs until none can be closed any more.
     pub(super) fn close_arcs(&mut self) {
         let face_areas: Vec<f64> =
@@ -127,7 +133,7 @@ impl<'a, 'b> Sewing<'a, 'b> {
         for _ in 0..MAX_ROUNDS {
             let mut candidates: Vec<(f64, Arc)> = arcs(self.charts)
                 .into_iter()
-                .filter(|arc| !self.charts.wanted[arc.half_edges[0] as usize])
+                .filter(|arc| self.may_change(arc) && !self.charts.wanted[arc.half_edges[0] as usize])
                 .filter(|arc| !self.refused_parts.contains(&key(&arc.half_edges)))
                 .map(|arc| (self.price(&arc.half_edges), arc))
                 .filter(|(price, _)| *price > least)

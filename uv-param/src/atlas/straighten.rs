@@ -19,7 +19,17 @@ pub(super) type Layout<'a> = &'a dyn Fn(&Disk, Vec<[f64; 2]>) -> Option<Vec<[f64
 
 /// Tries every seam once, the dearest first.
 pub(super) fn straighten(charts: &mut Charts, prices: &SeamPrices, layout: Layout) {
-    for (price, arc) in dearest_first(charts, prices) {
+    straighten_where(charts, prices, layout, |_| true);
+}
+
+/// The same for some of the seams.
+pub(super) fn straighten_where(
+    charts: &mut Charts,
+    prices: &SeamPrices,
+    layout: Layout,
+    wanted: impl Fn(&Arc) -> bool,
+) {
+    for (price, arc) in dearest_first(charts, prices).into_iter().filter(|(_, arc)| wanted(arc)) {
         let rings = (arc.half_edges.len() / REACH[0]).max(REACH[1]);
         if let Some(detour) = Detour::new(charts, prices, price, &arc, rings) {
             detour.take(charts, layout);

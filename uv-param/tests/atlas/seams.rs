@@ -39,6 +39,10 @@ fn gutters_continue_what_lies_beyond_the_seam() {
         }
         sum / weight
     };
+    let within = |uv: [f64; 2]| {
+        let size = [page.width, page.height].map(|texels| (texels as f64 - 0.5) * texel_m);
+        (0..2).all(|k| uv[k] >= 0.5 * texel_m && uv[k] <= size[k])
+    };
     let (mut error, mut without, mut count) = (0.0_f64, 0.0_f64, 0);
     for h in 0..3 * surface.faces().len() {
         let Some(twin) = surface.twin(h) else { continue };
@@ -51,6 +55,10 @@ fn gutters_continue_what_lies_beyond_the_seam() {
             let (here, there) = (on(h, t), on(twin, 1.0 - t));
             let (one, other) = (found.uv_of(here).1, found.uv_of(there).1);
             if (one[0] - other[0]).hypot(one[1] - other[1]) < 1e-6 {
+                continue;
+            }
+            // Charts reach up to the rim of a page: nothing can lie in a gutter beyond it.
+            if [one, other].iter().any(|uv| !within(*uv)) {
                 continue;
             }
             error = error.max((sample(&image, one) - sample(&image, other)).abs());

@@ -3,6 +3,7 @@
 
 use super::bottom_left::{Pages, Place, Step};
 use super::shape::Shapes;
+use crate::random::Random;
 
 /// How much worse than the present arrangement a new one may be at the start of the search; nothing at its end.
 const THRESHOLD: f64 = 0.04;
@@ -202,25 +203,4 @@ fn moved(shapes: &Shapes, plan: &Plan, goal: Goal, random: &mut Random) -> (Plan
         (from != to).then_some(from.min(to))
     };
     (plan, first)
-}
-
-/// `SplitMix64` (Steele et al. 2014): this crate has no random numbers elsewhere, and needs no crate for these.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn unit(&mut self) -> f64 {
-        self.next() as f64 / u64::MAX as f64
-    }
-
-    fn below(&mut self, count: usize) -> usize {
-        (self.next() % count.max(1) as u64) as usize
-    }
 }
