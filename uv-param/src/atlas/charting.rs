@@ -92,7 +92,12 @@ pub(super) fn charts(
     let whole = if surface.faces().len() > COARSE_FROM && parametrizer.is_none() {
         by_coarse(&mut charts, bounds, progress)
     } else {
-        cut_open(&mut charts, bounds, parametrizer, progress)
+        let whole = cut_open(&mut charts, bounds, parametrizer, progress);
+        // On a coarse surface this would not pay: what it gains is less than what the fine one changes.
+        let (prices, deficits) = (SeamPrices::new(surface), angle_deficits(surface));
+        let tools = Tools { prices: &prices, deficits: &deficits, bounds, parametrizer };
+        shorten(&mut charts, tools, &whole.iter().copied().collect(), progress);
+        whole
     };
     finish(charts, &Kept { whole: &whole, sizes: &HashMap::new() }, settings, parametrizer, progress)
 }
@@ -126,8 +131,6 @@ fn cut_open(
         }
         straighten(charts, &prices, &|disk, start| fit(disk, start, bounds, parametrizer));
     }
-    let tools = Tools { prices: &prices, deficits: &deficits, bounds, parametrizer };
-    shorten(charts, tools, &whole.iter().copied().collect(), progress);
     whole
 }
 

@@ -32,6 +32,8 @@ const PATCH: [f64; 2] = [0.004, 0.12];
 const HOPELESS: f64 = 1.03;
 /// The same after parts were closed: beyond, straightening would not.
 const TOO_DEAR: f64 = 1.02;
+/// Price of a chart besides that of its seams, relative to the square root of the area: otherwise patches that close nowhere would pile up.
+const EACH: f64 = 0.05;
 /// Smallest relative gain that counts.
 const MIN_GAIN: f64 = 1e-6;
 
@@ -50,13 +52,13 @@ pub(super) fn shorten(charts: &mut Charts, tools: Tools, stays: &HashSet<u32>, p
     let faces = charts.surface.faces().len();
     let mut work = (WORK * faces).min(MAX_WORK);
     let mut random = Random(0);
-    let mut price = seam_price(charts, tools.prices);
+    let mut price = price_of(charts, tools.prices);
     while work > 0 {
         let Some(patch) = draw_patch(charts, tools.prices, stays, &mut random) else { break };
         let before = State::of(charts);
         let spent = Trial { tools, stays, price }.make(charts, &patch, progress);
         work = work.saturating_sub(spent.max(1 + faces / LEAST_WORK));
-        let after = seam_price(charts, tools.prices);
+        let after = price_of(charts, tools.prices);
         if after < price * (1.0 - MIN_GAIN) {
             price = after;
         } else {
@@ -69,7 +71,7 @@ pub(super) fn shorten(charts: &mut Charts, tools: Tools, stays: &HashSet<u32>, p
 struct Trial<'a> {
     tools: Tools<'a>,
     stays: &'a HashSet<u32>,
-    /// Price of all seams before.
+    /// Price of all seams and charts before.
     price: f64,
 }
 
@@ -88,13 +90,13 @@ impl Trial<'_> {
         sewing.close_arcs();
         // A patch is laid out twice at most: from its shadow, and from Tutte's embedding.
         let mut spent = 2 * patch.len() + limit - sewing.work;
-        if seam_price(sewing.charts, prices) > HOPELESS * self.price {
+        if price_of(sewing.charts, prices) > HOPELESS * self.price {
             return spent;
         }
         let left = sewing.work;
         sewing.close_parts(deficits);
         spent += left - sewing.work;
-        if seam_price(charts, prices) > TOO_DEAR * self.price {
+        if price_of(charts, prices) > TOO_DEAR * self.price {
             return spent;
         }
         let laid_out = Cell::new(0);
@@ -194,6 +196,12 @@ fn draw_patch(charts: &Charts, prices: &SeamPrices, stays: &HashSet<u32>, random
     }
     patch.sort_unstable();
     Some(patch)
+}
+
+/// Price of all seams and charts.
+fn price_of(charts: &Charts, prices: &SeamPrices) -> f64 {
+    let count = charts.members.iter().filter(|faces| !faces.is_empty()).count();
+    seam_price(charts, prices) + EACH * charts.surface.area().sqrt() * count as f64
 }
 
 /// Price of all seams.

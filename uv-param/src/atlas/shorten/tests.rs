@@ -62,10 +62,10 @@ fn seams_never_become_dearer_and_charts_keep_the_bounds() {
     for (surface, block) in [(torus(20), 5), (torus(20), 20), (surface(20, wave), 10), (surface(20, wave), 7)] {
         let (prices, deficits) = (SeamPrices::new(&surface), angle_deficits(&surface));
         let mut charts = in_blocks(&surface, 20, block);
-        let mut before = seam_price(&charts, &prices);
+        let mut before = price_of(&charts, &prices);
         for _ in 0..2 {
             shorten(&mut charts, tools(&prices, &deficits), &HashSet::new(), &mut |_| ());
-            let after = seam_price(&charts, &prices);
+            let after = price_of(&charts, &prices);
             assert!(after <= before, "{before} {after}");
             before = after;
         }
