@@ -6,6 +6,8 @@ mod placement;
 mod straight;
 mod surface_point;
 
+use std::sync::OnceLock;
+
 use nalgebra::{Point3, Unit, Vector3};
 
 use crate::disk::Disk;
@@ -24,7 +26,9 @@ pub struct Chart {
     uv: Vec<[f64; 2]>,
     width: f64,
     height: f64,
-    quality: Quality,
+    iterations: usize,
+    /// Measured when it is first asked for: an atlas that is brought up to date has many charts that nobody asks about.
+    quality: OnceLock<Quality>,
     vertex_normals: Vec<Vector3<f64>>,
     grid: Grid,
 }
@@ -46,9 +50,8 @@ impl Chart {
     /// A chart that lies where it is to lie, in a box of this size.
     pub(crate) fn placed(disk: Disk, uv: Vec<[f64; 2]>, [width, height]: [f64; 2], iterations: usize) -> Self {
         let grid = Grid::new(&uv, &disk.faces, [width, height]);
-        let quality = Quality::measure(&disk, &uv, grid.overlap(&uv, &disk.faces), iterations);
         let vertex_normals = normals::vertex_normals(&disk);
-        Self { disk, uv, width, height, quality, vertex_normals, grid }
+        Self { disk, uv, width, height, iterations, quality: OnceLock::new(), vertex_normals, grid }
     }
 
     /// The surface.
@@ -75,9 +78,11 @@ impl Chart {
         self.height
     }
 
-    /// Distortion metrics.
+    /// Distortion metrics, measured when they are first asked for.
     pub fn quality(&self) -> &Quality {
-        &self.quality
+        self.quality.get_or_init(|| {
+            Quality::measure(&self.disk, &self.uv, self.grid.overlap(&self.uv, &self.disk.faces), self.iterations)
+        })
     }
 
     /// The surface point at `uv` (metres); on a common edge the face with the lower index. `None` outside the chart and

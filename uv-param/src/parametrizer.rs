@@ -67,7 +67,7 @@ pub enum Stage {
     Seam,
     /// Seams that were found on a coarse surface: a chart of the fine one was laid out, or could not be; the iteration counts them, energy 0.
     Level,
-    /// A chart of an atlas is finished; the iteration is its number.
+    /// A chart of an atlas is finished; the iteration is its number, energy 0.
     Chart,
     /// Newton iterations on the symmetric Dirichlet energy.
     SymmetricDirichlet,

@@ -43,9 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<(), UnwrapError> {
     let earlier = arguments.previous.as_deref().map(previous::read).transpose()?;
     std::fs::create_dir_all(folder).map_err(|e| UnwrapError::unwritable(folder, &e))?;
 
-    let cpu = ProcessTime::try_now().ok();
-    let (atlas, update) = unwrap(&mesh, &seams, arguments, earlier.as_ref())?;
-    let cpu_s = cpu.and_then(|start| start.try_elapsed().ok()).unwrap_or_default().as_secs_f64();
+    let (atlas, update, cpu_s) = unwrap(&mesh, &seams, arguments, earlier.as_ref())?;
 
     let stage = Stage::start("write");
     let bounds = [arguments.max_stretch, arguments.worst_stretch];
@@ -73,12 +71,13 @@ pub fn run(arguments: &Arguments) -> Result<(), UnwrapError> {
     Ok(())
 }
 
+/// The atlas, what became of an earlier one, and the processor time that it took, seconds.
 fn unwrap(
     mesh: &TriangleMesh,
     seams: &[[u32; 2]],
     arguments: &Arguments,
     earlier: Option<&AtlasLayout>,
-) -> Result<(Atlas, Option<AtlasUpdate>), UnwrapError> {
+) -> Result<(Atlas, Option<AtlasUpdate>, f64), UnwrapError> {
     let positions: Vec<[f64; 3]> = mesh.positions.iter().map(|p| p.map(|c| f64::from(c) * arguments.scale)).collect();
     let settings = AtlasSettings {
         charts: ChartSettings {
@@ -102,12 +101,14 @@ fn unwrap(
         uv_param::Stage::Chart => stage.tell(&format!("{} charts finished", at.iteration)),
         _ => {}
     };
+    let cpu = ProcessTime::try_now().ok();
     let laid_out = match earlier {
         None => unwrap_atlas(&positions, &mesh.faces, seams, &settings, progress).map(|atlas| (atlas, None)),
         Some(earlier) => update_atlas(earlier, &positions, &mesh.faces, seams, &settings, progress)
             .map(|(atlas, update)| (atlas, Some(update))),
     };
     let (atlas, update) = laid_out.map_err(|source| UnwrapError::Atlas { path: arguments.mesh.clone(), source })?;
+    let cpu_s = cpu.and_then(|start| start.try_elapsed().ok()).unwrap_or_default().as_secs_f64();
     let quality = AtlasQuality::of(&atlas);
     stage.done(&format!(
         "{} charts of {} part(s), seams {:.2} m, stretch {:.3} (99 %), {:.3} (all), {:.0} % of the page used",
@@ -128,7 +129,7 @@ fn unwrap(
             update.new_charts
         );
     }
-    Ok((atlas, update))
+    Ok((atlas, update, cpu_s))
 }
 
 /// Pairs of vertex numbers, one on each line; what follows a `#` is passed over.

@@ -289,11 +289,7 @@ pub(super) fn finish(
             Some(&size) => Chart::placed(disk, uv, size, 0),
             None => Chart::new(disk, uv, 0, settings.up)?,
         };
-        progress(Progress {
-            stage: Stage::Chart,
-            iteration: done.0.len() + 1,
-            energy: chart.quality().symmetric_dirichlet,
-        });
+        progress(Progress { stage: Stage::Chart, iteration: done.0.len() + 1, energy: 0.0 });
         done.0.push(chart);
         done.1.push(faces);
     }
