@@ -12,7 +12,7 @@ use anderson::Anderson;
 
 /// Energies per area below this are rounding.
 const ZERO_ENERGY: f64 = 1e-28;
-/// How far projections go, over the way to what they project onto: below 2 they converge, and in a half of the iterations that 1 takes.
+/// How far projections go, over the way to what they project onto: below 2 they converge (over-relaxation), in fewer iterations than with 1.
 const RELAXATION: f64 = 1.6;
 
 /// As-rigid-as-possible: the energy `sum A |J - R|^2`, from Tutte's layout. It may fold triangles over.

@@ -43,8 +43,11 @@ impl Laplacian {
             below.extend(around.iter().map(|&v| ((vertices + hole) as u32, v)));
         }
         // Few factorisations and many solves: the plain column factor is read faster than blocks, until making it takes longer than they do.
-        let many = size > BLOCKS_FROM;
-        let kind = if many { SupernodalThreshold::FORCE_SUPERNODAL } else { SupernodalThreshold::FORCE_SIMPLICIAL };
+        let kind = if size > BLOCKS_FROM {
+            SupernodalThreshold::FORCE_SUPERNODAL
+        } else {
+            SupernodalThreshold::FORCE_SIMPLICIAL
+        };
         let spd = Spd::new(size, &below, kind)?;
         let edges = below.iter().map(|&(i, j)| (i, j, spd.entry(i, j) as u32)).collect();
         Ok(Self { spd, vertices, size, edges, surface_edges })

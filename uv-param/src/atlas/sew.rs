@@ -89,7 +89,7 @@ impl<'a, 'b> Sewing<'a, 'b> {
             let areas = self.charts.areas(&face_areas);
             let mut candidates: Vec<(f64, Arc)> = arcs(self.charts)
                 .into_iter()
-                .filter(|arc| self.may_change(arc) && !self.refused.contains(&key(&arc.half_edges)))
+                .filter(|arc| self.may_change(arc) && !self.refused.contains(&arc.key()))
                 .filter_map(|arc| self.score(&arc, &areas).map(|score| (score, arc)))
                 .collect();
             candidates.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.half_edges[0].cmp(&b.1.half_edges[0])));
@@ -109,7 +109,7 @@ impl<'a, 'b> Sewing<'a, 'b> {
                     touched.extend([arc.left, arc.right]);
                     closed += 1;
                 } else {
-                    self.refused.insert(key(&arc.half_edges));
+                    self.refused.insert(arc.key());
                 }
             }
             if closed == 0 && tried == 0 {
@@ -134,7 +134,7 @@ impl<'a, 'b> Sewing<'a, 'b> {
             let mut candidates: Vec<(f64, Arc)> = arcs(self.charts)
                 .into_iter()
                 .filter(|arc| self.may_change(arc) && !self.charts.wanted[arc.half_edges[0] as usize])
-                .filter(|arc| !self.refused_parts.contains(&key(&arc.half_edges)))
+                .filter(|arc| !self.refused_parts.contains(&arc.key()))
                 .map(|arc| (self.price(&arc.half_edges), arc))
                 .filter(|(price, _)| *price > least)
                 .collect();
@@ -149,7 +149,7 @@ impl<'a, 'b> Sewing<'a, 'b> {
                     touched.extend([arc.left, arc.right]);
                     closed += 1;
                 } else {
-                    self.refused_parts.insert(key(&arc.half_edges));
+                    self.refused_parts.insert(arc.key());
                 }
             }
             if closed == 0 {
@@ -291,10 +291,6 @@ impl<'a, 'b> Sewing<'a, 'b> {
 /// Longer side of the smallest rectangle around a layout, metres.
 fn extent(uv: &[[f64; 2]]) -> f64 {
     min_area_rectangle(uv).map_or(f64::INFINITY, |rectangle| rectangle.width.max(rectangle.height))
-}
-
-fn key(half_edges: &[u32]) -> (u32, u32) {
-    (half_edges[0], half_edges[half_edges.len() - 1])
 }
 
 /// Two ascending lists as one.

@@ -151,9 +151,9 @@ pub fn update_atlas(
                 let is_new: Vec<bool> = faces.iter().map(|&f| old[f as usize].is_none()).collect();
                 // What came and little around it, so that all else stays to the bit; everything where that does not do, and much came.
                 let came = is_new.iter().filter(|is_new| **is_new).count();
-                let all =
-                    || (came as f64 >= REFITTED * faces.len() as f64).then(|| fit(&disk, start.clone(), bounds, None));
-                let uv = mended(&disk, start.clone(), &is_new, bounds).or_else(|| all().flatten());
+                let much = came as f64 >= REFITTED * faces.len() as f64;
+                let uv = mended(&disk, start.clone(), &is_new, bounds)
+                    .or_else(|| if much { fit(&disk, start, bounds, None) } else { None });
                 uv.map(|uv| charts.place(&faces, &disk, &uv)).is_some()
             });
         let left = if refitted { faces.clone() } else { largest_piece(&charts, &old, &faces) };
