@@ -9,11 +9,11 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Parser;
-use paintcopter_examples::design::Design;
-use paintcopter_examples::mission::{Decision, Mission, MissionSettings, inspect, report, save};
-use paintcopter_examples::region::Scene;
-use paintcopter_examples::report::Check;
-use paintcopter_examples::world::rock_wall;
+use paintcopter::design::Design;
+use paintcopter::mission::{Decision, Mission, MissionSettings, inspect, report, save};
+use paintcopter::region::Scene;
+use paintcopter::report::Check;
+use paintcopter::world::rock_wall;
 
 /// Most missions of one run: more is a slip of the keyboard.
 const MOST_SEEDS: u64 = 1000;

@@ -7,10 +7,10 @@ use paint_planner::{
     Clarabel, InteriorPoint, OptimalPlanner, Planner, PrimalDualActiveSet, QpSolver, SmoothingPlanner, Trajectory,
     stroke_program,
 };
+use paintcopter::adapters::{MeshSurface, Robot};
+use paintcopter::mission::MissionSettings;
 use paintcopter_benches::planner::helix;
 use paintcopter_benches::{criterion, rock};
-use paintcopter_examples::adapters::{MeshSurface, Robot};
-use paintcopter_examples::mission::MissionSettings;
 use ptu_kinematics::Ptu;
 
 /// Targets of the stroke.

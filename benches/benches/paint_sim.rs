@@ -12,11 +12,11 @@ use paint_sim::{
     Camera, Film, FlightSettings, Hit, Lights, Reference, ReferenceState, Shading, Shot, SprayModel, ciede2000, fly,
     render,
 };
+use paintcopter::adapters::{MeshSurface, PlanReference, Robot, ServoPanTilt};
+use paintcopter::mission::MissionSettings;
+use paintcopter::surface::PaintSurface;
 use paintcopter_benches::films::Films;
 use paintcopter_benches::{Rng, criterion, rock};
-use paintcopter_examples::adapters::{MeshSurface, PlanReference, Robot, ServoPanTilt};
-use paintcopter_examples::mission::MissionSettings;
-use paintcopter_examples::surface::PaintSurface;
 use ptu_kinematics::Ptu;
 
 type AnyError = Box<dyn Error>;

@@ -3,9 +3,9 @@
 use std::error::Error;
 
 use criterion::Throughput;
+use paintcopter::world::rock_wall;
 use paintcopter_benches::rock::TEXEL;
 use paintcopter_benches::{Rng, criterion};
-use paintcopter_examples::world::rock_wall;
 use uv_param::{Method, NozzleSettings, Settings, TexelMap, largest_disk, nozzle_command, unwrap};
 
 /// Points looked up.

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use paint_net::{ColourProblem, ColourSeparation, SprayKernel};
-use paintcopter_examples::paint_image::{Glazes, compare_colours, pictures_in, read_picture};
+use paintcopter::paint_image::{Glazes, compare_colours, pictures_in, read_picture};
 use serde_json::json;
 
 use crate::cpu::median_seconds;

@@ -12,9 +12,9 @@ use paint_sim::flight::{
     Interlock, Localisation, Valve, Wind, fly_with,
 };
 use paint_sim::{FlightLog, FlightSettings, Reference, ReferenceState};
-use paintcopter_examples::adapters::{MeshSurface, MpcController, PlanReference, Robot, ServoPanTilt};
-use paintcopter_examples::mission::MissionSettings;
-use paintcopter_examples::surface::PaintSurface;
+use paintcopter::adapters::{MeshSurface, MpcController, PlanReference, Robot, ServoPanTilt};
+use paintcopter::mission::MissionSettings;
+use paintcopter::surface::PaintSurface;
 use ptu_kinematics::Ptu;
 use serde_json::json;
 

@@ -8,7 +8,7 @@ use paint_net::{
     ClosedLoopPainter, Deconvolution, Feedback, FreeSprays, Image, Limits, MatchingPursuit, Observer, PaintProblem,
     Painter, Painting, ScanOrder, SlewLimited, Spray, SprayKernel, metrics, slew_violations,
 };
-use paintcopter_examples::paint_image::{pictures_in, read_ink};
+use paintcopter::paint_image::{pictures_in, read_ink};
 use serde_json::{Value, json};
 
 use crate::Rng;

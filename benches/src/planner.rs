@@ -16,8 +16,8 @@ use paint_planner::{
     stroke_program, transit_lower_bound,
 };
 use paint_sim::TriangleSurface;
-use paintcopter_examples::adapters::{MeshSurface, Robot};
-use paintcopter_examples::mission::MissionSettings;
+use paintcopter::adapters::{MeshSurface, Robot};
+use paintcopter::mission::MissionSettings;
 use ptu_kinematics::Ptu;
 use serde_json::json;
 

@@ -1,8 +1,8 @@
 //! The built-in rock wall, unwrapped, and a stroke on it.
 
 use paint_planner::Target;
-use paintcopter_examples::surface::{PaintSurface, SurfaceError};
-use paintcopter_examples::world::rock_wall;
+use paintcopter::surface::{PaintSurface, SurfaceError};
+use paintcopter::world::rock_wall;
 
 /// Side of a texel, metres (Paper IV, section 4).
 pub const TEXEL: f64 = 0.0125;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
-use paintcopter_examples::mesh_io::read_mesh;
+use paintcopter::mesh_io::read_mesh;
 use serde_json::json;
 use uv_param::{AtlasQuality, AtlasSettings, PackSettings, unwrap_atlas};
 

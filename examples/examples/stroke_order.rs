@@ -1,7 +1,7 @@
 //! Draws the route over the strokes of a picture, in the painter's order and in that of `order_strokes`, for the planner's chapter:
 //!
 //! ```text
-//! cargo run --release -p paintcopter-examples --example stroke_order -- docs/src/images/stroke-order.png
+//! cargo run --release -p paintcopter --example stroke_order -- docs/src/images/stroke-order.png
 //! ```
 
 use std::error::Error;
@@ -11,7 +11,7 @@ use nalgebra::{Point3, Vector3};
 use paint_net::procedural::Texture;
 use paint_net::{Deconvolution, Limits, PaintProblem, Painter, SprayKernel, Stroke, StrokeSettings, boustrophedon};
 use paint_planner::{Settings, StrokeEnds, Target, order_strokes};
-use paintcopter_examples::pictures::{PathPanel, save_paths};
+use paintcopter::pictures::{PathPanel, save_paths};
 
 /// Metres, as those of a mission.
 const TEXEL: f64 = 0.0125;

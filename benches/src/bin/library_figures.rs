@@ -10,12 +10,12 @@ use clap::{Parser, Subcommand};
 use nalgebra::{Matrix2, Vector2, Vector3};
 use paint_sim::ciede2000;
 use paint_sim::colour::BANDS;
+use paintcopter::mesh_io::read_mesh;
+use paintcopter::world::rock_wall;
 use paintcopter_benches::cpu::{CpuTimer, median_seconds};
 use paintcopter_benches::{
     Rng, colours, control, films, fuzzed_meshes, motion, painting, planner, pose_graphs, room, split_meshes, vocabulary,
 };
-use paintcopter_examples::mesh_io::read_mesh;
-use paintcopter_examples::world::rock_wall;
 use serde_json::json;
 use uv_param::{Chart, CutSettings, Method, Settings, largest_disk, unwrap, unwrap_with_cuts};
 use vio_ekf::{Alignment, Association, Trajectory, ate, tum};

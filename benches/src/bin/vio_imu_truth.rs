@@ -7,8 +7,8 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use nalgebra::{DMatrix, DVector, Vector3};
+use paintcopter::exit::exit_code;
 use paintcopter_benches::sequences::{REAL_IMU, motion, real_samples};
-use paintcopter_examples::exit::exit_code;
 use serde_json::json;
 use vio_ekf::{Imu, Motion, Spline, so3};
 

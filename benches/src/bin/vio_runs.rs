@@ -8,10 +8,10 @@ use std::process::ExitCode;
 use clap::Parser;
 use cpu_time::ThreadTime;
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
+use paintcopter::exit::exit_code;
 use paintcopter_benches::Rng;
 use paintcopter_benches::frames::Frames;
 use paintcopter_benches::sequences::{REAL_IMU, SEQUENCES, cameras, motion, real_samples};
-use paintcopter_examples::exit::exit_code;
 use serde_json::json;
 use vio_ekf::sim::{ImuModel, Scenario, SimulatedCamera, Simulation};
 use vio_ekf::{

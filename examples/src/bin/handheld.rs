@@ -3,8 +3,8 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use paintcopter_examples::exit::exit_code;
-use paintcopter_examples::handheld::{Arguments, run};
+use paintcopter::exit::exit_code;
+use paintcopter::handheld::{Arguments, run};
 
 fn main() -> ExitCode {
     exit_code("handheld", run(&Arguments::parse()))

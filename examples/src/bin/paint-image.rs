@@ -3,8 +3,8 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use paintcopter_examples::exit::exit_code;
-use paintcopter_examples::paint_image::{Arguments, run};
+use paintcopter::exit::exit_code;
+use paintcopter::paint_image::{Arguments, run};
 
 fn main() -> ExitCode {
     exit_code("paint-image", run(Arguments::parse()))

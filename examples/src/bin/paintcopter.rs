@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use paintcopter_examples::exit::exit_code;
-use paintcopter_examples::mission::{Coats, preview, save, save_coats};
-use paintcopter_examples::mission_arguments::MissionArguments;
+use paintcopter::exit::exit_code;
+use paintcopter::mission::{Coats, preview, save, save_coats};
+use paintcopter::mission_arguments::MissionArguments;
 
 /// Paints a surface with a simulated flying robot: unwraps it, decides what to spray, plans and flies the strokes, and shows
 /// what the paint looks like. Without arguments it paints a built-in rock wall.

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use paintcopter_examples::exit::exit_code;
-use paintcopter_examples::mission::{PlannedMission, save_plan};
-use paintcopter_examples::mission_arguments::MissionArguments;
+use paintcopter::exit::exit_code;
+use paintcopter::mission::{PlannedMission, save_plan};
+use paintcopter::mission_arguments::MissionArguments;
 
 /// Plans a painting mission without flying it: the trajectory with nozzle and valve as a table and as a recording, a picture of
 /// the way, and the figures. The mission.toml that it leaves is what `paintcopter --mission` flies.

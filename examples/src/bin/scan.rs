@@ -7,10 +7,10 @@ use std::time::Duration;
 
 use clap::{Parser, ValueEnum};
 use nalgebra::Isometry3;
-use paintcopter_examples::exit::exit_code;
-use paintcopter_examples::mesh_io::{PlyMesh, write_ply};
-use paintcopter_examples::report::save_figures;
-use paintcopter_examples::scan::{
+use paintcopter::exit::exit_code;
+use paintcopter::mesh_io::{PlyMesh, write_ply};
+use paintcopter::report::save_figures;
+use paintcopter::scan::{
     CheckpointSettings, Device, FrameRange, Gyroscope, LiveSettings, OdometryError, PoseSource, Scan, ScanReport,
     ScanSettings, Sequence, in_options, mebibytes, open_sequence, parse_intrinsics, parse_noise, parse_odometry_error,
     read_body_from_camera, read_colour_camera, save_views, take_poses,

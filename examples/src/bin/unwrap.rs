@@ -3,8 +3,8 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use paintcopter_examples::exit::exit_code;
-use paintcopter_examples::unwrap::{Arguments, run};
+use paintcopter::exit::exit_code;
+use paintcopter::unwrap::{Arguments, run};
 
 fn main() -> ExitCode {
     exit_code("unwrap", run(&Arguments::parse()))

@@ -3,8 +3,8 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use paintcopter_examples::exit::exit_code;
-use paintcopter_examples::vio::{Arguments, execute};
+use paintcopter::exit::exit_code;
+use paintcopter::vio::{Arguments, execute};
 
 fn main() -> ExitCode {
     exit_code("vio", execute(&Arguments::parse()))

@@ -3,8 +3,8 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use paintcopter_examples::exit::exit_code;
-use paintcopter_examples::vr::{Arguments, run};
+use paintcopter::exit::exit_code;
+use paintcopter::vr::{Arguments, run};
 
 fn main() -> ExitCode {
     exit_code("vr", run(&Arguments::parse()))

@@ -2,13 +2,13 @@
 
 use std::f64::consts::PI;
 
-use paintcopter_examples::appearance::{Appearance, DENSITY, UNIT_THICKNESS};
-use paintcopter_examples::design::Design;
-use paintcopter_examples::mesh_io::TriangleMesh;
-use paintcopter_examples::mission::{Decision, Mission, MissionSettings, PainterChoice, save};
-use paintcopter_examples::mission_file::{MissionFile, MissionFileError};
-use paintcopter_examples::region::Scene;
-use paintcopter_examples::report::Report;
+use paintcopter::appearance::{Appearance, DENSITY, UNIT_THICKNESS};
+use paintcopter::design::Design;
+use paintcopter::mesh_io::TriangleMesh;
+use paintcopter::mission::{Decision, Mission, MissionSettings, PainterChoice, save};
+use paintcopter::mission_file::{MissionFile, MissionFileError};
+use paintcopter::region::Scene;
+use paintcopter::report::Report;
 
 use crate::scratch::Scratch;
 

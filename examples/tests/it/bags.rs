@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use paintcopter_examples::vio::{CameraFrame, Recording};
+use paintcopter::vio::{CameraFrame, Recording};
 use vio_ekf::{Distortion, Imu, Stamp};
 
 use crate::scratch::Scratch;

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use paint_planner::{Settings, Target, Tool, plan};
 use paint_sim::TriangleSurface;
-use paintcopter_examples::adapters::{MeshSurface, Robot};
+use paintcopter::adapters::{MeshSurface, Robot};
 use ptu_kinematics::{KinematicChain, Ptu, PtuSettings, SerialArm};
 
 const ARM: &str = r#"

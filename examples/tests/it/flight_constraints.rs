@@ -5,8 +5,8 @@ use std::process::Command;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use paint_planner::{Settings, Target, Tool, VehicleState, plan, reachable_targets};
 use paint_sim::TriangleSurface;
-use paintcopter_examples::adapters::{MeshSurface, Robot};
-use paintcopter_examples::mission_file::MissionFile;
+use paintcopter::adapters::{MeshSurface, Robot};
+use paintcopter::mission_file::MissionFile;
 use ptu_kinematics::{KinematicChain, PitchingPtu, Ptu, PtuSettings, Range};
 
 use crate::scratch::Scratch;

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use clap::Parser as _;
-use paintcopter_examples::mesh_io::{MeshError, TextureSource, TriangleMesh, read_mesh};
-use paintcopter_examples::picture_placement::PicturePlacement;
-use paintcopter_examples::unwrap::{Arguments, run};
+use paintcopter::mesh_io::{MeshError, TextureSource, TriangleMesh, read_mesh};
+use paintcopter::picture_placement::PicturePlacement;
+use paintcopter::unwrap::{Arguments, run};
 use serde_json::{Value, json};
 
 use crate::scratch::Scratch;
@@ -310,15 +310,15 @@ fn materials_of_an_obj_are_used_without_texture_option() {
 fn the_main_job_wants_what_the_file_shows() {
     let s = Scratch::new("gltf-wanted");
     s.write("square.glb", Document::square().glb());
-    let file = paintcopter_examples::mission_file::MissionFile {
+    let file = paintcopter::mission_file::MissionFile {
         mesh: Some(s.0.join("square.glb")),
         scale: Some(1.0),
         ..Default::default()
     };
     let mesh = file.read_surface().unwrap().1.canvas;
     let materials = mesh.materials.as_ref().unwrap();
-    let design = paintcopter_examples::design::Design::from_materials(materials).unwrap();
-    let surface = paintcopter_examples::surface::PaintSurface::new(&mesh, 0.02, &|_| ()).unwrap();
+    let design = paintcopter::design::Design::from_materials(materials).unwrap();
+    let surface = paintcopter::surface::PaintSurface::new(&mesh, 0.02, &|_| ()).unwrap();
     let wanted = design.on_surface(&surface, &mesh, &PicturePlacement::default(), None).unwrap();
     // 0.85 (1 - luma) of the two colours, red on the left.
     let ink = |[r, g, b]: [u8; 3]| {

@@ -6,8 +6,8 @@ use std::path::Path;
 use clap::Parser as _;
 use nalgebra::Isometry3;
 use paint_sim::gantry_robot::{HandMotion, HandSettings, PoseSensorSettings};
-use paintcopter_examples::handheld::cube::{cube, cube_edges, in_circle, upper_faces};
-use paintcopter_examples::handheld::{
+use paintcopter::handheld::cube::{cube, cube_edges, in_circle, upper_faces};
+use paintcopter::handheld::{
     Arguments, HandPoses, HandheldError, HandheldSettings, PaintJob, PaintObject, Processor, SessionLog,
     SessionSettings, evaluate, paint, passes, run,
 };
@@ -298,7 +298,7 @@ fn a_motion_that_moves_no_robot_is_refused_with_the_way_out() {
 #[test]
 fn holes_and_thin_faces_of_a_mesh_are_said() {
     let scratch = Scratch::new("handheld-remarks");
-    let mesh = paintcopter_examples::mesh_io::read_mesh(Path::new(&broken_mesh(&scratch))).unwrap();
+    let mesh = paintcopter::mesh_io::read_mesh(Path::new(&broken_mesh(&scratch))).unwrap();
     let object = PaintObject::new(&mesh, &[], 2e-3, &mut |_| 20e-6).unwrap();
     let said = |what: &str| object.remarks.iter().any(|remark| remark.contains(what));
     assert!(said("thinner than 1 : 100") && said("have no area") && said("one face only"), "{:?}", object.remarks);

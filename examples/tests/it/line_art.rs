@@ -1,10 +1,10 @@
 //! A drawing of lines is flown along its lines: the valve is open most of the time.
 
-use paintcopter_examples::design::{Design, Picture};
-use paintcopter_examples::mesh_io::TriangleMesh;
-use paintcopter_examples::mission::{Decision, Mission, MissionSettings, PainterChoice, save};
-use paintcopter_examples::region::Scene;
-use paintcopter_examples::report::Report;
+use paintcopter::design::{Design, Picture};
+use paintcopter::mesh_io::TriangleMesh;
+use paintcopter::mission::{Decision, Mission, MissionSettings, PainterChoice, save};
+use paintcopter::region::Scene;
+use paintcopter::report::Report;
 
 use crate::scratch::Scratch;
 

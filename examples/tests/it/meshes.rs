@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use paintcopter_examples::mesh_io::{MeshError, PlyMesh, TriangleMesh, read_mesh, write_ply};
-use paintcopter_examples::surface::PaintSurface;
+use paintcopter::mesh_io::{MeshError, PlyMesh, TriangleMesh, read_mesh, write_ply};
+use paintcopter::surface::PaintSurface;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 

@@ -4,11 +4,11 @@
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
-use paintcopter_examples::design::{Design, Picture};
-use paintcopter_examples::mesh_io::{MeshUv, TriangleMesh, read_mesh};
-use paintcopter_examples::mission::{Decision, Mission, MissionSettings, save};
-use paintcopter_examples::region::Scene;
-use paintcopter_examples::report::Report;
+use paintcopter::design::{Design, Picture};
+use paintcopter::mesh_io::{MeshUv, TriangleMesh, read_mesh};
+use paintcopter::mission::{Decision, Mission, MissionSettings, save};
+use paintcopter::region::Scene;
+use paintcopter::report::Report;
 
 use crate::scratch::Scratch;
 

@@ -3,14 +3,14 @@
 use std::process::Command;
 
 use paint_planner::TimingPolicy;
-use paintcopter_examples::mesh_placement::UpAxis;
-use paintcopter_examples::mission::{MissionSettings, PainterChoice};
-use paintcopter_examples::mission_file::MissionFile;
-use paintcopter_examples::mission_paint::MissionPaint;
-use paintcopter_examples::palette::PaintName;
-use paintcopter_examples::picture_placement::{PicturePlacement, PlacementMode};
-use paintcopter_examples::projection::Viewpoint;
-use paintcopter_examples::region::Region;
+use paintcopter::mesh_placement::UpAxis;
+use paintcopter::mission::{MissionSettings, PainterChoice};
+use paintcopter::mission_file::MissionFile;
+use paintcopter::mission_paint::MissionPaint;
+use paintcopter::palette::PaintName;
+use paintcopter::picture_placement::{PicturePlacement, PlacementMode};
+use paintcopter::projection::Viewpoint;
+use paintcopter::region::Region;
 
 use crate::scratch::Scratch;
 

@@ -9,8 +9,8 @@ use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use paintcopter_examples::mesh_io::read_mesh;
-use paintcopter_examples::vio::{Overrides, camera_frames, open_euroc, open_mcap, simulate};
+use paintcopter::mesh_io::read_mesh;
+use paintcopter::vio::{Overrides, camera_frames, open_euroc, open_mcap, simulate};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 use vio_ekf::Camera;
@@ -124,7 +124,7 @@ fn kinds(s: &Scratch) -> Vec<Kind> {
     let picture = |name: &'static str, image: image::DynamicImage| {
         let mut png = std::io::Cursor::new(Vec::new());
         image.write_to(&mut png, image::ImageFormat::Png).unwrap();
-        let read = |file: &Path| paintcopter_examples::vio::GreyImage::read(file).is_ok();
+        let read = |file: &Path| paintcopter::vio::GreyImage::read(file).is_ok();
         Kind { name, bytes: png.into_inner(), read: Box::new(read) }
     };
     let grey = image::GrayImage::from_fn(40, 30, |x, y| image::Luma([(x * y % 251) as u8]));
@@ -181,7 +181,7 @@ fn mutate(bytes: &mut Vec<u8>, random: &mut impl FnMut(usize) -> usize) {
 }
 
 /// `MUTATIONS` is how many (3000); a million with
-/// `MUTATIONS=1000000 cargo test --release -p paintcopter-examples --all-features --test it mutated_files -- --nocapture`.
+/// `MUTATIONS=1000000 cargo test --release -p paintcopter --all-features --test it mutated_files -- --nocapture`.
 #[test]
 fn mutated_files_are_read_or_refused() {
     let count: u64 = std::env::var("MUTATIONS").map_or(3000, |text| text.parse().unwrap());
@@ -245,6 +245,6 @@ fn what_a_reader_holds_is_counted() {
     std::fs::write(s.0.join("huge.png"), &bytes).unwrap();
     PEAK.set(HELD.get());
     let before = HELD.get();
-    assert!(paintcopter_examples::vio::GreyImage::read(&s.0.join("huge.png")).is_err());
+    assert!(paintcopter::vio::GreyImage::read(&s.0.join("huge.png")).is_err());
     assert!(PEAK.get() - before <= allowed(bytes.len()), "{} bytes", PEAK.get() - before);
 }

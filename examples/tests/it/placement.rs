@@ -1,11 +1,11 @@
 //! Pictures stand upright and keep their proportions, whatever the shape of the surface and the axes of its file.
 
-use paintcopter_examples::design::{Design, Picture};
-use paintcopter_examples::mesh_io::TriangleMesh;
-use paintcopter_examples::mesh_placement::{MeshPlacement, UpAxis, place_mesh};
-use paintcopter_examples::picture_placement::{PicturePlacement, PlacementMode};
-use paintcopter_examples::projection::Viewpoint;
-use paintcopter_examples::surface::PaintSurface;
+use paintcopter::design::{Design, Picture};
+use paintcopter::mesh_io::TriangleMesh;
+use paintcopter::mesh_placement::{MeshPlacement, UpAxis, place_mesh};
+use paintcopter::picture_placement::{PicturePlacement, PlacementMode};
+use paintcopter::projection::Viewpoint;
+use paintcopter::surface::PaintSurface;
 
 use crate::scratch::Scratch;
 

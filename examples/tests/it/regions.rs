@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 
 use nalgebra::{Point3, Vector3};
 use paint_sim::{Surface as _, TriangleSurface};
-use paintcopter_examples::mesh_io::{MeshUv, TriangleMesh};
-use paintcopter_examples::mesh_placement::UpAxis;
-use paintcopter_examples::mission::{Mission, MissionSettings, inspect, report};
-use paintcopter_examples::mission_file::{MissionFile, MissionFileError};
-use paintcopter_examples::region::{Region, RegionError, Scene};
+use paintcopter::mesh_io::{MeshUv, TriangleMesh};
+use paintcopter::mesh_placement::UpAxis;
+use paintcopter::mission::{Mission, MissionSettings, inspect, report};
+use paintcopter::mission_file::{MissionFile, MissionFileError};
+use paintcopter::region::{Region, RegionError, Scene};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 

@@ -1,10 +1,10 @@
 //! The scan before the paint, on a small piece of the built-in wall.
 
-use paintcopter_examples::scan_flight::{ScanFlight, ScanFlightError};
-use paintcopter_examples::world::{CENTRE, rock_wall};
+use paintcopter::scan_flight::{ScanFlight, ScanFlightError};
+use paintcopter::world::{CENTRE, rock_wall};
 
 /// 1.6 m by 0.8 m, as high above the ground as the whole wall.
-fn small_wall() -> paintcopter_examples::mesh_io::TriangleMesh {
+fn small_wall() -> paintcopter::mesh_io::TriangleMesh {
     let mut mesh = rock_wall(1);
     for [x, y, z] in &mut mesh.positions {
         (*x, *y, *z) = (0.35 * *x, 0.35 * *y, (CENTRE + 0.35 * (f64::from(*z) - CENTRE)) as f32);

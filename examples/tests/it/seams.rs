@@ -2,10 +2,10 @@
 
 use std::f64::consts::{PI, TAU};
 
-use paintcopter_examples::design::Design;
-use paintcopter_examples::mesh_io::TriangleMesh;
-use paintcopter_examples::mission::{Decision, MissionSettings, preview};
-use paintcopter_examples::region::Scene;
+use paintcopter::design::Design;
+use paintcopter::mesh_io::TriangleMesh;
+use paintcopter::mission::{Decision, MissionSettings, preview};
+use paintcopter::region::Scene;
 
 use crate::scratch::Scratch;
 

@@ -6,7 +6,7 @@ use std::process::Command;
 
 use image::{ImageBuffer, Luma, Rgb};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use paintcopter_examples::scan::{Scan, ScanSettings, open_sequence};
+use paintcopter::scan::{Scan, ScanSettings, open_sequence};
 
 use crate::scratch::Scratch;
 

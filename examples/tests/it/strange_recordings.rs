@@ -5,7 +5,7 @@ use std::process::Command;
 
 use image::{ImageBuffer, Luma, Rgb};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use paintcopter_examples::scan::FrameRange;
+use paintcopter::scan::FrameRange;
 
 use crate::scratch::Scratch;
 

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
-use paintcopter_examples::mesh_io::read_mesh;
-use paintcopter_examples::surface::PaintSurface;
-use paintcopter_examples::unwrap::{Arguments, UnwrapError, run};
+use paintcopter::mesh_io::read_mesh;
+use paintcopter::surface::PaintSurface;
+use paintcopter::unwrap::{Arguments, UnwrapError, run};
 
 use super::scratch::Scratch;
 

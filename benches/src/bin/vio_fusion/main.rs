@@ -11,8 +11,8 @@ use arguments::Arguments;
 use clap::Parser;
 use estimator::{Estimator, Way};
 use nalgebra::{Isometry3, Matrix3, Vector3};
+use paintcopter::exit::exit_code;
 use paintcopter_benches::flight::{Flight, MapErrors, sway};
-use paintcopter_examples::exit::exit_code;
 use vio_ekf::{Odometry, nalgebra, so3};
 
 type AnyError = Box<dyn Error>;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use paintcopter_examples::vio::{Flight, SimulationSettings};
+use paintcopter::vio::{Flight, SimulationSettings};
 use vio_ekf::Camera;
 use vio_ekf::sim::{RoomSettings, Scenario, SimulatedCamera};
 

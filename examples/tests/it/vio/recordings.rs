@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use paintcopter_examples::vio::{
+use paintcopter::vio::{
     Images, Overrides, Recording, RunSettings, SimulationSettings, camera_frames, evaluate_run, open_euroc,
     open_euroc_stereo, open_mcap, open_mcap_stereo, run, simulate,
 };
@@ -175,8 +175,7 @@ fn a_second_camera_is_used_where_it_has_images() {
     let pair = follow(&recording, 1);
     assert_eq!((pair.frames, pair.pairs), (120, 120));
     assert_eq!(follow(&recording, 2).trajectories().unwrap(), pair.trajectories().unwrap(), "threads");
-    let error =
-        |run: &paintcopter_examples::vio::Run| evaluate_run(run, recording.truth.as_ref().unwrap()).unwrap().unwrap();
+    let error = |run: &paintcopter::vio::Run| evaluate_run(run, recording.truth.as_ref().unwrap()).unwrap().unwrap();
     assert!(error(&pair).ate_yaw < 0.03, "{}", error(&pair).ate_yaw);
     // With one camera the trajectory is another one.
     let alone = follow(&open_euroc(&s.0, &none).unwrap(), 1);

@@ -5,7 +5,7 @@ use std::io::Read as _;
 use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
-use paintcopter_examples::vio::{Images, Overrides, RunSettings, evaluate_run, open_euroc, run, simulate};
+use paintcopter::vio::{Images, Overrides, RunSettings, evaluate_run, open_euroc, run, simulate};
 
 use super::fixtures::{columns, copy, edit, flight, images, run_folder, vio};
 use crate::recorded::recorded;
