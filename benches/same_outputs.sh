@@ -5,12 +5,13 @@
 #   bash benches/same_outputs.sh run BIN_DIR OUT [JOB]  only the runs, with binaries that are already built
 #   python3 benches/same_outputs.py OUT_BASE OUT_HEAD   only the comparison
 #
-# Jobs: mission, scanned (a mission on its own scan), vio, paint-image and scan; scan reads the recording named by
-# PAINTCOPTER_DATA (rgbd/7scenes_redkitchen_sparse20) and is left out, with a word, where there is none.
+# Jobs: mission, scanned (a mission on its own scan), plan, unwrap, vio, paint-image, handheld, vr and scan; unwrap and scan read a
+# mesh and a recording named by PAINTCOPTER_DATA (meshes/common3d/spot.obj, rgbd/7scenes_redkitchen_sparse20) and are left out, with
+# a word, where there is none.
 set -euo pipefail
 
 run() {
-    local bin out="$2" jobs="${3:-mission scanned vio paint-image scan}"
+    local bin out="$2" jobs="${3:-mission scanned plan unwrap vio paint-image handheld vr scan}"
     bin="$(cd "$1" && pwd)"
     mkdir -p "$out"
     out="$(cd "$out" && pwd)"
@@ -22,6 +23,21 @@ run() {
         case "$job" in
         mission) "$bin/paintcopter" --seed 3 --out paint >log 2>&1 ;;
         scanned) "$bin/paintcopter" --scan --seed 2 --out paint >log 2>&1 ;;
+        plan) "$bin/plan" --seed 4 --painter feedback --out plan >log 2>&1 ;;
+        unwrap)
+            local mesh="${PAINTCOPTER_DATA:-}/meshes/common3d/spot.obj"
+            if [ ! -f "$mesh" ]; then
+                echo "unwrap: not compared: PAINTCOPTER_DATA names no folder with meshes/common3d/spot.obj"
+                continue
+            fi
+            cp "$mesh" mesh.obj
+            "$bin/unwrap" --mesh mesh.obj --out charts >log 2>&1
+            ;;
+        handheld) "$bin/handheld" --seed 2 --out handheld >log 2>&1 ;;
+        vr)
+            "$bin/vr" --experiment area-fill --seed 2 --out area >log 2>&1
+            "$bin/vr" --replay "$root/examples/sessions/headset.mcap" --out replay >>log 2>&1
+            ;;
         vio)
             "$bin/vio" sim --flight wall --seconds 12 --stereo --mcap --seed 5 --out recording >log 2>&1
             "$bin/vio" --euroc recording --out mono >>log 2>&1
@@ -48,6 +64,8 @@ run() {
             fi
             ln -s "$sequence" sequence
             "$bin/scan" --sequence sequence --voxel 0.02 --device cpu --out plain >log 2>&1
+            "$bin/scan" --sequence sequence --voxel 0.02 --poses tracked --loops --device cpu --out tracked >>log 2>&1
+            "$bin/scan" --sequence sequence --voxel 0.02 --relocalise plain/map.tsdf --device cpu --out relocalised >>log 2>&1
             "$bin/scan" --sequence sequence --voxel 0.02 --active-mib 8 --host-mib 64 --device cpu --out capped >>log 2>&1
             rm sequence
             ;;
@@ -70,9 +88,9 @@ for side in base head; do
     revision="$1"
     [ $side = base ] || revision="${2:-HEAD}"
     git worktree add --quiet --detach "$work/$side" "$revision"
-    (cd "$work/$side" && CARGO_TARGET_DIR="$work/target" cargo build --quiet --release)
+    (cd "$work/$side" && CARGO_TARGET_DIR="$work/target" cargo build --quiet --release --all-features)
     mkdir -p "$work/bin-$side"
-    cp "$work"/target/release/{paintcopter,scan,vio,paint-image} "$work/bin-$side/"
+    cp "$work"/target/release/{paintcopter,plan,scan,unwrap,vio,paint-image,handheld,vr} "$work/bin-$side/"
     (run "$work/bin-$side" "$work/out-$side")
 done
 python3 "$root/benches/same_outputs.py" "$work/out-base" "$work/out-head"
