@@ -6,7 +6,9 @@ pub mod appearance;
 pub mod design;
 pub mod exit;
 pub mod flight_constraints;
+#[cfg(feature = "handheld")]
 pub mod handheld;
+#[cfg(feature = "recordings")]
 mod mcap_messages;
 pub mod mesh_io;
 pub mod mesh_placement;
@@ -14,6 +16,7 @@ pub mod mission;
 pub mod mission_arguments;
 pub mod mission_file;
 pub mod mission_paint;
+#[cfg(feature = "paint-image")]
 pub mod paint_image;
 pub mod palette;
 pub mod picture_file;
@@ -24,15 +27,20 @@ pub mod projection;
 pub mod recording;
 pub mod region;
 pub mod report;
+#[cfg(feature = "scan")]
 pub mod scan;
 pub mod scan_flight;
 mod srgb;
 pub mod surface;
 pub mod targets;
 pub mod textured_mesh;
+#[cfg(feature = "unwrap")]
 pub mod unwrap;
+#[cfg(feature = "svg")]
 pub mod vector_drawing;
+#[cfg(feature = "vio")]
 pub mod vio;
+#[cfg(feature = "vr")]
 pub mod vr;
 pub mod world;
 

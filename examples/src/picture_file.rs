@@ -5,6 +5,7 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageDecoder as _, ImageError, ImageReader};
 
+#[cfg(feature = "svg")]
 use crate::vector_drawing::{DrawingError, draw_svg};
 
 /// Why a picture cannot be read.
@@ -17,15 +18,23 @@ pub enum PictureFileError {
     #[error(transparent)]
     Image(#[from] ImageError),
     /// It is called `.svg` and cannot be drawn.
+    #[cfg(feature = "svg")]
     #[error(transparent)]
     Drawing(#[from] DrawingError),
+    /// It is called `.svg`, and this program cannot draw.
+    #[cfg(not(feature = "svg"))]
+    #[error("built without the feature `svg`: build with `--features svg`, or turn the drawing into a PNG")]
+    WithoutDrawings,
 }
 
 /// Reads a PNG or JPEG, whatever its file is called, and turns it as its EXIF orientation says: cameras and telephones store what
 /// their sensor saw and only note how they were held. An SVG, told by its name, is drawn.
 pub fn open_upright(path: &Path) -> Result<DynamicImage, PictureFileError> {
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg")) {
+        #[cfg(feature = "svg")]
         return Ok(draw_svg(&std::fs::read_to_string(path)?)?);
+        #[cfg(not(feature = "svg"))]
+        return Err(PictureFileError::WithoutDrawings);
     }
     upright(ImageReader::open(path)?)
 }

@@ -158,11 +158,13 @@ impl Recorder {
     }
 
     /// A channel of JSON messages of our own, with the schema that describes them.
+    #[cfg(feature = "vr")]
     pub(crate) fn json_channel(&mut self, topic: &str, name: &str, schema: &str) -> Result<u16, RecordingError> {
         let schema = self.writer.add_schema(name, "jsonschema", schema.as_bytes()).map_err(failed)?;
         self.writer.add_channel(schema, topic, "json", &BTreeMap::new()).map_err(failed)
     }
 
+    #[cfg(feature = "vr")]
     pub(crate) fn write_json(
         &mut self,
         channel_id: u16,

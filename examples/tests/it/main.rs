@@ -3,22 +3,30 @@
 
 mod area_fill;
 mod bad_input;
+#[cfg(feature = "vio")]
 mod bags;
 mod five_joint_arm;
 mod flight_constraints;
 mod gltf_meshes;
+#[cfg(feature = "scan")]
 mod gyroscope;
+#[cfg(feature = "handheld")]
 mod handheld;
 mod independence;
 mod line_art;
+#[cfg(feature = "scan")]
 mod live;
+#[cfg(feature = "scan")]
 mod mcap_recordings;
 mod meshes;
 mod mission;
 mod mission_file;
 mod module_graph;
+#[cfg(feature = "vio")]
 mod mutations;
+#[cfg(feature = "scan")]
 mod odometry_prior;
+#[cfg(feature = "paint-image")]
 mod paint_image;
 mod placement;
 mod recorded;
@@ -26,9 +34,15 @@ mod regions;
 mod scan_flight;
 mod scratch;
 mod seams;
+#[cfg(feature = "scan")]
 mod sequences;
+#[cfg(feature = "scan")]
 mod stored_maps;
+#[cfg(feature = "scan")]
 mod strange_recordings;
+#[cfg(feature = "unwrap")]
 mod unwrap;
+#[cfg(feature = "vio")]
 mod vio;
+#[cfg(feature = "vr")]
 mod vr;
