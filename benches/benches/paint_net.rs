@@ -1,9 +1,8 @@
 //! The painters on procedural pictures of 128 x 128 pixels, with the thesis' nozzle and ink.
 
+use paint_net::painters::{Layered, MatchingPursuit};
 use paint_net::procedural::Texture;
-use paint_net::{
-    Deconvolution, Error, Feedback, Layered, MatchingPursuit, PaintProblem, Painter, SprayKernel, metrics,
-};
+use paint_net::{Deconvolution, Error, Feedback, PaintProblem, Painter, SprayKernel, metrics};
 use paintcopter_benches::criterion;
 
 /// Side of the pictures, pixels.

@@ -7,11 +7,12 @@ use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, Throughput};
 use nalgebra::{Point3, Vector3};
 use paint_planner::{OptimalPlanner, Planner};
+use paint_sim::colour::ciede2000;
 use paint_sim::colour::{BANDS, Spectrum, spectrum_srgb8};
-use paint_sim::{
-    Camera, Film, FlightSettings, Hit, Lights, Reference, ReferenceState, Shading, Shot, SprayModel, ciede2000, fly,
-    render,
-};
+use paint_sim::flight::{Reference, ReferenceState};
+use paint_sim::render::{Lights, Shading};
+use paint_sim::surface::Hit;
+use paint_sim::{Camera, Film, FlightSettings, Shot, SprayModel, fly, render};
 use paintcopter::adapters::{MeshSurface, PlanReference, Robot, ServoPanTilt};
 use paintcopter::mission::MissionSettings;
 use paintcopter::surface::PaintSurface;

@@ -6,7 +6,9 @@ use criterion::Throughput;
 use paintcopter::world::rock_wall;
 use paintcopter_benches::rock::TEXEL;
 use paintcopter_benches::{Rng, criterion};
-use uv_param::{Method, NozzleSettings, Settings, TexelMap, largest_disk, nozzle_command, unwrap};
+use uv_param::nozzle::{NozzleSettings, nozzle_command};
+use uv_param::texture::TexelMap;
+use uv_param::{Method, Settings, largest_disk, unwrap};
 
 /// Points looked up.
 const POINTS: usize = 100_000;

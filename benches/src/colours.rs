@@ -3,7 +3,8 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use paint_net::{ColourProblem, ColourSeparation, SprayKernel};
+use paint_net::SprayKernel;
+use paint_net::colour::{ColourProblem, ColourSeparation};
 use paintcopter::paint_image::{Glazes, compare_colours, pictures_in, read_picture};
 use serde_json::json;
 

@@ -7,11 +7,12 @@ use std::path::Path;
 use nalgebra::{Point3, Vector3};
 use paint_planner::control::{AttitudeSample, MpcSettings, identify_attitude};
 use paint_planner::{OptimalPlanner, Plan, Planner};
+use paint_sim::FlightSettings;
 use paint_sim::flight::{
     CascadedController, Command, Controller, ControllerSettings, Estimate, Faults, FlightSample, Gust, HoseModel,
     Interlock, Localisation, Valve, Wind, fly_with,
 };
-use paint_sim::{FlightLog, FlightSettings, Reference, ReferenceState};
+use paint_sim::flight::{FlightLog, Reference, ReferenceState};
 use paintcopter::adapters::{MeshSurface, MpcController, PlanReference, Robot, ServoPanTilt};
 use paintcopter::mission::MissionSettings;
 use paintcopter::surface::PaintSurface;

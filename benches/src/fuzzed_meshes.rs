@@ -5,7 +5,8 @@ use std::panic::catch_unwind;
 
 use cpu_time::ThreadTime;
 use serde_json::json;
-use uv_param::{Atlas, AtlasQuality, AtlasSettings, PackSettings, unwrap_atlas};
+use uv_param::atlas::{AtlasQuality, PackSettings};
+use uv_param::{Atlas, AtlasSettings, unwrap_atlas};
 
 use crate::Rng;
 

@@ -3,10 +3,11 @@
 use std::error::Error;
 use std::path::PathBuf;
 
+use paint_net::painters::{ClosedLoopPainter, FreeSprays, MatchingPursuit, SlewLimited, slew_violations};
+use paint_net::path::ScanOrder;
 use paint_net::procedural::Texture;
 use paint_net::{
-    ClosedLoopPainter, Deconvolution, Feedback, FreeSprays, Image, Limits, MatchingPursuit, Observer, PaintProblem,
-    Painter, Painting, ScanOrder, SlewLimited, Spray, SprayKernel, metrics, slew_violations,
+    Deconvolution, Feedback, Image, Limits, Observer, PaintProblem, Painter, Painting, Spray, SprayKernel, metrics,
 };
 use paintcopter::paint_image::{pictures_in, read_ink};
 use serde_json::{Value, json};

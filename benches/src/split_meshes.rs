@@ -5,7 +5,8 @@ use std::path::Path;
 use nalgebra::Vector3;
 use paintcopter::mesh_io::read_mesh;
 use serde_json::json;
-use uv_param::{AtlasQuality, AtlasSettings, PackSettings, unwrap_atlas};
+use uv_param::atlas::{AtlasQuality, PackSettings};
+use uv_param::{AtlasSettings, unwrap_atlas};
 
 use crate::cpu::seconds;
 

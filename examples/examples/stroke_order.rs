@@ -8,8 +8,9 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use nalgebra::{Point3, Vector3};
+use paint_net::path::{Stroke, StrokeSettings, boustrophedon};
 use paint_net::procedural::Texture;
-use paint_net::{Deconvolution, Limits, PaintProblem, Painter, SprayKernel, Stroke, StrokeSettings, boustrophedon};
+use paint_net::{Deconvolution, Limits, PaintProblem, Painter, SprayKernel};
 use paint_planner::{Settings, StrokeEnds, Target, order_strokes};
 use paintcopter::pictures::{PathPanel, save_paths};
 

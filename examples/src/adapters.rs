@@ -6,8 +6,9 @@ use paint_planner::control::{
     AttitudeResponse, ControlReference, ControlState, MpcSettings, TrackingMpc, VehicleModel,
 };
 use paint_planner::{NozzleState, Plan, Tether, Tool, VehicleState};
+use paint_sim::TriangleSurface;
 use paint_sim::flight::{Airframe, Command, Controller, Estimate, GRAVITY};
-use paint_sim::{PanTilt, Reference, ReferenceState, TriangleSurface};
+use paint_sim::flight::{PanTilt, Reference, ReferenceState};
 use ptu_kinematics::{Hover, Joints, KinematicChain, Ptu, Servo};
 
 /// The simulator's mesh as the planner's surface.

@@ -1,6 +1,7 @@
 //! From paint thickness to ink and colour: a paint on sandstone, by Kubelka-Munk in 36 bands.
 
-use paint_net::{MonotoneCurve, Saturation};
+use paint_net::Saturation;
+use paint_net::model::MonotoneCurve;
 use paint_sim::colour::{BANDS, Spectrum, spectrum_lab, wavelength, xyz};
 use paint_sim::{Paint, Substrate};
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use paint_net::Image;
 use paint_net::procedural::{fbm, value_noise};
-use uv_param::{Texture, luminance};
+use uv_param::texture::{Texture, luminance};
 
 use crate::mesh_io::{MaterialError, MeshMaterials, TriangleMesh};
 use crate::picture_file::open_upright;

@@ -1,4 +1,4 @@
-//! The transfer curve of sRGB (IEC 61966-2-1); its inverse is `uv_param::linear_from_srgb`.
+//! The transfer curve of sRGB (IEC 61966-2-1); its inverse is `uv_param::texture::linear_from_srgb`.
 
 /// sRGB value of a linear one, unquantised.
 pub(crate) fn srgb(linear: f64) -> f64 {

@@ -1,12 +1,15 @@
 //! A mesh made ready for painting: unwrapped, cut into texels, searchable for rays.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
-use paint_net::{GhostPixels, Image};
+use paint_net::Image;
+use paint_net::problem::GhostPixels;
 use paint_sim::{Texel, TriangleSurface};
-use uv_param::{
-    AtlasSettings, Chart, ChartSettings, CutSettings, Disk, Error, Gutter, NormalMode, NozzleSettings, PackSettings,
-    RepairReport, Settings, TexelMap, Turns,
-};
+use uv_param::atlas::{ChartSettings, PackSettings, Turns};
+use uv_param::cut::CutSettings;
+use uv_param::disk::RepairReport;
+use uv_param::nozzle::{NormalMode, NozzleSettings};
+use uv_param::texture::{Gutter, TexelMap};
+use uv_param::{AtlasSettings, Chart, Disk, Error, Settings};
 
 use crate::mesh_io::TriangleMesh;
 use crate::region::Scene;
@@ -65,8 +68,8 @@ impl PaintSurface {
         progress: &dyn Fn(f64),
     ) -> Result<Self, SurfaceError> {
         let positions: Vec<[f64; 3]> = mesh.positions.iter().map(|p| p.map(f64::from)).collect();
-        let repair = uv_param::Repair { weld: true, split_vertices: true };
-        let (disk, repair_report) = match uv_param::largest_disk_with(&positions, &mesh.faces, repair) {
+        let repair = uv_param::disk::Repair { weld: true, split_vertices: true };
+        let (disk, repair_report) = match uv_param::disk::largest_disk_with(&positions, &mesh.faces, repair) {
             // A region is painted in all of its pieces.
             Ok((_, report)) if report.components > 1 && !obstacles.faces.is_empty() => {
                 return Self::all_around(&positions, mesh, obstacles, texel);
@@ -87,7 +90,7 @@ impl PaintSurface {
         let cuts = CutSettings { max_stretch: MAX_STRETCH, ..CutSettings::default() };
         let chart = uv_param::unwrap_with_cuts(&disk, &settings, &cuts, |p| {
             let share = p.iteration as f64 / settings.iterations as f64;
-            progress(if p.stage == uv_param::Stage::Cut { 0.0 } else { share });
+            progress(if p.stage == uv_param::parametrizer::Stage::Cut { 0.0 } else { share });
         })?;
         let texels = TexelMap::new(&chart, texel)?;
         let beyond_seams = beyond_seams(&chart, &texels)?;
@@ -185,7 +188,7 @@ impl PaintSurface {
         let uv = [(x + 0.5) * texel, (self.height() as f64 - y - 0.5) * texel];
         let nozzle =
             NozzleSettings { normal: NormalMode::Footprint { radius: FOOTPRINT }, ..NozzleSettings::default() };
-        let command = uv_param::nozzle_command(&self.chart, uv, &nozzle).ok()?;
+        let command = uv_param::nozzle::nozzle_command(&self.chart, uv, &nozzle).ok()?;
         Some((command.point, -command.direction))
     }
 

@@ -1,6 +1,7 @@
 //! From strokes in the picture plane to targets on the surface (thesis Eq. (8.1), the half that does not depend on the robot).
 
-use paint_net::{Spray, SprayKernel, Stroke};
+use paint_net::path::Stroke;
+use paint_net::{Spray, SprayKernel};
 use paint_planner::{Settings, StrokeEnds, Target, order_strokes};
 
 use crate::appearance::UNIT_THICKNESS;

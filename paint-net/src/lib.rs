@@ -30,59 +30,51 @@
 //! | source | item |
 //! |---|---|
 //! | Paper IV, 3.1: reference, canvas, sprays | [`PaintProblem`], [`Painting`], [`Spray`] |
-//! | Paper IV, 3.2: layers by intensity | [`Layered`] |
+//! | Paper IV, 3.2: layers by intensity | [`painters::Layered`] |
 //! | Paper IV, 3.3: spray footprint, ink `tanh c` | [`SprayKernel`], [`Saturation`] |
 //! | Paper IV, 3.3: the "ideal", a Gaussian of the reference | [`ideal`] |
 //! | Paper IV, 3.3: the network with READ, PAINT and a learned stop | [`thesis::ThesisPainter`], [`thesis::Network`] |
 //! | non-negative deconvolution by projected L-BFGS | [`Deconvolution`] |
-//! | the same with strokes along lines (thinning: Zhang and Suen 1984) | [`Centrelines`] |
-//! | matching pursuit (Mallat and Zhang 1993) | [`MatchingPursuit`] |
-//! | few sprays at free positions, of free spreads | [`FreeSprays`] |
-//! | a feedback network (as Zamir et al. 2017), convolutional; ours: Paper IV paints one spray per step | [`Feedback`], [`Network`] |
-//! | closed loop: coats, and a measurement after each; ours: Paper IV paints open loop | [`ClosedLoopPainter`] |
+//! | the same with strokes along lines (thinning: Zhang and Suen 1984) | [`painters::Centrelines`] |
+//! | matching pursuit (Mallat and Zhang 1993) | [`painters::MatchingPursuit`] |
+//! | few sprays at free positions, of free spreads | [`painters::FreeSprays`] |
+//! | a feedback network (as Zamir et al. 2017), convolutional; ours: Paper IV paints one spray per step | [`Feedback`], [`network::Network`] |
+//! | closed loop: coats, and a measurement after each; ours: Paper IV paints open loop | [`painters::ClosedLoopPainter`] |
 //! | volumes fitted to what sprays leave on the surface itself, curved, stretched and cut; ours | [`OnSurface`] |
-//! | a valve of limited slew rate (augmented Lagrangian), on a context-based path (Dafner et al. 2000) | [`SlewLimited`], [`ScanOrder`] |
-//! | several paints that mix (Kubelka and Munk 1931) | [`Palette`], [`ColourSeparation`] |
-//! | strokes a robot can fly | [`boustrophedon`] |
+//! | a valve of limited slew rate (augmented Lagrangian), on a context-based path (Dafner et al. 2000) | [`painters::SlewLimited`], [`path::ScanOrder`] |
+//! | several paints that mix (Kubelka and Munk 1931) | [`colour::Palette`], [`colour::ColourSeparation`] |
+//! | strokes a robot can fly | [`path::boustrophedon`] |
 //!
 //! Pixels: centres at integers, `x` = column, `y` = row, row 0 at the top. Lengths are in pixels, depths in the unit of the
 //! saturation curve. Every result is the same bytes for the same input.
 
-mod colour;
+pub mod colour;
 mod error;
 mod ideal;
 mod image;
 pub mod metrics;
-mod model;
-mod network;
+pub mod model;
+pub mod network;
 mod optimise;
 mod painter;
-mod painters;
+pub mod painters;
 mod painting;
-mod path;
-mod problem;
+pub mod path;
+pub mod problem;
 pub mod procedural;
 pub mod thesis;
 mod trace;
 #[cfg(feature = "train")]
 pub mod train;
 
-pub use colour::{
-    ColourImage, ColourMetric, ColourPainting, ColourProblem, ColourSeparation, MAX_PAINTS, Paint, Palette,
-};
 pub use error::Error;
 pub use ideal::ideal;
 pub use image::Image;
-pub use model::{MonotoneCurve, Saturation, Spray, SprayKernel};
-pub use network::{Architecture, Network};
+pub use model::{Saturation, Spray, SprayKernel};
 pub use painter::{Observer, Painter};
-pub use painters::{
-    AreaFill, Centrelines, ClosedLoopPainter, Deconvolution, Feedback, FreeSprays, LayerPlanning, Layered,
-    MatchingPursuit, OnSurface, SlewLimited, SurfaceFootprint, ThresholdSpacing, slew_violations,
-};
+pub use painters::{Deconvolution, Feedback, OnSurface};
 pub use painting::Painting;
-pub use path::{ScanOrder, Stroke, StrokeSettings, boustrophedon};
-pub use problem::{GhostPixels, Limits, PaintProblem, WeightedPixels};
+pub use problem::{Limits, PaintProblem};
 
 /// Paints an image in one call: wanted ink in `[0, 1]`, by the feedback network with its shipped weights, on a bare wall, with
 /// the thesis' nozzle and `tanh`.

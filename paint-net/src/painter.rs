@@ -9,8 +9,8 @@ use crate::trace::{event, span};
 
 /// Decides what to spray where.
 ///
-/// A painter of one's own implements `name` and `paint_observed`; it can then be wrapped by [`crate::Layered`],
-/// [`crate::SlewLimited`] and [`crate::ClosedLoopPainter`] like any other.
+/// A painter of one's own implements `name` and `paint_observed`; it can then be wrapped by [`crate::painters::Layered`],
+/// [`crate::painters::SlewLimited`] and [`crate::painters::ClosedLoopPainter`] like any other.
 pub trait Painter {
     /// Short name for tables and command lines.
     fn name(&self) -> &'static str;

@@ -21,7 +21,7 @@ pub struct Painting {
     /// plans one.
     pub waypoints: Vec<Spray>,
     /// The strokes along which the sprays are to be flown; empty unless the painter plans them, as for rows
-    /// ([`boustrophedon`](crate::boustrophedon)).
+    /// ([`boustrophedon`](crate::path::boustrophedon)).
     pub strokes: Vec<Stroke>,
     /// Paint that came out over paint that was asked for, as a closed loop estimates it; 1 unless somebody measured.
     pub flow_gain: f64,

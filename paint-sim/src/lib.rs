@@ -35,7 +35,7 @@
 //! | source | equation | item |
 //! |---|---|---|
 //! | VR paper, Section IV (form ours) | conical Gaussian spray, per area and volume | [`SprayModel::density`] |
-//! | handheld paper, Section V (ours) | paint per texel, exact mass balance | [`Film::deposit`], [`MassBalance`] |
+//! | handheld paper, Section V (ours) | paint per texel, exact mass balance | [`Film::deposit`], [`film::MassBalance`] |
 //! | handheld paper, Eqs. (1), (6), (7) | required density, score of a step | [`droplets`] |
 //! | handheld paper, Section VI-B | hand, sensors, slide, valve | [`gantry_robot`] |
 //! | Kubelka 1948 | film of finite thickness on a ground | [`km::reflectance`] |
@@ -44,10 +44,10 @@
 //! | Duncan 1940 | wet mixture `K = sum c K`, `S = sum c S` | [`Paint::mix`] |
 //! | Saunderson 1942 | the air above the paint | [`km::saunderson`] |
 //! | CIE 015, IEC 61966-2-1 | XYZ, CIELAB, sRGB of 36 bands | [`colour`] |
-//! | Sharma, Wu, Dalal 2005 | colour difference CIEDE2000 | [`ciede2000`] |
+//! | Sharma, Wu, Dalal 2005 | colour difference CIEDE2000 | [`colour::ciede2000`] |
 //! | Paper II, Section 5.2 (roll and pitch), linear drag | first-order attitude, rotor drag | [`flight::Vehicle::step`] |
 //! | catenary (textbook) | hose force | [`flight::HoseModel::force`] |
-//! | Paper II, Section 7.2 | hit error, distance error, angle errors | [`FlightStatistics`] |
+//! | Paper II, Section 7.2 | hit error, distance error, angle errors | [`flight::FlightStatistics`] |
 
 pub mod colour;
 pub mod droplets;
@@ -63,16 +63,14 @@ pub mod spray;
 pub mod surface;
 mod trace;
 
-pub use nalgebra;
-
-pub use colour::ciede2000;
 pub use error::Error;
-pub use film::{Film, MassBalance, Texel, spray};
-pub use flight::{FlightLog, FlightSettings, FlightStatistics, PanTilt, Reference, ReferenceState, fly};
+pub use film::{Film, Texel, spray};
+pub use flight::{FlightSettings, fly};
+pub use nalgebra;
 pub use paint::{Paint, Substrate};
-pub use render::{Camera, Frame, Lights, Shading, render};
+pub use render::{Camera, render};
 pub use spray::{Shot, SprayModel};
-pub use surface::{Hit, Surface, TriangleSurface};
+pub use surface::{Surface, TriangleSurface};
 
 /// The recipe of the README.
 #[cfg(doctest)]

@@ -5,28 +5,18 @@
 //! 3. Seams are closed again, the most useful first, as long as what they join can really be laid out within the bounds.
 //! 4. Patches around seams change charts where that makes all seams together cheaper.
 
-mod absorb;
-mod add_region;
-mod bitmap;
-mod charting;
-mod fit;
-mod layout;
-mod levels;
-mod mend;
-mod motion;
+mod charts;
+mod compute_charts;
+mod cut;
+mod merge;
 mod pack;
-mod page_cuts;
-mod price;
+mod parametrize;
 mod quality;
-mod refine;
-mod regions;
-mod seams;
-mod sew;
-mod shorten;
-mod simple_boundary;
-mod straighten;
+mod segment;
 mod texels;
 mod update;
+
+use cut::box_cutter::cut_and_pack;
 
 use crate::chart::{Chart, SurfacePoint};
 use crate::error::Error;
@@ -34,7 +24,7 @@ use crate::parametrizer::{Parametrizer, Progress};
 use crate::surface::{FaceLookup, Surface, SurfaceReport};
 use crate::trace::{event, span};
 use crate::triangle;
-pub use charting::ChartSettings;
+pub use compute_charts::ChartSettings;
 pub use pack::{PackSettings, Page, Placement, Turns};
 pub use quality::AtlasQuality;
 pub use texels::{PageTexels, TexelKind};
@@ -104,10 +94,10 @@ impl Atlas {
             "surface checked"
         );
         pack::check(&settings.pack, surface.area())?;
-        let (charts, members) = charting::charts(&surface, seams, &settings.charts, parametrizer, &mut progress)?;
+        let (charts, members) =
+            compute_charts::compute_charts(&surface, seams, &settings.charts, parametrizer, &mut progress)?;
         let turned = settings.charts.up.is_none() && settings.pack.turns != Turns::None;
-        let (charts, members, placements, pages) =
-            page_cuts::cut_and_pack(&surface, charts, members, &settings.pack, turned)?;
+        let (charts, members, placements, pages) = cut_and_pack(&surface, charts, members, &settings.pack, turned)?;
         Self::of_parts(surface, report, charts, members, placements, pages, settings.pack.texel_m)
     }
 

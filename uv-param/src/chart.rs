@@ -1,5 +1,6 @@
 //! A surface laid out in the plane in metres, and the way back.
 
+pub(crate) mod distortion;
 mod locate;
 mod normals;
 mod placement;
@@ -11,9 +12,9 @@ use std::sync::OnceLock;
 use nalgebra::{Point3, Unit, Vector3};
 
 use crate::disk::Disk;
-use crate::distortion::Quality;
 use crate::error::Error;
 use crate::triangle::Frame;
+pub use distortion::Quality;
 use locate::Grid;
 pub(crate) use locate::{inside, overlapping_faces, overlapping_pairs};
 pub use surface_point::SurfacePoint;

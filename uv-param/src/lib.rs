@@ -10,7 +10,9 @@
 //! topology are taken apart into few charts, each within a bound of stretch ([`unwrap_atlas`]).
 //!
 //! ```
-//! use uv_param::{Settings, NozzleSettings, TexelMap, largest_disk, nozzle_command, unwrap};
+//! use uv_param::nozzle::{NozzleSettings, nozzle_command};
+//! use uv_param::texture::TexelMap;
+//! use uv_param::{Settings, largest_disk, unwrap};
 //!
 //! // A 2 m x 1 m wall with a right-angled fold, z up.
 //! let positions = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 0., 1.], [1., 0., 1.], [1., 1., 1.]];
@@ -28,66 +30,47 @@
 //!
 //! | equation | item |
 //! |---|---|
-//! | Liu et al. 2008, local/global ARAP | [`unwrap`], [`Arap`] |
-//! | Peng et al. 2018, Anderson acceleration of the iteration | [`Arap`] |
-//! | Smith and Schaefer 2015, symmetric Dirichlet energy | [`SymmetricDirichlet`] |
+//! | Liu et al. 2008, local/global ARAP | [`unwrap`], [`parametrizer::Arap`] |
+//! | Peng et al. 2018, Anderson acceleration of the iteration | [`parametrizer::Arap`] |
+//! | Smith and Schaefer 2015, symmetric Dirichlet energy | [`parametrizer::SymmetricDirichlet`] |
 //! | thesis 8, "cuts along high distortion areas"; Gu et al. 2002, cut to the worst distortion | [`unwrap_with_cuts`], [`Disk::cut`] |
-//! | Cohen-Steiner et al. 2004, regions of similar normals; sewn together within a bound of stretch (ours) | [`unwrap_atlas`] |
-//! | Tutte 1963, barycentric layout | [`Tutte`] |
+//! | Cohen-Steiner et al. 2004, regions of similar normals; merged within a bound of stretch (ours) | [`unwrap_atlas`] |
+//! | Tutte 1963, barycentric layout | [`parametrizer::Tutte`] |
 //! | a map of your own | [`Parametrizer`], [`unwrap_by`] |
-//! | thesis 8.3.1, box of smallest area by rotating calipers | [`min_area_rectangle`], [`Chart::new`] |
-//! | thesis 8.3.1, 1 px = 1.25 cm texture | [`TexelMap`], [`Texture`] |
+//! | thesis 8.3.1, box of smallest area by rotating calipers | [`min_area_rectangle::min_area_rectangle`], [`Chart::new`] |
+//! | thesis 8.3.1, 1 px = 1.25 cm texture | [`texture::TexelMap`], [`texture::Texture`] |
 //! | thesis Eq. (8.1), `p_3D = sum b_i V_i` | [`Chart::locate`], [`Chart::point`] |
-//! | thesis Eq. (8.1), `n`, `w_dir`, `w_pos` | [`nozzle_command`] |
+//! | thesis Eq. (8.1), `n`, `w_dir`, `w_pos` | [`nozzle::nozzle_command`] |
 
-mod arap;
-mod atlas;
-mod chart;
+pub mod atlas;
+pub mod chart;
 mod clip;
-mod cut;
+pub mod cut;
 mod decimate;
-mod disk;
-mod distortion;
+pub mod disk;
 mod error;
-mod gutter;
 mod half_edges;
 mod laplacian;
 mod linear;
-mod min_area_rectangle;
-mod nozzle;
-mod parametrizer;
+pub mod min_area_rectangle;
+pub mod nozzle;
+pub mod parametrizer;
+mod polygon_soup;
 mod random;
-mod soup;
-mod surface;
-mod symmetric_dirichlet;
-mod texel;
-mod texture;
+pub mod surface;
+pub mod texture;
 mod trace;
 mod triangle;
-mod tutte;
 mod unfold;
 mod unwrap;
 
-pub use arap::Arap;
-pub use atlas::{
-    Atlas, AtlasLayout, AtlasQuality, AtlasSettings, AtlasUpdate, ChartSettings, PackSettings, Page, PageTexels,
-    Placement, TexelKind, Turns, unwrap_atlas, update_atlas,
-};
+pub use atlas::{Atlas, AtlasSettings, unwrap_atlas};
 pub use chart::{Chart, SurfacePoint};
-pub use cut::{CutSettings, unwrap_with_cuts};
-pub use disk::{Disk, Repair, RepairReport, largest_disk, largest_disk_with};
-pub use distortion::Quality;
+pub use cut::unwrap_with_cuts;
+pub use disk::{Disk, largest_disk};
 pub use error::Error;
-pub use gutter::{Gutter, GutterTexel, WeightedTexels};
-pub use min_area_rectangle::{Rectangle, convex_hull, min_area_rectangle};
 pub use nalgebra;
-pub use nozzle::{NormalMode, NozzleCommand, NozzleSettings, nozzle_command};
-pub use parametrizer::{Layout, Parametrizer, Progress, Stage, StoppingCriterion};
-pub use surface::{Surface, SurfaceReport};
-pub use symmetric_dirichlet::SymmetricDirichlet;
-pub use texel::TexelMap;
-pub use texture::{Texture, linear_from_srgb, luminance};
-pub use tutte::Tutte;
+pub use parametrizer::Parametrizer;
 pub use unwrap::{Method, Settings, unwrap, unwrap_by};
 
 /// The recipe of the README.

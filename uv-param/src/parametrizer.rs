@@ -1,11 +1,18 @@
 //! What a layout of a disk in the plane has to offer.
 
+pub(crate) mod arap;
+pub(crate) mod symmetric_dirichlet;
+pub(crate) mod tutte;
+
 use crate::disk::Disk;
 use crate::error::Error;
+pub use arap::Arap;
+pub use symmetric_dirichlet::SymmetricDirichlet;
+pub use tutte::Tutte;
 
 /// Lays a disk out in the plane: a map from the surface to uv, one point per vertex.
 ///
-/// [`Tutte`](crate::Tutte), [`Arap`](crate::Arap) and [`SymmetricDirichlet`](crate::SymmetricDirichlet) are
+/// [`Tutte`], [`Arap`] and [`SymmetricDirichlet`] are
 /// implementations; a closed form of one's own (a cylinder, a cone) is another, see
 /// [`unwrap_by`](crate::unwrap_by).
 pub trait Parametrizer {

@@ -6,7 +6,7 @@ use crate::decimate::decimate;
 use crate::disk::Disk;
 use crate::error::Error;
 use crate::half_edges::{BORDER, EdgeTable, half_edge};
-use crate::soup::{check, faces_with_shape, find_root, weld};
+use crate::polygon_soup::{check, faces_with_shape, find_root, weld};
 use crate::triangle;
 
 /// What [`Surface::new`] found and changed. Nothing of it moves a vertex.

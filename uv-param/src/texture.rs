@@ -1,9 +1,13 @@
 //! From what is known about the surface to the texels of its chart.
 
+mod gutter;
+mod texel_map;
+
 use crate::chart::SurfacePoint;
 use crate::disk::Disk;
 use crate::error::Error;
-use crate::texel::TexelMap;
+pub use gutter::{Gutter, GutterTexel, WeightedTexels};
+pub use texel_map::TexelMap;
 
 /// An image over a [`TexelMap`] with `CHANNELS` values per texel (1 = grey, 3 = linear RGB), row-major, row 0 at the top.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,14 +1,14 @@
 //! The one call: a disk in, a metric chart out.
 
-use crate::arap::minimise_arap;
 use crate::chart::Chart;
 use crate::disk::Disk;
 use crate::error::Error;
+use crate::parametrizer::arap::minimise_arap;
+use crate::parametrizer::symmetric_dirichlet::minimise_symmetric_dirichlet;
+use crate::parametrizer::tutte::tutte_layout;
 use crate::parametrizer::{Layout, Parametrizer, Progress, StoppingCriterion};
-use crate::symmetric_dirichlet::minimise_symmetric_dirichlet;
 use crate::trace::{event, span};
 use crate::triangle::flips;
-use crate::tutte::tutte_layout;
 
 /// Which energy shapes the chart.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -17,7 +17,7 @@ pub enum Method {
     /// ARAP as the thesis uses it; where that flips a face, the flip-free energy instead.
     #[default]
     Auto,
-    /// ARAP only; [`crate::Quality::flips`] tells whether the chart is usable.
+    /// ARAP only; [`crate::chart::Quality::flips`] tells whether the chart is usable.
     Arap,
     /// The symmetric Dirichlet energy, which no flipped face can enter.
     SymmetricDirichlet,

@@ -8,8 +8,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use nalgebra::{Matrix2, Vector2, Vector3};
-use paint_sim::ciede2000;
 use paint_sim::colour::BANDS;
+use paint_sim::colour::ciede2000;
 use paintcopter::mesh_io::read_mesh;
 use paintcopter::world::rock_wall;
 use paintcopter_benches::cpu::{CpuTimer, median_seconds};
@@ -17,7 +17,8 @@ use paintcopter_benches::{
     Rng, colours, control, films, fuzzed_meshes, motion, painting, planner, pose_graphs, room, split_meshes, vocabulary,
 };
 use serde_json::json;
-use uv_param::{Chart, CutSettings, Method, Settings, largest_disk, unwrap, unwrap_with_cuts};
+use uv_param::cut::CutSettings;
+use uv_param::{Chart, Method, Settings, largest_disk, unwrap, unwrap_with_cuts};
 use vio_ekf::{Alignment, Association, Trajectory, ate, tum};
 
 type AnyError = Box<dyn Error>;

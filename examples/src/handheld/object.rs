@@ -3,7 +3,9 @@
 use nalgebra::{Point3, UnitVector3, Vector3};
 use paint_sim::TriangleSurface;
 use paint_sim::droplets::{Coverage, TexelFace, TexelSurface};
-use uv_param::{Atlas, AtlasSettings, Chart, ChartSettings, PackSettings, TexelMap, Turns, unwrap_atlas};
+use uv_param::atlas::{ChartSettings, PackSettings, Turns};
+use uv_param::texture::TexelMap;
+use uv_param::{Atlas, AtlasSettings, Chart, unwrap_atlas};
 
 use super::error::HandheldError;
 use crate::mesh_io::TriangleMesh;

@@ -5,7 +5,7 @@ use std::path::Path;
 use image::{Rgb, RgbImage};
 use paint_planner::gantry::GantryPlan;
 use paint_sim::droplets::Coverage;
-use uv_param::TexelMap;
+use uv_param::texture::TexelMap;
 
 use super::error::HandheldError;
 use crate::pictures::{DensityPicture, save_density};

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use image::{DynamicImage, RgbaImage};
-use uv_param::linear_from_srgb;
+use uv_param::texture::linear_from_srgb;
 
 use crate::picture_file::{PictureFileError, open_upright, read_upright};
 use crate::srgb::srgb_byte;

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use uv_param::linear_from_srgb;
+use uv_param::texture::linear_from_srgb;
 
 use super::material::{MeshMaterial, TextureSource};
 

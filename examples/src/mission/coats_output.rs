@@ -5,8 +5,10 @@ use std::path::Path;
 
 use nalgebra::Point3;
 use paint_net::Image;
+use paint_sim::Substrate;
+use paint_sim::colour::ciede2000;
 use paint_sim::colour::spectrum_lab;
-use paint_sim::{Hit, Substrate, ciede2000};
+use paint_sim::surface::Hit;
 use serde::Serialize;
 
 use super::coats::{Coats, linear};

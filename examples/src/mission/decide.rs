@@ -1,9 +1,8 @@
 //! What to spray: the wanted picture into layers.
 
-use paint_net::{
-    AreaFill, Centrelines, Deconvolution, Feedback, Image, Layered, MatchingPursuit, Observer, OnSurface, PaintProblem,
-    Painter, Painting, Stroke,
-};
+use paint_net::painters::{AreaFill, Centrelines, Layered, MatchingPursuit};
+use paint_net::path::Stroke;
+use paint_net::{Deconvolution, Feedback, Image, Observer, OnSurface, PaintProblem, Painter, Painting};
 
 use super::error::MissionError;
 use super::footprints::Footprints;

@@ -2,7 +2,7 @@
 
 use paint_net::{ideal, metrics};
 use paint_planner::{Plan, Surface, normal_deviation};
-use paint_sim::FlightLog;
+use paint_sim::flight::FlightLog;
 use paint_sim::flight::{FlightSample, FlightStatistics};
 use paint_sim::spray::QUANTUM;
 

@@ -1,8 +1,9 @@
 //! Flying it, and what the paint does meanwhile.
 
 use paint_planner::Plan;
+use paint_sim::flight::FlightLog;
 use paint_sim::flight::{Interlock, Localisation, Valve};
-use paint_sim::{Film, FlightLog, FlightSettings, TriangleSurface};
+use paint_sim::{Film, FlightSettings, TriangleSurface};
 
 use super::decision::Decision;
 use super::error::MissionError;

@@ -1,6 +1,8 @@
 //! What sprays leave on the surface itself: painters plan on the plane of its charts.
 
-use paint_net::{SprayKernel, Stroke, SurfaceFootprint};
+use paint_net::SprayKernel;
+use paint_net::painters::SurfaceFootprint;
+use paint_net::path::Stroke;
 use paint_planner::Target;
 use paint_sim::{Film, Shot, SprayModel};
 

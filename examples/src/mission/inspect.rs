@@ -1,7 +1,9 @@
 //! After the paint: the wall mapped with a depth camera, and the flight as trajectories.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use paint_sim::{Camera, Frame, Hit, Lights, Shading, Surface, render};
+use paint_sim::render::{Frame, Lights, Shading};
+use paint_sim::surface::Hit;
+use paint_sim::{Camera, Surface, render};
 use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics, Map, Mesh};
 use vio_ekf::{Alignment, Stamp, Trajectory};
 

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use nalgebra::Point3;
 use paint_planner::normal_deviation;
-use paint_sim::Hit;
 use paint_sim::flight::FlightSample;
+use paint_sim::surface::Hit;
 use tsdf_hash::Mesh;
 
 use super::error::MissionError;

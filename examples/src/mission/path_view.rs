@@ -4,7 +4,9 @@ use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
 use paint_net::Image;
-use paint_sim::{Camera, Frame, Hit};
+use paint_sim::Camera;
+use paint_sim::render::Frame;
+use paint_sim::surface::Hit;
 
 use super::decision::Decision;
 use super::error::MissionError;

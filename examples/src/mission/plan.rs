@@ -1,6 +1,7 @@
 //! How to fly it: strokes onto the surface, nozzle and vehicle along them.
 
-use paint_net::{Painting, StrokeSettings, boustrophedon};
+use paint_net::Painting;
+use paint_net::path::{StrokeSettings, boustrophedon};
 use paint_planner::{Error, NotServed, Plan, Planner, Settings, SmoothingPlanner, Target, VehicleState};
 
 use super::decision::Decision;

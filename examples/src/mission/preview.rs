@@ -5,7 +5,8 @@ use std::path::Path;
 use nalgebra::Point3;
 use paint_net::Image;
 use paint_planner::{Target, TimingPolicy};
-use paint_sim::{Hit, Shading};
+use paint_sim::render::Shading;
+use paint_sim::surface::Hit;
 use serde::Serialize;
 
 use super::decision::Decision;

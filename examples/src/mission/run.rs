@@ -77,7 +77,10 @@ impl Mission {
         let painted = self.painted_depth();
         let pixel = |k: usize| {
             let wanted = self.decision.appearance.ink().inverse(self.decision.wanted.data()[k]);
-            paint_sim::ciede2000(self.decision.appearance.lab(painted.data()[k]), self.decision.appearance.lab(wanted))
+            paint_sim::colour::ciede2000(
+                self.decision.appearance.lab(painted.data()[k]),
+                self.decision.appearance.lab(wanted),
+            )
         };
         (0..painted.data().len()).map(|k| (self.decision.coverage.data()[k] > 0.0).then(|| pixel(k))).collect()
     }

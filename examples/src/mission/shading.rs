@@ -1,7 +1,8 @@
 //! How the painted surface looks: where a ray hits it, and at its vertices.
 
 use paint_net::Image;
-use paint_sim::{Hit, Shading};
+use paint_sim::render::Shading;
+use paint_sim::surface::Hit;
 use uv_param::SurfacePoint;
 
 use super::decision::Decision;

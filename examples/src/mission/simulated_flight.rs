@@ -3,8 +3,9 @@
 use nalgebra::{Point3, Vector3};
 use paint_planner::control::MpcSettings;
 use paint_planner::{Plan, Tether};
+use paint_sim::flight::FlightLog;
 use paint_sim::flight::{CascadedController, Controller, ControllerSettings, HoseModel, fly_with};
-use paint_sim::{FlightLog, FlightSettings, TriangleSurface};
+use paint_sim::{FlightSettings, TriangleSurface};
 
 use super::error::MissionError;
 use super::settings::{ControllerChoice, MissionSettings};

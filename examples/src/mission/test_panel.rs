@@ -3,7 +3,7 @@
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use paint_planner::{Plan, Target};
-use paint_sim::FlightLog;
+use paint_sim::flight::FlightLog;
 use ptu_kinematics::Ptu;
 
 use super::fly::fly_three;

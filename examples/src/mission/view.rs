@@ -1,7 +1,9 @@
 //! Pictures of the surface as somebody standing before it sees it.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
-use paint_sim::{Camera, Frame, Hit, Lights, Shading, Surface as _, render};
+use paint_sim::render::{Frame, Lights, Shading};
+use paint_sim::surface::Hit;
+use paint_sim::{Camera, Surface as _, render};
 
 use super::decision::Decision;
 use super::error::MissionError;

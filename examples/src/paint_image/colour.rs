@@ -3,9 +3,8 @@
 use std::path::Path;
 
 use clap::ValueEnum;
-use paint_net::{
-    ColourImage, ColourPainting, ColourProblem, ColourSeparation, Error, Image, Paint, Palette, Spray, metrics,
-};
+use paint_net::colour::{ColourImage, ColourPainting, ColourProblem, ColourSeparation, Paint, Palette};
+use paint_net::{Error, Image, Spray, metrics};
 use paint_sim::colour::lab;
 use serde::Serialize;
 
@@ -119,7 +118,7 @@ fn rgb(picture: &ColourImage) -> Rgb {
 /// CIEDE2000 of every pixel.
 fn differences(painted: &ColourImage, wanted: &ColourImage) -> Vec<f64> {
     let pairs = painted.data().iter().zip(wanted.data());
-    pairs.map(|(a, b)| paint_sim::ciede2000(lab_of(*a), lab_of(*b))).collect()
+    pairs.map(|(a, b)| paint_sim::colour::ciede2000(lab_of(*a), lab_of(*b))).collect()
 }
 
 fn ink(picture: &ColourImage) -> Result<Image, Error> {

@@ -3,7 +3,8 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use paint_net::{Image, LayerPlanning, Painting};
+use paint_net::painters::LayerPlanning;
+use paint_net::{Image, Painting};
 use serde::Serialize;
 
 use super::error::PaintImageError;

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use paint_net::painters::FreeSprays;
 use paint_net::thesis::ThesisPainter;
-use paint_net::{Feedback, FreeSprays, Image, Limits, PaintProblem, Painter, SprayKernel, metrics};
+use paint_net::{Feedback, Image, Limits, PaintProblem, Painter, SprayKernel, metrics};
 
 use super::error::PaintImageError;
 use super::files::read_network;

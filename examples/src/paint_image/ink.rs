@@ -42,7 +42,7 @@ pub(super) fn colour_difference(ink: &Image, wanted: &Image) -> f64 {
         .collect();
     let lab = |ink: f64| [lightness[usize::from(level(ink))], 0.0, 0.0];
     let pairs = ink.data().iter().zip(wanted.data());
-    pairs.map(|(&a, &b)| paint_sim::ciede2000(lab(a), lab(b))).sum::<f64>() / ink.data().len() as f64
+    pairs.map(|(&a, &b)| paint_sim::colour::ciede2000(lab(a), lab(b))).sum::<f64>() / ink.data().len() as f64
 }
 
 pub(super) fn level(ink: f64) -> u8 {

@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use clap::ValueEnum;
-use paint_net::thesis::{Network, ThesisPainter};
-use paint_net::{
-    Centrelines, ClosedLoopPainter, Deconvolution, Feedback, FreeSprays, Image, LayerPlanning, Layered, Limits,
-    MatchingPursuit, PaintProblem, Painter, Painting, ScanOrder, SlewLimited, SprayKernel, metrics, slew_violations,
+use paint_net::painters::{
+    Centrelines, ClosedLoopPainter, FreeSprays, LayerPlanning, Layered, MatchingPursuit, SlewLimited, slew_violations,
 };
+use paint_net::path::ScanOrder;
+use paint_net::thesis::{Network, ThesisPainter};
+use paint_net::{Deconvolution, Feedback, Image, Limits, PaintProblem, Painter, Painting, SprayKernel, metrics};
 use serde::Serialize;
 
 use super::commands;

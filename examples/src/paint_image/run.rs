@@ -2,10 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use paint_net::painters::LayerPlanning;
+use paint_net::path::ScanOrder;
 use paint_net::procedural::Texture;
 use paint_net::thesis::{Architecture, Objective};
 use paint_net::train::{ThesisSettings, TrainSettings};
-use paint_net::{Image, LayerPlanning, Limits, ScanOrder, SprayKernel};
+use paint_net::{Image, Limits, SprayKernel};
 
 use super::colour::{Glazes, paint_colours, read_picture, save_colours};
 use super::command_line::{Arguments, Command, Nozzle, Preset, ScanOrderName, SharingName, Training};

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use nalgebra::{Isometry3, Translation3, Vector3};
-use paint_sim::{Camera, Frame, Hit, Lights, Shading, TriangleSurface, render};
+use paint_sim::render::{Frame, Lights, Shading};
+use paint_sim::surface::Hit;
+use paint_sim::{Camera, TriangleSurface, render};
 use tsdf_hash::Mesh;
 
 use super::decode::Images;

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
-use paint_sim::{Camera, Hit, Lights, Shading, TriangleSurface, render};
+use paint_sim::render::{Lights, Shading};
+use paint_sim::surface::Hit;
+use paint_sim::{Camera, TriangleSurface, render};
 use vio_ekf::Trajectory;
 
 use super::fly::ScanFlight;

@@ -2,7 +2,9 @@
 
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, UnitVector3, Vector3};
 use paint_net::procedural::{lattice, value_noise};
-use paint_sim::{Hit, Lights, Shading, TriangleSurface, render};
+use paint_sim::render::{Lights, Shading};
+use paint_sim::surface::Hit;
+use paint_sim::{TriangleSurface, render};
 use tsdf_hash::Intrinsics;
 use vio_ekf::{Camera, Distortion, ImageView};
 

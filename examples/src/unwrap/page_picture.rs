@@ -1,6 +1,8 @@
 //! Pictures of pages: a checkerboard in the colours of the stretch, or the mesh's own texture carried over.
 
-use uv_param::{Atlas, PageTexels, SurfacePoint, TexelKind, linear_from_srgb};
+use uv_param::atlas::{PageTexels, TexelKind};
+use uv_param::texture::linear_from_srgb;
+use uv_param::{Atlas, SurfacePoint};
 
 use crate::mesh_io::MeshUv;
 use crate::srgb::srgb_byte;

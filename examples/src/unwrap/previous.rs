@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use uv_param::{AtlasLayout, Placement};
+use uv_param::atlas::{AtlasLayout, Placement};
 
 use super::error::UnwrapError;
 

@@ -1,7 +1,8 @@
 //! The figures of an atlas.
 
 use serde::Serialize;
-use uv_param::{Atlas, AtlasQuality, AtlasUpdate};
+use uv_param::Atlas;
+use uv_param::atlas::{AtlasQuality, AtlasUpdate};
 
 /// What `report.json` of `unwrap` holds. Flat, SI units in the names; every number is finite.
 #[derive(Debug, Clone, Serialize)]

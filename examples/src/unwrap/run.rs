@@ -4,10 +4,11 @@ use std::path::Path;
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
-use uv_param::{
-    Atlas, AtlasLayout, AtlasQuality, AtlasSettings, AtlasUpdate, ChartSettings, PackSettings, PageTexels, Progress,
-    Turns, unwrap_atlas, update_atlas,
+use uv_param::atlas::{
+    AtlasLayout, AtlasQuality, AtlasUpdate, ChartSettings, PackSettings, PageTexels, Turns, update_atlas,
 };
+use uv_param::parametrizer::Progress;
+use uv_param::{Atlas, AtlasSettings, unwrap_atlas};
 
 use super::arguments::Arguments;
 use super::error::UnwrapError;
@@ -96,9 +97,11 @@ fn unwrap(
     };
     let stage = Stage::start("unwrap");
     let progress = |at: Progress| match at.stage {
-        uv_param::Stage::Seam => stage.tell(&format!("{} seams tried", at.iteration)),
-        uv_param::Stage::Level => stage.tell(&format!("{} charts of the fine surface tried", at.iteration)),
-        uv_param::Stage::Chart => stage.tell(&format!("{} charts finished", at.iteration)),
+        uv_param::parametrizer::Stage::Seam => stage.tell(&format!("{} seams tried", at.iteration)),
+        uv_param::parametrizer::Stage::Level => {
+            stage.tell(&format!("{} charts of the fine surface tried", at.iteration))
+        }
+        uv_param::parametrizer::Stage::Chart => stage.tell(&format!("{} charts finished", at.iteration)),
         _ => {}
     };
     let cpu = ProcessTime::try_now().ok();

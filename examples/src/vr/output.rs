@@ -4,7 +4,9 @@ use std::path::Path;
 
 use nalgebra::{UnitVector3, Vector3};
 use paint_sim::colour::decode_srgb8;
-use paint_sim::{Camera, Hit, Lights, Shading, render};
+use paint_sim::render::{Lights, Shading};
+use paint_sim::surface::Hit;
+use paint_sim::{Camera, render};
 use uv_param::SurfacePoint;
 
 use super::canvas::Patch;

@@ -1,7 +1,7 @@
 //! A simulated flight that begins in motion: the simulator starts at rest, so the vehicle is brought to that motion first.
 
 use nalgebra::Vector3;
-use paint_sim::FlightLog;
+use paint_sim::flight::FlightLog;
 use paint_sim::flight::{Reference, ReferenceState};
 
 /// Time in which the vehicle comes to the motion that a continued plan begins with, s: slow enough for its controller to be on the

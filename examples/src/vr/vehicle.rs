@@ -7,8 +7,9 @@ use paint_planner::session::{
     Continuation, RATE, Segment, Task, VrMode, VrState, continue_plan, latency_in_time, targets,
 };
 use paint_planner::{NozzleState, Plan, Settings, Target, Tool, VehicleState, plan};
+use paint_sim::flight::FlightLog;
 use paint_sim::flight::{FlightSample, Localisation};
-use paint_sim::{FlightLog, FlightSettings, Shot};
+use paint_sim::{FlightSettings, Shot};
 use ptu_kinematics::{Hover, Joints, ServoSettings};
 
 use super::error::VrError;

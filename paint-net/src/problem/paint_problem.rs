@@ -32,8 +32,8 @@ pub struct PaintProblem<'a> {
     /// Pixels over which the nozzle may spray, row by row; `None`: everywhere.
     pub paintable: Option<&'a [bool]>,
     /// Pixels that show others, beyond the seams of the surface; `None`: none. Their weight must be 0, and their reference and canvas
-    /// are those of what they show. Paint on them counts where it lies. [`MatchingPursuit`](crate::MatchingPursuit) and
-    /// [`FreeSprays`](crate::FreeSprays) choose places without them.
+    /// are those of what they show. Paint on them counts where it lies. [`MatchingPursuit`](crate::painters::MatchingPursuit) and
+    /// [`FreeSprays`](crate::painters::FreeSprays) choose places without them.
     pub ghosts: Option<&'a GhostPixels>,
     /// Footprint of a spray. Default: the thesis' nozzle, σ = 2 px cut at 4 px.
     pub kernel: &'a SprayKernel,

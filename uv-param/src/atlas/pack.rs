@@ -2,8 +2,9 @@
 
 mod add;
 mod arrange;
-mod back;
+pub(in crate::atlas) mod bitmap;
 mod bottom_left;
+mod restore;
 mod search;
 mod settings;
 mod shape;
@@ -11,7 +12,7 @@ mod shape;
 use crate::error::Error;
 pub(super) use add::add_to;
 use arrange::{Arrangement, area};
-pub(super) use back::{Home, back};
+pub(super) use restore::{PageSlot, restore};
 pub use settings::{PackSettings, Page, Placement, Turns};
 pub(super) use settings::{check, check_pages};
 pub(super) use shape::Piece;

@@ -1,6 +1,6 @@
 //! Distortion, seams and pages of a whole atlas.
 
-use super::Atlas;
+use crate::atlas::Atlas;
 
 /// Figures of merit of an atlas.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,6 @@
 //! Texels of the pages: which point of the surface each one is, in the gutters as well.
 
-use super::Atlas;
+use crate::atlas::Atlas;
 use crate::chart::{SurfacePoint, inside};
 use crate::unfold::{MAX_REACH, Nearest, across, for_texels, note_edge};
 

@@ -2,17 +2,17 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-use super::add_region::add_region;
-use super::charting::{Kept, by_number, finish, wanted_seams};
-use super::fit::{Bounds, fit};
-use super::layout::Charts;
-use super::mend::mend;
-use super::motion::nearest_motion;
-use super::pack::{self, Home, PackSettings, Page, Piece, Placement};
-use super::price::SeamPrices;
-use super::refine::keeps;
-use super::sew::Sewing;
-use super::{Atlas, AtlasSettings, unwrap_atlas};
+use crate::atlas::charts::Charts;
+use crate::atlas::compute_charts::{Kept, by_number, finish, wanted_seams};
+use crate::atlas::cut::seam_cost::SeamCosts;
+use crate::atlas::merge::merge_charts::ChartMerger;
+use crate::atlas::pack::{self, PackSettings, Page, PageSlot, Piece, Placement};
+use crate::atlas::parametrize::add_region::add_region;
+use crate::atlas::parametrize::fit::{Bounds, fit};
+use crate::atlas::parametrize::procrustes::procrustes;
+use crate::atlas::parametrize::refine::keeps;
+use crate::atlas::parametrize::untangle::untangle;
+use crate::atlas::{Atlas, AtlasSettings, unwrap_atlas};
 use crate::disk::Disk;
 use crate::error::Error;
 use crate::parametrizer::Progress;
@@ -111,7 +111,7 @@ impl AtlasLayout {
 
 /// Lays out a surface of which an earlier state was laid out as `previous`. Faces are the same if their corners lie at the same places to the bit.
 /// Charts of which every face is still there are kept. Those that lost faces get what came instead, if that can be laid out within the
-/// bounds; otherwise what is left of them stays where it is. All else becomes new charts, which are sewn to changed ones where they can be. Where
+/// bounds; otherwise what is left of them stays where it is. All else becomes new charts, which are merged to changed ones where they can be. Where
 /// less than half of the faces is left, all is laid out anew.
 ///
 /// # Errors
@@ -152,7 +152,7 @@ pub fn update_atlas(
                 // What came and little around it, so that all else stays to the bit; everything where that does not do, and much came.
                 let came = is_new.iter().filter(|is_new| **is_new).count();
                 let much = came as f64 >= REFITTED * faces.len() as f64;
-                let uv = mended(&disk, start.clone(), &is_new, bounds)
+                let uv = untangled(&disk, start.clone(), &is_new, bounds)
                     .or_else(|| if much { fit(&disk, start, bounds, None) } else { None });
                 uv.map(|uv| charts.place(&faces, &disk, &uv)).is_some()
             });
@@ -176,10 +176,10 @@ pub fn update_atlas(
         add_region(&mut charts, faces, bounds, None);
     }
     if charts.members.len() as u32 > first_new {
-        let prices = SeamPrices::new(&surface);
-        let mut sewing = Sewing::new(&mut charts, &prices, bounds, None, &mut progress);
-        sewing.only = Some((stay.clone(), first_new));
-        sewing.close_arcs();
+        let costs = SeamCosts::new(&surface);
+        let mut merging = ChartMerger::new(&mut charts, &costs, bounds, None, &mut progress);
+        merging.only = Some((stay.clone(), first_new));
+        merging.close_arcs();
     }
     let old_charts: Vec<u32> =
         (0..charts.members.len() as u32).filter(|&c| !charts.members[c as usize].is_empty()).collect();
@@ -200,8 +200,8 @@ pub fn update_atlas(
 }
 
 /// A layout of old faces, and of new ones around which alone it may change.
-fn mended(disk: &Disk, start: Vec<[f64; 2]>, is_new: &[bool], bounds: Bounds) -> Option<Vec<[f64; 2]>> {
-    let found = mend(disk, start, is_new, bounds)?;
+fn untangled(disk: &Disk, start: Vec<[f64; 2]>, is_new: &[bool], bounds: Bounds) -> Option<Vec<[f64; 2]>> {
+    let found = untangle(disk, start, is_new, bounds)?;
     (!found.parted.contains(&true) && keeps(disk, &found.uv, bounds)).then_some(found.uv)
 }
 
@@ -221,13 +221,13 @@ fn settle(
     let mut pieces = Vec::with_capacity(names.len());
     for &c in &names {
         let place = previous.placements[c as usize];
-        let (size, home) = if stay.contains(&c) {
-            (previous.sizes[c as usize], Home::Taken(place))
+        let (size, slot) = if stay.contains(&c) {
+            (previous.sizes[c as usize], PageSlot::Taken(place))
         } else {
             let (size, low) = move_back(previous, old, charts, c);
             let zero = Placement { shift: [0.0; 2], ..place }.apply(low);
             let shift = [0, 1].map(|k| place.shift[k] + zero[k]);
-            (size, Home::Wanted(Placement { shift, ..place }))
+            (size, PageSlot::Wanted(Placement { shift, ..place }))
         };
         sizes.push(size);
         let faces: Vec<usize> = charts.members[c as usize].iter().map(|&f| f as usize).collect();
@@ -237,9 +237,9 @@ fn settle(
             charts.is_seam(*h) || charts.surface.twin(*h).is_none_or(|twin| charts.chart[twin / 3] != c)
         };
         let rim = faces.iter().flat_map(|&f| edges(f)).filter(is_rim).map(|ends| ends.map(|h| charts.corner_uv[h]));
-        pieces.push((Piece { rim: rim.collect() }, home));
+        pieces.push((Piece { rim: rim.collect() }, slot));
     }
-    let places = pack::back(&pieces, &previous.pages, settings);
+    let places = pack::restore(&pieces, &previous.pages, settings);
     let settled = names.into_iter().zip(sizes).zip(places);
     settled.filter_map(|((c, size), place)| place.map(|place| (c, (size, place)))).collect()
 }
@@ -261,7 +261,7 @@ fn move_back(
     }
     // Most of it was not touched: then nothing is turned, which would round.
     let same = 2 * pairs.iter().filter(|(_, there, here)| there == here).count() >= pairs.len();
-    let motion = nearest_motion(&pairs, same);
+    let motion = procrustes(&pairs, same);
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for h in faces.iter().flat_map(|&f| 3 * f..3 * f + 3) {
         if !same {

@@ -5,7 +5,7 @@ use std::collections::BinaryHeap;
 
 use crate::disk::Disk;
 
-/// How much dearer than its length a sharply convex edge is, and how much cheaper a sharply concave one: seams in
+/// How much costlier than its length a sharply convex edge is, and how much cheaper a sharply concave one: seams in
 /// creases are seen least and disturb a spray least.
 const CREASE_FACTOR: f64 = 0.5;
 /// Length over which bending counts as sharp, relative to the square root of the area.
@@ -49,7 +49,7 @@ impl BoundaryPaths {
         paths
     }
 
-    /// The vertex with the dearest way out; `None` if all are on the boundary.
+    /// The vertex with the costliest way out; `None` if all are on the boundary.
     pub(super) fn farthest(&self) -> Option<u32> {
         let inner = (0..self.distance.len()).filter(|&v| self.distance[v] > 0.0);
         inner.max_by(|&a, &b| self.distance[a].total_cmp(&self.distance[b])).map(|v| v as u32)
@@ -106,7 +106,7 @@ impl Neighbours {
     }
 }
 
-/// Length of an inner edge, dearer on ridges and cheaper in creases. Bending is measured per length, so that the price does
+/// Length of an inner edge, costlier on ridges and cheaper in creases. Bending is measured per length, so that the price does
 /// not depend on how finely the surface is meshed.
 fn price(disk: &Disk, h: usize, twin: usize, sharp: f64) -> f64 {
     let edge = disk.edge(h);

@@ -3,7 +3,7 @@
 use super::surface::Disk;
 use crate::error::Error;
 use crate::half_edges::{BORDER, EdgeTable, boundary_loops, fans, half_edge};
-use crate::soup::{check, faces_with_shape, find_root, weld};
+use crate::polygon_soup::{check, faces_with_shape, find_root, weld};
 use crate::triangle;
 
 /// What [`largest_disk_with`] may change in the mesh.

@@ -6,7 +6,7 @@ use crate::triangle::{self, Frame};
 
 /// A triangle mesh that can be laid out in the plane: connected, manifold, consistently oriented, genus 0, at least one
 /// boundary loop, no degenerate face. Made by [`largest_disk`](crate::largest_disk); vertices keep their order and are never moved or merged
-/// (unless [`Repair::weld`](crate::Repair::weld) asks).
+/// (unless [`Repair::weld`](crate::disk::Repair::weld) asks).
 ///
 /// Half-edge `3 f + k` runs from corner `k` of face `f` to corner `(k + 1) % 3`.
 #[derive(Debug, Clone, PartialEq)]

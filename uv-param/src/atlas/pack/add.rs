@@ -2,7 +2,7 @@
 
 use super::settings::{PackSettings, Page, Placement};
 use super::shape::{Piece, Shape, Shapes};
-use crate::atlas::bitmap::Bitmap;
+use crate::atlas::pack::bitmap::Bitmap;
 use crate::error::Error;
 
 /// Cells along the side of the first page while a place is searched for.

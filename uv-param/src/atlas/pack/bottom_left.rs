@@ -1,7 +1,7 @@
 //! Charts onto pages in a given order, each at the lowest place that is free.
 
 use super::shape::{Shape, Shapes};
-use crate::atlas::bitmap::Bitmap;
+use crate::atlas::pack::bitmap::Bitmap;
 
 /// Where a chart lies: page, number of the turn, column and row.
 pub(super) type Place = (usize, usize, [usize; 2]);

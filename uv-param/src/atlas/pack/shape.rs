@@ -1,7 +1,7 @@
 //! A chart as cells, in each of its turns.
 
 use super::settings::PackSettings;
-use crate::atlas::bitmap::{Bitmap, Outline, scattered};
+use crate::atlas::pack::bitmap::{Bitmap, Outline, scattered};
 use crate::half_edges::{EdgeTable, half_edge};
 
 /// What is packed: a shape in the plane, metres.

@@ -1,0 +1,99 @@
+//! Faults of a flight, and the valve that shuts because of them.
+
+use nalgebra::Vector3;
+use paint_sim::flight::*;
+use paint_sim::{Error, FlightSettings, fly};
+
+use super::{Ellipse, arm, outdoors, still, wall};
+
+/// Outdoors with an interlock, and a valve that follows at once.
+fn interlocked(seed: u64, faults: Faults) -> FlightSettings {
+    let valve = Valve { dead_time: 0.0, lead: 0.0, interlock: Some(Interlock::default()) };
+    FlightSettings { valve, faults, ..outdoors(seed) }
+}
+
+/// Stands still and sweeps the spray over the wall, 8 cm to either side.
+struct Sweep;
+
+impl Reference for Sweep {
+    fn duration(&self) -> f64 {
+        6.0
+    }
+
+    fn at(&self, t: f64) -> ReferenceState {
+        let state = still();
+        ReferenceState { aim: state.aim.map(|aim| aim + Vector3::new(0.0, 0.08 * (0.8 * t).sin(), 0.0)), ..state }
+    }
+}
+
+/// Whether the spray misses its aim, or is too near or too far, by a centimetre more than the interlock permits: its estimate lags.
+fn beyond(sample: &FlightSample) -> bool {
+    let ray = sample.aim.unwrap() - sample.nozzle;
+    ray.cross(&sample.axis).norm() > 0.025 || (ray.dot(&sample.axis) - sample.wanted_distance).abs() > 0.06
+}
+
+#[test]
+fn in_the_usual_wind_the_interlock_changes_nothing() {
+    let reference = Ellipse { duration: 20.0 };
+    let valve = Valve { interlock: Some(Interlock::default()), ..Valve::default() };
+    let with = fly(&reference, &mut arm(), &wall(), &FlightSettings { valve, ..outdoors(3) }).unwrap();
+    assert_eq!(with, fly(&reference, &mut arm(), &wall(), &outdoors(3)).unwrap());
+    assert_eq!(with.statistics().held_samples, 0);
+}
+
+#[test]
+fn without_a_pose_the_valve_is_shut() {
+    let faults = Faults { pose_lost: Some(3.0), ..Faults::default() };
+    let reference = Ellipse { duration: 5.0 };
+    let log = fly(&reference, &mut arm(), &wall(), &interlocked(1, faults)).unwrap();
+    for sample in &log.samples {
+        let lost = sample.time > 3.0 - 1e-9;
+        assert_eq!((sample.flow > 0.0, sample.held), (!lost, lost), "at {}", sample.time);
+    }
+    assert_eq!(log.statistics().held_samples, 201);
+    // Paint follows the command after the valve's dead time.
+    let late = Valve { dead_time: 0.05, lead: 0.05, interlock: Some(Interlock::default()) };
+    let late = FlightSettings { valve: late, ..interlocked(1, faults) };
+    let log = fly(&reference, &mut arm(), &wall(), &late).unwrap();
+    let last = log.samples.iter().filter(|s| s.flow > 0.0).map(|s| s.time).fold(0.0, f64::max);
+    assert!((last - 3.04).abs() < 1e-9, "{last}");
+}
+
+#[test]
+fn stuck_servos_and_gusts_beyond_the_limits_shut_the_valve() {
+    let gust = Gust { time: 3.0, velocity: Vector3::new(3.0, -18.0, 0.0) };
+    let cases: [(&str, &dyn Reference, Faults); 2] = [
+        ("stuck", &Sweep, Faults { servos_stuck: Some(3.0), ..Faults::default() }),
+        ("gust", &Ellipse { duration: 4.5 }, Faults { gust: Some(gust), ..Faults::default() }),
+    ];
+    for (name, reference, faults) in cases {
+        for seed in 0..20 {
+            let log = fly(reference, &mut arm(), &wall(), &interlocked(seed, faults)).unwrap();
+            assert!(log.samples.iter().all(|s| s.time > 3.0 || !s.held), "{name} {seed}: held before the fault");
+            assert!(log.samples.iter().any(beyond), "{name} {seed}: no effect");
+            for pair in log.samples.windows(2) {
+                let late = beyond(&pair[0]) && beyond(&pair[1]) && pair[1].flow > 0.0;
+                assert!(!late, "{name} {seed}: paint misses at {}", pair[1].time);
+            }
+            let blind = interlocked(seed, faults);
+            let blind = FlightSettings { valve: Valve { interlock: None, ..blind.valve }, ..blind };
+            let log = fly(reference, &mut arm(), &wall(), &blind).unwrap();
+            assert!(log.samples.iter().any(|s| beyond(s) && s.flow > 0.0), "{name} {seed}: nothing to prevent");
+        }
+    }
+}
+
+#[test]
+fn faults_and_interlocks_out_of_range_are_refused() {
+    let refused = |settings: &FlightSettings| {
+        let flown = fly(&Ellipse { duration: 1.0 }, &mut arm(), &wall(), settings);
+        matches!(flown, Err(Error::OutOfRange { .. } | Error::NotFinite { .. }))
+    };
+    let gust = Gust { time: 1.0, velocity: Vector3::new(f64::NAN, 0.0, 0.0) };
+    assert!(refused(&interlocked(0, Faults { gust: Some(gust), ..Faults::default() })));
+    let wind = Wind { mean: Vector3::new(0.0, f64::NAN, 0.0), ..Wind::default() };
+    assert!(refused(&FlightSettings { wind, ..outdoors(0) }));
+    assert!(refused(&interlocked(0, Faults { pose_lost: Some(-1.0), ..Faults::default() })));
+    let valve = Valve { interlock: Some(Interlock { miss: 0.0, distance: 0.05 }), ..Valve::default() };
+    assert!(refused(&FlightSettings { valve, ..outdoors(0) }));
+}

@@ -1,0 +1,4 @@
+//! First charts: regions of similar normals, and charts of a coarse surface carried over to the fine one.
+
+pub(in crate::atlas) mod shape_approximation;
+pub(in crate::atlas) mod transfer;
