@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use clap::Parser;
 use paintcopter::design::Design;
-use paintcopter::mission::{Decision, Mission, MissionSettings, inspect, report, save};
+use paintcopter::mission::{Mission, MissionSettings, PaintingTask, inspect, report, save};
 use paintcopter::region::Scene;
 use paintcopter::report::Check;
 use paintcopter::world::rock_wall;
@@ -84,8 +84,12 @@ fn checks(seed: u64, threads: Option<u16>, folder: Option<&Path>) -> Result<Vec<
     if let Some(folder) = folder {
         std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}; choose another --out", folder.display()))?;
     }
-    let mission =
-        Mission::run(Decision::make("Rock wall", &Scene::whole(rock_wall(seed)), &Design::Strata { seed }, settings)?)?;
+    let mission = Mission::run(PaintingTask::new(
+        "Rock wall",
+        &Scene::whole(rock_wall(seed)),
+        &Design::Strata { seed },
+        settings,
+    )?)?;
     let report = match folder {
         Some(folder) => save(&mission, folder)?,
         None => report(&mission, &inspect(&mission)?)?,

@@ -3,10 +3,10 @@
 use std::error::Error;
 
 use nalgebra::Vector5;
-use paint_planner::{
-    Clarabel, InteriorPoint, OptimalPlanner, Planner, PrimalDualActiveSet, QpSolver, SmoothingPlanner, Trajectory,
-    stroke_program,
-};
+use paint_planner::nozzle::{Clarabel, InteriorPoint, PrimalDualActiveSet, QpSolver, stroke_program};
+use paint_planner::plan::SmoothingPlanner;
+use paint_planner::trajectory::Trajectory;
+use paint_planner::{OptimalPlanner, Planner};
 use paintcopter::adapters::{MeshSurface, Robot};
 use paintcopter::mission::MissionSettings;
 use paintcopter_benches::planner::helix;

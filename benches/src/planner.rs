@@ -1,7 +1,7 @@
 //! The planner beside general solvers: its programs in a form that they read, and its own figures.
 
 // The tests' wall stands for itself.
-#[path = "../../paint-planner/tests/planner/walls.rs"]
+#[path = "../../paint-planner/tests/it/walls.rs"]
 #[allow(dead_code)]
 mod walls;
 
@@ -10,11 +10,14 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3, Vector4, Vector5};
-use paint_planner::{
-    Clarabel, HeadingSettings, HeadingTable, InteriorPoint, NozzleSettings, OptimalPlanner, Plan, Planner,
-    PrimalDualActiveSet, QpSolver, Settings, StandardForm, StrokeEnds, Target, TimingPolicy, Trajectory, order_strokes,
-    stroke_program, transit_lower_bound,
+use paint_planner::heading::{HeadingSettings, HeadingTable};
+use paint_planner::nozzle::{
+    Clarabel, InteriorPoint, NozzleSettings, PrimalDualActiveSet, QpSolver, StandardForm, stroke_program,
 };
+use paint_planner::stroke_order::{StrokeEnds, order_strokes, transit_lower_bound};
+use paint_planner::timing::TimingPolicy;
+use paint_planner::trajectory::Trajectory;
+use paint_planner::{OptimalPlanner, Plan, Planner, Settings, Target};
 use paint_sim::TriangleSurface;
 use paintcopter::adapters::{MeshSurface, Robot};
 use paintcopter::mission::MissionSettings;

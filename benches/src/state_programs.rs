@@ -4,7 +4,8 @@ use std::error::Error;
 use std::path::Path;
 
 use nalgebra::{DMatrix, DVector, Matrix5, Point3, UnitVector3, Vector3, Vector5};
-use paint_planner::{GaussSeidel, NozzleSettings, QpSolver, QuadraticProgram, StandardForm, Target, state_programs};
+use paint_planner::Target;
+use paint_planner::nozzle::{GaussSeidel, NozzleSettings, QpSolver, QuadraticProgram, StandardForm, state_programs};
 use serde_json::json;
 
 use crate::Rng;

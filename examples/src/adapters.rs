@@ -2,14 +2,17 @@
 //! gives it.
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
+use paint_planner::constraints::Tether;
 use paint_planner::control::{
     AttitudeResponse, ControlReference, ControlState, MpcSettings, TrackingMpc, VehicleModel,
 };
-use paint_planner::{NozzleState, Plan, Tether, Tool, VehicleState};
+use paint_planner::{NozzleState, Plan, Tool, VehicleState};
+use paint_planner::mission::Chart;
 use paint_sim::TriangleSurface;
 use paint_sim::flight::{Airframe, Command, Controller, Estimate, GRAVITY};
+use crate::surface::PaintSurface;
 use paint_sim::flight::{PanTilt, Reference, ReferenceState};
-use ptu_kinematics::{Hover, Joints, KinematicChain, Ptu, Servo};
+use ptu_kinematics::{CollisionBody, Hover, Joints, KinematicChain, Ptu, Servo};
 
 /// The simulator's mesh as the planner's surface.
 pub struct MeshSurface<'a>(pub &'a TriangleSurface);
@@ -31,45 +34,32 @@ impl paint_planner::Surface for MeshSurface<'_> {
     }
 }
 
+/// The picture plane of a surface as the planner's chart, in texels.
+impl Chart for PaintSurface {
+    fn lift(&self, [x, y]: [f64; 2]) -> Option<(Point3<f64>, UnitVector3<f64>)> {
+        self.lift(x, y)
+    }
+
+    fn lift_from(&self, place: [f64; 2], offset: [f64; 2]) -> Option<(Point3<f64>, UnitVector3<f64>)> {
+        self.lift_from(place, offset)
+    }
+}
+
 /// A kinematic chain, with the room it takes, as the planner's tool.
 #[derive(Debug, Clone)]
 pub struct Robot<C = Ptu> {
     /// The chain.
     pub chain: C,
-    /// Radius of the sphere about the body that holds the rotors, metres.
-    pub body_radius: f64,
-    /// Radius of the arm and the gun, metres.
-    pub arm_radius: f64,
+    /// The room that it takes.
+    pub body: CollisionBody,
     /// The hose or tether that it keeps behind it.
     pub tether: Option<Tether>,
 }
 
 impl<C: KinematicChain> Robot<C> {
-    /// The chain with its limits, a body of 35 cm radius and an arm 5 cm thick.
+    /// The chain with its limits and the room of the usual vehicle.
     pub fn new(chain: C) -> Self {
-        Self { chain, body_radius: 0.35, arm_radius: 0.025, tether: None }
-    }
-
-    /// Spheres that cover the robot in any pose of the body: rotors, arm, gun without its last centimetres.
-    pub fn spheres_at(&self, world_from_body: &Isometry3<f64>, joints: &C::Joints, out: &mut Vec<(Point3<f64>, f64)>) {
-        let body = Point3::from(world_from_body.translation.vector);
-        let nozzle = self.chain.forward(world_from_body, joints);
-        let mut members = self.chain.members(world_from_body, joints);
-        // The sphere at the tip ends where the paint begins.
-        if let Some(tip) = members.last_mut() {
-            *tip = nozzle.tip - nozzle.direction.into_inner() * self.arm_radius;
-        }
-        out.push((body, self.body_radius));
-        if let Some(shoulder) = members.first() {
-            for share in [0.75, 1.0] {
-                out.push((body + (shoulder - body) * share, self.arm_radius));
-            }
-        }
-        for member in members.windows(2) {
-            for share in [0.33, 0.67, 1.0] {
-                out.push((member[0] + (member[1] - member[0]) * share, self.arm_radius));
-            }
-        }
+        Self { chain, body: CollisionBody::default(), tether: None }
     }
 }
 
@@ -85,7 +75,7 @@ impl<C: KinematicChain> Tool for Robot<C> {
     fn spheres(&self, vehicle: &VehicleState, out: &mut Vec<(Point3<f64>, f64)>) {
         let joints = self.chain.point(vehicle.pan, vehicle.tilt);
         let hover = Hover { position: vehicle.position, heading: vehicle.heading, joints };
-        self.spheres_at(&hover.world_from_body(), &hover.joints, out);
+        self.body.spheres(&self.chain, &hover.world_from_body(), &hover.joints, out);
     }
 
     fn permits(&self, vehicle: &VehicleState) -> bool {

@@ -5,7 +5,6 @@ pub mod adapters;
 pub mod appearance;
 pub mod design;
 pub mod exit;
-pub mod flight_constraints;
 #[cfg(feature = "handheld")]
 pub mod handheld;
 #[cfg(feature = "recordings")]
@@ -32,7 +31,6 @@ pub mod scan;
 pub mod scan_flight;
 mod srgb;
 pub mod surface;
-pub mod targets;
 pub mod textured_mesh;
 #[cfg(feature = "unwrap")]
 pub mod unwrap;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use paint_planner::TimingPolicy;
+use paint_planner::timing::TimingPolicy;
 
 use crate::mesh_placement::UpAxis;
 use crate::mission::{MissionSettings, PainterChoice};

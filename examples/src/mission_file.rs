@@ -10,7 +10,7 @@ use crate::appearance::{Appearance, UNIT_THICKNESS};
 use crate::design::{Design, DesignError, MATERIALS, Picture};
 use crate::mesh_io::{MeshError, TriangleMesh, read_mesh};
 use crate::mesh_placement::{MeshPlacement, PlacementError, UpAxis, place_mesh, place_scene};
-use crate::mission::{Decision, MissionError, MissionSettings};
+use crate::mission::{MissionError, MissionSettings, PaintingTask};
 use crate::mission_paint::{MissionPaint, absolute, file_of_design};
 use crate::region::{Region, RegionError, Scene};
 use crate::scan_flight::{ScanFlight, ScanFlightError, save as save_scan_flight};
@@ -199,7 +199,7 @@ impl MissionFile {
     ///
     /// # Errors
     /// A file with several paints among others: see [`MissionFile::decide_coats`].
-    pub fn decide(&self, folder: &Path) -> Result<Decision, MissionFileError> {
+    pub fn decide(&self, folder: &Path) -> Result<PaintingTask, MissionFileError> {
         if !self.paints.is_empty() {
             return Err(MissionFileError::Paints("several paints are several decisions".into()));
         }
@@ -222,7 +222,7 @@ impl MissionFile {
     }
 
     /// Reads the design and decides.
-    fn decide_on(&self, Place { name, scene, truth }: &Place) -> Result<Decision, MissionFileError> {
+    fn decide_on(&self, Place { name, scene, truth }: &Place) -> Result<PaintingTask, MissionFileError> {
         let settings = self.settings.clone();
         let mesh = &scene.canvas;
         let materials = mesh.materials.as_ref().filter(|materials| materials.textured() && mesh.uv.is_some());
@@ -240,12 +240,12 @@ impl MissionFile {
             (None, None, None) if self.mesh.is_some() => Design::Stripes,
             (None, None, None) => Design::Strata { seed: settings.seed },
         };
-        let decision = Decision::make(name, scene, &design, settings);
-        let decision = decision.and_then(|decision| match truth {
-            Some(truth) => decision.before(truth),
-            None => Ok(decision),
+        let task = PaintingTask::new(name, scene, &design, settings);
+        let task = task.and_then(|task| match truth {
+            Some(truth) => task.on_true_surface(truth),
+            None => Ok(task),
         });
-        decision.map_err(|source| self.in_mesh(source))
+        task.map_err(|source| self.in_mesh(source))
     }
 
     /// The design of an even coat.

@@ -66,7 +66,7 @@ pub enum Error {
         /// Distance between the collision body and the surface, m (negative: overlap).
         clearance: f64,
     },
-    /// Knots and durations given to [`Trajectory`](crate::Trajectory) do not describe a curve.
+    /// Knots and durations given to [`Trajectory`](crate::trajectory::Trajectory) do not describe a curve.
     #[error("trajectory knot {index}: {what}")]
     Knot {
         /// Index of the knot or segment.

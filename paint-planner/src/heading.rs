@@ -6,17 +6,18 @@ mod table;
 mod viterbi;
 
 use crate::clearance::{ClearanceChecker, DistanceCache};
-use crate::settings::HeadingSettings;
+use crate::not_served::NotServed;
 use crate::target::NozzleState;
 use crate::world::VehicleState;
 
+pub use crate::settings::HeadingSettings;
 pub(crate) use graph::HeadingGraph;
 pub use table::{HeadingPath, HeadingTable};
 
 /// Vehicle states of the nozzle states that have an admissible heading.
 pub(crate) struct Headings {
-    /// One per nozzle state.
-    pub(crate) vehicle: Vec<Option<VehicleState>>,
+    /// One per nozzle state, or why it has none.
+    pub(crate) vehicle: Vec<Result<VehicleState, NotServed>>,
     /// `joined[i]`: the vehicle may fly straight from the state i to the state i+1.
     pub(crate) joined: Vec<bool>,
     /// Optimal cost on the grid.
@@ -33,7 +34,7 @@ const LAZY_SEARCHES: usize = 8;
 /// and Srinivasa 2016).
 fn best_path(
     graph: &mut HeadingGraph,
-    nozzles: &[Option<NozzleState>],
+    nozzles: &[Result<NozzleState, NotServed>],
     linked: &[bool],
     checker: &mut ClearanceChecker<'_>,
     clearance: &[f64],
@@ -60,21 +61,22 @@ fn best_path(
 /// i and i+1 belong to one stroke.
 pub(crate) fn choose_headings(
     graph: &mut HeadingGraph,
-    nozzles: &[Option<NozzleState>],
+    nozzles: &[Result<NozzleState, NotServed>],
     linked: &[bool],
     checker: &mut ClearanceChecker<'_>,
     clearance: &[f64],
     settings: &HeadingSettings,
 ) -> Headings {
     let path = best_path(graph, nozzles, linked, checker, clearance, settings);
-    let mut vehicle: Vec<Option<VehicleState>> = vec![None; nozzles.len()];
+    let mut vehicle: Vec<Result<VehicleState, NotServed>> =
+        nozzles.iter().map(|nozzle| nozzle.and(Err(NotServed::NoHeading))).collect();
     let mut joined = vec![false; nozzles.len().saturating_sub(1)];
     for run in path.runs() {
         let on_grid: Vec<f64> = run.clone().map(|i| graph.heading(path.bins[i].unwrap_or(0))).collect();
-        let states: Vec<NozzleState> = run.clone().filter_map(|i| nozzles[i]).collect();
+        let states: Vec<NozzleState> = run.clone().filter_map(|i| nozzles[i].ok()).collect();
         let smoothed = smooth_off_grid(&states, &on_grid, checker, &clearance[run.clone()], settings);
         for (i, state) in run.clone().zip(smoothed) {
-            vehicle[i] = state;
+            vehicle[i] = state.ok_or(NotServed::NoHeading);
         }
         joined[run.start..run.end - 1].fill(true);
     }
@@ -159,7 +161,8 @@ mod tests {
             position: Point3::new(-0.1 - 0.02 * (0.3 * k as f64).sin(), 0.02 * k as f64, 1.0),
             direction: Vector3::x_axis(),
         };
-        let nozzles: Vec<Option<NozzleState>> = (0..80).map(|k| (k != 33).then(|| nozzle(k))).collect();
+        let nozzles: Vec<Result<NozzleState, NotServed>> =
+            (0..80).map(|k| if k == 33 { Err(NotServed::Hidden) } else { Ok(nozzle(k)) }).collect();
         let linked: Vec<bool> = (0..79).map(|k| k != 50).collect();
         for (window, clearance) in [(3, 0.01), (1, 0.01), (3, 0.06), (6, 0.1)] {
             let settings = HeadingSettings { window, ..HeadingSettings::default() };

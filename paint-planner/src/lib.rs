@@ -49,14 +49,14 @@
 //!
 //! | paper | item |
 //! |---|---|
-//! | VR paper, Eqs. (1)-(6) = thesis, Eqs. (7.1)-(7.6) | [`OptimalPlanner`] with [`Mode::PaperExact`]; [`Mode::Sequential`] is the default |
-//! | VR paper, Eq. (7) = thesis, Eq. (7.7) | [`HeadingSettings`], searched globally |
-//! | thesis, section 7.5, timing | [`TimingPolicy`] |
-//! | Held and Karp 1970, travelling salesman | [`order_strokes`], [`transit_lower_bound`] |
-//! | Richter et al., minimum snap | [`Trajectory::minimum_snap`] |
-//! | Paper II, section 6.2, LOWESS baseline | [`SmoothingPlanner`] |
+//! | VR paper, Eqs. (1)-(6) = thesis, Eqs. (7.1)-(7.6) | [`OptimalPlanner`] with [`nozzle::Mode::PaperExact`]; [`nozzle::Mode::Sequential`] is the default |
+//! | VR paper, Eq. (7) = thesis, Eq. (7.7) | [`heading::HeadingSettings`], searched globally |
+//! | thesis, section 7.5, timing | [`timing::TimingPolicy`] |
+//! | Held and Karp 1970, travelling salesman | [`stroke_order::order_strokes`], [`stroke_order::transit_lower_bound`] |
+//! | Richter et al., minimum snap | [`trajectory::Trajectory::minimum_snap`] |
+//! | Paper II, section 6.2, LOWESS baseline | [`plan::SmoothingPlanner`] |
 //! | Paper II, section 5.2, first-order attitude | [`control::TrackingMpc`], [`control::identify_attitude`] |
-//! | VR paper, section V, deviation from the normal | [`normal_deviation`] |
+//! | VR paper, section V, deviation from the normal | [`Target::normal_deviation`] |
 //! | handheld paper, section IV, Eqs. (1)-(5) | [`gantry`] |
 //! | VR paper, Algorithm 1, rules (a)-(e), latencies | [`session`] |
 
@@ -64,50 +64,37 @@ mod angle;
 mod bernstein;
 mod block_tridiagonal;
 mod clearance;
+pub mod constraints;
 pub mod control;
 mod error;
 pub mod gantry;
 mod gravity;
-mod heading;
-mod keep_out;
+pub mod heading;
 mod lattice;
 mod lowess;
 mod minimum_snap;
-mod nozzle;
-mod plan;
-mod planner;
-mod reach;
+pub mod mission;
+mod not_served;
+pub mod nozzle;
+pub mod plan;
+mod raise_clearance;
 mod route;
 pub mod session;
 mod settings;
-mod stroke_order;
+pub mod stroke_order;
 mod target;
-mod tether;
-mod timing;
+pub mod timing;
 mod trace;
-mod trajectory;
+pub mod trajectory;
 mod transit;
 mod visibility;
 mod world;
 
 pub use error::Error;
-pub use heading::{HeadingPath, HeadingTable};
-pub use keep_out::{KeepOutVolume, WithKeepOut};
 pub use nalgebra;
-#[cfg(feature = "clarabel")]
-pub use nozzle::Clarabel;
-pub use nozzle::{
-    GaussSeidel, InteriorPoint, Mode, PrimalDualActiveSet, QpOutcome, QpSolver, QuadraticProgram, StandardForm,
-    state_programs, stroke_program,
-};
-pub use plan::{NotServed, Plan, PlanReport, Setpoint, Waypoint};
-pub use planner::{OptimalPlanner, Planner, SmoothingPlanner, plan};
-pub use reach::reachable_targets;
-pub use settings::{HeadingSettings, LowessSettings, NozzleSettings, Settings, TimingPolicy, TimingSettings};
-pub use stroke_order::{OrderedStroke, StrokeEnds, StrokeOrder, order_strokes, transit_lower_bound};
-pub use target::{NozzleState, Target, normal_deviation};
-pub use tether::Tether;
-pub use trajectory::{Extrema, Sample, Trajectory};
+pub use plan::{OptimalPlanner, Plan, Planner, plan};
+pub use settings::Settings;
+pub use target::{NozzleState, Target};
 pub use world::{Hit, Surface, Tool, VehicleState};
 
 /// The recipe of the README.

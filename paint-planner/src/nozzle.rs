@@ -19,7 +19,7 @@ mod standard_form;
 mod tests;
 
 use crate::error::Error;
-use crate::settings::NozzleSettings;
+pub use crate::settings::NozzleSettings;
 use crate::target::Target;
 
 #[cfg(feature = "clarabel")]

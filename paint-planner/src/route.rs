@@ -3,6 +3,7 @@
 use crate::angle::nearest_equivalent;
 use crate::clearance::ClearanceChecker;
 use crate::error::Error;
+use crate::not_served::NotServed;
 use crate::settings::Settings;
 use crate::transit::{TransitPlanner, between};
 use crate::world::VehicleState;
@@ -24,7 +25,7 @@ pub(crate) struct RoutePoint {
 /// A stroke that no flight leads to is dropped from `vehicle`; an error means that none is left, or that the goal pose
 /// cannot be reached.
 pub(crate) fn build(
-    vehicle: &mut [Option<VehicleState>],
+    vehicle: &mut [Result<VehicleState, NotServed>],
     joined: &[bool],
     mut checker: Option<&mut ClearanceChecker<'_>>,
     clearance: &[f64],
@@ -40,7 +41,7 @@ pub(crate) fn build(
     let (mut on_route, mut dropping) = (false, false);
     for i in 0..vehicle.len() {
         let follows = i > 0 && joined[i - 1];
-        let Some(state) = vehicle[i] else {
+        let Ok(state) = vehicle[i] else {
             (on_route, dropping) = (false, false);
             continue;
         };
@@ -60,7 +61,7 @@ pub(crate) fn build(
         }
         on_route = !dropping;
         if dropping {
-            vehicle[i] = None;
+            vehicle[i] = Err(NotServed::NoTransit);
             continue;
         }
         push(&mut route, state, Some(i), rest);

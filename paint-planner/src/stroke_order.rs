@@ -21,7 +21,7 @@ use transit_cost::TransitCost;
 pub struct StrokeOrder {
     /// Every stroke once.
     pub strokes: Vec<OrderedStroke>,
-    /// Estimated duration of all transits, s: rest to rest within the limits of [`TimingSettings`](crate::TimingSettings),
+    /// Estimated duration of all transits, s: rest to rest within the limits of [`TimingSettings`](crate::timing::TimingSettings),
     /// obstacles left aside; at the speed of a stroke where the next one begins within `break_length`.
     pub transit_time: f64,
 }

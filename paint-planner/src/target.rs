@@ -14,7 +14,7 @@ pub struct Target {
     /// Paint wanted per metre of stroke from here to the next target, m^3/m; 0 means valve shut.
     pub dose: f64,
     /// Time stamp of the person who drew the stroke, s; needed by
-    /// [`TimingPolicy::GradientPreserving`](crate::TimingPolicy::GradientPreserving) only.
+    /// [`TimingPolicy::GradientPreserving`](crate::timing::TimingPolicy::GradientPreserving) only.
     pub time: Option<f64>,
 }
 
@@ -28,15 +28,17 @@ pub struct NozzleState {
     pub direction: UnitVector3<f64>,
 }
 
-/// Distance of the nozzle from the normal line of the target, `|n x (p - t)|`, m (VR paper, section V).
-///
-/// ```
-/// # use paint_planner::{Target, normal_deviation, nalgebra::{Point3, Vector3}};
-/// let target = Target { point: Point3::origin(), normal: Vector3::z_axis(), dose: 0.0, time: None };
-/// assert_eq!(normal_deviation(&target, &Point3::new(0.03, 0.04, 0.1)), 0.05);
-/// ```
-pub fn normal_deviation(target: &Target, nozzle_position: &Point3<f64>) -> f64 {
-    target.normal.cross(&(nozzle_position - target.point)).norm()
+impl Target {
+    /// Distance of a nozzle from the normal line of the target, `|n x (p - t)|`, m (VR paper, section V).
+    ///
+    /// ```
+    /// # use paint_planner::{Target, nalgebra::{Point3, Vector3}};
+    /// let target = Target { point: Point3::origin(), normal: Vector3::z_axis(), dose: 0.0, time: None };
+    /// assert_eq!(target.normal_deviation(&Point3::new(0.03, 0.04, 0.1)), 0.05);
+    /// ```
+    pub fn normal_deviation(&self, nozzle_position: &Point3<f64>) -> f64 {
+        self.normal.cross(&(nozzle_position - self.point)).norm()
+    }
 }
 
 /// Refuses paths that no planner can read.

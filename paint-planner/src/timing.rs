@@ -5,7 +5,7 @@ pub(crate) mod speed_profile;
 use crate::error::Error;
 use crate::minimum_snap::KnotDerivatives;
 use crate::route::RoutePoint;
-use crate::settings::{TimingPolicy, TimingSettings};
+pub use crate::settings::{TimingPolicy, TimingSettings};
 use crate::target::Target;
 use crate::trajectory::{Extrema, Trajectory};
 use nalgebra::Vector4;

@@ -3,6 +3,7 @@
 use nalgebra::Point3;
 
 use crate::error::Error;
+use crate::not_served::NotServed;
 use crate::target::{NozzleState, Target};
 use crate::world::Surface;
 
@@ -53,19 +54,19 @@ pub(crate) fn look(target: &Target, nozzle: &NozzleState, surface: &dyn Surface)
 /// from behind: then targets and surface do not belong together, and a plan would paint the air or the inside of a wall.
 pub(crate) fn drop_hidden(
     targets: &[Target],
-    states: &mut [Option<NozzleState>],
+    states: &mut [Result<NozzleState, NotServed>],
     surface: &dyn Surface,
 ) -> Result<(), Error> {
     let (mut seen, mut back, mut nothing) = (0_usize, 0_usize, None);
     for (target, state) in targets.iter().zip(states) {
-        let Some(nozzle) = state else { continue };
+        let Ok(nozzle) = state else { continue };
         match look(target, nozzle, surface)? {
             Sight::Target => seen += 1,
             Sight::Back => back += 1,
             Sight::Nothing => nothing = nothing.or(Some(target.point)),
             Sight::Obstacle => {
                 seen += 1;
-                *state = None;
+                *state = Err(NotServed::Hidden);
             }
         }
     }

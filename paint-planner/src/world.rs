@@ -62,7 +62,7 @@ pub trait Tool: Sync {
     /// Appends the collision body as (centre in world, radius) spheres, m: always the same number in the same order.
     fn spheres(&self, vehicle: &VehicleState, out: &mut Vec<(Point3<f64>, f64)>);
 
-    /// Whether the vehicle may be in this state for reasons beside joints and collisions, such as a [`Tether`](crate::Tether). Asked at every
+    /// Whether the vehicle may be in this state for reasons beside joints and collisions, such as a [`Tether`](crate::constraints::Tether). Asked at every
     /// target, and every 5 cm of the flights between strokes.
     fn permits(&self, vehicle: &VehicleState) -> bool {
         let _ = vehicle;

@@ -34,7 +34,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let coats = mission_file.decide_coats(folder)?;
     if arguments.preview {
         for coat in coats {
-            let found = preview(&coat.decision, &coat.folder)?;
+            let found = preview(&coat.task, &coat.folder)?;
             eprintln!("{}", found.summary());
             println!("{}", coat.folder.join("preview.png").display());
         }

@@ -33,7 +33,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let mission_file = arguments.mission.mission_file()?;
     mission_file.write_into(folder)?;
     for coat in mission_file.decide_coats(folder)? {
-        let mission = PlannedMission::new(coat.decision).map_err(|error| mission_file.in_mesh(error))?;
+        let mission = PlannedMission::new(coat.task).map_err(|error| mission_file.in_mesh(error))?;
         let figures = save_plan(&mission, &coat.folder)?;
         eprintln!("{}", figures.summary());
         println!("{}", coat.folder.join("plan.csv").display());

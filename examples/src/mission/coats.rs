@@ -6,8 +6,8 @@ use paint_net::Image;
 use paint_sim::colour::spectrum_linear_srgb;
 use paint_sim::{Paint, Substrate};
 
-use super::decision::Decision;
 use super::error::MissionError;
+use super::painting_task::PaintingTask;
 use super::planned_mission::PlannedMission;
 use super::run::Mission;
 use crate::appearance::{UNIT_THICKNESS, sandstone};
@@ -17,7 +17,7 @@ pub struct Coat {
     /// Where its results belong.
     pub folder: PathBuf,
     /// The sprays.
-    pub decision: Decision,
+    pub task: PaintingTask,
 }
 
 /// The missions of all paints, flown. Each is complete in itself; its pictures show its paint alone.
@@ -32,10 +32,10 @@ impl Coats {
     /// As [`Mission::run`]; the error of one of several paints names it.
     pub fn run(coats: Vec<Coat>) -> Result<Self, MissionError> {
         let several = coats.len() > 1;
-        let each = |Coat { folder, decision }| {
-            let paint = decision.settings.paint;
+        let each = |Coat { folder, task }| {
+            let paint = task.settings.paint;
             let named = |error: MissionError| if several { error.in_paint(paint) } else { error };
-            Ok((folder, PlannedMission::new(decision).map_err(named)?))
+            Ok((folder, PlannedMission::new(task).map_err(named)?))
         };
         // What cannot be planned is known before anything is flown.
         let planned: Vec<(PathBuf, PlannedMission)> =
@@ -55,10 +55,10 @@ impl Coats {
         let layers: Vec<(Paint, Image)> = self
             .missions
             .iter()
-            .map(|(_, mission)| Ok((mission.decision.settings.paint.paint()?, depth(mission))))
+            .map(|(_, mission)| Ok((mission.task.settings.paint.paint()?, depth(mission))))
             .collect::<Result<_, MissionError>>()?;
         let Some((_, first)) = self.missions.first() else { return Ok(Vec::new()) };
-        let covered = first.decision.coverage.data();
+        let covered = first.task.coverage.data();
         let wall = |(k, covered): (usize, &f64)| {
             let films = layers.iter().map(|(paint, depth)| (paint, depth.data()[k] * UNIT_THICKNESS));
             (*covered > 0.0).then(|| over_each_other(films, &ground)).transpose()

@@ -131,17 +131,17 @@ fn save_pictures(
     folder: &Path,
 ) -> Result<(), MissionError> {
     let Some((_, mission)) = coats.missions().next() else { return Ok(()) };
-    let decision = &mission.decision;
-    let (width, height) = (decision.wanted.width(), decision.wanted.height());
+    let task = &mission.task;
+    let (width, height) = (task.wanted.width(), task.wanted.height());
     for (walls, name) in [(wanted, "wanted.png"), (painted, "painted.png")] {
         let pixels = walls.iter().map(|wall| wall.as_ref().map_or(BACKGROUND, |wall| wall.srgb().rgb));
         let picture = Rgb::from_pixels(width, height, pixels);
         picture.enlarged((1400 / width as u32).clamp(1, 8)).save(&folder.join(name))?;
     }
     let colours: [Image; 3] = linear(painted, width, height)?;
-    let corners: Vec<Point3<f64>> = decision.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
-    let shade = |hit: &Hit| shading_of_colours(decision, &colours, hit);
-    let frame = view(decision, &camera(decision, &corners)?, &shade)?;
+    let corners: Vec<Point3<f64>> = task.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
+    let shade = |hit: &Hit| shading_of_colours(task, &colours, hit);
+    let frame = view(task, &camera(task, &corners)?, &shade)?;
     Ok(picture_of(&frame).save(&folder.join("painted_view.png"))?)
 }
 
@@ -162,7 +162,7 @@ fn figures(
         version: env!("CARGO_PKG_VERSION"),
         surface: reports.first().map_or_else(String::new, |report| report.surface.clone()),
         seed: reports.first().map_or(0, |report| report.seed),
-        paints: coats.missions().map(|(_, mission)| mission.decision.settings.paint.as_str()).collect(),
+        paints: coats.missions().map(|(_, mission)| mission.task.settings.paint.as_str()).collect(),
         folders: coats.missions().map(|(folder, _)| name(folder)).collect(),
         flight_time_s_by_paint: of(|r| r.flight_time_s),
         paint_deposited_kg_by_paint: of(|r| r.paint_deposited_kg),

@@ -51,12 +51,13 @@ pub(super) fn decide(
         PainterChoice::Pursuit => Box::new(MatchingPursuit::default()),
     };
     let footprints = Footprints::new(surface, settings)?;
-    let footprints = |strokes: &[Stroke]| footprints.of(strokes);
-    let layers = match settings.painter {
+    let on_surface = |strokes: &[Stroke]| footprints.of(strokes);
+    let painted = match settings.painter {
         // The doses of a coat are corrected when the nozzle's poses are known.
         PainterChoice::Fill => paint(painter, settings.layered, &problem, &mut progress),
-        _ => paint(OnSurface::new(painter, &footprints), settings.layered, &problem, &mut progress),
-    }?;
+        _ => paint(OnSurface::new(painter, &on_surface), settings.layered, &problem, &mut progress),
+    };
+    let layers = footprints.checked(painted)?;
     let sprays: usize = layers.iter().map(|l| l.sprays.len()).sum();
     if sprays == 0 {
         return Err(MissionError::NothingToPaint("no place of it is darker than the bare wall"));

@@ -8,8 +8,8 @@ use paint_planner::{Plan, Target};
 use paint_sim::{SprayModel, Surface, Texel};
 
 use super::decide::UNPAINTABLE_WEIGHT;
-use super::decision::Decision;
 use super::nozzle::spray_model;
+use super::painting_task::PaintingTask;
 use crate::appearance::UNIT_THICKNESS;
 
 /// Edge of a cell of the search for texels, metres: no less than the reach of a spray at the stand-off.
@@ -28,14 +28,14 @@ const MAX_DOSE: f64 = 4.0;
 /// with their plan.
 ///
 /// Returns the deviation over the mean of the thickness that is then expected where the robot can paint.
-pub(super) fn correct_doses(flights: &mut [(&mut [Target], &Plan)], decision: &Decision) -> f64 {
-    let (texels, pixels) = decision.surface.film_texels();
-    let ink = decision.appearance.ink();
-    let wanted: Vec<f64> = pixels.iter().map(|&k| ink.inverse(decision.wanted.data()[k]) * UNIT_THICKNESS).collect();
+pub(super) fn correct_doses(flights: &mut [(&mut [Target], &Plan)], task: &PaintingTask) -> f64 {
+    let (texels, pixels) = task.surface.film_texels();
+    let ink = task.appearance.ink();
+    let wanted: Vec<f64> = pixels.iter().map(|&k| ink.inverse(task.wanted.data()[k]) * UNIT_THICKNESS).collect();
     let weight: Vec<f64> = pixels
         .iter()
         .zip(&texels)
-        .map(|(&k, texel)| texel.area * if decision.in_reach[k] { 1.0 } else { UNPAINTABLE_WEIGHT })
+        .map(|(&k, texel)| texel.area * if task.in_reach[k] { 1.0 } else { UNPAINTABLE_WEIGHT })
         .collect();
     let mut ways: Vec<Way> = Vec::new();
     let mut doses: Vec<f64> = Vec::new();
@@ -45,7 +45,7 @@ pub(super) fn correct_doses(flights: &mut [(&mut [Target], &Plan)], decision: &D
             doses.push(targets[k].dose);
         }
     }
-    let response = Response::new(&ways, &texels, &spray_model(&decision.settings), &decision.surface.world);
+    let response = Response::new(&ways, &texels, &spray_model(&task.settings), &task.surface.world);
     let mut volumes: Vec<f64> = ways.iter().zip(&doses).map(|(way, dose)| dose * way.length).collect();
     doses.sort_unstable_by(f64::total_cmp);
     let most = MAX_DOSE * doses.get(doses.len() / 2).copied().unwrap_or_default();
@@ -64,7 +64,7 @@ pub(super) fn correct_doses(flights: &mut [(&mut [Target], &Plan)], decision: &D
     for (way, volume) in ways.iter().zip(volumes) {
         flights[way.flight].0[way.target].dose = volume / way.length;
     }
-    let reached = (0..texels.len()).filter(|&k| decision.in_reach[pixels[k]] && wanted[k] > 0.0);
+    let reached = (0..texels.len()).filter(|&k| task.in_reach[pixels[k]] && wanted[k] > 0.0);
     let (mut area, mut sum, mut squares) = (0.0, 0.0, 0.0);
     for k in reached {
         let ratio = thickness[k] / wanted[k];

@@ -1,7 +1,7 @@
 //! The figures of a mission.
 
 use paint_net::{ideal, metrics};
-use paint_planner::{Plan, Surface, normal_deviation};
+use paint_planner::{Plan, Surface};
 use paint_sim::flight::FlightLog;
 use paint_sim::flight::{FlightSample, FlightStatistics};
 use paint_sim::spray::QUANTUM;
@@ -9,8 +9,7 @@ use paint_sim::spray::QUANTUM;
 use super::error::MissionError;
 use super::fly::LayerFlight;
 use super::inspect::Inspection;
-use super::plan::path_length;
-use super::rehearse::{GAP_STRIDE, gap};
+use super::rehearsal::{GAP_STRIDE, gap_at};
 use super::run::Mission;
 use super::seams::likeness;
 use super::settings::{MissionSettings, PainterChoice};
@@ -23,46 +22,46 @@ const LIMIT_STEP: f64 = 0.02;
 
 /// All figures, with those of the inspection.
 pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, MissionError> {
-    let quality = mission.decision.surface.chart.quality();
+    let quality = mission.task.surface.chart.quality();
     let deviations = normal_deviations(mission);
     let flown = statistics(&mission.flights, |f| &f.flight);
     let slam = statistics(&mission.flights, |f| &f.slam);
     let locked = statistics(&mission.flights, |f| &f.locked);
     let flight_time: f64 = mission.flights.iter().map(|f| f.plan.trajectory.duration()).sum();
-    let path: f64 = mission.flights.iter().map(|f| path_length(&f.plan)).sum();
+    let path: f64 = mission.flights.iter().map(|f| f.plan.path_length()).sum();
 
     let balance = mission.film.mass_balance();
     let on_texels: u64 = mission.film.volumes().iter().sum();
     let kilograms = |quanta: u64| quanta as f64 * QUANTUM * DENSITY;
     let unaccounted = (i128::from(balance.emitted) - i128::from(on_texels) - i128::from(balance.overspray)).abs();
 
-    let canvas = mission.decision.layers.last().map_or(&mission.decision.wanted, |l| &l.ink);
-    let filtered = ideal(&mission.decision.wanted, mission.decision.settings.spot / mission.decision.settings.texel)?;
+    let canvas = mission.task.layers.last().map_or(&mission.task.wanted, |l| &l.ink);
+    let filtered = ideal(&mission.task.wanted, mission.task.settings.spot / mission.task.settings.texel)?;
     let painted = mission.painted_ink();
-    let weight = Some(&mission.decision.coverage);
-    let in_reach = mission.decision.coverage_in_reach();
+    let weight = Some(&mission.task.coverage);
+    let in_reach = mission.task.coverage_in_reach();
     let in_reach = Some(&in_reach);
-    let fill = (mission.decision.settings.painter == PainterChoice::Fill).then(|| evenness(mission));
+    let fill = (mission.task.settings.painter == PainterChoice::Fill).then(|| evenness(mission));
     let seams = likeness(mission)?;
-    let met = MeshSurface(mission.decision.met());
-    let obstacles = mission.decision.settings.constraints.around(&met);
+    let met = MeshSurface(mission.task.met());
+    let obstacles = mission.task.settings.constraints.around(&met);
     Ok(Report {
         version: env!("CARGO_PKG_VERSION"),
-        surface: mission.decision.name.clone(),
-        seed: mission.decision.settings.seed,
-        surface_area_m2: mission.decision.surface.disk().area(),
-        faces: mission.decision.surface.disk().faces().len(),
+        surface: mission.task.name.clone(),
+        seed: mission.task.settings.seed,
+        surface_area_m2: mission.task.surface.disk().area(),
+        faces: mission.task.surface.disk().faces().len(),
         uv_flips: quality.flips,
         uv_symmetric_dirichlet: quality.symmetric_dirichlet,
         normal_deviation_mean_m: deviations.mean,
         normal_deviation_max_m: deviations.max,
         smoothing_normal_deviation_mean_m: deviations.smoothing_mean,
         unreachable_normal_share: deviations.unreachable,
-        reach_share: mission.decision.share_in_reach(),
-        lost_to_constraints_share: mission.decision.share_lost_to_constraints(),
+        reach_share: mission.task.share_in_reach(),
+        lost_to_constraints_share: mission.task.share_lost_to_constraints(),
         unreachable_paint_share: mission.share_out_of_reach(),
-        targets: mission.service.targets,
-        targets_not_served: mission.service.not_served(),
+        targets: mission.outcomes.targets,
+        targets_not_served: mission.outcomes.not_served(),
         targets_kept_off: mission.kept_off,
         targets_left_bare: mission.left_bare,
         hit_error_rms_m: flown.hit_error_rms,
@@ -76,28 +75,28 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         planning_per_flight_time: mission.planning / flight_time,
         path_length_m: path,
         flight_time_s: flight_time,
-        valve_open_share: mission.flights.iter().map(|f| open_time(&f.plan)).sum::<f64>() / flight_time,
+        valve_open_share: mission.flights.iter().map(|f| f.plan.open_time()).sum::<f64>() / flight_time,
         valve_held_share: share_held(mission),
-        transit_s: mission.flights.iter().map(|f| f.route.transit_s).sum(),
+        transit_s: mission.flights.iter().map(|f| f.route.transit_time).sum(),
         paint_emitted_kg: kilograms(balance.emitted),
         paint_deposited_kg: kilograms(on_texels),
         paint_overspray_kg: kilograms(balance.overspray),
         mass_balance_relative: unaccounted as f64 / balance.emitted.max(1) as f64,
-        psnr_canvas_db: metrics::psnr(canvas, &mission.decision.wanted, weight)?,
-        psnr_ideal_db: metrics::psnr(&filtered, &mission.decision.wanted, weight)?,
-        psnr_canvas_in_reach_db: metrics::psnr(canvas, &mission.decision.wanted, in_reach)?,
-        psnr_ideal_in_reach_db: metrics::psnr(&filtered, &mission.decision.wanted, in_reach)?,
-        psnr_painted_db: metrics::psnr(&painted, &mission.decision.wanted, weight)?,
-        ssim_canvas: metrics::ssim(canvas, &mission.decision.wanted, weight)?,
-        ssim_painted: metrics::ssim(&painted, &mission.decision.wanted, weight)?,
-        ssim_canvas_in_reach: metrics::ssim(canvas, &mission.decision.wanted, in_reach)?,
-        ssim_painted_in_reach: metrics::ssim(&painted, &mission.decision.wanted, in_reach)?,
+        psnr_canvas_db: metrics::psnr(canvas, &mission.task.wanted, weight)?,
+        psnr_ideal_db: metrics::psnr(&filtered, &mission.task.wanted, weight)?,
+        psnr_canvas_in_reach_db: metrics::psnr(canvas, &mission.task.wanted, in_reach)?,
+        psnr_ideal_in_reach_db: metrics::psnr(&filtered, &mission.task.wanted, in_reach)?,
+        psnr_painted_db: metrics::psnr(&painted, &mission.task.wanted, weight)?,
+        ssim_canvas: metrics::ssim(canvas, &mission.task.wanted, weight)?,
+        ssim_painted: metrics::ssim(&painted, &mission.task.wanted, weight)?,
+        ssim_canvas_in_reach: metrics::ssim(canvas, &mission.task.wanted, in_reach)?,
+        ssim_painted_in_reach: metrics::ssim(&painted, &mission.task.wanted, in_reach)?,
         ciede2000_mean: mean(mission.colour_difference().into_iter().flatten()),
-        collisions: mission.flights.iter().map(|f| collisions(&mission.decision.robot, &obstacles, &f.flight)).sum(),
+        collisions: mission.flights.iter().map(|f| collisions(&mission.task.robot, &obstacles, &f.flight)).sum(),
         limit_violations: mission
             .flights
             .iter()
-            .map(|f| limit_violations(&f.plan, &f.flight, &mission.decision.settings))
+            .map(|f| limit_violations(&f.plan, &f.flight, &mission.task.settings))
             .sum(),
         scan_error_mean_m: inspection.mesh_error,
         slam_ate_rms_m: inspection.slam_ate,
@@ -105,12 +104,12 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         fill_thin_share: fill.as_ref().map(|f| f.thin),
         fill_deviation: fill.as_ref().map(|f| f.deviation),
         fill_mean_ratio: fill.as_ref().map(|f| f.mean),
-        seam_length_m: mission.decision.surface.disk().seam_length(),
+        seam_length_m: mission.task.surface.disk().seam_length(),
         ssim_painted_at_seams: seams.as_ref().map(|s| s.near),
         ssim_painted_off_seams: seams.as_ref().map(|s| s.far),
-        layers: mission.decision.layers.len(),
+        layers: mission.task.layers.len(),
         strokes: mission.flights.iter().map(|f| f.route.strokes).sum(),
-        wall_s: mission.decision.started.elapsed().as_secs_f64(),
+        wall_s: mission.task.started.elapsed().as_secs_f64(),
         peak_rss_bytes: peak_resident_bytes(),
     })
 }
@@ -150,17 +149,17 @@ fn normal_deviations(mission: &Mission) -> Deviations {
         for (k, target) in f.route.targets.iter().enumerate().filter(|(_, t)| t.dose > 0.0) {
             total += 1;
             let heading = 0.0;
-            let joints = mission.decision.robot.chain.inverse_unlimited(&target.point, &-target.normal, heading).joints;
+            let joints = mission.task.robot.chain.inverse_unlimited(&target.point, &-target.normal, heading).joints;
             // Any heading will do: only the tilt is decided by the normal.
-            if !mission.decision.settings.ptu.tilt_limits.contains(joints.tilt) {
+            if !mission.task.settings.ptu.tilt_limits.contains(joints.tilt) {
                 out_of_reach += 1;
                 continue;
             }
             if f.plan.reachable[k] {
-                ours.push(normal_deviation(target, &f.plan.nozzle[k].position));
+                ours.push(target.normal_deviation(&f.plan.nozzle[k].position));
             }
             if f.smoothing.reachable[k] {
-                smoothing.push(normal_deviation(target, &f.smoothing.nozzle[k].position));
+                smoothing.push(target.normal_deviation(&f.smoothing.nozzle[k].position));
             }
         }
     }
@@ -172,12 +171,6 @@ fn normal_deviations(mission: &Mission) -> Deviations {
     }
 }
 
-/// Planned time with the valve open, s.
-pub(super) fn open_time(plan: &Plan) -> f64 {
-    let open = plan.target_time.windows(2).zip(&plan.flow).filter(|(_, flow)| **flow > 0.0);
-    open.map(|(times, _)| times[1] - times[0]).sum()
-}
-
 /// Share of the samples with paint asked for in which the interlock kept the valve shut.
 fn share_held(mission: &Mission) -> f64 {
     let samples = || mission.flights.iter().flat_map(|f| &f.flight.samples);
@@ -187,25 +180,12 @@ fn share_held(mission: &Mission) -> f64 {
 
 /// Moments of a flight at which the robot overlaps the surface or is in a keep-out volume.
 fn collisions(robot: &Robot, obstacles: &dyn Surface, log: &FlightLog) -> usize {
-    log.samples.iter().step_by(GAP_STRIDE).filter(|sample| gap(robot, obstacles, sample, 0.0) < 0.0).count()
+    log.samples.iter().step_by(GAP_STRIDE).filter(|sample| gap_at(robot, obstacles, sample, 0.0) < 0.0).count()
 }
 
 /// Moments at which the plan exceeds a limit of speed, acceleration, heading rate or joint rate, or the flown gun its joint limits.
 fn limit_violations(plan: &Plan, flight: &FlightLog, settings: &MissionSettings) -> usize {
-    let timing = &settings.planner.timing;
-    let slack = 1.0 + 1e-9;
-    let steps = (plan.trajectory.duration() / LIMIT_STEP) as usize;
-    let planned = (0..=steps)
-        .map(|k| (plan.setpoint(k as f64 * LIMIT_STEP), plan.setpoint((k + 1) as f64 * LIMIT_STEP)))
-        .filter(|(here, next)| {
-            let s = &here.sample;
-            let joints = (next.pan - here.pan).abs().max((next.tilt - here.tilt).abs());
-            s.velocity.norm() > timing.max_speed * slack
-                || s.acceleration.norm() > timing.max_acceleration * slack
-                || s.heading_rate.abs() > timing.max_heading_rate * slack
-                || joints > LIMIT_STEP * timing.max_joint_rate * slack
-        })
-        .count();
+    let planned = plan.limit_violations(&settings.planner.timing, LIMIT_STEP);
     let ptu = &settings.ptu;
     // The servo's steps do not divide the limits: allow one half step.
     let margin = 0.5 * settings.servo.resolution;
@@ -239,7 +219,7 @@ pub(super) fn mean(values: impl Iterator<Item = f64>) -> f64 {
 mod tests {
     use super::super::test_panel;
     use super::*;
-    use ptu_kinematics::{Ptu, PtuSettings, Range};
+    use ptu_kinematics::{CollisionBody, Ptu, PtuSettings, Range};
 
     /// None where the planner kept clear, all of them for a robot that is larger than its distance from the wall.
     #[test]
@@ -251,7 +231,10 @@ mod tests {
         let robot = Robot::new(Ptu::new(settings.ptu).unwrap());
         assert_eq!(collisions(&robot, world, &flight), 0);
         let checked = flight.samples.len().div_ceil(GAP_STRIDE);
-        assert_eq!(collisions(&Robot { body_radius: 3.0, ..robot }, world, &flight), checked);
+        assert_eq!(
+            collisions(&Robot { body: CollisionBody { vehicle_radius: 3.0, ..robot.body }, ..robot }, world, &flight),
+            checked
+        );
     }
 
     #[test]

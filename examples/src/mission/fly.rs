@@ -1,19 +1,19 @@
 //! Flying it, and what the paint does meanwhile.
 
 use paint_planner::Plan;
+use paint_planner::mission::Route;
 use paint_sim::flight::FlightLog;
 use paint_sim::flight::{Interlock, Localisation, Valve};
 use paint_sim::{Film, FlightSettings, TriangleSurface};
 
-use super::decision::Decision;
 use super::error::MissionError;
 use super::nozzle::spray_model;
+use super::painting_task::PaintingTask;
 use super::plan::Planned;
 use super::settings::MissionSettings;
 use super::simulated_flight::{flight_settings, fly_plan};
 use crate::adapters::Robot;
 use crate::progress::Stage;
-use crate::targets::Route;
 
 /// Motion of the nozzle that one shot stands for, metres: widens the spot by less than a percent.
 pub(super) const SHOT_STEP: f64 = 0.01;
@@ -35,13 +35,13 @@ pub struct LayerFlight {
 }
 
 /// Flies every layer three times.
-pub(super) fn fly(planned: Planned, decision: &Decision) -> Result<Vec<LayerFlight>, MissionError> {
+pub(super) fn fly(planned: Planned, task: &PaintingTask) -> Result<Vec<LayerFlight>, MissionError> {
     let stage = Stage::start("fly");
     let count = planned.layers.len();
     let mut flights = Vec::with_capacity(count);
     for (k, (route, plan, smoothing)) in planned.layers.into_iter().enumerate() {
         stage.share(k as f64 / count as f64);
-        let [flight, slam, locked] = fly_three(&plan, decision.met(), &decision.robot, &decision.settings, k as u64)?;
+        let [flight, slam, locked] = fly_three(&plan, task.met(), &task.robot, &task.settings, k as u64)?;
         flights.push(LayerFlight { route, plan, smoothing, flight, slam, locked });
     }
     let seconds: f64 = flights.iter().map(|f| f.plan.trajectory.duration()).sum();
@@ -50,20 +50,14 @@ pub(super) fn fly(planned: Planned, decision: &Decision) -> Result<Vec<LayerFlig
 }
 
 /// Puts the paint of the flights with motion capture onto the texels; returns the film and the pixel of each of its texels.
-pub(super) fn spray(flights: &[LayerFlight], decision: &Decision) -> Result<(Film, Vec<usize>), MissionError> {
+pub(super) fn spray(flights: &[LayerFlight], task: &PaintingTask) -> Result<(Film, Vec<usize>), MissionError> {
     let stage = Stage::start("spray");
-    let (texels, pixels) = decision.film_texels();
+    let (texels, pixels) = task.film_texels();
     let mut film = Film::new(texels)?;
     let shots: Vec<_> = flights.iter().flat_map(|f| f.flight.shots(SHOT_STEP)).collect();
-    film.deposit(
-        &shots,
-        &spray_model(&decision.settings),
-        decision.met(),
-        decision.settings.threads,
-        &mut |done, total| {
-            stage.share(done as f64 / total as f64);
-        },
-    )?;
+    film.deposit(&shots, &spray_model(&task.settings), task.met(), task.settings.threads, &mut |done, total| {
+        stage.share(done as f64 / total as f64);
+    })?;
     let balance = film.mass_balance();
     let share = 100.0 * balance.deposited as f64 / balance.emitted.max(1) as f64;
     stage.done(&format!("{share:.1} % of the paint on the surface"));

@@ -3,15 +3,16 @@
 use paint_net::SprayKernel;
 use paint_net::painters::SurfaceFootprint;
 use paint_net::path::Stroke;
+use std::cell::OnceCell;
 use paint_planner::Target;
+use paint_planner::mission::{spray_cell, upright};
 use paint_sim::{Film, Shot, SprayModel};
 
 use super::error::MissionError;
-use super::nozzle::{kernel, spray_model, upright_shot};
+use super::nozzle::{kernel, shot, spray_model, sprays};
 use super::settings::MissionSettings;
 use crate::appearance::UNIT_THICKNESS;
 use crate::surface::PaintSurface;
-use crate::targets::cell;
 
 /// Gauss points of order two on -1/2..1/2: `+- 1/sqrt(12)`.
 const GAUSS: f64 = 0.288_675_134_594_812_9;
@@ -25,6 +26,8 @@ pub(super) struct Footprints<'a> {
     kernel: SprayKernel,
     model: SprayModel,
     settings: &'a MissionSettings,
+    /// Why the simulation refused, if it did: a painter's closure cannot say so.
+    refused: OnceCell<paint_sim::Error>,
 }
 
 impl<'a> Footprints<'a> {
@@ -34,7 +37,7 @@ impl<'a> Footprints<'a> {
         let film = Film::new(texels)?;
         // Settings are refused here, not in the middle of a plan.
         film.shares(&[], &model, &surface.world, settings.threads)?;
-        Ok(Self { surface, film, pixels, kernel, model, settings })
+        Ok(Self { surface, film, pixels, kernel, model, settings, refused: OnceCell::new() })
     }
 
     /// Depth on each pixel per unit of a spray's volume, stroke by stroke; nothing for a spray that finds no surface under it. A spray is the way
@@ -44,16 +47,23 @@ impl<'a> Footprints<'a> {
         let volume = self.kernel.mass() * texel * texel;
         let stand_off = self.settings.planner.nozzle.stand_off;
         let shot = |[start, end]: &[Target; 2], share: f64| {
-            upright_shot([start, end], share, stand_off, 0.5 * volume * UNIT_THICKNESS)
+            shot(&upright([start, end], share, stand_off), 0.5 * volume * UNIT_THICKNESS)
         };
         let spacing = self.settings.limits.spray_spacing as f64;
-        let on_surface = |stroke: &Stroke, k: usize| cell(self.surface, &stroke.sprays, k, spacing);
-        let cells: Vec<Option<[Target; 2]>> =
-            strokes.iter().flat_map(|stroke| (0..stroke.sprays.len()).map(move |k| on_surface(stroke, k))).collect();
+        let on_surface = |stroke: &Stroke| {
+            let sprays = sprays(stroke, &self.kernel, texel);
+            (0..sprays.len()).map(move |k| spray_cell(self.surface, &sprays, k, spacing))
+        };
+        let cells: Vec<Option<[Target; 2]>> = strokes.iter().flat_map(on_surface).collect();
         let shots: Vec<Shot> =
             cells.iter().flatten().flat_map(|cell| [0.5 - GAUSS, 0.5 + GAUSS].map(|share| shot(cell, share))).collect();
-        let shares = self.film.shares(&shots, &self.model, &self.surface.world, self.settings.threads);
-        let shares = shares.unwrap_or_default();
+        let shares = match self.film.shares(&shots, &self.model, &self.surface.world, self.settings.threads) {
+            Ok(shares) => shares,
+            Err(error) => {
+                self.refused.get_or_init(|| error);
+                return Vec::new();
+            }
+        };
         let mut of_cells = shares.chunks(2);
         let depth = |&(k, share): &(u32, f64)| {
             let k = k as usize;
@@ -64,5 +74,13 @@ impl<'a> Footprints<'a> {
             own.iter().flatten().map(depth).collect()
         };
         cells.iter().map(footprint).collect()
+    }
+
+    /// What a painter has found, unless the simulation refused it footprints.
+    pub(super) fn checked<T>(self, painted: Result<T, paint_net::Error>) -> Result<T, MissionError> {
+        match self.refused.into_inner() {
+            Some(error) => Err(error.into()),
+            None => Ok(painted?),
+        }
     }
 }

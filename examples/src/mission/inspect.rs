@@ -43,7 +43,7 @@ pub struct Inspection {
 /// Maps the painted surface with a simulated depth camera, and evaluates the localisation of the flight.
 pub fn inspect(mission: &Mission) -> Result<Inspection, MissionError> {
     let mesh = scan(mission)?;
-    let world = &mission.decision.surface.world;
+    let world = &mission.task.surface.world;
     let off = |p: &[f32; 3]| world.distance(&Point3::from(p.map(f64::from)), 1.0);
     let mesh_error = mesh.positions.iter().map(off).sum::<f64>() / mesh.positions.len().max(1) as f64;
     let (flown, estimated) = trajectories(mission)?;
@@ -56,12 +56,12 @@ fn scan(mission: &Mission) -> Result<Mesh, MissionError> {
     let painted = mission.painted_depth();
     // Even light from everywhere: the colours of the map are the surface's own.
     let lights = Lights { sun: [0.0; 3], ambient: [1.0; 3], ..Lights::default() };
-    let shade = |hit: &Hit| -> Shading { shading(&mission.decision, &painted, hit) };
-    let threads = mission.decision.settings.threads;
+    let shade = |hit: &Hit| -> Shading { shading(&mission.task, &painted, hit) };
+    let threads = mission.task.settings.threads;
     let settings = tsdf_hash::Settings { voxel_size: VOXEL, threads, ..tsdf_hash::Settings::default() };
     let mut map = Map::new(settings)?;
     for camera in viewpoints(mission)? {
-        let frame = render(&mission.decision.surface.world, &camera, &shade, &lights, 1, threads)?;
+        let frame = render(&mission.task.surface.world, &camera, &shade, &lights, 1, threads)?;
         if frame.depth.iter().any(|&depth| depth > 0.0) {
             fuse(&mut map, &camera, &frame)?;
         }
@@ -71,7 +71,7 @@ fn scan(mission: &Mission) -> Result<Mesh, MissionError> {
 
 /// A grid of viewpoints before a surface that faces one side, two rings around one that does not.
 fn viewpoints(mission: &Mission) -> Result<Vec<Camera>, MissionError> {
-    let positions = mission.decision.surface.disk().positions();
+    let positions = mission.task.surface.disk().positions();
     let (low, high) = positions
         .iter()
         .map(|p| Vector3::from(*p))
@@ -81,7 +81,7 @@ fn viewpoints(mission: &Mission) -> Result<Vec<Camera>, MissionError> {
     let camera_at = |eye: Vector3<f64>, target: Vector3<f64>| {
         Camera::looking_at(&Point3::from(eye), &Point3::from(target), &up, FIELD_OF_VIEW, IMAGE)
     };
-    let facing = mission.decision.surface.facing();
+    let facing = mission.task.surface.facing();
     let flat = Vector3::new(facing.x, facing.y, 0.0);
     let mut cameras = Vec::new();
     if let Some(front) = flat.try_normalize(0.5) {

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use nalgebra::Point3;
-use paint_planner::normal_deviation;
 use paint_sim::flight::FlightSample;
 use paint_sim::surface::Hit;
 use tsdf_hash::Mesh;
@@ -43,9 +42,9 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
     let stage = Stage::start("pictures");
     save_textures(mission, folder)?;
     stage.share(0.2);
-    let colours = vertex_colours(&mission.decision, &mission.painted_depth());
-    let positions = mission.decision.surface.vertices();
-    let faces = mission.decision.surface.disk().faces();
+    let colours = vertex_colours(&mission.task, &mission.painted_depth());
+    let positions = mission.task.surface.vertices();
+    let faces = mission.task.surface.disk().faces();
     let ply = folder.join("surface.ply");
     write_ply(&ply, &PlyMesh { positions: &positions, normals: None, colours: &colours, faces })
         .map_err(unwritable(&ply))?;
@@ -58,7 +57,7 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
     save_mcap(
         mission,
         folder,
-        &ColouredMesh { positions: &positions, faces, colours: &colours, bare: mission.decision.appearance.srgb(0.0) },
+        &ColouredMesh { positions: &positions, faces, colours: &colours, bare: mission.task.appearance.srgb(0.0) },
     )?;
     stage.done(&folder.display().to_string());
 
@@ -78,32 +77,28 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
 }
 
 fn save_textures(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
-    let (width, height) = (mission.decision.wanted.width(), mission.decision.wanted.height());
+    let (width, height) = (mission.task.wanted.width(), mission.task.wanted.height());
     let painted = mission.painted_depth();
     let picture = |depth: &dyn Fn(usize) -> f64| {
         let pixels = (0..width * height).map(|k| {
-            if mission.decision.coverage.data()[k] > 0.0 {
-                mission.decision.appearance.srgb(depth(k))
-            } else {
-                BACKGROUND
-            }
+            if mission.task.coverage.data()[k] > 0.0 { mission.task.appearance.srgb(depth(k)) } else { BACKGROUND }
         });
         let picture = Rgb::from_pixels(width, height, pixels);
         picture.enlarged((1400 / width as u32).clamp(1, 8))
     };
-    let ink = mission.decision.appearance.ink();
-    picture(&|k| ink.inverse(mission.decision.wanted.data()[k])).save(&folder.join("wanted.png"))?;
+    let ink = mission.task.appearance.ink();
+    picture(&|k| ink.inverse(mission.task.wanted.data()[k])).save(&folder.join("wanted.png"))?;
     picture(&|k| painted.data()[k]).save(&folder.join("painted.png"))?;
     save_error_map(
         &folder.join("error.png"),
         width,
         &mission.colour_difference(),
-        (mission.decision.settings.texel, "m"),
+        (mission.task.settings.texel, "m"),
         &COLOUR_DIFFERENCE,
     )?;
-    if mission.decision.settings.painter == PainterChoice::Fill {
+    if mission.task.settings.painter == PainterChoice::Fill {
         let off = mission.thickness_ratio().into_iter().map(|ratio| ratio.map(|ratio| 100.0 * (ratio - 1.0).abs()));
-        let texel = (mission.decision.settings.texel, "m");
+        let texel = (mission.task.settings.texel, "m");
         save_error_map(&folder.join("coat.png"), width, &off.collect::<Vec<_>>(), texel, &COAT)?;
     }
     Ok(())
@@ -111,10 +106,9 @@ fn save_textures(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
 
 fn save_views(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
     let painted = mission.painted_depth();
-    let corners: Vec<Point3<f64>> =
-        mission.decision.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
-    let shade = |hit: &Hit| shading(&mission.decision, &painted, hit);
-    let frame = view(&mission.decision, &camera(&mission.decision, &corners)?, &shade)?;
+    let corners: Vec<Point3<f64>> = mission.task.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
+    let shade = |hit: &Hit| shading(&mission.task, &painted, hit);
+    let frame = view(&mission.task, &camera(&mission.task, &corners)?, &shade)?;
     picture_of(&frame).save(&folder.join("painted_view.png"))?;
 
     // Of layers the base coat alone: all of them on top of each other hide the surface and one another.
@@ -124,7 +118,7 @@ fn save_views(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
     };
     let vehicle = path(&|s| s.world_from_body.translation.vector.into());
     let nozzle = path(&|s| s.nozzle);
-    save_path(&mission.decision, &painted, nozzle, vehicle, &folder.join("path.png"))
+    save_path(&mission.task, &painted, nozzle, vehicle, &folder.join("path.png"))
 }
 
 fn save_angles(mission: &Mission, path: &Path) -> Result<(), MissionError> {
@@ -144,7 +138,7 @@ fn save_angles(mission: &Mission, path: &Path) -> Result<(), MissionError> {
         }
         for (k, t) in f.route.targets.iter().enumerate().filter(|(k, t)| t.dose > 0.0 && f.plan.reachable[*k]) {
             let minutes = (start + f.plan.target_time[k]) / 60.0;
-            curves[5].push((minutes, 100.0 * normal_deviation(t, &f.plan.nozzle[k].position)));
+            curves[5].push((minutes, 100.0 * t.normal_deviation(&f.plan.nozzle[k].position)));
         }
         start += f.plan.trajectory.duration();
     }
@@ -177,7 +171,7 @@ fn save_mcap(mission: &Mission, folder: &Path, mesh: &ColouredMesh) -> Result<()
         }));
         start += f.plan.trajectory.duration();
     }
-    save_recording(&folder.join("mission.mcap"), mesh, mission.decision.paint_style(), &states, &log_lines)?;
+    save_recording(&folder.join("mission.mcap"), mesh, mission.task.paint_style(), &states, &log_lines)?;
     Ok(())
 }
 
@@ -185,14 +179,13 @@ fn save_mcap(mission: &Mission, folder: &Path, mesh: &ColouredMesh) -> Result<()
 fn save_textured_mesh(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
     let painted = mission.painted_depth();
     let (width, height) = (painted.width(), painted.height());
-    let pixel = |k: usize| {
-        (mission.decision.coverage.data()[k] > 0.0).then(|| mission.decision.appearance.srgb(painted.data()[k]))
-    };
-    let extent = [width, height].map(|side| side as f64 * mission.decision.settings.texel);
+    let pixel =
+        |k: usize| (mission.task.coverage.data()[k] > 0.0).then(|| mission.task.appearance.srgb(painted.data()[k]));
+    let extent = [width, height].map(|side| side as f64 * mission.task.settings.texel);
     let mesh = TexturedMesh {
-        positions: mission.decision.surface.disk().positions(),
-        faces: mission.decision.surface.disk().faces(),
-        uv: mission.decision.surface.chart.uv().iter().map(|uv| [uv[0] / extent[0], uv[1] / extent[1]]).collect(),
+        positions: mission.task.surface.disk().positions(),
+        faces: mission.task.surface.disk().faces(),
+        uv: mission.task.surface.chart.uv().iter().map(|uv| [uv[0] / extent[0], uv[1] / extent[1]]).collect(),
         texture: with_gutter(width, height, (0..width * height).map(pixel).collect()),
     };
     mesh.save(folder, "painted").map_err(unwritable(&folder.join("painted.*")))

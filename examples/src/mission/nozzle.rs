@@ -1,11 +1,12 @@
 //! The nozzle, as the painter and as the simulation know it.
 
-use nalgebra::UnitVector3;
-use paint_net::SprayKernel;
-use paint_planner::Target;
+use paint_net::{Spray, SprayKernel};
+use paint_net::path::Stroke;
+use paint_planner::NozzleState;
 use paint_sim::{Shot, SprayModel};
 
 use super::settings::MissionSettings;
+use crate::appearance::UNIT_THICKNESS;
 
 /// Where the cone of the spray ends, in deviations: all but 0.2 % of the paint lies inside.
 const SPRAY_CUT: f64 = 3.5;
@@ -23,9 +24,13 @@ pub(super) fn spray_model(settings: &MissionSettings) -> SprayModel {
     SprayModel { sigma, cut: SPRAY_CUT, range: SPRAY_RANGE, ..SprayModel::default() }
 }
 
-/// A share of the way from a target to the next, with the nozzle upright at the stand-off, metres, and a volume in m³.
-pub(super) fn upright_shot([from, to]: [&Target; 2], share: f64, stand_off: f64, volume: f64) -> Shot {
-    let normal = UnitVector3::try_new(from.normal.lerp(&to.normal, share), 1e-9).unwrap_or(from.normal);
-    let point = from.point + (to.point - from.point) * share;
-    Shot { origin: point + normal.into_inner() * stand_off, axis: -normal, volume }
+/// A stroke of sprays as the planner reads it, in texels of `texel` metres: `v · mass · texel² · unit` of paint each.
+pub(super) fn sprays(stroke: &Stroke, kernel: &SprayKernel, texel: f64) -> Vec<paint_planner::mission::Spray> {
+    let volume = |s: &Spray| s.volume * kernel.mass() * texel * texel * UNIT_THICKNESS;
+    stroke.sprays.iter().map(|s| paint_planner::mission::Spray { place: [s.x, s.y], volume: volume(s) }).collect()
+}
+
+/// What a nozzle of the planner sprays in the simulation, m³.
+pub(super) fn shot(nozzle: &NozzleState, volume: f64) -> Shot {
+    Shot { origin: nozzle.position, axis: nozzle.direction, volume }
 }

@@ -8,42 +8,46 @@ use paint_sim::Camera;
 use paint_sim::render::Frame;
 use paint_sim::surface::Hit;
 
-use super::decision::Decision;
 use super::error::MissionError;
+use super::painting_task::PaintingTask;
 use super::shading::shading;
 use super::view::{camera, picture_of, view};
 use crate::pictures::{Polyline, Scene, save_scene};
 
+/// Colour of keep-out volumes and anchors.
+const OUTLINE: [u8; 3] = [235, 150, 0];
+
 /// Draws the nozzle's way (blue) and the vehicle's (orange) before the surface with `depth` of paint on its texels.
 pub(super) fn save_path(
-    decision: &Decision,
+    task: &PaintingTask,
     depth: &Image,
     nozzle: Vec<Point3<f64>>,
     vehicle: Vec<Point3<f64>>,
     file: &Path,
 ) -> Result<(), MissionError> {
-    let corners = decision.surface.disk().positions().iter().map(|p| Point3::from(*p));
-    let camera = camera(decision, &corners.chain(vehicle.iter().copied()).collect::<Vec<_>>())?;
-    let frame = view(decision, &camera, &|hit: &Hit| shading(decision, depth, hit))?;
+    let corners = task.surface.disk().positions().iter().map(|p| Point3::from(*p));
+    let camera = camera(task, &corners.chain(vehicle.iter().copied()).collect::<Vec<_>>())?;
+    let frame = view(task, &camera, &|hit: &Hit| shading(task, depth, hit))?;
     let lines = vec![
         Polyline { points: nozzle, colour: [0, 90, 200], radius: 0.5 },
         Polyline { points: vehicle, colour: [230, 110, 20], radius: 0.7 },
     ];
-    save_lines(decision, &camera, &frame, lines, file)
+    save_lines(task, &camera, &frame, lines, file)
 }
 
 /// Draws lines and the outlines of the mission's constraints into a view of the surface.
 pub(super) fn save_lines(
-    decision: &Decision,
+    task: &PaintingTask,
     camera: &Camera,
     frame: &Frame,
     mut lines: Vec<Polyline>,
     file: &Path,
 ) -> Result<(), MissionError> {
-    let corners = decision.surface.disk().positions().iter().map(|p| Vector3::from(*p));
+    let corners = task.surface.disk().positions().iter().map(|p| Vector3::from(*p));
     let none = (Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN));
     let (low, high) = corners.fold(none, |(low, high), p| (low.inf(&p), high.sup(&p)));
-    lines.extend(decision.settings.constraints.outlines(&low, &high));
+    let outlines = task.settings.constraints.outlines(&low, &high);
+    lines.extend(outlines.into_iter().map(|points| Polyline { points, colour: OUTLINE, radius: 1.2 }));
     let project = |p: &Point3<f64>| {
         let c = camera.world_from_camera.inverse_transform_point(p);
         (c.z > 0.05).then(|| (camera.fx * c.x / c.z + camera.cx, camera.fy * c.y / c.z + camera.cy, c.z))

@@ -4,19 +4,19 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use paint_planner::{Plan, Setpoint};
+use paint_planner::Plan;
+use paint_planner::mission::TargetOutcomes;
+use paint_planner::plan::Setpoint;
 use ptu_kinematics::Joints;
 use serde::Serialize;
 
-use super::decision::Decision;
 use super::error::MissionError;
-use super::figures::{mean, open_time};
+use super::figures::mean;
 use super::mission_output::{RECORDING_STEP, write};
+use super::painting_task::PaintingTask;
 use super::path_view::save_path;
-use super::plan::path_length;
 use super::planned_mission::{PlannedMission, share_out_of_reach};
 use super::preview::expected_depth;
-use super::service::Service;
 use super::shading::vertex_colours;
 use super::trajectory_table::{TRAJECTORY_STEP, cells};
 use crate::appearance::DENSITY;
@@ -51,11 +51,11 @@ pub struct PlanFigures {
     pub targets_too_near: usize,
     /// No flight to them was found.
     pub targets_without_transit: usize,
-    /// The rehearsal in wind left them bare.
+    /// The rehearsal in wind gave them up: those of `targets_left_bare` that have paint before them or after them and no other flight.
     pub targets_left_in_wind: usize,
     /// Targets that keep more clearance since the rehearsal in wind.
     pub targets_kept_off: usize,
-    /// Targets given up in the rehearsal.
+    /// Targets given up in the rehearsal, with paint and without, in all flights.
     pub targets_left_bare: usize,
     /// Share of the surface in reach but for keep-out volumes and tether.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -85,7 +85,7 @@ pub struct PlanFigures {
     /// Wall-clock time of everything.
     pub wall_s: f64,
     #[serde(skip)]
-    service: Service,
+    outcomes: TargetOutcomes,
 }
 
 impl PlanFigures {
@@ -97,7 +97,7 @@ impl PlanFigures {
             self.path_length_m,
             100.0 * self.valve_open_share,
             self.paint_kg,
-            self.service.summary()
+            self.outcomes.summary()
         )
     }
 }
@@ -105,28 +105,22 @@ impl PlanFigures {
 /// Writes `plan.csv`, `path.png`, `plan.mcap` and `report.json` into an existing folder; the report last.
 pub fn save_plan(mission: &PlannedMission, folder: &Path) -> Result<PlanFigures, MissionError> {
     let stage = Stage::start("export");
-    let decision = &mission.decision;
+    let task = &mission.task;
     write(&folder.join("plan.csv"), &table(mission))?;
     stage.share(0.2);
-    let depth = expected_depth(decision);
+    let depth = expected_depth(task);
     if let Some((_, plan)) = mission.layers().next() {
         let along =
-            |of: &dyn Fn(&Setpoint) -> Point3<f64>| setpoints(plan, RECORDING_STEP).map(|(_, s)| of(&s)).collect();
+            |of: &dyn Fn(&Setpoint) -> Point3<f64>| plan.setpoints(RECORDING_STEP).map(|(_, s)| of(&s)).collect();
         let (nozzle, vehicle) = (along(&|s| s.nozzle.position), along(&|s| s.sample.position));
-        save_path(decision, &depth, nozzle, vehicle, &folder.join("path.png"))?;
+        save_path(task, &depth, nozzle, vehicle, &folder.join("path.png"))?;
     }
     stage.share(0.7);
-    save_mcap(mission, &vertex_colours(decision, &depth), &folder.join("plan.mcap"))?;
+    save_mcap(mission, &vertex_colours(task, &depth), &folder.join("plan.mcap"))?;
     let figures = figures(mission);
     save_figures(&figures, folder)?;
     stage.done(&folder.display().to_string());
     Ok(figures)
-}
-
-/// References at equal steps of time, from the start of the plan on.
-fn setpoints(plan: &Plan, step: f64) -> impl Iterator<Item = (f64, Setpoint)> {
-    let steps = (plan.trajectory.duration() / step) as usize;
-    (0..=steps).map(move |k| (k as f64 * step, plan.setpoint(k as f64 * step)))
 }
 
 /// One row every [`TRAJECTORY_STEP`] seconds; layers follow each other.
@@ -137,7 +131,7 @@ fn table(mission: &PlannedMission) -> String {
     );
     let mut start = 0.0;
     for (layer, (_, plan)) in mission.layers().enumerate() {
-        for (time, s) in setpoints(plan, TRAJECTORY_STEP) {
+        for (time, s) in plan.setpoints(TRAJECTORY_STEP) {
             let (p, v) = (s.sample.position, s.sample.velocity);
             let row =
                 [p.x, p.y, p.z, s.sample.heading, v.x, v.y, v.z, s.pan, s.tilt, s.flow, s.aim.x, s.aim.y, s.aim.z];
@@ -150,26 +144,26 @@ fn table(mission: &PlannedMission) -> String {
 }
 
 fn save_mcap(mission: &PlannedMission, colours: &[[u8; 3]], file: &Path) -> Result<(), MissionError> {
-    let decision = &mission.decision;
-    let positions = decision.surface.vertices();
+    let task = &mission.task;
+    let positions = task.surface.vertices();
     let (mut states, mut log, mut start) = (Vec::new(), Vec::new(), 0.0);
     for (k, (route, plan)) in mission.layers().enumerate() {
         log.push((start, format!("layer {}: {} strokes, as planned", k + 1, route.strokes)));
-        states.extend(setpoints(plan, RECORDING_STEP).map(|(time, s)| state(decision, start + time, &s)));
+        states.extend(plan.setpoints(RECORDING_STEP).map(|(time, s)| state(task, start + time, &s)));
         start += plan.trajectory.duration();
     }
-    let faces = decision.surface.disk().faces();
-    let mesh = ColouredMesh { positions: &positions, faces, colours, bare: decision.appearance.srgb(0.0) };
-    Ok(save_recording(file, &mesh, decision.paint_style(), &states, &log)?)
+    let faces = task.surface.disk().faces();
+    let mesh = ColouredMesh { positions: &positions, faces, colours, bare: task.appearance.srgb(0.0) };
+    Ok(save_recording(file, &mesh, task.paint_style(), &states, &log)?)
 }
 
 /// The robot as the plan has it: level, with the pan and tilt of the reference.
-fn state(decision: &Decision, time: f64, s: &Setpoint) -> RobotState {
+fn state(task: &PaintingTask, time: f64, s: &Setpoint) -> RobotState {
     let heading = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), s.sample.heading);
     RobotState {
         time,
         world_from_body: Isometry3::from_parts(Translation3::from(s.sample.position), heading),
-        arm: decision.robot.chain.link_poses(Joints { pan: s.pan, tilt: s.tilt }),
+        arm: task.robot.chain.link_poses(Joints { pan: s.pan, tilt: s.tilt }),
         joints: [s.pan, s.tilt],
         hit: Some(s.aim),
         flow: s.flow,
@@ -177,8 +171,8 @@ fn state(decision: &Decision, time: f64, s: &Setpoint) -> RobotState {
 }
 
 fn figures(mission: &PlannedMission) -> PlanFigures {
-    let (decision, planned) = (&mission.decision, &mission.planned);
-    let service = planned.service;
+    let (task, planned) = (&mission.task, &mission.planned);
+    let outcomes = planned.outcomes;
     let sum = |of: &dyn Fn(&Plan) -> f64| mission.layers().map(|(_, plan)| of(plan)).sum::<f64>();
     let most = |of: &dyn Fn(&Plan) -> f64| mission.layers().map(|(_, plan)| of(plan)).fold(0.0, f64::max);
     let flight_time = sum(&|plan| plan.trajectory.duration());
@@ -187,30 +181,30 @@ fn figures(mission: &PlannedMission) -> PlanFigures {
         .layers()
         .flat_map(|(route, plan)| {
             let served = route.targets.iter().enumerate().filter(|(k, t)| t.dose > 0.0 && plan.reachable[*k]);
-            served.map(|(k, target)| paint_planner::normal_deviation(target, &plan.nozzle[k].position))
+            served.map(|(k, target)| target.normal_deviation(&plan.nozzle[k].position))
         })
         .collect();
     PlanFigures {
         version: env!("CARGO_PKG_VERSION"),
-        surface: decision.name.clone(),
-        seed: decision.settings.seed,
+        surface: task.name.clone(),
+        seed: task.settings.seed,
         layers: planned.layers.len(),
         strokes: mission.layers().map(|(route, _)| route.strokes).sum(),
-        targets: service.targets,
-        targets_not_served: service.not_served(),
-        targets_out_of_reach: service.out_of_reach,
-        targets_hidden: service.hidden,
-        targets_without_heading: service.without_heading,
-        targets_too_near: service.too_near,
-        targets_without_transit: service.without_transit,
-        targets_left_in_wind: service.left_in_wind,
+        targets: outcomes.targets,
+        targets_not_served: outcomes.not_served(),
+        targets_out_of_reach: outcomes.out_of_reach,
+        targets_hidden: outcomes.hidden,
+        targets_without_heading: outcomes.without_heading,
+        targets_too_near: outcomes.too_near,
+        targets_without_transit: outcomes.without_transit,
+        targets_left_in_wind: outcomes.excluded,
         targets_kept_off: planned.kept_off,
         targets_left_bare: planned.left_bare,
-        lost_to_constraints_share: decision.share_lost_to_constraints(),
-        unreachable_paint_share: share_out_of_reach(decision, planned.unreachable_paint, mission.layers()),
+        lost_to_constraints_share: task.share_lost_to_constraints(),
+        unreachable_paint_share: share_out_of_reach(task, planned.unreachable_paint, mission.layers()),
         flight_time_s: flight_time,
-        path_length_m: sum(&path_length),
-        valve_open_share: sum(&open_time) / flight_time,
+        path_length_m: sum(&Plan::path_length),
+        valve_open_share: sum(&Plan::open_time) / flight_time,
         paint_kg: volume * DENSITY,
         normal_deviation_mean_m: mean(deviations.iter().copied()),
         normal_deviation_max_m: deviations.iter().fold(0.0, |most, &d| most.max(d)),
@@ -218,7 +212,7 @@ fn figures(mission: &PlannedMission) -> PlanFigures {
         max_acceleration_m_per_s2: most(&|plan| plan.report.extrema.acceleration),
         max_joint_rate_rad_per_s: most(&|plan| plan.report.joint_rate),
         planning_s: planned.seconds,
-        wall_s: decision.started.elapsed().as_secs_f64(),
-        service,
+        wall_s: task.started.elapsed().as_secs_f64(),
+        outcomes,
     }
 }

@@ -1,27 +1,27 @@
 //! A mission that is planned: what can be looked at, exported or flown.
 
 use paint_planner::Plan;
+use paint_planner::mission::Route;
 
-use super::decision::Decision;
 use super::error::MissionError;
+use super::painting_task::PaintingTask;
 use super::plan::{Planned, plan};
-use crate::targets::Route;
 
 /// A mission is given up when more of the wanted paint than this is out of reach.
 const MAX_UNREACHABLE_SHARE: f64 = 0.9;
 
 /// What was decided, with a plan for every layer.
 pub struct PlannedMission {
-    pub(super) decision: Decision,
+    pub(super) task: PaintingTask,
     pub(super) planned: Planned,
 }
 
 impl PlannedMission {
     /// Plans what was decided. An error where nearly all of the paint is out of reach.
-    pub fn new(decision: Decision) -> Result<Self, MissionError> {
-        let planned = plan(&decision)?;
-        let mission = Self { decision, planned };
-        let share = share_out_of_reach(&mission.decision, mission.planned.unreachable_paint, mission.layers());
+    pub fn new(task: PaintingTask) -> Result<Self, MissionError> {
+        let planned = plan(&task)?;
+        let mission = Self { task, planned };
+        let share = share_out_of_reach(&mission.task, mission.planned.unreachable_paint, mission.layers());
         if share > MAX_UNREACHABLE_SHARE {
             return Err(MissionError::OutOfReach { percent: 100.0 * share });
         }
@@ -37,13 +37,13 @@ impl PlannedMission {
 /// Share of the wanted paint that is not planned: no pose of the robot, or no surface below the spray. `unreachable`: paint of
 /// layers without a plan, m³.
 pub(super) fn share_out_of_reach<'a>(
-    decision: &Decision,
+    task: &PaintingTask,
     unreachable: f64,
     layers: impl Iterator<Item = (&'a Route, &'a Plan)>,
 ) -> f64 {
-    let (mut planned, mut wanted) = (0.0, unreachable + decision.wanted_out_of_reach());
+    let (mut planned, mut wanted) = (0.0, unreachable + task.wanted_out_of_reach());
     for (route, plan) in layers {
-        wanted += route.lost + route.paint();
+        wanted += route.lost_volume + route.volume();
         planned += (0..route.targets.len()).map(|k| plan.volume(k)).sum::<f64>();
     }
     if wanted > 0.0 { (1.0 - planned / wanted).max(0.0) } else { 0.0 }

@@ -4,13 +4,14 @@ use std::path::Path;
 
 use nalgebra::Point3;
 use paint_net::Image;
-use paint_planner::{Target, TimingPolicy};
+use paint_planner::Target;
+use paint_planner::timing::TimingPolicy;
 use paint_sim::render::Shading;
 use paint_sim::surface::Hit;
 use serde::Serialize;
 
-use super::decision::Decision;
 use super::error::MissionError;
+use super::painting_task::PaintingTask;
 use super::path_view::save_lines;
 use super::plan::layer_route;
 use super::seams::deposit_error;
@@ -64,21 +65,21 @@ pub struct Preview {
 }
 
 /// Writes `preview.png` and `report.json` into an existing folder.
-pub fn preview(decision: &Decision, folder: &Path) -> Result<Preview, MissionError> {
+pub fn preview(task: &PaintingTask, folder: &Path) -> Result<Preview, MissionError> {
     let stage = Stage::start("preview");
-    let estimate = estimate(decision)?;
+    let estimate = estimate(task)?;
     stage.share(0.5);
-    let painted = expected_depth(decision);
+    let painted = expected_depth(task);
     let shade = |hit: &Hit| -> Shading {
-        let plain = shading(decision, &painted, hit);
-        let bare = texel_at(decision, hit).filter(|&texel| !decision.in_reach[texel]);
-        let why = bare.map(|texel| if decision.lost_to_constraints[texel] { CONSTRAINED } else { OUT_OF_REACH });
+        let plain = shading(task, &painted, hit);
+        let bare = texel_at(task, hit).filter(|&texel| !task.in_reach[texel]);
+        let why = bare.map(|texel| if task.lost_to_constraints[texel] { CONSTRAINED } else { OUT_OF_REACH });
         let mixed = |c: usize| why.map_or(plain.albedo[c], |why| 0.5 * (plain.albedo[c] + why[c]));
         Shading { albedo: [mixed(0), mixed(1), mixed(2)], ..plain }
     };
-    let corners: Vec<Point3<f64>> = decision.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
-    let camera = camera(decision, &corners)?;
-    save_lines(decision, &camera, &view(decision, &camera, &shade)?, Vec::new(), &folder.join("preview.png"))?;
+    let corners: Vec<Point3<f64>> = task.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
+    let camera = camera(task, &corners)?;
+    save_lines(task, &camera, &view(task, &camera, &shade)?, Vec::new(), &folder.join("preview.png"))?;
     save_figures(&estimate, folder)?;
     stage.done(&folder.join("preview.png").display().to_string());
     Ok(estimate)
@@ -97,46 +98,45 @@ impl Preview {
     }
 }
 
-fn estimate(decision: &Decision) -> Result<Preview, MissionError> {
-    let timing = &decision.settings.planner.timing;
+fn estimate(task: &PaintingTask) -> Result<Preview, MissionError> {
+    let timing = &task.settings.planner.timing;
     let speed = match timing.policy {
         TimingPolicy::Uniform { speed } => speed.min(timing.max_speed),
         TimingPolicy::GradientPreserving => timing.max_speed,
     };
     let (mut time, mut volume, mut strokes, mut last) = (0.0, 0.0, 0, None::<Target>);
-    for layer in &decision.layers {
-        let route = layer_route(layer, &decision.surface, &decision.settings, last.as_ref())?;
-        let gap = decision.settings.planner.break_length;
+    for layer in &task.layers {
+        let route = layer_route(layer, &task.surface, &task.settings, last.as_ref())?;
+        let gap = task.settings.planner.break_length;
         let steps = route.targets.windows(2).map(|pair| (pair[1].point - pair[0].point).norm());
-        time += steps.filter(|step| *step <= gap).sum::<f64>() / speed + route.transit_s;
-        volume += route.paint();
+        time += steps.filter(|step| *step <= gap).sum::<f64>() / speed + route.transit_time;
+        volume += route.volume();
         strokes += route.strokes;
         last = route.targets.last().copied().or(last);
     }
-    let seams = deposit_error(decision)?;
-    let depth = decision.wanted.map(|ink| decision.appearance.ink().inverse(ink));
+    let seams = deposit_error(task)?;
+    let depth = task.wanted.map(|ink| task.appearance.ink().inverse(ink));
     let wanted = |weight: &Image| depth.data().iter().zip(weight.data()).map(|(d, w)| d * w).sum::<f64>();
     Ok(Preview {
         version: env!("CARGO_PKG_VERSION"),
-        surface: decision.name.clone(),
-        seed: decision.settings.seed,
-        surface_area_m2: decision.surface.disk().area(),
-        reach_share: decision.share_in_reach(),
-        lost_to_constraints_share: decision.share_lost_to_constraints(),
-        wanted_in_reach_share: wanted(&decision.coverage_in_reach())
-            / wanted(&decision.coverage).max(f64::MIN_POSITIVE),
+        surface: task.name.clone(),
+        seed: task.settings.seed,
+        surface_area_m2: task.surface.disk().area(),
+        reach_share: task.share_in_reach(),
+        lost_to_constraints_share: task.share_lost_to_constraints(),
+        wanted_in_reach_share: wanted(&task.coverage_in_reach()) / wanted(&task.coverage).max(f64::MIN_POSITIVE),
         paint_kg: volume * DENSITY,
         flight_time_s: time,
         strokes,
         deposit_error_at_seams: seams.map(|s| s.near),
         deposit_error_at_seams_naive: seams.map(|s| s.naive),
         deposit_error_off_seams: seams.map(|s| s.far),
-        wall_s: decision.started.elapsed().as_secs_f64(),
+        wall_s: task.started.elapsed().as_secs_f64(),
     })
 }
 
 /// Depth of paint on every texel when every spray lands where it is meant to.
-pub(super) fn expected_depth(decision: &Decision) -> Image {
-    let ink = decision.layers.last().map_or(&decision.wanted, |layer| &layer.ink);
-    ink.map(|ink| decision.appearance.ink().inverse(ink))
+pub(super) fn expected_depth(task: &PaintingTask) -> Image {
+    let ink = task.layers.last().map_or(&task.wanted, |layer| &layer.ink);
+    ink.map(|ink| task.appearance.ink().inverse(ink))
 }

@@ -2,15 +2,15 @@
 
 use nalgebra::Isometry3;
 use paint_net::Image;
+use paint_planner::mission::TargetOutcomes;
 use paint_sim::Film;
 use paint_sim::flight::FlightSample;
 use ptu_kinematics::Joints;
 
-use super::decision::Decision;
 use super::error::MissionError;
 use super::fly::{LayerFlight, fly, spray};
+use super::painting_task::PaintingTask;
 use super::planned_mission::{PlannedMission, share_out_of_reach};
-use super::service::Service;
 use crate::appearance::UNIT_THICKNESS;
 
 /// Thickness below which nothing is wanted, metres: ink is given to a few digits.
@@ -18,7 +18,7 @@ const LEAST_COAT: f64 = 0.5e-6;
 
 /// Everything a mission made; what the report, the pictures and the recording are drawn from.
 pub struct Mission {
-    pub(super) decision: Decision,
+    pub(super) task: PaintingTask,
     pub(super) flights: Vec<LayerFlight>,
     pub(super) film: Film,
     /// Pixel of every texel of the film.
@@ -29,24 +29,24 @@ pub struct Mission {
     /// Targets that keep more clearance since the rehearsal in wind, and those it gave up.
     pub(super) kept_off: usize,
     pub(super) left_bare: usize,
-    /// Which targets the flights serve.
-    pub(super) service: Service,
+    /// What becomes of the targets with paint.
+    pub(super) outcomes: TargetOutcomes,
 }
 
 impl Mission {
     /// Plans and flies what was decided, and sprays it onto the film.
-    pub fn run(decision: Decision) -> Result<Self, MissionError> {
-        PlannedMission::new(decision).and_then(Self::fly)
+    pub fn run(task: PaintingTask) -> Result<Self, MissionError> {
+        PlannedMission::new(task).and_then(Self::fly)
     }
 
     /// Flies what is planned, and sprays it onto the film.
     pub fn fly(mission: PlannedMission) -> Result<Self, MissionError> {
-        let PlannedMission { decision, planned } = mission;
+        let PlannedMission { task, planned } = mission;
         let (planning, unreachable_paint) = (planned.seconds, planned.unreachable_paint);
-        let (kept_off, left_bare, service) = (planned.kept_off, planned.left_bare, planned.service);
-        let flights = fly(planned, &decision)?;
-        let (film, pixels) = spray(&flights, &decision)?;
-        Ok(Self { decision, flights, film, pixels, planning, unreachable_paint, kept_off, left_bare, service })
+        let (kept_off, left_bare, outcomes) = (planned.kept_off, planned.left_bare, planned.outcomes);
+        let flights = fly(planned, &task)?;
+        let (film, pixels) = spray(&flights, &task)?;
+        Ok(Self { task, flights, film, pixels, planning, unreachable_paint, kept_off, left_bare, outcomes })
     }
 
     /// The layers, in the order in which they were flown.
@@ -56,7 +56,7 @@ impl Mission {
 
     /// Paint depth per pixel as it came out, 0 beside the surface.
     pub(super) fn painted_depth(&self) -> Image {
-        let mut depth = self.decision.wanted.map(|_| 0.0);
+        let mut depth = self.task.wanted.map(|_| 0.0);
         for (k, &pixel) in self.pixels.iter().enumerate() {
             depth.data_mut()[pixel] = self.film.thickness(k) / UNIT_THICKNESS;
         }
@@ -65,29 +65,26 @@ impl Mission {
 
     /// Paint depth per pixel as it is wanted.
     pub(super) fn wanted_depth(&self) -> Image {
-        self.decision.wanted.map(|ink| self.decision.appearance.ink().inverse(ink))
+        self.task.wanted.map(|ink| self.task.appearance.ink().inverse(ink))
     }
 
     pub(super) fn painted_ink(&self) -> Image {
-        self.painted_depth().map(|d| self.decision.appearance.ink().forward(d))
+        self.painted_depth().map(|d| self.task.appearance.ink().forward(d))
     }
 
     /// CIEDE2000 between painted and wanted per pixel, `None` beside the surface.
     pub(super) fn colour_difference(&self) -> Vec<Option<f64>> {
         let painted = self.painted_depth();
         let pixel = |k: usize| {
-            let wanted = self.decision.appearance.ink().inverse(self.decision.wanted.data()[k]);
-            paint_sim::colour::ciede2000(
-                self.decision.appearance.lab(painted.data()[k]),
-                self.decision.appearance.lab(wanted),
-            )
+            let wanted = self.task.appearance.ink().inverse(self.task.wanted.data()[k]);
+            paint_sim::colour::ciede2000(self.task.appearance.lab(painted.data()[k]), self.task.appearance.lab(wanted))
         };
-        (0..painted.data().len()).map(|k| (self.decision.coverage.data()[k] > 0.0).then(|| pixel(k))).collect()
+        (0..painted.data().len()).map(|k| (self.task.coverage.data()[k] > 0.0).then(|| pixel(k))).collect()
     }
 
     /// Thickness over wanted thickness per pixel, `None` where the robot cannot paint or nothing is wanted.
     pub(super) fn thickness_ratio(&self) -> Vec<Option<f64>> {
-        let Decision { wanted, in_reach, appearance, .. } = &self.decision;
+        let PaintingTask { wanted, in_reach, appearance, .. } = &self.task;
         let mut ratio = vec![None; in_reach.len()];
         for (k, &pixel) in self.pixels.iter().enumerate() {
             let asked = appearance.ink().inverse(wanted.data()[pixel]) * UNIT_THICKNESS;
@@ -101,12 +98,12 @@ impl Mission {
     /// Share of the wanted paint that was not planned.
     pub(super) fn share_out_of_reach(&self) -> f64 {
         let layers = self.flights.iter().map(|f| (&f.route, &f.plan));
-        share_out_of_reach(&self.decision, self.unreachable_paint, layers)
+        share_out_of_reach(&self.task, self.unreachable_paint, layers)
     }
 
     /// The arm's links at a sample: pan in the body's frame, tilt in pan's, the nozzle in tilt's (x along the spray).
     pub(super) fn arm(&self, sample: &FlightSample) -> [Isometry3<f64>; 3] {
         let [pan, tilt] = sample.pan_tilt;
-        self.decision.robot.chain.link_poses(Joints { pan, tilt })
+        self.task.robot.chain.link_poses(Joints { pan, tilt })
     }
 }

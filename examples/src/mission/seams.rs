@@ -1,16 +1,15 @@
 //! How good the painting is at seams: where the plane of the picture is cut, and the surface is not.
 
 use paint_net::{Image, metrics};
-use paint_planner::Target;
-use paint_sim::{Film, Shot};
+use paint_planner::mission::upright_steps;
+use paint_sim::Film;
 
-use super::decision::Decision;
 use super::error::MissionError;
 use super::fly::SHOT_STEP;
-use super::nozzle::{kernel, spray_model, upright_shot};
+use super::nozzle::{kernel, shot, spray_model};
+use super::painting_task::PaintingTask;
 use super::plan::layer_route;
 use super::run::Mission;
-use super::settings::MissionSettings;
 use crate::appearance::UNIT_THICKNESS;
 
 /// Half the width of the band about the seams, metres.
@@ -38,17 +37,17 @@ pub(super) struct DepositError {
 
 /// `None` on a surface without seams.
 pub(super) fn likeness(mission: &Mission) -> Result<Option<SeamLikeness>, MissionError> {
-    let decision = &mission.decision;
-    let Some(at_seams) = band(decision) else { return Ok(None) };
-    let ghosts = &decision.surface.beyond_seams;
+    let task = &mission.task;
+    let Some(at_seams) = band(task) else { return Ok(None) };
+    let ghosts = &task.surface.beyond_seams;
     let continued = |mut image: Image| {
         ghosts.gather(image.data_mut());
         image
     };
-    let (painted, wanted) = (continued(mission.painted_ink()), continued(decision.wanted.clone()));
-    let weight = continued(decision.coverage_in_reach()).map(|share| f64::from(u8::from(share > 0.999)));
+    let (painted, wanted) = (continued(mission.painted_ink()), continued(task.wanted.clone()));
+    let weight = continued(task.coverage_in_reach()).map(|share| f64::from(u8::from(share > 0.999)));
     // Ghosts are where windows end, not where they lie.
-    let own = own_texels(decision);
+    let own = own_texels(task);
     let [near, far] =
         [true, false].map(|side| own.iter().zip(&at_seams).map(|(&o, &n)| o && n == side).collect::<Vec<_>>());
     Ok(Some(SeamLikeness {
@@ -58,21 +57,23 @@ pub(super) fn likeness(mission: &Mission) -> Result<Option<SeamLikeness>, Missio
 }
 
 /// `None` on a surface without seams.
-pub(super) fn deposit_error(decision: &Decision) -> Result<Option<DepositError>, MissionError> {
-    let (Some(at_seams), Some(last)) = (band(decision), decision.layers.last()) else { return Ok(None) };
-    let Decision { surface, settings, .. } = decision;
+pub(super) fn deposit_error(task: &PaintingTask) -> Result<Option<DepositError>, MissionError> {
+    let (Some(at_seams), Some(last)) = (band(task), task.layers.last()) else { return Ok(None) };
+    let PaintingTask { surface, settings, .. } = task;
     let kernel = kernel(settings)?;
-    let mut naive = decision.wanted.map(|_| 0.0);
+    let mut naive = task.wanted.map(|_| 0.0);
     let mut shots = Vec::new();
-    for layer in &decision.layers {
+    for layer in &task.layers {
         layer.sprays.iter().for_each(|spray| kernel.stamp(spray, &mut naive));
         let targets = layer_route(layer, surface, settings, None)?.targets;
-        shots.extend(targets.windows(2).flat_map(|pair| upright(&pair[0], &pair[1], settings)));
+        let stand_off = settings.planner.nozzle.stand_off;
+        let ways = targets.windows(2).flat_map(|pair| upright_steps(&pair[0], &pair[1], stand_off, SHOT_STEP));
+        shots.extend(ways.map(|spray| shot(&spray.nozzle, spray.volume)));
     }
     let (texels, pixels) = surface.film_texels();
     let mut film = Film::new(texels)?;
     film.deposit(&shots, &spray_model(settings), &surface.world, settings.threads, &mut |_, _| ())?;
-    let own = own_texels(decision);
+    let own = own_texels(task);
     let error = |expected: &Image, near: bool| {
         let (mut off, mut all) = (0.0, 0.0);
         for (k, (&pixel, texel)) in pixels.iter().zip(film.texels()).enumerate() {
@@ -91,33 +92,24 @@ pub(super) fn deposit_error(decision: &Decision) -> Result<Option<DepositError>,
     }))
 }
 
-/// The way from a target to the next with the nozzle upright all along, in steps that widen the spot by less than a percent.
-fn upright(from: &Target, to: &Target, settings: &MissionSettings) -> impl Iterator<Item = Shot> {
-    let way = to.point - from.point;
-    let steps = if from.dose > 0.0 { (way.norm() / SHOT_STEP).ceil() } else { 0.0 };
-    let volume = from.dose * way.norm() / steps;
-    let (from, to, stand_off) = (*from, *to, settings.planner.nozzle.stand_off);
-    (0..steps as usize).map(move |k| upright_shot([&from, &to], (k as f64 + 0.5) / steps, stand_off, volume))
-}
-
 /// Texels of the surface that show nothing else.
-fn own_texels(decision: &Decision) -> Vec<bool> {
-    let mut own: Vec<bool> = decision.coverage.data().iter().map(|&covered| covered > 0.0).collect();
-    for (ghost, _) in decision.surface.beyond_seams.ghosts() {
+fn own_texels(task: &PaintingTask) -> Vec<bool> {
+    let mut own: Vec<bool> = task.coverage.data().iter().map(|&covered| covered > 0.0).collect();
+    for (ghost, _) in task.surface.beyond_seams.ghosts() {
         own[*ghost] = false;
     }
     own
 }
 
 /// Texels nearer to a seam than the band is wide; `None` on a surface without seams.
-fn band(decision: &Decision) -> Option<Vec<bool>> {
-    let ghosts = decision.surface.beyond_seams.ghosts();
+fn band(task: &PaintingTask) -> Option<Vec<bool>> {
+    let ghosts = task.surface.beyond_seams.ghosts();
     if ghosts.is_empty() {
         return None;
     }
-    let (width, height) = (decision.surface.width(), decision.surface.height());
+    let (width, height) = (task.surface.width(), task.surface.height());
     // The seam lies half a texel before the first centre beyond it.
-    let reach = BAND / decision.settings.texel + 0.5;
+    let reach = BAND / task.settings.texel + 0.5;
     let steps = reach.floor() as i64;
     let mut near = vec![false; width * height];
     for &(ghost, _) in ghosts {

@@ -1,11 +1,12 @@
 //! What a mission can be told.
 
 use paint_net::Limits;
+use paint_planner::constraints::FlightConstraints;
+use paint_planner::nozzle::NozzleSettings;
 use ptu_kinematics::{PtuSettings, ServoSettings};
 use serde::{Deserialize, Serialize};
 
 use super::error::MissionError;
-use crate::flight_constraints::FlightConstraints;
 use crate::palette::PaintName;
 use crate::picture_placement::PicturePlacement;
 use crate::projection::Viewpoint;
@@ -46,7 +47,8 @@ pub struct MissionSettings {
     pub servo: ServoSettings,
     /// Who flies it.
     pub controller: ControllerChoice,
-    /// Where it may not fly, and where its hose hangs.
+    /// Where it may not fly, and where its hose hangs, in the world of `plan.csv`; the simulated hose of a robot without a tether comes from
+    /// behind the middle of the flight.
     #[serde(skip_serializing_if = "FlightConstraints::is_empty")]
     pub constraints: FlightConstraints,
 }
@@ -126,7 +128,7 @@ fn planner_settings() -> paint_planner::Settings {
     let defaults = paint_planner::Settings::default();
     let max_elevation = 40.0_f64.to_radians();
     paint_planner::Settings {
-        nozzle: paint_planner::NozzleSettings { ca: 0.1, cb: 0.002, distance: 0.3, max_elevation, ..defaults.nozzle },
+        nozzle: NozzleSettings { ca: 0.1, cb: 0.002, distance: 0.3, max_elevation, ..defaults.nozzle },
         ..defaults
     }
 }
@@ -168,7 +170,7 @@ mod tests {
             distances.fold(f64::INFINITY, f64::min)
         };
         let mut weak = settings.planner.clone();
-        weak.nozzle.distance = paint_planner::NozzleSettings::default().distance;
+        weak.nozzle.distance = NozzleSettings::default().distance;
         let (kept, lost) = (nearest(&settings.planner), nearest(&weak));
         assert!(kept > 0.07 && kept > 1.2 * lost, "{kept} m, {lost} m with a weak pull");
     }

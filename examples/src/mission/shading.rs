@@ -5,55 +5,55 @@ use paint_sim::render::Shading;
 use paint_sim::surface::Hit;
 use uv_param::SurfacePoint;
 
-use super::decision::Decision;
+use super::painting_task::PaintingTask;
 
 /// Shading of a point of the world: painted and smooth on the disk, grey elsewhere.
-pub(super) fn shading(decision: &Decision, painted: &Image, hit: &Hit) -> Shading {
-    shading_by(decision, hit, &|x, y| decision.appearance.linear(bilinear(painted, x, y)))
+pub(super) fn shading(task: &PaintingTask, painted: &Image, hit: &Hit) -> Shading {
+    shading_by(task, hit, &|x, y| task.appearance.linear(bilinear(painted, x, y)))
 }
 
 /// The same where the three pictures are the linear sRGB of the surface.
-pub(super) fn shading_of_colours(decision: &Decision, linear: &[Image; 3], hit: &Hit) -> Shading {
-    shading_by(decision, hit, &|x, y| linear.each_ref().map(|channel| bilinear(channel, x, y)))
+pub(super) fn shading_of_colours(task: &PaintingTask, linear: &[Image; 3], hit: &Hit) -> Shading {
+    shading_by(task, hit, &|x, y| linear.each_ref().map(|channel| bilinear(channel, x, y)))
 }
 
 /// `colour` gives linear sRGB at a place of the chart, in pixels.
-fn shading_by(decision: &Decision, hit: &Hit, colour: &dyn Fn(f64, f64) -> [f64; 3]) -> Shading {
-    let Some(face) = decision.surface.disk().faces().get(hit.face as usize) else {
+fn shading_by(task: &PaintingTask, hit: &Hit, colour: &dyn Fn(f64, f64) -> [f64; 3]) -> Shading {
+    let Some(face) = task.surface.disk().faces().get(hit.face as usize) else {
         return Shading { albedo: [0.4; 3], normal: hit.normal };
     };
-    let [u, v] = place(decision, *face, hit).map(|m| m / decision.settings.texel);
-    let (x, y) = (u - 0.5, decision.surface.height() as f64 - v - 0.5);
+    let [u, v] = place(task, *face, hit).map(|m| m / task.settings.texel);
+    let (x, y) = (u - 0.5, task.surface.height() as f64 - v - 0.5);
     let [a, b] = hit.barycentric;
     let albedo = colour(x, y).map(|c| c as f32);
     let at = SurfacePoint { face: hit.face, barycentric: [1.0 - a - b, a, b] };
-    Shading { albedo, normal: decision.surface.chart.smooth_normal(at).into_inner() }
+    Shading { albedo, normal: task.surface.chart.smooth_normal(at).into_inner() }
 }
 
 /// Colour of every vertex of the disk with `depth` of paint on its texels.
-pub(super) fn vertex_colours(decision: &Decision, depth: &Image) -> Vec<[u8; 3]> {
-    let texel = decision.settings.texel;
+pub(super) fn vertex_colours(task: &PaintingTask, depth: &Image) -> Vec<[u8; 3]> {
+    let texel = task.settings.texel;
     let (width, height) = (depth.width(), depth.height());
     let at = |uv: &[f64; 2]| {
         let x = ((uv[0] / texel) as usize).min(width - 1);
         let y = (((height as f64 * texel - uv[1]) / texel) as usize).min(height - 1);
-        decision.appearance.srgb(depth.at(x, y))
+        task.appearance.srgb(depth.at(x, y))
     };
-    decision.surface.chart.uv().iter().map(at).collect()
+    task.surface.chart.uv().iter().map(at).collect()
 }
 
 /// The texel that a ray hits; `None` beside the disk.
-pub(super) fn texel_at(decision: &Decision, hit: &Hit) -> Option<usize> {
-    let face = decision.surface.disk().faces().get(hit.face as usize)?;
-    let [u, v] = place(decision, *face, hit).map(|m| m / decision.settings.texel);
-    let (width, height) = (decision.surface.width(), decision.surface.height());
+pub(super) fn texel_at(task: &PaintingTask, hit: &Hit) -> Option<usize> {
+    let face = task.surface.disk().faces().get(hit.face as usize)?;
+    let [u, v] = place(task, *face, hit).map(|m| m / task.settings.texel);
+    let (width, height) = (task.surface.width(), task.surface.height());
     let (x, y) = ((u as usize).min(width - 1), ((height as f64 - v).max(0.0) as usize).min(height - 1));
     Some(y * width + x)
 }
 
 /// Where on the chart a ray hits, metres from its lower left corner.
-fn place(decision: &Decision, face: [u32; 3], hit: &Hit) -> [f64; 2] {
-    let uv = decision.surface.chart.uv();
+fn place(task: &PaintingTask, face: [u32; 3], hit: &Hit) -> [f64; 2] {
+    let uv = task.surface.chart.uv();
     let [a, b] = hit.barycentric;
     let [p, q, r] = face.map(|i| uv[i as usize]);
     [0, 1].map(|k| (1.0 - a - b) * p[k] + a * q[k] + b * r[k])

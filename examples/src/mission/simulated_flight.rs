@@ -1,8 +1,9 @@
 //! A plan in the flight simulator: wind, hose, localisation, servos.
 
 use nalgebra::{Point3, Vector3};
+use paint_planner::Plan;
+use paint_planner::constraints::Tether;
 use paint_planner::control::MpcSettings;
-use paint_planner::{Plan, Tether};
 use paint_sim::flight::FlightLog;
 use paint_sim::flight::{CascadedController, Controller, ControllerSettings, HoseModel, fly_with};
 use paint_sim::{FlightSettings, TriangleSurface};

@@ -5,8 +5,8 @@ use paint_sim::render::{Frame, Lights, Shading};
 use paint_sim::surface::Hit;
 use paint_sim::{Camera, Surface as _, render};
 
-use super::decision::Decision;
 use super::error::MissionError;
+use super::painting_task::PaintingTask;
 use crate::pictures::Rgb;
 
 /// Width and height of the rendered views, pixels.
@@ -23,7 +23,7 @@ const OWN_SURFACE: f64 = 0.01;
 
 /// The surface in the light of a sun behind the camera's shoulder.
 pub(super) fn view(
-    decision: &Decision,
+    task: &PaintingTask,
     camera: &Camera,
     shade: &(dyn Fn(&Hit) -> Shading + Sync),
 ) -> Result<Frame, MissionError> {
@@ -35,7 +35,7 @@ pub(super) fn view(
         ambient: [0.28, 0.30, 0.34],
         ..Lights::default()
     };
-    Ok(render(&decision.surface.world, camera, shade, &lights, 2, decision.settings.threads)?)
+    Ok(render(&task.surface.world, camera, shade, &lights, 2, task.settings.threads)?)
 }
 
 fn extent(points: &[Point3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
@@ -44,10 +44,10 @@ fn extent(points: &[Point3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
 }
 
 /// A camera on the surface's mean side that has all the points in view.
-pub(super) fn camera(decision: &Decision, points: &[Point3<f64>]) -> Result<Camera, MissionError> {
+pub(super) fn camera(task: &PaintingTask, points: &[Point3<f64>]) -> Result<Camera, MissionError> {
     let (low, high) = extent(points);
     let centre = (low + high) / 2.0;
-    let facing = decision.surface.facing();
+    let facing = task.surface.facing();
     let flat = Vector3::new(facing.x, facing.y, 0.0);
     let front: Vector3<f64> = flat.try_normalize(0.1).unwrap_or(-Vector3::x());
     let side: Vector3<f64> = Vector3::z().cross(&front);
@@ -55,7 +55,7 @@ pub(super) fn camera(decision: &Decision, points: &[Point3<f64>]) -> Result<Came
         |to_side: f64, above: f64| fitted(points, centre, (front + side * to_side + Vector3::z() * above).normalize());
     let usual = from(0.45, 0.28)?;
     // In a room a wall may stand between: then from where most is seen.
-    let seen = |camera: &Camera| visible(decision, camera);
+    let seen = |camera: &Camera| visible(task, camera);
     let mut best = (2 * seen(&usual), usual);
     for [to_side, above] in OTHER_SIDES {
         let camera = from(to_side, above)?;
@@ -68,14 +68,14 @@ pub(super) fn camera(decision: &Decision, points: &[Point3<f64>]) -> Result<Came
 }
 
 /// How many of some points of the surface the camera sees.
-fn visible(decision: &Decision, camera: &Camera) -> usize {
-    let disk = decision.surface.disk();
+fn visible(task: &PaintingTask, camera: &Camera) -> usize {
+    let disk = task.surface.disk();
     let eye = Point3::from(camera.world_from_camera.translation.vector);
     let sees = |face: &usize| {
         let corners = disk.faces()[*face].map(|v| Vector3::from(disk.positions()[v as usize]));
         let way = corners.iter().sum::<Vector3<f64>>() / 3.0 - eye.coords;
         let Some(direction) = UnitVector3::try_new(way, 1e-9) else { return false };
-        let hit = decision.surface.world.cast(&eye, &direction, way.norm() + OWN_SURFACE);
+        let hit = task.surface.world.cast(&eye, &direction, way.norm() + OWN_SURFACE);
         hit.is_some_and(|hit| hit.distance > way.norm() - OWN_SURFACE)
     };
     (0..disk.faces().len()).step_by((disk.faces().len() / LOOKED_AT).max(1)).filter(sees).count()

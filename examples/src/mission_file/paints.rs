@@ -10,7 +10,7 @@ impl MissionFile {
     /// The same for every paint in flying order; a file without `paints` is one coat, whose results belong into `folder` itself.
     pub fn decide_coats(&self, folder: &Path) -> Result<Vec<Coat>, MissionFileError> {
         if self.paints.is_empty() {
-            return Ok(vec![Coat { folder: folder.to_owned(), decision: self.decide(folder)? }]);
+            return Ok(vec![Coat { folder: folder.to_owned(), task: self.decide(folder)? }]);
         }
         let coats = self.coats()?;
         let place = self.place(folder)?;
@@ -18,9 +18,9 @@ impl MissionFile {
             let folder = folder.join(self.paints[number].folder(number + 1));
             coat.write_into(&folder)?;
             eprintln!("paint {} of {}: {}", number + 1, self.paints.len(), coat.settings.paint.as_str());
-            let decision = coat.decide_on(&place);
-            let decision = decision.map_err(|error| in_paint(error, &self.paints[number]))?;
-            Ok(Coat { folder, decision })
+            let task = coat.decide_on(&place);
+            let task = task.map_err(|error| in_paint(error, &self.paints[number]))?;
+            Ok(Coat { folder, task })
         };
         coats.into_iter().enumerate().map(decide).collect()
     }

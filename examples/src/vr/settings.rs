@@ -3,8 +3,10 @@
 use std::path::PathBuf;
 
 use clap::ValueEnum;
+use paint_planner::Settings;
+use paint_planner::nozzle::NozzleSettings;
 use paint_planner::session::{SessionSettings, TargetSettings};
-use paint_planner::{NozzleSettings, Settings, TimingPolicy, TimingSettings};
+use paint_planner::timing::{TimingPolicy, TimingSettings};
 use paint_sim::SprayModel;
 use serde::{Deserialize, Serialize};
 

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use paintcopter::appearance::{Appearance, DENSITY, UNIT_THICKNESS};
 use paintcopter::design::Design;
 use paintcopter::mesh_io::TriangleMesh;
-use paintcopter::mission::{Decision, Mission, MissionSettings, PainterChoice, save};
+use paintcopter::mission::{Mission, MissionSettings, PainterChoice, PaintingTask, save};
 use paintcopter::mission_file::{MissionFile, MissionFileError};
 use paintcopter::region::Scene;
 use paintcopter::report::Report;
@@ -43,7 +43,7 @@ fn painted(painter: PainterChoice) -> Report {
     let settings = MissionSettings { painter, ..MissionSettings::default() };
     let ink = Appearance::charcoal_on_sandstone().unwrap().ink().forward(COAT / UNIT_THICKNESS);
     let design = Design::Even { ink };
-    let mission = Decision::make("wall", &Scene::whole(wall()), &design, settings).and_then(Mission::run).unwrap();
+    let mission = PaintingTask::new("wall", &Scene::whole(wall()), &design, settings).and_then(Mission::run).unwrap();
     save(&mission, &s.0).unwrap()
 }
 

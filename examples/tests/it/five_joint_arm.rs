@@ -57,7 +57,7 @@ fn planned_with<C: KinematicChain>(chain: C) -> f64 {
         assert!(!limits.is_empty());
         let (mut spheres, mut again) = (Vec::new(), Vec::new());
         robot.spheres(state, &mut spheres);
-        robot.spheres_at(&hover.world_from_body(), &hover.joints, &mut again);
+        robot.body.spheres(&robot.chain, &hover.world_from_body(), &hover.joints, &mut again);
         assert_eq!(spheres, again);
     }
     plan.report.normal_deviation_mean

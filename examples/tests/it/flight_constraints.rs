@@ -3,7 +3,8 @@
 use std::process::Command;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
-use paint_planner::{Settings, Target, Tool, VehicleState, plan, reachable_targets};
+use paint_planner::mission::reachable_targets;
+use paint_planner::{Settings, Target, Tool, VehicleState, plan};
 use paint_sim::TriangleSurface;
 use paintcopter::adapters::{MeshSurface, Robot};
 use paintcopter::mission_file::MissionFile;

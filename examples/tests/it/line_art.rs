@@ -2,7 +2,7 @@
 
 use paintcopter::design::{Design, Picture};
 use paintcopter::mesh_io::TriangleMesh;
-use paintcopter::mission::{Decision, Mission, MissionSettings, PainterChoice, save};
+use paintcopter::mission::{Mission, MissionSettings, PainterChoice, PaintingTask, save};
 use paintcopter::region::Scene;
 use paintcopter::report::Report;
 
@@ -35,7 +35,7 @@ fn painted(painter: PainterChoice) -> Report {
     let s = Scratch::new("line_art");
     let settings = MissionSettings { painter, ..MissionSettings::default() };
     let design = Design::Picture(letters(&s));
-    let mission = Decision::make("wall", &Scene::whole(wall()), &design, settings).and_then(Mission::run).unwrap();
+    let mission = PaintingTask::new("wall", &Scene::whole(wall()), &design, settings).and_then(Mission::run).unwrap();
     save(&mission, &s.0).unwrap()
 }
 

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use paintcopter::design::{Design, Picture};
 use paintcopter::mesh_io::{MeshUv, TriangleMesh, read_mesh};
-use paintcopter::mission::{Decision, Mission, MissionSettings, save};
+use paintcopter::mission::{Mission, MissionSettings, PaintingTask, save};
 use paintcopter::region::Scene;
 use paintcopter::report::Report;
 
@@ -75,7 +75,7 @@ fn paint(threads: usize) -> Painted {
     let s = Scratch::new("mission");
     let mut settings = MissionSettings { seed: 3, threads, ..MissionSettings::default() };
     settings.planner.timing.max_flow = MAX_FLOW;
-    let mission = Decision::make("panel", &Scene::whole(panel()), &Design::Texture(picture(&s)), settings)
+    let mission = PaintingTask::new("panel", &Scene::whole(panel()), &Design::Texture(picture(&s)), settings)
         .and_then(Mission::run)
         .unwrap();
     let report = save(&mission, &s.0).unwrap();

@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-use paint_planner::TimingPolicy;
+use paint_planner::timing::TimingPolicy;
 use paintcopter::mesh_placement::UpAxis;
 use paintcopter::mission::{MissionSettings, PainterChoice};
 use paintcopter::mission_file::MissionFile;

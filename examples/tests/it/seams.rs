@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use paintcopter::design::Design;
 use paintcopter::mesh_io::TriangleMesh;
-use paintcopter::mission::{Decision, MissionSettings, preview};
+use paintcopter::mission::{MissionSettings, PaintingTask, preview};
 use paintcopter::region::Scene;
 
 use crate::scratch::Scratch;
@@ -42,8 +42,8 @@ fn egg() -> TriangleMesh {
 fn a_canvas_knows_what_falls_over_its_seams() {
     let s = Scratch::new("seams");
     let settings = MissionSettings::default();
-    let decision = Decision::make("egg", &Scene::whole(egg()), &Design::Even { ink: 0.5 }, settings).unwrap();
-    let figures = preview(&decision, &s.0).unwrap();
+    let task = PaintingTask::new("egg", &Scene::whole(egg()), &Design::Even { ink: 0.5 }, settings).unwrap();
+    let figures = preview(&task, &s.0).unwrap();
     let [at, naive, off] =
         [figures.deposit_error_at_seams, figures.deposit_error_at_seams_naive, figures.deposit_error_off_seams]
             .map(Option::unwrap);

@@ -2,6 +2,7 @@
 
 use crate::angle::wrap;
 use crate::clearance::{ClearanceChecker, DistanceCache};
+use crate::not_served::NotServed;
 use crate::target::NozzleState;
 use nalgebra::Point3;
 use std::f64::consts::TAU;
@@ -28,7 +29,11 @@ pub(crate) struct HeadingGraph {
 
 impl HeadingGraph {
     /// Asks the joints about every pair.
-    pub(crate) fn build(nozzles: &[Option<NozzleState>], checker: &mut ClearanceChecker<'_>, bins: usize) -> Self {
+    pub(crate) fn build(
+        nozzles: &[Result<NozzleState, NotServed>],
+        checker: &mut ClearanceChecker<'_>,
+        bins: usize,
+    ) -> Self {
         let first = nozzles.iter().flatten().next();
         let origin = first.map_or(0.0, |nozzle| nozzle.direction.y.atan2(nozzle.direction.x));
         let count = nozzles.len() * bins;
@@ -40,14 +45,14 @@ impl HeadingGraph {
     /// Asks again about some states, whose nozzle or clearance is another.
     pub(crate) fn update(
         &mut self,
-        nozzles: &[Option<NozzleState>],
+        nozzles: &[Result<NozzleState, NotServed>],
         checker: &mut ClearanceChecker<'_>,
         states: &[usize],
     ) {
         for bin in 0..self.bins {
             let heading = self.heading(bin);
             for &i in states {
-                let vehicle = nozzles[i].as_ref().and_then(|nozzle| checker.vehicle(nozzle, heading));
+                let vehicle = nozzles[i].ok().and_then(|nozzle| checker.vehicle(&nozzle, heading));
                 self.nodes[i * self.bins + bin] =
                     vehicle.map(|vehicle| Node { position: vehicle.position, pan: vehicle.pan });
                 self.checked[i * self.bins + bin] = false;
@@ -60,7 +65,7 @@ impl HeadingGraph {
     pub(crate) fn check(
         &mut self,
         nodes: impl Iterator<Item = (usize, usize)>,
-        nozzles: &[Option<NozzleState>],
+        nozzles: &[Result<NozzleState, NotServed>],
         checker: &mut ClearanceChecker<'_>,
         clearance: &[f64],
     ) -> Vec<usize> {
@@ -70,7 +75,7 @@ impl HeadingGraph {
             if std::mem::replace(&mut self.checked[node], true) || self.nodes[node].is_none() {
                 continue;
             }
-            let vehicle = nozzles[i].as_ref().and_then(|nozzle| checker.vehicle(nozzle, self.heading(bin)));
+            let vehicle = nozzles[i].ok().and_then(|nozzle| checker.vehicle(&nozzle, self.heading(bin)));
             if !vehicle.is_some_and(|vehicle| checker.is_clear(&vehicle, clearance[i], &mut cache)) {
                 self.nodes[node] = None;
                 lost.push(i);
@@ -139,13 +144,13 @@ mod tests {
     fn an_update_is_as_good_as_a_new_graph() {
         let nozzle = |k: usize| {
             let position = Point3::new(-0.1 - 0.01 * (k % 7) as f64, 0.02 * k as f64, 1.0);
-            Some(NozzleState { position, direction: Vector3::x_axis() })
+            Ok(NozzleState { position, direction: Vector3::x_axis() })
         };
-        let mut nozzles: Vec<Option<NozzleState>> = (0..40).map(nozzle).collect();
+        let mut nozzles: Vec<Result<NozzleState, NotServed>> = (0..40).map(nozzle).collect();
         let mut clearance = vec![0.03; 40];
         let mut checker = ClearanceChecker::new(&Plane, &Boom);
         let mut graph = HeadingGraph::build(&nozzles, &mut checker, 72);
-        let possible = |graph: &mut HeadingGraph, nozzles: &[Option<NozzleState>], clearance: &[f64]| {
+        let possible = |graph: &mut HeadingGraph, nozzles: &[Result<NozzleState, NotServed>], clearance: &[f64]| {
             let all = (0..72).flat_map(|bin| (0..40).map(move |i| (i, bin)));
             graph.check(all, nozzles, &mut ClearanceChecker::new(&Plane, &Boom), clearance);
             graph.nodes.iter().map(Option::is_some).collect::<Vec<bool>>()
@@ -155,7 +160,7 @@ mod tests {
         for &k in &changed {
             clearance[k] = 0.15;
         }
-        nozzles[20] = None;
+        nozzles[20] = Err(NotServed::TooNear);
         graph.update(&nozzles, &mut checker, &changed);
         let mut again = HeadingGraph::build(&nozzles, &mut checker, 72);
         let after = possible(&mut graph, &nozzles, &clearance);

@@ -4,6 +4,7 @@ use super::graph::HeadingGraph;
 use super::viterbi::{edge, search};
 use crate::clearance::ClearanceChecker;
 use crate::error::Error;
+use crate::not_served::NotServed;
 use crate::settings::HeadingSettings;
 use crate::target::NozzleState;
 use crate::world::{Surface, Tool};
@@ -37,7 +38,7 @@ impl HeadingTable {
         clearance: f64,
         bins: usize,
     ) -> Result<Self, Error> {
-        let nozzles: Vec<Option<NozzleState>> = nozzles.iter().copied().map(Some).collect();
+        let nozzles: Vec<Result<NozzleState, NotServed>> = nozzles.iter().copied().map(Ok).collect();
         let mut checker = ClearanceChecker::new(surface, tool);
         let mut graph = HeadingGraph::build(&nozzles, &mut checker, bins);
         let all = (0..bins).flat_map(|bin| (0..nozzles.len()).map(move |i| (i, bin)));

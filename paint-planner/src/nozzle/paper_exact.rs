@@ -11,6 +11,7 @@ use super::quadratic_program::QuadraticProgram;
 use super::solution::Nozzles;
 use crate::angle::nearest_equivalent;
 use crate::error::Error;
+use crate::not_served::NotServed;
 use crate::settings::NozzleSettings;
 use crate::target::{NozzleState, Target};
 use nalgebra::{Matrix3, UnitVector3, Vector2, Vector3, Vector5};
@@ -39,7 +40,8 @@ pub(super) fn optimise(
         }
         states.push(state);
     }
-    let mut result = Nozzles { states: vec![None; targets.len()], rounds: 0, steps: 0, slack: 0.0 };
+    let mut result =
+        Nozzles { states: vec![Err(NotServed::OutOfReach); targets.len()], rounds: 0, steps: 0, slack: 0.0 };
     for _ in 0..settings.iterations {
         // Jacobi: every neighbour is the one of the previous iteration, so the states decouple.
         let program = build(&chosen, &states, &stroke_links, settings);
@@ -51,7 +53,7 @@ pub(super) fn optimise(
     for (&index, s) in indices.iter().zip(&states) {
         let direction = Vector3::new(s[4].sin() * s[3].cos(), s[4].sin() * s[3].sin(), s[4].cos());
         let position = nalgebra::Point3::new(s[0], s[1], s[2]);
-        result.states[index] = Some(NozzleState { position, direction: UnitVector3::new_normalize(direction) });
+        result.states[index] = Ok(NozzleState { position, direction: UnitVector3::new_normalize(direction) });
     }
     Ok(result)
 }

@@ -5,6 +5,7 @@ use super::qp_solver::QpSolver;
 use super::quadratic_program::QuadraticProgram;
 use super::solution::Nozzles;
 use crate::error::Error;
+use crate::not_served::NotServed;
 use crate::settings::NozzleSettings;
 use crate::target::{NozzleState, Target};
 use nalgebra::{Matrix2x3, Matrix2x5, Matrix3, Point3, UnitVector3, Vector2, Vector3, Vector5};
@@ -60,7 +61,8 @@ pub(super) fn optimise(
         .filter_map(|(s, t)| s.map(|s| Linearisation::new(*t, s.state.position, s)))
         .collect();
     let stroke_links: Vec<bool> = indices.windows(2).map(|pair| pair[1] == pair[0] + 1 && linked[pair[0]]).collect();
-    let mut result = Nozzles { states: vec![None; targets.len()], rounds: 0, steps: 0, slack: 0.0 };
+    let mut result =
+        Nozzles { states: vec![Err(NotServed::OutOfReach); targets.len()], rounds: 0, steps: 0, slack: 0.0 };
     for round in 1..=settings.rounds {
         let program = build(&points, &stroke_links, settings);
         let mut x = start_of(&points);
@@ -79,7 +81,7 @@ pub(super) fn optimise(
             let axis = point.axis + point.basis.tr_mul(&Vector2::new(x[3], x[4])) * share;
             *point = Linearisation::new(point.target, position, point.start);
             let direction = clamp_to_cone(&axis, &point.axis, settings.cone / 2.0);
-            result.states[index] = Some(NozzleState { position, direction });
+            result.states[index] = Ok(NozzleState { position, direction });
         }
         if moved < 1e-5 {
             break;

@@ -6,7 +6,7 @@ use super::{
     GaussSeidel, InteriorPoint, Mode, PrimalDualActiveSet, QpSolver, initial_states, optimise, stroke_program,
 };
 use crate::settings::NozzleSettings;
-use crate::target::{Target, normal_deviation};
+use crate::target::Target;
 use nalgebra::{Matrix2x5, Matrix5, Point3, UnitVector3, Vector2, Vector3, Vector5};
 
 /// Uniform numbers in [-1, 1).
@@ -170,7 +170,7 @@ fn three_targets_of_known_optimum() {
     for i in 0..3 {
         let p = result.states[i].unwrap().position;
         assert!((p - Point3::from(expected[i])).norm() < 1e-6);
-        assert!((normal_deviation(&targets[i], &p) - deviations[i]).abs() < 1e-6);
+        assert!((targets[i].normal_deviation(&p) - deviations[i]).abs() < 1e-6);
     }
 }
 
@@ -187,7 +187,7 @@ fn the_answer_is_a_minimum_of_the_cost_as_written() {
         let smooth: f64 = p.windows(2).map(|pair| settings.ca * (pair[1] - pair[0]).norm_squared()).sum();
         let local = |(t, p): (&Target, &Point3<f64>)| {
             let height = t.normal.dot(&(p - t.point));
-            settings.cd * normal_deviation(t, p).powi(2) + settings.distance * (height - settings.stand_off).powi(2)
+            settings.cd * t.normal_deviation(p).powi(2) + settings.distance * (height - settings.stand_off).powi(2)
         };
         smooth + targets.iter().zip(p).map(local).sum::<f64>()
     };

@@ -3,9 +3,9 @@
 use crate::angle::nearest_equivalent;
 use crate::clearance::ClearanceChecker;
 use crate::error::Error;
+use crate::not_served::NotServed;
 use crate::nozzle::Nozzles;
-use crate::plan::Plan;
-use crate::planner::{OptimalPlanner, Planner, UntimedPlan, assemble_plan};
+use crate::plan::{OptimalPlanner, Plan, Planner, UntimedPlan, assemble_plan};
 use crate::route::RoutePoint;
 use crate::settings::Settings;
 use crate::target::{NozzleState, Target};
@@ -82,8 +82,7 @@ pub fn continue_plan(
             steps: anew.report.steps,
             slack: anew.report.slack,
         },
-        vehicle: states.iter().copied().map(Some).collect(),
-        not_served: vec![None; states.len()],
+        vehicle: states.iter().copied().map(Ok).collect(),
         heading_cost: anew.report.heading_cost,
         route: route.collect(),
         start: flying.trajectory.motion(at),
@@ -106,7 +105,7 @@ fn blended(
     remaining: usize,
     anew: &Plan,
     at: f64,
-) -> (Vec<VehicleState>, Vec<Option<NozzleState>>) {
+) -> (Vec<VehicleState>, Vec<Result<NozzleState, NotServed>>) {
     let here = flying.trajectory.sample(at);
     let mut states = anew.vehicle.clone();
     let mut nozzles: Vec<NozzleState> = anew.nozzle.clone();
@@ -124,7 +123,7 @@ fn blended(
     // The trajectory may pass its waypoints at the tolerance, and where it passes is where the new one begins.
     states[0].position = here.position;
     states[0].heading = here.heading;
-    (states, nozzles.into_iter().map(Some).collect())
+    (states, nozzles.into_iter().map(Ok).collect())
 }
 
 fn mixed(from: &NozzleState, to: &NozzleState, share: f64) -> NozzleState {

@@ -7,7 +7,8 @@ use paint_planner::session::{
     CradlePose, FarReference, Feedback, LagIndicator, LiveQueue, PaintHit, RATE, Resampler, Segment, SessionSettings,
     TargetSettings, Task, VERSION, VrMode, VrState, latency_in_time, segments, targets,
 };
-use paint_planner::{Error, OptimalPlanner, Planner, Settings, TimingPolicy};
+use paint_planner::timing::TimingPolicy;
+use paint_planner::{Error, OptimalPlanner, Planner, Settings};
 
 use crate::walls::{Arm, Wall};
 
@@ -336,8 +337,10 @@ fn targets_keep_volume_gradient_and_time() {
     assert!((found[40].time.unwrap() - (1.5 + 0.1 / 0.6)).abs() < 1e-6);
     assert!(found.windows(2).all(|pair| pair[0].time < pair[1].time));
     // The planner takes them as they are.
-    let timing =
-        paint_planner::TimingSettings { policy: TimingPolicy::GradientPreserving, ..Settings::default().timing };
+    let timing = paint_planner::timing::TimingSettings {
+        policy: TimingPolicy::GradientPreserving,
+        ..Settings::default().timing
+    };
     let settings = Settings { timing, ..Settings::default() };
     let plan = OptimalPlanner::default().plan(&found, &Wall::flat(), &Arm::default(), &settings).unwrap();
     let flown: f64 = (0..found.len()).map(|k| plan.volume(k)).sum();

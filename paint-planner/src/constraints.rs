@@ -1,25 +1,27 @@
-//! Where a mission may not fly, and on which side the hose hangs.
+//! Where the vehicle may not fly, and on which side its hose hangs.
+
+mod keep_out;
+mod tether;
 
 use std::f64::consts::TAU;
 
+use crate::error::Error;
+use crate::world::Surface;
 use nalgebra::{Point3, Vector3};
-use paint_planner::{KeepOutVolume, Surface, Tether, WithKeepOut};
-use serde::{Deserialize, Serialize};
 
-use crate::pictures::Polyline;
+pub use keep_out::{KeepOutVolume, WithKeepOut};
+pub use tether::Tether;
 
-/// Colour of the outlines in pictures.
-const OUTLINE: [u8; 3] = [235, 150, 0];
 /// Size of the mark at a tether's anchor, metres.
 const ANCHOR: f64 = 0.1;
 
-/// What the vehicle keeps to beside the surface itself, in the world of the mission: that of `plan.csv`, metres, z up.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+/// What the vehicle keeps to beside the surface itself, world frame, metres, z up.
+#[derive(Debug, Clone, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct FlightConstraints {
     /// Volumes that the vehicle must not enter.
     pub keep_out: Vec<KeepOutVolume>,
-    /// The hose or tether; without one the vehicle turns as it likes, and the simulated hose comes from behind the middle of the flight.
+    /// The hose or tether; without one the vehicle turns as it likes.
     pub tether: Option<Tether>,
 }
 
@@ -32,8 +34,8 @@ impl FlightConstraints {
     /// Refuses volumes and tethers that are none.
     ///
     /// # Errors
-    /// [`paint_planner::Error::Setting`].
-    pub fn check(&self) -> Result<(), paint_planner::Error> {
+    /// [`Error::Setting`].
+    pub fn check(&self) -> Result<(), Error> {
         self.keep_out.iter().try_for_each(KeepOutVolume::check)?;
         self.tether.as_ref().map_or(Ok(()), Tether::check)
     }
@@ -43,8 +45,8 @@ impl FlightConstraints {
         WithKeepOut { surface, volumes: &self.keep_out }
     }
 
-    /// Edges of the volumes and a mark at the anchor, for a picture of what lies between `low` and `high`.
-    pub fn outlines(&self, low: &Vector3<f64>, high: &Vector3<f64>) -> Vec<Polyline> {
+    /// Edges of the volumes and a mark at the anchor as lines, m, for a picture of what lies between `low` and `high`.
+    pub fn outlines(&self, low: &Vector3<f64>, high: &Vector3<f64>) -> Vec<Vec<Point3<f64>>> {
         let mut lines = Vec::new();
         for volume in &self.keep_out {
             match volume {
@@ -54,7 +56,7 @@ impl FlightConstraints {
             }
         }
         lines.extend(self.tether.iter().flat_map(|tether| great_circles(&tether.anchor, ANCHOR)));
-        lines.into_iter().map(|points| Polyline { points, colour: OUTLINE, radius: 1.2 }).collect()
+        lines
     }
 }
 
@@ -108,7 +110,7 @@ mod tests {
         let constraints = FlightConstraints { keep_out, tether: None };
         let lines = constraints.outlines(&Vector3::zeros(), &Vector3::new(1.0, 1.0, 1.0));
         assert_eq!(lines.len(), 12 + 3 + 1);
-        let length: f64 = lines[..12].iter().map(|line| (line.points[1] - line.points[0]).norm()).sum();
+        let length: f64 = lines[..12].iter().map(|line| (line[1] - line[0]).norm()).sum();
         assert!((length - 24.0).abs() < 1e-12);
         for (k, line) in lines.iter().enumerate() {
             let volume = &constraints.keep_out[match k {
@@ -117,7 +119,7 @@ mod tests {
                 _ => 2,
             }];
             // On the border: in the volume or a rounding beside it, and outside of it a little farther out.
-            assert!(line.points.iter().all(|p| volume.distance(p) < 1e-12), "line {k}");
+            assert!(line.iter().all(|p| volume.distance(p) < 1e-12), "line {k}");
         }
     }
 }

@@ -1,13 +1,15 @@
 //! The optimal planner: nozzle program, heading search, minimum snap (VR paper, section IV).
 
 use super::assemble::{ClearanceViolation, UntimedPlan, assemble_plan};
+use super::solution::Plan;
 use super::strategy::Planner;
 use crate::clearance::ClearanceChecker;
 use crate::error::Error;
 use crate::heading::HeadingGraph;
 use crate::minimum_snap::KnotDerivatives;
-use crate::nozzle::{Mode, Nozzles, PrimalDualActiveSet, QpSolver, initial_states, optimise};
-use crate::plan::{NotServed, Plan};
+use crate::not_served::NotServed;
+use crate::nozzle::{Mode, PrimalDualActiveSet, QpSolver, initial_states, optimise};
+use crate::raise_clearance::{Raise, Shortfall, until_clear};
 use crate::settings::Settings;
 use crate::target::{Target, check, stroke_links};
 use crate::trace::{event, span};
@@ -38,27 +40,10 @@ impl Planner for OptimalPlanner<'_> {
         }
     }
 
-    fn plan(
+    fn plan_with_clearance(
         &self,
         targets: &[Target],
-        surface: &dyn Surface,
-        tool: &dyn Tool,
-        settings: &Settings,
-    ) -> Result<Plan, Error> {
-        self.plan_with_clearance(targets, &vec![settings.clearance; targets.len()], surface, tool, settings)
-    }
-}
-
-impl OptimalPlanner<'_> {
-    /// The same with a clearance of its own for every target, m, in the place of `settings.clearance`: what a rehearsal in wind
-    /// has shown to be needed. A flight between two strokes keeps what both of its ends keep.
-    ///
-    /// # Errors
-    /// As [`Planner::plan`]; [`Error::Target`] where a clearance is missing, negative or not a number.
-    pub fn plan_with_clearance(
-        &self,
-        targets: &[Target],
-        clearance: &[f64],
+        clearance: &[Option<f64>],
         surface: &dyn Surface,
         tool: &dyn Tool,
         settings: &Settings,
@@ -66,28 +51,36 @@ impl OptimalPlanner<'_> {
         span!("plan");
         settings.check()?;
         check(targets)?;
-        let usable = |index: &usize| clearance.get(*index).is_some_and(|c| *c >= 0.0);
+        let usable = |index: &usize| clearance.get(*index).is_some_and(|c| c.is_none_or(|c| c >= 0.0));
         if let Some(index) = (0..targets.len()).find(|index| !usable(index)) {
             return Err(Error::Target { index, what: "needs a clearance of its own that is not negative" });
         }
         let linked = stroke_links(targets, settings.break_length);
         let initial_states = initial_states(targets, &settings.nozzle);
-        let mut not_served = vec![None; targets.len()];
-        explain(&mut not_served, &initial_states, NotServed::OutOfReach);
         let mut nozzles = optimise(targets, &initial_states, &linked, self.mode, self.solver, &settings.nozzle)?;
         drop_hidden(targets, &mut nozzles.states, surface)?;
-        explain(&mut not_served, &nozzles.states, NotServed::Hidden);
         event!(
             debug,
             targets = targets.len(),
-            hidden = nozzles.states.iter().filter(|state| state.is_none()).count(),
+            hidden = nozzles.states.iter().filter(|state| state.is_err()).count(),
             "targets that cannot be seen are left out"
         );
         let mut checker = ClearanceChecker::new(surface, tool);
-        let mut clearance = clearance.to_vec();
         let mut graph = HeadingGraph::build(&nozzles.states, &mut checker, settings.heading.bins);
-        let mut attempt = 0;
-        loop {
+        let mut before = clearance.to_vec();
+        let raise = Raise { beyond: BEYOND, most: MAX_CLEARANCE };
+        until_clear(&mut clearance.to_vec(), raise, |kept, attempt| {
+            let is_new = |i: &usize| kept[*i] != before[*i] || attempt == 0 && kept[*i].is_none();
+            let changed: Vec<usize> = (0..kept.len()).filter(is_new).collect();
+            before = kept.to_vec();
+            for &i in changed.iter().filter(|&&i| kept[i].is_none()) {
+                nozzles.states[i] = match nozzles.states[i] {
+                    _ if attempt == 0 => Err(NotServed::Excluded),
+                    state => state.and(Err(NotServed::TooNear)),
+                };
+            }
+            graph.update(&nozzles.states, &mut checker, &changed);
+            let clearance: Vec<f64> = kept.iter().map(|kept| kept.unwrap_or(settings.clearance)).collect();
             let mut headings = heading::choose_headings(
                 &mut graph,
                 &nozzles.states,
@@ -97,18 +90,14 @@ impl OptimalPlanner<'_> {
                 &settings.heading,
             );
             checker.check_answers()?;
-            if headings.vehicle.iter().all(Option::is_none) {
+            if headings.vehicle.iter().all(Result::is_err) {
                 return Err(Error::NothingReachable { count: targets.len() });
             }
-            let mut not_served_here = not_served.clone();
-            explain(&mut not_served_here, &headings.vehicle, NotServed::NoHeading);
             let route =
                 route::build(&mut headings.vehicle, &headings.joined, Some(&mut checker), &clearance, settings)?;
-            explain(&mut not_served_here, &headings.vehicle, NotServed::NoTransit);
             let untimed = UntimedPlan {
                 nozzles: nozzles.clone(),
                 vehicle: headings.vehicle,
-                not_served: not_served_here,
                 heading_cost: headings.cost,
                 route,
                 start: KnotDerivatives::zeros(),
@@ -120,54 +109,32 @@ impl OptimalPlanner<'_> {
             }
             checker.check_answers()?;
             if violations.is_empty() {
-                return Ok(plan);
+                return Ok((plan, Vec::new()));
             }
-            attempt += 1;
             event!(warn, attempt, violations = violations.len(), "plan refused: too near to the surface");
-            if attempt == MAX_ATTEMPTS {
-                return if plan.report.clearance > 0.0 {
-                    Ok(plan)
-                } else {
-                    Err(Error::Collision { clearance: plan.report.clearance })
-                };
+            if attempt + 1 < MAX_ATTEMPTS {
+                let shortfalls = violations.iter().flat_map(|violation| shortfalls(&plan, violation)).collect();
+                return Ok((plan, shortfalls));
             }
-            let before = clearance.clone();
-            for violation in violations {
-                raise_clearance(&plan, &violation, &mut clearance, &mut nozzles);
+            match plan.report.clearance {
+                clearance if clearance > 0.0 => Ok((plan, Vec::new())),
+                clearance => Err(Error::Collision { clearance }),
             }
-            explain(&mut not_served, &nozzles.states, NotServed::TooNear);
-            let raised: Vec<usize> = (0..clearance.len()).filter(|&i| clearance[i] > before[i]).collect();
-            graph.update(&nozzles.states, &mut checker, &raised);
-        }
-    }
-}
-
-/// Notes why targets have no state, for those that had one so far.
-fn explain<T>(not_served: &mut [Option<NotServed>], states: &[Option<T>], why: NotServed) {
-    for (reason, _) in not_served.iter_mut().zip(states).filter(|(reason, state)| reason.is_none() && state.is_none()) {
-        *reason = Some(why);
+        })
     }
 }
 
 /// Plans made before a collision is final.
 const MAX_ATTEMPTS: usize = 8;
-/// Targets on either side of a violation that are kept farther off.
-const NEIGHBOURS: usize = 2;
+/// More clearance than is missing, m.
+const BEYOND: f64 = 0.02;
 /// Clearance beyond which a target that still causes violations is given up, m.
 const MAX_CLEARANCE: f64 = 0.2;
 
-/// Asks for more clearance about a violation; targets that have had their chances, and those at the ends of a flight
-/// that comes too near, are given up.
-fn raise_clearance(plan: &Plan, violation: &ClearanceViolation, clearance: &mut [f64], nozzles: &mut Nozzles) {
-    let before = plan.waypoints[..=violation.waypoint].iter().rev().find_map(|w| w.target);
-    let after = plan.waypoints[violation.waypoint + 1..].iter().find_map(|w| w.target);
-    let on_stroke = matches!((before, after), (Some(a), Some(b)) if b <= a + 1);
-    for target in before.into_iter().chain(after) {
-        for neighbour in target.saturating_sub(NEIGHBOURS)..(target + NEIGHBOURS + 1).min(clearance.len()) {
-            clearance[neighbour] += violation.missing + 0.02;
-            if !on_stroke || clearance[neighbour] > MAX_CLEARANCE {
-                nozzles.states[neighbour] = None;
-            }
-        }
-    }
+/// The targets on both sides of a violation; at the ends of a flight that comes too near more clearance does not help.
+fn shortfalls(plan: &Plan, violation: &ClearanceViolation) -> impl Iterator<Item = Shortfall> {
+    let about = plan.targets_about(violation.waypoint);
+    let hopeless = !matches!(about, [Some(a), Some(b)] if b <= a + 1);
+    let missing = violation.missing;
+    about.into_iter().flatten().map(move |target| Shortfall { target, missing, hopeless })
 }

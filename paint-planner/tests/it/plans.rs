@@ -2,9 +2,11 @@
 
 use crate::walls::{Arm, Wall};
 use paint_planner::nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
+use paint_planner::nozzle::Mode;
+use paint_planner::plan::{NotServed, SmoothingPlanner};
+use paint_planner::timing::TimingPolicy;
 use paint_planner::{
-    Error, Hit, Mode, NotServed, NozzleState, OptimalPlanner, Plan, Planner, Settings, SmoothingPlanner, Surface,
-    Target, TimingPolicy, Tool, VehicleState, normal_deviation,
+    Error, Hit, NozzleState, OptimalPlanner, Plan, Planner, Settings, Surface, Target, Tool, VehicleState,
 };
 
 fn optimal(targets: &[Target], wall: &Wall, settings: &Settings) -> Result<Plan, Error> {
@@ -280,7 +282,7 @@ fn paper_exact_mode_depends_on_the_world_frame_and_the_sequential_mode_does_not(
             .unwrap();
         let back =
             Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -turn));
-        let deviations = plan.nozzle.iter().zip(&targets).map(|(n, t)| normal_deviation(t, &n.position));
+        let deviations = plan.nozzle.iter().zip(&targets).map(|(n, t)| t.normal_deviation(&n.position));
         assert!(deviations.fold(0.0, f64::max) < 0.02);
         plan.nozzle.iter().map(|n| back * n.position).collect::<Vec<Point3<f64>>>()
     };
@@ -413,7 +415,7 @@ fn hidden_targets_are_not_served() {
 #[cfg(feature = "clarabel")]
 #[test]
 fn plans_do_not_depend_on_who_solves_their_programs() {
-    use paint_planner::Clarabel;
+    use paint_planner::nozzle::Clarabel;
     let wall = Wall::bumpy(0.1);
     let targets = wall.rows(1.0, 1, 0.2);
     let general = OptimalPlanner { solver: &Clarabel::default(), ..OptimalPlanner::default() };

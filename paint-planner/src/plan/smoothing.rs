@@ -1,13 +1,14 @@
 //! The smoothing planner, the baseline of Paper II, section 6.2: face the wall horizontally, smooth, fly.
 
 use super::assemble::{UntimedPlan, assemble_plan};
+use super::solution::Plan;
 use super::strategy::Planner;
 use crate::clearance::ClearanceChecker;
 use crate::error::Error;
 use crate::lowess::lowess;
 use crate::minimum_snap::KnotDerivatives;
+use crate::not_served::NotServed;
 use crate::nozzle::Nozzles;
-use crate::plan::{NotServed, Plan};
 use crate::route;
 use crate::settings::Settings;
 use crate::target::{NozzleState, Target, check, stroke_links};
@@ -15,7 +16,7 @@ use crate::world::{Surface, Tool, VehicleState};
 use nalgebra::{Point3, UnitVector3, Vector3};
 
 /// Stands off along the horizontal part of the normal, looks straight at the wall, and smooths position and heading with
-/// LOWESS. It ignores tilt and collisions, as published; [`PlanReport`](crate::PlanReport) tells what that costs.
+/// LOWESS. It ignores tilt, collisions and clearances, as published; [`PlanReport`](super::PlanReport) tells what that costs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SmoothingPlanner;
 
@@ -24,9 +25,10 @@ impl Planner for SmoothingPlanner {
         "smoothing"
     }
 
-    fn plan(
+    fn plan_with_clearance(
         &self,
         targets: &[Target],
+        _: &[Option<f64>],
         surface: &dyn Surface,
         tool: &dyn Tool,
         settings: &Settings,
@@ -35,22 +37,21 @@ impl Planner for SmoothingPlanner {
         check(targets)?;
         let linked = stroke_links(targets, settings.break_length);
         let nozzles = smooth(targets, &linked, settings);
-        let mut vehicle: Vec<Option<VehicleState>> = nozzles
+        let mut vehicle: Vec<Result<VehicleState, NotServed>> = nozzles
             .iter()
             .map(|nozzle| {
                 let heading = nozzle.direction.y.atan2(nozzle.direction.x);
-                tool.vehicle(nozzle, heading)
+                tool.vehicle(nozzle, heading).ok_or(NotServed::OutOfReach)
             })
             .collect();
-        if vehicle.iter().all(Option::is_none) {
+        if vehicle.iter().all(Result::is_err) {
             return Err(Error::NothingReachable { count: targets.len() });
         }
         let route = route::build(&mut vehicle, &linked, None, &vec![settings.clearance; targets.len()], settings)?;
-        let not_served = vehicle.iter().map(|v| v.is_none().then_some(NotServed::OutOfReach)).collect();
         let states = nozzles.into_iter().zip(&vehicle).map(|(n, v)| v.map(|_| n)).collect();
         let nozzles = Nozzles { states, rounds: 0, steps: 0, slack: 0.0 };
         let start = KnotDerivatives::zeros();
-        let untimed = UntimedPlan { nozzles, vehicle, not_served, heading_cost: 0.0, route, start };
+        let untimed = UntimedPlan { nozzles, vehicle, heading_cost: 0.0, route, start };
         Ok(assemble_plan(&untimed, targets, &mut ClearanceChecker::new(surface, tool), settings, false)?.0)
     }
 }

@@ -1,10 +1,11 @@
 //! What room the surface leaves, and answers of a surface or a tool that cannot be.
 
 use crate::walls::{Arm, Wall};
+use paint_planner::mission::reachable_targets;
 use paint_planner::nalgebra::{Point3, UnitVector3, Vector3};
+use paint_planner::plan::NotServed;
 use paint_planner::{
     Error, Hit, NozzleState, OptimalPlanner, Plan, Planner, Settings, Surface, Target, Tool, VehicleState,
-    reachable_targets,
 };
 
 /// The flat wall x = 0 with a second wall in a plane `y = side` or `x = -gap`.
@@ -58,21 +59,26 @@ fn least_gap(plan: &Plan, room: &Room, targets: std::ops::Range<usize>) -> f64 {
 fn targets_keep_the_clearance_that_each_is_given() {
     let room = Room { side: Some(-0.44), ..Room::default() };
     let (targets, settings) = (row(), Settings::default());
-    let plan = |clearance: &[f64]| {
+    let plan = |clearance: &[Option<f64>]| {
         OptimalPlanner::default().plan_with_clearance(&targets, clearance, &room, &Arm::default(), &settings)
     };
     let usual = OptimalPlanner::default().plan(&targets, &room, &Arm::default(), &settings).unwrap();
-    assert_eq!(plan(&vec![settings.clearance; targets.len()]).unwrap(), usual);
+    assert_eq!(plan(&vec![Some(settings.clearance); targets.len()]).unwrap(), usual);
     assert!(least_gap(&usual, &room, 0..6) < 0.09, "the side wall must matter");
-    let mut clearance = vec![settings.clearance; targets.len()];
-    clearance[..6].fill(0.1);
+    let mut clearance = vec![Some(settings.clearance); targets.len()];
+    clearance[..6].fill(Some(0.1));
     let kept = plan(&clearance).unwrap();
     assert!(kept.reachable.iter().all(|r| *r) && least_gap(&kept, &room, 0..6) >= 0.1);
-    clearance[20..24].fill(10.0);
+    clearance[20..24].fill(None);
     let bare = plan(&clearance).unwrap();
-    assert!((0..targets.len()).all(|i| bare.reachable[i] != (20..24).contains(&i)));
+    let reason = |i| (20..24).contains(&i).then_some(NotServed::Excluded);
+    assert!((0..targets.len()).all(|i| bare.not_served[i] == reason(i)));
+    // As if more were asked for than there is.
+    clearance[20..24].fill(Some(10.0));
+    let far = plan(&clearance).unwrap();
+    assert_eq!((far.reachable, far.target_time, far.waypoints), (bare.reachable, bare.target_time, bare.waypoints));
     assert!(matches!(plan(&clearance[1..]), Err(Error::Target { index: 40, .. })));
-    clearance[7] = f64::NAN;
+    clearance[7] = Some(f64::NAN);
     assert!(matches!(plan(&clearance), Err(Error::Target { index: 7, .. })));
 }
 

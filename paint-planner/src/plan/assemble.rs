@@ -1,13 +1,14 @@
 //! From a route to a plan: times, flow, figures.
 
+use super::solution::{Plan, PlanReport, Waypoint};
 use crate::clearance::{ClearanceChecker, DistanceCache};
 use crate::error::Error;
 use crate::minimum_snap::KnotDerivatives;
+use crate::not_served::NotServed;
 use crate::nozzle::Nozzles;
-use crate::plan::{NotServed, Plan, PlanReport, Waypoint};
 use crate::route::RoutePoint;
 use crate::settings::{Settings, TimingPolicy};
-use crate::target::{NozzleState, Target, normal_deviation};
+use crate::target::{NozzleState, Target};
 use crate::timing::speed_profile::{joint_motion, stroke_between};
 use crate::timing::{TimedTrajectory, schedule};
 use crate::transit::between;
@@ -21,9 +22,8 @@ const MAX_CLEARANCE: f64 = 1.0;
 /// A path with its vehicle states, not timed yet.
 pub(crate) struct UntimedPlan {
     pub(crate) nozzles: Nozzles,
-    pub(crate) vehicle: Vec<Option<VehicleState>>,
-    /// Why a target has none.
-    pub(crate) not_served: Vec<Option<NotServed>>,
+    /// Of each target, or why it has none.
+    pub(crate) vehicle: Vec<Result<VehicleState, NotServed>>,
     pub(crate) heading_cost: f64,
     pub(crate) route: Vec<RoutePoint>,
     /// Motion at the first point of the route; zero: it is left from rest.
@@ -68,7 +68,7 @@ pub(crate) fn assemble_plan(
             flow[target] = dose * length / (times[1] - times[0]);
         }
     }
-    let reachable: Vec<bool> = untimed.vehicle.iter().map(Option::is_some).collect();
+    let reachable: Vec<bool> = untimed.vehicle.iter().map(Result::is_ok).collect();
     let ideal = |target: &Target| NozzleState {
         position: target.point + target.normal.into_inner() * settings.nozzle.stand_off,
         direction: -target.normal,
@@ -78,7 +78,7 @@ pub(crate) fn assemble_plan(
         .states
         .iter()
         .zip(targets)
-        .map(|(state, target)| state.unwrap_or_else(|| ideal(target)))
+        .map(|(state, target)| state.unwrap_or_else(|_| ideal(target)))
         .collect();
     let (clearance, violations) = least_clearance(&timed, &waypoints, checker, 0.5 * settings.clearance);
     let report = report(untimed, targets, &nozzle, &timed, joint_rate(&waypoints), clearance);
@@ -87,7 +87,7 @@ pub(crate) fn assemble_plan(
         vehicle: fill(&untimed.vehicle, &waypoints),
         target_time: target_times(targets.len(), &waypoints),
         reachable,
-        not_served: untimed.not_served.clone(),
+        not_served: untimed.vehicle.iter().map(|vehicle| vehicle.err()).collect(),
         flow,
         trajectory: timed.trajectory,
         waypoints,
@@ -122,8 +122,8 @@ fn report(
     clearance: f64,
 ) -> PlanReport {
     let deviation = |i: usize| match untimed.vehicle[i] {
-        Some(_) => normal_deviation(&targets[i], &nozzle[i].position),
-        None => 0.0,
+        Ok(_) => targets[i].normal_deviation(&nozzle[i].position),
+        Err(_) => 0.0,
     };
     let normal_deviation: Vec<f64> = (0..targets.len()).map(deviation).collect();
     let served = untimed.vehicle.iter().flatten().count();
@@ -183,7 +183,7 @@ fn least_clearance(
 }
 
 /// Vehicle states of targets not served: the one before, at the beginning the one after.
-fn fill(vehicle: &[Option<VehicleState>], waypoints: &[Waypoint]) -> Vec<VehicleState> {
+fn fill(vehicle: &[Result<VehicleState, NotServed>], waypoints: &[Waypoint]) -> Vec<VehicleState> {
     let mut last = waypoints.iter().find(|w| w.target.is_some()).unwrap_or(&waypoints[0]).state;
     let mut result: Vec<VehicleState> = Vec::with_capacity(vehicle.len());
     for state in vehicle {

@@ -2,7 +2,8 @@
 
 use crate::clearance::{ClearanceChecker, DistanceCache};
 use crate::error::Error;
-use crate::nozzle::initial_states;
+use crate::not_served::NotServed;
+use crate::nozzle::{InitialState, initial_states};
 use crate::settings::Settings;
 use crate::target::{NozzleState, Target, check_each};
 use crate::visibility::drop_hidden;
@@ -26,7 +27,8 @@ pub fn reachable_targets(
     settings.check()?;
     check_each(targets)?;
     let starts = initial_states(targets, &settings.nozzle);
-    let mut nozzles: Vec<Option<NozzleState>> = starts.iter().map(|start| start.map(|start| start.state)).collect();
+    let nozzle = |start: Option<InitialState>| start.map(|start| start.state).ok_or(NotServed::OutOfReach);
+    let mut nozzles: Vec<Result<NozzleState, NotServed>> = starts.into_iter().map(nozzle).collect();
     drop_hidden(targets, &mut nozzles, surface)?;
     let mut checker = ClearanceChecker::new(surface, tool);
     // Neighbouring targets lie near each other and see the same directions: each heading keeps what it knows of the distances.
@@ -38,7 +40,7 @@ pub fn reachable_targets(
             vehicle.is_some_and(|vehicle| checker.is_clear(&vehicle, settings.clearance, cache))
         })
     };
-    let reachable = nozzles.iter().map(|nozzle| nozzle.as_ref().is_some_and(&mut admissible)).collect();
+    let reachable = nozzles.iter().map(|nozzle| nozzle.as_ref().is_ok_and(&mut admissible)).collect();
     checker.check_answers()?;
     Ok(reachable)
 }

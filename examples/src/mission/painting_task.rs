@@ -29,7 +29,7 @@ const LAYERED: f64 = 2.2;
 const USUAL_TEXEL: f64 = 0.0125;
 
 /// A surface with the picture wanted on it and the sprays that shall make it.
-pub struct Decision {
+pub struct PaintingTask {
     pub(super) settings: MissionSettings,
     pub(super) name: String,
     pub(super) surface: PaintSurface,
@@ -49,9 +49,9 @@ pub struct Decision {
     truth: Option<TriangleSurface>,
 }
 
-impl Decision {
+impl PaintingTask {
     /// Unwraps the surface, lays the design onto it and lets the painter decide. `name` is what the report calls the surface.
-    pub fn make(name: &str, scene: &Scene, design: &Design, settings: MissionSettings) -> Result<Self, MissionError> {
+    pub fn new(name: &str, scene: &Scene, design: &Design, settings: MissionSettings) -> Result<Self, MissionError> {
         let started = Instant::now();
         let robot = Robot { tether: settings.constraints.tether, ..Robot::new(Ptu::new(settings.ptu)?) };
         let appearance = Appearance::on_sandstone(&settings.paint.paint()?)?;
@@ -107,7 +107,7 @@ impl Decision {
     ///
     /// # Errors
     /// A mesh without faces.
-    pub fn before(self, truth: &TriangleMesh) -> Result<Self, MissionError> {
+    pub fn on_true_surface(self, truth: &TriangleMesh) -> Result<Self, MissionError> {
         let truth = TriangleSurface::new(&truth.positions, &truth.faces)?;
         Ok(Self { truth: Some(truth), ..self })
     }

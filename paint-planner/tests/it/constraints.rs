@@ -3,11 +3,11 @@
 use std::f64::consts::PI;
 
 use crate::walls::{Arm, Wall};
+use paint_planner::constraints::{KeepOutVolume, Tether, WithKeepOut};
+use paint_planner::mission::reachable_targets;
 use paint_planner::nalgebra::{Point3, Vector3};
-use paint_planner::{
-    KeepOutVolume, NotServed, NozzleState, Plan, Settings, Target, Tether, Tool, VehicleState, WithKeepOut, plan,
-    reachable_targets,
-};
+use paint_planner::plan::NotServed;
+use paint_planner::{NozzleState, Plan, Settings, Target, Tool, VehicleState, plan};
 
 /// Least distance between the tool and some volumes along a whole trajectory, every 10 ms.
 fn least_gap(plan: &Plan, volumes: &[KeepOutVolume]) -> f64 {
@@ -82,7 +82,7 @@ fn the_tether_stays_on_its_side() {
     let largest = |plan: &Plan| {
         let samples =
             (0..=(plan.trajectory.duration() / 0.01) as usize).map(|k| plan.trajectory.sample(0.01 * k as f64));
-        let angle = |s: paint_planner::Sample| {
+        let angle = |s: paint_planner::trajectory::Sample| {
             tether.angle(&VehicleState { position: s.position, heading: s.heading, pan: 0.0, tilt: 0.0 }).abs()
         };
         samples.map(angle).fold(0.0, f64::max)

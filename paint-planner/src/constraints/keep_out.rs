@@ -37,7 +37,7 @@ impl KeepOutVolume {
     /// Distance from a point to the solid, m; 0 inside.
     ///
     /// ```
-    /// # use paint_planner::{KeepOutVolume, nalgebra::{Point3, Vector3}};
+    /// # use paint_planner::{constraints::KeepOutVolume, nalgebra::{Point3, Vector3}};
     /// let ground = KeepOutVolume::HalfSpace { point: Point3::origin(), normal: Vector3::z() * 2.0 };
     /// assert_eq!(ground.distance(&Point3::new(4.0, 0.0, 3.0)), 3.0);
     /// assert_eq!(ground.distance(&Point3::new(4.0, 0.0, -3.0)), 0.0);

@@ -1,0 +1,59 @@
+//! The flights of a mission and what they leave bare.
+
+use super::strokes::Route;
+use super::target_outcomes::TargetOutcomes;
+use crate::plan::Plan;
+use crate::settings::Settings;
+use crate::target::Target;
+use crate::world::VehicleState;
+
+/// One flight: planned and rehearsed, from take-off or the end of the flight before to the last of its targets.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MissionFlight {
+    /// Its strokes.
+    pub route: Route,
+    /// Its plan.
+    pub plan: Plan,
+    /// Clearance of each target since the rehearsal, m; `None` where that gave it up.
+    pub clearance: Vec<Option<f64>>,
+    /// What it was planned with.
+    pub settings: Settings,
+}
+
+impl MissionFlight {
+    /// Targets that keep more clearance than the settings ask for since the rehearsal.
+    pub fn kept_off(&self) -> usize {
+        self.clearance.iter().flatten().filter(|clearance| **clearance > self.settings.clearance).count()
+    }
+
+    /// Targets, with paint or without, that the rehearsal gave up.
+    pub fn excluded(&self) -> usize {
+        self.clearance.iter().filter(|clearance| clearance.is_none()).count()
+    }
+}
+
+/// All flights of a mission.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct MissionPlan {
+    /// In flying order.
+    pub flights: Vec<MissionFlight>,
+    /// Paint of strokes that no flight was planned for, m³.
+    pub refused_volume: f64,
+    /// Their targets.
+    pub refused: TargetOutcomes,
+}
+
+impl MissionPlan {
+    /// Which targets the flights serve, and why not the others.
+    pub fn outcomes(&self) -> TargetOutcomes {
+        let mut outcomes = self.refused;
+        self.flights.iter().for_each(|flight| outcomes.add_flight(&flight.route.targets, &flight.plan));
+        outcomes
+    }
+
+    /// Where the last flight ends: the vehicle, and the last target.
+    pub fn end(&self) -> (Option<VehicleState>, Option<&Target>) {
+        let Some(last) = self.flights.last() else { return (None, None) };
+        (last.plan.waypoints.last().map(|w| w.state), last.route.targets.last())
+    }
+}

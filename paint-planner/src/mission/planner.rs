@@ -1,0 +1,181 @@
+//! From strokes on a surface to flights: plan, rehearse, and fly once more what was given up although a pose reaches it.
+
+use super::flights::{MissionFlight, MissionPlan};
+use super::rehearse::Rehearsal;
+use super::retry::take_unserved;
+use super::strokes::Route;
+use crate::error::Error;
+use crate::not_served::NotServed;
+use crate::plan::{OptimalPlanner, Planner};
+use crate::settings::Settings;
+use crate::target::Target;
+use crate::world::{Surface, Tool};
+
+/// What a mission can be told (all defaults ours).
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
+pub struct MissionSettings {
+    /// The planner's settings.
+    pub planner: Settings,
+    /// Flights over the same strokes (default 3). The first gives stretches up that a pose reaches, since all of a stroke is one
+    /// program; those become strokes of the next.
+    pub flights: usize,
+    /// Weights `c_a` and `c_b` between neighbours of what is flown once more, against those of the first flight (default 0.1): nozzles
+    /// stay nearer to their normals.
+    pub retry_weight: f64,
+    /// Shortest stretch worth another flight, m (default 0.05).
+    pub shortest_retry: f64,
+    /// Plans that are rehearsed before what still comes too near is left out (default 4).
+    pub rounds: usize,
+    /// More clearance than is missing in a rehearsal, m (default 0.01): the next plan comes near elsewhere.
+    pub beyond: f64,
+}
+
+impl Default for MissionSettings {
+    fn default() -> Self {
+        Self {
+            planner: Settings::default(),
+            flights: 3,
+            retry_weight: 0.1,
+            shortest_retry: 0.05,
+            rounds: 4,
+            beyond: 0.01,
+        }
+    }
+}
+
+/// Plans a mission step by step: layer after layer, each of which may take several flights.
+pub struct MissionPlanner<'a, R: ?Sized> {
+    /// Who plans each flight.
+    pub planner: &'a dyn Planner,
+    /// The surface to paint, with whatever else is in the way.
+    pub surface: &'a dyn Surface,
+    /// The vehicle with its gun.
+    pub tool: &'a dyn Tool,
+    /// What flies the plans before they count.
+    pub rehearsal: &'a R,
+    /// Settings.
+    pub settings: MissionSettings,
+}
+
+/// Plans a mission over strokes on a surface, each of at least two targets, in the order that is flown soonest.
+///
+/// # Errors
+/// Of the first flight as [`Planner::plan`]; what keeps later ones from being planned is counted in the outcomes instead. Those of the
+/// rehearsal.
+pub fn plan_mission<R: Rehearsal + ?Sized>(
+    strokes: &[Vec<Target>],
+    surface: &dyn Surface,
+    tool: &dyn Tool,
+    rehearsal: &R,
+    settings: MissionSettings,
+) -> Result<MissionPlan, R::Error> {
+    let mut mission = MissionPlan::default();
+    let route = Route::ordered(strokes, None, &settings.planner)?;
+    let planner = MissionPlanner { planner: &OptimalPlanner::default(), surface, tool, rehearsal, settings };
+    planner.add_layer(route, &mut mission)?;
+    if mission.flights.is_empty() {
+        return Err(Error::NothingReachable { count: mission.refused.targets }.into());
+    }
+    Ok(mission)
+}
+
+/// Why there is no plan for a flight: none of its targets can be served, or an error.
+pub(super) enum Refusal<E> {
+    NotServed(Error),
+    Failed(E),
+}
+
+impl<E: From<Error>> From<Error> for Refusal<E> {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::NothingReachable { .. } | Error::NoTransit { .. } | Error::Collision { .. } => {
+                Self::NotServed(error)
+            }
+            error => Self::Failed(error.into()),
+        }
+    }
+}
+
+impl<R: Rehearsal + ?Sized> MissionPlanner<'_, R> {
+    /// Adds the flights of a layer of paint: its route, and what is given up there once more by itself. It begins where the mission ends
+    /// so far.
+    ///
+    /// # Errors
+    /// As [`plan_mission`]; a layer of which nothing is reachable is none, it adds to what the mission refused.
+    pub fn add_layer(&self, route: Route, mission: &mut MissionPlan) -> Result<(), R::Error> {
+        let first = mission.flights.len();
+        let mut next = Some(route);
+        while let Some(route) = next.take() {
+            let again = mission.flights.len() > first;
+            let mut settings = self.settings.planner.clone();
+            if again {
+                settings.nozzle.ca *= self.settings.retry_weight;
+                settings.nozzle.cb *= self.settings.retry_weight;
+            }
+            let clearance = vec![Some(settings.clearance); route.targets.len()];
+            if !self.add_flight(again, route, clearance, settings, mission)? {
+                break;
+            }
+            if mission.flights.len() - first < self.settings.flights {
+                next = self.retry(mission)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Plans the flights from the `first` on again, for doses that were changed in their routes. Doses change the speed of the spot at
+    /// most, so nozzles and clearances stay as they were rehearsed.
+    ///
+    /// # Errors
+    /// As [`add_layer`](Self::add_layer).
+    pub fn replan(&self, first: usize, mission: &mut MissionPlan) -> Result<(), R::Error> {
+        for flight in mission.flights.split_off(first) {
+            let again = mission.flights.len() > first;
+            self.add_flight(again, flight.route, flight.clearance, flight.settings, mission)?;
+        }
+        Ok(())
+    }
+
+    /// Plans and rehearses one flight; whether there is one. What is flown once more (`again`) may also lie where no flight leads to.
+    fn add_flight(
+        &self,
+        again: bool,
+        route: Route,
+        mut clearance: Vec<Option<f64>>,
+        settings: Settings,
+        mission: &mut MissionPlan,
+    ) -> Result<bool, R::Error> {
+        let settings = Settings { start: mission.end().0.or(self.settings.planner.start), ..settings };
+        let refused = if route.targets.len() < 2 {
+            NotServed::OutOfReach
+        } else {
+            match self.rehearsed_plan(&route.targets, &mut clearance, &settings) {
+                Ok(plan) => {
+                    mission.flights.push(MissionFlight { route, plan, clearance, settings });
+                    return Ok(true);
+                }
+                Err(Refusal::NotServed(Error::NothingReachable { .. })) => NotServed::NoHeading,
+                Err(Refusal::NotServed(Error::NoTransit { .. })) if again => NotServed::NoTransit,
+                Err(Refusal::NotServed(Error::Collision { .. })) if again => NotServed::TooNear,
+                Err(Refusal::NotServed(error)) => return Err(error.into()),
+                Err(Refusal::Failed(error)) => return Err(error),
+            }
+        };
+        mission.refused_volume += route.volume() + route.lost_volume;
+        mission.refused.add_refused(&route.targets, refused);
+        Ok(false)
+    }
+
+    /// What the last flight gave up although a pose reaches it, as a route of its own.
+    fn retry(&self, mission: &mut MissionPlan) -> Result<Option<Route>, Error> {
+        let Some(MissionFlight { route, plan, .. }) = mission.flights.last_mut() else { return Ok(None) };
+        let shortest = self.settings.shortest_retry;
+        let strokes =
+            take_unserved(&mut route.targets, plan, shortest, self.surface, self.tool, &self.settings.planner)?;
+        if strokes.is_empty() {
+            return Ok(None);
+        }
+        Route::ordered(&strokes, route.targets.last(), &self.settings.planner).map(Some)
+    }
+}

@@ -1,0 +1,192 @@
+//! From strokes in the picture plane to targets on the surface (thesis Eq. (8.1), the half that does not depend on the robot).
+
+use crate::error::Error;
+use crate::settings::Settings;
+use crate::stroke_order::{StrokeEnds, order_strokes};
+use crate::target::Target;
+use nalgebra::{Point3, UnitVector3};
+
+/// A surface laid out in a plane, in which strokes are drawn. The plane's unit is the caller's: texels, as a rule.
+pub trait Chart {
+    /// The point of the surface at a place of the plane, m, world frame, and the outward normal that a spray there should follow; `None`
+    /// beside the surface.
+    fn lift(&self, place: [f64; 2]) -> Option<(Point3<f64>, UnitVector3<f64>)>;
+
+    /// The same `offset` on from a place where the plane ends before that: beyond a seam the surface goes on elsewhere. `None` for a
+    /// plane without seams, as it is here.
+    fn lift_from(&self, place: [f64; 2], offset: [f64; 2]) -> Option<(Point3<f64>, UnitVector3<f64>)> {
+        let _ = (place, offset);
+        None
+    }
+}
+
+/// One spray of a stroke in the plane of a [`Chart`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spray {
+    /// Where, in the plane's unit.
+    pub place: [f64; 2],
+    /// Paint, m³.
+    pub volume: f64,
+}
+
+/// Targets of strokes, joined by flights with the valve shut.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Route {
+    /// Targets in flying order.
+    pub targets: Vec<Target>,
+    /// Strokes among them.
+    pub strokes: usize,
+    /// Paint of sprays that found no surface under them, m³.
+    pub lost_volume: f64,
+    /// Estimated duration of the transits between strokes, s.
+    pub transit_time: f64,
+}
+
+impl Route {
+    /// Strokes in the order and the directions in which they are flown soonest after `from`; those of fewer than two targets are left
+    /// out, and the dose after the last target of each is dropped.
+    ///
+    /// # Errors
+    /// As [`order_strokes`].
+    pub fn ordered(strokes: &[Vec<Target>], from: Option<&Target>, settings: &Settings) -> Result<Self, Error> {
+        let strokes: Vec<&Vec<Target>> = strokes.iter().filter(|targets| targets.len() > 1).collect();
+        let ends: Vec<StrokeEnds> =
+            strokes.iter().map(|targets| StrokeEnds { first: targets[0], last: targets[targets.len() - 1] }).collect();
+        let order = order_strokes(&ends, from, settings)?;
+        let flown = order.strokes.iter().map(|stroke| {
+            let targets = strokes[stroke.index];
+            let mut flown = if stroke.reversed { reversed(targets) } else { targets.clone() };
+            // Nothing is sprayed on the way to the next stroke.
+            if let Some(last) = flown.last_mut() {
+                last.dose = 0.0;
+            }
+            flown
+        });
+        let targets = flown.flatten().collect();
+        Ok(Self { targets, strokes: ends.len(), lost_volume: 0.0, transit_time: order.transit_time })
+    }
+
+    /// Lays strokes onto a surface, sprays `spacing` apart in the plane's unit, and [orders](Self::ordered) them.
+    ///
+    /// # Errors
+    /// As [`order_strokes`].
+    pub fn lifted(
+        chart: &dyn Chart,
+        strokes: &[Vec<Spray>],
+        spacing: f64,
+        from: Option<&Target>,
+        settings: &Settings,
+    ) -> Result<Self, Error> {
+        let mut lost_volume = 0.0;
+        let lifted: Vec<Vec<Target>> =
+            strokes.iter().map(|stroke| lift(chart, stroke, spacing, &mut lost_volume)).collect();
+        Ok(Self { lost_volume, ..Self::ordered(&lifted, from, settings)? })
+    }
+
+    /// Paint that the targets ask for, m³.
+    pub fn volume(&self) -> f64 {
+        self.targets.windows(2).map(|pair| pair[0].dose * (pair[1].point - pair[0].point).norm()).sum()
+    }
+}
+
+/// One stroke on the surface. A spray stands for the paint of one cell of its stroke, half the way to its neighbours and `spacing` long
+/// where it has none: the targets are the borders of the cells, and the dose between them is the spray's volume over the length on the
+/// surface. What finds no surface under it is added to `lost`.
+fn lift(chart: &dyn Chart, stroke: &[Spray], spacing: f64, lost: &mut f64) -> Vec<Target> {
+    let mut targets: Vec<Target> = Vec::new();
+    for (k, spray) in stroke.iter().enumerate() {
+        let Some([start, end]) = spray_cell(chart, stroke, k, spacing) else {
+            *lost += spray.volume;
+            continue;
+        };
+        let dose = spray.volume / (end.point - start.point).norm();
+        // Neighbouring sprays share a border; across a gap the stroke goes on with the valve shut.
+        match targets.last_mut() {
+            Some(last) if (last.point - start.point).norm() < 1e-3 => last.dose = dose,
+            _ => {
+                if k > 0 {
+                    let [_, left] = half_cell(stroke, k - 1, spacing);
+                    let [back, _] = half_cell(stroke, k, spacing);
+                    let (from, to) = (added(stroke[k - 1].place, left), added(spray.place, back));
+                    bridge(chart, from, to, spacing, &mut targets);
+                }
+                targets.push(Target { dose, ..start });
+            }
+        }
+        targets.push(end);
+    }
+    targets
+}
+
+fn added([x, y]: [f64; 2], [dx, dy]: [f64; 2]) -> [f64; 2] {
+    [x + dx, y + dy]
+}
+
+/// Where the paint of the `k`-th spray of a stroke begins and ends on the surface, without doses; `None` where there is none under it.
+/// Sprays lie `spacing` apart.
+pub fn spray_cell(chart: &dyn Chart, stroke: &[Spray], k: usize, spacing: f64) -> Option<[Target; 2]> {
+    let [start, end] = half_cell(stroke, k, spacing).map(|offset| border(chart, stroke[k].place, offset));
+    start.zip(end).filter(|(start, end)| (end.point - start.point).norm() >= 1e-6).map(|(start, end)| [start, end])
+}
+
+/// From a spray to the borders of its cell, backwards and forwards: half the way to a neighbour that is no farther than
+/// one and a half cells, else half a cell on in the direction of the stroke.
+fn half_cell(sprays: &[Spray], k: usize, spacing: f64) -> [[f64; 2]; 2] {
+    let half_way = |a: usize, b: usize| [0, 1].map(|c| 0.5 * (sprays[b].place[c] - sprays[a].place[c]));
+    let half_step = |[x, y]: [f64; 2]| {
+        let stretch = 0.5 * spacing / x.hypot(y);
+        [x * stretch, y * stretch]
+    };
+    let negative = |[x, y]: [f64; 2]| [-x, -y];
+    let near = |[x, y]: &[f64; 2]| 2.0 * x.hypot(*y) <= 1.5 * spacing;
+    let (before, after) = ((k > 0).then(|| half_way(k - 1, k)), (k + 1 < sprays.len()).then(|| half_way(k, k + 1)));
+    let (touching, next) = (before.filter(near), after.filter(near));
+    let back = touching.or(next).or_else(|| before.or(after).map(half_step)).unwrap_or([0.5 * spacing, 0.0]);
+    let ahead = next.or(touching).or_else(|| after.or(before).map(half_step)).unwrap_or([0.5 * spacing, 0.0]);
+    [negative(back), ahead]
+}
+
+/// The same stroke flown from its end: a target's dose belongs to the way to the next one.
+fn reversed(stroke: &[Target]) -> Vec<Target> {
+    let doses = stroke.iter().rev().skip(1).map(|target| target.dose).chain([0.0]);
+    stroke.iter().rev().zip(doses).map(|(target, dose)| Target { dose, ..*target }).collect()
+}
+
+/// Targets with the valve shut between two places of a stroke, no farther apart than the others: a planner weighs steps.
+fn bridge(chart: &dyn Chart, from: [f64; 2], to: [f64; 2], along: f64, targets: &mut Vec<Target>) {
+    let steps = ((to[0] - from[0]).hypot(to[1] - from[1]) / along).ceil() as usize;
+    for k in 1..steps {
+        let place = [0, 1].map(|c| from[c] + (to[c] - from[c]) * k as f64 / steps as f64);
+        targets.extend(chart.lift(place).map(|(point, normal)| Target { point, normal, dose: 0.0, time: None }));
+    }
+}
+
+/// The target `offset` from a spray, beyond a seam where one lies between; drawn back to the spray where the surface ends before it.
+fn border(chart: &dyn Chart, place: [f64; 2], offset: [f64; 2]) -> Option<Target> {
+    [1.0, 0.75, 0.5, 0.25, 0.0].iter().find_map(|share| {
+        let offset = offset.map(|o| share * o);
+        let (point, normal) = chart.lift(added(place, offset)).or_else(|| chart.lift_from(place, offset))?;
+        Some(Target { point, normal, dose: 0.0, time: None })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn a_stroke_flown_backwards_puts_the_same_paint_on_the_same_places() {
+        let target = |y: f64, dose: f64| Target {
+            point: Point3::new(0.0, y, 1.0),
+            normal: -Vector3::x_axis(),
+            dose,
+            time: None,
+        };
+        let stroke = [target(0.0, 1.0), target(0.1, 0.0), target(0.3, 3.0), target(0.6, 0.0)];
+        let back = reversed(&stroke);
+        let expected = [target(0.6, 3.0), target(0.3, 0.0), target(0.1, 1.0), target(0.0, 0.0)];
+        assert_eq!(back, expected);
+        assert_eq!(reversed(&back), stroke);
+    }
+}

@@ -1,0 +1,17 @@
+//! Whole plans and missions on analytic worlds. `own_*`: what each trait asks of whoever brings his own.
+
+mod constraints;
+mod continuation;
+mod control;
+mod gantry;
+mod missions;
+mod own_planner;
+mod own_rehearsal;
+mod own_surface;
+mod own_tool;
+mod plans;
+mod readme;
+mod session;
+mod transits;
+mod walls;
+mod worlds;
