@@ -82,6 +82,14 @@ pub enum Error {
         /// What is wrong and what is asked for.
         what: &'static str,
     },
+    /// A frame of the gantry's sensors that none measures.
+    #[error("frame at {time} s: {what}")]
+    Frame {
+        /// Time of the frame, s.
+        time: f64,
+        /// What is wrong and what is asked for.
+        what: &'static str,
+    },
     /// A plan in flight cannot go on with the next segment.
     #[error("the plan in flight cannot be continued: {what}; let it halt and plan from there")]
     Continuation {

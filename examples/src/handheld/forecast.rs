@@ -1,5 +1,6 @@
 //! The simulator's droplets as the gantry planner's paint.
 
+use nalgebra::Isometry3;
 use paint_planner::gantry::{GantrySample, PaintModel, Segment};
 use paint_sim::droplets::{
     Coverage, DensityPlace, DensitySettings, Droplets, Flux, PathOutcome, PathSimulation, SimulatedSegment, StepCast,
@@ -68,6 +69,18 @@ impl<'a> PaintJob<'a> {
     /// Settings out of range.
     pub fn new(surface: &'a TexelSurface, settings: &'a HandheldSettings) -> Result<Self, HandheldError> {
         Ok(Self { surface, settings, sets: settings.droplet_sets()? })
+    }
+
+    /// Where the droplets of a time step land, from a pose of the robot and a gantry position, m.
+    pub(super) fn hits(&self, world_from_robot: &Isometry3<f64>, position: f64, step: usize) -> StepHits {
+        let nozzle = self.settings.geometry.nozzle(world_from_robot, position);
+        StepHits::cast(self.surface, &nozzle, &self.sets[step % self.sets.len()])
+    }
+
+    /// What a whole step of spray is worth there.
+    pub(super) fn score(&self, hits: &StepHits, coverage: &Coverage) -> f64 {
+        let deposit = &self.settings.deposit;
+        hits.score(deposit.droplet(), deposit.punishment, |texel| coverage.remaining(texel as usize)).score
     }
 }
 

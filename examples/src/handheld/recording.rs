@@ -11,7 +11,7 @@ use paint_sim::droplets::GantryGeometry;
 
 use super::error::HandheldError;
 use super::object::PaintObject;
-use super::session::{SessionLog, Tick};
+use super::painting::{PaintingLog, Tick};
 use crate::recording::{ColouredMesh, Recorder, log_message, mesh_scene, point, quaternion, rgb, scene, vector};
 
 /// Colour of the bare object and of the paint.
@@ -22,7 +22,7 @@ const PAINT: [f64; 3] = [30.0, 60.0, 150.0];
 pub(super) fn save(
     object: &PaintObject,
     geometry: &GantryGeometry,
-    log: &SessionLog,
+    log: &PaintingLog,
     path: &Path,
 ) -> Result<(), HandheldError> {
     let mut recorder = Recorder::create(path)?;
@@ -98,7 +98,7 @@ fn spray_scene(tick: &Tick, tip: &Point3<f64>) -> SceneUpdate {
 }
 
 /// Colours of the vertices by the texels that they lie in. Meshes with few vertices show little of the paint: the textures show all.
-fn vertex_colours(object: &PaintObject, log: &SessionLog) -> Vec<[u8; 3]> {
+fn vertex_colours(object: &PaintObject, log: &PaintingLog) -> Vec<[u8; 3]> {
     let coverage = &log.truth;
     let full = coverage.full_thickness();
     let share = |uv: [f64; 2]| {

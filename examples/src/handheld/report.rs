@@ -4,7 +4,7 @@ use paint_sim::droplets::CoverageFigures;
 use serde::Serialize;
 
 use super::evaluation::{Evaluation, mean, quantile};
-use super::session::SessionLog;
+use super::painting::PaintingLog;
 
 /// `report.json`: flat, SI units in the names unless they say otherwise.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -99,7 +99,7 @@ impl HandheldReport {
     }
 
     /// What the painting left.
-    pub fn painted(&mut self, log: &SessionLog) {
+    pub fn painted(&mut self, log: &PaintingLog) {
         let (truth, belief): (CoverageFigures, CoverageFigures) = (log.truth.figures(), log.belief.figures());
         if self.scenarios == 0 {
             self.decision_ms_median = quantile(&log.decision_ms, 0.5);

@@ -13,13 +13,14 @@ use super::cube::{cube, cube_edges, in_circle, upper_faces};
 use super::error::HandheldError;
 use super::evaluation::{evaluate, time_ratio};
 use super::forecast::{PaintDevice, PaintJob, Processor};
+use super::hardware::HardwareSettings;
 use super::motion_file::read_poses;
 use super::object::{PaintObject, SurfaceSample};
+use super::painting::{HandPoses, PaintingLog, paint};
 use super::pictures::{save_plan, save_textures};
 use super::recorded_motion::{MotionFrame, RecordedMotion};
 use super::recording;
 use super::report::HandheldReport;
-use super::session::{HandPoses, SessionLog, SessionSettings, paint};
 use super::settings::HandheldSettings;
 use super::target::read_target;
 use super::views::passes;
@@ -73,7 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<(), HandheldError> {
 /// Whether the result is usable.
 fn judge(
     object: &PaintObject,
-    log: &SessionLog,
+    log: &PaintingLog,
     settings: &HandheldSettings,
     report: &HandheldReport,
     recorded: bool,
@@ -98,7 +99,7 @@ fn judge(
 }
 
 /// Shortest distance of the robot from the target, m.
-fn nearest(object: &PaintObject, log: &SessionLog) -> f64 {
+fn nearest(object: &PaintObject, log: &PaintingLog) -> f64 {
     // A target has thousands of texels and a motion thousands of moments: some of each will do for a message.
     let wanted: Vec<_> = object.wanted_points().map(|(sample, _)| sample.point).collect();
     let some = |count: usize| (count / 200).max(1);
@@ -259,10 +260,10 @@ fn spray(
     object: &PaintObject,
     device: &mut dyn PaintDevice,
     settings: &HandheldSettings,
-) -> Result<SessionLog, HandheldError> {
+) -> Result<PaintingLog, HandheldError> {
     let job = PaintJob::new(&object.surface, settings)?;
     let away = Vector3::new(1.0, -0.7, 0.4).normalize() * arguments.registration_error;
-    let session = SessionSettings {
+    let hardware = HardwareSettings {
         pose_sensor: PoseSensorSettings { position_sigma: arguments.pose_noise, ..PoseSensorSettings::default() },
         // What the filter reaches with each: a camera alone leaves the place less certain.
         max_position_sigma: (arguments.pose_noise * if arguments.no_inertial { 0.9 } else { 0.6 }).max(GOOD_ENOUGH),
@@ -271,7 +272,7 @@ fn spray(
         registration: arguments.correct_registration.then(RegistrationSettings::default),
         world_from_model: Isometry3::from_parts(Translation3::from(away), nalgebra::UnitQuaternion::identity()),
         seed: arguments.seed,
-        ..SessionSettings::default()
+        ..HardwareSettings::default()
     };
     let stage = Stage::start("paint");
     let share = |share: f64| stage.share(share);
@@ -279,13 +280,13 @@ fn spray(
         let passes = passes(object, settings, arguments.seconds);
         let hand = HandMotion::new(&passes, HandSettings::default(), arguments.seed)?;
         let motion = HandPoses { pose: &|time| hand.at(time), tracked: &|_| true, duration: hand.duration() };
-        paint(object, &job, device, &session, &motion, &share)?
+        paint(object, &job, device, &hardware, &motion, &share)?
     } else {
         let recorded = recorded_motion(arguments, object, settings)?;
         recorded.remarks.iter().for_each(|remark| eprintln!("{remark}"));
         let (pose, tracked) = (|time| recorded.at(time), |time| recorded.tracked(time));
         let motion = HandPoses { pose: &pose, tracked: &tracked, duration: recorded.duration };
-        paint(object, &job, device, &session, &motion, &share)?
+        paint(object, &job, device, &hardware, &motion, &share)?
     };
     let figures = log.truth.figures();
     stage.done(&format!(

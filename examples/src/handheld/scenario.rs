@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use paint_planner::gantry::GantryState;
-use paint_sim::droplets::{Coverage, StepHits, Sweep};
+use paint_sim::droplets::{Coverage, Sweep};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 
@@ -100,14 +100,12 @@ pub(super) fn facing(face: &SurfaceSample) -> UnitQuaternion<f64> {
 
 /// A pass at one gantry position, the valve open where that does good.
 fn spray_pass(coverage: &mut Coverage, job: &PaintJob, sweep: &Sweep, position: f64) {
-    let (settings, sets) = (job.settings, &job.sets);
+    let settings = job.settings;
     let deposit = &settings.deposit;
     let steps = (settings.planner.interval * settings.planner.horizon as f64 / deposit.step).round() as usize;
     for k in 0..steps {
-        let pose = sweep.at((k as f64 + 0.5) * deposit.step);
-        let hits = StepHits::cast(job.surface, &settings.geometry.nozzle(&pose, position), &sets[k % sets.len()]);
-        let outcome = hits.score(deposit.droplet(), deposit.punishment, |texel| coverage.remaining(texel as usize));
-        if outcome.score > 0.0 {
+        let hits = job.hits(&sweep.at((k as f64 + 0.5) * deposit.step), position, k);
+        if job.score(&hits, coverage) > 0.0 {
             coverage.spray(&hits, deposit.droplet());
         }
     }

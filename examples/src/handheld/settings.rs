@@ -57,20 +57,8 @@ impl HandheldSettings {
 
     /// The planner's settings with the flux of this nozzle on this slide.
     pub fn planner(&self) -> GantrySettings {
-        let spread = self.spray.sigma.tan();
-        // Width, or area, over which a Gaussian of this spread is even for its own droplets: one over the integral of its square.
-        let width = 2.0 * std::f64::consts::PI.sqrt() * spread;
-        let area = 4.0 * std::f64::consts::PI * spread * spread;
-        let punishment = self.deposit.punishment;
-        let over = if self.paper_literal { area } else { width };
-        GantrySettings {
-            flux_speed: self.deposit.flow / over,
-            travel: self.geometry.travel,
-            // Where the punishment shuts the valve: nothing is gained by going where it stays shut.
-            least_use: if self.paper_literal { self.planner.least_use } else { punishment / (1.0 + punishment) },
-            saturate: self.planner.saturate && !self.paper_literal,
-            ..self.planner
-        }
+        let planner = GantrySettings { travel: self.geometry.travel, ..self.planner };
+        planner.with_spray(self.deposit.flow, self.spray.sigma, self.deposit.punishment, self.paper_literal)
     }
 
     /// The droplets of the time steps.

@@ -8,8 +8,8 @@ use nalgebra::Isometry3;
 use paint_sim::gantry_robot::{HandMotion, HandSettings, PoseSensorSettings};
 use paintcopter::handheld::cube::{cube, cube_edges, in_circle, upper_faces};
 use paintcopter::handheld::{
-    Arguments, HandPoses, HandheldError, HandheldSettings, PaintJob, PaintObject, Processor, SessionLog,
-    SessionSettings, evaluate, paint, passes, run,
+    Arguments, HandPoses, HandheldError, HandheldSettings, HardwareSettings, PaintJob, PaintObject, PaintingLog,
+    Processor, evaluate, paint, passes, run,
 };
 
 use crate::scratch::Scratch;
@@ -23,10 +23,10 @@ fn painted_cube() -> PaintObject {
 fn session(
     object: &PaintObject,
     settings: &HandheldSettings,
-    session: &SessionSettings,
+    session: &HardwareSettings,
     pose: &dyn Fn(f64) -> Isometry3<f64>,
     seconds: f64,
-) -> Result<SessionLog, HandheldError> {
+) -> Result<PaintingLog, HandheldError> {
     let droplets = settings.density_droplets()?;
     let mut device = Processor { surface: &object.surface, droplets, threads: settings.threads };
     let job = PaintJob::new(&object.surface, settings)?;
@@ -58,7 +58,7 @@ fn the_cube_has_three_circles_of_34_millimetres() {
 #[test]
 fn a_perfectly_known_robot_paints_the_circle_and_any_number_of_threads_paints_the_same() {
     let object = painted_cube();
-    let known = SessionSettings {
+    let known = HardwareSettings {
         pose_sensor: PoseSensorSettings {
             position_sigma: 0.0,
             rotation_sigma: 0.0,
@@ -66,7 +66,7 @@ fn a_perfectly_known_robot_paints_the_circle_and_any_number_of_threads_paints_th
             ..PoseSensorSettings::default()
         },
         registration: None,
-        ..SessionSettings::default()
+        ..HardwareSettings::default()
     };
     let run = |threads: usize| {
         let settings = HandheldSettings { threads, ..HandheldSettings::default() };
@@ -88,10 +88,10 @@ fn a_perfectly_known_robot_paints_the_circle_and_any_number_of_threads_paints_th
 fn lost_markers_shut_the_valve_within_a_step_and_are_said() {
     let object = painted_cube();
     let settings = HandheldSettings::default();
-    let losing = SessionSettings {
+    let losing = HardwareSettings {
         pose_sensor: PoseSensorSettings { loss_rate: 1.0, loss_duration: 0.5, ..PoseSensorSettings::default() },
         registration: None,
-        ..SessionSettings::default()
+        ..HardwareSettings::default()
     };
     let log = session(&object, &settings, &losing, &sweeps(&object, &settings), 8.0).unwrap();
     assert!(log.lost_ticks > 50 && log.held_decisions > 5, "{} {}", log.lost_ticks, log.held_decisions);
@@ -116,12 +116,12 @@ fn a_misplaced_object_is_found_by_its_distances() {
     // Before all three sides in turn: one alone does not say where the object stands along it.
     let hand = HandMotion::new(&passes(&object, &settings, Some(5.0)), HandSettings::default(), 3).unwrap();
     let error = |registration| {
-        let misplaced = SessionSettings { registration, world_from_model: away, ..SessionSettings::default() };
+        let misplaced = HardwareSettings { registration, world_from_model: away, ..HardwareSettings::default() };
         session(&object, &settings, &misplaced, &|time| hand.at(time), hand.duration()).unwrap().registration_error
     };
     let before = error(None);
     assert!((before - 29.0_f64.sqrt() * 1e-3).abs() < 1e-9);
-    let after = error(SessionSettings::default().registration);
+    let after = error(HardwareSettings::default().registration);
     assert!(after < 0.4 * before, "{after} {before}");
 }
 
@@ -310,7 +310,7 @@ fn a_target_out_of_reach_is_said() {
     let settings = HandheldSettings::default();
     // Two metres off, looking away.
     let far = |_: f64| Isometry3::translation(2.0, 0.0, 0.0);
-    let log = session(&object, &settings, &SessionSettings::default(), &far, 2.0).unwrap();
+    let log = session(&object, &settings, &HardwareSettings::default(), &far, 2.0).unwrap();
     assert!(log.emitted == 0.0 && log.idle_decisions == log.decision_ms.len() && log.idle_decisions > 10);
 }
 

@@ -7,6 +7,7 @@ use super::edge_scores::EdgeScores;
 use super::lattice::Lattice;
 
 /// Values and decisions of all nodes.
+#[derive(Debug)]
 pub(super) struct ValueSweep {
     /// For each layer the first cell, and for each cell and incoming speed the best sum from there on and the speed that begins it.
     layers: Vec<(i32, Vec<(f64, i32)>)>,

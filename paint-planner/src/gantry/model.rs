@@ -1,6 +1,11 @@
-//! What the gantry planner needs to know of the world.
+//! What the gantry planner and its controller need to know of paint.
+
+use nalgebra::Isometry3;
 
 use super::lattice::Segment;
+use super::robot_motion::RobotMotion;
+use crate::error::Error;
+use crate::world::Surface;
 
 /// A place that the nozzle could be at.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,4 +32,41 @@ pub trait PaintModel {
 
     /// Paint that a path from the plan's start would place, m^3, by simulation (Section V). Leaves the paint as it is.
     fn simulate(&mut self, path: &[Segment]) -> f64;
+}
+
+/// Where spray lands on the object, and whether it does good there: what a [`Controller`](super::Controller) asks of a simulation of paint.
+///
+/// Poses are those of the robot as seen from the object's model (`model_from_robot`); gantry positions are metres along the slide. Time steps
+/// are those of the controller's frames.
+pub trait DepositModel {
+    /// The paint on the object.
+    type Deposit: Clone;
+    /// Where the spray of one time step lands.
+    type Footprint;
+    /// Why a forecast may fail.
+    type Error: From<Error>;
+
+    /// Surface of the object in its model's place, against which measured distances are held.
+    fn surface(&self) -> &dyn Surface;
+
+    /// Where the nozzle sprays during a time step, from its pose in the middle of the step. A model that samples its spray may take another
+    /// sample for each number of a step.
+    fn footprint(&self, model_from_robot: &Isometry3<f64>, position: f64, step: usize) -> Self::Footprint;
+
+    /// What a whole step of spray is worth there (the sum `S` of handheld paper, Eqs. (6) and (7)): positive where it does more good than harm.
+    fn score(&self, footprint: &Self::Footprint, deposit: &Self::Deposit) -> f64;
+
+    /// Adds the spray of a step in which the valve is open for the share `open`.
+    fn spray(&self, footprint: &Self::Footprint, open: f64, deposit: &mut Self::Deposit);
+
+    /// Calls `plan` with the paint as it would go on from `deposit` under a robot that moves on as `motion` says; time 0 is that of `motion`.
+    ///
+    /// # Errors
+    /// What `plan` returns, or what the model cannot compute.
+    fn forecast<R>(
+        &mut self,
+        deposit: &Self::Deposit,
+        motion: &RobotMotion,
+        plan: impl FnOnce(&mut dyn PaintModel) -> Result<R, Error>,
+    ) -> Result<R, Self::Error>;
 }

@@ -11,6 +11,7 @@ use crate::error::Error;
 use crate::trace::{event, span};
 
 /// A decision and what it was made from.
+#[derive(Debug)]
 pub struct GantryPlan {
     /// The lattice around the start.
     pub lattice: Lattice,

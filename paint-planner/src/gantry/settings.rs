@@ -1,6 +1,6 @@
 //! Numbers of the gantry planner.
 
-use crate::error::Error;
+use crate::error::{Error, ensure};
 
 /// Lattice, horizon and flux of the gantry planner. `Default` is the handheld paper's setting: 7 decisions of 0.1 s, 3 directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,6 +82,23 @@ impl GantrySettings {
         ensure("gantry.density_spacing", samples, samples <= 1e7, "coarser: that many samples are too many")
     }
 
+    /// With the flux of a nozzle that sprays `flow` (m^3/s) in a Gaussian of the half angle `sigma` (rad), on a robot whose valve shuts where
+    /// the paint above the target, times `punishment`, outweighs the rest. `paper_literal` takes Eqs. (1), (3) and (4) as they are printed.
+    #[must_use]
+    pub fn with_spray(self, flow: f64, sigma: f64, punishment: f64, paper_literal: bool) -> Self {
+        let spread = sigma.tan();
+        // Width, or area, over which a Gaussian of this spread is even for its own droplets: one over the integral of its square.
+        let width = 2.0 * std::f64::consts::PI.sqrt() * spread;
+        let area = 4.0 * std::f64::consts::PI * spread * spread;
+        Self {
+            flux_speed: flow / if paper_literal { area } else { width },
+            // Where the punishment shuts the valve: nothing is gained by going where it stays shut.
+            least_use: if paper_literal { self.least_use } else { punishment / (1.0 + punishment) },
+            saturate: self.saturate && !paper_literal,
+            ..self
+        }
+    }
+
     /// Fastest movement in steps of speed.
     pub(super) fn fastest(&self) -> i32 {
         (self.directions / 2) as i32
@@ -96,8 +113,4 @@ impl GantrySettings {
     pub(super) fn duration(&self) -> f64 {
         self.interval * self.horizon as f64
     }
-}
-
-fn ensure(name: &'static str, value: f64, holds: bool, requirement: &'static str) -> Result<(), Error> {
-    if holds { Ok(()) } else { Err(Error::Setting { name, value, requirement }) }
 }

@@ -5,6 +5,7 @@ mod continuation;
 mod control;
 mod gantry;
 mod missions;
+mod own_deposit_model;
 mod own_planner;
 mod own_rehearsal;
 mod own_surface;

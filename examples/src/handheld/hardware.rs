@@ -8,7 +8,7 @@ use paint_sim::gantry_robot::{
 
 /// Sensors, actuators and what is wrong with them.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SessionSettings {
+pub struct HardwareSettings {
     /// Marker tracking.
     pub pose_sensor: PoseSensorSettings,
     /// Inertial sensor; `None`: the camera alone, as in the paper.
@@ -33,7 +33,7 @@ pub struct SessionSettings {
     pub seed: u64,
 }
 
-impl Default for SessionSettings {
+impl Default for HardwareSettings {
     fn default() -> Self {
         Self {
             pose_sensor: PoseSensorSettings::default(),
