@@ -4,6 +4,6 @@ pub(crate) mod adjust;
 mod pixel_cell;
 mod point_terms;
 mod posed_frame;
+mod residual_stats;
 pub(crate) mod settings;
 mod surface_points;
-mod tally;

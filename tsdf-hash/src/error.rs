@@ -1,5 +1,8 @@
 //! What can be wrong with an input.
 
+/// An error of a caller's own code.
+pub type BoxedError = Box<dyn std::error::Error + Send + Sync>;
+
 /// Everything this crate can refuse. Nothing of the map has changed when an error is returned.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -92,8 +95,32 @@ pub enum Error {
     InvalidTime {
         /// Its time, seconds.
         time: f64,
-        /// The time of the last frame that was fused, seconds.
+        /// The time of the last frame that was fused, or sample, seconds.
         last: f64,
+    },
+    /// A sample of a sensor that is not finite.
+    #[error("the {what} at {stamp} s is not finite: leave the sample out")]
+    InvalidSample {
+        /// What it measures.
+        what: &'static str,
+        /// Seconds.
+        stamp: f64,
+    },
+    /// A frame could not be read a second time.
+    #[error("frame {frame} cannot be read again: {source}")]
+    FrameSource {
+        /// Its number.
+        frame: usize,
+        /// What the source says.
+        source: BoxedError,
+    },
+    /// What is stored with a map makes no sense.
+    #[error("the map's metadata \"{key}\" makes no sense: {why}")]
+    InvalidMetadata {
+        /// Which of them.
+        key: &'static str,
+        /// What was expected, and found.
+        why: String,
     },
     /// A cap on the swap file without such a file, or the other way round.
     #[error("memory.disk_bytes = {disk_bytes}: a map with a swap file is made by with_swap, one without by new")]
@@ -210,7 +237,6 @@ pub enum Error {
         why: String,
     },
     /// No GPU can be used; [`Map`](crate::Map) works without one.
-    #[cfg(feature = "gpu")]
     #[error("no GPU: {reason}")]
     NoAdapter {
         /// What was found instead.

@@ -4,5 +4,5 @@ pub(crate) mod bit_stream;
 pub(crate) mod compressed_frame;
 pub(crate) mod index;
 mod keyframe;
-mod plane_coder;
+pub(crate) mod plane_coder;
 mod small_image;

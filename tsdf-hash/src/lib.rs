@@ -62,6 +62,7 @@ mod changes;
 mod codec;
 mod dense_map;
 mod derived_blocks;
+mod device_map;
 mod distance_field;
 mod error;
 mod file;
@@ -84,6 +85,7 @@ mod ray_cast;
 mod report;
 mod rounding;
 mod settings;
+pub mod slam;
 mod storage;
 mod trace;
 mod tracking;
@@ -105,10 +107,10 @@ pub use dense_map::DenseMap;
 pub use derived_blocks::UpdateReport;
 pub use distance_field::field::DistanceField;
 pub use distance_field::settings::DistanceSettings;
-pub use error::Error;
+pub use error::{BoxedError, Error};
 pub use file::map_file::MapFile;
 #[cfg(feature = "gpu")]
-pub use gpu::gpu_map::{GpuMap, gpu_or_cpu_map};
+pub use gpu::gpu_map::GpuMap;
 #[cfg(feature = "gpu")]
 pub use gpu::options::GpuOptions;
 pub use images::{ColourData, ColourView, DepthData, DepthView, Intrinsics};
@@ -136,6 +138,7 @@ pub use pose_graph::graph::PoseGraph;
 pub use pose_graph::levenberg_marquardt::{PoseGraphReport, PoseGraphSettings};
 #[cfg(feature = "pose-graph")]
 pub use pose_graph::robust_kernel::RobustKernel;
+pub use ray_cast::depth_comparison::DepthComparison;
 pub use ray_cast::incremental::{IncrementalRayCast, IncrementalRayCastSettings};
 pub use ray_cast::settings::RayCastSettings;
 pub use ray_cast::single_ray::SurfaceHit;

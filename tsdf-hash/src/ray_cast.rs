@@ -3,6 +3,7 @@
 pub(crate) mod camera;
 pub(crate) mod caster;
 mod cell;
+pub(crate) mod depth_comparison;
 mod forward_projection;
 pub(crate) mod incremental;
 pub(crate) mod lanes;

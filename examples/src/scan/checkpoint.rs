@@ -1,18 +1,15 @@
-//! What a run has done so far, kept in the file of its map: after a crash the run goes on from there.
+//! What a run has done so far is kept in the file of its map: after a crash the run goes on from there.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use tsdf_hash::{KeyframeIndex, Map, MapFile};
-use vio_ekf::{Trajectory, tum};
+use tsdf_hash::slam::{FrameSource, Slam};
 
 use super::error::ScanError;
 
-/// Names of the metadata: the folder, the stamp of the last frame that is done, and the trajectory.
-const KEYS: [&str; 3] = ["scan.sequence", "scan.last_stamp", "scan.trajectory"];
-/// And of the keyframes.
-const KEYFRAMES: &str = "scan.keyframes";
+/// Name of the metadata that says which sequence a map is of.
+const SEQUENCE: &str = "scan.sequence";
 /// Saving takes no larger share of the time than this.
 const LARGEST_SHARE: f64 = 0.1;
 
@@ -25,53 +22,15 @@ pub struct CheckpointSettings {
     pub interval: Duration,
 }
 
-/// What a stored run had done.
-pub(super) struct Progress {
-    /// Seconds; frames up to this one need not be looked at again.
-    pub(super) last_stamp: f64,
-    /// The poses of those that were fused.
-    pub(super) trajectory: Trajectory,
+/// Whether a stored map is of this sequence.
+pub(super) fn is_of(metadata: &BTreeMap<String, Vec<u8>>, sequence: &Path) -> bool {
+    metadata.get(SEQUENCE).is_some_and(|name| *name == metadata_of(sequence)[SEQUENCE])
 }
 
-impl Progress {
-    /// What the run that saved a map had done with this sequence; nothing if it was another one.
-    pub(super) fn read(path: &Path, file: &MapFile, sequence: &Path) -> Result<Option<Self>, ScanError> {
-        let fault = |why: String| ScanError::Checkpoint { path: path.display().to_string(), why };
-        let metadata = file.metadata().map_err(|e| fault(e.to_string()))?;
-        let text = |key: &str| metadata.get(key).map(|bytes| String::from_utf8_lossy(bytes).into_owned());
-        let [Some(of), Some(done), Some(rows)] = KEYS.map(text) else { return Ok(None) };
-        if of != name(sequence) {
-            return Ok(None);
-        }
-        let last_stamp = done.parse().map_err(|_| fault(format!("its last stamp is \"{done}\"")))?;
-        let trajectory = if rows.is_empty() { Trajectory::default() } else { tum::read(&rows)? };
-        Ok(Some(Self { last_stamp, trajectory }))
-    }
-}
-
-/// The keyframes that were stored with a map; none in maps of runs before there were any.
-pub(super) fn stored_keyframes(path: &Path, file: &MapFile) -> Result<Option<KeyframeIndex>, ScanError> {
-    let fault = |source| ScanError::Stored { path: path.display().to_string(), source };
-    let metadata = file.metadata().map_err(fault)?;
-    metadata.get(KEYFRAMES).map(|bytes| KeyframeIndex::from_bytes(bytes).map_err(fault)).transpose()
-}
-
-/// The metadata of a run.
-pub(super) fn metadata(
-    sequence: &Path,
-    last_stamp: f64,
-    trajectory: &Trajectory,
-    keyframes: &KeyframeIndex,
-) -> BTreeMap<String, Vec<u8>> {
-    let values = [name(sequence), last_stamp.to_string(), tum::write(trajectory)];
-    let mut metadata: BTreeMap<String, Vec<u8>> =
-        KEYS.iter().map(|key| (*key).to_string()).zip(values.map(String::into_bytes)).collect();
-    metadata.insert(KEYFRAMES.into(), keyframes.to_bytes());
-    metadata
-}
-
-fn name(sequence: &Path) -> String {
-    std::fs::canonicalize(sequence).unwrap_or_else(|_| sequence.to_path_buf()).display().to_string()
+/// What a later run over the same sequence needs to know, beside its state.
+pub(super) fn metadata_of(sequence: &Path) -> BTreeMap<String, Vec<u8>> {
+    let name = std::fs::canonicalize(sequence).unwrap_or_else(|_| sequence.to_path_buf()).display().to_string();
+    [(SEQUENCE.to_string(), name.into_bytes())].into()
 }
 
 /// Saves a run from time to time.
@@ -86,23 +45,16 @@ impl Checkpoints {
         Self { settings, next: Instant::now() + interval }
     }
 
-    /// Whether it is time for the next one.
-    pub(super) fn are_due(&self) -> bool {
-        self.settings.is_some() && Instant::now() >= self.next
-    }
-
-    /// Saves; a map on a GPU is not saved before the end.
-    pub(super) fn save(
-        &mut self,
-        map: Option<&Map>,
-        sequence: &Path,
-        last_stamp: f64,
-        trajectory: &Trajectory,
-        keyframes: &KeyframeIndex,
-    ) -> Result<(), ScanError> {
-        let (Some(settings), Some(map)) = (&self.settings, map) else { return Ok(()) };
+    /// Saves if it is time to; a map on a GPU is not saved before the end.
+    pub(super) fn save(&mut self, slam: &mut Slam<impl FrameSource>, sequence: &Path) -> Result<(), ScanError> {
+        let Some(settings) = self.settings.as_ref().filter(|_| Instant::now() >= self.next) else { return Ok(()) };
+        if slam.map().cpu().is_none() {
+            return Ok(());
+        }
+        // A stored map must fit the poses that are stored with it.
+        slam.reintegrate(usize::MAX)?;
         let start = Instant::now();
-        map.save(&settings.path, None, &metadata(sequence, last_stamp, trajectory, keyframes))?;
+        slam.save(&settings.path, None, metadata_of(sequence))?;
         self.next = Instant::now() + settings.interval.max(start.elapsed().div_f64(LARGEST_SHARE));
         Ok(())
     }

@@ -2,11 +2,12 @@
 
 use image::{DynamicImage, ImageReader};
 use nalgebra::Point3;
+use tsdf_hash::slam::{ColourImage, ColourPixels, DepthPixels, FrameImages};
 use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics};
 
 use super::error::SequenceError;
 use super::image_source::ImageSource;
-use super::sequence::{ColourCamera, FrameFiles};
+use super::sequence::{ColourCamera, FrameFiles, Sequence};
 use crate::mcap_messages::images::{ImageData, RawPixels};
 use crate::pictures::Rgb;
 
@@ -118,6 +119,22 @@ impl Images {
         DepthView { width: self.width, height: self.height, data, intrinsics }
     }
 
+    /// Both, owned.
+    pub fn into_frame(self, intrinsics: Intrinsics, scale: f64) -> FrameImages {
+        let Self { width, height, depth, colour, .. } = self;
+        let colour = colour.map(|colour| ColourImage {
+            intrinsics: scaled(intrinsics, width, height, &colour),
+            width: colour.width,
+            height: colour.height,
+            pixels: ColourPixels::Rgb8(colour.rgb8),
+        });
+        let depth = match depth {
+            Depths::Units(data) => DepthPixels::U16 { data, scale },
+            Depths::Metres(data) => DepthPixels::F32(data),
+        };
+        FrameImages { width, height, depth, intrinsics, colour }
+    }
+
     /// The colour image, seen through the depth camera: scaled to its own size where that differs.
     pub fn colour(&self, depth_intrinsics: Intrinsics) -> Option<ColourView<'_>> {
         let colour = self.colour.as_ref()?;
@@ -128,6 +145,20 @@ impl Images {
             data: ColourData::Rgb8(&colour.rgb8),
             intrinsics,
         })
+    }
+}
+
+impl Sequence {
+    /// Reads a frame, with its colours where the depth camera sees them.
+    ///
+    /// # Errors
+    /// As [`Images::read`].
+    pub fn images(&self, index: usize) -> Result<Images, SequenceError> {
+        let mut images = Images::read(&self.frames[index])?;
+        if let Some(camera) = &self.colour_camera {
+            images.register_colour(camera, self.intrinsics, self.depth_scale);
+        }
+        Ok(images)
     }
 }
 

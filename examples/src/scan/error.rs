@@ -56,7 +56,7 @@ pub enum ScanError {
     Sequence(#[from] SequenceError),
     /// The map refused something.
     #[error(transparent)]
-    Map(#[from] tsdf_hash::Error),
+    Map(tsdf_hash::Error),
     /// The stored map cannot be used.
     #[error("{path}: {source}")]
     Stored {
@@ -131,4 +131,15 @@ pub enum ScanError {
         /// What was wrong with the first of them.
         first: String,
     },
+}
+
+impl From<tsdf_hash::Error> for ScanError {
+    /// A frame that cannot be read a second time is what cannot be read the first time.
+    fn from(error: tsdf_hash::Error) -> Self {
+        let tsdf_hash::Error::FrameSource { frame, source } = error else { return Self::Map(error) };
+        match source.downcast() {
+            Ok(fault) => Self::Sequence(*fault),
+            Err(source) => Self::Map(tsdf_hash::Error::FrameSource { frame, source }),
+        }
+    }
 }

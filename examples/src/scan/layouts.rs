@@ -99,7 +99,7 @@ fn seven_scenes(folder: &Path) -> Result<Option<Sequence>> {
         depth_scale: 1000.0,
         scale_origin: "as 7-Scenes has it".into(),
         colour_camera: None,
-        gyroscope: None,
+        angular_rates: Vec::new(),
         frames,
     }))
 }
@@ -153,7 +153,7 @@ fn tum(folder: &Path) -> Result<Sequence> {
         depth_scale,
         scale_origin: origin.into(),
         colour_camera: None,
-        gyroscope: None,
+        angular_rates: Vec::new(),
         frames,
     })
 }
@@ -225,7 +225,7 @@ fn icl(folder: &Path) -> Result<Sequence> {
         depth_scale: 5000.0,
         scale_origin: "as ICL-NUIM has it".into(),
         colour_camera: None,
-        gyroscope: None,
+        angular_rates: Vec::new(),
         frames,
     })
 }
@@ -253,7 +253,7 @@ fn redwood(folder: &Path) -> Result<Sequence> {
         depth_scale: 1000.0,
         scale_origin: "as Redwood has it".into(),
         colour_camera: None,
-        gyroscope: None,
+        angular_rates: Vec::new(),
         frames: in_folders(folder, &poses)?,
     })
 }

@@ -1,30 +1,25 @@
 //! What a run leaves: the map, the mesh, the trajectory and what was measured on the way.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::Isometry3;
-use tsdf_hash::{KeyframeIndex, Map, Mesh};
+use tsdf_hash::Mesh;
+use tsdf_hash::slam::{PoseSource, Quality, SlamState, SlamStatistics};
 use vio_ekf::Trajectory;
 
-use super::checkpoint::metadata;
-use super::correction::LoopMetrics;
+use super::checkpoint::metadata_of;
 use super::error::ScanError;
-use super::pose_source::{PoseSource, TrackingMetrics};
-use super::quality::Quality;
 use super::ray_cast_check::RayCastCheck;
 use super::sequence::Sequence;
 
 /// A mapped sequence.
 pub struct Scan {
-    /// The map.
-    pub map: Map,
-    /// Its mesh.
+    /// Map, keyframes and poses.
+    pub state: SlamState,
+    /// The map's mesh.
     pub mesh: Mesh,
     /// Poses of the frames that were fused.
     pub trajectory: Trajectory,
-    /// Keyframes, to find a camera in the map by.
-    pub keyframes: KeyframeIndex,
     /// Indices of the frames that were fused (or only found) in this run, and their poses.
     pub fused: Vec<(usize, Isometry3<f64>)>,
     /// Frames that could not be fused, with the reason.
@@ -44,31 +39,33 @@ pub struct Scan {
 pub struct ScanMetrics {
     /// Processor time of each fusion, seconds.
     pub integrate_s: Vec<f64>,
+    /// Processor time per tracked frame, ray cast of the model included, seconds.
+    pub tracking_s: Vec<f64>,
     /// Processor time of the incremental mesh update after each fusion, seconds; empty for a map on a GPU.
     pub mesh_update_s: Vec<f64>,
     /// Ray casts of the map: of the finished one, or, if blocks leave active memory, on the way.
     pub ray_casts: Vec<RayCastCheck>,
     /// Processor time of the mesh from nothing, seconds.
     pub mesh_s: f64,
-    /// Largest number of bytes in active memory.
-    pub active_bytes_peak: usize,
-    /// Largest number of bytes in the host tier.
-    pub host_bytes_peak: usize,
     /// What the pixels and poses were worth.
     pub quality: Quality,
-    /// What became of tracking, if the poses were tracked.
-    pub tracking: Option<TrackingMetrics>,
-    /// What became of the loops, if they were looked for.
-    pub loops: Option<LoopMetrics>,
+    /// Frames whose colour image could not be read.
+    pub without_colour: usize,
+    /// What became of tracking and loops.
+    pub statistics: SlamStatistics,
+    /// Whether loops were looked for.
+    pub loops: bool,
     /// Position error of the tracked poses against those recorded, rigidly aligned, root mean square, metres.
     pub ate_se3_rmse: Option<f64>,
 }
 
 impl Scan {
-    /// What a later run over the same sequence needs to know, for [`Map::save`].
-    pub fn metadata(&self, folder: &Path, sequence: &Sequence) -> BTreeMap<String, Vec<u8>> {
-        let last = sequence.frames.last().map_or(f64::NEG_INFINITY, |frame| frame.stamp);
-        metadata(folder, last, &self.trajectory, &self.keyframes)
+    /// Writes the map with its mesh, and with what a later run over the same sequence needs to know.
+    ///
+    /// # Errors
+    /// [`ScanError::Map`].
+    pub fn save(&self, path: &Path, folder: &Path) -> Result<(), ScanError> {
+        Ok(self.state.save(path, Some(&self.mesh), metadata_of(folder))?)
     }
 
     /// Whether at least half of the work was done.
@@ -76,6 +73,27 @@ impl Scan {
     /// # Errors
     /// [`ScanError::Unusable`], with the reason.
     pub fn verdict(&self, sequence: &Sequence) -> Result<(), ScanError> {
-        self.metrics.quality.verdict(self.fused.len() + self.resumed, sequence.frames.len())
+        let (quality, taken, frames) = (&self.metrics.quality, self.fused.len() + self.resumed, sequence.frames.len());
+        let unusable = |why: String| Err(ScanError::Unusable(format!("the result is written, but not usable: {why}")));
+        if 2 * taken < frames {
+            // A map that only locates the camera takes nothing in.
+            let done = if quality.valid == 0 { "found in the map" } else { "fused" };
+            return unusable(format!("only {taken} of {frames} frames were {done}"));
+        }
+        let share = quality.fused_share();
+        if share < Quality::LEAST_FUSED_SHARE {
+            let percent = 100.0 * share;
+            return unusable(format!(
+                "only {percent:.0} % of the valid pixels were fused: check --depth-scale and --noise"
+            ));
+        }
+        let agreement = quality.median_agreement();
+        if agreement < Quality::LEAST_AGREEMENT {
+            let percent = 100.0 * agreement;
+            return unusable(format!(
+                "only {percent:.0} % of the depth agrees with the map: check camera (--intrinsics), --depth-scale and poses"
+            ));
+        }
+        Ok(())
     }
 }

@@ -120,7 +120,7 @@ pub(super) fn open_mcap(path: &Path) -> Result<Sequence, SequenceError> {
             depth.name
         ),
         colour_camera,
-        gyroscope: None,
+        angular_rates: Vec::new(),
         frames,
     })
 }

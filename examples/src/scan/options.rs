@@ -12,7 +12,7 @@ use super::sequence::{ColourCamera, FrameFiles};
 ///
 /// # Errors
 /// What was expected.
-pub fn parse_intrinsics(text: &str) -> Result<Intrinsics, String> {
+pub(super) fn parse_intrinsics(text: &str) -> Result<Intrinsics, String> {
     let [fx, fy, cx, cy] = numbers(text, "FX,FY,CX,CY")?;
     if fx == 0.0 || fy == 0.0 {
         return Err("focal lengths must not be 0".into());
@@ -24,7 +24,7 @@ pub fn parse_intrinsics(text: &str) -> Result<Intrinsics, String> {
 ///
 /// # Errors
 /// What was expected.
-pub fn parse_noise(text: &str) -> Result<NoiseModel, String> {
+pub(super) fn parse_noise(text: &str) -> Result<NoiseModel, String> {
     let [base, quadratic, nearest] = numbers(text, "BASE,QUADRATIC,NEAREST")?;
     Ok(NoiseModel { base, quadratic, nearest })
 }
@@ -33,7 +33,7 @@ pub fn parse_noise(text: &str) -> Result<NoiseModel, String> {
 ///
 /// # Errors
 /// What was expected.
-pub fn parse_odometry_error(text: &str) -> Result<[f64; 2], String> {
+pub(super) fn parse_odometry_error(text: &str) -> Result<[f64; 2], String> {
     let [degrees, metres] = numbers(text, "DEGREES,METRES")?;
     if degrees <= 0.0 || metres <= 0.0 {
         return Err("standard deviations must be above 0".into());
@@ -86,7 +86,7 @@ impl FrameRange {
 ///
 /// # Errors
 /// [`SequenceError`].
-pub fn read_colour_camera(path: &Path) -> Result<ColourCamera, SequenceError> {
+pub(super) fn read_colour_camera(path: &Path) -> Result<ColourCamera, SequenceError> {
     let numbers = read_numbers(path)?;
     let expected = "the 16 numbers of depth_from_colour and, if need be, fx fy cx cy";
     let (depth_from_colour, rest) = isometry(path, &numbers, expected)?;
@@ -102,7 +102,7 @@ pub fn read_colour_camera(path: &Path) -> Result<ColourCamera, SequenceError> {
 ///
 /// # Errors
 /// [`SequenceError`].
-pub fn read_body_from_camera(path: &Path) -> Result<Isometry3<f64>, SequenceError> {
+pub(super) fn read_body_from_camera(path: &Path) -> Result<Isometry3<f64>, SequenceError> {
     let numbers = read_numbers(path)?;
     let expected = "the 16 numbers of body_from_camera";
     let (body_from_camera, rest) = isometry(path, &numbers, expected)?;
@@ -137,12 +137,12 @@ fn unexpected(path: &Path, expected: &str, found: usize) -> SequenceError {
 ///
 /// # Errors
 /// When they cannot be counted.
-pub fn mebibytes(option: &str, count: usize) -> Result<usize, String> {
+pub(super) fn mebibytes(option: &str, count: usize) -> Result<usize, String> {
     count.checked_mul(1 << 20).ok_or_else(|| format!("{option} {count}: more bytes than there are addresses"))
 }
 
 /// An error of the map in the words of the command line: options, not fields.
-pub fn in_options(message: &str) -> String {
+pub(super) fn in_options(message: &str) -> String {
     // The longer names first: some hold a shorter one.
     const NAMES: [(&str, &str); 9] = [
         ("settings: ", ""),

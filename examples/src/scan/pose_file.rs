@@ -17,7 +17,7 @@ const LONGEST_GAP: f64 = 0.5;
 ///
 /// # Errors
 /// [`SequenceError`]; a file that covers no frame is one.
-pub fn take_poses(
+pub(super) fn take_poses(
     sequence: &mut Sequence,
     path: &Path,
     body_from_camera: &Isometry3<f64>,

@@ -1,9 +1,9 @@
 //! The figures of a mapping run.
 
 use serde::Serialize;
+use tsdf_hash::slam::PoseSource;
 
 use super::mapped::Scan;
-use super::pose_source::PoseSource;
 use super::sequence::Sequence;
 
 /// What `report.json` of a scan holds. Flat, SI units in the names; every number is finite.
@@ -114,8 +114,10 @@ pub struct ScanReport {
 impl ScanReport {
     /// The figures of a run.
     pub fn new(scan: &Scan, sequence: &Sequence) -> Self {
-        let (settings, metrics) = (scan.map.settings(), &scan.metrics);
-        let (quality, tracking) = (&metrics.quality, metrics.tracking.as_ref());
+        let (map, metrics) = (&scan.state.map, &scan.metrics);
+        let (settings, quality) = (map.settings(), &metrics.quality);
+        let tracking = (scan.poses != PoseSource::Given).then_some(&metrics.statistics);
+        let loops = metrics.loops.then_some(&metrics.statistics);
         let share = |part: usize, whole: usize| part as f64 / whole.max(1) as f64;
         let k = &sequence.intrinsics;
         let casts: Vec<f64> = metrics.ray_casts.iter().map(|cast| cast.seconds).collect();
@@ -124,7 +126,7 @@ impl ScanReport {
             frames: scan.fused.len(),
             frames_skipped: scan.skipped.len(),
             frames_resumed: scan.resumed,
-            frames_without_colour: quality.without_colour,
+            frames_without_colour: metrics.without_colour,
             poses: match scan.poses {
                 PoseSource::Given => "given",
                 PoseSource::Tracked => "tracked",
@@ -139,28 +141,28 @@ impl ScanReport {
             filled_share: share(quality.filled, quality.valid),
             depth_agreement_median: (!quality.agreement.is_empty()).then(|| quality.median_agreement()),
             tracking_losses: tracking.map(|t| t.losses),
-            tracking_degenerate_frames: tracking.map(|t| t.degenerate),
-            tracking_cpu_ms_median: tracking.map(|t| 1e3 * median(&t.seconds)),
+            tracking_degenerate_frames: tracking.map(|t| t.degenerate_frames),
+            tracking_cpu_ms_median: tracking.map(|_| 1e3 * median(&metrics.tracking_s)),
             tracking_relocalisations: tracking.map(|t| t.relocalisations),
-            keyframes: scan.keyframes.len(),
-            loops: metrics.loops.map(|l| l.loops),
-            loop_corrections: metrics.loops.map(|l| l.corrections),
-            loop_adjustments_refused: metrics.loops.map(|l| l.adjustments_refused),
-            loop_frames_reintegrated: metrics.loops.map(|l| l.refused),
-            loop_drift_max_m: metrics.loops.map(|l| l.largest_drift),
+            keyframes: scan.state.keyframes.len(),
+            loops: loops.map(|l| l.loops),
+            loop_corrections: loops.map(|l| l.corrections),
+            loop_adjustments_refused: loops.map(|l| l.adjustments_refused),
+            loop_frames_reintegrated: loops.map(|l| l.reintegrated),
+            loop_drift_max_m: loops.map(|l| l.largest_drift),
             ate_se3_rmse_m: metrics.ate_se3_rmse,
             voxel_m: settings.voxel_size,
             integrate_cpu_ms_median: 1e3 * median(&metrics.integrate_s),
             raycast_cpu_ms_median: 1e3 * median(&casts),
-            depth_error_mean_m: mean(metrics.ray_casts.iter().map(|cast| cast.depth_error)),
-            raycast_fill: mean(metrics.ray_casts.iter().map(|cast| cast.fill)),
+            depth_error_mean_m: mean(metrics.ray_casts.iter().map(|cast| cast.depth.mean_error)),
+            raycast_fill: mean(metrics.ray_casts.iter().map(|cast| cast.depth.fill)),
             mesh_full_cpu_ms: 1e3 * metrics.mesh_s,
             mesh_incremental_cpu_ms_median: (!metrics.mesh_update_s.is_empty())
                 .then(|| 1e3 * median(&metrics.mesh_update_s)),
-            active_bytes_peak: metrics.active_bytes_peak,
-            host_bytes_peak: metrics.host_bytes_peak,
-            blocks: scan.map.blocks(),
-            map_hash: format!("{:016x}", scan.map.hash()),
+            active_bytes_peak: metrics.statistics.active_bytes_peak,
+            host_bytes_peak: metrics.statistics.host_bytes_peak,
+            blocks: map.blocks(),
+            map_hash: format!("{:016x}", map.hash()),
             vertices: scan.mesh.positions.len(),
             triangles: scan.mesh.faces.len(),
             non_manifold_edges: non_manifold_edges(&scan.mesh.faces),

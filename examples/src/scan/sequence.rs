@@ -1,9 +1,8 @@
 //! A recorded sequence: which images, from where, through which camera.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
 use tsdf_hash::Intrinsics;
 
-use super::gyroscope::Gyroscope;
 use super::image_source::ImageSource;
 
 /// A sequence of depth images, with colour and poses where they were recorded.
@@ -23,8 +22,8 @@ pub struct Sequence {
     pub scale_origin: String,
     /// A colour camera that stands elsewhere.
     pub colour_camera: Option<ColourCamera>,
-    /// A gyroscope on the camera.
-    pub gyroscope: Option<Gyroscope>,
+    /// Samples of a gyroscope on the camera: seconds, and the angular rate along the camera's axes, rad/s.
+    pub angular_rates: Vec<(f64, Vector3<f64>)>,
     /// The frames, by rising stamps.
     pub frames: Vec<FrameFiles>,
 }

@@ -22,7 +22,7 @@ const ABOVE: f64 = 0.6;
 const SMOOTH: u32 = 2;
 
 /// Writes `views.png`, recorded picture, coloured mesh, shaded mesh and their overview, into a folder.
-pub fn save_views(scan: &Scan, sequence: &Sequence, folder: &Path, threads: usize) -> Result<(), ScanError> {
+pub(super) fn save_views(scan: &Scan, sequence: &Sequence, folder: &Path, threads: usize) -> Result<(), ScanError> {
     let Some(&(middle, world_from_camera)) = scan.fused.get(scan.fused.len() / 2) else { return Ok(()) };
     let images = Images::read(&sequence.frames[middle])?;
     let k = sequence.intrinsics;

@@ -7,6 +7,7 @@ use std::process::Command;
 use image::{ImageBuffer, Luma, Rgb};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use paintcopter::scan::{Scan, ScanSettings, open_sequence};
+use tsdf_hash::slam::{PoseSource, SlamSettings};
 
 use crate::scratch::Scratch;
 
@@ -88,7 +89,8 @@ fn redwood(s: &Scratch) {
 fn run(folder: &Path, threads: usize) -> Scan {
     let sequence = open_sequence(folder).unwrap();
     let map = tsdf_hash::Settings { voxel_size: 0.02, threads, ..tsdf_hash::Settings::default() };
-    Scan::run(folder, &sequence, &ScanSettings { map, ray_cast_every: 1, ..ScanSettings::default() }).unwrap()
+    let slam = SlamSettings { map, poses: PoseSource::Given, ..SlamSettings::default() };
+    Scan::run(folder, &sequence, &ScanSettings { slam, ray_cast_every: 1, ..ScanSettings::default() }).unwrap()
 }
 
 #[test]
@@ -113,10 +115,10 @@ fn three_layouts_give_the_same_wall() {
             assert!(colour[0].abs_diff(200) <= 4 && colour[1].abs_diff(20) <= 4, "{layout}: {colour:?}");
         }
         for cast in &scan.metrics.ray_casts {
-            assert!(cast.depth_error < 1e-3 && cast.fill > 0.8, "{layout}: {cast:?}");
+            assert!(cast.depth.mean_error < 1e-3 && cast.depth.fill > 0.8, "{layout}: {cast:?}");
         }
         assert_eq!(scan.metrics.ray_casts.len(), 3, "{layout}");
-        assert_eq!(scan.map.hash(), run(&s.0, 3).map.hash(), "{layout}");
+        assert_eq!(scan.state.map.hash(), run(&s.0, 3).state.map.hash(), "{layout}");
     }
 }
 

@@ -4,9 +4,9 @@ use nalgebra::Isometry3;
 
 use crate::bundle_adjustment::point_terms::add_point;
 use crate::bundle_adjustment::posed_frame::{Observation, PosedFrame};
+use crate::bundle_adjustment::residual_stats::{ResidualStats, Scales};
 use crate::bundle_adjustment::settings::BundleAdjustmentSettings;
 use crate::bundle_adjustment::surface_points::{SurfacePoint, surface_points};
-use crate::bundle_adjustment::tally::{Scales, Tally};
 use crate::error::Error;
 use crate::keyframes::index::KeyframeIndex;
 use crate::parallel::in_chunks;
@@ -72,22 +72,22 @@ pub fn bundle_adjust(
         let seen = observations(&frames, &points, settings);
         let mut equations = NormalEquations::new(&fixed, &graph.betweens, &covisible(&seen, poses.len()))?;
         equations.assemble(&poses, &graph.betweens, &graph.priors);
-        let mut tally = Tally::new(poses.len(), scales);
+        let mut stats = ResidualStats::new(poses.len(), scales);
         for (point, seen) in points.iter_mut().zip(&seen).filter(|(_, seen)| seen.len() > 1) {
-            let way = add_point(point, seen, &frames, &brightness, &mut equations, &mut tally);
+            let way = add_point(point, seen, &frames, &brightness, &mut equations, &mut stats);
             point.position += way * point.normal;
         }
-        scales = tally.spread();
+        scales = stats.spread();
         report.spread[1] = scales.depth;
         if report.iterations == 0 {
             report.points = seen.iter().filter(|seen| seen.len() > 1).count();
-            report.terms = tally.terms;
+            report.terms = stats.terms;
             report.spread[0] = scales.depth;
         }
-        if is_done || equations.b.is_empty() || tally.terms == 0 || report.iterations == settings.max_iterations {
+        if is_done || equations.b.is_empty() || stats.terms == 0 || report.iterations == settings.max_iterations {
             break;
         }
-        brightness.iter_mut().zip(tally.brighter()).for_each(|(own, more)| *own += more);
+        brightness.iter_mut().zip(stats.brighter()).for_each(|(own, more)| *own += more);
         let mut step = -&equations.b;
         equations.h.factorise()?;
         equations.h.solve(step.as_mut_slice());

@@ -3,8 +3,8 @@
 use nalgebra::{Matrix2, Matrix6x2, Vector2, Vector3, Vector6};
 
 use crate::bundle_adjustment::posed_frame::{Observation, PosedFrame};
+use crate::bundle_adjustment::residual_stats::{ResidualStats, Scales};
 use crate::bundle_adjustment::surface_points::SurfacePoint;
-use crate::bundle_adjustment::tally::{Scales, Tally};
 use crate::pose_graph::normal_equations::NormalEquations;
 
 /// Huber's constant: 95 % efficiency on normal residuals.
@@ -27,23 +27,23 @@ pub(crate) fn add_point(
     frames: &[Option<PosedFrame>],
     brightness: &[f64],
     equations: &mut NormalEquations,
-    tally: &mut Tally,
+    stats: &mut ResidualStats,
 ) -> f64 {
-    let scales = tally.scales;
+    let scales = stats.scales;
     let mut terms = distances(point, seen, frames, scales);
     let offset = centre(&mut terms);
     for (term, observation) in terms.iter().zip(seen) {
-        tally.depth.add((term.residual / observation.sigma) as f32);
+        stats.depth.add((term.residual / observation.sigma) as f32);
     }
     let mut bright = intensities(point, seen, frames, brightness, scales);
     if bright.len() > 1 {
         centre(&mut bright);
         for term in &bright {
-            tally.add_intensity(term.frame, term.residual);
+            stats.add_intensity(term.frame, term.residual);
         }
         terms.append(&mut bright);
     }
-    tally.terms += terms.len();
+    stats.terms += terms.len();
     offset + eliminate(&terms, equations)
 }
 

@@ -304,17 +304,3 @@ impl DenseMap for GpuMap {
         Ok(hash)
     }
 }
-
-/// A map on the GPU or, where none can be used, on the processor, with the reason: one line for the caller's log.
-///
-/// # Errors
-/// Settings that make no sense, and those of [`Map::new`].
-pub fn gpu_or_cpu_map(settings: Settings, options: &GpuOptions) -> Result<(Box<dyn DenseMap>, Option<String>), Error> {
-    match GpuMap::new(settings, options) {
-        Ok(map) => Ok((Box::new(map), None)),
-        Err(error @ (Error::NoAdapter { .. } | Error::Device { .. })) => {
-            Ok((Box::new(Map::new(settings)?), Some(format!("mapping on the processor: {error}"))))
-        }
-        Err(error) => Err(error),
-    }
-}

@@ -5,6 +5,7 @@ use crate::settings::NoiseModel;
 
 /// How loops are looked for, and how far the poses are believed.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct LoopSettings {
     /// Bytes of keyframes (64 MiB).
     pub max_bytes: usize,

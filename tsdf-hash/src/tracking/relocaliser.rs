@@ -98,6 +98,11 @@ impl Relocaliser {
         self.places.len()
     }
 
+    /// Number of frames that are placed to each other: the latest of those that were taken.
+    pub(crate) fn frames(&self) -> usize {
+        self.reserve.as_ref().map_or(0, |reserve| reserve.poses.len())
+    }
+
     /// Takes the next frame of a lost camera. When its place is found, the search is reset.
     ///
     /// # Errors

@@ -4,14 +4,19 @@
 //! the frame where it jumps, and no loop is measured. Against what was seen lately it goes on smoothly until a loop is closed.
 
 use nalgebra::Isometry3;
-use tsdf_hash::{ColourView, DenseMap, DepthView, Error, Map, MemoryLimits, Settings};
+
+use crate::dense_map::DenseMap;
+use crate::error::Error;
+use crate::images::{ColourView, DepthView};
+use crate::map::Map;
+use crate::settings::{MemoryLimits, Settings};
 
 /// Keyframes that a map takes before another one is begun, which replaces it after as many again: it holds 8 to 16, and the search for
 /// loops takes those ten or more before the present one for old.
 const KEYFRAMES: usize = 8;
 
 /// Two maps in turns: frames are fused into both, and tracked against the older one.
-pub(super) struct RecentMap {
+pub struct LocalMap {
     settings: Settings,
     /// The older one first; empty before the first frame.
     maps: Vec<Map>,
@@ -21,20 +26,24 @@ pub(super) struct RecentMap {
     world_from_maps: Isometry3<f64>,
 }
 
-impl RecentMap {
-    pub(super) fn new(settings: &Settings) -> Self {
+impl LocalMap {
+    /// Empty; with the settings of the whole map, but nothing is evicted.
+    pub fn new(settings: &Settings) -> Self {
         let settings = Settings { memory: MemoryLimits::default(), ..*settings };
         Self { settings, maps: Vec::new(), begun: 0, world_from_maps: Isometry3::identity() }
     }
 
     /// The map to track against, and where its world is; `None` before the first frame.
-    pub(super) fn older(&mut self) -> Option<(&mut dyn DenseMap, Isometry3<f64>)> {
+    pub fn older(&mut self) -> Option<(&mut dyn DenseMap, Isometry3<f64>)> {
         let world_from_maps = self.world_from_maps;
         self.maps.first_mut().map(|map| (map as &mut dyn DenseMap, world_from_maps))
     }
 
     /// Takes a frame that was fused at a pose, when the run had so many keyframes.
-    pub(super) fn fuse(
+    ///
+    /// # Errors
+    /// As [`Map::integrate`].
+    pub fn fuse(
         &mut self,
         depth: &DepthView,
         colour: Option<&ColourView>,
@@ -57,12 +66,13 @@ impl RecentMap {
     }
 
     /// The camera is somewhere else: what was seen lately is not around it.
-    pub(super) fn forget(&mut self) {
+    pub fn forget(&mut self) {
         self.maps.clear();
         self.world_from_maps = Isometry3::identity();
     }
 
-    pub(super) fn move_by(&mut self, correction: &Isometry3<f64>) {
+    /// The world was corrected.
+    pub fn move_by(&mut self, correction: &Isometry3<f64>) {
         self.world_from_maps = correction * self.world_from_maps;
         self.world_from_maps.rotation.renormalize();
     }
@@ -71,23 +81,24 @@ impl RecentMap {
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
-    use tsdf_hash::{DepthData, Intrinsics};
 
     use super::*;
+    use crate::images::{DepthData, Intrinsics};
+    use crate::ray_cast::settings::RayCastSettings;
 
     /// A flat wall two metres before the camera.
-    fn fuse(recent: &mut RecentMap, pose: &Isometry3<f64>, keyframes: usize) {
+    fn fuse(local: &mut LocalMap, pose: &Isometry3<f64>, keyframes: usize) {
         let data = vec![2.0_f32; 80 * 60];
         let intrinsics = Intrinsics { fx: 70.0, fy: 70.0, cx: 39.5, cy: 29.5 };
         let view = DepthView { width: 80, height: 60, data: DepthData::F32 { data: &data }, intrinsics };
-        recent.fuse(&view, None, pose, keyframes).unwrap();
+        local.fuse(&view, None, pose, keyframes).unwrap();
     }
 
     /// Whether a ray from the camera of a pose meets the wall in the map that is tracked against.
-    fn is_seen(recent: &mut RecentMap, pose: &Isometry3<f64>) -> bool {
-        let (map, world_from_map) = recent.older().unwrap();
+    fn is_seen(local: &mut LocalMap, pose: &Isometry3<f64>) -> bool {
+        let (map, world_from_map) = local.older().unwrap();
         let camera = world_from_map.inverse() * pose;
-        let settings = tsdf_hash::RayCastSettings::default();
+        let settings = RayCastSettings::default();
         let intrinsics = Intrinsics { fx: 10.0, fy: 10.0, cx: 0.0, cy: 0.0 };
         let view = map.ray_cast(&intrinsics, 1, 1, &camera, &settings).unwrap();
         let depth = f64::from(view.depth[0]);
@@ -97,23 +108,23 @@ mod tests {
 
     #[test]
     fn what_was_seen_long_ago_is_forgotten_and_corrections_move_the_rest() {
-        let mut recent = RecentMap::new(&Settings { voxel_size: 0.04, ..Settings::default() });
-        assert!(recent.older().is_none());
+        let mut local = LocalMap::new(&Settings { voxel_size: 0.04, ..Settings::default() });
+        assert!(local.older().is_none());
         // A keyframe every five metres: no wall reaches the next one.
         let place = |k: usize| Isometry3::translation(0.0, 5.0 * k as f64, 0.0);
         for k in 0..20 {
-            fuse(&mut recent, &place(k), k);
-            let oldest = (0..=k).find(|n| is_seen(&mut recent, &place(*n))).unwrap();
+            fuse(&mut local, &place(k), k);
+            let oldest = (0..=k).find(|n| is_seen(&mut local, &place(*n))).unwrap();
             let span = k + 1 - oldest;
             assert!(span <= 2 * KEYFRAMES && (span >= KEYFRAMES || oldest == 0), "{oldest} of {k}");
         }
         let correction = Isometry3::new(Vector3::new(0.3, -0.2, 0.1), Vector3::new(0.0, 0.0, 0.4));
-        recent.move_by(&correction);
-        assert!(is_seen(&mut recent, &(correction * place(19))));
+        local.move_by(&correction);
+        assert!(is_seen(&mut local, &(correction * place(19))));
         // What comes now is fused beside it, in the corrected world.
-        fuse(&mut recent, &(correction * place(20)), 20);
-        assert!(is_seen(&mut recent, &(correction * place(20))));
-        recent.forget();
-        assert!(recent.older().is_none());
+        fuse(&mut local, &(correction * place(20)), 20);
+        assert!(is_seen(&mut local, &(correction * place(20))));
+        local.forget();
+        assert!(local.older().is_none());
     }
 }

@@ -1,20 +1,20 @@
 //! How the camera turned between two frames, as a gyroscope on it has it.
 
-use std::path::Path;
-
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::error::SequenceError;
+use crate::error::Error;
 
 /// Between samples that are farther apart nothing is known, seconds (ours).
 const LONGEST_GAP: f64 = 0.1;
 /// Least share of what is new that the bias takes from a tracked motion (ours): at first it is the mean of all of them.
 const LEAST_GAIN: f64 = 0.05;
+/// Samples that are forgotten at once: seldom, as the rest moves up.
+const KEPT: usize = 4096;
 /// No gyroscope is off by more, rad/s: what a frame says beyond that is a mistake of the tracker.
 const LARGEST_BIAS: f64 = 0.2;
 
 /// The angular rate of the camera, along its axes, and what of it is bias.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Gyroscope {
     /// Seconds, and rad/s.
     rates: Vec<(f64, Vector3<f64>)>,
@@ -23,32 +23,42 @@ pub struct Gyroscope {
 }
 
 impl Gyroscope {
-    /// Reads `imu0/data.csv` of the EuRoC layout (nanoseconds, angular rate, specific force; the clock of the images); `body_from_camera` is how
-    /// the camera is turned against the unit.
-    ///
-    /// # Errors
-    /// [`SequenceError`]; a file that covers none of the stamps from `first` to `last` is one.
-    pub fn read(
-        path: &Path,
-        body_from_camera: &UnitQuaternion<f64>,
-        [first, last]: [f64; 2],
-    ) -> Result<Self, SequenceError> {
-        let text = std::fs::read_to_string(path).map_err(|e| SequenceError::unreadable(path, &e))?;
-        let samples = vio_ekf::asl::read_imu(&text).map_err(|e| SequenceError::malformed(path, 0, e.to_string()))?;
-        let camera_from_body = body_from_camera.inverse();
-        let rates: Vec<_> = samples.iter().map(|s| (s.stamp.as_secs(), camera_from_body * s.gyro)).collect();
-        let [begin, end] = [rates[0].0, rates[rates.len() - 1].0];
-        if begin > last || end < first {
-            let why = format!(
-                "its stamps ({begin:.3} to {end:.3} s) are not those of the images ({first:.3} to {last:.3} s)"
-            );
-            return Err(SequenceError::malformed(path, 0, why));
-        }
-        Ok(Self { rates, bias: Vector3::zeros(), learned: 0 })
+    /// Without samples.
+    pub fn new() -> Self {
+        Self::default()
     }
 
-    /// `camera_then_from_camera_now`; `None` where samples are missing.
-    pub(super) fn turn(&self, then: f64, now: f64) -> Option<UnitQuaternion<f64>> {
+    /// Takes a sample: seconds, on the clock of the images, and the angular rate of the camera along its own axes, rad/s.
+    ///
+    /// # Errors
+    /// [`Error::InvalidTime`] unless it comes after the sample before; [`Error::InvalidSample`] for a rate that is not finite.
+    pub fn add(&mut self, stamp: f64, rate_in_camera: Vector3<f64>) -> Result<(), Error> {
+        let last = self.rates.last().map_or(f64::NEG_INFINITY, |(last, _)| *last);
+        if !(stamp.is_finite() && stamp > last) {
+            return Err(Error::InvalidTime { time: stamp, last });
+        }
+        if !rate_in_camera.iter().all(|rate| rate.is_finite()) {
+            return Err(Error::InvalidSample { what: "angular rate", stamp });
+        }
+        self.rates.push((stamp, rate_in_camera));
+        Ok(())
+    }
+
+    /// Forgets samples that no turn from `stamp` on needs.
+    pub(crate) fn forget_before(&mut self, stamp: f64) {
+        let first = self.rates.partition_point(|(at, _)| *at <= stamp).saturating_sub(1);
+        if first >= KEPT {
+            self.rates.drain(..first);
+        }
+    }
+
+    /// What is taken for bias, rad/s.
+    pub fn bias(&self) -> &Vector3<f64> {
+        &self.bias
+    }
+
+    /// `camera_then_from_camera_now`: the integral of the rate without the bias; `None` where samples are missing.
+    pub fn turn(&self, then: f64, now: f64) -> Option<UnitQuaternion<f64>> {
         let begin = self.rates.partition_point(|(stamp, _)| *stamp <= then).checked_sub(1)?;
         let mut turn = UnitQuaternion::identity();
         for pair in self.rates[begin..].windows(2) {
@@ -67,8 +77,8 @@ impl Gyroscope {
         None
     }
 
-    /// A motion was tracked: what the gyroscope has beyond it is bias.
-    pub(super) fn learn(&mut self, then: f64, now: f64, tracked: &UnitQuaternion<f64>) {
+    /// A motion was tracked, `camera_then_from_camera_now`: what the gyroscope has beyond it is bias.
+    pub fn learn(&mut self, then: f64, now: f64, tracked: &UnitQuaternion<f64>) {
         let Some(turn) = self.turn(then, now).filter(|_| now > then) else { return };
         let off = (tracked.inverse() * turn).scaled_axis() / (now - then);
         if off.norm() <= LARGEST_BIAS {

@@ -1,4 +1,4 @@
-//! What a linearisation counts beside its equations.
+//! Spread of the residuals of a linearisation, and brightness of each keyframe.
 
 use crate::tracking::residual_scale::ResidualHistogram;
 
@@ -17,7 +17,7 @@ pub(crate) struct Scales {
 }
 
 /// Residuals of one linearisation.
-pub(crate) struct Tally {
+pub(crate) struct ResidualStats {
     /// That the residuals are weighed by.
     pub(crate) scales: Scales,
     pub(crate) terms: usize,
@@ -27,7 +27,7 @@ pub(crate) struct Tally {
     brightness: Vec<[f64; 2]>,
 }
 
-impl Tally {
+impl ResidualStats {
     pub(crate) fn new(frames: usize, scales: Scales) -> Self {
         let [depth, intensity] = MOST.map(ResidualHistogram::new);
         Self { scales, terms: 0, depth, intensity, brightness: vec![[0.0; 2]; frames] }

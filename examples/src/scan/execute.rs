@@ -1,0 +1,61 @@
+//! A command line of `scan`, carried out: the recording is mapped, the folder is filled.
+
+use std::path::Path;
+
+use super::arguments::{self, Arguments};
+use super::mapped::Scan;
+use super::options::in_options;
+use super::report::ScanReport;
+use super::views::save_views;
+use crate::mesh_io::{PlyMesh, write_ply};
+use crate::report::save_figures;
+
+/// Maps the recording of a command line and writes what became of it; an error in the words of the command line.
+///
+/// # Errors
+/// One line that names the input and the way out.
+pub fn execute(arguments: &Arguments) -> Result<(), String> {
+    run(arguments).map_err(|error| in_options(&error.to_string()))
+}
+
+fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
+    let folder = &arguments.out;
+    prepare(folder)?;
+    let sequence = arguments::sequence(arguments)?;
+    eprintln!("{}: {} layout, {} frames", arguments.sequence.display(), sequence.layout, sequence.frames.len());
+    eprintln!("{:28} {}", "camera", sequence.description());
+    let settings = arguments::settings(arguments)?;
+    let scan = Scan::run(&arguments.sequence, &sequence, &settings)?;
+    for (_, why) in &scan.skipped {
+        eprintln!("left out: {}", in_options(why));
+    }
+    // What cannot be made again comes first, pictures last.
+    scan.save(&folder.join("map.tsdf"), &arguments.sequence)?;
+    let ply = folder.join("mesh.ply");
+    let tsdf_hash::Mesh { positions, normals, colours, faces, .. } = &scan.mesh;
+    write_ply(&ply, &PlyMesh { positions, normals: Some(normals), colours, faces })
+        .map_err(|e| format!("{}: cannot be written ({e})", ply.display()))?;
+    let tum = folder.join("trajectory.tum");
+    std::fs::write(&tum, vio_ekf::tum::write(&scan.trajectory))
+        .map_err(|e| format!("{}: cannot be written ({e})", tum.display()))?;
+    save_views(&scan, &sequence, folder, settings.slam.map.threads)?;
+    // Last, so that its presence means the folder is complete.
+    save_figures(&ScanReport::new(&scan, &sequence), folder)?;
+    println!("{}", folder.join("mesh.ply").display());
+    scan.verdict(&sequence)?;
+    Ok(())
+}
+
+/// Makes the folder, and tries it before any work is done.
+fn prepare(folder: &Path) -> Result<(), String> {
+    let refuse = |e: std::io::Error| format!("{}: cannot be written to ({e}): choose another --out", folder.display());
+    std::fs::create_dir_all(folder).map_err(refuse)?;
+    let probe = folder.join(".tried");
+    std::fs::write(&probe, b"").map_err(refuse)?;
+    std::fs::remove_file(&probe).map_err(refuse)?;
+    // A report of an earlier run would say that this one is complete.
+    match std::fs::remove_file(folder.join("report.json")) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(refuse(e)),
+        _ => Ok(()),
+    }
+}

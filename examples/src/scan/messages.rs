@@ -1,0 +1,75 @@
+//! What happened with a frame, in words.
+
+use tsdf_hash::slam::{Event, FrameOutcome, LeftOut};
+use tsdf_hash::{TrackingOutcome, TrackingStatus};
+
+use super::error::ScanError;
+
+/// The line that an event is worth. `name` names a frame; a frame that is left out is told at the end.
+pub(super) fn line(event: &Event, outcome: &FrameOutcome, name: impl Fn(usize) -> String) -> Option<String> {
+    let here = || name(outcome.frame);
+    Some(match event {
+        Event::Lost => {
+            let tracking = outcome.tracking.as_ref()?;
+            format!("warning: {}: the camera is lost: {}", here(), reason(tracking))
+        }
+        Event::Found => format!("{}: the camera is found again", here()),
+        Event::Degenerate { directions } => format!(
+            "warning: {}: {directions} of 6 directions are not seen; the motion before goes on along them",
+            here()
+        ),
+        Event::LowFusedShare { frame, share } => format!(
+            "warning: {}: only {:.0} % of the valid pixels were fused: neighbouring depths differ by more than the \
+             noise of the camera. Check --depth-scale, or tell the noise by --noise",
+            name(*frame),
+            100.0 * share
+        ),
+        Event::LowAgreement { agreement } => format!(
+            "warning: {}: only {:.0} % of the depth agrees with the map at the given poses: check camera \
+             (--intrinsics), --depth-scale and poses",
+            here(),
+            100.0 * agreement
+        ),
+        Event::AdjustmentRefused { frame } => format!(
+            "{}: the keyframes agree less after a bundle adjustment: the poses stay as the pose graph has them",
+            name(*frame)
+        ),
+        Event::LoopClosed { frame, keyframe, drift, distance } if drift.is_significant() => {
+            let degrees = drift.angle().to_degrees();
+            format!("{}: back at keyframe {keyframe}: drift {:.1} mm, {degrees:.2} deg", name(*frame), 1e3 * distance)
+        }
+        _ => return None,
+    })
+}
+
+/// Why a frame was left out.
+pub(super) fn fault(why: LeftOut, tracking: Option<&TrackingOutcome>) -> ScanError {
+    match why {
+        LeftOut::Lost { places } => {
+            let search = match places {
+                0 => "no keyframe of the map agrees with what it sees",
+                1 => "a place agrees; more frames, from other poses, must confirm it",
+                _ => "several places agree; more frames must tell them apart",
+            };
+            ScanError::Lost(tracking.map_or(search.into(), |outcome| format!("{}; {search}", reason(outcome))))
+        }
+        LeftOut::Refused(error) => error.into(),
+        // A frame without a pose is not read.
+        _ => ScanError::NoPose("no pose was recorded for it"),
+    }
+}
+
+fn reason(outcome: &TrackingOutcome) -> String {
+    let (overlap, agreement) = (100.0 * outcome.overlap, 100.0 * outcome.agreement);
+    match outcome.status {
+        TrackingStatus::NoOverlap => {
+            let coverage = 100.0 * outcome.coverage;
+            format!(
+                "{overlap:.0} % of the map in view were measured, {coverage:.0} % of the frame are in the map: too little"
+            )
+        }
+        TrackingStatus::Disagreement => format!("only {agreement:.0} % of the pixels agree with the map"),
+        TrackingStatus::Rejected => "the motion is not plausible".into(),
+        TrackingStatus::Tracked => "it is not".into(),
+    }
+}

@@ -1,0 +1,125 @@
+//! A map on the processor or on a GPU, by one constructor.
+
+use crate::dense_map::DenseMap;
+use crate::error::Error;
+#[cfg(feature = "gpu")]
+use crate::gpu::gpu_map::GpuMap;
+#[cfg(feature = "gpu")]
+use crate::gpu::options::GpuOptions;
+use crate::map::Map;
+
+/// Which device keeps a map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Device {
+    /// The processor.
+    #[default]
+    Cpu,
+    /// A GPU where there is one and the crate has its feature `gpu`, else the processor.
+    Auto,
+    /// A GPU, a software one such as Mesa's included, or none.
+    Gpu,
+}
+
+/// A map on one of the devices. Both are the same map, to the bit.
+pub enum DeviceMap {
+    /// On the processor.
+    Cpu(Box<Map>),
+    /// On a GPU.
+    #[cfg(feature = "gpu")]
+    Gpu(Box<GpuMap>),
+}
+
+impl DeviceMap {
+    /// The map on a device, evicted blocks included; and why it is on the processor, if a GPU was to be taken where there is one.
+    ///
+    /// # Errors
+    /// With [`Device::Gpu`]: [`Error::NoAdapter`], without the feature, too, and [`Error::Device`](crate::Error). In any case [`Error::OutOfBudget`], and those of
+    /// evicted blocks.
+    pub fn open(map: Map, device: Device) -> Result<(Self, Option<Error>), Error> {
+        match device {
+            Device::Cpu => Ok((Self::Cpu(Box::new(map)), None)),
+            Device::Auto | Device::Gpu => Self::on_gpu(map, device == Device::Gpu),
+        }
+    }
+
+    #[cfg(feature = "gpu")]
+    fn on_gpu(map: Map, demanded: bool) -> Result<(Self, Option<Error>), Error> {
+        let options = GpuOptions { software: demanded, ..GpuOptions::default() };
+        match GpuMap::from_map(&map, &options) {
+            Ok(on_gpu) => Ok((Self::Gpu(Box::new(on_gpu)), None)),
+            Err(why @ (Error::NoAdapter { .. } | Error::Device { .. })) if !demanded => {
+                Ok((Self::Cpu(Box::new(map)), Some(why)))
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    fn on_gpu(map: Map, demanded: bool) -> Result<(Self, Option<Error>), Error> {
+        let missing = || Error::NoAdapter { reason: "the crate was built without its feature `gpu`".into() };
+        if demanded { Err(missing()) } else { Ok((Self::Cpu(Box::new(map)), None)) }
+    }
+
+    /// The map, whatever keeps it.
+    pub fn dense(&self) -> &dyn DenseMap {
+        match self {
+            Self::Cpu(map) => map.as_ref(),
+            #[cfg(feature = "gpu")]
+            Self::Gpu(map) => map.as_ref(),
+        }
+    }
+
+    /// The map, to be changed.
+    pub fn dense_mut(&mut self) -> &mut dyn DenseMap {
+        match self {
+            Self::Cpu(map) => map.as_mut(),
+            #[cfg(feature = "gpu")]
+            Self::Gpu(map) => map.as_mut(),
+        }
+    }
+
+    /// The map, if the processor keeps it.
+    #[cfg_attr(not(feature = "gpu"), expect(clippy::unnecessary_wraps, reason = "a map on a GPU must be fetched"))]
+    pub fn cpu(&self) -> Option<&Map> {
+        match self {
+            Self::Cpu(map) => Some(map),
+            #[cfg(feature = "gpu")]
+            Self::Gpu(_) => None,
+        }
+    }
+
+    /// Name, interface and driver of the GPU, or `cpu`.
+    pub fn device(&self) -> &str {
+        match self {
+            Self::Cpu(_) => "cpu",
+            #[cfg(feature = "gpu")]
+            Self::Gpu(map) => map.adapter(),
+        }
+    }
+
+    /// Shows the map to a function; that of a GPU as a copy.
+    ///
+    /// # Errors
+    /// Those of the function, and [`Error::Device`](crate::Error).
+    pub fn with_map<T>(&self, show: impl FnOnce(&Map) -> Result<T, Error>) -> Result<T, Error> {
+        match self {
+            Self::Cpu(map) => show(map),
+            #[cfg(feature = "gpu")]
+            Self::Gpu(map) => show(&map.to_map(usize::MAX)?),
+        }
+    }
+
+    /// The map in the processor's memory; that of a GPU without a cap in bytes.
+    ///
+    /// # Errors
+    /// [`Error::Device`](crate::Error).
+    #[cfg_attr(not(feature = "gpu"), expect(clippy::unnecessary_wraps, reason = "a map on a GPU must be fetched"))]
+    pub fn into_map(self) -> Result<Map, Error> {
+        match self {
+            Self::Cpu(map) => Ok(*map),
+            #[cfg(feature = "gpu")]
+            Self::Gpu(map) => map.to_map(usize::MAX),
+        }
+    }
+}
