@@ -11,8 +11,8 @@ use nalgebra::{Point3, Vector3};
 use paint_net::path::{Stroke, StrokeSettings, boustrophedon};
 use paint_net::procedural::Texture;
 use paint_net::{Deconvolution, Limits, PaintProblem, Painter, SprayKernel};
-use paint_planner::{Settings, Target};
 use paint_planner::stroke_order::{StrokeEnds, order_strokes};
+use paint_planner::{Settings, Target};
 use paintcopter::pictures::{PathPanel, save_paths};
 
 /// Metres, as those of a mission.

@@ -1,16 +1,16 @@
 //! The lines that join the crates: each library says by a small trait what it needs from the world, and here another library
 //! gives it.
 
+use crate::surface::PaintSurface;
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use paint_planner::constraints::Tether;
 use paint_planner::control::{
     AttitudeResponse, ControlReference, ControlState, MpcSettings, TrackingMpc, VehicleModel,
 };
-use paint_planner::{NozzleState, Plan, Tool, VehicleState};
 use paint_planner::mission::Chart;
+use paint_planner::{NozzleState, Plan, Tool, VehicleState};
 use paint_sim::TriangleSurface;
 use paint_sim::flight::{Airframe, Command, Controller, Estimate, GRAVITY};
-use crate::surface::PaintSurface;
 use paint_sim::flight::{PanTilt, Reference, ReferenceState};
 use ptu_kinematics::{CollisionBody, Hover, Joints, KinematicChain, Ptu, Servo};
 

@@ -3,10 +3,10 @@
 use paint_net::SprayKernel;
 use paint_net::painters::SurfaceFootprint;
 use paint_net::path::Stroke;
-use std::cell::OnceCell;
 use paint_planner::Target;
 use paint_planner::mission::{spray_cell, upright};
 use paint_sim::{Film, Shot, SprayModel};
+use std::cell::OnceCell;
 
 use super::error::MissionError;
 use super::nozzle::{kernel, shot, spray_model, sprays};

@@ -1,7 +1,7 @@
 //! The nozzle, as the painter and as the simulation know it.
 
-use paint_net::{Spray, SprayKernel};
 use paint_net::path::Stroke;
+use paint_net::{Spray, SprayKernel};
 use paint_planner::NozzleState;
 use paint_sim::{Shot, SprayModel};
 

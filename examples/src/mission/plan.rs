@@ -2,9 +2,9 @@
 
 use paint_net::Painting;
 use paint_net::path::{StrokeSettings, boustrophedon};
-use paint_planner::{Error, OptimalPlanner, Plan, Planner, Settings, Surface, Target, Tool};
 use paint_planner::mission::{MissionFlight, MissionPlan, MissionPlanner, Route, Spray, TargetOutcomes};
 use paint_planner::plan::SmoothingPlanner;
+use paint_planner::{Error, OptimalPlanner, Plan, Planner, Settings, Surface, Target, Tool};
 use std::cell::Cell;
 use std::time::Instant;
 
