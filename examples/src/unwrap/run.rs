@@ -99,7 +99,7 @@ fn unwrap(
     let progress = |at: Progress| match at.stage {
         uv_param::parametrizer::Stage::Seam => stage.tell(&format!("{} seams tried", at.iteration)),
         uv_param::parametrizer::Stage::Level => {
-            stage.tell(&format!("{} charts of the fine surface tried", at.iteration))
+            stage.tell(&format!("{} charts of the fine surface tried", at.iteration));
         }
         uv_param::parametrizer::Stage::Chart => stage.tell(&format!("{} charts finished", at.iteration)),
         _ => {}

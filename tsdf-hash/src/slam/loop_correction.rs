@@ -80,7 +80,7 @@ fn tell(frame: usize, pose: &Isometry3<f64>, report: &LoopReport, events: &mut V
     events.extend(report.loops.iter().map(|found| Event::LoopClosed {
         frame,
         keyframe: found.old,
-        drift: found.drift.clone(),
+        drift: Box::new(found.drift.clone()),
         distance: found.drift.distance(pose),
     }));
 }

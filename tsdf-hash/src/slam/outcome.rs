@@ -71,7 +71,7 @@ pub enum Event {
         /// The keyframe.
         keyframe: usize,
         /// The drift since then.
-        drift: Drift,
+        drift: Box<Drift>,
         /// Its size at the camera, metres.
         distance: f64,
     },
