@@ -43,15 +43,24 @@ impl DeviceMap {
         }
     }
 
+    /// The map on the GPU that the options choose, or on the processor where that one is not there or does not work; then with the reason.
+    ///
+    /// # Errors
+    /// [`Error::OutOfBudget`], and those of evicted blocks.
+    #[cfg(feature = "gpu")]
+    pub fn on_adapter(map: Map, options: &GpuOptions) -> Result<(Self, Option<Error>), Error> {
+        match GpuMap::from_map(&map, options) {
+            Ok(on_gpu) => Ok((Self::Gpu(Box::new(on_gpu)), None)),
+            Err(why @ (Error::NoAdapter { .. } | Error::Device { .. })) => Ok((Self::Cpu(Box::new(map)), Some(why))),
+            Err(error) => Err(error),
+        }
+    }
+
     #[cfg(feature = "gpu")]
     fn on_gpu(map: Map, demanded: bool) -> Result<(Self, Option<Error>), Error> {
-        let options = GpuOptions { software: demanded, ..GpuOptions::default() };
-        match GpuMap::from_map(&map, &options) {
-            Ok(on_gpu) => Ok((Self::Gpu(Box::new(on_gpu)), None)),
-            Err(why @ (Error::NoAdapter { .. } | Error::Device { .. })) if !demanded => {
-                Ok((Self::Cpu(Box::new(map)), Some(why)))
-            }
-            Err(error) => Err(error),
+        match Self::on_adapter(map, &GpuOptions { software: demanded, ..GpuOptions::default() })? {
+            (Self::Cpu(_), Some(why)) if demanded => Err(why),
+            opened => Ok(opened),
         }
     }
 

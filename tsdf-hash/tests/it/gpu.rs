@@ -2,9 +2,10 @@
 //! `PAINTCOPTER_REQUIRE_GPU=1` demands one.
 
 use nalgebra::{Isometry3, Point3, Vector3};
+use tsdf_hash::slam::DeviceMap;
 use tsdf_hash::{
     ColourData, ColourView, DenseMap, DepthData, DepthView, DistanceField, DistanceSettings, Error, GpuMap, GpuOptions,
-    IncrementalMesher, Intrinsics, Map, MemoryLimits, RayCastSettings, Settings, TsdfLayer, gpu_or_cpu_map,
+    IncrementalMesher, Intrinsics, Map, MemoryLimits, RayCastSettings, Settings, TsdfLayer,
 };
 
 use crate::random::Random;
@@ -329,17 +330,18 @@ fn an_adapter_that_is_not_there_is_an_error() {
     let Err(Error::NoAdapter { reason }) = GpuMap::new(settings(), &nowhere) else { panic!("it was found") };
     assert!(!reason.is_empty());
     // The processor takes over, and the reason says so.
-    let (mut map, reason) = gpu_or_cpu_map(settings(), &nowhere).unwrap();
-    assert!(reason.unwrap().contains("no GPU"));
+    let on = |options: &GpuOptions| DeviceMap::on_adapter(Map::new(settings()).unwrap(), options).unwrap();
+    let (mut map, reason) = on(&nowhere);
+    assert!(reason.unwrap().to_string().contains("no GPU"));
     let shot = wall();
+    let map = map.dense_mut();
     map.integrate(&shot.view(), None, &shot.world_from_camera).unwrap();
     let expected = map.hash().unwrap();
-    if let (mut map, None) = gpu_or_cpu_map(settings(), &options()).unwrap() {
+    if let (mut map, None) = on(&options()) {
+        let map = map.dense_mut();
         map.integrate(&shot.view(), None, &shot.world_from_camera).unwrap();
         assert_eq!((map.hash().unwrap(), map.mesh().unwrap().faces.is_empty()), (expected, false));
     }
-    let wrong = Settings { threads: 0, ..settings() };
-    assert!(matches!(gpu_or_cpu_map(wrong, &nowhere), Err(Error::InvalidSetting { .. })));
 }
 
 /// The mesh, the distance field and distance queries follow a map wherever it is kept.

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 /// Vertices and triangles.
-pub type Mesh = (Vec<[f64; 3]>, Vec<[u32; 3]>);
+pub(crate) type Mesh = (Vec<[f64; 3]>, Vec<[u32; 3]>);
 
 /// A mesh of the folder `tests/fixtures`.
-pub fn fixture(name: &str) -> Mesh {
+pub(crate) fn fixture(name: &str) -> Mesh {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name);
     read(&std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display())))
 }
@@ -15,7 +15,7 @@ pub fn fixture(name: &str) -> Mesh {
 ///
 /// # Panics
 /// If `PAINTCOPTER_REQUIRE_DATA` is set and there is none.
-pub fn data_mesh(name: &str) -> Option<Mesh> {
+pub(crate) fn data_mesh(name: &str) -> Option<Mesh> {
     let text = std::fs::read_to_string(data_root()?.join(name)).ok();
     if text.is_none() {
         absent(&format!("the data folder holds no meshes/{name}"));
@@ -41,7 +41,7 @@ fn read(text: &str) -> Mesh {
 }
 
 /// All meshes of the data folder, relative to `meshes/`, sorted.
-pub fn all_data_meshes() -> Vec<String> {
+pub(crate) fn all_data_meshes() -> Vec<String> {
     let Some(root) = data_root() else { return Vec::new() };
     let mut found = Vec::new();
     let mut folders = vec![root.clone()];
@@ -63,7 +63,7 @@ pub fn all_data_meshes() -> Vec<String> {
 }
 
 /// Positions and fanned faces of an OBJ text; everything else is ignored.
-pub fn read_obj(text: &str) -> Mesh {
+pub(crate) fn read_obj(text: &str) -> Mesh {
     let (mut positions, mut faces) = (Vec::new(), Vec::new());
     for line in text.lines() {
         let mut words = line.split_whitespace();
@@ -87,7 +87,7 @@ pub fn read_obj(text: &str) -> Mesh {
 }
 
 /// Positions and fanned faces of an OFF text.
-pub fn read_off(text: &str) -> Mesh {
+pub(crate) fn read_off(text: &str) -> Mesh {
     let mut lines = text.lines().map(|l| l.split('#').next().unwrap().trim()).filter(|l| !l.is_empty());
     assert_eq!(lines.next(), Some("OFF"));
     let count: Vec<usize> = lines.next().unwrap().split_whitespace().map(|w| w.parse().unwrap()).collect();
@@ -108,7 +108,7 @@ pub fn read_off(text: &str) -> Mesh {
 }
 
 /// A grid of `nx` x `ny` squares, each cut into two triangles, its vertices placed by `place`.
-pub fn grid(nx: u32, ny: u32, place: impl Fn(f64, f64) -> [f64; 3]) -> Mesh {
+pub(crate) fn grid(nx: u32, ny: u32, place: impl Fn(f64, f64) -> [f64; 3]) -> Mesh {
     let mut positions = Vec::new();
     let mut faces = Vec::new();
     for j in 0..=ny {
@@ -127,10 +127,10 @@ pub fn grid(nx: u32, ny: u32, place: impl Fn(f64, f64) -> [f64; 3]) -> Mesh {
 }
 
 /// splitmix64.
-pub struct Rng(pub u64);
+pub(crate) struct Rng(pub u64);
 
 impl Rng {
-    pub fn next(&mut self) -> u64 {
+    pub(crate) fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -139,12 +139,12 @@ impl Rng {
     }
 
     /// Uniform in [0, 1).
-    pub fn unit(&mut self) -> f64 {
+    pub(crate) fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
     /// Uniform below `n`.
-    pub fn below(&mut self, n: usize) -> usize {
+    pub(crate) fn below(&mut self, n: usize) -> usize {
         (self.next() % n as u64) as usize
     }
 }
