@@ -1,5 +1,6 @@
 //! Straight segments on a wall of a million triangles.
 
+use std::error::Error;
 use std::f64::consts::TAU;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -10,7 +11,6 @@ use paintcopter::mission::MissionSettings;
 use ptu_kinematics::Ptu;
 use serde_json::json;
 
-use super::AnyError;
 use crate::cpu::seconds;
 use crate::{Rng, rock};
 
@@ -23,7 +23,7 @@ const SEGMENTS: usize = 200;
 const SPACING: f64 = 0.01;
 
 /// A wall with bumps of five centimetres, a million triangles.
-fn large_mesh() -> Result<TriangleSurface, AnyError> {
+fn large_mesh() -> Result<TriangleSurface, Box<dyn Error>> {
     let [columns, rows] = QUADS.map(|quads| quads + 1);
     let mut positions = Vec::with_capacity(columns * rows);
     for j in 0..rows {
@@ -48,7 +48,7 @@ fn bump(y: f64, z: f64) -> f64 {
 }
 
 /// Straight segments on the large mesh, targets a centimetre apart: all stages of a plan.
-pub(super) fn segments(length: f64) -> Result<(), AnyError> {
+pub(super) fn segments(length: f64) -> Result<(), Box<dyn Error>> {
     let MissionSettings { planner: settings, ptu, .. } = MissionSettings::default();
     let mesh = large_mesh()?;
     let (robot, wall) = (Robot::new(Ptu::new(ptu)?), MeshSurface(&mesh));

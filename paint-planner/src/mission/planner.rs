@@ -6,7 +6,8 @@ use super::retry::take_unserved;
 use super::strokes::Route;
 use crate::error::Error;
 use crate::not_served::NotServed;
-use crate::plan::{OptimalPlanner, Planner};
+use crate::plan::{OptimalPlanner, Plan, Planner};
+use crate::raise_clearance::{Raise, Shortfall, until_clear};
 use crate::settings::Settings;
 use crate::target::Target;
 use crate::world::{Surface, Tool};
@@ -81,7 +82,7 @@ pub fn plan_mission<R: Rehearsal + ?Sized>(
 }
 
 /// Why there is no plan for a flight: none of its targets can be served, or an error.
-pub(super) enum Refusal<E> {
+enum Refusal<E> {
     NotServed(Error),
     Failed(E),
 }
@@ -165,6 +166,32 @@ impl<R: Rehearsal + ?Sized> MissionPlanner<'_, R> {
         mission.refused_volume += route.volume() + route.lost_volume;
         mission.refused.add_refused(&route.targets, refused);
         Ok(false)
+    }
+
+    /// Plans, flies, and plans again until no rehearsal comes too near, `settings.rounds` times at most; then what still does is left
+    /// out. `clearance` of each target, m, is what the plan keeps in the end.
+    fn rehearsed_plan(
+        &self,
+        targets: &[Target],
+        clearance: &mut [Option<f64>],
+        settings: &Settings,
+    ) -> Result<Plan, Refusal<R::Error>> {
+        let raise = Raise { beyond: self.settings.beyond, most: f64::INFINITY };
+        until_clear(clearance, raise, |clearance, attempt| {
+            let plan = self.planner.plan_with_clearance(targets, clearance, self.surface, self.tool, settings)?;
+            let mut missing = vec![0.0_f64; targets.len()];
+            if attempt <= self.settings.rounds {
+                for miss in self.rehearsal.near_misses(&plan).map_err(Refusal::Failed)? {
+                    let passed = plan.waypoints.partition_point(|w| w.time <= miss.time);
+                    for target in plan.targets_about(passed.saturating_sub(1)).into_iter().flatten() {
+                        missing[target] = missing[target].max(miss.missing);
+                    }
+                }
+            }
+            let hopeless = attempt == self.settings.rounds;
+            let short = missing.iter().enumerate().filter(|(_, missing)| **missing > 0.0);
+            Ok((plan, short.map(|(target, &missing)| Shortfall { target, missing, hopeless }).collect()))
+        })
     }
 
     /// What the last flight gave up although a pose reaches it, as a route of its own.

@@ -1,12 +1,7 @@
-//! A plan is flown in the caller's simulation before it counts: where the vehicle then comes too near the surface, the plan keeps
-//! farther off, and what cannot be served that way is left out.
+//! Rehearsals: a plan is flown in the caller's simulation before it counts, which tells where the vehicle came too near the surface.
 
-use super::planner::{MissionPlanner, Refusal};
 use crate::error::Error;
 use crate::plan::{Plan, Setpoint};
-use crate::raise_clearance::{Raise, Shortfall, until_clear};
-use crate::settings::Settings;
-use crate::target::Target;
 use crate::world::{Surface, Tool, VehicleState};
 use nalgebra::Point3;
 
@@ -94,32 +89,4 @@ pub fn gap(spheres: &[(Point3<f64>, f64)], surface: &dyn Surface, below: f64) ->
         if distance < far { distance - radius } else { below }
     };
     spheres.iter().map(gap).fold(below, f64::min)
-}
-
-impl<R: Rehearsal + ?Sized> MissionPlanner<'_, R> {
-    /// Plans, flies, and plans again until no rehearsal comes too near, `settings.rounds` times at most; then what still does is left
-    /// out. `clearance` of each target, m, is what the plan keeps in the end.
-    pub(super) fn rehearsed_plan(
-        &self,
-        targets: &[Target],
-        clearance: &mut [Option<f64>],
-        settings: &Settings,
-    ) -> Result<Plan, Refusal<R::Error>> {
-        let raise = Raise { beyond: self.settings.beyond, most: f64::INFINITY };
-        until_clear(clearance, raise, |clearance, attempt| {
-            let plan = self.planner.plan_with_clearance(targets, clearance, self.surface, self.tool, settings)?;
-            let mut missing = vec![0.0_f64; targets.len()];
-            if attempt <= self.settings.rounds {
-                for miss in self.rehearsal.near_misses(&plan).map_err(Refusal::Failed)? {
-                    let passed = plan.waypoints.partition_point(|w| w.time <= miss.time);
-                    for target in plan.targets_about(passed.saturating_sub(1)).into_iter().flatten() {
-                        missing[target] = missing[target].max(miss.missing);
-                    }
-                }
-            }
-            let hopeless = attempt == self.settings.rounds;
-            let short = missing.iter().enumerate().filter(|(_, missing)| **missing > 0.0);
-            Ok((plan, short.map(|(target, &missing)| Shortfall { target, missing, hopeless }).collect()))
-        })
-    }
 }
