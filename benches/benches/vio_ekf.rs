@@ -1,7 +1,10 @@
 //! Judging a trajectory of ten thousand poses.
 
 use paintcopter_benches::{criterion, motion};
-use vio_ekf::{Alignment, Error, EvaluationSettings, RpeSettings, Spline, ate, evaluate, rpe, tum};
+use vio_ekf::Error;
+use vio_ekf::eval::{Alignment, EvaluationSettings, RpeSettings, ate, evaluate, rpe};
+use vio_ekf::format::tum;
+use vio_ekf::trajectory::Spline;
 
 /// Poses of either trajectory.
 const POSES: usize = 10_000;

@@ -3,10 +3,9 @@
 
 use nalgebra::{Isometry3, Vector3};
 use paintcopter_benches::{Rng, criterion};
-use vio_ekf::{
-    Camera, Error, ImageView, Imu, ImuNoise, InitialSigma, InitialState, LandmarkSettings, Settings, Stamp,
-    StationarySettings, Vio, nalgebra,
-};
+use vio_ekf::filter::{LandmarkSettings, StationarySettings};
+use vio_ekf::inertial::{InitialSigma, InitialState};
+use vio_ekf::{Camera, Error, ImageView, Imu, ImuNoise, Settings, Stamp, Vio, nalgebra};
 
 const WIDTH: usize = 752;
 const HEIGHT: usize = 480;

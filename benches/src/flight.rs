@@ -1,8 +1,12 @@
 //! A flight with two inertial sensors, a camera that sees points, and poses from a map that are late, noisy and drift.
 
 use nalgebra::{Isometry3, Point3, Translation3, Vector2, Vector3};
+use vio_ekf::filter::PointObservation;
+use vio_ekf::fusion::PoseMeasurement;
+use vio_ekf::lie::so3;
 use vio_ekf::sim::{ImuModel, forward_pinhole, observe_points, swaying_flight};
-use vio_ekf::{Camera, Error, Imu, ImuNoise, PointObservation, PoseMeasurement, Spline, Stamp, so3};
+use vio_ekf::trajectory::Spline;
+use vio_ekf::{Camera, Error, Imu, ImuNoise, Stamp};
 
 use crate::Rng;
 

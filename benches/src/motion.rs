@@ -39,7 +39,7 @@ pub fn pair(count: usize) -> Result<(Trajectory, Trajectory), Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use vio_ekf::{Alignment, ate};
+    use vio_ekf::eval::{Alignment, ate};
 
     /// Root mean squares by evo 1.38.1 (`peers/trajectory_peers.py`) on the files that `library_figures pair` writes.
     #[test]

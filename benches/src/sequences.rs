@@ -5,8 +5,10 @@ use std::path::Path;
 use std::process::Command;
 
 use nalgebra::{Isometry3, Translation3, Vector3};
+use vio_ekf::format::{asl, euroc, tum};
 use vio_ekf::sim::{camera_ahead, camera_ahead_right, painting_flight};
-use vio_ekf::{Camera, Imu, Spline, Stamp, Trajectory, asl, euroc, tum};
+use vio_ekf::trajectory::Spline;
+use vio_ekf::{Camera, Imu, Stamp, Trajectory};
 
 /// Four recorded flights, and two along a wall that is to be painted.
 pub const SEQUENCES: [&str; 6] = ["MH_01", "MH_03", "MH_04", "V1_02", "paint_1", "paint_2"];

@@ -1,14 +1,18 @@
+//! The pinhole with each lens that Kalibr knows, and the trait of any other.
+
 mod distortion;
 mod fisheye;
 pub(crate) mod model;
 mod sphere_models;
 
+pub use model::CameraModel;
+
 use nalgebra::{Isometry3, Matrix2x3, Unit, Vector2, Vector3};
 
-use crate::Error;
+use crate::error::Error;
 use crate::error::invalid;
 use crate::trajectory::is_finite;
-use model::{CameraModel, check_side};
+use model::check_side;
 use sphere_models::{double_sphere, eucm, omni};
 
 /// How a lens departs from a pinhole.

@@ -172,6 +172,26 @@ pub enum Error {
         /// The assignment that fits.
         hint: String,
     },
+    /// A run could use no image.
+    #[error("none of the {given} images could be used; the first: {first}")]
+    NoImage {
+        /// Images that were given.
+        given: usize,
+        /// Why the first was skipped.
+        first: String,
+    },
+    /// A run with two cameras could use no image of the second.
+    #[error("no image of the second camera could be used; the first: {first}")]
+    NoSecondImage {
+        /// Why the first was skipped.
+        first: String,
+    },
+    /// A run has not a single pose.
+    #[error("the odometry never started: {why}")]
+    NeverStarted {
+        /// What it waited for, or why it was lost.
+        why: String,
+    },
     /// A covariance is not symmetric positive definite.
     #[error("{what} covariance {index} is not symmetric positive definite: check the filter, or its export")]
     NotPositiveDefinite {

@@ -11,10 +11,14 @@ pub mod euroc;
 pub mod kitti;
 pub mod tum;
 
+pub use crate::stamp::InvalidStamp;
+
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
+use crate::error::Error;
+use crate::stamp::Stamp;
 use crate::stamp::scaled_integer;
-use crate::{Error, Stamp, Trajectory};
+use crate::trajectory::Trajectory;
 
 /// Quaternions are printed with few digits in some files; more than this off unit length is another column.
 const QUATERNION_NORM_TOLERANCE: f64 = 0.01;

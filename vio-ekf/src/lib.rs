@@ -62,69 +62,37 @@
 //! Frames: poses are `world_from_body`, world `z` up where [`Alignment::PosYaw`] or gravity is meant. Metres, radians,
 //! nanoseconds. Quaternions are Hamilton's; TUM files put the scalar last, EuRoC files first.
 
-mod camera;
-mod core;
+pub mod camera;
 mod error;
-mod eval;
-mod filter;
-mod format;
-mod fusion;
-mod imu_axes;
-mod imu_rest;
-mod imu_validation;
-mod inertial;
-mod lie;
+pub mod eval;
+pub mod filter;
+pub mod format;
+pub mod fusion;
+pub mod imu_check;
+pub mod inertial;
+pub mod lie;
+pub mod run;
 mod samples;
-mod signed_axes;
 pub mod sim;
-mod spline;
 mod stamp;
 #[cfg(test)]
 mod test_random;
 mod trace;
-mod trajectory;
+pub mod trajectory;
 #[cfg(feature = "tune")]
 pub mod tune;
 
-pub use camera::model::CameraModel;
-pub use camera::{Camera, Distortion};
-pub use core::core_state::{CoreCovariance, CoreState};
-pub use core::divergence::{DivergenceCause, DivergenceSettings};
-pub use core::imu_noise_estimator::{AccelMatrixEstimation, ImuSettings};
-pub use core::initial_state::{InitialSigma, InitialState};
-pub use core::iterated_update::Linearization;
-pub use core::odometry::Odometry;
+pub use camera::Camera;
 pub use error::Error;
-pub use eval::align::{Alignment, align, apply};
-pub use eval::associate::{Association, PosePairs, associate};
-pub use eval::ate::{Ate, ate};
-pub use eval::chi2;
-pub use eval::nees::{Nees, PoseCovariance, nees};
-pub use eval::rpe::{PairsFrom, Rpe, RpeSettings, Span, Tolerance, rpe};
-pub use eval::stats::Stats;
-pub use eval::{Evaluation, EvaluationSettings, Segment, evaluate};
-pub use filter::{
-    Bearing, BodyPose, Calibration, CalibrationSettings, DynamicInitializationSettings, FrameReport,
-    InitializationStatus, LandmarkEstimate, LandmarkSettings, Measurement, PatchSettings, PointObservation, PointPair,
-    PointTracker, Settings, StationarySettings, Status, StereoSettings, Trial, UpdateSettings, Vio, VioState,
-    error_state,
-};
-pub use format::{asl, calibration, euroc, kitti, tum};
-pub use fusion::{
-    AlignmentSettings, ExtrinsicsSettings, FusionSettings, ImuPair, ImuPairSettings, MeasurementCounts, PoseFusion,
-    PoseMeasurement, PoseSource, SourceEstimate, UnifiedSettings, UnifiedVio,
-};
-pub use imu_axes::{AxesCheck, AxesReading, check_imu_axes};
-pub use imu_validation::{ImuDoubt, ImuValidation, validate_samples};
-pub use inertial::InertialOdometry;
-pub use lie::{se3, so3};
+pub use filter::{Settings, Status, Vio};
+pub use inertial::Odometry;
 pub use nalgebra;
+pub use run::Runner;
 pub use samples::{ImageView, Imu, ImuNoise};
-pub use spline::{Motion, Spline};
-pub use stamp::{InvalidStamp, Stamp};
-pub use trajectory::{Trajectory, interpolate, path_lengths};
+pub use stamp::Stamp;
+pub use trajectory::Trajectory;
 
 /// The recipe of the README, as a test.
 #[cfg(all(doctest, feature = "yaml"))]
 #[doc = include_str!("../README.md")]
-pub struct Readme;
+struct Readme;

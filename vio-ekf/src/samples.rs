@@ -2,8 +2,9 @@
 
 use nalgebra::Vector3;
 
+use crate::error::Error;
+use crate::stamp::Stamp;
 use crate::trajectory::same_length;
-use crate::{Error, Stamp};
 
 /// One sample of an inertial measurement unit, in the axes of the unit.
 #[derive(Debug, Clone, Copy, PartialEq)]

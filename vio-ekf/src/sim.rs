@@ -7,7 +7,8 @@
 //! ```
 //! use vio_ekf::nalgebra::Isometry3;
 //! use vio_ekf::sim::{RoomSettings, Scenario, Simulation};
-//! use vio_ekf::{Spline, Stamp};
+//! use vio_ekf::Stamp;
+//! use vio_ekf::trajectory::Spline;
 //!
 //! // Sideways along a wall at 1 m/s for half a second, looking along the body's z axis.
 //! let knots = (0..14).map(|i| Isometry3::translation(0.05 * f64::from(i), 0.0, 1.0)).collect();
@@ -45,8 +46,10 @@ use camera::Renderer;
 pub(crate) use rng::Rng;
 use rng::derive;
 
+use crate::error::Error;
 use crate::error::invalid;
-use crate::{Error, Motion, Spline, Stamp};
+use crate::stamp::Stamp;
+use crate::trajectory::spline::{Motion, Spline};
 
 /// What is simulated.
 #[derive(Debug, Clone, PartialEq)]

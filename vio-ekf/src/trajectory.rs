@@ -1,6 +1,14 @@
+//! Poses over time: discrete, and as a smooth curve with exact rates and accelerations.
+
+pub(crate) mod spline;
+
+pub use spline::{Motion, Spline};
+
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 
-use crate::{Error, Stamp, so3};
+use crate::error::Error;
+use crate::lie::so3;
+use crate::stamp::Stamp;
 
 /// Poses `world_from_body` over time; stamps strictly increase and every number is finite.
 ///

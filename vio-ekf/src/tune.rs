@@ -18,8 +18,10 @@ pub use points::PointRecording;
 
 use bobyqa::{Bobyqa, Config, RestartConfig};
 
+use crate::error::Error;
 use crate::error::invalid;
-use crate::{Error, ImuNoise, Settings};
+use crate::filter::settings::Settings;
+use crate::samples::ImuNoise;
 
 /// Factors on the noise that is assumed, as powers of ten.
 ///

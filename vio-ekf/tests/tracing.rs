@@ -10,8 +10,9 @@ use std::sync::{Arc, Mutex};
 use tracing::field::{Field, Visit};
 use tracing::span::{Attributes, Id, Record};
 use tracing::{Event, Metadata, Subscriber};
+use vio_ekf::inertial::{InitialSigma, InitialState};
 use vio_ekf::nalgebra::{Isometry3, Vector3};
-use vio_ekf::{Camera, ImageView, Imu, ImuNoise, InitialSigma, InitialState, Settings, Stamp, Vio};
+use vio_ekf::{Camera, ImageView, Imu, ImuNoise, Settings, Stamp, Vio};
 
 /// Writes the names of spans and the texts of events, one a line.
 struct Listener {

@@ -19,7 +19,9 @@ use paintcopter_benches::{
 use serde_json::json;
 use uv_param::cut::CutSettings;
 use uv_param::{Chart, Method, Settings, largest_disk, unwrap, unwrap_with_cuts};
-use vio_ekf::{Alignment, Association, Trajectory, ate, tum};
+use vio_ekf::Trajectory;
+use vio_ekf::eval::{Alignment, Association, ate};
+use vio_ekf::format::tum;
 
 type AnyError = Box<dyn Error>;
 

@@ -10,7 +10,9 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use paintcopter::exit::exit_code;
 use paintcopter_benches::sequences::{REAL_IMU, motion, real_samples};
 use serde_json::json;
-use vio_ekf::{Imu, Motion, Spline, so3};
+use vio_ekf::Imu;
+use vio_ekf::lie::so3;
+use vio_ekf::trajectory::{Motion, Spline};
 
 /// Compares readings with truth over short spans.
 #[derive(Parser)]

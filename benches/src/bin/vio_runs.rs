@@ -7,17 +7,18 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use cpu_time::ThreadTime;
-use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 use paintcopter::exit::exit_code;
 use paintcopter_benches::Rng;
 use paintcopter_benches::frames::Frames;
 use paintcopter_benches::sequences::{REAL_IMU, SEQUENCES, cameras, motion, real_samples};
 use serde_json::json;
+use vio_ekf::eval::{Alignment, Association, ate, chi2, heading_onto};
+use vio_ekf::format::tum;
+use vio_ekf::inertial::{InitialSigma, InitialState};
+use vio_ekf::lie::so3;
 use vio_ekf::sim::{ImuModel, Scenario, SimulatedCamera, Simulation};
-use vio_ekf::{
-    Alignment, Association, Camera, InitialSigma, InitialState, Odometry, Settings, Stamp, Status, Trajectory, Vio,
-    ate, chi2, so3, tum,
-};
+use vio_ekf::{Camera, Odometry, Settings, Stamp, Status, Trajectory, Vio};
 
 type AnyError = Box<dyn Error>;
 
@@ -258,13 +259,6 @@ fn accel_matrix(arguments: &Arguments) -> Matrix3<f64> {
     })
 }
 
-/// The shift and the turn about the vertical that take one pose to the place and heading of another.
-fn heading_onto(target: &Isometry3<f64>, from: &Isometry3<f64>) -> Isometry3<f64> {
-    let q = (target.rotation * from.rotation.inverse()).into_inner();
-    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.0 * q.k.atan2(q.w));
-    Isometry3::from_parts(Translation3::from(target.translation.vector - turn * from.translation.vector), turn)
-}
-
 /// The truth, less errors drawn from what the start admits.
 fn start(simulation: &Simulation, stamp: Stamp, imu: &ImuModel, seed: u64) -> Result<InitialState, AnyError> {
     let motion = simulation.motion(stamp)?;
@@ -285,7 +279,7 @@ fn start(simulation: &Simulation, stamp: Stamp, imu: &ImuModel, seed: u64) -> Re
     })
 }
 
-fn nees(o: &Odometry, truth: &vio_ekf::Motion, biases: [Vector3<f64>; 2]) -> [f64; 5] {
+fn nees(o: &Odometry, truth: &vio_ekf::trajectory::Motion, biases: [Vector3<f64>; 2]) -> [f64; 5] {
     let errors = [
         truth.world_from_body.translation.vector - o.world_from_body.translation.vector,
         so3::log(&(truth.world_from_body.rotation * o.world_from_body.rotation.inverse())),

@@ -7,7 +7,8 @@ use foxglove::messages::{FrameTransform, PoseInFrame};
 use mcap::Message;
 use nalgebra::Isometry3;
 use serde::Deserialize;
-use vio_ekf::{Stamp, Trajectory, euroc, tum};
+use vio_ekf::format::{euroc, tum};
+use vio_ekf::{Stamp, Trajectory};
 
 use super::error::HandheldError;
 use crate::mcap_messages::fields::{isometry, isometry_of, stamp};

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use vio_ekf::{Spline, Stamp, Trajectory};
+use vio_ekf::trajectory::Spline;
+use vio_ekf::{Stamp, Trajectory};
 
 use super::arguments::MotionAxes;
 use super::error::HandheldError;

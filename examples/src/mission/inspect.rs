@@ -5,7 +5,8 @@ use paint_sim::render::{Frame, Lights, Shading};
 use paint_sim::surface::Hit;
 use paint_sim::{Camera, Surface, render};
 use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics, Map, Mesh};
-use vio_ekf::{Alignment, Stamp, Trajectory};
+use vio_ekf::eval::Alignment;
+use vio_ekf::{Stamp, Trajectory};
 
 use super::error::MissionError;
 use super::run::Mission;
@@ -47,7 +48,7 @@ pub fn inspect(mission: &Mission) -> Result<Inspection, MissionError> {
     let off = |p: &[f32; 3]| world.distance(&Point3::from(p.map(f64::from)), 1.0);
     let mesh_error = mesh.positions.iter().map(off).sum::<f64>() / mesh.positions.len().max(1) as f64;
     let (flown, estimated) = trajectories(mission)?;
-    let slam_ate = vio_ekf::ate(flown.poses(), estimated.poses(), Alignment::Se3)?.position.rmse;
+    let slam_ate = vio_ekf::eval::ate(flown.poses(), estimated.poses(), Alignment::Se3)?.position.rmse;
     Ok(Inspection { mesh, mesh_error, flown, estimated, slam_ate })
 }
 

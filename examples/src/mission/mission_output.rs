@@ -68,7 +68,7 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
     let ply = folder.join("scan.ply");
     write_ply(&ply, &found_mesh).map_err(unwritable(&ply))?;
     for (name, trajectory) in [("flight_true.tum", &found.flown), ("flight_slam.tum", &found.estimated)] {
-        write(&folder.join(name), &vio_ekf::tum::write(trajectory))?;
+        write(&folder.join(name), &vio_ekf::format::tum::write(trajectory))?;
     }
     stage.done(&format!("{} faces, {:.2} mm off the surface", found.mesh.faces.len(), 1e3 * found.mesh_error));
     let figures = report(mission, &found)?;

@@ -36,7 +36,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     write_ply(&ply, &PlyMesh { positions, normals: Some(normals), colours, faces })
         .map_err(|e| format!("{}: cannot be written ({e})", ply.display()))?;
     let tum = folder.join("trajectory.tum");
-    std::fs::write(&tum, vio_ekf::tum::write(&scan.trajectory))
+    std::fs::write(&tum, vio_ekf::format::tum::write(&scan.trajectory))
         .map_err(|e| format!("{}: cannot be written ({e})", tum.display()))?;
     save_views(&scan, &sequence, folder, settings.slam.map.threads)?;
     // Last, so that its presence means the folder is complete.

@@ -17,7 +17,8 @@ pub(super) fn read_angular_rates(
     [first, last]: [f64; 2],
 ) -> Result<Vec<(f64, Vector3<f64>)>, SequenceError> {
     let text = std::fs::read_to_string(path).map_err(|e| SequenceError::unreadable(path, &e))?;
-    let samples = vio_ekf::asl::read_imu(&text).map_err(|e| SequenceError::malformed(path, 0, e.to_string()))?;
+    let samples =
+        vio_ekf::format::asl::read_imu(&text).map_err(|e| SequenceError::malformed(path, 0, e.to_string()))?;
     let camera_from_body = body_from_camera.inverse();
     let rates: Vec<_> = samples.iter().map(|s| (s.stamp.as_secs(), camera_from_body * s.gyro)).collect();
     let [begin, end] = [rates[0].0, rates[rates.len() - 1].0];

@@ -15,7 +15,8 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 use tsdf_hash::Intrinsics;
-use vio_ekf::{Stamp, Trajectory, tum as tum_format};
+use vio_ekf::format::tum as tum_format;
+use vio_ekf::{Stamp, Trajectory};
 
 use super::error::SequenceError;
 use super::image_source::ImageSource;

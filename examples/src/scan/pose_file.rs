@@ -23,7 +23,7 @@ pub(super) fn take_poses(
     body_from_camera: &Isometry3<f64>,
 ) -> Result<usize, SequenceError> {
     let text = std::fs::read_to_string(path).map_err(|e| SequenceError::unreadable(path, &e))?;
-    let trajectory = vio_ekf::tum::read(&text).map_err(|e| SequenceError::malformed(path, 0, e.to_string()))?;
+    let trajectory = vio_ekf::format::tum::read(&text).map_err(|e| SequenceError::malformed(path, 0, e.to_string()))?;
     let mut found = 0;
     for frame in &mut sequence.frames {
         frame.world_from_camera = pose_at(&trajectory, frame.stamp).map(|pose| pose * body_from_camera);

@@ -8,7 +8,8 @@ use tsdf_hash::BoxedError;
 use tsdf_hash::slam::{
     Device, Event, FrameImages, FrameOutcome, FrameSource, PlacedFrame, PoseSource, Slam, SlamSettings,
 };
-use vio_ekf::{Alignment, Stamp, Trajectory, ate};
+use vio_ekf::eval::{Alignment, ate};
+use vio_ekf::{Stamp, Trajectory};
 
 use super::checkpoint::Checkpoints;
 use super::decode::Images;

@@ -3,7 +3,8 @@
 use nalgebra::{Isometry3, Point3};
 use paint_sim::{Surface, TriangleSurface};
 use serde::Serialize;
-use vio_ekf::{Alignment, Trajectory, ate};
+use vio_ekf::Trajectory;
+use vio_ekf::eval::{Alignment, ate};
 
 use super::error::ScanFlightError;
 use crate::mesh_io::TriangleMesh;

@@ -112,7 +112,7 @@ impl ScanFlight {
 }
 
 /// The inertial sensor along the flight.
-fn inertial(spline: vio_ekf::Spline, seed: u64) -> Result<Simulation, vio_ekf::Error> {
+fn inertial(spline: vio_ekf::trajectory::Spline, seed: u64) -> Result<Simulation, vio_ekf::Error> {
     // The cameras look at the surface, not at the simulator's own room.
     let room = RoomSettings { texture_size: 64, furniture: 0, ..RoomSettings::default() };
     Simulation::new(spline, Scenario { seed, cameras: Vec::new(), room, ..Scenario::default() })

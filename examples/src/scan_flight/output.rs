@@ -24,8 +24,8 @@ pub fn save(scan: &ScanFlight, folder: &Path) -> Result<(), MissionError> {
         std::fs::write(&path, text)
             .map_err(|source| MissionError::Unwritable { path: path.display().to_string(), source })
     };
-    write("scan_flight_true.tum", vio_ekf::tum::write(&scan.flown))?;
-    write("scan_flight_estimated.tum", vio_ekf::tum::write(&scan.estimated))?;
+    write("scan_flight_true.tum", vio_ekf::format::tum::write(&scan.flown))?;
+    write("scan_flight_estimated.tum", vio_ekf::format::tum::write(&scan.estimated))?;
     let ply = folder.join("scan_flight.ply");
     let (positions, faces) = (&scan.mesh.positions, &scan.mesh.faces);
     let grey = vec![[180; 3]; positions.len()];

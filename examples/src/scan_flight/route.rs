@@ -1,7 +1,8 @@
 //! The way of a scan: rows along the front of a surface, from rest to rest.
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use vio_ekf::{Spline, Stamp};
+use vio_ekf::Stamp;
+use vio_ekf::trajectory::Spline;
 
 use super::error::ScanFlightError;
 use crate::mesh_io::TriangleMesh;

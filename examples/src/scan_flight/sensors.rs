@@ -6,7 +6,8 @@ use paint_sim::render::{Lights, Shading};
 use paint_sim::surface::Hit;
 use paint_sim::{TriangleSurface, render};
 use tsdf_hash::Intrinsics;
-use vio_ekf::{Camera, Distortion, ImageView};
+use vio_ekf::camera::Distortion;
+use vio_ekf::{Camera, ImageView};
 
 use super::error::ScanFlightError;
 use crate::mesh_io::TriangleMesh;

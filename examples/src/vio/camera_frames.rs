@@ -1,33 +1,28 @@
 //! The images of a recording, read one after the other.
 
-use std::iter::Peekable;
 use std::path::Path;
 
+use vio_ekf::run::{RecordedFrame, pair_by_stamp};
 use vio_ekf::{Error, Stamp};
 
 use super::grey_image::GreyImage;
 use super::mcap_in::read_images;
 use super::recording::{Images, Recording, SecondCamera};
 
-/// Images of both cameras whose stamps differ by no more, ns, were taken together.
-const MAX_STAMP_DIFFERENCE: i64 = 1_000_000;
-
-/// An image that was due.
-pub struct CameraFrame {
-    /// Middle of the exposure by the camera's clock.
-    pub stamp: Stamp,
-    /// The image, or why there is none.
-    pub picture: Result<GreyImage, String>,
-    /// The image that a second camera took together with it, if there is one.
-    pub second: Option<Result<GreyImage, String>>,
-}
+/// Images of both cameras whose stamps differ by no more, s, were taken together.
+const MAX_STAMP_DIFFERENCE_S: f64 = 1e-3;
 
 /// Reads the images one after the other, as they are asked for, each with that of the second camera.
-pub fn camera_frames(recording: &Recording) -> impl Iterator<Item = CameraFrame> + Send + '_ {
-    let mut second = recording.second.as_ref().map(|second| (second, images(&second.images).peekable()));
-    images(&recording.images).map(move |(stamp, decode)| {
-        let second = second.as_mut().and_then(|(camera, images)| second_image(camera, images, stamp));
-        CameraFrame { stamp, picture: decode.decode(), second }
+pub fn camera_frames(recording: &Recording) -> impl Iterator<Item = RecordedFrame<GreyImage>> + Send + '_ {
+    let second = recording.second.as_ref();
+    let seconds = second.into_iter().flat_map(|second| images(&second.images));
+    pair_by_stamp(images(&recording.images), seconds, MAX_STAMP_DIFFERENCE_S).map(move |(stamp, first, taken_with)| {
+        let taken_with = second.zip(taken_with);
+        RecordedFrame {
+            stamp,
+            picture: first.decode(),
+            second: taken_with.map(|(camera, (stamp, encoded))| decode_second(camera, stamp, encoded)),
+        }
     })
 }
 
@@ -57,19 +52,11 @@ fn images(images: &Images) -> EncodedImages<'_> {
     }
 }
 
-/// The image that the second camera took together with one of the first, or why it cannot be used; `None` if there is none.
-fn second_image(
-    camera: &SecondCamera,
-    images: &mut Peekable<EncodedImages<'_>>,
-    stamp: Stamp,
-) -> Option<Result<GreyImage, String>> {
-    let earliest = stamp.nanos().saturating_sub(MAX_STAMP_DIFFERENCE);
-    let latest = stamp.nanos().saturating_add(MAX_STAMP_DIFFERENCE);
-    while images.next_if(|(other, _)| other.nanos() < earliest).is_some() {}
-    let (other, encoded) = images.next_if(|(other, _)| other.nanos() <= latest)?;
+/// An image of the second camera, or why it cannot be used.
+fn decode_second(camera: &SecondCamera, stamp: Stamp, encoded: Encoded<'_>) -> Result<GreyImage, String> {
     let picture = encoded.decode().and_then(|picture| {
         let (given, expected) = ((picture.width, picture.height), (camera.camera.width, camera.camera.height));
         if given == expected { Ok(picture) } else { Err(Error::ImageSize { given, expected }.to_string()) }
     });
-    Some(picture.map_err(|why| format!("second camera, image of {other} s: {why}")))
+    picture.map_err(|why| format!("second camera, image of {stamp} s: {why}"))
 }

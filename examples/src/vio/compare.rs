@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use serde::Serialize;
-use vio_ekf::{Alignment, Association, Error, Evaluation, EvaluationSettings};
+use vio_ekf::Error;
+use vio_ekf::eval::{Alignment, Association, Evaluation, EvaluationSettings};
 
 use super::error::VioError;
 use super::euroc_folder::read_truth;
@@ -79,14 +80,14 @@ pub fn compare(reference: &Path, estimate: &Path, settings: &CompareSettings) ->
         ..EvaluationSettings::default()
     };
     let evaluate = |alignment| {
-        match vio_ekf::evaluate(&reference, &estimate, &with(alignment)) {
+        match vio_ekf::eval::evaluate(&reference, &estimate, &with(alignment)) {
             // All poses at one place, or on one line.
             Err(Error::Degenerate { .. }) => Ok(None),
             other => other.map(Some),
         }
     };
     // Pairs and drift do not depend on the alignment; without any it is always defined.
-    let raw = vio_ekf::evaluate(&reference, &estimate, &with(Alignment::None))?;
+    let raw = vio_ekf::eval::evaluate(&reference, &estimate, &with(Alignment::None))?;
     let scaled = evaluate(Alignment::Sim3)?;
     let measured = raw.segments.iter().filter_map(|segment| Some((segment.length_m, segment.rpe.as_ref()?)));
     let (rigid, yaw) = (evaluate(Alignment::Se3)?, evaluate(Alignment::PosYaw)?);

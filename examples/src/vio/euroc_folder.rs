@@ -2,8 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use vio_ekf::calibration::{self, CameraCalibration, ImuCalibration};
-use vio_ekf::{Stamp, asl, euroc, nalgebra::Isometry3, tum};
+use vio_ekf::Stamp;
+use vio_ekf::format::calibration;
+use vio_ekf::format::calibration::{CameraCalibration, ImuCalibration};
+use vio_ekf::format::{asl, euroc, tum};
+use vio_ekf::nalgebra::Isometry3;
 
 use super::error::{VioError, read_text};
 use super::recording::{GroundTruth, Images, Recording};

@@ -1,14 +1,15 @@
 //! The estimate against the truth.
 
-use vio_ekf::nalgebra::{Isometry3, Matrix3, Vector3};
-use vio_ekf::{
-    Alignment, Association, Error, Odometry, PairsFrom, RpeSettings, Span, Stamp, Stats, Tolerance, apply, ate, rpe,
-    so3,
+use vio_ekf::eval::{
+    Alignment, Association, PairsFrom, RpeSettings, Span, Stats, Tolerance, apply, ate, heading_onto, rpe,
 };
+use vio_ekf::lie::so3;
+use vio_ekf::nalgebra::{Isometry3, Matrix3, Vector3};
+use vio_ekf::run::Run;
+use vio_ekf::{Error, Odometry, Stamp};
 
 use super::error::VioError;
 use super::recording::GroundTruth;
-use super::run::{Run, heading_onto};
 
 /// Standard deviations that a recorded truth has of its own, added to those that the filter claims: 1 mm, 0.1 degrees,
 /// 3 mm/s. Ours; without them the first poses, which the filter knows exactly by definition, would decide.
@@ -99,7 +100,7 @@ pub fn evaluate_run(run: &Run, truth: &GroundTruth) -> Result<Option<RunEvaluati
     let coverage = if both > 0.0 { covered / both } else { 1.0 };
     let (mut errors, mut sums) = (Vec::new(), Sums::default());
     for segment in &run.segments {
-        accumulate_errors(&segment.odometry, truth, &mut errors, &mut sums);
+        accumulate_errors(segment.estimates.iter().map(|estimate| &estimate.odometry), truth, &mut errors, &mut sums);
     }
     let count = (errors.len() as f64).max(1.0);
     Ok(Some(RunEvaluation {
@@ -162,10 +163,15 @@ struct Sums {
 }
 
 /// Errors along one stretch, the truth moved to where the stretch begins.
-fn accumulate_errors(odometry: &[Odometry], truth: &GroundTruth, errors: &mut Vec<PoseError>, sums: &mut Sums) {
+fn accumulate_errors<'a>(
+    odometry: impl Iterator<Item = &'a Odometry>,
+    truth: &GroundTruth,
+    errors: &mut Vec<PoseError>,
+    sums: &mut Sums,
+) {
     let known = |o: &&Odometry| truth.trajectory.pose_at(o.stamp).is_ok();
     let mut filter_from_truth = None;
-    for o in odometry.iter().filter(known) {
+    for o in odometry.filter(known) {
         let Ok(pose) = truth.trajectory.pose_at(o.stamp) else { continue };
         let onto = *filter_from_truth.get_or_insert_with(|| heading_onto(&o.world_from_body, &pose));
         let moved = onto * pose;
@@ -221,7 +227,7 @@ mod tests {
         let filter_from_truth = Isometry3::from_parts([5.0, -3.0, 1.0].into(), turned(0.7));
         let (position_error, velocity_error) = (Vector3::new(0.02, -0.03, 0.01), Vector3::new(0.1, 0.02, -0.3));
         let (position_sigma, velocity_sigma) = (Vector3::new(0.01, 0.02, 0.04), Vector3::new(0.05, 0.04, 0.2));
-        let mut covariance = vio_ekf::CoreCovariance::identity() * 1e-4;
+        let mut covariance = vio_ekf::inertial::CoreCovariance::identity() * 1e-4;
         covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::from_diagonal(&position_sigma.map(|s| s * s)));
         covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&Matrix3::from_diagonal(&velocity_sigma.map(|s| s * s)));
         let odometry: Vec<Odometry> = [0, 1, 2]
@@ -243,7 +249,7 @@ mod tests {
             })
             .into();
         let (mut errors, mut sums) = (Vec::new(), Sums::default());
-        accumulate_errors(&odometry, &truth, &mut errors, &mut sums);
+        accumulate_errors(odometry.iter(), &truth, &mut errors, &mut sums);
         let nees = |error: Vector3<f64>, sigma: Vector3<f64>, truth: f64| {
             error.zip_map(&sigma, |e, s| e * e / (s * s + truth * truth)).sum()
         };

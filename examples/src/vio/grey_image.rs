@@ -5,6 +5,7 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageError, ImageReader, Limits};
 use vio_ekf::ImageView;
+use vio_ekf::run::Picture;
 
 /// Deflate makes no more than so many bytes of one; pictures of one colour come near it.
 const MOST_BYTES_OF_A_BYTE: u64 = 1032;
@@ -51,9 +52,10 @@ impl GreyImage {
         let grey = image.into_luma8();
         Self { width: grey.width() as usize, height: grey.height() as usize, data: grey.into_raw() }
     }
+}
 
-    /// The image, borrowed.
-    pub fn view(&self) -> ImageView<'_> {
+impl Picture for GreyImage {
+    fn view(&self) -> ImageView<'_> {
         ImageView { width: self.width, height: self.height, data: &self.data }
     }
 }

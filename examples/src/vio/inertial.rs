@@ -3,13 +3,15 @@
 use std::path::Path;
 
 use serde::Serialize;
+use vio_ekf::Imu;
+use vio_ekf::format::{asl, euroc, tum};
+use vio_ekf::inertial::{ImuSettings, InertialOdometry, InitialSigma, InitialState};
 use vio_ekf::nalgebra::Vector3;
-use vio_ekf::{Imu, ImuSettings, InertialOdometry, InitialSigma, InitialState, asl, euroc, tum};
+use vio_ekf::run::{Estimate, Segment};
 
 use super::command_line::Inertial;
 use super::error::{VioError, read_text, write_file};
 use super::euroc_folder::{Overrides, imu, inside};
-use super::run::Segment;
 use super::states::states_csv;
 use crate::report::save_figures;
 
@@ -61,9 +63,7 @@ pub(super) fn dead_reckon(arguments: &Inertial) -> Result<InertialReport, Box<dy
             break;
         }
         odometry.imu(&pair[1])?;
-        segment.odometry.push(odometry.output());
-        segment.used.push(0);
-        segment.dead_reckoned.push(true);
+        segment.estimates.push(Estimate { odometry: odometry.output(), used: 0, dead_reckoned: true });
     }
     let report = report(&segment, &truth)?;
     write_file(&arguments.out.join("trajectory.tum"), tum::write(&segment.trajectory()?).as_bytes())?;
@@ -96,9 +96,10 @@ fn initial_state(states: &euroc::States, samples: &[Imu]) -> Result<InitialState
 }
 
 fn report(segment: &Segment, truth: &Path) -> Result<InertialReport, Box<dyn std::error::Error>> {
-    let (Some(first), Some(end)) = (segment.odometry.first(), segment.odometry.last()) else {
+    let (Some(first), Some(end)) = (segment.estimates.first(), segment.estimates.last()) else {
         return Err("no inertial sample comes after the start".into());
     };
+    let (first, end) = (&first.odometry, &end.odometry);
     let sigma = |row: usize| (row..row + 3).map(|k| end.covariance[(k, k)].max(0.0).sqrt()).fold(0.0, f64::max);
     // The truth may end before the samples do, and then there is nothing to compare with.
     let known = truth.is_file().then(|| read_text(truth)).transpose()?;
@@ -108,7 +109,7 @@ fn report(segment: &Segment, truth: &Path) -> Result<InertialReport, Box<dyn std
     let covariance = end.covariance.fixed_view::<3, 3>(0, 0).into_owned();
     Ok(InertialReport {
         mode: "dead reckoning",
-        samples: segment.odometry.len(),
+        samples: segment.estimates.len(),
         duration_s: end.stamp.secs_since(first.stamp),
         path_length_m: segment.trajectory()?.path_length(),
         position_sigma_end_m: sigma(0),

@@ -8,9 +8,11 @@ use std::path::{Path, PathBuf};
 use foxglove::Decode;
 use foxglove::messages::{self, FrameTransform, FrameTransforms, PoseInFrame};
 use mcap::Message;
-use vio_ekf::calibration::{self, CameraCalibration, ImuCalibration};
+use vio_ekf::camera::Distortion;
+use vio_ekf::format::calibration;
+use vio_ekf::format::calibration::{CameraCalibration, ImuCalibration};
 use vio_ekf::nalgebra::Isometry3;
-use vio_ekf::{Camera, Distortion, Imu, ImuNoise, Stamp, Trajectory};
+use vio_ekf::{Camera, Imu, ImuNoise, Stamp, Trajectory};
 
 use super::error::{VioError, read_text};
 use super::euroc_folder::{Overrides, read_truth};

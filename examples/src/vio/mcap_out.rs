@@ -11,9 +11,10 @@ use foxglove::messages::{
     self, CompressedImage, FrameTransform, Pose, PoseInFrame, Quaternion, RawImage, Timestamp,
     Vector3 as FoxgloveVector3,
 };
-use vio_ekf::calibration::{CameraCalibration, ImuCalibration};
+use vio_ekf::camera::Distortion;
+use vio_ekf::format::calibration::{CameraCalibration, ImuCalibration};
 use vio_ekf::nalgebra::Isometry3;
-use vio_ekf::{Distortion, Imu, Stamp};
+use vio_ekf::{Imu, Stamp};
 
 use super::error::VioError;
 use super::grey_image::GreyImage;

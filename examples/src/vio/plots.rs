@@ -2,11 +2,13 @@
 
 use std::path::Path;
 
+use vio_ekf::Trajectory;
+use vio_ekf::lie::so3;
 use vio_ekf::nalgebra::Vector3;
-use vio_ekf::{Trajectory, so3};
+use vio_ekf::run::{Estimate, Run};
 
 use super::evaluation::AlignedPair;
-use super::{Run, RunEvaluation, VioError};
+use super::{RunEvaluation, VioError};
 use crate::pictures::{Panel, PathPanel, save_curves, save_paths};
 
 /// Points of a curve at most: more cannot be seen.
@@ -50,10 +52,10 @@ fn save_path(trajectories: &[Trajectory], evaluation: Option<&RunEvaluation>, pa
 }
 
 fn save_state(run: &Run, path: &Path) -> Result<(), VioError> {
-    let all = || run.segments.iter().flat_map(|segment| segment.odometry.iter().zip(&segment.used));
-    let Some(first) = all().next().map(|(o, _)| o.stamp) else { return Ok(()) };
+    let all = || run.segments.iter().flat_map(|segment| &segment.estimates);
+    let Some(first) = all().next().map(|first| first.odometry.stamp) else { return Ok(()) };
     let curve = |value: &dyn Fn(&vio_ekf::Odometry, usize) -> f64| -> Curve {
-        thinned(all().map(|(o, &used)| (o.stamp.secs_since(first), value(o, used))).collect())
+        thinned(all().map(|Estimate { odometry: o, used, .. }| (o.stamp.secs_since(first), value(o, *used))).collect())
     };
     let bias = |pick: fn(&vio_ekf::Odometry) -> Vector3<f64>| {
         let axis = |k: usize| curve(&|o, _| pick(o)[k]);

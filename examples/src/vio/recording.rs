@@ -2,8 +2,10 @@
 
 use std::path::PathBuf;
 
-use vio_ekf::calibration::{CameraCalibration, ImuCalibration};
-use vio_ekf::{Camera, Imu, ImuValidation, Stamp, Trajectory, nalgebra::Vector3, validate_samples};
+use vio_ekf::format::calibration::{CameraCalibration, ImuCalibration};
+use vio_ekf::imu_check::{ImuValidation, validate_samples};
+use vio_ekf::nalgebra::Vector3;
+use vio_ekf::{Camera, Imu, Stamp, Trajectory};
 
 use super::error::VioError;
 use super::grey_image::GreyImage;

@@ -4,11 +4,16 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use serde::Serialize;
-use vio_ekf::{ImuValidation, Stamp, Trajectory, so3, tum};
+use vio_ekf::format::tum;
+use vio_ekf::imu_check::ImuValidation;
+use vio_ekf::lie::so3;
+use vio_ekf::run::{Loss, Run};
+use vio_ekf::{Stamp, Trajectory};
 
 use super::error::write_file;
+use super::run::TimedRun;
 use super::states::states_csv;
-use super::{Recording, Run, RunEvaluation, VioError, plots};
+use super::{Recording, RunEvaluation, VioError, plots};
 use crate::report::save_figures;
 
 /// What `report.json` of a run holds. Flat, SI units in the names; every number is finite. What needs the truth is absent
@@ -102,7 +107,7 @@ impl VioReport {
     pub fn new(
         recording: &Recording,
         findings: Option<&ImuValidation>,
-        run: &Run,
+        TimedRun { run, frame_s, imu_s }: &TimedRun,
         evaluation: Option<&RunEvaluation>,
         threads: usize,
     ) -> Result<Self, VioError> {
@@ -125,7 +130,7 @@ impl VioReport {
             segment_last_s: end(|trajectory| trajectory.stamps().last()),
             imu_samples: run.imu_samples,
             imu_gaps: findings.map(|findings| findings.gaps),
-            imu_doubts: findings.map(|findings| findings.doubts.iter().map(ToString::to_string).collect()),
+            imu_doubts: findings.map(|findings| findings.warnings.iter().map(ToString::to_string).collect()),
             duration_s: trajectories.iter().map(Trajectory::duration_s).sum(),
             path_length_m: trajectories.iter().map(Trajectory::path_length).sum(),
             ate_se3_rmse_m: evaluation.map(|j| j.ate_se3),
@@ -135,9 +140,9 @@ impl VioReport {
             nees_attitude_mean: evaluation.map(|j| j.nees_attitude),
             nees_velocity_mean: evaluation.and_then(|j| j.nees_velocity),
             coverage: evaluation.map(|j| j.coverage),
-            frame_cpu_ms_median: 1e3 * quantile(&run.frame_s, 0.5),
-            frame_cpu_ms_p99: 1e3 * quantile(&run.frame_s, 0.99),
-            imu_cpu_us_median: 1e6 * quantile(&run.imu_s, 0.5),
+            frame_cpu_ms_median: 1e3 * quantile(frame_s, 0.5),
+            frame_cpu_ms_p99: 1e3 * quantile(frame_s, 0.99),
+            imu_cpu_us_median: 1e6 * quantile(imu_s, 0.5),
             diverged: !run.lost.is_empty(),
             resets: run.lost.len(),
             initialization_time_s: run.initialization_time_s,
@@ -159,7 +164,7 @@ impl VioReport {
             self.duration_s,
             self.version
         );
-        for (stamp, why) in &run.lost {
+        for Loss { stamp, reason: why } in &run.lost {
             let _ = writeln!(text, "**Diverged at {stamp} s**: {why}.\n");
         }
         if self.segments > 1 {

@@ -4,10 +4,13 @@ use std::path::{Path, PathBuf};
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
-use vio_ekf::calibration::{CameraCalibration, ImuCalibration, write_asl_camera, write_asl_imu};
+use vio_ekf::format::calibration::{CameraCalibration, ImuCalibration, write_asl_camera, write_asl_imu};
+use vio_ekf::format::{asl, euroc, tum};
+use vio_ekf::lie::so3;
 use vio_ekf::nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use vio_ekf::sim::{Frame, ImuRecording, Scenario, SimulatedCamera, Simulation};
-use vio_ekf::{Spline, Stamp, Trajectory, asl, euroc, so3, tum};
+use vio_ekf::trajectory::Spline;
+use vio_ekf::{Stamp, Trajectory};
 
 use super::error::{make_folder, write_file};
 use super::euroc_folder::read_truth;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::Segment;
+use vio_ekf::run::{Estimate, Segment};
 
 /// The parts of the error state, three rows each, in the order of the covariance.
 const PARTS: [&str; 5] = ["p", "v", "r", "bg", "ba"];
@@ -21,9 +21,8 @@ pub(super) fn states_csv(segments: &[Segment]) -> String {
     }
     text.push('\n');
     for (number, segment) in segments.iter().enumerate() {
-        for (k, o) in segment.odometry.iter().enumerate() {
-            let _ =
-                write!(text, "{},{},{},{}", o.stamp, number + 1, segment.used[k], u8::from(segment.dead_reckoned[k]));
+        for Estimate { odometry: o, used, dead_reckoned } in &segment.estimates {
+            let _ = write!(text, "{},{},{},{}", o.stamp, number + 1, used, u8::from(*dead_reckoned));
             let pose = &o.world_from_body;
             let vectors = [o.velocity_in_body, o.gyro_bias, o.accel_bias];
             let pose = pose.translation.vector.iter().chain(pose.rotation.coords.iter());

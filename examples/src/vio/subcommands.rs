@@ -2,17 +2,21 @@
 
 use std::path::{Path, PathBuf};
 
-use vio_ekf::calibration::read_kalibr_cameras;
+use vio_ekf::filter::CalibrationSettings;
+use vio_ekf::format::calibration::read_kalibr_cameras;
+use vio_ekf::imu_check::{ImuValidation, check_axes_with_images, diagnose_axes};
+use vio_ekf::run::{Loss, Run};
 use vio_ekf::sim::{Scenario, SimulatedCamera};
 use vio_ekf::tune::TuneSettings;
-use vio_ekf::{CalibrationSettings, Camera, ImuValidation, Settings};
+use vio_ekf::{Camera, Settings};
 
 use super::command_line::{Arguments, Command, Eval, FlightName, Sim, Track, Tune};
 use super::error::{read_text, write_file};
 use super::inertial::dead_reckon;
+use super::run::filter;
 use super::{
-    CompareSettings, Flight, GreyImage, Overrides, Recording, Run, RunSettings, SimulationSettings, Tuning, TuningData,
-    VioError, VioReport, axes_doubts, compare, diagnose, evaluate_run, open_euroc, open_euroc_stereo, open_mcap,
+    CompareSettings, Flight, GreyImage, Overrides, Recording, RunSettings, SimulationSettings, Tuning, TuningData,
+    VioError, VioReport, camera_frames, compare, evaluate_run, open_euroc, open_euroc_stereo, open_mcap,
     open_mcap_stereo, run, save, simulate, tune_noise,
 };
 use crate::report::save_figures;
@@ -100,18 +104,22 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         );
     }
     if let Some(findings) = &mut findings {
-        findings.doubts.extend(axes_doubts(&recording, filter.gravity)?);
+        let camera = recording.camera;
+        let known = (filter.gravity, camera.time_offset_s);
+        let frames = camera_frames(&recording);
+        findings.warnings.extend(check_axes_with_images(&recording.samples, frames, &camera.camera, known)?);
         eprintln!("inertial sensor: {:.0} Hz, {} gaps", findings.rate_hz, findings.gaps);
-        findings.doubts.iter().for_each(|doubt| eprintln!("warning: {doubt}"));
+        findings.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
     }
     let threads = threads(arguments.threads);
     let settings = RunSettings { filter, threads, ..RunSettings::default() };
-    let run = match run(&recording, &settings) {
+    let timed = match run(&recording, &settings) {
         Err(VioError::Unusable { recording: name, why }) => {
             return Err(format!("{name}: {}", with_cause(why, &recording, &settings)).into());
         }
         other => other?,
     };
+    let run = &timed.run;
     for why in run.skipped.iter().take(3) {
         eprintln!("left out: {why}");
     }
@@ -122,13 +130,13 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
             "the accelerometer was not found to be calibrated: it reads {x}, {y}, {z} % on its axes (accel_matrix in report.json)"
         );
     }
-    for (stamp, why) in &run.lost {
+    for Loss { stamp, reason: why } in &run.lost {
         eprintln!("diverged at {stamp} s: {why}");
     }
-    let evaluation = recording.truth.as_ref().map(|truth| evaluate_run(&run, truth)).transpose()?.flatten();
+    let evaluation = recording.truth.as_ref().map(|truth| evaluate_run(run, truth)).transpose()?.flatten();
     write_file(&folder.join("settings.toml"), toml::to_string(&filter)?.as_bytes())?;
-    let report = VioReport::new(&recording, findings.as_ref(), &run, evaluation.as_ref(), threads)?;
-    save(&report, &recording, &run, evaluation.as_ref(), folder)?;
+    let report = VioReport::new(&recording, findings.as_ref(), &timed, evaluation.as_ref(), threads)?;
+    save(&report, &recording, run, evaluation.as_ref(), folder)?;
     println!("{}", folder.join("report.md").display());
     if run.segments.len() > 1 {
         eprintln!("{} segments, each in a world of its own: see trajectory.tum and report.json", run.segments.len());
@@ -137,7 +145,7 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         eprintln!("{} poses were taken back: wrong starts, or contradicted before a divergence", run.withdrawn);
     }
     // The files are there to look at, but such a trajectory is not to be relied on.
-    usable(&recording, &run).map_err(|why| with_cause(why, &recording, &settings).into())
+    usable(&recording, run).map_err(|why| with_cause(why, &recording, &settings).into())
 }
 
 /// The test of the inertial samples; `None` if they are accepted though they fail it.
@@ -155,7 +163,10 @@ fn check_samples(recording: &Recording, gravity: f64, accept: bool) -> Result<Op
 /// Why a run failed and, if axes are the cause, which.
 fn with_cause(why: String, recording: &Recording, settings: &RunSettings) -> String {
     eprintln!("looking for a cause: the inertial sensor is read with other axes");
-    match diagnose(recording, settings) {
+    let cause = filter(recording, settings, false)
+        .ok()
+        .and_then(|filter| diagnose_axes(&filter, &recording.samples, camera_frames(recording), settings.threads));
+    match cause {
         Some(cause) => format!("{why}; it would go on if {cause}"),
         None => why,
     }
@@ -164,11 +175,13 @@ fn with_cause(why: String, recording: &Recording, settings: &RunSettings) -> Str
 /// Whether a run did what was asked of it, or why not.
 fn usable(recording: &Recording, run: &Run) -> Result<(), String> {
     let (name, images, poses) = (&recording.name, recording.images.count(), run.poses());
-    if let Some((stamp, why)) = run.lost.last().filter(|_| !run.tracking_at_end) {
-        return Err(format!("{name}: the filter diverged at {stamp} s ({why}), and was not restarted"));
+    if let Some(Loss { stamp, reason }) = run.lost.last().filter(|_| !run.tracking_at_end) {
+        return Err(format!("{name}: the filter diverged at {stamp} s ({reason}), and was not restarted"));
     }
     if 2 * poses < images {
-        let why = run.skipped.first().or(run.lost.last().map(|(_, why)| why)).map_or("it started late", String::as_str);
+        let skipped = run.skipped.first().map(ToString::to_string);
+        let why = skipped.or_else(|| run.lost.last().map(|loss| loss.reason.to_string()));
+        let why = why.unwrap_or_else(|| "it started late".into());
         return Err(format!("{name}: only {poses} of {images} images have a pose: {why}"));
     }
     let left_out = run.skipped.len();

@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
-use paintcopter::vio::{CameraFrame, Recording};
-use vio_ekf::{Distortion, Imu, Stamp};
+use paintcopter::vio::{GreyImage, Recording};
+use vio_ekf::camera::Distortion;
+use vio_ekf::run::RecordedFrame;
+use vio_ekf::{Imu, Stamp};
 
 use crate::scratch::Scratch;
 
@@ -106,7 +108,7 @@ pub(crate) fn write_kalibr_files(s: &Scratch, folder: &Recording) {
 }
 
 /// Inertial samples and images as ROS 2 records them, raw or as PNG.
-pub(crate) fn write_ros2_bag(file: &Path, samples: &[Imu], frames: &[CameraFrame], compressed: bool) {
+pub(crate) fn write_ros2_bag(file: &Path, samples: &[Imu], frames: &[RecordedFrame<GreyImage>], compressed: bool) {
     let mut writer = mcap::WriteOptions::new()
         .compression(None)
         .profile("ros2")

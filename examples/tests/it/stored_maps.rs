@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use image::{ImageBuffer, Luma};
-use vio_ekf::tum;
+use vio_ekf::format::tum;
 
 use crate::scratch::Scratch;
 use crate::strange_recordings::{FRAMES, SIZE, change, pose, recording, scan};

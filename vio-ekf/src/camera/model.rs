@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use nalgebra::{Isometry3, Matrix2x3, Unit, Vector2, Vector3};
 
-use crate::Error;
+use crate::error::Error;
 use crate::error::invalid;
 use crate::trajectory::is_finite;
 

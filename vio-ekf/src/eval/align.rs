@@ -2,7 +2,7 @@ use nalgebra::{
     Isometry3, Matrix3, Matrix4, Quaternion, Similarity3, SymmetricEigen, Translation3, UnitQuaternion, Vector3,
 };
 
-use crate::Error;
+use crate::error::Error;
 use crate::trajectory::{check_poses, same_length};
 
 /// Eigenvalue gaps and horizontal moments below this share of the spread are rounding.
@@ -21,6 +21,14 @@ pub enum Alignment {
     Se3,
     /// Rigid motion and scale: `evo --align --correct_scale`, for monocular vision without an IMU.
     Sim3,
+}
+
+/// The shift and the turn about the vertical that take one pose to the place and heading of another.
+pub fn heading_onto(target: &Isometry3<f64>, from: &Isometry3<f64>) -> Isometry3<f64> {
+    // The turn about z that is nearest to the rotation between both.
+    let q = (target.rotation * from.rotation.inverse()).into_inner();
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.0 * q.k.atan2(q.w));
+    Isometry3::from_parts(Translation3::from(target.translation.vector - turn * from.translation.vector), turn)
 }
 
 /// The transform `reference_from_estimate` that brings the estimated positions nearest to the reference ones, in the

@@ -1,6 +1,8 @@
 use nalgebra::Isometry3;
 
-use crate::{Error, Stamp, Trajectory};
+use crate::error::Error;
+use crate::stamp::Stamp;
+use crate::trajectory::Trajectory;
 
 /// Which poses of two trajectories belong together.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,8 +2,9 @@ use nalgebra::{Isometry3, Similarity3};
 
 use super::align::{Alignment, align, apply};
 use super::stats::Stats;
+use crate::error::Error;
+use crate::lie::so3;
 use crate::trajectory::{check_poses, same_length};
-use crate::{Error, so3};
 
 /// Absolute trajectory error: what is left of the difference of poses after alignment.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,7 +23,7 @@ pub struct Ate {
 
 /// Absolute trajectory error of paired poses: `evo_ape`, with [`Alignment::PosYaw`] in addition.
 ///
-/// `reference[i]` and `estimate[i]` belong together; see [`crate::Association::pair_up`].
+/// `reference[i]` and `estimate[i]` belong together; see [`crate::eval::Association::pair_up`].
 pub fn ate(reference: &[Isometry3<f64>], estimate: &[Isometry3<f64>], mode: Alignment) -> Result<Ate, Error> {
     same_length("reference", reference.len(), "estimate", estimate.len())?;
     check_poses("reference pose", reference)?;

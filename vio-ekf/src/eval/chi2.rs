@@ -1,6 +1,6 @@
 //! The chi-square distribution: bounds for consistency tests and gates.
 
-use crate::Error;
+use crate::error::Error;
 
 /// Probability that a chi-square variable of `dof` degrees of freedom is at most `x`; 0 for `x ≤ 0` and for NaN. Without
 /// any degree of freedom the variable is zero.
@@ -21,7 +21,7 @@ pub fn cdf(x: f64, dof: usize) -> f64 {
 ///
 /// ```
 /// // The gate of a two-dimensional residual at 99 %.
-/// assert!((vio_ekf::chi2::quantile(0.99, 2)? - 9.210_340_371_976_18).abs() < 1e-10);
+/// assert!((vio_ekf::eval::chi2::quantile(0.99, 2)? - 9.210_340_371_976_18).abs() < 1e-10);
 /// # Ok::<(), vio_ekf::Error>(())
 /// ```
 pub fn quantile(p: f64, dof: usize) -> Result<f64, Error> {

@@ -1,8 +1,9 @@
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use super::stats::Stats;
+use crate::error::Error;
+use crate::lie::so3;
 use crate::trajectory::{check_poses, same_length};
-use crate::{Error, so3};
 
 /// What an estimator says about the error of one pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,8 +30,8 @@ pub struct Nees {
 
 /// Normalised squared errors of paired poses, both **in the frame of the estimate**.
 ///
-/// Align the reference into the estimate's frame first (`align(estimate, reference, ..)` and [`crate::apply`]): the
-/// covariances then need no rotation. Compare the mean over runs with [`crate::chi2::mean_band`]. An estimate that was
+/// Align the reference into the estimate's frame first (`align(estimate, reference, ..)` and [`crate::eval::apply`]): the
+/// covariances then need no rotation. Compare the mean over runs with [`crate::eval::chi2::mean_band`]. An estimate that was
 /// started at the truth with a nonzero covariance scores below 1 for ever; draw its start from that covariance.
 pub fn nees(
     reference: &[Isometry3<f64>],

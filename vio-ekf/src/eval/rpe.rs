@@ -1,8 +1,9 @@
 use nalgebra::Isometry3;
 
 use super::stats::Stats;
+use crate::error::Error;
+use crate::lie::so3;
 use crate::trajectory::{check_poses, path_lengths, same_length};
-use crate::{Error, so3};
 
 /// How far apart the two poses of a relative error are.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,7 +77,7 @@ pub struct Rpe {
 
 /// Relative errors `E = (G_i⁻¹ G_j)⁻¹ (E_i⁻¹ E_j)` of paired poses: `evo_rpe`.
 ///
-/// A rigid alignment changes nothing; for a scale, pass poses moved by [`crate::apply`].
+/// A rigid alignment changes nothing; for a scale, pass poses moved by [`crate::eval::apply`].
 pub fn rpe(reference: &[Isometry3<f64>], estimate: &[Isometry3<f64>], settings: &RpeSettings) -> Result<Rpe, Error> {
     same_length("reference", reference.len(), "estimate", estimate.len())?;
     check_poses("reference pose", reference)?;

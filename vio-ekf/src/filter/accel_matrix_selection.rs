@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use super::estimator::Estimator;
 use super::innovation_adaptation::Correction;
 use super::state::error_state::{ACCEL_MATRIX, MATRIX_SIZE};
-use crate::core::imu_noise_estimator::ImuSettings;
+use crate::inertial::imu_noise_estimator::ImuSettings;
 use crate::trace::event;
 
 /// The matrix, row by row.

@@ -4,7 +4,7 @@ use super::settings::LandmarkSettings;
 use super::state::error_state;
 use super::state::inverse_distance::InverseDistance;
 use super::state::vio_state::VioState;
-use crate::core::covariance::Covariance;
+use crate::inertial::covariance::Covariance;
 
 /// Lets the prior walk: the camera comes to see another scene.
 pub(crate) fn propagate(state: &VioState, covariance: &mut Covariance, settings: &LandmarkSettings, elapsed: f64) {

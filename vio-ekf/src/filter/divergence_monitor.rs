@@ -1,9 +1,9 @@
 //! Divergence over successive images.
 
 use super::report::FrameReport;
-use crate::Stamp;
-use crate::core::divergence::{DivergenceCause, DivergenceSettings, exceeded_limit};
 use crate::filter::estimator::Estimator;
+use crate::inertial::divergence::{DivergenceCause, DivergenceSettings, exceeded_limit};
+use crate::stamp::Stamp;
 
 /// Outliers in a row that show an initialization in motion to have been wrong.
 const MAX_PROBATION_OUTLIERS: u32 = 3;

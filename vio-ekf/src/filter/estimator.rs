@@ -9,13 +9,15 @@ use super::state::error_state;
 use super::state::inverse_distance::InverseDistance;
 use super::state::landmark::Landmark;
 use super::state::vio_state::VioState;
-use crate::core::core_state::{CoreState, set_core_covariance};
-use crate::core::covariance::{Covariance, LinearizedMeasurement};
-use crate::core::imu_buffer::ImuBuffer;
-use crate::core::initial_state::InitialState;
-use crate::core::odometry::Odometry;
-use crate::core::preintegration::ImuPreintegration;
-use crate::{CameraModel, Imu, ImuNoise, Stamp};
+use crate::camera::model::CameraModel;
+use crate::inertial::core_state::{CoreState, set_core_covariance};
+use crate::inertial::covariance::{Covariance, LinearizedMeasurement};
+use crate::inertial::imu_buffer::ImuBuffer;
+use crate::inertial::initial_state::InitialState;
+use crate::inertial::odometry::Odometry;
+use crate::inertial::preintegration::ImuPreintegration;
+use crate::samples::{Imu, ImuNoise};
+use crate::stamp::Stamp;
 
 /// State and covariance at the time of the last measurement, and the prediction from there until now.
 ///

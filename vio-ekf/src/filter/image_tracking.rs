@@ -14,7 +14,7 @@ use super::state::landmark::unproject;
 use super::state::rolling_shutter::RollingShutter;
 use super::stereo::stereo_camera::StereoCamera;
 use super::tracking_state::{LandmarkTrack, TrackingState};
-use crate::CameraModel;
+use crate::camera::model::CameraModel;
 use crate::trace::span;
 
 /// Inverse distance beyond which a landmark is too near to be tracked, 1/m.

@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::estimator::Estimator;
 use super::state::error_state;
-use crate::core::core_state::CoreState;
-use crate::so3;
+use crate::inertial::core_state::CoreState;
+use crate::lie::so3;
 
 /// Change of the logarithm of a variance per image, per unit of excess.
 const RATE: f64 = 0.1;

@@ -117,7 +117,12 @@ mod tests {
     use nalgebra::{Isometry3, Vector3};
 
     use super::*;
-    use crate::{Camera, Imu, ImuNoise, InitialSigma, InitialState, LandmarkSettings, Settings, Stamp};
+    use crate::camera::Camera;
+    use crate::filter::settings::LandmarkSettings;
+    use crate::filter::settings::Settings;
+    use crate::inertial::initial_state::{InitialSigma, InitialState};
+    use crate::samples::{Imu, ImuNoise};
+    use crate::stamp::Stamp;
 
     #[test]
     fn landmarks_share_the_error_of_the_depth_prior() {

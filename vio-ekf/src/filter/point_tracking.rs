@@ -9,7 +9,7 @@ use super::settings::Settings;
 use super::state::landmark::unproject;
 use super::state::rolling_shutter::RollingShutter;
 use super::tracking_state::{LandmarkTrack, TrackingState};
-use crate::CameraModel;
+use crate::camera::model::CameraModel;
 
 /// Updates with all landmarks that are among the points, unless the body is stationary.
 pub(crate) fn update_with_points(

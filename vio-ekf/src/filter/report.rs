@@ -1,8 +1,10 @@
 //! What the filter reports about itself and about each image.
 
+use std::fmt;
+
 use nalgebra::{Isometry3, Matrix3, SMatrix, Unit, Vector2, Vector3};
 
-use crate::core::divergence::DivergenceCause;
+use crate::inertial::divergence::DivergenceCause;
 
 /// Whether the estimate can be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,7 +46,7 @@ pub struct Calibration {
     /// Of the errors of, in this order: position (m), attitude as a rotation vector in **body** axes (rad), time offset (s).
     pub covariance: SMatrix<f64, 7, 7>,
     /// The matrix `A` of the accelerometer, which reads `A⁻¹` of the specific force; the identity where it is not estimated
-    /// ([`ImuSettings::accel_scale_sigma`](crate::ImuSettings::accel_scale_sigma)).
+    /// ([`ImuSettings::accel_scale_sigma`](crate::inertial::ImuSettings::accel_scale_sigma)).
     pub accel_matrix: Matrix3<f64>,
     /// Standard deviation of each of its entries.
     pub accel_matrix_sigma: Matrix3<f64>,
@@ -87,6 +89,23 @@ pub struct FrameReport {
     /// Images in a row, this one included, in which most landmarks contradicted the prediction. What was estimated since the first
     /// of them is in doubt.
     pub consecutive_outliers: u32,
+}
+
+impl fmt::Display for InitializationStatus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::WaitingForSteadyImu => {
+                "there was no second of rest to start from, and no motion that tells the scale"
+            }
+            Self::WaitingForStationaryImages => {
+                "the images move while the inertial sensor is at rest: check that both are of the same flight and clock"
+            }
+            Self::WaitingForFeatures => "the images show nothing to track: they are dark, blurred or bare",
+            Self::GravityMismatch => {
+                "gravity test: at rest the accelerometer does not read gravity; check its axes, unit and calibration"
+            }
+        })
+    }
 }
 
 impl Status {

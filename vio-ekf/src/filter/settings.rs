@@ -16,10 +16,10 @@ pub use stationary::StationarySettings;
 pub use stereo::StereoSettings;
 pub use update::UpdateSettings;
 
-use crate::Error;
-use crate::core::divergence::DivergenceSettings;
-use crate::core::imu_noise_estimator::ImuSettings;
+use crate::error::Error;
 use crate::error::invalid;
+use crate::inertial::divergence::DivergenceSettings;
+use crate::inertial::imu_noise_estimator::ImuSettings;
 
 /// Settings of the filter. The defaults suit a 752x480 camera at 20 Hz and an inertial sensor at 200 Hz.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,8 +8,10 @@ use super::frontend::patch::Patch;
 use super::innovation_adaptation::{BeforeImage, InnovationAdaptation};
 use super::landmarks;
 use super::settings::PatchSettings;
-use crate::core::imu_noise_estimator::{AccelMatrixEstimation, ImuSettings};
-use crate::{CameraModel, Imu, Stamp};
+use crate::camera::model::CameraModel;
+use crate::inertial::imu_noise_estimator::{AccelMatrixEstimation, ImuSettings};
+use crate::samples::Imu;
+use crate::stamp::Stamp;
 
 /// What is remembered of a landmark besides its state.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -31,13 +31,17 @@ use super::stationary::zero_velocity::{inflate_undetected_motion, zero_velocity_
 use super::stereo::stereo_camera::StereoCamera;
 use super::stereo::stereo_points::{check_pairs, update_with_second_points};
 use super::tracking_state::TrackingState;
+use crate::camera::model::CameraModel;
 use crate::camera::model::check_model;
-use crate::core::initial_state::InitialState;
-use crate::core::odometry::Odometry;
+use crate::error::Error;
 use crate::error::invalid;
 use crate::format::calibration::{CameraCalibration, ImuCalibration};
+use crate::inertial::initial_state::InitialState;
+use crate::inertial::odometry::Odometry;
+use crate::lie::so3;
+use crate::samples::{ImageView, Imu, ImuNoise};
+use crate::stamp::Stamp;
 use crate::trace::{event, span};
-use crate::{CameraModel, Error, ImageView, Imu, ImuNoise, Stamp, so3};
 
 /// A measurement this much ahead of the inertial samples, in seconds, is waiting for data that does not come.
 const MAX_AHEAD: f64 = 0.1;
@@ -49,13 +53,14 @@ const MIN_FEATURES: usize = 5;
 
 /// A camera, maybe a second one beside it, and an inertial sensor.
 ///
-/// Feed samples and images as they come; an image may arrive up to [`ImuSettings::buffer_samples`](crate::ImuSettings::buffer_samples)
+/// Feed samples and images as they come; an image may arrive up to [`ImuSettings::buffer_samples`](crate::inertial::ImuSettings::buffer_samples)
 /// samples late and is used at its own time, with the same result to the last bit. The filter initialises itself, at rest or in
 /// motion, or from a state that is given.
 ///
 /// ```
 /// use vio_ekf::nalgebra::{Isometry3, Vector3};
-/// use vio_ekf::{Camera, ImageView, Imu, ImuNoise, InitialSigma, InitialState, Settings, Stamp, Status, Vio};
+/// use vio_ekf::{Camera, ImageView, Imu, ImuNoise, Settings, Stamp, Status, Vio};
+/// use vio_ekf::inertial::{InitialSigma, InitialState};
 ///
 /// let mut vio = Vio::new(Camera::euroc(), ImuNoise::default(), Settings::default())?;
 /// let at = |millis: i64| Stamp::from_nanos(millis * 1_000_000);
@@ -134,8 +139,8 @@ impl Vio {
 
     /// With a second camera fixed beside the first, whose images measure the distances of landmarks: [`image_pair`](Self::image_pair).
     ///
-    /// The pose of one camera against the other is taken as known; [`StereoSettings::pixel_sigma`](crate::StereoSettings::pixel_sigma)
-    /// covers what is wrong with it. The pose that [`CalibrationSettings`](crate::CalibrationSettings) lets the filter estimate is that
+    /// The pose of one camera against the other is taken as known; [`StereoSettings::pixel_sigma`](crate::filter::StereoSettings::pixel_sigma)
+    /// covers what is wrong with it. The pose that [`CalibrationSettings`](crate::filter::CalibrationSettings) lets the filter estimate is that
     /// of the first camera on the body.
     pub fn stereo(
         first: impl CameraModel + 'static,
@@ -154,8 +159,8 @@ impl Vio {
 
     /// From a calibration as Kalibr and EuRoC folders give it, of one camera or two: the lenses, the noise of the inertial sensor,
     /// and the time offset of the first camera (`timeshift_cam_imu`), which is added to
-    /// [`CalibrationSettings::time_offset_s`](crate::CalibrationSettings::time_offset_s), as the time of a row of its shutter
-    /// (`line_delay`) is to [`row_time_s`](crate::CalibrationSettings::row_time_s). The filter's body is the inertial sensor:
+    /// [`CalibrationSettings::time_offset_s`](crate::filter::CalibrationSettings::time_offset_s), as the time of a row of its shutter
+    /// (`line_delay`) is to [`row_time_s`](crate::filter::CalibrationSettings::row_time_s). The filter's body is the inertial sensor:
     /// where that is not the body of the calibration, the cameras are moved into its axes.
     ///
     /// Both images of a pair carry one stamp, that of the first camera's clock.
@@ -304,7 +309,7 @@ impl Vio {
     /// Takes the points that a tracker of the caller found in an image.
     ///
     /// `stamp` is the middle of the exposure by the camera's clock. Each point carries independent noise of
-    /// [`LandmarkSettings::pixel_sigma`](crate::LandmarkSettings::pixel_sigma). Landmarks that are not among the points are
+    /// [`LandmarkSettings::pixel_sigma`](crate::filter::LandmarkSettings::pixel_sigma). Landmarks that are not among the points are
     /// dropped; points that are new take their place while there is room, in the order given.
     pub fn points(&mut self, stamp: Stamp, points: &[PointObservation]) -> Result<FrameReport, Error> {
         if let Some(index) = points.iter().position(|p| p.pixel.iter().any(|v| !v.is_finite())) {
@@ -362,7 +367,7 @@ impl Vio {
     /// Takes a measurement of any other sensor: a position fix, a barometer, a range, a wheel.
     ///
     /// Its time is by the inertial sensor's clock, not before that of the last image or measurement; a measurement and an image of
-    /// the same time must come in the order image, measurement. [`UnifiedVio`](crate::UnifiedVio) sees to the order of images and
+    /// the same time must come in the order image, measurement. [`UnifiedVio`](crate::fusion::UnifiedVio) sees to the order of images and
     /// poses. Returns whether it was used: it is not before the initialization, nor if its gate refuses it.
     pub fn update<const M: usize, const C: usize>(
         &mut self,
@@ -426,6 +431,12 @@ impl Vio {
                 estimator.covariance.variance(error_state::ACCEL_MATRIX + 3 * r + c).max(0.0).sqrt()
             }),
         })
+    }
+
+    /// Seconds to add to the camera's stamps, as they are known now.
+    pub(crate) fn time_offset_s(&self) -> f64 {
+        let nominal = self.settings.calibration.time_offset_s;
+        self.tracking.as_ref().map_or(nominal, |tracking| tracking.estimator.state.time_offset)
     }
 
     /// The landmarks that are followed, as they are estimated at the last image.

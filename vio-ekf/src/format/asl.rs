@@ -5,13 +5,15 @@ use std::fmt::Write as _;
 use nalgebra::Vector3;
 
 use super::data_lines;
-use crate::{Error, Imu, Stamp};
+use crate::error::Error;
+use crate::samples::Imu;
+use crate::stamp::Stamp;
 
 /// Reads `imu0/data.csv`: nanoseconds, angular rate (rad/s), specific force (m/s²). A line that repeats the stamp before
 /// is dropped; stamps that go back are refused.
 ///
 /// ```
-/// let samples = vio_ekf::asl::read_imu("1403636579758555392,0.1,0,0,0,0,9.81\n")?;
+/// let samples = vio_ekf::format::asl::read_imu("1403636579758555392,0.1,0,0,0,0,9.81\n")?;
 /// assert_eq!((samples[0].gyro.x, samples[0].accel.z), (0.1, 9.81));
 /// # Ok::<(), vio_ekf::Error>(())
 /// ```

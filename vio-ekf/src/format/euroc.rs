@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use nalgebra::Vector3;
 
 use super::data_lines;
-use crate::{Error, Trajectory};
+use crate::error::Error;
+use crate::trajectory::Trajectory;
 
 /// A ground-truth or estimate file with as much as it gives. Vectors that the file lacks are empty.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -23,7 +24,7 @@ pub struct States {
 /// Reads 8 columns (pose), 11 (and velocity) or 17 (and both biases), the same in all lines.
 ///
 /// ```
-/// let states = vio_ekf::euroc::read("1403636580838555648,1,2,3,1,0,0,0,0.5,0,0\n")?;
+/// let states = vio_ekf::format::euroc::read("1403636580838555648,1,2,3,1,0,0,0,0.5,0,0\n")?;
 /// assert_eq!(states.trajectory.stamps()[0].nanos(), 1_403_636_580_838_555_648);
 /// assert_eq!(states.velocities_in_world[0].x, 0.5);
 /// assert!(states.gyro_biases.is_empty());

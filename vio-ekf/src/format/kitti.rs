@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use super::data_lines;
-use crate::Error;
+use crate::error::Error;
 
 /// Entries of `RᵀR` may be this far from the identity; the files print six or seven digits.
 const ORTHOGONALITY_TOLERANCE: f64 = 1e-3;
@@ -13,12 +13,12 @@ const ORTHOGONALITY_TOLERANCE: f64 = 1e-3;
 /// Reads poses. The printed matrices are rotations only to their printed digits; each is replaced by the nearest one.
 ///
 /// Pair the result with stamps by [`crate::Trajectory::new`] where a `times.txt` is at hand, or give it to
-/// [`crate::ate`] and [`crate::rpe`] as it is.
+/// [`crate::eval::ate`] and [`crate::eval::rpe`] as it is.
 ///
 /// ```
-/// let poses = vio_ekf::kitti::read("1 0 0 5 0 1 0 6 0 0 1 7\n")?;
+/// let poses = vio_ekf::format::kitti::read("1 0 0 5 0 1 0 6 0 0 1 7\n")?;
 /// assert_eq!(poses[0].translation.z, 7.0);
-/// assert_eq!(vio_ekf::kitti::write(&poses), "1 0 0 5 0 1 0 6 0 0 1 7\n");
+/// assert_eq!(vio_ekf::format::kitti::write(&poses), "1 0 0 5 0 1 0 6 0 0 1 7\n");
 /// # Ok::<(), vio_ekf::Error>(())
 /// ```
 pub fn read(text: &str) -> Result<Vec<Isometry3<f64>>, Error> {

@@ -3,15 +3,16 @@
 use std::fmt::Write as _;
 
 use super::data_lines;
-use crate::{Error, Trajectory};
+use crate::error::Error;
+use crate::trajectory::Trajectory;
 
 /// Reads a trajectory. Columns may be separated by any run of spaces and tabs; there must be exactly eight.
 ///
 /// ```
 /// let text = "# timestamp tx ty tz qx qy qz qw\n1.5 1 2 3 0 0 0 1\n";
-/// let trajectory = vio_ekf::tum::read(text)?;
+/// let trajectory = vio_ekf::format::tum::read(text)?;
 /// assert_eq!(trajectory.poses()[0].translation.y, 2.0);
-/// assert_eq!(vio_ekf::tum::write(&trajectory), "1.500000000 1 2 3 0 0 0 1\n");
+/// assert_eq!(vio_ekf::format::tum::write(&trajectory), "1.500000000 1 2 3 0 0 0 1\n");
 /// # Ok::<(), vio_ekf::Error>(())
 /// ```
 pub fn read(text: &str) -> Result<Trajectory, Error> {

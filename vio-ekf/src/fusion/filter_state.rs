@@ -6,14 +6,15 @@ use super::pose_model::{
     LOCAL, SOURCE, SourceState, WhitenedPose, first_row, linearize, predict, rows, source_rows, trial,
 };
 use super::settings::{AlignmentSettings, FusionSettings, PoseSource};
-use crate::core::core_state::{CoreState, set_core_covariance};
-use crate::core::covariance::Covariance;
-use crate::core::divergence::{DivergenceCause, DivergenceSettings, exceeded_limit};
-use crate::core::error_state;
-use crate::core::initial_state::InitialState;
-use crate::core::iterated_update::{Iteration, iterate, mahalanobis};
-use crate::core::preintegration::StateTransition;
-use crate::{Imu, Stamp};
+use crate::inertial::core_state::{CoreState, set_core_covariance};
+use crate::inertial::covariance::Covariance;
+use crate::inertial::divergence::{DivergenceCause, DivergenceSettings, exceeded_limit};
+use crate::inertial::error_state;
+use crate::inertial::initial_state::InitialState;
+use crate::inertial::iterated_update::{Iteration, iterate, mahalanobis};
+use crate::inertial::preintegration::StateTransition;
+use crate::samples::Imu;
+use crate::stamp::Stamp;
 
 /// State and covariance at one time.
 #[derive(Debug, Clone, PartialEq)]

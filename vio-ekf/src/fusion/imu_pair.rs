@@ -2,9 +2,10 @@
 
 use nalgebra::{Isometry3, Vector3};
 
+use crate::error::Error;
 use crate::error::{all_not_negative, invalid};
+use crate::samples::{Imu, ImuNoise};
 use crate::trajectory::is_finite;
-use crate::{Error, Imu, ImuNoise};
 
 /// Samples of each sensor that wait for the other at most.
 const MAX_PENDING: usize = 64;

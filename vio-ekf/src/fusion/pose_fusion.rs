@@ -7,13 +7,15 @@ use super::pose_measurement::PoseMeasurement;
 use super::pose_model::{SOURCE, WhitenedPose, first_row};
 use super::settings::{FusionSettings, PoseSource};
 use super::state_buffer::{FilterContext, StateBuffer};
-use crate::core::divergence::DivergenceCause;
-use crate::core::error_state;
-use crate::core::initial_state::InitialState;
-use crate::core::odometry::Odometry;
+use crate::error::Error;
 use crate::error::invalid;
+use crate::inertial::divergence::DivergenceCause;
+use crate::inertial::error_state;
+use crate::inertial::initial_state::InitialState;
+use crate::inertial::odometry::Odometry;
+use crate::samples::{Imu, ImuNoise};
+use crate::stamp::Stamp;
 use crate::trajectory::is_finite;
-use crate::{Error, Imu, ImuNoise, Stamp};
 
 /// Most sources of one filter.
 const MAX_SOURCES: usize = 8;
@@ -37,7 +39,9 @@ const MAX_AHEAD: f64 = 0.1;
 ///
 /// ```
 /// use vio_ekf::nalgebra::{Isometry3, Vector3};
-/// use vio_ekf::{FusionSettings, Imu, ImuNoise, PoseFusion, PoseMeasurement, PoseSource, Stamp, InitialState, InitialSigma};
+/// use vio_ekf::{Imu, ImuNoise, Stamp};
+/// use vio_ekf::fusion::{FusionSettings, PoseFusion, PoseMeasurement, PoseSource};
+/// use vio_ekf::inertial::{InitialSigma, InitialState};
 ///
 /// let mut fusion = PoseFusion::new(ImuNoise::default(), &[PoseSource::default()], FusionSettings::default())?;
 /// let at = |millis: i64| Stamp::from_nanos(millis * 1_000_000);

@@ -2,9 +2,10 @@
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
-use crate::core::information::{stepped, whitener};
+use crate::error::Error;
 use crate::filter::BodyPose;
-use crate::{Error, Stamp};
+use crate::inertial::information::{stepped, whitener};
+use crate::stamp::Stamp;
 
 /// A pose that somebody else has measured, and how well, in the frame of its source. In the world of the odometry it is a
 /// [`BodyPose`].

@@ -3,10 +3,11 @@
 use nalgebra::{Matrix3, Matrix6, SMatrix, SVector, UnitQuaternion, Vector3, Vector6};
 
 use super::pose_measurement::PoseMeasurement;
-use crate::core::core_state::{CoreState, block, rotated};
-use crate::core::error_state::{ACCEL_BIAS, ATTITUDE, CORE, GYRO_BIAS, POSITION, VELOCITY};
-use crate::core::iterated_update::Linearization;
-use crate::{Imu, so3};
+use crate::inertial::core_state::{CoreState, block, rotated};
+use crate::inertial::error_state::{ACCEL_BIAS, ATTITUDE, CORE, GYRO_BIAS, POSITION, VELOCITY};
+use crate::inertial::iterated_update::Linearization;
+use crate::lie::so3;
+use crate::samples::Imu;
 
 /// Rows of a source.
 pub(crate) const SOURCE: usize = 14;

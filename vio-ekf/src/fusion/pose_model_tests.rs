@@ -4,10 +4,12 @@ use nalgebra::{Isometry3, Matrix6, SVector, Vector3, Vector6};
 
 use super::pose_measurement::PoseMeasurement;
 use super::pose_model::{LOCAL, SourceState, linearize, predict, trial};
-use crate::core::core_state::CoreState;
+use crate::inertial::core_state::CoreState;
+use crate::lie::so3;
+use crate::samples::Imu;
 use crate::sim::Rng;
+use crate::stamp::Stamp;
 use crate::test_random::{signed, vector};
-use crate::{Imu, Stamp, so3};
 
 fn state(rng: &mut Rng) -> (CoreState, SourceState, Imu) {
     let core = CoreState {

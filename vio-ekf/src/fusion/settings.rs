@@ -2,10 +2,10 @@
 
 use nalgebra::Isometry3;
 
-use crate::Error;
-use crate::core::divergence::DivergenceSettings;
-use crate::core::imu_noise_estimator::check_buffer;
+use crate::error::Error;
 use crate::error::{all_not_negative, invalid};
+use crate::inertial::divergence::DivergenceSettings;
+use crate::inertial::imu_noise_estimator::check_buffer;
 use crate::trajectory::is_finite;
 
 /// Settings of [`PoseFusion`](super::PoseFusion).

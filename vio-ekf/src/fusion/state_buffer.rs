@@ -3,9 +3,10 @@
 use super::filter_state::{FilterState, Workspace};
 use super::pose_model::WhitenedPose;
 use super::settings::{FusionSettings, PoseSource};
-use crate::core::imu_buffer::ImuBuffer;
-use crate::core::preintegration::ImuPreintegration;
-use crate::{Imu, ImuNoise, Stamp};
+use crate::inertial::imu_buffer::ImuBuffer;
+use crate::inertial::preintegration::ImuPreintegration;
+use crate::samples::{Imu, ImuNoise};
+use crate::stamp::Stamp;
 
 /// States are kept at this many of the buffered samples besides those at poses, so that the buffer can be freed in steps even
 /// while no pose comes.

@@ -4,10 +4,14 @@ use nalgebra::{Isometry3, Vector2};
 
 use super::imu_pair::{ImuPair, ImuPairSettings};
 use super::pose_measurement::PoseMeasurement;
-use crate::core::initial_state::InitialState;
+use crate::camera::model::CameraModel;
+use crate::error::Error;
 use crate::error::invalid;
 use crate::filter::{BodyPose, FrameReport, PointObservation, PointPair, Settings, Status, Vio};
-use crate::{CameraModel, Error, ImageView, Imu, ImuNoise, Odometry, Stamp};
+use crate::inertial::initial_state::InitialState;
+use crate::inertial::odometry::Odometry;
+use crate::samples::{ImageView, Imu, ImuNoise};
+use crate::stamp::Stamp;
 
 /// Measurements in the delay buffer at most.
 const MAX_PENDING: usize = 64;

@@ -4,8 +4,12 @@ use super::photometry::{Photometry, Sensor, tiling};
 use super::render::{TILE, TILE_HEIGHT, TILE_WIDTH, TileRays, View};
 use super::rng::{Rng, derive};
 use super::room::Room;
+use crate::camera::Camera;
+use crate::error::Error;
 use crate::error::{all_not_negative, invalid};
-use crate::{Camera, Error, ImageView, Spline, Stamp};
+use crate::samples::ImageView;
+use crate::stamp::Stamp;
+use crate::trajectory::spline::Spline;
 
 /// A camera, its shutter, and its clock.
 #[derive(Debug, Clone, PartialEq)]

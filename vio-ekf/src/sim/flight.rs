@@ -1,8 +1,12 @@
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use super::rng::{Rng, derive};
+use crate::camera::Camera;
+use crate::error::Error;
 use crate::error::invalid;
-use crate::{Camera, Error, Spline, Stamp, so3};
+use crate::lie::so3;
+use crate::stamp::Stamp;
+use crate::trajectory::spline::Spline;
 
 const KNOT_NS: i64 = 50_000_000;
 /// Half the length of a row, m, and the time of a row, s: 0.8 m/s in its middle.

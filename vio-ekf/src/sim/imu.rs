@@ -1,9 +1,12 @@
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use super::rng::{Rng, derive};
+use crate::error::Error;
 use crate::error::{all_not_negative, invalid};
+use crate::samples::{Imu, ImuNoise};
+use crate::stamp::Stamp;
 use crate::trajectory::is_finite;
-use crate::{Error, Imu, ImuNoise, Motion, Spline, Stamp};
+use crate::trajectory::spline::{Motion, Spline};
 
 /// Samples that one recording may hold: 14 hours at 1 kHz.
 const MAX_SAMPLES: f64 = 5e7;

@@ -2,9 +2,10 @@ use std::sync::OnceLock;
 
 use super::render::{TILE, TILE_HEIGHT, TILE_WIDTH};
 use super::rng::{derive, mix};
+use crate::camera::Camera;
+use crate::error::Error;
 use crate::error::{all_not_negative, invalid};
 use crate::eval::chi2;
-use crate::{Camera, Error};
 
 /// What happens to the light between the lens and the file.
 #[derive(Debug, Clone, PartialEq)]

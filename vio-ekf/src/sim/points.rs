@@ -2,7 +2,13 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
 
-use crate::{Camera, CameraModel, Distortion, Error, PointObservation, Spline, Stamp, so3};
+use crate::camera::model::CameraModel;
+use crate::camera::{Camera, Distortion};
+use crate::error::Error;
+use crate::filter::point_observation::PointObservation;
+use crate::lie::so3;
+use crate::stamp::Stamp;
+use crate::trajectory::spline::Spline;
 
 /// Time between two knots, ns.
 const KNOT_NS: i64 = 100_000_000;

@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Matrix3, Vector2, Vector3};
 
 use super::room::{Cuboid, Room, Surface};
 use super::texture::Texture;
-use crate::Camera;
+use crate::camera::Camera;
 
 pub(super) const TILE_WIDTH: usize = 16;
 pub(super) const TILE_HEIGHT: usize = 8;

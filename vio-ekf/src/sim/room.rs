@@ -2,8 +2,10 @@ use nalgebra::Vector3;
 
 use super::rng::{Rng, derive};
 use super::texture::Texture;
+use crate::error::Error;
 use crate::error::invalid;
-use crate::{Error, Spline, Stamp};
+use crate::stamp::Stamp;
+use crate::trajectory::spline::Spline;
 
 /// Motion is looked at this often when the room is laid out.
 const PATH_STEP_NS: i64 = 100_000_000;

@@ -1,5 +1,5 @@
 use super::rng::Rng;
-use crate::Error;
+use crate::error::Error;
 use crate::error::invalid;
 
 /// A square grey texture that repeats in both directions, with its mip levels.

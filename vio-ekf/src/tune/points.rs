@@ -1,11 +1,20 @@
 use nalgebra::{Isometry3, Point3, Translation3, Vector2, Vector3};
 
 use super::{NoisePoint, Score, with_factors};
+use crate::camera::Camera;
+use crate::error::Error;
+use crate::eval::align::Alignment;
+use crate::eval::ate::ate;
+use crate::filter::point_observation::PointObservation;
+use crate::filter::settings::Settings;
+use crate::filter::vio::Vio;
+use crate::inertial::initial_state::{InitialSigma, InitialState};
+use crate::inertial::odometry::Odometry;
+use crate::lie::so3;
+use crate::samples::{Imu, ImuNoise};
 use crate::sim::{ImuModel, Rng};
-use crate::{
-    Alignment, Camera, Error, Imu, ImuNoise, InitialSigma, InitialState, Motion, Odometry, PointObservation, Settings,
-    Spline, Stamp, Vio, ate, so3,
-};
+use crate::stamp::Stamp;
+use crate::trajectory::spline::{Motion, Spline};
 
 /// Time between two images, ns.
 const IMAGE_STEP: i64 = 50_000_000;

@@ -1,8 +1,9 @@
 //! An accelerometer whose scale and axes are off, on points.
 
 use crate::support::flight::{Flight, nees};
+use vio_ekf::inertial::{AccelMatrixEstimation, ImuSettings, InitialSigma};
 use vio_ekf::nalgebra::Matrix3;
-use vio_ekf::{AccelMatrixEstimation, ImuSettings, InitialSigma, Settings, Vio};
+use vio_ekf::{Settings, Vio};
 
 /// What the accelerometer reads of the specific force: up to 5 % and a degree off.
 const READS: [[f64; 3]; 3] = [[1.05, 0.012, -0.006], [-0.008, 0.96, 0.015], [0.01, -0.004, 1.03]];

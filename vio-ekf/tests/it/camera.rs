@@ -1,8 +1,9 @@
 //! Lenses: published values, closed forms, derivatives against differences, and what must be refused.
 
 use crate::support::rng::Rng;
+use vio_ekf::Camera;
+use vio_ekf::camera::Distortion;
 use vio_ekf::nalgebra::{Matrix2x3, Vector2, Vector3};
-use vio_ekf::{Camera, Distortion};
 
 fn lenses() -> [Camera; 4] {
     let euroc = Camera::euroc();

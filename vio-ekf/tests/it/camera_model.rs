@@ -4,9 +4,11 @@ use crate::support::double_sphere::DoubleSphere;
 use crate::support::flight::Flight;
 use crate::support::rng::Rng;
 use crate::support::sequences::drawn_start;
+use vio_ekf::camera::{CameraModel, Distortion};
+use vio_ekf::inertial::InitialSigma;
 use vio_ekf::nalgebra::{Isometry3, Matrix2x3, Vector2, Vector3};
 use vio_ekf::sim::{RoomSettings, Scenario, SimulatedCamera, Simulation, camera_ahead, painting_flight};
-use vio_ekf::{Camera, CameraModel, Distortion, Error, ImuNoise, InitialSigma, Settings, Status, Vio};
+use vio_ekf::{Camera, Error, ImuNoise, Settings, Status, Vio};
 
 /// The left fisheye of TUM-VI as Basalt calibrated it: half-angles beyond a right one.
 fn tum_vi() -> DoubleSphere {

@@ -4,10 +4,11 @@
 
 use crate::support::recorded;
 use nalgebra::Vector3;
+use vio_ekf::filter::LandmarkSettings;
+use vio_ekf::format::{asl, euroc};
+use vio_ekf::inertial::{InitialSigma, InitialState};
 use vio_ekf::sim::{ImuModel, RoomSettings, Scenario, Simulation, painting_flight};
-use vio_ekf::{
-    Camera, Imu, ImuNoise, InitialSigma, InitialState, LandmarkSettings, Settings, Stamp, Vio, asl, euroc, nalgebra,
-};
+use vio_ekf::{Camera, Imu, ImuNoise, Settings, Stamp, Vio, nalgebra};
 
 /// Stamps of truth and samples agree to this, ns.
 const SAME: i64 = 1_000;

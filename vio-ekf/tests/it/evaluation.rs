@@ -2,10 +2,13 @@
 
 use crate::support::rng::Rng;
 use nalgebra::{Isometry3, Matrix3, Similarity3, Translation3, UnitQuaternion, Vector3};
-use vio_ekf::{
-    Alignment, Association, Error, EvaluationSettings, PoseCovariance, RpeSettings, Span, Stamp, Stats, Tolerance,
-    Trajectory, align, apply, associate, ate, chi2, evaluate, nalgebra, nees, path_lengths, rpe, so3,
+use vio_ekf::eval::{
+    Alignment, Association, EvaluationSettings, PoseCovariance, RpeSettings, Span, Stats, Tolerance, align, apply,
+    associate, ate, chi2, evaluate, nees, rpe,
 };
+use vio_ekf::lie::so3;
+use vio_ekf::trajectory::path_lengths;
+use vio_ekf::{Error, Stamp, Trajectory, nalgebra};
 
 fn stamps(nanos: &[i64]) -> Vec<Stamp> {
     nanos.iter().copied().map(Stamp::from_nanos).collect()
@@ -187,7 +190,7 @@ fn relative_error_of_a_scaled_circle_is_known() {
     assert!((ate.position.min - 0.1).abs() < 1e-12 && (ate.position.max - 0.1).abs() < 1e-12);
     for span in [Span::Frames(0), Span::Metres(0.0), Span::Metres(f64::NAN)] {
         let settings = RpeSettings { span, ..Default::default() };
-        assert!(matches!(vio_ekf::rpe(&circle(1.0), &circle(1.0), &settings), Err(Error::InvalidSetting { .. })));
+        assert!(matches!(vio_ekf::eval::rpe(&circle(1.0), &circle(1.0), &settings), Err(Error::InvalidSetting { .. })));
     }
     let negative = RpeSettings {
         span: Span::Metres(1.0),
@@ -195,7 +198,7 @@ fn relative_error_of_a_scaled_circle_is_known() {
         tolerance: Tolerance::Relative(-0.1),
         ..Default::default()
     };
-    assert!(matches!(vio_ekf::rpe(&circle(1.0), &circle(1.0), &negative), Err(Error::InvalidSetting { .. })));
+    assert!(matches!(vio_ekf::eval::rpe(&circle(1.0), &circle(1.0), &negative), Err(Error::InvalidSetting { .. })));
 }
 
 #[test]

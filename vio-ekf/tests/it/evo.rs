@@ -2,10 +2,11 @@
 
 use crate::support::recorded;
 use nalgebra::Isometry3;
-use vio_ekf::{
-    Alignment, Association, Error, PairsFrom, PosePairs, RpeSettings, Span, Stats, Tolerance, align, apply, ate, kitti,
-    nalgebra, rpe, tum,
+use vio_ekf::eval::{
+    Alignment, Association, PairsFrom, PosePairs, RpeSettings, Span, Stats, Tolerance, align, apply, ate, rpe,
 };
+use vio_ekf::format::{kitti, tum};
+use vio_ekf::{Error, nalgebra};
 
 /// A mean of angles or metres of order one, summed in another order, differs by less.
 const AGREEMENT: f64 = 1e-9;

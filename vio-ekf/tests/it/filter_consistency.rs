@@ -3,7 +3,9 @@
 
 use crate::support::flight::nees;
 use crate::support::sequences::{SEQUENCES, Sequence, drawn_start};
-use vio_ekf::{ImuNoise, LandmarkSettings, Settings, Stamp, Vio, chi2};
+use vio_ekf::eval::chi2;
+use vio_ekf::filter::LandmarkSettings;
+use vio_ekf::{ImuNoise, Settings, Stamp, Vio};
 
 const NAMES: [&str; 5] = ["position", "attitude", "velocity", "gyro bias", "accel bias"];
 

@@ -3,7 +3,9 @@
 use crate::support::flight::{GRAVITY, camera};
 use crate::support::rng::Rng;
 use nalgebra::{UnitQuaternion, Vector3};
-use vio_ekf::{Camera, ImageView, Imu, ImuNoise, InitializationStatus, Settings, Stamp, Status, Vio, nalgebra, so3};
+use vio_ekf::filter::InitializationStatus;
+use vio_ekf::lie::so3;
+use vio_ekf::{Camera, ImageView, Imu, ImuNoise, Settings, Stamp, Status, Vio, nalgebra};
 
 const WIDTH: usize = 320;
 const HEIGHT: usize = 240;
@@ -136,16 +138,16 @@ fn starts_only_from_a_rest_that_it_sees() {
 
 /// A filter that knows its state, and that measures every image because standing still is not recognised.
 fn initialized(still: &mut Still, settings: &Settings) -> Vio {
-    let stationary = vio_ekf::StationarySettings { min_duration_s: f64::INFINITY, ..Default::default() };
+    let stationary = vio_ekf::filter::StationarySettings { min_duration_s: f64::INFINITY, ..Default::default() };
     let mut vio = Vio::new(small_camera(), still.noise, Settings { stationary, ..*settings }).unwrap();
     vio.imu(&still.imu(0)).unwrap();
-    vio.initialize(&vio_ekf::InitialState {
+    vio.initialize(&vio_ekf::inertial::InitialState {
         stamp: Stamp::from_nanos(0),
         world_from_body: nalgebra::Isometry3::from_parts(Vector3::zeros().into(), still.attitude),
         velocity_in_body: Vector3::zeros(),
         gyro_bias: still.biases[0],
         accel_bias: still.biases[1],
-        sigma: vio_ekf::InitialSigma::default(),
+        sigma: vio_ekf::inertial::InitialSigma::default(),
     })
     .unwrap();
     vio
@@ -219,7 +221,7 @@ fn nothing_is_tracked_where_the_image_is_masked() {
 /// The claimed deviation of the position after two seconds at rest, as if it were a hover, by the drift of templates.
 fn deviation_at_rest(drift: f64) -> f64 {
     let mut still = Still::new(11);
-    let patches = vio_ekf::PatchSettings { template_drift: drift, ..Default::default() };
+    let patches = vio_ekf::filter::PatchSettings { template_drift: drift, ..Default::default() };
     let mut vio = initialized(&mut still, &Settings { patches, ..Settings::default() });
     let picture = boxes(3);
     for sample in 1..400 {

@@ -2,10 +2,9 @@
 
 use crate::support::sequences::{SEQUENCES, Sequence};
 use nalgebra::{Isometry3, Vector3};
-use vio_ekf::{
-    Alignment, DynamicInitializationSettings, ImuNoise, LandmarkSettings, Settings, Stamp, Status, Vio, align, ate,
-    nalgebra,
-};
+use vio_ekf::eval::{Alignment, align, ate};
+use vio_ekf::filter::{DynamicInitializationSettings, LandmarkSettings};
+use vio_ekf::{ImuNoise, Settings, Stamp, Status, Vio, nalgebra};
 
 /// Seconds in which a start must come, and after which it is judged.
 const PATIENCE: f64 = 8.0;

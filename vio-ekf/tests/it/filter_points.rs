@@ -2,10 +2,11 @@
 
 use crate::support::flight::{Flight, nees};
 use nalgebra::{Isometry3, SVector};
-use vio_ekf::{
-    CalibrationSettings, DynamicInitializationSettings, Error, ImageView, Imu, ImuSettings, InitialSigma, InitialState,
-    LandmarkSettings, PointObservation, Settings, Stamp, Status, Vio, chi2, nalgebra, so3,
-};
+use vio_ekf::eval::chi2;
+use vio_ekf::filter::{CalibrationSettings, DynamicInitializationSettings, LandmarkSettings, PointObservation};
+use vio_ekf::inertial::{ImuSettings, InitialSigma, InitialState};
+use vio_ekf::lie::so3;
+use vio_ekf::{Error, ImageView, Imu, Settings, Stamp, Status, Vio, nalgebra};
 
 #[test]
 fn follows_a_flight_and_knows_how_well() {

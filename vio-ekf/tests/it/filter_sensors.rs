@@ -1,8 +1,11 @@
 //! Sensors of a caller's own through `Vio::update`: a position fix, a barometer, a range to a beacon.
 
 use crate::support::flight::{Flight, nees};
+use vio_ekf::eval::chi2;
+use vio_ekf::filter::{Measurement, Trial, error_state};
+use vio_ekf::inertial::{InitialSigma, Linearization};
 use vio_ekf::nalgebra::{Matrix1, Matrix1x3, Matrix3, Matrix3x6, Point3, Vector1, Vector3};
-use vio_ekf::{InitialSigma, Linearization, Measurement, Settings, Stamp, Trial, Vio, chi2, error_state};
+use vio_ekf::{Settings, Stamp, Vio};
 
 /// Position of an antenna on the body, as of satellite navigation.
 struct PositionFix {

@@ -2,7 +2,10 @@
 
 use crate::support::flight::{Flight, nees, spline};
 use nalgebra::{Isometry3, Vector3};
-use vio_ekf::{DynamicInitializationSettings, InitialSigma, Settings, Spline, Stamp, Status, Vio, nalgebra};
+use vio_ekf::filter::DynamicInitializationSettings;
+use vio_ekf::inertial::InitialSigma;
+use vio_ekf::trajectory::Spline;
+use vio_ekf::{Settings, Stamp, Status, Vio, nalgebra};
 
 /// Seconds of rest.
 const REST: usize = 15;
@@ -38,7 +41,7 @@ fn a_rest_on_points_and_the_take_off_after_it() {
         let mut flight = standing(seed, seconds);
         let start = flight.drawn_start(InitialSigma::default());
         let first = flight.first();
-        let each = |odometry: &vio_ekf::Odometry, truth: &vio_ekf::Motion, biases: &[Vector3<f64>; 2]| {
+        let each = |odometry: &vio_ekf::Odometry, truth: &vio_ekf::trajectory::Motion, biases: &[Vector3<f64>; 2]| {
             let second = (odometry.stamp.secs_since(first) as usize).min(seconds - 1);
             let squares = nees(odometry, truth, biases);
             (0..5).for_each(|k| sums[second][k] += squares[k] / (20 * runs) as f64);

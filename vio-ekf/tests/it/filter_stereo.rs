@@ -2,11 +2,12 @@
 
 use crate::support::flight::{Flight, nees};
 use nalgebra::{Isometry3, Vector2, Vector3};
+use vio_ekf::filter::{PointObservation, PointPair};
+use vio_ekf::fusion::{UnifiedSettings, UnifiedVio};
+use vio_ekf::inertial::{InitialSigma, InitialState};
 use vio_ekf::sim::{RoomSettings, Scenario, SimulatedCamera, Simulation, camera_ahead, camera_ahead_right};
-use vio_ekf::{
-    Camera, Error, ImageView, ImuNoise, InitialSigma, InitialState, Odometry, PointObservation, PointPair, Settings,
-    Spline, Stamp, Status, UnifiedSettings, UnifiedVio, Vio, nalgebra,
-};
+use vio_ekf::trajectory::Spline;
+use vio_ekf::{Camera, Error, ImageView, ImuNoise, Odometry, Settings, Stamp, Status, Vio, nalgebra};
 
 /// End of the rest, s; a second later the body moves at 1 m/s.
 const TAKE_OFF: f64 = 1.6;

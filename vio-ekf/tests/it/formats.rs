@@ -3,7 +3,9 @@
 use crate::support::recorded;
 use crate::support::rng::Rng;
 use nalgebra::{Isometry3, Vector3};
-use vio_ekf::{Error, InvalidStamp, Stamp, Trajectory, euroc, kitti, nalgebra, so3, tum};
+use vio_ekf::format::{InvalidStamp, euroc, kitti, tum};
+use vio_ekf::lie::so3;
+use vio_ekf::{Error, Stamp, Trajectory, nalgebra};
 
 #[test]
 fn stamps_are_exact_in_every_notation() {

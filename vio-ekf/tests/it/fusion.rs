@@ -4,10 +4,11 @@ use crate::support::flight::{Flight, nees};
 use crate::support::rng::Rng;
 use crate::support::tracker::Tracker;
 use nalgebra::{Isometry3, Translation3, Vector3, Vector6};
-use vio_ekf::{
-    AlignmentSettings, ExtrinsicsSettings, FusionSettings, Imu, ImuNoise, InitialSigma, InitialState, Odometry,
-    PoseFusion, PoseMeasurement, PoseSource, Stamp, chi2, nalgebra, so3,
-};
+use vio_ekf::eval::chi2;
+use vio_ekf::fusion::{AlignmentSettings, ExtrinsicsSettings, FusionSettings, PoseFusion, PoseMeasurement, PoseSource};
+use vio_ekf::inertial::{InitialSigma, InitialState};
+use vio_ekf::lie::so3;
+use vio_ekf::{Imu, ImuNoise, Odometry, Stamp, nalgebra};
 
 /// Runs a filter over a flight with a pose every 50 ms that arrives 40 ms after it was taken.
 fn run(
@@ -15,7 +16,7 @@ fn run(
     source: &Tracker,
     assumed: PoseSource,
     start: &InitialState,
-    mut each: impl FnMut(&Odometry, &vio_ekf::Motion, &[Vector3<f64>; 2]),
+    mut each: impl FnMut(&Odometry, &vio_ekf::trajectory::Motion, &[Vector3<f64>; 2]),
 ) -> PoseFusion {
     let mut fusion = PoseFusion::new(flight.noise, &[assumed], FusionSettings::default()).unwrap();
     let first = flight.first();

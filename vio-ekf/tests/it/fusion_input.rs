@@ -4,10 +4,10 @@ use crate::support::flight::Flight;
 use crate::support::rng::Rng;
 use crate::support::tracker::Tracker;
 use nalgebra::{Isometry3, Matrix6, Translation3, Vector3, Vector6};
-use vio_ekf::{
-    DivergenceCause, Error, FusionSettings, Imu, InitialSigma, InitialState, PoseFusion, PoseMeasurement, PoseSource,
-    Stamp, nalgebra, so3,
-};
+use vio_ekf::fusion::{FusionSettings, PoseFusion, PoseMeasurement, PoseSource};
+use vio_ekf::inertial::{DivergenceCause, InitialSigma, InitialState};
+use vio_ekf::lie::so3;
+use vio_ekf::{Error, Imu, Stamp, nalgebra};
 
 #[test]
 fn outliers_are_refused_and_a_source_that_is_wrong_is_told() {

@@ -3,8 +3,9 @@
 use crate::support::flight::{Flight, GRAVITY};
 use crate::support::imus::{bias, models, settings};
 use nalgebra::Vector3;
+use vio_ekf::fusion::{ImuPair, ImuPairSettings};
 use vio_ekf::sim::ImuModel;
-use vio_ekf::{Imu, ImuNoise, ImuPair, ImuPairSettings, nalgebra};
+use vio_ekf::{Imu, ImuNoise, nalgebra};
 
 /// All samples of a pair, with those of the second sensor until a time.
 fn joined(pair: &mut ImuPair, first: &[Imu], second: &[Imu]) -> Vec<Imu> {

@@ -6,11 +6,12 @@ use crate::support::flight::{Flight, GRAVITY};
 use crate::support::recorded;
 use crate::support::rng::Rng;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Vector2, Vector3};
+use vio_ekf::filter::PointObservation;
+use vio_ekf::format::{asl, euroc, tum};
+use vio_ekf::imu_check::{ImuValidation, ImuWarning, check_imu_axes, validate_samples};
 use vio_ekf::sim::{ImuModel, observe_points};
-use vio_ekf::{
-    Camera, Error, Imu, ImuDoubt, ImuValidation, PointObservation, Spline, Stamp, asl, check_imu_axes, euroc, nalgebra,
-    tum, validate_samples,
-};
+use vio_ekf::trajectory::Spline;
+use vio_ekf::{Camera, Error, Imu, Stamp, nalgebra};
 
 /// A simulated flight that tilts by about 15 degrees, and real ones where they are there.
 fn recordings() -> Vec<(&'static str, Vec<Imu>)> {
@@ -29,10 +30,10 @@ fn with(samples: &[Imu], change: impl Fn(&Imu) -> Imu) -> Vec<Imu> {
     samples.iter().map(change).collect()
 }
 
-/// Whether axes or units are named, as a refusal or as a doubt.
+/// Whether axes or units are named, as a refusal or as a warning.
 fn is_named(result: &Result<ImuValidation, Error>) -> bool {
     match result {
-        Ok(validation) => validation.doubts.iter().any(|doubt| matches!(doubt, ImuDoubt::Axes { .. })),
+        Ok(validation) => validation.warnings.iter().any(|warning| matches!(warning, ImuWarning::Axes { .. })),
         Err(error) => matches!(error, Error::SwappedAxes { .. } | Error::NoGravity { .. }),
     }
 }
@@ -65,8 +66,8 @@ fn sound_samples_pass_and_swapped_axes_are_named() {
         let result = validate_samples(&with(&samples, |s| Imu { accel: cycle * s.accel, ..*s }), 200.0, GRAVITY);
         let hint = match result {
             Err(Error::SwappedAxes { hint }) => hint,
-            Ok(ImuValidation { doubts, .. }) => match &doubts[..] {
-                [ImuDoubt::Axes { hint, .. }] => hint.clone(),
+            Ok(ImuValidation { warnings, .. }) => match &warnings[..] {
+                [ImuWarning::Axes { hint, .. }] => hint.clone(),
                 other => panic!("{other:?}"),
             },
             Err(other) => panic!("{other}"),
@@ -97,7 +98,7 @@ fn rocking(gyro_bias: Vector3<f64>) -> Vec<Imu> {
 fn a_gyroscope_with_a_bias_is_sound_and_its_axes_are_found_all_the_same() {
     let samples = rocking(Vector3::new(0.08, -0.07, 0.1));
     let sound = validate_samples(&samples, 200.0, GRAVITY).unwrap();
-    assert!(sound.doubts.is_empty(), "{sound:?}");
+    assert!(sound.warnings.is_empty(), "{sound:?}");
     let cycle = Matrix3::new(0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0);
     let spoilt = validate_samples(&with(&samples, |s| Imu { accel: cycle * s.accel, ..*s }), 200.0, GRAVITY);
     assert!(is_named(&spoilt), "{spoilt:?}");
@@ -113,7 +114,7 @@ fn a_hard_turn_is_flown_and_not_refused() {
     };
     let samples: Vec<Imu> = (0..12_000).map(sample).collect();
     let found = validate_samples(&samples, 200.0, GRAVITY).unwrap();
-    assert!(matches!(found.doubts[..], [ImuDoubt::Force { .. }]), "{found:?}");
+    assert!(matches!(found.warnings[..], [ImuWarning::Force { .. }]), "{found:?}");
 }
 
 #[test]
@@ -291,7 +292,7 @@ fn no_correct_motion_is_refused() {
                 let spoilt = validate_samples(&with(&samples, change), 200.0, GRAVITY);
                 caught[k][0] += usize::from(spoilt.is_err());
                 caught[k][1] += usize::from(is_named(&spoilt));
-                let text = spoilt.map_or_else(|e| e.to_string(), |v| format!("{:?}", v.doubts));
+                let text = spoilt.map_or_else(|e| e.to_string(), |v| format!("{:?}", v.warnings));
                 writeln!(line, "    {fault}: {text}").unwrap();
             }
             eprintln!("{line}");

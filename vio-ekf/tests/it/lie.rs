@@ -2,7 +2,8 @@
 
 use crate::support::rng::Rng;
 use nalgebra::{Matrix3, Vector3, Vector6};
-use vio_ekf::{nalgebra, se3, so3};
+use vio_ekf::lie::{se3, so3};
+use vio_ekf::nalgebra;
 
 #[test]
 fn rotation_reference_values() {

@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use crate::support::sequences::drawn_start;
+use vio_ekf::filter::LandmarkSettings;
 use vio_ekf::sim::{RoomSettings, Scenario, SimulatedCamera, Simulation, camera_ahead, painting_flight};
-use vio_ekf::{Camera, ImuNoise, LandmarkSettings, Settings, Vio};
+use vio_ekf::{Camera, ImuNoise, Settings, Vio};
 
 #[test]
 fn an_image_measures_no_more_landmarks_than_it_may() {

@@ -7,7 +7,9 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use crate::support::flight::Flight;
-use vio_ekf::{FusionSettings, ImageView, InitialSigma, PoseFusion, PoseMeasurement, PoseSource, Settings, Stamp, Vio};
+use vio_ekf::fusion::{FusionSettings, PoseFusion, PoseMeasurement, PoseSource};
+use vio_ekf::inertial::InitialSigma;
+use vio_ekf::{ImageView, Settings, Stamp, Vio};
 
 struct Counting;
 

@@ -4,14 +4,14 @@
 use crate::support::recorded;
 use crate::support::rng::Rng;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use vio_ekf::calibration::{
+use vio_ekf::camera::Distortion;
+use vio_ekf::format::calibration::{
     CameraCalibration, ImuCalibration, read_asl_camera, read_asl_imu, read_kalibr_cameras, read_kalibr_imu,
     write_asl_camera, write_asl_imu,
 };
-use vio_ekf::{
-    Camera, Distortion, Error, Imu, ImuNoise, InitialSigma, InitialState, Settings, Stamp, Trajectory, Vio, asl, euroc,
-    kitti, tum,
-};
+use vio_ekf::format::{asl, euroc, kitti, tum};
+use vio_ekf::inertial::{InitialSigma, InitialState};
+use vio_ekf::{Camera, Error, Imu, ImuNoise, Settings, Stamp, Trajectory, Vio};
 
 const KALIBR: &str = "%YAML:1.0
 cam0:

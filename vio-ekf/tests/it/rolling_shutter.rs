@@ -1,10 +1,13 @@
 //! A shutter that exposes row after row: the simulator's images, and the filter that knows of it or does not.
 
 use crate::support::sequences::drawn_start;
+use vio_ekf::eval::{Alignment, ate};
+use vio_ekf::filter::CalibrationSettings;
 use vio_ekf::sim::{
     Frame, Photometry, RoomSettings, Scenario, SimulatedCamera, Simulation, camera_ahead, painting_flight,
 };
-use vio_ekf::{Alignment, CalibrationSettings, Camera, Error, ImuNoise, Settings, Spline, Trajectory, Vio, ate};
+use vio_ekf::trajectory::Spline;
+use vio_ekf::{Camera, Error, ImuNoise, Settings, Trajectory, Vio};
 
 const READOUT: f64 = 0.03;
 const HEIGHT: usize = 240;
@@ -107,7 +110,7 @@ fn what_a_shutter_cannot_be_is_refused() {
 #[cfg(feature = "yaml")]
 #[test]
 fn files_say_how_long_a_row_takes() {
-    use vio_ekf::calibration::{CameraCalibration, ImuCalibration, read_asl_camera, write_asl_camera};
+    use vio_ekf::format::calibration::{CameraCalibration, ImuCalibration, read_asl_camera, write_asl_camera};
 
     let global = CameraCalibration { camera: Camera::euroc(), rate_hz: None, time_offset_s: 0.0, row_time_s: 0.0 };
     assert!(!write_asl_camera(&global).contains("line_delay"));

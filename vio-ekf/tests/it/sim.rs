@@ -5,7 +5,8 @@ use vio_ekf::sim::{
     Cuboid, Gain, ImuModel, Occluder, Photometry, Room, RoomSettings, Scenario, SimulatedCamera, Simulation, Surface,
     Texture, Vibration,
 };
-use vio_ekf::{Camera, Error, ImuNoise, Spline, Stamp};
+use vio_ekf::trajectory::Spline;
+use vio_ekf::{Camera, Error, ImuNoise, Stamp};
 
 const KNOT_NS: i64 = 50_000_000;
 

@@ -1,9 +1,10 @@
 //! The wide lenses of Kalibr: against the geometry that they are made of, differences, their inverse, and their files.
 
 use crate::support::rng::Rng;
-use vio_ekf::calibration::{CameraCalibration, read_asl_camera, read_kalibr_cameras, write_asl_camera};
+use vio_ekf::camera::Distortion;
+use vio_ekf::format::calibration::{CameraCalibration, read_asl_camera, read_kalibr_cameras, write_asl_camera};
 use vio_ekf::nalgebra::{Matrix2x3, Vector2, Vector3};
-use vio_ekf::{Camera, Distortion, Error};
+use vio_ekf::{Camera, Error};
 
 /// Calibrations of real lenses: the fisheyes of TUM-VI and others as Usenko et al. 2018 print them in table I, and a mirror.
 fn lenses() -> [Camera; 6] {

@@ -3,7 +3,10 @@
 use crate::support::recorded;
 use crate::support::rng::Rng;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use vio_ekf::{Error, Motion, Spline, Stamp, Trajectory, nalgebra, so3, tum};
+use vio_ekf::format::tum;
+use vio_ekf::lie::so3;
+use vio_ekf::trajectory::{Motion, Spline};
+use vio_ekf::{Error, Stamp, Trajectory, nalgebra};
 
 fn nanos(nanos: i64) -> Stamp {
     Stamp::from_nanos(nanos)

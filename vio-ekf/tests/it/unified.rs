@@ -4,11 +4,13 @@ use crate::support::flight::{Flight, GRAVITY, nees};
 use crate::support::imus::{bias, models, settings};
 use crate::support::rng::Rng;
 use nalgebra::{Isometry3, Matrix6, SMatrix, SVector, Translation3, Vector3, Vector6};
+use vio_ekf::eval::chi2;
+use vio_ekf::filter::{BodyPose, PointObservation};
+use vio_ekf::fusion::{ImuPair, ImuPairSettings, PoseMeasurement, UnifiedSettings, UnifiedVio};
+use vio_ekf::inertial::{CoreCovariance, InitialSigma, InitialState};
+use vio_ekf::lie::so3;
 use vio_ekf::sim::{ImuModel, ImuRecording};
-use vio_ekf::{
-    BodyPose, CoreCovariance, Error, Imu, ImuNoise, ImuPair, ImuPairSettings, InitialSigma, InitialState, Odometry,
-    PointObservation, PoseMeasurement, Settings, Stamp, UnifiedSettings, UnifiedVio, Vio, chi2, nalgebra, so3,
-};
+use vio_ekf::{Error, Imu, ImuNoise, Odometry, Settings, Stamp, Vio, nalgebra};
 
 /// A vector of three normal numbers times a matrix, and back: any symmetric positive definite matrix.
 fn random_information(rng: &mut Rng) -> Matrix6<f64> {

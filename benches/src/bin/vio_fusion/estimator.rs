@@ -3,11 +3,15 @@
 use nalgebra::{Isometry3, Vector3};
 use paintcopter_benches::Rng;
 use paintcopter_benches::flight::{Arrival, Flight, PIXEL_SIGMA, normals};
-use vio_ekf::{
-    AlignmentSettings, Error, ExtrinsicsSettings, FusionSettings, ImuPair, ImuPairSettings, ImuSettings, InitialSigma,
-    InitialState, LandmarkSettings, Motion, Odometry, PoseFusion, PoseMeasurement, PoseSource, Settings,
-    UnifiedSettings, UnifiedVio, Vio, nalgebra, so3,
+use vio_ekf::filter::LandmarkSettings;
+use vio_ekf::fusion::{
+    AlignmentSettings, ExtrinsicsSettings, FusionSettings, ImuPair, ImuPairSettings, PoseFusion, PoseMeasurement,
+    PoseSource, UnifiedSettings, UnifiedVio,
 };
+use vio_ekf::inertial::{ImuSettings, InitialSigma, InitialState};
+use vio_ekf::lie::so3;
+use vio_ekf::trajectory::Motion;
+use vio_ekf::{Error, Odometry, Settings, Vio, nalgebra};
 
 use super::arguments::Arguments;
 

@@ -13,7 +13,8 @@ use estimator::{Estimator, Way};
 use nalgebra::{Isometry3, Matrix3, Vector3};
 use paintcopter::exit::exit_code;
 use paintcopter_benches::flight::{Flight, MapErrors, sway};
-use vio_ekf::{Odometry, nalgebra, so3};
+use vio_ekf::lie::so3;
+use vio_ekf::{Odometry, nalgebra};
 
 type AnyError = Box<dyn Error>;
 

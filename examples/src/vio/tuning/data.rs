@@ -60,12 +60,12 @@ fn score_recording(recording: &Recording, point: &NoisePoint) -> Result<Score, V
     };
     let (noise, filter) = with_factors(&recording.imu.noise, &Settings::default(), point);
     let settings = RunSettings { filter, noise: Some(noise), threads: 1, quiet: true };
-    let run = match run(recording, &settings) {
-        Ok(run) => run,
+    let timed = match run(recording, &settings) {
+        Ok(timed) => timed,
         Err(VioError::Unusable { .. }) => return Ok(lost),
         Err(error) => return Err(error),
     };
-    let Some(evaluation) = evaluate_run(&run, truth)? else { return Ok(lost) };
+    let Some(evaluation) = evaluate_run(&timed.run, truth)? else { return Ok(lost) };
     let nees = [evaluation.nees_position, evaluation.nees_attitude, evaluation.nees_velocity.unwrap_or(3.0)];
     Ok(Score { ate: evaluation.ate_yaw, nees, lost: 1.0 - evaluation.coverage })
 }

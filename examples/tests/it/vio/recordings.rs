@@ -15,14 +15,14 @@ use crate::scratch::Scratch;
 
 fn follow(recording: &Recording, threads: usize) -> String {
     recording.check(9.81).unwrap();
-    let run = run(recording, &RunSettings { threads, ..RunSettings::default() }).unwrap();
+    let run = run(recording, &RunSettings { threads, ..RunSettings::default() }).unwrap().run;
     assert!(run.skipped.len() <= 1 && run.lost.is_empty(), "{:?} {:?}", run.skipped, run.lost);
     let evaluation = evaluate_run(&run, recording.truth.as_ref().unwrap()).unwrap().unwrap();
     // Six seconds in the air, three metres: a hundredth of it is what the filter promises.
     assert!(evaluation.ate_yaw < 0.05 && evaluation.ate_se3 <= evaluation.ate_yaw + 1e-9, "{evaluation:?}");
     assert!(evaluation.coverage > 0.75, "{}", evaluation.coverage);
     assert!(evaluation.nees_position < 20.0 && evaluation.nees_attitude < 20.0);
-    vio_ekf::tum::write(&run.trajectories().unwrap()[0])
+    vio_ekf::format::tum::write(&run.trajectories().unwrap()[0])
 }
 
 /// Numbers of two texts, one by one.
@@ -54,9 +54,9 @@ fn folders_and_mcap_files_give_the_same_trajectory() {
     for (stamp, _) in files.iter_mut() {
         *stamp = Stamp::from_nanos(stamp.nanos() - 30_000_000);
     }
-    let found = run(&late, &RunSettings { threads: 1, quiet: true, ..RunSettings::default() }).unwrap();
+    let found = run(&late, &RunSettings { threads: 1, quiet: true, ..RunSettings::default() }).unwrap().run;
     assert_eq!(found.calibration.time_offset_s, 0.03);
-    close(&vio_ekf::tum::write(&found.trajectories().unwrap()[0]), &reference, 1e-6);
+    close(&vio_ekf::format::tum::write(&found.trajectories().unwrap()[0]), &reference, 1e-6);
 
     let through_mcap = follow(&recorded, 1);
     assert_eq!(through_mcap, reference, "folder and MCAP");
@@ -79,8 +79,8 @@ fn a_second_camera_in_mcap_is_that_of_the_folder() {
     let none = Overrides::default();
     let quiet = RunSettings { threads: 1, quiet: true, ..RunSettings::default() };
     let text = |recording: &Recording| {
-        let found = run(recording, &quiet).unwrap();
-        (found.pairs, vio_ekf::tum::write(&found.trajectories().unwrap()[0]))
+        let found = run(recording, &quiet).unwrap().run;
+        (found.pairs, vio_ekf::format::tum::write(&found.trajectories().unwrap()[0]))
     };
     let folder = text(&open_euroc_stereo(&s.0, &none).unwrap());
     assert_eq!(folder.0, 80);
@@ -169,13 +169,13 @@ fn a_second_camera_is_used_where_it_has_images() {
     let none = Overrides::default();
     let follow = |recording: &Recording, threads: usize| {
         recording.check(9.81).unwrap();
-        run(recording, &RunSettings { threads, quiet: true, ..RunSettings::default() }).unwrap()
+        run(recording, &RunSettings { threads, quiet: true, ..RunSettings::default() }).unwrap().run
     };
     let recording = open_euroc_stereo(&s.0, &none).unwrap();
     let pair = follow(&recording, 1);
     assert_eq!((pair.frames, pair.pairs), (120, 120));
     assert_eq!(follow(&recording, 2).trajectories().unwrap(), pair.trajectories().unwrap(), "threads");
-    let error = |run: &paintcopter::vio::Run| evaluate_run(run, recording.truth.as_ref().unwrap()).unwrap().unwrap();
+    let error = |run: &vio_ekf::run::Run| evaluate_run(run, recording.truth.as_ref().unwrap()).unwrap().unwrap();
     assert!(error(&pair).ate_yaw < 0.03, "{}", error(&pair).ate_yaw);
     // With one camera the trajectory is another one.
     let alone = follow(&open_euroc(&s.0, &none).unwrap(), 1);

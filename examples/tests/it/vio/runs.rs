@@ -222,9 +222,14 @@ fn no_pose_is_left_that_the_images_contradict() {
     for k in 100..180 {
         files[k].1 = sound[200 - k - 20 + 40].1.clone();
     }
-    let found = run(&recording, &RunSettings { threads: 1, quiet: true, ..RunSettings::default() }).unwrap();
-    let last =
-        found.segments.iter().flat_map(|segment| &segment.odometry).map(|odometry| odometry.stamp).max().unwrap();
+    let found = run(&recording, &RunSettings { threads: 1, quiet: true, ..RunSettings::default() }).unwrap().run;
+    let last = found
+        .segments
+        .iter()
+        .flat_map(|segment| &segment.estimates)
+        .map(|estimate| estimate.odometry.stamp)
+        .max()
+        .unwrap();
     eprintln!("{} withdrawn, {:?}", found.withdrawn, found.lost);
     assert!(!found.lost.is_empty() && found.withdrawn > 0, "{:?}", found.lost);
     assert!(last <= sound[101].0, "a pose at {last}, the images are wrong from {} on", sound[100].0);
@@ -307,7 +312,7 @@ fn real_images_at_rest_do_not_drift() {
     unpack("state_groundtruth_estimate0/V1_01_easy.txt.gz", "state_groundtruth_estimate0/data.csv");
     let recording = open_euroc(&s.0, &Overrides::default()).unwrap();
     recording.check(9.81).unwrap();
-    let run = run(&recording, &RunSettings::default()).unwrap();
+    let run = run(&recording, &RunSettings::default()).unwrap().run;
     assert_eq!((run.frames, run.skipped.len(), run.lost.len()), (95, 0, 0), "{:?} {:?}", run.skipped, run.lost);
     let evaluation = evaluate_run(&run, recording.truth.as_ref().unwrap()).unwrap().unwrap();
     let worst = evaluation.errors.iter().map(|e| e.position.norm()).fold(0.0, f64::max);
@@ -341,10 +346,10 @@ fn a_wide_lens_with_a_rolling_shutter_is_rendered_and_followed() {
     let sim = vio(&["sim", "--cameras", &chain, "--readout", "0.02", "--seconds", "8"], Path::new(&out));
     assert!(sim.status.success(), "{}", String::from_utf8_lossy(&sim.stderr));
     let recording = open_euroc(Path::new(&out), &Overrides::default()).unwrap();
-    assert_eq!(recording.camera.camera.distortion, vio_ekf::Distortion::DoubleSphere([-0.172, 0.593]));
+    assert_eq!(recording.camera.camera.distortion, vio_ekf::camera::Distortion::DoubleSphere([-0.172, 0.593]));
     assert!((recording.camera.row_time_s - 0.02 / 240.0).abs() < 1e-12);
     let follow = |recording| {
-        let run = run(recording, &RunSettings { quiet: true, ..RunSettings::default() }).unwrap();
+        let run = run(recording, &RunSettings { quiet: true, ..RunSettings::default() }).unwrap().run;
         evaluate_run(&run, recording.truth.as_ref().unwrap()).unwrap().unwrap().ate_se3
     };
     let known = follow(&recording);
@@ -371,7 +376,7 @@ fn inertial_samples_alone_are_carried_on_and_said_to_be() {
     assert!((figure("duration_s") - 4.0).abs() < 0.02, "{report}");
     // A start that is 5 cm/s and 0.1 m/s² off admits 1.5 m after four seconds; this one is exact.
     assert!(figure("position_error_end_m") < 0.1 && (0.5..2.0).contains(&figure("position_sigma_end_m")), "{report}");
-    let poses = vio_ekf::tum::read(&std::fs::read_to_string(out.join("trajectory.tum")).unwrap()).unwrap();
+    let poses = vio_ekf::format::tum::read(&std::fs::read_to_string(out.join("trajectory.tum")).unwrap()).unwrap();
     let states = std::fs::read_to_string(out.join("states.csv")).unwrap();
     assert_eq!((poses.len(), states.lines().count()), (800, 801));
 

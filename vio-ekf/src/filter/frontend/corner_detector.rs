@@ -4,8 +4,8 @@ use nalgebra::Vector2;
 
 use super::patch::Patch;
 use super::pyramid::{Level, Pyramid};
-use crate::ImageView;
 use crate::filter::settings::PatchSettings;
+use crate::samples::ImageView;
 
 /// Corners are thinned to one per square of this many pixels of the level they are found on.
 const CELL: usize = 6;

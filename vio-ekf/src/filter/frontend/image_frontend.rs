@@ -3,8 +3,9 @@
 use super::corner_detector::CornerDetector;
 use super::patch::LEVELS;
 use super::pyramid::Pyramid;
+use crate::camera::model::CameraModel;
 use crate::filter::settings::PatchSettings;
-use crate::{CameraModel, ImageView};
+use crate::samples::ImageView;
 
 /// The current image and what is needed to detect corners in it.
 #[derive(Debug, Clone)]

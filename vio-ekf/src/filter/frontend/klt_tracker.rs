@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, UnitQuaternion, Vector2, Vector3};
 
-use crate::CameraModel;
+use crate::camera::model::CameraModel;
 use crate::filter::frontend::corner_detector::{CornerDetector, DetectionCriteria};
 use crate::filter::frontend::patch::Patch;
 use crate::filter::frontend::pyramid::Pyramid;

@@ -6,15 +6,15 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::patch::{LEVELS, Patch};
 use super::pyramid::Pyramid;
-use crate::CameraModel;
-use crate::core::covariance::LinearizedMeasurement;
-use crate::core::iterated_update::Iteration;
+use crate::camera::model::CameraModel;
 use crate::filter::estimator::Estimator;
 use crate::filter::measurements::patch::PatchMeasurement;
 use crate::filter::measurements::update::{linearize_iterated, passes_gate};
 use crate::filter::settings::Settings;
 use crate::filter::state::error_state;
 use crate::filter::state::rolling_shutter::RollingShutter;
+use crate::inertial::covariance::LinearizedMeasurement;
+use crate::inertial::iterated_update::Iteration;
 
 /// Spacing of the initial guesses, in pixels of the patch's coarsest level: half of the alignment's region of convergence.
 const GUESS_SPACING: f64 = 1.0;

@@ -7,10 +7,12 @@ use nalgebra::UnitQuaternion;
 use super::corner_detector::DetectionCriteria;
 use super::image_frontend::ImageFrontend;
 use super::klt_tracker::KltTracker;
+use crate::camera::model::CameraModel;
 use crate::camera::model::check_model;
+use crate::error::Error;
 use crate::filter::point_observation::PointObservation;
 use crate::filter::settings::PatchSettings;
-use crate::{CameraModel, Error, ImageView};
+use crate::samples::ImageView;
 
 /// Follows some dozens of corners through the images of a camera (Lucas and Kanade 1981); each keeps its id as long as it is found.
 /// The prediction is the flow so far: motion that changes by more than eight pixels from image to image is lost.

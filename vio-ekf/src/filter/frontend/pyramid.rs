@@ -2,7 +2,7 @@
 
 use nalgebra::Vector2;
 
-use crate::ImageView;
+use crate::samples::ImageView;
 
 /// Corners are detected on this level, unless patches begin above it.
 const CORNER_LEVEL: usize = 2;

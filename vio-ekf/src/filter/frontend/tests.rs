@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use super::corner_detector::{CornerDetector, DetectionCriteria};
 use super::patch::{LEVELS, Patch};
 use super::pyramid::Pyramid;
-use crate::ImageView;
+use crate::samples::ImageView;
 
 const WIDTH: usize = 160;
 const HEIGHT: usize = 120;

@@ -7,11 +7,13 @@ use nalgebra::{UnitQuaternion, Vector3};
 use super::dynamic::result::{DynamicOutcome, InitialMotion};
 use super::dynamic::solver::{MIN_POINTS, solve};
 use super::dynamic::window::{BearingObservation, WindowInput};
-use crate::core::core_state::ImuCorrection;
-use crate::core::imu_buffer::ImuBuffer;
-use crate::core::preintegration::ImuPreintegration;
+use crate::camera::model::CameraModel;
 use crate::filter::settings::DynamicInitializationSettings;
-use crate::{CameraModel, Imu, ImuNoise, Stamp};
+use crate::inertial::core_state::ImuCorrection;
+use crate::inertial::imu_buffer::ImuBuffer;
+use crate::inertial::preintegration::ImuPreintegration;
+use crate::samples::{Imu, ImuNoise};
+use crate::stamp::Stamp;
 
 /// Least number of observations of a point.
 const MIN_OBSERVATIONS: usize = 5;

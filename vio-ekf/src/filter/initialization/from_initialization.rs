@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix2, SVector, Translation3, Vector2};
 
 use super::dynamic::result::InitialMotion;
 use super::dynamic::window::GLOBAL;
-use crate::core::initial_state::{InitialSigma, InitialState};
+use crate::camera::model::CameraModel;
 use crate::filter::depth_prior;
 use crate::filter::estimator::Estimator;
 use crate::filter::frontend::patch::Patch;
@@ -14,7 +14,9 @@ use crate::filter::state::bearing::Bearing;
 use crate::filter::state::error_state;
 use crate::filter::state::landmark::unproject;
 use crate::filter::tracking_state::{LandmarkTrack, TrackingState};
-use crate::{CameraModel, Imu, ImuNoise, Stamp};
+use crate::inertial::initial_state::{InitialSigma, InitialState};
+use crate::samples::{Imu, ImuNoise};
+use crate::stamp::Stamp;
 
 /// A filter from the motion at the time of an image, and the samples until now. `observe` gives the pixel of a point, by its id,
 /// in that image, and its patch.

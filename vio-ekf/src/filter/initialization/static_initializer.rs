@@ -2,12 +2,12 @@
 
 use nalgebra::{Isometry3, Translation3, Unit, Vector3};
 
-use crate::Stamp;
-use crate::core::initial_state::{InitialSigma, InitialState};
 use crate::filter::report::InitializationStatus;
 use crate::filter::settings::Settings;
 use crate::filter::state::bearing::Bearing;
 use crate::filter::stationary::detector::{StationaryDetector, StationaryMean};
+use crate::inertial::initial_state::{InitialSigma, InitialState};
+use crate::stamp::Stamp;
 
 /// Standard deviation of roll and pitch before the mean force is weighed against the accelerometer's bias, rad.
 const TILT_SIGMA: f64 = 0.1;

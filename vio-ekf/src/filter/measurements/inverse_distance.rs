@@ -3,7 +3,7 @@
 use nalgebra::{Matrix1, Vector1};
 
 use super::measurement::{Measurement, Trial};
-use crate::core::iterated_update::Linearization;
+use crate::inertial::iterated_update::Linearization;
 
 /// An inverse distance and its variance.
 #[derive(Debug, Clone, Copy)]

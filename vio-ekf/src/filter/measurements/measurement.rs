@@ -2,24 +2,25 @@
 
 use nalgebra::{SVector, Vector3};
 
-use crate::core::core_state::CoreState;
-use crate::core::error_state::CORE;
-use crate::core::iterated_update::Linearization;
 use crate::eval::chi2;
 use crate::filter::state::vio_state::VioState;
+use crate::inertial::core_state::CoreState;
+use crate::inertial::error_state::CORE;
+use crate::inertial::iterated_update::Linearization;
 
 /// A measurement `z = h(x) + n` of `M` values that depends on `C` rows of the error state: what a sensor must be able to say to
 /// update the filter through [`Vio::update`](crate::Vio::update). Patches, pixels, stereo depths, poses and the stationary body
 /// are implementations.
 ///
-/// Rows are numbered as in [`error_state`](crate::error_state). Angles of the attitude are on the world's side,
+/// Rows are numbered as in [`error_state`](crate::filter::error_state). Angles of the attitude are on the world's side,
 /// `R_true = Exp(δθ) R`, and the velocity is in body axes.
 ///
 /// A barometer that reads the height of the body, with standard deviation `sigma`:
 ///
 /// ```
 /// use vio_ekf::nalgebra::{Matrix1, Vector1};
-/// use vio_ekf::{Linearization, Measurement, Trial, error_state};
+/// use vio_ekf::filter::{error_state, Measurement, Trial};
+/// use vio_ekf::inertial::Linearization;
 ///
 /// struct Height {
 ///     height: f64,

@@ -5,14 +5,14 @@ use std::cell::Cell;
 use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 
 use super::measurement::{Measurement, Trial};
-use crate::CameraModel;
-use crate::core::iterated_update::Linearization;
+use crate::camera::model::CameraModel;
 use crate::filter::frontend::patch::{Comparison, Patch};
 use crate::filter::frontend::pyramid::Pyramid;
 use crate::filter::settings::PatchSettings;
 use crate::filter::state::error_state::bearing_and_time;
 use crate::filter::state::landmark::Landmark;
 use crate::filter::state::rolling_shutter::RollingShutter;
+use crate::inertial::iterated_update::Linearization;
 
 /// A patch in an image. The residual is whitened by the square root of the normal matrix of its alignment, so that the 72 pixels of
 /// both levels become two values, whatever the warp.

@@ -3,11 +3,11 @@
 use nalgebra::{Matrix2, Matrix2x3, Vector2};
 
 use super::measurement::{Measurement, Trial};
-use crate::CameraModel;
-use crate::core::iterated_update::Linearization;
+use crate::camera::model::CameraModel;
 use crate::filter::settings::{LandmarkSettings, UpdateSettings};
 use crate::filter::state::error_state::bearing_and_time;
 use crate::filter::state::landmark::{Landmark, project};
+use crate::inertial::iterated_update::Linearization;
 
 /// A pixel of the first camera.
 #[derive(Debug)]

@@ -3,10 +3,12 @@
 use nalgebra::{Isometry3, Matrix6, SMatrix, Vector6};
 
 use super::measurement::{Measurement, Trial};
-use crate::core::information::{stepped, whitener};
-use crate::core::iterated_update::Linearization;
+use crate::error::Error;
 use crate::filter::state::error_state;
-use crate::{Error, Stamp, so3};
+use crate::inertial::information::{stepped, whitener};
+use crate::inertial::iterated_update::Linearization;
+use crate::lie::so3;
+use crate::stamp::Stamp;
 
 /// 99.9 % of chi-square with 6 degrees of freedom.
 const GATE: f64 = 22.46;

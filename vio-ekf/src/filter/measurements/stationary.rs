@@ -4,11 +4,11 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::measurement::{Measurement, Trial};
 use super::update::ungated_update;
-use crate::core::iterated_update::Linearization;
 use crate::filter::estimator::Estimator;
 use crate::filter::settings::StationarySettings;
 use crate::filter::state::error_state;
 use crate::filter::stationary::detector::StationaryMean;
+use crate::inertial::iterated_update::Linearization;
 
 /// The mean rate, of which all is bias.
 #[derive(Debug, Clone, Copy)]

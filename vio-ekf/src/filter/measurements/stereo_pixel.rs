@@ -3,12 +3,12 @@
 use nalgebra::{Matrix2, Matrix2x4, Vector2};
 
 use super::measurement::{Measurement, Trial};
-use crate::core::iterated_update::Linearization;
 use crate::filter::settings::{LandmarkSettings, UpdateSettings};
 use crate::filter::state::error_state;
 use crate::filter::state::inverse_distance::InverseDistance;
 use crate::filter::state::landmark::Landmark;
 use crate::filter::stereo::rig::StereoRig;
+use crate::inertial::iterated_update::Linearization;
 
 /// A pixel of the second camera.
 #[derive(Debug)]

@@ -3,9 +3,9 @@
 use nalgebra::SVector;
 
 use super::measurement::{Measurement, Trial};
-use crate::core::covariance::LinearizedMeasurement;
-use crate::core::iterated_update::{Iteration, iterate, mahalanobis};
 use crate::filter::estimator::Estimator;
+use crate::inertial::covariance::LinearizedMeasurement;
+use crate::inertial::iterated_update::{Iteration, iterate, mahalanobis};
 
 /// Length of a last step, in units of the prior's deviation.
 const TOLERANCE: f64 = 1e-3;

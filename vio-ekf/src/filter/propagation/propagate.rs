@@ -2,13 +2,13 @@
 
 use nalgebra::{SMatrix, Vector3};
 
-use crate::core::core_state::CoreCovariance;
-use crate::core::covariance::Covariance;
-use crate::core::preintegration::{ImuPreintegration, StateTransition};
 use crate::filter::propagation::camera_motion::{CameraMotion, LandmarkTransition};
 use crate::filter::propagation::second_order_terms::{SecondOrderTerms, correlation_factor};
 use crate::filter::state::error_state;
 use crate::filter::state::vio_state::VioState;
+use crate::inertial::core_state::CoreCovariance;
+use crate::inertial::covariance::Covariance;
+use crate::inertial::preintegration::{ImuPreintegration, StateTransition};
 
 /// Rows of the camera's motion.
 const MOTION: usize = 6;

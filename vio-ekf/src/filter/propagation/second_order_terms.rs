@@ -2,10 +2,10 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use crate::core::covariance::Covariance;
 use crate::filter::propagation::camera_motion::LandmarkTransition;
 use crate::filter::state::error_state;
 use crate::filter::state::vio_state::VioState;
+use crate::inertial::covariance::Covariance;
 
 /// Least correlation time of the velocity's error, s; ours.
 pub(super) const MIN_CORRELATION_S: f64 = 0.1;

@@ -1,6 +1,6 @@
 //! How well the camera's calibration is known.
 
-use crate::Error;
+use crate::error::Error;
 use crate::error::{all_not_negative, invalid};
 
 /// Uncertainty of the calibration. A zero means known exactly: the quantity is then not estimated.

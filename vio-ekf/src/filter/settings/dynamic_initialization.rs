@@ -1,6 +1,6 @@
 //! When an initialization in motion is accepted.
 
-use crate::Error;
+use crate::error::Error;
 use crate::error::{all_not_negative, all_positive};
 
 /// When an initialization in motion is accepted.

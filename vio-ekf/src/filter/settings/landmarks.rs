@@ -1,6 +1,6 @@
 //! Number, priors and process noise of landmarks.
 
-use crate::Error;
+use crate::error::Error;
 use crate::error::{all_not_negative, all_positive, invalid};
 
 /// Number, priors and process noise of landmarks.

@@ -1,6 +1,6 @@
 //! Extraction and photometric alignment of patches.
 
-use crate::Error;
+use crate::error::Error;
 use crate::error::{all_not_negative, all_positive, invalid};
 
 /// Extraction and photometric alignment of patches.

@@ -1,6 +1,6 @@
 //! When the body is taken to be stationary.
 
-use crate::Error;
+use crate::error::Error;
 use crate::error::all_not_negative;
 
 /// When the body is taken to be stationary: for the static initialization, and for zero-velocity propagation afterwards.

@@ -1,6 +1,6 @@
 //! Depth from a second camera.
 
-use crate::Error;
+use crate::error::Error;
 use crate::error::invalid;
 
 /// Depth from a second camera by epipolar search. All ours.

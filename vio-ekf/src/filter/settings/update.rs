@@ -1,6 +1,6 @@
 //! Iteration and gate of an update.
 
-use crate::Error;
+use crate::error::Error;
 use crate::error::{all_positive, invalid};
 
 /// Iteration and gate of an update.

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2x3, Matrix3x2, Unit, UnitQuaternion, Vector2, Vector3};
 
-use crate::so3;
+use crate::lie::so3;
 
 /// A direction with a tangent basis: `μ = Q e_z`, `N` = the first two columns of `Q`.
 ///

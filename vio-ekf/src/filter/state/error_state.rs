@@ -5,7 +5,7 @@
 //!        p  v  R  b_g b_a | camera's pose  offset  depth prior  accel. matrix | landmark k: bearing (2), inverse distance (1)
 //! ```
 
-pub use crate::core::error_state::{ACCEL_BIAS, ATTITUDE, CORE, GYRO_BIAS, POSITION, VELOCITY};
+pub use crate::inertial::error_state::{ACCEL_BIAS, ATTITUDE, CORE, GYRO_BIAS, POSITION, VELOCITY};
 
 /// Position of the camera on the body, m.
 pub const CAMERA_POSITION: usize = 15;

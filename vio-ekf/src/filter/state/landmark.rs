@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::bearing::Bearing;
 use super::inverse_distance::InverseDistance;
-use crate::CameraModel;
+use crate::camera::model::CameraModel;
 
 /// A point of the scene in the axes of the camera that sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,7 +31,7 @@ pub(crate) fn unproject(camera: &dyn CameraModel, pixel: &Vector2<f64>) -> Optio
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Camera;
+    use crate::camera::Camera;
     use crate::sim::Rng;
     use crate::test_random::signed;
 

@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::bearing::Bearing;
 use super::landmark::project;
-use crate::CameraModel;
+use crate::camera::model::CameraModel;
 use crate::filter::settings::Settings;
 
 /// Iterations for the row in which a landmark is seen: each shortens the error by the pixels that it moves per row, some per cent.

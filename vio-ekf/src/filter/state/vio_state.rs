@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use super::error_state;
 use super::inverse_distance::InverseDistance;
 use super::landmark::Landmark;
-use crate::core::core_state::{CoreState, ImuCorrection, block, rotated};
+use crate::inertial::core_state::{CoreState, ImuCorrection, block, rotated};
 
 /// The state of the odometry: core, calibration of the camera, landmarks in the camera's axes (Bloesch et al. 2017).
 #[derive(Debug, Clone, PartialEq)]
@@ -43,7 +43,7 @@ impl VioState {
     }
 
     /// The matrix `A` of the accelerometer: with a reading `f̃` the specific force is `A f̃ − b_a`. The identity where it is not
-    /// estimated ([`ImuSettings::accel_scale_sigma`](crate::ImuSettings::accel_scale_sigma)).
+    /// estimated ([`ImuSettings::accel_scale_sigma`](crate::inertial::ImuSettings::accel_scale_sigma)).
     pub fn accel_matrix(&self) -> Matrix3<f64> {
         self.accel_matrix.unwrap_or_else(Matrix3::identity)
     }

@@ -3,12 +3,14 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::parallax_check::{ParallaxCheck, ParallaxResult};
+use crate::camera::model::CameraModel;
 use crate::filter::frontend::corner_detector::DetectionCriteria;
 use crate::filter::frontend::image_frontend::ImageFrontend;
 use crate::filter::frontend::patch::Patch;
 use crate::filter::point_observation::PointObservation;
 use crate::filter::settings::{PatchSettings, StationarySettings};
-use crate::{CameraModel, Imu, Stamp};
+use crate::samples::Imu;
+use crate::stamp::Stamp;
 
 /// Patches that are compared for parallax.
 const MAX_PATCHES: usize = 8;

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector2;
 
-use crate::Stamp;
 use crate::filter::point_observation::PointObservation;
+use crate::stamp::Stamp;
 
 /// Points that are compared at most.
 const MAX_POINTS: usize = 64;

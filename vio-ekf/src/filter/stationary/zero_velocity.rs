@@ -2,10 +2,10 @@
 
 use nalgebra::Vector3;
 
-use crate::Stamp;
 use crate::filter::estimator::Estimator;
 use crate::filter::settings::StationarySettings;
 use crate::filter::state::error_state;
+use crate::stamp::Stamp;
 
 /// Propagates to a time without any motion: what the samples read is then bias and gravity. The state stays behind by the delay of
 /// the settings: should the body turn out to have set off meanwhile, the buffered samples tell how.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix2, Vector2};
 
-use crate::CameraModel;
+use crate::camera::model::CameraModel;
 use crate::filter::propagation::camera_motion::CameraMotion;
 use crate::filter::state::landmark::{Landmark, project};
 

@@ -6,7 +6,9 @@ use nalgebra::Matrix2;
 
 use super::epipolar_search::{EpipolarSearch, StereoDepth};
 use super::rig::StereoRig;
+use crate::camera::model::CameraModel;
 use crate::camera::model::check_model;
+use crate::error::Error;
 use crate::error::invalid;
 use crate::filter::estimator::Estimator;
 use crate::filter::frontend::patch::{LEVELS, Patch};
@@ -18,7 +20,7 @@ use crate::filter::settings::{PatchSettings, Settings};
 use crate::filter::state::bearing::Bearing;
 use crate::filter::state::error_state;
 use crate::filter::state::landmark::project;
-use crate::{CameraModel, Error, ImageView};
+use crate::samples::ImageView;
 
 /// Two cameras that are nearer to each other, m, are one.
 const MIN_BASELINE: f64 = 1e-3;

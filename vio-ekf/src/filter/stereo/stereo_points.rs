@@ -3,6 +3,7 @@
 use nalgebra::Vector2;
 
 use super::rig::StereoRig;
+use crate::error::Error;
 use crate::filter::estimator::Estimator;
 use crate::filter::measurements::stereo_pixel::StereoPixelMeasurement;
 use crate::filter::measurements::update::gated_update;
@@ -13,7 +14,7 @@ use crate::filter::state::error_state;
 use crate::filter::state::inverse_distance::InverseDistance;
 use crate::filter::state::landmark::Landmark;
 use crate::filter::tracking_state::TrackingState;
-use crate::{Error, Stamp};
+use crate::stamp::Stamp;
 
 /// Length of a last step of the triangulation, pixels.
 const TOLERANCE: f64 = 0.01;

@@ -5,7 +5,9 @@ use nalgebra::Isometry3;
 use super::schema::{CameraChain, CameraSection, ImuChain, ImuSection, parse};
 use super::section::Section;
 use super::types::{CameraCalibration, ImuCalibration};
-use crate::{Camera, Distortion, Error, ImuNoise};
+use crate::camera::{Camera, Distortion};
+use crate::error::Error;
+use crate::samples::ImuNoise;
 
 const WHOLE_FILE: Section = Section { prefix: "", line: 1 };
 /// Kalibr writes two chains, and the one of the cameras alone does not say where the inertial sensor is.

@@ -3,8 +3,8 @@
 use nalgebra::{Isometry3, Matrix3};
 
 use super::schema::{FORMAT, Field, Numbers, OpenCvMatrix};
-use crate::Error;
 use crate::camera::nearest_pose;
+use crate::error::Error;
 
 /// Rotations are printed with few digits in some files; more than this off is not a rotation.
 const ROTATION_TOLERANCE: f64 = 1e-3;

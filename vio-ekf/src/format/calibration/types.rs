@@ -2,7 +2,8 @@
 
 use nalgebra::Isometry3;
 
-use crate::{Camera, ImuNoise};
+use crate::camera::Camera;
+use crate::samples::ImuNoise;
 
 /// A camera with its clock.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 
 use super::types::{CameraCalibration, ImuCalibration};
-use crate::Distortion;
+use crate::camera::Distortion;
 
 /// The `sensor.yaml` of an EuRoC/ASL camera. `Distortion::None` becomes a polynomial of zeros, which it equals.
 pub fn write_asl_camera(calibration: &CameraCalibration) -> String {

@@ -1,8 +1,11 @@
 //! Recordings of a flight that goes wrong for a while, and what the filter makes of them.
 
 use nalgebra::{Isometry3, Vector3};
+use vio_ekf::eval::chi2;
+use vio_ekf::lie::so3;
 use vio_ekf::sim::{Gain, ImuModel, RoomSettings, Scenario, SimulatedCamera, Simulation, Vibration, camera_ahead};
-use vio_ekf::{Camera, Odometry, Settings, Spline, Stamp, Status, Vio, chi2, nalgebra, so3};
+use vio_ekf::trajectory::Spline;
+use vio_ekf::{Camera, Odometry, Settings, Stamp, Status, Vio, nalgebra};
 
 use super::rng::Rng;
 use super::sequences::{SEQUENCES, drawn_start, motion};

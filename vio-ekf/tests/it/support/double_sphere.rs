@@ -1,6 +1,6 @@
 //! A lens of a caller's own: the double-sphere model.
 
-use vio_ekf::CameraModel;
+use vio_ekf::camera::CameraModel;
 use vio_ekf::nalgebra::{Isometry3, Matrix2x3, Unit, Vector2, Vector3};
 
 /// The double-sphere camera (Usenko, Demmel and Cremers 2018, section IV).

@@ -1,11 +1,13 @@
 //! A flight through a room full of points: exact motion, noisy inertial samples, noisy pixels, and filters run on them.
 
 use nalgebra::{Isometry3, Point3, Translation3, Vector2, Vector3};
+use vio_ekf::camera::CameraModel;
+use vio_ekf::filter::PointObservation;
+use vio_ekf::inertial::{InitialSigma, InitialState};
+use vio_ekf::lie::so3;
 use vio_ekf::sim::{forward_pinhole, observe_points, swaying_flight};
-use vio_ekf::{
-    Camera, CameraModel, Error, Imu, ImuNoise, InitialSigma, InitialState, Motion, Odometry, PointObservation,
-    Settings, Spline, Stamp, Vio, nalgebra, so3,
-};
+use vio_ekf::trajectory::{Motion, Spline};
+use vio_ekf::{Camera, Error, Imu, ImuNoise, Odometry, Settings, Stamp, Vio, nalgebra};
 
 use super::rng::Rng;
 

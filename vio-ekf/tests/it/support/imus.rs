@@ -1,8 +1,9 @@
 //! Two inertial sensors on one body.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use vio_ekf::fusion::ImuPairSettings;
 use vio_ekf::sim::{ImuModel, ImuRecording};
-use vio_ekf::{ImuNoise, ImuPairSettings, Stamp, nalgebra};
+use vio_ekf::{ImuNoise, Stamp, nalgebra};
 
 /// Two sensors of different make, not in step, on one body.
 pub(crate) fn models() -> [ImuModel; 2] {

@@ -1,13 +1,16 @@
 //! The motions on which the filter is judged, and what a point tracker or a camera records along them.
 
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
+use vio_ekf::filter::PointObservation;
+use vio_ekf::format::{euroc, tum};
+use vio_ekf::inertial::{InitialSigma, InitialState};
+use vio_ekf::lie::so3;
 use vio_ekf::sim::{
     ImuModel, ImuRecording, RoomSettings, Scenario, SimulatedCamera, Simulation, camera_ahead, observe_points,
     painting_flight,
 };
-use vio_ekf::{
-    Camera, InitialSigma, InitialState, PointObservation, Spline, Stamp, Trajectory, euroc, nalgebra, so3, tum,
-};
+use vio_ekf::trajectory::Spline;
+use vio_ekf::{Camera, Stamp, Trajectory, nalgebra};
 
 use super::recorded;
 use super::rng::Rng;

@@ -1,7 +1,9 @@
 //! A source of poses, such as a motion capture or a camera that is tracked.
 
 use nalgebra::{Isometry3, Translation3, Vector3};
-use vio_ekf::{AlignmentSettings, ExtrinsicsSettings, PoseMeasurement, PoseSource, Stamp, nalgebra, so3};
+use vio_ekf::fusion::{AlignmentSettings, ExtrinsicsSettings, PoseMeasurement, PoseSource};
+use vio_ekf::lie::so3;
+use vio_ekf::{Stamp, nalgebra};
 
 use super::flight::Flight;
 

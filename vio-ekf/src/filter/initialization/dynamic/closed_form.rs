@@ -3,7 +3,7 @@
 use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 
 use super::window::{BIASES, GLOBAL, GRAVITY, InitializationWindow};
-use crate::so3;
+use crate::lie::so3;
 
 /// Prior distance of a point, for one without parallax, and its weight, per m².
 const PRIOR_DISTANCE: (f64, f64) = (4.0, 1e-5);

@@ -80,7 +80,7 @@ fn pairs(window: &InitializationWindow) -> Vec<Pair> {
 impl Pair {
     /// Of half the smallest eigenvalue, by the bias.
     fn gradient(&self, bias: &Vector3<f64>) -> Vector3<f64> {
-        let rotation = crate::so3::exp(&(self.by_bias * (bias - self.linearized_at))) * self.rotation;
+        let rotation = crate::lie::so3::exp(&(self.by_bias * (bias - self.linearized_at))) * self.rotation;
         let mut sum = Matrix3::zeros();
         for (first, second) in &self.seen {
             let normal = first.cross(&(rotation * second));

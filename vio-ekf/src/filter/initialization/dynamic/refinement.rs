@@ -4,9 +4,9 @@ use nalgebra::{Matrix2x3, Matrix3, SMatrix, SVector, Unit, UnitQuaternion, Vecto
 
 use super::result::InitialDistance;
 use super::window::{BIASES, GLOBAL, GRAVITY, InitializationWindow, VELOCITY};
-use crate::core::preintegration::ImuPreintegration;
 use crate::filter::settings::DynamicInitializationSettings;
 use crate::filter::state::bearing::Bearing;
+use crate::inertial::preintegration::ImuPreintegration;
 
 const ITERATIONS: usize = 40;
 /// Residuals beyond this many standard deviations count less (Huber).

@@ -3,7 +3,7 @@
 use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::window::GLOBAL;
-use crate::core::error_state;
+use crate::inertial::error_state;
 
 /// State at the end of the window. Errors of the core and of the distances are those of the window's unknowns, times
 /// their derivatives.

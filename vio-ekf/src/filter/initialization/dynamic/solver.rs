@@ -7,10 +7,10 @@ use super::gyro_bias;
 use super::refinement::{self, Solution};
 use super::result::{DynamicOutcome, InitialDistance, InitialMotion};
 use super::window::{BIASES, GLOBAL, GRAVITY, InitializationWindow, VELOCITY, WindowInput};
-use crate::core::error_state;
-use crate::core::preintegration::ImuPreintegration;
 use crate::filter::settings::DynamicInitializationSettings;
 use crate::filter::state::bearing::Bearing;
+use crate::inertial::error_state;
+use crate::inertial::preintegration::ImuPreintegration;
 
 /// A point whose error is this many times the median is an outlier.
 const OUTLIER_RATIO: f64 = 2.5;

@@ -5,10 +5,13 @@ use nalgebra::{Isometry3, Point3, SVector, UnitQuaternion, Vector3};
 use super::result::{DynamicOutcome, InitialMotion};
 use super::solver::solve;
 use super::window::{BearingObservation, WindowInput};
-use crate::core::error_state;
-use crate::core::preintegration::ImuPreintegration;
 use crate::filter::settings::DynamicInitializationSettings;
-use crate::{ImuNoise, Spline, Stamp, so3};
+use crate::inertial::error_state;
+use crate::inertial::preintegration::ImuPreintegration;
+use crate::lie::so3;
+use crate::samples::ImuNoise;
+use crate::stamp::Stamp;
+use crate::trajectory::spline::Spline;
 
 const FOCAL_LENGTH: f64 = 460.0;
 const GRAVITY: f64 = 9.81;

@@ -2,7 +2,7 @@
 
 use nalgebra::{SVector, UnitQuaternion, Vector3};
 
-use crate::core::preintegration::ImuPreintegration;
+use crate::inertial::preintegration::ImuPreintegration;
 
 /// Unknowns besides the points: velocity and gravity at the first image, biases of gyroscope and accelerometer.
 pub(crate) const GLOBAL: usize = 12;

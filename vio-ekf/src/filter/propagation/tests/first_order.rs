@@ -5,10 +5,10 @@ use nalgebra::{DMatrix, Matrix3};
 use super::support::{
     GRAVITY, dense, difference, filled, integrate, model, random_covariance, readings, state, transition,
 };
-use crate::ImuNoise;
-use crate::core::covariance::Covariance;
 use crate::filter::propagation::propagate::{Workspace, propagate};
 use crate::filter::state::error_state;
+use crate::inertial::covariance::Covariance;
+use crate::samples::ImuNoise;
 use crate::sim::Rng;
 use crate::test_random::signed;
 

@@ -3,11 +3,11 @@
 use nalgebra::{DMatrix, DVector, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::support::{GRAVITY, difference, filled, integrate, model, readings, state, transition};
-use crate::ImuNoise;
 use crate::filter::propagation::propagate::{Workspace, propagate};
 use crate::filter::propagation::second_order_terms::MIN_CORRELATION_S;
 use crate::filter::state::error_state;
 use crate::filter::state::inverse_distance::InverseDistance;
+use crate::samples::ImuNoise;
 use crate::sim::Rng;
 use crate::test_random::signed;
 

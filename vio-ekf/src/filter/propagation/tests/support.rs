@@ -2,18 +2,19 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2, Unit, UnitQuaternion, Vector3};
 
-use crate::core::core_state::CoreState;
-use crate::core::covariance::Covariance;
-use crate::core::preintegration::ImuPreintegration;
 use crate::filter::propagation::propagate::{Workspace, propagate};
 use crate::filter::state::bearing::Bearing;
 use crate::filter::state::error_state;
 use crate::filter::state::inverse_distance::InverseDistance;
 use crate::filter::state::landmark::Landmark;
 use crate::filter::state::vio_state::VioState;
+use crate::inertial::core_state::CoreState;
+use crate::inertial::covariance::Covariance;
+use crate::inertial::preintegration::ImuPreintegration;
+use crate::lie::so3;
+use crate::samples::ImuNoise;
 use crate::sim::Rng;
 use crate::test_random::{signed, vector};
-use crate::{ImuNoise, so3};
 
 pub(super) const GRAVITY: f64 = 9.81;
 

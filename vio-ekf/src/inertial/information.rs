@@ -2,8 +2,9 @@
 
 use nalgebra::{Isometry3, Matrix6, Translation3, Vector3, Vector6};
 
+use crate::error::Error;
+use crate::lie::so3;
 use crate::trajectory::is_finite;
-use crate::{Error, so3};
 
 /// The pose that a registration asks for: the one at which it was linearised, moved by its step `(δp, δθ)`.
 pub(crate) fn stepped(linearized_at: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {

@@ -1,11 +1,11 @@
 //! The output of a filter: the core state now, with its covariance.
 
-use nalgebra::{Isometry3, SMatrix, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
 use super::core_state::{CoreCovariance, CoreState};
 use super::imu_buffer::ImuBuffer;
 use super::preintegration::{ImuPreintegration, StateTransition};
-use crate::Stamp;
+use crate::stamp::Stamp;
 
 /// An estimate of the body's motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,12 +55,5 @@ impl Odometry {
             accel_bias: core.accel_bias,
             covariance: *covariance,
         }
-    }
-
-    /// Covariance of the attitude error as a rotation vector in body axes, rad².
-    pub fn attitude_covariance_in_body(&self) -> nalgebra::Matrix3<f64> {
-        let rotation = self.world_from_body.rotation.to_rotation_matrix().into_inner();
-        let world: SMatrix<f64, 3, 3> = self.covariance.fixed_view::<3, 3>(6, 6).into_owned();
-        rotation.transpose() * world * rotation
     }
 }

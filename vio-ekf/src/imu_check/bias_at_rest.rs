@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::Imu;
+use crate::samples::Imu;
 
 /// A sensor that turns no faster, rad/s, and as steadily, over this time, s, is at rest, and reads its bias: over a window the bias
 /// would turn it by more than a radian.

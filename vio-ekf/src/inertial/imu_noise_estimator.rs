@@ -2,8 +2,9 @@
 
 use nalgebra::Vector3;
 
+use crate::error::Error;
 use crate::error::{all_not_negative, all_positive, invalid};
-use crate::{Error, Imu, ImuNoise};
+use crate::samples::{Imu, ImuNoise};
 
 /// When scale and axes of the accelerometer are estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -206,7 +207,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::Stamp;
+    use crate::stamp::Stamp;
 
     const SHEET: ImuNoise = ImuNoise { gyro_density: 2e-4, accel_density: 2e-3, ..ImuNoise::ZERO };
 

@@ -7,7 +7,8 @@ use nalgebra::Vector3;
 use super::core_state::ImuCorrection;
 use super::imu_noise_estimator::{ImuNoiseEstimator, ImuSettings, SampleNoise};
 use super::preintegration::ImuPreintegration;
-use crate::{Imu, ImuNoise, Stamp};
+use crate::samples::{Imu, ImuNoise};
+use crate::stamp::Stamp;
 
 /// The inertial samples since the time of the state, so that an image that arrives late is used at its own time.
 #[derive(Debug, Clone)]

@@ -1,5 +1,7 @@
 //! The divergence test: limits on the state beyond which an estimate is given up.
 
+use std::fmt;
+
 use super::core_state::CoreState;
 use super::covariance::Covariance;
 use super::error_state;
@@ -44,6 +46,19 @@ pub enum DivergenceCause {
     Uncertainty,
     /// Measurements fail their gate, one after the other.
     ConsecutiveOutliers,
+}
+
+impl fmt::Display for DivergenceCause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Speed => "the speed ran away",
+            Self::Bias => "a bias grew beyond what a sensor has",
+            Self::Uncertainty => "nothing was seen for too long",
+            Self::ConsecutiveOutliers => {
+                "images and inertial samples contradict each other: check axes, calibration and clocks of both"
+            }
+        })
+    }
 }
 
 /// The first of the limits that the core of the state exceeds.

@@ -4,7 +4,8 @@ use nalgebra::{Isometry3, Matrix3, SMatrix, Translation3, UnitQuaternion, Vector
 
 use super::core_state::CoreCovariance;
 use super::error_state;
-use crate::{ImuNoise, so3};
+use crate::lie::so3;
+use crate::samples::ImuNoise;
 
 /// Rows of the relative motion: rotation, velocity, position.
 const MOTION: usize = 9;

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
 use super::covariance::Covariance;
 use super::error_state::{self, CORE};
 use super::initial_state::{InitialSigma, InitialState};
-use crate::so3;
+use crate::lie::so3;
 
 /// Covariance of the core, 15 rows; their order is that of [`Odometry::covariance`](crate::Odometry::covariance).
 pub type CoreCovariance = SMatrix<f64, CORE, CORE>;
@@ -47,7 +47,7 @@ impl From<&InitialState> for CoreState {
 }
 
 impl CoreState {
-    /// `x ⊞ δ`, with the rows of [`error_state`](crate::error_state).
+    /// `x ⊞ δ`, with the rows of [`error_state`](crate::filter::error_state).
     #[must_use]
     pub fn corrected(&self, delta: &[f64]) -> Self {
         Self {

@@ -4,7 +4,7 @@ use std::fmt;
 
 use nalgebra::Matrix3;
 
-use crate::signed_axes::{RADIANS_PER_DEGREE, axis_names};
+use crate::imu_check::signed_axes::{RADIANS_PER_DEGREE, axis_names};
 
 /// A reading is wrong if another one leaves less than this share of what it leaves.
 const CLEARER: f64 = 0.7;

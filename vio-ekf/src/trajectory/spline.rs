@@ -2,9 +2,12 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
+use crate::error::Error;
+use crate::lie::so3;
 use crate::stamp::InvalidStamp;
+use crate::stamp::Stamp;
+use crate::trajectory::Trajectory;
 use crate::trajectory::check_poses;
-use crate::{Error, Stamp, Trajectory, so3};
 
 /// Six days at 50 ms: more is a mistaken unit, and would exhaust the memory.
 const MAX_SAMPLED_KNOTS: f64 = 1e7;

@@ -1,19 +1,18 @@
 //! Which axes, signs and unit inertial samples have, as the images of a camera tell.
 
-mod accelerometer;
-mod gyroscope;
-mod reading;
-mod seen_image;
-
 use nalgebra::Matrix3;
 
-use crate::imu_rest::bias_at_rest;
+use crate::camera::model::CameraModel;
+use crate::error::Error;
+use crate::filter::point_observation::PointObservation;
+use crate::imu_check::accelerometer::check_accelerometer;
+use crate::imu_check::bias_at_rest::bias_at_rest;
+use crate::imu_check::gyroscope::check_gyroscope;
+use crate::imu_check::reading::AxesReading;
+use crate::imu_check::seen_image::SeenImage;
+use crate::samples::Imu;
+use crate::stamp::Stamp;
 use crate::trajectory::same_length;
-use crate::{CameraModel, Error, Imu, PointObservation, Stamp};
-use accelerometer::check_accelerometer;
-use gyroscope::check_gyroscope;
-pub use reading::AxesReading;
-use seen_image::SeenImage;
 
 /// What the images say about the axes of inertial samples. `None` where nothing is wrong, or nothing can be told.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

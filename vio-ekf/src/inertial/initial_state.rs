@@ -2,9 +2,10 @@
 
 use nalgebra::{Isometry3, Vector3};
 
+use crate::error::Error;
 use crate::error::all_not_negative;
+use crate::stamp::Stamp;
 use crate::trajectory::is_finite;
-use crate::{Error, Stamp};
 
 /// A state to start from, and how far it may be off.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,10 +2,11 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::reading::{AxesReading, clearly_better};
-use super::seen_image::{MIN_POINTS, SeenImage, between};
-use crate::signed_axes::signed_permutations;
-use crate::{Imu, so3};
+use crate::imu_check::reading::{AxesReading, clearly_better};
+use crate::imu_check::seen_image::{MIN_POINTS, SeenImage, between};
+use crate::imu_check::signed_axes::signed_permutations;
+use crate::lie::so3;
+use crate::samples::Imu;
 
 /// Time between the two images that tell a rotation, s.
 const PAIR_S: f64 = 0.15;

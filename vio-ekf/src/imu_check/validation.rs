@@ -4,10 +4,13 @@ use std::fmt;
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
+use crate::error::Error;
 use crate::error::invalid;
-use crate::imu_rest::bias_at_rest;
-use crate::signed_axes::{RADIANS_PER_DEGREE, axis_names, signed_permutations};
-use crate::{AxesReading, Error, Imu, so3};
+use crate::imu_check::bias_at_rest::bias_at_rest;
+use crate::imu_check::reading::AxesReading;
+use crate::imu_check::signed_axes::{RADIANS_PER_DEGREE, axis_names, signed_permutations};
+use crate::lie::so3;
+use crate::samples::Imu;
 
 /// Length of the windows over which the gyroscope is integrated, s: short enough for one without calibration.
 const WINDOW_S: f64 = 24.0;
@@ -25,7 +28,7 @@ const GAP: f64 = 5.0;
 const CLEARER: f64 = 0.25;
 /// ... and the one given by more than this, (m/s²)²: changes of speed by 28 m/s from block to block.
 const IMPLAUSIBLE: f64 = 12.0;
-/// From here to there it is only a doubt: 13 m/s.
+/// From here to there it is only a warning: 13 m/s.
 const DOUBTFUL: f64 = 2.5;
 /// Mean rate from which rates may be degrees per second, rad/s. Slower ones would be no rotation at all then, and the force of a
 /// multirotor stays along its own axis: without rotation it would always seem to agree.
@@ -43,12 +46,12 @@ pub struct ImuValidation {
     /// The longest time between two samples, s.
     pub longest_gap_s: f64,
     /// What is unusual, and may be right: people should look at it.
-    pub doubts: Vec<ImuDoubt>,
+    pub warnings: Vec<ImuWarning>,
 }
 
 /// What is unusual about inertial samples, with the evidence.
 #[derive(Debug, Clone, PartialEq)]
-pub enum ImuDoubt {
+pub enum ImuWarning {
     /// The force is far from gravity: an aggressive flight, or a wrong scale.
     Force {
         /// Median over windows of the mean length of the specific force, m/s².
@@ -65,7 +68,7 @@ pub enum ImuDoubt {
         /// The same with those of the hint, m/s².
         departure_of_hint: f64,
     },
-    /// The images agree with another reading ([`check_imu_axes`](crate::check_imu_axes)).
+    /// The images agree with another reading ([`check_imu_axes`](crate::imu_check::check_imu_axes)).
     Images {
         /// `"gyroscope"` or `"accelerometer"`.
         sensor: &'static str,
@@ -74,7 +77,7 @@ pub enum ImuDoubt {
     },
 }
 
-impl fmt::Display for ImuDoubt {
+impl fmt::Display for ImuWarning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Force { force, gravity } => write!(
@@ -106,7 +109,7 @@ impl fmt::Display for ImuDoubt {
 /// `R_k` integrated from the gyroscope, is gravity up to the change of speed. If the axes of one sensor are swapped or
 /// mirrored against those of the other, or rates are in degrees, gravity is smeared instead; the 24 rotations by quarters, each
 /// with both signs and both units of the gyroscope, are tried, and one that does much better is named. Only what no flight can do is
-/// refused: changes of speed by 28 m/s from piece to piece. The rest is a [doubt](ImuDoubt). Motion that
+/// refused: changes of speed by 28 m/s from piece to piece. The rest is a [warning](ImuWarning). Motion that
 /// hardly tilts the sensor tells nothing, nor does the force of a multirotor that leans about one axis only, and a mirror image of
 /// both sensors together shows only in the camera.
 pub fn validate_samples(samples: &[Imu], rate_hz: f64, gravity: f64) -> Result<ImuValidation, Error> {
@@ -132,8 +135,8 @@ pub fn validate_samples(samples: &[Imu], rate_hz: f64, gravity: f64) -> Result<I
     }
     let gaps = steps.len() - steps.partition_point(|&step| step <= GAP * usual);
     let windows = windows(samples, GAP * usual, &bias_at_rest(samples));
-    let doubts = check_gravity(&windows, gravity)?;
-    Ok(ImuValidation { rate_hz: measured, gaps, longest_gap_s: steps[steps.len() - 1], doubts })
+    let warnings = check_gravity(&windows, gravity)?;
+    Ok(ImuValidation { rate_hz: measured, gaps, longest_gap_s: steps[steps.len() - 1], warnings })
 }
 
 /// Forces of one window, turned into the axes of its first sample, for each reading of the gyroscope.
@@ -200,17 +203,17 @@ impl Window {
     }
 }
 
-fn check_gravity(windows: &[Window], gravity: f64) -> Result<Vec<ImuDoubt>, Error> {
+fn check_gravity(windows: &[Window], gravity: f64) -> Result<Vec<ImuWarning>, Error> {
     let mut forces: Vec<f64> = windows.iter().map(|window| window.force).collect();
     forces.sort_unstable_by(f64::total_cmp);
-    let mut doubts = Vec::new();
-    let Some(&force) = forces.get(forces.len() / 2) else { return Ok(doubts) };
+    let mut warnings = Vec::new();
+    let Some(&force) = forces.get(forces.len() / 2) else { return Ok(warnings) };
     let [least, most] = PLAUSIBLE_FORCE.map(|factor| factor * gravity);
     if force < least || force > most {
         return Err(Error::NoGravity { force, gravity });
     }
     if (force - gravity).abs() > CALM {
-        doubts.push(ImuDoubt::Force { force, gravity });
+        warnings.push(ImuWarning::Force { force, gravity });
     }
     let departure = |axes: &Matrix3<f64>, reading: usize| {
         let parts = windows.iter().map(|window| window.departure(axes, reading, gravity));
@@ -224,7 +227,7 @@ fn check_gravity(windows: &[Window], gravity: f64) -> Result<Vec<ImuDoubt>, Erro
     let best =
         readings.map(|(axes, reading)| (departure(&axes, reading), axes, reading)).min_by(|a, b| a.0.total_cmp(&b.0));
     let Some((least, axes, reading)) = best.filter(|(least, ..)| *least < CLEARER * as_given) else {
-        return Ok(doubts);
+        return Ok(warnings);
     };
     let gyroscope = [
         "",
@@ -238,9 +241,9 @@ fn check_gravity(windows: &[Window], gravity: f64) -> Result<Vec<ImuDoubt>, Erro
     }
     if as_given > DOUBTFUL {
         let [departure, departure_of_hint] = [as_given, least].map(f64::sqrt);
-        doubts.push(ImuDoubt::Axes { hint, departure, departure_of_hint });
+        warnings.push(ImuWarning::Axes { hint, departure, departure_of_hint });
     }
-    Ok(doubts)
+    Ok(warnings)
 }
 
 /// The 24 rotations that map axes to axes. Their mirror images scatter gravity alike: they turn the world upside down.

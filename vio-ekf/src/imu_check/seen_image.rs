@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use crate::{Imu, Stamp};
+use crate::samples::Imu;
+use crate::stamp::Stamp;
 
 /// Least points that two images, or a window of them, must share.
 pub(super) const MIN_POINTS: usize = 8;
