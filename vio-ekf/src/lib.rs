@@ -16,50 +16,71 @@
 //! ATE² = mean |g_i − (s R e_i + t)|²          E_ij = (G_i⁻¹ G_j)⁻¹ (E_i⁻¹ E_j)          NEES = eᵀ P⁻¹ e
 //! ```
 //!
+//! A flight, here a simulated one, from samples and images to poses:
+//!
 //! ```
-//! use vio_ekf::{Alignment, EvaluationSettings, evaluate, tum};
+//! use vio_ekf::run::{Event, RunnerSettings};
+//! use vio_ekf::sim::{RoomSettings, Scenario, SimulatedCamera, Simulation, camera_ahead, painting_flight};
+//! use vio_ekf::{ImuNoise, Runner, Settings, Vio};
 //!
-//! let reference = tum::read("0.0 0 0 0 0 0 0 1\n0.1 1 0 0 0 0 0 1\n0.2 1 1 0 0 0 0 1\n0.3 1 1 1 0 0 0 1\n")?;
-//! // The same path seen from a frame that is shifted and turned by a quarter about the vertical.
-//! let estimate = tum::read("0.0 5 0 0 0 0 0.7071 0.7071\n0.1 5 1 0 0 0 0.7071 0.7071\n\
-//!                           0.2 4 1 0 0 0 0.7071 0.7071\n0.3 4 1 1 0 0 0.7071 0.7071\n")?;
-//! let report = evaluate(&reference, &estimate, &EvaluationSettings::default())?;
-//! assert!(report.ate.position.rmse < 1e-12 && report.ate.orientation.max < 1e-7);
+//! let cameras = vec![SimulatedCamera { camera: camera_ahead(), ..SimulatedCamera::default() }];
+//! let room = RoomSettings { texture_size: 512, ..RoomSettings::default() };
+//! let driver = Simulation::new(painting_flight(1, 3.0)?, Scenario { cameras, room, ..Scenario::default() })?;
 //!
-//! let raw = EvaluationSettings { alignment: Alignment::None, ..Default::default() };
-//! assert!(evaluate(&reference, &estimate, &raw)?.ate.position.rmse > 3.0);
+//! let vio = Vio::new(camera_ahead(), ImuNoise::default(), Settings::default())?;
+//! let mut runner = Runner::new(vio, RunnerSettings::default());
+//! let mut samples = driver.imu(0)?.samples.into_iter();
+//! for frame in driver.frames(0) {
+//!     let frame = frame?;
+//!     runner.imu_until(frame.stamp, &mut samples)?; // or `runner.imu(&sample)` for each as it comes
+//!     let outcome = runner.image(frame.stamp, &frame.view())?;
+//!     for event in outcome.events {
+//!         assert_eq!(event, Event::Started); // or lost, poses withdrawn, image skipped: each with its reason
+//!     }
+//!     if let Some(now) = outcome.odometry {
+//!         println!("{} m, {} m/s", now.world_from_body.translation, now.velocity_in_body);
+//!     }
+//! }
+//! let run = runner.finish()?;
+//! assert!(run.poses() > 20 && run.tracking_at_end);
 //! # Ok::<(), vio_ekf::Error>(())
 //! ```
 //!
+//! Where to look: [`run`] holds the odometry's whole protocol, [`Vio`] the filter alone and [`filter`] what it is set and answers with;
+//! [`camera`] lenses, [`format`](mod@format) files, [`fusion`] poses of others and second inertial sensors, [`imu_check`] tests of
+//! inertial samples, [`inertial`] dead reckoning, [`eval`] trajectory errors, [`sim`] a test bed, `tune` (a feature) the search
+//! for noise settings.
+//!
 //! | what | source | item |
 //! |---|---|---|
+//! | start, withdrawal of poses, segments, losses | ours | [`Runner`], [`run_recording`](run::run_recording) |
 //! | robocentric filter on images | after ROVIO, Bloesch et al. 2017 (thesis, Paper I, section 4.1) | [`Vio`], [`Vio::image`] |
 //! | distances by a second camera | ours | [`Vio::stereo`], [`Vio::image_pair`], [`Vio::point_pairs`] |
 //! | the same on a caller's points | ours | [`Vio::points`] |
 //! | motion between images, its noise | Forster et al. 2017 | [`Vio::imu`], [`ImuNoise`] |
-//! | bearing with a tangent basis | Hertzberg et al. 2013; Bloesch et al. 2017 | [`Bearing`] |
-//! | iterated update | Bell and Cathey 1993 | [`UpdateSettings`] |
-//! | start in motion | gyroscope: Kneip and Lynen 2013; closed form: Martinelli 2014; refined: ours | [`DynamicInitializationSettings`] |
-//! | any other sensor: position, height, range, wheel | the update of the literature; the trait: ours | [`Measurement`], [`Vio::update`] |
-//! | a lens of the caller's own | ours | [`CameraModel`] |
-//! | noise that samples show | ours | [`ImuSettings`] |
-//! | inertial sensor and foreign poses | Weiss and Siegwart 2011; Lynen et al. 2013 (thesis, Paper II, section 4) | [`PoseFusion`] |
-//! | poses as measurements of the odometry | thesis, outlook: one estimator instead of two; ours | [`Vio::pose`], [`UnifiedVio`] |
-//! | two inertial sensors as one | ours | [`ImuPair`] |
-//! | axes and units of inertial samples | ours | [`validate_samples`] |
-//! | the same beside images | gyroscope: Kneip and Lynen 2013; accelerometer: after Martinelli 2014 | [`check_imu_axes`] |
-//! | one-call evaluation | ours | [`evaluate`] |
-//! | least-squares alignment | Umeyama 1991, Eqs. (40)-(42); Horn 1987 | [`align`] |
-//! | alignment of position and yaw | closed form, ours; Zhang and Scaramuzza 2018 for the choice of mode | [`Alignment::PosYaw`] |
-//! | absolute trajectory error | Sturm et al. 2012, section VI | [`ate`] |
-//! | relative pose error | Sturm et al. 2012, section VI; Geiger et al. 2012 for path lengths | [`rpe`] |
-//! | normalised estimation error squared | Bar-Shalom, Li, Kirubarajan 2001, section 5.4 | [`nees`], [`chi2`] |
-//! | cumulative B-spline and its derivatives | Sommer et al. 2020 | [`Spline`] |
-//! | exponentials and Jacobians | Barfoot 2017, chapter 7 | [`so3`], [`se3`] |
+//! | bearing with a tangent basis | Hertzberg et al. 2013; Bloesch et al. 2017 | [`Bearing`](filter::Bearing) |
+//! | iterated update | Bell and Cathey 1993 | [`UpdateSettings`](filter::UpdateSettings) |
+//! | start in motion | gyroscope: Kneip and Lynen 2013; closed form: Martinelli 2014; refined: ours | [`DynamicInitializationSettings`](filter::DynamicInitializationSettings) |
+//! | any other sensor: position, height, range, wheel | the update of the literature; the trait: ours | [`Measurement`](filter::Measurement), [`Vio::update`] |
+//! | a lens of the caller's own | ours | [`CameraModel`](camera::CameraModel) |
+//! | noise that samples show | ours | [`ImuSettings`](inertial::ImuSettings) |
+//! | inertial sensor and foreign poses | Weiss and Siegwart 2011; Lynen et al. 2013 (thesis, Paper II, section 4) | [`PoseFusion`](fusion::PoseFusion) |
+//! | poses as measurements of the odometry | thesis, outlook: one estimator instead of two; ours | [`Vio::pose`], [`UnifiedVio`](fusion::UnifiedVio) |
+//! | two inertial sensors as one | ours | [`ImuPair`](fusion::ImuPair) |
+//! | axes and units of inertial samples | ours | [`validate_samples`](imu_check::validate_samples) |
+//! | the same beside images | gyroscope: Kneip and Lynen 2013; accelerometer: after Martinelli 2014 | [`check_imu_axes`](imu_check::check_imu_axes) |
+//! | one-call evaluation | ours | [`evaluate`](eval::evaluate) |
+//! | least-squares alignment | Umeyama 1991, Eqs. (40)-(42); Horn 1987 | [`align`](eval::align) |
+//! | alignment of position and yaw | closed form, ours; Zhang and Scaramuzza 2018 for the choice of mode | [`Alignment::PosYaw`](eval::Alignment::PosYaw) |
+//! | absolute trajectory error | Sturm et al. 2012, section VI | [`ate`](eval::ate) |
+//! | relative pose error | Sturm et al. 2012, section VI; Geiger et al. 2012 for path lengths | [`rpe`](eval::rpe) |
+//! | normalised estimation error squared | Bar-Shalom, Li, Kirubarajan 2001, section 5.4 | [`nees`](eval::nees), [`chi2`](eval::chi2) |
+//! | cumulative B-spline and its derivatives | Sommer et al. 2020 | [`Spline`](trajectory::Spline) |
+//! | exponentials and Jacobians | Barfoot 2017, chapter 7 | [`so3`](lie::so3), [`se3`](lie::se3) |
 //!
 //! The thesis prints no equations for these; its odometry is judged by trajectory error (Paper I, section 4.2).
 //!
-//! Frames: poses are `world_from_body`, world `z` up where [`Alignment::PosYaw`] or gravity is meant. Metres, radians,
+//! Frames: poses are `world_from_body`, world `z` up where [`Alignment::PosYaw`](eval::Alignment::PosYaw) or gravity is meant. Metres, radians,
 //! nanoseconds. Quaternions are Hamilton's; TUM files put the scalar last, EuRoC files first.
 
 pub mod camera;
