@@ -114,6 +114,6 @@ pub use stamp::Stamp;
 pub use trajectory::Trajectory;
 
 /// The recipe of the README, as a test.
-#[cfg(all(doctest, feature = "yaml"))]
+#[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

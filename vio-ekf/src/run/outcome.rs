@@ -36,6 +36,17 @@ pub enum Event {
     Skipped(SkippedImage),
 }
 
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Started => f.write_str("a segment begins"),
+            Self::Withdrawn { poses } => write!(f, "{poses} poses are taken back"),
+            Self::Lost(loss) => write!(f, "lost: {}", loss.reason),
+            Self::Skipped(image) => image.fmt(f),
+        }
+    }
+}
+
 /// When and why the filter gave up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Loss {

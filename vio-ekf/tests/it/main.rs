@@ -4,7 +4,6 @@
 
 mod accel_matrix;
 mod camera;
-mod camera_model;
 mod dead_reckoning;
 mod evaluation;
 mod evo;
@@ -13,7 +12,6 @@ mod filter_consistency;
 mod filter_images;
 mod filter_initialization;
 mod filter_points;
-mod filter_sensors;
 mod filter_stationary;
 mod filter_stereo;
 mod formats;
@@ -24,9 +22,14 @@ mod imu_validation;
 mod lie;
 mod max_measured;
 mod memory;
+mod own_camera_model;
+mod own_measurement;
+mod own_picture;
+mod programs;
 #[cfg(feature = "yaml")]
 mod recordings;
 mod rolling_shutter;
+mod run;
 mod sim;
 #[cfg(feature = "yaml")]
 mod sphere_models;
