@@ -1,7 +1,7 @@
 //! What a subscriber hears: the steps of an image, and what is refused. A program of its own: tests beside it that have no subscriber
 //! would take part in what `tracing` remembers about who listens.
 #![cfg(feature = "tracing")]
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
 
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -1,3 +1,5 @@
+//! The frame of an estimate moved onto that of the reference.
+
 use nalgebra::{
     Isometry3, Matrix3, Matrix4, Quaternion, Similarity3, SymmetricEigen, Translation3, UnitQuaternion, Vector3,
 };

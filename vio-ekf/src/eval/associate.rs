@@ -1,3 +1,5 @@
+//! Poses of two trajectories paired by their stamps.
+
 use nalgebra::Isometry3;
 
 use crate::error::Error;

@@ -1,3 +1,5 @@
+//! Absolute trajectory error.
+
 use nalgebra::{Isometry3, Similarity3};
 
 use super::align::{Alignment, align, apply};

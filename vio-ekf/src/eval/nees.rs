@@ -1,3 +1,5 @@
+//! Whether covariances are as large as the errors.
+
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use super::stats::Stats;

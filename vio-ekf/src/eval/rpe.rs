@@ -1,3 +1,5 @@
+//! Relative pose error: drift over frames or path lengths.
+
 use nalgebra::Isometry3;
 
 use super::stats::Stats;

@@ -1,3 +1,5 @@
+//! Figures of a list of errors.
+
 /// Summary of a list of errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]

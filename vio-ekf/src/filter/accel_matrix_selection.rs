@@ -31,8 +31,7 @@ const CONTRADICTION: f64 = 30.0;
 /// Dickey 1971) it is chosen: the estimate is conditioned on `A = I`, which leaves what a filter would have found that had known it
 /// from the start. After the choice of the identity a score test (Rao 1948) watches the corrections, and a contradiction reopens the
 /// case.
-// No allocation while the filter runs, so no box.
-#[allow(clippy::large_enum_variant)]
+#[allow(clippy::large_enum_variant, reason = "no allocation while the filter runs, so no box")]
 #[derive(Debug, Clone)]
 pub(crate) enum AccelMatrixSelection {
     /// Nothing has moved yet.

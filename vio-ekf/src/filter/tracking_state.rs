@@ -28,8 +28,7 @@ pub(crate) struct LandmarkTrack {
 }
 
 impl LandmarkTrack {
-    // The track keeps the patch: a reference would be copied.
-    #[allow(clippy::large_types_passed_by_value)]
+    #[allow(clippy::large_types_passed_by_value, reason = "the track keeps the patch: a reference would be copied")]
     pub(crate) fn new(id: u64, patch: Option<Patch>) -> Self {
         Self { id, failures: 0, chosen: true, in_view: true, patch }
     }

@@ -1,3 +1,5 @@
+//! A camera on a motion: its shutter, its clock, the frames it loses.
+
 use nalgebra::Isometry3;
 
 use super::photometry::{Photometry, Sensor, tiling};

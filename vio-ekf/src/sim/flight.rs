@@ -1,3 +1,5 @@
+//! The flight and the cameras of a robot that paints a wall.
+
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use super::rng::{Rng, derive};

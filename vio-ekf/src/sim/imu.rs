@@ -1,3 +1,5 @@
+//! What an inertial sensor with its faults reads along a motion.
+
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use super::rng::{Rng, derive};

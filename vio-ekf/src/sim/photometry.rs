@@ -1,3 +1,5 @@
+//! From light to grey levels: exposure, gain, vignetting and noise.
+
 use std::sync::OnceLock;
 
 use super::render::{TILE, TILE_HEIGHT, TILE_WIDTH};

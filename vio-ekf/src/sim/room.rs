@@ -1,3 +1,5 @@
+//! A textured room around a path, with boxes that stand and swing.
+
 use nalgebra::Vector3;
 
 use super::rng::{Rng, derive};

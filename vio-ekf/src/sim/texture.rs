@@ -1,3 +1,5 @@
+//! Grey textures without an end, filtered for the distance at which they are seen.
+
 use super::rng::Rng;
 use crate::error::Error;
 use crate::error::invalid;

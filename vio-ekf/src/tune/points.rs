@@ -1,3 +1,5 @@
+//! A recording of points instead of images, on which noise settings are tried thousands of times.
+
 use nalgebra::{Isometry3, Point3, Translation3, Vector2, Vector3};
 
 use super::{NoisePoint, Score, with_factors};

@@ -17,8 +17,7 @@ pub(super) struct Section<'a> {
     pub(super) line: u64,
 }
 
-// A field is what the schema gives: a key that may be missing.
-#[allow(clippy::ref_option)]
+#[allow(clippy::ref_option, reason = "a field is what the schema gives: a key that may be missing")]
 impl Section<'_> {
     pub(super) fn refuse(&self, line: u64, key: &str, what: &str) -> Error {
         let what = format!("`{}{key}`: {what}", self.prefix);
