@@ -110,6 +110,10 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         findings.warnings.extend(check_axes_with_images(&recording.samples, frames, &camera.camera, known)?);
         eprintln!("inertial sensor: {:.0} Hz, {} gaps", findings.rate_hz, findings.gaps);
         findings.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+        match findings.refuse_contradicted() {
+            Err(error) if arguments.accept_imu => eprintln!("warning: {error}; taken as they are (--accept-imu)"),
+            other => other.map_err(|error| format!("{}: {error}", recording.name))?,
+        }
     }
     let threads = threads(arguments.threads);
     let settings = RunSettings { filter, threads, ..RunSettings::default() };
@@ -259,9 +263,11 @@ fn search(arguments: &Tune) -> Result<(), AnyError> {
     let data = if arguments.euroc.is_empty() {
         TuningData::simulated(arguments.flights, arguments.seconds, arguments.seed)?
     } else {
-        let open = |folder: &PathBuf| {
+        let open = |folder: &PathBuf| -> Result<Recording, VioError> {
             let recording = open_euroc(folder, &Overrides::default())?;
-            recording.check(Settings::default().gravity).map(|_| recording)
+            let findings = recording.check(Settings::default().gravity)?;
+            findings.warnings.iter().for_each(|warning| eprintln!("warning: {}: {warning}", recording.name));
+            Ok(recording)
         };
         TuningData::Recordings(arguments.euroc.iter().map(open).collect::<Result<_, _>>()?)
     };

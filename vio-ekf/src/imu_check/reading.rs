@@ -57,7 +57,8 @@ pub(super) fn clearly_better(readings: &[AxesReading], left: &[Vec<f64>]) -> Opt
     let given = *left.first()?;
     let least = left.iter().copied().fold(f64::INFINITY, f64::min);
     let clearer = if evidence < FEW.0 { FEW.1 } else { CLEARER };
-    if least > clearer * given {
+    // Nothing left by any reading, or by none a number: no evidence.
+    if !(given > 0.0 && least.is_finite() && least <= clearer * given) {
         return None;
     }
     let equal = readings.iter().zip(&left).filter(|(_, left)| **left <= EQUAL * least);
@@ -71,4 +72,26 @@ fn trimmed_mean(values: &[f64]) -> f64 {
     sorted.sort_unstable_by(f64::total_cmp);
     let kept = &sorted[..sorted.len() - sorted.len() / 10];
     kept.iter().sum::<f64>() / kept.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imu_check::signed_axes::signed_permutations;
+
+    #[test]
+    fn without_evidence_nothing_is_said() {
+        let readings: Vec<AxesReading> = signed_permutations().map(|axes| AxesReading::new(axes, false)).collect();
+        let left = |given: f64, others: f64| -> Vec<Vec<f64>> {
+            (0..readings.len()).map(|k| vec![if k == 0 { given } else { others }; 20]).collect()
+        };
+        for (given, others) in
+            [(0.0, 0.0), (f64::INFINITY, f64::INFINITY), (f64::NAN, f64::NAN), (0.0, 1.0), (1.0, 1.0)]
+        {
+            assert_eq!(clearly_better(&readings, &left(given, others)), None, "{given} {others}");
+        }
+        assert_eq!(clearly_better(&readings, &[]), None);
+        let found = clearly_better(&readings, &left(1.0, 0.125)).unwrap();
+        assert_eq!(found.unexplained, [1.0, 0.125]);
+    }
 }

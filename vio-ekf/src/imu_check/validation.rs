@@ -26,10 +26,10 @@ const RATE_TOLERANCE: f64 = 0.2;
 const GAP: f64 = 5.0;
 /// Another reading of the sensors is named if it departs from gravity less by this factor in square...
 const CLEARER: f64 = 0.25;
-/// ... and the one given by more than this, (m/s²)²: changes of speed by 28 m/s from block to block.
-const IMPLAUSIBLE: f64 = 12.0;
-/// From here to there it is only a warning: 13 m/s.
+/// ... and the one given by more than this, (m/s²)²: changes of speed by 13 m/s from block to block.
 const DOUBTFUL: f64 = 2.5;
+/// From here on the samples are refused if images contradict them too: 28 m/s.
+const IMPLAUSIBLE: f64 = 12.0;
 /// Mean rate from which rates may be degrees per second, rad/s. Slower ones would be no rotation at all then, and the force of a
 /// multirotor stays along its own axis: without rotation it would always seem to agree.
 const FAST: f64 = 3.0;
@@ -47,6 +47,26 @@ pub struct ImuValidation {
     pub longest_gap_s: f64,
     /// What is unusual, and may be right: people should look at it.
     pub warnings: Vec<ImuWarning>,
+}
+
+impl ImuValidation {
+    /// Refuses samples whose axes both gravity and images contradict: gravity by changes of speed of 28 m/s from piece to piece, and
+    /// images by what [`check_axes_with_images`](crate::imu_check::check_axes_with_images) has added to the warnings. Either alone
+    /// is no proof.
+    ///
+    /// # Errors
+    /// [`Error::SwappedAxes`] with the axes by which gravity would be steady.
+    pub fn refuse_contradicted(&self) -> Result<(), Error> {
+        let by_gravity = self.warnings.iter().find_map(|warning| match warning {
+            ImuWarning::Axes { hint, departure, .. } if departure * departure > IMPLAUSIBLE => Some(hint),
+            _ => None,
+        });
+        let by_images = self.warnings.iter().any(|warning| matches!(warning, ImuWarning::Images { .. }));
+        match by_gravity.filter(|_| by_images) {
+            Some(hint) => Err(Error::SwappedAxes { hint: hint.clone() }),
+            None => Ok(()),
+        }
+    }
 }
 
 /// What is unusual about inertial samples, with the evidence.
@@ -108,8 +128,8 @@ impl fmt::Display for ImuWarning {
 /// The last is a test of axes and units that needs no calibration and no camera. Piece by piece, the mean of `R_k f_k`, with
 /// `R_k` integrated from the gyroscope, is gravity up to the change of speed. If the axes of one sensor are swapped or
 /// mirrored against those of the other, or rates are in degrees, gravity is smeared instead; the 24 rotations by quarters, each
-/// with both signs and both units of the gyroscope, are tried, and one that does much better is named. Only what no flight can do is
-/// refused: changes of speed by 28 m/s from piece to piece. The rest is a [warning](ImuWarning). Motion that
+/// with both signs and both units of the gyroscope, are tried, and one that does much better is [named](ImuWarning::Axes). That refuses
+/// nothing: over half a minute real flights do so too; see [`refuse_contradicted`](ImuValidation::refuse_contradicted). Motion that
 /// hardly tilts the sensor tells nothing, nor does the force of a multirotor that leans about one axis only, and a mirror image of
 /// both sensors together shows only in the camera.
 pub fn validate_samples(samples: &[Imu], rate_hz: f64, gravity: f64) -> Result<ImuValidation, Error> {
@@ -236,9 +256,6 @@ fn check_gravity(windows: &[Window], gravity: f64) -> Result<Vec<ImuWarning>, Er
         ", and the gyroscope in negated degrees per second",
     ][reading];
     let hint = format!("{}{gyroscope}", names(&axes));
-    if as_given > IMPLAUSIBLE {
-        return Err(Error::SwappedAxes { hint });
-    }
     if as_given > DOUBTFUL {
         let [departure, departure_of_hint] = [as_given, least].map(f64::sqrt);
         warnings.push(ImuWarning::Axes { hint, departure, departure_of_hint });

@@ -6,8 +6,8 @@ use crate::filter::vio::Vio;
 use crate::inertial::odometry::Odometry;
 use crate::run::frames::{Picture, RecordedFrame};
 use crate::run::outcome::{Event, ImageOutcome, Loss, LossReason, SkipReason, SkippedImage};
-use crate::run::recorded::Run;
 use crate::run::segments::{Estimate, Segments};
+use crate::run::summary::Run;
 use crate::samples::{ImageView, Imu};
 use crate::stamp::Stamp;
 

@@ -8,7 +8,7 @@ use crate::support::rng::Rng;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Vector2, Vector3};
 use vio_ekf::filter::PointObservation;
 use vio_ekf::format::{asl, euroc, tum};
-use vio_ekf::imu_check::{ImuValidation, ImuWarning, check_imu_axes, validate_samples};
+use vio_ekf::imu_check::{AxesReading, ImuValidation, ImuWarning, check_imu_axes, validate_samples};
 use vio_ekf::sim::{ImuModel, observe_points};
 use vio_ekf::trajectory::Spline;
 use vio_ekf::{Camera, Error, Imu, Stamp, nalgebra};
@@ -74,6 +74,47 @@ fn sound_samples_pass_and_swapped_axes_are_named() {
         };
         // x came from y, y from z, z from x.
         assert_eq!(hint, "(z, x, y)");
+    }
+}
+
+/// The readings of three EuRoC flights, in pieces of 15 to 50 s from every fifth second on.
+#[test]
+fn no_piece_of_a_real_recording_is_refused() {
+    let files = [
+        "vio/euroc_imu_gt/MH_04_difficult/imu_MH04.txt.gz",
+        "vio/euroc_imu_gt/V1_02_medium/imu_V102.txt.gz",
+        "vio/euroc_V1_01_micro/mav0/imu0/data.csv.gz",
+    ];
+    for file in files {
+        let Some(text) = recorded::text(file) else { continue };
+        let samples = asl::read_imu(&text).unwrap();
+        let (mut pieces, mut refused, mut warned) = (0, Vec::new(), 0);
+        for length in [15, 20, 30, 50] {
+            for piece in (0..samples.len()).step_by(1000).filter_map(|from| samples.get(from..from + 200 * length)) {
+                pieces += 1;
+                match validate_samples(piece, 200.0, GRAVITY) {
+                    Ok(validation) => warned += usize::from(!validation.warnings.is_empty()),
+                    Err(error) => refused.push(error.to_string()),
+                }
+            }
+        }
+        eprintln!("{file}: {pieces} pieces, {} refused, {warned} with a warning", refused.len());
+        assert!(refused.is_empty(), "{file}: {} of {pieces} refused: {}", refused.len(), refused[0]);
+    }
+}
+
+/// Gravity smeared by a departure, m/s², and what the images say.
+#[test]
+fn only_what_gravity_and_images_contradict_is_refused() {
+    let axes = |departure| ImuWarning::Axes { hint: "(y, x, z)".into(), departure, departure_of_hint: 0.1 };
+    let reading = AxesReading { axes: Matrix3::identity(), in_degrees: false, unexplained: [1.0, 0.1] };
+    let images = || ImuWarning::Images { sensor: "gyroscope", reading };
+    let refused = |warnings: Vec<ImuWarning>| {
+        ImuValidation { rate_hz: 200.0, gaps: 0, longest_gap_s: 0.005, warnings }.refuse_contradicted()
+    };
+    assert_eq!(refused(vec![axes(3.5), images()]), Err(Error::SwappedAxes { hint: "(y, x, z)".into() }));
+    for warnings in [vec![], vec![axes(9.0)], vec![images()], vec![axes(3.4), images()]] {
+        assert_eq!(refused(warnings), Ok(()));
     }
 }
 
