@@ -4,7 +4,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use paintcopter_benches::{criterion, pose_graphs};
-use tsdf_hash::PoseGraphSettings;
+use tsdf_hash::pose_graph::PoseGraphSettings;
 
 fn optimise(c: &mut Criterion) {
     for (name, graph) in pose_graphs::graphs() {

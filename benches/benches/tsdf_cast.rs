@@ -4,7 +4,8 @@
 use nalgebra::{Isometry3, Vector3};
 use paintcopter_benches::cpu::median_seconds;
 use paintcopter_benches::room::RgbdFrame;
-use tsdf_hash::{Error, Map, RayCastSettings, Settings, View};
+use tsdf_hash::ray_cast::{RayCastSettings, View};
+use tsdf_hash::{Error, Map, Settings};
 
 const TURN: usize = 60;
 

@@ -7,10 +7,8 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 use paintcopter_benches::cpu::median_seconds;
 use paintcopter_benches::room::RgbdFrame;
-use tsdf_hash::{
-    ColourData, ColourView, DepthData, DepthView, Error, Intrinsics, Map, Settings, TsdfLayer, VoxelBlock,
-    decode_block, encode_block,
-};
+use tsdf_hash::layer::{TsdfLayer, VoxelBlock, decode_block, encode_block};
+use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Error, Intrinsics, Map, Settings};
 
 const VOXELS: usize = 512;
 

@@ -6,7 +6,9 @@ use std::time::Instant;
 
 use clap::Parser;
 use paintcopter_benches::room::RgbdFrame;
-use tsdf_hash::{DenseMap, Error, GpuMap, GpuOptions, Map, RayCastSettings, Settings};
+use tsdf_hash::gpu::{GpuMap, GpuOptions};
+use tsdf_hash::ray_cast::RayCastSettings;
+use tsdf_hash::{DenseMap, Error, Map, Settings};
 
 /// Images of a full turn, as many as in the stream `loop`; every sixth is used.
 const TURN: usize = 60;

@@ -6,10 +6,11 @@ use nalgebra::Point3;
 use paintcopter_benches::Rng;
 use paintcopter_benches::cpu::seconds;
 use paintcopter_benches::room::{RgbdFrame, distance};
-use tsdf_hash::{
-    DistanceField, DistanceSettings, Error, IncrementalMesher, IncrementalRayCast, IncrementalRayCastSettings, Map,
-    MemoryLimits, RayCastSettings, Settings, View,
-};
+use tsdf_hash::distance_field::{DistanceField, DistanceSettings};
+use tsdf_hash::mesh::IncrementalMesher;
+use tsdf_hash::ray_cast::{IncrementalRayCast, IncrementalRayCastSettings, RayCastSettings, View};
+use tsdf_hash::storage::MemoryLimits;
+use tsdf_hash::{Error, Map, Settings};
 
 const TURN: usize = 60;
 

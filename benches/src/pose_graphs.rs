@@ -8,7 +8,7 @@ use std::error::Error;
 use std::path::Path;
 
 use serde_json::json;
-use tsdf_hash::{PoseGraph, PoseGraphSettings};
+use tsdf_hash::pose_graph::{PoseGraph, PoseGraphSettings};
 
 use crate::Rng;
 use crate::cpu::median_seconds;

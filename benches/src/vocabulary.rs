@@ -4,7 +4,8 @@ use std::error::Error;
 use std::path::Path;
 
 use nalgebra::Isometry3;
-use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics, KeyframeIndex};
+use tsdf_hash::place_recognition::KeyframeIndex;
+use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics};
 use vio_ekf::sim::{RoomSettings, Scenario, Simulation, painting_flight};
 
 /// Rooms, each with its own paint, furniture and flight.

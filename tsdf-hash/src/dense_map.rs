@@ -7,6 +7,7 @@ use crate::blocks::voxel_block::VoxelBlock;
 use crate::changes::{BlockChanges, MapVersion};
 use crate::error::Error;
 use crate::images::{ColourView, DepthView, Intrinsics};
+use crate::layer::{BlockReader, TsdfLayer, cell_around};
 use crate::map::Map;
 use crate::mesh::incremental::IncrementalMesher;
 use crate::mesh::triangle_mesh::Mesh;
@@ -15,12 +16,11 @@ use crate::ray_cast::view::View;
 use crate::report::FrameReport;
 use crate::settings::Settings;
 use crate::storage::block_storage::BlockStorage;
-use crate::tsdf_layer::{BlockReader, TsdfLayer, cell_around};
 
 /// A dense map, whoever keeps it: on the processor ([`Map`]), on a GPU, or the caller's own.
 ///
 /// It is a [`TsdfLayer`], too, so that distances can be asked for and an [`IncrementalMesher`] or a
-/// [`DistanceField`](crate::DistanceField) can follow it. Maps of this crate that were given the same frames have the same
+/// [`DistanceField`](crate::distance_field::DistanceField) can follow it. Maps of this crate that were given the same frames have the same
 /// hash, whatever keeps them.
 ///
 /// ```

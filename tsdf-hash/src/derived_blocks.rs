@@ -5,7 +5,7 @@ use crate::blocks::block_key::BlockKey;
 use crate::blocks::block_table::BlockTable;
 use crate::blocks::sign_bits::SignBits;
 use crate::changes::MapVersion;
-use crate::tsdf_layer::TsdfLayer;
+use crate::layer::TsdfLayer;
 
 /// Dirty blocks that are read together: with their neighbours some 1000 blocks of 7 KiB at a time.
 const BATCH: usize = 512;

@@ -7,3 +7,6 @@ mod sites;
 #[cfg(test)]
 mod tests;
 mod tree;
+
+pub use field::DistanceField;
+pub use settings::DistanceSettings;

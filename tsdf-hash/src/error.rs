@@ -125,7 +125,7 @@ pub enum Error {
     /// A cap on the swap file without such a file, or the other way round.
     #[error("memory.disk_bytes = {disk_bytes}: a map with a swap file is made by with_swap, one without by new")]
     SwapFileMismatch {
-        /// [`MemoryLimits::disk_bytes`](crate::MemoryLimits::disk_bytes).
+        /// [`MemoryLimits::disk_bytes`](crate::storage::MemoryLimits::disk_bytes).
         disk_bytes: u64,
     },
     /// An evicted or stored block is not what was put there.

@@ -12,3 +12,6 @@ mod split;
 mod stream;
 #[cfg(test)]
 mod test_adapter;
+
+pub use gpu_map::GpuMap;
+pub use options::GpuOptions;

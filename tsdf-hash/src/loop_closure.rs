@@ -5,3 +5,9 @@ mod error_growth;
 mod factors;
 pub(crate) mod report;
 pub(crate) mod settings;
+
+pub use crate::bundle_adjustment::adjust::{BundleAdjustmentReport, bundle_adjust};
+pub use crate::bundle_adjustment::settings::BundleAdjustmentSettings;
+pub use closer::LoopCloser;
+pub use report::{LoopClosure, LoopReport};
+pub use settings::LoopSettings;

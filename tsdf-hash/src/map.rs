@@ -73,18 +73,18 @@ impl Map {
         Ok(Self { settings, storage, plane_image: PlaneImage::default(), clock: FrameClock::default() })
     }
 
-    /// Opens a file written by [`save`](Self::save) with the settings it was saved with; [`MapFile`](crate::MapFile) does it
+    /// Opens a file written by [`save`](Self::save) with the settings it was saved with; [`MapFile`](crate::storage::MapFile) does it
     /// with others.
     ///
     /// # Errors
-    /// As [`MapFile::open`](crate::MapFile::open) and [`MapFile::into_map`](crate::MapFile::into_map).
+    /// As [`MapFile::open`](crate::storage::MapFile::open) and [`MapFile::into_map`](crate::storage::MapFile::into_map).
     pub fn open(path: &Path) -> Result<Self, Error> {
         let contents = Contents::read(path)?;
         let settings = contents.settings;
         Self::from_contents(contents, settings, None)
     }
 
-    /// What [`MapFile::into_map`](crate::MapFile::into_map) does.
+    /// What [`MapFile::into_map`](crate::storage::MapFile::into_map) does.
     pub(crate) fn from_contents(contents: Contents, settings: Settings, swap: Option<&Path>) -> Result<Self, Error> {
         let Settings { max_bytes, threads, memory, .. } = settings;
         if settings != (Settings { max_bytes, threads, memory, ..contents.settings }) {

@@ -14,3 +14,10 @@ pub(crate) mod ply;
 mod tests;
 pub(crate) mod triangle_mesh;
 mod weld;
+
+pub use deformation::EmbeddedDeformation;
+pub use incremental::IncrementalMesher;
+pub use obj::write_obj;
+pub use patches::PatchKey;
+pub use ply::write_ply;
+pub use triangle_mesh::Mesh;

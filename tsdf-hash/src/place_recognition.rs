@@ -8,3 +8,6 @@ pub(crate) mod features;
 mod grey_image;
 pub(crate) mod inverse_index;
 pub(crate) mod vocabulary;
+
+pub use crate::keyframes::index::{KeyframeIndex, KeyframeMatch, RecognisedPlace};
+pub use vocabulary::Vocabulary;

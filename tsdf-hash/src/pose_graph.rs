@@ -9,3 +9,8 @@ pub(crate) mod levenberg_marquardt;
 pub(crate) mod normal_equations;
 pub(crate) mod robust_kernel;
 pub(crate) mod se3;
+
+pub use factors::{BetweenFactor, PriorFactor};
+pub use graph::PoseGraph;
+pub use levenberg_marquardt::{PoseGraphReport, PoseGraphSettings};
+pub use robust_kernel::RobustKernel;

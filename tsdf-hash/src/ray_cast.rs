@@ -15,3 +15,9 @@ mod splat;
 pub(crate) mod tiles;
 pub(crate) mod unpacked;
 pub(crate) mod view;
+
+pub use depth_comparison::DepthComparison;
+pub use incremental::{IncrementalRayCast, IncrementalRayCastSettings};
+pub use settings::RayCastSettings;
+pub use single_ray::SurfaceHit;
+pub use view::View;

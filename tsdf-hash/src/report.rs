@@ -22,7 +22,7 @@ pub struct FrameReport {
     pub blocks_evicted: usize,
     /// Evicted blocks that were reloaded because the frame saw them again.
     pub blocks_reloaded: usize,
-    /// Reloaded blocks that waited for longer than [`MemoryLimits::merge_timeout`](crate::MemoryLimits::merge_timeout) and
+    /// Reloaded blocks that waited for longer than [`MemoryLimits::merge_timeout`](crate::storage::MemoryLimits::merge_timeout) and
     /// were merged without a decision.
     pub blocks_timed_out: usize,
 }
@@ -33,9 +33,9 @@ pub struct MemoryUsage {
     /// Active memory, reloaded blocks included; capped by [`Settings::max_bytes`](crate::Settings::max_bytes).
     pub active_bytes: usize,
     /// Evicted blocks in RAM and the index of all evicted blocks; capped by
-    /// [`MemoryLimits::host_bytes`](crate::MemoryLimits::host_bytes).
+    /// [`MemoryLimits::host_bytes`](crate::storage::MemoryLimits::host_bytes).
     pub host_bytes: usize,
-    /// Length of the swap file; capped by [`MemoryLimits::disk_bytes`](crate::MemoryLimits::disk_bytes).
+    /// Length of the swap file; capped by [`MemoryLimits::disk_bytes`](crate::storage::MemoryLimits::disk_bytes).
     pub disk_bytes: u64,
     /// Blocks in active memory, without the reloaded ones.
     pub active_blocks: usize,

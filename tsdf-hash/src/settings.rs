@@ -48,7 +48,7 @@ pub struct MemoryLimits {
     pub max_age: f64,
     /// Most blocks that are evicted by age, and most that are reloaded, per frame (not printed; ours: 1024).
     pub max_transfers: usize,
-    /// How long reloaded blocks wait for the caller's decision ([`MergePolicy`](crate::MergePolicy)) before they are merged
+    /// How long reloaded blocks wait for the caller's decision ([`MergePolicy`](crate::storage::MergePolicy)) before they are merged
     /// without one, seconds (not in the paper, which merges in one place and waits in another; 0, the default: merged at
     /// once).
     pub merge_timeout: f64,

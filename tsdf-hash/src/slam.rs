@@ -36,3 +36,4 @@ pub use system::Slam;
 pub use trajectory_text::{trajectory_from_tum, trajectory_to_tum};
 
 pub use crate::device_map::{Device, DeviceMap};
+pub use crate::error::BoxedError;

@@ -10,3 +10,9 @@ pub(crate) mod reloaded;
 mod sorted_pages;
 pub(crate) mod summary;
 pub(crate) mod swap_file;
+
+pub use crate::file::map_file::MapFile;
+pub use crate::report::MemoryUsage;
+pub use crate::settings::MemoryLimits;
+pub use merge_policy::{MergeDecision, MergeImmediately, MergePolicy};
+pub use reloaded::ReloadedBlocks;

@@ -14,3 +14,9 @@ pub(crate) mod residual_scale;
 pub(crate) mod residuals;
 pub(crate) mod settings;
 pub(crate) mod tracker;
+
+pub use drift::Drift;
+pub use outcome::{PosePrior, TrackingOutcome, TrackingStatus};
+pub use relocaliser::{Relocalisation, Relocaliser};
+pub use settings::TrackingSettings;
+pub use tracker::Tracker;

@@ -21,7 +21,8 @@ use std::io::{Seek, SeekFrom, Write};
 use nalgebra::{Isometry3, Point3};
 use random::Random;
 use scene::{Shot, look_at, room};
-use tsdf_hash::{Error, Map, MapFile, MemoryLimits, Settings};
+use tsdf_hash::storage::{MapFile, MemoryLimits};
+use tsdf_hash::{Error, Map, Settings};
 use twox_hash::XxHash3_64;
 
 /// Bytes that a thread holds, and the most it has held at once.
@@ -241,7 +242,7 @@ fn mutate(good: &[u8], random: &mut Random) -> Vec<u8> {
 }
 
 /// All that a caller can read from a file: hash and number of blocks, mesh, metadata.
-type Contents = (u64, usize, Option<tsdf_hash::Mesh>, BTreeMap<String, Vec<u8>>);
+type Contents = (u64, usize, Option<tsdf_hash::mesh::Mesh>, BTreeMap<String, Vec<u8>>);
 
 fn read_all(path: &std::path::Path) -> Result<Contents, Error> {
     let file = MapFile::open(path)?;

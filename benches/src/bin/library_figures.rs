@@ -348,7 +348,7 @@ fn tsdf(
     let mesh = map.mesh();
     if let Some(path) = out {
         let file = std::fs::File::create(path).map_err(|e| format!("{}: {e}", path.display()))?;
-        tsdf_hash::write_ply(&mesh, std::io::BufWriter::new(file))?;
+        tsdf_hash::mesh::write_ply(&mesh, std::io::BufWriter::new(file))?;
     }
     for frame in &frames {
         let colour = frame.colour();

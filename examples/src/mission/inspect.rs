@@ -4,7 +4,8 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use paint_sim::render::{Frame, Lights, Shading};
 use paint_sim::surface::Hit;
 use paint_sim::{Camera, Surface, render};
-use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics, Map, Mesh};
+use tsdf_hash::mesh::Mesh;
+use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics, Map};
 use vio_ekf::eval::Alignment;
 use vio_ekf::{Stamp, Trajectory};
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::Point3;
 use paint_sim::flight::FlightSample;
 use paint_sim::surface::Hit;
-use tsdf_hash::Mesh;
+use tsdf_hash::mesh::Mesh;
 
 use super::error::MissionError;
 use super::figures::report;

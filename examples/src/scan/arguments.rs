@@ -6,8 +6,10 @@ use std::time::Duration;
 
 use clap::{Parser, ValueEnum};
 use nalgebra::Isometry3;
+use tsdf_hash::loop_closure::LoopSettings;
 use tsdf_hash::slam::{Device, OdometryError, PoseSource, SlamSettings};
-use tsdf_hash::{Intrinsics, LoopSettings, MemoryLimits, NoiseModel};
+use tsdf_hash::storage::MemoryLimits;
+use tsdf_hash::{Intrinsics, NoiseModel};
 
 use super::checkpoint::CheckpointSettings;
 use super::imu_file::read_angular_rates;

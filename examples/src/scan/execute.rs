@@ -32,7 +32,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     // What cannot be made again comes first, pictures last.
     scan.save(&folder.join("map.tsdf"), &arguments.sequence)?;
     let ply = folder.join("mesh.ply");
-    let tsdf_hash::Mesh { positions, normals, colours, faces, .. } = &scan.mesh;
+    let tsdf_hash::mesh::Mesh { positions, normals, colours, faces, .. } = &scan.mesh;
     write_ply(&ply, &PlyMesh { positions, normals: Some(normals), colours, faces })
         .map_err(|e| format!("{}: cannot be written ({e})", ply.display()))?;
     let tum = folder.join("trajectory.tum");

@@ -17,7 +17,9 @@ use foxglove::{Channel, Context, Encode, FoxgloveError, McapWriterHandle, Partia
 use image::codecs::jpeg::JpegEncoder;
 use nalgebra::{Isometry3, Point3};
 use serde::Serialize;
-use tsdf_hash::{ColourData, ColourView, EmbeddedDeformation, IncrementalMesher, Mesh, PatchKey, TrackingOutcome};
+use tsdf_hash::mesh::{EmbeddedDeformation, IncrementalMesher, Mesh, PatchKey};
+use tsdf_hash::tracking::TrackingOutcome;
+use tsdf_hash::{ColourData, ColourView};
 
 use super::error::ScanError;
 use crate::recording::{log_message, point, quaternion, rgb, scene, vector};

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nalgebra::Isometry3;
-use tsdf_hash::Mesh;
+use tsdf_hash::mesh::Mesh;
 use tsdf_hash::slam::{PoseSource, Quality, SlamState, SlamStatistics};
 use vio_ekf::Trajectory;
 

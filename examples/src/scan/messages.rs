@@ -1,7 +1,7 @@
 //! What happened with a frame, in words.
 
 use tsdf_hash::slam::{Event, FrameOutcome, LeftOut};
-use tsdf_hash::{TrackingOutcome, TrackingStatus};
+use tsdf_hash::tracking::{TrackingOutcome, TrackingStatus};
 
 use super::error::ScanError;
 

@@ -2,7 +2,8 @@
 
 use cpu_time::ProcessTime;
 use nalgebra::Isometry3;
-use tsdf_hash::{DenseMap, DepthComparison, RayCastSettings, Settings};
+use tsdf_hash::ray_cast::{DepthComparison, RayCastSettings};
+use tsdf_hash::{DenseMap, Settings};
 
 use super::decode::Images;
 use super::error::ScanError;

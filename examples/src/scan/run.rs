@@ -4,7 +4,7 @@ use std::path::Path;
 
 use cpu_time::ProcessTime;
 use nalgebra::Isometry3;
-use tsdf_hash::BoxedError;
+use tsdf_hash::slam::BoxedError;
 use tsdf_hash::slam::{
     Device, Event, FrameImages, FrameOutcome, FrameSource, PlacedFrame, PoseSource, Slam, SlamSettings,
 };

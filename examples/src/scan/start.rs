@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use tsdf_hash::Map;
 use tsdf_hash::slam::SlamState;
-use tsdf_hash::{Map, MapFile};
+use tsdf_hash::storage::MapFile;
 
 use super::checkpoint::is_of;
 use super::error::ScanError;

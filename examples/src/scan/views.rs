@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Translation3, Vector3};
 use paint_sim::render::{Frame, Lights, Shading};
 use paint_sim::surface::Hit;
 use paint_sim::{Camera, TriangleSurface, render};
-use tsdf_hash::Mesh;
+use tsdf_hash::mesh::Mesh;
 
 use super::decode::Images;
 use super::error::ScanError;

@@ -1,7 +1,8 @@
 //! Where the robot is in the map that it makes: odometry predicts, the depth image corrects (thesis Paper I, section 4.1).
 
 use nalgebra::Isometry3;
-use tsdf_hash::{ColourView, DepthView, Map, PosePrior, Tracker, TrackingSettings};
+use tsdf_hash::tracking::{PosePrior, Tracker, TrackingSettings};
+use tsdf_hash::{ColourView, DepthView, Map};
 
 use super::error::ScanFlightError;
 

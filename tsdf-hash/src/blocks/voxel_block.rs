@@ -16,7 +16,7 @@ pub(crate) const MAX_COLOURS: u16 = 1040;
 /// A block of 8³ voxels: sums over observations, never averages.
 ///
 /// Adding and subtracting commute, so the order of the frames does not matter and any of them can be taken out again. Voxel
-/// `(x, y, z)` of the block has the number `x + 8 (y + 8 z)`, `0..512`. Who keeps a [`TsdfLayer`](crate::TsdfLayer) of their
+/// `(x, y, z)` of the block has the number `x + 8 (y + 8 z)`, `0..512`. Who keeps a [`TsdfLayer`](crate::layer::TsdfLayer) of their
 /// own fills blocks by [`add_distance`](Self::add_distance) and [`add_colour`](Self::add_colour).
 #[derive(Clone, PartialEq, Eq)]
 pub struct VoxelBlock {

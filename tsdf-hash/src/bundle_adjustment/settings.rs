@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::settings::NoiseModel;
 
-/// How [`bundle_adjust`](crate::bundle_adjust) works.
+/// How [`bundle_adjust`](crate::loop_closure::bundle_adjust) works.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct BundleAdjustmentSettings {

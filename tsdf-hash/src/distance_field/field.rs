@@ -11,7 +11,7 @@ use crate::distance_field::settings::DistanceSettings;
 use crate::distance_field::sites::{BlockSites, CutEdge};
 use crate::distance_field::tree::Tree;
 use crate::error::Error;
-use crate::tsdf_layer::{BlockReader, TsdfLayer};
+use crate::layer::{BlockReader, TsdfLayer};
 
 /// Stands for blocks that no edge reaches into.
 static EMPTY_BLOCK: VoxelBlock = VoxelBlock::ZERO;
@@ -32,7 +32,8 @@ const SOURCES: [[i32; 3]; 4] = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]];
 ///
 /// ```
 /// # use nalgebra::{Isometry3, Point3, Vector3};
-/// # use tsdf_hash::{DepthData, DepthView, DistanceField, DistanceSettings, Intrinsics, Map, Settings};
+/// # use tsdf_hash::distance_field::{DistanceField, DistanceSettings};
+/// # use tsdf_hash::{DepthData, DepthView, Intrinsics, Map, Settings};
 /// # let depth = vec![1000_u16; 160 * 120];
 /// # let intrinsics = Intrinsics { fx: 130.0, fy: 130.0, cx: 79.5, cy: 59.5 };
 /// # let view = DepthView { width: 160, height: 120, data: DepthData::U16 { data: &depth, scale: 1000.0 }, intrinsics };

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 
-/// Settings of a [`DistanceField`](crate::DistanceField).
+/// Settings of a [`DistanceField`](crate::distance_field::DistanceField).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct DistanceSettings {

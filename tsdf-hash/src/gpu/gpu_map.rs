@@ -24,6 +24,7 @@ use crate::gpu::stream::{Stream, upload};
 use crate::images::{ColourView, DepthView, Intrinsics};
 use crate::integration::integrator::{Frame, Operation};
 use crate::integration::plane_image::PlaneImage;
+use crate::layer::{BlockReader, TsdfLayer};
 use crate::map::Map;
 use crate::ray_cast::camera::Camera;
 use crate::ray_cast::settings::RayCastSettings;
@@ -31,7 +32,6 @@ use crate::ray_cast::view::View;
 use crate::report::FrameReport;
 use crate::settings::{MemoryLimits, Settings};
 use crate::storage::block_storage::hash_block;
-use crate::tsdf_layer::{BlockReader, TsdfLayer};
 
 /// A map whose blocks lie on a GPU. It equals, to the bit, a [`Map`] that was given the same frames.
 ///

@@ -39,7 +39,8 @@ const BASELINES: [usize; 6] = [1, 2, 3, 4, 5, 6];
 ///
 /// ```
 /// # use nalgebra::Isometry3;
-/// # use tsdf_hash::{DepthView, Error, LoopCloser};
+/// # use tsdf_hash::loop_closure::LoopCloser;
+/// # use tsdf_hash::{DepthView, Error};
 /// # fn follow(closer: &mut LoopCloser, depth: &DepthView, pose: Isometry3<f64>) -> Result<(), Error> {
 /// let report = closer.add(depth, None, &pose)?;
 /// if let Some(before) = &report.corrected_from {

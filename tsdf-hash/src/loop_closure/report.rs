@@ -25,7 +25,7 @@ pub struct LoopReport {
     pub compared: usize,
     /// Loops that were found.
     pub loops: Vec<LoopClosure>,
-    /// Where the keyframes were before the correction, if there was one; where they are now says [`LoopCloser::poses`](crate::LoopCloser::poses).
+    /// Where the keyframes were before the correction, if there was one; where they are now says [`LoopCloser::poses`](crate::loop_closure::LoopCloser::poses).
     pub corrected_from: Option<Vec<Isometry3<f64>>>,
     /// The dense bundle adjustment after it.
     pub adjustment: Option<BundleAdjustmentReport>,

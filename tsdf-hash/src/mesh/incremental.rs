@@ -8,12 +8,12 @@ use crate::blocks::sign_bits::SignBits;
 use crate::blocks::voxel_block::VoxelBlock;
 use crate::derived_blocks::{DerivedBlocks, UpdateReport};
 use crate::error::Error;
+use crate::layer::{BlockReader, TsdfLayer};
 use crate::mesh::block_mesh::{BlockMesh, BlockMesher, MeshScale};
 use crate::mesh::marching_cubes::CASES;
 use crate::mesh::patches::{ChangedPatches, PatchKey, patch, patches_of};
 use crate::mesh::triangle_mesh::Mesh;
 use crate::mesh::weld::weld;
-use crate::tsdf_layer::{BlockReader, TsdfLayer};
 
 /// Stands for blocks that no cell reaches into.
 static EMPTY_BLOCK: VoxelBlock = VoxelBlock::ZERO;
@@ -29,7 +29,8 @@ const SOURCES: [[i32; 3]; 8] = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 
 ///
 /// ```
 /// # use nalgebra::Isometry3;
-/// # use tsdf_hash::{DepthData, DepthView, IncrementalMesher, Intrinsics, Map, Settings};
+/// # use tsdf_hash::mesh::IncrementalMesher;
+/// # use tsdf_hash::{DepthData, DepthView, Intrinsics, Map, Settings};
 /// # let depth = vec![1000_u16; 160 * 120];
 /// # let intrinsics = Intrinsics { fx: 130.0, fy: 130.0, cx: 79.5, cy: 59.5 };
 /// # let view = DepthView { width: 160, height: 120, data: DepthData::U16 { data: &depth, scale: 1000.0 }, intrinsics };

@@ -14,7 +14,7 @@ use crate::mesh::triangle_mesh::Mesh;
 /// [`Error::Write`] when the writer fails.
 ///
 /// ```
-/// # use tsdf_hash::{Mesh, write_obj};
+/// # use tsdf_hash::mesh::{Mesh, write_obj};
 /// let mesh = Mesh {
 ///     positions: vec![[0.0, 0.0, 1.5], [1.0, 0.0, 1.5], [0.0, 1.0, 1.5]],
 ///     faces: vec![[0, 1, 2]],

@@ -14,7 +14,8 @@ use crate::mesh::triangle_mesh::Mesh;
 /// [`Error::Write`] when the writer fails.
 ///
 /// ```
-/// # use tsdf_hash::{Map, Settings, write_ply};
+/// # use tsdf_hash::mesh::write_ply;
+/// # use tsdf_hash::{Map, Settings};
 /// let mut file = Vec::new();
 /// write_ply(&Map::new(Settings::default())?.mesh(), &mut file)?;
 /// assert!(file.starts_with(b"ply\nformat binary_little_endian 1.0\nelement vertex 0\n"));

@@ -18,10 +18,10 @@ const LEVELS: usize = 4;
 /// What comes with the crate, trained on rendered rooms by `library_figures vocabulary`.
 static SHIPPED: &[u8] = include_bytes!("vocabulary.bin");
 
-/// A tree of visual words: what a [`KeyframeIndex`](crate::KeyframeIndex) finds places again by.
+/// A tree of visual words: what a [`KeyframeIndex`](crate::place_recognition::KeyframeIndex) finds places again by.
 ///
 /// The one that comes with the crate was trained on rendered rooms. For pictures of another kind another one can be trained on the
-/// keyframes of a map: [`KeyframeIndex::train_vocabulary`](crate::KeyframeIndex::train_vocabulary).
+/// keyframes of a map: [`KeyframeIndex::train_vocabulary`](crate::place_recognition::KeyframeIndex::train_vocabulary).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Vocabulary {
     /// The root is the first; children lie side by side, after all nodes of the levels above.

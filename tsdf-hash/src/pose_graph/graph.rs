@@ -17,7 +17,7 @@ use crate::trace::span;
 ///
 /// ```
 /// use nalgebra::{Isometry3, Matrix6};
-/// use tsdf_hash::{BetweenFactor, PoseGraph, PoseGraphSettings, RobustKernel};
+/// use tsdf_hash::pose_graph::{BetweenFactor, PoseGraph, PoseGraphSettings, RobustKernel};
 ///
 /// // Three steps of a metre; from end to end 2.7 m were measured.
 /// let x = |length| Isometry3::translation(length, 0.0, 0.0);

@@ -7,7 +7,7 @@ use crate::storage::reloaded::ReloadedBlocks;
 pub enum MergeDecision {
     /// The new frames agree with them, or have been corrected: add them to the active map.
     Merge,
-    /// Keep them apart for now; [`MemoryLimits::merge_timeout`](crate::MemoryLimits::merge_timeout) limits how long.
+    /// Keep them apart for now; [`MemoryLimits::merge_timeout`](crate::storage::MemoryLimits::merge_timeout) limits how long.
     Defer,
 }
 

@@ -51,7 +51,7 @@ impl Drift {
 impl Tracker {
     /// Measures the drift between the map of an old visit and a present frame that is believed to be taken from `present`: point-to-plane
     /// ICP between the ray cast of the old map and the frame, from each of some starts. The best registration is taken, if one is sure:
-    /// agreeing by [`TrackingSettings::relocalise_agreement`](crate::TrackingSettings::relocalise_agreement) and fixed in all directions.
+    /// agreeing by [`TrackingSettings::relocalise_agreement`](crate::tracking::TrackingSettings::relocalise_agreement) and fixed in all directions.
     /// `covariance` is that of `present`, in the order and frame of [`TrackingOutcome::covariance`]; `None` if it is exact.
     ///
     /// # Errors

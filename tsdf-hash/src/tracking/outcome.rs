@@ -73,7 +73,7 @@ pub enum TrackingStatus {
     Rejected,
 }
 
-/// The result of [`Tracker::track`](crate::Tracker::track).
+/// The result of [`Tracker::track`](crate::tracking::Tracker::track).
 #[derive(Clone, Debug)]
 pub struct TrackingOutcome {
     /// Whether the pose can be believed; if not, the pose is the prior's.

@@ -36,7 +36,9 @@ const ANOTHER: [f64; 2] = [0.02, 0.02];
 /// or the place is dropped. It is believed when three frames agree and no other place is left; without colour these must have been taken from different poses.
 ///
 /// ```
-/// # use tsdf_hash::{DenseMap, DepthView, Error, KeyframeIndex, Relocaliser, TrackingSettings};
+/// # use tsdf_hash::place_recognition::KeyframeIndex;
+/// # use tsdf_hash::tracking::{Relocaliser, TrackingSettings};
+/// # use tsdf_hash::{DenseMap, DepthView, Error};
 /// # fn search(map: &mut dyn DenseMap, keyframes: &KeyframeIndex, lost: &[DepthView]) -> Result<(), Error> {
 /// let mut relocaliser = Relocaliser::new(TrackingSettings::default())?;
 /// for depth in lost {

@@ -62,7 +62,8 @@ const LEAST_SHARES: [f64; LEVELS] = [LEAST_SHARE, 1e-3, 2e-3];
 ///
 /// ```
 /// # use nalgebra::{Isometry3, Vector3};
-/// # use tsdf_hash::{DepthData, DepthView, Error, Intrinsics, Map, PosePrior, Settings, Tracker, TrackingSettings};
+/// # use tsdf_hash::tracking::{PosePrior, Tracker, TrackingSettings};
+/// # use tsdf_hash::{DepthData, DepthView, Error, Intrinsics, Map, Settings};
 /// # fn follow(map: &mut Map, depth: &DepthView, guess: Isometry3<f64>) -> Result<(), Error> {
 /// let mut tracker = Tracker::new(TrackingSettings::default())?;
 /// let prior = PosePrior { world_from_camera: guess, covariance: None };

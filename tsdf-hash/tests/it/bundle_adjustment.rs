@@ -1,10 +1,10 @@
 //! Keyframes whose poses bend slowly, as after a loop, are straightened by what they see in common.
 
 use nalgebra::{Isometry3, Matrix6, Vector3};
-use tsdf_hash::{
-    BetweenFactor, BundleAdjustmentReport, BundleAdjustmentSettings, Error, KeyframeIndex, PoseGraph, RobustKernel,
-    bundle_adjust,
-};
+use tsdf_hash::Error;
+use tsdf_hash::loop_closure::{BundleAdjustmentReport, BundleAdjustmentSettings, bundle_adjust};
+use tsdf_hash::place_recognition::KeyframeIndex;
+use tsdf_hash::pose_graph::{BetweenFactor, PoseGraph, RobustKernel};
 
 use crate::noisy_room::{alignment, apart, seen};
 use crate::random::Random;

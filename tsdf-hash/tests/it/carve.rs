@@ -1,7 +1,8 @@
 //! Space that is seen to be free.
 
 use nalgebra::{Point3, Vector3};
-use tsdf_hash::{Map, MemoryLimits, Settings};
+use tsdf_hash::storage::MemoryLimits;
+use tsdf_hash::{Map, Settings};
 
 use crate::scene::{Shot, look_at};
 

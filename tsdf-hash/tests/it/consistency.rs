@@ -1,7 +1,8 @@
 //! Whether the tracker's covariance is right: normalised estimation error squared over seeded runs.
 
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
-use tsdf_hash::{Map, PosePrior, Settings, Tracker, TrackingSettings};
+use tsdf_hash::tracking::{PosePrior, Tracker, TrackingSettings};
+use tsdf_hash::{Map, Settings};
 
 use crate::random::Random;
 use crate::scene::{Shot, room};

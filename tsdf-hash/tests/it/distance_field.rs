@@ -1,7 +1,9 @@
 //! Distances far from surfaces: exact, and the same however the map came about.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use tsdf_hash::{DistanceField, DistanceSettings, Error, Map, MemoryLimits, Settings};
+use tsdf_hash::distance_field::{DistanceField, DistanceSettings};
+use tsdf_hash::storage::MemoryLimits;
+use tsdf_hash::{Error, Map, Settings};
 
 use crate::eviction::{FREE, add, take_out};
 use crate::random::Random;

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use nalgebra::{Isometry3, Point3};
-use tsdf_hash::{ColourData, ColourView, Error, Map, MemoryLimits, MergeDecision, ReloadedBlocks, Settings};
+use tsdf_hash::storage::MemoryLimits;
+use tsdf_hash::{ColourData, ColourView, Error, Map, Settings};
 
 use crate::scene::{Shot, look_at, room};
 
@@ -24,11 +25,11 @@ pub(crate) const FREE: Settings = Settings {
     noise: tsdf_hash::NoiseModel { base: 0.0012, quadratic: 0.0019, nearest: 0.4 },
 };
 
-fn limits(host_bytes: usize, disk_bytes: u64) -> MemoryLimits {
+pub(crate) fn limits(host_bytes: usize, disk_bytes: u64) -> MemoryLimits {
     MemoryLimits { host_bytes, disk_bytes, ..FREE.memory }
 }
 
-fn make(settings: Settings, name: &str) -> Map {
+pub(crate) fn make(settings: Settings, name: &str) -> Map {
     if settings.memory.disk_bytes == 0 { Map::new(settings) } else { Map::with_swap(settings, &scratch(name)) }.unwrap()
 }
 
@@ -56,7 +57,7 @@ fn assert_capped(map: &Map) {
 }
 
 /// All voxels, read back from wherever they are: not the fingerprints that are kept beside them.
-pub(crate) fn contents(map: &Map) -> (u64, usize, tsdf_hash::Mesh) {
+pub(crate) fn contents(map: &Map) -> (u64, usize, tsdf_hash::mesh::Mesh) {
     let whole = map.consolidated().unwrap();
     assert_eq!((whole.hash(), whole.blocks()), (map.hash(), map.blocks()));
     (whole.hash(), whole.blocks(), whole.mesh())
@@ -191,7 +192,7 @@ fn full_storage_refuses_the_frame_and_nothing_else() {
 }
 
 /// A wall at 0.4 m, where every observation weighs 15; the camera looks along x or the other way.
-fn close_wall(side: f64) -> Shot {
+pub(crate) fn close_wall(side: f64) -> Shot {
     let pose = look_at(Point3::origin(), Point3::new(side, 0.0, 0.0));
     Shot::take((12, 9), [20.0; 2], pose, |o, d| Some((0.4 * side - o.x) / d.x))
 }
@@ -226,47 +227,6 @@ fn copies_that_would_run_over_together_are_saturated() {
         look(&mut map, 0, 1e-3).unwrap();
         assert_eq!((map.hash(), map.blocks()), before);
     }
-}
-
-#[test]
-fn reloaded_blocks_wait_for_a_decision() {
-    let walls = [close_wall(1.0), close_wall(-1.0)];
-    let memory = MemoryLimits { max_age: 1.0, merge_timeout: 10.0, ..limits(1 << 20, 0) };
-    let mut map = make(Settings { memory, ..FREE }, "decision");
-    let see = |map: &mut Map, side: usize, time: f64, drift: f64| {
-        let mut pose = walls[side].world_from_camera;
-        pose.translation.vector.x += drift;
-        map.integrate_at(time, &walls[side].view(), None, &pose).unwrap()
-    };
-    see(&mut map, 0, 0.0, 0.0);
-    let left = see(&mut map, 1, 5.0, 0.0).blocks_evicted;
-    assert!(left > 0 && map.memory().host_blocks == left && map.reloaded_blocks().is_empty());
-    let on_wall = Point3::new(0.405, 0.01, 0.01);
-    assert!(map.distance(&on_wall).is_none());
-    // Seen again, 6 mm too far: the old surface is there to compare with, and untouched.
-    let back = see(&mut map, 0, 6.0, 0.006);
-    assert!(back.blocks_reloaded > 0 && map.memory().reloaded_blocks == back.blocks_reloaded);
-    let mut asked = 0;
-    let mut policy = |reloaded: &ReloadedBlocks| {
-        asked += 1;
-        assert!(reloaded.reloaded_at() == Some(6.0) && reloaded.blocks().len() == reloaded.len());
-        let drift = reloaded.distance(&on_wall).unwrap() - reloaded.active_distance(&on_wall).unwrap();
-        assert!((drift + 0.006).abs() < 1e-5, "{drift}");
-        MergeDecision::Defer
-    };
-    assert_eq!(map.merge_reloaded(&mut policy).unwrap(), 0);
-    assert_eq!(asked, 1);
-    let hash = contents(&map).0;
-    assert_eq!(map.merge_reloaded(&mut tsdf_hash::MergeImmediately).unwrap(), back.blocks_reloaded);
-    assert!(map.reloaded_blocks().is_empty() && map.hash() == hash);
-    // The mean of the two: equal weights but for the cosine.
-    assert!((map.distance(&on_wall).unwrap() + 0.002).abs() < 1e-4);
-    // Without a decision they are merged when the time is up, and reported.
-    see(&mut map, 1, 20.0, 0.0);
-    see(&mut map, 0, 21.0, 0.0);
-    assert!(!map.reloaded_blocks().is_empty());
-    let late = see(&mut map, 1, 31.5, 0.0);
-    assert!(late.blocks_timed_out > 0 && map.reloaded_blocks().len() == late.blocks_reloaded);
 }
 
 #[test]
@@ -362,7 +322,7 @@ fn copies_whose_colours_would_run_over_together_are_saturated() {
     assert!(matches!(look(&mut map, 0, 1e-3).unwrap_err(), Error::Saturated { .. }));
     assert_eq!((map.hash(), map.blocks()), before);
     // Merged they are the same map, and still full.
-    map.merge_reloaded(&mut tsdf_hash::MergeImmediately).unwrap();
+    map.merge_reloaded(&mut tsdf_hash::storage::MergeImmediately).unwrap();
     assert_eq!((map.hash(), map.blocks()), before);
     assert!(matches!(look(&mut map, 0, 1e-3).unwrap_err(), Error::Saturated { .. }));
 }

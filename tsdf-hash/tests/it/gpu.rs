@@ -2,11 +2,14 @@
 //! `PAINTCOPTER_REQUIRE_GPU=1` demands one.
 
 use nalgebra::{Isometry3, Point3, Vector3};
+use tsdf_hash::distance_field::{DistanceField, DistanceSettings};
+use tsdf_hash::gpu::{GpuMap, GpuOptions};
+use tsdf_hash::layer::TsdfLayer;
+use tsdf_hash::mesh::IncrementalMesher;
+use tsdf_hash::ray_cast::RayCastSettings;
 use tsdf_hash::slam::DeviceMap;
-use tsdf_hash::{
-    ColourData, ColourView, DenseMap, DepthData, DepthView, DistanceField, DistanceSettings, Error, GpuMap, GpuOptions,
-    IncrementalMesher, Intrinsics, Map, MemoryLimits, RayCastSettings, Settings, TsdfLayer,
-};
+use tsdf_hash::storage::MemoryLimits;
+use tsdf_hash::{ColourData, ColourView, DenseMap, DepthData, DepthView, Error, Intrinsics, Map, Settings};
 
 use crate::random::Random;
 use crate::scene::{Shot, look_at, room};

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use nalgebra::Isometry3;
-use tsdf_hash::{IncrementalMesher, Map, MemoryLimits, Mesh, PatchKey, Settings, write_obj};
+use tsdf_hash::mesh::{IncrementalMesher, Mesh, PatchKey, write_obj};
+use tsdf_hash::storage::MemoryLimits;
+use tsdf_hash::{Map, Settings};
 
 use crate::eviction::{FREE, add, take_out};
 use crate::scene::room;

@@ -1,7 +1,10 @@
 //! Drift that was put in is measured, loops are found, and what was mapped on the way is corrected.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use tsdf_hash::{Error, KeyframeIndex, LoopCloser, LoopSettings, Map, Settings, Tracker, TrackingSettings};
+use tsdf_hash::loop_closure::{LoopCloser, LoopSettings};
+use tsdf_hash::place_recognition::KeyframeIndex;
+use tsdf_hash::tracking::{Tracker, TrackingSettings};
+use tsdf_hash::{Error, Map, Settings};
 
 use crate::noisy_room::{alignment, apart, seen, shot, unit};
 use crate::random::Random;
@@ -78,7 +81,7 @@ fn injected_drift_is_measured() {
 }
 
 /// Twice around the room by odometry that turns and shifts a little with every step.
-fn drifting_tour(steps: usize, turns: usize) -> Vec<(Isometry3<f64>, Isometry3<f64>)> {
+pub(crate) fn drifting_tour(steps: usize, turns: usize) -> Vec<(Isometry3<f64>, Isometry3<f64>)> {
     let error = Isometry3::new(Vector3::new(1.2e-3, -0.8e-3, 0.6e-3), Vector3::new(2e-4, 7e-4, -3e-4));
     let mut believed = room::pose(0, steps);
     (0..steps * turns)

@@ -1,4 +1,4 @@
-//! What the crate promises, against closed forms and recorded images.
+//! What the crate promises, against closed forms and recorded images. `own_*`: what each trait asks of whoever brings his own.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
 
@@ -10,15 +10,20 @@ mod consistency;
 mod distance_field;
 mod errors;
 mod eviction;
+mod examples;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod holes;
 mod incremental;
-mod layers;
 #[cfg(feature = "pose-graph")]
 mod loops;
 mod map_file;
 mod noisy_room;
+#[cfg(feature = "pose-graph")]
+mod own_frame_source;
+mod own_layer;
+mod own_map;
+mod own_merge_policy;
 #[cfg(feature = "pose-graph")]
 mod pose_graph;
 mod random;

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use nalgebra::Isometry3;
-use tsdf_hash::{Error, Map, MapFile, MemoryLimits, Settings};
+use tsdf_hash::storage::{MapFile, MemoryLimits};
+use tsdf_hash::{Error, Map, Settings};
 
 use crate::eviction::{FREE, add, contents, scratch, take_out};
 use crate::scene::{Shot, room};

@@ -3,7 +3,8 @@
 mod worlds;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
-use tsdf_hash::{BetweenFactor, Error, PoseGraph, PoseGraphSettings, PriorFactor, RobustKernel};
+use tsdf_hash::Error;
+use tsdf_hash::pose_graph::{BetweenFactor, PoseGraph, PoseGraphSettings, PriorFactor, RobustKernel};
 
 use crate::random::Random;
 use worlds::{Noise, World, sphere, torus};

@@ -1,7 +1,7 @@
 //! A frame is recognised by its features: far beside the keyframes, and not in another room.
 
 use nalgebra::{Isometry3, UnitQuaternion};
-use tsdf_hash::{KeyframeIndex, RecognisedPlace};
+use tsdf_hash::place_recognition::{KeyframeIndex, RecognisedPlace};
 
 use crate::noisy_room::{apart, seen, unit};
 use crate::random::Random;

@@ -136,7 +136,7 @@ impl Fixture {
         let map = fuse(fused, scale, self.intrinsics);
         let (median, known) = residual(&map, held_out, scale, &self.intrinsics);
         assert!(median < 1e-3 && known > 0.5, "median {median}, known {known}");
-        let mean = |mesh: &tsdf_hash::Mesh| {
+        let mean = |mesh: &tsdf_hash::mesh::Mesh| {
             let error = |p: &[f32; 3]| room::sdf(&Point3::from(p.map(f64::from))).abs();
             mesh.positions.iter().map(error).sum::<f64>() / mesh.positions.len() as f64
         };

@@ -1,7 +1,9 @@
 //! A lost camera is found in the room that was mapped, and not in another one.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use tsdf_hash::{KeyframeIndex, Map, Relocaliser, Settings, TrackingSettings};
+use tsdf_hash::place_recognition::KeyframeIndex;
+use tsdf_hash::tracking::{Relocaliser, TrackingSettings};
+use tsdf_hash::{Map, Settings};
 
 use crate::noisy_room::{apart, seen, unit};
 use crate::random::Random;

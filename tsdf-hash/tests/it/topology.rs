@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
-use tsdf_hash::{Map, Mesh, Settings, write_ply};
+use tsdf_hash::mesh::{Mesh, write_ply};
+use tsdf_hash::{Map, Settings};
 
 use crate::random::Random;
 use crate::scene::{Shot, hit_sphere, look_at};

@@ -1,10 +1,8 @@
 //! The tracker against poses that are known.
 
 use nalgebra::{Isometry3, Matrix6, Point3, UnitQuaternion, Vector3};
-use tsdf_hash::{
-    ColourData, ColourView, Map, NoiseModel, PosePrior, Settings, Tracker, TrackingOutcome, TrackingSettings,
-    TrackingStatus,
-};
+use tsdf_hash::tracking::{PosePrior, Tracker, TrackingOutcome, TrackingSettings, TrackingStatus};
+use tsdf_hash::{ColourData, ColourView, Map, NoiseModel, Settings};
 
 use crate::random::Random;
 use crate::scene::{Shot, look_at, room};

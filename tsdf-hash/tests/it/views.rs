@@ -1,10 +1,9 @@
 //! Views seen from elsewhere, and the incremental ray cast of reloaded blocks.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use tsdf_hash::{
-    Error, IncrementalRayCast, IncrementalRayCastSettings, Intrinsics, Map, MemoryLimits, RayCastSettings, Settings,
-    View,
-};
+use tsdf_hash::ray_cast::{IncrementalRayCast, IncrementalRayCastSettings, RayCastSettings, View};
+use tsdf_hash::storage::MemoryLimits;
+use tsdf_hash::{Error, Intrinsics, Map, Settings};
 
 use crate::eviction::{FREE, add};
 use crate::scene::{Shot, hit_sphere, look_at, room};

@@ -1,7 +1,7 @@
 //! Pose graphs with known poses: a spiral around a sphere and one around a torus, as the literature's `sphere2500` and `torus3D`.
 
 use nalgebra::{Isometry3, Matrix6, Rotation3, Translation3, UnitQuaternion, Vector3, Vector6};
-use tsdf_hash::{BetweenFactor, PoseGraph, RobustKernel};
+use tsdf_hash::pose_graph::{BetweenFactor, PoseGraph, RobustKernel};
 
 /// A graph whose poses are those of its odometry, and the true ones.
 pub(crate) struct World {

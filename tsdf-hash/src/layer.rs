@@ -3,10 +3,13 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::blocks::trilinear::TrilinearCell;
-use crate::blocks::voxel_block::VoxelBlock;
-use crate::changes::{BlockChanges, MapVersion};
 use crate::error::Error;
 use crate::settings::Settings;
+
+pub use crate::blocks::voxel_block::VoxelBlock;
+pub use crate::changes::{BlockChanges, MapVersion};
+pub use crate::codec::{decode_block, encode_block};
+pub use crate::derived_blocks::UpdateReport;
 
 /// Reads single blocks.
 pub trait BlockReader {
@@ -19,7 +22,7 @@ pub trait BlockReader {
 }
 
 /// A layer of voxel blocks with a truncated signed distance, whoever keeps it (voxblox and nvblox call it so): what
-/// [`IncrementalMesher`](crate::IncrementalMesher) and [`DistanceField`](crate::DistanceField) follow.
+/// [`IncrementalMesher`](crate::mesh::IncrementalMesher) and [`DistanceField`](crate::distance_field::DistanceField) follow.
 ///
 /// The block `b` spans `8h b .. 8h (b + 1)` in the world, `h` being the voxel size; voxel `(i, j, k)` has its centre at
 /// `(i + ½, j + ½, k + ½) h`.
@@ -45,7 +48,7 @@ pub trait TsdfLayer {
 
     /// Signed distance from the nearest surface, metres, by trilinear interpolation, of the whole layer; `None` where one of
     /// the eight voxels around the point was never observed. For many points of a layer that is not in the processor's
-    /// memory, a [`DistanceField`](crate::DistanceField) is faster.
+    /// memory, a [`DistanceField`](crate::distance_field::DistanceField) is faster.
     ///
     /// # Errors
     /// Those of the map, when a block cannot be read.
