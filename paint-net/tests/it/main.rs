@@ -1,10 +1,12 @@
-//! What the crate promises, seen from outside.
+//! What the crate promises, seen from outside. `own_*`: what each trait asks of whoever brings his own.
 #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
 
 mod colour;
+mod examples;
 mod feedback;
 mod free_sprays;
 mod on_surface;
+mod own_observer;
 mod own_painter;
 mod painters;
 mod promises;

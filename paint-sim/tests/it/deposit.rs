@@ -3,8 +3,7 @@
 use nalgebra::{Point3, UnitVector3, Vector3};
 use paint_sim::film::MassBalance;
 use paint_sim::spray::QUANTUM;
-use paint_sim::surface::Hit;
-use paint_sim::{Error, Film, Shot, SprayModel, Surface, Texel, TriangleSurface};
+use paint_sim::{Error, Film, Shot, SprayModel, Texel, TriangleSurface};
 
 fn unit(x: f64, y: f64, z: f64) -> UnitVector3<f64> {
     UnitVector3::new_normalize(Vector3::new(x, y, z))
@@ -16,14 +15,14 @@ fn plate(height: f32, from: f32, size: f32) -> ([[f32; 3]; 4], [[u32; 3]; 2]) {
 }
 
 /// A surface that is never in the way.
-fn far_plate() -> TriangleSurface {
+pub(crate) fn far_plate() -> TriangleSurface {
     let (positions, faces) = plate(-50.0, -1.0, 1.0);
     TriangleSurface::new(&positions, &faces).unwrap()
 }
 
 /// Square texels of side `step` on the plane through (0, 0, d), tilted by `tilt` about y, as seen from a nozzle at the
 /// origin that sprays along z.
-fn tilted_plane(tilt: f64, d: f64, step: f64, half: f64) -> Vec<Texel> {
+pub(crate) fn tilted_plane(tilt: f64, d: f64, step: f64, half: f64) -> Vec<Texel> {
     let (s, c) = tilt.sin_cos();
     let n = (half / step) as i32;
     let place = |i: i32, j: i32| {
@@ -33,7 +32,7 @@ fn tilted_plane(tilt: f64, d: f64, step: f64, half: f64) -> Vec<Texel> {
     (-n..=n).flat_map(|i| (-n..=n).map(move |j| place(i, j))).collect()
 }
 
-fn shot(x: f64, y: f64, volume: f64) -> Shot {
+pub(crate) fn shot(x: f64, y: f64, volume: f64) -> Shot {
     Shot { origin: Point3::new(x, y, 0.0), axis: unit(0.0, 0.0, 1.0), volume }
 }
 
@@ -237,57 +236,6 @@ fn bad_input_is_named_and_leaves_the_film_alone() {
     assert!(matches!(attempt(&[good], &model, 0), Error::OutOfRange { what: "threads", .. }));
     let wide = SprayModel { sigma: 2.0, ..model };
     assert!(matches!(attempt(&[good], &wide, 1), Error::OutOfRange { what: "spray.sigma", .. }));
-}
-
-/// A ball in the spray, in closed form: a user's own surface.
-struct Ball {
-    centre: Point3<f64>,
-    radius: f64,
-}
-
-impl Surface for Ball {
-    fn cast(&self, origin: &Point3<f64>, direction: &Vector3<f64>, max: f64) -> Option<Hit> {
-        let to_centre = self.centre - origin;
-        let along = to_centre.dot(direction);
-        let beside = to_centre.norm_squared() - along * along;
-        let half = (self.radius * self.radius - beside).max(0.0).sqrt();
-        let distance = along - half;
-        let meets = beside < self.radius * self.radius && (0.0..=max).contains(&distance);
-        let normal = (direction * distance - to_centre) / self.radius;
-        meets.then_some(Hit { distance, face: 0, barycentric: [0.0; 2], normal })
-    }
-
-    fn distance(&self, point: &Point3<f64>, max: f64) -> f64 {
-        ((point - self.centre).norm() - self.radius).abs().min(max)
-    }
-}
-
-#[test]
-fn one_call_sprays_past_a_surface_of_the_users_own() {
-    let ball = Ball { centre: Point3::new(0.004, 0.0, 0.05), radius: 0.008 };
-    let texels = tilted_plane(0.0, 0.1, 1e-3, 0.06);
-    let shots = [shot(0.0, 0.0, 1e-9)];
-    let film = paint_sim::spray(texels.clone(), &shots, &SprayModel::default(), &ball, 1).unwrap();
-    let open = paint_sim::spray(texels, &shots, &SprayModel::default(), &far_plate(), 1).unwrap();
-    assert!(film.mass_balance().balanced());
-    let (mut dark, mut lit) = (0, 0);
-    for (texel, (behind, free)) in film.texels().iter().zip(film.volumes().iter().zip(open.volumes())) {
-        // The line from the nozzle to the texel passes the ball's centre at this distance.
-        let line = texel.point.coords.normalize();
-        let passing = ball.centre.coords.cross(&line).norm();
-        if *free == 0 || (passing - ball.radius).abs() < 1e-6 {
-            continue;
-        }
-        if passing < ball.radius {
-            assert_eq!(*behind, 0, "{}", texel.point);
-            dark += 1;
-        } else {
-            // What the open plane claims beyond a whole shot by its finite sum is scaled away.
-            assert!(behind.abs_diff(*free) <= 1 + free / 1000, "{}", texel.point);
-            lit += 1;
-        }
-    }
-    assert!(dark > 100 && lit > 1000, "{dark} {lit}");
 }
 
 #[test]

@@ -2,57 +2,17 @@
 
 mod interlock;
 
-use std::collections::VecDeque;
-
-use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
+use nalgebra::{Point3, Vector3};
 use paint_sim::flight::*;
 use paint_sim::{Error, FlightSettings, Shot, TriangleSurface, fly};
 
+use crate::own_pan_tilt::{LaggingPanTilt, arm};
+use crate::own_reference::{Ellipse, Still};
+
 /// A wall in the plane x = 0, painted from -x.
-fn wall() -> TriangleSurface {
+pub(crate) fn wall() -> TriangleSurface {
     let corners = [[0.0, -10.0, -10.0], [0.0, 10.0, -10.0], [0.0, 10.0, 10.0], [0.0, -10.0, 10.0]];
     TriangleSurface::new(&corners, &[[0, 2, 1], [0, 3, 2]]).unwrap()
-}
-
-/// An ellipse on the wall at up to 0.4 m/s, from 10 cm.
-struct Ellipse {
-    duration: f64,
-}
-
-impl Reference for Ellipse {
-    fn duration(&self) -> f64 {
-        self.duration
-    }
-
-    fn at(&self, t: f64) -> ReferenceState {
-        let (a, b, rate) = (0.5, 0.3, 0.8);
-        let (s, c) = (rate * t.clamp(0.0, self.duration)).sin_cos();
-        let on_wall = Vector3::new(0.0, a * s, 2.0 + b * c);
-        ReferenceState {
-            position: Point3::from(on_wall - Vector3::new(0.8, 0.0, 0.0)),
-            velocity: Vector3::new(0.0, a * rate * c, -b * rate * s),
-            acceleration: Vector3::new(0.0, -a * rate * rate * s, -b * rate * rate * c),
-            heading: 0.0,
-            heading_rate: 0.0,
-            aim: Some(Point3::from(on_wall)),
-            lever: Vector3::zeros(),
-            nozzle_distance: 0.1,
-            flow: 5e-7,
-        }
-    }
-}
-
-/// Stands still, the way a user's closure would.
-struct Still(ReferenceState);
-
-impl Reference for Still {
-    fn duration(&self) -> f64 {
-        2.0
-    }
-
-    fn at(&self, _: f64) -> ReferenceState {
-        self.0
-    }
 }
 
 fn still() -> ReferenceState {
@@ -60,65 +20,12 @@ fn still() -> ReferenceState {
     ReferenceState { velocity: zero, acceleration: zero, ..Ellipse { duration: 1.0 }.at(0.0) }
 }
 
-/// The ideal unit behind servos with a dead time of 20 ms, a first-order lag of 30 ms and steps of `resolution` rad: a
-/// user's own [`PanTilt`].
-struct LaggingPanTilt {
-    unit: IdealPanTilt,
-    resolution: f64,
-    pending: VecDeque<[f64; 2]>,
-    angles: [f64; 2],
-}
-
-const DEAD_STEPS: usize = 20;
-const SERVO_TIME_CONSTANT: f64 = 0.03;
-
-impl LaggingPanTilt {
-    fn new(resolution: f64) -> Self {
-        Self { unit: IdealPanTilt::default(), resolution, pending: VecDeque::new(), angles: [0.0; 2] }
-    }
-}
-
-impl PanTilt for LaggingPanTilt {
-    fn command(&self, world_from_body: &Isometry3<f64>, aim: &Point3<f64>) -> [f64; 2] {
-        self.unit.command(world_from_body, aim)
-    }
-
-    fn reset(&mut self, angles: [f64; 2]) {
-        self.angles = angles;
-        self.pending = VecDeque::from(vec![angles; DEAD_STEPS]);
-    }
-
-    /// Steps of one millisecond, as the flight makes them.
-    fn step(&mut self, command: [f64; 2], dt: f64) -> [f64; 2] {
-        let step = self.resolution;
-        self.pending.push_back(command.map(|c| if step > 0.0 { (c / step).round() * step } else { c }));
-        let due = self.pending.pop_front().unwrap_or(command);
-        for (angle, goal) in self.angles.iter_mut().zip(due) {
-            *angle += (goal - *angle) * (1.0 - (-dt / SERVO_TIME_CONSTANT).exp());
-        }
-        self.angles
-    }
-
-    fn nozzle(&self, world_from_body: &Isometry3<f64>, angles: [f64; 2]) -> (Point3<f64>, UnitVector3<f64>) {
-        self.unit.nozzle(world_from_body, angles)
-    }
-
-    fn delay(&self) -> f64 {
-        DEAD_STEPS as f64 * 1e-3 + SERVO_TIME_CONSTANT
-    }
-}
-
-/// Servos with steps of 300/1023 degrees.
-fn arm() -> LaggingPanTilt {
-    LaggingPanTilt::new((300.0_f64 / 1023.0).to_radians())
-}
-
-fn paint_hose() -> HoseModel {
+pub(crate) fn paint_hose() -> HoseModel {
     HoseModel { base: Point3::new(-2.5, 0.0, 0.0), length: 5.0, line_density: 0.12, base_on_floor: true }
 }
 
 /// Wind of 2 m/s with gusts, hose, motion capture.
-fn outdoors(seed: u64) -> FlightSettings {
+pub(crate) fn outdoors(seed: u64) -> FlightSettings {
     FlightSettings { hose: Some(paint_hose()), seed, ..FlightSettings::default() }
 }
 
@@ -226,35 +133,6 @@ fn every_noise_follows_the_seed() {
     }
     // Without any of them the seed means nothing.
     assert_eq!(run(Wind::calm(), exact, 7), run(Wind::calm(), exact, 8));
-}
-
-/// A controller of one's own: proportional and derivative, nothing known of lags or disturbances.
-struct PlainPd(Airframe);
-
-impl Controller for PlainPd {
-    fn command(&mut self, time: f64, estimate: &Estimate, reference: &dyn Reference) -> Command {
-        let wanted = reference.at(time);
-        let a = 2.0 * (wanted.position - estimate.position) + 2.0 * (wanted.velocity - estimate.velocity);
-        let [_, _, yaw] = estimate.attitude;
-        Command {
-            roll: -a.y / GRAVITY / self.0.roll_gain,
-            pitch: a.x / GRAVITY / self.0.pitch_gain,
-            yaw_rate: wanted.heading - yaw,
-            thrust: self.0.mass * (GRAVITY + a.z),
-        }
-    }
-}
-
-#[test]
-fn a_controller_of_ones_own_flies() {
-    let settings =
-        FlightSettings { wind: Wind::calm(), localisation: Localisation::perfect(), ..FlightSettings::default() };
-    let reference = Ellipse { duration: 20.0 };
-    let plain = fly_with(&reference, &mut PlainPd(settings.airframe), &mut arm(), &wall(), &settings).unwrap();
-    let error = plain.statistics().position_error_rms;
-    let cascaded = fly(&reference, &mut arm(), &wall(), &settings).unwrap().statistics().position_error_rms;
-    // No feed-forward: it lags behind an ellipse of half a metre, but not by much more than a tenth of it.
-    assert!(error < 0.15 && error > 3.0 * cascaded, "{error} {cascaded}");
 }
 
 #[test]

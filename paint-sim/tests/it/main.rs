@@ -1,10 +1,15 @@
-//! What the crate promises, seen from outside.
+//! What the crate promises, seen from outside. `own_*`: what each trait asks of whoever brings his own.
 #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
 
 mod colour;
 mod deposit;
 mod droplets;
+mod examples;
 mod flight;
 mod km;
+mod own_controller;
+mod own_pan_tilt;
+mod own_reference;
+mod own_surface;
 mod render;
 mod surface;

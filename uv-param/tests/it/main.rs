@@ -1,4 +1,4 @@
-//! What the crate promises, seen from outside.
+//! What the crate promises, seen from outside. `own_*`: what the trait asks of whoever brings his own.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
 
@@ -7,6 +7,7 @@ mod common;
 mod cuts;
 mod data;
 mod disk;
+mod examples;
 mod mapping;
 mod min_area_rectangle;
 mod own_parametrizer;
