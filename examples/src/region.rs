@@ -1,20 +1,17 @@
 //! The part of a mesh that is painted; all the rest stays in the way of the robot and of the spray.
 
-mod creases;
-mod parts;
-mod refine;
-
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
+use uv_param::region::{
+    DEFAULT_MEMORY_M, EditableMesh, EditableUv, Sample, divide_at_border, drop_small_parts, grow_to_creases,
+    samples_of_face,
+};
 
 use crate::mesh_io::TriangleMesh;
 use crate::picture_file::open_upright;
-use creases::{MEMORY, grow_to_creases};
-use parts::drop_small_parts;
-use refine::{Sample, refine, samples_of_face};
 
 /// A plane's region reaches as far off the plane as this share of its radius.
 const OFF_PLANE: f64 = 0.1;
@@ -71,6 +68,9 @@ pub enum RegionError {
     /// A vertex is not finite.
     #[error("vertex {0} is not finite: repair the mesh")]
     NotFinite(usize),
+    /// Its faces name what is not there.
+    #[error(transparent)]
+    Mesh(#[from] uv_param::Error),
 }
 
 /// A mesh of which a part is painted.
@@ -104,10 +104,10 @@ impl Region {
         let before = mesh.faces.len();
         let mut hint = String::new();
         let mut inside = match self {
-            Self::Pick(point) => self.picked(&mesh, Point3::from(*point), finest, MEMORY / unit)?,
+            Self::Pick(point) => self.picked(&mesh, Point3::from(*point), finest, DEFAULT_MEMORY_M / unit)?,
             Self::Box(corners) => {
                 let (low, high) = sides(corners);
-                refine(&mut mesh, finest, &|s| (0..3).all(|c| (low[c]..=high[c]).contains(&s.point[c])))
+                divide(&mut mesh, finest, &|s| (0..3).all(|c| (low[c]..=high[c]).contains(&s.point[c])))?
             }
             Self::Plane([px, py, pz, nx, ny, nz, radius]) => {
                 let (centre, normal) = (Point3::new(*px, *py, *pz), Vector3::new(*nx, *ny, *nz).normalize());
@@ -116,10 +116,12 @@ impl Region {
                     way.norm() <= *radius && way.dot(&normal).abs() <= OFF_PLANE * radius
                 };
                 let behind = |s: &Sample| near(s) && s.normal.dot(&normal) <= -SAME_SIDE;
-                if (0..mesh.faces.len()).any(|f| samples_of_face(&mesh, f, finest).iter().any(behind)) {
+                if (0..mesh.faces.len())
+                    .any(|f| samples_of_face(&mesh.positions, mesh.faces[f], finest).iter().any(behind))
+                {
                     hint = " on the side of its normal, but something on the other: turn the normal about".into();
                 }
-                refine(&mut mesh, finest, &|s| near(s) && s.normal.dot(&normal) >= SAME_SIDE)
+                divide(&mut mesh, finest, &|s| near(s) && s.normal.dot(&normal) >= SAME_SIDE)?
             }
             Self::Mask(path) => {
                 if mesh.uv.is_none() {
@@ -129,17 +131,17 @@ impl Region {
                     .map_err(|e| RegionError::Mask { region: self.to_string(), why: e.to_string() })?
                     .to_luma8();
                 let side = |c: f64, n: u32| ((c.rem_euclid(1.0) * f64::from(n)) as u32).min(n - 1);
-                refine(&mut mesh, finest, &|s| {
+                divide(&mut mesh, finest, &|s| {
                     let [u, v] = s.uv;
                     picture.get_pixel(side(u, picture.width()), side(1.0 - v, picture.height())).0[0] > 127
-                })
+                })?
             }
         };
         let divided = mesh.faces.len() - before;
         if divided > 0 {
             mesh.notes.push(format!("{divided} faces more where the border of the region divides them"));
         }
-        let small = drop_small_parts(&mesh, &mut inside, SMALLEST_PART / (unit * unit));
+        let small = drop_small_parts(&mesh.positions, &mesh.faces, &mut inside, SMALLEST_PART / (unit * unit))?;
         if small.parts > 0 {
             mesh.notes.push(format!(
                 "{} parts of the region ({} faces) are smaller than a spray and stay bare",
@@ -182,7 +184,7 @@ impl Region {
     ) -> Result<Vec<bool>, RegionError> {
         let mut nearest = (f64::INFINITY, 0);
         for face in 0..mesh.faces.len() {
-            for sample in samples_of_face(mesh, face, finest) {
+            for sample in samples_of_face(&mesh.positions, mesh.faces[face], finest) {
                 let distance = (sample.point - point).norm();
                 if distance < nearest.0 {
                     nearest = (distance, face);
@@ -194,13 +196,24 @@ impl Region {
         if nearest.0 > PICKED * diagonal {
             return Err(self.empty(mesh, format!(", the nearest point is {:.3} units away", nearest.0)));
         }
-        Ok(grow_to_creases(mesh, nearest.1, memory))
+        Ok(grow_to_creases(&mesh.positions, &mesh.faces, nearest.1, memory)?)
     }
 
     fn empty(&self, mesh: &TriangleMesh, hint: String) -> RegionError {
         let (low, high) = mesh.bounds();
         RegionError::Empty { region: self.to_string(), hint, low, high }
     }
+}
+
+/// Divides the faces across a border; says which faces lie inside.
+fn divide(mesh: &mut TriangleMesh, finest: f64, inside: &dyn Fn(&Sample) -> bool) -> Result<Vec<bool>, RegionError> {
+    let TriangleMesh { positions, faces, colours, uv, materials, .. } = mesh;
+    let uv = uv.as_mut().map(|uv| EditableUv { coordinates: &mut uv.coordinates, faces: &mut uv.faces });
+    let division = divide_at_border(EditableMesh { positions, faces, colours: colours.as_mut(), uv }, finest, inside)?;
+    if let Some(materials) = materials {
+        materials.faces = division.source.iter().map(|&face| materials.faces[face as usize]).collect();
+    }
+    Ok(division.inside)
 }
 
 fn sides(corners: &[f64; 6]) -> ([f64; 3], [f64; 3]) {

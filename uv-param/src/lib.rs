@@ -35,6 +35,7 @@
 //! | Smith and Schaefer 2015, symmetric Dirichlet energy | [`parametrizer::SymmetricDirichlet`] |
 //! | thesis 8, "cuts along high distortion areas"; Gu et al. 2002, cut to the worst distortion | [`unwrap_with_cuts`], [`Disk::cut`] |
 //! | Cohen-Steiner et al. 2004, regions of similar normals; merged within a bound of stretch (ours) | [`unwrap_atlas`] |
+//! | Zheng et al. 2011, Eq. (3), bilateral normals; a part of a mesh up to its creases (ours) | [`region::grow_to_creases`] |
 //! | Tutte 1963, barycentric layout | [`parametrizer::Tutte`] |
 //! | a map of your own | [`Parametrizer`], [`unwrap_by`] |
 //! | thesis 8.3.1, box of smallest area by rotating calipers | [`min_area_rectangle::min_area_rectangle`], [`Chart::new`] |
@@ -57,6 +58,7 @@ pub mod nozzle;
 pub mod parametrizer;
 mod polygon_soup;
 mod random;
+pub mod region;
 pub mod surface;
 pub mod texture;
 mod trace;

@@ -92,12 +92,12 @@ fn a_turret_keeps_the_promises_of_the_trait() {
 
 #[test]
 fn the_collision_body_covers_its_barrel() {
-    let (turret, pose) = (Turret { barrel: 0.6 }, Isometry3::translation(0.0, 0.0, 2.0));
+    let (turret, pose) = (Turret { barrel: 0.14 }, Isometry3::translation(0.0, 0.0, 2.0));
     let mut spheres = Vec::new();
     CollisionBody::default().spheres(&turret, &pose, &[0.4, -0.3], &mut spheres);
     let [from, to] = turret.members(&pose, &[0.4, -0.3])[..] else { panic!("a barrel has two ends") };
-    // All of it but the last centimetres.
-    for share in (0..90).map(|k| f64::from(k) / 100.0) {
+    // All of it but the last centimetres: three spheres of 2.5 cm reach along 15 cm.
+    for share in (0..80).map(|k| f64::from(k) / 100.0) {
         let point = from + (to - from) * share;
         assert!(spheres.iter().any(|(centre, radius)| (centre - point).norm() <= radius + 1e-9), "{share}");
     }

@@ -11,4 +11,5 @@ mod examples;
 mod mapping;
 mod min_area_rectangle;
 mod own_parametrizer;
+mod region;
 mod unwrap;

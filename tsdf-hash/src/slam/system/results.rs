@@ -76,7 +76,7 @@ impl<S: FrameSource> Slam<S> {
     /// [`SlamState::read`] reads it. Let the map follow first ([`reintegrate`](Self::reintegrate)): it must fit the poses.
     ///
     /// # Errors
-    /// As [`Map::save`]; a map on a GPU is fetched first.
+    /// As [`Map::save`](crate::Map::save); a map on a GPU is fetched first.
     pub fn save(&self, path: &Path, mesh: Option<&Mesh>, metadata: BTreeMap<String, Vec<u8>>) -> Result<(), Error> {
         let metadata = with_metadata(metadata, self.last_stamp, &self.trajectory, self.keyframes());
         self.map.with_map(|map| map.save(path, mesh, &metadata))

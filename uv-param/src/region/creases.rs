@@ -5,9 +5,9 @@ use std::collections::BinaryHeap;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::mesh_io::TriangleMesh;
-
 use super::parts::neighbours;
+use super::{area_vectors, check};
+use crate::error::Error;
 
 /// Rounds of smoothing: scans are rough at the size of their faces.
 const ROUNDS: usize = 4;
@@ -15,9 +15,9 @@ const ROUNDS: usize = 4;
 const SIGMA: f64 = 0.35;
 /// Cosine of the angle between a face and what lies before it on the way, above which there is a crease: 25 degrees.
 const CREASE: f64 = 0.906;
-/// Way over which "what lies before" is averaged, metres: maps round their creases by a few centimetres. A pillar thinner than half a
+/// Way over which "what lies before" is averaged, metres (ours): maps round their creases by a few centimetres. A pillar thinner than half a
 /// metre has no end of creases then.
-pub(super) const MEMORY: f64 = 0.12;
+pub const DEFAULT_MEMORY_M: f64 = 0.12;
 
 /// A face that can be reached, the nearest first.
 #[derive(PartialEq)]
@@ -42,21 +42,36 @@ impl PartialOrd for Step {
 }
 
 /// The faces that are reached from `seed` without a crease, the nearest first. A crease is where the normal leaves the mean of the
-/// normals on the way, which forgets over `memory` (units of the file): a sharp edge, and one that a map has rounded, but not a
-/// surface that bends slowly.
-pub(super) fn grow_to_creases(mesh: &TriangleMesh, seed: usize, memory: f64) -> Vec<bool> {
-    let pairs = neighbours(mesh);
-    let normals = filtered_normals(mesh, &pairs);
+/// normals on the way, which forgets over `memory` (units of the mesh): a sharp edge, and one that a map has rounded, but not a
+/// surface that bends slowly. Says of every face whether it was reached.
+///
+/// # Errors
+/// [`Error::IndexOutOfRange`]; [`Error::Setting`] for a seed that is no face, and for a memory below 0.
+pub fn grow_to_creases(
+    positions: &[[f32; 3]],
+    faces: &[[u32; 3]],
+    seed: usize,
+    memory: f64,
+) -> Result<Vec<bool>, Error> {
+    check(positions, faces)?;
+    if seed >= faces.len() {
+        return Err(Error::Setting { name: "seed", value: seed as f64, must_be: "the number of a face" });
+    }
+    if !(memory >= 0.0 && memory.is_finite()) {
+        return Err(Error::Setting { name: "memory", value: memory, must_be: "finite and at least 0" });
+    }
+    let pairs = neighbours(positions, faces);
+    let normals = filtered_normals(positions, faces, &pairs);
     let centre = |f: u32| {
-        let corners = mesh.faces[f as usize].map(|i| Vector3::from(mesh.positions[i as usize].map(f64::from)));
+        let corners = faces[f as usize].map(|i| Vector3::from(positions[i as usize].map(f64::from)));
         Point3::from(corners.iter().sum::<Vector3<f64>>() / 3.0)
     };
-    let mut around = vec![Vec::new(); mesh.faces.len()];
+    let mut around = vec![Vec::new(); faces.len()];
     for [a, b] in pairs {
         around[a as usize].push(b);
         around[b as usize].push(a);
     }
-    let mut before: Vec<Option<Vector3<f64>>> = vec![None; mesh.faces.len()];
+    let mut before: Vec<Option<Vector3<f64>>> = vec![None; faces.len()];
     let mut open = BinaryHeap::from([Reverse(Step { way: 0.0, face: seed as u32, from: seed as u32 })]);
     while let Some(Reverse(Step { way, face, from })) = open.pop() {
         if before[face as usize].is_some() {
@@ -75,12 +90,12 @@ pub(super) fn grow_to_creases(mesh: &TriangleMesh, seed: usize, memory: f64) -> 
             open.push(Reverse(Step { way, face: next, from: face }));
         }
     }
-    before.iter().map(Option::is_some).collect()
+    Ok(before.iter().map(Option::is_some).collect())
 }
 
 /// Bilaterally filtered normals: averaged where they are alike, kept apart across a crease.
-fn filtered_normals(mesh: &TriangleMesh, pairs: &[[u32; 2]]) -> Vec<Vector3<f64>> {
-    let areas: Vec<Vector3<f64>> = mesh.area_vectors().collect();
+fn filtered_normals(positions: &[[f32; 3]], faces: &[[u32; 3]], pairs: &[[u32; 2]]) -> Vec<Vector3<f64>> {
+    let areas: Vec<Vector3<f64>> = area_vectors(positions, faces).collect();
     let mut normals: Vec<Vector3<f64>> = areas.iter().map(|a| a.try_normalize(0.0).unwrap_or_default()).collect();
     for _ in 0..ROUNDS {
         let mut next: Vec<Vector3<f64>> = normals.iter().zip(&areas).map(|(n, a)| n * a.norm()).collect();

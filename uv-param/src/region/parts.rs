@@ -2,23 +2,24 @@
 
 use std::collections::HashMap;
 
-use crate::mesh_io::TriangleMesh;
-
-use super::refine::same_places;
+use super::{area_vectors, check, same_places};
+use crate::error::Error;
 
 /// What was taken out of a selection.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct SmallParts {
-    pub(super) parts: usize,
-    pub(super) faces: usize,
+pub struct SmallParts {
+    /// How many parts.
+    pub parts: usize,
+    /// How many faces they had.
+    pub faces: usize,
 }
 
 /// Faces on either side of every edge, as pairs; edges with more faces are in several.
-pub(super) fn neighbours(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
-    let joined = same_places(mesh);
-    let mut last: HashMap<(u32, u32), u32> = HashMap::with_capacity(2 * mesh.faces.len());
-    let mut pairs = Vec::with_capacity(2 * mesh.faces.len());
-    for (f, face) in mesh.faces.iter().enumerate() {
+pub(super) fn neighbours(positions: &[[f32; 3]], faces: &[[u32; 3]]) -> Vec<[u32; 2]> {
+    let joined = same_places(positions);
+    let mut last: HashMap<(u32, u32), u32> = HashMap::with_capacity(2 * faces.len());
+    let mut pairs = Vec::with_capacity(2 * faces.len());
+    for (f, face) in faces.iter().enumerate() {
         for k in 0..3 {
             let [a, b] = [face[k], face[(k + 1) % 3]].map(|v| joined[v as usize]);
             if let Some(other) = last.insert((a.min(b), a.max(b)), f as u32) {
@@ -29,17 +30,29 @@ pub(super) fn neighbours(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     pairs
 }
 
-/// Takes parts with less than `smallest` area (square units of the file) out of a selection.
-pub(super) fn drop_small_parts(mesh: &TriangleMesh, inside: &mut [bool], smallest: f64) -> SmallParts {
-    let mut parent: Vec<u32> = (0..mesh.faces.len() as u32).collect();
-    for [a, b] in neighbours(mesh) {
+/// Takes parts with less than `smallest` area (square units of the mesh) out of a selection of faces.
+///
+/// # Errors
+/// [`Error::IndexOutOfRange`]; [`Error::Length`] where `inside` has not one value per face.
+pub fn drop_small_parts(
+    positions: &[[f32; 3]],
+    faces: &[[u32; 3]],
+    inside: &mut [bool],
+    smallest: f64,
+) -> Result<SmallParts, Error> {
+    check(positions, faces)?;
+    if inside.len() != faces.len() {
+        return Err(Error::Length { what: "inside", expected: faces.len(), found: inside.len() });
+    }
+    let mut parent: Vec<u32> = (0..faces.len() as u32).collect();
+    for [a, b] in neighbours(positions, faces) {
         if inside[a as usize] && inside[b as usize] {
             let [a, b] = [a, b].map(|f| root(&mut parent, f));
             parent[a.max(b) as usize] = a.min(b);
         }
     }
-    let mut area = vec![0.0; mesh.faces.len()];
-    for (f, vector) in mesh.area_vectors().enumerate() {
+    let mut area = vec![0.0; faces.len()];
+    for (f, vector) in area_vectors(positions, faces).enumerate() {
         area[root(&mut parent, f as u32) as usize] += vector.norm();
     }
     let mut small = SmallParts::default();
@@ -51,7 +64,7 @@ pub(super) fn drop_small_parts(mesh: &TriangleMesh, inside: &mut [bool], smalles
             *inside = false;
         }
     }
-    small
+    Ok(small)
 }
 
 fn root(parent: &mut [u32], mut face: u32) -> u32 {
