@@ -20,6 +20,7 @@ mod settings;
 mod state;
 mod system;
 mod trajectory_text;
+mod wrong_minimum;
 
 pub use correction::Correction;
 pub use frame_memory::FrameMemory;

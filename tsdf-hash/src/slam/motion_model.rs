@@ -68,6 +68,11 @@ impl MotionModel {
         self.last.is_none()
     }
 
+    /// The last pose.
+    pub(crate) fn last(&self) -> Option<Isometry3<f64>> {
+        self.last.map(|last| last.world_from_camera)
+    }
+
     /// Whether frames are missing before this one, and no odometry says where the camera has gone.
     pub fn is_gap(&self, frame: &StampedPose) -> bool {
         self.steps(frame).is_some_and(|steps| steps > LONGEST_STEP) && !self.is_led(frame)

@@ -156,6 +156,12 @@ impl Tracker {
             && outcome.degenerate.is_empty()
     }
 
+    /// Whether map and frame agree, in depth and in intensity, as they do at the right pose.
+    pub(crate) fn convinces(&self, outcome: &TrackingOutcome) -> bool {
+        outcome.agreement >= self.settings.relocalise_agreement
+            && outcome.likeness.is_none_or(|likeness| likeness >= LEAST_LIKENESS)
+    }
+
     /// Whether an outcome says that the camera is elsewhere: enough of the map was in view, and it is another one.
     pub(crate) fn contradicts(&self, outcome: &TrackingOutcome) -> bool {
         let unlike = outcome.likeness.is_some_and(|likeness| likeness < LEAST_LIKENESS);

@@ -32,6 +32,8 @@ mod recorded;
 mod relocalisation;
 mod reversible;
 mod scene;
+mod strange_motion;
 mod topology;
 mod tracking;
 mod views;
+mod worlds;
