@@ -58,7 +58,7 @@
 //! | Paper II, section 5.2, first-order attitude | [`control::TrackingMpc`], [`control::identify_attitude`] |
 //! | VR paper, section V, deviation from the normal | [`Target::normal_deviation`] |
 //! | handheld paper, section IV, Eqs. (1)-(5) | [`gantry`] |
-//! | VR paper, Algorithm 1, rules (a)-(e), latencies | [`session`] |
+//! | VR paper, Algorithm 1, rules (a)-(e), latencies | [`teleop`] |
 
 mod angle;
 mod bernstein;
@@ -79,10 +79,10 @@ pub mod nozzle;
 pub mod plan;
 mod raise_clearance;
 mod route;
-pub mod session;
 mod settings;
 pub mod stroke_order;
 mod target;
+pub mod teleop;
 pub mod timing;
 mod trace;
 pub mod trajectory;

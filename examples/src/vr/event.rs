@@ -1,7 +1,7 @@
 //! What the person does: states and commands, in one sequence.
 
 use nalgebra::Point3;
-use paint_planner::session::VrState;
+use paint_planner::teleop::VrState;
 use serde::{Deserialize, Serialize};
 
 /// A button of the page.

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, UnitVector3, Vector3};
-use paint_planner::session::{CradlePose, PaintHit, RATE, VERSION, VrMode, VrState};
+use paint_planner::teleop::{CradlePose, PaintHit, RATE, VERSION, VrMode, VrState};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
@@ -86,7 +86,7 @@ pub(super) fn way(what: Way) -> Vec<[f64; 2]> {
 pub(super) fn place(world: &VrWorld, [right, up]: [f64; 2]) -> Option<PaintHit> {
     let ahead = UnitVector3::new_unchecked(Vector3::new(world.home.heading.cos(), world.home.heading.sin(), 0.0));
     let aside = ahead.cross(&Vector3::z());
-    world.cast(&(world.stand + aside * right + Vector3::z() * up), &ahead)
+    world.hit_along(&(world.stand + aside * right + Vector3::z() * up), &ahead)
 }
 
 fn state(world: &VrWorld, tick: u64, mode: VrMode, at: [f64; 2]) -> VrState {

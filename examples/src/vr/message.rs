@@ -1,6 +1,6 @@
 //! What the person is told, beside pictures.
 
-use paint_planner::session::Feedback;
+use paint_planner::teleop::Feedback;
 use serde::Serialize;
 
 /// A message of the session.

@@ -111,7 +111,7 @@ pub(super) fn welcome(session: &Session, key: &str) -> ServerMessage {
         cradle: world.stand.coords.into(),
         heading: world.home.heading,
         far: session.settings().session.far,
-        stand_off: super::settings::STAND_OFF,
+        stand_off: session.stand_off(),
     }
 }
 

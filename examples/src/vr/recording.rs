@@ -7,12 +7,13 @@ use std::path::{Path, PathBuf};
 use foxglove::messages::{Pose, PoseInFrame, Timestamp};
 use mcap::Message;
 use paint_planner::Plan;
+use paint_planner::teleop::PlannedTask;
 use serde::{Deserialize, Serialize};
 
 use super::error::VrError;
 use super::event::Event;
 use super::settings::VrSettings;
-use super::vehicle::{PlannedTask, VehicleView};
+use super::simulated_vehicle::VehicleView;
 use crate::mcap_messages::{MessagesFault, messages_of};
 use crate::recording::{Recorder, quaternion, vector};
 
@@ -42,8 +43,11 @@ pub(super) struct PlanMark {
 
 impl PlanMark {
     pub(super) fn of(planned: &PlannedTask) -> Self {
-        let hash = planned.plan.as_ref().map_or_else(String::new, |plan| format!("{:016x}", plan_hash(plan)));
-        Self { number: planned.number, time: planned.time, kind: planned.kind.into(), hash }
+        let hash = planned
+            .flight
+            .as_ref()
+            .map_or_else(|_| String::new(), |flight| format!("{:016x}", plan_hash(&flight.plan)));
+        Self { number: planned.number, time: planned.time, kind: planned.kind.name().into(), hash }
     }
 }
 
@@ -152,8 +156,8 @@ impl SessionRecorder {
 
     /// The waypoints of a plan as rows; numbers have the digits that tell them apart.
     fn write_table(&mut self, planned: &PlannedTask) -> std::io::Result<()> {
-        let PlannedTask { number, kind, .. } = planned;
-        for waypoint in planned.plan.iter().flat_map(|plan| &plan.waypoints) {
+        let (number, kind) = (planned.number, planned.kind.name());
+        for waypoint in planned.flight.iter().flat_map(|flight| &flight.plan.waypoints) {
             let s = &waypoint.state;
             let target = waypoint.target.map_or(String::new(), |target| target.to_string());
             let [x, y, z] = s.position.into();

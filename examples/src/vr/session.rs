@@ -1,12 +1,11 @@
 //! A session without a network: events in, paint, plans and notices out. It knows no clock but that of the events.
 
-use std::collections::VecDeque;
 use std::path::PathBuf;
+use std::time::Instant;
 
-use nalgebra::Point3;
 use nalgebra::UnitVector3;
-use paint_planner::session::{
-    Feedback, LagIndicator, LiveQueue, QueueCounts, RATE, ResampleCounts, Resampler, Task, VrMode, VrState,
+use paint_planner::teleop::{
+    PlannedTask, QueueCounts, RATE, ResampleCounts, Resampler, TaskKind, Teleop, TeleopScene, VrMode, VrState,
 };
 use paint_sim::Shot;
 
@@ -18,14 +17,12 @@ use super::latency::LatencyCurves;
 use super::message::Notice;
 use super::recording::{PlanMark, SessionRecorder};
 use super::settings::VrSettings;
-use super::strokes::Strokes;
-use super::vehicle::{PlannedTask, Vehicle, VehicleView, stand_off};
+use super::simulated_vehicle::{SimulatedVehicle, VehicleView};
 use super::world::VrWorld;
+use crate::adapters::MeshSurface;
 
 /// Ticks between two entries of the latency curve and of the recorded flight.
 const CURVE_STRIDE: u64 = 9;
-/// Way of the cradle after which the robot is asked once more to come, m.
-const SOUGHT: f64 = 0.1;
 /// Longest time that the vehicle is given to finish after the last event, s.
 const LONGEST_FINISH: f64 = 3600.0;
 
@@ -52,25 +49,17 @@ pub struct Session {
     settings: VrSettings,
     world: VrWorld,
     clock: Resampler,
-    queue: LiveQueue,
-    vehicle: Vehicle,
-    lag: LagIndicator,
-    live: bool,
+    teleop: Teleop,
+    vehicle: SimulatedVehicle,
     /// The latest tick before a pause: all that the recording knows of the hand until it ends.
     paused: Option<VrState>,
     /// Paint as the person sees it, and as the robot has sprayed it.
     seen: Canvas,
     flown: Canvas,
-    /// What was painted while the robot did not follow.
-    strokes: Strokes,
-    tasks: VecDeque<Task>,
     next_sequence: u64,
     /// Time of the latest state on the page's clock, s.
     page_time: f64,
-    /// Where the person was when the robot was last asked to come.
-    sought: Option<Point3<f64>>,
     last_tick: Option<VrState>,
-    too_far: bool,
     notices: Vec<Notice>,
     curves: LatencyCurves,
     /// Once it is finished: how far the robot was behind at the last state, m, and how long it flew on, s.
@@ -86,22 +75,18 @@ impl Session {
     /// # Errors
     /// A world without texels.
     pub fn new(settings: VrSettings, world: VrWorld, recorder: Option<SessionRecorder>) -> Result<Self, VrError> {
+        let mut teleop = Teleop::new(settings.teleop(), world.home);
+        teleop.set_live(settings.live);
         Ok(Self {
             clock: Resampler::new(settings.session.clone()),
-            queue: LiveQueue::new(settings.session.clone()),
-            vehicle: Vehicle::new(&world),
-            lag: LagIndicator::default(),
-            live: settings.live,
+            teleop,
+            vehicle: SimulatedVehicle::new(&world, settings.seed),
             paused: None,
             seen: Canvas::new(&world)?,
             flown: Canvas::new(&world)?,
-            strokes: Strokes::default(),
-            tasks: VecDeque::new(),
             next_sequence: 0,
             page_time: 0.0,
-            sought: None,
             last_tick: None,
-            too_far: false,
             notices: Vec::new(),
             curves: LatencyCurves::default(),
             behind: None,
@@ -177,15 +162,15 @@ impl Session {
     /// As [`Session::handle`].
     pub fn finish(&mut self) -> Result<(), VrError> {
         let Some(last) = self.last_tick else { return Ok(()) };
-        self.fly_strokes();
+        self.teleop.fly_strokes();
         let (lag, end) = (self.lag(), last.time + LONGEST_FINISH);
         let mut tick = VrState { mode: VrMode::Idle, hit: None, ..last };
-        while !(self.queue.is_empty() && self.tasks.is_empty() && self.vehicle.is_free()) && tick.time < end {
+        while !self.teleop.is_done() && tick.time < end {
             tick.sequence += 1;
             tick.time = tick.sequence as f64 / RATE;
             self.tick(tick)?;
         }
-        self.behind = Some([if self.live { lag } else { 0.0 }, self.time() - last.time]);
+        self.behind = Some([if self.is_live() { lag } else { 0.0 }, self.time() - last.time]);
         if let Some(recorder) = self.recorder.take() {
             recorder.finish()?;
         }
@@ -204,7 +189,7 @@ impl Session {
 
     /// What the person is to be told since the last call.
     pub fn take_notices(&mut self) -> Vec<Notice> {
-        let feedback = self.queue.take_feedback();
+        let feedback = self.teleop.take_feedback();
         self.notices.extend(feedback.into_iter().map(Notice::Feedback));
         std::mem::take(&mut self.notices)
     }
@@ -237,7 +222,7 @@ impl Session {
     }
 
     pub(super) fn is_live(&self) -> bool {
-        self.live
+        self.teleop.is_live()
     }
 
     pub(super) fn is_paused(&self) -> bool {
@@ -245,12 +230,17 @@ impl Session {
     }
 
     pub(super) fn is_waiting(&self) -> bool {
-        self.queue.is_waiting()
+        self.teleop.is_waiting()
+    }
+
+    /// Nearest and farthest stand-off that the brush size stands for, m.
+    pub(super) fn stand_off(&self) -> [f64; 2] {
+        self.teleop.settings().stand_off
     }
 
     /// Latency in distance now, m.
     pub(super) fn lag(&self) -> f64 {
-        (self.queue.painted_length() - self.vehicle.painted_length()).max(0.0)
+        self.teleop.lag()
     }
 
     /// How far the robot was behind at the last state, m (0 where it does not follow), and how long it flew on after it, s; `None` before
@@ -270,7 +260,7 @@ impl Session {
     }
 
     pub(super) fn counts(&self) -> (SessionCounts, QueueCounts, ResampleCounts) {
-        (self.counts, self.queue.counts(), self.clock.counts())
+        (self.counts, self.teleop.counts(), self.clock.counts())
     }
 
     fn state(&mut self, state: VrState) -> Result<(), VrError> {
@@ -285,96 +275,46 @@ impl Session {
 
     fn tick(&mut self, tick: VrState) -> Result<(), VrError> {
         self.last_tick = Some(tick);
-        let painted = if self.live { self.push_live(tick) } else { self.push_offline(tick) };
-        if painted {
-            let shot: Vec<Shot> = preview(&tick).into_iter().collect();
-            let spray = self.settings.spray();
-            self.seen.spray(tick.colour, &shot, &spray, &self.world.surface.world)?;
+        if self.teleop.push(tick) {
+            let shot: Vec<Shot> = self.preview(&tick).into_iter().collect();
+            self.seen.spray(tick.colour, &shot, &self.settings.spray(), &self.world.surface.world)?;
         }
         self.start_tasks(tick.time)?;
-        let (colour, shots) = self.vehicle.advance(tick.time);
+        let (colour, shots) = self.vehicle.advance(tick.time, &self.world)?;
         if !shots.is_empty() {
             self.flown.spray(colour, &shots, &self.settings.spray(), &self.world.surface.world)?;
         }
+        self.teleop.advance(tick.time, &self.vehicle);
         self.measure(&tick)
     }
 
-    /// Whether the state paints: not while the person has to wait, nor from too far away.
-    fn push_live(&mut self, tick: VrState) -> bool {
-        let before = self.queue.counts().accepted;
-        self.queue.push(tick);
-        let accepted = self.queue.counts().accepted > before;
-        accepted && tick.hit.is_some_and(|hit| self.near(&tick, &hit.point))
-    }
-
-    fn push_offline(&mut self, tick: VrState) -> bool {
-        let Some(hit) = tick.hit.filter(|_| tick.mode == VrMode::Painting) else {
-            self.strokes.rest(tick);
-            self.too_far = false;
-            return false;
-        };
-        let near = self.near(&tick, &hit.point);
-        if near {
-            self.strokes.paint(tick);
-        } else if !self.too_far {
-            let distance = (hit.point - tick.nozzle_position()).norm();
-            self.notices.push(Notice::Feedback(Feedback::MoveCloser { distance }));
-        }
-        self.too_far = !near;
-        near
-    }
-
-    fn near(&self, tick: &VrState, hit: &Point3<f64>) -> bool {
-        (hit - tick.nozzle_position()).norm() < self.settings.session.far
-    }
-
-    /// Gives the vehicle its next task when it is free: first what was painted offline, then what the queue has. While it paints live
-    /// it is given the next piece of the stroke before it halts.
     fn start_tasks(&mut self, now: f64) -> Result<(), VrError> {
-        if self.tasks.is_empty() && self.vehicle.is_continuable(now) {
-            let position = self.vehicle.position();
-            if let Some(segment) = self.queue.next_continuation(now, &position) {
-                if let Some(planned) = self.vehicle.go_on(&segment, now, &self.world, &self.settings)? {
-                    self.counts.continued += 1;
-                    self.planned(&planned)?;
-                } else {
-                    self.queue.give_back(segment);
-                    self.vehicle.let_halt();
-                }
-            }
+        loop {
+            let begun = Instant::now();
+            let surface = MeshSurface(&self.world.surface.world);
+            let scene = TeleopScene { canvas: &self.world, surface: &surface, tool: &self.world.robot };
+            let Some(planned) = self.teleop.step(now, &scene, &mut self.vehicle)? else { return Ok(()) };
+            self.curves.planning.push(begun.elapsed().as_secs_f64());
+            self.planned(&planned)?;
         }
-        while self.vehicle.is_free() {
-            let position = self.vehicle.position();
-            let Some(task) = self.tasks.pop_front().or_else(|| self.queue.next_task(now, &position)) else { break };
-            if let Task::Seek(state) = &task {
-                // Where the robot could not come to the person it is not asked again until the person has moved.
-                let here = state.cradle.position;
-                if self.sought.is_some_and(|sought| (sought - here).norm() < SOUGHT) {
-                    continue;
-                }
-                self.sought = Some(here);
-            }
-            if let Some(planned) = self.vehicle.begin(&task, now, &self.world, &self.settings)? {
-                self.planned(&planned)?;
-                self.sought = self.sought.filter(|_| planned.kind == "seek");
-            }
-        }
-        Ok(())
     }
 
     fn planned(&mut self, planned: &PlannedTask) -> Result<(), VrError> {
+        let paints = planned.kind == TaskKind::Paint;
         self.counts.plans += 1;
-        self.curves.planning.push(planned.seconds);
-        if planned.kind == "paint" {
+        if paints {
             self.counts.paint_tasks += 1;
-            self.counts.targets += planned.targets[0] as u64;
-            self.counts.targets_served += planned.targets[1] as u64;
+            self.counts.targets += planned.targets as u64;
+            self.counts.targets_served += planned.served as u64;
         }
-        self.curves.time.extend(planned.latency.filter(|_| self.live).map(|latency| (planned.time, latency)));
-        if let Some(why) = &planned.refused {
-            self.counts.refused_tasks += 1;
-            self.counts.refused_paint += u64::from(planned.kind == "paint");
-            self.say(format!("the robot cannot {} here: {why}", planned.kind));
+        self.curves.time.extend(planned.latency.filter(|_| self.is_live()).map(|latency| (planned.time, latency)));
+        match &planned.flight {
+            Ok(flight) => self.counts.continued += u64::from(flight.takes_over),
+            Err(why) => {
+                self.counts.refused_tasks += 1;
+                self.counts.refused_paint += u64::from(paints);
+                self.say(format!("the robot cannot {} here: {why}", planned.kind.name()));
+            }
         }
         let mark = PlanMark::of(planned);
         if let Some(recorder) = &mut self.recorder {
@@ -386,11 +326,8 @@ impl Session {
 
     fn measure(&mut self, tick: &VrState) -> Result<(), VrError> {
         let lag = self.lag();
-        if let Some(feedback) = self.lag.update(lag, &self.settings.session).filter(|_| self.live) {
-            self.notices.push(Notice::Feedback(feedback));
-        }
         if tick.sequence.is_multiple_of(CURVE_STRIDE) {
-            if self.live && (tick.mode == VrMode::Painting || lag > 0.0) {
+            if self.is_live() && (tick.mode == VrMode::Painting || lag > 0.0) {
                 self.curves.distance.push((tick.time, lag));
             }
             if let Some(recorder) = &mut self.recorder {
@@ -402,14 +339,14 @@ impl Session {
 
     fn command(&mut self, command: Command) -> Result<Handled, VrError> {
         match command {
-            Command::Live { on } => self.live = on,
+            Command::Live { on } => self.teleop.set_live(on),
             Command::Pause { on } => self.pause(on),
             Command::Undo => self.undo()?,
             Command::Erase { point, radius } => {
-                let erased = self.strokes.erase(&point, radius);
+                let erased = self.teleop.erase(&point, radius);
                 self.withdraw(&erased)?;
             }
-            Command::Fly => self.fly_strokes(),
+            Command::Fly => self.teleop.fly_strokes(),
             Command::Save => return Ok(Handled::Results { end: false }),
             Command::End => return Ok(Handled::Results { end: true }),
         }
@@ -422,7 +359,7 @@ impl Session {
     }
 
     fn undo(&mut self) -> Result<(), VrError> {
-        let stroke = self.strokes.undo();
+        let stroke = self.teleop.undo();
         if stroke.is_empty() {
             self.say("nothing to take back: what the robot follows at once is on the wall".into());
         }
@@ -433,25 +370,21 @@ impl Session {
         self.counts.taken_back += states.len() as u64;
         let spray = self.settings.spray();
         for of_one_colour in states.chunk_by(|a, b| a.colour == b.colour) {
-            let shots: Vec<Shot> = of_one_colour.iter().filter_map(preview).collect();
+            let shots: Vec<Shot> = of_one_colour.iter().filter_map(|state| self.preview(state)).collect();
             self.seen.withdraw(of_one_colour[0].colour, &shots, &spray, &self.world.surface.world)?;
         }
         Ok(())
     }
 
-    fn fly_strokes(&mut self) {
-        self.tasks.extend(self.strokes.take(&self.settings.session).into_iter().map(Task::Segment));
-    }
-
     fn say(&mut self, text: String) {
         self.notices.push(Notice::Text { text });
     }
-}
 
-/// The paint of one tick as the robot will spray it: along the normal, from the gun's distance within what the robot keeps.
-fn preview(tick: &VrState) -> Option<Shot> {
-    let hit = tick.hit?;
-    let axis = UnitVector3::new_unchecked(-hit.normal.into_inner());
-    let origin = hit.point + hit.normal.into_inner() * stand_off(tick);
-    Some(Shot { origin, axis, volume: tick.flow / RATE })
+    /// The paint of one tick as the robot will spray it: along the normal, from the gun's distance within what the robot keeps.
+    fn preview(&self, tick: &VrState) -> Option<Shot> {
+        let hit = tick.hit?;
+        let axis = UnitVector3::new_unchecked(-hit.normal.into_inner());
+        let origin = hit.point + hit.normal.into_inner() * self.teleop.settings().stand_off_of(tick);
+        Some(Shot { origin, axis, volume: tick.flow / RATE })
+    }
 }

@@ -3,10 +3,9 @@
 use std::path::PathBuf;
 
 use clap::ValueEnum;
-use paint_planner::Settings;
 use paint_planner::nozzle::NozzleSettings;
-use paint_planner::session::{SessionSettings, TargetSettings};
-use paint_planner::timing::{TimingPolicy, TimingSettings};
+use paint_planner::teleop::{SessionSettings, TeleopSettings};
+use paint_planner::timing::TimingPolicy;
 use paint_sim::SprayModel;
 use serde::{Deserialize, Serialize};
 
@@ -69,10 +68,6 @@ impl Default for VrSettings {
     }
 }
 
-/// Nearest and farthest stand-off that the brush size stands for, metres: inside what the planner permits.
-pub(super) const STAND_OFF: [f64; 2] = [0.06, 0.14];
-/// Distance at which the robot looks at the surface, metres.
-pub(super) const VIEW_DISTANCE: f64 = 0.8;
 /// Where the cone of the spray ends, in deviations.
 const SPRAY_CUT: f64 = 3.5;
 /// Paint that has met nothing after this way is overspray, metres.
@@ -100,34 +95,16 @@ impl VrSettings {
         SprayModel { sigma, cut: SPRAY_CUT, range: SPRAY_RANGE, ..SprayModel::default() }
     }
 
-    /// How segments become targets: normals averaged over the spot.
-    pub(super) fn targets(&self) -> TargetSettings {
-        TargetSettings { footprint: self.spot, ..TargetSettings::default() }
-    }
-
-    /// The planner for paint from a stand-off, metres.
-    pub(super) fn painting(&self, stand_off: f64) -> Settings {
-        let usual = MissionSettings::default().planner;
-        // Who follows a hand has no time for every bend of the surface: a stronger pull between neighbours, and a trajectory that may
-        // pass its waypoints at a third of the spot's deviation.
-        let nozzle = NozzleSettings { stand_off, ca: 1.0, cb: 0.01, ..usual.nozzle.clone() };
-        let timing = TimingSettings { tolerance: 0.005, ..usual.timing.clone() };
-        let mut settings = Settings { nozzle, timing, ..usual };
-        if self.timing == Timing::Gradient {
-            settings.timing.policy = TimingPolicy::GradientPreserving;
+    /// How the robot follows the hand; normals are averaged over the spot.
+    pub(super) fn teleop(&self) -> TeleopSettings {
+        let mut teleop = TeleopSettings::new(&MissionSettings::default().planner);
+        teleop.session = self.session.clone();
+        teleop.targets.footprint = self.spot;
+        match self.timing {
+            Timing::Dose => {}
+            Timing::Uniform => teleop.even_coat = true,
+            Timing::Gradient => teleop.painting.timing.policy = TimingPolicy::GradientPreserving,
         }
-        settings
+        teleop
     }
-}
-
-/// The planner for looking at the surface with the gun shut.
-pub(super) fn viewing() -> Settings {
-    let usual = MissionSettings::default().planner;
-    let nozzle = NozzleSettings {
-        stand_off: VIEW_DISTANCE,
-        min: 0.75 * VIEW_DISTANCE,
-        max: 1.25 * VIEW_DISTANCE,
-        ..usual.nozzle.clone()
-    };
-    Settings { nozzle, ..usual }
 }

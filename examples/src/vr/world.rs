@@ -1,16 +1,16 @@
 //! The surface before which the person stands.
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
-use paint_planner::VehicleState;
-use paint_planner::session::PaintHit;
-use paint_sim::{Substrate, Surface};
+use paint_planner::teleop::PaintHit;
+use paint_planner::{Hit, Surface, VehicleState};
+use paint_sim::Substrate;
 use ptu_kinematics::{Ptu, PtuSettings};
 use tsdf_hash::Map;
 use uv_param::SurfacePoint;
 
 use super::error::VrError;
 use super::settings::VrSettings;
-use crate::adapters::Robot;
+use crate::adapters::{MeshSurface, Robot};
 use crate::appearance::sandstone;
 use crate::mesh_io::TriangleMesh;
 use crate::mission_file::MissionFile;
@@ -79,12 +79,20 @@ impl VrWorld {
     /// Where the gun's ray (x of the nozzle) meets the part of the surface that is painted, with its smooth normal.
     pub(super) fn hit(&self, nozzle: &Isometry3<f64>) -> Option<PaintHit> {
         let origin = Point3::from(nozzle.translation.vector);
-        self.cast(&origin, &(nozzle.rotation * Vector3::x_axis()))
+        self.hit_along(&origin, &(nozzle.rotation * Vector3::x_axis()))
     }
 
     /// The same for any ray.
-    pub(super) fn cast(&self, origin: &Point3<f64>, direction: &UnitVector3<f64>) -> Option<PaintHit> {
-        let hit = self.surface.world.cast(origin, direction, RAY)?;
+    pub(super) fn hit_along(&self, origin: &Point3<f64>, direction: &UnitVector3<f64>) -> Option<PaintHit> {
+        let Hit { point, normal, .. } = self.cast(origin, direction, RAY)?;
+        Some(PaintHit { point, normal })
+    }
+}
+
+/// The part that is painted, with its smooth normals.
+impl Surface for VrWorld {
+    fn cast(&self, origin: &Point3<f64>, direction: &UnitVector3<f64>, max_distance: f64) -> Option<Hit> {
+        let hit = paint_sim::Surface::cast(&self.surface.world, origin, direction, max_distance)?;
         // The back of the surface and what stands beside it are not painted.
         if hit.face as usize >= self.surface.disk().faces().len() || hit.normal.dot(direction) >= 0.0 {
             return None;
@@ -92,7 +100,11 @@ impl VrWorld {
         let [a, b] = hit.barycentric;
         let at = SurfacePoint { face: hit.face, barycentric: [1.0 - a - b, a, b] };
         let normal = self.surface.chart.smooth_normal(at);
-        Some(PaintHit { point: origin + direction.into_inner() * hit.distance, normal })
+        Some(Hit { point: origin + direction.into_inner() * hit.distance, normal, distance: hit.distance })
+    }
+
+    fn distance(&self, point: &Point3<f64>, max: f64) -> f64 {
+        MeshSurface(&self.surface.world).distance(point, max)
     }
 }
 

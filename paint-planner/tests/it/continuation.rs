@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
 
-use paint_planner::session::continue_plan;
+use paint_planner::teleop::continue_plan;
 use paint_planner::{Error, OptimalPlanner, Plan, Planner, Settings, Target, VehicleState};
 
 use crate::walls::{Arm, Wall};

@@ -1,10 +1,14 @@
 //! What was painted while the robot does not follow: it can be taken back until it is flown.
 
 use nalgebra::Point3;
-use paint_planner::session::{Segment, SessionSettings, VrMode, VrState, segments};
+
+use super::offline::segments;
+use super::settings::SessionSettings;
+use super::state::{VrMode, VrState};
+use super::task::Segment;
 
 /// Strokes in their order, with an idle state between them.
-#[derive(Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Strokes {
     states: Vec<VrState>,
 }
