@@ -2,7 +2,6 @@
 
 use nalgebra::Point3;
 
-use crate::angle::wrap;
 use crate::error::Error;
 use crate::plan::{Plan, plan};
 use crate::settings::Settings;
@@ -30,7 +29,7 @@ impl<'a> HeldHeading<'a> {
 
 impl Tool for HeldHeading<'_> {
     fn vehicle(&self, nozzle: &NozzleState, heading: f64) -> Option<VehicleState> {
-        let turned = wrap(heading - self.heading).abs();
+        let turned = (heading - self.heading).sin().atan2((heading - self.heading).cos()).abs();
         let held = |state: &VehicleState| turned <= self.turn[0] && state.pan.abs() <= self.turn[1];
         self.tool.vehicle(nozzle, heading).filter(held)
     }

@@ -2,15 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
 
-use paint_planner::nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
+use paint_planner::nalgebra::{Isometry3, Point3, Vector3};
 use paint_planner::teleop::{
-    CradlePose, FarReference, Feedback, LagIndicator, LiveQueue, PaintHit, RATE, Resampler, Segment, SessionSettings,
-    TargetSettings, Task, VERSION, VrMode, VrState, latency_in_time, segments, targets,
+    CradlePose, FarReference, Feedback, LagIndicator, LiveQueue, PaintHit, RATE, Segment, SessionSettings, Task,
+    VERSION, VrMode, VrState, latency_in_time, segments,
 };
-use paint_planner::timing::TimingPolicy;
-use paint_planner::{Error, OptimalPlanner, Planner, Settings};
-
-use crate::walls::{Arm, Wall};
 
 /// Where the vehicle stands unless a test says otherwise.
 const VEHICLE: Point3<f64> = Point3::new(-0.7, 0.0, 2.0);
