@@ -1,4 +1,4 @@
-//! The page that has the seat, from the side of whoever serves it.
+//! The page that holds the lease, from the side of whoever serves it.
 
 use std::sync::mpsc::{SyncSender, TrySendError};
 
@@ -29,7 +29,7 @@ impl Client {
         self.own.is_some()
     }
 
-    /// Whether a connection is the one that has the seat.
+    /// Whether a connection is the one that holds the lease.
     pub(super) fn is(&self, connection: u64) -> bool {
         self.own.as_ref().is_some_and(|(own, _)| *own == connection)
     }

@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Error, Message, WebSocket};
 
+use super::client_lease::ClientLease;
 use super::event::Event;
 use super::protocol::ClientMessage;
-use super::seat::Seat;
 
 /// Longest message, bytes: half a minute of states.
 const LONGEST_MESSAGE: usize = 1 << 20;
@@ -38,7 +38,7 @@ pub(super) struct TrafficCounts {
 
 /// What a connection has to tell the session.
 pub(super) enum Inbound {
-    /// It has the seat.
+    /// It has the lease.
     Join { connection: u64, key: String, outbox: SyncSender<Outgoing> },
     /// Events of the person.
     Events { connection: u64, events: Vec<Event> },
@@ -75,12 +75,12 @@ impl Bucket {
     }
 }
 
-/// Serves a connection that has the seat until it ends.
+/// Serves a connection that has the lease until it ends.
 pub(super) fn serve_connection(
     stream: TcpStream,
     rest: Vec<u8>,
     connection: u64,
-    seat: &Seat,
+    lease: &ClientLease,
     inbox: &SyncSender<Inbound>,
     outbox: &Receiver<Outgoing>,
     counts: &TrafficCounts,
@@ -93,17 +93,17 @@ pub(super) fn serve_connection(
         let mut bucket = Bucket::new();
         let mut turn = || turn(&mut socket, connection, &mut bucket, inbox, outbox, counts);
         let mut open = true;
-        while open && seat.holds(connection) {
+        while open && lease.holds(connection) {
             open = turn();
         }
-        // What had come before another connection took the seat is counted all the same.
+        // What had come before another connection took the lease is counted all the same.
         if open {
             turn();
         }
         let _ = socket.close(None);
         let _ = socket.flush();
     }
-    seat.leave(connection);
+    lease.leave(connection);
     let _ = inbox.send(Inbound::Leave { connection });
 }
 

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
+use super::client_lease::ClientLease;
 use super::connection::{Inbound, TrafficCounts, serve_connection};
 use super::error::VrError;
-use super::front_door::{Door, Visit, refuse};
-use super::seat::Seat;
+use super::http_server::{HttpOutcome, HttpServer, refuse};
 
 /// Connections at once; more are turned away.
 const MOST_CONNECTIONS: usize = 32;
@@ -36,62 +36,62 @@ pub(super) fn listen(address: SocketAddr, does: &str) -> Result<Listening, VrErr
     announce(&address.to_string(), token.as_deref(), does);
     let (inbox, events) = sync_channel(INBOX);
     let counts = Arc::new(TrafficCounts::default());
-    let house = Arc::new(House {
-        door: Door { token },
-        seat: Seat::default(),
+    let state = Arc::new(ServerState {
+        http: HttpServer { token },
+        lease: ClientLease::default(),
         inbox,
         counts: Arc::clone(&counts),
         visitors: AtomicUsize::new(0),
     });
-    std::thread::spawn(move || receive(&listener, &house));
+    std::thread::spawn(move || receive(&listener, &state));
     Ok(Listening { inbox: events, counts, enter: wait_for_enter() })
 }
 
 /// What the threads of the connections share.
-struct House {
-    door: Door,
-    seat: Seat,
+struct ServerState {
+    http: HttpServer,
+    lease: ClientLease,
     inbox: SyncSender<Inbound>,
     counts: Arc<TrafficCounts>,
     visitors: AtomicUsize,
 }
 
-fn receive(listener: &TcpListener, house: &Arc<House>) {
+fn receive(listener: &TcpListener, state: &Arc<ServerState>) {
     for stream in listener.incoming() {
         let Ok(mut stream) = stream else { continue };
-        if house.visitors.fetch_add(1, Ordering::Relaxed) >= MOST_CONNECTIONS {
+        if state.visitors.fetch_add(1, Ordering::Relaxed) >= MOST_CONNECTIONS {
             let _ = refuse(&mut stream, "503 Service Unavailable", "Too many connections.");
-            house.counts.refused.fetch_add(1, Ordering::Relaxed);
-            house.visitors.fetch_sub(1, Ordering::Relaxed);
+            state.counts.refused.fetch_add(1, Ordering::Relaxed);
+            state.visitors.fetch_sub(1, Ordering::Relaxed);
             continue;
         }
-        let house = Arc::clone(house);
+        let state = Arc::clone(state);
         std::thread::spawn(move || {
             // A client that goes away in the middle of a request is no matter.
-            let _ = visit(stream, &house);
-            house.visitors.fetch_sub(1, Ordering::Relaxed);
+            let _ = visit(stream, &state);
+            state.visitors.fetch_sub(1, Ordering::Relaxed);
         });
     }
 }
 
-fn visit(mut stream: TcpStream, house: &House) -> std::io::Result<()> {
-    let (rest, answer, shown) = match house.door.open(&mut stream)? {
-        Visit::Answered => return Ok(()),
-        Visit::Refused => {
-            house.counts.refused.fetch_add(1, Ordering::Relaxed);
+fn visit(mut stream: TcpStream, state: &ServerState) -> std::io::Result<()> {
+    let (rest, answer, shown) = match state.http.open(&mut stream)? {
+        HttpOutcome::Answered => return Ok(()),
+        HttpOutcome::Refused => {
+            state.counts.refused.fetch_add(1, Ordering::Relaxed);
             return Ok(());
         }
-        Visit::Session { rest, answer, key } => (rest, answer, key),
+        HttpOutcome::Session { rest, answer, key } => (rest, answer, key),
     };
     let fresh = secret().map_err(std::io::Error::other)?;
-    let Some((connection, key)) = house.seat.take(shown.as_deref(), fresh) else {
-        house.counts.refused.fetch_add(1, Ordering::Relaxed);
+    let Some((connection, key)) = state.lease.take(shown.as_deref(), fresh) else {
+        state.counts.refused.fetch_add(1, Ordering::Relaxed);
         return refuse(&mut stream, "409 Conflict", "Another person is here.").map(|_| ());
     };
     stream.write_all(answer.as_bytes())?;
     let (outbox, outgoing) = sync_channel(OUTBOX);
-    if house.inbox.send(Inbound::Join { connection, key, outbox }).is_ok() {
-        serve_connection(stream, rest, connection, &house.seat, &house.inbox, &outgoing, &house.counts);
+    if state.inbox.send(Inbound::Join { connection, key, outbox }).is_ok() {
+        serve_connection(stream, rest, connection, &state.lease, &state.inbox, &outgoing, &state.counts);
     }
     Ok(())
 }

@@ -71,7 +71,7 @@ fn plan_hash(plan: &Plan) -> u64 {
 }
 
 /// A recording and its channels.
-struct Tape {
+struct RecordingWriter {
     recorder: Recorder,
     settings: u16,
     events: u16,
@@ -79,7 +79,7 @@ struct Tape {
     vehicle: u16,
 }
 
-impl Tape {
+impl RecordingWriter {
     fn create(path: &Path) -> Result<Self, VrError> {
         let mut recorder = Recorder::create(path)?;
         let settings = recorder.json_channel(SETTINGS_TOPIC, "paintcopter.VrSettings", SCHEMA)?;
@@ -105,7 +105,7 @@ impl Tape {
 
 /// Writes a session as it goes, beside its final name: what has that name is whole.
 pub struct SessionRecorder {
-    tape: Tape,
+    writer: RecordingWriter,
     /// The recording when it is whole, and while it is not.
     path: PathBuf,
     part: PathBuf,
@@ -121,37 +121,37 @@ impl SessionRecorder {
     /// Files that cannot be written.
     pub fn create(folder: &Path, settings: &VrSettings) -> Result<Self, VrError> {
         let (path, part) = (folder.join(RECORDING), folder.join(PART));
-        let mut tape = Tape::create(&part)?;
+        let mut writer = RecordingWriter::create(&part)?;
         let table_path = folder.join("plan.csv");
         let mut table = File::create(&table_path).map(BufWriter::new).map_err(VrError::unwritable(&table_path))?;
         writeln!(table, "task,kind,time_s,x_m,y_m,z_m,heading_rad,pan_rad,tilt_rad,target")
             .map_err(VrError::unwritable(&table_path))?;
-        tape.recorder.write_json(tape.settings, 0.0, settings)?;
-        Ok(Self { tape, path, part, table, table_path })
+        writer.recorder.write_json(writer.settings, 0.0, settings)?;
+        Ok(Self { writer, path, part, table, table_path })
     }
 
     /// Makes what is recorded so far a whole file, and goes on in another that begins with the same: a finished MCAP file has its index
     /// at its end. Its path.
     pub(super) fn save(&mut self) -> Result<PathBuf, VrError> {
         self.close()?;
-        self.tape = Tape::create(&self.part)?;
-        self.tape.copy(&self.path)?;
+        self.writer = RecordingWriter::create(&self.part)?;
+        self.writer.copy(&self.path)?;
         Ok(self.path.clone())
     }
 
     fn close(&mut self) -> Result<(), VrError> {
         self.table.flush().map_err(VrError::unwritable(&self.table_path))?;
-        self.tape.recorder.finish()?;
+        self.writer.recorder.finish()?;
         std::fs::rename(&self.part, &self.path).map_err(VrError::unwritable(&self.path))
     }
 
     pub(super) fn event(&mut self, time: f64, event: &Event) -> Result<(), VrError> {
-        Ok(self.tape.recorder.write_json(self.tape.events, time, event)?)
+        Ok(self.writer.recorder.write_json(self.writer.events, time, event)?)
     }
 
     pub(super) fn plan(&mut self, planned: &PlannedTask, mark: &PlanMark) -> Result<(), VrError> {
         self.write_table(planned).map_err(VrError::unwritable(&self.table_path))?;
-        Ok(self.tape.recorder.write_json(self.tape.plans, planned.time, mark)?)
+        Ok(self.writer.recorder.write_json(self.writer.plans, planned.time, mark)?)
     }
 
     /// The waypoints of a plan as rows; numbers have the digits that tell them apart.
@@ -172,7 +172,7 @@ impl SessionRecorder {
         let pose = Some(Pose { position: Some(vector(body)), orientation: Some(quaternion(body)) });
         let timestamp = Some(Timestamp::saturating_from_epoch_secs_f64(time));
         let message = PoseInFrame { timestamp, frame_id: "world".into(), pose };
-        Ok(self.tape.recorder.write(self.tape.vehicle, time, &message)?)
+        Ok(self.writer.recorder.write(self.writer.vehicle, time, &message)?)
     }
 
     pub(super) fn finish(mut self) -> Result<(), VrError> {

@@ -26,23 +26,23 @@ const WAIT: Duration = Duration::from_millis(11);
 /// Serves a session until the person ends it.
 pub(super) fn serve(arguments: &Arguments, mut session: Session) -> Result<(), VrError> {
     let listening = listen(arguments.listen, "mouse, keyboard and touch paint")?;
-    let mut desk = Desk::default();
+    let mut connection = Connection::default();
     loop {
         let ended = match listening.inbox.recv_timeout(WAIT) {
-            Ok(inbound) => desk.take(inbound, &mut session, arguments, &listening.counts)?,
+            Ok(inbound) => connection.take(inbound, &mut session, arguments, &listening.counts)?,
             Err(RecvTimeoutError::Timeout) => false,
             Err(RecvTimeoutError::Disconnected) => true,
         };
         if ended || listening.enter.try_recv().is_ok() {
-            return desk.end(&mut session, arguments, &listening.counts);
+            return connection.end(&mut session, arguments, &listening.counts);
         }
-        desk.show(&mut session);
+        connection.show(&mut session);
     }
 }
 
 /// The session's side of the connection.
 #[derive(Default)]
-struct Desk {
+struct Connection {
     client: Client,
     /// Pictures that the page has missed because it was slow: they are sent whole when it takes them.
     missed: [bool; 2],
@@ -52,7 +52,7 @@ struct Desk {
     traffic: Traffic,
 }
 
-impl Desk {
+impl Connection {
     /// Takes what a connection says; whether the session is over.
     fn take(
         &mut self,
@@ -87,7 +87,7 @@ impl Desk {
                 self.client.say(&ServerMessage::Ack { next_sequence: session.next_sequence() });
             }
             Inbound::Leave { connection } if self.client.is(connection) => self.client.leave(),
-            // The words of a connection that has lost the seat.
+            // The words of a connection that has lost the lease.
             _ => {}
         }
         Ok(false)

@@ -139,7 +139,7 @@ impl Show {
                 self.client.say(&ServerMessage::Ack { next_sequence: self.next_sequence });
             }
             Inbound::Leave { connection } if self.client.is(connection) => self.client.leave(),
-            // The words of a connection that has lost the seat.
+            // The words of a connection that has lost the lease.
             _ => {}
         }
         false

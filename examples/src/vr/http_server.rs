@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use tungstenite::handshake::derive_accept_key;
 
-use super::seat::same;
+use super::client_lease::same;
 use super::web_files::web_file;
 
 /// Longest head of a request, bytes.
@@ -17,13 +17,13 @@ const MOST_HEADERS: usize = 64;
 const HEAD_TIME: Duration = Duration::from_secs(5);
 
 /// Who is let in.
-pub(super) struct Door {
+pub(super) struct HttpServer {
     /// Needed in every request where the program can be reached from elsewhere.
     pub(super) token: Option<String>,
 }
 
 /// What a connection is.
-pub(super) enum Visit {
+pub(super) enum HttpOutcome {
     /// It has been answered.
     Answered,
     /// It was refused.
@@ -48,9 +48,9 @@ struct Request {
     websocket_key: Option<String>,
 }
 
-impl Door {
+impl HttpServer {
     /// Reads the head and answers it, but for the last word of a WebSocket's handshake.
-    pub(super) fn open(&self, stream: &mut TcpStream) -> std::io::Result<Visit> {
+    pub(super) fn open(&self, stream: &mut TcpStream) -> std::io::Result<HttpOutcome> {
         let Some((request, rest)) = read_request(stream)? else {
             return refuse(stream, "400 Bad Request", "This is not a request that is understood here.");
         };
@@ -83,20 +83,20 @@ impl Door {
             let answer = format!(
                 "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: {accept}\r\n\r\n"
             );
-            return Ok(Visit::Session { rest, answer, key: parameter(&request.query, "key") });
+            return Ok(HttpOutcome::Session { rest, answer, key: parameter(&request.query, "key") });
         }
         match web_file(&request.path) {
             Some(file) => answer(stream, "200 OK", file.kind, file.bytes)?,
             None => answer(stream, "404 Not Found", "text/plain", b"There is nothing here.")?,
         }
-        Ok(Visit::Answered)
+        Ok(HttpOutcome::Answered)
     }
 }
 
 /// Answers with an error.
-pub(super) fn refuse(stream: &mut TcpStream, status: &str, why: &str) -> std::io::Result<Visit> {
+pub(super) fn refuse(stream: &mut TcpStream, status: &str, why: &str) -> std::io::Result<HttpOutcome> {
     answer(stream, status, "text/plain; charset=utf-8", why.as_bytes())?;
-    Ok(Visit::Refused)
+    Ok(HttpOutcome::Refused)
 }
 
 fn answer(stream: &mut TcpStream, status: &str, kind: &str, body: &[u8]) -> std::io::Result<()> {

@@ -4,18 +4,18 @@ use std::sync::{Mutex, PoisonError};
 
 /// One person paints at a time.
 #[derive(Default)]
-pub(super) struct Seat(Mutex<Holder>);
+pub(super) struct ClientLease(Mutex<LeaseHolder>);
 
 #[derive(Default)]
-struct Holder {
+struct LeaseHolder {
     key: String,
-    /// Number of the connection that has the seat; 0 while it is free.
+    /// Number of the connection that has the lease; 0 while it is free.
     connection: u64,
     latest: u64,
 }
 
-impl Seat {
-    /// Takes the seat: while another person has it only with that person's key, who has lost the connection. The number of the
+impl ClientLease {
+    /// Takes the lease: while another person has it only with that person's key, who has lost the connection. The number of the
     /// connection, and the key to come back with.
     pub(super) fn take(&self, shown: Option<&str>, fresh_key: String) -> Option<(u64, String)> {
         let mut holder = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -31,12 +31,12 @@ impl Seat {
         Some((holder.connection, holder.key.clone()))
     }
 
-    /// Whether the connection still has the seat.
+    /// Whether the connection still has the lease.
     pub(super) fn holds(&self, connection: u64) -> bool {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).connection == connection
     }
 
-    /// Gives the seat back, unless somebody has come back to it meanwhile.
+    /// Gives the lease back, unless somebody has come back to it meanwhile.
     pub(super) fn leave(&self, connection: u64) {
         let mut holder = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if holder.connection == connection {
