@@ -9,7 +9,6 @@ use crate::settings::Settings;
 pub use crate::blocks::voxel_block::VoxelBlock;
 pub use crate::changes::{BlockChanges, MapVersion};
 pub use crate::codec::{decode_block, encode_block};
-pub use crate::derived_blocks::UpdateReport;
 
 /// Reads single blocks.
 pub trait BlockReader {

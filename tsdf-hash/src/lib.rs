@@ -107,6 +107,7 @@ pub mod tracking;
 pub struct Readme;
 
 pub use dense_map::DenseMap;
+pub use derived_blocks::UpdateReport;
 pub use error::Error;
 pub use images::{ColourData, ColourView, DepthData, DepthView, Intrinsics};
 pub use map::Map;

@@ -4,29 +4,15 @@ mod interlock;
 
 use nalgebra::{Point3, Vector3};
 use paint_sim::flight::*;
-use paint_sim::{Error, FlightSettings, Shot, TriangleSurface, fly};
+use paint_sim::{Error, FlightSettings, Shot, fly};
 
+use crate::flight_scene::{outdoors, paint_hose, wall};
 use crate::own_pan_tilt::{LaggingPanTilt, arm};
 use crate::own_reference::{Ellipse, Still};
-
-/// A wall in the plane x = 0, painted from -x.
-pub(crate) fn wall() -> TriangleSurface {
-    let corners = [[0.0, -10.0, -10.0], [0.0, 10.0, -10.0], [0.0, 10.0, 10.0], [0.0, -10.0, 10.0]];
-    TriangleSurface::new(&corners, &[[0, 2, 1], [0, 3, 2]]).unwrap()
-}
 
 fn still() -> ReferenceState {
     let zero = Vector3::zeros();
     ReferenceState { velocity: zero, acceleration: zero, ..Ellipse { duration: 1.0 }.at(0.0) }
-}
-
-pub(crate) fn paint_hose() -> HoseModel {
-    HoseModel { base: Point3::new(-2.5, 0.0, 0.0), length: 5.0, line_density: 0.12, base_on_floor: true }
-}
-
-/// Wind of 2 m/s with gusts, hose, motion capture.
-pub(crate) fn outdoors(seed: u64) -> FlightSettings {
-    FlightSettings { hose: Some(paint_hose()), seed, ..FlightSettings::default() }
 }
 
 #[test]

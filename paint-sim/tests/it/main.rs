@@ -6,6 +6,7 @@ mod deposit;
 mod droplets;
 mod examples;
 mod flight;
+mod flight_scene;
 mod km;
 mod own_controller;
 mod own_pan_tilt;

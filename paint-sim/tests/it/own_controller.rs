@@ -3,7 +3,7 @@
 use paint_sim::flight::*;
 use paint_sim::{FlightSettings, fly};
 
-use crate::flight::wall;
+use crate::flight_scene::wall;
 use crate::own_pan_tilt::arm;
 use crate::own_reference::Ellipse;
 

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point3, UnitVector3};
 use paint_sim::flight::*;
 use paint_sim::{FlightSettings, fly};
 
-use crate::flight::{outdoors, wall};
+use crate::flight_scene::{outdoors, wall};
 use crate::own_reference::Ellipse;
 
 /// The ideal unit behind servos with a dead time of 20 ms, a first-order lag of 30 ms and steps of `resolution` rad.

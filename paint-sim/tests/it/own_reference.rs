@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 use paint_sim::flight::*;
 use paint_sim::{FlightSettings, fly};
 
-use crate::flight::wall;
+use crate::flight_scene::wall;
 use crate::own_pan_tilt::arm;
 
 /// An ellipse on the wall at up to 0.4 m/s, from 10 cm.

@@ -4,9 +4,9 @@ use std::cell::Cell;
 
 use nalgebra::{Point3, Vector3};
 use tsdf_hash::distance_field::{DistanceField, DistanceSettings};
-use tsdf_hash::layer::{BlockChanges, BlockReader, MapVersion, TsdfLayer, UpdateReport, VoxelBlock};
+use tsdf_hash::layer::{BlockChanges, BlockReader, MapVersion, TsdfLayer, VoxelBlock};
 use tsdf_hash::mesh::IncrementalMesher;
-use tsdf_hash::{Error, Settings};
+use tsdf_hash::{Error, Settings, UpdateReport};
 
 use crate::topology::{assert_manifold, directed_edges};
 
