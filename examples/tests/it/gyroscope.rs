@@ -46,8 +46,17 @@ fn last_error(s: &Scratch) -> Option<f64> {
 }
 
 #[test]
+fn features_find_a_camera_after_frames_that_are_missing() {
+    let s = with_a_gap("gap");
+    let found = scan(&s, &["--poses", "tracked"]);
+    assert!(found.ok && last_error(&s).unwrap() < 8e-3, "{:?} {}", last_error(&s), found.said);
+}
+
+#[test]
 fn a_gyroscope_leads_over_frames_that_are_missing() {
     let s = with_a_gap("gyroscope");
+    // In the dark there are no features.
+    std::fs::remove_file(s.0.join("rgb.txt")).unwrap();
     // Alone it is lost, and that is said: it must not be placed half a metre off.
     let alone = scan(&s, &["--poses", "tracked"]);
     assert!(

@@ -6,7 +6,7 @@ use std::process::Command;
 
 use crate::module_graph::{ModuleGraph, circles};
 
-const LIBRARIES: [&str; 7] =
+pub(crate) const LIBRARIES: [&str; 7] =
     ["tsdf-hash", "vio-ekf", "ptu-kinematics", "paint-planner", "paint-sim", "uv-param", "paint-net"];
 
 #[test]

@@ -13,6 +13,7 @@ mod gyroscope;
 #[cfg(feature = "handheld")]
 mod handheld;
 mod independence;
+mod layout;
 mod line_art;
 #[cfg(feature = "scan")]
 mod live;
@@ -46,3 +47,5 @@ mod unwrap;
 mod vio;
 #[cfg(feature = "vr")]
 mod vr;
+#[cfg(feature = "vr")]
+mod vr_layers;
