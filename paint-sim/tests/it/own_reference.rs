@@ -5,7 +5,6 @@ use paint_sim::flight::*;
 use paint_sim::{FlightSettings, fly};
 
 use crate::flight_scene::wall;
-use crate::own_pan_tilt::arm;
 
 /// An ellipse on the wall at up to 0.4 m/s, from 10 cm.
 pub(crate) struct Ellipse {
@@ -52,7 +51,7 @@ impl Reference for Still {
 fn the_spray_goes_round_the_ellipse() {
     let calm =
         FlightSettings { wind: Wind::calm(), localisation: Localisation::perfect(), ..FlightSettings::default() };
-    let log = fly(&Ellipse { duration: 10.0 }, &mut arm(), &wall(), &calm).unwrap();
+    let log = fly(&Ellipse { duration: 10.0 }, &mut IdealPanTilt::default(), &wall(), &calm).unwrap();
     let shots = log.shots(0.0);
     assert!(shots.len() > 900);
     for shot in shots {
