@@ -1,11 +1,9 @@
-//! From paint thickness to ink and colour: a paint on sandstone, by Kubelka-Munk in 36 bands.
+//! From paint thickness to ink and colour: a paint on sandstone.
 
 use paint_net::Saturation;
 use paint_net::model::MonotoneCurve;
-use paint_sim::colour::{BANDS, Spectrum, spectrum_lab, wavelength, xyz};
+use paint_sim::paint::{PaintName, ink_curve};
 use paint_sim::{Paint, Substrate};
-
-use crate::srgb::srgb;
 
 /// Film thickness that the painter calls a depth of 1, metres.
 pub const UNIT_THICKNESS: f64 = 20e-6;
@@ -13,20 +11,11 @@ pub const UNIT_THICKNESS: f64 = 20e-6;
 pub const DENSITY: f64 = 1200.0;
 /// Deepest knot of the ink curve, in units of depth.
 const DEEPEST: f64 = 4.0;
-/// Knots of the curves.
-const KNOTS: usize = 400;
 
 /// How the wall looks under a film of paint.
 pub struct Appearance {
     ink: Saturation,
-    /// Linear sRGB and Lab at evenly spaced depths from 0 to `DEEPEST`.
-    table: Vec<Shade>,
-}
-
-#[derive(Clone, Copy)]
-struct Shade {
-    linear: [f64; 3],
-    lab: [f64; 3],
+    colours: paint_sim::paint::Appearance,
 }
 
 /// What is wrong with the paint. The built-in one is sound; the error exists because its parts are checked.
@@ -41,31 +30,18 @@ pub enum AppearanceError {
 }
 
 impl Appearance {
-    /// [`charcoal`] on [`sandstone`].
+    /// Charcoal on sandstone.
     pub fn charcoal_on_sandstone() -> Result<Self, AppearanceError> {
-        Self::on_sandstone(&charcoal()?)
+        Self::on_sandstone(&PaintName::Charcoal.paint(UNIT_THICKNESS)?)
     }
 
-    /// A paint on [`sandstone`]. Ink is a scale of thickness, that of [`charcoal`] for every paint: the grey of a coloured or white paint
-    /// need not fall with its thickness.
+    /// A paint on sandstone. Ink is a scale of thickness, that of charcoal for every paint: the grey of a coloured or white paint need not
+    /// fall with its thickness.
     pub fn on_sandstone(paint: &Paint) -> Result<Self, AppearanceError> {
-        let (wall, scale) = (sandstone()?, charcoal()?);
-        let at = |paint: &Paint, depth: f64| paint.over(depth * UNIT_THICKNESS, &wall);
-
-        let grey = |s: &Substrate| srgb(xyz(s.reflectance())[1]);
-        let bare = grey(&wall);
-        // Ten times the deepest knot is opaque to rounding.
-        let darkest = grey(&at(&scale, 10.0 * DEEPEST)?);
-        let mut knots = Vec::with_capacity(KNOTS);
-        let mut table = Vec::with_capacity(KNOTS);
-        for k in 0..KNOTS {
-            let depth = DEEPEST * k as f64 / (KNOTS - 1) as f64;
-            knots.push((depth, if k == 0 { 0.0 } else { (bare - grey(&at(&scale, depth)?)) / (bare - darkest) }));
-            let film = at(paint, depth)?;
-            let linear = paint_sim::colour::spectrum_linear_srgb(film.reflectance());
-            table.push(Shade { linear, lab: spectrum_lab(film.reflectance()) });
-        }
-        Ok(Self { ink: Saturation::Curve(MonotoneCurve::new(&knots)?), table })
+        let (wall, scale) = (Substrate::sandstone(), PaintName::Charcoal.paint(UNIT_THICKNESS)?);
+        let knots = ink_curve(&scale, &wall, UNIT_THICKNESS, DEEPEST)?;
+        let colours = paint_sim::paint::Appearance::new(paint, &wall, UNIT_THICKNESS, DEEPEST)?;
+        Ok(Self { ink: Saturation::Curve(MonotoneCurve::new(&knots)?), colours })
     }
 
     /// Ink as a function of depth: the share of the way from the bare wall's grey to opaque paint's, in sRGB greys.
@@ -75,40 +51,18 @@ impl Appearance {
 
     /// Linear sRGB at a depth.
     pub fn linear(&self, depth: f64) -> [f64; 3] {
-        self.mix(depth, |s| s.linear)
+        self.colours.linear(depth)
     }
 
     /// sRGB bytes at a depth.
     pub fn srgb(&self, depth: f64) -> [u8; 3] {
-        self.linear(depth).map(|c| paint_sim::colour::encode_srgb8(c).0)
+        self.colours.srgb(depth)
     }
 
     /// CIELAB at a depth.
     pub fn lab(&self, depth: f64) -> [f64; 3] {
-        self.mix(depth, |s| s.lab)
+        self.colours.lab(depth)
     }
-
-    fn mix(&self, depth: f64, of: impl Fn(&Shade) -> [f64; 3]) -> [f64; 3] {
-        let at = (depth / DEEPEST).clamp(0.0, 1.0) * (self.table.len() - 1) as f64;
-        let k = (at as usize).min(self.table.len() - 2);
-        let (a, b, t) = (of(&self.table[k]), of(&self.table[k + 1]), at - k as f64);
-        std::array::from_fn(|i| a[i] + t * (b[i] - a[i]))
-    }
-}
-
-/// Sandstone (ours): reflectance rising from 0.38 in the blue to 0.74 in the red.
-pub fn sandstone() -> Result<Substrate, paint_sim::Error> {
-    Substrate::new(spectrum(|l| 0.38 + 0.36 / (1.0 + (-(l - 530.0) / 45.0).exp())))
-}
-
-/// Charcoal paint (ours): strong, almost flat absorption, little scattering.
-pub fn charcoal() -> Result<Paint, paint_sim::Error> {
-    Paint::new(&spectrum(|l| 1.5 - 0.0002 * (l - 380.0)), &[0.08; BANDS], UNIT_THICKNESS)
-}
-
-/// A spectrum by formula of the wavelength, nm.
-pub(crate) fn spectrum(of_wavelength: impl Fn(f64) -> f64) -> Spectrum {
-    std::array::from_fn(|k| of_wavelength(wavelength(k)))
 }
 
 #[cfg(test)]

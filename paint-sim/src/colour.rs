@@ -60,12 +60,15 @@ pub fn spectrum_linear_srgb(reflectance: &Spectrum) -> [f64; 3] {
     linear_srgb(std::array::from_fn(|i| values[i] / white[i] * WHITE[i]))
 }
 
-/// The transfer curve of IEC 61966-2-1 to 0..=255, and whether the component had to be clipped.
+/// The transfer curve of IEC 61966-2-1, from linear to encoded; neither is clipped.
+pub fn encode_srgb(linear: f64) -> f64 {
+    if linear <= 0.0031308 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// [`encode_srgb`] to 0..=255, and whether the component had to be clipped.
 pub fn encode_srgb8(linear: f64) -> (u8, bool) {
     let clipped = !(0.0..=1.0).contains(&linear);
-    let c = linear.clamp(0.0, 1.0);
-    let encoded = if c <= 0.0031308 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
-    ((encoded * 255.0).round() as u8, clipped)
+    ((encode_srgb(linear.clamp(0.0, 1.0)) * 255.0).round() as u8, clipped)
 }
 
 /// The inverse of [`encode_srgb8`]: a component 0..=255 to linear 0..=1.

@@ -41,6 +41,7 @@
 //! | Kubelka 1948 | film of finite thickness on a ground | [`km::reflectance`] |
 //! | Kubelka-Munk 1931 | opaque film, Riccati equation | [`km::opaque_reflectance`], [`km::gradient`] |
 //! | Kubelka 1954 | layers on layers | [`km::Layer::over`] |
+//! | a paint by name on a substrate, by thickness (ours) | table of colours, curve of ink | [`paint::Appearance`], [`paint::ink_curve`] |
 //! | Duncan 1940 | wet mixture `K = sum c K`, `S = sum c S` | [`Paint::mix`] |
 //! | Saunderson 1942 | the air above the paint | [`km::saunderson`] |
 //! | CIE 015, IEC 61966-2-1 | XYZ, CIELAB, sRGB of 36 bands | [`colour`] |

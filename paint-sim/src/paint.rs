@@ -1,5 +1,11 @@
 //! Paints and grounds with 36 bands: from the thickness of a film to the colour one sees.
 
+mod appearance;
+mod named;
+
+pub use appearance::{Appearance, ink_curve};
+pub use named::PaintName;
+
 use crate::colour::{BANDS, Spectrum, Srgb8, spectrum_srgb8, wavelength};
 use crate::error::{Error, check_not_negative, check_positive, check_range};
 use crate::km;

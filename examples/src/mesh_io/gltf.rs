@@ -9,11 +9,11 @@ use ::gltf::json::validation::Checked;
 use ::gltf::mesh::Mode;
 use ::gltf::{Document, Gltf, Node, Primitive, Semantic};
 use nalgebra::{Matrix4, Point3};
+use paint_sim::colour::encode_srgb;
 
 use super::fault::Fault;
 use super::material::{MeshMaterial, MeshMaterials};
 use super::mesh::{MeshUv, TriangleMesh};
-use crate::srgb::srgb;
 use accessor::numbers;
 
 /// Extensions that change only how light falls, or that are read.
@@ -227,7 +227,7 @@ impl Joined {
         let values = numbers(&accessor, &self.buffers, &[3, 4])?;
         let width = accessor.dimensions().multiplicity();
         check_count(accessor.index(), values.len() / width, count)?;
-        let colour = |c: &[f64]| Some([c[0], c[1], c[2]].map(|c| srgb(c.clamp(0.0, 1.0)) as f32));
+        let colour = |c: &[f64]| Some([c[0], c[1], c[2]].map(|c| encode_srgb(c.clamp(0.0, 1.0)) as f32));
         self.colours.extend(values.chunks_exact(width).map(colour));
         Ok(())
     }

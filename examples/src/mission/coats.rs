@@ -10,7 +10,7 @@ use super::error::MissionError;
 use super::painting_task::PaintingTask;
 use super::planned_mission::PlannedMission;
 use super::run::Mission;
-use crate::appearance::{UNIT_THICKNESS, sandstone};
+use crate::appearance::UNIT_THICKNESS;
 
 /// What was decided about one paint.
 pub struct Coat {
@@ -51,11 +51,11 @@ impl Coats {
 
     /// The wall on every pixel under the depths that a mission stands for, the first paint lowest; `None` beside the surface.
     pub(super) fn walls(&self, depth: impl Fn(&Mission) -> Image) -> Result<Vec<Option<Substrate>>, MissionError> {
-        let ground = sandstone()?;
+        let ground = paint_sim::Substrate::sandstone();
         let layers: Vec<(Paint, Image)> = self
             .missions
             .iter()
-            .map(|(_, mission)| Ok((mission.task.settings.paint.paint()?, depth(mission))))
+            .map(|(_, mission)| Ok((mission.task.settings.paint.paint(UNIT_THICKNESS)?, depth(mission))))
             .collect::<Result<_, MissionError>>()?;
         let Some((_, first)) = self.missions.first() else { return Ok(Vec::new()) };
         let covered = first.task.coverage.data();
@@ -69,7 +69,7 @@ impl Coats {
 
 /// Linear sRGB as three pictures; the bare wall beside the surface, so that its edge is not darker.
 pub(super) fn linear(walls: &[Option<Substrate>], width: usize, height: usize) -> Result<[Image; 3], MissionError> {
-    let bare = spectrum_linear_srgb(sandstone()?.reflectance());
+    let bare = spectrum_linear_srgb(paint_sim::Substrate::sandstone().reflectance());
     let colours: Vec<[f64; 3]> =
         walls.iter().map(|wall| wall.as_ref().map_or(bare, |wall| spectrum_linear_srgb(wall.reflectance()))).collect();
     let channel = |c: usize| Image::new(width, height, colours.iter().map(|colour| colour[c]).collect());
@@ -92,8 +92,8 @@ mod tests {
 
     #[test]
     fn the_upper_film_hides_the_lower_one() {
-        let [charcoal, white] = [PaintName::Charcoal, PaintName::White].map(|name| name.paint().unwrap());
-        let (ground, thick) = (sandstone().unwrap(), 40.0 * UNIT_THICKNESS);
+        let [charcoal, white] = [PaintName::Charcoal, PaintName::White].map(|name| name.paint(UNIT_THICKNESS).unwrap());
+        let (ground, thick) = (paint_sim::Substrate::sandstone(), 40.0 * UNIT_THICKNESS);
         let lightness =
             |films: [(&Paint, f64); 2]| spectrum_lab(over_each_other(films, &ground).unwrap().reflectance())[0];
         let (white_above, white_below) =

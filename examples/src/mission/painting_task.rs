@@ -54,7 +54,7 @@ impl PaintingTask {
     pub fn new(name: &str, scene: &Scene, design: &Design, settings: MissionSettings) -> Result<Self, MissionError> {
         let started = Instant::now();
         let robot = Robot { tether: settings.constraints.tether, ..Robot::new(Ptu::new(settings.ptu)?) };
-        let appearance = Appearance::on_sandstone(&settings.paint.paint()?)?;
+        let appearance = Appearance::on_sandstone(&settings.paint.paint(UNIT_THICKNESS)?)?;
 
         settings.check()?;
         design.check_movable(&settings.placement, settings.viewpoint)?;

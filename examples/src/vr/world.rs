@@ -11,7 +11,6 @@ use uv_param::SurfacePoint;
 use super::error::VrError;
 use super::settings::VrSettings;
 use crate::adapters::{MeshSurface, Robot};
-use crate::appearance::sandstone;
 use crate::mesh_io::TriangleMesh;
 use crate::mission_file::MissionFile;
 use crate::palette::{PaletteEntry, palette};
@@ -67,7 +66,7 @@ impl VrWorld {
         Ok(Self {
             name,
             surface,
-            ground: sandstone()?,
+            ground: paint_sim::Substrate::sandstone(),
             palette: palette()?,
             robot: Robot::new(Ptu::new(ptu)?),
             ptu,

@@ -2,6 +2,7 @@
 
 use paint_sim::colour::ciede2000;
 use paint_sim::colour::{BANDS, band_white, decode_srgb8, encode_srgb8, spectrum_lab, spectrum_srgb8, xyz};
+use paint_sim::paint::{Appearance, PaintName, ink_curve};
 use paint_sim::{Error, Paint, Substrate};
 
 /// The test data of Sharma, Wu and Dalal (2005), table 1: L1 a1 b1 L2 a2 b2 and the difference.
@@ -189,4 +190,23 @@ fn bad_paints_are_refused() {
     assert!(Paint::mix(&[(yellow, 0.0)]).is_err() && Paint::mix(&[(yellow, -1.0)]).is_err());
     assert!(yellow.over(f64::NAN, &Substrate::grey(0.5).unwrap()).is_err());
     assert!(Substrate::grey(1.1).is_err());
+}
+
+#[test]
+fn an_appearance_is_the_paint_over_its_substrate() {
+    let wall = Substrate::sandstone();
+    for name in PaintName::ALL {
+        let paint = name.paint(20e-6).unwrap();
+        let table = Appearance::new(&paint, &wall, 20e-6, 4.0).unwrap();
+        for depth in [0.0, 0.013, 0.4, 1.0, 2.7, 4.0] {
+            let exact = spectrum_lab(paint.over(20e-6 * depth, &wall).unwrap().reflectance());
+            assert!(ciede2000(table.lab(depth), exact) < 0.02, "{} at {depth}", name.as_str());
+        }
+        assert_eq!(table.lab(9.0), table.lab(4.0));
+    }
+    // Ink rises with the depth of charcoal, from nothing to nearly all.
+    let knots = ink_curve(&PaintName::Charcoal.paint(20e-6).unwrap(), &wall, 20e-6, 4.0).unwrap();
+    assert_eq!(knots[0], (0.0, 0.0));
+    assert!(knots.windows(2).all(|pair| pair[0].1 < pair[1].1) && (0.99..1.0).contains(&knots[knots.len() - 1].1));
+    assert!(matches!(ink_curve(&Paint::white(1e-6).unwrap(), &wall, 0.0, 4.0), Err(Error::OutOfRange { .. })));
 }
