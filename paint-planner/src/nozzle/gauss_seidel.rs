@@ -7,8 +7,8 @@ use crate::error::Error;
 use nalgebra::Vector5;
 
 /// Block Gauss-Seidel: the states in turn, each by a dual active-set method (Goldfarb and Idnani 1983) with its neighbours where they are.
-/// Programs whose states do not couple, as those of [`Mode::PaperExact`](crate::Mode::PaperExact), are solved by one sweep, to rounding; those of
-/// a whole stroke take the more sweeps the stronger the smoothness, and [`PrimalDualActiveSet`](crate::PrimalDualActiveSet) is the faster there.
+/// Programs whose states do not couple, as those of [`Mode::PaperExact`](crate::nozzle::Mode::PaperExact), are solved by one sweep, to rounding; those of
+/// a whole stroke take the more sweeps the stronger the smoothness, and [`PrimalDualActiveSet`](crate::nozzle::PrimalDualActiveSet) is the faster there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GaussSeidel {
     /// Greatest change of a coordinate in the last sweep. Default 1e-11.

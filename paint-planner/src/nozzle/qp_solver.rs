@@ -15,8 +15,8 @@ pub struct QpOutcome {
 
 /// A solver for the convex quadratic programs of stage 1.
 ///
-/// [`PrimalDualActiveSet`](crate::PrimalDualActiveSet) and [`InteriorPoint`](crate::InteriorPoint) know their structure; the former is the
-/// default. `Clarabel` (feature `clarabel`) takes them as general sparse ones. To bring another, hand the matrices of [`StandardForm`](crate::StandardForm) to it.
+/// [`PrimalDualActiveSet`](crate::nozzle::PrimalDualActiveSet) and [`InteriorPoint`](crate::nozzle::InteriorPoint) know their structure; the former is the
+/// default. `Clarabel` (feature `clarabel`) takes them as general sparse ones. To bring another, hand the matrices of [`StandardForm`](crate::nozzle::StandardForm) to it.
 pub trait QpSolver: std::fmt::Debug + Sync {
     /// Minimises the program. `states` holds a start, which satisfies the hard rows strictly where the program has such a point, and
     /// takes the answer: five coordinates for each state.

@@ -13,7 +13,7 @@ pub(crate) struct Row {
 /// `min 1/2 x'Hx + g'x` over states `x_i = (p_i, u_i)` in R^5, with H block tridiagonal, subject to hard rows on the positions
 /// `p_i` and soft rows on `w_i = soft_map_i x_i` (the aim beside the target) that may be exceeded at `penalty` per unit.
 ///
-/// [`StandardForm`](crate::StandardForm) has its matrices.
+/// [`StandardForm`](crate::nozzle::StandardForm) has its matrices.
 #[derive(Debug, Clone, Default)]
 pub struct QuadraticProgram {
     pub(crate) hessian: BlockTridiagonal<5>,
