@@ -8,6 +8,7 @@ pub mod exit;
 #[cfg(feature = "handheld")]
 pub mod handheld;
 #[cfg(feature = "recordings")]
+#[cfg_attr(not(feature = "programs"), allow(dead_code, reason = "each program reads and writes some of the messages"))]
 mod mcap_messages;
 pub mod mesh_io;
 pub mod mesh_placement;
@@ -17,7 +18,6 @@ pub mod mission_file;
 pub mod mission_paint;
 #[cfg(feature = "paint-image")]
 pub mod paint_image;
-pub mod palette;
 pub mod picture_file;
 pub mod picture_placement;
 pub mod pictures;

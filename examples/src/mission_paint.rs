@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::design::Design;
-use crate::palette::PaintName;
+use paint_sim::paint::PaintName;
 
 /// An entry of `[[paints]]`. The paints are flown in their order, each with a tank of its own, over those before it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

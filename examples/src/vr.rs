@@ -22,6 +22,7 @@ mod listener;
 mod message;
 mod mission_export;
 mod output;
+mod palette;
 mod protocol;
 mod recording;
 mod run;

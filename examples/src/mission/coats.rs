@@ -87,8 +87,8 @@ fn over_each_other<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::palette::PaintName;
     use paint_sim::colour::spectrum_lab;
+    use paint_sim::paint::PaintName;
 
     #[test]
     fn the_upper_film_hides_the_lower_one() {

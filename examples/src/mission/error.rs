@@ -2,11 +2,11 @@
 
 use crate::appearance::AppearanceError;
 use crate::design::DesignError;
-use crate::palette::PaintName;
 use crate::pictures::PictureError;
 use crate::recording::RecordingError;
 use crate::report::ReportError;
 use crate::surface::SurfaceError;
+use paint_sim::paint::PaintName;
 
 /// Why a mission could not be finished.
 #[derive(Debug, thiserror::Error)]

@@ -7,9 +7,9 @@ use ptu_kinematics::{PtuSettings, ServoSettings};
 use serde::{Deserialize, Serialize};
 
 use super::error::MissionError;
-use crate::palette::PaintName;
 use crate::picture_placement::PicturePlacement;
 use crate::projection::Viewpoint;
+use paint_sim::paint::PaintName;
 
 /// Everything a mission can be told.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -3,8 +3,8 @@
 use paint_sim::colour::{BANDS, spectrum_srgb8};
 use paint_sim::{Film, Shot, SprayModel, Surface, km};
 
+use super::palette::PaletteEntry;
 use super::world::VrWorld;
-use crate::palette::PaletteEntry;
 
 /// A rectangle of the atlas, sRGB.
 pub(super) struct Patch {

@@ -9,11 +9,11 @@ use tsdf_hash::Map;
 use uv_param::SurfacePoint;
 
 use super::error::VrError;
+use super::palette::{PaletteEntry, palette};
 use super::settings::VrSettings;
 use crate::adapters::{MeshSurface, Robot};
 use crate::mesh_io::TriangleMesh;
 use crate::mission_file::MissionFile;
-use crate::palette::{PaletteEntry, palette};
 use crate::progress::Stage;
 use crate::surface::PaintSurface;
 

@@ -3,11 +3,11 @@
 use std::process::Command;
 
 use paint_planner::timing::TimingPolicy;
+use paint_sim::paint::PaintName;
 use paintcopter::mesh_placement::UpAxis;
 use paintcopter::mission::{MissionSettings, PainterChoice};
 use paintcopter::mission_file::MissionFile;
 use paintcopter::mission_paint::MissionPaint;
-use paintcopter::palette::PaintName;
 use paintcopter::picture_placement::{PicturePlacement, PlacementMode};
 use paintcopter::projection::Viewpoint;
 use paintcopter::region::Region;

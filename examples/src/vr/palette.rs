@@ -1,20 +1,20 @@
 //! The paints to choose from.
 
-pub use paint_sim::paint::PaintName;
+use paint_sim::paint::PaintName;
 use paint_sim::{Paint, Substrate};
 
 use crate::appearance::UNIT_THICKNESS;
 
 /// A paint with a name. The number of a paint in a session is its place in [`PaintName::ALL`].
-pub(crate) struct PaletteEntry {
-    pub(crate) name: PaintName,
-    pub(crate) paint: Paint,
+pub(super) struct PaletteEntry {
+    pub(super) name: PaintName,
+    pub(super) paint: Paint,
     /// Colour of a thick coat, sRGB.
-    pub(crate) srgb: [u8; 3],
+    pub(super) srgb: [u8; 3],
 }
 
 /// The palette, the first paint preset.
-pub(crate) fn palette() -> Result<Vec<PaletteEntry>, paint_sim::Error> {
+pub(super) fn palette() -> Result<Vec<PaletteEntry>, paint_sim::Error> {
     let ground = Substrate::sandstone();
     let entry = |name: PaintName| {
         let paint = name.paint(UNIT_THICKNESS)?;
