@@ -214,7 +214,8 @@ impl Frontend {
         if !self.lost && !self.motion.is_led(frame) {
             best = self.recognise(map, keyframes, depth, colour, is_guess, best)?;
         }
-        if best.is_tracked() && is_contradicted(&best) {
+        // What has been moved since a stored map was made differs from it, and the agreement that it asks for is higher already.
+        if !self.fixed_map && best.is_tracked() && is_contradicted(&best) {
             best.status = TrackingStatus::Disagreement;
         }
         Ok(Some(best))
