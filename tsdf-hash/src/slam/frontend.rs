@@ -14,7 +14,7 @@ use crate::slam::outcome::Event;
 use crate::slam::settings::{PoseSource, SlamSettings};
 use crate::slam::wrong_minimum::{UsualAgreement, is_contradicted, rank};
 use crate::tracking::outcome::{PosePrior, TrackingOutcome, TrackingStatus};
-use crate::tracking::pose::step;
+use crate::tracking::pose::within;
 use crate::tracking::relocaliser::Relocaliser;
 use crate::tracking::settings::TrackingSettings;
 use crate::tracking::tracker::Tracker;
@@ -171,8 +171,7 @@ impl Frontend {
             (true, false) => located.events.push(Event::Found),
             _ => {}
         }
-        if let Some(outcome) = tracked.cloned() {
-            let outcome = &outcome;
+        if let Some(outcome) = tracked {
             self.usual.learn(outcome);
             // After a jump the last two poses are no motion, but what led to the place where it is found is one.
             self.motion.found(outcome, located.earlier.last().copied(), frame, was_lost);
@@ -215,7 +214,7 @@ impl Frontend {
             best = self.recognise(map, keyframes, depth, colour, is_guess, best)?;
         }
         // What has been moved since a stored map was made differs from it, and the agreement that it asks for is higher already.
-        if !self.fixed_map && best.is_tracked() && is_contradicted(&best) {
+        if !self.fixed_map && best.is_tracked() && is_contradicted(&best, self.tracker.settings()) {
             best.status = TrackingStatus::Disagreement;
         }
         Ok(Some(best))
@@ -275,9 +274,4 @@ impl Frontend {
         }
         Ok(outcome)
     }
-}
-
-fn within(a: &Isometry3<f64>, b: &Isometry3<f64>, [turn, shift]: [f64; 2]) -> bool {
-    let apart = step(a, b);
-    apart.fixed_rows::<3>(0).norm() <= turn && apart.fixed_rows::<3>(3).norm() <= shift
 }

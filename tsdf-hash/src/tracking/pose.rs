@@ -28,6 +28,12 @@ pub(crate) fn rotated(covariance: &Matrix6<f64>, to_from: &UnitQuaternion<f64>) 
     axes * covariance * axes.transpose()
 }
 
+/// Whether two poses are so near to each other: radians, metres.
+pub(crate) fn within(a: &Isometry3<f64>, b: &Isometry3<f64>, [turn, shift]: [f64; 2]) -> bool {
+    let apart = step(a, b);
+    apart.fixed_rows::<3>(0).norm() <= turn && apart.fixed_rows::<3>(3).norm() <= shift
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

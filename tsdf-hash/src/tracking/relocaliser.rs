@@ -9,7 +9,7 @@ use crate::keyframes::index::KeyframeIndex;
 use crate::map::Map;
 use crate::settings::{MemoryLimits, Settings};
 use crate::tracking::outcome::{PosePrior, TrackingOutcome};
-use crate::tracking::pose::step;
+use crate::tracking::pose::within;
 use crate::tracking::settings::TrackingSettings;
 use crate::tracking::tracker::{FROM_AFAR, FROM_NEAR, Tracker};
 
@@ -252,11 +252,6 @@ impl Reserve {
 
 fn is_same(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
     within(a, b, SAME)
-}
-
-fn within(a: &Isometry3<f64>, b: &Isometry3<f64>, [turn, shift]: [f64; 2]) -> bool {
-    let apart = step(a, b);
-    apart.fixed_rows::<3>(0).norm() <= turn && apart.fixed_rows::<3>(3).norm() <= shift
 }
 
 /// How many of some poses are apart from all that were counted before.

@@ -33,7 +33,7 @@ const FINE_STRIDE: usize = 2;
 /// Least coverage of a frame that is believed to be found.
 const LEAST_COVERAGE: f64 = 0.5;
 /// Least correlation of its intensities with those of the map, where both have colour (ours).
-const LEAST_LIKENESS: f64 = 0.75;
+pub(crate) const LEAST_LIKENESS: f64 = 0.75;
 /// Searches from a pose that may be off by half a metre: largest distances of partners, one search after the other, as multiples of the
 /// setting, and the least agreement after each of them: what is below leads nowhere (ours).
 pub(crate) const FROM_AFAR: [(f64, f64); 10] = [

@@ -131,9 +131,12 @@ fn followed_share(mut vio: Vio, samples: &[Imu], frames: &[(Stamp, impl Picture)
     followed as f64 / frames.len() as f64
 }
 
-/// The results do not depend on the number of threads.
+/// The results do not depend on the number of threads; one spawns none.
 fn in_parallel(readings: &[Reading], threads: usize, share: &(dyn Fn(&Reading) -> f64 + Sync)) -> Vec<f64> {
-    let part = readings.len().div_ceil(threads.max(1));
+    if threads < 2 {
+        return readings.iter().map(share).collect();
+    }
+    let part = readings.len().div_ceil(threads);
     std::thread::scope(|scope| {
         let workers: Vec<_> = readings
             .chunks(part)

@@ -122,6 +122,8 @@ impl Runner {
     /// # Errors
     /// [`Error`]: a stamp that is not after the one before, numbers that are not finite. The sample is then left out.
     pub fn imu(&mut self, sample: &Imu) -> Result<Option<Event>, Error> {
+        // A broken sample must not end a segment.
+        sample.check_after(None)?;
         let gap_s = self.latest_sample.map_or(0.0, |before| sample.stamp.secs_since(before));
         let interrupts = gap_s > self.settings.max_imu_gap_s && self.vio.output().is_some();
         let event = interrupts.then(|| self.end_segment(sample.stamp, LossReason::ImuGap { gap_s }));

@@ -69,6 +69,21 @@ fn a_gap_ends_a_segment_and_a_new_one_begins() {
 }
 
 #[test]
+fn a_broken_sample_after_a_gap_ends_no_segment() {
+    let (mut runner, picture) = (Runner::new(small(), RunnerSettings::default()), tiles());
+    for millis in (0..3000).step_by(5) {
+        runner.imu(&still(millis)).unwrap();
+        if millis % 50 == 0 {
+            runner.image(at(millis), &ImageView::new(SIZE.0, SIZE.1, &picture).unwrap()).unwrap();
+        }
+    }
+    assert!(runner.output().is_some());
+    let broken = Imu { accel: [f64::NAN; 3].into(), ..still(4000) };
+    assert!(matches!(runner.imu(&broken), Err(Error::NonFinite { .. })));
+    assert!(runner.output().is_some(), "a sample that is left out has no gap before it");
+}
+
+#[test]
 fn without_a_history_the_events_and_counts_are_the_same() {
     let (events, run) = pause(RunnerSettings::default());
     let (told, bare) = pause(RunnerSettings { keep_history: false, ..RunnerSettings::default() });
