@@ -116,9 +116,7 @@ impl Region {
                     way.norm() <= *radius && way.dot(&normal).abs() <= OFF_PLANE * radius
                 };
                 let behind = |s: &Sample| near(s) && s.normal.dot(&normal) <= -SAME_SIDE;
-                if (0..mesh.faces.len())
-                    .any(|f| samples_of_face(&mesh.positions, mesh.faces[f], finest).iter().any(behind))
-                {
+                if (0..mesh.faces.len()).any(|f| samples_of_face(mesh.corners(f), finest).iter().any(behind)) {
                     hint = " on the side of its normal, but something on the other: turn the normal about".into();
                 }
                 divide(&mut mesh, finest, &|s| near(s) && s.normal.dot(&normal) >= SAME_SIDE)?
@@ -184,7 +182,7 @@ impl Region {
     ) -> Result<Vec<bool>, RegionError> {
         let mut nearest = (f64::INFINITY, 0);
         for face in 0..mesh.faces.len() {
-            for sample in samples_of_face(&mesh.positions, mesh.faces[face], finest) {
+            for sample in samples_of_face(mesh.corners(face), finest) {
                 let distance = (sample.point - point).norm();
                 if distance < nearest.0 {
                     nearest = (distance, face);

@@ -31,6 +31,11 @@ pub struct MeshUv {
 }
 
 impl TriangleMesh {
+    /// The corners of a face; its indices must be valid.
+    pub fn corners(&self, face: usize) -> [[f32; 3]; 3] {
+        self.faces[face].map(|vertex| self.positions[vertex as usize])
+    }
+
     /// Sum of the areas of its triangles, in the square of its unit; indices must be valid.
     pub fn area(&self) -> f64 {
         self.area_vectors().map(|vector| vector.norm()).sum()

@@ -137,12 +137,9 @@ impl EditableMesh<'_> {
             .uv
             .as_ref()
             .map_or([[0.0; 2]; 3], |uv| uv.faces[face].map(|i| uv.coordinates[i as usize].map(f64::from)));
-        Corners { points: points(self.positions, self.faces[face]), uv }
+        let points = self.faces[face].map(|v| Point3::from(self.positions[v as usize].map(f64::from)));
+        Corners { points, uv }
     }
-}
-
-fn points(positions: &[[f32; 3]], face: [u32; 3]) -> [Point3<f64>; 3] {
-    face.map(|v| Point3::from(positions[v as usize].map(f64::from)))
 }
 
 /// The corners of a face.
@@ -182,10 +179,11 @@ impl Corners {
     }
 }
 
-/// Places on a face (its vertices must exist), at most `finest` apart: its corners among them (drawn in a little), its centre last.
-/// Without texture coordinates.
-pub fn samples_of_face(positions: &[[f32; 3]], face: [u32; 3], finest: f64) -> Vec<Sample> {
-    Corners { points: points(positions, face), uv: [[0.0; 2]; 3] }.samples(finest)
+/// Places on a face with these corners, at most `finest` apart (units of the mesh): its corners among them (drawn in a little), its centre
+/// last. Without texture coordinates.
+pub fn samples_of_face(corners: [[f32; 3]; 3], finest: f64) -> Vec<Sample> {
+    let points = corners.map(|corner| Point3::from(corner.map(f64::from)));
+    Corners { points, uv: [[0.0; 2]; 3] }.samples(finest)
 }
 
 fn classify(mesh: &EditableMesh, face: usize, finest: f64, inside: &dyn Fn(&Sample) -> bool) -> Side {
