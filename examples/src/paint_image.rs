@@ -1,7 +1,7 @@
 //! The job of `paint-image`: a picture in, sprays and figures out.
 
+mod arguments;
 mod colour;
-mod command_line;
 mod commands;
 mod compare;
 mod cpu_timer;
@@ -14,8 +14,8 @@ mod progress_strip;
 mod run;
 mod training;
 
+pub use arguments::Arguments;
 pub use colour::{ColourFigures, Glazes, compare_colours, paint_colours, read_picture, save_colours};
-pub use command_line::Arguments;
 pub use commands::NOZZLE_SPEED;
 pub use compare::{Row, compare, table};
 pub use equal_sprays::{EqualSprays, equal_sprays, print_equal_sprays};

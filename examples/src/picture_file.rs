@@ -56,7 +56,6 @@ fn upright(reader: ImageReader<impl BufRead + Seek>) -> Result<DynamicImage, Pic
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use image::ImageEncoder as _;

@@ -65,7 +65,6 @@ pub fn draw_svg(text: &str) -> Result<DynamicImage, DrawingError> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

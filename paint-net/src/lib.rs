@@ -41,6 +41,7 @@
 //! | a feedback network (as Zamir et al. 2017), convolutional; ours: Paper IV paints one spray per step | [`Feedback`], [`network::Network`] |
 //! | closed loop: coats, and a measurement after each; ours: Paper IV paints open loop | [`painters::ClosedLoopPainter`] |
 //! | volumes fitted to what sprays leave on the surface itself, curved, stretched and cut; ours | [`OnSurface`] |
+//! | doses of a coat, least squares on thickness (Daube-Witherspoon and Muehllehner 1986) | [`painters::DoseCorrection`] |
 //! | a valve of limited slew rate (augmented Lagrangian), on a context-based path (Dafner et al. 2000) | [`painters::SlewLimited`], [`path::ScanOrder`] |
 //! | several paints that mix (Kubelka and Munk 1931) | [`colour::Palette`], [`colour::ColourSeparation`] |
 //! | strokes a robot can fly | [`path::boustrophedon`] |

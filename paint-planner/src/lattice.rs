@@ -89,7 +89,6 @@ fn way_to(goal: Cell, reached: &HashMap<Cell, Reached>) -> Vec<Cell> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

@@ -321,7 +321,6 @@ fn parts_of(twins: &[u32]) -> (Vec<u32>, usize) {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

@@ -90,7 +90,7 @@ pub(super) fn plan(task: &PaintingTask) -> Result<Planned, MissionError> {
             let flights = &mut mission.flights[first..];
             let mut parts: Vec<(&mut [Target], &Plan)> =
                 flights.iter_mut().map(|f| (f.route.targets.as_mut_slice(), &f.plan)).collect();
-            let expected = correct_doses(&mut parts, task);
+            let expected = correct_doses(&mut parts, task)?;
             eprintln!(
                 "coat: doses corrected on the surface, expected to be even within {:.1} % (deviation over mean)",
                 100.0 * expected

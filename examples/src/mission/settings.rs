@@ -134,7 +134,6 @@ fn planner_settings() -> paint_planner::Settings {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::super::test_panel;
     use super::*;

@@ -1,5 +1,4 @@
 //! A stroke over a flat wall, for the tests of the mission's parts.
-#![allow(clippy::unwrap_used)]
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use paint_planner::{Plan, Target};

@@ -10,7 +10,7 @@ use paint_net::train::{ThesisSettings, TrainSettings};
 use paint_net::{Image, Limits, SprayKernel};
 
 use super::colour::{Glazes, paint_colours, read_picture, save_colours};
-use super::command_line::{Arguments, Command, Nozzle, Preset, ScanOrderName, SharingName, Training};
+use super::arguments::{Arguments, Command, Nozzle, Preset, ScanOrderName, SharingName, Training};
 use super::compare::{compare, table};
 use super::equal_sprays::{equal_sprays, print_equal_sprays};
 use super::error::PaintImageError;

@@ -1,4 +1,7 @@
 //! The HTTP side: one request per connection, which gets a file of the page or becomes a WebSocket.
+//!
+//! `httparse` and `tungstenite` do the protocol; the rest is here and not in `tiny_http` (0.12), which gives every connection a thread
+//! without a bound and waits for a head without a limit of time: strangers could shut out the owner of the token.
 
 use std::io::{Read, Write};
 use std::net::{IpAddr, TcpStream};
@@ -178,7 +181,6 @@ fn origin_is(origin: &str, host: &str) -> bool {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
 
 mod colour;
+mod doses;
 mod examples;
 mod feedback;
 mod free_sprays;

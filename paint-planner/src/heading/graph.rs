@@ -106,7 +106,6 @@ impl HeadingGraph {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use nalgebra::{UnitVector3, Vector3};
 

@@ -46,7 +46,6 @@ pub(super) fn take_unserved(
     Ok(strokes)
 }
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use nalgebra::{Point3, UnitVector3, Vector3};
 

@@ -73,7 +73,6 @@ pub(super) fn utilisation(pieces: &[Piece], pages: &[Page], settings: &PackSetti
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::arrange::{COARSE_CELLS, LONGEST, texels_per_cell};
     use super::search::{Goal, search};

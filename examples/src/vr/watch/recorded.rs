@@ -96,7 +96,6 @@ fn why(fault: MessagesFault) -> String {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::super::feed::LOG;
     use super::*;

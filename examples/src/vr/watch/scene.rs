@@ -155,7 +155,6 @@ impl Scene {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use foxglove::Encode as _;

@@ -161,7 +161,6 @@ fn coloured(colours: &[Color], colour: Option<Color>, points: usize) -> Option<V
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

@@ -32,7 +32,6 @@ impl FromStr for WatchSource {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

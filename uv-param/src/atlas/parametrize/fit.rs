@@ -142,7 +142,6 @@ pub(in crate::atlas) fn projection(disk: &Disk) -> Vec<[f64; 2]> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use crate::parametrizer::tutte::tutte_layout;

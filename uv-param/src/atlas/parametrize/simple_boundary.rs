@@ -121,7 +121,6 @@ fn contact([a, b]: [u32; 2], [c, d]: [u32; 2], uv: &[[f64; 2]]) -> Contact {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use crate::surface::{FaceLookup, Surface};

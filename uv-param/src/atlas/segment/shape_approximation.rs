@@ -204,7 +204,6 @@ fn distances(surface: &Surface, starts: &[u32], joined: &impl Fn(usize) -> bool)
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

@@ -276,7 +276,6 @@ impl Prism {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use crate::surface::Surface;
