@@ -16,6 +16,7 @@ pub mod mission;
 pub mod mission_arguments;
 pub mod mission_file;
 pub mod mission_paint;
+pub mod onboard;
 #[cfg(feature = "paint-image")]
 pub mod paint_image;
 pub mod picture_file;
@@ -29,6 +30,7 @@ pub mod report;
 #[cfg(feature = "scan")]
 pub mod scan;
 pub mod scan_flight;
+mod simulated_sensors;
 mod srgb;
 pub mod surface;
 pub mod textured_mesh;

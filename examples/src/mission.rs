@@ -42,4 +42,4 @@ pub use plan_output::{PlanFigures, save_plan};
 pub use planned_mission::PlannedMission;
 pub use preview::{Preview, preview};
 pub use run::Mission;
-pub use settings::{ControllerChoice, MissionSettings, PainterChoice};
+pub use settings::{ControllerChoice, LocalisationChoice, MissionSettings, PainterChoice};

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use paint_planner::timing::TimingPolicy;
 
 use crate::mesh_placement::UpAxis;
-use crate::mission::{MissionSettings, PainterChoice};
+use crate::mission::{LocalisationChoice, MissionSettings, PainterChoice};
 use crate::mission_file::MissionFile;
 use crate::picture_placement::{PicturePlacement, PlacementMode};
 use crate::projection::Viewpoint;
@@ -17,7 +17,7 @@ type AnyError = Box<dyn std::error::Error>;
 /// What an even coat keeps of the tilt joint's range beyond what every mission does: three degrees, in radians.
 const COAT_MARGIN: f64 = 3.0 * std::f64::consts::PI / 180.0;
 /// What stands in a mission file.
-const MISSION: [&str; 22] = [
+const MISSION: [&str; 23] = [
     "mesh",
     "texture",
     "scale",
@@ -26,6 +26,7 @@ const MISSION: [&str; 22] = [
     "design",
     "fill",
     "scan",
+    "localisation",
     "painter",
     "layers",
     "seed",
@@ -78,6 +79,10 @@ pub struct MissionArguments {
     /// Scan the surface first, with the robot's own camera, inertial sensor and depth camera, and paint what it has mapped
     #[arg(long, conflicts_with = "texture")]
     scan: bool,
+    /// What tells the painting flight where the robot is: motion capture, a model of noise of 7 cm, or the robot's own camera, depth camera and
+    /// inertial sensor in the map of its --scan [default: motion-capture]
+    #[arg(long, value_enum, default_value = "motion-capture")]
+    localisation: LocalisationName,
     /// Who decides the sprays [default: feedback; fill with --fill]
     #[arg(long)]
     painter: Option<PainterName>,
@@ -205,6 +210,13 @@ impl Placement {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
+enum LocalisationName {
+    MotionCapture,
+    Noise,
+    Slam,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
 enum PainterName {
     /// The network with feedback from its canvas
     Feedback,
@@ -237,6 +249,11 @@ impl MissionArguments {
             layered: self.layers,
             memory_gib: self.memory_gib,
             placement: self.placement.picture()?,
+            localisation: match self.localisation {
+                LocalisationName::MotionCapture => LocalisationChoice::MotionCapture,
+                LocalisationName::Noise => LocalisationChoice::Noise,
+                LocalisationName::Slam => LocalisationChoice::Slam,
+            },
             viewpoint: self.placement.project,
             painter: match self.painter.unwrap_or(if self.fill.is_some() {
                 PainterName::Fill

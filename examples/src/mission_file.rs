@@ -13,7 +13,7 @@ use crate::mesh_placement::{MeshPlacement, PlacementError, UpAxis, place_mesh, p
 use crate::mission::{MissionError, MissionSettings, PaintingTask};
 use crate::mission_paint::{MissionPaint, absolute, file_of_design};
 use crate::region::{Region, RegionError, Scene};
-use crate::scan_flight::{ScanFlight, ScanFlightError, save as save_scan_flight};
+use crate::scan_flight::{self, ScanFlight, ScanFlightError, save as save_scan_flight};
 use crate::world::rock_wall;
 
 /// Thickness of an even coat, metres: what paint is thicker does not show.
@@ -150,7 +150,8 @@ pub enum MissionFileError {
 struct Place {
     name: String,
     scene: Scene,
-    truth: Option<TriangleMesh>,
+    /// The true surface, and the file of the map.
+    truth: Option<(TriangleMesh, PathBuf)>,
 }
 
 impl MissionFile {
@@ -218,7 +219,8 @@ impl MissionFile {
         let scan_flight = ScanFlight::fly(&scene.canvas, self.settings.seed, self.settings.threads)
             .map_err(|source| MissionFileError::Scan { surface: self.mesh_prefix(), source })?;
         save_scan_flight(&scan_flight, folder).map_err(|source| self.in_mesh(source))?;
-        Ok(Place { name, scene: Scene::whole(scan_flight.mesh), truth: Some(scene.canvas) })
+        let map = folder.join(scan_flight::MAP_FILE);
+        Ok(Place { name, scene: Scene::whole(scan_flight.mesh), truth: Some((scene.canvas, map)) })
     }
 
     /// Reads the design and decides.
@@ -242,7 +244,7 @@ impl MissionFile {
         };
         let task = PaintingTask::new(name, scene, &design, settings);
         let task = task.and_then(|task| match truth {
-            Some(truth) => task.on_true_surface(truth),
+            Some((truth, map)) => task.on_true_surface(truth, map.clone()),
             None => Ok(task),
         });
         task.map_err(|source| self.in_mesh(source))

@@ -125,6 +125,21 @@ pub struct Report {
     /// That mean.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fill_mean_ratio: Option<f64>,
+    /// Position error of the robot's own localisation over the flights that paint, root mean square.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_error_rms_m: Option<f64>,
+    /// Longest time from the first image of a flight to the first pose.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relocalised_after_s: Option<f64>,
+    /// Largest error of such a pose.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relocalisation_error_max_m: Option<f64>,
+    /// Depth images that gave no pose in the map, of all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unconfirmed_depth_share: Option<f64>,
+    /// Processor time of odometry and localisation for a second of flight.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub onboard_cpu_s_per_s: Option<f64>,
     /// Length of all seams on the surface.
     pub seam_length_m: f64,
     /// Structural similarity of the painted surface within 3 cm of a seam, where the robot can paint; windows go on beyond the seams.

@@ -7,9 +7,8 @@ mod fly;
 mod localiser;
 mod output;
 mod route;
-mod sensors;
 
 pub use error::ScanFlightError;
 pub use evaluation::ScanFlightFigures;
 pub use fly::ScanFlight;
-pub use output::save;
+pub use output::{MAP_FILE, save};

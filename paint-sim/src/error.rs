@@ -63,13 +63,21 @@ pub enum Error {
         /// Distance from base to vehicle, m.
         distance: f64,
     },
-    /// The reference, the controller or the pan-tilt unit returned a number that is not finite.
+    /// The reference, the controller, the localisation or the pan-tilt unit returned a number that is not finite.
     #[error("{who} returned a value that is not finite at t = {time} s")]
     BadCallback {
         /// Which part.
         who: &'static str,
         /// Time in the flight, s.
         time: f64,
+    },
+    /// The source of poses gave up, or had none to start with.
+    #[error("localisation at t = {time} s: {why}")]
+    Localisation {
+        /// Time in the flight, s.
+        time: f64,
+        /// What it said.
+        why: String,
     },
     /// There is no GPU that can be used, or it failed.
     #[error("GPU: {what}; the processor does the same without it")]

@@ -15,6 +15,7 @@ mod interlock;
 mod log;
 mod noise;
 mod pan_tilt;
+mod pose_source;
 mod reference;
 mod sample;
 mod settings;
@@ -29,6 +30,7 @@ pub use hose::{Catenary, HoseModel};
 pub use interlock::Interlock;
 pub use log::FlightLog;
 pub use pan_tilt::{IdealPanTilt, PanTilt};
+pub use pose_source::{LocalisedPose, PoseSource};
 pub use reference::{Reference, ReferenceState};
 pub use sample::FlightSample;
 pub use settings::{FlightSettings, Localisation, Valve, Wind};
@@ -82,6 +84,23 @@ pub fn fly_with(
     surface: &dyn Surface,
     settings: &FlightSettings,
 ) -> Result<FlightLog, Error> {
+    settings.check()?;
+    let mut sensor = PoseSensor::new(settings.localisation, CONTROL_STEP, settings.seed);
+    fly_localised(reference, controller, ptu, surface, &mut sensor, settings)
+}
+
+/// As [`fly_with`], with a source of poses in the place of [`FlightSettings::localisation`].
+///
+/// # Errors
+/// As [`fly_with`], and [`Error::Localisation`].
+pub fn fly_localised(
+    reference: &dyn Reference,
+    controller: &mut dyn Controller,
+    ptu: &mut dyn PanTilt,
+    surface: &dyn Surface,
+    localisation: &mut dyn PoseSource,
+    settings: &FlightSettings,
+) -> Result<FlightLog, Error> {
     span!("fly");
     settings.check()?;
     let duration = reference.duration();
@@ -92,8 +111,12 @@ pub fn fly_with(
 
     let mut vehicle = Vehicle::at_rest(start.position, start.heading);
     let mut wind = WindModel::new(&settings.wind, STEP, settings.seed);
-    let mut sensor = PoseSensor::new(settings.localisation, CONTROL_STEP, settings.seed);
-    let mut estimator = Estimator::new(settings.airframe, ObserverSettings::default(), &sensor.measure(&vehicle));
+    let first = -(settings.settle / CONTROL_STEP).round() as i64 * CONTROL_STEPS;
+    let begin = first as f64 * STEP;
+    let start = localised(localisation, begin, &vehicle)?;
+    let nowhere = || Error::Localisation { time: begin, why: "there is no pose to start from".into() };
+    let start = start.ok_or_else(nowhere)?.world_from_body;
+    let mut estimator = Estimator::new(settings.airframe, ObserverSettings::default(), &start);
     let mut command = Command { thrust: settings.airframe.mass * GRAVITY, ..Command::default() };
     let mut hose_force = Vector3::zeros();
     let mut aim = [0.0; 2];
@@ -106,11 +129,11 @@ pub fn fly_with(
     );
 
     let log_steps = i64::from(RATE / settings.log_rate);
-    let first = -(settings.settle / CONTROL_STEP).round() as i64 * CONTROL_STEPS;
     // A hair of tolerance, or rounding would drop the last sample of a duration such as 0.3 s.
     let last = (duration / STEP + 1e-6).floor() as i64;
     let interval = log_steps as f64 * STEP;
     let mut samples = Vec::with_capacity((last / log_steps + 1) as usize);
+    let mut trusted = !settings.faults.pose_lost(begin);
     for step in first..=last {
         let time = step as f64 * STEP;
         if step % CONTROL_STEPS == 0 {
@@ -120,15 +143,14 @@ pub fn fly_with(
                 event!(warn, time, distance, "vehicle diverged from its reference");
                 return Err(Error::Diverged { time, distance });
             }
-            let lost = settings.faults.pose_lost(time);
             if step > first {
-                // The sensor's noise goes on, so that a fault changes nothing before it.
-                let measured = sensor.measure(&vehicle);
-                if lost {
-                    estimator.coast(CONTROL_STEP);
-                } else {
-                    estimator.update(&measured, CONTROL_STEP);
+                // A source whose poses are lost goes on all the same, so that a fault changes nothing before it.
+                let pose = localised(localisation, time, &vehicle)?.filter(|_| !settings.faults.pose_lost(time));
+                match &pose {
+                    Some(pose) => estimator.update(&pose.world_from_body, CONTROL_STEP),
+                    None => estimator.coast(CONTROL_STEP),
                 }
+                trusted = pose.is_some_and(|pose| pose.trusted);
             }
             command = controller.command(time, estimator.estimate(), &hover);
             if ![command.roll, command.pitch, command.yaw_rate, command.thrust].iter().all(|v| v.is_finite()) {
@@ -144,7 +166,7 @@ pub fn fly_with(
             aim = target.map_or([0.0; 2], |point| ptu.command(&estimator.predict(ahead), &point));
             let ahead = settings.valve.dead_time + 0.5 * CONTROL_STEP;
             let later = checked(&hover, time + ahead)?;
-            let estimator = (!lost).then_some(&estimator);
+            let estimator = trusted.then_some(&estimator);
             let known = Known { estimator, angles: pan_tilt, command: aim, now: &wanted, later: &later, ahead };
             interlock.decide(ptu, &known);
         }
@@ -156,6 +178,7 @@ pub fn fly_with(
         }
         let air = wind.step() + settings.faults.gust(time);
         vehicle.step(&settings.airframe, &command, &air, &hose_force, STEP);
+        localisation.moved(time + STEP, &vehicle)?;
         if !settings.faults.servos_stuck(time) {
             pan_tilt = ptu.step(aim, STEP);
         }
@@ -189,6 +212,12 @@ impl Reference for HoldBeforeStart<'_> {
 fn checked(reference: &dyn Reference, time: f64) -> Result<ReferenceState, Error> {
     let state = reference.at(time);
     if state.is_finite() { Ok(state) } else { Err(Error::BadCallback { who: "the reference", time }) }
+}
+
+fn localised(source: &mut dyn PoseSource, time: f64, truth: &Vehicle) -> Result<Option<LocalisedPose>, Error> {
+    let pose = source.pose(time, truth)?;
+    let finite = |pose: &LocalisedPose| pose.world_from_body.to_matrix().iter().all(|v| v.is_finite());
+    if pose.as_ref().is_none_or(finite) { Ok(pose) } else { Err(Error::BadCallback { who: "the localisation", time }) }
 }
 
 /// What a sample of the log is measured against.

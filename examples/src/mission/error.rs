@@ -2,6 +2,7 @@
 
 use crate::appearance::AppearanceError;
 use crate::design::DesignError;
+use crate::onboard::LocalisationError;
 use crate::pictures::PictureError;
 use crate::recording::RecordingError;
 use crate::report::ReportError;
@@ -47,6 +48,12 @@ pub enum MissionError {
     /// The simulation refused.
     #[error("simulation: {0}")]
     Simulation(#[from] paint_sim::Error),
+    /// The robot shall find itself in a map, and there is none.
+    #[error("localisation by slam needs a map of the surface: let the robot scan it first (--scan)")]
+    NoMap,
+    /// The map cannot be read, or odometry and map refuse.
+    #[error("localisation: {0}")]
+    Localisation(#[from] LocalisationError),
     /// The paint.
     #[error("paint: {0}")]
     Appearance(#[from] AppearanceError),

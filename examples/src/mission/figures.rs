@@ -15,6 +15,7 @@ use super::seams::likeness;
 use super::settings::{MissionSettings, PainterChoice};
 use crate::adapters::{MeshSurface, Robot};
 use crate::appearance::DENSITY;
+use crate::onboard::LocalisationFigures;
 use crate::report::{Report, peak_resident_bytes};
 
 /// Step of the dense check of the planned limits, seconds; the certificates do not depend on it.
@@ -27,6 +28,7 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
     let flown = statistics(&mission.flights, |f| &f.flight);
     let slam = statistics(&mission.flights, |f| &f.slam);
     let locked = statistics(&mission.flights, |f| &f.locked);
+    let own = mission.flights.iter().filter_map(|f| f.localisation).reduce(LocalisationFigures::and);
     let flight_time: f64 = mission.flights.iter().map(|f| f.plan.trajectory.duration()).sum();
     let path: f64 = mission.flights.iter().map(|f| f.plan.path_length()).sum();
 
@@ -104,6 +106,11 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         fill_thin_share: fill.as_ref().map(|f| f.thin),
         fill_deviation: fill.as_ref().map(|f| f.deviation),
         fill_mean_ratio: fill.as_ref().map(|f| f.mean),
+        position_error_rms_m: own.map(|own| own.position_error_rms_m()),
+        relocalised_after_s: own.map(|own| own.relocalised_after_s),
+        relocalisation_error_max_m: own.map(|own| own.relocalisation_error_m),
+        unconfirmed_depth_share: own.map(|own| own.unconfirmed as f64 / own.depth_images.max(1) as f64),
+        onboard_cpu_s_per_s: own.map(|own| own.cpu.as_secs_f64() / flight_time),
         seam_length_m: mission.task.surface.disk().seam_length(),
         ssim_painted_at_seams: seams.as_ref().map(|s| s.near),
         ssim_painted_off_seams: seams.as_ref().map(|s| s.far),

@@ -1,19 +1,22 @@
 //! Flying it, and what the paint does meanwhile.
 
+use nalgebra::Vector3;
 use paint_planner::Plan;
 use paint_planner::mission::Route;
 use paint_sim::flight::FlightLog;
-use paint_sim::flight::{Interlock, Localisation, Valve};
+use paint_sim::flight::{Interlock, Localisation, PoseSource, Valve};
 use paint_sim::{Film, FlightSettings, TriangleSurface};
 
 use super::error::MissionError;
 use super::nozzle::spray_model;
-use super::painting_task::PaintingTask;
+use super::painting_task::{PaintingTask, ScannedSurface};
 use super::plan::Planned;
-use super::settings::MissionSettings;
+use super::settings::{LocalisationChoice, MissionSettings};
 use super::simulated_flight::{flight_settings, fly_plan};
 use crate::adapters::Robot;
+use crate::onboard::{LocalisationFigures, LocalisedFlight};
 use crate::progress::Stage;
+use crate::simulated_sensors::SimulatedCamera;
 
 /// Motion of the nozzle that one shot stands for, metres: widens the spot by less than a percent.
 pub(super) const SHOT_STEP: f64 = 0.01;
@@ -26,8 +29,10 @@ pub struct LayerFlight {
     pub plan: Plan,
     /// The baseline planner on the same targets.
     pub smoothing: Plan,
-    /// Flown with motion capture: the flight whose paint counts.
+    /// Flown with the localisation that was chosen: the flight whose paint counts.
     pub flight: FlightLog,
+    /// What its localisation was worth, if that was the robot's own.
+    pub(super) localisation: Option<LocalisationFigures>,
     /// Flown with a localisation that errs by 7 cm.
     pub slam: FlightLog,
     /// Flown with the pan-tilt unit locked forward.
@@ -41,15 +46,30 @@ pub(super) fn fly(planned: Planned, task: &PaintingTask) -> Result<Vec<LayerFlig
     let mut flights = Vec::with_capacity(count);
     for (k, (route, plan, smoothing)) in planned.layers.into_iter().enumerate() {
         stage.share(k as f64 / count as f64);
-        let [flight, slam, locked] = fly_three(&plan, task.met(), &task.robot, &task.settings, k as u64)?;
-        flights.push(LayerFlight { route, plan, smoothing, flight, slam, locked });
+        let mut onboard = onboard(task)?;
+        let [flight, slam, locked] =
+            fly_three(&plan, task.met(), &task.robot, &task.settings, k as u64, onboard.as_mut())?;
+        let localisation = onboard.map(|onboard| onboard.figures());
+        flights.push(LayerFlight { route, plan, smoothing, flight, localisation, slam, locked });
     }
     let seconds: f64 = flights.iter().map(|f| f.plan.trajectory.duration()).sum();
     stage.done(&format!("{:.0} min in the air, three times", seconds / 60.0));
     Ok(flights)
 }
 
-/// Puts the paint of the flights with motion capture onto the texels; returns the film and the pixel of each of its texels.
+/// The robot's own localisation, if it is to fly by that; it finds itself anew before every flight.
+fn onboard(task: &PaintingTask) -> Result<Option<LocalisedFlight<'_>>, MissionError> {
+    if task.settings.localisation != LocalisationChoice::Slam {
+        return Ok(None);
+    }
+    let ScannedSurface { mesh, surface, map } = task.scanned().ok_or(MissionError::NoMap)?;
+    let PaintingTask { settings, .. } = task;
+    // The same light and stone as in the scan, other noise.
+    let camera = SimulatedCamera::new(mesh, surface, Vector3::x(), settings.seed, settings.threads);
+    Ok(Some(LocalisedFlight::new(camera, map, settings.seed)?))
+}
+
+/// Puts the paint of the flights that count onto the texels; returns the film and the pixel of each of its texels.
 pub(super) fn spray(flights: &[LayerFlight], task: &PaintingTask) -> Result<(Film, Vec<usize>), MissionError> {
     let stage = Stage::start("spray");
     let (texels, pixels) = task.film_texels();
@@ -64,32 +84,41 @@ pub(super) fn spray(flights: &[LayerFlight], task: &PaintingTask) -> Result<(Fil
     Ok((film, pixels))
 }
 
-/// The same plan with motion capture, with a drifting localisation, and with the pan-tilt unit locked.
+/// The same plan with the localisation that was chosen, with a drifting localisation, and with the pan-tilt unit locked.
 pub(super) fn fly_three(
     plan: &Plan,
     world: &TriangleSurface,
     robot: &Robot,
     settings: &MissionSettings,
     layer: u64,
+    onboard: Option<&mut LocalisedFlight>,
 ) -> Result<[FlightLog; 3], MissionError> {
     let usual = flight_settings(plan, robot.tether, settings.seed.wrapping_mul(0x9E37_79B9).wrapping_add(layer));
     // Paint that misses by less than the spot is wide is better than none. The flights beside it are flown to see what they miss by, so
     // nothing shuts their valve.
     let interlock = Interlock { miss: settings.spot, ..Interlock::default() };
     let valve = Valve { interlock: Some(interlock), ..usual.valve };
+    let chosen = match settings.localisation {
+        LocalisationChoice::Noise => Localisation::slam_7cm(),
+        LocalisationChoice::MotionCapture | LocalisationChoice::Slam => usual.localisation,
+    };
     let variants = [
-        FlightSettings { valve, ..usual },
+        FlightSettings { valve, localisation: chosen, ..usual },
         FlightSettings { localisation: Localisation::slam_7cm(), ..usual },
         FlightSettings { ptu_locked: true, ..usual },
     ];
-    let one = |flight: &FlightSettings| fly_plan(plan, world, robot, settings, flight);
+    let source = onboard.map(|onboard| onboard as &mut dyn PoseSource);
+    let [first, others @ ..] = &variants;
+    let one = |flight: &FlightSettings| fly_plan(plan, world, robot, settings, flight, None);
+    let counted = || fly_plan(plan, world, robot, settings, first, source);
     if settings.threads < 2 {
-        let [a, b, c] = variants.map(|v| one(&v));
+        let (a, [b, c]) = (counted(), others.each_ref().map(one));
         return Ok([a?, b?, c?]);
     }
     std::thread::scope(|scope| {
-        let handles = variants.each_ref().map(|v| scope.spawn(|| one(v)));
-        let [a, b, c] = handles.map(|h| h.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+        let handles = others.each_ref().map(|flight| scope.spawn(move || one(flight)));
+        let a = counted();
+        let [b, c] = handles.map(|h| h.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
         Ok([a?, b?, c?])
     })
 }
@@ -108,7 +137,7 @@ mod tests {
         let plan = test_panel::plan(&surface, &robot, &settings);
         let fly = |seed, layer| {
             let settings = MissionSettings { seed, ..settings.clone() };
-            fly_three(&plan, &surface.world, &robot, &settings, layer).unwrap()
+            fly_three(&plan, &surface.world, &robot, &settings, layer, None).unwrap()
         };
         let (usual, again, other, next) = (fly(1, 0), fly(1, 0), fly(2, 0), fly(1, 1));
         for k in 0..3 {

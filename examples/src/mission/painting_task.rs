@@ -1,6 +1,7 @@
 //! What is known before anything is planned: the surface, the picture on it, what the robot reaches, and the sprays.
 
 use std::fmt::Write as _;
+use std::path::PathBuf;
 use std::time::Instant;
 
 use paint_net::{Image, Painting};
@@ -46,7 +47,17 @@ pub struct PaintingTask {
     pub(super) layers: Vec<Painting>,
     pub(super) started: Instant,
     /// What is really there, if `surface` is a map of it.
-    truth: Option<TriangleSurface>,
+    truth: Option<ScannedSurface>,
+}
+
+/// A surface that the robot knows by its map only.
+pub(super) struct ScannedSurface {
+    /// What is really there.
+    pub(super) mesh: TriangleMesh,
+    /// The same, for rays.
+    pub(super) surface: TriangleSurface,
+    /// File of the map and its keyframes.
+    pub(super) map: PathBuf,
 }
 
 impl PaintingTask {
@@ -103,25 +114,31 @@ impl PaintingTask {
         })
     }
 
-    /// What was decided about a map, flown and sprayed before the surface that was mapped, of which planning knows nothing.
+    /// What was decided about a map, flown and sprayed before the surface that was mapped, of which planning knows nothing. `map` is the
+    /// file of the map.
     ///
     /// # Errors
     /// A mesh without faces.
-    pub fn on_true_surface(self, truth: &TriangleMesh) -> Result<Self, MissionError> {
-        let truth = TriangleSurface::new(&truth.positions, &truth.faces)?;
-        Ok(Self { truth: Some(truth), ..self })
+    pub fn on_true_surface(self, truth: &TriangleMesh, map: PathBuf) -> Result<Self, MissionError> {
+        let surface = TriangleSurface::new(&truth.positions, &truth.faces)?;
+        Ok(Self { truth: Some(ScannedSurface { mesh: truth.clone(), surface, map }), ..self })
+    }
+
+    /// What the robot has scanned.
+    pub(super) fn scanned(&self) -> Option<&ScannedSurface> {
+        self.truth.as_ref()
     }
 
     /// What the robot and its paint meet.
     pub(super) fn met(&self) -> &TriangleSurface {
-        self.truth.as_ref().unwrap_or(&self.surface.world)
+        self.truth.as_ref().map_or(&self.surface.world, |truth| &truth.surface)
     }
 
     /// The texels that paint falls on, with the pixel of each.
     pub(super) fn film_texels(&self) -> (Vec<Texel>, Vec<usize>) {
         let (texels, pixels) = self.surface.film_texels();
         match &self.truth {
-            Some(truth) => (moved_onto(truth, texels), pixels),
+            Some(truth) => (moved_onto(&truth.surface, texels), pixels),
             None => (texels, pixels),
         }
     }

@@ -47,6 +47,9 @@ pub struct MissionSettings {
     pub servo: ServoSettings,
     /// Who flies it.
     pub controller: ControllerChoice,
+    /// How it knows where it is.
+    #[serde(skip_serializing_if = "LocalisationChoice::is_default")]
+    pub localisation: LocalisationChoice,
     /// Where it may not fly, and where its hose hangs, in the world of `plan.csv`; the simulated hose of a robot without a tether comes from
     /// behind the middle of the flight.
     #[serde(skip_serializing_if = "FlightConstraints::is_empty")]
@@ -62,6 +65,26 @@ pub enum ControllerChoice {
     Cascade,
     /// `paint_planner::control::TrackingMpc`: keeps the distance better, above all in strong gusts.
     Mpc,
+}
+
+/// What tells the painting flight where the robot is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LocalisationChoice {
+    /// Motion capture, by a model of its noise.
+    #[default]
+    MotionCapture,
+    /// A model of a localisation that errs by 7 cm, as the thesis measured.
+    Noise,
+    /// The robot's own camera, depth camera and inertial sensor, in the map of its scan.
+    Slam,
+}
+
+impl LocalisationChoice {
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// The painters to choose from.
@@ -98,6 +121,7 @@ impl Default for MissionSettings {
             ptu: PtuSettings::default(),
             servo: ServoSettings::default(),
             controller: ControllerChoice::default(),
+            localisation: LocalisationChoice::default(),
             constraints: FlightConstraints::default(),
         }
     }

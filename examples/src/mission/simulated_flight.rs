@@ -5,25 +5,29 @@ use paint_planner::Plan;
 use paint_planner::constraints::Tether;
 use paint_planner::control::MpcSettings;
 use paint_sim::flight::FlightLog;
-use paint_sim::flight::{CascadedController, Controller, ControllerSettings, HoseModel, fly_with};
+use paint_sim::flight::{
+    CascadedController, Controller, ControllerSettings, HoseModel, PoseSource, fly_localised, fly_with,
+};
 use paint_sim::{FlightSettings, TriangleSurface};
 
 use super::error::MissionError;
 use super::settings::{ControllerChoice, MissionSettings};
 use crate::adapters::{MpcController, PlanReference, Robot, ServoPanTilt};
+use crate::onboard::Approach;
 
 /// The usual wind, hose and localisation.
 pub(super) fn flight_settings(plan: &Plan, tether: Option<Tether>, seed: u64) -> FlightSettings {
     FlightSettings { hose: Some(hose(plan, tether)), seed, ..FlightSettings::default() }
 }
 
-/// Flies a plan with the robot's own servos and the controller that was chosen.
+/// Flies a plan with the robot's own servos and the controller that was chosen, by a source of poses or by the noise of `flight`.
 pub(super) fn fly_plan(
     plan: &Plan,
     world: &TriangleSurface,
     robot: &Robot,
     settings: &MissionSettings,
     flight: &FlightSettings,
+    localisation: Option<&mut dyn PoseSource>,
 ) -> Result<FlightLog, MissionError> {
     let reference = PlanReference {
         plan,
@@ -36,7 +40,13 @@ pub(super) fn fly_plan(
         ControllerChoice::Cascade => Box::new(CascadedController::new(flight.airframe, ControllerSettings::default())),
         ControllerChoice::Mpc => Box::new(MpcController::new(&flight.airframe, MpcSettings::default())?),
     };
-    Ok(fly_with(&reference, controller.as_mut(), &mut gun, world, flight)?)
+    Ok(match localisation {
+        Some(source) => {
+            let approach = Approach::to(&reference);
+            Approach::cut(fly_localised(&approach, controller.as_mut(), &mut gun, world, source, flight)?)
+        }
+        None => fly_with(&reference, controller.as_mut(), &mut gun, world, flight)?,
+    })
 }
 
 /// The paint hose: from its anchor, or from the ground behind the middle of the flight, long enough for all of it.
@@ -75,7 +85,7 @@ mod tests {
             let wind = Wind { mean: Vector3::zeros(), gust_sigma: 3.0, ..Wind::default() };
             let spread = (0..12).map(|seed| {
                 let flight = FlightSettings { wind, ..flight_settings(&plan, None, seed) };
-                let log = fly_plan(&plan, &surface.world, &robot, &settings, &flight).unwrap();
+                let log = fly_plan(&plan, &surface.world, &robot, &settings, &flight, None).unwrap();
                 log.statistics().nozzle_distance_std.powi(2)
             });
             (spread.sum::<f64>() / 12.0).sqrt()

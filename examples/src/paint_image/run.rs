@@ -9,8 +9,8 @@ use paint_net::thesis::{Architecture, Objective};
 use paint_net::train::{ThesisSettings, TrainSettings};
 use paint_net::{Image, Limits, SprayKernel};
 
-use super::colour::{Glazes, paint_colours, read_picture, save_colours};
 use super::arguments::{Arguments, Command, Nozzle, Preset, ScanOrderName, SharingName, Training};
+use super::colour::{Glazes, paint_colours, read_picture, save_colours};
 use super::compare::{compare, table};
 use super::equal_sprays::{equal_sprays, print_equal_sprays};
 use super::error::PaintImageError;

@@ -2,6 +2,8 @@
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use paint_sim::TriangleSurface;
+use tsdf_hash::place_recognition::KeyframeIndex;
+use tsdf_hash::slam::SlamState;
 use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Map};
 use vio_ekf::sim::{RoomSettings, Scenario, Simulation};
 use vio_ekf::{ImuNoise, Stamp, Trajectory, Vio};
@@ -10,9 +12,9 @@ use super::error::ScanFlightError;
 use super::evaluation::{ScanFlightFigures, figures};
 use super::localiser::Localiser;
 use super::route::along;
-use super::sensors::{FRAMES_PER_SECOND, SimulatedCamera};
 use crate::mesh_io::TriangleMesh;
 use crate::progress::Stage;
+use crate::simulated_sensors::{FRAMES_PER_SECOND, SimulatedCamera};
 
 /// Edge of a voxel of the map, metres: below the size of a spray spot.
 const VOXEL: f64 = 0.02;
@@ -23,6 +25,8 @@ const FUSE_EVERY: usize = 4;
 pub struct ScanFlight {
     /// The surface as the robot mapped it, in the world's frame.
     pub mesh: TriangleMesh,
+    /// The map that it is taken from, with keyframes.
+    pub(super) map: SlamState,
     /// How far it is from the true one.
     pub figures: ScanFlightFigures,
     /// Where the robot was.
@@ -47,6 +51,7 @@ impl ScanFlight {
         let mut samples = simulation.imu(0)?.samples.into_iter().peekable();
         let mut map = Map::new(tsdf_hash::Settings { voxel_size: VOXEL, threads, ..tsdf_hash::Settings::default() })?;
 
+        let mut keyframes = KeyframeIndex::new();
         let mut localiser = Localiser::new(threads)?;
         let mut world_from_start = None;
         // From where odometry takes the robot to be to where the map does.
@@ -89,7 +94,10 @@ impl ScanFlight {
                 // The first image is what the others are tracked against.
                 if k % FUSE_EVERY == 0 || map.blocks() == 0 {
                     match map.integrate(&depth, Some(&colour), &world_from_camera) {
-                        Ok(_) | Err(tsdf_hash::Error::NoDepth { .. }) => {}
+                        Ok(_) => {
+                            keyframes.add(&depth, Some(&colour), &world_from_camera)?;
+                        }
+                        Err(tsdf_hash::Error::NoDepth { .. }) => {}
                         Err(error) => return Err(error.into()),
                     }
                 }
@@ -107,7 +115,8 @@ impl ScanFlight {
         let scanned = TriangleMesh { positions: mapped.positions, faces: mapped.faces, ..TriangleMesh::default() };
         let figures = figures(&surface, mesh, &scanned, &flown, &drifting, &estimated)?;
         stage.done(&figures.summary());
-        Ok(Self { mesh: scanned, figures, flown, estimated })
+        let map = SlamState { keyframes, ..SlamState::new(map) };
+        Ok(Self { mesh: scanned, map, figures, flown, estimated })
     }
 }
 

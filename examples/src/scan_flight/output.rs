@@ -1,5 +1,6 @@
 //! What a scan leaves in its folder.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -17,7 +18,10 @@ use crate::report::{ReportError, check_finite};
 /// Size of the picture, pixels.
 const VIEW: (u32, u32) = (1400, 900);
 
-/// Writes `scan_flight.json`, `scan_flight.png`, `scan_flight.ply` and both trajectories into an existing folder.
+/// The map with its keyframes, in which the robot finds itself again.
+pub const MAP_FILE: &str = "scan_flight.tsdf";
+
+/// Writes `scan_flight.json`, `scan_flight.png`, `scan_flight.ply`, [`MAP_FILE`] and both trajectories into an existing folder.
 pub fn save(scan: &ScanFlight, folder: &Path) -> Result<(), MissionError> {
     let write = |name: &str, text: String| {
         let path = folder.join(name);
@@ -32,6 +36,8 @@ pub fn save(scan: &ScanFlight, folder: &Path) -> Result<(), MissionError> {
     write_ply(&ply, &PlyMesh { positions, normals: None, colours: &grey, faces })
         .map_err(|source| MissionError::Unwritable { path: ply.display().to_string(), source })?;
     save_picture(scan, &folder.join("scan_flight.png"))?;
+    let saved = scan.map.save(&folder.join(MAP_FILE), None, BTreeMap::new());
+    saved.map_err(|error| MissionError::Localisation(error.into()))?;
     check_finite(&scan.figures)?;
     let figures = serde_json::to_string_pretty(&scan.figures).map_err(ReportError::from)?;
     write("scan_flight.json", figures + "\n")

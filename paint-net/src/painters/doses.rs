@@ -65,15 +65,17 @@ impl DoseCorrection<'_> {
     }
 
     fn check(&self, volumes: &[f64], most: &[f64]) -> Result<(), Error> {
-        let same = |what: &'static str, found: usize, expected: usize| match found == expected {
-            true => Ok(()),
-            false => Err(Error::Mismatch { what, found: (found, 1), expected: (expected, 1) }),
+        let same = |what: &'static str, found: usize, expected: usize| {
+            if found == expected {
+                return Ok(());
+            }
+            Err(Error::Mismatch { what, found: (found, 1), expected: (expected, 1) })
         };
         same("list of weights", self.weight.len(), self.wanted.len())?;
         same("list of volumes", volumes.len(), self.footprints.len())?;
         same("list of largest volumes", most.len(), self.footprints.len())?;
         let allowed = |value: &f64| *value >= 0.0 && value.is_finite();
-        let lists = [("wanted", self.wanted), ("weight", self.weight), ("volumes", &*volumes), ("most", most)];
+        let lists = [("wanted", self.wanted), ("weight", self.weight), ("volumes", volumes), ("most", most)];
         for (name, list) in lists {
             let wrong = list.iter().copied().find(|value| !allowed(value));
             require(name, wrong.unwrap_or(0.0), wrong.is_none(), "it must be 0 or more, and finite")?;

@@ -7,7 +7,9 @@ use paint_net::painters::{DoseCorrection, DoseFootprint};
 fn dense(footprints: &[DoseFootprint], places: usize) -> Vec<Vec<f64>> {
     let column = |footprint: &DoseFootprint| {
         let mut column = vec![0.0; places];
-        footprint.iter().for_each(|&(k, share)| column[k as usize] += share);
+        for &(k, share) in footprint {
+            column[k as usize] += share;
+        }
         column
     };
     footprints.iter().map(column).collect()

@@ -2,8 +2,10 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
+use super::pose_source::{LocalisedPose, PoseSource};
 use super::settings::{Localisation, Wind};
 use super::vehicle::Vehicle;
+use crate::error::Error;
 use crate::rng::Rng;
 
 /// Three independent Ornstein-Uhlenbeck processes, stepped exactly: `w+ = a w + sigma sqrt(1 - a^2) N(0,1)`.
@@ -68,12 +70,18 @@ impl PoseSensor {
         Self { settings, position, attitude, white: Rng::new(seed, 4) }
     }
 
-    pub(super) fn measure(&mut self, vehicle: &Vehicle) -> Isometry3<f64> {
+    fn measure(&mut self, vehicle: &Vehicle) -> Isometry3<f64> {
         let shift = self.position.step() + self.settings.position_noise * normal3(&mut self.white);
         let turn = self.attitude.step() + self.settings.attitude_noise * normal3(&mut self.white);
         let [roll, pitch, yaw] = vehicle.attitude;
         let rotation = UnitQuaternion::from_euler_angles(roll + turn.x, pitch + turn.y, yaw + turn.z);
         Isometry3::from_parts(Translation3::from(vehicle.position + shift), rotation)
+    }
+}
+
+impl PoseSource for PoseSensor {
+    fn pose(&mut self, _time: f64, truth: &Vehicle) -> Result<Option<LocalisedPose>, Error> {
+        Ok(Some(LocalisedPose { world_from_body: self.measure(truth), trusted: true }))
     }
 }
 

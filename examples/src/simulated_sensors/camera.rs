@@ -1,19 +1,19 @@
-//! What the robot sees on its way: grey images of rough stone, and their depth.
+//! Grey images of rough stone, and their depth.
 
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, UnitVector3, Vector3};
-use paint_net::procedural::{lattice, value_noise};
+use paint_net::procedural::value_noise;
 use paint_sim::render::{Lights, Shading};
 use paint_sim::surface::Hit;
-use paint_sim::{TriangleSurface, render};
+use paint_sim::{Error, TriangleSurface, render};
 use tsdf_hash::Intrinsics;
 use vio_ekf::camera::Distortion;
 use vio_ekf::{Camera, ImageView};
 
-use super::error::ScanFlightError;
+use super::normal;
 use crate::mesh_io::TriangleMesh;
 
 /// Images per second.
-pub(super) const FRAMES_PER_SECOND: f64 = 20.0;
+pub(crate) const FRAMES_PER_SECOND: f64 = 20.0;
 /// Size of an image and its focal length, pixels: half of the EuRoC vehicle's.
 const IMAGE: (usize, usize, f64) = (376, 240, 229.0);
 /// Standard deviation of a pixel's noise, grey levels.
@@ -24,9 +24,9 @@ const DEPTH_NOISE: [f64; 2] = [0.0012, 0.0019];
 const TEXTURE_OCTAVES: [(f64, f64); 5] = [(0.35, 0.25), (0.12, 0.25), (0.05, 0.3), (0.025, 0.25), (0.012, 0.15)];
 
 /// The robot's camera, with the depth of every pixel, before a surface.
-pub(super) struct SimulatedCamera<'a> {
+pub(crate) struct SimulatedCamera<'a> {
     /// Lens, and place on the body.
-    pub(super) camera: Camera,
+    pub(crate) camera: Camera,
     mesh: &'a TriangleMesh,
     surface: &'a TriangleSurface,
     lights: Lights,
@@ -35,24 +35,25 @@ pub(super) struct SimulatedCamera<'a> {
 }
 
 /// One image.
-pub(super) struct SimulatedImage {
+#[derive(Clone)]
+pub(crate) struct SimulatedImage {
     grey: Vec<u8>,
     /// Along the optical axis, metres; 0 where there is nothing.
-    pub(super) depth: Vec<f32>,
+    pub(crate) depth: Vec<f32>,
 }
 
 impl SimulatedImage {
-    pub(super) fn grey(&self) -> ImageView<'_> {
+    pub(crate) fn grey(&self) -> ImageView<'_> {
         ImageView { width: IMAGE.0, height: IMAGE.1, data: &self.grey }
     }
 
     /// The same, as the map wants it.
-    pub(super) fn colour(&self) -> Vec<u8> {
+    pub(crate) fn colour(&self) -> Vec<u8> {
         self.grey.iter().flat_map(|grey| [*grey; 3]).collect()
     }
 
     /// The middle one of all depths, metres; `None` of nothing but sky.
-    pub(super) fn distance(&self) -> Option<f64> {
+    pub(crate) fn distance(&self) -> Option<f64> {
         let mut depths: Vec<f32> = self.depth.iter().copied().filter(|depth| *depth > 0.0).collect();
         let middle = depths.len() / 2;
         (!depths.is_empty()).then(|| f64::from(*depths.select_nth_unstable_by(middle, f32::total_cmp).1))
@@ -61,7 +62,7 @@ impl SimulatedImage {
 
 impl<'a> SimulatedCamera<'a> {
     /// `towards`: from the robot to the surface.
-    pub(super) fn new(
+    pub(crate) fn new(
         mesh: &'a TriangleMesh,
         surface: &'a TriangleSurface,
         towards: Vector3<f64>,
@@ -74,31 +75,27 @@ impl<'a> SimulatedCamera<'a> {
         Self { camera: camera(), mesh, surface, lights, seed, threads }
     }
 
-    pub(super) fn intrinsics(&self) -> Intrinsics {
+    pub(crate) fn intrinsics(&self) -> Intrinsics {
         let Camera { fx, fy, cx, cy, .. } = self.camera;
         Intrinsics { fx, fy, cx, cy }
     }
 
     /// Image `index`, taken from a pose.
-    pub(super) fn capture(
-        &self,
-        index: usize,
-        world_from_camera: &Isometry3<f64>,
-    ) -> Result<SimulatedImage, ScanFlightError> {
+    pub(crate) fn capture(&self, index: usize, world_from_camera: &Isometry3<f64>) -> Result<SimulatedImage, Error> {
         let Camera { width, height, fx, fy, cx, cy, .. } = self.camera;
         let (width, height) = (width as u32, height as u32);
         let camera = paint_sim::Camera { fx, fy, cx, cy, width, height, world_from_camera: *world_from_camera };
         let shade = |hit: &Hit| Shading { albedo: [self.albedo(hit) as f32; 3], normal: hit.normal };
         let mut frame = render(self.surface, &camera, &shade, &self.lights, 1, self.threads)?;
         let grey = frame.colour.iter().enumerate().map(|(pixel, colour)| {
-            let noisy = f64::from(colour[0]) + GREY_NOISE * self.normal(2 * index, pixel);
+            let noisy = f64::from(colour[0]) + GREY_NOISE * self.noise(2 * index, pixel);
             noisy.round().clamp(0.0, 255.0) as u8
         });
         let grey = grey.collect();
         for (pixel, depth) in frame.depth.iter_mut().enumerate().filter(|(_, depth)| **depth > 0.0) {
             let z = f64::from(*depth);
             let sigma = DEPTH_NOISE[0] + DEPTH_NOISE[1] * (z - 0.4) * (z - 0.4);
-            *depth = (z + sigma * self.normal(2 * index + 1, pixel)) as f32;
+            *depth = (z + sigma * self.noise(2 * index + 1, pixel)) as f32;
         }
         Ok(SimulatedImage { grey, depth: frame.depth })
     }
@@ -122,9 +119,8 @@ impl<'a> SimulatedCamera<'a> {
     }
 
     /// A number of the standard normal distribution for a pixel of an image.
-    fn normal(&self, image: usize, pixel: usize) -> f64 {
-        let uniform = |half: i64| lattice(self.seed ^ 0x5EE5, image as i64, 2 * pixel as i64 + half);
-        (-2.0 * (1.0 - uniform(0)).ln()).sqrt() * (std::f64::consts::TAU * uniform(1)).cos()
+    fn noise(&self, image: usize, pixel: usize) -> f64 {
+        normal(self.seed ^ 0x5EE5, image as i64, pixel as i64)
     }
 }
 

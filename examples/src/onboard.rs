@@ -1,0 +1,9 @@
+//! The robot's own programs: what runs on board, and the sensors that a simulated flight gives it.
+
+mod approach;
+mod localisation;
+mod localised_flight;
+
+pub(crate) use approach::Approach;
+pub use localisation::{LocalisationError, LocalisationSettings, MapUpdate, OnboardLocalisation, OnboardPose};
+pub(crate) use localised_flight::{LocalisationFigures, LocalisedFlight};
