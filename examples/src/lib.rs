@@ -30,7 +30,7 @@ pub mod report;
 #[cfg(feature = "scan")]
 pub mod scan;
 pub mod scan_flight;
-mod simulated_sensors;
+pub mod simulated_sensors;
 mod srgb;
 pub mod surface;
 pub mod textured_mesh;

@@ -4,6 +4,6 @@ mod approach;
 mod localisation;
 mod localised_flight;
 
-pub(crate) use approach::Approach;
+pub use approach::Approach;
 pub use localisation::{LocalisationError, LocalisationSettings, MapUpdate, OnboardLocalisation, OnboardPose};
-pub(crate) use localised_flight::{LocalisationFigures, LocalisedFlight};
+pub use localised_flight::{LocalisationFigures, LocalisedFlight};

@@ -1,10 +1,12 @@
 //! What a simulated robot senses: images and depth of the surface before it, and its own motion.
 
 mod camera;
+mod fault;
 mod inertial;
 
-pub(crate) use camera::{FRAMES_PER_SECOND, SimulatedCamera, SimulatedImage};
-pub(crate) use inertial::SimulatedImu;
+pub use camera::{FRAMES_PER_SECOND, SimulatedCamera, SimulatedImage};
+pub use fault::{FaultInterval, SensorFault};
+pub use inertial::SimulatedImu;
 
 use paint_net::procedural::lattice;
 

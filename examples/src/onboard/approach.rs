@@ -9,18 +9,18 @@ const BACK: f64 = 0.9;
 const DURATION: f64 = 4.5;
 
 /// A plan that is flown from farther off: with the least jerk to its first state, then as it is.
-pub(crate) struct Approach<'a> {
+pub struct Approach<'a> {
     plan: &'a dyn Reference,
 }
 
 impl<'a> Approach<'a> {
     /// Before a plan.
-    pub(crate) fn to(plan: &'a dyn Reference) -> Self {
+    pub fn to(plan: &'a dyn Reference) -> Self {
         Self { plan }
     }
 
     /// The flight of the plan itself, by its own time.
-    pub(crate) fn cut(log: FlightLog) -> FlightLog {
+    pub fn cut(log: FlightLog) -> FlightLog {
         let FlightLog { mut samples, interval } = log;
         // Half an interval, or rounding would decide about a sample.
         samples.retain(|sample| sample.time > DURATION - 0.5 * interval);

@@ -26,6 +26,10 @@ pub struct LocalisationSettings {
     pub trusted_sigma: f64,
     /// Nor one that the map has not confirmed for so long, s.
     pub trusted_age_s: f64,
+    /// A pose in the map that is farther from the one that was expected contradicts it, m: there is no painting by either.
+    pub contradiction: f64,
+    /// After so many contradictions in a row the odometry is given up for the map.
+    pub contradictions: usize,
     /// Threads of tracking.
     pub threads: usize,
 }
@@ -40,6 +44,8 @@ impl Default for LocalisationSettings {
             map_correlation_s: 0.3,
             trusted_sigma: 0.01,
             trusted_age_s: 0.5,
+            contradiction: 0.02,
+            contradictions: 5,
             threads: 1,
         }
     }
@@ -70,7 +76,7 @@ pub struct OnboardPose {
 /// What a depth image said.
 #[derive(Debug)]
 pub struct MapUpdate {
-    /// Whether it gave a pose in the map.
+    /// Whether it gave a pose in the map, near the one that was expected.
     pub confirmed: bool,
     /// What happened in the map.
     pub events: Vec<Event>,
@@ -86,8 +92,10 @@ pub struct OnboardLocalisation {
     slam: Slam,
     body_from_camera: Isometry3<f64>,
     settings: LocalisationSettings,
-    /// When the map confirmed the pose last, s.
+    /// When the map confirmed the pose last, s; `None` where it contradicts.
     confirmed: Option<f64>,
+    /// Contradictions since then.
+    contradictions: usize,
 }
 
 impl OnboardLocalisation {
@@ -122,6 +130,7 @@ impl OnboardLocalisation {
             body_from_camera,
             settings,
             confirmed: None,
+            contradictions: 0,
         })
     }
 
@@ -159,7 +168,7 @@ impl OnboardLocalisation {
             accel_bias,
             sigma,
         })?;
-        self.confirmed = Some(seconds(stamp));
+        (self.confirmed, self.contradictions) = (Some(seconds(stamp)), 0);
         Ok(world_from_body)
     }
 
@@ -195,17 +204,23 @@ impl OnboardLocalisation {
         let prior = world_from_body.map(|pose| pose * self.body_from_camera);
         let outcome = self.slam.frame(seconds(stamp), depth, Some(colour), prior.as_ref())?;
         let tracking = outcome.tracking.filter(|tracking| tracking.is_tracked() && tracking.degenerate.is_empty());
-        let confirmed = tracking.is_some();
-        if let Some(tracking) = tracking {
-            if self.vio.output().is_none() {
-                self.start(stamp, &tracking, FLYING)?;
-            } else if let Some(information) = self.information(&tracking) {
-                let source_from_sensor = tracking.world_from_camera;
-                self.vio.pose(&PoseMeasurement { source: 0, stamp, source_from_sensor, information })?;
-            }
-            self.confirmed = Some(seconds(stamp));
+        let events = outcome.events;
+        let Some(tracking) = tracking else { return Ok(MapUpdate { confirmed: false, events }) };
+        let Some(expected) = prior.filter(|_| self.vio.output().is_some()) else {
+            self.start(stamp, &tracking, FLYING)?;
+            return Ok(MapUpdate { confirmed: true, events });
+        };
+        let off = tracking.world_from_camera.translation.vector - expected.translation.vector;
+        let confirmed = off.norm() <= self.settings.contradiction;
+        self.contradictions = if confirmed { 0 } else { self.contradictions + 1 };
+        self.confirmed = confirmed.then_some(seconds(stamp));
+        if self.contradictions >= self.settings.contradictions {
+            self.start(stamp, &tracking, FLYING)?;
+        } else if let Some(information) = self.information(&tracking) {
+            let source_from_sensor = tracking.world_from_camera;
+            self.vio.pose(&PoseMeasurement { source: 0, stamp, source_from_sensor, information })?;
         }
-        Ok(MapUpdate { confirmed, events: outcome.events })
+        Ok(MapUpdate { confirmed, events })
     }
 
     /// Where the robot is at the time of the latest inertial sample; `None` before it has been found, and after the odometry gave up.

@@ -14,7 +14,7 @@ use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics};
 use vio_ekf::Stamp;
 
 use super::localisation::{LocalisationError, LocalisationSettings, OnboardLocalisation, OnboardPose};
-use crate::simulated_sensors::{SimulatedCamera, SimulatedImage, SimulatedImu};
+use crate::simulated_sensors::{FaultInterval, SensorFault, SimulatedCamera, SimulatedImage, SimulatedImu};
 
 /// Milliseconds from one inertial sample to the next, from one image to the next, and from one depth image to the next.
 const INERTIAL_MS: i64 = 5;
@@ -28,17 +28,17 @@ const SEARCH_MS: i64 = 3000;
 
 /// What the localisation was worth.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct LocalisationFigures {
+pub struct LocalisationFigures {
     /// Time from the first image to the first pose, s.
-    pub(crate) relocalised_after_s: f64,
+    pub relocalised_after_s: f64,
     /// Error of that pose, m.
-    pub(crate) relocalisation_error_m: f64,
+    pub relocalisation_error_m: f64,
     /// Depth images, and those that the map did not confirm.
-    pub(crate) depth_images: usize,
+    pub depth_images: usize,
     /// See above.
-    pub(crate) unconfirmed: usize,
+    pub unconfirmed: usize,
     /// Processor time of the programs on board, s.
-    pub(crate) cpu: Duration,
+    pub cpu: Duration,
     /// Sum of the squares of the position error over all control steps, m²; their number.
     squares: f64,
     steps: usize,
@@ -46,7 +46,7 @@ pub(crate) struct LocalisationFigures {
 
 impl LocalisationFigures {
     /// Of both flights together.
-    pub(crate) fn and(self, other: Self) -> Self {
+    pub fn and(self, other: Self) -> Self {
         Self {
             relocalised_after_s: self.relocalised_after_s.max(other.relocalised_after_s),
             relocalisation_error_m: self.relocalisation_error_m.max(other.relocalisation_error_m),
@@ -59,13 +59,13 @@ impl LocalisationFigures {
     }
 
     /// Position error, root mean square, m.
-    pub(crate) fn position_error_rms_m(&self) -> f64 {
+    pub fn position_error_rms_m(&self) -> f64 {
         (self.squares / self.steps.max(1) as f64).sqrt()
     }
 }
 
 /// Sensors before a surface, the programs on board, and what they say.
-pub(crate) struct LocalisedFlight<'a> {
+pub struct LocalisedFlight<'a> {
     camera: SimulatedCamera<'a>,
     imu: Option<SimulatedImu>,
     onboard: OnboardLocalisation,
@@ -76,12 +76,13 @@ pub(crate) struct LocalisedFlight<'a> {
     /// From milliseconds of the reference to those of the sensors' clock; `None` before the robot has found itself.
     offset: Option<i64>,
     captured: usize,
+    fault: Option<FaultInterval>,
     figures: LocalisationFigures,
 }
 
 impl<'a> LocalisedFlight<'a> {
     /// In a stored map of the surface, from its file.
-    pub(crate) fn new(camera: SimulatedCamera<'a>, map: &Path, seed: u64) -> Result<Self, LocalisationError> {
+    pub fn new(camera: SimulatedCamera<'a>, map: &Path, seed: u64) -> Result<Self, LocalisationError> {
         let map = SlamState::read(
             MapFile::open(map)?,
             &tsdf_hash::Settings { threads: 1, ..tsdf_hash::Settings::default() },
@@ -99,12 +100,23 @@ impl<'a> LocalisedFlight<'a> {
             depths: VecDeque::new(),
             offset: None,
             captured: 0,
+            fault: None,
             figures: LocalisationFigures::default(),
         })
     }
 
+    /// With a fault of its sensors.
+    #[must_use]
+    pub fn with_fault(self, fault: FaultInterval) -> Self {
+        Self { fault: Some(fault), ..self }
+    }
+
+    fn fault(&self, ms: i64) -> Option<SensorFault> {
+        self.fault.as_ref().filter(|fault| fault.when.contains(&ms)).map(|fault| fault.fault)
+    }
+
     /// What it was worth.
-    pub(crate) fn figures(&self) -> LocalisationFigures {
+    pub fn figures(&self) -> LocalisationFigures {
         self.figures
     }
 
@@ -137,7 +149,10 @@ impl<'a> LocalisedFlight<'a> {
     }
 
     fn sense_motion(&mut self, ms: i64, truth: &Vehicle) -> Result<(), String> {
-        let Some(sample) = self.imu.as_mut().map(|imu| imu.sample(stamp(ms), truth)) else { return Ok(()) };
+        let fault = self.fault(ms);
+        let sample = self.imu.as_mut().map(|imu| imu.sample(stamp(ms), truth));
+        let sample = sample.and_then(|sample| fault.map_or(Some(sample), |fault| fault.inertial(sample)));
+        let Some(sample) = sample else { return Ok(()) };
         let cpu = ThreadTime::now();
         let done = self.onboard.imu(&sample).map_err(|error| error.to_string());
         self.figures.cpu += cpu.elapsed();
@@ -151,12 +166,18 @@ impl<'a> LocalisedFlight<'a> {
             self.sense_motion(ms, truth)?;
         }
         if ms % IMAGE_MS == 0 {
-            let image = self.capture(truth).map_err(|error| error.to_string())?;
-            if ms % DEPTH_MS == 0 {
+            let mut image = self.capture(truth).map_err(|error| error.to_string())?;
+            let fault = self.fault(ms);
+            if fault == Some(SensorFault::CameraBlack) {
+                image.darken();
+            }
+            if ms % DEPTH_MS == 0 && !matches!(fault, Some(SensorFault::NoDepth | SensorFault::NoImages)) {
                 let pose = self.onboard.pose().map(|pose| pose.world_from_body);
                 self.depths.push_back(Arriving { at: ms + DEPTH_LATENCY_MS, taken: ms, what: (image.clone(), pose) });
             }
-            self.images.push_back(Arriving { at: ms + IMAGE_LATENCY_MS, taken: ms, what: image });
+            if fault != Some(SensorFault::NoImages) {
+                self.images.push_back(Arriving { at: ms + IMAGE_LATENCY_MS, taken: ms, what: image });
+            }
         }
         let cpu = ThreadTime::now();
         while let Some(Arriving { taken, what: image, .. }) = self.images.pop_front_if(|image| image.at <= ms) {

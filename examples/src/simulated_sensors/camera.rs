@@ -13,7 +13,7 @@ use super::normal;
 use crate::mesh_io::TriangleMesh;
 
 /// Images per second.
-pub(crate) const FRAMES_PER_SECOND: f64 = 20.0;
+pub const FRAMES_PER_SECOND: f64 = 20.0;
 /// Size of an image and its focal length, pixels: half of the EuRoC vehicle's.
 const IMAGE: (usize, usize, f64) = (376, 240, 229.0);
 /// Standard deviation of a pixel's noise, grey levels.
@@ -24,9 +24,9 @@ const DEPTH_NOISE: [f64; 2] = [0.0012, 0.0019];
 const TEXTURE_OCTAVES: [(f64, f64); 5] = [(0.35, 0.25), (0.12, 0.25), (0.05, 0.3), (0.025, 0.25), (0.012, 0.15)];
 
 /// The robot's camera, with the depth of every pixel, before a surface.
-pub(crate) struct SimulatedCamera<'a> {
+pub struct SimulatedCamera<'a> {
     /// Lens, and place on the body.
-    pub(crate) camera: Camera,
+    pub camera: Camera,
     mesh: &'a TriangleMesh,
     surface: &'a TriangleSurface,
     lights: Lights,
@@ -36,24 +36,30 @@ pub(crate) struct SimulatedCamera<'a> {
 
 /// One image.
 #[derive(Clone)]
-pub(crate) struct SimulatedImage {
+pub struct SimulatedImage {
     grey: Vec<u8>,
     /// Along the optical axis, metres; 0 where there is nothing.
-    pub(crate) depth: Vec<f32>,
+    pub depth: Vec<f32>,
 }
 
 impl SimulatedImage {
-    pub(crate) fn grey(&self) -> ImageView<'_> {
+    /// Without light.
+    pub fn darken(&mut self) {
+        self.grey.fill(0);
+    }
+
+    /// For the odometry.
+    pub fn grey(&self) -> ImageView<'_> {
         ImageView { width: IMAGE.0, height: IMAGE.1, data: &self.grey }
     }
 
     /// The same, as the map wants it.
-    pub(crate) fn colour(&self) -> Vec<u8> {
+    pub fn colour(&self) -> Vec<u8> {
         self.grey.iter().flat_map(|grey| [*grey; 3]).collect()
     }
 
     /// The middle one of all depths, metres; `None` of nothing but sky.
-    pub(crate) fn distance(&self) -> Option<f64> {
+    pub fn distance(&self) -> Option<f64> {
         let mut depths: Vec<f32> = self.depth.iter().copied().filter(|depth| *depth > 0.0).collect();
         let middle = depths.len() / 2;
         (!depths.is_empty()).then(|| f64::from(*depths.select_nth_unstable_by(middle, f32::total_cmp).1))
@@ -62,7 +68,7 @@ impl SimulatedImage {
 
 impl<'a> SimulatedCamera<'a> {
     /// `towards`: from the robot to the surface.
-    pub(crate) fn new(
+    pub fn new(
         mesh: &'a TriangleMesh,
         surface: &'a TriangleSurface,
         towards: Vector3<f64>,
@@ -75,13 +81,14 @@ impl<'a> SimulatedCamera<'a> {
         Self { camera: camera(), mesh, surface, lights, seed, threads }
     }
 
-    pub(crate) fn intrinsics(&self) -> Intrinsics {
+    /// Of images and depth, pixels.
+    pub fn intrinsics(&self) -> Intrinsics {
         let Camera { fx, fy, cx, cy, .. } = self.camera;
         Intrinsics { fx, fy, cx, cy }
     }
 
     /// Image `index`, taken from a pose.
-    pub(crate) fn capture(&self, index: usize, world_from_camera: &Isometry3<f64>) -> Result<SimulatedImage, Error> {
+    pub fn capture(&self, index: usize, world_from_camera: &Isometry3<f64>) -> Result<SimulatedImage, Error> {
         let Camera { width, height, fx, fy, cx, cy, .. } = self.camera;
         let (width, height) = (width as u32, height as u32);
         let camera = paint_sim::Camera { fx, fy, cx, cy, width, height, world_from_camera: *world_from_camera };

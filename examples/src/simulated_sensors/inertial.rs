@@ -13,7 +13,7 @@ const FIRST_BIAS: [f64; 2] = [2e-3, 3e-2];
 
 /// Samples with white noise and wandering biases, of the mean rate and the mean specific force since the sample before, as a sensor that
 /// integrates gives them.
-pub(crate) struct SimulatedImu {
+pub struct SimulatedImu {
     noise: ImuNoise,
     seed: u64,
     biases: [Vector3<f64>; 2],
@@ -23,7 +23,7 @@ pub(crate) struct SimulatedImu {
 
 impl SimulatedImu {
     /// The first interval begins at `stamp`.
-    pub(crate) fn new(noise: ImuNoise, seed: u64, stamp: Stamp, vehicle: &Vehicle) -> Self {
+    pub fn new(noise: ImuNoise, seed: u64, stamp: Stamp, vehicle: &Vehicle) -> Self {
         let seed = seed ^ 0x1A0_5EED;
         let first = |sensor: usize| FIRST_BIAS[sensor] * normal3(seed, STREAMS[sensor][2], 0);
         let before = (stamp, vehicle.world_from_body(), vehicle.velocity);
@@ -31,7 +31,7 @@ impl SimulatedImu {
     }
 
     /// The sample that ends now. Axes of the body.
-    pub(crate) fn sample(&mut self, stamp: Stamp, vehicle: &Vehicle) -> Imu {
+    pub fn sample(&mut self, stamp: Stamp, vehicle: &Vehicle) -> Imu {
         let (then, pose, velocity) =
             std::mem::replace(&mut self.before, (stamp, vehicle.world_from_body(), vehicle.velocity));
         let dt = stamp.secs_since(then);

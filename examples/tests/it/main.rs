@@ -27,6 +27,7 @@ mod module_graph;
 mod mutations;
 #[cfg(feature = "scan")]
 mod odometry_prior;
+mod onboard;
 #[cfg(feature = "paint-image")]
 mod paint_image;
 mod placement;

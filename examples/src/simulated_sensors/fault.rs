@@ -1,0 +1,43 @@
+//! What goes wrong with a simulated robot's sensors.
+
+use vio_ekf::Imu;
+
+/// A fault of a sensor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SensorFault {
+    /// Images are black; depth is as it is.
+    CameraBlack,
+    /// No depth image arrives.
+    NoDepth,
+    /// Neither arrives.
+    NoImages,
+    /// No inertial sample arrives.
+    NoMotion,
+    /// The accelerometer reads at most so much on each axis, m/s².
+    Clipped(f64),
+    /// The gyroscope's x and y are swapped.
+    Swapped,
+}
+
+impl SensorFault {
+    /// What is left of an inertial sample.
+    #[must_use]
+    pub fn inertial(self, mut sample: Imu) -> Option<Imu> {
+        match self {
+            Self::NoMotion => return None,
+            Self::Clipped(most) => sample.accel = sample.accel.map(|a| a.clamp(-most, most)),
+            Self::Swapped => sample.gyro.swap_rows(0, 1),
+            Self::CameraBlack | Self::NoDepth | Self::NoImages => {}
+        }
+        Some(sample)
+    }
+}
+
+/// A fault with the time in which it is there, milliseconds of the sensors' clock.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FaultInterval {
+    /// What.
+    pub fault: SensorFault,
+    /// When.
+    pub when: std::ops::Range<i64>,
+}
