@@ -2,6 +2,7 @@
 
 mod distortion;
 mod fisheye;
+pub(crate) mod intrinsics;
 pub(crate) mod model;
 mod sphere_models;
 
@@ -258,6 +259,10 @@ impl CameraModel for Camera {
             _ => 1.0,
         };
         self.fx.min(self.fy) / on_axis
+    }
+
+    fn kalibr(&self) -> Option<Camera> {
+        Some(*self)
     }
 
     fn check(&self) -> Result<(), Error> {

@@ -10,6 +10,7 @@ mod initialization;
 mod initializing;
 mod innovation_adaptation;
 mod landmarks;
+mod lens_prior;
 pub(crate) mod measurements;
 pub(crate) mod point_observation;
 mod point_tracking;

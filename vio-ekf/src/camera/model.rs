@@ -4,6 +4,7 @@ use std::fmt::Debug;
 
 use nalgebra::{Isometry3, Matrix2x3, Unit, Vector2, Vector3};
 
+use super::Camera;
 use crate::error::Error;
 use crate::error::invalid;
 use crate::trajectory::is_finite;
@@ -39,6 +40,12 @@ pub trait CameraModel: Debug + Send + Sync {
     fn focal_length(&self) -> f64 {
         let on_axis = self.project_with_jacobian(&Vector3::z());
         on_axis.map_or(f64::NAN, |(_, jacobian)| jacobian.row(0).norm().min(jacobian.row(1).norm()))
+    }
+
+    /// The camera as one of Kalibr's, if it is one: only then can its intrinsics be estimated
+    /// ([`CalibrationSettings::focal_sigma`](crate::filter::CalibrationSettings::focal_sigma)).
+    fn kalibr(&self) -> Option<Camera> {
+        None
     }
 
     /// Refuses a calibration that no camera has.

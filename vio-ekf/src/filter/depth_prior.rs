@@ -23,16 +23,17 @@ pub(crate) fn reset_to_mean(state: &mut VioState, covariance: &mut Covariance, s
     state.depth_prior = InverseDistance::new(mean);
     covariance.reset_row(error_state::DEPTH_PRIOR, 0.0);
     for slot in 0..count {
-        covariance.add_row(error_state::DEPTH_PRIOR, share, error_state::landmark(slot) + 2);
+        covariance.add_row(error_state::DEPTH_PRIOR, share, state.landmark_row(slot) + 2);
     }
     covariance.inflate(error_state::DEPTH_PRIOR, settings.own_variance(mean) * share);
 }
 
 /// Rescales the covariance of inverse distances that have become smaller: the errors of what is far away are relative to it.
 pub(crate) fn rescale_covariance(state: &mut VioState, covariance: &mut Covariance) {
+    let head = state.head();
     let landmarks = state.landmarks.iter_mut().map(|landmark| &mut landmark.inverse_distance).enumerate();
     for (row, distance) in landmarks
-        .map(|(slot, distance)| (error_state::landmark(slot) + 2, distance))
+        .map(|(slot, distance)| (error_state::landmark(head, slot) + 2, distance))
         .chain([(error_state::DEPTH_PRIOR, &mut state.depth_prior)])
     {
         let factor = distance.take_scale_factor();

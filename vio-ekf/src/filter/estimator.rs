@@ -3,12 +3,14 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
 
 use super::depth_prior;
+use super::lens_prior;
 use super::propagation::propagate::{Workspace, propagate};
 use super::settings::{LandmarkSettings, Settings};
 use super::state::error_state;
 use super::state::inverse_distance::InverseDistance;
 use super::state::landmark::Landmark;
-use super::state::vio_state::VioState;
+use super::state::vio_state::{SecondCamera, VioState};
+use crate::camera::Camera;
 use crate::camera::model::CameraModel;
 use crate::inertial::core_state::{CoreState, set_core_covariance};
 use crate::inertial::covariance::{Covariance, LinearizedMeasurement};
@@ -44,24 +46,31 @@ pub(crate) struct Estimator {
 
 impl Estimator {
     pub(crate) fn new(
-        camera: &dyn CameraModel,
+        (camera, second): (&dyn CameraModel, Option<&dyn CameraModel>),
         noise: ImuNoise,
         settings: &Settings,
         initial: &InitialState,
         sample: Imu,
     ) -> Self {
-        let capacity = error_state::landmark(settings.landmarks.max_count);
-        let state = VioState {
+        let mut state = VioState {
             core: CoreState::from(initial),
             camera_position: camera.body_from_camera().translation.vector,
             camera_attitude: camera.body_from_camera().rotation,
             time_offset: settings.calibration.time_offset_s,
             depth_prior: InverseDistance::new(settings.landmarks.inverse_distance),
             accel_matrix: None,
+            lens: None,
+            second: None,
             landmarks: Vec::with_capacity(settings.landmarks.max_count),
         };
-        let mut covariance = Covariance::new(error_state::FIRST_LANDMARK, capacity);
         let calibration = &settings.calibration;
+        if calibration.estimates_intrinsics() {
+            state.lens = camera.kalibr().map(Camera::estimable);
+            state.second = second.and_then(|second| SecondCamera::new(camera, second));
+        }
+        let capacity = state.landmark_row(settings.landmarks.max_count);
+        let mut covariance = Covariance::new(state.head(), capacity);
+        lens_prior::set_covariance(&mut covariance, &state, calibration);
         set_core_covariance(&mut covariance, &initial.sigma);
         covariance.set_diagonal3(error_state::CAMERA_POSITION, [calibration.camera_position_sigma_m; 3]);
         covariance.set_diagonal3(error_state::CAMERA_ATTITUDE, [calibration.camera_attitude_sigma; 3]);
@@ -76,7 +85,7 @@ impl Estimator {
             noise,
             gravity: settings.gravity,
             landmarks: settings.landmarks,
-            workspace: Workspace::new(capacity),
+            workspace: Workspace::new(capacity, settings.landmarks.max_count),
             delta: vec![0.0; capacity],
             owed: vec![0.0; capacity],
             impulse: (Vector3::zeros(), 0.0),
@@ -165,7 +174,8 @@ impl Estimator {
         let delta = &self.delta[..self.covariance.size()];
         self.state.correct_head(delta);
         // Distances at once: a step back after a step away is not the sum of both.
-        for (landmark, delta) in self.state.landmarks.iter_mut().zip(landmark_rows(delta)) {
+        let head = self.state.head();
+        for (landmark, delta) in self.state.landmarks.iter_mut().zip(landmark_rows(&delta[head..])) {
             landmark.inverse_distance.correct(delta[2]);
         }
         self.owed.iter_mut().zip(delta).for_each(|(owed, delta)| *owed += delta);
@@ -174,7 +184,7 @@ impl Estimator {
 
     /// Corrects a landmark's bearing by what the series has found so far.
     pub(crate) fn settle(&mut self, slot: usize) {
-        let owed = &mut self.owed[error_state::landmark(slot)..][..error_state::LANDMARK_SIZE];
+        let owed = &mut self.owed[self.state.landmark_row(slot)..][..error_state::LANDMARK_SIZE];
         if owed[0] != 0.0 || owed[1] != 0.0 {
             let bearing = &mut self.state.landmarks[slot].bearing;
             *bearing = bearing.boxplus(&Vector2::new(owed[0], owed[1]));
@@ -204,7 +214,7 @@ impl Estimator {
 
     /// Inflates the covariance of all bearings, rad² per axis.
     pub(crate) fn inflate_bearings(&mut self, variance: f64) {
-        for row in (error_state::FIRST_LANDMARK..self.covariance.size()).step_by(error_state::LANDMARK_SIZE) {
+        for row in (self.state.head()..self.covariance.size()).step_by(error_state::LANDMARK_SIZE) {
             self.covariance.inflate(row, variance);
             self.covariance.inflate(row + 1, variance);
         }
@@ -246,5 +256,5 @@ impl Estimator {
 
 /// The three rows of each landmark.
 fn landmark_rows(delta: &[f64]) -> impl Iterator<Item = &[f64]> {
-    delta[error_state::FIRST_LANDMARK..].chunks_exact(error_state::LANDMARK_SIZE)
+    delta.chunks_exact(error_state::LANDMARK_SIZE)
 }

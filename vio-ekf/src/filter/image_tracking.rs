@@ -7,9 +7,9 @@ use super::frontend::patch::Patch;
 use super::frontend::patch_alignment::{PatchAlignment, align_patch};
 use super::frontend::pyramid::Pyramid;
 use super::landmarks;
+use super::measurements::patch::{WITH_LENS, WITHOUT_LENS};
 use super::report::FrameReport;
 use super::settings::Settings;
-use super::state::error_state;
 use super::state::landmark::unproject;
 use super::state::rolling_shutter::RollingShutter;
 use super::stereo::stereo_camera::StereoCamera;
@@ -38,20 +38,26 @@ pub(crate) fn align_and_update(
         let time_offset_error = estimator.state.time_offset - offset;
         estimator.settle(slot);
         if !track.chosen {
+            let lens = estimator.state.lens;
+            let camera = lens.as_ref().map_or(camera, |lens| lens);
             track.in_view = is_in_view(estimator, slot, track, (pyramid, camera, &shutter));
             continue;
         }
         track.in_view = true;
-        let alignment = track.patch.as_ref().map_or(PatchAlignment::OutOfView, |patch| {
-            align_patch(estimator, slot, time_offset_error, (patch, pyramid), camera, settings)
-        });
-        match alignment {
-            PatchAlignment::Converged(measurement) if estimator.update_in_series(&measurement) => {
+        // What the landmarks before have told of the lens counts.
+        let (input, lens) = ((time_offset_error, pyramid), estimator.state.lens);
+        let outcome = match (&track.patch, &lens) {
+            (None, _) => PatchUpdate::OutOfView,
+            (Some(patch), None) => update_with_patch::<WITHOUT_LENS>(estimator, slot, patch, input, camera, settings),
+            (Some(patch), Some(lens)) => update_with_patch::<WITH_LENS>(estimator, slot, patch, input, lens, settings),
+        };
+        match outcome {
+            PatchUpdate::Used => {
                 report.used += 1;
                 track.failures = 0;
             }
-            PatchAlignment::OutOfView => track.in_view = false,
-            _ => {
+            PatchUpdate::OutOfView => track.in_view = false,
+            PatchUpdate::Failed => {
                 report.rejected += 1;
                 track.failures += 1;
             }
@@ -60,12 +66,34 @@ pub(crate) fn align_and_update(
     estimator.end_updates();
 }
 
+/// What a patch did.
+enum PatchUpdate {
+    OutOfView,
+    Failed,
+    Used,
+}
+
+fn update_with_patch<const C: usize>(
+    estimator: &mut Estimator,
+    slot: usize,
+    patch: &Patch,
+    (time_offset_error, pyramid): (f64, &Pyramid),
+    camera: &dyn CameraModel,
+    settings: &Settings,
+) -> PatchUpdate {
+    match align_patch::<C>(estimator, slot, time_offset_error, (patch, pyramid), camera, settings) {
+        PatchAlignment::Converged(measurement) if estimator.update_in_series(&measurement) => PatchUpdate::Used,
+        PatchAlignment::OutOfView => PatchUpdate::OutOfView,
+        _ => PatchUpdate::Failed,
+    }
+}
+
 /// Chooses the landmarks that the image measures: those whose bearings are known least, which are the new ones and those that have
 /// waited.
 fn choose(tracking: &mut TrackingState, most: usize) {
     let TrackingState { estimator, tracks, ranking, .. } = tracking;
     let variance = |slot: usize| {
-        let row = error_state::landmark(slot);
+        let row = estimator.state.landmark_row(slot);
         estimator.covariance.variance(row) + estimator.covariance.variance(row + 1)
     };
     ranking.clear();
@@ -175,7 +203,9 @@ pub(crate) fn detect_landmarks(
         let covariance = warp * warp.transpose() * settings.patches.pixel_sigma.powi(2);
         let (bearing, delayed) = landmarks::at_stamp(estimator, bearing, warp, shutter.delay(&pixel), None);
         let covariance = covariance + delayed;
-        match stereo.and_then(|stereo| stereo.initial_distance(&patch, (&bearing, &warp), settings)) {
+        // While the cameras' calibration is estimated the pair is measured with all that it depends on.
+        let known = stereo.filter(|_| estimator.state.second.is_none());
+        match known.and_then(|stereo| stereo.initial_distance(&patch, (&bearing, &warp), settings)) {
             Some(measured) => landmarks::add_with_distance(estimator, bearing, warp, &covariance, measured),
             None => landmarks::add(estimator, bearing, warp, &covariance),
         }

@@ -168,7 +168,7 @@ impl Initializing {
         observe: impl FnMut(u64) -> Option<(Vector2<f64>, Option<Patch>)>,
     ) -> Option<Running> {
         let samples: Vec<Imu> = self.dynamic_initializer.samples().copied().collect();
-        let known = (sensors.camera.as_ref(), sensors.noise, &sensors.settings);
+        let known = (sensors.cameras(), sensors.noise, &sensors.settings);
         let tracking = from_initialization(known, time, motion, &samples, observe)?;
         event!(info, stamp = %time, landmarks = tracking.tracks.len(), "initialised in motion");
         let ids = tracking.tracks.iter().map(|track| track.id + 1);

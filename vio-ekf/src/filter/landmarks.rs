@@ -8,7 +8,7 @@ use super::measurements::update::ungated_update;
 use super::state::bearing::Bearing;
 use super::state::error_state;
 use super::state::inverse_distance::InverseDistance;
-use super::state::landmark::Landmark;
+use super::state::landmark::{Landmark, project};
 
 /// Adds a landmark seen in the current image, at the distance of the shared depth prior; there must be room. `covariance` is that of
 /// its tangent coordinates.
@@ -84,7 +84,7 @@ pub(crate) fn insert(
 /// Resets a landmark's bearing to that of another point, seen in the current image exactly where the old one is estimated, and at
 /// the same distance.
 pub(crate) fn reset_bearing(estimator: &mut Estimator, slot: usize, warp: Matrix2<f64>, covariance: &Matrix2<f64>) {
-    let row = error_state::landmark(slot);
+    let row = estimator.state.landmark_row(slot);
     estimator.state.landmarks[slot].warp = warp;
     estimator.covariance.reset_row(row, 0.0);
     estimator.covariance.reset_row(row + 1, 0.0);
@@ -93,13 +93,23 @@ pub(crate) fn reset_bearing(estimator: &mut Estimator, slot: usize, warp: Matrix
 }
 
 /// The covariance of a new bearing. Seen at the true time of the image but entered at the assumed one, it is correlated with
-/// the time offset.
+/// the time offset, and so with the lens.
 fn enter_bearing(estimator: &mut Estimator, row: usize, landmark: &Landmark, covariance: &Matrix2<f64>) {
     let rate = estimator.bearing_rate(landmark);
     for k in 0..2 {
         if estimator.covariance.variance(error_state::TIME_OFFSET) > 0.0 {
             estimator.covariance.add_row(row + k, -rate[k], error_state::TIME_OFFSET);
         }
+    }
+    // Nor is a lens that is off what the bearing was measured with.
+    let by_lens = estimator.state.lens.and_then(|lens| {
+        let direction = landmark.bearing.direction();
+        let tangent_by_pixel = project(&lens, &landmark.bearing)?.1.try_inverse()?;
+        Some(tangent_by_pixel * lens.intrinsics_jacobian(&direction)?)
+    });
+    for (k, column) in by_lens.iter().flat_map(|by_lens| by_lens.column_iter().enumerate()) {
+        estimator.covariance.add_row(row, -column[0], error_state::INTRINSICS + k);
+        estimator.covariance.add_row(row + 1, -column[1], error_state::INTRINSICS + k);
     }
     for (r, c) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         estimator.covariance.row_mut(row + r)[row + c] += covariance[(r, c)];
@@ -109,7 +119,7 @@ fn enter_bearing(estimator: &mut Estimator, row: usize, landmark: &Landmark, cov
 /// Drops a landmark; the last one takes its slot.
 pub(crate) fn remove(estimator: &mut Estimator, slot: usize) {
     estimator.state.landmarks.swap_remove(slot);
-    estimator.covariance.swap_remove(error_state::landmark(slot), error_state::LANDMARK_SIZE);
+    estimator.covariance.swap_remove(estimator.state.landmark_row(slot), error_state::LANDMARK_SIZE);
 }
 
 #[cfg(test)]
@@ -137,7 +147,7 @@ mod tests {
             sigma: InitialSigma::default(),
         };
         let settings = Settings::default();
-        let mut estimator = Estimator::new(&Camera::euroc(), ImuNoise::default(), &settings, &initial, sample);
+        let mut estimator = Estimator::new((&Camera::euroc(), None), ImuNoise::default(), &settings, &initial, sample);
         let bearing = Bearing::new(&Vector3::z_axis());
         for _ in 0..4 {
             add(&mut estimator, bearing, Matrix2::identity(), &Matrix2::identity());
@@ -145,7 +155,7 @@ mod tests {
         let prior = settings.landmarks;
         let of = |sigma: f64| (sigma * prior.inverse_distance).powi(2);
         let (shared, own) = (of(prior.shared_sigma), of(prior.inverse_distance_sigma));
-        let row = |slot: usize| error_state::landmark(slot) + 2;
+        let row = |slot: usize| estimator.state.landmark_row(slot) + 2;
         for (one, other) in [(0, 3), (2, 1), (2, 2)] {
             let expected = shared + if one == other { own } else { 0.0 };
             assert!((estimator.covariance.row(row(one))[row(other)] - expected).abs() < 1e-12, "{one}, {other}");

@@ -1,6 +1,7 @@
 //! What the points of a caller's tracker do to the filter.
 
 use super::landmarks;
+use super::measurements::patch::WITHOUT_LENS;
 use super::measurements::pixel::PixelMeasurement;
 use super::measurements::update::gated_update;
 use super::point_observation::PointObservation;
@@ -33,18 +34,24 @@ pub(crate) fn update_with_points(
             continue;
         }
         let landmark = estimator.state.landmarks[slot];
-        let measurement = PixelMeasurement {
-            slot,
+        let lens = estimator.state.lens;
+        let measurement = PixelMeasurement::<WITHOUT_LENS> {
+            row: estimator.state.landmark_row(slot),
             pixel: point.pixel,
             landmark,
             rate: estimator.bearing_rate(&landmark),
             time_offset_error: estimator.state.time_offset - offset,
             delay: shutter.delay(&point.pixel),
             camera,
+            lens,
             landmarks: &settings.landmarks,
             update: &settings.update,
         };
-        if gated_update(estimator, &measurement) {
+        let used = match lens {
+            None => gated_update(estimator, &measurement),
+            Some(_) => gated_update(estimator, &measurement.with_lens()),
+        };
+        if used {
             report.used += 1;
             track.failures = 0;
         } else {

@@ -55,7 +55,7 @@ impl Running {
         initial.check(sample.stamp)?;
         event!(info, stamp = %initial.stamp, "initialised");
         let settings = &sensors.settings;
-        let estimator = Estimator::new(sensors.camera.as_ref(), sensors.noise, settings, initial, sample);
+        let estimator = Estimator::new(sensors.cameras(), sensors.noise, settings, initial, sample);
         let tracking = TrackingState::new(estimator, settings.landmarks.max_count, &settings.imu);
         Ok(Self { tracking, divergence: DivergenceMonitor::default(), last_aided: Some(initial.stamp) })
     }
@@ -88,7 +88,9 @@ impl Running {
     fn use_image(&mut self, sensors: &mut Sensors, elapsed: f64, report: &mut FrameReport) {
         let tracking = &mut self.tracking;
         let Sensors { frontend, stereo, camera, settings, .. } = sensors;
-        let camera = camera.as_ref();
+        let given = camera.as_ref();
+        let lens = tracking.estimator.state.lens;
+        let camera = lens.as_ref().map_or(given, |lens| lens);
         if !report.stationary {
             tracking.drift_templates(camera, &settings.patches, elapsed);
             if frontend.detector.has_mask() {
@@ -96,6 +98,8 @@ impl Running {
             }
             let before = BeforeImage::new(&tracking.estimator);
             align_and_update(tracking, &frontend.pyramid, camera, settings, report);
+            let lens = tracking.estimator.state.lens;
+            let camera = lens.as_ref().map_or(given, |lens| lens);
             drop_landmarks(tracking, settings, report);
             update_templates(tracking, &frontend.pyramid, camera, settings);
             if let Some(stereo) = stereo {
@@ -107,12 +111,16 @@ impl Running {
         }
         let enough = settings.patches.start_detection_ratio * settings.landmarks.max_count as f64;
         if (tracking.tracks.len() as f64) < enough {
+            let lens = tracking.estimator.state.lens;
+            let camera = lens.as_ref().map_or(given, |lens| lens);
             report.added = detect_landmarks(tracking, frontend, stereo.as_ref(), camera, settings);
         }
     }
 
     fn use_points(&mut self, sensors: &Sensors, points: &[PointObservation], report: &mut FrameReport) {
-        let (tracking, settings, camera) = (&mut self.tracking, &sensors.settings, sensors.camera.as_ref());
+        let (tracking, settings) = (&mut self.tracking, &sensors.settings);
+        let lens = tracking.estimator.state.lens;
+        let camera = lens.as_ref().map_or(sensors.camera.as_ref(), |lens| lens);
         let before = BeforeImage::new(&tracking.estimator);
         update_with_points(tracking, points, camera, settings, report);
         if report.used > 0 {
@@ -190,9 +198,9 @@ impl Running {
             LandmarkEstimate {
                 id: track.id,
                 bearing_in_camera: Unit::new_unchecked(bearing_in_camera),
-                pixel: camera.project(&bearing_in_camera),
+                pixel: estimator.state.lens.as_ref().map_or(camera, |lens| lens).project(&bearing_in_camera),
                 inverse_distance: landmark.inverse_distance.value,
-                inverse_distance_sigma: estimator.covariance.variance(error_state::landmark(slot) + 2).sqrt(),
+                inverse_distance_sigma: estimator.covariance.variance(estimator.state.landmark_row(slot) + 2).sqrt(),
                 failures: track.failures,
             }
         })

@@ -41,6 +41,11 @@ impl Sensors {
         self.last_sample.map_or(stamp, |sample| sample.stamp)
     }
 
+    /// Both cameras, as they were given.
+    pub(crate) fn cameras(&self) -> (&dyn CameraModel, Option<&dyn CameraModel>) {
+        (self.camera.as_ref(), self.stereo.as_ref().map(|stereo| stereo.rig.camera.as_ref()))
+    }
+
     /// How far the body may have turned without being seen to, rad.
     pub(crate) fn undetected_angle(&self) -> f64 {
         self.stationary.undetected_angle(self.camera.as_ref())

@@ -2,13 +2,14 @@
 
 use std::cell::Cell;
 
-use nalgebra::{Matrix2, Vector2, Vector3};
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 use super::patch::{LEVELS, Patch};
 use super::pyramid::Pyramid;
+use crate::camera::intrinsics::INTRINSICS;
 use crate::camera::model::CameraModel;
 use crate::filter::estimator::Estimator;
-use crate::filter::measurements::patch::PatchMeasurement;
+use crate::filter::measurements::patch::{PatchMeasurement, WITH_LENS, WITHOUT_LENS};
 use crate::filter::measurements::update::{linearize_iterated, passes_gate};
 use crate::filter::settings::Settings;
 use crate::filter::state::error_state;
@@ -24,30 +25,30 @@ const MAX_GUESSES: i32 = 12;
 const COARSE_ITERATIONS: usize = 4;
 
 /// Outcome of an alignment.
-pub(crate) enum PatchAlignment {
+pub(crate) enum PatchAlignment<const C: usize> {
     /// Part of the patch is outside the image.
     OutOfView,
     /// Nothing there fits.
     Failed,
     /// The measurement at the solution.
-    Converged(LinearizedMeasurement<2, 3>),
+    Converged(LinearizedMeasurement<2, C>),
 }
 
 /// Aligns a landmark's patch: the best of some guesses, iterations on the coarsest level, then on all; then the gates.
 /// `time_offset_error` is the change of the time offset by the updates of this image so far.
-pub(crate) fn align_patch(
+pub(crate) fn align_patch<const C: usize>(
     estimator: &Estimator,
     slot: usize,
     time_offset_error: f64,
     (patch, pyramid): (&Patch, &Pyramid),
     camera: &dyn CameraModel,
     settings: &Settings,
-) -> PatchAlignment {
+) -> PatchAlignment<C> {
     let landmark = estimator.state.landmarks[slot];
     let rate = estimator.bearing_rate(&landmark);
     let Some(patch_from_tangent) = landmark.warp.try_inverse() else { return PatchAlignment::Failed };
-    let measurement = PatchMeasurement {
-        slot,
+    let measurement = PatchMeasurement::<C> {
+        row: estimator.state.landmark_row(slot),
         patch,
         pyramid,
         landmark,
@@ -55,13 +56,14 @@ pub(crate) fn align_patch(
         rate,
         time_offset_error,
         camera,
+        lens: estimator.state.lens,
         shutter: RollingShutter::new(camera, settings),
         settings: &settings.patches,
         coarse: Cell::new(true),
-        last_step: Cell::default(),
+        last_step: Cell::new(SVector::zeros()),
         last_comparison: Cell::new(None),
     };
-    let Some((pixel, by_bearing)) = measurement.project(&Vector3::zeros()) else { return PatchAlignment::OutOfView };
+    let Some((pixel, by_bearing)) = measurement.project(&SVector::zeros()) else { return PatchAlignment::OutOfView };
     if !Patch::is_inside(pyramid, &pixel, &(by_bearing * landmark.warp)) {
         return PatchAlignment::OutOfView;
     }
@@ -88,22 +90,25 @@ pub(crate) fn align_patch(
 
 /// The best of some guesses along the longer axis of the predicted uncertainty, over two deviations: photometric alignment
 /// converges from a pixel or two only, and the prediction may be off by more.
-fn initial_guess(estimator: &Estimator, measurement: &PatchMeasurement, by_bearing: &Matrix2<f64>) -> Vector3<f64> {
-    let row = error_state::landmark(measurement.slot);
-    let bearing = estimator.covariance.block::<2, 2>(row, row);
-    let eigen = (by_bearing * bearing * by_bearing.transpose()).symmetric_eigen();
+fn initial_guess<const C: usize>(
+    estimator: &Estimator,
+    measurement: &PatchMeasurement<C>,
+    by_bearing: &Matrix2<f64>,
+) -> SVector<f64, C> {
+    let eigen = predicted(estimator, measurement, by_bearing).symmetric_eigen();
     let longest = eigen.eigenvalues.imax();
     let deviation = eigen.eigenvalues[longest].max(0.0).sqrt();
     let spacing = GUESS_SPACING / measurement.pyramid.patch_levels()[LEVELS - 1].scale;
     let count = ((2.0 * deviation / spacing).floor() as i32).min(MAX_GUESSES);
-    let Some(tangent_from_pixel) = by_bearing.try_inverse() else { return Vector3::zeros() };
+    let Some(tangent_from_pixel) = by_bearing.try_inverse() else { return SVector::zeros() };
     let step: Vector2<f64> = tangent_from_pixel * eigen.eigenvectors.column(longest) * spacing;
-    let mut best = (f64::INFINITY, Vector3::zeros());
+    let mut best = (f64::INFINITY, SVector::zeros());
     if count == 0 {
         return best.1;
     }
     for k in -count..=count {
-        let delta = (step * f64::from(k)).push(0.0);
+        let mut delta = SVector::<f64, C>::zeros();
+        delta.fixed_rows_mut::<2>(0).copy_from(&(step * f64::from(k)));
         if let Some(comparison) = measurement.compare_coarse(&delta)
             && comparison.ssd < best.0
         {
@@ -111,4 +116,25 @@ fn initial_guess(estimator: &Estimator, measurement: &PatchMeasurement, by_beari
         }
     }
     best.1
+}
+
+/// Covariance of the pixel in which a landmark is expected.
+fn predicted<const C: usize>(
+    estimator: &Estimator,
+    measurement: &PatchMeasurement<C>,
+    by_bearing: &Matrix2<f64>,
+) -> Matrix2<f64> {
+    let row = measurement.row;
+    let by_direction = |covariance: Matrix2<f64>| by_bearing * covariance * by_bearing.transpose();
+    let direction = measurement.landmark.bearing.direction();
+    let by_lens = measurement.lens.as_ref().filter(|_| C > WITHOUT_LENS);
+    let Some(by_lens) = by_lens.and_then(|lens| lens.intrinsics_jacobian(&direction)) else {
+        return by_direction(estimator.covariance.block::<2, 2>(row, row));
+    };
+    // A bearing that was measured through a wrong lens is wrong, and its pixel right.
+    let mut jacobian = SMatrix::<f64, 2, { WITH_LENS - 1 }>::zeros();
+    jacobian.fixed_columns_mut::<2>(0).copy_from(by_bearing);
+    jacobian.fixed_columns_mut::<INTRINSICS>(2).copy_from(&by_lens);
+    let rows = std::array::from_fn(|k| if k < 2 { row + k } else { error_state::INTRINSICS + k - 2 });
+    jacobian * estimator.covariance.marginal::<{ WITH_LENS - 1 }>(&rows) * jacobian.transpose()
 }

@@ -21,7 +21,7 @@ use crate::stamp::Stamp;
 /// A filter from the motion at the time of an image, and the samples until now. `observe` gives the pixel of a point, by its id,
 /// in that image, and its patch.
 pub(crate) fn from_initialization(
-    (camera, noise, settings): (&dyn CameraModel, ImuNoise, &Settings),
+    (cameras, noise, settings): ((&dyn CameraModel, Option<&dyn CameraModel>), ImuNoise, &Settings),
     stamp: Stamp,
     motion: &InitialMotion,
     samples: &[Imu],
@@ -37,7 +37,8 @@ pub(crate) fn from_initialization(
         accel_bias: motion.accel_bias,
         sigma: InitialSigma::default(),
     };
-    let estimator = Estimator::new(camera, noise, settings, &initial, *before);
+    let camera = cameras.0;
+    let estimator = Estimator::new(cameras, noise, settings, &initial, *before);
     let mut tracking = TrackingState::new(estimator, settings.landmarks.max_count, &settings.imu);
     let TrackingState { estimator, tracks, .. } = &mut tracking;
     let pixel_sigma = settings.dynamic_initialization.pixel_sigma;

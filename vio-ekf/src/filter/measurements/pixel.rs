@@ -1,18 +1,22 @@
 //! The pixel of a landmark that a tracker of the caller's own has found.
 
-use nalgebra::{Matrix2, Matrix2x3, Vector2};
+use nalgebra::{Matrix2, SMatrix, Vector2};
 
 use super::measurement::{Measurement, Trial};
+use super::patch::{WITH_LENS, WITHOUT_LENS};
+use crate::camera::Camera;
+use crate::camera::intrinsics::INTRINSICS;
 use crate::camera::model::CameraModel;
 use crate::filter::settings::{LandmarkSettings, UpdateSettings};
-use crate::filter::state::error_state::bearing_and_time;
+use crate::filter::state::error_state::bearing_and_camera;
 use crate::filter::state::landmark::{Landmark, project};
 use crate::inertial::iterated_update::Linearization;
 
 /// A pixel of the first camera.
 #[derive(Debug)]
-pub(crate) struct PixelMeasurement<'a> {
-    pub(crate) slot: usize,
+pub(crate) struct PixelMeasurement<'a, const C: usize> {
+    /// First row of the landmark.
+    pub(crate) row: usize,
     pub(crate) pixel: Vector2<f64>,
     /// The landmark in the state.
     pub(crate) landmark: Landmark,
@@ -23,22 +27,43 @@ pub(crate) struct PixelMeasurement<'a> {
     /// From the stamp of the image until the row of the pixel is exposed, s.
     pub(crate) delay: f64,
     pub(crate) camera: &'a dyn CameraModel,
+    /// The camera where its intrinsics are estimated.
+    pub(crate) lens: Option<Camera>,
     pub(crate) landmarks: &'a LandmarkSettings,
     pub(crate) update: &'a UpdateSettings,
 }
 
-impl Measurement<2, 3> for PixelMeasurement<'_> {
-    fn rows(&self) -> [usize; 3] {
-        bearing_and_time(self.slot)
+impl<'a> PixelMeasurement<'a, WITHOUT_LENS> {
+    /// The same that depends on the lens.
+    pub(crate) fn with_lens(self) -> PixelMeasurement<'a, WITH_LENS> {
+        let Self { row, pixel, landmark, rate, time_offset_error, delay, camera, lens, landmarks, update } = self;
+        PixelMeasurement { row, pixel, landmark, rate, time_offset_error, delay, camera, lens, landmarks, update }
+    }
+}
+
+impl<const C: usize> Measurement<2, C> for PixelMeasurement<'_, C> {
+    fn rows(&self) -> [usize; C] {
+        bearing_and_camera(self.row)
     }
 
-    fn linearize(&self, trial: &Trial<'_, 3>) -> Option<Linearization<2, 3>> {
+    fn linearize(&self, trial: &Trial<'_, C>) -> Option<Linearization<2, C>> {
         let delta = trial.delta;
         let step = Vector2::new(delta[0], delta[1]) + self.rate * (self.time_offset_error + self.delay + delta[2]);
-        let (pixel, by_bearing) = project(self.camera, &self.landmark.bearing.boxplus(&step))?;
-        let mut jacobian = Matrix2x3::zeros();
+        let bearing = self.landmark.bearing.boxplus(&step);
+        let changed: Option<Camera> = self
+            .lens
+            .as_ref()
+            .filter(|_| C > WITHOUT_LENS)
+            .map(|lens| lens.with_intrinsics_changed(&std::array::from_fn(|k| delta[WITHOUT_LENS + k])));
+        let camera = changed.as_ref().map_or(self.camera, |lens| lens);
+        let (pixel, by_bearing) = project(camera, &bearing)?;
+        let mut jacobian = SMatrix::<f64, 2, C>::zeros();
         jacobian.fixed_columns_mut::<2>(0).copy_from(&by_bearing);
         jacobian.set_column(2, &(by_bearing * self.rate));
+        if let Some(lens) = &changed {
+            let by_lens = lens.intrinsics_jacobian(&bearing.direction())?;
+            jacobian.columns_mut(WITHOUT_LENS, INTRINSICS).copy_from(&by_lens);
+        }
         let noise = Matrix2::identity() * self.landmarks.pixel_sigma.powi(2);
         Some(Linearization { residual: self.pixel - pixel, jacobian, noise })
     }

@@ -13,7 +13,8 @@ use crate::inertial::iterated_update::Linearization;
 /// A pixel of the second camera.
 #[derive(Debug)]
 pub(crate) struct StereoPixelMeasurement<'a> {
-    pub(crate) slot: usize,
+    /// First row of the landmark.
+    pub(crate) row: usize,
     pub(crate) pixel: Vector2<f64>,
     /// The landmark in the state.
     pub(crate) landmark: Landmark,
@@ -28,7 +29,7 @@ pub(crate) struct StereoPixelMeasurement<'a> {
 
 impl Measurement<2, 4> for StereoPixelMeasurement<'_> {
     fn rows(&self) -> [usize; 4] {
-        let row = error_state::landmark(self.slot);
+        let row = self.row;
         [row, row + 1, row + 2, error_state::TIME_OFFSET]
     }
 

@@ -13,8 +13,8 @@ use crate::inertial::preintegration::{ImuPreintegration, StateTransition};
 /// Rows of the camera's motion.
 const MOTION: usize = 6;
 
-/// Rows before the first landmark.
-const HEAD: usize = error_state::FIRST_LANDMARK;
+/// Rows before the first landmark, at most.
+const MAX_HEAD: usize = error_state::MAX_HEAD;
 
 /// Memory of [`propagate`], claimed once: six rows each of the size of the covariance.
 #[derive(Debug, Clone)]
@@ -34,8 +34,7 @@ pub(crate) struct Workspace {
 }
 
 impl Workspace {
-    pub(crate) fn new(capacity: usize) -> Self {
-        let landmarks = (capacity - HEAD) / error_state::LANDMARK_SIZE;
+    pub(crate) fn new(capacity: usize, landmarks: usize) -> Self {
         let six = || vec![0.0; MOTION * capacity];
         Self {
             stride: capacity,
@@ -67,7 +66,7 @@ pub(crate) fn propagate(
     for slot in (0..state.landmarks.len()).rev() {
         if camera.transform(&state.landmarks[slot]).is_none() {
             state.landmarks.swap_remove(slot);
-            covariance.swap_remove(error_state::landmark(slot), error_state::LANDMARK_SIZE);
+            covariance.swap_remove(state.landmark_row(slot), error_state::LANDMARK_SIZE);
             dropped(slot);
         }
     }
@@ -96,16 +95,16 @@ pub(crate) fn propagate(
     let xi_core = camera.by_motion * noise.motion_core;
     let xi_xi = camera.by_motion * noise.motion * camera.by_motion.transpose();
 
-    let head = HeadTransition { body, by_matrix: by_matrix.as_ref() };
+    let head = HeadTransition { size: state.head(), body, by_matrix: by_matrix.as_ref() };
     motion_product(covariance, (&xi, by_matrix.as_ref()), workspace);
     let motion_covariance = motion_covariance((&xi, by_matrix.as_ref()), workspace) + xi_xi;
     let translation = motion_covariance.fixed_view::<3, 3>(3, 3).into_owned();
     let correlation_factor = correlation_factor(covariance, &start_from_world, preintegration.duration);
-    workspace
-        .second_order
-        .record(covariance, |row| Vector3::from_fn(|k, _| workspace.motion[(3 + k) * workspace.stride + row]));
+    workspace.second_order.record((covariance, head.size), |row| {
+        Vector3::from_fn(|k, _| workspace.motion[(3 + k) * workspace.stride + row])
+    });
 
-    turn_motion_product(&motion_covariance, workspace);
+    turn_motion_product(&motion_covariance, head.size, workspace);
     propagate_head(covariance, &head, core_noise);
     propagate_landmarks(covariance, &head, &xi_core, workspace);
     workspace.second_order.apply(state, covariance, (&translation, correlation_factor), &workspace.transitions);
@@ -114,6 +113,8 @@ pub(crate) fn propagate(
 
 /// The transition of the rows before the landmarks: of the core; the others stay.
 struct HeadTransition<'a> {
+    /// How many there are.
+    size: usize,
     body: &'a StateTransition,
     by_matrix: Option<&'a ByAccelMatrix>,
 }
@@ -137,17 +138,18 @@ impl HeadTransition<'_> {
 
 /// `F P Fᵀ + N` of the rows before the landmarks.
 fn propagate_head(covariance: &mut Covariance, head: &HeadTransition, core_noise: &CoreCovariance) {
-    let mut product = SMatrix::<f64, HEAD, HEAD>::zeros();
-    for column in 0..HEAD {
-        let before = &covariance.row(column)[..HEAD];
+    let size = head.size;
+    let mut product = SMatrix::<f64, MAX_HEAD, MAX_HEAD>::zeros();
+    for column in 0..size {
+        let before = &covariance.row(column)[..size];
         let mut after = product.column_mut(column);
-        after.as_mut_slice().copy_from_slice(before);
+        after.as_mut_slice()[..size].copy_from_slice(before);
         after.as_mut_slice()[..error_state::CORE].copy_from_slice(&head.core(before));
     }
-    for row in 0..HEAD {
-        let mut from = [0.0; HEAD];
+    for row in 0..size {
+        let mut from = [0.0; MAX_HEAD];
         from.iter_mut().zip(product.row(row).iter()).for_each(|(from, value)| *from = *value);
-        let core = head.core(&from);
+        let core = head.core(&from[..size]);
         from[..error_state::CORE].copy_from_slice(&core);
         if row < error_state::CORE {
             from.iter_mut().zip(core_noise.row(row).iter()).for_each(|(from, noise)| *from += noise);
@@ -165,9 +167,9 @@ fn propagate_landmarks(
 ) {
     const SIZE: usize = error_state::LANDMARK_SIZE;
     let Workspace { stride, motion, turned, moved, by_motion, rows, transitions, .. } = workspace;
-    let stride = *stride;
+    let (stride, size) = (*stride, head.size);
     for (slot, transition) in transitions.iter().enumerate() {
-        let at = error_state::landmark(slot);
+        let at = error_state::landmark(size, slot);
         let count = at + SIZE;
         // J_i P_i.
         for r in 0..SIZE {
@@ -182,12 +184,12 @@ fn propagate_landmarks(
         for r in 0..SIZE {
             let from = &mut rows[r * stride..][..count];
             for k in 0..MOTION {
-                add(&mut from[..HEAD], transition.by_motion[(r, k)], &motion[k * stride..][..HEAD]);
+                add(&mut from[..size], transition.by_motion[(r, k)], &motion[k * stride..][..size]);
             }
-            let core = head.core(&from[..HEAD]);
+            let core = head.core(&from[..size]);
             from[..error_state::CORE].copy_from_slice(&core);
             from.iter_mut().zip(noise.row(r).iter()).for_each(|(from, noise)| *from += noise);
-            for (other, own) in from[HEAD..].chunks_exact_mut(SIZE).zip(transitions.iter()) {
+            for (other, own) in from[size..].chunks_exact_mut(SIZE).zip(transitions.iter()) {
                 let j = &own.by_itself;
                 let old = [other[0], other[1], other[2]];
                 for c in 0..SIZE {
@@ -196,11 +198,11 @@ fn propagate_landmarks(
             }
             for k in (0..MOTION).step_by(2) {
                 let [a, b] =
-                    [0, 1].map(|i| (transition.by_motion[(r, k + i)], &moved[(k + i) * stride..][HEAD..count]));
+                    [0, 1].map(|i| (transition.by_motion[(r, k + i)], &moved[(k + i) * stride..][size..count]));
                 let [c, d] =
-                    [0, 1].map(|i| (turned[(k + i) * stride + at + r], &by_motion[(k + i) * stride..][HEAD..count]));
+                    [0, 1].map(|i| (turned[(k + i) * stride + at + r], &by_motion[(k + i) * stride..][size..count]));
                 let others = a.1.iter().zip(b.1).zip(c.1).zip(d.1);
-                for (target, (((va, vb), vc), vd)) in from[HEAD..].iter_mut().zip(others) {
+                for (target, (((va, vb), vc), vd)) in from[size..].iter_mut().zip(others) {
                     *target += (a.0 * va + b.0 * vb) + (c.0 * vc + d.0 * vd);
                 }
             }
@@ -225,7 +227,7 @@ fn motion_covariance(
     workspace: &Workspace,
 ) -> SMatrix<f64, MOTION, MOTION> {
     SMatrix::from_fn(|r, c| {
-        let row = &workspace.motion[r * workspace.stride..][..HEAD];
+        let row = &workspace.motion[r * workspace.stride..][..error_state::FIXED];
         let by_head: f64 = xi.row(c).iter().zip(row).map(|(w, p)| w * p).sum();
         let matrix_rows = &row[error_state::ACCEL_MATRIX..];
         by_head + by_matrix.map_or(0.0, |by| by.xi.row(c).iter().zip(matrix_rows).map(|(w, p)| w * p).sum())
@@ -254,10 +256,10 @@ fn motion_product(
 }
 
 /// The rows that all landmarks share.
-fn turn_motion_product(motion_covariance: &SMatrix<f64, MOTION, MOTION>, workspace: &mut Workspace) {
+fn turn_motion_product(motion_covariance: &SMatrix<f64, MOTION, MOTION>, head: usize, workspace: &mut Workspace) {
     let Workspace { stride, motion, turned, moved, by_motion, transitions, .. } = workspace;
     for (slot, transition) in transitions.iter().enumerate() {
-        let at = error_state::landmark(slot);
+        let at = error_state::landmark(head, slot);
         let before = SMatrix::<f64, MOTION, 3>::from_fn(|r, c| motion[r * *stride + at + c]);
         let w = before * transition.by_itself.transpose();
         let v = w + motion_covariance * transition.by_motion.transpose();

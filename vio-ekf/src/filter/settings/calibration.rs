@@ -15,6 +15,18 @@ pub struct CalibrationSettings {
     pub time_offset_s: f64,
     /// Its standard deviation, s; ours: 0.
     pub time_offset_sigma_s: f64,
+    /// Standard deviation of the focal length, relative; ours: 0. With this or one of the next two the intrinsics are estimated, of
+    /// Kalibr's models alone. Both axes err together, and a tenth of it each by itself.
+    pub focal_sigma: f64,
+    /// Standard deviation of the principal point, pixels per axis; ours: 0.
+    pub principal_point_sigma_px: f64,
+    /// Standard deviation of the first term of the distortion (`k1`; `xi` of `ds`, `alpha` of `eucm`); a third of it is that of the
+    /// second; ours: 0.
+    pub distortion_sigma: f64,
+    /// Where intrinsics are estimated: standard deviation of the angles of the second camera against the first, rad; ours: 0.
+    pub stereo_attitude_sigma: f64,
+    /// The same of its place, m per axis; ours: 0.
+    pub stereo_position_sigma_m: f64,
     /// Standard deviation of the stamp of each image, s; ours: 0. With it every image has an offset of its own, found with the
     /// landmarks that it sees, and the mean offset is taken as known.
     pub stamp_jitter_s: f64,
@@ -24,6 +36,11 @@ pub struct CalibrationSettings {
 }
 
 impl CalibrationSettings {
+    /// Whether the intrinsics are estimated.
+    pub(crate) fn estimates_intrinsics(&self) -> bool {
+        self.focal_sigma > 0.0 || self.principal_point_sigma_px > 0.0 || self.distortion_sigma > 0.0
+    }
+
     pub(super) fn check(&self) -> Result<(), Error> {
         if self.time_offset_s.is_nan() || self.time_offset_s.abs() > 10.0 {
             return Err(invalid("time_offset_s", self.time_offset_s, "must be below 10 s"));
@@ -41,6 +58,11 @@ impl CalibrationSettings {
             ("camera_attitude_sigma", self.camera_attitude_sigma),
             ("time_offset_sigma_s", self.time_offset_sigma_s),
             ("stamp_jitter_s", self.stamp_jitter_s),
+            ("focal_sigma", self.focal_sigma),
+            ("principal_point_sigma_px", self.principal_point_sigma_px),
+            ("distortion_sigma", self.distortion_sigma),
+            ("stereo_attitude_sigma", self.stereo_attitude_sigma),
+            ("stereo_position_sigma_m", self.stereo_position_sigma_m),
         ])
     }
 }

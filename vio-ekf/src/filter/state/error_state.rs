@@ -1,10 +1,11 @@
 //! First row of each block of the odometry's error state.
 //!
 //! ```text
-//! rows   0  3  6  9  12 | 15       18       21      22           23           | 32 + 3 k
-//!        p  v  R  b_g b_a | camera's pose  offset  depth prior  accel. matrix | landmark k: bearing (2), inverse distance (1)
+//! rows   0  3  6  9  12 | 15       18       21      22           23           | 32                  | then 3 each
+//!        p  v  R  b_g b_a | camera's pose  offset  depth prior  accel. matrix | intrinsics of cameras | landmark: bearing (2), inverse distance (1)
 //! ```
 
+use crate::camera::intrinsics;
 pub use crate::inertial::error_state::{ACCEL_BIAS, ATTITUDE, CORE, GYRO_BIAS, POSITION, VELOCITY};
 
 /// Position of the camera on the body, m.
@@ -19,18 +20,29 @@ pub const DEPTH_PRIOR: usize = 22;
 pub const ACCEL_MATRIX: usize = 23;
 /// Entries of a 3x3 matrix.
 pub(crate) const MATRIX_SIZE: usize = 9;
-/// Rows before the first landmark.
-pub(crate) const FIRST_LANDMARK: usize = 32;
+/// Rows that are always there.
+pub(crate) const FIXED: usize = 32;
+/// Intrinsics of the first camera, where they are estimated: focal lengths, principal point, first two terms of the distortion.
+pub const INTRINSICS: usize = FIXED;
+/// The same of a second camera, then its attitude (error on its own side) and the position of the first camera in its axes.
+pub(crate) const SECOND_INTRINSICS: usize = INTRINSICS + intrinsics::INTRINSICS;
+pub(crate) const SECOND_ATTITUDE: usize = SECOND_INTRINSICS + intrinsics::INTRINSICS;
+pub(crate) const SECOND_POSITION: usize = SECOND_ATTITUDE + 3;
+/// Rows before the first landmark, at most.
+pub(crate) const MAX_HEAD: usize = SECOND_POSITION + 3;
 /// Rows of a landmark: two of the bearing, one of the inverse distance.
 pub(crate) const LANDMARK_SIZE: usize = 3;
 
-/// First row of a landmark.
-pub(crate) const fn landmark(slot: usize) -> usize {
-    FIRST_LANDMARK + LANDMARK_SIZE * slot
+/// First row of a landmark, after so many rows.
+pub(crate) const fn landmark(head: usize, slot: usize) -> usize {
+    head + LANDMARK_SIZE * slot
 }
 
-/// Rows of a landmark's bearing and of the time offset.
-pub(crate) fn bearing_and_time(slot: usize) -> [usize; 3] {
-    let row = landmark(slot);
-    [row, row + 1, TIME_OFFSET]
+/// Rows of a landmark's bearing, of the time offset, and of as many intrinsics as there is room for.
+pub(crate) fn bearing_and_camera<const C: usize>(landmark: usize) -> [usize; C] {
+    std::array::from_fn(|k| match k {
+        0 | 1 => landmark + k,
+        2 => TIME_OFFSET,
+        k => INTRINSICS + k - 3,
+    })
 }

@@ -5,6 +5,8 @@ use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use super::error_state;
 use super::inverse_distance::InverseDistance;
 use super::landmark::Landmark;
+use crate::camera::Camera;
+use crate::camera::intrinsics::INTRINSICS;
 use crate::inertial::core_state::{CoreState, ImuCorrection, block, rotated};
 
 /// The state of the odometry: core, calibration of the camera, landmarks in the camera's axes (Bloesch et al. 2017).
@@ -23,10 +25,49 @@ pub struct VioState {
     pub(crate) depth_prior: InverseDistance,
     /// Specific force by the accelerometer's reading; `None`, the identity, where it is not estimated.
     pub(crate) accel_matrix: Option<Matrix3<f64>>,
+    /// The first camera, where its intrinsics are estimated.
+    pub(crate) lens: Option<Camera>,
+    /// The second one, likewise.
+    pub(crate) second: Option<SecondCamera>,
     pub(crate) landmarks: Vec<Landmark>,
 }
 
+/// A second camera whose calibration is estimated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct SecondCamera {
+    /// Its lens; the pose is not used.
+    pub(crate) lens: Camera,
+    /// Pose of the first camera in its axes.
+    pub(crate) from_first: Isometry3<f64>,
+}
+
+impl SecondCamera {
+    fn correct(&mut self, delta: &[f64]) {
+        self.lens = self.lens.with_intrinsics_changed(&intrinsics(delta, error_state::SECOND_INTRINSICS));
+        self.from_first.rotation = rotated(&block(delta, error_state::SECOND_ATTITUDE), &self.from_first.rotation);
+        self.from_first.translation.vector += block(delta, error_state::SECOND_POSITION);
+    }
+}
+
+fn intrinsics(delta: &[f64], row: usize) -> [f64; INTRINSICS] {
+    std::array::from_fn(|k| delta[row + k])
+}
+
 impl VioState {
+    /// Rows before the first landmark.
+    pub(crate) fn head(&self) -> usize {
+        match (&self.lens, &self.second) {
+            (None, _) => error_state::FIXED,
+            (Some(_), None) => error_state::SECOND_INTRINSICS,
+            (Some(_), Some(_)) => error_state::MAX_HEAD,
+        }
+    }
+
+    /// First row of a landmark.
+    pub(crate) fn landmark_row(&self, slot: usize) -> usize {
+        error_state::landmark(self.head(), slot)
+    }
+
     /// Pose, velocity and biases of the body.
     pub fn core(&self) -> &CoreState {
         &self.core
@@ -57,7 +98,7 @@ impl VioState {
     #[cfg(test)]
     pub(crate) fn correct(&mut self, delta: &[f64]) {
         self.correct_head(delta);
-        let landmark_errors = delta[error_state::FIRST_LANDMARK..].chunks_exact(error_state::LANDMARK_SIZE);
+        let landmark_errors = delta[self.head()..].chunks_exact(error_state::LANDMARK_SIZE);
         for (landmark, d) in self.landmarks.iter_mut().zip(landmark_errors) {
             landmark.bearing = landmark.bearing.boxplus(&nalgebra::Vector2::new(d[0], d[1]));
             landmark.inverse_distance.correct(d[2]);
@@ -74,6 +115,12 @@ impl VioState {
         if let Some(matrix) = &mut self.accel_matrix {
             let rows = &delta[error_state::ACCEL_MATRIX..][..error_state::MATRIX_SIZE];
             *matrix += Matrix3::from_row_slice(rows);
+        }
+        if let Some(lens) = &mut self.lens {
+            *lens = lens.with_intrinsics_changed(&intrinsics(delta, error_state::INTRINSICS));
+        }
+        if let Some(second) = &mut self.second {
+            second.correct(delta);
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Isometry3, Matrix2, Vector2};
 
 use crate::camera::model::CameraModel;
 use crate::filter::propagation::camera_motion::CameraMotion;
@@ -28,6 +28,12 @@ pub(crate) struct StereoProjection {
 impl StereoRig {
     pub(crate) fn new(first: &dyn CameraModel, camera: Arc<dyn CameraModel>) -> Self {
         let second_from_first = CameraMotion::between(&first.body_from_camera(), &camera.body_from_camera());
+        Self { camera, second_from_first }
+    }
+
+    /// From the pose of the first camera in the second one's axes.
+    pub(crate) fn posed(from_first: &Isometry3<f64>, camera: Arc<dyn CameraModel>) -> Self {
+        let second_from_first = CameraMotion::between(from_first, &Isometry3::identity());
         Self { camera, second_from_first }
     }
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Matrix2;
 
+use super::calibrating::update_with_pairs;
 use super::epipolar_search::{EpipolarSearch, StereoDepth};
 use super::rig::StereoRig;
 use crate::camera::model::CameraModel;
@@ -18,7 +19,6 @@ use crate::filter::measurements::update::gated_update;
 use crate::filter::point_observation::PointObservation;
 use crate::filter::settings::{PatchSettings, Settings};
 use crate::filter::state::bearing::Bearing;
-use crate::filter::state::error_state;
 use crate::filter::state::landmark::project;
 use crate::samples::ImageView;
 
@@ -87,9 +87,12 @@ impl StereoCamera {
         if !self.has_image {
             return;
         }
+        if estimator.state.second.is_some() {
+            return update_with_pairs(estimator, (first, &self.pyramid), settings);
+        }
         for slot in 0..estimator.state.landmarks.len() {
             let landmark = estimator.state.landmarks[slot];
-            let row = error_state::landmark(slot) + 2;
+            let row = estimator.state.landmark_row(slot) + 2;
             let deviation = estimator.covariance.variance(row).sqrt();
             let Some((pixel, by_bearing)) = project(camera, &landmark.bearing) else { continue };
             let (Some(patch), Some(warp)) = (Patch::extract(first, &pixel), by_bearing.try_inverse()) else { continue };

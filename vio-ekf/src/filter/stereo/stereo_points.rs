@@ -10,7 +10,6 @@ use crate::filter::measurements::update::gated_update;
 use crate::filter::point_observation::PointPair;
 use crate::filter::report::FrameReport;
 use crate::filter::settings::Settings;
-use crate::filter::state::error_state;
 use crate::filter::state::inverse_distance::InverseDistance;
 use crate::filter::state::landmark::Landmark;
 use crate::filter::tracking_state::TrackingState;
@@ -49,7 +48,7 @@ pub(crate) fn update_with_second_points(
         }
         let landmark = tracking.estimator.state.landmarks[slot];
         let measurement = StereoPixelMeasurement {
-            slot,
+            row: tracking.estimator.state.landmark_row(slot),
             pixel,
             landmark,
             rate: tracking.estimator.bearing_rate(&landmark),
@@ -85,5 +84,5 @@ fn triangulate(rig: &StereoRig, estimator: &mut Estimator, slot: usize, pixel: &
     }
     let deviation = settings.landmarks.inverse_distance_sigma * landmark.inverse_distance.value.max(value);
     estimator.state.landmarks[slot].inverse_distance = InverseDistance::new(value);
-    estimator.covariance.reset_row(error_state::landmark(slot) + 2, deviation * deviation);
+    estimator.covariance.reset_row(estimator.state.landmark_row(slot) + 2, deviation * deviation);
 }

@@ -112,6 +112,8 @@ fn empty_state() -> VioState {
         time_offset: 0.0,
         depth_prior: InverseDistance::new(1.0),
         accel_matrix: None,
+        lens: None,
+        second: None,
         landmarks: Vec::new(),
     }
 }
@@ -233,7 +235,7 @@ fn pixels_of_the_second_camera_move_with_bearing_distance_and_clock() {
         let inverse_distance = InverseDistance::new(0.1 + 0.02 * f64::from(k));
         let landmark = Landmark { bearing, inverse_distance, warp: Matrix2::identity() * 3.0 };
         let measurement = StereoPixelMeasurement {
-            slot: 0,
+            row: crate::filter::state::error_state::FIXED,
             pixel: Vector2::zeros(),
             landmark,
             rate,

@@ -26,7 +26,7 @@ fn covariance_moves_with_the_transition_of_the_whole_state() {
         let mut covariance = filled(&prior);
         let mut end = state.clone();
         let preintegration = integrate(&readings, &state, &ImuNoise::ZERO);
-        propagate(&mut end, &mut covariance, (&preintegration, GRAVITY), &mut Workspace::new(f.nrows()), |_| {
+        propagate(&mut end, &mut covariance, (&preintegration, GRAVITY), &mut Workspace::new(f.nrows(), 4), |_| {
             panic!("lost")
         });
         let error = dense(&covariance) - &f * &prior * f.transpose();
@@ -43,7 +43,7 @@ fn covariance_moves_with_the_transition_of_the_whole_state() {
             &mut state.clone(),
             &mut covariance,
             (&preintegration, GRAVITY),
-            &mut Workspace::new(f.nrows()),
+            &mut Workspace::new(f.nrows(), 4),
             |_| panic!("lost"),
         );
         let error = dense(&covariance) - &f * &exact * f.transpose();
@@ -58,7 +58,7 @@ fn noise_is_the_sum_over_the_samples() {
     let mut rng = Rng::new(2);
     let (state, readings) = (state(&mut rng, 3), readings(&mut rng, 12));
     let noise = ImuNoise { gyro_density: 0.01, gyro_walk: 0.02, accel_density: 0.03, accel_walk: 0.5 };
-    let n = error_state::landmark(3);
+    let n = error_state::landmark(error_state::FIXED, 3);
     let mut expected = DMatrix::<f64>::zeros(n, n);
     let (h, dt) = (1e-4, 0.005);
     for first in 0..readings.len() {
@@ -93,7 +93,7 @@ fn noise_is_the_sum_over_the_samples() {
     }
     let mut covariance = Covariance::new(n, n);
     let preintegration = integrate(&readings, &state, &noise);
-    propagate(&mut state.clone(), &mut covariance, (&preintegration, GRAVITY), &mut Workspace::new(n), |_| {
+    propagate(&mut state.clone(), &mut covariance, (&preintegration, GRAVITY), &mut Workspace::new(n, 4), |_| {
         panic!("lost")
     });
     let ours = dense(&covariance);
@@ -114,7 +114,7 @@ fn position_and_yaw_never_reach_what_the_camera_sees() {
     let mut rng = Rng::new(3);
     for _ in 0..20 {
         let (state, readings) = (state(&mut rng, 3), readings(&mut rng, 10));
-        let n = error_state::landmark(3);
+        let n = error_state::landmark(error_state::FIXED, 3);
         for direction in 0..4 {
             let row = [
                 error_state::POSITION,
@@ -126,9 +126,13 @@ fn position_and_yaw_never_reach_what_the_camera_sees() {
             prior[(row, row)] = 1.0;
             let mut covariance = filled(&prior);
             let preintegration = integrate(&readings, &state, &ImuNoise::ZERO);
-            propagate(&mut state.clone(), &mut covariance, (&preintegration, GRAVITY), &mut Workspace::new(n), |_| {
-                panic!("lost")
-            });
+            propagate(
+                &mut state.clone(),
+                &mut covariance,
+                (&preintegration, GRAVITY),
+                &mut Workspace::new(n, 4),
+                |_| panic!("lost"),
+            );
             for k in (error_state::VELOCITY..n).filter(|&k| k != error_state::ATTITUDE + 2) {
                 assert!(covariance.variance(k) == 0.0, "row {k} depends on gauge direction {direction}");
             }

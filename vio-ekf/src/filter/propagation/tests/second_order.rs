@@ -20,13 +20,13 @@ fn products_of_errors_are_accounted_for() {
     (state.core.velocity, state.camera_attitude) = (Vector3::new(0.4, -0.3, 0.5), UnitQuaternion::identity());
     state.landmarks.iter_mut().for_each(|landmark| landmark.inverse_distance = InverseDistance::new(0.6));
     let readings = readings(&mut rng, 10);
-    let n = error_state::landmark(2);
+    let n = error_state::landmark(error_state::FIXED, 2);
     let rows = [
         error_state::VELOCITY,
         error_state::VELOCITY + 1,
         error_state::VELOCITY + 2,
-        error_state::landmark(0) + 2,
-        error_state::landmark(1) + 2,
+        error_state::landmark(error_state::FIXED, 0) + 2,
+        error_state::landmark(error_state::FIXED, 1) + 2,
     ];
     // Each error by five independent ones.
     let mix = SMatrix::<f64, 5, 5>::new(
@@ -44,7 +44,7 @@ fn products_of_errors_are_accounted_for() {
         }
     }
     let bearings = |d: &DVector<f64>| {
-        let [a, b] = [error_state::landmark(0), error_state::landmark(1)];
+        let [a, b] = [error_state::landmark(error_state::FIXED, 0), error_state::landmark(error_state::FIXED, 1)];
         SVector::<f64, 4>::new(d[a], d[a + 1], d[b], d[b + 1])
     };
     let mut normal = || (0..12).map(|_| signed(&mut rng)).sum::<f64>() / 2.0;
@@ -66,11 +66,11 @@ fn products_of_errors_are_accounted_for() {
     let mut covariance = filled(&prior);
     let preintegration = integrate(&readings, &state, &ImuNoise::ZERO);
     let mut end = state.clone();
-    propagate(&mut end, &mut covariance, (&preintegration, GRAVITY), &mut Workspace::new(n), |_| panic!("lost"));
+    propagate(&mut end, &mut covariance, (&preintegration, GRAVITY), &mut Workspace::new(n, 4), |_| panic!("lost"));
     let f = transition(&readings, &state);
     let linear = &f * &prior * f.transpose();
     let block = |of: &dyn Fn(usize, usize) -> f64| {
-        let at = |k: usize| error_state::landmark(k / 2) + k % 2;
+        let at = |k: usize| error_state::landmark(error_state::FIXED, k / 2) + k % 2;
         SMatrix::<f64, 4, 4>::from_fn(|r, c| of(at(r), at(c)))
     };
     let linear = block(&|r, c| linear[(r, c)]);

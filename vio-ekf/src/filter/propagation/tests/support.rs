@@ -32,6 +32,8 @@ pub(super) fn state(rng: &mut Rng, landmarks: usize) -> VioState {
         time_offset: 0.01,
         depth_prior: InverseDistance::new(0.3),
         accel_matrix: None,
+        lens: None,
+        second: None,
         landmarks: (0..landmarks)
             .map(|_| Landmark {
                 bearing: Bearing::new(&Unit::new_normalize(Vector3::new(signed(rng), signed(rng), 1.0))),
@@ -62,17 +64,21 @@ pub(super) fn integrate(readings: &[[Vector3<f64>; 2]], state: &VioState, noise:
 pub(super) fn model(readings: &[[Vector3<f64>; 2]], state: &VioState) -> VioState {
     let preintegration = integrate(readings, state, &ImuNoise::ZERO);
     let mut end = state.clone();
-    let capacity = error_state::landmark(state.landmarks.len());
+    let capacity = error_state::landmark(error_state::FIXED, state.landmarks.len());
     let mut covariance = Covariance::new(capacity, capacity);
-    propagate(&mut end, &mut covariance, (&preintegration, GRAVITY), &mut Workspace::new(capacity), |_| {
-        panic!("a landmark was lost")
-    });
+    propagate(
+        &mut end,
+        &mut covariance,
+        (&preintegration, GRAVITY),
+        &mut Workspace::new(capacity, state.landmarks.len()),
+        |_| panic!("a landmark was lost"),
+    );
     end
 }
 
 /// `a ⊟ b` in the filter's error coordinates.
 pub(super) fn difference(a: &VioState, b: &VioState) -> DVector<f64> {
-    let mut d = DVector::zeros(error_state::landmark(a.landmarks.len()));
+    let mut d = DVector::zeros(error_state::landmark(error_state::FIXED, a.landmarks.len()));
     let rotation = |a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>| so3::log(&(a * b.inverse()));
     d.fixed_rows_mut::<3>(error_state::POSITION).copy_from(&(a.core.position - b.core.position));
     d.fixed_rows_mut::<3>(error_state::VELOCITY).copy_from(&(a.core.velocity - b.core.velocity));
@@ -86,15 +92,16 @@ pub(super) fn difference(a: &VioState, b: &VioState) -> DVector<f64> {
     let matrix = (a.accel_matrix() - b.accel_matrix()).transpose();
     d.rows_mut(error_state::ACCEL_MATRIX, error_state::MATRIX_SIZE).copy_from_slice(matrix.as_slice());
     for (slot, (a, b)) in a.landmarks.iter().zip(&b.landmarks).enumerate() {
-        d.fixed_rows_mut::<2>(error_state::landmark(slot)).copy_from(&a.bearing.boxminus(&b.bearing));
-        d[error_state::landmark(slot) + 2] = a.inverse_distance.value - b.inverse_distance.value;
+        d.fixed_rows_mut::<2>(error_state::landmark(error_state::FIXED, slot))
+            .copy_from(&a.bearing.boxminus(&b.bearing));
+        d[error_state::landmark(error_state::FIXED, slot) + 2] = a.inverse_distance.value - b.inverse_distance.value;
     }
     d
 }
 
 /// The transition `F` by central differences.
 pub(super) fn transition(readings: &[[Vector3<f64>; 2]], state: &VioState) -> DMatrix<f64> {
-    let (n, h) = (error_state::landmark(state.landmarks.len()), 1e-5);
+    let (n, h) = (error_state::landmark(error_state::FIXED, state.landmarks.len()), 1e-5);
     let middle = model(readings, state);
     let mut f = DMatrix::zeros(n, n);
     for column in 0..n {
@@ -104,12 +111,9 @@ pub(super) fn transition(readings: &[[Vector3<f64>; 2]], state: &VioState) -> DM
             let further = |distance: &mut InverseDistance| *distance = InverseDistance::new(distance.value + h);
             if column == error_state::DEPTH_PRIOR {
                 further(&mut state.depth_prior);
-            } else if column >= error_state::FIRST_LANDMARK
-                && (column - error_state::FIRST_LANDMARK) % error_state::LANDMARK_SIZE == 2
-            {
+            } else if column >= error_state::FIXED && (column - error_state::FIXED) % error_state::LANDMARK_SIZE == 2 {
                 further(
-                    &mut state.landmarks[(column - error_state::FIRST_LANDMARK) / error_state::LANDMARK_SIZE]
-                        .inverse_distance,
+                    &mut state.landmarks[(column - error_state::FIXED) / error_state::LANDMARK_SIZE].inverse_distance,
                 );
             } else {
                 let mut delta = vec![0.0; n];

@@ -1,0 +1,46 @@
+//! What is known of lenses and of the second camera before the images tell.
+
+use crate::camera::Camera;
+use crate::camera::model::CameraModel;
+use crate::filter::settings::CalibrationSettings;
+use crate::filter::state::error_state;
+use crate::filter::state::vio_state::{SecondCamera, VioState};
+use crate::inertial::covariance::Covariance;
+
+/// Deviation of one axis' focal length from the other's, in units of that of both.
+const ASPECT: f64 = 0.1;
+/// Deviation of the second term of the distortion, in units of that of the first.
+const SECOND_TERM: f64 = 1.0 / 3.0;
+
+impl SecondCamera {
+    /// `None` where a lens is not one of Kalibr's.
+    pub(crate) fn new(first: &dyn CameraModel, second: &dyn CameraModel) -> Option<Self> {
+        let from_first = second.body_from_camera().inverse() * first.body_from_camera();
+        Some(Self { lens: second.kalibr()?.estimable(), from_first })
+    }
+}
+
+/// Sets the covariance of what is estimated of the lenses.
+pub(crate) fn set_covariance(covariance: &mut Covariance, state: &VioState, settings: &CalibrationSettings) {
+    if let Some(lens) = &state.lens {
+        set_lens(covariance, error_state::INTRINSICS, lens, settings);
+    }
+    if let Some(second) = &state.second {
+        set_lens(covariance, error_state::SECOND_INTRINSICS, &second.lens, settings);
+        covariance.set_diagonal3(error_state::SECOND_ATTITUDE, [settings.stereo_attitude_sigma; 3]);
+        covariance.set_diagonal3(error_state::SECOND_POSITION, [settings.stereo_position_sigma_m; 3]);
+    }
+}
+
+fn set_lens(covariance: &mut Covariance, row: usize, lens: &Camera, settings: &CalibrationSettings) {
+    let common = settings.focal_sigma.powi(2);
+    let aspect = common * ASPECT * ASPECT;
+    covariance.reset_row(row, lens.fx * lens.fx * (common + aspect));
+    covariance.reset_row(row + 1, lens.fy * lens.fy * (common + aspect));
+    covariance.set_covariance(row, row + 1, lens.fx * lens.fy * common);
+    for k in 2..4 {
+        covariance.reset_row(row + k, settings.principal_point_sigma_px.powi(2));
+    }
+    covariance.reset_row(row + 4, settings.distortion_sigma.powi(2));
+    covariance.reset_row(row + 5, (settings.distortion_sigma * SECOND_TERM).powi(2));
+}
