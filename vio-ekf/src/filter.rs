@@ -1,6 +1,8 @@
 //! The odometry: a camera, maybe a second one, an inertial sensor, and an iterated extended Kalman filter around the body.
 
 mod accel_matrix_selection;
+pub(crate) mod calibration_error;
+mod calibration_prior;
 mod depth_prior;
 mod divergence_monitor;
 mod estimator;
@@ -10,7 +12,6 @@ mod initialization;
 mod initializing;
 mod innovation_adaptation;
 mod landmarks;
-mod lens_prior;
 pub(crate) mod measurements;
 pub(crate) mod point_observation;
 mod point_tracking;
@@ -21,7 +22,7 @@ mod sensors;
 pub(crate) mod settings;
 pub(crate) mod state;
 mod stationary;
-mod stereo;
+pub(crate) mod stereo;
 mod tracking_state;
 pub(crate) mod vio;
 

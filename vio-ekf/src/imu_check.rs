@@ -4,6 +4,7 @@
 mod accelerometer;
 mod axes;
 mod bias_at_rest;
+mod clipping;
 mod diagnosis;
 mod gyroscope;
 mod images;

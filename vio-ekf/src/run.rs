@@ -1,12 +1,16 @@
 //! The odometry's protocol around the filter: when it starts, when poses are withdrawn, when a new segment begins, and why.
 
+mod calibration_evidence;
+mod calibration_watch;
 pub(crate) mod frames;
 mod outcome;
+mod pair_order;
 mod recorded;
 mod runner;
 mod segments;
 mod summary;
 
+pub use calibration_watch::{CalibrationDoubt, CalibrationPart, check_calibration};
 pub use frames::{Picture, RecordedFrame, pair_by_stamp};
 pub use outcome::{Event, ImageOutcome, Loss, LossReason, SkipReason, SkippedImage};
 pub use recorded::run_recording;

@@ -60,7 +60,8 @@ pub(super) struct Track {
     /// Landmarks that are followed at once [default: 25, or that of the settings]
     #[arg(long, value_name = "NUMBER")]
     pub(super) features: Option<usize>,
-    /// Estimate the camera's place and clock as well, starting from the calibration
+    /// Estimate the calibration as well, starting from the one given: lenses, places of the cameras, their clock, the accelerometer's
+    /// scale; runs twice
     #[arg(long)]
     pub(super) calibrate: bool,
     /// Take the inertial samples as they are, though the test of gravity, axes or rate refuses them

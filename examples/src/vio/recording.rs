@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use vio_ekf::format::calibration::{CameraCalibration, ImuCalibration};
 use vio_ekf::imu_check::{ImuValidation, validate_samples};
 use vio_ekf::nalgebra::Vector3;
+use vio_ekf::run::CalibrationDoubt;
 use vio_ekf::{Camera, Imu, Stamp, Trajectory};
 
 use super::error::VioError;
@@ -96,6 +97,27 @@ impl Recording {
             validate_samples(&self.samples, self.imu.rate_hz, gravity).map_err(|error| unusable(error.to_string()))?;
         self.check_clocks()?;
         Ok(findings)
+    }
+
+    /// Puts what was found in place of what is doubted of the calibration.
+    pub(super) fn correct_calibration(&mut self, doubt: &CalibrationDoubt) {
+        let second = self.second.iter().map(|second| CameraCalibration { camera: second.camera, ..self.camera });
+        let mut cameras: Vec<CameraCalibration> = std::iter::once(self.camera).chain(second).collect();
+        doubt.correct(&mut cameras);
+        self.camera = cameras[0];
+        if let (Some(second), Some(corrected)) = (&mut self.second, cameras.get(1)) {
+            second.camera = corrected.camera;
+        }
+    }
+
+    /// The calibration of the first camera in a line.
+    pub(super) fn calibration_words(&self) -> String {
+        let CameraCalibration { camera, time_offset_s, .. } = &self.camera;
+        let Camera { fx, fy, cx, cy, distortion, .. } = camera;
+        format!(
+            "focal lengths {fx:.1}, {fy:.1} px, principal point {cx:.1}, {cy:.1} px, {distortion:.3?}, clock {:.1} ms",
+            1e3 * time_offset_s
+        )
     }
 
     /// Refuses a recording whose images were taken at another time than its inertial samples.

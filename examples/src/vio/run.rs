@@ -64,7 +64,11 @@ pub(super) fn filter(recording: &Recording, settings: &RunSettings, stereo: bool
 /// [`VioError`] if the recording cannot be used, or the filter never starts.
 pub fn run(recording: &Recording, settings: &RunSettings) -> Result<TimedRun, VioError> {
     let mut runner = TimedRunner {
-        runner: Runner::new(filter(recording, settings, true)?, RunnerSettings::default()),
+        // The calibration is checked beside the run, so that the times of images are those of one filter.
+        runner: Runner::new(
+            filter(recording, settings, true)?,
+            RunnerSettings { watch_calibration: false, ..RunnerSettings::default() },
+        ),
         samples: recording.samples.iter(),
         frame_s: Vec::new(),
         imu_s: Vec::new(),

@@ -2,10 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use vio_ekf::filter::CalibrationSettings;
 use vio_ekf::format::calibration::read_kalibr_cameras;
 use vio_ekf::imu_check::{ImuValidation, check_axes_with_images, diagnose_axes};
-use vio_ekf::run::{Loss, Run};
+use vio_ekf::run::{CalibrationDoubt, CalibrationPart, Loss, Run, check_calibration};
 use vio_ekf::sim::{Scenario, SimulatedCamera};
 use vio_ekf::tune::TuneSettings;
 use vio_ekf::{Camera, Settings};
@@ -15,12 +14,14 @@ use super::error::{read_text, write_file};
 use super::inertial::dead_reckon;
 use super::run::filter;
 use super::{
-    CompareSettings, Flight, GreyImage, Overrides, Recording, RunSettings, SimulationSettings, Tuning, TuningData,
-    VioError, VioReport, camera_frames, compare, evaluate_run, open_euroc, open_euroc_stereo, open_mcap,
+    CompareSettings, Flight, GreyImage, Overrides, Recording, RunSettings, SimulationSettings, TimedRun, Tuning,
+    TuningData, VioError, VioReport, camera_frames, compare, evaluate_run, open_euroc, open_euroc_stereo, open_mcap,
     open_mcap_stereo, run, save, simulate, tune_noise,
 };
 use crate::report::save_figures;
 
+/// Checks of `--calibrate` at most.
+const MAX_CHECKS: usize = 4;
 /// Share of the images that may be left out of a run that counts as a success.
 const MAX_LEFT_OUT: f64 = 0.1;
 
@@ -54,22 +55,8 @@ fn filter_settings(arguments: &Track) -> Result<Settings, AnyError> {
     if let Some(features) = arguments.features {
         filter.landmarks.max_count = features;
     }
-    if arguments.calibrate {
-        let time_offset_s = filter.calibration.time_offset_s;
-        filter.calibration = CalibrationSettings { time_offset_s, ..rough_calibration() };
-    }
     filter.check()?;
     Ok(filter)
-}
-
-/// How far the calibration may be off with `--calibrate`: what a ruler and a guess leave.
-fn rough_calibration() -> CalibrationSettings {
-    CalibrationSettings {
-        camera_position_sigma_m: 0.03,
-        camera_attitude_sigma: 0.05,
-        time_offset_sigma_s: 0.01,
-        ..CalibrationSettings::default()
-    }
 }
 
 fn track(arguments: &Track) -> Result<(), AnyError> {
@@ -116,10 +103,17 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         }
     }
     let threads = threads(arguments.threads);
-    let settings = RunSettings { filter, threads, ..RunSettings::default() };
-    let timed = match run(&recording, &settings) {
+    let mut settings = RunSettings { filter, threads, ..RunSettings::default() };
+    if arguments.calibrate {
+        calibrate(&mut recording, &mut settings)?;
+    }
+    let (timed, doubt) = with_calibration_check(&recording, &settings);
+    if let Some(doubt) = &doubt {
+        eprintln!("warning: {}", calibration_advice(doubt));
+    }
+    let timed = match timed {
         Err(VioError::Unusable { recording: name, why }) => {
-            return Err(format!("{name}: {}", with_cause(why, &recording, &settings)).into());
+            return Err(format!("{name}: {}", with_cause(why, doubt.as_ref(), &recording, &settings)).into());
         }
         other => other?,
     };
@@ -138,7 +132,7 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         eprintln!("diverged at {stamp} s: {why}");
     }
     let evaluation = recording.truth.as_ref().map(|truth| evaluate_run(run, truth)).transpose()?.flatten();
-    write_file(&folder.join("settings.toml"), toml::to_string(&filter)?.as_bytes())?;
+    write_file(&folder.join("settings.toml"), toml::to_string(&settings.filter)?.as_bytes())?;
     let report = VioReport::new(&recording, findings.as_ref(), &timed, evaluation.as_ref(), threads)?;
     save(&report, &recording, run, evaluation.as_ref(), folder)?;
     println!("{}", folder.join("report.md").display());
@@ -149,7 +143,56 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         eprintln!("{} poses were taken back: wrong starts, or contradicted before a divergence", run.withdrawn);
     }
     // The files are there to look at, but such a trajectory is not to be relied on.
-    usable(&recording, run).map_err(|why| with_cause(why, &recording, &settings).into())
+    usable(&recording, run).map_err(|why| with_cause(why, doubt.as_ref(), &recording, &settings).into())
+}
+
+/// Corrects the calibration of a recording, and lets the run estimate what is left: checks until nothing is doubted, because a first
+/// estimate far from what is given is not at its best.
+fn calibrate(recording: &mut Recording, settings: &mut RunSettings) -> Result<(), VioError> {
+    for _ in 0..MAX_CHECKS {
+        let filter = filter(recording, settings, true)?;
+        let Some(doubt) = check_calibration(&filter, &recording.samples, camera_frames(recording)) else { break };
+        eprintln!("calibration: {doubt}");
+        if doubt.parts.contains(&CalibrationPart::Accelerometer) {
+            settings.filter = settings.filter.with_rough_accelerometer();
+        }
+        recording.correct_calibration(&doubt);
+        if doubt.parts == [CalibrationPart::Accelerometer] || doubt.found.is_none() {
+            break;
+        }
+    }
+    eprintln!("calibration in use: {}", recording.calibration_words());
+    settings.filter.calibration = settings.filter.calibration.nearly();
+    Ok(())
+}
+
+/// The run, and beside it, on a second thread if there is one, what the images say against the calibration.
+fn with_calibration_check(
+    recording: &Recording,
+    settings: &RunSettings,
+) -> (Result<TimedRun, VioError>, Option<CalibrationDoubt>) {
+    let check = || {
+        let filter = filter(recording, settings, true).ok()?;
+        check_calibration(&filter, &recording.samples, camera_frames(recording))
+    };
+    if settings.threads < 2 {
+        return (run(recording, settings), check());
+    }
+    std::thread::scope(|scope| {
+        let beside = scope.spawn(check);
+        let timed = run(recording, settings);
+        (timed, beside.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+    })
+}
+
+/// What is doubted of the calibration, and what to do.
+fn calibration_advice(doubt: &CalibrationDoubt) -> String {
+    let way_out = if doubt.parts.contains(&CalibrationPart::CameraOrder) {
+        "exchange the cameras"
+    } else {
+        "run with --calibrate, or calibrate anew"
+    };
+    format!("the images contradict the calibration: {doubt}: {way_out}")
 }
 
 /// The test of the inertial samples; `None` if they are accepted though they fail it.
@@ -164,15 +207,19 @@ fn check_samples(recording: &Recording, gravity: f64, accept: bool) -> Result<Op
     }
 }
 
-/// Why a run failed and, if axes are the cause, which.
-fn with_cause(why: String, recording: &Recording, settings: &RunSettings) -> String {
+/// Why a run failed and, if the calibration or axes are the cause, which.
+fn with_cause(why: String, doubt: Option<&CalibrationDoubt>, recording: &Recording, settings: &RunSettings) -> String {
+    if let Some(doubt) = doubt {
+        return format!("{why}; {}", calibration_advice(doubt));
+    }
     eprintln!("looking for a cause: the inertial sensor is read with other axes");
     let cause = filter(recording, settings, false)
         .ok()
         .and_then(|filter| diagnose_axes(&filter, &recording.samples, camera_frames(recording), settings.threads));
     match cause {
         Some(cause) => format!("{why}; it would go on if {cause}"),
-        None => why,
+        None if settings.filter.calibration.focal_sigma > 0.0 => why,
+        None => format!("{why}; if the calibration may be wrong, --calibrate estimates it"),
     }
 }
 

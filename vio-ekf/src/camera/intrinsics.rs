@@ -40,6 +40,22 @@ impl Camera {
         Self { fx, fy, cx: self.cx + cx, cy: self.cy + cy, distortion, ..*self }
     }
 
+    /// What has to be added to another lens of the same model to get this one.
+    pub(crate) fn intrinsics_less(&self, other: &Self) -> [f64; INTRINSICS] {
+        let terms = |camera: &Self| match camera.distortion {
+            Distortion::None => [0.0; 2],
+            Distortion::RadTan([a, b, ..]) | Distortion::Equidistant([a, b, ..]) => [a, b],
+            Distortion::Omni { radtan: [a, b, ..], .. } => [a, b],
+            Distortion::DoubleSphere(terms) | Distortion::Eucm(terms) => terms,
+        };
+        let numbers = |camera: &Self| {
+            let [first, second] = terms(camera);
+            [camera.fx, camera.fy, camera.cx, camera.cy, first, second]
+        };
+        let (own, others) = (numbers(self), numbers(other));
+        std::array::from_fn(|k| own[k] - others[k])
+    }
+
     /// Derivative of the pixel of a point by the intrinsics.
     pub(crate) fn intrinsics_jacobian(&self, point_in_camera: &Vector3<f64>) -> Option<SMatrix<f64, 2, INTRINSICS>> {
         let pixel = self.project(point_in_camera)?;

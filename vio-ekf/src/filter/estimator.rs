@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
 
+use super::calibration_prior;
 use super::depth_prior;
-use super::lens_prior;
 use super::propagation::propagate::{Workspace, propagate};
 use super::settings::{LandmarkSettings, Settings};
 use super::state::error_state;
@@ -63,18 +63,14 @@ impl Estimator {
             second: None,
             landmarks: Vec::with_capacity(settings.landmarks.max_count),
         };
-        let calibration = &settings.calibration;
-        if calibration.estimates_intrinsics() {
+        if settings.calibration.estimates_intrinsics() {
             state.lens = camera.kalibr().map(Camera::estimable);
             state.second = second.and_then(|second| SecondCamera::new(camera, second));
         }
         let capacity = state.landmark_row(settings.landmarks.max_count);
         let mut covariance = Covariance::new(state.head(), capacity);
-        lens_prior::set_covariance(&mut covariance, &state, calibration);
         set_core_covariance(&mut covariance, &initial.sigma);
-        covariance.set_diagonal3(error_state::CAMERA_POSITION, [calibration.camera_position_sigma_m; 3]);
-        covariance.set_diagonal3(error_state::CAMERA_ATTITUDE, [calibration.camera_attitude_sigma; 3]);
-        covariance.reset_row(error_state::TIME_OFFSET, calibration.time_offset_sigma_s.powi(2));
+        calibration_prior::set_calibration(&mut covariance, &state, settings);
         let shared = settings.landmarks.shared_sigma * settings.landmarks.inverse_distance;
         covariance.reset_row(error_state::DEPTH_PRIOR, shared * shared);
         Self {

@@ -4,6 +4,7 @@ use std::fmt;
 
 use nalgebra::{Isometry3, Matrix3, SMatrix, Unit, Vector2, Vector3};
 
+use crate::camera::Camera;
 use crate::inertial::divergence::DivergenceCause;
 
 /// Whether the estimate can be used.
@@ -43,6 +44,10 @@ pub struct Calibration {
     pub body_from_camera: Isometry3<f64>,
     /// Seconds to add to the camera's stamps to get the inertial sensor's time.
     pub time_offset_s: f64,
+    /// The first camera with the intrinsics that are estimated; `None` where they are not.
+    pub camera: Option<Camera>,
+    /// The second camera likewise; its pose is that which follows from both estimates.
+    pub second_camera: Option<Camera>,
     /// Of the errors of, in this order: position (m), attitude as a rotation vector in **body** axes (rad), time offset (s).
     pub covariance: SMatrix<f64, 7, 7>,
     /// The matrix `A` of the accelerometer, which reads `A⁻¹` of the specific force; the identity where it is not estimated

@@ -2,8 +2,10 @@
 
 use nalgebra::{Matrix3, Unit};
 
+use crate::camera::Camera;
 use crate::camera::model::CameraModel;
 use crate::error::Error;
+use crate::filter::calibration_error::CalibrationError;
 use crate::filter::divergence_monitor::DivergenceMonitor;
 use crate::filter::estimator::Estimator;
 use crate::filter::image_tracking::{
@@ -181,12 +183,22 @@ impl Running {
         Calibration {
             body_from_camera: state.body_from_camera(),
             time_offset_s: state.time_offset,
+            camera: state.lens.map(|lens| Camera { body_from_camera: state.body_from_camera(), ..lens }),
+            second_camera: state.second.map(|second| Camera {
+                body_from_camera: state.body_from_camera() * second.from_first.inverse(),
+                ..second.lens
+            }),
             covariance: covariance.block(error_state::CAMERA_POSITION, error_state::CAMERA_POSITION),
             accel_matrix: state.accel_matrix(),
             accel_matrix_sigma: Matrix3::from_fn(|r, c| {
                 covariance.variance(error_state::ACCEL_MATRIX + 3 * r + c).max(0.0).sqrt()
             }),
         }
+    }
+
+    /// How far the calibration is from what was given.
+    pub(crate) fn calibration_error(&self, sensors: &Sensors) -> CalibrationError {
+        CalibrationError::new(&self.tracking.estimator, sensors.cameras(), &sensors.settings)
     }
 
     /// The landmarks that are followed, as they are estimated at the last image.

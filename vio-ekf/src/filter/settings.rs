@@ -19,7 +19,7 @@ pub use update::UpdateSettings;
 use crate::error::Error;
 use crate::error::invalid;
 use crate::inertial::divergence::DivergenceSettings;
-use crate::inertial::imu_noise_estimator::ImuSettings;
+use crate::inertial::imu_noise_estimator::{AccelMatrixEstimation, ImuSettings};
 
 /// Settings of the filter. The defaults suit a 752x480 camera at 20 Hz and an inertial sensor at 200 Hz.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,6 +65,21 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// The same with a calibration that is known roughly only ([`CalibrationSettings::roughly`]), the accelerometer's too: a filter that
+    /// finds what is wrong.
+    #[must_use]
+    pub fn with_rough_calibration(self) -> Self {
+        Self { calibration: self.calibration.roughly(), ..self }.with_rough_accelerometer()
+    }
+
+    /// The same with an accelerometer whose scale is known to 3 % only.
+    #[must_use]
+    pub fn with_rough_accelerometer(mut self) -> Self {
+        self.imu.accel_matrix = AccelMatrixEstimation::Always;
+        self.imu.accel_scale_sigma = self.imu.accel_scale_sigma.max(0.03);
+        self
+    }
+
     /// Refuses values that no filter can work with.
     pub fn check(&self) -> Result<(), Error> {
         if !(self.gravity > 0.0 && self.gravity < 100.0) {

@@ -6,6 +6,7 @@ use nalgebra::Isometry3;
 
 use crate::camera::model::{CameraModel, check_model};
 use crate::error::{Error, invalid};
+use crate::filter::calibration_error::CalibrationError;
 use crate::filter::frontend::image_frontend::ImageFrontend;
 use crate::filter::initializing::Initializing;
 use crate::filter::measurements::measurement::Measurement;
@@ -276,6 +277,30 @@ impl Vio {
     /// The calibration of camera and accelerometer at the last image; `None` before the initialization.
     pub fn calibration(&self) -> Option<Calibration> {
         self.running().map(Running::calibration)
+    }
+
+    /// Both cameras, if there are two.
+    pub(crate) fn camera_pair(&self) -> Option<[Arc<dyn CameraModel>; 2]> {
+        let second = &self.sensors.stereo.as_ref()?.rig.camera;
+        Some([Arc::clone(&self.sensors.camera), Arc::clone(second)])
+    }
+
+    /// How far the calibration is from what was given; `None` before the initialization.
+    pub(crate) fn calibration_error(&self) -> Option<CalibrationError> {
+        self.running().map(|running| running.calibration_error(&self.sensors))
+    }
+
+    /// A filter of the same sensors that has not started, with other settings.
+    pub(crate) fn with_settings(&self, settings: Settings) -> Result<Self, Error> {
+        settings.check()?;
+        let mut sensors = self.sensors.clone();
+        sensors.settings = settings;
+        Ok(Self { state: State::new(&settings), sensors })
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &Settings {
+        &self.sensors.settings
     }
 
     /// Seconds to add to the camera's stamps, as they are known now.

@@ -7,6 +7,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use crate::error::Error;
 use crate::error::invalid;
 use crate::imu_check::bias_at_rest::bias_at_rest;
+use crate::imu_check::clipping::{ClippedAxis, clipped_axes};
 use crate::imu_check::reading::AxesReading;
 use crate::imu_check::signed_axes::{RADIANS_PER_DEGREE, axis_names, signed_permutations};
 use crate::lie::so3;
@@ -88,6 +89,17 @@ pub enum ImuWarning {
         /// The same with those of the hint, m/s².
         departure_of_hint: f64,
     },
+    /// An axis is cut off: more than its end is not read, and what is missing is missing in velocity and attitude.
+    Clipped {
+        /// `"gyroscope"` or `"accelerometer"`.
+        sensor: &'static str,
+        /// `'x'`, `'y'` or `'z'`.
+        axis: char,
+        /// The end of the range, rad/s or m/s².
+        end: f64,
+        /// Samples there.
+        samples: usize,
+    },
     /// The images agree with another reading ([`check_imu_axes`](crate::imu_check::check_imu_axes)).
     Images {
         /// `"gyroscope"` or `"accelerometer"`.
@@ -95,6 +107,12 @@ pub enum ImuWarning {
         /// The reading.
         reading: AxesReading,
     },
+}
+
+impl From<ClippedAxis> for ImuWarning {
+    fn from(ClippedAxis { sensor, axis, end, samples }: ClippedAxis) -> Self {
+        Self::Clipped { sensor: ["gyroscope", "accelerometer"][sensor], axis: ['x', 'y', 'z'][axis], end, samples }
+    }
 }
 
 impl fmt::Display for ImuWarning {
@@ -109,6 +127,16 @@ impl fmt::Display for ImuWarning {
                 "gravity is {departure:.1} m/s² off when the gyroscope's turns are taken out, and {departure_of_hint:.1} m/s² if \
                  the accelerometer's (x, y, z) were {hint}: a flight that leans as it accelerates, or other axes"
             ),
+            Self::Clipped { sensor, axis, end, samples } => {
+                let (unit, range) =
+                    if *sensor == "gyroscope" { ("rad/s", "gyro_range") } else { ("m/s²", "accel_range") };
+                write!(
+                    f,
+                    "the {sensor} is clipped: {axis} ends at {end:.2} {unit} in {samples} samples, and what is beyond is lost: use a \
+                     larger range, or tell the filter ({range} = {:.2} in [imu] of --settings)",
+                    end.abs()
+                )
+            }
             Self::Images { sensor, reading } => {
                 let [given, read] = reading.unexplained;
                 write!(
@@ -155,7 +183,8 @@ pub fn validate_samples(samples: &[Imu], rate_hz: f64, gravity: f64) -> Result<I
     }
     let gaps = steps.len() - steps.partition_point(|&step| step <= GAP * usual);
     let windows = windows(samples, GAP * usual, &bias_at_rest(samples));
-    let warnings = check_gravity(&windows, gravity)?;
+    let mut warnings = check_gravity(&windows, gravity)?;
+    warnings.extend(clipped_axes(samples).into_iter().map(ImuWarning::from));
     Ok(ImuValidation { rate_hz: measured, gaps, longest_gap_s: steps[steps.len() - 1], warnings })
 }
 

@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::filter::report::FrameReport;
 use crate::inertial::divergence::DivergenceCause;
 use crate::inertial::odometry::Odometry;
+use crate::run::calibration_watch::CalibrationDoubt;
 use crate::stamp::Stamp;
 
 /// What became of an image.
@@ -32,6 +33,9 @@ pub enum Event {
     },
     /// The filter gave up. The segment ends, and the filter tries to start anew.
     Lost(Loss),
+    /// The images contradict the calibration that was given: it should be estimated
+    /// ([`CalibrationSettings`](crate::filter::CalibrationSettings)), or done anew.
+    Doubted(CalibrationDoubt),
     /// An image was not used.
     Skipped(SkippedImage),
 }
@@ -42,6 +46,7 @@ impl fmt::Display for Event {
             Self::Started => f.write_str("a segment begins"),
             Self::Withdrawn { poses } => write!(f, "{poses} poses are taken back"),
             Self::Lost(loss) => write!(f, "lost: {}", loss.reason),
+            Self::Doubted(doubt) => write!(f, "the images contradict the calibration: {doubt}"),
             Self::Skipped(image) => image.fmt(f),
         }
     }

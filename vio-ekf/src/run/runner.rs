@@ -4,6 +4,7 @@ use crate::error::Error;
 use crate::filter::report::{Calibration, FrameReport, Status};
 use crate::filter::vio::Vio;
 use crate::inertial::odometry::Odometry;
+use crate::run::calibration_watch::{CalibrationDoubt, CalibrationWatch};
 use crate::run::frames::{Picture, RecordedFrame};
 use crate::run::outcome::{Event, ImageOutcome, Loss, LossReason, SkipReason, SkippedImage};
 use crate::run::segments::{Estimate, Segments};
@@ -20,11 +21,14 @@ pub struct RunnerSettings {
     /// Whether estimates, losses and skipped images are kept for [`Runner::finish`]. They take 2 kB an image: a robot that runs for days
     /// needs the events only.
     pub keep_history: bool,
+    /// Whether a second filter beside the first, which knows the calibration roughly only, tests it over the first twenty seconds of
+    /// motion. These take three times the processor time.
+    pub watch_calibration: bool,
 }
 
 impl Default for RunnerSettings {
     fn default() -> Self {
-        Self { max_imu_gap_s: 0.5, keep_history: true }
+        Self { max_imu_gap_s: 0.5, keep_history: true, watch_calibration: true }
     }
 }
 
@@ -58,6 +62,8 @@ impl Default for RunnerSettings {
 #[derive(Debug, Clone)]
 pub struct Runner {
     vio: Vio,
+    watch: Option<CalibrationWatch>,
+    doubt: Option<CalibrationDoubt>,
     settings: RunnerSettings,
     latest_sample: Option<Stamp>,
     latest_image: Option<Stamp>,
@@ -80,6 +86,8 @@ impl Runner {
     /// Around a filter that has not started yet.
     pub fn new(vio: Vio, settings: RunnerSettings) -> Self {
         Self {
+            watch: CalibrationWatch::beside(&vio).filter(|_| settings.watch_calibration),
+            doubt: None,
             vio,
             settings,
             latest_sample: None,
@@ -128,6 +136,9 @@ impl Runner {
         let interrupts = gap_s > self.settings.max_imu_gap_s && self.vio.output().is_some();
         let event = interrupts.then(|| self.end_segment(sample.stamp, LossReason::ImuGap { gap_s }));
         self.vio.imu(sample)?;
+        if let Some(watch) = &mut self.watch {
+            watch.imu(sample);
+        }
         self.latest_sample = Some(sample.stamp);
         self.imu_samples += 1;
         Ok(event)
@@ -153,7 +164,11 @@ impl Runner {
     /// # Errors
     /// [`Error::ImageSize`] if the first image is not of the camera's size: then it is the calibration that is wrong.
     pub fn image(&mut self, stamp: Stamp, image: &ImageView) -> Result<ImageOutcome, Error> {
-        self.take(stamp, image.width, image.height, |vio| vio.image(stamp, image))
+        let mut outcome = self.take(stamp, image.width, image.height, |vio| vio.image(stamp, image))?;
+        if outcome.report.is_some() {
+            outcome.events.extend(self.watch_calibration(stamp, image, None));
+        }
+        Ok(outcome)
     }
 
     /// Takes the images that both cameras took at the same moment.
@@ -163,7 +178,10 @@ impl Runner {
     /// always: give the first alone.
     pub fn image_pair(&mut self, stamp: Stamp, first: &ImageView, second: &ImageView) -> Result<ImageOutcome, Error> {
         let frames = self.frames;
-        let outcome = self.take(stamp, first.width, first.height, |vio| vio.image_pair(stamp, first, second))?;
+        let mut outcome = self.take(stamp, first.width, first.height, |vio| vio.image_pair(stamp, first, second))?;
+        if outcome.report.is_some() {
+            outcome.events.extend(self.watch_calibration(stamp, first, Some(second)));
+        }
         self.pairs += self.frames - frames;
         Ok(outcome)
     }
@@ -211,7 +229,9 @@ impl Runner {
             };
             return Err(Error::NeverStarted { why });
         };
+        let doubt = self.doubt.or_else(|| self.watch?.finish());
         Ok(Run {
+            doubt,
             images_span: self.span.unwrap_or((first_image, first_image)),
             initialization_time_s: first_pose.secs_since(first_image).max(0.0),
             frames: self.frames,
@@ -286,6 +306,14 @@ impl Runner {
             self.calibration = self.vio.calibration();
         }
         ImageOutcome { report: Some(report), odometry, events }
+    }
+
+    /// Gives images that were taken to the second filter as well.
+    fn watch_calibration(&mut self, stamp: Stamp, first: &ImageView, second: Option<&ImageView>) -> Option<Event> {
+        let found = self.watch.as_mut()?.images(stamp, first, second)?;
+        self.watch = None;
+        self.doubt = found;
+        self.doubt.clone().map(Event::Doubted)
     }
 
     fn withdraw(&mut self, count: usize) -> Option<Event> {

@@ -4,6 +4,7 @@ use nalgebra::Matrix3;
 
 use crate::error::Error;
 use crate::filter::report::Calibration;
+use crate::run::calibration_watch::CalibrationDoubt;
 use crate::run::outcome::{Loss, SkippedImage};
 use crate::run::segments::Segment;
 use crate::stamp::Stamp;
@@ -33,6 +34,8 @@ pub struct Run {
     pub withdrawn: usize,
     /// Whether it runs at the end.
     pub tracking_at_end: bool,
+    /// What of the given calibration the images contradict.
+    pub doubt: Option<CalibrationDoubt>,
     /// The camera's calibration at the end.
     pub calibration: Calibration,
 }

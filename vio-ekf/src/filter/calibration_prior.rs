@@ -1,8 +1,9 @@
-//! What is known of lenses and of the second camera before the images tell.
+//! What is known of the calibration before the images tell.
 
 use crate::camera::Camera;
 use crate::camera::model::CameraModel;
-use crate::filter::settings::CalibrationSettings;
+use crate::filter::accel_matrix_selection::prior_sigma;
+use crate::filter::settings::{CalibrationSettings, Settings};
 use crate::filter::state::error_state;
 use crate::filter::state::vio_state::{SecondCamera, VioState};
 use crate::inertial::covariance::Covariance;
@@ -20,8 +21,21 @@ impl SecondCamera {
     }
 }
 
-/// Sets the covariance of what is estimated of the lenses.
-pub(crate) fn set_covariance(covariance: &mut Covariance, state: &VioState, settings: &CalibrationSettings) {
+/// Sets the covariance of all that is estimated of the calibration.
+pub(crate) fn set_calibration(covariance: &mut Covariance, state: &VioState, settings: &Settings) {
+    let Settings { calibration, imu, .. } = settings;
+    covariance.set_diagonal3(error_state::CAMERA_POSITION, [calibration.camera_position_sigma_m; 3]);
+    covariance.set_diagonal3(error_state::CAMERA_ATTITUDE, [calibration.camera_attitude_sigma; 3]);
+    covariance.reset_row(error_state::TIME_OFFSET, calibration.time_offset_sigma_s.powi(2));
+    if state.accel_matrix.is_some() {
+        for (entry, sigma) in prior_sigma(imu).iter().enumerate() {
+            covariance.reset_row(error_state::ACCEL_MATRIX + entry, sigma * sigma);
+        }
+    }
+    set_lenses(covariance, state, calibration);
+}
+
+fn set_lenses(covariance: &mut Covariance, state: &VioState, settings: &CalibrationSettings) {
     if let Some(lens) = &state.lens {
         set_lens(covariance, error_state::INTRINSICS, lens, settings);
     }

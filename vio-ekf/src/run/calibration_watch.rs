@@ -1,0 +1,311 @@
+//! A second filter beside the first that knows the calibration roughly only, and tells whether it is what was given.
+
+use std::fmt;
+
+use nalgebra::UnitQuaternion;
+
+use crate::camera::Camera;
+use crate::filter::report::{Calibration, Status};
+use crate::filter::settings::CalibrationSettings;
+use crate::filter::state::error_state;
+use crate::filter::vio::Vio;
+use crate::format::calibration::CameraCalibration;
+use crate::run::calibration_evidence::contradicted;
+use crate::run::frames::{Picture, RecordedFrame};
+use crate::run::pair_order::PairOrder;
+use crate::samples::{ImageView, Imu};
+use crate::stamp::Stamp;
+
+/// Images with landmarks in motion after which it speaks.
+const IMAGES: usize = 400;
+/// With fewer it does not, if a run ends before.
+const FEWEST: usize = 100;
+/// Growth of the logarithm of the evidence that frees a part: ours.
+const ENOUGH: f64 = 10.0;
+/// Starts of the second filter, each after a divergence.
+const STARTS: usize = 3;
+
+/// A part of a calibration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum CalibrationPart {
+    /// Which images are of which of two cameras.
+    CameraOrder,
+    /// Angles of the camera on the body.
+    CameraAttitude,
+    /// Place of the camera on the body.
+    CameraPosition,
+    /// Offset of the camera's clock.
+    Clock,
+    /// Scale and axes of the accelerometer.
+    Accelerometer,
+    /// Focal length.
+    FocalLength,
+    /// Principal point.
+    PrincipalPoint,
+    /// First terms of the distortion.
+    Distortion,
+    /// Focal length of the second camera.
+    SecondFocalLength,
+    /// Its principal point.
+    SecondPrincipalPoint,
+    /// Its distortion.
+    SecondDistortion,
+    /// Pose of one camera against the other.
+    StereoPose,
+}
+
+use CalibrationPart as Part;
+
+/// Rows of each part.
+const PARTS: [(Part, usize, usize); 11] = [
+    (Part::CameraAttitude, error_state::CAMERA_ATTITUDE, 3),
+    (Part::CameraPosition, error_state::CAMERA_POSITION, 3),
+    (Part::Clock, error_state::TIME_OFFSET, 1),
+    (Part::Accelerometer, error_state::ACCEL_MATRIX, error_state::MATRIX_SIZE),
+    (Part::FocalLength, error_state::INTRINSICS, 2),
+    (Part::PrincipalPoint, error_state::INTRINSICS + 2, 2),
+    (Part::Distortion, error_state::INTRINSICS + 4, 2),
+    (Part::SecondFocalLength, error_state::SECOND_INTRINSICS, 2),
+    (Part::SecondPrincipalPoint, error_state::SECOND_INTRINSICS + 2, 2),
+    (Part::SecondDistortion, error_state::SECOND_INTRINSICS + 4, 2),
+    (Part::StereoPose, error_state::SECOND_ATTITUDE, 6),
+];
+
+/// What is wrong with both cameras of a pair as easily as with one.
+const BOTH: [[Part; 2]; 3] = [
+    [Part::FocalLength, Part::SecondFocalLength],
+    [Part::PrincipalPoint, Part::SecondPrincipalPoint],
+    [Part::Distortion, Part::SecondDistortion],
+];
+
+/// What of the calibration the images contradict.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CalibrationDoubt {
+    /// The parts, the most certain first; not empty.
+    pub parts: Vec<CalibrationPart>,
+    /// All that was found, whether it is doubted or not; `None` where the images alone tell.
+    pub found: Option<Calibration>,
+    /// What has to be added to the offset of the camera's clock, s.
+    clock_change_s: f64,
+    /// In words, with what was found.
+    words: String,
+}
+
+impl CalibrationDoubt {
+    /// Puts what was found in place of what is doubted, and leaves the rest. Of one camera or two.
+    pub fn correct(&self, cameras: &mut [CameraCalibration]) {
+        let Some(found) = &self.found else { return };
+        let doubted = |part: Part| self.parts.contains(&part);
+        let Some(first) = cameras.first() else { return };
+        let before = first.camera.body_from_camera;
+        let mut after = before;
+        if doubted(Part::CameraAttitude) {
+            after.rotation = found.body_from_camera.rotation;
+        }
+        if doubted(Part::CameraPosition) {
+            after.translation = found.body_from_camera.translation;
+        }
+        let parts = [
+            (found.camera, [Part::FocalLength, Part::PrincipalPoint, Part::Distortion]),
+            (found.second_camera, [Part::SecondFocalLength, Part::SecondPrincipalPoint, Part::SecondDistortion]),
+        ];
+        for (index, (calibration, (lens, [focal, centre, distortion]))) in cameras.iter_mut().zip(parts).enumerate() {
+            let camera = &mut calibration.camera;
+            // A rig is moved as a whole, unless how its cameras stand to each other is doubted too.
+            let first_from_this = before.inverse() * camera.body_from_camera;
+            camera.body_from_camera = if index == 0 { after } else { after * first_from_this };
+            if doubted(Part::Clock) {
+                calibration.time_offset_s += self.clock_change_s;
+            }
+            let Some(lens) = lens else { continue };
+            if index == 1 && doubted(Part::StereoPose) {
+                camera.body_from_camera = after * found.body_from_camera.inverse() * lens.body_from_camera;
+            }
+            if doubted(focal) {
+                (camera.fx, camera.fy) = (lens.fx, lens.fy);
+            }
+            if doubted(centre) {
+                (camera.cx, camera.cy) = (lens.cx, lens.cy);
+            }
+            if doubted(distortion) {
+                camera.distortion = lens.distortion;
+            }
+        }
+    }
+}
+
+impl fmt::Display for CalibrationDoubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.words)
+    }
+}
+
+/// The second filter.
+#[derive(Debug, Clone)]
+pub(super) struct CalibrationWatch {
+    vio: Vio,
+    order: Option<PairOrder>,
+    images: usize,
+    starts: usize,
+}
+
+impl CalibrationWatch {
+    /// Beside a filter; `None` where that estimates its calibration itself, or has no lens that can be estimated.
+    pub(super) fn beside(vio: &Vio) -> Option<Self> {
+        let given = vio.settings();
+        vio.camera().kalibr()?;
+        let sure = CalibrationSettings {
+            time_offset_s: given.calibration.time_offset_s,
+            row_time_s: given.calibration.row_time_s,
+            ..CalibrationSettings::default()
+        };
+        if given.calibration != sure {
+            return None;
+        }
+        let order = vio.camera_pair().map(|cameras| PairOrder::new(cameras, *given));
+        let vio = vio.with_settings(given.with_rough_calibration()).ok()?;
+        Some(Self { vio, order, images: 0, starts: 1 })
+    }
+
+    pub(super) fn imu(&mut self, sample: &Imu) {
+        // What is refused is told by the first filter.
+        let _ = self.vio.imu(sample);
+    }
+
+    /// Gives it the images of a time; what it finds once it has seen enough, after which it is not needed any more.
+    pub(super) fn images(
+        &mut self,
+        stamp: Stamp,
+        first: &ImageView,
+        second: Option<&ImageView>,
+    ) -> Option<Option<CalibrationDoubt>> {
+        if let (Some(order), Some(second)) = (&mut self.order, second)
+            && let Some([given, exchanged]) = order.pair(first, second)
+        {
+            let words = format!(
+                "the images of the two cameras are exchanged: of the corners {given} are found in the other image as they are given, \
+                 {exchanged} the other way round"
+            );
+            let parts = vec![Part::CameraOrder];
+            return Some(Some(CalibrationDoubt { parts, found: None, clock_change_s: 0.0, words }));
+        }
+        let given = match second {
+            Some(second) => self.vio.image_pair(stamp, first, second),
+            None => self.vio.image(stamp, first),
+        };
+        // What it cannot take is told by the first filter.
+        let report = given.ok()?;
+        match report.status {
+            Status::Diverged(_) if self.starts == STARTS => return Some(None),
+            Status::Diverged(_) => {
+                self.vio.reset();
+                (self.starts, self.images) = (self.starts + 1, 0);
+            }
+            Status::Uninitialised(_) => self.images = 0,
+            _ => self.images += usize::from(report.used > 0 && !report.stationary),
+        }
+        (self.images >= IMAGES).then(|| self.doubt())
+    }
+
+    /// What it has found so far.
+    pub(super) fn finish(&self) -> Option<CalibrationDoubt> {
+        if self.images < FEWEST { None } else { self.doubt() }
+    }
+
+    fn doubt(&self) -> Option<CalibrationDoubt> {
+        let found = self.vio.calibration_error()?;
+        let rows = |(_, first, count): &(Part, usize, usize)| (*first..first + count).collect::<Vec<usize>>();
+        let estimated = |part: &&(Part, usize, usize)| found.prior.get((part.1, part.1)).is_some_and(|v| *v > 0.0);
+        let parts: Vec<&(Part, usize, usize)> = PARTS.iter().filter(estimated).collect();
+        let groups: Vec<Vec<usize>> = parts.iter().map(|part| rows(part)).collect();
+        let named: Vec<Part> = parts.iter().map(|part| part.0).collect();
+        let single = (0..groups.len()).map(|k| vec![k]);
+        let both =
+            BOTH.iter().filter_map(|both| both.iter().map(|part| named.iter().position(|p| p == part)).collect());
+        let steps: Vec<Vec<usize>> = single.chain(both).collect();
+        let chosen = contradicted(&found.error, (&found.posterior, &found.prior), (&groups, &steps), ENOUGH);
+        let parts: Vec<Part> = chosen.into_iter().map(|k| named[k]).collect();
+        if parts.is_empty() {
+            return None;
+        }
+        let words: Vec<String> = parts.iter().map(|part| self.describe(*part)).collect();
+        let clock_change_s = found.error[error_state::TIME_OFFSET];
+        Some(CalibrationDoubt { parts, found: self.vio.calibration(), clock_change_s, words: words.join("; ") })
+    }
+
+    fn describe(&self, part: CalibrationPart) -> String {
+        let Some(found) = self.vio.calibration() else { return String::new() };
+        let camera = self.vio.camera();
+        let second = self.vio.second_camera().ok();
+        let focal = |name: &str, given: Option<Camera>, found: Option<Camera>| match (given, found) {
+            (Some(given), Some(found)) => {
+                format!("{name} {:.1}, {:.1} px, found {:.1}, {:.1}", given.fx, given.fy, found.fx, found.fy)
+            }
+            _ => name.to_owned(),
+        };
+        let centre = |name: &str, given: Option<Camera>, found: Option<Camera>| match (given, found) {
+            (Some(given), Some(found)) => {
+                format!("{name} ({:.1}, {:.1}), found ({:.1}, {:.1})", given.cx, given.cy, found.cx, found.cy)
+            }
+            _ => name.to_owned(),
+        };
+        let distortion = |name: &str, given: Option<Camera>, found: Option<Camera>| match (given, found) {
+            (Some(given), Some(found)) => format!("{name} {:?}, found {:.3?}", given.distortion, found.distortion),
+            _ => name.to_owned(),
+        };
+        let (given, others) = (camera.kalibr(), second.and_then(crate::camera::CameraModel::kalibr));
+        let (lens, other) = (found.camera, found.second_camera);
+        match part {
+            Part::CameraOrder => "order of the cameras".into(),
+            Part::CameraAttitude => {
+                let turned: UnitQuaternion<f64> =
+                    found.body_from_camera.rotation * camera.body_from_camera().rotation.inverse();
+                format!("attitude of the camera on the body, found {:.1} degrees off", turned.angle().to_degrees())
+            }
+            Part::CameraPosition => {
+                let moved = found.body_from_camera.translation.vector - camera.body_from_camera().translation.vector;
+                format!("place of the camera on the body, found {:.0} mm off", 1e3 * moved.norm())
+            }
+            Part::Clock => {
+                let given = self.vio.settings().calibration.time_offset_s;
+                format!("clock of the camera, offset {:.1} ms, found {:.1}", 1e3 * given, 1e3 * found.time_offset_s)
+            }
+            Part::Accelerometer => "scale or axes of the accelerometer".into(),
+            Part::FocalLength => focal("focal lengths", given, lens),
+            Part::PrincipalPoint => centre("principal point", given, lens),
+            Part::Distortion => distortion("distortion", given, lens),
+            Part::SecondFocalLength => focal("focal lengths of the second camera", others, other),
+            Part::SecondPrincipalPoint => centre("principal point of the second camera", others, other),
+            Part::SecondDistortion => distortion("distortion of the second camera", others, other),
+            Part::StereoPose => "pose of the second camera against the first".into(),
+        }
+    }
+}
+
+/// What the first twenty seconds of motion of a recording say against the calibration of a filter that has not started: as a
+/// [`Runner`](crate::run::Runner) does it beside the filter, by itself.
+pub fn check_calibration<P: Picture>(
+    vio: &Vio,
+    samples: &[Imu],
+    frames: impl IntoIterator<Item = RecordedFrame<P>>,
+) -> Option<CalibrationDoubt> {
+    let mut watch = CalibrationWatch::beside(vio)?;
+    let mut samples = samples.iter();
+    for RecordedFrame { stamp, picture, second } in frames {
+        let Ok(picture) = picture else { continue };
+        let time = stamp.plus_secs(watch.vio.time_offset_s());
+        for sample in samples.by_ref() {
+            watch.imu(sample);
+            if sample.stamp >= time {
+                break;
+            }
+        }
+        let second = second.and_then(Result::ok);
+        let seen = watch.images(stamp, &picture.view(), second.as_ref().map(Picture::view).as_ref());
+        if let Some(found) = seen {
+            return found;
+        }
+    }
+    watch.finish()
+}
