@@ -7,7 +7,7 @@ pub(crate) mod images;
 mod records;
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read as _};
 use std::path::Path;
 
 use mcap::Message;
@@ -30,6 +30,9 @@ pub(crate) fn messages_of(
     path: &Path,
 ) -> Result<impl Iterator<Item = Result<Message<'static>, MessagesFault>> + Send + use<>, MessagesFault> {
     let file = File::open(path).map_err(MessagesFault::Unreadable)?;
+    if let Some(way_out) = other_format(path) {
+        return Err(MessagesFault::Malformed(way_out));
+    }
     // A record that claims to be longer than the file asks for memory that is not there.
     let most = usize::try_from(file.metadata().map_err(MessagesFault::Unreadable)?.len()).unwrap_or(usize::MAX);
     let options = LinearReaderOptions::default().with_record_length_limit(most).with_validate_chunk_crcs(true);
@@ -37,6 +40,29 @@ pub(crate) fn messages_of(
     reader.add_decompressor(Zstd::new()).map_err(|e| broken(&e))?;
     reader.add_decompressor(Lz4::new()).map_err(|e| broken(&e))?;
     Ok(reader.map(|message| message.map_err(|e| broken(&e))))
+}
+
+/// What to do with a recording that is no MCAP file; `None` if it may be one.
+fn other_format(path: &Path) -> Option<String> {
+    let convert = |what: &str, source: &Path| {
+        let name = source.file_stem().unwrap_or_default().to_string_lossy();
+        let source = source.display();
+        Some(format!(
+            "{what}, no MCAP file: convert it with `pip install rosbags` and `rosbags-convert --src {source} --dst {name}_mcap \
+             --dst-storage mcap`, then give {name}_mcap/{name}_mcap.mcap"
+        ))
+    };
+    if path.is_dir() {
+        return Some("a folder, no MCAP file: name the .mcap file in it".into());
+    }
+    let mut head = [0; 16];
+    File::open(path).ok()?.read_exact(&mut head).ok()?;
+    if head.starts_with(b"#ROSBAG V") {
+        return convert("a bag of ROS 1", path);
+    }
+    // The folder holds the list of topics.
+    let folder = path.parent().filter(|folder| folder.join("metadata.yaml").exists()).unwrap_or(path);
+    if head == *b"SQLite format 3\0" { convert("a bag of ROS 2 in SQLite", folder) } else { None }
 }
 
 fn broken(error: &mcap::McapError) -> MessagesFault {

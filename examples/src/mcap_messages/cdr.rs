@@ -53,7 +53,7 @@ pub(crate) struct CameraInfo {
     pub(crate) header: Header,
     pub(crate) height: u32,
     pub(crate) width: u32,
-    pub(crate) _distortion_model: String,
+    pub(crate) distortion_model: String,
     pub(crate) d: Vec<f64>,
     /// Row by row.
     pub(crate) k: [f64; 9],

@@ -39,6 +39,12 @@ pub(super) struct Track {
     /// MCAP file with images, inertial samples and, unless given by files of Kalibr, calibration
     #[arg(long, value_name = "FILE")]
     pub(super) mcap: Option<PathBuf>,
+    /// Topic of the images in the MCAP file, with --stereo given twice [default: the first that are no depth and fit the calibration]
+    #[arg(long, value_name = "TOPIC", requires = "mcap")]
+    pub(super) camera_topic: Vec<String>,
+    /// Topic of the inertial samples in the MCAP file [default: the first with rates and forces]
+    #[arg(long, value_name = "TOPIC", requires = "mcap")]
+    pub(super) imu_topic: Option<String>,
     /// Kalibr's camera chain, instead of the recording's own calibration
     #[arg(long, value_name = "YAML")]
     pub(super) cameras: Option<PathBuf>,

@@ -40,6 +40,14 @@ pub enum VioError {
         /// What is missing, and what to do.
         why: String,
     },
+    /// The recording is readable, but its pictures cannot be used.
+    #[error("{recording}: {why}")]
+    Pictures {
+        /// Folder or file.
+        recording: String,
+        /// What is wrong with them.
+        why: String,
+    },
     /// The library refused.
     #[error(transparent)]
     Library(#[from] vio_ekf::Error),

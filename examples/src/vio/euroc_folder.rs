@@ -20,6 +20,10 @@ pub struct Overrides {
     pub imu: Option<PathBuf>,
     /// True poses, TUM or EuRoC text.
     pub truth: Option<PathBuf>,
+    /// Topics of the first and the second camera in an MCAP file.
+    pub camera_topics: Vec<String>,
+    /// Topic of the inertial sensor there.
+    pub imu_topic: Option<String>,
 }
 
 /// Opens a folder that holds `mav0`, or is it. Images are read later.
@@ -48,6 +52,7 @@ pub fn open_euroc(folder: &Path, overrides: &Overrides) -> Result<Recording, Vio
         second: None,
         truth,
         unused: Vec::new(),
+        assumed: Vec::new(),
         mask: None,
     })
 }

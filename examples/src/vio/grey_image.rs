@@ -39,7 +39,14 @@ impl GreyImage {
         Self::decoded(bytes).map_err(|error| format!("no PNG or JPEG image ({error})"))
     }
 
-    fn decoded(bytes: &[u8]) -> Result<Self, ImageError> {
+    fn decoded(bytes: &[u8]) -> Result<Self, String> {
+        if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
+            return Err("WebP is not read: convert the images to PNG or JPEG, `mogrify -format png *.webp`".into());
+        }
+        Self::decoded_by_format(bytes).map_err(|error| error.to_string())
+    }
+
+    fn decoded_by_format(bytes: &[u8]) -> Result<Self, ImageError> {
         let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
         // A file that claims more pixels than its bytes can hold asks for no memory.
         let mut limits = Limits::default();

@@ -1,7 +1,9 @@
 //! Recordings as MCAP: images as Foxglove or ROS 2 has them, inertial samples as ROS 2 has them.
 
 mod fields;
+mod frames;
 mod pixels;
+mod topics;
 
 use std::path::{Path, PathBuf};
 
@@ -19,17 +21,20 @@ use super::euroc_folder::{Overrides, read_truth};
 use super::grey_image::GreyImage;
 use super::mcap_out::NOISE_SCHEMA;
 use super::recording::{GroundTruth, Images, Recording, SecondCamera};
-use crate::mcap_messages::fields::{isometry, stamp};
-use crate::mcap_messages::images::image_header;
+use crate::mcap_messages::cdr;
+use crate::mcap_messages::fields::{isometry, isometry_of, stamp};
+use crate::mcap_messages::images::{self, image_header};
 use crate::mcap_messages::{MessagesFault, messages_of, schema_of};
-use fields::{imu, noise};
+use fields::noise;
+use frames::StillFrames;
 use pixels::image;
+use topics::{ImageTopic, ImuTopic, choose_imu, order_images};
 
 /// Opens an MCAP file: one pass for everything but the images, which are read later, one by one.
 ///
-/// The first topic with images and the first with inertial samples are taken. The camera's calibration comes from
-/// `foxglove.CameraCalibration` and a `foxglove.FrameTransform` from the inertial sensor's frame to the camera's, the noise from
-/// our own message; files of Kalibr take their place.
+/// The topics that are named are taken; otherwise the first with images that are no depth and fit the calibration, and the first
+/// with rates and forces. The camera's calibration comes from `foxglove.CameraCalibration` or `sensor_msgs/msg/CameraInfo` and the
+/// transforms between the frames of both sensors, the noise from our own message; files of Kalibr take their place.
 ///
 /// # Errors
 /// [`VioError`] names what the file lacks, or what cannot be read.
@@ -50,46 +55,66 @@ fn open(path: &Path, overrides: &Overrides, stereo: bool) -> Result<Recording, V
     for message in messages_of(path).map_err(|why| fault(path, &why))? {
         found.take(&message.map_err(|why| fault(path, &why))?).map_err(|why| VioError::malformed(path, &why))?;
     }
-    let lacks = |what: &str| VioError::malformed(path, &what);
-    if found.images.is_empty() {
+    let lacks = |what: String| VioError::malformed(path, &what);
+    let Found { imus, images, cameras, frames, noise, truth: poses } = found;
+    if images.is_empty() {
         return Err(lacks(
             "no topic with images: expected foxglove.RawImage, foxglove.CompressedImage, sensor_msgs/msg/Image or \
-               sensor_msgs/msg/CompressedImage",
+             sensor_msgs/msg/CompressedImage"
+                .into(),
         ));
     }
-    if stereo && found.images.len() < 2 {
-        return Err(lacks(&format!("one topic with images only, `{}`: --stereo needs two", found.images[0].topic)));
+    if stereo && images.len() < 2 {
+        return Err(lacks(format!("one topic with images only, `{}`: --stereo needs two", images[0].topic)));
     }
-    if found.samples.is_empty() {
-        return Err(lacks("no topic with inertial samples: expected sensor_msgs/msg/Imu in CDR"));
-    }
-    let (cameras, imu) = found.calibrations(path, overrides, if stereo { 2 } else { 1 })?;
-    let unused = found.images.iter().skip(cameras.len()).map(|images| images.topic.clone()).collect();
-    let mut images = found.images.into_iter().map(|ImageTopic { topic, stamps, .. }| Images::Mcap {
+    let (sensor, mut unused) = choose_imu(imus, overrides.imu_topic.as_deref()).map_err(lacks)?;
+    let chain = overrides.cameras.as_deref().map(|file| (file, kalibr_chain(file)));
+    let chain = chain.map(|(file, chain)| chain.map(|chain| (file, chain))).transpose()?;
+    let size =
+        chain.as_ref().and_then(|(_, chain)| chain.first()).map(|first| (first.camera.width, first.camera.height));
+    let images = order_images(images, &overrides.camera_topics, size).map_err(lacks)?;
+    let known = Known { cameras, frames, noise, imu_frame: &sensor.frame };
+    let count = if stereo { 2 } else { 1 };
+    let (imu, time_offset_s, assumed) = known.imu(&sensor.samples, overrides)?;
+    let cameras = match chain {
+        Some((file, chain)) if chain.len() < count => return Err(VioError::malformed(file, &"holds one camera only")),
+        Some((_, mut chain)) => {
+            chain.truncate(count);
+            chain
+        }
+        None => known.cameras(path, &images[..count], time_offset_s)?,
+    };
+    let others = images.iter().skip(count).map(ImageTopic::describe);
+    unused.splice(0..0, others);
+    let mut images = images.into_iter().map(|ImageTopic { topic, stamps, .. }| Images::Mcap {
         path: path.to_path_buf(),
         topic,
         stamps,
     });
     let truth = match &overrides.truth {
         Some(path) => Some(read_truth(path)?),
-        None => (!found.truth.is_empty())
-            .then_some(GroundTruth { trajectory: found.truth, velocities_in_world: Vec::new() }),
+        None => (!poses.is_empty()).then_some(GroundTruth { trajectory: poses, velocities_in_world: Vec::new() }),
     };
     let name = path.display().to_string();
-    let first = images.next().ok_or_else(|| lacks("no images"))?;
+    let first = images.next().ok_or_else(|| lacks("no images".into()))?;
     let second =
         cameras.get(1).zip(images.next()).map(|(second, images)| SecondCamera { camera: second.camera, images });
     Ok(Recording {
         name,
         camera: cameras[0],
         imu,
-        samples: found.samples,
+        samples: sensor.samples,
         images: first,
         second,
         truth,
         unused,
+        assumed,
         mask: None,
     })
+}
+
+fn kalibr_chain(file: &Path) -> Result<Vec<CameraCalibration>, VioError> {
+    calibration::read_kalibr_cameras(&read_text(file)?).map_err(|error| VioError::malformed(file, &error))
 }
 
 /// The images of a topic in the order of the file, with their stamps.
@@ -119,24 +144,15 @@ fn fault(path: &Path, fault: &MessagesFault) -> VioError {
     }
 }
 
-/// Images of one camera.
-struct ImageTopic {
-    topic: String,
-    frame: String,
-    stamps: Vec<Stamp>,
-}
-
 /// Everything but the images.
 #[derive(Default)]
 struct Found {
-    samples: Vec<Imu>,
-    imu_topic: Option<String>,
-    imu_frame: String,
-    /// In the order in which they appear.
+    /// In the order in which they appear, as the next.
+    imus: Vec<ImuTopic>,
     images: Vec<ImageTopic>,
     /// One for each frame.
     cameras: Vec<messages::CameraCalibration>,
-    frames: Vec<FrameTransform>,
+    frames: StillFrames,
     noise: Option<(ImuNoise, f64, f64)>,
     truth: Trajectory,
 }
@@ -147,32 +163,47 @@ impl Found {
         let name = schema_of(message);
         let bad = || format!("topic {topic}: a {name} that cannot be decoded");
         match name {
-            "sensor_msgs/msg/Imu" if self.imu_topic.get_or_insert_with(|| topic.clone()) == topic => {
-                let (sample, frame) = imu(data).ok_or_else(bad)?;
-                // Drivers repeat samples; a stamp that goes back is another matter.
-                if self.samples.last().is_none_or(|last| last.stamp != sample.stamp) {
-                    self.samples.push(sample);
-                }
-                self.imu_frame = frame;
+            "sensor_msgs/msg/Imu" => {
+                let index = self.imus.iter().position(|imu| imu.topic == *topic);
+                let index = index.unwrap_or_else(|| {
+                    self.imus.push(ImuTopic::new(topic));
+                    self.imus.len() - 1
+                });
+                self.imus[index].take(data);
             }
-            "foxglove.RawImage"
-            | "foxglove.CompressedImage"
-            | "sensor_msgs/msg/Image"
-            | "sensor_msgs/msg/CompressedImage" => {
-                let Some((stamp, frame)) = image_header(name, data) else { return Ok(()) };
+            _ if images::SCHEMAS.contains(&name) => {
                 match self.images.iter_mut().find(|images| images.topic == *topic) {
-                    Some(images) => images.stamps.push(stamp),
-                    None => self.images.push(ImageTopic { topic: topic.clone(), frame, stamps: vec![stamp] }),
+                    Some(images) => images.stamps.extend(image_header(name, data).map(|header| header.0)),
+                    None => self.images.extend(ImageTopic::new(message)),
                 }
             }
             "foxglove.CameraCalibration" => {
-                let camera = messages::CameraCalibration::decode(data).map_err(|_| bad())?;
-                self.cameras.retain(|other| other.frame_id != camera.frame_id);
-                self.cameras.push(camera);
+                self.add_camera(messages::CameraCalibration::decode(data).map_err(|_| bad())?);
             }
-            "foxglove.FrameTransform" => self.frames.push(FrameTransform::decode(data).map_err(|_| bad())?),
-            "foxglove.FrameTransforms" if self.frames.len() < 1000 => {
-                self.frames.extend(FrameTransforms::decode(data).map_err(|_| bad())?.transforms);
+            "sensor_msgs/msg/CameraInfo" => {
+                let info: cdr::CameraInfo = cdr::decode(data).ok_or_else(bad)?;
+                self.add_camera(messages::CameraCalibration {
+                    frame_id: info.header.frame_id,
+                    width: info.width,
+                    height: info.height,
+                    distortion_model: info.distortion_model,
+                    d: info.d,
+                    k: info.k.to_vec(),
+                    ..messages::CameraCalibration::default()
+                });
+            }
+            "foxglove.FrameTransform" => self.add_frame(FrameTransform::decode(data).map_err(|_| bad())?),
+            "foxglove.FrameTransforms" => {
+                let all = FrameTransforms::decode(data).map_err(|_| bad())?.transforms;
+                all.into_iter().for_each(|frame| self.add_frame(frame));
+            }
+            "tf2_msgs/msg/TFMessage" => {
+                let transforms: Vec<cdr::TransformStamped> = cdr::decode(data).ok_or_else(bad)?;
+                for frame in transforms {
+                    if let Some(pose) = isometry_of(frame.translation, frame.rotation) {
+                        self.frames.add(&frame.header.frame_id, &frame.child_frame_id, pose);
+                    }
+                }
             }
             "foxglove.PoseInFrame" if topic == "/truth" => {
                 let message = PoseInFrame::decode(data).map_err(|_| bad())?;
@@ -186,35 +217,56 @@ impl Found {
         Ok(())
     }
 
-    fn calibrations(
-        &self,
-        path: &Path,
-        overrides: &Overrides,
-        count: usize,
-    ) -> Result<(Vec<CameraCalibration>, ImuCalibration), VioError> {
-        let (noise, rate_hz, time_offset_s) = match &overrides.imu {
-            Some(file) => {
+    /// The latest of a frame counts.
+    fn add_camera(&mut self, camera: messages::CameraCalibration) {
+        self.cameras.retain(|other| other.frame_id != camera.frame_id);
+        self.cameras.push(camera);
+    }
+
+    fn add_frame(&mut self, frame: FrameTransform) {
+        if let Some(pose) = frame.translation.and_then(|moved| isometry(Some(moved), frame.rotation)) {
+            self.frames.add(&frame.parent_frame_id, &frame.child_frame_id, pose);
+        }
+    }
+}
+
+/// What the file says of the sensors.
+struct Known<'a> {
+    cameras: Vec<messages::CameraCalibration>,
+    frames: StillFrames,
+    noise: Option<(ImuNoise, f64, f64)>,
+    imu_frame: &'a str,
+}
+
+impl Known<'_> {
+    /// Noise and rate of the inertial sensor, the offset of the camera's clock, and what of it is assumed.
+    fn imu(&self, samples: &[Imu], overrides: &Overrides) -> Result<(ImuCalibration, f64, Vec<String>), VioError> {
+        let mut assumed = Vec::new();
+        let (noise, rate_hz, time_offset_s) = match (&overrides.imu, self.noise) {
+            (Some(file), _) => {
                 let imu = calibration::read_kalibr_imu(&read_text(file)?);
                 let imu = imu.map_err(|error| VioError::malformed(file, &error))?;
                 (imu.noise, imu.rate_hz, 0.0)
             }
-            None => self.noise.ok_or_else(|| {
-                VioError::malformed(
-                    path,
-                    &"says nothing about the noise of its inertial sensor: give Kalibr's file with --imu",
-                )
-            })?,
-        };
-        let imu = ImuCalibration { noise, rate_hz, body_from_imu: Isometry3::identity() };
-        if let Some(file) = &overrides.cameras {
-            let chain = calibration::read_kalibr_cameras(&read_text(file)?);
-            let mut chain = chain.map_err(|error| VioError::malformed(file, &error))?;
-            if chain.len() < count {
-                return Err(VioError::malformed(file, &"holds one camera only"));
+            (None, Some(known)) => known,
+            (None, None) => {
+                assumed.push(
+                    "the noise of the inertial sensor is not known: that of an ADIS16448 is assumed (Kalibr's file with --imu \
+                     tells it)"
+                        .into(),
+                );
+                (ImuNoise::default(), usual_rate(samples), 0.0)
             }
-            chain.truncate(count);
-            return Ok((chain, imu));
-        }
+        };
+        Ok((ImuCalibration { noise, rate_hz, body_from_imu: Isometry3::identity() }, time_offset_s, assumed))
+    }
+
+    fn cameras(
+        &self,
+        path: &Path,
+        images: &[ImageTopic],
+        time_offset_s: f64,
+    ) -> Result<Vec<CameraCalibration>, VioError> {
         let read = |images: &ImageTopic| {
             let camera = self.camera(images).map_err(|why| {
                 VioError::malformed(path, &format!("{why}: give Kalibr's camera chain with --cameras"))
@@ -225,29 +277,24 @@ impl Found {
             let read = calibration::read_asl_camera(&calibration::write_asl_camera(&written))?;
             Ok(CameraCalibration { time_offset_s, ..read })
         };
-        let cameras = self.images.iter().take(count).map(read).collect::<Result<_, VioError>>()?;
-        Ok((cameras, imu))
+        images.iter().map(read).collect()
     }
 
     fn camera(&self, images: &ImageTopic) -> Result<Camera, String> {
         let of_frame = self.cameras.iter().find(|camera| camera.frame_id == images.frame);
         // A camera that is alone needs no name.
-        let message = of_frame.or(self.cameras.first().filter(|_| self.cameras.len() == 1 && self.images.len() == 1));
+        let message = of_frame.or(self.cameras.first().filter(|_| self.cameras.len() == 1));
         let message = message.ok_or_else(|| {
             format!(
-                "holds no foxglove.CameraCalibration of the frame `{}`, that of topic {}",
+                "holds no foxglove.CameraCalibration or sensor_msgs/msg/CameraInfo of the frame `{}`, that of topic {}",
                 images.frame, images.topic
             )
         })?;
-        let place = |frame: &&FrameTransform| {
-            frame.child_frame_id == message.frame_id && frame.parent_frame_id == self.imu_frame
-        };
-        let body_from_camera = self.frames.iter().find(place).and_then(|f| {
-            let t = f.translation?;
-            isometry(Some(t), f.rotation)
-        });
-        let body_from_camera = body_from_camera.ok_or_else(|| {
-            format!("holds no foxglove.FrameTransform from `{}` to `{}`", self.imu_frame, message.frame_id)
+        let body_from_camera = self.frames.pose(&message.frame_id, self.imu_frame).ok_or_else(|| {
+            format!(
+                "holds no transform between `{}` and `{}` (foxglove.FrameTransform, tf2_msgs/msg/TFMessage)",
+                self.imu_frame, message.frame_id
+            )
         })?;
         let k: [f64; 9] = message.k.as_slice().try_into().map_err(|_| "its camera matrix has not nine numbers")?;
         let four =
@@ -269,4 +316,11 @@ impl Found {
         let (width, height) = (message.width as usize, message.height as usize);
         Ok(Camera { width, height, fx: k[0], fy: k[4], cx: k[2], cy: k[5], distortion, body_from_camera })
     }
+}
+
+/// One over the median time between samples, Hz.
+fn usual_rate(samples: &[Imu]) -> f64 {
+    let mut times: Vec<f64> = samples.windows(2).map(|pair| pair[1].stamp.secs_since(pair[0].stamp)).collect();
+    times.sort_unstable_by(f64::total_cmp);
+    times.get(times.len() / 2).filter(|time| **time > 0.0).map_or(200.0, |time| time.recip())
 }

@@ -28,8 +28,10 @@ pub struct Recording {
     pub second: Option<SecondCamera>,
     /// What is known of the true motion.
     pub truth: Option<GroundTruth>,
-    /// Topics with images that are not used.
+    /// Topics with images or inertial samples that are not used.
     pub unused: Vec<String>,
+    /// What is not known of the sensors, and what is assumed instead.
+    pub assumed: Vec<String>,
     /// Of the size of the first camera's images: nothing is tracked where it is 0.
     pub mask: Option<GreyImage>,
 }

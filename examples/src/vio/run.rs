@@ -94,9 +94,10 @@ pub fn run(recording: &Recording, settings: &RunSettings) -> Result<TimedRun, Vi
         })
     };
     let unusable = |error: Error| match error {
-        Error::ImageSize { .. } | Error::NoImage { .. } | Error::NoSecondImage { .. } | Error::NeverStarted { .. } => {
-            VioError::Unusable { recording: recording.name.clone(), why: error.to_string() }
+        Error::ImageSize { .. } | Error::NoImage { .. } | Error::NoSecondImage { .. } => {
+            VioError::Pictures { recording: recording.name.clone(), why: error.to_string() }
         }
+        Error::NeverStarted { .. } => VioError::Unusable { recording: recording.name.clone(), why: error.to_string() },
         error => error.into(),
     };
     let run = done.and_then(|()| runner.runner.finish()).map_err(unusable)?;

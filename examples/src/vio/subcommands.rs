@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use vio_ekf::format::calibration::read_kalibr_cameras;
 use vio_ekf::imu_check::{ImuValidation, check_axes_with_images, diagnose_axes};
-use vio_ekf::run::{CalibrationDoubt, CalibrationPart, Loss, Run, check_calibration};
+use vio_ekf::lie::so3;
+use vio_ekf::run::{CalibrationDoubt, CalibrationPart, Loss, RecordedFrame, Run, check_calibration};
 use vio_ekf::sim::{Scenario, SimulatedCamera};
 use vio_ekf::tune::TuneSettings;
 use vio_ekf::{Camera, Settings};
@@ -20,6 +21,8 @@ use super::{
 };
 use crate::report::save_figures;
 
+/// Images of which the first that can be read tells the size.
+const LOOKED_AT: usize = 20;
 /// Checks of `--calibrate` at most.
 const MAX_CHECKS: usize = 4;
 /// Share of the images that may be left out of a run that counts as a success.
@@ -62,8 +65,13 @@ fn filter_settings(arguments: &Track) -> Result<Settings, AnyError> {
 fn track(arguments: &Track) -> Result<(), AnyError> {
     let folder = &arguments.out;
     make(folder)?;
-    let overrides =
-        Overrides { cameras: arguments.cameras.clone(), imu: arguments.imu.clone(), truth: arguments.truth.clone() };
+    let overrides = Overrides {
+        cameras: arguments.cameras.clone(),
+        imu: arguments.imu.clone(),
+        truth: arguments.truth.clone(),
+        camera_topics: arguments.camera_topic.clone(),
+        imu_topic: arguments.imu_topic.clone(),
+    };
     let mut recording = match (&arguments.euroc, &arguments.mcap) {
         (Some(folder), _) if arguments.stereo => open_euroc_stereo(folder, &overrides)?,
         (Some(folder), _) => open_euroc(folder, &overrides)?,
@@ -82,11 +90,13 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         recording.mask = Some(mask);
     }
     let filter = filter_settings(arguments)?;
+    check_first_images(&recording)?;
+    recording.assumed.iter().for_each(|assumed| eprintln!("warning: {assumed}"));
     let mut findings = check_samples(&recording, filter.gravity, arguments.accept_imu)?;
     eprintln!("{}: {} images, {} inertial samples", recording.name, recording.images.count(), recording.samples.len());
     if !recording.unused.is_empty() {
         eprintln!(
-            "images that are not used: {} (a second camera goes along with --stereo)",
+            "topics that are not used: {} (choose with --camera-topic and --imu-topic; a second camera goes along with --stereo)",
             recording.unused.join(", ")
         );
     }
@@ -104,6 +114,7 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
     }
     let threads = threads(arguments.threads);
     let mut settings = RunSettings { filter, threads, ..RunSettings::default() };
+    let given = recording.camera.camera.body_from_camera.rotation;
     if arguments.calibrate {
         calibrate(&mut recording, &mut settings)?;
     }
@@ -112,6 +123,8 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         eprintln!("warning: {}", calibration_advice(doubt));
     }
     let timed = match timed {
+        // Pictures that cannot be used have nothing to do with axes.
+        Err(error @ VioError::Pictures { .. }) => return Err(error.into()),
         Err(VioError::Unusable { recording: name, why }) => {
             return Err(format!("{name}: {}", with_cause(why, doubt.as_ref(), &recording, &settings)).into());
         }
@@ -133,7 +146,8 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
     }
     let evaluation = recording.truth.as_ref().map(|truth| evaluate_run(run, truth)).transpose()?.flatten();
     write_file(&folder.join("settings.toml"), toml::to_string(&settings.filter)?.as_bytes())?;
-    let report = VioReport::new(&recording, findings.as_ref(), &timed, evaluation.as_ref(), threads)?;
+    let mut report = VioReport::new(&recording, findings.as_ref(), &timed, evaluation.as_ref(), threads)?;
+    report.extrinsics_error_rad = so3::angle_between(&given, &run.calibration.body_from_camera.rotation);
     save(&report, &recording, run, evaluation.as_ref(), folder)?;
     println!("{}", folder.join("report.md").display());
     if run.segments.len() > 1 {
@@ -193,6 +207,20 @@ fn calibration_advice(doubt: &CalibrationDoubt) -> String {
         "run with --calibrate, or calibrate anew"
     };
     format!("the images contradict the calibration: {doubt}: {way_out}")
+}
+
+/// Refuses a recording whose images are of another size than the calibration's, before anything is looked for in them.
+fn check_first_images(recording: &Recording) -> Result<(), VioError> {
+    recording.check_clocks()?;
+    let readable = |frame: RecordedFrame<GreyImage>| frame.picture.ok();
+    let Some(first) = camera_frames(recording).take(LOOKED_AT).find_map(readable) else { return Ok(()) };
+    let camera = recording.camera.camera;
+    let (given, expected) = ((first.width, first.height), (camera.width, camera.height));
+    if given == expected {
+        return Ok(());
+    }
+    let why = vio_ekf::Error::ImageSize { given, expected }.to_string();
+    Err(VioError::Unusable { recording: recording.name.clone(), why })
 }
 
 /// The test of the inertial samples; `None` if they are accepted though they fail it.
