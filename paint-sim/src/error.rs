@@ -28,6 +28,24 @@ pub enum Error {
         /// The allowed range, in words.
         allowed: &'static str,
     },
+    /// A list has not as many elements as it must.
+    #[error("{found} {what} were given, but {expected} are needed")]
+    WrongLength {
+        /// Name of the list.
+        what: &'static str,
+        /// How many are needed.
+        expected: usize,
+        /// How many were given.
+        found: usize,
+    },
+    /// Rotors that leave an axis uncontrolled.
+    #[error(
+        "{rotors} rotors cannot set thrust and three torques one by one: give at least four, of both spins, around the centre"
+    )]
+    Uncontrollable {
+        /// How many rotors there are.
+        rotors: usize,
+    },
     /// A triangle names a vertex that does not exist.
     #[error("face {face} refers to vertex {vertex}, but there are only {vertices} vertices")]
     VertexIndex {

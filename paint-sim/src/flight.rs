@@ -13,6 +13,7 @@ mod faults;
 mod hose;
 mod interlock;
 mod log;
+pub mod multirotor;
 mod noise;
 mod pan_tilt;
 mod pose_source;

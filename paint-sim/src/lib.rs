@@ -47,6 +47,7 @@
 //! | CIE 015, IEC 61966-2-1 | XYZ, CIELAB, sRGB of 36 bands | [`colour`] |
 //! | Sharma, Wu, Dalal 2005 | colour difference CIEDE2000 | [`colour::ciede2000`] |
 //! | Paper II, Section 5.2 (roll and pitch), linear drag | first-order attitude, rotor drag | [`flight::Vehicle::step`] |
+//! | rigid body with motor lag (textbook; PX4's thrust curve) | motor-level vehicle and its sensors | [`flight::multirotor`] |
 //! | catenary (textbook) | hose force | [`flight::HoseModel::force`] |
 //! | Paper II, Section 7.2 | hit error, distance error, angle errors | [`flight::FlightStatistics`] |
 

@@ -1,5 +1,6 @@
 //! Seeded random numbers: the same seed gives the same bytes on every build.
 
+use nalgebra::Vector3;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 
@@ -20,6 +21,11 @@ impl Rng {
     /// Uniform in `[0, 1)` with 53 bits.
     pub(crate) fn uniform(&mut self) -> f64 {
         (self.bits.next_u64() >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0)
+    }
+
+    /// Three normal deviates.
+    pub(crate) fn normal3(&mut self) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| self.normal())
     }
 
     /// Normal deviate with mean 0 and variance 1.

@@ -22,20 +22,16 @@ impl OrnsteinUhlenbeck {
     pub(super) fn new(sigma: f64, time: f64, dt: f64, seed: u64, stream: u64) -> Self {
         let mut rng = Rng::new(seed, stream);
         let decay = (-dt / time).exp();
-        let value = sigma * normal3(&mut rng);
+        let value = sigma * rng.normal3();
         Self { decay, noise: sigma * (1.0 - decay * decay).sqrt(), value, rng }
     }
 
     pub(super) fn step(&mut self) -> Vector3<f64> {
         if self.noise > 0.0 {
-            self.value = self.decay * self.value + self.noise * normal3(&mut self.rng);
+            self.value = self.decay * self.value + self.noise * self.rng.normal3();
         }
         self.value
     }
-}
-
-fn normal3(rng: &mut Rng) -> Vector3<f64> {
-    Vector3::new(rng.normal(), rng.normal(), rng.normal())
 }
 
 /// The moving air.
@@ -70,9 +66,9 @@ impl PoseSensor {
         Self { settings, position, attitude, white: Rng::new(seed, 4) }
     }
 
-    fn measure(&mut self, vehicle: &Vehicle) -> Isometry3<f64> {
-        let shift = self.position.step() + self.settings.position_noise * normal3(&mut self.white);
-        let turn = self.attitude.step() + self.settings.attitude_noise * normal3(&mut self.white);
+    pub(super) fn measure(&mut self, vehicle: &Vehicle) -> Isometry3<f64> {
+        let shift = self.position.step() + self.settings.position_noise * self.white.normal3();
+        let turn = self.attitude.step() + self.settings.attitude_noise * self.white.normal3();
         let [roll, pitch, yaw] = vehicle.attitude;
         let rotation = UnitQuaternion::from_euler_angles(roll + turn.x, pitch + turn.y, yaw + turn.z);
         Isometry3::from_parts(Translation3::from(vehicle.position + shift), rotation)

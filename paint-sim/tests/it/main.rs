@@ -8,6 +8,7 @@ mod examples;
 mod flight;
 mod flight_scene;
 mod km;
+mod multirotor;
 mod own_controller;
 mod own_pan_tilt;
 mod own_reference;
