@@ -1,6 +1,6 @@
 //! The flight that paints: vehicle, wind, hose, pan-tilt unit and controller in a closed loop at 1 kHz.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Vector3;
 
 use crate::error::{Error, check_range};
 use crate::surface::Surface;
@@ -28,8 +28,9 @@ pub use controller::{CascadedController, Controller, ControllerSettings};
 pub use estimator::{Estimate, Estimator, ObserverSettings};
 pub use faults::{Faults, Gust};
 pub use hose::{Catenary, HoseModel};
-pub use interlock::Interlock;
+pub use interlock::{Interlock, InterlockInput, InterlockState};
 pub use log::FlightLog;
+pub use noise::{PoseSensor, WindModel};
 pub use pan_tilt::{IdealPanTilt, PanTilt};
 pub use pose_source::{LocalisedPose, PoseSource};
 pub use reference::{Reference, ReferenceState};
@@ -38,17 +39,12 @@ pub use settings::{FlightSettings, Localisation, Valve, Wind};
 pub use statistics::FlightStatistics;
 pub use vehicle::Vehicle;
 
-use interlock::{InterlockState, Known};
-use noise::{PoseSensor, WindModel};
-
 /// Steps of the physics per second.
 const RATE: u32 = 1000;
 const STEP: f64 = 1.0 / RATE as f64;
 /// Steps of the physics per step of localisation, controller and pan-tilt command.
 const CONTROL_STEPS: i64 = 10;
 const CONTROL_STEP: f64 = CONTROL_STEPS as f64 * STEP;
-/// The spray is followed this far, m.
-const MAX_SPRAY_DISTANCE: f64 = 10.0;
 /// A vehicle farther than this from its reference is lost, m.
 const DIVERGENCE_DISTANCE: f64 = 20.0;
 /// Longest flight, s: a reference that asks for more has a wrong unit.
@@ -168,7 +164,8 @@ pub fn fly_localised(
             let ahead = settings.valve.dead_time + 0.5 * CONTROL_STEP;
             let later = checked(&hover, time + ahead)?;
             let estimator = trusted.then_some(&estimator);
-            let known = Known { estimator, angles: pan_tilt, command: aim, now: &wanted, later: &later, ahead };
+            let known =
+                InterlockInput { estimator, angles: pan_tilt, command: aim, now: &wanted, later: &later, ahead };
             interlock.decide(ptu, &known);
         }
         if step >= 0 && step % log_steps == 0 {
@@ -240,31 +237,8 @@ impl SampleContext<'_> {
     ) -> Result<FlightSample, Error> {
         let wanted = checked(self.reference, time)?;
         let flow = self.flow(time)?;
-        let world_from_body: Isometry3<f64> = vehicle.world_from_body();
-        let (nozzle, axis) = self.ptu.nozzle(&world_from_body, pan_tilt);
-        if !nozzle.iter().chain(axis.iter()).all(|v| v.is_finite()) {
-            return Err(Error::BadCallback { who: "the pan-tilt unit", time });
-        }
-        let distance = self.surface.cast(&nozzle, &axis, MAX_SPRAY_DISTANCE).map(|hit| hit.distance);
-        Ok(FlightSample {
-            time,
-            world_from_body,
-            velocity: vehicle.velocity,
-            acceleration: vehicle.acceleration,
-            attitude: vehicle.attitude,
-            estimated_position: estimate.position,
-            reference_position: wanted.position,
-            pan_tilt,
-            desired_pan_tilt: wanted.aim.map_or(pan_tilt, |aim| self.ptu.command(&world_from_body, &aim)),
-            nozzle,
-            axis,
-            aim: wanted.aim,
-            hit: distance.map(|d| nozzle + axis.as_ref() * d),
-            distance: distance.unwrap_or(f64::INFINITY),
-            wanted_distance: wanted.nozzle_distance,
-            flow: if open { flow } else { 0.0 },
-            held: flow > 0.0 && !open,
-        })
+        let seen = FlightSample::measured(time, vehicle, estimate.position, pan_tilt, &wanted, self.ptu, self.surface)?;
+        Ok(FlightSample { flow: if open { flow } else { 0.0 }, held: flow > 0.0 && !open, ..seen })
     }
 
     /// The valve follows the reference later by its dead time, for which its commands are given early.

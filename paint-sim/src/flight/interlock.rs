@@ -50,7 +50,8 @@ impl Interlock {
 }
 
 /// The interlock at work: one decision for each control step.
-pub(super) struct InterlockState {
+#[derive(Debug, Clone)]
+pub struct InterlockState {
     settings: Option<Interlock>,
     /// Control steps from a command of the joints to its effect, and from one of the valve.
     delays: [usize; 2],
@@ -59,28 +60,32 @@ pub(super) struct InterlockState {
 }
 
 /// What is known when a control step begins.
-pub(super) struct Known<'a> {
+#[derive(Clone, Copy)]
+pub struct InterlockInput<'a> {
     /// `None` while no pose arrives.
-    pub(super) estimator: Option<&'a Estimator>,
-    /// The joints as they report themselves, and as they are commanded now.
-    pub(super) angles: [f64; 2],
-    pub(super) command: [f64; 2],
-    /// The reference now, and when the valve will have followed, `ahead` seconds later.
-    pub(super) now: &'a ReferenceState,
-    pub(super) later: &'a ReferenceState,
-    pub(super) ahead: f64,
+    pub estimator: Option<&'a Estimator>,
+    /// The joints as they report themselves.
+    pub angles: [f64; 2],
+    /// The joints as they are commanded now.
+    pub command: [f64; 2],
+    /// The reference now.
+    pub now: &'a ReferenceState,
+    /// The reference when the valve will have followed.
+    pub later: &'a ReferenceState,
+    /// Time until then, s.
+    pub ahead: f64,
 }
 
 impl InterlockState {
     /// `None` leaves the valve to the reference. Delays of joints and valve in control steps.
-    pub(super) fn new(settings: Option<Interlock>, delays: [f64; 2]) -> Self {
+    pub fn new(settings: Option<Interlock>, delays: [f64; 2]) -> Self {
         let delays = delays.map(|steps| steps.round() as usize);
         Self { settings, delays, commands: Vec::new(), open: Vec::new() }
     }
 
     /// Decides for the control step that begins: the spray must meet its aim now and when the valve will have followed; without a
     /// pose the valve is shut. The joints will then be where they were commanded to, but for what they are off now.
-    pub(super) fn decide(&mut self, ptu: &dyn PanTilt, known: &Known) {
+    pub fn decide(&mut self, ptu: &dyn PanTilt, known: &InterlockInput) {
         self.commands.push(known.command);
         let [joints, valve] = self.delays;
         let commanded = |ago: usize| self.commands[self.commands.len().saturating_sub(1 + ago)];
@@ -98,7 +103,7 @@ impl InterlockState {
     }
 
     /// The decision of a control step, counted from the first; before it nothing was forbidden.
-    pub(super) fn open(&self, control_step: i64) -> bool {
+    pub fn open(&self, control_step: i64) -> bool {
         usize::try_from(control_step).ok().and_then(|k| self.open.get(k)).copied().unwrap_or(true)
     }
 }

@@ -35,24 +35,27 @@ impl OrnsteinUhlenbeck {
 }
 
 /// The moving air.
-pub(super) struct WindModel {
+#[derive(Debug, Clone)]
+pub struct WindModel {
     mean: Vector3<f64>,
     gusts: OrnsteinUhlenbeck,
 }
 
 impl WindModel {
-    pub(super) fn new(wind: &Wind, dt: f64, seed: u64) -> Self {
+    /// The air of a seed, in steps of `dt` seconds.
+    pub fn new(wind: &Wind, dt: f64, seed: u64) -> Self {
         Self { mean: wind.mean, gusts: OrnsteinUhlenbeck::new(wind.gust_sigma, wind.gust_time, dt, seed, 1) }
     }
 
     /// Velocity of the air for the next step, m/s.
-    pub(super) fn step(&mut self) -> Vector3<f64> {
+    pub fn step(&mut self) -> Vector3<f64> {
         self.mean + self.gusts.step()
     }
 }
 
 /// Turns the true pose into what the localisation reports.
-pub(super) struct PoseSensor {
+#[derive(Debug, Clone)]
+pub struct PoseSensor {
     settings: Localisation,
     position: OrnsteinUhlenbeck,
     attitude: OrnsteinUhlenbeck,
@@ -60,13 +63,15 @@ pub(super) struct PoseSensor {
 }
 
 impl PoseSensor {
-    pub(super) fn new(settings: Localisation, dt: f64, seed: u64) -> Self {
+    /// The errors of a seed, in steps of `dt` seconds.
+    pub fn new(settings: Localisation, dt: f64, seed: u64) -> Self {
         let drift = |sigma, stream| OrnsteinUhlenbeck::new(sigma, settings.drift_time, dt, seed, stream);
         let (position, attitude) = (drift(settings.position_drift, 2), drift(settings.attitude_drift, 3));
         Self { settings, position, attitude, white: Rng::new(seed, 4) }
     }
 
-    pub(super) fn measure(&mut self, vehicle: &Vehicle) -> Isometry3<f64> {
+    /// The pose that is reported for the next step.
+    pub fn measure(&mut self, vehicle: &Vehicle) -> Isometry3<f64> {
         let shift = self.position.step() + self.settings.position_noise * self.white.normal3();
         let turn = self.attitude.step() + self.settings.attitude_noise * self.white.normal3();
         let [roll, pitch, yaw] = vehicle.attitude;

@@ -7,6 +7,7 @@ use super::settings::MultirotorSettings;
 use super::surroundings::Surroundings;
 use crate::error::{Error, check_not_negative, check_positive};
 use crate::flight::airframe::GRAVITY;
+use crate::flight::vehicle::Vehicle;
 
 /// The vehicle and its state of motion.
 #[derive(Debug, Clone, PartialEq)]
@@ -154,6 +155,18 @@ impl Multirotor {
     /// Angular velocity, body frame, rad/s.
     pub fn angular_velocity(&self) -> Vector3<f64> {
         self.motion.rate
+    }
+
+    /// The same motion without motors and angular velocity.
+    pub fn as_vehicle(&self) -> Vehicle {
+        let (roll, pitch, yaw) = self.rotation().euler_angles();
+        Vehicle {
+            position: self.position(),
+            velocity: self.motion.velocity,
+            attitude: [roll, pitch, yaw],
+            yaw_rate: self.motion.rate.z,
+            acceleration: self.acceleration,
+        }
     }
 
     /// Where each motor is between 0 and 1.
