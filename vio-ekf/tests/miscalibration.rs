@@ -6,6 +6,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
 
+#![allow(clippy::large_types_passed_by_value, clippy::unused_self, reason = "a table of runs of seconds each")]
+
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use vio_ekf::camera::Distortion;
 use vio_ekf::eval::{Alignment, Association, ate, heading_onto};

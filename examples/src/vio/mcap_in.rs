@@ -192,10 +192,12 @@ impl Found {
                     ..messages::CameraCalibration::default()
                 });
             }
-            "foxglove.FrameTransform" => self.add_frame(FrameTransform::decode(data).map_err(|_| bad())?),
+            "foxglove.FrameTransform" => self.add_frame(&FrameTransform::decode(data).map_err(|_| bad())?),
             "foxglove.FrameTransforms" => {
                 let all = FrameTransforms::decode(data).map_err(|_| bad())?.transforms;
-                all.into_iter().for_each(|frame| self.add_frame(frame));
+                for frame in &all {
+                    self.add_frame(frame);
+                }
             }
             "tf2_msgs/msg/TFMessage" => {
                 let transforms: Vec<cdr::TransformStamped> = cdr::decode(data).ok_or_else(bad)?;
@@ -223,7 +225,7 @@ impl Found {
         self.cameras.push(camera);
     }
 
-    fn add_frame(&mut self, frame: FrameTransform) {
+    fn add_frame(&mut self, frame: &FrameTransform) {
         if let Some(pose) = frame.translation.and_then(|moved| isometry(Some(moved), frame.rotation)) {
             self.frames.add(&frame.parent_frame_id, &frame.child_frame_id, pose);
         }

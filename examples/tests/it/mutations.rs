@@ -102,7 +102,12 @@ fn kinds(s: &Scratch) -> Vec<Kind> {
     let folder = open_euroc(&s.0, &none()).unwrap();
     write_kalibr_files(s, &folder);
     let frames: Vec<_> = camera_frames(&folder).collect();
-    let kalibr = || Overrides { cameras: Some(s.0.join("cameras.yaml")), imu: Some(s.0.join("imu.yaml")), truth: None };
+    let kalibr = || Overrides {
+        cameras: Some(s.0.join("cameras.yaml")),
+        imu: Some(s.0.join("imu.yaml")),
+        truth: None,
+        ..Overrides::default()
+    };
     for (name, compressed) in [("MCAP of ROS 2, raw", false), ("MCAP of ROS 2, PNG", true)] {
         let file = s.0.join("bag.mcap");
         write_ros2_bag(&file, &folder.samples, &frames, compressed);

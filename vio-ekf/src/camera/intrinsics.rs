@@ -44,8 +44,9 @@ impl Camera {
     pub(crate) fn intrinsics_less(&self, other: &Self) -> [f64; INTRINSICS] {
         let terms = |camera: &Self| match camera.distortion {
             Distortion::None => [0.0; 2],
-            Distortion::RadTan([a, b, ..]) | Distortion::Equidistant([a, b, ..]) => [a, b],
-            Distortion::Omni { radtan: [a, b, ..], .. } => [a, b],
+            Distortion::RadTan([a, b, ..])
+            | Distortion::Equidistant([a, b, ..])
+            | Distortion::Omni { radtan: [a, b, ..], .. } => [a, b],
             Distortion::DoubleSphere(terms) | Distortion::Eucm(terms) => terms,
         };
         let numbers = |camera: &Self| {

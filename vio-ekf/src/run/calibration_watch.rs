@@ -5,6 +5,7 @@ use std::fmt;
 use nalgebra::UnitQuaternion;
 
 use crate::camera::Camera;
+use crate::filter::calibration_error::CalibrationError;
 use crate::filter::report::{Calibration, Status};
 use crate::filter::settings::CalibrationSettings;
 use crate::filter::state::error_state;
@@ -23,7 +24,9 @@ const FEWEST: usize = 100;
 /// Growth of the logarithm of the evidence that frees a part: ours.
 const ENOUGH: f64 = 10.0;
 /// Starts of the second filter, each after a divergence.
-const STARTS: usize = 3;
+const STARTS: usize = 5;
+/// Images after which what it has found is nearer to the truth than what was given.
+const LEARNT: usize = 40;
 
 /// A part of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,20 +60,23 @@ pub enum CalibrationPart {
 
 use CalibrationPart as Part;
 
-/// Rows of each part.
-const PARTS: [(Part, usize, usize); 11] = [
-    (Part::CameraAttitude, error_state::CAMERA_ATTITUDE, 3),
-    (Part::CameraPosition, error_state::CAMERA_POSITION, 3),
-    (Part::Clock, error_state::TIME_OFFSET, 1),
-    (Part::Accelerometer, error_state::ACCEL_MATRIX, error_state::MATRIX_SIZE),
-    (Part::FocalLength, error_state::INTRINSICS, 2),
-    (Part::PrincipalPoint, error_state::INTRINSICS + 2, 2),
-    (Part::Distortion, error_state::INTRINSICS + 4, 2),
-    (Part::SecondFocalLength, error_state::SECOND_INTRINSICS, 2),
-    (Part::SecondPrincipalPoint, error_state::SECOND_INTRINSICS + 2, 2),
-    (Part::SecondDistortion, error_state::SECOND_INTRINSICS + 4, 2),
-    (Part::StereoPose, error_state::SECOND_ATTITUDE, 6),
+/// Rows of each part, and how well the best calibrations agree with each other in it: less is not doubted.
+const PARTS: [Rows; 11] = [
+    (Part::CameraAttitude, error_state::CAMERA_ATTITUDE, &[1e-3; 3]),
+    (Part::CameraPosition, error_state::CAMERA_POSITION, &[5e-3; 3]),
+    (Part::Clock, error_state::TIME_OFFSET, &[5e-4]),
+    (Part::Accelerometer, error_state::ACCEL_MATRIX, &[2e-3; error_state::MATRIX_SIZE]),
+    (Part::FocalLength, error_state::INTRINSICS, &[0.4; 2]),
+    (Part::PrincipalPoint, error_state::INTRINSICS + 2, &[0.4; 2]),
+    (Part::Distortion, error_state::INTRINSICS + 4, &[2e-3; 2]),
+    (Part::SecondFocalLength, error_state::SECOND_INTRINSICS, &[0.4; 2]),
+    (Part::SecondPrincipalPoint, error_state::SECOND_INTRINSICS + 2, &[0.4; 2]),
+    (Part::SecondDistortion, error_state::SECOND_INTRINSICS + 4, &[2e-3; 2]),
+    (Part::StereoPose, error_state::SECOND_ATTITUDE, &[1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3]),
 ];
+
+/// A part, its first row, and the floors of its rows.
+type Rows = (Part, usize, &'static [f64]);
 
 /// What is wrong with both cameras of a pair as easily as with one.
 const BOTH: [[Part; 2]; 3] = [
@@ -144,6 +150,8 @@ impl fmt::Display for CalibrationDoubt {
 /// The second filter.
 #[derive(Debug, Clone)]
 pub(super) struct CalibrationWatch {
+    /// The filter before its start, with the calibration that was given.
+    given: Vio,
     vio: Vio,
     order: Option<PairOrder>,
     images: usize,
@@ -163,9 +171,9 @@ impl CalibrationWatch {
         if given.calibration != sure {
             return None;
         }
-        let order = vio.camera_pair().map(|cameras| PairOrder::new(cameras, *given));
-        let vio = vio.with_settings(given.with_rough_calibration()).ok()?;
-        Some(Self { vio, order, images: 0, starts: 1 })
+        let order = vio.camera_pair().map(|cameras| PairOrder::new(cameras, given));
+        let vio = vio.with_settings(&given.with_rough_calibration()).ok()?;
+        Some(Self { given: vio.clone(), vio, order, images: 0, starts: 1 })
     }
 
     pub(super) fn imu(&mut self, sample: &Imu) {
@@ -174,6 +182,7 @@ impl CalibrationWatch {
     }
 
     /// Gives it the images of a time; what it finds once it has seen enough, after which it is not needed any more.
+    #[allow(clippy::option_option, reason = "nothing yet, nothing found, or a doubt")]
     pub(super) fn images(
         &mut self,
         stamp: Stamp,
@@ -199,7 +208,7 @@ impl CalibrationWatch {
         match report.status {
             Status::Diverged(_) if self.starts == STARTS => return Some(None),
             Status::Diverged(_) => {
-                self.vio.reset();
+                self.restart();
                 (self.starts, self.images) = (self.starts + 1, 0);
             }
             Status::Uninitialised(_) => self.images = 0,
@@ -208,36 +217,50 @@ impl CalibrationWatch {
         (self.images >= IMAGES).then(|| self.doubt())
     }
 
+    /// Starts anew, from the calibration that it had found, if it had seen anything: far from the truth a filter diverges on its way.
+    fn restart(&mut self) {
+        let found = self.vio.calibration().filter(|_| self.images >= LEARNT);
+        match found.and_then(|found| self.vio.with_calibration(&found).ok()) {
+            Some(vio) => self.vio = vio,
+            None => self.vio.reset(),
+        }
+    }
+
     /// What it has found so far.
     pub(super) fn finish(&self) -> Option<CalibrationDoubt> {
         if self.images < FEWEST { None } else { self.doubt() }
     }
 
     fn doubt(&self) -> Option<CalibrationDoubt> {
-        let found = self.vio.calibration_error()?;
-        let rows = |(_, first, count): &(Part, usize, usize)| (*first..first + count).collect::<Vec<usize>>();
-        let estimated = |part: &&(Part, usize, usize)| found.prior.get((part.1, part.1)).is_some_and(|v| *v > 0.0);
-        let parts: Vec<&(Part, usize, usize)> = PARTS.iter().filter(estimated).collect();
+        let found = self.vio.calibration_error(&self.given)?;
+        let CalibrationError { error, mut posterior, mut prior } = found;
+        let rows = |(_, first, floor): &Rows| (*first..first + floor.len()).collect::<Vec<usize>>();
+        let estimated = |part: &&Rows| prior.get((part.1, part.1)).is_some_and(|v| *v > 0.0);
+        let parts: Vec<&Rows> = PARTS.iter().filter(estimated).collect();
+        for (row, floor) in parts.iter().flat_map(|(_, first, floor)| (*first..).zip(floor.iter())) {
+            posterior[(row, row)] += floor * floor;
+            prior[(row, row)] += floor * floor;
+        }
         let groups: Vec<Vec<usize>> = parts.iter().map(|part| rows(part)).collect();
         let named: Vec<Part> = parts.iter().map(|part| part.0).collect();
         let single = (0..groups.len()).map(|k| vec![k]);
         let both =
             BOTH.iter().filter_map(|both| both.iter().map(|part| named.iter().position(|p| p == part)).collect());
         let steps: Vec<Vec<usize>> = single.chain(both).collect();
-        let chosen = contradicted(&found.error, (&found.posterior, &found.prior), (&groups, &steps), ENOUGH);
+        let chosen = contradicted(&error, (&posterior, &prior), (&groups, &steps), ENOUGH);
         let parts: Vec<Part> = chosen.into_iter().map(|k| named[k]).collect();
         if parts.is_empty() {
             return None;
         }
         let words: Vec<String> = parts.iter().map(|part| self.describe(*part)).collect();
-        let clock_change_s = found.error[error_state::TIME_OFFSET];
+        let clock_change_s = error[error_state::TIME_OFFSET];
         Some(CalibrationDoubt { parts, found: self.vio.calibration(), clock_change_s, words: words.join("; ") })
     }
 
     fn describe(&self, part: CalibrationPart) -> String {
         let Some(found) = self.vio.calibration() else { return String::new() };
-        let camera = self.vio.camera();
-        let second = self.vio.second_camera().ok();
+        let camera = self.given.camera();
+        let second = self.given.second_camera().ok();
         let focal = |name: &str, given: Option<Camera>, found: Option<Camera>| match (given, found) {
             (Some(given), Some(found)) => {
                 format!("{name} {:.1}, {:.1} px, found {:.1}, {:.1}", given.fx, given.fy, found.fx, found.fy)
@@ -268,7 +291,7 @@ impl CalibrationWatch {
                 format!("place of the camera on the body, found {:.0} mm off", 1e3 * moved.norm())
             }
             Part::Clock => {
-                let given = self.vio.settings().calibration.time_offset_s;
+                let given = self.given.settings().calibration.time_offset_s;
                 format!("clock of the camera, offset {:.1} ms, found {:.1}", 1e3 * given, 1e3 * found.time_offset_s)
             }
             Part::Accelerometer => "scale or axes of the accelerometer".into(),

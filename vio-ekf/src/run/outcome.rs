@@ -35,7 +35,7 @@ pub enum Event {
     Lost(Loss),
     /// The images contradict the calibration that was given: it should be estimated
     /// ([`CalibrationSettings`](crate::filter::CalibrationSettings)), or done anew.
-    Doubted(CalibrationDoubt),
+    Doubted(Box<CalibrationDoubt>),
     /// An image was not used.
     Skipped(SkippedImage),
 }

@@ -31,8 +31,8 @@ pub(super) struct PairOrder {
 }
 
 impl PairOrder {
-    pub(super) fn new(cameras: [Arc<dyn CameraModel>; 2], settings: Settings) -> Self {
-        Self { cameras, settings, seen: 0, found: [0; 2] }
+    pub(super) fn new(cameras: [Arc<dyn CameraModel>; 2], settings: &Settings) -> Self {
+        Self { cameras, settings: *settings, seen: 0, found: [0; 2] }
     }
 
     /// Takes a pair; once enough were seen, whether they are exchanged: corners found as given, and the other way round.

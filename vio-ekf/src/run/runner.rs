@@ -313,7 +313,7 @@ impl Runner {
         let found = self.watch.as_mut()?.images(stamp, first, second)?;
         self.watch = None;
         self.doubt = found;
-        self.doubt.clone().map(Event::Doubted)
+        self.doubt.clone().map(|doubt| Event::Doubted(Box::new(doubt)))
     }
 
     fn withdraw(&mut self, count: usize) -> Option<Event> {
