@@ -28,8 +28,10 @@ pub struct LocalisationSettings {
     pub trusted_age_s: f64,
     /// A pose in the map that is farther from the one that was expected contradicts it, m: there is no painting by either.
     pub contradiction: f64,
-    /// After so many contradictions in a row the odometry is given up for the map.
-    pub contradictions: usize,
+    /// Inertial samples farther apart than this, s, end the odometry; and without one for so long there is no pose.
+    pub longest_gap_s: f64,
+    /// Poses in the map in a row that must follow from each other before the odometry starts again from them.
+    pub confirmations: usize,
     /// Threads of tracking.
     pub threads: usize,
 }
@@ -45,7 +47,8 @@ impl Default for LocalisationSettings {
             trusted_sigma: 0.01,
             trusted_age_s: 0.5,
             contradiction: 0.02,
-            contradictions: 5,
+            longest_gap_s: 0.02,
+            confirmations: 5,
             threads: 1,
         }
     }
@@ -94,8 +97,11 @@ pub struct OnboardLocalisation {
     settings: LocalisationSettings,
     /// When the map confirmed the pose last, s; `None` where it contradicts.
     confirmed: Option<f64>,
-    /// Contradictions since then.
-    contradictions: usize,
+    /// The last pose in the map.
+    last: Option<MapPose>,
+    /// Poses in the map that have followed from each other since the odometry was given up; `None` while it goes on.
+    recovering: Option<usize>,
+    imu: InertialCheck,
 }
 
 impl OnboardLocalisation {
@@ -130,7 +136,9 @@ impl OnboardLocalisation {
             body_from_camera,
             settings,
             confirmed: None,
-            contradictions: 0,
+            last: None,
+            recovering: None,
+            imu: InertialCheck::default(),
         })
     }
 
@@ -146,20 +154,26 @@ impl OnboardLocalisation {
     ) -> Result<Option<Isometry3<f64>>, LocalisationError> {
         let outcome = self.slam.frame(seconds(stamp), depth, Some(colour), None)?;
         let found = outcome.tracking.filter(|_| outcome.world_from_camera.is_some());
-        found.map(|tracking| self.start(stamp, &tracking, STANDING)).transpose()
+        let body_from_camera = self.body_from_camera;
+        let pose = |tracking: &TrackingOutcome| {
+            MapPose::standing(stamp, tracking.world_from_camera * body_from_camera.inverse())
+        };
+        found.map(|tracking| self.start(&pose(&tracking), &tracking, STANDING)).transpose()
     }
 
-    /// Odometry from a pose in the map, with a velocity that is off by so much.
+    /// Odometry from a pose in the map, moved on to the latest inertial sample.
     fn start(
         &mut self,
-        stamp: Stamp,
+        pose: &MapPose,
         tracking: &TrackingOutcome,
         velocity: f64,
     ) -> Result<Isometry3<f64>, LocalisationError> {
-        let world_from_body = tracking.world_from_camera * self.body_from_camera.inverse();
+        let stamp = self.imu.last.map_or(pose.stamp, |last| last.stamp.max(pose.stamp));
+        let world_from_body = pose.after(stamp);
         let [position, attitude] = self.spread(tracking);
         let sigma = InitialSigma { position, velocity, yaw: attitude, tilt: attitude, ..InitialSigma::default() };
-        let [velocity_in_body, gyro_bias, accel_bias] = [Vector3::zeros(); 3];
+        let [gyro_bias, accel_bias] = [Vector3::zeros(); 2];
+        let velocity_in_body = world_from_body.inverse_transform_vector(&pose.velocity);
         self.vio.initialize(&InitialState {
             stamp,
             world_from_body,
@@ -168,8 +182,13 @@ impl OnboardLocalisation {
             accel_bias,
             sigma,
         })?;
-        (self.confirmed, self.contradictions) = (Some(seconds(stamp)), 0);
+        (self.confirmed, self.recovering) = (Some(seconds(pose.stamp)), None);
         Ok(world_from_body)
+    }
+
+    /// Nothing that the odometry says is believed until it starts again.
+    fn give_up(&mut self) {
+        (self.confirmed, self.recovering) = (None, Some(0));
     }
 
     /// A sample of the inertial sensor.
@@ -177,6 +196,9 @@ impl OnboardLocalisation {
     /// # Errors
     /// What the odometry refuses.
     pub fn imu(&mut self, sample: &Imu) -> Result<(), LocalisationError> {
+        if !self.imu.is_sound(sample, self.settings.longest_gap_s) {
+            self.give_up();
+        }
         self.vio.imu(sample)?;
         Ok(())
     }
@@ -189,8 +211,8 @@ impl OnboardLocalisation {
         Ok(self.vio.image(stamp, image)?)
     }
 
-    /// A depth image, at most `lag_s` after it was taken, with the pose of the body by [`pose`](Self::pose) when it was taken: `None` if there
-    /// was none, because the odometry has given up; it starts again where the map finds the camera.
+    /// A depth image, at most `lag_s` after it was taken, with the pose of the body by [`pose`](Self::pose) when it was taken, if there was
+    /// one. An odometry that was given up starts again where the map finds the camera.
     ///
     /// # Errors
     /// What map and odometry refuse.
@@ -205,26 +227,50 @@ impl OnboardLocalisation {
         let outcome = self.slam.frame(seconds(stamp), depth, Some(colour), prior.as_ref())?;
         let tracking = outcome.tracking.filter(|tracking| tracking.is_tracked() && tracking.degenerate.is_empty());
         let events = outcome.events;
-        let Some(tracking) = tracking else { return Ok(MapUpdate { confirmed: false, events }) };
-        let Some(expected) = prior.filter(|_| self.vio.output().is_some()) else {
-            self.start(stamp, &tracking, FLYING)?;
-            return Ok(MapUpdate { confirmed: true, events });
+        let Some(tracking) = tracking else {
+            self.last = None;
+            return Ok(MapUpdate { confirmed: false, events });
         };
-        let off = tracking.world_from_camera.translation.vector - expected.translation.vector;
-        let confirmed = off.norm() <= self.settings.contradiction;
-        self.contradictions = if confirmed { 0 } else { self.contradictions + 1 };
-        self.confirmed = confirmed.then_some(seconds(stamp));
-        if self.contradictions >= self.settings.contradictions {
-            self.start(stamp, &tracking, FLYING)?;
-        } else if let Some(information) = self.information(&tracking) {
+        let pose = MapPose::next(self.last, stamp, tracking.world_from_camera * self.body_from_camera.inverse());
+        let follows = self.last.is_some_and(|last| last.distance(&pose) <= self.settings.contradiction);
+        self.last = Some(pose);
+        if self.vio.output().is_none() && self.recovering.is_none() {
+            self.give_up();
+        }
+        if let Some(count) = self.recovering {
+            let count = if follows && self.imu.is_sound_now() { count + 1 } else { 0 };
+            self.recovering = Some(count);
+            if count >= self.settings.confirmations {
+                self.start(&pose, &tracking, FLYING)?;
+            }
+            return Ok(MapUpdate { confirmed: false, events });
+        }
+        let off = world_from_body
+            .map_or(0.0, |expected| (pose.world_from_body.translation.vector - expected.translation.vector).norm());
+        if off > self.settings.contradiction {
+            self.give_up();
+            return Ok(MapUpdate { confirmed: false, events });
+        }
+        self.confirmed = Some(seconds(stamp));
+        if let Some(information) = self.information(&tracking) {
             let source_from_sensor = tracking.world_from_camera;
             self.vio.pose(&PoseMeasurement { source: 0, stamp, source_from_sensor, information })?;
         }
-        Ok(MapUpdate { confirmed, events })
+        Ok(MapUpdate { confirmed: true, events })
     }
 
-    /// Where the robot is at the time of the latest inertial sample; `None` before it has been found, and after the odometry gave up.
-    pub fn pose(&self) -> Option<OnboardPose> {
+    /// Where the robot is; `None` before it has been found, and where nothing recent says so. While odometry and map contradict each other, or
+    /// the inertial sensor fails, that is the last pose in the map, moved on, and not to be trusted.
+    pub fn pose(&self, now: Stamp) -> Option<OnboardPose> {
+        let silent = self.imu.last.is_none_or(|last| now.secs_since(last.stamp) > self.settings.longest_gap_s);
+        if silent || self.recovering.is_some() {
+            let last = self.last.filter(|last| now.secs_since(last.stamp) <= self.settings.trusted_age_s)?;
+            return Some(OnboardPose {
+                world_from_body: last.after(now),
+                position_sigma: f64::INFINITY,
+                trusted: false,
+            });
+        }
         let Odometry { stamp, world_from_body, covariance, .. } = self.vio.output()?;
         let position = covariance.fixed_view::<3, 3>(0, 0).into_owned();
         let position_sigma = position.symmetric_eigenvalues().max().max(0.0).sqrt();
@@ -262,6 +308,65 @@ impl OnboardLocalisation {
         [0, 3].map(|first| {
             covariance.fixed_view::<3, 3>(first, first).into_owned().symmetric_eigenvalues().max().max(0.0).sqrt()
         })
+    }
+}
+
+/// A pose in the map, with the velocity since the one before.
+#[derive(Debug, Clone, Copy)]
+struct MapPose {
+    stamp: Stamp,
+    world_from_body: Isometry3<f64>,
+    velocity: Vector3<f64>,
+}
+
+impl MapPose {
+    fn standing(stamp: Stamp, world_from_body: Isometry3<f64>) -> Self {
+        Self { stamp, world_from_body, velocity: Vector3::zeros() }
+    }
+
+    fn next(last: Option<Self>, stamp: Stamp, world_from_body: Isometry3<f64>) -> Self {
+        let since = |last: Self| {
+            let way = world_from_body.translation.vector - last.world_from_body.translation.vector;
+            way / stamp.secs_since(last.stamp).max(1e-3)
+        };
+        Self { stamp, world_from_body, velocity: last.map_or_else(Vector3::zeros, since) }
+    }
+
+    /// Where it leads until a time, without turning.
+    fn after(&self, stamp: Stamp) -> Isometry3<f64> {
+        let way = self.velocity * stamp.secs_since(self.stamp);
+        Isometry3::from_parts((self.world_from_body.translation.vector + way).into(), self.world_from_body.rotation)
+    }
+
+    /// How far the next one is from where this one leads, m.
+    fn distance(&self, next: &Self) -> f64 {
+        (self.after(next.stamp).translation.vector - next.world_from_body.translation.vector).norm()
+    }
+}
+
+/// Whether inertial samples can be believed by themselves.
+#[derive(Debug, Clone, Copy, Default)]
+struct InertialCheck {
+    last: Option<Imu>,
+    /// Samples in a row in which a number of each sensor did not change at all: noise changes it, a limit of the range does not.
+    unchanged: usize,
+}
+
+/// So many are no chance, even of a sensor of few bits.
+const UNCHANGED: usize = 3;
+
+impl InertialCheck {
+    /// Takes a sample; whether it follows the one before, and the sensor moves.
+    fn is_sound(&mut self, sample: &Imu, longest_gap_s: f64) -> bool {
+        let last = self.last.replace(*sample);
+        let same = |a: &Vector3<f64>, b: &Vector3<f64>| (0..3).any(|k| a[k] == b[k]);
+        let stuck = last.is_some_and(|last| same(&last.accel, &sample.accel) || same(&last.gyro, &sample.gyro));
+        self.unchanged = if stuck { self.unchanged + 1 } else { 0 };
+        self.is_sound_now() && last.is_none_or(|last| sample.stamp.secs_since(last.stamp) <= longest_gap_s)
+    }
+
+    fn is_sound_now(&self) -> bool {
+        self.unchanged < UNCHANGED
     }
 }
 

@@ -46,6 +46,7 @@ pub struct LocalisationFigures {
 
 impl LocalisationFigures {
     /// Of both flights together.
+    #[must_use]
     pub fn and(self, other: Self) -> Self {
         Self {
             relocalised_after_s: self.relocalised_after_s.max(other.relocalised_after_s),
@@ -172,7 +173,7 @@ impl<'a> LocalisedFlight<'a> {
                 image.darken();
             }
             if ms % DEPTH_MS == 0 && !matches!(fault, Some(SensorFault::NoDepth | SensorFault::NoImages)) {
-                let pose = self.onboard.pose().map(|pose| pose.world_from_body);
+                let pose = self.onboard.pose(stamp(ms)).map(|pose| pose.world_from_body);
                 self.depths.push_back(Arriving { at: ms + DEPTH_LATENCY_MS, taken: ms, what: (image.clone(), pose) });
             }
             if fault != Some(SensorFault::NoImages) {
@@ -206,7 +207,8 @@ impl PoseSource for LocalisedFlight<'_> {
             let found = self.search(truth).map_err(|why| Error::Localisation { time, why })?;
             self.offset = Some(found - milliseconds(time));
         }
-        let Some(OnboardPose { world_from_body, trusted, .. }) = self.onboard.pose() else { return Ok(None) };
+        let now = stamp(milliseconds(time) + self.offset.unwrap_or_default());
+        let Some(OnboardPose { world_from_body, trusted, .. }) = self.onboard.pose(now) else { return Ok(None) };
         self.figures.steps += 1;
         self.figures.squares += (world_from_body.translation.vector - truth.position.coords).norm_squared();
         Ok(Some(LocalisedPose { world_from_body, trusted }))
