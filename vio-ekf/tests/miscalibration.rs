@@ -5,7 +5,6 @@
 //! length, `CAMERAS=1` or `2` one table of both.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
-
 #![allow(clippy::large_types_passed_by_value, clippy::unused_self, reason = "a table of runs of seconds each")]
 
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
