@@ -104,7 +104,7 @@ mod tests {
             assert!(((after.velocity - before.velocity) / 2e-4 - state.acceleration).norm() < 1e-3, "t = {t}");
             assert!(state.velocity.norm() < 0.4);
         }
-        assert_eq!(approach.at(DURATION + 0.7), Line.at(0.7));
+        assert_eq!(approach.at(DURATION + 0.5), Line.at(0.5));
         assert!((approach.at(DURATION - 1e-6).position - Line.at(0.0).position).norm() < 1e-9);
         assert_eq!(approach.duration(), DURATION + 2.0);
     }
