@@ -285,26 +285,26 @@ impl Flight {
 
     /// As the binary does it with `--calibrate`: checks until nothing is doubted; how many, and the settings of the run then.
     fn calibrated(&self, given: &Given, count: usize) -> (Given, usize, Settings) {
-        let (mut given, mut settings, mut checks) = (given.clone(), Settings::default(), 0);
-        settings.calibration = settings.calibration.nearly();
+        let (mut given, mut checks, mut is_scaled) = (given.clone(), 0, false);
         for _ in 0..4 {
             let filter = self.filter(&given, Settings::default(), count);
-            let frames = self.frames.iter().map(|(stamp, images)| {
-                let [first, second] = [0, 1].map(|k| if given.swapped { 1 - k } else { k });
-                let picture = |k: usize| Shot(&images[k]);
-                if count == 2 {
-                    RecordedFrame { stamp: *stamp, picture: Ok(picture(first)), second: Some(Ok(picture(second))) }
-                } else {
-                    RecordedFrame::single(*stamp, picture(0))
-                }
-            });
-            let Some(doubt) = check_calibration(&filter, &given.samples, frames) else { break };
+            let frames = || {
+                self.frames.iter().map(|(stamp, images)| {
+                    let [first, second] = [0, 1].map(|k| if given.swapped { 1 - k } else { k });
+                    let picture = |k: usize| Shot(&images[k]);
+                    if count == 2 {
+                        RecordedFrame { stamp: *stamp, picture: Ok(picture(first)), second: Some(Ok(picture(second))) }
+                    } else {
+                        RecordedFrame::single(*stamp, picture(0))
+                    }
+                })
+            };
+            let doubt = check_calibration(&filter, &given.samples, frames);
+            is_scaled = doubt.as_ref().is_some_and(|doubt| doubt.parts.contains(&CalibrationPart::Accelerometer));
+            let Some(doubt) = doubt else { break };
             checks += 1;
             if std::env::var_os("VERBOSE").is_some() {
                 println!("    {doubt}");
-            }
-            if doubt.parts.contains(&CalibrationPart::Accelerometer) {
-                settings = settings.with_rough_accelerometer();
             }
             let mut calibrations = given.calibrations();
             doubt.correct(&mut calibrations);
@@ -313,7 +313,9 @@ impl Flight {
                 break;
             }
         }
-        (given, checks, settings)
+        let sound = Settings::default();
+        let settings = Settings { calibration: sound.calibration.nearly(), ..sound };
+        (given, checks, if is_scaled { settings.with_rough_accelerometer() } else { settings })
     }
 
     /// Position error after alignment, m, NEES of the position, share of images with a pose; of the longest segment.

@@ -163,13 +163,13 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
 /// Corrects the calibration of a recording, and lets the run estimate what is left: checks until nothing is doubted, because a first
 /// estimate far from what is given is not at its best.
 fn calibrate(recording: &mut Recording, settings: &mut RunSettings) -> Result<(), VioError> {
+    let mut is_scaled = false;
     for _ in 0..MAX_CHECKS {
         let filter = filter(recording, settings, true)?;
-        let Some(doubt) = check_calibration(&filter, &recording.samples, camera_frames(recording)) else { break };
+        let doubt = check_calibration(&filter, &recording.samples, || camera_frames(recording));
+        is_scaled = doubt.as_ref().is_some_and(|doubt| doubt.parts.contains(&CalibrationPart::Accelerometer));
+        let Some(doubt) = doubt else { break };
         eprintln!("calibration: {doubt}");
-        if doubt.parts.contains(&CalibrationPart::Accelerometer) {
-            settings.filter = settings.filter.with_rough_accelerometer();
-        }
         recording.correct_calibration(&doubt);
         if doubt.parts == [CalibrationPart::Accelerometer] || doubt.found.is_none() {
             break;
@@ -177,6 +177,9 @@ fn calibrate(recording: &mut Recording, settings: &mut RunSettings) -> Result<()
     }
     eprintln!("calibration in use: {}", recording.calibration_words());
     settings.filter.calibration = settings.filter.calibration.nearly();
+    if is_scaled {
+        settings.filter = settings.filter.with_rough_accelerometer();
+    }
     Ok(())
 }
 
@@ -187,7 +190,7 @@ fn with_calibration_check(
 ) -> (Result<TimedRun, VioError>, Option<CalibrationDoubt>) {
     let check = || {
         let filter = filter(recording, settings, true).ok()?;
-        check_calibration(&filter, &recording.samples, camera_frames(recording))
+        check_calibration(&filter, &recording.samples, || camera_frames(recording))
     };
     if settings.threads < 2 {
         return (run(recording, settings), check());

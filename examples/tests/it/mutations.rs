@@ -105,7 +105,6 @@ fn kinds(s: &Scratch) -> Vec<Kind> {
     let kalibr = || Overrides {
         cameras: Some(s.0.join("cameras.yaml")),
         imu: Some(s.0.join("imu.yaml")),
-        truth: None,
         ..Overrides::default()
     };
     for (name, compressed) in [("MCAP of ROS 2, raw", false), ("MCAP of ROS 2, PNG", true)] {

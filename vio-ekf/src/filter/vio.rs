@@ -290,21 +290,6 @@ impl Vio {
         self.running().map(|running| running.calibration_error(&given.sensors))
     }
 
-    /// A filter that has not started, with a calibration that was found.
-    pub(crate) fn with_calibration(&self, found: &Calibration) -> Result<Self, Error> {
-        let mut sensors = self.sensors.clone();
-        if let Some(camera) = found.camera {
-            check_model(&camera)?;
-            sensors.camera = Arc::new(camera);
-        }
-        let patches = &sensors.settings.patches;
-        if let (Some(_), Some(camera)) = (&sensors.stereo, found.second_camera) {
-            sensors.stereo = Some(StereoCamera::new(sensors.camera.as_ref(), Arc::new(camera), patches)?);
-        }
-        sensors.settings.calibration.time_offset_s = found.time_offset_s;
-        Ok(Self { state: State::new(&sensors.settings), sensors })
-    }
-
     /// A filter of the same sensors that has not started, with other settings.
     pub(crate) fn with_settings(&self, settings: &Settings) -> Result<Self, Error> {
         settings.check()?;

@@ -1,5 +1,6 @@
 //! A second filter beside the first that knows the calibration roughly only, and tells whether it is what was given.
 
+use std::collections::VecDeque;
 use std::fmt;
 
 use nalgebra::UnitQuaternion;
@@ -7,7 +8,7 @@ use nalgebra::UnitQuaternion;
 use crate::camera::Camera;
 use crate::filter::calibration_error::CalibrationError;
 use crate::filter::report::{Calibration, Status};
-use crate::filter::settings::CalibrationSettings;
+use crate::filter::settings::{CalibrationSettings, Settings};
 use crate::filter::state::error_state;
 use crate::filter::vio::Vio;
 use crate::format::calibration::CameraCalibration;
@@ -23,10 +24,8 @@ const IMAGES: usize = 400;
 const FEWEST: usize = 100;
 /// Growth of the logarithm of the evidence that frees a part: ours.
 const ENOUGH: f64 = 10.0;
-/// Starts of the second filter, each after a divergence.
-const STARTS: usize = 5;
-/// Images after which what it has found is nearer to the truth than what was given.
-const LEARNT: usize = 40;
+/// Images that wait at most: 0.4 s at 20 Hz.
+const MOST_WAITING: usize = 8;
 
 /// A part of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,7 +60,7 @@ pub enum CalibrationPart {
 use CalibrationPart as Part;
 
 /// Rows of each part, and how well the best calibrations agree with each other in it: less is not doubted.
-const PARTS: [Rows; 11] = [
+const PARTS: [(Part, usize, &[f64]); 11] = [
     (Part::CameraAttitude, error_state::CAMERA_ATTITUDE, &[1e-3; 3]),
     (Part::CameraPosition, error_state::CAMERA_POSITION, &[5e-3; 3]),
     (Part::Clock, error_state::TIME_OFFSET, &[5e-4]),
@@ -74,9 +73,6 @@ const PARTS: [Rows; 11] = [
     (Part::SecondDistortion, error_state::SECOND_INTRINSICS + 4, &[2e-3; 2]),
     (Part::StereoPose, error_state::SECOND_ATTITUDE, &[1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3]),
 ];
-
-/// A part, its first row, and the floors of its rows.
-type Rows = (Part, usize, &'static [f64]);
 
 /// What is wrong with both cameras of a pair as easily as with one.
 const BOTH: [[Part; 2]; 3] = [
@@ -147,6 +143,14 @@ impl fmt::Display for CalibrationDoubt {
     }
 }
 
+/// What may be wrong, the most probable last: all of it a little, or the lenses much, or place and clock of the camera. A filter that
+/// is to learn much of everything at once loses its way.
+fn hypotheses(given: &Settings) -> Vec<Settings> {
+    let all = given.with_rough_calibration();
+    let (lenses, place) = (all.calibration.of_lenses_only(), all.calibration.of_place_only());
+    vec![Settings { calibration: place, ..*given }, Settings { calibration: lenses, ..*given }, all]
+}
+
 /// The second filter.
 #[derive(Debug, Clone)]
 pub(super) struct CalibrationWatch {
@@ -154,8 +158,19 @@ pub(super) struct CalibrationWatch {
     given: Vio,
     vio: Vio,
     order: Option<PairOrder>,
+    /// What is tried after a divergence, the last first.
+    remaining: Vec<Settings>,
     images: usize,
-    starts: usize,
+    latest: Option<Stamp>,
+    /// Images for which there are no samples yet.
+    waiting: VecDeque<(Stamp, Pixels, Option<Pixels>)>,
+}
+
+/// Columns, rows, and the grey values.
+type Pixels = (usize, usize, Vec<u8>);
+
+fn view((width, height, data): &Pixels) -> Option<ImageView<'_>> {
+    ImageView::new(*width, *height, data).ok()
 }
 
 impl CalibrationWatch {
@@ -171,19 +186,45 @@ impl CalibrationWatch {
         if given.calibration != sure {
             return None;
         }
-        let order = vio.camera_pair().map(|cameras| PairOrder::new(cameras, given));
-        let vio = vio.with_settings(&given.with_rough_calibration()).ok()?;
-        Some(Self { given: vio.clone(), vio, order, images: 0, starts: 1 })
+        let order = vio.camera_pair().map(|cameras| PairOrder::new(cameras, *given));
+        let mut remaining = hypotheses(given);
+        let first = vio.with_settings(remaining.pop()?).ok()?;
+        let given = first.clone();
+        Some(Self { given, vio: first, order, remaining, images: 0, latest: None, waiting: VecDeque::new() })
     }
 
     pub(super) fn imu(&mut self, sample: &Imu) {
         // What is refused is told by the first filter.
         let _ = self.vio.imu(sample);
+        self.latest = Some(sample.stamp);
     }
 
-    /// Gives it the images of a time; what it finds once it has seen enough, after which it is not needed any more.
-    #[allow(clippy::option_option, reason = "nothing yet, nothing found, or a doubt")]
+    /// Takes the images of a time; what it finds once it has seen enough, after which it is not needed any more. By its own idea of the
+    /// camera's clock they may be early: then they wait for the samples.
     pub(super) fn images(
+        &mut self,
+        stamp: Stamp,
+        first: &ImageView,
+        second: Option<&ImageView>,
+    ) -> Option<Option<CalibrationDoubt>> {
+        let owned = |image: &ImageView| (image.width, image.height, image.data.to_vec());
+        self.waiting.push_back((stamp, owned(first), second.map(owned)));
+        while let Some((stamp, ..)) = self.waiting.front() {
+            let time = stamp.plus_secs(self.vio.time_offset_s());
+            if self.latest.is_none_or(|latest| latest < time) && self.waiting.len() < MOST_WAITING {
+                break;
+            }
+            let Some((stamp, first, second)) = self.waiting.pop_front() else { break };
+            let Some(first) = view(&first) else { continue };
+            let second = second.as_ref().and_then(view);
+            if let Some(found) = self.due_images(stamp, &first, second.as_ref()) {
+                return Some(found);
+            }
+        }
+        None
+    }
+
+    fn due_images(
         &mut self,
         stamp: Stamp,
         first: &ImageView,
@@ -206,24 +247,18 @@ impl CalibrationWatch {
         // What it cannot take is told by the first filter.
         let report = given.ok()?;
         match report.status {
-            Status::Diverged(_) if self.starts == STARTS => return Some(None),
             Status::Diverged(_) => {
-                self.restart();
-                (self.starts, self.images) = (self.starts + 1, 0);
+                // It must leave the others, too, while it learns.
+                let Some(next) = self.remaining.pop().and_then(|settings| self.given.with_settings(settings).ok())
+                else {
+                    return Some(None);
+                };
+                (self.vio, self.images) = (next, 0);
             }
             Status::Uninitialised(_) => self.images = 0,
             _ => self.images += usize::from(report.used > 0 && !report.stationary),
         }
         (self.images >= IMAGES).then(|| self.doubt())
-    }
-
-    /// Starts anew, from the calibration that it had found, if it had seen anything: far from the truth a filter diverges on its way.
-    fn restart(&mut self) {
-        let found = self.vio.calibration().filter(|_| self.images >= LEARNT);
-        match found.and_then(|found| self.vio.with_calibration(&found).ok()) {
-            Some(vio) => self.vio = vio,
-            None => self.vio.reset(),
-        }
     }
 
     /// What it has found so far.
@@ -234,6 +269,7 @@ impl CalibrationWatch {
     fn doubt(&self) -> Option<CalibrationDoubt> {
         let found = self.vio.calibration_error(&self.given)?;
         let CalibrationError { error, mut posterior, mut prior } = found;
+        type Rows = (Part, usize, &'static [f64]);
         let rows = |(_, first, floor): &Rows| (*first..first + floor.len()).collect::<Vec<usize>>();
         let estimated = |part: &&Rows| prior.get((part.1, part.1)).is_some_and(|v| *v > 0.0);
         let parts: Vec<&Rows> = PARTS.iter().filter(estimated).collect();
@@ -307,28 +343,44 @@ impl CalibrationWatch {
 }
 
 /// What the first twenty seconds of motion of a recording say against the calibration of a filter that has not started: as a
-/// [`Runner`](crate::run::Runner) does it beside the filter, by itself.
-pub fn check_calibration<P: Picture>(
+/// [`Runner`](crate::run::Runner) does it beside the filter, by itself. `frames` is asked for the frames anew after a divergence.
+pub fn check_calibration<P: Picture, F: IntoIterator<Item = RecordedFrame<P>>>(
     vio: &Vio,
     samples: &[Imu],
-    frames: impl IntoIterator<Item = RecordedFrame<P>>,
+    frames: impl Fn() -> F,
 ) -> Option<CalibrationDoubt> {
-    let mut watch = CalibrationWatch::beside(vio)?;
-    let mut samples = samples.iter();
-    for RecordedFrame { stamp, picture, second } in frames {
-        let Ok(picture) = picture else { continue };
-        let time = stamp.plus_secs(watch.vio.time_offset_s());
-        for sample in samples.by_ref() {
-            watch.imu(sample);
-            if sample.stamp >= time {
-                break;
+    let watch = CalibrationWatch::beside(vio)?;
+    let mut tries = vec![watch.given.clone()];
+    tries.extend(watch.remaining.iter().rev().filter_map(|settings| vio.with_settings(*settings).ok()));
+    tries.into_iter().find_map(|vio| {
+        let one = CalibrationWatch { given: vio.clone(), vio, remaining: Vec::new(), ..watch.clone() };
+        one.over(samples, frames())
+    })?
+}
+
+impl CalibrationWatch {
+    /// What a recording says; `None` where the filter diverges, or sees too little.
+    fn over<P: Picture>(
+        mut self,
+        samples: &[Imu],
+        frames: impl IntoIterator<Item = RecordedFrame<P>>,
+    ) -> Option<Option<CalibrationDoubt>> {
+        let mut samples = samples.iter();
+        for RecordedFrame { stamp, picture, second } in frames {
+            let Ok(picture) = picture else { continue };
+            let time = stamp.plus_secs(self.vio.time_offset_s());
+            while self.latest.is_none_or(|latest| latest < time) {
+                let Some(sample) = samples.next() else { break };
+                self.imu(sample);
+            }
+            let second = second.and_then(Result::ok);
+            let seen = self.images(stamp, &picture.view(), second.as_ref().map(Picture::view).as_ref());
+            match seen {
+                Some(None) if matches!(self.vio.status(), Status::Diverged(_)) => return None,
+                Some(found) => return Some(found),
+                None => {}
             }
         }
-        let second = second.and_then(Result::ok);
-        let seen = watch.images(stamp, &picture.view(), second.as_ref().map(Picture::view).as_ref());
-        if let Some(found) = seen {
-            return found;
-        }
+        (self.images >= FEWEST).then(|| self.doubt())
     }
-    watch.finish()
 }

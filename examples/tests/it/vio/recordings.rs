@@ -140,12 +140,8 @@ fn a_bag_of_ros_2_is_read_like_the_folder() {
     assert_eq!(frames.len(), simulated.frames);
     let camera = folder.camera.camera;
     write_kalibr_files(&s, &folder);
-    let overrides = Overrides {
-        cameras: Some(s.0.join("cameras.yaml")),
-        imu: Some(s.0.join("imu.yaml")),
-        truth: None,
-        ..Overrides::default()
-    };
+    let overrides =
+        Overrides { cameras: Some(s.0.join("cameras.yaml")), imu: Some(s.0.join("imu.yaml")), ..Overrides::default() };
     for compressed in [false, true] {
         let file = s.0.join("bag_0.mcap");
         write_ros2_bag(&file, &folder.samples, &frames, compressed);

@@ -54,6 +54,29 @@ impl CalibrationSettings {
         }
     }
 
+    /// The lenses alone, the first term of the distortion to 0.3.
+    pub(crate) fn of_lenses_only(self) -> Self {
+        Self {
+            camera_position_sigma_m: 0.0,
+            camera_attitude_sigma: 0.0,
+            time_offset_sigma_s: 0.0,
+            distortion_sigma: 2.0 * self.distortion_sigma,
+            ..self
+        }
+    }
+
+    /// Place and clock of the camera alone.
+    pub(crate) fn of_place_only(self) -> Self {
+        Self {
+            focal_sigma: 0.0,
+            principal_point_sigma_px: 0.0,
+            distortion_sigma: 0.0,
+            stereo_attitude_sigma: 0.0,
+            stereo_position_sigma_m: 0.0,
+            ..self
+        }
+    }
+
     /// Of what a first estimate leaves, all of it estimated: a tenth of [`roughly`](Self::roughly).
     #[must_use]
     pub fn nearly(self) -> Self {
