@@ -1,5 +1,7 @@
 //! A second filter beside the first that knows the calibration roughly only, and tells whether it is what was given.
 
+#![allow(clippy::option_option, reason = "nothing yet, nothing found, or a doubt")]
+
 use std::collections::VecDeque;
 use std::fmt;
 
@@ -73,6 +75,9 @@ const PARTS: [(Part, usize, &[f64]); 11] = [
     (Part::SecondDistortion, error_state::SECOND_INTRINSICS + 4, &[2e-3; 2]),
     (Part::StereoPose, error_state::SECOND_ATTITUDE, &[1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3]),
 ];
+
+/// A part, its first row, and the floors of its rows.
+type Rows = (Part, usize, &'static [f64]);
 
 /// What is wrong with both cameras of a pair as easily as with one.
 const BOTH: [[Part; 2]; 3] = [
@@ -186,9 +191,9 @@ impl CalibrationWatch {
         if given.calibration != sure {
             return None;
         }
-        let order = vio.camera_pair().map(|cameras| PairOrder::new(cameras, *given));
+        let order = vio.camera_pair().map(|cameras| PairOrder::new(cameras, given));
         let mut remaining = hypotheses(given);
-        let first = vio.with_settings(remaining.pop()?).ok()?;
+        let first = vio.with_settings(&remaining.pop()?).ok()?;
         let given = first.clone();
         Some(Self { given, vio: first, order, remaining, images: 0, latest: None, waiting: VecDeque::new() })
     }
@@ -249,7 +254,7 @@ impl CalibrationWatch {
         match report.status {
             Status::Diverged(_) => {
                 // It must leave the others, too, while it learns.
-                let Some(next) = self.remaining.pop().and_then(|settings| self.given.with_settings(settings).ok())
+                let Some(next) = self.remaining.pop().and_then(|settings| self.given.with_settings(&settings).ok())
                 else {
                     return Some(None);
                 };
@@ -269,7 +274,6 @@ impl CalibrationWatch {
     fn doubt(&self) -> Option<CalibrationDoubt> {
         let found = self.vio.calibration_error(&self.given)?;
         let CalibrationError { error, mut posterior, mut prior } = found;
-        type Rows = (Part, usize, &'static [f64]);
         let rows = |(_, first, floor): &Rows| (*first..first + floor.len()).collect::<Vec<usize>>();
         let estimated = |part: &&Rows| prior.get((part.1, part.1)).is_some_and(|v| *v > 0.0);
         let parts: Vec<&Rows> = PARTS.iter().filter(estimated).collect();
@@ -351,7 +355,7 @@ pub fn check_calibration<P: Picture, F: IntoIterator<Item = RecordedFrame<P>>>(
 ) -> Option<CalibrationDoubt> {
     let watch = CalibrationWatch::beside(vio)?;
     let mut tries = vec![watch.given.clone()];
-    tries.extend(watch.remaining.iter().rev().filter_map(|settings| vio.with_settings(*settings).ok()));
+    tries.extend(watch.remaining.iter().rev().filter_map(|settings| vio.with_settings(settings).ok()));
     tries.into_iter().find_map(|vio| {
         let one = CalibrationWatch { given: vio.clone(), vio, remaining: Vec::new(), ..watch.clone() };
         one.over(samples, frames())
