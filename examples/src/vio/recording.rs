@@ -135,8 +135,10 @@ impl Recording {
             return Err(unusable("there are no inertial samples".into()));
         };
         if last < began || first > ended {
+            let rate = (self.samples.len() - 1) as f64 / ended.secs_since(began).max(1e-9);
             return Err(unusable(format!(
-                "the images span {first}..{last} s, the inertial samples {began}..{ended} s: both need the same clock"
+                "the images span {first}..{last} s, the inertial samples {began}..{ended} s at {rate:.0} Hz: both need the same clock, \
+                 and the same unit of the stamps"
             )));
         }
         Ok(())

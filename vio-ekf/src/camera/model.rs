@@ -5,12 +5,10 @@ use std::fmt::Debug;
 use nalgebra::{Isometry3, Matrix2x3, Unit, Vector2, Vector3};
 
 use super::Camera;
+use super::image_side::check_side;
 use crate::error::Error;
 use crate::error::invalid;
 use crate::trajectory::is_finite;
-
-/// Longest image side that is plausible.
-const MAX_SIDE: usize = 1 << 15;
 
 /// A camera: image size, projection and its inverse, pose on the body. [`Camera`](crate::Camera) is one, with the lens models of
 /// Kalibr; a caller's own lens goes into [`Vio`](crate::Vio) likewise.
@@ -69,14 +67,5 @@ pub(crate) fn check_model(camera: &dyn CameraModel) -> Result<(), Error> {
         Ok(())
     } else {
         Err(Error::NonFinite { what: "body_from_camera", index: 0 })
-    }
-}
-
-/// Refuses an image side that no camera has.
-pub(crate) fn check_side(name: &'static str, side: usize) -> Result<(), Error> {
-    if (1..=MAX_SIDE).contains(&side) {
-        Ok(())
-    } else {
-        Err(invalid(name, side as f64, "must be between 1 and 32768 pixels"))
     }
 }

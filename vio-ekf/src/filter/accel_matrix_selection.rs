@@ -1,15 +1,14 @@
 //! Whether the accelerometer is calibrated: estimates its matrix at first, and goes on with it only if it is not the identity.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
+use super::calibration_prior::{Entries, prior_sigma};
 use super::estimator::Estimator;
 use super::innovation_adaptation::Correction;
 use super::state::error_state::{ACCEL_MATRIX, MATRIX_SIZE};
 use crate::inertial::imu_noise_estimator::ImuSettings;
 use crate::trace::event;
 
-/// The matrix, row by row.
-pub(crate) type Entries = SVector<f64, MATRIX_SIZE>;
 type Information = SMatrix<f64, MATRIX_SIZE, MATRIX_SIZE>;
 
 /// Seconds of motion before the identity is chosen.
@@ -80,11 +79,6 @@ impl AccelMatrixSelection {
             }
         }
     }
-}
-
-/// Deviations of the entries; one that is known exactly hardly counts.
-pub(crate) fn prior_sigma(settings: &ImuSettings) -> Entries {
-    Entries::from_fn(|k, _| settings.accel_matrix_sigma(k).max(1e-9))
 }
 
 /// Logarithm of the posterior over the prior density of `A = I`.

@@ -1,12 +1,17 @@
 //! What is known of the calibration before the images tell.
 
+use nalgebra::SVector;
+
 use crate::camera::Camera;
 use crate::camera::model::CameraModel;
-use crate::filter::accel_matrix_selection::prior_sigma;
 use crate::filter::settings::{CalibrationSettings, Settings};
 use crate::filter::state::error_state;
 use crate::filter::state::vio_state::{SecondCamera, VioState};
 use crate::inertial::covariance::Covariance;
+use crate::inertial::imu_noise_estimator::ImuSettings;
+
+/// The accelerometer's matrix, row by row.
+pub(crate) type Entries = SVector<f64, { error_state::MATRIX_SIZE }>;
 
 /// Deviation of one axis' focal length from the other's, in units of that of both.
 const ASPECT: f64 = 0.1;
@@ -57,4 +62,9 @@ fn set_lens(covariance: &mut Covariance, row: usize, lens: &Camera, settings: &C
     }
     covariance.reset_row(row + 4, settings.distortion_sigma.powi(2));
     covariance.reset_row(row + 5, (settings.distortion_sigma * SECOND_TERM).powi(2));
+}
+
+/// Deviations of the entries; one that is known exactly hardly counts.
+pub(crate) fn prior_sigma(settings: &ImuSettings) -> Entries {
+    Entries::from_fn(|k, _| settings.accel_matrix_sigma(k).max(1e-9))
 }

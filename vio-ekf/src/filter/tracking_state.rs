@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::accel_matrix_selection::{AccelMatrixSelection, prior_sigma};
+use super::accel_matrix_selection::AccelMatrixSelection;
+use super::calibration_prior::prior_sigma;
 use super::estimator::Estimator;
 use super::frontend::patch::Patch;
 use super::innovation_adaptation::{BeforeImage, InnovationAdaptation};

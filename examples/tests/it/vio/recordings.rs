@@ -92,7 +92,7 @@ fn a_second_camera_in_mcap_is_that_of_the_folder() {
     );
     assert_eq!(text(&recording), folder);
     let mono = open_mcap(&plain, &none).unwrap();
-    assert!(mono.second.is_none() && mono.unused == ["/camera_right/image"], "{:?}", mono.unused);
+    assert!(mono.second.is_none() && mono.unused == ["/camera_right/image (80 images, 376x240)"], "{:?}", mono.unused);
     for compression in ["lz4", "zstd"] {
         let packed = s.0.join(format!("{compression}.mcap"));
         recompress(&plain, &packed, compression);
