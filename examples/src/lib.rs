@@ -12,6 +12,7 @@ pub mod handheld;
 mod mcap_messages;
 pub mod mesh_io;
 pub mod mesh_placement;
+mod minimum_jerk;
 pub mod mission;
 pub mod mission_arguments;
 pub mod mission_file;

@@ -5,5 +5,5 @@ mod localisation;
 mod localised_flight;
 
 pub use approach::Approach;
-pub use localisation::{LocalisationError, LocalisationSettings, MapUpdate, OnboardLocalisation, OnboardPose};
+pub use localisation::{LocalisationError, MapUpdate, OnboardLocalisation};
 pub use localised_flight::{LocalisationFigures, LocalisedFlight};

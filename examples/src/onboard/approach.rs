@@ -3,6 +3,8 @@
 use nalgebra::{Point3, Vector3};
 use paint_sim::flight::{FlightLog, Reference, ReferenceState};
 
+use crate::minimum_jerk::minimum_jerk;
+
 /// The robot stands back by so much, m: about as far as it was from the surface when it scanned it, so that the keyframes show what it sees.
 const BACK: f64 = 0.9;
 /// Duration of the approach, s: 0.4 m/s at most.
@@ -42,15 +44,11 @@ impl Reference for Approach<'_> {
         }
         let first = self.plan.at(0.0);
         let ahead = Vector3::new(first.heading.cos(), first.heading.sin(), 0.0);
-        let s = (t / DURATION).max(0.0);
-        // Minimum jerk from rest to rest (Flash and Hogan 1985), and its derivatives.
-        let share = s * s * s * (10.0 + s * (6.0 * s - 15.0));
-        let speed = 30.0 * s * s * (1.0 - s) * (1.0 - s) / DURATION;
-        let acceleration = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (DURATION * DURATION);
+        let [share, speed, acceleration] = minimum_jerk(t / DURATION);
         ReferenceState {
             position: Point3::from(first.position.coords - ahead * (BACK * (1.0 - share))),
-            velocity: ahead * (BACK * speed),
-            acceleration: ahead * (BACK * acceleration),
+            velocity: ahead * (BACK * speed / DURATION),
+            acceleration: ahead * (BACK * acceleration / (DURATION * DURATION)),
             heading_rate: 0.0,
             aim: None,
             flow: 0.0,

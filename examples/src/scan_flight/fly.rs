@@ -2,9 +2,9 @@
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use paint_sim::TriangleSurface;
+use tsdf_hash::Map;
 use tsdf_hash::place_recognition::KeyframeIndex;
 use tsdf_hash::slam::SlamState;
-use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Map};
 use vio_ekf::sim::{RoomSettings, Scenario, Simulation};
 use vio_ekf::{ImuNoise, Stamp, Trajectory, Vio};
 
@@ -84,10 +84,8 @@ impl ScanFlight {
             let correction = correction.get_or_insert_with(|| truth * by_odometry.inverse());
             // Past the edge of the surface there is nothing to see.
             if image.distance().is_some() {
-                let (width, height, intrinsics) = (camera.width, camera.height, sensor.intrinsics());
-                let depth = DepthView { width, height, data: DepthData::F32 { data: &image.depth }, intrinsics };
-                let rgb = image.colour();
-                let colour = ColourView { width, height, data: ColourData::Rgb8(&rgb), intrinsics };
+                let views = sensor.views(&image);
+                let (depth, colour) = (views.depth(), views.colour());
                 let by_odometry = by_odometry * camera.body_from_camera;
                 let start = *correction * by_odometry;
                 let world_from_camera = localiser.place(&mut map, &depth, &colour, &by_odometry, &start)?;

@@ -7,6 +7,7 @@ use vio_ekf::trajectory::Spline;
 use super::error::ScanFlightError;
 use crate::mesh_io::TriangleMesh;
 use crate::mesh_placement::mean_normal;
+use crate::minimum_jerk::minimum_jerk;
 
 /// Distance of the robot from the foremost point of the surface, metres.
 const STAND_OFF: f64 = 1.5;
@@ -84,8 +85,7 @@ pub(super) fn along(mesh: &TriangleMesh) -> Result<Route, ScanFlightError> {
 fn position_at(corners: &[Vector3<f64>], legs: &[f64], mut t: f64) -> Vector3<f64> {
     for (ends, &duration) in corners.windows(2).zip(legs) {
         if t < duration {
-            let s = (t / duration).max(0.0);
-            return ends[0] + (ends[1] - ends[0]) * (s * s * s * (10.0 + s * (6.0 * s - 15.0)));
+            return ends[0] + (ends[1] - ends[0]) * minimum_jerk(t / duration)[0];
         }
         t -= duration;
     }

@@ -1,15 +1,14 @@
 //! Grey images of rough stone, and their depth.
 
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, UnitVector3, Vector3};
-use paint_net::procedural::value_noise;
+use paint_net::procedural::{lattice, value_noise};
 use paint_sim::render::{Lights, Shading};
 use paint_sim::surface::Hit;
 use paint_sim::{Error, TriangleSurface, render};
-use tsdf_hash::Intrinsics;
+use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics};
 use vio_ekf::camera::Distortion;
 use vio_ekf::{Camera, ImageView};
 
-use super::normal;
 use crate::mesh_io::TriangleMesh;
 
 /// Images per second.
@@ -39,7 +38,7 @@ pub struct SimulatedCamera<'a> {
 pub struct SimulatedImage {
     grey: Vec<u8>,
     /// Along the optical axis, metres; 0 where there is nothing.
-    pub depth: Vec<f32>,
+    depth: Vec<f32>,
 }
 
 impl SimulatedImage {
@@ -53,16 +52,32 @@ impl SimulatedImage {
         ImageView { width: IMAGE.0, height: IMAGE.1, data: &self.grey }
     }
 
-    /// The same, as the map wants it.
-    pub fn colour(&self) -> Vec<u8> {
-        self.grey.iter().flat_map(|grey| [*grey; 3]).collect()
-    }
-
     /// The middle one of all depths, metres; `None` of nothing but sky.
     pub fn distance(&self) -> Option<f64> {
         let mut depths: Vec<f32> = self.depth.iter().copied().filter(|depth| *depth > 0.0).collect();
         let middle = depths.len() / 2;
         (!depths.is_empty()).then(|| f64::from(*depths.select_nth_unstable_by(middle, f32::total_cmp).1))
+    }
+}
+
+/// Depth and colour as the map takes them.
+pub struct RgbdViews<'a> {
+    depth: &'a [f32],
+    rgb: Vec<u8>,
+    intrinsics: Intrinsics,
+}
+
+impl RgbdViews<'_> {
+    /// Depth.
+    pub fn depth(&self) -> DepthView<'_> {
+        let (data, (width, height, _)) = (DepthData::F32 { data: self.depth }, IMAGE);
+        DepthView { width, height, data, intrinsics: self.intrinsics }
+    }
+
+    /// Colour, registered to depth.
+    pub fn colour(&self) -> ColourView<'_> {
+        let (data, (width, height, _)) = (ColourData::Rgb8(&self.rgb), IMAGE);
+        ColourView { width, height, data, intrinsics: self.intrinsics }
     }
 }
 
@@ -81,10 +96,11 @@ impl<'a> SimulatedCamera<'a> {
         Self { camera: camera(), mesh, surface, lights, seed, threads }
     }
 
-    /// Of images and depth, pixels.
-    pub fn intrinsics(&self) -> Intrinsics {
+    /// An image of it for the map.
+    pub fn views<'i>(&self, image: &'i SimulatedImage) -> RgbdViews<'i> {
         let Camera { fx, fy, cx, cy, .. } = self.camera;
-        Intrinsics { fx, fy, cx, cy }
+        let rgb = image.grey.iter().flat_map(|grey| [*grey; 3]).collect();
+        RgbdViews { depth: &image.depth, rgb, intrinsics: Intrinsics { fx, fy, cx, cy } }
     }
 
     /// Image `index`, taken from a pose.
@@ -127,7 +143,8 @@ impl<'a> SimulatedCamera<'a> {
 
     /// A number of the standard normal distribution for a pixel of an image.
     fn noise(&self, image: usize, pixel: usize) -> f64 {
-        normal(self.seed ^ 0x5EE5, image as i64, pixel as i64)
+        let uniform = |half: i64| lattice(self.seed ^ 0x5EE5, image as i64, 2 * pixel as i64 + half);
+        (-2.0 * (1.0 - uniform(0)).ln()).sqrt() * (std::f64::consts::TAU * uniform(1)).cos()
     }
 }
 

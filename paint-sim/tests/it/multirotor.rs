@@ -231,15 +231,18 @@ fn sensors_without_noise_measure_the_motion() {
     let mut imu = Imu::new(silent, 1).unwrap();
     // On the ground: gravity upwards. In free fall: nothing, however it turns about its axis of symmetry.
     let mut vehicle = at_origin(without_drag());
-    imu.measure(&vehicle, 4e-3);
+    imu.measure(&vehicle.velocity(), &vehicle.rotation(), 4e-3);
     run(&mut vehicle, 0.0, &Surroundings { ground: Some(0.0), ..Surroundings::default() }, 4e-3);
-    assert!((imu.measure(&vehicle, 4e-3).specific_force - Vector3::z() * GRAVITY).norm() < 1e-12);
+    assert!(
+        (imu.measure(&vehicle.velocity(), &vehicle.rotation(), 4e-3).specific_force - Vector3::z() * GRAVITY).norm()
+            < 1e-12
+    );
     let spin = Vector3::new(0.0, 0.0, 2.0);
     let mut vehicle = at_origin(without_drag()).with_motion(UnitQuaternion::identity(), Vector3::zeros(), spin);
     let mut imu = Imu::new(silent, 1).unwrap();
-    imu.measure(&vehicle, 4e-3);
+    imu.measure(&vehicle.velocity(), &vehicle.rotation(), 4e-3);
     run(&mut vehicle, 0.0, &Surroundings::default(), 4e-3);
-    let reading = imu.measure(&vehicle, 4e-3);
+    let reading = imu.measure(&vehicle.velocity(), &vehicle.rotation(), 4e-3);
     assert!(reading.specific_force.norm() < 1e-9 && (reading.angular_velocity - spin).norm() < 1e-9);
 
     let mut barometer = Barometer::new(BarometerSettings { noise: 0.0, origin_height: 0.0 }, 1).unwrap();
@@ -268,7 +271,7 @@ fn noise_has_its_density_and_follows_the_seed() {
     let still = ImuSettings { accelerometer_random_walk: 0.0, gyroscope_random_walk: 0.0, ..ImuSettings::default() };
     let readings = |seed| {
         let mut imu = Imu::new(still, seed).unwrap();
-        (0..20_000).map(move |_| imu.measure(&vehicle, 4e-3)).collect::<Vec<_>>()
+        (0..20_000).map(move |_| imu.measure(&vehicle.velocity(), &vehicle.rotation(), 4e-3)).collect::<Vec<_>>()
     };
     let first = readings(1);
     let spread = |of: &dyn Fn(&ImuReading) -> f64| {
@@ -279,7 +282,7 @@ fn noise_has_its_density_and_follows_the_seed() {
     assert!((spread(&|r| r.specific_force.x) / (2e-3 / 4e-3_f64.sqrt()) - 1.0).abs() < 0.02);
     assert!((spread(&|r| r.angular_velocity.z) / (1.7e-4 / 4e-3_f64.sqrt()) - 1.0).abs() < 0.02);
     let vehicle = at_origin(MultirotorSettings::default());
-    let second = Imu::new(still, 2).unwrap().measure(&vehicle, 4e-3);
+    let second = Imu::new(still, 2).unwrap().measure(&vehicle.velocity(), &vehicle.rotation(), 4e-3);
     assert_ne!(first[0], second);
-    assert_eq!(first[0], Imu::new(still, 1).unwrap().measure(&vehicle, 4e-3));
+    assert_eq!(first[0], Imu::new(still, 1).unwrap().measure(&vehicle.velocity(), &vehicle.rotation(), 4e-3));
 }

@@ -2,7 +2,6 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::vehicle::Multirotor;
 use crate::error::{Error, check_not_negative};
 use crate::flight::airframe::GRAVITY;
 use crate::rng::Rng;
@@ -79,9 +78,10 @@ impl Imu {
         Ok(Self { settings, rng, gyroscope_bias, accelerometer_bias, before: None })
     }
 
-    /// The mean specific force and angular velocity since the last reading, `dt` seconds ago.
-    pub fn measure(&mut self, vehicle: &Multirotor, dt: f64) -> ImuReading {
-        let now = (vehicle.velocity(), vehicle.rotation());
+    /// The mean specific force and angular velocity since the last reading, `dt` seconds ago, of a body with a velocity (m/s, world) and an
+    /// attitude (`world_from_body`).
+    pub fn measure(&mut self, velocity: &Vector3<f64>, rotation: &UnitQuaternion<f64>, dt: f64) -> ImuReading {
+        let now = (*velocity, *rotation);
         let (velocity, rotation) = self.before.replace(now).unwrap_or(now);
         let turn = rotation.inverse() * now.1;
         // The force is given in the middle of the interval.

@@ -1,0 +1,265 @@
+//! Odometry in a stored map: poses from the map correct it, and stand in for it while it cannot be believed.
+
+use nalgebra::{Isometry3, Matrix6, Vector3};
+
+use super::inertial_check::InertialCheck;
+use super::map_pose::MapPose;
+use super::pose_measurement::PoseMeasurement;
+use super::unified::{UnifiedSettings, UnifiedVio};
+use crate::camera::model::CameraModel;
+use crate::error::Error;
+use crate::filter::Settings;
+use crate::inertial::initial_state::{InitialSigma, InitialState};
+use crate::inertial::odometry::Odometry;
+use crate::samples::{ImageView, Imu};
+use crate::stamp::Stamp;
+
+/// Settings of [`MapAidedVio`]. Ours.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MapAidedSettings {
+    /// The estimator; its frame of poses is the map.
+    pub unified: UnifiedSettings,
+    /// Seconds from one pose in the map to the next; 0.1.
+    pub pose_interval_s: f64,
+    /// What the map itself is off, m and rad per axis: the same for all images of a place, so no number of poses averages it away; 2e-3, 1e-3.
+    pub map_sigma: [f64; 2],
+    /// Time after which the error of a pose in the map is another one, s; 0.3.
+    pub map_correlation_s: f64,
+    /// A position that is less well known is not trusted, m along the axis where it is known least; 0.01.
+    pub trusted_sigma_m: f64,
+    /// Nor is one that the map has not confirmed for so long, s; 0.5.
+    pub trusted_age_s: f64,
+    /// A pose in the map that is off the expected one by more than this, m and rad, and by more than three deviations, contradicts it; 0.02, 0.02.
+    pub contradiction: [f64; 2],
+    /// Inertial samples farther apart than this, s, end the odometry, and without one for so long it says nothing; 0.02.
+    pub longest_gap_s: f64,
+    /// Poses in the map in a row that must follow from each other before the odometry starts again; 5.
+    pub confirmations: usize,
+}
+
+impl Default for MapAidedSettings {
+    fn default() -> Self {
+        Self {
+            unified: UnifiedSettings::default(),
+            pose_interval_s: 0.1,
+            map_sigma: [2e-3, 1e-3],
+            map_correlation_s: 0.3,
+            trusted_sigma_m: 0.01,
+            trusted_age_s: 0.5,
+            contradiction: [0.02, 0.02],
+            longest_gap_s: 0.02,
+            confirmations: 5,
+        }
+    }
+}
+
+/// Where the body is in the map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AidedPose {
+    /// Pose in the world of the map.
+    pub world_from_body: Isometry3<f64>,
+    /// Standard deviation of the position along the axis where it is known least, m; infinite while the map stands in for the odometry.
+    pub position_sigma_m: f64,
+    /// Whether something may be done that must not miss.
+    pub trusted: bool,
+    /// Poses of the same number follow from each other; at every change of the source it rises.
+    pub source: usize,
+}
+
+/// Standard deviations at a start: velocity (m/s) of a body that stands; position (m), attitude (rad) and velocity of one that moves, at the
+/// latest, as the start is later than the pose that it is made of.
+const STANDING: f64 = 0.05;
+const MOVING: [f64; 3] = [0.01, 0.02, 0.3];
+
+/// [`UnifiedVio`] in a stored map, with tests of what it is given: inertial samples that stand still or have gaps, and poses in the map that
+/// contradict the expected ones, end the odometry at once. The map's poses, moved on, stand in for it, not to be trusted, until enough of
+/// them follow from each other; the odometry then starts anew.
+#[derive(Debug, Clone)]
+pub struct MapAidedVio {
+    vio: UnifiedVio,
+    settings: MapAidedSettings,
+    imu: InertialCheck,
+    /// When the map confirmed the odometry last.
+    confirmed: Option<Stamp>,
+    last: Option<MapPose>,
+    /// Poses in the map that have followed from each other since the odometry was given up; `None` while it goes on.
+    recovering: Option<usize>,
+    source: usize,
+}
+
+impl MapAidedVio {
+    /// Not started yet.
+    ///
+    /// # Errors
+    /// As [`UnifiedVio::new`].
+    pub fn new(camera: impl CameraModel + 'static, vio: Settings, settings: MapAidedSettings) -> Result<Self, Error> {
+        Ok(Self {
+            vio: UnifiedVio::new(camera, vio, settings.unified)?,
+            settings,
+            imu: InertialCheck::default(),
+            confirmed: None,
+            last: None,
+            recovering: None,
+            source: 0,
+        })
+    }
+
+    /// The estimator.
+    pub fn unified(&self) -> &UnifiedVio {
+        &self.vio
+    }
+
+    /// Starts a body that stands and was found in the map. At least one inertial sample must have come. Returns its pose.
+    ///
+    /// # Errors
+    /// As [`UnifiedVio::initialize`]; information without an inverse.
+    pub fn start(&mut self, found: &PoseMeasurement) -> Result<Isometry3<f64>, Error> {
+        let pose = self.map_pose(None, found);
+        let [position, attitude] = self.spread(found)?;
+        self.initialize(&pose, [position, attitude, STANDING])?;
+        self.last = Some(pose);
+        Ok(pose.world_from_body)
+    }
+
+    /// Takes a sample of the inertial sensor.
+    ///
+    /// # Errors
+    /// As [`UnifiedVio::imu`].
+    pub fn imu(&mut self, sample: &Imu) -> Result<(), Error> {
+        self.vio.imu(sample)?;
+        if !self.imu.is_sound(sample, self.settings.longest_gap_s) && self.recovering.is_none() {
+            self.give_up();
+        }
+        Ok(())
+    }
+
+    /// Takes an image; see [`UnifiedVio::image`].
+    ///
+    /// # Errors
+    /// As [`UnifiedVio::image`].
+    pub fn image(&mut self, stamp: Stamp, image: &ImageView) -> Result<(), Error> {
+        self.vio.image(stamp, image)
+    }
+
+    /// Takes what the map says of a moment: a pose, or nothing. `expected` is what [`pose`](Self::pose) said then. Returns whether the map
+    /// confirms it.
+    ///
+    /// # Errors
+    /// As [`UnifiedVio::pose`].
+    pub fn map(&mut self, found: Option<&PoseMeasurement>, expected: Option<&AidedPose>) -> Result<bool, Error> {
+        let Some(found) = found else {
+            self.last = None;
+            return Ok(false);
+        };
+        let pose = self.map_pose(self.last, found);
+        let follows = self.last.is_some_and(|last| self.agree(&last.after(pose.stamp), &pose.world_from_body, 0.0));
+        self.last = Some(pose);
+        if self.vio.output().is_none() && self.recovering.is_none() {
+            self.give_up();
+        }
+        if let Some(count) = self.recovering {
+            let count = if follows && self.imu.is_moving() { count + 1 } else { 0 };
+            self.recovering = Some(count);
+            if count >= self.settings.confirmations {
+                let [position, attitude] = self.spread(found)?;
+                self.initialize(&pose, [position.max(MOVING[0]), attitude.max(MOVING[1]), MOVING[2]])?;
+            }
+            return Ok(false);
+        }
+        // What was expected of another source says nothing.
+        let expected = expected.filter(|expected| expected.source == self.source);
+        let agrees = |expected: &AidedPose| {
+            self.agree(&expected.world_from_body, &pose.world_from_body, expected.position_sigma_m)
+        };
+        if !expected.is_none_or(agrees) {
+            self.give_up();
+            return Ok(false);
+        }
+        if expected.is_some() {
+            self.confirmed = Some(pose.stamp);
+        }
+        let settings = &self.settings;
+        let independent = (2.0 * settings.map_correlation_s / settings.pose_interval_s).max(1.0);
+        let information = self.covariance(found)?.cholesky().map(|factor| factor.inverse() / independent);
+        if let Some(information) = information {
+            self.vio.pose(&PoseMeasurement { information, ..*found })?;
+        }
+        Ok(expected.is_some())
+    }
+
+    /// Where the body is now; `None` before the start, and where nothing recent says so.
+    pub fn pose(&self, now: Stamp) -> Option<AidedPose> {
+        let Self { settings, source, .. } = self;
+        let silent = self.imu.last().is_none_or(|last| now.secs_since(last) > settings.longest_gap_s);
+        if silent || self.recovering.is_some() {
+            let last = self.last.filter(|last| now.secs_since(last.stamp) <= settings.trusted_age_s)?;
+            let world_from_body = last.after(now);
+            return Some(AidedPose {
+                world_from_body,
+                position_sigma_m: f64::INFINITY,
+                trusted: false,
+                source: *source,
+            });
+        }
+        let Odometry { stamp, world_from_body, covariance, .. } = self.vio.output()?;
+        let position_sigma_m = largest_deviation(&covariance.fixed_view::<3, 3>(0, 0).into_owned());
+        let age = self.confirmed.map_or(f64::INFINITY, |confirmed| stamp.secs_since(confirmed));
+        let trusted = position_sigma_m <= settings.trusted_sigma_m && age <= settings.trusted_age_s;
+        Some(AidedPose { world_from_body, position_sigma_m, trusted, source: *source })
+    }
+
+    /// Nothing that the odometry says is believed until it starts again.
+    fn give_up(&mut self) {
+        (self.confirmed, self.recovering) = (None, Some(0));
+        self.source += 1;
+    }
+
+    /// Odometry from a pose in the map, moved on to the latest inertial sample.
+    fn initialize(&mut self, pose: &MapPose, [position, attitude, velocity]: [f64; 3]) -> Result<(), Error> {
+        let stamp = self.imu.last().map_or(pose.stamp, |last| last.max(pose.stamp));
+        let world_from_body = pose.after(stamp);
+        let [gyro_bias, accel_bias] = [Vector3::zeros(); 2];
+        let velocity_in_body = world_from_body.inverse_transform_vector(&pose.velocity);
+        let sigma = InitialSigma { position, velocity, yaw: attitude, tilt: attitude, ..InitialSigma::default() };
+        self.vio.initialize(&InitialState {
+            stamp,
+            world_from_body,
+            velocity_in_body,
+            gyro_bias,
+            accel_bias,
+            sigma,
+        })?;
+        (self.confirmed, self.recovering) = (Some(pose.stamp), None);
+        self.source += 1;
+        Ok(())
+    }
+
+    fn map_pose(&self, before: Option<MapPose>, found: &PoseMeasurement) -> MapPose {
+        let UnifiedSettings { source_from_world, body_from_sensor, .. } = &self.settings.unified;
+        MapPose::next(before, found.stamp, found.of_body(source_from_world, body_from_sensor).world_from_body)
+    }
+
+    fn agree(&self, one: &Isometry3<f64>, other: &Isometry3<f64>, position_sigma_m: f64) -> bool {
+        let [shift, turn] = self.settings.contradiction;
+        (one.translation.vector - other.translation.vector).norm() <= shift.max(3.0 * position_sigma_m)
+            && one.rotation.angle_to(&other.rotation) <= turn
+    }
+
+    /// The covariance of a pose in the map with what the map itself is off.
+    fn covariance(&self, found: &PoseMeasurement) -> Result<Matrix6<f64>, Error> {
+        let unusable = Error::NonFinite { what: "information of a pose", index: 0 };
+        let own = found.information.cholesky().ok_or(unusable)?.inverse();
+        let [shift, turn] = self.settings.map_sigma.map(|sigma| sigma * sigma);
+        Ok(own + Matrix6::from_diagonal(&[shift, shift, shift, turn, turn, turn].into()))
+    }
+
+    /// Deviations of position and attitude along the axes where they are known least.
+    fn spread(&self, found: &PoseMeasurement) -> Result<[f64; 2], Error> {
+        let covariance = self.covariance(found)?;
+        Ok([0, 3].map(|first| largest_deviation(&covariance.fixed_view::<3, 3>(first, first).into_owned())))
+    }
+}
+
+fn largest_deviation(covariance: &nalgebra::Matrix3<f64>) -> f64 {
+    covariance.symmetric_eigenvalues().max().max(0.0).sqrt()
+}
