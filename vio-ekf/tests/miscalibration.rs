@@ -5,7 +5,6 @@
 //! length, `CAMERAS=1` or `2` one table of both.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
-#![allow(clippy::large_types_passed_by_value, clippy::unused_self, reason = "a table of runs of seconds each")]
 
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use vio_ekf::camera::Distortion;
@@ -239,8 +238,8 @@ impl Flight {
     }
 
     /// A run as the binary makes it.
-    fn run(&self, given: &Given, settings: Settings, count: usize) -> (Result<Run, String>, Vec<String>) {
-        let mut runner = Runner::new(self.filter(given, settings, count), RunnerSettings::default());
+    fn run(&self, given: &Given, settings: &Settings, count: usize) -> (Result<Run, String>, Vec<String>) {
+        let mut runner = Runner::new(Self::filter(given, settings, count), RunnerSettings::default());
         let found = validate_samples(&given.samples, 200.0, 9.81);
         let mut said: Vec<String> = match found {
             Ok(found) => found.warnings.iter().map(ToString::to_string).collect(),
@@ -278,16 +277,16 @@ impl Flight {
         (run.map_err(|error| error.to_string()), said)
     }
 
-    fn filter(&self, given: &Given, settings: Settings, count: usize) -> Vio {
+    fn filter(given: &Given, settings: &Settings, count: usize) -> Vio {
         let imu = ImuCalibration { noise: ImuNoise::default(), rate_hz: 200.0, body_from_imu: Isometry3::identity() };
-        Vio::from_calibration(&given.calibrations()[..count], &imu, settings).unwrap()
+        Vio::from_calibration(&given.calibrations()[..count], &imu, *settings).unwrap()
     }
 
     /// As the binary does it with `--calibrate`: checks until nothing is doubted; how many, and the settings of the run then.
     fn calibrated(&self, given: &Given, count: usize) -> (Given, usize, Settings) {
         let (mut given, mut checks, mut is_scaled) = (given.clone(), 0, false);
         for _ in 0..4 {
-            let filter = self.filter(&given, Settings::default(), count);
+            let filter = Self::filter(&given, &Settings::default(), count);
             let frames = || {
                 self.frames.iter().map(|(stamp, images)| {
                     let [first, second] = [0, 1].map(|k| if given.swapped { 1 - k } else { k });
@@ -366,9 +365,9 @@ fn wrong_calibrations() {
                     }
                     Err(why) => format!("failed: {why}"),
                 };
-                let (plain, mut said) = flight.run(&given, Settings::default(), count);
+                let (plain, mut said) = flight.run(&given, &Settings::default(), count);
                 let (found, checks, settings) = flight.calibrated(&given, count);
-                let (calibrated, _) = flight.run(&found, settings, count);
+                let (calibrated, _) = flight.run(&found, &settings, count);
                 let [plain, calibrated] = [&plain, &calibrated].map(figures);
                 said.dedup();
                 println!("{case:24} | {plain:24} | {calibrated:24} | {checks} | {}", said.join("; "));

@@ -43,11 +43,6 @@ pub struct OnboardLocalisation {
     aided: MapAidedVio,
     slam: Slam,
     body_from_camera: Isometry3<f64>,
-    /// The camera in the world of the prior, whose motion is that of `expected`.
-    prior: Isometry3<f64>,
-    /// The pose at the last depth image, and the motion of the camera to it.
-    expected: Option<AidedPose>,
-    motion: Isometry3<f64>,
 }
 
 impl OnboardLocalisation {
@@ -74,9 +69,6 @@ impl OnboardLocalisation {
             aided: MapAidedVio::new(camera, odometry, settings)?,
             slam: Slam::with_source(slam, map.without_trajectory(), FrameMemory::new())?,
             body_from_camera,
-            prior: Isometry3::identity(),
-            expected: None,
-            motion: Isometry3::identity(),
         })
     }
 
@@ -94,7 +86,6 @@ impl OnboardLocalisation {
         let outcome = self.slam.frame(seconds(stamp), depth, Some(colour), None)?;
         let found = outcome.tracking.filter(|_| outcome.world_from_camera.is_some());
         let Some(measured) = found.and_then(|tracking| measurement(stamp, &tracking)) else { return Ok(None) };
-        self.prior = measured.source_from_sensor;
         Ok(Some(self.aided.start(&measured)?))
     }
 
@@ -125,16 +116,10 @@ impl OnboardLocalisation {
         colour: &ColourView,
         expected: Option<&AidedPose>,
     ) -> Result<MapUpdate, LocalisationError> {
-        // Where the source of poses has changed, the camera is taken to move as before: a jump would be a motion to the tracker.
-        if let (Some(before), Some(now)) = (self.expected, expected)
-            && before.source == now.source
-        {
-            let [before, now] = [before, *now].map(|pose| pose.world_from_body * self.body_from_camera);
-            self.motion = before.inverse() * now;
-        }
-        self.expected = expected.copied();
-        self.prior *= self.motion;
-        let outcome = self.slam.frame(seconds(stamp), depth, Some(colour), Some(&self.prior))?;
+        // While the map stands in for the odometry, its own poses are no odometry to lead the tracker by: the camera moves as before.
+        let odometry = expected.filter(|expected| !expected.from_map);
+        let prior = odometry.map(|expected| expected.world_from_body * self.body_from_camera);
+        let outcome = self.slam.frame(seconds(stamp), depth, Some(colour), prior.as_ref())?;
         let tracking = outcome.tracking.filter(|tracking| tracking.is_tracked() && tracking.degenerate.is_empty());
         let measured = tracking.and_then(|tracking| measurement(stamp, &tracking));
         let confirmed = self.aided.map(measured.as_ref(), expected)?;

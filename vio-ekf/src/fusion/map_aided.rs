@@ -29,11 +29,15 @@ pub struct MapAidedSettings {
     pub trusted_sigma_m: f64,
     /// Nor is one that the map has not confirmed for so long, s; 0.5.
     pub trusted_age_s: f64,
+    /// Nor, after a start in motion, is one that the map has not confirmed so many times in a row; 10.
+    pub trusted_confirmations: usize,
     /// A pose in the map that is off the expected one by more than this, m and rad, and by more than three deviations, contradicts it; 0.02, 0.02.
     pub contradiction: [f64; 2],
+    /// Poses in the map follow from each other if they depart from constant velocity by no more than this, m and rad; 0.1, 0.1.
+    pub jump: [f64; 2],
     /// Inertial samples farther apart than this, s, end the odometry, and without one for so long it says nothing; 0.02.
     pub longest_gap_s: f64,
-    /// Poses in the map in a row that must follow from each other before the odometry starts again; 5.
+    /// Poses in the map in a row that must follow from each other before the odometry starts again; 2.
     pub confirmations: usize,
 }
 
@@ -46,9 +50,11 @@ impl Default for MapAidedSettings {
             map_correlation_s: 0.3,
             trusted_sigma_m: 0.01,
             trusted_age_s: 0.5,
+            trusted_confirmations: 10,
             contradiction: [0.02, 0.02],
+            jump: [0.1, 0.1],
             longest_gap_s: 0.02,
-            confirmations: 5,
+            confirmations: 2,
         }
     }
 }
@@ -58,8 +64,10 @@ impl Default for MapAidedSettings {
 pub struct AidedPose {
     /// Pose in the world of the map.
     pub world_from_body: Isometry3<f64>,
-    /// Standard deviation of the position along the axis where it is known least, m; infinite while the map stands in for the odometry.
+    /// Standard deviation of the position along the axis where it is known least, m; infinite where it is from the map.
     pub position_sigma_m: f64,
+    /// Whether the map stands in for the odometry: the last pose in it, moved on.
+    pub from_map: bool,
     /// Whether something may be done that must not miss.
     pub trusted: bool,
     /// Poses of the same number follow from each other; at every change of the source it rises.
@@ -79,8 +87,9 @@ pub struct MapAidedVio {
     vio: UnifiedVio,
     settings: MapAidedSettings,
     imu: InertialCheck,
-    /// When the map confirmed the odometry last.
+    /// When the map confirmed the odometry last, and how many times it has to before that is trusted.
     confirmed: Option<Stamp>,
+    to_confirm: usize,
     last: Option<MapPose>,
     /// Poses in the map that have followed from each other since the odometry was given up; `None` while it goes on.
     recovering: Option<usize>,
@@ -98,6 +107,7 @@ impl MapAidedVio {
             settings,
             imu: InertialCheck::default(),
             confirmed: None,
+            to_confirm: 0,
             last: None,
             recovering: None,
             source: 0,
@@ -152,7 +162,8 @@ impl MapAidedVio {
             return Ok(false);
         };
         let pose = self.map_pose(self.last, found);
-        let follows = self.last.is_some_and(|last| self.agree(&last.after(pose.stamp), &pose.world_from_body, 0.0));
+        let follows =
+            self.last.is_some_and(|last| agree(&last.after(pose.stamp), &pose.world_from_body, self.settings.jump));
         self.last = Some(pose);
         if self.vio.output().is_none() && self.recovering.is_none() {
             self.give_up();
@@ -163,13 +174,16 @@ impl MapAidedVio {
             if count >= self.settings.confirmations {
                 let [position, attitude] = self.spread(found)?;
                 self.initialize(&pose, [position.max(MOVING[0]), attitude.max(MOVING[1]), MOVING[2]])?;
+                self.to_confirm = self.settings.trusted_confirmations;
             }
             return Ok(false);
         }
         // What was expected of another source says nothing.
         let expected = expected.filter(|expected| expected.source == self.source);
         let agrees = |expected: &AidedPose| {
-            self.agree(&expected.world_from_body, &pose.world_from_body, expected.position_sigma_m)
+            let [shift, turn] = self.settings.contradiction;
+            let within = [shift.max(3.0 * expected.position_sigma_m), turn];
+            agree(&expected.world_from_body, &pose.world_from_body, within)
         };
         if !expected.is_none_or(agrees) {
             self.give_up();
@@ -177,6 +191,7 @@ impl MapAidedVio {
         }
         if expected.is_some() {
             self.confirmed = Some(pose.stamp);
+            self.to_confirm = self.to_confirm.saturating_sub(1);
         }
         let settings = &self.settings;
         let independent = (2.0 * settings.map_correlation_s / settings.pose_interval_s).max(1.0);
@@ -197,6 +212,7 @@ impl MapAidedVio {
             return Some(AidedPose {
                 world_from_body,
                 position_sigma_m: f64::INFINITY,
+                from_map: true,
                 trusted: false,
                 source: *source,
             });
@@ -204,8 +220,9 @@ impl MapAidedVio {
         let Odometry { stamp, world_from_body, covariance, .. } = self.vio.output()?;
         let position_sigma_m = largest_deviation(&covariance.fixed_view::<3, 3>(0, 0).into_owned());
         let age = self.confirmed.map_or(f64::INFINITY, |confirmed| stamp.secs_since(confirmed));
-        let trusted = position_sigma_m <= settings.trusted_sigma_m && age <= settings.trusted_age_s;
-        Some(AidedPose { world_from_body, position_sigma_m, trusted, source: *source })
+        let confirmed = self.to_confirm == 0 && age <= settings.trusted_age_s;
+        let trusted = confirmed && position_sigma_m <= settings.trusted_sigma_m;
+        Some(AidedPose { world_from_body, position_sigma_m, from_map: false, trusted, source: *source })
     }
 
     /// Nothing that the odometry says is believed until it starts again.
@@ -239,12 +256,6 @@ impl MapAidedVio {
         MapPose::next(before, found.stamp, found.of_body(source_from_world, body_from_sensor).world_from_body)
     }
 
-    fn agree(&self, one: &Isometry3<f64>, other: &Isometry3<f64>, position_sigma_m: f64) -> bool {
-        let [shift, turn] = self.settings.contradiction;
-        (one.translation.vector - other.translation.vector).norm() <= shift.max(3.0 * position_sigma_m)
-            && one.rotation.angle_to(&other.rotation) <= turn
-    }
-
     /// The covariance of a pose in the map with what the map itself is off.
     fn covariance(&self, found: &PoseMeasurement) -> Result<Matrix6<f64>, Error> {
         let unusable = Error::NonFinite { what: "information of a pose", index: 0 };
@@ -258,6 +269,12 @@ impl MapAidedVio {
         let covariance = self.covariance(found)?;
         Ok([0, 3].map(|first| largest_deviation(&covariance.fixed_view::<3, 3>(first, first).into_owned())))
     }
+}
+
+/// Whether poses are within so much of each other, m and rad.
+fn agree(one: &Isometry3<f64>, other: &Isometry3<f64>, [shift, turn]: [f64; 2]) -> bool {
+    (one.translation.vector - other.translation.vector).norm() <= shift
+        && one.rotation.angle_to(&other.rotation) <= turn
 }
 
 fn largest_deviation(covariance: &nalgebra::Matrix3<f64>) -> f64 {

@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::filter::report::FrameReport;
 use crate::inertial::divergence::DivergenceCause;
 use crate::inertial::odometry::Odometry;
-use crate::run::calibration_watch::CalibrationDoubt;
+use crate::run::calibration_doubt::CalibrationDoubt;
 use crate::stamp::Stamp;
 
 /// What became of an image.

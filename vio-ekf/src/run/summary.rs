@@ -4,7 +4,7 @@ use nalgebra::Matrix3;
 
 use crate::error::Error;
 use crate::filter::report::Calibration;
-use crate::run::calibration_watch::CalibrationDoubt;
+use crate::run::calibration_doubt::CalibrationDoubt;
 use crate::run::outcome::{Loss, SkippedImage};
 use crate::run::segments::Segment;
 use crate::stamp::Stamp;

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
 
 mod accel_matrix;
+mod calibration_doubt;
 mod camera;
 mod dead_reckoning;
 mod evaluation;

@@ -1,0 +1,77 @@
+//! A calibration that the images contradict is named, a sound one is not.
+
+use vio_ekf::imu_check::validate_samples;
+use vio_ekf::run::{CalibrationPart, Run, Runner, RunnerSettings};
+use vio_ekf::sim::{
+    RoomSettings, Scenario, SimulatedCamera, Simulation, camera_ahead, camera_ahead_right, painting_flight,
+};
+use vio_ekf::{Camera, ImuNoise, Settings, Vio};
+
+/// A flight along a wall, seen by two cameras.
+fn flight(seed: u64) -> Simulation {
+    let cameras = [camera_ahead(), camera_ahead_right()];
+    let cameras = cameras.map(|camera| SimulatedCamera { camera, ..SimulatedCamera::default() }).to_vec();
+    let room = RoomSettings { texture_size: 512, ..RoomSettings::default() };
+    Simulation::new(painting_flight(seed, 16.0).unwrap(), Scenario { seed, cameras, room, ..Scenario::default() })
+        .unwrap()
+}
+
+/// The first camera alone, taken for another one.
+fn run(simulation: &Simulation, camera: Camera, settings: RunnerSettings) -> Run {
+    let mut runner = Runner::new(Vio::new(camera, ImuNoise::default(), Settings::default()).unwrap(), settings);
+    let mut samples = simulation.imu(0).unwrap().samples.into_iter();
+    for index in 0..simulation.frame_count(0) {
+        let Some(frame) = simulation.frame(0, index).unwrap() else { continue };
+        runner.imu_until(frame.stamp, &mut samples).unwrap();
+        runner.image(frame.stamp, &frame.view()).unwrap();
+    }
+    runner.finish().unwrap()
+}
+
+#[test]
+fn a_wrong_focal_length_is_named_with_the_right_one_and_a_sound_one_is_not() {
+    let simulation = flight(3);
+    let sound = camera_ahead();
+    assert_eq!(run(&simulation, sound, RunnerSettings::default()).doubt, None);
+    let wrong = Camera { fx: 1.04 * sound.fx, fy: 1.04 * sound.fy, ..sound };
+    let doubt = run(&simulation, wrong, RunnerSettings::default()).doubt.expect("4 % of focal length");
+    assert_eq!(doubt.parts, [CalibrationPart::FocalLength], "{doubt}");
+    let found = doubt.found.and_then(|found| found.camera).unwrap();
+    assert!((found.fx / sound.fx - 1.0).abs() < 0.01 && (found.fy / sound.fy - 1.0).abs() < 0.01, "{doubt}");
+    let unwatched = RunnerSettings { watch_calibration: false, ..RunnerSettings::default() };
+    assert_eq!(run(&simulation, wrong, unwatched).doubt, None);
+}
+
+#[test]
+fn exchanged_images_of_two_cameras_are_named() {
+    let simulation = flight(4);
+    let doubt = |exchanged: bool| {
+        let vio = Vio::stereo(camera_ahead(), camera_ahead_right(), ImuNoise::default(), Settings::default()).unwrap();
+        let mut runner = Runner::new(vio, RunnerSettings::default());
+        let mut samples = simulation.imu(0).unwrap().samples.into_iter();
+        for index in 0..120 {
+            let both = [0, 1].map(|camera| simulation.frame(camera, index).unwrap().unwrap());
+            let [first, second] = if exchanged { [&both[1], &both[0]] } else { [&both[0], &both[1]] };
+            runner.imu_until(both[0].stamp, &mut samples).unwrap();
+            runner.image_pair(both[0].stamp, &first.view(), &second.view()).unwrap();
+        }
+        runner.finish().ok().and_then(|run| run.doubt)
+    };
+    assert_eq!(doubt(true).expect("exchanged").parts, [CalibrationPart::CameraOrder]);
+    assert_eq!(doubt(false), None);
+}
+
+#[test]
+fn an_accelerometer_that_is_cut_off_is_named_with_its_range() {
+    let mut samples = flight(5).imu(0).unwrap().samples;
+    let said = |samples: &[vio_ekf::Imu]| {
+        let found = validate_samples(samples, 200.0, 9.81).unwrap();
+        found.warnings.iter().map(ToString::to_string).filter(|warning| warning.contains("clipped")).collect::<Vec<_>>()
+    };
+    assert_eq!(said(&samples), Vec::<String>::new());
+    for sample in &mut samples {
+        sample.accel.z = sample.accel.z.min(9.9);
+    }
+    let said = said(&samples);
+    assert!(said.len() == 1 && said[0].contains("9.90"), "{said:?}");
+}
