@@ -1,7 +1,7 @@
 //! Runs the odometry over recordings, evaluates the trajectories, and makes recordings to run it on.
 
 mod camera_frames;
-mod command_line;
+mod arguments;
 mod compare;
 mod error;
 mod euroc_folder;
@@ -21,7 +21,7 @@ mod subcommands;
 mod tuning;
 
 pub use camera_frames::camera_frames;
-pub use command_line::Arguments;
+pub use arguments::Arguments;
 pub use compare::{CompareSettings, Comparison, compare};
 pub use error::VioError;
 pub use euroc_folder::{Overrides, open_euroc};

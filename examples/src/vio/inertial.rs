@@ -9,7 +9,7 @@ use vio_ekf::inertial::{ImuSettings, InertialOdometry, InitialSigma, InitialStat
 use vio_ekf::nalgebra::Vector3;
 use vio_ekf::run::{Estimate, Segment};
 
-use super::command_line::Inertial;
+use super::arguments::Inertial;
 use super::error::{VioError, read_text, write_file};
 use super::euroc_folder::{Overrides, imu, inside};
 use super::states::states_csv;

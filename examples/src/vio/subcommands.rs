@@ -10,7 +10,7 @@ use vio_ekf::sim::{Scenario, SimulatedCamera};
 use vio_ekf::tune::TuneSettings;
 use vio_ekf::{Camera, Settings};
 
-use super::command_line::{Arguments, Command, Eval, FlightName, Sim, Track, Tune};
+use super::arguments::{Arguments, Command, Eval, FlightName, Sim, Track, Tune};
 use super::error::{read_text, write_file};
 use super::inertial::dead_reckon;
 use super::run::filter;

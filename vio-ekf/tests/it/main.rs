@@ -21,6 +21,7 @@ mod fusion_input;
 mod imu_pair;
 mod imu_validation;
 mod lie;
+mod map_aided;
 mod max_measured;
 mod memory;
 mod own_camera_model;

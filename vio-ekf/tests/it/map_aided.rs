@@ -1,0 +1,131 @@
+//! Odometry in a stored map: what confirms it, what ends it, and when it is trusted again.
+
+use vio_ekf::fusion::{AidedPose, MapAidedSettings, MapAidedVio, PoseMeasurement};
+use vio_ekf::nalgebra::{Isometry3, Vector3};
+use vio_ekf::{Camera, ImageView, Imu, Settings, Stamp};
+
+const SIZE: (usize, usize) = (160, 120);
+/// Milliseconds between samples, images and poses in the map.
+const SAMPLE: i64 = 5;
+const IMAGE: i64 = 50;
+const POSE: i64 = 100;
+
+fn at(millis: i64) -> Stamp {
+    Stamp::from_nanos(millis * 1_000_000)
+}
+
+/// A body that stands before tiles.
+struct Scene {
+    vio: MapAidedVio,
+    picture: Vec<u8>,
+    now: i64,
+}
+
+impl Scene {
+    /// Found in the map after a tenth of a second.
+    fn started() -> Self {
+        let bright = |k: usize| k % SIZE.0 % 24 < 12 && k / SIZE.0 % 24 < 12;
+        let picture = (0..SIZE.0 * SIZE.1).map(|k| if bright(k) { 180 } else { 60 }).collect();
+        let camera =
+            Camera { width: SIZE.0, height: SIZE.1, fx: 100.0, fy: 100.0, cx: 80.0, cy: 60.0, ..Camera::euroc() };
+        let vio = MapAidedVio::new(camera, Settings::default(), MapAidedSettings::default()).unwrap();
+        let mut scene = Self { vio, picture, now: 0 };
+        scene.sense(100, true);
+        let found = scene.measured(0.0);
+        scene.vio.start(&found).unwrap();
+        scene
+    }
+
+    /// The sensor of the poses is the body. Off along x by so much, m.
+    fn measured(&self, off: f64) -> PoseMeasurement {
+        PoseMeasurement::isotropic(0, at(self.now), Isometry3::translation(off, 0.0, 1.0), 1e-3, 1e-3)
+    }
+
+    /// Time goes on, with inertial samples or without; the images follow.
+    fn sense(&mut self, millis: i64, moves: bool) {
+        for _ in 0..millis / SAMPLE {
+            self.now += SAMPLE;
+            // No two samples are the same, as of a sensor with noise.
+            let hum = 1e-4 * (0.7 * self.now as f64).sin();
+            let sample =
+                Imu { stamp: at(self.now), gyro: Vector3::repeat(hum), accel: Vector3::new(hum, -hum, 9.81 + hum) };
+            if moves {
+                self.vio.imu(&sample).unwrap();
+            }
+            if self.now % IMAGE == 0 {
+                self.vio.image(at(self.now), &ImageView::new(SIZE.0, SIZE.1, &self.picture).unwrap()).unwrap();
+            }
+        }
+    }
+
+    fn pose(&self) -> AidedPose {
+        self.vio.pose(at(self.now)).unwrap()
+    }
+
+    /// A pose in the map after a tenth of a second; whether it confirms what was expected.
+    fn map(&mut self, off: f64) -> bool {
+        self.sense(POSE, true);
+        let expected = self.vio.pose(at(self.now));
+        let found = self.measured(off);
+        self.vio.map(Some(&found), expected.as_ref()).unwrap()
+    }
+}
+
+#[test]
+fn what_the_map_confirms_is_trusted_until_it_says_nothing() {
+    let mut scene = Scene::started();
+    for _ in 0..5 {
+        assert!(scene.map(0.0));
+    }
+    let AidedPose { trusted, from_map, position_sigma_m, world_from_body, .. } = scene.pose();
+    assert!(trusted && !from_map && position_sigma_m < 0.01);
+    assert!((world_from_body.translation.vector - Vector3::z()).norm() < 5e-3, "{world_from_body}");
+    scene.sense(450, true);
+    assert!(scene.pose().trusted);
+    scene.sense(100, true);
+    assert!(!scene.pose().trusted && !scene.pose().from_map);
+}
+
+#[test]
+fn a_contradiction_ends_the_odometry_which_is_trusted_again_after_ten_confirmations() {
+    let mut scene = Scene::started();
+    assert!(scene.map(0.0) && scene.map(0.0));
+    let source = scene.pose().source;
+    assert!(!scene.map(0.05), "5 cm off");
+    let held = scene.pose();
+    assert!(held.from_map && !held.trusted && held.source > source);
+    assert!((held.world_from_body.translation.x - 0.05).abs() < 1e-9);
+    // Two poses that follow from each other start it again.
+    assert!(!scene.map(0.05) && scene.pose().from_map);
+    assert!(!scene.map(0.05) && !scene.pose().from_map);
+    let mut confirmations = 0;
+    while !scene.pose().trusted && confirmations < 30 {
+        assert!(scene.map(0.05), "{confirmations}");
+        confirmations += 1;
+    }
+    // The position has to be known well enough, too.
+    assert!((10..30).contains(&confirmations), "{confirmations}");
+}
+
+#[test]
+fn without_samples_the_map_stands_in_and_a_stuck_axis_is_no_sample() {
+    let mut scene = Scene::started();
+    assert!(scene.map(0.0));
+    scene.sense(25, false);
+    assert!(scene.pose().from_map && !scene.pose().trusted);
+    // What comes after the gap is not believed either.
+    scene.sense(10, true);
+    assert!(scene.pose().from_map);
+
+    let mut scene = Scene::started();
+    assert!(scene.map(0.0));
+    for _ in 0..4 {
+        scene.now += SAMPLE;
+        let hum = 1e-4 * (0.7 * scene.now as f64).sin();
+        let accel = Vector3::new(hum, -hum, 9.0);
+        scene.vio.imu(&Imu { stamp: at(scene.now), gyro: Vector3::repeat(hum), accel }).unwrap();
+    }
+    assert!(scene.pose().from_map && !scene.pose().trusted, "z stands at the end of its range");
+    scene.sense(600, true);
+    assert!(scene.vio.pose(at(scene.now)).is_none(), "and nothing recent says where the body is");
+}
