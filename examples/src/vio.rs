@@ -1,7 +1,7 @@
 //! Runs the odometry over recordings, evaluates the trajectories, and makes recordings to run it on.
 
-mod camera_frames;
 mod arguments;
+mod camera_frames;
 mod compare;
 mod error;
 mod euroc_folder;
@@ -20,8 +20,8 @@ mod stereo;
 mod subcommands;
 mod tuning;
 
-pub use camera_frames::camera_frames;
 pub use arguments::Arguments;
+pub use camera_frames::camera_frames;
 pub use compare::{CompareSettings, Comparison, compare};
 pub use error::VioError;
 pub use euroc_folder::{Overrides, open_euroc};
