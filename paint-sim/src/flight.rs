@@ -26,7 +26,7 @@ mod vehicle;
 pub use airframe::{Airframe, Command, GRAVITY};
 pub use controller::{CascadedController, Controller, ControllerSettings};
 pub use estimator::{Estimate, Estimator, ObserverSettings};
-pub use faults::{Faults, Gust};
+pub use faults::{Clog, Faults, Gust};
 pub use hose::{Catenary, HoseModel};
 pub use interlock::{Interlock, InterlockInput, InterlockState};
 pub use log::FlightLog;
@@ -172,7 +172,9 @@ pub fn fly_localised(
             let scene = SampleContext { reference, ptu, surface, settings };
             let given = step - (settings.valve.dead_time / STEP).round() as i64;
             let open = interlock.open((given - first).div_euclid(CONTROL_STEPS));
-            samples.push(scene.sample(time, &vehicle, pan_tilt, estimator.estimate(), open)?);
+            let sample = scene.sample(time, &vehicle, pan_tilt, estimator.estimate(), open)?;
+            localisation.sprayed(&sample, interval);
+            samples.push(sample);
         }
         let air = wind.step() + settings.faults.gust(time);
         vehicle.step(&settings.airframe, &command, &air, &hose_force, STEP);
@@ -245,7 +247,7 @@ impl SampleContext<'_> {
     fn flow(&self, time: f64) -> Result<f64, Error> {
         let commanded = time - self.settings.valve.dead_time + self.settings.valve.lead;
         if (0.0..=self.reference.duration()).contains(&commanded) {
-            Ok(checked(self.reference, commanded)?.flow.max(0.0))
+            Ok(checked(self.reference, commanded)?.flow.max(0.0) * self.settings.faults.flow_share(time))
         } else {
             Ok(0.0)
         }

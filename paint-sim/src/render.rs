@@ -55,7 +55,7 @@ impl Camera {
         Ok(camera)
     }
 
-    fn check(&self) -> Result<(), Error> {
+    pub(crate) fn check(&self) -> Result<(), Error> {
         check_positive("camera.width", f64::from(self.width))?;
         check_positive("camera.height", f64::from(self.height))?;
         for (what, f) in [("camera.fx", self.fx), ("camera.fy", self.fy)] {

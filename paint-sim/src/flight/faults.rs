@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use crate::error::{Error, check_not_negative, check_range};
 
-/// Faults at given times of the reference; none by default. What has failed stays so.
+/// Faults at given times of the reference; none by default. What has failed stays so unless said.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct Faults {
@@ -14,6 +14,20 @@ pub struct Faults {
     pub servos_stuck: Option<f64>,
     /// From this time on the wind blows harder.
     pub gust: Option<Gust>,
+    /// The nozzle gives less than it is asked for.
+    pub clogged: Option<Clog>,
+}
+
+/// A nozzle that is partly clogged for a while.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+pub struct Clog {
+    /// Since when, s.
+    pub from: f64,
+    /// Until when, s.
+    pub until: f64,
+    /// Share of the flow that comes out, 0 to 1.
+    pub flow: f64,
 }
 
 /// A gust that sets in at once and stays.
@@ -32,6 +46,11 @@ impl Faults {
         for (what, time) in ["faults.pose_lost", "faults.servos_stuck", "faults.gust.time"].into_iter().zip(times) {
             time.map_or(Ok(()), |time| check_not_negative(what, time))?;
         }
+        if let Some(Clog { from, until, flow }) = self.clogged {
+            check_not_negative("faults.clogged.from", from)?;
+            check_not_negative("faults.clogged.until", until)?;
+            check_range("faults.clogged.flow", flow, 0.0, 1.0, "between 0 and 1")?;
+        }
         // Each by itself: the largest of several numbers hides one that is not a number.
         self.gust.map_or(Ok(()), |gust| {
             gust.velocity
@@ -48,6 +67,11 @@ impl Faults {
     /// Whether the servos are stuck at a time.
     pub(super) fn servos_stuck(&self, time: f64) -> bool {
         self.servos_stuck.is_some_and(|from| time >= from)
+    }
+
+    /// Share of the flow that comes out at a time.
+    pub(super) fn flow_share(&self, time: f64) -> f64 {
+        self.clogged.filter(|clog| (clog.from..clog.until).contains(&time)).map_or(1.0, |clog| clog.flow)
     }
 
     /// What is added to the wind at a time, m/s.

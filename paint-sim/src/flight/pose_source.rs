@@ -2,6 +2,7 @@
 
 use nalgebra::Isometry3;
 
+use super::sample::FlightSample;
 use super::vehicle::Vehicle;
 use crate::error::Error;
 
@@ -26,6 +27,10 @@ pub trait PoseSource {
     fn moved(&mut self, _time: f64, _truth: &Vehicle) -> Result<(), Error> {
         Ok(())
     }
+
+    /// A sample of the log as it is taken, with the paint that leaves the nozzle until the next one, `interval` seconds later: for cameras that
+    /// see what is painted. Default: nothing.
+    fn sprayed(&mut self, _sample: &FlightSample, _interval: f64) {}
 
     /// The pose at a control step, every 10 ms; `None` while there is none: then the observer goes on by its model, and the interlock shuts the
     /// valve. The first one must be there.

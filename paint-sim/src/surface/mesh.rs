@@ -63,6 +63,19 @@ impl TriangleSurface {
         surface.tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
         Ok(surface)
     }
+
+    /// Where a hit lies, m, world frame; `None` of a hit on another surface.
+    pub fn point(&self, hit: &Hit) -> Option<Point3<f64>> {
+        let [a, b, c] = &self.corners[self.faces.binary_search(&hit.face).ok()?];
+        let [v, w] = hit.barycentric;
+        Some((a * (1.0 - v - w) + b * v + c * w).into())
+    }
+
+    /// Least and largest coordinate along an axis, m.
+    pub fn extent(&self, axis: &Vector3<f64>) -> (f64, f64) {
+        let along = self.corners.iter().flatten().map(|corner| corner.dot(axis));
+        along.fold((f64::MAX, f64::MIN), |(low, high), a| (low.min(a), high.max(a)))
+    }
 }
 
 impl Surface for TriangleSurface {

@@ -7,6 +7,7 @@ mod droplets;
 mod examples;
 mod flight;
 mod flight_scene;
+mod inspection;
 mod km;
 mod multirotor;
 mod own_controller;
