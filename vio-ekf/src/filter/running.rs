@@ -24,6 +24,7 @@ use crate::filter::state::error_state;
 use crate::filter::stationary::zero_velocity::{inflate_undetected_motion, zero_velocity_propagate};
 use crate::filter::tracking_state::TrackingState;
 use crate::inertial::initial_state::InitialState;
+use crate::samples::Imu;
 use crate::stamp::Stamp;
 use crate::trace::{event, span};
 
@@ -51,14 +52,23 @@ pub(crate) struct Stepped {
 impl Running {
     /// From a given state.
     pub(crate) fn from_state(initial: &InitialState, sensors: &Sensors) -> Result<Self, Error> {
-        let Some(sample) = sensors.last_sample else {
+        Self::from_past_state(initial, sensors.last_sample.as_slice(), sensors)
+    }
+
+    /// From a given state, of whose time or earlier the first sample is, and the samples since.
+    pub(crate) fn from_past_state(initial: &InitialState, samples: &[Imu], sensors: &Sensors) -> Result<Self, Error> {
+        let Some((&sample, since)) = samples.split_first() else {
             return Err(Error::TooFew { what: "inertial samples before the initialization", got: 0, need: 1 });
         };
         initial.check(sample.stamp)?;
         event!(info, stamp = %initial.stamp, "initialised");
         let settings = &sensors.settings;
         let estimator = Estimator::new(sensors.cameras(), sensors.noise, settings, initial, sample);
-        let tracking = TrackingState::new(estimator, settings.landmarks.max_count, &settings.imu);
+        let mut tracking = TrackingState::new(estimator, settings.landmarks.max_count, &settings.imu);
+        for (sample, before) in since.iter().zip(samples) {
+            sample.check_after(Some(before))?;
+            tracking.imu(sample);
+        }
         Ok(Self { tracking, divergence: DivergenceMonitor::default(), last_aided: Some(initial.stamp) })
     }
 

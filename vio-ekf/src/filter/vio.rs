@@ -151,6 +151,19 @@ impl Vio {
         Ok(())
     }
 
+    /// The same from a state of the past, as a map or a motion capture gives it late: with the samples since then, of which the first one is
+    /// at its time or before, and the last one the latest that the filter was given.
+    pub fn initialize_past(&mut self, initial: &InitialState, samples: &[Imu]) -> Result<(), Error> {
+        let latest = samples.last().map(|sample| sample.stamp);
+        if let (Some(stamp), Some(now)) = (latest, self.sensors.last_sample.map(|sample| sample.stamp))
+            && stamp != now
+        {
+            return Err(Error::Late { what: "last sample since the initial state", stamp, now });
+        }
+        self.state = State::Running(Box::new(Running::from_past_state(initial, samples, &self.sensors)?));
+        Ok(())
+    }
+
     /// Drops the estimate. The filter tries to initialise itself from here on.
     pub fn reset(&mut self) {
         self.state = State::new(&self.sensors.settings);

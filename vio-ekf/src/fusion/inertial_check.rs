@@ -27,7 +27,7 @@ impl InertialCheck {
     }
 
     /// Whether all axes have moved lately.
-    pub(super) fn is_moving(&self) -> bool {
+    fn is_moving(&self) -> bool {
         self.unchanged < UNCHANGED
     }
 

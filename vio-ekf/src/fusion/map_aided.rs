@@ -1,5 +1,7 @@
 //! Odometry in a stored map: poses from the map correct it, and stand in for it while it cannot be believed.
 
+use std::collections::VecDeque;
+
 use nalgebra::{Isometry3, Matrix6, Vector3};
 
 use super::inertial_check::InertialCheck;
@@ -74,10 +76,11 @@ pub struct AidedPose {
     pub source: usize,
 }
 
-/// Standard deviations at a start: velocity (m/s) of a body that stands; position (m), attitude (rad) and velocity of one that moves, at the
-/// latest, as the start is later than the pose that it is made of.
+/// Standard deviation of the velocity at a start, m/s: of a body that stands, and of one that moves.
 const STANDING: f64 = 0.05;
-const MOVING: [f64; 3] = [0.01, 0.02, 0.3];
+const MOVING: f64 = 0.1;
+/// Inertial samples are kept for so long, s: a pose in the map comes no later than this, and the one before it is no older.
+const KEPT: f64 = 0.5;
 
 /// [`UnifiedVio`] in a stored map, with tests of what it is given: inertial samples that stand still or have gaps, and poses in the map that
 /// contradict the expected ones, end the odometry at once. The map's poses, moved on, stand in for it, not to be trusted, until enough of
@@ -87,6 +90,9 @@ pub struct MapAidedVio {
     vio: UnifiedVio,
     settings: MapAidedSettings,
     imu: InertialCheck,
+    /// The latest inertial samples, as far back as they can be believed.
+    recent: VecDeque<Imu>,
+    gravity: f64,
     /// When the map confirmed the odometry last, and how many times it has to before that is trusted.
     confirmed: Option<Stamp>,
     to_confirm: usize,
@@ -106,6 +112,8 @@ impl MapAidedVio {
             vio: UnifiedVio::new(camera, vio, settings.unified)?,
             settings,
             imu: InertialCheck::default(),
+            recent: VecDeque::new(),
+            gravity: vio.gravity,
             confirmed: None,
             to_confirm: 0,
             last: None,
@@ -137,8 +145,16 @@ impl MapAidedVio {
     /// As [`UnifiedVio::imu`].
     pub fn imu(&mut self, sample: &Imu) -> Result<(), Error> {
         self.vio.imu(sample)?;
-        if !self.imu.is_sound(sample, self.settings.longest_gap_s) && self.recovering.is_none() {
-            self.give_up();
+        if !self.imu.is_sound(sample, self.settings.longest_gap_s) {
+            self.recent.clear();
+            if self.recovering.is_none() {
+                self.give_up();
+            }
+        }
+        self.recent.push_back(*sample);
+        // One is kept that is older.
+        while self.recent.get(1).is_some_and(|second| sample.stamp.secs_since(second.stamp) > KEPT) {
+            self.recent.pop_front();
         }
         Ok(())
     }
@@ -169,11 +185,13 @@ impl MapAidedVio {
             self.give_up();
         }
         if let Some(count) = self.recovering {
-            let count = if follows && self.imu.is_moving() { count + 1 } else { 0 };
+            let count = if follows { count + 1 } else { 0 };
             self.recovering = Some(count);
-            if count >= self.settings.confirmations {
+            let covered = self.recent.front().is_some_and(|first| first.stamp <= pose.since);
+            if covered && count >= self.settings.confirmations {
                 let [position, attitude] = self.spread(found)?;
-                self.initialize(&pose, [position.max(MOVING[0]), attitude.max(MOVING[1]), MOVING[2]])?;
+                let pose = pose.with_velocity_by(self.recent.make_contiguous(), self.gravity);
+                self.initialize(&pose, [position, attitude, MOVING])?;
                 self.to_confirm = self.settings.trusted_confirmations;
             }
             return Ok(false);
@@ -231,22 +249,17 @@ impl MapAidedVio {
         self.source += 1;
     }
 
-    /// Odometry from a pose in the map, moved on to the latest inertial sample.
+    /// Odometry from a pose in the map at its own time, with the inertial samples since.
     fn initialize(&mut self, pose: &MapPose, [position, attitude, velocity]: [f64; 3]) -> Result<(), Error> {
-        let stamp = self.imu.last().map_or(pose.stamp, |last| last.max(pose.stamp));
-        let world_from_body = pose.after(stamp);
+        let MapPose { stamp, world_from_body, .. } = *pose;
         let [gyro_bias, accel_bias] = [Vector3::zeros(); 2];
         let velocity_in_body = world_from_body.inverse_transform_vector(&pose.velocity);
         let sigma = InitialSigma { position, velocity, yaw: attitude, tilt: attitude, ..InitialSigma::default() };
-        self.vio.initialize(&InitialState {
-            stamp,
-            world_from_body,
-            velocity_in_body,
-            gyro_bias,
-            accel_bias,
-            sigma,
-        })?;
-        (self.confirmed, self.recovering) = (Some(pose.stamp), None);
+        let initial = InitialState { stamp, world_from_body, velocity_in_body, gyro_bias, accel_bias, sigma };
+        let samples = self.recent.make_contiguous();
+        let first = samples.partition_point(|sample| sample.stamp <= stamp).saturating_sub(1);
+        self.vio.initialize_past(&initial, &samples[first..])?;
+        (self.confirmed, self.recovering) = (Some(stamp), None);
         self.source += 1;
         Ok(())
     }

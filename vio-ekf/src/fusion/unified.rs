@@ -163,6 +163,11 @@ impl UnifiedVio {
         self.vio.initialize(initial)
     }
 
+    /// The same from a state of the past; see [`Vio::initialize_past`]. With two sensors there are no such samples to give.
+    pub fn initialize_past(&mut self, initial: &InitialState, samples: &[Imu]) -> Result<(), Error> {
+        self.vio.initialize_past(initial, samples)
+    }
+
     /// Takes a sample of the body's own inertial sensor, and uses the measurements that have become old enough.
     pub fn imu(&mut self, sample: &Imu) -> Result<Status, Error> {
         match &mut self.pair {
