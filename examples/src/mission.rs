@@ -9,6 +9,7 @@ mod figures;
 mod fly;
 mod footprints;
 mod inspect;
+mod look;
 mod mission_output;
 mod nozzle;
 mod painting_task;
@@ -26,6 +27,7 @@ mod shading;
 mod simulated_flight;
 #[cfg(test)]
 mod test_panel;
+mod touch_up;
 mod trajectory_table;
 mod true_surface;
 mod view;

@@ -17,7 +17,7 @@ type AnyError = Box<dyn std::error::Error>;
 /// What an even coat keeps of the tilt joint's range beyond what every mission does: three degrees, in radians.
 const COAT_MARGIN: f64 = 3.0 * std::f64::consts::PI / 180.0;
 /// What stands in a mission file.
-const MISSION: [&str; 23] = [
+const MISSION: [&str; 24] = [
     "mesh",
     "texture",
     "scale",
@@ -27,6 +27,7 @@ const MISSION: [&str; 23] = [
     "fill",
     "scan",
     "localisation",
+    "look",
     "painter",
     "layers",
     "seed",
@@ -83,6 +84,9 @@ pub struct MissionArguments {
     /// inertial sensor in the map of its --scan [default: motion-capture]
     #[arg(long, value_enum, default_value = "motion-capture")]
     localisation: LocalisationName,
+    /// Fly along the painted surface, look at it, and paint again what is missing
+    #[arg(long)]
+    look: bool,
     /// Who decides the sprays [default: feedback; fill with --fill]
     #[arg(long)]
     painter: Option<PainterName>,
@@ -249,6 +253,7 @@ impl MissionArguments {
             layered: self.layers,
             memory_gib: self.memory_gib,
             placement: self.placement.picture()?,
+            look: self.look,
             localisation: match self.localisation {
                 LocalisationName::MotionCapture => LocalisationChoice::MotionCapture,
                 LocalisationName::Noise => LocalisationChoice::Noise,

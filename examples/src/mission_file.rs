@@ -10,10 +10,10 @@ use crate::appearance::{Appearance, UNIT_THICKNESS};
 use crate::design::{Design, DesignError, MATERIALS, Picture};
 use crate::mesh_io::{MeshError, TriangleMesh, read_mesh};
 use crate::mesh_placement::{MeshPlacement, PlacementError, UpAxis, place_mesh, place_scene};
-use crate::mission::{MissionError, MissionSettings, PaintingTask};
+use crate::mission::{LocalisationChoice, MissionError, MissionSettings, PaintingTask};
 use crate::mission_paint::{MissionPaint, absolute, file_of_design};
 use crate::region::{Region, RegionError, Scene};
-use crate::scan_flight::{self, ScanFlight, ScanFlightError, save as save_scan_flight};
+use crate::scan_flight::{self, ScanFlight, ScanFlightError, save as save_scan_flight, save_map, surveyed_map};
 use crate::world::rock_wall;
 
 /// Thickness of an even coat, metres: what paint is thicker does not show.
@@ -146,12 +146,14 @@ pub enum MissionFileError {
     },
 }
 
-/// The surface itself with its name and, where the robot scans it first, what is really there.
+/// The surface itself with its name, what is really there where the robot scans it first, and what it finds itself in.
 struct Place {
     name: String,
     scene: Scene,
-    /// The true surface, and the file of the map.
-    truth: Option<(TriangleMesh, PathBuf)>,
+    /// The true surface.
+    truth: Option<TriangleMesh>,
+    /// The file of a map of it.
+    map: Option<PathBuf>,
 }
 
 impl MissionFile {
@@ -210,21 +212,27 @@ impl MissionFile {
     /// Reads the surface and scans it if asked to.
     fn place(&self, folder: &Path) -> Result<Place, MissionFileError> {
         let (name, scene) = self.read_surface()?;
+        let MissionSettings { seed, threads, localisation, .. } = self.settings;
+        let failed = |source| MissionFileError::Scan { surface: self.mesh_prefix(), source };
+        let map = folder.join(scan_flight::MAP_FILE);
         if !self.scan {
-            return Ok(Place { name, scene, truth: None });
+            let found_by_mesh = localisation == LocalisationChoice::Slam;
+            if found_by_mesh {
+                let surveyed = surveyed_map(&scene.canvas, threads).map_err(failed)?;
+                save_map(&surveyed, &map).map_err(|source| self.in_mesh(source))?;
+            }
+            return Ok(Place { name, scene, truth: None, map: found_by_mesh.then_some(map) });
         }
         if self.region.is_some() {
             return Err(MissionFileError::RegionBeforeScan);
         }
-        let scan_flight = ScanFlight::fly(&scene.canvas, self.settings.seed, self.settings.threads)
-            .map_err(|source| MissionFileError::Scan { surface: self.mesh_prefix(), source })?;
+        let scan_flight = ScanFlight::fly(&scene.canvas, seed, threads).map_err(failed)?;
         save_scan_flight(&scan_flight, folder).map_err(|source| self.in_mesh(source))?;
-        let map = folder.join(scan_flight::MAP_FILE);
-        Ok(Place { name, scene: Scene::whole(scan_flight.mesh), truth: Some((scene.canvas, map)) })
+        Ok(Place { name, scene: Scene::whole(scan_flight.mesh), truth: Some(scene.canvas), map: Some(map) })
     }
 
     /// Reads the design and decides.
-    fn decide_on(&self, Place { name, scene, truth }: &Place) -> Result<PaintingTask, MissionFileError> {
+    fn decide_on(&self, Place { name, scene, truth, map }: &Place) -> Result<PaintingTask, MissionFileError> {
         let settings = self.settings.clone();
         let mesh = &scene.canvas;
         let materials = mesh.materials.as_ref().filter(|materials| materials.textured() && mesh.uv.is_some());
@@ -244,8 +252,12 @@ impl MissionFile {
         };
         let task = PaintingTask::new(name, scene, &design, settings);
         let task = task.and_then(|task| match truth {
-            Some((truth, map)) => task.on_true_surface(truth, map.clone()),
+            Some(truth) => task.on_true_surface(truth),
             None => Ok(task),
+        });
+        let task = task.map(|task| match map {
+            Some(map) => task.in_map(map.clone()),
+            None => task,
         });
         task.map_err(|source| self.in_mesh(source))
     }

@@ -5,5 +5,5 @@ mod localisation;
 mod localised_flight;
 
 pub use approach::Approach;
-pub use localisation::{LocalisationError, MapUpdate, OnboardLocalisation};
+pub use localisation::{LocalisationError, MapUpdate, OnboardLocalisation, read_map};
 pub use localised_flight::{LocalisationFigures, LocalisedFlight};

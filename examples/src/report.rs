@@ -140,6 +140,16 @@ pub struct Report {
     /// Processor time of odometry and localisation for a second of flight.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub onboard_cpu_s_per_s: Option<f64>,
+    /// Error of the film's thickness as the robot saw it, root mean square over that of the thickness, where there is a tenth of a unit of paint
+    /// or more and it is not opaque.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub film_estimate_error_share: Option<f64>,
+    /// Share of those texels that it saw.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub film_estimate_seen_share: Option<f64>,
+    /// Paint that it found to be missing, and painted again.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub paint_missing_kg: Option<f64>,
     /// Length of all seams on the surface.
     pub seam_length_m: f64,
     /// Structural similarity of the painted surface within 3 cm of a seam, where the robot can paint; windows go on beyond the seams.

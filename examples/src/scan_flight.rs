@@ -6,9 +6,11 @@ mod evaluation;
 mod fly;
 mod localiser;
 mod output;
-mod route;
+pub(crate) mod route;
+mod surveyed;
 
 pub use error::ScanFlightError;
 pub use evaluation::ScanFlightFigures;
 pub use fly::ScanFlight;
-pub use output::{MAP_FILE, save};
+pub use output::{MAP_FILE, save, save_map};
+pub use surveyed::surveyed_map;

@@ -2,6 +2,8 @@
 
 mod camera;
 mod fault;
+mod painted_front;
 
 pub use camera::{FRAMES_PER_SECOND, RgbdViews, SimulatedCamera, SimulatedImage};
 pub use fault::{FaultInterval, SensorFault};
+pub use painted_front::{PaintedFront, SEEN};

@@ -9,6 +9,7 @@ use crate::trace::{event, span};
 
 mod ball_tree;
 mod deposit;
+pub mod inspection;
 mod mass_balance;
 mod texel;
 mod texel_index;

@@ -41,7 +41,7 @@
 //! | Kubelka 1948 | film of finite thickness on a ground | [`km::reflectance`] |
 //! | Kubelka-Munk 1931 | opaque film, Riccati equation | [`km::opaque_reflectance`], [`km::gradient`] |
 //! | Kubelka 1954 | layers on layers | [`km::Layer::over`] |
-//! | pictures before and after (ours) | fall-off of the lens, light of the scene, thickness of the film | [`inspection`] |
+//! | pictures before and after (ours) | fall-off of the lens, light of the scene, thickness of the film | [`film::inspection`] |
 //! | a paint by name on a substrate, by thickness (ours) | table of colours, curve of ink | [`paint::Appearance`], [`paint::ink_curve`] |
 //! | Duncan 1940 | wet mixture `K = sum c K`, `S = sum c S` | [`Paint::mix`] |
 //! | Saunderson 1942 | the air above the paint | [`km::saunderson`] |
@@ -58,7 +58,6 @@ mod error;
 pub mod film;
 pub mod flight;
 pub mod gantry_robot;
-pub mod inspection;
 pub mod km;
 pub mod paint;
 pub mod render;

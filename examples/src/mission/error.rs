@@ -12,6 +12,12 @@ use paint_sim::paint::PaintName;
 /// Why a mission could not be finished.
 #[derive(Debug, thiserror::Error)]
 pub enum MissionError {
+    /// No way along the surface to look at it.
+    #[error("look: {0}")]
+    Look(#[source] crate::scan_flight::ScanFlightError),
+    /// A flight to look from that nothing plans around obstacles.
+    #[error("look: the flight along the surface does not know of keep-out volumes and tethers: leave out one of them")]
+    LookConstrained,
     /// A size that is none.
     #[error("setting {name} = {value}: it must be a positive number")]
     Setting {
@@ -49,7 +55,7 @@ pub enum MissionError {
     #[error("simulation: {0}")]
     Simulation(#[from] paint_sim::Error),
     /// The robot shall find itself in a map, and there is none.
-    #[error("localisation by slam needs a map of the surface: let the robot scan it first (--scan)")]
+    #[error("localisation by slam needs a map of the surface")]
     NoMap,
     /// The map cannot be read, or odometry and map refuse.
     #[error("localisation: {0}")]

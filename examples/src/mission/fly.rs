@@ -4,19 +4,20 @@ use nalgebra::Vector3;
 use paint_planner::Plan;
 use paint_planner::mission::Route;
 use paint_sim::flight::FlightLog;
-use paint_sim::flight::{Interlock, Localisation, PoseSource, Valve};
+use paint_sim::flight::{Faults, Interlock, Localisation, PoseSource, Valve};
 use paint_sim::{Film, FlightSettings, TriangleSurface};
 
 use super::error::MissionError;
 use super::nozzle::spray_model;
-use super::painting_task::{PaintingTask, ScannedSurface};
+use super::painting_task::PaintingTask;
 use super::plan::Planned;
 use super::settings::{LocalisationChoice, MissionSettings};
 use super::simulated_flight::{flight_settings, fly_plan};
 use crate::adapters::Robot;
-use crate::onboard::{LocalisationFigures, LocalisedFlight};
+use crate::appearance::UNIT_THICKNESS;
+use crate::onboard::{LocalisationFigures, LocalisedFlight, read_map};
 use crate::progress::Stage;
-use crate::simulated_sensors::SimulatedCamera;
+use crate::simulated_sensors::{PaintedFront, SimulatedCamera};
 
 /// Motion of the nozzle that one shot stands for, metres: widens the spot by less than a percent.
 pub(super) const SHOT_STEP: f64 = 0.01;
@@ -39,16 +40,25 @@ pub struct LayerFlight {
     pub locked: FlightLog,
 }
 
-/// Flies every layer three times.
-pub(super) fn fly(planned: Planned, task: &PaintingTask) -> Result<Vec<LayerFlight>, MissionError> {
+/// Flies every layer three times, after others whose paint is on the surface.
+pub(super) fn fly(
+    planned: Planned,
+    task: &PaintingTask,
+    before: &[LayerFlight],
+) -> Result<Vec<LayerFlight>, MissionError> {
     let stage = Stage::start("fly");
     let count = planned.layers.len();
     let mut flights = Vec::with_capacity(count);
+    let mut faulty = task.settings.clone();
     for (k, (route, plan, smoothing)) in planned.layers.into_iter().enumerate() {
         stage.share(k as f64 / count as f64);
-        let mut onboard = onboard(task)?;
+        let mut onboard = onboard(task, before.iter().chain(&flights))?;
+        let layer = before.len() + k;
+        if layer > 0 {
+            faulty.faults = Faults::default();
+        }
         let [flight, slam, locked] =
-            fly_three(&plan, task.met(), &task.robot, &task.settings, k as u64, onboard.as_mut())?;
+            fly_three(&plan, task.met(), &task.robot, &faulty, layer as u64, onboard.as_mut())?;
         let localisation = onboard.map(|onboard| onboard.figures());
         flights.push(LayerFlight { route, plan, smoothing, flight, localisation, slam, locked });
     }
@@ -57,16 +67,27 @@ pub(super) fn fly(planned: Planned, task: &PaintingTask) -> Result<Vec<LayerFlig
     Ok(flights)
 }
 
-/// The robot's own localisation, if it is to fly by that; it finds itself anew before every flight.
-fn onboard(task: &PaintingTask) -> Result<Option<LocalisedFlight<'_>>, MissionError> {
+/// The robot's own localisation, if it is to fly by that, before a surface with the paint of earlier flights. It finds itself anew before
+/// every flight.
+fn onboard<'a, 'b>(
+    task: &'a PaintingTask,
+    before: impl Iterator<Item = &'b LayerFlight>,
+) -> Result<Option<LocalisedFlight<'a>>, MissionError> {
     if task.settings.localisation != LocalisationChoice::Slam {
         return Ok(None);
     }
-    let ScannedSurface { mesh, surface, map } = task.scanned().ok_or(MissionError::NoMap)?;
+    let map = read_map(task.map().ok_or(MissionError::NoMap)?)?;
     let PaintingTask { settings, .. } = task;
+    // Surfaces are turned so that they face the robot.
+    let towards = Vector3::x_axis();
+    let paint = settings.paint.paint(UNIT_THICKNESS)?;
+    let mut painted = PaintedFront::new(task.met(), &towards, spray_model(settings), &paint)?;
+    for earlier in before {
+        painted.spray(&earlier.flight.shots(SHOT_STEP), task.met(), settings.threads)?;
+    }
     // The same light and stone as in the scan, other noise.
-    let camera = SimulatedCamera::new(mesh, surface, Vector3::x(), settings.seed, settings.threads);
-    Ok(Some(LocalisedFlight::new(camera, map, settings.seed)?))
+    let camera = SimulatedCamera::new(task.met(), towards.into_inner(), settings.seed, settings.threads);
+    Ok(Some(LocalisedFlight::new(camera.before(painted), map, settings.seed)?))
 }
 
 /// Puts the paint of the flights that count onto the texels; returns the film and the pixel of each of its texels.
@@ -84,6 +105,14 @@ pub(super) fn spray(flights: &[LayerFlight], task: &PaintingTask) -> Result<(Fil
     Ok((film, pixels))
 }
 
+/// The noise of the localisation that was chosen, where it is a model of noise.
+pub(super) fn localisation_noise(settings: &MissionSettings, usual: Localisation) -> Localisation {
+    match settings.localisation {
+        LocalisationChoice::Noise => Localisation::slam_7cm(),
+        LocalisationChoice::MotionCapture | LocalisationChoice::Slam => usual,
+    }
+}
+
 /// The same plan with the localisation that was chosen, with a drifting localisation, and with the pan-tilt unit locked.
 pub(super) fn fly_three(
     plan: &Plan,
@@ -98,12 +127,9 @@ pub(super) fn fly_three(
     // nothing shuts their valve.
     let interlock = Interlock { miss: settings.spot, ..Interlock::default() };
     let valve = Valve { interlock: Some(interlock), ..usual.valve };
-    let chosen = match settings.localisation {
-        LocalisationChoice::Noise => Localisation::slam_7cm(),
-        LocalisationChoice::MotionCapture | LocalisationChoice::Slam => usual.localisation,
-    };
+    let chosen = localisation_noise(settings, usual.localisation);
     let variants = [
-        FlightSettings { valve, localisation: chosen, ..usual },
+        FlightSettings { valve, localisation: chosen, faults: settings.faults, ..usual },
         FlightSettings { localisation: Localisation::slam_7cm(), ..usual },
         FlightSettings { ptu_locked: true, ..usual },
     ];

@@ -1,7 +1,7 @@
 //! What is known before anything is planned: the surface, the picture on it, what the robot reaches, and the sprays.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use paint_net::{Image, Painting};
@@ -47,17 +47,9 @@ pub struct PaintingTask {
     pub(super) layers: Vec<Painting>,
     pub(super) started: Instant,
     /// What is really there, if `surface` is a map of it.
-    truth: Option<ScannedSurface>,
-}
-
-/// A surface that the robot knows by its map only.
-pub(super) struct ScannedSurface {
-    /// What is really there.
-    pub(super) mesh: TriangleMesh,
-    /// The same, for rays.
-    pub(super) surface: TriangleSurface,
-    /// File of the map and its keyframes.
-    pub(super) map: PathBuf,
+    truth: Option<TriangleSurface>,
+    /// File of the map and its keyframes that the robot may find itself in.
+    map: Option<PathBuf>,
 }
 
 impl PaintingTask {
@@ -111,34 +103,39 @@ impl PaintingTask {
             layers,
             started,
             truth: None,
+            map: None,
         })
     }
 
-    /// What was decided about a map, flown and sprayed before the surface that was mapped, of which planning knows nothing. `map` is the
-    /// file of the map.
+    /// What was decided about a map, flown and sprayed before the surface that was mapped, of which planning knows nothing.
     ///
     /// # Errors
     /// A mesh without faces.
-    pub fn on_true_surface(self, truth: &TriangleMesh, map: PathBuf) -> Result<Self, MissionError> {
-        let surface = TriangleSurface::new(&truth.positions, &truth.faces)?;
-        Ok(Self { truth: Some(ScannedSurface { mesh: truth.clone(), surface, map }), ..self })
+    pub fn on_true_surface(self, truth: &TriangleMesh) -> Result<Self, MissionError> {
+        Ok(Self { truth: Some(TriangleSurface::new(&truth.positions, &truth.faces)?), ..self })
     }
 
-    /// What the robot has scanned.
-    pub(super) fn scanned(&self) -> Option<&ScannedSurface> {
-        self.truth.as_ref()
+    /// With the file of a map and its keyframes, in which the robot may find itself.
+    #[must_use]
+    pub fn in_map(self, map: PathBuf) -> Self {
+        Self { map: Some(map), ..self }
+    }
+
+    /// The file of the map.
+    pub(super) fn map(&self) -> Option<&Path> {
+        self.map.as_deref()
     }
 
     /// What the robot and its paint meet.
     pub(super) fn met(&self) -> &TriangleSurface {
-        self.truth.as_ref().map_or(&self.surface.world, |truth| &truth.surface)
+        self.truth.as_ref().unwrap_or(&self.surface.world)
     }
 
     /// The texels that paint falls on, with the pixel of each.
     pub(super) fn film_texels(&self) -> (Vec<Texel>, Vec<usize>) {
         let (texels, pixels) = self.surface.film_texels();
         match &self.truth {
-            Some(truth) => (moved_onto(&truth.surface, texels), pixels),
+            Some(truth) => (moved_onto(truth, texels), pixels),
             None => (texels, pixels),
         }
     }

@@ -11,6 +11,7 @@ use super::error::MissionError;
 use super::fly::{LayerFlight, fly, spray};
 use super::painting_task::PaintingTask;
 use super::planned_mission::{PlannedMission, share_out_of_reach};
+use super::touch_up::{TouchUpFigures, touch_up};
 use crate::appearance::UNIT_THICKNESS;
 
 /// Thickness below which nothing is wanted, metres: ink is given to a few digits.
@@ -31,6 +32,8 @@ pub struct Mission {
     pub(super) left_bare: usize,
     /// What becomes of the targets with paint.
     pub(super) outcomes: TargetOutcomes,
+    /// What looking at it found, if the robot has looked.
+    pub(super) looked: Option<TouchUpFigures>,
 }
 
 impl Mission {
@@ -41,12 +44,20 @@ impl Mission {
 
     /// Flies what is planned, and sprays it onto the film.
     pub fn fly(mission: PlannedMission) -> Result<Self, MissionError> {
-        let PlannedMission { task, planned } = mission;
+        let PlannedMission { mut task, planned } = mission;
         let (planning, unreachable_paint) = (planned.seconds, planned.unreachable_paint);
         let (kept_off, left_bare, outcomes) = (planned.kept_off, planned.left_bare, planned.outcomes);
-        let flights = fly(planned, &task)?;
-        let (film, pixels) = spray(&flights, &task)?;
-        Ok(Self { task, flights, film, pixels, planning, unreachable_paint, kept_off, left_bare, outcomes })
+        let mut flights = fly(planned, &task, &[])?;
+        let (mut film, pixels) = spray(&flights, &task)?;
+        let mut looked = None;
+        if task.settings.look {
+            let (again, figures) = touch_up(&mut task, &flights, &film, &pixels)?;
+            flights.extend(again);
+            // From the beginning, as the shots of one flight are batched.
+            (film, _) = spray(&flights, &task)?;
+            looked = Some(figures);
+        }
+        Ok(Self { task, flights, film, pixels, planning, unreachable_paint, kept_off, left_bare, outcomes, looked })
     }
 
     /// The layers, in the order in which they were flown.

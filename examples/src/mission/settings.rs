@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::error::MissionError;
 use crate::picture_placement::PicturePlacement;
 use crate::projection::Viewpoint;
+use paint_sim::flight::Faults;
 use paint_sim::paint::PaintName;
 
 /// Everything a mission can be told.
@@ -50,6 +51,12 @@ pub struct MissionSettings {
     /// How it knows where it is.
     #[serde(skip_serializing_if = "LocalisationChoice::is_default")]
     pub localisation: LocalisationChoice,
+    /// Look at the painted surface and paint again what is missing.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub look: bool,
+    /// What goes wrong in the first flight.
+    #[serde(skip_serializing_if = "no_faults")]
+    pub faults: Faults,
     /// Where it may not fly, and where its hose hangs, in the world of `plan.csv`; the simulated hose of a robot without a tether comes from
     /// behind the middle of the flight.
     #[serde(skip_serializing_if = "FlightConstraints::is_empty")]
@@ -87,6 +94,10 @@ impl LocalisationChoice {
     }
 }
 
+fn no_faults(faults: &Faults) -> bool {
+    *faults == Faults::default()
+}
+
 /// The painters to choose from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -122,6 +133,8 @@ impl Default for MissionSettings {
             servo: ServoSettings::default(),
             controller: ControllerChoice::default(),
             localisation: LocalisationChoice::default(),
+            look: false,
+            faults: Faults::default(),
             constraints: FlightConstraints::default(),
         }
     }
@@ -139,6 +152,9 @@ impl MissionSettings {
         let (planned, servo) = (self.planner.timing.max_joint_rate, self.servo.max_rate);
         if planned > servo {
             return Err(MissionError::JointRate { planned, servo });
+        }
+        if self.look && !self.constraints.is_empty() {
+            return Err(MissionError::LookConstrained);
         }
         Ok(self.constraints.check()?)
     }

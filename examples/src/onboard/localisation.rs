@@ -1,8 +1,11 @@
 //! Where the robot is in a stored map (Paper II, Fig. 6.4): relocalisation before it takes off, then odometry by camera and inertial sensor,
 //! to which every depth image gives a pose in the map.
 
+use std::path::Path;
+
 use nalgebra::{Isometry3, Matrix6};
 use tsdf_hash::slam::{Event, FrameMemory, OdometryError, PoseSource, Slam, SlamSettings, SlamState};
+use tsdf_hash::storage::MapFile;
 use tsdf_hash::tracking::TrackingOutcome;
 use tsdf_hash::{ColourView, DepthView};
 use vio_ekf::fusion::{AidedPose, MapAidedSettings, MapAidedVio, PoseMeasurement};
@@ -35,6 +38,15 @@ pub struct MapUpdate {
     pub confirmed: bool,
     /// What happened in the map.
     pub events: Vec<Event>,
+}
+
+/// A stored map from its file.
+///
+/// # Errors
+/// A file that is none.
+pub fn read_map(path: &Path) -> Result<SlamState, LocalisationError> {
+    let settings = tsdf_hash::Settings { threads: 1, ..tsdf_hash::Settings::default() };
+    Ok(SlamState::read(MapFile::open(path)?, &settings, None)?)
 }
 
 /// Tracking in a stored map and odometry, joined. Fed in the order in which measurements arrive; it opens no file and starts no thread of its

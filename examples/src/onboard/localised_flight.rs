@@ -1,20 +1,20 @@
 //! A simulated flight whose robot knows of its place only what its own sensors tell.
 
 use std::collections::VecDeque;
-use std::path::Path;
 use std::time::Duration;
 
 use cpu_time::ThreadTime;
 use paint_sim::Error;
 use paint_sim::flight::multirotor::{Imu, ImuSettings};
-use paint_sim::flight::{GRAVITY, LocalisedPose, PoseSource, Vehicle};
+use paint_sim::flight::{FlightSample, GRAVITY, LocalisedPose, PoseSource, Vehicle};
 use tsdf_hash::slam::SlamState;
-use tsdf_hash::storage::MapFile;
 use vio_ekf::Stamp;
 use vio_ekf::fusion::{AidedPose, MapAidedSettings, UnifiedSettings};
 
 use super::localisation::{LocalisationError, OnboardLocalisation};
-use crate::simulated_sensors::{FRAMES_PER_SECOND, FaultInterval, SensorFault, SimulatedCamera, SimulatedImage};
+use crate::simulated_sensors::{
+    FRAMES_PER_SECOND, FaultInterval, PaintedFront, SensorFault, SimulatedCamera, SimulatedImage,
+};
 
 /// Milliseconds from one inertial sample to the next, from one image to the next, and from one depth image to the next.
 const INERTIAL_MS: i64 = 5;
@@ -82,13 +82,8 @@ pub struct LocalisedFlight<'a> {
 }
 
 impl<'a> LocalisedFlight<'a> {
-    /// In a stored map of the surface, from its file.
-    pub fn new(camera: SimulatedCamera<'a>, map: &Path, seed: u64) -> Result<Self, LocalisationError> {
-        let map = SlamState::read(
-            MapFile::open(map)?,
-            &tsdf_hash::Settings { threads: 1, ..tsdf_hash::Settings::default() },
-            None,
-        )?;
+    /// In a stored map of the surface.
+    pub fn new(camera: SimulatedCamera<'a>, map: SlamState, seed: u64) -> Result<Self, LocalisationError> {
         let odometry = vio_ekf::Settings { gravity: GRAVITY, ..vio_ekf::Settings::default() };
         let unified =
             UnifiedSettings { lag_s: 1e-3 * (DEPTH_LATENCY_MS + 2 * INERTIAL_MS) as f64, ..UnifiedSettings::default() };
@@ -115,6 +110,11 @@ impl<'a> LocalisedFlight<'a> {
 
     fn fault(&self, ms: i64) -> Option<SensorFault> {
         self.fault.as_ref().filter(|fault| fault.when.contains(&ms)).map(|fault| fault.fault)
+    }
+
+    /// The paint that is on the surface, where the camera sees it.
+    pub fn into_paint(self) -> Option<PaintedFront> {
+        self.camera.into_paint()
     }
 
     /// What it was worth.
@@ -198,6 +198,10 @@ impl PoseSource for LocalisedFlight<'_> {
     fn moved(&mut self, time: f64, truth: &Vehicle) -> Result<(), Error> {
         let Some(offset) = self.offset else { return Ok(()) };
         self.sense(milliseconds(time) + offset, truth).map_err(|why| Error::Localisation { time, why: why.to_string() })
+    }
+
+    fn sprayed(&mut self, sample: &FlightSample, interval: f64) {
+        self.camera.spray(sample, interval);
     }
 
     fn pose(&mut self, time: f64, truth: &Vehicle) -> Result<Option<LocalisedPose>, Error> {

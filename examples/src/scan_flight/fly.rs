@@ -11,13 +11,14 @@ use vio_ekf::{ImuNoise, Stamp, Trajectory, Vio};
 use super::error::ScanFlightError;
 use super::evaluation::{ScanFlightFigures, figures};
 use super::localiser::Localiser;
-use super::route::along;
+use super::route::{STAND_OFF, along};
 use crate::mesh_io::TriangleMesh;
+use crate::mesh_placement::mean_normal;
 use crate::progress::Stage;
 use crate::simulated_sensors::{FRAMES_PER_SECOND, SimulatedCamera};
 
 /// Edge of a voxel of the map, metres: below the size of a spray spot.
-const VOXEL: f64 = 0.02;
+pub(super) const VOXEL: f64 = 0.02;
 /// One image in so many is fused: neighbours see the same.
 const FUSE_EVERY: usize = 4;
 
@@ -44,8 +45,8 @@ impl ScanFlight {
     pub fn fly(mesh: &TriangleMesh, seed: u64, threads: usize) -> Result<Self, ScanFlightError> {
         let stage = Stage::start("scan flight");
         let surface = TriangleSurface::new(&mesh.positions, &mesh.faces)?;
-        let route = along(mesh)?;
-        let sensor = SimulatedCamera::new(mesh, &surface, route.towards, seed, threads);
+        let route = along(&surface, &mean_normal(mesh), STAND_OFF)?;
+        let mut sensor = SimulatedCamera::new(&surface, route.towards, seed, threads);
         let camera = sensor.camera;
         let simulation = inertial(route.spline, seed)?;
         let mut samples = simulation.imu(0)?.samples.into_iter().peekable();

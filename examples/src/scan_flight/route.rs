@@ -1,16 +1,16 @@
 //! The way of a scan: rows along the front of a surface, from rest to rest.
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use paint_sim::TriangleSurface;
+use paint_sim::flight::{Reference, ReferenceState};
 use vio_ekf::Stamp;
 use vio_ekf::trajectory::Spline;
 
 use super::error::ScanFlightError;
-use crate::mesh_io::TriangleMesh;
-use crate::mesh_placement::mean_normal;
 use crate::minimum_jerk::minimum_jerk;
 
-/// Distance of the robot from the foremost point of the surface, metres.
-const STAND_OFF: f64 = 1.5;
+/// Distance of the robot from the foremost point of the surface in a scan, metres.
+pub(crate) const STAND_OFF: f64 = 1.5;
 /// Distance between rows, metres: the camera sees twice that.
 const ROW: f64 = 0.8;
 /// The robot stays this far inside the edges, metres.
@@ -33,22 +33,24 @@ const KNOTS_PER_SECOND: f64 = 10.0;
 const FRONT: f64 = 0.4;
 
 /// A flight along a surface.
-pub(super) struct Route {
+pub(crate) struct Route {
     /// The motion of the body.
     pub(super) spline: Spline,
     /// Level unit vector from the robot towards the surface.
     pub(super) towards: Vector3<f64>,
 }
 
-pub(super) fn along(mesh: &TriangleMesh) -> Result<Route, ScanFlightError> {
-    let front = front(mesh).ok_or(ScanFlightError::NoFront)?;
+/// Along a surface with a mean normal (not of unit length: a sphere's has none), metres from its foremost point.
+pub(crate) fn along(
+    surface: &TriangleSurface,
+    facing: &Vector3<f64>,
+    stand_off: f64,
+) -> Result<Route, ScanFlightError> {
+    let level = Vector3::new(facing.x, facing.y, 0.0);
+    let front = level.try_normalize(FRONT).ok_or(ScanFlightError::NoFront)?;
     let up = Vector3::z();
     let side = front.cross(&up);
-    let range = |axis: &Vector3<f64>| {
-        let along = mesh.positions.iter().map(|p| Vector3::from(p.map(f64::from)).dot(axis));
-        along.fold((f64::MAX, f64::MIN), |(low, high), a| (low.min(a), high.max(a)))
-    };
-    let ((left, right), (bottom, top), (_, foremost)) = (range(&side), range(&up), range(&front));
+    let [(left, right), (bottom, top), (_, foremost)] = [&side, &up, &front].map(|axis| surface.extent(axis));
     let (width, height) = (right - left, top - bottom);
     if !(0.5..=30.0).contains(&width) || !(0.5..=30.0).contains(&height) {
         return Err(ScanFlightError::Size { width, height });
@@ -60,7 +62,7 @@ pub(super) fn along(mesh: &TriangleMesh) -> Result<Route, ScanFlightError> {
         .flat_map(|row| {
             let level = (bottom + (row as f64 + 0.5) / rows as f64 * height).max(LOWEST);
             let ends = if row % 2 == 0 { [-half, half] } else { [half, -half] };
-            ends.map(|end| side * (middle + end) + up * level + front * (foremost + STAND_OFF))
+            ends.map(|end| side * (middle + end) + up * level + front * (foremost + stand_off))
         })
         .collect();
 
@@ -92,17 +94,50 @@ fn position_at(corners: &[Vector3<f64>], legs: &[f64], mut t: f64) -> Vector3<f6
     corners[corners.len() - 1]
 }
 
-/// The level direction that a surface faces, unit length.
-fn front(mesh: &TriangleMesh) -> Option<Vector3<f64>> {
-    let facing = mean_normal(mesh);
-    let level = Vector3::new(facing.x, facing.y, 0.0);
-    (level.norm() >= FRONT).then(|| level.normalize())
+impl Reference for Route {
+    fn duration(&self) -> f64 {
+        let (first, last) = self.spline.span();
+        last.secs_since(first)
+    }
+
+    fn at(&self, t: f64) -> ReferenceState {
+        let (first, last) = self.spline.span();
+        let stamp = Stamp::from_nanos(first.nanos() + (1e9 * t) as i64).clamp(first, last);
+        let hover = ReferenceState {
+            // The flight ends with an error at a position that is none.
+            position: Vector3::repeat(f64::NAN).into(),
+            velocity: Vector3::zeros(),
+            acceleration: Vector3::zeros(),
+            heading: 0.0,
+            heading_rate: 0.0,
+            lever: Vector3::zeros(),
+            aim: None,
+            nozzle_distance: 0.0,
+            flow: 0.0,
+        };
+        let Ok(motion) = self.spline.sample(stamp) else { return hover };
+        let ahead = motion.world_from_body * Vector3::x();
+        ReferenceState {
+            position: motion.world_from_body.translation.vector.into(),
+            velocity: motion.velocity_in_world,
+            acceleration: motion.acceleration_in_world,
+            heading: ahead.y.atan2(ahead.x),
+            heading_rate: (motion.world_from_body * motion.rate_in_body).z,
+            ..hover
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh_io::TriangleMesh;
+    use crate::mesh_placement::mean_normal;
     use crate::world::rock_wall;
+
+    fn along(mesh: &TriangleMesh) -> Result<Route, ScanFlightError> {
+        super::along(&TriangleSurface::new(&mesh.positions, &mesh.faces).unwrap(), &mean_normal(mesh), STAND_OFF)
+    }
 
     #[test]
     fn the_robot_keeps_its_distance_and_looks_at_the_wall() {

@@ -2,14 +2,15 @@
 
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, UnitVector3, Vector3};
 use paint_net::procedural::{lattice, value_noise};
-use paint_sim::render::{Lights, Shading};
+use paint_sim::flight::FlightSample;
+use paint_sim::render::{Frame, Lights, Shading};
 use paint_sim::surface::Hit;
 use paint_sim::{Error, TriangleSurface, render};
 use tsdf_hash::{ColourData, ColourView, DepthData, DepthView, Intrinsics};
 use vio_ekf::camera::Distortion;
 use vio_ekf::{Camera, ImageView};
 
-use crate::mesh_io::TriangleMesh;
+use super::painted_front::PaintedFront;
 
 /// Images per second.
 pub const FRAMES_PER_SECOND: f64 = 20.0;
@@ -26,11 +27,11 @@ const TEXTURE_OCTAVES: [(f64, f64); 5] = [(0.35, 0.25), (0.12, 0.25), (0.05, 0.3
 pub struct SimulatedCamera<'a> {
     /// Lens, and place on the body.
     pub camera: Camera,
-    mesh: &'a TriangleMesh,
     surface: &'a TriangleSurface,
     lights: Lights,
     seed: u64,
     threads: usize,
+    paint: Option<PaintedFront>,
 }
 
 /// One image.
@@ -83,17 +84,29 @@ impl RgbdViews<'_> {
 
 impl<'a> SimulatedCamera<'a> {
     /// `towards`: from the robot to the surface.
-    pub fn new(
-        mesh: &'a TriangleMesh,
-        surface: &'a TriangleSurface,
-        towards: Vector3<f64>,
-        seed: u64,
-        threads: usize,
-    ) -> Self {
+    pub fn new(surface: &'a TriangleSurface, towards: Vector3<f64>, seed: u64, threads: usize) -> Self {
         // Light from everywhere; the sun is behind the surface and costs no shadows.
         let towards_sun = UnitVector3::new_normalize(towards);
         let lights = Lights { towards_sun, sun: [0.0; 3], ambient: [1.0; 3], background: [0.2; 3] };
-        Self { camera: camera(), mesh, surface, lights, seed, threads }
+        Self { camera: camera(), surface, lights, seed, threads, paint: None }
+    }
+
+    /// With paint on the surface, which it sees as it is sprayed.
+    #[must_use]
+    pub fn before(self, paint: PaintedFront) -> Self {
+        Self { paint: Some(paint), ..self }
+    }
+
+    /// The paint that is on the surface.
+    pub fn into_paint(self) -> Option<PaintedFront> {
+        self.paint
+    }
+
+    /// A sample of the flight with the paint that leaves the nozzle until the next one, `interval` seconds later.
+    pub fn spray(&mut self, sample: &FlightSample, interval: f64) {
+        if let Some(paint) = &mut self.paint {
+            paint.fly(sample, interval);
+        }
     }
 
     /// An image of it for the map.
@@ -104,12 +117,12 @@ impl<'a> SimulatedCamera<'a> {
     }
 
     /// Image `index`, taken from a pose.
-    pub fn capture(&self, index: usize, world_from_camera: &Isometry3<f64>) -> Result<SimulatedImage, Error> {
-        let Camera { width, height, fx, fy, cx, cy, .. } = self.camera;
-        let (width, height) = (width as u32, height as u32);
-        let camera = paint_sim::Camera { fx, fy, cx, cy, width, height, world_from_camera: *world_from_camera };
+    pub fn capture(&mut self, index: usize, world_from_camera: &Isometry3<f64>) -> Result<SimulatedImage, Error> {
+        if let Some(paint) = &mut self.paint {
+            paint.land(self.surface, self.threads)?;
+        }
         let shade = |hit: &Hit| Shading { albedo: [self.albedo(hit) as f32; 3], normal: hit.normal };
-        let mut frame = render(self.surface, &camera, &shade, &self.lights, 1, self.threads)?;
+        let mut frame = self.render(world_from_camera, &shade)?;
         let grey = frame.colour.iter().enumerate().map(|(pixel, colour)| {
             let noisy = f64::from(colour[0]) + GREY_NOISE * self.noise(2 * index, pixel);
             noisy.round().clamp(0.0, 255.0) as u8
@@ -123,13 +136,30 @@ impl<'a> SimulatedCamera<'a> {
         Ok(SimulatedImage { grey, depth: frame.depth })
     }
 
-    /// Albedo of the stone: noise in the plane that the surface is most nearly in.
+    /// What the mesh itself would show: depth without noise, and no colour.
+    ///
+    /// # Errors
+    /// A pose that is not finite.
+    pub fn exact_depth(&self, world_from_camera: &Isometry3<f64>) -> Result<SimulatedImage, Error> {
+        let black = |hit: &Hit| Shading { albedo: [0.0; 3], normal: hit.normal };
+        let depth = self.render(world_from_camera, &black)?.depth;
+        Ok(SimulatedImage { grey: vec![0; depth.len()], depth })
+    }
+
+    fn render(
+        &self,
+        world_from_camera: &Isometry3<f64>,
+        shade: &(dyn Fn(&Hit) -> Shading + Sync),
+    ) -> Result<Frame, Error> {
+        let Camera { width, height, fx, fy, cx, cy, .. } = self.camera;
+        let (width, height) = (width as u32, height as u32);
+        let camera = paint_sim::Camera { fx, fy, cx, cy, width, height, world_from_camera: *world_from_camera };
+        render(self.surface, &camera, shade, &self.lights, 1, self.threads)
+    }
+
+    /// Albedo of the stone, noise in the plane that the surface is most nearly in, with the paint that is on it.
     fn albedo(&self, hit: &Hit) -> f64 {
-        let corners = self.mesh.faces[hit.face as usize].map(|i| self.mesh.positions[i as usize]);
-        let [u, v] = hit.barycentric;
-        let shares = [1.0 - u - v, u, v];
-        let p: Vector3<f64> =
-            corners.iter().zip(shares).map(|(c, share)| Vector3::from(c.map(f64::from)) * share).sum();
+        let p = self.surface.point(hit).unwrap_or_default();
         let (u, v) = match hit.normal.abs().imax() {
             0 => (p.y, p.z),
             1 => (p.x, p.z),
@@ -138,7 +168,8 @@ impl<'a> SimulatedCamera<'a> {
         let octave = |(k, (spacing, share)): (usize, (f64, f64))| {
             share * (value_noise(self.seed.wrapping_add(101 * k as u64), u / spacing, v / spacing) - 0.5)
         };
-        (0.35 + TEXTURE_OCTAVES.into_iter().enumerate().map(octave).sum::<f64>()).clamp(0.02, 0.9)
+        let stone = (0.35 + TEXTURE_OCTAVES.into_iter().enumerate().map(octave).sum::<f64>()).clamp(0.02, 0.9);
+        self.paint.as_ref().map_or(stone, |paint| paint.albedo(&p, stone))
     }
 
     /// A number of the standard normal distribution for a pixel of an image.

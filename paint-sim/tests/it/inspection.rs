@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, UnitVector3, Vector3};
 use paint_sim::colour::decode_srgb8;
-use paint_sim::inspection::{FilmEstimate, GreyPaint, Mosaic, Picture, estimate_film};
+use paint_sim::film::inspection::{FilmEstimate, GreyPaint, Mosaic, Picture, estimate_film};
 use paint_sim::paint::PaintName;
 use paint_sim::render::{Lights, Shading};
 use paint_sim::surface::Hit;

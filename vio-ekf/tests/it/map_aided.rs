@@ -129,3 +129,38 @@ fn without_samples_the_map_stands_in_and_a_stuck_axis_is_no_sample() {
     scene.sense(600, true);
     assert!(scene.vio.pose(at(scene.now)).is_none(), "and nothing recent says where the body is");
 }
+
+/// Poses come 60 ms late, from a body that swings by half a metre with up to 2 m/s².
+#[test]
+fn in_motion_it_starts_again_with_the_velocity_of_the_moment() {
+    let mut scene = Scene::started();
+    let start = scene.now;
+    let time = |now: i64| 1e-3 * (now - start) as f64;
+    let place = |now: i64| 0.5 * (1.0 - (2.0 * time(now)).cos());
+    let mut taken = None;
+    let mut off = Vec::new();
+    for k in 1..=400 {
+        scene.now += SAMPLE;
+        let hum = 1e-4 * (0.7 * scene.now as f64).sin();
+        let accel = Vector3::new(2.0 * (2.0 * time(scene.now)).cos() + hum, -hum, 9.81 + hum);
+        scene.vio.imu(&Imu { stamp: at(scene.now), gyro: Vector3::repeat(hum), accel }).unwrap();
+        if k % 20 == 0 {
+            taken = Some((scene.now, scene.vio.pose(at(scene.now))));
+        }
+        if let Some((then, expected)) = taken.filter(|(then, _)| scene.now - then == 60) {
+            // The first one contradicts what is expected.
+            let wrong = if k < 40 { 0.05 } else { 0.0 };
+            let pose = Isometry3::translation(place(then) + wrong, 0.0, 1.0);
+            let found = PoseMeasurement::isotropic(0, at(then), pose, 1e-3, 1e-3);
+            scene.vio.map(Some(&found), expected.as_ref()).unwrap();
+        }
+        let pose = scene.pose();
+        if k > 40 && !pose.from_map {
+            off.push((pose.world_from_body.translation.x - place(scene.now)).abs());
+        }
+    }
+    // Two seconds, of which it flies by the map for the first half second or less.
+    assert!(off.len() > 280, "{}", off.len());
+    let most = off.iter().copied().fold(0.0, f64::max);
+    assert!(most < 0.01, "{most} m");
+}
