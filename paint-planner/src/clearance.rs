@@ -3,8 +3,15 @@
 use crate::error::Error;
 use crate::target::NozzleState;
 use crate::world::{Surface, Tool, VehicleState};
-use nalgebra::Point3;
+use nalgebra::{Matrix2, Point3, Vector2};
 
+/// Shortest motion between two looks along a curve, m: a curve that is certified keeps half of it more.
+const LEAST_STEP: f64 = 0.002;
+/// Longest motion between two looks, m.
+const GREATEST_STEP: f64 = 0.1;
+/// Steps to the joints that point at an aim, and the difference that gives their slopes, rad.
+const AIM_STEPS: usize = 6;
+const AIM_DIFFERENCE: f64 = 1e-5;
 /// How far distances are resolved, m: spheres farther off than this need no query for a long way.
 const QUERY_MARGIN: f64 = 1.0;
 
@@ -67,6 +74,37 @@ impl<'a> ClearanceChecker<'a> {
         })
     }
 
+    /// How far the spray of a vehicle misses its aim on the surface, m: infinite where it meets nothing there. `None` for a tool that cannot
+    /// tell.
+    pub(crate) fn miss(&self, state: &VehicleState, aim: &Point3<f64>) -> Option<f64> {
+        let nozzle = self.tool.nozzle(state)?;
+        let reach = 2.0 * (aim - nozzle.position).norm();
+        let hit = self.surface.cast(&nozzle.position, &nozzle.direction, reach);
+        Some(hit.map_or(f64::INFINITY, |hit| (hit.point - aim).norm()))
+    }
+
+    /// The vehicle with the joints turned so that its spray points at `aim`: Gauss-Newton steps with slopes by differences. `None` where
+    /// that needs what the joints do not give, and for a tool that cannot tell where it sprays.
+    pub(crate) fn aimed(&self, state: &VehicleState, aim: &Point3<f64>) -> Option<VehicleState> {
+        let off = |pan: f64, tilt: f64| {
+            let nozzle = self.tool.nozzle(&VehicleState { pan, tilt, ..*state })?;
+            let way = aim - nozzle.position;
+            Some(way - nozzle.direction.into_inner() * way.dot(&nozzle.direction))
+        };
+        let (mut pan, mut tilt) = (state.pan, state.tilt);
+        for _ in 0..AIM_STEPS {
+            let here = off(pan, tilt)?;
+            let slopes = [off(pan + AIM_DIFFERENCE, tilt)?, off(pan, tilt + AIM_DIFFERENCE)?];
+            let [a, b] = slopes.map(|there| (there - here) / AIM_DIFFERENCE);
+            let normal = Matrix2::new(a.dot(&a), a.dot(&b), a.dot(&b), b.dot(&b));
+            let step = normal.try_inverse()? * Vector2::new(a.dot(&here), b.dot(&here));
+            (pan, tilt) = (pan - step.x, tilt - step.y);
+        }
+        let found = VehicleState { pan, tilt, ..*state };
+        // The inverse kinematics know the limits.
+        self.tool.vehicle(&self.tool.nozzle(&found)?, state.heading).map(|_| found)
+    }
+
     /// Distance from a point to the surface, clipped at `max`, m. What is no distance counts as a touch.
     pub(crate) fn distance(&mut self, centre: &Point3<f64>, max: f64) -> f64 {
         let distance = self.surface.distance(centre, max);
@@ -107,6 +145,40 @@ impl<'a> ClearanceChecker<'a> {
         true
     }
 
+    /// The least clearance seen along a motion, clipped at `below`, m, and how much is missing at most anywhere between, where that is
+    /// more than nothing. `motion` bounds how far a point of the body moves in all, and `state` is even along it, shares from 0 to 1.
+    ///
+    /// Distances change no faster than the body moves: between two looks a motion `L` apart the clearance is at least
+    /// `(d0 + d1 - L) / 2`. Looks lie the closer the nearer the surface is (conservative advancement, Mirtich 1996).
+    pub(crate) fn along(
+        &mut self,
+        state: &dyn Fn(f64) -> VehicleState,
+        motion: f64,
+        wanted: f64,
+        below: f64,
+        cache: &mut DistanceCache,
+    ) -> (f64, f64) {
+        let below = below.max(wanted + 0.5 * GREATEST_STEP);
+        let (mut share, mut here) = (0.0, self.clearance(&state(0.0), below, cache));
+        let (mut least, mut missing) = (here, wanted - here);
+        while share < 1.0 {
+            let mut step = (1.6 * (here - wanted)).clamp(LEAST_STEP, GREATEST_STEP);
+            loop {
+                let next = if motion > step { (share + step / motion).min(1.0) } else { 1.0 };
+                let there = self.clearance(&state(next), below, cache);
+                let short = wanted - 0.5 * (here + there - motion * (next - share));
+                least = least.min(there);
+                if short <= 0.0 || step <= LEAST_STEP {
+                    missing = missing.max(short);
+                    (share, here) = (next, there);
+                    break;
+                }
+                step = (0.5 * step).max(LEAST_STEP);
+            }
+        }
+        (least, missing.max(0.0))
+    }
+
     /// Smallest distance between a sphere and the surface, negative where they overlap, clipped at `below`, m.
     pub(crate) fn clearance(&mut self, state: &VehicleState, below: f64, cache: &mut DistanceCache) -> f64 {
         self.spheres.clear();
@@ -128,5 +200,62 @@ impl<'a> ClearanceChecker<'a> {
             least = least.min(distance - radius);
         }
         least
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::Hit;
+    use nalgebra::{UnitVector3, Vector3};
+
+    /// A point in the room.
+    struct Tip;
+
+    impl Surface for Tip {
+        fn cast(&self, _: &Point3<f64>, _: &UnitVector3<f64>, _: f64) -> Option<Hit> {
+            None
+        }
+
+        fn distance(&self, point: &Point3<f64>, max: f64) -> f64 {
+            point.coords.norm().min(max)
+        }
+    }
+
+    /// A ball of 10 cm.
+    struct Ball;
+
+    impl Tool for Ball {
+        fn vehicle(&self, _: &NozzleState, _: f64) -> Option<VehicleState> {
+            None
+        }
+
+        fn spheres(&self, vehicle: &VehicleState, out: &mut Vec<(Point3<f64>, f64)>) {
+            out.push((vehicle.position, 0.1));
+        }
+    }
+
+    #[test]
+    fn what_is_near_for_a_moment_only_is_seen_between_two_looks() {
+        for (side, clear) in [(0.115, false), (0.128, false), (0.132, true), (0.3, true)] {
+            for begin in [-0.93, -0.512, -0.4] {
+                let mut checker = ClearanceChecker::new(&Tip, &Ball);
+                let position = |share: f64| Point3::new(begin + share, side, 0.0);
+                let state = |share: f64| VehicleState { position: position(share), heading: 0.0, pan: 0.0, tilt: 0.0 };
+                let (least, missing) = checker.along(&state, 1.0, 0.03, 1.0, &mut DistanceCache::default());
+                assert_eq!(missing == 0.0, clear, "{side} {begin}");
+                assert!((least - (side - 0.1)).abs() < 0.01 || clear, "{least}");
+                let truly = 0.13 - side;
+                assert!(clear || (truly - 1e-9..truly + LEAST_STEP).contains(&missing), "{missing} {truly}");
+            }
+        }
+    }
+
+    #[test]
+    fn rest_is_one_look() {
+        let mut checker = ClearanceChecker::new(&Tip, &Ball);
+        let state = VehicleState { position: Point3::from(Vector3::x() * 0.12), heading: 0.0, pan: 0.0, tilt: 0.0 };
+        let (least, missing) = checker.along(&|_| state, 0.0, 0.03, 1.0, &mut DistanceCache::default());
+        assert!((least - 0.02).abs() < 1e-12 && (missing - 0.01).abs() < 1e-12, "{least} {missing}");
     }
 }

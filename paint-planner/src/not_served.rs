@@ -14,6 +14,8 @@ pub enum NotServed {
     TooNear,
     /// No flight leads there from the rest.
     NoTransit,
+    /// The vehicle passes it, but between it and the next one the spray would miss its aim: the valve stays shut.
+    Missed,
     /// The caller gave it no clearance: a rehearsal had touched something there.
     Excluded,
 }

@@ -1,10 +1,12 @@
 //! From targets to a plan: one trait, the optimal planner and the smoothing baseline.
 
 mod assemble;
+mod binding;
 mod optimal;
 mod smoothing;
 mod solution;
 mod strategy;
+mod valve;
 
 use crate::error::Error;
 pub use crate::not_served::NotServed;
@@ -14,6 +16,7 @@ use crate::target::Target;
 use crate::world::{Surface, Tool};
 
 pub(crate) use assemble::{UntimedPlan, assemble_plan};
+pub use binding::BindingLimits;
 pub use optimal::OptimalPlanner;
 pub use smoothing::SmoothingPlanner;
 pub use solution::{Plan, PlanReport, Setpoint, Waypoint};

@@ -19,6 +19,8 @@ pub struct Settings {
     pub clearance: f64,
     /// Neighbouring targets farther apart than this are separate strokes with a flight between them, m (default 0.15).
     pub break_length: f64,
+    /// Greatest distance between aim and spray on the surface with the valve open, m (default 0.025: the deviation of a spot).
+    pub valve_tolerance: f64,
     /// Where the flight begins; `None`: at the first target served.
     pub start: Option<VehicleState>,
     /// Where the flight ends; `None`: at the last target served.
@@ -105,6 +107,8 @@ pub struct TimingSettings {
     pub max_speed: f64,
     /// Greatest acceleration of the vehicle, m/s^2 (default 1).
     pub max_acceleration: f64,
+    /// The same while paint is sprayed, m/s^2 (default 0.5, ours): the gun is off its aim by what the body leans too late.
+    pub max_spray_acceleration: f64,
     /// Greatest heading rate, rad/s (default 1).
     pub max_heading_rate: f64,
     /// Greatest rate of pan and tilt, rad/s (default 6.1: just below the 59 rpm of an AX-12A servo without load, Paper II section 3; less
@@ -116,7 +120,7 @@ pub struct TimingSettings {
     pub knot_spacing: f64,
     /// Greatest distance between the trajectory and a planned waypoint at its time, m (default 0.002).
     pub tolerance: f64,
-    /// Rounds of knot insertion and local slowing before the rest is scaled globally (default 30).
+    /// Rounds of knot insertion, and of slowing where a route is entered in motion (default 30).
     pub rounds: usize,
 }
 
@@ -139,6 +143,7 @@ impl Default for Settings {
             lowess: LowessSettings::default(),
             clearance: 0.03,
             break_length: 0.15,
+            valve_tolerance: 0.025,
             start: None,
             goal: None,
         }
@@ -180,6 +185,7 @@ impl Default for TimingSettings {
             policy: TimingPolicy::Uniform { speed: 0.4 },
             max_speed: 0.5,
             max_acceleration: 1.0,
+            max_spray_acceleration: 0.5,
             max_heading_rate: 1.0,
             max_joint_rate: 6.1,
             max_flow: 2e-6,
@@ -212,6 +218,7 @@ impl Settings {
             ("nozzle.facet", nozzle.facet),
             ("timing.max_speed", timing.max_speed),
             ("timing.max_acceleration", timing.max_acceleration),
+            ("timing.max_spray_acceleration", timing.max_spray_acceleration),
             ("timing.max_heading_rate", timing.max_heading_rate),
             ("timing.max_joint_rate", timing.max_joint_rate),
             ("timing.max_flow", timing.max_flow),
@@ -219,6 +226,7 @@ impl Settings {
             ("timing.tolerance", timing.tolerance),
             ("lowess.span", self.lowess.span),
             ("break_length", self.break_length),
+            ("valve_tolerance", self.valve_tolerance),
         ] {
             ensure(name, value, value > 0.0 && value.is_finite(), positive)?;
         }

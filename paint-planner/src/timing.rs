@@ -1,16 +1,21 @@
 //! Times for the route, and the trajectory within limits that results.
 
+mod reachability;
 pub(crate) mod speed_profile;
+mod time_law;
 
 use crate::error::Error;
 use crate::minimum_snap::KnotDerivatives;
 use crate::route::RoutePoint;
 pub use crate::settings::{TimingPolicy, TimingSettings};
 use crate::target::Target;
-use crate::trajectory::{Extrema, Trajectory};
+use crate::trajectory::{Extrema, TIGHT, Trajectory};
+use crate::transit::between;
+use crate::world::VehicleState;
 use nalgebra::Vector4;
 use speed_profile::SpeedProfile;
 pub(crate) use speed_profile::rest_to_rest;
+use time_law::{Edge, Retimed, retime};
 
 /// Metres of deviation that a radian of heading error counts as: about the lever of an arm.
 const HEADING_LEVER: f64 = 0.5;
@@ -28,13 +33,25 @@ pub(crate) struct TimedTrajectory {
     pub(crate) deviation: f64,
     /// Final global stretch factor.
     pub(crate) stretch: f64,
+    /// Time that no time law along the path takes less than, s; the duration where the polynomials keep their own.
+    pub(crate) time_bound: f64,
+}
+
+impl TimedTrajectory {
+    /// The vehicle on the way between two states that are passed at `times`: on the trajectory, its joints linear in time.
+    pub(crate) fn state(&self, from: &VehicleState, to: &VehicleState, times: [f64; 2], share: f64) -> VehicleState {
+        let sample = self.trajectory.sample(times[0] + (times[1] - times[0]) * share);
+        VehicleState { position: sample.position, heading: sample.heading, ..between(from, to, share) }
+    }
 }
 
 /// Finds times such that all limits hold, certified. `dense` makes every route point a knot.
 ///
-/// Rounds of: speed profile, minimum snap through the knots, exact extrema. Route points that the curve misses become knots,
-/// segments that break a limit are slowed. Whatever is left is repaired by one global stretch, which is exact because
-/// the path does not depend on it. A route that is entered with the motion `start` cannot be stretched: it is refused.
+/// Rounds of: speed profile, minimum snap through the knots; route points that the curve misses become knots. The path that results is
+/// flown as fast as the limits allow at each place, from stop to stop.
+///
+/// Two kinds of route keep the time of their polynomials. What stamps time is stretched as a whole; a route that is entered with the
+/// motion `start` is slowed where it breaks a limit, and refused if it still does after the last round.
 pub(crate) fn schedule(
     start: &KnotDerivatives,
     route: &[RoutePoint],
@@ -46,67 +63,87 @@ pub(crate) fn schedule(
     let mut profile = SpeedProfile::new(route, targets, settings);
     profile.enter_with(start.fixed_view::<1, 3>(0, 0).norm());
     let local = matches!(settings.policy, TimingPolicy::Uniform { .. });
+    let own_time = moving || !local;
     let mut knots = first_knots(route, settings, dense);
     let mut slowdown = vec![1.0; route.len() - 1];
-    let mut best: Option<TimedTrajectory> = None;
-    for round in 0..=settings.rounds {
+    let mut best: Option<Attempt> = None;
+    for _ in 0..=settings.rounds {
         let durations = profile.durations(&slowdown, settings);
-        let attempt = fit(start, route, &knots, &durations)?;
-        let mut most = Extrema::default();
-        let mut ratios = vec![1.0; knots.len() - 1];
-        for (i, worst) in ratios.iter_mut().enumerate() {
-            let extrema = attempt.segment_extrema(i);
-            most = most.max(extrema);
-            *worst = limit_ratio(&extrema, settings);
-        }
+        let trajectory = fit(start, route, &knots, &durations)?;
         let times = cumulative(&durations);
-        let (deviation, missed) = missed_points(route, &knots, &attempt, &times, settings.tolerance);
-        let stretch = limit_ratio(&most, settings).max(1.0);
-        let better = |other: &TimedTrajectory| {
-            let (now, then) = (deviation <= settings.tolerance, other.deviation <= settings.tolerance);
-            (now && !then) || (now == then && attempt.duration() * stretch < other.trajectory.duration())
-        };
-        // Before the curve follows the route points, the latest attempt is the one to keep.
-        let possible = !moving || stretch == 1.0;
-        if possible && best.as_ref().is_none_or(|other| better(other) || other.deviation > settings.tolerance) {
-            best = Some(stretched(attempt, times, most, deviation, stretch));
-        }
+        let (deviation, missed) = missed_points(route, &knots, &trajectory, &times, settings.tolerance);
+        let certified = trajectory.segments().iter().filter(|_| own_time);
+        let ratios: Vec<f64> =
+            certified.map(|segment| limit_ratio(&segment.extrema(&Extrema::default(), TIGHT), settings)).collect();
+        let stretch = ratios.iter().fold(1.0_f64, |most, ratio| most.max(*ratio));
+        let attempt = Attempt { trajectory, times, deviation, stretch, knots: knots.clone() };
         let done = missed.is_empty() && (stretch == 1.0 || !local);
-        if done || round == settings.rounds {
+        // A route that is entered in motion cannot be stretched.
+        let possible = !moving || stretch == 1.0;
+        if possible && best.as_ref().is_none_or(|best| attempt.better_than(best, settings.tolerance)) {
+            best = Some(attempt);
+        }
+        if done {
             break;
         }
-        if local {
+        if moving {
             slow_down(&mut slowdown, &knots, &ratios);
         }
         knots.extend(missed);
         knots.sort_unstable();
     }
-    let usable = |timed: &TimedTrajectory| !moving || timed.deviation <= settings.tolerance;
-    let mut timed = best.filter(usable).ok_or(Error::Numerical { stage: "the time allocation" })?;
+    let usable = |attempt: &Attempt| !moving || attempt.deviation <= settings.tolerance;
+    let best = best.filter(usable).ok_or(Error::Numerical { stage: "the time allocation" })?;
+    let mut timed = if own_time { best.stretched() } else { best.retimed(route, &profile, settings) };
     timed.stretch *= profile.factor;
     Ok(timed)
 }
 
-fn stretched(
+/// A minimum-snap curve through some of the route points.
+struct Attempt {
     trajectory: Trajectory,
-    mut times: Vec<f64>,
-    most: Extrema,
+    /// Time of each route point, s.
+    times: Vec<f64>,
+    /// Greatest distance from a route point, m.
     deviation: f64,
-    mut k: f64,
-) -> TimedTrajectory {
-    if k > 1.0 {
-        // The certificate is an upper bound; one more part in 1e9 covers the rounding of the division.
-        k *= 1.0 + 1e-9;
-        for time in &mut times {
-            *time *= k;
-        }
+    /// How much slower it has to be flown for all limits to hold.
+    stretch: f64,
+    /// The route points that are knots.
+    knots: Vec<usize>,
+}
+
+impl Attempt {
+    /// The sooner one of those that follow the route points; before there is one, the latest.
+    fn better_than(&self, other: &Self, tolerance: f64) -> bool {
+        let time = |attempt: &Self| attempt.trajectory.duration() * attempt.stretch;
+        other.deviation > tolerance || self.deviation <= tolerance && time(self) < time(other)
     }
-    let extrema = Extrema {
-        speed: most.speed / k,
-        acceleration: most.acceleration / (k * k),
-        heading_rate: most.heading_rate / k,
-    };
-    TimedTrajectory { trajectory: trajectory.stretched(k), times, extrema, deviation, stretch: k }
+
+    /// All of it slowed by one factor: exact, as the path does not depend on it.
+    fn stretched(self) -> TimedTrajectory {
+        // The certificate is an upper bound; one more part in 1e9 covers the rounding of the division.
+        let k = if self.stretch > 1.0 { self.stretch * (1.0 + 1e-9) } else { 1.0 };
+        let trajectory = self.trajectory.stretched(k);
+        let times = self.times.iter().map(|time| time * k).collect();
+        let extrema = trajectory.extrema();
+        let time_bound = trajectory.duration();
+        TimedTrajectory { trajectory, times, extrema, deviation: self.deviation, stretch: k, time_bound }
+    }
+
+    /// As fast as the limits allow at every place.
+    fn retimed(self, route: &[RoutePoint], profile: &SpeedProfile, settings: &TimingSettings) -> TimedTrajectory {
+        let edge = |i: usize| Edge {
+            end: self.times[i + 1],
+            slowness: profile.min_duration(i) / (self.times[i + 1] - self.times[i]),
+            acceleration: profile.acceleration(i),
+        };
+        let edges: Vec<Edge> = (0..route.len() - 1).map(edge).collect();
+        let rest: Vec<bool> = self.knots[..self.knots.len() - 1].iter().map(|&i| i == 0 || route[i].rest).collect();
+        let retimed = retime(&self.trajectory, &rest, &edges, settings);
+        let times = self.times.iter().map(|time| retimed.time(*time)).collect();
+        let Retimed { trajectory, extrema, bound, .. } = retimed;
+        TimedTrajectory { trajectory, times, extrema, deviation: self.deviation, stretch: 1.0, time_bound: bound }
+    }
 }
 
 /// How much slower a segment has to be flown; at most 1 where it is within limits.

@@ -1,56 +1,30 @@
 //! Minimum-snap trajectories of position and heading, with certified extrema.
 
+mod sample;
+mod segment;
+
 use crate::bernstein::Bernstein;
 use crate::error::Error;
 use crate::minimum_snap::{KnotDerivatives, knot_derivatives};
-use nalgebra::{Point3, Vector3, Vector4};
+use nalgebra::Vector4;
+pub use sample::{Extrema, Sample};
+pub(crate) use segment::Segment;
 
-/// The vehicle at one instant.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
-    /// Body origin in the world, m.
-    pub position: Point3<f64>,
-    /// Velocity in the world, m/s.
-    pub velocity: Vector3<f64>,
-    /// Acceleration in the world, m/s^2.
-    pub acceleration: Vector3<f64>,
-    /// Heading about world z, rad, continuous (not wrapped).
-    pub heading: f64,
-    /// Heading rate, rad/s.
-    pub heading_rate: f64,
-}
+/// Fraction by which certified bounds may lie above the true maxima.
+pub(crate) const TIGHT: f64 = 1e-6;
+/// The same where those of the coefficients will do.
+pub(crate) const COARSE: f64 = 1e6;
 
-/// Certified bounds over a stretch of trajectory: never below the true maxima, and above them by at most 1e-6 of them.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Extrema {
-    /// Greatest speed, m/s.
-    pub speed: f64,
-    /// Greatest acceleration, m/s^2.
-    pub acceleration: f64,
-    /// Greatest absolute heading rate, rad/s.
-    pub heading_rate: f64,
-}
-
-impl Extrema {
-    /// The larger of both, field by field.
-    pub(crate) fn max(self, other: Self) -> Self {
-        Self {
-            speed: self.speed.max(other.speed),
-            acceleration: self.acceleration.max(other.acceleration),
-            heading_rate: self.heading_rate.max(other.heading_rate),
-        }
-    }
-}
-
-/// A piecewise polynomial of degree 7 in x, y, z and heading, with continuous snap between its knots. It ends at rest; it begins at
-/// rest as well, unless it continues another in flight.
+/// A piecewise polynomial path of degree 7 in x, y, z and heading, and a time law along it. It ends at rest; it begins at rest as well,
+/// unless it continues another in flight.
+///
+/// As [`minimum_snap`](Self::minimum_snap) makes it, the polynomials are those of time and the snap is continuous. A planner flies the
+/// same path in its own time, `dt/ds` a quadratic spline: the acceleration stays continuous, its slope jumps at the knots.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     /// Times of the knots, s, from 0.
     times: Vec<f64>,
-    /// Per segment and axis the Bernstein coefficients over the segment.
-    segments: Vec<[Bernstein; 4]>,
+    segments: Vec<Segment>,
 }
 
 impl Trajectory {
@@ -87,16 +61,25 @@ impl Trajectory {
             let derivatives =
                 knot_derivatives(stretch, own, &begin).ok_or(Error::Numerical { stage: "the minimum-snap system" })?;
             for (i, &t) in own.iter().enumerate() {
-                segments.push(hermite(&stretch[i], &derivatives[i], &stretch[i + 1], &derivatives[i + 1], t));
+                let path = hermite(&stretch[i], &derivatives[i], &stretch[i + 1], &derivatives[i + 1], t);
+                segments.push(Segment { path, slowness: Bernstein::new(&[t]) });
             }
             first = last;
         }
-        let mut times = vec![0.0];
-        times.extend(durations.iter().scan(0.0, |sum, t| {
-            *sum += t;
+        Ok(Self::of_segments(segments))
+    }
+
+    /// Segments in order of time.
+    pub(crate) fn of_segments(segments: Vec<Segment>) -> Self {
+        let ends = segments.iter().scan(0.0, |sum, segment| {
+            *sum += segment.duration();
             Some(*sum)
-        }));
-        Ok(Self { times, segments })
+        });
+        Self { times: std::iter::once(0.0).chain(ends).collect(), segments }
+    }
+
+    pub(crate) fn segments(&self) -> &[Segment] {
+        &self.segments
     }
 
     /// Total time, s.
@@ -111,69 +94,44 @@ impl Trajectory {
 
     /// The vehicle at time `t`, clamped to the duration.
     pub fn sample(&self, t: f64) -> Sample {
-        let (i, s, length) = self.locate(t);
-        let (mut value, mut rate, mut second) = (Vector4::zeros(), Vector4::zeros(), Vector4::zeros());
-        for (axis, curve) in self.segments[i].iter().enumerate() {
-            let first = curve.derivative();
-            value[axis] = curve.value(s);
-            rate[axis] = first.value(s) / length;
-            second[axis] = first.derivative().value(s) / (length * length);
-        }
-        Sample {
-            position: Point3::from(value.xyz()),
-            velocity: rate.xyz(),
-            acceleration: second.xyz(),
-            heading: value.w,
-            heading_rate: rate.w,
-        }
+        let (segment, time) = self.locate(t);
+        segment.sample(time)
     }
 
     /// Velocity, acceleration and jerk at time `t`, clamped to the duration: what a trajectory that continues this one begins with.
     pub(crate) fn motion(&self, t: f64) -> KnotDerivatives {
-        let (i, s, length) = self.locate(t);
-        let mut motion = KnotDerivatives::zeros();
-        for (axis, curve) in self.segments[i].iter().enumerate() {
-            let first = curve.derivative();
-            let second = first.derivative();
-            motion[(0, axis)] = first.value(s) / length;
-            motion[(1, axis)] = second.value(s) / length.powi(2);
-            motion[(2, axis)] = second.derivative().value(s) / length.powi(3);
-        }
-        motion
+        let (segment, time) = self.locate(t);
+        segment.motion(time).1
     }
 
-    /// Segment of time `t`, the share of it that has passed, and its length, s.
-    fn locate(&self, t: f64) -> (usize, f64, f64) {
+    /// Segment of time `t`, and the time since its beginning, s.
+    fn locate(&self, t: f64) -> (&Segment, f64) {
         let t = if t.is_finite() { t.clamp(0.0, self.duration()) } else { 0.0 };
         let i = self.times.partition_point(|&knot| knot <= t).clamp(1, self.segments.len()) - 1;
-        let length = self.times[i + 1] - self.times[i];
-        (i, ((t - self.times[i]) / length).clamp(0.0, 1.0), length)
-    }
-
-    /// Certified extrema of segment `i`, by subdivision of the Bernstein form of `|v|^2`, `|a|^2` and the heading rate.
-    pub(crate) fn segment_extrema(&self, i: usize) -> Extrema {
-        let length = self.times[i + 1] - self.times[i];
-        let rates = self.segments[i].map(|curve| curve.derivative());
-        let seconds = [rates[0].derivative(), rates[1].derivative(), rates[2].derivative()];
-        let root = |squares: Bernstein| squares.maximum(0.0, 1e-6).sqrt();
-        let turn = Bernstein::sum_of_squares(&rates[3..]);
-        Extrema {
-            speed: root(Bernstein::sum_of_squares(&rates[..3])) / length,
-            acceleration: root(Bernstein::sum_of_squares(&seconds)) / (length * length),
-            heading_rate: root(turn) / length,
-        }
+        (&self.segments[i], t - self.times[i])
     }
 
     /// Certified extrema over the whole trajectory.
     pub fn extrema(&self) -> Extrema {
-        (0..self.segments.len()).fold(Extrema::default(), |most, i| most.max(self.segment_extrema(i)))
+        self.bounds(TIGHT)
+    }
+
+    /// The same, above the true maxima by a fraction of `tight` at most.
+    pub(crate) fn bounds(&self, tight: f64) -> Extrema {
+        self.segments.iter().fold(Extrema::default(), |most, segment| segment.extrema(&most, tight))
+    }
+
+    /// Bounds between two times, those of the segments about them: a little too high.
+    pub(crate) fn bounds_between(&self, [from, to]: [f64; 2]) -> Extrema {
+        let first = self.times.partition_point(|&knot| knot <= from).clamp(1, self.segments.len()) - 1;
+        let about = self.segments[first..].iter().zip(&self.times[first..]).take_while(|(_, begin)| **begin < to);
+        about.fold(Extrema::default(), |most, (segment, _)| segment.extrema(&most, COARSE))
     }
 
     /// The same path flown `k` times slower: speeds divide by `k`, accelerations by `k^2`.
     pub(crate) fn stretched(mut self, k: f64) -> Self {
-        for time in &mut self.times {
-            *time *= k;
-        }
+        self.times.iter_mut().for_each(|time| *time *= k);
+        self.segments.iter_mut().for_each(|segment| *segment = segment.stretched(k));
         self
     }
 }
@@ -231,11 +189,11 @@ mod tests {
         let mut seen = Extrema::default();
         for k in 0..=200_000 {
             let sample = curve.sample(curve.duration() * f64::from(k) / 200_000.0);
-            seen = seen.max(Extrema {
-                speed: sample.velocity.norm(),
-                acceleration: sample.acceleration.norm(),
-                heading_rate: sample.heading_rate.abs(),
-            });
+            seen = Extrema {
+                speed: seen.speed.max(sample.velocity.norm()),
+                acceleration: seen.acceleration.max(sample.acceleration.norm()),
+                heading_rate: seen.heading_rate.max(sample.heading_rate.abs()),
+            };
         }
         for (bound, sampled) in [
             (extrema.speed, seen.speed),

@@ -11,6 +11,8 @@ use crate::world::VehicleState;
 
 /// Greatest motion between two collision checks of a flight, m and (scaled by one metre) rad.
 const CHECK_STEP: f64 = 0.05;
+/// What a leg may come nearer between two looks, m: half of the shortest step of the certificate, and its ends are just clear.
+const LEG_SLACK: f64 = 0.002;
 /// Retreats tried, m.
 const RETREAT_DISTANCES: [f64; 4] = [0.15, 0.3, 0.6, 1.2];
 /// Edge of the cells in which a way from the surface to the open is looked for, m.
@@ -252,15 +254,20 @@ pub(crate) fn between(from: &VehicleState, to: &VehicleState, share: f64) -> Veh
     }
 }
 
-/// Whether the body keeps clear along the straight legs between the corners.
+/// Whether the body keeps clear along the straight legs between the corners: certified but for [`LEG_SLACK`].
 fn legs_are_clear(checker: &mut ClearanceChecker<'_>, corners: &[VehicleState], clearance: f64) -> bool {
     let mut cache = DistanceCache::default();
     corners.windows(2).all(|leg| {
         let turn = nearest_equivalent(leg[1].heading, leg[0].heading) - leg[0].heading;
-        let joints = Vector3::new(turn, leg[1].pan - leg[0].pan, leg[1].tilt - leg[0].tilt);
-        let motion = (leg[1].position - leg[0].position).norm() + joints.abs().sum();
-        let steps = (motion / CHECK_STEP).ceil().clamp(1.0, 1e5) as usize;
-        (0..=steps)
-            .all(|k| checker.is_clear(&between(&leg[0], &leg[1], k as f64 / steps as f64), clearance, &mut cache))
+        let joints = Vector3::new(turn, leg[1].pan - leg[0].pan, leg[1].tilt - leg[0].tilt).abs().sum();
+        let way = (leg[1].position - leg[0].position).norm();
+        let steps = ((way + joints) / CHECK_STEP).ceil().clamp(1.0, 1e5) as usize;
+        let state = |share: f64| between(&leg[0], &leg[1], share);
+        let looks_clear = (0..=steps).all(|k| checker.is_clear(&state(k as f64 / steps as f64), clearance, &mut cache));
+        looks_clear && {
+            let lever = checker.radius(leg.iter().copied());
+            let wanted = (clearance - LEG_SLACK).max(0.0);
+            checker.along(&state, way + lever * joints, wanted, wanted, &mut cache).1 == 0.0
+        }
     })
 }

@@ -62,6 +62,13 @@ pub trait Tool: Sync {
     /// Appends the collision body as (centre in world, radius) spheres, m: always the same number in the same order.
     fn spheres(&self, vehicle: &VehicleState, out: &mut Vec<(Point3<f64>, f64)>);
 
+    /// Where the nozzle of a vehicle is and where it sprays: what [`vehicle`](Self::vehicle) undoes. A plan opens the valve only while the
+    /// spray meets its aim; `None`, as it is here, for a tool that cannot tell.
+    fn nozzle(&self, vehicle: &VehicleState) -> Option<NozzleState> {
+        let _ = vehicle;
+        None
+    }
+
     /// Whether the vehicle may be in this state for reasons beside joints and collisions, such as a [`Tether`](crate::constraints::Tether). Asked at every
     /// target, and every 5 cm of the flights between strokes.
     fn permits(&self, vehicle: &VehicleState) -> bool {

@@ -20,6 +20,8 @@ pub struct TargetOutcomes {
     pub too_near: usize,
     /// Those that no flight was found to.
     pub without_transit: usize,
+    /// Those passed with the valve shut, as the spray would miss.
+    pub missed: usize,
     /// Those given up in the rehearsal.
     pub excluded: usize,
 }
@@ -55,17 +57,19 @@ impl TargetOutcomes {
             Some(NotServed::NoHeading) | None => &mut self.without_heading,
             Some(NotServed::TooNear) => &mut self.too_near,
             Some(NotServed::NoTransit) => &mut self.without_transit,
+            Some(NotServed::Missed) => &mut self.missed,
             Some(NotServed::Excluded) => &mut self.excluded,
         } += count;
     }
 
-    fn reasons(&self) -> [(usize, &'static str); 6] {
+    fn reasons(&self) -> [(usize, &'static str); 7] {
         [
             (self.out_of_reach, "out of the joints' reach"),
             (self.hidden, "hidden"),
             (self.without_heading, "without a heading"),
             (self.too_near, "too near something"),
             (self.without_transit, "without a flight to them"),
+            (self.missed, "off the aim"),
             (self.excluded, "left bare after the rehearsal"),
         ]
     }

@@ -1,6 +1,7 @@
 //! From a route to a plan: times, flow, figures.
 
 use super::solution::{Plan, PlanReport, Waypoint};
+use super::valve::{Valve, valve};
 use crate::clearance::{ClearanceChecker, DistanceCache};
 use crate::error::Error;
 use crate::minimum_snap::KnotDerivatives;
@@ -9,13 +10,10 @@ use crate::nozzle::Nozzles;
 use crate::route::RoutePoint;
 use crate::settings::{Settings, TimingPolicy};
 use crate::target::{NozzleState, Target};
-use crate::timing::speed_profile::{joint_motion, stroke_between};
+use crate::timing::speed_profile::joint_motion;
 use crate::timing::{TimedTrajectory, schedule};
-use crate::transit::between;
 use crate::world::VehicleState;
 
-/// Greatest motion between two samples at the clearance of the trajectory, m.
-const CLEARANCE_STEP: f64 = 0.02;
 /// Clearances beyond this are not resolved, m.
 const MAX_CLEARANCE: f64 = 1.0;
 
@@ -30,7 +28,7 @@ pub(crate) struct UntimedPlan {
     pub(crate) start: KnotDerivatives,
 }
 
-/// Where the trajectory comes nearer to the surface than half the clearance its waypoints keep: between two waypoints.
+/// Where the trajectory may come nearer to the surface than the clearance asked for: between two waypoints.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ClearanceViolation {
     /// Index of the waypoint before.
@@ -55,18 +53,10 @@ pub(crate) fn assemble_plan(
         route.push(RoutePoint { target: None, ..only });
     }
     let timed = schedule(&untimed.start, &route, targets, &settings.timing, dense)?;
-    let waypoints: Vec<Waypoint> = route
-        .iter()
-        .zip(&timed.times)
-        .map(|(point, &time)| Waypoint { time, state: point.state, target: point.target })
-        .collect();
-    let mut flow = vec![0.0; targets.len()];
-    for (points, times) in route.windows(2).zip(timed.times.windows(2)) {
-        let (length, dose) = stroke_between(points, targets);
-        if let Some(target) = points[0].target.filter(|_| length > 0.0) {
-            // Dose times spot speed: the volume on the stroke does not depend on the timing.
-            flow[target] = dose * length / (times[1] - times[0]);
-        }
+    let Valve { waypoints, flow, missed } = valve(&route, &timed, targets, checker, settings);
+    let mut not_served: Vec<Option<NotServed>> = untimed.vehicle.iter().map(|vehicle| vehicle.err()).collect();
+    for target in missed {
+        not_served[target] = Some(NotServed::Missed);
     }
     let reachable: Vec<bool> = untimed.vehicle.iter().map(Result::is_ok).collect();
     let ideal = |target: &Target| NozzleState {
@@ -80,14 +70,15 @@ pub(crate) fn assemble_plan(
         .zip(targets)
         .map(|(state, target)| state.unwrap_or_else(|_| ideal(target)))
         .collect();
-    let (clearance, violations) = least_clearance(&timed, &waypoints, checker, 0.5 * settings.clearance);
-    let report = report(untimed, targets, &nozzle, &timed, joint_rate(&waypoints), clearance);
+    let (clearance, violations) = least_clearance(&timed, &waypoints, checker, settings.clearance);
+    let missing = violations.iter().fold(0.0_f64, |most, violation| most.max(violation.missing));
+    let report = report(untimed, targets, &nozzle, &timed, joint_rate(&waypoints), [clearance, missing]);
     let plan = Plan {
         nozzle,
         vehicle: fill(&untimed.vehicle, &waypoints),
         target_time: target_times(targets.len(), &waypoints),
         reachable,
-        not_served: untimed.vehicle.iter().map(|vehicle| vehicle.err()).collect(),
+        not_served,
         flow,
         trajectory: timed.trajectory,
         waypoints,
@@ -119,7 +110,7 @@ fn report(
     nozzle: &[NozzleState],
     timed: &TimedTrajectory,
     joint_rate: f64,
-    clearance: f64,
+    [clearance, clearance_missing]: [f64; 2],
 ) -> PlanReport {
     let deviation = |i: usize| match untimed.vehicle[i] {
         Ok(_) => targets[i].normal_deviation(&nozzle[i].position),
@@ -139,8 +130,10 @@ fn report(
         extrema: timed.extrema,
         joint_rate,
         stretch: timed.stretch,
+        time_bound: timed.time_bound,
         path_deviation: timed.deviation,
         clearance,
+        clearance_missing,
     }
 }
 
@@ -151,7 +144,7 @@ fn joint_rate(waypoints: &[Waypoint]) -> f64 {
 }
 
 /// Flies the trajectory with the planned joints and measures the distance to the surface: the least of all, and where it
-/// falls below `wanted`.
+/// may fall below `wanted`, certified between the looks.
 fn least_clearance(
     timed: &TimedTrajectory,
     waypoints: &[Waypoint],
@@ -163,19 +156,16 @@ fn least_clearance(
     let mut violations = Vec::new();
     for (waypoint, pair) in waypoints.windows(2).enumerate() {
         let (from, to) = (&pair[0].state, &pair[1].state);
-        let turn = (to.heading - from.heading).abs() + (to.pan - from.pan).abs() + (to.tilt - from.tilt).abs();
-        let samples = (((to.position - from.position).norm() + turn) / CLEARANCE_STEP).ceil().clamp(1.0, 1e4) as usize;
-        let mut here = MAX_CLEARANCE;
-        for k in 0..=samples {
-            let share = k as f64 / samples as f64;
-            let sample = timed.trajectory.sample(pair[0].time + (pair[1].time - pair[0].time) * share);
-            let joints = between(from, to, share);
-            let state = VehicleState { position: sample.position, heading: sample.heading, ..joints };
-            // Only what is nearer than the least so far matters, and every violation.
-            here = here.min(checker.clearance(&state, least.max(wanted), &mut cache));
-        }
-        if here < wanted {
-            violations.push(ClearanceViolation { waypoint, missing: wanted - here });
+        let times = [pair[0].time, pair[1].time];
+        // Every point of the body lies within a ball about its origin.
+        let lever = checker.radius([*from, *to].into_iter());
+        let joints = (to.pan - from.pan).abs() + (to.tilt - from.tilt).abs();
+        let most = timed.trajectory.bounds_between(times);
+        let motion = (times[1] - times[0]) * (most.speed + lever * most.heading_rate) + lever * joints;
+        let state = |share: f64| timed.state(from, to, times, share);
+        let (here, missing) = checker.along(&state, motion, wanted, least, &mut cache);
+        if missing > 0.0 {
+            violations.push(ClearanceViolation { waypoint, missing });
         }
         least = least.min(here);
     }

@@ -80,7 +80,8 @@ impl Planner for OptimalPlanner<'_> {
                 };
             }
             graph.update(&nozzles.states, &mut checker, &changed);
-            let clearance: Vec<f64> = kept.iter().map(|kept| kept.unwrap_or(settings.clearance)).collect();
+            let kept_off = |kept: &Option<f64>| kept.unwrap_or(settings.clearance) + CURVE_MARGIN;
+            let clearance: Vec<f64> = kept.iter().map(kept_off).collect();
             let mut headings = heading::choose_headings(
                 &mut graph,
                 &nozzles.states,
@@ -113,7 +114,8 @@ impl Planner for OptimalPlanner<'_> {
             }
             event!(warn, attempt, violations = violations.len(), "plan refused: too near to the surface");
             if attempt + 1 < MAX_ATTEMPTS {
-                let shortfalls = violations.iter().flat_map(|violation| shortfalls(&plan, violation)).collect();
+                let last = attempt + LAST_ATTEMPTS >= MAX_ATTEMPTS;
+                let shortfalls = violations.iter().flat_map(|violation| shortfalls(&plan, violation, last)).collect();
                 return Ok((plan, shortfalls));
             }
             match plan.report.clearance {
@@ -126,15 +128,19 @@ impl Planner for OptimalPlanner<'_> {
 
 /// Plans made before a collision is final.
 const MAX_ATTEMPTS: usize = 8;
+/// How many of them give up what still comes too near.
+const LAST_ATTEMPTS: usize = 4;
+/// More clearance than is asked of the curve at its waypoints, m: between them it is certified to what is asked.
+const CURVE_MARGIN: f64 = 0.002;
 /// More clearance than is missing, m.
 const BEYOND: f64 = 0.02;
 /// Clearance beyond which a target that still causes violations is given up, m.
 const MAX_CLEARANCE: f64 = 0.2;
 
 /// The targets on both sides of a violation; at the ends of a flight that comes too near more clearance does not help.
-fn shortfalls(plan: &Plan, violation: &ClearanceViolation) -> impl Iterator<Item = Shortfall> {
+fn shortfalls(plan: &Plan, violation: &ClearanceViolation, last: bool) -> impl Iterator<Item = Shortfall> {
     let about = plan.targets_about(violation.waypoint);
-    let hopeless = !matches!(about, [Some(a), Some(b)] if b <= a + 1);
+    let hopeless = last || !matches!(about, [Some(a), Some(b)] if b <= a + 1);
     let missing = violation.missing;
     about.into_iter().flatten().map(move |target| Shortfall { target, missing, hopeless })
 }

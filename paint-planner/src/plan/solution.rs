@@ -15,7 +15,7 @@ pub struct Waypoint {
     pub time: f64,
     /// Planned state; its heading is continuous along the plan.
     pub state: VehicleState,
-    /// Index of the target served here; `None` on flights between strokes.
+    /// Index of the target served here, or of the last one where the joints turn unevenly to the next; `None` on flights between strokes.
     pub target: Option<usize>,
 }
 
@@ -44,12 +44,16 @@ pub struct PlanReport {
     /// Greatest rate of pan or tilt, rad/s; exact, as planned joints are linear in time between waypoints.
     pub joint_rate: f64,
     /// Factor by which all times were stretched in the end to meet the limits; with gradient-preserving timing the
-    /// factor k of thesis section 7.5.
+    /// factor k of thesis section 7.5, else 1.
     pub stretch: f64,
+    /// Lower bound of the time along the same path within the same limits, s: the acceleration may jump (TOPP-RA).
+    pub time_bound: f64,
     /// Greatest distance between the trajectory and a waypoint at its time, m.
     pub path_deviation: f64,
-    /// Least distance between collision body and surface along the trajectory, m, clipped at 1; negative: overlap.
+    /// Least distance between collision body and surface seen along the trajectory, m, clipped at 1; negative: overlap.
     pub clearance: f64,
+    /// How much of the clearance asked for may be missing somewhere along the trajectory, m; 0 certifies that none is.
+    pub clearance_missing: f64,
 }
 
 /// A plan for a whole path. Vectors are indexed by target.
@@ -61,7 +65,7 @@ pub struct Plan {
     pub vehicle: Vec<VehicleState>,
     /// Which targets are served.
     pub reachable: Vec<bool>,
-    /// Why the others are not.
+    /// Why the others are not; [`NotServed::Missed`]: passed, but with the valve shut to the next one.
     pub not_served: Vec<Option<NotServed>>,
     /// When each target is passed, s; for targets not served a time between their neighbours'.
     pub target_time: Vec<f64>,
@@ -110,7 +114,7 @@ impl Plan {
         let (p, q) = (&self.nozzle[from], &self.nozzle[to]);
         let mixed = p.direction.lerp(&q.direction, ratio);
         let direction = UnitVector3::try_new(mixed, 1e-9).unwrap_or(p.direction);
-        let stroke = matches!((a.target, b.target), (Some(x), Some(y)) if y == x + 1);
+        let stroke = matches!((a.target, b.target), (Some(x), Some(y)) if y == x || y == x + 1);
         Setpoint {
             sample: self.trajectory.sample(t),
             aim: self.points[from] + (self.points[to] - self.points[from]) * ratio,
@@ -125,7 +129,8 @@ impl Plan {
     /// The last target at or before a waypoint, and the first one after it.
     pub(crate) fn targets_about(&self, waypoint: usize) -> [Option<usize>; 2] {
         let (before, after) = self.waypoints.split_at(waypoint + 1);
-        [before.iter().rev().find_map(|w| w.target), after.iter().find_map(|w| w.target)]
+        let last = before.iter().rev().find_map(|w| w.target);
+        [last, after.iter().find_map(|w| w.target.filter(|target| Some(*target) != last))]
     }
 
     /// Paint the plan puts between target `i` and the next, m^3.

@@ -70,7 +70,7 @@ pub fn continue_plan(
         tool,
         &Settings { start: None, goal: None, ..settings.clone() },
     )?;
-    if anew.report.served < all.len() || anew.waypoints.len() > all.len() {
+    if anew.report.served < all.len() || anew.waypoints.iter().any(|waypoint| waypoint.target.is_none()) {
         return refuse("a target cannot be served on the way");
     }
     let (states, nozzles) = blended(flying, first, remaining, &anew, at);

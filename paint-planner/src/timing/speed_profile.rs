@@ -27,6 +27,8 @@ pub(crate) struct SpeedProfile {
     turn: Vec<f64>,
     /// Least duration by spot speed, flow, speed, heading rate and joint rate, s.
     min_duration: Vec<f64>,
+    /// Greatest acceleration, m/s^2: less where paint is sprayed.
+    acceleration: Vec<f64>,
     /// Greatest speed at a route point by curvature, m/s; 0 where the vehicle halts.
     speed_limit: Vec<f64>,
     /// Edges whose time is given by stamps and may only be stretched all together, except for starting and halting.
@@ -41,6 +43,7 @@ impl SpeedProfile {
             travel: vec![],
             turn: vec![],
             min_duration: vec![],
+            acceleration: vec![],
             speed_limit: vec![],
             stamped: vec![],
             factor: 1.0,
@@ -65,6 +68,8 @@ impl SpeedProfile {
             profile.min_duration.push(min_duration);
             profile.travel.push(travel);
             profile.turn.push(turn);
+            let spraying = if dose > 0.0 { settings.max_spray_acceleration } else { f64::INFINITY };
+            profile.acceleration.push(settings.max_acceleration.min(spraying));
             profile.stamped.push(stamp.is_some());
             stamps.push(stamp);
         }
@@ -121,6 +126,16 @@ impl SpeedProfile {
                 moving.max(min_duration)
             })
             .collect()
+    }
+
+    /// Least duration of edge `i` by all that limits a rate, s.
+    pub(crate) fn min_duration(&self, i: usize) -> f64 {
+        self.min_duration[i]
+    }
+
+    /// Greatest acceleration on edge `i`, m/s^2.
+    pub(crate) fn acceleration(&self, i: usize) -> f64 {
+        self.acceleration[i]
     }
 
     /// Limits speeds by what can be gained since the route point before, in the order of `edges`; `from` is 0 when edges are

@@ -1,0 +1,107 @@
+//! One piece of a trajectory: a polynomial path and the time law along it.
+
+use super::sample::{Extrema, Sample};
+use crate::bernstein::Bernstein;
+use crate::minimum_snap::KnotDerivatives;
+use nalgebra::{Point3, Vector4};
+
+/// Newton steps to the parameter at a time; the time law is monotone and nearly linear.
+const NEWTON: usize = 12;
+
+/// A path `q(s)`, s from 0 to 1, along which time passes at the rate `dt/ds`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Segment {
+    /// x, y, z in m, heading in rad.
+    pub(crate) path: [Bernstein; 4],
+    /// `dt/ds`, s: greater than 0, of degree 0 or 2.
+    pub(crate) slowness: Bernstein,
+}
+
+impl Segment {
+    /// How long it is flown, s.
+    pub(crate) fn duration(&self) -> f64 {
+        self.slowness.integral(1.0)
+    }
+
+    /// Time since its beginning at `s`, s.
+    pub(crate) fn time(&self, s: f64) -> f64 {
+        self.slowness.integral(s)
+    }
+
+    /// The share `s` of the path at a time since its beginning, the inverse of [`time`](Self::time).
+    fn parameter(&self, time: f64) -> f64 {
+        let mut s = (time / self.duration()).clamp(0.0, 1.0);
+        if self.slowness.degree() == 0 {
+            return s;
+        }
+        for _ in 0..NEWTON {
+            let step = (time - self.time(s)) / self.slowness.value(s);
+            s = (s + step).clamp(0.0, 1.0);
+            if step.abs() < 1e-15 {
+                break;
+            }
+        }
+        s
+    }
+
+    /// The vehicle at a time since the beginning.
+    pub(crate) fn sample(&self, time: f64) -> Sample {
+        let (value, motion) = self.motion(time);
+        let row = |r: usize| motion.fixed_view::<1, 3>(r, 0).transpose();
+        Sample {
+            position: Point3::from(value.xyz()),
+            velocity: row(0),
+            acceleration: row(1),
+            heading: value.w,
+            heading_rate: motion[(0, 3)],
+        }
+    }
+
+    /// Place, and velocity, acceleration and jerk, at a time since the beginning.
+    pub(crate) fn motion(&self, time: f64) -> (Vector4<f64>, KnotDerivatives) {
+        let s = self.parameter(time);
+        let slope = self.slowness.derivative();
+        let (w, w1, w2) = (self.slowness.value(s), slope.value(s), slope.derivative().value(s));
+        let (mut value, mut motion) = (Vector4::zeros(), KnotDerivatives::zeros());
+        for (axis, path) in self.path.iter().enumerate() {
+            let (first, second) = (path.derivative(), path.derivative().derivative());
+            let [q1, q2, q3] = [first, second, second.derivative()].map(|curve| curve.value(s));
+            value[axis] = path.value(s);
+            // d/dt = (1/w) d/ds, again and again.
+            motion[(0, axis)] = q1 / w;
+            motion[(1, axis)] = (q2 - q1 * w1 / w) / w.powi(2);
+            motion[(2, axis)] = (q3 - (q1 * w2 + 3.0 * w1 * (q2 - q1 * w1 / w)) / w) / w.powi(3);
+        }
+        (value, motion)
+    }
+
+    /// Certified extrema of the segment, above the true ones by a fraction of `tight` at most, and no less than `floor`: what is below need
+    /// not be resolved.
+    pub(crate) fn extrema(&self, floor: &Extrema, tight: f64) -> Extrema {
+        let rates = self.path.map(|path| path.derivative());
+        let square = self.slowness.product(&self.slowness);
+        let root = |squares: Bernstein, below: Bernstein, floor: f64| {
+            squares.greatest_ratio(&below.elevated(squares.degree()), floor * floor, tight).sqrt()
+        };
+        // The acceleration is q''/w^2, or (q'' w - q' w')/w^3 where w changes.
+        let second = |axis: usize| {
+            let second = rates[axis].derivative();
+            match self.slowness.degree() {
+                0 => second,
+                _ => second.product(&self.slowness).minus(&rates[axis].product(&self.slowness.derivative())),
+            }
+        };
+        let fourth = square.product(&square);
+        let below = if self.slowness.degree() == 0 { fourth } else { fourth.product(&square) };
+        Extrema {
+            speed: root(Bernstein::sum_of_squares(&rates[..3]), square, floor.speed),
+            acceleration: root(Bernstein::sum_of_squares(&[0, 1, 2].map(second)), below, floor.acceleration),
+            heading_rate: root(Bernstein::sum_of_squares(&rates[3..]), square, floor.heading_rate),
+        }
+    }
+
+    /// The same path flown `k` times slower.
+    pub(crate) fn stretched(&self, k: f64) -> Self {
+        Self { slowness: self.slowness.scaled(k), ..*self }
+    }
+}
