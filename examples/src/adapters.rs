@@ -78,6 +78,13 @@ impl<C: KinematicChain> Tool for Robot<C> {
         self.body.spheres(&self.chain, &hover.world_from_body(), &hover.joints, out);
     }
 
+    fn nozzle(&self, vehicle: &VehicleState) -> Option<NozzleState> {
+        let joints = self.chain.point(vehicle.pan, vehicle.tilt);
+        let hover = Hover { position: vehicle.position, heading: vehicle.heading, joints };
+        let nozzle = self.chain.forward(&hover.world_from_body(), &hover.joints);
+        Some(NozzleState { position: nozzle.tip, direction: nozzle.direction })
+    }
+
     fn permits(&self, vehicle: &VehicleState) -> bool {
         self.tether.is_none_or(|tether| tether.permits(vehicle))
     }

@@ -1,6 +1,7 @@
 //! What a run found: `report.json` for programs, `report.md` for people.
 
 mod check;
+mod times;
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -8,6 +9,7 @@ use std::path::Path;
 use serde::Serialize;
 
 pub use check::{Check, Requirement, Unit};
+pub use times::TimeFigures;
 
 /// The figures of one mission. Flat, SI units in the names; every number is finite.
 #[derive(Debug, Clone, Serialize)]
@@ -71,6 +73,9 @@ pub struct Report {
     pub path_length_m: f64,
     /// Time in the air.
     pub flight_time_s: f64,
+    /// What makes it that long.
+    #[serde(flatten)]
+    pub times: TimeFigures,
     /// Share of the time in the air with the valve open.
     pub valve_open_share: f64,
     /// Share of the time in which the plan asks for paint for which the interlock kept the valve shut.

@@ -16,7 +16,7 @@ use super::settings::{MissionSettings, PainterChoice};
 use crate::adapters::{MeshSurface, Robot};
 use crate::appearance::DENSITY;
 use crate::onboard::LocalisationFigures;
-use crate::report::{Report, peak_resident_bytes};
+use crate::report::{Report, TimeFigures, peak_resident_bytes};
 
 /// Step of the dense check of the planned limits, seconds; the certificates do not depend on it.
 const LIMIT_STEP: f64 = 0.02;
@@ -77,6 +77,7 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         planning_per_flight_time: mission.planning / flight_time,
         path_length_m: path,
         flight_time_s: flight_time,
+        times: TimeFigures::of(mission.flights.iter().map(|f| &f.plan), &mission.task.settings.planner.timing),
         valve_open_share: mission.flights.iter().map(|f| f.plan.open_time()).sum::<f64>() / flight_time,
         valve_held_share: share_held(mission),
         transit_s: mission.flights.iter().map(|f| f.route.transit_time).sum(),

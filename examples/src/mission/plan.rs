@@ -2,7 +2,9 @@
 
 use paint_net::Painting;
 use paint_net::path::{StrokeSettings, boustrophedon};
-use paint_planner::mission::{MissionFlight, MissionPlan, MissionPlanner, Route, Spray, TargetOutcomes};
+use paint_planner::mission::{
+    MissionFlight, MissionPlan, MissionPlanner, NoRehearsal, Rehearsal, Route, Spray, TargetOutcomes,
+};
 use paint_planner::plan::SmoothingPlanner;
 use paint_planner::{Error, OptimalPlanner, Plan, Planner, Settings, Surface, Target, Tool};
 use std::cell::Cell;
@@ -70,17 +72,9 @@ pub(super) fn plan(task: &PaintingTask) -> Result<Planned, MissionError> {
     let stage = Stage::start("plan");
     let mesh = MeshSurface(&surface.world);
     let timed = TimedPlanner::default();
-    let planner = MissionPlanner {
-        planner: &timed,
-        surface: &settings.constraints.around(&mesh),
-        tool: robot,
-        rehearsal: &WindRehearsal { surface, robot, settings },
-        settings: paint_planner::mission::MissionSettings {
-            planner: settings.planner.clone(),
-            shortest_retry: SHORTEST_RETRY * settings.spot,
-            ..paint_planner::mission::MissionSettings::default()
-        },
-    };
+    let obstacles = settings.constraints.around(&mesh);
+    let rehearsal = WindRehearsal { surface, robot, settings };
+    let planner = mission_planner(task, &timed, &obstacles, &rehearsal);
     let mut mission = MissionPlan::default();
     for (k, layer) in layers.iter().enumerate() {
         stage.share(k as f64 / layers.len() as f64);
@@ -125,6 +119,34 @@ pub(super) fn plan(task: &PaintingTask) -> Result<Planned, MissionError> {
     };
     stage.done(&format!("{metres:.0} m of path, {:.1} ms per metre{again}{rehearsed}", 1e3 * planned.seconds / metres));
     Ok(planned)
+}
+
+/// Who plans the flights of a mission.
+fn mission_planner<'a, R: Rehearsal>(
+    task: &'a PaintingTask,
+    planner: &'a dyn Planner,
+    surface: &'a dyn Surface,
+    rehearsal: &'a R,
+) -> MissionPlanner<'a, R> {
+    let settings = paint_planner::mission::MissionSettings {
+        planner: task.settings.planner.clone(),
+        shortest_retry: SHORTEST_RETRY * task.settings.spot,
+        ..paint_planner::mission::MissionSettings::default()
+    };
+    MissionPlanner { planner, surface, tool: &task.robot, rehearsal, settings }
+}
+
+/// The flights of all layers as they are before any rehearsal.
+pub(super) fn unrehearsed(task: &PaintingTask) -> Result<MissionPlan, MissionError> {
+    let mesh = MeshSurface(&task.surface.world);
+    let obstacles = task.settings.constraints.around(&mesh);
+    let optimal = OptimalPlanner::default();
+    let planner = mission_planner(task, &optimal, &obstacles, &NoRehearsal);
+    let mut mission = MissionPlan::default();
+    for layer in &task.layers {
+        planner.add_layer(layer_route(layer, &task.surface, &task.settings, mission.end().1)?, &mut mission)?;
+    }
+    Ok(mission)
 }
 
 /// The strokes of a layer on the surface, in the order in which they are flown after `from`.

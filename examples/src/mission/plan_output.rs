@@ -22,7 +22,7 @@ use super::trajectory_table::{TRAJECTORY_STEP, cells};
 use crate::appearance::DENSITY;
 use crate::progress::Stage;
 use crate::recording::{ColouredMesh, RobotState, save_recording};
-use crate::report::save_figures;
+use crate::report::{TimeFigures, save_figures};
 
 /// The figures of a plan. Flat, SI units in the names.
 #[derive(Debug, Clone, Serialize)]
@@ -51,6 +51,8 @@ pub struct PlanFigures {
     pub targets_too_near: usize,
     /// No flight to them was found.
     pub targets_without_transit: usize,
+    /// The planned motion misses them: the valve stays shut.
+    pub targets_missed: usize,
     /// The rehearsal in wind gave them up: those of `targets_left_bare` that have paint before them or after them and no other flight.
     pub targets_left_in_wind: usize,
     /// Targets that keep more clearance since the rehearsal in wind.
@@ -64,6 +66,9 @@ pub struct PlanFigures {
     pub unreachable_paint_share: f64,
     /// Time in the air.
     pub flight_time_s: f64,
+    /// What makes it that long.
+    #[serde(flatten)]
+    pub times: TimeFigures,
     /// Length of the vehicle's way.
     pub path_length_m: f64,
     /// Share of the time with the valve open.
@@ -80,6 +85,8 @@ pub struct PlanFigures {
     pub max_acceleration_m_per_s2: f64,
     /// Greatest planned rate of pan or tilt.
     pub max_joint_rate_rad_per_s: f64,
+    /// How much of the clearance asked for may be missing along the planned motion; 0: certified, between targets too.
+    pub clearance_missing_m: f64,
     /// Planning time on one core.
     pub planning_s: f64,
     /// Wall-clock time of everything.
@@ -197,12 +204,14 @@ fn figures(mission: &PlannedMission) -> PlanFigures {
         targets_without_heading: outcomes.without_heading,
         targets_too_near: outcomes.too_near,
         targets_without_transit: outcomes.without_transit,
+        targets_missed: outcomes.missed,
         targets_left_in_wind: outcomes.excluded,
         targets_kept_off: planned.kept_off,
         targets_left_bare: planned.left_bare,
         lost_to_constraints_share: task.share_lost_to_constraints(),
         unreachable_paint_share: share_out_of_reach(task, planned.unreachable_paint, mission.layers()),
         flight_time_s: flight_time,
+        times: TimeFigures::of(mission.layers().map(|(_, plan)| plan), &task.settings.planner.timing),
         path_length_m: sum(&Plan::path_length),
         valve_open_share: sum(&Plan::open_time) / flight_time,
         paint_kg: volume * DENSITY,
@@ -211,6 +220,7 @@ fn figures(mission: &PlannedMission) -> PlanFigures {
         max_speed_m_per_s: most(&|plan| plan.report.extrema.speed),
         max_acceleration_m_per_s2: most(&|plan| plan.report.extrema.acceleration),
         max_joint_rate_rad_per_s: most(&|plan| plan.report.joint_rate),
+        clearance_missing_m: most(&|plan| plan.report.clearance_missing),
         planning_s: planned.seconds,
         wall_s: task.started.elapsed().as_secs_f64(),
         outcomes,

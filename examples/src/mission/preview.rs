@@ -1,11 +1,9 @@
-//! What a mission will look like, how long it takes and what it cannot reach: before anything is planned.
+//! What a mission will look like, how long it takes and what it cannot reach: planned, but neither rehearsed nor flown.
 
 use std::path::Path;
 
 use nalgebra::Point3;
 use paint_net::Image;
-use paint_planner::Target;
-use paint_planner::timing::TimingPolicy;
 use paint_sim::render::Shading;
 use paint_sim::surface::Hit;
 use serde::Serialize;
@@ -13,7 +11,7 @@ use serde::Serialize;
 use super::error::MissionError;
 use super::painting_task::PaintingTask;
 use super::path_view::save_lines;
-use super::plan::layer_route;
+use super::plan::unrehearsed;
 use super::seams::deposit_error;
 use super::shading::{shading, texel_at};
 use super::view::{camera, view};
@@ -46,7 +44,7 @@ pub struct Preview {
     pub wanted_in_reach_share: f64,
     /// Paint that leaves the nozzle.
     pub paint_kg: f64,
-    /// Estimated time in the air: strokes at their speed, transits by the limits of the vehicle, obstacles left aside.
+    /// Estimated time in the air: that of the plan before its rehearsal in wind.
     pub flight_time_s: f64,
     /// Strokes over all layers.
     pub strokes: usize,
@@ -99,21 +97,9 @@ impl Preview {
 }
 
 fn estimate(task: &PaintingTask) -> Result<Preview, MissionError> {
-    let timing = &task.settings.planner.timing;
-    let speed = match timing.policy {
-        TimingPolicy::Uniform { speed } => speed.min(timing.max_speed),
-        TimingPolicy::GradientPreserving => timing.max_speed,
-    };
-    let (mut time, mut volume, mut strokes, mut last) = (0.0, 0.0, 0, None::<Target>);
-    for layer in &task.layers {
-        let route = layer_route(layer, &task.surface, &task.settings, last.as_ref())?;
-        let gap = task.settings.planner.break_length;
-        let steps = route.targets.windows(2).map(|pair| (pair[1].point - pair[0].point).norm());
-        time += steps.filter(|step| *step <= gap).sum::<f64>() / speed + route.transit_time;
-        volume += route.volume();
-        strokes += route.strokes;
-        last = route.targets.last().copied().or(last);
-    }
+    let flights = unrehearsed(task)?.flights;
+    let strokes = flights.iter().map(|flight| flight.route.strokes).sum();
+    let volume: f64 = flights.iter().map(|flight| flight.route.volume()).sum();
     let seams = deposit_error(task)?;
     let depth = task.wanted.map(|ink| task.appearance.ink().inverse(ink));
     let wanted = |weight: &Image| depth.data().iter().zip(weight.data()).map(|(d, w)| d * w).sum::<f64>();
@@ -126,7 +112,7 @@ fn estimate(task: &PaintingTask) -> Result<Preview, MissionError> {
         lost_to_constraints_share: task.share_lost_to_constraints(),
         wanted_in_reach_share: wanted(&task.coverage_in_reach()) / wanted(&task.coverage).max(f64::MIN_POSITIVE),
         paint_kg: volume * DENSITY,
-        flight_time_s: time,
+        flight_time_s: flights.iter().map(|flight| flight.plan.trajectory.duration()).sum(),
         strokes,
         deposit_error_at_seams: seams.map(|s| s.near),
         deposit_error_at_seams_naive: seams.map(|s| s.naive),

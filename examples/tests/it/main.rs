@@ -7,6 +7,7 @@ mod bad_input;
 mod bags;
 mod five_joint_arm;
 mod flight_constraints;
+mod flight_times;
 mod gltf_meshes;
 #[cfg(feature = "scan")]
 mod gyroscope;
