@@ -190,12 +190,12 @@ fn share_held(mission: &Mission) -> f64 {
 }
 
 /// Moments of a flight at which the robot overlaps the surface or is in a keep-out volume.
-fn collisions(robot: &Robot, obstacles: &dyn Surface, log: &FlightLog) -> usize {
+pub(super) fn collisions(robot: &Robot, obstacles: &dyn Surface, log: &FlightLog) -> usize {
     log.samples.iter().step_by(GAP_STRIDE).filter(|sample| gap_at(robot, obstacles, sample, 0.0) < 0.0).count()
 }
 
 /// Moments at which the plan exceeds a limit of speed, acceleration, heading rate or joint rate, or the flown gun its joint limits.
-fn limit_violations(plan: &Plan, flight: &FlightLog, settings: &MissionSettings) -> usize {
+pub(super) fn limit_violations(plan: &Plan, flight: &FlightLog, settings: &MissionSettings) -> usize {
     let planned = plan.limit_violations(&settings.planner.timing, LIMIT_STEP);
     let ptu = &settings.ptu;
     // The servo's steps do not divide the limits: allow one half step.

@@ -90,12 +90,15 @@ fn onboard<'a, 'b>(
     Ok(Some(LocalisedFlight::new(camera.before(painted), map, settings.seed)?))
 }
 
-/// Puts the paint of the flights that count onto the texels; returns the film and the pixel of each of its texels.
-pub(super) fn spray(flights: &[LayerFlight], task: &PaintingTask) -> Result<(Film, Vec<usize>), MissionError> {
+/// Puts the paint of flights onto the texels; returns the film and the pixel of each of its texels.
+pub(super) fn spray<'a>(
+    flights: impl Iterator<Item = &'a FlightLog>,
+    task: &PaintingTask,
+) -> Result<(Film, Vec<usize>), MissionError> {
     let stage = Stage::start("spray");
     let (texels, pixels) = task.film_texels();
     let mut film = Film::new(texels)?;
-    let shots: Vec<_> = flights.iter().flat_map(|f| f.flight.shots(SHOT_STEP)).collect();
+    let shots: Vec<_> = flights.flat_map(|flight| flight.shots(SHOT_STEP)).collect();
     film.deposit(&shots, &spray_model(&task.settings), task.met(), task.settings.threads, &mut |done, total| {
         stage.share(done as f64 / total as f64);
     })?;
@@ -113,6 +116,24 @@ pub(super) fn localisation_noise(settings: &MissionSettings, usual: Localisation
     }
 }
 
+/// The flight whose paint counts: with the localisation that was chosen, as far as that is a noise, with an interlock, and with faults.
+pub(super) fn counted_flight(plan: &Plan, robot: &Robot, settings: &MissionSettings, layer: u64) -> FlightSettings {
+    let usual = usual_flight(plan, robot, settings, layer);
+    // Paint that misses by less than the spot is wide is better than none. The flights beside it are flown to see what they miss by, so
+    // nothing shuts their valve.
+    let interlock = Interlock { miss: settings.spot, ..Interlock::default() };
+    FlightSettings {
+        localisation: localisation_noise(settings, usual.localisation),
+        valve: Valve { interlock: Some(interlock), ..usual.valve },
+        faults: settings.faults,
+        ..usual
+    }
+}
+
+fn usual_flight(plan: &Plan, robot: &Robot, settings: &MissionSettings, layer: u64) -> FlightSettings {
+    flight_settings(plan, robot.tether, settings.seed.wrapping_mul(0x9E37_79B9).wrapping_add(layer))
+}
+
 /// The same plan with the localisation that was chosen, with a drifting localisation, and with the pan-tilt unit locked.
 pub(super) fn fly_three(
     plan: &Plan,
@@ -122,14 +143,9 @@ pub(super) fn fly_three(
     layer: u64,
     onboard: Option<&mut LocalisedFlight>,
 ) -> Result<[FlightLog; 3], MissionError> {
-    let usual = flight_settings(plan, robot.tether, settings.seed.wrapping_mul(0x9E37_79B9).wrapping_add(layer));
-    // Paint that misses by less than the spot is wide is better than none. The flights beside it are flown to see what they miss by, so
-    // nothing shuts their valve.
-    let interlock = Interlock { miss: settings.spot, ..Interlock::default() };
-    let valve = Valve { interlock: Some(interlock), ..usual.valve };
-    let chosen = localisation_noise(settings, usual.localisation);
+    let usual = usual_flight(plan, robot, settings, layer);
     let variants = [
-        FlightSettings { valve, localisation: chosen, faults: settings.faults, ..usual },
+        counted_flight(plan, robot, settings, layer),
         FlightSettings { localisation: Localisation::slam_7cm(), ..usual },
         FlightSettings { ptu_locked: true, ..usual },
     ];

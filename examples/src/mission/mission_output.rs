@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use nalgebra::Point3;
+use paint_net::Image;
 use paint_sim::flight::FlightSample;
 use paint_sim::surface::Hit;
 use tsdf_hash::mesh::Mesh;
@@ -10,6 +11,7 @@ use tsdf_hash::mesh::Mesh;
 use super::error::MissionError;
 use super::figures::report;
 use super::inspect::inspect;
+use super::painting_task::PaintingTask;
 use super::path_view::save_path;
 use super::run::Mission;
 use super::settings::PainterChoice;
@@ -77,18 +79,10 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
 }
 
 fn save_textures(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
-    let (width, height) = (mission.task.wanted.width(), mission.task.wanted.height());
-    let painted = mission.painted_depth();
-    let picture = |depth: &dyn Fn(usize) -> f64| {
-        let pixels = (0..width * height).map(|k| {
-            if mission.task.coverage.data()[k] > 0.0 { mission.task.appearance.srgb(depth(k)) } else { BACKGROUND }
-        });
-        let picture = Rgb::from_pixels(width, height, pixels);
-        picture.enlarged((1400 / width as u32).clamp(1, 8))
-    };
+    let width = mission.task.wanted.width();
     let ink = mission.task.appearance.ink();
-    picture(&|k| ink.inverse(mission.task.wanted.data()[k])).save(&folder.join("wanted.png"))?;
-    picture(&|k| painted.data()[k]).save(&folder.join("painted.png"))?;
+    texture(&mission.task, &mission.task.wanted.map(|wanted| ink.inverse(wanted))).save(&folder.join("wanted.png"))?;
+    texture(&mission.task, &mission.painted_depth()).save(&folder.join("painted.png"))?;
     save_error_map(
         &folder.join("error.png"),
         width,
@@ -104,12 +98,25 @@ fn save_textures(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
     Ok(())
 }
 
+/// The chart with this depth of paint on its pixels.
+pub(super) fn texture(task: &PaintingTask, depth: &Image) -> Rgb {
+    let (width, height) = (depth.width(), depth.height());
+    let pixel = |k: usize| {
+        if task.coverage.data()[k] > 0.0 { task.appearance.srgb(depth.data()[k]) } else { BACKGROUND }
+    };
+    Rgb::from_pixels(width, height, (0..width * height).map(pixel)).enlarged((1400 / width as u32).clamp(1, 8))
+}
+
+/// The surface with this depth of paint as somebody standing before it sees it.
+pub(super) fn painted_view(task: &PaintingTask, painted: &Image) -> Result<Rgb, MissionError> {
+    let corners: Vec<Point3<f64>> = task.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
+    let shade = |hit: &Hit| shading(task, painted, hit);
+    Ok(picture_of(&view(task, &camera(task, &corners)?, &shade)?))
+}
+
 fn save_views(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
     let painted = mission.painted_depth();
-    let corners: Vec<Point3<f64>> = mission.task.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
-    let shade = |hit: &Hit| shading(&mission.task, &painted, hit);
-    let frame = view(&mission.task, &camera(&mission.task, &corners)?, &shade)?;
-    picture_of(&frame).save(&folder.join("painted_view.png"))?;
+    painted_view(&mission.task, &painted)?.save(&folder.join("painted_view.png"))?;
 
     // Of layers the base coat alone: all of them on top of each other hide the surface and one another.
     let Some(base) = mission.flights.first() else { return Ok(()) };

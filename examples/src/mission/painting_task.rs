@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use paint_net::{Image, Painting};
-use paint_sim::{Texel, TriangleSurface};
+use paint_sim::{Film, Texel, TriangleSurface};
 use ptu_kinematics::Ptu;
 
 use super::decide::decide;
@@ -129,6 +129,15 @@ impl PaintingTask {
     /// What the robot and its paint meet.
     pub(super) fn met(&self) -> &TriangleSurface {
         self.truth.as_ref().unwrap_or(&self.surface.world)
+    }
+
+    /// Paint depth per pixel of a film whose texels lie on `pixels`, 0 beside the surface.
+    pub(super) fn depth_of(&self, film: &Film, pixels: &[usize]) -> Image {
+        let mut depth = self.wanted.map(|_| 0.0);
+        for (k, &pixel) in pixels.iter().enumerate() {
+            depth.data_mut()[pixel] = film.thickness(k) / UNIT_THICKNESS;
+        }
+        depth
     }
 
     /// The texels that paint falls on, with the pixel of each.

@@ -48,13 +48,13 @@ impl Mission {
         let (planning, unreachable_paint) = (planned.seconds, planned.unreachable_paint);
         let (kept_off, left_bare, outcomes) = (planned.kept_off, planned.left_bare, planned.outcomes);
         let mut flights = fly(planned, &task, &[])?;
-        let (mut film, pixels) = spray(&flights, &task)?;
+        let (mut film, pixels) = spray(flights.iter().map(|f| &f.flight), &task)?;
         let mut looked = None;
         if task.settings.look {
             let (again, figures) = touch_up(&mut task, &flights, &film, &pixels)?;
             flights.extend(again);
             // From the beginning, as the shots of one flight are batched.
-            (film, _) = spray(&flights, &task)?;
+            (film, _) = spray(flights.iter().map(|f| &f.flight), &task)?;
             looked = Some(figures);
         }
         Ok(Self { task, flights, film, pixels, planning, unreachable_paint, kept_off, left_bare, outcomes, looked })
@@ -67,11 +67,7 @@ impl Mission {
 
     /// Paint depth per pixel as it came out, 0 beside the surface.
     pub(super) fn painted_depth(&self) -> Image {
-        let mut depth = self.task.wanted.map(|_| 0.0);
-        for (k, &pixel) in self.pixels.iter().enumerate() {
-            depth.data_mut()[pixel] = self.film.thickness(k) / UNIT_THICKNESS;
-        }
-        depth
+        self.task.depth_of(&self.film, &self.pixels)
     }
 
     /// Paint depth per pixel as it is wanted.

@@ -102,6 +102,11 @@ impl InterlockState {
         });
     }
 
+    /// The decision of the last control step; before the first nothing is forbidden.
+    pub fn last(&self) -> bool {
+        self.open.last().copied().unwrap_or(true)
+    }
+
     /// The decision of a control step, counted from the first; before it nothing was forbidden.
     pub fn open(&self, control_step: i64) -> bool {
         usize::try_from(control_step).ok().and_then(|k| self.open.get(k)).copied().unwrap_or(true)
