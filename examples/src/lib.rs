@@ -3,6 +3,8 @@
 
 pub mod adapters;
 pub mod appearance;
+#[cfg(all(feature = "autopilot", unix))]
+pub mod autopilot;
 pub mod design;
 pub mod exit;
 #[cfg(feature = "handheld")]

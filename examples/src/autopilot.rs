@@ -1,0 +1,32 @@
+//! Between this robot and an autopilot that speaks MAVLink: frames, messages, and the state of the off-board link, fed message by
+//! message without sockets; one thin file of sockets; and PX4 itself as a program beside this one.
+//!
+//! | link | where | what |
+//! |---|---|---|
+//! | simulator | TCP 4560, PX4 connects to us | [`simulator`]: `HIL_SENSOR` sets the clock, `HIL_ACTUATOR_CONTROLS` comes back |
+//! | off-board | UDP, PX4 at 14580 sends to 14540 | [`OffboardLink`]: set-points, odometry, mode and arming, telemetry |
+
+mod codec;
+mod error;
+mod failsafe;
+pub mod frames;
+mod lockstep;
+mod odometry;
+mod offboard;
+mod px4;
+mod setpoint;
+pub mod simulator;
+mod sockets;
+mod stamps;
+mod telemetry;
+
+pub use codec::{Decoder, Encoder};
+pub use error::AutopilotError;
+pub use failsafe::{Cause, FailsafeSettings};
+pub use mavlink::dialects::common::MavMessage;
+pub use odometry::Odometry;
+pub use offboard::{OffboardLink, OffboardSettings, Request};
+pub use px4::{Px4, Px4Vehicle};
+pub use setpoint::Setpoint;
+pub use sockets::{SimulatorSocket, UdpLink};
+pub use telemetry::{Identity, Mode, Telemetry};

@@ -1,0 +1,126 @@
+//! The sockets of both links; everything else of this module knows none.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
+use std::time::{Duration, Instant};
+
+use mavlink::MavHeader;
+use mavlink::dialects::common::MavMessage;
+
+use super::codec::{Decoder, Encoder};
+use super::error::AutopilotError;
+
+/// The longest wait for an answer, wall clock: a loaded machine may take long, a dead autopilot takes for ever.
+const ANSWER: Duration = Duration::from_secs(10);
+
+/// The simulator's end of the link to PX4.
+pub struct SimulatorSocket {
+    stream: TcpStream,
+    encoder: Encoder,
+    decoder: Decoder,
+}
+
+impl SimulatorSocket {
+    /// Waits for PX4 to connect, while `alive` finds nothing wrong with it.
+    pub fn accept(
+        listener: &TcpListener,
+        mut alive: impl FnMut() -> Result<(), AutopilotError>,
+    ) -> Result<Self, AutopilotError> {
+        let failed = |source| AutopilotError::Socket { what: "simulator link of PX4".into(), source };
+        listener.set_nonblocking(true).map_err(failed)?;
+        let start = Instant::now();
+        let stream = loop {
+            match listener.accept() {
+                Ok((stream, _)) => break stream,
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+                Err(error) => return Err(failed(error)),
+            }
+            alive()?;
+            if start.elapsed() > ANSWER {
+                return Err(AutopilotError::silent("PX4", ANSWER, "it does not connect to the simulator's port"));
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        };
+        stream.set_nonblocking(false).and_then(|()| stream.set_nodelay(true)).map_err(failed)?;
+        Ok(Self { stream, encoder: Encoder::new(1, 51), decoder: Decoder::default() })
+    }
+
+    /// Sends a message.
+    pub fn send(&mut self, message: &MavMessage) -> Result<(), AutopilotError> {
+        let frame = self.encoder.frame(message);
+        self.stream.write_all(&frame).map_err(|source| AutopilotError::Socket { what: "simulator link".into(), source })
+    }
+
+    /// The next message, if one comes within a time; an error where the link is broken.
+    pub fn receive(&mut self, wait: Duration) -> Result<Option<MavMessage>, AutopilotError> {
+        let failed = |source| AutopilotError::Socket { what: "simulator link of PX4".into(), source };
+        let until = Instant::now() + wait;
+        loop {
+            if let Some((_, message)) = self.decoder.next_message() {
+                return Ok(Some(message));
+            }
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(None);
+            }
+            self.stream.set_read_timeout(Some(left)).map_err(failed)?;
+            let mut buffer = [0; 2048];
+            match self.stream.read(&mut buffer) {
+                Ok(0) => return Err(failed(ErrorKind::UnexpectedEof.into())),
+                Ok(count) => self.decoder.push(&buffer[..count]),
+                Err(error) if would_block(&error) || error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => return Err(failed(error)),
+            }
+        }
+    }
+}
+
+/// A MAVLink peer over UDP.
+pub struct UdpLink {
+    socket: UdpSocket,
+    peer: Option<SocketAddr>,
+    encoder: Encoder,
+    decoder: Decoder,
+}
+
+impl UdpLink {
+    /// Listens at `local` and speaks to `peer`, or to whoever speaks first.
+    pub fn open(local: SocketAddr, peer: Option<SocketAddr>) -> Result<Self, AutopilotError> {
+        let failed = |source| AutopilotError::Socket { what: format!("UDP {local}"), source };
+        let socket = UdpSocket::bind(local).map_err(failed)?;
+        socket.set_nonblocking(true).map_err(failed)?;
+        Ok(Self { socket, peer, encoder: Encoder::new(1, 191), decoder: Decoder::default() })
+    }
+
+    /// Sends a message; lost like any datagram where nobody listens.
+    pub fn send(&mut self, message: &MavMessage) {
+        let frame = self.encoder.frame(message);
+        if let Some(peer) = self.peer {
+            // A refused datagram is a link that is silent, which is noticed where it matters.
+            let _ = self.socket.send_to(&frame, peer);
+        }
+    }
+
+    /// What has come; never waits.
+    pub fn receive(&mut self) -> Vec<(MavHeader, MavMessage)> {
+        let mut buffer = [0; 2048];
+        loop {
+            match self.socket.recv_from(&mut buffer) {
+                Ok((count, from)) if *self.peer.get_or_insert(from) == from => self.decoder.push(&buffer[..count]),
+                Ok(_) => {}
+                Err(error) if error.kind() == ErrorKind::ConnectionRefused => {}
+                Err(_) => break,
+            }
+        }
+        std::iter::from_fn(|| self.decoder.next_message()).collect()
+    }
+
+    /// Bytes that have come, and messages in them.
+    pub fn counts(&self) -> (usize, usize) {
+        self.decoder.counts()
+    }
+}
+
+fn would_block(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut)
+}

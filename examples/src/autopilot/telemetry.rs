@@ -1,0 +1,193 @@
+//! What the autopilot says of itself.
+
+use mavlink::MavHeader;
+use mavlink::dialects::common::{
+    EstimatorStatusFlags, HEARTBEAT_DATA, MavAutopilot, MavLandedState, MavMessage, MavModeFlag, MavType,
+};
+use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
+
+use super::error::AutopilotError;
+use super::frames;
+use super::stamps::{StampGuard, Verdict};
+
+/// Who flies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Identity {
+    /// MAVLink system.
+    pub system: u8,
+    /// MAVLink component.
+    pub component: u8,
+    /// Kind of vehicle.
+    pub vehicle: MavType,
+    /// Whose firmware.
+    pub firmware: MavAutopilot,
+}
+
+impl Default for Identity {
+    /// A quadrotor of PX4.
+    fn default() -> Self {
+        let (vehicle, firmware) = (MavType::MAV_TYPE_QUADROTOR, MavAutopilot::MAV_AUTOPILOT_PX4);
+        Self { system: 1, component: 1, vehicle, firmware }
+    }
+}
+
+impl Identity {
+    /// Whether its modes and its motions are known here: those of a multirotor on PX4.
+    ///
+    /// # Errors
+    /// [`AutopilotError::Airframe`].
+    pub fn check(&self) -> Result<(), AutopilotError> {
+        let multirotor = matches!(
+            self.vehicle,
+            MavType::MAV_TYPE_QUADROTOR
+                | MavType::MAV_TYPE_HEXAROTOR
+                | MavType::MAV_TYPE_OCTOROTOR
+                | MavType::MAV_TYPE_TRICOPTER
+                | MavType::MAV_TYPE_DODECAROTOR
+                | MavType::MAV_TYPE_DECAROTOR
+        );
+        if multirotor && self.firmware == MavAutopilot::MAV_AUTOPILOT_PX4 {
+            return Ok(());
+        }
+        Err(AutopilotError::Airframe { found: format!("{:?} on {:?}", self.vehicle, self.firmware) })
+    }
+}
+
+/// The flight mode, in PX4's terms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mode {
+    /// Follows our set-points.
+    Offboard,
+    /// Lands by itself.
+    Land,
+    /// Anything else: main and sub mode.
+    Other(u8, u8),
+}
+
+impl Mode {
+    /// PX4 packs main and sub mode into the upper half of the custom mode.
+    fn of(custom: u32) -> Self {
+        match ((custom >> 16) as u8, (custom >> 24) as u8) {
+            (6, _) => Self::Offboard,
+            (4, 6) => Self::Land,
+            (main, sub) => Self::Other(main, sub),
+        }
+    }
+}
+
+/// What the autopilot takes for its state, and when it was heard.
+#[derive(Debug, Clone, Default)]
+pub struct Telemetry {
+    /// Who flies, once a heartbeat has come.
+    pub identity: Option<Identity>,
+    /// Mode at the last heartbeat.
+    pub mode: Option<Mode>,
+    /// Whether its motors may turn.
+    pub armed: bool,
+    /// When the last message of it has come, our clock, s.
+    pub heard: Option<f64>,
+    /// When its last heartbeat has come, s.
+    pub heartbeat: Option<f64>,
+    /// Its attitude, our frames.
+    pub attitude: Option<UnitQuaternion<f64>>,
+    /// Its position, our frames, m.
+    pub position: Option<Point3<f64>>,
+    /// Its velocity, our frames, m/s.
+    pub velocity: Option<Vector3<f64>>,
+    /// Charge of its battery, 0 to 1; `None` where it does not know.
+    pub battery: Option<f64>,
+    /// Whether it takes itself to be on the ground.
+    pub landed: Option<bool>,
+    /// Whether its estimator has attitude, velocity and position.
+    pub estimator: Option<bool>,
+    /// The last thing that it said in words.
+    pub text: Option<String>,
+    /// Whether its clock has jumped and does not yet run steadily again.
+    pub clock_jumped: bool,
+    /// How often it was started anew.
+    pub restarts: u32,
+    pub(super) stamps: StampGuard,
+}
+
+impl Telemetry {
+    /// Takes in a message that arrives at `now`, s; those of others than the autopilot are passed over.
+    pub fn receive(&mut self, now: f64, header: &MavHeader, message: &MavMessage) {
+        if let MavMessage::HEARTBEAT(heartbeat) = message {
+            self.heartbeat(now, *header, heartbeat);
+        }
+        let from_autopilot = self.identity.is_some_and(|identity| {
+            u32::from(identity.system) == header.system_id && identity.component == header.component_id
+        });
+        if !from_autopilot {
+            return;
+        }
+        self.heard = Some(now);
+        match message {
+            MavMessage::ATTITUDE_QUATERNION(m) => {
+                self.stamp(now, f64::from(m.time_boot_ms) * 1e-3);
+                let q = Quaternion::new(m.q1, m.q2, m.q3, m.q4).cast::<f64>();
+                // Anything far from unit length, NaN too, is none.
+                if (q.norm() - 1.0).abs() < 0.1 {
+                    self.attitude = Some(frames::attitude(&UnitQuaternion::from_quaternion(q)));
+                }
+            }
+            MavMessage::LOCAL_POSITION_NED(m) => {
+                self.stamp(now, f64::from(m.time_boot_ms) * 1e-3);
+                let [p, v] = [[m.x, m.y, m.z], [m.vx, m.vy, m.vz]].map(|v| frames::world(&Vector3::from(v).cast()));
+                if p.iter().chain(&v).all(|value| value.is_finite()) {
+                    (self.position, self.velocity) = (Some(p.into()), Some(v));
+                }
+            }
+            MavMessage::SYS_STATUS(m) if m.battery_remaining >= 0 => {
+                self.battery = Some(f64::from(m.battery_remaining) / 100.0);
+            }
+            MavMessage::EXTENDED_SYS_STATE(m) => {
+                self.landed = match m.landed_state {
+                    MavLandedState::MAV_LANDED_STATE_UNDEFINED => None,
+                    state => Some(state == MavLandedState::MAV_LANDED_STATE_ON_GROUND),
+                };
+            }
+            MavMessage::ESTIMATOR_STATUS(m) => {
+                let needed = EstimatorStatusFlags::ESTIMATOR_ATTITUDE
+                    | EstimatorStatusFlags::ESTIMATOR_VELOCITY_HORIZ
+                    | EstimatorStatusFlags::ESTIMATOR_VELOCITY_VERT
+                    | EstimatorStatusFlags::ESTIMATOR_POS_HORIZ_REL
+                    | EstimatorStatusFlags::ESTIMATOR_POS_VERT_ABS;
+                self.estimator = Some(m.flags.contains(needed));
+            }
+            MavMessage::STATUSTEXT(m) => self.text = Some(m.text.to_str().unwrap_or_default().to_owned()),
+            _ => {}
+        }
+    }
+
+    /// Whether it takes itself to be elsewhere than `pose`, by more than a distance (m) or an angle (rad).
+    pub fn disagrees(&self, pose: &Isometry3<f64>, distance: f64, angle: f64) -> bool {
+        self.position.is_some_and(|p| (p.coords - pose.translation.vector).norm() > distance)
+            || self.attitude.is_some_and(|q| q.angle_to(&pose.rotation) > angle)
+    }
+
+    /// The first autopilot that is heard is ours.
+    fn heartbeat(&mut self, now: f64, header: MavHeader, heartbeat: &HEARTBEAT_DATA) {
+        let Ok(system) = u8::try_from(header.system_id) else { return };
+        if heartbeat.autopilot == MavAutopilot::MAV_AUTOPILOT_INVALID {
+            return;
+        }
+        let (vehicle, firmware) = (heartbeat.mavtype, heartbeat.autopilot);
+        let found = Identity { system, component: header.component_id, vehicle, firmware };
+        let ours = *self.identity.get_or_insert(found);
+        if (ours.system, ours.component) == (found.system, found.component) {
+            self.identity = Some(found);
+            self.heartbeat = Some(now);
+            self.mode = Some(Mode::of(heartbeat.custom_mode));
+            self.armed = heartbeat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED);
+        }
+    }
+
+    fn stamp(&mut self, now: f64, stamp: f64) {
+        let verdict = self.stamps.judge(now, stamp);
+        self.clock_jumped = verdict == Verdict::Jumped;
+        if verdict == Verdict::Restarted {
+            self.restarts += 1;
+        }
+    }
+}
