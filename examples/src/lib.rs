@@ -30,6 +30,8 @@ pub mod projection;
 pub mod recording;
 pub mod region;
 pub mod report;
+#[cfg(all(feature = "robot", unix))]
+pub mod robot;
 #[cfg(feature = "scan")]
 pub mod scan;
 pub mod scan_flight;

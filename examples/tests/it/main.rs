@@ -28,12 +28,16 @@ mod module_graph;
 mod mutations;
 #[cfg(feature = "scan")]
 mod odometry_prior;
+#[cfg(all(feature = "robot", unix))]
+mod on_board;
 mod onboard;
 #[cfg(feature = "paint-image")]
 mod paint_image;
 mod placement;
 mod recorded;
 mod regions;
+#[cfg(all(feature = "robot", unix))]
+mod robot;
 mod scan_flight;
 mod scratch;
 mod seams;

@@ -1,0 +1,57 @@
+//! Why a flight did not come about.
+
+use std::path::PathBuf;
+
+use crate::autopilot::AutopilotError;
+use crate::mission::MissionError;
+use crate::report::ReportError;
+
+/// Why a flight did not come about, or its result is not usable.
+#[derive(Debug, thiserror::Error)]
+pub enum RobotError {
+    /// The autopilot.
+    #[error(transparent)]
+    Autopilot(#[from] AutopilotError),
+    /// The mission.
+    #[error(transparent)]
+    Mission(#[from] MissionError),
+    /// The simulation.
+    #[error("simulation: {0}")]
+    Simulation(#[from] paint_sim::Error),
+    /// The report.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    /// A file.
+    #[error("{path}: {source}")]
+    File {
+        /// Which.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Its own localisation does not yet see the map from the ground, and what it says of fast motion is not smooth enough for the
+    /// autopilot's estimator.
+    #[error(
+        "--localisation slam does not hold on an autopilot yet: fly with motion-capture or noise, or without an autopilot by `paintcopter`"
+    )]
+    OwnSenses,
+    /// An option that says nothing about a vehicle over UDP.
+    #[error("{option} is for the simulated vehicle on PX4: leave it out with --autopilot udp:ADDRESS:PORT ({why})")]
+    SimulationOnly {
+        /// The option.
+        option: &'static str,
+        /// Why.
+        why: &'static str,
+    },
+    /// The mission has nothing to fly.
+    #[error("the mission has no flight: nothing of it is within reach")]
+    NothingToFly,
+    /// The flight was given up; what there is of it is in the folder.
+    #[error("the flight was not finished: {reason}; what there is of it is in {folder}")]
+    Unfinished {
+        /// Why.
+        reason: String,
+        /// The folder of the results.
+        folder: PathBuf,
+    },
+}

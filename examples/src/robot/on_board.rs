@@ -1,0 +1,283 @@
+//! The on-board program: fed poses, joint angles and the autopilot's messages, it says what to send, where to aim and when to spray.
+//! It knows neither sockets nor the simulation; times are those of whoever runs it, 100 steps a second.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+use paint_sim::flight::{
+    Airframe, CascadedController, Command, Controller as _, ControllerSettings, Estimator, GRAVITY, InterlockInput,
+    InterlockState, Localisation, LocalisedPose, ObserverSettings, PanTilt, Reference, ReferenceState, Valve,
+};
+
+use super::phase::{Phase, Phases, Situation};
+use crate::adapters::ServoPanTilt;
+use crate::autopilot::{Cause, FailsafeSettings, MavMessage, Odometry, OffboardLink, OffboardSettings, Setpoint};
+
+/// Time of a control step, s.
+pub(super) const CONTROL_STEP: f64 = 0.01;
+/// A pose that is farther from the one before than the fastest robot flies has jumped: m, and m/s.
+const JUMP: f64 = 0.05;
+const FASTEST: f64 = 3.0;
+
+/// Gains on an autopilot whose attitude loop is slower and of higher order than the controller's model: a third of its bandwidth.
+const CONTROLLER: ControllerSettings =
+    ControllerSettings { position: 4.0, velocity: 3.5, attitude: 6.0, heading: 3.0, lever_rate: 1.0, jerk_window: 0.1 };
+
+/// The observer's poles: inside our own position loop as slow as that loop needs it, beside the autopilot's as fast as the aim wants it.
+fn observer(setpoints: SetpointKind) -> ObserverSettings {
+    let translation = match setpoints {
+        SetpointKind::Attitude => 6.0,
+        SetpointKind::Trajectory => 16.0,
+    };
+    ObserverSettings { translation, ..ObserverSettings::default() }
+}
+
+/// Which set-points the autopilot is given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum SetpointKind {
+    /// Attitude and thrust: the position controller is ours, as in the thesis
+    Attitude,
+    /// Position, velocity, acceleration and heading: the position controller is the autopilot's
+    Trajectory,
+}
+
+/// What the on-board program is told.
+#[derive(Debug, Clone, Copy)]
+pub struct OnBoardSettings {
+    /// Which set-points are sent.
+    pub setpoints: SetpointKind,
+    /// Whether it arms and takes control by itself: in simulation only; on a vehicle it waits for the pilot to do both.
+    pub arms: bool,
+    /// Responses of the vehicle under the autopilot's attitude control.
+    pub airframe: Airframe,
+    /// Share of the full thrust that carries the weight.
+    pub hover_thrust: f64,
+    /// Errors of the poses, for the covariance that the autopilot is told.
+    pub localisation: Localisation,
+    /// Whether poses go to the autopilot as odometry; no if they come from it.
+    pub sends_odometry: bool,
+    /// The valve and its interlock.
+    pub valve: Valve,
+    /// When something is a cause to shut it.
+    pub failsafe: FailsafeSettings,
+    /// Rates of the link.
+    pub offboard: OffboardSettings,
+    /// How much of the plan is painted, s.
+    pub seconds: f64,
+}
+
+/// What the robot is told in a control step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Commanded {
+    /// For the autopilot.
+    pub messages: Vec<MavMessage>,
+    /// Pan and tilt, rad.
+    pub pan_tilt: [f64; 2],
+    /// Flow that the valve is opened for, m^3/s.
+    pub flow: f64,
+}
+
+/// The state of the program.
+pub struct OnBoard<'a> {
+    settings: OnBoardSettings,
+    plan: &'a dyn Reference,
+    controller: CascadedController,
+    estimator: Option<Estimator>,
+    ptu: ServoPanTilt,
+    interlock: InterlockState,
+    link: OffboardLink,
+    phases: Phases<'a>,
+    /// The last pose, and when it came.
+    last: Option<(f64, LocalisedPose)>,
+    /// Jumps of the pose.
+    resets: u8,
+}
+
+impl<'a> OnBoard<'a> {
+    /// On the ground with nothing heard.
+    pub fn new(plan: &'a dyn Reference, ptu: ServoPanTilt, settings: OnBoardSettings) -> Self {
+        let delays = [ptu.delay(), settings.valve.dead_time].map(|delay| delay / CONTROL_STEP);
+        Self {
+            controller: CascadedController::new(settings.airframe, CONTROLLER),
+            estimator: None,
+            interlock: InterlockState::new(settings.valve.interlock, delays),
+            link: OffboardLink::new(settings.offboard),
+            phases: Phases::new(plan, settings.seconds, settings.valve.lead),
+            last: None,
+            resets: 0,
+            plan,
+            ptu,
+            settings,
+        }
+    }
+
+    /// The off-board link, which is to be fed with the autopilot's messages.
+    pub fn link(&mut self) -> &mut OffboardLink {
+        &mut self.link
+    }
+
+    /// What it is doing.
+    pub fn phase(&self) -> Phase {
+        self.phases.phase()
+    }
+
+    /// When each phase began.
+    pub fn events(&self) -> &[(f64, Phase)] {
+        self.phases.events()
+    }
+
+    /// Time of the plan, while it is painted.
+    pub fn plan_time(&self, now: f64) -> Option<f64> {
+        self.phases.plan_time(now).filter(|_| self.phase() == Phase::Paint)
+    }
+
+    /// Time of the plan up to which it is painted, s.
+    pub fn painted(&self) -> f64 {
+        self.phases.painted()
+    }
+
+    /// Why a flight that landed did not paint all of it.
+    pub fn ended_early(&self) -> Option<Cause> {
+        self.phases.ended_early()
+    }
+
+    /// Where it takes itself to be.
+    pub fn estimated_position(&self) -> Option<Point3<f64>> {
+        self.estimator.as_ref().map(|estimator| estimator.estimate().position)
+    }
+
+    /// Where it shall be; nothing on the ground.
+    pub fn wanted(&self, now: f64) -> Option<ReferenceState> {
+        self.phases.guided().map(|guided| guided.at(now))
+    }
+
+    /// One control step at `now` (s), with the newest pose (`None`: there is none) and the joints as they report themselves.
+    pub fn step(&mut self, now: f64, pose: Option<&LocalisedPose>, angles: [f64; 2]) -> Commanded {
+        match (&mut self.estimator, pose) {
+            (Some(estimator), Some(pose)) => estimator.update(&pose.world_from_body, CONTROL_STEP),
+            (Some(estimator), None) => estimator.coast(CONTROL_STEP),
+            (none, Some(pose)) => {
+                let observer = observer(self.settings.setpoints);
+                *none = Some(Estimator::new(self.settings.airframe, observer, &pose.world_from_body));
+            }
+            (None, None) => {}
+        }
+        let trusted = pose.is_some_and(|pose| pose.trusted) && !self.jumped(now, pose);
+        let pose = pose.map(|pose| LocalisedPose { trusted, ..*pose });
+        let cause = self.settings.failsafe.cause(now, self.link.telemetry(), pose.as_ref());
+        if let Some(estimator) = &self.estimator {
+            let estimate = estimator.estimate();
+            let (ready, armed) = (self.ready(pose.as_ref()), self.link.telemetry().armed);
+            let [_, _, heading] = estimate.attitude;
+            self.phases.advance(&Situation { now, cause, position: estimate.position, heading, ready, armed });
+            self.link.request(self.phases.request(self.settings.arms));
+        }
+        let setpoint = self.setpoint(now);
+        let odometry = pose.filter(|_| self.settings.sends_odometry).map(|pose| self.odometry(&pose));
+        let messages = self.link.transmit(now, setpoint.as_ref(), odometry.as_ref());
+        let (pan_tilt, permitted) = self.aim(now, angles, trusted);
+        let flow = if permitted && cause.is_none() { self.wanted_flow(now) } else { 0.0 };
+        Commanded { messages, pan_tilt, flow }
+    }
+
+    /// Whether a pose does not follow from the one before; such jumps are counted for the autopilot's estimator.
+    fn jumped(&mut self, now: f64, pose: Option<&LocalisedPose>) -> bool {
+        let Some(pose) = pose else { return false };
+        let (before, at) = self.last.replace((now, *pose)).map_or((*pose, now), |(at, before)| (before, at));
+        let way = pose.world_from_body.translation.vector - before.world_from_body.translation.vector;
+        let jumped = way.norm() > JUMP + FASTEST * (now - at);
+        self.resets = self.resets.wrapping_add(u8::from(jumped));
+        jumped
+    }
+
+    /// Whether the autopilot knows where it is, and takes itself to be where we do.
+    fn ready(&self, pose: Option<&LocalisedPose>) -> bool {
+        let telemetry = self.link.telemetry();
+        let FailsafeSettings { disagreement, turn, .. } = self.settings.failsafe;
+        let elsewhere =
+            |pose: &LocalisedPose| telemetry.disagrees(&pose.world_from_body, 0.5 * disagreement, 0.5 * turn);
+        telemetry.estimator == Some(true)
+            && telemetry.position.is_some()
+            && pose.is_some_and(|pose| pose.trusted && !elsewhere(pose))
+    }
+
+    fn setpoint(&mut self, now: f64) -> Option<Setpoint> {
+        let (station, station_heading) = self.phases.station()?;
+        let Some(guided) = self.phases.guided() else {
+            // On the ground.
+            return Some(match self.settings.setpoints {
+                SetpointKind::Attitude => Setpoint::leaning(0.0, 0.0, station_heading, station_heading, 0.0),
+                SetpointKind::Trajectory => Setpoint::Trajectory {
+                    position: station,
+                    velocity: Vector3::zeros(),
+                    acceleration: Vector3::zeros(),
+                    heading: station_heading,
+                },
+            });
+        };
+        let estimator = self.estimator.as_mut()?;
+        let estimate = *estimator.estimate();
+        let wanted = guided.at(now);
+        let (setpoint, command) = match self.settings.setpoints {
+            SetpointKind::Attitude => {
+                let command = self.controller.command(now, &estimate, &guided);
+                let [_, _, yaw] = estimate.attitude;
+                let thrust = command.thrust / (self.settings.airframe.mass * GRAVITY) * self.settings.hover_thrust;
+                (Setpoint::leaning(command.roll, command.pitch, yaw, wanted.heading, thrust), command)
+            }
+            SetpointKind::Trajectory => {
+                let setpoint = Setpoint::Trajectory {
+                    position: wanted.position,
+                    velocity: wanted.velocity,
+                    acceleration: wanted.acceleration,
+                    heading: wanted.heading,
+                };
+                // What the autopilot commands is not known: the observer takes it to keep the attitude.
+                let [roll, pitch, _] = estimate.attitude;
+                let Airframe { mass, roll_gain, pitch_gain, .. } = self.settings.airframe;
+                let thrust = mass * GRAVITY / (roll.cos() * pitch.cos()).max(0.5);
+                let command =
+                    Command { roll: roll / roll_gain, pitch: pitch / pitch_gain, yaw_rate: estimate.yaw_rate, thrust };
+                (setpoint, command)
+            }
+        };
+        estimator.set_command(command);
+        Some(setpoint)
+    }
+
+    fn odometry(&self, pose: &LocalisedPose) -> Odometry {
+        let Localisation { position_noise, position_drift, attitude_noise, attitude_drift, .. } =
+            self.settings.localisation;
+        Odometry {
+            world_from_body: pose.world_from_body,
+            velocity: None,
+            position_covariance: Matrix3::from_diagonal_element(position_noise.powi(2) + position_drift.powi(2)),
+            attitude_covariance: Matrix3::from_diagonal_element(attitude_noise.powi(2) + attitude_drift.powi(2)),
+            velocity_covariance: Matrix3::zeros(),
+            north: true,
+            resets: self.resets,
+        }
+    }
+
+    /// Where the joints shall be, and whether the interlock permits paint.
+    fn aim(&mut self, now: f64, angles: [f64; 2], trusted: bool) -> ([f64; 2], bool) {
+        let Some(estimator) = &self.estimator else { return ([0.0; 2], false) };
+        self.ptu.reset(angles);
+        let Some(offset) = self.phases.aim_offset(now) else { return ([0.0; 2], false) };
+        let at = |time: f64| self.plan.at(time - offset);
+        // A command holds for one control step, so on average it acts half a step later still.
+        let ahead = self.ptu.delay() + 0.5 * CONTROL_STEP;
+        let aim = at(now + ahead).aim;
+        let command = aim.map_or([0.0; 2], |point| self.ptu.command(&estimator.predict(ahead), &point));
+        let ahead = self.settings.valve.dead_time + 0.5 * CONTROL_STEP;
+        let (wanted, later) = (at(now), at(now + ahead));
+        let estimator = trusted.then_some(estimator);
+        self.interlock
+            .decide(&self.ptu, &InterlockInput { estimator, angles, command, now: &wanted, later: &later, ahead });
+        (command, self.interlock.last())
+    }
+
+    /// What the plan asks for when a command of now takes effect; nothing where it is painted already.
+    fn wanted_flow(&self, now: f64) -> f64 {
+        let Some(time) = self.plan_time(now).map(|time| time + self.settings.valve.lead) else { return 0.0 };
+        if self.phases.unpainted().contains(&time) { self.plan.at(time).flow.max(0.0) } else { 0.0 }
+    }
+}

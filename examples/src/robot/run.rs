@@ -1,0 +1,160 @@
+//! The run of `robot`: plan, fly, spray, report.
+
+use std::path::Path;
+use std::time::Instant;
+
+use cpu_time::ProcessTime;
+use paint_sim::FlightSettings;
+use paint_sim::flight::multirotor::MultirotorSettings;
+use paint_sim::flight::{Airframe, Reference};
+
+use super::arguments::{Arguments, AutopilotChoice};
+use super::error::RobotError;
+use super::flight::{Flown, Scene, fly_px4};
+use super::on_board::{OnBoard, OnBoardSettings, SetpointKind};
+use super::phase::Phase;
+use super::recorder::Record;
+use super::report::RobotReport;
+use super::simulated_robot::{SimulatedRobot, station};
+use super::udp::fly_udp;
+use crate::autopilot::{FailsafeSettings, OffboardSettings, Px4, Px4Vehicle};
+use crate::mission::{LocalisationChoice, PlannedFlight, PlannedMission};
+use crate::progress::Stage;
+use crate::report::save_figures;
+
+/// Responses of the default vehicle under PX4's attitude control, s.
+const PX4_RESPONSE: f64 = 0.18;
+
+/// Plans the mission, flies its first flight on the autopilot, and leaves pictures, track and figures.
+pub fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
+    let folder = &arguments.out;
+    let mission_file = arguments.mission.mission_file()?;
+    if mission_file.settings.localisation == LocalisationChoice::Slam {
+        return Err(RobotError::OwnSenses.into());
+    }
+    mission_file.write_into(folder)?;
+    let coat = mission_file.decide_coats(folder)?.into_iter().next().ok_or(RobotError::NothingToFly)?;
+    let mission = PlannedMission::new(coat.task).map_err(|error| mission_file.in_mesh(error))?;
+    let flight = mission.flight(0).ok_or(RobotError::NothingToFly)?;
+    let clock = (Instant::now(), ProcessTime::now());
+    let stage = Stage::start("fly");
+    let flown = fly(arguments, &flight, folder, &mut |painted| {
+        stage.share(painted / arguments.seconds.min(flight.reference().duration()));
+    })?;
+    stage.done(&format!("{:.0} s", flown.seconds));
+    let (wall, cpu) = (clock.0.elapsed().as_secs_f64(), clock.1.elapsed().as_secs_f64());
+    let report = save(arguments, &flight, &flown, [wall, cpu], folder)?;
+    eprintln!("{}", report.summary());
+    println!("{}", folder.join("report.json").display());
+    let mostly_shut = || format!("the valve was kept shut for {:.0} % of the paint", 100.0 * report.valve_held_share);
+    match flown.failed.or_else(|| (report.valve_held_share > 0.5).then(mostly_shut)) {
+        Some(reason) => Err(RobotError::Unfinished { reason, folder: folder.clone() }.into()),
+        None => Ok(()),
+    }
+}
+
+fn fly(
+    arguments: &Arguments,
+    flight: &PlannedFlight,
+    folder: &Path,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Flown, RobotError> {
+    let conditions = flight.conditions();
+    let reference = flight.reference();
+    match &arguments.autopilot {
+        AutopilotChoice::Px4(source) => {
+            let start = reference.at(0.0);
+            let vehicle = MultirotorSettings::default();
+            let station = station(&start.position, start.heading);
+            let mut robot = SimulatedRobot::new(vehicle, &station, flight.pan_tilt()?, &conditions)?;
+            let settings = on_board_settings(arguments, &conditions, robot.body().hover_command());
+            let mut on_board = OnBoard::new(&reference, flight.pan_tilt()?, settings);
+            let vehicle = Px4Vehicle {
+                hover_thrust: settings.hover_thrust,
+                max_speed: flight.settings().planner.timing.max_speed,
+                max_tilt: settings.airframe.tilt_limit,
+            };
+            let launch = || Px4::start(source, &folder.join("px4"), &vehicle);
+            let scene = Scene { plan: &reference, surface: flight.surface(), faults: &arguments.fault };
+            fly_px4(&launch, &mut robot, &mut on_board, &scene, progress)
+        }
+        AutopilotChoice::Udp(address) => {
+            let only = |option, why| Err(RobotError::SimulationOnly { option, why });
+            if flight.settings().localisation != LocalisationChoice::MotionCapture {
+                return only("--localisation", "it says itself where it is");
+            }
+            if arguments.setpoints == SetpointKind::Attitude {
+                return only("--setpoints attitude", "which thrust carries it is not known");
+            }
+            if !arguments.fault.is_empty() {
+                return only("--fault", "nothing is made to fail on a vehicle");
+            }
+            // Trajectories hold no thrust.
+            fly_udp(*address, flight, on_board_settings(arguments, &conditions, 0.0), progress)
+        }
+    }
+}
+
+fn on_board_settings(arguments: &Arguments, conditions: &FlightSettings, hover_thrust: f64) -> OnBoardSettings {
+    let airframe = Airframe {
+        roll_gain: 1.0,
+        roll_time_constant: PX4_RESPONSE,
+        pitch_gain: 1.0,
+        pitch_time_constant: PX4_RESPONSE,
+        ..conditions.airframe
+    };
+    OnBoardSettings {
+        setpoints: arguments.setpoints,
+        arms: matches!(arguments.autopilot, AutopilotChoice::Px4(_)),
+        airframe,
+        hover_thrust,
+        localisation: conditions.localisation,
+        sends_odometry: true,
+        valve: conditions.valve,
+        failsafe: FailsafeSettings::default(),
+        offboard: OffboardSettings::default(),
+        seconds: arguments.seconds,
+    }
+}
+
+fn save(
+    arguments: &Arguments,
+    flight: &PlannedFlight,
+    flown: &Flown,
+    [wall, cpu]: [f64; 2],
+    folder: &Path,
+) -> Result<RobotReport, RobotError> {
+    let path = folder.join("track.csv");
+    std::fs::write(&path, &flown.record.track).map_err(|source| RobotError::File { path, source })?;
+    let Record { painting, ways, events, .. } = &flown.record;
+    let figures = flight.save(painting, ways, folder)?;
+    let statistics = painting.statistics();
+    let asked = painting.samples.iter().filter(|s| s.held || s.flow > 0.0).count();
+    let painted = painting.samples.last().map_or(0.0, |sample| sample.time);
+    let report = RobotReport {
+        version: env!("CARGO_PKG_VERSION"),
+        seed: flight.settings().seed,
+        setpoints: format!("{:?}", arguments.setpoints).to_lowercase(),
+        ended: flown.failed.clone().unwrap_or_else(|| "landed".into()),
+        painted_s: painted,
+        flight_s: flown.seconds,
+        hit_error_rms_m: statistics.hit_error_rms,
+        hit_error_p95_m: statistics.hit_error_p95,
+        position_error_rms_m: statistics.position_error_rms,
+        localisation_error_rms_m: statistics.localisation_error_rms,
+        nozzle_distance_std_m: statistics.nozzle_distance_std,
+        valve_held_share: statistics.held_samples as f64 / asked.max(1) as f64,
+        valve_open_late_count: flown.valve_open_late,
+        holds: events.iter().filter(|(_, phase)| matches!(phase, Phase::Hold(_))).count(),
+        limit_violations: figures.limit_violations,
+        collisions: figures.collisions,
+        max_tilt_rad: statistics.max_tilt,
+        paint_emitted_kg: figures.emitted,
+        paint_deposited_kg: figures.deposited,
+        simulated_over_wall_time: flown.seconds / wall,
+        autopilot_cpu_s_per_s: flown.px4_cpu / flown.seconds,
+        robot_cpu_s_per_s: cpu / flown.seconds,
+    };
+    save_figures(&report, folder)?;
+    Ok(report)
+}

@@ -1,0 +1,246 @@
+//! `robot`: a short flight on PX4 where there is one, and what is no autopilot.
+
+use std::net::{Ipv4Addr, UdpSocket};
+use std::path::PathBuf;
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use mavlink::dialects::common::{HEARTBEAT_DATA, MavAutopilot, MavMessage, MavType};
+use paintcopter::autopilot::Encoder;
+
+use crate::scratch::Scratch;
+
+/// The folder of PX4; `None`, said on stderr, where `PAINTCOPTER_PX4` does not name one.
+fn px4() -> Option<PathBuf> {
+    let found = std::env::var_os("PAINTCOPTER_PX4").map(PathBuf::from);
+    if found.is_none() {
+        eprintln!("SKIPPED: no PX4: set PAINTCOPTER_PX4 to the folder with px4, px4-alias.sh and etc/");
+    }
+    found
+}
+
+#[test]
+fn a_localisation_that_does_not_hold_on_an_autopilot_is_refused() {
+    let s = Scratch::new("own-senses");
+    let out = s.path("out");
+    let output = robot(&s, "px4:anywhere", &["--scan", "--localisation", "slam", "--out", &out]).output().unwrap();
+    refused(&output, &["--localisation slam", "motion-capture or noise"]);
+}
+
+/// A panel of one square metre that stands a metre above the ground.
+fn panel(scratch: &Scratch) -> String {
+    // Once: another robot may be reading it.
+    if !scratch.0.join("panel.obj").exists() {
+        scratch.write("panel.obj", "v 0 0.5 1\nv 0 -0.5 1\nv 0 -0.5 2\nv 0 0.5 2\nf 1 2 3\nf 1 3 4\n");
+    }
+    scratch.path("panel.obj")
+}
+
+fn robot(scratch: &Scratch, autopilot: &str, more: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_robot"));
+    command.args(["--autopilot", autopilot, "--mesh", &panel(scratch), "--scale", "1", "--up", "z"]);
+    command.args(["--design", "stripes", "--texel", "0.02"]).args(more).stdin(Stdio::null());
+    command
+}
+
+fn text(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn figure(scratch: &Scratch, folder: &str, name: &str) -> f64 {
+    let json = std::fs::read_to_string(scratch.0.join(folder).join("report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&json).unwrap();
+    report[name].as_f64().unwrap_or_else(|| panic!("{name} in {json}"))
+}
+
+/// Flies the panel for some seconds of paint and returns what it said, with its exit code.
+fn fly(s: &Scratch, px4: &std::path::Path, folder: &str, more: &[&str]) -> (Option<i32>, String) {
+    let out = s.path(folder);
+    let output = robot(s, &format!("px4:{}", px4.display()), &[more, &["--out", &out]].concat()).output().unwrap();
+    (output.status.code(), text(&output))
+}
+
+#[test]
+fn px4_flies_the_plan_and_every_run_is_the_same() {
+    let Some(px4) = px4() else { return };
+    let s = Scratch::new("px4");
+    for (folder, more) in [("first", ["--seconds", "4"]), ("second", ["--seconds", "4"])] {
+        let (code, said) = fly(&s, &px4, folder, &more);
+        assert_eq!(code, Some(0), "{said}");
+        assert!(figure(&s, folder, "hit_error_rms_m") < 0.02, "{folder}");
+        assert!(figure(&s, folder, "painted_s") > 3.9, "{folder}");
+        for none in ["limit_violations", "collisions", "valve_open_late_count", "holds"] {
+            assert_eq!(figure(&s, folder, none), 0.0, "{none} of {folder}");
+        }
+    }
+    for file in ["track.csv", "painted.png", "painted_view.png"] {
+        let [first, second] = ["first", "second"].map(|folder| std::fs::read(s.0.join(folder).join(file)).unwrap());
+        assert!(first == second, "{file} differs between two runs");
+    }
+}
+
+#[test]
+fn faults_in_flight_shut_the_valve_and_the_paint_goes_on_after_those_that_pass() {
+    let Some(px4) = px4() else { return };
+    let s = Scratch::new("px4-faults");
+    let passing = ["link@1+1", "mode@10.3+1"];
+    let mut more = vec!["--seconds", "6"];
+    more.extend(passing.iter().flat_map(|fault| ["--fault", fault]));
+    let (code, said) = fly(&s, &px4, "passing", &more);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(figure(&s, "passing", "painted_s") > 5.9 && figure(&s, "passing", "hit_error_rms_m") < 0.02);
+    assert!(figure(&s, "passing", "holds") >= passing.len() as f64, "{said}");
+    assert_eq!(figure(&s, "passing", "valve_open_late_count"), 0.0);
+    for fault in ["restart@2", "program@2"] {
+        let (code, said) = fly(&s, &px4, fault, &["--seconds", "4", "--fault", fault]);
+        assert_eq!(code, Some(1), "{said}");
+        assert!(said.contains("robot: the flight was not finished: "), "{said}");
+        assert_eq!(figure(&s, fault, "valve_open_late_count"), 0.0, "{fault}");
+        assert!((1.9..2.2).contains(&figure(&s, fault, "painted_s")), "{fault}");
+    }
+}
+
+/// Random faults, in flights of the built-in wall of seeds 1 to 25; twenty minutes:
+/// `PAINTCOPTER_PX4=... cargo test --release --all-features --test it -- --ignored a_thousand_faults --nocapture`
+#[test]
+#[ignore = "twenty minutes"]
+fn a_thousand_faults_find_the_valve_shut() {
+    let px4 = px4().expect("PAINTCOPTER_PX4");
+    let mut state = 1_u64;
+    let mut random = move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    for seed in 1..=25 {
+        let faults: Vec<String> = (0..40)
+            .map(|k| {
+                let kind = ["link", "clock", "pose", "estimate", "mode"][(5.0 * random()) as usize];
+                format!("{kind}@{:.3}+{:.3}", 9.0 * f64::from(k) + 2.0 * random(), 0.05 + random())
+            })
+            .collect();
+        let s = Scratch::new("px4-thousand");
+        let (out, seed) = (s.path("out"), seed.to_string());
+        let mut command = Command::new(env!("CARGO_BIN_EXE_robot"));
+        command.args(["--autopilot", &format!("px4:{}", px4.display()), "--seed", &seed, "--out", &out]);
+        let setpoints = if seed.len() == 1 { "trajectory" } else { "attitude" };
+        command
+            .args(["--setpoints", setpoints])
+            .args(faults.iter().flat_map(|fault| ["--fault", fault]))
+            .stdin(Stdio::null());
+        let output = command.output().unwrap();
+        let [late, holds, error] =
+            ["valve_open_late_count", "holds", "hit_error_rms_m"].map(|name| figure(&s, "out", name));
+        println!("seed {seed}: {:?}, {holds} holds, {late} late, hit error {error:.4} m", output.status.code());
+        assert!(late == 0.0 && output.status.success(), "{}", text(&output));
+    }
+}
+
+/// The processes that run in a folder.
+fn running_in(folder: &std::path::Path) -> usize {
+    let processes = std::fs::read_dir("/proc").into_iter().flatten().flatten();
+    processes.filter(|process| std::fs::read_link(process.path().join("cwd")).is_ok_and(|at| at == folder)).count()
+}
+
+#[test]
+fn px4_ends_with_a_robot_that_is_killed() {
+    let Some(px4) = px4() else { return };
+    let s = Scratch::new("px4-killed");
+    let out = s.path("out");
+    let run = s.0.join("out/px4");
+    let more = ["--seconds", "300", "--out", &out];
+    let mut child = robot(&s, &format!("px4:{}", px4.display()), &more).stderr(Stdio::null()).spawn().unwrap();
+    let begun = Instant::now();
+    while running_in(&run) == 0 && begun.elapsed() < Duration::from_mins(1) {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert_eq!(running_in(&run), 1);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    while running_in(&run) > 0 && begun.elapsed() < Duration::from_mins(1) {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert_eq!(running_in(&run), 0, "PX4 runs on without a robot");
+}
+
+/// What is none is told in one line, and soon.
+fn refused(output: &Output, words: &[&str]) {
+    let text = text(output);
+    assert!(!output.status.success() && !text.contains("panicked"), "{text}");
+    for word in words {
+        assert!(text.contains(word), "\"{word}\" is missing in: {text}");
+    }
+}
+
+#[test]
+fn what_is_no_autopilot_is_refused() {
+    let s = Scratch::new("no-autopilot");
+    let out = s.path("out");
+    let run = |autopilot: &str| robot(&s, autopilot, &["--out", &out]).output().unwrap();
+    refused(&run("px4:no/such/folder"), &["no/such/folder", "px4 is missing"]);
+    // Another airframe's: a program without the mixer of four rotors in an X.
+    for name in
+        ["px4", "px4-alias.sh", "etc/init.d-posix/rcS", "etc/init.d-posix/airframes/1_x", "etc/init.d/rc.mc_defaults"]
+    {
+        s.write(&format!("other/{name}"), "#!/bin/sh\nexit 3\n");
+    }
+    let other = format!("px4:{}", s.path("other"));
+    refused(&run(&other), &["quad_x.main.mix is missing"]);
+    s.write("other/etc/mixers/quad_x.main.mix", "R: 4x\n");
+    let program = s.0.join("other/px4");
+    std::fs::set_permissions(&program, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
+    refused(&run(&other), &["PX4 ended", "exit status: 3", "px4.log"]);
+    refused(&run("serial:/dev/ttyUSB0,57600"), &["serial lines are not built in"]);
+    refused(&run("tcp:127.0.0.1:5760"), &["px4:FOLDER or udp:ADDRESS:PORT"]);
+}
+
+#[test]
+fn what_says_nothing_about_a_vehicle_is_refused() {
+    let s = Scratch::new("udp-options");
+    let out = s.path("out");
+    for (more, word) in [
+        (["--setpoints", "attitude"], "--setpoints attitude"),
+        (["--localisation", "noise"], "--localisation"),
+        (["--fault", "link@1+1"], "--fault"),
+    ] {
+        let output = robot(&s, "udp:127.0.0.1:0", &[&more[..], &["--out", &out]].concat()).output().unwrap();
+        refused(&output, &[word, "is for the simulated vehicle on PX4"]);
+    }
+}
+
+#[test]
+fn silence_and_nonsense_end_the_wait() {
+    let s = Scratch::new("nonsense");
+    let free = || UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap().local_addr().unwrap();
+    let (silent, noisy, plane) = (free(), free(), free());
+    let out = [s.path("silent"), s.path("noisy"), s.path("plane")];
+    let start = |address, out: &str| {
+        robot(&s, &format!("udp:{address}"), &["--out", out]).stderr(Stdio::piped()).spawn().unwrap()
+    };
+    let begun = Instant::now();
+    let waiting = start(silent, &out[0]);
+    let mut fed = start(noisy, &out[1]);
+    let on_plane = start(plane, &out[2]);
+    let heartbeat = MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+        mavtype: MavType::MAV_TYPE_FIXED_WING,
+        autopilot: MavAutopilot::MAV_AUTOPILOT_PX4,
+        ..Default::default()
+    });
+    let frame = Encoder::new(1, 1).frame(&heartbeat);
+    let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    let mut state = 1_u32;
+    while fed.try_wait().unwrap().is_none() && begun.elapsed() < Duration::from_mins(1) {
+        // Bytes that look like the starts of frames.
+        let rubbish: Vec<u8> = (0..200)
+            .map(|k| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                if k % 40 == 0 { 0xFD } else { (state >> 24) as u8 }
+            })
+            .collect();
+        let _ = socket.send_to(&rubbish, noisy);
+        let _ = socket.send_to(&frame, plane);
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    refused(&fed.wait_with_output().unwrap(), &["no heartbeat of an autopilot", "is it MAVLink"]);
+    refused(&on_plane.wait_with_output().unwrap(), &["FIXED_WING", "a multirotor on PX4"]);
+    refused(&waiting.wait_with_output().unwrap(), &["said nothing for 10 s", "let the vehicle send MAVLink there"]);
+}
