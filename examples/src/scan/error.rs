@@ -91,6 +91,9 @@ pub enum ScanError {
     /// Tracking did not find the camera.
     #[error("the camera is lost: {0}")]
     Lost(String),
+    /// Shape and texture of a frame do not fix its pose.
+    #[error("{0} of 6 directions of its pose are not fixed by shape or texture: not fused along a guess")]
+    Degenerate(usize),
     /// Less than half of the work was done.
     #[error("{0}")]
     Unusable(String),

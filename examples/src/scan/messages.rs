@@ -15,7 +15,8 @@ pub(super) fn line(event: &Event, outcome: &FrameOutcome, name: impl Fn(usize) -
         }
         Event::Found => format!("{}: the camera is found again", here()),
         Event::Degenerate { directions } => format!(
-            "warning: {}: {directions} of 6 directions are not seen; the motion before goes on along them",
+            "warning: {}: {directions} of 6 directions of the pose are not fixed: before a wall or along a corridor only odometry knows them \
+             (--poses odometry)",
             here()
         ),
         Event::LowFusedShare { frame, share } => format!(
@@ -65,6 +66,7 @@ fn reason(outcome: &TrackingOutcome) -> String {
         TrackingStatus::NoOverlap => {
             let coverage = 100.0 * outcome.coverage;
             format!(
+        LeftOut::Degenerate { directions } => ScanError::Degenerate(directions),
                 "{overlap:.0} % of the map in view were measured, {coverage:.0} % of the frame are in the map: too little"
             )
         }
@@ -73,3 +75,4 @@ fn reason(outcome: &TrackingOutcome) -> String {
         TrackingStatus::Tracked => "it is not".into(),
     }
 }
+        TrackingStatus::Degenerate => "its shape does not fix the pose".into(),

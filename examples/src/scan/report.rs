@@ -42,12 +42,15 @@ pub struct ScanReport {
     /// Times that tracking lost the camera.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracking_losses: Option<usize>,
-    /// Tracked frames that did not fix all six directions.
+    /// Frames that did not fix all six directions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracking_degenerate_frames: Option<usize>,
     /// Processor time of tracking a frame, ray cast included, median.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracking_cpu_ms_median: Option<f64>,
+    /// Those of them that were left out, because no odometry knew more.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tracking_degenerate_left_out: Option<usize>,
     /// Times that a camera was found by keyframes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracking_relocalisations: Option<usize>,
@@ -149,6 +152,7 @@ impl ScanReport {
             loop_corrections: loops.map(|l| l.corrections),
             loop_adjustments_refused: loops.map(|l| l.adjustments_refused),
             loop_frames_reintegrated: loops.map(|l| l.reintegrated),
+            tracking_degenerate_left_out: tracking.map(|t| t.degenerate_left_out),
             loop_drift_max_m: loops.map(|l| l.largest_drift),
             ate_se3_rmse_m: metrics.ate_se3_rmse,
             voxel_m: settings.voxel_size,

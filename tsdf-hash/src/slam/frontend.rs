@@ -28,6 +28,8 @@ const FIXED_MAP_AGREEMENT: f64 = 0.8;
 const HYPOTHESES: usize = 3;
 /// They were taken within so much of the last pose: radians, metres (ours).
 const NEAR: [f64; 2] = [1.0, 1.0];
+/// A camera that moves by more from frame to frame may have turned back: radians, metres (ours).
+const FAST: [f64; 2] = [0.05, 0.03];
 
 /// Where a frame was taken.
 #[derive(Debug, Default)]
@@ -42,6 +44,15 @@ pub struct Located {
     pub events: Vec<Event>,
 }
 
+/// What is known of the last pose.
+#[derive(Clone, Copy, PartialEq)]
+enum Last {
+    Tracked,
+    /// Along some directions the motion before goes on.
+    Guessed,
+    Lost,
+}
+
 /// Tracks a camera, and finds it again when it is lost.
 pub struct Frontend {
     tracker: Tracker,
@@ -49,7 +60,7 @@ pub struct Frontend {
     /// Tracked against instead of the whole map, where loops are looked for.
     local_map: Option<LocalMap>,
     motion: MotionModel,
-    lost: bool,
+    last: Last,
     usual: UsualAgreement,
     /// Where the camera is at first is looked for, too.
     relocalise_first: bool,
@@ -76,7 +87,7 @@ impl Frontend {
             relocaliser: Relocaliser::new(tracking)?,
             local_map: settings.closes_loops().then(|| LocalMap::new(map)),
             motion: MotionModel::new(odometry, settings.frame_interval),
-            lost: false,
+            last: Last::Tracked,
             usual: UsualAgreement::default(),
             relocalise_first: settings.relocalise_first,
             fixed_map,
@@ -145,7 +156,7 @@ impl Frontend {
             return Ok(located);
         }
         located.tracking = match self.follow(map, keyframes, frame, depth, colour)? {
-            Some(outcome) if outcome.is_tracked() => {
+            Some(outcome) if outcome.is_on_the_map() => {
                 self.relocaliser.reset();
                 Some(outcome)
             }
@@ -160,22 +171,28 @@ impl Frontend {
                 None => tracked,
             },
         };
-        let was_lost = self.lost;
-        let tracked = located.tracking.as_ref().filter(|outcome| outcome.is_tracked());
-        self.lost = tracked.is_none();
-        if let Some(outcome) = tracked.filter(|outcome| !outcome.degenerate.is_empty()) {
+        let was_lost = self.last == Last::Lost;
+        let followed = located.tracking.as_ref().filter(|outcome| outcome.is_on_the_map());
+        self.last = match followed {
+            Some(outcome) if is_guess(outcome) => Last::Guessed,
+            Some(_) => Last::Tracked,
+            None => Last::Lost,
+        };
+        if let Some(outcome) = followed.filter(|outcome| !outcome.degenerate.is_empty()) {
             located.events.push(Event::Degenerate { directions: outcome.degenerate.len() });
         }
-        match (was_lost, self.lost) {
+        match (was_lost, self.last == Last::Lost) {
             (false, true) => located.events.push(Event::Lost),
             (true, false) => located.events.push(Event::Found),
             _ => {}
         }
-        if let Some(outcome) = tracked {
-            self.usual.learn(outcome);
+        if let Some(outcome) = followed {
+            if outcome.is_tracked() {
+                self.usual.learn(outcome);
+                located.world_from_camera = Some(outcome.world_from_camera);
+            }
             // After a jump the last two poses are no motion, but what led to the place where it is found is one.
             self.motion.found(outcome, located.earlier.last().copied(), frame, was_lost);
-            located.world_from_camera = Some(outcome.world_from_camera);
         } else if located.tracking.is_some() {
             self.motion.lost(frame);
         }
@@ -197,20 +214,34 @@ impl Frontend {
     ) -> Result<Option<TrackingOutcome>, Error> {
         // A lost camera has moved, nobody knows where, unless odometry does, and one that skipped frames: what would do from one frame to the
         // next is not enough.
-        let is_guess = (self.lost && !self.motion.is_led(frame)) || self.motion.is_gap(frame);
+        let is_guess = (self.last != Last::Tracked && !self.motion.is_led(frame)) || self.motion.is_gap(frame);
+        let mut priors = self.motion.priors(frame);
+        // Without colour, a step of stairs looks like the next one. A fast camera that turns back is led there: of the places that agree, the one
+        // that more of the frame is seen at.
+        let is_fast = colour.is_none()
+            && priors.len() > 1
+            && !within(&priors[0].world_from_camera, &priors[1].world_from_camera, FAST);
+        if is_fast {
+            priors.extend(self.motion.turned_back());
+        }
         let mut best: Option<TrackingOutcome> = None;
-        for prior in self.motion.priors(frame) {
+        for prior in priors {
             let outcome = self.track(map, depth, colour, &prior, is_guess)?;
-            if !self.usual.is_doubtful(&outcome, &self.tracker) {
+            if !is_fast && !self.usual.is_doubtful(&outcome, &self.tracker) {
                 return Ok(Some(outcome));
             }
             if best.as_ref().is_none_or(|best| rank(&outcome) > rank(best)) {
                 best = Some(outcome);
             }
         }
+        if let Some(best) = best.take_if(|best| !self.usual.is_doubtful(best, &self.tracker)) {
+            return Ok(Some(best));
+        }
         let Some(mut best) = best else { return Ok(None) };
-        // Odometry knows better than looks, and of a lost camera the relocaliser asks more than one frame.
-        if !self.lost && !self.motion.is_led(frame) {
+        // Odometry knows better than looks, and of a lost camera the relocaliser asks more than one frame. What a frame does not fix, it does
+        // not fix elsewhere, either.
+        let is_open = self::is_guess(&best) && self.tracker.convinces(&best);
+        if self.last != Last::Lost && !is_open && !self.motion.is_led(frame) {
             best = self.recognise(map, keyframes, depth, colour, is_guess, best)?;
         }
         // What has been moved since a stored map was made differs from it, and the agreement that it asks for is higher already.
@@ -269,9 +300,18 @@ impl Frontend {
         if self.fixed_map && (outcome.coverage < LEAST_COVERAGE || !outcome.degenerate.is_empty()) {
             outcome.status = TrackingStatus::NoOverlap;
         }
+        // A gyroscope does not say where the camera moves to.
+        if outcome.is_tracked() && !self.motion.has_odometry() && outcome.leaves_shift_open() {
+            outcome.status = TrackingStatus::Degenerate;
+        }
         if is_guess && outcome.agreement < self.tracker.settings().relocalise_agreement {
             outcome.status = TrackingStatus::Disagreement;
         }
         Ok(outcome)
     }
+}
+
+/// Whether a pose goes on by the motion before along some directions, because nothing fixes them.
+fn is_guess(outcome: &TrackingOutcome) -> bool {
+    outcome.status == TrackingStatus::Degenerate
 }

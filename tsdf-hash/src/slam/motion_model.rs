@@ -73,6 +73,11 @@ impl MotionModel {
         self.last.map(|last| last.world_from_camera)
     }
 
+    /// Whether odometry was recorded.
+    pub(crate) fn has_odometry(&self) -> bool {
+        self.odometry.is_some()
+    }
+
     /// Whether frames are missing before this one, and no odometry says where the camera has gone.
     pub fn is_gap(&self, frame: &StampedPose) -> bool {
         self.steps(frame).is_some_and(|steps| steps > LONGEST_STEP) && !self.is_led(frame)
@@ -100,6 +105,11 @@ impl MotionModel {
         let onwards = before.map(|before| stopped * (before.inverse() * stopped));
         let guess = |world_from_camera| PosePrior { world_from_camera, covariance: None };
         onwards.into_iter().chain([stopped]).map(guess).collect()
+    }
+
+    /// Where the camera is if it moves back as it came; `None` without two poses.
+    pub(crate) fn turned_back(&self) -> Option<PosePrior> {
+        Some(PosePrior { world_from_camera: self.before?, covariance: None })
     }
 
     /// Intervals since the last frame.

@@ -36,7 +36,8 @@ pub enum Event {
         /// Frames before this one, each [`Placed`](Self::Placed) or [`LeftOut`](Self::LeftOut) next.
         earlier: usize,
     },
-    /// The frame does not fix all six directions of its pose; along the others the motion before goes on.
+    /// The frame does not fix all six directions of its pose. Odometry leads on along the others; without, the frame is
+    /// [`LeftOut`](Self::LeftOut), and the next one is looked for where the motion before leads.
     Degenerate {
         /// Directions that are not fixed.
         directions: usize,
@@ -125,6 +126,11 @@ pub enum LeftOut {
     /// It cannot be used.
     Refused(Error),
 }
+    /// Nothing fixes some directions of its pose: fused along a guess, it would bend the map.
+    Degenerate {
+        /// Directions that are not fixed.
+        directions: usize,
+    },
 
 impl From<Error> for LeftOut {
     fn from(error: Error) -> Self {
@@ -139,11 +145,13 @@ pub struct SlamStatistics {
     pub losses: usize,
     /// Times that it was found by keyframes.
     pub relocalisations: usize,
-    /// Tracked frames that did not fix all six directions.
+    /// Frames that did not fix all six directions.
     pub degenerate_frames: usize,
     /// Loops that were found.
     pub loops: usize,
     /// Corrections of the trajectory.
+    /// Those of them that were left out, because no odometry knew more.
+    pub degenerate_left_out: usize,
     pub corrections: usize,
     /// Corrections whose bundle adjustment was not taken: it made keyframes agree less.
     pub adjustments_refused: usize,
@@ -166,6 +174,7 @@ impl SlamStatistics {
             Event::LoopClosed { distance, .. } => {
                 self.loops += 1;
                 self.largest_drift = self.largest_drift.max(*distance);
+            Event::LeftOut { why: LeftOut::Degenerate { .. }, .. } => self.degenerate_left_out += 1,
             }
             Event::AdjustmentRefused { .. } => self.adjustments_refused += 1,
             Event::Corrected(_) => self.corrections += 1,

@@ -24,6 +24,7 @@ use crate::slam::reintegration::Reintegration;
 use crate::slam::settings::{PoseSource, SlamSettings};
 use crate::slam::state::SlamState;
 
+use crate::tracking::outcome::TrackingStatus;
 /// Localises a depth camera, maps what it sees, and corrects both where it comes back.
 ///
 /// Frame by frame, without files or threads of its own; what happens is told by values. Frames that may be looked at again, after a loop
@@ -207,6 +208,13 @@ impl<S: FrameSource> Slam<S> {
         let (places, remembered) = (frontend.places(), frontend.remembered());
         if self.settings.fuse {
             self.source.store(outcome.frame, depth, colour);
+        }
+        if let Some(tracking) = outcome.tracking.as_ref().filter(|t| t.status == TrackingStatus::Degenerate) {
+            let directions = tracking.degenerate.len();
+            while !self.lost.is_empty() {
+                self.forget_lost();
+            }
+            return Err(LeftOut::Degenerate { directions });
         }
         self.lost.push_back((outcome.frame, frame.stamp));
         while self.lost.len() > remembered {

@@ -38,9 +38,10 @@ impl UsualAgreement {
     }
 }
 
-/// Order of outcomes, the better later: tracked, then by how much map and frame agree.
+/// Order of outcomes, the better later: tracked, then by how much map and frame agree, and how much of both.
 pub(crate) fn rank(outcome: &TrackingOutcome) -> (bool, f64) {
-    (outcome.is_tracked(), outcome.agreement + outcome.likeness.unwrap_or_default())
+    let seen = outcome.agreement * outcome.coverage.min(outcome.overlap);
+    (outcome.is_tracked(), outcome.agreement + seen + outcome.likeness.unwrap_or_default())
 }
 
 /// Whether an outcome must be wrong, when no other pose was found to be better.

@@ -1,6 +1,6 @@
 //! The directions of a pose, by how much a frame says about each, and which of them it says nothing about.
 
-use nalgebra::{Isometry3, Matrix6, SymmetricEigen, Vector6};
+use nalgebra::{DMatrix, Isometry3, Matrix6, SymmetricEigen, Vector6};
 
 use crate::tracking::normal_equations::NormalEquations;
 use crate::tracking::pose::moved;
@@ -15,8 +15,6 @@ const LEAST_INFORMATION: f64 = 400.0;
 const ENOUGH: f64 = 1e4;
 /// Of the information of a direction at least this share is believed (ours).
 const LEAST_LEFT: f64 = 0.02;
-/// Directions with a share below so many times the scatter of the normals get a second look (ours).
-const MARGIN: f64 = 1.0;
 /// The cost must rise by this share of what the linear system says when the pose is moved (ours); with the robust cost a perfect
 /// constraint makes 0.3 or more.
 const LEAST_RISE: f64 = 0.25;
@@ -91,8 +89,41 @@ impl Directions {
     }
 
     /// `(ω, v)` of a unit step along a direction.
-    fn step(&self, k: usize) -> Vector6<f64> {
+    pub(crate) fn step(&self, k: usize) -> Vector6<f64> {
         self.axes.column(k).component_div(&self.scale)
+    }
+
+    /// Puts combinations of some directions, the columns, in the place of these.
+    pub(crate) fn combine(&mut self, of: &[usize], columns: &DMatrix<f64>) {
+        let axes = of.iter().map(|&k| self.axes.column(k).into_owned()).collect::<Vec<_>>();
+        for (column, &k) in of.iter().enumerate() {
+            let combined =
+                axes.iter().enumerate().map(|(row, axis)| axis * columns[(row, column)]).sum::<Vector6<f64>>();
+            self.axes.set_column(k, &combined);
+        }
+    }
+
+    /// A direction is known to so many metres at the surface, by other means than slopes.
+    pub(crate) fn fix(&mut self, k: usize, deviation: f64) {
+        (self.information[k], self.of_distances[k]) = (deviation.powi(-2), 0.0);
+    }
+
+    /// The span of some steps without that of others: steps `(ω, v)` of a metre each.
+    pub(crate) fn without(&self, steps: &[Vector6<f64>], others: &[Vector6<f64>]) -> Vec<Vector6<f64>> {
+        let unit = |step: &Vector6<f64>| step.component_mul(&self.scale).normalize();
+        let mut left = Matrix6::zeros();
+        steps.iter().map(unit).for_each(|axis| left += axis * axis.transpose());
+        let mut basis: Vec<Vector6<f64>> = Vec::new();
+        for other in others.iter().map(unit) {
+            let rest = basis.iter().fold(other, |rest, axis| rest - axis * axis.dot(&other));
+            if rest.norm() > 0.1 {
+                basis.push(rest.normalize());
+            }
+        }
+        let out = basis.iter().fold(Matrix6::identity(), |out, axis| out - axis * axis.transpose());
+        let eigen = SymmetricEigen::new(out * left * out);
+        let kept = (0..6).filter(|&k| eigen.eigenvalues[k] > 0.5);
+        kept.map(|k| eigen.eigenvectors.column(k).component_div(&self.scale)).collect()
     }
 
     /// The part of a step `(ω, v)` along the directions that are taken.
@@ -105,24 +136,31 @@ impl Directions {
         part.component_div(&self.scale)
     }
 
+    /// Which directions the linear system says nothing of, or no more than the noise of the model's normals would, of variance `scatter` in
+    /// radians squared: it makes a wall seem to be seen to slide along itself.
+    pub(crate) fn weak(&self, scatter: f64) -> [bool; 6] {
+        let most = self.information.max();
+        std::array::from_fn(|k| {
+            let by_intensities = self.information[k] - self.of_distances[k] >= ENOUGH;
+            let feigned = self.of_distances[k] < scatter * most && !by_intensities;
+            self.information[k] < LEAST_INFORMATION || feigned
+        })
+    }
+
     /// Which directions the frame says nothing about.
     ///
-    /// The noise of the model's normals, of variance `scatter` in radians squared, makes the linear system believe that it can see a
-    /// wall slide along itself. So where the system says no more than such noise would, the pose is moved a little, both
-    /// ways: if the cost does not rise as it should, nothing is known. `dense` makes the comparison with as many points as
-    /// there are, because the partners of a moved pose have other noise.
+    /// Where the system is [weak](Self::weak), the pose is moved a little, both ways: if the cost does not rise as it should, nothing is known.
+    /// `dense` makes the comparison with as many points as there are, because the partners of a moved pose have other noise.
     pub(crate) fn degenerate(
         &self,
         dense: &mut dyn FnMut(&Isometry3<f64>) -> Evaluation,
         pose: &Isometry3<f64>,
         scatter: f64,
     ) -> [bool; 6] {
-        let most = self.information.max();
-        let weak = |k: usize| self.of_distances[k] < MARGIN * scatter * most;
-        let by_intensities = |k: usize| self.information[k] - self.of_distances[k] >= ENOUGH;
-        let doubtful = |k: usize| self.information[k] >= LEAST_INFORMATION && weak(k) && !by_intensities(k);
         let mut unknown = std::array::from_fn(|k| self.information[k] < LEAST_INFORMATION);
-        if !(0..6).any(doubtful) {
+        let weak = self.weak(scatter);
+        let doubtful = |k: &usize| weak[*k] && self.information[*k] >= LEAST_INFORMATION;
+        if !(0..6).any(|k| doubtful(&k)) {
             return unknown;
         }
         let here = dense(pose);
@@ -136,7 +174,7 @@ impl Directions {
         // A residual changes by as many standard deviations along the best known direction.
         let best = (0..6).map(per_term).fold(0.0, f64::max);
         let distance = DEVIATIONS / best.sqrt();
-        for k in (0..6).filter(|&k| doubtful(k)) {
+        for k in (0..6).filter(doubtful) {
             let mut at = |step: f64| dense(&moved(pose, &(self.step(k) * step))).mean_cost(share);
             let rise = 0.5 * (at(distance) + at(-distance)) - here.mean_cost(share);
             unknown[k] = rise < LEAST_RISE * 0.5 * distance * distance * per_term(k);

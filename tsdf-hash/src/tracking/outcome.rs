@@ -1,6 +1,6 @@
 //! What tracking a frame gave.
 
-use nalgebra::{Isometry3, Matrix6, Vector6};
+use nalgebra::{Isometry3, Matrix3xX, Matrix6, Vector6};
 
 use crate::tracking::pose::{moved, rotated, step};
 
@@ -71,12 +71,18 @@ pub enum TrackingStatus {
     Disagreement,
     /// The pose is too far from the prior for the covariances of both (chi-squared of six degrees of freedom, 99 %).
     Rejected,
+    /// Frame and model agree, but along some directions ([`TrackingOutcome::degenerate`]) neither the frame nor the prior says where the camera
+    /// is: before a wall, along a corridor. The pose is a guess along these.
+    Degenerate,
 }
+
+/// A direction with less of a turn, of one, is a shift (ours).
+const PURE_SHIFT: f64 = 0.2;
 
 /// The result of [`Tracker::track`](crate::tracking::Tracker::track).
 #[derive(Clone, Debug)]
 pub struct TrackingOutcome {
-    /// Whether the pose can be believed; if not, the pose is the prior's.
+    /// Whether the pose can be believed; if not, the pose is the prior's, of a degenerate frame along the degenerate directions.
     pub status: TrackingStatus,
     /// The pose.
     pub world_from_camera: Isometry3<f64>,
@@ -105,6 +111,21 @@ impl TrackingOutcome {
     /// Whether the pose can be believed.
     pub fn is_tracked(&self) -> bool {
         self.status == TrackingStatus::Tracked
+    }
+
+    /// Whether frame and map agree, be it that nothing fixes some directions.
+    pub(crate) fn is_on_the_map(&self) -> bool {
+        matches!(self.status, TrackingStatus::Tracked | TrackingStatus::Degenerate)
+    }
+
+    /// Whether the frame leaves a shift open that no turn goes with.
+    pub(crate) fn leaves_shift_open(&self) -> bool {
+        if self.degenerate.is_empty() {
+            return false;
+        }
+        let turns: Vec<_> = self.degenerate.iter().map(|direction| direction.fixed_rows::<3>(0).into_owned()).collect();
+        let turns = Matrix3xX::from_columns(&turns);
+        turns.ncols() > 3 || turns.singular_values().min() < PURE_SHIFT
     }
 
     /// The same in a world that `there` leads to.

@@ -14,6 +14,7 @@ const LEAST_DEPTH_SCALE: f64 = 0.1;
 const LEAST_INTENSITY_SCALE: f64 = 1.5;
 
 /// Where the search has come to.
+#[derive(Clone)]
 pub(crate) struct Registration {
     pub(crate) pose: Isometry3<f64>,
     pub(crate) scales: Scales,

@@ -9,10 +9,11 @@ use crate::images::{ColourView, DepthView, check_pose};
 use crate::ray_cast::settings::RayCastSettings;
 use crate::ray_cast::view::View;
 use crate::trace::{event, span};
-use crate::tracking::directions::{Directions, LEAST_SHARE};
+use crate::tracking::directions::LEAST_SHARE;
 use crate::tracking::image_level::{ImageLevel, reduced};
 use crate::tracking::likeness::intensity_correlation;
 use crate::tracking::model_points::{Model, model_points};
+use crate::tracking::observability::{Observation, Observed};
 use crate::tracking::outcome::{PosePrior, TrackingOutcome, TrackingStatus};
 use crate::tracking::pose::{moved, step};
 use crate::tracking::registration::Registration;
@@ -80,6 +81,8 @@ pub struct Tracker {
     /// Fine to coarse.
     levels: [ImageLevel; LEVELS],
     models: [Model; LEVELS],
+    /// Settles from afar: whoever does will try again from elsewhere, and needs no search for what outlines say.
+    settles: bool,
 }
 
 impl Tracker {
@@ -89,7 +92,7 @@ impl Tracker {
     /// [`Error::InvalidSetting`].
     pub fn new(settings: TrackingSettings) -> Result<Self, Error> {
         settings.check()?;
-        Ok(Self { settings, levels: Default::default(), models: Default::default() })
+        Ok(Self { settings, levels: Default::default(), models: Default::default(), settles: false })
     }
 
     /// The settings given to [`new`](Self::new).
@@ -131,10 +134,12 @@ impl Tracker {
             // From afar little agrees at first.
             self.settings.min_agreement = if reach > 1.0 { 0.0 } else { least };
             let prior = PosePrior { world_from_camera: pose, covariance: None };
+            self.settles = true;
             let outcome = self.track(map, depth, colour, &prior);
+            self.settles = false;
             (self.settings.max_distance, self.settings.min_agreement) = (near, least);
             let outcome = outcome?;
-            if !outcome.is_tracked() || outcome.agreement < progress {
+            if !outcome.is_on_the_map() || outcome.agreement < progress {
                 return Ok(None);
             }
             let moved = step(&pose, &outcome.world_from_camera).amax();
@@ -223,7 +228,7 @@ impl Tracker {
         let Some((last, comparison)) = last else { return Ok(lost(prior, TrackingStatus::NoOverlap)) };
         // The levels hold means of pixels: their noise is that much smaller.
         let reduction = settings.reduction(depth.width) as f64;
-        let outcome = self.outcome(&mut search, &last, &comparison, view, reduction, prior);
+        let outcome = self.outcome(&mut search, last, &comparison, view, reduction, prior);
         if !outcome.is_tracked() {
             event!(debug, status = ?outcome.status, agreement = outcome.agreement, "not tracked from this prior");
         }
@@ -258,7 +263,7 @@ impl Tracker {
     fn outcome(
         &self,
         search: &mut Registration,
-        last: &Evaluation,
+        last: Evaluation,
         comparison: &Comparison,
         view: &View,
         reduction: f64,
@@ -271,20 +276,15 @@ impl Tracker {
         let cell = (FINE_STRIDE * FINE_STRIDE) as f64;
         let measured = comparison.level.omega.iter().filter(|omega| **omega > 0.0).count();
         let coverage = (cell * f64::from(last.in_view) / measured.max(1) as f64).min(1.0);
-        let found = Directions::new(&last.equations, last.mean_depth(), LEAST_SHARE);
-        let (Some(directions), true) = (found, last.partners > 0) else {
+        let scatter = scatter(view, comparison, reduction * f64::from(search.scales.depth));
+        let partners = last.partners > 0;
+        // The search looks at distances alone: where there is colour, intensities know better.
+        let searches = prior.covariance.is_none() && !comparison.photometric && !self.settles;
+        let found = Observation { comparison, view, scatter, searches }.observe(search, last).filter(|_| partners);
+        let Some(Observed { last, directions, unknown }) = found else {
             return TrackingOutcome { overlap, coverage, agreement, ..lost(prior, TrackingStatus::NoOverlap) };
         };
-        let scatter = scatter(view, comparison, reduction * f64::from(search.scales.depth));
-        let mut all = Model::default();
-        let (scales, brightness) = (search.scales, search.brightness);
-        let mut dense = |pose: &Isometry3<f64>| {
-            if all.points.is_empty() {
-                model_points(view, 1, 0, &mut all);
-            }
-            Comparison { model: &all, ..*comparison }.evaluate(pose, scales, brightness)
-        };
-        let unknown = directions.degenerate(&mut dense, &search.pose, scatter);
+        let (overlap, agreement) = (share(last.in_view, points), share(last.agreeing, last.in_view));
         // Along what the frame does not fix, back to the prior, if it is more than a guess.
         if prior.covariance.is_some() {
             let wandered = directions.part(&step(&search.pose, &prior.world_from_camera), |k| unknown[k]);
@@ -311,10 +311,16 @@ impl Tracker {
             TrackingStatus::Disagreement
         } else if far {
             TrackingStatus::Rejected
+        } else if unknown.contains(&true) && prior.covariance.is_none() {
+            TrackingStatus::Degenerate
         } else {
             TrackingStatus::Tracked
         };
-        let pose = if status == TrackingStatus::Tracked { search.pose } else { prior.world_from_camera };
+        let pose = if matches!(status, TrackingStatus::Tracked | TrackingStatus::Degenerate) {
+            search.pose
+        } else {
+            prior.world_from_camera
+        };
         TrackingOutcome {
             status,
             world_from_camera: pose,

@@ -8,6 +8,7 @@ mod bundle_adjustment;
 mod carve;
 mod consistency;
 mod distance_field;
+mod degenerate;
 mod errors;
 mod eviction;
 mod examples;

@@ -1,6 +1,6 @@
 //! The tracker against poses that are known.
 
-use nalgebra::{Isometry3, Matrix6, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
 use tsdf_hash::tracking::{PosePrior, Tracker, TrackingOutcome, TrackingSettings, TrackingStatus};
 use tsdf_hash::{ColourData, ColourView, Map, NoiseModel, Settings};
 
@@ -51,7 +51,10 @@ fn a_room_is_followed_without_poses() {
     for shot in &shots[1..] {
         let guess = last * (before.inverse() * last);
         let outcome = tracker.track(&mut map, &shot.view(), None, &prior(guess)).unwrap();
-        assert_eq!(outcome.status, TrackingStatus::Tracked);
+        // A ball before a wall leaves the turn about its axis along the wall's normal open, where nothing else is in view.
+        let is_turn = |direction: &Vector6<f64>| direction[0].abs() > 0.5 && direction[1].hypot(direction[2]) < 0.05;
+        assert!(outcome.is_tracked() || outcome.status == TrackingStatus::Degenerate, "{outcome:?}");
+        assert!(outcome.degenerate.len() <= 1 && outcome.degenerate.iter().all(is_turn), "{outcome:?}");
         (before, last) = (last, outcome.world_from_camera);
         map.integrate(&shot.view(), None, &last).unwrap();
         let (metres, radians) = apart(&last, &shot.world_from_camera);
