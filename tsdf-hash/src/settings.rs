@@ -17,7 +17,6 @@ pub struct NoiseModel {
     pub nearest: f64,
 }
 
-#[cfg(feature = "pose-graph")]
 impl NoiseModel {
     /// Standard deviation at a depth, metres.
     pub(crate) fn deviation(&self, depth: f64) -> f64 {

@@ -4,6 +4,7 @@
 //! is closed the trajectory is corrected at once and the map follows, frame by frame, to the bit. (Thesis Paper I, algorithm 1.)
 
 mod backend;
+mod camera_check;
 mod correction;
 mod frame_memory;
 mod frame_source;
@@ -16,12 +17,14 @@ mod motion_model;
 mod outcome;
 mod quality;
 mod reintegration;
+mod self_calibration;
 mod settings;
 mod state;
 mod system;
 mod trajectory_text;
 mod wrong_minimum;
 
+pub use camera_check::CameraDoubt;
 pub use correction::Correction;
 pub use frame_memory::FrameMemory;
 pub use frame_source::{ColourImage, ColourPixels, DepthPixels, FrameImages, FrameSource};

@@ -4,11 +4,12 @@ use std::path::Path;
 
 use nalgebra::Isometry3;
 use tsdf_hash::mesh::Mesh;
-use tsdf_hash::slam::{PoseSource, Quality, SlamState, SlamStatistics};
+use tsdf_hash::slam::{CameraDoubt, PoseSource, Quality, SlamState, SlamStatistics};
 use vio_ekf::Trajectory;
 
 use super::checkpoint::metadata_of;
 use super::error::ScanError;
+use super::messages::camera;
 use super::ray_cast_check::RayCastCheck;
 use super::sequence::Sequence;
 
@@ -51,6 +52,10 @@ pub struct ScanMetrics {
     pub quality: Quality,
     /// Frames whose colour image could not be read.
     pub without_colour: usize,
+    /// The camera that fits the frames clearly better.
+    pub camera_doubt: Option<CameraDoubt>,
+    /// Units per metre with which the tracked path is as long as the recorded one, if it clearly is not.
+    pub fitting_depth_scale: Option<f64>,
     /// What became of tracking and loops.
     pub statistics: SlamStatistics,
     /// Whether loops were looked for.
@@ -85,6 +90,14 @@ impl Scan {
             let percent = 100.0 * share;
             return unusable(format!(
                 "only {percent:.0} % of the valid pixels were fused: check --depth-scale and --noise"
+            ));
+        }
+        if let Some(doubt) = &self.metrics.camera_doubt {
+            return unusable(camera(doubt));
+        }
+        if let Some(scale) = self.metrics.fitting_depth_scale {
+            return unusable(format!(
+                "the tracked path is not as long as the recorded one, with --depth-scale {scale:.0} it is"
             ));
         }
         let agreement = quality.median_agreement();

@@ -1,6 +1,6 @@
 //! What happened with a frame, in words.
 
-use tsdf_hash::slam::{Event, FrameOutcome, LeftOut};
+use tsdf_hash::slam::{CameraDoubt, Event, FrameOutcome, LeftOut};
 use tsdf_hash::tracking::{TrackingOutcome, TrackingStatus};
 
 use super::error::ScanError;
@@ -31,6 +31,7 @@ pub(super) fn line(event: &Event, outcome: &FrameOutcome, name: impl Fn(usize) -
             here(),
             100.0 * agreement
         ),
+        Event::CameraDoubted(doubt) => format!("warning: {}: {}", here(), camera(doubt)),
         Event::AdjustmentRefused { frame } => format!(
             "{}: the keyframes agree less after a bundle adjustment: the poses stay as the pose graph has them",
             name(*frame)
@@ -41,6 +42,17 @@ pub(super) fn line(event: &Event, outcome: &FrameOutcome, name: impl Fn(usize) -
         }
         _ => return None,
     })
+}
+
+/// What a doubtful camera should be.
+pub(super) fn camera(doubt: &CameraDoubt) -> String {
+    let CameraDoubt { fits_better: k, agreement, .. } = doubt;
+    let [given, better] = agreement.map(|share| 100.0 * share);
+    format!(
+        "the frames do not fit each other with this camera: {given:.0} % of the depth agrees, with \
+         --intrinsics {:.1},{:.1},{:.1},{:.1} {better:.0} %",
+        k.fx, k.fy, k.cx, k.cy
+    )
 }
 
 /// Why a frame was left out.
@@ -54,6 +66,7 @@ pub(super) fn fault(why: LeftOut, tracking: Option<&TrackingOutcome>) -> ScanErr
             };
             ScanError::Lost(tracking.map_or(search.into(), |outcome| format!("{}; {search}", reason(outcome))))
         }
+        LeftOut::Degenerate { directions } => ScanError::Degenerate(directions),
         LeftOut::Refused(error) => error.into(),
         // A frame without a pose is not read.
         _ => ScanError::NoPose("no pose was recorded for it"),
@@ -66,13 +79,12 @@ fn reason(outcome: &TrackingOutcome) -> String {
         TrackingStatus::NoOverlap => {
             let coverage = 100.0 * outcome.coverage;
             format!(
-        LeftOut::Degenerate { directions } => ScanError::Degenerate(directions),
                 "{overlap:.0} % of the map in view were measured, {coverage:.0} % of the frame are in the map: too little"
             )
         }
         TrackingStatus::Disagreement => format!("only {agreement:.0} % of the pixels agree with the map"),
         TrackingStatus::Rejected => "the motion is not plausible".into(),
+        TrackingStatus::Degenerate => "its shape does not fix the pose".into(),
         TrackingStatus::Tracked => "it is not".into(),
     }
 }
-        TrackingStatus::Degenerate => "its shape does not fix the pose".into(),

@@ -25,6 +25,9 @@ pub struct ScanReport {
     pub camera_px: [f64; 4],
     /// Where they are from.
     pub camera_origin: String,
+    /// The camera that fits the frames clearly better; absent where none does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera_fits_better_px: Option<[f64; 4]>,
     /// Units of the depth images per metre.
     pub depth_units_per_m: f64,
     /// Where that is from.
@@ -45,12 +48,12 @@ pub struct ScanReport {
     /// Frames that did not fix all six directions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracking_degenerate_frames: Option<usize>,
-    /// Processor time of tracking a frame, ray cast included, median.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tracking_cpu_ms_median: Option<f64>,
     /// Those of them that were left out, because no odometry knew more.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracking_degenerate_left_out: Option<usize>,
+    /// Processor time of tracking a frame, ray cast included, median.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tracking_cpu_ms_median: Option<f64>,
     /// Times that a camera was found by keyframes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tracking_relocalisations: Option<usize>,
@@ -137,6 +140,10 @@ impl ScanReport {
             },
             camera_px: [k.fx, k.fy, k.cx, k.cy],
             camera_origin: sequence.camera_origin.clone(),
+            camera_fits_better_px: metrics.camera_doubt.map(|doubt| {
+                let k = doubt.fits_better;
+                [k.fx, k.fy, k.cx, k.cy]
+            }),
             depth_units_per_m: sequence.depth_scale,
             depth_scale_origin: sequence.scale_origin.clone(),
             valid_share: share(quality.valid, quality.pixels),
@@ -145,6 +152,7 @@ impl ScanReport {
             depth_agreement_median: (!quality.agreement.is_empty()).then(|| quality.median_agreement()),
             tracking_losses: tracking.map(|t| t.losses),
             tracking_degenerate_frames: tracking.map(|t| t.degenerate_frames),
+            tracking_degenerate_left_out: tracking.map(|t| t.degenerate_left_out),
             tracking_cpu_ms_median: tracking.map(|_| 1e3 * median(&metrics.tracking_s)),
             tracking_relocalisations: tracking.map(|t| t.relocalisations),
             keyframes: scan.state.keyframes.len(),
@@ -152,7 +160,6 @@ impl ScanReport {
             loop_corrections: loops.map(|l| l.corrections),
             loop_adjustments_refused: loops.map(|l| l.adjustments_refused),
             loop_frames_reintegrated: loops.map(|l| l.reintegrated),
-            tracking_degenerate_left_out: tracking.map(|t| t.degenerate_left_out),
             loop_drift_max_m: loops.map(|l| l.largest_drift),
             ate_se3_rmse_m: metrics.ate_se3_rmse,
             voxel_m: settings.voxel_size,

@@ -252,10 +252,14 @@ impl<'a> Run<'a> {
         let Self { sequence, settings, slam, resumed, skipped, mut metrics, .. } = self;
         let poses = settings.slam.poses;
         // Odometry is no truth to measure against.
-        if poses == PoseSource::Tracked {
-            metrics.ate_se3_rmse = tracked_error(sequence, &fused);
+        if poses == PoseSource::Tracked
+            && let Some((error, ratio)) = tracked_error(sequence, &fused)
+        {
+            metrics.ate_se3_rmse = Some(error);
+            metrics.fitting_depth_scale = ratio.map(|ratio| sequence.depth_scale / ratio);
         }
         metrics.quality = slam.quality().clone();
+        metrics.camera_doubt = slam.camera_doubt();
         metrics.statistics = *slam.statistics();
         let device = slam.map().device().to_string();
         let state = slam.finish()?;
@@ -267,9 +271,17 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Of the frames that have a recorded pose; `None` where these do not fix an alignment: below three, or on one line.
-fn tracked_error(sequence: &Sequence, fused: &[(usize, Isometry3<f64>)]) -> Option<f64> {
+/// The path grows or shrinks by so much, or the depth scale is not doubted (ours).
+const LEAST_RATIO: f64 = 1.1;
+
+/// Of the frames that have a recorded pose, the error after rigid alignment, and what the recorded path is longer by if that explains most of
+/// it; `None` where these do not fix an alignment: below three, or on one line.
+fn tracked_error(sequence: &Sequence, fused: &[(usize, Isometry3<f64>)]) -> Option<(f64, Option<f64>)> {
     let recorded = |(index, pose): &(usize, Isometry3<f64>)| Some((sequence.frames[*index].world_from_camera?, *pose));
     let (given, tracked): (Vec<_>, Vec<_>) = fused.iter().filter_map(recorded).unzip();
-    ate(&given, &tracked, Alignment::Se3).ok().map(|found| found.position.rmse)
+    let [rigid, scaled] = [Alignment::Se3, Alignment::Sim3].map(|mode| ate(&given, &tracked, mode).ok());
+    let (rigid, scaled) = (rigid?.position.rmse, scaled?);
+    let ratio = scaled.reference_from_estimate.scaling();
+    let explains = 2.0 * scaled.position.rmse < rigid && ratio.max(1.0 / ratio) > LEAST_RATIO;
+    Some((rigid, explains.then_some(ratio)))
 }

@@ -4,6 +4,7 @@ use nalgebra::Isometry3;
 
 use crate::error::Error;
 use crate::report::FrameReport;
+use crate::slam::camera_check::CameraDoubt;
 use crate::slam::correction::Correction;
 use crate::tracking::drift::Drift;
 use crate::tracking::outcome::TrackingOutcome;
@@ -57,6 +58,8 @@ pub enum Event {
         /// Median of the shares of the pixels that agree.
         agreement: f64,
     },
+    /// The frames fit each other clearly better with another camera: the map is bent. Said once.
+    CameraDoubted(CameraDoubt),
     /// Less than [`Quality::LEAST_FUSED_SHARE`](crate::slam::Quality::LEAST_FUSED_SHARE) of the valid pixels were fused: neighbouring depths differ by more than the noise of the
     /// camera. Said once.
     LowFusedShare {
@@ -123,14 +126,14 @@ pub enum LeftOut {
         /// Places of the map that agree with the frames since: more frames tell them apart, or confirm the only one.
         places: usize,
     },
-    /// It cannot be used.
-    Refused(Error),
-}
     /// Nothing fixes some directions of its pose: fused along a guess, it would bend the map.
     Degenerate {
         /// Directions that are not fixed.
         directions: usize,
     },
+    /// It cannot be used.
+    Refused(Error),
+}
 
 impl From<Error> for LeftOut {
     fn from(error: Error) -> Self {
@@ -147,11 +150,11 @@ pub struct SlamStatistics {
     pub relocalisations: usize,
     /// Frames that did not fix all six directions.
     pub degenerate_frames: usize,
+    /// Those of them that were left out, because no odometry knew more.
+    pub degenerate_left_out: usize,
     /// Loops that were found.
     pub loops: usize,
     /// Corrections of the trajectory.
-    /// Those of them that were left out, because no odometry knew more.
-    pub degenerate_left_out: usize,
     pub corrections: usize,
     /// Corrections whose bundle adjustment was not taken: it made keyframes agree less.
     pub adjustments_refused: usize,
@@ -171,10 +174,10 @@ impl SlamStatistics {
             Event::Lost => self.losses += 1,
             Event::Relocalised { .. } => self.relocalisations += 1,
             Event::Degenerate { .. } => self.degenerate_frames += 1,
+            Event::LeftOut { why: LeftOut::Degenerate { .. }, .. } => self.degenerate_left_out += 1,
             Event::LoopClosed { distance, .. } => {
                 self.loops += 1;
                 self.largest_drift = self.largest_drift.max(*distance);
-            Event::LeftOut { why: LeftOut::Degenerate { .. }, .. } => self.degenerate_left_out += 1,
             }
             Event::AdjustmentRefused { .. } => self.adjustments_refused += 1,
             Event::Corrected(_) => self.corrections += 1,

@@ -13,6 +13,7 @@ use crate::map::Map;
 use crate::mesh::incremental::IncrementalMesher;
 use crate::report::FrameReport;
 use crate::slam::backend::Backend;
+use crate::slam::camera_check::CameraCheck;
 use crate::slam::correction::Correction;
 use crate::slam::frame_memory::FrameMemory;
 use crate::slam::frame_source::{FrameSource, read_again};
@@ -23,8 +24,8 @@ use crate::slam::quality::Quality;
 use crate::slam::reintegration::Reintegration;
 use crate::slam::settings::{PoseSource, SlamSettings};
 use crate::slam::state::SlamState;
-
 use crate::tracking::outcome::TrackingStatus;
+
 /// Localises a depth camera, maps what it sees, and corrects both where it comes back.
 ///
 /// Frame by frame, without files or threads of its own; what happens is told by values. Frames that may be looked at again, after a loop
@@ -68,6 +69,7 @@ pub struct Slam<S = FrameMemory> {
     /// Numbers and stamps of the frames since the camera was lost.
     lost: VecDeque<(usize, f64)>,
     quality: Quality,
+    camera_check: CameraCheck,
     statistics: SlamStatistics,
     clock: Option<fn() -> f64>,
 }
@@ -127,6 +129,7 @@ impl<S: FrameSource> Slam<S> {
             reintegration: Reintegration::default(),
             lost: VecDeque::new(),
             quality: Quality::default(),
+            camera_check: CameraCheck::default(),
             statistics: SlamStatistics::default(),
             clock: None,
         })
@@ -206,15 +209,15 @@ impl<S: FrameSource> Slam<S> {
             return Ok((pose, earlier));
         }
         let (places, remembered) = (frontend.places(), frontend.remembered());
-        if self.settings.fuse {
-            self.source.store(outcome.frame, depth, colour);
-        }
         if let Some(tracking) = outcome.tracking.as_ref().filter(|t| t.status == TrackingStatus::Degenerate) {
             let directions = tracking.degenerate.len();
             while !self.lost.is_empty() {
                 self.forget_lost();
             }
             return Err(LeftOut::Degenerate { directions });
+        }
+        if self.settings.fuse {
+            self.source.store(outcome.frame, depth, colour);
         }
         self.lost.push_back((outcome.frame, frame.stamp));
         while self.lost.len() > remembered {
@@ -287,6 +290,9 @@ impl<S: FrameSource> Slam<S> {
         if let Some(report) = &report {
             events.extend(self.quality.count(frame, depth.width * depth.height, report));
             self.count_bytes();
+            if self.camera_check.add(depth, pose) {
+                events.extend(self.camera_doubt().map(Event::CameraDoubted));
+            }
         }
         self.frames.push(frame);
         self.trajectory.push((stamp, *pose));

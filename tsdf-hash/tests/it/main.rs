@@ -5,10 +5,11 @@
 mod accuracy;
 #[cfg(feature = "pose-graph")]
 mod bundle_adjustment;
+mod calibration;
 mod carve;
 mod consistency;
-mod distance_field;
 mod degenerate;
+mod distance_field;
 mod errors;
 mod eviction;
 mod examples;

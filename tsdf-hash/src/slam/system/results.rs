@@ -11,6 +11,7 @@ use crate::error::Error;
 use crate::keyframes::index::KeyframeIndex;
 use crate::mesh::incremental::IncrementalMesher;
 use crate::mesh::triangle_mesh::Mesh;
+use crate::slam::camera_check::CameraDoubt;
 use crate::slam::frame_source::FrameSource;
 use crate::slam::outcome::SlamStatistics;
 use crate::slam::quality::Quality;
@@ -65,6 +66,12 @@ impl<S: FrameSource> Slam<S> {
     /// What the frames were worth.
     pub fn quality(&self) -> &Quality {
         &self.quality
+    }
+
+    /// The camera that fits the frames clearly better than the one given, as far as the camera has turned; also an
+    /// [`Event`](crate::slam::Event) when it has turned enough. A wrong depth scale cannot be told from frames alone.
+    pub fn camera_doubt(&self) -> Option<CameraDoubt> {
+        self.camera_check.doubt(&self.map.dense().settings().noise)
     }
 
     /// What was counted.
