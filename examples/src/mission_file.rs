@@ -10,10 +10,10 @@ use crate::appearance::{Appearance, UNIT_THICKNESS};
 use crate::design::{Design, DesignError, MATERIALS, Picture};
 use crate::mesh_io::{MeshError, TriangleMesh, read_mesh};
 use crate::mesh_placement::{MeshPlacement, PlacementError, UpAxis, place_mesh, place_scene};
-use crate::mission::{LocalisationChoice, MissionError, MissionSettings, PaintingTask};
+use crate::mission::{MissionError, MissionSettings, PaintingTask};
 use crate::mission_paint::{MissionPaint, absolute, file_of_design};
 use crate::region::{Region, RegionError, Scene};
-use crate::scan_flight::{self, ScanFlight, ScanFlightError, save as save_scan_flight, save_map, surveyed_map};
+use crate::scan_flight::{self, ScanFlight, ScanFlightError, save as save_scan_flight};
 use crate::world::rock_wall;
 
 /// Thickness of an even coat, metres: what paint is thicker does not show.
@@ -212,22 +212,16 @@ impl MissionFile {
     /// Reads the surface and scans it if asked to.
     fn place(&self, folder: &Path) -> Result<Place, MissionFileError> {
         let (name, scene) = self.read_surface()?;
-        let MissionSettings { seed, threads, localisation, .. } = self.settings;
-        let failed = |source| MissionFileError::Scan { surface: self.mesh_prefix(), source };
-        let map = folder.join(scan_flight::MAP_FILE);
         if !self.scan {
-            let found_by_mesh = localisation == LocalisationChoice::Slam;
-            if found_by_mesh {
-                let surveyed = surveyed_map(&scene.canvas, threads).map_err(failed)?;
-                save_map(&surveyed, &map).map_err(|source| self.in_mesh(source))?;
-            }
-            return Ok(Place { name, scene, truth: None, map: found_by_mesh.then_some(map) });
+            return Ok(Place { name, scene, truth: None, map: None });
         }
         if self.region.is_some() {
             return Err(MissionFileError::RegionBeforeScan);
         }
-        let scan_flight = ScanFlight::fly(&scene.canvas, seed, threads).map_err(failed)?;
+        let scan_flight = ScanFlight::fly(&scene.canvas, self.settings.seed, self.settings.threads)
+            .map_err(|source| MissionFileError::Scan { surface: self.mesh_prefix(), source })?;
         save_scan_flight(&scan_flight, folder).map_err(|source| self.in_mesh(source))?;
+        let map = folder.join(scan_flight::MAP_FILE);
         Ok(Place { name, scene: Scene::whole(scan_flight.mesh), truth: Some(scene.canvas), map: Some(map) })
     }
 

@@ -7,10 +7,8 @@ mod fly;
 mod localiser;
 mod output;
 pub(crate) mod route;
-mod surveyed;
 
 pub use error::ScanFlightError;
 pub use evaluation::ScanFlightFigures;
 pub use fly::ScanFlight;
-pub use output::{MAP_FILE, save, save_map};
-pub use surveyed::surveyed_map;
+pub use output::{MAP_FILE, save};

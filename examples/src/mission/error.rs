@@ -55,7 +55,7 @@ pub enum MissionError {
     #[error("simulation: {0}")]
     Simulation(#[from] paint_sim::Error),
     /// The robot shall find itself in a map, and there is none.
-    #[error("localisation by slam needs a map of the surface")]
+    #[error("localisation by slam needs a map of the surface: let the robot scan it first (--scan)")]
     NoMap,
     /// The map cannot be read, or odometry and map refuse.
     #[error("localisation: {0}")]

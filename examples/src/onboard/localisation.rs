@@ -11,6 +11,11 @@ use tsdf_hash::{ColourView, DepthView};
 use vio_ekf::fusion::{AidedPose, MapAidedSettings, MapAidedVio, PoseMeasurement};
 use vio_ekf::{Camera, ImageView, Imu, Stamp};
 
+/// A frame that does not fix its pose shows what is expected if at least so much of it is on the map and agrees, and if what it does fix is
+/// within so many metres of what is expected.
+const SHOWN: f64 = 0.9;
+const NEAR: f64 = 0.02;
+
 /// Why the robot does not know where it is.
 #[derive(Debug, thiserror::Error)]
 pub enum LocalisationError {
@@ -117,7 +122,8 @@ impl OnboardLocalisation {
         Ok(self.aided.image(stamp, image)?)
     }
 
-    /// A depth image, as late at most, with what [`pose`](Self::pose) said when it was taken.
+    /// A depth image, as late at most, with what [`pose`](Self::pose) said when it was taken. Shape alone is compared with the map: the robot
+    /// changes how the surface looks.
     ///
     /// # Errors
     /// What map and odometry refuse.
@@ -125,16 +131,25 @@ impl OnboardLocalisation {
         &mut self,
         stamp: Stamp,
         depth: &DepthView,
-        colour: &ColourView,
         expected: Option<&AidedPose>,
     ) -> Result<MapUpdate, LocalisationError> {
         // While the map stands in for the odometry, its own poses are no odometry to lead the tracker by: the camera moves as before.
         let odometry = expected.filter(|expected| !expected.from_map);
         let prior = odometry.map(|expected| expected.world_from_body * self.body_from_camera);
-        let outcome = self.slam.frame(seconds(stamp), depth, Some(colour), prior.as_ref())?;
-        let tracking = outcome.tracking.filter(|tracking| tracking.is_tracked() && tracking.degenerate.is_empty());
-        let measured = tracking.and_then(|tracking| measurement(stamp, &tracking));
-        let confirmed = self.aided.map(measured.as_ref(), expected)?;
+        let outcome = self.slam.frame(seconds(stamp), depth, None, prior.as_ref())?;
+        let shown = |tracking: &TrackingOutcome| {
+            let off = prior.map_or(f64::INFINITY, |prior| {
+                (tracking.world_from_camera.translation.vector - prior.translation.vector).norm()
+            });
+            !tracking.degenerate.is_empty() && tracking.agreement.min(tracking.overlap) >= SHOWN && off <= NEAR
+        };
+        let confirmed = if outcome.tracking.as_ref().is_some_and(shown) {
+            self.aided.seen(stamp, expected)
+        } else {
+            let fixed = outcome.tracking.filter(|tracking| tracking.is_tracked() && tracking.degenerate.is_empty());
+            let measured = fixed.and_then(|tracking| measurement(stamp, &tracking));
+            self.aided.map(measured.as_ref(), expected)?
+        };
         Ok(MapUpdate { confirmed, events: outcome.events })
     }
 

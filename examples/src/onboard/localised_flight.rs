@@ -185,7 +185,7 @@ impl<'a> LocalisedFlight<'a> {
         }
         while let Some(Arriving { taken, what: (image, pose), .. }) = self.depths.pop_front_if(|depth| depth.at <= ms) {
             let views = self.camera.views(&image);
-            let update = self.onboard.depth(stamp(taken), &views.depth(), &views.colour(), pose.as_ref())?;
+            let update = self.onboard.depth(stamp(taken), &views.depth(), pose.as_ref())?;
             self.figures.depth_images += 1;
             self.figures.unconfirmed += usize::from(!update.confirmed);
         }

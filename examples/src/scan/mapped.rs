@@ -92,19 +92,19 @@ impl Scan {
                 "only {percent:.0} % of the valid pixels were fused: check --depth-scale and --noise"
             ));
         }
+        let agreement = quality.median_agreement();
+        if agreement < Quality::LEAST_AGREEMENT {
+            let percent = 100.0 * agreement;
+            return unusable(format!(
+                "only {percent:.0} % of the depth agrees with the map: check camera (--intrinsics), --depth-scale and poses"
+            ));
+        }
         if let Some(doubt) = &self.metrics.camera_doubt {
             return unusable(camera(doubt));
         }
         if let Some(scale) = self.metrics.fitting_depth_scale {
             return unusable(format!(
                 "the tracked path is not as long as the recorded one, with --depth-scale {scale:.0} it is"
-            ));
-        }
-        let agreement = quality.median_agreement();
-        if agreement < Quality::LEAST_AGREEMENT {
-            let percent = 100.0 * agreement;
-            return unusable(format!(
-                "only {percent:.0} % of the depth agrees with the map: check camera (--intrinsics), --depth-scale and poses"
             ));
         }
         Ok(())

@@ -18,7 +18,7 @@ use crate::progress::Stage;
 use crate::simulated_sensors::{FRAMES_PER_SECOND, SimulatedCamera};
 
 /// Edge of a voxel of the map, metres: below the size of a spray spot.
-pub(super) const VOXEL: f64 = 0.02;
+const VOXEL: f64 = 0.02;
 /// One image in so many is fused: neighbours see the same.
 const FUSE_EVERY: usize = 4;
 

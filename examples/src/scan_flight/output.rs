@@ -7,7 +7,6 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use paint_sim::render::{Lights, Shading};
 use paint_sim::surface::Hit;
 use paint_sim::{Camera, TriangleSurface, render};
-use tsdf_hash::slam::SlamState;
 use vio_ekf::Trajectory;
 
 use super::fly::ScanFlight;
@@ -37,19 +36,11 @@ pub fn save(scan: &ScanFlight, folder: &Path) -> Result<(), MissionError> {
     write_ply(&ply, &PlyMesh { positions, normals: None, colours: &grey, faces })
         .map_err(|source| MissionError::Unwritable { path: ply.display().to_string(), source })?;
     save_picture(scan, &folder.join("scan_flight.png"))?;
-    save_map(&scan.map, &folder.join(MAP_FILE))?;
+    let saved = scan.map.save(&folder.join(MAP_FILE), None, BTreeMap::new());
+    saved.map_err(|error| MissionError::Localisation(error.into()))?;
     check_finite(&scan.figures)?;
     let figures = serde_json::to_string_pretty(&scan.figures).map_err(ReportError::from)?;
     write("scan_flight.json", figures + "\n")
-}
-
-/// Writes a map with its keyframes.
-///
-/// # Errors
-/// A file that cannot be written.
-pub fn save_map(map: &SlamState, path: &Path) -> Result<(), MissionError> {
-    let saved = map.save(path, None, BTreeMap::new());
-    saved.map_err(|error| MissionError::Localisation(error.into()))
 }
 
 /// The map with the way that was flown (blue) and the way that was estimated (orange), from behind the robot's shoulder.

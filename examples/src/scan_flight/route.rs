@@ -10,7 +10,7 @@ use super::error::ScanFlightError;
 use crate::minimum_jerk::minimum_jerk;
 
 /// Distance of the robot from the foremost point of the surface in a scan, metres.
-pub(crate) const STAND_OFF: f64 = 1.5;
+pub(super) const STAND_OFF: f64 = 1.5;
 /// Distance between rows, metres: the camera sees twice that.
 const ROW: f64 = 0.8;
 /// The robot stays this far inside the edges, metres.

@@ -136,16 +136,6 @@ impl<'a> SimulatedCamera<'a> {
         Ok(SimulatedImage { grey, depth: frame.depth })
     }
 
-    /// What the mesh itself would show: depth without noise, and no colour.
-    ///
-    /// # Errors
-    /// A pose that is not finite.
-    pub fn exact_depth(&self, world_from_camera: &Isometry3<f64>) -> Result<SimulatedImage, Error> {
-        let black = |hit: &Hit| Shading { albedo: [0.0; 3], normal: hit.normal };
-        let depth = self.render(world_from_camera, &black)?.depth;
-        Ok(SimulatedImage { grey: vec![0; depth.len()], depth })
-    }
-
     fn render(
         &self,
         world_from_camera: &Isometry3<f64>,

@@ -140,6 +140,25 @@ fn a_wrong_camera_is_seen_by_its_residuals() {
     assert!(ran.figure("depth_agreement_median") < 0.6, "{}", ran.report);
 }
 
+/// The tracker makes do with a wrong camera: the frames agree with the map that it makes of them.
+#[test]
+fn a_wrong_camera_is_named_where_poses_are_tracked() {
+    let s = recording("tracked");
+    let ran = scan(&s, &["--poses", "tracked"]);
+    assert!(ran.ok, "{}", ran.said);
+    for wrong in ["100,100,79.5,59.5", "130,130,59.5,79.5"] {
+        let ran = scan(&s, &["--poses", "tracked", "--intrinsics", wrong]);
+        assert!(!ran.ok, "{wrong}: {}", ran.said);
+        ran.says(&["do not fit each other", "with --intrinsics "]);
+        let focal = ran.report["camera_fits_better_px"][0].as_f64().unwrap();
+        assert!((focal / CAMERA[0] - 1.0).abs() < 0.03, "{focal}");
+    }
+    // A smaller world fits as well, but not the recorded path.
+    let ran = scan(&s, &["--poses", "tracked", "--depth-scale", "1500"]);
+    assert!(!ran.ok, "{}", ran.said);
+    ran.says(&["recorded", "with --depth-scale "]);
+}
+
 #[test]
 fn a_transposed_camera_matrix_is_refused() {
     let s = Scratch::new("transposed");

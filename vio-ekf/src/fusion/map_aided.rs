@@ -220,6 +220,17 @@ impl MapAidedVio {
         Ok(expected.is_some())
     }
 
+    /// Takes that the map shows what is expected of a moment, without fixing all of the pose: before a plane, say. That confirms the odometry as
+    /// long as it knows its position well enough by itself. Returns whether it does.
+    pub fn seen(&mut self, stamp: Stamp, expected: Option<&AidedPose>) -> bool {
+        self.last = None;
+        let confirms = self.recovering.is_none() && expected.is_some_and(|expected| expected.source == self.source);
+        if confirms {
+            self.confirmed = Some(stamp);
+        }
+        confirms
+    }
+
     /// Where the body is now; `None` before the start, and where nothing recent says so.
     pub fn pose(&self, now: Stamp) -> Option<AidedPose> {
         let Self { settings, source, .. } = self;

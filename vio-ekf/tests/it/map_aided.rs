@@ -87,6 +87,25 @@ fn what_the_map_confirms_is_trusted_until_it_says_nothing() {
 }
 
 #[test]
+fn what_the_map_shows_without_fixing_it_is_trusted_as_long_as_the_odometry_knows_its_place() {
+    let mut scene = Scene::started();
+    assert!(scene.map(0.0) && scene.map(0.0));
+    let mut trusted = 0;
+    for _ in 0..100 {
+        scene.sense(POSE, true);
+        let expected = scene.vio.pose(at(scene.now));
+        assert!(scene.vio.seen(at(scene.now), expected.as_ref()));
+        trusted += usize::from(scene.pose().trusted);
+        assert!(!scene.pose().trusted || scene.pose().position_sigma_m <= 0.01);
+    }
+    assert!((2..90).contains(&trusted), "{trusted}");
+    // What was expected of another source says nothing.
+    assert!(!scene.map(0.05), "5 cm off");
+    let held = scene.vio.pose(at(scene.now));
+    assert!(!scene.vio.seen(at(scene.now), held.as_ref()));
+}
+
+#[test]
 fn a_contradiction_ends_the_odometry_which_is_trusted_again_after_ten_confirmations() {
     let mut scene = Scene::started();
     assert!(scene.map(0.0) && scene.map(0.0));
