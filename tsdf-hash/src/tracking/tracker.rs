@@ -278,8 +278,9 @@ impl Tracker {
         let coverage = (cell * f64::from(last.in_view) / measured.max(1) as f64).min(1.0);
         let scatter = scatter(view, comparison, reduction * f64::from(search.scales.depth));
         let partners = last.partners > 0;
-        // The search looks at distances alone: where there is colour, intensities know better.
-        let searches = prior.covariance.is_none() && !comparison.photometric && !self.settles;
+        // The search looks at distances alone: where there is colour, intensities know better. Without steps a pose is to be judged, not moved.
+        let fixed = self.settings.iterations == [0; 3];
+        let searches = prior.covariance.is_none() && !comparison.photometric && !self.settles && !fixed;
         let found = Observation { comparison, view, scatter, searches }.observe(search, last).filter(|_| partners);
         let Some(Observed { last, directions, unknown }) = found else {
             return TrackingOutcome { overlap, coverage, agreement, ..lost(prior, TrackingStatus::NoOverlap) };
