@@ -24,6 +24,8 @@ use crate::simulated_sensors::{PaintedFront, SEEN, SimulatedCamera};
 const STAND_OFF: f64 = 1.0;
 /// Seconds between two pictures.
 const BETWEEN: f64 = 0.5;
+/// With fewer bare texels light and exposure are taken for unchanged.
+const LEAST_BARE: usize = 500;
 /// The pan-tilt unit looks ahead and does nothing.
 const GUN: f64 = 0.3;
 
@@ -46,7 +48,8 @@ pub(super) fn look(
     // The camera's exposure is set by a white patch, so that its light is the reflectance.
     let light: Vec<f64> = before.light().iter().flatten().map(|texel| texel.log.exp()).collect();
     let ground = light.iter().sum::<f64>() / light.len().max(1) as f64;
-    let told = estimate_film(&before, &after, bare, &GreyPaint::at(&paint, SEEN), ground)?;
+    let enough = bare.iter().filter(|bare| **bare).count() >= LEAST_BARE;
+    let told = estimate_film(&before, &after, enough.then_some(bare), &GreyPaint::at(&paint, SEEN), ground)?;
     let seen = told.iter().flatten().count();
     stage.done(&format!("{:.1} % of the surface seen", 100.0 * seen as f64 / told.len().max(1) as f64));
     Ok(told)

@@ -186,11 +186,15 @@ fn the_film_is_told_from_pictures_in_low_sun() {
     let sun_moved = lights(Vector3::new(-0.7, 0.8, 0.35));
     for (name, lights, most) in [("same sun", low, 0.1), ("later", sun_moved, 0.15)] {
         let after = Scene { film: &film, lights, exposure: 0.7, seed: 900, ..scene }.mosaic(&texels);
-        let told = estimate_film(&before, &after, &bare, &paint, GROUND).unwrap();
+        let told = estimate_film(&before, &after, Some(&bare), &paint, GROUND).unwrap();
         let (error, share, bare_most) = judge(&film, &bare, &told);
         println!("{name}: error {error:.4}, told {share:.4}, bare {:.2} um", 1e6 * bare_most);
         assert!(error <= most && share > 0.9, "{name}: {error} {share}");
     }
+    // Where nothing stayed bare, the light has to be the same.
+    let after = Scene { film: &film, seed: 900, ..scene }.mosaic(&texels);
+    let (error, ..) = judge(&film, &bare, &estimate_film(&before, &after, None, &paint, GROUND).unwrap());
+    assert!(error <= 0.1, "{error}");
 }
 
 #[test]
@@ -200,9 +204,9 @@ fn what_cannot_be_told_is_refused() {
     let paint = GreyPaint::at(&PaintName::Charcoal.paint(UNIT).unwrap(), 550.0);
     let unseen = Mosaic::new(texels.clone());
     let bare = vec![true; texels.len()];
-    let error = estimate_film(&unseen, &unseen, &bare, &paint, GROUND).unwrap_err();
+    let error = estimate_film(&unseen, &unseen, Some(&bare), &paint, GROUND).unwrap_err();
     assert!(matches!(error, Error::WrongLength { found: 0, .. }), "{error}");
-    let short = estimate_film(&unseen, &Mosaic::new(texels[1..].to_vec()), &bare, &paint, GROUND).unwrap_err();
+    let short = estimate_film(&unseen, &Mosaic::new(texels[1..].to_vec()), Some(&bare), &paint, GROUND).unwrap_err();
     assert!(short.to_string().contains("texels of the mosaic after"), "{short}");
     let camera =
         Camera::looking_at(&Point3::new(-1.0, 0.0, 0.4), &Point3::new(0.0, 0.0, 0.4), &Vector3::z(), 1.0, (4, 3))

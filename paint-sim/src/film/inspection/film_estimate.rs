@@ -56,7 +56,8 @@ pub struct FilmEstimate {
 
 /// The film on every texel that both mosaics have seen and that would show it; `None` of the others.
 ///
-/// `bare` names texels that no paint was meant for: their change is the light's, and the light is smooth. `ground` is the mean reflectance
+/// `bare` names texels that no paint was meant for: their change is the light's, and the light is smooth. `None`: light and exposure were the
+/// same in both. `ground` is the mean reflectance
 /// of the bare surface at the camera's wavelength; its texture is taken from the pictures.
 ///
 /// # Errors
@@ -65,12 +66,13 @@ pub struct FilmEstimate {
 pub fn estimate_film(
     before: &Mosaic,
     after: &Mosaic,
-    bare: &[bool],
+    bare: Option<&[bool]>,
     paint: &GreyPaint,
     ground: f64,
 ) -> Result<Vec<Option<FilmEstimate>>, Error> {
     let texels = before.texels();
-    for (what, length) in [("texels of the mosaic after", after.texels().len()), ("list of bare texels", bare.len())] {
+    let listed = bare.map_or(texels.len(), <[bool]>::len);
+    for (what, length) in [("texels of the mosaic after", after.texels().len()), ("list of bare texels", listed)] {
         if length != texels.len() {
             return Err(Error::WrongLength { what, expected: texels.len(), found: length });
         }
@@ -93,7 +95,7 @@ pub fn estimate_film(
         })
     };
     let scene = all(&|[before, _]| before.log, &|_| true)?;
-    let change = all(&|[before, after]| after.log - before.log, &|k| bare[k])?;
+    let change = bare.map(|bare| all(&|[before, after]| after.log - before.log, &|k| bare[k])).transpose()?;
     // Against the mean of the surface; a fit of logarithms is below it where the ground is mottled.
     let against_scene = |k: usize| Some((seen[k]?[0].log - scene.log(&texels[k])).exp());
     let mottles: Vec<f64> = (0..texels.len()).filter_map(against_scene).collect();
@@ -101,7 +103,8 @@ pub fn estimate_film(
     let film = |k: usize| {
         let [before, after] = seen[k].as_ref()?;
         let ground = (ground * against_scene(k)? / mean).clamp(GROUND[0], GROUND[1]);
-        let ratio = (after.log - before.log - change.log(&texels[k])).exp();
+        let light = change.as_ref().map_or(0.0, |change| change.log(&texels[k]));
+        let ratio = (after.log - before.log - light).exp();
         let sigma = ground * ratio * before.sigma.hypot(after.sigma);
         film_of(paint, ground, ground * ratio, sigma)
     };
