@@ -6,6 +6,7 @@ mod decide;
 mod dose_correction;
 mod error;
 mod figures;
+mod flight_sensors;
 mod fly;
 mod footprints;
 mod inspect;

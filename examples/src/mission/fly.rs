@@ -1,6 +1,5 @@
 //! Flying it, and what the paint does meanwhile.
 
-use nalgebra::Vector3;
 use paint_planner::Plan;
 use paint_planner::mission::Route;
 use paint_sim::flight::FlightLog;
@@ -8,16 +7,15 @@ use paint_sim::flight::{Faults, Interlock, Localisation, PoseSource, Valve};
 use paint_sim::{Film, FlightSettings, TriangleSurface};
 
 use super::error::MissionError;
+use super::flight_sensors::{camera_before, localised_flight};
 use super::nozzle::spray_model;
 use super::painting_task::PaintingTask;
 use super::plan::Planned;
 use super::settings::{LocalisationChoice, MissionSettings};
 use super::simulated_flight::{flight_settings, fly_plan};
 use crate::adapters::Robot;
-use crate::appearance::UNIT_THICKNESS;
-use crate::onboard::{LocalisationFigures, LocalisedFlight, read_map};
+use crate::onboard::{LocalisationFigures, LocalisedFlight};
 use crate::progress::Stage;
-use crate::simulated_sensors::{PaintedFront, SimulatedCamera};
 
 /// Motion of the nozzle that one shot stands for, metres: widens the spot by less than a percent.
 pub(super) const SHOT_STEP: f64 = 0.01;
@@ -76,18 +74,8 @@ fn onboard<'a, 'b>(
     if task.settings.localisation != LocalisationChoice::Slam {
         return Ok(None);
     }
-    let map = read_map(task.map().ok_or(MissionError::NoMap)?)?;
-    let PaintingTask { settings, .. } = task;
-    // Surfaces are turned so that they face the robot.
-    let towards = Vector3::x_axis();
-    let paint = settings.paint.paint(UNIT_THICKNESS)?;
-    let mut painted = PaintedFront::new(task.met(), &towards, spray_model(settings), &paint)?;
-    for earlier in before {
-        painted.spray(&earlier.flight.shots(SHOT_STEP), task.met(), settings.threads)?;
-    }
-    // The same light and stone as in the scan, other noise.
-    let camera = SimulatedCamera::new(task.met(), towards.into_inner(), settings.seed, settings.threads);
-    Ok(Some(LocalisedFlight::new(camera.before(painted), map, settings.seed)?))
+    let camera = camera_before(task, before.map(|layer| &layer.flight))?;
+    localised_flight(task, camera, 0).map(Some)
 }
 
 /// Puts the paint of flights onto the texels; returns the film and the pixel of each of its texels.

@@ -1,6 +1,6 @@
 //! Looking at the painted surface from a flight along it: the film on every texel, by pictures from before and after.
 
-use nalgebra::Vector3;
+use nalgebra::Point3;
 use paint_sim::colour::decode_srgb8;
 use paint_sim::film::inspection::{FilmEstimate, GreyPaint, Mosaic, Picture, estimate_film};
 use paint_sim::flight::{
@@ -10,15 +10,14 @@ use paint_sim::flight::{
 use paint_sim::{Error, FlightSettings, TriangleSurface};
 
 use super::error::MissionError;
-use super::fly::{LayerFlight, SHOT_STEP, localisation_noise};
-use super::nozzle::spray_model;
+use super::flight_sensors::{camera_before, localised_flight};
+use super::fly::{LayerFlight, localisation_noise};
 use super::painting_task::PaintingTask;
 use super::settings::LocalisationChoice;
 use crate::appearance::UNIT_THICKNESS;
-use crate::onboard::{LocalisedFlight, read_map};
 use crate::progress::Stage;
 use crate::scan_flight::route::along;
-use crate::simulated_sensors::{PaintedFront, SEEN, SimulatedCamera};
+use crate::simulated_sensors::{SEEN, SimulatedCamera};
 
 /// Distance of the robot from the foremost point of the surface, metres: near, as an error of its attitude shifts what it sees.
 const STAND_OFF: f64 = 1.0;
@@ -26,7 +25,7 @@ const STAND_OFF: f64 = 1.0;
 const BETWEEN: f64 = 0.5;
 /// With fewer bare texels light and exposure are taken for unchanged.
 const LEAST_BARE: usize = 500;
-/// The pan-tilt unit looks ahead and does nothing.
+/// Length of the gun, metres: it points ahead and does nothing.
 const GUN: f64 = 0.3;
 
 /// The film that flights have left on texels, as the robot sees it; `bare` are texels that no paint was meant for.
@@ -36,15 +35,10 @@ pub(super) fn look(
     bare: &[bool],
 ) -> Result<Vec<Option<FilmEstimate>>, MissionError> {
     let stage = Stage::start("look");
-    let threads = task.settings.threads;
     let paint = task.settings.paint.paint(UNIT_THICKNESS)?;
-    let unpainted = PaintedFront::new(task.met(), &Vector3::x_axis(), spray_model(&task.settings), &paint)?;
-    let mut painted = unpainted.clone();
-    let shots: Vec<_> = flights.iter().flat_map(|f| f.flight.shots(SHOT_STEP)).collect();
-    painted.spray(&shots, task.met(), threads)?;
-    let before = photograph(task, &unpainted, 1)?;
+    let before = photograph(task, camera_before(task, std::iter::empty())?, 1)?;
     stage.share(0.5);
-    let after = photograph(task, &painted, 2)?;
+    let after = photograph(task, camera_before(task, flights.iter().map(|layer| &layer.flight))?, 2)?;
     // The camera's exposure is set by a white patch, so that its light is the reflectance.
     let light: Vec<f64> = before.light().iter().flatten().map(|texel| texel.log.exp()).collect();
     let ground = light.iter().sum::<f64>() / light.len().max(1) as f64;
@@ -56,17 +50,14 @@ pub(super) fn look(
 }
 
 /// Flies along the surface and takes pictures; places are where the robot takes itself to be.
-fn photograph(task: &PaintingTask, paint: &PaintedFront, flight: u64) -> Result<Mosaic, MissionError> {
+fn photograph(task: &PaintingTask, camera: SimulatedCamera, flight: u64) -> Result<Mosaic, MissionError> {
     let PaintingTask { settings, surface, .. } = task;
     let seed = settings.seed.wrapping_mul(0x9E37_79B9).wrapping_add(0x100 + flight);
-    let camera = |seed| SimulatedCamera::new(task.met(), Vector3::x(), seed, settings.threads).before(paint.clone());
     let usual = FlightSettings { seed, ..FlightSettings::default() };
     let mut sensor = PoseSensor::new(localisation_noise(settings, usual.localisation), 0.01, seed);
-    let mut onboard = match (settings.localisation, task.map()) {
-        (LocalisationChoice::Slam, Some(map)) => {
-            Some(LocalisedFlight::new(camera(settings.seed), read_map(map)?, settings.seed.wrapping_add(flight))?)
-        }
-        _ => None,
+    let mut onboard = match settings.localisation {
+        LocalisationChoice::Slam => Some(localised_flight(task, camera.clone(), flight)?),
+        LocalisationChoice::MotionCapture | LocalisationChoice::Noise => None,
     };
     let inner: &mut dyn PoseSource = match &mut onboard {
         Some(onboard) => onboard,
@@ -74,17 +65,11 @@ fn photograph(task: &PaintingTask, paint: &PaintedFront, flight: u64) -> Result<
     };
     // The robot knows the surface that it plans on.
     let mosaic = Mosaic::new(surface.film_texels().0);
-    let mut photographer = Photographer {
-        inner,
-        camera: camera(settings.seed),
-        known: &surface.world,
-        mosaic,
-        taken: 0,
-        threads: settings.threads,
-    };
+    let mut photographer =
+        Photographer { inner, camera, known: &surface.world, mosaic, taken: 0, threads: settings.threads };
     let route = along(task.met(), &surface.facing(), STAND_OFF).map_err(MissionError::Look)?;
     let mut controller = CascadedController::new(usual.airframe, ControllerSettings::default());
-    let mut gun = IdealPanTilt::new(nalgebra::Point3::origin(), GUN, [0.8; 2])?;
+    let mut gun = IdealPanTilt::new(Point3::origin(), GUN, [0.8; 2])?;
     fly_localised(&route, &mut controller, &mut gun, task.met(), &mut photographer, &usual)?;
     Ok(photographer.mosaic)
 }

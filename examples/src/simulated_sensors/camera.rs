@@ -24,6 +24,7 @@ const DEPTH_NOISE: [f64; 2] = [0.0012, 0.0019];
 const TEXTURE_OCTAVES: [(f64, f64); 5] = [(0.35, 0.25), (0.12, 0.25), (0.05, 0.3), (0.025, 0.25), (0.012, 0.15)];
 
 /// The robot's camera, with the depth of every pixel, before a surface.
+#[derive(Clone)]
 pub struct SimulatedCamera<'a> {
     /// Lens, and place on the body.
     pub camera: Camera,

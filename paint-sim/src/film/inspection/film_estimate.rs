@@ -57,8 +57,7 @@ pub struct FilmEstimate {
 /// The film on every texel that both mosaics have seen and that would show it; `None` of the others.
 ///
 /// `bare` names texels that no paint was meant for: their change is the light's, and the light is smooth. `None`: light and exposure were the
-/// same in both. `ground` is the mean reflectance
-/// of the bare surface at the camera's wavelength; its texture is taken from the pictures.
+/// same in both. `ground` is the mean reflectance of the bare surface at the camera's wavelength; its texture is taken from the pictures.
 ///
 /// # Errors
 /// Mosaics or a list of other lengths, a ground outside its range, a paint with numbers that are not finite or negative, too few bare texels
@@ -83,19 +82,21 @@ pub fn estimate_film(
 
     let seen: Vec<Option<[TexelLight; 2]>> =
         before.light().into_iter().zip(after.light()).map(|(a, b)| Some([a?, b?])).collect();
-    let all = |value: &dyn Fn(&[TexelLight; 2]) -> f64, wanted: &dyn Fn(usize) -> bool| {
+    let fit = |what, value: &dyn Fn(&[TexelLight; 2]) -> f64, wanted: &dyn Fn(usize) -> bool| {
         let observed: Vec<(&Texel, f64)> = (0..texels.len())
             .filter(|&k| wanted(k))
             .filter_map(|k| Some((&texels[k], value(seen[k].as_ref()?))))
             .collect();
         Lighting::fit(texels, &observed).ok_or(Error::WrongLength {
-            what: "bare texels that both mosaics show",
+            what,
             expected: Lighting::LEAST,
             found: observed.len(),
         })
     };
-    let scene = all(&|[before, _]| before.log, &|_| true)?;
-    let change = bare.map(|bare| all(&|[before, after]| after.log - before.log, &|k| bare[k])).transpose()?;
+    let scene = fit("texels that both mosaics show", &|[before, _]| before.log, &|_| true)?;
+    let change = bare
+        .map(|bare| fit("bare texels that both mosaics show", &|[before, after]| after.log - before.log, &|k| bare[k]))
+        .transpose()?;
     // Against the mean of the surface; a fit of logarithms is below it where the ground is mottled.
     let against_scene = |k: usize| Some((seen[k]?[0].log - scene.log(&texels[k])).exp());
     let mottles: Vec<f64> = (0..texels.len()).filter_map(against_scene).collect();

@@ -30,7 +30,7 @@ pub struct Picture<'a> {
 pub struct TexelLight {
     /// Natural logarithm of the linear light as the middle of the picture would show it.
     pub log: f64,
-    /// Its standard deviation.
+    /// Its standard deviation by the noise of the pictures; 0 where no texel of the mosaic was seen more than a few times.
     pub sigma: f64,
 }
 
