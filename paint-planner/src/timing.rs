@@ -33,7 +33,7 @@ pub(crate) struct TimedTrajectory {
     pub(crate) deviation: f64,
     /// Final global stretch factor.
     pub(crate) stretch: f64,
-    /// Time that no time law along the path takes less than, s; the duration where the polynomials keep their own.
+    /// Time of the fastest law along the path, its acceleration free to jump, s; the duration where the polynomials keep their own.
     pub(crate) time_bound: f64,
 }
 

@@ -4,12 +4,11 @@ use nalgebra::Vector3;
 use paint_sim::flight::FlightLog;
 
 use super::error::MissionError;
-use super::fly::SHOT_STEP;
 use super::nozzle::spray_model;
 use super::painting_task::PaintingTask;
 use crate::appearance::UNIT_THICKNESS;
 use crate::onboard::{LocalisedFlight, read_map};
-use crate::simulated_sensors::{PaintedFront, SimulatedCamera};
+use crate::simulated_sensors::{PaintedFront, SHOT_STEP, SimulatedCamera};
 
 /// The camera before the true surface with the paint of flights on it. Surfaces are turned so that they face the robot, which is at smaller x.
 pub(super) fn camera_before<'a, 'b>(

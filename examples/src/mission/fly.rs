@@ -16,9 +16,7 @@ use super::simulated_flight::{flight_settings, fly_plan};
 use crate::adapters::Robot;
 use crate::onboard::{LocalisationFigures, LocalisedFlight};
 use crate::progress::Stage;
-
-/// Motion of the nozzle that one shot stands for, metres: widens the spot by less than a percent.
-pub(super) const SHOT_STEP: f64 = 0.01;
+use crate::simulated_sensors::SHOT_STEP;
 
 /// One layer of paint, decided, planned and flown.
 pub struct LayerFlight {

@@ -5,12 +5,12 @@ use paint_planner::mission::upright_steps;
 use paint_sim::Film;
 
 use super::error::MissionError;
-use super::fly::SHOT_STEP;
 use super::nozzle::{kernel, shot, spray_model};
 use super::painting_task::PaintingTask;
 use super::plan::layer_route;
 use super::run::Mission;
 use crate::appearance::UNIT_THICKNESS;
+use crate::simulated_sensors::SHOT_STEP;
 
 /// Half the width of the band about the seams, metres.
 const BAND: f64 = 0.03;

@@ -11,8 +11,8 @@ const TEXEL: f64 = 0.01;
 const MOST_TEXELS: f64 = 1e6;
 /// A texel seen at a flatter angle than this cosine stands for no more surface.
 const FLATTEST: f64 = 0.1;
-/// Motion of the nozzle that one shot stands for, metres.
-const SHOT_STEP: f64 = 0.01;
+/// Motion of the nozzle that one shot stands for, metres: widens the spot by less than a percent.
+pub const SHOT_STEP: f64 = 0.01;
 /// Wavelength that the camera sees, nanometres: the middle of a silicon sensor's band behind an infrared filter.
 pub const SEEN: f64 = 550.0;
 

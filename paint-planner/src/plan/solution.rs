@@ -46,7 +46,7 @@ pub struct PlanReport {
     /// Factor by which all times were stretched in the end to meet the limits; with gradient-preserving timing the
     /// factor k of thesis section 7.5, else 1.
     pub stretch: f64,
-    /// Lower bound of the time along the same path within the same limits, s: the acceleration may jump (TOPP-RA).
+    /// Time of the fastest law along the same path within the same limits, s: the acceleration may jump (TOPP-RA on pieces of 12.5 ms).
     pub time_bound: f64,
     /// Greatest distance between the trajectory and a waypoint at its time, m.
     pub path_deviation: f64,

@@ -41,7 +41,7 @@ pub(super) struct Retimed {
     pub(super) trajectory: Trajectory,
     /// Certified to a thousandth.
     pub(super) extrema: Extrema,
-    /// No time law takes less, s.
+    /// Time of the fastest law, its acceleration free to jump, s.
     pub(super) bound: f64,
     /// Where its segments begin and the last one ends in the path's own time, s.
     begins: Vec<f64>,
@@ -195,7 +195,8 @@ fn fastest(span: &[Piece]) -> Vec<Segment> {
     }
 }
 
-/// The time of the fastest law along a span on finer pieces, its acceleration free to jump (TOPP-RA): none takes less, s.
+/// The time of the fastest law along a span on finer pieces, its acceleration free to jump (TOPP-RA), s: a lower bound as far as these pieces are
+/// fine, and as none flies faster than [`GREATEST_RATE`].
 fn time_bound(span: &[Piece], settings: &TimingSettings) -> f64 {
     let fine: Vec<Piece> = span.iter().flat_map(|piece| piece.finer(settings)).collect();
     let caps: Vec<f64> = fine.iter().map(|piece| piece.slowness.powi(-2)).collect();
