@@ -24,7 +24,6 @@ pub use arguments::{Arguments, AutopilotChoice};
 pub use error::RobotError;
 pub use fault::{Fault, FaultKind};
 pub use flight::{Flown, Scene, fly_px4};
-pub use guidance::Guidance;
 pub use on_board::{Commanded, OnBoard, OnBoardSettings, SetpointKind};
 pub use phase::Phase;
 pub use recorder::Record;

@@ -1,9 +1,9 @@
 //! The way from where the robot finds itself to where its plan begins.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use paint_sim::flight::{FlightLog, Reference, ReferenceState};
 
-use crate::minimum_jerk::minimum_jerk;
+use crate::minimum_jerk::StraightWay;
 
 /// The robot stands back by so much, m: about as far as it was from the surface when it scanned it, so that the keyframes show what it sees.
 const BACK: f64 = 0.9;
@@ -44,22 +44,16 @@ impl Reference for Approach<'_> {
         }
         let first = self.plan.at(0.0);
         let ahead = Vector3::new(first.heading.cos(), first.heading.sin(), 0.0);
-        let [share, speed, acceleration] = minimum_jerk(t / DURATION);
-        ReferenceState {
-            position: Point3::from(first.position.coords - ahead * (BACK * (1.0 - share))),
-            velocity: ahead * (BACK * speed / DURATION),
-            acceleration: ahead * (BACK * acceleration / (DURATION * DURATION)),
-            heading_rate: 0.0,
-            aim: None,
-            flow: 0.0,
-            ..first
-        }
+        let back = first.position - ahead * BACK;
+        let way = StraightWay { ends: [back, first.position], heading: [first.heading; 2], duration: DURATION };
+        way.at(t, first.lever)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Point3;
 
     /// Flies along y at constant speed, painting.
     struct Line;

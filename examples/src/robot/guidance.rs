@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use paint_sim::flight::{Reference, ReferenceState};
 
-use crate::minimum_jerk::minimum_jerk;
+use crate::minimum_jerk::StraightWay;
 
 /// Mean speed of a way, m/s.
 const SPEED: f64 = 0.5;
@@ -12,19 +12,13 @@ const TURN_RATE: f64 = 0.5;
 
 /// What is followed now.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Guidance {
+pub(super) enum Guidance {
     /// A straight way at rest at both ends, with the least jerk.
     Way {
-        /// From where.
-        from: Point3<f64>,
-        /// To where.
-        to: Point3<f64>,
-        /// Headings at both ends, rad; the second within half a turn of the first.
-        heading: [f64; 2],
+        /// The way.
+        way: StraightWay,
         /// When it begins, s.
         start: f64,
-        /// How long it takes, s.
-        duration: f64,
     },
     /// The plan, `offset` seconds later than it says.
     Plan {
@@ -35,43 +29,31 @@ pub enum Guidance {
 
 impl Guidance {
     /// A way at the usual speed.
-    pub fn way(from: Point3<f64>, from_heading: f64, to: Point3<f64>, to_heading: f64, start: f64) -> Self {
+    pub(super) fn way(from: Point3<f64>, from_heading: f64, to: Point3<f64>, to_heading: f64, start: f64) -> Self {
         let turn = to_heading - from_heading;
         let turn = turn.sin().atan2(turn.cos());
         let duration = ((to - from).norm() / SPEED).max(turn.abs() / TURN_RATE).max(1.0);
-        Self::Way { from, to, heading: [from_heading, from_heading + turn], start, duration }
+        Self::Way {
+            way: StraightWay { ends: [from, to], heading: [from_heading, from_heading + turn], duration },
+            start,
+        }
     }
 
     /// To stay.
-    pub fn stay(at: Point3<f64>, heading: f64, now: f64) -> Self {
-        Self::Way { from: at, to: at, heading: [heading; 2], start: now, duration: 1.0 }
+    pub(super) fn stay(at: Point3<f64>, heading: f64, now: f64) -> Self {
+        Self::Way { way: StraightWay { ends: [at; 2], heading: [heading; 2], duration: 1.0 }, start: now }
     }
 
     /// Whether a way has been at its end for `rest` seconds.
-    pub fn arrived(&self, now: f64, rest: f64) -> bool {
-        matches!(self, Self::Way { start, duration, .. } if now >= start + duration + rest)
+    pub(super) fn arrived(&self, now: f64, rest: f64) -> bool {
+        matches!(self, Self::Way { way, start } if now >= start + way.duration + rest)
     }
 
     /// The state at a time. `lever` of a way, see [`ReferenceState::lever`].
-    pub fn at(&self, now: f64, plan: &dyn Reference, lever: Vector3<f64>) -> ReferenceState {
+    pub(super) fn at(&self, now: f64, plan: &dyn Reference, lever: Vector3<f64>) -> ReferenceState {
         match *self {
             Self::Plan { offset } => plan.at(now - offset),
-            Self::Way { from, to, heading, start, duration } => {
-                let [place, speed, acceleration] = minimum_jerk((now - start) / duration);
-                let (speed, acceleration) = (speed / duration, acceleration / (duration * duration));
-                let way = to - from;
-                ReferenceState {
-                    position: from + way * place,
-                    velocity: way * speed,
-                    acceleration: way * acceleration,
-                    heading: heading[0] + (heading[1] - heading[0]) * place,
-                    heading_rate: (heading[1] - heading[0]) * speed,
-                    lever,
-                    aim: None,
-                    nozzle_distance: 0.0,
-                    flow: 0.0,
-                }
-            }
+            Self::Way { way, start } => way.at(now - start, lever),
         }
     }
 }
