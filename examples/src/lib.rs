@@ -9,6 +9,7 @@ pub mod design;
 pub mod exit;
 #[cfg(feature = "handheld")]
 pub mod handheld;
+pub mod interruption;
 #[cfg(feature = "recordings")]
 #[cfg_attr(not(feature = "programs"), allow(dead_code, reason = "each program reads and writes some of the messages"))]
 mod mcap_messages;
@@ -32,10 +33,13 @@ pub mod region;
 pub mod report;
 #[cfg(all(feature = "robot", unix))]
 pub mod robot;
+pub mod run_folder;
 #[cfg(feature = "scan")]
 pub mod scan;
 pub mod scan_flight;
 pub mod simulated_sensors;
+#[cfg(feature = "programs")]
+pub mod socket_address;
 mod srgb;
 pub mod surface;
 pub mod textured_mesh;
@@ -47,6 +51,7 @@ pub mod vector_drawing;
 pub mod vio;
 #[cfg(feature = "vr")]
 pub mod vr;
+pub mod whole_file;
 pub mod world;
 
 /// The code in the README and in the book compiles.

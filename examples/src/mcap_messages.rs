@@ -23,6 +23,8 @@ pub(crate) enum MessagesFault {
     Unreadable(std::io::Error),
     /// It is no sound recording.
     Malformed(String),
+    /// It is one whose end is missing.
+    CutOff(String),
 }
 
 /// Streams a file's messages; memory does not grow with the file.
@@ -66,12 +68,16 @@ fn other_format(path: &Path) -> Option<String> {
 }
 
 fn broken(error: &mcap::McapError) -> MessagesFault {
-    MessagesFault::Malformed(match error {
-        mcap::McapError::UnsupportedCompression(name) => format!(
+    use mcap::McapError::{UnexpectedEoc, UnexpectedEof, UnsupportedCompression};
+    let unsound = || format!("no sound MCAP file ({error}): `mcap recover` may help");
+    match error {
+        UnsupportedCompression(name) => MessagesFault::Malformed(format!(
             "its chunks are compressed with {name}, which is not read here: rewrite it with `mcap compress --compression none`"
-        ),
-        error => format!("no sound MCAP file ({error}): `mcap recover` may help"),
-    })
+        )),
+        // The length of a chunk is written when it has ended.
+        UnexpectedEof | UnexpectedEoc => MessagesFault::CutOff(unsound()),
+        _ => MessagesFault::Malformed(unsound()),
+    }
 }
 
 /// Name of a message's schema; empty without one.

@@ -15,6 +15,7 @@ use crate::mission_paint::{MissionPaint, absolute, file_of_design};
 use crate::region::{Region, RegionError, Scene};
 use crate::scan_flight::{self, ScanFlight, ScanFlightError, save as save_scan_flight};
 use crate::world::rock_wall;
+use crate::{run_folder, whole_file};
 
 /// Thickness of an even coat, metres: what paint is thicker does not show.
 const COAT: std::ops::RangeInclusive<f64> = 0.999e-6..=60.001e-6;
@@ -188,7 +189,14 @@ impl MissionFile {
         let name = || path.display().to_string();
         let text = toml::to_string(&written)
             .map_err(|error| MissionFileError::Malformed { path: name(), why: error.to_string() })?;
-        std::fs::write(path, text).map_err(|source| MissionFileError::File { path: name(), source })
+        whole_file::write(path, text).map_err(|source| MissionFileError::File { path: name(), source })
+    }
+
+    /// Begins a run of a program in a folder, and leaves the mission there as `mission.toml`.
+    pub fn begin_run(&self, folder: &Path, program: &str) -> Result<(), MissionFileError> {
+        run_folder::begin(folder, program)
+            .map_err(|source| MissionFileError::Folder { path: folder.display().to_string(), source })?;
+        self.write_into(folder)
     }
 
     /// Makes the folder of the results and leaves the mission there as `mission.toml`.

@@ -14,6 +14,8 @@ use std::sync::Once;
 
 use plotters::style::{FontStyle, register_font};
 
+use crate::whole_file::WholeFile;
+
 pub use contact_sheet::{Tile, save_contact_sheet};
 pub use curves::{Panel, save_curves};
 pub use density::{DensityPicture, save_density};
@@ -70,9 +72,23 @@ impl Rgb {
 
     /// Writes a PNG.
     pub fn save(&self, path: &Path) -> Result<(), PictureError> {
-        image::save_buffer(path, &self.data, self.width, self.height, image::ExtendedColorType::Rgb8)
+        write_png(path, &self.data, [self.width, self.height])
             .map_err(|e| PictureError::Unwritable { path: path.display().to_string(), why: e.to_string() })
     }
+}
+
+/// Writes three bytes per pixel as a PNG.
+pub(crate) fn write_png(path: &Path, data: &[u8], [width, height]: [u32; 2]) -> image::ImageResult<()> {
+    let mut file = WholeFile::create(path)?;
+    image::write_buffer_with_format(
+        &mut file,
+        data,
+        width,
+        height,
+        image::ExtendedColorType::Rgb8,
+        image::ImageFormat::Png,
+    )?;
+    Ok(file.commit()?)
 }
 
 /// The charts' font comes with the program, so that no system font is needed.

@@ -3,8 +3,6 @@
 mod paint_traces;
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::Path;
 
 use foxglove::Encode;
@@ -18,6 +16,8 @@ use nalgebra::{Isometry3, Point3};
 pub use paint_traces::PaintStyle;
 use paint_traces::PaintTraces;
 pub(crate) use paint_traces::point;
+
+use crate::whole_file::WholeFile;
 
 /// The robot at one moment of the flight.
 #[derive(Debug, Clone, Copy)]
@@ -133,20 +133,37 @@ pub fn save_recording(
 
 /// Writes messages with Foxglove's schemas, time stamps in seconds.
 pub(crate) struct Recorder {
-    writer: mcap::Writer<BufWriter<File>>,
+    writer: mcap::Writer<WholeFile>,
     sequence: u32,
 }
 
 impl Recorder {
     pub(crate) fn create(path: &Path) -> Result<Self, RecordingError> {
-        let file = File::create(path)
-            .map_err(|source| RecordingError::Unwritable { path: path.display().to_string(), source })?;
-        let options = mcap::WriteOptions::new().compression(None).library("paintcopter");
-        Ok(Self { writer: options.create(BufWriter::new(file)).map_err(failed)?, sequence: 0 })
+        Self::new(path, WholeFile::create(path))
     }
 
-    pub(crate) fn finish(&mut self) -> Result<(), RecordingError> {
-        self.writer.finish().map(|_| ()).map_err(failed)
+    /// For what cannot be made again: as much of it as [`Recorder::flush`] has seen stays, whatever happens.
+    #[cfg(feature = "vr")]
+    pub(crate) fn create_kept(path: &Path) -> Result<Self, RecordingError> {
+        Self::new(path, WholeFile::create_kept(path))
+    }
+
+    fn new(path: &Path, file: std::io::Result<WholeFile>) -> Result<Self, RecordingError> {
+        let file = file.map_err(|source| RecordingError::Unwritable { path: path.display().to_string(), source })?;
+        let options = mcap::WriteOptions::new().compression(None).library("paintcopter");
+        Ok(Self { writer: options.create(file).map_err(failed)?, sequence: 0 })
+    }
+
+    /// Writes the index; then the file has its name.
+    pub(crate) fn finish(mut self) -> Result<(), RecordingError> {
+        self.writer.finish().map_err(failed)?;
+        self.writer.into_inner().commit().map_err(failed)
+    }
+
+    /// What was written so far can be read, even if nothing more comes.
+    #[cfg(feature = "vr")]
+    pub(crate) fn flush(&mut self) -> Result<(), RecordingError> {
+        self.writer.flush().map_err(failed)
     }
 
     pub(crate) fn channel<T: Encode>(&mut self, topic: &str) -> Result<u16, RecordingError> {

@@ -8,6 +8,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use crate::whole_file;
+
 pub use check::{Check, Requirement, Unit};
 pub use times::TimeFigures;
 
@@ -389,7 +391,7 @@ pub fn peak_resident_bytes() -> u64 {
 }
 
 fn write(path: &Path, text: &str) -> Result<(), ReportError> {
-    std::fs::write(path, text).map_err(|source| ReportError::Unwritable { path: path.display().to_string(), source })
+    whole_file::write(path, text).map_err(|source| ReportError::Unwritable { path: path.display().to_string(), source })
 }
 
 #[cfg(test)]

@@ -9,6 +9,8 @@ use gltf::binary::{Glb, Header};
 use gltf::json::validation::{Checked::Valid, USize64};
 use gltf::json::{self, Index};
 
+use crate::whole_file;
+
 /// Width of the border of a chart that takes the colour of its rim, texels: what bilinear sampling and a few levels of a mipmap
 /// reach.
 const GUTTER: usize = 8;
@@ -52,11 +54,11 @@ impl TexturedMesh<'_> {
     /// What the file system says.
     pub fn save(&self, folder: &Path, name: &str) -> io::Result<()> {
         let png = self.png()?;
-        std::fs::write(folder.join(format!("{name}_texture.png")), &png)?;
-        std::fs::write(folder.join(format!("{name}.glb")), self.glb_with(&png)?)?;
-        std::fs::write(folder.join(format!("{name}.obj")), self.obj(name))?;
-        std::fs::write(
-            folder.join(format!("{name}.mtl")),
+        whole_file::write(&folder.join(format!("{name}_texture.png")), &png)?;
+        whole_file::write(&folder.join(format!("{name}.glb")), self.glb_with(&png)?)?;
+        whole_file::write(&folder.join(format!("{name}.obj")), self.obj(name))?;
+        whole_file::write(
+            &folder.join(format!("{name}.mtl")),
             format!("newmtl paint\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd {name}_texture.png\n"),
         )
     }

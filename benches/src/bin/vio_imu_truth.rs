@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use nalgebra::{DMatrix, DVector, Vector3};
-use paintcopter::exit::exit_code;
+use paintcopter::exit::run_program;
 use paintcopter_benches::sequences::{REAL_IMU, motion, real_samples};
 use serde_json::json;
 use vio_ekf::Imu;
@@ -27,7 +27,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    exit_code("vio_imu_truth", run(&Arguments::parse()))
+    run_program("vio_imu_truth", || run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {

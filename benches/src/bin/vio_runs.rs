@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use cpu_time::ThreadTime;
 use nalgebra::{Isometry3, Matrix3, Vector3};
-use paintcopter::exit::exit_code;
+use paintcopter::exit::run_program;
 use paintcopter_benches::Rng;
 use paintcopter_benches::frames::Frames;
 use paintcopter_benches::sequences::{REAL_IMU, SEQUENCES, cameras, motion, real_samples};
@@ -70,7 +70,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    exit_code("vio_runs", run(&Arguments::parse()))
+    run_program("vio_runs", || run(&Arguments::parse()))
 }
 
 /// Squared errors in units of the claimed covariance: position, attitude, velocity, both biases.

@@ -23,6 +23,8 @@ pub enum Cause {
     ClockJumped,
     /// The battery is low.
     BatteryLow,
+    /// Whoever runs the program wants its end.
+    Interrupted,
     /// It is far from where it is told to be.
     NotFollowed,
     /// Our pose is not known well enough to paint by, or has jumped.
@@ -41,6 +43,7 @@ impl Cause {
             Self::EstimateLost => "the autopilot's estimate is lost or elsewhere",
             Self::ClockJumped => "the autopilot's stamps jump",
             Self::BatteryLow => "the battery is low",
+            Self::Interrupted => "interrupted",
             Self::NotFollowed => "the autopilot does not follow",
             Self::PoseUncertain => "the pose is uncertain",
         }
@@ -48,7 +51,12 @@ impl Cause {
 
     /// Whether the flight may go on when the cause is gone. After the others it ends.
     pub fn passes(self) -> bool {
-        !matches!(self, Self::AutopilotRestarted | Self::Disarmed | Self::BatteryLow)
+        !matches!(self, Self::AutopilotRestarted | Self::Disarmed) && !self.brings_home()
+    }
+
+    /// Whether the flight ends where it began.
+    pub fn brings_home(self) -> bool {
+        matches!(self, Self::BatteryLow | Self::Interrupted)
     }
 }
 

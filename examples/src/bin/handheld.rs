@@ -3,9 +3,9 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use paintcopter::exit::exit_code;
+use paintcopter::exit::run_program;
 use paintcopter::handheld::{Arguments, run};
 
 fn main() -> ExitCode {
-    exit_code("handheld", run(&Arguments::parse()))
+    run_program("handheld", || run(&Arguments::parse()))
 }

@@ -3,9 +3,9 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use paintcopter::exit::exit_code;
+use paintcopter::exit::run_program;
 use paintcopter::paint_image::{Arguments, run};
 
 fn main() -> ExitCode {
-    exit_code("paint-image", run(Arguments::parse()))
+    run_program("paint-image", || run(Arguments::parse()))
 }

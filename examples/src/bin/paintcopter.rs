@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use paintcopter::exit::exit_code;
+use paintcopter::exit::run_program;
+use paintcopter::interruption::Finishing;
 use paintcopter::mission::{Coats, preview, save, save_coats};
 use paintcopter::mission_arguments::MissionArguments;
 
@@ -24,13 +25,13 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    exit_code("paintcopter", run(&Arguments::parse()))
+    run_program("paintcopter", || run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let folder = &arguments.out;
     let mission_file = arguments.mission.mission_file()?;
-    mission_file.write_into(folder)?;
+    mission_file.begin_run(folder, "paintcopter")?;
     let coats = mission_file.decide_coats(folder)?;
     if arguments.preview {
         for coat in coats {
@@ -41,6 +42,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
         return Ok(());
     }
     let coats = Coats::run(coats).map_err(|error| mission_file.in_mesh(error))?;
+    // What is flown is not lost.
+    let _finishing = Finishing::begin();
     let summary = match coats.missions().next() {
         Some((_, mission)) if mission_file.paints.is_empty() => save(mission, folder)?.summary(),
         _ => save_coats(&coats, folder)?.summary(),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use paintcopter::exit::exit_code;
+use paintcopter::exit::run_program;
 use paintcopter::mission::{PlannedMission, save_plan};
 use paintcopter::mission_arguments::MissionArguments;
 
@@ -25,13 +25,13 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    exit_code("plan", run(&Arguments::parse()))
+    run_program("plan", || run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let folder = &arguments.out;
     let mission_file = arguments.mission.mission_file()?;
-    mission_file.write_into(folder)?;
+    mission_file.begin_run(folder, "plan")?;
     for coat in mission_file.decide_coats(folder)? {
         let mission = PlannedMission::new(coat.task).map_err(|error| mission_file.in_mesh(error))?;
         let figures = save_plan(&mission, &coat.folder)?;

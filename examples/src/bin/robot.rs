@@ -3,9 +3,9 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use paintcopter::exit::exit_code;
+use paintcopter::exit::run_program;
 use paintcopter::robot::{Arguments, run};
 
 fn main() -> ExitCode {
-    exit_code("robot", run(&Arguments::parse()))
+    run_program("robot", || run(&Arguments::parse()))
 }

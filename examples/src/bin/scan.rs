@@ -3,9 +3,9 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use paintcopter::exit::exit_code;
+use paintcopter::exit::run_program;
 use paintcopter::scan::{Arguments, execute};
 
 fn main() -> ExitCode {
-    exit_code("scan", execute(&Arguments::parse()))
+    run_program("scan", || execute(&Arguments::parse()))
 }

@@ -3,9 +3,9 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use paintcopter::exit::exit_code;
+use paintcopter::exit::run_program;
 use paintcopter::unwrap::{Arguments, run};
 
 fn main() -> ExitCode {
-    exit_code("unwrap", run(&Arguments::parse()))
+    run_program("unwrap", || run(&Arguments::parse()))
 }

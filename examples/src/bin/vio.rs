@@ -3,9 +3,9 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use paintcopter::exit::exit_code;
+use paintcopter::exit::run_program;
 use paintcopter::vio::{Arguments, execute};
 
 fn main() -> ExitCode {
-    exit_code("vio", execute(&Arguments::parse()))
+    run_program("vio", || execute(&Arguments::parse()))
 }

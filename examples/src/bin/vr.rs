@@ -3,9 +3,9 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use paintcopter::exit::exit_code;
+use paintcopter::exit::run_program;
 use paintcopter::vr::{Arguments, run};
 
 fn main() -> ExitCode {
-    exit_code("vr", run(&Arguments::parse()))
+    run_program("vr", || run(&Arguments::parse()))
 }

@@ -68,7 +68,7 @@ pub(super) fn read_poses(path: &Path) -> Result<RecordedPoses, HandheldError> {
 fn from_mcap(path: &Path) -> Result<RecordedPoses, HandheldError> {
     let fault = |why: MessagesFault| match why {
         MessagesFault::Unreadable(why) => HandheldError::unreadable(path, &why),
-        MessagesFault::Malformed(why) => HandheldError::unreadable(path, &why),
+        MessagesFault::Malformed(why) | MessagesFault::CutOff(why) => HandheldError::unreadable(path, &why),
     };
     let mut topic: Option<String> = None;
     let (mut poses, mut left_out) = (Trajectory::default(), 0);

@@ -16,6 +16,7 @@ use super::error::HandheldError;
 use super::forecast::{PaintDevice, PaintJob};
 use super::hardware::HardwareSettings;
 use super::object::PaintObject;
+use crate::interruption;
 pub use log::{PaintingLog, Tick};
 
 /// Number of the first set of droplets that falls on the true object: the believed ones have their own.
@@ -64,6 +65,9 @@ pub fn paint(
     let mut squared_error = 0.0;
     let ticks = (hand.duration / dt).round() as usize;
     for tick in 0..ticks {
+        if interruption::is_requested() {
+            break;
+        }
         let time = tick as f64 * dt;
         let pose = (hand.pose)(time);
         let measured = robot.pose_sensor.measure(&pose, time, dt).filter(|_| (hand.tracked)(time));
@@ -94,7 +98,7 @@ pub fn paint(
     }
     let (middle, believed) = (object.middle(), controller.object_place());
     log.registration_error = (believed * middle - hardware.world_from_model * middle).norm();
-    log.position_error_rms = (squared_error / (ticks - log.lost_ticks).max(1) as f64).sqrt();
+    log.position_error_rms = (squared_error / (log.ticks.len() - log.lost_ticks).max(1) as f64).sqrt();
     (log.limit_hits, log.valve_switches) = (robot.stepper.limit_hits, robot.valve.switched);
     (log.truth, log.emitted) = (robot.truth, robot.emitted);
     log.belief = controller.deposit().clone();

@@ -8,7 +8,7 @@ use paint_sim::droplets::Coverage;
 use uv_param::texture::TexelMap;
 
 use super::error::HandheldError;
-use crate::pictures::{DensityPicture, save_density};
+use crate::pictures::{DensityPicture, save_density, write_png};
 
 /// Beside the surface.
 const PAPER: [u8; 3] = [200, 205, 210];
@@ -39,7 +39,7 @@ pub(super) fn save_textures(texels: &TexelMap, coverage: &Coverage, folder: &Pat
             Rgb(if texels.area_m2[texel] > 0.0 { colour(texel) } else { PAPER })
         });
         let path = folder.join(name);
-        picture.save(&path).map_err(|e| HandheldError::unwritable(&path, &e))
+        write_png(&path, &picture, picture.dimensions().into()).map_err(|e| HandheldError::unwritable(&path, &e))
     };
     draw(ZOOM, &|k| grey(share(target[k], k)), "target.png")?;
     draw(ZOOM, &|k| grey(share(current[k], k)), "painted.png")?;

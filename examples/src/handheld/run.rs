@@ -24,9 +24,12 @@ use super::report::HandheldReport;
 use super::settings::HandheldSettings;
 use super::target::read_target;
 use super::views::passes;
+use crate::interruption::Finishing;
 use crate::mesh_io::read_mesh;
+use crate::pictures::write_png;
 use crate::progress::Stage;
 use crate::report::save_figures;
+use crate::run_folder;
 
 /// Standard deviation of the believed place with which any robot may spray, m.
 const GOOD_ENOUGH: f64 = 0.3e-3;
@@ -40,7 +43,7 @@ const RATIO_SCENARIOS: usize = 9;
 pub fn run(arguments: &Arguments) -> Result<(), HandheldError> {
     check(arguments)?;
     let folder = arguments.out.as_path();
-    std::fs::create_dir_all(folder).map_err(|e| HandheldError::unwritable(folder, &e))?;
+    run_folder::begin(folder, "handheld").map_err(|e| HandheldError::unwritable(folder, &e))?;
     let settings = settings(arguments);
     let stage = Stage::start("object");
     let object = object(arguments, folder)?;
@@ -59,6 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<(), HandheldError> {
     if arguments.evaluate {
         rank(arguments, &object, device.as_mut(), &settings, &mut report)?;
     }
+    let _finishing = Finishing::begin();
     let log = spray(arguments, &object, device.as_mut(), &settings)?;
     report.painted(&log);
     save_textures(&object.texels, &log.truth, folder)?;
@@ -186,7 +190,7 @@ fn save_atlas(
         Rgb(if samples[y as usize * width + x as usize].is_some() { [255; 3] } else { [200, 205, 210] })
     });
     let path = folder.join("atlas.png");
-    picture.save(&path).map_err(|e| HandheldError::unwritable(&path, &e))
+    write_png(&path, &picture, picture.dimensions().into()).map_err(|e| HandheldError::unwritable(&path, &e))
 }
 
 fn open_device<'a>(

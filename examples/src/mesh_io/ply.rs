@@ -1,6 +1,6 @@
 //! PLY by `ply-rs-bw`: positions, colours and faces in all encodings; writing in binary little endian.
 
-use std::io::{self, Write};
+use std::io;
 use std::path::Path;
 
 use ply_rs_bw::parser::Parser;
@@ -12,6 +12,7 @@ use ply_rs_bw::writer::Writer;
 
 use super::fault::Fault;
 use super::mesh::{TriangleMesh, fan};
+use crate::whole_file::WholeFile;
 
 pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
     check_counts(bytes)?;
@@ -145,7 +146,7 @@ impl PropertyAccess for Face {
 
 /// Writes a binary little-endian PLY.
 pub fn write_ply(path: &Path, mesh: &PlyMesh) -> io::Result<()> {
-    let mut out = io::BufWriter::new(std::fs::File::create(path)?);
+    let mut out = WholeFile::create(path)?;
     let element = |name: &str, count: usize, properties: &[(&str, PropertyType)]| {
         let mut element = ElementDef { count, ..ElementDef::new(name.into()) };
         for (name, kind) in properties {
@@ -177,7 +178,7 @@ pub fn write_ply(path: &Path, mesh: &PlyMesh) -> io::Result<()> {
         let [a, b, c] = *corners;
         writer.write_little_endian_element(&mut out, &Face([index(a)?, index(b)?, index(c)?]), &face)?;
     }
-    out.flush()
+    out.commit()
 }
 
 #[cfg(test)]

@@ -23,6 +23,7 @@ use crate::pictures::{COLOUR_DIFFERENCE, ErrorScale, Panel, Rgb, save_curves, sa
 use crate::progress::Stage;
 use crate::recording::{ColouredMesh, RobotState, save_recording};
 use crate::textured_mesh::{TexturedMesh, with_gutter};
+use crate::whole_file;
 
 /// Colour beside the surface in the texture pictures.
 const BACKGROUND: [u8; 3] = [255, 255, 255];
@@ -199,7 +200,7 @@ fn save_textured_mesh(mission: &Mission, folder: &Path) -> Result<(), MissionErr
 }
 
 pub(super) fn write(path: &Path, text: &str) -> Result<(), MissionError> {
-    std::fs::write(path, text).map_err(unwritable(path))
+    whole_file::write(path, text).map_err(unwritable(path))
 }
 
 pub(super) fn unwritable(path: &Path) -> impl FnOnce(std::io::Error) -> MissionError {

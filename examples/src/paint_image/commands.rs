@@ -1,8 +1,6 @@
 //! What is sprayed, in painting order: as JSON, and with times as MCAP.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::Path;
 
 use paint_net::Spray;
@@ -10,6 +8,7 @@ use serde::Serialize;
 
 use super::error::PaintImageError;
 use super::files::write_json;
+use crate::whole_file::WholeFile;
 
 /// Speed of the nozzle in `commands.mcap`, pixels per second.
 pub const NOZZLE_SPEED: f64 = 100.0;
@@ -69,7 +68,7 @@ pub(super) fn save(
 }
 
 fn record(path: &Path, commands: &[Command]) -> mcap::McapResult<()> {
-    let file = BufWriter::new(File::create(path)?);
+    let file = WholeFile::create(path)?;
     let mut writer = mcap::WriteOptions::new().compression(None).library("paintcopter").create(file)?;
     let schema = writer.add_schema("paintcopter.Spray", "jsonschema", schema().to_string().as_bytes())?;
     let channel_id = writer.add_channel(schema, "/sprays", "json", &BTreeMap::new())?;
@@ -84,5 +83,5 @@ fn record(path: &Path, commands: &[Command]) -> mcap::McapResult<()> {
         writer.write_to_known_channel(&header, &message)?;
     }
     writer.finish()?;
-    Ok(())
+    Ok(writer.into_inner().commit()?)
 }

@@ -7,6 +7,8 @@ use serde::Serialize;
 
 use super::error::PaintImageError;
 
+use crate::whole_file;
+
 /// The thesis' network of a file.
 pub(super) fn read_network(path: &Path) -> Result<Network, PaintImageError> {
     let file_error = |why: String| PaintImageError::File { path: path.display().to_string(), why };
@@ -41,5 +43,5 @@ pub(super) fn write_json(path: &Path, value: &impl Serialize) -> Result<(), Pain
 
 pub(super) fn write_text(path: &Path, text: &str) -> Result<(), PaintImageError> {
     let failed = |why: String| PaintImageError::File { path: path.display().to_string(), why };
-    std::fs::write(path, text).map_err(|e| failed(format!("cannot be written ({e})")))
+    whole_file::write(path, text).map_err(|e| failed(format!("cannot be written ({e})")))
 }

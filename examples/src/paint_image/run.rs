@@ -19,6 +19,7 @@ use super::ink::read_ink;
 use super::job::{Job, PainterKind};
 use super::training::{ThesisTrainingRun, TrainingImages, TrainingRun, train_painter, train_thesis};
 use crate::progress::Stage;
+use crate::run_folder;
 
 /// Does what the command line asks for.
 pub fn run(arguments: Arguments) -> Result<(), PaintImageError> {
@@ -174,7 +175,7 @@ fn paint_file_in_colours(image: &Path, job: &Job, glazes: Glazes, out: &Path) ->
 }
 
 fn create(folder: &Path) -> Result<(), PaintImageError> {
-    std::fs::create_dir_all(folder).map_err(|e| PaintImageError::File {
+    run_folder::begin(folder, "paint-image").map_err(|e| PaintImageError::File {
         path: folder.display().to_string(),
         why: format!("cannot be created ({e}): choose another --out"),
     })

@@ -1,6 +1,6 @@
 //! The command line of `robot`.
 
-use std::net::{SocketAddr, ToSocketAddrs};
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -9,6 +9,7 @@ use clap::Parser;
 use super::fault::Fault;
 use super::on_board::SetpointKind;
 use crate::mission_arguments::MissionArguments;
+use crate::socket_address;
 
 /// Flies the first minutes of a painting mission on an autopilot that speaks MAVLink: PX4 as a program in lockstep with the simulated
 /// vehicle, or a multirotor with PX4 over UDP. Without other arguments it paints the built-in rock wall.
@@ -53,10 +54,7 @@ impl FromStr for AutopilotChoice {
     fn from_str(text: &str) -> Result<Self, String> {
         match text.split_once(':') {
             Some(("px4", folder)) if !folder.is_empty() => Ok(Self::Px4(folder.into())),
-            Some(("udp", address)) => {
-                let mut found = address.to_socket_addrs().map_err(|error| format!("{address}: {error}"))?;
-                found.next().map(Self::Udp).ok_or_else(|| format!("{address}: no such address"))
-            }
+            Some(("udp", address)) => socket_address::parse(address).map(Self::Udp),
             Some(("serial", _)) => {
                 Err("serial lines are not built in: let a router such as mavlink-router carry them to UDP".into())
             }

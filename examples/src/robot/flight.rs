@@ -10,6 +10,7 @@ use super::phase::Phase;
 use super::recorder::{Record, Recorder, Seen};
 use super::simulated_robot::{CONTROL_STEPS, SENSOR_STEPS, STEP, SimulatedRobot};
 use crate::autopilot::{AutopilotError, Px4, Request, simulator};
+use crate::interruption;
 
 /// The autopilot must be ready, armed and in the air after so long, s of its own clock.
 const LONGEST_START: f64 = 60.0;
@@ -63,6 +64,9 @@ pub fn fly_px4(
     let (first_paint, late, past_cpu) = (None, 0, None);
     let mut flight = Px4Flight { launch, robot, on_board, faults, px4, motors, recorder, first_paint, late, past_cpu };
     let failed = loop {
+        if interruption::is_requested() {
+            flight.on_board.interrupt();
+        }
         let end = flight.control_step().and_then(|end| flight.physics().map(|()| end));
         progress(flight.on_board.painted());
         match end {
@@ -202,11 +206,13 @@ pub(super) fn over(on_board: &mut OnBoard, now: f64) -> Result<End, RobotError> 
     let phase = on_board.phase();
     let since = on_board.events().last().map_or(0.0, |(since, _)| now - since);
     let ended_early = on_board.ended_early();
+    let called_off = on_board.is_called_off();
     let telemetry = on_board.link().telemetry();
     if let Some(identity) = telemetry.identity {
         identity.check()?;
     }
     match phase {
+        _ if called_off => Ok(End::Failed("interrupted before it took off".into())),
         Phase::Done => Ok(match ended_early {
             Some(cause) => End::Failed(format!("ended early: {}", cause.text())),
             None => End::Landed,

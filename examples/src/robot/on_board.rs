@@ -89,6 +89,7 @@ pub struct OnBoard<'a> {
     last: Option<(f64, LocalisedPose)>,
     /// Jumps of the pose.
     resets: u8,
+    interrupted: bool,
 }
 
 impl<'a> OnBoard<'a> {
@@ -103,6 +104,7 @@ impl<'a> OnBoard<'a> {
             phases: Phases::new(plan, settings.seconds, settings.valve.lead),
             last: None,
             resets: 0,
+            interrupted: false,
             plan,
             ptu,
             settings,
@@ -112,6 +114,16 @@ impl<'a> OnBoard<'a> {
     /// The off-board link, which is to be fed with the autopilot's messages.
     pub fn link(&mut self) -> &mut OffboardLink {
         &mut self.link
+    }
+
+    /// The flight is to end: with the valve shut it returns and lands, or stays on the ground.
+    pub fn interrupt(&mut self) {
+        self.interrupted = true;
+    }
+
+    /// Whether it was interrupted before it took off.
+    pub(super) fn is_called_off(&self) -> bool {
+        self.interrupted && matches!(self.phase(), Phase::Wait | Phase::Arm)
     }
 
     /// What it is doing.
@@ -162,7 +174,8 @@ impl<'a> OnBoard<'a> {
         }
         let trusted = pose.is_some_and(|pose| pose.trusted) && !self.jumped(now, pose);
         let pose = pose.map(|pose| LocalisedPose { trusted, ..*pose });
-        let cause = self.settings.failsafe.cause(now, self.link.telemetry(), pose.as_ref());
+        let failed = self.settings.failsafe.cause(now, self.link.telemetry(), pose.as_ref());
+        let cause = failed.into_iter().chain(self.interrupted.then_some(Cause::Interrupted)).min();
         if let Some(estimator) = &self.estimator {
             let estimate = estimator.estimate();
             let (ready, armed) = (self.ready(pose.as_ref()), self.link.telemetry().armed);

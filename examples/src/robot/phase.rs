@@ -240,7 +240,7 @@ impl<'a> Phases<'a> {
         let Situation { now, position, heading, .. } = *situation;
         match self.phase {
             Phase::Hold(_) if now - self.since > LONGEST_HOLD => self.enter(now, Phase::Aborted(cause), None),
-            _ if cause == Cause::BatteryLow => {
+            _ if cause.brings_home() => {
                 self.ended_early = Some(cause);
                 if self.phase == Phase::Return {
                     self.advance(&Situation { cause: None, ..*situation });
@@ -391,6 +391,7 @@ mod tests {
             (Cause::AutopilotRestarted, Phase::Aborted(Cause::AutopilotRestarted)),
             (Cause::Disarmed, Phase::Aborted(Cause::Disarmed)),
             (Cause::BatteryLow, Phase::Return),
+            (Cause::Interrupted, Phase::Return),
             (Cause::LinkLost, Phase::Aborted(Cause::LinkLost)),
         ] {
             let (mut phases, mut clock) = (Phases::new(&Line, 20.0, 0.0), 0.0);
@@ -401,10 +402,12 @@ mod tests {
             assert_eq!(waited > 1.0, cause == Cause::LinkLost, "{cause:?} {waited}");
             assert!(waited < LONGEST_HOLD + 0.3);
         }
-        // A battery that is low still brings it home.
-        let (mut phases, mut clock) = (Phases::new(&Line, 20.0, 0.0), 0.0);
-        until(&mut phases, &mut clock, None, |phase| phase == Phase::Paint);
-        until(&mut phases, &mut clock, Some(Cause::BatteryLow), |phase| phase == Phase::Land);
-        assert_eq!(phases.ended_early(), Some(Cause::BatteryLow));
+        // A battery that is low still brings it home, and so does an interruption.
+        for cause in [Cause::BatteryLow, Cause::Interrupted] {
+            let (mut phases, mut clock) = (Phases::new(&Line, 20.0, 0.0), 0.0);
+            until(&mut phases, &mut clock, None, |phase| phase == Phase::Paint);
+            until(&mut phases, &mut clock, Some(cause), |phase| phase == Phase::Land);
+            assert_eq!(phases.ended_early(), Some(cause));
+        }
     }
 }

@@ -18,9 +18,11 @@ use super::report::RobotReport;
 use super::simulated_robot::{SimulatedRobot, station};
 use super::udp::fly_udp;
 use crate::autopilot::{FailsafeSettings, OffboardSettings, Px4, Px4Vehicle};
+use crate::interruption::Finishing;
 use crate::mission::{LocalisationChoice, PlannedFlight, PlannedMission};
 use crate::progress::Stage;
 use crate::report::save_figures;
+use crate::whole_file;
 
 /// Responses of the default vehicle under PX4's attitude control, s.
 const PX4_RESPONSE: f64 = 0.18;
@@ -32,11 +34,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     if mission_file.settings.localisation == LocalisationChoice::Slam {
         return Err(RobotError::OwnSenses.into());
     }
-    mission_file.write_into(folder)?;
+    mission_file.begin_run(folder, "robot")?;
     let coat = mission_file.decide_coats(folder)?.into_iter().next().ok_or(RobotError::NothingToFly)?;
     let mission = PlannedMission::new(coat.task).map_err(|error| mission_file.in_mesh(error))?;
     let flight = mission.flight(0).ok_or(RobotError::NothingToFly)?;
     let clock = (Instant::now(), ProcessTime::now());
+    let _finishing = Finishing::begin();
     let stage = Stage::start("fly");
     let flown = fly(arguments, &flight, folder, &mut |painted| {
         stage.share(painted / arguments.seconds.min(flight.reference().duration()));
@@ -125,7 +128,7 @@ fn save(
     folder: &Path,
 ) -> Result<RobotReport, RobotError> {
     let path = folder.join("track.csv");
-    std::fs::write(&path, &flown.record.track).map_err(|source| RobotError::File { path, source })?;
+    whole_file::write(&path, &flown.record.track).map_err(|source| RobotError::File { path, source })?;
     let Record { painting, ways, events, .. } = &flown.record;
     let figures = flight.save(painting, ways, folder)?;
     let statistics = painting.statistics();

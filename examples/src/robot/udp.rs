@@ -14,6 +14,7 @@ use super::on_board::{CONTROL_STEP, OnBoard, OnBoardSettings};
 use super::recorder::{Recorder, Seen};
 use super::simulated_robot::{STEP, station};
 use crate::autopilot::{AutopilotError, FailsafeSettings, OffboardLink, OffboardSettings, Telemetry, UdpLink};
+use crate::interruption;
 use crate::mission::PlannedFlight;
 
 /// Telemetry that is asked for, per second, and its longest silence, s: radios are slower than a simulation.
@@ -82,6 +83,9 @@ pub(super) fn fly_udp(
         }
         let pose = pose(on_board.link().telemetry());
         let localised = pose.map(|world_from_body| LocalisedPose { world_from_body, trusted: true });
+        if interruption::is_requested() {
+            on_board.interrupt();
+        }
         let commanded = on_board.step(now, localised.as_ref(), pan_tilt);
         for message in &commanded.messages {
             link.send(message);

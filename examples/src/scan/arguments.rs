@@ -22,6 +22,7 @@ use super::options::{
 use super::pose_file::take_poses;
 use super::sequence::Sequence;
 use super::settings::ScanSettings;
+use crate::socket_address;
 
 /// Maps a recorded RGB-D sequence into a voxel-hashed distance field and its mesh.
 #[derive(Debug, Clone, Parser)]
@@ -100,7 +101,13 @@ pub struct Arguments {
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
     pub(super) checkpoint: f64,
     /// Show the run as it goes over Foxglove's WebSocket protocol: to this machine alone, unless an address says otherwise
-    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8765")]
+    #[arg(
+        long,
+        value_name = "ADDRESS",
+        num_args = 0..=1,
+        default_missing_value = "127.0.0.1:8765",
+        value_parser = socket_address::parse
+    )]
     pub(super) live: Option<SocketAddr>,
     /// Write what --live shows into scan.mcap in the folder for the results
     #[arg(long)]

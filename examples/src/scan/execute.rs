@@ -7,8 +7,10 @@ use super::mapped::Scan;
 use super::options::in_options;
 use super::report::ScanReport;
 use super::views::save_views;
+use crate::interruption::Finishing;
 use crate::mesh_io::{PlyMesh, write_ply};
 use crate::report::save_figures;
+use crate::{run_folder, whole_file};
 
 /// Maps the recording of a command line and writes what became of it; an error in the words of the command line.
 ///
@@ -25,6 +27,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     eprintln!("{}: {} layout, {} frames", arguments.sequence.display(), sequence.layout, sequence.frames.len());
     eprintln!("{:28} {}", "camera", sequence.description());
     let settings = arguments::settings(arguments)?;
+    // The map and its files are finished where somebody interrupts.
+    let _finishing = Finishing::begin();
     let scan = Scan::run(&arguments.sequence, &sequence, &settings)?;
     for (_, why) in &scan.skipped {
         eprintln!("left out: {}", in_options(why));
@@ -36,7 +40,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     write_ply(&ply, &PlyMesh { positions, normals: Some(normals), colours, faces })
         .map_err(|e| format!("{}: cannot be written ({e})", ply.display()))?;
     let tum = folder.join("trajectory.tum");
-    std::fs::write(&tum, vio_ekf::format::tum::write(&scan.trajectory))
+    whole_file::write(&tum, vio_ekf::format::tum::write(&scan.trajectory))
         .map_err(|e| format!("{}: cannot be written ({e})", tum.display()))?;
     save_views(&scan, &sequence, folder, settings.slam.map.threads)?;
     // Last, so that its presence means the folder is complete.
@@ -49,7 +53,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
 /// Makes the folder, and tries it before any work is done.
 fn prepare(folder: &Path) -> Result<(), String> {
     let refuse = |e: std::io::Error| format!("{}: cannot be written to ({e}): choose another --out", folder.display());
-    std::fs::create_dir_all(folder).map_err(refuse)?;
+    run_folder::begin(folder, "scan").map_err(refuse)?;
     let probe = folder.join(".tried");
     std::fs::write(&probe, b"").map_err(refuse)?;
     std::fs::remove_file(&probe).map_err(refuse)?;

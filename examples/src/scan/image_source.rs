@@ -85,6 +85,6 @@ impl ImageTopic {
 pub(super) fn reason(fault: MessagesFault) -> String {
     match fault {
         MessagesFault::Unreadable(why) => why.to_string(),
-        MessagesFault::Malformed(why) => why,
+        MessagesFault::Malformed(why) | MessagesFault::CutOff(why) => why,
     }
 }

@@ -1,8 +1,6 @@
 //! A run as it goes, for viewers: pose, picture, tracking and the mesh where it changes, with Foxglove's schemas, over a WebSocket
 //! and into a file.
 
-use std::fs::File;
-use std::io::BufWriter;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -23,6 +21,7 @@ use tsdf_hash::{ColourData, ColourView};
 
 use super::error::ScanError;
 use crate::recording::{log_message, point, quaternion, rgb, scene, vector};
+use crate::whole_file::WholeFile;
 
 /// Frames between two pictures, and between two looks at what has changed of the mesh.
 const PICTURE_EVERY: usize = 5;
@@ -80,7 +79,7 @@ pub(super) struct Live {
     frames: usize,
     /// Kept open as long as the run goes on.
     _context: Arc<Context>,
-    _recording: Option<McapWriterHandle<BufWriter<File>>>,
+    recording: Option<McapWriterHandle<WholeFile>>,
 }
 
 /// Sees who subscribes.
@@ -102,8 +101,8 @@ impl Live {
         let recording = match &settings.record {
             Some(path) => {
                 let refuse = |why: String| ScanError::Unwritable { path: path.display().to_string(), why };
-                let file = File::create(path).map_err(|e| refuse(e.to_string()))?;
-                Some(context.mcap_writer().create(BufWriter::new(file)).map_err(|e| refuse(e.to_string()))?)
+                let file = WholeFile::create(path).map_err(|e| refuse(e.to_string()))?;
+                Some(context.mcap_writer().create(file).map_err(|e| refuse(e.to_string()))?)
             }
             None => None,
         };
@@ -139,7 +138,7 @@ impl Live {
             bent: false,
             frames: 0,
             _context: context,
-            _recording: recording,
+            recording,
         }))
     }
 
@@ -193,6 +192,13 @@ impl Live {
             // What no frame that moved had seen is still shown bent.
             self.draw_patches(stamp, &mesher.patches(), mesher);
         }
+    }
+
+    /// Nothing more is told: the recording is whole.
+    pub(super) fn close(self) -> Result<(), ScanError> {
+        let Some(recording) = self.recording else { return Ok(()) };
+        let file = recording.close().map_err(|e| ScanError::Recording(e.to_string()))?;
+        file.commit().map_err(|e| ScanError::Recording(e.to_string()))
     }
 
     /// All frames have moved: the mesh is bent after them until the map has followed.

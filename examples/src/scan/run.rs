@@ -21,6 +21,7 @@ use super::ray_cast_check::ray_cast_check;
 use super::sequence::Sequence;
 use super::settings::ScanSettings;
 use super::start;
+use crate::interruption;
 use crate::progress::Stage;
 
 impl Scan {
@@ -31,6 +32,10 @@ impl Scan {
         let mut checkpoints = Checkpoints::new(settings.checkpoint.clone());
         for index in run.resumed..sequence.frames.len() {
             stage.share(index as f64 / sequence.frames.len() as f64);
+            if interruption::is_requested() {
+                eprintln!("interrupted before frame {index}: --resume goes on from the map");
+                break;
+            }
             run.take(index)?;
             checkpoints.save(&mut run.slam, folder)?;
         }
@@ -244,6 +249,7 @@ impl<'a> Run<'a> {
         if let (Some(live), Some((index, _)), Some(_)) = (&self.live, fused.last(), self.slam.map().cpu()) {
             live.finished(self.sequence.frames[*index].stamp, self.slam.update_mesh()?);
         }
+        self.live.take().map_or(Ok(()), Live::close)?;
         let stage = Stage::start("mesh");
         let start = ProcessTime::now();
         let mesh = self.slam.map().dense().mesh()?;

@@ -14,6 +14,7 @@ use crate::mesh_io::{PlyMesh, write_ply};
 use crate::mission::MissionError;
 use crate::pictures::{Polyline, Rgb, Scene, save_scene};
 use crate::report::{ReportError, check_finite};
+use crate::whole_file;
 
 /// Size of the picture, pixels.
 const VIEW: (u32, u32) = (1400, 900);
@@ -25,7 +26,7 @@ pub const MAP_FILE: &str = "scan_flight.tsdf";
 pub fn save(scan: &ScanFlight, folder: &Path) -> Result<(), MissionError> {
     let write = |name: &str, text: String| {
         let path = folder.join(name);
-        std::fs::write(&path, text)
+        whole_file::write(&path, text)
             .map_err(|source| MissionError::Unwritable { path: path.display().to_string(), source })
     };
     write("scan_flight_true.tum", vio_ekf::format::tum::write(&scan.flown))?;

@@ -8,7 +8,9 @@ use uv_param::Atlas;
 use super::error::UnwrapError;
 use crate::mesh_io::TriangleMesh;
 use crate::mesh_placement::UpAxis;
+use crate::pictures::write_png;
 use crate::textured_mesh::TexturedMesh;
+use crate::whole_file;
 
 /// Writes `atlas.obj`, `atlas.mtl`, `atlas_texture[_N].png` and `atlas[_N].glb`.
 ///
@@ -23,11 +25,11 @@ pub(super) fn save(
 ) -> Result<(), UnwrapError> {
     let write = |name: String, bytes: &[u8]| {
         let path = folder.join(name);
-        std::fs::write(&path, bytes).map_err(|e| UnwrapError::unwritable(&path, &e))
+        whole_file::write(&path, bytes).map_err(|e| UnwrapError::unwritable(&path, &e))
     };
     for (page, texture) in textures.iter().enumerate() {
         let path = folder.join(format!("atlas_texture{}.png", suffix(page)));
-        texture.save(&path).map_err(|e| UnwrapError::unwritable(&path, &e))?;
+        write_png(&path, texture, texture.dimensions().into()).map_err(|e| UnwrapError::unwritable(&path, &e))?;
         let mut part = page_mesh(atlas, page);
         if up == UpAxis::Y {
             part.positions.iter_mut().for_each(|[_, y, z]| (*y, *z) = (-*z, *y));

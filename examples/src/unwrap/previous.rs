@@ -6,6 +6,8 @@ use uv_param::atlas::{AtlasLayout, Placement};
 
 use super::error::UnwrapError;
 
+use crate::whole_file;
+
 /// Name of the file in the folder of the results.
 pub(super) const NAME: &str = "atlas.layout";
 /// How it begins; everything behind it is little-endian, 8 bytes each.
@@ -34,7 +36,7 @@ pub(super) fn write(layout: &AtlasLayout, folder: &Path) -> Result<(), UnwrapErr
     }
     layout.pages.as_flattened().iter().map(|&side| side as u64).for_each(&mut put);
     let path = folder.join(NAME);
-    std::fs::write(&path, bytes).map_err(|e| UnwrapError::unwritable(&path, &e))
+    whole_file::write(&path, bytes).map_err(|e| UnwrapError::unwritable(&path, &e))
 }
 
 pub(super) fn read(folder: &Path) -> Result<AtlasLayout, UnwrapError> {

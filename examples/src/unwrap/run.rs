@@ -19,8 +19,10 @@ use super::report::UnwrapReport;
 use crate::mesh_io::{TriangleMesh, read_mesh};
 use crate::mesh_placement::UpAxis;
 use crate::picture_file::open_upright;
+use crate::pictures::write_png;
 use crate::progress::Stage;
 use crate::report::save_figures;
+use crate::run_folder;
 
 /// Does what the command line asks for.
 ///
@@ -42,7 +44,7 @@ pub fn run(arguments: &Arguments) -> Result<(), UnwrapError> {
     mesh.notes.iter().for_each(|note| eprintln!("{}: {note}", arguments.mesh.display()));
     let carried = read_pictures(&mesh, arguments)?;
     let earlier = arguments.previous.as_deref().map(previous::read).transpose()?;
-    std::fs::create_dir_all(folder).map_err(|e| UnwrapError::unwritable(folder, &e))?;
+    run_folder::begin(folder, "unwrap").map_err(|e| UnwrapError::unwritable(folder, &e))?;
 
     let (atlas, update, cpu_s) = unwrap(&mesh, &seams, arguments, earlier.as_ref())?;
 
@@ -54,7 +56,7 @@ pub fn run(arguments: &Arguments) -> Result<(), UnwrapError> {
     for (page, texels) in pages.iter().enumerate() {
         let board = checkerboard(&atlas, texels, bounds);
         let path = folder.join(format!("charts{}.png", suffix(page)));
-        board.save(&path).map_err(|e| UnwrapError::unwritable(&path, &e))?;
+        write_png(&path, &board, board.dimensions().into()).map_err(|e| UnwrapError::unwritable(&path, &e))?;
         textures.push(match (&carried, &mesh.uv) {
             (Some(carried), Some(uv)) => carried_over(&atlas, texels, uv, carried),
             _ => board,

@@ -8,6 +8,7 @@ use vio_ekf::{Error, Stamp};
 use super::grey_image::GreyImage;
 use super::mcap_in::read_images;
 use super::recording::{Images, Recording, SecondCamera};
+use crate::interruption;
 
 /// Images of both cameras whose stamps differ by no more, s, were taken together.
 const MAX_STAMP_DIFFERENCE_S: f64 = 1e-3;
@@ -16,7 +17,9 @@ const MAX_STAMP_DIFFERENCE_S: f64 = 1e-3;
 pub fn camera_frames(recording: &Recording) -> impl Iterator<Item = RecordedFrame<GreyImage>> + Send + '_ {
     let second = recording.second.as_ref();
     let seconds = second.into_iter().flat_map(|second| images(&second.images));
-    pair_by_stamp(images(&recording.images), seconds, MAX_STAMP_DIFFERENCE_S).map(move |(stamp, first, taken_with)| {
+    // A recording that somebody interrupts has ended.
+    let first = images(&recording.images).take_while(|_| !interruption::is_requested());
+    pair_by_stamp(first, seconds, MAX_STAMP_DIFFERENCE_S).map(move |(stamp, first, taken_with)| {
         let taken_with = second.zip(taken_with);
         RecordedFrame {
             stamp,

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::pictures::PictureError;
 use crate::report::ReportError;
+use crate::whole_file;
 
 /// Why there is no usable trajectory; every variant names the input and the way out.
 #[derive(Debug, thiserror::Error)]
@@ -80,7 +81,7 @@ pub(super) fn read_text(path: &Path) -> Result<String, VioError> {
 
 /// Writes a file.
 pub(super) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), VioError> {
-    std::fs::write(path, bytes).map_err(|error| VioError::unwritable(path, &error))
+    whole_file::write(path, bytes).map_err(|error| VioError::unwritable(path, &error))
 }
 
 /// Makes a folder and those above it.

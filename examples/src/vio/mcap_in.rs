@@ -140,7 +140,7 @@ pub(super) fn read_images(
 fn fault(path: &Path, fault: &MessagesFault) -> VioError {
     match fault {
         MessagesFault::Unreadable(why) => VioError::unreadable(path, why),
-        MessagesFault::Malformed(why) => VioError::malformed(path, why),
+        MessagesFault::Malformed(why) | MessagesFault::CutOff(why) => VioError::malformed(path, why),
     }
 }
 

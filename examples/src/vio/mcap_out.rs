@@ -2,8 +2,6 @@
 //! has none of its own. Opens in Foxglove as it is.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::Path;
 
 use foxglove::Encode;
@@ -19,6 +17,7 @@ use vio_ekf::{Imu, Stamp};
 use super::error::VioError;
 use super::grey_image::GreyImage;
 use crate::mcap_messages::cdr;
+use crate::whole_file::WholeFile;
 
 /// Frames of the sensors.
 pub(super) const IMU_FRAME: &str = "imu";
@@ -66,7 +65,7 @@ pub(super) enum Pixels<'a> {
 
 /// Writes a recording, message by message.
 pub(super) struct McapWriter {
-    writer: mcap::Writer<BufWriter<File>>,
+    writer: mcap::Writer<WholeFile>,
     path: String,
     sequence: u32,
     imu: u16,
@@ -85,10 +84,10 @@ impl McapWriter {
         imu: &ImuCalibration,
         raw: bool,
     ) -> Result<Self, VioError> {
-        let file = File::create(path).map_err(|error| VioError::unwritable(path, &error))?;
+        let file = WholeFile::create(path).map_err(|error| VioError::unwritable(path, &error))?;
         let options = mcap::WriteOptions::new().compression(None).library("paintcopter");
         let failed = |error: mcap::McapError| VioError::unwritable(path, &error);
-        let writer = options.create(BufWriter::new(file)).map_err(failed)?;
+        let writer = options.create(file).map_err(failed)?;
         let white = [imu.noise.gyro_density, imu.noise.accel_density];
         let noise = white.map(|density| density * density * imu.rate_hz);
         let name = path.display().to_string();
@@ -158,8 +157,9 @@ impl McapWriter {
 
     /// Ends the file.
     pub(super) fn finish(mut self) -> Result<(), VioError> {
-        let done = self.writer.finish();
-        done.map(|_| ()).map_err(|error| self.failed(&error))
+        let unwritable = |why: &dyn std::fmt::Display| VioError::unwritable(Path::new(&self.path), why);
+        self.writer.finish().map_err(|error| unwritable(&error))?;
+        self.writer.into_inner().commit().map_err(|error| unwritable(&error))
     }
 
     fn channel<T: Encode>(&mut self, topic: &str) -> Result<u16, VioError> {

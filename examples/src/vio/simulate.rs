@@ -16,6 +16,7 @@ use super::error::{make_folder, write_file};
 use super::euroc_folder::read_truth;
 use super::mcap_out::{McapWriter, Pixels};
 use super::{GreyImage, VioError};
+use crate::interruption::{self, Finishing};
 use crate::progress::Stage;
 
 /// Time between two knots of the motion, ns.
@@ -146,12 +147,16 @@ struct EncodedImage {
 
 /// Renders in parallel, a few frames at a time, and writes in order.
 fn render(simulation: &Simulation, threads: usize, mut out: Sink) -> Result<usize, VioError> {
+    let _finishing = Finishing::begin();
     let stage = Stage::start("render");
     let (cameras, threads) = (out.names.len(), threads.max(1));
     let counts = (0..cameras).map(|which| simulation.frame_count(which));
     // The frames of a moment one after the other; a camera that takes fewer has none at the end.
     let count = cameras * counts.max().unwrap_or(0);
     for first in (0..count).step_by(threads) {
+        if interruption::is_requested() {
+            break;
+        }
         stage.share(first as f64 / count as f64);
         let batch = first..(first + threads).min(count);
         let developed: Vec<Result<Option<EncodedImage>, VioError>> = std::thread::scope(|scope| {

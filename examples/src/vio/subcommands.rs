@@ -19,7 +19,9 @@ use super::{
     TuningData, VioError, VioReport, camera_frames, compare, evaluate_run, open_euroc, open_euroc_stereo, open_mcap,
     open_mcap_stereo, run, save, simulate, tune_noise,
 };
+use crate::interruption::{self, Finishing};
 use crate::report::save_figures;
+use crate::run_folder;
 
 /// Images of which the first that can be read tells the size.
 const LOOKED_AT: usize = 20;
@@ -118,6 +120,7 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
     if arguments.calibrate {
         calibrate(&mut recording, &mut settings)?;
     }
+    let _finishing = Finishing::begin();
     let (timed, doubt) = with_calibration_check(&recording, &settings);
     if let Some(doubt) = &doubt {
         eprintln!("warning: {}", calibration_advice(doubt));
@@ -242,6 +245,9 @@ fn check_samples(recording: &Recording, gravity: f64, accept: bool) -> Result<Op
 fn with_cause(why: String, doubt: Option<&CalibrationDoubt>, recording: &Recording, settings: &RunSettings) -> String {
     if let Some(doubt) = doubt {
         return format!("{why}; {}", calibration_advice(doubt));
+    }
+    if interruption::is_requested() {
+        return why;
     }
     eprintln!("looking for a cause: the inertial sensor is read with other axes");
     let cause = filter(recording, settings, false)
@@ -388,7 +394,7 @@ fn search(arguments: &Tune) -> Result<(), AnyError> {
 }
 
 fn make(folder: &Path) -> Result<(), String> {
-    std::fs::create_dir_all(folder)
+    run_folder::begin(folder, "vio")
         .map_err(|e| format!("{}: cannot be created ({e}): choose another --out", folder.display()))
 }
 

@@ -9,6 +9,7 @@ use super::hand::Way;
 use super::settings::{Timing, VrSettings};
 use super::watch::WatchSource;
 use crate::mesh_placement::UpAxis;
+use crate::socket_address;
 
 /// Serves a page on which a person paints a surface by hand, in a headset or with mouse, keyboard or touch; the simulated robot
 /// follows at once or flies the session later. Without a mesh: the built-in rock wall.
@@ -46,7 +47,7 @@ pub struct Arguments {
     #[arg(long)]
     offline: bool,
     /// Address to serve; anything but loopback is served only to who knows the token that is printed
-    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8090")]
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8090", value_parser = socket_address::parse)]
     pub(super) listen: SocketAddr,
     /// Paint a recorded session again, serve nothing, and check that the plans are the same
     #[arg(long, value_name = "FILE")]

@@ -36,6 +36,11 @@ impl ClientLease {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).connection == connection
     }
 
+    /// Whether nobody has it.
+    pub(super) fn is_free(&self) -> bool {
+        self.holds(0)
+    }
+
     /// Gives the lease back, unless somebody has come back to it meanwhile.
     pub(super) fn leave(&self, connection: u64) {
         let mut holder = self.0.lock().unwrap_or_else(PoisonError::into_inner);

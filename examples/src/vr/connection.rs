@@ -1,11 +1,11 @@
 //! One WebSocket: messages in within size and rate, whatever the session says out.
 
 use std::net::TcpStream;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, sync_channel};
 use std::time::{Duration, Instant};
 
-use tungstenite::protocol::{Role, WebSocketConfig};
+use tungstenite::protocol::{CloseFrame, Role, WebSocketConfig};
 use tungstenite::{Error, Message, WebSocket};
 
 use super::client_lease::ClientLease;
@@ -48,6 +48,29 @@ pub(super) enum Inbound {
     Leave { connection: u64 },
 }
 
+/// Where connections leave what they have to tell; it may be closed, and then takes nothing more.
+pub(super) struct Inbox {
+    sender: SyncSender<Inbound>,
+    closed: AtomicBool,
+}
+
+impl Inbox {
+    /// With room for so many messages; the other end.
+    pub(super) fn new(room: usize) -> (Self, Receiver<Inbound>) {
+        let (sender, receiver) = sync_channel(room);
+        (Self { sender, closed: AtomicBool::new(false) }, receiver)
+    }
+
+    /// Waits for room if need be; whether anybody is there to hear it.
+    pub(super) fn send(&self, inbound: Inbound) -> bool {
+        self.closed.load(Ordering::SeqCst) || self.sender.send(inbound).is_ok()
+    }
+
+    pub(super) fn close(&self) {
+        self.closed.store(true, Ordering::SeqCst);
+    }
+}
+
 /// What the session has to say.
 pub(super) enum Outgoing {
     Text(String),
@@ -81,7 +104,7 @@ pub(super) fn serve_connection(
     rest: Vec<u8>,
     connection: u64,
     lease: &ClientLease,
-    inbox: &SyncSender<Inbound>,
+    inbox: &Inbox,
     outbox: &Receiver<Outgoing>,
     counts: &TrafficCounts,
 ) {
@@ -104,7 +127,17 @@ pub(super) fn serve_connection(
         let _ = socket.flush();
     }
     lease.leave(connection);
-    let _ = inbox.send(Inbound::Leave { connection });
+    inbox.send(Inbound::Leave { connection });
+}
+
+/// Tells a WebSocket whose handshake is answered that it is not let in, and why.
+pub(super) fn turn_away(stream: TcpStream, (code, why): (u16, &'static str)) {
+    let mut socket = WebSocket::from_raw_socket(stream, Role::Server, None);
+    let _ = socket.close(Some(CloseFrame { code: code.into(), reason: why.into() }));
+    // Until the other side has taken it: what is closed before may be lost.
+    let _ = socket.get_ref().set_read_timeout(Some(WRITE_TIME));
+    let begun = Instant::now();
+    while begun.elapsed() < WRITE_TIME && socket.read().is_ok() {}
 }
 
 /// Sends what there is, then reads what has come; whether the connection goes on.
@@ -112,7 +145,7 @@ fn turn(
     socket: &mut WebSocket<TcpStream>,
     connection: u64,
     bucket: &mut Bucket,
-    inbox: &SyncSender<Inbound>,
+    inbox: &Inbox,
     outbox: &Receiver<Outgoing>,
     counts: &TrafficCounts,
 ) -> bool {
@@ -167,13 +200,7 @@ fn read_now(socket: &mut WebSocket<TcpStream>) -> Result<Option<Message>, Error>
 }
 
 /// Hands a message to the session; whether the connection goes on.
-fn take(
-    message: &Message,
-    connection: u64,
-    bucket: &mut Bucket,
-    inbox: &SyncSender<Inbound>,
-    counts: &TrafficCounts,
-) -> bool {
+fn take(message: &Message, connection: u64, bucket: &mut Bucket, inbox: &Inbox, counts: &TrafficCounts) -> bool {
     let events = match message {
         Message::Text(text) => serde_json::from_str::<ClientMessage>(text).ok().map(|message| message.events),
         Message::Ping(_) | Message::Pong(_) => return true,
@@ -194,5 +221,5 @@ fn take(
             Inbound::Dropped { connection }
         }
     };
-    inbox.send(inbound).is_ok()
+    inbox.send(inbound)
 }

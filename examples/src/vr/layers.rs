@@ -12,6 +12,7 @@ use serde::Serialize;
 use super::error::VrError;
 use crate::pictures::Rgb;
 use crate::report::save_figures;
+use crate::whole_file;
 
 /// The tables below the folder of the pigments.
 const COEFFICIENTS: &str = "pigment_painter_KS/pigment_ks_380_750.csv";
@@ -96,7 +97,7 @@ pub(super) fn save_layers(pigments: &Path, folder: &Path) -> Result<(), VrError>
         line(row.name, "measured", [0.0; 2], &row.measured);
     }
     let path = folder.join("layers.csv");
-    std::fs::write(&path, table).map_err(VrError::unwritable(&path))?;
+    whole_file::write(&path, table).map_err(VrError::unwritable(&path))?;
     picture(&rows).save(&folder.join("layers.png"))?;
 
     let mut errors: Vec<[f64; 2]> = rows.iter().map(|row| row.error(&row.opaque)).collect();

@@ -18,10 +18,16 @@ pub enum Notice {
     Saved {
         /// The recording.
         path: String,
+        /// Share of the paint that the mission leaves out, because it lies thicker than a picture can say.
+        left_out: f64,
     },
     /// The session is over; the results are written.
     Ended {
         /// Where.
         folder: String,
+        /// As in [`Notice::Saved`].
+        left_out: f64,
+        /// Why the results are not usable, if they are not.
+        failed: Option<String>,
     },
 }

@@ -19,6 +19,7 @@ use crate::appearance::{Appearance, AppearanceError};
 use crate::pictures::{Panel, Rgb, save_curves};
 use crate::progress::Stage;
 use crate::report::save_figures;
+use crate::whole_file;
 
 /// Width and height of a view, pixels.
 const VIEW: (u32, u32) = (900, 560);
@@ -30,8 +31,8 @@ const LEAST_FLOWN: f64 = 0.5;
 const LOST: f64 = 1.0;
 const LOST_TIME: f64 = 30.0;
 
-/// Writes pictures, mission and report; the report last.
-pub(super) fn save(session: &Session, traffic: &Traffic, folder: &Path) -> Result<(), VrError> {
+/// Writes pictures, mission and report; the report last. The share of the paint that the mission leaves out.
+pub(super) fn save(session: &Session, traffic: &Traffic, folder: &Path) -> Result<f64, VrError> {
     let stage = Stage::start("results");
     let appearance = Appearance::charcoal_on_sandstone().map_err(|error| match error {
         AppearanceError::Paint(error) => VrError::Simulation(error),
@@ -63,7 +64,7 @@ pub(super) fn save(session: &Session, traffic: &Traffic, folder: &Path) -> Resul
     }
     match session.behind() {
         Some([lag, seconds]) if lag > LOST && seconds > LOST_TIME => Err(VrError::NeverCaughtUp { lag, seconds }),
-        _ => Ok(()),
+        _ => Ok(left_out),
     }
 }
 
@@ -95,7 +96,7 @@ fn save_latency_table(session: &Session, path: &Path) -> Result<(), VrError> {
     for (name, curve) in [("time_s", &curves.time), ("distance_m", &curves.distance)] {
         table.extend(curve.iter().map(|(time, value)| format!("{time:.3},{name},{value:.4}\n")));
     }
-    std::fs::write(path, table).map_err(VrError::unwritable(path))
+    whole_file::write(path, table).map_err(VrError::unwritable(path))
 }
 
 /// The surface in its paint as the person sees it from the start.

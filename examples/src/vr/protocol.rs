@@ -9,7 +9,7 @@ use super::session::Session;
 use super::world::VrWorld;
 
 /// Version of everything below; the page reloads itself where it differs.
-pub(super) const PROTOCOL: u32 = 2;
+pub(super) const PROTOCOL: u32 = 3;
 
 /// From the page.
 #[derive(Debug, Deserialize)]

@@ -1,8 +1,8 @@
 //! A session as MCAP: events and plans as JSON of our own, the flight with Foxglove's schema.
 
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, UNIX_EPOCH};
 
 use foxglove::messages::{Pose, PoseInFrame, Timestamp};
 use mcap::Message;
@@ -16,11 +16,12 @@ use super::settings::VrSettings;
 use super::simulated_vehicle::VehicleView;
 use crate::mcap_messages::{MessagesFault, messages_of};
 use crate::recording::{Recorder, quaternion, vector};
+use crate::whole_file::{self, part_of};
 
 /// Name of the recording in the folder of the results.
 pub(super) const RECORDING: &str = "session.mcap";
-/// Its name as long as it is not whole.
-const PART: &str = "session.mcap.part";
+/// A session that ends without warning loses no more than this.
+const LONGEST_LOSS: Duration = Duration::from_secs(5);
 const SETTINGS_TOPIC: &str = "/vr/settings";
 const EVENT_TOPIC: &str = "/vr/event";
 const PLAN_TOPIC: &str = "/vr/plan";
@@ -80,8 +81,9 @@ struct RecordingWriter {
 }
 
 impl RecordingWriter {
-    fn create(path: &Path) -> Result<Self, VrError> {
-        let mut recorder = Recorder::create(path)?;
+    /// `kept`: as [`WholeFile::create_kept`](whole_file::WholeFile::create_kept).
+    fn create(path: &Path, kept: bool) -> Result<Self, VrError> {
+        let mut recorder = if kept { Recorder::create_kept(path) } else { Recorder::create(path) }?;
         let settings = recorder.json_channel(SETTINGS_TOPIC, "paintcopter.VrSettings", SCHEMA)?;
         let events = recorder.json_channel(EVENT_TOPIC, "paintcopter.VrEvent", SCHEMA)?;
         let plans = recorder.json_channel(PLAN_TOPIC, "paintcopter.VrPlan", SCHEMA)?;
@@ -100,71 +102,94 @@ impl RecordingWriter {
             };
             Ok(self.recorder.write_bytes(channel, message.log_time, &message.data)?)
         })
+        .map(|_| ())
     }
 }
 
-/// Writes a session as it goes, beside its final name: what has that name is whole.
+/// Writes a session as it goes, beside its final name: what has that name is whole, and the rest can be replayed all the same.
 pub struct SessionRecorder {
-    writer: RecordingWriter,
-    /// The recording when it is whole, and while it is not.
+    /// `None` only while one file is finished and the next is begun, or after that has failed.
+    writer: Option<RecordingWriter>,
     path: PathBuf,
-    part: PathBuf,
-    /// The plans as a table.
-    table: BufWriter<File>,
+    /// The plans as a table, and where it is written.
+    table: String,
     table_path: PathBuf,
+    /// Whether it cannot be made again, and when what is recorded was last made safe.
+    kept: bool,
+    flushed: Instant,
 }
 
 impl SessionRecorder {
-    /// Begins `session.mcap` and `plan.csv` in a folder.
+    /// Begins `session.mcap` and `plan.csv` in a folder. A session that is there is kept: it is renamed, and so is what was left of one that
+    /// ended without its last words. `by_hand`: a person paints, and what is recorded stays whatever happens.
     ///
     /// # Errors
     /// Files that cannot be written.
-    pub fn create(folder: &Path, settings: &VrSettings) -> Result<Self, VrError> {
-        let (path, part) = (folder.join(RECORDING), folder.join(PART));
-        let mut writer = RecordingWriter::create(&part)?;
-        let table_path = folder.join("plan.csv");
-        let mut table = File::create(&table_path).map(BufWriter::new).map_err(VrError::unwritable(&table_path))?;
-        writeln!(table, "task,kind,time_s,x_m,y_m,z_m,heading_rad,pan_rad,tilt_rad,target")
-            .map_err(VrError::unwritable(&table_path))?;
+    pub fn create(folder: &Path, settings: &VrSettings, by_hand: bool) -> Result<Self, VrError> {
+        let path = folder.join(RECORDING);
+        for earlier in [path.clone(), part_of(&path)] {
+            keep(&earlier)?;
+        }
+        let mut writer = RecordingWriter::create(&path, by_hand)?;
         writer.recorder.write_json(writer.settings, 0.0, settings)?;
-        Ok(Self { writer, path, part, table, table_path })
+        let table = "task,kind,time_s,x_m,y_m,z_m,heading_rad,pan_rad,tilt_rad,target\n".into();
+        let table_path = folder.join("plan.csv");
+        Ok(Self { writer: Some(writer), path, table, table_path, kept: by_hand, flushed: Instant::now() })
     }
 
     /// Makes what is recorded so far a whole file, and goes on in another that begins with the same: a finished MCAP file has its index
     /// at its end. Its path.
     pub(super) fn save(&mut self) -> Result<PathBuf, VrError> {
         self.close()?;
-        self.writer = RecordingWriter::create(&self.part)?;
-        self.writer.copy(&self.path)?;
+        let mut next = RecordingWriter::create(&self.path, self.kept)?;
+        next.copy(&self.path)?;
+        self.writer = Some(next);
         Ok(self.path.clone())
     }
 
     fn close(&mut self) -> Result<(), VrError> {
-        self.table.flush().map_err(VrError::unwritable(&self.table_path))?;
-        self.writer.recorder.finish()?;
-        std::fs::rename(&self.part, &self.path).map_err(VrError::unwritable(&self.path))
+        if let Some(writer) = self.writer.take() {
+            writer.recorder.finish()?;
+        }
+        whole_file::write(&self.table_path, &self.table).map_err(VrError::unwritable(&self.table_path))
+    }
+
+    /// Makes the events so far safe, from time to time: a chunk of a recording can be read when it has ended.
+    fn flush(&mut self) -> Result<(), VrError> {
+        if self.flushed.elapsed() < LONGEST_LOSS {
+            return Ok(());
+        }
+        self.flushed = Instant::now();
+        Ok(self.writer()?.recorder.flush()?)
+    }
+
+    fn writer(&mut self) -> Result<&mut RecordingWriter, VrError> {
+        let gone = || VrError::recording(&self.path, "could not be saved before: nothing more is recorded");
+        self.writer.as_mut().ok_or_else(gone)
     }
 
     pub(super) fn event(&mut self, time: f64, event: &Event) -> Result<(), VrError> {
-        Ok(self.writer.recorder.write_json(self.writer.events, time, event)?)
+        let writer = self.writer()?;
+        writer.recorder.write_json(writer.events, time, event)?;
+        self.flush()
     }
 
     pub(super) fn plan(&mut self, planned: &PlannedTask, mark: &PlanMark) -> Result<(), VrError> {
-        self.write_table(planned).map_err(VrError::unwritable(&self.table_path))?;
-        Ok(self.writer.recorder.write_json(self.writer.plans, planned.time, mark)?)
+        self.write_table(planned);
+        let writer = self.writer()?;
+        Ok(writer.recorder.write_json(writer.plans, planned.time, mark)?)
     }
 
     /// The waypoints of a plan as rows; numbers have the digits that tell them apart.
-    fn write_table(&mut self, planned: &PlannedTask) -> std::io::Result<()> {
+    fn write_table(&mut self, planned: &PlannedTask) {
         let (number, kind) = (planned.number, planned.kind.name());
         for waypoint in planned.flight.iter().flat_map(|flight| &flight.plan.waypoints) {
             let s = &waypoint.state;
             let target = waypoint.target.map_or(String::new(), |target| target.to_string());
             let [x, y, z] = s.position.into();
             let numbers = format!("{},{x},{y},{z},{},{},{}", planned.time + waypoint.time, s.heading, s.pan, s.tilt);
-            writeln!(self.table, "{number},{kind},{numbers},{target}")?;
+            let _ = writeln!(self.table, "{number},{kind},{numbers},{target}");
         }
-        Ok(())
     }
 
     pub(super) fn vehicle(&mut self, time: f64, view: &VehicleView) -> Result<(), VrError> {
@@ -172,7 +197,8 @@ impl SessionRecorder {
         let pose = Some(Pose { position: Some(vector(body)), orientation: Some(quaternion(body)) });
         let timestamp = Some(Timestamp::saturating_from_epoch_secs_f64(time));
         let message = PoseInFrame { timestamp, frame_id: "world".into(), pose };
-        Ok(self.writer.recorder.write(self.writer.vehicle, time, &message)?)
+        let writer = self.writer()?;
+        Ok(writer.recorder.write(writer.vehicle, time, &message)?)
     }
 
     pub(super) fn finish(mut self) -> Result<(), VrError> {
@@ -184,13 +210,15 @@ impl SessionRecorder {
 pub(super) struct RecordedSession {
     pub(super) settings: VrSettings,
     pub(super) plans: Vec<PlanMark>,
+    /// Whether it has its end.
+    pub(super) whole: bool,
 }
 
 impl RecordedSession {
     /// Reads settings and plans; the events are streamed by [`for_each_event`].
     pub(super) fn open(path: &Path) -> Result<Self, VrError> {
         let (mut settings, mut plans) = (None, Vec::new());
-        for_each_message(path, |message| {
+        let whole = for_each_message(path, |message| {
             let (topic, data) = (message.channel.topic.as_str(), &message.data[..]);
             match topic {
                 SETTINGS_TOPIC => settings = Some(parsed(path, topic, data)?),
@@ -199,10 +227,13 @@ impl RecordedSession {
             }
             Ok(())
         })?;
+        if !whole {
+            eprintln!("{}: its end is missing: what is there is painted", path.display());
+        }
         let settings = settings.ok_or_else(|| {
             VrError::recording(path, "no session of `vr`: it has no topic /vr/settings; give a session.mcap")
         })?;
-        Ok(Self { settings, plans })
+        Ok(Self { settings, plans, whole })
     }
 }
 
@@ -212,17 +243,38 @@ pub(super) fn for_each_event(path: &Path, mut take: impl FnMut(Event) -> Result<
         topic @ EVENT_TOPIC => take(parsed(path, topic, &message.data)?),
         _ => Ok(()),
     })
+    .map(|_| ())
 }
 
-fn for_each_message(path: &Path, mut take: impl FnMut(&Message) -> Result<(), VrError>) -> Result<(), VrError> {
+/// Renames a recording after the time of its last change, so that no session overwrites it.
+fn keep(path: &Path) -> Result<(), VrError> {
+    let Ok(changed) = std::fs::metadata(path).and_then(|found| found.modified()) else { return Ok(()) };
+    let seconds = changed.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    let (mut kept, mut number) = (path.with_file_name(format!("session-{seconds}.mcap")), 1);
+    while kept.exists() {
+        number += 1;
+        kept.set_file_name(format!("session-{seconds}-{number}.mcap"));
+    }
+    std::fs::rename(path, &kept).map_err(VrError::unwritable(&kept))?;
+    eprintln!("an earlier session is kept as {}", kept.display());
+    Ok(())
+}
+
+/// Hands out the messages of a recording; whether it has its end. A session that ended without its last words is what there is of it.
+fn for_each_message(path: &Path, mut take: impl FnMut(&Message) -> Result<(), VrError>) -> Result<bool, VrError> {
     let fault = |fault: MessagesFault| match fault {
         MessagesFault::Unreadable(why) => VrError::recording(path, format!("cannot be read ({why})")),
-        MessagesFault::Malformed(why) => VrError::recording(path, why),
+        MessagesFault::Malformed(why) | MessagesFault::CutOff(why) => VrError::recording(path, why),
     };
+    let mut empty = true;
     for message in messages_of(path).map_err(fault)? {
-        take(&message.map_err(fault)?)?;
+        match message {
+            Err(MessagesFault::CutOff(_)) if !empty => return Ok(false),
+            message => take(&message.map_err(fault)?)?,
+        }
+        empty = false;
     }
-    Ok(())
+    Ok(true)
 }
 
 fn parsed<T: for<'a> Deserialize<'a>>(path: &Path, topic: &str, data: &[u8]) -> Result<T, VrError> {

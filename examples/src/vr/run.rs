@@ -16,7 +16,9 @@ use super::session::{Handled, Session};
 use super::settings::VrSettings;
 use super::watch::watch;
 use super::world::VrWorld;
+use crate::interruption::Finishing;
 use crate::progress::Stage;
+use crate::run_folder;
 
 /// Runs the program.
 ///
@@ -24,7 +26,7 @@ use crate::progress::Stage;
 /// [`VrError`] names the input and the way out.
 pub fn run(arguments: &Arguments) -> Result<(), VrError> {
     let folder = &arguments.out;
-    std::fs::create_dir_all(folder).map_err(VrError::unwritable(folder))?;
+    run_folder::begin(folder, "vr").map_err(VrError::unwritable(folder))?;
     if let Some(path) = &arguments.replay {
         return replay(path, folder);
     }
@@ -32,6 +34,7 @@ pub fn run(arguments: &Arguments) -> Result<(), VrError> {
         return Err(VrError::PigmentsUnused);
     }
     if let Some(source) = &arguments.watch {
+        let _finishing = Finishing::begin();
         return watch(source, arguments);
     }
     if let (Some(Experiment::Layers), Some(pigments)) = (arguments.experiment, &arguments.pigments) {
@@ -39,11 +42,13 @@ pub fn run(arguments: &Arguments) -> Result<(), VrError> {
     }
     let settings = arguments.settings();
     let world = VrWorld::new(&settings)?;
-    let recorder = SessionRecorder::create(folder, &settings)?;
     if let Some(way) = arguments.experiment.and_then(Experiment::way) {
+        let recorder = SessionRecorder::create(folder, &settings, false)?;
         let events = hand(&world, way, arguments.hand_speed, settings.seed);
         return perform(way, &events, Session::new(settings, world, Some(recorder))?, folder);
     }
+    let _finishing = Finishing::begin();
+    let recorder = SessionRecorder::create(folder, &settings, true)?;
     serve(arguments, Session::new(settings, world, Some(recorder))?)
 }
 
@@ -78,7 +83,7 @@ fn replay(path: &Path, folder: &Path) -> Result<(), VrError> {
     }
     let settings: VrSettings = recorded.settings;
     let world = VrWorld::new(&settings)?;
-    let recorder = SessionRecorder::create(folder, &settings)?;
+    let recorder = SessionRecorder::create(folder, &settings, false)?;
     let mut session = Session::new(settings, world, Some(recorder))?;
     let stage = Stage::start("replay");
     let mut traffic = Traffic::default();
@@ -98,7 +103,8 @@ fn replay(path: &Path, folder: &Path) -> Result<(), VrError> {
     session.finish()?;
     tell(&mut session);
     let again = session.plans();
-    let plans = recorded.plans.len().max(again.len());
+    // Where the end is missing, more is planned now than then.
+    let plans = if recorded.whole { recorded.plans.len().max(again.len()) } else { recorded.plans.len() };
     let equal = recorded.plans.iter().zip(again).filter(|(a, b)| a == b).count();
     stage.done(&format!("{equal} of {plans} plans the same, bit for bit"));
     save(&session, &traffic, folder)?;

@@ -11,11 +11,12 @@ use super::client::Client;
 use super::connection::{Inbound, Outgoing, TrafficCounts};
 use super::counters::Traffic;
 use super::error::VrError;
-use super::listener::listen;
+use super::listener::{Listening, listen};
 use super::message::Notice;
 use super::output::save;
 use super::protocol::{ServerMessage, patch, robot, surface, welcome};
 use super::session::{Handled, Session};
+use crate::interruption;
 
 /// Time between two changes of what the person paints, and between two of the robot and of what it has sprayed.
 const HAND_STEP: Duration = Duration::from_millis(5);
@@ -33,8 +34,8 @@ pub(super) fn serve(arguments: &Arguments, mut session: Session) -> Result<(), V
             Err(RecvTimeoutError::Timeout) => false,
             Err(RecvTimeoutError::Disconnected) => true,
         };
-        if ended || listening.enter.try_recv().is_ok() {
-            return connection.end(&mut session, arguments, &listening.counts);
+        if ended || listening.enter.try_recv().is_ok() || interruption::is_requested() {
+            return connection.end(&mut session, arguments, &listening);
         }
         connection.show(&mut session);
     }
@@ -120,17 +121,25 @@ impl Connection {
         }
     }
 
-    fn end(&mut self, session: &mut Session, arguments: &Arguments, counts: &TrafficCounts) -> Result<(), VrError> {
+    fn end(&mut self, session: &mut Session, arguments: &Arguments, listening: &Listening) -> Result<(), VrError> {
+        let text = "the robot finishes, and the results are written".into();
+        self.client.say(&ServerMessage::Notice { notice: Notice::Text { text } });
+        listening.close_inbox();
+        let saved = self.finish(session, arguments, &listening.counts);
+        let (folder, left_out) = (arguments.out.display().to_string(), *saved.as_ref().unwrap_or(&0.0));
+        let failed = saved.as_ref().err().map(ToString::to_string);
+        self.client.say(&ServerMessage::Notice { notice: Notice::Ended { folder, left_out, failed } });
+        self.client.leave();
+        listening.wait_until_told();
+        saved.map(|_| ())
+    }
+
+    fn finish(&mut self, session: &mut Session, arguments: &Arguments, counts: &TrafficCounts) -> Result<f64, VrError> {
         session.finish()?;
         self.missed = [true; 2];
         self.shown = [None; 2];
         self.show(session);
-        let saved = self.save(session, arguments, counts);
-        self.client
-            .say(&ServerMessage::Notice { notice: Notice::Ended { folder: arguments.out.display().to_string() } });
-        // Time for the last words to reach the page.
-        std::thread::sleep(Duration::from_millis(200));
-        saved
+        self.save(session, arguments, counts)
     }
 
     /// Writes recording and results while the session goes on. What cannot be written then is told and no end of the session.
@@ -138,18 +147,22 @@ impl Connection {
         let saved = session.save_recording().and_then(|path| {
             // Too little flown is a result of the end, not of the way to it.
             match self.save(session, arguments, counts) {
-                Ok(()) | Err(VrError::Unreachable { .. } | VrError::NeverCaughtUp { .. }) => Ok(path),
+                Ok(left_out) => Ok((path, left_out)),
+                Err(VrError::Unreachable { .. } | VrError::NeverCaughtUp { .. }) => Ok((path, 0.0)),
                 Err(error) => Err(error),
             }
         });
         let notice = match saved {
-            Ok(path) => Notice::Saved { path: path.map_or_else(String::new, |path| path.display().to_string()) },
+            Ok((path, left_out)) => {
+                Notice::Saved { path: path.map_or_else(String::new, |path| path.display().to_string()), left_out }
+            }
             Err(error) => Notice::Text { text: format!("not saved: {error}") },
         };
         self.client.say(&ServerMessage::Notice { notice });
     }
 
-    fn save(&mut self, session: &Session, arguments: &Arguments, counts: &TrafficCounts) -> Result<(), VrError> {
+    /// Writes the results; the share of the paint that the mission leaves out.
+    fn save(&mut self, session: &Session, arguments: &Arguments, counts: &TrafficCounts) -> Result<f64, VrError> {
         self.traffic.malformed = counts.malformed.load(Ordering::Relaxed);
         self.traffic.too_many = counts.too_many.load(Ordering::Relaxed);
         self.traffic.refused = counts.refused.load(Ordering::Relaxed);

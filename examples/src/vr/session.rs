@@ -161,7 +161,19 @@ impl Session {
     /// # Errors
     /// As [`Session::handle`].
     pub fn finish(&mut self) -> Result<(), VrError> {
-        let Some(last) = self.last_tick else { return Ok(()) };
+        if let Some(last) = self.last_tick {
+            self.fly_on(last)?;
+        }
+        if let Some(recorder) = self.recorder.take() {
+            recorder.finish()?;
+        }
+        // The pictures show what has been flown now.
+        self.take_patches();
+        Ok(())
+    }
+
+    /// Everything that is left after the last tick of the hand.
+    fn fly_on(&mut self, last: VrState) -> Result<(), VrError> {
         self.teleop.fly_strokes();
         let (lag, end) = (self.lag(), last.time + LONGEST_FINISH);
         let mut tick = VrState { mode: VrMode::Idle, hit: None, ..last };
@@ -171,11 +183,6 @@ impl Session {
             self.tick(tick)?;
         }
         self.behind = Some([if self.is_live() { lag } else { 0.0 }, self.time() - last.time]);
-        if let Some(recorder) = self.recorder.take() {
-            recorder.finish()?;
-        }
-        // The pictures show what has been flown now.
-        self.take_patches();
         Ok(())
     }
 

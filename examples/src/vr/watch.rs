@@ -23,9 +23,10 @@ use super::client::Client;
 use super::connection::{Inbound, Outgoing};
 use super::error::VrError;
 use super::event::{Command, Event};
-use super::listener::listen;
+use super::listener::{Listening, listen};
 use super::message::Notice;
 use super::protocol::{Frame, PROTOCOL, ServerMessage};
+use crate::interruption;
 use crate::report::save_figures;
 use feed::{Feed, Heard};
 use foxglove_client::FoxgloveClient;
@@ -72,9 +73,8 @@ pub(super) fn watch(source: &WatchSource, arguments: &Arguments) -> Result<(), V
             Err(RecvTimeoutError::Disconnected) => true,
         };
         show.go_on();
-        if ended || listening.enter.try_recv().is_ok() {
-            let refused = listening.counts.refused.load(Ordering::Relaxed);
-            return show.end(refused, &arguments.out);
+        if ended || listening.enter.try_recv().is_ok() || interruption::is_requested() {
+            return show.end(&listening, &arguments.out);
         }
     }
 }
@@ -239,10 +239,10 @@ impl Show {
     }
 
     /// Says goodbye and writes the report.
-    fn end(mut self, refused_connections: u64, folder: &Path) -> Result<(), VrError> {
+    fn end(mut self, listening: &Listening, folder: &Path) -> Result<(), VrError> {
         let counts = self.scene.counts();
         let source = self.feed.name();
-        self.client.say(&ServerMessage::Notice { notice: Notice::Ended { folder: folder.display().to_string() } });
+        listening.close_inbox();
         save_figures(
             &WatchFigures {
                 source: source.clone(),
@@ -252,7 +252,7 @@ impl Show {
                 entities: self.scene.keys().count() as u64,
                 triangles: self.scene.triangles(),
                 parts_not_drawn: counts.not_drawn,
-                refused_connections,
+                refused_connections: listening.counts.refused.load(Ordering::Relaxed),
                 connections: self.client.connections,
                 unsent_messages: self.client.unsent,
                 version: env!("CARGO_PKG_VERSION"),
@@ -266,8 +266,11 @@ impl Show {
                 counts.malformed, counts.not_drawn
             );
         }
-        // Time for the last words to reach the page.
-        std::thread::sleep(Duration::from_millis(200));
+        let folder = folder.display().to_string();
+        let notice = Notice::Ended { folder, left_out: 0.0, failed: None };
+        self.client.say(&ServerMessage::Notice { notice });
+        self.client.leave();
+        listening.wait_until_told();
         if self.begun && counts.messages == 0 {
             return Err(VrError::NothingToWatch { from: source });
         }

@@ -14,6 +14,8 @@ mod gyroscope;
 #[cfg(feature = "handheld")]
 mod handheld;
 mod independence;
+#[cfg(all(feature = "programs", unix))]
+mod interruptions;
 mod layout;
 mod line_art;
 #[cfg(feature = "scan")]
@@ -53,5 +55,9 @@ mod unwrap;
 mod vio;
 #[cfg(feature = "vr")]
 mod vr;
+#[cfg(feature = "vr")]
+mod vr_client;
+#[cfg(feature = "vr")]
+mod vr_connections;
 #[cfg(feature = "vr")]
 mod vr_layers;

@@ -1,14 +1,12 @@
 //! The binary `vr`: a simulated hand and its replay, the server against clients that behave and clients that do not.
 
-use std::io::{BufRead, BufReader, Read, Write};
-use std::net::TcpStream;
-use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::process::{Command, Output};
 
 use serde_json::{Value, json};
-use tungstenite::{Message, WebSocket};
+use tungstenite::Message;
 
 use crate::scratch::Scratch;
+use crate::vr_client::{Client, Server};
 
 /// A wall of 2.6 metres by 1.4, facing -x.
 const WALL: &str = "v 0 1.3 1\nv 0 -1.3 1\nv 0 -1.3 2.4\nv 0 1.3 2.4\nf 1 2 3\nf 1 3 4\n";
@@ -24,7 +22,7 @@ pub(crate) fn report(folder: &str) -> Value {
     serde_json::from_str(&std::fs::read_to_string(format!("{folder}/report.json")).unwrap()).unwrap()
 }
 
-fn wall(scratch: &Scratch) -> [String; 5] {
+pub(crate) fn wall(scratch: &Scratch) -> [String; 5] {
     scratch.write("wall.obj", WALL);
     ["--mesh".into(), scratch.path("wall.obj"), "--up".into(), "z".into(), "--scale=1".into()]
 }
@@ -87,107 +85,6 @@ fn a_session_is_flown_as_it_was_seen_and_replays_bit_for_bit() {
     assert!(output.status.code() == Some(1) && text.contains("wall.obj"), "{text}");
 }
 
-/// A running server; ended if a test fails.
-struct Server {
-    child: Child,
-    address: String,
-    query: String,
-}
-
-impl Server {
-    fn start(arguments: &[&str]) -> Self {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_vr"))
-            .args(arguments)
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        let mut line = String::new();
-        BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
-        let (address, query) = line.trim().trim_start_matches("http://").split_once('/').unwrap();
-        Self { child, address: address.replace("0.0.0.0", "127.0.0.1"), query: query.into() }
-    }
-
-    /// The status line of a request.
-    fn get(&self, path: &str, headers: &str) -> String {
-        let mut stream = TcpStream::connect(&self.address).unwrap();
-        let host = if headers.contains("Host:") { String::new() } else { format!("Host: {}\r\n", self.address) };
-        stream.write_all(format!("GET {path} HTTP/1.1\r\n{host}{headers}\r\n").as_bytes()).unwrap();
-        let mut answer = Vec::new();
-        let _ = stream.read_to_end(&mut answer);
-        String::from_utf8_lossy(&answer).lines().next().unwrap_or("").to_owned()
-    }
-
-    fn connect(&self, key: &str) -> Result<Client, String> {
-        let stream = TcpStream::connect(&self.address).unwrap();
-        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
-        let address =
-            format!("ws://{}/session{}&key={key}", self.address, if self.query.is_empty() { "?" } else { &self.query });
-        let (socket, _) = tungstenite::client(&address, stream).map_err(|error| error.to_string())?;
-        let mut client = Client { socket, key: String::new(), next: 0 };
-        let welcome = client.until("welcome");
-        client.key = welcome["key"].as_str().unwrap().into();
-        client.next = welcome["next_sequence"].as_u64().unwrap();
-        Ok(client)
-    }
-
-    fn finish(mut self) -> bool {
-        let begun = Instant::now();
-        while begun.elapsed() < Duration::from_mins(1) {
-            if let Some(status) = self.child.try_wait().unwrap() {
-                return status.success();
-            }
-            std::thread::sleep(Duration::from_millis(50));
-        }
-        false
-    }
-}
-
-impl Drop for Server {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-    }
-}
-
-struct Client {
-    socket: WebSocket<TcpStream>,
-    key: String,
-    next: u64,
-}
-
-impl Client {
-    /// The next message of a type.
-    fn until(&mut self, kind: &str) -> Value {
-        loop {
-            if let Message::Text(text) = self.socket.read().unwrap() {
-                let message: Value = serde_json::from_str(&text).unwrap();
-                if message["type"] == kind {
-                    return message;
-                }
-            }
-        }
-    }
-
-    fn send(&mut self, events: &[Value]) -> u64 {
-        self.socket.send(Message::text(json!({ "events": events }).to_string())).unwrap();
-        self.until("ack")["next_sequence"].as_u64().unwrap()
-    }
-
-    /// States of a gun before the wall, in the order of `sequence`; they paint between 10 and 40.
-    fn states(from: u64, to: u64) -> Vec<Value> {
-        let mode = |k| if (10..40).contains(&k) { "painting" } else { "idle" };
-        (from..to).map(|k| Self::state(k, mode(k), [0.2 - 0.005 * k as f64, 2.2], (0, 4e-7))).collect()
-    }
-
-    /// A gun 10 cm before the wall, at `y` and `z`.
-    fn state(k: u64, mode: &str, [y, z]: [f64; 2], (colour, flow): (u8, f64)) -> Value {
-        json!({"state": {"version": 1, "sequence": k, "time": k as f64 / 90.0, "mode": mode,
-            "nozzle": {"translation": [-0.1, y, z], "rotation": [0.0, 0.0, 0.0, 1.0]},
-            "cradle": {"position": [-1.0, 0.0, 2.2], "heading": 0.0}, "colour": colour, "flow": flow}})
-    }
-}
-
 #[test]
 fn nothing_is_lost_or_done_twice_over_lost_connections() {
     let s = Scratch::new("vr-server");
@@ -204,7 +101,9 @@ fn nothing_is_lost_or_done_twice_over_lost_connections() {
 
     let mut client = server.connect("").unwrap();
     assert_eq!(client.send(&Client::states(0, 20)), 20);
-    assert!(server.connect("").is_err() && server.connect("guessed").is_err(), "another person is painting");
+    for key in ["", "guessed"] {
+        assert_eq!(server.connect(key).unwrap_err(), "4001 Another person is here.");
+    }
     // A gap: what follows it is not taken.
     assert_eq!(client.send(&Client::states(25, 30)), 20);
     // The connection is lost; what had arrived comes again with the rest.
@@ -212,12 +111,8 @@ fn nothing_is_lost_or_done_twice_over_lost_connections() {
     let mut client = server.connect(&key).unwrap();
     assert_eq!((client.next, client.key.as_str()), (20, key.as_str()));
     assert_eq!(client.send(&Client::states(10, 60)), 60);
-    client
-        .socket
-        .send(Message::text(json!({"events": [{"command": {"sequence": 60, "command": {"do": "end"}}}]}).to_string()))
-        .unwrap();
-    client.until("notice");
-    assert!(server.finish());
+    assert_eq!(client.end(60)["folder"], out.as_str());
+    assert_eq!(server.finish(), Some(0));
     let figures = report(&out);
     let count = |name: &str| figures[name].as_u64().unwrap();
     assert_eq!((count("events"), count("states"), count("repeated_events")), (61, 60, 10));
@@ -261,8 +156,8 @@ fn a_session_in_two_colours_is_flown_as_a_mission_of_two_paints() {
     }
     events.push(json!({"command": {"sequence": 300, "command": {"do": "end"}}}));
     client.socket.send(Message::text(json!({ "events": events }).to_string())).unwrap();
-    client.until("notice");
-    assert!(server.finish());
+    assert_eq!(client.ended()["folder"], out.as_str());
+    assert_eq!(server.finish(), Some(0));
 
     let mission = std::fs::read_to_string(format!("{out}/mission.toml")).unwrap();
     let [blue, red] = ["\"blue\"", "\"red\""].map(|name| mission.find(name).expect("both paints are saved"));
@@ -350,12 +245,8 @@ fn ten_thousand_bad_messages_are_counted_and_the_session_goes_on() {
         client = server.connect(&key).unwrap();
     }
     assert_eq!(client.send(&Client::states(1, 60)), 60);
-    client
-        .socket
-        .send(Message::text(json!({"events": [{"command": {"sequence": 60, "command": {"do": "end"}}}]}).to_string()))
-        .unwrap();
-    client.until("notice");
-    assert!(server.finish());
+    assert_eq!(client.end(60)["folder"], out.as_str());
+    assert_eq!(server.finish(), Some(0));
     let figures = report(&out);
     let count = |name: &str| figures[name].as_u64().unwrap();
     assert_eq!(count("malformed_messages"), 10_000);

@@ -9,6 +9,7 @@ export class Banner {
   private readonly canvas = document.createElement("canvas");
   private readonly texture: THREE.CanvasTexture;
   private timer = 0;
+  private last = false;
 
   constructor(line: HTMLElement) {
     this.line = line;
@@ -24,6 +25,17 @@ export class Banner {
   }
 
   say(text: string, headset: boolean): void {
+    this.show(text, headset, false);
+  }
+
+  /** The last words: they stay. */
+  stay(text: string, headset: boolean): void {
+    this.show(text, headset, true);
+    this.last = true;
+  }
+
+  private show(text: string, headset: boolean, stays: boolean): void {
+    if (this.last) return;
     this.line.textContent = text;
     this.line.classList.add("on");
     const pen = this.canvas.getContext("2d");
@@ -40,7 +52,7 @@ export class Banner {
     }
     this.sign.visible = headset;
     clearTimeout(this.timer);
-    this.timer = window.setTimeout(() => {
+    this.timer = stays ? 0 : window.setTimeout(() => {
       this.line.classList.remove("on");
       this.sign.visible = false;
     }, SHOWN);

@@ -6,11 +6,16 @@ const MOST_EVENTS = 500;
 // Time between two messages, and before another attempt, milliseconds.
 const SEND_STEP = 8;
 const RETRY = 500;
+// How a visitor's connection ends while another person is here, and the time before the next attempt.
+const OCCUPIED = 4001;
+const OCCUPIED_RETRY = 3000;
 
 export interface Listener {
   message(message: ServerMessage): void;
   binary(data: ArrayBuffer): void;
   connected(open: boolean): void;
+  /** Another person is here. */
+  occupied(): void;
   /** Events before this one are on their way. */
   sent(before: number): void;
 }
@@ -83,10 +88,13 @@ export class Connection {
       if (event.data instanceof ArrayBuffer) this.listener.binary(event.data);
       else this.take(JSON.parse(event.data) as ServerMessage);
     };
-    socket.onclose = () => {
+    socket.onclose = (event) => {
       this.welcomed = false;
-      this.listener.connected(false);
-      if (!this.ended) setTimeout(() => this.open(), RETRY);
+      if (this.ended) return;
+      const occupied = event.code === OCCUPIED;
+      if (occupied) this.listener.occupied();
+      else this.listener.connected(false);
+      setTimeout(() => this.open(), occupied ? OCCUPIED_RETRY : RETRY);
     };
   }
 

@@ -104,7 +104,13 @@ function pause(on: boolean): void {
 }
 
 const sent = (before: number) => delays.sent(before);
-const connection = new Connection({ message, binary, sent, connected: (open) => tools.connected(open, connection.waiting) });
+const connection = new Connection({
+  message,
+  binary,
+  sent,
+  connected: (open) => tools.connected(open, connection.waiting),
+  occupied: () => tools.status("another person is here: this page waits"),
+});
 
 function message(message: ServerMessage): void {
   stale ||= message.type !== "ack" && message.type !== "robot";
@@ -159,11 +165,20 @@ function stand(at: Triple, heading: number): void {
   placed = true;
 }
 
+/** What the mission lacks, from a hundredth of the paint on. */
+const leftOut = (share: number): string =>
+  share < 0.01 ? "" : `; mission.toml leaves out ${Math.round(100 * share)} % of the paint, which lies too thick: less flow, or faster`;
+
 function notice(notice: Notice): void {
   const say = (text: string) => banner.say(text, headset.presenting);
   if (notice.type === "text") return say(notice.text);
-  if (notice.type === "saved") return say(`saved: ${notice.path}`);
-  if (notice.type === "ended") return say(`results in ${notice.folder}`);
+  if (notice.type === "saved") return say(`saved: ${notice.path}${leftOut(notice.left_out)}`);
+  if (notice.type === "ended") {
+    connection.end();
+    tools.status("ended");
+    const results = `results in ${notice.folder}${leftOut(notice.left_out)}`;
+    return banner.stay(notice.failed === null ? results : `${results}: ${notice.failed}`, headset.presenting);
+  }
   switch (notice.say) {
     case "move_closer":
       return say("Move closer to the surface");

@@ -1,6 +1,6 @@
 // What page and server say to each other; see examples/src/vr/protocol.rs.
 
-export const PROTOCOL = 2;
+export const PROTOCOL = 3;
 export const STATE_VERSION = 1;
 
 export type Mode = "idle" | "painting" | "viewing";
@@ -59,8 +59,8 @@ export interface RobotState {
 export type Notice =
   | { type: "feedback"; say: string; distance?: number; lag?: number }
   | { type: "text"; text: string }
-  | { type: "saved"; path: string }
-  | { type: "ended"; folder: string };
+  | { type: "saved"; path: string; left_out: number }
+  | { type: "ended"; folder: string; left_out: number; failed: string | null };
 
 export type Quadruple = [number, number, number, number];
 

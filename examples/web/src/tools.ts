@@ -2,7 +2,7 @@
 import type { RobotState, Triple, Welcome } from "./protocol";
 
 // Flow of the open valve, m^3/s.
-const MOST_FLOW = 1e-6;
+const MOST_FLOW = 5e-7;
 
 const element = <T extends HTMLElement>(id: string) => document.getElementById(id) as T;
 
@@ -98,6 +98,12 @@ export class Tools {
   connected(open: boolean, waiting: number): void {
     element("dot").classList.toggle("on", open);
     element("connection").textContent = open ? "connected" : `connection lost, ${waiting} states kept`;
+  }
+
+  /** There is no connection, and why. */
+  status(text: string): void {
+    element("dot").classList.remove("on");
+    element("connection").textContent = text;
   }
 
   robot(state: RobotState): void {

@@ -11,7 +11,7 @@ use arguments::Arguments;
 use clap::Parser;
 use estimator::{Estimator, Way};
 use nalgebra::{Isometry3, Matrix3, Vector3};
-use paintcopter::exit::exit_code;
+use paintcopter::exit::run_program;
 use paintcopter_benches::flight::{Flight, MapErrors, sway};
 use vio_ekf::lie::so3;
 use vio_ekf::{Odometry, nalgebra};
@@ -19,7 +19,7 @@ use vio_ekf::{Odometry, nalgebra};
 type AnyError = Box<dyn Error>;
 
 fn main() -> ExitCode {
-    exit_code("vio_fusion", run(&Arguments::parse()))
+    run_program("vio_fusion", || run(&Arguments::parse()))
 }
 
 /// What is compared.

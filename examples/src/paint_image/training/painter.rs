@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 use paint_net::train::{TrainSettings, Trainer};
 use serde::Serialize;
 
+use crate::interruption::{self, Finishing};
 use crate::paint_image::error::PaintImageError;
 use crate::paint_image::files::write_json;
 use crate::pictures::{Panel, save_curves};
 use crate::progress::Stage;
 use crate::report::check_finite;
+use crate::whole_file;
 
 /// Steps between two points of the curve.
 const POINT: usize = 50;
@@ -52,15 +54,19 @@ pub fn train_painter(run: &TrainingRun, folder: &Path) -> Result<(), PaintImageE
     };
     let save = |name: &str, bytes: &[u8]| {
         let path = folder.join(name);
-        std::fs::write(&path, bytes)
+        whole_file::write(&path, bytes)
             .map_err(|e| PaintImageError::File { path: path.display().to_string(), why: e.to_string() })
     };
     let stage = Stage::start("train");
     let (mut losses, mut qualities) = (Vec::new(), Vec::new());
     let (mut loss, mut quality, mut count) = (0.0, 0.0, 0.0);
-    let last = run.until.unwrap_or(settings.steps).min(settings.steps);
+    let mut last = run.until.unwrap_or(settings.steps).min(settings.steps);
+    let _finishing = Finishing::begin();
     while trainer.steps_done() < last {
         let progress = trainer.step();
+        if interruption::is_requested() {
+            last = progress.step;
+        }
         loss += progress.loss;
         quality += progress.psnr_db;
         count += 1.0;

@@ -10,11 +10,13 @@ use serde::Serialize;
 
 use super::digits;
 use super::rollout::{rollout_picture, stamp};
+use crate::interruption::{self, Finishing};
 use crate::paint_image::error::PaintImageError;
 use crate::paint_image::files::write_json;
 use crate::pictures::{Panel, save_curves};
 use crate::progress::Stage;
 use crate::report::check_finite;
+use crate::whole_file;
 
 /// Digits that are trained on; the others, which come after them in the file, are held out.
 const TRAINED: usize = 7000;
@@ -82,18 +84,22 @@ pub fn train_thesis(run: &ThesisTrainingRun, folder: &Path) -> Result<(), PaintI
     };
     let save = |name: &str, bytes: &[u8]| {
         let path = folder.join(name);
-        std::fs::write(&path, bytes).map_err(|e| file_error(&path, e.to_string()))
+        whole_file::write(&path, bytes).map_err(|e| file_error(&path, e.to_string()))
     };
     let mut curve = Curve::before(run.resume.as_deref(), trainer.steps_done());
     let picture = |n: u64| match &shown {
         Some(digits) => Ok(digits[(lattice(settings.seed, n as i64, -13) * digits.len() as f64) as usize].clone()),
         None => thesis_patch(settings.seed, n, &settings.architecture),
     };
-    let last = run.until.unwrap_or(settings.steps).min(settings.steps);
+    let mut last = run.until.unwrap_or(settings.steps).min(settings.steps);
     let stage = Stage::start("train");
+    let _finishing = Finishing::begin();
     while trainer.steps_done() < last {
         let loss = trainer.step(&picture)?;
         let step = trainer.steps_done();
+        if interruption::is_requested() {
+            last = step;
+        }
         curve.add(step, "trained", &loss);
         if step % run.save_every.max(1) == 0 || step == last {
             curve.add(step, "held", &trainer.validate(&held)?);

@@ -91,7 +91,7 @@ impl Feed for Recorded {
 fn why(fault: MessagesFault) -> String {
     match fault {
         MessagesFault::Unreadable(why) => format!("cannot be read ({why})"),
-        MessagesFault::Malformed(why) => why,
+        MessagesFault::Malformed(why) | MessagesFault::CutOff(why) => why,
     }
 }
 

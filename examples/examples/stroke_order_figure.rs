@@ -1,7 +1,7 @@
 //! Draws the route over the strokes of a picture, in the painter's order and in that of `order_strokes`, for the planner's chapter:
 //!
 //! ```text
-//! cargo run --release -p paintcopter --example stroke_order -- docs/src/images/stroke-order.png
+//! cargo run --release -p paintcopter --example stroke_order_figure -- docs/src/images/stroke-order.png
 //! ```
 
 use std::error::Error;
