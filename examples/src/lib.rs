@@ -5,14 +5,26 @@ pub mod adapters;
 pub mod appearance;
 #[cfg(all(feature = "autopilot", unix))]
 pub mod autopilot;
+pub mod console;
 pub mod design;
 pub mod exit;
 #[cfg(feature = "handheld")]
 pub mod handheld;
 pub mod interruption;
+#[cfg(feature = "log")]
+mod log;
 #[cfg(feature = "recordings")]
 #[cfg_attr(not(feature = "programs"), allow(dead_code, reason = "each program reads and writes some of the messages"))]
 mod mcap_messages;
+#[cfg(not(feature = "log"))]
+mod log {
+    //! Built without the feature `log`: nothing is said.
+    pub(crate) fn subscribe(verbose: u8) {
+        if verbose > 0 || std::env::var_os("RUST_LOG").is_some() {
+            eprintln!("warning: this program was built without the feature `log`: -v and RUST_LOG do nothing");
+        }
+    }
+}
 pub mod mesh_io;
 pub mod mesh_placement;
 mod minimum_jerk;
@@ -30,6 +42,7 @@ pub mod progress;
 pub mod projection;
 pub mod recording;
 pub mod region;
+mod relative_path;
 pub mod report;
 #[cfg(all(feature = "robot", unix))]
 pub mod robot;
@@ -52,6 +65,7 @@ pub mod vio;
 #[cfg(feature = "vr")]
 pub mod vr;
 pub mod whole_file;
+pub mod worker_threads;
 pub mod world;
 
 /// The code in the README and in the book compiles.

@@ -16,56 +16,29 @@ type AnyError = Box<dyn std::error::Error>;
 
 /// What an even coat keeps of the tilt joint's range beyond what every mission does: three degrees, in radians.
 const COAT_MARGIN: f64 = 3.0 * std::f64::consts::PI / 180.0;
-/// What stands in a mission file.
-const MISSION: [&str; 24] = [
-    "mesh",
-    "texture",
-    "scale",
-    "up",
-    "region",
-    "design",
-    "fill",
-    "scan",
-    "localisation",
-    "look",
-    "painter",
-    "layers",
-    "seed",
-    "memory_gib",
-    "texel",
-    "spot",
-    "stand_off",
-    "speed",
-    "max_flow",
-    "place",
-    "rotate",
-    "offset",
-    "size",
-    "project",
-];
-
 /// What to paint on what, and how.
 #[derive(Args)]
 pub struct MissionArguments {
-    /// Fly a mission again: mission.toml of an earlier run, or one of your own
-    #[arg(long, value_name = "FILE", conflicts_with_all = MISSION)]
+    /// Fly a mission again: mission.toml of an earlier run, or one of your own. What this command line says beside it comes before the
+    /// file, the file before the defaults
+    #[arg(long, value_name = "FILE")]
     mission: Option<PathBuf>,
     /// Surface to paint, OBJ, glTF (.glb, .gltf), PLY or OFF; the built-in rock wall if not given
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
     /// Picture on the mesh's own texture coordinates (OBJ, glTF): it becomes the design
-    #[arg(long, value_name = "PNG", requires = "mesh", conflicts_with = "design")]
+    #[arg(long, value_name = "PNG", conflicts_with = "design")]
     texture: Option<PathBuf>,
     /// Metres per unit of the mesh file [default: the longest side becomes 3 m]
-    #[arg(long, requires = "mesh", allow_negative_numbers = true)]
+    #[arg(long, allow_negative_numbers = true)]
     scale: Option<f64>,
     /// Axis of the mesh file that points up: x, y, z, or any direction X,Y,Z [default: y for OBJ and glTF, z otherwise]
-    #[arg(long, requires = "mesh", value_name = "x|y|z|X,Y,Z", value_parser = up_axis, allow_hyphen_values = true)]
+    #[arg(long, value_name = "x|y|z|X,Y,Z", value_parser = up_axis, allow_hyphen_values = true)]
     up: Option<UpAxis>,
     /// Paint only a part of the mesh; the rest stays in the way. In the coordinates of the mesh file: box:x0,y0,z0,x1,y1,z1,
     /// plane:px,py,pz,nx,ny,nz,RADIUS, pick:px,py,pz (as far as no crease), or mask:PNG on its texture coordinates. The mesh is a
     /// place in metres then, unless --scale says otherwise
-    #[arg(long, requires = "mesh", conflicts_with = "scan")]
+    #[arg(long, conflicts_with = "scan")]
     region: Option<Region>,
     /// What to paint: strata, stripes, gradient, colours (of the mesh's vertices), materials (the pictures
     /// that the mesh file or its MTL names), or a PNG, JPEG or SVG file
@@ -82,8 +55,8 @@ pub struct MissionArguments {
     scan: bool,
     /// What tells the painting flight where the robot is: motion capture, a model of noise of 7 cm, or the robot's own camera, depth camera and
     /// inertial sensor in the map of its --scan [default: motion-capture]
-    #[arg(long, value_enum, default_value = "motion-capture")]
-    localisation: LocalisationName,
+    #[arg(long, value_enum)]
+    localisation: Option<LocalisationName>,
     /// Fly along the painted surface, look at it, and paint again what is missing
     #[arg(long)]
     look: bool,
@@ -95,13 +68,13 @@ pub struct MissionArguments {
     layers: bool,
     #[command(flatten)]
     nozzle: Nozzle,
-    /// Seed of the world, the wind and the errors
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Memory that the mission may need by estimate, GiB
-    #[arg(long, value_name = "GIB", value_parser = positive, default_value_t = 8.0)]
-    memory_gib: f64,
-    /// Worker threads, 1 to 1024 [default: all cores]
+    /// Seed of the world, the wind and the errors [default: 1]
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Memory that the mission may need by estimate, GiB [default: 8]
+    #[arg(long, value_name = "GIB", value_parser = positive)]
+    memory_gib: Option<f64>,
+    /// Worker threads [default: all cores]; results do not depend on it
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
 }
@@ -140,6 +113,10 @@ impl Nozzle {
     }
 }
 
+fn finite(text: &str) -> Result<f64, String> {
+    numbers::<1>(text).map(|[value]| value)
+}
+
 fn positive(text: &str) -> Result<f64, String> {
     let value = text.parse().ok().filter(|v: &f64| v.is_finite() && *v > 0.0);
     value.ok_or_else(|| "give a positive number".to_owned())
@@ -148,15 +125,15 @@ fn positive(text: &str) -> Result<f64, String> {
 /// Where a picture of --design lies.
 #[derive(Args)]
 struct Placement {
-    /// How large a picture becomes: whole within the surface, covering it, repeated, or stretched over it
-    #[arg(long, default_value = "fit")]
-    place: PlaceName,
-    /// Turn of the picture about its middle, degrees counter-clockwise
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
-    rotate: f64,
-    /// Where the middle of the picture lies beside that of the surface, metres to the right and up
-    #[arg(long, value_name = "X,Y", value_parser = numbers::<2>, default_value = "0,0", allow_hyphen_values = true)]
-    offset: [f64; 2],
+    /// How large a picture becomes: whole within the surface, covering it, repeated, or stretched over it [default: fit]
+    #[arg(long)]
+    place: Option<PlaceName>,
+    /// Turn of the picture about its middle, degrees counter-clockwise [default: 0]
+    #[arg(long, value_name = "DEGREES", value_parser = finite, allow_negative_numbers = true)]
+    rotate: Option<f64>,
+    /// Where the middle of the picture lies beside that of the surface, metres to the right and up [default: 0,0]
+    #[arg(long, value_name = "X,Y", value_parser = numbers::<2>, allow_hyphen_values = true)]
+    offset: Option<[f64; 2]>,
     /// Width of the picture, metres; its height follows [default: as --place says]
     #[arg(long, value_name = "METRES", value_parser = positive)]
     size: Option<f64>,
@@ -199,17 +176,18 @@ fn viewpoint(text: &str) -> Result<Viewpoint, String> {
 }
 
 impl Placement {
-    fn picture(&self) -> Result<PicturePlacement, String> {
-        if !self.rotate.is_finite() {
-            return Err(format!("--rotate {}: give an angle in degrees", self.rotate));
+    fn apply(&self, placement: &mut PicturePlacement) {
+        if let Some(place) = self.place {
+            placement.mode = match place {
+                PlaceName::Fit => PlacementMode::Fit,
+                PlaceName::Fill => PlacementMode::Fill,
+                PlaceName::Tile => PlacementMode::Tile,
+                PlaceName::Stretch => PlacementMode::Stretch,
+            };
         }
-        let mode = match self.place {
-            PlaceName::Fit => PlacementMode::Fit,
-            PlaceName::Fill => PlacementMode::Fill,
-            PlaceName::Tile => PlacementMode::Tile,
-            PlaceName::Stretch => PlacementMode::Stretch,
-        };
-        Ok(PicturePlacement { mode, rotate: self.rotate.to_radians(), offset: self.offset, size: self.size })
+        placement.rotate = self.rotate.map_or(placement.rotate, f64::to_radians);
+        placement.offset = self.offset.unwrap_or(placement.offset);
+        placement.size = self.size.or(placement.size);
     }
 }
 
@@ -234,61 +212,142 @@ enum PainterName {
     Pursuit,
 }
 
-impl MissionArguments {
-    /// The mission of `--mission`, or what the options say.
-    pub fn mission_file(&self) -> Result<MissionFile, AnyError> {
-        let mut mission_file = match &self.mission {
-            Some(path) => MissionFile::read(path)?,
-            None => self.options()?,
-        };
-        if let Some(threads) = self.threads {
-            mission_file.settings.threads = usize::from(threads);
+impl From<PainterName> for PainterChoice {
+    fn from(name: PainterName) -> Self {
+        match name {
+            PainterName::Feedback => Self::Feedback,
+            PainterName::Deconvolution => Self::Deconvolution,
+            PainterName::Centrelines => Self::Centrelines,
+            PainterName::Fill => Self::Fill,
+            PainterName::Pursuit => Self::Pursuit,
         }
-        Ok(mission_file)
+    }
+}
+
+impl From<LocalisationName> for LocalisationChoice {
+    fn from(name: LocalisationName) -> Self {
+        match name {
+            LocalisationName::MotionCapture => Self::MotionCapture,
+            LocalisationName::Noise => Self::Noise,
+            LocalisationName::Slam => Self::Slam,
+        }
+    }
+}
+
+impl MissionArguments {
+    /// The mission of `--mission`, or that of the defaults, with what the options say.
+    pub fn mission_file(&self) -> Result<MissionFile, AnyError> {
+        let mut mission = self.mission.as_deref().map(MissionFile::read).transpose()?.unwrap_or_default();
+        self.apply_surface(&mut mission)?;
+        self.apply_design(&mut mission)?;
+        let settings = &mut mission.settings;
+        settings.seed = self.seed.unwrap_or(settings.seed);
+        settings.threads = self.threads.map_or(settings.threads, usize::from);
+        settings.memory_gib = self.memory_gib.unwrap_or(settings.memory_gib);
+        settings.layered |= self.layers;
+        settings.look |= self.look;
+        settings.localisation = self.localisation.map_or(settings.localisation, LocalisationChoice::from);
+        settings.painter = self.painter.map_or(settings.painter, PainterChoice::from);
+        settings.viewpoint = self.placement.project.or(settings.viewpoint);
+        self.placement.apply(&mut settings.placement);
+        self.nozzle.apply(settings);
+        Ok(mission)
     }
 
-    fn options(&self) -> Result<MissionFile, AnyError> {
-        let mut settings = MissionSettings {
-            seed: self.seed,
-            layered: self.layers,
-            memory_gib: self.memory_gib,
-            placement: self.placement.picture()?,
-            look: self.look,
-            localisation: match self.localisation {
-                LocalisationName::MotionCapture => LocalisationChoice::MotionCapture,
-                LocalisationName::Noise => LocalisationChoice::Noise,
-                LocalisationName::Slam => LocalisationChoice::Slam,
-            },
-            viewpoint: self.placement.project,
-            painter: match self.painter.unwrap_or(if self.fill.is_some() {
-                PainterName::Fill
-            } else {
-                PainterName::Feedback
-            }) {
-                PainterName::Feedback => PainterChoice::Feedback,
-                PainterName::Deconvolution => PainterChoice::Deconvolution,
-                PainterName::Centrelines => PainterChoice::Centrelines,
-                PainterName::Fill => PainterChoice::Fill,
-                PainterName::Pursuit => PainterChoice::Pursuit,
-            },
-            ..MissionSettings::default()
-        };
-        if self.fill.is_some() {
-            // An even coat shows where the valve was shut because the body leaned beyond the tilt joint's end: three degrees more are kept for it.
-            settings.planner.nozzle.max_elevation -= COAT_MARGIN;
+    /// Another mesh is another place: what the file says of its own goes with it.
+    fn apply_surface(&self, mission: &mut MissionFile) -> Result<(), AnyError> {
+        if let Some(mesh) = &self.mesh {
+            (mission.mesh, mission.scale, mission.up, mission.region) = (Some(mesh.clone()), None, None, None);
         }
-        self.nozzle.apply(&mut settings);
-        Ok(MissionFile {
-            mesh: self.mesh.clone(),
-            scale: self.scale,
-            up: self.up,
-            region: self.region.clone(),
-            design: self.design.clone(),
-            fill: self.fill.map(|micrometres| 1e-6 * micrometres),
-            texture: self.texture.clone(),
-            scan: self.scan,
-            settings,
-            paints: Vec::new(),
-        })
+        mission.scale = self.scale.or(mission.scale);
+        mission.up = self.up.or(mission.up);
+        mission.region = self.region.clone().or(mission.region.take());
+        mission.scan |= self.scan;
+        let given =
+            [("--scale", self.scale.is_some()), ("--up", self.up.is_some()), ("--region", self.region.is_some())];
+        match given.into_iter().chain([("--texture", self.texture.is_some())]).find(|(_, given)| *given) {
+            Some((option, _)) if mission.mesh.is_none() => Err(format!("{option}: needs --mesh").into()),
+            _ if mission.scan && self.region.is_some() => {
+                Err("--region: not of a surface that is scanned first".into())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// What is painted is one of several things: the one that is named comes instead of the one in the file.
+    fn apply_design(&self, mission: &mut MissionFile) -> Result<(), AnyError> {
+        if self.design.is_none() && self.texture.is_none() && self.fill.is_none() {
+            return Ok(());
+        }
+        if !mission.paints.is_empty() {
+            let why = "the mission has several paints, each with what it paints: change the file, or leave out --design, --texture and --fill";
+            return Err(why.into());
+        }
+        let filled = mission.fill.is_some();
+        (mission.design, mission.texture) = (self.design.clone(), self.texture.clone());
+        mission.fill = self.fill.map(|micrometres| 1e-6 * micrometres);
+        // An even coat shows where the valve was shut because the body leaned beyond the tilt joint's end: three degrees more are kept for it.
+        let margin = f64::from(u8::from(mission.fill.is_some())) - f64::from(u8::from(filled));
+        mission.settings.planner.nozzle.max_elevation -= margin * COAT_MARGIN;
+        mission.settings.painter = match (mission.settings.painter, mission.fill.is_some()) {
+            (_, true) => PainterChoice::Fill,
+            (PainterChoice::Fill, false) => PainterChoice::Feedback,
+            (painter, false) => painter,
+        };
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        mission: MissionArguments,
+    }
+
+    fn mission(line: &[&str]) -> Result<MissionFile, String> {
+        let line = std::iter::once("fly").chain(line.iter().copied());
+        Line::try_parse_from(line).map_err(|e| e.to_string())?.mission.mission_file().map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn the_line_comes_before_the_file_and_the_file_before_the_defaults() {
+        let folder = std::env::temp_dir().join(format!("paintcopter-line-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let file = folder.join("mission.toml");
+        std::fs::write(
+            &file,
+            "mesh = \"a.obj\"\nscale = 0.5\nfill = 2e-5\n[settings]\nseed = 7\nspot = 0.03\npainter = \"fill\"\n",
+        )
+        .unwrap();
+        let path = file.to_str().unwrap();
+        let same = mission(&["--mission", path]).unwrap();
+        assert_eq!((same.scale, same.fill, same.settings.seed, same.settings.spot), (Some(0.5), Some(2e-5), 7, 0.03));
+        assert_eq!(same.settings.texel, MissionSettings::default().texel);
+
+        let other = mission(&["--mission", path, "--seed=3", "--texel=0.01", "--up=x", "--rotate=90"]).unwrap();
+        assert_eq!((other.settings.seed, other.settings.texel, other.settings.spot), (3, 0.01, 0.03));
+        assert_eq!((other.up, other.scale, other.mesh), (Some(UpAxis::X), Some(0.5), same.mesh));
+        assert!((other.settings.placement.rotate - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+
+        // A design takes the place of the coat; another mesh has another scale.
+        let other = mission(&["--mission", path, "--design", "stripes", "--mesh", "b.obj"]).unwrap();
+        assert_eq!((other.fill, other.design.as_deref(), other.scale), (None, Some("stripes"), None));
+        assert_eq!(other.settings.painter, PainterChoice::Feedback);
+        let coat = mission(&["--fill=20"]).unwrap();
+        assert_eq!((coat.settings.painter, coat.fill), (PainterChoice::Fill, Some(20.0 * 1e-6)));
+        assert!(coat.settings.planner.nozzle.max_elevation < MissionSettings::default().planner.nozzle.max_elevation);
+        assert_eq!(mission(&[]).unwrap(), MissionFile::default());
+
+        std::fs::write(&file, "[[paints]]\nname = \"red\"\nfill = 1e-5\n").unwrap();
+        assert!(mission(&["--mission", path, "--fill=10"]).unwrap_err().contains("several paints"));
+        assert!(mission(&["--scale=2"]).unwrap_err().contains("needs --mesh"));
+        assert!(mission(&["--scan", "--mesh", "a.obj", "--region", "pick:0,0,0"]).is_err());
+        std::fs::remove_dir_all(&folder).unwrap();
     }
 }

@@ -11,8 +11,10 @@ use crate::design::{Design, DesignError, MATERIALS, Picture};
 use crate::mesh_io::{MeshError, TriangleMesh, read_mesh};
 use crate::mesh_placement::{MeshPlacement, PlacementError, UpAxis, place_mesh, place_scene};
 use crate::mission::{MissionError, MissionSettings, PaintingTask};
-use crate::mission_paint::{MissionPaint, absolute, file_of_design};
+use crate::mission_paint::{MissionPaint, file_of_design};
 use crate::region::{Region, RegionError, Scene};
+use crate::relative_path::from_folder;
+use crate::say;
 use crate::scan_flight::{self, ScanFlight, ScanFlightError, save as save_scan_flight};
 use crate::world::rock_wall;
 use crate::{run_folder, whole_file};
@@ -162,30 +164,30 @@ impl MissionFile {
     pub fn read(path: &Path) -> Result<Self, MissionFileError> {
         let name = || path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|source| MissionFileError::File { path: name(), source })?;
-        let mut mission: Self = toml::from_str(&text).map_err(|error| MissionFileError::Malformed {
+        let mission: Self = toml::from_str(&text).map_err(|error| MissionFileError::Malformed {
             path: name(),
             why: error.to_string().trim_end().to_owned(),
         })?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        for file in [&mut mission.mesh, &mut mission.texture].into_iter().flatten() {
-            *file = folder.join(&*file);
-        }
-        mission.region = mission.region.map(|region| region.in_folder(folder));
-        mission.design = mission.design.map(|design| file_of_design(design, |file| folder.join(file)));
-        mission.paints = mission.paints.into_iter().map(|paint| paint.in_folder(folder)).collect();
-        Ok(mission)
+        Ok(mission.with_files(&|file| folder.join(file)))
     }
 
-    /// Writes the mission, with the files it names as absolute paths and every number that it had.
+    fn with_files(self, place: &dyn Fn(PathBuf) -> PathBuf) -> Self {
+        Self {
+            mesh: self.mesh.map(place),
+            texture: self.texture.map(place),
+            design: self.design.map(|design| file_of_design(design, place)),
+            region: self.region.map(|region| region.with_file(place)),
+            paints: self.paints.into_iter().map(|paint| paint.with_files(place)).collect(),
+            ..self
+        }
+    }
+
+    /// Writes the mission with every number that it had. The files it names are said from its folder, so that both can be moved together;
+    /// from the root where they have no folder in common.
     pub fn write(&self, path: &Path) -> Result<(), MissionFileError> {
-        let written = Self {
-            mesh: self.mesh.clone().map(absolute),
-            texture: self.texture.clone().map(absolute),
-            design: self.design.clone().map(|design| file_of_design(design, absolute)),
-            region: self.region.clone().map(Region::absolute),
-            paints: self.paints.iter().map(MissionPaint::absolute).collect(),
-            ..self.clone()
-        };
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let written = self.clone().with_files(&|file| from_folder(folder, file));
         let name = || path.display().to_string();
         let text = toml::to_string(&written)
             .map_err(|error| MissionFileError::Malformed { path: name(), why: error.to_string() })?;
@@ -243,7 +245,7 @@ impl MissionFile {
             (Some(texture), ..) => Design::Texture(Picture::open(texture)?),
             (None, Some(name), _) if name != MATERIALS => Design::from_name(name, settings.seed)?,
             (None, _, Some(materials)) => {
-                eprintln!("{}wanted is the texture that the file names", self.mesh_prefix());
+                say!("{}wanted is the texture that the file names", self.mesh_prefix());
                 Design::from_materials(materials)?
             }
             (None, Some(_), None) => {
@@ -313,8 +315,8 @@ impl MissionFile {
         let scene = region
             .split(mesh, self.settings.texel / unit, unit)
             .map_err(|source| MissionFileError::Region { path: name.to_owned(), source })?;
-        scene.canvas.notes.iter().for_each(|note| eprintln!("{name}: {note}"));
-        eprintln!("{name}: {} of {all} faces lie in the region {region}", scene.canvas.faces.len());
+        scene.canvas.notes.iter().for_each(|note| say!("{name}: {note}"));
+        say!("{name}: {} of {all} faces lie in the region {region}", scene.canvas.faces.len());
         Ok(scene)
     }
 
@@ -333,13 +335,13 @@ impl MissionFile {
             let placed = place_scene(&mut scene, placement);
             (scene, placed)
         } else {
-            mesh.notes.iter().for_each(|note| eprintln!("{name}: {note}"));
+            mesh.notes.iter().for_each(|note| say!("{name}: {note}"));
             let placed = place_mesh(&mut mesh, placement);
             (Scene::whole(mesh), placed)
         };
         let placed = placed.map_err(|source| MissionFileError::Placement { path: name.clone(), source })?;
         let hung = if placed.hung { ", hung like a wall" } else { "" };
-        eprintln!("{name}: {} faces, scale {:.4}{hung}", scene.canvas.faces.len(), placed.scale);
+        say!("{name}: {} faces, scale {:.4}{hung}", scene.canvas.faces.len(), placed.scale);
         Ok(scene)
     }
 }

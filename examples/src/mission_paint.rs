@@ -1,6 +1,6 @@
 //! One of several paints of a mission file: what is in the tank, and where it shall be.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
@@ -27,21 +27,12 @@ impl MissionPaint {
         format!("{place}_{}", self.name.as_str())
     }
 
-    /// The same with files that begin at a folder.
-    pub(crate) fn in_folder(self, folder: &Path) -> Self {
+    /// The same with the files that it names at other places.
+    pub(crate) fn with_files(self, place: &dyn Fn(PathBuf) -> PathBuf) -> Self {
         Self {
-            design: self.design.map(|design| file_of_design(design, |file| folder.join(file))),
-            texture: self.texture.map(|file| folder.join(file)),
+            design: self.design.map(|design| file_of_design(design, place)),
+            texture: self.texture.map(place),
             ..self
-        }
-    }
-
-    /// The same with the files that it names as absolute paths.
-    pub(crate) fn absolute(&self) -> Self {
-        Self {
-            design: self.design.clone().map(|design| file_of_design(design, absolute)),
-            texture: self.texture.clone().map(absolute),
-            ..self.clone()
         }
     }
 }
@@ -49,9 +40,4 @@ impl MissionPaint {
 /// A design with its file, where it is one, at another place.
 pub(crate) fn file_of_design(design: String, place: impl FnOnce(PathBuf) -> PathBuf) -> String {
     if Design::is_built_in(&design) { design } else { place(design.into()).display().to_string() }
-}
-
-/// A path from the root; as it is where the system does not know its own folder.
-pub(crate) fn absolute(file: PathBuf) -> PathBuf {
-    std::path::absolute(&file).unwrap_or(file)
 }

@@ -6,6 +6,8 @@ use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::{console, say};
+
 /// One stage under way.
 pub struct Stage {
     name: String,
@@ -21,7 +23,7 @@ const INTERVAL_S: u64 = 10;
 impl Stage {
     /// Announces a stage.
     pub fn start(name: &str) -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
+        let bar = (std::io::stderr().is_terminal() && !console::is_quiet()).then(|| {
             let bar = ProgressBar::new(1000);
             if let Ok(style) = ProgressStyle::with_template("{msg:28} [{bar:40}] {percent:>3} % {elapsed:>4}") {
                 bar.set_style(style.progress_chars("=> "));
@@ -57,7 +59,7 @@ impl Stage {
     fn line(&self, what: &str) {
         let seconds = self.started.elapsed().as_secs();
         if self.told.fetch_max(seconds / INTERVAL_S, Ordering::Relaxed) < seconds / INTERVAL_S {
-            eprintln!("{:28} {what} ({seconds} s)", self.name);
+            say!("{:28} {what} ({seconds} s)", self.name);
         }
     }
 
@@ -67,9 +69,9 @@ impl Stage {
         match self.bar {
             Some(bar) => {
                 bar.finish_and_clear();
-                bar.suspend(|| eprintln!("{line}"));
+                bar.suspend(|| say!("{line}"));
             }
-            None => eprintln!("{line}"),
+            None => say!("{line}"),
         }
     }
 }

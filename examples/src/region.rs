@@ -1,6 +1,6 @@
 //! The part of a mesh that is painted; all the rest stays in the way of the robot and of the spray.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 
 use nalgebra::{Point3, Vector3};
@@ -155,20 +155,11 @@ impl Region {
         Ok(separated(mesh, &inside))
     }
 
-    /// Paths in a region, from another folder.
+    /// The same with the file that it names, if it does, at another place.
     #[must_use]
-    pub fn in_folder(self, folder: &Path) -> Self {
+    pub fn with_file(self, place: impl FnOnce(PathBuf) -> PathBuf) -> Self {
         match self {
-            Self::Mask(path) => Self::Mask(folder.join(path)),
-            other => other,
-        }
-    }
-
-    /// Paths in a region from the root.
-    #[must_use]
-    pub fn absolute(self) -> Self {
-        match self {
-            Self::Mask(path) => Self::Mask(std::path::absolute(&path).unwrap_or(path)),
+            Self::Mask(path) => Self::Mask(place(path)),
             other => other,
         }
     }

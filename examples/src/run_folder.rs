@@ -9,6 +9,8 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use crate::say;
+
 /// Where files of an earlier run go.
 const EARLIER: &str = "earlier";
 /// They say that a run is complete.
@@ -31,11 +33,15 @@ struct RunFolder {
 pub fn begin(folder: &Path, program: &str) -> io::Result<()> {
     std::fs::create_dir_all(folder)?;
     let folder = folder.canonicalize()?;
+    let mut folders = FOLDERS.lock().unwrap_or_else(PoisonError::into_inner);
+    if folders.contains_key(&folder) {
+        return Ok(());
+    }
     let listed = std::fs::read_to_string(list_of(&folder, program)).unwrap_or_default();
     let own = |name: &&str| Path::new(name).components().all(|part| matches!(part, std::path::Component::Normal(_)));
     let earlier = listed.lines().filter(|name| !name.is_empty()).filter(own).map(str::to_string).collect();
     let run = RunFolder { program: program.into(), earlier, written: BTreeSet::new() };
-    FOLDERS.lock().unwrap_or_else(PoisonError::into_inner).insert(folder, run);
+    folders.insert(folder, run);
     Ok(())
 }
 
@@ -57,11 +63,15 @@ pub(crate) fn note(path: &Path) {
     }
 }
 
-/// The runs of this process are over: what they have not written again goes.
-pub fn end() {
-    for (folder, run) in std::mem::take(&mut *FOLDERS.lock().unwrap_or_else(PoisonError::into_inner)) {
+/// The runs of this process are over: what they have not written again goes. Their reports.
+pub(crate) fn end() -> Vec<PathBuf> {
+    let folders = std::mem::take(&mut *FOLDERS.lock().unwrap_or_else(PoisonError::into_inner));
+    let end = |(folder, run): (PathBuf, RunFolder)| {
+        let reported = run.written.contains(REPORTS[0]);
         run.end(&folder);
-    }
+        reported.then(|| folder.join(REPORTS[0]))
+    };
+    folders.into_iter().filter_map(end).collect()
 }
 
 impl RunFolder {
@@ -73,7 +83,7 @@ impl RunFolder {
         let stale: Vec<String> = self.earlier.difference(&self.written).cloned().collect();
         let moved = self.retire(folder, &stale);
         if moved > 0 {
-            eprintln!("{moved} files of an earlier run are in {}", folder.join(EARLIER).display());
+            say!("{moved} files of an earlier run are in {}", folder.join(EARLIER).display());
         }
         let text: String = self.written.iter().flat_map(|name| [name, "\n"]).collect();
         let _ = std::fs::write(list_of(folder, &self.program), text);

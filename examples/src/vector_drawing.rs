@@ -2,7 +2,7 @@
 
 use image::{DynamicImage, RgbaImage};
 use resvg::tiny_skia::{Color, Pixmap, Transform};
-use resvg::usvg::{Options, Tree, roxmltree};
+use resvg::usvg::{Group, Node, Options, Tree, roxmltree};
 
 /// Longer side of the picture, pixels: a millimetre on a surface of 2 m.
 const SIDE: f32 = 2048.0;
@@ -25,6 +25,12 @@ pub enum DrawingError {
         line: u32,
         /// The way out.
         advice: &'static str,
+    },
+    /// More than a picture can mean.
+    #[error("the drawing has {what}: simplify it, or give it as a PNG")]
+    TooMuch {
+        /// What there is too much of.
+        what: String,
     },
     /// A size without area.
     #[error("the drawing is {width} x {height}: give it a size (viewBox)")]
@@ -52,6 +58,7 @@ pub fn draw_svg(text: &str) -> Result<DynamicImage, DrawingError> {
         return Err(DrawingError::Unsupported { element: node.tag_name().name().into(), line, advice });
     }
     let tree = Tree::from_xmltree(&document, &Options::default())?;
+    check_cost(tree.root())?;
     let (width, height) = (tree.size().width(), tree.size().height());
     let scale = SIDE / width.max(height);
     let pixels = |length: f32| (length * scale).round().max(2.0) as u32;
@@ -62,6 +69,32 @@ pub fn draw_svg(text: &str) -> Result<DynamicImage, DrawingError> {
     let (width, height) = (pixmap.width(), pixmap.height());
     // On white nothing is transparent, so that premultiplied colours are the colours.
     RgbaImage::from_raw(width, height, pixmap.take()).map(DynamicImage::ImageRgba8).ok_or_else(empty)
+}
+
+/// Groups that are drawn apart (opacity, masks, filters) within each other, each a picture of its own, and things in all.
+const DEEPEST: usize = 8;
+const MOST_THINGS: usize = 200_000;
+
+fn check_cost(root: &Group) -> Result<(), DrawingError> {
+    let (mut open, mut things) = (vec![(root, 0)], 0);
+    while let Some((group, above)) = open.pop() {
+        let apart = above + usize::from(group.should_isolate());
+        things += group.children().len();
+        if apart > DEEPEST {
+            return Err(DrawingError::TooMuch {
+                what: format!("more than {DEEPEST} transparent groups within each other"),
+            });
+        }
+        if things > MOST_THINGS {
+            return Err(DrawingError::TooMuch { what: format!("more than {MOST_THINGS} elements") });
+        }
+        for child in group.children() {
+            if let Node::Group(group) = child {
+                open.push((group.as_ref(), apart));
+            }
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -90,5 +123,28 @@ mod tests {
         for broken in ["", "<svg", "<html/>", "no xml"] {
             assert!(draw_svg(broken).is_err(), "{broken:?}");
         }
+    }
+
+    #[test]
+    fn what_costs_too_much_is_refused() {
+        let nested = |depth: usize| {
+            let (open, close) =
+                ("<g opacity=\"0.9\"><path d=\"M 0 0 H 9\" stroke=\"#000\"/>".repeat(depth), "</g>".repeat(depth));
+            draw_svg(&format!(
+                "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 9 9\">{open}<path d=\"M 1 1 H 8 V 8\"/>{close}</svg>"
+            ))
+        };
+        assert!(nested(7).is_ok());
+        assert!(nested(9).unwrap_err().to_string().contains("within each other"));
+        // Three copies of three copies and so on.
+        let mut defs = String::from("<g id=\"a0\"><path d=\"M 1 1 H 8 V 8\"/></g>");
+        for k in 1..12 {
+            let copies = format!("<use href=\"#a{}\"/>", k - 1).repeat(3);
+            defs.push_str(&format!("<g id=\"a{k}\">{copies}</g>"));
+        }
+        let many = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 9 9\"><defs>{defs}</defs><use href=\"#a11\"/></svg>"
+        );
+        assert!(draw_svg(&many).unwrap_err().to_string().contains("elements"));
     }
 }

@@ -27,7 +27,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    run_program("vio_imu_truth", || run(&Arguments::parse()))
+    run_program("vio_imu_truth", run)
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {

@@ -70,7 +70,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    run_program("vio_runs", || run(&Arguments::parse()))
+    run_program("vio_runs", run)
 }
 
 /// Squared errors in units of the claimed covariance: position, attitude, velocity, both biases.

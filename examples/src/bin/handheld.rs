@@ -2,10 +2,9 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
 use paintcopter::exit::run_program;
-use paintcopter::handheld::{Arguments, run};
+use paintcopter::handheld::run;
 
 fn main() -> ExitCode {
-    run_program("handheld", || run(&Arguments::parse()))
+    run_program("handheld", run)
 }

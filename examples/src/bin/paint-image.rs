@@ -2,10 +2,9 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
 use paintcopter::exit::run_program;
-use paintcopter::paint_image::{Arguments, run};
+use paintcopter::paint_image::run;
 
 fn main() -> ExitCode {
-    run_program("paint-image", || run(Arguments::parse()))
+    run_program("paint-image", run)
 }

@@ -8,6 +8,7 @@ use paintcopter::exit::run_program;
 use paintcopter::interruption::Finishing;
 use paintcopter::mission::{Coats, preview, save, save_coats};
 use paintcopter::mission_arguments::MissionArguments;
+use paintcopter::{result, say};
 
 /// Paints a surface with a simulated flying robot: unwraps it, decides what to spray, plans and flies the strokes, and shows
 /// what the paint looks like. Without arguments it paints a built-in rock wall.
@@ -25,7 +26,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    run_program("paintcopter", || run(&Arguments::parse()))
+    run_program("paintcopter", run)
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
@@ -36,8 +37,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     if arguments.preview {
         for coat in coats {
             let found = preview(&coat.task, &coat.folder)?;
-            eprintln!("{}", found.summary());
-            println!("{}", coat.folder.join("preview.png").display());
+            say!("{}", found.summary());
+            result!("{}", coat.folder.join("preview.png").display());
         }
         return Ok(());
     }
@@ -48,7 +49,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
         Some((_, mission)) if mission_file.paints.is_empty() => save(mission, folder)?.summary(),
         _ => save_coats(&coats, folder)?.summary(),
     };
-    eprintln!("{summary}");
-    println!("{}", folder.join("report.md").display());
+    say!("{summary}");
+    result!("{}", folder.join("report.md").display());
     Ok(())
 }

@@ -7,6 +7,7 @@ use clap::Parser;
 use paintcopter::exit::run_program;
 use paintcopter::mission::{PlannedMission, save_plan};
 use paintcopter::mission_arguments::MissionArguments;
+use paintcopter::{result, say};
 
 /// Plans a painting mission without flying it: the trajectory with nozzle and valve as a table and as a recording, a picture of
 /// the way, and the figures. The mission.toml that it leaves is what `paintcopter --mission` flies.
@@ -25,7 +26,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    run_program("plan", || run(&Arguments::parse()))
+    run_program("plan", run)
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
@@ -35,8 +36,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     for coat in mission_file.decide_coats(folder)? {
         let mission = PlannedMission::new(coat.task).map_err(|error| mission_file.in_mesh(error))?;
         let figures = save_plan(&mission, &coat.folder)?;
-        eprintln!("{}", figures.summary());
-        println!("{}", coat.folder.join("plan.csv").display());
+        say!("{}", figures.summary());
+        result!("{}", coat.folder.join("plan.csv").display());
     }
     Ok(())
 }

@@ -2,10 +2,9 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
 use paintcopter::exit::run_program;
-use paintcopter::robot::{Arguments, run};
+use paintcopter::robot::run;
 
 fn main() -> ExitCode {
-    run_program("robot", || run(&Arguments::parse()))
+    run_program("robot", run)
 }

@@ -2,10 +2,9 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
 use paintcopter::exit::run_program;
-use paintcopter::scan::{Arguments, execute};
+use paintcopter::scan::execute;
 
 fn main() -> ExitCode {
-    run_program("scan", || execute(&Arguments::parse()))
+    run_program("scan", execute)
 }

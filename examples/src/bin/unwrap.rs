@@ -2,10 +2,9 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
 use paintcopter::exit::run_program;
-use paintcopter::unwrap::{Arguments, run};
+use paintcopter::unwrap::run;
 
 fn main() -> ExitCode {
-    run_program("unwrap", || run(&Arguments::parse()))
+    run_program("unwrap", run)
 }

@@ -2,10 +2,9 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
 use paintcopter::exit::run_program;
-use paintcopter::vio::{Arguments, execute};
+use paintcopter::vio::execute;
 
 fn main() -> ExitCode {
-    run_program("vio", || execute(&Arguments::parse()))
+    run_program("vio", execute)
 }

@@ -2,10 +2,9 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
 use paintcopter::exit::run_program;
-use paintcopter::vr::{Arguments, run};
+use paintcopter::vr::run;
 
 fn main() -> ExitCode {
-    run_program("vr", || run(&Arguments::parse()))
+    run_program("vr", run)
 }

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Parser, ValueEnum};
 
+use crate::worker_threads;
+
 /// Paints an object with a nozzle on a handheld gantry: a person sweeps it past, the program decides where the nozzle slides and when it
 /// sprays. Without a mesh: a cube of 60 mm on its corner, with a circle of 34 mm on each upper face.
 #[derive(Debug, Clone, Parser)]
@@ -90,9 +92,9 @@ pub struct Arguments {
     /// Compute the density and cast the droplets of path simulation on a GPU (needs the feature `gpu`)
     #[arg(long)]
     pub gpu: bool,
-    /// Threads; the results do not depend on it
-    #[arg(long, default_value_t = 2)]
-    pub threads: usize,
+    /// Worker threads [default: all cores]; results do not depend on it
+    #[arg(long, value_parser = worker_threads::parse)]
+    pub threads: Option<usize>,
     /// Seed of everything random
     #[arg(long, default_value_t = 1)]
     pub seed: u64,

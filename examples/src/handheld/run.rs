@@ -30,6 +30,8 @@ use crate::pictures::write_png;
 use crate::progress::Stage;
 use crate::report::save_figures;
 use crate::run_folder;
+use crate::worker_threads::worker_threads;
+use crate::{result, say};
 
 /// Standard deviation of the believed place with which any robot may spray, m.
 const GOOD_ENOUGH: f64 = 0.3e-3;
@@ -71,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<(), HandheldError> {
     }
     recording::save(&object, &settings.geometry, &log, &folder.join("handheld.mcap"))?;
     save_figures(&report, folder)?;
-    println!("{}", folder.join("painted.png").display());
+    result!("{}", folder.join("painted.png").display());
     judge(&object, &log, &settings, &report, arguments.motion != "synthetic")
 }
 
@@ -134,7 +136,7 @@ fn check(arguments: &Arguments) -> Result<(), HandheldError> {
         let must_be = "must lie between 0 and 0.05 m";
         return Err(HandheldError::Option { option: "--registration-error", value: error, must_be });
     }
-    let counts = [("--threads", arguments.threads, 256), ("--scenarios", arguments.scenarios, 100_000)];
+    let counts = [("--scenarios", arguments.scenarios, 100_000)];
     for (option, value, most) in counts {
         if !(1..=most).contains(&value) {
             return Err(HandheldError::Option {
@@ -160,7 +162,7 @@ fn settings(arguments: &Arguments) -> HandheldSettings {
         },
         stand_off: arguments.stand_off,
         paper_literal: arguments.paper_literal,
-        threads: arguments.threads,
+        threads: worker_threads(arguments.threads),
         ..HandheldSettings::default()
     }
 }
@@ -287,7 +289,7 @@ fn spray(
         paint(object, &job, device, &hardware, &motion, &share)?
     } else {
         let recorded = recorded_motion(arguments, object, settings)?;
-        recorded.remarks.iter().for_each(|remark| eprintln!("{remark}"));
+        recorded.remarks.iter().for_each(|remark| say!("{remark}"));
         let (pose, tracked) = (|time| recorded.at(time), |time| recorded.tracked(time));
         let motion = HandPoses { pose: &pose, tracked: &tracked, duration: recorded.duration };
         paint(object, &job, device, &hardware, &motion, &share)?

@@ -31,6 +31,7 @@ pub(super) fn parse(bytes: &[u8], folder: &Path) -> Result<TriangleMesh, Fault> 
     let mut json = document.into_json();
     check_extensions(&json.extensions_required)?;
     prepare_positions(&mut json)?;
+    prepare_images(&mut json)?;
     // Checked above: the validation knows only those that the crate itself reads.
     json.extensions_required.clear();
     let document = Document::from_json(json).map_err(broken)?;
@@ -72,6 +73,20 @@ fn prepare_positions(json: &mut ::gltf::json::Root) -> Result<(), Fault> {
         })?;
         accessor.min.get_or_insert_with(|| vec![0; 3].into());
         accessor.max.get_or_insert_with(|| vec![0; 3].into());
+    }
+    Ok(())
+}
+
+/// A picture in a buffer must say what it is and a picture must be somewhere: `gltf` (1.4.1) panics where one does not. What it is its bytes
+/// tell as well.
+fn prepare_images(json: &mut ::gltf::json::Root) -> Result<(), Fault> {
+    for (k, image) in json.images.iter_mut().enumerate() {
+        if image.buffer_view.is_some() {
+            image.mime_type.get_or_insert_with(|| ::gltf::json::image::MimeType("image/png".into()));
+        } else if image.uri.is_none() {
+            let what = "is neither in the file nor beside it: export it again".to_owned();
+            return Err(Fault { place: format!("image {k}"), what });
+        }
     }
     Ok(())
 }

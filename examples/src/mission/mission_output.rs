@@ -70,7 +70,7 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
     let found_mesh = PlyMesh { positions, normals: None, colours, faces };
     let ply = folder.join("scan.ply");
     write_ply(&ply, &found_mesh).map_err(unwritable(&ply))?;
-    for (name, trajectory) in [("flight_true.tum", &found.flown), ("flight_slam.tum", &found.estimated)] {
+    for (name, trajectory) in [("drift_true.tum", &found.flown), ("drift_estimated.tum", &found.estimated)] {
         write(&folder.join(name), &vio_ekf::format::tum::write(trajectory))?;
     }
     stage.done(&format!("{} faces, {:.2} mm off the surface", found.mesh.faces.len(), 1e3 * found.mesh_error));

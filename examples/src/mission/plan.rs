@@ -18,6 +18,7 @@ use super::rehearsal::WindRehearsal;
 use super::settings::{MissionSettings, PainterChoice};
 use crate::adapters::MeshSurface;
 use crate::progress::Stage;
+use crate::say;
 use crate::surface::PaintSurface;
 
 /// Shortest stretch worth another flight, in deviations of a spot: one spot is wider.
@@ -85,7 +86,7 @@ pub(super) fn plan(task: &PaintingTask) -> Result<Planned, MissionError> {
             let mut parts: Vec<(&mut [Target], &Plan)> =
                 flights.iter_mut().map(|f| (f.route.targets.as_mut_slice(), &f.plan)).collect();
             let expected = correct_doses(&mut parts, task)?;
-            eprintln!(
+            say!(
                 "coat: doses corrected on the surface, expected to be even within {:.1} % (deviation over mean)",
                 100.0 * expected
             );

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::{MissionFile, MissionFileError};
 use crate::mission::{Coat, MissionSettings};
 use crate::mission_paint::MissionPaint;
+use crate::say;
 
 impl MissionFile {
     /// The same for every paint in flying order; a file without `paints` is one coat, whose results belong into `folder` itself.
@@ -17,7 +18,7 @@ impl MissionFile {
         let decide = |(number, coat): (usize, Self)| {
             let folder = folder.join(self.paints[number].folder(number + 1));
             coat.write_into(&folder)?;
-            eprintln!("paint {} of {}: {}", number + 1, self.paints.len(), coat.settings.paint.as_str());
+            say!("paint {} of {}: {}", number + 1, self.paints.len(), coat.settings.paint.as_str());
             let task = coat.decide_on(&place);
             let task = task.map_err(|error| in_paint(error, &self.paints[number]))?;
             Ok(Coat { folder, task })

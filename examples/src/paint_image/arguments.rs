@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::colour::Glazes;
 use super::job::PainterKind;
+use crate::worker_threads;
 
 /// Decides what to spray so that the wall comes to look like a picture. Dark is paint, white is bare wall.
 #[derive(Parser)]
@@ -65,8 +66,8 @@ pub(super) struct Nozzle {
     /// Passes of the network over its canvas [default: 6]
     #[arg(long)]
     pub(super) passes: Option<usize>,
-    /// Worker threads [default: 1]
-    #[arg(long)]
+    /// Worker threads [default: all cores]; results do not depend on it
+    #[arg(long, value_parser = worker_threads::parse)]
     pub(super) threads: Option<usize>,
     /// Weights of the thesis' network: thesis.safetensors of a training with --preset thesis-paint
     #[arg(long, value_name = "FILE")]
@@ -132,9 +133,9 @@ pub(super) struct Training {
     /// Weight of the divergence of the latent code, for the thesis' presets; less pays for more detail [default: the thesis']
     #[arg(long)]
     pub(super) latent_weight: Option<f64>,
-    /// Worker threads; the weights do not depend on it
-    #[arg(long, default_value_t = 1)]
-    pub(super) threads: usize,
+    /// Worker threads [default: all cores]; the weights do not depend on it
+    #[arg(long, value_parser = worker_threads::parse)]
+    pub(super) threads: Option<usize>,
     /// Checkpoint to go on from
     #[arg(long, value_name = "FILE")]
     pub(super) resume: Option<PathBuf>,

@@ -19,39 +19,41 @@ use super::ink::read_ink;
 use super::job::{Job, PainterKind};
 use super::training::{ThesisTrainingRun, TrainingImages, TrainingRun, train_painter, train_thesis};
 use crate::progress::Stage;
+use crate::result;
 use crate::run_folder;
+use crate::worker_threads::worker_threads;
 
 /// Does what the command line asks for.
-pub fn run(arguments: Arguments) -> Result<(), PaintImageError> {
-    match arguments.job {
+pub fn run(arguments: &Arguments) -> Result<(), PaintImageError> {
+    match &arguments.job {
         None => {
             // The command line requires it.
-            let image = arguments.image.unwrap_or_default();
+            let image = arguments.image.clone().unwrap_or_default();
             let Arguments { painter, palette, out, nozzle, .. } = arguments;
             if palette.is_some() {
-                only_for_one_paint(painter, &nozzle)?;
+                only_for_one_paint(*painter, nozzle)?;
             }
-            let job = job(painter.unwrap_or(PainterKind::Feedback), &nozzle)?;
+            let job = job(painter.unwrap_or(PainterKind::Feedback), nozzle)?;
             for file in pictures_in(&image)? {
                 let out = if image.is_dir() { out.join(file.file_name().unwrap_or_default()) } else { out.clone() };
                 match palette {
                     None => paint(&file, &job, &out)?,
-                    Some(palette) => paint_file_in_colours(&file, &job, palette, &out)?,
+                    Some(palette) => paint_file_in_colours(&file, &job, *palette, &out)?,
                 }
             }
             Ok(())
         }
         Some(Command::Compare { pictures, runs, out, nozzle }) => {
-            let pictures = pictures_or_textures(pictures)?;
-            create(&out)?;
-            print!("{}", table(&compare(&job(PainterKind::Feedback, &nozzle)?, &pictures, runs, &out)?));
+            let pictures = pictures_or_textures(pictures.clone())?;
+            create(out, "paint-image-compare")?;
+            print!("{}", table(&compare(&job(PainterKind::Feedback, nozzle)?, &pictures, *runs, out)?));
             Ok(())
         }
         Some(Command::EqualSprays { weights, pictures }) => {
-            print!("{}", print_equal_sprays(&equal_sprays(&weights, &pictures_or_textures(pictures)?)?));
+            print!("{}", print_equal_sprays(&equal_sprays(weights, &pictures_or_textures(pictures.clone())?)?));
             Ok(())
         }
-        Some(Command::Train(training)) => run_training(training),
+        Some(Command::Train(training)) => run_training(training.clone()),
     }
 }
 
@@ -84,7 +86,8 @@ fn pictures_or_textures(pictures: Option<PathBuf>) -> Result<Vec<Image>, PaintIm
 fn run_training(training: Training) -> Result<(), PaintImageError> {
     let Training { preset, data, seed, steps, until, batch, rate, last_rate, as_printed, latent_weight, .. } = training;
     let Training { threads, resume, out, .. } = training;
-    create(&out)?;
+    create(&out, "paint-image-train")?;
+    let threads = worker_threads(threads);
     let (architecture, pictures) = match preset {
         Preset::Painter => {
             let preset = TrainSettings::default();
@@ -97,7 +100,7 @@ fn run_training(training: Training) -> Result<(), PaintImageError> {
                 ..preset
             };
             train_painter(&TrainingRun { settings, resume, until, save_every: 500 }, &out)?;
-            println!("{}", out.join("painter.safetensors").display());
+            result!("{}", out.join("painter.safetensors").display());
             return Ok(());
         }
         // The command line requires the data.
@@ -121,7 +124,7 @@ fn run_training(training: Training) -> Result<(), PaintImageError> {
         ..preset
     };
     train_thesis(&ThesisTrainingRun { settings, pictures, resume, until, save_every: 100 }, &out)?;
-    println!("{}", out.join("thesis.safetensors").display());
+    result!("{}", out.join("thesis.safetensors").display());
     Ok(())
 }
 
@@ -146,36 +149,36 @@ fn job(painter: PainterKind, nozzle: &Nozzle) -> Result<Job, PaintImageError> {
             SharingName::Joint => LayerPlanning::Joint,
             SharingName::Sequential => LayerPlanning::Sequential,
         }),
-        threads: nozzle.threads.unwrap_or(1),
+        threads: worker_threads(nozzle.threads),
         thesis: nozzle.weights.as_deref().map(read_network).transpose()?,
     })
 }
 
 fn paint(image: &Path, job: &Job, out: &Path) -> Result<(), PaintImageError> {
     let wanted = read_ink(image)?;
-    create(out)?;
+    create(out, "paint-image")?;
     let stage = Stage::start("paint");
     let (painting, figures) = job.paint(&wanted, &mut |share| stage.share(share))?;
     stage.done(&format!("{} sprays, {:.2} dB, {:.1} ms", figures.sprays, figures.psnr_db, figures.cpu_ms));
     job.save(out, &wanted, &painting, &figures)?;
-    println!("{}", out.join("report.json").display());
+    result!("{}", out.join("report.json").display());
     Ok(())
 }
 
 fn paint_file_in_colours(image: &Path, job: &Job, glazes: Glazes, out: &Path) -> Result<(), PaintImageError> {
     let (wanted, palette) = (read_picture(image)?, glazes.palette()?);
-    create(out)?;
+    create(out, "paint-image")?;
     let stage = Stage::start("paint");
     let (painting, figures) = paint_colours(job, &wanted, &palette, &mut |share| stage.share(share))?;
     stage
         .done(&format!("{} sprays, CIEDE2000 {:.2}, {:.1} ms", figures.sprays, figures.ciede2000_mean, figures.cpu_ms));
     save_colours(job, out, &wanted, &palette, &painting, &figures)?;
-    println!("{}", out.join("report.json").display());
+    result!("{}", out.join("report.json").display());
     Ok(())
 }
 
-fn create(folder: &Path) -> Result<(), PaintImageError> {
-    run_folder::begin(folder, "paint-image").map_err(|e| PaintImageError::File {
+fn create(folder: &Path, subcommand: &str) -> Result<(), PaintImageError> {
+    run_folder::begin(folder, subcommand).map_err(|e| PaintImageError::File {
         path: folder.display().to_string(),
         why: format!("cannot be created ({e}): choose another --out"),
     })

@@ -23,6 +23,7 @@ use crate::mission::{LocalisationChoice, PlannedFlight, PlannedMission};
 use crate::progress::Stage;
 use crate::report::save_figures;
 use crate::whole_file;
+use crate::{result, say};
 
 /// Responses of the default vehicle under PX4's attitude control, s.
 const PX4_RESPONSE: f64 = 0.18;
@@ -47,8 +48,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     stage.done(&format!("{:.0} s", flown.seconds));
     let (wall, cpu) = (clock.0.elapsed().as_secs_f64(), clock.1.elapsed().as_secs_f64());
     let report = save(arguments, &flight, &flown, [wall, cpu], folder)?;
-    eprintln!("{}", report.summary());
-    println!("{}", folder.join("report.json").display());
+    say!("{}", report.summary());
+    result!("{}", folder.join("report.json").display());
     let mostly_shut = || format!("the valve was kept shut for {:.0} % of the paint", 100.0 * report.valve_held_share);
     match flown.failed.or_else(|| (report.valve_held_share > 0.5).then(mostly_shut)) {
         Some(reason) => Err(RobotError::Unfinished { reason, folder: folder.clone() }.into()),

@@ -22,7 +22,9 @@ use super::options::{
 use super::pose_file::take_poses;
 use super::sequence::Sequence;
 use super::settings::ScanSettings;
+use crate::say;
 use crate::socket_address;
+use crate::worker_threads::{self, worker_threads};
 
 /// Maps a recorded RGB-D sequence into a voxel-hashed distance field and its mesh.
 #[derive(Debug, Clone, Parser)]
@@ -116,7 +118,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR", default_value = "out/scan")]
     pub(super) out: PathBuf,
     /// Worker threads [default: all cores]; results do not depend on it
-    #[arg(long)]
+    #[arg(long, value_parser = worker_threads::parse)]
     pub(super) threads: Option<usize>,
 }
 
@@ -166,7 +168,7 @@ pub(super) fn sequence(arguments: &Arguments) -> Result<Sequence, Box<dyn std::e
     }
     if let Some(path) = &arguments.pose_file {
         let found = take_poses(&mut sequence, path, &camera)?;
-        eprintln!("{}: poses of {found} of {} frames", path.display(), sequence.frames.len());
+        say!("{}: poses of {found} of {} frames", path.display(), sequence.frames.len());
     }
     if let Some(range) = &arguments.frames {
         let listed = sequence.frames.len();
@@ -180,7 +182,6 @@ pub(super) fn sequence(arguments: &Arguments) -> Result<Sequence, Box<dyn std::e
 
 /// How it is mapped.
 pub(super) fn settings(arguments: &Arguments) -> Result<ScanSettings, String> {
-    let threads = arguments.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
     let memory = MemoryLimits {
         host_bytes: mebibytes("--host-mib", arguments.host_mib)?,
         disk_bytes: mebibytes("--disk-mib", usize::try_from(arguments.disk_mib).unwrap_or(usize::MAX))? as u64,
@@ -192,7 +193,7 @@ pub(super) fn settings(arguments: &Arguments) -> Result<ScanSettings, String> {
         carve: arguments.carve,
         max_bytes: mebibytes("--active-mib", arguments.active_mib)?,
         noise: arguments.noise,
-        threads: threads.clamp(1, 1024),
+        threads: worker_threads(arguments.threads),
         memory,
         ..tsdf_hash::Settings::default()
     };

@@ -10,6 +10,7 @@ use super::views::save_views;
 use crate::interruption::Finishing;
 use crate::mesh_io::{PlyMesh, write_ply};
 use crate::report::save_figures;
+use crate::{result, say};
 use crate::{run_folder, whole_file};
 
 /// Maps the recording of a command line and writes what became of it; an error in the words of the command line.
@@ -24,14 +25,14 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let folder = &arguments.out;
     prepare(folder)?;
     let sequence = arguments::sequence(arguments)?;
-    eprintln!("{}: {} layout, {} frames", arguments.sequence.display(), sequence.layout, sequence.frames.len());
-    eprintln!("{:28} {}", "camera", sequence.description());
+    say!("{}: {} layout, {} frames", arguments.sequence.display(), sequence.layout, sequence.frames.len());
+    say!("{:28} {}", "camera", sequence.description());
     let settings = arguments::settings(arguments)?;
     // The map and its files are finished where somebody interrupts.
     let _finishing = Finishing::begin();
     let scan = Scan::run(&arguments.sequence, &sequence, &settings)?;
     for (_, why) in &scan.skipped {
-        eprintln!("left out: {}", in_options(why));
+        say!("left out: {}", in_options(why));
     }
     // What cannot be made again comes first, pictures last.
     scan.save(&folder.join("map.tsdf"), &arguments.sequence)?;
@@ -45,7 +46,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     save_views(&scan, &sequence, folder, settings.slam.map.threads)?;
     // Last, so that its presence means the folder is complete.
     save_figures(&ScanReport::new(&scan, &sequence), folder)?;
-    println!("{}", folder.join("mesh.ply").display());
+    result!("{}", folder.join("mesh.ply").display());
     scan.verdict(&sequence)?;
     Ok(())
 }

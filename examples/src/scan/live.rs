@@ -21,6 +21,7 @@ use tsdf_hash::{ColourData, ColourView};
 
 use super::error::ScanError;
 use crate::recording::{log_message, point, quaternion, rgb, scene, vector};
+use crate::say;
 use crate::whole_file::WholeFile;
 
 /// Frames between two pictures, and between two looks at what has changed of the mesh.
@@ -117,7 +118,7 @@ impl Live {
             let handle = server.start_blocking().map_err(refuse)?;
             // An address with port 0 asks for any.
             let address = SocketAddr::new(address.ip(), handle.port());
-            eprintln!("live view: ws://{address} (Foxglove: open connection, Foxglove WebSocket)");
+            say!("live view: ws://{address} (Foxglove: open connection, Foxglove WebSocket)");
         }
         Ok(Some(Self {
             transforms: channel(&context, "/tf"),

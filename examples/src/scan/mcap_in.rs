@@ -19,6 +19,7 @@ use super::sequence::{ColourCamera, FrameFiles, Sequence};
 use crate::mcap_messages::fields::{isometry, isometry_of, stamp};
 use crate::mcap_messages::images::{SCHEMAS, image, image_header};
 use crate::mcap_messages::{cdr, messages_of, schema_of};
+use crate::say;
 
 /// Frames between a camera and the world; more make a circle.
 const DEEPEST: usize = 32;
@@ -47,7 +48,7 @@ pub(super) fn open_mcap(path: &Path) -> Result<Sequence, SequenceError> {
         ));
     };
     depths[1..].iter().chain(pictures.get(1..).unwrap_or_default()).for_each(|unused| {
-        eprintln!("{}: topic {} is not used", path.display(), unused.name);
+        say!("{}: topic {} is not used", path.display(), unused.name);
     });
     let Some(camera) = camera_of(&cameras, depth) else {
         return Err(malformed(format!(

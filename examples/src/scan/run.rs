@@ -23,6 +23,7 @@ use super::settings::ScanSettings;
 use super::start;
 use crate::interruption;
 use crate::progress::Stage;
+use crate::say;
 
 impl Scan {
     /// Maps a sequence. Frames that cannot be used are counted and left out.
@@ -33,7 +34,7 @@ impl Scan {
         for index in run.resumed..sequence.frames.len() {
             stage.share(index as f64 / sequence.frames.len() as f64);
             if interruption::is_requested() {
-                eprintln!("interrupted before frame {index}: --resume goes on from the map");
+                say!("interrupted before frame {index}: --resume goes on from the map");
                 break;
             }
             run.take(index)?;
@@ -91,7 +92,7 @@ impl<'a> Run<'a> {
         let mut slam = Slam::with_source(slam_settings, state, Recording(sequence))?;
         slam.set_clock(|| ProcessTime::now().as_duration().as_secs_f64());
         if let Some(why) = slam.device_fallback() {
-            eprintln!("mapping on the processor: {why}");
+            say!("mapping on the processor: {why}");
         }
         for (stamp, rate) in &sequence.angular_rates {
             slam.angular_rate(*stamp, *rate)?;
@@ -158,7 +159,7 @@ impl<'a> Run<'a> {
         }
         if let Some(why) = images.colour_fault.take() {
             self.metrics.without_colour += 1;
-            eprintln!("without colour: {}: {why}", frame.depth);
+            say!("without colour: {}: {why}", frame.depth);
         }
         Ok(images)
     }
@@ -175,7 +176,7 @@ impl<'a> Run<'a> {
             // Directions that are not seen are told once.
             let told = matches!(event, Event::Degenerate { .. }) && self.slam.statistics().degenerate_frames > 1;
             if let Some(line) = line(&event, &outcome, name).filter(|_| !told) {
-                eprintln!("{line}");
+                say!("{line}");
             }
             match event {
                 Event::Placed(placed) => self.placed(&placed, outcome.frame, images)?,

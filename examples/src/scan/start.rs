@@ -11,6 +11,8 @@ use super::error::ScanError;
 use super::sequence::Sequence;
 use super::settings::ScanSettings;
 
+use crate::say;
+
 pub(super) fn open(folder: &Path, sequence: &Sequence, settings: &ScanSettings) -> Result<SlamState, ScanError> {
     let map = &settings.slam.map;
     let Some(path) = settings.resume.as_ref().or(settings.relocalise.as_ref()) else {
@@ -32,7 +34,7 @@ pub(super) fn open(folder: &Path, sequence: &Sequence, settings: &ScanSettings) 
     if settings.relocalise.is_some() || !is_of(&metadata, folder) {
         return Ok(state.without_trajectory());
     }
-    eprintln!("{}: goes on after the frame of {} s", path.display(), state.last_stamp);
+    say!("{}: goes on after the frame of {} s", path.display(), state.last_stamp);
     state.next_frame = sequence.frames.partition_point(|frame| frame.stamp <= state.last_stamp);
     Ok(state)
 }

@@ -23,6 +23,7 @@ use crate::pictures::write_png;
 use crate::progress::Stage;
 use crate::report::save_figures;
 use crate::run_folder;
+use crate::{result, say};
 
 /// Does what the command line asks for.
 ///
@@ -41,7 +42,7 @@ pub fn run(arguments: &Arguments) -> Result<(), UnwrapError> {
         mesh = scene.map_err(|source| UnwrapError::Region { path: arguments.mesh.clone(), source })?.canvas;
     }
     let seams = arguments.seams.as_deref().map(read_seams).transpose()?.unwrap_or_default();
-    mesh.notes.iter().for_each(|note| eprintln!("{}: {note}", arguments.mesh.display()));
+    mesh.notes.iter().for_each(|note| say!("{}: {note}", arguments.mesh.display()));
     let carried = read_pictures(&mesh, arguments)?;
     let earlier = arguments.previous.as_deref().map(previous::read).transpose()?;
     run_folder::begin(folder, "unwrap").map_err(|e| UnwrapError::unwritable(folder, &e))?;
@@ -67,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<(), UnwrapError> {
     let report = UnwrapReport::new(&atlas, update, wall.elapsed().as_secs_f64(), cpu_s);
     save_figures(&report, folder)?;
     stage.done(&format!("{} page(s) of {} x {} texels", report.pages, report.page_width_px, report.page_height_px));
-    println!("{}", folder.join("atlas.obj").display());
+    result!("{}", folder.join("atlas.obj").display());
     if report.flips + report.flips_f32 + report.overlaps > 0 {
         return Err(UnwrapError::Broken { flips: report.flips.max(report.flips_f32), overlaps: report.overlaps });
     }
@@ -125,7 +126,7 @@ fn unwrap(
         100.0 * quality.utilisation
     ));
     if let Some(update) = &update {
-        println!(
+        result!(
             "{} of {} faces as before; {} charts kept, {} changed, {} new",
             update.kept_faces,
             atlas.surface().faces().len(),

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::worker_threads;
+
 /// Runs the visual-inertial filter over a recording: trajectory, figures and pictures.
 #[derive(Parser)]
 #[command(
@@ -34,7 +36,7 @@ pub(super) enum Command {
 #[derive(Args)]
 pub(super) struct Track {
     /// Folder in the layout of EuRoC/ASL: mav0/cam0, mav0/imu0 and, if known, the truth
-    #[arg(long, value_name = "DIR", conflicts_with = "mcap", required_unless_present = "mcap")]
+    #[arg(long, value_name = "DIR", conflicts_with = "mcap")]
     pub(super) euroc: Option<PathBuf>,
     /// MCAP file with images, inertial samples and, unless given by files of Kalibr, calibration
     #[arg(long, value_name = "FILE")]
@@ -77,7 +79,7 @@ pub(super) struct Track {
     #[arg(long, value_name = "DIR", default_value = "out/vio")]
     pub(super) out: PathBuf,
     /// Worker threads [default: all cores]; results do not depend on it
-    #[arg(long)]
+    #[arg(long, value_parser = worker_threads::parse)]
     pub(super) threads: Option<usize>,
 }
 
@@ -120,7 +122,7 @@ pub(super) struct Sim {
     #[arg(long, value_name = "DIR", default_value = "out/vio-sim")]
     pub(super) out: PathBuf,
     /// Worker threads [default: all cores]; results do not depend on it
-    #[arg(long)]
+    #[arg(long, value_parser = worker_threads::parse)]
     pub(super) threads: Option<usize>,
 }
 
@@ -211,6 +213,6 @@ pub(super) struct Tune {
     #[arg(long, value_name = "DIR", default_value = "out/vio-tune")]
     pub(super) out: PathBuf,
     /// Worker threads [default: all cores]; results do not depend on it
-    #[arg(long)]
+    #[arg(long, value_parser = worker_threads::parse)]
     pub(super) threads: Option<usize>,
 }

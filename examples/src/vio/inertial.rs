@@ -14,6 +14,7 @@ use super::error::{VioError, read_text, write_file};
 use super::euroc_folder::{Overrides, imu, inside};
 use super::states::states_csv;
 use crate::report::save_figures;
+use crate::say;
 
 /// Longest pause of the samples that is integrated over, s.
 const MAX_GAP: f64 = 0.5;
@@ -56,7 +57,7 @@ pub(super) fn dead_reckon(arguments: &Inertial) -> Result<InertialReport, Box<dy
     for pair in samples[first..].windows(2) {
         let gap = pair[1].stamp.secs_since(pair[0].stamp);
         if gap > MAX_GAP {
-            eprintln!("ends at {} s: {gap:.2} s without inertial samples", pair[0].stamp);
+            say!("ends at {} s: {gap:.2} s without inertial samples", pair[0].stamp);
             break;
         }
         if pair[1].stamp.secs_since(initial.stamp) > arguments.seconds {

@@ -22,6 +22,8 @@ use super::{
 use crate::interruption::{self, Finishing};
 use crate::report::save_figures;
 use crate::run_folder;
+use crate::worker_threads::worker_threads;
+use crate::{result, say};
 
 /// Images of which the first that can be read tells the size.
 const LOOKED_AT: usize = 20;
@@ -29,6 +31,10 @@ const LOOKED_AT: usize = 20;
 const MAX_CHECKS: usize = 4;
 /// Share of the images that may be left out of a run that counts as a success.
 const MAX_LEFT_OUT: f64 = 0.1;
+
+/// The ways in.
+const NO_RECORDING: &str =
+    "name a recording: --euroc DIR, or --mcap FILE; without one, `vio sim --out DIR` makes a folder for --euroc";
 
 type AnyError = Box<dyn std::error::Error>;
 
@@ -41,9 +47,9 @@ pub fn execute(arguments: &Arguments) -> Result<(), AnyError> {
         None => track(&arguments.track),
         Some(Command::Sim(sim)) => render(sim),
         Some(Command::Inertial(inertial)) => {
-            make(&inertial.out)?;
-            eprintln!("{}", dead_reckon(inertial)?.summary());
-            println!("{}", inertial.out.display());
+            make(&inertial.out, "vio-inertial")?;
+            say!("{}", dead_reckon(inertial)?.summary());
+            result!("{}", inertial.out.display());
             Ok(())
         }
         Some(Command::Eval(eval)) => evaluate(eval),
@@ -65,8 +71,11 @@ fn filter_settings(arguments: &Track) -> Result<Settings, AnyError> {
 }
 
 fn track(arguments: &Track) -> Result<(), AnyError> {
+    if arguments.euroc.is_none() && arguments.mcap.is_none() {
+        return Err(NO_RECORDING.into());
+    }
     let folder = &arguments.out;
-    make(folder)?;
+    make(folder, "vio")?;
     let overrides = Overrides {
         cameras: arguments.cameras.clone(),
         imu: arguments.imu.clone(),
@@ -79,7 +88,7 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         (Some(folder), _) => open_euroc(folder, &overrides)?,
         (None, Some(file)) if arguments.stereo => open_mcap_stereo(file, &overrides)?,
         (None, Some(file)) => open_mcap(file, &overrides)?,
-        (None, None) => return Err("name a recording with --euroc or --mcap".into()),
+        (None, None) => return Err(NO_RECORDING.into()),
     };
     if let Some(path) = &arguments.mask {
         let mask = GreyImage::read(path)?;
@@ -95,9 +104,9 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
     check_first_images(&recording)?;
     recording.assumed.iter().for_each(|assumed| eprintln!("warning: {assumed}"));
     let mut findings = check_samples(&recording, filter.gravity, arguments.accept_imu)?;
-    eprintln!("{}: {} images, {} inertial samples", recording.name, recording.images.count(), recording.samples.len());
+    say!("{}: {} images, {} inertial samples", recording.name, recording.images.count(), recording.samples.len());
     if !recording.unused.is_empty() {
-        eprintln!(
+        say!(
             "topics that are not used: {} (choose with --camera-topic and --imu-topic; a second camera goes along with --stereo)",
             recording.unused.join(", ")
         );
@@ -107,14 +116,14 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         let known = (filter.gravity, camera.time_offset_s);
         let frames = camera_frames(&recording);
         findings.warnings.extend(check_axes_with_images(&recording.samples, frames, &camera.camera, known)?);
-        eprintln!("inertial sensor: {:.0} Hz, {} gaps", findings.rate_hz, findings.gaps);
+        say!("inertial sensor: {:.0} Hz, {} gaps", findings.rate_hz, findings.gaps);
         findings.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
         match findings.refuse_contradicted() {
             Err(error) if arguments.accept_imu => eprintln!("warning: {error}; taken as they are (--accept-imu)"),
             other => other.map_err(|error| format!("{}: {error}", recording.name))?,
         }
     }
-    let threads = threads(arguments.threads);
+    let threads = worker_threads(arguments.threads);
     let mut settings = RunSettings { filter, threads, ..RunSettings::default() };
     let given = recording.camera.camera.body_from_camera.rotation;
     if arguments.calibrate {
@@ -135,29 +144,29 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
     };
     let run = &timed.run;
     for why in run.skipped.iter().take(3) {
-        eprintln!("left out: {why}");
+        say!("left out: {why}");
     }
     if let Some(matrix) = run.accel_matrix() {
         let scale = [0, 1, 2].map(|axis| 100.0 * (matrix[(axis, axis)].recip() - 1.0));
         let [x, y, z] = scale.map(|percent| format!("{percent:+.1}"));
-        eprintln!(
+        say!(
             "the accelerometer was not found to be calibrated: it reads {x}, {y}, {z} % on its axes (accel_matrix in report.json)"
         );
     }
     for Loss { stamp, reason: why } in &run.lost {
-        eprintln!("diverged at {stamp} s: {why}");
+        say!("diverged at {stamp} s: {why}");
     }
     let evaluation = recording.truth.as_ref().map(|truth| evaluate_run(run, truth)).transpose()?.flatten();
     write_file(&folder.join("settings.toml"), toml::to_string(&settings.filter)?.as_bytes())?;
     let mut report = VioReport::new(&recording, findings.as_ref(), &timed, evaluation.as_ref(), threads)?;
     report.extrinsics_error_rad = so3::angle_between(&given, &run.calibration.body_from_camera.rotation);
     save(&report, &recording, run, evaluation.as_ref(), folder)?;
-    println!("{}", folder.join("report.md").display());
+    result!("{}", folder.join("report.md").display());
     if run.segments.len() > 1 {
-        eprintln!("{} segments, each in a world of its own: see trajectory.tum and report.json", run.segments.len());
+        say!("{} segments, each in a world of its own: see trajectory.tum and report.json", run.segments.len());
     }
     if run.withdrawn > 0 {
-        eprintln!("{} poses were taken back: wrong starts, or contradicted before a divergence", run.withdrawn);
+        say!("{} poses were taken back: wrong starts, or contradicted before a divergence", run.withdrawn);
     }
     // The files are there to look at, but such a trajectory is not to be relied on.
     usable(&recording, run).map_err(|why| with_cause(why, doubt.as_ref(), &recording, &settings).into())
@@ -172,13 +181,13 @@ fn calibrate(recording: &mut Recording, settings: &mut RunSettings) -> Result<()
         let doubt = check_calibration(&filter, &recording.samples, || camera_frames(recording));
         is_scaled = doubt.as_ref().is_some_and(|doubt| doubt.parts.contains(&CalibrationPart::Accelerometer));
         let Some(doubt) = doubt else { break };
-        eprintln!("calibration: {doubt}");
+        say!("calibration: {doubt}");
         recording.correct_calibration(&doubt);
         if doubt.parts == [CalibrationPart::Accelerometer] || doubt.found.is_none() {
             break;
         }
     }
-    eprintln!("calibration in use: {}", recording.calibration_words());
+    say!("calibration in use: {}", recording.calibration_words());
     settings.filter.calibration = settings.filter.calibration.nearly();
     if is_scaled {
         settings.filter = settings.filter.with_rough_accelerometer();
@@ -249,7 +258,7 @@ fn with_cause(why: String, doubt: Option<&CalibrationDoubt>, recording: &Recordi
     if interruption::is_requested() {
         return why;
     }
-    eprintln!("looking for a cause: the inertial sensor is read with other axes");
+    say!("looking for a cause: the inertial sensor is read with other axes");
     let cause = filter(recording, settings, false)
         .ok()
         .and_then(|filter| diagnose_axes(&filter, &recording.samples, camera_frames(recording), settings.threads));
@@ -282,7 +291,7 @@ fn usable(recording: &Recording, run: &Run) -> Result<(), String> {
 }
 
 fn render(arguments: &Sim) -> Result<(), AnyError> {
-    make(&arguments.out)?;
+    make(&arguments.out, "vio-sim")?;
     let flight = match (&arguments.trajectory, arguments.flight) {
         (Some(file), _) => Flight::File(file.clone()),
         (None, FlightName::Room) => Flight::Room,
@@ -295,14 +304,17 @@ fn render(arguments: &Sim) -> Result<(), AnyError> {
         scenario: Scenario { seed: arguments.seed, cameras, ..Scenario::default() },
         mcap: arguments.mcap,
         raw: arguments.raw,
-        threads: threads(arguments.threads),
+        threads: worker_threads(arguments.threads),
     };
     let simulated = simulate(&settings, &arguments.out)?;
-    eprintln!(
+    say!(
         "{} images, {} inertial samples, {:.1} m in {:.1} s",
-        simulated.frames, simulated.samples, simulated.path_length_m, simulated.duration_s
+        simulated.frames,
+        simulated.samples,
+        simulated.path_length_m,
+        simulated.duration_s
     );
-    println!("{}", arguments.out.display());
+    result!("{}", arguments.out.display());
     Ok(())
 }
 
@@ -336,14 +348,14 @@ fn evaluate(arguments: &Eval) -> Result<(), AnyError> {
     let comparison = compare(&arguments.reference, &arguments.estimate, &settings)?;
     print!("{}", comparison.table());
     if let Some(folder) = &arguments.out {
-        make(folder)?;
+        make(folder, "vio-eval")?;
         save_figures(&comparison, folder)?;
     }
     Ok(())
 }
 
 fn search(arguments: &Tune) -> Result<(), AnyError> {
-    make(&arguments.out)?;
+    make(&arguments.out, "vio-tune")?;
     let data = if arguments.euroc.is_empty() {
         TuningData::simulated(arguments.flights, arguments.seconds, arguments.seed)?
     } else {
@@ -367,37 +379,35 @@ fn search(arguments: &Tune) -> Result<(), AnyError> {
         random: arguments.random,
         seed: arguments.seed,
         resume: arguments.resume,
-        threads: threads(arguments.threads),
+        threads: worker_threads(arguments.threads),
     };
     let report = tune_noise(&data, &tuning, &arguments.out)?;
-    eprintln!(
+    say!(
         "position error {:.4} m at the start, {:.4} m now; NEES {:.1}, now {:.1}",
-        report.ate_start_m, report.ate_best_m, report.nees_start, report.nees_best
+        report.ate_start_m,
+        report.ate_best_m,
+        report.nees_start,
+        report.nees_best
     );
     match (report.held_out_error_data_sheet_m, report.held_out_error_tuned_m) {
         (Some(given), Some(tuned)) => {
-            eprintln!(
-                "on recordings left out: {given:.4} m with the noise given, {tuned:.4} m with that of the others"
-            );
+            say!("on recordings left out: {given:.4} m with the noise given, {tuned:.4} m with that of the others");
         }
-        _ => eprintln!("one recording only: nothing says what the result is worth on others"),
+        _ => say!("one recording only: nothing says what the result is worth on others"),
     }
     if report.data_sheet_kept {
-        eprintln!("no gain on what was left out, or worse positions: noise.yaml has the noise given");
+        say!("no gain on what was left out, or worse positions: noise.yaml has the noise given");
     }
     if let Some(ratio) = report.ratio_to_random {
         let (worse, points, seconds) = (100.0 * (ratio - 1.0), report.random_samples, report.search_wall_s);
-        eprintln!("{worse:+.1} % against the best of {points} random points, after {seconds:.1} s");
+        say!("{worse:+.1} % against the best of {points} random points, after {seconds:.1} s");
     }
-    println!("{}", arguments.out.join("report.md").display());
+    result!("{}", arguments.out.join("report.md").display());
     Ok(())
 }
 
-fn make(folder: &Path) -> Result<(), String> {
-    run_folder::begin(folder, "vio")
+/// Makes the folder of what a subcommand leaves: each has its own files in it.
+fn make(folder: &Path, subcommand: &str) -> Result<(), String> {
+    run_folder::begin(folder, subcommand)
         .map_err(|e| format!("{}: cannot be created ({e}): choose another --out", folder.display()))
-}
-
-fn threads(asked: Option<usize>) -> usize {
-    asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).clamp(1, 1024)
 }

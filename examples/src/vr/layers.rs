@@ -13,6 +13,7 @@ use super::error::VrError;
 use crate::pictures::Rgb;
 use crate::report::save_figures;
 use crate::whole_file;
+use crate::{result, say};
 
 /// The tables below the folder of the pigments.
 const COEFFICIENTS: &str = "pigment_painter_KS/pigment_ks_380_750.csv";
@@ -102,7 +103,7 @@ pub(super) fn save_layers(pigments: &Path, folder: &Path) -> Result<(), VrError>
 
     let mut errors: Vec<[f64; 2]> = rows.iter().map(|row| row.error(&row.opaque)).collect();
     for (row, [mean, max]) in rows.iter().zip(&errors) {
-        println!("{:32} mean {:4.1} %, at most {:4.1} %", row.name, 100.0 * mean, 100.0 * max);
+        result!("{:32} mean {:4.1} %, at most {:4.1} %", row.name, 100.0 * mean, 100.0 * max);
     }
     let within = errors.iter().filter(|[mean, max]| *mean <= WELL[0] && *max <= WELL[1]).count();
     let approaching = |row: &&Row| row.layers.windows(2).all(|pair| row.error(&pair[1])[0] <= row.error(&pair[0])[0]);
@@ -136,7 +137,7 @@ fn chart(folder: &Path) -> Result<Vec<Row>, VrError> {
         let found =
             (coefficients.get(&format!("{name},K")), coefficients.get(&format!("{name},S")), masstones.get(measured));
         let (Some(k), Some(s), Some(percent)) = found else {
-            eprintln!("{name}: not in both tables, left out");
+            say!("{name}: not in both tables, left out");
             continue;
         };
         let paint = Paint::new(k, s, 1.0)?;

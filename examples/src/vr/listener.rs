@@ -13,6 +13,8 @@ use super::connection::{Inbound, Inbox, TrafficCounts, serve_connection, turn_aw
 use super::error::VrError;
 use super::http_server::{HttpOutcome, HttpServer};
 
+use crate::{result, say};
+
 /// Connections that have not said yet what they want, or are being answered. Another one ends the oldest of them: whoever asks for the page
 /// does so within a millisecond, who keeps connections half open must open them faster than that.
 const MOST_WAITING: usize = 128;
@@ -156,17 +158,17 @@ fn visit(mut stream: TcpStream, number: u64, state: &ServerState) -> std::io::Re
 fn announce(address: SocketAddr, token: Option<&str>, does: &str) {
     let query = token.map_or(String::new(), |token| format!("?token={token}"));
     let port = address.port();
-    println!("http://{}/{query}", SocketAddr::new(reachable(address.ip()), port));
+    result!("http://{}/{query}", SocketAddr::new(reachable(address.ip()), port));
     if token.is_some() {
-        eprintln!("Whoever has this address with its token is let in. Headsets show VR only over https or localhost:");
-        eprintln!(
+        say!("Whoever has this address with its token is let in. Headsets show VR only over https or localhost:");
+        say!(
             "put a TLS proxy before it, or use `adb reverse tcp:{port} tcp:{port}` and open http://localhost:{port}/{query} in the headset."
         );
     } else {
-        eprintln!("Open it in a browser; {does}. For a headset: connect it by USB, run");
-        eprintln!("`adb reverse tcp:{port} tcp:{port}`, and open the address in the headset's browser.");
+        say!("Open it in a browser; {does}. For a headset: connect it by USB, run");
+        say!("`adb reverse tcp:{port} tcp:{port}`, and open the address in the headset's browser.");
     }
-    eprintln!("Press Enter here, or Stop on the page, to end.");
+    say!("Press Enter here, or Stop on the page, to end.");
 }
 
 /// An address that others can open: where all of them are listened on, that of the network that other machines are reached by, as the system

@@ -11,6 +11,7 @@ use crate::mission_file::MissionFile;
 use crate::mission_paint::MissionPaint;
 use crate::picture_placement::{PicturePlacement, PlacementMode};
 use crate::pictures::Rgb;
+use crate::say;
 
 /// A share of the paint that is said.
 const SAID: f64 = 0.01;
@@ -29,7 +30,7 @@ pub(super) fn write_mission(session: &Session, appearance: &Appearance, folder: 
     let left_out = sum(&|t| (t - thickest).max(0.0)) / sum(&|t| t);
     if left_out > SAID {
         let (percent, micrometres) = (100.0 * left_out, 1e6 * thickest);
-        eprintln!(
+        say!(
             "mission.toml: {percent:.0} % of the paint is left out: it lies thicker than {micrometres:.0} micrometres"
         );
     }

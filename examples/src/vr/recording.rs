@@ -16,6 +16,7 @@ use super::settings::VrSettings;
 use super::simulated_vehicle::VehicleView;
 use crate::mcap_messages::{MessagesFault, messages_of};
 use crate::recording::{Recorder, quaternion, vector};
+use crate::say;
 use crate::whole_file::{self, part_of};
 
 /// Name of the recording in the folder of the results.
@@ -228,7 +229,7 @@ impl RecordedSession {
             Ok(())
         })?;
         if !whole {
-            eprintln!("{}: its end is missing: what is there is painted", path.display());
+            say!("{}: its end is missing: what is there is painted", path.display());
         }
         let settings = settings.ok_or_else(|| {
             VrError::recording(path, "no session of `vr`: it has no topic /vr/settings; give a session.mcap")
@@ -256,7 +257,7 @@ fn keep(path: &Path) -> Result<(), VrError> {
         kept.set_file_name(format!("session-{seconds}-{number}.mcap"));
     }
     std::fs::rename(path, &kept).map_err(VrError::unwritable(&kept))?;
-    eprintln!("an earlier session is kept as {}", kept.display());
+    say!("an earlier session is kept as {}", kept.display());
     Ok(())
 }
 

@@ -19,6 +19,7 @@ use super::world::VrWorld;
 use crate::interruption::Finishing;
 use crate::progress::Stage;
 use crate::run_folder;
+use crate::say;
 
 /// Runs the program.
 ///
@@ -121,6 +122,6 @@ fn tell(session: &mut Session) {
     }
     lines.dedup();
     for line in lines {
-        eprintln!("{line}");
+        say!("{line}");
     }
 }

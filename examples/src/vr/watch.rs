@@ -28,6 +28,7 @@ use super::message::Notice;
 use super::protocol::{Frame, PROTOCOL, ServerMessage};
 use crate::interruption;
 use crate::report::save_figures;
+use crate::say;
 use feed::{Feed, Heard};
 use foxglove_client::FoxgloveClient;
 use place::place;
@@ -198,7 +199,7 @@ impl Show {
     }
 
     fn say(&mut self, text: String) {
-        eprintln!("{text}");
+        say!("{text}");
         self.client.say(&ServerMessage::Notice { notice: Notice::Text { text } });
     }
 
@@ -206,7 +207,7 @@ impl Show {
     fn find_place(&mut self) {
         let camera = self.scene.frames().find(|(name, _)| *name == CAMERA);
         let Some((name, pose)) = camera.or_else(|| self.scene.frames().next()) else { return };
-        let at = place(&pose, name == CAMERA);
+        let at = place(&pose, name == CAMERA, self.scene.bounds());
         let q = at.page_from_scene.rotation.coords;
         let message = ServerMessage::Place {
             position: at.page_from_scene.translation.vector.into(),
@@ -261,9 +262,10 @@ impl Show {
         )?;
         let lost = counts.malformed + counts.not_drawn;
         if lost > 0 {
-            eprintln!(
+            say!(
                 "{source}: {} messages or parts of them could not be read, {} are of kinds that are not drawn",
-                counts.malformed, counts.not_drawn
+                counts.malformed,
+                counts.not_drawn
             );
         }
         let folder = folder.display().to_string();

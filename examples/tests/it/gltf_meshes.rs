@@ -93,6 +93,18 @@ impl Document {
     }
 }
 
+/// A square with a picture.
+pub(crate) fn square_glb() -> Vec<u8> {
+    Document::square().glb()
+}
+
+/// The same as a document and a buffer that lies beside it under this name.
+pub(crate) fn square_gltf(buffer: &str) -> (Vec<u8>, Vec<u8>) {
+    let mut d = Document::square();
+    (d.json["buffers"][0]["byteLength"], d.json["buffers"][0]["uri"]) = (d.bytes.len().into(), buffer.into());
+    (d.json.to_string().into_bytes(), d.bytes)
+}
+
 /// A small file to damage.
 pub(crate) fn triangle_glb() -> Vec<u8> {
     let mut d = Document::new();

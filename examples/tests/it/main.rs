@@ -5,6 +5,8 @@ mod area_fill;
 mod bad_input;
 #[cfg(feature = "vio")]
 mod bags;
+#[cfg(all(feature = "programs", feature = "log"))]
+mod command_lines;
 mod five_joint_arm;
 mod flight_constraints;
 mod flight_times;

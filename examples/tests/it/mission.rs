@@ -67,8 +67,8 @@ const FILES: [&str; 11] = [
     "surface.ply",
     "scan.ply",
     "mission.mcap",
-    "flight_true.tum",
-    "flight_slam.tum",
+    "drift_true.tum",
+    "drift_estimated.tum",
 ];
 
 fn paint(threads: usize) -> Painted {

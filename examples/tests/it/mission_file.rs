@@ -103,8 +103,17 @@ fn a_run_can_be_repeated_from_the_file_that_it_leaves() {
         one["reach_share"].as_f64().unwrap() > 0.95
             && one["flight_time_s"].as_f64().unwrap() > 0.9 * 2.25 / 0.0375 / 0.3
     );
+    // What the line says comes before what the file says, and the file before the defaults.
     let (code, text) = run(&["--mission", "elsewhere/mission.toml", "--seed", "4"], "three");
-    assert!(code == Some(2) && text.contains("--seed") && text.contains("--mission"), "{text}");
+    let third = MissionFile::read(&s.0.join("three/mission.toml")).unwrap();
+    assert_eq!((code, third.settings.seed, third.scale), (Some(0), 4, Some(1.5)), "{text}");
+    // The folder can be moved with what it names.
+    std::fs::create_dir(s.0.join("moved")).unwrap();
+    for name in ["wall.obj", "two"] {
+        std::fs::rename(s.0.join(name), s.0.join("moved").join(name)).unwrap();
+    }
+    let (code, text) = run(&["--mission", "moved/two/mission.toml"], "four");
+    assert_eq!(code, Some(0), "{text}");
 }
 
 #[test]

@@ -6,16 +6,19 @@
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use paintcopter::mesh_io::read_mesh;
+use paintcopter::mission_file::MissionFile;
 use paintcopter::vio::{Overrides, camera_frames, open_euroc, open_mcap, simulate};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
+use serde_json::Value;
 use vio_ekf::Camera;
 
 use crate::bags::{recompress, write_kalibr_files, write_ros2_bag};
+use crate::gltf_meshes::{square_glb, square_gltf};
 use crate::scratch::Scratch;
 use crate::vio::fixtures::flight;
 
@@ -61,11 +64,36 @@ fn allowed(file: usize) -> isize {
     10 * file as isize + (16 << 20)
 }
 
-/// A sound file, and who reads it; whether it was read.
+/// What is done to a file.
+#[derive(Clone, Copy, PartialEq)]
+enum Mutation {
+    Bytes,
+    /// Bytes, after which the checksums of a PNG are made right in most cases.
+    Png,
+    /// Values of a JSON document, or in the JSON part of a GLB.
+    Json,
+}
+
+/// A sound file, what is done to it, and who reads it; whether it was read.
 struct Kind {
     name: &'static str,
+    extension: &'static str,
     bytes: Vec<u8>,
+    mutation: Mutation,
+    /// What the reader may hold beside [`allowed`], bytes: a drawing becomes a picture, whatever the length of its text.
+    more: isize,
     read: Box<dyn Fn(&Path) -> bool>,
+}
+
+impl Kind {
+    fn new(
+        name: &'static str,
+        extension: &'static str,
+        bytes: Vec<u8>,
+        read: impl Fn(&Path) -> bool + 'static,
+    ) -> Self {
+        Self { name, extension, bytes, mutation: Mutation::Bytes, more: 0, read: Box::new(read) }
+    }
 }
 
 fn kinds(s: &Scratch) -> Vec<Kind> {
@@ -79,16 +107,12 @@ fn kinds(s: &Scratch) -> Vec<Kind> {
         simulate(&settings, &s.0).unwrap();
         std::fs::read(s.0.join("recording.mcap")).unwrap()
     };
-    let recording = |name: &'static str, mut bytes: Vec<u8>, overrides: Overrides| Kind {
-        name,
-        bytes: {
-            drop_checksums(&mut bytes);
-            bytes
-        },
-        read: Box::new(move |file| {
+    let recording = |name: &'static str, mut bytes: Vec<u8>, overrides: Overrides| {
+        drop_checksums(&mut bytes);
+        Kind::new(name, "mcap", bytes, move |file| {
             open_mcap(file, &overrides)
                 .is_ok_and(|recording| camera_frames(&recording).take(100).filter(|f| f.picture.is_ok()).count() > 0)
-        }),
+        })
     };
     let none = Overrides::default;
     let mut kinds = vec![
@@ -115,8 +139,11 @@ fn kinds(s: &Scratch) -> Vec<Kind> {
 
     let header = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list \
                   uchar int vertex_indices\nend_header\n";
-    let mesh =
-        |name: &'static str, bytes: Vec<u8>| Kind { name, bytes, read: Box::new(|file| read_mesh(file).is_ok()) };
+    let mesh = |name: &'static str, bytes: Vec<u8>| {
+        let (_, extension) = name.split_once('.').unwrap_or(("", "ply"));
+        let extension = extension.split(',').next().unwrap_or_default();
+        Kind::new(name, extension, bytes, |file| read_mesh(file).is_ok())
+    };
     kinds
         .push(mesh("PLY, text", format!("ply\nformat ascii 1.0\n{header}0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").into_bytes()));
     let mut binary = format!("ply\nformat binary_little_endian 1.0\n{header}").into_bytes();
@@ -128,15 +155,40 @@ fn kinds(s: &Scratch) -> Vec<Kind> {
     let picture = |name: &'static str, image: image::DynamicImage| {
         let mut png = std::io::Cursor::new(Vec::new());
         image.write_to(&mut png, image::ImageFormat::Png).unwrap();
-        let read = |file: &Path| paintcopter::vio::GreyImage::read(file).is_ok();
-        Kind { name, bytes: png.into_inner(), read: Box::new(read) }
+        let kind = Kind::new(name, "png", png.into_inner(), |file| paintcopter::vio::GreyImage::read(file).is_ok());
+        Kind { mutation: Mutation::Png, ..kind }
     };
     let grey = image::GrayImage::from_fn(40, 30, |x, y| image::Luma([(x * y % 251) as u8]));
     let deep = image::ImageBuffer::from_fn(20, 15, |x, y| image::Luma([(x * y * 200) as u16]));
     kinds.push(picture("PNG, 8 bits", image::DynamicImage::ImageLuma8(grey)));
     kinds.push(picture("PNG, 16 bits", image::DynamicImage::ImageLuma16(deep)));
+
+    kinds.push(mesh("mesh.glb, bytes", square_glb()));
+    kinds.push(Kind { mutation: Mutation::Json, ..mesh("mesh.glb, its document", square_glb()) });
+    let (document, buffer) = square_gltf("buffer.bin");
+    s.write("buffer.bin", buffer);
+    kinds.push(Kind { mutation: Mutation::Json, ..mesh("mesh.gltf, with its buffer beside it", document) });
+    s.write("paint.mtl", "newmtl a\nKd 1 0.5 0\nmap_Kd none.png\n");
+    kinds.push(mesh("mesh.obj", OBJ.into()));
+    kinds.push(mesh("mesh.off", b"OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n".to_vec()));
+    let drawing = Kind::new("SVG", "svg", SVG.into(), |file| {
+        std::fs::read_to_string(file).is_ok_and(|text| paintcopter::vector_drawing::draw_svg(&text).is_ok())
+    });
+    // A picture of 2048 by 2048 pixels for the drawing, and one for each transparent group within another.
+    kinds.push(Kind { more: 9 * (16 << 20), ..drawing });
+    let mission = MissionFile { fill: Some(2e-5), ..MissionFile::default() };
+    let text = toml::to_string(&mission).unwrap();
+    kinds.push(Kind::new("mission.toml", "toml", text.into(), |file| MissionFile::read(file).is_ok()));
     kinds
 }
+
+const OBJ: &str = "mtllib paint.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\nusemtl a\n\
+                   f 1/1/1 2/2/1 3/3/1\nf -4/1 -2/3 -1/4\n";
+
+const SVG: &str = r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 40 20"><defs><linearGradient id="a"><stop offset="0"/>
+<stop offset="1" stop-color="#fff"/></linearGradient><clipPath id="c"><circle cx="9" cy="9" r="8"/></clipPath></defs>
+<g opacity="0.5" transform="rotate(10 3 4)"><path d="M 2 5 H 8 C 9 9 12 12 20 10 Z" stroke="#000" stroke-width="2" fill="url(#a)"/></g>
+<g clip-path="url(#c)"><rect x="1" y="2" width="30" height="9"/><use href="#d"/></g><ellipse id="d" cx="5" cy="5" rx="4" ry="2"/></svg>"##;
 
 /// Takes the checksums out of the chunks of an MCAP file, or every change in one would end there.
 fn drop_checksums(bytes: &mut [u8]) {
@@ -149,6 +201,56 @@ fn drop_checksums(bytes: &mut [u8]) {
         }
         at += 9 + length;
     }
+}
+
+/// Takes away, replaces or moves values of a JSON document, in a GLB with the lengths that then fit.
+fn mutate_json(bytes: &mut Vec<u8>, random: &mut impl FnMut(usize) -> usize) {
+    let binary = bytes.starts_with(b"glTF");
+    let length = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    let (from, to) = if binary { (20, 20 + length(12)) } else { (0, bytes.len()) };
+    let mut document: Value = serde_json::from_slice(&bytes[from..to]).unwrap();
+    let mut count = 0;
+    each(&mut document, &mut |_| count += 1);
+    for _ in 0..=random(2) {
+        let (chosen, what) = (random(count), random(8));
+        let number = [0_i64, -1, 1, 255, 5126, 1 << 31, i64::MAX][random(7)];
+        let mut at = 0;
+        each(&mut document, &mut |value| {
+            if at == chosen {
+                match (what, &mut *value) {
+                    (0..3, Value::Object(fields)) if !fields.is_empty() => {
+                        let key = fields.keys().nth(number.unsigned_abs() as usize % fields.len()).unwrap().clone();
+                        fields.remove(&key);
+                    }
+                    (0..3, Value::Array(items)) => drop(items.pop()),
+                    (3, Value::Array(items)) if !items.is_empty() => items.push(items[0].clone()),
+                    (4, value) => *value = Value::Null,
+                    (5, value) => *value = Value::String("data:,".into()),
+                    (6, value) => *value = serde_json::json!(1e300),
+                    (_, value) => *value = number.into(),
+                }
+            }
+            at += 1;
+        });
+    }
+    let mut text = document.to_string().into_bytes();
+    if binary {
+        text.resize(text.len().next_multiple_of(4), b' ');
+        let total = (20 + text.len() + bytes.len() - to) as u32;
+        bytes[8..12].copy_from_slice(&total.to_le_bytes());
+        bytes[12..16].copy_from_slice(&(text.len() as u32).to_le_bytes());
+    }
+    bytes.splice(from..to, text);
+}
+
+/// Visits every value of a document, those inside others before them.
+fn each(value: &mut Value, visit: &mut dyn FnMut(&mut Value)) {
+    match value {
+        Value::Array(items) => items.iter_mut().for_each(|item| each(item, visit)),
+        Value::Object(fields) => fields.values_mut().for_each(|field| each(field, visit)),
+        _ => {}
+    }
+    visit(value);
 }
 
 /// Makes the checksums of a PNG right again, or every change would end there.
@@ -191,24 +293,26 @@ fn mutated_files_are_read_or_refused() {
     let count: u64 = std::env::var("MUTATIONS").map_or(3000, |text| text.parse().unwrap());
     let s = Scratch::new("mutated");
     let kinds = kinds(&s);
-    let ends: Vec<PathBuf> = ["mutated.mcap", "mutated.ply", "mutated.png"].map(|name| s.0.join(name)).to_vec();
     let mut generator = SplitMix64::seed_from_u64(7);
     let mut random = move |below: usize| (generator.next_u64() % below.max(1) as u64) as usize;
-    for Kind { name, bytes, read } in &kinds {
-        let sound = s.0.join("sound").with_extension(if name.starts_with("PLY") { "ply" } else { "mcap" });
+    for Kind { name, extension, bytes, read, .. } in &kinds {
+        let sound = s.0.join("sound").with_extension(extension);
         std::fs::write(&sound, bytes).unwrap();
         assert!(read(&sound), "{name} is not read as it is");
     }
     let mut of_kind = vec![(0_u64, 0_u64, Duration::ZERO, 0_isize); kinds.len()];
     for k in 0..count {
         let which = k as usize % kinds.len();
-        let Kind { name, bytes, read } = &kinds[which];
+        let Kind { name, extension, bytes, mutation, more, read } = &kinds[which];
         let mut bytes = bytes.clone();
-        mutate(&mut bytes, &mut random);
-        if name.starts_with("PNG") && random(4) > 0 {
+        match mutation {
+            Mutation::Json => mutate_json(&mut bytes, &mut random),
+            Mutation::Bytes | Mutation::Png => mutate(&mut bytes, &mut random),
+        }
+        if *mutation == Mutation::Png && random(4) > 0 {
             mend_checksums(&mut bytes);
         }
-        let file = &ends[if name.starts_with("MCAP") { 0 } else { 1 + usize::from(name.starts_with("PNG")) }];
+        let file = &s.0.join("mutated").with_extension(extension);
         std::fs::write(file, &bytes).unwrap();
         let (before, began) = (HELD.get(), Instant::now());
         PEAK.set(before);
@@ -216,7 +320,7 @@ fn mutated_files_are_read_or_refused() {
         let (taken, elapsed) = (PEAK.get() - before, began.elapsed());
         // A hang, not a slow machine.
         assert!(elapsed < Duration::from_secs(20), "{name}, mutation {k}: {elapsed:?}");
-        assert!(taken <= allowed(bytes.len()), "{name}, mutation {k}: {taken} bytes for {}", bytes.len());
+        assert!(taken <= allowed(bytes.len()) + more, "{name}, mutation {k}: {taken} bytes for {}", bytes.len());
         let (tried, good, slowest, most) = &mut of_kind[which];
         *tried += 1;
         *good += u64::from(is_read);

@@ -397,8 +397,11 @@ fn absurd_settings_are_named() {
             assert_refused(&[&["--image", &image, &setting, "--out", &out], more].concat(), &[word]);
         }
     }
-    for (setting, word) in [("--passes=100000000000", "`passes`"), ("--threads=1000000000", "`threads`")] {
-        assert_refused(&["--image", &image, setting, "--out", &out], &[word]);
+    assert_refused(&["--image", &image, "--passes=100000000000", "--out", &out], &["`passes`"]);
+    for arguments in [["--image", &image, "--threads=1000000000"], ["train", "--preset=painter", "--threads=0"]] {
+        let output = run(&arguments);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(2) && text.contains("give 1 to 1024 threads"), "{text}");
     }
     for setting in [
         "--layers",
@@ -413,12 +416,7 @@ fn absurd_settings_are_named() {
         assert_refused(&["--image", &image, "--palette", "cmy", setting, "--out", &out], &["--palette", name]);
     }
     assert_refused(&["--image", &image, "--painter", "thesis", "--out", &out], &["--weights"]);
-    for (setting, word) in [
-        ("--steps=0", "`steps`"),
-        ("--batch=0", "`batch`"),
-        ("--rate=nan", "`learning_rate`"),
-        ("--threads=0", "`threads`"),
-    ] {
+    for (setting, word) in [("--steps=0", "`steps`"), ("--batch=0", "`batch`"), ("--rate=nan", "`learning_rate`")] {
         for preset in ["painter", "thesis-paint"] {
             assert_refused(&["train", "--preset", preset, setting, "--out", &out], &[word]);
         }

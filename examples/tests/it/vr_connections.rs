@@ -4,6 +4,8 @@ use std::io::Write;
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 use serde_json::json;
 use tungstenite::Message;
 
@@ -128,4 +130,53 @@ fn a_session_that_was_killed_is_painted_again() {
     assert!(output.status.success() && text.contains("its end is missing"), "{text}");
     let states = report(&again)["states"].as_u64().unwrap();
     assert!(states > next / 2 && states <= next, "{states} of {next}");
+}
+
+/// Frames that no browser sends, after a handshake that is one.
+#[test]
+fn raw_frames_end_their_connection_and_nothing_else() {
+    let s = Scratch::new("vr-frames");
+    let out = s.path("out");
+    let server = serve(&arguments(&s, &out));
+    let mut generator = SplitMix64::seed_from_u64(11);
+    let mut random = move |below: u64| generator.next_u64() % below;
+    let text = json!({ "events": Client::states(0, 1) }).to_string();
+    let mut key = String::new();
+    for round in 0..400 {
+        let mut client = server.connect(&key).unwrap();
+        key.clone_from(&client.key);
+        let stream = client.socket.get_mut();
+        let mut frame = vec![random(256) as u8];
+        match round % 4 {
+            // A length that is not there, of 7, 16 or 64 bits.
+            0 => frame.extend([
+                0x80 | (124 + random(4)) as u8,
+                random(256) as u8,
+                0xff,
+                0xff,
+                0xff,
+                0xff,
+                0xff,
+                0xff,
+                0xff,
+            ]),
+            // Without a mask, which a client must set.
+            1 => {
+                frame.push(text.len().min(125) as u8);
+                frame.extend(text.as_bytes());
+            }
+            // Reserved bits and kinds of frames.
+            2 => frame = vec![0xff, 0x84, 1, 2, 3, 4, 5, 6, 7, 8],
+            _ => frame.extend((0..random(64)).map(|_| 0_u8).collect::<Vec<_>>()),
+        }
+        let _ = stream.write_all(&frame);
+        if round % 3 == 0 {
+            let _ = stream.shutdown(std::net::Shutdown::Write);
+        }
+    }
+    let mut client = server.connect(&key).unwrap();
+    let next = client.next;
+    assert_eq!(client.send(&Client::states(next, next + 60)), next + 60);
+    client.end(next + 60);
+    assert_eq!(server.finish(), Some(0));
 }

@@ -8,7 +8,6 @@ use std::error::Error;
 use std::process::ExitCode;
 
 use arguments::Arguments;
-use clap::Parser;
 use estimator::{Estimator, Way};
 use nalgebra::{Isometry3, Matrix3, Vector3};
 use paintcopter::exit::run_program;
@@ -19,7 +18,7 @@ use vio_ekf::{Odometry, nalgebra};
 type AnyError = Box<dyn Error>;
 
 fn main() -> ExitCode {
-    run_program("vio_fusion", || run(&Arguments::parse()))
+    run_program("vio_fusion", run)
 }
 
 /// What is compared.

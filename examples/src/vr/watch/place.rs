@@ -1,10 +1,12 @@
-//! Where the person stands who watches: behind the first that is seen of camera or robot.
+//! Where the person stands who watches: behind the camera, or so far before what the robot flies at that all of it is seen.
 
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
 
 /// How far behind it, and how much higher, m.
 const BEHIND: f64 = 1.0;
 const ABOVE: f64 = 0.3;
+/// Half of the smaller angle of the page's view, rad.
+const HALF_VIEW: f64 = 0.54;
 /// A scene whose up is less than this part of the page's up lies on its side.
 const UPRIGHT: f64 = 0.5;
 /// Height of the person's eyes above the page's ground, m, where the scene itself does not say.
@@ -21,8 +23,8 @@ pub(super) struct Place {
 }
 
 /// Looks where the frame looks: along z of a camera (`optical`, y down), along x of a body (z up). A scene that is not upright is turned
-/// so that the frame is.
-pub(super) fn place(scene_from_frame: &Isometry3<f64>, optical: bool) -> Place {
+/// so that the frame is. `bounds`: lowest and highest corner of what stands before a body.
+pub(super) fn place(scene_from_frame: &Isometry3<f64>, optical: bool, bounds: Option<[Point3<f64>; 2]>) -> Place {
     let (ahead, up) = if optical { (Vector3::z(), -Vector3::y()) } else { (Vector3::x(), Vector3::z()) };
     let (ahead, up) = (scene_from_frame.rotation * ahead, scene_from_frame.rotation * up);
     let turn = if up.z >= UPRIGHT {
@@ -35,7 +37,13 @@ pub(super) fn place(scene_from_frame: &Isometry3<f64>, optical: bool) -> Place {
     let ahead = turn * ahead;
     let heading = ahead.y.atan2(ahead.x);
     let level = Vector3::new(heading.cos(), heading.sin(), 0.0);
-    let eyes = turn * scene_from_frame.translation.vector - level * BEHIND + Vector3::z() * ABOVE;
+    let frame = turn * scene_from_frame.translation.vector;
+    let behind = frame - level * BEHIND + Vector3::z() * ABOVE;
+    let eyes = bounds.filter(|_| !optical).map_or(behind, |[low, high]| {
+        let (middle, radius) = (turn * nalgebra::center(&low, &high), 0.5 * (high - low).norm());
+        let away = (radius / HALF_VIEW.sin()).max(level.dot(&(middle.coords - behind)));
+        middle.coords - level * away
+    });
     let lift = if turn == UnitQuaternion::identity() && eyes.z >= LOWEST { 0.0 } else { EYES - eyes.z };
     let lift = Vector3::z() * lift;
     Place { page_from_scene: Isometry3::from_parts(lift.into(), turn), eyes: (eyes + lift).into(), heading }
@@ -48,7 +56,7 @@ mod tests {
     #[test]
     fn a_scene_on_its_side_is_set_upright_and_looked_at() {
         // The world of a depth camera: z ahead, y down.
-        let at = place(&Isometry3::translation(0.2, 0.0, 0.0), true);
+        let at = place(&Isometry3::translation(0.2, 0.0, 0.0), true, None);
         let wall = at.page_from_scene * Point3::new(0.2, 0.0, 1.5);
         let ahead = Vector3::new(at.heading.cos(), at.heading.sin(), 0.0);
         let way = wall - at.eyes;
@@ -62,12 +70,27 @@ mod tests {
     #[test]
     fn an_upright_scene_stays_as_it_is() {
         let body = Isometry3::new(Vector3::new(-1.0, 2.0, 1.5), Vector3::z() * 0.4);
-        let at = place(&body, false);
+        let at = place(&body, false, None);
         assert_eq!(at.page_from_scene, Isometry3::identity());
         assert!((at.heading - 0.4).abs() < 1e-12);
         let eyes = Point3::new(-1.0 - 0.4_f64.cos(), 2.0 - 0.4_f64.sin(), 1.8);
         assert!((at.eyes - eyes).norm() < 1e-12);
         let down = Isometry3::rotation(Vector3::x() * std::f64::consts::PI);
-        assert!((place(&down, false).page_from_scene * (down * Vector3::z()) - Vector3::z()).norm() < 1e-9);
+        assert!((place(&down, false, None).page_from_scene * (down * Vector3::z()) - Vector3::z()).norm() < 1e-9);
+    }
+
+    #[test]
+    fn all_of_a_wall_is_before_the_eyes() {
+        let body = Isometry3::translation(-1.0, 2.5, 0.4);
+        let (low, high) = (Point3::new(0.0, -3.0, 1.0), Point3::new(0.2, 3.0, 3.0));
+        let at = place(&body, false, Some([low, high]));
+        assert_eq!((at.page_from_scene, at.heading), (Isometry3::identity(), 0.0));
+        for [x, y, z] in [[0.0, -3.0, 1.0], [0.2, 3.0, 3.0], [0.0, 3.0, 1.0], [0.2, -3.0, 3.0]] {
+            let way = Point3::new(x, y, z) - at.eyes;
+            assert!(way.x > 1.0 && way.angle(&Vector3::x()) < HALF_VIEW, "{way}");
+        }
+        // What is small is looked at from behind the robot all the same.
+        let at = place(&body, false, Some([Point3::new(0.0, 2.4, 1.6), Point3::new(0.1, 2.6, 1.8)]));
+        assert!(at.eyes.x <= -2.0 && (at.eyes.y - 2.5).abs() < 1e-9);
     }
 }

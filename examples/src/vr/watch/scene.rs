@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use foxglove::Decode as _;
 use foxglove::messages::{CompressedImage, FrameTransform, FrameTransforms, Log, Pose, SceneUpdate};
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 
 use super::feed::{FeedMessage, IMAGE, LOG, SCENE, TRANSFORM, TRANSFORMS};
 use super::shapes::{Shapes, entity, isometry, picture};
@@ -36,6 +36,9 @@ pub(super) struct SceneCounts {
 struct Thing {
     bytes: Vec<u8>,
     triangles: u64,
+    frame: String,
+    /// Lowest and highest corner in its frame.
+    bounds: Option<[[f32; 3]; 2]>,
 }
 
 /// The scene.
@@ -95,6 +98,15 @@ impl Scene {
         self.frames.keys().filter_map(|name| Some((name.as_str(), self.pose(name)?)))
     }
 
+    /// Lowest and highest corner of what does not move: of the surfaces in a frame that has no parent.
+    pub(super) fn bounds(&self) -> Option<[Point3<f64>; 2]> {
+        let fixed = self.things.values().filter(|thing| !self.frames.contains_key(&thing.frame));
+        let bounds = fixed.filter_map(|thing| thing.bounds).reduce(|[low, high], [l, h]| {
+            [std::array::from_fn(|k| low[k].min(l[k])), std::array::from_fn(|k| high[k].max(h[k]))]
+        });
+        bounds.map(|bounds| bounds.map(|corner| Point3::from(corner.map(f64::from))))
+    }
+
     fn pose(&self, name: &str) -> Option<Isometry3<f64>> {
         let mut pose = Isometry3::identity();
         let mut at = name;
@@ -125,7 +137,12 @@ impl Scene {
             let shapes = Shapes::of(&new);
             self.counts.malformed += shapes.malformed;
             self.counts.not_drawn += shapes.not_drawn;
-            let thing = Thing { bytes: entity(&key, &new.frame_id, &shapes.parts), triangles: shapes.triangles() };
+            let thing = Thing {
+                bytes: entity(&key, &new.frame_id, &shapes.parts),
+                triangles: shapes.triangles(),
+                bounds: shapes.bounds(),
+                frame: new.frame_id,
+            };
             self.things.insert(key.clone(), thing);
             changes.push(Change::Entity(key));
         }

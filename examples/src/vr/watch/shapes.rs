@@ -51,6 +51,15 @@ impl Shapes {
         }
     }
 
+    /// Lowest and highest corner of what has triangles.
+    pub(super) fn bounds(&self) -> Option<[[f32; 3]; 2]> {
+        let corners = self.parts.iter().filter(|part| !part.lines).flat_map(|part| &part.positions);
+        corners.fold(None, |bounds, p| {
+            let [low, high] = bounds.unwrap_or([*p; 2]);
+            Some([std::array::from_fn(|k| low[k].min(p[k])), std::array::from_fn(|k| high[k].max(p[k]))])
+        })
+    }
+
     pub(super) fn triangles(&self) -> u64 {
         self.parts.iter().map(|part| part.corners as u64 / 3).sum()
     }
