@@ -160,3 +160,59 @@ fn gaps(poses: &Trajectory, start: Stamp) -> Vec<[f64; 2]> {
         .map(|(t, _)| [t[0].secs_since(start), t[1].secs_since(start)])
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn trajectory(poses: &[(f64, [f64; 3])]) -> Trajectory {
+        let stamps = poses.iter().map(|(time, _)| Stamp::from_secs(*time).unwrap()).collect();
+        Trajectory::new(stamps, poses.iter().map(|(_, [x, y, z])| Isometry3::translation(*x, *y, *z)).collect())
+            .unwrap()
+    }
+
+    #[test]
+    fn gaps_are_silences_and_jumps() {
+        let still = trajectory(&[
+            (10.0, [0.0; 3]),
+            (10.05, [0.04, 0.0, 0.0]),
+            // A silence.
+            (10.2, [0.05, 0.0, 0.0]),
+            (10.25, [0.06, 0.0, 0.0]),
+            // A jump: 0.3 m in 0.05 s.
+            (10.3, [0.36, 0.0, 0.0]),
+            // Far, but no faster than a hand.
+            (10.38, [0.36, 0.3, 0.0]),
+            // Fast, but not far.
+            (10.385, [0.36, 0.34, 0.0]),
+        ]);
+        let gaps = gaps(&still, Stamp::from_secs(10.0).unwrap());
+        let expected = [[0.05, 0.2], [0.25, 0.3]];
+        assert_eq!(gaps.len(), 2, "{gaps:?}");
+        assert!(gaps.iter().flatten().zip(expected.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-9), "{gaps:?}");
+        // Steps of 0.8, 0.067, 0.2, 6, 3.75 and 8 m/s.
+        assert!((median_speed(&still) - 3.75).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_recording_is_placed_turned_and_scaled() {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.3);
+        let pose = |x: f64| Isometry3::from_parts(Translation3::new(x, 100.0, 0.0), turn);
+        let stamps = [0.0, 0.1, 0.2].map(|time| Stamp::from_secs(time).unwrap()).to_vec();
+        let poses = Trajectory::new(stamps, [0.0, 200.0, 400.0].map(pose).to_vec()).unwrap();
+        let middle = Isometry3::new(Vector3::new(1.0, 2.0, 3.0), Vector3::z() * 0.5);
+        let frame = MotionFrame { scale: 1e-3, axes: MotionAxes::Robot, middle: Some(middle) };
+        let placed = in_frame(&poses, &frame).unwrap();
+        // The one in the middle is where the middle shall be, the others 0.2 m before and after it along the recording's x.
+        assert!((placed.poses()[1].inverse() * middle).translation.vector.norm() < 1e-9);
+        assert!(placed.poses()[1].rotation.angle_to(&middle.rotation) < 1e-9);
+        let way = placed.poses()[2].translation.vector - placed.poses()[1].translation.vector;
+        let expected = middle.rotation * turn.inverse() * Vector3::x() * 0.2;
+        assert!((way - expected).norm() < 1e-9, "{way}");
+        // A camera looks along z with y down: the robot's x and -z.
+        let frame = MotionFrame { scale: 1.0, axes: MotionAxes::Camera, middle: None };
+        let turned = in_frame(&trajectory(&[(0.0, [0.0; 3]), (0.1, [0.0; 3])]), &frame).unwrap();
+        assert!((turned.poses()[0] * Vector3::x() - Vector3::z()).norm() < 1e-12);
+        assert!((turned.poses()[0] * Vector3::z() + Vector3::y()).norm() < 1e-12);
+    }
+}

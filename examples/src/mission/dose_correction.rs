@@ -87,3 +87,38 @@ fn deviation_over_mean(values: impl Iterator<Item = (f64, f64)>) -> f64 {
     let [all, sum, squares] = values.fold([0.0; 3], add);
     (squares * all / (sum * sum) - 1.0).max(0.0).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+    use ptu_kinematics::Ptu;
+
+    use super::super::settings::MissionSettings;
+    use super::super::test_panel;
+    use super::*;
+    use crate::adapters::Robot;
+
+    #[test]
+    fn the_deviation_is_that_of_the_weights() {
+        let deviation = |values: &[(f64, f64)]| deviation_over_mean(values.iter().copied());
+        assert!((deviation(&[(1.0, 1.0), (3.0, 1.0)]) - 0.5).abs() < 1e-12);
+        // Mean 1.5, variance (3 * 0.25 + 2.25) / 4.
+        assert!((deviation(&[(1.0, 3.0), (3.0, 1.0)]) - 0.75_f64.sqrt() / 1.5).abs() < 1e-12);
+        assert!(deviation(&[(2.0, 0.3), (2.0, 7.0)]) < 1e-7);
+        assert_eq!(median(vec![5.0, 1.0, 3.0]), 3.0);
+    }
+
+    #[test]
+    fn a_shot_leaves_from_its_share_of_the_way() {
+        let settings = MissionSettings { threads: 1, ..MissionSettings::default() };
+        let surface = test_panel::surface();
+        let plan = test_panel::plan(&surface, &Robot::new(Ptu::new(settings.ptu).unwrap()), &settings);
+        let targets = test_panel::targets();
+        let nozzle = |k: usize| plan.nozzle[k].position;
+        let shot = shot_between(&targets, &plan, 7, 0.25);
+        assert!((shot.origin - (nozzle(7) + 0.25 * (nozzle(8) - nozzle(7)))).norm() < 1e-12);
+        let aim = targets[7].point + 0.25 * (targets[8].point - targets[7].point);
+        let way: Vector3<f64> = aim - shot.origin;
+        assert!((shot.axis.into_inner() - way.normalize()).norm() < 1e-12);
+    }
+}

@@ -48,3 +48,20 @@ fn pose_at(trajectory: &Trajectory, seconds: f64) -> Option<Isometry3<f64>> {
     let is_near = *after == stamp || next.checked_sub(1).is_some_and(|k| after.secs_since(stamps[k]) <= LONGEST_GAP);
     is_near.then(|| trajectory.pose_at(stamp).ok()).flatten()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn poses_lie_between_neighbours_and_not_in_gaps() {
+        let stamps = [1.0, 1.4, 2.0].map(|time| Stamp::from_secs(time).unwrap()).to_vec();
+        let poses = [0.0, 4.0, 10.0].map(|x| Isometry3::translation(x, 0.0, 0.0)).to_vec();
+        let trajectory = Trajectory::new(stamps, poses).unwrap();
+        let x = |time: f64| pose_at(&trajectory, time).map(|pose| (1e6 * pose.translation.x).round() / 1e6);
+        assert_eq!([x(1.0), x(1.1), x(1.4)], [Some(0.0), Some(1.0), Some(4.0)]);
+        // 0.6 s apart: nothing between them, the end itself.
+        assert_eq!([x(1.5), x(1.999), x(2.0)], [None, None, Some(10.0)]);
+        assert_eq!([x(0.999), x(2.001), x(f64::NAN)], [None; 3]);
+    }
+}

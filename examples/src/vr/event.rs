@@ -76,3 +76,23 @@ impl Event {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_eraser_has_a_place_and_a_size() {
+        let erase = |x: f64, radius: f64| {
+            let command = Command::Erase { point: Point3::new(x, 0.0, 0.0), radius };
+            Event::Command { sequence: 7, command }.check()
+        };
+        for (x, radius) in [(0.0, 0.0), (-3.0, 0.06), (0.0, 1.0)] {
+            assert!(erase(x, radius).is_ok(), "{radius}");
+        }
+        for (x, radius) in [(0.0, 1.01), (0.0, -0.01), (0.0, f64::NAN), (f64::NAN, 0.1), (f64::INFINITY, 0.1)] {
+            let error = erase(x, radius).unwrap_err();
+            assert!(matches!(error, paint_planner::Error::VrState { sequence: 7, .. }), "{radius}: {error}");
+        }
+    }
+}

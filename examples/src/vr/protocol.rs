@@ -163,3 +163,51 @@ pub(super) fn patch(picture: u8, patch: &Patch) -> Vec<u8> {
     bytes.extend_from_slice(&patch.rgb);
     bytes
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::settings::VrSettings;
+    use super::*;
+
+    #[test]
+    fn a_surface_is_as_it_is_described() {
+        let folder = std::env::temp_dir().join(format!("paintcopter-protocol-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let mesh = folder.join("wall.obj");
+        std::fs::write(&mesh, "v 0 1 1\nv 0 -1 1\nv 0 -1 2\nv 0 1 2\nf 1 2 3\nf 1 3 4\n").unwrap();
+        let world =
+            VrWorld::new(&VrSettings { mesh: Some(mesh), scale: Some(1.0), texel: 0.02, ..VrSettings::default() });
+        std::fs::remove_dir_all(&folder).unwrap();
+        let world = world.unwrap();
+        let bytes = surface(&world);
+        let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+        let float = |at: usize| f32::from_bits(word(at));
+        let (vertices, faces) = (word(4) as usize, word(8) as usize);
+        assert_eq!((bytes[..4].to_vec(), vertices, faces), (vec![1, 0, 0, 0], 4, 2));
+        assert_eq!(bytes.len(), 12 + 12 * vertices + 8 * vertices + 12 * faces);
+        let corner = |k: usize| [0, 1, 2].map(|c| float(12 + 12 * k + 4 * c));
+        let texture = |k: usize| [0, 1].map(|c| float(12 + 12 * vertices + 8 * k + 4 * c));
+        for k in 0..4 {
+            assert!(texture(k).iter().all(|c| (-1e-3..=1.001).contains(c)), "{:?}", texture(k));
+            for l in 0..4 {
+                let [a, b] = [corner(k), corner(l)];
+                let ([u, v], [s, t]) = (texture(k), texture(l));
+                // Seen from the robot, which looks along x: +y is left, and row 0 of the picture is above.
+                if a[1] > b[1] + 1.0 {
+                    assert!(u < s, "left of it");
+                }
+                if a[2] > b[2] + 0.5 {
+                    assert!(v < t, "above it");
+                }
+            }
+        }
+        let corners: Vec<u32> = (0..6).map(|k| word(12 + 20 * vertices + 4 * k)).collect();
+        assert!(corners.iter().all(|c| (*c as usize) < vertices));
+    }
+
+    #[test]
+    fn a_patch_is_as_it_is_described() {
+        let change = Patch { left: 3, top: 258, width: 2, height: 1, rgb: vec![9, 8, 7, 6, 5, 4] };
+        assert_eq!(patch(1, &change), [2, 1, 0, 0, 3, 0, 2, 1, 2, 0, 1, 0, 9, 8, 7, 6, 5, 4]);
+    }
+}

@@ -57,7 +57,8 @@ struct Painted {
 }
 
 /// Files that a mission leaves, without those that hold times.
-const FILES: [&str; 11] = [
+const FILES: [&str; 12] = [
+    "trajectory.csv",
     "wanted.png",
     "painted.png",
     "painted_view.png",
@@ -101,6 +102,49 @@ fn a_panel_is_painted_and_the_figures_are_those_of_an_easy_one() {
     assert!(report.scan_error_mean_m < 0.005);
     let json: serde_json::Value = serde_json::from_slice(&files["report.json"]).unwrap();
     assert!(json.as_object().unwrap().len() >= 33);
+}
+
+/// The figures of the joints are those of the joints, and the table says what was planned and flown.
+#[test]
+fn joints_are_not_confused() {
+    let Painted { mission, report, files } = painted();
+    let flight = mission.flights().first().unwrap();
+    let open: Vec<_> =
+        flight.flight.samples.iter().filter(|s| s.flow > 0.0 && s.aim.is_some() && s.hit.is_some()).collect();
+    let rms = |joint: usize| {
+        let squares = open.iter().map(|s| (s.pan_tilt[joint] - s.desired_pan_tilt[joint]).powi(2));
+        (squares.sum::<f64>() / open.len() as f64).sqrt()
+    };
+    assert!((report.pan_error_rms_rad - rms(0)).abs() < 1e-12 && (report.tilt_error_rms_rad - rms(1)).abs() < 1e-12);
+    assert!((rms(0) - rms(1)).abs() > 1e-6, "the two differ");
+
+    let table = std::str::from_utf8(&files["trajectory.csv"]).unwrap();
+    let names: Vec<&str> = table.lines().next().unwrap().split(',').collect();
+    for row in table.lines().skip(1).step_by(97) {
+        let numbers: Vec<f64> = row.split(',').map(|cell| cell.parse().unwrap()).collect();
+        let column = |name: &str| numbers[names.iter().position(|n| *n == name).unwrap()];
+        let time = column("time_s");
+        let planned = flight.plan.setpoint(time);
+        for (name, value) in [
+            ("x_m", planned.sample.position.x),
+            ("heading_rad", planned.sample.heading),
+            ("pan_rad", planned.pan),
+            ("tilt_rad", planned.tilt),
+            ("target_z_m", planned.aim.z),
+        ] {
+            assert!((column(name) - value).abs() < 1e-8, "{name} at {time}");
+        }
+        let flown = flight
+            .flight
+            .samples
+            .iter()
+            .min_by(|a, b| (a.time - time).abs().total_cmp(&(b.time - time).abs()))
+            .unwrap();
+        assert!(
+            (column("flown_pan_rad") - flown.pan_tilt[0]).abs() < 1e-8
+                && (column("flown_tilt_rad") - flown.pan_tilt[1]).abs() < 1e-8
+        );
+    }
 }
 
 #[test]

@@ -206,6 +206,10 @@ fn ten_thousand_bad_messages_are_counted_and_the_session_goes_on() {
     let server = Server::start(&arguments);
     assert!(server.query.starts_with("?token=") && server.query.len() == 39, "{}", server.query);
     assert!(server.get("/", "").contains("403") && server.get("/?token=0123", "").contains("403"));
+    let handshake = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
+    for path in ["/session", "/session?token=0123", "/session?key=0123"] {
+        assert!(server.get(path, handshake).contains("403"), "{path}");
+    }
     assert!(server.get(&format!("/{}", server.query), "").contains("200"));
 
     let mut client = server.connect("").unwrap();

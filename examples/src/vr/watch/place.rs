@@ -91,6 +91,6 @@ mod tests {
         }
         // What is small is looked at from behind the robot all the same.
         let at = place(&body, false, Some([Point3::new(0.0, 2.4, 1.6), Point3::new(0.1, 2.6, 1.8)]));
-        assert!(at.eyes.x <= -2.0 && (at.eyes.y - 2.5).abs() < 1e-9);
+        assert!(at.eyes.x < -1.99 && (at.eyes.y - 2.5).abs() < 1e-9);
     }
 }
