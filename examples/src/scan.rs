@@ -20,6 +20,7 @@ mod report;
 mod run;
 mod sequence;
 mod settings;
+mod simulate;
 mod start;
 mod views;
 

@@ -1,10 +1,10 @@
 //! The command line of `scan`.
 
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use clap::{Parser, ValueEnum};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use nalgebra::Isometry3;
 use tsdf_hash::loop_closure::LoopSettings;
 use tsdf_hash::slam::{Device, OdometryError, PoseSource, SlamSettings};
@@ -26,13 +26,48 @@ use crate::say;
 use crate::socket_address;
 use crate::worker_threads::{self, worker_threads};
 
+#[derive(Debug, Clone, Subcommand)]
+pub(super) enum Command {
+    /// Renders a recording to try: RGB-D images of the built-in wall with noise and true poses, in the layout of 7-Scenes
+    Sim(Simulation),
+}
+
+/// A recording to try.
+#[derive(Debug, Clone, Args)]
+pub(super) struct Simulation {
+    /// Length of the recording at 30 Hz, seconds
+    #[arg(long, default_value_t = 6.0, value_parser = parse_seconds)]
+    pub(super) seconds: f64,
+    /// Seed of the wall and of the noise
+    #[arg(long, default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Worker threads [default: all cores]; results do not depend on it
+    #[arg(long, value_parser = worker_threads::parse)]
+    pub(super) threads: Option<usize>,
+    /// Folder for the recording
+    #[arg(long, value_name = "DIR", default_value = "out/scan-sim")]
+    pub(super) out: PathBuf,
+}
+
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|v: &f64| *v > 0.0 && *v <= 600.0);
+    value.ok_or_else(|| "give seconds, at most 600".into())
+}
+
 /// Maps a recorded RGB-D sequence into a voxel-hashed distance field and its mesh.
 #[derive(Debug, Clone, Parser)]
-#[command(version, after_help = "Example:\n  scan --sequence recordings/kitchen --voxel 0.01 --out out/kitchen")]
+#[command(
+    version,
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    after_help = "Examples:\n  scan --sequence recordings/kitchen --voxel 0.01 --out out/kitchen\n  scan sim --out out/recording"
+)]
 pub struct Arguments {
+    #[command(subcommand)]
+    pub(super) command: Option<Command>,
     /// Folder in the layout of 7-Scenes, TUM, ICL-NUIM or Redwood, or an MCAP file
-    #[arg(long, value_name = "PATH")]
-    pub(super) sequence: PathBuf,
+    #[arg(long, value_name = "PATH", required = true)]
+    pub(super) sequence: Option<PathBuf>,
     /// Where the poses come from
     #[arg(long, default_value = "given")]
     pub(super) poses: Poses,
@@ -144,7 +179,7 @@ pub(super) enum DeviceName {
 
 /// The recording, with what the command line knows better.
 pub(super) fn sequence(arguments: &Arguments) -> Result<Sequence, Box<dyn std::error::Error>> {
-    let mut sequence = open_sequence(&arguments.sequence)?;
+    let mut sequence = open_sequence(arguments.recording())?;
     if let Some(scale) = arguments.depth_scale {
         (sequence.depth_scale, sequence.scale_origin) = (scale, "--depth-scale".into());
     }
@@ -178,6 +213,13 @@ pub(super) fn sequence(arguments: &Arguments) -> Result<Sequence, Box<dyn std::e
         }
     }
     Ok(sequence)
+}
+
+impl Arguments {
+    /// The recording; the command line requires it where it has no subcommand.
+    pub(super) fn recording(&self) -> &Path {
+        self.sequence.as_deref().unwrap_or(Path::new(""))
+    }
 }
 
 /// How it is mapped.

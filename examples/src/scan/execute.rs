@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use super::arguments::{self, Arguments};
+use super::arguments::{self, Arguments, Command};
 use super::mapped::Scan;
 use super::options::in_options;
 use super::report::ScanReport;
+use super::simulate::simulate;
 use super::views::save_views;
 use crate::interruption::Finishing;
 use crate::mesh_io::{PlyMesh, write_ply};
@@ -22,20 +23,26 @@ pub fn execute(arguments: &Arguments) -> Result<(), String> {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
+    if let Some(Command::Sim(simulation)) = &arguments.command {
+        prepare(&simulation.out, "scan-sim")?;
+        simulate(simulation)?;
+        result!("{}", simulation.out.display());
+        return Ok(());
+    }
     let folder = &arguments.out;
-    prepare(folder)?;
+    prepare(folder, "scan")?;
     let sequence = arguments::sequence(arguments)?;
-    say!("{}: {} layout, {} frames", arguments.sequence.display(), sequence.layout, sequence.frames.len());
+    say!("{}: {} layout, {} frames", arguments.recording().display(), sequence.layout, sequence.frames.len());
     say!("{:28} {}", "camera", sequence.description());
     let settings = arguments::settings(arguments)?;
     // The map and its files are finished where somebody interrupts.
     let _finishing = Finishing::begin();
-    let scan = Scan::run(&arguments.sequence, &sequence, &settings)?;
+    let scan = Scan::run(arguments.recording(), &sequence, &settings)?;
     for (_, why) in &scan.skipped {
         say!("left out: {}", in_options(why));
     }
     // What cannot be made again comes first, pictures last.
-    scan.save(&folder.join("map.tsdf"), &arguments.sequence)?;
+    scan.save(&folder.join("map.tsdf"), arguments.recording())?;
     let ply = folder.join("mesh.ply");
     let tsdf_hash::mesh::Mesh { positions, normals, colours, faces, .. } = &scan.mesh;
     write_ply(&ply, &PlyMesh { positions, normals: Some(normals), colours, faces })
@@ -52,15 +59,10 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// Makes the folder, and tries it before any work is done.
-fn prepare(folder: &Path) -> Result<(), String> {
+fn prepare(folder: &Path, program: &str) -> Result<(), String> {
     let refuse = |e: std::io::Error| format!("{}: cannot be written to ({e}): choose another --out", folder.display());
-    run_folder::begin(folder, "scan").map_err(refuse)?;
+    run_folder::begin(folder, program).map_err(refuse)?;
     let probe = folder.join(".tried");
     std::fs::write(&probe, b"").map_err(refuse)?;
-    std::fs::remove_file(&probe).map_err(refuse)?;
-    // A report of an earlier run would say that this one is complete.
-    match std::fs::remove_file(folder.join("report.json")) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(refuse(e)),
-        _ => Ok(()),
-    }
+    std::fs::remove_file(&probe).map_err(refuse)
 }

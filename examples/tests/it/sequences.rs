@@ -203,3 +203,24 @@ fn one_damaged_frame_is_left_out_and_counted() {
     assert_eq!((fused, scan.skipped.len()), (vec![0, 2], 1));
     assert!(scan.skipped[0].1.contains("frame-000001.depth.png"), "{}", scan.skipped[0].1);
 }
+
+/// The recording that a newcomer can try is one: mapped with its poses, and without.
+#[test]
+fn a_simulated_recording_is_mapped() {
+    let s = Scratch::new("scan-sim");
+    let (recording, out) = (s.path("recording"), s.path("out"));
+    let scan = |arguments: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_scan")).args(arguments).output().unwrap();
+        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    };
+    scan(&["sim", "--seconds", "1", "--out", &recording]);
+    for poses in ["given", "tracked"] {
+        scan(&["--sequence", &recording, "--poses", poses, "--voxel", "0.03", "--out", &out]);
+        let report = std::fs::read_to_string(format!("{out}/report.json")).unwrap();
+        let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+        assert_eq!(report["frames_fused"], 30, "{poses}: {report:#}");
+        if poses == "tracked" {
+            assert!(report["ate_se3_rmse_m"].as_f64().unwrap() < 0.01, "{report:#}");
+        }
+    }
+}
