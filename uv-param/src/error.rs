@@ -31,6 +31,19 @@ pub enum Error {
         /// Largest number accepted.
         limit: usize,
     },
+    /// A mesh far from the origin of its coordinates was stored with too few digits.
+    #[error(
+        "coordinates reach {coordinate:.4e}, but come in steps of {step:.3} where edges are {edge:.3} long: the relief is lost in the file; \
+         export it in double precision, or moved to the origin"
+    )]
+    LostRelief {
+        /// Largest coordinate, units of the file.
+        coordinate: f64,
+        /// Their step.
+        step: f64,
+        /// Median length of an edge.
+        edge: f64,
+    },
     /// All faces are degenerate.
     #[error("all faces have zero area or are repeated; check the units and the export of the mesh")]
     ZeroArea,

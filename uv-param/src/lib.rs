@@ -36,6 +36,7 @@
 //! | thesis 8, "cuts along high distortion areas"; Gu et al. 2002, cut to the worst distortion | [`unwrap_with_cuts`], [`Disk::cut`] |
 //! | Cohen-Steiner et al. 2004, regions of similar normals; merged within a bound of stretch (ours) | [`unwrap_atlas`] |
 //! | Zheng et al. 2011, Eq. (3), bilateral normals; a part of a mesh up to its creases (ours) | [`region::grow_to_creases`] |
+//! | Fu et al. 2008, the side on which a thing stands; meshes far from their origin; units (ours) | [`surface::file_frame`] |
 //! | Tutte 1963, barycentric layout | [`parametrizer::Tutte`] |
 //! | a map of your own | [`Parametrizer`], [`unwrap_by`] |
 //! | thesis 8.3.1, box of smallest area by rotating calipers | [`min_area_rectangle::min_area_rectangle`], [`Chart::new`] |

@@ -1,5 +1,7 @@
 //! Any triangle mesh as oriented, edge-manifold pieces: what an atlas is made of.
 
+pub mod file_frame;
+
 use nalgebra::Vector3;
 
 use crate::decimate::decimate;

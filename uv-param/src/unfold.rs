@@ -69,3 +69,42 @@ fn on_segment(a: [f64; 2], b: [f64; 2], at: [f64; 2]) -> (f64, f64) {
     let along = ((at - a).dot(&(b - a)) / (b - a).norm_squared()).clamp(0.0, 1.0);
     (along, (a + along * (b - a) - at).norm())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The other side is turned by a quarter and half as long again: the share of the edge stays, and so does the distance from it.
+    #[test]
+    fn a_place_beyond_an_edge_keeps_its_share_and_its_distance() {
+        let (here, there) = ([[0.0, 0.0], [2.0, 0.0]], [[5.0, 5.0], [5.0, 8.0]]);
+        for (at, expected) in
+            [([0.0, 0.0], [5.0, 5.0]), ([2.0, 0.0], [5.0, 8.0]), ([1.0, 0.5], [4.5, 6.5]), ([3.0, -0.25], [5.25, 9.5])]
+        {
+            let found = across(here, there, at);
+            assert!((0..2).all(|k| (found[k] - expected[k]).abs() < 1e-12), "{at:?}: {found:?} for {expected:?}");
+        }
+    }
+
+    /// Every texel whose centre is within the reach of an edge, and no other, has it, at its distance from the segment.
+    #[test]
+    fn edges_are_noted_at_the_texels_around_them() {
+        let (size, reach) = ([20, 15], 3);
+        let (a, b) = ([4.2, 6.1], [13.7, 9.4]);
+        let mut nearest = vec![None; size[0] * size[1]];
+        note_edge([a, b], 7, reach, size, &mut nearest);
+        for (k, found) in nearest.iter().enumerate() {
+            let centre = [(k % size[0]) as f64 + 0.5, (size[1] - 1 - k / size[0]) as f64 + 0.5];
+            // By brute force along the segment.
+            let to = |s: f64| (a[0] + s * (b[0] - a[0]) - centre[0]).hypot(a[1] + s * (b[1] - a[1]) - centre[1]);
+            let distance = (0..=10_000).map(|s| to(f64::from(s) / 10_000.0)).fold(f64::INFINITY, f64::min);
+            match found {
+                Some(Nearest { distance: d, half_edge, along }) => {
+                    assert!(*half_edge == 7 && (d - distance).abs() < 1e-3 && (to(*along) - d).abs() < 1e-12);
+                }
+                None => assert!(distance > reach as f64 + 1.0 - 1e-3, "texel {k} at {distance}"),
+            }
+        }
+        assert!(nearest.iter().flatten().count() > 60);
+    }
+}

@@ -3,15 +3,17 @@
 use std::collections::{HashMap, HashSet};
 
 use crate::atlas::charts::Charts;
+use crate::atlas::cut::cut_graph::cut_graph;
 use crate::atlas::cut::seam_cost::{SeamCosts, angle_deficits};
 use crate::atlas::cut::straighten::{straighten, straighten_unlaid};
 use crate::atlas::merge::merge_charts::ChartMerger;
 use crate::atlas::merge::merge_small::merge_small_charts;
-use crate::atlas::merge::ruin_and_recreate::{SearchContext, ruin_and_recreate};
+use crate::atlas::merge::ruin_and_recreate::{SearchContext, cost_of, ruin_and_recreate};
 use crate::atlas::parametrize::add_region::add_region;
 use crate::atlas::parametrize::fit::{Bounds, Distortion, POWER, fit};
 use crate::atlas::parametrize::refine::{is_small, refine};
 use crate::atlas::parametrize::simple_boundary::boundary_is_simple;
+use crate::atlas::segment::creases::sides_between_creases;
 use crate::atlas::segment::shape_approximation::shape_approximation;
 use crate::atlas::segment::transfer::transfer;
 use crate::chart::Chart;
@@ -39,6 +41,10 @@ const LAST_WORK: usize = 1_000_000;
 /// Relative gain at which they stop.
 const LAST_TOLERANCE: f64 = 1e-4;
 
+/// Bounds of stretch that are tried one after the other where they may be relaxed. Each is kept if it makes seams and charts cheaper by more than it
+/// is larger.
+const RELAXED: [f64; 3] = [1.3, 1.6, 2.0];
+
 /// Where a surface is cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
@@ -47,6 +53,9 @@ pub struct ChartSettings {
     pub max_stretch: f64,
     /// Stretch that no face may exceed, at least `max_stretch`. Default 1.5.
     pub worst_stretch: f64,
+    /// Stretch up to which `max_stretch` may be relaxed where that saves seams, `worst_stretch` in proportion: a rough surface, as of a scan with
+    /// noise, is torn to shreds otherwise. Default `None`: not at all.
+    pub relaxed_stretch: Option<f64>,
     /// Direction that points up in every chart, as [`Settings::up`].
     pub up: Option<[f64; 3]>,
     /// Whether vertices at exactly the same position are one. Default true.
@@ -55,7 +64,7 @@ pub struct ChartSettings {
 
 impl Default for ChartSettings {
     fn default() -> Self {
-        Self { max_stretch: 1.15, worst_stretch: 1.5, up: None, join: true }
+        Self { max_stretch: 1.15, worst_stretch: 1.5, relaxed_stretch: None, up: None, join: true }
     }
 }
 
@@ -71,11 +80,27 @@ impl ChartSettings {
                 must_be: "at least max_stretch",
             });
         }
+        if let Some(value) = self.relaxed_stretch
+            && !(value.is_finite() && value >= self.max_stretch)
+        {
+            return Err(Error::Setting { name: "relaxed_stretch", value, must_be: "at least max_stretch" });
+        }
         Settings { up: self.up, ..Settings::default() }.check()
     }
 
     pub(super) fn bounds(&self) -> Bounds {
         Bounds { stretch: self.max_stretch, worst: self.worst_stretch }
+    }
+
+    /// The bounds that may be tried beyond, the strictest first.
+    fn relaxed_bounds(&self) -> impl Iterator<Item = Bounds> {
+        let most = self.relaxed_stretch.unwrap_or(self.max_stretch);
+        let worst_per_stretch = (self.worst_stretch - 1.0) / (self.max_stretch - 1.0);
+        let within = RELAXED.into_iter().filter(move |s| *s < most).chain([most]);
+        let strict = self.max_stretch;
+        within
+            .filter(move |stretch| *stretch > strict)
+            .map(move |stretch| Bounds { stretch, worst: 1.0 + worst_per_stretch * (stretch - 1.0) })
     }
 }
 
@@ -88,8 +113,32 @@ pub(super) fn compute_charts(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<(Vec<Chart>, Vec<Vec<u32>>), Error> {
     settings.check()?;
-    let bounds = settings.bounds();
-    let mut charts = Charts::new(surface, wanted_seams(surface, seams)?);
+    let wanted = wanted_seams(surface, seams)?;
+    let (costs, mut bounds) = (SeamCosts::new(surface), settings.bounds());
+    let (mut charts, mut whole) = search(surface, &wanted, bounds, parametrizer, progress);
+    let mut cost = cost_of(&charts, &costs);
+    for relaxed in settings.relaxed_bounds() {
+        if whole.len() == surface.part_count() {
+            break;
+        }
+        let (other, other_whole) = search(surface, &wanted, relaxed, parametrizer, progress);
+        let other_cost = cost_of(&other, &costs);
+        if other_cost * relaxed.stretch < cost * bounds.stretch {
+            (charts, whole, cost, bounds) = (other, other_whole, other_cost, relaxed);
+        }
+    }
+    finish(charts, &Kept { whole: &whole, sizes: &HashMap::new() }, (bounds, settings.up), parametrizer, progress)
+}
+
+/// Charts within the bounds, and which of them are whole parts.
+fn search<'a>(
+    surface: &'a Surface,
+    wanted: &[bool],
+    bounds: Bounds,
+    parametrizer: Option<&dyn Parametrizer>,
+    progress: &mut dyn FnMut(Progress),
+) -> (Charts<'a>, Vec<u32>) {
+    let mut charts = Charts::new(surface, wanted.to_vec());
     let whole = if surface.faces().len() > COARSE_FROM && parametrizer.is_none() {
         by_coarse(&mut charts, bounds, progress)
     } else {
@@ -100,7 +149,7 @@ pub(super) fn compute_charts(
         ruin_and_recreate(&mut charts, tools, &whole.iter().copied().collect(), progress);
         whole
     };
-    finish(charts, &Kept { whole: &whole, sizes: &HashMap::new() }, settings, parametrizer, progress)
+    (charts, whole)
 }
 
 /// Every face in a chart within the bounds. Returns the charts that are whole parts, in the layout that [`crate::unwrap`] makes.
@@ -111,7 +160,63 @@ fn cut_open(
     progress: &mut dyn FnMut(Progress),
 ) -> Vec<u32> {
     let surface = charts.surface;
-    let mut region = shape_approximation(surface, &charts.wanted);
+    let shapes = shape_approximation(surface, &charts.wanted);
+    let mut whole = cut_open_from(charts, shapes.clone(), bounds, parametrizer, progress);
+    if whole.len() == surface.part_count() {
+        return whole;
+    }
+    // Other beginnings, which are better for some surfaces.
+    let costs = SeamCosts::new(surface);
+    let mut cost = cost_of(charts, &costs);
+    let mut opened = Charts::new(surface, charts.wanted.clone());
+    if open_parts(&mut opened, &costs, bounds, parametrizer) {
+        let opened_whole = cut_open_from(&mut opened, shapes, bounds, parametrizer, progress);
+        let opened_cost = cost_of(&opened, &costs);
+        if opened_cost < cost {
+            (*charts, whole, cost) = (opened, opened_whole, opened_cost);
+        }
+    }
+    if let Some(sides) = sides_between_creases(surface, &charts.wanted) {
+        let mut other = Charts::new(surface, charts.wanted.clone());
+        let other_whole = cut_open_from(&mut other, sides, bounds, parametrizer, progress);
+        if cost_of(&other, &costs) < cost {
+            (*charts, whole) = (other, other_whole);
+        }
+    }
+    whole
+}
+
+/// Charts for those parts that can be laid out whole once the shortest cuts open them. Whether there are any.
+fn open_parts(charts: &mut Charts, costs: &SeamCosts, bounds: Bounds, parametrizer: Option<&dyn Parametrizer>) -> bool {
+    let surface = charts.surface;
+    for faces in by_number(&(0..surface.faces().len()).map(|f| surface.part(f) as u32).collect::<Vec<_>>()) {
+        let cut = cut_graph(surface, &faces, costs);
+        let sides = |h: u32| std::iter::once(h as usize).chain(surface.twin(h as usize));
+        for side in cut.iter().flat_map(|&h| sides(h)) {
+            charts.cut[side] = true;
+        }
+        let laid_out = charts.disk(&faces).filter(|_| !cut.is_empty()).and_then(|disk| {
+            let (_, start) = tutte_layout(&disk, &mut |_| ()).ok()?;
+            fit(&disk, start, bounds, parametrizer).map(|uv| (disk, uv))
+        });
+        if let Some((disk, uv)) = laid_out {
+            charts.add(faces, &disk, &uv);
+        } else {
+            cut.iter().flat_map(|&h| sides(h)).for_each(|side| charts.cut[side] = false);
+        }
+    }
+    !charts.members.is_empty()
+}
+
+/// The same from first regions.
+fn cut_open_from(
+    charts: &mut Charts,
+    mut region: Vec<u32>,
+    bounds: Bounds,
+    parametrizer: Option<&dyn Parametrizer>,
+    progress: &mut dyn FnMut(Progress),
+) -> Vec<u32> {
+    let surface = charts.surface;
     let whole = whole_parts(charts, bounds, parametrizer, |_| true);
     for (number, _) in region.iter_mut().zip(&charts.chart).filter(|(_, chart)| **chart != u32::MAX) {
         *number = u32::MAX;
@@ -145,7 +250,8 @@ fn whole_parts(
     let surface = charts.surface;
     let mut whole = Vec::new();
     for faces in by_number(&(0..surface.faces().len()).map(|f| surface.part(f) as u32).collect::<Vec<_>>()) {
-        if wanted(surface.part(faces[0] as usize))
+        if charts.chart[faces[0] as usize] == u32::MAX
+            && wanted(surface.part(faces[0] as usize))
             && let Some(disk) = charts.disk(&faces)
             && let Some(uv) = whole_part(&disk, bounds, parametrizer)
         {
@@ -253,11 +359,10 @@ pub(super) struct Kept<'a> {
 pub(super) fn finish(
     mut charts: Charts,
     kept: &Kept,
-    settings: &ChartSettings,
+    (bounds, up): (Bounds, Option<[f64; 3]>),
     parametrizer: Option<&dyn Parametrizer>,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<(Vec<Chart>, Vec<Vec<u32>>), Error> {
-    let bounds = settings.bounds();
     let iterations = (LAST_WORK / charts.surface.faces().len()).min(LAST_ITERATIONS);
     let names: Vec<u32> =
         (0..charts.members.len() as u32).filter(|&c| !charts.members[c as usize].is_empty()).collect();
@@ -288,7 +393,7 @@ pub(super) fn finish(
         }
         let chart = match kept.sizes.get(&name) {
             Some(&size) => Chart::placed(disk, uv, size, 0),
-            None => Chart::new(disk, uv, 0, settings.up)?,
+            None => Chart::new(disk, uv, 0, up)?,
         };
         progress(Progress { stage: Stage::Chart, iteration: done.0.len() + 1, energy: 0.0 });
         done.0.push(chart);

@@ -185,7 +185,13 @@ pub fn update_atlas(
         (0..charts.members.len() as u32).filter(|&c| !charts.members[c as usize].is_empty()).collect();
     let homes = settle(previous, &old, &mut charts, &stay, &settings.pack);
     let sizes: HashMap<u32, [f64; 2]> = homes.iter().map(|(&c, &(size, _))| (c, size)).collect();
-    let (done, members) = finish(charts, &Kept { whole: &[], sizes: &sizes }, &settings.charts, None, &mut progress)?;
+    let (done, members) = finish(
+        charts,
+        &Kept { whole: &[], sizes: &sizes },
+        (settings.charts.bounds(), settings.charts.up),
+        None,
+        &mut progress,
+    )?;
     let pieces: Vec<Piece> = done.iter().map(|c| Piece::new(c.uv(), c.disk().faces())).collect();
     let places: Vec<Option<Placement>> = old_charts.iter().map(|c| homes.get(c).map(|&(_, place)| place)).collect();
     let (placements, pages) = pack::add_to(&pieces, &places, &previous.pages, &settings.pack)?;

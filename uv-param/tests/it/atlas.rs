@@ -2,6 +2,7 @@
 
 mod box_cutter;
 mod levels;
+mod relaxed;
 mod seams;
 mod update;
 
@@ -25,6 +26,20 @@ fn assert_sound(atlas: &Atlas) {
     let q = AtlasQuality::of(atlas);
     assert_eq!((q.flips, q.flips_f32, q.overlap_pairs), (0, 0, 0));
     assert!(q.stretch_max <= 1.5, "{q:?}");
+    // By the definitions, face by face.
+    let (mut flat, mut error, mut area) = (0.0, 0.0, 0.0);
+    for chart in atlas.charts() {
+        for (face, corners) in chart.disk().faces().iter().enumerate() {
+            let [a, b, c] = corners.map(|v| chart.uv()[v as usize]);
+            flat += 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
+            let (size, stretch) = (chart.disk().face_area(face), chart.stretch(face as u32));
+            error += size * stretch.map(|s| (s - 1.0).abs()).into_iter().fold(0.0, f64::max);
+            area += size;
+        }
+    }
+    let texels: usize = atlas.pages().iter().map(|[columns, rows]| columns * rows).sum();
+    assert!((flat / (texels as f64 * atlas.texel_m().powi(2)) - q.utilisation).abs() < 1e-9, "{q:?}");
+    assert!((error / area - q.length_err_mean).abs() < 1e-9 && (area - q.area_m2).abs() < 1e-9 * area, "{q:?}");
     let members: usize = (0..atlas.charts().len()).map(|c| atlas.chart_faces(c).len()).sum();
     assert_eq!(members, atlas.surface().faces().len());
     assert!(q.utilisation > 0.0 && q.utilisation <= 1.0 && q.seam_relative.is_finite());

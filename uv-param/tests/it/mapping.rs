@@ -108,6 +108,24 @@ fn texels_share_the_surface_among_them() {
     assert!(matches!(TexelMap::new(&chart, 1e-9), Err(Error::TooManyTexels { .. })));
 }
 
+/// Two texels on a wall of 1 m x 0.3 m, neither centre on it: the diagonal leaves more of the upper face in the first and of the lower face in
+/// the second, whichever comes first.
+#[test]
+fn a_texel_without_its_centre_shows_its_largest_piece() {
+    let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 0.3], [0.0, 0.0, 0.3]];
+    for faces in [[[0, 1, 2], [0, 2, 3]], [[0, 2, 3], [0, 1, 2]]] {
+        let (disk, _) = largest_disk_with(&positions, &faces, Repair::default()).unwrap();
+        let up = Settings { up: Some([0.0, 0.0, 1.0]), ..Settings::default() };
+        let map = TexelMap::new(&unwrap(&disk, &up, |_| ()).unwrap(), 0.7).unwrap();
+        assert_eq!((map.width, map.height), (2, 1));
+        let shown = [0, 1].map(|k| {
+            let face = disk.faces()[map.cells[k].unwrap().face as usize];
+            face.iter().all(|&v| disk.positions()[v as usize] != positions[1])
+        });
+        assert_eq!(shown, [true, false], "whether it is the upper face");
+    }
+}
+
 #[test]
 fn vertex_colours_that_are_linear_on_a_wall_stay_linear() {
     let chart = flat_wall();

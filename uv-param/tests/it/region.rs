@@ -76,6 +76,34 @@ fn a_disc_is_cut_out_of_a_square_without_gaps() {
     }
 }
 
+/// Colours and texture coordinates that are linear on the square are linear on what it is divided into.
+#[test]
+fn what_is_divided_keeps_its_colours_and_coordinates() {
+    let (mut positions, mut faces) = mesh(2, 2, |s, t| [s, t, 0.0]);
+    let colour = |p: [f32; 3]| [p[0], 1.0 - p[1], 0.5 * p[0] + 0.25 * p[1]];
+    let at = |p: [f32; 3]| [2.0 * p[0] - p[1], 3.0 * p[1] + 1.0];
+    let mut colours: Vec<[f32; 3]> = positions.iter().map(|&p| colour(p)).collect();
+    // In an order of their own, each once for every corner.
+    let mut coordinates: Vec<[f32; 2]> =
+        faces.iter().rev().flat_map(|f| f.map(|v| at(positions[v as usize]))).collect();
+    let last = faces.len() as u32 - 1;
+    let mut uv_faces: Vec<[u32; 3]> = (0..=last).map(|f| [0, 1, 2].map(|k| 3 * (last - f) + k)).collect();
+    let uv = uv_param::region::EditableUv { coordinates: &mut coordinates, faces: &mut uv_faces };
+    let editable =
+        EditableMesh { positions: &mut positions, faces: &mut faces, colours: Some(&mut colours), uv: Some(uv) };
+    divide_at_border(editable, 0.02, &|s| (s.point.x - 0.4).hypot(s.point.y - 0.6) < 0.25).unwrap();
+    assert!(faces.len() > 100 && colours.len() == positions.len() && uv_faces.len() == faces.len());
+    for (p, found) in positions.iter().zip(&colours) {
+        assert!(colour(*p).iter().zip(found).all(|(a, b)| (a - b).abs() < 1e-5), "{p:?}: {found:?}");
+    }
+    for (face, corners) in faces.iter().zip(&uv_faces) {
+        for (v, i) in face.iter().zip(corners) {
+            let (expected, found) = (at(positions[*v as usize]), coordinates[*i as usize]);
+            assert!((0..2).all(|k| (expected[k] - found[k]).abs() < 1e-5), "{expected:?}: {found:?}");
+        }
+    }
+}
+
 #[test]
 fn what_does_not_fit_is_refused() {
     let (mut positions, mut faces) = mesh(1, 1, |s, t| [s, t, 0.0]);

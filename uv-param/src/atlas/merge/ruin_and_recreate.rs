@@ -204,7 +204,7 @@ fn draw_patch(charts: &Charts, costs: &SeamCosts, stays: &HashSet<u32>, random: 
 }
 
 /// Cost of all seams and charts.
-fn cost_of(charts: &Charts, costs: &SeamCosts) -> f64 {
+pub(in crate::atlas) fn cost_of(charts: &Charts, costs: &SeamCosts) -> f64 {
     let count = charts.members.iter().filter(|faces| !faces.is_empty()).count();
     seam_cost_of(charts, costs) + EACH * charts.surface.area().sqrt() * count as f64
 }

@@ -182,4 +182,20 @@ mod tests {
         // Its curvature allows no less: a layout of all of it within this is none.
         assert!(fit(&disk, start, Bounds { stretch: 1.01, worst: 1.5 }, None).is_none());
     }
+
+    /// One face in a hundred may be stretched beyond the bound, none of them beyond the worst.
+    #[test]
+    fn few_faces_may_go_beyond_the_bound_and_none_beyond_the_worst() {
+        let frames = patch().frames();
+        let bounds = Bounds { stretch: 1.1, worst: 1.5 };
+        let within = |count: usize, stretch: f64| {
+            let mut stretches = vec![1.05; frames.len()];
+            // From all over the patch, so that their share of the area is about that of the faces.
+            stretches.iter_mut().step_by(97).take(count).for_each(|s| *s = stretch);
+            Distortion::of(&frames, &stretches, bounds).within(bounds)
+        };
+        assert_eq!(frames.len(), 512);
+        assert_eq!([within(0, 1.4), within(4, 1.4), within(6, 1.4)], [true, true, false]);
+        assert_eq!([within(1, 1.5), within(1, 1.51), within(1, f64::INFINITY)], [true, false, false]);
+    }
 }

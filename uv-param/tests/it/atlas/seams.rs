@@ -1,12 +1,12 @@
 //! What lies beyond the seams of an atlas, texel by texel and along a line.
 
-use uv_param::SurfacePoint;
 use uv_param::atlas::{AtlasQuality, PageTexels, TexelKind};
 use uv_param::nalgebra::Vector3;
 use uv_param::texture::{Gutter, TexelMap};
+use uv_param::{SurfacePoint, unwrap_atlas};
 
-use super::{atlas, cube, sphere};
-use crate::common::Rng;
+use super::{atlas, cube, settings, sphere};
+use crate::common::{Rng, grid};
 
 /// A smooth function, sampled into the page and read back bilinearly, is the same on the two sides of every seam: far nearer
 /// than with gutters that repeat the rim.
@@ -220,4 +220,81 @@ fn the_gutter_is_the_other_side_of_the_seam() {
         checked += 1;
     }
     assert!(checked > 500, "{checked}");
+}
+
+/// A wall that is cut into strips: a gutter texel that shows a place near the rim takes what it lies between from both sides of the seam, and
+/// errs by little more than half of what it would if it took the nearer side alone.
+#[test]
+fn places_near_a_rim_are_interpolated_from_both_sides() {
+    // Strips of 20.4 texels: beside a rim lie centres that are hardly beyond it.
+    let texel = 0.0126;
+    let mesh = grid(8, 6, |s, t| [1.03 * s, 0.0, 0.7 * t]);
+    let seam: Vec<[u32; 2]> =
+        [2, 4, 6].iter().flat_map(|k| (0..6).map(move |row| [9 * row + k, 9 * (row + 1) + k])).collect();
+    let found = unwrap_atlas(&mesh.0, &mesh.1, &seam, &settings(texel), |_| ()).unwrap();
+    assert_eq!(found.charts().len(), 4);
+    let page = found.page_chart(0).unwrap();
+    let map = TexelMap::new(&page, texel).unwrap();
+    let centre = |k: usize| map.uv_of_texel(k % map.width, k / map.width);
+    let (mut both, mut one, mut count) = (0.0, 0.0, 0);
+    for gutter in &Gutter::new(&page, &map, 4).texels {
+        let truth = page.point(gutter.point).coords;
+        // Around the place, what lies in the chart itself.
+        let at = page.uv_of(gutter.point);
+        let share = |k: usize| {
+            let off = [0, 1].map(|c| 1.0 - ((centre(k)[c] - at[c]) / texel).abs());
+            off[0].max(0.0) * off[1].max(0.0)
+        };
+        let own: Vec<(f64, Vector3<f64>)> = (0..map.cells.len())
+            .filter(|&k| share(k) > 0.0)
+            .filter_map(|k| Some((share(k), page.point(page.locate(centre(k))?).coords)))
+            .collect();
+        let sum: f64 = own.iter().map(|(weight, _)| weight).sum();
+        if !(1e-9..=1.0 - 1e-9).contains(&sum) {
+            continue;
+        }
+        let nearer: Vector3<f64> = own.iter().map(|(weight, place)| place * (*weight / sum)).sum();
+        let shown: Vector3<f64> =
+            gutter.sources.iter().map(|&(k, weight)| weight * page.point(map.cells[k].unwrap()).coords).sum();
+        both += (shown - truth).norm();
+        one += (nearer - truth).norm();
+        count += 1;
+    }
+    assert!(count > 30, "{count}");
+    assert!(both < 0.6 * one, "{} texels against {}", both / texel / f64::from(count), one / texel / f64::from(count));
+}
+
+/// A footprint over an edge of a cube sees the side beyond as far as it reaches there, also over a seam: the mean of two normals, by the area of the
+/// segment of the disc.
+#[test]
+fn footprints_reach_over_seams() {
+    let found = atlas(&cube(4), 0.02);
+    let page = found.page_chart(0).unwrap();
+    let mut random = Rng(8);
+    let (radius, mut checked, mut seams) = (0.15_f64, 0, 0);
+    while checked < 200 {
+        let face = random.below(page.disk().faces().len()) as u32;
+        let at = SurfacePoint { face, barycentric: [1.0 / 3.0; 3] };
+        let (point, normal) = (page.point(at).coords, page.face_normal(face).into_inner());
+        // The edges of this side that are nearer than the radius: the way to each, and how far.
+        let near: Vec<(Vector3<f64>, f64)> = (0..3)
+            .filter(|k| normal[*k].abs() < 0.5)
+            .flat_map(|k| [(k, 1.0, 1.0 - point[k]), (k, -1.0, point[k])])
+            .filter(|(_, _, room)| *room < radius)
+            .map(|(k, sign, room)| (Vector3::ith(k, sign), room))
+            .collect();
+        let [(out, room)] = near[..] else { continue };
+        let share =
+            ((room / radius).acos() - room / radius * (1.0 - (room / radius).powi(2)).sqrt()) / std::f64::consts::PI;
+        let expected = (normal * (1.0 - share) + out * share).normalize();
+        let seen = page.footprint_normal(at, radius).into_inner();
+        assert!((seen - expected).norm() < 0.05, "{seen} for {expected}, {room} m from the edge");
+        let uv = page.uv_of(at);
+        seams += usize::from((0..24).any(|k| {
+            let angle = std::f64::consts::TAU * f64::from(k) / 24.0;
+            page.locate([uv[0] + radius * angle.cos(), uv[1] + radius * angle.sin()]).is_none()
+        }));
+        checked += 1;
+    }
+    assert!(seams > 20, "{seams}");
 }

@@ -5,6 +5,7 @@ use uv_param::nalgebra::Vector3;
 use uv_param::{Atlas, Error, unwrap_atlas};
 
 use super::{assert_sound, atlas, cube, settings, sphere};
+use crate::common::grid;
 
 /// A dent in a sphere of many charts: what is away from it stays to the bit, what is near is laid out again within the bounds.
 #[test]
@@ -155,6 +156,33 @@ fn what_comes_and_goes_is_laid_out_again() {
     vast.pages[0] = [1 << 40, 1 << 40];
     let vast = update_atlas(&vast, &positions, &faces, &[], &settings(0.02), |_| ());
     assert!(matches!(vast, Err(Error::TooManyTexels { .. })), "pages are not believed before they are counted");
+}
+
+/// A wall that loses a strip at each of its sides in turn: what is left of its chart has another corner, and lies where it was.
+#[test]
+fn what_is_left_of_a_chart_lies_where_it_was() {
+    let mesh = grid(12, 8, |s, t| [1.2 * s, 0.0, 0.8 * t]);
+    let before = atlas(&mesh, 0.01);
+    assert_eq!(before.charts().len(), 1);
+    let corners = |atlas: &Atlas, f: usize| {
+        let (chart, local) = atlas.chart_of_face(f);
+        let uv = atlas.charts()[chart].disk().faces()[local].map(|v| atlas.charts()[chart].uv()[v as usize]);
+        uv.map(|at| atlas.placements()[chart].apply(at))
+    };
+    let gone: [fn([f64; 3]) -> bool; 4] = [|p| p[0] < 0.15, |p| p[0] > 1.05, |p| p[2] < 0.15, |p| p[2] > 0.65];
+    for (side, gone) in gone.iter().enumerate() {
+        let stays = |f: &usize| mesh.1[*f].iter().all(|&v| !gone(mesh.0[v as usize]));
+        let kept: Vec<usize> = (0..mesh.1.len()).filter(stays).collect();
+        let faces: Vec<[u32; 3]> = kept.iter().map(|&f| mesh.1[f]).collect();
+        assert!(kept.len() < mesh.1.len() && 2 * kept.len() > mesh.1.len());
+        let (after, update) = update_atlas(&before.layout(), &mesh.0, &faces, &[], &settings(0.01), |_| ()).unwrap();
+        assert_eq!((update.changed_charts, update.new_charts, after.charts().len()), (1, 0, 1));
+        for (f, &old) in kept.iter().enumerate() {
+            let (there, here) = (corners(&before, old), corners(&after, f));
+            let off = (0..3).map(|k| (there[k][0] - here[k][0]).hypot(there[k][1] - here[k][1])).fold(0.0, f64::max);
+            assert!(off < 1e-9, "side {side}: face {old} moved by {off} m");
+        }
+    }
 }
 
 /// Pairs of texels of different charts that are nearer to each other than a gutter, by texels whose centres charts cover.
