@@ -16,6 +16,7 @@ mod tiles;
 #[cfg(any(test, feature = "train"))]
 mod unrolled;
 mod weights;
+mod widest;
 
 #[cfg(feature = "train")]
 pub(crate) use adjoint::Adjoint;

@@ -3,10 +3,12 @@
 
 mod area_fill;
 mod centrelines;
+mod centring;
 mod closed_loop;
 mod deconvolution;
 mod distance;
 mod doses;
+mod drawn_lines;
 mod feedback;
 mod fitting;
 mod free_sprays;
@@ -14,9 +16,12 @@ mod layers;
 mod on_surface;
 mod placed_sprays;
 mod pursuit;
+mod skeleton_graph;
+mod skeleton_lines;
 mod slew;
 mod thinning;
 mod trace;
+mod volume_fit;
 
 pub use area_fill::AreaFill;
 pub use centrelines::Centrelines;
@@ -26,6 +31,7 @@ pub use doses::{DoseCorrection, DoseFootprint};
 pub use feedback::Feedback;
 pub use free_sprays::FreeSprays;
 pub use layers::{LayerPlanning, Layered, ThresholdSpacing};
-pub use on_surface::{OnSurface, SurfaceFootprint};
+pub use on_surface::OnSurface;
 pub use pursuit::MatchingPursuit;
 pub use slew::{SlewLimited, slew_violations};
+pub use volume_fit::{SurfaceFootprint, VolumeFit};

@@ -23,6 +23,8 @@ pub struct Painting {
     /// The strokes along which the sprays are to be flown; empty unless the painter plans them, as for rows
     /// ([`boustrophedon`](crate::path::boustrophedon)).
     pub strokes: Vec<Stroke>,
+    /// Weights of missing ink that the volumes were fitted by, for whoever fits them anew; `None`: those of the problem.
+    pub missing_weight: Option<Image>,
     /// Paint that came out over paint that was asked for, as a closed loop estimates it; 1 unless somebody measured.
     pub flow_gain: f64,
 }
@@ -31,7 +33,16 @@ impl Painting {
     /// A painting in one piece, from its sprays and the depth that they lead to.
     pub fn new(sprays: Vec<Spray>, canvas: Image, saturation: &Saturation) -> Self {
         let ink = canvas.map(|c| saturation.forward(c));
-        Self { sprays, canvas, ink, layers: Vec::new(), waypoints: Vec::new(), strokes: Vec::new(), flow_gain: 1.0 }
+        Self {
+            sprays,
+            canvas,
+            ink,
+            layers: Vec::new(),
+            waypoints: Vec::new(),
+            strokes: Vec::new(),
+            missing_weight: None,
+            flow_gain: 1.0,
+        }
     }
 
     /// A painting in one piece, rendered: every spray is stamped on the problem's canvas with the problem's kernel.

@@ -5,11 +5,10 @@
 
 use super::padded_grid::{BLOCK, PaddedGrid};
 use super::real::Real;
+use super::widest::{self, Work};
 
 /// Taps of one kernel.
 const TAPS: usize = 9;
-/// Output channels per inner loop: as many sums as fit the registers.
-const LANES: usize = if cfg!(target_feature = "avx") { 4 } else { 2 };
 
 /// Weights ordered for the inner loop: per group of outputs, per input channel, per tap, one weight for each output of the
 /// group (zero for outputs that do not exist).
@@ -17,6 +16,8 @@ const LANES: usize = if cfg!(target_feature = "avx") { 4 } else { 2 };
 pub(crate) struct Packed<T> {
     ins: usize,
     outs: usize,
+    /// Outputs in a group.
+    lanes: usize,
     weights: Vec<T>,
 }
 
@@ -33,7 +34,7 @@ impl<T: Real> Packed<T> {
     }
 
     fn gather(ins: usize, outs: usize, weight: impl Fn(usize, usize, usize) -> T) -> Self {
-        let lanes = LANES.min(outs);
+        let lanes = widest::lanes().min(outs);
         let mut packed = Vec::with_capacity(outs.next_multiple_of(lanes) * ins * TAPS);
         for group in (0..outs).step_by(lanes) {
             for i in 0..ins {
@@ -44,35 +45,54 @@ impl<T: Real> Packed<T> {
                 }
             }
         }
-        Self { ins, outs, weights: packed }
+        Self { ins, outs, lanes, weights: packed }
     }
 
     /// `output = conv(input) + start`, where `start` is the output itself or the bias; negative results become zero with
     /// `rectify`. Output values past the end of a row are zeroed.
     pub(crate) fn apply(&self, grid: &PaddedGrid, input: &[T], output: &mut [T], start: Start<T>, rectify: bool) {
-        // One output alone must not pay for a group.
-        if self.outs == 1 {
-            self.groups::<1>(grid, input, output, start, rectify);
-        } else {
-            self.groups::<LANES>(grid, input, output, start, rectify);
+        let rows = Rows { packed: self, grid, input, output, start, rectify };
+        match self.lanes {
+            // One output alone must not pay for a group.
+            1 => widest::run(Groups::<T, 1>(rows)),
+            2 => widest::run(Groups::<T, 2>(rows)),
+            3 => widest::run(Groups::<T, 3>(rows)),
+            _ => widest::run(Groups::<T, 4>(rows)),
         }
     }
+}
 
-    fn groups<const N: usize>(&self, grid: &PaddedGrid, input: &[T], output: &mut [T], start: Start<T>, rectify: bool) {
+/// What one convolution works on.
+struct Rows<'a, T> {
+    packed: &'a Packed<T>,
+    grid: &'a PaddedGrid,
+    input: &'a [T],
+    output: &'a mut [T],
+    start: Start<'a, T>,
+    rectify: bool,
+}
+
+/// A convolution by groups of `N` outputs.
+struct Groups<'a, T, const N: usize>(Rows<'a, T>);
+
+impl<T: Real, const N: usize> Work for Groups<'_, T, N> {
+    #[inline(always)]
+    fn run(self) {
+        let Rows { packed: Packed { ins, outs, weights, .. }, grid, input, output, start, rectify } = self.0;
         let plane = grid.plane();
         let taps = |channel: usize| (0..TAPS).map(move |tap| channel * plane + tap / 3 * grid.pitch + tap % 3);
-        let offsets: Vec<usize> = (0..self.ins).flat_map(taps).collect();
+        let offsets: Vec<usize> = (0..*ins).flat_map(taps).collect();
         // Rows outside, groups inside: the rows that all groups read stay in the nearest cache.
         for y in 0..grid.height {
-            for (group, weights) in self.weights.chunks_exact(self.ins * TAPS * N).enumerate() {
+            for (group, weights) in weights.chunks_exact(ins * TAPS * N).enumerate() {
                 let first = group * N;
-                let count = N.min(self.outs - first);
+                let count = N.min(outs - first);
                 for x in (0..grid.width).step_by(BLOCK) {
                     let at = grid.at(x, y);
                     let mut sums = [[T::default(); BLOCK]; N];
                     for (o, sum) in sums.iter_mut().enumerate().take(count) {
                         match start {
-                            Start::Bias(bias) => sum.fill(bias[first + o]),
+                            Start::Bias(bias) => *sum = [bias[first + o]; BLOCK],
                             Start::Output => sum.copy_from_slice(&output[(first + o) * plane + at..][..BLOCK]),
                         }
                     }
@@ -172,4 +192,49 @@ fn correlate<T: Real>(mut sums: [[T; WIDE]; UPS], ups: [&[T]; UPS], from: &[T]) 
         }
     }
     sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::procedural::lattice;
+
+    /// The same bits with the registers at hand as with the narrow ones, and the sum of the definition.
+    #[test]
+    fn wide_registers_change_no_bit() {
+        let (ins, outs) = (5, 7);
+        let number = |seed: u64, k: usize| lattice(seed, k as i64, 1) as f32 - 0.5;
+        let weights: Vec<f32> = (0..outs * ins * TAPS).map(|k| number(3, k)).collect();
+        let grid = PaddedGrid::new(37, 9, 1);
+        let mut input = grid.planes(ins);
+        for (plane, y, x) in (0..ins).flat_map(|i| (0..9).flat_map(move |y| (0..37).map(move |x| (i, y, x)))) {
+            grid.row_mut(&mut input, plane, y)[x] = number(4, (plane * 9 + y) * 37 + x);
+        }
+        let packed = Packed::new(&weights, ins, outs);
+        let bias: Vec<f32> = (0..outs).map(|o| number(5, o)).collect();
+        let (mut wide, mut narrow) = (grid.planes(outs), grid.planes(outs));
+        packed.apply(&grid, &input, &mut wide, Start::Bias(&bias), false);
+        let start = Start::Bias(&bias[..]);
+        let rows = Rows { packed: &packed, grid: &grid, input: &input, output: &mut narrow, start, rectify: false };
+        if packed.lanes == 4 {
+            Groups::<f32, 4>(rows).run();
+        } else {
+            Groups::<f32, 2>(rows).run();
+        }
+        let bits = |planes: &[f32]| planes.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&wide), bits(&narrow));
+        let value = |o: usize, y: usize, x: usize| {
+            let mut sum = f64::from(bias[o]);
+            for (i, tap) in (0..ins).flat_map(|i| (0..TAPS).map(move |tap| (i, tap))) {
+                let (dy, dx) = ((y + tap / 3).wrapping_sub(1), (x + tap % 3).wrapping_sub(1));
+                if dy < 9 && dx < 37 {
+                    sum += f64::from(weights[(o * ins + i) * TAPS + tap]) * f64::from(grid.row(&input, i, dy)[dx]);
+                }
+            }
+            sum
+        };
+        for (o, y, x) in (0..outs).flat_map(|o| (0..9).flat_map(move |y| (0..37).map(move |x| (o, y, x)))) {
+            assert!((f64::from(grid.row(&wide, o, y)[x]) - value(o, y, x)).abs() < 1e-5, "output {o} at {x}, {y}");
+        }
+    }
 }

@@ -129,3 +129,34 @@ fn mean_depth(wanted: &[f64], region: &[bool]) -> f64 {
         wanted.iter().zip(region).filter(|(_, inside)| **inside).fold((0.0, 0.0), |(s, n), (d, _)| (s + d, n + 1.0));
     if count > 0.0 { sum / count } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Image;
+
+    /// What replaces the canvas is the derivative of the cost, by differences, each pixel by its own weight.
+    #[test]
+    fn the_depth_that_is_missing_is_weighed() {
+        let wanted = [0.4, 0.1, 0.9, 0.0, 0.7, 0.3];
+        let weight = Image::from_fn(3, 2, |x, y| 0.25 * (x + 3 * y) as f64);
+        let reference = Image::from_fn(3, 2, |_, _| 0.5);
+        let problem = PaintProblem { weight: Some(&weight), ..PaintProblem::new(&reference) };
+        let depths = [0.1, 0.6, 0.2, 0.5, 0.0, 0.3];
+        let cost = |depths: [f64; 6]| {
+            let mut canvas = depths;
+            (depth_cost(&problem, &wanted, &mut canvas), canvas)
+        };
+        let by_hand: f64 = (0..6).map(|k| 0.5 * 0.25 * k as f64 * (depths[k] - wanted[k]).powi(2)).sum();
+        assert!((cost(depths).0 - by_hand).abs() < 1e-15);
+        for k in 0..6 {
+            let moved = |h: f64| {
+                let mut depths = depths;
+                depths[k] += h;
+                cost(depths).0
+            };
+            let slope = (moved(1e-4) - moved(-1e-4)) / 2e-4;
+            assert!((cost(depths).1[k] - slope).abs() < 1e-9, "pixel {k}: {slope}");
+        }
+    }
+}

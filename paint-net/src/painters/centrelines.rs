@@ -1,7 +1,7 @@
 //! Strokes along the lines of line art, rows for the rest.
 
-use super::distance::distances;
-use super::fitting::{ink_cost, missing_ink, prune_with, uniform_volume};
+use super::drawn_lines::DrawnLines;
+use super::fitting::{ink_cost, prune_with, uniform_volume};
 use super::placed_sprays::PlacedSprays;
 use super::trace::{Line, trace};
 use crate::error::{Error, require};
@@ -11,16 +11,19 @@ use crate::painting::Painting;
 use crate::path::{Stroke, StrokeSettings, boustrophedon};
 use crate::problem::{PaintGrid, PaintProblem};
 
-/// Share of the darkest ink below which nothing is worth a row of its own beside lines.
-const LEFT_OVER: f64 = 0.02;
+/// How often the volumes are fitted. In the last round, what is still bare has strokes of its own.
+const ROUNDS: u32 = 8;
+/// How many times as much missing ink counts in the next round, where a line was left bare.
+const MORE: f64 = 2.0;
 
 /// Non-negative deconvolution whose sprays lie along the lines of the picture: what is thin and dark is painted in strokes along
 /// its middle, everything else in rows as by [`Deconvolution`](crate::Deconvolution). Ours.
 ///
 /// Where more than half of the darkest ink is missing the picture is thinned to its centrelines (Zhang and Suen 1984). Those that
 /// are narrow become strokes, smoothed, with a spray every [`Limits::spray_spacing`](crate::Limits::spray_spacing) pixels;
-/// the cells of the grid beside them are left out. The volumes of all sprays are fitted together. [`Painting::strokes`] holds
-/// the strokes. A picture without lines is painted as by `Deconvolution`.
+/// the cells of the grid beside them are left out. The volumes of all sprays are fitted together, several times: where the core of a
+/// line is left pale, missing ink counts more the next time. [`Painting::strokes`] holds the strokes. A picture without lines is painted as by
+/// `Deconvolution`.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Centrelines {
@@ -53,38 +56,38 @@ impl Painter for Centrelines {
         require("smoothness", smoothness, (0.0..=1e6).contains(&smoothness), "it must lie in [0, 1000000]")?;
         require("tolerance", self.tolerance, self.tolerance >= 0.0, "it must be 0 or more")?;
         let grid = PaintGrid::new(problem)?;
-        let reach = half_width * problem.kernel.sigma();
-        let missing = missing_ink(problem, &grid);
-        let darker_than = |share: f64| {
-            let least = share * missing.iter().fold(0.0_f64, |most, &m| most.max(m));
-            missing.iter().map(|&m| m > least).collect::<Vec<_>>()
-        };
-        let lines = trace(&darker_than(0.5), problem.reference.width(), reach);
-        let rest = left_over(&lines, &darker_than(LEFT_OVER), problem, reach);
-        let placed = PlacedSprays::new(problem, &grid, &sampled(&lines, problem), &rest);
-
-        // In units of what the square of a volume costs on white paper.
-        let stiffness = smoothness * std::f64::consts::PI * problem.kernel.sigma().powi(2);
-        let stop = StoppingRule { iterations: self.iterations, relative_decrease: self.tolerance };
-        let fit = |upper_bounds: &[f64], volumes: &mut Vec<f64>, progress: &mut dyn FnMut(f64)| {
-            let mut canvas = grid.initial.data().to_vec();
-            let mut cost = |v: &[f64], gradient: &mut [f64]| {
-                canvas.copy_from_slice(grid.initial.data());
-                placed.deposit(v, &mut canvas);
-                problem.settle(grid.initial.data(), &mut canvas);
-                let value = ink_cost(problem, problem.saturation, &mut canvas);
-                problem.settle_adjoint(&mut canvas);
-                placed.adjoint(&canvas, gradient);
-                value + placed.roughness(v, stiffness, gradient)
-            };
-            minimise(volumes, upper_bounds, &stop, &mut cost, progress);
-        };
-        let start = uniform_volume(problem, &grid);
+        let reach = self.max_half_width * problem.kernel.sigma();
+        let drawn = DrawnLines::find(problem, &grid, reach);
+        let mut places = sampled(&drawn.lines, problem);
+        let mut placed = PlacedSprays::new(problem, &grid, &places, &drawn.rest);
+        let mut volumes = vec![uniform_volume(problem, &grid); placed.len()];
+        let given = problem.missing_weight.or(problem.weight);
+        let mut weight = given.cloned().unwrap_or_else(|| problem.reference.map(|_| 1.0));
+        for round in 0..ROUNDS {
+            let share = f64::from(round) / f64::from(ROUNDS);
+            let mut told = |part: f64| observer.progress(share + part / f64::from(ROUNDS));
+            let heeding = problem.with_missing_weight(&weight);
+            let upper_bounds = placed.upper_bounds(problem.limits.max_volume);
+            let canvas = self.fit(&heeding, &grid, &placed, &upper_bounds, &mut volumes, &mut told);
+            let bare = drawn.bare(problem, &canvas);
+            if round + 1 == ROUNDS || !bare.contains(&true) {
+                break;
+            }
+            if round + 2 < ROUNDS {
+                let bare = weight.data_mut().iter_mut().zip(&bare).filter(|(_, bare)| **bare);
+                bare.for_each(|(weight, _)| *weight *= MORE);
+            } else {
+                // What no weight helps gets strokes of its own.
+                let added = sampled(&trace(&bare, problem.reference.width(), reach), problem);
+                volumes = placed.with_more(&volumes, added.iter().map(Vec::len).sum());
+                places.extend(added);
+                placed = PlacedSprays::new(problem, &grid, &places, &drawn.rest);
+            }
+        }
+        let problem = problem.with_missing_weight(&weight);
         let upper_bounds = placed.upper_bounds(problem.limits.max_volume);
-        let mut volumes: Vec<f64> = upper_bounds.iter().map(|upper| upper.min(start)).collect();
-        fit(&upper_bounds, &mut volumes, &mut |share| observer.progress(share));
         prune_with(&upper_bounds, problem.limits, &mut volumes, &mut |upper_bounds, volumes| {
-            fit(upper_bounds, volumes, &mut |_| ());
+            self.fit(&problem, &grid, &placed, upper_bounds, volumes, &mut |_| ());
         });
         observer.progress(1.0);
 
@@ -93,28 +96,45 @@ impl Painter for Centrelines {
         let mut strokes: Vec<Stroke> = along.into_iter().map(|sprays| Stroke { sprays }).collect();
         strokes.extend(boustrophedon(&rows, &settings)?);
         let sprays = strokes.iter().flat_map(|stroke| stroke.sprays.iter().copied()).collect();
-        Ok(Painting { strokes, ..Painting::render(problem, sprays) })
+        let painting = Painting::render(&problem, sprays);
+        Ok(Painting { strokes, missing_weight: (!drawn.lines.is_empty()).then_some(weight), ..painting })
+    }
+}
+
+impl Centrelines {
+    /// Fits the volumes; the canvas that they give.
+    fn fit(
+        &self,
+        problem: &PaintProblem,
+        grid: &PaintGrid,
+        placed: &PlacedSprays,
+        upper_bounds: &[f64],
+        volumes: &mut Vec<f64>,
+        progress: &mut dyn FnMut(f64),
+    ) -> Vec<f64> {
+        // In units of what the square of a volume costs on white paper.
+        let stiffness = self.smoothness * std::f64::consts::PI * problem.kernel.sigma().powi(2);
+        let stop = StoppingRule { iterations: self.iterations, relative_decrease: self.tolerance };
+        let show = |v: &[f64], canvas: &mut [f64]| {
+            canvas.copy_from_slice(grid.initial.data());
+            placed.deposit(v, canvas);
+            problem.settle(grid.initial.data(), canvas);
+        };
+        let mut canvas = grid.initial.data().to_vec();
+        let mut cost = |v: &[f64], gradient: &mut [f64]| {
+            show(v, &mut canvas);
+            let value = ink_cost(problem, problem.saturation, &mut canvas);
+            problem.settle_adjoint(&mut canvas);
+            placed.adjoint(&canvas, gradient);
+            value + placed.roughness(v, stiffness, gradient)
+        };
+        minimise(volumes, upper_bounds, &stop, &mut cost, progress);
+        show(volumes, &mut canvas);
+        canvas
     }
 }
 
 /// Places of sprays along each line, as far apart as on the grid.
 fn sampled(lines: &[Line], problem: &PaintProblem) -> Vec<Vec<[f64; 2]>> {
     lines.iter().map(|line| line.sampled(problem.limits.spray_spacing as f64)).collect()
-}
-
-/// The pixels from which cells of the grid may spray: those beside something dark that is farther from every line than half the
-/// widest. All of them where there is no line.
-fn left_over(lines: &[Line], dark: &[bool], problem: &PaintProblem, reach: f64) -> Vec<bool> {
-    if lines.is_empty() {
-        return vec![true; dark.len()];
-    }
-    let width = problem.reference.width();
-    let mut on_line = vec![false; dark.len()];
-    for [x, y] in lines.iter().flat_map(|line| &line.points) {
-        on_line[y.round() as usize * width + x.round() as usize] = true;
-    }
-    let from_line = distances(&on_line, width);
-    let rest: Vec<bool> = dark.iter().zip(&from_line).map(|(&dark, &from)| dark && from > reach + 0.5).collect();
-    let cell = problem.limits.spray_spacing.max(problem.limits.row_spacing) as f64;
-    distances(&rest, width).iter().zip(&from_line).map(|(&to, &from)| to <= cell && from > reach + 0.5).collect()
 }

@@ -1,5 +1,10 @@
 //! Distance of every pixel to the nearest one of a set.
 
+/// Distance of two places.
+pub(super) fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
 /// Euclidean distances in pixels to the nearest pixel that is set, infinite where none is: lower envelopes of parabolas along
 /// columns, then along rows (Felzenszwalb and Huttenlocher 2012).
 pub(super) fn distances(set: &[bool], width: usize) -> Vec<f64> {

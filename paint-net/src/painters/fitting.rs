@@ -26,16 +26,17 @@ pub(super) fn fit(
     minimise(volumes, upper_bounds, stop, &mut cost, progress);
 }
 
-/// `½ Σ w (f(c) - y)²`; replaces the canvas by its derivative with respect to each pixel's depth.
+/// `½ Σ w (f(c) - y)²`, and what stands above the ceiling; replaces the canvas by its derivative with respect to each pixel's depth.
 ///
 /// The saturation is an argument of its own so that the compiler knows that writing the canvas does not change it.
 pub(super) fn ink_cost(problem: &PaintProblem, saturation: &Saturation, canvas: &mut [f64]) -> f64 {
     let mut value = 0.0;
     for (k, (depth, wanted)) in canvas.iter_mut().zip(problem.reference.data()).enumerate() {
-        let weight = problem.weight(k);
-        let residual = saturation.forward(*depth) - wanted;
-        value += 0.5 * weight * residual * residual;
-        *depth = weight * residual * saturation.derivative(*depth);
+        let ink = saturation.forward(*depth);
+        let (residual, above) = (ink - wanted, problem.above_ceiling(k, ink));
+        let weight = problem.weight_of(k, residual);
+        value += 0.5 * (weight * residual * residual + PaintProblem::CEILING_WEIGHT * above * above);
+        *depth = (weight * residual + PaintProblem::CEILING_WEIGHT * above) * saturation.derivative(*depth);
     }
     value
 }

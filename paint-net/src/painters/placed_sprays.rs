@@ -48,6 +48,17 @@ impl PlacedSprays {
         Self { footprints, along: lines.iter().map(Vec::len).collect(), width }
     }
 
+    /// How many there are.
+    pub(super) fn len(&self) -> usize {
+        self.footprints.len()
+    }
+
+    /// Volumes with as many of 0 after those of the lines: for the sprays of more lines.
+    pub(super) fn with_more(&self, volumes: &[f64], count: usize) -> Vec<f64> {
+        let (along, rest) = volumes.split_at(self.along.iter().sum());
+        along.iter().copied().chain(std::iter::repeat_n(0.0, count)).chain(rest.iter().copied()).collect()
+    }
+
     /// Largest volume of every spray; 0 where the nozzle may not spray.
     pub(super) fn upper_bounds(&self, most: f64) -> Vec<f64> {
         self.footprints.iter().map(|f| if f.allowed { most } else { 0.0 }).collect()

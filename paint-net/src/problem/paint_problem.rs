@@ -29,6 +29,12 @@ pub struct PaintProblem<'a> {
     pub canvas: Option<&'a Image>,
     /// How much each pixel matters, not negative; 0 outside the surface. `None`: all alike.
     pub weight: Option<&'a Image>,
+    /// The same while a pixel has less ink than it should, in place of `weight`; `None`: as with more. What is missing in the middle of a thin line
+    /// shows, what is too much there does not. Painters that fit volumes to the ink heed it; the network does not.
+    pub missing_weight: Option<&'a Image>,
+    /// Ink that a pixel shall not exceed, above what is wanted; what does counts [`CEILING_WEIGHT`](Self::CEILING_WEIGHT) times more, also where
+    /// little else counts. `None`: none. Heeded as `missing_weight`.
+    pub ceiling: Option<&'a Image>,
     /// Pixels over which the nozzle may spray, row by row; `None`: everywhere.
     pub paintable: Option<&'a [bool]>,
     /// Pixels that show others, beyond the seams of the surface; `None`: none. Their weight must be 0, and their reference and canvas
@@ -44,12 +50,17 @@ pub struct PaintProblem<'a> {
 }
 
 impl<'a> PaintProblem<'a> {
+    /// Weight of ink above the ceiling. Ours.
+    pub const CEILING_WEIGHT: f64 = 100.0;
+
     /// The whole reference on a bare wall, with the defaults of the other fields.
     pub fn new(reference: &'a Image) -> Self {
         Self {
             reference,
             canvas: None,
             weight: None,
+            missing_weight: None,
+            ceiling: None,
             paintable: None,
             ghosts: None,
             kernel: &KERNEL,
@@ -68,6 +79,18 @@ impl<'a> PaintProblem<'a> {
     #[must_use]
     pub fn with_weight(self, weight: &'a Image) -> Self {
         Self { weight: Some(weight), ..self }
+    }
+
+    /// The same with pixels on which missing ink matters more, or less, than surplus.
+    #[must_use]
+    pub fn with_missing_weight(self, weight: &'a Image) -> Self {
+        Self { missing_weight: Some(weight), ..self }
+    }
+
+    /// The same with ink that pixels shall not exceed.
+    #[must_use]
+    pub fn with_ceiling(self, ceiling: &'a Image) -> Self {
+        Self { ceiling: Some(ceiling), ..self }
     }
 
     /// The same with pixels over which the nozzle must not spray.
@@ -104,9 +127,12 @@ impl<'a> PaintProblem<'a> {
     pub fn check(&self) -> Result<(), Error> {
         self.reference.check_range("reference", 0.0, 1.0, "ink in [0, 1]")?;
         let expected = self.reference.size();
-        for (what, image, range) in
-            [("canvas", self.canvas, "a depth of 0 or more"), ("weight", self.weight, "a weight of 0 or more")]
-        {
+        for (what, image, range) in [
+            ("canvas", self.canvas, "a depth of 0 or more"),
+            ("weight", self.weight, "a weight of 0 or more"),
+            ("missing_weight", self.missing_weight, "a weight of 0 or more"),
+            ("ceiling", self.ceiling, "ink of 0 or more"),
+        ] {
             if let Some(image) = image {
                 if image.size() != expected {
                     return Err(Error::Mismatch { what, found: image.size(), expected });
@@ -171,5 +197,18 @@ impl<'a> PaintProblem<'a> {
     /// The weight of pixel `k`.
     pub(crate) fn weight(&self, k: usize) -> f64 {
         self.weight.map_or(1.0, |w| w.data()[k])
+    }
+
+    /// The weight of pixel `k` for this much more ink than wanted.
+    pub(crate) fn weight_of(&self, k: usize, surplus: f64) -> f64 {
+        match self.missing_weight {
+            Some(weight) if surplus < 0.0 => weight.data()[k],
+            _ => self.weight(k),
+        }
+    }
+
+    /// How far ink stands above the ceiling of pixel `k`.
+    pub(crate) fn above_ceiling(&self, k: usize, ink: f64) -> f64 {
+        self.ceiling.filter(|_| self.weight(k) > 0.0).map_or(0.0, |ceiling| (ink - ceiling.data()[k]).max(0.0))
     }
 }

@@ -6,6 +6,7 @@ mod doses;
 mod examples;
 mod feedback;
 mod free_sprays;
+mod line_art;
 mod on_surface;
 mod own_observer;
 mod own_painter;

@@ -1,5 +1,6 @@
 //! Properties every painter must have.
 
+mod area_fill;
 mod ghost_pixels;
 
 use paint_net::model::MonotoneCurve;

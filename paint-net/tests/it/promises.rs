@@ -153,13 +153,13 @@ fn layers_go_from_light_to_dark() {
     assert!(layers[0].sprays.len() > 2 * layers[layers.len() - 1].sprays.len());
 }
 
-/// A nozzle that gives half of what it is asked for.
-struct HalfNozzle(Image);
+/// A nozzle that gives a share of what it is asked for.
+struct WeakNozzle(Image, f64);
 
-impl Observer for HalfNozzle {
+impl Observer for WeakNozzle {
     fn spray(&mut self, sprays: &[Spray]) -> Result<Option<Image>, paint_net::Error> {
         for s in sprays {
-            SprayKernel::default().stamp(&Spray { volume: 0.5 * s.volume, ..*s }, &mut self.0);
+            SprayKernel::default().stamp(&Spray { volume: self.1 * s.volume, ..*s }, &mut self.0);
         }
         Ok(Some(self.0.map(|c| Saturation::Tanh.forward(c))))
     }
@@ -170,11 +170,14 @@ fn the_later_coats_make_good_for_a_weak_nozzle() {
     let wanted = Texture::Worley.image(4, 48);
     let problem = PaintProblem::new(&wanted);
     let painter = ClosedLoopPainter::new(Deconvolution::default());
-    let painting = painter.paint_observed(&problem, &mut HalfNozzle(problem.initial_canvas())).unwrap();
+    let painting = painter.paint_observed(&problem, &mut WeakNozzle(problem.initial_canvas(), 0.5)).unwrap();
     assert!((painting.flow_gain - 0.5).abs() < 0.01, "{}", painting.flow_gain);
     let open = painter.paint(&problem).unwrap();
     assert!(psnr(&painting.ink, &wanted) > psnr(&open.ink, &wanted) - 1.0);
     assert_eq!(open.flow_gain, 1.0);
+    // A twentieth is a nozzle that is clogged, not one that gives little: no more than five times as much is asked of it.
+    let clogged = painter.paint_observed(&problem, &mut WeakNozzle(problem.initial_canvas(), 0.05)).unwrap();
+    assert_eq!(clogged.flow_gain, 0.2);
 }
 
 #[test]
@@ -185,4 +188,34 @@ fn a_slew_limit_holds_in_both_directions() {
     let steps: Vec<f64> = painting.waypoints.windows(2).map(|p| p[1].volume - p[0].volume).collect();
     assert!(steps.iter().all(|s| s.abs() <= 0.02), "{:?}", steps.iter().fold(0.0_f64, |m, s| m.max(s.abs())));
     assert!(steps.iter().any(|s| *s > 0.019) && steps.iter().any(|s| *s < -0.019));
+}
+
+/// A dark bar beside a pale one: without a ceiling the fit goes beyond what is wanted on both, to make the edge sharper.
+#[test]
+fn ink_keeps_below_its_ceiling() {
+    let wanted = Image::from_fn(48, 32, |x, _| if (16..28).contains(&x) { 0.6 } else { 0.05 });
+    let ceiling = Image::from_fn(48, 32, |x, _| if (12..32).contains(&x) { 0.62 } else { 0.07 });
+    let kernel = SprayKernel::new(2.0, 3.5).unwrap();
+    let problem = PaintProblem::new(&wanted).with_kernel(&kernel);
+    let above = |problem: &PaintProblem| {
+        let ink = Deconvolution::default().paint(problem).unwrap().ink;
+        ink.data().iter().zip(ceiling.data()).map(|(ink, ceiling)| ink - ceiling).fold(f64::MIN, f64::max)
+    };
+    let (free, kept) = (above(&problem), above(&problem.with_ceiling(&ceiling)));
+    assert!(free > 0.03 && kept < 0.01, "{free} above without a ceiling, {kept} with one");
+}
+
+/// Missing ink of a dot that counts more is missing less, and surplus is not punished for it.
+#[test]
+fn missing_ink_can_count_more_than_surplus() {
+    let wanted = Image::from_fn(32, 32, |x, y| if (x as f64 - 15.5).hypot(y as f64 - 15.5) < 2.5 { 0.8 } else { 0.0 });
+    let weight = wanted.map(|ink| if ink > 0.0 { 20.0 } else { 1.0 });
+    let least = |problem: &PaintProblem| {
+        let ink = Deconvolution::default().paint(problem).unwrap().ink;
+        let on_dot = ink.data().iter().zip(wanted.data()).filter(|(_, wanted)| **wanted > 0.0);
+        on_dot.map(|(ink, _)| *ink).fold(f64::MAX, f64::min)
+    };
+    let problem = PaintProblem::new(&wanted);
+    let (plain, heeded) = (least(&problem), least(&problem.with_missing_weight(&weight)));
+    assert!(heeded > plain + 0.1, "{plain}, {heeded} with weights");
 }
