@@ -271,3 +271,60 @@ fn legs_are_clear(checker: &mut ClearanceChecker<'_>, corners: &[VehicleState], 
         }
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::UnitVector3;
+
+    use super::*;
+    use crate::target::NozzleState;
+    use crate::world::{Hit, Surface, Tool};
+
+    /// A wall at x = 0, and a robot of one ball that goes anywhere.
+    struct Wall;
+
+    impl Surface for Wall {
+        fn cast(&self, _: &Point3<f64>, _: &UnitVector3<f64>, _: f64) -> Option<Hit> {
+            None
+        }
+
+        fn distance(&self, point: &Point3<f64>, max: f64) -> f64 {
+            point.x.abs().min(max)
+        }
+    }
+
+    impl Tool for Wall {
+        fn vehicle(&self, _: &NozzleState, _: f64) -> Option<VehicleState> {
+            None
+        }
+
+        fn spheres(&self, vehicle: &VehicleState, out: &mut Vec<(Point3<f64>, f64)>) {
+            out.push((vehicle.position, 0.2));
+        }
+    }
+
+    /// What is left of a way, in cells: the straight line to a goal in the open, and the gap that is missing from the wall. A greater estimate
+    /// would lead the search astray, a smaller one would make it long.
+    #[test]
+    fn what_is_left_of_a_way_is_its_straight_line() {
+        let state = VehicleState { position: Point3::new(0.3, 1.0, 2.0), heading: 0.4, pan: 0.0, tilt: 0.0 };
+        let mut checker = ClearanceChecker::new(&Wall, &Wall);
+        let mut planner = TransitPlanner::new(&state);
+        let mut open = Open { planner: &mut planner, checker: &mut checker, goal: [2, -1, 7], least: 0.5 };
+        for (cell, left) in [([2, -1, 7], 0.0), ([2, 3, 4], 5.0), ([1, 1, 5], 3.0), ([2, -2, 7], 1.0)] {
+            assert!((open.left(cell) - left).abs() < 1e-12, "{cell:?}: {}", open.left(cell));
+        }
+        // Forwards is along the heading: 0.15 m on are 0.138 m farther from the wall.
+        assert_eq!([open.passable([0; 3], [1, 0, 0]), open.passable([0; 3], [2, 0, 0])], [false, true]);
+
+        let (axes, clear, cache) = (axes(&state), HashMap::new(), DistanceCache::default());
+        let mut escape =
+            Escape { state: &state, axes, checker: &mut checker, clearance: 0.05, open: 0.8, clear, cache };
+        for (cell, left) in [([0; 3], 5.0), ([0, 0, 9], 5.0), ([2, 0, 0], 5.0 - 2.0 * 0.4_f64.cos())] {
+            assert!((escape.left(cell) - left).abs() < 1e-9, "{cell:?}: {}", escape.left(cell));
+        }
+        assert!(escape.left([6, 0, 0]) <= 0.0 && escape.left([5, 0, 0]) > 0.0);
+        // The ball of 0.2 m keeps 5 cm: one cell of 0.1 m nearer to the wall it touches.
+        assert_eq!([escape.passable([0; 3], [0; 3]), escape.passable([0; 3], [-1, 0, 0])], [true, false]);
+    }
+}

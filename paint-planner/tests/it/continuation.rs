@@ -58,6 +58,26 @@ fn a_plan_that_goes_on_in_flight_keeps_state_limits_and_paint() {
     assert_eq!(again.targets.last().unwrap().point.y, more.last().unwrap().point.y);
 }
 
+/// A vehicle that has gone round once, and looks at the wall at 360 degrees: it goes on from there, and does not turn back to 0.
+#[test]
+fn a_heading_goes_on_from_the_turn_it_is_in() {
+    use std::f64::consts::TAU;
+    let (_, plain) = along_the_wall(0.0, 0.5, None);
+    let start = VehicleState { heading: plain.vehicle[0].heading + TAU, ..plain.vehicle[0] };
+    let (targets, flying) = along_the_wall(0.0, 0.5, Some(start));
+    let (next, _) = along_the_wall(0.5, 1.0, None);
+    let earliest = flying.trajectory.duration() - 1.2;
+    let on = continue_plan(&flying, &targets, earliest, &next, &Wall::flat(), &Arm::default(), &Settings::default())
+        .unwrap();
+    let begin = flying.trajectory.sample(on.at).heading;
+    assert!((begin - TAU).abs() < 1.0, "{begin}");
+    let end = on.plan.trajectory.duration();
+    for k in 0..=200 {
+        let heading = on.plan.trajectory.sample(end * f64::from(k) / 200.0).heading;
+        assert!((heading - begin).abs() < 1.0, "{heading} after {begin}");
+    }
+}
+
 #[test]
 fn a_plan_that_cannot_go_on_says_so() {
     let (targets, flying) = along_the_wall(0.0, 0.3, None);

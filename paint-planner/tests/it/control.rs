@@ -1,7 +1,7 @@
 //! Tracking control, and the identification of what it knows of the vehicle.
 #![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
 
-use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
+use nalgebra::{Matrix2, Matrix3, Point3, Rotation3, Vector2, Vector3};
 use paint_planner::Error;
 use paint_planner::control::*;
 use rand_xoshiro::SplitMix64;
@@ -106,6 +106,71 @@ fn commands_keep_their_limits_in_a_wind_beyond_them() {
     let gust = |t: f64| Vector3::new(if (0.5..1.0).contains(&t) { -6.0 } else { 0.0 }, 0.0, 0.0);
     let (back, _, _) = fly(9.0, MpcSettings::default(), gust);
     assert!(back < 0.006, "{back}");
+}
+
+/// Upwards and without bounds it is the regulator of a double integrator with drag: the thrust against an error of place and one of
+/// velocity by the gain of the endless Riccati recursion, written out here.
+#[test]
+fn the_thrust_is_that_of_the_linear_quadratic_regulator() {
+    let vehicle = VehicleModel { drag: [0.0; 2], thrust: [0.1, 1000.0], ..VehicleModel::default() };
+    for velocity in [0.0, 0.01, 1.0] {
+        let settings = MpcSettings { velocity, ..MpcSettings::default() };
+        let (h, r) = (settings.step, settings.thrust);
+        let (a, b) = (Matrix2::new(1.0, h, 0.0, 1.0), Vector2::new(0.5 * h * h, h));
+        let cost = Matrix2::new(1.0, 0.0, 0.0, velocity);
+        let gain = |p: &Matrix2<f64>| b.transpose() * p * a / (r + (b.transpose() * p * b).x);
+        let mut p = cost;
+        for _ in 0..100_000 {
+            p = cost + a.transpose() * p * a - a.transpose() * p * b * gain(&p);
+        }
+        for (high, fast) in [(0.02, 0.0), (0.0, 0.1), (-0.01, -0.2)] {
+            let state = ControlState {
+                position: Point3::new(0.0, 0.0, 2.0 + high),
+                velocity: Vector3::new(0.0, 0.0, fast),
+                attitude: [0.0; 3],
+                disturbance: Vector3::zeros(),
+            };
+            let command = TrackingMpc::new(vehicle, settings).unwrap().command(0.0, &state, &|_| standing(0.0));
+            let expected = GRAVITY - (gain(&p) * Vector2::new(high, fast)).x;
+            assert!((command.thrust - expected).abs() < 1e-6, "{velocity}: {} for {expected}", command.thrust);
+        }
+    }
+}
+
+/// In its place a tilted body gives as much more thrust as keeps its weight.
+#[test]
+fn a_tilted_body_keeps_its_height() {
+    for (roll, pitch) in [(0.0, 0.0), (0.3, 0.0), (0.0, -0.4), (-0.25, 0.35)] {
+        let (position, still) = (Point3::new(0.0, 0.0, 2.0), Vector3::zeros());
+        let state = ControlState { position, velocity: still, attitude: [roll, pitch, 0.7], disturbance: still };
+        let mut mpc = TrackingMpc::new(VehicleModel::default(), MpcSettings::default()).unwrap();
+        let command = mpc.command(0.0, &state, &|_| standing(0.7));
+        let lift = (Rotation3::from_euler_angles(roll, pitch, 0.7) * Vector3::z() * command.thrust).z;
+        assert!((lift - GRAVITY).abs() < 1e-9, "{roll} {pitch}: {lift}");
+    }
+}
+
+/// Two metres up, looking along a heading.
+fn standing(heading: f64) -> ControlReference {
+    let still = Vector3::zeros();
+    let position = Point3::new(0.0, 0.0, 2.0);
+    ControlReference { position, velocity: still, acceleration: still, heading, heading_rate: 0.0, lever: still }
+}
+
+/// From -177 to 177 degrees it is 6 degrees to the right, not 354 to the left; and 3 rad/s for each radian.
+#[test]
+fn the_body_turns_the_shorter_way() {
+    use std::f64::consts::{PI, TAU};
+    for (yaw, heading, way) in
+        [(0.05 - PI, PI - 0.05, -0.1), (PI - 0.05, 0.05 - PI, 0.1), (0.2, 0.5 - TAU, 0.3), (3.0 * TAU, -0.4, -0.4)]
+    {
+        let position = Point3::new(0.0, 0.0, 2.0);
+        let still = Vector3::zeros();
+        let state = ControlState { position, velocity: still, attitude: [0.0, 0.0, yaw], disturbance: still };
+        let mut mpc = TrackingMpc::new(VehicleModel::default(), MpcSettings::default()).unwrap();
+        let command = mpc.command(0.0, &state, &|_| ControlReference { heading_rate: 0.02, ..standing(heading) });
+        assert!((command.yaw_rate - 0.02 - 3.0 * way).abs() < 1e-9, "{} for {way} rad", command.yaw_rate);
+    }
 }
 
 #[test]

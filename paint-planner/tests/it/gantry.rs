@@ -2,9 +2,9 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use paint_planner::gantry::{
-    BeamSettings, DensityMap, GantrySample, GantrySettings, GantryState, Lattice, PaintModel, PoseFilter,
-    PoseFilterSettings, PoseSmoother, RangeReading, Registration, RegistrationSettings, RoundedPath, Segment,
-    all_paths, greedy_path, plan_gantry, random_path, rank, refine,
+    BeamSettings, DensityMap, DepositEstimate, DepositModel, GantrySample, GantrySettings, GantryState, Lattice,
+    PaintModel, PoseFilter, PoseFilterSettings, PoseSmoother, RangeReading, Registration, RegistrationSettings,
+    RobotMotion, RoundedPath, Segment, all_paths, greedy_path, plan_gantry, random_path, rank, refine,
 };
 use paint_planner::{Error, Hit, Surface};
 use rand_xoshiro::SplitMix64;
@@ -60,15 +60,15 @@ fn score(model: &Waves, s: &Segment, settings: &GantrySettings) -> f64 {
         let share = (f64::from(k) + 0.5) / 32.0;
         model.need(s.start + share * s.duration, s.from + share * (s.to - s.from))
     };
-    (0..32).map(need).filter(|need| flux < *need).sum::<f64>() / 32.0
+    (0..32).map(need).filter(|need| settings.least_use * flux < *need).sum::<f64>() / 32.0
 }
 
 #[test]
 fn the_best_path_is_that_of_brute_force() {
-    for seed in 0..20 {
+    for (seed, least_use) in (0..10).map(|seed| (seed, 1.0)).chain((10..20).map(|seed| (seed, 0.5))) {
         let mut model = Waves::new(seed);
         // Samples so dense that interpolation does not decide.
-        let settings = GantrySettings { density_spacing: [1e-4, 1e-3], speed_change: 1, ..printed(0.07) };
+        let settings = GantrySettings { density_spacing: [1e-4, 1e-3], speed_change: 1, least_use, ..printed(0.07) };
         let plan = plan_gantry(&mut model, MIDDLE, &settings).unwrap();
         let mut best = f64::MIN;
         let mut count = 0;
@@ -264,6 +264,24 @@ fn the_smoother_knows_twice_as_well_where_the_robot_was() {
     assert_eq!(filter.restarts(), 0);
 }
 
+/// A robot that stands, with sensors that say otherwise: the biases are found, and nothing is believed to move.
+#[test]
+fn biases_of_a_robot_that_stands_are_found() {
+    let pose = Isometry3::new(Vector3::new(0.1, -0.2, 0.5), Vector3::new(0.0, 0.0, 0.7));
+    let (force, rate) = (Vector3::new(0.03, -0.02, 9.80665 + 0.04), Vector3::new(0.004, -0.003, 0.005));
+    let mut filter = PoseFilter::new(PoseFilterSettings::default()).unwrap();
+    for _ in 0..3000 {
+        filter.update(Some(&pose), 0.01);
+        filter.inertial(&force, &rate);
+    }
+    let motion = filter.motion().unwrap();
+    // A tenth of the biases, as rates and as what acceleration makes of a place between two poses.
+    assert!(motion.angular_velocity.norm() < 0.1 * rate.norm(), "{}", motion.angular_velocity);
+    assert!(motion.velocity.norm() < 1e-4, "{}", motion.velocity);
+    assert!((motion.world_from_robot.translation.vector - pose.translation.vector).norm() < 1e-5);
+    assert!(motion.world_from_robot.rotation.angle_to(&pose.rotation) < 1e-5);
+}
+
 #[test]
 fn a_pose_that_jumps_starts_the_filter_anew() {
     let mut filter = PoseFilter::new(PoseFilterSettings::default()).unwrap();
@@ -283,6 +301,65 @@ fn a_pose_that_jumps_starts_the_filter_anew() {
     for (age, motion) in motions.iter().enumerate() {
         let expected = if age <= 5 { 0.3 } else { 0.0 };
         assert!((motion.world_from_robot.translation.x - expected).abs() < 1e-9, "{age}");
+    }
+}
+
+/// A book of where the robot was, and how far the valve was open, at each shot.
+struct Book;
+
+impl DepositModel for Book {
+    type Deposit = Vec<(f64, f64)>;
+    type Footprint = f64;
+    type Error = Error;
+
+    fn surface(&self) -> &dyn Surface {
+        &Corner
+    }
+
+    fn footprint(&self, model_from_robot: &Isometry3<f64>, position: f64, _step: usize) -> f64 {
+        model_from_robot.translation.y + position
+    }
+
+    fn score(&self, _: &f64, _: &Self::Deposit) -> f64 {
+        0.0
+    }
+
+    fn spray(&self, place: &f64, open: f64, deposit: &mut Self::Deposit) {
+        deposit.push((*place, open));
+    }
+
+    fn forecast<R>(
+        &mut self,
+        _: &Self::Deposit,
+        _: &RobotMotion,
+        plan: impl FnOnce(&mut dyn PaintModel) -> Result<R, Error>,
+    ) -> Result<R, Error> {
+        plan(&mut Bare)
+    }
+}
+
+/// The robot slides at 0.2 m/s, and every shot is booked in the middle of its step: half a step is a millimetre.
+#[test]
+fn paint_is_booked_in_the_middle_of_its_step() {
+    let dt = 0.01;
+    let mut filter = PoseFilter::new(PoseFilterSettings::default()).unwrap();
+    let mut estimate = DepositEstimate::<Book>::new(Vec::new(), dt, 10);
+    let model_from_world = Isometry3::translation(0.0, 0.7, 0.0);
+    for step in 0..300 {
+        filter.update(Some(&Isometry3::translation(0.0, 0.2 * dt * step as f64, 0.0)), dt);
+        estimate.observe(&filter);
+        estimate.sprayed(step, 0.01, 1.0 / (1 + step) as f64);
+        if step % 10 != 9 {
+            continue;
+        }
+        let booked = estimate.estimate(&Book, &model_from_world, step);
+        assert_eq!(booked.len(), step + 1);
+        for (k, (place, open)) in booked.iter().enumerate() {
+            let middle = 0.2 * dt * (k as f64 + 0.5) + 0.7 + 0.01;
+            // The filter learns the speed in its first steps.
+            assert!(k < 100 || (place - middle).abs() < 1e-4, "shot {k} at {place} instead of {middle}");
+            assert_eq!(*open, 1.0 / (1 + k) as f64);
+        }
     }
 }
 

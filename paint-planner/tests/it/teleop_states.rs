@@ -47,6 +47,30 @@ fn states_at_any_rate_become_ninety_a_second() {
     assert_eq!(modes, [VrMode::Idle, VrMode::Idle, VrMode::Painting, VrMode::Painting]);
 }
 
+/// A body that turns through the back: every tick lies between its two states the shorter way, at the share of the time.
+#[test]
+fn a_heading_goes_through_half_a_turn_the_shorter_way() {
+    use std::f64::consts::PI;
+    for (first, rate) in [(PI - 0.05, 0.6), (0.05 - PI, -0.6)] {
+        let heading = |seconds: f64| {
+            let turned = first + rate * seconds;
+            turned.sin().atan2(turned.cos())
+        };
+        let mut resampler = Resampler::new(SessionSettings::default());
+        let mut ticks = Vec::new();
+        for k in 0..=30 {
+            let seconds = k as f64 / 30.0;
+            let cradle = CradlePose { heading: heading(seconds), ..state(k, VrMode::Idle, 0.0).cradle };
+            resampler.push(VrState { time: seconds, cradle, ..state(k, VrMode::Idle, 0.0) }, &mut ticks);
+        }
+        assert_eq!(ticks.len(), 91);
+        for (k, tick) in ticks.iter().enumerate() {
+            let off = tick.cradle.heading - heading(k as f64 / RATE);
+            assert!(off.sin().abs() < 1e-9 && off.cos() > 0.0, "tick {k}: {off}");
+        }
+    }
+}
+
 #[test]
 fn targets_keep_volume_gradient_and_time() {
     // Half a second standing, then 30 cm at 0.3 m/s, then 30 cm at 0.6 m/s, always 1 ml/s.
@@ -115,6 +139,10 @@ fn a_dab_is_two_targets_with_its_paint() {
     assert_eq!(found.len(), 2);
     let way = (found[1].point - found[0].point).norm();
     assert!((way - 0.005).abs() < 1e-12 && (found[0].dose * way - 8.0 / RATE * 1e-6).abs() < 1e-15);
+    // One state is a tick long.
+    let tick = Segment { states: vec![state(0, VrMode::Painting, 0.4)], ..dab.clone() };
+    let found = targets(&tick, &Wall::flat(), &TargetSettings::default());
+    assert!(found.len() == 2 && (found[0].dose * 0.005 - 1e-6 / RATE).abs() < 1e-15, "{found:?}");
     let nothing = Segment { states: Vec::new(), ..dab };
     assert!(targets(&nothing, &Wall::flat(), &TargetSettings::default()).is_empty());
 }

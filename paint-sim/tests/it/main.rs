@@ -7,6 +7,8 @@ mod droplets;
 mod examples;
 mod flight;
 mod flight_scene;
+mod flight_statistics;
+mod gantry_robot;
 mod inspection;
 mod km;
 mod multirotor;

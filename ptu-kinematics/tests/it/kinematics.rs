@@ -169,6 +169,7 @@ fn the_spray_axis_goes_through_the_target_from_any_attitude() {
         if aim.clamped {
             clamped += 1;
             assert!((nozzle.direction.angle(&line) - aim.pointing_error).abs() < 1e-7);
+            assert!((line.norm() - aim.distance).abs() < 1e-12, "{} m, said {}", line.norm(), aim.distance);
             assert!(ptu.check_limits(aim.joints).is_ok());
         } else {
             let hit = nozzle.tip + nozzle.direction.into_inner() * aim.distance;

@@ -112,6 +112,26 @@ fn a_pan_tilt_unit_read_as_a_serial_arm_gives_the_closed_form() {
     }
 }
 
+/// A quarter turn to the left, 10 cm on, 20 cm up, then the joint: what is fixed lies along the turned axes, from the root on.
+#[test]
+fn fixed_joints_follow_each_other_from_the_root() {
+    let text = r#"
+<robot name="bracket">
+  <joint name="turn" type="fixed"><parent link="base"/><child link="a"/><origin rpy="0 0 1.5707963267948966"/></joint>
+  <joint name="bar" type="fixed"><parent link="a"/><child link="b"/><origin xyz="0.1 0 0.2"/></joint>
+  <joint name="pan" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/><limit lower="-2" upper="2"/></joint>
+  <joint name="dip" type="fixed"><parent link="c"/><child link="d"/><origin rpy="0 1.5707963267948966 0"/></joint>
+  <joint name="gun" type="fixed"><parent link="d"/><child link="nozzle"/><origin xyz="0.3 0 0"/></joint>
+</robot>"#;
+    let arm = SerialArm::from_urdf(text, "nozzle").unwrap();
+    assert!((arm.joints()[0].parent_from_joint * Point3::origin() - Point3::new(0.0, 0.1, 0.2)).norm() < 1e-12);
+    for pan in [0.0, 0.7, -1.9] {
+        let nozzle = arm.forward(&Isometry3::identity(), &vec![pan]);
+        assert!((nozzle.tip - Point3::new(0.0, 0.1, -0.1)).norm() < 1e-12, "{}", nozzle.tip);
+        assert!((nozzle.direction.into_inner() + Vector3::z()).norm() < 1e-12);
+    }
+}
+
 #[test]
 fn the_inverse_stays_within_the_limits_and_says_when_it_cannot() {
     let arm = arm();

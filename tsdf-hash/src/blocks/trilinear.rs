@@ -88,3 +88,27 @@ fn lowest_voxel(settings: &Settings, point_in_world: &Point3<f64>) -> Option<(Ve
     // A NaN fails; beyond this the key would fail later, and the cast must not saturate.
     low.iter().all(|c| c.abs() <= f64::from(1 << 24)).then(|| (voxel, low, [0, 1, 2].map(|k| low[k] as i32)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A polynomial with a term of its own for every axis and product, by its value and its partial derivatives.
+    #[test]
+    fn distance_and_gradient_are_those_of_the_polynomial() {
+        let value = |x: f64, y: f64, z: f64| {
+            1.0 + 2.0 * x - 3.0 * y + 5.0 * z + 7.0 * x * y - 11.0 * y * z + 13.0 * z * x + 17.0 * x * y * z
+        };
+        let corners = std::array::from_fn(|n| value((n & 1) as f64, (n >> 1 & 1) as f64, (n >> 2 & 1) as f64));
+        for [x, y, z] in [[0.0, 0.0, 0.0], [0.25, 0.5, 0.75], [0.9, 0.1, 0.3], [1.0, 0.0, 1.0]] {
+            let cell = TrilinearCell { corners, along: Vector3::new(x, y, z) };
+            let slopes = Vector3::new(
+                2.0 + 7.0 * y + 13.0 * z + 17.0 * y * z,
+                -3.0 + 7.0 * x - 11.0 * z + 17.0 * z * x,
+                5.0 - 11.0 * y + 13.0 * x + 17.0 * x * y,
+            );
+            assert!((cell.distance() - value(x, y, z)).abs() < 1e-12);
+            assert!((cell.gradient() - slopes).norm() < 1e-12, "{} for {slopes}", cell.gradient());
+        }
+    }
+}

@@ -125,3 +125,40 @@ fn eliminate(terms: &[Term], equations: &mut NormalEquations) -> f64 {
     }
     -(inverse * pull)[0]
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Isometry3;
+
+    use super::*;
+    use crate::bundle_adjustment::posed_frame::Intensity;
+    use crate::tracking::image_level::ImageLevel;
+
+    /// How much brighter keyframes are found than they were taken to be, and the pull on their poses, where they see `seen` of one point.
+    fn found(seen: [f64; 3], brightness: [f64; 3]) -> (Vec<f64>, f64) {
+        let level = ImageLevel::default();
+        let pose = |k: usize| Isometry3::translation(0.2 * k as f64, 0.0, -1.0);
+        let frames = [0, 1, 2].map(|k| Some(PosedFrame::new(&level, &pose(k))));
+        let point = SurfacePoint { position: Vector3::zeros(), normal: -Vector3::z() };
+        let slope = Vector3::new(30.0, -20.0, 0.0);
+        let see = |k: usize| {
+            let intensity = Some(Intensity { value: seen[k], slope });
+            Observation { frame: k, distance: 0.0, sigma: 1e-3, intensity }
+        };
+        let mut equations = NormalEquations::new(&[true, false, false], &[], &[[0, 1], [0, 2], [1, 2]]).unwrap();
+        let mut stats = ResidualStats::new(3, Scales { depth: 1.0, intensity: 2.0 });
+        add_point(&point, &[0, 1, 2].map(see), &frames, &brightness, &mut equations, &mut stats);
+        (stats.brighter().collect(), equations.b.amax())
+    }
+
+    /// Keyframes that see a point as much brighter as they are say the same of it; where nothing is known of their brightness it is found,
+    /// beside that of the middle one.
+    #[test]
+    fn the_brightness_of_keyframes_is_no_error() {
+        let (brighter, pull) = found([100.0, 112.0, 95.0], [0.0, 12.0, -5.0]);
+        assert!(brighter.iter().all(|b| b.abs() < 1e-9) && pull < 1e-9, "{brighter:?} {pull}");
+        let (brighter, pull) = found([100.0, 112.0, 95.0], [0.0; 3]);
+        assert_eq!(brighter, [0.0, 12.0, -5.0]);
+        assert!(pull > 1.0, "{pull}");
+    }
+}

@@ -86,6 +86,20 @@ mod tests {
         }
     }
 
+    /// Places 1 to 5 m away that shift by as many metres: the fifth has no say, and (4² 1 + 3² 2 + 2² 3 + 1² 4) / 30 is left.
+    #[test]
+    fn nearer_places_weigh_more() {
+        let places = |order: [i32; 5]| {
+            EmbeddedDeformation::new(
+                order.map(f64::from).map(|d| (Point3::new(0.0, d, 0.0), Isometry3::translation(d, 0.0, 0.0))).to_vec(),
+            )
+        };
+        for order in [[1, 2, 3, 4, 5], [5, 3, 1, 4, 2]] {
+            let moved = places(order).point(&Point3::origin());
+            assert!((moved - Point3::new(50.0 / 30.0, 0.0, 0.0)).norm() < 1e-12, "{moved}");
+        }
+    }
+
     #[test]
     fn places_that_say_nothing_change_nothing() {
         let point = Point3::new(1.0, 2.0, 3.0);

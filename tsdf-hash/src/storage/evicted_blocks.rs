@@ -445,3 +445,6 @@ impl EvictedBlocks {
         Ok(true)
     }
 }
+
+#[cfg(test)]
+mod tests;

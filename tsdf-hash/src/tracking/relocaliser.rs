@@ -264,3 +264,26 @@ fn different<'a>(poses: impl Iterator<Item = &'a Isometry3<f64>>) -> usize {
     }
     counted.len()
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    use super::*;
+
+    /// The next shelf is 10 cm on: another place. What two tracked frames differ by is the same one, wherever it is and looks.
+    #[test]
+    fn places_a_hand_apart_are_two() {
+        let there = Isometry3::new(Vector3::new(3.0, -2.0, 1.0), Vector3::new(0.4, -1.9, 0.7));
+        let moved = |shift: f64, turn: f64| {
+            let rotation = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), turn);
+            there * Isometry3::from_parts(Vector3::new(0.0, 0.0, shift).into(), rotation)
+        };
+        for (shift, turn, same) in
+            [(0.0, 0.0, true), (0.03, 0.0, true), (0.0, 0.03, true), (0.1, 0.0, false), (0.0, 0.1, false)]
+        {
+            assert_eq!(is_same(&there, &moved(shift, turn)), same, "{shift} m, {turn} rad");
+            assert_eq!(is_same(&moved(shift, turn), &there), same, "{shift} m, {turn} rad");
+        }
+    }
+}

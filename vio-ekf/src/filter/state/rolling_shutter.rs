@@ -50,3 +50,48 @@ impl RollingShutter {
         Some((pixel, implicit.try_inverse()? * by_bearing))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Unit;
+
+    use super::*;
+    use crate::sim::{Rng, camera_ahead};
+    use crate::test_random::signed;
+
+    /// The pixel is that of the bearing at the time of its own row, and the matrix is its derivative by differences.
+    #[test]
+    fn a_moving_bearing_is_seen_where_it_is_at_the_time_of_its_row() {
+        let camera = camera_ahead();
+        let (width, height) = camera.image_size();
+        let shutter = RollingShutter { row_time: 0.03 / height as f64, middle_row: 0.5 * (height as f64 - 1.0) };
+        assert_eq!(shutter.delay(&Vector2::new(7.0, shutter.middle_row + 10.0)), 10.0 * shutter.row_time);
+        let mut rng = Rng::new(3);
+        let mut checked = 0;
+        for _ in 0..300 {
+            let middle = Vector2::new(0.5 * width as f64, 0.5 * height as f64);
+            let pixel =
+                middle + Vector2::new(0.4 * width as f64 * signed(&mut rng), 0.4 * height as f64 * signed(&mut rng));
+            let Some(direction) = camera.bearing(&pixel) else { continue };
+            let bearing = Bearing::new(&Unit::new_normalize(direction.into_inner()));
+            let rate = Vector2::new(signed(&mut rng), signed(&mut rng));
+            let seen = |bearing: &Bearing| shutter.project(&camera, bearing, &rate);
+            let Some((pixel, jacobian)) = seen(&bearing) else { continue };
+            let since = shutter.row_time * (pixel.y - shutter.middle_row);
+            let (expected, _) = project(&camera, &bearing.boxplus(&(rate * since))).unwrap();
+            assert!((pixel - expected).norm() < 1e-5, "{pixel} for {expected}");
+            let h = 1e-5;
+            for k in 0..2 {
+                let mut step = Vector2::zeros();
+                step[k] = h;
+                let [plus, minus] = [step, -step].map(|step| seen(&bearing.boxplus(&step)).unwrap().0);
+                let slope = (plus - minus) / (2.0 * h);
+                let off = (slope - jacobian.column(k)).norm();
+                // Of some hundred pixels per radian; a row's motion is a hundredth of that.
+                assert!(off < 2e-3 * slope.norm(), "column {k}: {off} of {}", slope.norm());
+            }
+            checked += 1;
+        }
+        assert!(checked > 250, "{checked}");
+    }
+}

@@ -188,3 +188,76 @@ impl StationaryDetector {
         self.current.map(|mean| mean.force)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples::ImageView;
+    use crate::sim::camera_ahead;
+
+    fn sample(milliseconds: i64, force: f64) -> Imu {
+        let (gyro, accel) = (Vector3::zeros(), Vector3::new(0.0, 0.0, force));
+        Imu { stamp: Stamp::from_nanos(1_000_000 * milliseconds), gyro, accel }
+    }
+
+    /// Whether a picture that stands at so many of its patches, and moved by two pixels everywhere else, is a standstill.
+    fn stands(still: usize) -> bool {
+        let (camera, settings) = (camera_ahead(), PatchSettings::default());
+        let (width, height) = camera.image_size();
+        // Squares of 16 pixels, each with a brightness of its own.
+        let brightness = |x: usize, y: usize| {
+            let square = (x / 16 + 100 * (y / 16)) as u32;
+            40 + (square.wrapping_mul(2_654_435_761) >> 25) as u8
+        };
+        let picture = |value: &dyn Fn(usize, usize) -> u8| -> Vec<u8> {
+            (0..width * height).map(|k| value(k % width, k / width)).collect()
+        };
+        let mut frontend = ImageFrontend::new(&camera, &settings);
+        let mut detector = StationaryDetector::new(StationarySettings::default());
+        let mut show = |detector: &mut StationaryDetector, data: &[u8]| {
+            frontend.set_image(&ImageView { width, height, data });
+            detector.image(&mut frontend, &settings);
+        };
+        (0..=40).for_each(|k| detector.imu(&sample(5 * k, 9.81)));
+        show(&mut detector, &picture(&brightness));
+        let places: Vec<Vector2<f64>> = detector.patches.iter().map(|(pixel, _)| *pixel).collect();
+        assert_eq!(places.len(), MAX_PATCHES);
+        (41..=300).for_each(|k| detector.imu(&sample(5 * k, 9.81)));
+        let near = |x: usize, y: usize| {
+            places[..still].iter().any(|place| (place - Vector2::new(x as f64, y as f64)).amax() < 14.0)
+        };
+        show(&mut detector, &picture(&|x, y| if near(x, y) { brightness(x, y) } else { brightness(x + 2, y + 2) }));
+        detector.is_stationary(sample(1500, 9.81).stamp)
+    }
+
+    #[test]
+    fn most_patches_must_stand() {
+        let found = [0, 1, 3, 5, MAX_PATCHES].map(stands);
+        assert_eq!(found, [false, false, false, true, true]);
+    }
+
+    /// A mean over a second counts half a second after its end, and not at all if something moved before that.
+    #[test]
+    fn what_was_measured_at_rest_is_certain_after_the_delay() {
+        for moves_at in [1250, i64::MAX] {
+            let mut detector = StationaryDetector::new(StationarySettings::default());
+            let mut certain = None;
+            for milliseconds in (0..2000).step_by(10) {
+                let force = if milliseconds < moves_at { 9.81 } else { 12.0 };
+                let sample = sample(milliseconds, force);
+                detector.imu(&sample);
+                if let Some(mean) = detector.take_certain_mean(sample.stamp) {
+                    certain.get_or_insert((milliseconds, mean.duration, mean.force.z));
+                }
+            }
+            if moves_at < 2000 {
+                assert_eq!(certain, None);
+                continue;
+            }
+            let (at, duration, force) = certain.unwrap();
+            // The first tenth of a second is what the rest is compared with.
+            assert!((1600..1630).contains(&at), "{at} ms");
+            assert!((duration - 1.0).abs() < 0.015 && (force - 9.81).abs() < 1e-9, "{duration} s, {force} m/s^2");
+        }
+    }
+}
