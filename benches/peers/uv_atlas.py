@@ -85,7 +85,7 @@ def main():
             stem = os.path.splitext(os.path.basename(path))[0]
             out = os.path.join(folder, stem)
             texel = math.sqrt(1.5 * area_of(path)) / o.page
-            command = [unwrap, "--mesh", path, "--texel", f"{texel:.6g}", "--gutter", str(o.gutter), "--out", out]
+            command = [unwrap, "--mesh", path, "--scale", "1", "--texel", f"{texel:.6g}", "--gutter", str(o.gutter), "--out", out]
             _, error, code = run(command + (["--utilisation", o.utilisation] if o.utilisation else []))
             if code:
                 print(f"{stem}: unwrap: {error}", file=sys.stderr)

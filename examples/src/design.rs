@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use nalgebra::{Point3, UnitVector3};
 use paint_net::Image;
 use paint_net::procedural::{fbm, value_noise};
 use uv_param::texture::{Texture, luminance};
@@ -102,8 +103,9 @@ impl Design {
         Ok(Self::Materials(pictures.collect::<Result<_, DesignError>>()?))
     }
 
-    /// Ink wanted on every texel of a surface made from `mesh`. Designs that do not lie on the mesh itself are laid over the
-    /// chart's box, or with a viewpoint over what is seen from there; a picture lies in that box as `placement` says.
+    /// Ink wanted on every texel of a surface made from `mesh`. Designs that do not lie on the mesh itself are laid over the box of a surface
+    /// in one piece, or with a viewpoint over what is seen from there; a picture lies in that box as `placement` says. On a surface with
+    /// seams, where its charts would tear, they fill space: what a viewer in front sees goes through to the back.
     pub fn on_surface(
         &self,
         surface: &PaintSurface,
@@ -129,6 +131,7 @@ impl Design {
             }
             _ => {
                 let (places, extent) = match viewpoint {
+                    None if surface.disk().seam_length() > 0.0 => places_in_space(surface),
                     None => chart_places(surface),
                     Some(viewpoint) => projected_places(surface, viewpoint),
                 };
@@ -193,17 +196,32 @@ fn chart_places(surface: &PaintSurface) -> (Vec<Option<[f64; 2]>>, [f64; 2]) {
     ((0..width * surface.height()).map(place).collect(), extent)
 }
 
-/// Metres from the upper left corner of what is seen from a viewpoint, for every texel that is seen, and its width and height.
+/// The same of what is seen from a viewpoint, for every texel that is seen.
 fn projected_places(surface: &PaintSurface, viewpoint: Viewpoint) -> (Vec<Option<[f64; 2]>>, [f64; 2]) {
     let projection = Projection::new(viewpoint, surface);
+    places_in_plane(surface, |point, normal| {
+        let at = projection.project(point)?;
+        projection.sees(surface, point, normal).then_some(at)
+    })
+}
+
+/// The same of what a viewer in front would see if everything were transparent: a place for every texel, the same on both sides of a seam.
+fn places_in_space(surface: &PaintSurface) -> (Vec<Option<[f64; 2]>>, [f64; 2]) {
+    let projection = Projection::new(Viewpoint::Front, surface);
+    places_in_plane(surface, |point, _| projection.project(point))
+}
+
+/// Where every texel lies on a plane, from right and up on it; from the upper left corner of all of them, and their width and height.
+fn places_in_plane(
+    surface: &PaintSurface,
+    place: impl Fn(&Point3<f64>, &UnitVector3<f64>) -> Option<[f64; 2]>,
+) -> (Vec<Option<[f64; 2]>>, [f64; 2]) {
     let width = surface.width();
-    let seen = |k: usize| {
+    let of_texel = |k: usize| {
         let on_surface = surface.texels.at(k % width, k / width)?;
-        let point = surface.chart.point(on_surface);
-        let at = projection.project(&point)?;
-        projection.sees(surface, &point, &surface.chart.face_normal(on_surface.face)).then_some(at)
+        place(&surface.chart.point(on_surface), &surface.chart.face_normal(on_surface.face))
     };
-    let mut places: Vec<Option<[f64; 2]>> = (0..width * surface.height()).map(seen).collect();
+    let mut places: Vec<Option<[f64; 2]>> = (0..width * surface.height()).map(of_texel).collect();
     let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
     for at in places.iter().flatten() {
         for c in 0..2 {

@@ -19,7 +19,7 @@ struct CommonArguments {
     /// Say nothing but warnings and errors
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
-    /// Show what the libraries do, with times; twice: in detail. RUST_LOG says it by library, such as vio_ekf=debug
+    /// Show what the libraries do, with times; twice: in detail. By library: `RUST_LOG=vio_ekf=debug`
     #[arg(short, long, global = true, action = ArgAction::Count)]
     verbose: u8,
     /// Print report.json, and nothing else, to stdout

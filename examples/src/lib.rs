@@ -25,6 +25,7 @@ mod log {
         }
     }
 }
+pub mod mesh_frame;
 pub mod mesh_io;
 pub mod mesh_placement;
 mod minimum_jerk;

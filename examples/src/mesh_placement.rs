@@ -30,10 +30,33 @@ pub enum UpAxis {
 }
 
 impl UpAxis {
-    /// What programs usually mean by a file of this name: y for OBJ, y by definition for glTF, z otherwise.
+    /// What programs usually mean by a file of this name: y for OBJ and OFF, y by definition for glTF, z otherwise.
     pub fn of_file(path: &Path) -> Self {
         let is = |usual: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(usual));
-        if ["obj", "glb", "gltf"].into_iter().any(is) { Self::Y } else { Self::Z }
+        if ["obj", "off", "glb", "gltf"].into_iter().any(is) { Self::Y } else { Self::Z }
+    }
+
+    /// The axis along a direction, where it is one.
+    pub fn of_direction(direction: [f64; 3]) -> Self {
+        match direction {
+            [1.0, 0.0, 0.0] => Self::X,
+            [0.0, 1.0, 0.0] => Self::Y,
+            [0.0, 0.0, 1.0] => Self::Z,
+            other => Self::Direction(other),
+        }
+    }
+
+    /// `x`, `y`, `z`, `-y` or the direction.
+    pub fn name(self) -> String {
+        match self {
+            Self::X => "x".into(),
+            Self::Y => "y".into(),
+            Self::Z => "z".into(),
+            Self::Direction([-1.0, 0.0, 0.0]) => "-x".into(),
+            Self::Direction([0.0, -1.0, 0.0]) => "-y".into(),
+            Self::Direction([0.0, 0.0, -1.0]) => "-z".into(),
+            Self::Direction([x, y, z]) => format!("{x},{y},{z}"),
+        }
     }
 }
 
@@ -47,7 +70,7 @@ pub struct MeshPlacement {
 }
 
 /// Longest side when no scale is given, metres.
-const LONGEST_SIDE: f64 = 3.0;
+pub const LONGEST_SIDE: f64 = 3.0;
 
 /// What is wrong with a mesh before placement.
 #[derive(Debug, thiserror::Error)]

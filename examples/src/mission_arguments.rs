@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use paint_planner::timing::TimingPolicy;
 
+use crate::mesh_frame::MeshScale;
 use crate::mesh_placement::UpAxis;
-use crate::mission::{LocalisationChoice, MissionSettings, PainterChoice};
+use crate::mission::{LocalisationChoice, MissionSettings, PainterChoice, with_tilt};
 use crate::mission_file::MissionFile;
 use crate::picture_placement::{PicturePlacement, PlacementMode};
 use crate::projection::Viewpoint;
@@ -23,16 +24,18 @@ pub struct MissionArguments {
     /// file, the file before the defaults
     #[arg(long, value_name = "FILE")]
     mission: Option<PathBuf>,
-    /// Surface to paint, OBJ, glTF (.glb, .gltf), PLY or OFF; the built-in rock wall if not given
+    /// Surface to paint, OBJ, glTF (.glb, .gltf), PLY, STL or OFF; the built-in rock wall if not given
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
     /// Picture on the mesh's own texture coordinates (OBJ, glTF): it becomes the design
     #[arg(long, value_name = "PNG", conflicts_with = "design")]
     texture: Option<PathBuf>,
-    /// Metres per unit of the mesh file [default: the longest side becomes 3 m]
-    #[arg(long, allow_negative_numbers = true)]
-    scale: Option<f64>,
-    /// Axis of the mesh file that points up: x, y, z, or any direction X,Y,Z [default: y for OBJ and glTF, z otherwise]
+    /// Metres per unit of the mesh file, or m, cm, mm, ft, in, or fit (the longest side becomes 3 m) [default: what the file says, else what its
+    /// size tells]
+    #[arg(long, value_name = "METRES|UNIT|fit", allow_negative_numbers = true)]
+    scale: Option<MeshScale>,
+    /// Axis of the mesh file that points up: x, y, z, or any direction X,Y,Z [default: what the file or its base says, else y for OBJ and OFF, z
+    /// for PLY and STL]
     #[arg(long, value_name = "x|y|z|X,Y,Z", value_parser = up_axis, allow_hyphen_values = true)]
     up: Option<UpAxis>,
     /// Paint only a part of the mesh; the rest stays in the way. In the coordinates of the mesh file: box:x0,y0,z0,x1,y1,z1,
@@ -89,11 +92,17 @@ struct Nozzle {
     #[arg(long, value_name = "METRES", value_parser = positive)]
     spot: Option<f64>,
     /// Distance of the nozzle from the surface, metres, within 0.05 to 0.15 [default: 0.1]
-    #[arg(long, value_name = "METRES", value_parser = positive)]
+    #[arg(long, value_name = "METRES", value_parser = stand_off)]
     stand_off: Option<f64>,
     /// Speed of the spot over the surface, metres per second [default: 0.4]
     #[arg(long, value_name = "M_PER_S", value_parser = positive)]
     speed: Option<f64>,
+    /// Length of the arm, from the middle of the vehicle to the pan joint, metres [default: 0.45]
+    #[arg(long, value_name = "METRES", value_parser = arm)]
+    arm: Option<f64>,
+    /// How far the tilt joint goes to both sides, degrees; more reaches tops and undersides [default: 45]
+    #[arg(long, value_name = "DEGREES", value_parser = tilt)]
+    tilt: Option<f64>,
     /// Most that the valve gives, litres per minute [default: 0.12]
     #[arg(long, value_name = "L_PER_MIN", value_parser = positive)]
     max_flow: Option<f64>,
@@ -103,8 +112,18 @@ impl Nozzle {
     fn apply(&self, settings: &mut MissionSettings) {
         settings.texel = self.texel.unwrap_or(settings.texel);
         settings.spot = self.spot.unwrap_or(settings.spot);
+        if let Some(arm) = self.arm {
+            settings.ptu.body_from_pan_axis.x = arm;
+        }
+        if let Some(tilt) = self.tilt {
+            *settings = with_tilt(settings, tilt.to_radians());
+        }
         let planner = &mut settings.planner;
-        planner.nozzle.stand_off = self.stand_off.unwrap_or(planner.nozzle.stand_off);
+        if let Some(stand_off) = self.stand_off {
+            let nozzle = &mut planner.nozzle;
+            // The room about the stand-off stays what it is for the usual one: half of it to both sides.
+            (nozzle.stand_off, nozzle.min, nozzle.max) = (stand_off, 0.5 * stand_off, 1.5 * stand_off);
+        }
         if let Some(speed) = self.speed {
             planner.timing.policy = TimingPolicy::Uniform { speed };
             planner.timing.max_speed = planner.timing.max_speed.max(1.25 * speed);
@@ -115,6 +134,22 @@ impl Nozzle {
 
 fn finite(text: &str) -> Result<f64, String> {
     numbers::<1>(text).map(|[value]| value)
+}
+
+fn stand_off(text: &str) -> Result<f64, String> {
+    let metres = text.parse().ok().filter(|v: &f64| (0.05..=0.15).contains(v));
+    metres.ok_or_else(|| "give metres from 0.05 to 0.15".to_owned())
+}
+
+/// The vehicle's rotors end before the arm does, and no arm carries a gun farther.
+fn arm(text: &str) -> Result<f64, String> {
+    let metres = text.parse().ok().filter(|v: &f64| (0.4..=2.0).contains(v));
+    metres.ok_or_else(|| "give metres from 0.4 (the rotors) to 2".to_owned())
+}
+
+fn tilt(text: &str) -> Result<f64, String> {
+    let degrees = text.parse().ok().filter(|v: &f64| (20.0..=80.0).contains(v));
+    degrees.ok_or_else(|| "give degrees from 20 to 80: beyond, the pan joint turns the spray about itself".to_owned())
 }
 
 fn positive(text: &str) -> Result<f64, String> {
@@ -138,7 +173,7 @@ struct Placement {
     #[arg(long, value_name = "METRES", value_parser = positive)]
     size: Option<f64>,
     /// Throw the design onto the surface like a slide: from the front, or from a point X,Y,Z (metres; the robot's side is -x, z
-    /// is up) [default: laid over the unwrapped surface]
+    /// is up) [default: laid over a surface in one piece; through a surface with seams, as seen from the front]
     #[arg(long, value_name = "front|X,Y,Z", value_parser = viewpoint, allow_hyphen_values = true)]
     project: Option<Viewpoint>,
 }
@@ -327,12 +362,13 @@ mod tests {
         .unwrap();
         let path = file.to_str().unwrap();
         let same = mission(&["--mission", path]).unwrap();
-        assert_eq!((same.scale, same.fill, same.settings.seed, same.settings.spot), (Some(0.5), Some(2e-5), 7, 0.03));
+        assert_eq!((same.scale, same.fill), (Some(MeshScale::Factor(0.5)), Some(2e-5)));
+        assert_eq!((same.settings.seed, same.settings.spot), (7, 0.03));
         assert_eq!(same.settings.texel, MissionSettings::default().texel);
 
         let other = mission(&["--mission", path, "--seed=3", "--texel=0.01", "--up=x", "--rotate=90"]).unwrap();
         assert_eq!((other.settings.seed, other.settings.texel, other.settings.spot), (3, 0.01, 0.03));
-        assert_eq!((other.up, other.scale, other.mesh), (Some(UpAxis::X), Some(0.5), same.mesh));
+        assert_eq!((other.up, other.scale, other.mesh), (Some(UpAxis::X), same.scale, same.mesh));
         assert!((other.settings.placement.rotate - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
 
         // A design takes the place of the coat; another mesh has another scale.

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::appearance::{Appearance, UNIT_THICKNESS};
 use crate::design::{Design, DesignError, MATERIALS, Picture};
+use crate::mesh_frame::{MeshScale, Subject, scale_of, up_of};
 use crate::mesh_io::{MeshError, TriangleMesh, read_mesh};
 use crate::mesh_placement::{MeshPlacement, PlacementError, UpAxis, place_mesh, place_scene};
 use crate::mission::{MissionError, MissionSettings, PaintingTask};
@@ -26,11 +27,11 @@ const COAT: std::ops::RangeInclusive<f64> = 0.999e-6..=60.001e-6;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MissionFile {
-    /// Surface to paint, OBJ, glTF, PLY or OFF; the built-in rock wall if there is none. Relative paths begin at the file's folder.
+    /// Surface to paint, OBJ, glTF, PLY, STL or OFF; the built-in rock wall if there is none. Relative paths begin at the file's folder.
     pub mesh: Option<PathBuf>,
-    /// Metres per unit of the mesh file; without it the longest side becomes 3 m.
-    pub scale: Option<f64>,
-    /// Axis of the mesh file that points up; y for OBJ and glTF, z otherwise.
+    /// Metres per unit of the mesh file, or the unit; without it what the file says, else what its size tells.
+    pub scale: Option<MeshScale>,
+    /// Axis of the mesh file that points up; without it what the file or its base says, else what is usual in such files.
     pub up: Option<UpAxis>,
     /// What to paint: `strata`, `stripes`, `gradient`, `colours`, `materials` or a picture file; strata on the rock wall; on a mesh
     /// the textures that its file names, stripes without.
@@ -99,17 +100,16 @@ pub enum MissionFileError {
     /// No pose of the robot paints anything of the region.
     #[error(
         "{path}: --region {region}: no pose of the robot can paint any of it: something stands before it, it faces up or down, or it faces \
-         away; the mesh reaches from {low:?} to {high:?} in the coordinates of its file (--up says which way is up, now {up:?})"
+         away; the mesh reaches from {:?} to {:?} in the coordinates of its file (--up says which way is up, now {up:?})",
+        extent[0], extent[1]
     )]
     RegionOutOfReach {
         /// The mesh.
         path: String,
         /// The region.
         region: String,
-        /// Least coordinates of the mesh.
-        low: [f32; 3],
-        /// Largest.
-        high: [f32; 3],
+        /// Least and largest coordinates of the mesh.
+        extent: Box<[[f64; 3]; 2]>,
         /// What points up.
         up: UpAxis,
     },
@@ -296,10 +296,10 @@ impl MissionFile {
         if let (MissionError::OutOfReach { .. }, Some(region), Some(path)) = (&source, &self.region, &self.mesh)
             && let Ok(mesh) = read_mesh(path)
         {
-            let (low, high) = mesh.bounds();
-            let up = self.up.unwrap_or_else(|| UpAxis::of_file(path));
+            let (low, high) = mesh.bounds_in_file();
+            let (up, _) = up_of(&mesh, path, self.up);
             let (path, region) = (path.display().to_string(), region.to_string());
-            return MissionFileError::RegionOutOfReach { path, region, low, high, up };
+            return MissionFileError::RegionOutOfReach { path, region, extent: Box::new([low, high]), up };
         }
         MissionFileError::Mission { surface: self.mesh_prefix(), source }
     }
@@ -327,10 +327,12 @@ impl MissionFile {
         if self.texture.is_some() && mesh.uv.is_none() {
             return Err(MissionFileError::NoTextureCoordinates { path: name });
         }
-        let up = self.up.unwrap_or_else(|| UpAxis::of_file(path));
-        let placement = MeshPlacement { scale: self.scale, up };
+        let (up, up_said) = up_of(&mesh, path, self.up);
+        let subject = if self.region.is_some() { Subject::Place } else { Subject::Object };
+        let (scale, scale_said) = scale_of(&mesh, self.scale, subject);
+        let placement = MeshPlacement { scale: Some(scale), up };
         let (scene, placed) = if self.region.is_some() {
-            let unit = self.scale.filter(|s| s.is_finite() && *s > 0.0).unwrap_or(1.0);
+            let unit = if scale.is_finite() && scale > 0.0 { scale } else { 1.0 };
             let mut scene = self.select(&name, mesh, unit)?;
             let placed = place_scene(&mut scene, placement);
             (scene, placed)
@@ -341,7 +343,7 @@ impl MissionFile {
         };
         let placed = placed.map_err(|source| MissionFileError::Placement { path: name.clone(), source })?;
         let hung = if placed.hung { ", hung like a wall" } else { "" };
-        say!("{name}: {} faces, scale {:.4}{hung}", scene.canvas.faces.len(), placed.scale);
+        say!("{name}: {} faces, {scale_said}, {up_said}{hung}", scene.canvas.faces.len());
         Ok(scene)
     }
 }

@@ -13,6 +13,8 @@ pub struct Stage {
     name: String,
     bar: Option<ProgressBar>,
     started: Instant,
+    /// Largest share so far, thousandths: of several threads or rounds the one that is behind does not turn the bar back.
+    most: AtomicU64,
     /// Plain lines so far.
     told: AtomicU64,
 }
@@ -31,17 +33,18 @@ impl Stage {
             bar.set_message(name.to_string());
             bar
         });
-        Self { name: name.to_string(), bar, started: Instant::now(), told: AtomicU64::new(0) }
+        Self { name: name.to_string(), bar, started: Instant::now(), most: AtomicU64::new(0), told: AtomicU64::new(0) }
     }
 
     /// Moves the bar to a share in `[0, 1]`.
     pub fn share(&self, share: f64) {
-        let share = share.clamp(0.0, 1.0);
+        let now = (1000.0 * share.clamp(0.0, 1.0)) as u64;
+        let most = self.most.fetch_max(now, Ordering::Relaxed).max(now);
         if let Some(bar) = &self.bar {
-            bar.set_position((1000.0 * share) as u64);
+            bar.set_position(most);
             return;
         }
-        self.line(&format!("{:.0} %", 100.0 * share));
+        self.line(&format!("{:.0} %", most as f64 / 10.0));
     }
 
     /// Says what is being done where nobody knows how much of it is left.

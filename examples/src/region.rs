@@ -42,17 +42,16 @@ pub enum Region {
 pub enum RegionError {
     /// Nothing of the mesh lies in it.
     #[error(
-        "--region {region}: holds nothing of the mesh{hint}; the mesh reaches from {low:?} to {high:?} in the coordinates of its file"
+        "--region {region}: holds nothing of the mesh{hint}; the mesh reaches from {:?} to {:?} in the coordinates of its file",
+        extent[0], extent[1]
     )]
     Empty {
         /// The region.
         region: String,
         /// What may be wrong.
         hint: String,
-        /// Least coordinates of the mesh.
-        low: [f32; 3],
-        /// Largest.
-        high: [f32; 3],
+        /// Least and largest coordinates of the mesh.
+        extent: Box<[[f64; 3]; 2]>,
     },
     /// A mask without texture coordinates to lie on.
     #[error("--region {0}: the mesh has no texture coordinates; unwrap it first, and give the atlas.obj as the mesh")]
@@ -103,7 +102,8 @@ impl Region {
         let finest = if finest > 0.0 { finest } else { f64::INFINITY };
         let before = mesh.faces.len();
         let mut hint = String::new();
-        let mut inside = match self {
+        let here = self.relative_to(mesh.origin);
+        let mut inside = match &here {
             Self::Pick(point) => self.picked(&mesh, Point3::from(*point), finest, DEFAULT_MEMORY_M / unit)?,
             Self::Box(corners) => {
                 let (low, high) = sides(corners);
@@ -155,6 +155,16 @@ impl Region {
         Ok(separated(mesh, &inside))
     }
 
+    /// The region about another origin.
+    fn relative_to(&self, [x, y, z]: [f64; 3]) -> Self {
+        match *self {
+            Self::Box([x0, y0, z0, x1, y1, z1]) => Self::Box([x0 - x, y0 - y, z0 - z, x1 - x, y1 - y, z1 - z]),
+            Self::Plane([px, py, pz, nx, ny, nz, radius]) => Self::Plane([px - x, py - y, pz - z, nx, ny, nz, radius]),
+            Self::Pick([px, py, pz]) => Self::Pick([px - x, py - y, pz - z]),
+            Self::Mask(ref path) => Self::Mask(path.clone()),
+        }
+    }
+
     /// The same with the file that it names, if it does, at another place.
     #[must_use]
     pub fn with_file(self, place: impl FnOnce(PathBuf) -> PathBuf) -> Self {
@@ -189,8 +199,8 @@ impl Region {
     }
 
     fn empty(&self, mesh: &TriangleMesh, hint: String) -> RegionError {
-        let (low, high) = mesh.bounds();
-        RegionError::Empty { region: self.to_string(), hint, low, high }
+        let (low, high) = mesh.bounds_in_file();
+        RegionError::Empty { region: self.to_string(), hint, extent: Box::new([low, high]) }
     }
 }
 

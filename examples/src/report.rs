@@ -1,6 +1,7 @@
 //! What a run found: `report.json` for programs, `report.md` for people.
 
 mod check;
+mod reach;
 mod times;
 
 use std::fmt::Write as _;
@@ -11,6 +12,7 @@ use serde::Serialize;
 use crate::whole_file;
 
 pub use check::{Check, Requirement, Unit};
+pub use reach::ReachNeeds;
 pub use times::TimeFigures;
 
 /// The figures of one mission. Flat, SI units in the names; every number is finite.
@@ -40,6 +42,9 @@ pub struct Report {
     pub unreachable_normal_share: f64,
     /// Share of the surface that the robot can paint.
     pub reach_share: f64,
+    /// What the rest would need, where it is more than 3 % of the surface.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub reach_needs: Option<ReachNeeds>,
     /// Share of the surface that it could paint but for keep-out volumes and tether.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lost_to_constraints_share: Option<f64>,
@@ -157,6 +162,8 @@ pub struct Report {
     /// Paint that it found to be missing, and painted again.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub paint_missing_kg: Option<f64>,
+    /// Share of the surface's pixels that came out 15 grey levels darker than the darkest that is wanted within 3 cm.
+    pub darker_than_wanted_share: f64,
     /// Length of all seams on the surface.
     pub seam_length_m: f64,
     /// Structural similarity of the painted surface within 3 cm of a seam, where the robot can paint; windows go on beyond the seams.
@@ -290,6 +297,13 @@ impl Report {
                 ),
                 Index,
                 self.ssim_painted,
+            ),
+            check(
+                "Pixels darker than anything wanted near them",
+                self.darker_than_wanted_share,
+                Percent,
+                AtMost(1e-3),
+                NOT_REPORTED,
             ),
             check("Mean colour difference, CIEDE2000", self.ciede2000_mean, Index, Open, NOT_REPORTED),
             check("Collisions", self.collisions as f64, Count, AtMost(0.0), NOT_REPORTED),

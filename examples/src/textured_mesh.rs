@@ -9,6 +9,7 @@ use gltf::binary::{Glb, Header};
 use gltf::json::validation::{Checked::Valid, USize64};
 use gltf::json::{self, Index};
 
+use crate::mesh_io::GENERATOR;
 use crate::whole_file;
 
 /// Width of the border of a chart that takes the colour of its rim, texels: what bilinear sampling and a few levels of a mipmap
@@ -21,6 +22,8 @@ pub struct TexturedMesh<'a> {
     pub positions: &'a [[f64; 3]],
     /// Triangles.
     pub faces: &'a [[u32; 3]],
+    /// What to add to a vertex in the frame of the mesh; the glTF has it in a node, the OBJ in its vertices.
+    pub origin: [f64; 3],
     /// Texture coordinates of every vertex in `[0, 1]`, v up.
     pub uv: Vec<[f64; 2]>,
     /// Texture, first row at v = 1.
@@ -65,7 +68,8 @@ impl TexturedMesh<'_> {
 
     fn obj(&self, name: &str) -> String {
         let mut text = format!("# metres, z up\nmtllib {name}.mtl\nusemtl paint\n");
-        for [x, y, z] in self.positions {
+        for position in self.positions {
+            let [x, y, z] = [0, 1, 2].map(|c| position[c] + self.origin[c]);
             let _ = writeln!(text, "v {x:.6} {y:.6} {z:.6}");
         }
         for [u, v] in &self.uv {
@@ -123,7 +127,8 @@ impl TexturedMesh<'_> {
             extensions: None,
             extras: json::Extras::default(),
         };
-        builder.finish(primitive)
+        let [x, y, z] = self.origin;
+        builder.finish(primitive, [x, z, -y])
     }
 }
 
@@ -211,15 +216,26 @@ impl Builder {
         })
     }
 
-    /// One mesh of one primitive in one scene.
-    fn finish(mut self, primitive: json::mesh::Primitive) -> io::Result<Vec<u8>> {
+    /// One mesh of one primitive in one scene, moved by `origin`.
+    fn finish(mut self, primitive: json::mesh::Primitive, origin: [f64; 3]) -> io::Result<Vec<u8>> {
+        self.root.asset.generator = Some(GENERATOR.into());
         let mesh = self.root.push(json::Mesh {
             primitives: vec![primitive],
             weights: None,
             extensions: None,
             extras: json::Extras::default(),
         });
-        let node = self.root.push(json::Node { mesh: Some(mesh), ..json::Node::default() });
+        let mut node = self.root.push(json::Node { mesh: Some(mesh), ..json::Node::default() });
+        if origin != [0.0; 3] {
+            // Numbers of a node are of single precision: what the first leaves, the second adds.
+            let most = origin.map(|c| c as f32);
+            let rest = [0, 1, 2].map(|c| (origin[c] - f64::from(most[c])) as f32);
+            for translation in [rest, most] {
+                let parent =
+                    json::Node { translation: Some(translation), children: Some(vec![node]), ..json::Node::default() };
+                node = self.root.push(parent);
+            }
+        }
         let scene =
             self.root.push(json::Scene { nodes: vec![node], extensions: None, extras: json::Extras::default() });
         self.root.scene = Some(scene);
@@ -268,6 +284,7 @@ mod tests {
         let mesh = TexturedMesh {
             positions: &positions,
             faces: &[[0, 1, 2], [0, 2, 3]],
+            origin: [0.0; 3],
             uv: vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]],
             texture,
         };

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Parser, ValueEnum};
 
+use crate::mesh_frame::MeshScale;
 use crate::worker_threads;
 
 /// Paints an object with a nozzle on a handheld gantry: a person sweeps it past, the program decides where the nozzle slides and when it
@@ -16,16 +17,17 @@ use crate::worker_threads;
     after_help = "Examples:\n  handheld\n  handheld --mesh bust.obj --scale 0.001 --target face.png --texel 0.002\n  handheld --evaluate"
 )]
 pub struct Arguments {
-    /// Object, OBJ, PLY or OFF, z up
-    #[arg(long, value_name = "FILE", requires = "target")]
+    /// Object, OBJ, glTF, PLY, STL or OFF, z up
+    #[arg(long, value_name = "FILE")]
     pub mesh: Option<PathBuf>,
     /// Wanted paint on the atlas of the mesh: black is a full coat, white is bare; as many pixels as the atlas has texels (a first run
-    /// without a fitting one writes atlas.png to paint on)
+    /// without one writes atlas.png to paint on, and ends)
     #[arg(long, value_name = "PNG", requires = "mesh")]
     pub target: Option<PathBuf>,
-    /// Metres per unit of the mesh file
-    #[arg(long, default_value_t = 1.0)]
-    pub scale: f64,
+    /// Metres per unit of the mesh file, or m, cm, mm, ft, in, or fit (the longest side becomes 3 m) [default: what the file says, else what its
+    /// size tells]
+    #[arg(long, value_name = "METRES|UNIT|fit")]
+    pub scale: Option<MeshScale>,
     /// Side of a texel on the surface, metres
     #[arg(long, value_name = "METRES", default_value_t = 0.001)]
     pub texel: f64,

@@ -30,6 +30,19 @@ pub enum HandheldError {
         /// What is accepted.
         must_be: &'static str,
     },
+    /// There is nothing to paint yet.
+    #[error(
+        "no target: paint black on {}, the atlas of this mesh ({width} x {height} texels), what shall be painted, and give it as --target with the same \
+         --mesh and --texel", atlas.display()
+    )]
+    NoTarget {
+        /// The atlas that was written.
+        atlas: PathBuf,
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+    },
     /// The target is no picture of the atlas.
     #[error(
         "{}: {found_w} x {found_h} pixels, but the atlas of this mesh has {wanted_w} x {wanted_h} texels: paint on the \

@@ -25,6 +25,7 @@ use super::settings::HandheldSettings;
 use super::target::read_target;
 use super::views::passes;
 use crate::interruption::Finishing;
+use crate::mesh_frame::{Subject, scale_of};
 use crate::mesh_io::read_mesh;
 use crate::pictures::write_png;
 use crate::progress::Stage;
@@ -117,7 +118,6 @@ fn nearest(object: &PaintObject, log: &PaintingLog) -> f64 {
 
 fn check(arguments: &Arguments) -> Result<(), HandheldError> {
     let positive = [
-        ("--scale", arguments.scale),
         ("--motion-scale", arguments.motion_scale),
         ("--texel", arguments.texel),
         ("--coat", arguments.coat),
@@ -168,17 +168,24 @@ fn settings(arguments: &Arguments) -> HandheldSettings {
 }
 
 fn object(arguments: &Arguments, folder: &Path) -> Result<PaintObject, HandheldError> {
-    let (Some(mesh_file), Some(target)) = (&arguments.mesh, &arguments.target) else {
+    let Some(mesh_file) = &arguments.mesh else {
         let coat = arguments.coat;
         let wanted = &mut |at: &SurfaceSample| if in_circle(at) { coat } else { 0.0 };
         return PaintObject::new(&cube(), &cube_edges(), arguments.texel, wanted);
     };
     let mut mesh = read_mesh(mesh_file)?;
-    let scale = arguments.scale as f32;
+    let (scale, said) = scale_of(&mesh, arguments.scale, Subject::Handheld);
+    if !(scale.is_finite() && scale > 0.0) {
+        return Err(HandheldError::Option { option: "--scale", value: scale, must_be: "must be positive and finite" });
+    }
+    say!("{}: {} faces, {said}, z up", mesh_file.display(), mesh.faces.len());
+    let scale = scale as f32;
     mesh.positions.iter_mut().flatten().for_each(|c| *c *= scale);
     PaintObject::laid_out(&mesh, &[], arguments.texel, |size, samples| {
         save_atlas(size, samples, folder)?;
-        read_target(target, size, samples, arguments.coat)
+        let [width, height] = size;
+        let none = || HandheldError::NoTarget { atlas: folder.join("atlas.png"), width, height };
+        read_target(arguments.target.as_deref().ok_or_else(none)?, size, samples, arguments.coat)
     })
 }
 

@@ -13,8 +13,11 @@ use paint_sim::colour::encode_srgb;
 
 use super::fault::Fault;
 use super::material::{MeshMaterial, MeshMaterials};
-use super::mesh::{MeshUv, TriangleMesh};
+use super::mesh::{MeshUv, Parsed, TriangleMesh};
 use accessor::numbers;
+
+/// What our own files name as the program that wrote them.
+pub(crate) const GENERATOR: &str = "PaintCopter";
 
 /// Extensions that change only how light falls, or that are read.
 const KNOWN: [&str; 3] = ["KHR_texture_transform", "KHR_mesh_quantization", "KHR_lights_punctual"];
@@ -22,7 +25,7 @@ const KNOWN: [&str; 3] = ["KHR_texture_transform", "KHR_mesh_quantization", "KHR
 const SHADING: &str = "KHR_materials_";
 const OTHER_COLOUR: &str = "KHR_materials_pbrSpecularGlossiness";
 
-pub(super) fn parse(bytes: &[u8], folder: &Path) -> Result<TriangleMesh, Fault> {
+pub(super) fn parse(bytes: &[u8], folder: &Path) -> Result<Parsed, Fault> {
     let broken = |error: ::gltf::Error| Fault {
         place: "document".into(),
         what: format!("is no valid glTF 2.0 ({}): export it again", error.to_string().trim().replace('\n', "; ")),
@@ -34,6 +37,8 @@ pub(super) fn parse(bytes: &[u8], folder: &Path) -> Result<TriangleMesh, Fault> 
     prepare_images(&mut json)?;
     // Checked above: the validation knows only those that the crate itself reads.
     json.extensions_required.clear();
+    // The format is in metres, many of its files are not; those written here are.
+    let ours = json.asset.generator.as_deref() == Some(GENERATOR);
     let document = Document::from_json(json).map_err(broken)?;
     let mut joined = Joined {
         buffers: buffers::read(&document, blob.as_deref(), folder)?,
@@ -56,7 +61,9 @@ pub(super) fn parse(bytes: &[u8], folder: &Path) -> Result<TriangleMesh, Fault> 
             }
         }
     }
-    Ok(joined.finish())
+    let mut parsed = joined.finish();
+    parsed.mesh.unit = ours.then_some(1.0);
+    Ok(parsed)
 }
 
 /// Bounds of positions are asked for by the format, left out by some programs, and not needed here; a missing accessor is an index
@@ -111,6 +118,7 @@ struct Joined {
     buffers: Vec<Vec<u8>>,
     visited: Vec<bool>,
     mesh: TriangleMesh,
+    points: Vec<[f64; 3]>,
     uv: MeshUv,
     /// Per vertex, where the primitive had colours.
     colours: Vec<Option<[f32; 3]>>,
@@ -181,10 +189,10 @@ impl Joined {
             return Ok(());
         }
         self.primitives += 1;
-        let (first, positions) = (self.mesh.positions.len(), numbers(&accessor, &self.buffers, &[3])?);
+        let (first, positions) = (self.points.len(), numbers(&accessor, &self.buffers, &[3])?);
         let count = positions.len() / 3;
         let placed = positions.chunks_exact(3).map(|p| world_from_node.transform_point(&Point3::new(p[0], p[1], p[2])));
-        self.mesh.positions.extend(placed.map(|p| [p.x, p.y, p.z].map(|c| c as f32)));
+        self.points.extend(placed.map(|p| [p.x, p.y, p.z]));
         let material = primitive.material().index().unwrap_or(self.materials.materials.len() - 1);
         let found = self.add_coordinates(primitive, material, count)?;
         self.add_colours(primitive, count)?;
@@ -218,7 +226,7 @@ impl Joined {
     /// Coordinates of a primitive's vertices, moved as its material says; whether it has any.
     fn add_coordinates(&mut self, primitive: &Primitive, material: usize, count: usize) -> Result<bool, Fault> {
         let (set, [row_u, row_v]) = self.coordinates[material];
-        self.uv.coordinates.resize(self.mesh.positions.len() + 1 - count, [0.0; 2]);
+        self.uv.coordinates.resize(self.points.len() + 1 - count, [0.0; 2]);
         let accessor = primitive.get(&Semantic::TexCoords(set));
         if let Some(accessor) = &accessor {
             let values = numbers(accessor, &self.buffers, &[2])?;
@@ -228,7 +236,7 @@ impl Joined {
             let moved = values.chunks_exact(2).map(|uv| [along(row_u, uv), 1.0 - along(row_v, uv)].map(|c| c as f32));
             self.uv.coordinates.extend(moved);
         } else {
-            self.uv.coordinates.resize(self.mesh.positions.len() + 1, [0.0; 2]);
+            self.uv.coordinates.resize(self.points.len() + 1, [0.0; 2]);
         }
         Ok(accessor.is_some())
     }
@@ -236,7 +244,7 @@ impl Joined {
     /// Colours of vertices: linear in the file, sRGB in the mesh.
     fn add_colours(&mut self, primitive: &Primitive, count: usize) -> Result<(), Fault> {
         let Some(accessor) = primitive.get(&Semantic::Colors(0)) else {
-            self.colours.resize(self.mesh.positions.len(), None);
+            self.colours.resize(self.points.len(), None);
             return Ok(());
         };
         let values = numbers(&accessor, &self.buffers, &[3, 4])?;
@@ -247,8 +255,8 @@ impl Joined {
         Ok(())
     }
 
-    fn finish(self) -> TriangleMesh {
-        let Self { mut mesh, uv, colours, materials, bare_faces, mut notes, .. } = self;
+    fn finish(self) -> Parsed {
+        let Self { mut mesh, points, uv, colours, materials, bare_faces, mut notes, .. } = self;
         notes.insert(0, format!("glTF of {} primitive(s), y up", self.primitives));
         if bare_faces < mesh.faces.len() {
             mesh.uv = Some(uv);
@@ -270,7 +278,8 @@ impl Joined {
         }
         mesh.materials = Some(materials);
         mesh.notes = notes;
-        mesh
+        mesh.up = Some([0.0, 1.0, 0.0]);
+        Parsed { mesh, points }
     }
 }
 

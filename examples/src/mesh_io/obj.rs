@@ -9,12 +9,12 @@ use std::path::Path;
 
 use super::fault::{Fault, number};
 use super::material::{MeshMaterial, MeshMaterials};
-use super::mesh::{MeshUv, TriangleMesh, fan};
+use super::mesh::{MeshUv, Parsed, fan};
 use super::mtl;
 
-pub(super) fn parse(bytes: &[u8], folder: &Path) -> Result<TriangleMesh, Fault> {
+pub(super) fn parse(bytes: &[u8], folder: &Path) -> Result<Parsed, Fault> {
     let text = String::from_utf8_lossy(bytes);
-    let mut mesh = TriangleMesh::default();
+    let mut parsed = Parsed::default();
     let mut colours: Vec<[f32; 3]> = Vec::new();
     let mut uv = MeshUv::default();
     let mut corners: Vec<(u32, Option<u32>)> = Vec::new();
@@ -25,7 +25,7 @@ pub(super) fn parse(bytes: &[u8], folder: &Path) -> Result<TriangleMesh, Fault> 
         let mut words = line.split_whitespace();
         match words.next() {
             Some("v") => {
-                mesh.positions.push([
+                parsed.points.push([
                     number(&mut words, k, "x")?,
                     number(&mut words, k, "y")?,
                     number(&mut words, k, "z")?,
@@ -38,20 +38,20 @@ pub(super) fn parse(bytes: &[u8], folder: &Path) -> Result<TriangleMesh, Fault> 
             Some("vt") => uv.coordinates.push([number(&mut words, k, "u")?, number(&mut words, k, "v")?]),
             Some("mtllib") => {
                 let name = line.trim().trim_start_matches("mtllib").trim();
-                used.library.extend(mtl::read(&folder.join(name.replace('\\', "/")), &mut mesh.notes));
+                used.library.extend(mtl::read(&folder.join(name.replace('\\', "/")), &mut parsed.mesh.notes));
             }
             // Names of materials may have spaces in them.
             Some("usemtl") => used.set(line.trim().trim_start_matches("usemtl").trim()),
             Some("f") => {
                 corners.clear();
                 for word in words {
-                    corners.push(corner(word, mesh.positions.len(), uv.coordinates.len(), k)?);
+                    corners.push(corner(word, parsed.points.len(), uv.coordinates.len(), k)?);
                 }
                 if corners.len() < 3 {
                     return Err(Fault::at_line(k, format!("a face has {} corners, expected 3 or more", corners.len())));
                 }
                 fan(&corners, |triangle| {
-                    mesh.faces.push(triangle.map(|c| c.0));
+                    parsed.mesh.faces.push(triangle.map(|c| c.0));
                     used.add_face();
                     if let [(_, Some(a)), (_, Some(b)), (_, Some(c))] = triangle {
                         uv.faces.push([a, b, c]);
@@ -60,10 +60,12 @@ pub(super) fn parse(bytes: &[u8], folder: &Path) -> Result<TriangleMesh, Fault> 
                     }
                 });
             }
+            Some(word) if word.starts_with('#') => parsed.read_comment(line.trim().trim_start_matches('#')),
             _ => {}
         }
     }
-    if colours.len() == mesh.positions.len() && !colours.is_empty() {
+    let mesh = &mut parsed.mesh;
+    if colours.len() == parsed.points.len() && !colours.is_empty() {
         mesh.colours = Some(colours);
     }
     if faces_without_uv == 0 && !uv.faces.is_empty() {
@@ -73,7 +75,7 @@ pub(super) fn parse(bytes: &[u8], folder: &Path) -> Result<TriangleMesh, Fault> 
         mesh.notes.push(format!("texture coordinates left aside: {faces_without_uv} of {faces} faces have none"));
     }
     mesh.materials = (!used.library.is_empty()).then_some(used.materials);
-    Ok(mesh)
+    Ok(parsed)
 }
 
 /// The materials that faces have had so far.

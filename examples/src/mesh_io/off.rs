@@ -1,9 +1,9 @@
 //! OFF and COFF: counts, vertices, polygons; comments start with `#`.
 
 use super::fault::{Fault, number};
-use super::mesh::{TriangleMesh, fan};
+use super::mesh::{Parsed, fan};
 
-pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
+pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Fault> {
     let text = String::from_utf8_lossy(bytes);
     let mut lines = text
         .lines()
@@ -24,11 +24,12 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
     let vertices: usize = number(&mut words, k, "vertex count")?;
     let polygons: usize = number(&mut words, k, "face count")?;
 
-    let mut mesh = TriangleMesh::default();
+    let mut parsed = Parsed::default();
+    text.lines().filter_map(|line| line.split_once('#')).for_each(|(_, comment)| parsed.read_comment(comment.trim()));
     for _ in 0..vertices {
         let (k, line) = lines.next().ok_or_else(end)?;
         let mut words = line.split_whitespace();
-        mesh.positions.push([number(&mut words, k, "x")?, number(&mut words, k, "y")?, number(&mut words, k, "z")?]);
+        parsed.points.push([number(&mut words, k, "x")?, number(&mut words, k, "y")?, number(&mut words, k, "z")?]);
     }
     let mut corners: Vec<u32> = Vec::new();
     for _ in 0..polygons {
@@ -43,7 +44,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
             }
             corners.push(index);
         }
-        fan(&corners, |triangle| mesh.faces.push(triangle));
+        fan(&corners, |triangle| parsed.mesh.faces.push(triangle));
     }
-    Ok(mesh)
+    Ok(parsed)
 }

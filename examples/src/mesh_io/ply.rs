@@ -11,23 +11,24 @@ use ply_rs_bw::ply::{
 use ply_rs_bw::writer::Writer;
 
 use super::fault::Fault;
-use super::mesh::{TriangleMesh, fan};
+use super::mesh::{Parsed, fan};
 use crate::whole_file::WholeFile;
 
-pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
+pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Fault> {
     check_counts(bytes)?;
     let ply = Parser::<DefaultElement>::new()
         .read_ply(&mut io::Cursor::new(bytes))
         .map_err(|e| Fault { place: "PLY".into(), what: e.to_string() })?;
     let fault = |k: usize, element: &str, what: &str| Fault { place: format!("{element} {k}"), what: what.into() };
-    let mut mesh = TriangleMesh::default();
+    let mut parsed = Parsed::default();
+    ply.header.comments.iter().for_each(|comment| parsed.read_comment(comment.trim()));
     let mut colours = Vec::new();
     for (k, vertex) in ply.payload.get("vertex").into_iter().flatten().enumerate() {
-        let read = |name: &str| vertex.get(name).and_then(Property::to_f32_lossy);
+        let read = |name: &str| vertex.get(name).and_then(double);
         let [Some(x), Some(y), Some(z)] = ["x", "y", "z"].map(read) else {
             return Err(fault(k, "vertex", "x, y and z must be numbers"));
         };
-        mesh.positions.push([x, y, z]);
+        parsed.points.push([x, y, z]);
         if let [Some(r), Some(g), Some(b)] = ["red", "green", "blue"].map(|name| vertex.get(name).and_then(unit)) {
             colours.push([r, g, b]);
         }
@@ -36,16 +37,16 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
         let indices = ["vertex_indices", "vertex_index"].iter().find_map(|name| face.get(*name));
         let corners =
             indices.and_then(Property::to_u32_list).ok_or_else(|| fault(k, "face", "no list of vertex indices"))?;
-        if let Some(bad) = corners.iter().find(|&&i| i as usize >= mesh.positions.len()) {
-            let what = format!("vertex {bad} does not exist ({} vertices)", mesh.positions.len());
+        if let Some(bad) = corners.iter().find(|&&i| i as usize >= parsed.points.len()) {
+            let what = format!("vertex {bad} does not exist ({} vertices)", parsed.points.len());
             return Err(fault(k, "face", &what));
         }
-        fan(&corners, |triangle| mesh.faces.push(triangle));
+        fan(&corners, |triangle| parsed.mesh.faces.push(triangle));
     }
-    if colours.len() == mesh.positions.len() && !colours.is_empty() {
-        mesh.colours = Some(colours);
+    if colours.len() == parsed.points.len() && !colours.is_empty() {
+        parsed.mesh.colours = Some(colours);
     }
-    Ok(mesh)
+    Ok(parsed)
 }
 
 /// Refuses a header that promises more elements than the file has room for: elements without properties would be made until the memory
@@ -82,6 +83,16 @@ fn size(scalar: &ScalarType) -> usize {
     }
 }
 
+/// A number in double precision: surveyed coordinates need it.
+fn double(property: &Property) -> Option<f64> {
+    match *property {
+        Property::Double(v) => Some(v),
+        Property::Int(v) => Some(f64::from(v)),
+        Property::UInt(v) => Some(f64::from(v)),
+        _ => property.to_f32_lossy().map(f64::from),
+    }
+}
+
 /// A colour channel in `[0, 1]`: integers are scaled by their type's maximum.
 fn unit(property: &Property) -> Option<f32> {
     Some(match *property {
@@ -93,7 +104,7 @@ fn unit(property: &Property) -> Option<f32> {
     })
 }
 
-/// A mesh to write; one normal, if there are any, and one sRGB colour per vertex.
+/// A mesh to write, metres; one normal, if there are any, and one sRGB colour per vertex.
 pub struct PlyMesh<'a> {
     /// Vertices.
     pub positions: &'a [[f32; 3]],
@@ -162,6 +173,7 @@ pub fn write_ply(path: &Path, mesh: &PlyMesh) -> io::Result<()> {
     let indices = ("vertex_indices", PropertyType::List(ScalarType::UChar, ScalarType::Int));
     let face = element("face", mesh.faces.len(), &[indices]);
     let mut header = Header { encoding: Encoding::BinaryLittleEndian, ..Header::new() };
+    header.comments.push("units: m".into());
     header.elements.add(vertex.clone());
     header.elements.add(face.clone());
 

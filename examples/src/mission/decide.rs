@@ -6,6 +6,7 @@ use paint_net::{Deconvolution, Feedback, Image, Observer, OnSurface, PaintProble
 
 use super::error::MissionError;
 use super::footprints::Footprints;
+use super::ink_ceiling::ceiling;
 use super::nozzle::kernel;
 use super::settings::{MissionSettings, PainterChoice};
 use crate::appearance::Appearance;
@@ -26,17 +27,12 @@ pub(super) fn decide(
     settings: &MissionSettings,
 ) -> Result<Vec<Painting>, MissionError> {
     let stage = Stage::start("decide");
-    // What nobody can spray must not pull paint from its neighbours; a little weight keeps overspray off it.
-    let mut weight = Image::from_fn(coverage.width(), coverage.height(), |x, y| {
-        let share = if paintable[y * coverage.width() + x] { 1.0 } else { UNPAINTABLE_WEIGHT };
-        share * coverage.at(x, y)
-    });
-    for (ghost, _) in surface.beyond_seams.ghosts() {
-        weight.data_mut()[*ghost] = 0.0;
-    }
+    let weight = weights(coverage, surface, paintable);
+    let ceiling = ceiling(wanted, surface);
     let kernel = kernel(settings)?;
     let problem = PaintProblem::new(wanted)
         .with_weight(&weight)
+        .with_ceiling(&ceiling)
         .with_paintable(paintable)
         .with_ghosts(&surface.beyond_seams)
         .with_kernel(&kernel)
@@ -64,6 +60,18 @@ pub(super) fn decide(
     }
     stage.done(&format!("{} layer(s), {sprays} sprays", layers.len()));
     Ok(layers)
+}
+
+/// How much each texel matters: what nobody can spray must not pull paint from its neighbours, but a little weight keeps overspray off it.
+pub(super) fn weights(coverage: &Image, surface: &PaintSurface, paintable: &[bool]) -> Image {
+    let mut weight = Image::from_fn(coverage.width(), coverage.height(), |x, y| {
+        let share = if paintable[y * coverage.width() + x] { 1.0 } else { UNPAINTABLE_WEIGHT };
+        share * coverage.at(x, y)
+    });
+    for (ghost, _) in surface.beyond_seams.ghosts() {
+        weight.data_mut()[*ghost] = 0.0;
+    }
+    weight
 }
 
 /// One painting, or one for each layer.

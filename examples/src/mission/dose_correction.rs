@@ -2,18 +2,23 @@
 //! and every spray stands upright.
 
 use nalgebra::{Point3, UnitVector3};
-use paint_net::painters::{DoseCorrection, DoseFootprint};
+use paint_net::PaintProblem;
+use paint_net::painters::{DoseCorrection, DoseFootprint, SurfaceFootprint, VolumeFit};
 use paint_planner::{Plan, Target};
 use paint_sim::{Film, Shot};
 
-use super::decide::UNPAINTABLE_WEIGHT;
+use super::decide::{UNPAINTABLE_WEIGHT, weights};
 use super::error::MissionError;
-use super::nozzle::spray_model;
+use super::ink_ceiling::ceiling;
+use super::nozzle::{kernel, spray_model};
 use super::painting_task::PaintingTask;
 use crate::appearance::UNIT_THICKNESS;
 
 /// Updates of the volumes.
 const ROUNDS: usize = 300;
+/// Weight of the differences from the painter's volumes against the ink, and steps of that fit.
+const PROXIMITY: f64 = 0.05;
+const ITERATIONS: usize = 40;
 /// Largest dose in medians of all: what would run is left thin instead, and shows in the report.
 const MAX_DOSE: f64 = 4.0;
 /// Shares do not depend on it, m³.
@@ -35,22 +40,11 @@ pub(super) fn correct_doses(flights: &mut [(&mut [Target], &Plan)], task: &Paint
     };
     let weight: Vec<f64> = texels.iter().enumerate().map(weigh).collect();
     let film = Film::new(texels)?;
-
-    // Where the valve is open: flight, target, and how far it is to the next one.
-    let mut sprayed: Vec<(usize, usize, f64)> = Vec::new();
-    let mut shots: Vec<Shot> = Vec::new();
-    for (flight, (targets, plan)) in flights.iter().enumerate() {
-        for k in (0..targets.len().saturating_sub(1)).filter(|&k| plan.flow[k] > 0.0) {
-            sprayed.push((flight, k, (targets[k + 1].point - targets[k].point).norm()));
-            shots.extend(SHARES.map(|share| shot_between(targets, plan, k, share)));
-        }
-    }
-    let settings = &task.settings;
-    let shares = film.shares(&shots, &spray_model(settings), &task.surface.world, settings.threads)?;
-    let thickness =
-        |&(place, share): &(u32, f64)| (place, share / SHARES.len() as f64 / film.texels()[place as usize].area);
+    let sprayed = sprayed(flights);
+    let thickness = |&(place, share): &(u32, f64)| (place, share / film.texels()[place as usize].area);
+    let shares = shares(flights, &sprayed, &film, task)?;
     let footprints: Vec<DoseFootprint> =
-        shares.chunks(SHARES.len()).map(|of_target| of_target.iter().flatten().map(thickness).collect()).collect();
+        shares.iter().map(|of_target| of_target.iter().map(thickness).collect()).collect();
 
     let doses: Vec<f64> = sprayed.iter().map(|&(flight, k, _)| flights[flight].0[k].dose).collect();
     let mut volumes: Vec<f64> = sprayed.iter().zip(&doses).map(|((_, _, length), dose)| dose * length).collect();
@@ -63,6 +57,74 @@ pub(super) fn correct_doses(flights: &mut [(&mut [Target], &Plan)], task: &Paint
     }
     let places = (0..wanted.len()).filter(|&place| in_reach(place) && wanted[place] > 0.0);
     Ok(deviation_over_mean(places.map(|place| (expected[place] / wanted[place], film.texels()[place].area))))
+}
+
+/// Changes the doses so that the ink on the surface comes as near the wanted one as it can from where the nozzle is planned to be: it stands
+/// nearer than painters think where a joint ends, and its spots are smaller and darker there.
+pub(super) fn correct_ink(flights: &mut [(&mut [Target], &Plan)], task: &PaintingTask) -> Result<(), MissionError> {
+    let PaintingTask { settings, surface, appearance, .. } = task;
+    let (texels, pixels) = surface.film_texels();
+    let film = Film::new(texels)?;
+    let sprayed = sprayed(flights);
+    let kernel = kernel(settings)?;
+    let area = kernel.mass() * settings.texel * settings.texel;
+    let depth = |&(place, share): &(u32, f64)| {
+        (pixels[place as usize] as u32, (share * area / film.texels()[place as usize].area) as f32)
+    };
+    let shares = shares(flights, &sprayed, &film, task)?;
+    let footprints: Vec<SurfaceFootprint> =
+        shares.iter().map(|of_target| of_target.iter().map(depth).collect()).collect();
+
+    let (weight, ceiling) = (weights(&task.coverage, surface, &task.in_reach), ceiling(&task.wanted, surface));
+    let problem = PaintProblem::new(&task.wanted)
+        .with_weight(&weight)
+        .with_ceiling(&ceiling)
+        .with_ghosts(&surface.beyond_seams)
+        .with_kernel(&kernel)
+        .with_saturation(appearance.ink())
+        .with_limits(&settings.limits);
+    let heeded = task.layers.first().and_then(|layer| layer.missing_weight.as_ref());
+    let problem = PaintProblem { missing_weight: heeded, ..problem };
+    let unit = area * UNIT_THICKNESS;
+    let mut volumes: Vec<f64> =
+        sprayed.iter().map(|&(flight, k, length)| flights[flight].0[k].dose * length / unit).collect();
+    let fit = VolumeFit {
+        problem: &problem,
+        footprints: &footprints,
+        proximity: PROXIMITY,
+        iterations: ITERATIONS,
+        tolerance: 1e-4,
+    };
+    fit.solve(&mut volumes, &mut |_| ())?;
+    for (&(flight, k, length), volume) in sprayed.iter().zip(volumes) {
+        flights[flight].0[k].dose = volume * unit / length;
+    }
+    Ok(())
+}
+
+/// Where the valve is open: flight, target, and how far it is to the next one.
+fn sprayed(flights: &[(&mut [Target], &Plan)]) -> Vec<(usize, usize, f64)> {
+    let of_flight = |(flight, (targets, plan)): (usize, &(&mut [Target], &Plan))| {
+        let open = (0..targets.len().saturating_sub(1)).filter(|&k| plan.flow[k] > 0.0);
+        open.map(|k| (flight, k, (targets[k + 1].point - targets[k].point).norm())).collect::<Vec<_>>()
+    };
+    flights.iter().enumerate().flat_map(of_flight).collect()
+}
+
+/// Which share of what is sprayed after each target falls on which place of a film.
+fn shares(
+    flights: &[(&mut [Target], &Plan)],
+    sprayed: &[(usize, usize, f64)],
+    film: &Film,
+    task: &PaintingTask,
+) -> Result<Vec<Vec<(u32, f64)>>, MissionError> {
+    let shot = |&(flight, k, _): &(usize, usize, f64)| {
+        SHARES.map(|share| shot_between(flights[flight].0, flights[flight].1, k, share))
+    };
+    let shots: Vec<Shot> = sprayed.iter().flat_map(shot).collect();
+    let shares = film.shares(&shots, &spray_model(&task.settings), &task.surface.world, task.settings.threads)?;
+    let part = |&(place, share): &(u32, f64)| (place, share / SHARES.len() as f64);
+    Ok(shares.chunks(SHARES.len()).map(|of_target| of_target.iter().flatten().map(part).collect()).collect())
 }
 
 /// The spray from a share of the way between a target and the next.

@@ -6,6 +6,7 @@ use paint_sim::flight::FlightLog;
 use paint_sim::flight::{FlightSample, FlightStatistics};
 use paint_sim::spray::QUANTUM;
 
+use super::darker_than_wanted;
 use super::error::MissionError;
 use super::fly::LayerFlight;
 use super::inspect::Inspection;
@@ -60,6 +61,7 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         smoothing_normal_deviation_mean_m: deviations.smoothing_mean,
         unreachable_normal_share: deviations.unreachable,
         reach_share: mission.task.share_in_reach(),
+        reach_needs: mission.task.reach_needs,
         lost_to_constraints_share: mission.task.share_lost_to_constraints(),
         unreachable_paint_share: mission.share_out_of_reach(),
         targets: mission.outcomes.targets,
@@ -115,6 +117,7 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         film_estimate_error_share: mission.looked.map(|looked| looked.film_error),
         film_estimate_seen_share: mission.looked.map(|looked| looked.film_seen),
         paint_missing_kg: mission.looked.map(|looked| looked.missing * DENSITY),
+        darker_than_wanted_share: darker_than_wanted::share(mission),
         seam_length_m: mission.task.surface.disk().seam_length(),
         ssim_painted_at_seams: seams.as_ref().map(|s| s.near),
         ssim_painted_off_seams: seams.as_ref().map(|s| s.far),

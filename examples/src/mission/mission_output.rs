@@ -193,6 +193,7 @@ fn save_textured_mesh(mission: &Mission, folder: &Path) -> Result<(), MissionErr
     let mesh = TexturedMesh {
         positions: mission.task.surface.disk().positions(),
         faces: mission.task.surface.disk().faces(),
+        origin: [0.0; 3],
         uv: mission.task.surface.chart.uv().iter().map(|uv| [uv[0] / extent[0], uv[1] / extent[1]]).collect(),
         texture: with_gutter(width, height, (0..width * height).map(pixel).collect()),
     };

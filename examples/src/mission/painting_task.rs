@@ -11,6 +11,7 @@ use ptu_kinematics::Ptu;
 use super::decide::decide;
 use super::error::MissionError;
 use super::reach::{texels_in_reach, texels_lost_to_constraints};
+use super::reach_needs::reach_needs;
 use super::settings::MissionSettings;
 use super::true_surface::moved_onto;
 use crate::adapters::Robot;
@@ -20,12 +21,16 @@ use crate::mesh_io::TriangleMesh;
 use crate::progress::Stage;
 use crate::recording::PaintStyle;
 use crate::region::Scene;
+use crate::report::ReachNeeds;
+use crate::say;
 use crate::surface::PaintSurface;
 
 /// Flight logs are most of what a mission keeps: the built-in wall of 10.6 m² takes 200 MB with texels of 1.25 cm.
 const BYTES_PER_SQUARE_METRE: f64 = 2e7;
 /// As many times as much with layers, on the same wall.
 const LAYERED: f64 = 2.2;
+/// Share of the surface out of reach from which on it is looked into what would reach it.
+const MANY: f64 = 0.03;
 /// The size of a texel for that, metres.
 const USUAL_TEXEL: f64 = 0.0125;
 
@@ -44,6 +49,8 @@ pub struct PaintingTask {
     pub(super) in_reach: Vec<bool>,
     /// Which texels it could serve but for keep-out volumes and tether.
     pub(super) lost_to_constraints: Vec<bool>,
+    /// What the texels out of reach would need, where they are many.
+    pub(super) reach_needs: Option<ReachNeeds>,
     pub(super) layers: Vec<Painting>,
     pub(super) started: Instant,
     /// What is really there, if `surface` is a map of it.
@@ -88,6 +95,11 @@ impl PaintingTask {
             lost => format!(", {lost:.1} % lost to keep-out volumes and tether"),
         };
         stage.done(&format!("{:.1} % of the surface{constrained}", percent(&in_reach)));
+        let bare = 1.0 - share(&in_reach, &coverage);
+        let needs = (bare > MANY).then(|| reach_needs(&in_reach, &surface, &settings)).transpose()?;
+        if let Some(needs) = &needs {
+            say!("{}", needs.describe());
+        }
         let layers = decide(&wanted, &coverage, &surface, &in_reach, &appearance, &settings)?;
         let name = name.to_string();
         Ok(Self {
@@ -100,6 +112,7 @@ impl PaintingTask {
             coverage,
             in_reach,
             lost_to_constraints: lost,
+            reach_needs: needs,
             layers,
             started,
             truth: None,

@@ -10,7 +10,7 @@ use paint_planner::{Error, OptimalPlanner, Plan, Planner, Settings, Surface, Tar
 use std::cell::Cell;
 use std::time::Instant;
 
-use super::dose_correction::correct_doses;
+use super::dose_correction::{correct_doses, correct_ink};
 use super::error::MissionError;
 use super::nozzle::{kernel, sprays};
 use super::painting_task::PaintingTask;
@@ -90,6 +90,12 @@ pub(super) fn plan(task: &PaintingTask) -> Result<Planned, MissionError> {
                 "coat: doses corrected on the surface, expected to be even within {:.1} % (deviation over mean)",
                 100.0 * expected
             );
+            planner.replan(first, &mut mission)?;
+        } else if layers.len() == 1 {
+            let flights = &mut mission.flights[first..];
+            let mut parts: Vec<(&mut [Target], &Plan)> =
+                flights.iter_mut().map(|f| (f.route.targets.as_mut_slice(), &f.plan)).collect();
+            correct_ink(&mut parts, task)?;
             planner.replan(first, &mut mission)?;
         }
     }

@@ -17,7 +17,7 @@ use super::shading::{shading, texel_at};
 use super::view::{camera, view};
 use crate::appearance::DENSITY;
 use crate::progress::Stage;
-use crate::report::save_figures;
+use crate::report::{ReachNeeds, save_figures};
 
 /// Albedo of what the robot cannot paint, mixed in by half.
 const OUT_OF_REACH: [f32; 3] = [0.75, 0.05, 0.35];
@@ -37,6 +37,9 @@ pub struct Preview {
     pub surface_area_m2: f64,
     /// Share of it that the robot can paint.
     pub reach_share: f64,
+    /// What the rest would need, where it is more than 3 % of the surface.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub reach_needs: Option<ReachNeeds>,
     /// Share of it that the robot could paint but for keep-out volumes and tether.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lost_to_constraints_share: Option<f64>,
@@ -109,6 +112,7 @@ fn estimate(task: &PaintingTask) -> Result<Preview, MissionError> {
         seed: task.settings.seed,
         surface_area_m2: task.surface.disk().area(),
         reach_share: task.share_in_reach(),
+        reach_needs: task.reach_needs,
         lost_to_constraints_share: task.share_lost_to_constraints(),
         wanted_in_reach_share: wanted(&task.coverage_in_reach()) / wanted(&task.coverage).max(f64::MIN_POSITIVE),
         paint_kg: volume * DENSITY,

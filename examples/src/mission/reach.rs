@@ -2,6 +2,7 @@
 
 use paint_planner::constraints::FlightConstraints;
 use paint_planner::mission::reachable_texels;
+use ptu_kinematics::KinematicChain;
 
 use super::error::MissionError;
 use super::settings::MissionSettings;
@@ -10,9 +11,9 @@ use crate::surface::PaintSurface;
 
 /// Whether the robot can paint each texel, row by row: it lies on the surface, its chart is not stretched beyond use there, and
 /// some pose of the robot serves it.
-pub(super) fn texels_in_reach(
+pub(super) fn texels_in_reach<C: KinematicChain>(
     surface: &PaintSurface,
-    robot: &Robot,
+    robot: &Robot<C>,
     settings: &MissionSettings,
 ) -> Result<Vec<bool>, MissionError> {
     let occupied: Vec<bool> = surface.coverage().data().iter().map(|&covered| covered > 0.0).collect();

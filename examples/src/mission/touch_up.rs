@@ -66,9 +66,11 @@ pub(super) fn touch_up(
         Err(MissionError::NothingToPaint(_)) => return Ok((Vec::new(), figures)),
         other => other?,
     };
+    // Doses are fitted to what is wanted of these flights.
     let first = std::mem::replace(&mut task.layers, layers);
+    let whole = std::mem::replace(&mut task.wanted, wanted);
     let flown = plan(task).and_then(|planned| fly(planned, task, flights));
-    task.layers = first;
+    (task.layers, task.wanted) = (first, whole);
     Ok((flown?, figures))
 }
 

@@ -18,6 +18,8 @@ const OTHER_SIDES: [[f64; 2]; 8] =
     [[-0.45, 0.28], [0.0, 0.28], [0.9, 0.28], [-0.9, 0.28], [0.0, 0.8], [0.6, 0.8], [-0.6, 0.8], [0.0, 0.0]];
 /// Places on the surface that are asked whether they are seen.
 const LOOKED_AT: usize = 500;
+/// Depth before the eye below which nothing can be drawn, metres.
+const NEAREST: f64 = 0.1;
 /// Hits as near as this to a place are the place itself, metres.
 const OWN_SURFACE: f64 = 0.01;
 
@@ -85,25 +87,53 @@ fn visible(task: &PaintingTask, camera: &Camera) -> usize {
 fn fitted(points: &[Point3<f64>], centre: Vector3<f64>, direction: Vector3<f64>) -> Result<Camera, MissionError> {
     let (low, high) = extent(points);
     let up = Vector3::z();
-    // Step back until everything fits, then look at the middle of what is seen.
-    let (mut target, mut distance) = (centre, 0.8 * (high - low).norm());
-    for _ in 0..40 {
-        let eye = Point3::from(target + direction * distance);
-        let camera = Camera::looking_at(&eye, &Point3::from(target), &up, 0.8, VIEW)?;
+    let look = |target: Vector3<f64>, distance: f64| {
+        Camera::looking_at(&Point3::from(target + direction * distance), &Point3::from(target), &up, 0.8, VIEW)
+    };
+    // Left, right, top and bottom of what is seen, tangents of angles; `None` where something lies beside the eye or behind it.
+    let bounds = |camera: &Camera| {
         let seen = points.iter().map(|p| camera.world_from_camera.inverse_transform_point(p));
         let (mut left, mut right, mut top, mut bottom) = (f64::MAX, f64::MIN, f64::MAX, f64::MIN);
         for p in seen {
-            let (u, v) = (p.x / p.z.max(0.1), p.y / p.z.max(0.1));
+            if p.z < NEAREST {
+                return None;
+            }
+            let (u, v) = (p.x / p.z, p.y / p.z);
             (left, right) = (left.min(u), right.max(u));
             (top, bottom) = (top.min(v), bottom.max(v));
         }
+        Some([left, right, top, bottom])
+    };
+    // Step back until everything fits, then look at the middle of what is seen.
+    let (mut target, mut distance) = (centre, 0.8 * (high - low).norm());
+    for _ in 0..40 {
+        let camera = look(target, distance)?;
+        let Some([left, right, top, bottom]) = bounds(&camera) else {
+            distance *= 1.5;
+            continue;
+        };
         let (half_width, half_height) = (camera.cx / camera.fx, camera.cy / camera.fy);
         let fill = ((right - left) / (2.0 * half_width)).max((bottom - top) / (2.0 * half_height));
         let shift = Vector3::new(0.5 * (left + right), 0.5 * (top + bottom), 0.0) * distance;
         target += camera.world_from_camera.rotation * shift;
         distance *= 1.0 + 0.7 * (fill / FILL - 1.0).clamp(-0.5, 0.5);
     }
-    Ok(Camera::looking_at(&Point3::from(target + direction * distance), &Point3::from(target), &up, 0.8, VIEW)?)
+    // A deep surface may not have settled: nothing of it is cut off.
+    let mut camera = look(target, distance)?;
+    let whole = |camera: &Camera| {
+        let (half_width, half_height) = (camera.cx / camera.fx, camera.cy / camera.fy);
+        bounds(camera).is_some_and(|[left, right, top, bottom]| {
+            left.abs().max(right.abs()) <= half_width && top.abs().max(bottom.abs()) <= half_height
+        })
+    };
+    for _ in 0..40 {
+        if whole(&camera) {
+            break;
+        }
+        distance *= 1.1;
+        camera = look(target, distance)?;
+    }
+    Ok(camera)
 }
 
 pub(super) fn picture_of(frame: &Frame) -> Rgb {

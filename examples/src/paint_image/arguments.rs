@@ -27,6 +27,9 @@ pub struct Arguments {
     /// Paint in colour with these glazes; the painter is then the one of colours
     #[arg(long)]
     pub(super) palette: Option<Glazes>,
+    /// Memory that painting may need by estimate, GiB
+    #[arg(long, value_name = "GIB", default_value_t = 8.0)]
+    pub(super) memory_gib: f64,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/paint-image")]
     pub(super) out: PathBuf,

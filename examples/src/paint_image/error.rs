@@ -16,6 +16,23 @@ pub enum PaintImageError {
         /// Why.
         why: String,
     },
+    /// It would need too much memory.
+    #[error(
+        "{path}: {width} x {height} pixels need about {need_gib:.1} GiB, more than {limit_gib} GiB: make it smaller (a spot of spray covers many \
+         pixels) or raise --memory-gib"
+    )]
+    TooLarge {
+        /// The file.
+        path: String,
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Estimate.
+        need_gib: f64,
+        /// What is allowed.
+        limit_gib: f64,
+    },
     /// The painter refused.
     #[error("{0}")]
     Painter(#[from] Error),

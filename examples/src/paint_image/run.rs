@@ -14,7 +14,7 @@ use super::colour::{Glazes, paint_colours, read_picture, save_colours};
 use super::compare::{compare, table};
 use super::equal_sprays::{equal_sprays, print_equal_sprays};
 use super::error::PaintImageError;
-use super::files::{pictures_in, read_network};
+use super::files::{check_memory, pictures_in, read_network};
 use super::ink::read_ink;
 use super::job::{Job, PainterKind};
 use super::training::{ThesisTrainingRun, TrainingImages, TrainingRun, train_painter, train_thesis};
@@ -29,12 +29,13 @@ pub fn run(arguments: &Arguments) -> Result<(), PaintImageError> {
         None => {
             // The command line requires it.
             let image = arguments.image.clone().unwrap_or_default();
-            let Arguments { painter, palette, out, nozzle, .. } = arguments;
+            let Arguments { painter, palette, out, nozzle, memory_gib, .. } = arguments;
             if palette.is_some() {
                 only_for_one_paint(*painter, nozzle)?;
             }
             let job = job(painter.unwrap_or(PainterKind::Feedback), nozzle)?;
             for file in pictures_in(&image)? {
+                check_memory(&file, palette.is_some(), *memory_gib)?;
                 let out = if image.is_dir() { out.join(file.file_name().unwrap_or_default()) } else { out.clone() };
                 match palette {
                     None => paint(&file, &job, &out)?,

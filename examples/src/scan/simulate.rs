@@ -61,8 +61,8 @@ pub(super) fn simulate(simulation: &Simulation) -> Result<usize, AnyError> {
             png(&name("color.png"), rgb, [width, height], ColorType::Rgb8.into())?;
         }
         let rows = world_from_camera.to_homogeneous();
-        let text: String = rows.row_iter().map(|r| format!("{} {} {} {}\n", r[0], r[1], r[2], r[3])).collect();
-        write(&name("pose.txt"), text.as_bytes())?;
+        let text: Vec<String> = rows.row_iter().map(|r| format!("{} {} {} {}", r[0], r[1], r[2], r[3])).collect();
+        write(&name("pose.txt"), text.join("\n").as_bytes())?;
     }
     stage.done(&format!("{count} frames"));
     Ok(count)

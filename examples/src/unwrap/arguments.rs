@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Parser;
 
+use crate::mesh_frame::MeshScale;
 use crate::region::Region;
 
 /// Lays a mesh out in metres: cuts it into few charts that are hardly stretched, packs them onto pages, writes OBJ, glTF, a
@@ -11,18 +12,19 @@ use crate::region::Region;
 #[derive(Debug, Clone, Parser)]
 #[command(version, after_help = "Example:\n  unwrap --mesh statue.obj --texel 0.0125 --out out/statue")]
 pub struct Arguments {
-    /// Surface, OBJ, glTF (.glb, .gltf), PLY or OFF
+    /// Surface, OBJ, glTF (.glb, .gltf), PLY, STL or OFF
     #[arg(long, value_name = "FILE")]
     pub mesh: PathBuf,
     /// Side of a texel on the surface, metres
     #[arg(long, value_name = "METRES", default_value_t = 0.0125)]
     pub texel: f64,
-    /// Metres per unit of the mesh file
-    #[arg(long, default_value_t = 1.0)]
-    pub scale: f64,
-    /// Stretch that 99 % of the faces may not exceed
-    #[arg(long, default_value_t = 1.15)]
-    pub max_stretch: f64,
+    /// Metres per unit of the mesh file, or m, cm, mm, ft, in, or fit (the longest side becomes 3 m) [default: what the file says, else what its
+    /// size tells]
+    #[arg(long, value_name = "METRES|UNIT|fit", allow_negative_numbers = true)]
+    pub scale: Option<MeshScale>,
+    /// Stretch that 99 % of the faces may not exceed [default: 1.15, relaxed up to 2 where that saves more seams than it stretches]
+    #[arg(long)]
+    pub max_stretch: Option<f64>,
     /// Stretch that no face may exceed
     #[arg(long, default_value_t = 1.5)]
     pub worst_stretch: f64,

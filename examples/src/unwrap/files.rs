@@ -12,14 +12,23 @@ use crate::pictures::write_png;
 use crate::textured_mesh::TexturedMesh;
 use crate::whole_file;
 
+/// Unit and up axis of the mesh file.
+#[derive(Clone, Copy)]
+pub(super) struct FileFrame {
+    /// Metres per unit.
+    pub(super) scale: f64,
+    /// The axis that points up.
+    pub(super) up: UpAxis,
+}
+
 /// Writes `atlas.obj`, `atlas.mtl`, `atlas_texture[_N].png` and `atlas[_N].glb`.
 ///
 /// The OBJ keeps every vertex of the mesh at its place and number (`mesh` in the unit of its file); texture coordinates have
-/// indices of their own. Faces that were left out are not in it. `up` points up in the file; y in a glTF.
+/// indices of their own. Faces that were left out are not in it. glTF has metres and y up.
 pub(super) fn save(
     atlas: &Atlas,
     mesh: &TriangleMesh,
-    up: UpAxis,
+    frame: FileFrame,
     textures: &[image::RgbImage],
     folder: &Path,
 ) -> Result<(), UnwrapError> {
@@ -31,15 +40,16 @@ pub(super) fn save(
         let path = folder.join(format!("atlas_texture{}.png", suffix(page)));
         write_png(&path, texture, texture.dimensions().into()).map_err(|e| UnwrapError::unwritable(&path, &e))?;
         let mut part = page_mesh(atlas, page);
-        if up == UpAxis::Y {
-            part.positions.iter_mut().for_each(|[_, y, z]| (*y, *z) = (-*z, *y));
+        let mut origin = mesh.origin.map(|c| c * frame.scale);
+        if frame.up == UpAxis::Y {
+            part.positions.iter_mut().chain([&mut origin]).for_each(|[_, y, z]| (*y, *z) = (-*z, *y));
         }
-        let textured =
-            TexturedMesh { positions: &part.positions, faces: &part.faces, uv: part.uv, texture: texture.clone() };
+        let PageMesh { positions, faces, uv } = &part;
+        let textured = TexturedMesh { positions, faces, origin, uv: uv.clone(), texture: texture.clone() };
         let glb = textured.glb().map_err(|e| UnwrapError::unwritable(folder, &e))?;
         write(format!("atlas{}.glb", suffix(page)), &glb)?;
     }
-    write("atlas.obj".into(), obj(atlas, mesh).as_bytes())?;
+    write("atlas.obj".into(), obj(atlas, mesh, frame).as_bytes())?;
     write("atlas.mtl".into(), mtl(atlas.pages().len()).as_bytes())
 }
 
@@ -57,10 +67,21 @@ fn mtl(pages: usize) -> String {
     text
 }
 
-fn obj(atlas: &Atlas, mesh: &TriangleMesh) -> String {
-    let mut text = String::from("mtllib atlas.mtl\n");
-    for [x, y, z] in &mesh.positions {
-        let _ = writeln!(text, "v {x} {y} {z}");
+fn obj(atlas: &Atlas, mesh: &TriangleMesh, frame: FileFrame) -> String {
+    let mut text = String::new();
+    if let UpAxis::X | UpAxis::Y | UpAxis::Z = frame.up {
+        let _ = writeln!(text, "# unit {} m, {} up", frame.scale, frame.up.name());
+    }
+    text.push_str("mtllib atlas.mtl\n");
+    let digits = digits(mesh);
+    for position in &mesh.positions {
+        let [x, y, z] = position;
+        if let Some(digits) = digits {
+            let [x, y, z] = [0, 1, 2].map(|c| f64::from(position[c]) + mesh.origin[c]);
+            let _ = writeln!(text, "v {x:.digits$} {y:.digits$} {z:.digits$}");
+        } else {
+            let _ = writeln!(text, "v {x} {y} {z}");
+        }
     }
     let mut first = Vec::with_capacity(atlas.charts().len());
     let mut count = 1;
@@ -90,6 +111,14 @@ fn obj(atlas: &Atlas, mesh: &TriangleMesh) -> String {
         }
     }
     text
+}
+
+/// Decimals that a mesh far from the origin of its coordinates has in single precision; `None` near it, where its numbers are the shortest that read
+/// back the same.
+fn digits(mesh: &TriangleMesh) -> Option<usize> {
+    let (low, high) = mesh.bounds();
+    let longest = (0..3).map(|c| f64::from(high[c] - low[c])).fold(f64::MIN_POSITIVE, f64::max);
+    (mesh.origin != [0.0; 3]).then(|| (7.0 - longest.log10().ceil()).clamp(0.0, 12.0) as usize)
 }
 
 struct FaceOfInput {

@@ -12,10 +12,11 @@ use uv_param::{Atlas, AtlasSettings, unwrap_atlas};
 
 use super::arguments::Arguments;
 use super::error::UnwrapError;
-use super::files::{save, suffix};
+use super::files::{FileFrame, save, suffix};
 use super::page_picture::{CarriedPictures, carried_over, checkerboard};
 use super::previous;
 use super::report::UnwrapReport;
+use crate::mesh_frame::{Subject, scale_of, up_of};
 use crate::mesh_io::{TriangleMesh, read_mesh};
 use crate::mesh_placement::UpAxis;
 use crate::picture_file::open_upright;
@@ -25,20 +26,19 @@ use crate::report::save_figures;
 use crate::run_folder;
 use crate::{result, say};
 
+/// Stretch up to which the bound is relaxed: a spot of spray is an ellipse of two to one there, on a rough surface many to a spot.
+const RELAXED_STRETCH: f64 = 2.0;
+
 /// Does what the command line asks for.
 ///
 /// # Errors
 /// [`UnwrapError`]; after [`UnwrapError::Broken`] the files are there, but not to be used.
 pub fn run(arguments: &Arguments) -> Result<(), UnwrapError> {
     let (wall, folder) = (Instant::now(), arguments.out.as_path());
-    if !(arguments.scale.is_finite() && arguments.scale > 0.0) {
-        let must_be = "a scale must be positive and finite";
-        return Err(UnwrapError::Option { option: "--scale", value: arguments.scale, must_be });
-    }
     let mut mesh = read_mesh(&arguments.mesh)?;
+    let frame = frame(&mesh, arguments)?;
     if let Some(region) = &arguments.region {
-        let finest = arguments.texel / arguments.scale;
-        let scene = region.split(mesh, finest, arguments.scale);
+        let scene = region.split(mesh, arguments.texel / frame.scale, frame.scale);
         mesh = scene.map_err(|source| UnwrapError::Region { path: arguments.mesh.clone(), source })?.canvas;
     }
     let seams = arguments.seams.as_deref().map(read_seams).transpose()?.unwrap_or_default();
@@ -47,10 +47,11 @@ pub fn run(arguments: &Arguments) -> Result<(), UnwrapError> {
     let earlier = arguments.previous.as_deref().map(previous::read).transpose()?;
     run_folder::begin(folder, "unwrap").map_err(|e| UnwrapError::unwritable(folder, &e))?;
 
-    let (atlas, update, cpu_s) = unwrap(&mesh, &seams, arguments, earlier.as_ref())?;
+    let (atlas, update, cpu_s) = unwrap(&mesh, frame.scale, &seams, arguments, earlier.as_ref())?;
 
     let stage = Stage::start("write");
-    let bounds = [arguments.max_stretch, arguments.worst_stretch];
+    let charts = chart_settings(arguments);
+    let bounds = [charts.max_stretch, charts.worst_stretch];
     // Half of the gutter belongs to each of two charts; a texel more does no harm where there is room.
     let pages = PageTexels::of(&atlas, arguments.gutter.div_ceil(2).max(1));
     let mut textures = Vec::with_capacity(pages.len());
@@ -63,7 +64,7 @@ pub fn run(arguments: &Arguments) -> Result<(), UnwrapError> {
             _ => board,
         });
     }
-    save(&atlas, &mesh, UpAxis::of_file(&arguments.mesh), &textures, folder)?;
+    save(&atlas, &mesh, frame, &textures, folder)?;
     previous::write(&atlas.layout(), folder)?;
     let report = UnwrapReport::new(&atlas, update, wall.elapsed().as_secs_f64(), cpu_s);
     save_figures(&report, folder)?;
@@ -75,21 +76,39 @@ pub fn run(arguments: &Arguments) -> Result<(), UnwrapError> {
     Ok(())
 }
 
+/// Where to cut: as asked, or relaxed where that saves seams.
+fn chart_settings(arguments: &Arguments) -> ChartSettings {
+    let usual = ChartSettings { worst_stretch: arguments.worst_stretch, up: arguments.up, ..ChartSettings::default() };
+    match arguments.max_stretch {
+        Some(max_stretch) => ChartSettings { max_stretch, ..usual },
+        None => ChartSettings { relaxed_stretch: Some(RELAXED_STRETCH), ..usual },
+    }
+}
+
+/// Unit and up axis of the file, which are told.
+fn frame(mesh: &TriangleMesh, arguments: &Arguments) -> Result<FileFrame, UnwrapError> {
+    let subject = if arguments.region.is_some() { Subject::Place } else { Subject::Object };
+    let (scale, scale_said) = scale_of(mesh, arguments.scale, subject);
+    if !(scale.is_finite() && scale > 0.0) {
+        let must_be = "a scale must be positive and finite";
+        return Err(UnwrapError::Option { option: "--scale", value: scale, must_be });
+    }
+    let (up, up_said) = up_of(mesh, &arguments.mesh, arguments.up.map(UpAxis::of_direction));
+    say!("{}: {} faces, {scale_said}, {up_said}", arguments.mesh.display(), mesh.faces.len());
+    Ok(FileFrame { scale, up })
+}
+
 /// The atlas, what became of an earlier one, and the processor time that it took, seconds.
 fn unwrap(
     mesh: &TriangleMesh,
+    scale: f64,
     seams: &[[u32; 2]],
     arguments: &Arguments,
     earlier: Option<&AtlasLayout>,
 ) -> Result<(Atlas, Option<AtlasUpdate>, f64), UnwrapError> {
-    let positions: Vec<[f64; 3]> = mesh.positions.iter().map(|p| p.map(|c| f64::from(c) * arguments.scale)).collect();
+    let positions: Vec<[f64; 3]> = mesh.positions.iter().map(|p| p.map(|c| f64::from(c) * scale)).collect();
     let settings = AtlasSettings {
-        charts: ChartSettings {
-            max_stretch: arguments.max_stretch,
-            worst_stretch: arguments.worst_stretch,
-            up: arguments.up,
-            ..ChartSettings::default()
-        },
+        charts: chart_settings(arguments),
         pack: PackSettings {
             texel_m: arguments.texel,
             gutter: arguments.gutter,

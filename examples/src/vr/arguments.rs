@@ -8,6 +8,7 @@ use clap::{Parser, ValueEnum};
 use super::hand::Way;
 use super::settings::{Timing, VrSettings};
 use super::watch::WatchSource;
+use crate::mesh_frame::MeshScale;
 use crate::mesh_placement::UpAxis;
 use crate::socket_address;
 
@@ -19,16 +20,18 @@ use crate::socket_address;
     after_help = "Examples:\n  vr\n  vr --mesh bust.obj --offline --out out/bust\n  vr --listen 0.0.0.0:8090\n  vr --watch 127.0.0.1:8765\n  vr --watch out/paintcopter/mission.mcap\n  vr --replay out/vr/session.mcap --out out/again"
 )]
 pub struct Arguments {
-    /// Surface to paint, OBJ, PLY or OFF; the built-in rock wall if not given
+    /// Surface to paint, OBJ, glTF, PLY, STL or OFF; the built-in rock wall if not given
     #[arg(long, value_name = "FILE", conflicts_with_all = ["map", "replay"])]
     mesh: Option<PathBuf>,
     /// A stored map of `scan` instead of a mesh
     #[arg(long, value_name = "FILE", conflicts_with = "replay")]
     map: Option<PathBuf>,
-    /// Metres per unit of the mesh file [default: the longest side becomes 3 m]
-    #[arg(long, requires = "mesh")]
-    scale: Option<f64>,
-    /// Axis of the mesh file that points up [default: y for OBJ, z otherwise]
+    /// Metres per unit of the mesh file, or m, cm, mm, ft, in, or fit (the longest side becomes 3 m) [default: what the file says, else what its
+    /// size tells]
+    #[arg(long, requires = "mesh", value_name = "METRES|UNIT|fit")]
+    scale: Option<MeshScale>,
+    /// Axis of the mesh file that points up [default: what the file or its base says, else y for OBJ and OFF, z for
+    /// PLY and STL]
     #[arg(long, requires = "mesh")]
     up: Option<Up>,
     /// Size of a texel, metres

@@ -168,6 +168,7 @@ pub(super) fn patch(picture: u8, patch: &Patch) -> Vec<u8> {
 mod tests {
     use super::super::settings::VrSettings;
     use super::*;
+    use crate::mesh_frame::MeshScale;
 
     #[test]
     fn a_surface_is_as_it_is_described() {
@@ -175,8 +176,12 @@ mod tests {
         std::fs::create_dir_all(&folder).unwrap();
         let mesh = folder.join("wall.obj");
         std::fs::write(&mesh, "v 0 1 1\nv 0 -1 1\nv 0 -1 2\nv 0 1 2\nf 1 2 3\nf 1 3 4\n").unwrap();
-        let world =
-            VrWorld::new(&VrSettings { mesh: Some(mesh), scale: Some(1.0), texel: 0.02, ..VrSettings::default() });
+        let world = VrWorld::new(&VrSettings {
+            mesh: Some(mesh),
+            scale: Some(MeshScale::Factor(1.0)),
+            texel: 0.02,
+            ..VrSettings::default()
+        });
         std::fs::remove_dir_all(&folder).unwrap();
         let world = world.unwrap();
         let bytes = surface(&world);

@@ -10,6 +10,7 @@ use paint_sim::SprayModel;
 use serde::{Deserialize, Serialize};
 
 use super::error::VrError;
+use crate::mesh_frame::MeshScale;
 use crate::mesh_placement::UpAxis;
 use crate::mission::MissionSettings;
 
@@ -29,10 +30,10 @@ pub enum Timing {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct VrSettings {
-    /// Surface, OBJ, PLY or OFF; the built-in rock wall if there is none.
+    /// Surface, OBJ, glTF, PLY, STL or OFF; the built-in rock wall if there is none.
     pub mesh: Option<PathBuf>,
-    /// Metres per unit of the mesh file.
-    pub scale: Option<f64>,
+    /// Metres per unit of the mesh file, or the unit.
+    pub scale: Option<MeshScale>,
     /// Axis of the mesh file that points up.
     pub up: Option<UpAxis>,
     /// A stored map of `scan` instead of a mesh file.

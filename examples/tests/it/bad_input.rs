@@ -33,7 +33,9 @@ fn meshes_that_are_no_surface_are_refused() {
         refused(&s, &["--mesh", &file], &[&[name], words].concat());
     };
     refused(&s, &["--mesh", "no/such/file.obj"], &["no/such/file.obj", "cannot be read"]);
-    mesh("picture.stl", "solid", &["extension", ".obj"]);
+    mesh("picture.fbx", "solid", &["extension", ".obj"]);
+    mesh("nothing.stl", "solid", &["no triangle"]);
+    mesh("line.stl", "solid\nvertex 0 0 0\nvertex 1 0 0\nendloop\n", &["line 4", "three vertices"]);
     mesh("empty.obj", "", &["no triangle"]);
     mesh("points.off", "OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n", &["no triangle"]);
     mesh("index.obj", &format!("{SQUARE}f 1 2 9\n"), &["line 5", "9"]);
@@ -71,7 +73,7 @@ fn a_surface_that_no_gun_reaches_is_refused() {
     let text = "OFF\n6 4 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 -0.05\n0 1 -0.05\n3 0 1 2\n3 0 2 3\n3 1 4 5\n3 1 5 2\n";
     s.write("sheet.off", text);
     let sheet = s.path("sheet.off");
-    refused(&s, &["--mesh", &sheet], &["sheet.off", "cannot be sprayed"]);
+    refused(&s, &["--mesh", &sheet, "--up", "z"], &["sheet.off", "cannot be sprayed"]);
 }
 
 #[test]

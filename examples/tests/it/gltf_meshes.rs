@@ -159,8 +159,8 @@ fn nodes_may_nest_as_deep_as_they_like() {
     nodes.push(json!({"mesh": 0}));
     d.json["nodes"] = nodes.into();
     let mesh = read(&d.glb()).unwrap();
-    let low = mesh.bounds().0;
-    assert!((f64::from(low[1]) - 200.0).abs() < 1e-3, "{low:?}");
+    let low = mesh.bounds_in_file().0;
+    assert!((low[1] - 200.0).abs() < 1e-3, "{low:?}");
 }
 
 #[test]
@@ -324,7 +324,7 @@ fn the_main_job_wants_what_the_file_shows() {
     s.write("square.glb", Document::square().glb());
     let file = paintcopter::mission_file::MissionFile {
         mesh: Some(s.0.join("square.glb")),
-        scale: Some(1.0),
+        scale: Some(paintcopter::mesh_frame::MeshScale::Factor(1.0)),
         ..Default::default()
     };
     let mesh = file.read_surface().unwrap().1.canvas;

@@ -5,8 +5,10 @@ mod area_fill;
 mod bad_input;
 #[cfg(feature = "vio")]
 mod bags;
+mod choices;
 #[cfg(all(feature = "programs", feature = "log"))]
 mod command_lines;
+mod designs_across_seams;
 mod five_joint_arm;
 mod flight_constraints;
 mod flight_times;
@@ -24,6 +26,7 @@ mod line_art;
 mod live;
 #[cfg(feature = "scan")]
 mod mcap_recordings;
+mod mesh_frames;
 mod meshes;
 mod mission;
 mod mission_file;

@@ -63,7 +63,7 @@ fn one_square_in_every_format() {
     let colours = [[255, 0, 51]; 4];
     write_ply(&path, &PlyMesh { positions: &positions, normals: None, colours: &colours, faces: &faces }).unwrap();
     let bytes = std::fs::read(&path).unwrap();
-    let header = "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+    let header = "ply\nformat binary_little_endian 1.0\ncomment units: m\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
                   property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 2\n\
                   property list uchar int vertex_indices\nend_header\n";
     assert!(bytes.starts_with(header.as_bytes()) && bytes.len() == header.len() + 4 * 15 + 2 * 13);

@@ -4,6 +4,7 @@ use std::process::Command;
 
 use paint_planner::timing::TimingPolicy;
 use paint_sim::paint::PaintName;
+use paintcopter::mesh_frame::MeshScale;
 use paintcopter::mesh_placement::UpAxis;
 use paintcopter::mission::{MissionSettings, PainterChoice};
 use paintcopter::mission_file::MissionFile;
@@ -32,7 +33,7 @@ fn a_mission_keeps_all_that_it_was_told() {
     settings.servo.dead_time = 0.07;
     let told = MissionFile {
         mesh: Some(s.0.join("a.obj")),
-        scale: Some(2.5),
+        scale: Some(MeshScale::Factor(2.5)),
         up: Some(UpAxis::X),
         design: Some(s.path("b.png")),
         fill: Some(2e-5),
@@ -106,7 +107,7 @@ fn a_run_can_be_repeated_from_the_file_that_it_leaves() {
     // What the line says comes before what the file says, and the file before the defaults.
     let (code, text) = run(&["--mission", "elsewhere/mission.toml", "--seed", "4"], "three");
     let third = MissionFile::read(&s.0.join("three/mission.toml")).unwrap();
-    assert_eq!((code, third.settings.seed, third.scale), (Some(0), 4, Some(1.5)), "{text}");
+    assert_eq!((code, third.settings.seed, third.scale), (Some(0), 4, Some(MeshScale::Factor(1.5))), "{text}");
     // The folder can be moved with what it names.
     std::fs::create_dir(s.0.join("moved")).unwrap();
     for name in ["wall.obj", "two"] {

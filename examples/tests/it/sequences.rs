@@ -218,7 +218,11 @@ fn a_simulated_recording_is_mapped() {
         scan(&["--sequence", &recording, "--poses", poses, "--voxel", "0.03", "--out", &out]);
         let report = std::fs::read_to_string(format!("{out}/report.json")).unwrap();
         let report: serde_json::Value = serde_json::from_str(&report).unwrap();
-        assert_eq!((&report["fused_share"], &report["frames_skipped"]), (&1.0.into(), &0.into()), "{poses}: {report:#}");
+        assert_eq!(
+            (&report["fused_share"], &report["frames_skipped"]),
+            (&1.0.into(), &0.into()),
+            "{poses}: {report:#}"
+        );
         if poses == "tracked" {
             assert!(report["ate_se3_rmse_m"].as_f64().unwrap() < 0.01, "{report:#}");
         }
