@@ -33,6 +33,8 @@ impl Server {
     /// The status line of a request.
     pub(crate) fn get(&self, path: &str, headers: &str) -> String {
         let mut stream = TcpStream::connect(&self.address).unwrap();
+        // A connection that becomes a session, though it should not, stays open.
+        stream.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
         let host = if headers.contains("Host:") { String::new() } else { format!("Host: {}\r\n", self.address) };
         stream.write_all(format!("GET {path} HTTP/1.1\r\n{host}{headers}\r\n").as_bytes()).unwrap();
         let mut answer = Vec::new();
