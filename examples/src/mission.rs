@@ -10,7 +10,6 @@ mod figures;
 mod flight_sensors;
 mod fly;
 mod footprints;
-mod ink_ceiling;
 mod inspect;
 mod look;
 mod mission_output;

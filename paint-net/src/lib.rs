@@ -55,6 +55,7 @@ mod ideal;
 mod image;
 pub mod metrics;
 pub mod model;
+mod nearby;
 pub mod network;
 mod optimise;
 mod painter;

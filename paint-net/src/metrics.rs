@@ -1,5 +1,9 @@
 //! How alike two pictures are. Inks in `[0, 1]`; the first picture is clipped there first.
 
+mod darker;
+
+pub use darker::darker_than_wanted;
+
 use crate::error::Error;
 use crate::image::Image;
 

@@ -3,6 +3,7 @@
 mod calibration_doubt;
 mod calibration_evidence;
 mod calibration_watch;
+mod evaluation;
 pub(crate) mod frames;
 mod outcome;
 mod pair_order;
@@ -13,6 +14,7 @@ mod summary;
 
 pub use calibration_doubt::{CalibrationDoubt, CalibrationPart};
 pub use calibration_watch::check_calibration;
+pub use evaluation::{AlignedPair, GroundTruth, PoseError, RunEvaluation, evaluate_run};
 pub use frames::{Picture, RecordedFrame, pair_by_stamp};
 pub use outcome::{Event, ImageOutcome, Loss, LossReason, SkipReason, SkippedImage};
 pub use recorded::run_recording;

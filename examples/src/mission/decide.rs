@@ -2,11 +2,11 @@
 
 use paint_net::painters::{AreaFill, Centrelines, Layered, MatchingPursuit};
 use paint_net::path::Stroke;
+use paint_net::problem::ink_ceiling;
 use paint_net::{Deconvolution, Feedback, Image, Observer, OnSurface, PaintProblem, Painter, Painting};
 
 use super::error::MissionError;
 use super::footprints::Footprints;
-use super::ink_ceiling::ceiling;
 use super::nozzle::kernel;
 use super::settings::{MissionSettings, PainterChoice};
 use crate::appearance::Appearance;
@@ -28,7 +28,7 @@ pub(super) fn decide(
 ) -> Result<Vec<Painting>, MissionError> {
     let stage = Stage::start("decide");
     let weight = weights(coverage, surface, paintable);
-    let ceiling = ceiling(wanted, surface);
+    let ceiling = ceiling(wanted, surface)?;
     let kernel = kernel(settings)?;
     let problem = PaintProblem::new(wanted)
         .with_weight(&weight)
@@ -60,6 +60,13 @@ pub(super) fn decide(
     }
     stage.done(&format!("{} layer(s), {sprays} sprays", layers.len()));
     Ok(layers)
+}
+
+/// Ink that no texel shall exceed.
+pub(super) fn ceiling(wanted: &Image, surface: &PaintSurface) -> Result<Image, paint_net::Error> {
+    let (texels, pixels) = surface.film_texels();
+    let points: Vec<[f64; 3]> = texels.iter().map(|texel| texel.point.coords.into()).collect();
+    ink_ceiling(wanted, &points, &pixels)
 }
 
 /// How much each texel matters: what nobody can spray must not pull paint from its neighbours, but a little weight keeps overspray off it.

@@ -7,9 +7,8 @@ use paint_net::painters::{DoseCorrection, DoseFootprint, SurfaceFootprint, Volum
 use paint_planner::{Plan, Target};
 use paint_sim::{Film, Shot};
 
-use super::decide::{UNPAINTABLE_WEIGHT, weights};
+use super::decide::{UNPAINTABLE_WEIGHT, ceiling, weights};
 use super::error::MissionError;
-use super::ink_ceiling::ceiling;
 use super::nozzle::{kernel, spray_model};
 use super::painting_task::PaintingTask;
 use crate::appearance::UNIT_THICKNESS;
@@ -75,7 +74,7 @@ pub(super) fn correct_ink(flights: &mut [(&mut [Target], &Plan)], task: &Paintin
     let footprints: Vec<SurfaceFootprint> =
         shares.iter().map(|of_target| of_target.iter().map(depth).collect()).collect();
 
-    let (weight, ceiling) = (weights(&task.coverage, surface, &task.in_reach), ceiling(&task.wanted, surface));
+    let (weight, ceiling) = (weights(&task.coverage, surface, &task.in_reach), ceiling(&task.wanted, surface)?);
     let problem = PaintProblem::new(&task.wanted)
         .with_weight(&weight)
         .with_ceiling(&ceiling)

@@ -117,7 +117,7 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         film_estimate_error_share: mission.looked.map(|looked| looked.film_error),
         film_estimate_seen_share: mission.looked.map(|looked| looked.film_seen),
         paint_missing_kg: mission.looked.map(|looked| looked.missing * DENSITY),
-        darker_than_wanted_share: darker_than_wanted::share(mission),
+        darker_than_wanted_share: darker_than_wanted::share(mission)?,
         seam_length_m: mission.task.surface.disk().seam_length(),
         ssim_painted_at_seams: seams.as_ref().map(|s| s.near),
         ssim_painted_off_seams: seams.as_ref().map(|s| s.far),

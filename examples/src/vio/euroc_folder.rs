@@ -7,9 +7,10 @@ use vio_ekf::format::calibration;
 use vio_ekf::format::calibration::{CameraCalibration, ImuCalibration};
 use vio_ekf::format::{asl, euroc, tum};
 use vio_ekf::nalgebra::Isometry3;
+use vio_ekf::run::GroundTruth;
 
 use super::error::{VioError, read_text};
-use super::recording::{GroundTruth, Images, Recording};
+use super::recording::{Images, Recording};
 
 /// Files that take the place of those in the folder.
 #[derive(Debug, Clone, Default)]

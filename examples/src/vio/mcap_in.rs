@@ -14,13 +14,14 @@ use vio_ekf::camera::Distortion;
 use vio_ekf::format::calibration;
 use vio_ekf::format::calibration::{CameraCalibration, ImuCalibration};
 use vio_ekf::nalgebra::Isometry3;
+use vio_ekf::run::GroundTruth;
 use vio_ekf::{Camera, Imu, ImuNoise, Stamp, Trajectory};
 
 use super::error::{VioError, read_text};
 use super::euroc_folder::{Overrides, read_truth};
 use super::grey_image::GreyImage;
 use super::mcap_out::NOISE_SCHEMA;
-use super::recording::{GroundTruth, Images, Recording, SecondCamera};
+use super::recording::{Images, Recording, SecondCamera};
 use crate::mcap_messages::cdr;
 use crate::mcap_messages::fields::{isometry, isometry_of, stamp};
 use crate::mcap_messages::images::{self, image_header};

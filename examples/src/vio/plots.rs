@@ -5,10 +5,9 @@ use std::path::Path;
 use vio_ekf::Trajectory;
 use vio_ekf::lie::so3;
 use vio_ekf::nalgebra::Vector3;
-use vio_ekf::run::{Estimate, Run};
+use vio_ekf::run::{AlignedPair, Estimate, PoseError, Run, RunEvaluation};
 
-use super::evaluation::AlignedPair;
-use super::{RunEvaluation, VioError};
+use super::VioError;
 use crate::pictures::{Panel, PathPanel, save_curves, save_paths};
 
 /// Points of a curve at most: more cannot be seen.
@@ -86,9 +85,9 @@ fn save_errors(evaluation: &RunEvaluation, path: &Path) -> Result<(), VioError> 
 
 fn save_sigmas(evaluation: &RunEvaluation, path: &Path) -> Result<(), VioError> {
     let Some(first) = evaluation.errors.first().map(|error| error.stamp) else { return Ok(()) };
-    let panel = |label, factor: f64, pick: &dyn Fn(&super::evaluation::PoseError) -> (f64, f64)| {
+    let panel = |label, factor: f64, pick: &dyn Fn(&PoseError) -> (f64, f64)| {
         let curve = |value: &dyn Fn(f64, f64) -> f64| -> Curve {
-            let at = |error: &super::evaluation::PoseError| {
+            let at = |error: &PoseError| {
                 let (error_value, sigma) = pick(error);
                 (error.stamp.secs_since(first), factor * value(error_value, sigma))
             };

@@ -4,9 +4,8 @@ use std::path::PathBuf;
 
 use vio_ekf::format::calibration::{CameraCalibration, ImuCalibration};
 use vio_ekf::imu_check::{ImuValidation, validate_samples};
-use vio_ekf::nalgebra::Vector3;
-use vio_ekf::run::CalibrationDoubt;
-use vio_ekf::{Camera, Imu, Stamp, Trajectory};
+use vio_ekf::run::{CalibrationDoubt, GroundTruth};
+use vio_ekf::{Camera, Imu, Stamp};
 
 use super::error::VioError;
 use super::grey_image::GreyImage;
@@ -43,15 +42,6 @@ pub struct SecondCamera {
     pub camera: Camera,
     /// Its images, by rising stamps.
     pub images: Images,
-}
-
-/// The true motion of the body, as far as it was recorded.
-#[derive(Debug, Clone)]
-pub struct GroundTruth {
-    /// Poses.
-    pub trajectory: Trajectory,
-    /// Velocity in world axes, m/s, one per pose; empty if it was not recorded.
-    pub velocities_in_world: Vec<Vector3<f64>>,
 }
 
 /// Where the images are.

@@ -7,13 +7,13 @@ use serde::Serialize;
 use vio_ekf::format::tum;
 use vio_ekf::imu_check::ImuValidation;
 use vio_ekf::lie::so3;
-use vio_ekf::run::{Loss, Run};
+use vio_ekf::run::{Loss, Run, RunEvaluation};
 use vio_ekf::{Stamp, Trajectory};
 
 use super::error::write_file;
 use super::run::TimedRun;
 use super::states::states_csv;
-use super::{Recording, RunEvaluation, VioError, plots};
+use super::{Recording, VioError, plots};
 use crate::report::save_figures;
 
 /// What `report.json` of a run holds. Flat, SI units in the names; every number is finite. What needs the truth is absent

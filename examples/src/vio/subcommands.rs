@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use vio_ekf::format::calibration::read_kalibr_cameras;
 use vio_ekf::imu_check::{ImuValidation, check_axes_with_images, diagnose_axes};
 use vio_ekf::lie::so3;
-use vio_ekf::run::{CalibrationDoubt, CalibrationPart, Loss, RecordedFrame, Run, check_calibration};
+use vio_ekf::run::{CalibrationDoubt, CalibrationPart, Loss, RecordedFrame, Run, check_calibration, evaluate_run};
 use vio_ekf::sim::{Scenario, SimulatedCamera};
 use vio_ekf::tune::TuneSettings;
 use vio_ekf::{Camera, Settings};
@@ -16,7 +16,7 @@ use super::inertial::dead_reckon;
 use super::run::filter;
 use super::{
     CompareSettings, Flight, GreyImage, Overrides, Recording, RunSettings, SimulationSettings, TimedRun, Tuning,
-    TuningData, VioError, VioReport, camera_frames, compare, evaluate_run, open_euroc, open_euroc_stereo, open_mcap,
+    TuningData, VioError, VioReport, camera_frames, compare, open_euroc, open_euroc_stereo, open_mcap,
     open_mcap_stereo, run, save, simulate, tune_noise,
 };
 use crate::interruption::{self, Finishing};

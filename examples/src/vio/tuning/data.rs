@@ -1,11 +1,11 @@
 //! What noise settings are tuned on, and what a point costs there.
 
+use vio_ekf::run::evaluate_run;
 use vio_ekf::sim::ImuModel;
 use vio_ekf::tune::{NoisePoint, PointRecording, Score, with_factors};
 use vio_ekf::{Camera, ImuNoise, Settings};
 
 use crate::vio::error::VioError;
-use crate::vio::evaluation::evaluate_run;
 use crate::vio::recording::Recording;
 use crate::vio::run::{RunSettings, run};
 use crate::vio::simulate::{Flight, flight_spline};

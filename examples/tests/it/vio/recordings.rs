@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use paintcopter::vio::{
-    Images, Overrides, Recording, RunSettings, SimulationSettings, camera_frames, evaluate_run, open_euroc,
-    open_euroc_stereo, open_mcap, open_mcap_stereo, run, simulate,
+    Images, Overrides, Recording, RunSettings, SimulationSettings, camera_frames, open_euroc, open_euroc_stereo,
+    open_mcap, open_mcap_stereo, run, simulate,
 };
+use vio_ekf::run::evaluate_run;
 use vio_ekf::sim::SimulatedCamera;
 use vio_ekf::{Camera, Stamp};
 

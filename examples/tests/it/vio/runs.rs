@@ -5,7 +5,8 @@ use std::io::Read as _;
 use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
-use paintcopter::vio::{Images, Overrides, RunSettings, evaluate_run, open_euroc, run, simulate};
+use paintcopter::vio::{Images, Overrides, RunSettings, open_euroc, run, simulate};
+use vio_ekf::run::evaluate_run;
 
 use super::fixtures::{columns, copy, edit, flight, images, run_folder, vio};
 use crate::recorded::recorded;

@@ -1,21 +1,31 @@
-//! The estimate against the truth.
+//! A run against the truth: its errors, and whether they are those that its covariances claim.
 
-use vio_ekf::eval::{
+use nalgebra::{Isometry3, Matrix3, Vector3};
+
+use crate::error::Error;
+use crate::eval::{
     Alignment, Association, PairsFrom, RpeSettings, Span, Stats, Tolerance, apply, ate, heading_onto, rpe,
 };
-use vio_ekf::lie::so3;
-use vio_ekf::nalgebra::{Isometry3, Matrix3, Vector3};
-use vio_ekf::run::Run;
-use vio_ekf::{Error, Odometry, Stamp};
-
-use super::error::VioError;
-use super::recording::GroundTruth;
+use crate::inertial::Odometry;
+use crate::lie::so3;
+use crate::run::Run;
+use crate::stamp::Stamp;
+use crate::trajectory::Trajectory;
 
 /// Standard deviations that a recorded truth has of its own, added to those that the filter claims: 1 mm, 0.1 degrees,
 /// 3 mm/s. Ours; without them the first poses, which the filter knows exactly by definition, would decide.
 const GROUND_TRUTH_SIGMA: [f64; 3] = [1e-3, 1.7e-3, 3e-3];
 /// Path length of the relative error, m.
 const RPE_LENGTH: f64 = 10.0;
+
+/// The true motion of the body, as far as it was recorded.
+#[derive(Debug, Clone)]
+pub struct GroundTruth {
+    /// Poses.
+    pub trajectory: Trajectory,
+    /// Velocity in world axes, m/s, one per pose; empty if it was not recorded.
+    pub velocities_in_world: Vec<Vector3<f64>>,
+}
 
 /// Time, true pose, and estimated pose moved into the truth's world.
 pub type AlignedPair = (Stamp, Isometry3<f64>, Isometry3<f64>);
@@ -61,8 +71,8 @@ pub struct PoseError {
 /// Evaluates a run. `None` if truth and estimate have no time in common.
 ///
 /// # Errors
-/// [`VioError::Library`] if the poses cannot be aligned.
-pub fn evaluate_run(run: &Run, truth: &GroundTruth) -> Result<Option<RunEvaluation>, VioError> {
+/// Poses that cannot be aligned.
+pub fn evaluate_run(run: &Run, truth: &GroundTruth) -> Result<Option<RunEvaluation>, Error> {
     let association = Association { interpolate: true, ..Association::default() };
     let settings = RpeSettings {
         span: Span::Metres(RPE_LENGTH),
@@ -85,7 +95,7 @@ pub fn evaluate_run(run: &Run, truth: &GroundTruth) -> Result<Option<RunEvaluati
         match rpe(&pairs.reference, &pairs.estimate, &settings) {
             Ok(rpe) => drift.extend(rpe.translation_errors),
             Err(Error::NoPairs { .. }) => {}
-            Err(error) => return Err(error.into()),
+            Err(error) => return Err(error),
         }
         covered += pairs.stamps[pairs.stamps.len() - 1].secs_since(pairs.stamps[0]);
         aligned.extend(pairs.stamps.iter().zip(&pairs.reference).zip(onto).map(|((&s, &g), e)| (s, g, e)));
@@ -131,7 +141,7 @@ fn position_error(
     reference: &[Isometry3<f64>],
     estimate: &[Isometry3<f64>],
     alignment: Alignment,
-) -> Result<(f64, Vec<Isometry3<f64>>), VioError> {
+) -> Result<(f64, Vec<Isometry3<f64>>), Error> {
     match ate(reference, estimate, alignment) {
         Ok(result) => Ok((result.position.rmse, apply(&result.reference_from_estimate, estimate))),
         Err(Error::Degenerate { .. }) => {
@@ -146,7 +156,7 @@ fn position_error(
             let mean = reference.iter().zip(&moved).map(square).sum::<f64>() / reference.len() as f64;
             Ok((mean.sqrt(), moved))
         }
-        Err(error) => Err(error.into()),
+        Err(error) => Err(error),
     }
 }
 
@@ -207,8 +217,7 @@ fn velocity_at(truth: &GroundTruth, stamp: Stamp) -> Option<Vector3<f64>> {
 
 #[cfg(test)]
 mod tests {
-    use vio_ekf::nalgebra::{Matrix3, UnitQuaternion};
-    use vio_ekf::{Stamp, Trajectory};
+    use nalgebra::UnitQuaternion;
 
     use super::*;
 
@@ -227,7 +236,7 @@ mod tests {
         let filter_from_truth = Isometry3::from_parts([5.0, -3.0, 1.0].into(), turned(0.7));
         let (position_error, velocity_error) = (Vector3::new(0.02, -0.03, 0.01), Vector3::new(0.1, 0.02, -0.3));
         let (position_sigma, velocity_sigma) = (Vector3::new(0.01, 0.02, 0.04), Vector3::new(0.05, 0.04, 0.2));
-        let mut covariance = vio_ekf::inertial::CoreCovariance::identity() * 1e-4;
+        let mut covariance = crate::inertial::CoreCovariance::identity() * 1e-4;
         covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::from_diagonal(&position_sigma.map(|s| s * s)));
         covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&Matrix3::from_diagonal(&velocity_sigma.map(|s| s * s)));
         let odometry: Vec<Odometry> = [0, 1, 2]
