@@ -58,6 +58,7 @@ mod settings;
 mod trace;
 #[cfg(feature = "urdf")]
 mod urdf;
+mod urdf_writer;
 
 pub use aim::Aim;
 pub use angle::wrap;

@@ -14,6 +14,7 @@ use crate::settings::PtuSettings;
 use crate::trace::event;
 #[cfg(feature = "urdf")]
 use crate::trace::span;
+use crate::urdf_writer;
 
 /// `∂(p, h) / ∂(r, ψ, θ₁, θ₂)`: rows are tip (3) and direction (3), columns position (3), heading, pan, tilt.
 pub type Jacobian = Matrix6<f64>;
@@ -50,6 +51,13 @@ impl Ptu {
         span!("from_urdf");
         let (settings, signs) = read_settings(text, nozzle_link)?;
         Ok((Self::new(settings)?, signs))
+    }
+
+    /// This chain as URDF, for viewers and planners: links `body`, `pan`, `tilt` and `nozzle`, whose x axis is the spray axis; joints with the
+    /// names of the links that they move, angles as here. `max_rate`: of the servos, rad/s.
+    #[must_use]
+    pub fn to_urdf(&self, robot: &str, max_rate: f64) -> String {
+        urdf_writer::write(&self.settings, robot, max_rate)
     }
 
     /// The settings it was made from.

@@ -77,3 +77,21 @@ fn says_what_is_wrong() {
     let cycle = PLAIN.replace("<parent link=\"base_link\"/>", "<parent link=\"nozzle\"/>");
     assert!(message(&cycle, "nozzle").contains("loop"));
 }
+
+/// Written, read by the reader of robots of others, it is the same robot.
+#[test]
+fn what_is_written_is_the_same_robot() {
+    let settings = PtuSettings {
+        body_from_pan_axis: Vector3::new(0.41, -0.02, 0.07),
+        pan_from_tilt_axis: Vector3::new(0.03, 0.01, 0.04),
+        tilt_from_tip: Vector3::new(0.12, 0.015, -0.02),
+        gun_pitch: 0.15,
+        pan_limits: Range { min: -1.1, max: 1.4 },
+        tilt_limits: Range { min: -0.5, max: 0.8 },
+    };
+    let written = Ptu::new(settings).unwrap().to_urdf("R2 & \"friends\" <3", 6.0);
+    let (read, signs) = Ptu::from_urdf(&written, "nozzle").unwrap();
+    assert_eq!((signs.pan, signs.tilt), (1.0, 1.0));
+    assert!((read.settings().gun_pitch - 0.15).abs() < 1e-12);
+    assert_eq!(read.settings(), &PtuSettings { gun_pitch: read.settings().gun_pitch, ..settings });
+}
