@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use paint_net::painters::LayerPlanning;
 use paint_planner::timing::TimingPolicy;
 
 use crate::mesh_frame::MeshScale;
@@ -66,9 +67,10 @@ pub struct MissionArguments {
     /// Who decides the sprays [default: feedback; fill with --fill]
     #[arg(long)]
     painter: Option<PainterName>,
-    /// Paint in layers by intensity, a flight for each [default: one flight whose flow carries the picture]
-    #[arg(long)]
-    layers: bool,
+    /// Paint in layers by intensity, a flight for each: decided together, or one after the other as in the thesis [default: one flight whose
+    /// flow carries the picture]
+    #[arg(long, value_enum, num_args = 0..=1, default_missing_value = "joint", value_name = "PLANNING")]
+    layers: Option<LayersName>,
     #[command(flatten)]
     nozzle: Nozzle,
     /// Seed of the world, the wind and the errors [default: 1]
@@ -247,6 +249,23 @@ enum PainterName {
     Pursuit,
 }
 
+#[derive(Clone, Copy, ValueEnum)]
+enum LayersName {
+    /// One plan, cut at the layers' thresholds
+    Joint,
+    /// Each layer by itself, on what lies there already, as the thesis does
+    Sequential,
+}
+
+impl LayersName {
+    fn planning(self) -> LayerPlanning {
+        match self {
+            Self::Joint => LayerPlanning::Joint,
+            Self::Sequential => LayerPlanning::Sequential,
+        }
+    }
+}
+
 impl From<PainterName> for PainterChoice {
     fn from(name: PainterName) -> Self {
         match name {
@@ -279,7 +298,7 @@ impl MissionArguments {
         settings.seed = self.seed.unwrap_or(settings.seed);
         settings.threads = self.threads.map_or(settings.threads, usize::from);
         settings.memory_gib = self.memory_gib.unwrap_or(settings.memory_gib);
-        settings.layered |= self.layers;
+        settings.layered = self.layers.map(LayersName::planning).or(settings.layered);
         settings.look |= self.look;
         settings.localisation = self.localisation.map_or(settings.localisation, LocalisationChoice::from);
         settings.painter = self.painter.map_or(settings.painter, PainterChoice::from);

@@ -1,6 +1,6 @@
 //! What to spray: the wanted picture into layers.
 
-use paint_net::painters::{AreaFill, Centrelines, Layered, MatchingPursuit};
+use paint_net::painters::{AreaFill, Centrelines, LayerPlanning, Layered, MatchingPursuit};
 use paint_net::path::Stroke;
 use paint_net::problem::ink_ceiling;
 use paint_net::{Deconvolution, Feedback, Image, Observer, OnSurface, PaintProblem, Painter, Painting};
@@ -84,12 +84,12 @@ pub(super) fn weights(coverage: &Image, surface: &PaintSurface, paintable: &[boo
 /// One painting, or one for each layer.
 fn paint<P: Painter>(
     painter: P,
-    layered: bool,
+    layered: Option<LayerPlanning>,
     problem: &PaintProblem,
     progress: &mut dyn Observer,
 ) -> Result<Vec<Painting>, paint_net::Error> {
-    if layered {
-        Layered::new(painter).paint_observed(problem, progress).map(Painting::into_layers)
+    if let Some(planning) = layered {
+        Layered { planning, ..Layered::new(painter) }.paint_observed(problem, progress).map(Painting::into_layers)
     } else {
         painter.paint_observed(problem, progress).map(|painting| vec![painting])
     }

@@ -208,7 +208,7 @@ fn check_memory(mesh: &TriangleMesh, settings: &MissionSettings) -> Result<(), M
     let area = mesh.area();
     // The way over the surface grows with the rows, its texels with their square.
     let finer = USUAL_TEXEL / settings.texel;
-    let layers = if settings.layered { LAYERED } else { 1.0 };
+    let layers = if settings.layered.is_some() { LAYERED } else { 1.0 };
     let need_gib = layers * area * BYTES_PER_SQUARE_METRE * finer.max(finer * finer) / f64::from(1 << 30);
     if need_gib > settings.memory_gib {
         return Err(MissionError::TooLarge { area, need_gib, limit_gib: settings.memory_gib });

@@ -1,6 +1,7 @@
 //! What a mission can be told.
 
 use paint_net::Limits;
+use paint_net::painters::LayerPlanning;
 use paint_planner::constraints::FlightConstraints;
 use paint_planner::nozzle::NozzleSettings;
 use ptu_kinematics::{PtuSettings, ServoSettings};
@@ -21,7 +22,7 @@ pub struct MissionSettings {
     /// Worker threads. Not part of a mission file: results do not depend on it.
     #[serde(skip)]
     pub threads: usize,
-    /// Size of a texel, metres. Default 1.25 cm (Paper IV, section 4).
+    /// Size of a texel, metres. Default 1.25 cm (Paper IV, section 3.1).
     pub texel: f64,
     /// Standard deviation of a spray spot at the stand-off, metres. Default 2.5 cm (Paper IV: half the radius of 5 cm).
     pub spot: f64,
@@ -37,7 +38,7 @@ pub struct MissionSettings {
     pub painter: PainterChoice,
     /// Paint in layers by intensity, the base coat first, each with a flight of its own (Paper IV, section 3.3). Default: one
     /// flight whose flow carries the picture, which is faster at an equal result (ours).
-    pub layered: bool,
+    pub layered: Option<LayerPlanning>,
     /// Where sprays may lie, in texels. Default: 2 along a row, rows 3 apart (ours).
     pub limits: Limits,
     /// The planner's settings.
@@ -126,7 +127,7 @@ impl Default for MissionSettings {
             placement: PicturePlacement::default(),
             viewpoint: None,
             painter: PainterChoice::Feedback,
-            layered: false,
+            layered: None,
             limits: Limits { spray_spacing: 2, row_spacing: 3, min_volume: 0.01, ..Limits::default() },
             planner: planner_settings(),
             ptu: PtuSettings::default(),

@@ -2,6 +2,7 @@
 
 use std::process::Command;
 
+use paint_net::painters::LayerPlanning;
 use paint_planner::timing::TimingPolicy;
 use paint_sim::paint::PaintName;
 use paintcopter::mesh_frame::MeshScale;
@@ -22,7 +23,7 @@ fn a_mission_keeps_all_that_it_was_told() {
         seed: 7,
         texel: 0.02,
         painter: PainterChoice::Pursuit,
-        layered: true,
+        layered: Some(LayerPlanning::Joint),
         viewpoint: Some(Viewpoint::Point([-1.0, 0.25, 2.0].into())),
         placement: PicturePlacement { mode: PlacementMode::Tile, rotate: 0.1, offset: [0.2, -0.3], size: Some(0.4) },
         ..MissionSettings::default()

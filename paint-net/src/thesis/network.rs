@@ -14,10 +14,13 @@ use crate::procedural::lattice;
 pub struct Network {
     architecture: Architecture,
     parameters: Vec<f32>,
+    gated: bool,
 }
 
 /// Tensor that holds the sizes.
 const SIZES: &str = "shape";
+/// Tensor that says whether the stop variable scales the volume; a file without it is of a network whose does.
+const GATED: &str = "gated";
 /// First bias of the volume: many small sprays rather than a black wall, whose derivatives vanish (ours).
 const FIRST_VOLUME: f32 = -2.0;
 /// First biases of READ's log variance and log spacing: wide filters over the middle of the picture, which see enough to learn
@@ -43,7 +46,7 @@ impl Network {
         parameters[layers.spray.bias().start + 3] = FIRST_VOLUME;
         let window = layers.attention.bias().start + 2;
         parameters[window..window + 2].copy_from_slice(&FIRST_WINDOW);
-        Ok(Self { architecture, parameters })
+        Ok(Self { architecture, parameters, gated: true })
     }
 
     /// From the bytes of a safetensors file.
@@ -70,7 +73,8 @@ impl Network {
         };
         architecture.check()?;
         let parameters = layout::parameters(tensors, &architecture.parts())?;
-        Ok(Self { architecture, parameters })
+        let gated = tensors.iter().find(|tensor| tensor.name == GATED).is_none_or(|tensor| tensor.values != [0.0]);
+        Ok(Self { architecture, parameters, gated })
     }
 
     /// The bytes of a safetensors file, with notes for whoever reads it.
@@ -82,7 +86,11 @@ impl Network {
         let s = &self.architecture;
         let sizes = [s.side, s.steps, s.latent, s.hidden, s.read].map(|n| n as f32);
         let sizes = [&sizes[..], &[s.radius as f32, s.stop as f32, s.paint as f32]].concat();
-        let mut tensors = vec![Tensor { name: SIZES.into(), shape: vec![sizes.len()], values: sizes }];
+        let gated = vec![f32::from(u8::from(self.gated))];
+        let mut tensors = vec![
+            Tensor { name: SIZES.into(), shape: vec![sizes.len()], values: sizes },
+            Tensor { name: GATED.into(), shape: vec![1], values: gated },
+        ];
         tensors.extend(layout::tensors(&self.parameters, self.architecture.parts()));
         tensors
     }
@@ -90,6 +98,11 @@ impl Network {
     /// Sizes.
     pub fn architecture(&self) -> Architecture {
         self.architecture
+    }
+
+    /// Whether the stop variable scales the volume of every spray, as it did in training ([`Objective::gated`](super::Objective)).
+    pub fn is_gated(&self) -> bool {
+        self.gated
     }
 
     /// Number of weights.
@@ -120,13 +133,13 @@ impl Network {
             before.extend(there.data().iter().map(|&v| v.min(20.0) as f32));
         }
         let mut rollout = Rollout::new(&architecture, wanted, before, Noise::none(&architecture, pictures.len()));
-        rollout.run(&Model::new(&self.architecture, &self.parameters), true);
+        rollout.run(&Model::new(&self.architecture, &self.parameters), self.gated);
         Ok((0..pictures.len()).map(|k| steps_of(&rollout, k)).collect())
     }
 
     #[cfg(feature = "train")]
-    pub(crate) fn from_parameters(architecture: Architecture, parameters: Vec<f32>) -> Self {
-        Self { architecture, parameters }
+    pub(crate) fn from_parameters(architecture: Architecture, parameters: Vec<f32>, gated: bool) -> Self {
+        Self { architecture, parameters, gated }
     }
 
     #[cfg(feature = "train")]

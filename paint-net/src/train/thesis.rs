@@ -103,7 +103,8 @@ impl ThesisTrainer {
 
     /// The weights as they are.
     pub fn network(&self) -> Network {
-        Network::from_parameters(self.settings.architecture, self.descent.parameters.clone())
+        let ThesisSettings { architecture, objective, .. } = self.settings;
+        Network::from_parameters(architecture, self.descent.parameters.clone(), objective.gated)
     }
 
     /// Steps done.

@@ -1,6 +1,6 @@
 //! The thesis' network as its users see it: one seed, one network; checkpoints; what it paints; what it refuses.
 
-use paint_net::thesis::{Architecture, Network, ThesisPainter};
+use paint_net::thesis::{Architecture, Network, Objective, ThesisPainter};
 use paint_net::train::{ThesisSettings, ThesisTrainer, thesis_patch};
 use paint_net::{Error, Image, Limits, PaintProblem, Painter, Painting, SprayKernel, metrics};
 
@@ -36,6 +36,23 @@ fn one_seed_gives_one_network() {
     assert!(first == run(1, 2) && first == run(1, 7));
     assert!(first != run(2, 1));
     assert!(Network::from_safetensors(&first.to_safetensors(&[])).unwrap() == first);
+}
+
+/// A network that was trained as the thesis prints it paints so: the stop variable leaves its volumes alone.
+#[test]
+fn a_network_paints_as_it_was_trained() {
+    let objective = |gated| Objective { gated, ..Objective::default() };
+    let [gated, printed] = [true, false].map(|gated| {
+        let trainer = ThesisTrainer::new(ThesisSettings { objective: objective(gated), ..settings() }).unwrap();
+        let file = trainer.network().to_safetensors(&[]);
+        let network = Network::from_safetensors(&file).unwrap();
+        assert_eq!(network.is_gated(), gated);
+        network.paint(&[(picture(3).unwrap(), None)]).unwrap()[0][0]
+    });
+    // The same weights: the first spray goes to the same place, and untrained the variable is near a half.
+    assert_eq!(gated.position, printed.position);
+    let share = gated.volume / printed.volume;
+    assert!((0.3..0.7).contains(&share), "{share}");
 }
 
 #[test]
