@@ -3,7 +3,7 @@
 use crate::error::{Error, require};
 use crate::image::Image;
 
-/// The papers' "ideal" result: the wanted picture under a Gaussian filter (thesis, Paper IV, section 3.3). Border pixels are
+/// The papers' "ideal" result: the wanted picture under a Gaussian filter (thesis, Paper IV, section 3.2; σ is half of the spray's radius in section 3.3). Border pixels are
 /// repeated by reflection (`d c b a | a b c d`), taps reach 4 σ. Not an upper bound: deconvolution does better.
 pub fn ideal(reference: &Image, sigma: f64) -> Result<Image, Error> {
     require("sigma", sigma, sigma > 0.0 && sigma <= 1e4, "it must lie in (0, 10000] pixels")?;

@@ -42,7 +42,8 @@ pub enum Mode {
     /// The whole path in one program, directions as unit vectors, incidence as an inscribed octagon of planes.
     #[default]
     Sequential,
-    /// Eqs. (2)-(6) as printed: azimuth and polar angles, three planes, Jacobi iterations.
+    /// Eqs. (2)-(6) in the printed variables: azimuth and polar angles, three planes, Jacobi iterations. Facets are of one size, and heading
+    /// rows soft.
     PaperExact,
 }
 

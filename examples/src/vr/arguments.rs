@@ -40,9 +40,9 @@ pub struct Arguments {
     /// Standard deviation of a spray spot from 10 cm, metres
     #[arg(long, value_name = "METRES", default_value_t = 0.015)]
     spot: f64,
-    /// Length of the segments that the robot flies live, metres
-    #[arg(long, value_name = "METRES", default_value_t = 0.1)]
-    segment: f64,
+    /// Length of the segments that the robot flies live, metres, cut as in the paper [default: 0.1, and up to 1 where the robot is behind]
+    #[arg(long, value_name = "METRES")]
+    segment: Option<f64>,
     /// How fast the robot paints what the hand has painted
     #[arg(long, default_value = "dose")]
     timing: Timing,
@@ -123,7 +123,9 @@ impl Arguments {
             live: !self.offline,
             ..VrSettings::default()
         };
-        settings.session.segment = self.segment;
+        if let Some(length) = self.segment {
+            (settings.session.segment, settings.session.longest) = (length, length);
+        }
         settings
     }
 }

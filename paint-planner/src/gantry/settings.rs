@@ -92,8 +92,8 @@ impl GantrySettings {
         let area = 4.0 * std::f64::consts::PI * spread * spread;
         Self {
             flux_speed: flow / if paper_literal { area } else { width },
-            // Where the punishment shuts the valve: nothing is gained by going where it stays shut.
-            least_use: if paper_literal { self.least_use } else { punishment / (1.0 + punishment) },
+            // Handheld paper, Eq. (4), scores where all of the flux is needed. Where the punishment shuts the valve nothing is gained.
+            least_use: if paper_literal { 1.0 } else { punishment / (1.0 + punishment) },
             saturate: self.saturate && !paper_literal,
             ..self
         }

@@ -15,7 +15,7 @@ use std::f64::consts::TAU;
 pub struct HeadingPath {
     /// Heading of every state in (-pi, pi]; `None` where none is possible.
     pub headings: Vec<Option<f64>>,
-    /// Cost of VR paper, Eq. (7), summed over the states.
+    /// Cost of VR paper, Eq. (7), summed over the states; `c_e d` where it prints `c_e d^2` of a distance `d` that is squared already.
     pub cost: f64,
 }
 

