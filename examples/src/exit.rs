@@ -7,7 +7,8 @@ use std::process::ExitCode;
 use clap::{ArgAction, Args, Command, CommandFactory, FromArgMatches};
 use clap_complete::Shell;
 
-use crate::{console, interruption, log, run_folder};
+use crate::mcap_messages::ros2::write_ros2_beside;
+use crate::{console, interruption, log, run_folder, say};
 
 /// Version and, where it was built from a repository, its revision.
 const VERSION: &str = env!("PAINTCOPTER_VERSION");
@@ -25,6 +26,9 @@ struct CommonArguments {
     /// Print report.json, and nothing else, to stdout
     #[arg(long, global = true)]
     json: bool,
+    /// Write every recording NAME.mcap once more as NAME.ros2.mcap, which ROS 2 tools read whole: CDR, profile ros2
+    #[arg(long, global = true)]
+    ros2: bool,
     /// Print a script that completes this command line in a shell, and end
     #[arg(long, global = true, value_name = "SHELL", exclusive = true)]
     completions: Option<Shell>,
@@ -62,7 +66,10 @@ where
     interruption::watch(program);
     console::configure(common.quiet, common.json);
     log::subscribe(common.verbose);
-    let result = run(&arguments);
+    let result = run(&arguments).map_err(|error| error.to_string());
+    // What is not good enough is written all the same.
+    let again = common.ros2 && !interruption::is_requested();
+    let result = result.and(if again { write_for_ros2() } else { Ok(()) });
     for report in run_folder::end() {
         if common.json {
             print(&report);
@@ -98,6 +105,14 @@ fn print_about(command: &mut Command, common: &CommonArguments) -> std::io::Resu
         }
     }
     Ok(common.completions.is_some() || common.manual)
+}
+
+fn write_for_ros2() -> Result<(), String> {
+    for recording in run_folder::written("mcap") {
+        let written = write_ros2_beside(&recording)?;
+        say!("{}", written.display());
+    }
+    Ok(())
 }
 
 fn print(report: &Path) {

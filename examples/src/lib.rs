@@ -13,7 +13,6 @@ pub mod handheld;
 pub mod interruption;
 #[cfg(feature = "log")]
 mod log;
-#[cfg(feature = "recordings")]
 #[cfg_attr(not(feature = "programs"), allow(dead_code, reason = "each program reads and writes some of the messages"))]
 mod mcap_messages;
 #[cfg(not(feature = "log"))]

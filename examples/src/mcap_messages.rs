@@ -1,10 +1,12 @@
 //! Messages of MCAP recordings: a stream of them, and what images and times in them are, as Foxglove or ROS 2 has them.
 
 pub(crate) mod cdr;
+#[cfg(feature = "recordings")]
 mod chunks;
 pub(crate) mod fields;
 pub(crate) mod images;
 mod records;
+pub(crate) mod ros2;
 
 use std::fs::File;
 use std::io::{BufReader, Read as _};
@@ -13,6 +15,7 @@ use std::path::Path;
 use mcap::Message;
 use mcap::sans_io::LinearReaderOptions;
 
+#[cfg(feature = "recordings")]
 use chunks::{Lz4, Zstd};
 use records::Messages;
 
@@ -27,6 +30,15 @@ pub(crate) enum MessagesFault {
     CutOff(String),
 }
 
+impl std::fmt::Display for MessagesFault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Unreadable(error) => error.fmt(f),
+            Self::Malformed(why) | Self::CutOff(why) => why.fmt(f),
+        }
+    }
+}
+
 /// Streams a file's messages; memory does not grow with the file.
 pub(crate) fn messages_of(
     path: &Path,
@@ -38,9 +50,13 @@ pub(crate) fn messages_of(
     // A record that claims to be longer than the file asks for memory that is not there.
     let most = usize::try_from(file.metadata().map_err(MessagesFault::Unreadable)?.len()).unwrap_or(usize::MAX);
     let options = LinearReaderOptions::default().with_record_length_limit(most).with_validate_chunk_crcs(true);
+    #[cfg_attr(not(feature = "recordings"), allow(unused_mut, reason = "our own chunks are not compressed"))]
     let mut reader = Messages::new(BufReader::new(file), options);
-    reader.add_decompressor(Zstd::new()).map_err(|e| broken(&e))?;
-    reader.add_decompressor(Lz4::new()).map_err(|e| broken(&e))?;
+    #[cfg(feature = "recordings")]
+    {
+        reader.add_decompressor(Zstd::new()).map_err(|e| broken(&e))?;
+        reader.add_decompressor(Lz4::new()).map_err(|e| broken(&e))?;
+    }
     Ok(reader.map(|message| message.map_err(|e| broken(&e))))
 }
 

@@ -1,5 +1,6 @@
 //! The mission as an MCAP file with Foxglove's well-known schemas: opens in Foxglove and Rerun as it is.
 
+mod origin;
 mod paint_traces;
 
 use std::collections::BTreeMap;
@@ -13,6 +14,7 @@ use foxglove::messages::{
 };
 use nalgebra::{Isometry3, Point3};
 
+pub use origin::{Attachment, Origin};
 pub use paint_traces::PaintStyle;
 use paint_traces::PaintTraces;
 pub(crate) use paint_traces::point;
@@ -72,8 +74,10 @@ pub fn save_recording(
     paint: PaintStyle,
     states: &[RobotState],
     log_lines: &[(f64, String)],
+    origin: &Origin,
 ) -> Result<(), RecordingError> {
     let mut recorder = Recorder::create(path)?;
+    recorder.describe(origin)?;
     let transforms = recorder.channel::<FrameTransforms>("/tf")?;
     let pose = recorder.channel::<PoseInFrame>("/vehicle/pose")?;
     let joints = recorder.channel::<JointStates>("/joint_states")?;
@@ -158,6 +162,18 @@ impl Recorder {
     pub(crate) fn finish(mut self) -> Result<(), RecordingError> {
         self.writer.finish().map_err(failed)?;
         self.writer.into_inner().commit().map_err(failed)
+    }
+
+    /// Metadata and attachments.
+    pub(crate) fn describe(&mut self, origin: &Origin) -> Result<(), RecordingError> {
+        self.writer.write_metadata(&origin.metadata()).map_err(failed)?;
+        for Attachment { name, media_type, data } in &origin.attachments {
+            // Without times: the same mission gives the same bytes.
+            let (name, media_type) = ((*name).into(), (*media_type).into());
+            let file = mcap::Attachment { log_time: 0, create_time: 0, name, media_type, data: data.into() };
+            self.writer.attach(&file).map_err(failed)?;
+        }
+        Ok(())
     }
 
     /// What was written so far can be read, even if nothing more comes.
@@ -328,9 +344,17 @@ mod tests {
         let flow = |k: i32| if k == 3 { 0.0 } else { 1e-7 };
         let states: Vec<RobotState> =
             (0..5).map(|k| RobotState { flow: flow(k), ..moment(f64::from(k) * 0.5) }).collect();
-        save_recording(&path, &mesh, paint, &states, &[(0.0, "take-off".into()), (1.0, "layer 1".into())]).unwrap();
+        let urdf = Attachment { name: "robot.urdf", media_type: "application/xml", data: b"<robot/>".to_vec() };
+        let origin = Origin { seed: Some(7), attachments: vec![urdf] };
+        save_recording(&path, &mesh, paint, &states, &[(0.0, "take-off".into()), (1.0, "layer 1".into())], &origin)
+            .unwrap();
         let bytes = std::fs::read(&path).unwrap();
         std::fs::remove_file(&path).unwrap();
+        let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+        let metadata = mcap::read::metadata(&bytes, &summary.metadata_indexes[0]).unwrap();
+        assert_eq!(metadata.metadata["seed"], "7");
+        let attached = mcap::read::attachment(&bytes, &summary.attachment_indexes[0]).unwrap();
+        assert_eq!((attached.name.as_str(), &attached.data[..]), ("robot.urdf", &b"<robot/>"[..]));
         let mut count = BTreeMap::new();
         for message in mcap::MessageStream::new(&bytes).unwrap() {
             let message = message.unwrap();

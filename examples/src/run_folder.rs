@@ -63,6 +63,13 @@ pub(crate) fn note(path: &Path) {
     }
 }
 
+/// Files with this ending that were written so far.
+pub(crate) fn written(ending: &str) -> Vec<PathBuf> {
+    let folders = FOLDERS.lock().unwrap_or_else(PoisonError::into_inner);
+    let all = folders.iter().flat_map(|(folder, run)| run.written.iter().map(|name| folder.join(name)));
+    all.filter(|path| path.extension().is_some_and(|own| own == ending)).collect()
+}
+
 /// The runs of this process are over: what they have not written again goes. Their reports.
 pub(crate) fn end() -> Vec<PathBuf> {
     let folders = std::mem::take(&mut *FOLDERS.lock().unwrap_or_else(PoisonError::into_inner));

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use vio_ekf::Stamp;
 
 /// `std_msgs/Header`.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Header {
     seconds: i32,
     nanos: u32,
@@ -18,6 +18,11 @@ impl Header {
         let nanos = stamp.nanos();
         let (seconds, nanos) = (nanos.div_euclid(1_000_000_000) as i32, nanos.rem_euclid(1_000_000_000) as u32);
         Self { seconds, nanos, frame_id: frame_id.into() }
+    }
+
+    /// Seconds and nanoseconds.
+    pub(crate) fn time(&self) -> (i32, u32) {
+        (self.seconds, self.nanos)
     }
 
     pub(crate) fn stamp(&self) -> Stamp {

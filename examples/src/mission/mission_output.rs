@@ -56,6 +56,7 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
     stage.share(0.8);
     save_angles(mission, &folder.join("angles.png"))?;
     write(&folder.join("trajectory.csv"), &trajectory_table(mission))?;
+    write(&folder.join("robot.urdf"), &mission.task.urdf())?;
     save_textured_mesh(mission, folder)?;
     save_mcap(
         mission,
@@ -179,7 +180,8 @@ fn save_mcap(mission: &Mission, folder: &Path, mesh: &ColouredMesh) -> Result<()
         }));
         start += f.plan.trajectory.duration();
     }
-    save_recording(&folder.join("mission.mcap"), mesh, mission.task.paint_style(), &states, &log_lines)?;
+    let origin = mission.task.origin(folder);
+    save_recording(&folder.join("mission.mcap"), mesh, mission.task.paint_style(), &states, &log_lines, &origin)?;
     Ok(())
 }
 

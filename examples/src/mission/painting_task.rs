@@ -19,7 +19,7 @@ use crate::appearance::{Appearance, UNIT_THICKNESS};
 use crate::design::Design;
 use crate::mesh_io::TriangleMesh;
 use crate::progress::Stage;
-use crate::recording::PaintStyle;
+use crate::recording::{Origin, PaintStyle};
 use crate::region::Scene;
 use crate::report::ReachNeeds;
 use crate::say;
@@ -186,6 +186,16 @@ impl PaintingTask {
             max_flow: self.settings.planner.timing.max_flow,
             colour: self.appearance.srgb(1.0),
         }
+    }
+
+    /// The robot as URDF.
+    pub(super) fn urdf(&self) -> String {
+        self.robot.chain.to_urdf("paintcopter", self.settings.planner.timing.max_joint_rate)
+    }
+
+    /// What makes a recording of it again; the mission's results lie in `folder`.
+    pub(super) fn origin(&self, folder: &Path) -> Origin {
+        Origin::mission(self.settings.seed, self.urdf(), folder)
     }
 
     /// 1 on texels that the robot can serve, 0 elsewhere.

@@ -109,7 +109,7 @@ impl PlanFigures {
     }
 }
 
-/// Writes `plan.csv`, `path.png`, `plan.mcap` and `report.json` into an existing folder; the report last.
+/// Writes `plan.csv`, `path.png`, `robot.urdf`, `plan.mcap` and `report.json` into an existing folder; the report last.
 pub fn save_plan(mission: &PlannedMission, folder: &Path) -> Result<PlanFigures, MissionError> {
     let stage = Stage::start("export");
     let task = &mission.task;
@@ -123,7 +123,8 @@ pub fn save_plan(mission: &PlannedMission, folder: &Path) -> Result<PlanFigures,
         save_path(task, &depth, nozzle, vehicle, &folder.join("path.png"))?;
     }
     stage.share(0.7);
-    save_mcap(mission, &vertex_colours(task, &depth), &folder.join("plan.mcap"))?;
+    write(&folder.join("robot.urdf"), &task.urdf())?;
+    save_mcap(mission, &vertex_colours(task, &depth), folder)?;
     let figures = figures(mission);
     save_figures(&figures, folder)?;
     stage.done(&folder.display().to_string());
@@ -150,7 +151,7 @@ fn table(mission: &PlannedMission) -> String {
     text
 }
 
-fn save_mcap(mission: &PlannedMission, colours: &[[u8; 3]], file: &Path) -> Result<(), MissionError> {
+fn save_mcap(mission: &PlannedMission, colours: &[[u8; 3]], folder: &Path) -> Result<(), MissionError> {
     let task = &mission.task;
     let positions = task.surface.vertices();
     let (mut states, mut log, mut start) = (Vec::new(), Vec::new(), 0.0);
@@ -161,7 +162,8 @@ fn save_mcap(mission: &PlannedMission, colours: &[[u8; 3]], file: &Path) -> Resu
     }
     let faces = task.surface.disk().faces();
     let mesh = ColouredMesh { positions: &positions, faces, colours, bare: task.appearance.srgb(0.0) };
-    Ok(save_recording(file, &mesh, task.paint_style(), &states, &log)?)
+    let (file, origin) = (folder.join("plan.mcap"), task.origin(folder));
+    Ok(save_recording(&file, &mesh, task.paint_style(), &states, &log, &origin)?)
 }
 
 /// The robot as the plan has it: level, with the pan and tilt of the reference.

@@ -20,7 +20,7 @@ use vio_ekf::{Camera, Imu, ImuNoise, Stamp, Trajectory};
 use super::error::{VioError, read_text};
 use super::euroc_folder::{Overrides, read_truth};
 use super::grey_image::GreyImage;
-use super::mcap_out::NOISE_SCHEMA;
+use super::mcap_out::NOISE_TOPIC;
 use super::recording::{Images, Recording, SecondCamera};
 use crate::mcap_messages::cdr;
 use crate::mcap_messages::fields::{isometry, isometry_of, stamp};
@@ -214,7 +214,15 @@ impl Found {
                 let (Some(stamp), Some(pose)) = (message.timestamp.map(stamp), pose) else { return Err(bad()) };
                 self.truth.push(stamp, pose).map_err(|error| format!("topic {topic}: {error}"))?;
             }
-            NOISE_SCHEMA => self.noise = Some(noise(data).ok_or_else(bad)?),
+            "geometry_msgs/msg/PoseStamped" if topic == "/truth" => {
+                let (header, position, orientation): (cdr::Header, _, _) = cdr::decode(data).ok_or_else(bad)?;
+                let pose = isometry_of(position, orientation).ok_or_else(bad)?;
+                self.truth.push(header.stamp(), pose).map_err(|error| format!("topic {topic}: {error}"))?;
+            }
+            "std_msgs/msg/String" if topic == NOISE_TOPIC => {
+                let text: String = cdr::decode(data).ok_or_else(bad)?;
+                self.noise = Some(noise(&text).ok_or_else(bad)?);
+            }
             _ => {}
         }
         Ok(())

@@ -110,13 +110,8 @@ pub fn simulate(settings: &SimulationSettings, folder: &Path) -> Result<Simulate
     let mcap = settings
         .mcap
         .then(|| {
-            McapWriter::create(
-                &folder.join("recording.mcap"),
-                began,
-                &cameras[..cameras.len().min(2)],
-                &imu,
-                settings.raw,
-            )
+            let cameras = &cameras[..cameras.len().min(2)];
+            McapWriter::create(&folder.join("recording.mcap"), began, cameras, &imu, settings.scenario.seed)
         })
         .transpose()?;
     let out = Sink {

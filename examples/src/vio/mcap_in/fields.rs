@@ -12,8 +12,8 @@ pub(super) fn imu(data: &[u8]) -> Option<(Imu, String)> {
 }
 
 /// Noise, rate and offset of the camera's clock from our own message.
-pub(super) fn noise(data: &[u8]) -> Option<(ImuNoise, f64, f64)> {
-    let value: serde_json::Value = serde_json::from_slice(data).ok()?;
+pub(super) fn noise(text: &str) -> Option<(ImuNoise, f64, f64)> {
+    let value: serde_json::Value = serde_json::from_str(text).ok()?;
     let number = |key: &str| value.get(key)?.as_f64();
     let noise = ImuNoise {
         gyro_density: number("gyroscope_noise_density")?,
