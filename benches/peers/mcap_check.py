@@ -5,12 +5,14 @@
   python3 mcap_check.py FILE.mcap ...
 
 Checksums are verified, counts and times are compared with the summary, protobuf and JSON are decoded by the schemas in the
-file, ROS messages by the definition in the file and once more by that of ROS 2 Humble (rosbags), which must write them back. Exit code 1 if
+file, ROS messages by the definition in the file and once more by that of ROS 2 Humble (rosbags), which must write them back. Files with the profile of ROS 2 are
+read whole by rosbags. Exit code 1 if
 anything does not fit."""
 
 import argparse
 import collections
 import json
+import pathlib
 import sys
 
 from google.protobuf.message import Message
@@ -19,6 +21,7 @@ from mcap.reader import NonSeekingReader, make_reader
 from mcap.well_known import MessageEncoding
 from mcap_protobuf.decoder import DecoderFactory as Protobuf
 from mcap_ros2.decoder import DecoderFactory as Ros2
+from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 
@@ -49,10 +52,23 @@ def fields(value):
     if hasattr(value, "__slots__"):
         return {name.lstrip("_"): fields(getattr(value, name)) for name in value.__slots__}
     if hasattr(value, "__dataclass_fields__"):
-        return {n: fields(getattr(value, n)) for n in value.__dataclass_fields__ if n != "__msgtype__"}
+        # Constants of the definition are no fields.
+        names = [name for name in value.__dataclass_fields__ if name != "__msgtype__" and not name.isupper()]
+        return {name: fields(getattr(value, name)) for name in names}
     if hasattr(value, "tolist"):
         return value.tolist()
-    return list(value) if isinstance(value, tuple) else value
+    if isinstance(value, (list, tuple, bytes, bytearray)):
+        return [fields(part) for part in value]
+    return value
+
+
+def read_by_rosbags(path):
+    """How many messages rosbags decodes of a file with the profile of ROS 2; None without that profile."""
+    with open(path, "rb") as file:
+        if make_reader(file).get_header().profile != "ros2":
+            return None
+    with AnyReader([pathlib.Path(path)]) as bag:
+        return sum(1 for connection, _, data in bag.messages() if bag.deserialize(data, connection.msgtype) is not None)
 
 
 def check(path, humble):
@@ -76,13 +92,16 @@ def check(path, humble):
                 if humble.serialize_cdr(other, schema.name).tobytes() != bytes(message.data):
                     wrong.append(f"{channel.topic}: ROS 2 Humble writes other bytes")
                 if repr(fields(other)) != repr(fields(decoded)):
-                    wrong.append(f"{channel.topic}: {fields(other)} by Humble, {fields(decoded)} by the file")
+                    wrong.append(f"{channel.topic}: {str(fields(other))[:200]} by Humble, {str(fields(decoded))[:200]} by the file")
     with open(path, "rb") as file:
         summary = make_reader(file, validate_crcs=True).get_summary()
     if summary is None or summary.statistics is None:
         wrong.append("no summary: players have to read the whole file first")
     else:
         count = sum(topic["messages"] for topic in topics.values())
+        bag = read_by_rosbags(path)
+        if bag not in (None, count):
+            wrong.append(f"{count} messages, {bag} by rosbags")
         if summary.statistics.message_count != count:
             wrong.append(f"{count} messages, {summary.statistics.message_count} by the summary")
         silent = {channel.topic for channel in summary.channels.values()} - set(topics)

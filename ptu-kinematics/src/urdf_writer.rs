@@ -20,7 +20,7 @@ pub(crate) fn write(settings: &PtuSettings, robot: &str, max_rate: f64) -> Strin
         )
     };
     // Tilt is positive upwards: about -y. A fixed rotation about y by the negative angle lifts the gun.
-    let (tip, pitch) = (vector(&settings.tilt_from_tip), -settings.gun_pitch);
+    let (tip, pitch) = (vector(&settings.tilt_from_tip), 0.0 - settings.gun_pitch);
     format!(
         "<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n  <link name=\"body\"/>\n  <link name=\"pan\"/>\n  <link name=\"tilt\"/>\n  \
          <link name=\"nozzle\"/>\n{}{}  <joint name=\"nozzle\" type=\"fixed\">\n    <parent link=\"tilt\"/>\n    \

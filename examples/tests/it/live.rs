@@ -58,11 +58,18 @@ fn a_recording_of_a_run_holds_what_became_of_it() {
     let first = std::fs::read(s.0.join("out/scan.mcap")).unwrap();
     let again = Command::new(env!("CARGO_BIN_EXE_scan"))
         .args(["--sequence", s.0.to_str().unwrap(), "--out", &s.path("out"), "--voxel", "0.02", "--threads", "3"])
-        .args(["--poses", "tracked", "--record"])
+        .args(["--poses", "tracked", "--record", "--ros2"])
         .output()
         .unwrap();
     assert!(again.status.success());
     assert!(first == std::fs::read(s.0.join("out/scan.mcap")).unwrap());
+    // And once more for ROS 2, message by message.
+    let for_ros2 = std::fs::read(s.0.join("out/scan.ros2.mcap")).unwrap();
+    let topics = |bytes: &[u8]| {
+        let messages = mcap::MessageStream::new(bytes).unwrap().map(Result::unwrap);
+        messages.map(|message| (message.channel.topic.clone(), message.log_time)).collect::<Vec<_>>()
+    };
+    assert!(topics(&for_ros2) == topics(&first));
 }
 
 /// A viewer that asks for the map when half of it does not change any more is shown all of it.

@@ -77,3 +77,72 @@ fn rewrite(message: &Message, table: &mut MarkerTable, writer: &mut Ros2Writer) 
         _ => Ok(false),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use foxglove::messages::{FrameTransform, FrameTransforms, Log, Pose, PoseInFrame, Quaternion, Timestamp, Vector3};
+
+    use super::*;
+    use crate::mcap_messages::cdr;
+    use crate::recording::Recorder;
+
+    #[test]
+    fn every_message_comes_out_in_cdr_with_its_values() {
+        let path = std::env::temp_dir().join(format!("paintcopter-ros2-{}.mcap", std::process::id()));
+        let mut recorder = Recorder::create(&path).unwrap();
+        let timestamp = Some(Timestamp::new(7, 250_000_000));
+        let place = Vector3 { x: 1.0, y: -2.0, z: 3.0 };
+        let turn = Quaternion { x: 0.0, y: 0.6, z: 0.0, w: 0.8 };
+        let frame = FrameTransform {
+            timestamp,
+            parent_frame_id: "world".into(),
+            child_frame_id: "body".into(),
+            translation: Some(place),
+            rotation: Some(turn),
+        };
+        let tf = recorder.channel::<FrameTransforms>("/tf").unwrap();
+        recorder.write(tf, 7.25, &FrameTransforms { transforms: vec![frame] }).unwrap();
+        let pose = recorder.channel::<PoseInFrame>("/pose").unwrap();
+        let posed = Some(Pose { position: Some(place), orientation: Some(turn) });
+        recorder.write(pose, 7.25, &PoseInFrame { timestamp, frame_id: "world".into(), pose: posed }).unwrap();
+        let log = recorder.channel::<Log>("/log").unwrap();
+        let line = Log { timestamp, level: 3, message: "gusts".into(), ..Log::default() };
+        recorder.write(log, 7.5, &line).unwrap();
+        recorder.finish().unwrap();
+
+        let written = write_ros2_beside(&path).unwrap();
+        let bytes = std::fs::read(&written).unwrap();
+        for file in [&path, &written] {
+            std::fs::remove_file(file).unwrap();
+        }
+        // After the magic number, the opcode and the record's length: the length of the profile's name, and the name.
+        assert_eq!(&bytes[17..25], b"\x04\0\0\0ros2");
+        let messages: Vec<Message> = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).collect();
+        let told: Vec<_> = messages.iter().map(|m| (m.channel.topic.as_str(), schema_of(m), m.log_time)).collect();
+        assert_eq!(
+            told,
+            [
+                ("/tf", "tf2_msgs/msg/TFMessage", 7_250_000_000),
+                ("/pose", "geometry_msgs/msg/PoseStamped", 7_250_000_000),
+                ("/log", "rcl_interfaces/msg/Log", 7_500_000_000),
+            ]
+        );
+        assert!(messages.iter().all(|m| m.channel.message_encoding == "cdr"));
+        let transforms: Vec<cdr::TransformStamped> = cdr::decode(&messages[0].data).unwrap();
+        let read = &transforms[0];
+        assert_eq!((read.header.frame_id.as_str(), read.child_frame_id.as_str()), ("world", "body"));
+        assert_eq!(
+            (read.header.time(), read.translation, read.rotation),
+            ((7, 250_000_000), [1.0, -2.0, 3.0], [0.0, 0.6, 0.0, 0.8])
+        );
+        let (header, position, orientation): (cdr::Header, [f64; 3], [f64; 4]) =
+            cdr::decode(&messages[1].data).unwrap();
+        assert_eq!(
+            (header.frame_id.as_str(), position, orientation),
+            ("world", [1.0, -2.0, 3.0], [0.0, 0.6, 0.0, 0.8])
+        );
+        // Foxglove counts warnings as 3, ROS as 30.
+        let (_, level, _, message): ((i32, u32), u8, String, String) = cdr::decode(&messages[2].data).unwrap();
+        assert_eq!((level, message.as_str()), (30, "gusts"));
+    }
+}
