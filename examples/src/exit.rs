@@ -13,7 +13,7 @@ use crate::{console, interruption, log, run_folder, say};
 /// Version and, where it was built from a repository, its revision.
 const VERSION: &str = env!("PAINTCOPTER_VERSION");
 
-/// Options that all programs have.
+// Options that all programs have. No documentation: clap would take it for what the program does.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 struct CommonArguments {

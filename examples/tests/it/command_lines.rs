@@ -1,5 +1,6 @@
 //! What all programs have in common on their command lines.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -18,6 +19,7 @@ fn text(bytes: &[u8]) -> String {
 
 #[test]
 fn every_program_tells_its_version_completes_itself_and_has_a_manual() {
+    let mut seen = BTreeSet::new();
     for program in PROGRAMS {
         let output = run(program, &["--version"]);
         let version = text(&output.stdout);
@@ -25,6 +27,9 @@ fn every_program_tells_its_version_completes_itself_and_has_a_manual() {
             output.status.success() && version.starts_with(&format!("{program} {}", env!("CARGO_PKG_VERSION"))),
             "{version}"
         );
+        // What it does comes first, and is its own.
+        let does = text(&run(program, &["--help"]).stdout).lines().next().unwrap_or_default().to_string();
+        assert!(does.len() > 40 && seen.insert(does.clone()), "{program}: {does}");
         for shell in ["bash", "zsh", "fish"] {
             let output = run(program, &["--completions", shell]);
             let script = text(&output.stdout);
