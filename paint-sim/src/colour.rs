@@ -3,9 +3,11 @@
 mod ciede2000;
 mod spectrum;
 mod tables;
+mod upsampling;
 
 pub use ciede2000::ciede2000;
 pub use spectrum::{BANDS, Spectrum, wavelength};
+pub use upsampling::spectrum_of_linear_srgb;
 
 /// Tristimulus values of the D65 white that sRGB is defined for (IEC 61966-2-1).
 pub const WHITE: [f64; 3] = [0.95047, 1.0, 1.08883];
@@ -71,10 +73,25 @@ pub fn encode_srgb8(linear: f64) -> (u8, bool) {
     ((encode_srgb(linear.clamp(0.0, 1.0)) * 255.0).round() as u8, clipped)
 }
 
+/// The inverse of [`encode_srgb`].
+pub fn decode_srgb(encoded: f64) -> f64 {
+    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
 /// The inverse of [`encode_srgb8`]: a component 0..=255 to linear 0..=1.
 pub fn decode_srgb8(encoded: u8) -> f64 {
-    let c = f64::from(encoded) / 255.0;
-    if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+    decode_srgb(f64::from(encoded) / 255.0)
+}
+
+/// CIELAB against [`WHITE`] of linear sRGB (IEC 61966-2-1).
+pub fn linear_srgb_lab(linear: [f64; 3]) -> [f64; 3] {
+    let row = |m: [f64; 3]| m[0] * linear[0] + m[1] * linear[1] + m[2] * linear[2];
+    let xyz = [
+        row([0.4124564, 0.3575761, 0.1804375]),
+        row([0.2126729, 0.7151522, 0.072175]),
+        row([0.0193339, 0.119192, 0.9503041]),
+    ];
+    lab(xyz, WHITE)
 }
 
 /// A colour for the screen.

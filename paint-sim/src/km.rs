@@ -5,6 +5,7 @@ mod gradient;
 mod layer;
 mod reflectance;
 
+pub(crate) use domain::tanhc;
 pub use gradient::{Gradient, gradient};
 pub use layer::{Layer, saunderson, saunderson_inverse};
 pub use reflectance::{absorption_over_scattering, opaque_reflectance, reflectance, reflectance_f32};

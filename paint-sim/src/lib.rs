@@ -41,6 +41,9 @@
 //! | Kubelka 1948 | film of finite thickness on a ground | [`km::reflectance`] |
 //! | Kubelka-Munk 1931 | opaque film, Riccati equation | [`km::opaque_reflectance`], [`km::gradient`] |
 //! | Kubelka 1954 | layers on layers | [`km::Layer::over`] |
+//! | Kubelka 1948, solved for two grounds | `K` and `S` from a drawdown | [`Paint::from_drawdown`] |
+//! | Riccati's equation, film by film (ours) | colour of a stack of films and its derivatives | [`paint::FilmStack`] |
+//! | Jakob and Hanika 2019 | reflectance of a colour | [`colour::spectrum_of_linear_srgb`] |
 //! | pictures before and after (ours) | fall-off of the lens, light of the scene, thickness of the film | [`film::inspection`] |
 //! | a paint by name on a substrate, by thickness (ours) | table of colours, curve of ink | [`paint::Appearance`], [`paint::ink_curve`] |
 //! | Duncan 1940 | wet mixture `K = sum c K`, `S = sum c S` | [`Paint::mix`] |

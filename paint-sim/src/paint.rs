@@ -1,10 +1,16 @@
 //! Paints and grounds with 36 bands: from the thickness of a film to the colour one sees.
 
 mod appearance;
+mod drawdown;
+mod film_stack;
 mod named;
+mod pigments;
 
 pub use appearance::{Appearance, ink_curve};
+pub use drawdown::Drawdown;
+pub use film_stack::{Bands, FilmStack, MOST_FILMS};
 pub use named::PaintName;
+pub use pigments::{PIGMENTS, Pigment};
 
 use crate::colour::{BANDS, Spectrum, Srgb8, spectrum_srgb8, wavelength};
 use crate::error::{Error, check_not_negative, check_positive, check_range};

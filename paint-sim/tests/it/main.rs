@@ -5,6 +5,7 @@ mod colour;
 mod deposit;
 mod droplets;
 mod examples;
+mod film_stack;
 mod flight;
 mod flight_scene;
 mod flight_statistics;
