@@ -44,6 +44,7 @@
 //! | doses of a coat, least squares on thickness (Daube-Witherspoon and Muehllehner 1986) | [`painters::DoseCorrection`] |
 //! | a valve of limited slew rate (augmented Lagrangian), on a context-based path (Dafner et al. 2000) | [`painters::SlewLimited`], [`path::ScanOrder`] |
 //! | several paints that mix (Kubelka and Munk 1931) | [`colour::Palette`], [`colour::ColourSeparation`] |
+//! | separation by any mixing model, paints chosen and ordered, all sprays at once; ours | [`colour::TexelSeparation`], [`colour::choose_paints`], [`colour::ColourFit`] |
 //! | strokes a robot can fly | [`path::boustrophedon`] |
 //!
 //! Pixels: centres at integers, `x` = column, `y` = row, row 0 at the top. Lengths are in pixels, depths in the unit of the

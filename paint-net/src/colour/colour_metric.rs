@@ -50,7 +50,12 @@ fn ciede2000_jacobian(colour: [f64; 3]) -> [[f64; 3]; 3] {
         lab[row] = (0..3).map(|k| of[k] * f[k]).sum();
         lab_by_colour[row] = std::array::from_fn(|c| (0..3).map(|k| of[k] * f_by[k][c]).sum());
     }
-    let [lightness, a, b] = [lab[0] - 16.0, lab[1], lab[2]];
+    let by_lab = ciede2000_rows([lab[0] - 16.0, lab[1], lab[2]]);
+    by_lab.map(|row| std::array::from_fn(|c| (0..3).map(|k| row[k] * lab_by_colour[k][c]).sum()))
+}
+
+/// The same between colours in CIELAB.
+pub(super) fn ciede2000_rows([lightness, a, b]: [f64; 3]) -> [[f64; 3]; 3] {
     let seventh = a.hypot(b).powi(7);
     let a_scale = 1.5 - 0.5 * (seventh / (seventh + 25.0_f64.powi(7))).sqrt();
     let a = a_scale * a;
@@ -67,12 +72,11 @@ fn ciede2000_jacobian(colour: [f64; 3]) -> [[f64; 3]; 3] {
     let rotation_term = -(2.0 * rotation).to_radians().sin() * 2.0 * (seventh / (seventh + 25.0_f64.powi(7))).sqrt();
     let by_chroma = [0.0, cos * a_scale / s_chroma, sin / s_chroma];
     let by_hue = [0.0, -sin * a_scale / s_hue, cos / s_hue];
-    let by_lab = [
+    [
         [1.0 / s_lightness, 0.0, 0.0],
         std::array::from_fn(|k| by_chroma[k] + 0.5 * rotation_term * by_hue[k]),
         by_hue.map(|v| (1.0 - 0.25 * rotation_term * rotation_term).sqrt() * v),
-    ];
-    by_lab.map(|row| std::array::from_fn(|c| (0..3).map(|k| row[k] * lab_by_colour[k][c]).sum()))
+    ]
 }
 
 /// A stored value of sRGB made linear, and the slope there.

@@ -14,6 +14,7 @@ mod painters;
 mod promises;
 mod reference;
 #[cfg(feature = "train")]
+mod separation;
 mod thesis;
 #[cfg(feature = "train")]
 mod train;
