@@ -3,6 +3,7 @@
 
 use crate::surface::PaintSurface;
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
+use paint_net::colour::MixingModel;
 use paint_planner::constraints::Tether;
 use paint_planner::control::{
     AttitudeResponse, ControlReference, ControlState, MpcSettings, TrackingMpc, VehicleModel,
@@ -12,6 +13,7 @@ use paint_planner::{NozzleState, Plan, Tool, VehicleState};
 use paint_sim::TriangleSurface;
 use paint_sim::flight::{Airframe, Command, Controller, Estimate, GRAVITY};
 use paint_sim::flight::{PanTilt, Reference, ReferenceState};
+use paint_sim::paint::{Bands, FilmStack};
 use ptu_kinematics::{CollisionBody, Hover, Joints, KinematicChain, Ptu, Servo};
 
 /// The simulator's mesh as the planner's surface.
@@ -42,6 +44,26 @@ impl Chart for PaintSurface {
 
     fn lift_from(&self, place: [f64; 2], offset: [f64; 2]) -> Option<(Point3<f64>, UnitVector3<f64>)> {
         self.lift_from(place, offset)
+    }
+}
+
+/// The simulator's films over each other on a wall, as what a separation asks for.
+pub struct FilmsOnWall<'a> {
+    /// The paints, the lowest film first.
+    pub stack: &'a FilmStack,
+    /// Reflectances of the wall.
+    pub grounds: &'a [Bands],
+    /// Which of them each pixel has.
+    pub of_pixel: &'a [u32],
+}
+
+impl MixingModel for FilmsOnWall<'_> {
+    fn paints(&self) -> usize {
+        self.stack.films()
+    }
+
+    fn lab(&self, pixel: usize, depths: &[f64], slopes: &mut [[f64; 3]]) -> [f64; 3] {
+        self.stack.lab(depths, &self.grounds[self.of_pixel[pixel] as usize], slopes)
     }
 }
 

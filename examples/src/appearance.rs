@@ -10,9 +10,10 @@ pub const UNIT_THICKNESS: f64 = 20e-6;
 /// Density of the paint, kg/m³: an acrylic.
 pub const DENSITY: f64 = 1200.0;
 /// Deepest knot of the ink curve, in units of depth.
-const DEEPEST: f64 = 4.0;
+pub(crate) const DEEPEST: f64 = 4.0;
 
 /// How the wall looks under a film of paint.
+#[derive(Clone)]
 pub struct Appearance {
     ink: Saturation,
     colours: paint_sim::paint::Appearance,
@@ -32,15 +33,15 @@ pub enum AppearanceError {
 impl Appearance {
     /// Charcoal on sandstone.
     pub fn charcoal_on_sandstone() -> Result<Self, AppearanceError> {
-        Self::on_sandstone(&PaintName::Charcoal.paint(UNIT_THICKNESS)?)
+        Self::new(&PaintName::Charcoal.paint(UNIT_THICKNESS)?, &Substrate::sandstone())
     }
 
-    /// A paint on sandstone. Ink is a scale of thickness, that of charcoal for every paint: the grey of a coloured or white paint need not
-    /// fall with its thickness.
-    pub fn on_sandstone(paint: &Paint) -> Result<Self, AppearanceError> {
-        let (wall, scale) = (Substrate::sandstone(), PaintName::Charcoal.paint(UNIT_THICKNESS)?);
-        let knots = ink_curve(&scale, &wall, UNIT_THICKNESS, DEEPEST)?;
-        let colours = paint_sim::paint::Appearance::new(paint, &wall, UNIT_THICKNESS, DEEPEST)?;
+    /// A paint on a wall. Ink is a scale of thickness, that of charcoal on sandstone for every paint and wall: the grey of a coloured or white
+    /// paint need not fall with its thickness.
+    pub fn new(paint: &Paint, wall: &Substrate) -> Result<Self, AppearanceError> {
+        let (stone, scale) = (Substrate::sandstone(), PaintName::Charcoal.paint(UNIT_THICKNESS)?);
+        let knots = ink_curve(&scale, &stone, UNIT_THICKNESS, DEEPEST)?;
+        let colours = paint_sim::paint::Appearance::new(paint, wall, UNIT_THICKNESS, DEEPEST)?;
         Ok(Self { ink: Saturation::Curve(MonotoneCurve::new(&knots)?), colours })
     }
 

@@ -2,15 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Point3, UnitVector3};
 use paint_net::Image;
 use paint_net::procedural::{fbm, value_noise};
 use uv_param::texture::{Texture, luminance};
 
+use crate::design_places::design_places;
 use crate::mesh_io::{MaterialError, MeshMaterials, TriangleMesh};
 use crate::picture_file::open_upright;
 use crate::picture_placement::PicturePlacement;
-use crate::projection::{Projection, Viewpoint};
+use crate::projection::Viewpoint;
 use crate::surface::PaintSurface;
 
 /// Largest ink asked for by the built-in designs: full black would need endless paint.
@@ -18,6 +18,8 @@ pub(crate) const DARKEST: f64 = 0.85;
 
 /// Name of the design that is the mesh's own materials.
 pub(crate) const MATERIALS: &str = "materials";
+/// Name of the built-in picture in colour.
+pub(crate) const MURAL: &str = "mural";
 
 /// What to paint.
 #[derive(Debug, Clone)]
@@ -75,6 +77,9 @@ pub enum DesignError {
     /// The mesh's texture cannot be read.
     #[error("texture of the mesh: {0}")]
     Texture(#[from] uv_param::Error),
+    /// The wall has no such reflectance.
+    #[error("wall: {0}")]
+    Wall(#[source] paint_sim::Error),
     /// The picture plane has no pixels.
     #[error("picture plane: {0}")]
     Plane(#[from] paint_net::Error),
@@ -83,7 +88,7 @@ pub enum DesignError {
 impl Design {
     /// Whether a name is that of a design that needs no file.
     pub fn is_built_in(name: &str) -> bool {
-        ["strata", "stripes", "gradient", "colours", MATERIALS].contains(&name)
+        ["strata", "stripes", "gradient", "colours", MATERIALS, MURAL].contains(&name)
     }
 
     /// From the command line: a built-in name or a file.
@@ -93,6 +98,7 @@ impl Design {
             "stripes" => Ok(Self::Stripes),
             "gradient" => Ok(Self::Gradient),
             "colours" => Ok(Self::VertexColours),
+            MURAL => Err(DesignError::NotMovable("the mural is in colour: give its paints with --palette")),
             file => Picture::open(Path::new(file)).map(Self::Picture),
         }
     }
@@ -130,11 +136,7 @@ impl Design {
                 Texture::from_vertices(&surface.texels, surface.disk(), &grey)?
             }
             _ => {
-                let (places, extent) = match viewpoint {
-                    None if surface.disk().seam_length() > 0.0 => places_in_space(surface),
-                    None => chart_places(surface),
-                    Some(viewpoint) => projected_places(surface, viewpoint),
-                };
+                let (places, extent) = design_places(surface, viewpoint);
                 let ink = |place: &Option<[f64; 2]>| place.map_or(0.0, |at| self.ink(at, extent, placement));
                 return Ok(Image::new(width, height, places.iter().map(ink).collect())?);
             }
@@ -183,55 +185,9 @@ impl Design {
 }
 
 /// Texture coordinates of the corners of every face.
-fn corner_uv(mesh: &TriangleMesh) -> Result<Vec<[[f32; 2]; 3]>, DesignError> {
+pub(crate) fn corner_uv(mesh: &TriangleMesh) -> Result<Vec<[[f32; 2]; 3]>, DesignError> {
     let uv = mesh.uv.as_ref().ok_or(DesignError::Missing("texture coordinates"))?;
     Ok(uv.faces.iter().map(|face| face.map(|i| uv.coordinates[i as usize])).collect())
-}
-
-/// Metres from the upper left corner of the chart of every texel's middle, and the chart's width and height.
-fn chart_places(surface: &PaintSurface) -> (Vec<Option<[f64; 2]>>, [f64; 2]) {
-    let (width, texel) = (surface.width(), surface.texels.texel_m);
-    let place = |k: usize| Some([k % width, k / width].map(|c| (c as f64 + 0.5) * texel));
-    let extent = [width, surface.height()].map(|side| side as f64 * texel);
-    ((0..width * surface.height()).map(place).collect(), extent)
-}
-
-/// The same of what is seen from a viewpoint, for every texel that is seen.
-fn projected_places(surface: &PaintSurface, viewpoint: Viewpoint) -> (Vec<Option<[f64; 2]>>, [f64; 2]) {
-    let projection = Projection::new(viewpoint, surface);
-    places_in_plane(surface, |point, normal| {
-        let at = projection.project(point)?;
-        projection.sees(surface, point, normal).then_some(at)
-    })
-}
-
-/// The same of what a viewer in front would see if everything were transparent: a place for every texel, the same on both sides of a seam.
-fn places_in_space(surface: &PaintSurface) -> (Vec<Option<[f64; 2]>>, [f64; 2]) {
-    let projection = Projection::new(Viewpoint::Front, surface);
-    places_in_plane(surface, |point, _| projection.project(point))
-}
-
-/// Where every texel lies on a plane, from right and up on it; from the upper left corner of all of them, and their width and height.
-fn places_in_plane(
-    surface: &PaintSurface,
-    place: impl Fn(&Point3<f64>, &UnitVector3<f64>) -> Option<[f64; 2]>,
-) -> (Vec<Option<[f64; 2]>>, [f64; 2]) {
-    let width = surface.width();
-    let of_texel = |k: usize| {
-        let on_surface = surface.texels.at(k % width, k / width)?;
-        place(&surface.chart.point(on_surface), &surface.chart.face_normal(on_surface.face))
-    };
-    let mut places: Vec<Option<[f64; 2]>> = (0..width * surface.height()).map(of_texel).collect();
-    let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
-    for at in places.iter().flatten() {
-        for c in 0..2 {
-            (low[c], high[c]) = (low[c].min(at[c]), high[c].max(at[c]));
-        }
-    }
-    for at in places.iter_mut().flatten() {
-        *at = [at[0] - low[0], high[1] - at[1]];
-    }
-    (places, [0, 1].map(|c| (high[c] - low[c]).max(f64::MIN_POSITIVE)))
 }
 
 /// Strata: a base coat that breathes, bands that dip and pinch, and a dark foot that fades upwards.

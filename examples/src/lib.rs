@@ -5,8 +5,11 @@ pub mod adapters;
 pub mod appearance;
 #[cfg(all(feature = "autopilot", unix))]
 pub mod autopilot;
+pub mod colour_design;
+pub mod colour_picture;
 pub mod console;
 pub mod design;
+mod design_places;
 pub mod exit;
 #[cfg(feature = "handheld")]
 pub mod handheld;
@@ -32,9 +35,12 @@ pub mod mission;
 pub mod mission_arguments;
 pub mod mission_file;
 pub mod mission_paint;
+pub mod mural;
 pub mod onboard;
 #[cfg(feature = "paint-image")]
 pub mod paint_image;
+pub mod paint_set;
+pub mod palette_choice;
 pub mod picture_file;
 pub mod picture_placement;
 pub mod pictures;
@@ -53,6 +59,8 @@ pub mod scan_flight;
 pub mod simulated_sensors;
 #[cfg(feature = "programs")]
 pub mod socket_address;
+#[cfg(feature = "spray")]
+pub mod spray;
 mod srgb;
 pub mod surface;
 pub mod textured_mesh;
@@ -64,6 +72,7 @@ pub mod vector_drawing;
 pub mod vio;
 #[cfg(feature = "vr")]
 pub mod vr;
+pub mod wall;
 pub mod whole_file;
 pub mod worker_threads;
 pub mod world;

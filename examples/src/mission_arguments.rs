@@ -10,9 +10,11 @@ use crate::mesh_frame::MeshScale;
 use crate::mesh_placement::UpAxis;
 use crate::mission::{LocalisationChoice, MissionSettings, PainterChoice, with_tilt};
 use crate::mission_file::MissionFile;
+use crate::palette_choice::PaletteChoice;
 use crate::picture_placement::{PicturePlacement, PlacementMode};
 use crate::projection::Viewpoint;
 use crate::region::Region;
+use crate::wall::Wall;
 
 type AnyError = Box<dyn std::error::Error>;
 
@@ -44,7 +46,7 @@ pub struct MissionArguments {
     /// place in metres then, unless --scale says otherwise
     #[arg(long, conflicts_with = "scan")]
     region: Option<Region>,
-    /// What to paint: strata, stripes, gradient, colours (of the mesh's vertices), materials (the pictures
+    /// What to paint: mural (in colour, with --palette), strata, stripes, gradient, colours (of the mesh's vertices), materials (the pictures
     /// that the mesh file or its MTL names), or a PNG, JPEG or SVG file
     /// [default: strata on the rock wall, materials on a mesh that has pictures, else stripes]
     #[arg(long)]
@@ -52,6 +54,8 @@ pub struct MissionArguments {
     /// Cover all that is in reach with a coat of this thickness, micrometres from 1 to 60
     #[arg(long, value_name = "MICROMETRES", value_parser = positive, conflicts_with_all = ["design", "texture"])]
     fill: Option<f64>,
+    #[command(flatten)]
+    colours: Colours,
     #[command(flatten)]
     placement: Placement,
     /// Scan the surface first, with the robot's own camera, inertial sensor and depth camera, and paint what it has mapped
@@ -82,6 +86,22 @@ pub struct MissionArguments {
     /// Worker threads [default: all cores]; results do not depend on it
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+}
+
+/// In which paints a picture is painted, on what wall.
+#[derive(Args)]
+struct Colours {
+    /// Paint the design in colour: cmyk, six (white, black, yellow, orange, magenta, blue), spot:N (as many paints, chosen for the picture), or a file of
+    /// paints (TOML). Each paint is a coat of its own; they lie over each other in the order that shows the picture best
+    #[arg(long, value_name = "cmyk|six|spot:N|FILE", conflicts_with = "fill")]
+    palette: Option<PaletteChoice>,
+    /// File with the paints that spot:N chooses from [default: artists' pigments]
+    #[arg(long, value_name = "FILE", requires = "palette")]
+    available: Option<PathBuf>,
+    /// The wall under the picture: sandstone, white, concrete, dark, a colour as #rrggbb, or mesh (its own colours) [default: mesh where it has colours that
+    /// are not the design, else sandstone]
+    #[arg(long, value_name = "WALL")]
+    wall: Option<Wall>,
 }
 
 /// The spray and how it moves.
@@ -294,6 +314,12 @@ impl MissionArguments {
         let mut mission = self.mission.as_deref().map(MissionFile::read).transpose()?.unwrap_or_default();
         self.apply_surface(&mut mission)?;
         self.apply_design(&mut mission)?;
+        mission.palette = self.colours.palette.clone().or(mission.palette.take());
+        mission.available = self.colours.available.clone().or(mission.available.take());
+        mission.wall = self.colours.wall.or(mission.wall);
+        if mission.palette.is_some() && self.painter.is_some() {
+            return Err("--painter: the paints of a palette are decided together: leave it out".into());
+        }
         let settings = &mut mission.settings;
         settings.seed = self.seed.unwrap_or(settings.seed);
         settings.threads = self.threads.map_or(settings.threads, usize::from);

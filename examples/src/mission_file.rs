@@ -1,6 +1,7 @@
 //! A mission as a file: all that is needed to fly it again.
 
 mod paints;
+mod picture;
 
 use std::path::{Path, PathBuf};
 
@@ -13,10 +14,12 @@ use crate::mesh_io::{MeshError, TriangleMesh, read_mesh};
 use crate::mesh_placement::{MeshPlacement, PlacementError, UpAxis, place_mesh, place_scene};
 use crate::mission::{MissionError, MissionSettings, PaintingTask};
 use crate::mission_paint::{MissionPaint, file_of_design};
+use crate::palette_choice::{PaletteChoice, PaletteError};
 use crate::region::{Region, RegionError, Scene};
 use crate::relative_path::from_folder;
 use crate::say;
 use crate::scan_flight::{self, ScanFlight, ScanFlightError, save as save_scan_flight};
+use crate::wall::Wall;
 use crate::world::rock_wall;
 use crate::{run_folder, whole_file};
 
@@ -46,6 +49,13 @@ pub struct MissionFile {
     pub region: Option<Region>,
     /// All numbers.
     pub settings: MissionSettings,
+    /// The paints of a picture in colour: `cmyk`, `six`, `spot:N` or a file of paints; the design is separated for them.
+    pub palette: Option<PaletteChoice>,
+    /// A file with the paints that `spot:N` chooses from; artists' pigments without.
+    pub available: Option<PathBuf>,
+    /// The wall under a picture in colour: `sandstone`, `white`, `concrete`, `dark`, `#rrggbb`, or `mesh`; the colours of the mesh, where it has some that
+    /// are not the design, else sandstone.
+    pub wall: Option<Wall>,
     /// Several paints, each with what it paints, in the order in which they are flown; one paint with the design above without.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub paints: Vec<MissionPaint>,
@@ -125,6 +135,12 @@ pub enum MissionFileError {
     /// Paints that cannot be flown as the file has them.
     #[error("paints: {0}")]
     Paints(String),
+    /// A palette that does not go with the rest of the file.
+    #[error("palette: {0}")]
+    Palette(&'static str),
+    /// A palette without paints.
+    #[error(transparent)]
+    PaletteFile(#[from] PaletteError),
     /// A coat that cannot be asked for.
     #[error("fill: {0}")]
     Fill(&'static str),
@@ -159,6 +175,20 @@ struct Place {
     map: Option<PathBuf>,
 }
 
+impl Place {
+    /// A task on it, told of the true surface and the map.
+    fn known(&self, task: PaintingTask) -> Result<PaintingTask, MissionError> {
+        let task = match &self.truth {
+            Some(truth) => task.on_true_surface(truth)?,
+            None => task,
+        };
+        Ok(match &self.map {
+            Some(map) => task.in_map(map.clone()),
+            None => task,
+        })
+    }
+}
+
 impl MissionFile {
     /// Reads a mission; paths in it begin at its folder.
     pub fn read(path: &Path) -> Result<Self, MissionFileError> {
@@ -177,6 +207,8 @@ impl MissionFile {
             mesh: self.mesh.map(place),
             texture: self.texture.map(place),
             design: self.design.map(|design| file_of_design(design, place)),
+            palette: self.palette.map(|palette| palette.with_file(place)),
+            available: self.available.map(place),
             region: self.region.map(|region| region.with_file(place)),
             paints: self.paints.into_iter().map(|paint| paint.with_files(place)).collect(),
             ..self
@@ -213,7 +245,7 @@ impl MissionFile {
     /// # Errors
     /// A file with several paints among others: see [`MissionFile::decide_coats`].
     pub fn decide(&self, folder: &Path) -> Result<PaintingTask, MissionFileError> {
-        if !self.paints.is_empty() {
+        if !self.paints.is_empty() || self.palette.is_some() {
             return Err(MissionFileError::Paints("several paints are several decisions".into()));
         }
         self.decide_on(&self.place(folder)?)
@@ -236,7 +268,8 @@ impl MissionFile {
     }
 
     /// Reads the design and decides.
-    fn decide_on(&self, Place { name, scene, truth, map }: &Place) -> Result<PaintingTask, MissionFileError> {
+    fn decide_on(&self, place: &Place) -> Result<PaintingTask, MissionFileError> {
+        let Place { name, scene, .. } = place;
         let settings = self.settings.clone();
         let mesh = &scene.canvas;
         let materials = mesh.materials.as_ref().filter(|materials| materials.textured() && mesh.uv.is_some());
@@ -255,15 +288,7 @@ impl MissionFile {
             (None, None, None) => Design::Strata { seed: settings.seed },
         };
         let task = PaintingTask::new(name, scene, &design, settings);
-        let task = task.and_then(|task| match truth {
-            Some(truth) => task.on_true_surface(truth),
-            None => Ok(task),
-        });
-        let task = task.map(|task| match map {
-            Some(map) => task.in_map(map.clone()),
-            None => task,
-        });
-        task.map_err(|source| self.in_mesh(source))
+        task.and_then(|task| place.known(task)).map_err(|source| self.in_mesh(source))
     }
 
     /// The design of an even coat.

@@ -49,7 +49,7 @@ impl PicturePlacement {
     }
 
     /// Width and height in metres.
-    fn size_in(&self, extent: [f64; 2], aspect: f64) -> [f64; 2] {
+    pub(crate) fn size_in(&self, extent: [f64; 2], aspect: f64) -> [f64; 2] {
         if let Some(width) = self.size {
             return [width, width / aspect];
         }

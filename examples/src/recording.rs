@@ -66,12 +66,12 @@ pub enum RecordingError {
     Encoding(String),
 }
 
-/// Writes the recording: the bare mesh first, then robot, spray and log as they come with the paint as traces, the painted mesh
+/// Writes the recording, with each paint from its time on: the bare mesh first, then robot, spray and log as they come with the paint as traces, the painted mesh
 /// in the end.
 pub fn save_recording(
     path: &Path,
     mesh: &ColouredMesh,
-    paint: PaintStyle,
+    paints: &[(f64, PaintStyle)],
     states: &[RobotState],
     log_lines: &[(f64, String)],
     origin: &Origin,
@@ -90,8 +90,17 @@ pub fn save_recording(
     recorder.write(surface, start, &mesh_scene(mesh, None))?;
     recorder.write(spray, start, &robot_scene())?;
     let mut log_lines = log_lines.iter().peekable();
-    let mut paint = PaintTraces::new(paint);
+    let mut paints = paints.iter().peekable();
+    let Some((_, style)) = paints.next() else {
+        return Err(RecordingError::Encoding("no paint is told of".into()));
+    };
+    let mut paint = PaintTraces::new(*style);
     for state in states {
+        while let Some((_, style)) = paints.next_if(|(from, _)| *from <= state.time) {
+            if let Some(trace) = paint.change(*style) {
+                recorder.write(traces, state.time, &trace)?;
+            }
+        }
         while let Some((time, message)) = log_lines.next_if(|(time, _)| *time <= state.time) {
             recorder.write(text, *time, &log_message(*time, message))?;
         }
@@ -122,7 +131,7 @@ pub fn save_recording(
             acceleration: None,
             effort: None,
         };
-        let states = vec![joint("pan", state.joints[0]), joint("tilt", state.joints[1])];
+        let states = vec![joint("pan", state.joints[0]), joint("tilt", state.joints[1]), joint("valve", state.flow)];
         recorder.write(joints, state.time, &JointStates { timestamp: stamp, joints: states })?;
         recorder.write(spray, state.time, &spray_scene(state))?;
         if let Some(trace) = paint.push(state.time, state.hit, state.flow) {
@@ -346,8 +355,8 @@ mod tests {
             (0..5).map(|k| RobotState { flow: flow(k), ..moment(f64::from(k) * 0.5) }).collect();
         let urdf = Attachment { name: "robot.urdf", media_type: "application/xml", data: b"<robot/>".to_vec() };
         let origin = Origin { seed: Some(7), attachments: vec![urdf] };
-        save_recording(&path, &mesh, paint, &states, &[(0.0, "take-off".into()), (1.0, "layer 1".into())], &origin)
-            .unwrap();
+        let log = [(0.0, "take-off".into()), (1.0, "layer 1".into())];
+        save_recording(&path, &mesh, &[(0.0, paint)], &states, &log, &origin).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         std::fs::remove_file(&path).unwrap();
         let summary = mcap::Summary::read(&bytes).unwrap().unwrap();

@@ -208,7 +208,7 @@ impl Report {
     /// Writes `report.json` and `report.md` into a folder. Refuses figures that are not finite.
     pub fn save(&self, folder: &Path) -> Result<(), ReportError> {
         save_figures(self, folder)?;
-        write(&folder.join("report.md"), &self.markdown())
+        write(&folder.join("report.md"), &self.markdown(folder))
     }
 
     /// Every figure that is asked for, with what is asked of it: the one place where the floors stand.
@@ -324,7 +324,8 @@ impl Report {
         text
     }
 
-    fn markdown(&self) -> String {
+    /// With the pictures that lie in the folder: of one paint of several there are fewer.
+    fn markdown(&self, folder: &Path) -> String {
         let mut text = format!(
             "# {} painted\n\n{} layer(s), {} strokes, {:.0} m flown in {:.0} min with the valve open {:.0} % of the time, {:.3} \
              kg of paint on {:.1} m²; computed in {:.0} s. Seed {}, version {}.\n\n",
@@ -348,7 +349,9 @@ impl Report {
             ("path.png", "Flown path, of the base coat if there are layers: vehicle orange, nozzle blue"),
             ("angles.png", "Pan, tilt, distance and normal deviation over time"),
         ] {
-            let _ = writeln!(text, "**{caption}**\n\n![{caption}]({file})\n");
+            if folder.join(file).exists() {
+                let _ = writeln!(text, "**{caption}**\n\n![{caption}]({file})\n");
+            }
         }
         text.push_str("| figure | this run | asked for | papers | |\n|---|---|---|---|---|\n");
         for check in self.checks() {
@@ -356,14 +359,13 @@ impl Report {
             let (figure, value, requirement) = (check.figure, check.value_text(), check.requirement_text());
             let _ = writeln!(text, "| {figure} | {value} | {requirement} | {} | {mark} |", check.papers);
         }
-        let _ = writeln!(
-            text,
-            "\nThe figures asked for are for the built-in rock; on other surfaces they are for orientation. All of them, in SI \
-             units, are in [report.json](report.json). The recording [mission.mcap](mission.mcap) opens in Foxglove and \
-             Rerun, the painted mesh [painted.glb](painted.glb) and the \
-             depth camera's map of it [scan.ply](scan.ply) in any mesh viewer; [trajectory.csv](trajectory.csv) has plan and \
-             flight as a table."
-        );
+        text += "\nThe figures asked for are for the built-in rock; on other surfaces they are for orientation. All of them, in SI units, are in \
+                 [report.json](report.json).\n";
+        if folder.join("mission.mcap").exists() {
+            text += "The recording [mission.mcap](mission.mcap) opens in Foxglove and Rerun, the painted mesh [painted.glb](painted.glb) and the \
+                     depth camera's map of it [scan.ply](scan.ply) in any mesh viewer; [trajectory.csv](trajectory.csv) has plan and flight as \
+                     a table.\n";
+        }
         text
     }
 }

@@ -6,12 +6,12 @@ use std::process::ExitCode;
 use clap::Parser;
 use paintcopter::exit::run_program;
 use paintcopter::interruption::Finishing;
-use paintcopter::mission::{Coats, preview, save, save_coats};
+use paintcopter::mission::{Coats, preview, preview_picture, save, save_coats};
 use paintcopter::mission_arguments::MissionArguments;
 use paintcopter::{result, say};
 
 /// Paints a surface with a simulated flying robot: unwraps it, decides what to spray, plans and flies the strokes, and shows
-/// what the paint looks like. Without arguments it paints a built-in rock wall.
+/// what the paint looks like. Without arguments it paints a mural in six paints on a built-in rock wall.
 #[derive(Parser)]
 #[command(version, after_help = "Example:\n  paintcopter --mesh bust.obj --design stripes --out out/bust")]
 struct Arguments {
@@ -31,22 +31,29 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let folder = &arguments.out;
-    let mission_file = arguments.mission.mission_file()?;
+    let mission_file = arguments.mission.mission_file()?.or_mural();
     mission_file.begin_run(folder, "paintcopter")?;
     let coats = mission_file.decide_coats(folder)?;
     if arguments.preview {
-        for coat in coats {
+        if let Some(found) = preview_picture(&coats, folder)? {
+            say!("{}", found.summary());
+            result!("{}", folder.join("expected.png").display());
+            return Ok(());
+        }
+        for coat in coats.coats {
+            std::fs::create_dir_all(&coat.folder)?;
             let found = preview(&coat.task, &coat.folder)?;
             say!("{}", found.summary());
             result!("{}", coat.folder.join("preview.png").display());
         }
         return Ok(());
     }
+    let alone = mission_file.paints.is_empty() && mission_file.palette.is_none();
     let coats = Coats::run(coats).map_err(|error| mission_file.in_mesh(error))?;
     // What is flown is not lost.
     let _finishing = Finishing::begin();
     let summary = match coats.missions().next() {
-        Some((_, mission)) if mission_file.paints.is_empty() => save(mission, folder)?.summary(),
+        Some((_, mission)) if alone => save(mission, folder)?.summary(),
         _ => save_coats(&coats, folder)?.summary(),
     };
     say!("{summary}");

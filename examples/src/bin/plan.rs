@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use paintcopter::exit::run_program;
-use paintcopter::mission::{PlannedMission, save_plan};
+use paintcopter::mission::{PlannedCoats, save_plan};
 use paintcopter::mission_arguments::MissionArguments;
 use paintcopter::{result, say};
 
@@ -33,11 +33,12 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let folder = &arguments.out;
     let mission_file = arguments.mission.mission_file()?;
     mission_file.begin_run(folder, "plan")?;
-    for coat in mission_file.decide_coats(folder)? {
-        let mission = PlannedMission::new(coat.task).map_err(|error| mission_file.in_mesh(error))?;
-        let figures = save_plan(&mission, &coat.folder)?;
+    let coats = mission_file.decide_coats(folder)?;
+    for (folder, mission) in PlannedCoats::new(coats).map_err(|error| mission_file.in_mesh(error))?.missions {
+        std::fs::create_dir_all(&folder)?;
+        let figures = save_plan(&mission, &folder)?;
         say!("{}", figures.summary());
-        result!("{}", coat.folder.join("plan.csv").display());
+        result!("{}", folder.join("plan.csv").display());
     }
     Ok(())
 }

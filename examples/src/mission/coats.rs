@@ -1,16 +1,24 @@
 //! Several paints: a mission for each, flown one after another, their films over each other.
 
 use std::path::PathBuf;
+use std::thread;
 
 use paint_net::Image;
-use paint_sim::colour::spectrum_linear_srgb;
+use paint_sim::colour::{spectrum_lab, spectrum_linear_srgb};
 use paint_sim::{Paint, Substrate};
 
+use super::colour_doses::correct_colours;
 use super::error::MissionError;
 use super::painting_task::PaintingTask;
+use super::picture_task::PictureTask;
+use super::plan::{Draft, draft, finish, replan};
 use super::planned_mission::PlannedMission;
 use super::run::Mission;
 use crate::appearance::UNIT_THICKNESS;
+
+/// Until the film of an acrylic is dry to touch at 20 °C, seconds, and until another tank is mounted.
+const DRYING_S: f64 = 900.0;
+const TOOL_CHANGE_S: f64 = 300.0;
 
 /// What was decided about one paint.
 pub struct Coat {
@@ -20,28 +28,110 @@ pub struct Coat {
     pub task: PaintingTask,
 }
 
+/// What was decided about all paints, in flying order.
+pub struct CoatTasks {
+    /// The paints.
+    pub coats: Vec<Coat>,
+    /// The picture that they are painted for, if it is one.
+    pub picture: Option<PictureTask>,
+}
+
+/// The same, planned.
+pub struct PlannedCoats {
+    /// The paints with the folders of their results.
+    pub missions: Vec<(PathBuf, PlannedMission)>,
+    picture: Option<PictureTask>,
+}
+
 /// The missions of all paints, flown. Each is complete in itself; its pictures show its paint alone.
 pub struct Coats {
     pub(super) missions: Vec<(PathBuf, Mission)>,
+    pub(super) picture: Option<PictureTask>,
+}
+
+/// How a place of the painted wall looks.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Look {
+    pub(super) linear: [f64; 3],
+    pub(super) lab: [f64; 3],
+}
+
+impl Look {
+    fn of(wall: &Substrate) -> Self {
+        Self { linear: spectrum_linear_srgb(wall.reflectance()), lab: spectrum_lab(wall.reflectance()) }
+    }
+}
+
+impl PlannedCoats {
+    /// Plans all paints; those of a picture with doses for each other.
+    ///
+    /// # Errors
+    /// As [`PlannedMission::new`]; the error of one of several paints names it.
+    pub fn new(CoatTasks { coats, picture }: CoatTasks) -> Result<Self, MissionError> {
+        let several = coats.len() > 1;
+        let named = |task: &PaintingTask, error: MissionError| {
+            if several { error.in_paint(&task.paint.name) } else { error }
+        };
+        let threads = coats.first().map_or(1, |coat| coat.task.settings.threads);
+        let tasks: Vec<&PaintingTask> = coats.iter().map(|coat| &coat.task).collect();
+        let mut drafts = each(&tasks, threads, &|task| draft(task).map_err(|error| named(task, error)))?;
+        if let Some(picture) = &picture {
+            let mut open: Vec<(&PaintingTask, &mut Draft)> = tasks.iter().copied().zip(&mut drafts).collect();
+            correct_colours(&mut open, picture)?;
+        }
+        let again = picture.is_some();
+        let finished = |(task, mut draft): (&PaintingTask, Draft)| {
+            let done = if again { replan(task, &mut draft) } else { Ok(()) };
+            done.and_then(|()| finish(task, draft)).map_err(|error| named(task, error))
+        };
+        let work: Vec<_> = tasks.iter().copied().zip(drafts).collect();
+        let planned = each(work, threads, &finished)?;
+        let missions = coats.into_iter().zip(planned).map(|(Coat { folder, task }, planned)| {
+            let mission = PlannedMission::checked(task, planned);
+            mission.map(|mission| (folder, mission))
+        });
+        Ok(Self { missions: missions.collect::<Result<_, MissionError>>()?, picture })
+    }
+}
+
+/// Work on every item, as many at once as there are threads; in their order.
+fn each<T: Send, R: Send>(
+    items: impl IntoIterator<Item = T>,
+    threads: usize,
+    work: &(dyn Fn(T) -> Result<R, MissionError> + Sync),
+) -> Result<Vec<R>, MissionError> {
+    let mut results = Vec::new();
+    let mut items = items.into_iter().peekable();
+    while items.peek().is_some() {
+        let batch: Vec<T> = items.by_ref().take(threads.max(1)).collect();
+        results.extend(thread::scope(|scope| {
+            let handles: Vec<_> = batch.into_iter().map(|item| scope.spawn(move || work(item))).collect();
+            let join = |handle: thread::ScopedJoinHandle<'_, Result<R, MissionError>>| {
+                handle.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+            };
+            handles.into_iter().map(join).collect::<Result<Vec<R>, MissionError>>()
+        })?);
+    }
+    Ok(results)
 }
 
 impl Coats {
     /// Plans all paints, then flies them in their order.
     ///
     /// # Errors
-    /// As [`Mission::run`]; the error of one of several paints names it.
-    pub fn run(coats: Vec<Coat>) -> Result<Self, MissionError> {
-        let several = coats.len() > 1;
-        let each = |Coat { folder, task }| {
-            let paint = task.settings.paint;
-            let named = |error: MissionError| if several { error.in_paint(paint) } else { error };
-            Ok((folder, PlannedMission::new(task).map_err(named)?))
-        };
+    /// As [`PlannedCoats::new`] and [`Mission::fly`].
+    pub fn run(tasks: CoatTasks) -> Result<Self, MissionError> {
         // What cannot be planned is known before anything is flown.
-        let planned: Vec<(PathBuf, PlannedMission)> =
-            coats.into_iter().map(each).collect::<Result<_, MissionError>>()?;
+        PlannedCoats::new(tasks).and_then(Self::fly)
+    }
+
+    /// Flies the paints in their order.
+    ///
+    /// # Errors
+    /// As [`Mission::fly`].
+    pub fn fly(PlannedCoats { missions, picture }: PlannedCoats) -> Result<Self, MissionError> {
         let fly = |(folder, planned)| Ok((folder, Mission::fly(planned)?));
-        Ok(Self { missions: planned.into_iter().map(fly).collect::<Result<_, MissionError>>()? })
+        Ok(Self { missions: missions.into_iter().map(fly).collect::<Result<_, MissionError>>()?, picture })
     }
 
     /// The missions in flying order, each with the folder of its results.
@@ -50,28 +140,46 @@ impl Coats {
     }
 
     /// The wall on every pixel under the depths that a mission stands for, the first paint lowest; `None` beside the surface.
-    pub(super) fn walls(&self, depth: impl Fn(&Mission) -> Image) -> Result<Vec<Option<Substrate>>, MissionError> {
-        let ground = paint_sim::Substrate::sandstone();
-        let layers: Vec<(Paint, Image)> = self
-            .missions
-            .iter()
-            .map(|(_, mission)| Ok((mission.task.settings.paint.paint(UNIT_THICKNESS)?, depth(mission))))
-            .collect::<Result<_, MissionError>>()?;
+    pub(super) fn looks(&self, depth: impl Fn(&Mission) -> Image) -> Result<Vec<Option<Look>>, MissionError> {
         let Some((_, first)) = self.missions.first() else { return Ok(Vec::new()) };
-        let covered = first.task.coverage.data();
-        let wall = |(k, covered): (usize, &f64)| {
-            let films = layers.iter().map(|(paint, depth)| (paint, depth.data()[k] * UNIT_THICKNESS));
-            (*covered > 0.0).then(|| over_each_other(films, &ground)).transpose()
-        };
-        covered.iter().enumerate().map(wall).collect::<Result<_, paint_sim::Error>>().map_err(MissionError::from)
+        let layers: Vec<(&Paint, Image)> =
+            self.missions.iter().map(|(_, mission)| (&mission.task.paint.paint, depth(mission))).collect();
+        looks(&layers, &first.task.coverage, self.picture.as_ref())
     }
 }
 
-/// Linear sRGB as three pictures; the bare wall beside the surface, so that its edge is not darker.
-pub(super) fn linear(walls: &[Option<Substrate>], width: usize, height: usize) -> Result<[Image; 3], MissionError> {
-    let bare = spectrum_linear_srgb(paint_sim::Substrate::sandstone().reflectance());
-    let colours: Vec<[f64; 3]> =
-        walls.iter().map(|wall| wall.as_ref().map_or(bare, |wall| spectrum_linear_srgb(wall.reflectance()))).collect();
+/// The wall on every pixel under some depths of paints, the first lowest; `None` beside the surface.
+pub(super) fn looks(
+    layers: &[(&Paint, Image)],
+    coverage: &Image,
+    picture: Option<&PictureTask>,
+) -> Result<Vec<Option<Look>>, MissionError> {
+    let mut grounds = vec![Substrate::sandstone(); coverage.data().len()];
+    if let Some(picture) = picture {
+        for (place, &pixel) in picture.pixels.iter().enumerate() {
+            grounds[pixel] = Substrate::new(*picture.wall.at(place))?;
+        }
+    }
+    let look = |(k, covered): (usize, &f64)| {
+        let films = layers.iter().map(|(paint, depth)| (*paint, depth.data()[k] * UNIT_THICKNESS));
+        let wall = (*covered > 0.0).then(|| over_each_other(films, &grounds[k])).transpose()?;
+        Ok(wall.as_ref().map(Look::of))
+    };
+    coverage.data().iter().enumerate().map(look).collect::<Result<_, paint_sim::Error>>().map_err(MissionError::from)
+}
+
+/// Times that the tank is changed between flights of these durations, seconds, and how long all takes: while one film dries, another tank is mounted.
+pub(super) fn time_of_coats(flights: &[f64]) -> (usize, f64) {
+    let changes = flights.len().saturating_sub(1);
+    (changes, flights.iter().sum::<f64>() + changes as f64 * DRYING_S.max(TOOL_CHANGE_S))
+}
+
+/// Linear sRGB as three pictures; the mean beside the surface, so that its edge is not darker.
+pub(super) fn linear(looks: &[Option<Look>], width: usize, height: usize) -> Result<[Image; 3], MissionError> {
+    let known: Vec<[f64; 3]> = looks.iter().flatten().map(|look| look.linear).collect();
+    let mean: [f64; 3] =
+        std::array::from_fn(|c| known.iter().map(|colour| colour[c]).sum::<f64>() / known.len().max(1) as f64);
+    let colours: Vec<[f64; 3]> = looks.iter().map(|look| look.map_or(mean, |look| look.linear)).collect();
     let channel = |c: usize| Image::new(width, height, colours.iter().map(|colour| colour[c]).collect());
     Ok([channel(0)?, channel(1)?, channel(2)?])
 }
@@ -87,7 +195,6 @@ fn over_each_other<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use paint_sim::colour::spectrum_lab;
     use paint_sim::paint::PaintName;
 
     #[test]

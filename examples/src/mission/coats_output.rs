@@ -5,20 +5,22 @@ use std::path::Path;
 
 use nalgebra::Point3;
 use paint_net::Image;
-use paint_sim::Substrate;
-use paint_sim::colour::ciede2000;
-use paint_sim::colour::spectrum_lab;
+use paint_sim::colour::{ciede2000, encode_srgb8};
 use paint_sim::surface::Hit;
 use serde::Serialize;
 
-use super::coats::{Coats, linear};
+use super::coats::{Coats, Look, linear, time_of_coats};
 use super::error::MissionError;
 use super::figures::mean;
-use super::mission_output::{save, write};
+use super::mission_output::{save, save_flights, save_flown_path};
+use super::painted_mesh::save_painted_mesh;
+use super::picture_figures::save_out_of_gamut;
+use super::picture_figures::{PictureFigures, wanted_looks};
 use super::run::Mission;
 use super::shading::shading_of_colours;
 use super::view::{camera, picture_of, view};
-use crate::pictures::Rgb;
+use super::written_file::{unwritable, write};
+use crate::pictures::{COLOUR_DIFFERENCE, Rgb, save_error_map};
 use crate::progress::Stage;
 use crate::report::{Report, save_figures};
 
@@ -37,7 +39,7 @@ pub struct CoatsFigures {
     /// Seed of everything random.
     pub seed: u64,
     /// The paints in flying order.
-    pub paints: Vec<&'static str>,
+    pub paints: Vec<String>,
     /// Folder of each one's results.
     pub folders: Vec<String>,
     /// Time in the air of each.
@@ -50,6 +52,10 @@ pub struct CoatsFigures {
     pub ssim_painted_by_paint: Vec<f64>,
     /// Time in the air.
     pub flight_time_s: f64,
+    /// Times that the tank is changed.
+    pub tool_changes: usize,
+    /// From the first start to the last landing: in the air, and on the ground while a film dries and the tank is changed.
+    pub mission_time_s: f64,
     /// Length of the vehicle's paths.
     pub path_length_m: f64,
     /// Paint that stayed on the surface.
@@ -64,6 +70,9 @@ pub struct CoatsFigures {
     pub ciede2000_mean: f64,
     /// The same where paint is wanted.
     pub ciede2000_mean_where_wanted: f64,
+    /// What a picture in colour came to.
+    #[serde(flatten)]
+    pub picture: Option<PictureFigures>,
 }
 
 impl CoatsFigures {
@@ -79,21 +88,29 @@ impl CoatsFigures {
             );
         }
         let (minutes, difference) = (self.flight_time_s / 60.0, self.ciede2000_mean_where_wanted);
-        let _ = writeln!(text, "  all        {minutes:6.1} min, CIEDE2000 {difference:.2} where paint is wanted");
+        let hours = self.mission_time_s / 3600.0;
+        let _ = writeln!(
+            text,
+            "  all        {minutes:6.1} min in the air, {hours:.1} h with tool changes and drying, CIEDE2000 {difference:.2} where paint is wanted"
+        );
+        if let Some(picture) = &self.picture {
+            text += &picture.summary();
+        }
         text
     }
 
     fn markdown(&self) -> String {
         let mut text = format!(
             "# {} painted in {} paints\n\n![The painted surface](painted_view.png)\n\n**Wanted**\n\n![Wanted](wanted.png)\n\n**Painted**\n\n\
-             ![Painted](painted.png)\n\nMean CIEDE2000 {:.2}, {:.2} where paint is wanted; {} collisions, {} limit violations.\n\n\
+             ![Painted](painted.png)\n\nMean CIEDE2000 {:.2}, {:.2} where paint is wanted; {} collisions, {} limit violations.\n\n{}\
              | paint | results | minutes | kg | not planned | SSIM |\n|---|---|---|---|---|---|\n",
             self.surface,
             self.paints.len(),
             self.ciede2000_mean,
             self.ciede2000_mean_where_wanted,
             self.collisions,
-            self.limit_violations
+            self.limit_violations,
+            self.picture.as_ref().map_or_else(String::new, PictureFigures::markdown)
         );
         for (k, (paint, folder)) in self.paints.iter().zip(&self.folders).enumerate() {
             let (minutes, kilograms) = (self.flight_time_s_by_paint[k] / 60.0, self.paint_deposited_kg_by_paint[k]);
@@ -111,11 +128,15 @@ impl CoatsFigures {
 pub fn save_coats(coats: &Coats, folder: &Path) -> Result<CoatsFigures, MissionError> {
     let mut reports = Vec::new();
     for (folder, mission) in coats.missions() {
+        std::fs::create_dir_all(folder).map_err(unwritable(folder))?;
         reports.push(save(mission, folder)?);
     }
     let stage = Stage::start("all paints");
-    let painted = coats.walls(Mission::painted_depth)?;
-    let wanted = coats.walls(Mission::wanted_depth)?;
+    let painted = coats.looks(Mission::painted_depth)?;
+    let wanted = match &coats.picture {
+        Some(picture) => wanted_looks(picture, painted.len()),
+        None => coats.looks(Mission::wanted_depth)?,
+    };
     save_pictures(coats, &wanted, &painted, folder)?;
     let figures = figures(coats, &reports, &wanted, &painted);
     write(&folder.join("report.md"), &figures.markdown())?;
@@ -126,49 +147,65 @@ pub fn save_coats(coats: &Coats, folder: &Path) -> Result<CoatsFigures, MissionE
 
 fn save_pictures(
     coats: &Coats,
-    wanted: &[Option<Substrate>],
-    painted: &[Option<Substrate>],
+    wanted: &[Option<Look>],
+    painted: &[Option<Look>],
     folder: &Path,
 ) -> Result<(), MissionError> {
     let Some((_, mission)) = coats.missions().next() else { return Ok(()) };
     let task = &mission.task;
     let (width, height) = (task.wanted.width(), task.wanted.height());
     for (walls, name) in [(wanted, "wanted.png"), (painted, "painted.png")] {
-        let pixels = walls.iter().map(|wall| wall.as_ref().map_or(BACKGROUND, |wall| wall.srgb().rgb));
+        let pixels = walls.iter().map(|look| look.map_or(BACKGROUND, |look| look.linear.map(|c| encode_srgb8(c).0)));
         let picture = Rgb::from_pixels(width, height, pixels);
         picture.enlarged((1400 / width as u32).clamp(1, 8)).save(&folder.join(name))?;
+    }
+    if let Some(picture) = &coats.picture {
+        save_out_of_gamut(picture, wanted, [width, height], folder)?;
     }
     let colours: [Image; 3] = linear(painted, width, height)?;
     let corners: Vec<Point3<f64>> = task.surface.disk().positions().iter().map(|p| Point3::from(*p)).collect();
     let shade = |hit: &Hit| shading_of_colours(task, &colours, hit);
     let frame = view(task, &camera(task, &corners)?, &shade)?;
-    Ok(picture_of(&frame).save(&folder.join("painted_view.png"))?)
+    picture_of(&frame).save(&folder.join("painted_view.png"))?;
+    save_flown_path(mission, &shade, folder)?;
+    let texel = (task.settings.texel, "m");
+    save_error_map(&folder.join("error.png"), width, &differences(wanted, painted), texel, &COLOUR_DIFFERENCE)?;
+    let bytes = |look: &Option<Look>| look.map(|look| look.linear.map(|c| encode_srgb8(c).0));
+    let vertices = save_painted_mesh(task, &painted.iter().map(bytes).collect::<Vec<_>>(), folder)?;
+    let missions: Vec<&Mission> = coats.missions().map(|(_, mission)| mission).collect();
+    save_flights(&missions, &vertices, folder)
 }
 
-fn figures(
-    coats: &Coats,
-    reports: &[Report],
-    wanted: &[Option<Substrate>],
-    painted: &[Option<Substrate>],
-) -> CoatsFigures {
+/// CIEDE2000 per pixel, `None` beside the surface.
+fn differences(wanted: &[Option<Look>], painted: &[Option<Look>]) -> Vec<Option<f64>> {
+    let difference =
+        |(wanted, painted): (&Option<Look>, &Option<Look>)| Some(ciede2000((*painted)?.lab, (*wanted)?.lab));
+    wanted.iter().zip(painted).map(difference).collect()
+}
+
+fn figures(coats: &Coats, reports: &[Report], wanted: &[Option<Look>], painted: &[Option<Look>]) -> CoatsFigures {
     let of = |value: fn(&Report) -> f64| reports.iter().map(value).collect::<Vec<f64>>();
     let sum = |value: fn(&Report) -> f64| reports.iter().map(value).sum::<f64>();
     let depths: Vec<Image> = coats.missions().map(|(_, mission)| mission.wanted_depth()).collect();
     let is_wanted = |k: usize| depths.iter().any(|depth| depth.data()[k] > WANTED);
-    let lab = |walls: &[Option<Substrate>], k: usize| Some(spectrum_lab(walls[k].as_ref()?.reflectance()));
-    let difference = |k: usize| Some(ciede2000(lab(painted, k)?, lab(wanted, k)?));
+    let differences = differences(wanted, painted);
+    let difference = |k: usize| differences[k];
+    let flight_times = of(|r| r.flight_time_s);
+    let (tool_changes, mission_time_s) = time_of_coats(&flight_times);
     let name = |folder: &Path| folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     CoatsFigures {
         version: env!("CARGO_PKG_VERSION"),
         surface: reports.first().map_or_else(String::new, |report| report.surface.clone()),
         seed: reports.first().map_or(0, |report| report.seed),
-        paints: coats.missions().map(|(_, mission)| mission.task.settings.paint.as_str()).collect(),
+        paints: coats.missions().map(|(_, mission)| mission.task.paint.name.clone()).collect(),
         folders: coats.missions().map(|(folder, _)| name(folder)).collect(),
-        flight_time_s_by_paint: of(|r| r.flight_time_s),
+        flight_time_s_by_paint: flight_times,
         paint_deposited_kg_by_paint: of(|r| r.paint_deposited_kg),
         unreachable_paint_share_by_paint: of(|r| r.unreachable_paint_share),
         ssim_painted_by_paint: of(|r| r.ssim_painted),
         flight_time_s: sum(|r| r.flight_time_s),
+        tool_changes,
+        mission_time_s,
         path_length_m: sum(|r| r.path_length_m),
         paint_deposited_kg: sum(|r| r.paint_deposited_kg),
         strokes: reports.iter().map(|r| r.strokes).sum(),
@@ -176,5 +213,6 @@ fn figures(
         limit_violations: reports.iter().map(|r| r.limit_violations).sum(),
         ciede2000_mean: mean((0..wanted.len()).filter_map(difference)),
         ciede2000_mean_where_wanted: mean((0..wanted.len()).filter(|k| is_wanted(*k)).filter_map(difference)),
+        picture: coats.picture.as_ref().map(|picture| PictureFigures::new(coats, picture, painted)),
     }
 }

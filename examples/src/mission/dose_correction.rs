@@ -102,7 +102,7 @@ pub(super) fn correct_ink(flights: &mut [(&mut [Target], &Plan)], task: &Paintin
 }
 
 /// Where the valve is open: flight, target, and how far it is to the next one.
-fn sprayed(flights: &[(&mut [Target], &Plan)]) -> Vec<(usize, usize, f64)> {
+pub(super) fn sprayed(flights: &[(&mut [Target], &Plan)]) -> Vec<(usize, usize, f64)> {
     let of_flight = |(flight, (targets, plan)): (usize, &(&mut [Target], &Plan))| {
         let open = (0..targets.len().saturating_sub(1)).filter(|&k| plan.flow[k] > 0.0);
         open.map(|k| (flight, k, (targets[k + 1].point - targets[k].point).norm())).collect::<Vec<_>>()
@@ -111,7 +111,7 @@ fn sprayed(flights: &[(&mut [Target], &Plan)]) -> Vec<(usize, usize, f64)> {
 }
 
 /// Which share of what is sprayed after each target falls on which place of a film.
-fn shares(
+pub(super) fn shares(
     flights: &[(&mut [Target], &Plan)],
     sprayed: &[(usize, usize, f64)],
     film: &Film,

@@ -3,11 +3,11 @@
 use crate::appearance::AppearanceError;
 use crate::design::DesignError;
 use crate::onboard::LocalisationError;
+use crate::palette_choice::PaletteError;
 use crate::pictures::PictureError;
 use crate::recording::RecordingError;
 use crate::report::ReportError;
 use crate::surface::SurfaceError;
-use paint_sim::paint::PaintName;
 
 /// Why a mission could not be finished.
 #[derive(Debug, thiserror::Error)]
@@ -42,6 +42,9 @@ pub enum MissionError {
     /// The design does not fit the mesh.
     #[error(transparent)]
     Design(#[from] DesignError),
+    /// The paints of a picture.
+    #[error(transparent)]
+    Palette(#[from] PaletteError),
     /// The painter refused.
     #[error("painter: {0}")]
     Painter(#[from] paint_net::Error),
@@ -67,7 +70,7 @@ pub enum MissionError {
     #[error("{paint}: {source}")]
     OfPaint {
         /// The paint.
-        paint: &'static str,
+        paint: String,
         /// What is wrong.
         source: Box<MissionError>,
     },
@@ -133,7 +136,7 @@ pub enum MissionError {
 impl MissionError {
     /// The same with the paint whose mission it is.
     #[must_use]
-    pub fn in_paint(self, paint: PaintName) -> Self {
-        Self::OfPaint { paint: paint.as_str(), source: Box::new(self) }
+    pub fn in_paint(self, paint: &str) -> Self {
+        Self::OfPaint { paint: paint.to_owned(), source: Box::new(self) }
     }
 }

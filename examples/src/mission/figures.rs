@@ -15,7 +15,6 @@ use super::run::Mission;
 use super::seams::likeness;
 use super::settings::{MissionSettings, PainterChoice};
 use crate::adapters::{MeshSurface, Robot};
-use crate::appearance::DENSITY;
 use crate::onboard::LocalisationFigures;
 use crate::report::{Report, TimeFigures, peak_resident_bytes};
 
@@ -35,7 +34,7 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
 
     let balance = mission.film.mass_balance();
     let on_texels: u64 = mission.film.volumes().iter().sum();
-    let kilograms = |quanta: u64| quanta as f64 * QUANTUM * DENSITY;
+    let kilograms = |quanta: u64| quanta as f64 * QUANTUM * mission.task.paint.density;
     let unaccounted = (i128::from(balance.emitted) - i128::from(on_texels) - i128::from(balance.overspray)).abs();
 
     let canvas = mission.task.layers.last().map_or(&mission.task.wanted, |l| &l.ink);
@@ -116,7 +115,7 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         onboard_cpu_s_per_s: own.map(|own| own.cpu.as_secs_f64() / flight_time),
         film_estimate_error_share: mission.looked.map(|looked| looked.film_error),
         film_estimate_seen_share: mission.looked.map(|looked| looked.film_seen),
-        paint_missing_kg: mission.looked.map(|looked| looked.missing * DENSITY),
+        paint_missing_kg: mission.looked.map(|looked| looked.missing * mission.task.paint.density),
         darker_than_wanted_share: darker_than_wanted::share(mission)?,
         seam_length_m: mission.task.surface.disk().seam_length(),
         ssim_painted_at_seams: seams.as_ref().map(|s| s.near),

@@ -6,7 +6,6 @@ use paint_sim::flight::FlightLog;
 use super::error::MissionError;
 use super::nozzle::spray_model;
 use super::painting_task::PaintingTask;
-use crate::appearance::UNIT_THICKNESS;
 use crate::onboard::{LocalisedFlight, read_map};
 use crate::simulated_sensors::{PaintedFront, SHOT_STEP, SimulatedCamera};
 
@@ -17,8 +16,7 @@ pub(super) fn camera_before<'a, 'b>(
 ) -> Result<SimulatedCamera<'a>, MissionError> {
     let PaintingTask { settings, .. } = task;
     let towards = Vector3::x_axis();
-    let paint = settings.paint.paint(UNIT_THICKNESS)?;
-    let mut painted = PaintedFront::new(task.met(), &towards, spray_model(settings), &paint)?;
+    let mut painted = PaintedFront::new(task.met(), &towards, spray_model(settings), &task.paint.paint)?;
     let shots: Vec<_> = flights.flat_map(|flight| flight.shots(SHOT_STEP)).collect();
     painted.spray(&shots, task.met(), settings.threads)?;
     // The same light and stone as in the scan.

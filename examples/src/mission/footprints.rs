@@ -43,6 +43,13 @@ impl<'a> Footprints<'a> {
     /// Depth on each pixel per unit of a spray's volume, stroke by stroke; nothing for a spray that finds no surface under it. A spray is the way
     /// through its cell: two shots at the Gauss points spread as far.
     pub(super) fn of(&self, strokes: &[Stroke]) -> Vec<SurfaceFootprint> {
+        let mut footprints = self.on_texels(strokes);
+        footprints.iter_mut().flatten().for_each(|(k, _)| *k = self.pixels[*k as usize] as u32);
+        footprints
+    }
+
+    /// The same on the texels of the film.
+    pub(super) fn on_texels(&self, strokes: &[Stroke]) -> Vec<SurfaceFootprint> {
         let texel = self.settings.texel;
         let volume = self.kernel.mass() * texel * texel;
         let stand_off = self.settings.planner.nozzle.stand_off;
@@ -67,7 +74,7 @@ impl<'a> Footprints<'a> {
         let mut of_cells = shares.chunks(2);
         let depth = |&(k, share): &(u32, f64)| {
             let k = k as usize;
-            (self.pixels[k] as u32, (0.5 * share * volume / self.film.texels()[k].area) as f32)
+            (k as u32, (0.5 * share * volume / self.film.texels()[k].area) as f32)
         };
         let footprint = |cell: &Option<[Target; 2]>| {
             let own = cell.as_ref().and_then(|_| of_cells.next()).unwrap_or_default();

@@ -14,7 +14,6 @@ use super::flight_sensors::{camera_before, localised_flight};
 use super::fly::{LayerFlight, localisation_noise};
 use super::painting_task::PaintingTask;
 use super::settings::LocalisationChoice;
-use crate::appearance::UNIT_THICKNESS;
 use crate::progress::Stage;
 use crate::scan_flight::route::along;
 use crate::simulated_sensors::{SEEN, SimulatedCamera};
@@ -35,7 +34,7 @@ pub(super) fn look(
     bare: &[bool],
 ) -> Result<Vec<Option<FilmEstimate>>, MissionError> {
     let stage = Stage::start("look");
-    let paint = task.settings.paint.paint(UNIT_THICKNESS)?;
+    let paint = &task.paint.paint;
     let before = photograph(task, camera_before(task, std::iter::empty())?, 1)?;
     stage.share(0.5);
     let after = photograph(task, camera_before(task, flights.iter().map(|layer| &layer.flight))?, 2)?;
@@ -43,7 +42,7 @@ pub(super) fn look(
     let light: Vec<f64> = before.light().iter().flatten().map(|texel| texel.log.exp()).collect();
     let ground = light.iter().sum::<f64>() / light.len().max(1) as f64;
     let enough = bare.iter().filter(|bare| **bare).count() >= LEAST_BARE;
-    let told = estimate_film(&before, &after, enough.then_some(bare), &GreyPaint::at(&paint, SEEN), ground)?;
+    let told = estimate_film(&before, &after, enough.then_some(bare), &GreyPaint::at(paint, SEEN), ground)?;
     let seen = told.iter().flatten().count();
     stage.done(&format!("{:.1} % of the surface seen", 100.0 * seen as f64 / told.len().max(1) as f64));
     Ok(told)

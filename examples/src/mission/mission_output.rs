@@ -5,25 +5,26 @@ use std::path::Path;
 use nalgebra::Point3;
 use paint_net::Image;
 use paint_sim::flight::FlightSample;
+use paint_sim::render::Shading;
 use paint_sim::surface::Hit;
 use tsdf_hash::mesh::Mesh;
 
 use super::error::MissionError;
 use super::figures::report;
 use super::inspect::inspect;
+use super::painted_mesh::save_painted_mesh;
 use super::painting_task::PaintingTask;
 use super::path_view::save_path;
 use super::run::Mission;
 use super::settings::PainterChoice;
-use super::shading::{shading, vertex_colours};
+use super::shading::shading;
 use super::trajectory_table::trajectory_table;
 use super::view::{camera, picture_of, view};
+use super::written_file::{unwritable, write};
 use crate::mesh_io::{PlyMesh, write_ply};
 use crate::pictures::{COLOUR_DIFFERENCE, ErrorScale, Panel, Rgb, save_curves, save_error_map};
 use crate::progress::Stage;
 use crate::recording::{ColouredMesh, RobotState, save_recording};
-use crate::textured_mesh::{TexturedMesh, with_gutter};
-use crate::whole_file;
 
 /// Colour beside the surface in the texture pictures.
 const BACKGROUND: [u8; 3] = [255, 255, 255];
@@ -45,25 +46,22 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
     let stage = Stage::start("pictures");
     save_textures(mission, folder)?;
     stage.share(0.2);
-    let colours = vertex_colours(&mission.task, &mission.painted_depth());
-    let positions = mission.task.surface.vertices();
-    let faces = mission.task.surface.disk().faces();
-    let ply = folder.join("surface.ply");
-    write_ply(&ply, &PlyMesh { positions: &positions, normals: None, colours: &colours, faces })
-        .map_err(unwritable(&ply))?;
-    stage.share(0.4);
-    save_views(mission, folder)?;
-    stage.share(0.8);
-    save_angles(mission, &folder.join("angles.png"))?;
-    write(&folder.join("trajectory.csv"), &trajectory_table(mission))?;
-    write(&folder.join("robot.urdf"), &mission.task.urdf())?;
-    save_textured_mesh(mission, folder)?;
-    save_mcap(
-        mission,
-        folder,
-        &ColouredMesh { positions: &positions, faces, colours: &colours, bare: mission.task.appearance.srgb(0.0) },
-    )?;
-    stage.done(&folder.display().to_string());
+    if mission.task.of_picture {
+        // Its surface and its flight are shown with those of the other paints.
+        save_angles(&[mission], folder)?;
+        write(&folder.join("trajectory.csv"), &trajectory_table(&[mission]))?;
+        stage.done(&folder.display().to_string());
+    } else {
+        let colours = save_painted_mesh(&mission.task, &page_colours(&mission.task, &mission.painted_depth()), folder)?;
+        stage.share(0.4);
+        let painted = mission.painted_depth();
+        painted_view(&mission.task, &painted)?.save(&folder.join("painted_view.png"))?;
+        let shade = |hit: &Hit| shading(&mission.task, &painted, hit);
+        save_flown_path(mission, &shade, folder)?;
+        stage.share(0.8);
+        save_flights(&[mission], &colours, folder)?;
+        stage.done(&folder.display().to_string());
+    }
 
     let stage = Stage::start("scan");
     let found = inspect(mission)?;
@@ -100,6 +98,12 @@ fn save_textures(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
     Ok(())
 }
 
+/// What this depth of paint looks like on the page, `None` beside the surface.
+pub(super) fn page_colours(task: &PaintingTask, depth: &Image) -> Vec<Option<[u8; 3]>> {
+    let colour = |(covered, depth): (&f64, &f64)| (*covered > 0.0).then(|| task.appearance.srgb(*depth));
+    task.coverage.data().iter().zip(depth.data()).map(colour).collect()
+}
+
 /// The chart with this depth of paint on its pixels.
 pub(super) fn texture(task: &PaintingTask, depth: &Image) -> Rgb {
     let (width, height) = (depth.width(), depth.height());
@@ -116,26 +120,38 @@ pub(super) fn painted_view(task: &PaintingTask, painted: &Image) -> Result<Rgb, 
     Ok(picture_of(&view(task, &camera(task, &corners)?, &shade)?))
 }
 
-fn save_views(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
-    let painted = mission.painted_depth();
-    painted_view(&mission.task, &painted)?.save(&folder.join("painted_view.png"))?;
-
-    // Of layers the base coat alone: all of them on top of each other hide the surface and one another.
+/// The way of the first flight before the surface: of several layers the base coat alone, as all of them hide the surface and one another.
+pub(super) fn save_flown_path(
+    mission: &Mission,
+    shade: &(dyn Fn(&Hit) -> Shading + Sync),
+    folder: &Path,
+) -> Result<(), MissionError> {
     let Some(base) = mission.flights.first() else { return Ok(()) };
     let path = |of: &dyn Fn(&FlightSample) -> Point3<f64>| -> Vec<Point3<f64>> {
         base.flight.samples.iter().step_by(10).map(of).collect()
     };
     let vehicle = path(&|s| s.world_from_body.translation.vector.into());
     let nozzle = path(&|s| s.nozzle);
-    save_path(&mission.task, &painted, nozzle, vehicle, &folder.join("path.png"))
+    save_path(&mission.task, shade, nozzle, vehicle, &folder.join("path.png"))
 }
 
-fn save_angles(mission: &Mission, path: &Path) -> Result<(), MissionError> {
+/// The flights of some missions, one after the other: `angles.png`, `trajectory.csv`, `mission.mcap`; with the colours of the vertices in the end.
+pub(super) fn save_flights(missions: &[&Mission], colours: &[[u8; 3]], folder: &Path) -> Result<(), MissionError> {
+    save_angles(missions, folder)?;
+    write(&folder.join("trajectory.csv"), &trajectory_table(missions))?;
+    if let Some(mission) = missions.first() {
+        write(&folder.join("robot.urdf"), &mission.task.urdf())?;
+    }
+    save_mcap(missions, colours, folder)
+}
+
+fn save_angles(missions: &[&Mission], folder: &Path) -> Result<(), MissionError> {
     let mut curves: [Vec<(f64, f64)>; 6] = std::array::from_fn(|_| Vec::new());
-    let total: usize = mission.flights.iter().map(|f| f.flight.samples.len()).sum();
+    let flights = || missions.iter().flat_map(|mission| &mission.flights);
+    let total: usize = flights().map(|f| f.flight.samples.len()).sum();
     let stride = (total / CURVE_POINTS).max(1);
     let mut start = 0.0;
-    for f in &mission.flights {
+    for f in flights() {
         for s in f.flight.samples.iter().step_by(stride) {
             let minutes = (start + s.time) / 60.0;
             let open = |v: f64| if s.flow > 0.0 { v } else { f64::NAN };
@@ -158,55 +174,41 @@ fn save_angles(mission: &Mission, path: &Path) -> Result<(), MissionError> {
         Panel { label: "distance, cm", curves: vec![("nozzle to surface, valve open", distance)] },
         Panel { label: "off the normal, cm", curves: vec![("planned nozzle", deviation)] },
     ];
-    save_curves(path, "Pan-tilt unit and nozzle over the mission", "time, min", &panels)?;
+    save_curves(&folder.join("angles.png"), "Pan-tilt unit and nozzle over the mission", "time, min", &panels)?;
     Ok(())
 }
 
-fn save_mcap(mission: &Mission, folder: &Path, mesh: &ColouredMesh) -> Result<(), MissionError> {
-    let mut states = Vec::new();
-    let mut log_lines = Vec::new();
+fn save_mcap(missions: &[&Mission], colours: &[[u8; 3]], folder: &Path) -> Result<(), MissionError> {
+    let Some(task) = missions.first().map(|mission| &mission.task) else { return Ok(()) };
+    let (mut states, mut log_lines, mut paints) = (Vec::new(), Vec::new(), Vec::new());
     let mut start = 0.0;
-    for (k, f) in mission.flights.iter().enumerate() {
-        let strokes = f.route.strokes;
-        log_lines.push((start, format!("layer {} of {}: {strokes} strokes", k + 1, mission.flights.len())));
-        let stride = (RECORDING_STEP / f.flight.interval).round().max(1.0) as usize;
-        states.extend(f.flight.samples.iter().step_by(stride).map(|s| RobotState {
-            time: start + s.time,
-            world_from_body: s.world_from_body,
-            arm: mission.arm(s),
-            joints: s.pan_tilt,
-            hit: s.hit,
-            flow: s.flow,
-        }));
-        start += f.plan.trajectory.duration();
+    for mission in missions {
+        paints.push((start, mission.task.paint_style()));
+        if missions.len() > 1 {
+            log_lines.push((start, format!("paint: {}", mission.task.paint.name)));
+        }
+        for (k, f) in mission.flights.iter().enumerate() {
+            let strokes = f.route.strokes;
+            log_lines.push((start, format!("layer {} of {}: {strokes} strokes", k + 1, mission.flights.len())));
+            let stride = (RECORDING_STEP / f.flight.interval).round().max(1.0) as usize;
+            states.extend(f.flight.samples.iter().step_by(stride).map(|s| RobotState {
+                time: start + s.time,
+                world_from_body: s.world_from_body,
+                arm: mission.arm(s),
+                joints: s.pan_tilt,
+                hit: s.hit,
+                flow: s.flow,
+            }));
+            start += f.plan.trajectory.duration();
+        }
     }
-    let origin = mission.task.origin(folder);
-    save_recording(&folder.join("mission.mcap"), mesh, mission.task.paint_style(), &states, &log_lines, &origin)?;
-    Ok(())
-}
-
-/// The painted part of the surface with the paint as its texture: `painted.glb`, and `painted.obj` with its material.
-fn save_textured_mesh(mission: &Mission, folder: &Path) -> Result<(), MissionError> {
-    let painted = mission.painted_depth();
-    let (width, height) = (painted.width(), painted.height());
-    let pixel =
-        |k: usize| (mission.task.coverage.data()[k] > 0.0).then(|| mission.task.appearance.srgb(painted.data()[k]));
-    let extent = [width, height].map(|side| side as f64 * mission.task.settings.texel);
-    let mesh = TexturedMesh {
-        positions: mission.task.surface.disk().positions(),
-        faces: mission.task.surface.disk().faces(),
-        origin: [0.0; 3],
-        uv: mission.task.surface.chart.uv().iter().map(|uv| [uv[0] / extent[0], uv[1] / extent[1]]).collect(),
-        texture: with_gutter(width, height, (0..width * height).map(pixel).collect()),
+    let mesh = ColouredMesh {
+        positions: &task.surface.vertices(),
+        faces: task.surface.disk().faces(),
+        colours,
+        bare: task.appearance.srgb(0.0),
     };
-    mesh.save(folder, "painted").map_err(unwritable(&folder.join("painted.*")))
-}
-
-pub(super) fn write(path: &Path, text: &str) -> Result<(), MissionError> {
-    whole_file::write(path, text).map_err(unwritable(path))
-}
-
-pub(super) fn unwritable(path: &Path) -> impl FnOnce(std::io::Error) -> MissionError {
-    let path = path.display().to_string();
-    |source| MissionError::Unwritable { path, source }
+    let origin = task.origin(folder);
+    save_recording(&folder.join("mission.mcap"), &mesh, &paints, &states, &log_lines, &origin)?;
+    Ok(())
 }

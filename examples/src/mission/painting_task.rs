@@ -2,10 +2,11 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use paint_net::{Image, Painting};
-use paint_sim::{Film, Texel, TriangleSurface};
+use paint_sim::{Film, Substrate, Texel, TriangleSurface};
 use ptu_kinematics::Ptu;
 
 use super::decide::decide;
@@ -18,6 +19,7 @@ use crate::adapters::Robot;
 use crate::appearance::{Appearance, UNIT_THICKNESS};
 use crate::design::Design;
 use crate::mesh_io::TriangleMesh;
+use crate::paint_set::NamedPaint;
 use crate::progress::Stage;
 use crate::recording::{Origin, PaintStyle};
 use crate::region::Scene;
@@ -35,10 +37,13 @@ const MANY: f64 = 0.03;
 const USUAL_TEXEL: f64 = 0.0125;
 
 /// A surface with the picture wanted on it and the sprays that shall make it.
+#[derive(Clone)]
 pub struct PaintingTask {
     pub(super) settings: MissionSettings,
     pub(super) name: String,
-    pub(super) surface: PaintSurface,
+    /// What is in the tank.
+    pub(super) paint: NamedPaint,
+    pub(super) surface: Arc<PaintSurface>,
     pub(super) appearance: Appearance,
     pub(super) robot: Robot,
     /// Ink wanted on every texel.
@@ -52,9 +57,11 @@ pub struct PaintingTask {
     /// What the texels out of reach would need, where they are many.
     pub(super) reach_needs: Option<ReachNeeds>,
     pub(super) layers: Vec<Painting>,
+    /// Whether it is one of the paints of a picture, whose doses depend on each other.
+    pub(super) of_picture: bool,
     pub(super) started: Instant,
     /// What is really there, if `surface` is a map of it.
-    truth: Option<TriangleSurface>,
+    truth: Option<Arc<TriangleSurface>>,
     /// File of the map and its keyframes that the robot may find itself in.
     map: Option<PathBuf>,
 }
@@ -62,24 +69,33 @@ pub struct PaintingTask {
 impl PaintingTask {
     /// Unwraps the surface, lays the design onto it and lets the painter decide. `name` is what the report calls the surface.
     pub fn new(name: &str, scene: &Scene, design: &Design, settings: MissionSettings) -> Result<Self, MissionError> {
-        let started = Instant::now();
-        let robot = Robot { tether: settings.constraints.tether, ..Robot::new(Ptu::new(settings.ptu)?) };
-        let appearance = Appearance::on_sandstone(&settings.paint.paint(UNIT_THICKNESS)?)?;
-
-        settings.check()?;
         design.check_movable(&settings.placement, settings.viewpoint)?;
+        let mut task = Self::undecided(name, scene, settings)?;
+        let settings = &task.settings;
+        // Nothing is wanted beside the surface, and no more than the paint can show.
+        let wanted = design.on_surface(&task.surface, &scene.canvas, &settings.placement, settings.viewpoint)?;
+        let mut wanted = wanted.map(|ink| ink.min(task.appearance.ink().max_ink()));
+        for (ink, covered) in wanted.data_mut().iter_mut().zip(task.coverage.data()) {
+            *ink *= covered;
+        }
+        task.layers = decide(&wanted, &task.coverage, &task.surface, &task.in_reach, &task.appearance, settings)?;
+        task.wanted = wanted;
+        Ok(task)
+    }
+
+    /// The surface with what the robot reaches of it, before anything is wanted.
+    pub(super) fn undecided(name: &str, scene: &Scene, settings: MissionSettings) -> Result<Self, MissionError> {
+        let started = Instant::now();
+        settings.check()?;
+        let robot = Robot { tether: settings.constraints.tether, ..Robot::new(Ptu::new(settings.ptu)?) };
+        let paint = NamedPaint::built_in(settings.paint)?;
+        let appearance = Appearance::new(&paint.paint, &Substrate::sandstone())?;
         check_memory(&scene.canvas, &settings)?;
         let stage = Stage::start("unwrap");
         let surface = PaintSurface::of_scene(scene, settings.texel, &|s| stage.share(s))?;
         stage.done(&describe(&surface));
 
         let coverage = surface.coverage();
-        // Nothing is wanted beside the surface, and no more than the paint can show.
-        let wanted = design.on_surface(&surface, &scene.canvas, &settings.placement, settings.viewpoint)?;
-        let mut wanted = wanted.map(|ink| ink.min(appearance.ink().max_ink()));
-        for (ink, covered) in wanted.data_mut().iter_mut().zip(coverage.data()) {
-            *ink *= covered;
-        }
         let stage = Stage::start("reach");
         let in_reach = texels_in_reach(&surface, &robot, &settings)?;
         let lost = texels_lost_to_constraints(&in_reach, &surface, &robot, &settings)?;
@@ -100,24 +116,41 @@ impl PaintingTask {
         if let Some(needs) = &needs {
             say!("{}", needs.describe());
         }
-        let layers = decide(&wanted, &coverage, &surface, &in_reach, &appearance, &settings)?;
-        let name = name.to_string();
         Ok(Self {
             settings,
-            name,
-            surface,
+            name: name.to_string(),
+            paint,
+            surface: Arc::new(surface),
             appearance,
             robot,
-            wanted,
+            wanted: coverage.map(|_| 0.0),
             coverage,
             in_reach,
             lost_to_constraints: lost,
             reach_needs: needs,
-            layers,
+            layers: Vec::new(),
+            of_picture: false,
             started,
             truth: None,
             map: None,
         })
+    }
+
+    /// The same with another paint in the tank, on another wall.
+    pub(super) fn with_paint(self, paint: NamedPaint, wall: &Substrate) -> Result<Self, MissionError> {
+        Ok(Self { appearance: Appearance::new(&paint.paint, wall)?, paint, ..self })
+    }
+
+    /// One paint of a picture on the same surface, to lie as deep as a painting says.
+    pub(super) fn of_paint(
+        &self,
+        paint: NamedPaint,
+        wall: &Substrate,
+        painting: Painting,
+    ) -> Result<Self, MissionError> {
+        let wanted = painting.ink.clone();
+        let task = self.clone().with_paint(paint, wall)?;
+        Ok(Self { wanted, layers: vec![painting], of_picture: true, ..task })
     }
 
     /// What was decided about a map, flown and sprayed before the surface that was mapped, of which planning knows nothing.
@@ -125,7 +158,8 @@ impl PaintingTask {
     /// # Errors
     /// A mesh without faces.
     pub fn on_true_surface(self, truth: &TriangleMesh) -> Result<Self, MissionError> {
-        Ok(Self { truth: Some(TriangleSurface::new(&truth.positions, &truth.faces)?), ..self })
+        let truth = TriangleSurface::new(&truth.positions, &truth.faces)?;
+        Ok(Self { truth: Some(Arc::new(truth)), ..self })
     }
 
     /// With the file of a map and its keyframes, in which the robot may find itself.
@@ -141,7 +175,7 @@ impl PaintingTask {
 
     /// What the robot and its paint meet.
     pub(super) fn met(&self) -> &TriangleSurface {
-        self.truth.as_ref().unwrap_or(&self.surface.world)
+        self.truth.as_deref().unwrap_or(&self.surface.world)
     }
 
     /// Paint depth per pixel of a film whose texels lie on `pixels`, 0 beside the surface.

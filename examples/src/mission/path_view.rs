@@ -3,31 +3,29 @@
 use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
-use paint_net::Image;
 use paint_sim::Camera;
-use paint_sim::render::Frame;
+use paint_sim::render::{Frame, Shading};
 use paint_sim::surface::Hit;
 
 use super::error::MissionError;
 use super::painting_task::PaintingTask;
-use super::shading::shading;
 use super::view::{camera, picture_of, view};
 use crate::pictures::{Polyline, Scene, save_scene};
 
 /// Colour of keep-out volumes and anchors.
 const OUTLINE: [u8; 3] = [235, 150, 0];
 
-/// Draws the nozzle's way (blue) and the vehicle's (orange) before the surface with `depth` of paint on its texels.
+/// Draws the nozzle's way (blue) and the vehicle's (orange) before the surface, of which `shade` tells what is seen.
 pub(super) fn save_path(
     task: &PaintingTask,
-    depth: &Image,
+    shade: &(dyn Fn(&Hit) -> Shading + Sync),
     nozzle: Vec<Point3<f64>>,
     vehicle: Vec<Point3<f64>>,
     file: &Path,
 ) -> Result<(), MissionError> {
     let corners = task.surface.disk().positions().iter().map(|p| Point3::from(*p));
     let camera = camera(task, &corners.chain(vehicle.iter().copied()).collect::<Vec<_>>())?;
-    let frame = view(task, &camera, &|hit: &Hit| shading(task, depth, hit))?;
+    let frame = view(task, &camera, shade)?;
     let lines = vec![
         Polyline { points: nozzle, colour: [0, 90, 200], radius: 0.5 },
         Polyline { points: vehicle, colour: [230, 110, 20], radius: 0.7 },

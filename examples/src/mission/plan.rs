@@ -67,8 +67,20 @@ impl Planner for TimedPlanner {
     }
 }
 
+/// The flights of all layers while their doses may still change.
+pub(super) struct Draft {
+    pub(super) mission: MissionPlan,
+    /// Time the optimal planner took, seconds on one core.
+    seconds: f64,
+}
+
 /// Plans every layer; each flight begins where the one before ends.
 pub(super) fn plan(task: &PaintingTask) -> Result<Planned, MissionError> {
+    finish(task, draft(task)?)
+}
+
+/// The flights of all layers, with doses corrected unless they depend on those of other paints.
+pub(super) fn draft(task: &PaintingTask) -> Result<Draft, MissionError> {
     let PaintingTask { layers, surface, robot, settings, .. } = task;
     let stage = Stage::start("plan");
     let mesh = MeshSurface(&surface.world);
@@ -91,7 +103,7 @@ pub(super) fn plan(task: &PaintingTask) -> Result<Planned, MissionError> {
                 100.0 * expected
             );
             planner.replan(first, &mut mission)?;
-        } else if layers.len() == 1 {
+        } else if layers.len() == 1 && !task.of_picture {
             let flights = &mut mission.flights[first..];
             let mut parts: Vec<(&mut [Target], &Plan)> =
                 flights.iter_mut().map(|f| (f.route.targets.as_mut_slice(), &f.plan)).collect();
@@ -102,8 +114,30 @@ pub(super) fn plan(task: &PaintingTask) -> Result<Planned, MissionError> {
     if mission.flights.is_empty() {
         return Err(MissionError::OutOfReach { percent: 100.0 });
     }
+    let metres: f64 = mission.flights.iter().map(|flight| flight.plan.path_length()).sum();
+    stage.done(&format!("{metres:.0} m of path"));
+    Ok(Draft { mission, seconds: timed.seconds.get() })
+}
+
+/// Plans all flights again for doses that were changed.
+pub(super) fn replan(task: &PaintingTask, draft: &mut Draft) -> Result<(), MissionError> {
+    let PaintingTask { surface, robot, settings, .. } = task;
+    let mesh = MeshSurface(&surface.world);
+    let timed = TimedPlanner::default();
+    let obstacles = settings.constraints.around(&mesh);
+    let rehearsal = WindRehearsal { surface, robot, settings };
+    mission_planner(task, &timed, &obstacles, &rehearsal).replan(0, &mut draft.mission)?;
+    draft.seconds += timed.seconds.get();
+    Ok(())
+}
+
+/// The flights with what they are compared with.
+pub(super) fn finish(task: &PaintingTask, Draft { mission, seconds }: Draft) -> Result<Planned, MissionError> {
+    let PaintingTask { layers, surface, robot, settings, .. } = task;
+    let stage = Stage::start("compare");
+    let mesh = MeshSurface(&surface.world);
     let mut planned = Planned {
-        seconds: timed.seconds.get(),
+        seconds,
         unreachable_paint: mission.refused_volume,
         kept_off: mission.flights.iter().map(MissionFlight::kept_off).sum(),
         left_bare: mission.flights.iter().map(MissionFlight::excluded).sum(),

@@ -7,19 +7,20 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use paint_planner::Plan;
 use paint_planner::mission::TargetOutcomes;
 use paint_planner::plan::Setpoint;
+use paint_sim::surface::Hit;
 use ptu_kinematics::Joints;
 use serde::Serialize;
 
 use super::error::MissionError;
 use super::figures::mean;
-use super::mission_output::{RECORDING_STEP, write};
+use super::mission_output::RECORDING_STEP;
 use super::painting_task::PaintingTask;
 use super::path_view::save_path;
 use super::planned_mission::{PlannedMission, share_out_of_reach};
 use super::preview::expected_depth;
-use super::shading::vertex_colours;
+use super::shading::{shading, vertex_colours};
 use super::trajectory_table::{TRAJECTORY_STEP, cells};
-use crate::appearance::DENSITY;
+use super::written_file::write;
 use crate::progress::Stage;
 use crate::recording::{ColouredMesh, RobotState, save_recording};
 use crate::report::{TimeFigures, save_figures};
@@ -120,7 +121,7 @@ pub fn save_plan(mission: &PlannedMission, folder: &Path) -> Result<PlanFigures,
         let along =
             |of: &dyn Fn(&Setpoint) -> Point3<f64>| plan.setpoints(RECORDING_STEP).map(|(_, s)| of(&s)).collect();
         let (nozzle, vehicle) = (along(&|s| s.nozzle.position), along(&|s| s.sample.position));
-        save_path(task, &depth, nozzle, vehicle, &folder.join("path.png"))?;
+        save_path(task, &|hit: &Hit| shading(task, &depth, hit), nozzle, vehicle, &folder.join("path.png"))?;
     }
     stage.share(0.7);
     write(&folder.join("robot.urdf"), &task.urdf())?;
@@ -163,7 +164,7 @@ fn save_mcap(mission: &PlannedMission, colours: &[[u8; 3]], folder: &Path) -> Re
     let faces = task.surface.disk().faces();
     let mesh = ColouredMesh { positions: &positions, faces, colours, bare: task.appearance.srgb(0.0) };
     let (file, origin) = (folder.join("plan.mcap"), task.origin(folder));
-    Ok(save_recording(&file, &mesh, task.paint_style(), &states, &log, &origin)?)
+    Ok(save_recording(&file, &mesh, &[(0.0, task.paint_style())], &states, &log, &origin)?)
 }
 
 /// The robot as the plan has it: level, with the pan and tilt of the reference.
@@ -216,7 +217,7 @@ fn figures(mission: &PlannedMission) -> PlanFigures {
         times: TimeFigures::of(mission.layers().map(|(_, plan)| plan), &task.settings.planner.timing),
         path_length_m: sum(&Plan::path_length),
         valve_open_share: sum(&Plan::open_time) / flight_time,
-        paint_kg: volume * DENSITY,
+        paint_kg: volume * task.paint.density,
         normal_deviation_mean_m: mean(deviations.iter().copied()),
         normal_deviation_max_m: deviations.iter().fold(0.0, |most, &d| most.max(d)),
         max_speed_m_per_s: most(&|plan| plan.report.extrema.speed),

@@ -20,6 +20,11 @@ impl PlannedMission {
     /// Plans what was decided. An error where nearly all of the paint is out of reach.
     pub fn new(task: PaintingTask) -> Result<Self, MissionError> {
         let planned = plan(&task)?;
+        Self::checked(task, planned)
+    }
+
+    /// The same of a plan that was made.
+    pub(super) fn checked(task: PaintingTask, planned: Planned) -> Result<Self, MissionError> {
         let mission = Self { task, planned };
         let share = share_out_of_reach(&mission.task, mission.planned.unreachable_paint, mission.layers());
         if share > MAX_UNREACHABLE_SHARE {

@@ -15,7 +15,6 @@ use super::plan::unrehearsed;
 use super::seams::deposit_error;
 use super::shading::{shading, texel_at};
 use super::view::{camera, view};
-use crate::appearance::DENSITY;
 use crate::progress::Stage;
 use crate::report::{ReachNeeds, save_figures};
 
@@ -115,7 +114,7 @@ fn estimate(task: &PaintingTask) -> Result<Preview, MissionError> {
         reach_needs: task.reach_needs,
         lost_to_constraints_share: task.share_lost_to_constraints(),
         wanted_in_reach_share: wanted(&task.coverage_in_reach()) / wanted(&task.coverage).max(f64::MIN_POSITIVE),
-        paint_kg: volume * DENSITY,
+        paint_kg: volume * task.paint.density,
         flight_time_s: flights.iter().map(|flight| flight.plan.trajectory.duration()).sum(),
         strokes,
         deposit_error_at_seams: seams.map(|s| s.near),

@@ -5,14 +5,15 @@ use super::run::Mission;
 /// Seconds between two rows.
 pub(super) const TRAJECTORY_STEP: f64 = 0.05;
 
-/// One row every [`TRAJECTORY_STEP`] seconds: what was planned, then what was flown.
-pub(super) fn trajectory_table(mission: &Mission) -> String {
+/// One row every [`TRAJECTORY_STEP`] seconds: what was planned, then what was flown, of the nozzle as well; missions one after the other.
+pub(super) fn trajectory_table(missions: &[&Mission]) -> String {
     let mut text = String::from(
         "time_s,x_m,y_m,z_m,heading_rad,pan_rad,tilt_rad,flow_m3_per_s,target_x_m,target_y_m,target_z_m,flown_x_m,flown_y_m,\
-         flown_z_m,flown_qx,flown_qy,flown_qz,flown_qw,flown_pan_rad,flown_tilt_rad\n",
+         flown_z_m,flown_qx,flown_qy,flown_qz,flown_qw,flown_pan_rad,flown_tilt_rad,nozzle_x_m,nozzle_y_m,nozzle_z_m,axis_x,axis_y,axis_z,\
+         nozzle_flow_m3_per_s\n",
     );
     let mut start = 0.0;
-    for f in &mission.flights {
+    for f in missions.iter().flat_map(|mission| &mission.flights) {
         let stride = (TRAJECTORY_STEP / f.flight.interval).round().max(1.0) as usize;
         for s in f.flight.samples.iter().step_by(stride) {
             let planned = f.plan.setpoint(s.time);
@@ -22,6 +23,7 @@ pub(super) fn trajectory_table(mission: &Mission) -> String {
                 [start + s.time, p.x, p.y, p.z, planned.sample.heading, planned.pan, planned.tilt].as_slice(),
                 &[planned.flow, aim.x, aim.y, aim.z, flown.x, flown.y, flown.z],
                 &[q.x, q.y, q.z, q.w, s.pan_tilt[0], s.pan_tilt[1]],
+                &[s.nozzle.x, s.nozzle.y, s.nozzle.z, s.axis.x, s.axis.y, s.axis.z, s.flow],
             ]
             .concat();
             text += &cells(&row);

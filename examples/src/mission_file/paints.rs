@@ -3,15 +3,25 @@
 use std::path::Path;
 
 use super::{MissionFile, MissionFileError};
-use crate::mission::{Coat, MissionSettings};
+use crate::mission::{Coat, CoatTasks, MissionSettings};
 use crate::mission_paint::MissionPaint;
 use crate::say;
 
 impl MissionFile {
     /// The same for every paint in flying order; a file without `paints` is one coat, whose results belong into `folder` itself.
-    pub fn decide_coats(&self, folder: &Path) -> Result<Vec<Coat>, MissionFileError> {
+    pub fn decide_coats(&self, folder: &Path) -> Result<CoatTasks, MissionFileError> {
+        if let Some(palette) = &self.palette {
+            let place = self.place(folder)?;
+            return self.decide_palette(palette, &place, folder);
+        }
+        if self.wall.is_some() || self.available.is_some() {
+            return Err(MissionFileError::Palette(
+                "the wall and the paints to choose from belong to a palette: give one",
+            ));
+        }
         if self.paints.is_empty() {
-            return Ok(vec![Coat { folder: folder.to_owned(), task: self.decide(folder)? }]);
+            let coats = vec![Coat { folder: folder.to_owned(), task: self.decide(folder)? }];
+            return Ok(CoatTasks { coats, picture: None });
         }
         let coats = self.coats()?;
         let place = self.place(folder)?;
@@ -23,7 +33,8 @@ impl MissionFile {
             let task = task.map_err(|error| in_paint(error, &self.paints[number]))?;
             Ok(Coat { folder, task })
         };
-        coats.into_iter().enumerate().map(decide).collect()
+        let coats = coats.into_iter().enumerate().map(decide).collect::<Result<_, MissionFileError>>()?;
+        Ok(CoatTasks { coats, picture: None })
     }
 
     /// The missions of one paint that this one is made of.
@@ -49,7 +60,7 @@ impl MissionFile {
 fn in_paint(error: MissionFileError, paint: &MissionPaint) -> MissionFileError {
     match error {
         MissionFileError::Mission { surface, source } => {
-            MissionFileError::Mission { surface, source: source.in_paint(paint.name) }
+            MissionFileError::Mission { surface, source: source.in_paint(paint.name.as_str()) }
         }
         error => error,
     }

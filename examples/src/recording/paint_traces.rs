@@ -50,6 +50,13 @@ impl PaintTraces {
         trace
     }
 
+    /// Goes on with another paint; returns the trace that this ends.
+    pub(super) fn change(&mut self, style: PaintStyle) -> Option<SceneUpdate> {
+        let trace = self.take();
+        self.style = style;
+        trace
+    }
+
     /// The trace so far; none below two points.
     pub(super) fn take(&mut self) -> Option<SceneUpdate> {
         let points = std::mem::take(&mut self.points);

@@ -36,7 +36,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
         return Err(RobotError::OwnSenses.into());
     }
     mission_file.begin_run(folder, "robot")?;
-    let coat = mission_file.decide_coats(folder)?.into_iter().next().ok_or(RobotError::NothingToFly)?;
+    let coat = mission_file.decide_coats(folder)?.coats.into_iter().next().ok_or(RobotError::NothingToFly)?;
     let mission = PlannedMission::new(coat.task).map_err(|error| mission_file.in_mesh(error))?;
     let flight = mission.flight(0).ok_or(RobotError::NothingToFly)?;
     let clock = (Instant::now(), ProcessTime::now());

@@ -6,7 +6,8 @@ use std::process::{Command, Output};
 
 use crate::scratch::Scratch;
 
-const PROGRAMS: [&str; 9] = ["handheld", "paint-image", "paintcopter", "plan", "robot", "scan", "unwrap", "vio", "vr"];
+const PROGRAMS: [&str; 10] =
+    ["handheld", "paint-image", "paintcopter", "plan", "robot", "scan", "spray", "unwrap", "vio", "vr"];
 
 fn run(program: &str, arguments: &[&str]) -> Output {
     let programs = Path::new(env!("CARGO_BIN_EXE_vio")).parent().unwrap();

@@ -6,6 +6,7 @@ mod bad_input;
 #[cfg(feature = "vio")]
 mod bags;
 mod choices;
+mod colour_missions;
 #[cfg(all(feature = "programs", feature = "log"))]
 mod command_lines;
 mod designs_across_seams;
@@ -50,6 +51,8 @@ mod scratch;
 mod seams;
 #[cfg(feature = "scan")]
 mod sequences;
+#[cfg(feature = "spray")]
+mod spray;
 #[cfg(feature = "scan")]
 mod stored_maps;
 #[cfg(feature = "scan")]

@@ -10,9 +10,11 @@ use paintcopter::mesh_placement::UpAxis;
 use paintcopter::mission::{MissionSettings, PainterChoice};
 use paintcopter::mission_file::MissionFile;
 use paintcopter::mission_paint::MissionPaint;
+use paintcopter::palette_choice::PaletteChoice;
 use paintcopter::picture_placement::{PicturePlacement, PlacementMode};
 use paintcopter::projection::Viewpoint;
 use paintcopter::region::Region;
+use paintcopter::wall::Wall;
 
 use crate::scratch::Scratch;
 
@@ -41,6 +43,9 @@ fn a_mission_keeps_all_that_it_was_told() {
         texture: Some(s.0.join("c.png")),
         scan: true,
         region: Some(Region::Mask(s.0.join("d.png"))),
+        palette: Some(PaletteChoice::File(s.0.join("f.toml"))),
+        available: Some(s.0.join("g.toml")),
+        wall: Some(Wall::Colour([1, 2, 255])),
         settings,
         paints: vec![MissionPaint {
             name: PaintName::Green,

@@ -1,0 +1,102 @@
+//! Shots from anywhere on a surface: what a mission shows of its own.
+
+use std::path::Path;
+
+use paint_sim::{Film, Shot, Substrate, TriangleSurface};
+
+use super::error::MissionError;
+use super::mission_output::{page_colours, painted_view, texture};
+use super::nozzle::spray_model;
+use super::painted_mesh::save_painted_mesh;
+use super::painting_task::PaintingTask;
+use super::settings::MissionSettings;
+use crate::paint_set::NamedPaint;
+use crate::progress::Stage;
+use crate::region::Scene;
+
+/// Pictures of the paint as it grows.
+const PICTURES: usize = 8;
+
+/// A surface with a film of one paint that grows shot by shot.
+pub struct SprayedFilm {
+    task: PaintingTask,
+    film: Film,
+    /// Pixel of every texel of the film.
+    pixels: Vec<usize>,
+}
+
+impl SprayedFilm {
+    /// A bare surface. `name` is what reports call it.
+    ///
+    /// # Errors
+    /// A mesh that is no surface, settings out of range.
+    pub fn new(
+        name: &str,
+        scene: &Scene,
+        settings: MissionSettings,
+        paint: NamedPaint,
+        wall: &Substrate,
+    ) -> Result<Self, MissionError> {
+        let task = PaintingTask::undecided(name, scene, settings)?.with_paint(paint, wall)?;
+        let (texels, pixels) = task.film_texels();
+        Ok(Self { film: Film::new(texels)?, task, pixels })
+    }
+
+    /// Everything there is to hit.
+    pub fn world(&self) -> &TriangleSurface {
+        self.task.met()
+    }
+
+    /// Sprays shots with their times of `duration` seconds, in their order, and leaves a picture after every eighth of it in `folder`.
+    ///
+    /// # Errors
+    /// Shots that the simulation refuses, a folder that cannot be written.
+    pub fn spray(&mut self, shots: &[(f64, Shot)], duration: f64, folder: &Path) -> Result<(), MissionError> {
+        let stage = Stage::start("spray");
+        let settings = &self.task.settings;
+        let mut rest = shots;
+        for k in 1..=PICTURES {
+            let until = duration * k as f64 / PICTURES as f64;
+            let count = if k == PICTURES { rest.len() } else { rest.partition_point(|(time, _)| *time <= until) };
+            let (now, later) = rest.split_at(count);
+            let now: Vec<Shot> = now.iter().map(|(_, shot)| *shot).collect();
+            self.film.deposit(&now, &spray_model(settings), self.task.met(), settings.threads, &mut |_, _| ())?;
+            let depth = self.task.depth_of(&self.film, &self.pixels);
+            texture(&self.task, &depth).save(&folder.join(format!("painted_{k}_of_{PICTURES}.png")))?;
+            stage.share(k as f64 / PICTURES as f64);
+            rest = later;
+        }
+        stage.done(&format!("{} shots", shots.len()));
+        Ok(())
+    }
+
+    /// Paint that left the nozzle, that lies on the surface, and that met nothing, m³.
+    pub fn volumes(&self) -> [f64; 3] {
+        let balance = self.film.mass_balance();
+        [balance.emitted, balance.deposited, balance.overspray].map(|quanta| quanta as f64 * paint_sim::spray::QUANTUM)
+    }
+
+    /// Mean thickness by area where there is paint, and the largest, metres.
+    pub fn thickness(&self) -> [f64; 2] {
+        let (mut volume, mut area, mut most) = (0.0, 0.0, 0.0_f64);
+        for (k, texel) in self.film.texels().iter().enumerate() {
+            let thickness = self.film.thickness(k);
+            if thickness > 0.0 {
+                (volume, area) = (volume + thickness * texel.area, area + texel.area);
+                most = most.max(thickness);
+            }
+        }
+        [volume / f64::max(area, f64::MIN_POSITIVE), most]
+    }
+
+    /// Writes the painted mesh and pictures into an existing folder.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn save(&self, folder: &Path) -> Result<(), MissionError> {
+        let depth = self.task.depth_of(&self.film, &self.pixels);
+        texture(&self.task, &depth).save(&folder.join("painted.png"))?;
+        save_painted_mesh(&self.task, &page_colours(&self.task, &depth), folder)?;
+        Ok(painted_view(&self.task, &depth)?.save(&folder.join("painted_view.png"))?)
+    }
+}

@@ -1,0 +1,140 @@
+//! Recorded motions of a nozzle become paint.
+
+use std::path::PathBuf;
+
+use clap::Parser as _;
+use paintcopter::mission::{Coats, save};
+use paintcopter::mission_file::MissionFile;
+use paintcopter::spray::{Arguments, SprayError, run};
+use serde_json::Value;
+
+use crate::scratch::Scratch;
+
+/// Litres a minute as m³/s.
+const FLOW: f64 = 0.06 * 1e-3 / 60.0;
+const HEAD: &str = "time_s,nozzle_x_m,nozzle_y_m,nozzle_z_m,axis_x,axis_y,axis_z,nozzle_flow_m3_per_s\n";
+
+/// A wall of 1.2 m by 0.8 m in the plane y = 0 that faces -y.
+fn wall(scratch: &Scratch) -> String {
+    scratch.write("wall.obj", "v 0 0 0\nv 1.2 0 0\nv 1.2 0 0.8\nv 0 0 0.8\nf 1 2 3\nf 1 3 4\n");
+    scratch.path("wall.obj")
+}
+
+/// A straight pass at 0.2 m/s, 10 cm before the middle of the wall, spraying all the way; `change` may spoil a line.
+fn pass(change: &dyn Fn(usize, [f64; 8]) -> Option<[f64; 8]>) -> String {
+    let line = |k: usize| {
+        let time = 0.1 * k as f64;
+        let row = change(k, [time, 0.2 + 0.2 * time, -0.1, 0.4, 0.0, 1.0, 0.0, FLOW])?;
+        Some(row.map(|v| format!("{v:?}")).join(",") + "\n")
+    };
+    HEAD.to_owned() + &(0..=40).filter_map(line).collect::<String>()
+}
+
+fn sprayed(s: &Scratch, nozzle: &str, more: &[&str]) -> Result<Value, SprayError> {
+    let out = s.path("out");
+    let line = ["spray", "--scale", "1", "--nozzle", nozzle, "--threads", "2", "--out", &out];
+    run(&Arguments::try_parse_from(line.iter().chain(more)).unwrap())?;
+    Ok(serde_json::from_slice(&std::fs::read(s.0.join("out/report.json")).unwrap()).unwrap())
+}
+
+fn table(s: &Scratch, text: &str) -> Result<Value, SprayError> {
+    s.write("pass.csv", text);
+    let mesh = wall(s);
+    sprayed(s, &s.path("pass.csv"), &["--mesh", &mesh, "--texel", "0.005"])
+}
+
+/// Along a straight pass the thickness in the middle is `Q / (v d tan(sigma) sqrt(2 pi))`, and no paint is lost.
+#[test]
+fn a_straight_pass_leaves_the_thickness_of_the_closed_form() {
+    let s = Scratch::new("pass");
+    let report = table(&s, &pass(&|_, row| Some(row))).unwrap();
+    let figure = |name: &str| report[name].as_f64().unwrap();
+    let expected = FLOW / (0.2 * 0.025 * std::f64::consts::TAU.sqrt());
+    let efficiency = figure("paint_deposited_kg") / figure("paint_emitted_kg");
+    let off = figure("thickness_max_m") / (efficiency * expected) - 1.0;
+    assert!(off.abs() < 0.02, "{off}: {report}");
+    assert!((figure("paint_emitted_kg") / (FLOW * 4.0 * 1200.0) - 1.0).abs() < 1e-6, "{report}");
+    let books = figure("paint_emitted_kg") - figure("paint_deposited_kg") - figure("paint_overspray_kg");
+    assert!(books.abs() < 1e-12, "{books}");
+    for file in ["painted.glb", "painted.obj", "painted.png", "painted_view.png", "painted_1_of_8.png"] {
+        assert!(s.0.join("out").join(file).exists(), "{file} is missing");
+    }
+}
+
+#[test]
+fn gaps_stay_bare_and_stamps_that_go_back_are_left_out() {
+    let s = Scratch::new("gap");
+    // Two seconds are missing; two stamps repeat.
+    let report = table(&s, &pass(&|k, row| (!(10..30).contains(&k)).then_some(row))).unwrap();
+    assert_eq!((report["gaps"].as_u64(), report["samples_left_out"].as_u64()), (Some(1), Some(0)));
+    assert!((report["paint_emitted_kg"].as_f64().unwrap() / (FLOW * 1.9 * 1200.0) - 1.0).abs() < 1e-6, "{report}");
+    let report = table(
+        &s,
+        &pass(&|k, mut row| {
+            row[0] -= if k == 7 || k == 20 { 0.15 } else { 0.0 };
+            Some(row)
+        }),
+    )
+    .unwrap();
+    assert_eq!((report["gaps"].as_u64(), report["samples_left_out"].as_u64()), (Some(0), Some(2)));
+}
+
+#[test]
+fn motions_that_make_no_sense_are_refused() {
+    let s = Scratch::new("motions");
+    for (text, expected) in [
+        (pass(&|_, row| Some(row)).replace("axis_z", "z_axis"), "no column axis_z"),
+        (pass(&|k, row| (k == 0).then_some(row)), "fewer than two"),
+        (pass(&|_, row| Some(row)).replace("0.4,0.0,1.0", "0.4,0.0,x"), "line 2: column axis_y"),
+        (
+            pass(&|_, mut row| {
+                row[5] = 0.0;
+                Some(row)
+            }),
+            "no length",
+        ),
+        (
+            pass(&|_, mut row| {
+                row[7] = -1.0;
+                Some(row)
+            }),
+            "below zero",
+        ),
+        // Inside the wall, looking out.
+        (
+            pass(&|_, mut row| {
+                row[2] = 0.02;
+                row[5] = -1.0;
+                Some(row)
+            }),
+            "behind the surface",
+        ),
+        (String::new(), "is empty"),
+    ] {
+        let error = table(&s, &text).unwrap_err().to_string();
+        assert!(error.contains(expected) && error.contains("pass.csv"), "{error}, expected {expected}");
+    }
+}
+
+/// What a mission has flown, sprayed again from its table and from its recording.
+#[test]
+fn flights_are_sprayed_again_from_what_they_leave() {
+    let s = Scratch::new("again");
+    let mesh = wall(&s);
+    let scale = Some(paintcopter::mesh_frame::MeshScale::Factor(1.0));
+    let mut mission = MissionFile { mesh: Some(PathBuf::from(&mesh)), scale, ..MissionFile::default() };
+    mission.design = Some("gradient".into());
+    let flown = s.0.join("flown");
+    mission.begin_run(&flown, "test").unwrap();
+    let coats = Coats::run(mission.decide_coats(&flown).unwrap()).unwrap();
+    let report = save(coats.missions().next().unwrap().1, &flown).unwrap();
+    for (file, within) in [("trajectory.csv", 0.02), ("mission.mcap", 0.04)] {
+        let again = sprayed(&s, flown.join(file).to_str().unwrap(), &["--mesh", &mesh, "--placed"]).unwrap();
+        for (name, flown) in
+            [("paint_emitted_kg", report.paint_emitted_kg), ("paint_deposited_kg", report.paint_deposited_kg)]
+        {
+            let share = again[name].as_f64().unwrap() / flown;
+            assert!((share - 1.0).abs() < within, "{file}: {name} is {share} of what was flown");
+        }
+    }
+}
