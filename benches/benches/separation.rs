@@ -37,10 +37,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     group.bench_function("1e5 texels, 6 paints", |b| b.iter(|| separation.separate(&wanted, &model)));
 
     let square: Vec<[f64; 3]> = (0..SIDE * SIDE).map(|k| colour(place(k, SIDE), [1.28, 1.28])).collect();
+    let weight = vec![1.0; SIDE * SIDE];
     let spots: Vec<SurfaceFootprint> = (0..SIDE * SIDE / 4).map(spot).collect();
     let fit = ColourFit {
         wanted: &square,
-        weight: &[1.0; SIDE * SIDE],
+        weight: &weight,
         model: &model,
         footprints: &[spots.as_slice(); 6],
         min_volume: 0.0,

@@ -11,7 +11,7 @@ use uv_param::texture::Texture;
 
 use crate::colour_picture::ColourPicture;
 use crate::design::{DesignError, corner_uv};
-use crate::mesh_io::TriangleMesh;
+use crate::mesh_io::{MeshMaterials, TriangleMesh};
 use crate::surface::PaintSurface;
 
 /// Steps of a colour component from one reflectance of a textured wall to the next.
@@ -147,7 +147,7 @@ impl WallSpectra {
 
 /// Whether a mesh has colours of its own.
 pub fn has_colours(mesh: &TriangleMesh) -> bool {
-    mesh.colours.is_some() || mesh.uv.is_some() && mesh.materials.as_ref().is_some_and(|m| m.textured())
+    mesh.colours.is_some() || mesh.uv.is_some() && mesh.materials.as_ref().is_some_and(MeshMaterials::textured)
 }
 
 /// Linear sRGB of the mesh's own colours on every pixel of the page.

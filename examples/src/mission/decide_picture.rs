@@ -43,7 +43,7 @@ pub fn decide_picture(
     let colours = design.on_surface(&task.surface, mesh, &task.settings.placement, task.settings.viewpoint)?;
     let (_, pixels) = task.surface.film_texels();
     let wall = WallSpectra::new(wall, &task.surface, mesh, &pixels)?;
-    let mut picture = PictureTask::separate(&task, &colours, paints, wall, pixels)?;
+    let mut picture = PictureTask::separate(&task, &colours, &paints, wall, pixels)?;
     let paintings = decide_colours(&task, &mut picture)?;
     let ground = picture.mean_wall()?;
     // What is not needed is not flown.

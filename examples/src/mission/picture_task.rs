@@ -53,7 +53,7 @@ impl PictureTask {
     pub(super) fn separate(
         task: &PaintingTask,
         picture: &[[f32; 4]],
-        candidates: PaletteCandidates,
+        candidates: &PaletteCandidates,
         wall: WallSpectra,
         pixels: Vec<usize>,
     ) -> Result<Self, MissionError> {
@@ -74,7 +74,7 @@ impl PictureTask {
         if colours.is_empty() {
             return Err(MissionError::NothingToPaint("the picture does not lie on it"));
         }
-        let (paints, stack) = choose(&candidates, &colours, &bands[..1], &separation)?;
+        let (paints, stack) = choose(candidates, &colours, &bands[..1], &separation)?;
         stage.share(0.3);
         let model = FilmsOnWall { stack: &stack, grounds: &bands, of_pixel: &wall.of_place };
         let asked: Vec<Option<[f64; 3]>> =
@@ -150,7 +150,9 @@ fn usual_colours(wanted: &[[f64; 3]], opaque: &[bool]) -> Vec<([f64; 3], f64)> {
     colours.sort_by(|a, b| b.1.total_cmp(&a.1));
     colours.truncate(CELLS);
     let all: f64 = colours.iter().map(|(_, count)| count).sum();
-    colours.iter_mut().for_each(|(_, count)| *count /= all);
+    for (_, count) in &mut colours {
+        *count /= all;
+    }
     colours
 }
 

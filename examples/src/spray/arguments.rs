@@ -17,8 +17,8 @@ pub struct Arguments {
     /// Surface, OBJ, glTF (.glb, .gltf), PLY, STL or OFF; the built-in rock wall if not given
     #[arg(long, value_name = "FILE")]
     pub mesh: Option<PathBuf>,
-    /// Motion: CSV with time_s, nozzle_x_m, nozzle_y_m, nozzle_z_m, axis_x, axis_y, axis_z, nozzle_flow_m3_per_s (as trajectory.csv), or MCAP with the
-    /// transforms or poses of the nozzle, x along the spray, and a joint called valve
+    /// Motion: CSV with `time_s`, `nozzle_x_m`, `nozzle_y_m`, `nozzle_z_m`, `axis_x`, `axis_y`, `axis_z`, `nozzle_flow_m3_per_s` (as trajectory.csv), or
+    /// MCAP with the transforms or poses of the nozzle, x along the spray, and a joint called valve
     #[arg(long, value_name = "FILE")]
     pub nozzle: PathBuf,
     /// One flow for all of the motion, litres per minute [default: the recorded one]

@@ -23,7 +23,7 @@ const VALVE: &str = "valve";
 pub(super) fn read_mcap(path: &Path, flow: Option<f64>) -> Result<Vec<NozzleSample>, String> {
     let fault = |why: MessagesFault| match why {
         MessagesFault::Unreadable(why) => why.to_string(),
-        MessagesFault::Malformed(why) | MessagesFault::CutOff(why) => why.to_string(),
+        MessagesFault::Malformed(why) | MessagesFault::CutOff(why) => why,
     };
     let (mut chained, mut posed) = (Vec::new(), Vec::new());
     let mut topic: Option<String> = None;

@@ -58,7 +58,7 @@ fn band_of(drawdown: &Drawdown, band: usize) -> Result<(f64, f64), Error> {
     )?;
     let below = (r + dark) * (q - light) - (q + light) * (r - dark);
     let a = ((1.0 + r * dark) * (q - light) - (1.0 + q * light) * (r - dark)) / below;
-    if !(a < CLEAR) {
+    if a.is_nan() || a >= CLEAR {
         return Ok((-0.5 * (q / light).ln(), 0.0));
     }
     // Rounding may lead just below the film that absorbs nothing.
