@@ -57,8 +57,8 @@ impl KeepOutVolume {
     pub fn check(&self) -> Result<(), Error> {
         match self {
             Self::Box { min, max } => {
-                let least = (max - min).min();
-                ensure("keep_out.box", least, least >= 0.0 && least.is_finite(), "finite, with no min above its max")
+                let (least, sum) = ((max - min).min(), (max - min).sum());
+                ensure("keep_out.box", least, least >= 0.0 && sum.is_finite(), "finite, with no min above its max")
             }
             Self::Sphere { centre, radius } => {
                 let sum = centre.coords.sum() + radius;
