@@ -125,3 +125,108 @@ fn band(task: &PaintingTask) -> Option<Vec<bool>> {
     }
     Some(near)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashMap;
+
+    use nalgebra::{Point3, Vector3};
+    use paint_planner::mission::TargetOutcomes;
+
+    use super::super::settings::MissionSettings;
+    use super::*;
+    use crate::design::Design;
+    use crate::mesh_io::TriangleMesh;
+    use crate::region::Scene;
+
+    const TEXEL: f64 = 0.025;
+
+    /// A cube of 0.6 m, half of it dark.
+    fn cube() -> PaintingTask {
+        let mut mesh = TriangleMesh::default();
+        let corner = |k: u32| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { 0.3 } else { -0.3 });
+        mesh.positions = (0..8).map(corner).map(|[x, y, z]| [x, y, z + 1.8]).collect();
+        for [a, b, c, d] in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]] {
+            mesh.faces.extend([[a, b, c], [a, c, d]]);
+        }
+        let settings = MissionSettings { texel: TEXEL, ..MissionSettings::default() };
+        PaintingTask::new("cube", &Scene::whole(mesh), &Design::Even { ink: 0.5 }, settings).unwrap()
+    }
+
+    /// How far every texel lies from where the surface is cut, metres; `None` beside it.
+    fn from_cut(task: &PaintingTask) -> Vec<Option<f64>> {
+        let disk = task.surface.disk();
+        let mut edges: HashMap<[u32; 2], usize> = HashMap::new();
+        for face in disk.faces() {
+            for k in 0..3 {
+                let (a, b) = (face[k], face[(k + 1) % 3]);
+                *edges.entry([a.min(b), a.max(b)]).or_default() += 1;
+            }
+        }
+        let at = |v: u32| Point3::from(disk.positions()[v as usize]);
+        let cut: Vec<_> = edges.iter().filter(|(_, sides)| **sides == 1).map(|([a, b], _)| (at(*a), at(*b))).collect();
+        let to = |p: &Point3<f64>, (a, b): &(Point3<f64>, Point3<f64>)| {
+            let way: Vector3<f64> = b - a;
+            let share = ((p - a).dot(&way) / way.norm_squared()).clamp(0.0, 1.0);
+            (p - (a + way * share)).norm()
+        };
+        let (width, height) = (task.surface.width(), task.surface.height());
+        let of = |k: usize| {
+            let at = task.surface.texels.at(k % width, k / width)?;
+            let point = task.surface.chart.point(at);
+            Some(cut.iter().map(|edge| to(&point, edge)).fold(f64::INFINITY, f64::min))
+        };
+        (0..width * height).map(of).collect()
+    }
+
+    #[test]
+    fn the_band_is_what_lies_within_three_centimetres_of_a_cut() {
+        let task = cube();
+        let (own, near, distance) = (own_texels(&task), band(&task).unwrap(), from_cut(&task));
+        let mut counts = [0; 2];
+        for k in (0..own.len()).filter(|&k| own[k]) {
+            let distance = distance[k].unwrap();
+            assert!(!near[k] || distance < BAND + 1.5 * TEXEL, "{k}: {distance} m");
+            assert!(near[k] || distance > BAND - TEXEL, "{k}: {distance} m");
+            counts[usize::from(near[k])] += 1;
+        }
+        assert!(counts.iter().all(|count| *count > 200), "far and near: {counts:?}");
+        assert!(task.surface.beyond_seams.ghosts().iter().all(|(ghost, _)| !own[*ghost]));
+    }
+
+    /// Nothing is painted. A pattern that is wanted counts where it is, and nowhere else.
+    #[test]
+    fn a_pattern_at_seams_shows_at_seams() {
+        let likeness_of = |wanted_at: &dyn Fn(f64) -> bool| {
+            let mut task = cube();
+            let (distance, width) = (from_cut(&task), task.surface.width());
+            task.in_reach.fill(true);
+            for (k, ink) in task.wanted.data_mut().iter_mut().enumerate() {
+                let dark = distance[k].is_some_and(wanted_at) && (k % width + k / width).is_multiple_of(2);
+                *ink = f64::from(u8::from(dark));
+            }
+            let (texels, pixels) = task.film_texels();
+            let (film, outcomes) = (Film::new(texels).unwrap(), TargetOutcomes::default());
+            let (flights, looked) = (Vec::new(), None);
+            let (planning, unreachable_paint, kept_off, left_bare) = (0.0, 0.0, 0, 0);
+            let mission = Mission {
+                task,
+                flights,
+                film,
+                pixels,
+                planning,
+                unreachable_paint,
+                kept_off,
+                left_bare,
+                outcomes,
+                looked,
+            };
+            likeness(&mission).unwrap().unwrap()
+        };
+        let seams = likeness_of(&|distance| distance < BAND);
+        assert!(seams.near < 0.3 && seams.far > seams.near + 0.3, "{} {}", seams.near, seams.far);
+        // Windows are 11 texels wide.
+        let middles = likeness_of(&|distance| distance > BAND + 6.5 * TEXEL);
+        assert!(middles.near > 1.0 - 1e-9 && middles.far < 0.9, "{} {}", middles.near, middles.far);
+    }
+}

@@ -88,3 +88,40 @@ pub fn save_error_map(
 fn colour(share: f64) -> RGBColor {
     ViridisRGB.get_color(share.clamp(0.0, 1.0) as f32)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The first value is that of the upper left cell, and none leaves the paper white.
+    #[test]
+    fn every_cell_has_its_own_place_and_colour() {
+        let path = std::env::temp_dir().join(format!("paintcopter-{}-error-map.png", std::process::id()));
+        let difference = [Some(2.0), Some(8.0), None, Some(14.0), Some(30.0), Some(20.0)];
+        save_error_map(&path, 3, &difference, (0.1, "m"), &COLOUR_DIFFERENCE).unwrap();
+        let picture = image::open(&path).unwrap().to_rgb8();
+        std::fs::remove_file(&path).unwrap();
+        // The scale stands on the right, 140 pixels wide.
+        let (mut middles, right) = (Vec::new(), picture.width() - 140);
+        for value in [2.0, 8.0, 14.0, 20.0] {
+            let RGBColor(r, g, b) = colour(value / COLOUR_DIFFERENCE.ceiling);
+            let places: Vec<_> = picture
+                .enumerate_pixels()
+                .filter(|(x, _, c)| *x < right && c.0 == [r, g, b])
+                .map(|(x, y, _)| (x, y))
+                .collect();
+            let mean = |of: &dyn Fn(&(u32, u32)) -> u32| {
+                places.iter().map(|at| f64::from(of(at))).sum::<f64>() / places.len() as f64
+            };
+            middles.push([mean(&|at| at.0), mean(&|at| at.1), places.len() as f64]);
+        }
+        let [two, eight, fourteen, twenty] = middles[..] else { panic!() };
+        // Above and above the ceiling share a colour: two cells side by side.
+        assert!((twenty[2] / two[2] - 2.0).abs() < 0.02, "{middles:?}");
+        assert!((two[1] - eight[1]).abs() < 1.5 && (two[0] - fourteen[0]).abs() < 1.5, "{middles:?}");
+        let side = two[2].sqrt();
+        assert!((eight[0] - two[0] - side).abs() < 0.03 * side, "{middles:?}");
+        assert!((fourteen[1] - two[1] - side).abs() < 0.03 * side, "{middles:?}");
+        assert!((twenty[0] - two[0] - 1.5 * side).abs() < 0.03 * side, "{middles:?}");
+    }
+}
