@@ -65,6 +65,17 @@ fn volumes_are_those_for_what_lands_on_the_surface() {
     }
 }
 
+/// A dark wall asks for more than the valve gives: no spray is larger for it.
+#[test]
+fn no_spray_on_a_surface_is_larger_than_the_largest() {
+    let (wanted, kernel) = (Image::filled(SIDE, SIDE, 0.9), nozzle());
+    let limits = Limits { spray_spacing: 2, row_spacing: 3, min_volume: 0.02, max_volume: 0.1, ..Limits::default() };
+    let problem = PaintProblem::new(&wanted).with_kernel(&kernel).with_limits(&limits);
+    let painting = OnSurface::new(Deconvolution::default(), &footprints).paint(&problem).unwrap();
+    let largest = painting.sprays.iter().map(|spray| spray.volume).fold(0.0, f64::max);
+    assert!((largest - 0.1).abs() < 1e-12, "{largest}");
+}
+
 #[test]
 fn footprints_that_cannot_be_are_refused() {
     let wanted = Image::filled(SIDE, SIDE, 0.3);

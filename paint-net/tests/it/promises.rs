@@ -1,6 +1,7 @@
 //! What limits and metrics promise, to the last bit, and that every part of a problem counts.
 
 use paint_net::colour::{ColourImage, ColourProblem, ColourSeparation, MAX_PAINTS, Paint, Palette};
+use paint_net::model::MonotoneCurve;
 use paint_net::painters::{ClosedLoopPainter, FreeSprays, Layered, MatchingPursuit, SlewLimited};
 use paint_net::procedural::{Texture, lattice};
 use paint_net::{
@@ -218,4 +219,39 @@ fn missing_ink_can_count_more_than_surplus() {
     let problem = PaintProblem::new(&wanted);
     let (plain, heeded) = (least(&problem), least(&problem.with_missing_weight(&weight)));
     assert!(heeded > plain + 0.1, "{plain}, {heeded} with weights");
+}
+
+/// Knots between which a plain cubic would fall again.
+#[test]
+fn a_curve_through_any_knots_rises_and_ends_at_its_last() {
+    let knots = [(0.0, 0.0), (1.0, 0.01), (1.1, 0.85), (2.0, 0.86), (4.0, 0.9)];
+    let curve = Saturation::Curve(MonotoneCurve::new(&knots).unwrap());
+    let ink: Vec<f64> = (0..=4000).map(|k| curve.forward(0.001 * f64::from(k))).collect();
+    assert!(ink.windows(2).all(|pair| pair[1] >= pair[0] - 1e-15));
+    assert!(knots.iter().all(|(depth, ink)| (curve.forward(*depth) - ink).abs() < 1e-12));
+    assert_eq!((curve.forward(7.0), curve.derivative(7.0)), (0.9, 0.0));
+}
+
+/// One window of 7 x 7 pixels by the definition.
+#[test]
+fn similarity_about_a_pixel_is_that_of_its_window() {
+    let image = |a: usize, b: usize| Image::from_fn(11, 9, |x, y| ((a * x + b * y) % 17) as f64 / 16.0);
+    let (picture, wanted) = (image(5, 3), image(7, 11));
+    for (cx, cy) in [(4, 4), (3, 3), (7, 5)] {
+        let at: Vec<[f64; 2]> = (cy - 3..=cy + 3)
+            .flat_map(|y| (cx - 3..=cx + 3).map(move |x| (x, y)))
+            .map(|(x, y)| [picture.at(x, y), wanted.at(x, y)])
+            .collect();
+        let [p, w] = [0, 1].map(|k| at.iter().map(|pair| pair[k]).sum::<f64>() / 49.0);
+        let about = |k: usize, l: usize| {
+            let mean = [p, w];
+            at.iter().map(|pair| (pair[k] - mean[k]) * (pair[l] - mean[l])).sum::<f64>() / 48.0
+        };
+        let (c1, c2) = (1e-4, 9e-4);
+        let expected =
+            (2.0 * p * w + c1) * (2.0 * about(0, 1) + c2) / ((p * p + w * w + c1) * (about(0, 0) + about(1, 1) + c2));
+        let centres: Vec<bool> = (0..99).map(|k| k == cy * 11 + cx).collect();
+        let found = metrics::ssim_at(&picture, &wanted, None, &centres).unwrap();
+        assert!((found - expected).abs() < 1e-9, "{found} instead of {expected}");
+    }
 }

@@ -101,3 +101,24 @@ fn the_tether_stays_on_its_side() {
     assert!(Tether { half_angle: 0.0, ..tether }.check().is_err() && tether.check().is_ok());
     assert!(Tether { half_angle: PI + 0.1, ..tether }.check().is_err());
 }
+
+#[test]
+fn volumes_that_are_none_are_refused() {
+    let origin = Point3::origin();
+    for sound in [
+        KeepOutVolume::Box { min: origin, max: Point3::new(1.0, 0.0, 2.0) },
+        KeepOutVolume::Sphere { centre: origin, radius: 0.2 },
+        KeepOutVolume::HalfSpace { point: origin, normal: Vector3::y() * 3.0 },
+    ] {
+        sound.check().unwrap();
+    }
+    for wrong in [
+        KeepOutVolume::Box { min: origin, max: Point3::new(1.0, -0.1, 2.0) },
+        KeepOutVolume::Box { min: origin, max: Point3::new(1.0, f64::INFINITY, 2.0) },
+        KeepOutVolume::Sphere { centre: origin, radius: 0.0 },
+        KeepOutVolume::Sphere { centre: Point3::new(f64::NAN, 0.0, 0.0), radius: 0.2 },
+        KeepOutVolume::HalfSpace { point: origin, normal: Vector3::zeros() },
+    ] {
+        assert!(wrong.check().is_err(), "{wrong:?}");
+    }
+}

@@ -407,3 +407,19 @@ fn the_registration_finds_an_object_that_stands_elsewhere() {
     assert!(registration.rejected >= 140 && registration.used > 1500);
     assert!(registration.translation_sigmas().max() < 1e-3);
 }
+
+/// The width, or the area, over which a Gaussian is even for its own droplets: one over the integral of its square, summed here.
+#[test]
+fn the_flux_is_that_of_the_nozzles_gaussian() {
+    let (flow, sigma, punishment) = (2e-9, 0.1_f64, 3.0);
+    let (spread, step) = (sigma.tan(), 1e-4);
+    let gaussian = |x: f64| (-0.5 * (x / spread).powi(2)).exp() / (std::f64::consts::TAU.sqrt() * spread);
+    let squared: f64 = (-10_000..=10_000).map(|k| gaussian(step * f64::from(k)).powi(2) * step).sum();
+    let usual = GantrySettings::default();
+    let [physical, literal] = [false, true].map(|literal| usual.with_spray(flow, sigma, punishment, literal));
+    assert!((physical.flux_speed / (flow * squared) - 1.0).abs() < 1e-9, "{}", physical.flux_speed);
+    assert!((literal.flux_speed / (flow * squared * squared) - 1.0).abs() < 1e-9, "{}", literal.flux_speed);
+    // One part gained for three lost.
+    assert_eq!((physical.least_use, literal.least_use), (0.75, usual.least_use));
+    assert!(!literal.saturate && physical.saturate == usual.saturate);
+}

@@ -15,6 +15,7 @@ mod plans;
 mod readme;
 mod teleop;
 mod teleop_states;
+mod told_of_plans;
 mod transits;
 mod walls;
 mod worlds;

@@ -1,8 +1,12 @@
 //! Strokes lifted onto a surface, ordered, planned, and accounted for.
 
-use paint_planner::mission::{Chart, Route, Spray, TargetOutcomes, reachable_texels};
+use paint_planner::mission::{
+    Chart, MissionSettings, NoRehearsal, Route, Spray, TargetOutcomes, plan_mission, reachable_targets,
+    reachable_texels,
+};
 use paint_planner::nalgebra::{Point3, UnitVector3, Vector3};
 use paint_planner::plan::NotServed;
+use paint_planner::timing::TimingSettings;
 use paint_planner::{Plan, Settings, Target, plan};
 
 use crate::walls::{Arm, Wall};
@@ -72,17 +76,18 @@ fn what_lies_beside_the_surface_is_lost_and_a_cell_goes_on_beyond_a_seam() {
 #[test]
 fn texels_are_reached_as_if_each_were_asked_about() {
     // A wall that leans back more from row to row: the tilt joint ends somewhere.
-    struct Leaning;
+    struct Leaning(f64);
     impl Chart for Leaning {
         fn lift(&self, [x, y]: [f64; 2]) -> Option<(Point3<f64>, UnitVector3<f64>)> {
-            let (sin, cos) = (0.035 * y).sin_cos();
+            let (sin, cos) = (self.0 * y).sin_cos();
             Some((Point3::new(0.0, 0.02 * x, 2.0), UnitVector3::new_normalize(Vector3::new(-cos, 0.0, -sin))))
         }
     }
     let (width, height, settings) = (12, 45, Settings::default());
     let mut occupied = vec![true; width * height];
     occupied[..width].fill(false);
-    let reached = reachable_texels(&occupied, width, &Leaning, &Wall::flat(), &Arm::default(), &settings).unwrap();
+    let reached =
+        reachable_texels(&occupied, width, &Leaning(0.035), &Wall::flat(), &Arm::default(), &settings).unwrap();
     // 44 degrees of the joint and 25 of incidence, less a degree: rows of two degrees.
     let limit = 68_f64.to_radians() / 0.035;
     for (texel, reached) in reached.iter().enumerate() {
@@ -90,6 +95,34 @@ fn texels_are_reached_as_if_each_were_asked_about() {
         assert!(*reached == (occupied[texel] && row < limit) || (row - limit).abs() < 3.0, "row {row}");
     }
     assert!(reached.iter().any(|r| *r) && reached[reached.len() - 1..] == [false]);
+    // Wherever the last row lies in its cell of three, no texel is reached that by itself is not.
+    for lean in [0.0345, 0.035, 0.0355, 0.036] {
+        let chart = Leaning(lean);
+        let reached = reachable_texels(&occupied, width, &chart, &Wall::flat(), &Arm::default(), &settings).unwrap();
+        let target = |texel: usize| {
+            let (point, normal) = chart.lift([(texel % width) as f64, (texel / width) as f64]).unwrap();
+            Target { point, normal, dose: 0.0, time: None }
+        };
+        let targets: Vec<Target> = (0..reached.len()).map(target).collect();
+        let alone = reachable_targets(&targets, &Wall::flat(), &Arm::default(), &settings).unwrap();
+        assert!(reached.iter().zip(&alone).all(|(reached, alone)| *alone || !reached), "{lean}");
+    }
+}
+
+/// A rich stroke is flown as slowly as the valve asks, in every flight of a mission.
+#[test]
+fn a_mission_keeps_the_limit_of_the_valve() {
+    let (wall, usual) = (Wall::flat(), Settings::default());
+    let strokes = [wall.rows(1.0, 1, 0.2)];
+    let greatest = |planner: Settings| {
+        let settings = MissionSettings { planner, ..MissionSettings::default() };
+        let mission = plan_mission(&strokes, &wall, &Arm::default(), &NoRehearsal, settings).unwrap();
+        mission.flights.iter().flat_map(|flight| flight.plan.flow.clone()).fold(0.0, f64::max)
+    };
+    let free = greatest(usual.clone());
+    let timing = TimingSettings { max_flow: 0.5 * free, ..usual.timing.clone() };
+    let limited = greatest(Settings { timing, ..usual });
+    assert!(limited > 0.4 * free && limited <= 0.5 * free * (1.0 + 1e-9), "{free} {limited}");
 }
 
 #[test]

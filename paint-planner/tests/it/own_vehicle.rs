@@ -203,6 +203,9 @@ fn what_is_kept_can_be_taken_back_and_is_flown_when_it_is_asked_for() {
     assert!((teleop.undo().first().unwrap().hit.unwrap().point.y - 0.5).abs() < 1e-12);
     let erased = teleop.erase(&Point3::new(0.0, 0.15, 2.0), 0.05);
     assert!(erased.iter().all(|state| (state.hit.unwrap().point.y - 0.15).abs() <= 0.05) && erased.len() > 50);
+    // What is left of the first are two strokes: one of them is taken back.
+    let back = teleop.clone().undo();
+    assert!(!back.is_empty() && back.iter().filter_map(|state| state.hit).all(|hit| hit.point.y > 0.2));
     teleop.fly_strokes();
     last.sequence = 700;
     rest(&mut teleop, &mut vehicle, &wall, last);

@@ -62,6 +62,8 @@ fn bumpy_wall_meets_the_published_deviations() {
     assert!(plan.trajectory.duration() < targets.len() as f64 * 0.025 / 0.25);
     let baseline = SmoothingPlanner.plan(&targets, &wall, &Arm::default(), &settings).unwrap();
     assert!(baseline.report.normal_deviation_mean >= 5.0 * plan.report.normal_deviation_mean);
+    let faces = |(nozzle, target): (&NozzleState, &Target)| nozzle.direction.dot(&target.normal) < -0.8;
+    assert!(baseline.nozzle.iter().zip(&targets).all(faces), "it sprays at the wall");
 }
 
 #[test]

@@ -5,7 +5,7 @@
 use paint_planner::nalgebra::{Isometry3, Point3, Vector3};
 use paint_planner::teleop::{
     CradlePose, FarReference, Feedback, LagIndicator, LiveQueue, PaintHit, RATE, Segment, SessionSettings, Task,
-    VERSION, VrMode, VrState, latency_in_time, segments,
+    TaskKind, VERSION, VrMode, VrState, latency_in_time, segments,
 };
 
 /// Where the vehicle stands unless a test says otherwise.
@@ -321,4 +321,10 @@ fn a_piece_that_is_given_back_grows_until_the_vehicle_asks_for_a_task() {
     queue.give_back(piece);
     let Some(Task::Segment(again)) = queue.next_task(0.2, &VEHICLE) else { panic!("it is full") };
     assert!(again.start == start && again.length >= length && (start - 0.3).abs() < 1e-12);
+}
+
+#[test]
+fn tasks_have_the_names_of_the_rules() {
+    let names = [TaskKind::Paint, TaskKind::View, TaskKind::Approach, TaskKind::Seek].map(TaskKind::name);
+    assert_eq!(names, ["paint", "view", "approach", "seek"]);
 }

@@ -1,7 +1,9 @@
 //! Colours: CIEDE2000 against the published pairs, paints against printed digits.
 
 use paint_sim::colour::ciede2000;
-use paint_sim::colour::{BANDS, band_white, decode_srgb8, encode_srgb8, spectrum_lab, spectrum_srgb8, xyz};
+use paint_sim::colour::{
+    BANDS, band_white, decode_srgb8, encode_srgb8, spectrum_lab, spectrum_linear_srgb, spectrum_srgb8, xyz,
+};
 use paint_sim::paint::{Appearance, PaintName, ink_curve};
 use paint_sim::{Error, Paint, Substrate};
 
@@ -199,8 +201,12 @@ fn an_appearance_is_the_paint_over_its_substrate() {
         let paint = name.paint(20e-6).unwrap();
         let table = Appearance::new(&paint, &wall, 20e-6, 4.0).unwrap();
         for depth in [0.0, 0.013, 0.4, 1.0, 2.7, 4.0] {
-            let exact = spectrum_lab(paint.over(20e-6 * depth, &wall).unwrap().reflectance());
+            let film = paint.over(20e-6 * depth, &wall).unwrap();
+            let exact = spectrum_lab(film.reflectance());
             assert!(ciede2000(table.lab(depth), exact) < 0.02, "{} at {depth}", name.as_str());
+            let (light, exact) = (table.linear(depth), spectrum_linear_srgb(film.reflectance()));
+            let off = light.iter().zip(exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-3, "{} at {depth}: {light:?} instead of {exact:?}", name.as_str());
         }
         assert_eq!(table.lab(9.0), table.lab(4.0));
     }
@@ -209,4 +215,21 @@ fn an_appearance_is_the_paint_over_its_substrate() {
     assert_eq!(knots[0], (0.0, 0.0));
     assert!(knots.windows(2).all(|pair| pair[0].1 < pair[1].1) && (0.99..1.0).contains(&knots[knots.len() - 1].1));
     assert!(matches!(ink_curve(&Paint::white(1e-6).unwrap(), &wall, 0.0, 4.0), Err(Error::OutOfRange { .. })));
+}
+
+/// The formulas of the named paints at the ends of the spectrum: 380 and 730 nm, or where their steps lie.
+#[test]
+fn named_paints_absorb_what_their_formulas_say() {
+    let at = |paint: PaintName, wavelength: usize| paint.paint(20e-6).unwrap().absorption()[(wavelength - 380) / 10];
+    for (paint, wavelength, expected) in [
+        (PaintName::Charcoal, 380, 1.5),
+        (PaintName::Charcoal, 730, 1.43),
+        (PaintName::Red, 590, 0.03 + 2.4 / (1.0 + (-5.0_f64 / 9.0).exp())),
+        (PaintName::Green, 530, 0.04),
+        (PaintName::Blue, 510, 1.15),
+    ] {
+        // In units of the thickness that the formulas hold for.
+        let found = at(paint, wavelength) * 20e-6;
+        assert!((found - expected).abs() < 1e-9, "{paint:?} at {wavelength} nm: {found} instead of {expected}");
+    }
 }

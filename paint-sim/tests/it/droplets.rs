@@ -1,13 +1,9 @@
-//! Droplets on texels against closed forms, and the hardware of the handheld robot.
+//! Droplets on texels against closed forms.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use paint_sim::droplets::{
     Coverage, DensityPlace, DensitySettings, DepositSettings, Droplets, Flux, GantryGeometry, Nozzle, PathSimulation,
     SimulatedSegment, StepHits, Sweep, TexelFace, TexelSurface, density_map,
-};
-use paint_sim::gantry_robot::{
-    HandMotion, HandSettings, InertialSensor, InertialSensorSettings, Pass, PoseSensor, PoseSensorSettings, Stepper,
-    StepperSettings, Valve, ValveSettings,
 };
 use paint_sim::{Error, SprayModel};
 
@@ -227,6 +223,45 @@ fn paths_are_simulated_with_the_paint_that_they_place() {
     assert_eq!(placed, some.paint);
 }
 
+/// The nozzle of a step is that of its middle: along the slide, and with the robot.
+#[test]
+fn steps_of_a_path_are_cast_from_their_middles() {
+    let wall = surface(&wall_at(0.06));
+    let deposit = DepositSettings::default();
+    let sets = Droplets::sets(&spray(), deposit.droplets, 16).unwrap();
+    let coverage = Coverage::new(&wall, &vec![1e-6; SIDE * SIDE]).unwrap();
+    let (gantry, sweep) = (GantryGeometry::default(), sweep());
+    let simulation = PathSimulation::new(&wall, &coverage, &sets, &deposit, &gantry, &sweep).unwrap();
+    let segment = SimulatedSegment { key: [1, 0, 0], start: 0.2, duration: 0.2, from: 0.02, to: 0.06 };
+    let steps = simulation.missing(&segment);
+    assert_eq!((steps.len(), steps[0].set, steps[19].set), (20, 20 % 16, 39 % 16));
+    for (k, step) in steps.iter().enumerate() {
+        let passed = (k as f64 + 0.5) / 20.0;
+        // 10 cm/s along y from -2 cm; the slide's zero is 5 cm below the robot.
+        let expected = Point3::new(0.0, -0.02 + 0.1 * (0.2 + 0.2 * passed), -0.05 + 0.02 + 0.04 * passed);
+        assert!((step.nozzle.origin - expected).norm() < 1e-12, "{k}: {}", step.nozzle.origin);
+    }
+}
+
+/// Turns are about the axes of the world, and move what is painted as well as the robot.
+#[test]
+fn a_sweep_turns_about_the_axes_of_the_world() {
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let turned = UnitQuaternion::from_scaled_axis(Vector3::z() * quarter);
+    let still = Sweep::still(Isometry3::from_parts(Vector3::zeros().into(), turned));
+    let sweep = Sweep { angular_velocity: Vector3::x() * 0.5, ..still };
+    // The robot's x axis is the world's y at first, and has risen after a quarter turn about the world's x.
+    let pose = sweep.at(quarter / 0.5);
+    assert!((pose.rotation * Vector3::x() - Vector3::z()).norm() < 1e-12, "{pose}");
+    let gantry = GantryGeometry::default();
+    let level = Sweep::still(Isometry3::identity());
+    let both = Sweep { velocity: Vector3::y() * 0.1, angular_velocity: Vector3::z() * 0.5, ..level };
+    // 10 cm/s, and half a radian a second of a lever of 20 cm.
+    assert!((both.cross_speed(&gantry, 0.2, 0.0) - 0.2).abs() < 1e-12);
+    let aside = Sweep { velocity: Vector3::x() * 0.1, ..level };
+    assert_eq!(aside.cross_speed(&gantry, 0.2, 0.0), 0.0);
+}
+
 #[test]
 fn a_target_of_another_size_is_refused() {
     let wall = surface(&wall_at(0.06));
@@ -246,91 +281,25 @@ fn figures_count_paint_inside_outside_and_above() {
     let mut thickness = vec![0.0; SIDE * SIDE];
     thickness[..4].fill(10e-6);
     let mut coverage = Coverage::new(&wall, &thickness).unwrap();
-    // A coat is 1e-11 m^3 = 1e7 fL on a texel. Half, all, 1.2 coats, and half a coat beside the target.
-    for (texel, paint) in [(0, 5_000_000), (1, 10_000_000), (2, 12_000_000), (9, 5_000_000)] {
-        coverage.add(texel, paint);
+    // A coat is 1e-11 m^3 = 1e7 fL on a texel. Half, all, 1.2 coats, and half a coat beside the target twice.
+    for (texel, paint) in [(0, 5_000_000), (1, 10_000_000), (2, 12_000_000), (9, 5_000_000), (10, 5_000_000)] {
+        assert_eq!(coverage.add(texel, paint), paint);
     }
     let figures = coverage.figures();
-    assert_eq!((figures.inside, figures.outside, figures.above), (2.5 / 4.0, 0.5 / 4.0, 0.2 / 4.0));
+    assert_eq!((figures.inside, figures.outside, figures.above), (2.5 / 4.0, 1.0 / 4.0, 0.2 / 4.0));
     let one = 1.0 / (SIDE * SIDE) as f64;
-    assert_eq!((figures.overdosed_wanted, figures.overdosed_bare, figures.overdosed()), (one, one, 2.0 * one));
+    assert_eq!((figures.overdosed_wanted, figures.overdosed_bare, figures.overdosed()), (one, 2.0 * one, 3.0 * one));
 }
 
+/// Texels of the page that are no surface, and those beyond it.
 #[test]
-fn the_valve_answers_late() {
-    let mut valve = Valve::new(ValveSettings { open_delay: 4e-3, close_delay: 2e-3 }).unwrap();
-    valve.command(0.0, true);
-    assert!((valve.open_share(0.0, 0.01) - 0.6).abs() < 1e-9);
-    valve.command(0.01, false);
-    assert!((valve.open_share(0.01, 0.02) - 0.2).abs() < 1e-9);
-    // Told to open and at once to shut: it never opens.
-    valve.command(0.02, true);
-    valve.command(0.021, false);
-    assert_eq!((valve.open_share(0.02, 0.03), valve.switched), (0.0, 4));
-}
-
-#[test]
-fn the_slide_keeps_its_limits_and_stops_at_its_ends() {
-    let settings = StepperSettings::default();
-    let mut stepper = Stepper::new(settings, 0.05).unwrap();
-    let (mut speed, dt) = (0.0, 5e-3);
-    for k in 0..400 {
-        let target = if k < 100 { 0.09 } else { 0.02 };
-        stepper.step(target, 0.0, dt);
-        assert!((stepper.speed() - speed).abs() <= settings.max_acceleration * dt + 1e-12);
-        assert!(stepper.speed().abs() <= settings.max_speed + 1e-12);
-        speed = stepper.speed();
-        if k == 99 {
-            assert!((stepper.position() - 0.09).abs() < 1e-4, "{}", stepper.position());
-        }
-    }
-    assert!((stepper.position() - 0.02).abs() < 1e-4 && stepper.limit_hits == 0);
-    let steps = stepper.position() / settings.step;
-    assert!((steps - steps.round()).abs() < 1e-6);
-    (0..100).for_each(|_| stepper.step(-0.05, 0.0, dt));
-    assert_eq!((stepper.position(), stepper.limit_hits), (0.0, 1));
-}
-
-#[test]
-fn sensors_are_as_noisy_as_they_say_and_the_seed_decides() {
-    let pose = Isometry3::translation(0.1, 0.2, 0.3);
-    let settings = PoseSensorSettings { loss_rate: 1.0, loss_duration: 0.2, ..PoseSensorSettings::default() };
-    let run = |seed: u64| {
-        let mut sensor = PoseSensor::new(settings, seed).unwrap();
-        (0..20_000).map(|k| sensor.measure(&pose, f64::from(k) * 0.01, 0.01)).collect::<Vec<_>>()
-    };
-    let seen = run(1);
-    assert!(seen == run(1) && seen != run(2));
-    let found: Vec<_> = seen.iter().flatten().collect();
-    let squared: f64 = found.iter().map(|p| (p.translation.vector - pose.translation.vector).norm_squared()).sum();
-    assert!(((squared / 3.0 / found.len() as f64).sqrt() / 2e-3 - 1.0).abs() < 0.03);
-    // Gaps of 0.2 s begin once a second of tracking: a sixth of the time is lost.
-    let lost = 1.0 - found.len() as f64 / 20_000.0;
-    assert!((lost - 1.0 / 6.0).abs() < 0.035, "{lost}");
-}
-
-#[test]
-fn the_hand_sweeps_as_wide_and_as_fast_as_it_is_told() {
-    let steady = HandSettings { sway: 0.0, turn: 0.0, tremor: 0.0, ..HandSettings::default() };
-    let pass = |x: f64| Pass { middle: Isometry3::translation(x, 0.0, 0.0), half_width: 0.03, duration: 10.0 };
-    let hand = HandMotion::new(&[pass(0.0), pass(0.1)], steady, 1).unwrap();
-    let y = |t: f64| hand.at(t).translation.y;
-    let times = || (0..9000).map(|k| f64::from(k) * 1e-3);
-    let widest = times().map(|t| y(t).abs()).fold(0.0, f64::max);
-    let fastest = times().map(|t| (y(t + 1e-3) - y(t)).abs() / 1e-3).fold(0.0, f64::max);
-    assert!((widest - 0.03).abs() < 1e-6 && (fastest - 0.1).abs() < 1e-4);
-    // No jumps, also not from one part to the next, and an inertial sensor at rest feels gravity.
-    let whole = (hand.duration() / 1e-3) as i32;
-    let moved = |k: i32| {
-        (hand.at(f64::from(k + 1) * 1e-3).translation.vector - hand.at(f64::from(k) * 1e-3).translation.vector).norm()
-    };
-    assert!((0..whole).map(moved).fold(0.0, f64::max) < 4e-4);
-    let silent = InertialSensorSettings { force_sigma: 0.0, force_bias: 0.0, rate_sigma: 0.0, rate_bias: 0.0 };
-    let mut sensor = InertialSensor::new(silent, 1).unwrap();
-    let turned = UnitQuaternion::from_scaled_axis(Vector3::x() * 0.5);
-    let motion = |t: f64| Isometry3::from_parts(Vector3::new(0.0, 0.0, 0.5 * t * t).into(), turned);
-    let reading = sensor.measure(&motion, 3.0);
-    assert!((turned * reading.specific_force - Vector3::new(0.0, 0.0, 10.80665)).norm() < 1e-6);
+fn paint_beside_the_surface_is_not_booked() {
+    let mut areas = vec![1e-6; SIDE * SIDE];
+    areas[7] = 0.0;
+    let wall = TexelSurface::new(&wall_at(0.06), [SIDE, SIDE], &areas).unwrap();
+    let mut coverage = Coverage::new(&wall, &vec![10e-6; SIDE * SIDE]).unwrap();
+    assert_eq!([6, 7, SIDE * SIDE].map(|texel| coverage.add(texel, 1000)), [1000, 0, 0]);
+    assert_eq!((coverage.current()[6], coverage.current()[7]), (1000, 0));
 }
 
 /// The GPU agrees with the processor within what is stated.

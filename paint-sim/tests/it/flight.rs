@@ -249,3 +249,24 @@ fn bad_flights_are_refused() {
     let storm = FlightSettings { wind: Wind { mean: Vector3::new(0.0, 90.0, 0.0), ..good.wind }, ..good };
     assert!(matches!(run(still(), &storm), Error::Diverged { .. }));
 }
+
+/// The gains of an observer whose poles are all at `z = exp(-w dt)` (three of translation, two of yaw, one of roll and pitch): what one
+/// pose changes in an estimate at rest.
+#[test]
+fn one_pose_changes_the_estimate_by_the_gains_of_its_poles() {
+    let (dt, settings) = (0.02, ObserverSettings::default());
+    let start = nalgebra::Isometry3::translation(1.0, 2.0, 3.0);
+    let mut estimator = Estimator::new(Airframe::default(), settings, &start);
+    let (shift, [roll, pitch, yaw]) = (Vector3::new(0.01, -0.02, 0.03), [0.02, -0.01, 0.04]);
+    let turned = nalgebra::UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+    estimator.update(&nalgebra::Isometry3::from_parts((start.translation.vector + shift).into(), turned), dt);
+    let found = *estimator.estimate();
+    let z = (-settings.translation * dt).exp();
+    let near = |a: Vector3<f64>, b: Vector3<f64>| assert!((a - b).norm() < 1e-9 * b.norm(), "{a} {b}");
+    near(found.position.coords - start.translation.vector, shift * (1.0 - z.powi(3)));
+    near(found.velocity, shift * (1.5 * (1.0 - z).powi(2) * (1.0 + z) / dt));
+    near(found.disturbance, shift * ((1.0 - z).powi(3) / (dt * dt)));
+    let z = (-settings.attitude * dt).exp();
+    near(Vector3::from(found.attitude), Vector3::new((1.0 - z) * roll, (1.0 - z) * pitch, (1.0 - z * z) * yaw));
+    assert!((found.yaw_rate - (1.0 - z).powi(2) / dt * yaw).abs() < 1e-9, "{}", found.yaw_rate);
+}

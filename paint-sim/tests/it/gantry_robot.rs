@@ -1,8 +1,9 @@
-//! What the sensors of a handheld robot say of motions in closed form, and where the hand goes.
+//! The hardware of a handheld robot: its sensors on motions in closed form, its slide and valve, and where the hand goes.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use paint_sim::gantry_robot::{
-    HandMotion, HandSettings, InertialSensor, InertialSensorSettings, Pass, RangeSensor, RangeSensorSettings,
+    HandMotion, HandSettings, InertialSensor, InertialSensorSettings, Pass, PoseSensor, PoseSensorSettings,
+    RangeSensor, RangeSensorSettings, Stepper, StepperSettings, Valve, ValveSettings,
 };
 use paint_sim::surface::{Hit, Surface};
 
@@ -80,4 +81,92 @@ fn a_hand_retreats_between_two_places() {
     let last = (hand.duration() / 1e-3) as u32;
     let (nearest, farthest) = (0..last).map(x).fold((f64::MIN, f64::MAX), |(n, f), x| (n.max(x), f.min(x)));
     assert!((nearest + 0.3).abs() < 1e-12 && (farthest + 0.45).abs() < 1e-6, "{nearest} {farthest}");
+}
+
+#[test]
+fn the_valve_answers_late() {
+    let mut valve = Valve::new(ValveSettings { open_delay: 4e-3, close_delay: 2e-3 }).unwrap();
+    valve.command(0.0, true);
+    assert!((valve.open_share(0.0, 0.01) - 0.6).abs() < 1e-9);
+    valve.command(0.01, false);
+    assert!((valve.open_share(0.01, 0.02) - 0.2).abs() < 1e-9);
+    // Told to open and at once to shut: it never opens.
+    valve.command(0.02, true);
+    valve.command(0.021, false);
+    assert_eq!((valve.open_share(0.02, 0.03), valve.switched), (0.0, 4));
+}
+
+#[test]
+fn the_slide_keeps_its_limits_and_stops_at_its_ends() {
+    let settings = StepperSettings::default();
+    let mut stepper = Stepper::new(settings, 0.05).unwrap();
+    let (mut speed, dt) = (0.0, 5e-3);
+    for k in 0..400 {
+        let target = if k < 100 { 0.09 } else { 0.02 };
+        stepper.step(target, 0.0, dt);
+        assert!((stepper.speed() - speed).abs() <= settings.max_acceleration * dt + 1e-12);
+        assert!(stepper.speed().abs() <= settings.max_speed + 1e-12);
+        speed = stepper.speed();
+        // Hardly farther than where it is told to go: it brakes before.
+        assert!((0.02 - 1e-3..=0.09 + 1e-3).contains(&stepper.position()), "{}", stepper.position());
+        if k == 99 {
+            assert!((stepper.position() - 0.09).abs() < 1e-4, "{}", stepper.position());
+        }
+    }
+    assert!((stepper.position() - 0.02).abs() < 1e-4 && stepper.limit_hits == 0);
+    let steps = stepper.position() / settings.step;
+    assert!((steps - steps.round()).abs() < 1e-6);
+    (0..100).for_each(|_| stepper.step(-0.05, 0.0, dt));
+    assert_eq!((stepper.position(), stepper.limit_hits), (0.0, 1));
+}
+
+#[test]
+fn sensors_are_as_noisy_as_they_say_and_the_seed_decides() {
+    let pose = Isometry3::translation(0.1, 0.2, 0.3);
+    let settings = PoseSensorSettings { loss_rate: 1.0, loss_duration: 0.2, ..PoseSensorSettings::default() };
+    let run = |seed: u64| {
+        let mut sensor = PoseSensor::new(settings, seed).unwrap();
+        (0..20_000).map(|k| sensor.measure(&pose, f64::from(k) * 0.01, 0.01)).collect::<Vec<_>>()
+    };
+    let seen = run(1);
+    assert!(seen == run(1) && seen != run(2));
+    let found: Vec<_> = seen.iter().flatten().collect();
+    let squared: f64 = found.iter().map(|p| (p.translation.vector - pose.translation.vector).norm_squared()).sum();
+    assert!(((squared / 3.0 / found.len() as f64).sqrt() / 2e-3 - 1.0).abs() < 0.03);
+    let turned: f64 = found.iter().map(|p| p.rotation.angle().powi(2)).sum();
+    let sigma = (turned / 3.0 / found.len() as f64).sqrt();
+    assert!((sigma.to_degrees() / 0.2 - 1.0).abs() < 0.03, "{} degrees", sigma.to_degrees());
+    // Gaps of 0.2 s begin once a second of tracking: a sixth of the time is lost.
+    let lost = 1.0 - found.len() as f64 / 20_000.0;
+    assert!((lost - 1.0 / 6.0).abs() < 0.035, "{lost}");
+}
+
+#[test]
+fn the_hand_sweeps_as_wide_and_as_fast_as_it_is_told() {
+    let steady = HandSettings { sway: 0.0, turn: 0.0, tremor: 0.0, ..HandSettings::default() };
+    let pass = |x: f64| Pass { middle: Isometry3::translation(x, 0.0, 0.0), half_width: 0.03, duration: 10.0 };
+    let hand = HandMotion::new(&[pass(0.0), pass(0.1)], steady, 1).unwrap();
+    let y = |t: f64| hand.at(t).translation.y;
+    let times = || (0..9000).map(|k| f64::from(k) * 1e-3);
+    let widest = times().map(|t| y(t).abs()).fold(0.0, f64::max);
+    let fastest = times().map(|t| (y(t + 1e-3) - y(t)).abs() / 1e-3).fold(0.0, f64::max);
+    assert!((widest - 0.03).abs() < 1e-6 && (fastest - 0.1).abs() < 1e-4);
+    // Every part takes as long as the one before it, with the change to it.
+    let [one, two, three] = [1, 2, 3].map(|parts| {
+        let passes: Vec<_> = (0..parts).map(|k| pass(0.1 * f64::from(k))).collect();
+        HandMotion::new(&passes, steady, 1).unwrap().duration()
+    });
+    assert!(two > one + 5.0 && (three - two - (two - one)).abs() < 1e-9, "{one} {two} {three}");
+    // No jumps, also not from one part to the next, and an inertial sensor at rest feels gravity.
+    let whole = (hand.duration() / 1e-3) as i32;
+    let moved = |k: i32| {
+        (hand.at(f64::from(k + 1) * 1e-3).translation.vector - hand.at(f64::from(k) * 1e-3).translation.vector).norm()
+    };
+    assert!((0..whole).map(moved).fold(0.0, f64::max) < 4e-4);
+    let silent = InertialSensorSettings { force_sigma: 0.0, force_bias: 0.0, rate_sigma: 0.0, rate_bias: 0.0 };
+    let mut sensor = InertialSensor::new(silent, 1).unwrap();
+    let turned = UnitQuaternion::from_scaled_axis(Vector3::x() * 0.5);
+    let motion = |t: f64| Isometry3::from_parts(Vector3::new(0.0, 0.0, 0.5 * t * t).into(), turned);
+    let reading = sensor.measure(&motion, 3.0);
+    assert!((turned * reading.specific_force - Vector3::new(0.0, 0.0, 10.80665)).norm() < 1e-6);
 }

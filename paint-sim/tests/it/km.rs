@@ -180,3 +180,14 @@ fn three_band_paints_over_white_and_black() {
         }
     }
 }
+
+/// Thin films take a series, thick ones the closed form: where one hands over to the other, both are the same.
+#[test]
+fn the_gradient_has_no_step_where_its_series_ends() {
+    // The optical depth sqrt(K (K + 2 S)) d is a hundredth there.
+    let (k, s) = (0.3_f64, 0.2_f64);
+    let end = 0.01 / (k * (k + 2.0 * s)).sqrt();
+    let [below, above] = [1.0 - 1e-12, 1.0 + 1e-12].map(|near| gradient(k, s, near * end, 0.4));
+    assert_close(below.absorption, above.absorption, 3e-11);
+    assert_close(below.scattering, above.scattering, 3e-11);
+}

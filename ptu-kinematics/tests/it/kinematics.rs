@@ -308,4 +308,6 @@ fn wrapping_covers_the_circle_once() {
         assert!(w > -PI && w <= PI);
         close([w.sin(), w.cos()], [angle.sin(), angle.cos()], 1e-13);
     }
+    // Half a turn has one name, whichever way it was made.
+    assert_eq!([PI, -PI, 3.0 * PI].map(wrap), [PI; 3]);
 }

@@ -186,3 +186,16 @@ fn arms_that_are_none_are_refused() {
     assert!(SerialArm::new(vec![crossed], Isometry3::identity()).is_err());
     assert!(matches!(SerialArm::from_urdf(FIVE_JOINTS, "gripper"), Err(Error::Urdf { .. })));
 }
+
+/// One joint that turns half a radian to either side, told to rest beyond.
+#[test]
+fn a_rest_beyond_the_limits_is_the_limit() {
+    let (axis, limits) = (Vector3::z_axis(), Range::symmetric(0.5));
+    let joint = SerialJoint { name: "pan".into(), parent_from_joint: Isometry3::identity(), axis, limits };
+    let arm = SerialArm::new(vec![joint], Isometry3::translation(0.1, 0.0, 0.0)).unwrap().with_rest(&[1.0]).unwrap();
+    // The rest itself, what is within reach, and what is not.
+    for (azimuth, expected) in [(1.0, 0.5), (0.2, 0.2), (-1.0, -0.5)] {
+        let found = arm.point(azimuth, 0.0);
+        assert!((found[0] - expected).abs() < 1e-9, "{azimuth}: {found:?}");
+    }
+}

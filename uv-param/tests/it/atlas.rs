@@ -27,16 +27,18 @@ fn assert_sound(atlas: &Atlas) {
     assert_eq!((q.flips, q.flips_f32, q.overlap_pairs), (0, 0, 0));
     assert!(q.stretch_max <= 1.5, "{q:?}");
     // By the definitions, face by face.
-    let (mut flat, mut error, mut area) = (0.0, 0.0, 0.0);
+    let (mut flat, mut error, mut area, mut worst) = (0.0, 0.0, 0.0, 1.0_f64);
     for chart in atlas.charts() {
         for (face, corners) in chart.disk().faces().iter().enumerate() {
             let [a, b, c] = corners.map(|v| chart.uv()[v as usize]);
             flat += 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
             let (size, stretch) = (chart.disk().face_area(face), chart.stretch(face as u32));
             error += size * stretch.map(|s| (s - 1.0).abs()).into_iter().fold(0.0, f64::max);
+            worst = worst.max(stretch[0]).max(1.0 / stretch[1]);
             area += size;
         }
     }
+    assert!((worst - q.stretch_max).abs() < 1e-9, "{worst} {q:?}");
     let texels: usize = atlas.pages().iter().map(|[columns, rows]| columns * rows).sum();
     assert!((flat / (texels as f64 * atlas.texel_m().powi(2)) - q.utilisation).abs() < 1e-9, "{q:?}");
     assert!((error / area - q.length_err_mean).abs() < 1e-9 && (area - q.area_m2).abs() < 1e-9 * area, "{q:?}");
@@ -302,7 +304,7 @@ fn the_unit_of_length_changes_nothing() {
 fn soups_do_no_harm() {
     let mut rng = Rng(17);
     let (mut laid_out, mut refused) = (0, 0);
-    for _ in 0..400 {
+    for _ in 0..120 {
         let vertices = 3 + rng.below(12);
         let mut positions: Vec<[f64; 3]> =
             (0..vertices).map(|_| [0; 3].map(|_: i32| (rng.unit() * 4.0).round() * 0.25)).collect();
@@ -325,5 +327,5 @@ fn soups_do_no_harm() {
             }
         }
     }
-    assert!(laid_out > 250 && refused > 20, "{laid_out} {refused}");
+    assert!(laid_out > 75 && refused > 6, "{laid_out} {refused}");
 }

@@ -88,6 +88,37 @@ fn the_built_in_parametrizers_agree_with_unwrap() {
     assert!(tutte.quality().stretch_max > 1.5);
 }
 
+/// A square metre of which a tenth is squeezed to half of its width: all that is said of its quality, by hand.
+#[test]
+fn quality_is_that_of_the_triangles_by_their_area() {
+    struct Squeezed;
+    impl Parametrizer for Squeezed {
+        fn parametrize(&self, disk: &Disk, _: &mut dyn FnMut(Progress)) -> Result<Layout, Error> {
+            let uv = disk.positions().iter().map(|p| [p[0].min(0.9) + 0.5 * (p[0] - 0.9).max(0.0), p[1]]).collect();
+            Ok(Layout { uv, iterations: 0 })
+        }
+    }
+    // The columns are narrow where nothing is squeezed: a tenth of the area is a twentieth of the triangles.
+    let (positions, faces) =
+        grid(20, 10, |s, t| [if s < 0.95 { s * 0.9 / 0.95 } else { 0.9 + (s - 0.95) * 2.0 }, t, 0.0]);
+    let disk = largest_disk_with(&positions, &faces, uv_param::disk::Repair::default()).unwrap().0;
+    let chart = unwrap_by(&disk, &Squeezed, None, |_| ()).unwrap();
+    let quality = chart.quality();
+    for (what, found, expected) in [
+        ("largest stretch", quality.stretch_max, 2.0),
+        ("stretch, 99 %", quality.stretch_p99, 2.0),
+        ("error of length", quality.length_err_mean, 0.1 * 0.5),
+        ("error of length, 99 %", quality.length_err_p99, 0.5),
+        ("rigidity", quality.arap, 0.1 * 0.25),
+        // Squares of stretches and of their inverses, over four.
+        ("symmetric Dirichlet", quality.symmetric_dirichlet, 0.9 + 0.1 * (1.0 + 1.0 + 0.25 + 4.0) / 4.0),
+        ("area", quality.area_m2, 1.0),
+        ("overlap", quality.overlap_share, 0.0),
+    ] {
+        assert!((found - expected).abs() < 1e-9, "{what}: {found} instead of {expected}");
+    }
+}
+
 #[test]
 fn bad_parametrizers_are_refused() {
     struct Short;

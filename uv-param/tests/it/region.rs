@@ -53,7 +53,11 @@ fn small_parts_are_left_out() {
 fn a_disc_is_cut_out_of_a_square_without_gaps() {
     let (mut positions, mut faces) = mesh(2, 2, |s, t| [s, t, 0.0]);
     let editable = EditableMesh { positions: &mut positions, faces: &mut faces, colours: None, uv: None };
-    let disc = |s: &uv_param::region::Sample| (s.point.x - 0.5).hypot(s.point.y - 0.5) < 0.3;
+    let disc = |s: &uv_param::region::Sample| {
+        // Only what lies on the square is asked about.
+        assert!([s.point.x, s.point.y].iter().all(|c| (0.0..=1.0).contains(c)), "{}", s.point);
+        (s.point.x - 0.5).hypot(s.point.y - 0.5) < 0.3
+    };
     let division = divide_at_border(editable, 0.01, &disc).unwrap();
     assert_eq!((division.inside.len(), division.source.len()), (faces.len(), faces.len()));
     assert!(division.source.iter().all(|&f| f < 8));
@@ -71,6 +75,30 @@ fn a_disc_is_cut_out_of_a_square_without_gaps() {
     }
     for (edge, count) in edges {
         let outer = |c: usize, side: f32| edge.iter().all(|&v| (all.0[v as usize][c] - side).abs() < 1e-6);
+        let border = (0..2).any(|c| outer(c, 0.0) || outer(c, 1.0));
+        assert_eq!(count, if border { 1 } else { 2 }, "{edge:?}");
+    }
+}
+
+/// Files double vertices: what meets at a place is divided there, whether it shares the vertex or not.
+#[test]
+fn nothing_tears_where_vertices_are_doubled() {
+    let (shared, shared_faces) = mesh(2, 2, |s, t| [s, t, 0.0]);
+    let mut positions: Vec<[f32; 3]> = shared_faces.iter().flatten().map(|&v| shared[v as usize]).collect();
+    let mut faces: Vec<[u32; 3]> = (0..shared_faces.len() as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+    let editable = EditableMesh { positions: &mut positions, faces: &mut faces, colours: None, uv: None };
+    // Well inside one of the eight triangles: its neighbours are divided for its sake alone.
+    divide_at_border(editable, 0.02, &|s| (s.point.x - 0.3).hypot(s.point.y - 0.15) < 0.08).unwrap();
+    let key = |v: u32| positions[v as usize].map(f32::to_bits);
+    let mut edges: HashMap<[[u32; 3]; 2], usize> = HashMap::new();
+    for face in &faces {
+        for k in 0..3 {
+            let (a, b) = (key(face[k]), key(face[(k + 1) % 3]));
+            *edges.entry([a.min(b), a.max(b)]).or_default() += 1;
+        }
+    }
+    for (edge, count) in edges {
+        let outer = |c: usize, side: f32| edge.iter().all(|p| (f32::from_bits(p[c]) - side).abs() < 1e-6);
         let border = (0..2).any(|c| outer(c, 0.0) || outer(c, 1.0));
         assert_eq!(count, if border { 1 } else { 2 }, "{edge:?}");
     }

@@ -168,3 +168,16 @@ fn images_of_two_cameras_are_paired_by_their_stamps() {
         .collect();
     assert_eq!(pairs, [(true, Some("a")), (true, Some("b")), (true, None), (true, Some("e"))]);
 }
+
+/// An image is a tenth of a second later by the clock of the inertial sensor: samples are taken until then.
+#[test]
+fn samples_are_taken_until_an_image_by_their_own_clock() {
+    let mut settings = Settings::default();
+    settings.calibration.time_offset_s = 0.1;
+    let camera = Camera { width: SIZE.0, height: SIZE.1, fx: 100.0, fy: 100.0, cx: 80.0, cy: 60.0, ..Camera::euroc() };
+    let mut runner = Runner::new(Vio::new(camera, ImuNoise::default(), settings).unwrap(), RunnerSettings::default());
+    let mut samples = (0..3000).step_by(5).map(still);
+    runner.imu_until(at(1000), &mut samples).unwrap();
+    assert_eq!((runner.imu_time(at(1000)), runner.latest_sample()), (at(1100), Some(at(1100))));
+    assert_eq!(samples.next().unwrap().stamp, at(1105));
+}

@@ -331,3 +331,24 @@ fn a_second_camera_changes_nothing_for_the_first() {
     let (first, second) = (frame(&twice, 0), frame(&twice, 1));
     assert!(first.data != second.data && first.stamp != second.stamp && first.true_stamp == second.true_stamp);
 }
+
+/// Each of the numbers of a surface by itself.
+#[test]
+fn surfaces_that_cannot_be_rendered_are_refused() {
+    chequered_room().check().unwrap();
+    let changes: [fn(&mut Surface); 5] = [
+        |surface| surface.texels_per_m = 0.0,
+        |surface| surface.shade = -0.1,
+        |surface| surface.shade = f64::NAN,
+        |surface| surface.offset[1] = f64::INFINITY,
+        |surface| surface.texture = 1,
+    ];
+    for (k, change) in changes.iter().enumerate() {
+        let mut room = chequered_room();
+        change(&mut room.walls.faces[3]);
+        assert!(room.check().is_err(), "change {k}");
+    }
+    let mut flat = chequered_room();
+    flat.walls.max.z = flat.walls.min.z;
+    assert!(flat.check().is_err());
+}

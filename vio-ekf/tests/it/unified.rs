@@ -18,6 +18,14 @@ fn random_information(rng: &mut Rng) -> Matrix6<f64> {
     root.transpose() * root * 1e4
 }
 
+/// One over the squares of the deviations: position first, then attitude.
+#[test]
+fn a_pose_is_as_certain_as_its_deviations_say() {
+    let pose = BodyPose::isotropic(Stamp::from_nanos(0), Isometry3::identity(), 0.1, 0.02);
+    let expected = Matrix6::from_diagonal(&Vector6::new(100.0, 100.0, 100.0, 2500.0, 2500.0, 2500.0));
+    assert!((pose.information - expected).norm() < 1e-9, "{}", pose.information);
+}
+
 #[test]
 fn a_pose_adds_its_information_to_that_of_the_filter() {
     // Without landmarks the core is all there is: P⁺ = (P⁻¹ + HᵀΛH)⁻¹, δ = P⁺ HᵀΛ y.

@@ -27,3 +27,18 @@ fn sprays_lie_where_paint_is_wanted() {
         }
     }
 }
+/// Across the rows the depth varies by no more than is asked for.
+#[test]
+fn an_even_area_is_as_even_as_it_is_told() {
+    let (kernel, wanted) = (kernel(), Image::filled(64, 64, 0.4));
+    for ripple in [0.005, 0.05] {
+        let painting =
+            AreaFill { ripple, ..AreaFill::default() }.paint(&PaintProblem::new(&wanted).with_kernel(&kernel)).unwrap();
+        // Away from the rims.
+        let depths: Vec<f64> =
+            (20..44).flat_map(|y| (20..44).map(move |x| (x, y))).map(|(x, y)| painting.canvas.at(x, y)).collect();
+        let mean = depths.iter().sum::<f64>() / depths.len() as f64;
+        let deviation = (depths.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / depths.len() as f64).sqrt();
+        assert!(deviation < 2.0 * ripple * mean, "{deviation} of {mean}, {ripple} asked");
+    }
+}
