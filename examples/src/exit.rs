@@ -16,6 +16,7 @@ const VERSION: &str = env!("PAINTCOPTER_VERSION");
 // Options that all programs have. No documentation: clap would take it for what the program does.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
+#[allow(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 struct CommonArguments {
     /// Say nothing but warnings and errors
     #[arg(short, long, global = true, conflicts_with = "verbose")]

@@ -29,8 +29,8 @@ impl Origin {
     /// above.
     pub(crate) fn mission(seed: u64, urdf: String, folder: &Path) -> Self {
         let robot = Attachment { name: "robot.urdf", media_type: "application/xml", data: urdf.into_bytes() };
-        let mission = [Some(folder), folder.parent()].into_iter().flatten();
-        let mission = mission.filter_map(|folder| std::fs::read(folder.join("mission.toml")).ok()).next();
+        let mut mission = [Some(folder), folder.parent()].into_iter().flatten();
+        let mission = mission.find_map(|folder| std::fs::read(folder.join("mission.toml")).ok());
         let mission = mission.map(|data| Attachment { name: "mission.toml", media_type: "application/toml", data });
         Self { seed: Some(seed), attachments: mission.into_iter().chain([robot]).collect() }
     }

@@ -40,16 +40,15 @@ impl Ros2Writer {
         log_time: u64,
         data: &[u8],
     ) -> McapResult<()> {
-        let channel_id = match self.channels.get(topic) {
-            Some(known) => *known,
-            None => {
-                let schema = self.writer.add_schema(schema, encoding, &definition())?;
-                // What rosbag2 plays with the default settings of a publisher.
-                let quality = BTreeMap::from([("offered_qos_profiles".to_string(), String::new())]);
-                let channel = self.writer.add_channel(schema, topic, "cdr", &quality)?;
-                self.channels.insert(topic.to_owned(), channel);
-                channel
-            }
+        let channel_id = if let Some(known) = self.channels.get(topic) {
+            *known
+        } else {
+            let schema = self.writer.add_schema(schema, encoding, &definition())?;
+            // What rosbag2 plays with the default settings of a publisher.
+            let quality = BTreeMap::from([("offered_qos_profiles".to_string(), String::new())]);
+            let channel = self.writer.add_channel(schema, topic, "cdr", &quality)?;
+            self.channels.insert(topic.to_owned(), channel);
+            channel
         };
         self.sequence = self.sequence.wrapping_add(1);
         let header = MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time: log_time };
