@@ -13,6 +13,7 @@ mod figures;
 mod flight_sensors;
 mod fly;
 mod footprints;
+mod identify;
 mod inspect;
 mod look;
 mod mission_output;

@@ -65,6 +65,10 @@ pub struct MissionArguments {
     /// inertial sensor in the map of its --scan [default: motion-capture]
     #[arg(long, value_enum)]
     localisation: Option<LocalisationName>,
+    /// Excite roll and pitch in a flight of a minute before the first that paints, and let controller and observer use the response
+    /// that it tells
+    #[arg(long)]
+    identify: bool,
     /// Fly along the painted surface, look at it, and paint again what is missing
     #[arg(long)]
     look: bool,
@@ -326,6 +330,7 @@ impl MissionArguments {
         settings.memory_gib = self.memory_gib.unwrap_or(settings.memory_gib);
         settings.layered = self.layers.map(LayersName::planning).or(settings.layered);
         settings.look |= self.look;
+        settings.identify |= self.identify;
         settings.localisation = self.localisation.map_or(settings.localisation, LocalisationChoice::from);
         settings.painter = self.painter.map_or(settings.painter, PainterChoice::from);
         settings.viewpoint = self.placement.project.or(settings.viewpoint);

@@ -1,6 +1,7 @@
 //! What a run found: `report.json` for programs, `report.md` for people.
 
 mod check;
+mod identified;
 mod reach;
 mod times;
 
@@ -12,6 +13,7 @@ use serde::Serialize;
 use crate::whole_file;
 
 pub use check::{Check, Requirement, Unit};
+pub use identified::IdentifiedFigures;
 pub use reach::ReachNeeds;
 pub use times::TimeFigures;
 
@@ -152,8 +154,7 @@ pub struct Report {
     /// Processor time of odometry and localisation for a second of flight.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub onboard_cpu_s_per_s: Option<f64>,
-    /// Error of the film's thickness as the robot saw it, root mean square over that of the thickness, where there is a tenth of a unit of paint
-    /// or more and it is not opaque.
+    /// Error of the film's thickness as the robot saw it over that thickness (both RMS), where it is a tenth of a unit or more and not opaque.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub film_estimate_error_share: Option<f64>,
     /// Share of those texels that it saw.
@@ -162,6 +163,9 @@ pub struct Report {
     /// Paint that it found to be missing, and painted again.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub paint_missing_kg: Option<f64>,
+    /// What an excitation flight told.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub identified: Option<IdentifiedFigures>,
     /// Share of the surface's pixels that came out 15 grey levels darker than the darkest that is wanted within 3 cm.
     pub darker_than_wanted_share: f64,
     /// Length of all seams on the surface.

@@ -112,9 +112,12 @@ pub fn fly_localised(
     let begin = first as f64 * STEP;
     let start = localised(localisation, begin, &vehicle)?;
     let nowhere = || Error::Localisation { time: begin, why: "there is no pose to start from".into() };
-    let start = start.ok_or_else(nowhere)?.world_from_body;
-    let mut estimator = Estimator::new(settings.airframe, ObserverSettings::default(), &start);
-    let mut command = Command { thrust: settings.airframe.mass * GRAVITY, ..Command::default() };
+    let start = start.ok_or_else(nowhere)?;
+    controller.reported(begin, &start);
+    let start = start.world_from_body;
+    let model = settings.model();
+    let mut estimator = Estimator::new(model, ObserverSettings::default(), &start);
+    let mut command = Command { thrust: model.mass * GRAVITY, ..Command::default() };
     let mut hose_force = Vector3::zeros();
     let mut aim = [0.0; 2];
     let mut pan_tilt = [0.0; 2];
@@ -143,9 +146,11 @@ pub fn fly_localised(
             if step > first {
                 // A source whose poses are lost goes on all the same, so that a fault changes nothing before it.
                 let pose = localised(localisation, time, &vehicle)?.filter(|_| !settings.faults.pose_lost(time));
-                match &pose {
-                    Some(pose) => estimator.update(&pose.world_from_body, CONTROL_STEP),
-                    None => estimator.coast(CONTROL_STEP),
+                if let Some(pose) = &pose {
+                    controller.reported(time, pose);
+                    estimator.update(&pose.world_from_body, CONTROL_STEP);
+                } else {
+                    estimator.coast(CONTROL_STEP);
                 }
                 trusted = pose.is_some_and(|pose| pose.trusted);
             }

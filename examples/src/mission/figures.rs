@@ -16,7 +16,7 @@ use super::seams::likeness;
 use super::settings::{MissionSettings, PainterChoice};
 use crate::adapters::{MeshSurface, Robot};
 use crate::onboard::LocalisationFigures;
-use crate::report::{Report, TimeFigures, peak_resident_bytes};
+use crate::report::{IdentifiedFigures, Report, TimeFigures, peak_resident_bytes};
 
 /// Step of the dense check of the planned limits, seconds; the certificates do not depend on it.
 const LIMIT_STEP: f64 = 0.02;
@@ -116,6 +116,10 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         film_estimate_error_share: mission.looked.map(|looked| looked.film_error),
         film_estimate_seen_share: mission.looked.map(|looked| looked.film_seen),
         paint_missing_kg: mission.looked.map(|looked| looked.missing * mission.task.paint.density),
+        identified: mission
+            .identified
+            .as_ref()
+            .map(|told| IdentifiedFigures::of(&told.model, &told.attitude, &mission.task.settings.airframe)),
         darker_than_wanted_share: darker_than_wanted::share(mission)?,
         seam_length_m: mission.task.surface.disk().seam_length(),
         ssim_painted_at_seams: seams.as_ref().map(|s| s.near),

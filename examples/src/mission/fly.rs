@@ -65,7 +65,7 @@ pub(super) fn fly(
 
 /// The robot's own localisation, if it is to fly by that, before a surface with the paint of earlier flights. It finds itself anew before
 /// every flight.
-fn onboard<'a, 'b>(
+pub(super) fn onboard<'a, 'b>(
     task: &'a PaintingTask,
     before: impl Iterator<Item = &'b LayerFlight>,
 ) -> Result<Option<LocalisedFlight<'a>>, MissionError> {
@@ -116,8 +116,13 @@ pub(super) fn counted_flight(plan: &Plan, robot: &Robot, settings: &MissionSetti
     }
 }
 
-fn usual_flight(plan: &Plan, robot: &Robot, settings: &MissionSettings, layer: u64) -> FlightSettings {
-    flight_settings(plan, robot.tether, settings.seed.wrapping_mul(0x9E37_79B9).wrapping_add(layer))
+/// Wind, hose and vehicle of a flight.
+pub(super) fn usual_flight(plan: &Plan, robot: &Robot, settings: &MissionSettings, layer: u64) -> FlightSettings {
+    FlightSettings {
+        airframe: settings.airframe,
+        model: Some(settings.model),
+        ..flight_settings(plan, robot.tether, settings.seed.wrapping_mul(0x9E37_79B9).wrapping_add(layer))
+    }
 }
 
 /// The same plan with the localisation that was chosen, with a drifting localisation, and with the pan-tilt unit locked.

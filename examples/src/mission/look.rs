@@ -52,7 +52,8 @@ pub(super) fn look(
 fn photograph(task: &PaintingTask, camera: SimulatedCamera, flight: u64) -> Result<Mosaic, MissionError> {
     let PaintingTask { settings, surface, .. } = task;
     let seed = settings.seed.wrapping_mul(0x9E37_79B9).wrapping_add(0x100 + flight);
-    let usual = FlightSettings { seed, ..FlightSettings::default() };
+    let usual =
+        FlightSettings { airframe: settings.airframe, model: Some(settings.model), seed, ..FlightSettings::default() };
     let mut sensor = PoseSensor::new(localisation_noise(settings, usual.localisation), 0.01, seed);
     let mut onboard = match settings.localisation {
         LocalisationChoice::Slam => Some(localised_flight(task, camera.clone(), flight)?),
@@ -67,7 +68,7 @@ fn photograph(task: &PaintingTask, camera: SimulatedCamera, flight: u64) -> Resu
     let mut photographer =
         Photographer { inner, camera, known: &surface.world, mosaic, taken: 0, threads: settings.threads };
     let route = along(task.met(), &surface.facing(), STAND_OFF).map_err(MissionError::Look)?;
-    let mut controller = CascadedController::new(usual.airframe, ControllerSettings::default());
+    let mut controller = CascadedController::new(usual.model(), ControllerSettings::default());
     let mut gun = IdealPanTilt::new(Point3::origin(), GUN, [0.8; 2])?;
     fly_localised(&route, &mut controller, &mut gun, task.met(), &mut photographer, &usual)?;
     Ok(photographer.mosaic)

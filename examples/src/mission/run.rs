@@ -9,6 +9,7 @@ use ptu_kinematics::Joints;
 
 use super::error::MissionError;
 use super::fly::{LayerFlight, fly, spray};
+use super::identify::{Identified, identify};
 use super::painting_task::PaintingTask;
 use super::planned_mission::{PlannedMission, share_out_of_reach};
 use super::touch_up::{TouchUpFigures, touch_up};
@@ -34,6 +35,8 @@ pub struct Mission {
     pub(super) outcomes: TargetOutcomes,
     /// What looking at it found, if the robot has looked.
     pub(super) looked: Option<TouchUpFigures>,
+    /// What an excitation flight told, if one was flown.
+    pub(super) identified: Option<Identified>,
 }
 
 impl Mission {
@@ -47,6 +50,7 @@ impl Mission {
         let PlannedMission { mut task, planned } = mission;
         let (planning, unreachable_paint) = (planned.seconds, planned.unreachable_paint);
         let (kept_off, left_bare, outcomes) = (planned.kept_off, planned.left_bare, planned.outcomes);
+        let identified = identify(&mut task, &planned)?;
         let mut flights = fly(planned, &task, &[])?;
         let (mut film, pixels) = spray(flights.iter().map(|f| &f.flight), &task)?;
         let mut looked = None;
@@ -57,7 +61,19 @@ impl Mission {
             (film, _) = spray(flights.iter().map(|f| &f.flight), &task)?;
             looked = Some(figures);
         }
-        Ok(Self { task, flights, film, pixels, planning, unreachable_paint, kept_off, left_bare, outcomes, looked })
+        Ok(Self {
+            task,
+            flights,
+            film,
+            pixels,
+            planning,
+            unreachable_paint,
+            kept_off,
+            left_bare,
+            outcomes,
+            looked,
+            identified,
+        })
     }
 
     /// The layers, in the order in which they were flown.

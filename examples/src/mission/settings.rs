@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::error::MissionError;
 use crate::picture_placement::PicturePlacement;
 use crate::projection::Viewpoint;
-use paint_sim::flight::Faults;
+use paint_sim::flight::{Airframe, Faults};
 use paint_sim::paint::PaintName;
 
 /// Everything a mission can be told.
@@ -49,6 +49,15 @@ pub struct MissionSettings {
     pub servo: ServoSettings,
     /// Who flies it.
     pub controller: ControllerChoice,
+    /// The vehicle that the simulation flies.
+    #[serde(skip_serializing_if = "usual_airframe")]
+    pub airframe: Airframe,
+    /// What controller and observer take it for.
+    #[serde(skip_serializing_if = "usual_airframe")]
+    pub model: Airframe,
+    /// Identify that in an excitation flight before the first that paints.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub identify: bool,
     /// How it knows where it is.
     #[serde(skip_serializing_if = "LocalisationChoice::is_default")]
     pub localisation: LocalisationChoice,
@@ -95,6 +104,10 @@ impl LocalisationChoice {
     }
 }
 
+fn usual_airframe(airframe: &Airframe) -> bool {
+    *airframe == Airframe::default()
+}
+
 fn no_faults(faults: &Faults) -> bool {
     *faults == Faults::default()
 }
@@ -133,6 +146,9 @@ impl Default for MissionSettings {
             ptu: PtuSettings::default(),
             servo: ServoSettings::default(),
             controller: ControllerChoice::default(),
+            airframe: Airframe::default(),
+            model: Airframe::default(),
+            identify: false,
             localisation: LocalisationChoice::default(),
             look: false,
             faults: Faults::default(),

@@ -37,8 +37,8 @@ pub(super) fn fly_plan(
     };
     let mut gun = ServoPanTilt::new(robot.chain.clone(), settings.servo)?;
     let mut controller: Box<dyn Controller> = match settings.controller {
-        ControllerChoice::Cascade => Box::new(CascadedController::new(flight.airframe, ControllerSettings::default())),
-        ControllerChoice::Mpc => Box::new(MpcController::new(&flight.airframe, MpcSettings::default())?),
+        ControllerChoice::Cascade => Box::new(CascadedController::new(flight.model(), ControllerSettings::default())),
+        ControllerChoice::Mpc => Box::new(MpcController::new(&flight.model(), MpcSettings::default())?),
     };
     Ok(match localisation {
         Some(source) => {

@@ -1,11 +1,9 @@
-//! Tracking control, and the identification of what it knows of the vehicle.
+//! Tracking control.
 #![allow(clippy::unwrap_used, reason = "the helpers of the tests are tests as well")]
 
-use nalgebra::{Matrix2, Matrix3, Point3, Rotation3, Vector2, Vector3};
+use nalgebra::{Matrix2, Point3, Rotation3, Vector2, Vector3};
 use paint_planner::Error;
 use paint_planner::control::*;
-use rand_xoshiro::SplitMix64;
-use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 
 const GRAVITY: f64 = 9.80665;
 
@@ -182,83 +180,4 @@ fn a_controller_out_of_range_is_refused() {
     assert!(refused(VehicleModel { drag: [f64::NAN, 0.0], ..vehicle }, settings));
     assert!(refused(vehicle, MpcSettings { steps: 1, ..settings }));
     assert!(refused(vehicle, MpcSettings { tilt: 0.0, ..settings }));
-}
-
-fn normal(random: &mut SplitMix64) -> f64 {
-    let mut unit = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
-    let radius = (-2.0 * (1.0 - unit()).ln()).sqrt();
-    radius * (std::f64::consts::TAU * unit()).cos()
-}
-
-/// Random steps of the command; the answer to each in closed form, `K (1 - exp(-(t - t_i - delay)/tau))`, added up.
-fn recording(truth: [f64; 4], noise: f64, seed: u64) -> Vec<AttitudeSample> {
-    let [gain, tau, delay, offset] = truth;
-    let mut random = SplitMix64::seed_from_u64(seed);
-    let step = |k: usize| 30 * (k / 30);
-    let levels: Vec<f64> = (0..1500).map(|_| 0.15 * normal(&mut random)).collect();
-    // Nothing before the first sample was commanded that differs from its command.
-    let command = |k: usize| levels[step(k)];
-    (0..1500)
-        .map(|k| {
-            let time = 0.01 * k as f64;
-            let mut angle = gain * levels[0] + offset;
-            for i in (30..=k).step_by(30) {
-                let since = time - 0.01 * i as f64 - delay;
-                if since > 0.0 {
-                    angle += gain * (levels[i] - levels[i - 30]) * (1.0 - (-since / tau).exp());
-                }
-            }
-            AttitudeSample { time, commanded: command(k), measured: angle + noise * normal(&mut random) }
-        })
-        .collect()
-}
-
-#[test]
-fn gain_lag_and_delay_are_found_without_noise() {
-    for truth in [[1.017, 0.1847, 0.0, 0.0], [0.789, 0.175, 0.053, 0.02], [0.6, 0.04, 0.21, -0.1]] {
-        let fit = identify_attitude(&recording(truth, 0.0, 4)).unwrap();
-        let found = [fit.response.gain, fit.response.time_constant, fit.delay, fit.offset];
-        for (found, truth) in found.iter().zip(truth) {
-            assert!((found - truth).abs() < 1e-5, "{found} for {truth}");
-        }
-    }
-}
-
-/// The covariance is that of the errors: their normalised square is 3 in the mean.
-#[test]
-fn errors_are_as_large_as_their_covariance_says() {
-    let truth = [0.789, 0.175, 0.053, 0.02];
-    let (mut sum, count) = (0.0, 60);
-    for seed in 0..count {
-        let fit = identify_attitude(&recording(truth, 0.01, seed)).unwrap();
-        let error =
-            Vector3::new(fit.response.gain - truth[0], fit.response.time_constant - truth[1], fit.delay - truth[2]);
-        assert!(error.amax() < 0.02, "{error}");
-        let inverse: Matrix3<f64> = fit.covariance.try_inverse().unwrap();
-        sum += error.dot(&(inverse * error));
-        assert!((fit.residual - 0.01).abs() < 0.001);
-    }
-    let mean = sum / count as f64;
-    // Chi-square of 3 degrees: the mean of 60 deviates by 0.32.
-    assert!((mean - 3.0).abs() < 1.2, "{mean}");
-}
-
-#[test]
-fn recordings_that_tell_nothing_are_refused() {
-    let good = recording([1.0, 0.2, 0.0, 0.0], 0.001, 1);
-    let refused = |samples: &[AttitudeSample]| matches!(identify_attitude(samples), Err(Error::Recording { .. }));
-    assert!(refused(&good[..20]));
-    let still: Vec<_> = good.iter().map(|s| AttitudeSample { commanded: 0.1, ..*s }).collect();
-    assert!(refused(&still));
-    let mut random = SplitMix64::seed_from_u64(8);
-    let noise: Vec<_> = good.iter().map(|s| AttitudeSample { measured: 0.1 * normal(&mut random), ..*s }).collect();
-    assert!(refused(&noise));
-    let drift: Vec<_> = good.iter().map(|s| AttitudeSample { measured: 0.01 * s.time, ..*s }).collect();
-    assert!(refused(&drift));
-    let mut twice = good.clone();
-    twice[7].time = twice[6].time;
-    assert!(refused(&twice));
-    let mut holed = good;
-    holed[3].measured = f64::NAN;
-    assert!(refused(&holed));
 }

@@ -4,6 +4,7 @@ mod constraints;
 mod continuation;
 mod control;
 mod gantry;
+mod identification;
 mod missions;
 mod own_deposit_model;
 mod own_planner;

@@ -2,6 +2,8 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
+use crate::error::{Error, check_not_negative, check_positive, check_range};
+
 /// Standard gravity, m/s^2.
 pub const GRAVITY: f64 = 9.80665;
 
@@ -56,6 +58,21 @@ impl Default for Airframe {
 }
 
 impl Airframe {
+    pub(super) fn check(&self) -> Result<(), Error> {
+        for (what, value) in [
+            ("airframe.mass", self.mass),
+            ("airframe.roll_gain", self.roll_gain),
+            ("airframe.roll_time_constant", self.roll_time_constant),
+            ("airframe.pitch_gain", self.pitch_gain),
+            ("airframe.pitch_time_constant", self.pitch_time_constant),
+            ("airframe.yaw_time_constant", self.yaw_time_constant),
+        ] {
+            check_positive(what, value)?;
+        }
+        self.drag.iter().try_for_each(|drag| check_not_negative("airframe.drag", *drag))?;
+        check_range("airframe.tilt_limit", self.tilt_limit, 0.01, 1.2, "between 0.01 and 1.2 rad")
+    }
+
     /// Roll, pitch and yaw after `dt` seconds of a constant command: `tau x' = k u - x` solved exactly for roll and pitch.
     pub(crate) fn attitude_after(&self, attitude: [f64; 3], yaw_rate: f64, command: &Command, dt: f64) -> [f64; 3] {
         let follow = |x: f64, gain: f64, tau: f64, u: f64| x + (gain * u - x) * -(-dt / tau).exp_m1();

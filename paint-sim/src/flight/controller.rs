@@ -4,10 +4,14 @@ use nalgebra::{Rotation3, Vector3};
 
 use super::airframe::{Airframe, Command, GRAVITY};
 use super::estimator::{Estimate, wrap};
+use super::pose_source::LocalisedPose;
 use super::reference::Reference;
 
 /// Something that flies the vehicle along a reference, asked every 10 ms. It may look ahead in the reference.
 pub trait Controller {
+    /// The pose that was reported for this control step, before its command: for controllers that estimate by themselves. Default: nothing.
+    fn reported(&mut self, _time: f64, _pose: &LocalisedPose) {}
+
     /// The command for the time `time` (s of the reference).
     fn command(&mut self, time: f64, estimate: &Estimate, reference: &dyn Reference) -> Command;
 }

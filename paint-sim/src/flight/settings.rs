@@ -109,6 +109,8 @@ impl Default for Valve {
 pub struct FlightSettings {
     /// The vehicle.
     pub airframe: Airframe,
+    /// What the observer takes it for; `None` (default): what it is.
+    pub model: Option<Airframe>,
     /// The air.
     pub wind: Wind,
     /// The hose; `None` for a free flight (default).
@@ -133,6 +135,7 @@ impl Default for FlightSettings {
     fn default() -> Self {
         Self {
             airframe: Airframe::default(),
+            model: None,
             wind: Wind::default(),
             hose: None,
             localisation: Localisation::default(),
@@ -147,33 +150,21 @@ impl Default for FlightSettings {
 }
 
 impl FlightSettings {
+    /// What the observer takes the vehicle for.
+    pub fn model(&self) -> Airframe {
+        self.model.unwrap_or(self.airframe)
+    }
+
     pub(crate) fn check(&self) -> Result<(), Error> {
-        let Airframe {
-            mass,
-            roll_gain,
-            roll_time_constant,
-            pitch_gain,
-            pitch_time_constant,
-            yaw_time_constant,
-            drag,
-            tilt_limit,
-        } = self.airframe;
+        self.airframe.check()?;
+        self.model().check()?;
         for (what, value) in [
-            ("airframe.mass", mass),
-            ("airframe.roll_gain", roll_gain),
-            ("airframe.roll_time_constant", roll_time_constant),
-            ("airframe.pitch_gain", pitch_gain),
-            ("airframe.pitch_time_constant", pitch_time_constant),
-            ("airframe.yaw_time_constant", yaw_time_constant),
             ("wind.gust_time", self.wind.gust_time),
             ("localisation.drift_time", self.localisation.drift_time),
         ] {
             check_positive(what, value)?;
         }
         for (what, value) in [
-            ("airframe.drag", drag[0]),
-            ("airframe.drag", drag[1]),
-            ("airframe.drag", drag[2]),
             ("wind.gust_sigma", self.wind.gust_sigma),
             ("localisation.position_noise", self.localisation.position_noise),
             ("localisation.position_drift", self.localisation.position_drift),
@@ -186,7 +177,6 @@ impl FlightSettings {
         }
         self.valve.interlock.map_or(Ok(()), |interlock| interlock.check())?;
         self.faults.check()?;
-        check_range("airframe.tilt_limit", tilt_limit, 0.01, 1.2, "between 0.01 and 1.2 rad")?;
         for speed in &self.wind.mean {
             check_range("wind.mean", *speed, -100.0, 100.0, "below 100 m/s")?;
         }
