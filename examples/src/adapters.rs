@@ -204,6 +204,19 @@ impl<C: KinematicChain> Reference for PlanReference<'_, C> {
     }
 }
 
+/// The motion that a reference wants.
+pub fn control_reference(wanted: &ReferenceState) -> ControlReference {
+    let ReferenceState { position, velocity, acceleration, heading, heading_rate, lever, .. } = *wanted;
+    ControlReference { position, velocity, acceleration, heading, heading_rate, lever }
+}
+
+/// A motion as a reference that asks nothing of the gun.
+pub fn reference_state(wanted: &ControlReference) -> ReferenceState {
+    let ControlReference { position, velocity, acceleration, heading, heading_rate, lever } = *wanted;
+    let (aim, nozzle_distance, flow) = (None, 0.0, 0.0);
+    ReferenceState { position, velocity, acceleration, heading, heading_rate, lever, aim, nozzle_distance, flow }
+}
+
 /// The planner's controller in the simulator.
 pub struct MpcController {
     mpc: TrackingMpc,
@@ -234,18 +247,7 @@ impl Controller for MpcController {
             attitude: estimate.attitude,
             disturbance: estimate.disturbance,
         };
-        let wanted = |t: f64| {
-            let r = reference.at(t);
-            ControlReference {
-                position: r.position,
-                velocity: r.velocity,
-                acceleration: r.acceleration,
-                heading: r.heading,
-                heading_rate: r.heading_rate,
-                lever: r.lever,
-            }
-        };
-        let command = self.mpc.command(time, &state, &wanted);
+        let command = self.mpc.command(time, &state, &|t| control_reference(&reference.at(t)));
         Command {
             roll: command.roll,
             pitch: command.pitch,

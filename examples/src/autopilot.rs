@@ -8,7 +8,6 @@
 
 mod codec;
 mod error;
-mod failsafe;
 pub mod frames;
 mod lockstep;
 mod odometry;
@@ -23,10 +22,9 @@ mod telemetry;
 
 pub use codec::{Decoder, Encoder};
 pub use error::AutopilotError;
-pub use failsafe::{Cause, FailsafeSettings};
 pub use mavlink::dialects::common::MavMessage;
 pub use odometry::Odometry;
-pub use offboard::{OffboardLink, OffboardSettings, Request};
+pub use offboard::{OffboardLink, OffboardSettings};
 pub use px4::Px4;
 pub use px4_folder::Px4Vehicle;
 pub use setpoint::Setpoint;

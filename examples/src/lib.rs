@@ -30,7 +30,6 @@ mod log {
 pub mod mesh_frame;
 pub mod mesh_io;
 pub mod mesh_placement;
-mod minimum_jerk;
 pub mod mission;
 pub mod mission_arguments;
 pub mod mission_file;

@@ -1,5 +1,8 @@
 //! The options that say what to paint: those of `paintcopter` and `plan`.
 
+mod positive;
+mod vehicle;
+
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
@@ -15,6 +18,9 @@ use crate::picture_placement::{PicturePlacement, PlacementMode};
 use crate::projection::Viewpoint;
 use crate::region::Region;
 use crate::wall::Wall;
+
+use positive::positive;
+use vehicle::Vehicle;
 
 type AnyError = Box<dyn std::error::Error>;
 
@@ -62,13 +68,11 @@ pub struct MissionArguments {
     #[arg(long, conflicts_with = "texture")]
     scan: bool,
     /// What tells the painting flight where the robot is: motion capture, a model of noise of 7 cm, or the robot's own camera, depth camera and
-    /// inertial sensor in the map of its --scan [default: motion-capture]
+    /// inertial sensors in the map of its --scan, else in the shape of the surface [default: motion-capture]
     #[arg(long, value_enum)]
     localisation: Option<LocalisationName>,
-    /// Excite roll and pitch in a flight of a minute before the first that paints, and let controller and observer use the response
-    /// that it tells
-    #[arg(long)]
-    identify: bool,
+    #[command(flatten)]
+    vehicle: Vehicle,
     /// Fly along the painted surface, look at it, and paint again what is missing
     #[arg(long)]
     look: bool,
@@ -176,11 +180,6 @@ fn arm(text: &str) -> Result<f64, String> {
 fn tilt(text: &str) -> Result<f64, String> {
     let degrees = text.parse().ok().filter(|v: &f64| (20.0..=80.0).contains(v));
     degrees.ok_or_else(|| "give degrees from 20 to 80: beyond, the pan joint turns the spray about itself".to_owned())
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|v: &f64| v.is_finite() && *v > 0.0);
-    value.ok_or_else(|| "give a positive number".to_owned())
 }
 
 /// Where a picture of --design lies.
@@ -330,7 +329,7 @@ impl MissionArguments {
         settings.memory_gib = self.memory_gib.unwrap_or(settings.memory_gib);
         settings.layered = self.layers.map(LayersName::planning).or(settings.layered);
         settings.look |= self.look;
-        settings.identify |= self.identify;
+        self.vehicle.apply(settings);
         settings.localisation = self.localisation.map_or(settings.localisation, LocalisationChoice::from);
         settings.painter = self.painter.map_or(settings.painter, PainterChoice::from);
         settings.viewpoint = self.placement.project.or(settings.viewpoint);
@@ -429,6 +428,8 @@ mod tests {
         assert_eq!((coat.settings.painter, coat.fill), (PainterChoice::Fill, Some(20.0 * 1e-6)));
         assert!(coat.settings.planner.nozzle.max_elevation < MissionSettings::default().planner.nozzle.max_elevation);
         assert_eq!(mission(&[]).unwrap(), MissionFile::default());
+        let cut = mission(&["--tank=0.5", "--battery=6", "--identify"]).unwrap().settings;
+        assert_eq!((cut.endurance.tank, cut.endurance.battery, cut.identify), (Some(5e-4), Some(360.0), true));
 
         std::fs::write(&file, "[[paints]]\nname = \"red\"\nfill = 1e-5\n").unwrap();
         assert!(mission(&["--mission", path, "--fill=10"]).unwrap_err().contains("several paints"));

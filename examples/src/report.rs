@@ -2,6 +2,7 @@
 
 mod check;
 mod identified;
+mod localisation;
 mod reach;
 mod times;
 
@@ -14,6 +15,7 @@ use crate::whole_file;
 
 pub use check::{Check, Requirement, Unit};
 pub use identified::IdentifiedFigures;
+pub use localisation::LocalisationReport;
 pub use reach::ReachNeeds;
 pub use times::TimeFigures;
 
@@ -139,21 +141,12 @@ pub struct Report {
     /// That mean.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fill_mean_ratio: Option<f64>,
-    /// Position error of the robot's own localisation over the flights that paint, root mean square.
+    /// What the robot's own localisation was worth.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub localisation: Option<LocalisationReport>,
+    /// Flights that tank or battery have cut the plans into.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub position_error_rms_m: Option<f64>,
-    /// Longest time from the first image of a flight to the first pose.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub relocalised_after_s: Option<f64>,
-    /// Largest error of such a pose.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub relocalisation_error_max_m: Option<f64>,
-    /// Depth images that gave no pose in the map, of all.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub unconfirmed_depth_share: Option<f64>,
-    /// Processor time of odometry and localisation for a second of flight.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub onboard_cpu_s_per_s: Option<f64>,
+    pub sorties: Option<usize>,
     /// Error of the film's thickness as the robot saw it over that thickness (both RMS), where it is a tenth of a unit or more and not opaque.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub film_estimate_error_share: Option<f64>,

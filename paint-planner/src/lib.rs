@@ -58,6 +58,7 @@
 //! | Paper II, section 5.2, first-order attitude | [`control::TrackingMpc`], [`control::identify_attitude`] |
 //! | VR paper, section V, deviation from the normal | [`Target::normal_deviation`] |
 //! | handheld paper, section IV, Eqs. (1)-(5) | [`gantry`] |
+//! | Paper II, sections 4 and 6, phases of a flight; failsafes, sorties: ours | [`onboard`] |
 //! | VR paper, Algorithm 1, rules (a)-(e), latencies | [`teleop`] |
 
 mod angle;
@@ -76,6 +77,7 @@ mod minimum_snap;
 pub mod mission;
 mod not_served;
 pub mod nozzle;
+pub mod onboard;
 pub mod plan;
 mod raise_clearance;
 mod route;

@@ -5,6 +5,8 @@ use mavlink::dialects::common::{
 };
 use mavlink::{MavHeader, MessageData};
 
+use paint_planner::onboard::Request;
+
 use super::odometry::Odometry;
 use super::setpoint::Setpoint;
 use super::telemetry::{Identity, Mode, Telemetry};
@@ -26,17 +28,6 @@ impl Default for OffboardSettings {
     fn default() -> Self {
         Self { setpoint_rate: 100.0, odometry_rate: 50.0, telemetry_rate: 250.0, retry: 0.5 }
     }
-}
-
-/// What the autopilot is asked for until it does it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Request {
-    /// To follow our set-points.
-    Offboard,
-    /// To follow our set-points and turn its motors on. In simulation only: on a vehicle it is the pilot who arms.
-    Arm,
-    /// To land where it is.
-    Land,
 }
 
 /// The state of the link.

@@ -5,6 +5,8 @@ use mavlink::dialects::common::{
     EstimatorStatusFlags, HEARTBEAT_DATA, MavAutopilot, MavLandedState, MavMessage, MavModeFlag, MavType,
 };
 use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
+use paint_planner::onboard::{Watched, WatchedPose};
+use paint_sim::flight::LocalisedPose;
 
 use super::error::AutopilotError;
 use super::frames;
@@ -160,10 +162,23 @@ impl Telemetry {
         }
     }
 
-    /// Whether it takes itself to be elsewhere than `pose`, by more than a distance (m) or an angle (rad).
-    pub fn disagrees(&self, pose: &Isometry3<f64>, distance: f64, angle: f64) -> bool {
-        self.position.is_some_and(|p| (p.coords - pose.translation.vector).norm() > distance)
-            || self.attitude.is_some_and(|q| q.angle_to(&pose.rotation) > angle)
+    /// What failsafes look at, with our own pose.
+    pub fn watched(&self, pose: Option<&LocalisedPose>) -> Watched {
+        let apart = |pose: &Isometry3<f64>| {
+            let distance = self.position.map_or(0.0, |position| (position.coords - pose.translation.vector).norm());
+            [distance, self.attitude.map_or(0.0, |attitude| attitude.angle_to(&pose.rotation))]
+        };
+        Watched {
+            heard: self.heard,
+            heartbeat: self.heartbeat,
+            restarted: self.restarts > 0,
+            armed: self.armed,
+            follows: self.mode == Some(Mode::Offboard),
+            estimator: self.estimator,
+            clock_jumped: self.clock_jumped,
+            battery: self.battery,
+            pose: pose.map(|pose| WatchedPose { trusted: pose.trusted, apart: apart(&pose.world_from_body) }),
+        }
     }
 
     /// The first autopilot that is heard is ours.
@@ -189,5 +204,61 @@ impl Telemetry {
         if verdict == Verdict::Restarted {
             self.restarts += 1;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::codec::{Decoder, Encoder};
+    use super::super::offboard::{OffboardLink, OffboardSettings};
+    use super::*;
+    use mavlink::dialects::common::ATTITUDE_QUATERNION_DATA;
+    use paint_planner::onboard::{Cause, FailsafeSettings};
+
+    #[test]
+    fn the_own_pose_is_watched_beside_the_autopilots() {
+        let telemetry = Telemetry {
+            position: Some(Point3::new(1.0, 2.0, 3.0)),
+            attitude: Some(UnitQuaternion::identity()),
+            mode: Some(Mode::Other(4, 3)),
+            ..Telemetry::default()
+        };
+        let ours = Isometry3::new(Vector3::new(1.0, 2.3, 2.6), Vector3::z() * 0.25);
+        let watched = telemetry.watched(Some(&LocalisedPose { world_from_body: ours, trusted: false }));
+        let WatchedPose { trusted, apart: [distance, angle] } = watched.pose.unwrap();
+        assert!(!trusted && (distance - 0.5).abs() < 1e-12 && (angle - 0.25).abs() < 1e-12, "{watched:?}");
+        assert!(!watched.follows && telemetry.watched(None).pose.is_none());
+        assert!(Telemetry { mode: Some(Mode::Offboard), ..telemetry }.watched(None).follows);
+    }
+
+    /// Restart and jump, from the messages themselves.
+    #[test]
+    fn a_restart_and_a_jump_are_seen_in_the_stamps() {
+        let mut link = OffboardLink::new(OffboardSettings::default());
+        let mut encoder = Encoder::new(1, 1);
+        let heartbeat = MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+            autopilot: MavAutopilot::MAV_AUTOPILOT_PX4,
+            custom_mode: 6 << 16,
+            base_mode: MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED,
+            ..Default::default()
+        });
+        let mut decoder = Decoder::default();
+        let mut feed = |now: f64, stamp: f64| {
+            let attitude =
+                ATTITUDE_QUATERNION_DATA { q1: 1.0, time_boot_ms: (stamp * 1e3) as u32, ..Default::default() };
+            for message in [heartbeat.clone(), MavMessage::ATTITUDE_QUATERNION(attitude)] {
+                decoder.push(&encoder.frame(&message));
+                let (header, message) = decoder.next_message().unwrap();
+                link.receive(now, &header, &message);
+            }
+            // Facing north.
+            let world_from_body = Isometry3::rotation(Vector3::z() * std::f64::consts::FRAC_PI_2);
+            let watched = link.telemetry().watched(Some(&LocalisedPose { world_from_body, trusted: true }));
+            FailsafeSettings::default().cause(now, &watched)
+        };
+        assert_eq!(feed(40.0, 40.0), None);
+        assert_eq!(feed(40.01, 43.01), Some(Cause::ClockJumped));
+        assert_eq!(feed(40.02, 40.02), None);
+        assert_eq!(feed(40.03, 0.5), Some(Cause::AutopilotRestarted));
     }
 }

@@ -16,7 +16,7 @@ use super::seams::likeness;
 use super::settings::{MissionSettings, PainterChoice};
 use crate::adapters::{MeshSurface, Robot};
 use crate::onboard::LocalisationFigures;
-use crate::report::{IdentifiedFigures, Report, TimeFigures, peak_resident_bytes};
+use crate::report::{LocalisationReport, Report, TimeFigures, peak_resident_bytes};
 
 /// Step of the dense check of the planned limits, seconds; the certificates do not depend on it.
 const LIMIT_STEP: f64 = 0.02;
@@ -108,18 +108,12 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         fill_thin_share: fill.as_ref().map(|f| f.thin),
         fill_deviation: fill.as_ref().map(|f| f.deviation),
         fill_mean_ratio: fill.as_ref().map(|f| f.mean),
-        position_error_rms_m: own.map(|own| own.position_error_rms_m()),
-        relocalised_after_s: own.map(|own| own.relocalised_after_s),
-        relocalisation_error_max_m: own.map(|own| own.relocalisation_error_m),
-        unconfirmed_depth_share: own.map(|own| own.unconfirmed as f64 / own.depth_images.max(1) as f64),
-        onboard_cpu_s_per_s: own.map(|own| own.cpu.as_secs_f64() / flight_time),
+        localisation: own.map(|own| LocalisationReport::of(&own, flight_time)),
+        sorties: mission.sorties(),
         film_estimate_error_share: mission.looked.map(|looked| looked.film_error),
         film_estimate_seen_share: mission.looked.map(|looked| looked.film_seen),
         paint_missing_kg: mission.looked.map(|looked| looked.missing * mission.task.paint.density),
-        identified: mission
-            .identified
-            .as_ref()
-            .map(|told| IdentifiedFigures::of(&told.model, &told.attitude, &mission.task.settings.airframe)),
+        identified: mission.identified.as_ref().map(|told| told.figures(&mission.task.settings.airframe)),
         darker_than_wanted_share: darker_than_wanted::share(mission)?,
         seam_length_m: mission.task.surface.disk().seam_length(),
         ssim_painted_at_seams: seams.as_ref().map(|s| s.near),

@@ -2,6 +2,7 @@
 
 use paint_planner::Plan;
 use paint_planner::mission::Route;
+use paint_planner::onboard::sorties;
 use paint_sim::flight::FlightLog;
 use paint_sim::flight::{Faults, Interlock, Localisation, PoseSource, Valve};
 use paint_sim::{Film, FlightSettings, TriangleSurface};
@@ -18,6 +19,9 @@ use crate::onboard::{LocalisationFigures, LocalisedFlight};
 use crate::progress::Stage;
 use crate::simulated_sensors::SHOT_STEP;
 
+/// Flights of other sorties have seeds so far apart.
+const SORTIE: u64 = 0x1_0000;
+
 /// One layer of paint, decided, planned and flown.
 pub struct LayerFlight {
     /// Its strokes on the surface.
@@ -30,6 +34,8 @@ pub struct LayerFlight {
     pub flight: FlightLog,
     /// What its localisation was worth, if that was the robot's own.
     pub(super) localisation: Option<LocalisationFigures>,
+    /// Pieces that tank or battery have cut it into.
+    pub(super) sorties: usize,
     /// Flown with a localisation that errs by 7 cm.
     pub slam: FlightLog,
     /// Flown with the pan-tilt unit locked forward.
@@ -48,32 +54,73 @@ pub(super) fn fly(
     let mut faulty = task.settings.clone();
     for (k, (route, plan, smoothing)) in planned.layers.into_iter().enumerate() {
         stage.share(k as f64 / count as f64);
-        let mut onboard = onboard(task, before.iter().chain(&flights))?;
         let layer = before.len() + k;
         if layer > 0 {
             faulty.faults = Faults::default();
         }
-        let [flight, slam, locked] =
-            fly_three(&plan, task.met(), &task.robot, &faulty, layer as u64, onboard.as_mut())?;
-        let localisation = onboard.map(|onboard| onboard.figures());
-        flights.push(LayerFlight { route, plan, smoothing, flight, localisation, slam, locked });
+        let mut told = (None, 0);
+        let logs: Vec<&FlightLog> = before.iter().chain(&flights).map(|layer| &layer.flight).collect();
+        let counted = || {
+            let (flight, localisation, sorties) = fly_sorties(&plan, task, &faulty, layer as u64, &logs)?;
+            told = (localisation, sorties);
+            Ok(flight)
+        };
+        let [flight, slam, locked] = fly_beside(&plan, task.met(), &task.robot, &faulty, layer as u64, counted)?;
+        let (localisation, sorties) = told;
+        flights.push(LayerFlight { route, plan, smoothing, flight, localisation, sorties, slam, locked });
     }
     let seconds: f64 = flights.iter().map(|f| f.plan.trajectory.duration()).sum();
     stage.done(&format!("{:.0} min in the air, three times", seconds / 60.0));
     Ok(flights)
 }
 
+/// The flight whose paint counts, in as many sorties as tank and battery ask for; each has wind of its own, and finds itself anew before the
+/// paint that is there by then.
+fn fly_sorties(
+    plan: &Plan,
+    task: &PaintingTask,
+    settings: &MissionSettings,
+    layer: u64,
+    before: &[&FlightLog],
+) -> Result<(FlightLog, Option<LocalisationFigures>, usize), MissionError> {
+    let endurance = &settings.endurance;
+    let flow = |time: f64| plan.setpoint(time).flow;
+    let pieces = if endurance.is_endless() {
+        vec![None]
+    } else {
+        sorties(plan.trajectory.duration(), &flow, endurance)?.into_iter().map(Some).collect()
+    };
+    let (mut whole, mut figures): (Option<FlightLog>, _) = (None, None);
+    for (k, piece) in pieces.iter().enumerate() {
+        let usual = counted_flight(plan, &task.robot, settings, layer);
+        let flight = FlightSettings {
+            seed: usual.seed.wrapping_add(SORTIE * k as u64),
+            faults: if k == 0 { usual.faults } else { Faults::default() },
+            ..usual
+        };
+        let mut onboard = onboard(task, before.iter().copied().chain(&whole))?;
+        let source = onboard.as_mut().map(|onboard| onboard as &mut dyn PoseSource);
+        let part = fly_plan(plan, *piece, task.met(), &task.robot, settings, &flight, source)?;
+        let told = onboard.map(|onboard| onboard.figures());
+        figures = told.map(|told| figures.map_or(told, |before: LocalisationFigures| before.and(told)));
+        match &mut whole {
+            Some(whole) => whole.samples.extend(part.samples),
+            None => whole = Some(part),
+        }
+    }
+    whole.map(|whole| (whole, figures, pieces.len())).ok_or(MissionError::NothingToPaint("the plan has no pieces"))
+}
+
 /// The robot's own localisation, if it is to fly by that, before a surface with the paint of earlier flights. It finds itself anew before
 /// every flight.
 pub(super) fn onboard<'a, 'b>(
     task: &'a PaintingTask,
-    before: impl Iterator<Item = &'b LayerFlight>,
+    before: impl Iterator<Item = &'b FlightLog>,
 ) -> Result<Option<LocalisedFlight<'a>>, MissionError> {
     if task.settings.localisation != LocalisationChoice::Slam {
         return Ok(None);
     }
-    let camera = camera_before(task, before.map(|layer| &layer.flight))?;
-    localised_flight(task, camera, 0).map(Some)
+    localised_flight(task, camera_before(task, before)?, 0).map(Some)
 }
 
 /// Puts the paint of flights onto the texels; returns the film and the pixel of each of its texels.
@@ -125,25 +172,21 @@ pub(super) fn usual_flight(plan: &Plan, robot: &Robot, settings: &MissionSetting
     }
 }
 
-/// The same plan with the localisation that was chosen, with a drifting localisation, and with the pan-tilt unit locked.
-pub(super) fn fly_three(
+/// The flight whose paint counts, as it is `counted`, and the same plan with a drifting localisation, and with the pan-tilt unit locked.
+fn fly_beside(
     plan: &Plan,
     world: &TriangleSurface,
     robot: &Robot,
     settings: &MissionSettings,
     layer: u64,
-    onboard: Option<&mut LocalisedFlight>,
+    counted: impl FnOnce() -> Result<FlightLog, MissionError>,
 ) -> Result<[FlightLog; 3], MissionError> {
     let usual = usual_flight(plan, robot, settings, layer);
-    let variants = [
-        counted_flight(plan, robot, settings, layer),
+    let others = [
         FlightSettings { localisation: Localisation::slam_7cm(), ..usual },
         FlightSettings { ptu_locked: true, ..usual },
     ];
-    let source = onboard.map(|onboard| onboard as &mut dyn PoseSource);
-    let [first, others @ ..] = &variants;
-    let one = |flight: &FlightSettings| fly_plan(plan, world, robot, settings, flight, None);
-    let counted = || fly_plan(plan, world, robot, settings, first, source);
+    let one = |flight: &FlightSettings| fly_plan(plan, None, world, robot, settings, flight, None);
     if settings.threads < 2 {
         let (a, [b, c]) = (counted(), others.each_ref().map(one));
         return Ok([a?, b?, c?]);
@@ -156,11 +199,28 @@ pub(super) fn fly_three(
     })
 }
 
+/// The same in one sortie by motion capture or noise, for the tests of the mission's parts.
+#[cfg(test)]
+pub(super) fn fly_three(
+    plan: &Plan,
+    world: &TriangleSurface,
+    robot: &Robot,
+    settings: &MissionSettings,
+    layer: u64,
+) -> Result<[FlightLog; 3], MissionError> {
+    let first = counted_flight(plan, robot, settings, layer);
+    let counted = || fly_plan(plan, None, world, robot, settings, &first, None);
+    fly_beside(plan, world, robot, settings, layer, counted)
+}
+
 #[cfg(test)]
 mod tests {
+    use paint_planner::onboard::Endurance;
+    use paint_planner::timing::TimingPolicy;
+    use ptu_kinematics::Ptu;
+
     use super::super::test_panel;
     use super::*;
-    use ptu_kinematics::Ptu;
 
     #[test]
     fn the_seed_and_the_layer_change_wind_and_localisation() {
@@ -170,7 +230,7 @@ mod tests {
         let plan = test_panel::plan(&surface, &robot, &settings);
         let fly = |seed, layer| {
             let settings = MissionSettings { seed, ..settings.clone() };
-            fly_three(&plan, &surface.world, &robot, &settings, layer, None).unwrap()
+            fly_three(&plan, &surface.world, &robot, &settings, layer).unwrap()
         };
         let (usual, again, other, next) = (fly(1, 0), fly(1, 0), fly(2, 0), fly(1, 1));
         for k in 0..3 {
@@ -178,5 +238,35 @@ mod tests {
             assert_ne!(usual[k], other[k], "flight {k} ignores the seed");
             assert_ne!(usual[k], next[k], "flight {k} is the same in every layer");
         }
+    }
+
+    /// A wave of 20 s in pieces of a battery: every moment of the plan is sprayed once, as much as without pieces, and meets its aim.
+    #[test]
+    fn sorties_leave_nothing_out_and_nothing_twice() {
+        let mut settings = MissionSettings { threads: 1, ..MissionSettings::default() };
+        settings.planner.timing.policy = TimingPolicy::Uniform { speed: 0.05 };
+        let surface = test_panel::surface();
+        let robot = Robot::new(Ptu::new(settings.ptu).unwrap());
+        let plan = test_panel::plan(&surface, &robot, &settings);
+        let flown = |piece, seed| {
+            let flight = FlightSettings { seed, ..counted_flight(&plan, &robot, &settings, 0) };
+            fly_plan(&plan, piece, &surface.world, &robot, &settings, &flight, None).unwrap()
+        };
+        let endurance = Endurance { battery: Some(47.0), ..Endurance::default() };
+        let pieces = sorties(plan.trajectory.duration(), &|t| plan.setpoint(t).flow, &endurance).unwrap();
+        assert!(pieces.len() >= 3, "{pieces:?}");
+        let logs: Vec<FlightLog> = pieces.iter().zip(1..).map(|(piece, seed)| flown(Some(*piece), seed)).collect();
+        let whole = flown(None, 1);
+        let joined: Vec<_> = logs.iter().flat_map(|log| log.samples.iter().copied()).collect();
+        assert_eq!(joined.len(), whole.samples.len());
+        for (joined, whole) in joined.iter().zip(&whole.samples) {
+            assert!((joined.time - whole.time).abs() < 1e-9);
+            // Where paint begins or ends, rounding of the time may move it by a sample's share.
+            assert!((joined.flow - whole.flow).abs() < 0.05 * whole.flow + 1e-12, "{} {}", joined.time, joined.flow);
+            assert!(!joined.held);
+        }
+        let miss = |sample: &paint_sim::flight::FlightSample| (sample.hit.unwrap() - sample.aim.unwrap()).norm();
+        let worst = joined.iter().filter(|sample| sample.flow > 0.0).map(miss).fold(0.0, f64::max);
+        assert!(worst < settings.spot, "{worst} m");
     }
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 use paint_planner::control::{AttitudeFit, Excitation, Identification, IdentifiedAttitude};
+use paint_planner::onboard::StraightWay;
 use paint_sim::Surface;
 use paint_sim::flight::{
     Airframe, CascadedController, Command, Controller, ControllerSettings, Estimate, FlightLog, FlightSettings,
@@ -12,8 +13,9 @@ use super::error::MissionError;
 use super::fly::{localisation_noise, onboard, usual_flight};
 use super::painting_task::PaintingTask;
 use super::plan::Planned;
-use crate::minimum_jerk::StraightWay;
+use crate::adapters::reference_state;
 use crate::progress::Stage;
+use crate::report::IdentifiedFigures;
 
 /// The robot stands back from the place where its plan begins by so much, m, so that it may move.
 const BACK: f64 = 1.2;
@@ -32,6 +34,13 @@ pub(super) struct Identified {
     pub(super) model: Airframe,
     /// Roll and pitch.
     pub(super) attitude: IdentifiedAttitude,
+}
+
+impl Identified {
+    /// For the report, beside the vehicle that was flown.
+    pub(super) fn figures(&self, truth: &Airframe) -> IdentifiedFigures {
+        IdentifiedFigures::of(&self.model, &self.attitude, truth)
+    }
 }
 
 /// Flies an excitation behind the place where the first plan begins, if the mission asks for it, by the localisation that was chosen. What it
@@ -127,7 +136,7 @@ impl Reference for Hover {
 
     fn at(&self, t: f64) -> ReferenceState {
         let way = StraightWay { ends: [self.place; 2], heading: [self.heading; 2], duration: self.duration };
-        way.at(t, Vector3::zeros())
+        reference_state(&way.at(t, Vector3::zeros()))
     }
 }
 
@@ -185,7 +194,7 @@ mod tests {
             assert!(excursion < 0.6, "{excursion} m");
             let learnt = FlightSettings { model: Some(model), ..believed };
             let hits = [believed, learnt].map(|flight| {
-                let log = fly_plan(&plan, &surface.world, &robot, &settings, &flight, None).unwrap();
+                let log = fly_plan(&plan, None, &surface.world, &robot, &settings, &flight, None).unwrap();
                 log.statistics().hit_error_rms
             });
             println!("vehicle {seed}: {:.4} m by what was believed, {:.4} m by what is identified", hits[0], hits[1]);

@@ -14,6 +14,7 @@ use super::mission_output::{painted_view, texture};
 use super::painting_task::PaintingTask;
 use super::planned_mission::PlannedMission;
 use super::settings::MissionSettings;
+use super::simulated_flight::reference;
 use crate::adapters::{MeshSurface, PlanReference, ServoPanTilt};
 use crate::appearance::DENSITY;
 
@@ -49,12 +50,7 @@ impl PlannedMission {
 impl<'a> PlannedFlight<'a> {
     /// The reference: what the flight is asked to do.
     pub fn reference(&self) -> PlanReference<'a> {
-        PlanReference {
-            plan: self.plan,
-            chain: &self.task.robot.chain,
-            gun_length: self.task.settings.ptu.tilt_from_tip.norm(),
-            stand_off: self.task.settings.planner.nozzle.stand_off,
-        }
+        reference(self.plan, &self.task.robot, &self.task.settings)
     }
 
     /// The pan-tilt unit on its servos, at rest.

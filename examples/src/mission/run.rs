@@ -81,6 +81,12 @@ impl Mission {
         &self.flights
     }
 
+    /// Flights that tank or battery have cut the plans into, if they have.
+    pub(super) fn sorties(&self) -> Option<usize> {
+        let cut = !self.task.settings.endurance.is_endless();
+        cut.then(|| self.flights.iter().map(|flight| flight.sorties).sum())
+    }
+
     /// Paint depth per pixel as it came out, 0 beside the surface.
     pub(super) fn painted_depth(&self) -> Image {
         self.task.depth_of(&self.film, &self.pixels)

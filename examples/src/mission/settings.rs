@@ -4,6 +4,7 @@ use paint_net::Limits;
 use paint_net::painters::LayerPlanning;
 use paint_planner::constraints::FlightConstraints;
 use paint_planner::nozzle::NozzleSettings;
+use paint_planner::onboard::Endurance;
 use ptu_kinematics::{PtuSettings, ServoSettings};
 use serde::{Deserialize, Serialize};
 
@@ -61,6 +62,9 @@ pub struct MissionSettings {
     /// How it knows where it is.
     #[serde(skip_serializing_if = "LocalisationChoice::is_default")]
     pub localisation: LocalisationChoice,
+    /// How long tank and battery last; without them all comes through the tether.
+    #[serde(skip_serializing_if = "Endurance::is_endless")]
+    pub endurance: Endurance,
     /// Look at the painted surface and paint again what is missing.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub look: bool,
@@ -150,6 +154,7 @@ impl Default for MissionSettings {
             model: Airframe::default(),
             identify: false,
             localisation: LocalisationChoice::default(),
+            endurance: Endurance::default(),
             look: false,
             faults: Faults::default(),
             constraints: FlightConstraints::default(),

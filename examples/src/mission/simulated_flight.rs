@@ -4,48 +4,58 @@ use nalgebra::{Point3, Vector3};
 use paint_planner::Plan;
 use paint_planner::constraints::Tether;
 use paint_planner::control::MpcSettings;
+use paint_planner::onboard::Sortie;
 use paint_sim::flight::FlightLog;
 use paint_sim::flight::{
-    CascadedController, Controller, ControllerSettings, HoseModel, PoseSource, fly_localised, fly_with,
+    CascadedController, Controller, ControllerSettings, HoseModel, PoseSource, Reference, fly_localised, fly_with,
 };
 use paint_sim::{FlightSettings, TriangleSurface};
 
 use super::error::MissionError;
 use super::settings::{ControllerChoice, MissionSettings};
 use crate::adapters::{MpcController, PlanReference, Robot, ServoPanTilt};
-use crate::onboard::Approach;
+use crate::onboard::{Approach, Piece};
 
 /// The usual wind, hose and localisation.
 pub(super) fn flight_settings(plan: &Plan, tether: Option<Tether>, seed: u64) -> FlightSettings {
     FlightSettings { hose: Some(hose(plan, tether)), seed, ..FlightSettings::default() }
 }
 
-/// Flies a plan with the robot's own servos and the controller that was chosen, by a source of poses or by the noise of `flight`.
+/// A plan as the robot's reference.
+pub(super) fn reference<'a>(plan: &'a Plan, robot: &'a Robot, settings: &MissionSettings) -> PlanReference<'a> {
+    let gun_length = settings.ptu.tilt_from_tip.norm();
+    PlanReference { plan, chain: &robot.chain, gun_length, stand_off: settings.planner.nozzle.stand_off }
+}
+
+/// Flies a piece of a plan, or all of it, with the robot's own servos and the controller that was chosen, by a source of poses or by the noise
+/// of `flight`.
 pub(super) fn fly_plan(
     plan: &Plan,
+    piece: Option<Sortie>,
     world: &TriangleSurface,
     robot: &Robot,
     settings: &MissionSettings,
     flight: &FlightSettings,
     localisation: Option<&mut dyn PoseSource>,
 ) -> Result<FlightLog, MissionError> {
-    let reference = PlanReference {
-        plan,
-        chain: &robot.chain,
-        gun_length: settings.ptu.tilt_from_tip.norm(),
-        stand_off: settings.planner.nozzle.stand_off,
-    };
+    let whole = reference(plan, robot, settings);
+    let piece = piece.map(|sortie| Piece::of(&whole, sortie));
+    let reference: &dyn Reference = piece.as_ref().map_or(&whole, |piece| piece);
     let mut gun = ServoPanTilt::new(robot.chain.clone(), settings.servo)?;
     let mut controller: Box<dyn Controller> = match settings.controller {
         ControllerChoice::Cascade => Box::new(CascadedController::new(flight.model(), ControllerSettings::default())),
         ControllerChoice::Mpc => Box::new(MpcController::new(&flight.model(), MpcSettings::default())?),
     };
-    Ok(match localisation {
+    let log = match localisation {
         Some(source) => {
-            let approach = Approach::to(&reference);
+            let approach = Approach::to(reference);
             Approach::cut(fly_localised(&approach, controller.as_mut(), &mut gun, world, source, flight)?)
         }
-        None => fly_with(&reference, controller.as_mut(), &mut gun, world, flight)?,
+        None => fly_with(reference, controller.as_mut(), &mut gun, world, flight)?,
+    };
+    Ok(match &piece {
+        Some(piece) => piece.cut(log),
+        None => log,
     })
 }
 
@@ -85,7 +95,7 @@ mod tests {
             let wind = Wind { mean: Vector3::zeros(), gust_sigma: 3.0, ..Wind::default() };
             let spread = (0..12).map(|seed| {
                 let flight = FlightSettings { wind, ..flight_settings(&plan, None, seed) };
-                let log = fly_plan(&plan, &surface.world, &robot, &settings, &flight, None).unwrap();
+                let log = fly_plan(&plan, None, &surface.world, &robot, &settings, &flight, None).unwrap();
                 log.statistics().nozzle_distance_std.powi(2)
             });
             (spread.sum::<f64>() / 12.0).sqrt()

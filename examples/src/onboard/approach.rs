@@ -1,9 +1,10 @@
 //! The way from where the robot finds itself to where its plan begins.
 
 use nalgebra::Vector3;
+use paint_planner::onboard::StraightWay;
 use paint_sim::flight::{FlightLog, Reference, ReferenceState};
 
-use crate::minimum_jerk::StraightWay;
+use crate::adapters::reference_state;
 
 /// The robot stands back by so much, m: about as far as it was from the surface when it scanned it, so that the keyframes show what it sees.
 const BACK: f64 = 0.9;
@@ -46,7 +47,7 @@ impl Reference for Approach<'_> {
         let ahead = Vector3::new(first.heading.cos(), first.heading.sin(), 0.0);
         let back = first.position - ahead * BACK;
         let way = StraightWay { ends: [back, first.position], heading: [first.heading; 2], duration: DURATION };
-        way.at(t, first.lever)
+        reference_state(&way.at(t, first.lever))
     }
 }
 

@@ -35,6 +35,12 @@ pub enum RobotError {
         "--localisation slam does not hold on an autopilot yet: fly with motion-capture or noise, or without an autopilot by `paintcopter`"
     )]
     OwnSenses,
+    /// An option of the built-in simulation alone.
+    #[error("{option} is for the built-in simulation of `paintcopter`: leave it out with --autopilot")]
+    BuiltInOnly {
+        /// The option.
+        option: &'static str,
+    },
     /// An option that says nothing about a vehicle over UDP.
     #[error("{option} is for the simulated vehicle on PX4: leave it out with --autopilot udp:ADDRESS:PORT ({why})")]
     SimulationOnly {

@@ -1,15 +1,15 @@
 //! The flight on PX4: physics, PX4 and the on-board program in one simulated time.
 
+use paint_planner::onboard::{Phase, Request};
 use paint_sim::Surface;
 use paint_sim::flight::Reference;
 
 use super::error::RobotError;
 use super::fault::{Fault, FaultKind};
 use super::on_board::{CONTROL_STEP, OnBoard};
-use super::phase::Phase;
 use super::recorder::{Record, Recorder, Seen};
 use super::simulated_robot::{CONTROL_STEPS, SENSOR_STEPS, STEP, SimulatedRobot};
-use crate::autopilot::{AutopilotError, Px4, Request, simulator};
+use crate::autopilot::{AutopilotError, Px4, simulator};
 use crate::interruption;
 
 /// The autopilot must be ready, armed and in the air after so long, s of its own clock.

@@ -2,14 +2,15 @@
 //! It knows neither sockets nor the simulation; times are those of whoever runs it, 100 steps a second.
 
 use nalgebra::{Matrix3, Point3, Vector3};
+use paint_planner::onboard::{Cause, FailsafeSettings, Phase, Phases, Situation};
 use paint_sim::flight::{
     Airframe, CascadedController, Command, Controller as _, ControllerSettings, Estimator, GRAVITY, InterlockInput,
     InterlockState, Localisation, LocalisedPose, ObserverSettings, PanTilt, Reference, ReferenceState, Valve,
 };
 
-use super::phase::{Phase, Phases, Situation};
+use super::guided_reference::{GuidedReference, ReferencePlan};
 use crate::adapters::ServoPanTilt;
-use crate::autopilot::{Cause, FailsafeSettings, MavMessage, Odometry, OffboardLink, OffboardSettings, Setpoint};
+use crate::autopilot::{MavMessage, Odometry, OffboardLink, OffboardSettings, Setpoint};
 
 /// Time of a control step, s.
 pub(super) const CONTROL_STEP: f64 = 0.01;
@@ -84,7 +85,7 @@ pub struct OnBoard<'a> {
     ptu: ServoPanTilt,
     interlock: InterlockState,
     link: OffboardLink,
-    phases: Phases<'a>,
+    phases: Phases<ReferencePlan<'a>>,
     /// The last pose, and when it came.
     last: Option<(f64, LocalisedPose)>,
     /// Jumps of the pose.
@@ -101,7 +102,7 @@ impl<'a> OnBoard<'a> {
             estimator: None,
             interlock: InterlockState::new(settings.valve.interlock, delays),
             link: OffboardLink::new(settings.offboard),
-            phases: Phases::new(plan, settings.seconds, settings.valve.lead),
+            phases: Phases::new(ReferencePlan(plan), settings.seconds, settings.valve.lead),
             last: None,
             resets: 0,
             interrupted: false,
@@ -158,7 +159,7 @@ impl<'a> OnBoard<'a> {
 
     /// Where it shall be; nothing on the ground.
     pub fn wanted(&self, now: f64) -> Option<ReferenceState> {
-        self.phases.guided().map(|guided| guided.at(now))
+        self.phases.guided().map(|guided| GuidedReference(guided).at(now))
     }
 
     /// One control step at `now` (s), with the newest pose (`None`: there is none) and the joints as they report themselves.
@@ -174,11 +175,13 @@ impl<'a> OnBoard<'a> {
         }
         let trusted = pose.is_some_and(|pose| pose.trusted) && !self.jumped(now, pose);
         let pose = pose.map(|pose| LocalisedPose { trusted, ..*pose });
-        let failed = self.settings.failsafe.cause(now, self.link.telemetry(), pose.as_ref());
+        let watched = self.link.telemetry().watched(pose.as_ref());
+        let failed = self.settings.failsafe.cause(now, &watched);
         let cause = failed.into_iter().chain(self.interrupted.then_some(Cause::Interrupted)).min();
         if let Some(estimator) = &self.estimator {
             let estimate = estimator.estimate();
-            let (ready, armed) = (self.ready(pose.as_ref()), self.link.telemetry().armed);
+            let ready = self.settings.failsafe.ready(&watched) && self.link.telemetry().position.is_some();
+            let armed = watched.armed;
             let [_, _, heading] = estimate.attitude;
             self.phases.advance(&Situation { now, cause, position: estimate.position, heading, ready, armed });
             self.link.request(self.phases.request(self.settings.arms));
@@ -201,20 +204,9 @@ impl<'a> OnBoard<'a> {
         jumped
     }
 
-    /// Whether the autopilot knows where it is, and takes itself to be where we do.
-    fn ready(&self, pose: Option<&LocalisedPose>) -> bool {
-        let telemetry = self.link.telemetry();
-        let FailsafeSettings { disagreement, turn, .. } = self.settings.failsafe;
-        let elsewhere =
-            |pose: &LocalisedPose| telemetry.disagrees(&pose.world_from_body, 0.5 * disagreement, 0.5 * turn);
-        telemetry.estimator == Some(true)
-            && telemetry.position.is_some()
-            && pose.is_some_and(|pose| pose.trusted && !elsewhere(pose))
-    }
-
     fn setpoint(&mut self, now: f64) -> Option<Setpoint> {
         let (station, station_heading) = self.phases.station()?;
-        let Some(guided) = self.phases.guided() else {
+        let Some(guided) = self.phases.guided().map(GuidedReference) else {
             // On the ground.
             return Some(match self.settings.setpoints {
                 SetpointKind::Attitude => Setpoint::leaning(0.0, 0.0, station_heading, station_heading, 0.0),

@@ -3,12 +3,12 @@
 use std::fmt::{Display, Write as _};
 
 use nalgebra::Point3;
+use paint_planner::onboard::Phase;
 use paint_sim::Surface;
 use paint_sim::flight::{FlightLog, FlightSample, PanTilt, Reference, Vehicle};
 
 use super::error::RobotError;
 use super::on_board::{CONTROL_STEP, OnBoard};
-use super::phase::Phase;
 
 /// Control steps from one line of the track to the next.
 const TRACK_STEPS: u64 = 5;

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
+use paint_planner::onboard::{FailsafeSettings, Phase};
 use paint_sim::FlightSettings;
 use paint_sim::flight::multirotor::MultirotorSettings;
 use paint_sim::flight::{Airframe, Reference};
@@ -12,12 +13,11 @@ use super::arguments::{Arguments, AutopilotChoice};
 use super::error::RobotError;
 use super::flight::{Flown, Scene, fly_px4};
 use super::on_board::{OnBoard, OnBoardSettings, SetpointKind};
-use super::phase::Phase;
 use super::recorder::Record;
 use super::report::RobotReport;
 use super::simulated_robot::{SimulatedRobot, station};
 use super::udp::fly_udp;
-use crate::autopilot::{FailsafeSettings, OffboardSettings, Px4, Px4Vehicle};
+use crate::autopilot::{OffboardSettings, Px4, Px4Vehicle};
 use crate::interruption::Finishing;
 use crate::mission::{LocalisationChoice, PlannedFlight, PlannedMission};
 use crate::progress::Stage;
@@ -34,6 +34,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let mission_file = arguments.mission.mission_file()?;
     if mission_file.settings.localisation == LocalisationChoice::Slam {
         return Err(RobotError::OwnSenses.into());
+    }
+    let settings = &mission_file.settings;
+    for (option, given) in
+        [("--tank and --battery", !settings.endurance.is_endless()), ("--identify", settings.identify)]
+    {
+        if given {
+            return Err(RobotError::BuiltInOnly { option }.into());
+        }
     }
     mission_file.begin_run(folder, "robot")?;
     let coat = mission_file.decide_coats(folder)?.coats.into_iter().next().ok_or(RobotError::NothingToFly)?;

@@ -6,6 +6,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use paint_planner::onboard::FailsafeSettings;
 use paint_sim::flight::{LocalisedPose, PanTilt, Reference, ReferenceState, Vehicle};
 
 use super::error::RobotError;
@@ -13,7 +14,7 @@ use super::flight::{End, Flown, over};
 use super::on_board::{CONTROL_STEP, OnBoard, OnBoardSettings};
 use super::recorder::{Recorder, Seen};
 use super::simulated_robot::{STEP, station};
-use crate::autopilot::{AutopilotError, FailsafeSettings, OffboardLink, OffboardSettings, Telemetry, UdpLink};
+use crate::autopilot::{AutopilotError, OffboardLink, OffboardSettings, Telemetry, UdpLink};
 use crate::interruption;
 use crate::mission::PlannedFlight;
 

@@ -1,13 +1,13 @@
 //! The way of a scan: rows along the front of a surface, from rest to rest.
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use paint_planner::onboard::minimum_jerk;
 use paint_sim::TriangleSurface;
 use paint_sim::flight::{Reference, ReferenceState};
 use vio_ekf::Stamp;
 use vio_ekf::trajectory::Spline;
 
 use super::error::ScanFlightError;
-use crate::minimum_jerk::minimum_jerk;
 
 /// Distance of the robot from the foremost point of the surface in a scan, metres.
 pub(super) const STAND_OFF: f64 = 1.5;

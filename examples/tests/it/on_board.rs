@@ -6,10 +6,11 @@ use mavlink::dialects::common::{
 };
 use mavlink::{MavHeader, MavlinkVersion, Message};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use paint_planner::onboard::{Cause, FailsafeSettings, Phase};
 use paint_sim::flight::{Airframe, Localisation, LocalisedPose, Reference, ReferenceState, Valve};
 use paintcopter::adapters::ServoPanTilt;
-use paintcopter::autopilot::{Cause, FailsafeSettings, OffboardSettings};
-use paintcopter::robot::{Commanded, OnBoard, OnBoardSettings, Phase, SetpointKind};
+use paintcopter::autopilot::OffboardSettings;
+use paintcopter::robot::{Commanded, OnBoard, OnBoardSettings, SetpointKind};
 use ptu_kinematics::{Ptu, PtuSettings, ServoSettings};
 
 const STEP: f64 = 0.01;

@@ -3,10 +3,9 @@
 use std::fmt;
 
 use nalgebra::{Point3, Vector3};
-use paint_sim::flight::Reference;
 
-use super::guidance::{Guidance, Guided};
-use crate::autopilot::{Cause, Request};
+use super::failsafe::Cause;
+use super::guidance::{FlightPlan, Guidance, Guided};
 
 /// Rest before the plan begins or goes on, s: the observer learns wind and hose.
 const SETTLE: f64 = 4.0;
@@ -77,26 +76,38 @@ impl fmt::Display for Phase {
     }
 }
 
-/// What the state machine is told in a control step.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Situation {
-    /// Time, s.
-    pub(super) now: f64,
-    /// Why the flight must not go on.
-    pub(super) cause: Option<Cause>,
-    /// Where the robot takes itself to be.
-    pub(super) position: Point3<f64>,
-    /// Its heading, rad.
-    pub(super) heading: f64,
-    /// Whether the autopilot takes itself to be there too.
-    pub(super) ready: bool,
-    /// Whether the motors may turn.
-    pub(super) armed: bool,
+/// What the autopilot is asked for until it does it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Request {
+    /// To follow our set-points.
+    Offboard,
+    /// To follow our set-points and turn its motors on. In simulation only: on a vehicle it is the pilot who arms.
+    Arm,
+    /// To land where it is.
+    Land,
 }
 
-/// The state machine.
-pub(super) struct Phases<'a> {
-    plan: &'a dyn Reference,
+/// What the state machine is told in a control step.
+#[derive(Debug, Clone, Copy)]
+pub struct Situation {
+    /// Time, s.
+    pub now: f64,
+    /// Why the flight must not go on.
+    pub cause: Option<Cause>,
+    /// Where the robot takes itself to be.
+    pub position: Point3<f64>,
+    /// Its heading, rad.
+    pub heading: f64,
+    /// Whether the autopilot takes itself to be there too.
+    pub ready: bool,
+    /// Whether the motors may turn.
+    pub armed: bool,
+}
+
+/// The state machine. `P` is the plan that is painted.
+#[derive(Debug, Clone)]
+pub struct Phases<P> {
+    plan: P,
     /// The plan is painted up to here, s.
     until: f64,
     /// The paint of a command leaves so much later, s.
@@ -112,12 +123,12 @@ pub(super) struct Phases<'a> {
     events: Vec<(f64, Phase)>,
 }
 
-impl<'a> Phases<'a> {
-    /// On the ground, for the first `seconds` of a plan.
-    pub(super) fn new(plan: &'a dyn Reference, seconds: f64, lead: f64) -> Self {
+impl<P: FlightPlan + Copy> Phases<P> {
+    /// On the ground, for the first `seconds` of a plan; the paint of a command leaves `lead` seconds later.
+    pub fn new(plan: P, seconds: f64, lead: f64) -> Self {
         Self {
-            plan,
             until: plan.duration().min(seconds),
+            plan,
             lead,
             phase: Phase::Wait,
             since: 0.0,
@@ -130,37 +141,38 @@ impl<'a> Phases<'a> {
         }
     }
 
-    pub(super) fn phase(&self) -> Phase {
+    /// What the robot is doing.
+    pub fn phase(&self) -> Phase {
         self.phase
     }
 
     /// When each phase began.
-    pub(super) fn events(&self) -> &[(f64, Phase)] {
+    pub fn events(&self) -> &[(f64, Phase)] {
         &self.events
     }
 
     /// Time of the plan up to which it is painted, s.
-    pub(super) fn painted(&self) -> f64 {
+    pub fn painted(&self) -> f64 {
         self.painted
     }
 
     /// Where the plan is painted next, s of its own time.
-    pub(super) fn unpainted(&self) -> std::ops::RangeInclusive<f64> {
+    pub fn unpainted(&self) -> std::ops::RangeInclusive<f64> {
         self.painted..=self.until
     }
 
     /// Why a flight that landed did not paint all of it.
-    pub(super) fn ended_early(&self) -> Option<Cause> {
+    pub fn ended_early(&self) -> Option<Cause> {
         self.ended_early
     }
 
     /// Where it stood, with heading.
-    pub(super) fn station(&self) -> Option<(Point3<f64>, f64)> {
+    pub fn station(&self) -> Option<(Point3<f64>, f64)> {
         self.station
     }
 
     /// Time of the plan at `now`, while it is followed.
-    pub(super) fn plan_time(&self, now: f64) -> Option<f64> {
+    pub fn plan_time(&self, now: f64) -> Option<f64> {
         match self.guidance {
             Some(Guidance::Plan { offset }) => Some(now - offset),
             _ => None,
@@ -168,7 +180,7 @@ impl<'a> Phases<'a> {
     }
 
     /// Time of the plan that the gun aims by at `now`: before the plan begins or goes on, at where it will.
-    pub(super) fn aim_offset(&self, now: f64) -> Option<f64> {
+    pub fn aim_offset(&self, now: f64) -> Option<f64> {
         match (self.phase, self.guidance) {
             (Phase::Paint, Some(Guidance::Plan { offset })) => Some(offset),
             (Phase::Approach, _) => Some(now - self.resume()),
@@ -177,7 +189,7 @@ impl<'a> Phases<'a> {
     }
 
     /// What is followed; nothing on the ground.
-    pub(super) fn guided(&self) -> Option<Guided<'a>> {
+    pub fn guided(&self) -> Option<Guided<P>> {
         if matches!(self.phase, Phase::Wait | Phase::Arm) {
             return None;
         }
@@ -189,8 +201,8 @@ impl<'a> Phases<'a> {
         Some(Guided { guidance: self.guidance?, plan: self.plan, lever })
     }
 
-    /// What the autopilot is asked for; `arms`: whether it is ours to arm and to take control, see [`OnBoardSettings`](super::OnBoardSettings).
-    pub(super) fn request(&self, arms: bool) -> Option<Request> {
+    /// What the autopilot is asked for; `arms`: whether it is ours to arm and to take control, which on a vehicle is the pilot's.
+    pub fn request(&self, arms: bool) -> Option<Request> {
         match self.phase {
             Phase::Arm => arms.then_some(Request::Arm),
             Phase::Hold(_) => arms.then_some(Request::Offboard),
@@ -200,7 +212,7 @@ impl<'a> Phases<'a> {
     }
 
     /// One control step.
-    pub(super) fn advance(&mut self, situation: &Situation) {
+    pub fn advance(&mut self, situation: &Situation) {
         let Situation { now, cause, position, heading, ready, armed } = *situation;
         let (station, station_heading) = *self.station.get_or_insert((position, heading));
         if let Some(cause) = cause.or(self.astray(situation)).filter(|_| self.phase.is_guarded()) {
@@ -320,10 +332,10 @@ impl<'a> Phases<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::guidance::tests::Line;
+    use crate::onboard::guidance::tests::Line;
 
     /// Ten steps a second until a phase, at the place where it is guided to.
-    fn until(phases: &mut Phases, clock: &mut f64, cause: Option<Cause>, phase: impl Fn(Phase) -> bool) {
+    fn until(phases: &mut Phases<Line>, clock: &mut f64, cause: Option<Cause>, phase: impl Fn(Phase) -> bool) {
         for _ in 0..1000 {
             *clock += 0.1;
             let (position, heading) =
@@ -339,7 +351,7 @@ mod tests {
 
     #[test]
     fn the_phases_follow_the_table() {
-        let (mut phases, mut clock) = (Phases::new(&Line, 20.0, 0.0), 0.0);
+        let (mut phases, mut clock) = (Phases::new(Line, 20.0, 0.0), 0.0);
         until(&mut phases, &mut clock, None, |phase| phase == Phase::Return);
         let names: Vec<_> = phases.events().iter().map(|(_, phase)| phase.to_string()).collect();
         assert_eq!(names, ["arm", "take off", "approach", "paint", "return"]);
@@ -354,7 +366,7 @@ mod tests {
 
     #[test]
     fn a_hold_goes_on_before_the_place_where_the_paint_ended() {
-        let (mut phases, mut clock) = (Phases::new(&Line, 20.0, 0.0), 0.0);
+        let (mut phases, mut clock) = (Phases::new(Line, 20.0, 0.0), 0.0);
         until(&mut phases, &mut clock, None, |phase| phase == Phase::Paint);
         for _ in 0..30 {
             until(&mut phases, &mut clock, None, |phase| phase == Phase::Paint);
@@ -374,7 +386,7 @@ mod tests {
 
     #[test]
     fn a_robot_that_stays_on_the_ground_does_not_paint() {
-        let mut phases = Phases::new(&Line, 20.0, 0.0);
+        let mut phases = Phases::new(Line, 20.0, 0.0);
         for k in 0..1000 {
             let now = 0.1 * f64::from(k);
             let position = Point3::origin();
@@ -394,7 +406,7 @@ mod tests {
             (Cause::Interrupted, Phase::Return),
             (Cause::LinkLost, Phase::Aborted(Cause::LinkLost)),
         ] {
-            let (mut phases, mut clock) = (Phases::new(&Line, 20.0, 0.0), 0.0);
+            let (mut phases, mut clock) = (Phases::new(Line, 20.0, 0.0), 0.0);
             until(&mut phases, &mut clock, None, |phase| phase == Phase::Paint);
             let before = clock;
             until(&mut phases, &mut clock, Some(cause), |found| found == phase);
@@ -404,7 +416,7 @@ mod tests {
         }
         // A battery that is low still brings it home, and so does an interruption.
         for cause in [Cause::BatteryLow, Cause::Interrupted] {
-            let (mut phases, mut clock) = (Phases::new(&Line, 20.0, 0.0), 0.0);
+            let (mut phases, mut clock) = (Phases::new(Line, 20.0, 0.0), 0.0);
             until(&mut phases, &mut clock, None, |phase| phase == Phase::Paint);
             until(&mut phases, &mut clock, Some(cause), |phase| phase == Phase::Land);
             assert_eq!(phases.ended_early(), Some(cause));

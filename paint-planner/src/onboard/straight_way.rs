@@ -1,43 +1,41 @@
 //! From rest to rest with the least jerk (Flash and Hogan 1985).
 
 use nalgebra::{Point3, Vector3};
-use paint_sim::flight::ReferenceState;
+
+use crate::control::ControlReference;
 
 /// Share of the way at a share `s` of the time, cut to 0..=1, with its first and second derivative by `s`: `10 s³ - 15 s⁴ + 6 s⁵`.
-pub(crate) fn minimum_jerk(s: f64) -> [f64; 3] {
+pub fn minimum_jerk(s: f64) -> [f64; 3] {
     let s = s.clamp(0.0, 1.0);
     let left = 1.0 - s;
     [s * s * s * (10.0 + s * (6.0 * s - 15.0)), 30.0 * s * s * left * left, 60.0 * s * left * (1.0 - 2.0 * s)]
 }
 
-/// A straight way of a vehicle, at rest at both ends, without paint.
+/// A straight way of a vehicle, at rest at both ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct StraightWay {
+pub struct StraightWay {
     /// Both ends in the world, m.
-    pub(crate) ends: [Point3<f64>; 2],
+    pub ends: [Point3<f64>; 2],
     /// Headings there, rad; the second within half a turn of the first.
-    pub(crate) heading: [f64; 2],
+    pub heading: [f64; 2],
     /// How long it takes, s.
-    pub(crate) duration: f64,
+    pub duration: f64,
 }
 
 impl StraightWay {
-    /// The state `t` seconds after it began. `lever`: see [`ReferenceState::lever`].
-    pub(crate) fn at(&self, t: f64, lever: Vector3<f64>) -> ReferenceState {
+    /// The state `t` seconds after it began. `lever`: see [`ControlReference::lever`].
+    pub fn at(&self, t: f64, lever: Vector3<f64>) -> ControlReference {
         let Self { ends: [from, to], heading: [first, last], duration } = *self;
         let [share, speed, acceleration] = minimum_jerk(t / duration);
         let (speed, acceleration) = (speed / duration, acceleration / (duration * duration));
         let way = to - from;
-        ReferenceState {
+        ControlReference {
             position: from + way * share,
             velocity: way * speed,
             acceleration: way * acceleration,
             heading: first + (last - first) * share,
             heading_rate: (last - first) * speed,
             lever,
-            aim: None,
-            nozzle_distance: 0.0,
-            flow: 0.0,
         }
     }
 }

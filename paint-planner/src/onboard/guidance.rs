@@ -1,18 +1,27 @@
 //! Where the robot shall be: the plan, and the ways to it and back.
 
 use nalgebra::{Point3, Vector3};
-use paint_sim::flight::{Reference, ReferenceState};
 
-use crate::minimum_jerk::StraightWay;
+use super::straight_way::StraightWay;
+use crate::control::ControlReference;
 
 /// Mean speed of a way, m/s.
 const SPEED: f64 = 0.5;
 /// Mean turn rate on a way, rad/s.
 const TURN_RATE: f64 = 0.5;
 
+/// A planned flight, as far as the vehicle's motion goes.
+pub trait FlightPlan {
+    /// How long it lasts, s.
+    fn duration(&self) -> f64;
+
+    /// The wanted motion at `t` seconds; asked for a little before zero and after the end as well, where it should stand still.
+    fn at(&self, t: f64) -> ControlReference;
+}
+
 /// What is followed now.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Guidance {
+pub enum Guidance {
     /// A straight way at rest at both ends, with the least jerk.
     Way {
         /// The way.
@@ -29,7 +38,7 @@ pub(super) enum Guidance {
 
 impl Guidance {
     /// A way at the usual speed.
-    pub(super) fn way(from: Point3<f64>, from_heading: f64, to: Point3<f64>, to_heading: f64, start: f64) -> Self {
+    pub fn way(from: Point3<f64>, from_heading: f64, to: Point3<f64>, to_heading: f64, start: f64) -> Self {
         let turn = to_heading - from_heading;
         let turn = turn.sin().atan2(turn.cos());
         let duration = ((to - from).norm() / SPEED).max(turn.abs() / TURN_RATE).max(1.0);
@@ -40,17 +49,17 @@ impl Guidance {
     }
 
     /// To stay.
-    pub(super) fn stay(at: Point3<f64>, heading: f64, now: f64) -> Self {
+    pub fn stay(at: Point3<f64>, heading: f64, now: f64) -> Self {
         Self::Way { way: StraightWay { ends: [at; 2], heading: [heading; 2], duration: 1.0 }, start: now }
     }
 
     /// Whether a way has been at its end for `rest` seconds.
-    pub(super) fn arrived(&self, now: f64, rest: f64) -> bool {
+    pub fn arrived(&self, now: f64, rest: f64) -> bool {
         matches!(self, Self::Way { way, start } if now >= start + way.duration + rest)
     }
 
-    /// The state at a time. `lever` of a way, see [`ReferenceState::lever`].
-    pub(super) fn at(&self, now: f64, plan: &dyn Reference, lever: Vector3<f64>) -> ReferenceState {
+    /// The state at a time. `lever` of a way, see [`ControlReference::lever`].
+    pub fn at(&self, now: f64, plan: &dyn FlightPlan, lever: Vector3<f64>) -> ControlReference {
         match *self {
             Self::Plan { offset } => plan.at(now - offset),
             Self::Way { way, start } => way.at(now - start, lever),
@@ -58,20 +67,29 @@ impl Guidance {
     }
 }
 
-/// A guidance for a controller, which looks ahead and back in it.
-pub(super) struct Guided<'a> {
-    pub(super) guidance: Guidance,
-    pub(super) plan: &'a dyn Reference,
-    pub(super) lever: Vector3<f64>,
+/// A guidance with the plan that it leads along, for controllers, which look ahead and back in it.
+#[derive(Debug, Clone, Copy)]
+pub struct Guided<P> {
+    /// What is followed.
+    pub guidance: Guidance,
+    /// The plan.
+    pub plan: P,
+    /// Of ways, see [`ControlReference::lever`].
+    pub lever: Vector3<f64>,
 }
 
-impl Reference for Guided<'_> {
-    fn duration(&self) -> f64 {
-        f64::INFINITY
+impl<P: FlightPlan> Guided<P> {
+    /// The wanted motion at a time.
+    pub fn at(&self, now: f64) -> ControlReference {
+        self.guidance.at(now, &self.plan, self.lever)
     }
 
-    fn at(&self, t: f64) -> ReferenceState {
-        self.guidance.at(t, self.plan, self.lever)
+    /// Time of the plan, where that is followed.
+    pub fn plan_time(&self, now: f64) -> Option<f64> {
+        match self.guidance {
+            Guidance::Plan { offset } => Some(now - offset),
+            Guidance::Way { .. } => None,
+        }
     }
 }
 
@@ -79,20 +97,20 @@ impl Reference for Guided<'_> {
 pub(super) mod tests {
     use super::*;
 
-    /// A plan of 8 s along y at a height of 2 m, painted all the way.
-    pub(in crate::robot) struct Line;
+    /// A plan of 8 s along y at a height of 2 m.
+    #[derive(Clone, Copy)]
+    pub(in crate::onboard) struct Line;
 
-    impl Reference for Line {
+    impl FlightPlan for Line {
         fn duration(&self) -> f64 {
             8.0
         }
 
-        fn at(&self, t: f64) -> ReferenceState {
+        fn at(&self, t: f64) -> ControlReference {
             let place = Point3::new(3.0, 0.2 * t.clamp(0.0, 8.0), 2.0);
             let rest = Guidance::stay(place, 0.0, 0.0).at(0.0, self, Vector3::zeros());
             let velocity = if (0.0..=8.0).contains(&t) { Vector3::y() * 0.2 } else { Vector3::zeros() };
-            let aim = Some(place + Vector3::x());
-            ReferenceState { velocity, aim, nozzle_distance: 0.1, flow: 1e-6, ..rest }
+            ControlReference { velocity, ..rest }
         }
     }
 
