@@ -26,7 +26,7 @@ mod vehicle;
 pub use airframe::{Airframe, Command, GRAVITY};
 pub use controller::{CascadedController, Controller, ControllerSettings};
 pub use estimator::{Estimate, Estimator, ObserverSettings};
-pub use faults::{Clog, Faults, Gust};
+pub use faults::{Clog, Faults, Gust, Mislocalised};
 pub use hose::{Catenary, HoseModel};
 pub use interlock::{Interlock, InterlockInput, InterlockState};
 pub use log::FlightLog;
@@ -145,7 +145,10 @@ pub fn fly_localised(
             }
             if step > first {
                 // A source whose poses are lost goes on all the same, so that a fault changes nothing before it.
-                let pose = localised(localisation, time, &vehicle)?.filter(|_| !settings.faults.pose_lost(time));
+                let mut pose = localised(localisation, time, &vehicle)?.filter(|_| !settings.faults.pose_lost(time));
+                if let Some(pose) = &mut pose {
+                    pose.world_from_body.translation.vector += settings.faults.shift(time);
+                }
                 if let Some(pose) = &pose {
                     controller.reported(time, pose);
                     estimator.update(&pose.world_from_body, CONTROL_STEP);

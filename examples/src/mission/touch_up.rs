@@ -102,7 +102,8 @@ fn figures(film: &Film, told: &[Option<FilmEstimate>], missing: f64) -> TouchUpF
 
 #[cfg(test)]
 mod tests {
-    use paint_sim::flight::{Clog, Faults};
+    use nalgebra::Vector3;
+    use paint_sim::flight::{Clog, Faults, Mislocalised};
 
     use super::super::run::Mission;
     use super::super::settings::MissionSettings;
@@ -111,41 +112,65 @@ mod tests {
     use crate::region::Scene;
     use crate::world::{CENTRE, rock_wall};
 
-    /// A rough wall of 1.6 m by 0.8 m with a gradient, flown with a nozzle that is clogged in its second half, or is not.
-    fn flown(clogged: Option<Clog>, look: bool) -> Mission {
+    /// A rough wall of 1.6 m by 0.8 m with a gradient, flown with faults.
+    fn flown(faults: Faults, look: bool) -> Mission {
         let mut mesh = rock_wall(1);
         for [x, y, z] in &mut mesh.positions {
             (*x, *y, *z) = (0.35 * *x, 0.35 * *y, (CENTRE + 0.35 * (f64::from(*z) - CENTRE)) as f32);
         }
-        let faults = Faults { clogged, ..Faults::default() };
         let settings = MissionSettings { look, faults, ..MissionSettings::default() };
         PaintingTask::new("wall", &Scene::whole(mesh), &Design::Gradient, settings).and_then(Mission::run).unwrap()
     }
 
-    /// Half of the difference in colour where the nozzle was clogged is the goal. The error of the film is that of motion capture's poses, which
-    /// shift spots, and of roughness below a texel; the tenth that is wanted holds on smoother walls (tests of `paint-sim`).
-    #[test]
-    fn what_a_clogged_nozzle_has_left_out_is_seen_and_painted() {
-        let sound = flown(None, true);
-        let duration: f64 = sound.flights[0].plan.trajectory.duration();
-        let clog = Clog { from: 0.4 * duration, until: 0.4 * duration + 60.0, flow: 0.6 };
-        let [damaged, repaired] = [false, true].map(|look| flown(Some(clog), look));
-        let looked = repaired.looked.unwrap();
-        let [whole, left, again] = [&sound, &damaged, &repaired].map(Mission::painted_depth);
-        let (before, after) = (damaged.colour_difference(), repaired.colour_difference());
+    /// Texels where a quarter of what should be there is missing, and the mean of differences in colour there.
+    fn where_missing(whole: &Image, left: &Image, differences: [&[Option<f64>]; 2]) -> (u32, [f64; 2]) {
         let (mut sums, mut count) = ([0.0; 2], 0);
-        for k in 0..whole.data().len() {
-            // Where a quarter of what should be there is missing.
-            if let (Some(before), Some(after)) = (before[k], after[k])
-                && whole.data()[k] > 0.2
-                && left.data()[k] < 0.75 * whole.data()[k]
+        let depths = whole.data().iter().zip(left.data());
+        for ((whole, left), (before, after)) in depths.zip(differences[0].iter().zip(differences[1])) {
+            if let (Some(before), Some(after)) = (before, after)
+                && *whole > 0.2
+                && *left < 0.75 * whole
             {
                 count += 1;
                 sums[0] += before;
                 sums[1] += after;
             }
         }
-        let [before, after] = sums.map(|sum| sum / f64::from(count));
+        (count, sums.map(|sum| sum / f64::from(count)))
+    }
+
+    /// Five centimetres too high for a quarter of the flight, which nobody knows at the time.
+    ///
+    /// `cargo test --release -p paintcopter --all-features --lib -- --ignored --nocapture a_band_that_was_painted`
+    #[test]
+    #[ignore = "three missions"]
+    fn a_band_that_was_painted_beside_its_place_is_seen_and_painted() {
+        let sound = flown(Faults::default(), false);
+        let duration: f64 = sound.flights[0].plan.trajectory.duration();
+        let shift = Vector3::new(0.0, 0.0, -0.05);
+        let wrong = Mislocalised { from: 0.4 * duration, until: 0.65 * duration, shift };
+        let faults = Faults { mislocalised: Some(wrong), ..Faults::default() };
+        let [damaged, repaired] = [false, true].map(|look| flown(faults, look));
+        let [whole, left] = [&sound, &damaged].map(Mission::painted_depth);
+        let (before, after) = (damaged.colour_difference(), repaired.colour_difference());
+        let (count, [before, after]) = where_missing(&whole, &left, [&before, &after]);
+        println!("{count} texels: CIEDE2000 {before:.2}, {after:.2}; {:?}", repaired.looked);
+        assert!(count > 100 && after < 0.5 * before, "{count} {before} {after}");
+    }
+
+    /// Half of the difference in colour where the nozzle was clogged is the goal. The error of the film is that of motion capture's poses, which
+    /// shift spots, and of roughness below a texel; the tenth that is wanted holds on smoother walls (tests of `paint-sim`).
+    #[test]
+    fn what_a_clogged_nozzle_has_left_out_is_seen_and_painted() {
+        let sound = flown(Faults::default(), true);
+        let duration: f64 = sound.flights[0].plan.trajectory.duration();
+        let clog = Clog { from: 0.4 * duration, until: 0.4 * duration + 60.0, flow: 0.6 };
+        let faults = Faults { clogged: Some(clog), ..Faults::default() };
+        let [damaged, repaired] = [false, true].map(|look| flown(faults, look));
+        let looked = repaired.looked.unwrap();
+        let [whole, left, again] = [&sound, &damaged, &repaired].map(Mission::painted_depth);
+        let (before, after) = (damaged.colour_difference(), repaired.colour_difference());
+        let (count, [before, after]) = where_missing(&whole, &left, [&before, &after]);
         println!("{count} texels: CIEDE2000 {before:.2}, {after:.2}; {looked:?}; sound {:?}", sound.looked);
         assert!(count > 500 && after < 0.5 * before, "{count} {before} {after}");
         assert!(looked.film_error < 0.16 && looked.film_seen > 0.9, "{looked:?}");

@@ -16,6 +16,8 @@ pub struct Faults {
     pub gust: Option<Gust>,
     /// The nozzle gives less than it is asked for.
     pub clogged: Option<Clog>,
+    /// The poses are off, and nobody knows.
+    pub mislocalised: Option<Mislocalised>,
 }
 
 /// A nozzle that is partly clogged for a while.
@@ -28,6 +30,18 @@ pub struct Clog {
     pub until: f64,
     /// Share of the flow that comes out, 0 to 1.
     pub flow: f64,
+}
+
+/// A localisation that errs for a while and believes itself.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+pub struct Mislocalised {
+    /// Since when, s.
+    pub from: f64,
+    /// Until when, s.
+    pub until: f64,
+    /// What is added to every position, m.
+    pub shift: Vector3<f64>,
 }
 
 /// A gust that sets in at once and stays.
@@ -51,6 +65,13 @@ impl Faults {
             check_not_negative("faults.clogged.until", until)?;
             check_range("faults.clogged.flow", flow, 0.0, 1.0, "between 0 and 1")?;
         }
+        if let Some(Mislocalised { from, until, shift }) = self.mislocalised {
+            check_not_negative("faults.mislocalised.from", from)?;
+            check_not_negative("faults.mislocalised.until", until)?;
+            for off in &shift {
+                check_range("faults.mislocalised.shift", *off, -10.0, 10.0, "within 10 m")?;
+            }
+        }
         // Each by itself: the largest of several numbers hides one that is not a number.
         self.gust.map_or(Ok(()), |gust| {
             gust.velocity
@@ -72,6 +93,12 @@ impl Faults {
     /// Share of the flow that comes out at a time.
     pub(super) fn flow_share(&self, time: f64) -> f64 {
         self.clogged.filter(|clog| (clog.from..clog.until).contains(&time)).map_or(1.0, |clog| clog.flow)
+    }
+
+    /// What is added to the position that is reported at a time, m.
+    pub(super) fn shift(&self, time: f64) -> Vector3<f64> {
+        let wrong = self.mislocalised.filter(|wrong| (wrong.from..wrong.until).contains(&time));
+        wrong.map_or_else(Vector3::zeros, |wrong| wrong.shift)
     }
 
     /// What is added to the wind at a time, m/s.
