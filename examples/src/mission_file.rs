@@ -3,8 +3,11 @@
 mod paints;
 mod picture;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use nalgebra::Vector3;
+use paint_sim::TriangleSurface;
 use serde::{Deserialize, Serialize};
 
 use crate::appearance::{Appearance, UNIT_THICKNESS};
@@ -12,8 +15,9 @@ use crate::design::{Design, DesignError, MATERIALS, Picture};
 use crate::mesh_frame::{MeshScale, Subject, scale_of, up_of};
 use crate::mesh_io::{MeshError, TriangleMesh, read_mesh};
 use crate::mesh_placement::{MeshPlacement, PlacementError, UpAxis, place_mesh, place_scene};
-use crate::mission::{MissionError, MissionSettings, PaintingTask};
+use crate::mission::{LocalisationChoice, MissionError, MissionSettings, PaintingTask};
 use crate::mission_paint::{MissionPaint, file_of_design};
+use crate::onboard::{LocalisationError, surveyed_map};
 use crate::palette_choice::{PaletteChoice, PaletteError};
 use crate::region::{Region, RegionError, Scene};
 use crate::relative_path::from_folder;
@@ -23,6 +27,8 @@ use crate::wall::Wall;
 use crate::world::rock_wall;
 use crate::{run_folder, whole_file};
 
+/// The map of a surface that the robot has not scanned and shall find itself on.
+const SURVEY_FILE: &str = "surveyed.tsdf";
 /// Thickness of an even coat, metres: what paint is thicker does not show.
 const COAT: std::ops::RangeInclusive<f64> = 0.999e-6..=60.001e-6;
 
@@ -255,7 +261,9 @@ impl MissionFile {
     fn place(&self, folder: &Path) -> Result<Place, MissionFileError> {
         let (name, scene) = self.read_surface()?;
         if !self.scan {
-            return Ok(Place { name, scene, truth: None, map: None });
+            let finds_itself = self.settings.localisation == LocalisationChoice::Slam;
+            let map = finds_itself.then(|| self.survey(&scene, folder)).transpose()?;
+            return Ok(Place { name, scene, truth: None, map });
         }
         if self.region.is_some() {
             return Err(MissionFileError::RegionBeforeScan);
@@ -265,6 +273,19 @@ impl MissionFile {
         save_scan_flight(&scan_flight, folder).map_err(|source| self.in_mesh(source))?;
         let map = folder.join(scan_flight::MAP_FILE);
         Ok(Place { name, scene: Scene::whole(scan_flight.mesh), truth: Some(scene.canvas), map: Some(map) })
+    }
+
+    /// Leaves a map of the surface as it is given, in which the robot finds itself by shape.
+    fn survey(&self, scene: &Scene, folder: &Path) -> Result<PathBuf, MissionFileError> {
+        let file = folder.join(SURVEY_FILE);
+        let TriangleMesh { positions, faces, .. } = &scene.canvas;
+        let map = TriangleSurface::new(positions, faces)
+            .map_err(LocalisationError::from)
+            // Surfaces are turned so that they face the robot, which is at smaller x.
+            .and_then(|surface| surveyed_map(&surface, &-Vector3::x(), self.settings.threads))
+            .and_then(|map| Ok(map.save(&file, None, BTreeMap::new())?));
+        map.map_err(|error| self.in_mesh(MissionError::Localisation(error)))?;
+        Ok(file)
     }
 
     /// Reads the design and decides.

@@ -4,8 +4,11 @@ mod approach;
 mod localisation;
 mod localised_flight;
 mod piece;
+mod surveyed_map;
+mod sway;
 
 pub use approach::Approach;
 pub use localisation::{LocalisationError, MapUpdate, OnboardLocalisation, read_map};
-pub use localised_flight::{LocalisationFigures, LocalisedFlight};
+pub use localised_flight::{Bridging, LocalisationFigures, LocalisedFlight};
 pub use piece::Piece;
+pub use surveyed_map::surveyed_map;

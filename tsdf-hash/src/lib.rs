@@ -77,6 +77,7 @@ pub mod distance_field;
 mod error;
 mod file;
 mod frame_clock;
+pub mod global_registration;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 mod hashing;

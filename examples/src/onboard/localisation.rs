@@ -3,7 +3,8 @@
 
 use std::path::Path;
 
-use nalgebra::{Isometry3, Matrix6};
+use nalgebra::{Isometry3, Matrix6, Vector3};
+use tsdf_hash::global_registration::{GlobalRegistration, GlobalRegistrationSettings};
 use tsdf_hash::slam::{Event, FrameMemory, OdometryError, PoseSource, Slam, SlamSettings, SlamState};
 use tsdf_hash::storage::MapFile;
 use tsdf_hash::tracking::TrackingOutcome;
@@ -25,6 +26,9 @@ pub enum LocalisationError {
     /// The map refused.
     #[error("map: {0}")]
     Map(#[from] tsdf_hash::Error),
+    /// There is no way along the surface that was surveyed.
+    #[error("surveyed surface: {0}")]
+    Surveyed(#[from] crate::scan_flight::ScanFlightError),
     /// The simulated sensors refused.
     #[error("sensors: {0}")]
     Sensors(#[from] paint_sim::Error),
@@ -60,10 +64,12 @@ pub struct OnboardLocalisation {
     aided: MapAidedVio,
     slam: Slam,
     body_from_camera: Isometry3<f64>,
+    /// Sum of what the accelerometer has measured before the robot was found: up, as it stands or sways.
+    up_in_body: Vector3<f64>,
 }
 
 impl OnboardLocalisation {
-    /// In a stored map, which stays as it is; tracking takes one thread. Where the camera is comes from `camera`.
+    /// In a stored map, which stays as it is: the robot is found in it by its keyframes, and by its shape. Tracking takes one thread. Where the camera is comes from `camera`.
     ///
     /// # Errors
     /// Settings that odometry or map refuse.
@@ -82,15 +88,16 @@ impl OnboardLocalisation {
             relocalise_first: true,
             ..SlamSettings::default()
         };
-        Ok(Self {
-            aided: MapAidedVio::new(camera, odometry, settings)?,
-            slam: Slam::with_source(slam, map.without_trajectory(), FrameMemory::new())?,
-            body_from_camera,
-        })
+        let shape = map.map.mesh();
+        let surface = GlobalRegistration::new(&shape.positions, &shape.faces, GlobalRegistrationSettings::default())?;
+        let mut slam = Slam::with_source(slam, map.without_trajectory(), FrameMemory::new())?;
+        slam.set_surface(surface);
+        let aided = MapAidedVio::new(camera, odometry, settings)?;
+        Ok(Self { aided, slam, body_from_camera, up_in_body: Vector3::zeros() })
     }
 
-    /// A depth image of a robot that stands still and does not know where. Once it has been found, the odometry starts there; the pose of the
-    /// body.
+    /// A depth image of a robot that does not know where it is. Once it has been found and stands still, the odometry starts there; the pose of
+    /// the body. Where no keyframe shows it, it must sway to be found.
     ///
     /// # Errors
     /// What map and odometry refuse.
@@ -99,9 +106,11 @@ impl OnboardLocalisation {
         stamp: Stamp,
         depth: &DepthView,
         colour: &ColourView,
+        stands: bool,
     ) -> Result<Option<Isometry3<f64>>, LocalisationError> {
+        self.slam.set_vertical(self.body_from_camera.inverse_transform_vector(&self.up_in_body));
         let outcome = self.slam.frame(seconds(stamp), depth, Some(colour), None)?;
-        let found = outcome.tracking.filter(|_| outcome.world_from_camera.is_some());
+        let found = outcome.tracking.filter(|_| stands && outcome.world_from_camera.is_some());
         let Some(measured) = found.and_then(|tracking| measurement(stamp, &tracking)) else { return Ok(None) };
         Ok(Some(self.aided.start(&measured)?))
     }
@@ -111,7 +120,18 @@ impl OnboardLocalisation {
     /// # Errors
     /// What the odometry refuses.
     pub fn imu(&mut self, sample: &Imu) -> Result<(), LocalisationError> {
+        if self.aided.unified().output().is_none() {
+            self.up_in_body += sample.accel;
+        }
         Ok(self.aided.imu(sample)?)
+    }
+
+    /// A sample of the vehicle's own inertial sensor, where the settings have one.
+    ///
+    /// # Errors
+    /// What the odometry refuses.
+    pub fn second_imu(&mut self, sample: &Imu) -> Result<(), LocalisationError> {
+        Ok(self.aided.second_imu(sample)?)
     }
 
     /// An image; how late it may come says [`UnifiedSettings::lag_s`](vio_ekf::fusion::UnifiedSettings::lag_s).

@@ -4,14 +4,16 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use cpu_time::ThreadTime;
+use nalgebra::{Isometry3, UnitQuaternion};
 use paint_sim::Error;
-use paint_sim::flight::multirotor::{Imu, ImuSettings};
+use paint_sim::flight::multirotor::{Imu, ImuReading, ImuSettings};
 use paint_sim::flight::{FlightSample, GRAVITY, LocalisedPose, PoseSource, Vehicle};
 use tsdf_hash::slam::SlamState;
 use vio_ekf::Stamp;
-use vio_ekf::fusion::{AidedPose, MapAidedSettings, UnifiedSettings};
+use vio_ekf::fusion::{AidedPose, ImuPairSettings, MapAidedSettings, UnifiedSettings};
 
 use super::localisation::{LocalisationError, OnboardLocalisation};
+use super::sway::{SWAY_MS, in_its_place, sway};
 use crate::simulated_sensors::{
     FRAMES_PER_SECOND, FaultInterval, PaintedFront, SensorFault, SimulatedCamera, SimulatedImage,
 };
@@ -23,8 +25,10 @@ const DEPTH_MS: i64 = 100;
 /// Milliseconds from an image, and from a depth image, to when what was made of it is known.
 const IMAGE_LATENCY_MS: i64 = 20;
 const DEPTH_LATENCY_MS: i64 = 60;
-/// The robot stands and looks for its place for so long at most.
-const SEARCH_MS: i64 = 3000;
+/// The vehicle's own sensor has noise of its own.
+const OF_VEHICLE: u64 = 0x1_0000;
+/// A vehicle's sensor that is later than this, s, is left out.
+const SECOND_IMU_TIMEOUT: f64 = 0.01;
 
 /// What the localisation was worth.
 #[derive(Debug, Clone, Copy, Default)]
@@ -66,14 +70,31 @@ impl LocalisationFigures {
     }
 }
 
+/// What the pose between two images is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Bridging {
+    /// The odometry's last two poses, at the times of their images, moved on.
+    Odometry,
+    /// The inertial sensor of the camera.
+    CameraImu,
+    /// That and the vehicle's own.
+    #[default]
+    BothImus,
+}
+
 /// Sensors before a surface, the programs on board, and what they say.
 pub struct LocalisedFlight<'a> {
     camera: SimulatedCamera<'a>,
     imu: Imu,
+    vehicle_imu: Imu,
+    bridging: Bridging,
     onboard: OnboardLocalisation,
     /// Images on their way through the programs.
     images: VecDeque<Arriving<SimulatedImage>>,
     depths: VecDeque<Arriving<(SimulatedImage, Option<AidedPose>)>>,
+    /// What the odometry said of the moments of images, and the last two of those that are known.
+    said: VecDeque<Arriving<Option<AidedPose>>>,
+    known: [Option<(i64, AidedPose)>; 2],
     /// From milliseconds of the reference to those of the sensors' clock; `None` before the robot has found itself.
     offset: Option<i64>,
     captured: usize,
@@ -84,15 +105,33 @@ pub struct LocalisedFlight<'a> {
 impl<'a> LocalisedFlight<'a> {
     /// In a stored map of the surface.
     pub fn new(camera: SimulatedCamera<'a>, map: SlamState, seed: u64) -> Result<Self, LocalisationError> {
+        Self::bridged(camera, map, seed, Bridging::default())
+    }
+
+    /// The same with poses between images as it is said.
+    pub fn bridged(
+        camera: SimulatedCamera<'a>,
+        map: SlamState,
+        seed: u64,
+        bridging: Bridging,
+    ) -> Result<Self, LocalisationError> {
         let odometry = vio_ekf::Settings { gravity: GRAVITY, ..vio_ekf::Settings::default() };
-        let unified =
-            UnifiedSettings { lag_s: 1e-3 * (DEPTH_LATENCY_MS + 2 * INERTIAL_MS) as f64, ..UnifiedSettings::default() };
+        let pair = ImuPairSettings { timeout_s: SECOND_IMU_TIMEOUT, ..ImuPairSettings::default() };
+        let unified = UnifiedSettings {
+            lag_s: 1e-3 * (DEPTH_LATENCY_MS + 2 * INERTIAL_MS) as f64,
+            imu_pair: (bridging == Bridging::BothImus).then_some(pair),
+            ..UnifiedSettings::default()
+        };
         let settings =
             MapAidedSettings { unified, pose_interval_s: 1e-3 * DEPTH_MS as f64, ..MapAidedSettings::default() };
         Ok(Self {
             onboard: OnboardLocalisation::new(map, camera.camera, odometry, settings)?,
             camera,
             imu: Imu::new(ImuSettings::default(), seed)?,
+            vehicle_imu: Imu::new(ImuSettings::default(), seed.wrapping_add(OF_VEHICLE))?,
+            bridging,
+            said: VecDeque::new(),
+            known: [None; 2],
             images: VecDeque::new(),
             depths: VecDeque::new(),
             offset: None,
@@ -128,36 +167,75 @@ impl<'a> LocalisedFlight<'a> {
         Ok(self.camera.capture(self.captured, &world_from_camera)?)
     }
 
-    /// Looks for its place before take-off, at the pose where it stands. Returns the milliseconds that takes.
+    /// Looks for its place before the flight, at the pose where it stands and then swaying about it. Returns the milliseconds that takes.
     fn search(&mut self, truth: &Vehicle) -> Result<i64, LocalisationError> {
-        for ms in (1..=SEARCH_MS).filter(|ms| ms % INERTIAL_MS == 0) {
-            self.sense_motion(ms, truth)?;
+        let mut found = false;
+        for ms in 1..=SWAY_MS {
+            let (truth, stands) = sway(truth, ms);
+            let truth = &truth;
+            if found {
+                self.sense(ms, truth)?;
+                continue;
+            }
+            if ms % INERTIAL_MS == 0 {
+                self.sense_motion(ms, truth)?;
+            }
             if ms % DEPTH_MS != 0 {
                 continue;
             }
             let image = self.capture(truth)?;
             let views = self.camera.views(&image);
             let cpu = ThreadTime::now();
-            let found = self.onboard.relocalise(stamp(ms), &views.depth(), &views.colour());
+            let pose = self.onboard.relocalise(stamp(ms), &views.depth(), &views.colour(), stands);
             self.figures.cpu += cpu.elapsed();
-            if let Some(world_from_body) = found? {
+            if let Some(world_from_body) = pose? {
                 self.figures.relocalised_after_s = 1e-3 * ms as f64;
                 let error = world_from_body.translation.vector - truth.position.coords;
                 self.figures.relocalisation_error_m = error.norm();
-                return Ok(ms);
+                if in_its_place(ms) {
+                    return Ok(ms);
+                }
+                found = true;
             }
         }
-        Err(LocalisationError::NotHere { seconds: 1e-3 * SEARCH_MS as f64 })
+        if found { Ok(SWAY_MS) } else { Err(LocalisationError::NotHere { seconds: 1e-3 * SWAY_MS as f64 }) }
     }
 
     fn sense_motion(&mut self, ms: i64, truth: &Vehicle) -> Result<(), LocalisationError> {
         let reading = self.imu.measure(&truth.velocity, &truth.rotation(), 1e-3 * INERTIAL_MS as f64);
-        let sample = vio_ekf::Imu { stamp: stamp(ms), gyro: reading.angular_velocity, accel: reading.specific_force };
-        let Some(sample) = self.fault(ms).map_or(Some(sample), |fault| fault.inertial(sample)) else { return Ok(()) };
+        let of_vehicle = self.vehicle_imu.measure(&truth.velocity, &truth.rotation(), 1e-3 * INERTIAL_MS as f64);
+        let sample = |reading: ImuReading| vio_ekf::Imu {
+            stamp: stamp(ms),
+            gyro: reading.angular_velocity,
+            accel: reading.specific_force,
+        };
+        // Faults are those of the camera's.
+        let first = self.fault(ms).map_or(Some(sample(reading)), |fault| fault.inertial(sample(reading)));
         let cpu = ThreadTime::now();
-        let done = self.onboard.imu(&sample);
+        let mut done = first.map_or(Ok(()), |first| self.onboard.imu(&first));
+        if self.bridging == Bridging::BothImus {
+            done = done.and_then(|()| self.onboard.second_imu(&sample(of_vehicle)));
+        }
         self.figures.cpu += cpu.elapsed();
         done
+    }
+
+    /// The last two poses of the odometry, moved on to now.
+    fn moved_on(&mut self, ms: i64) -> Option<AidedPose> {
+        while let Some(Arriving { taken, what, .. }) = self.said.pop_front_if(|said| said.at <= ms) {
+            self.known = [self.known[1], what.map(|pose| (taken, pose))];
+        }
+        let [before, last] = self.known;
+        let (at, last) = last?;
+        let Some((first, before)) = before.filter(|(_, before)| before.source == last.source) else {
+            return Some(last);
+        };
+        let share = (ms - at) as f64 / (at - first) as f64;
+        let [from, to] = [before.world_from_body, last.world_from_body];
+        let shift = (to.translation.vector - from.translation.vector) * share;
+        let turn = UnitQuaternion::from_scaled_axis((to.rotation * from.rotation.inverse()).scaled_axis() * share);
+        let world_from_body = Isometry3::from_parts((to.translation.vector + shift).into(), turn * to.rotation);
+        Some(AidedPose { world_from_body, ..last })
     }
 
     /// What the sensors give at a millisecond of their clock, and what the programs are through with.
@@ -168,6 +246,10 @@ impl<'a> LocalisedFlight<'a> {
         if ms % IMAGE_MS == 0 {
             let mut image = self.capture(truth)?;
             let fault = self.fault(ms);
+            if self.bridging == Bridging::Odometry {
+                let what = self.onboard.pose(stamp(ms));
+                self.said.push_back(Arriving { at: ms + IMAGE_LATENCY_MS, taken: ms, what });
+            }
             if fault == Some(SensorFault::CameraBlack) {
                 image.darken();
             }
@@ -209,8 +291,12 @@ impl PoseSource for LocalisedFlight<'_> {
             let found = self.search(truth).map_err(|why| Error::Localisation { time, why: why.to_string() })?;
             self.offset = Some(found - milliseconds(time));
         }
-        let now = stamp(milliseconds(time) + self.offset.unwrap_or_default());
-        let Some(AidedPose { world_from_body, trusted, .. }) = self.onboard.pose(now) else { return Ok(None) };
+        let now = milliseconds(time) + self.offset.unwrap_or_default();
+        let pose = match self.bridging {
+            Bridging::Odometry => self.moved_on(now).or_else(|| self.onboard.pose(stamp(now))),
+            Bridging::CameraImu | Bridging::BothImus => self.onboard.pose(stamp(now)),
+        };
+        let Some(AidedPose { world_from_body, trusted, .. }) = pose else { return Ok(None) };
         self.figures.steps += 1;
         self.figures.squares += (world_from_body.translation.vector - truth.position.coords).norm_squared();
         Ok(Some(LocalisedPose { world_from_body, trusted }))

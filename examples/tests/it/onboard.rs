@@ -1,18 +1,21 @@
 //! A robot that knows of its place only what its own sensors tell: it finds itself in the map of its scan, flies and paints by it.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use paint_sim::flight::{
-    CascadedController, ControllerSettings, FlightLog, FlightSettings, IdealPanTilt, Interlock, Reference,
-    ReferenceState, Valve, fly_localised,
+    CascadedController, ControllerSettings, FlightLog, FlightSettings, IdealPanTilt, Interlock, PoseSource, Reference,
+    ReferenceState, Valve, Vehicle, fly_localised,
 };
 use paint_sim::paint::PaintName;
 use paint_sim::{Error, SprayModel, Surface, TriangleSurface};
 use paintcopter::appearance::UNIT_THICKNESS;
 use paintcopter::mesh_io::TriangleMesh;
-use paintcopter::onboard::{Approach, LocalisationFigures, LocalisedFlight, OnboardLocalisation, read_map};
+use paintcopter::onboard::{
+    Approach, Bridging, LocalisationFigures, LocalisedFlight, OnboardLocalisation, read_map, surveyed_map,
+};
 use paintcopter::scan_flight::{MAP_FILE, ScanFlight, save};
 use paintcopter::simulated_sensors::{FaultInterval, PaintedFront, SensorFault, SimulatedCamera, SimulatedImage};
 use paintcopter::world::{CENTRE, rock_wall};
@@ -90,15 +93,26 @@ fn fly_again(
     fault: Option<(SensorFault, i64)>,
     paint: PaintedFront,
 ) -> Result<(FlightLog, LocalisationFigures, PaintedFront), Error> {
+    fly_bridged(surface, fault, paint, Bridging::default(), 3)
+}
+
+/// The same with a choice of inertial sensors and the wind of a seed.
+fn fly_bridged(
+    surface: &TriangleSurface,
+    fault: Option<(SensorFault, i64)>,
+    paint: PaintedFront,
+    bridging: Bridging,
+    seed: u64,
+) -> Result<(FlightLog, LocalisationFigures, PaintedFront), Error> {
     // The same stone as in the scan, which has seed 1.
     let camera = SimulatedCamera::new(surface, Vector3::x(), 1, 1).before(paint);
-    let mut onboard = LocalisedFlight::new(camera, read_map(map()).unwrap(), 7).unwrap();
+    let mut onboard = LocalisedFlight::bridged(camera, read_map(map()).unwrap(), seed + 4, bridging).unwrap();
     if let Some((fault, duration)) = fault {
         let from = BEFORE + 1500;
         onboard = onboard.with_fault(FaultInterval { fault, when: from..from + duration });
     }
     let valve = Valve { interlock: Some(Interlock { miss: SPOT, ..Interlock::default() }), ..Valve::default() };
-    let settings = FlightSettings { valve, settle: 1.0, seed: 3, ..FlightSettings::default() };
+    let settings = FlightSettings { valve, settle: 1.0, seed, ..FlightSettings::default() };
     let mut controller = CascadedController::new(settings.airframe, ControllerSettings::default());
     let mut gun = IdealPanTilt::new(Point3::new(0.2, 0.0, 0.0), 0.3, [0.8; 2]).unwrap();
     let stroke = Stroke(surface);
@@ -196,7 +210,7 @@ fn stand(camera: &mut SimulatedCamera, map: SlamState, body: &Isometry3<f64>) ->
         onboard.imu(&Imu { stamp, gyro: Vector3::zeros(), accel }).unwrap();
         let image = camera.capture(tenth as usize, &(body * camera.camera.body_from_camera)).unwrap();
         let views = camera.views(&image);
-        if let Some(found) = onboard.relocalise(stamp, &views.depth(), &views.colour()).unwrap() {
+        if let Some(found) = onboard.relocalise(stamp, &views.depth(), &views.colour(), true).unwrap() {
             return Found::At((found.translation.vector - body.translation.vector).norm(), 0.1 * tenth as f64);
         }
     }
@@ -250,6 +264,51 @@ fn found_from_random_places() {
     assert_eq!(wrong, 0);
 }
 
+/// The same without keyframes, against the mesh of the wall alone: the robot sways where it does not find itself at once.
+///
+/// `cargo test --release -p paintcopter --all-features --test it -- --ignored --nocapture found_by_the_mesh_alone`
+#[test]
+#[ignore = "some minutes; reprints the table of the chapter"]
+fn found_by_the_mesh_alone() {
+    let mesh = rock_wall(1);
+    let surface = TriangleSurface::new(&mesh.positions, &mesh.faces).unwrap();
+    let map = std::env::temp_dir().join(format!("paintcopter-surveyed-{}.tsdf", std::process::id()));
+    surveyed_map(&surface, &-Vector3::x(), 2).unwrap().save(&map, None, BTreeMap::new()).unwrap();
+    let places = places(4.5, 20);
+    let mut false_ = 0;
+    for (wall, stone) in [(1, 1), (1, 2), (2, 1), (3, 3), (4, 4)] {
+        let mesh = rock_wall(wall);
+        let surface = TriangleSurface::new(&mesh.positions, &mesh.faces).unwrap();
+        let (mut right, mut slowest, mut worst) = (0, 0.0_f64, 0.0_f64);
+        // Elsewhere every fourth.
+        let every = if (wall, stone) == (1, 1) { 1 } else { 4 };
+        for (k, body) in places.iter().enumerate().step_by(every) {
+            let camera = SimulatedCamera::new(&surface, Vector3::x(), stone, 2);
+            let mut flight = LocalisedFlight::new(camera, read_map(&map).unwrap(), k as u64).unwrap();
+            let (roll, pitch, yaw) = body.rotation.euler_angles();
+            let place = Point3::from(body.translation.vector);
+            let stood = Vehicle { attitude: [roll, pitch, yaw], ..Vehicle::at_rest(place, yaw) };
+            let found = flight.pose(0.0, &stood);
+            let figures = flight.figures();
+            let error = figures.relocalisation_error_m;
+            println!(
+                "wall {wall}, stone {stone}, place {k}: {} {:.1} s {error:.4} m, CPU {:.1} s",
+                found.is_ok(),
+                figures.relocalised_after_s,
+                figures.cpu.as_secs_f64()
+            );
+            if found.is_ok() {
+                right += usize::from(wall == 1 && error < 0.05);
+                false_ += usize::from(wall != 1 || error >= 0.05);
+                (slowest, worst) = (slowest.max(figures.relocalised_after_s), worst.max(error));
+            }
+        }
+        println!("wall {wall}, stone {stone}: {right} right, {slowest:.1} s, {worst:.4} m; {false_} false so far");
+        assert!(wall != 1 || right >= 16 / every, "{right} right");
+    }
+    assert_eq!(false_, 0);
+}
+
 /// `cargo test --release -p paintcopter --all-features --test it -- --ignored --nocapture faults_of_sensors`
 #[test]
 #[ignore = "some minutes; reprints the table of the chapter"]
@@ -277,4 +336,26 @@ fn faults_of_sensors() {
         }
     }
     assert_eq!(all, 0);
+}
+
+/// The hit error by the odometry's own poses, by those moved on with the camera's inertial sensor, and with the vehicle's as well.
+///
+/// `cargo test --release -p paintcopter --all-features --test it -- --ignored --nocapture fused_with_the_vehicles_sensor`
+#[test]
+#[ignore = "some minutes; reprints the table of the chapter"]
+fn fused_with_the_vehicles_sensor() {
+    let mesh = wall(1);
+    let surface = TriangleSurface::new(&mesh.positions, &mesh.faces).unwrap();
+    let mut together = [0.0_f64; 3];
+    for seed in 1..=5 {
+        let flown = [Bridging::Odometry, Bridging::CameraImu, Bridging::BothImus].map(|bridging| {
+            let (log, figures, _) = fly_bridged(&surface, None, bare(&surface), bridging, seed).unwrap();
+            (log.statistics().hit_error_rms, figures.position_error_rms_m(), log.statistics().held_samples)
+        });
+        println!("seed {seed}: {flown:?}");
+        together = [0, 1, 2].map(|k| together[k] + flown[k].0.powi(2));
+    }
+    let rms = together.map(|sum| (0.2 * sum).sqrt());
+    println!("hit error: {:.5} m by odometry alone, {:.5} m by one sensor, {:.5} m by both", rms[0], rms[1], rms[2]);
+    assert!(rms[2] <= 0.9 * rms[0], "{rms:?}");
 }

@@ -158,10 +158,9 @@ impl FlightSettings {
     pub(crate) fn check(&self) -> Result<(), Error> {
         self.airframe.check()?;
         self.model().check()?;
-        for (what, value) in [
-            ("wind.gust_time", self.wind.gust_time),
-            ("localisation.drift_time", self.localisation.drift_time),
-        ] {
+        for (what, value) in
+            [("wind.gust_time", self.wind.gust_time), ("localisation.drift_time", self.localisation.drift_time)]
+        {
             check_positive(what, value)?;
         }
         for (what, value) in [

@@ -99,6 +99,11 @@ impl Frontend {
         self.motion.start(pose, None);
     }
 
+    /// What looks for a lost camera.
+    pub fn relocaliser(&mut self) -> &mut Relocaliser {
+        &mut self.relocaliser
+    }
+
     /// The gyroscope, to be given samples; between frames the camera is taken to turn as it says.
     pub fn gyroscope(&mut self) -> &mut Gyroscope {
         &mut self.motion.gyroscope

@@ -8,6 +8,7 @@ use nalgebra::{Isometry3, Vector3};
 
 use crate::device_map::DeviceMap;
 use crate::error::Error;
+use crate::global_registration::GlobalRegistration;
 use crate::images::{ColourView, DepthView, check_pose};
 use crate::map::Map;
 use crate::mesh::incremental::IncrementalMesher;
@@ -379,6 +380,23 @@ impl<S: FrameSource> Slam<S> {
     /// As [`Gyroscope::add`](crate::slam::Gyroscope::add).
     pub fn angular_rate(&mut self, stamp: f64, rate_in_camera: Vector3<f64>) -> Result<(), Error> {
         self.frontend.as_mut().map_or(Ok(()), |frontend| frontend.gyroscope().add(stamp, rate_in_camera))
+    }
+
+    /// Looks for a lost camera by the shape of the map, too, where keyframes do not show it; see [`Relocaliser::set_surface`]. Where poses are
+    /// given, none is looked for.
+    ///
+    /// [`Relocaliser::set_surface`]: crate::tracking::Relocaliser::set_surface
+    pub fn set_surface(&mut self, surface: GlobalRegistration) {
+        if let Some(frontend) = &mut self.frontend {
+            frontend.relocaliser().set_surface(surface);
+        }
+    }
+
+    /// The vertical along the axes of the camera that takes the next frame, for that; of any length.
+    pub fn set_vertical(&mut self, up_in_camera: Vector3<f64>) {
+        if let Some(frontend) = &mut self.frontend {
+            frontend.relocaliser().set_vertical(up_in_camera);
+        }
     }
 
     /// Lets outcomes say how long tracking and fusion took, by a clock of the caller's: seconds since any moment.

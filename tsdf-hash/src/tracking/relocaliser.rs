@@ -1,9 +1,10 @@
 //! Finds a lost camera by a few frames (thesis Paper II, section 6.3).
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
 
 use crate::dense_map::DenseMap;
 use crate::error::Error;
+use crate::global_registration::{GlobalRegistration, LocalCloud};
 use crate::images::{ColourView, DepthView};
 use crate::keyframes::index::KeyframeIndex;
 use crate::map::Map;
@@ -25,6 +26,8 @@ const LONGEST: usize = 60;
 const SAME: [f64; 2] = [0.04, 0.04];
 /// Starts nearer to each other are one: radians, metres.
 const ONE_START: [f64; 2] = [0.05, 0.05];
+/// Views from different poses of which a cloud is made at most.
+const VIEWS: usize = 8;
 /// Without colour, a frame counts beside others that it was taken at least so far from: radians, metres (ours).
 const ANOTHER: [f64; 2] = [0.02, 0.02];
 
@@ -52,6 +55,10 @@ const ANOTHER: [f64; 2] = [0.02, 0.02];
 /// ```
 pub struct Relocaliser {
     tracker: Tracker,
+    /// The map's surface, to look for the camera by shape.
+    surface: Option<GlobalRegistration>,
+    /// The vertical along the axes of the camera.
+    up_in_camera: Option<Vector3<f64>>,
     reserve: Option<Reserve>,
     places: Vec<Place>,
 }
@@ -69,6 +76,10 @@ pub struct Relocalisation {
 struct Reserve {
     map: Map,
     poses: Vec<Isometry3<f64>>,
+    /// What was seen from poses apart from each other, and for how many of them it was looked for by shape.
+    cloud: LocalCloud,
+    views: Vec<Isometry3<f64>>,
+    searched: usize,
 }
 
 /// A place where the camera may be.
@@ -86,7 +97,19 @@ impl Relocaliser {
     /// # Errors
     /// [`Error::InvalidSetting`].
     pub fn new(settings: TrackingSettings) -> Result<Self, Error> {
-        Ok(Self { tracker: Tracker::new(settings)?, reserve: None, places: Vec::new() })
+        let tracker = Tracker::new(settings)?;
+        Ok(Self { tracker, surface: None, up_in_camera: None, reserve: None, places: Vec::new() })
+    }
+
+    /// Looks for the camera by shape, too, where keyframes do not show it: on the surface of the map, as soon as the vertical is known. The
+    /// camera must be moved a little meanwhile.
+    pub fn set_surface(&mut self, surface: GlobalRegistration) {
+        self.surface = Some(surface);
+    }
+
+    /// The vertical along the axes of the camera that takes the next frame, from an inertial sensor; of any length.
+    pub fn set_vertical(&mut self, up_in_camera: Vector3<f64>) {
+        self.up_in_camera = Some(up_in_camera);
     }
 
     /// Forgets the frames: the camera is no longer lost.
@@ -150,9 +173,13 @@ impl Relocaliser {
         }
         self.places.clear();
         let mut map = Map::new(Settings { memory: MemoryLimits::default(), ..*settings })?;
-        map.integrate(depth, colour, &Isometry3::identity())?;
-        self.reserve = Some(Reserve { map, poses: vec![Isometry3::identity()] });
-        Ok(Isometry3::identity())
+        let first = Isometry3::identity();
+        map.integrate(depth, colour, &first)?;
+        let spacing = self.surface.as_ref().map_or(1.0, |surface| surface.settings().spacing);
+        let mut cloud = LocalCloud::new(spacing);
+        cloud.add(depth, &first, settings.max_depth)?;
+        self.reserve = Some(Reserve { map, poses: vec![first], cloud, views: vec![first], searched: 0 });
+        Ok(first)
     }
 
     /// Asks the frame about each place: whether the old map is seen from there.
@@ -213,6 +240,31 @@ impl Relocaliser {
                 self.suspect(found, present);
             }
         }
+        if self.places.is_empty() { self.search_by_shape(map, depth, colour, present) } else { Ok(()) }
+    }
+
+    /// Looks for all that was seen on the surface, once for every view from another pose.
+    fn search_by_shape(
+        &mut self,
+        map: &mut dyn DenseMap,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        present: &Isometry3<f64>,
+    ) -> Result<(), Error> {
+        let Self { surface: Some(surface), up_in_camera: Some(up), reserve: Some(reserve), .. } = self else {
+            return Ok(());
+        };
+        if reserve.searched == reserve.views.len() {
+            return Ok(());
+        }
+        reserve.searched = reserve.views.len();
+        let found = surface.register(&reserve.cloud, &(present.rotation * *up));
+        for place in found {
+            let start = place.world_from_local * present;
+            if let Some(found) = self.tracker.settle(map, depth, colour, &start, FROM_NEAR)? {
+                self.suspect(found, present);
+            }
+        }
         Ok(())
     }
 
@@ -243,6 +295,10 @@ impl Reserve {
                 let pose = outcome.world_from_camera;
                 self.map.integrate(depth, colour, &pose)?;
                 self.poses.push(pose);
+                if self.views.len() < VIEWS && !self.views.iter().any(|other| within(other, &pose, ANOTHER)) {
+                    self.cloud.add(depth, &pose, self.map.settings().max_depth)?;
+                    self.views.push(pose);
+                }
                 return Ok(Some(pose));
             }
         }

@@ -13,6 +13,7 @@ mod distance_field;
 mod errors;
 mod eviction;
 mod examples;
+mod global_registration;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod holes;

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use nalgebra::{Isometry3, Matrix6, Vector3};
 
+use super::imu_pair::ImuPair;
 use super::inertial_check::InertialCheck;
 use super::map_pose::MapPose;
 use super::pose_measurement::PoseMeasurement;
@@ -19,7 +20,7 @@ use crate::stamp::Stamp;
 /// Settings of [`MapAidedVio`]. Ours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapAidedSettings {
-    /// The estimator; its frame of poses is the map.
+    /// The estimator; its frame of poses is the map. Two inertial sensors are joined before anything else is asked of them.
     pub unified: UnifiedSettings,
     /// Seconds from one pose in the map to the next; 0.1.
     pub pose_interval_s: f64,
@@ -89,6 +90,7 @@ const KEPT: f64 = 0.5;
 pub struct MapAidedVio {
     vio: UnifiedVio,
     settings: MapAidedSettings,
+    pair: Option<ImuPair>,
     imu: InertialCheck,
     /// The latest inertial samples, as far back as they can be believed.
     recent: VecDeque<Imu>,
@@ -108,9 +110,13 @@ impl MapAidedVio {
     /// # Errors
     /// As [`UnifiedVio::new`].
     pub fn new(camera: impl CameraModel + 'static, vio: Settings, settings: MapAidedSettings) -> Result<Self, Error> {
+        let pair = settings.unified.imu_pair.map(ImuPair::new).transpose()?;
+        let noise = pair.as_ref().map_or(settings.unified.imu, ImuPair::noise);
+        let unified = UnifiedSettings { imu: noise, imu_pair: None, ..settings.unified };
         Ok(Self {
-            vio: UnifiedVio::new(camera, vio, settings.unified)?,
+            vio: UnifiedVio::new(camera, vio, unified)?,
             settings,
+            pair,
             imu: InertialCheck::default(),
             recent: VecDeque::new(),
             gravity: vio.gravity,
@@ -144,6 +150,29 @@ impl MapAidedVio {
     /// # Errors
     /// As [`UnifiedVio::imu`].
     pub fn imu(&mut self, sample: &Imu) -> Result<(), Error> {
+        let Some(pair) = &mut self.pair else { return self.joined_imu(sample) };
+        pair.first(sample)?;
+        self.drain_pair()
+    }
+
+    /// Takes a sample of the second inertial sensor, in its own axes.
+    ///
+    /// # Errors
+    /// As [`UnifiedVio::second_imu`].
+    pub fn second_imu(&mut self, sample: &Imu) -> Result<(), Error> {
+        let none = Error::NoSuch { what: "inertial sensor", index: 1, count: 1 };
+        self.pair.as_mut().ok_or(none)?.second(sample)?;
+        self.drain_pair()
+    }
+
+    fn drain_pair(&mut self) -> Result<(), Error> {
+        while let Some(sample) = self.pair.as_mut().and_then(ImuPair::read) {
+            self.joined_imu(&sample)?;
+        }
+        Ok(())
+    }
+
+    fn joined_imu(&mut self, sample: &Imu) -> Result<(), Error> {
         self.vio.imu(sample)?;
         if !self.imu.is_sound(sample, self.settings.longest_gap_s) {
             self.recent.clear();

@@ -1,6 +1,6 @@
 //! Odometry in a stored map: what confirms it, what ends it, and when it is trusted again.
 
-use vio_ekf::fusion::{AidedPose, MapAidedSettings, MapAidedVio, PoseMeasurement};
+use vio_ekf::fusion::{AidedPose, ImuPairSettings, MapAidedSettings, MapAidedVio, PoseMeasurement, UnifiedSettings};
 use vio_ekf::nalgebra::{Isometry3, Vector3};
 use vio_ekf::{Camera, ImageView, Imu, Settings, Stamp};
 
@@ -182,4 +182,38 @@ fn in_motion_it_starts_again_with_the_velocity_of_the_moment() {
     assert!(off.len() > 280, "{}", off.len());
     let most = off.iter().copied().fold(0.0, f64::max);
     assert!(most < 0.01, "{most} m");
+}
+
+/// Two sensors whose constant errors are opposite: what the pair reads has none, so the body stays where it is without help from the map;
+/// the first alone flies off. A second one that falls silent is done without.
+#[test]
+fn a_second_sensor_is_joined_and_done_without() {
+    let camera = Camera { width: SIZE.0, height: SIZE.1, fx: 100.0, fy: 100.0, cx: 80.0, cy: 60.0, ..Camera::euroc() };
+    let pair = ImuPairSettings { timeout_s: 0.01, ..ImuPairSettings::default() };
+    let fly = |imu_pair: Option<ImuPairSettings>| {
+        let unified = UnifiedSettings { imu_pair, ..UnifiedSettings::default() };
+        let settings = MapAidedSettings { unified, ..MapAidedSettings::default() };
+        let mut vio = MapAidedVio::new(camera, Settings::default(), settings).unwrap();
+        let sample = |millis: i64, off: f64| {
+            let hum = 1e-4 * (0.7 * millis as f64).sin();
+            let accel = Vector3::new(off + hum, -hum, 9.81 + hum);
+            Imu { stamp: at(millis), gyro: Vector3::repeat(hum), accel }
+        };
+        for millis in (5..=2000).step_by(5) {
+            vio.imu(&sample(millis, 0.1)).unwrap();
+            match imu_pair {
+                Some(_) if millis <= 1500 => vio.second_imu(&sample(millis, -0.1)).unwrap(),
+                Some(_) => {}
+                None => assert!(vio.second_imu(&sample(millis, -0.1)).is_err()),
+            }
+            if millis == 100 {
+                let found = PoseMeasurement::isotropic(0, at(millis), Isometry3::identity(), 1e-3, 1e-3);
+                vio.start(&found).unwrap();
+            }
+        }
+        vio.pose(at(2000)).unwrap().world_from_body.translation.vector.x
+    };
+    let (both, one) = (fly(Some(pair)), fly(None));
+    // Half of 0.1 m/s² over 1.9 s squared.
+    assert!((one - 0.18).abs() < 0.02 && both.abs() < 0.02, "{one} m, {both} m");
 }
