@@ -220,6 +220,7 @@ mod tests {
                 left_bare,
                 outcomes,
                 looked,
+                identified: None,
             };
             likeness(&mission).unwrap().unwrap()
         };
