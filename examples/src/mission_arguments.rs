@@ -54,7 +54,7 @@ pub struct MissionArguments {
     region: Option<Region>,
     /// What to paint: mural (in colour, with --palette), strata, stripes, gradient, colours (of the mesh's vertices), materials (the pictures
     /// that the mesh file or its MTL names), or a PNG, JPEG or SVG file
-    /// [default: strata on the rock wall, materials on a mesh that has pictures, else stripes]
+    /// [default: on the rock wall the mural where `paintcopter` flies it, else strata; on a mesh materials where it has pictures, else stripes]
     #[arg(long)]
     design: Option<String>,
     /// Cover all that is in reach with a coat of this thickness, micrometres from 1 to 60

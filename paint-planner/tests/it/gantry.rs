@@ -419,7 +419,7 @@ fn the_flux_is_that_of_the_nozzles_gaussian() {
     let [physical, literal] = [false, true].map(|literal| usual.with_spray(flow, sigma, punishment, literal));
     assert!((physical.flux_speed / (flow * squared) - 1.0).abs() < 1e-9, "{}", physical.flux_speed);
     assert!((literal.flux_speed / (flow * squared * squared) - 1.0).abs() < 1e-9, "{}", literal.flux_speed);
-    // One part gained for three lost.
-    assert_eq!((physical.least_use, literal.least_use), (0.75, usual.least_use));
+    // One part gained for three lost; Eq. (4) asks for all of the flux.
+    assert_eq!((physical.least_use, literal.least_use), (0.75, 1.0));
     assert!(!literal.saturate && physical.saturate == usual.saturate);
 }
