@@ -9,7 +9,7 @@ use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 use serde::Deserialize;
 
-use crate::AnyError;
+use crate::any_error::AnyError;
 
 /// Who planted a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,6 +5,7 @@
 //!
 //! Prints one table, a row a crate, and the faults that no test sees. The exit code is 1 if too few are seen.
 
+mod any_error;
 mod arguments;
 mod blocks;
 mod fault;
@@ -14,17 +15,15 @@ mod scratch;
 mod switch;
 mod tests;
 
-use std::error::Error;
 use std::process::ExitCode;
 
 use clap::Parser as _;
 
+use any_error::AnyError;
 use arguments::Arguments;
 use memory::Memory;
 use outcome::Outcome;
 use scratch::Scratch;
-
-type AnyError = Box<dyn Error + Send + Sync>;
 
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {

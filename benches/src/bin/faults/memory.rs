@@ -6,7 +6,7 @@ use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
 
-use crate::AnyError;
+use crate::any_error::AnyError;
 use crate::fault::Fault;
 use crate::tests::Test;
 

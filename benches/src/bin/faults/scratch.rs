@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::AnyError;
+use crate::any_error::AnyError;
 use crate::fault::Fault;
 use crate::memory::Memory;
 use crate::outcome::Outcome;

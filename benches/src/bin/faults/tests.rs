@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
-use crate::AnyError;
+use crate::any_error::AnyError;
 use crate::arguments::Arguments;
 use crate::fault::Fault;
 use crate::memory::Memory;

@@ -1,0 +1,3 @@
+//! What goes wrong anywhere.
+
+pub(crate) type AnyError = Box<dyn std::error::Error + Send + Sync>;
