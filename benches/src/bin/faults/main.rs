@@ -13,6 +13,7 @@ mod memory;
 mod outcome;
 mod scratch;
 mod switch;
+mod test_program;
 mod tests;
 
 use std::process::ExitCode;

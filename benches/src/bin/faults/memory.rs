@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::any_error::AnyError;
 use crate::fault::Fault;
-use crate::tests::Test;
+use crate::test_program::Test;
 
 /// Kept beside the copy of the workspace.
 #[derive(Default, Serialize, Deserialize)]

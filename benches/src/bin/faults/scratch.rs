@@ -12,7 +12,7 @@ use crate::fault::Fault;
 use crate::memory::Memory;
 use crate::outcome::Outcome;
 use crate::switch::{self, Edit, Switched};
-use crate::tests::Program;
+use crate::test_program::Program;
 
 /// Says which fault is on, or notes which are reached.
 const RUNTIME: &str = include_str!("runtime.txt");

@@ -2,38 +2,18 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::os::unix::process::CommandExt as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
-
-use serde::{Deserialize, Serialize};
 
 use crate::any_error::AnyError;
 use crate::arguments::Arguments;
 use crate::fault::Fault;
 use crate::memory::Memory;
 use crate::outcome::Outcome;
-
-/// A program of tests of one crate.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct Program {
-    pub(crate) krate: String,
-    pub(crate) path: PathBuf,
-    pub(crate) folder: PathBuf,
-}
-
-/// A test that passes without a fault.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct Test {
-    pub(crate) program: Program,
-    pub(crate) name: String,
-    /// Without a fault.
-    pub(crate) time: Duration,
-    /// Numbers of the faults whose code it runs.
-    pub(crate) reaches: BTreeSet<u32>,
-}
+use crate::test_program::{Program, Test};
 
 /// What a test with a fault may take: that many times what it takes without, and some seconds for a machine that is busy.
 const PATIENCE: (u32, Duration) = (10, Duration::from_secs(20));
