@@ -56,7 +56,7 @@ pub mod run_folder;
 pub mod scan;
 pub mod scan_flight;
 pub mod simulated_sensors;
-#[cfg(feature = "programs")]
+#[cfg(any(feature = "robot", feature = "scan", feature = "vr"))]
 pub mod socket_address;
 #[cfg(feature = "spray")]
 pub mod spray;

@@ -89,7 +89,7 @@ impl DeviceMap {
     }
 
     /// The map, if the processor keeps it.
-    #[cfg_attr(not(feature = "gpu"), expect(clippy::unnecessary_wraps, reason = "a map on a GPU must be fetched"))]
+    #[cfg_attr(not(feature = "gpu"), allow(clippy::unnecessary_wraps, reason = "a map on a GPU must be fetched"))]
     pub fn cpu(&self) -> Option<&Map> {
         match self {
             Self::Cpu(map) => Some(map),
@@ -123,7 +123,7 @@ impl DeviceMap {
     ///
     /// # Errors
     /// [`Error::Device`](crate::Error).
-    #[cfg_attr(not(feature = "gpu"), expect(clippy::unnecessary_wraps, reason = "a map on a GPU must be fetched"))]
+    #[cfg_attr(not(feature = "gpu"), allow(clippy::unnecessary_wraps, reason = "a map on a GPU must be fetched"))]
     pub fn into_map(self) -> Result<Map, Error> {
         match self {
             Self::Cpu(map) => Ok(*map),

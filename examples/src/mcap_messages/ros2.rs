@@ -6,7 +6,10 @@ mod messages;
 mod transcode;
 mod writer;
 
-pub(crate) use definition::RosMessage;
-pub(crate) use messages::{CameraInfo, CompressedImage, Image, Pose, PoseStamped, Text, TransformStamped, Transforms};
 pub(crate) use transcode::write_ros2_beside;
-pub(crate) use writer::Ros2Writer;
+#[cfg(feature = "vio")]
+pub(crate) use {
+    definition::RosMessage,
+    messages::{CameraInfo, Text, Transforms},
+    writer::Ros2Writer,
+};
