@@ -19,6 +19,9 @@ use mcap::sans_io::LinearReaderOptions;
 use chunks::{Lz4, Zstd};
 use records::Messages;
 
+/// First bytes of an MCAP file.
+pub(crate) const FIRST_BYTES: &[u8] = b"\x89MCAP";
+
 /// Why a file gives no messages.
 #[derive(Debug)]
 pub(crate) enum MessagesFault {

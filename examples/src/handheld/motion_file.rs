@@ -6,26 +6,15 @@ use foxglove::Decode;
 use foxglove::messages::{FrameTransform, PoseInFrame};
 use mcap::Message;
 use nalgebra::Isometry3;
-use serde::Deserialize;
 use vio_ekf::format::{euroc, tum};
 use vio_ekf::{Stamp, Trajectory};
 
 use super::error::HandheldError;
 use crate::mcap_messages::fields::{isometry, isometry_of, stamp};
-use crate::mcap_messages::{MessagesFault, cdr, messages_of, schema_of};
+use crate::mcap_messages::{FIRST_BYTES, MessagesFault, cdr, messages_of, schema_of};
 
-/// First bytes of an MCAP file, and of one that gzip has packed.
-const MCAP: &[u8] = b"\x89MCAP";
+/// First bytes of a file that gzip has packed.
 const GZIP: &[u8] = &[0x1f, 0x8b];
-
-/// `geometry_msgs/msg/PoseStamped`.
-#[derive(Deserialize)]
-struct PoseStamped {
-    header: cdr::Header,
-    position: [f64; 3],
-    /// x, y, z, w.
-    orientation: [f64; 4],
-}
 
 /// Poses as they are in the file.
 pub(super) struct RecordedPoses {
@@ -47,7 +36,9 @@ pub(super) fn read_poses(path: &Path) -> Result<RecordedPoses, HandheldError> {
     if bytes.starts_with(GZIP) {
         return Err(unreadable(&"packed by gzip: unpack it with gunzip"));
     }
-    if bytes.starts_with(MCAP) || path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap")) {
+    if bytes.starts_with(FIRST_BYTES)
+        || path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"))
+    {
         return from_mcap(path);
     }
     let text = String::from_utf8(bytes)
@@ -103,8 +94,9 @@ fn pose(message: &Message) -> Option<Result<(Stamp, Isometry3<f64>), String>> {
         "foxglove.FrameTransform" => FrameTransform::decode(data)
             .ok()
             .and_then(|found| Some((found.timestamp.map(stamp)?, isometry(found.translation, found.rotation)?))),
-        "geometry_msgs/msg/PoseStamped" => cdr::decode::<PoseStamped>(data)
-            .and_then(|found| Some((found.header.stamp(), isometry_of(found.position, found.orientation)?))),
+        "geometry_msgs/msg/PoseStamped" => cdr::decode(data).and_then(|cdr::PoseStamped { header, pose }| {
+            Some((header.stamp(), isometry_of(pose.position, pose.orientation)?))
+        }),
         _ => return None,
     };
     let bad = || format!("topic {}: a {} that cannot be decoded", message.channel.topic, schema_of(message));

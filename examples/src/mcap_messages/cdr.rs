@@ -31,7 +31,7 @@ impl Header {
 }
 
 /// `sensor_msgs/Image`.
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 pub(crate) struct Image<'a> {
     pub(crate) header: Header,
     pub(crate) height: u32,
@@ -44,7 +44,7 @@ pub(crate) struct Image<'a> {
 }
 
 /// `sensor_msgs/CompressedImage`.
-#[derive(Deserialize)]
+#[derive(Default, Serialize, Deserialize)]
 pub(crate) struct CompressedImage<'a> {
     pub(crate) header: Header,
     pub(crate) format: String,
@@ -53,7 +53,7 @@ pub(crate) struct CompressedImage<'a> {
 }
 
 /// The first fields of `sensor_msgs/CameraInfo`.
-#[derive(Deserialize)]
+#[derive(Default, Serialize, Deserialize)]
 pub(crate) struct CameraInfo {
     pub(crate) header: Header,
     pub(crate) height: u32,
@@ -64,8 +64,29 @@ pub(crate) struct CameraInfo {
     pub(crate) k: [f64; 9],
 }
 
+/// `geometry_msgs/Pose`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Pose {
+    pub(crate) position: [f64; 3],
+    /// x, y, z, w.
+    pub(crate) orientation: [f64; 4],
+}
+
+impl Default for Pose {
+    fn default() -> Self {
+        Self { position: [0.0; 3], orientation: [0.0, 0.0, 0.0, 1.0] }
+    }
+}
+
+/// `geometry_msgs/msg/PoseStamped`.
+#[derive(Serialize, Deserialize)]
+pub(crate) struct PoseStamped {
+    pub(crate) header: Header,
+    pub(crate) pose: Pose,
+}
+
 /// `geometry_msgs/TransformStamped`.
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 pub(crate) struct TransformStamped {
     pub(crate) header: Header,
     pub(crate) child_frame_id: String,

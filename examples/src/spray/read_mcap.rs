@@ -21,10 +21,7 @@ const VALVE: &str = "valve";
 /// # Errors
 /// What is wrong.
 pub(super) fn read_mcap(path: &Path, flow: Option<f64>) -> Result<Vec<NozzleSample>, String> {
-    let fault = |why: MessagesFault| match why {
-        MessagesFault::Unreadable(why) => why.to_string(),
-        MessagesFault::Malformed(why) | MessagesFault::CutOff(why) => why,
-    };
+    let fault = |why: MessagesFault| why.to_string();
     let (mut chained, mut posed) = (Vec::new(), Vec::new());
     let mut topic: Option<String> = None;
     let mut valve = None;

@@ -1,5 +1,7 @@
 //! From a motion and a mesh to a painted mesh in a folder.
 
+use std::fs::File;
+use std::io::Read as _;
 use std::path::Path;
 
 use paint_sim::paint::PaintName;
@@ -11,6 +13,7 @@ use super::error::SprayError;
 use super::motion::NozzleMotion;
 use super::read_csv::read_csv;
 use super::read_mcap::read_mcap;
+use crate::mcap_messages::FIRST_BYTES;
 use crate::mesh_frame::{Subject, scale_of};
 use crate::mesh_io::read_mesh;
 use crate::mission::{MissionSettings, SprayedFilm};
@@ -21,8 +24,6 @@ use crate::report::save_figures;
 use crate::simulated_sensors::SHOT_STEP;
 use crate::{result, run_folder, say};
 
-/// First bytes of an MCAP file.
-const MCAP: &[u8] = b"\x89MCAP";
 /// Share of the shots from behind the surface from which on nothing of it is believed.
 const MOSTLY: f64 = 0.5;
 /// How far a nozzle sprays, metres: what lies farther is not looked at to tell its side.
@@ -117,11 +118,11 @@ pub fn run(arguments: &Arguments) -> Result<(), SprayError> {
 fn read_motion(arguments: &Arguments) -> Result<NozzleMotion, SprayError> {
     let path = &arguments.nozzle;
     let flow = arguments.flow.map(|litres| litres * 1e-3 / 60.0);
-    let bytes = std::fs::read(path).map_err(|error| SprayError::motion(path, &error))?;
-    let samples = if bytes.starts_with(MCAP) {
+    let samples = if is_mcap(path).map_err(|error| SprayError::motion(path, &error))? {
         read_mcap(path, flow)
     } else {
-        String::from_utf8(bytes).map_err(|_| "neither MCAP nor text".to_owned()).and_then(|text| read_csv(&text, flow))
+        let text = std::fs::read_to_string(path).map_err(|error| format!("neither MCAP nor text ({error})"));
+        text.and_then(|text| read_csv(&text, flow))
     };
     let motion = samples.and_then(NozzleMotion::new).map_err(|why| SprayError::motion(path, &why))?;
     if motion.left_out + motion.gaps > 0 {
@@ -132,6 +133,13 @@ fn read_motion(arguments: &Arguments) -> Result<NozzleMotion, SprayError> {
         );
     }
     Ok(motion)
+}
+
+/// By its first bytes: a recording need not fit into memory.
+fn is_mcap(path: &Path) -> std::io::Result<bool> {
+    let mut head = Vec::new();
+    File::open(path)?.take(FIRST_BYTES.len() as u64).read_to_end(&mut head)?;
+    Ok(head == FIRST_BYTES)
 }
 
 fn paint_of(name: &str) -> Result<NamedPaint, SprayError> {

@@ -215,8 +215,8 @@ impl Found {
                 self.truth.push(stamp, pose).map_err(|error| format!("topic {topic}: {error}"))?;
             }
             "geometry_msgs/msg/PoseStamped" if topic == "/truth" => {
-                let (header, position, orientation): (cdr::Header, _, _) = cdr::decode(data).ok_or_else(bad)?;
-                let pose = isometry_of(position, orientation).ok_or_else(bad)?;
+                let cdr::PoseStamped { header, pose } = cdr::decode(data).ok_or_else(bad)?;
+                let pose = isometry_of(pose.position, pose.orientation).ok_or_else(bad)?;
                 self.truth.push(header.stamp(), pose).map_err(|error| format!("topic {topic}: {error}"))?;
             }
             "std_msgs/msg/String" if topic == NOISE_TOPIC => {

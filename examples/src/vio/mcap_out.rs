@@ -9,10 +9,8 @@ use vio_ekf::{Imu, Stamp};
 
 use super::error::VioError;
 use super::grey_image::GreyImage;
-use crate::mcap_messages::cdr::{self, Header};
-use crate::mcap_messages::ros2::{
-    CameraInfo, CompressedImage, Image, Pose, PoseStamped, Ros2Writer, RosMessage, Text, TransformStamped, Transforms,
-};
+use crate::mcap_messages::cdr::{self, CompressedImage, Header, Image, Pose, PoseStamped, TransformStamped};
+use crate::mcap_messages::ros2::{CameraInfo, Ros2Writer, RosMessage, Text, Transforms};
 use crate::recording::Origin;
 
 /// Frames of the sensors.
@@ -56,10 +54,10 @@ impl McapWriter {
         for (frame, camera) in CAMERA_FRAMES.iter().zip(cameras) {
             out.message(&format!("/{frame}/camera_info"), began, &camera_info(began, frame, camera))?;
         }
-        let place = |(frame, camera): (&&str, &CameraCalibration)| TransformStamped {
-            header: Header::new(began, IMU_FRAME),
-            child_frame_id: (*frame).into(),
-            parent_from_child: pose(&camera.camera.body_from_camera),
+        let place = |(frame, camera): (&&str, &CameraCalibration)| {
+            let Pose { position, orientation } = pose(&camera.camera.body_from_camera);
+            let (header, child_frame_id) = (Header::new(began, IMU_FRAME), (*frame).into());
+            TransformStamped { header, child_frame_id, translation: position, rotation: orientation }
         };
         let places = CAMERA_FRAMES.iter().zip(cameras).map(place).collect();
         out.message("/tf_static", began, &Transforms(places))?;
@@ -87,12 +85,12 @@ impl McapWriter {
         match pixels {
             Pixels::Raw(grey) => {
                 let (width, height) = (grey.width as u32, grey.height as u32);
-                let (encoding, data) = ("mono8".into(), grey.data.clone());
+                let (encoding, data) = ("mono8".into(), grey.data.as_slice());
                 let image = Image { header, height, width, encoding, is_bigendian: 0, step: width, data };
                 self.message(&topic, stamp, &image)
             }
             Pixels::Png(bytes) => {
-                let image = CompressedImage { header, format: "png".into(), data: bytes.to_vec() };
+                let image = CompressedImage { header, format: "png".into(), data: bytes };
                 self.message(&topic, stamp, &image)
             }
         }
@@ -129,13 +127,16 @@ fn camera_info(stamp: Stamp, frame: &str, calibration: &CameraCalibration) -> Ca
         Distortion::DoubleSphere(k) => ("ds", k.to_vec()),
         Distortion::Eucm(k) => ("eucm", k.to_vec()),
     };
-    CameraInfo {
+    let first = cdr::CameraInfo {
         header: Header::new(stamp, frame),
         height: camera.height as u32,
         width: camera.width as u32,
         distortion_model: model.into(),
         d,
         k: [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
+    };
+    CameraInfo {
+        first,
         r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
         p: [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
         ..CameraInfo::default()

@@ -2,10 +2,8 @@
 
 use foxglove::messages::{self, FrameTransform, LinePrimitive, SceneEntity, SceneUpdate, Timestamp, line_primitive};
 
-use super::messages::{
-    CameraInfo, CompressedImage, Header, Image, JointState, Log, Marker, Markers, Pose, PoseStamped, Region,
-    TransformStamped, Transforms,
-};
+use super::messages::{CameraInfo, JointState, Log, Marker, Markers, Transforms};
+use crate::mcap_messages::cdr::{self, CompressedImage, Header, Image, Pose, PoseStamped, TransformStamped};
 use crate::mcap_messages::fields::stamp;
 
 /// Kinds of markers, and what is done with them.
@@ -23,8 +21,11 @@ pub(super) fn header(time: Option<Timestamp>, frame: &str) -> Header {
 }
 
 fn pose(position: Option<messages::Vector3>, orientation: Option<messages::Quaternion>) -> Pose {
-    let moved = position.map_or([0.0; 3], |p| [p.x, p.y, p.z]);
-    Pose { position: moved, orientation: orientation.map_or(Pose::IDENTITY.orientation, |q| [q.x, q.y, q.z, q.w]) }
+    let still = Pose::default();
+    Pose {
+        position: position.map_or(still.position, |p| [p.x, p.y, p.z]),
+        orientation: orientation.map_or(still.orientation, |q| [q.x, q.y, q.z, q.w]),
+    }
 }
 
 pub(super) fn pose_stamped(message: &messages::PoseInFrame) -> PoseStamped {
@@ -33,10 +34,14 @@ pub(super) fn pose_stamped(message: &messages::PoseInFrame) -> PoseStamped {
 }
 
 pub(super) fn transforms<'a>(frames: impl IntoIterator<Item = &'a FrameTransform>) -> Transforms {
-    let one = |frame: &FrameTransform| TransformStamped {
-        header: header(frame.timestamp, &frame.parent_frame_id),
-        child_frame_id: frame.child_frame_id.clone(),
-        parent_from_child: pose(frame.translation, frame.rotation),
+    let one = |frame: &FrameTransform| {
+        let Pose { position, orientation } = pose(frame.translation, frame.rotation);
+        TransformStamped {
+            header: header(frame.timestamp, &frame.parent_frame_id),
+            child_frame_id: frame.child_frame_id.clone(),
+            translation: position,
+            rotation: orientation,
+        }
     };
     Transforms(frames.into_iter().map(one).collect())
 }
@@ -55,26 +60,26 @@ pub(super) fn joint_state(message: &messages::JointStates) -> JointState {
     }
 }
 
-pub(super) fn image(message: messages::RawImage) -> Image {
+pub(super) fn image(message: &messages::RawImage) -> Image<'_> {
     Image {
         header: header(message.timestamp, &message.frame_id),
         height: message.height,
         width: message.width,
-        encoding: message.encoding,
+        encoding: message.encoding.clone(),
         is_bigendian: 0,
         step: message.step,
-        data: message.data.into(),
+        data: &message.data,
     }
 }
 
-pub(super) fn compressed_image(message: messages::CompressedImage) -> CompressedImage {
+pub(super) fn compressed_image(message: &messages::CompressedImage) -> CompressedImage<'_> {
     let header = header(message.timestamp, &message.frame_id);
-    CompressedImage { header, format: message.format, data: message.data.into() }
+    CompressedImage { header, format: message.format.clone(), data: &message.data }
 }
 
 /// `None` for matrices of other sizes than they have.
 pub(super) fn camera_info(message: messages::CameraCalibration) -> Option<CameraInfo> {
-    Some(CameraInfo {
+    let first = cdr::CameraInfo {
         header: header(message.timestamp, &message.frame_id),
         height: message.height,
         width: message.width,
@@ -84,11 +89,9 @@ pub(super) fn camera_info(message: messages::CameraCalibration) -> Option<Camera
         },
         d: message.d,
         k: message.k.try_into().ok()?,
-        r: message.r.try_into().ok()?,
-        p: message.p.try_into().ok()?,
-        binning: [0; 2],
-        region: Region::default(),
-    })
+    };
+    let (r, p) = (message.r.try_into().ok()?, message.p.try_into().ok()?);
+    Some(CameraInfo { first, r, p, ..CameraInfo::default() })
 }
 
 pub(super) fn log(message: messages::Log) -> Log {
@@ -105,7 +108,7 @@ pub(super) fn markers(entity: &SceneEntity) -> Vec<Marker> {
         header: header(entity.timestamp, &entity.frame_id),
         ns: entity.id.clone(),
         kind,
-        pose: pose.map_or(Pose::IDENTITY, |p| self::pose(p.position, p.orientation)),
+        pose: pose.map_or_else(Pose::default, |p| self::pose(p.position, p.orientation)),
         lifetime,
         frame_locked: entity.frame_locked,
         ..Marker::default()

@@ -1,4 +1,4 @@
-//! Messages of ROS 2 that are written here. Fields are named in the definitions beside them.
+//! Messages of ROS 2 that are only written, and the definitions of all that are. Fields are named there.
 
 use serde::Serialize;
 
@@ -6,39 +6,11 @@ use super::definition::{
     COLOUR, COMPRESSED_IMAGE, DURATION, HEADER, MARKER, MESH_FILE, POINT, POSE, Part, QUATERNION, REGION, RosMessage,
     TIME, TRANSFORM, TRANSFORM_STAMPED, UV, VECTOR,
 };
-use crate::mcap_messages::cdr;
-pub(crate) use crate::mcap_messages::cdr::Header;
-
-/// `geometry_msgs/Pose`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(crate) struct Pose {
-    pub(crate) position: [f64; 3],
-    /// x, y, z, w.
-    pub(crate) orientation: [f64; 4],
-}
-
-impl Pose {
-    pub(crate) const IDENTITY: Self = Self { position: [0.0; 3], orientation: [0.0, 0.0, 0.0, 1.0] };
-}
-
-/// `geometry_msgs/msg/PoseStamped`.
-#[derive(Serialize)]
-pub(crate) struct PoseStamped {
-    pub(crate) header: Header,
-    pub(crate) pose: Pose,
-}
-
-/// One of `tf2_msgs/msg/TFMessage`.
-#[derive(Serialize)]
-pub(crate) struct TransformStamped {
-    pub(crate) header: Header,
-    pub(crate) child_frame_id: String,
-    pub(crate) parent_from_child: Pose,
-}
+use crate::mcap_messages::cdr::{self, Header, Pose, PoseStamped};
 
 /// `tf2_msgs/msg/TFMessage`.
 #[derive(Serialize)]
-pub(crate) struct Transforms(pub(crate) Vec<TransformStamped>);
+pub(crate) struct Transforms(pub(crate) Vec<cdr::TransformStamped>);
 
 /// `sensor_msgs/msg/JointState`.
 #[derive(Serialize)]
@@ -50,36 +22,11 @@ pub(crate) struct JointState {
     pub(crate) effort: Vec<f64>,
 }
 
-/// `sensor_msgs/msg/Image`.
-#[derive(Serialize)]
-pub(crate) struct Image {
-    pub(crate) header: Header,
-    pub(crate) height: u32,
-    pub(crate) width: u32,
-    pub(crate) encoding: String,
-    pub(crate) is_bigendian: u8,
-    pub(crate) step: u32,
-    pub(crate) data: Vec<u8>,
-}
-
-/// `sensor_msgs/msg/CompressedImage`.
-#[derive(Default, Serialize)]
-pub(crate) struct CompressedImage {
-    pub(crate) header: Header,
-    pub(crate) format: String,
-    pub(crate) data: Vec<u8>,
-}
-
 /// `sensor_msgs/msg/CameraInfo`.
 #[derive(Default, Serialize)]
 pub(crate) struct CameraInfo {
-    pub(crate) header: Header,
-    pub(crate) height: u32,
-    pub(crate) width: u32,
-    pub(crate) distortion_model: String,
-    pub(crate) d: Vec<f64>,
-    /// Row by row, as the next two.
-    pub(crate) k: [f64; 9],
+    pub(crate) first: cdr::CameraInfo,
+    /// Row by row, as the next.
     pub(crate) r: [f64; 9],
     pub(crate) p: [f64; 12],
     pub(crate) binning: [u32; 2],
@@ -131,18 +78,12 @@ pub(crate) struct Marker {
     pub(crate) points: Vec<[f64; 3]>,
     pub(crate) colors: Vec<[f32; 4]>,
     pub(crate) texture_resource: String,
-    pub(crate) texture: CompressedImage,
+    pub(crate) texture: cdr::CompressedImage<'static>,
     pub(crate) uv_coordinates: Vec<[f32; 2]>,
     pub(crate) text: String,
     pub(crate) mesh_resource: String,
     pub(crate) mesh_file: (String, Vec<u8>),
     pub(crate) mesh_use_embedded_materials: bool,
-}
-
-impl Default for Pose {
-    fn default() -> Self {
-        Self::IDENTITY
-    }
 }
 
 /// `visualization_msgs/msg/MarkerArray`.
@@ -168,7 +109,7 @@ impl RosMessage for JointState {
     const PARTS: &'static [Part] = &[HEADER, TIME];
 }
 
-impl RosMessage for Image {
+impl RosMessage for cdr::Image<'_> {
     const NAME: &'static str = "sensor_msgs/msg/Image";
     const FIELDS: &'static str = "\
 std_msgs/Header header
@@ -182,7 +123,7 @@ uint8[] data
     const PARTS: &'static [Part] = &[HEADER, TIME];
 }
 
-impl RosMessage for CompressedImage {
+impl RosMessage for cdr::CompressedImage<'_> {
     const NAME: &'static str = "sensor_msgs/msg/CompressedImage";
     const FIELDS: &'static str = COMPRESSED_IMAGE.1;
     const PARTS: &'static [Part] = &[HEADER, TIME];

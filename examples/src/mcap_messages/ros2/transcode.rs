@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use foxglove::Decode;
 use foxglove::messages;
-use mcap::Message;
+use mcap::{McapResult, Message};
 
 use super::convert::{MarkerTable, camera_info, compressed_image, image, joint_state, log, pose_stamped, transforms};
 use super::messages::Text;
@@ -27,55 +27,45 @@ pub(crate) fn write_ros2_beside(recording: &Path) -> Result<PathBuf, String> {
         let message = message.map_err(unread)?;
         let table = scenes.entry(message.channel.topic.clone()).or_default();
         match rewrite(&message, table, &mut writer) {
-            Ok(true) => {}
-            Ok(false) => {
+            Some(Ok(())) => {}
+            Some(Err(error)) => return Err(in_target(error)),
+            None => {
                 let (schema, topic) = (schema_of(&message), &message.channel.topic);
                 return Err(format!("{}: topic {topic}: no {schema} for ROS 2", recording.display()));
             }
-            Err(error) => return Err(in_target(error)),
         }
     }
     writer.finish().map_err(in_target)?;
     Ok(target)
 }
 
-/// One message; whether there is one for it.
-fn rewrite(message: &Message, table: &mut MarkerTable, writer: &mut Ros2Writer) -> mcap::McapResult<bool> {
+/// One message; `None` where there is none for it.
+fn rewrite(message: &Message, table: &mut MarkerTable, writer: &mut Ros2Writer) -> Option<McapResult<()>> {
+    use messages::{FrameTransform, FrameTransforms, JointStates, PoseInFrame, RawImage, SceneUpdate};
     let (topic, time, data) = (message.channel.topic.as_str(), message.log_time, message.data.as_ref());
-    macro_rules! as_ros {
-        ($foxglove:ident, $convert:expr) => {
-            match messages::$foxglove::decode(data) {
-                Ok(read) => writer.write(topic, time, &$convert(read)).map(|()| true),
-                Err(_) => Ok(false),
-            }
-        };
-    }
-    match (message.channel.message_encoding.as_str(), schema_of(message)) {
+    Some(match (message.channel.message_encoding.as_str(), schema_of(message)) {
         ("cdr", name) => {
-            let Some(schema) = &message.channel.schema else { return Ok(false) };
-            let definition = || schema.data.to_vec();
-            writer.write_encoded(topic, name, &schema.encoding, &definition, time, data).map(|()| true)
+            let schema = message.channel.schema.as_ref()?;
+            writer.write_encoded(topic, name, &schema.encoding, &|| schema.data.to_vec(), time, data)
         }
-        ("json", _) => {
-            let text = String::from_utf8_lossy(data).into_owned();
-            writer.write(topic, time, &Text(text)).map(|()| true)
-        }
-        (_, "foxglove.FrameTransform") => as_ros!(FrameTransform, |read| transforms([&read])),
+        ("json", _) => writer.write(topic, time, &Text(String::from_utf8_lossy(data).into_owned())),
+        (_, "foxglove.FrameTransform") => writer.write(topic, time, &transforms([&decoded::<FrameTransform>(data)?])),
         (_, "foxglove.FrameTransforms") => {
-            as_ros!(FrameTransforms, |read: messages::FrameTransforms| transforms(&read.transforms))
+            writer.write(topic, time, &transforms(&decoded::<FrameTransforms>(data)?.transforms))
         }
-        (_, "foxglove.PoseInFrame") => as_ros!(PoseInFrame, |read| pose_stamped(&read)),
-        (_, "foxglove.JointStates") => as_ros!(JointStates, |read| joint_state(&read)),
-        (_, "foxglove.SceneUpdate") => as_ros!(SceneUpdate, |read| table.update(&read)),
-        (_, "foxglove.Log") => as_ros!(Log, log),
-        (_, "foxglove.RawImage") => as_ros!(RawImage, image),
-        (_, "foxglove.CompressedImage") => as_ros!(CompressedImage, compressed_image),
-        (_, "foxglove.CameraCalibration") => {
-            let info = messages::CameraCalibration::decode(data).ok().and_then(camera_info);
-            info.map_or(Ok(false), |info| writer.write(topic, time, &info).map(|()| true))
-        }
-        _ => Ok(false),
-    }
+        (_, "foxglove.PoseInFrame") => writer.write(topic, time, &pose_stamped(&decoded::<PoseInFrame>(data)?)),
+        (_, "foxglove.JointStates") => writer.write(topic, time, &joint_state(&decoded::<JointStates>(data)?)),
+        (_, "foxglove.SceneUpdate") => writer.write(topic, time, &table.update(&decoded::<SceneUpdate>(data)?)),
+        (_, "foxglove.Log") => writer.write(topic, time, &log(decoded(data)?)),
+        (_, "foxglove.RawImage") => writer.write(topic, time, &image(&decoded::<RawImage>(data)?)),
+        (_, "foxglove.CompressedImage") => writer.write(topic, time, &compressed_image(&decoded(data)?)),
+        (_, "foxglove.CameraCalibration") => writer.write(topic, time, &camera_info(decoded(data)?)?),
+        _ => return None,
+    })
+}
+
+fn decoded<M: Decode>(data: &[u8]) -> Option<M> {
+    M::decode(data).ok()
 }
 
 #[cfg(test)]
