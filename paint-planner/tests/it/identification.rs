@@ -90,6 +90,27 @@ fn errors_are_as_large_as_their_covariance_says() {
     assert!((mean - 3.0).abs() < 1.2, "{mean}");
 }
 
+/// Samples two time constants apart: what was measured follows the command, but the lag is lost in the noise.
+#[test]
+fn a_lag_that_is_not_known_is_refused() {
+    let (interval, tau) = (0.25, 0.12);
+    let recording = |noise: f64| {
+        let mut random = SplitMix64::seed_from_u64(5);
+        let (mut angle, mut held) = (0.0, 0.0);
+        let sample = |k: usize| {
+            angle = held + (angle - held) * f64::exp(-interval / tau);
+            held = 0.15 * normal(&mut random);
+            let measured = angle + noise * normal(&mut random);
+            AttitudeSample { time: interval * k as f64, commanded: held, measured }
+        };
+        (0..60).map(sample).collect::<Vec<_>>()
+    };
+    let weak = identify_attitude(&recording(0.04));
+    assert!(matches!(weak, Err(Error::Recording { what }) if what.contains("too weak")), "{weak:?}");
+    let fit = identify_attitude(&recording(1e-5)).unwrap();
+    assert!((fit.response.time_constant - tau).abs() < 0.1 * tau, "{fit:?}");
+}
+
 #[test]
 fn recordings_that_tell_nothing_are_refused() {
     let good = recording([1.0, 0.2, 0.0, 0.0], 0.001, 1);
