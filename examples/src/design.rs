@@ -58,7 +58,9 @@ pub struct Picture {
 #[derive(Debug, thiserror::Error)]
 pub enum DesignError {
     /// Neither a built-in name nor a readable picture.
-    #[error("design \"{name}\": {why}; give strata, stripes, gradient, colours, materials or a PNG, JPEG or SVG file")]
+    #[error(
+        "design \"{name}\": {why}; give mural, strata, stripes, gradient, colours, materials or a PNG, JPEG or SVG file"
+    )]
     Unusable {
         /// What was given.
         name: String,

@@ -56,6 +56,12 @@ impl Rgb {
         Self { width: width as u32, height: height as u32, data: pixels.into_iter().flatten().collect() }
     }
 
+    /// A page of a surface's texels as it is looked at: white where there is no surface, enlarged where it is small.
+    pub fn of_page(width: usize, height: usize, texels: impl IntoIterator<Item = Option<[u8; 3]>>) -> Self {
+        let pixels = texels.into_iter().map(|texel| texel.unwrap_or([255; 3]));
+        Self::from_pixels(width, height, pixels).enlarged((1400 / width as u32).clamp(1, 8))
+    }
+
     /// The same picture with every pixel as a block of `factor` by `factor`.
     #[must_use]
     pub fn enlarged(&self, factor: u32) -> Self {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::thread;
 
 use paint_net::Image;
-use paint_sim::colour::{spectrum_lab, spectrum_linear_srgb};
+use paint_sim::colour::{encode_srgb8, spectrum_lab, spectrum_linear_srgb};
 use paint_sim::{Paint, Substrate};
 
 use super::colour_doses::correct_colours;
@@ -57,6 +57,11 @@ pub(super) struct Look {
 }
 
 impl Look {
+    /// Stored sRGB.
+    pub(super) fn srgb8(&self) -> [u8; 3] {
+        self.linear.map(|c| encode_srgb8(c).0)
+    }
+
     fn of(wall: &Substrate) -> Self {
         Self { linear: spectrum_linear_srgb(wall.reflectance()), lab: spectrum_lab(wall.reflectance()) }
     }

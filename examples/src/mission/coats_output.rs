@@ -5,7 +5,7 @@ use std::path::Path;
 
 use nalgebra::Point3;
 use paint_net::Image;
-use paint_sim::colour::{ciede2000, encode_srgb8};
+use paint_sim::colour::ciede2000;
 use paint_sim::surface::Hit;
 use serde::Serialize;
 
@@ -14,8 +14,7 @@ use super::error::MissionError;
 use super::figures::mean;
 use super::mission_output::{save, save_flights, save_flown_path};
 use super::painted_mesh::save_painted_mesh;
-use super::picture_figures::save_out_of_gamut;
-use super::picture_figures::{PictureFigures, wanted_looks};
+use super::picture_figures::{PictureFigures, save_out_of_gamut, wanted_looks};
 use super::run::Mission;
 use super::shading::shading_of_colours;
 use super::view::{camera, picture_of, view};
@@ -24,8 +23,6 @@ use crate::pictures::{COLOUR_DIFFERENCE, Rgb, save_error_map};
 use crate::progress::Stage;
 use crate::report::{Report, save_figures};
 
-/// Colour beside the surface in the texture pictures.
-const BACKGROUND: [u8; 3] = [255, 255, 255];
 /// Depth from which a paint counts as wanted.
 const WANTED: f64 = 0.05;
 
@@ -155,9 +152,8 @@ fn save_pictures(
     let task = &mission.task;
     let (width, height) = (task.wanted.width(), task.wanted.height());
     for (walls, name) in [(wanted, "wanted.png"), (painted, "painted.png")] {
-        let pixels = walls.iter().map(|look| look.map_or(BACKGROUND, |look| look.linear.map(|c| encode_srgb8(c).0)));
-        let picture = Rgb::from_pixels(width, height, pixels);
-        picture.enlarged((1400 / width as u32).clamp(1, 8)).save(&folder.join(name))?;
+        let page = walls.iter().map(|look| look.as_ref().map(Look::srgb8));
+        Rgb::of_page(width, height, page).save(&folder.join(name))?;
     }
     if let Some(picture) = &coats.picture {
         save_out_of_gamut(picture, wanted, [width, height], folder)?;
@@ -170,8 +166,8 @@ fn save_pictures(
     save_flown_path(mission, &shade, folder)?;
     let texel = (task.settings.texel, "m");
     save_error_map(&folder.join("error.png"), width, &differences(wanted, painted), texel, &COLOUR_DIFFERENCE)?;
-    let bytes = |look: &Option<Look>| look.map(|look| look.linear.map(|c| encode_srgb8(c).0));
-    let vertices = save_painted_mesh(task, &painted.iter().map(bytes).collect::<Vec<_>>(), folder)?;
+    let page: Vec<_> = painted.iter().map(|look| look.as_ref().map(Look::srgb8)).collect();
+    let vertices = save_painted_mesh(task, &page, folder)?;
     let missions: Vec<&Mission> = coats.missions().map(|(_, mission)| mission).collect();
     save_flights(&missions, &vertices, folder)
 }

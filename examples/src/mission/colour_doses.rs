@@ -2,22 +2,18 @@
 
 use paint_net::colour::ColourFit;
 use paint_net::painters::SurfaceFootprint;
-use paint_planner::Plan;
-use paint_planner::Target;
+use paint_planner::{Plan, Target};
 use paint_sim::Film;
 
 use super::decide_colours::{LEAST_VOLUME, PAINT_WEIGHT, looks, weights};
 use super::dose_correction::{shares, sprayed};
 use super::error::MissionError;
-use super::figures::mean;
 use super::nozzle::kernel;
+use super::painting_task::PaintingTask;
 use super::picture_task::PictureTask;
 use super::plan::Draft;
 use crate::appearance::UNIT_THICKNESS;
 use crate::progress::Stage;
-use paint_sim::colour::ciede2000;
-
-use super::painting_task::PaintingTask;
 
 const ITERATIONS: usize = 50;
 const TOLERANCE: f64 = 3e-4;
@@ -67,8 +63,7 @@ pub(super) fn correct_colours(
         }
     }
     let expected = looks(picture, &depths);
-    let shown = (0..expected.len()).filter(|&k| picture.in_gamut[k] && task.in_reach[picture.pixels[k]]);
-    let difference = mean(shown.map(|k| ciede2000(expected[k], picture.wanted[k])));
+    let difference = picture.difference_in_gamut(&task.in_reach, |k| Some(expected[k]));
     stage.done(&format!("CIEDE2000 {difference:.2} expected where paints show the picture"));
     Ok(())
 }

@@ -26,8 +26,6 @@ use crate::pictures::{COLOUR_DIFFERENCE, ErrorScale, Panel, Rgb, save_curves, sa
 use crate::progress::Stage;
 use crate::recording::{ColouredMesh, RobotState, save_recording};
 
-/// Colour beside the surface in the texture pictures.
-const BACKGROUND: [u8; 3] = [255, 255, 255];
 /// Seconds between two states of the recording.
 pub(super) const RECORDING_STEP: f64 = 0.1;
 /// Points in a curve: more than the picture has columns shows nothing more.
@@ -106,11 +104,7 @@ pub(super) fn page_colours(task: &PaintingTask, depth: &Image) -> Vec<Option<[u8
 
 /// The chart with this depth of paint on its pixels.
 pub(super) fn texture(task: &PaintingTask, depth: &Image) -> Rgb {
-    let (width, height) = (depth.width(), depth.height());
-    let pixel = |k: usize| {
-        if task.coverage.data()[k] > 0.0 { task.appearance.srgb(depth.data()[k]) } else { BACKGROUND }
-    };
-    Rgb::from_pixels(width, height, (0..width * height).map(pixel)).enlarged((1400 / width as u32).clamp(1, 8))
+    Rgb::of_page(depth.width(), depth.height(), page_colours(task, depth))
 }
 
 /// The surface with this depth of paint as somebody standing before it sees it.

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use paint_sim::colour::{ciede2000, encode_srgb8};
+use paint_sim::colour::ciede2000;
 use serde::Serialize;
 
 use super::coats::{Coats, Look};
@@ -35,22 +35,17 @@ pub struct PictureFigures {
 
 impl PictureFigures {
     pub(super) fn new(coats: &Coats, picture: &PictureTask, painted: &[Option<Look>]) -> Self {
-        let in_reach: Vec<usize> = match coats.missions().next() {
-            Some((_, mission)) => {
-                (0..picture.pixels.len()).filter(|&k| mission.task.in_reach[picture.pixels[k]]).collect()
-            }
-            None => Vec::new(),
-        };
-        let inside = || in_reach.iter().copied().filter(|&k| picture.in_gamut[k]);
-        let painted = |k: usize| Some(ciede2000(painted[picture.pixels[k]]?.lab, picture.wanted[k]));
+        let in_reach = coats.missions().next().map_or(&[][..], |(_, mission)| &mission.task.in_reach);
+        let painted = |k: usize| painted[picture.pixels[k]].map(|look| look.lab);
+        let reached = (0..picture.pixels.len()).filter(|&k| in_reach.get(picture.pixels[k]) == Some(&true));
         let litres = |mission: &super::run::Mission| {
             let emitted = mission.film.mass_balance().emitted as f64 * paint_sim::spray::QUANTUM;
             1e3 * emitted / mission.task.paint.solids
         };
         Self {
-            ciede2000_in_gamut_mean: mean(inside().filter_map(painted)),
-            ciede2000_optimum_mean: mean(inside().map(|k| ciede2000(picture.optimum[k], picture.wanted[k]))),
-            ciede2000_in_reach_mean: mean(in_reach.iter().copied().filter_map(painted)),
+            ciede2000_in_gamut_mean: picture.difference_in_gamut(in_reach, painted),
+            ciede2000_optimum_mean: picture.difference_in_gamut(in_reach, |k| Some(picture.optimum[k])),
+            ciede2000_in_reach_mean: mean(reached.filter_map(|k| Some(ciede2000(painted(k)?, picture.wanted[k])))),
             out_of_gamut_share: picture.out_of_gamut_share(),
             paint_l_by_paint: coats.missions().map(|(_, mission)| litres(mission)).collect(),
         }
@@ -95,13 +90,11 @@ pub(super) fn save_out_of_gamut(
     [width, height]: [usize; 2],
     folder: &Path,
 ) -> Result<(), MissionError> {
-    let mut colours: Vec<[u8; 3]> =
-        wanted.iter().map(|look| look.map_or([255; 3], |look| look.linear.map(|c| encode_srgb8(c).0))).collect();
+    let mut colours: Vec<Option<[u8; 3]>> = wanted.iter().map(|look| look.as_ref().map(Look::srgb8)).collect();
     for (&pixel, _) in picture.pixels.iter().zip(&picture.in_gamut).filter(|(_, inside)| !**inside) {
         if (pixel % width + pixel / width) % STRIPES < STRIPES / 2 {
-            colours[pixel] = OUTSIDE;
+            colours[pixel] = Some(OUTSIDE);
         }
     }
-    let picture = Rgb::from_pixels(width, height, colours);
-    Ok(picture.enlarged((1400 / width as u32).clamp(1, 8)).save(&folder.join("out_of_gamut.png"))?)
+    Ok(Rgb::of_page(width, height, colours).save(&folder.join("out_of_gamut.png"))?)
 }

@@ -2,12 +2,10 @@
 
 use std::path::Path;
 
-use paint_sim::colour::{ciede2000, encode_srgb8};
 use serde::Serialize;
 
-use super::coats::{CoatTasks, looks, time_of_coats};
+use super::coats::{CoatTasks, Look, looks, time_of_coats};
 use super::error::MissionError;
-use super::figures::mean;
 use super::picture_figures::{save_out_of_gamut, wanted_looks};
 use super::plan::unrehearsed;
 use crate::pictures::Rgb;
@@ -76,11 +74,10 @@ pub fn preview_picture(tasks: &CoatTasks, folder: &Path) -> Result<Option<Pictur
     let wanted = wanted_looks(picture, expected.len());
     let (width, height) = (task.surface.width(), task.surface.height());
     for (looks, name) in [(&wanted, "wanted.png"), (&expected, "expected.png")] {
-        let pixels = looks.iter().map(|look| look.map_or([255; 3], |look| look.linear.map(|c| encode_srgb8(c).0)));
-        Rgb::from_pixels(width, height, pixels).enlarged((1400 / width as u32).clamp(1, 8)).save(&folder.join(name))?;
+        let page = looks.iter().map(|look| look.as_ref().map(Look::srgb8));
+        Rgb::of_page(width, height, page).save(&folder.join(name))?;
     }
     save_out_of_gamut(picture, &wanted, [width, height], folder)?;
-    let shown = (0..picture.pixels.len()).filter(|&k| picture.in_gamut[k] && task.in_reach[picture.pixels[k]]);
     let (_, mission_time_s) = time_of_coats(&times);
     let figures = PicturePreview {
         version: env!("CARGO_PKG_VERSION"),
@@ -91,7 +88,7 @@ pub fn preview_picture(tasks: &CoatTasks, folder: &Path) -> Result<Option<Pictur
         flight_time_s_by_paint: times,
         paint_kg_by_paint: kilograms,
         mission_time_s,
-        ciede2000_optimum_mean: mean(shown.map(|k| ciede2000(picture.optimum[k], picture.wanted[k]))),
+        ciede2000_optimum_mean: picture.difference_in_gamut(&task.in_reach, |k| Some(picture.optimum[k])),
         out_of_gamut_share: picture.out_of_gamut_share(),
     };
     save_figures(&figures, folder)?;

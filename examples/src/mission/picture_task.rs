@@ -8,6 +8,7 @@ use paint_sim::colour::{ciede2000, linear_srgb_lab, spectrum_linear_srgb};
 use paint_sim::paint::{Bands, FilmStack};
 
 use super::error::MissionError;
+use super::figures::mean;
 use super::painting_task::PaintingTask;
 use crate::adapters::FilmsOnWall;
 use crate::appearance::{DEEPEST, UNIT_THICKNESS};
@@ -123,6 +124,13 @@ impl PictureTask {
         self.stack = self.stack.select(&kept);
         self.separated = kept.iter().map(|&k| self.separated[k].clone()).collect();
         self.paints = kept.into_iter().map(|k| self.paints[k].clone()).collect();
+    }
+
+    /// Mean CIEDE2000 between the picture and what is found on the texels, inside the gamut and where the robot paints.
+    pub(super) fn difference_in_gamut(&self, in_reach: &[bool], found: impl Fn(usize) -> Option<[f64; 3]>) -> f64 {
+        let counts = |k: &usize| self.in_gamut[*k] && in_reach.get(self.pixels[*k]) == Some(&true);
+        let inside = (0..self.pixels.len()).filter(counts);
+        mean(inside.filter_map(|k| Some(ciede2000(found(k)?, self.wanted[k]))))
     }
 
     /// Share of the texels that paints do not show.
