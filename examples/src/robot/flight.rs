@@ -182,7 +182,10 @@ impl Px4Flight<'_, '_> {
             self.motors.fill(0.0);
         }
         for k in 0..CONTROL_STEPS {
-            if self.robot.steps().is_multiple_of(SENSOR_STEPS)
+            // Not at 0: PX4 takes such a clock for one that is not set, sleeps on the wall clock until the next sample, and how its loops
+            // lie among the samples would be the scheduler's choice.
+            if self.robot.steps() > 0
+                && self.robot.steps().is_multiple_of(SENSOR_STEPS)
                 && let Some(controls) = self.px4.step(&self.robot.sensors())?
             {
                 self.motors = simulator::motor_commands(controls, self.motors.len());
