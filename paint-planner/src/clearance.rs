@@ -251,6 +251,46 @@ mod tests {
         }
     }
 
+    /// The plane x = 1, seen along x by a nozzle in the body's origin.
+    struct Screen;
+
+    impl Surface for Screen {
+        fn cast(&self, origin: &Point3<f64>, _: &UnitVector3<f64>, max: f64) -> Option<Hit> {
+            let (distance, normal) = (1.0 - origin.x, -Vector3::x_axis());
+            let point = Point3::new(1.0, origin.y, origin.z);
+            (distance <= max).then_some(Hit { point, normal, distance })
+        }
+
+        fn distance(&self, point: &Point3<f64>, max: f64) -> f64 {
+            (1.0 - point.x).abs().min(max)
+        }
+    }
+
+    impl Tool for Screen {
+        fn vehicle(&self, _: &NozzleState, _: f64) -> Option<VehicleState> {
+            None
+        }
+
+        fn spheres(&self, _: &VehicleState, _: &mut Vec<(Point3<f64>, f64)>) {}
+
+        fn nozzle(&self, vehicle: &VehicleState) -> Option<NozzleState> {
+            Some(NozzleState { position: vehicle.position, direction: Vector3::x_axis() })
+        }
+    }
+
+    /// A spray is followed behind its aim for as far as it has come, and no farther.
+    #[test]
+    fn a_spray_misses_by_where_it_meets_the_surface() {
+        let checker = ClearanceChecker::new(&Screen, &Screen);
+        let miss = |x: f64, aim: f64| {
+            let state = VehicleState { position: Point3::new(x, 0.0, 0.0), heading: 0.0, pan: 0.0, tilt: 0.0 };
+            checker.miss(&state, &Point3::new(aim, 0.03, 0.0)).unwrap()
+        };
+        assert!((miss(0.7, 1.0) - 0.03).abs() < 1e-12);
+        assert!((miss(0.5, 0.8) - 0.2_f64.hypot(0.03)).abs() < 1e-12);
+        assert!(miss(0.0, 0.45).is_infinite());
+    }
+
     #[test]
     fn rest_is_one_look() {
         let mut checker = ClearanceChecker::new(&Tip, &Ball);

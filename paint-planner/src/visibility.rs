@@ -83,3 +83,53 @@ pub(crate) fn drop_hidden(
         _ => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{UnitVector3, Vector3};
+
+    use super::*;
+    use crate::world::Hit;
+
+    /// The plane x = 0: its front where y is 0, its back where it is 1, a hole where it is 2.
+    struct Sheet;
+
+    impl Surface for Sheet {
+        fn cast(&self, origin: &Point3<f64>, direction: &UnitVector3<f64>, max: f64) -> Option<Hit> {
+            let (distance, y) = (origin.x.abs(), origin.y.round());
+            let normal = if y == 1.0 { Vector3::x_axis() } else { -Vector3::x_axis() };
+            let point = origin + direction.into_inner() * distance;
+            (y != 2.0 && distance <= max).then_some(Hit { point, normal, distance })
+        }
+
+        fn distance(&self, point: &Point3<f64>, max: f64) -> f64 {
+            point.x.abs().min(max)
+        }
+    }
+
+    /// Whether targets at these places, each sprayed at from the front, are refused.
+    fn refused(places: &[f64]) -> bool {
+        let normal = -Vector3::x_axis();
+        let target = |&y: &f64| Target { point: Point3::new(0.0, y, 0.0), normal, dose: 1e-6, time: None };
+        let targets: Vec<Target> = places.iter().map(target).collect();
+        let from = |t: &Target| NozzleState { position: t.point - Vector3::x() * 0.3, direction: Vector3::x_axis() };
+        let mut states: Vec<_> = targets.iter().map(|t| Ok(from(t))).collect();
+        drop_hidden(&targets, &mut states, &Sheet).is_err()
+    }
+
+    #[test]
+    fn targets_that_are_mostly_behind_or_all_in_holes_are_refused() {
+        for (places, expected) in [
+            (&[0.0][..], false),
+            (&[2.0], true),
+            (&[2.0, 2.0, 2.0], true),
+            (&[2.0, 0.0], false),
+            (&[2.0, 0.0, 1.0], false),
+            (&[2.0, 1.0], true),
+            (&[0.0, 1.0], false),
+            (&[0.0, 1.0, 1.0], true),
+        ] {
+            assert_eq!(refused(places), expected, "{places:?}");
+        }
+    }
+}

@@ -171,7 +171,10 @@ mod tests {
                 if turns > settings.window {
                     continue 'paths;
                 }
-                cost += edge(&before, &node, turns as f64 * TAU / bins as f64, settings.ce);
+                // Eq. (7), written out again.
+                let [x, y, z]: [f64; 3] = (node.position - before.position).into();
+                let (turn, square) = (turns as f64 * TAU / bins as f64, x * x + y * y + z * z);
+                cost += turn.powi(2) / (square + 1e-6) + settings.ce * square;
             }
             least = least.min(cost);
         }

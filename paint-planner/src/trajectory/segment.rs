@@ -105,3 +105,32 @@ impl Segment {
         Self { slowness: self.slowness.scaled(k), ..*self }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Paths s^3, (s - 1)^2, 2 s and 5 along which time passes as t = s + s^3, so that w = dt/ds = 1 + 3 s^2. The derivatives of s by t
+    /// are then 1/w, -w'/w^3 and (3 w'^2 - 6 w)/w^5.
+    #[test]
+    fn motion_is_that_of_the_chain_rule() {
+        let path = [&[0.0, 0.0, 0.0, 1.0][..], &[1.0, 0.0, 0.0], &[0.0, 2.0], &[5.0]].map(Bernstein::new);
+        let segment = Segment { path, slowness: Bernstein::new(&[1.0, 1.0, 4.0]) };
+        assert!((segment.duration() - 2.0).abs() < 1e-14);
+        for s in [0.0_f64, 0.2, 0.5, 0.9] {
+            let (w, w1) = (1.0 + 3.0 * s * s, 6.0 * s);
+            let (a, b, c) = (1.0 / w, -w1 / w.powi(3), (3.0 * w1 * w1 - 6.0 * w) / w.powi(5));
+            let (value, motion) = segment.motion(s + s.powi(3));
+            let places = [s.powi(3), (s - 1.0).powi(2), 2.0 * s, 5.0];
+            let slopes = [[3.0 * s * s, 6.0 * s, 6.0], [2.0 * (s - 1.0), 2.0, 0.0], [2.0, 0.0, 0.0], [0.0; 3]];
+            for (axis, [q1, q2, q3]) in slopes.into_iter().enumerate() {
+                let third = q3 * a * a * a + 3.0 * q2 * a * b + q1 * c;
+                for (row, expected) in [q1 * a, q2 * a * a + q1 * b, third].into_iter().enumerate() {
+                    let found = motion[(row, axis)];
+                    assert!((found - expected).abs() < 1e-10, "s {s}, axis {axis}, order {row}: {found} {expected}");
+                }
+                assert!((value[axis] - places[axis]).abs() < 1e-12);
+            }
+        }
+    }
+}

@@ -105,6 +105,37 @@ fn what_always_comes_too_near_is_left_out_and_says_so() {
     assert_eq!((flight.excluded(), mission.outcomes().excluded), (6, 7));
 }
 
+/// A gust in the first flight alone: what is given up there is flown once more, by itself.
+#[test]
+fn what_a_flight_gives_up_is_flown_once_more() {
+    let (strokes, arm) = ([Wall::flat().rows(1.0, 1, 0.2)], Arm::default());
+    let count = strokes[0].len();
+    let gust = |plan: &Plan| {
+        let first = plan.target_time.len() == count && plan.reachable[10];
+        first.then(|| NearMiss { time: plan.target_time[10], missing: 1e-3 }).into_iter().collect::<Vec<NearMiss>>()
+    };
+    let planned = |flights: usize, shortest_retry: f64| {
+        let settings = MissionSettings { flights, shortest_retry, ..MissionSettings::default() };
+        plan_mission(&strokes, &Wall::flat(), &arm, &gust, settings).unwrap()
+    };
+    let mission = planned(2, 0.05);
+    let [first, second] = &mission.flights[..] else { panic!("{} flights", mission.flights.len()) };
+    let bare: Vec<usize> = (0..count - 1).filter(|&k| first.plan.flow[k] == 0.0).collect();
+    assert!(bare.len() >= 6 && bare.windows(2).all(|pair| pair[1] == pair[0] + 1), "{bare:?}");
+    let expected: Vec<_> = (bare[0]..=bare[0] + bare.len()).map(|k| strokes[0][k].point).collect();
+    let mut again: Vec<_> = second.route.targets.iter().map(|target| target.point).collect();
+    // It may be flown from either end.
+    if again[0] != expected[0] {
+        again.reverse();
+    }
+    assert_eq!(again, expected);
+    assert!(bare.iter().all(|&k| first.route.targets[k].dose == 0.0), "paint is doubled");
+    assert_eq!(mission.outcomes().not_served(), 0);
+    // Not where there is no further flight, and not if it is too short.
+    assert_eq!(planned(1, 0.05).flights.len(), 1);
+    assert_eq!(planned(2, 1.0).flights.len(), 1);
+}
+
 #[test]
 fn a_margin_holds_between_the_targets_too() {
     let (strokes, arm, settings) = ([Wall::flat().rows(1.0, 1, 0.2)], Arm::default(), MissionSettings::default());
