@@ -68,3 +68,36 @@ fn set_lens(covariance: &mut Covariance, row: usize, lens: &Camera, settings: &C
 pub(crate) fn prior_sigma(settings: &ImuSettings) -> Entries {
     Entries::from_fn(|k, _| settings.accel_matrix_sigma(k).max(1e-9))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Both focal lengths err by 2 % together and by 0.2 % each: variances of f^2 (0.02^2 + 0.002^2), covariance of fx fy 0.02^2.
+    #[test]
+    fn focal_lengths_are_uncertain_together() {
+        let lens = Camera { fx: 400.0, fy: 500.0, ..Camera::euroc() };
+        let settings = CalibrationSettings {
+            focal_sigma: 0.02,
+            principal_point_sigma_px: 3.0,
+            distortion_sigma: 0.06,
+            ..CalibrationSettings::default()
+        };
+        let mut covariance = Covariance::new(10, 10);
+        set_lens(&mut covariance, 2, &lens, &settings);
+        let found = covariance.block::<6, 6>(2, 2);
+        let expected = |row: usize, column: usize| match (row, column) {
+            (0, 0) => 64.64,
+            (0, 1) => 80.0,
+            (1, 1) => 101.0,
+            (2, 2) | (3, 3) => 9.0,
+            (4, 4) => 3.6e-3,
+            (5, 5) => 4e-4,
+            _ => 0.0,
+        };
+        for (row, column) in (0..6).flat_map(|row| (row..6).map(move |column| (row, column))) {
+            let (found, expected) = (found[(row, column)], expected(row, column));
+            assert!((found - expected).abs() < 1e-12 * (1.0 + expected), "{row} {column}: {found} {expected}");
+        }
+    }
+}
