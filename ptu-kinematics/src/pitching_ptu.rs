@@ -51,7 +51,8 @@ impl PitchingPtu {
     }
 
     /// Pose of the body at a pitch.
-    fn body(world_from_level: &Isometry3<f64>, pitch: f64) -> Isometry3<f64> {
+    #[must_use]
+    pub fn body(world_from_level: &Isometry3<f64>, pitch: f64) -> Isometry3<f64> {
         world_from_level * UnitQuaternion::from_rotation_matrix(&elevation_rotation(pitch))
     }
 

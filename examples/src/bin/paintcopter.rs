@@ -32,6 +32,9 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let folder = &arguments.out;
     let mission_file = arguments.mission.mission_file()?.or_mural();
+    if !arguments.preview {
+        mission_file.settings.check_simulated()?;
+    }
     mission_file.begin_run(folder, "paintcopter")?;
     let coats = mission_file.decide_coats(folder)?;
     if arguments.preview {

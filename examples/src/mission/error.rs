@@ -26,6 +26,18 @@ pub enum MissionError {
         /// Its value.
         value: f64,
     },
+    /// A pitch at which nothing hovers.
+    #[error("setting pitch = {value} rad: it must be from 0 to π/3")]
+    Pitch {
+        /// Its value.
+        value: f64,
+    },
+    /// A flight of a vehicle that hovers pitched.
+    #[error(
+        "--pitch (settings.pitch): the simulated vehicle hovers level; `plan` plans for one that pitches and `paintcopter --preview` \
+         shows what it paints: leave it out to fly"
+    )]
+    PitchedFlight,
     /// A plan may ask for more than the servos do.
     #[error(
         "setting planner.timing.max_joint_rate = {planned} rad/s: the servos turn by {servo} rad/s at most (servo.max_rate); plan slower ones"

@@ -11,6 +11,7 @@ use ptu_kinematics::Ptu;
 
 use super::decide::decide;
 use super::error::MissionError;
+use super::planned_robot::PlannedRobot;
 use super::reach::{texels_in_reach, texels_lost_to_constraints};
 use super::reach_needs::reach_needs;
 use super::settings::MissionSettings;
@@ -45,7 +46,10 @@ pub struct PaintingTask {
     pub(super) paint: NamedPaint,
     pub(super) surface: Arc<PaintSurface>,
     pub(super) appearance: Appearance,
+    /// The robot that the simulation flies.
     pub(super) robot: Robot,
+    /// The robot that plans are made for: the same unless it hovers pitched.
+    pub(super) planned_robot: PlannedRobot,
     /// Ink wanted on every texel.
     pub(super) wanted: Image,
     /// 1 on texels of the surface, 0 beside it.
@@ -88,6 +92,7 @@ impl PaintingTask {
         let started = Instant::now();
         settings.check()?;
         let robot = Robot { tether: settings.constraints.tether, ..Robot::new(Ptu::new(settings.ptu)?) };
+        let planned_robot = PlannedRobot::new(&settings)?;
         let paint = NamedPaint::built_in(settings.paint)?;
         let appearance = Appearance::new(&paint.paint, &Substrate::sandstone())?;
         check_memory(&scene.canvas, &settings)?;
@@ -97,8 +102,8 @@ impl PaintingTask {
 
         let coverage = surface.coverage();
         let stage = Stage::start("reach");
-        let in_reach = texels_in_reach(&surface, &robot, &settings)?;
-        let lost = texels_lost_to_constraints(&in_reach, &surface, &robot, &settings)?;
+        let in_reach = texels_in_reach(&surface, &settings)?;
+        let lost = texels_lost_to_constraints(&in_reach, &surface, &settings)?;
         let percent = |texels: &[bool]| 100.0 * share(texels, &coverage);
         if !in_reach.contains(&true) {
             return Err(match percent(&lost) {
@@ -123,6 +128,7 @@ impl PaintingTask {
             surface: Arc::new(surface),
             appearance,
             robot,
+            planned_robot,
             wanted: coverage.map(|_| 0.0),
             coverage,
             in_reach,

@@ -133,7 +133,7 @@ pub(super) fn replan(task: &PaintingTask, draft: &mut Draft) -> Result<(), Missi
 
 /// The flights with what they are compared with.
 pub(super) fn finish(task: &PaintingTask, Draft { mission, seconds }: Draft) -> Result<Planned, MissionError> {
-    let PaintingTask { layers, surface, robot, settings, .. } = task;
+    let PaintingTask { layers, surface, planned_robot, settings, .. } = task;
     let stage = Stage::start("compare");
     let mesh = MeshSurface(&surface.world);
     let mut planned = Planned {
@@ -145,11 +145,14 @@ pub(super) fn finish(task: &PaintingTask, Draft { mission, seconds }: Draft) -> 
         layers: Vec::with_capacity(mission.flights.len()),
     };
     for flight in mission.flights {
-        let smoothing = SmoothingPlanner.plan(&flight.route.targets, &mesh, robot, &settings.planner)?;
+        let smoothing = SmoothingPlanner.plan(&flight.route.targets, &mesh, planned_robot.tool(), &settings.planner)?;
         planned.layers.push((flight.route, flight.plan, smoothing));
     }
     let metres: f64 = planned.layers.iter().map(|(_, plan, _)| plan.path_length()).sum();
     let rehearsed = match (planned.kept_off, planned.left_bare) {
+        _ if settings.check_simulated().is_err() => {
+            ", not rehearsed in wind: nothing simulates a pitched hover".to_owned()
+        }
         (0, 0) => String::new(),
         (kept, 0) => format!(", {kept} targets kept farther off after a rehearsal in wind"),
         (kept, bare) => format!(", {kept} targets kept farther off after a rehearsal in wind, {bare} left bare"),
@@ -174,7 +177,7 @@ fn mission_planner<'a, R: Rehearsal>(
         shortest_retry: SHORTEST_RETRY * task.settings.spot,
         ..paint_planner::mission::MissionSettings::default()
     };
-    MissionPlanner { planner, surface, tool: &task.robot, rehearsal, settings }
+    MissionPlanner { planner, surface, tool: task.planned_robot.tool(), rehearsal, settings }
 }
 
 /// The flights of all layers as they are before any rehearsal.

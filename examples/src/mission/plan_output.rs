@@ -8,7 +8,7 @@ use paint_planner::Plan;
 use paint_planner::mission::TargetOutcomes;
 use paint_planner::plan::Setpoint;
 use paint_sim::surface::Hit;
-use ptu_kinematics::Joints;
+use ptu_kinematics::{Joints, PitchingJoints};
 use serde::Serialize;
 
 use super::error::MissionError;
@@ -17,6 +17,7 @@ use super::mission_output::RECORDING_STEP;
 use super::painting_task::PaintingTask;
 use super::path_view::save_path;
 use super::planned_mission::{PlannedMission, share_out_of_reach};
+use super::planned_robot::PlannedRobot;
 use super::preview::expected_depth;
 use super::shading::{shading, vertex_colours};
 use super::trajectory_table::{TRAJECTORY_STEP, cells};
@@ -86,6 +87,9 @@ pub struct PlanFigures {
     pub max_acceleration_m_per_s2: f64,
     /// Greatest planned rate of pan or tilt.
     pub max_joint_rate_rad_per_s: f64,
+    /// Greatest planned pitch of a vehicle that hovers pitched.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_pitch_rad: Option<f64>,
     /// How much of the clearance asked for may be missing along the planned motion; 0: certified, between targets too.
     pub clearance_missing_m: f64,
     /// Planning time on one core.
@@ -136,14 +140,18 @@ pub fn save_plan(mission: &PlannedMission, folder: &Path) -> Result<PlanFigures,
 fn table(mission: &PlannedMission) -> String {
     let mut text = String::from(
         "time_s,layer,x_m,y_m,z_m,heading_rad,vx_m_per_s,vy_m_per_s,vz_m_per_s,pan_rad,tilt_rad,flow_m3_per_s,\
-         target_x_m,target_y_m,target_z_m\n",
+         target_x_m,target_y_m,target_z_m,pitch_rad\n",
     );
     let mut start = 0.0;
     for (layer, (_, plan)) in mission.layers().enumerate() {
         for (time, s) in plan.setpoints(TRAJECTORY_STEP) {
             let (p, v) = (s.sample.position, s.sample.velocity);
-            let row =
-                [p.x, p.y, p.z, s.sample.heading, v.x, v.y, v.z, s.pan, s.tilt, s.flow, s.aim.x, s.aim.y, s.aim.z];
+            let PitchingJoints { pitch, pan, tilt } = mission.task.planned_robot.joints(s.pan, s.tilt);
+            let row = [
+                [p.x, p.y, p.z, s.sample.heading, v.x, v.y, v.z, pan, tilt, s.flow].as_slice(),
+                &[s.aim.x, s.aim.y, s.aim.z, pitch],
+            ]
+            .concat();
             // Writing to a string cannot fail.
             let _ = writeln!(text, "{},{layer},{}", cells(&[start + time]), cells(&row));
         }
@@ -167,14 +175,17 @@ fn save_mcap(mission: &PlannedMission, colours: &[[u8; 3]], folder: &Path) -> Re
     Ok(save_recording(&file, &mesh, &[(0.0, task.paint_style())], &states, &log, &origin)?)
 }
 
-/// The robot as the plan has it: level, with the pan and tilt of the reference.
+/// The robot as the plan has it: without roll, with the joints of the reference.
 fn state(task: &PaintingTask, time: f64, s: &Setpoint) -> RobotState {
     let heading = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), s.sample.heading);
+    let level = Isometry3::from_parts(Translation3::from(s.sample.position), heading);
+    let joints = task.planned_robot.joints(s.pan, s.tilt);
+    let PitchingJoints { pan, tilt, .. } = joints;
     RobotState {
         time,
-        world_from_body: Isometry3::from_parts(Translation3::from(s.sample.position), heading),
-        arm: task.robot.chain.link_poses(Joints { pan: s.pan, tilt: s.tilt }),
-        joints: [s.pan, s.tilt],
+        world_from_body: PlannedRobot::body(&level, &joints),
+        arm: task.robot.chain.link_poses(Joints { pan, tilt }),
+        joints: [pan, tilt],
         hit: Some(s.aim),
         flow: s.flow,
     }
@@ -223,9 +234,18 @@ fn figures(mission: &PlannedMission) -> PlanFigures {
         max_speed_m_per_s: most(&|plan| plan.report.extrema.speed),
         max_acceleration_m_per_s2: most(&|plan| plan.report.extrema.acceleration),
         max_joint_rate_rad_per_s: most(&|plan| plan.report.joint_rate),
+        max_pitch_rad: max_pitch(mission),
         clearance_missing_m: most(&|plan| plan.report.clearance_missing),
         planning_s: planned.seconds,
         wall_s: task.started.elapsed().as_secs_f64(),
         outcomes,
     }
+}
+
+/// Greatest planned pitch, radians; `None` where the vehicle is level.
+fn max_pitch(mission: &PlannedMission) -> Option<f64> {
+    let task = &mission.task;
+    let states = mission.layers().flat_map(|(_, plan)| plan.setpoints(TRAJECTORY_STEP).map(|(_, s)| (s.pan, s.tilt)));
+    let pitch = |(pan, tilt)| task.planned_robot.joints(pan, tilt).pitch.abs();
+    (task.settings.pitch > 0.0).then(|| states.map(pitch).fold(0.0, f64::max))
 }

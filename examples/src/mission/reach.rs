@@ -2,27 +2,23 @@
 
 use paint_planner::constraints::FlightConstraints;
 use paint_planner::mission::reachable_texels;
-use ptu_kinematics::KinematicChain;
 
 use super::error::MissionError;
+use super::planned_robot::{PlannedRobot, elevation};
 use super::settings::MissionSettings;
-use crate::adapters::{MeshSurface, Robot};
+use crate::adapters::MeshSurface;
 use crate::surface::PaintSurface;
 
 /// Whether the robot can paint each texel, row by row: it lies on the surface, its chart is not stretched beyond use there, and
 /// some pose of the robot serves it.
-pub(super) fn texels_in_reach<C: KinematicChain>(
-    surface: &PaintSurface,
-    robot: &Robot<C>,
-    settings: &MissionSettings,
-) -> Result<Vec<bool>, MissionError> {
+pub(super) fn texels_in_reach(surface: &PaintSurface, settings: &MissionSettings) -> Result<Vec<bool>, MissionError> {
     let occupied: Vec<bool> = surface.coverage().data().iter().map(|&covered| covered > 0.0).collect();
     let mesh = MeshSurface(&surface.world);
     let obstacles = settings.constraints.around(&mesh);
-    let reached = reachable_texels(&occupied, surface.width(), surface, &obstacles, robot, &settings.planner)?;
-    let tilt = settings.ptu.tilt_limits.min.abs().min(settings.ptu.tilt_limits.max);
-    // The planner may lean the spray by its incidence angle to reach what the tilt servo alone cannot.
-    let steepest = (tilt + 0.8 * settings.planner.nozzle.incidence).min(std::f64::consts::FRAC_PI_2);
+    let robot = PlannedRobot::new(settings)?;
+    let reached = reachable_texels(&occupied, surface.width(), surface, &obstacles, robot.tool(), &settings.planner)?;
+    // The planner may lean the spray by its incidence angle to reach what the joints alone cannot.
+    let steepest = (elevation(settings) + 0.8 * settings.planner.nozzle.incidence).min(std::f64::consts::FRAC_PI_2);
     Ok(surface.paintable(steepest).into_iter().zip(reached).map(|(paintable, reached)| paintable && reached).collect())
 }
 
@@ -30,15 +26,13 @@ pub(super) fn texels_in_reach<C: KinematicChain>(
 pub(super) fn texels_lost_to_constraints(
     in_reach: &[bool],
     surface: &PaintSurface,
-    robot: &Robot,
     settings: &MissionSettings,
 ) -> Result<Vec<bool>, MissionError> {
     if settings.constraints.is_empty() {
         return Ok(vec![false; in_reach.len()]);
     }
     let free = MissionSettings { constraints: FlightConstraints::default(), ..settings.clone() };
-    let unbound = Robot { tether: None, ..robot.clone() };
-    let mut lost = texels_in_reach(surface, &unbound, &free)?;
+    let mut lost = texels_in_reach(surface, &free)?;
     lost.iter_mut().zip(in_reach).for_each(|(lost, reached)| *lost &= !reached);
     Ok(lost)
 }

@@ -1,20 +1,12 @@
 //! What the parts that the robot does not reach would need: a tilt joint that goes further, a longer arm, a vehicle that hovers pitched.
 
-use nalgebra::Vector3;
-use paint_planner::nozzle::NozzleSettings;
-use ptu_kinematics::{KinematicChain, PitchingPtu, Ptu, PtuSettings, Range};
-
 use super::error::MissionError;
+use super::planned_robot::{STEEPEST, with_pitch, with_tilt};
 use super::reach::texels_in_reach;
 use super::settings::MissionSettings;
-use crate::adapters::Robot;
 use crate::report::ReachNeeds;
 use crate::surface::PaintSurface;
 
-/// How far a tilt joint may go, radians: at 90 degrees the pan joint turns the spray about itself.
-pub(super) const STEEPEST: f64 = 80.0 * std::f64::consts::PI / 180.0;
-/// What the spray keeps of the joint's range, radians: the body leans against the wind.
-pub(super) const KEPT: f64 = 5.0 * std::f64::consts::PI / 180.0;
 /// How much longer an arm is tried, metres.
 const LONGER: f64 = 0.4;
 /// Pitch at which a vehicle with vectored thrust hovers, radians.
@@ -44,43 +36,27 @@ pub(super) fn reach_needs(
         };
         *part += 1.0 / all;
     }
-    let longer = |ptu: PtuSettings| PtuSettings {
-        body_from_pan_axis: ptu.body_from_pan_axis + Vector3::new(LONGER, 0.0, 0.0),
-        ..ptu
+    let longer = |settings: &MissionSettings| {
+        let mut longer = settings.clone();
+        longer.ptu.body_from_pan_axis.x += LONGER;
+        longer
     };
-    let mut served = |reached: Vec<bool>| {
+    let mut served = |settings: &MissionSettings| {
         let mut count = 0.0;
+        let reached = texels_in_reach(surface, settings)?;
         for (open, _) in open.iter_mut().zip(reached).filter(|(open, reached)| **open && *reached) {
             *open = false;
             count += 1.0;
         }
-        count / all
+        Ok::<_, MissionError>(count / all)
     };
     let steep = with_tilt(settings, STEEPEST);
-    needs.reach_needs_tilt_share = served(reached(surface, Ptu::new(steep.ptu)?, &steep)?);
-    let long = MissionSettings { ptu: longer(settings.ptu), ..settings.clone() };
-    needs.reach_needs_arm_share = served(reached(surface, Ptu::new(long.ptu)?, &long)?);
-    let both = MissionSettings { ptu: longer(steep.ptu), ..steep };
-    needs.reach_needs_tilt_and_arm_share = served(reached(surface, Ptu::new(both.ptu)?, &both)?);
-    let pitching = PitchingPtu::new(Ptu::new(both.ptu)?, Range::symmetric(PITCH))?;
-    needs.reach_needs_pitched_vehicle_share = served(reached(surface, pitching, &both)?);
+    let both = longer(&steep);
+    needs.reach_needs_tilt_share = served(&steep)?;
+    needs.reach_needs_arm_share = served(&longer(settings))?;
+    needs.reach_needs_tilt_and_arm_share = served(&both)?;
+    needs.reach_needs_pitch_share = served(&with_pitch(settings, PITCH.max(settings.pitch)))?;
+    needs.reach_needs_pitch_and_arm_share = served(&with_pitch(&longer(settings), PITCH.max(settings.pitch)))?;
     needs.reach_needs_more_share = open.iter().filter(|open| **open).count() as f64 / all;
     Ok(needs)
-}
-
-/// The settings with a tilt joint of this range, radians to both sides, and a spray that rises as far as that allows.
-pub fn with_tilt(settings: &MissionSettings, tilt: f64) -> MissionSettings {
-    let mut changed = settings.clone();
-    changed.ptu.tilt_limits = Range::symmetric(tilt);
-    changed.planner.nozzle = NozzleSettings { max_elevation: tilt - KEPT, ..changed.planner.nozzle };
-    changed
-}
-
-fn reached<C: KinematicChain + Clone>(
-    surface: &PaintSurface,
-    chain: C,
-    settings: &MissionSettings,
-) -> Result<Vec<bool>, MissionError> {
-    let robot = Robot { tether: settings.constraints.tether, ..Robot::new(chain) };
-    texels_in_reach(surface, &robot, settings)
 }

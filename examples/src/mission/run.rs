@@ -48,6 +48,7 @@ impl Mission {
     /// Flies what is planned, and sprays it onto the film.
     pub fn fly(mission: PlannedMission) -> Result<Self, MissionError> {
         let PlannedMission { mut task, planned } = mission;
+        task.settings.check_simulated()?;
         let (planning, unreachable_paint) = (planned.seconds, planned.unreachable_paint);
         let (kept_off, left_bare, outcomes) = (planned.kept_off, planned.left_bare, planned.outcomes);
         let identified = identify(&mut task, &planned)?;

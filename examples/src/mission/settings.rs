@@ -1,5 +1,7 @@
 //! What a mission can be told.
 
+use std::f64::consts::FRAC_PI_3;
+
 use paint_net::Limits;
 use paint_net::painters::LayerPlanning;
 use paint_planner::constraints::FlightConstraints;
@@ -46,6 +48,9 @@ pub struct MissionSettings {
     pub planner: paint_planner::Settings,
     /// The robot's kinematics.
     pub ptu: PtuSettings,
+    /// How far the vehicle pitches up and down while it hovers, radians, at most π/3. Such a vehicle is planned and not simulated. Default 0.
+    #[serde(skip_serializing_if = "is_level")]
+    pub pitch: f64,
     /// The servos of its pan-tilt unit.
     pub servo: ServoSettings,
     /// Who flies it.
@@ -108,6 +113,11 @@ impl LocalisationChoice {
     }
 }
 
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]
+fn is_level(pitch: &f64) -> bool {
+    *pitch == 0.0
+}
+
 fn usual_airframe(airframe: &Airframe) -> bool {
     *airframe == Airframe::default()
 }
@@ -148,6 +158,7 @@ impl Default for MissionSettings {
             limits: Limits { spray_spacing: 2, row_spacing: 3, min_volume: 0.01, ..Limits::default() },
             planner: planner_settings(),
             ptu: PtuSettings::default(),
+            pitch: 0.0,
             servo: ServoSettings::default(),
             controller: ControllerChoice::default(),
             airframe: Airframe::default(),
@@ -171,6 +182,9 @@ impl MissionSettings {
                 return Err(MissionError::Setting { name, value });
             }
         }
+        if !(0.0..=FRAC_PI_3).contains(&self.pitch) {
+            return Err(MissionError::Pitch { value: self.pitch });
+        }
         let (planned, servo) = (self.planner.timing.max_joint_rate, self.servo.max_rate);
         if planned > servo {
             return Err(MissionError::JointRate { planned, servo });
@@ -179,6 +193,14 @@ impl MissionSettings {
             return Err(MissionError::LookConstrained);
         }
         Ok(self.constraints.check()?)
+    }
+
+    /// Refuses a vehicle that nothing simulates.
+    ///
+    /// # Errors
+    /// A vehicle that pitches in hover.
+    pub fn check_simulated(&self) -> Result<(), MissionError> {
+        if self.pitch > 0.0 { Err(MissionError::PitchedFlight) } else { Ok(()) }
     }
 }
 

@@ -17,8 +17,10 @@ pub struct ReachNeeds {
     pub reach_needs_arm_share: f64,
     /// Reached with both, but not with one.
     pub reach_needs_tilt_and_arm_share: f64,
-    /// Reached only by a vehicle that hovers pitched by up to 45 degrees, in planning: none is simulated.
-    pub reach_needs_pitched_vehicle_share: f64,
+    /// Reached by none of these, but by a vehicle that hovers pitched by up to 45 degrees (`--pitch 45`: planned, not simulated).
+    pub reach_needs_pitch_share: f64,
+    /// Reached only by such a vehicle with the longer arm.
+    pub reach_needs_pitch_and_arm_share: f64,
     /// Reached by none of them.
     pub reach_needs_more_share: f64,
 }
@@ -35,7 +37,8 @@ impl ReachNeeds {
             (self.reach_needs_tilt_share, "--tilt 80"),
             (self.reach_needs_arm_share, "an --arm longer by 0.4 m"),
             (self.reach_needs_tilt_and_arm_share, "both"),
-            (self.reach_needs_pitched_vehicle_share, "a vehicle that hovers pitched"),
+            (self.reach_needs_pitch_share, "--pitch 45 (`plan` alone)"),
+            (self.reach_needs_pitch_and_arm_share, "--pitch 45 and the longer arm"),
             (self.reach_needs_more_share, "none of these"),
         ];
         let list = |shares: &[(f64, &str)]| {

@@ -43,6 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
             return Err(RobotError::BuiltInOnly { option }.into());
         }
     }
+    settings.check_simulated()?;
     mission_file.begin_run(folder, "robot")?;
     let coat = mission_file.decide_coats(folder)?.coats.into_iter().next().ok_or(RobotError::NothingToFly)?;
     let mission = PlannedMission::new(coat.task).map_err(|error| mission_file.in_mesh(error))?;

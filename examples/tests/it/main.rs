@@ -41,6 +41,8 @@ mod on_board;
 mod onboard;
 #[cfg(feature = "paint-image")]
 mod paint_image;
+#[cfg(all(feature = "robot", unix))]
+mod pitched_plan;
 mod placement;
 mod recorded;
 mod regions;
