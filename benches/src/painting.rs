@@ -21,8 +21,8 @@ const STOPS: [usize; 6] = [5, 10, 20, 40, 100, 200];
 const VOLUME_NOISE: f64 = 0.2;
 const AIM_NOISE: f64 = 0.5;
 
-/// Prints one JSON object per picture and figure.
-pub fn run(images: &[PathBuf], size: usize, runs: usize) -> Result<(), Box<dyn Error>> {
+/// Prints one JSON object per picture and figure; those of the feedback network with so many passes alone, if they are given.
+pub fn run(images: &[PathBuf], size: usize, runs: usize, passes: Option<usize>) -> Result<(), Box<dyn Error>> {
     let mut pictures: Vec<(String, Image)> = Vec::new();
     for path in images {
         for file in pictures_in(path)? {
@@ -43,6 +43,11 @@ pub fn run(images: &[PathBuf], size: usize, runs: usize) -> Result<(), Box<dyn E
             figures["method"] = json!(format!("paint-net_{method}"));
             println!("{figures}");
         };
+        if let Some(passes) = passes {
+            let painter = Feedback { passes, ..feedback.clone() };
+            print(format!("feedback_p{passes}"), measure(&painter, wanted, &kernel, &Limits::default(), runs)?);
+            continue;
+        }
         let mut painters: Vec<(String, Box<dyn Painter>)> = Vec::new();
         for passes in [2, 3, 4, 5, 6, 8, 12] {
             painters.push((format!("feedback_p{passes}"), Box::new(Feedback { passes, ..feedback.clone() })));
@@ -83,7 +88,7 @@ pub fn run(images: &[PathBuf], size: usize, runs: usize) -> Result<(), Box<dyn E
             print(method.into(), noisy(&feedback, painter.as_ref(), wanted, &kernel, gain)?);
         }
     }
-    seams(&feedback, &kernel, &pictures)
+    if passes.is_some() { Ok(()) } else { seams(&feedback, &kernel, &pictures) }
 }
 
 fn quality(painting: &Painting, wanted: &Image) -> Result<Value, paint_net::Error> {

@@ -11,6 +11,7 @@ mod pass;
 mod real;
 mod response;
 pub(crate) mod safetensors;
+mod tile_buffers;
 mod tile_problem;
 mod tiles;
 #[cfg(any(test, feature = "train"))]
@@ -33,3 +34,4 @@ pub(crate) use tiles::{State, Tiles};
 #[cfg(feature = "train")]
 pub(crate) use unrolled::Unrolled;
 pub use weights::Network;
+pub(crate) use widest::{Work, run as run_widest};

@@ -81,6 +81,9 @@ enum Job {
         /// Runs of which the median is printed
         #[arg(long, default_value_t = 3)]
         runs: usize,
+        /// The feedback network alone, with this many passes
+        #[arg(long, value_name = "PASSES")]
+        passes: Option<usize>,
     },
     /// Paints pictures in several paints, as `paint_baselines.py colour` does
     Colour {
@@ -185,7 +188,7 @@ fn main() -> ExitCode {
         Job::Uv { mesh, runs, save } => uv(&mesh, runs, save.as_deref()),
         Job::Fuzz { first, count } => fuzzed_meshes::run(first, count),
         Job::Split { mesh, splits } => split_meshes::run(&mesh, splits),
-        Job::Paint { image, size, runs } => painting::run(&image, size.into(), runs),
+        Job::Paint { image, size, runs, passes } => painting::run(&image, size.into(), runs, passes),
         Job::Colour { image, runs } => colours::run(&image, runs),
         Job::Sim { count, runs } => sim(count as usize, runs),
         Job::Tsdf { stream, voxel, frames, threads, no_colour, out } => {

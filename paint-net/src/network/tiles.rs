@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use super::footprint_operator::FootprintOperator;
-use super::padded_grid::PaddedGrid;
-use super::pass::{PackedNetwork, Pass};
+use super::pass::PackedNetwork;
 use super::response::Response;
-use super::tile_problem::{Scratch, TileProblem};
+use super::tile_buffers::TileBuffers;
+use super::tile_problem::TileProblem;
 
 /// A problem of any size, in the network's units, worked on in tiles. In every pass each tile has a halo as wide as the pass's
 /// receptive field, so that the tiling does not change a bit of the result.
@@ -44,27 +44,6 @@ type Region = (Range<usize>, Range<usize>);
 /// A row of tiles: its number, and its paint and last steps after the pass.
 type Band<'a> = (usize, (&'a mut [f32], &'a mut [f32]));
 
-/// Buffers of one thread, kept from tile to tile while their size stays the same.
-struct Work {
-    grids: (PaddedGrid, PaddedGrid),
-    pass: Pass<f32>,
-    scratch: Scratch<f32>,
-    paint: Vec<f32>,
-    last_step: Vec<f32>,
-}
-
-impl Work {
-    fn new(problem: &TileProblem<f32>, network: &PackedNetwork<f32>) -> Self {
-        Self {
-            grids: (problem.cells, problem.pixels),
-            pass: Pass::new(problem, &network.architecture()),
-            scratch: Scratch::new(problem),
-            paint: problem.cells.planes(1),
-            last_step: problem.cells.planes(1),
-        }
-    }
-}
-
 impl Tiles<'_> {
     /// Runs the passes of these stages; `progress` is told every stage.
     pub(crate) fn run(&self, stages: Range<usize>, state: &mut State, progress: &mut dyn FnMut(usize)) {
@@ -98,7 +77,7 @@ impl Tiles<'_> {
     fn run_whole(&self, stages: Range<usize>, state: &mut State, progress: &mut dyn FnMut(usize)) {
         let all: Region = (0..self.cells.0, 0..self.cells.1);
         let problem = self.tile_problem(&all);
-        let mut work = Work::new(&problem, self.network);
+        let mut work = TileBuffers::fitting(TileBuffers::kept(), &problem, self.network);
         self.load(&all, &problem, state, &mut work);
         for stage in stages {
             progress(stage);
@@ -109,11 +88,12 @@ impl Tiles<'_> {
             state.paint[at.clone()].copy_from_slice(problem.cells.row(&work.paint, 0, y));
             state.last_step[at].copy_from_slice(problem.cells.row(&work.last_step, 0, y));
         }
+        work.keep();
     }
 
     /// One pass over some bands.
     fn run_bands(&self, stage: usize, before: &State, bands: Vec<Band>) {
-        let mut kept: Option<Work> = None;
+        let mut kept = TileBuffers::kept();
         let (wide, high) = self.cells;
         for (band, (paint, last_step)) in bands {
             let rows = band * self.tile..((band + 1) * self.tile).min(high);
@@ -121,10 +101,7 @@ impl Tiles<'_> {
                 let columns = left..(left + self.tile).min(wide);
                 let region = self.with_halo(&columns, &rows);
                 let problem = self.tile_problem(&region);
-                let mut work = kept
-                    .take()
-                    .filter(|w| w.grids == (problem.cells, problem.pixels))
-                    .unwrap_or_else(|| Work::new(&problem, self.network));
+                let mut work = TileBuffers::fitting(kept.take(), &problem, self.network);
                 self.load(&region, &problem, before, &mut work);
                 self.pass(&problem, stage, &mut work);
                 for y in rows.clone() {
@@ -138,9 +115,12 @@ impl Tiles<'_> {
                 kept = Some(work);
             }
         }
+        if let Some(work) = kept {
+            work.keep();
+        }
     }
 
-    fn pass(&self, problem: &TileProblem<f32>, stage: usize, work: &mut Work) {
+    fn pass(&self, problem: &TileProblem<f32>, stage: usize, work: &mut TileBuffers) {
         work.pass.render(problem, &work.paint, &mut work.scratch);
         work.pass.features(problem, &work.paint, &work.last_step, &mut work.scratch);
         work.pass.predict(problem, self.network, stage);
@@ -190,7 +170,7 @@ impl Tiles<'_> {
     }
 
     /// Puts the state of a rectangle of cells into the buffers.
-    fn load(&self, cells: &Region, problem: &TileProblem<f32>, state: &State, work: &mut Work) {
+    fn load(&self, cells: &Region, problem: &TileProblem<f32>, state: &State, work: &mut TileBuffers) {
         for (j, y) in cells.1.clone().enumerate() {
             let from = y * self.cells.0 + cells.0.start..y * self.cells.0 + cells.0.end;
             problem.cells.row_mut(&mut work.paint, 0, j).copy_from_slice(&state.paint[from.clone()]);

@@ -37,6 +37,25 @@ fn tiles_and_threads_change_no_bit() {
     }
 }
 
+/// Buffers are kept from one painting to the next: between grids of the same size and other strides too.
+#[test]
+fn what_a_thread_painted_before_changes_no_bit() {
+    let kernel = SprayKernel::new(1.0, 3.0).unwrap();
+    let painter = Feedback::shipped().unwrap();
+    let painted = |size: usize, stride: usize| {
+        let wanted = scene(7, size, size);
+        let limits = Limits { spray_spacing: stride, row_spacing: stride, ..Limits::default() };
+        paint(&painter, &PaintProblem::new(&wanted), &kernel, &limits)
+    };
+    for size in 5..12 {
+        for stride in 1..6 {
+            let in_turn = painted(size, stride);
+            let alone = std::thread::scope(|scope| scope.spawn(|| painted(size, stride)).join().unwrap());
+            assert!(in_turn == alone, "{size} pixels, a cell every {stride}");
+        }
+    }
+}
+
 #[test]
 fn a_large_picture_is_the_same_in_tiles_and_whole() {
     let tile = scene(11, 256, 256);
