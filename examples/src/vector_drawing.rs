@@ -32,6 +32,12 @@ pub enum DrawingError {
         /// How many are drawn.
         most: usize,
     },
+    /// Coordinates that no drawing needs.
+    #[error("the drawing has a shape that reaches more than {most} times its size beyond it: cut it off there")]
+    TooFar {
+        /// How far is drawn, sizes of the drawing.
+        most: f32,
+    },
     /// A size without area.
     #[error("the drawing is {width} x {height}: give it a size (viewBox)")]
     Empty {
@@ -60,6 +66,9 @@ pub fn draw_svg(text: &str) -> Result<DynamicImage, DrawingError> {
     let tree = Tree::from_xmltree(&document, &Options::default())?;
     check_depth(tree.root())?;
     let (width, height) = (tree.size().width(), tree.size().height());
+    if !is_within(tree.root(), Transform::identity(), FARTHEST * width.max(height)) {
+        return Err(DrawingError::TooFar { most: FARTHEST });
+    }
     let scale = SIDE / width.max(height);
     let pixels = |length: f32| (length * scale).round().max(2.0) as u32;
     let empty = || DrawingError::Empty { width, height };
@@ -91,6 +100,26 @@ fn check_depth(root: &Group) -> Result<(), DrawingError> {
     Ok(())
 }
 
+/// How far shapes may reach beyond the drawing, in its size. From some 250,000 on the renderer counts pixels beyond 32 bits and stops
+/// the program.
+const FARTHEST: f32 = 1e4;
+
+/// Whether all shapes lie within so many units of the origin: those that clip, mask and fill others too, which are drawn by the
+/// transform of what they belong to.
+fn is_within(group: &Group, picture_from_group: Transform, most: f32) -> bool {
+    group.children().iter().all(|child| {
+        let reach = child.abs_stroke_bounding_box().transform(picture_from_group);
+        let sides = reach.map(|reach| [reach.left(), reach.right(), reach.top(), reach.bottom()]);
+        let mut within = sides.is_some_and(|sides| sides.iter().all(|side| side.abs() <= most));
+        let picture_from_child = picture_from_group.pre_concat(child.abs_transform());
+        child.subroots(|root| within &= is_within(root, picture_from_child, most));
+        let Node::Group(group) = child else { return within };
+        let mut clips = std::iter::successors(group.clip_path(), |clip| clip.clip_path());
+        within &= clips.all(|clip| is_within(clip.root(), picture_from_child.pre_concat(clip.transform()), most));
+        within && is_within(group, picture_from_group, most)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -117,6 +146,32 @@ mod tests {
         for broken in ["", "<svg", "<html/>", "no xml"] {
             assert!(draw_svg(broken).is_err(), "{broken:?}");
         }
+    }
+
+    /// The renderer would stop the program: an overflow beyond 2^31 pixels.
+    #[test]
+    fn shapes_far_beyond_the_drawing_are_refused_wherever_they_serve() {
+        let head = r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 40 20">"#;
+        let far = r#"<circle cx="9" cy="9" r="999999998"/>"#;
+        let rect = r#"<rect x="1" y="2" width="30" height="9""#;
+        let drawn = |body: &str| draw_svg(&format!("{head}{body}</svg>"));
+        for body in [
+            far.to_string(),
+            format!(r#"<g opacity="0.5">{far}</g>"#),
+            format!(r##"<clipPath id="c">{far}</clipPath><g clip-path="url(#c)">{rect}/></g>"##),
+            format!(
+                r##"<clipPath id="c" transform="scale(1e8)">{rect}/></clipPath><g clip-path="url(#c)">{rect}/></g>"##
+            ),
+            format!(r##"<mask id="c">{far}</mask><g mask="url(#c)">{rect}/></g>"##),
+            format!(r#"{rect} transform="scale(1e8)"/>"#),
+            format!(
+                r##"<clipPath id="c">{rect}/></clipPath><g transform="scale(1e8)" clip-path="url(#c)">{rect}/></g>"##
+            ),
+            format!(r##"{rect} stroke="#000" stroke-width="1e9"/>"##),
+        ] {
+            assert!(matches!(drawn(&body), Err(DrawingError::TooFar { .. })), "{body}");
+        }
+        assert!(drawn(r#"<circle cx="9" cy="9" r="9999"/>"#).is_ok(), "a large shape in the background");
     }
 
     #[test]
