@@ -228,7 +228,8 @@ fn rock(file: &Path, seed: u64) -> Result<(), AnyError> {
 
 fn uv(path: &Path, runs: usize, save: Option<&Path>) -> Result<(), AnyError> {
     let mesh = read_mesh(path)?;
-    let (disk, _) = largest_disk(&mesh.positions, &mesh.faces)?;
+    let positions: Vec<[f64; 3]> = mesh.positions.iter().map(|p| p.map(f64::from)).collect();
+    let (disk, _) = largest_disk(&positions, &mesh.faces)?;
     let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     println!(
         "{}",

@@ -50,12 +50,11 @@ pub struct RepairReport {
 /// # Errors
 /// Names the vertex, edge or face when the mesh is empty, not finite, or the kept part is not a disk (possibly with
 /// holes); see [`Error`] for the way out of each.
-pub fn largest_disk(positions: &[[f32; 3]], faces: &[[u32; 3]]) -> Result<(Disk, RepairReport), Error> {
-    let positions: Vec<[f64; 3]> = positions.iter().map(|p| p.map(f64::from)).collect();
-    largest_disk_with(&positions, faces, Repair::default())
+pub fn largest_disk(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Result<(Disk, RepairReport), Error> {
+    largest_disk_with(positions, faces, Repair::default())
 }
 
-/// As [`largest_disk`], with f64 positions and a choice of repairs.
+/// As [`largest_disk`], with a choice of repairs.
 pub fn largest_disk_with(
     positions: &[[f64; 3]],
     faces: &[[u32; 3]],
