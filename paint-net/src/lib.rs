@@ -49,6 +49,12 @@
 //!
 //! Pixels: centres at integers, `x` = column, `y` = row, row 0 at the top. Lengths are in pixels, depths in the unit of the
 //! saturation curve. Every result is the same bytes for the same input.
+//!
+//! | feature | brings |
+//! |---|---|
+//! | `train` | training of both networks, `train` |
+//! | `serde` | settings and results can be stored |
+//! | `tracing` | spans and events for subscribers of `tracing` |
 
 pub mod colour;
 mod error;

@@ -60,6 +60,12 @@
 //! | handheld paper, section IV, Eqs. (1)-(5) | [`gantry`] |
 //! | Paper II, sections 4 and 6, phases of a flight; failsafes, sorties: ours | [`onboard`] |
 //! | VR paper, Algorithm 1, rules (a)-(e), latencies | [`teleop`] |
+//!
+//! | feature | brings |
+//! |---|---|
+//! | `clarabel` | Clarabel as solver of the nozzle program |
+//! | `serde` | settings and results can be stored |
+//! | `tracing` | spans and events for subscribers of `tracing` |
 
 mod angle;
 mod bernstein;

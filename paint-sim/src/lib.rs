@@ -54,6 +54,12 @@
 //! | rigid body with motor lag (textbook; PX4's thrust curve) | motor-level vehicle and its sensors | [`flight::multirotor`] |
 //! | catenary (textbook) | hose force | [`flight::HoseModel::force`] |
 //! | Paper II, Section 7.2 | hit error, distance error, angle errors | [`flight::FlightStatistics`] |
+//!
+//! | feature | brings |
+//! |---|---|
+//! | `gpu` | required paint of droplets on a GPU (wgpu) |
+//! | `serde` | settings and results can be stored |
+//! | `tracing` | spans and events for subscribers of `tracing` |
 
 pub mod colour;
 pub mod droplets;

@@ -39,6 +39,12 @@
 //! | identification of `a`, `b`, `c`, `μ` | not in the thesis; linear least squares | [`calibrate`] |
 //!
 //! Frames: world `z` up; body `x` forward, `y` left, `z` up. Metres, radians, seconds.
+//!
+//! | feature | brings |
+//! |---|---|
+//! | `urdf`, on by default | geometry from a URDF file |
+//! | `serde` | settings and results can be stored |
+//! | `tracing` | spans and events for subscribers of `tracing` |
 
 mod aim;
 mod angle;

@@ -64,6 +64,13 @@
 //!
 //! Frames: the camera's z looks forward, `x` to the right and `y` down in its image; the world is the caller's. Distances
 //! are positive on the camera's side of a surface. Metres.
+//!
+//! | feature | brings |
+//! |---|---|
+//! | `gpu` | the map on a GPU, `gpu::GpuMap` (wgpu) |
+//! | `pose-graph` | pose graphs, `pose_graph` (faer's sparse Cholesky), and what closes loops by them |
+//! | `serde` | settings and results can be stored |
+//! | `tracing` | spans and events for subscribers of `tracing` |
 
 mod blocks;
 #[cfg(feature = "pose-graph")]

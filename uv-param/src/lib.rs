@@ -43,6 +43,11 @@
 //! | thesis 8.3.1, 1 px = 1.25 cm texture | [`texture::TexelMap`], [`texture::Texture`] |
 //! | thesis Eq. (8.1), `p_3D = sum b_i V_i` | [`Chart::locate`], [`Chart::point`] |
 //! | thesis Eq. (8.1), `n`, `w_dir`, `w_pos` | [`nozzle::nozzle_command`] |
+//!
+//! | feature | brings |
+//! |---|---|
+//! | `serde` | settings and results can be stored |
+//! | `tracing` | spans and events for subscribers of `tracing` |
 
 pub mod atlas;
 pub mod chart;

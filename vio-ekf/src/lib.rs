@@ -82,6 +82,13 @@
 //!
 //! Frames: poses are `world_from_body`, world `z` up where [`Alignment::PosYaw`](eval::Alignment::PosYaw) or gravity is meant. Metres, radians,
 //! nanoseconds. Quaternions are Hamilton's; TUM files put the scalar last, EuRoC files first.
+//!
+//! | feature | brings |
+//! |---|---|
+//! | `tune` | search for noise settings, `tune` |
+//! | `yaml` | calibration files of EuRoC folders and of Kalibr |
+//! | `serde` | settings and results can be stored |
+//! | `tracing` | spans and events for subscribers of `tracing` |
 
 pub mod camera;
 mod error;

@@ -34,17 +34,17 @@ impl ReachNeeds {
             (self.unreached_hidden_share, "hollows and what something hides"),
         ];
         let ways = [
-            (self.reach_needs_tilt_share, "--tilt 80"),
-            (self.reach_needs_arm_share, "an --arm longer by 0.4 m"),
-            (self.reach_needs_tilt_and_arm_share, "both"),
-            (self.reach_needs_pitch_share, "--pitch 45 (`plan` alone)"),
-            (self.reach_needs_pitch_and_arm_share, "--pitch 45 and the longer arm"),
-            (self.reach_needs_more_share, "none of these"),
+            (self.reach_needs_tilt_share, "by --tilt 80"),
+            (self.reach_needs_arm_share, "by an --arm longer by 0.4 m"),
+            (self.reach_needs_tilt_and_arm_share, "by both"),
+            (self.reach_needs_pitch_share, "by --pitch 45 (`plan` alone)"),
+            (self.reach_needs_pitch_and_arm_share, "by --pitch 45 and the longer arm"),
+            (self.reach_needs_more_share, "by no switch"),
         ];
         let list = |shares: &[(f64, &str)]| {
             let said = shares.iter().filter(|(share, _)| *share >= 0.0005);
             said.map(|(share, what)| format!("{:.1} % {what}", 100.0 * share)).collect::<Vec<_>>().join(", ")
         };
-        format!("bare: {}; reached with {}", list(&parts), list(&ways))
+        format!("bare: {}; reached: {}", list(&parts), list(&ways))
     }
 }

@@ -74,6 +74,21 @@ fn the_roots_of_the_libraries_have_few_names() {
     }
 }
 
+/// docs.rs shows no features by itself: the table in the crate's documentation has a row for each.
+#[test]
+fn every_feature_of_a_library_is_in_its_table() {
+    for library in LIBRARIES {
+        let folder = workspace().join(library);
+        let manifest: toml::Table = std::fs::read_to_string(folder.join("Cargo.toml")).unwrap().parse().unwrap();
+        let text = std::fs::read_to_string(folder.join("src/lib.rs")).unwrap();
+        let features = manifest["features"].as_table().unwrap();
+        let mut named: Vec<&str> = text.lines().filter_map(|line| line.strip_prefix("//! | `")).collect();
+        named.retain(|row| features.contains_key(row.split('`').next().unwrap()));
+        let expected = features.keys().filter(|feature| *feature != "default").count();
+        assert_eq!(named.len(), expected, "{library}: {named:?}");
+    }
+}
+
 #[test]
 fn files_are_short() {
     let mut found = Vec::new();
