@@ -11,7 +11,7 @@ use paint_net::painters::LayerPlanning;
 
 use crate::mesh_frame::MeshScale;
 use crate::mesh_placement::UpAxis;
-use crate::mission::{LocalisationChoice, PainterChoice};
+use crate::mission::{LocalisationChoice, PainterChoice, PlannerChoice};
 use crate::mission_file::MissionFile;
 use crate::palette_choice::PaletteChoice;
 use crate::picture_placement::{PicturePlacement, PlacementMode};
@@ -80,6 +80,9 @@ pub struct MissionArguments {
     /// Who decides the sprays [default: feedback; fill with --fill]
     #[arg(long)]
     painter: Option<PainterName>,
+    /// Who plans the flights [default: optimal]
+    #[arg(long, value_enum)]
+    planner: Option<PlannerChoice>,
     /// Paint in layers by intensity, a flight for each: decided together, or one after the other as in the thesis [default: one flight whose
     /// flow carries the picture]
     #[arg(long, value_enum, num_args = 0..=1, default_missing_value = "joint", value_name = "PLANNING")]
@@ -266,6 +269,7 @@ impl MissionArguments {
         settings.look |= self.look;
         self.vehicle.apply(settings);
         settings.localisation = self.localisation.map_or(settings.localisation, LocalisationChoice::from);
+        settings.path_planner = self.planner.unwrap_or(settings.path_planner);
         settings.painter = self.painter.map_or(settings.painter, PainterChoice::from);
         settings.viewpoint = self.placement.project.or(settings.viewpoint);
         self.placement.apply(&mut settings.placement);
@@ -366,6 +370,12 @@ mod tests {
         assert_eq!(mission(&[]).unwrap(), MissionFile::default());
         let cut = mission(&["--tank=0.5", "--battery=6", "--identify"]).unwrap().settings;
         assert_eq!((cut.endurance.tank, cut.endurance.battery, cut.identify), (Some(5e-4), Some(360.0), true));
+        let locked = mission(&["--planner=smoothing-locked"]).unwrap();
+        assert_eq!(locked.settings.path_planner, PlannerChoice::SmoothingLocked);
+        locked.write(&file).unwrap();
+        assert!(std::fs::read_to_string(&file).unwrap().contains("path_planner = \"smoothing_locked\""));
+        assert_eq!(mission(&["--mission", path]).unwrap(), locked);
+        assert_eq!(mission(&["--mission", path, "--planner=optimal"]).unwrap(), MissionFile::default());
 
         std::fs::write(&file, "[[paints]]\nname = \"red\"\nfill = 1e-5\n").unwrap();
         assert!(mission(&["--mission", path, "--fill=10"]).unwrap_err().contains("several paints"));

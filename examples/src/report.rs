@@ -70,7 +70,7 @@ pub struct Report {
     pub hit_error_rms_slam_m: f64,
     /// Standard deviation of the distance from nozzle to surface along the spray.
     pub nozzle_distance_std_m: f64,
-    /// Hit error with the pan-tilt unit locked forward.
+    /// Hit error of the smoothing planner's path with pan and tilt at zero.
     pub ptu_locked_hit_error_rms_m: f64,
     /// Pan: actual minus desired, root mean square.
     pub pan_error_rms_rad: f64,
@@ -262,7 +262,7 @@ impl Report {
             ),
             beside(
                 check(
-                    "Hit error with pan-tilt unit locked, ratio",
+                    "Hit error of smoothing plan with gun locked, ratio",
                     locked / self.hit_error_rms_m,
                     Ratio,
                     AtLeast(3.0),

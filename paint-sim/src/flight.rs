@@ -122,9 +122,8 @@ pub fn fly_localised(
     let mut aim = [0.0; 2];
     let mut pan_tilt = [0.0; 2];
     ptu.reset(aim);
-    // A locked unit is flown to see what it is worth: all of its paint counts.
     let mut interlock = InterlockState::new(
-        settings.valve.interlock.filter(|_| !settings.ptu_locked),
+        settings.valve.interlock,
         [ptu.delay(), settings.valve.dead_time].map(|delay| delay / CONTROL_STEP),
     );
 

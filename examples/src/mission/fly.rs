@@ -38,7 +38,7 @@ pub struct LayerFlight {
     pub(super) sorties: usize,
     /// Flown with a localisation that errs by 7 cm.
     pub slam: FlightLog,
-    /// Flown with the pan-tilt unit locked forward.
+    /// The baseline's plan flown with pan and tilt at zero (Paper II, section 7.2).
     pub locked: FlightLog,
 }
 
@@ -65,7 +65,8 @@ pub(super) fn fly(
             told = (localisation, sorties);
             Ok(flight)
         };
-        let [flight, slam, locked] = fly_beside(&plan, task.met(), &task.robot, &faulty, layer as u64, counted)?;
+        let [flight, slam, locked] =
+            fly_beside([&plan, &smoothing], task.met(), &task.robot, &faulty, layer as u64, counted)?;
         let (localisation, sorties) = told;
         flights.push(LayerFlight { route, plan, smoothing, flight, localisation, sorties, slam, locked });
     }
@@ -159,6 +160,7 @@ pub(super) fn counted_flight(plan: &Plan, robot: &Robot, settings: &MissionSetti
         localisation: localisation_noise(settings, usual.localisation),
         valve: Valve { interlock: Some(interlock), ..usual.valve },
         faults: settings.faults,
+        ptu_locked: settings.path_planner.locks_gun(),
         ..usual
     }
 }
@@ -172,21 +174,28 @@ pub(super) fn usual_flight(plan: &Plan, robot: &Robot, settings: &MissionSetting
     }
 }
 
-/// The flight whose paint counts, as it is `counted`, and the same plan with a drifting localisation, and with the pan-tilt unit locked.
+/// The flight whose paint counts, as it is `counted`, the same plan with a drifting localisation, and the smoothing plan with the gun locked.
 fn fly_beside(
-    plan: &Plan,
+    [plan, smoothing]: [&Plan; 2],
     world: &TriangleSurface,
     robot: &Robot,
     settings: &MissionSettings,
     layer: u64,
     counted: impl FnOnce() -> Result<FlightLog, MissionError>,
 ) -> Result<[FlightLog; 3], MissionError> {
-    let usual = usual_flight(plan, robot, settings, layer);
+    let ptu_locked = settings.path_planner.locks_gun();
     let others = [
-        FlightSettings { localisation: Localisation::slam_7cm(), ..usual },
-        FlightSettings { ptu_locked: true, ..usual },
+        (
+            plan,
+            FlightSettings {
+                localisation: Localisation::slam_7cm(),
+                ptu_locked,
+                ..usual_flight(plan, robot, settings, layer)
+            },
+        ),
+        (smoothing, FlightSettings { ptu_locked: true, ..usual_flight(smoothing, robot, settings, layer) }),
     ];
-    let one = |flight: &FlightSettings| fly_plan(plan, None, world, robot, settings, flight, None);
+    let one = |(plan, flight): &(&Plan, FlightSettings)| fly_plan(plan, None, world, robot, settings, flight, None);
     if settings.threads < 2 {
         let (a, [b, c]) = (counted(), others.each_ref().map(one));
         return Ok([a?, b?, c?]);
@@ -210,7 +219,7 @@ pub(super) fn fly_three(
 ) -> Result<[FlightLog; 3], MissionError> {
     let first = counted_flight(plan, robot, settings, layer);
     let counted = || fly_plan(plan, None, world, robot, settings, &first, None);
-    fly_beside(plan, world, robot, settings, layer, counted)
+    fly_beside([plan, plan], world, robot, settings, layer, counted)
 }
 
 #[cfg(test)]

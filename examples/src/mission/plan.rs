@@ -6,7 +6,7 @@ use paint_planner::mission::{
     MissionFlight, MissionPlan, MissionPlanner, NoRehearsal, Rehearsal, Route, Spray, TargetOutcomes,
 };
 use paint_planner::plan::SmoothingPlanner;
-use paint_planner::{Error, OptimalPlanner, Plan, Planner, Settings, Surface, Target, Tool};
+use paint_planner::{Error, Plan, Planner, Settings, Surface, Target, Tool};
 use std::cell::Cell;
 use std::time::Instant;
 
@@ -28,7 +28,7 @@ const SHORTEST_RETRY: f64 = 2.0;
 pub(super) struct Planned {
     /// Targets, plan, and the baseline's plan on the same targets.
     pub(super) layers: Vec<(Route, Plan, Plan)>,
-    /// Time the optimal planner took, seconds on one core.
+    /// Time the planner took, seconds on one core.
     pub(super) seconds: f64,
     /// Paint of layers that no pose of the robot can spray at all, m³.
     pub(super) unreachable_paint: f64,
@@ -40,11 +40,16 @@ pub(super) struct Planned {
     pub(super) outcomes: TargetOutcomes,
 }
 
-/// The optimal planner and the time it takes, seconds.
-#[derive(Default)]
+/// The planner that was chosen and the time it takes, seconds.
 struct TimedPlanner {
-    planner: OptimalPlanner<'static>,
+    planner: Box<dyn Planner>,
     seconds: Cell<f64>,
+}
+
+impl TimedPlanner {
+    fn new(settings: &MissionSettings) -> Self {
+        Self { planner: settings.path_planner.planner(), seconds: Cell::new(0.0) }
+    }
 }
 
 impl Planner for TimedPlanner {
@@ -70,7 +75,7 @@ impl Planner for TimedPlanner {
 /// The flights of all layers while their doses may still change.
 pub(super) struct Draft {
     pub(super) mission: MissionPlan,
-    /// Time the optimal planner took, seconds on one core.
+    /// Time the planner took, seconds on one core.
     seconds: f64,
 }
 
@@ -84,7 +89,7 @@ pub(super) fn draft(task: &PaintingTask) -> Result<Draft, MissionError> {
     let PaintingTask { layers, surface, robot, settings, .. } = task;
     let stage = Stage::start("plan");
     let mesh = MeshSurface(&surface.world);
-    let timed = TimedPlanner::default();
+    let timed = TimedPlanner::new(settings);
     let obstacles = settings.constraints.around(&mesh);
     let rehearsal = WindRehearsal { surface, robot, settings };
     let planner = mission_planner(task, &timed, &obstacles, &rehearsal);
@@ -123,7 +128,7 @@ pub(super) fn draft(task: &PaintingTask) -> Result<Draft, MissionError> {
 pub(super) fn replan(task: &PaintingTask, draft: &mut Draft) -> Result<(), MissionError> {
     let PaintingTask { surface, robot, settings, .. } = task;
     let mesh = MeshSurface(&surface.world);
-    let timed = TimedPlanner::default();
+    let timed = TimedPlanner::new(settings);
     let obstacles = settings.constraints.around(&mesh);
     let rehearsal = WindRehearsal { surface, robot, settings };
     mission_planner(task, &timed, &obstacles, &rehearsal).replan(0, &mut draft.mission)?;
@@ -152,6 +157,9 @@ pub(super) fn finish(task: &PaintingTask, Draft { mission, seconds }: Draft) -> 
     let rehearsed = match (planned.kept_off, planned.left_bare) {
         _ if settings.check_simulated().is_err() => {
             ", not rehearsed in wind: nothing simulates a pitched hover".to_owned()
+        }
+        _ if !settings.path_planner.is_rehearsed() => {
+            ", not rehearsed in wind: this planner ignores collisions".to_owned()
         }
         (0, 0) => String::new(),
         (kept, 0) => format!(", {kept} targets kept farther off after a rehearsal in wind"),
@@ -184,8 +192,8 @@ fn mission_planner<'a, R: Rehearsal>(
 pub(super) fn unrehearsed(task: &PaintingTask) -> Result<MissionPlan, MissionError> {
     let mesh = MeshSurface(&task.surface.world);
     let obstacles = task.settings.constraints.around(&mesh);
-    let optimal = OptimalPlanner::default();
-    let planner = mission_planner(task, &optimal, &obstacles, &NoRehearsal);
+    let chosen = task.settings.path_planner.planner();
+    let planner = mission_planner(task, chosen.as_ref(), &obstacles, &NoRehearsal);
     let mut mission = MissionPlan::default();
     for layer in &task.layers {
         planner.add_layer(layer_route(layer, &task.surface, &task.settings, mission.end().1)?, &mut mission)?;

@@ -20,7 +20,8 @@ pub(super) const GAP_STRIDE: usize = 5;
 /// Winds of the rehearsals are not that of the flight.
 const SALT: u64 = 0x5EED_0F4E;
 
-/// Flights in the usual wind before a surface as the robot knows it; none of a vehicle that is not simulated.
+/// Flights in the usual wind before a surface as the robot knows it; none of a vehicle that is not simulated, nor of a planner that keeps no
+/// clearance that it is told.
 pub(super) struct WindRehearsal<'a> {
     pub(super) surface: &'a PaintSurface,
     pub(super) robot: &'a Robot,
@@ -32,7 +33,7 @@ impl Rehearsal for WindRehearsal<'_> {
 
     fn near_misses(&self, plan: &Plan) -> Result<Vec<NearMiss>, MissionError> {
         let Self { surface, robot, settings } = self;
-        if settings.check_simulated().is_err() {
+        if settings.check_simulated().is_err() || !settings.path_planner.is_rehearsed() {
             return Ok(Vec::new());
         }
         let mesh = MeshSurface(&surface.world);

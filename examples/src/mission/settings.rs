@@ -11,6 +11,7 @@ use ptu_kinematics::{PtuSettings, ServoSettings};
 use serde::{Deserialize, Serialize};
 
 use super::error::MissionError;
+use super::planner_choice::PlannerChoice;
 use crate::picture_placement::PicturePlacement;
 use crate::projection::Viewpoint;
 use paint_sim::flight::{Airframe, Faults};
@@ -44,6 +45,9 @@ pub struct MissionSettings {
     pub layered: Option<LayerPlanning>,
     /// Where sprays may lie, in texels. Default: 2 along a row, rows 3 apart (ours).
     pub limits: Limits,
+    /// Who plans the flights, and whether the gun turns.
+    #[serde(skip_serializing_if = "PlannerChoice::is_default")]
+    pub path_planner: PlannerChoice,
     /// The planner's settings.
     pub planner: paint_planner::Settings,
     /// The robot's kinematics.
@@ -156,6 +160,7 @@ impl Default for MissionSettings {
             painter: PainterChoice::Feedback,
             layered: None,
             limits: Limits { spray_spacing: 2, row_spacing: 3, min_volume: 0.01, ..Limits::default() },
+            path_planner: PlannerChoice::default(),
             planner: planner_settings(),
             ptu: PtuSettings::default(),
             pitch: 0.0,

@@ -19,7 +19,7 @@ use super::simulated_robot::{SimulatedRobot, station};
 use super::udp::fly_udp;
 use crate::autopilot::{OffboardSettings, Px4, Px4Vehicle};
 use crate::interruption::Finishing;
-use crate::mission::{LocalisationChoice, PlannedFlight, PlannedMission};
+use crate::mission::{LocalisationChoice, PlannedFlight, PlannedMission, PlannerChoice};
 use crate::progress::Stage;
 use crate::report::save_figures;
 use crate::whole_file;
@@ -36,9 +36,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
         return Err(RobotError::OwnSenses.into());
     }
     let settings = &mission_file.settings;
-    for (option, given) in
-        [("--tank and --battery", !settings.endurance.is_endless()), ("--identify", settings.identify)]
-    {
+    for (option, given) in [
+        ("--tank and --battery", !settings.endurance.is_endless()),
+        ("--identify", settings.identify),
+        ("--planner smoothing and smoothing-locked", settings.path_planner != PlannerChoice::Optimal),
+    ] {
         if given {
             return Err(RobotError::BuiltInOnly { option }.into());
         }

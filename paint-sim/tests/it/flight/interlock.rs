@@ -59,6 +59,20 @@ fn without_a_pose_the_valve_is_shut() {
     assert!((last - 3.04).abs() < 1e-9, "{last}");
 }
 
+/// A gun that does not turn misses with every gust, and its paint is held back as any other's.
+#[test]
+fn a_locked_gun_paints_only_where_it_happens_to_aim() {
+    let reference = Ellipse { duration: 20.0 };
+    let locked = FlightSettings { ptu_locked: true, ..interlocked(2, Faults::default()) };
+    let log = fly(&reference, &mut arm(), &wall(), &locked).unwrap();
+    let [open, held] = [log.samples.iter().filter(|s| s.flow > 0.0).count(), log.statistics().held_samples];
+    assert!(open > 20 && held > 20, "{open} open, {held} held");
+    assert!(log.samples.windows(2).all(|pair| !(beyond(&pair[0]) && beyond(&pair[1]) && pair[1].flow > 0.0)));
+    let free = FlightSettings { valve: Valve { interlock: None, ..locked.valve }, ..locked };
+    let log = fly(&reference, &mut arm(), &wall(), &free).unwrap();
+    assert!(log.samples.iter().any(|s| beyond(s) && s.flow > 0.0), "nothing to prevent");
+}
+
 #[test]
 fn stuck_servos_and_gusts_beyond_the_limits_shut_the_valve() {
     let gust = Gust { time: 3.0, velocity: Vector3::new(3.0, -18.0, 0.0) };
