@@ -51,6 +51,13 @@ pub(super) fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
+/// Mean and standard deviation of a sample; 0 of nothing.
+pub(super) fn mean_and_deviation(values: &[f64]) -> [f64; 2] {
+    let mean = mean(values);
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    [mean, (squares / values.len().saturating_sub(1).max(1) as f64).sqrt()]
+}
+
 /// The value below which this share of the values lies (the nearest one); 0 of nothing.
 pub(super) fn quantile(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();
@@ -127,6 +134,19 @@ pub fn time_ratio(
 }
 
 impl Evaluation {
+    /// Ranks over the number of all paths as the curves of the paper's Fig. 5, each from best to worst, in per cent: CSV.
+    pub(super) fn rank_curves(&self) -> String {
+        let mut curves = [&self.ranks, &self.greedy_ranks, &self.random_ranks].map(Clone::clone);
+        curves.iter_mut().for_each(|curve| curve.sort_by(f64::total_cmp));
+        let [planned, greedy, random] = curves;
+        let mut table = String::from("trial,planned_percent,greedy_percent,random_percent\n");
+        for k in 0..planned.len() {
+            let [a, b, c] = [planned[k], greedy[k], random[k]].map(|rank| 100.0 * rank);
+            table += &format!("{},{a:.2},{b:.2},{c:.2}\n", k + 1);
+        }
+        table
+    }
+
     fn add(
         &mut self,
         job: &PaintJob,

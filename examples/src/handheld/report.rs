@@ -3,7 +3,7 @@
 use paint_sim::droplets::CoverageFigures;
 use serde::Serialize;
 
-use super::evaluation::{Evaluation, mean, quantile};
+use super::evaluation::{Evaluation, mean, mean_and_deviation, quantile};
 use super::painting::PaintingLog;
 
 /// `report.json`: flat, SI units in the names unless they say otherwise.
@@ -25,6 +25,14 @@ pub struct HandheldReport {
     pub decision_ms_p99: f64,
     /// Processor time of a decision, all threads together, median; 0 without an evaluation.
     pub decision_cpu_ms_median: f64,
+    /// Wall-clock time of a decision, mean and standard deviation, as Table I of the paper has them; 0 without an evaluation.
+    pub decision_ms_mean: f64,
+    /// See above.
+    pub decision_ms_deviation: f64,
+    /// The greedy planner's mean.
+    pub greedy_ms_mean: f64,
+    /// Its standard deviation.
+    pub greedy_ms_deviation: f64,
     /// Wall-clock time with the beam, median.
     pub beam_decision_ms_median: f64,
     /// Mean over the scenarios of rank over number of all paths, by paint placed in simulation.
@@ -90,6 +98,8 @@ impl HandheldReport {
         self.decision_ms_median = quantile(&evaluation.decision_ms, 0.5);
         self.decision_ms_p99 = quantile(&evaluation.decision_ms, 0.99);
         self.decision_cpu_ms_median = quantile(&evaluation.decision_cpu_ms, 0.5);
+        [self.decision_ms_mean, self.decision_ms_deviation] = mean_and_deviation(&evaluation.decision_ms);
+        [self.greedy_ms_mean, self.greedy_ms_deviation] = mean_and_deviation(&evaluation.greedy_ms);
         self.beam_decision_ms_median = quantile(&evaluation.beam_ms, 0.5);
         self.mean_rank_fraction = mean(&evaluation.ranks);
         self.top5_share = evaluation.top5_share();

@@ -31,6 +31,7 @@ use crate::pictures::write_png;
 use crate::progress::Stage;
 use crate::report::save_figures;
 use crate::run_folder;
+use crate::whole_file;
 use crate::worker_threads::worker_threads;
 use crate::{result, say};
 
@@ -232,6 +233,8 @@ fn rank(
     let scenarios = (arguments.scenarios, seeds);
     let evaluation = evaluate(object, &faces, device, settings, scenarios.clone(), &|share| stage.share(0.6 * share))?;
     report.evaluated(&evaluation);
+    let ranks = arguments.out.join("ranks.csv");
+    whole_file::write(&ranks, evaluation.rank_curves()).map_err(|e| HandheldError::unwritable(&ranks, &e))?;
     let literal = HandheldSettings { paper_literal: true, ..settings.clone() };
     let printed = evaluate(object, &faces, device, &literal, scenarios, &|share| stage.share(0.6 + 0.4 * share))?;
     report.paper_literal_mean_rank_fraction = super::evaluation::mean(&printed.ranks);

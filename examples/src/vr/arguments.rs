@@ -46,6 +46,9 @@ pub struct Arguments {
     /// How fast the robot paints what the hand has painted
     #[arg(long, default_value = "dose")]
     timing: Timing,
+    /// The robot's own speed along what it paints, metres per second [default: that of missions, 0.4]
+    #[arg(long, value_name = "M_PER_S")]
+    robot_speed: Option<f64>,
     /// The robot does not follow at once: it flies when it is told to
     #[arg(long)]
     offline: bool,
@@ -120,6 +123,7 @@ impl Arguments {
             texel: self.texel,
             spot: self.spot,
             timing: self.timing,
+            robot_speed: self.robot_speed,
             live: !self.offline,
             ..VrSettings::default()
         };

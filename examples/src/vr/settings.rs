@@ -46,6 +46,9 @@ pub struct VrSettings {
     pub spot: f64,
     /// How fast the robot paints.
     pub timing: Timing,
+    /// The robot's own speed along what it paints, m/s. Default that of missions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub robot_speed: Option<f64>,
     /// Whether the robot follows at once; otherwise it flies when it is told to.
     pub live: bool,
     /// Thresholds of the session.
@@ -63,6 +66,7 @@ impl Default for VrSettings {
             texel: 0.005,
             spot: 0.015,
             timing: Timing::Dose,
+            robot_speed: None,
             live: true,
             session: SessionSettings::default(),
         }
@@ -82,10 +86,19 @@ impl VrSettings {
             ("--spot", self.spot, 1e-3..=0.05, "give metres from 0.001 to 0.05"),
             ("--segment", self.session.segment, 0.02..=10.0, "give metres from 0.02 to 10"),
         ];
-        for (option, value, range, must_be) in sizes {
+        let speed =
+            self.robot_speed.map(|speed| ("--robot-speed", speed, 0.01..=1.0, "give metres per second from 0.01 to 1"));
+        for (option, value, range, must_be) in sizes.into_iter().chain(speed) {
             if !range.contains(&value) {
                 return Err(VrError::Option { option, value, must_be });
             }
+        }
+        if let Some(value) = self.robot_speed.filter(|_| self.timing == Timing::Gradient) {
+            return Err(VrError::Option {
+                option: "--robot-speed",
+                value,
+                must_be: "the hand's is flown with --timing gradient",
+            });
         }
         Ok(())
     }
@@ -101,6 +114,9 @@ impl VrSettings {
         let mut teleop = TeleopSettings::new(&MissionSettings::default().planner);
         teleop.session = self.session.clone();
         teleop.targets.footprint = self.spot;
+        if let Some(speed) = self.robot_speed {
+            teleop.painting.timing.policy = TimingPolicy::Uniform { speed };
+        }
         match self.timing {
             Timing::Dose => {}
             Timing::Uniform => teleop.even_coat = true,
