@@ -4,25 +4,21 @@
 use std::error::Error;
 use std::path::Path;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
+use paint_planner::OptimalPlanner;
 use paint_planner::control::{AttitudeSample, MpcSettings, identify_attitude};
-use paint_planner::{OptimalPlanner, Plan, Planner};
 use paint_sim::FlightSettings;
 use paint_sim::flight::{
-    CascadedController, Command, Controller, ControllerSettings, Estimate, Faults, FlightSample, Gust, HoseModel,
-    Interlock, Localisation, Valve, Wind, fly_with,
+    CascadedController, Command, Controller, ControllerSettings, Estimate, Faults, FlightSample, Gust, Interlock,
+    Localisation, Valve, Wind,
 };
-use paint_sim::flight::{FlightLog, Reference, ReferenceState};
-use paintcopter::adapters::{MeshSurface, MpcController, PlanReference, Robot, ServoPanTilt};
-use paintcopter::mission::MissionSettings;
-use paintcopter::surface::PaintSurface;
-use ptu_kinematics::Ptu;
+use paint_sim::flight::{Reference, ReferenceState};
+use paintcopter::adapters::{MpcController, PlanReference};
 use serde_json::json;
 
-use crate::{Rng, cpu, rock};
+use crate::planned_stroke::{PlannedStroke, hose};
+use crate::{Rng, cpu};
 
-/// Targets of the stroke over the rock, 2.5 cm apart.
-const TARGETS: usize = 800;
 /// Flights of each row.
 const FLIGHTS: u64 = 8;
 /// Flights with each fault, their length, and the time before it, seconds.
@@ -35,44 +31,6 @@ const PERMITTED_MISS: f64 = 0.025;
 const PERMITTED_DISTANCE: f64 = 0.06;
 
 type AnyError = Box<dyn Error>;
-
-/// A stroke over the rock, planned.
-struct Scene {
-    surface: PaintSurface,
-    robot: Robot,
-    plan: Plan,
-    settings: MissionSettings,
-}
-
-impl Scene {
-    fn new() -> Result<Self, AnyError> {
-        let settings = MissionSettings::default();
-        let surface = rock::rock()?;
-        let robot = Robot::new(Ptu::new(settings.ptu)?);
-        let targets = rock::stroke(&surface, TARGETS);
-        let plan = OptimalPlanner::default().plan(&targets, &MeshSurface(&surface.world), &robot, &settings.planner)?;
-        Ok(Self { surface, robot, plan, settings })
-    }
-
-    fn reference(&self) -> PlanReference<'_> {
-        PlanReference {
-            plan: &self.plan,
-            chain: &self.robot.chain,
-            gun_length: self.settings.ptu.tilt_from_tip.norm(),
-            stand_off: self.settings.planner.nozzle.stand_off,
-        }
-    }
-
-    fn fly(
-        &self,
-        reference: &dyn Reference,
-        controller: &mut dyn Controller,
-        settings: &FlightSettings,
-    ) -> Result<FlightLog, AnyError> {
-        let mut gun = ServoPanTilt::new(self.robot.chain.clone(), self.settings.servo)?;
-        Ok(fly_with(reference, controller, &mut gun, &self.surface.world, settings)?)
-    }
-}
 
 /// The controllers that are compared.
 #[derive(Clone, Copy)]
@@ -111,7 +69,7 @@ impl Controller for Timed<'_> {
 /// # Errors
 /// What planner and simulator refuse.
 pub fn run() -> Result<(), AnyError> {
-    let scene = Scene::new()?;
+    let scene = PlannedStroke::new(&OptimalPlanner::default())?;
     let wind = |mean: f64, gust_sigma: f64| Wind { mean: Vector3::new(mean, 0.0, 0.0), gust_sigma, ..Wind::default() };
     for (name, wind) in [("usual", wind(2.0, 0.5)), ("gusts_3m_s", wind(0.0, 3.0))] {
         for (place, localisation) in [("mocap", Localisation::mocap()), ("slam", Localisation::slam_7cm())] {
@@ -132,12 +90,8 @@ pub fn run() -> Result<(), AnyError> {
     Ok(())
 }
 
-fn hose() -> HoseModel {
-    HoseModel { base: Point3::new(-3.0, 0.0, 0.0), length: 9.0, line_density: 0.12, base_on_floor: true }
-}
-
 fn gusts(
-    scene: &Scene,
+    scene: &PlannedStroke,
     fig: &str,
     peer: &str,
     who: Who,
@@ -189,7 +143,7 @@ impl Reference for Part<'_> {
 
 /// Flights with a fault each, somewhere along the stroke: how often the valve is commanded shut at most one control step after the
 /// spray misses, or the pose is lost. The command, not the paint, which follows after the valve's dead time.
-fn faults(scene: &Scene, name: &str, peer: &str, who: Who, faults: Faults) -> Result<(), AnyError> {
+fn faults(scene: &PlannedStroke, name: &str, peer: &str, who: Who, faults: Faults) -> Result<(), AnyError> {
     let mut rng = Rng::new(5);
     let (mut late, mut struck, mut held_before) = (0, 0, 0);
     for seed in 0..FAULTS {

@@ -1,7 +1,7 @@
-"""Draws the plots of the book from the tables in docs/src/plots/*.csv.
+"""Draws the plots of the book from the tables in docs/src/plots/*.csv and docs/src/generated/*.csv.
 
     python3 -m venv .venv && .venv/bin/pip install -r docs/plots/requirements.txt
-    .venv/bin/python docs/plots/plots.py                # writes docs/src/plots/*.svg
+    .venv/bin/python docs/plots/plots.py                # writes docs/src/plots/*.svg and docs/src/generated/*.svg
     .venv/bin/python docs/plots/plots.py --check        # also: the tables that results.md repeats are the same
     .venv/bin/python docs/plots/plots.py --png DIR      # the same as PNG, to look at
 
@@ -20,7 +20,7 @@ matplotlib.use("svg")
 import matplotlib.pyplot as plt  # noqa: E402
 
 SOURCE = Path(__file__).resolve().parent.parent / "src"
-TABLES = SOURCE / "plots"
+TABLES, GENERATED = SOURCE / "plots", SOURCE / "generated"
 OURS, PEER, OTHER, PALE, RULE = "#1f6fb4", "#8a949e", "#d9822b", "#a9cbe8", "#c0392b"
 # Tables that results.md repeats.
 REPEATED = ["missions", "odometry"]
@@ -32,8 +32,8 @@ plt.rcParams.update({
 })
 
 
-def table(name):
-    with open(TABLES / f"{name}.csv", newline="") as file:
+def table(name, folder=TABLES):
+    with open(folder / f"{name}.csv", newline="") as file:
         return list(csv.DictReader(file))
 
 
@@ -224,6 +224,80 @@ def pigments():
     return figure
 
 
+def errors_over_time(axes, rows, curves):
+    for column, label, colour in curves:
+        axes.plot(numbers(rows, "time_s"), numbers(rows, column), color=colour, label=label, linewidth=1.1)
+    axes.legend(loc="upper right", ncols=len(curves), fontsize=8)
+
+
+def fig_6_9():
+    rows = table("fig_6_9", GENERATED)
+    figure, (hits, gun) = plt.subplots(2, 1, figsize=(7.6, 4.6), sharex=True)
+    errors_over_time(hits, rows, [("hit_cm", "gun turning", OURS), ("locked_hit_cm", "gun locked", OTHER)])
+    hits.set(ylabel="hit error, cm", ylim=(0, None))
+    curves = [("yaw_deg", "yaw, degrees", OURS), ("pitch_deg", "pitch, degrees", OTHER), ("distance_cm", "distance, cm", PEER)]
+    errors_over_time(gun, rows, curves)
+    gun.set(ylabel="gun turning: off the plan", xlabel="time, s")
+    return figure
+
+
+def fig_7_4():
+    rows = table("fig_7_4", GENERATED)
+    figure, axes = plt.subplots(figsize=(6.4, 2.8))
+    for column, label, colour, style in [("hand_ml_m", "hand, 0.1 to 1 m/s", PEER, "-"), ("uniform_ml_m", "uniform", OTHER, "-"),
+                                         ("gradient_ml_m", "gradient preserving", OURS, "--")]:
+        axes.plot(numbers(rows, "on_m"), numbers(rows, column), style, color=colour, label=label, linewidth=2.5 if style == "-" else 1.5)
+    axes.set(xlabel="length of the stroke, m", ylabel="paint, ml/m", ylim=(0, None))
+    axes.legend()
+    return figure
+
+
+def fig_7_6():
+    rows = table("fig_7_6", GENERATED)
+    figure, panels = plt.subplots(2, 3, figsize=(8.4, 3.8), sharex=True, sharey="row")
+    titles = ["1 m, robot 8 cm/s", "0.5 m, robot 15 cm/s", "0.1 m, robot 40 cm/s (ours)"]
+    for k, title in enumerate(titles):
+        own = [row for row in rows if row["run"] == str(k + 1)]
+        for axes, curve in zip(panels[:, k], ["time_s", "distance_m"]):
+            shown = [row for row in own if row["curve"] == curve]
+            axes.plot(numbers(shown, "time_s"), numbers(shown, "value"), color=OURS, linewidth=1.2,
+                      drawstyle="steps-post" if curve == "time_s" else "default")
+        panels[0, k].set_title(title)
+        panels[1, k].set_xlabel("time, s")
+    panels[0, 0].set(ylabel="latency in time, s", ylim=(0, None))
+    panels[1, 0].set(ylabel="in distance, m", ylim=(0, None))
+    return figure
+
+
+def fig_7_7():
+    rows = table("fig_7_7", GENERATED)
+    figure, panels = plt.subplots(2, 1, figsize=(7.6, 3.8), sharex=True, sharey=True)
+    for axes, planner in zip(panels, ["smoothing", "optimal"]):
+        errors_over_time(axes, rows, [(f"{planner}_pan_deg", "pan", OURS), (f"{planner}_tilt_deg", "tilt", OTHER)])
+        axes.set(ylabel=f"{planner}, degrees", ylim=(-35, 45))
+    panels[1].set_xlabel("time, s")
+    return figure
+
+
+def handheld_fig_5():
+    rows = table("handheld_fig_5", GENERATED)
+    figure, axes = plt.subplots(figsize=(6.4, 2.8))
+    for column, label, colour in [("planned_percent", "proposed", OURS), ("greedy_percent", "greedy", OTHER), ("random_percent", "random", PEER)]:
+        axes.plot(numbers(rows, "trial"), numbers(rows, column), color=colour, label=label)
+    axes.set(xlabel="trials, the best rank first", ylabel="rank of all paths, %", ylim=(0, 105))
+    axes.legend(loc="upper left")
+    return figure
+
+
+def digest(text):
+    """FNV-1a of the bytes of a table: a plot carries that of the table it shows."""
+    value = 0xCBF29CE484222325
+    for byte in text:
+        value = (value ^ byte) * 0x100000001B3 % 2**64
+    return f"fnv1a:{value:016x}"
+
+
+FROM_GENERATED = [fig_6_9, fig_7_4, fig_7_6, fig_7_7, handheld_fig_5]
 PLOTS = [missions, quadratic_programs, atlases, painters, equal_sprays, integration, odometry, landmarks, cascade, pigments]
 
 
@@ -248,13 +322,17 @@ def main():
     parser.add_argument("--check", action="store_true", help="fail if a figure of a table that results.md repeats is not there")
     parser.add_argument("--png", type=Path, metavar="DIR", help="write PNG into DIR instead")
     arguments = parser.parse_args()
-    for plot in PLOTS:
+    for plot in PLOTS + FROM_GENERATED:
         figure = plot()
+        name = plot.__name__
         if arguments.png:
             arguments.png.mkdir(parents=True, exist_ok=True)
-            figure.savefig(arguments.png / f"{plot.__name__}.png", dpi=110, bbox_inches="tight")
+            figure.savefig(arguments.png / f"{name}.png", dpi=110, bbox_inches="tight")
+        elif plot in FROM_GENERATED:
+            of = digest((GENERATED / f"{name}.csv").read_bytes())
+            figure.savefig(GENERATED / f"{name}.svg", bbox_inches="tight", metadata={"Date": None, "Identifier": of})
         else:
-            figure.savefig(TABLES / f"{plot.__name__}.svg", bbox_inches="tight", metadata={"Date": None})
+            figure.savefig(TABLES / f"{name}.svg", bbox_inches="tight", metadata={"Date": None})
         plt.close(figure)
     missing = check() if arguments.check else []
     print("\n".join(missing), end="\n" if missing else "", file=sys.stderr)
