@@ -36,10 +36,22 @@ impl PlannedStroke {
     /// # Errors
     /// What the planner refuses.
     pub fn new(planner: &dyn Planner) -> Result<Self, Box<dyn Error>> {
-        let settings = MissionSettings::default();
+        Self::with(planner, MissionSettings::default(), &|_| ())
+    }
+
+    /// Plans it by other settings, its targets changed.
+    ///
+    /// # Errors
+    /// What the planner refuses.
+    pub fn with(
+        planner: &dyn Planner,
+        settings: MissionSettings,
+        change: &dyn Fn(&mut Vec<Target>),
+    ) -> Result<Self, Box<dyn Error>> {
         let surface = rock::rock()?;
         let robot = Robot::new(Ptu::new(settings.ptu)?);
-        let targets = rock::stroke(&surface, TARGETS);
+        let mut targets = rock::stroke(&surface, TARGETS);
+        change(&mut targets);
         let plan = planner.plan(&targets, &MeshSurface(&surface.world), &robot, &settings.planner)?;
         Ok(Self { surface, robot, targets, plan, settings })
     }

@@ -1,5 +1,6 @@
 //! The tables and curves of the papers beside ours, as the book shows them: reruns, data, and pages made of the data.
 
+pub mod ablations;
 pub mod baselines;
 pub mod handheld;
 pub mod latency;
@@ -27,9 +28,10 @@ pub type Rerun = fn(Extent, &Path) -> Result<Vec<Table>, Box<dyn Error>>;
 
 /// Reruns in the order of the papers, each with its name; what it needs on the way lies in the folder that it is given. Its first table is
 /// shown as such, the others are drawn by `docs/plots/plots.py`.
-pub const PARTS: [(&str, Rerun); 6] = [
+pub const PARTS: [(&str, Rerun); 7] = [
     ("seeds", |_, _| Ok(vec![seeds::table()])),
     ("flown_baselines", |extent, _| baselines::tables(extent)),
+    ("paper_ii_ablations", |_, _| ablations::tables()),
     ("planners", |extent, _| planners::tables(extent)),
     ("time_allocation", |_, _| time_allocation::tables()),
     ("latency", latency::tables),

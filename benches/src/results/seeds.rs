@@ -43,10 +43,10 @@ const PAPERS: &[(&str, Parts)] = &[
             ["Figs. 6.1; 6.2; 6.11", PHOTO],
             ["Fig. 6.3; Eq. (6.1)", "[kinematics](ptu-kinematics.md)"],
             ["Figs. 6.4; 6.5; 6.7", DESIGN],
-            ["Fig. 6.6", "no row yet: headings with and without smoothing"],
+            ["Fig. 6.6", "[without smoothing](results.md#the-flights-of-paper-ii)"],
             ["Fig. 6.8", "[localised by itself](results.md#localised-by-itself)"],
             ["Fig. 6.9", "[the flights of Paper II](results.md#the-flights-of-paper-ii)"],
-            ["Fig. 6.10", "no row yet: a flight without a model of the surface"],
+            ["Fig. 6.10", "[without a model](results.md#the-flights-of-paper-ii)"],
         ],
     ),
     (

@@ -1,5 +1,6 @@
 //! The planner on many scenarios: how long it takes, and how its paths rank among all there are (handheld paper, Section VI-A).
 
+use std::fmt::Write as _;
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
@@ -136,13 +137,16 @@ pub fn time_ratio(
 impl Evaluation {
     /// Ranks over the number of all paths as the curves of the paper's Fig. 5, each from best to worst, in per cent: CSV.
     pub(super) fn rank_curves(&self) -> String {
-        let mut curves = [&self.ranks, &self.greedy_ranks, &self.random_ranks].map(Clone::clone);
-        curves.iter_mut().for_each(|curve| curve.sort_by(f64::total_cmp));
-        let [planned, greedy, random] = curves;
+        let curve = |ranks: &Vec<f64>| {
+            let mut ranks = ranks.clone();
+            ranks.sort_by(f64::total_cmp);
+            ranks
+        };
+        let [planned, greedy, random] = [&self.ranks, &self.greedy_ranks, &self.random_ranks].map(curve);
         let mut table = String::from("trial,planned_percent,greedy_percent,random_percent\n");
         for k in 0..planned.len() {
             let [a, b, c] = [planned[k], greedy[k], random[k]].map(|rank| 100.0 * rank);
-            table += &format!("{},{a:.2},{b:.2},{c:.2}\n", k + 1);
+            let _ = writeln!(table, "{},{a:.2},{b:.2},{c:.2}", k + 1);
         }
         table
     }
