@@ -117,7 +117,7 @@ def painters():
     rows = table("painters")
     figure, (upper, lower) = plt.subplots(2, 1, figsize=(7.6, 5.2), sharex=True, height_ratios=[3, 1.3])
     # Beside the mark, where it meets no other: (x, y) in points, alignment.
-    places = {"feedback, 6 passes": (3, 8, "right"), "feedback, 4 passes": (-7, -3, "right"), "deconvolution, 40": (0, -13, "center"),
+    places = {"feedback, 6 passes": (3, 8, "right"), "feedback, 4 passes": (0, -13, "center"), "deconvolution, 40": (0, -13, "center"),
               "feedback, three coats": (0, 8, "center"), "deconvolution, 200": (0, 8, "center"), "L-BFGS, 200": (7, 3, "left"),
               "greedy, 1600": (0, -13, "center"), "400 splats": (0, 7, "center")}
     for side, colour, mark, label in [("ours", OURS, "o", "painters of paint-net"), ("peer", PEER, "s", "peers of paint_baselines.py")]:
