@@ -2,6 +2,7 @@
 
 pub mod ablations;
 pub mod baselines;
+mod extent;
 pub mod handheld;
 pub mod latency;
 pub mod planners;
@@ -12,16 +13,8 @@ pub mod time_allocation;
 use std::error::Error;
 use std::path::Path;
 
+pub use extent::Extent;
 use table::Table;
-
-/// How much is rerun.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Extent {
-    /// All that the book shows.
-    Whole,
-    /// As little as tells that each part still runs.
-    Quick,
-}
 
 /// A rerun.
 pub type Rerun = fn(Extent, &Path) -> Result<Vec<Table>, Box<dyn Error>>;

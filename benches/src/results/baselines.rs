@@ -10,7 +10,7 @@ use paint_sim::flight::{
     CascadedController, ControllerSettings, FlightLog, FlightSample, FlightStatistics, Interlock, Valve,
 };
 
-use super::Extent;
+use super::extent::Extent;
 use super::table::{Table, number};
 use crate::planned_stroke::{PlannedStroke, hose};
 

@@ -7,7 +7,7 @@ use clap::Parser as _;
 use paintcopter::handheld::{Arguments, HandheldError, run};
 use serde_json::Value;
 
-use super::Extent;
+use super::extent::Extent;
 use super::table::{Table, number};
 
 /// Runs `handheld` and returns its report, that of a painting that was not finished included.

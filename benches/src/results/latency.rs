@@ -7,7 +7,7 @@ use clap::Parser as _;
 use paintcopter::vr::{Arguments, run};
 use serde_json::Value;
 
-use super::Extent;
+use super::extent::Extent;
 use super::table::{Table, number};
 
 /// Length of the segments, speed of hand and robot (m, m/s), and the printed latencies: the letter's two, then ours.
@@ -65,12 +65,12 @@ pub fn tables(extent: Extent, scratch: &Path) -> Result<Vec<Table>, Box<dyn Erro
         let figure = |name: &str| report[name].as_f64().ok_or_else(|| format!("report.json of vr lacks {name}"));
         let latencies = std::fs::read_to_string(folder.join("latency.csv"))?;
         let mut ranges = Vec::new();
-        for curve in ["time_s", "distance_m"] {
+        for (curve, digits) in [("time_s", 1), ("distance_m", 2)] {
             let points = points(&latencies, curve)?;
             // While hand and robot both paint: after the first segment has come, until the hand stops.
             let painting = points.iter().filter(|[time, _]| (ARRIVAL + 15.0..ARRIVAL + WAY / HAND).contains(time));
             let [least, most] = painting.fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], [_, v]| [a.min(*v), b.max(*v)]);
-            ranges.push(format!("{least:.1} to {most:.1}"));
+            ranges.push(format!("{least:.digits$} to {most:.digits$}"));
             // Lags come every tenth of a second.
             let stride = if curve == "distance_m" { 10 } else { 1 };
             for [time, value] in points.into_iter().step_by(stride) {

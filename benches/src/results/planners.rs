@@ -8,7 +8,7 @@ use paint_sim::FlightSettings;
 use paint_sim::flight::{CascadedController, ControllerSettings, FlightLog, FlightSample};
 use paintcopter::adapters::MeshSurface;
 
-use super::Extent;
+use super::extent::Extent;
 use super::table::{Table, number};
 use crate::cpu::median_seconds;
 use crate::planned_stroke::{PlannedStroke, hose};
