@@ -24,8 +24,10 @@ const RUNS: [Run; 3] = [
     },
     Run { name: "ours: 0.1 m; robot 40 cm/s", options: &[], printed: ["-"; 3] },
 ];
-/// The hand waits so long for the robot, s; the stretch at each end of the painting that is not looked at is as long as a segment takes.
+/// The hand waits so long for the robot, s.
 const ARRIVAL: f64 = 10.0;
+/// Within this time after it the first segment of 1 m is there, s: before, nothing is late yet.
+const FIRST_SEGMENT: f64 = 15.0;
 /// Speed of the hand, m/s, and length of its way, m.
 const HAND: f64 = 0.08;
 const WAY: f64 = 7.75;
@@ -68,7 +70,8 @@ pub fn tables(extent: Extent, scratch: &Path) -> Result<Vec<Table>, Box<dyn Erro
         for (curve, digits) in [("time_s", 1), ("distance_m", 2)] {
             let points = points(&latencies, curve)?;
             // While hand and robot both paint: after the first segment has come, until the hand stops.
-            let painting = points.iter().filter(|[time, _]| (ARRIVAL + 15.0..ARRIVAL + WAY / HAND).contains(time));
+            let painting =
+                points.iter().filter(|[time, _]| (ARRIVAL + FIRST_SEGMENT..ARRIVAL + WAY / HAND).contains(time));
             let [least, most] = painting.fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], [_, v]| [a.min(*v), b.max(*v)]);
             ranges.push(format!("{least:.digits$} to {most:.digits$}"));
             // Lags come every tenth of a second.
