@@ -158,14 +158,14 @@ mod tests {
         for body in [
             far.to_string(),
             format!(r#"<g opacity="0.5">{far}</g>"#),
-            format!(r##"<clipPath id="c">{far}</clipPath><g clip-path="url(#c)">{rect}/></g>"##),
+            format!(r#"<clipPath id="c">{far}</clipPath><g clip-path="url(#c)">{rect}/></g>"#),
             format!(
-                r##"<clipPath id="c" transform="scale(1e8)">{rect}/></clipPath><g clip-path="url(#c)">{rect}/></g>"##
+                r#"<clipPath id="c" transform="scale(1e8)">{rect}/></clipPath><g clip-path="url(#c)">{rect}/></g>"#
             ),
-            format!(r##"<mask id="c">{far}</mask><g mask="url(#c)">{rect}/></g>"##),
+            format!(r#"<mask id="c">{far}</mask><g mask="url(#c)">{rect}/></g>"#),
             format!(r#"{rect} transform="scale(1e8)"/>"#),
             format!(
-                r##"<clipPath id="c">{rect}/></clipPath><g transform="scale(1e8)" clip-path="url(#c)">{rect}/></g>"##
+                r#"<clipPath id="c">{rect}/></clipPath><g transform="scale(1e8)" clip-path="url(#c)">{rect}/></g>"#
             ),
             format!(r##"{rect} stroke="#000" stroke-width="1e9"/>"##),
         ] {
