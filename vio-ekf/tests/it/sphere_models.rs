@@ -69,6 +69,14 @@ fn widest(camera: &Camera) -> f64 {
     (1..3142).map(|k| f64::from(k) * 1e-3).take_while(|&angle| seen(angle)).last().unwrap()
 }
 
+/// Eqs. (43) to (45) with w1 = 1/2 and ξ = 7/8: w2 = (1/2 + 7/8) / sqrt(7/8 + 49/64 + 1) = (11/8) / (13/8).
+#[test]
+fn a_double_sphere_sees_as_far_behind_itself_as_its_equation_says() {
+    let camera = Camera { distortion: Distortion::DoubleSphere([0.875, 1.0 / 3.0]), ..Camera::euroc() };
+    let seen = |cosine: f64| camera.project(&Vector3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine)).is_some();
+    assert!(seen(-11.0 / 13.0 + 1e-6) && !seen(-11.0 / 13.0 - 1e-6));
+}
+
 #[test]
 fn wide_lenses_are_the_geometry_that_they_are_made_of() {
     let mut rng = Rng::new(3);

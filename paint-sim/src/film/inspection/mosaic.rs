@@ -192,3 +192,39 @@ impl Picture<'_> {
         Some(row(top) * (1.0 - low) + row(top + 1) * low)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Isometry3;
+
+    use super::*;
+    use crate::surface::Hit;
+
+    /// No surface.
+    struct Nothing;
+
+    impl Surface for Nothing {
+        fn cast(&self, _: &Point3<f64>, _: &Vector3<f64>, _: f64) -> Option<Hit> {
+            None
+        }
+
+        fn distance(&self, _: &Point3<f64>, max: f64) -> f64 {
+            max
+        }
+    }
+
+    /// Radii count from the principal point, wherever it is, and reach 1 half a diagonal away.
+    #[test]
+    fn the_fall_off_is_that_of_the_radius_around_the_principal_point() {
+        let (width, height) = (60, 80);
+        let world_from_camera = Isometry3::identity();
+        let camera = Camera { fx: 100.0, fy: 200.0, cx: 25.0, cy: 33.0, width, height, world_from_camera };
+        let light = vec![0.5; 60 * 80];
+        let picture = Picture { camera, light: &light };
+        // 15 pixels to the right and 20 down: 25 of the 50 pixels of half a diagonal.
+        let texel = Texel { point: Point3::new(0.3, 0.2, 2.0), normal: -Vector3::z_axis(), area: 1e-4 };
+        let (terms, seen) = picture.see(&texel, &Nothing).unwrap();
+        assert!((terms - Vector3::new(0.25, 0.0625, 0.015625)).norm() < 1e-12, "{terms}");
+        assert!((seen - 0.5).abs() < 1e-7);
+    }
+}

@@ -68,3 +68,28 @@ pub(in crate::atlas) fn angle_deficits(surface: &Surface) -> Vec<f64> {
     }
     deficits
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three right angles meet at a corner of a box; the diagonals of its sides pass some corners and not others.
+    #[test]
+    fn a_right_angle_is_missing_at_every_corner_of_a_box() {
+        let positions: Vec<[f64; 3]> =
+            (0..8).map(|v| [f64::from(v & 1), 2.0 * f64::from(v >> 1 & 1), 3.0 * f64::from(v >> 2)]).collect();
+        let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let mut faces: Vec<[u32; 3]> = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        let closed = Surface::new(&positions, &faces, false).unwrap().0;
+        for deficit in angle_deficits(&closed) {
+            assert!((deficit - TAU / 4.0).abs() < 1e-12, "{deficit}");
+        }
+        // Without the side x = 1 its four corners are on the border.
+        faces.truncate(10);
+        let open = Surface::new(&positions, &faces, false).unwrap().0;
+        for (v, deficit) in angle_deficits(&open).into_iter().enumerate() {
+            let expected = if v & 1 == 1 { TAU } else { TAU / 4.0 };
+            assert!((deficit - expected).abs() < 1e-12, "{v}: {deficit}");
+        }
+    }
+}

@@ -278,6 +278,17 @@ mod tests {
         assert_eq!(runs(map.row(0), 200).collect::<Vec<_>>(), [[60, 70], [128, 128], [190, 199]]);
     }
 
+    #[test]
+    fn maps_meet_where_both_are_marked() {
+        let of = |from: usize, to: usize| {
+            let mut map = Bitmap::new(200, 2);
+            map.set(from, to, 1);
+            map
+        };
+        assert!(of(60, 70).meets(&of(70, 199)));
+        assert!(!of(60, 70).meets(&of(71, 199)) && !of(60, 70).meets(&Bitmap::new(200, 2)));
+    }
+
     /// Against cells looked at one by one.
     #[test]
     fn the_lowest_place_is_that_of_brute_force() {
