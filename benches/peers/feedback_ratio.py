@@ -19,9 +19,8 @@ from argparse import Namespace
 
 import numpy as np
 import paint_baselines as peer
+from ours import library_figures
 
-HERE = os.path.dirname(os.path.abspath(__file__))
-ROOT = os.path.dirname(os.path.dirname(HERE))
 MOST_ITERATIONS = 200
 
 
@@ -49,11 +48,7 @@ def main():
     a.add_argument("--rounds", type=int, default=3)
     a.add_argument("--ours", help="the binary `library_figures` (default: built here with cargo)")
     o = a.parse_args()
-    ours = o.ours
-    if not ours:
-        build = ["cargo", "build", "--release", "-q", "-p", "paintcopter-benches", "--bin", "library_figures"]
-        subprocess.run(build, cwd=ROOT, check=True)
-        ours = os.path.join(ROOT, os.environ.get("CARGO_TARGET_DIR", "target"), "release", "library_figures")
+    ours = o.ours or library_figures()
     lines = []
     for file in sorted(glob.glob(os.path.join(o.folder, "*.png"))):
         ((_, y),) = peer.pictures(Namespace(image=[file], size=128))

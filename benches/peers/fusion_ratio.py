@@ -16,8 +16,9 @@ import subprocess
 import sys
 import tempfile
 
+from ours import library_figures
+
 HERE = os.path.dirname(os.path.abspath(__file__))
-ROOT = os.path.dirname(os.path.dirname(HERE))
 
 
 def last_json(command):
@@ -35,12 +36,7 @@ def main():
     a.add_argument("--rounds", type=int, default=2)
     a.add_argument("--ours", help="the binary `library_figures` (default: built here with cargo)")
     o = a.parse_args()
-    ours = o.ours
-    if not ours:
-        build = ["cargo", "build", "--release", "-q", "-p", "paintcopter-benches", "--bin", "library_figures"]
-        subprocess.run(build, cwd=ROOT, check=True)
-        target = os.environ.get("CARGO_TARGET_DIR", os.path.join(ROOT, "target"))
-        ours = os.path.join(ROOT, target, "release", "library_figures")
+    ours = o.ours or library_figures()
     peers = [sys.executable, os.path.join(HERE, "mapping_peers.py")]
     with tempfile.TemporaryDirectory() as folder:
         for voxel in o.voxel:

@@ -21,8 +21,8 @@ const STOPS: [usize; 6] = [5, 10, 20, 40, 100, 200];
 const VOLUME_NOISE: f64 = 0.2;
 const AIM_NOISE: f64 = 0.5;
 
-/// Prints one JSON object per picture and figure; those of the feedback network with so many passes alone, if they are given.
-pub fn run(images: &[PathBuf], size: usize, runs: usize, passes: Option<usize>) -> Result<(), Box<dyn Error>> {
+/// Inks of the pictures at these places, with their names; the procedural ones if there are none.
+fn pictures(images: &[PathBuf], size: usize) -> Result<Vec<(String, Image)>, Box<dyn Error>> {
     let mut pictures: Vec<(String, Image)> = Vec::new();
     for path in images {
         for file in pictures_in(path)? {
@@ -33,21 +33,37 @@ pub fn run(images: &[PathBuf], size: usize, runs: usize, passes: Option<usize>) 
     if images.is_empty() {
         pictures.extend(Texture::ALL.map(|t| (format!("proc-{t:?}").to_lowercase(), t.image(1000, size))));
     }
-    // The peers' nozzle: σ = 2 px cut at 4 px.
-    let kernel = SprayKernel::new(2.0, 2.0)?;
+    Ok(pictures)
+}
+
+/// The peers' nozzle: σ = 2 px cut at 4 px.
+fn nozzle() -> Result<SprayKernel, paint_net::Error> {
+    SprayKernel::new(2.0, 2.0)
+}
+
+fn print(image: &str, method: &str, mut figures: Value) {
+    figures["image"] = json!(image);
+    figures["method"] = json!(format!("paint-net_{method}"));
+    println!("{figures}");
+}
+
+/// Prints one JSON object per picture: the feedback network with so many passes.
+pub fn run_feedback(images: &[PathBuf], size: usize, runs: usize, passes: usize) -> Result<(), Box<dyn Error>> {
+    let (painter, kernel) = (Feedback { passes, ..Feedback::shipped()? }, nozzle()?);
+    for (name, wanted) in pictures(images, size)? {
+        let figures = measure(&painter, &wanted, &kernel, &Limits::default(), runs)?;
+        print(&name, &format!("feedback_p{passes}"), figures);
+    }
+    Ok(())
+}
+
+/// Prints one JSON object per picture and figure.
+pub fn run(images: &[PathBuf], size: usize, runs: usize) -> Result<(), Box<dyn Error>> {
+    let (pictures, kernel) = (pictures(images, size)?, nozzle()?);
     // The figures that are quoted are those of eight passes, wherever nothing else is said.
     let feedback = Feedback { passes: 8, ..Feedback::shipped()? };
     for (name, wanted) in &pictures {
-        let print = |method: String, mut figures: Value| {
-            figures["image"] = json!(name);
-            figures["method"] = json!(format!("paint-net_{method}"));
-            println!("{figures}");
-        };
-        if let Some(passes) = passes {
-            let painter = Feedback { passes, ..feedback.clone() };
-            print(format!("feedback_p{passes}"), measure(&painter, wanted, &kernel, &Limits::default(), runs)?);
-            continue;
-        }
+        let print = |method: String, figures: Value| print(name, &method, figures);
         let mut painters: Vec<(String, Box<dyn Painter>)> = Vec::new();
         for passes in [2, 3, 4, 5, 6, 8, 12] {
             painters.push((format!("feedback_p{passes}"), Box::new(Feedback { passes, ..feedback.clone() })));
@@ -88,7 +104,7 @@ pub fn run(images: &[PathBuf], size: usize, runs: usize, passes: Option<usize>) 
             print(method.into(), noisy(&feedback, painter.as_ref(), wanted, &kernel, gain)?);
         }
     }
-    if passes.is_some() { Ok(()) } else { seams(&feedback, &kernel, &pictures) }
+    seams(&feedback, &kernel, &pictures)
 }
 
 fn quality(painting: &Painting, wanted: &Image) -> Result<Value, paint_net::Error> {

@@ -5,7 +5,9 @@ use std::error::Error;
 use nalgebra::Point3;
 use paint_planner::{Plan, Planner, Target};
 use paint_sim::FlightSettings;
-use paint_sim::flight::{Controller, FlightLog, HoseModel, Reference, fly_with};
+use paint_sim::flight::{
+    CascadedController, Controller, ControllerSettings, FlightLog, HoseModel, Reference, fly_with,
+};
 use paintcopter::adapters::{MeshSurface, PlanReference, Robot, ServoPanTilt};
 use paintcopter::mission::MissionSettings;
 use paintcopter::surface::PaintSurface;
@@ -78,6 +80,15 @@ impl PlannedStroke {
     ) -> Result<FlightLog, Box<dyn Error>> {
         let mut gun = ServoPanTilt::new(self.robot.chain.clone(), self.settings.servo)?;
         Ok(fly_with(reference, controller, &mut gun, &self.surface.world, settings)?)
+    }
+
+    /// Flies the plan with the usual controller.
+    ///
+    /// # Errors
+    /// What the simulator refuses.
+    pub fn fly_plan(&self, settings: &FlightSettings) -> Result<FlightLog, Box<dyn Error>> {
+        let mut controller = CascadedController::new(settings.airframe, ControllerSettings::default());
+        self.fly(&self.reference(), &mut controller, settings)
     }
 }
 

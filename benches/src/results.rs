@@ -2,11 +2,12 @@
 
 pub mod ablations;
 pub mod baselines;
+mod excerpt;
 mod extent;
 pub mod handheld;
 pub mod latency;
+pub mod papers;
 pub mod planners;
-pub mod seeds;
 pub mod table;
 pub mod time_allocation;
 
@@ -22,7 +23,7 @@ pub type Rerun = fn(Extent, &Path) -> Result<Vec<Table>, Box<dyn Error>>;
 /// Reruns in the order of the papers, each with its name; what it needs on the way lies in the folder that it is given. Its first table is
 /// shown as such, the others are drawn by `docs/plots/plots.py`.
 pub const PARTS: [(&str, Rerun); 7] = [
-    ("seeds", |_, _| Ok(vec![seeds::table()])),
+    ("papers", |_, _| Ok(vec![papers::table()])),
     ("flown_baselines", |extent, _| baselines::tables(extent)),
     ("paper_ii_ablations", |_, _| ablations::tables()),
     ("planners", |extent, _| planners::tables(extent)),
@@ -78,7 +79,7 @@ mod tests {
     #[test]
     fn the_places_of_the_papers_parts_exist() {
         let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/src");
-        let table = seeds::table();
+        let table = papers::table();
         let links: Vec<&str> =
             table.rows.iter().filter_map(|row| Some(row[2].split_once("](")?.1.split_once(')')?.0)).collect();
         assert!(links.len() > 15, "{links:?}");

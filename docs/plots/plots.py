@@ -246,7 +246,7 @@ def fig_7_4():
     figure, axes = plt.subplots(figsize=(6.4, 2.8))
     for column, label, colour, style in [("hand_ml_m", "hand, 0.1 to 1 m/s", PEER, "-"), ("uniform_ml_m", "uniform", OTHER, "-"),
                                          ("gradient_ml_m", "gradient preserving", OURS, "--")]:
-        axes.plot(numbers(rows, "on_m"), numbers(rows, column), style, color=colour, label=label, linewidth=2.5 if style == "-" else 1.5)
+        axes.plot(numbers(rows, "arc_length_m"), numbers(rows, column), style, color=colour, label=label, linewidth=2.5 if style == "-" else 1.5)
     axes.set(xlabel="length of the stroke, m", ylabel="paint, ml/m", ylim=(0, None))
     axes.legend()
     return figure

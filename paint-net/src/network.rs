@@ -34,4 +34,3 @@ pub(crate) use tiles::{State, Tiles};
 #[cfg(feature = "train")]
 pub(crate) use unrolled::Unrolled;
 pub use weights::Network;
-pub(crate) use widest::{Work, run as run_widest};

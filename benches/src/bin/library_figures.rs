@@ -188,7 +188,10 @@ fn main() -> ExitCode {
         Job::Uv { mesh, runs, save } => uv(&mesh, runs, save.as_deref()),
         Job::Fuzz { first, count } => fuzzed_meshes::run(first, count),
         Job::Split { mesh, splits } => split_meshes::run(&mesh, splits),
-        Job::Paint { image, size, runs, passes } => painting::run(&image, size.into(), runs, passes),
+        Job::Paint { image, size, runs, passes: Some(passes) } => {
+            painting::run_feedback(&image, size.into(), runs, passes)
+        }
+        Job::Paint { image, size, runs, passes: None } => painting::run(&image, size.into(), runs),
         Job::Colour { image, runs } => colours::run(&image, runs),
         Job::Sim { count, runs } => sim(count as usize, runs),
         Job::Tsdf { stream, voxel, frames, threads, no_colour, out } => {

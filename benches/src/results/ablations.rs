@@ -8,7 +8,7 @@ use paint_planner::plan::SmoothingPlanner;
 use paint_planner::trajectory::Sample;
 use paint_planner::{Plan, Surface as _, Target};
 use paint_sim::FlightSettings;
-use paint_sim::flight::{CascadedController, ControllerSettings, FlightSample};
+use paint_sim::flight::FlightSample;
 use paintcopter::adapters::MeshSurface;
 use paintcopter::mission::MissionSettings;
 
@@ -86,8 +86,7 @@ fn before_the_wall(modelled: bool) -> Result<[f64; 5], Box<dyn Error>> {
     };
     let stroke = PlannedStroke::with(&SmoothingPlanner, MissionSettings::default(), &flat)?;
     let settings = FlightSettings { hose: Some(hose()), ptu_locked: !modelled, ..FlightSettings::default() };
-    let mut controller = CascadedController::new(settings.airframe, ControllerSettings::default());
-    let log = stroke.fly(&stroke.reference(), &mut controller, &settings)?;
+    let log = stroke.fly_plan(&settings)?;
     let wall = MeshSurface(&stroke.surface.world);
     // Where the pattern is on the wall, seen from the front.
     let wanted =

@@ -6,19 +6,15 @@ use nalgebra::UnitVector3;
 use paint_planner::plan::SmoothingPlanner;
 use paint_planner::{OptimalPlanner, Plan, Planner};
 use paint_sim::FlightSettings;
-use paint_sim::flight::{
-    CascadedController, ControllerSettings, FlightLog, FlightSample, FlightStatistics, Interlock, Valve,
-};
+use paint_sim::flight::{FlightLog, FlightSample, FlightStatistics, Interlock, Valve};
 
+use super::excerpt::excerpt;
 use super::extent::Extent;
 use super::table::{Table, number};
 use crate::planned_stroke::{PlannedStroke, hose};
 
 /// Flights of each column; of a quick run.
 const FLIGHTS: [u64; 2] = [8, 1];
-/// Part of the first flight that is drawn, s, as long as that of the paper's figure, and samples of the log between two of its rows.
-const SHOWN: [f64; 2] = [10.0, 40.0];
-const STRIDE: usize = 10;
 
 /// A plan, and flights along it in as many winds.
 struct Column {
@@ -36,8 +32,7 @@ impl Column {
                 let valve = Valve { interlock, ..Valve::default() };
                 let settings =
                     FlightSettings { valve, ptu_locked, hose: Some(hose()), seed, ..FlightSettings::default() };
-                let mut controller = CascadedController::new(settings.airframe, ControllerSettings::default());
-                stroke.fly(&stroke.reference(), &mut controller, &settings)
+                stroke.fly_plan(&settings)
             };
             (0..flights).map(flight).collect::<Result<Vec<_>, _>>()
         };
@@ -129,8 +124,7 @@ fn curves([turning, locked, _]: &[Column; 3]) -> Table {
     let mut table =
         Table::new("fig_6_9", &["time_s", "hit_cm", "locked_hit_cm", "yaw_deg", "pitch_deg", "distance_cm"]);
     let hit = |s: &FlightSample| s.hit.zip(s.aim).map(|(hit, aim)| 100.0 * (hit - aim).norm());
-    let pairs = turning.flights[0].samples.iter().zip(&locked.flights[0].samples).step_by(STRIDE);
-    for (s, locked) in pairs.filter(|(s, _)| (SHOWN[0]..SHOWN[1]).contains(&s.time)) {
+    for (s, locked) in excerpt(&turning.flights[0], &locked.flights[0]) {
         let (Some(error), Some(locked)) = (hit(s), hit(locked)) else { continue };
         let [yaw, pitch] = gun_error(&turning.stroke.plan, s);
         let cells = [error, locked, yaw, pitch, 100.0 * (s.distance - s.wanted_distance)];

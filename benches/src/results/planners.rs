@@ -5,17 +5,15 @@ use std::error::Error;
 use paint_planner::plan::SmoothingPlanner;
 use paint_planner::{OptimalPlanner, Planner};
 use paint_sim::FlightSettings;
-use paint_sim::flight::{CascadedController, ControllerSettings, FlightLog, FlightSample};
+use paint_sim::flight::{FlightLog, FlightSample};
 use paintcopter::adapters::MeshSurface;
 
+use super::excerpt::excerpt;
 use super::extent::Extent;
 use super::table::{Table, number};
 use crate::cpu::median_seconds;
 use crate::planned_stroke::{PlannedStroke, hose};
 
-/// Part of the flight that is drawn, s, and samples of the log between two of its rows.
-const SHOWN: [f64; 2] = [10.0, 40.0];
-const STRIDE: usize = 10;
 /// Runs of which the median is taken; of a quick run.
 const RUNS: [usize; 2] = [9, 3];
 
@@ -30,14 +28,13 @@ impl Column {
     fn new(planner: &dyn Planner, extent: Extent) -> Result<Self, Box<dyn Error>> {
         let stroke = PlannedStroke::new(planner)?;
         let settings = FlightSettings { hose: Some(hose()), ..FlightSettings::default() };
-        let mut controller = CascadedController::new(settings.airframe, ControllerSettings::default());
-        let flight = stroke.fly(&stroke.reference(), &mut controller, &settings)?;
+        let flight = stroke.fly_plan(&settings)?;
         let mesh = MeshSurface(&stroke.surface.world);
         let [metre, half] = [1.0, 0.5].map(|length| {
-            let mut on = 0.0;
+            let mut arc_length = 0.0;
             let steps = stroke.targets.windows(2).take_while(|pair| {
-                on += (pair[1].point - pair[0].point).norm();
-                on < length
+                arc_length += (pair[1].point - pair[0].point).norm();
+                arc_length < length
             });
             let targets = &stroke.targets[..=steps.count()];
             let plan = || planner.plan(targets, &mesh, &stroke.robot, &stroke.settings.planner);
@@ -120,8 +117,7 @@ pub fn tables(extent: Extent) -> Result<Vec<Table>, Box<dyn Error>> {
 fn curves([smoothing, optimal]: &[Column; 2]) -> Table {
     let head = ["time_s", "smoothing_pan_deg", "smoothing_tilt_deg", "optimal_pan_deg", "optimal_tilt_deg"];
     let mut table = Table::new("fig_7_7", &head);
-    let pairs = smoothing.flight.samples.iter().zip(&optimal.flight.samples).step_by(STRIDE);
-    for (a, b) in pairs.filter(|(s, _)| (SHOWN[0]..SHOWN[1]).contains(&s.time)) {
+    for (a, b) in excerpt(&smoothing.flight, &optimal.flight) {
         let angles = [a.pan_tilt[0], a.pan_tilt[1], b.pan_tilt[0], b.pan_tilt[1]];
         let [a_pan, a_tilt, b_pan, b_tilt] = angles.map(|angle| number(angle.to_degrees(), 2));
         table.row([number(a.time, 2), a_pan, a_tilt, b_pan, b_tilt]);

@@ -24,11 +24,11 @@ const STEP: f64 = 1e-4;
 /// Paint on each cell of a stroke, millilitres per metre.
 fn density(plan: &Plan, length: f64) -> Vec<f64> {
     let mut cells = vec![0.0; (length / CELL).ceil() as usize];
-    let (mut on, mut before) = (0.0, plan.setpoint(0.0));
+    let (mut arc_length, mut before) = (0.0, plan.setpoint(0.0));
     for k in 1..=(plan.trajectory.duration() / STEP) as usize {
         let here = plan.setpoint(k as f64 * STEP);
-        on += (here.aim - before.aim).norm();
-        let cell = ((on / CELL) as usize).min(cells.len() - 1);
+        arc_length += (here.aim - before.aim).norm();
+        let cell = ((arc_length / CELL) as usize).min(cells.len() - 1);
         cells[cell] += 0.5 * (here.flow + before.flow) * STEP * 1e6 / CELL;
         before = here;
     }
@@ -46,13 +46,13 @@ pub fn tables() -> Result<Vec<Table>, Box<dyn Error>> {
     let mut targets = rock::stroke(&surface, TARGETS);
     let steps: Vec<f64> = targets.windows(2).map(|pair| (pair[1].point - pair[0].point).norm()).collect();
     let length: f64 = steps.iter().sum();
-    let speed = |on: f64| HAND[0] + (HAND[1] - HAND[0]) * on / length;
-    let (mut on, mut time) = (0.0, 0.0);
+    let speed = |arc_length: f64| HAND[0] + (HAND[1] - HAND[0]) * arc_length / length;
+    let (mut arc_length, mut time) = (0.0, 0.0);
     for (target, step) in targets.iter_mut().zip(steps.iter().copied().chain([0.0])) {
-        let duration = step / speed(on + 0.5 * step);
+        let duration = step / speed(arc_length + 0.5 * step);
         // Paint per metre.
-        (target.time, target.dose) = (Some(time), FLOW / speed(on));
-        (on, time) = (on + step, time + duration);
+        (target.time, target.dose) = (Some(time), FLOW / speed(arc_length));
+        (arc_length, time) = (arc_length + step, time + duration);
     }
     let plan = |targets: &[Target], policy| {
         let mut settings = settings.clone();
@@ -99,7 +99,7 @@ fn table(hand: &[f64], [uniform, gradient]: &[Vec<f64>; 2], plans: [&Plan; 2], t
 }
 
 fn curves(hand: &[f64], [uniform, gradient]: &[Vec<f64>; 2]) -> Table {
-    let mut table = Table::new("fig_7_4", &["on_m", "hand_ml_m", "uniform_ml_m", "gradient_ml_m"]);
+    let mut table = Table::new("fig_7_4", &["arc_length_m", "hand_ml_m", "uniform_ml_m", "gradient_ml_m"]);
     for k in 0..hand.len() - 1 {
         let [a, b, c] = [hand[k], uniform[k], gradient[k]].map(|density| number(density, 4));
         table.row([number((k as f64 + 0.5) * CELL, 2), a, b, c]);

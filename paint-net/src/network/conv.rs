@@ -137,7 +137,7 @@ fn accumulate<T: Real, const N: usize>(
         let from = &input[offset..][..BLOCK];
         for (sum, &weight) in sums.iter_mut().zip(weights) {
             for (s, &v) in sum.iter_mut().zip(from) {
-                *s = weight.mul_add(v, *s);
+                *s += weight * v;
             }
         }
     }
@@ -187,7 +187,7 @@ fn correlate<T: Real>(mut sums: [[T; WIDE]; UPS], ups: [&[T]; UPS], from: &[T]) 
         for (sum, up) in sums.iter_mut().zip(ups) {
             let up = &up[b * WIDE..][..WIDE];
             for ((s, &u), &v) in sum.iter_mut().zip(up).zip(from) {
-                *s = u.mul_add(v, *s);
+                *s += u * v;
             }
         }
     }

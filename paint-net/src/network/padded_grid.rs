@@ -1,7 +1,6 @@
 //! Stacks of planes with margins.
 
 use super::real::Real;
-use super::widest::{self, Work};
 
 /// Values that one inner loop handles: every row of a plane may be read and written in blocks of this many, beyond its end too.
 pub(crate) const BLOCK: usize = 16;
@@ -64,27 +63,14 @@ impl PaddedGrid {
 
 /// `out[m] = Σ_k tap_k · source[offset_k + m]` over whole blocks.
 pub(crate) fn weighted_sum<T: Real>(out: &mut [T], source: &[T], terms: &[(usize, T)]) {
-    widest::run(WeightedSum { out, source, terms });
-}
-
-struct WeightedSum<'a, T> {
-    out: &'a mut [T],
-    source: &'a [T],
-    terms: &'a [(usize, T)],
-}
-
-impl<T: Real> Work for WeightedSum<'_, T> {
-    #[inline(always)]
-    fn run(self) {
-        for (b, out) in self.out.chunks_exact_mut(BLOCK).enumerate() {
-            let mut sum = [T::default(); BLOCK];
-            for &(offset, tap) in self.terms {
-                let from = &self.source[offset + b * BLOCK..][..BLOCK];
-                for (s, &v) in sum.iter_mut().zip(from) {
-                    *s = tap.mul_add(v, *s);
-                }
+    for (b, out) in out.chunks_exact_mut(BLOCK).enumerate() {
+        let mut sum = [T::default(); BLOCK];
+        for &(offset, tap) in terms {
+            let from = &source[offset + b * BLOCK..][..BLOCK];
+            for (s, &v) in sum.iter_mut().zip(from) {
+                *s += tap * v;
             }
-            out.copy_from_slice(&sum);
         }
+        out.copy_from_slice(&sum);
     }
 }

@@ -5,7 +5,6 @@ use super::conv::{Packed, Start};
 use super::padded_grid::{BLOCK, PaddedGrid};
 use super::real::Real;
 use super::tile_problem::{Scratch, TileProblem};
-use super::widest::{self, Work};
 
 /// Damping of the missing depth `r w / (w² + damping)` of a pixel: where ink is saturated, no depth is missing.
 pub(super) const DAMPING: f64 = 0.05;
@@ -75,28 +74,6 @@ pub(crate) struct Pass<T> {
     pub(crate) step: Vec<T>,
 }
 
-/// A row of pixels: ink, slope of the response, wanted ink and weight give weighted residual, curvature and missing depth.
-struct Residuals<'a, T> {
-    seen: [&'a [T]; 4],
-    terms: [&'a mut [T]; 3],
-    damping: T,
-}
-
-impl<T: Real> Work for Residuals<'_, T> {
-    #[inline(always)]
-    fn run(self) {
-        let [ink, slope, wanted, weight] = self.seen;
-        let [weighted_residual, curvature_term, missing] = self.terms;
-        let pixels = ink.iter().zip(slope).zip(wanted).zip(weight);
-        let terms = weighted_residual.iter_mut().zip(curvature_term).zip(missing);
-        for ((((&ink, &w), &wanted), &weight), ((residual, curvature), missing)) in pixels.zip(terms) {
-            *residual = weight * w * (wanted - ink);
-            *curvature = weight * w * w;
-            *missing = *residual / (w * w + self.damping);
-        }
-    }
-}
-
 /// Planes of the inputs.
 pub(super) mod input {
     pub(crate) const MISSING: usize = 0;
@@ -148,11 +125,12 @@ impl<T: Real> Pass<T> {
             let (wanted, weight) = (&problem.wanted[at.clone()], &problem.weight[at.clone()]);
             let (weighted_residual, curvature_term, missing) =
                 (&mut weighted_residual[at.clone()], &mut curvature_term[at.clone()], &mut missing[at]);
-            widest::run(Residuals {
-                seen: [ink, slope, wanted, weight],
-                terms: [weighted_residual, curvature_term, missing],
-                damping,
-            });
+            for k in 0..ink.len() {
+                let (w, r, weight) = (slope[k], wanted[k] - ink[k], weight[k]);
+                weighted_residual[k] = weight * w * r;
+                curvature_term[k] = weight * w * w;
+                missing[k] = weighted_residual[k] / (w * w + damping);
+            }
         }
         problem.footprint.mean(cells, &mut self.inputs, input::MISSING, pixels, weighted_residual, &mut scratch.phases);
         problem.footprint.mean(cells, &mut self.inputs, input::CURVATURE, pixels, curvature_term, &mut scratch.phases);

@@ -34,8 +34,8 @@ pub(crate) trait Real:
         if self < other { self } else { other }
     }
 
-    /// `self · factor + term`, rounded once on every processor; on those of before 2013 by a call, many times as slow.
-    fn mul_add(self, factor: Self, term: Self) -> Self;
+    /// `self · factor + term`; rounded once where the processor that is compiled for can, twice elsewhere.
+    fn fused(self, factor: Self, term: Self) -> Self;
 
     /// `eˣ`.
     fn exp(self) -> Self;
@@ -51,8 +51,8 @@ impl Real for f32 {
     }
 
     #[inline(always)]
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        f32::mul_add(self, factor, term)
+    fn fused(self, factor: Self, term: Self) -> Self {
+        if cfg!(target_feature = "fma") { self.mul_add(factor, term) } else { self * factor + term }
     }
 
     /// Within 2e-7 relative of `eˣ` for `x` in `[-87, 88]`, and at these bounds beyond: without branches or calls, so that
@@ -84,9 +84,8 @@ impl Real for f64 {
         self
     }
 
-    #[inline(always)]
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        f64::mul_add(self, factor, term)
+    fn fused(self, factor: Self, term: Self) -> Self {
+        self * factor + term
     }
 
     fn exp(self) -> Self {

@@ -1,7 +1,6 @@
 //! The response of ink to depth in the network's units.
 
 use super::real::Real;
-use super::widest::{self, Work};
 use crate::model::Saturation;
 
 /// Steps of a tabulated response over its range.
@@ -52,7 +51,12 @@ impl Response {
     /// Ink and slope of a row of depths; `depth` and `ink` may be the same values before and after.
     pub(crate) fn apply<T: Real>(&self, ink: &mut [T], slope: &mut [T]) {
         match self {
-            Self::Tanh => widest::run(TanhRow { ink, slope }),
+            Self::Tanh => {
+                for (a, w) in ink.iter_mut().zip(slope) {
+                    *a = tanh(*a);
+                    *w = T::of(1.0) - *a * *a;
+                }
+            }
             Self::Table(table) => {
                 for (a, w) in ink.iter_mut().zip(slope) {
                     let at = (a.to_f64() * (STEPS as f64 / DEEPEST)).clamp(0.0, STEPS as f64);
@@ -62,22 +66,6 @@ impl Response {
                     *w = T::of(low[1] + t * (high[1] - low[1]));
                 }
             }
-        }
-    }
-}
-
-/// A row of depths becomes ink and slope.
-struct TanhRow<'a, T> {
-    ink: &'a mut [T],
-    slope: &'a mut [T],
-}
-
-impl<T: Real> Work for TanhRow<'_, T> {
-    #[inline(always)]
-    fn run(self) {
-        for (a, w) in self.ink.iter_mut().zip(self.slope) {
-            *a = tanh(*a);
-            *w = T::of(1.0) - *a * *a;
         }
     }
 }

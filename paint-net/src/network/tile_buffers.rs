@@ -7,8 +7,8 @@ use super::padded_grid::PaddedGrid;
 use super::pass::{PackedNetwork, Pass};
 use super::tile_problem::{Scratch, TileProblem};
 
-/// Most pixels of the buffers that a thread keeps: some four megabytes.
-const KEPT_PIXELS: usize = 1 << 16;
+/// Most bytes that a thread keeps.
+const MOST_KEPT: usize = 8 << 20;
 
 thread_local! {
     /// Fresh buffers would take a quarter of the time of a small picture: the system hands out their pages one by one.
@@ -55,8 +55,14 @@ impl TileBuffers {
 
     /// Keeps them for the next painting of this thread, unless they are large.
     pub(super) fn keep(self) {
-        if self.layout.pixels.plane() <= KEPT_PIXELS {
+        if self.bytes() <= MOST_KEPT {
             KEPT.set(Some(self));
         }
+    }
+
+    fn bytes(&self) -> usize {
+        let (Pass { ink, slope, inputs, hidden, step }, Scratch { pixels, phases }) = (&self.pass, &self.scratch);
+        let planes = [ink, slope, inputs, step, pixels, phases, &self.paint, &self.last_step];
+        planes.into_iter().chain(hidden).map(|plane| size_of_val(&plane[..])).sum()
     }
 }

@@ -1,9 +1,16 @@
 //! Products of matrices, the one place where training spends its time.
 
-use crate::network::{Real, Work, run_widest};
+use crate::network::Real;
 
-/// Numbers in one register. Sums always run in the same order, so the width does not change a bit of the result.
-const LANES: usize = if cfg!(target_feature = "avx512f") { 16 } else { 8 };
+/// Numbers in one register of the processor that is compiled for. Sums always run in the same order, so the width does not
+/// change a bit of the result.
+const LANES: usize = if cfg!(target_feature = "avx512f") {
+    16
+} else if cfg!(target_feature = "avx") {
+    8
+} else {
+    4
+};
 /// Columns that are worked on at once: two registers.
 const WIDTH: usize = 2 * LANES;
 /// Most rows that are worked on at once: with `WIDTH` columns they fill the registers.
@@ -41,37 +48,22 @@ impl<T: Real> Panels<T> {
                 let (from, to) = (block * count / blocks, (block + 1) * count / blocks);
                 let left = &left[from * self.rows..to * self.rows];
                 let out = &mut out[from * self.columns..to * self.columns];
-                let rows = Rows { panels: self, panel, first: k * WIDTH, left, out };
                 match to - from {
-                    1 => run_widest(Block::<T, 1>(rows)),
-                    2 => run_widest(Block::<T, 2>(rows)),
-                    3 => run_widest(Block::<T, 3>(rows)),
-                    4 => run_widest(Block::<T, 4>(rows)),
-                    5 => run_widest(Block::<T, 5>(rows)),
-                    _ => run_widest(Block::<T, 6>(rows)),
+                    1 => self.block::<1>(panel, k * WIDTH, left, out),
+                    2 => self.block::<2>(panel, k * WIDTH, left, out),
+                    3 => self.block::<3>(panel, k * WIDTH, left, out),
+                    4 => self.block::<4>(panel, k * WIDTH, left, out),
+                    5 => self.block::<5>(panel, k * WIDTH, left, out),
+                    _ => self.block::<6>(panel, k * WIDTH, left, out),
                 }
             }
         }
     }
-}
 
-/// What one block of a product works on: one panel, which begins at column `first`, and some rows of the left factor.
-struct Rows<'a, T> {
-    panels: &'a Panels<T>,
-    panel: &'a [T],
-    first: usize,
-    left: &'a [T],
-    out: &'a mut [T],
-}
-
-/// `M` rows.
-struct Block<'a, T, const M: usize>(Rows<'a, T>);
-
-impl<T: Real, const M: usize> Work for Block<'_, T, M> {
-    #[inline(always)]
-    fn run(self) {
-        let Rows { panels: &Panels { rows: middle, columns, .. }, panel, first, left, out } = self.0;
-        let rows: [&[T]; M] = std::array::from_fn(|m| &left[m * middle..(m + 1) * middle]);
+    /// `M` rows. Not inlined: six of them in one function are more than the compiler keeps in registers.
+    #[inline(never)]
+    fn block<const M: usize>(&self, panel: &[T], first: usize, left: &[T], out: &mut [T]) {
+        let rows: [&[T]; M] = std::array::from_fn(|m| &left[m * self.rows..(m + 1) * self.rows]);
         let mut sums = [[[T::default(); LANES]; 2]; M];
         for (k, right) in panel.as_chunks::<LANES>().0.as_chunks::<2>().0.iter().enumerate() {
             // Whole arrays by index: this is the form that stays in registers.
@@ -79,13 +71,13 @@ impl<T: Real, const M: usize> Work for Block<'_, T, M> {
                 let a = rows[m][k];
                 for half in 0..2 {
                     for lane in 0..LANES {
-                        sums[m][half][lane] = a.mul_add(right[half][lane], sums[m][half][lane]);
+                        sums[m][half][lane] = a.fused(right[half][lane], sums[m][half][lane]);
                     }
                 }
             }
         }
-        let end = columns.min(first + WIDTH);
-        for (out, sums) in out.chunks_exact_mut(columns).zip(&sums) {
+        let end = self.columns.min(first + WIDTH);
+        for (out, sums) in out.chunks_exact_mut(self.columns).zip(&sums) {
             for (out, &sum) in out[first..end].iter_mut().zip(sums.as_flattened()) {
                 *out += sum;
             }

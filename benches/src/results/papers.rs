@@ -9,7 +9,7 @@ const NETWORK: &str = "no row yet: needs the network after all of its epochs";
 
 /// The table, in the order of the papers.
 pub fn table() -> Table {
-    let mut table = Table::new("seeds", &["paper", "what", "here"]);
+    let mut table = Table::new("papers", &["paper", "what", "here"]);
     for (paper, parts) in PAPERS {
         for [what, here] in *parts {
             table.row([(*paper).into(), (*what).into(), (*here).into()]);
