@@ -187,4 +187,18 @@ mod tests {
         }
         assert_eq!(axis_names(&Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0)), "(-y, x, z)");
     }
+
+    #[test]
+    fn threads_change_neither_shares_nor_their_order() {
+        let all = readings();
+        // What a reading makes of a vector that no two of them make the same of.
+        let share = |reading: &Reading| {
+            let read = reading.axes * Vector3::new(1.0, 10.0, 100.0);
+            read.x + 7.0 * read.y + 49.0 * read.z + 1e6 * f64::from(reading.sensor as u8)
+        };
+        let expected: Vec<f64> = all.iter().map(share).collect();
+        for threads in [0, 1, 2, 3, 7, 1000] {
+            assert_eq!(in_parallel(&all, threads, &share), expected, "{threads} threads");
+        }
+    }
 }

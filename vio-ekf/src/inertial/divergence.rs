@@ -83,3 +83,45 @@ pub(crate) fn exceeded_limit(
         None
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    use super::*;
+
+    #[test]
+    fn limits_are_within_what_is_allowed_and_not_a_number_is_beyond_all() {
+        let settings = DivergenceSettings {
+            max_speed: 4.0,
+            max_velocity_sigma: 0.5,
+            max_gyro_bias: 0.25,
+            max_accel_bias: 2.0,
+            ..DivergenceSettings::default()
+        };
+        let at_all_limits = CoreState {
+            velocity: Vector3::y() * 4.0,
+            gyro_bias: Vector3::z() * 0.25,
+            accel_bias: Vector3::x() * 2.0,
+            position: Vector3::zeros(),
+            attitude: UnitQuaternion::identity(),
+        };
+        let mut covariance = Covariance::new(error_state::CORE, error_state::CORE);
+        covariance.inflate(error_state::VELOCITY + 1, 0.25);
+        let cause = |core: &CoreState, covariance: &Covariance| exceeded_limit(core, covariance, &settings);
+        assert_eq!(cause(&at_all_limits, &covariance), None);
+        let more = 1.0 + f64::EPSILON;
+        let beyond = |change: &dyn Fn(&mut CoreState)| {
+            let mut core = at_all_limits;
+            change(&mut core);
+            cause(&core, &covariance)
+        };
+        assert_eq!(beyond(&|core| core.velocity *= more), Some(DivergenceCause::Speed));
+        assert_eq!(beyond(&|core| core.gyro_bias *= more), Some(DivergenceCause::Bias));
+        assert_eq!(beyond(&|core| core.accel_bias *= more), Some(DivergenceCause::Bias));
+        assert_eq!(beyond(&|core| core.position.x = f64::INFINITY), Some(DivergenceCause::Speed));
+        assert_eq!(beyond(&|core| core.gyro_bias.x = f64::NAN), Some(DivergenceCause::Bias));
+        covariance.inflate(error_state::VELOCITY + 2, 0.26);
+        assert_eq!(cause(&at_all_limits, &covariance), Some(DivergenceCause::Uncertainty));
+    }
+}

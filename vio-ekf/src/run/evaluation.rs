@@ -221,6 +221,12 @@ mod tests {
 
     use super::*;
 
+    #[test]
+    fn segments_count_by_their_poses() {
+        // Squared errors of one pose of 3 m and of three of 1 m: 12 m² over 4 poses.
+        assert!((pooled(&[(3.0, 1), (1.0, 3)]) - 3.0_f64.sqrt()).abs() < 1e-15);
+    }
+
     /// A body that has turned by 90 degrees, seen by a filter whose world is turned and shifted: the errors are those of the
     /// body's axes, the world's for the position, and the covariance that goes with each is not round.
     #[test]

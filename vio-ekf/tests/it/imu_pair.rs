@@ -5,7 +5,7 @@ use crate::support::imus::{bias, models, settings};
 use nalgebra::Vector3;
 use vio_ekf::fusion::{ImuPair, ImuPairSettings};
 use vio_ekf::sim::ImuModel;
-use vio_ekf::{Imu, ImuNoise, nalgebra};
+use vio_ekf::{Imu, ImuNoise, Stamp, nalgebra};
 
 /// All samples of a pair, with those of the second sensor until a time.
 fn joined(pair: &mut ImuPair, first: &[Imu], second: &[Imu]) -> Vec<Imu> {
@@ -132,4 +132,26 @@ fn a_silent_second_sensor_is_not_missed() {
     let other = recordings[1].biases_at(read[half].stamp).0;
     let difference = (recordings[0].biases_at(read[half].stamp).0 - turn * other).amax();
     assert!(difference > 5e-3, "{difference}");
+}
+
+#[test]
+fn a_second_sensor_is_silent_after_its_time_and_not_before() {
+    // At rest, the sensors in one place; the second turns by 1 rad/s more. It is read at 0 and `gap` later, and asked for between.
+    let read = |gap: f64| {
+        let settings = ImuPairSettings { timeout_s: 0.5, ..ImuPairSettings::default() };
+        let mut pair = ImuPair::new(settings).unwrap();
+        let at = |seconds: f64, rate: f64| Imu {
+            stamp: Stamp::from_secs(seconds).unwrap(),
+            gyro: Vector3::new(rate, 0.0, 0.0),
+            accel: Vector3::new(0.0, 0.0, 9.81),
+        };
+        pair.second(&at(0.0, 1.0)).unwrap();
+        pair.first(&at(0.25, 0.0)).unwrap();
+        pair.second(&at(gap, 1.0)).unwrap();
+        // Nobody waits for the second any longer.
+        pair.first(&at(0.75, 0.0)).unwrap();
+        pair.read().unwrap().gyro.x
+    };
+    assert!(read(0.5) > 0.1, "{}", read(0.5));
+    assert_eq!(read(0.501), 0.0);
 }

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
 
 mod accel_matrix;
+mod axes_diagnosis;
 mod calibration_doubt;
 mod camera;
 mod dead_reckoning;

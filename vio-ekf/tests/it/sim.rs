@@ -352,3 +352,24 @@ fn surfaces_that_cannot_be_rendered_are_refused() {
     flat.walls.max.z = flat.walls.min.z;
     assert!(flat.check().is_err());
 }
+
+#[test]
+fn furniture_stands_in_the_room_apart_and_clear_of_the_path() {
+    let spline = wild();
+    let settings = RoomSettings { wall_distance_m: (4.0, 5.0), furniture: 5, ..small_room() };
+    let room = Room::around(&spline, &settings, 3).unwrap();
+    assert_eq!(room.furniture.len(), 5, "there is room for all");
+    let (first, last) = spline.span();
+    let path: Vec<Vector3<f64>> = (0..=100)
+        .map(|k| Stamp::from_nanos(first.nanos() + (last.nanos() - first.nanos()) / 100 * k))
+        .map(|stamp| spline.sample(stamp).unwrap().world_from_body.translation.vector)
+        .collect();
+    for (k, one) in room.furniture.iter().enumerate() {
+        assert!((0..3).all(|a| room.walls.min[a] <= one.min[a] && one.max[a] <= room.walls.max[a]));
+        let stands = one.min.z == room.walls.min.z;
+        assert!(stands || (one.max.z - room.walls.max.z).abs() < 1e-12, "on the floor or under the ceiling");
+        assert!(path.iter().all(|p| (p - p.sup(&one.min).inf(&one.max)).norm() > settings.clearance_m - 0.02));
+        let apart = |other: &Cuboid| (0..3).any(|a| one.max[a] < other.min[a] || one.min[a] > other.max[a]);
+        assert!(room.furniture[..k].iter().all(apart));
+    }
+}

@@ -214,3 +214,26 @@ fn nine_in_a_row(ring: u32) -> bool {
     let eight = four & four >> 4;
     eight & twice >> 8 != 0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_corner_differs_by_more_than_the_threshold() {
+        // A bright square from (10, 10) on: nine and more of the circle about its corner are darker, by so much.
+        let strongest = |contrast: u8, sign: bool| {
+            let bright = |x: usize, y: usize| (x >= 10 && y >= 10) == sign;
+            let data = (0..20 * 20).map(|k| if bright(k % 20, k / 20) { 100 + contrast } else { 100 }).collect();
+            let level = Level { width: 20, height: 20, data, scale: 1.0, offset: 0.0 };
+            let mut detector = CornerDetector::new(&level, 20);
+            detector.fast_corners(&level);
+            let best = *detector.cells.iter().max().expect("cells");
+            (best.0 > 0).then_some((best.1, best.2))
+        };
+        for sign in [true, false] {
+            assert_eq!(strongest(20, sign), None);
+            assert_eq!(strongest(21, sign), Some((10, 10)));
+        }
+    }
+}

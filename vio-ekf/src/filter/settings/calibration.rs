@@ -124,3 +124,16 @@ impl CalibrationSettings {
         ])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lenses_alone_are_tried_with_twice_the_distortion_of_a_rough_guess() {
+        let lenses = CalibrationSettings::default().roughly().of_lenses_only();
+        assert_eq!((lenses.distortion_sigma, lenses.focal_sigma, lenses.principal_point_sigma_px), (0.3, 0.03, 10.0));
+        let place = [lenses.camera_position_sigma_m, lenses.camera_attitude_sigma, lenses.time_offset_sigma_s];
+        assert_eq!(place, [0.0; 3]);
+    }
+}
