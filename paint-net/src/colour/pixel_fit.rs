@@ -101,3 +101,28 @@ fn solve3(m: &[[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
     let determinant = dot(m[0], columns[0]);
     std::array::from_fn(|i| (0..3).map(|k| columns[k][i] * v[k]).sum::<f64>() / determinant)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Paint that changes nothing: the cost alone counts.
+    struct Clear;
+
+    impl MixingModel for Clear {
+        fn paints(&self) -> usize {
+            2
+        }
+
+        fn lab(&self, _: usize, _: &[f64], _: &mut [[f64; 3]]) -> [f64; 3] {
+            [50.0, 0.0, 0.0]
+        }
+    }
+
+    #[test]
+    fn paint_costs_by_its_depth_and_by_its_square() {
+        let fit = PixelFit { model: &Clear, deepest: 9.0, paint_weight: 3.0, spread_weight: 8.0, iterations: 1 };
+        // (3² + 4²) / 2 + 3 (1 + 2) + 8 (1² + 2²) / 2
+        assert_eq!(fit.cost(&[1.0, 2.0], [3.0, 0.0, 4.0]), 12.5 + 9.0 + 20.0);
+    }
+}

@@ -101,3 +101,23 @@ pub(super) fn parallel_map<R: Send>(threads: usize, count: usize, job: &(dyn Fn(
     });
     results.into_iter().flatten().collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_goes_against_the_mean_of_all_samples() {
+        // Four samples in two jobs: mean gradients of 1, then of 10, neither longer than what is let through.
+        let settings = StepSettings { threads: 1, jobs: 2, samples: 4, max_gradient_norm: 10.5, learning_rate: 0.5 };
+        let mut descent = Descent::new(vec![0.0]);
+        for mean in [1.0, 10.0] {
+            let job = |_: usize, _: &[f32]| Ok::<_, ()>(((), vec![2.0 * mean]));
+            descent.step(&settings, &job, &mut |()| ()).unwrap();
+        }
+        // Adam by hand: the first step is the rate; the second has these means.
+        let (mean, square): (f64, f64) = ((0.09 + 1.0) / (1.0 - 0.81), (0.000_999 + 0.1) / (1.0 - 0.998_001));
+        let expected = -0.5 * (1.0 + mean / square.sqrt());
+        assert!((f64::from(descent.parameters[0]) - expected).abs() < 1e-5, "{} {expected}", descent.parameters[0]);
+    }
+}

@@ -279,4 +279,26 @@ mod tests {
         other.descent.parameters.clone_from(&one.descent.parameters);
         assert!(one.step(&picture).unwrap().total != other.step(&picture).unwrap().total);
     }
+
+    #[test]
+    fn noise_is_normal_and_new_for_every_step_number_and_sample() {
+        let architecture =
+            Architecture { side: 4, steps: 40, latent: 25, hidden: 5, read: 2, radius: 3.0, stop: 3.0, paint: 4 };
+        let settings = ThesisSettings { seed: 5, architecture, batch: 10, ..ThesisSettings::default() };
+        let picture = Image::filled(4, 4, 0.5);
+        let samples: Vec<u64> = (0..10).collect();
+        let rollout = prepare(&settings, &[&picture; 10], &samples).unwrap();
+        let drawn: Vec<f64> =
+            (0..40).flat_map(|t| rollout.noise.latent.at(t).iter().map(|&v| f64::from(v)).collect::<Vec<_>>()).collect();
+        let count = drawn.len() as f64;
+        let moment = |power: i32| drawn.iter().map(|v| v.powi(power)).sum::<f64>() / count;
+        // Of 10,000 normal numbers; five deviations of each mean.
+        assert_eq!(drawn.len(), 10_000);
+        assert!(moment(1).abs() < 0.05 && (moment(2) - 1.0).abs() < 0.071 && (moment(4) - 3.0).abs() < 0.49);
+        let mut bits: Vec<u64> = drawn.iter().map(|v| v.to_bits()).collect();
+        bits.sort_unstable();
+        bits.dedup();
+        // Of so many of single precision hardly any agree by chance.
+        assert!(drawn.len() - bits.len() < 20, "{} are there twice", drawn.len() - bits.len());
+    }
 }

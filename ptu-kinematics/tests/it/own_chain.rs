@@ -102,3 +102,18 @@ fn the_collision_body_covers_its_barrel() {
         assert!(spheres.iter().any(|(centre, radius)| (centre - point).norm() <= radius + 1e-9), "{share}");
     }
 }
+
+#[test]
+fn spheres_lie_along_the_barrel_and_the_last_ends_at_the_tip() {
+    let (turret, pose) = (Turret { barrel: 0.14 }, Isometry3::translation(0.0, 0.0, 2.0));
+    let body = CollisionBody { vehicle_radius: 0.35, arm_radius: 0.02 };
+    let mut spheres = Vec::new();
+    body.spheres(&turret, &pose, &[0.4, -0.3], &mut spheres);
+    let [from, tip] = turret.members(&pose, &[0.4, -0.3])[..] else { panic!("a barrel has two ends") };
+    let nozzle = turret.forward(&pose, &[0.4, -0.3]);
+    let end = tip - 0.02 * nozzle.direction.into_inner();
+    let expected = [0.33, 0.67, 1.0].map(|share| from + (end - from) * share);
+    for ((centre, radius), expected) in spheres[spheres.len() - 3..].iter().zip(expected) {
+        assert!((centre - expected).norm() < 1e-12 && *radius == 0.02, "{centre}");
+    }
+}

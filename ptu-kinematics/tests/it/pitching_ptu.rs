@@ -1,7 +1,7 @@
 //! A vehicle that can pitch: the pan-tilt unit where the level vehicle has no reach.
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
-use ptu_kinematics::{Error, Hover, Joints, KinematicChain, PitchingPtu, Ptu, PtuSettings, Range};
+use ptu_kinematics::{Error, Hover, Joints, KinematicChain, PitchingJoints, PitchingPtu, Ptu, PtuSettings, Range};
 
 fn vehicle() -> PitchingPtu {
     let unit = Ptu::new(PtuSettings { gun_pitch: 0.05, ..PtuSettings::default() }).unwrap();
@@ -97,4 +97,17 @@ fn it_stays_level_where_the_tilt_joint_reaches_and_takes_the_least_pitch_beyond(
     let body = Isometry3::new(Vector3::new(1.0, 2.0, 3.0), Vector3::new(0.1, -0.2, 0.3));
     let (a, b) = (unit.forward(&body, joints), vehicle.forward(&body, &same));
     assert!((a.tip - b.tip).norm() < 1e-12 && (a.direction.into_inner() - b.direction.into_inner()).norm() < 1e-12);
+}
+
+#[test]
+fn its_arm_goes_from_the_pan_axis_of_the_pitched_body_to_the_tip() {
+    let (vehicle, pitch) = (vehicle(), 0.4_f64);
+    let pose = Isometry3::new(Vector3::new(1.0, -2.0, 3.0), Vector3::zeros());
+    let joints = PitchingJoints { pitch, pan: 0.3, tilt: -0.2 };
+    let members = vehicle.members(&pose, &joints);
+    let [x, y, z]: [f64; 3] = PtuSettings::default().body_from_pan_axis.into();
+    // A positive pitch lifts the nose.
+    let axis = Point3::new(1.0 + pitch.cos() * x - pitch.sin() * z, -2.0 + y, 3.0 + pitch.sin() * x + pitch.cos() * z);
+    assert!((members[0] - axis).norm() < 1e-12, "{members:?}");
+    assert_eq!(members[1..], [vehicle.forward(&pose, &joints).tip]);
 }

@@ -73,3 +73,22 @@ pub(in crate::atlas) fn procrustes(pairs: &[(f64, [f64; 2], [f64; 2])], same: bo
     motion.residual = (left_over.sum::<f64>() / weight).sqrt();
     motion
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_known_motion_is_found_and_undone() {
+        let (sin, cos) = 0.7_f64.sin_cos();
+        let moved = |[x, y]: [f64; 2]| [cos * x - sin * y + 3.0, sin * x + cos * y - 2.0];
+        let right = [[0.0, 0.0], [2.0, 0.5], [-1.0, 1.0]];
+        let pairs = [1.0, 4.0, 0.5].iter().zip(right).map(|(&weight, p)| (weight, moved(p), p)).collect::<Vec<_>>();
+        let motion = procrustes(&pairs, false);
+        let near = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]) < 1e-12;
+        for p in [[0.3, -0.8], [5.0, 1.0]] {
+            assert!(near(motion.apply(p), moved(p)) && near(motion.undo(moved(p)), p));
+        }
+        assert!(motion.residual < 1e-12);
+    }
+}

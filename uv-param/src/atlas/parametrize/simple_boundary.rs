@@ -6,7 +6,7 @@ use crate::disk::Disk;
 use crate::triangle::orientation;
 
 /// How two edges of a boundary lie.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Contact {
     /// Apart, or with a common end.
     None,
@@ -125,6 +125,34 @@ mod tests {
     use super::*;
     use crate::surface::{FaceLookup, Surface};
     use crate::triangle::flips;
+
+    #[test]
+    fn edges_cross_touch_or_are_apart() {
+        let between = |edges: [[[f64; 2]; 2]; 2]| {
+            let both = [contact([0, 1], [2, 3], &edges.concat()), contact([2, 3], [0, 1], &edges.concat())];
+            assert_eq!(both[0], both[1]);
+            both[0]
+        };
+        let level = [[0.0, 0.0], [2.0, 0.0]];
+        assert_eq!(between([level, [[1.0, -1.0], [1.0, 1.0]]]), Contact::Cross);
+        assert_eq!(between([level, [[1.0, 0.0], [1.5, 1.0]]]), Contact::Touch);
+        assert_eq!(between([level, [[1.0, 0.0], [3.0, 0.0]]]), Contact::Touch);
+        // The line of one goes through the other, and not the other way round: boxes overlap, edges do not.
+        assert_eq!(between([[[0.0, 0.0], [2.0, 2.0]], [[1.5, 0.5], [3.0, -1.0]]]), Contact::None);
+        assert_eq!(between([[[0.0, 0.0], [2.0, 2.0]], [[1.0, 0.5], [1.5, 0.0]]]), Contact::None);
+        // Boxes that meet at one number only, and boxes that do not.
+        assert_eq!(between([level, [[2.0, -1.0], [2.0, 1.0]]]), Contact::Touch);
+        assert_eq!(between([level, [[2.1, -1.0], [2.1, 1.0]]]), Contact::None);
+    }
+
+    #[test]
+    fn neighbours_meet_only_where_they_fold_back() {
+        let uv = |end: [f64; 2]| vec![[0.0, 0.0], [1.0, 0.0], end];
+        for (end, expected) in [([0.5, 0.0], Contact::Touch), ([2.0, 0.0], Contact::None), ([0.5, 0.5], Contact::None)] {
+            assert_eq!(contact([0, 1], [1, 2], &uv(end)), expected, "{end:?}");
+            assert_eq!(contact([1, 2], [0, 1], &uv(end)), expected, "{end:?}");
+        }
+    }
 
     /// A square with a triangular hole, of which one corner is pulled over the opposite side: no face flips and no edges cross, but
     /// the faces at that corner lie on the face beyond the side.
