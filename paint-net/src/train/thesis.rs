@@ -288,8 +288,9 @@ mod tests {
         let picture = Image::filled(4, 4, 0.5);
         let samples: Vec<u64> = (0..10).collect();
         let rollout = prepare(&settings, &[&picture; 10], &samples).unwrap();
-        let drawn: Vec<f64> =
-            (0..40).flat_map(|t| rollout.noise.latent.at(t).iter().map(|&v| f64::from(v)).collect::<Vec<_>>()).collect();
+        let drawn: Vec<f64> = (0..40)
+            .flat_map(|t| rollout.noise.latent.at(t).iter().map(|&v| f64::from(v)).collect::<Vec<_>>())
+            .collect();
         let count = drawn.len() as f64;
         let moment = |power: i32| drawn.iter().map(|v| v.powi(power)).sum::<f64>() / count;
         // Of 10,000 normal numbers; five deviations of each mean.

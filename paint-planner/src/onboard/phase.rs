@@ -366,7 +366,7 @@ mod tests {
 
     #[test]
     fn a_hold_goes_on_before_the_place_where_the_paint_ended() {
-        let (mut phases, mut clock) = (Phases::new(Line, 20.0, 0.0), 0.0);
+        let (mut phases, mut clock) = (Phases::new(Line, 20.0, 0.3), 0.0);
         until(&mut phases, &mut clock, None, |phase| phase == Phase::Paint);
         for _ in 0..30 {
             until(&mut phases, &mut clock, None, |phase| phase == Phase::Paint);
@@ -377,7 +377,9 @@ mod tests {
         assert_eq!((phases.request(true), phases.request(false)), (Some(Request::Offboard), None));
         // It stays where it was.
         assert_eq!(phases.guided().unwrap().at(clock + 5.0).velocity, Vector3::zeros());
+        // A step later, and what was commanded by then leaves 0.3 s after it.
         let ended = phases.painted();
+        assert!((ended - (painted + 0.1 + 0.3)).abs() < 1e-9, "{painted} {ended}");
         until(&mut phases, &mut clock, None, |phase| phase == Phase::Paint);
         assert_eq!(phases.painted(), ended);
         assert!((phases.plan_time(clock).unwrap() - (ended - RUN_UP)).abs() < 1e-9);

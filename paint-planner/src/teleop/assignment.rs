@@ -121,3 +121,22 @@ fn level(targets: &mut [Target]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_levelled_segment_takes_the_paint_that_it_took_before() {
+        // 1 m of 3 and 3 m of 7, in any unit of paint: 24 over 4 m.
+        let at =
+            |x: f64, dose: f64| Target { point: Point3::new(x, 0.0, 0.0), normal: Vector3::y_axis(), dose, time: None };
+        let mut targets = [at(0.0, 3.0), at(1.0, 7.0), at(4.0, 0.0)];
+        level(&mut targets);
+        assert_eq!(targets.map(|target| target.dose), [6.0, 6.0, 0.0]);
+        // At one place there is no way to spread it over.
+        let mut halted = [at(0.0, 3.0), at(0.0, 0.0)];
+        level(&mut halted);
+        assert_eq!(halted.map(|target| target.dose), [0.0, 0.0]);
+    }
+}

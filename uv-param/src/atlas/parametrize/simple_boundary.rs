@@ -148,7 +148,8 @@ mod tests {
     #[test]
     fn neighbours_meet_only_where_they_fold_back() {
         let uv = |end: [f64; 2]| vec![[0.0, 0.0], [1.0, 0.0], end];
-        for (end, expected) in [([0.5, 0.0], Contact::Touch), ([2.0, 0.0], Contact::None), ([0.5, 0.5], Contact::None)] {
+        for (end, expected) in [([0.5, 0.0], Contact::Touch), ([2.0, 0.0], Contact::None), ([0.5, 0.5], Contact::None)]
+        {
             assert_eq!(contact([0, 1], [1, 2], &uv(end)), expected, "{end:?}");
             assert_eq!(contact([1, 2], [0, 1], &uv(end)), expected, "{end:?}");
         }
