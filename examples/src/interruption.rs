@@ -23,7 +23,7 @@ pub fn watch(program: &str) {
             eprintln!("{program}: interrupted: finishes what is there (once more: leaves at once)");
             return;
         }
-        whole_file::remove_parts();
+        let _none_begins = whole_file::remove_parts();
         eprintln!("{program}: interrupted");
         exit(EXIT_CODE.into());
     });

@@ -5,7 +5,7 @@ use std::ffi::OsString;
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::run_folder;
 
@@ -22,11 +22,17 @@ pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> io::Result<()> {
     file.commit()
 }
 
-/// Removes what is not whole: the process ends.
-pub(crate) fn remove_parts() {
-    for part in PARTS.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+/// Removes what is not whole: the process ends. While the guard lives no file begins or gets its name.
+pub(crate) fn remove_parts() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    let parts = parts();
+    for part in parts.iter() {
         let _ = std::fs::remove_file(part);
     }
+    parts
+}
+
+fn parts() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    PARTS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A file under way. Dropped before [`WholeFile::commit`], it leaves nothing.
@@ -45,8 +51,10 @@ impl WholeFile {
     /// # Errors
     /// What the system says.
     pub fn create(path: &Path) -> io::Result<Self> {
+        // No signal comes between the file and its name in the list.
+        let mut parts = parts();
         let file = Self::begin(path, false)?;
-        PARTS.lock().unwrap_or_else(PoisonError::into_inner).insert(file.part.clone());
+        parts.insert(file.part.clone());
         Ok(file)
     }
 
@@ -73,6 +81,7 @@ impl WholeFile {
     pub fn commit(mut self) -> io::Result<()> {
         self.out.flush()?;
         if !self.committed {
+            let _parts = parts();
             std::fs::rename(&self.part, &self.path)?;
             self.committed = true;
             run_folder::note(&self.path);
@@ -106,10 +115,11 @@ impl Seek for WholeFile {
 
 impl Drop for WholeFile {
     fn drop(&mut self) {
+        let mut parts = parts();
         if !self.committed && !self.kept {
             let _ = std::fs::remove_file(&self.part);
         }
-        PARTS.lock().unwrap_or_else(PoisonError::into_inner).remove(&self.part);
+        parts.remove(&self.part);
     }
 }
 

@@ -227,4 +227,23 @@ mod tests {
         assert!((terms - Vector3::new(0.25, 0.0625, 0.015625)).norm() < 1e-12, "{terms}");
         assert!((seen - 0.5).abs() < 1e-7);
     }
+
+    #[test]
+    fn light_is_as_uncertain_as_the_pictures_disagree() {
+        // Two texels in the middle of four pictures each. Of eight readings two means and three terms of the fall-off are taken off.
+        let seen = |logs: [f64; 4]| Sums {
+            count: 4.0,
+            y: logs.iter().sum(),
+            yy: logs.iter().map(|log| log * log).sum(),
+            ..Sums::default()
+        };
+        let sums = vec![seen([-1.1, -0.9, -1.1, -0.9]), seen([-2.2, -1.8, -2.2, -1.8]), Sums::default()];
+        let light = Mosaic { texels: Vec::new(), sums }.light();
+        let expected = ((4.0 * 0.01 + 4.0 * 0.04) / (8.0 - 2.0 - 3.0_f64)).sqrt() / 2.0;
+        for (light, log) in light.iter().zip([-1.0, -2.0]) {
+            let light = light.expect("seen");
+            assert!((light.log - log).abs() < 1e-12 && (light.sigma - expected).abs() < 1e-12, "{light:?}");
+        }
+        assert_eq!(light[2], None);
+    }
 }
