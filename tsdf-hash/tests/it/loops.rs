@@ -56,6 +56,14 @@ fn measured_drift(light: bool) -> Measured {
         let Some(measured) = measured else { continue };
         tally.found += 1;
         assert!(measured.is_significant(), "{distance} m, {angle} rad: {}", measured.chi_squared);
+        if k == 0 {
+            // A present pose that is as uncertain as the registration halves what the distance is worth.
+            let (mut tracker, both) = (Tracker::new(TrackingSettings::default()).unwrap(), measured.outcome.covariance);
+            let (view, colour) = (present.view(), present.colour());
+            let unsure = tracker.drift(&mut old, &view, colour.as_ref(), &drifted, Some(&both), &[drifted]);
+            let share = unsure.unwrap().expect("found again").chi_squared / measured.chi_squared;
+            assert!((share - 0.5).abs() < 1e-9, "{share}");
+        }
         let (metres, radians) = apart(&measured.outcome.world_from_camera, &truth);
         let exact = metres < 2e-3 && radians < 0.1_f64.to_radians();
         tally.exact += usize::from(exact);
