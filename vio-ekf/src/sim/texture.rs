@@ -217,3 +217,28 @@ fn polygon(image: &mut [f32], size: usize, rng: &mut Rng, corners: usize, radius
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn masonry_has_dark_joints_between_its_courses() {
+        // 24 courses of 21 or 22 rows, the first row of each a joint of two fifths of the brightness.
+        let (size, courses) = (512, 24);
+        let texture = Texture::masonry(size, 4).expect("a texture");
+        let row = |y: usize| {
+            let values = (0..size as u32).map(|x| texture.sample(texture.levels[0], x << 8, (y as u32) << 8));
+            values.map(|value| f64::from(value) / 65536.0).sum::<f64>() / size as f64
+        };
+        let (mut below, mut beside) = (0, 0.0);
+        for course in 0..courses {
+            let joint = (course * size).div_ceil(courses);
+            let stones = (joint + 4..joint + 18).map(row).sum::<f64>() / 14.0;
+            below += usize::from(row(joint) < stones - 20.0);
+            beside += stones / courses as f64;
+        }
+        // What is drawn over the wall may hide a joint.
+        assert!(below >= 22 && beside > 70.0, "{below} dark joints; stones of {beside}");
+    }
+}

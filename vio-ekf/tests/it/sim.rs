@@ -368,6 +368,7 @@ fn furniture_stands_in_the_room_apart_and_clear_of_the_path() {
         assert!((0..3).all(|a| room.walls.min[a] <= one.min[a] && one.max[a] <= room.walls.max[a]));
         let stands = one.min.z == room.walls.min.z;
         assert!(stands || (one.max.z - room.walls.max.z).abs() < 1e-12, "on the floor or under the ceiling");
+        // The room looks at the path at other moments: between two of them it comes nearer by less than 2 cm.
         assert!(path.iter().all(|p| (p - p.sup(&one.min).inf(&one.max)).norm() > settings.clearance_m - 0.02));
         let apart = |other: &Cuboid| (0..3).any(|a| one.max[a] < other.min[a] || one.min[a] > other.max[a]);
         assert!(room.furniture[..k].iter().all(apart));
