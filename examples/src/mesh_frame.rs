@@ -135,3 +135,67 @@ fn rounded(value: f64) -> String {
     let digits = if value > 0.0 { (2.0 - value.log10().floor()).clamp(0.0, 9.0) } else { 0.0 };
     format!("{value:.*}", digits as usize)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A side of 2 units, whose file says that it is in centimetres with y up.
+    fn named_mesh() -> TriangleMesh {
+        TriangleMesh {
+            positions: vec![[0.0; 3], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            faces: vec![[0, 1, 2]],
+            unit: Some(0.01),
+            up: Some([0.0, 1.0, 0.0]),
+            ..TriangleMesh::default()
+        }
+    }
+
+    #[test]
+    fn switches_come_before_the_file_and_the_file_before_the_shape() {
+        let mesh = named_mesh();
+        let up = |asked| up_of(&mesh, Path::new("mesh.ply"), asked);
+        assert_eq!(up(Some(UpAxis::X)), (UpAxis::X, "x up (--up)".to_owned()));
+        assert_eq!(up(None).0, UpAxis::Y);
+        let unnamed = TriangleMesh { up: None, ..named_mesh() };
+        assert_eq!(up_of(&unnamed, Path::new("mesh.ply"), None).0, UpAxis::Z);
+        assert_eq!(up_of(&unnamed, Path::new("mesh.obj"), None).0, UpAxis::Y);
+
+        let scale = |asked| scale_of(&mesh, asked, Subject::Object).0;
+        assert_eq!(scale(Some(MeshScale::Factor(0.5))), 0.5);
+        assert_eq!(scale(Some(MeshScale::Fit)), 0.5 * LONGEST_SIDE);
+        assert_eq!(scale(None), 0.01);
+    }
+
+    /// Two units are metres for an object; 2000 are millimetres; what no unit makes plausible is made as long as a wall.
+    #[test]
+    fn a_unit_that_nobody_names_is_guessed_by_the_length() {
+        let of = |factor: f32, subject| {
+            let mut mesh = TriangleMesh { unit: None, ..named_mesh() };
+            mesh.positions.iter_mut().flatten().for_each(|c| *c *= factor);
+            scale_of(&mesh, None, subject)
+        };
+        assert_eq!(of(1.0, Subject::Object).0, 1.0);
+        assert_eq!(of(1e3, Subject::Object).0, 1e-3);
+        assert!((of(1e9, Subject::Object).0 * 2e9 - LONGEST_SIDE).abs() < 1e-9);
+        assert_eq!(of(1e9, Subject::Place).0, 1.0);
+    }
+
+    #[test]
+    fn scales_are_numbers_units_or_fit() {
+        let scale = |text: &str| text.parse::<MeshScale>();
+        assert_eq!(scale("0.25"), Ok(MeshScale::Factor(0.25)));
+        assert_eq!(scale("mm"), Ok(MeshScale::Factor(1e-3)));
+        assert_eq!(scale("ft"), Ok(MeshScale::Factor(0.3048)));
+        assert_eq!(scale("fit"), Ok(MeshScale::Fit));
+        assert!(scale("furlong").is_err());
+        let written = |scale| NumberOrText::from(scale);
+        assert_eq!(MeshScale::try_from(written(MeshScale::Fit)), Ok(MeshScale::Fit));
+        assert_eq!(MeshScale::try_from(written(MeshScale::Factor(2.0))), Ok(MeshScale::Factor(2.0)));
+    }
+
+    #[test]
+    fn lengths_are_said_with_three_digits() {
+        assert_eq!([0.0, 0.012_345, 1.234_5, 123.45, 12_345.0].map(rounded), ["0", "0.0123", "1.23", "123", "12345"]);
+    }
+}

@@ -259,6 +259,56 @@ mod tests {
         assert!((high.z - low.z - 1.0).abs() < 1e-5 && (high.y - low.y - 2.0).abs() < 1e-5);
     }
 
+    /// A slender pyramid along each axis stands on its base, its point up.
+    #[test]
+    fn what_points_up_in_the_file_points_up() {
+        let down = UpAxis::Direction([0.0, -1.0, 0.0]);
+        for (up, [along, across, aside]) in
+            [(UpAxis::X, [0, 1, 2]), (UpAxis::Y, [1, 2, 0]), (UpAxis::Z, [2, 0, 1]), (down, [1, 0, 2])]
+        {
+            let sign = if up == down { -1.0 } else { 1.0 };
+            let corner = |a: f32, b: f32, height: f32| {
+                let mut at = [0.0; 3];
+                (at[across], at[aside], at[along]) = (a, b, sign * height);
+                at
+            };
+            let base = [(-0.2, -0.2), (0.2, -0.2), (0.2, 0.2), (-0.2, 0.2)];
+            let mut mesh = square(base.map(|(a, b)| corner(a, b, 0.0)));
+            mesh.positions.push(corner(0.0, 0.0, 2.0));
+            mesh.faces.extend([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]);
+            place_mesh(&mut mesh, MeshPlacement { scale: Some(1.0), up }).unwrap();
+            let heights: Vec<f64> = mesh.positions.iter().map(|p| f64::from(p[2])).collect();
+            assert!(heights[..4].iter().all(|z| (z - CLEAR_OF_GROUND).abs() < 1e-5), "{up:?}: {heights:?}");
+            assert!((heights[4] - CLEAR_OF_GROUND - 2.0).abs() < 1e-5, "{up:?}: {heights:?}");
+        }
+    }
+
+    /// A wall that faces +y, with a block a metre before it and lower: both are turned, scaled and lifted as one.
+    #[test]
+    fn a_place_moves_as_one() {
+        let wall = [[0.0, 0.0, 0.0], [0.0, 0.0, 2.0], [4.0, 0.0, 2.0], [4.0, 0.0, 0.0]];
+        let block = [[1.0, 1.0, -1.0], [1.0, 1.0, 0.0], [3.0, 1.0, 0.0], [3.0, 1.0, -1.0]];
+        let positions = [wall, block].concat();
+        let part = |faces: [[u32; 3]; 2]| TriangleMesh {
+            positions: positions.clone(),
+            faces: faces.to_vec(),
+            ..TriangleMesh::default()
+        };
+        let mut scene = Scene { canvas: part([[0, 1, 2], [0, 2, 3]]), obstacles: part([[4, 5, 6], [4, 6, 7]]) };
+        assert!((mean_normal(&scene.canvas) - Vector3::y()).norm() < 1e-6);
+        place_scene(&mut scene, MeshPlacement { scale: Some(0.5), up: UpAxis::Z }).unwrap();
+        // Half as large, facing -x with the file's x to the robot's left: the box around all is 4 m by 1 m by 3 m.
+        let expected = positions
+            .iter()
+            .map(|[x, y, z]| [0.5 * (0.5 - y), 0.5 * (x - 2.0), 0.5 * (z + 1.0) + CLEAR_OF_GROUND as f32]);
+        for (k, expected) in expected.enumerate() {
+            for mesh in [&scene.canvas, &scene.obstacles] {
+                let error = (Vector3::from(mesh.positions[k]) - Vector3::from(expected)).norm();
+                assert!(error < 1e-5, "{k}: {:?} {expected:?}", mesh.positions[k]);
+            }
+        }
+    }
+
     #[test]
     fn bad_scales_and_meshes_are_refused() {
         let mesh = || square([[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);

@@ -72,3 +72,59 @@ impl Projection {
         normal.dot(&direction) > 0.0 && surface.world.cast(&start, &direction, distance - OWN_SURFACE).is_none()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh_io::TriangleMesh;
+
+    /// Two walls of 2 m by 2 m in one piece: the left half (y > 0) at x = 0, the right half goes back to x = 1.
+    fn bent() -> PaintSurface {
+        let corner = |k: u32| {
+            let (column, row) = ((k % 9) as f32, (k / 9) as f32);
+            [(0.25 * column - 1.0).max(0.0), 1.0 - 0.25 * column, 1.0 + 0.25 * row]
+        };
+        let quad = |a: u32| [[a, a + 1, a + 10], [a, a + 10, a + 9]];
+        let faces = (0..64).flat_map(|k| quad(9 * (k / 8) + k % 8)).collect();
+        let mesh = TriangleMesh { positions: (0..81).map(corner).collect(), faces, ..TriangleMesh::default() };
+        PaintSurface::new(&mesh, 0.05, &|_| ()).unwrap()
+    }
+
+    /// Similar triangles: what lies twice as far from the eye is half as large, and the plane through the middle keeps its size.
+    #[test]
+    fn a_point_throws_in_perspective_and_the_front_does_not() {
+        let surface = bent();
+        // The middle of the box: x = 0.5, z = 2. The eye stands on its normal, a metre and a half before it.
+        let eye = Point3::new(-1.0, 0.0, 2.0);
+        let projection = Projection::new(Viewpoint::Point(eye), &surface);
+        for (x, scale) in [(0.5, 1.0), (2.0, 0.5), (-0.25, 2.0)] {
+            let [right, up] = projection.project(&Point3::new(x, -0.2, 2.3)).unwrap();
+            assert!((right - 0.2 * scale).abs() < 1e-9 && (up - 0.3 * scale).abs() < 1e-9, "{x}: {right} {up}");
+        }
+        assert_eq!(projection.project(&Point3::new(-1.5, 0.0, 2.0)), None);
+
+        let front = Projection::new(Viewpoint::Front, &surface);
+        let at = |x: f64, y: f64| front.project(&Point3::new(x, y, 2.3)).unwrap();
+        let facing = surface.facing();
+        let along = Vector3::new(facing.x, facing.y, 0.0).normalize();
+        // Moving along the direction of view changes nothing; up is up.
+        let moved = front.project(&(Point3::new(0.0, 0.3, 2.3) + along * 0.7)).unwrap();
+        assert!((moved[0] - at(0.0, 0.3)[0]).abs() < 1e-9 && (moved[1] - 0.3).abs() < 1e-9, "{moved:?}");
+        assert!(at(0.0, 0.3)[0] < at(0.0, -0.3)[0], "y points to the viewer's left");
+    }
+
+    /// The part that goes back is hidden from an eye beside the wall's plane, and seen from before it.
+    #[test]
+    fn what_faces_away_is_not_seen() {
+        let surface = bent();
+        let normal = UnitVector3::new_normalize(Vector3::new(-1.0, -1.0, 0.0));
+        let (left, right) = (Point3::new(0.0, 0.5, 2.0), Point3::new(0.5, -0.5, 2.0));
+        let towards = |eye: Point3<f64>| Projection::new(Viewpoint::Point(eye), &surface);
+        let before = towards(Point3::new(-2.0, -1.0, 2.0));
+        assert!(before.sees(&surface, &left, &-Vector3::x_axis()) && before.sees(&surface, &right, &normal));
+        let aside = towards(Point3::new(-0.5, 2.0, 2.0));
+        assert!(aside.sees(&surface, &left, &-Vector3::x_axis()) && !aside.sees(&surface, &right, &normal));
+        let behind = towards(Point3::new(2.0, 0.5, 2.0));
+        assert!(!behind.sees(&surface, &left, &-Vector3::x_axis()));
+    }
+}

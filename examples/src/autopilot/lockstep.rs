@@ -119,4 +119,39 @@ mod tests {
         assert_eq!(allowed_processors("Name:\tx\nCpus_allowed_list:\t0-2,5,7-8\n"), [0, 1, 2, 5, 7, 8]);
         assert!(allowed_processors("").is_empty());
     }
+
+    /// Linux ends it when the thread that started it is gone; `setpriv` must have asked for that before.
+    #[test]
+    fn what_is_tied_dies_with_this_program() {
+        let sleep = Path::new("/bin/sleep");
+        if !cfg!(target_os = "linux") || !sleep.exists() || Command::new("setpriv").arg("--version").output().is_err() {
+            return;
+        }
+        let started = Instant::now();
+        let start = move || {
+            let child = tied(sleep, 0).arg("20").spawn().unwrap();
+            let name = PathBuf::from(format!("/proc/{}/comm", child.id()));
+            while !std::fs::read_to_string(&name).is_ok_and(|name| name.starts_with("sleep")) {
+                assert!(started.elapsed() < Duration::from_secs(15), "sleep does not begin");
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            child
+        };
+        let mut child = std::thread::spawn(start).join().unwrap();
+        let status = child.wait().unwrap();
+        assert_eq!(std::os::unix::process::ExitStatusExt::signal(&status), Some(9), "{status}");
+    }
+
+    /// One thread that works, then the same asleep.
+    #[test]
+    fn idle_is_when_all_threads_sleep() {
+        let mut busy = Command::new("sh").args(["-c", "while :; do :; done"]).spawn().unwrap();
+        let mut threads = Threads::of(busy.id());
+        let start = Instant::now();
+        threads.wait_until_idle();
+        let waited = start.elapsed();
+        busy.kill().unwrap();
+        busy.wait().unwrap();
+        assert!(!cfg!(target_os = "linux") || waited >= LONGEST, "{waited:?}");
+    }
 }

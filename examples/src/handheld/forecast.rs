@@ -183,3 +183,71 @@ impl PaintModel for Forecast<'_> {
         self.outcome(path).paint as f64 * QUANTUM
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use paint_sim::droplets::SimulatedSegment;
+
+    use super::super::object::PaintObject;
+    use super::*;
+    use crate::mesh_io::TriangleMesh;
+
+    /// A square of 20 cm before the robot on which 10 µm of paint are wanted.
+    fn square() -> PaintObject {
+        let mesh = TriangleMesh {
+            positions: vec![[0.06, 0.1, -0.1], [0.06, -0.1, -0.1], [0.06, -0.1, 0.1], [0.06, 0.1, 0.1]],
+            faces: vec![[0, 1, 2], [0, 2, 3]],
+            ..TriangleMesh::default()
+        };
+        PaintObject::new(&mesh, &[], 1e-3, &mut |_| 1e-5).unwrap()
+    }
+
+    /// Casts elsewhere what the processor would cast.
+    struct Elsewhere<'a>(&'a PaintJob<'a>, usize);
+
+    impl PaintDevice for Elsewhere<'_> {
+        fn density(&mut self, _: &Coverage, places: &[DensityPlace], _: Flux) -> Result<Vec<f32>, HandheldError> {
+            Ok(vec![0.0; places.len()])
+        }
+
+        fn hits(&mut self, steps: &[StepCast]) -> Result<Option<Vec<StepHits>>, HandheldError> {
+            self.1 += steps.len();
+            let PaintJob { surface, sets, .. } = self.0;
+            Ok(Some(steps.iter().map(|s| StepHits::cast(surface, &s.nozzle, &sets[s.set])).collect()))
+        }
+
+        fn name(&self) -> String {
+            "elsewhere".into()
+        }
+    }
+
+    /// Three segments of different lengths, one of them known before: each gets the hits of its own steps, and none is cast twice.
+    #[test]
+    fn hits_of_a_device_go_to_their_segments() {
+        let object = square();
+        let settings = HandheldSettings::default();
+        let job = PaintJob::new(&object.surface, &settings).unwrap();
+        let coverage = object.bare().unwrap();
+        let sweep = Sweep::still(Isometry3::identity());
+        let segment = |layer: usize, duration: f64, from: f64| {
+            let (start, to) = (0.1 * layer as f64, from + 0.02);
+            Segment { layer, cell: 0, speed: 1, start, duration, from, to }
+        };
+        let path = [segment(0, 0.05, 0.0), segment(1, 0.1, 0.02), segment(2, 0.02, 0.04)];
+        let mut device = Elsewhere(&job, 0);
+        let mut forecast = Forecast::new(&job, &coverage, &mut device, &sweep).unwrap();
+        let first = forecast.outcome(&path[1..2]);
+        let whole = forecast.outcome(&path);
+        forecast.check().unwrap();
+        assert_eq!(device.1, 17, "steps of 10 ms");
+
+        let geometry = &settings.geometry;
+        let mut simulation =
+            PathSimulation::new(&object.surface, &coverage, &job.sets, &settings.deposit, geometry, &sweep).unwrap();
+        let segments: Vec<SimulatedSegment> = path.iter().map(simulated).collect();
+        assert_eq!(first, simulation.simulate(&segments[1..2]));
+        assert_eq!(whole, simulation.simulate(&segments));
+        assert!(whole.paint > first.paint && first.paint > 0);
+        assert_eq!(whole.valve.len(), 17);
+    }
+}

@@ -60,3 +60,75 @@ pub(super) fn reach_needs(
     needs.reach_needs_more_share = open.iter().filter(|open| **open).count() as f64 / all;
     Ok(needs)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh_io::TriangleMesh;
+    use crate::mission::settings::MissionSettings;
+
+    /// A strip of `rows` along a line in the plane of x and z, from y = 0.5 to -0.5, in pieces of a quarter metre.
+    fn folded(line: &[[f32; 2]]) -> PaintSurface {
+        let mut mesh = TriangleMesh::default();
+        for [x, z] in line {
+            mesh.positions.extend((0..5).map(|k| [*x, 0.5 - 0.25 * k as f32, *z]));
+        }
+        for row in 0..line.len() as u32 - 1 {
+            for k in 0..4 {
+                let a = 5 * row + k;
+                mesh.faces.extend([[a, a + 1, a + 6], [a, a + 6, a + 5]]);
+            }
+        }
+        PaintSurface::new(&mesh, 0.05, &|_| ()).unwrap()
+    }
+
+    /// The line `from` to `to` in steps of at most a quarter.
+    fn points(corners: &[[f32; 2]]) -> Vec<[f32; 2]> {
+        let mut line = vec![corners[0]];
+        for pair in corners.windows(2) {
+            let [dx, dz] = [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]];
+            let pieces = (dx.hypot(dz) / 0.25).ceil().max(1.0);
+            line.extend(
+                (1..=pieces as u32).map(|k| [pair[0][0] + dx * k as f32 / pieces, pair[0][1] + dz * k as f32 / pieces]),
+            );
+        }
+        line
+    }
+
+    fn needs(surface: &PaintSurface) -> ReachNeeds {
+        let settings = MissionSettings::default();
+        let in_reach = texels_in_reach(surface, &settings).unwrap();
+        reach_needs(&in_reach, surface, &settings).unwrap()
+    }
+
+    /// A wall, a level shelf above it, and a wall again: a step whose tread faces up. The same upside down: an underside.
+    #[test]
+    fn tops_and_undersides_are_told_apart() {
+        let steps = [[0.0, 1.0], [0.0, 2.0], [0.75, 2.0], [0.75, 3.0]];
+        let top = needs(&folded(&points(&steps)));
+        assert!(top.unreached_tops_share > 0.1, "{top:?}");
+        assert_eq!(top.unreached_undersides_share, 0.0);
+        let under = needs(&folded(&points(&steps.map(|[x, z]| [0.75 - x, z]))));
+        assert!(under.unreached_undersides_share > 0.1 && under.unreached_tops_share == 0.0, "{under:?}");
+        for needs in [top, under] {
+            let unreached =
+                needs.unreached_tops_share + needs.unreached_undersides_share + needs.unreached_hidden_share;
+            let served = needs.reach_needs_tilt_share
+                + needs.reach_needs_arm_share
+                + needs.reach_needs_tilt_and_arm_share
+                + needs.reach_needs_pitch_share
+                + needs.reach_needs_pitch_and_arm_share
+                + needs.reach_needs_more_share;
+            assert!((unreached - served).abs() < 1e-9, "{needs:?}");
+        }
+    }
+
+    /// A groove as deep as the arm is too short: too narrow for the vehicle, its bottom is served by an arm longer by the 0.4 m.
+    #[test]
+    fn a_deep_groove_needs_a_longer_arm() {
+        let groove = [[0.0, 0.5], [0.0, 1.5], [0.5, 1.5], [0.5, 2.5], [0.0, 2.5], [0.0, 3.5]];
+        let found = needs(&folded(&points(&groove)));
+        println!("{found:?}");
+        assert!(found.reach_needs_arm_share > 0.03, "{found:?}");
+    }
+}

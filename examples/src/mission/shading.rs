@@ -68,3 +68,71 @@ fn bilinear(image: &Image, x: f64, y: f64) -> f64 {
     let row = |y: usize| image.at(x0, y) * (1.0 - fx) + image.at(x1, y) * fx;
     row(y0) * (1.0 - fy) + row(y1) * fy
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::Design;
+    use crate::mesh_io::TriangleMesh;
+    use crate::mission::settings::MissionSettings;
+    use crate::region::Scene;
+    use nalgebra::{Point3, UnitVector3, Vector3};
+
+    /// A wall of 2 m by 1 m at x = 0, from one to two metres up, seen from smaller x.
+    fn task() -> PaintingTask {
+        let corner = |k: u32| [0.0, 1.0 - 0.25 * (k % 9) as f32, 1.0 + 0.25 * (k / 9) as f32];
+        let quad = |a: u32| [[a, a + 1, a + 10], [a, a + 10, a + 9]];
+        let faces = (0..32).flat_map(|k| quad(9 * (k / 8) + k % 8)).collect();
+        let mesh = TriangleMesh { positions: (0..45).map(corner).collect(), faces, ..TriangleMesh::default() };
+        PaintingTask::new("wall", &Scene::whole(mesh), &Design::Gradient, MissionSettings::default()).unwrap()
+    }
+
+    /// Paint on the upper left quarter of the picture, and at all places of the surface.
+    #[test]
+    fn paint_is_shown_where_it_lies() {
+        let task = task();
+        let mut depth = task.wanted.map(|_| 0.0);
+        let (width, height) = (depth.width(), depth.height());
+        for y in 0..height / 2 {
+            for x in 0..width / 2 {
+                depth.data_mut()[y * width + x] = 1.0;
+            }
+        }
+        // Left of the viewer, who looks along x, is y > 0.
+        let painted = |p: [f64; 3]| p[1] > 0.0 && p[2] > 1.5;
+        let near_border = |p: [f64; 3]| p[1].abs() < 0.03 || (p[2] - 1.5).abs() < 0.03;
+        let [bare, full] = [0.0, 1.0].map(|depth| task.appearance.srgb(depth));
+        let mut seen = [0; 2];
+        for (colour, position) in vertex_colours(&task, &depth).iter().zip(task.surface.disk().positions()) {
+            if !near_border(*position) {
+                seen[usize::from(painted(*position))] += 1;
+                assert_eq!(*colour, if painted(*position) { full } else { bare }, "{position:?}");
+            }
+        }
+        assert!(seen[0] > 10 && seen[1] > 4, "{seen:?}");
+
+        let linear = [0.0, 1.0].map(|depth| task.appearance.linear(depth).map(|c| c as f32));
+        let channels = [0, 1, 2].map(|c| depth.map(|depth| task.appearance.linear(depth)[c]));
+        let axis = UnitVector3::new_unchecked(Vector3::x());
+        for k in 0..200 {
+            let at = [-1.0, 1.98 * f64::from(k % 20) / 19.0 - 0.99, 1.01 + 0.98 * f64::from(k / 20) / 9.0];
+            let hit = paint_sim::Surface::cast(&task.surface.world, &Point3::from(at), &axis, 2.0).unwrap();
+            let texel = texel_at(&task, &hit).unwrap();
+            let centre = task.surface.texels.at(texel % width, texel / width).map(|at| task.surface.chart.point(at));
+            let off = centre.unwrap() - Point3::new(0.0, at[1], at[2]);
+            assert!(off.norm() < task.settings.texel, "{at:?}: {off}");
+            if !near_border(at) {
+                for shading in [shading(&task, &depth, &hit), shading_of_colours(&task, &channels, &hit)] {
+                    assert_eq!(shading.albedo, linear[usize::from(painted(at))], "{at:?}");
+                    assert!((shading.normal + Vector3::x()).norm() < 1e-6);
+                }
+            }
+        }
+        let beside = Hit {
+            face: 1000,
+            ..paint_sim::Surface::cast(&task.surface.world, &Point3::new(-1.0, 0.0, 1.5), &axis, 2.0).unwrap()
+        };
+        assert_eq!(shading(&task, &depth, &beside).albedo, [0.4; 3]);
+        assert_eq!(texel_at(&task, &beside), None);
+    }
+}

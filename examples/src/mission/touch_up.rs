@@ -50,13 +50,13 @@ pub(super) fn touch_up(
         let expected = expected.data()[pixel];
         all += expected * texel.area;
         let Some(FilmEstimate { thickness, sigma, .. }) = told.filter(|told| !told.opaque) else { continue };
-        let lack = expected - thickness / UNIT_THICKNESS;
-        if lack > LEAST.max(CERTAIN * sigma / UNIT_THICKNESS).max(SHARE * expected) {
+        if let Some(lack) = certain_lack(expected, thickness / UNIT_THICKNESS, sigma / UNIT_THICKNESS) {
             missing.data_mut()[pixel] = lack;
             lacking += lack * texel.area;
         }
     }
-    let figures = figures(film, &told, lacking * UNIT_THICKNESS);
+    let truth: Vec<f64> = (0..told.len()).map(|k| film.thickness(k)).collect();
+    let figures = figures(&truth, &told, lacking * UNIT_THICKNESS);
     if lacking < WORTH * all {
         return Ok((Vec::new(), figures));
     }
@@ -74,6 +74,12 @@ pub(super) fn touch_up(
     Ok((flown?, figures))
 }
 
+/// What is missing of an expected depth of which `seen` is there within a standard deviation of `sigma`, if that is sure.
+fn certain_lack(expected: f64, seen: f64, sigma: f64) -> Option<f64> {
+    let lack = expected - seen;
+    (lack > LEAST.max(CERTAIN * sigma).max(SHARE * expected)).then_some(lack)
+}
+
 /// Depth of the paint as it was decided, per pixel: what no spray can reach is not missing.
 fn expected_depth(task: &PaintingTask) -> Image {
     let decided = task.layers.last().map(|Painting { ink, .. }| ink);
@@ -82,10 +88,10 @@ fn expected_depth(task: &PaintingTask) -> Image {
     ink.map(|ink| task.appearance.ink().inverse(ink))
 }
 
-fn figures(film: &Film, told: &[Option<FilmEstimate>], missing: f64) -> TouchUpFigures {
+/// Of true thicknesses and what was told of them, m, and of what was missing, m³.
+fn figures(truth: &[f64], told: &[Option<FilmEstimate>], missing: f64) -> TouchUpFigures {
     let (mut errors, mut squares, mut seen, mut painted) = (0.0, 0.0, 0, 0);
-    for (k, told) in told.iter().enumerate() {
-        let truth = film.thickness(k);
+    for (&truth, told) in truth.iter().zip(told) {
         if truth < 0.1 * UNIT_THICKNESS {
             continue;
         }
@@ -156,6 +162,28 @@ mod tests {
         let (count, [before, after]) = where_missing(&whole, &left, [&before, &after]);
         println!("{count} texels: CIEDE2000 {before:.2}, {after:.2}; {:?}", repaired.looked);
         assert!(count > 100 && after < 0.5 * before, "{count} {before} {after}");
+    }
+
+    /// Each of the three bounds by itself: 0.08 of a unit, a fifth of what was decided, three deviations.
+    #[test]
+    fn paint_is_missing_where_that_is_sure() {
+        assert!(certain_lack(0.3, 0.21, 0.0).is_some_and(|lack| (lack - 0.09).abs() < 1e-12));
+        assert_eq!(certain_lack(0.3, 0.23, 0.0), None);
+        assert!(certain_lack(1.0, 0.79, 0.0).is_some() && certain_lack(1.0, 0.81, 0.0).is_none());
+        assert!(certain_lack(0.3, 0.1, 0.06).is_some() && certain_lack(0.3, 0.1, 0.07).is_none());
+        assert_eq!(certain_lack(0.3, 0.5, 0.0), None);
+    }
+
+    /// Four texels: sound, wrong by a tenth, opaque, not seen; and one with hardly any paint, on which ten times as much is seen.
+    #[test]
+    fn the_error_of_the_film_counts_painted_texels() {
+        let truth = 0.5 * UNIT_THICKNESS;
+        let told = |thickness: f64, opaque: bool| Some(FilmEstimate { thickness, sigma: 0.01 * truth, opaque });
+        let told = [told(truth, false), told(1.1 * truth, false), told(3.0 * truth, true), None, told(truth, false)];
+        let found = figures(&[truth, truth, truth, truth, 0.05 * UNIT_THICKNESS], &told, 2e-9);
+        // Root of (0 + 0.1^2) / 2.
+        assert!((found.film_error - 0.1 / 2.0_f64.sqrt()).abs() < 1e-9, "{found:?}");
+        assert!((found.film_seen - 0.5).abs() < 1e-12 && found.missing == 2e-9, "{found:?}");
     }
 
     /// Half of the difference in colour where the nozzle was clogged is the goal. The error of the film is that of motion capture's poses, which
