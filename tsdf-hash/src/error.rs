@@ -177,7 +177,7 @@ pub enum Error {
     )]
     IncompatibleSettings,
     /// Reading or writing a file failed.
-    #[error("{what} failed")]
+    #[error("{what}: {source}")]
     Io {
         /// What was done.
         what: &'static str,
@@ -250,6 +250,6 @@ pub enum Error {
         what: String,
     },
     /// Writing a mesh failed.
-    #[error("writing the mesh failed")]
+    #[error("writing the mesh: {0}")]
     Write(#[from] std::io::Error),
 }

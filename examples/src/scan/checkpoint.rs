@@ -54,7 +54,8 @@ impl Checkpoints {
         // A stored map must fit the poses that are stored with it.
         slam.reintegrate(usize::MAX)?;
         let start = Instant::now();
-        slam.save(&settings.path, None, metadata_of(sequence))?;
+        let stored = |source| ScanError::Stored { path: settings.path.display().to_string(), source };
+        slam.save(&settings.path, None, metadata_of(sequence)).map_err(stored)?;
         self.next = Instant::now() + settings.interval.max(start.elapsed().div_f64(LARGEST_SHARE));
         Ok(())
     }

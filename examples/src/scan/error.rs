@@ -94,7 +94,7 @@ pub enum ScanError {
     /// Shape and texture of a frame do not fix its pose.
     #[error("{0} of 6 directions of its pose are not fixed by shape or texture: not fused along a guess")]
     Degenerate(usize),
-    /// Less than half of the work was done.
+    /// Half of the work or less was done, or the result does not agree with itself.
     #[error("{0}")]
     Unusable(String),
     /// A recording of the run cannot be written.

@@ -70,17 +70,18 @@ impl Scan {
     /// # Errors
     /// [`ScanError::Map`].
     pub fn save(&self, path: &Path, folder: &Path) -> Result<(), ScanError> {
-        Ok(self.state.save(path, Some(&self.mesh), metadata_of(folder))?)
+        let stored = |source| ScanError::Stored { path: path.display().to_string(), source };
+        self.state.save(path, Some(&self.mesh), metadata_of(folder)).map_err(stored)
     }
 
-    /// Whether at least half of the work was done.
+    /// Whether more than half of the work was done, and the result agrees with itself.
     ///
     /// # Errors
     /// [`ScanError::Unusable`], with the reason.
     pub fn verdict(&self, sequence: &Sequence) -> Result<(), ScanError> {
         let (quality, taken, frames) = (&self.metrics.quality, self.fused.len() + self.resumed, sequence.frames.len());
         let unusable = |why: String| Err(ScanError::Unusable(format!("the result is written, but not usable: {why}")));
-        if 2 * taken < frames {
+        if 2 * taken <= frames {
             // A map that only locates the camera takes nothing in.
             let done = if quality.valid == 0 { "found in the map" } else { "fused" };
             return unusable(format!("only {taken} of {frames} frames were {done}"));
@@ -91,6 +92,9 @@ impl Scan {
             return unusable(format!(
                 "only {percent:.0} % of the valid pixels were fused: check --depth-scale and --noise"
             ));
+        }
+        if self.mesh.faces.is_empty() {
+            return unusable("the map holds no surface: choose a smaller --voxel, or check --depth-scale".into());
         }
         let agreement = quality.median_agreement();
         if agreement < Quality::LEAST_AGREEMENT {

@@ -24,6 +24,9 @@ const SMOOTH: u32 = 2;
 /// Writes `views.png`, recorded picture, coloured mesh, shaded mesh and their overview, into a folder.
 pub(super) fn save_views(scan: &Scan, sequence: &Sequence, folder: &Path, threads: usize) -> Result<(), ScanError> {
     let Some(&(middle, world_from_camera)) = scan.fused.get(scan.fused.len() / 2) else { return Ok(()) };
+    if scan.mesh.faces.is_empty() {
+        return Ok(());
+    }
     let images = Images::read(&sequence.frames[middle])?;
     let k = sequence.intrinsics;
     let (width, height) = (images.width() as u32, images.height() as u32);

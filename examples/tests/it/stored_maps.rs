@@ -77,7 +77,7 @@ fn a_stored_map_is_not_believed_where_much_has_changed() {
         change(&s, k, |u, _, depth| if u < SIZE.0 / 3 { depth - 150 } else { depth });
     }
     let ran = scan(&s, &["--relocalise", &map]);
-    assert_eq!(ran.figure("frames"), 6.0, "{}", ran.said);
+    assert!(!ran.ok && ran.figure("frames") == 6.0, "{}", ran.said);
     ran.says(&["the camera is lost", "of the pixels agree with the map"]);
     let ran = scan(&s, &["--relocalise", &map, "--extend"]);
     assert!(ran.ok && ran.figure("frames") == FRAMES as f64, "{}", ran.said);

@@ -96,7 +96,10 @@ impl Ran {
 pub(crate) fn scan(s: &Scratch, options: &[&str]) -> Ran {
     let out = s.path("out");
     let mut command = Command::new(env!("CARGO_BIN_EXE_scan"));
-    command.args(["--sequence", s.0.to_str().unwrap(), "--out", &out, "--voxel", "0.02", "--threads", "1"]);
+    command.args(["--sequence", s.0.to_str().unwrap(), "--out", &out, "--threads", "1"]);
+    if !options.contains(&"--voxel") {
+        command.args(["--voxel", "0.02"]);
+    }
     let output = command.args(options).output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(!said.contains("panicked"), "{said}");
@@ -233,6 +236,15 @@ fn most_frames_lost_is_no_success() {
     assert!(!ran.ok, "{}", ran.said);
     ran.says(&["only 4 of 12 frames"]);
     assert_eq!(ran.figure("frames"), 4.0, "the report is written all the same");
+}
+
+/// Voxels as large as the room: there is a map, and nothing in it.
+#[test]
+fn a_map_without_surface_is_no_success() {
+    let s = recording("empty");
+    let ran = scan(&s, &["--voxel", "5"]);
+    assert!(!ran.ok, "{}", ran.said);
+    ran.says(&["no surface", "--voxel"]);
 }
 
 #[test]
