@@ -11,6 +11,7 @@ mod images;
 mod reading;
 mod seen_image;
 mod signed_axes;
+mod static_view;
 mod validation;
 mod window;
 

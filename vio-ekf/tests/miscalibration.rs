@@ -307,6 +307,7 @@ impl Flight {
             }
             let mut calibrations = given.calibrations();
             doubt.correct(&mut calibrations);
+            doubt.correct_samples(&mut given.samples);
             (given.cameras, given.time_offset_s) = (calibrations.map(|c| c.camera), calibrations[0].time_offset_s);
             if doubt.parts == [CalibrationPart::Accelerometer] {
                 break;

@@ -96,6 +96,7 @@ impl Recording {
         let second = self.second.iter().map(|second| CameraCalibration { camera: second.camera, ..self.camera });
         let mut cameras: Vec<CameraCalibration> = std::iter::once(self.camera).chain(second).collect();
         doubt.correct(&mut cameras);
+        doubt.correct_samples(&mut self.samples);
         self.camera = cameras[0];
         if let (Some(second), Some(corrected)) = (&mut self.second, cameras.get(1)) {
             second.camera = corrected.camera;

@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use nalgebra::Vector3;
 use vio_ekf::format::calibration::read_kalibr_cameras;
-use vio_ekf::imu_check::{ImuValidation, check_axes_with_images, diagnose_axes};
+use vio_ekf::imu_check::{ImuValidation, ImuWarning, check_axes_with_images, diagnose_axes};
 use vio_ekf::lie::so3;
 use vio_ekf::run::{CalibrationDoubt, CalibrationPart, Loss, RecordedFrame, Run, check_calibration, evaluate_run};
 use vio_ekf::sim::{Scenario, SimulatedCamera};
@@ -134,11 +135,14 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
     if let Some(doubt) = &doubt {
         eprintln!("warning: {}", calibration_advice(doubt));
     }
+    let is_static = |warning: &&ImuWarning| matches!(warning, ImuWarning::StaticView { .. });
+    let static_view = findings.as_ref().and_then(|findings| findings.warnings.iter().find(is_static));
+    let found = Found { static_view: static_view.map(ToString::to_string), doubt };
     let timed = match timed {
         // Pictures that cannot be used have nothing to do with axes.
         Err(error @ VioError::Pictures { .. }) => return Err(error.into()),
         Err(VioError::Unusable { recording: name, why }) => {
-            return Err(format!("{name}: {}", with_cause(why, doubt.as_ref(), &recording, &settings)).into());
+            return Err(format!("{name}: {}", with_cause(why, &found, &recording, &settings)).into());
         }
         other => other?,
     };
@@ -169,13 +173,13 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         say!("{} poses were taken back: wrong starts, or contradicted before a divergence", run.withdrawn);
     }
     // The files are there to look at, but such a trajectory is not to be relied on.
-    usable(&recording, run).map_err(|why| with_cause(why, doubt.as_ref(), &recording, &settings).into())
+    usable(&recording, run).map_err(|why| with_cause(why, &found, &recording, &settings).into())
 }
 
 /// Corrects the calibration of a recording, and lets the run estimate what is left: checks until nothing is doubted, because a first
 /// estimate far from what is given is not at its best.
 fn calibrate(recording: &mut Recording, settings: &mut RunSettings) -> Result<(), VioError> {
-    let mut is_scaled = false;
+    let (mut is_scaled, mut gyroscope) = (false, Vector3::repeat(1.0));
     for _ in 0..MAX_CHECKS {
         let filter = filter(recording, settings, true)?;
         let doubt = check_calibration(&filter, &recording.samples, || camera_frames(recording));
@@ -183,11 +187,15 @@ fn calibrate(recording: &mut Recording, settings: &mut RunSettings) -> Result<()
         let Some(doubt) = doubt else { break };
         say!("calibration: {doubt}");
         recording.correct_calibration(&doubt);
+        gyroscope.component_mul_assign(&doubt.gyroscope_scale());
         if doubt.parts == [CalibrationPart::Accelerometer] || doubt.found.is_none() {
             break;
         }
     }
     say!("calibration in use: {}", recording.calibration_words());
+    if gyroscope != Vector3::repeat(1.0) {
+        say!("readings of the gyroscope are divided by {:.4}, {:.4}, {:.4}", gyroscope.x, gyroscope.y, gyroscope.z);
+    }
     settings.filter.calibration = settings.filter.calibration.nearly();
     if is_scaled {
         settings.filter = settings.filter.with_rough_accelerometer();
@@ -250,9 +258,21 @@ fn check_samples(recording: &Recording, gravity: f64, accept: bool) -> Result<Op
     }
 }
 
-/// Why a run failed and, if the calibration or axes are the cause, which.
-fn with_cause(why: String, doubt: Option<&CalibrationDoubt>, recording: &Recording, settings: &RunSettings) -> String {
-    if let Some(doubt) = doubt {
+/// What the images say beside the run.
+struct Found {
+    /// That part of them stands still, in words.
+    static_view: Option<String>,
+    /// What they contradict of the calibration.
+    doubt: Option<CalibrationDoubt>,
+}
+
+/// Why a run failed and, if something else is in view, or calibration or axes are the cause, which.
+fn with_cause(why: String, found: &Found, recording: &Recording, settings: &RunSettings) -> String {
+    // A filter that follows the vehicle itself contradicts any calibration and any axes.
+    if let Some(static_view) = &found.static_view {
+        return format!("{why}; {static_view}");
+    }
+    if let Some(doubt) = &found.doubt {
         return format!("{why}; {}", calibration_advice(doubt));
     }
     if interruption::is_requested() {

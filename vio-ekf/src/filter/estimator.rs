@@ -18,6 +18,7 @@ use crate::inertial::imu_buffer::ImuBuffer;
 use crate::inertial::initial_state::InitialState;
 use crate::inertial::odometry::Odometry;
 use crate::inertial::preintegration::ImuPreintegration;
+use crate::lie::so3;
 use crate::samples::{Imu, ImuNoise};
 use crate::stamp::Stamp;
 
@@ -38,6 +39,8 @@ pub(crate) struct Estimator {
     pub(crate) rate: Vector3<f64>,
     /// Specific force integrated over the last propagation, in the body axes of its end, m/s, and over how many seconds.
     pub(crate) impulse: (Vector3<f64>, f64),
+    /// Rotation over the last propagation, in the body axes of its start, rad.
+    pub(crate) turn: Vector3<f64>,
     workspace: Workspace,
     delta: Vec<f64>,
     /// Corrections of a series of updates that bearings have not had yet.
@@ -85,6 +88,7 @@ impl Estimator {
             delta: vec![0.0; capacity],
             owed: vec![0.0; capacity],
             impulse: (Vector3::zeros(), 0.0),
+            turn: Vector3::zeros(),
             state,
             covariance,
         }
@@ -141,6 +145,7 @@ impl Estimator {
         let input = (&preintegration, self.gravity);
         propagate(&mut self.state, &mut self.covariance, input, &mut self.workspace, dropped);
         self.impulse = (preintegration.impulse(), preintegration.duration);
+        self.turn = so3::log(&preintegration.rotation);
         self.buffer.advance(until);
         self.rate = self.buffer.rate_at_state() - self.state.core.gyro_bias;
     }

@@ -47,6 +47,13 @@ impl BeforeImage {
         Self { core: estimator.state.core, velocity, attitude }
     }
 
+    /// How errors of the scales of the gyroscope's axes turn the attitude, on the world's side, over a rotation in the body axes of its
+    /// start that has led here.
+    pub(crate) fn turned(&self, rotation: &Vector3<f64>) -> Matrix3<f64> {
+        let start = self.core.attitude * so3::exp(&-rotation);
+        start.to_rotation_matrix().into_inner() * Matrix3::from_diagonal(rotation)
+    }
+
     /// What has been corrected since.
     pub(crate) fn correction(&self, estimator: &Estimator) -> Correction {
         let now = &estimator.state.core;

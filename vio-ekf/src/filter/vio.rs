@@ -8,6 +8,7 @@ use crate::camera::model::{CameraModel, check_model};
 use crate::error::{Error, invalid};
 use crate::filter::calibration_error::CalibrationError;
 use crate::filter::frontend::image_frontend::ImageFrontend;
+use crate::filter::gyroscope_scale::ScaleEstimate;
 use crate::filter::initializing::Initializing;
 use crate::filter::measurements::measurement::Measurement;
 use crate::filter::measurements::pose::BodyPose;
@@ -301,6 +302,11 @@ impl Vio {
     /// How far the calibration is from what another filter was given; `None` before the initialization.
     pub(crate) fn calibration_error(&self, given: &Self) -> Option<CalibrationError> {
         self.running().map(|running| running.calibration_error(&given.sensors))
+    }
+
+    /// Scales of the gyroscope's axes, as corrections of the attitude tell.
+    pub(crate) fn gyroscope_scale(&self) -> Option<ScaleEstimate> {
+        self.running()?.tracking.gyroscope_scale.estimate()
     }
 
     /// A filter of the same sensors that has not started, with other settings.

@@ -6,6 +6,7 @@ use crate::filter::frontend::point_tracker::PointTracker;
 use crate::filter::point_observation::PointObservation;
 use crate::filter::settings::PatchSettings;
 use crate::imu_check::axes::check_imu_axes;
+use crate::imu_check::static_view::{StaticView, static_view};
 use crate::imu_check::validation::ImuWarning;
 use crate::imu_check::window::busiest_window;
 use crate::run::frames::{Picture, RecordedFrame};
@@ -16,7 +17,8 @@ use crate::stamp::Stamp;
 const WINDOW_S: f64 = 12.0;
 
 /// What the images say about the axes of both inertial sensors; nothing where they say nothing against them. Points are tracked
-/// through the part of the recording that turns most; the other frames are not looked at. `time_offset_s` is added to the frames'
+/// through the part of the recording that turns most; the other frames are not looked at. Those that stay in their place while the
+/// camera turns are no evidence, and are [named](ImuWarning::StaticView) if they are many. `time_offset_s` is added to the frames'
 /// stamps, gravity in m/s².
 ///
 /// # Errors
@@ -43,10 +45,19 @@ pub fn check_axes_with_images<P: Picture>(
     if samples.len() < 2 {
         return Ok(Vec::new());
     }
+    let inside = samples[0].stamp..=samples[samples.len() - 1].stamp;
+    images.retain(|(stamp, _)| inside.contains(&stamp.plus_secs(time_offset_s)));
+    let mut warnings = Vec::new();
+    if let Some(StaticView { ids, share, low, high }) = static_view(&samples, &images, camera, time_offset_s) {
+        for (_, points) in &mut images {
+            points.retain(|point| ids.binary_search(&point.id).is_err());
+        }
+        warnings.push(ImuWarning::StaticView { share, low, high });
+    }
     let found = check_imu_axes(&samples, &images, camera, (gravity, time_offset_s))?;
-    let warnings = [("gyroscope", found.gyro), ("accelerometer", found.accel)];
-    Ok(warnings
-        .into_iter()
-        .filter_map(|(sensor, reading)| Some(ImuWarning::Images { sensor, reading: reading? }))
-        .collect())
+    let readings = [("gyroscope", found.gyro), ("accelerometer", found.accel)];
+    warnings.extend(
+        readings.into_iter().filter_map(|(sensor, reading)| Some(ImuWarning::Images { sensor, reading: reading? })),
+    );
+    Ok(warnings)
 }

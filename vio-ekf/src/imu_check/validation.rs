@@ -107,6 +107,16 @@ pub enum ImuWarning {
         /// The reading.
         reading: AxesReading,
     },
+    /// What is tracked stays in its place in the images while the sensor turns: part of the vehicle is in view, or the images stand
+    /// still ([`Vio::set_mask`](crate::Vio::set_mask)).
+    StaticView {
+        /// Its share of what is tracked.
+        share: f64,
+        /// The box around it in the image, pixels: smallest column and row...
+        low: [f64; 2],
+        /// ... and largest.
+        high: [f64; 2],
+    },
 }
 
 impl From<ClippedAxis> for ImuWarning {
@@ -146,6 +156,12 @@ impl fmt::Display for ImuWarning {
                     100.0 * read / given
                 )
             }
+            Self::StaticView { share, low: [left, top], high: [right, bottom] } => write!(
+                f,
+                "{:.0} % of what is tracked stays in its place in the images while the sensor turns, between columns {left:.0} and \
+                 {right:.0} and rows {top:.0} and {bottom:.0}: if that is part of the vehicle, leave it out with a mask (--mask)",
+                100.0 * share
+            ),
         }
     }
 }

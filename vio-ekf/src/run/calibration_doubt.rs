@@ -2,12 +2,13 @@
 
 use std::fmt;
 
-use nalgebra::UnitQuaternion;
+use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::camera::{Camera, CameraModel};
 use crate::filter::report::Calibration;
 use crate::filter::vio::Vio;
 use crate::format::calibration::CameraCalibration;
+use crate::samples::Imu;
 
 /// A part of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,6 +24,8 @@ pub enum CalibrationPart {
     Clock,
     /// Scale and axes of the accelerometer.
     Accelerometer,
+    /// Scales of the gyroscope's axes.
+    Gyroscope,
     /// Focal length.
     FocalLength,
     /// Principal point.
@@ -48,6 +51,8 @@ pub struct CalibrationDoubt {
     pub parts: Vec<CalibrationPart>,
     /// All that was found, whether it is doubted or not; `None` where the images alone tell.
     pub found: Option<Calibration>,
+    /// What the gyroscope's axes read of a rate, less one; zero where that is not doubted.
+    pub(super) gyroscope: Vector3<f64>,
     /// What has to be added to the offset of the camera's clock, s.
     pub(super) clock_change_s: f64,
     /// In words, with what was found.
@@ -55,7 +60,19 @@ pub struct CalibrationDoubt {
 }
 
 impl CalibrationDoubt {
-    /// Puts what was found in place of what is doubted, and leaves the rest. Of one camera or two.
+    /// What each axis of the gyroscope reads of a rate: 1 where that is not doubted.
+    pub fn gyroscope_scale(&self) -> Vector3<f64> {
+        self.gyroscope.add_scalar(1.0)
+    }
+
+    /// Divides the readings of the gyroscope by [its scale](Self::gyroscope_scale).
+    pub fn correct_samples(&self, samples: &mut [Imu]) {
+        for sample in samples {
+            sample.gyro.component_div_assign(&self.gyroscope_scale());
+        }
+    }
+
+    /// Puts what was found in place of what is doubted of the cameras, and leaves the rest. Of one camera or two.
     pub fn correct(&self, cameras: &mut [CameraCalibration]) {
         let Some(found) = &self.found else { return };
         let doubted = |part: Part| self.parts.contains(&part);
@@ -104,7 +121,11 @@ impl fmt::Display for CalibrationDoubt {
 }
 
 /// A part of what a filter has found beside what another one was given, in words.
-pub(super) fn describe(part: CalibrationPart, found: &Calibration, given: &Vio) -> String {
+pub(super) fn describe(
+    part: CalibrationPart,
+    (found, gyroscope): (&Calibration, &Vector3<f64>),
+    given: &Vio,
+) -> String {
     let settings = given.settings();
     let camera = given.camera();
     let second = given.second_camera().ok();
@@ -142,6 +163,10 @@ pub(super) fn describe(part: CalibrationPart, found: &Calibration, given: &Vio) 
             format!("clock of the camera, offset {:.1} ms, found {:.1}", 1e3 * given, 1e3 * found.time_offset_s)
         }
         Part::Accelerometer => "scale or axes of the accelerometer".into(),
+        Part::Gyroscope => {
+            let [x, y, z] = [0, 1, 2].map(|axis| format!("{:+.1}", 100.0 * gyroscope[axis]));
+            format!("scale of the gyroscope, which reads {x}, {y}, {z} % on its axes")
+        }
         Part::FocalLength => focal("focal lengths", given, lens),
         Part::PrincipalPoint => centre("principal point", given, lens),
         Part::Distortion => distortion("distortion", given, lens),

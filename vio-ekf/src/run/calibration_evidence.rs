@@ -2,9 +2,6 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// The deviations of the posterior are taken to be so many times as large: a filter is never as sure as it says.
-const CAUTION: f64 = 2.0;
-
 /// Chooses the groups of an estimate that are not what was given: `error` is the estimate less what was given, with covariances after
 /// and before the data; `groups` are rows that stand or fall together, `steps` the groups that may be freed at once. The most certain
 /// first.
@@ -18,11 +15,10 @@ pub(super) fn contradicted(
     (groups, steps): (&[Vec<usize>], &[Vec<usize>]),
     enough: f64,
 ) -> Vec<usize> {
-    let posterior = posterior * (CAUTION * CAUTION);
     let evidence = |free: &[usize]| {
         let fixed: Vec<usize> =
             (0..groups.len()).filter(|k| !free.contains(k)).flat_map(|k| groups[k].iter().copied()).collect();
-        let after = log_density(&error.select_rows(&fixed), &pick(&posterior, &fixed))?;
+        let after = log_density(&error.select_rows(&fixed), &pick(posterior, &fixed))?;
         Some(after - log_density(&DVector::zeros(fixed.len()), &pick(prior, &fixed))?)
     };
     let mut free: Vec<usize> = Vec::new();

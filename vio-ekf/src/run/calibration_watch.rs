@@ -4,7 +4,10 @@
 
 use std::collections::VecDeque;
 
+use nalgebra::Vector3;
+
 use crate::filter::calibration_error::CalibrationError;
+use crate::filter::gyroscope_scale::ScaleEstimate;
 use crate::filter::report::Status;
 use crate::filter::settings::{CalibrationSettings, Settings};
 use crate::filter::state::error_state;
@@ -22,6 +25,9 @@ const IMAGES: usize = 400;
 const FEWEST: usize = 100;
 /// Growth of the logarithm of the evidence that frees a part: ours.
 const ENOUGH: f64 = 10.0;
+/// The deviations of the posterior are taken to be so many times as large: a filter is never as sure as it says. The floors below are not:
+/// they were measured.
+const CAUTION: f64 = 2.0;
 /// Images that wait at most: 0.4 s at 20 Hz.
 const MOST_WAITING: usize = 8;
 
@@ -147,7 +153,8 @@ impl CalibrationWatch {
                  {exchanged} the other way round"
             );
             let parts = vec![Part::CameraOrder];
-            return Some(Some(CalibrationDoubt { parts, found: None, clock_change_s: 0.0, words }));
+            let gyroscope = Vector3::zeros();
+            return Some(Some(CalibrationDoubt { parts, found: None, gyroscope, clock_change_s: 0.0, words }));
         }
         let given = match second {
             Some(second) => self.vio.image_pair(stamp, first, second),
@@ -181,6 +188,7 @@ impl CalibrationWatch {
         let rows = |(_, first, floor): &Rows| (*first..first + floor.len()).collect::<Vec<usize>>();
         let estimated = |part: &&Rows| prior.get((part.1, part.1)).is_some_and(|v| *v > 0.0);
         let parts: Vec<&Rows> = PARTS.iter().filter(estimated).collect();
+        posterior *= CAUTION * CAUTION;
         for (row, floor) in parts.iter().flat_map(|(_, first, floor)| (*first..).zip(floor.iter())) {
             posterior[(row, row)] += floor * floor;
             prior[(row, row)] += floor * floor;
@@ -192,14 +200,18 @@ impl CalibrationWatch {
             BOTH.iter().filter_map(|both| both.iter().map(|part| named.iter().position(|p| p == part)).collect());
         let steps: Vec<Vec<usize>> = single.chain(both).collect();
         let chosen = contradicted(&error, (&posterior, &prior), (&groups, &steps), ENOUGH);
-        let parts: Vec<Part> = chosen.into_iter().map(|k| named[k]).collect();
+        let mut parts: Vec<Part> = chosen.into_iter().map(|k| named[k]).collect();
+        let contradicted = self.vio.gyroscope_scale().filter(ScaleEstimate::is_contradicted);
+        let gyroscope = contradicted.map_or_else(Vector3::zeros, |found| found.error);
+        parts.extend(contradicted.map(|_| Part::Gyroscope));
         if parts.is_empty() {
             return None;
         }
         let calibration = self.vio.calibration()?;
-        let words: Vec<String> = parts.iter().map(|part| describe(*part, &calibration, &self.given)).collect();
+        let words: Vec<String> =
+            parts.iter().map(|part| describe(*part, (&calibration, &gyroscope), &self.given)).collect();
         let clock_change_s = error[error_state::TIME_OFFSET];
-        Some(CalibrationDoubt { parts, found: Some(calibration), clock_change_s, words: words.join("; ") })
+        Some(CalibrationDoubt { parts, found: Some(calibration), gyroscope, clock_change_s, words: words.join("; ") })
     }
 }
 

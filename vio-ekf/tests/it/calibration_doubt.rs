@@ -1,11 +1,13 @@
 //! A calibration that the images contradict is named, a sound one is not.
 
 use vio_ekf::imu_check::validate_samples;
-use vio_ekf::run::{CalibrationPart, Run, Runner, RunnerSettings};
+use vio_ekf::nalgebra::Vector3;
+use vio_ekf::run::{CalibrationPart, RecordedFrame, Run, Runner, RunnerSettings, check_calibration};
 use vio_ekf::sim::{
     Frame, RoomSettings, Scenario, SimulatedCamera, Simulation, camera_ahead, camera_ahead_right, painting_flight,
+    swaying_flight,
 };
-use vio_ekf::{Camera, ImuNoise, Settings, Vio};
+use vio_ekf::{Camera, Imu, ImuNoise, Settings, Vio};
 
 /// A flight along a wall, seen by two cameras.
 fn flight(seed: u64) -> Simulation {
@@ -44,6 +46,35 @@ fn a_wrong_focal_length_is_named_with_the_right_one_and_a_sound_one_is_not() {
     assert!((found.fx / sound.fx - 1.0).abs() < 0.01 && (found.fy / sound.fy - 1.0).abs() < 0.01, "{doubt}");
     let unwatched = RunnerSettings { watch_calibration: false, ..RunnerSettings::default() };
     assert_eq!(run(&simulation, &seen, wrong, unwatched).doubt, None);
+}
+
+/// A flight that turns about all axes; one reads 2 % too much of each rate, one nothing.
+#[test]
+fn a_gyroscope_out_of_scale_is_named_and_put_right() {
+    let phases = [0.3, 1.7, 2.9, 4.4].map(|phase| Vector3::new(phase, phase + 1.1, phase + 2.3));
+    let cameras = vec![SimulatedCamera { camera: camera_ahead(), ..SimulatedCamera::default() }];
+    let room = RoomSettings { texture_size: 512, ..RoomSettings::default() };
+    let scenario = Scenario { seed: 8, cameras, room, ..Scenario::default() };
+    let simulation = Simulation::new(swaying_flight(&phases, 22.0).unwrap(), scenario).unwrap();
+    let seen = frames(&simulation, 0, simulation.frame_count(0));
+    let sound = simulation.imu(0).unwrap().samples;
+    let checked = |samples: &[Imu]| {
+        let vio = Vio::new(camera_ahead(), ImuNoise::default(), Settings::default()).unwrap();
+        check_calibration(&vio, samples, || seen.iter().map(|frame| RecordedFrame::single(frame.stamp, frame.clone())))
+    };
+    assert_eq!(checked(&sound), None);
+
+    let mut scaled: Vec<Imu> = sound.iter().map(|imu| Imu { gyro: 1.02 * imu.gyro, ..*imu }).collect();
+    let doubt = checked(&scaled).expect("2 % of the gyroscope");
+    assert!(doubt.parts.contains(&CalibrationPart::Gyroscope), "{doubt}");
+    for _ in 0..3 {
+        if let Some(doubt) = checked(&scaled) {
+            println!("{doubt}");
+            doubt.correct_samples(&mut scaled);
+        }
+    }
+    let most = sound.iter().zip(&scaled).map(|(a, b)| (a.gyro - b.gyro).norm() / a.gyro.norm()).fold(0.0, f64::max);
+    assert!(most < 0.006, "{most}");
 }
 
 #[test]

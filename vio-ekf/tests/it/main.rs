@@ -37,6 +37,7 @@ mod sim;
 #[cfg(feature = "yaml")]
 mod sphere_models;
 mod spline;
+mod static_view;
 mod support;
 #[cfg(feature = "tune")]
 mod tune;
