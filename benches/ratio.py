@@ -59,7 +59,7 @@ def main():
         git("add", "--detach", str(before), arguments.commit)
         try:
             target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).resolve()
-            sides = {"now": (ROOT, executables(ROOT, target)), "before": (before, executables(before, f"{target}-before"))}
+            sides = {"now": (ROOT, executables(ROOT, target)), "before": (before, executables(before, target / "before"))}
             return compare(sides, arguments)
         finally:
             git("remove", "--force", str(before))
