@@ -6,7 +6,9 @@ use nalgebra::Vector3;
 use vio_ekf::format::calibration::read_kalibr_cameras;
 use vio_ekf::imu_check::{ImuValidation, ImuWarning, check_axes_with_images, diagnose_axes};
 use vio_ekf::lie::so3;
-use vio_ekf::run::{CalibrationDoubt, CalibrationPart, Loss, RecordedFrame, Run, check_calibration, evaluate_run};
+use vio_ekf::run::{
+    CalibrationDoubt, CalibrationPart, Loss, Picture, RecordedFrame, Run, check_calibration, evaluate_run,
+};
 use vio_ekf::sim::{Scenario, SimulatedCamera};
 use vio_ekf::tune::TuneSettings;
 use vio_ekf::{Camera, Settings};
@@ -71,6 +73,16 @@ fn filter_settings(arguments: &Track) -> Result<Settings, AnyError> {
     Ok(filter)
 }
 
+/// An image of the size of the camera's.
+fn read_mask(path: &Path, camera: &Camera) -> Result<GreyImage, AnyError> {
+    let mask = GreyImage::read(path)?;
+    let (given, expected) = ((mask.width, mask.height), (camera.width, camera.height));
+    if given == expected {
+        return Ok(mask);
+    }
+    Err(VioError::malformed(path, &vio_ekf::Error::ImageSize { given, expected }).into())
+}
+
 fn track(arguments: &Track) -> Result<(), AnyError> {
     if arguments.euroc.is_none() && arguments.mcap.is_none() {
         return Err(NO_RECORDING.into());
@@ -91,16 +103,7 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         (None, Some(file)) => open_mcap(file, &overrides)?,
         (None, None) => return Err(NO_RECORDING.into()),
     };
-    if let Some(path) = &arguments.mask {
-        let mask = GreyImage::read(path)?;
-        let (given, camera) = ((mask.width, mask.height), recording.camera.camera);
-        if given != (camera.width, camera.height) {
-            let expected = (camera.width, camera.height);
-            let why = vio_ekf::Error::ImageSize { given, expected };
-            return Err(VioError::malformed(path, &why).into());
-        }
-        recording.mask = Some(mask);
-    }
+    recording.mask = arguments.mask.as_ref().map(|path| read_mask(path, &recording.camera.camera)).transpose()?;
     let filter = filter_settings(arguments)?;
     check_first_images(&recording)?;
     recording.assumed.iter().for_each(|assumed| eprintln!("warning: {assumed}"));
@@ -116,7 +119,9 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         let camera = recording.camera;
         let known = (filter.gravity, camera.time_offset_s);
         let frames = camera_frames(&recording);
-        findings.warnings.extend(check_axes_with_images(&recording.samples, frames, &camera.camera, known)?);
+        let mask = recording.mask.as_ref().map(Picture::view);
+        let seen_by = (&camera.camera, mask.as_ref());
+        findings.warnings.extend(check_axes_with_images(&recording.samples, frames, seen_by, known)?);
         say!("inertial sensor: {:.0} Hz, {} gaps", findings.rate_hz, findings.gaps);
         findings.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
         match findings.refuse_contradicted() {

@@ -10,7 +10,7 @@ use crate::imu_check::static_view::{StaticView, static_view};
 use crate::imu_check::validation::ImuWarning;
 use crate::imu_check::window::busiest_window;
 use crate::run::frames::{Picture, RecordedFrame};
-use crate::samples::Imu;
+use crate::samples::{ImageView, Imu};
 use crate::stamp::Stamp;
 
 /// Length of the part of the recording that is looked at, s: the one with the most rotation.
@@ -18,19 +18,20 @@ const WINDOW_S: f64 = 12.0;
 
 /// What the images say about the axes of both inertial sensors; nothing where they say nothing against them. Points are tracked
 /// through the part of the recording that turns most; the other frames are not looked at. Those that stay in their place while the
-/// camera turns are no evidence, and are [named](ImuWarning::StaticView) if they are many. `time_offset_s` is added to the frames'
-/// stamps, gravity in m/s².
+/// camera turns are no evidence, and are [named](ImuWarning::StaticView) if they are many; none lie where the `mask` is 0.
+/// `time_offset_s` is added to the frames' stamps, gravity in m/s².
 ///
 /// # Errors
-/// [`Error`] if the camera's calibration cannot be.
+/// [`Error`] if the camera's calibration cannot be, or the mask is not of its size.
 pub fn check_axes_with_images<P: Picture>(
     samples: &[Imu],
     frames: impl IntoIterator<Item = RecordedFrame<P>>,
-    camera: &Camera,
+    (camera, mask): (&Camera, Option<&ImageView>),
     (gravity, time_offset_s): (f64, f64),
 ) -> Result<Vec<ImuWarning>, Error> {
     let Some((from, until)) = busiest_window(samples, WINDOW_S) else { return Ok(Vec::new()) };
     let mut tracker = PointTracker::new(*camera, &PatchSettings::default())?;
+    mask.map_or(Ok(()), |mask| tracker.set_mask(mask))?;
     let mut images: Vec<(Stamp, Vec<PointObservation>)> = Vec::new();
     let frames = frames.into_iter().skip_while(|frame| frame.stamp < from);
     for RecordedFrame { stamp, picture, .. } in frames.take_while(|frame| frame.stamp <= until) {

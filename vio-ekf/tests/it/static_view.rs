@@ -5,7 +5,7 @@ use vio_ekf::imu_check::{ImuWarning, check_axes_with_images};
 use vio_ekf::nalgebra::Vector3;
 use vio_ekf::run::RecordedFrame;
 use vio_ekf::sim::{Frame, camera_ahead};
-use vio_ekf::{Imu, Stamp};
+use vio_ekf::{ImageView, Imu, Stamp};
 
 /// Grey values that have corners and hang on the place alone.
 fn painted(x: usize, y: usize) -> u8 {
@@ -33,9 +33,13 @@ fn covered(frames: &[Frame], first: usize) -> Vec<Frame> {
     frames
 }
 
-fn warnings(samples: &[Imu], frames: &[Frame]) -> Vec<ImuWarning> {
+fn warnings_beside(mask: Option<&ImageView>, samples: &[Imu], frames: &[Frame]) -> Vec<ImuWarning> {
     let frames = frames.iter().map(|frame| RecordedFrame::single(frame.stamp, frame.clone()));
-    check_axes_with_images(samples, frames, &camera_ahead(), (9.81, 0.0)).unwrap()
+    check_axes_with_images(samples, frames, (&camera_ahead(), mask), (9.81, 0.0)).unwrap()
+}
+
+fn warnings(samples: &[Imu], frames: &[Frame]) -> Vec<ImuWarning> {
+    warnings_beside(None, samples, frames)
 }
 
 /// Exchanged axes of the gyroscope are still seen in what is left of the image.
@@ -50,6 +54,12 @@ fn what_moves_with_the_camera_is_named_and_no_sensor_is_blamed_for_it() {
     assert!(share > 0.2 && share < 0.95, "{found:?}");
     assert!(low[1] > 232.0 && high[1] < 480.0, "{found:?}");
     assert!(found[0].to_string().contains("--mask"), "{}", found[0]);
+
+    // With the mask that is asked for there is nothing more to say.
+    let (width, height) = (whole[0].width, whole[0].height);
+    let mask: Vec<u8> = (0..width * height).map(|k| if k / width < height / 2 { 255 } else { 0 }).collect();
+    let mask = ImageView::new(width, height, &mask).unwrap();
+    assert_eq!(warnings_beside(Some(&mask), &samples, &half), []);
 
     let quarter = covered(&whole, 360);
     let exchanged: Vec<Imu> =

@@ -33,6 +33,13 @@ impl PointTracker {
         Ok(Self { camera, criteria: DetectionCriteria::from(patches), frontend, tracker: KltTracker::default() })
     }
 
+    /// From here on no point lies where the mask, of the size of the images, is 0.
+    pub fn set_mask(&mut self, mask: &ImageView) -> Result<(), Error> {
+        let mask = mask.checked(self.camera.image_size())?;
+        self.frontend.detector.set_mask(&mask);
+        Ok(())
+    }
+
     /// The points that the next image shows; it must be of the camera's size.
     pub fn image(&mut self, image: &ImageView) -> Result<Vec<PointObservation>, Error> {
         self.frontend.set_image(&image.checked(self.camera.image_size())?);
@@ -40,6 +47,7 @@ impl PointTracker {
         let still = Some(UnitQuaternion::identity());
         self.tracker.track(still, pyramid, (detector, &self.criteria), self.camera.as_ref());
         let ids = self.tracker.observations().map(|(id, _)| id);
-        Ok(ids.filter_map(|id| Some(PointObservation { id, pixel: self.tracker.pixel(id)? })).collect())
+        let points = ids.filter_map(|id| Some(PointObservation { id, pixel: self.tracker.pixel(id)? }));
+        Ok(points.filter(|point| !detector.is_masked(&point.pixel)).collect())
     }
 }
