@@ -192,14 +192,14 @@ mod tests {
     use super::*;
     use crate::mesh_io::TriangleMesh;
 
-    /// A square of 20 cm before the robot on which 10 µm of paint are wanted.
+    /// A square of 20 cm before the robot on which 10 µm of paint are wanted below z = -2 cm.
     fn square() -> PaintObject {
         let mesh = TriangleMesh {
             positions: vec![[0.06, 0.1, -0.1], [0.06, -0.1, -0.1], [0.06, -0.1, 0.1], [0.06, 0.1, 0.1]],
             faces: vec![[0, 1, 2], [0, 2, 3]],
             ..TriangleMesh::default()
         };
-        PaintObject::new(&mesh, &[], 1e-3, &mut |_| 1e-5).unwrap()
+        PaintObject::new(&mesh, &[], 1e-3, &mut |s| if s.point.z < -0.02 { 1e-5 } else { 0.0 }).unwrap()
     }
 
     /// Casts elsewhere what the processor would cast.

@@ -123,12 +123,26 @@ mod tests {
         }
     }
 
-    /// A groove as deep as the arm is too short: too narrow for the vehicle, its bottom is served by an arm longer by the 0.4 m.
+    /// A groove too narrow for the vehicle, its bottom 0.7 m behind the wall: what an arm 0.4 m longer, forwards, reaches there.
     #[test]
     fn a_deep_groove_needs_a_longer_arm() {
-        let groove = [[0.0, 0.5], [0.0, 1.5], [0.5, 1.5], [0.5, 2.5], [0.0, 2.5], [0.0, 3.5]];
-        let found = needs(&folded(&points(&groove)));
-        println!("{found:?}");
-        assert!(found.reach_needs_arm_share > 0.03, "{found:?}");
+        let groove = [[0.0, 0.5], [0.0, 1.5], [0.7, 1.5], [0.7, 2.5], [0.0, 2.5], [0.0, 3.5]];
+        let surface = folded(&points(&groove));
+        let settings = MissionSettings::default();
+        let reached = |settings: &MissionSettings| texels_in_reach(&surface, settings).unwrap();
+        let (usual, steep) = (reached(&settings), reached(&with_tilt(&settings, STEEPEST)));
+        let all = surface.coverage().data().iter().sum::<f64>();
+        // What an arm with its pan axis moved reaches, and nothing before it.
+        let more = |x: f64, y: f64| {
+            let mut moved = settings.clone();
+            moved.ptu.body_from_pan_axis.x += x;
+            moved.ptu.body_from_pan_axis.y += y;
+            let reached = reached(&moved);
+            (0..usual.len()).filter(|&k| reached[k] && !usual[k] && !steep[k]).count() as f64 / all
+        };
+        let found = reach_needs(&usual, &surface, &settings).unwrap().reach_needs_arm_share;
+        let [forwards, aside] = [more(0.4, 0.0), more(0.0, 0.4)];
+        assert!(found > 0.02 && (found - forwards).abs() < 1e-9, "{found} {forwards}");
+        assert!((forwards - aside).abs() > 0.02, "{forwards} {aside}");
     }
 }
