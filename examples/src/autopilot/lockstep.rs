@@ -142,9 +142,9 @@ mod tests {
         assert_eq!(std::os::unix::process::ExitStatusExt::signal(&status), Some(9), "{status}");
     }
 
-    /// One thread that works, then the same asleep.
+    /// As long as it is allowed to.
     #[test]
-    fn idle_is_when_all_threads_sleep() {
+    fn a_thread_that_works_is_waited_for() {
         let mut busy = Command::new("sh").args(["-c", "while :; do :; done"]).spawn().unwrap();
         let mut threads = Threads::of(busy.id());
         let start = Instant::now();

@@ -67,7 +67,7 @@ mod tests {
     use crate::mesh_io::TriangleMesh;
     use crate::mission::settings::MissionSettings;
 
-    /// A strip of `rows` along a line in the plane of x and z, from y = 0.5 to -0.5, in pieces of a quarter metre.
+    /// A strip along a line of points (x, z), metres, from y = 0.5 to -0.5 in pieces of a quarter metre.
     fn folded(line: &[[f32; 2]]) -> PaintSurface {
         let mut mesh = TriangleMesh::default();
         for [x, z] in line {
@@ -82,7 +82,7 @@ mod tests {
         PaintSurface::new(&mesh, 0.05, &|_| ()).unwrap()
     }
 
-    /// The line `from` to `to` in steps of at most a quarter.
+    /// The line through corners, metres, in steps of at most a quarter metre.
     fn points(corners: &[[f32; 2]]) -> Vec<[f32; 2]> {
         let mut line = vec![corners[0]];
         for pair in corners.windows(2) {

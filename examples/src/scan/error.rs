@@ -57,7 +57,7 @@ pub enum ScanError {
     /// The map refused something.
     #[error(transparent)]
     Map(tsdf_hash::Error),
-    /// The stored map cannot be used.
+    /// The stored map cannot be used, or not written.
     #[error("{path}: {source}")]
     Stored {
         /// The file.

@@ -68,7 +68,7 @@ impl Scan {
     /// Writes the map with its mesh, and with what a later run over the same sequence needs to know.
     ///
     /// # Errors
-    /// [`ScanError::Map`].
+    /// [`ScanError::Stored`], with the file and the reason.
     pub fn save(&self, path: &Path, folder: &Path) -> Result<(), ScanError> {
         let stored = |source| ScanError::Stored { path: path.display().to_string(), source };
         self.state.save(path, Some(&self.mesh), metadata_of(folder)).map_err(stored)

@@ -15,8 +15,8 @@ const SMALLEST: f64 = 0.002;
 
 /// Sums over the corrections of the attitude by images.
 ///
-/// Scales `1 + ε` of the axes turn the attitude by `U ε` too far between two images, `U = R diag(θ)` with the rotation `θ` in body axes.
-/// An image corrects the attitude by `δ`, whose covariance is `G = P⁻ − P⁺` if all is as modelled: then `s = −Σ Uᵀ G⁻¹ δ` has the mean
+/// Scales `1 + ε` of the axes turn the attitude by `U ε` too far between two images, `U = R diag(θ)` with the rotation `θ` (rad, body axes)
+/// and the attitude `R` at the first. An image corrects the attitude by `δ` (rad, world axes), whose covariance is `G = P⁻ − P⁺` if all is as modelled: then `s = −Σ Uᵀ G⁻¹ δ` has the mean
 /// zero and the covariance `Σ Uᵀ G⁻¹ U` (a score test, Rao 1948). How large `ε` is follows from the sums of windows, in which
 /// `Σ δ = −Σ U ε` up to what the last images have not yet corrected.
 #[derive(Debug, Clone, Copy, Default)]
@@ -49,7 +49,7 @@ pub(crate) struct ScaleEstimate {
 }
 
 impl ScaleEstimate {
-    /// Whether the scales are not one, and not by an error that no other test would mind.
+    /// Whether the scales are not one, by an error that matters.
     pub(crate) fn is_contradicted(&self) -> bool {
         let certain = (0..3).any(|k| self.error[k].abs() > (CERTAIN * self.sigma[k]).max(SMALLEST));
         self.statistic > CONTRADICTION && certain

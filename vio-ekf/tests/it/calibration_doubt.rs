@@ -48,7 +48,7 @@ fn a_wrong_focal_length_is_named_with_the_right_one_and_a_sound_one_is_not() {
     assert_eq!(run(&simulation, &seen, wrong, unwatched).doubt, None);
 }
 
-/// A flight that turns about all axes; one reads 2 % too much of each rate, one nothing.
+/// A flight that turns about all axes, with a gyroscope that reads each rate as it is, and then 2 % too much of it.
 #[test]
 fn a_gyroscope_out_of_scale_is_named_and_put_right() {
     let phases = [0.3, 1.7, 2.9, 4.4].map(|phase| Vector3::new(phase, phase + 1.1, phase + 2.3));
@@ -69,7 +69,6 @@ fn a_gyroscope_out_of_scale_is_named_and_put_right() {
     assert!(doubt.parts.contains(&CalibrationPart::Gyroscope), "{doubt}");
     for _ in 0..3 {
         if let Some(doubt) = checked(&scaled) {
-            println!("{doubt}");
             doubt.correct_samples(&mut scaled);
         }
     }
