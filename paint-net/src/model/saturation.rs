@@ -33,22 +33,26 @@ impl Saturation {
     /// Ink at a depth; depths below zero count as zero.
     #[inline]
     pub fn forward(&self, depth: f64) -> f64 {
-        let depth = depth.max(0.0);
-        match self {
-            Self::Tanh => depth.tanh(),
-            Self::BeerLambert { density } => -(-density * depth).exp_m1(),
-            Self::Curve(curve) => curve.value_and_slope(depth).0,
-        }
+        self.forward_and_derivative(depth).0
     }
 
     /// `f'(c)`.
     #[inline]
     pub fn derivative(&self, depth: f64) -> f64 {
+        self.forward_and_derivative(depth).1
+    }
+
+    /// [`forward`](Self::forward) and [`derivative`](Self::derivative) at once: what both need is computed once.
+    #[inline]
+    pub(crate) fn forward_and_derivative(&self, depth: f64) -> (f64, f64) {
         let depth = depth.max(0.0);
         match self {
-            Self::Tanh => 1.0 - depth.tanh().powi(2),
-            Self::BeerLambert { density } => density * (-density * depth).exp(),
-            Self::Curve(curve) => curve.value_and_slope(depth).1,
+            Self::Tanh => {
+                let ink = depth.tanh();
+                (ink, 1.0 - ink.powi(2))
+            }
+            Self::BeerLambert { density } => (-(-density * depth).exp_m1(), density * (-density * depth).exp()),
+            Self::Curve(curve) => curve.value_and_slope(depth),
         }
     }
 

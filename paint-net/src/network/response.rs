@@ -40,7 +40,8 @@ impl ScaledResponse {
         let table = (0..=STEPS)
             .map(|k| {
                 let at = depth * DEEPEST * k as f64 / STEPS as f64;
-                [saturation.forward(at) / ink, saturation.derivative(at) * depth / ink]
+                let (value, slope) = saturation.forward_and_derivative(at);
+                [value / ink, slope * depth / ink]
             })
             .collect();
         Self { response: Response::Table(table), depth, ink }

@@ -32,11 +32,11 @@ pub(super) fn fit(
 pub(super) fn ink_cost(problem: &PaintProblem, saturation: &Saturation, canvas: &mut [f64]) -> f64 {
     let mut value = 0.0;
     for (k, (depth, wanted)) in canvas.iter_mut().zip(problem.reference.data()).enumerate() {
-        let ink = saturation.forward(*depth);
+        let (ink, slope) = saturation.forward_and_derivative(*depth);
         let (residual, above) = (ink - wanted, problem.above_ceiling(k, ink));
         let weight = problem.weight_of(k, residual);
         value += 0.5 * (weight * residual * residual + PaintProblem::CEILING_WEIGHT * above * above);
-        *depth = (weight * residual + PaintProblem::CEILING_WEIGHT * above) * saturation.derivative(*depth);
+        *depth = (weight * residual + PaintProblem::CEILING_WEIGHT * above) * slope;
     }
     value
 }

@@ -177,9 +177,9 @@ impl<'a> Search<'a> {
         for y in y0..y1 {
             for p in y * width + x0..y * width + x1 {
                 let depth = self.canvas.data()[p];
-                let (slope, weight) = (self.problem.saturation.derivative(depth), self.problem.weight(p));
-                self.gradient[p] =
-                    weight * slope * (self.problem.reference.data()[p] - self.problem.saturation.forward(depth));
+                let (ink, slope) = self.problem.saturation.forward_and_derivative(depth);
+                let weight = self.problem.weight(p);
+                self.gradient[p] = weight * slope * (self.problem.reference.data()[p] - ink);
                 self.curvature[p] = weight * slope * slope;
             }
         }
