@@ -1,9 +1,8 @@
 //! The planner beside general solvers: its programs in a form that they read, and its own figures.
 
 mod segments;
-// The tests' wall stands for itself.
 #[path = "../../paint-planner/tests/it/walls.rs"]
-#[allow(dead_code)]
+#[allow(dead_code, reason = "the tests' wall stands for itself")]
 mod walls;
 
 use std::error::Error;

@@ -10,8 +10,7 @@ use crate::worker_threads;
 /// Paints an object with a nozzle on a handheld gantry: a person sweeps it past, the program decides where the nozzle slides and when it
 /// sprays. Without a mesh: a cube of 60 mm on its corner, with a circle of 34 mm on each upper face.
 #[derive(Debug, Clone, Parser)]
-// Each is a switch of the command line.
-#[allow(clippy::struct_excessive_bools)]
+#[allow(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 #[command(
     version,
     after_help = "Examples:\n  handheld\n  handheld --mesh bust.obj --scale 0.001 --target face.png --texel 0.002\n  handheld --evaluate"

@@ -1,5 +1,5 @@
 //! The binaries and what they share, from outside: one test binary, so that everything is linked once.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, reason = "a test may panic, in its helpers too")]
 
 mod area_fill;
 mod bad_input;

@@ -375,8 +375,7 @@ fn reliability_is_that_of_the_paper() {
 }
 
 /// A plate in front of a wall.
-// Scenes may be missed by a ray; this one is not.
-#[allow(clippy::unnecessary_wraps)]
+#[allow(clippy::unnecessary_wraps, reason = "scenes may be missed by a ray; this one is not")]
 fn plate_and_wall(o: &Point3<f64>, d: &Vector3<f64>) -> Option<f64> {
     let at = |x: f64| (x - o.x) / d.x;
     let plate = o + d * at(1.0);
