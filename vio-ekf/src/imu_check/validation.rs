@@ -21,6 +21,8 @@ const BLOCK_S: f64 = 8.0;
 const PLAUSIBLE_FORCE: [f64; 2] = [0.5, 3.0];
 /// The mean force of a calm flight differs from gravity by less, m/s².
 const CALM: f64 = 2.0;
+/// The length of its mean over a block does by less, m/s²: recorded flights of sound sensors by 0.2.
+const OFF: f64 = 0.25;
 /// Measured and claimed rate may differ by this share.
 const RATE_TOLERANCE: f64 = 0.2;
 /// Time between two samples, in units of the usual one, from which it counts as a gap.
@@ -80,6 +82,13 @@ pub enum ImuWarning {
         /// What was expected, m/s².
         gravity: f64,
     },
+    /// The mean force is not quite as long as gravity: a bias, or an accelerometer out of scale.
+    Gravity {
+        /// Median over blocks of the length of the mean force with the gyroscope's turns taken out, m/s².
+        force: f64,
+        /// What was expected, m/s².
+        gravity: f64,
+    },
     /// Another assignment of axes departs less from gravity: a flight that leans as it accelerates, or swapped axes.
     Axes {
         /// What the accelerometer's (x, y, z) and the gyroscope would have to be.
@@ -131,6 +140,13 @@ impl fmt::Display for ImuWarning {
             Self::Force { force, gravity } => write!(
                 f,
                 "the accelerometer reads {force:.1} m/s² on average, gravity is {gravity:.2}: an aggressive flight, or a wrong scale"
+            ),
+            Self::Gravity { force, gravity } => write!(
+                f,
+                "the accelerometer reads gravity as {force:.2} m/s², which is {gravity:.2}: it is {:+.1} % out of scale, or has a bias of \
+                 {:+.2} m/s²; if distances matter, calibrate it",
+                100.0 * (force / gravity - 1.0),
+                force - gravity
             ),
             Self::Axes { hint, departure, departure_of_hint } => write!(
                 f,
@@ -200,6 +216,9 @@ pub fn validate_samples(samples: &[Imu], rate_hz: f64, gravity: f64) -> Result<I
     let gaps = steps.len() - steps.partition_point(|&step| step <= GAP * usual);
     let windows = windows(samples, GAP * usual, &bias_at_rest(samples));
     let mut warnings = check_gravity(&windows, gravity)?;
+    if warnings.is_empty() {
+        warnings.extend(check_length(&windows, gravity));
+    }
     warnings.extend(clipped_axes(samples).into_iter().map(ImuWarning::from));
     Ok(ImuValidation { rate_hz: measured, gaps, longest_gap_s: steps[steps.len() - 1], warnings })
 }
@@ -257,6 +276,11 @@ impl Window {
         Self { turned, force, rate }
     }
 
+    /// Lengths of the mean force of each block, the axes as they are.
+    fn mean_forces(&self) -> impl Iterator<Item = f64> + '_ {
+        self.turned[0].iter().map(|block| Vector3::from_fn(|i, _| block[i].trace()).norm())
+    }
+
     /// Sum over blocks of the squared departure of the mean force from a vector as long as gravity along the window's mean, if
     /// axis `l` of the accelerometer is column `l` of `axes`; and how many blocks there are.
     fn departure(&self, axes: &Matrix3<f64>, reading: usize, gravity: f64) -> (f64, f64) {
@@ -306,6 +330,14 @@ fn check_gravity(windows: &[Window], gravity: f64) -> Result<Vec<ImuWarning>, Er
         warnings.push(ImuWarning::Axes { hint, departure, departure_of_hint });
     }
     Ok(warnings)
+}
+
+/// Whether what the forces of sound axes have in common is as long as gravity.
+fn check_length(windows: &[Window], gravity: f64) -> Option<ImuWarning> {
+    let mut lengths: Vec<f64> = windows.iter().flat_map(Window::mean_forces).collect();
+    lengths.sort_unstable_by(f64::total_cmp);
+    let force = *lengths.get(lengths.len() / 2)?;
+    ((force - gravity).abs() > OFF && lengths.len() > 1).then_some(ImuWarning::Gravity { force, gravity })
 }
 
 /// The 24 rotations that map axes to axes. Their mirror images scatter gravity alike: they turn the world upside down.

@@ -145,6 +145,20 @@ fn a_gyroscope_with_a_bias_is_sound_and_its_axes_are_found_all_the_same() {
     assert!(is_named(&spoilt), "{spoilt:?}");
 }
 
+/// A rocking body whose accelerometer reads 1 % and 4 % too much.
+#[test]
+fn gravity_of_another_length_is_named() {
+    let samples = rocking(Vector3::zeros());
+    let found = |factor: f64| {
+        let scaled = with(&samples, |s| Imu { accel: s.accel * factor, ..*s });
+        validate_samples(&scaled, 200.0, GRAVITY).unwrap().warnings
+    };
+    assert_eq!(found(1.01), []);
+    let [ImuWarning::Gravity { force, gravity }] = found(0.96)[..] else { panic!("{:?}", found(0.96)) };
+    assert!((force - 0.96 * GRAVITY).abs() < 0.02 && gravity == GRAVITY, "{force}");
+    assert!(found(0.96)[0].to_string().contains("-4.0 %"), "{}", found(0.96)[0]);
+}
+
 /// A level body carried round a circle: 12.7 m/s² all the time.
 #[test]
 fn a_hard_turn_is_flown_and_not_refused() {
