@@ -7,7 +7,6 @@ mod depth_prior;
 mod divergence_monitor;
 mod estimator;
 pub(crate) mod frontend;
-pub(crate) mod gyroscope_scale;
 mod image_tracking;
 mod initialization;
 mod initializing;

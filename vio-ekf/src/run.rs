@@ -2,6 +2,7 @@
 
 mod calibration_doubt;
 mod calibration_evidence;
+mod calibration_trial;
 mod calibration_watch;
 mod evaluation;
 pub(crate) mod frames;

@@ -12,7 +12,7 @@ use vio_ekf::eval::{Alignment, Association, ate, heading_onto};
 use vio_ekf::format::calibration::{CameraCalibration, ImuCalibration};
 use vio_ekf::format::{asl, euroc};
 use vio_ekf::imu_check::validate_samples;
-use vio_ekf::run::{CalibrationPart, Event, Picture, RecordedFrame, Run, Runner, RunnerSettings, check_calibration};
+use vio_ekf::run::{Event, Picture, RecordedFrame, Run, Runner, RunnerSettings, check_calibration};
 use vio_ekf::sim::{
     RoomSettings, Scenario, SimulatedCamera, Simulation, camera_ahead, camera_ahead_right, painting_flight,
     swaying_flight,
@@ -284,7 +284,7 @@ impl Flight {
 
     /// As the binary does it with `--calibrate`: checks until nothing is doubted; how many, and the settings of the run then.
     fn calibrated(&self, given: &Given, count: usize) -> (Given, usize, Settings) {
-        let (mut given, mut checks, mut is_scaled) = (given.clone(), 0, false);
+        let (mut given, mut checks, mut settings) = (given.clone(), 0, Settings::default());
         for _ in 0..4 {
             let filter = Self::filter(&given, &Settings::default(), count);
             let frames = || {
@@ -298,9 +298,7 @@ impl Flight {
                     }
                 })
             };
-            let doubt = check_calibration(&filter, &given.samples, frames);
-            is_scaled = doubt.as_ref().is_some_and(|doubt| doubt.parts.contains(&CalibrationPart::Accelerometer));
-            let Some(doubt) = doubt else { break };
+            let Some(doubt) = check_calibration(&filter, &given.samples, frames) else { break };
             checks += 1;
             if std::env::var_os("VERBOSE").is_some() {
                 println!("    {doubt}");
@@ -309,13 +307,9 @@ impl Flight {
             doubt.correct(&mut calibrations);
             doubt.correct_samples(&mut given.samples);
             (given.cameras, given.time_offset_s) = (calibrations.map(|c| c.camera), calibrations[0].time_offset_s);
-            if doubt.parts == [CalibrationPart::Accelerometer] {
-                break;
-            }
+            settings = doubt.freed(&settings);
         }
-        let sound = Settings::default();
-        let settings = Settings { calibration: sound.calibration.nearly(), ..sound };
-        (given, checks, if is_scaled { settings.with_rough_accelerometer() } else { settings })
+        (given, checks, settings)
     }
 
     /// Position error after alignment, m, NEES of the position, share of images with a pose; of the longest segment.

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::Vector3;
 use vio_ekf::format::calibration::read_kalibr_cameras;
 use vio_ekf::imu_check::{ImuValidation, ImuWarning, check_axes_with_images, diagnose_axes};
 use vio_ekf::lie::so3;
@@ -136,13 +135,17 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
         calibrate(&mut recording, &mut settings)?;
     }
     let _finishing = Finishing::begin();
-    let (timed, doubt) = with_calibration_check(&recording, &settings);
+    let (timed, doubt) = if arguments.calibrate {
+        (run(&recording, &settings), None)
+    } else {
+        with_calibration_check(&recording, &settings)
+    };
     if let Some(doubt) = &doubt {
         eprintln!("warning: {}", calibration_advice(doubt));
     }
     let is_static = |warning: &&ImuWarning| matches!(warning, ImuWarning::StaticView { .. });
     let static_view = findings.as_ref().and_then(|findings| findings.warnings.iter().find(is_static));
-    let found = Found { static_view: static_view.map(ToString::to_string), doubt };
+    let found = Found { static_view: static_view.map(ToString::to_string), doubt, is_calibrated: arguments.calibrate };
     let timed = match timed {
         // Pictures that cannot be used have nothing to do with axes.
         Err(error @ VioError::Pictures { .. }) => return Err(error.into()),
@@ -181,30 +184,20 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
     usable(&recording, run).map_err(|why| with_cause(why, &found, &recording, &settings).into())
 }
 
-/// Corrects the calibration of a recording, and lets the run estimate what is left: checks until nothing is doubted, because a first
-/// estimate far from what is given is not at its best.
+/// Corrects the calibration of a recording, and lets the run estimate what is left of what was doubted: checks until nothing is doubted,
+/// because a first estimate far from what is given is not at its best.
 fn calibrate(recording: &mut Recording, settings: &mut RunSettings) -> Result<(), VioError> {
-    let (mut is_scaled, mut gyroscope) = (false, Vector3::repeat(1.0));
+    let mut freed = settings.filter;
     for _ in 0..MAX_CHECKS {
         let filter = filter(recording, settings, true)?;
         let doubt = check_calibration(&filter, &recording.samples, || camera_frames(recording));
-        is_scaled = doubt.as_ref().is_some_and(|doubt| doubt.parts.contains(&CalibrationPart::Accelerometer));
         let Some(doubt) = doubt else { break };
         say!("calibration: {doubt}");
         recording.correct_calibration(&doubt);
-        gyroscope.component_mul_assign(&doubt.gyroscope_scale());
-        if doubt.parts == [CalibrationPart::Accelerometer] || doubt.found.is_none() {
-            break;
-        }
+        freed = doubt.freed(&freed);
     }
     say!("calibration in use: {}", recording.calibration_words());
-    if gyroscope != Vector3::repeat(1.0) {
-        say!("readings of the gyroscope are divided by {:.4}, {:.4}, {:.4}", gyroscope.x, gyroscope.y, gyroscope.z);
-    }
-    settings.filter.calibration = settings.filter.calibration.nearly();
-    if is_scaled {
-        settings.filter = settings.filter.with_rough_accelerometer();
-    }
+    settings.filter = freed;
     Ok(())
 }
 
@@ -269,6 +262,8 @@ struct Found {
     static_view: Option<String>,
     /// What they contradict of the calibration.
     doubt: Option<CalibrationDoubt>,
+    /// Whether that has been put right already.
+    is_calibrated: bool,
 }
 
 /// Why a run failed and, if something else is in view, or calibration or axes are the cause, which.
@@ -289,7 +284,7 @@ fn with_cause(why: String, found: &Found, recording: &Recording, settings: &RunS
         .and_then(|filter| diagnose_axes(&filter, &recording.samples, camera_frames(recording), settings.threads));
     match cause {
         Some(cause) => format!("{why}; it would go on if {cause}"),
-        None if settings.filter.calibration.focal_sigma > 0.0 => why,
+        None if found.is_calibrated => why,
         None => format!("{why}; if the calibration may be wrong, --calibrate estimates it"),
     }
 }

@@ -1,13 +1,15 @@
 //! How far the estimated calibration is from what was given.
 
-use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion};
+use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 
+use crate::camera::Camera;
 use crate::camera::model::CameraModel;
 use crate::filter::calibration_prior::set_calibration;
 use crate::filter::estimator::Estimator;
+use crate::filter::report::Calibration;
 use crate::filter::settings::Settings;
 use crate::filter::state::error_state;
-use crate::filter::state::vio_state::SecondCamera;
+use crate::filter::state::vio_state::{SecondCamera, VioState};
 use crate::inertial::covariance::Covariance;
 use crate::lie::so3;
 
@@ -39,6 +41,7 @@ impl CalibrationError {
         set(error_state::ACCEL_MATRIX, matrix.transpose().as_slice());
         if let (Some(lens), Some(given)) = (&state.lens, first.kalibr()) {
             set(error_state::INTRINSICS, &lens.intrinsics_less(&given.estimable()));
+            set(error_state::GYRO_SCALE, state.gyro_scale.add_scalar(-1.0).as_slice());
         }
         let given = second.and_then(|second| SecondCamera::new(first, second));
         if let (Some(found), Some(given)) = (&state.second, given) {
@@ -54,5 +57,46 @@ impl CalibrationError {
         set_calibration(&mut before, state, settings);
         let dense = |covariance: &Covariance| DMatrix::from_fn(head, head, |r, c| covariance.row(r)[c]);
         Self { error, posterior: dense(&estimator.covariance), prior: dense(&before) }
+    }
+}
+
+/// The calibration of a state, with its deviations.
+pub(crate) fn calibration_of(state: &VioState, covariance: &Covariance) -> Calibration {
+    let deviation = |row: usize| covariance.variance(row).max(0.0).sqrt();
+    Calibration {
+        body_from_camera: state.body_from_camera(),
+        time_offset_s: state.time_offset,
+        camera: state.lens.map(|lens| Camera { body_from_camera: state.body_from_camera(), ..lens }),
+        second_camera: state.second.map(|second| Camera {
+            body_from_camera: state.body_from_camera() * second.from_first.inverse(),
+            ..second.lens
+        }),
+        covariance: covariance.block(error_state::CAMERA_POSITION, error_state::CAMERA_POSITION),
+        accel_matrix: state.accel_matrix(),
+        accel_matrix_sigma: Matrix3::from_fn(|r, c| deviation(error_state::ACCEL_MATRIX + 3 * r + c)),
+        gyro_scale: state.gyro_scale,
+        gyro_scale_sigma: match state.lens {
+            Some(_) => Vector3::from_fn(|k, _| deviation(error_state::GYRO_SCALE + k)),
+            None => Vector3::zeros(),
+        },
+    }
+}
+
+/// A state with what was given for all that is estimated of the calibration.
+pub(crate) fn given_calibration(
+    state: &VioState,
+    (first, second): (&dyn CameraModel, Option<&dyn CameraModel>),
+    settings: &Settings,
+) -> VioState {
+    let pose = first.body_from_camera();
+    VioState {
+        camera_position: pose.translation.vector,
+        camera_attitude: pose.rotation,
+        time_offset: settings.calibration.time_offset_s,
+        accel_matrix: state.accel_matrix.map(|_| Matrix3::identity()),
+        gyro_scale: Vector3::repeat(1.0),
+        lens: state.lens.and_then(|_| first.kalibr()).map(Camera::estimable),
+        second: state.second.and_then(|_| SecondCamera::new(first, second?)),
+        ..state.clone()
     }
 }

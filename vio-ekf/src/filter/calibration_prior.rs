@@ -37,6 +37,9 @@ pub(crate) fn set_calibration(covariance: &mut Covariance, state: &VioState, set
             covariance.reset_row(error_state::ACCEL_MATRIX + entry, sigma * sigma);
         }
     }
+    if state.lens.is_some() {
+        covariance.set_diagonal3(error_state::GYRO_SCALE, [imu.gyro_scale_sigma; 3]);
+    }
     set_lenses(covariance, state, calibration);
 }
 

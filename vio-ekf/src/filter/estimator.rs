@@ -12,13 +12,12 @@ use super::state::landmark::Landmark;
 use super::state::vio_state::{SecondCamera, VioState};
 use crate::camera::Camera;
 use crate::camera::model::CameraModel;
-use crate::inertial::core_state::{CoreState, set_core_covariance};
+use crate::inertial::core_state::{CoreCovariance, CoreState, set_core_covariance};
 use crate::inertial::covariance::{Covariance, LinearizedMeasurement};
 use crate::inertial::imu_buffer::ImuBuffer;
 use crate::inertial::initial_state::InitialState;
 use crate::inertial::odometry::Odometry;
-use crate::inertial::preintegration::ImuPreintegration;
-use crate::lie::so3;
+use crate::inertial::preintegration::{CALIBRATION, ImuPreintegration};
 use crate::samples::{Imu, ImuNoise};
 use crate::stamp::Stamp;
 
@@ -39,8 +38,6 @@ pub(crate) struct Estimator {
     pub(crate) rate: Vector3<f64>,
     /// Specific force integrated over the last propagation, in the body axes of its end, m/s, and over how many seconds.
     pub(crate) impulse: (Vector3<f64>, f64),
-    /// Rotation over the last propagation, in the body axes of its start, rad.
-    pub(crate) turn: Vector3<f64>,
     workspace: Workspace,
     delta: Vec<f64>,
     /// Corrections of a series of updates that bearings have not had yet.
@@ -62,11 +59,12 @@ impl Estimator {
             time_offset: settings.calibration.time_offset_s,
             depth_prior: InverseDistance::new(settings.landmarks.inverse_distance),
             accel_matrix: None,
+            gyro_scale: Vector3::repeat(1.0),
             lens: None,
             second: None,
             landmarks: Vec::with_capacity(settings.landmarks.max_count),
         };
-        if settings.calibration.estimates_intrinsics() {
+        if settings.estimates_lens() {
             state.lens = camera.kalibr().map(Camera::estimable);
             state.second = second.and_then(|second| SecondCamera::new(camera, second));
         }
@@ -88,7 +86,6 @@ impl Estimator {
             delta: vec![0.0; capacity],
             owed: vec![0.0; capacity],
             impulse: (Vector3::zeros(), 0.0),
-            turn: Vector3::zeros(),
             state,
             covariance,
         }
@@ -145,9 +142,8 @@ impl Estimator {
         let input = (&preintegration, self.gravity);
         propagate(&mut self.state, &mut self.covariance, input, &mut self.workspace, dropped);
         self.impulse = (preintegration.impulse(), preintegration.duration);
-        self.turn = so3::log(&preintegration.rotation);
         self.buffer.advance(until);
-        self.rate = self.buffer.rate_at_state() - self.state.core.gyro_bias;
+        self.rate = self.state.imu_correction().rate(&self.buffer.rate_at_state());
     }
 
     /// Propagates to the sample in the middle of a full buffer, to make room for more.
@@ -234,24 +230,29 @@ impl Estimator {
     /// The estimate now, with covariance.
     pub(crate) fn odometry(&self) -> Odometry {
         let prior = self.covariance.block::<{ error_state::CORE }, { error_state::CORE }>(0, 0);
-        let core = &self.state.core;
-        if self.state.accel_matrix.is_none() {
-            return Odometry::predict(core, &prior, (&self.buffer, &self.prediction), self.gravity);
+        if self.state.lens.is_some() {
+            self.odometry_with_calibration::<CALIBRATION>(&prior)
+        } else if self.state.accel_matrix.is_some() {
+            self.odometry_with_calibration::<{ error_state::MATRIX_SIZE }>(&prior)
+        } else {
+            Odometry::predict(&self.state.core, &prior, (&self.buffer, &self.prediction), self.gravity)
         }
+    }
+
+    /// The same where errors of so many entries of the inertial sensor's calibration add to it.
+    fn odometry_with_calibration<const N: usize>(&self, prior: &CoreCovariance) -> Odometry {
+        let core = &self.state.core;
         let transition = self.prediction.transition(&core.velocity, &core.attitude, self.gravity);
-        let (by_matrix, _) = self.prediction.by_accel_matrix(&transition);
-        let own = self.covariance.block::<{ error_state::MATRIX_SIZE }, { error_state::MATRIX_SIZE }>(
-            error_state::ACCEL_MATRIX,
-            error_state::ACCEL_MATRIX,
-        );
-        let with_core =
-            self.covariance.block::<{ error_state::CORE }, { error_state::MATRIX_SIZE }>(0, error_state::ACCEL_MATRIX);
-        let crossed = transition.transition * with_core * by_matrix.transpose();
-        let covariance = transition.propagate_covariance(&prior)
-            + by_matrix * own * by_matrix.transpose()
-            + crossed
-            + crossed.transpose();
-        Odometry::at_end(core, &((covariance + covariance.transpose()) * 0.5), (&self.buffer, &transition))
+        let (by_imu, _) = self.prediction.by_calibration::<N>(&transition);
+        let entry = |row: usize, column: usize| self.covariance.row(row)[error_state::imu_calibration(column)];
+        let own = SMatrix::<f64, N, N>::from_fn(|r, c| entry(error_state::imu_calibration(r), c));
+        let with_core = SMatrix::<f64, { error_state::CORE }, N>::from_fn(entry);
+        let crossed = transition.transition * with_core * by_imu.transpose();
+        let covariance =
+            transition.propagate_covariance(prior) + by_imu * own * by_imu.transpose() + crossed + crossed.transpose();
+        let covariance = (covariance + covariance.transpose()) * 0.5;
+        let odometry = Odometry::at_end(core, &covariance, (&self.buffer, &transition));
+        Odometry { rate_in_body: self.state.imu_correction().rate(&self.buffer.latest().gyro), ..odometry }
     }
 }
 

@@ -114,7 +114,7 @@ impl Initializing {
         let mut running = Running::from_state(&initial, sensors)?;
         running.tracking.rested = true;
         let angle = sensors.undetected_angle();
-        stationary_update(&mut running.tracking.estimator, &mean, angle, &sensors.settings.stationary);
+        stationary_update(&mut running.tracking.estimator, &mean, angle, &sensors.settings);
         Ok(Some(running))
     }
 

@@ -24,6 +24,8 @@ const MAX_EXCESS: f64 = 10.0;
 pub(crate) struct InnovationAdaptation {
     /// Logarithm of the factor on the variance, of gyroscope and accelerometer; not negative.
     log_variance: [f64; 2],
+    /// Sum over images, see [`contradiction`](Self::contradiction).
+    contradiction: f64,
 }
 
 /// What is corrected by an image, as it was before.
@@ -45,13 +47,6 @@ impl BeforeImage {
     pub(crate) fn new(estimator: &Estimator) -> Self {
         let [velocity, attitude] = blocks(estimator);
         Self { core: estimator.state.core, velocity, attitude }
-    }
-
-    /// How errors of the scales of the gyroscope's axes turn the attitude, on the world's side, over a rotation in the body axes of its
-    /// start that has led here.
-    pub(crate) fn turned(&self, rotation: &Vector3<f64>) -> Matrix3<f64> {
-        let start = self.core.attitude * so3::exp(&-rotation);
-        start.to_rotation_matrix().into_inner() * Matrix3::from_diagonal(rotation)
     }
 
     /// What has been corrected since.
@@ -77,8 +72,16 @@ impl InnovationAdaptation {
         let most = 2.0 * max_factor.ln();
         for (log_variance, length) in self.log_variance.iter_mut().zip(lengths) {
             let Some(length) = length else { continue };
+            self.contradiction += (length / 3.0).min(MAX_EXCESS) + *log_variance;
             *log_variance = (*log_variance + RATE * (length / 3.0 - TOLERATED).min(MAX_EXCESS)).clamp(0.0, most);
         }
+    }
+
+    /// How much images and inertial samples have contradicted each other, a sum over images: of two filters over the same images the one
+    /// with less is nearer to the truth. Squared corrections of attitude and velocity in units of what is expected of them, and the logarithm of what their
+    /// noise had to be enlarged by.
+    pub(crate) fn contradiction(&self) -> f64 {
+        self.contradiction
     }
 
     /// Factors on the noise densities of gyroscope and accelerometer.

@@ -55,6 +55,11 @@ pub struct Calibration {
     pub accel_matrix: Matrix3<f64>,
     /// Standard deviation of each of its entries.
     pub accel_matrix_sigma: Matrix3<f64>,
+    /// Rate by what the gyroscope reads, axis by axis; one where that is not estimated
+    /// ([`ImuSettings::gyro_scale_sigma`](crate::inertial::ImuSettings::gyro_scale_sigma)).
+    pub gyro_scale: Vector3<f64>,
+    /// Its standard deviation.
+    pub gyro_scale_sigma: Vector3<f64>,
 }
 
 /// A landmark as the filter estimates it at the last image.

@@ -1,11 +1,10 @@
 //! The filter after its initialization: one image, or set of points, as the steps of the algorithm.
 
-use nalgebra::{Matrix3, Unit};
+use nalgebra::{DVector, Unit};
 
-use crate::camera::Camera;
 use crate::camera::model::CameraModel;
 use crate::error::Error;
-use crate::filter::calibration_error::CalibrationError;
+use crate::filter::calibration_error::{CalibrationError, calibration_of, given_calibration};
 use crate::filter::divergence_monitor::DivergenceMonitor;
 use crate::filter::estimator::Estimator;
 use crate::filter::image_tracking::{
@@ -20,7 +19,6 @@ use crate::filter::point_tracking::{add_points, drop_points, update_with_points}
 use crate::filter::report::{Calibration, FrameReport, LandmarkEstimate, Status};
 use crate::filter::sensors::{Input, Sensors};
 use crate::filter::settings::Settings;
-use crate::filter::state::error_state;
 use crate::filter::stationary::zero_velocity::{inflate_undetected_motion, zero_velocity_propagate};
 use crate::filter::tracking_state::TrackingState;
 use crate::inertial::initial_state::InitialState;
@@ -190,25 +188,20 @@ impl Running {
     /// The calibration of camera and accelerometer at the last image.
     pub(crate) fn calibration(&self) -> Calibration {
         let Estimator { state, covariance, .. } = &self.tracking.estimator;
-        Calibration {
-            body_from_camera: state.body_from_camera(),
-            time_offset_s: state.time_offset,
-            camera: state.lens.map(|lens| Camera { body_from_camera: state.body_from_camera(), ..lens }),
-            second_camera: state.second.map(|second| Camera {
-                body_from_camera: state.body_from_camera() * second.from_first.inverse(),
-                ..second.lens
-            }),
-            covariance: covariance.block(error_state::CAMERA_POSITION, error_state::CAMERA_POSITION),
-            accel_matrix: state.accel_matrix(),
-            accel_matrix_sigma: Matrix3::from_fn(|r, c| {
-                covariance.variance(error_state::ACCEL_MATRIX + 3 * r + c).max(0.0).sqrt()
-            }),
-        }
+        calibration_of(state, covariance)
     }
 
     /// How far the calibration is from what was given.
     pub(crate) fn calibration_error(&self, sensors: &Sensors) -> CalibrationError {
         CalibrationError::new(&self.tracking.estimator, sensors.cameras(), &sensors.settings)
+    }
+
+    /// The calibration that is so far from what was given, with the deviations of the estimate.
+    pub(crate) fn calibration_at(&self, error: &DVector<f64>, sensors: &Sensors) -> Calibration {
+        let Estimator { state, covariance, .. } = &self.tracking.estimator;
+        let mut state = given_calibration(state, sensors.cameras(), &sensors.settings);
+        state.correct_head(error.as_slice());
+        calibration_of(&state, covariance)
     }
 
     /// The landmarks that are followed, as they are estimated at the last image.
@@ -261,8 +254,8 @@ impl Running {
             return Ok(Some(tracking.propagate_to(time)));
         }
         tracking.rested = true;
-        let (settings, angle) = (&sensors.settings.stationary, sensors.undetected_angle());
-        zero_velocity_propagate(&mut tracking.estimator, time, settings);
+        let (settings, angle) = (&sensors.settings, sensors.undetected_angle());
+        zero_velocity_propagate(&mut tracking.estimator, time, &settings.stationary);
         if !was_stationary {
             inflate_undetected_motion(&mut tracking.estimator, angle);
         }

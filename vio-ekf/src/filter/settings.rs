@@ -65,11 +65,13 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The same with a calibration that is known roughly only ([`CalibrationSettings::roughly`]), the accelerometer's too: a filter that
-    /// finds what is wrong.
+    /// The same with a calibration that is known roughly only ([`CalibrationSettings::roughly`]), the inertial sensor's too, the scales of
+    /// the gyroscope to 2 %: a filter that finds what is wrong.
     #[must_use]
-    pub fn with_rough_calibration(self) -> Self {
-        Self { calibration: self.calibration.roughly(), ..self }.with_rough_accelerometer()
+    pub fn with_rough_calibration(mut self) -> Self {
+        self.calibration = self.calibration.roughly();
+        self.imu.gyro_scale_sigma = self.imu.gyro_scale_sigma.max(0.02);
+        self.with_rough_accelerometer()
     }
 
     /// The same with an accelerometer whose scale is known to 3 % only.
@@ -78,6 +80,11 @@ impl Settings {
         self.imu.accel_matrix = AccelMatrixEstimation::Always;
         self.imu.accel_scale_sigma = self.imu.accel_scale_sigma.max(0.03);
         self
+    }
+
+    /// Whether lenses and the scales of the gyroscope are in the state.
+    pub(crate) fn estimates_lens(&self) -> bool {
+        self.calibration.estimates_intrinsics() || self.imu.gyro_scale_sigma > 0.0
     }
 
     /// Refuses values that no filter can work with.

@@ -6,7 +6,6 @@ use super::accel_matrix_selection::AccelMatrixSelection;
 use super::calibration_prior::prior_sigma;
 use super::estimator::Estimator;
 use super::frontend::patch::Patch;
-use super::gyroscope_scale::GyroscopeScale;
 use super::innovation_adaptation::{BeforeImage, InnovationAdaptation};
 use super::landmarks;
 use super::settings::PatchSettings;
@@ -41,9 +40,8 @@ impl LandmarkTrack {
 pub(crate) struct TrackingState {
     pub(crate) estimator: Estimator,
     pub(crate) tracks: Vec<LandmarkTrack>,
-    innovations: InnovationAdaptation,
+    pub(crate) innovations: InnovationAdaptation,
     accel_matrix_selection: AccelMatrixSelection,
-    pub(crate) gyroscope_scale: GyroscopeScale,
     /// Whether the body has been at rest since the initialization.
     pub(crate) rested: bool,
     /// Memory for ordering landmarks.
@@ -60,7 +58,6 @@ impl TrackingState {
             tracks: Vec::with_capacity(max_count),
             innovations: InnovationAdaptation::default(),
             accel_matrix_selection: AccelMatrixSelection::Waiting,
-            gyroscope_scale: GyroscopeScale::default(),
             rested: false,
             ranking: Vec::with_capacity(max_count),
         }
@@ -89,10 +86,9 @@ impl TrackingState {
 
     /// Lets noise and matrix of the inertial sensor follow what an image has corrected.
     pub(crate) fn adapt_imu(&mut self, before: &BeforeImage, settings: &ImuSettings) {
-        let Self { estimator, innovations, gyroscope_scale, .. } = self;
+        let Self { estimator, innovations, .. } = self;
         let correction = before.correction(estimator);
         innovations.update(&correction, settings.max_innovation_inflation);
-        gyroscope_scale.add(&correction.attitude, (&before.turned(&estimator.turn), estimator.impulse.1));
         estimator.buffer.set_noise_factors(innovations.factors());
         self.select_accel_matrix(before, settings);
     }

@@ -2,13 +2,12 @@
 
 use std::sync::Arc;
 
-use nalgebra::Isometry3;
+use nalgebra::{DVector, Isometry3};
 
 use crate::camera::model::{CameraModel, check_model};
 use crate::error::{Error, invalid};
 use crate::filter::calibration_error::CalibrationError;
 use crate::filter::frontend::image_frontend::ImageFrontend;
-use crate::filter::gyroscope_scale::ScaleEstimate;
 use crate::filter::initializing::Initializing;
 use crate::filter::measurements::measurement::Measurement;
 use crate::filter::measurements::pose::BodyPose;
@@ -299,14 +298,34 @@ impl Vio {
         Some([Arc::clone(&self.sensors.camera), Arc::clone(second)])
     }
 
-    /// How far the calibration is from what another filter was given; `None` before the initialization.
-    pub(crate) fn calibration_error(&self, given: &Self) -> Option<CalibrationError> {
-        self.running().map(|running| running.calibration_error(&given.sensors))
+    /// How far the calibration is from what was given; `None` before the initialization.
+    pub(crate) fn calibration_error(&self) -> Option<CalibrationError> {
+        self.running().map(|running| running.calibration_error(&self.sensors))
     }
 
-    /// Scales of the gyroscope's axes, as corrections of the attitude tell.
-    pub(crate) fn gyroscope_scale(&self) -> Option<ScaleEstimate> {
-        self.running()?.tracking.gyroscope_scale.estimate()
+    /// The calibration that is so far from what was given; `None` before the initialization.
+    pub(crate) fn calibration_at(&self, error: &DVector<f64>) -> Option<Calibration> {
+        self.running().map(|running| running.calibration_at(error, &self.sensors))
+    }
+
+    /// How much images and inertial samples have contradicted each other since the initialization, a sum over images.
+    pub(crate) fn contradiction(&self) -> Option<f64> {
+        Some(self.running()?.tracking.innovations.contradiction())
+    }
+
+    /// A filter that has not started, with other cameras of the same sizes.
+    pub(crate) fn with_cameras(&self, cameras: &[CameraCalibration], settings: &Settings) -> Result<Self, Error> {
+        let mut changed = self.with_settings(settings)?;
+        let sensors = &mut changed.sensors;
+        if let [first, others @ ..] = cameras {
+            check_model(&first.camera)?;
+            sensors.camera = Arc::new(first.camera);
+            sensors.settings.calibration.time_offset_s = first.time_offset_s;
+            if let [second] = others {
+                sensors.stereo = Some(StereoCamera::new(&first.camera, Arc::new(second.camera), &settings.patches)?);
+            }
+        }
+        Ok(changed)
     }
 
     /// A filter of the same sensors that has not started, with other settings.

@@ -25,13 +25,32 @@ pub struct CoreState {
     pub accel_bias: Vector3<f64>,
 }
 
-/// What is taken out of inertial readings: rate `ω̃ − b_g`, specific force `A f̃ − b_a`.
+/// What is taken out of inertial readings: rate `diag(s) ω̃ − b_g`, specific force `A f̃ − b_a`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct ImuCorrection {
     pub(crate) gyro_bias: Vector3<f64>,
     pub(crate) accel_bias: Vector3<f64>,
     /// `None`, the identity, where it is not estimated.
     pub(crate) accel_matrix: Option<Matrix3<f64>>,
+    /// `None`, one, where it is not estimated.
+    pub(crate) gyro_scale: Option<Vector3<f64>>,
+}
+
+impl ImuCorrection {
+    /// Whether matrix or scales are estimated.
+    pub(crate) fn is_scaled(&self) -> bool {
+        self.accel_matrix.is_some() || self.gyro_scale.is_some()
+    }
+
+    /// Rate of the body, rad/s.
+    pub(crate) fn rate(&self, reading: &Vector3<f64>) -> Vector3<f64> {
+        self.gyro_scale.map_or(*reading, |scale| scale.component_mul(reading)) - self.gyro_bias
+    }
+
+    /// Specific force on the body, m/s².
+    pub(crate) fn force(&self, reading: &Vector3<f64>) -> Vector3<f64> {
+        self.accel_matrix.map_or(*reading, |matrix| matrix * reading) - self.accel_bias
+    }
 }
 
 impl From<&InitialState> for CoreState {
@@ -61,7 +80,7 @@ impl CoreState {
 
     /// The biases, to be taken out of inertial readings.
     pub(crate) fn imu_correction(&self) -> ImuCorrection {
-        ImuCorrection { gyro_bias: self.gyro_bias, accel_bias: self.accel_bias, accel_matrix: None }
+        ImuCorrection { gyro_bias: self.gyro_bias, accel_bias: self.accel_bias, ..ImuCorrection::default() }
     }
 }
 

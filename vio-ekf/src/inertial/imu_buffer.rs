@@ -218,12 +218,10 @@ fn integrate_segment(
     let dt = to.secs_since(from);
     let fraction = if gap > 0.0 { (from.secs_since(before.stamp) + 0.5 * dt) / gap } else { 0.0 };
     let mean = |a: &Vector3<f64>, b: &Vector3<f64>| a + (b - a) * fraction;
-    let rate = mean(&before.gyro, &after.gyro) - correction.gyro_bias;
-    let reading = mean(&before.accel, &after.accel);
-    let Some(matrix) = &correction.accel_matrix else {
-        preintegration.integrate_with_densities(&rate, &(reading - correction.accel_bias), dt, noise, densities);
-        return;
-    };
-    preintegration.advance_by_accel_matrix(&rate, (&reading, &(matrix * reading - correction.accel_bias)), dt);
-    preintegration.integrate_with_densities(&rate, &(matrix * reading - correction.accel_bias), dt, noise, densities);
+    let readings = [mean(&before.gyro, &after.gyro), mean(&before.accel, &after.accel)];
+    let (rate, force) = (correction.rate(&readings[0]), correction.force(&readings[1]));
+    if correction.is_scaled() {
+        preintegration.advance_by_calibration((&rate, &force), &readings, dt);
+    }
+    preintegration.integrate_with_densities(&rate, &force, dt, noise, densities);
 }

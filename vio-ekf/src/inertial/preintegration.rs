@@ -9,8 +9,9 @@ use crate::samples::ImuNoise;
 
 /// Rows of the relative motion: rotation, velocity, position.
 const MOTION: usize = 9;
-/// Entries of the accelerometer's matrix.
+/// Entries of the accelerometer's matrix, and with the scales of the gyroscope's axes.
 const MATRIX: usize = 9;
+pub(crate) const CALIBRATION: usize = MATRIX + 3;
 
 /// Motion between two times as the inertial samples tell it, independent of the state at the first (Forster et al. 2017).
 ///
@@ -25,8 +26,9 @@ pub(crate) struct ImuPreintegration {
     position: Vector3<f64>,
     /// Derivative by the biases of gyroscope and accelerometer.
     bias_jacobian: SMatrix<f64, MOTION, 6>,
-    /// Derivative by the entries of the accelerometer's matrix, row by row; zero where that is not estimated.
-    matrix_jacobian: SMatrix<f64, MOTION, MATRIX>,
+    /// Derivative by the entries of the accelerometer's matrix, row by row, and by the gyroscope's scales; zero where neither is
+    /// estimated.
+    calibration_jacobian: SMatrix<f64, MOTION, CALIBRATION>,
     /// Of the motion's errors, from noise.
     covariance: SMatrix<f64, MOTION, MOTION>,
     /// Between the motion's errors and the walk of the biases.
@@ -43,7 +45,7 @@ impl Default for ImuPreintegration {
             velocity: Vector3::zeros(),
             position: Vector3::zeros(),
             bias_jacobian: SMatrix::zeros(),
-            matrix_jacobian: SMatrix::zeros(),
+            calibration_jacobian: SMatrix::zeros(),
             covariance: SMatrix::zeros(),
             walk_covariance: SMatrix::zeros(),
             walk: [0.0; 2],
@@ -132,34 +134,47 @@ impl ImuPreintegration {
         self.duration += dt;
     }
 
-    /// The derivative by the accelerometer's matrix over `dt` seconds with this mean rate, reading and force; before the
-    /// integration over that time.
-    pub(crate) fn advance_by_accel_matrix(
+    /// The derivatives by the accelerometer's matrix and the gyroscope's scales over `dt` seconds with this mean rate and force, and
+    /// these readings of gyroscope and accelerometer; before the integration over that time.
+    pub(crate) fn advance_by_calibration(
         &mut self,
-        rate: &Vector3<f64>,
-        (reading, force): (&Vector3<f64>, &Vector3<f64>),
+        (rate, force): (&Vector3<f64>, &Vector3<f64>),
+        [turning, reading]: &[Vector3<f64>; 2],
         dt: f64,
     ) {
         let middle = (self.rotation * so3::exp(&(rate * (0.5 * dt)))).to_rotation_matrix().into_inner();
-        advance(&mut self.matrix_jacobian, &(middle * force), dt);
+        let acceleration = middle * force;
+        let jacobian = &mut self.calibration_jacobian;
+        advance(jacobian, &acceleration, dt);
         for row in 0..3 {
             for column in 0..3 {
                 let driven = middle.column(row) * (reading[column] * dt);
                 for axis in 0..3 {
-                    self.matrix_jacobian[(3 + axis, 3 * row + column)] += driven[axis];
-                    self.matrix_jacobian[(6 + axis, 3 * row + column)] += 0.5 * dt * driven[axis];
+                    jacobian[(3 + axis, 3 * row + column)] += driven[axis];
+                    jacobian[(6 + axis, 3 * row + column)] += 0.5 * dt * driven[axis];
                 }
+            }
+        }
+        for axis in 0..3 {
+            let turned = middle.column(axis) * (turning[axis] * dt);
+            let swung = acceleration.cross(&turned) * (-0.5 * dt);
+            let mut column = jacobian.column_mut(MATRIX + axis);
+            for k in 0..3 {
+                column[k] += turned[k];
+                column[3 + k] += swung[k];
+                column[6 + k] += 0.5 * dt * swung[k];
             }
         }
     }
 
-    /// Derivatives by the accelerometer's matrix: of the core at the end, and of the motion (position, rotation on the start's
-    /// side) from start to end.
-    pub(crate) fn by_accel_matrix(
+    /// Derivatives by the first entries of the accelerometer's matrix and the gyroscope's scales: of the core at the end, and of the motion
+    /// (position, rotation on the start's side) from start to end.
+    pub(crate) fn by_calibration<const N: usize>(
         &self,
         transition: &StateTransition,
-    ) -> (SMatrix<f64, { error_state::CORE }, MATRIX>, SMatrix<f64, 6, MATRIX>) {
-        (transition.compose * self.matrix_jacobian, reordered(&self.matrix_jacobian))
+    ) -> (SMatrix<f64, { error_state::CORE }, N>, SMatrix<f64, 6, N>) {
+        let jacobian = self.calibration_jacobian.fixed_columns::<N>(0).into_owned();
+        (transition.compose * jacobian, reordered(&jacobian))
     }
 
     /// Specific force integrated over the time, in the body axes of the end, m/s.

@@ -47,6 +47,27 @@ pub(super) fn contradicted(
     free
 }
 
+/// An estimate as it would be if all groups but the free ones were known to be as given: `e_f − P_fx P_xx⁻¹ e_x`, and nothing elsewhere.
+pub(super) fn conditioned(
+    error: &DVector<f64>,
+    posterior: &DMatrix<f64>,
+    (groups, free): (&[Vec<usize>], &[usize]),
+) -> Option<DVector<f64>> {
+    let rows = |is_free: bool| -> Vec<usize> {
+        (0..groups.len()).filter(|k| free.contains(k) == is_free).flat_map(|k| groups[k].iter().copied()).collect()
+    };
+    let (free, fixed) = (rows(true), rows(false));
+    let mut conditioned = error.select_rows(&free);
+    if !fixed.is_empty() {
+        let factor = pick(posterior, &fixed).cholesky()?;
+        let across = posterior.select_rows(&free).select_columns(&fixed);
+        conditioned -= across * factor.solve(&error.select_rows(&fixed));
+    }
+    let mut all = DVector::zeros(error.len());
+    free.iter().zip(&conditioned).for_each(|(row, value)| all[*row] = *value);
+    Some(all)
+}
+
 fn pick(matrix: &DMatrix<f64>, rows: &[usize]) -> DMatrix<f64> {
     matrix.select_rows(rows).select_columns(rows)
 }
@@ -85,5 +106,17 @@ mod tests {
         assert_eq!(found(0.3, 0.5).len(), 2);
         // Two deviations are none.
         assert_eq!(found(0.0, 0.02), Vec::<usize>::new());
+    }
+
+    /// Of two unknowns whose sum was measured the second is given: all of the sum is the first's.
+    #[test]
+    fn what_is_given_takes_no_share_of_an_error() {
+        let information = DMatrix::from_row_slice(2, 2, &[1.0, 1.0, 1.0, 1.0]) * 1e4 + DMatrix::identity(2, 2);
+        let posterior = information.try_inverse().unwrap();
+        let estimate: DVector<f64> = &posterior * DVector::from_row_slice(&[1.0, 1.0]) * 1e4 * 0.3;
+        assert!((estimate[0] - 0.15).abs() < 1e-3 && (estimate[1] - 0.15).abs() < 1e-3);
+        let found = conditioned(&estimate, &posterior, (&[vec![0], vec![1]], &[0])).unwrap();
+        assert!((found[0] - 0.3).abs() < 1e-3 && found[1] == 0.0, "{found}");
+        assert_eq!(conditioned(&estimate, &posterior, (&[vec![0], vec![1]], &[0, 1])).unwrap(), estimate);
     }
 }

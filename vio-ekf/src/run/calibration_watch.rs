@@ -4,16 +4,14 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::Vector3;
-
 use crate::filter::calibration_error::CalibrationError;
-use crate::filter::gyroscope_scale::ScaleEstimate;
 use crate::filter::report::Status;
 use crate::filter::settings::{CalibrationSettings, Settings};
 use crate::filter::state::error_state;
 use crate::filter::vio::Vio;
 use crate::run::calibration_doubt::{CalibrationDoubt, CalibrationPart, describe};
-use crate::run::calibration_evidence::contradicted;
+use crate::run::calibration_evidence::{conditioned, contradicted};
+use crate::run::calibration_trial::CalibrationTrial;
 use crate::run::frames::{Picture, RecordedFrame};
 use crate::run::pair_order::PairOrder;
 use crate::samples::{ImageView, Imu};
@@ -34,11 +32,12 @@ const MOST_WAITING: usize = 8;
 use CalibrationPart as Part;
 
 /// Rows of each part, and how well the best calibrations agree with each other in it: less is not doubted.
-const PARTS: [(Part, usize, &[f64]); 11] = [
+const PARTS: [(Part, usize, &[f64]); 12] = [
     (Part::CameraAttitude, error_state::CAMERA_ATTITUDE, &[1e-3; 3]),
     (Part::CameraPosition, error_state::CAMERA_POSITION, &[5e-3; 3]),
     (Part::Clock, error_state::TIME_OFFSET, &[5e-4]),
     (Part::Accelerometer, error_state::ACCEL_MATRIX, &[2e-3; error_state::MATRIX_SIZE]),
+    (Part::Gyroscope, error_state::GYRO_SCALE, &[2e-3; 3]),
     (Part::FocalLength, error_state::INTRINSICS, &[0.4; 2]),
     (Part::PrincipalPoint, error_state::INTRINSICS + 2, &[0.4; 2]),
     (Part::Distortion, error_state::INTRINSICS + 4, &[2e-3; 2]),
@@ -69,9 +68,9 @@ fn hypotheses(given: &Settings) -> Vec<Settings> {
 /// The second filter.
 #[derive(Debug, Clone)]
 pub(super) struct CalibrationWatch {
-    /// The filter before its start, with the calibration that was given.
+    /// The filter before its start, as it was given.
     given: Vio,
-    vio: Vio,
+    stage: Stage,
     order: Option<PairOrder>,
     /// What is tried after a divergence, the last first.
     remaining: Vec<Settings>,
@@ -79,6 +78,16 @@ pub(super) struct CalibrationWatch {
     latest: Option<Stamp>,
     /// Images for which there are no samples yet.
     waiting: VecDeque<(Stamp, Pixels, Option<Pixels>)>,
+}
+
+/// What it does.
+#[allow(clippy::large_enum_variant, reason = "there is one of them")]
+#[derive(Debug, Clone)]
+enum Stage {
+    /// Finds the calibration.
+    Search(Vio),
+    /// Has found one that is not what was given, and tries it.
+    Trial(CalibrationTrial),
 }
 
 /// Columns, rows, and the grey values.
@@ -103,14 +112,17 @@ impl CalibrationWatch {
         }
         let order = vio.camera_pair().map(|cameras| PairOrder::new(cameras, given));
         let mut remaining = hypotheses(given);
-        let first = vio.with_settings(&remaining.pop()?).ok()?;
-        let given = first.clone();
-        Some(Self { given, vio: first, order, remaining, images: 0, latest: None, waiting: VecDeque::new() })
+        let stage = Stage::Search(vio.with_settings(&remaining.pop()?).ok()?);
+        let given = vio.with_settings(given).ok()?;
+        Some(Self { given, stage, order, remaining, images: 0, latest: None, waiting: VecDeque::new() })
     }
 
     pub(super) fn imu(&mut self, sample: &Imu) {
-        // What is refused is told by the first filter.
-        let _ = self.vio.imu(sample);
+        match &mut self.stage {
+            // What is refused is told by the first filter.
+            Stage::Search(vio) => drop(vio.imu(sample)),
+            Stage::Trial(trial) => trial.imu(sample),
+        }
         self.latest = Some(sample.stamp);
     }
 
@@ -125,7 +137,7 @@ impl CalibrationWatch {
         let owned = |image: &ImageView| (image.width, image.height, image.data.to_vec());
         self.waiting.push_back((stamp, owned(first), second.map(owned)));
         while let Some((stamp, ..)) = self.waiting.front() {
-            let time = stamp.plus_secs(self.vio.time_offset_s());
+            let time = stamp.plus_secs(self.time_offset_s());
             if self.latest.is_none_or(|latest| latest < time) && self.waiting.len() < MOST_WAITING {
                 break;
             }
@@ -152,13 +164,16 @@ impl CalibrationWatch {
                 "the images of the two cameras are exchanged: of the corners {given} are found in the other image as they are given, \
                  {exchanged} the other way round"
             );
-            let parts = vec![Part::CameraOrder];
-            let gyroscope = Vector3::zeros();
-            return Some(Some(CalibrationDoubt { parts, found: None, gyroscope, clock_change_s: 0.0, words }));
+            let (parts, given_pose) = (vec![Part::CameraOrder], self.given.camera().body_from_camera());
+            return Some(Some(CalibrationDoubt { parts, found: None, given_pose, clock_change_s: 0.0, words }));
         }
+        let vio = match &mut self.stage {
+            Stage::Search(vio) => vio,
+            Stage::Trial(trial) => return trial.images(stamp, first, second).then(|| trial.finish()),
+        };
         let given = match second {
-            Some(second) => self.vio.image_pair(stamp, first, second),
-            None => self.vio.image(stamp, first),
+            Some(second) => vio.image_pair(stamp, first, second),
+            None => vio.image(stamp, first),
         };
         // What it cannot take is told by the first filter.
         let report = given.ok()?;
@@ -169,22 +184,48 @@ impl CalibrationWatch {
                 else {
                     return Some(None);
                 };
-                (self.vio, self.images) = (next, 0);
+                (self.stage, self.images) = (Stage::Search(next), 0);
             }
             Status::Uninitialised(_) => self.images = 0,
             _ => self.images += usize::from(report.used > 0 && !report.stationary),
         }
-        (self.images >= IMAGES).then(|| self.doubt())
+        if self.images < IMAGES {
+            return None;
+        }
+        let doubts = self.doubts().unwrap_or_default();
+        if doubts.is_empty() {
+            return Some(None);
+        }
+        self.stage = Stage::Trial(CalibrationTrial::new(&self.given, doubts));
+        None
+    }
+
+    /// The offset of the camera's clock as far as it is known now.
+    fn time_offset_s(&self) -> f64 {
+        match &self.stage {
+            Stage::Search(vio) => vio.time_offset_s(),
+            Stage::Trial(trial) => trial.time_offset_s(),
+        }
+    }
+
+    fn has_diverged(&self) -> bool {
+        matches!(&self.stage, Stage::Search(vio) if matches!(vio.status(), Status::Diverged(_)))
     }
 
     /// What it has found so far.
     pub(super) fn finish(&self) -> Option<CalibrationDoubt> {
-        if self.images < FEWEST { None } else { self.doubt() }
+        match &self.stage {
+            Stage::Search(_) if self.images < FEWEST => None,
+            Stage::Search(_) => self.doubts()?.into_iter().next(),
+            Stage::Trial(trial) => trial.finish(),
+        }
     }
 
-    fn doubt(&self) -> Option<CalibrationDoubt> {
-        let found = self.vio.calibration_error(&self.given)?;
-        let CalibrationError { error, mut posterior, mut prior } = found;
+    /// What is doubted, first all of it, then all but one part, then one alone: some of what a filter finds of everything at once is not
+    /// so. Empty where nothing is.
+    fn doubts(&self) -> Option<Vec<CalibrationDoubt>> {
+        let Stage::Search(vio) = &self.stage else { return None };
+        let CalibrationError { error, mut posterior, mut prior } = vio.calibration_error()?;
         let rows = |(_, first, floor): &Rows| (*first..first + floor.len()).collect::<Vec<usize>>();
         let estimated = |part: &&Rows| prior.get((part.1, part.1)).is_some_and(|v| *v > 0.0);
         let parts: Vec<&Rows> = PARTS.iter().filter(estimated).collect();
@@ -200,22 +241,29 @@ impl CalibrationWatch {
             BOTH.iter().filter_map(|both| both.iter().map(|part| named.iter().position(|p| p == part)).collect());
         let steps: Vec<Vec<usize>> = single.chain(both).collect();
         let chosen = contradicted(&error, (&posterior, &prior), (&groups, &steps), ENOUGH);
-        let mut parts: Vec<Part> = chosen.into_iter().map(|k| named[k]).collect();
-        let contradicted = self.vio.gyroscope_scale().filter(ScaleEstimate::is_contradicted);
-        let gyroscope = contradicted.map_or_else(Vector3::zeros, |found| found.error);
-        parts.extend(contradicted.map(|_| Part::Gyroscope));
-        if parts.is_empty() {
-            return None;
-        }
-        let calibration = self.vio.calibration()?;
-        let words: Vec<String> =
-            parts.iter().map(|part| describe(*part, (&calibration, &gyroscope), &self.given)).collect();
-        let clock_change_s = error[error_state::TIME_OFFSET];
-        Some(CalibrationDoubt { parts, found: Some(calibration), gyroscope, clock_change_s, words: words.join("; ") })
+
+        let without = |left_out: usize| chosen.iter().copied().filter(|k| *k != left_out).collect::<Vec<usize>>();
+        let many = |least: usize| if chosen.len() >= least { chosen.as_slice() } else { &[] };
+        let fewer = many(2).iter().map(|k| without(*k)).chain(many(3).iter().map(|k| vec![*k]));
+        let choices = std::iter::once(chosen.clone()).chain(fewer);
+        let doubt = |free: Vec<usize>| {
+            let error = conditioned(&error, &posterior, (&groups, &free))?;
+            let calibration = vio.calibration_at(&error)?;
+            let parts: Vec<Part> = free.into_iter().map(|k| named[k]).collect();
+            let words: Vec<String> = parts.iter().map(|part| describe(*part, &calibration, &self.given)).collect();
+            Some(CalibrationDoubt {
+                parts,
+                found: Some(calibration),
+                given_pose: self.given.camera().body_from_camera(),
+                clock_change_s: error[error_state::TIME_OFFSET],
+                words: words.join("; "),
+            })
+        };
+        Some(choices.filter(|free| !free.is_empty()).filter_map(doubt).collect())
     }
 }
 
-/// What the first twenty seconds of motion of a recording say against the calibration of a filter that has not started: as a
+/// What the first thirty seconds of motion of a recording say against the calibration of a filter that has not started: as a
 /// [`Runner`](crate::run::Runner) does it beside the filter, by itself. `frames` is asked for the frames anew after a divergence.
 pub fn check_calibration<P: Picture, F: IntoIterator<Item = RecordedFrame<P>>>(
     vio: &Vio,
@@ -223,10 +271,9 @@ pub fn check_calibration<P: Picture, F: IntoIterator<Item = RecordedFrame<P>>>(
     frames: impl Fn() -> F,
 ) -> Option<CalibrationDoubt> {
     let watch = CalibrationWatch::beside(vio)?;
-    let mut tries = vec![watch.given.clone()];
-    tries.extend(watch.remaining.iter().rev().filter_map(|settings| vio.with_settings(settings).ok()));
-    tries.into_iter().find_map(|vio| {
-        let one = CalibrationWatch { given: vio.clone(), vio, remaining: Vec::new(), ..watch.clone() };
+    hypotheses(vio.settings()).iter().rev().find_map(|settings| {
+        let stage = Stage::Search(vio.with_settings(settings).ok()?);
+        let one = CalibrationWatch { stage, remaining: Vec::new(), ..watch.clone() };
         one.over(samples, frames())
     })?
 }
@@ -241,7 +288,7 @@ impl CalibrationWatch {
         let mut samples = samples.iter();
         for RecordedFrame { stamp, picture, second } in frames {
             let Ok(picture) = picture else { continue };
-            let time = stamp.plus_secs(self.vio.time_offset_s());
+            let time = stamp.plus_secs(self.time_offset_s());
             while self.latest.is_none_or(|latest| latest < time) {
                 let Some(sample) = samples.next() else { break };
                 self.imu(sample);
@@ -249,11 +296,11 @@ impl CalibrationWatch {
             let second = second.and_then(Result::ok);
             let seen = self.images(stamp, &picture.view(), second.as_ref().map(Picture::view).as_ref());
             match seen {
-                Some(None) if matches!(self.vio.status(), Status::Diverged(_)) => return None,
+                Some(None) if self.has_diverged() => return None,
                 Some(found) => return Some(found),
                 None => {}
             }
         }
-        (self.images >= FEWEST).then(|| self.doubt())
+        (self.images >= FEWEST).then(|| self.finish())
     }
 }

@@ -23,7 +23,8 @@ pub struct RunnerSettings {
     /// needs the events only.
     pub keep_history: bool,
     /// Whether a second filter beside the first, which knows the calibration roughly only, tests it over the first twenty seconds of
-    /// motion. These take three times the processor time.
+    /// motion. These take three times the processor time. Where something is doubted, filters with all and with parts of it follow the next
+    /// ten seconds, too: as many as twice its parts.
     pub watch_calibration: bool,
 }
 

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 use super::measurement::{Measurement, Trial};
 use super::update::ungated_update;
 use crate::filter::estimator::Estimator;
-use crate::filter::settings::StationarySettings;
+use crate::filter::settings::Settings;
 use crate::filter::state::error_state;
 use crate::filter::stationary::detector::StationaryMean;
 use crate::inertial::iterated_update::Linearization;
@@ -23,7 +23,8 @@ impl Measurement<3, 3> for MeanRate {
     }
 
     fn linearize(&self, trial: &Trial<'_, 3>) -> Option<Linearization<3, 3>> {
-        let residual = self.rate - trial.core().gyro_bias;
+        // What errors of the scale are of a bias is nothing.
+        let residual = trial.state().imu_correction().rate(&self.rate);
         Some(Linearization { residual, jacobian: Matrix3::identity(), noise: Matrix3::identity() * self.variance })
     }
 }
@@ -65,16 +66,16 @@ impl Measurement<3, 15> for MeanForce {
 }
 
 /// Updates biases and tilt with the means of a stationary body; a rotation by `angle` may be undetected over their time.
-pub(crate) fn stationary_update(
-    estimator: &mut Estimator,
-    mean: &StationaryMean,
-    angle: f64,
-    settings: &StationarySettings,
-) {
-    let white = |density: f64| density * density / mean.duration;
-    let variance = (angle / mean.duration).powi(2) + white(estimator.noise.gyro_density);
+pub(crate) fn stationary_update(estimator: &mut Estimator, mean: &StationaryMean, angle: f64, settings: &Settings) {
+    // A sensor that is worse than its data sheet tells its biases worse, too.
+    let white = |sheet: f64, measured: f64| {
+        let density = if measured > settings.imu.noise_inflation * sheet { measured } else { sheet };
+        density * density / mean.duration
+    };
+    let [gyro, accel] = mean.noise;
+    let variance = (angle / mean.duration).powi(2) + white(estimator.noise.gyro_density, gyro);
     ungated_update(estimator, &MeanRate { rate: mean.rate, variance });
-    let variance = settings.force_sigma.powi(2) + white(estimator.noise.accel_density);
+    let variance = settings.stationary.force_sigma.powi(2) + white(estimator.noise.accel_density, accel);
     let gravity = estimator.gravity;
     ungated_update(estimator, &MeanForce { force: mean.force, gravity, variance });
 }

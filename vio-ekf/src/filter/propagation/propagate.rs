@@ -8,7 +8,7 @@ use crate::filter::state::error_state;
 use crate::filter::state::vio_state::VioState;
 use crate::inertial::core_state::CoreCovariance;
 use crate::inertial::covariance::Covariance;
-use crate::inertial::preintegration::{ImuPreintegration, StateTransition};
+use crate::inertial::preintegration::{CALIBRATION, ImuPreintegration, StateTransition};
 
 /// Rows of the camera's motion.
 const MOTION: usize = 6;
@@ -86,18 +86,19 @@ pub(crate) fn propagate(
     let mut xi = SMatrix::<f64, MOTION, { error_state::TIME_OFFSET }>::zeros();
     xi.fixed_columns_mut::<{ error_state::CORE }>(0).copy_from(&(camera.by_motion * body.motion()));
     xi.fixed_columns_mut::<6>(error_state::CAMERA_POSITION).copy_from(&camera.by_calibration);
-    let by_matrix = state.accel_matrix.map(|_| {
-        let (core, motion) = preintegration.by_accel_matrix(body);
-        ByAccelMatrix { core, xi: camera.by_motion * motion }
+    let by_imu = state.imu_correction().is_scaled().then(|| {
+        let (core, motion) = preintegration.by_calibration::<CALIBRATION>(body);
+        let count = if state.lens.is_some() { CALIBRATION } else { error_state::MATRIX_SIZE };
+        ByImuCalibration { core, xi: camera.by_motion * motion, count }
     });
     // Noise of the core and of ξ.
     let (core_noise, noise) = (&body.noise, preintegration.noise(body));
     let xi_core = camera.by_motion * noise.motion_core;
     let xi_xi = camera.by_motion * noise.motion * camera.by_motion.transpose();
 
-    let head = HeadTransition { size: state.head(), body, by_matrix: by_matrix.as_ref() };
-    motion_product(covariance, (&xi, by_matrix.as_ref()), workspace);
-    let motion_covariance = motion_covariance((&xi, by_matrix.as_ref()), workspace) + xi_xi;
+    let head = HeadTransition { size: state.head(), body, by_imu: by_imu.as_ref() };
+    motion_product(covariance, (&xi, by_imu.as_ref()), workspace);
+    let motion_covariance = motion_covariance((&xi, by_imu.as_ref()), workspace) + xi_xi;
     let translation = motion_covariance.fixed_view::<3, 3>(3, 3).into_owned();
     let correlation_factor = correlation_factor(covariance, &start_from_world, preintegration.duration);
     workspace.second_order.record((covariance, head.size), |row| {
@@ -116,7 +117,7 @@ struct HeadTransition<'a> {
     /// How many there are.
     size: usize,
     body: &'a StateTransition,
-    by_matrix: Option<&'a ByAccelMatrix>,
+    by_imu: Option<&'a ByImuCalibration>,
 }
 
 impl HeadTransition<'_> {
@@ -127,8 +128,9 @@ impl HeadTransition<'_> {
         for (column, &value) in transition.column_iter().zip(before) {
             after.iter_mut().zip(column.iter()).for_each(|(after, weight)| *after += weight * value);
         }
-        if let Some(by_matrix) = self.by_matrix {
-            for (column, &value) in by_matrix.core.column_iter().zip(&before[error_state::ACCEL_MATRIX..]) {
+        if let Some(by_imu) = self.by_imu {
+            for (k, column) in by_imu.core.column_iter().take(by_imu.count).enumerate() {
+                let value = before[error_state::imu_calibration(k)];
                 after.iter_mut().zip(column.iter()).for_each(|(after, weight)| *after += weight * value);
             }
         }
@@ -213,31 +215,34 @@ fn propagate_landmarks(
     }
 }
 
-/// Derivatives by the accelerometer's matrix.
-struct ByAccelMatrix {
+/// Derivatives by the accelerometer's matrix and the gyroscope's scales.
+struct ByImuCalibration {
     /// Of the core at the end.
-    core: SMatrix<f64, { error_state::CORE }, { error_state::MATRIX_SIZE }>,
+    core: SMatrix<f64, { error_state::CORE }, CALIBRATION>,
     /// Of the camera's motion.
-    xi: SMatrix<f64, MOTION, { error_state::MATRIX_SIZE }>,
+    xi: SMatrix<f64, MOTION, CALIBRATION>,
+    /// Columns that have a row in the error state.
+    count: usize,
 }
 
 /// Covariance of the camera's motion, `Ξ P Ξᵀ`.
 fn motion_covariance(
-    (xi, by_matrix): (&SMatrix<f64, MOTION, { error_state::TIME_OFFSET }>, Option<&ByAccelMatrix>),
+    (xi, by_imu): (&SMatrix<f64, MOTION, { error_state::TIME_OFFSET }>, Option<&ByImuCalibration>),
     workspace: &Workspace,
 ) -> SMatrix<f64, MOTION, MOTION> {
     SMatrix::from_fn(|r, c| {
-        let row = &workspace.motion[r * workspace.stride..][..error_state::FIXED];
+        let row = &workspace.motion[r * workspace.stride..];
         let by_head: f64 = xi.row(c).iter().zip(row).map(|(w, p)| w * p).sum();
-        let matrix_rows = &row[error_state::ACCEL_MATRIX..];
-        by_head + by_matrix.map_or(0.0, |by| by.xi.row(c).iter().zip(matrix_rows).map(|(w, p)| w * p).sum())
+        let imu =
+            |by: &ByImuCalibration| (0..by.count).map(|k| by.xi[(c, k)] * row[error_state::imu_calibration(k)]).sum();
+        by_head + by_imu.map_or(0.0, imu)
     })
 }
 
 /// `Ξ P` into the workspace.
 fn motion_product(
     covariance: &Covariance,
-    (xi, by_matrix): (&SMatrix<f64, MOTION, { error_state::TIME_OFFSET }>, Option<&ByAccelMatrix>),
+    (xi, by_imu): (&SMatrix<f64, MOTION, { error_state::TIME_OFFSET }>, Option<&ByImuCalibration>),
     workspace: &mut Workspace,
 ) {
     let n = covariance.size();
@@ -247,9 +252,9 @@ fn motion_product(
         for c in 0..error_state::TIME_OFFSET {
             add(target, xi[(r, c)], covariance.row(c));
         }
-        if let Some(by_matrix) = by_matrix {
-            for c in 0..error_state::MATRIX_SIZE {
-                add(target, by_matrix.xi[(r, c)], covariance.row(error_state::ACCEL_MATRIX + c));
+        if let Some(by_imu) = by_imu {
+            for c in 0..by_imu.count {
+                add(target, by_imu.xi[(r, c)], covariance.row(error_state::imu_calibration(c)));
             }
         }
     }

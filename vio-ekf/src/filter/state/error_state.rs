@@ -1,8 +1,8 @@
 //! First row of each block of the odometry's error state.
 //!
 //! ```text
-//! rows   0  3  6  9  12 | 15       18       21      22           23           | 32                  | then 3 each
-//!        p  v  R  b_g b_a | camera's pose  offset  depth prior  accel. matrix | intrinsics of cameras | landmark: bearing (2), inverse distance (1)
+//! rows   0  3  6  9  12 | 15       18       21      22           23           | 32          38           41            | then 3 each
+//!        p  v  R  b_g b_a | camera's pose  offset  depth prior  accel. matrix | intrinsics  gyro. scale  second camera | landmark: bearing (2), inverse distance (1)
 //! ```
 
 use crate::camera::intrinsics;
@@ -24,14 +24,21 @@ pub(crate) const MATRIX_SIZE: usize = 9;
 pub(crate) const FIXED: usize = 32;
 /// Intrinsics of the first camera, where they are estimated: focal lengths, principal point, first two terms of the distortion.
 pub const INTRINSICS: usize = FIXED;
-/// The same of a second camera, then its attitude (error on its own side) and the position of the first camera in its axes.
-pub(crate) const SECOND_INTRINSICS: usize = INTRINSICS + intrinsics::INTRINSICS;
+/// Scales of the gyroscope's axes, where intrinsics are estimated: relative errors.
+pub const GYRO_SCALE: usize = INTRINSICS + intrinsics::INTRINSICS;
+/// Intrinsics of a second camera, then its attitude (error on its own side) and the position of the first camera in its axes.
+pub(crate) const SECOND_INTRINSICS: usize = GYRO_SCALE + 3;
 pub(crate) const SECOND_ATTITUDE: usize = SECOND_INTRINSICS + intrinsics::INTRINSICS;
 pub(crate) const SECOND_POSITION: usize = SECOND_ATTITUDE + 3;
 /// Rows before the first landmark, at most.
 pub(crate) const MAX_HEAD: usize = SECOND_POSITION + 3;
 /// Rows of a landmark: two of the bearing, one of the inverse distance.
 pub(crate) const LANDMARK_SIZE: usize = 3;
+
+/// Row of what [`ImuPreintegration::by_calibration`](crate::inertial::preintegration::ImuPreintegration) derives by, in its order.
+pub(crate) const fn imu_calibration(column: usize) -> usize {
+    if column < MATRIX_SIZE { ACCEL_MATRIX + column } else { GYRO_SCALE + column - MATRIX_SIZE }
+}
 
 /// First row of a landmark, after so many rows.
 pub(crate) const fn landmark(head: usize, slot: usize) -> usize {

@@ -25,6 +25,8 @@ pub struct VioState {
     pub(crate) depth_prior: InverseDistance,
     /// Specific force by the accelerometer's reading; `None`, the identity, where it is not estimated.
     pub(crate) accel_matrix: Option<Matrix3<f64>>,
+    /// Rate by what the gyroscope reads, axis by axis; used where `lens` is there, and one everywhere else.
+    pub(crate) gyro_scale: Vector3<f64>,
     /// The first camera, where its intrinsics are estimated.
     pub(crate) lens: Option<Camera>,
     /// The second one, likewise.
@@ -91,7 +93,8 @@ impl VioState {
 
     /// What has to be taken out of inertial readings.
     pub(crate) fn imu_correction(&self) -> ImuCorrection {
-        ImuCorrection { accel_matrix: self.accel_matrix, ..self.core.imu_correction() }
+        let gyro_scale = self.lens.map(|_| self.gyro_scale);
+        ImuCorrection { accel_matrix: self.accel_matrix, gyro_scale, ..self.core.imu_correction() }
     }
 
     /// `x ← x ⊞ δ`.
@@ -118,6 +121,7 @@ impl VioState {
         }
         if let Some(lens) = &mut self.lens {
             *lens = lens.with_intrinsics_changed(&intrinsics(delta, error_state::INTRINSICS));
+            self.gyro_scale += block(delta, error_state::GYRO_SCALE);
         }
         if let Some(second) = &mut self.second {
             second.correct(delta);

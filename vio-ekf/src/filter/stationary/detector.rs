@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 
+use super::block_noise::BlockNoise;
 use super::parallax_check::{ParallaxCheck, ParallaxResult};
 use crate::camera::model::CameraModel;
 use crate::filter::frontend::corner_detector::DetectionCriteria;
@@ -29,11 +30,13 @@ pub(crate) struct StationaryMean {
     pub(crate) force: Vector3<f64>,
     /// Length, s.
     pub(crate) duration: f64,
+    /// Density of the noise of the period so far, of gyroscope and accelerometer.
+    pub(crate) noise: [f64; 2],
 }
 
 impl StationaryMean {
     fn new(sample: &Imu) -> Self {
-        Self { since: sample.stamp, count: 1, rate: sample.gyro, force: sample.accel, duration: 0.0 }
+        Self { since: sample.stamp, count: 1, rate: sample.gyro, force: sample.accel, duration: 0.0, noise: [0.0; 2] }
     }
 
     fn add(&mut self, sample: &Imu) {
@@ -52,6 +55,7 @@ pub(crate) struct StationaryDetector {
     reference: Option<Imu>,
     /// The block that is being averaged.
     block: Option<StationaryMean>,
+    noise: BlockNoise,
     /// Means that have not been used yet. Each sample is used once.
     current: Option<StationaryMean>,
     /// Those of a part that has ended, until it is certain that nothing moved before its end.
@@ -70,6 +74,7 @@ impl StationaryDetector {
             settings,
             reference: None,
             block: None,
+            noise: BlockNoise::default(),
             current: None,
             pending: None,
             patches: Vec::with_capacity(MAX_PATCHES),
@@ -97,10 +102,12 @@ impl StationaryDetector {
             if !self.reference.as_ref().is_some_and(same) {
                 self.reference = Some(Imu { stamp: block.since, gyro: block.rate, accel: block.force });
                 (self.current, self.pending) = (None, None);
+                self.noise = BlockNoise::default();
                 self.patches.clear();
                 self.parallax_check.clear();
                 self.images_stationary = false;
             }
+            self.noise.add([block.rate, block.force], block.duration);
         }
         match &mut self.current {
             Some(current) => current.add(sample),
@@ -170,7 +177,8 @@ impl StationaryDetector {
 
     /// The means since they were last taken, over at least the duration of the settings.
     pub(crate) fn take_mean(&mut self) -> Option<StationaryMean> {
-        self.current.take_if(|mean| mean.duration >= self.settings.min_duration_s)
+        let taken = self.current.take_if(|mean| mean.duration >= self.settings.min_duration_s)?;
+        Some(StationaryMean { noise: self.noise.densities(), ..taken })
     }
 
     /// The same, of a time of which it is certain by now that nothing moved.

@@ -112,6 +112,7 @@ fn empty_state() -> VioState {
         time_offset: 0.0,
         depth_prior: InverseDistance::new(1.0),
         accel_matrix: None,
+        gyro_scale: Vector3::repeat(1.0),
         lens: None,
         second: None,
         landmarks: Vec::new(),

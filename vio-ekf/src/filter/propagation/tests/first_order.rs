@@ -1,24 +1,29 @@
 //! Transition, noise and gauge freedom of the propagation.
 
-use nalgebra::{DMatrix, Matrix3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::support::{
     GRAVITY, dense, difference, filled, integrate, model, random_covariance, readings, state, transition,
 };
+use crate::camera::Camera;
 use crate::filter::propagation::propagate::{Workspace, propagate};
 use crate::filter::state::error_state;
 use crate::inertial::covariance::Covariance;
 use crate::samples::ImuNoise;
 use crate::sim::Rng;
-use crate::test_random::signed;
+use crate::test_random::{signed, vector};
 
 const SMALL: f64 = 1e-13;
 
 #[test]
 fn covariance_moves_with_the_transition_of_the_whole_state() {
     let mut rng = Rng::new(1);
-    for _ in 0..5 {
+    for seed in 0..6 {
         let (mut state, readings) = (state(&mut rng, 4), readings(&mut rng, 10));
+        if seed % 2 == 1 {
+            state.lens = Some(Camera::euroc());
+            state.gyro_scale = vector(&mut rng) * 0.05 + Vector3::repeat(1.0);
+        }
         state.accel_matrix = Some(Matrix3::identity() + Matrix3::from_fn(|_, _| 0.05 * signed(&mut rng)));
         let f = transition(&readings, &state);
         // Small, so that the products of errors, which are quadratic in it, do not show.
@@ -32,9 +37,10 @@ fn covariance_moves_with_the_transition_of_the_whole_state() {
         let error = dense(&covariance) - &f * &prior * f.transpose();
         // The bias columns drop terms of the order of rate · dt · dt / 12 per step.
         assert!(error.amax() < 2e-4 * SMALL, "{}", error.amax());
-        // Without bias errors nothing is dropped: only the truncation of the differences is left.
+        // Without errors of biases and of the gyroscope's scales nothing is dropped: only the truncation of the differences is left.
         let mut exact = prior.clone();
-        for k in error_state::GYRO_BIAS..error_state::CORE {
+        let scales = if state.lens.is_some() { error_state::GYRO_SCALE..error_state::SECOND_INTRINSICS } else { 0..0 };
+        for k in (error_state::GYRO_BIAS..error_state::CORE).chain(scales) {
             exact.row_mut(k).fill(0.0);
             exact.column_mut(k).fill(0.0);
         }

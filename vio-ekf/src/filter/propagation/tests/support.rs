@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2, Unit, UnitQuaternion, Vector3};
 
+use crate::camera::intrinsics::INTRINSICS;
 use crate::filter::propagation::propagate::{Workspace, propagate};
 use crate::filter::state::bearing::Bearing;
 use crate::filter::state::error_state;
@@ -32,6 +33,7 @@ pub(super) fn state(rng: &mut Rng, landmarks: usize) -> VioState {
         time_offset: 0.01,
         depth_prior: InverseDistance::new(0.3),
         accel_matrix: None,
+        gyro_scale: Vector3::repeat(1.0),
         lens: None,
         second: None,
         landmarks: (0..landmarks)
@@ -52,9 +54,9 @@ pub(super) fn readings(rng: &mut Rng, count: usize) -> Vec<[Vector3<f64>; 2]> {
 pub(super) fn integrate(readings: &[[Vector3<f64>; 2]], state: &VioState, noise: &ImuNoise) -> ImuPreintegration {
     let mut preintegration = ImuPreintegration::default();
     for [gyro, accel] in readings {
-        let rate = gyro - state.core.gyro_bias;
-        let force = state.accel_matrix() * accel - state.core.accel_bias;
-        preintegration.advance_by_accel_matrix(&rate, (accel, &force), 0.005);
+        let correction = state.imu_correction();
+        let (rate, force) = (correction.rate(gyro), correction.force(accel));
+        preintegration.advance_by_calibration((&rate, &force), &[*gyro, *accel], 0.005);
         preintegration.integrate(&rate, &force, 0.005, noise);
     }
     preintegration
@@ -64,7 +66,7 @@ pub(super) fn integrate(readings: &[[Vector3<f64>; 2]], state: &VioState, noise:
 pub(super) fn model(readings: &[[Vector3<f64>; 2]], state: &VioState) -> VioState {
     let preintegration = integrate(readings, state, &ImuNoise::ZERO);
     let mut end = state.clone();
-    let capacity = error_state::landmark(error_state::FIXED, state.landmarks.len());
+    let capacity = state.landmark_row(state.landmarks.len());
     let mut covariance = Covariance::new(capacity, capacity);
     propagate(
         &mut end,
@@ -78,7 +80,7 @@ pub(super) fn model(readings: &[[Vector3<f64>; 2]], state: &VioState) -> VioStat
 
 /// `a ⊟ b` in the filter's error coordinates.
 pub(super) fn difference(a: &VioState, b: &VioState) -> DVector<f64> {
-    let mut d = DVector::zeros(error_state::landmark(error_state::FIXED, a.landmarks.len()));
+    let mut d = DVector::zeros(a.landmark_row(a.landmarks.len()));
     let rotation = |a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>| so3::log(&(a * b.inverse()));
     d.fixed_rows_mut::<3>(error_state::POSITION).copy_from(&(a.core.position - b.core.position));
     d.fixed_rows_mut::<3>(error_state::VELOCITY).copy_from(&(a.core.velocity - b.core.velocity));
@@ -91,17 +93,22 @@ pub(super) fn difference(a: &VioState, b: &VioState) -> DVector<f64> {
     d[error_state::DEPTH_PRIOR] = a.depth_prior.value - b.depth_prior.value;
     let matrix = (a.accel_matrix() - b.accel_matrix()).transpose();
     d.rows_mut(error_state::ACCEL_MATRIX, error_state::MATRIX_SIZE).copy_from_slice(matrix.as_slice());
+    if let (Some(lens), Some(other)) = (&a.lens, &b.lens) {
+        d.rows_mut(error_state::INTRINSICS, INTRINSICS).copy_from_slice(&lens.intrinsics_less(other));
+        d.fixed_rows_mut::<3>(error_state::GYRO_SCALE).copy_from(&(a.gyro_scale - b.gyro_scale));
+    }
+    let head = a.head();
     for (slot, (a, b)) in a.landmarks.iter().zip(&b.landmarks).enumerate() {
-        d.fixed_rows_mut::<2>(error_state::landmark(error_state::FIXED, slot))
-            .copy_from(&a.bearing.boxminus(&b.bearing));
-        d[error_state::landmark(error_state::FIXED, slot) + 2] = a.inverse_distance.value - b.inverse_distance.value;
+        let row = error_state::landmark(head, slot);
+        d.fixed_rows_mut::<2>(row).copy_from(&a.bearing.boxminus(&b.bearing));
+        d[row + 2] = a.inverse_distance.value - b.inverse_distance.value;
     }
     d
 }
 
 /// The transition `F` by central differences.
 pub(super) fn transition(readings: &[[Vector3<f64>; 2]], state: &VioState) -> DMatrix<f64> {
-    let (n, h) = (error_state::landmark(error_state::FIXED, state.landmarks.len()), 1e-5);
+    let (n, h) = (state.landmark_row(state.landmarks.len()), 1e-5);
     let middle = model(readings, state);
     let mut f = DMatrix::zeros(n, n);
     for column in 0..n {
@@ -111,10 +118,8 @@ pub(super) fn transition(readings: &[[Vector3<f64>; 2]], state: &VioState) -> DM
             let further = |distance: &mut InverseDistance| *distance = InverseDistance::new(distance.value + h);
             if column == error_state::DEPTH_PRIOR {
                 further(&mut state.depth_prior);
-            } else if column >= error_state::FIXED && (column - error_state::FIXED) % error_state::LANDMARK_SIZE == 2 {
-                further(
-                    &mut state.landmarks[(column - error_state::FIXED) / error_state::LANDMARK_SIZE].inverse_distance,
-                );
+            } else if let Some(slot) = (0..state.landmarks.len()).find(|&slot| state.landmark_row(slot) + 2 == column) {
+                further(&mut state.landmarks[slot].inverse_distance);
             } else {
                 let mut delta = vec![0.0; n];
                 delta[column] = h;

@@ -1,0 +1,198 @@
+//! Whether a calibration that was found serves better than the one that was given: filters anew, over the images that follow.
+
+use crate::filter::report::Status;
+use crate::filter::vio::Vio;
+use crate::format::calibration::CameraCalibration;
+use crate::run::calibration_doubt::{CalibrationDoubt, CalibrationPart};
+use crate::samples::{ImageView, Imu};
+use crate::stamp::Stamp;
+
+/// Images that each filter follows, and the fewest that are compared where a recording ends before.
+const COMPARED: usize = 200;
+const FEWEST: usize = 50;
+/// Images after which it ends in any case.
+const MOST: usize = 400;
+/// What a part has to take off the contradiction, as a share of it, and the accelerometer besides, whose scale and axes every filter
+/// finds by itself where it has to: ours.
+const PART: f64 = 0.03;
+const ACCELEROMETER: f64 = 0.07;
+
+/// Filters that have not started when it begins.
+///
+/// What a filter finds that estimates all of a calibration at once may be wrong where the motion tells little, and it is surer of that
+/// than it may be, because it has linearised at wrong values. A filter that takes it as given pays for it: its inertial samples and
+/// images contradict each other more than those of the filter before.
+#[derive(Debug, Clone)]
+pub(super) struct CalibrationTrial {
+    /// The first is as it was given.
+    filters: Vec<Contender>,
+    images: usize,
+}
+
+#[derive(Debug, Clone)]
+struct Contender {
+    doubt: Option<CalibrationDoubt>,
+    vio: Vio,
+    has_diverged: bool,
+    /// Contradiction by image; `None` for those that it did not follow.
+    contradictions: Vec<Option<f64>>,
+}
+
+impl CalibrationTrial {
+    /// `given` has not started. What cannot be put in place of what was given is left out.
+    pub(super) fn new(given: &Vio, doubts: Vec<CalibrationDoubt>) -> Self {
+        let found = doubts.into_iter().filter_map(|doubt| Some((corrected(given, &doubt)?, Some(doubt))));
+        let all = std::iter::once((given.clone(), None)).chain(found);
+        let contender = |(vio, doubt)| Contender { doubt, vio, has_diverged: false, contradictions: Vec::new() };
+        Self { filters: all.map(contender).collect(), images: 0 }
+    }
+
+    pub(super) fn imu(&mut self, sample: &Imu) {
+        for Contender { doubt, vio, .. } in &mut self.filters {
+            let mut read = [*sample];
+            if let Some(doubt) = doubt {
+                doubt.correct_samples(&mut read);
+            }
+            // What is refused is told by the filter that is watched.
+            let _ = vio.imu(&read[0]);
+        }
+    }
+
+    /// The latest idea of the camera's clock.
+    pub(super) fn time_offset_s(&self) -> f64 {
+        self.filters.iter().map(|contender| contender.vio.time_offset_s()).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Takes the images of a time; whether enough has been seen.
+    pub(super) fn images(&mut self, stamp: Stamp, first: &ImageView, second: Option<&ImageView>) -> bool {
+        self.images += 1;
+        for contender in &mut self.filters {
+            contender.step(stamp, first, second);
+        }
+        let is_done = |contender: &Contender| contender.has_diverged || contender.followed() >= COMPARED;
+        self.images >= MOST || self.filters.iter().all(is_done)
+    }
+
+    /// What is left of the doubt; all of it where too little was seen, or nothing serves. A calibration with which a filter does not start,
+    /// or not for long, where another does, is out.
+    pub(super) fn finish(&self) -> Option<CalibrationDoubt> {
+        let most = self.filters.iter().map(Contender::followed).max().unwrap_or(0);
+        let serves = |one: &&Contender| most >= FEWEST && !one.has_diverged && 2 * one.followed() > most;
+        let running: Vec<&Contender> = self.filters.iter().filter(serves).collect();
+        let compared: Vec<usize> =
+            (0..self.images).filter(|&k| running.iter().all(|one| one.contradictions[k].is_some())).collect();
+        let sum = |one: &Contender| one.price() * compared.iter().filter_map(|&k| one.contradictions[k]).sum::<f64>();
+        // Of equals the first, which is what was given.
+        let best = running.into_iter().min_by(|a, b| sum(a).total_cmp(&sum(b)));
+        best.or_else(|| self.filters.get(1))?.doubt.clone()
+    }
+}
+
+impl Contender {
+    fn step(&mut self, stamp: Stamp, first: &ImageView, second: Option<&ImageView>) {
+        let before = self.vio.contradiction();
+        let given = match second {
+            _ if self.has_diverged => return self.contradictions.push(None),
+            Some(second) => self.vio.image_pair(stamp, first, second),
+            None => self.vio.image(stamp, first),
+        };
+        let followed = given.ok().filter(|report| {
+            self.has_diverged = matches!(report.status, Status::Diverged(_));
+            report.used > 0 && !report.stationary
+        });
+        self.contradictions.push(followed.and_then(|_| Some(self.vio.contradiction()? - before?)));
+    }
+
+    /// Factor on the contradiction.
+    fn price(&self) -> f64 {
+        let parts = self.doubt.as_ref().map_or(&[][..], |doubt| &doubt.parts);
+        let accelerometer = if parts.contains(&CalibrationPart::Accelerometer) { ACCELEROMETER } else { 0.0 };
+        1.0 + PART * parts.len() as f64 + accelerometer
+    }
+
+    fn followed(&self) -> usize {
+        self.contradictions.iter().flatten().count()
+    }
+}
+
+/// A filter with what was found, which goes on to estimate it.
+fn corrected(given: &Vio, doubt: &CalibrationDoubt) -> Option<Vio> {
+    let settings = given.settings();
+    let camera = |camera| CameraCalibration {
+        camera,
+        rate_hz: None,
+        time_offset_s: settings.calibration.time_offset_s,
+        row_time_s: settings.calibration.row_time_s,
+    };
+    let lenses = std::iter::once(given.camera()).chain(given.second_camera().ok());
+    let mut cameras = lenses.map(|lens| lens.kalibr().map(camera)).collect::<Option<Vec<_>>>()?;
+    doubt.correct(&mut cameras);
+    given.with_cameras(&cameras, &doubt.freed(settings)).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, SMatrix, Vector3};
+
+    use super::*;
+    use crate::camera::Camera;
+    use crate::camera::model::CameraModel;
+    use crate::filter::report::Calibration;
+    use crate::filter::settings::Settings;
+    use crate::samples::ImuNoise;
+    use crate::sim::{RoomSettings, Scenario, SimulatedCamera, Simulation, camera_ahead, painting_flight};
+
+    /// The doubt that the focal length is that of another camera.
+    fn doubt(given: &Camera, camera: Camera) -> CalibrationDoubt {
+        let found = Calibration {
+            body_from_camera: camera.body_from_camera,
+            time_offset_s: 0.0,
+            camera: Some(camera),
+            second_camera: None,
+            covariance: SMatrix::zeros(),
+            accel_matrix: Matrix3::identity(),
+            accel_matrix_sigma: Matrix3::zeros(),
+            gyro_scale: Vector3::repeat(1.0),
+            gyro_scale_sigma: Vector3::zeros(),
+        };
+        CalibrationDoubt {
+            parts: vec![CalibrationPart::FocalLength],
+            found: Some(found),
+            given_pose: given.body_from_camera(),
+            clock_change_s: 0.0,
+            words: String::new(),
+        }
+    }
+
+    #[test]
+    fn what_serves_worse_is_dropped_and_what_serves_better_stays() {
+        let sound = camera_ahead();
+        let wrong = Camera { fx: 1.02 * sound.fx, fy: 1.02 * sound.fy, ..sound };
+        let room = RoomSettings { texture_size: 512, ..RoomSettings::default() };
+        let cameras = vec![SimulatedCamera { camera: sound, ..SimulatedCamera::default() }];
+        let scenario = Scenario { seed: 6, cameras, room, ..Scenario::default() };
+        let simulation = Simulation::new(painting_flight(6, 10.0).unwrap(), scenario).unwrap();
+        let mut trials = [(sound, wrong), (wrong, sound)].map(|(given, found)| {
+            let vio = Vio::new(given, ImuNoise::default(), Settings::default()).unwrap();
+            CalibrationTrial::new(&vio, vec![doubt(&given, found)])
+        });
+        let mut samples = simulation.imu(0).unwrap().samples.into_iter().peekable();
+        for index in 0..simulation.frame_count(0) {
+            let Some(frame) = simulation.frame(0, index).unwrap() else { continue };
+            while let Some(sample) = samples.next_if(|sample| sample.stamp <= frame.stamp) {
+                for trial in &mut trials {
+                    trial.imu(&sample);
+                }
+            }
+            for trial in &mut trials {
+                trial.images(frame.stamp, &frame.view(), None);
+            }
+        }
+        let sums = trials.each_ref().map(|trial| {
+            trial.filters.iter().map(|one| one.contradictions.iter().flatten().sum::<f64>()).collect::<Vec<f64>>()
+        });
+        let [dropped, kept] = trials.each_ref().map(CalibrationTrial::finish);
+        assert_eq!(dropped, None, "{sums:?}");
+        assert!(kept.is_some(), "{sums:?}");
+    }
+}
