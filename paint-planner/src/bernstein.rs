@@ -79,16 +79,15 @@ impl Bernstein {
     /// The product of two polynomials whose degrees add up to at most 14.
     pub(crate) fn product(&self, other: &Self) -> Self {
         let (m, n) = (self.len - 1, other.len - 1);
+        let len = m + n + 1;
         let mut own = [0.0; MAX];
-        for (i, a) in self.all().iter().enumerate() {
-            for (j, b) in other.all().iter().enumerate() {
-                own[i + j] += a * b * BINOMIAL[m][i] * BINOMIAL[n][j];
+        for (i, (a, of_a)) in self.all().iter().zip(&BINOMIAL[m]).enumerate() {
+            for ((value, b), of_b) in own[i..].iter_mut().zip(other.all()).zip(&BINOMIAL[n]) {
+                *value += a * b * of_a * of_b;
             }
         }
-        for (k, value) in own.iter_mut().enumerate().take(m + n + 1) {
-            *value /= BINOMIAL[m + n][k];
-        }
-        Self { coefficients: own, len: m + n + 1 }
+        own[..len].iter_mut().zip(&BINOMIAL[m + n]).for_each(|(value, of_both)| *value /= of_both);
+        Self { coefficients: own, len }
     }
 
     /// `self - other`, of one degree.
@@ -126,12 +125,18 @@ impl Bernstein {
     pub(crate) fn greatest_ratio(&self, denominator: &Self, floor: f64, fraction: f64) -> f64 {
         let ratio = |p: &Self, d: &Self, k: usize| p.coefficients[k] / d.coefficients[k];
         let at_ends = |p: &Self, d: &Self| ratio(p, d, 0).max(ratio(p, d, p.degree()));
+        let most = |p: &Self, d: &Self| (0..p.len).fold(f64::NEG_INFINITY, |most, k| most.max(ratio(p, d, k)));
         let mut attained = floor.max(at_ends(self, denominator));
         let mut bound = attained;
+        // As a rule at once.
+        let top = most(self, denominator);
+        if top <= attained * (1.0 + fraction) {
+            return bound.max(top);
+        }
         // Depth 40 is beyond the resolution of f64 on [0, 1].
         let mut open = vec![(*self, *denominator, 0_u32)];
         while let Some((piece, below, depth)) = open.pop() {
-            let top = (0..piece.len).fold(f64::NEG_INFINITY, |most, k| most.max(ratio(&piece, &below, k)));
+            let top = most(&piece, &below);
             if top <= attained * (1.0 + fraction) || depth == 40 {
                 bound = bound.max(top);
                 continue;
