@@ -308,6 +308,9 @@ impl Flight {
             doubt.correct_samples(&mut given.samples);
             (given.cameras, given.time_offset_s) = (calibrations.map(|c| c.camera), calibrations[0].time_offset_s);
             settings = doubt.freed(&settings);
+            if doubt.found.is_none() {
+                break;
+            }
         }
         (given, checks, settings)
     }

@@ -131,17 +131,15 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
     let threads = worker_threads(arguments.threads);
     let mut settings = RunSettings { filter, threads, ..RunSettings::default() };
     let given = recording.camera.camera.body_from_camera.rotation;
-    if arguments.calibrate {
-        calibrate(&mut recording, &mut settings)?;
-    }
+    let left = if arguments.calibrate { calibrate(&mut recording, &mut settings)? } else { None };
     let _finishing = Finishing::begin();
     let (timed, doubt) = if arguments.calibrate {
-        (run(&recording, &settings), None)
+        (run(&recording, &settings), left)
     } else {
         with_calibration_check(&recording, &settings)
     };
     if let Some(doubt) = &doubt {
-        eprintln!("warning: {}", calibration_advice(doubt));
+        eprintln!("warning: {}", calibration_advice(doubt, arguments.calibrate));
     }
     let is_static = |warning: &&ImuWarning| matches!(warning, ImuWarning::StaticView { .. });
     let static_view = findings.as_ref().and_then(|findings| findings.warnings.iter().find(is_static));
@@ -185,20 +183,23 @@ fn track(arguments: &Track) -> Result<(), AnyError> {
 }
 
 /// Corrects the calibration of a recording, and lets the run estimate what is left of what was doubted: checks until nothing is doubted,
-/// because a first estimate far from what is given is not at its best.
-fn calibrate(recording: &mut Recording, settings: &mut RunSettings) -> Result<(), VioError> {
-    let mut freed = settings.filter;
+/// because a first estimate far from what is given is not at its best. What is doubted at the last check, or cannot be put right.
+fn calibrate(recording: &mut Recording, settings: &mut RunSettings) -> Result<Option<CalibrationDoubt>, VioError> {
+    let (mut freed, mut left) = (settings.filter, None);
     for _ in 0..MAX_CHECKS {
         let filter = filter(recording, settings, true)?;
-        let doubt = check_calibration(&filter, &recording.samples, || camera_frames(recording));
-        let Some(doubt) = doubt else { break };
+        left = check_calibration(&filter, &recording.samples, || camera_frames(recording));
+        let Some(doubt) = &left else { break };
         say!("calibration: {doubt}");
-        recording.correct_calibration(&doubt);
+        recording.correct_calibration(doubt);
         freed = doubt.freed(&freed);
+        if doubt.found.is_none() {
+            break;
+        }
     }
     say!("calibration in use: {}", recording.calibration_words());
     settings.filter = freed;
-    Ok(())
+    Ok(left)
 }
 
 /// The run, and beside it, on a second thread if there is one, what the images say against the calibration.
@@ -221,9 +222,11 @@ fn with_calibration_check(
 }
 
 /// What is doubted of the calibration, and what to do.
-fn calibration_advice(doubt: &CalibrationDoubt) -> String {
+fn calibration_advice(doubt: &CalibrationDoubt, is_calibrated: bool) -> String {
     let way_out = if doubt.parts.contains(&CalibrationPart::CameraOrder) {
         "exchange the cameras"
+    } else if is_calibrated {
+        "that was put right, and may not be enough: calibrate anew"
     } else {
         "run with --calibrate, or calibrate anew"
     };
@@ -273,7 +276,7 @@ fn with_cause(why: String, found: &Found, recording: &Recording, settings: &RunS
         return format!("{why}; {static_view}");
     }
     if let Some(doubt) = &found.doubt {
-        return format!("{why}; {}", calibration_advice(doubt));
+        return format!("{why}; {}", calibration_advice(doubt, found.is_calibrated));
     }
     if interruption::is_requested() {
         return why;

@@ -9,8 +9,9 @@ use crate::samples::ImuNoise;
 
 /// Rows of the relative motion: rotation, velocity, position.
 const MOTION: usize = 9;
-/// Entries of the accelerometer's matrix, and with the scales of the gyroscope's axes.
+/// Entries of the accelerometer's matrix.
 const MATRIX: usize = 9;
+/// These, and the scales of the gyroscope's axes.
 pub(crate) const CALIBRATION: usize = MATRIX + 3;
 
 /// Motion between two times as the inertial samples tell it, independent of the state at the first (Forster et al. 2017).

@@ -82,6 +82,7 @@ impl CalibrationDoubt {
     #[must_use]
     pub fn freed(&self, settings: &Settings) -> Settings {
         let (mut freed, near) = (*settings, settings.calibration.nearly());
+        let rough = Settings::default().with_rough_calibration().imu;
         let calibration = &mut freed.calibration;
         for part in &self.parts {
             match part {
@@ -91,10 +92,10 @@ impl CalibrationDoubt {
                 Part::Clock => calibration.time_offset_sigma_s = near.time_offset_sigma_s,
                 Part::Accelerometer => {
                     freed.imu.accel_matrix = AccelMatrixEstimation::Always;
-                    freed.imu.accel_scale_sigma = 0.003;
-                    freed.imu.accel_misalignment_sigma = 0.0012;
+                    freed.imu.accel_scale_sigma = 0.1 * rough.accel_scale_sigma;
+                    freed.imu.accel_misalignment_sigma = 0.1 * rough.accel_misalignment_sigma;
                 }
-                Part::Gyroscope => freed.imu.gyro_scale_sigma = 0.002,
+                Part::Gyroscope => freed.imu.gyro_scale_sigma = 0.1 * rough.gyro_scale_sigma,
                 Part::FocalLength | Part::SecondFocalLength => calibration.focal_sigma = near.focal_sigma,
                 Part::PrincipalPoint | Part::SecondPrincipalPoint => {
                     calibration.principal_point_sigma_px = near.principal_point_sigma_px;
@@ -223,7 +224,7 @@ fn percent(correction: &Vector3<f64>) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use nalgebra::{Matrix3, SMatrix};
 
     use super::*;
@@ -231,7 +232,7 @@ mod tests {
     use crate::lie::so3;
     use crate::stamp::Stamp;
 
-    fn found(camera: Camera) -> Calibration {
+    pub(in crate::run) fn found(camera: Camera) -> Calibration {
         Calibration {
             body_from_camera: camera.body_from_camera,
             time_offset_s: 0.0,
@@ -245,7 +246,7 @@ mod tests {
         }
     }
 
-    fn doubt(given: &Camera, found: &Calibration, part: Part) -> CalibrationDoubt {
+    pub(in crate::run) fn doubt(given: &Camera, found: &Calibration, part: Part) -> CalibrationDoubt {
         let given_pose = given.body_from_camera;
         CalibrationDoubt {
             parts: vec![part],

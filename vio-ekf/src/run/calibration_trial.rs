@@ -132,37 +132,12 @@ fn corrected(given: &Vio, doubt: &CalibrationDoubt) -> Option<Vio> {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Matrix3, SMatrix, Vector3};
-
     use super::*;
     use crate::camera::Camera;
-    use crate::camera::model::CameraModel;
-    use crate::filter::report::Calibration;
     use crate::filter::settings::Settings;
+    use crate::run::calibration_doubt::tests::{doubt, found as found_of};
     use crate::samples::ImuNoise;
     use crate::sim::{RoomSettings, Scenario, SimulatedCamera, Simulation, camera_ahead, painting_flight};
-
-    /// The doubt that the focal length is that of another camera.
-    fn doubt(given: &Camera, camera: Camera) -> CalibrationDoubt {
-        let found = Calibration {
-            body_from_camera: camera.body_from_camera,
-            time_offset_s: 0.0,
-            camera: Some(camera),
-            second_camera: None,
-            covariance: SMatrix::zeros(),
-            accel_matrix: Matrix3::identity(),
-            accel_matrix_sigma: Matrix3::zeros(),
-            gyro_scale: Vector3::repeat(1.0),
-            gyro_scale_sigma: Vector3::zeros(),
-        };
-        CalibrationDoubt {
-            parts: vec![CalibrationPart::FocalLength],
-            found: Some(found),
-            given_pose: given.body_from_camera(),
-            clock_change_s: 0.0,
-            words: String::new(),
-        }
-    }
 
     #[test]
     fn what_serves_worse_is_dropped_and_what_serves_better_stays() {
@@ -174,7 +149,7 @@ mod tests {
         let simulation = Simulation::new(painting_flight(6, 10.0).unwrap(), scenario).unwrap();
         let mut trials = [(sound, wrong), (wrong, sound)].map(|(given, found)| {
             let vio = Vio::new(given, ImuNoise::default(), Settings::default()).unwrap();
-            CalibrationTrial::new(&vio, vec![doubt(&given, found)])
+            CalibrationTrial::new(&vio, vec![doubt(&given, &found_of(found), CalibrationPart::FocalLength)])
         });
         let mut samples = simulation.imu(0).unwrap().samples.into_iter().peekable();
         for index in 0..simulation.frame_count(0) {

@@ -145,7 +145,7 @@ fn a_gyroscope_with_a_bias_is_sound_and_its_axes_are_found_all_the_same() {
     assert!(is_named(&spoilt), "{spoilt:?}");
 }
 
-/// A rocking body whose accelerometer reads 1 % and 4 % too much.
+/// A rocking body whose accelerometer reads 1 % too much, and then 4 % too little.
 #[test]
 fn gravity_of_another_length_is_named() {
     let samples = rocking(Vector3::zeros());
