@@ -132,6 +132,13 @@ struct Listed {
     replacement: String,
 }
 
+impl Listed {
+    /// `FILE:LINE:COLUMN: what`, without the place.
+    fn what(&self) -> &str {
+        self.name.splitn(4, ':').nth(3).unwrap_or(&self.name).trim()
+    }
+}
+
 #[derive(Deserialize)]
 struct Span {
     start: Position,
@@ -158,26 +165,44 @@ pub(crate) fn mutants(root: &Path, count: usize, seeds: &[u64]) -> Result<Vec<Fa
     listed.retain(|mutant| !mutant.file.starts_with("benches/"));
     let mut drawn = BTreeSet::new();
     for &seed in seeds {
-        let (mut random, mut left) = (SplitMix64::seed_from_u64(seed), (0..listed.len()).collect::<Vec<_>>());
-        for _ in 0..count.min(listed.len()) {
-            drawn.insert(left.swap_remove((random.next_u64() % left.len() as u64) as usize));
-        }
+        let mut ranks = ranks(&listed, seed);
+        ranks.sort_unstable();
+        drawn.extend(ranks.into_iter().take(count).map(|(_, index)| index));
     }
     eprintln!("{} of {} mutants", drawn.len(), listed.len());
     let mut texts = BTreeMap::new();
     let mut faults = Vec::new();
-    for Listed { name, file, span, replacement } in drawn.into_iter().map(|index| &listed[index]) {
+    for listed @ Listed { file, span, replacement, .. } in drawn.into_iter().map(|index| &listed[index]) {
         if !texts.contains_key(file) {
             texts.insert(file, std::fs::read_to_string(root.join(file))?);
         }
         let text = &texts[file];
         let place = offset(text, &span.start)..offset(text, &span.end);
-        // `FILE:LINE:COLUMN: what`
-        let what = name.splitn(4, ':').nth(3).unwrap_or(name).trim().to_owned();
-        faults.push(Fault::new(Origin::Mutant, file, what, text, place, replacement.clone()));
+        faults.push(Fault::new(Origin::Mutant, file, listed.what().to_owned(), text, place, replacement.clone()));
     }
     explain(root, &mut faults, &texts)?;
     Ok(faults)
+}
+
+/// Where each mutant stands in the draw of a seed, and its index. It stays there while its function does: a sample is the same
+/// but for what has changed, and so can be compared with that of an earlier commit.
+fn ranks(listed: &[Listed], seed: u64) -> Vec<(u64, usize)> {
+    let mut same = BTreeMap::<(&str, &str), u64>::new();
+    let rank = |mutant: &Listed, nth: u64| {
+        let words = [mutant.file.as_bytes(), mutant.what().as_bytes(), &nth.to_le_bytes(), &seed.to_le_bytes()];
+        // FNV-1a, mixed: its high bits say little of the last bytes.
+        let hash = words
+            .concat()
+            .iter()
+            .fold(0xcbf2_9ce4_8422_2325, |hash: u64, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3));
+        SplitMix64::seed_from_u64(hash).next_u64()
+    };
+    let numbered = listed.iter().enumerate().map(|(index, mutant)| {
+        let nth = same.entry((&mutant.file, mutant.what())).or_default();
+        *nth += 1;
+        (rank(mutant, *nth), index)
+    });
+    numbered.collect()
 }
 
 /// A place in bytes.
