@@ -109,7 +109,12 @@ impl Initializing {
         if self.status != InitializationStatus::WaitingForStationaryImages {
             return Ok(None);
         }
-        let found = static_initializer::initial_state(&mut sensors.stationary, sample.stamp, &sensors.settings);
+        let found = static_initializer::initial_state(
+            &mut sensors.stationary,
+            sample.stamp,
+            sensors.camera.as_ref(),
+            &sensors.settings,
+        );
         let Some((initial, mean)) = found else { return Ok(None) };
         let mut running = Running::from_state(&initial, sensors)?;
         running.tracking.rested = true;

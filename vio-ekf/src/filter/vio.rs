@@ -375,9 +375,7 @@ impl Vio {
         let now = self.sensors.now_or(stamp);
         let Sensors { frontend, stationary, settings, .. } = &mut self.sensors;
         frontend.set_image(image);
-        if stationary.is_imu_stationary(now) {
-            stationary.image(frontend, &settings.patches);
-        }
+        stationary.image(now, frontend, &settings.patches);
         self.step(stamp, Input::Image)
     }
 

@@ -80,9 +80,9 @@ fn what_the_map_confirms_is_trusted_until_it_says_nothing() {
     let AidedPose { trusted, from_map, position_sigma_m, world_from_body, .. } = scene.pose();
     assert!(trusted && !from_map && position_sigma_m < 0.01);
     assert!((world_from_body.translation.vector - Vector3::z()).norm() < 5e-3, "{world_from_body}");
-    scene.sense(450, true);
+    scene.sense(400, true);
     assert!(scene.pose().trusted);
-    scene.sense(100, true);
+    scene.sense(150, true);
     assert!(!scene.pose().trusted && !scene.pose().from_map);
 }
 

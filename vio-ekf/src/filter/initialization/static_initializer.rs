@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Translation3, Unit, Vector3};
 
+use crate::camera::model::CameraModel;
 use crate::filter::report::InitializationStatus;
 use crate::filter::settings::Settings;
 use crate::filter::state::bearing::Bearing;
@@ -29,14 +30,16 @@ pub(crate) fn status(detector: &StationaryDetector, now: Stamp, settings: &Setti
 pub(crate) fn initial_state(
     detector: &mut StationaryDetector,
     now: Stamp,
+    camera: &dyn CameraModel,
     settings: &Settings,
 ) -> Option<(InitialState, StationaryMean)> {
-    if !detector.is_stationary(now) {
+    if !detector.may_be_stationary(now) {
         return None;
     }
     let mean = detector.take_mean()?;
-    let sigma =
-        InitialSigma { velocity: settings.stationary.velocity_sigma, tilt: TILT_SIGMA, ..InitialSigma::default() };
+    let undetected = detector.undetected_speed(camera, settings.landmarks.inverse_distance);
+    let velocity = settings.stationary.velocity_sigma.hypot(undetected);
+    let sigma = InitialSigma { velocity, tilt: TILT_SIGMA, ..InitialSigma::default() };
     // Only the direction of the force is used here; the stationary update weighs its length against the bias.
     let attitude = Bearing::new(&Unit::new_normalize(mean.force)).level();
     let initial = InitialState {

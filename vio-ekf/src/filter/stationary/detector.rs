@@ -8,6 +8,7 @@ use crate::camera::model::CameraModel;
 use crate::filter::frontend::corner_detector::DetectionCriteria;
 use crate::filter::frontend::image_frontend::ImageFrontend;
 use crate::filter::frontend::patch::Patch;
+use crate::filter::frontend::pyramid::Pyramid;
 use crate::filter::point_observation::PointObservation;
 use crate::filter::settings::{PatchSettings, StationarySettings};
 use crate::samples::Imu;
@@ -15,8 +16,15 @@ use crate::stamp::Stamp;
 
 /// Patches that are compared for parallax.
 const MAX_PATCHES: usize = 8;
-/// Fewer are replaced by new ones.
+/// Steps of Gauss and Newton by which each is found.
+const STEPS: usize = 3;
+/// Fewer tell nothing.
 const MIN_PATCHES: usize = 5;
+/// Share of the least duration after which patches are taken, and over which they must then stand: a body that glides slowly stands
+/// still from one image to the next.
+const WATCHED_SHARE: f64 = 0.5;
+/// A patch that is not found is taken to have moved by this, pixels.
+const LOST_PX: f64 = 100.0;
 /// Samples are averaged over this before they are compared, s: the motors of a vehicle that stands shake it by several m/s²,
 /// but do not move it.
 const BLOCK_S: f64 = 0.1;
@@ -61,9 +69,13 @@ pub(crate) struct StationaryDetector {
     /// Those of a part that has ended, until it is certain that nothing moved before its end.
     pending: Option<StationaryMean>,
     patches: Vec<(Vector2<f64>, Patch)>,
-    /// The same for points of a caller's own.
+    /// Where the current image shows them.
+    seen: Vec<PointObservation>,
+    /// Of patches, or of points of a caller's own.
     parallax_check: ParallaxCheck,
     images_stationary: bool,
+    /// Seconds over which that was seen.
+    watched_s: f64,
     /// Parallax that is not told from noise, pixels.
     tolerance: f64,
 }
@@ -78,8 +90,10 @@ impl StationaryDetector {
             current: None,
             pending: None,
             patches: Vec::with_capacity(MAX_PATCHES),
+            seen: Vec::with_capacity(MAX_PATCHES),
             parallax_check: ParallaxCheck::new(),
             images_stationary: false,
+            watched_s: 0.0,
             tolerance: settings.max_parallax_px,
         }
     }
@@ -115,48 +129,62 @@ impl StationaryDetector {
         }
     }
 
-    /// Compares the current image with the first one of this period.
-    pub(crate) fn image(&mut self, frontend: &mut ImageFrontend, settings: &PatchSettings) {
+    /// Compares the current image with one of the first half of this period, if the inertial samples make it one.
+    pub(crate) fn image(&mut self, now: Stamp, frontend: &mut ImageFrontend, settings: &PatchSettings) {
+        if !self.is_imu_stationary_for(now, WATCHED_SHARE) {
+            return;
+        }
         let ImageFrontend { pyramid, detector, .. } = frontend;
-        if self.patches.len() < MIN_PATCHES {
-            self.patches.clear();
-            self.images_stationary = false;
+        if self.patches.is_empty() {
             let criteria = DetectionCriteria::from(settings);
             detector.detect(pyramid, &std::iter::empty(), &criteria);
             while self.patches.len() < MAX_PATCHES {
                 let Some(found) = detector.take_best(pyramid, &criteria) else { break };
                 self.patches.push(found);
             }
+            self.parallax_check.clear();
+        }
+        if self.patches.len() < MIN_PATCHES {
+            self.patches.clear();
+            self.images_stationary = false;
             return;
         }
-        let unmoved = |(pixel, patch): &(Vector2<f64>, Patch)| {
-            let comparison = patch.compare(pyramid, pixel, &Matrix2::identity())?;
-            let shift = comparison.information.try_inverse()? * comparison.gradient;
-            (shift.norm() < self.settings.max_parallax_px).then_some(())
-        };
-        let count = self.patches.iter().filter_map(unmoved).count();
-        // A majority: some patches may lie on things that move by themselves.
-        let stationary = 2 * count > self.patches.len();
-        self.set_images(ParallaxResult { stationary, tolerance: self.settings.max_parallax_px });
+        self.seen.clear();
+        let (mut variance, mut count) = (0.0, 0.0);
+        for ((place, patch), id) in self.patches.iter().zip(0..) {
+            let found = find(patch, place, pyramid);
+            if let Some((_, covariance)) = found {
+                variance += 0.5 * settings.intensity_sigma.powi(2) * covariance.trace();
+                count += 1.0;
+            }
+            let pixel = found.map_or(place + Vector2::repeat(LOST_PX), |(pixel, _)| pixel);
+            self.seen.push(PointObservation { id, pixel });
+        }
+        let sigma = (variance / f64::max(count, 1.0)).sqrt();
+        let result = self.parallax_check.check(now, &self.seen, (sigma, self.settings.max_parallax_px));
+        self.set_images(now, result);
     }
 
     /// Compares points, each with noise of `sigma` pixels, with those at the beginning of this period.
     pub(crate) fn points(&mut self, now: Stamp, points: &[PointObservation], sigma: f64) {
-        match self.parallax_check.check(now, points, (sigma, self.settings.max_parallax_px)) {
-            Some(result) => {
-                self.set_images(result);
-                // Slow motion takes its time to stand out from the noise.
-                self.images_stationary &= self.parallax_check.age(now) >= self.settings.min_duration_s;
-            }
-            None => self.images_stationary = false,
-        }
+        let result = self.parallax_check.check(now, points, (sigma, self.settings.max_parallax_px));
+        self.set_images(now, result);
+        // Slow motion takes its time to stand out from the noise.
+        self.images_stationary &= self.watched_s >= self.settings.min_duration_s;
     }
 
-    fn set_images(&mut self, ParallaxResult { stationary, tolerance }: ParallaxResult) {
+    fn set_images(&mut self, now: Stamp, result: Option<ParallaxResult>) {
+        let Some(ParallaxResult { stationary, tolerance }) = result else {
+            self.images_stationary = false;
+            return;
+        };
         (self.images_stationary, self.tolerance) = (stationary, tolerance);
+        self.watched_s = self.parallax_check.age(now);
         if !stationary {
-            // From here on something else is seen: the stationary period, if it is one, begins anew.
-            self.reference = None;
+            // From here on something else is seen. What the inertial samples have read so far is no rest if it would count as one.
+            self.reference.take_if(|reference| now.secs_since(reference.stamp) >= self.settings.min_duration_s);
+            self.patches.clear();
+            self.parallax_check.clear();
         }
     }
 
@@ -165,14 +193,29 @@ impl StationaryDetector {
         0.5 * self.tolerance / camera.focal_length()
     }
 
+    /// Standard deviation of a velocity that is not detected before points of this inverse distance (1/m), m/s.
+    pub(crate) fn undetected_speed(&self, camera: &dyn CameraModel, inverse_distance: f64) -> f64 {
+        self.undetected_angle(camera) / (inverse_distance * self.watched_s)
+    }
+
     /// Whether nothing has moved for long enough.
     pub(crate) fn is_stationary(&self, now: Stamp) -> bool {
+        self.watched_s >= WATCHED_SHARE * self.settings.min_duration_s && self.may_be_stationary(now)
+    }
+
+    /// Whether the inertial samples have been stationary for long enough, and the last images contradict that no more than by
+    /// [`undetected_speed`](Self::undetected_speed).
+    pub(crate) fn may_be_stationary(&self, now: Stamp) -> bool {
         self.images_stationary && self.is_imu_stationary(now)
     }
 
     /// Whether the inertial samples alone have been stationary for long enough.
     pub(crate) fn is_imu_stationary(&self, now: Stamp) -> bool {
-        self.reference.is_some_and(|reference| now.secs_since(reference.stamp) >= self.settings.min_duration_s)
+        self.is_imu_stationary_for(now, 1.0)
+    }
+
+    fn is_imu_stationary_for(&self, now: Stamp, share: f64) -> bool {
+        self.reference.is_some_and(|reference| now.secs_since(reference.stamp) >= share * self.settings.min_duration_s)
     }
 
     /// The means since they were last taken, over at least the duration of the settings.
@@ -197,6 +240,17 @@ impl StationaryDetector {
     }
 }
 
+/// Where a patch is, if it is near its place; and the covariance of that by unit noise of the grey levels.
+fn find(patch: &Patch, place: &Vector2<f64>, pyramid: &Pyramid) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+    let (mut pixel, mut covariance) = (*place, Matrix2::zeros());
+    for _ in 0..STEPS {
+        let comparison = patch.compare(pyramid, &pixel, &Matrix2::identity())?;
+        covariance = comparison.information.try_inverse()?;
+        pixel += covariance * comparison.gradient;
+    }
+    Some((pixel, covariance))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -208,40 +262,55 @@ mod tests {
         Imu { stamp: Stamp::from_nanos(1_000_000 * milliseconds), gyro, accel }
     }
 
-    /// Whether a picture that stands at so many of its patches, and moved by two pixels everywhere else, is a standstill.
-    fn stands(still: usize) -> bool {
-        let (camera, settings) = (camera_ahead(), PatchSettings::default());
-        let (width, height) = camera.image_size();
-        // Squares of 16 pixels, each with a brightness of its own.
+    /// A picture of squares of 16 pixels, each with a brightness of its own; those near some places stand, all others are moved.
+    fn picture(moved: usize, standing: &[Vector2<f64>]) -> Vec<u8> {
+        let (width, height) = camera_ahead().image_size();
         let brightness = |x: usize, y: usize| {
             let square = (x / 16 + 100 * (y / 16)) as u32;
             40 + (square.wrapping_mul(2_654_435_761) >> 25) as u8
         };
-        let picture = |value: &dyn Fn(usize, usize) -> u8| -> Vec<u8> {
-            (0..width * height).map(|k| value(k % width, k / width)).collect()
-        };
-        let mut frontend = ImageFrontend::new(&camera, &settings);
+        let stands =
+            |x: usize, y: usize| standing.iter().any(|place| (place - Vector2::new(x as f64, y as f64)).amax() < 14.0);
+        let at = |x: usize, y: usize| if stands(x, y) { (x, y) } else { (x + moved, y + moved) };
+        (0..width * height).map(|k| at(k % width, k / width)).map(|(x, y)| brightness(x, y)).collect()
+    }
+
+    /// When a detector that reads rest says that nothing moves, ms, if it is shown a picture each 50 ms, moved by so many pixels by the
+    /// time except at so many of its patches.
+    fn standstill(moved: impl Fn(i64) -> usize, still: usize) -> Vec<i64> {
+        let settings = PatchSettings::default();
+        let (width, height) = camera_ahead().image_size();
+        let mut frontend = ImageFrontend::new(&camera_ahead(), &settings);
         let mut detector = StationaryDetector::new(StationarySettings::default());
-        let mut show = |detector: &mut StationaryDetector, data: &[u8]| {
-            frontend.set_image(&ImageView { width, height, data });
-            detector.image(&mut frontend, &settings);
-        };
-        (0..=40).for_each(|k| detector.imu(&sample(5 * k, 9.81)));
-        show(&mut detector, &picture(&brightness));
-        let places: Vec<Vector2<f64>> = detector.patches.iter().map(|(pixel, _)| *pixel).collect();
-        assert_eq!(places.len(), MAX_PATCHES);
-        (41..=300).for_each(|k| detector.imu(&sample(5 * k, 9.81)));
-        let near = |x: usize, y: usize| {
-            places[..still].iter().any(|place| (place - Vector2::new(x as f64, y as f64)).amax() < 14.0)
-        };
-        show(&mut detector, &picture(&|x, y| if near(x, y) { brightness(x, y) } else { brightness(x + 2, y + 2) }));
-        detector.is_stationary(sample(1500, 9.81).stamp)
+        let mut found = Vec::new();
+        for milliseconds in (0..2000).step_by(5) {
+            let sample = sample(milliseconds, 9.81);
+            detector.imu(&sample);
+            if milliseconds % 50 == 0 {
+                let places: Vec<Vector2<f64>> = detector.patches.iter().map(|(pixel, _)| *pixel).take(still).collect();
+                let data = picture(moved(milliseconds), &places);
+                frontend.set_image(&ImageView { width, height, data: &data });
+                detector.image(sample.stamp, &mut frontend, &settings);
+                found.extend(detector.is_stationary(sample.stamp).then_some(milliseconds));
+            }
+        }
+        found
     }
 
     #[test]
     fn most_patches_must_stand() {
-        let found = [0, 1, 3, 5, MAX_PATCHES].map(stands);
-        assert_eq!(found, [false, false, false, true, true]);
+        let jumps = |milliseconds| if milliseconds < 1200 { 0 } else { 2 };
+        let stands = |still| standstill(jumps, still).contains(&1200);
+        assert_eq!([0, 1, 3, 5, MAX_PATCHES].map(stands), [false, false, false, true, true]);
+    }
+
+    /// A body that glides stands from one image to the next, but not over half a second.
+    #[test]
+    fn images_must_stand_for_half_a_second() {
+        let expected: Vec<i64> = (1000..2000).step_by(50).collect();
+        let resting = standstill(|_| 0, 0);
+        assert!(resting.ends_with(&expected[3..]) && resting.iter().all(|at| *at >= 1000), "{resting:?}");
+        assert_eq!(standstill(|milliseconds| milliseconds as usize / 200, 0), [0; 0]);
     }
 
     /// A mean over a second counts half a second after its end, and not at all if something moved before that.

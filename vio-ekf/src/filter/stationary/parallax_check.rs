@@ -16,9 +16,9 @@ const MEDIAN_FACTOR: f64 = 1.253;
 /// Deviations of a median that are taken for noise.
 const NOISE_DEVIATIONS: f64 = 3.0;
 
-/// Detects parallax of the points of a caller's own tracker.
+/// Detects parallax of patches, or of the points of a caller's own tracker.
 ///
-/// Each is too noisy to tell half a pixel by itself, but all of them move together: the image shifts, turns or grows. So the
+/// Each may be too noisy to tell half a pixel by itself, but all of them move together: the image shifts, turns or grows. So the
 /// test is on the median of their shifts to the right, downwards, outwards and around.
 #[derive(Debug, Clone)]
 pub(super) struct ParallaxCheck {
