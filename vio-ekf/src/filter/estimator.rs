@@ -209,22 +209,30 @@ impl Estimator {
         self.covariance.reset_row(error_state::TIME_OFFSET, jitter * jitter);
     }
 
-    /// Inflates the covariance of all bearings, rad² per axis.
-    pub(crate) fn inflate_bearings(&mut self, variance: f64) {
-        for row in (self.state.head()..self.covariance.size()).step_by(error_state::LANDMARK_SIZE) {
+    /// Inflates the covariance of all bearings, rad² per axis, by the rate at which the direction changes in which each point is
+    /// seen, rad/s.
+    pub(crate) fn inflate_bearings(&mut self, variance: impl Fn(f64) -> f64) {
+        let velocity = self.camera_velocity();
+        for (slot, landmark) in self.state.landmarks.iter().enumerate() {
+            let across = landmark.bearing.direction().cross(&velocity).norm();
+            let (row, variance) = (self.state.landmark_row(slot), variance(across * landmark.inverse_distance.value));
             self.covariance.inflate(row, variance);
             self.covariance.inflate(row + 1, variance);
         }
     }
 
+    /// Velocity of the camera in its own axes, m/s.
+    fn camera_velocity(&self) -> Vector3<f64> {
+        let state = &self.state;
+        state.camera_attitude.inverse() * (state.core.velocity + self.rate.cross(&state.camera_position))
+    }
+
     /// Velocity of a landmark's bearing in tangent coordinates, rad/s: `Nᵀ(−ω_c − ρ μ × v_c)`.
     pub(crate) fn bearing_rate(&self, landmark: &Landmark) -> Vector2<f64> {
-        let state = &self.state;
-        let camera_from_body = state.camera_attitude.inverse();
-        let rate = camera_from_body * self.rate;
-        let velocity = camera_from_body * (state.core.velocity + self.rate.cross(&state.camera_position));
+        let rate = self.state.camera_attitude.inverse() * self.rate;
         let direction = landmark.bearing.direction();
-        landmark.bearing.basis().transpose() * (-rate - direction.cross(&velocity) * landmark.inverse_distance.value)
+        let across = direction.cross(&self.camera_velocity());
+        landmark.bearing.basis().transpose() * (-rate - across * landmark.inverse_distance.value)
     }
 
     /// The estimate now, with covariance.

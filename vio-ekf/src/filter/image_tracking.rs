@@ -57,6 +57,7 @@ pub(crate) fn align_and_update(
                 track.failures = 0;
             }
             PatchUpdate::OutOfView => track.in_view = false,
+            PatchUpdate::Changed => track.failures += 1,
             PatchUpdate::Failed => {
                 report.rejected += 1;
                 track.failures += 1;
@@ -70,6 +71,8 @@ pub(crate) fn align_and_update(
 enum PatchUpdate {
     OutOfView,
     Failed,
+    /// Nothing, and contradicts nothing.
+    Changed,
     Used,
 }
 
@@ -84,6 +87,7 @@ fn update_with_patch<const C: usize>(
     match align_patch::<C>(estimator, slot, time_offset_error, (patch, pyramid), camera, settings) {
         PatchAlignment::Converged(measurement) if estimator.update_in_series(&measurement) => PatchUpdate::Used,
         PatchAlignment::OutOfView => PatchUpdate::OutOfView,
+        PatchAlignment::Changed => PatchUpdate::Changed,
         _ => PatchUpdate::Failed,
     }
 }

@@ -103,10 +103,11 @@ impl TrackingState {
         }
     }
 
-    /// Process noise of the templates over some seconds.
+    /// Process noise of the templates over some seconds: with time, and with the angle by which the point is seen from elsewhere.
     pub(crate) fn drift_templates(&mut self, camera: &dyn CameraModel, settings: &PatchSettings, elapsed: f64) {
-        let drift = settings.template_drift / camera.focal_length();
-        self.estimator.inflate_bearings(drift * drift * elapsed);
+        let square = |pixels: f64| (pixels / camera.focal_length()).powi(2);
+        let (by_time, by_angle) = (square(settings.template_drift) * elapsed, square(settings.template_parallax));
+        self.estimator.inflate_bearings(|parallax| by_time + by_angle * parallax * elapsed);
     }
 
     /// Drops a landmark; the last one takes its slot.

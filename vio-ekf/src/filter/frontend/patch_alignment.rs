@@ -23,6 +23,8 @@ const GUESS_SPACING: f64 = 1.0;
 const MAX_GUESSES: i32 = 12;
 /// Iterations on the coarsest level alone.
 const COARSE_ITERATIONS: usize = 4;
+/// Of a patch of which more than this share of the energy remains as residual, what is seen is something else.
+const ELSEWHERE: f64 = 0.7;
 
 /// Outcome of an alignment.
 pub(crate) enum PatchAlignment<const C: usize> {
@@ -30,6 +32,8 @@ pub(crate) enum PatchAlignment<const C: usize> {
     OutOfView,
     /// Nothing there fits.
     Failed,
+    /// The patch is where it is expected, and looks too different to tell where exactly: blurred, or seen from elsewhere.
+    Changed,
     /// The measurement at the solution.
     Converged(LinearizedMeasurement<2, C>),
 }
@@ -80,11 +84,13 @@ pub(crate) fn align_patch<const C: usize>(
     let (Some(linearized), Some(comparison)) = (linearized, measurement.last_comparison.get()) else {
         return PatchAlignment::Failed;
     };
-    let similar = comparison.residual <= settings.patches.max_residual_ratio * comparison.energy;
-    if passes_gate(estimator, &linearized, settings.update.max_mahalanobis) && similar {
-        PatchAlignment::Converged(linearized)
-    } else {
+    let ratio = comparison.residual / comparison.energy;
+    if ratio > ELSEWHERE || !passes_gate(estimator, &linearized, settings.update.max_mahalanobis) {
         PatchAlignment::Failed
+    } else if ratio > settings.patches.max_residual_ratio {
+        PatchAlignment::Changed
+    } else {
+        PatchAlignment::Converged(linearized)
     }
 }
 

@@ -17,6 +17,9 @@ pub struct PatchSettings {
     /// Random walk of the point that a patch stands for, pixels/√s: seen from elsewhere, a slanted or rough surface no longer
     /// agrees with the template, in a way that lasts; ours.
     pub template_drift: f64,
+    /// The same by the angle between the directions in which the point is seen, pixels/√rad: what a slanted or rough surface
+    /// no longer agrees in grows with that; ours.
+    pub template_parallax: f64,
     /// Largest share of a patch's energy (squared contrast) that may remain as residual; ours.
     pub max_residual_ratio: f64,
     /// Threshold of the FAST corner test, grey levels; 5 as in ROVIO.
@@ -40,6 +43,7 @@ impl Default for PatchSettings {
             intensity_sigma: 2.0,
             pixel_sigma: 0.1,
             template_drift: 0.15,
+            template_parallax: 0.5,
             max_residual_ratio: 0.4,
             fast_threshold: 5,
             min_score: 0.5,
@@ -67,6 +71,7 @@ impl PatchSettings {
         all_not_negative(&[
             ("patches.pixel_sigma", self.pixel_sigma),
             ("template_drift", self.template_drift),
+            ("template_parallax", self.template_parallax),
             ("min_score", self.min_score),
             ("start_detection_ratio", self.start_detection_ratio),
             ("min_distance", self.min_distance),

@@ -29,7 +29,7 @@ pub(crate) fn zero_velocity_propagate(estimator: &mut Estimator, now: Stamp, set
 /// Inflates the pose by a small motion, an angle, that was not detected before the body was found to be stationary.
 pub(crate) fn inflate_undetected_motion(estimator: &mut Estimator, angle: f64) {
     let variance = angle * angle;
-    estimator.inflate_bearings(variance);
+    estimator.inflate_bearings(|_| variance);
     for axis in 0..3 {
         estimator.covariance.inflate(error_state::ATTITUDE + axis, variance);
         let position_variance = variance / estimator.state.depth_prior.value.powi(2);

@@ -18,6 +18,9 @@ use super::rng::Rng;
 /// Four recorded flights and two along a wall that is to be painted.
 pub(crate) const SEQUENCES: [&str; 6] = ["MH_01", "MH_03", "MH_04", "V1_02", "paint_1", "paint_2"];
 
+/// Recorded races of drones, at up to 20 m/s.
+pub(crate) const RACES: [&str; 3] = ["indoor_3", "indoor_5", "outdoor_5"];
+
 /// The motion of a sequence; `None` if its recording is absent.
 pub(crate) fn motion(name: &str) -> Option<Spline> {
     let file = match name {
@@ -25,6 +28,9 @@ pub(crate) fn motion(name: &str) -> Option<Spline> {
         "MH_03" => "trajectories/euroc/MH_03_medium.txt.gz",
         "MH_04" => "vio/euroc_imu_gt/MH_04_difficult/groundtruth_MH_04_difficult.csv.gz",
         "V1_02" => "vio/euroc_imu_gt/V1_02_medium/groundtruth_V1_02_medium.csv.gz",
+        "indoor_3" => "trajectories/uzhfpv/indoor_forward_3_snapdragon_with_gt.txt.gz",
+        "indoor_5" => "trajectories/uzhfpv/indoor_forward_5_snapdragon_with_gt.txt.gz",
+        "outdoor_5" => "trajectories/uzhfpv/outdoor_forward_5_snapdragon_with_gt.txt.gz",
         "paint_1" => return Some(painting_flight(1, 60.0).unwrap()),
         _ => return Some(painting_flight(2, 60.0).unwrap()),
     };
