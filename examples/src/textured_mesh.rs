@@ -277,6 +277,16 @@ mod tests {
     }
 
     #[test]
+    fn missing_pixels_take_the_mean_of_their_neighbours() {
+        let mut pixels = vec![None; 40 * 30];
+        (pixels[10 * 40 + 5], pixels[12 * 40 + 5]) = (Some([100, 0, 0]), Some([200, 0, 80]));
+        let picture = with_gutter(40, 30, pixels);
+        assert_eq!(picture.get_pixel(5, 11).0, [150, 0, 40]);
+        assert_eq!((picture.get_pixel(4, 9).0, picture.get_pixel(6, 13).0), ([100, 0, 0], [200, 0, 80]));
+        assert_eq!(picture.get_pixel(39, 29).0, [255; 3]);
+    }
+
+    #[test]
     fn the_files_hold_mesh_coordinates_and_picture() {
         let folder = std::env::temp_dir().join(format!("paintcopter-textured-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();

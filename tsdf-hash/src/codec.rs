@@ -307,7 +307,7 @@ fn read_bits(input: &mut &[u8], count: usize) -> Option<u128> {
 
 #[cfg(test)]
 mod tests {
-    use super::{MAX_BYTES, decode_add, encode};
+    use super::{MAX_BYTES, decode_add, decode_block, encode, encode_block};
     use crate::blocks::voxel_block::{ONE, VOXELS, VoxelBlock};
     use crate::hashing::mix64;
 
@@ -317,6 +317,9 @@ mod tests {
         let mut back = VoxelBlock::ZERO;
         assert!(decode_add(&bytes, &mut back).is_some() && back == *block);
         assert!(bytes.len() <= MAX_BYTES);
+        let mut sent = vec![7];
+        encode_block(block, &mut sent);
+        assert!(sent[0] == 7 && sent[1..] == bytes && decode_block(&sent[1..]).as_ref() == Some(block));
         // Added to something else, and cut short.
         let mut twice = block.clone();
         assert!(decode_add(&bytes, &mut twice).is_some());

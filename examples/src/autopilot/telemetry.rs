@@ -212,7 +212,7 @@ mod tests {
     use super::super::codec::{Decoder, Encoder};
     use super::super::offboard::{OffboardLink, OffboardSettings};
     use super::*;
-    use mavlink::dialects::common::ATTITUDE_QUATERNION_DATA;
+    use mavlink::dialects::common::{ATTITUDE_QUATERNION_DATA, ESTIMATOR_STATUS_DATA};
     use paint_planner::onboard::{Cause, FailsafeSettings};
 
     #[test]
@@ -229,6 +229,30 @@ mod tests {
         assert!(!trusted && (distance - 0.5).abs() < 1e-12 && (angle - 0.25).abs() < 1e-12, "{watched:?}");
         assert!(!watched.follows && telemetry.watched(None).pose.is_none());
         assert!(Telemetry { mode: Some(Mode::Offboard), ..telemetry }.watched(None).follows);
+    }
+
+    #[test]
+    fn an_estimate_must_have_all_of_its_parts() {
+        let parts = [
+            EstimatorStatusFlags::ESTIMATOR_ATTITUDE,
+            EstimatorStatusFlags::ESTIMATOR_VELOCITY_HORIZ,
+            EstimatorStatusFlags::ESTIMATOR_VELOCITY_VERT,
+            EstimatorStatusFlags::ESTIMATOR_POS_HORIZ_REL,
+            EstimatorStatusFlags::ESTIMATOR_POS_VERT_ABS,
+        ];
+        let all = parts.iter().fold(EstimatorStatusFlags::empty(), |all, part| all | *part);
+        let told = |flags: EstimatorStatusFlags| {
+            let (mut telemetry, header) =
+                (Telemetry::default(), MavHeader { system_id: 1, component_id: 1, sequence: 0 });
+            let autopilot = HEARTBEAT_DATA { autopilot: MavAutopilot::MAV_AUTOPILOT_PX4, ..HEARTBEAT_DATA::default() };
+            let status = ESTIMATOR_STATUS_DATA { flags, ..ESTIMATOR_STATUS_DATA::default() };
+            for message in [MavMessage::HEARTBEAT(autopilot), MavMessage::ESTIMATOR_STATUS(status)] {
+                telemetry.receive(1.0, &header, &message);
+            }
+            telemetry.estimator
+        };
+        assert_eq!(told(all), Some(true));
+        assert!(parts.iter().all(|part| told(all - *part) == Some(false)));
     }
 
     /// Restart and jump, from the messages themselves.

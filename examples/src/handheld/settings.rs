@@ -77,3 +77,14 @@ impl HandheldSettings {
         Ok(Droplets::new(&self.spray, self.density_rays, 0)?)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_flux_is_the_papers_where_that_is_asked_for() {
+        let flux = |paper_literal| HandheldSettings { paper_literal, ..HandheldSettings::default() }.flux();
+        assert!(matches!((flux(true), flux(false)), (Flux::PaperLiteral, Flux::Physical)));
+    }
+}

@@ -85,3 +85,22 @@ fn existing(folder: &Path, named: &str) -> Result<PathBuf, String> {
     let candidates = [folder.join(&slashed), folder.join(last)];
     candidates.into_iter().find(|file| !last.is_empty() && file.is_file()).ok_or_else(|| format!("\"{named}\""))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::file_name;
+
+    #[test]
+    fn a_file_comes_after_the_options_and_their_arguments() {
+        for (line, file, noted) in [
+            ("brick wall.png", "brick wall.png", 0),
+            ("-blendu on brick wall.png", "brick wall.png", 0),
+            ("-mm 0.1 0.9 brick.png", "brick.png", 0),
+            ("-s 2 2 brick.png", "brick.png", 1),
+            ("-s 2 2 2 -o 1 \"brick.png\"", "brick.png", 2),
+        ] {
+            let mut notes = Vec::new();
+            assert_eq!((file_name(line, &mut notes), notes.len()), (file, noted), "{line}");
+        }
+    }
+}

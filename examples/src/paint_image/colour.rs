@@ -197,3 +197,23 @@ pub fn save_colours(
     let show = |depths: &[f64]| palette.colour(depths).map(byte);
     save_progress_strip(&folder.join("progress.png"), rgb(wanted), &paints, &job.kernel, &show)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of 100 pixels 10 are black where white is wanted: 100 CIEDE2000 each, and a squared error of one in each channel.
+    #[test]
+    fn pictures_are_compared_pixel_by_pixel() {
+        let picture = |black: usize| {
+            let pixels = (0..100).map(|k| if k < black { [0.0; 3] } else { [1.0; 3] }).collect();
+            ColourImage::new(10, 10, pixels).unwrap()
+        };
+        let (psnr, mean, p95) = compare_colours(&picture(10), &picture(0));
+        assert!((psnr - 10.0).abs() < 1e-9, "{psnr}");
+        assert!((mean - 10.0).abs() < 0.01 && (p95 - 100.0).abs() < 0.1, "{mean} {p95}");
+        let (psnr, mean, p95) = compare_colours(&picture(3), &picture(3));
+        assert!(psnr > 190.0 && mean == 0.0 && p95 == 0.0, "{psnr} {mean} {p95}");
+        assert_eq!(compare_colours(&picture(3), &picture(0)).2, 0.0);
+    }
+}

@@ -98,3 +98,23 @@ pub(crate) fn point(p: impl Into<[f64; 3]>) -> foxglove::messages::Point3 {
     let [x, y, z] = p.into();
     foxglove::messages::Point3 { x, y, z }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_trace_has_the_paints_colour_and_is_as_opaque_as_the_flow() {
+        let style = PaintStyle { width: 0.1, max_flow: 2.0, colour: [255, 51, 0] };
+        let mut traces = PaintTraces::new(style);
+        for (time, flow) in [(0.0, 2.0), (1.0, 1.0), (2.0, 0.02)] {
+            assert!(traces.push(time, Some(Point3::new(time, 0.0, 0.0)), flow).is_none());
+        }
+        let update = traces.push(3.0, None, 0.0).unwrap();
+        let line = &update.entities[0].lines[0];
+        let colours: Vec<[f64; 4]> = line.colors.iter().map(|c| [c.r, c.g, c.b, c.a]).collect();
+        assert_eq!(colours, [1.0, 0.5, 0.05].map(|a| [1.0, 0.2, 0.0, a]));
+        assert_eq!((line.points.len(), line.thickness), (3, 0.1));
+        assert!(traces.take().is_none());
+    }
+}

@@ -299,3 +299,21 @@ fn bayer_colour(pixels: &RawPixels) -> Result<Colour, String> {
     }
     Ok(Colour { width, height, rgb8 })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_shows_colour_at_the_size_of_the_depth_and_depth_where_there_is_none() {
+        let depth = Depths::Units(vec![0, 1000, 2000, 4000, 1000, 0, 4000, 2000]);
+        let rgb8 = [[10, 11, 12], [20, 21, 22]].concat();
+        let colour = Some(Colour { width: 2, height: 1, rgb8 });
+        let mut images = Images { width: 4, height: 2, depth, colour, colour_fault: None };
+        let [left, right] = [[10, 11, 12], [20, 21, 22]];
+        assert_eq!(images.picture().data, [left, left, right, right, left, left, right, right].concat());
+        images.colour = None;
+        let greys: Vec<u8> = images.picture().data.chunks(3).map(|pixel| pixel[0]).collect();
+        assert_eq!(greys, [0, 255, 127, 63, 255, 0, 63, 127]);
+    }
+}

@@ -88,3 +88,21 @@ fn reason(outcome: &TrackingOutcome) -> String {
         TrackingStatus::Tracked => "it is not".into(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_that_nothing_fixes_are_counted() {
+        let outcome = FrameOutcome {
+            frame: 7,
+            world_from_camera: None,
+            tracking: None,
+            events: Vec::new(),
+            tracking_seconds: None,
+        };
+        let said = line(&Event::Degenerate { directions: 3 }, &outcome, |frame| format!("frame {frame}")).unwrap();
+        assert!(said.starts_with("warning: frame 7: 3 of 6 directions of the pose are not fixed"), "{said}");
+    }
+}

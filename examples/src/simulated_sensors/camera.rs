@@ -194,6 +194,13 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_distance_is_the_middle_one_of_what_is_there() {
+        let distance = |depth: &[f32]| SimulatedImage { grey: Vec::new(), depth: depth.to_vec() }.distance();
+        assert_eq!(distance(&[0.0, 3.0, 0.0, 1.5, 9.0]), Some(3.0));
+        assert_eq!(distance(&[0.0, 0.0]), None);
+    }
+
+    #[test]
     fn the_camera_looks_ahead_with_the_sky_above() {
         let camera = camera();
         let see = |point_in_body: Point3<f64>| {

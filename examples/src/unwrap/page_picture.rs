@@ -100,3 +100,20 @@ fn bilinear(picture: &image::RgbImage, [u, v]: [f64; 2], linear: &[f32]) -> [f32
     let [a, b, c, d] = [pixel(0.0, 0.0), pixel(1.0, 0.0), pixel(0.0, 1.0), pixel(1.0, 1.0)];
     [0, 1, 2].map(|k| (1.0 - ty) * ((1.0 - tx) * a[k] + tx * b[k]) + ty * ((1.0 - tx) * c[k] + tx * d[k]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{COLOURS, DARKER, shade};
+
+    #[test]
+    fn stretch_is_shown_between_three_colours() {
+        let bytes = |colour: [f64; 3], light: f64| colour.map(|c| (light * c) as u8);
+        let bounds = [1.1, 1.5];
+        assert_eq!(shade(1.0, bounds, false), bytes(COLOURS[0], 1.0));
+        assert_eq!(shade(1.1, bounds, true), bytes(COLOURS[1], DARKER));
+        assert_eq!([1.5, 9.0].map(|stretch| shade(stretch, bounds, false)), [bytes(COLOURS[2], 1.0); 2]);
+        let between = shade(1.3, bounds, false);
+        let middle = [0, 1, 2].map(|c| 0.5 * (COLOURS[1][c] + COLOURS[2][c]));
+        assert!((0..3).all(|c| (f64::from(between[c]) - middle[c]).abs() <= 1.0), "{between:?} {middle:?}");
+    }
+}

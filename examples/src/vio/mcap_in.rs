@@ -335,3 +335,22 @@ fn usual_rate(samples: &[Imu]) -> f64 {
     times.sort_unstable_by(f64::total_cmp);
     times.get(times.len() / 2).filter(|time| **time > 0.0).map_or(200.0, |time| time.recip())
 }
+
+#[cfg(test)]
+mod tests {
+    use vio_ekf::nalgebra::Vector3;
+
+    use super::*;
+
+    #[test]
+    fn the_usual_rate_is_that_of_most_samples() {
+        let sample = |millis: i64| Imu {
+            stamp: Stamp::from_nanos(1_000_000 * millis),
+            gyro: Vector3::zeros(),
+            accel: Vector3::zeros(),
+        };
+        let samples: Vec<Imu> = [0, 4, 8, 12, 112, 116].map(sample).to_vec();
+        assert!((usual_rate(&samples) - 250.0).abs() < 1e-9);
+        assert_eq!([usual_rate(&samples[..1]), usual_rate(&[])], [200.0; 2]);
+    }
+}

@@ -196,6 +196,10 @@ fn bounds_hold_and_what_does_not_count_pulls_at_nothing() {
         assert!((volumes[0][5] - expected).abs() < 0.05, "{lab:?}: {volumes:?}");
     }
     let (wanted, footprints) = ([[50.0, 0.0, 0.0]; 20], [spots.as_slice(); 3]);
+    for [min_volume, max_volume] in [[-0.1, 2.0], [2.0, 2.0], [0.0, f64::INFINITY], [f64::NAN, 2.0]] {
+        let fit = ColourFit { min_volume, max_volume, ..fit(&model, &wanted, &[1.0; 20], &footprints) };
+        assert!(fit.solve(&mut vec![vec![1.0; 10]; 3], &mut |_| ()).is_err(), "{min_volume} to {max_volume}");
+    }
     let mut volumes = vec![vec![1.0; 10]; 3];
     fit(&model, &wanted, &[0.0; 20], &footprints).solve(&mut volumes, &mut |_| ()).unwrap();
     assert_eq!(volumes, vec![vec![1.0; 10]; 3]);

@@ -41,6 +41,10 @@ fn it_falls_freely_and_ends_at_terminal_speed() {
 
 #[test]
 fn four_and_six_rotors_hover_at_their_weight() {
+    let [four, six] = [MultirotorSettings::default(), MultirotorSettings::hexarotor()].map(|settings| settings.rotors);
+    assert_eq!((four.len(), six.len()), (4, 6));
+    let [of_four, of_six] = [four, six].map(|rotors| rotors.iter().map(|r| r.max_thrust).sum::<f64>());
+    assert!((of_four - of_six).abs() < 1e-9);
     for settings in
         [without_drag(), MultirotorSettings { rotor_drag: [0.0; 3], body_drag: 0.0, ..MultirotorSettings::hexarotor() }]
     {
@@ -250,6 +254,8 @@ fn sensors_without_noise_measure_the_motion() {
     assert!((barometer.measure(0.0).pressure - 101_325.0).abs() < 1e-9);
     let high = barometer.measure(1000.0);
     assert!((high.pressure - 89_874.6).abs() < 1.0 && (high.height - 1000.0).abs() < 1e-6);
+    // The same table: 8.5 degrees there.
+    assert!((high.temperature - 8.5).abs() < 1e-9);
 
     let mut compass =
         Magnetometer::new(MagnetometerSettings { noise: 0.0, ..MagnetometerSettings::default() }, 1).unwrap();

@@ -37,3 +37,16 @@ impl BlockHistory {
         self.frames = self.frames.saturating_sub(1);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::BlockHistory;
+
+    #[test]
+    fn two_copies_have_the_frames_of_both_and_the_latest_of_all_else() {
+        let one = BlockHistory { last_update: 3.0, frames: 5, call: 2, stamp: 40 };
+        let other = BlockHistory { last_update: 2.0, frames: 7, call: 9, stamp: 30 };
+        let merged = BlockHistory { last_update: 3.0, frames: 12, call: 9, stamp: 40 };
+        assert_eq!([one.merged(other), other.merged(one)], [merged; 2]);
+    }
+}

@@ -118,6 +118,7 @@ mod tests {
             ),
         ];
         let mut memory = FrameMemory::new();
+        assert!(memory.is_empty());
         let frames = frames.map(|(depth, colour)| FrameImages { width: 40, height: 30, depth, intrinsics, colour });
         for (k, images) in frames.iter().enumerate() {
             memory.store(10 * k, &images.depth(), images.colour().as_ref());
@@ -126,6 +127,6 @@ mod tests {
             assert_eq!(memory.read(10 * k).unwrap(), *images, "{k}");
         }
         memory.discard(10);
-        assert_eq!((memory.len(), memory.read(10).is_err()), (2, true));
+        assert_eq!((memory.len(), memory.is_empty(), memory.read(10).is_err()), (2, false, true));
     }
 }

@@ -96,3 +96,16 @@ fn weighted_percentile(sorted: &[(f64, f64)], share: f64) -> f64 {
     }
     sorted.last().map_or(0.0, |last| last.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::weighted_percentile;
+
+    #[test]
+    fn a_percentile_is_where_the_weights_reach_their_share() {
+        let sorted = [(1.0, 2.0), (2.0, 1.0), (5.0, 1.0)];
+        let found = [0.0, 2.0, 2.5, 3.5, 9.0].map(|share| weighted_percentile(&sorted, share));
+        assert_eq!(found, [1.0, 1.0, 2.0, 5.0, 5.0]);
+        assert_eq!(weighted_percentile(&[], 1.0), 0.0);
+    }
+}

@@ -96,11 +96,12 @@ fn texels_share_the_surface_among_them() {
                 assert!((chart.point(expected) - chart.point(at)).norm() < 1e-9);
             }
             assert_eq!(map.texel_of_uv(centre), Some([column, row]));
+            assert_eq!(map.at(column, row), Some(at));
         }
     }
     let map = TexelMap::new(&chart, 0.1).unwrap();
     assert_eq!(map.texel_of_uv([-0.01, 0.1]), None);
-    assert_eq!(map.at(map.width, 0), None);
+    assert_eq!((map.at(map.width, 0), map.at(0, map.height)), (None, None));
     assert_eq!(
         TexelMap::new(&chart, 0.0).unwrap_err(),
         Error::Setting { name: "texel_m", value: 0.0, must_be: "positive" }
