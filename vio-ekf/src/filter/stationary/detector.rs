@@ -178,8 +178,9 @@ impl StationaryDetector {
             self.images_stationary = false;
             return;
         };
-        (self.images_stationary, self.tolerance) = (stationary, tolerance);
-        self.watched_s = self.parallax_check.age(now);
+        (self.watched_s, self.tolerance) = (self.parallax_check.age(now), tolerance);
+        // Two images between the same samples tell nothing of time.
+        self.images_stationary = stationary && self.watched_s > 0.0;
         if !stationary {
             // From here on something else is seen. What the inertial samples have read so far is no rest if it would count as one.
             self.reference.take_if(|reference| now.secs_since(reference.stamp) >= self.settings.min_duration_s);
