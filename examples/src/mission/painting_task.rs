@@ -282,3 +282,26 @@ fn describe(surface: &PaintSurface) -> String {
     }
     text
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_grows_with_the_square_of_finer_texels() {
+        let wall = TriangleMesh {
+            positions: vec![[0.0, 0.0, 0.0], [0.0, 10.0, 0.0], [0.0, 10.0, 10.0], [0.0, 0.0, 10.0]],
+            faces: vec![[0, 1, 2], [0, 2, 3]],
+            ..TriangleMesh::default()
+        };
+        let usual_gib = 100.0 * BYTES_PER_SQUARE_METRE / f64::from(1 << 30);
+        let fits = |texel: f64, share: f64| {
+            let settings = MissionSettings { texel, memory_gib: share * usual_gib, ..MissionSettings::default() };
+            check_memory(&wall, &settings).is_ok()
+        };
+        for (coarser, share) in [(1.0, 1.0), (0.5, 4.0), (0.25, 16.0), (2.0, 0.5)] {
+            let texel = coarser * USUAL_TEXEL;
+            assert!(fits(texel, 1.01 * share) && !fits(texel, 0.99 * share), "{coarser}");
+        }
+    }
+}

@@ -97,3 +97,35 @@ pub(super) fn missing_ink(problem: &PaintProblem, grid: &PaintGrid) -> Vec<f64> 
     let wanted = problem.reference.data().iter().enumerate();
     wanted.zip(there).map(|((k, ink), there)| if problem.weight(k) > 0.0 { ink - there } else { 0.0 }).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Image;
+
+    /// The derivative against differences of the cost, with ink that is missing, too much, and above a ceiling.
+    #[test]
+    fn the_derivative_is_that_of_the_cost() {
+        let image = |values: [f64; 4]| Image::new(4, 1, values.to_vec()).unwrap();
+        let reference = image([0.2, 0.6, 0.1, 0.9]);
+        let (weight, missing, ceiling) = (image([1.0, 0.5, 2.0, 1.0]), image([3.0; 4]), image([0.9, 0.9, 0.3, 1.0]));
+        let problem =
+            PaintProblem::new(&reference).with_weight(&weight).with_missing_weight(&missing).with_ceiling(&ceiling);
+        let depths = [0.5, 0.3, 0.6, 0.2];
+        let cost = |depths: [f64; 4]| ink_cost(&problem, problem.saturation, &mut { depths });
+        let mut derivative = depths;
+        ink_cost(&problem, problem.saturation, &mut derivative);
+        for k in 0..4 {
+            let moved = |by: f64| {
+                let mut depths = depths;
+                depths[k] += by;
+                cost(depths)
+            };
+            let difference = (moved(1e-6) - moved(-1e-6)) / 2e-6;
+            assert!(
+                (derivative[k] - difference).abs() < 1e-6 * difference.abs().max(1.0),
+                "{k}: {derivative:?} {difference}"
+            );
+        }
+    }
+}

@@ -124,6 +124,20 @@ mod tests {
         GreyImage { width, height, pixels: (0..width * height).map(|k| grey(k % width, k / width)).collect() }
     }
 
+    /// Wherever an arc begins, bright or dark; what differs besides does not hide it.
+    #[test]
+    fn a_corner_counts_what_its_circle_differs_by() {
+        let circle: [isize; 16] = std::array::from_fn(|k| k as isize + 1);
+        for (start, length, sign) in (0..16).flat_map(|s| [(s, 9, 1), (s, 9, -1), (s, 8, 1), (s, 13, -1)]) {
+            let mut pixels = vec![100_u8; 17];
+            for k in 0..length {
+                pixels[1 + (start + k) % 16] = (100 + sign * (THRESHOLD + 10)) as u8;
+            }
+            let expected = if length < 9 { 0 } else { 10 * length as i32 };
+            assert_eq!(score(&pixels, 0, &circle), expected, "{start} {length} {sign}");
+        }
+    }
+
     #[test]
     fn arcs_of_nine_are_found_wherever_they_begin() {
         for start in 0..16 {

@@ -249,3 +249,21 @@ impl ImuPair {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of N readings without a walk the mean has a variance of white noise over N time steps, beside the prior's.
+    #[test]
+    fn the_difference_of_biases_is_the_mean_of_the_readings() {
+        let (first, second) = (Vector3::new(0.3, -0.1, 0.2), Vector3::new(0.1, 0.1, 0.1));
+        let mut difference = BiasDifference::new([0.02, 0.01], [0.0; 2], 0.4);
+        for _ in 0..50 {
+            difference.update(&first, &second, 0.005);
+        }
+        let (prior, data) = (0.4_f64.powi(-2), 50.0 * 0.005 / (0.02_f64.powi(2) + 0.01_f64.powi(2)));
+        assert!((difference.variance * (prior + data) - 1.0).abs() < 1e-9);
+        assert!((difference.mean - (first - second) * (data / (prior + data))).norm() < 1e-12);
+    }
+}

@@ -195,3 +195,22 @@ fn least_squares(equations: &SMatrix<f64, TERMS, TERMS>, reading: &AxesReading, 
     }
     cost(&x)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stamp::Stamp;
+
+    #[test]
+    fn windows_hold_twelve_images_that_are_far_enough_apart() {
+        let at = |k: i64| SeenImage { stamp: Stamp::from_nanos(50_000_000 * k), points: Vec::new() };
+        let images: Vec<SeenImage> = (0..100).map(at).collect();
+        let found = windows(&images, 0.15);
+        // Every third image, and the last of a window is the first of the next.
+        assert_eq!(found.len(), 3);
+        for (k, window) in found.iter().enumerate() {
+            let expected: Vec<Stamp> = (0..12).map(|j| images[3 * (11 * k + j)].stamp).collect();
+            assert_eq!(window.iter().map(|image| image.stamp).collect::<Vec<_>>(), expected);
+        }
+    }
+}

@@ -129,3 +129,22 @@ pub(super) fn choose_imu(mut topics: Vec<ImuTopic>, named: Option<&str>) -> Resu
         None => Ok((chosen, topics.iter().map(ImuTopic::describe).collect())),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use vio_ekf::nalgebra::Vector3;
+
+    use super::*;
+
+    #[test]
+    fn a_topic_with_one_half_of_the_sensor_is_told_apart() {
+        let topic = |gyro: f64, accel: f64| {
+            let stamp = vio_ekf::Stamp::from_nanos(0);
+            let sample = Imu { stamp, gyro: Vector3::x() * gyro, accel: Vector3::z() * accel };
+            ImuTopic { samples: vec![sample], ..ImuTopic::new("imu") }
+        };
+        let found = [(0.1, 9.8), (0.1, 0.0), (0.0, 9.8), (0.0, 0.0)].map(|(gyro, accel)| topic(gyro, accel).has_both());
+        assert_eq!(found, [true, false, false, false]);
+        assert!(topic(0.1, 0.0).describe().ends_with("(1 samples, one half only)"));
+    }
+}

@@ -184,6 +184,15 @@ mod tests {
     }
 
     #[test]
+    fn a_run_goes_on_over_a_gap_that_is_short_enough() {
+        let with_gap = |gap: f64| runs([0.0, 20.0], 1.0, 4.0, |at| at <= 5.0 || at >= 5.0 + gap);
+        // The sprays beside the gap lie half a spacing inside: it counts as longer by one.
+        assert_eq!([2.0, 3.0, 3.5, 6.0].map(|gap| with_gap(gap).len()), [1, 1, 2, 2]);
+        let ends: Vec<[f64; 2]> = with_gap(6.0).iter().map(|run| [run.start, run.end]).collect();
+        assert_eq!(ends, [[0.0, 5.0], [11.0, 20.0]]);
+    }
+
+    #[test]
     fn a_rectangle_is_one_cell_along_its_long_side() {
         let region = mask(40, 90, |x, y| (5.0..35.0).contains(&x) && (5.0..85.0).contains(&y));
         let found = cells(&region, 40, 4.0, 2.0, 8.0);
