@@ -7,14 +7,14 @@ use crate::error::all_not_negative;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct StationarySettings {
-    /// Least time without motion, s; 1 as in ROVIO. Infinite to switch all of it off.
+    /// Least time without motion, s; 1 as in ROVIO. Images must confirm its second half. Infinite to switch all of it off.
     pub min_duration_s: f64,
     /// Largest change of a rate, averaged over a tenth of a second, since the stationary period began, rad/s; ours (ROVIO limits
     /// the rate itself, to 0.1).
     pub max_rate_change: f64,
     /// Largest change of a specific force, averaged likewise, m/s²; 0.5 as in ROVIO.
     pub max_force_change: f64,
-    /// Largest parallax since the stationary period began, pixels; ours. Half of it is taken as the standard deviation of
+    /// Largest parallax since images are compared, pixels, in the median of patches or points; ours. Half of it is taken as the standard deviation of
     /// undetected motion, in the pose and in the mean rate.
     pub max_parallax_px: f64,
     /// Motion is detected some time after it began. What the body was doing this long ago is certain, s; ours. A stationary period
