@@ -230,3 +230,25 @@ fn slow_down(slowdown: &mut [f64], knots: &[usize], ratios: &[f64]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point3;
+
+    /// A millimetre and 0.08 rad from point to point, to either side: a knot where more than 0.3 rad have come together.
+    #[test]
+    fn a_bend_has_knots_where_its_turn_asks_for_them() {
+        for side in [1.0, -1.0] {
+            let point = |i: usize| {
+                let position = Point3::new(0.0, 1e-3 * i as f64, 1.0);
+                let state = VehicleState { position, heading: side * 0.08 * i as f64, pan: 0.0, tilt: 0.0 };
+                RoutePoint { state, target: Some(i), rest: false }
+            };
+            let route: Vec<RoutePoint> = (0..=20).map(point).collect();
+            let settings = TimingSettings::default();
+            assert_eq!(first_knots(&route, &settings, false), [0, 4, 8, 12, 16, 20]);
+            assert_eq!(first_knots(&route, &settings, true).len(), 21);
+        }
+    }
+}

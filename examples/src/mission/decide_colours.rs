@@ -117,3 +117,33 @@ fn means(footprints: &[SurfaceFootprint], depths: &[f64], settings: &MissionSett
     };
     footprints.iter().map(mean).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::Design;
+    use crate::mesh_io::TriangleMesh;
+    use crate::region::Scene;
+
+    /// Every texel of a wall lies in the cell of a spray: half a spacing along the row, half the rows' spacing across it.
+    #[test]
+    fn cells_cover_the_wall_from_its_border_on() {
+        let corner = |k: u32| [0.0, 0.5 - 0.25 * (k % 5) as f32, 1.0 + 0.25 * (k / 5) as f32];
+        let quad = |a: u32| [[a, a + 1, a + 6], [a, a + 6, a + 5]];
+        let faces = (0..16).flat_map(|k| quad(5 * (k / 4) + k % 4)).collect();
+        let mesh = TriangleMesh { positions: (0..25).map(corner).collect(), faces, ..TriangleMesh::default() };
+        let mut settings = MissionSettings::default();
+        (settings.limits.spray_spacing, settings.limits.row_spacing) = (3, 5);
+        let task = PaintingTask::new("wall", &Scene::whole(mesh), &Design::Gradient, settings).unwrap();
+        assert!(task.in_reach.iter().all(|reached| *reached));
+        let strokes = rows_of_cells(&task);
+        let first = strokes[0].sprays[0];
+        assert_eq!((first.x, first.y), (1.0, 2.0));
+        let last = strokes[strokes.len() - 1].sprays.last().unwrap();
+        let (width, height) = (task.surface.width() as f64, task.surface.height() as f64);
+        assert!(width - 1.0 - last.x <= 3.0 && height - 1.0 - last.y <= 5.0, "{last:?} of {width} x {height}");
+        let steps = |k: usize| strokes[k].sprays.windows(2).all(|pair| pair[1].x - pair[0].x == 3.0);
+        assert!((0..strokes.len()).all(steps));
+        assert!(strokes.windows(2).all(|pair| pair[1].sprays[0].y - pair[0].sprays[0].y == 5.0));
+    }
+}

@@ -128,6 +128,17 @@ mod tests {
                 }
             }
         }
+        // The corners of the wall, where texels end.
+        for (face, corners) in (0_u32..).zip(task.surface.disk().faces()) {
+            for (corner, vertex) in corners.iter().enumerate() {
+                let barycentric = [f64::from(u8::from(corner == 1)), f64::from(u8::from(corner == 2))];
+                let texel = texel_at(&task, &Hit { face, barycentric, distance: 1.0, normal: -Vector3::x() }).unwrap();
+                let centre =
+                    task.surface.texels.at(texel % width, texel / width).map(|at| task.surface.chart.point(at));
+                let off = centre.unwrap() - Point3::from(task.surface.disk().positions()[*vertex as usize]);
+                assert!(off.norm() < task.settings.texel, "{vertex}: {off}");
+            }
+        }
         let beside = Hit {
             face: 1000,
             ..paint_sim::Surface::cast(&task.surface.world, &Point3::new(-1.0, 0.0, 1.5), &axis, 2.0).unwrap()

@@ -139,3 +139,29 @@ fn fitted(points: &[Point3<f64>], centre: Vector3<f64>, direction: Vector3<f64>)
 pub(super) fn picture_of(frame: &Frame) -> Rgb {
     Rgb::from_pixels(frame.width as usize, frame.height as usize, frame.colour.iter().copied())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Half of a rectangle's width and height against those of the picture, as seen from before it.
+    #[test]
+    fn a_surface_fills_the_picture_one_way() {
+        let direction = Vector3::new(-1.0, -0.3, 0.2).normalize();
+        for (width, height) in [(4.0, 1.0), (1.0, 3.0), (0.4, 0.1), (60.0, 20.0)] {
+            let centre = Vector3::new(2.0, 1.0, 3.0);
+            let corner = |y: f64, z: f64| Point3::from(centre + Vector3::new(0.0, 0.5 * y * width, 0.5 * z * height));
+            let points = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+            let camera = fitted(&points, centre, direction).unwrap();
+            let seen = points.map(|p| camera.world_from_camera.inverse_transform_point(&p));
+            let share = |tangent: &dyn Fn(&Point3<f64>) -> f64, half: f64| {
+                let (low, high) = seen.iter().map(tangent).fold((f64::MAX, f64::MIN), |(l, h), t| (l.min(t), h.max(t)));
+                // Nothing is cut off, and it stands in the middle.
+                assert!(-low < half && high < half && (low + high).abs() < 0.02 * half, "{width} x {height}");
+                (high - low) / (2.0 * half)
+            };
+            let fill = share(&|p| p.x / p.z, camera.cx / camera.fx).max(share(&|p| p.y / p.z, camera.cy / camera.fy));
+            assert!((fill / FILL - 1.0).abs() < 0.02, "{width} x {height}: {fill}");
+        }
+    }
+}

@@ -123,5 +123,15 @@ mod tests {
         assert!((eight[0] - two[0] - side).abs() < 0.03 * side, "{middles:?}");
         assert!((fourteen[1] - two[1] - side).abs() < 0.03 * side, "{middles:?}");
         assert!((twenty[0] - two[0] - 1.5 * side).abs() < 0.03 * side, "{middles:?}");
+        // The scale goes on evenly from nothing, below, to its ceiling.
+        let height = |share: f64| {
+            let RGBColor(r, g, b) = colour(share);
+            let rows =
+                picture.enumerate_pixels().filter(|(x, _, c)| *x >= right && c.0 == [r, g, b]).map(|(_, y, _)| y);
+            let rows: Vec<f64> = rows.map(f64::from).collect();
+            rows.iter().sum::<f64>() / rows.len() as f64
+        };
+        let [low, middle, high] = [0.1, 0.5, 0.9].map(height);
+        assert!(low - middle > 50.0 && ((low - middle) / (middle - high) - 1.0).abs() < 0.02, "{low} {middle} {high}");
     }
 }

@@ -161,3 +161,36 @@ fn mark(texel: u32, stale: &mut Vec<u32>, marked: &mut [bool]) {
         stale.push(texel);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::world::tests::wall;
+    use super::*;
+    use nalgebra::{Point3, Vector3};
+
+    /// Thick paint hides the wall: what is seen is its reflectance at infinite thickness, `1 + K/S - sqrt((K/S)^2 + 2 K/S)` (Kubelka 1948).
+    #[test]
+    fn thick_paint_has_its_own_colour() {
+        let world = wall(0.0402);
+        for (number, PaletteEntry { paint, .. }) in world.palette.iter().enumerate() {
+            let mut canvas = Canvas::new(&world).unwrap();
+            let (origin, axis) = (Point3::new(-0.3, 0.0, 2.0), Vector3::x_axis());
+            let shots = vec![Shot { origin, axis, volume: 1e-5 }; 100];
+            canvas.spray(number as u8, &shots, &SprayModel::default(), &world.surface.world).unwrap();
+            let patch = canvas.take_patch(&world).unwrap();
+            let thickness = canvas.thickness();
+            let thickest = (0..thickness.len()).max_by(|a, b| thickness[*a].total_cmp(&thickness[*b])).unwrap();
+            let [x, y] =
+                [thickest % canvas.columns - patch.left as usize, thickest / canvas.columns - patch.top as usize];
+            let at = 3 * (y * patch.width as usize + x);
+            let masstone = |k: usize| {
+                let ratio = paint.absorption()[k] / paint.scattering()[k];
+                1.0 + ratio - (ratio * ratio + 2.0 * ratio).sqrt()
+            };
+            let expected = spectrum_srgb8(&std::array::from_fn(masstone)).rgb;
+            for (found, expected) in patch.rgb[at..at + 3].iter().zip(expected) {
+                assert!(found.abs_diff(expected) <= 1, "paint {number}: {:?}", &patch.rgb[at..at + 3]);
+            }
+        }
+    }
+}

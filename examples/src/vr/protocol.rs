@@ -166,24 +166,12 @@ pub(super) fn patch(picture: u8, patch: &Patch) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::settings::VrSettings;
+    use super::super::world::tests::wall;
     use super::*;
-    use crate::mesh_frame::MeshScale;
 
     #[test]
     fn a_surface_is_as_it_is_described() {
-        let folder = std::env::temp_dir().join(format!("paintcopter-protocol-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
-        let mesh = folder.join("wall.obj");
-        std::fs::write(&mesh, "v 0 1 1\nv 0 -1 1\nv 0 -1 2\nv 0 1 2\nf 1 2 3\nf 1 3 4\n").unwrap();
-        let world = VrWorld::new(&VrSettings {
-            mesh: Some(mesh),
-            scale: Some(MeshScale::Factor(1.0)),
-            texel: 0.02,
-            ..VrSettings::default()
-        });
-        std::fs::remove_dir_all(&folder).unwrap();
-        let world = world.unwrap();
+        let world = wall(0.02);
         let bytes = surface(&world);
         let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
         let float = |at: usize| f32::from_bits(word(at));

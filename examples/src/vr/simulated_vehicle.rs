@@ -148,3 +148,49 @@ fn at_rest(state: &VehicleState, world: &VrWorld) -> VehicleView {
         flow: 0.0,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{UnitVector3, Vector3};
+
+    fn sample(time: f64) -> FlightSample {
+        let origin = Point3::origin();
+        FlightSample {
+            time,
+            world_from_body: Isometry3::identity(),
+            velocity: Vector3::zeros(),
+            acceleration: Vector3::zeros(),
+            attitude: [0.0; 3],
+            estimated_position: origin,
+            reference_position: origin,
+            pan_tilt: [0.0; 2],
+            desired_pan_tilt: [0.0; 2],
+            nozzle: origin,
+            axis: UnitVector3::new_unchecked(Vector3::x()),
+            aim: None,
+            hit: None,
+            distance: 1.0,
+            wanted_distance: 1.0,
+            flow: 1e-7,
+            held: false,
+        }
+    }
+
+    /// Every sample passes once: up to the present one, or up to where another flight begins, which has that moment itself.
+    #[test]
+    fn every_sample_of_a_flight_passes_once() {
+        let log = FlightLog { samples: (0..9).map(|k| sample(0.25 * f64::from(k))).collect(), interval: 0.25 };
+        let mut flight = SimulatedFlight { begin: 10.0, end: 12.0, colour: 0, log, landed: 0 };
+        let mut passed = |now: f64, inclusive: bool| {
+            flight.advance(now, inclusive).iter().map(|sample| sample.time).collect::<Vec<_>>()
+        };
+        assert_eq!(passed(9.9, true), [] as [f64; 0]);
+        assert_eq!(passed(10.0, true), [0.0]);
+        assert_eq!(passed(10.6, true), [0.25, 0.5]);
+        assert_eq!(passed(10.6, true), [] as [f64; 0]);
+        assert_eq!(passed(11.0, false), [0.75]);
+        assert_eq!(passed(11.0, true), [1.0]);
+        assert_eq!(passed(13.0, true), [1.25, 1.5, 1.75, 2.0]);
+    }
+}

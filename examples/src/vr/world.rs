@@ -135,9 +135,62 @@ fn beginning(surface: &PaintSurface) -> (VehicleState, Point3<f64>) {
     let facing = surface.facing();
     let front: Vector3<f64> = Vector3::new(facing.x, facing.y, 0.0).try_normalize(0.1).unwrap_or(-Vector3::x());
     let middle = (low + high) / 2.0;
-    let depth = 0.5 * front.abs().dot(&(high - low));
+    // How far anything of it stands out to the front.
+    let depth = points().map(|p| front.dot(&(p - middle))).fold(0.0, f64::max);
     let right = Vector3::z().cross(&front);
     let position = Point3::from(middle + front * (depth + WAIT[0]) + right * WAIT[1] + Vector3::z() * WAIT[2]);
     let home = VehicleState { position, heading: (-front.y).atan2(-front.x), pan: 0.0, tilt: 0.0 };
     (home, Point3::from(middle + front * (depth + STAND)))
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::mesh_frame::MeshScale;
+    use crate::mesh_placement::UpAxis;
+
+    /// A wall of 2 m by 1 m at x = 0 that faces smaller x: as it is hung, from 1.5 to 2.5 metres up.
+    pub(in crate::vr) fn wall(texel: f64) -> VrWorld {
+        let folder = std::env::temp_dir().join(format!("paintcopter-vr-wall-{texel}-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let mesh = folder.join("wall.obj");
+        std::fs::write(&mesh, "v 0 1 1\nv 0 -1 1\nv 0 -1 2\nv 0 1 2\nf 1 2 3\nf 1 3 4\n").unwrap();
+        let (scale, up) = (Some(MeshScale::Factor(1.0)), Some(UpAxis::Z));
+        let world = VrWorld::new(&VrSettings { mesh: Some(mesh), scale, up, texel, ..VrSettings::default() });
+        std::fs::remove_dir_all(&folder).unwrap();
+        world.unwrap()
+    }
+
+    #[test]
+    fn distances_are_those_from_the_wall() {
+        let world = wall(0.0401);
+        for (point, expected) in [([-0.3, 0.0, 2.0], 0.3), ([0.2, -0.9, 1.6], 0.2), ([-0.3, 1.4, 2.0], 0.5)] {
+            assert!((world.distance(&Point3::from(point), 5.0) - expected).abs() < 1e-6, "{point:?}");
+        }
+    }
+
+    /// Whichever way a wall faces, the robot waits before it to the person's right, looking at it, and the person stands farther back.
+    #[test]
+    fn robot_and_person_look_at_the_wall() {
+        for degrees in [0.0_f64, 50.0, 140.0, 230.0, 320.0] {
+            let front = Vector3::new(degrees.to_radians().cos(), degrees.to_radians().sin(), 0.0);
+            let along = Vector3::z().cross(&front);
+            let corner = |k: usize| {
+                let [y, z] = [(k % 5) as f64 - 2.0, (k / 5) as f64];
+                Vector3::new(3.0, -7.0, 1.0) + along * (0.5 * y) + Vector3::z() * (0.5 * z)
+            };
+            let positions = (0..15).map(|k| corner(k).cast::<f32>().into()).collect();
+            let quad = |a: u32| [[a, a + 1, a + 6], [a, a + 6, a + 5]];
+            let faces = (0..8).flat_map(|k| quad(5 * (k / 4) + k % 4)).collect();
+            let mesh = TriangleMesh { positions, faces, ..TriangleMesh::default() };
+            let (home, stand) = beginning(&PaintSurface::new(&mesh, 0.05, &|_| ()).unwrap());
+            let middle = Point3::from(corner(7));
+            // Who looks against the normal has the wall's z cross n to the right.
+            let expected = middle + front * WAIT[0] + along * WAIT[1] + Vector3::z() * WAIT[2];
+            assert!((home.position - expected).norm() < 1e-3, "{degrees}: {}", home.position - expected);
+            let forward = Vector3::new(home.heading.cos(), home.heading.sin(), 0.0);
+            assert!((forward + front).norm() < 1e-3, "{degrees}: {}", home.heading.to_degrees());
+            assert!((stand - (middle + front * STAND)).norm() < 1e-3, "{degrees}: {stand}");
+        }
+    }
 }

@@ -110,3 +110,34 @@ fn left_over(lines: &[Line], dark: &[bool], problem: &PaintProblem, reach: f64) 
     let cell = problem.limits.spray_spacing.max(problem.limits.row_spacing) as f64;
     distances(&rest, width).iter().zip(&from_line).map(|(&to, &from)| to <= cell && from > reach + 0.5).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Limits;
+    use crate::image::Image;
+
+    /// A level line at row 20 of 80 by 60 pixels, 4 pixels to its border: what is dark at rows that are given.
+    fn rest_with(dark: impl Fn(usize, usize) -> bool) -> Vec<usize> {
+        let (width, height) = (80, 60);
+        let reference = Image::new(width, height, vec![0.0; width * height]).unwrap();
+        let limits = Limits { spray_spacing: 1, row_spacing: 1, ..Limits::default() };
+        // Sprays with a deviation of 2 pixels.
+        let problem = PaintProblem::new(&reference).with_limits(&limits);
+        let dark: Vec<bool> = (0..width * height).map(|k| dark(k % width, k / width)).collect();
+        let line = Line { points: (0..width).map(|x| [x as f64, 20.0]).collect() };
+        let rest = left_over(&[line], &dark, &problem, 4.0);
+        let rows = (0..height).filter(|y| rest[y * width..(y + 1) * width].contains(&true));
+        rows.collect()
+    }
+
+    /// Rows spray neither what a line covers nor a corner that stands a little out of it, but what is wide beside it, and all that is far.
+    #[test]
+    fn rows_spray_what_lines_leave() {
+        assert_eq!(rest_with(|_, y| (16..=24).contains(&y)), [] as [usize; 0]);
+        assert_eq!(rest_with(|_, y| (16..=25).contains(&y)), [] as [usize; 0], "a corner");
+        assert_eq!(rest_with(|_, y| (16..=32).contains(&y)), (25..=33).collect::<Vec<_>>(), "wide");
+        assert_eq!(rest_with(|_, y| y == 45), [44, 45, 46], "thin, and far");
+        assert_eq!(rest_with(|x, y| (25..=26).contains(&y) && x < 40), [] as [usize; 0], "thin, and beside");
+    }
+}

@@ -237,3 +237,39 @@ impl Lines {
         [x / length, y / length]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A level way of so many pixels from `x` on, between two meetings.
+    fn way(x: f64, count: usize, junctions: [Option<usize>; 2]) -> Way {
+        let points = (0..count).map(|k| [x + k as f64, 0.0]).collect();
+        Way { points, half_widths: vec![1.0; count], junctions, closed: false }
+    }
+
+    /// Two meetings with half-widths of 3, and between them so many pixels; a loop of one pixel at the first, a way out of the second.
+    fn with_bridge(count: usize) -> Lines {
+        let meeting = |x: f64| Meeting { middle: [x, 0.0], half_width: 3.0 };
+        let ways = vec![
+            way(0.0, 1, [Some(0), Some(0)]),
+            way(1.0, count, [Some(0), Some(1)]),
+            way(2.0 + count as f64, 30, [Some(1), None]),
+        ];
+        Lines { ways, junctions: vec![meeting(0.0), meeting(1.0 + count as f64)] }
+    }
+
+    #[test]
+    fn meetings_within_each_others_discs_become_one() {
+        let mut near = with_bridge(3);
+        near.merge_near_junctions();
+        let mut left: Vec<_> = near.ways.iter().map(|way| (way.points.len(), way.junctions)).collect();
+        left.sort_unstable();
+        assert_eq!(left, [(1, [Some(0), Some(0)]), (30, [Some(0), None])]);
+        assert_eq!(near.junctions[0].middle, [2.0, 0.0]);
+
+        let mut apart = with_bridge(4);
+        apart.merge_near_junctions();
+        assert_eq!(apart.ways.len(), 3);
+    }
+}

@@ -4,7 +4,7 @@ mod drawings;
 
 use drawings::{Drawing, INK};
 use paint_net::painters::Centrelines;
-use paint_net::{Image, Limits, PaintProblem, Painter, Painting, SprayKernel};
+use paint_net::{Image, Limits, Observer, PaintProblem, Painter, Painting, SprayKernel};
 
 /// Deviation of the nozzle, pixels: the core of a line ends half of it before its border.
 const SPOT: f64 = 2.0;
@@ -144,4 +144,31 @@ fn what_is_out_of_reach_is_not_painted_from_beside_it() {
     let part = Centrelines::default().paint(&problem.with_weight(&weight).with_paintable(&paintable)).unwrap();
     assert!(part.sprays.iter().all(|spray| spray.x < reached as f64 + 0.5));
     assert!(most(&part) < 1.2 * whole, "{} for {whole}", most(&part));
+}
+
+/// The share of the work that an observer was told of before the end.
+struct Told(f64);
+
+impl Observer for Told {
+    fn progress(&mut self, share: f64) {
+        if share < 1.0 {
+            self.0 = self.0.max(share);
+        }
+    }
+}
+
+/// Lines that a fit has covered are not fitted again: a straight one needs few of the eight rounds.
+#[test]
+fn what_is_covered_is_not_fitted_again() {
+    let kernel = SprayKernel::new(SPOT, 3.5).unwrap();
+    let wanted = Image::from_fn(80, 40, |x, y| {
+        let (x, y) = (x as f64, y as f64);
+        INK * (3.5 - (y - 20.0).hypot(x - x.clamp(15.0, 65.0))).clamp(0.0, 1.0)
+    });
+    let limits = Limits { row_spacing: 3, min_volume: 0.01, ..Limits::default() };
+    let mut told = Told(0.0);
+    let problem = PaintProblem::new(&wanted).with_kernel(&kernel).with_limits(&limits);
+    let painting = Centrelines::default().paint_observed(&problem, &mut told).unwrap();
+    assert_eq!(painting.strokes.len(), 1);
+    assert!(told.0 > 0.0 && told.0 < 0.5, "{}", told.0);
 }

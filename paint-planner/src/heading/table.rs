@@ -80,3 +80,31 @@ impl HeadingTable {
         HeadingPath { headings, cost }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point3;
+
+    use super::super::graph::Node;
+    use super::*;
+
+    /// Two states a metre apart, four headings. The cheapest heading of the first leads to a dear second one.
+    #[test]
+    fn one_after_the_other_takes_what_is_cheapest_now() {
+        let node = |y: f64, pan: f64| Some(Node { position: Point3::new(0.0, y, 1.0), pan });
+        let nodes = vec![node(0.0, 0.1), None, node(0.0, 0.2), None, None, None, node(1.0, 0.3), node(1.0, 0.9)];
+        let table = HeadingTable { graph: HeadingGraph::from_nodes(4, nodes), linked: vec![true] };
+        let settings = HeadingSettings { window: 2, pan: 5.0, ce: 0.5, ..HeadingSettings::default() };
+        // Eq. (7): from bin 0 the turns are half a circle to bin 2, a quarter to bin 3; from bin 2, none and a quarter.
+        let edge = |quarters: f64| (quarters * TAU / 4.0).powi(2) / (1.0 + 1e-6) + 0.5;
+        let pan = |pan: f64| 5.0 * pan * pan;
+        let greedy = table.one_after_the_other(&settings);
+        let dear = (edge(2.0) + pan(0.3)).min(edge(1.0) + pan(0.9));
+        assert!((greedy.cost - (pan(0.1) + dear)).abs() < 1e-12, "{greedy:?}");
+        let best = table.optimum(&settings);
+        assert!((best.cost - (pan(0.2) + edge(0.0) + pan(0.3))).abs() < 1e-12, "{best:?}");
+        let turned =
+            |path: &HeadingPath| path.headings.iter().map(|h| h.unwrap().to_degrees().round()).collect::<Vec<_>>();
+        assert_eq!((turned(&greedy), turned(&best)), (vec![0.0, -90.0], vec![180.0, 180.0]));
+    }
+}

@@ -189,4 +189,30 @@ mod tests {
         assert_eq!(back, expected);
         assert_eq!(reversed(&back), stroke);
     }
+
+    /// A wall that is drawn in metres.
+    struct Wall;
+
+    impl Chart for Wall {
+        fn lift(&self, [x, y]: [f64; 2]) -> Option<(Point3<f64>, UnitVector3<f64>)> {
+            Some((Point3::new(0.0, x, y), -Vector3::x_axis()))
+        }
+    }
+
+    /// A spray by itself paints half a spacing to either side; one at an end goes on as its stroke does.
+    #[test]
+    fn a_spray_paints_half_a_spacing_to_either_side() {
+        let spray = |x: f64, y: f64| Spray { place: [x, y], volume: 1e-9 };
+        let cell =
+            |stroke: &[Spray], k: usize| spray_cell(&Wall, stroke, k, 0.04).unwrap().map(|t| [t.point.y, t.point.z]);
+        let near = |found: [[f64; 2]; 2], expected: [[f64; 2]; 2]| {
+            let off = found.iter().flatten().zip(expected.iter().flatten()).map(|(a, b)| (a - b).abs());
+            assert!(off.fold(0.0, f64::max) < 1e-12, "{found:?} for {expected:?}");
+        };
+        near(cell(&[spray(1.0, 2.0)], 0), [[0.98, 2.0], [1.02, 2.0]]);
+        let upwards = [spray(1.0, 2.0), spray(1.0, 2.05), spray(1.0, 3.0)];
+        near(cell(&upwards, 0), [[1.0, 1.975], [1.0, 2.025]]);
+        near(cell(&upwards, 1), [[1.0, 2.025], [1.0, 2.075]]);
+        near(cell(&upwards, 2), [[1.0, 2.98], [1.0, 3.02]]);
+    }
 }

@@ -241,3 +241,24 @@ fn programs_without_a_point_are_refused_by_all_solvers() {
     assert!(GaussSeidel::default().solve(&program, &mut states.clone()).is_err());
     assert!(Clarabel::default().solve(&program, &mut states).is_err());
 }
+
+/// The soft rows of a state are an octagon about the target, its corners half the cone away from it.
+#[test]
+fn the_aim_may_leave_the_target_by_half_the_cone() {
+    let settings = NozzleSettings::default();
+    let normal = UnitVector3::new_normalize(Vector3::new(-1.0, 0.2, 0.1));
+    let targets = [Target { point: Point3::new(2.0, 1.0, 1.5), normal, dose: 0.0, time: None }];
+    let (program, start) = stroke_program(&targets, &settings);
+    let rows = &program.rows[program.rows.len() - program.soft_rows..];
+    let aimed = program.soft_map[0] * start[0];
+    let corner = (settings.cone / 2.0).tan();
+    let room = |angle: f64| {
+        let beside = aimed + Vector2::new(angle.cos(), angle.sin()) * corner;
+        rows.iter().map(|row| row.b - row.a.xy().dot(&beside)).fold(f64::INFINITY, f64::min)
+    };
+    for k in 0..8 {
+        let turn = std::f64::consts::FRAC_PI_4 * f64::from(k);
+        assert!(room(turn + std::f64::consts::FRAC_PI_8).abs() < 1e-12, "a corner");
+        assert!(room(turn) < -0.05 * corner, "beyond a side");
+    }
+}

@@ -251,3 +251,36 @@ fn neighbours(cost: &TransitCost) -> Vec<Vec<End>> {
     };
     (0..ends).map(of).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::stroke::StrokeEnds;
+    use super::*;
+    use crate::settings::Settings;
+    use crate::target::Target;
+    use nalgebra::{Point3, Vector3};
+
+    /// Dots in a row, flown in another order than they lie in: Or-opt puts the one that is out of place where it belongs.
+    #[test]
+    fn or_opt_moves_a_dot_to_where_it_lies() {
+        let strokes: Vec<StrokeEnds> = (0..5)
+            .map(|k| {
+                let point = Point3::new(0.0, 0.01 * f64::from(k), 1.0);
+                let target = Target { point, normal: -Vector3::x_axis(), dose: 0.0, time: None };
+                StrokeEnds { first: target, last: target }
+            })
+            .collect();
+        let cost = TransitCost::new(&strokes, None, &Settings::default());
+        let step = cost.between(0, 2);
+        let tour = |order: [usize; 5]| Tour { entries: order.map(|stroke| 2 * stroke).to_vec() };
+        let anywhere = |tour: &mut Tour| (0..5).any(|at| (0..5).any(|there| tour.move_run(at, there, &cost)));
+        // To before another stroke, and to behind the last.
+        for order in [[0, 2, 3, 1, 4], [0, 4, 1, 2, 3]] {
+            let mut tour = tour(order);
+            while anywhere(&mut tour) {}
+            assert!((tour.duration(&cost) - 4.0 * step).abs() < 1e-9, "{order:?}: {}", tour.duration(&cost));
+        }
+        let mut best = tour([0, 1, 2, 3, 4]);
+        assert!(!anywhere(&mut best));
+    }
+}

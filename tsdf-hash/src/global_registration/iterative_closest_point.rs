@@ -106,3 +106,36 @@ impl Alignment<'_> {
         (normal, right)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point3;
+
+    /// Three faces of a box that meet at a corner, so many metres a point, somewhere off the origin.
+    fn corner(spacing: f64) -> Vec<OrientedPoint> {
+        let face = |axis: usize| {
+            (0..20 * 20).map(move |k| {
+                let [along, across] = [f64::from(k % 20) + 0.5, f64::from(k / 20) + 0.5];
+                let mut place = Vector3::new(4.0, -6.0, 2.0);
+                place[(axis + 1) % 3] += along;
+                place[(axis + 2) % 3] += across;
+                OrientedPoint { point: Point3::from(place * spacing), normal: Vector3::ith(axis, 1.0) }
+            })
+        };
+        (0..3).flat_map(face).collect()
+    }
+
+    /// How firmly a cloud lies is no matter of the unit that it is measured in.
+    #[test]
+    fn the_slope_of_a_fit_is_that_of_its_shape() {
+        let fit = |spacing: f64| {
+            let cloud = corner(spacing);
+            let surface = NearestPoints::new(cloud.clone(), spacing);
+            Alignment { surface: &surface, cloud: &cloud, spacing }.fit(&Isometry3::identity())
+        };
+        let [small, large] = [0.01, 1.0].map(fit);
+        assert!(small.share > 0.9 && (small.share - large.share).abs() < 0.01, "{small:?} {large:?}");
+        assert!(small.slope > 0.02 && (small.slope / large.slope - 1.0).abs() < 0.01, "{small:?} {large:?}");
+    }
+}

@@ -345,3 +345,34 @@ pub(crate) fn is_near(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
     let apart = a.inverse() * b;
     apart.translation.vector.norm() < SPACING[0] && apart.rotation.angle() < SPACING[1]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::images::{DepthData, Intrinsics};
+
+    /// Every other one of the older half, but the first: it shows where the scan began.
+    #[test]
+    fn frames_of_the_older_half_make_room() {
+        let data: Vec<f32> = (0..64 * 48).map(|k| 1.0 + 0.01 * (k % 64) as f32).collect();
+        let depth = DepthView {
+            width: 64,
+            height: 48,
+            data: DepthData::F32 { data: &data },
+            intrinsics: Intrinsics { fx: 60.0, fy: 60.0, cx: 31.5, cy: 23.5 },
+        };
+        let with = |max_bytes: usize| {
+            let mut index = KeyframeIndex::with_budget(max_bytes);
+            for k in 0..8 {
+                index.push(&depth, None, &Isometry3::translation(0.3 * f64::from(k), 0.0, 0.0)).unwrap();
+            }
+            index
+        };
+        let all = with(usize::MAX);
+        assert_eq!(all.without_depth(), 0);
+        let thinned = with(all.bytes() - 1);
+        let kept: Vec<usize> = (0..8).filter(|k| thinned.keyframes[*k].frame.is_some()).collect();
+        assert_eq!((kept, thinned.without_depth()), (vec![0, 2, 4, 5, 6, 7], 2));
+        assert!(thinned.bytes() < all.bytes());
+    }
+}

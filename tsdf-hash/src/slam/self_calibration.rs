@@ -232,3 +232,15 @@ pub(crate) fn fit(kept: &[Kept], pairs: &[[usize; 2]], noise: &NoiseModel, free:
 fn turned_there(pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {
     moved(&Isometry3::identity(), step) * pose
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A pair that shows nothing leaves its pose as uncertain as it was: a tenth of a radian, and of a metre.
+    #[test]
+    fn without_points_the_pose_is_the_prior() {
+        let covariance = Sums::default().pose_inverse().unwrap();
+        assert!((covariance - Matrix6::identity() * 0.01).amax() < 1e-12, "{covariance}");
+    }
+}

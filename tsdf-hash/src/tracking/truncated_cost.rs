@@ -121,3 +121,50 @@ pub(crate) fn rise(comparison: &Comparison, poses: [&Isometry3<f64>; 2], scale: 
     }
     rise
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::NoiseModel;
+    use crate::tracking::model_points::Model;
+
+    /// A wall a metre before the camera: squares of the distance from it, up to one; nothing of what is behind the camera or at it.
+    #[test]
+    fn the_cost_is_the_square_of_the_distance_before_the_camera() {
+        let level = ImageLevel {
+            width: 32,
+            height: 24,
+            focal: [30.0; 2],
+            centre: [15.5, 11.5],
+            omega: vec![1.0; 32 * 24],
+            ..ImageLevel::default()
+        };
+        let noise = NoiseModel { base: 0.002, quadratic: 0.005, nearest: 0.4 };
+        let (origin, model) = (nalgebra::Vector3::new(2.0, -1.0, 0.5), Model::default());
+        let (max_distance, tolerance) = (0.2, 0.005);
+        let comparison = Comparison {
+            level: &level,
+            model: &model,
+            origin,
+            noise,
+            max_distance,
+            tolerance,
+            photometric: false,
+            threads: 1,
+        };
+        let pose = Isometry3::from_parts(origin.into(), nalgebra::UnitQuaternion::identity());
+        let posed = Posed::new(&comparison, &pose, 2.0, 0.01);
+        let cost = |z: f32| {
+            let position = [0.1 * z, 0.05 * z, z];
+            posed.cost(&ModelPoint { position, normal: [0.0, 0.0, -1.0], intensity: f32::NAN })
+        };
+        // Three standard deviations, which are doubled, and a centimetre.
+        let width = 3.0 * 2.0 * (0.002 + 0.005 * 0.36) + 0.01;
+        for z in [0.985_f32, 1.0, 1.01, 1.02] {
+            let expected = ((1.0 - z) / width).powi(2);
+            assert!((cost(z).unwrap() - expected).abs() < 1e-4, "{z}: {:?} for {expected}", cost(z));
+        }
+        assert_eq!(cost(1.2), Some(1.0));
+        assert_eq!([-1.0, -0.2, 0.04].map(cost), [None; 3]);
+    }
+}

@@ -134,3 +134,33 @@ impl PaintingLog {
         self.tick() * self.ticks.len() as f64
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use paint_planner::gantry::SlideSetpoint;
+    use paint_sim::droplets::{TexelFace, TexelSurface};
+
+    #[test]
+    fn what_happens_is_counted() {
+        let corners = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]];
+        let texels = Some([[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]]);
+        let surface = TexelSurface::new(&[TexelFace { corners, texels }], [1, 1], &[0.005]).unwrap();
+        let mut log = PaintingLog::new(Coverage::new(&surface, &[1e-5]).unwrap());
+        let slide = SlideSetpoint { position: 0.0, velocity: 0.0 };
+        let mut note = |time: f64, tracked: bool, valve_open: bool, events: Vec<Event>| {
+            let world_from_robot = tracked.then(Isometry3::identity);
+            let frame = Frame { time, world_from_robot, inertial: None, ranges: &[], position: 0.0, sprayed: 0.0 };
+            log.note(&frame, Command { valve_open, slide, events }, Duration::from_millis(2));
+        };
+        note(0.00, true, true, vec![]);
+        note(0.01, false, true, vec![Event::TrackingLost]);
+        note(0.02, false, false, vec![Event::Held, Event::Held]);
+        note(0.03, true, false, vec![Event::TrackingFound { after: 0.02 }, Event::PoseJumped]);
+        note(0.04, true, false, vec![Event::PoseJumped]);
+        assert_eq!((log.lost_ticks, log.held_decisions, log.pose_jumps), (2, 2, 2));
+        assert!((log.shut_after_loss - 0.01).abs() < 1e-12);
+        let times: Vec<f64> = log.messages.iter().map(|message| message.0).collect();
+        assert_eq!(times, [0.01, 0.03, 0.03, 0.04]);
+    }
+}

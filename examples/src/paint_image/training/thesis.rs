@@ -238,3 +238,25 @@ impl Curve {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A curve needs two points of both kinds; twenty steps of training are one.
+    #[test]
+    fn curves_are_drawn_once_there_are_some() {
+        let path = std::env::temp_dir().join(format!("paintcopter-thesis-curve-{}.png", std::process::id()));
+        let curve = |steps: usize| {
+            let line = |step: usize, pictures: &str| format!("{step},{pictures},3.0,2.0,0.5,0.4,0.1,4.0");
+            let trained = (0..steps).map(|step| line(step, "trained"));
+            Curve(trained.chain([line(0, "held"), line(steps, "held")]).collect())
+        };
+        curve(20).draw(&path).unwrap();
+        assert!(!path.exists());
+        curve(40).draw(&path).unwrap();
+        let picture = image::open(&path).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        assert!(picture.width() > 300 && picture.height() > 300);
+    }
+}

@@ -4,6 +4,7 @@ use super::EvictedBlocks;
 use crate::blocks::block_history::BlockHistory;
 use crate::blocks::block_key::BlockKey;
 use crate::blocks::voxel_block::{VOXELS, VoxelBlock};
+use crate::storage::swap_file::SwapFile;
 
 /// The same in all voxels, so that it takes few bytes when it is compressed.
 fn even(distance: f32, weight: u16) -> Box<VoxelBlock> {
@@ -70,4 +71,21 @@ fn a_staged_copy_counts_when_it_is_certain() {
         evicted.commit();
         assert!(evicted.is_empty() && evicted.counts() == [0; 3]);
     }
+}
+
+/// While uncompressed blocks fill the memory, the oldest are compressed and stay in it; the disk is for what then still finds no room.
+#[test]
+fn blocks_are_compressed_before_they_go_to_disk() {
+    let path = std::env::temp_dir().join(format!("tsdf-hash-compressed-first-{}", std::process::id()));
+    let room = 1 << 20;
+    let mut evicted = EvictedBlocks::new(room, Some(SwapFile::create(&path, 1 << 20).unwrap()));
+    let fit = room / size_of::<VoxelBlock>();
+    let mut put = |k: usize| {
+        let key = BlockKey::new([k as i32, 0, 0]).unwrap();
+        assert!(evicted.put(key, even(0.5, 2), history(k as f64, 1)).is_ok());
+        (evicted.counts(), evicted.uncompressed)
+    };
+    let (counts, uncompressed) = (0..fit + 10).map(&mut put).last().unwrap();
+    assert_eq!(counts, [fit + 10, 0, 0], "a few more than fit uncompressed");
+    assert!(uncompressed < fit);
 }

@@ -76,3 +76,81 @@ impl<const C: usize> Measurement<2, C> for PixelMeasurement<'_, C> {
         self.update.max_mahalanobis
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{SVector, UnitQuaternion, Vector3};
+
+    use super::*;
+    use crate::filter::settings::Settings;
+    use crate::filter::state::bearing::Bearing;
+    use crate::filter::state::error_state;
+    use crate::filter::state::inverse_distance::InverseDistance;
+    use crate::filter::state::vio_state::VioState;
+    use crate::inertial::core_state::CoreState;
+
+    /// A state that the measurement does not look at.
+    fn state() -> VioState {
+        let (zero, identity) = (Vector3::zeros(), UnitQuaternion::identity());
+        VioState {
+            core: CoreState { position: zero, velocity: zero, attitude: identity, gyro_bias: zero, accel_bias: zero },
+            camera_position: zero,
+            camera_attitude: identity,
+            time_offset: 0.0,
+            depth_prior: InverseDistance::new(1.0),
+            accel_matrix: None,
+            gyro_scale: Vector3::repeat(1.0),
+            lens: None,
+            second: None,
+            landmarks: Vec::new(),
+        }
+    }
+
+    /// The derivative against differences, at no step and at one that changes the lens: then with another focal length another pixel.
+    #[test]
+    fn the_pixel_moves_with_bearing_clock_and_lens() {
+        let (camera, settings, state) = (Camera::euroc(), Settings::default(), state());
+        let pixel = Vector2::new(600.0, 100.0);
+        let landmark = Landmark {
+            bearing: Bearing::new(&camera.bearing(&pixel).unwrap()),
+            inverse_distance: InverseDistance::new(0.2),
+            warp: Matrix2::identity(),
+        };
+        let measurement = PixelMeasurement::<WITHOUT_LENS> {
+            row: error_state::FIXED,
+            pixel,
+            landmark,
+            rate: Vector2::new(0.3, -0.5),
+            time_offset_error: 0.0,
+            delay: 0.0,
+            camera: &camera,
+            lens: Some(camera),
+            landmarks: &settings.landmarks,
+            update: &settings.update,
+        }
+        .with_lens();
+        let rows = measurement.rows();
+        let linearize = |delta: &SVector<f64, WITH_LENS>| {
+            let (state, rate_in_body) = (&state, &Vector3::zeros());
+            measurement.linearize(&Trial { state, rate_in_body, rows: &rows, delta }).unwrap()
+        };
+        let still = SVector::<f64, WITH_LENS>::zeros();
+        assert!(linearize(&still).residual.norm() < 1e-9);
+        let mut stepped = still;
+        (stepped[0], stepped[2], stepped[WITHOUT_LENS], stepped[WITHOUT_LENS + 2]) = (1e-3, 2e-4, 4.0, -3.0);
+        for at in [still, stepped] {
+            let jacobian = linearize(&at).jacobian;
+            for column in 0..WITH_LENS {
+                let h = 1e-6;
+                let [one, two] = [h, -h].map(|h| {
+                    let mut delta = at;
+                    delta[column] += h;
+                    -linearize(&delta).residual
+                });
+                let slope = (one - two) / (2.0 * h);
+                let off = (slope - jacobian.column(column)).norm();
+                assert!(off < 1e-3 * slope.norm().max(1.0), "column {column} at {at}: {off}");
+            }
+        }
+    }
+}
