@@ -5,6 +5,7 @@ use super::frontend::corner_detector::{CornerDetector, DetectionCriteria};
 use super::frontend::image_frontend::ImageFrontend;
 use super::frontend::patch::Patch;
 use super::frontend::patch_alignment::{PatchAlignment, align_patch};
+use super::frontend::patch_slant::PatchSlant;
 use super::frontend::pyramid::Pyramid;
 use super::landmarks;
 use super::measurements::patch::{WITH_LENS, WITHOUT_LENS};
@@ -46,10 +47,9 @@ pub(crate) fn align_and_update(
         track.in_view = true;
         // What the landmarks before have told of the lens counts.
         let (input, lens) = ((time_offset_error, pyramid), estimator.state.lens);
-        let outcome = match (&track.patch, &lens) {
-            (None, _) => PatchUpdate::OutOfView,
-            (Some(patch), None) => update_with_patch::<WITHOUT_LENS>(estimator, slot, patch, input, camera, settings),
-            (Some(patch), Some(lens)) => update_with_patch::<WITH_LENS>(estimator, slot, patch, input, lens, settings),
+        let outcome = match &lens {
+            None => update_with_patch::<WITHOUT_LENS>(estimator, slot, track, input, camera, settings),
+            Some(lens) => update_with_patch::<WITH_LENS>(estimator, slot, track, input, lens, settings),
         };
         match outcome {
             PatchUpdate::Used => {
@@ -79,13 +79,19 @@ enum PatchUpdate {
 fn update_with_patch<const C: usize>(
     estimator: &mut Estimator,
     slot: usize,
-    patch: &Patch,
+    track: &mut LandmarkTrack,
     (time_offset_error, pyramid): (f64, &Pyramid),
     camera: &dyn CameraModel,
     settings: &Settings,
 ) -> PatchUpdate {
+    let Some(patch) = &track.patch else { return PatchUpdate::OutOfView };
     match align_patch::<C>(estimator, slot, time_offset_error, (patch, pyramid), camera, settings) {
-        PatchAlignment::Converged(measurement) if estimator.update_in_series(&measurement) => PatchUpdate::Used,
+        PatchAlignment::Converged(measurement, slant) if estimator.update_in_series(&measurement) => {
+            if let Some(evidence) = slant {
+                track.slant.update(&evidence, &mut estimator.state.landmarks[slot]);
+            }
+            PatchUpdate::Used
+        }
         PatchAlignment::OutOfView => PatchUpdate::OutOfView,
         PatchAlignment::Changed => PatchUpdate::Changed,
         _ => PatchUpdate::Failed,
@@ -179,7 +185,7 @@ pub(crate) fn update_templates(
         if patch.shi_tomasi_score() < settings.min_score {
             continue;
         }
-        track.patch = Some(patch);
+        (track.patch, track.slant) = (Some(patch), PatchSlant::default());
         let covariance = warp * warp.transpose() * settings.pixel_sigma.powi(2);
         landmarks::reset_bearing(estimator, slot, warp, &covariance);
     }

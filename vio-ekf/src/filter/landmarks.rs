@@ -38,8 +38,7 @@ pub(crate) fn at_stamp(
         let shared = estimator.covariance.variance(error_state::DEPTH_PRIOR);
         (expected, estimator.landmarks.own_variance(expected) + shared)
     });
-    let at =
-        |value: f64| estimator.bearing_rate(&Landmark { bearing, inverse_distance: InverseDistance::new(value), warp });
+    let at = |value: f64| estimator.bearing_rate(&Landmark::new(bearing, InverseDistance::new(value), warp));
     let (rate, by_distance) = (at(value), (at(value) - at(0.0)) / value.max(f64::MIN_POSITIVE));
     let shift = by_distance * delay;
     (bearing.boxplus(&(rate * -delay)), shift * shift.transpose() * variance)
@@ -73,7 +72,7 @@ pub(crate) fn insert(
     covariance: &Matrix2<f64>,
     (inverse_distance, variance): (f64, f64),
 ) {
-    let landmark = Landmark { bearing, inverse_distance: InverseDistance::new(inverse_distance), warp };
+    let landmark = Landmark::new(bearing, InverseDistance::new(inverse_distance), warp);
     let row = estimator.covariance.size();
     estimator.state.landmarks.push(landmark);
     estimator.covariance.grow(error_state::LANDMARK_SIZE);
@@ -85,7 +84,8 @@ pub(crate) fn insert(
 /// the same distance.
 pub(crate) fn reset_bearing(estimator: &mut Estimator, slot: usize, warp: Matrix2<f64>, covariance: &Matrix2<f64>) {
     let row = estimator.state.landmark_row(slot);
-    estimator.state.landmarks[slot].warp = warp;
+    let Landmark { bearing, inverse_distance, .. } = estimator.state.landmarks[slot];
+    estimator.state.landmarks[slot] = Landmark::new(bearing, inverse_distance, warp);
     estimator.covariance.reset_row(row, 0.0);
     estimator.covariance.reset_row(row + 1, 0.0);
     let landmark = estimator.state.landmarks[slot];

@@ -6,6 +6,7 @@ use super::accel_matrix_selection::AccelMatrixSelection;
 use super::calibration_prior::prior_sigma;
 use super::estimator::Estimator;
 use super::frontend::patch::Patch;
+use super::frontend::patch_slant::PatchSlant;
 use super::innovation_adaptation::{BeforeImage, InnovationAdaptation};
 use super::landmarks;
 use super::settings::PatchSettings;
@@ -26,12 +27,14 @@ pub(crate) struct LandmarkTrack {
     pub(crate) in_view: bool,
     /// Its template; none for a point of the caller's own.
     pub(crate) patch: Option<Patch>,
+    /// What is known of its surface.
+    pub(crate) slant: PatchSlant,
 }
 
 impl LandmarkTrack {
     #[allow(clippy::large_types_passed_by_value, reason = "the track keeps the patch: a reference would be copied")]
     pub(crate) fn new(id: u64, patch: Option<Patch>) -> Self {
-        Self { id, failures: 0, chosen: true, in_view: true, patch }
+        Self { id, failures: 0, chosen: true, in_view: true, patch, slant: PatchSlant::default() }
     }
 }
 

@@ -5,6 +5,7 @@ use std::cell::Cell;
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 use super::patch::{LEVELS, Patch};
+use super::patch_slant::SlantEvidence;
 use super::pyramid::Pyramid;
 use crate::camera::intrinsics::INTRINSICS;
 use crate::camera::model::CameraModel;
@@ -34,8 +35,8 @@ pub(crate) enum PatchAlignment<const C: usize> {
     Failed,
     /// The patch is where it is expected, and looks too different to tell where exactly: blurred, or seen from elsewhere.
     Changed,
-    /// The measurement at the solution.
-    Converged(LinearizedMeasurement<2, C>),
+    /// The measurement at the solution, and how the patch's surface is turned.
+    Converged(LinearizedMeasurement<2, C>, Option<SlantEvidence>),
 }
 
 /// Aligns a landmark's patch: the best of some guesses, iterations on the coarsest level, then on all; then the gates.
@@ -90,7 +91,11 @@ pub(crate) fn align_patch<const C: usize>(
     } else if ratio > settings.patches.max_residual_ratio {
         PatchAlignment::Changed
     } else {
-        PatchAlignment::Converged(linearized)
+        let there = measurement.project(&measurement.last_step.get());
+        let slant = there.and_then(|(pixel, by_bearing)| {
+            SlantEvidence::new(&landmark, (patch, pyramid), (&pixel, &by_bearing), &comparison, &settings.patches)
+        });
+        PatchAlignment::Converged(linearized, slant)
     }
 }
 

@@ -1,10 +1,15 @@
 //! Patches, pyramid and corners against closed forms and against dense least squares.
 
-use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3};
 
 use super::corner_detector::{CornerDetector, DetectionCriteria};
 use super::patch::{LEVELS, Patch};
+use super::patch_slant::{PatchSlant, SlantEvidence};
 use super::pyramid::Pyramid;
+use crate::filter::settings::PatchSettings;
+use crate::filter::state::bearing::Bearing;
+use crate::filter::state::inverse_distance::InverseDistance;
+use crate::filter::state::landmark::Landmark;
 use crate::samples::ImageView;
 
 const WIDTH: usize = 160;
@@ -28,6 +33,22 @@ fn pyramid(data: &[u8]) -> Pyramid {
     let mut pyramid = Pyramid::new(WIDTH, HEIGHT, 0, LEVELS);
     pyramid.fill(&ImageView { width: WIDTH, height: HEIGHT, data });
     pyramid
+}
+
+const MIDDLE: Vector2<f64> = Vector2::new(80.0, 60.0);
+
+/// A picture warped about its middle.
+fn warped(from: &Pyramid, warp: &Matrix2<f64>) -> Pyramid {
+    let inverse = warp.try_inverse().unwrap();
+    let level = &from.patch_levels()[0];
+    let data: Vec<u8> = (0..WIDTH * HEIGHT)
+        .map(|k| {
+            let source = MIDDLE + inverse * (Vector2::new((k % WIDTH) as f64, (k / WIDTH) as f64) - MIDDLE);
+            let inside = level.contains(&source, &Vector2::zeros());
+            if inside { level.interpolate(source.x as f32, source.y as f32).round() as u8 } else { 0 }
+        })
+        .collect();
+    pyramid(&data)
 }
 
 #[test]
@@ -72,18 +93,8 @@ fn finds_a_shift_whatever_the_brightness() {
 fn a_warped_patch_fits_with_its_warp() {
     // The picture turned and scaled about a point: the same patch with the warp that says so fits at once.
     let warp = Matrix2::new(1.1, 0.15, -0.1, 0.95);
-    let inverse = warp.try_inverse().unwrap();
-    let middle = Vector2::new(80.0, 60.0);
-    let plain = picture(Vector2::zeros(), 1.0, 128.0);
-    let from = pyramid(&plain);
-    let turned: Vec<u8> = (0..WIDTH * HEIGHT)
-        .map(|k| {
-            let source = middle + inverse * (Vector2::new((k % WIDTH) as f64, (k / WIDTH) as f64) - middle);
-            let inside = from.patch_levels()[0].contains(&source, &Vector2::zeros());
-            if inside { from.patch_levels()[0].interpolate(source.x as f32, source.y as f32).round() as u8 } else { 0 }
-        })
-        .collect();
-    let (reference, other) = (pyramid(&plain), pyramid(&turned));
+    let reference = pyramid(&picture(Vector2::zeros(), 1.0, 128.0));
+    let (middle, other) = (MIDDLE, warped(&reference, &warp));
     let patch = Patch::extract(&reference, &middle).unwrap();
     let right = patch.compare(&other, &middle, &warp).unwrap();
     let wrong = patch.compare(&other, &middle, &Matrix2::identity()).unwrap();
@@ -166,4 +177,51 @@ fn corners_are_found_where_they_are() {
     detector.detect(&blank, &std::iter::empty(), &criteria);
     assert!(detector.take_best(&blank, &criteria).is_none());
     assert!(Patch::extract(&blank, &Vector2::new(80.0, 60.0)).is_none());
+}
+
+#[test]
+fn a_deformation_is_seen_besides_a_shift() {
+    let reference = pyramid(&picture(Vector2::zeros(), 1.0, 128.0));
+    let patch = Patch::extract(&reference, &MIDDLE).unwrap();
+    for deformation in [Matrix2::new(0.04, 0.0, 0.0, 0.0), Matrix2::new(-0.02, 0.05, 0.03, 0.01), Matrix2::zeros()] {
+        let other = warped(&reference, &(Matrix2::identity() + deformation));
+        // A little beside where it is.
+        let at = MIDDLE + Vector2::new(0.1, -0.05);
+        let seen = patch.deformation(&other, &at, &Matrix2::identity()).unwrap();
+        let found = Matrix2::from_column_slice((seen.information.try_inverse().unwrap() * seen.gradient).as_slice());
+        assert!((found - deformation).amax() < 0.012, "{found} for {deformation}");
+    }
+}
+
+/// A surface is seen from places farther and farther aside: its slope is found, and none where it faces the camera.
+#[test]
+fn a_slant_is_found_by_parallax() {
+    let focal = 400.0;
+    let reference = pyramid(&picture(Vector2::zeros(), 1.0, 128.0));
+    let patch = Patch::extract(&reference, &MIDDLE).unwrap();
+    let (settings, by_bearing) = (PatchSettings::default(), Matrix2::identity() * focal);
+    let new = Landmark::new(Bearing::new(&Vector3::z_axis()), InverseDistance::new(0.4), Matrix2::identity() / focal);
+    // At 31 degrees to the line of sight, and at 34: tangents of 0.6 and 0.67, by focal length and distance.
+    for slope in [Vector2::zeros(), Vector2::new(6e-4, 0.0), Vector2::new(-4e-4, 5.4e-4)] {
+        let (mut slant, mut found) = (PatchSlant::default(), Vector2::zeros());
+        for step in 1..=40 {
+            // Metres that the camera has moved aside.
+            let by_distance = Vector3::new(-0.01, 0.003, 0.0) * f64::from(step) + Vector3::z();
+            let at = |slope: &Vector2<f64>| {
+                let mut landmark = Landmark { by_distance, ..new };
+                landmark.tilt(slope);
+                landmark
+            };
+            let image = warped(&reference, &(by_bearing * at(&slope).warp));
+            let mut landmark = at(&found);
+            let warp = by_bearing * landmark.warp;
+            let comparison = patch.compare(&image, &MIDDLE, &warp).unwrap();
+            let place = (&MIDDLE, &by_bearing);
+            if let Some(evidence) = SlantEvidence::new(&landmark, (&patch, &image), place, &comparison, &settings) {
+                slant.update(&evidence, &mut landmark);
+            }
+            found = landmark.slope;
+        }
+        assert!((found - slope).norm() < 0.2 * slope.norm() + 5e-5, "{found} for {slope}");
+    }
 }

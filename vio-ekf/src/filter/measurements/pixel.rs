@@ -111,11 +111,8 @@ mod tests {
     fn the_pixel_moves_with_bearing_clock_and_lens() {
         let (camera, settings, state) = (Camera::euroc(), Settings::default(), state());
         let pixel = Vector2::new(600.0, 100.0);
-        let landmark = Landmark {
-            bearing: Bearing::new(&camera.bearing(&pixel).unwrap()),
-            inverse_distance: InverseDistance::new(0.2),
-            warp: Matrix2::identity(),
-        };
+        let bearing = Bearing::new(&camera.bearing(&pixel).unwrap());
+        let landmark = Landmark::new(bearing, InverseDistance::new(0.2), Matrix2::identity());
         let measurement = PixelMeasurement::<WITHOUT_LENS> {
             row: error_state::FIXED,
             pixel,
@@ -138,6 +135,10 @@ mod tests {
         assert!(linearize(&still).residual.norm() < 1e-9);
         let mut stepped = still;
         (stepped[0], stepped[2], stepped[WITHOUT_LENS], stepped[WITHOUT_LENS + 2]) = (1e-3, 2e-4, 4.0, -3.0);
+        // Where the principal point lies two pixels farther right, so does all that is seen.
+        let mut farther = still;
+        farther[WITHOUT_LENS + 2] = 2.0;
+        assert!((linearize(&farther).residual - Vector2::new(-2.0, 0.0)).norm() < 1e-9);
         for at in [still, stepped] {
             let jacobian = linearize(&at).jacobian;
             for column in 0..WITH_LENS {

@@ -36,12 +36,12 @@ impl Measurement<2, 4> for StereoPixelMeasurement<'_> {
     fn linearize(&self, trial: &Trial<'_, 4>) -> Option<Linearization<2, 4>> {
         let (delta, bearing) = (trial.delta, &self.landmark.bearing);
         let offset = self.time_offset_error + delta[3];
-        let moved = Landmark {
-            bearing: bearing.boxplus(&(delta.fixed_rows::<2>(0) + self.rate * offset)),
-            inverse_distance: InverseDistance::new(self.landmark.inverse_distance.value + delta[2]),
+        let moved = Landmark::new(
+            bearing.boxplus(&(delta.fixed_rows::<2>(0) + self.rate * offset)),
+            InverseDistance::new(self.landmark.inverse_distance.value + delta[2]),
             // Then the projection's warp is the derivative by the tangent coordinates.
-            warp: Matrix2::identity(),
-        };
+            Matrix2::identity(),
+        );
         let projection = self.rig.project(&moved)?;
         let mut jacobian = Matrix2x4::zeros();
         jacobian.fixed_columns_mut::<2>(0).copy_from(&projection.warp);

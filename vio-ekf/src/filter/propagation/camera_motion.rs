@@ -104,7 +104,63 @@ impl CameraMotion {
 
         let curvature = own_by_distance * (-2.0 * direction.dot(&self.translation) / length);
         let inverse_distance = InverseDistance::new(near / length);
-        let transformed = Landmark { bearing, inverse_distance, warp: own * landmark.warp };
+        let (warp, slope) = (&landmark.warp, landmark.slope.transpose());
+        let transformed = Landmark {
+            bearing,
+            inverse_distance,
+            warp: own * warp + own_by_distance * slope,
+            slope: (radial * by_bearing * warp + slope * by_itself[(2, 2)]).transpose(),
+            by_distance: by_itself * landmark.by_distance,
+        };
         Some((transformed, LandmarkTransition { by_motion, by_itself, mixed: tangent, curvature }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix2;
+
+    use super::*;
+    use crate::filter::state::bearing::Bearing;
+    use crate::lie::so3;
+    use crate::sim::Rng;
+    use crate::test_random::{signed, vector};
+
+    /// A patch on a plane: where its pixels go, and at what distance, against differences of the transformation itself.
+    #[test]
+    fn a_patch_moves_as_the_points_of_its_plane_do() {
+        let mut rng = Rng::new(3);
+        for _ in 0..50 {
+            let pose =
+                |rng: &mut Rng| Isometry3::from_parts((vector(rng) * 0.5).into(), so3::exp(&(vector(rng) * 0.4)));
+            let motion = CameraMotion::between(&pose(&mut rng), &pose(&mut rng));
+            let bearing = Bearing::new(&Unit::new_normalize(Vector3::new(signed(&mut rng), signed(&mut rng), 1.5)));
+            let mut landmark = Landmark::new(
+                bearing,
+                InverseDistance::new(0.4 + 0.3 * signed(&mut rng)),
+                Matrix2::from_fn(|_, _| signed(&mut rng)),
+            );
+            landmark.slope = Vector2::new(signed(&mut rng), signed(&mut rng));
+            let (moved, _) = motion.transform(&landmark).unwrap();
+            let slope_of = |by_pixel: &dyn Fn(f64) -> (Vector2<f64>, f64)| {
+                let [one, two] = [1e-6, -1e-6].map(|h| {
+                    let (aside, farther) = by_pixel(h);
+                    let inverse_distance = InverseDistance::new(landmark.inverse_distance.value + farther);
+                    let point = Landmark { bearing: bearing.boxplus(&aside), inverse_distance, ..landmark };
+                    motion.transform(&point).unwrap().0
+                });
+                let turned = one.bearing.direction() - two.bearing.direction();
+                let nearer = one.inverse_distance.value - two.inverse_distance.value;
+                let aside = moved.bearing.coordinates() * (turned / 2e-6);
+                Vector3::new(aside.x, aside.y, nearer / 2e-6)
+            };
+            for column in 0..2 {
+                let found = slope_of(&|h| (landmark.warp.column(column) * h, landmark.slope[column] * h));
+                assert!((found.xy() - moved.warp.column(column)).norm() < 1e-6 * (1.0 + found.norm()));
+                assert!((found.z - moved.slope[column]).abs() < 1e-6 * (1.0 + found.norm()));
+            }
+            let found = slope_of(&|h| (Vector2::zeros(), h));
+            assert!((found - moved.by_distance).norm() < 1e-6 * (1.0 + found.norm()));
+        }
     }
 }

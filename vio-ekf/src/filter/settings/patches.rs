@@ -12,13 +12,13 @@ pub struct PatchSettings {
     pub first_level: usize,
     /// Least standard deviation of a pixel's intensity difference, grey levels; the residual of an alignment may raise it.
     pub intensity_sigma: f64,
-    /// Standard deviation of a patch's position that no pixel noise explains, pixels: interpolation, slanted surfaces; ours.
+    /// Standard deviation of a patch's position that no pixel noise explains, pixels: interpolation, rough surfaces; ours.
     pub pixel_sigma: f64,
-    /// Random walk of the point that a patch stands for, pixels/√s: seen from elsewhere, a slanted or rough surface no longer
+    /// Random walk of the point that a patch stands for, pixels/√s: seen from elsewhere, a bent or rough surface no longer
     /// agrees with the template, in a way that lasts; ours.
     pub template_drift: f64,
-    /// The same by the angle between the directions in which the point is seen, pixels/√rad: what a slanted or rough surface
-    /// no longer agrees in grows with that; ours.
+    /// The same by the angle between the directions in which the point is seen, pixels/√rad: what a bent or rough surface no
+    /// longer agrees in grows with that; ours.
     pub template_parallax: f64,
     /// Largest share of a patch's energy (squared contrast) that may remain as residual; ours.
     pub max_residual_ratio: f64,

@@ -1,6 +1,6 @@
 //! Landmarks in robocentric coordinates, and how a camera sees them.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::bearing::Bearing;
 use super::inverse_distance::InverseDistance;
@@ -14,6 +14,23 @@ pub(crate) struct Landmark {
     pub(crate) inverse_distance: InverseDistance,
     /// Tangent coordinates per pixel of the patch as it was extracted: how the patch has been deformed since.
     pub(crate) warp: Matrix2<f64>,
+    /// Inverse distance per pixel of the patch: its surface is a plane (Molton, Davison and Reid 2004).
+    pub(crate) slope: Vector2<f64>,
+    /// Tangent coordinates and inverse distance by the inverse distance when the patch was extracted: the parallax since.
+    pub(crate) by_distance: Vector3<f64>,
+}
+
+impl Landmark {
+    /// With a patch that is extracted now, of a surface that faces the camera.
+    pub(crate) fn new(bearing: Bearing, inverse_distance: InverseDistance, warp: Matrix2<f64>) -> Self {
+        Self { bearing, inverse_distance, warp, slope: Vector2::zeros(), by_distance: Vector3::z() }
+    }
+
+    /// Changes the slope that the patch had when it was extracted.
+    pub(crate) fn tilt(&mut self, change: &Vector2<f64>) {
+        self.warp += self.by_distance.xy() * change.transpose();
+        self.slope += change * self.by_distance.z;
+    }
 }
 
 /// Pixel of a bearing and its derivative by the bearing's tangent coordinates.

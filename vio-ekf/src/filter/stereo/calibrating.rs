@@ -55,7 +55,7 @@ fn measure(
     let warp = by_bearing.try_inverse()?;
     let at = |value: f64| {
         let inverse_distance = InverseDistance::new(value);
-        rig.project(&Landmark { bearing: landmark.bearing, inverse_distance, warp })
+        rig.project(&Landmark::new(landmark.bearing, inverse_distance, warp))
     };
     let jacobian = |value: f64| {
         let projection = at(value)?;

@@ -50,7 +50,7 @@ impl EpipolarSearch<'_> {
     ) -> Option<StereoDepth> {
         let project = |inverse_distance| {
             let inverse_distance = InverseDistance::new(inverse_distance);
-            self.rig.project(&Landmark { bearing: *bearing, inverse_distance, warp: *warp })
+            self.rig.project(&Landmark::new(*bearing, inverse_distance, *warp))
         };
         let first = self.search(patch, &project, range)?;
         let mut inverse_distance = first;

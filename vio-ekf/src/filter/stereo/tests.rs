@@ -132,11 +132,7 @@ fn a_landmark_is_where_the_other_camera_sees_its_point() {
     for k in 0..60 {
         let pixel = Vector2::new(120.0 + 9.0 * f64::from(k), 60.0 + 67.0 * f64::from(k % 6));
         let bearing = Bearing::new(&first.bearing(&pixel).unwrap());
-        let landmark = |near| Landmark {
-            bearing,
-            inverse_distance: InverseDistance::new(near),
-            warp: Matrix2::new(1.1, 0.2, -0.3, 0.9),
-        };
+        let landmark = |near| Landmark::new(bearing, InverseDistance::new(near), Matrix2::new(1.1, 0.2, -0.3, 0.9));
         let near = 0.1 + 0.02 * f64::from(k);
         let (at, landmark) = (landmark, landmark(near));
         let seen = |landmark: &Landmark| {
@@ -236,7 +232,7 @@ fn pixels_of_the_second_camera_move_with_bearing_distance_and_clock() {
         let pixel = Vector2::new(150.0 + 11.0 * f64::from(k), 80.0 + 61.0 * f64::from(k % 6));
         let bearing = Bearing::new(&first.bearing(&pixel).unwrap());
         let inverse_distance = InverseDistance::new(0.1 + 0.02 * f64::from(k));
-        let landmark = Landmark { bearing, inverse_distance, warp: Matrix2::identity() * 3.0 };
+        let landmark = Landmark::new(bearing, inverse_distance, Matrix2::identity() * 3.0);
         let measurement = StereoPixelMeasurement {
             row: crate::filter::state::error_state::FIXED,
             pixel: Vector2::zeros(),

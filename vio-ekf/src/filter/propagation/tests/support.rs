@@ -37,10 +37,9 @@ pub(super) fn state(rng: &mut Rng, landmarks: usize) -> VioState {
         lens: None,
         second: None,
         landmarks: (0..landmarks)
-            .map(|_| Landmark {
-                bearing: Bearing::new(&Unit::new_normalize(Vector3::new(signed(rng), signed(rng), 1.0))),
-                inverse_distance: InverseDistance::new(0.3 + 0.2 * signed(rng)),
-                warp: Matrix2::identity(),
+            .map(|_| {
+                let bearing = Bearing::new(&Unit::new_normalize(Vector3::new(signed(rng), signed(rng), 1.0)));
+                Landmark::new(bearing, InverseDistance::new(0.3 + 0.2 * signed(rng)), Matrix2::identity())
             })
             .collect(),
     }
