@@ -41,7 +41,9 @@ def main():
             if channel.topic == "/tf":
                 frames = {frame.child_frame_id: matrix(frame) for frame in message.transforms}
                 continue
-            robot.update_cfg({joint.name: joint.position for joint in message.joints})
+            # The valve stands beside the joints, and is none of the robot's.
+            joints = {joint.name: joint.position for joint in message.joints if joint.name in robot.joint_map}
+            robot.update_cfg({name: joints[name] for name in robot.actuated_joint_names})
             ours = frames["pan"] @ frames["tilt"] @ frames["nozzle"]
             theirs = robot.get_transform("nozzle", "body")
             position = max(position, numpy.linalg.norm(ours[:3, 3] - theirs[:3, 3]))
