@@ -167,7 +167,7 @@ def odometry():
     columns(errors, names, [("one camera", numbers(rows, "ate_one_mm"), OURS), ("two cameras", numbers(rows, "ate_two_mm"), PALE)])
     errors.plot([i - 0.2 for i in range(len(rows))], numbers(rows, "ate_one_worst_mm"), "_", color=RULE, markersize=14, markeredgewidth=2,
                 label="one camera, worst of five")
-    errors.set(ylabel="position error (ATE), mm", ylim=(0, 42))
+    errors.set(ylabel="position error (ATE), mm", ylim=(0, 50))
     errors.legend(loc="upper right", fontsize=8)
     groups = [("position", "nees_position", "o", OURS), ("attitude", "nees_attitude", "s", OTHER), ("velocity", "nees_velocity", "^", "#4b9b6e"),
               ("gyroscope bias", "nees_gyro_bias", "D", "#8e63b0"), ("accelerometer bias", "nees_accel_bias", "v", PEER)]
