@@ -79,7 +79,7 @@ impl<const C: usize> Measurement<2, C> for PixelMeasurement<'_, C> {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{SVector, UnitQuaternion, Vector3};
+    use nalgebra::{SVector, Vector3};
 
     use super::*;
     use crate::filter::settings::Settings;
@@ -87,29 +87,11 @@ mod tests {
     use crate::filter::state::error_state;
     use crate::filter::state::inverse_distance::InverseDistance;
     use crate::filter::state::vio_state::VioState;
-    use crate::inertial::core_state::CoreState;
-
-    /// A state that the measurement does not look at.
-    fn state() -> VioState {
-        let (zero, identity) = (Vector3::zeros(), UnitQuaternion::identity());
-        VioState {
-            core: CoreState { position: zero, velocity: zero, attitude: identity, gyro_bias: zero, accel_bias: zero },
-            camera_position: zero,
-            camera_attitude: identity,
-            time_offset: 0.0,
-            depth_prior: InverseDistance::new(1.0),
-            accel_matrix: None,
-            gyro_scale: Vector3::repeat(1.0),
-            lens: None,
-            second: None,
-            landmarks: Vec::new(),
-        }
-    }
 
     /// The derivative against differences, at no step and at one that changes the lens: then with another focal length another pixel.
     #[test]
     fn the_pixel_moves_with_bearing_clock_and_lens() {
-        let (camera, settings, state) = (Camera::euroc(), Settings::default(), state());
+        let (camera, settings, state) = (Camera::euroc(), Settings::default(), VioState::empty());
         let pixel = Vector2::new(600.0, 100.0);
         let bearing = Bearing::new(&camera.bearing(&pixel).unwrap());
         let landmark = Landmark::new(bearing, InverseDistance::new(0.2), Matrix2::identity());

@@ -128,3 +128,23 @@ impl VioState {
         }
     }
 }
+
+#[cfg(test)]
+impl VioState {
+    /// At rest at the origin, without landmarks: for measurements that do not look at it.
+    pub(crate) fn empty() -> Self {
+        let (zero, identity) = (Vector3::zeros(), UnitQuaternion::identity());
+        Self {
+            core: CoreState { position: zero, velocity: zero, attitude: identity, gyro_bias: zero, accel_bias: zero },
+            camera_position: zero,
+            camera_attitude: identity,
+            time_offset: 0.0,
+            depth_prior: InverseDistance::new(1.0),
+            accel_matrix: None,
+            gyro_scale: Vector3::repeat(1.0),
+            lens: None,
+            second: None,
+            landmarks: Vec::new(),
+        }
+    }
+}

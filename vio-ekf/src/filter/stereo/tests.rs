@@ -17,7 +17,6 @@ use crate::filter::state::bearing::Bearing;
 use crate::filter::state::inverse_distance::InverseDistance;
 use crate::filter::state::landmark::{Landmark, project};
 use crate::filter::state::vio_state::VioState;
-use crate::inertial::core_state::CoreState;
 use crate::inertial::iterated_update::Linearization;
 use crate::samples::ImageView;
 use crate::sim::Rng;
@@ -101,23 +100,6 @@ fn measured(
 
 fn wide(_: f64) -> (f64, f64) {
     (0.0, 2.0)
-}
-
-/// A state that the measurement does not look at.
-fn empty_state() -> VioState {
-    let (zero, identity) = (Vector3::zeros(), UnitQuaternion::identity());
-    VioState {
-        core: CoreState { position: zero, velocity: zero, attitude: identity, gyro_bias: zero, accel_bias: zero },
-        camera_position: zero,
-        camera_attitude: identity,
-        time_offset: 0.0,
-        depth_prior: InverseDistance::new(1.0),
-        accel_matrix: None,
-        gyro_scale: Vector3::repeat(1.0),
-        lens: None,
-        second: None,
-        landmarks: Vec::new(),
-    }
 }
 
 /// Twelve uniform numbers summed up to a normal distribution.
@@ -226,7 +208,7 @@ fn nothing_is_found_where_it_is_not() {
 fn pixels_of_the_second_camera_move_with_bearing_distance_and_clock() {
     let [first, other] = [Camera::euroc(), Camera::euroc_right()];
     let rig = StereoRig::new(&first, Arc::new(other));
-    let (rate, mut settings, state) = (Vector2::new(0.3, -0.5), Settings::default(), empty_state());
+    let (rate, mut settings, state) = (Vector2::new(0.3, -0.5), Settings::default(), VioState::empty());
     settings.landmarks.pixel_sigma = 0.7;
     for k in 0..40 {
         let pixel = Vector2::new(150.0 + 11.0 * f64::from(k), 80.0 + 61.0 * f64::from(k % 6));
