@@ -125,7 +125,7 @@ mod tests {
     use crate::mesh_io::TriangleMesh;
     use crate::region::Scene;
 
-    /// Every texel of a wall lies in the cell of a spray: half a spacing along the row, half the rows' spacing across it.
+    /// The first cell begins at the border of a wall, the others follow a spacing apart to its other end.
     #[test]
     fn cells_cover_the_wall_from_its_border_on() {
         let corner = |k: u32| [0.0, 0.5 - 0.25 * (k % 5) as f32, 1.0 + 0.25 * (k / 5) as f32];
