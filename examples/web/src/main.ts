@@ -19,7 +19,7 @@ import { Wall } from "./wall";
 import type { Hit } from "./wall";
 import { Watch } from "./watch";
 
-// Time without a movement after which a pointer rests, milliseconds.
+// Time without a movement after which a pointer rests, milliseconds; as long as a movement may be on its way to the page.
 const STILL = 60;
 // Radius of the eraser, metres.
 const ERASER = 0.06;
@@ -315,11 +315,11 @@ renderer.setAnimationLoop((time) => {
   cradle.move(Math.min(clock.getDelta(), 0.1));
   if (!headset.presenting) camera.rotation.set(pointer.pitch, 0, 0);
   scene.updateMatrixWorld();
-  // A pointer that moves speaks for itself: a frame between two of its places would hold it still, and the stroke would be dots.
-  const now = performance.now();
-  const moving = !headset.presenting && now - moved < STILL;
+  // A pointer that moves speaks for itself: a frame between two of its places would hold it still, and the stroke would be dots. One that
+  // rests is known until STILL ago: a later movement may have been made already, and the session leaves out what is older than its latest.
+  const now = headset.presenting ? performance.now() : performance.now() - STILL;
   if (watch && headset.presenting) headset.update();
-  if (wall && !moving) wall.project(publish(wall, now) === "viewing" ? robot.camera : null);
+  if (wall && (headset.presenting || now > moved)) wall.project(publish(wall, now) === "viewing" ? robot.camera : null);
   if (echo?.tidy()) stale = true;
   if (drawing || !(stale || watch || headset.presenting)) return;
   stale = false;

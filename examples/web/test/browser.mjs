@@ -62,6 +62,37 @@ async function stroke(page, from, to, halfway = async () => {}) {
   await page.mouse.up();
 }
 
+/** Whether a movement that reaches the page 40 ms after it was made is a state later than those before it. */
+const comesLate = (page) =>
+  page.evaluate(async () => {
+    const { connection } = window.paintcopter;
+    const canvas = document.getElementById("scene");
+    const frame = () => new Promise((done) => requestAnimationFrame(done));
+    const times = [];
+    const { state } = connection;
+    connection.state = (next) => {
+      times.push(next.time);
+      return state.call(connection, next);
+    };
+    const place = canvas.getBoundingClientRect();
+    const send = (name, event) => canvas.dispatchEvent(event ?? new PointerEvent(name, { clientX: place.x + 300, clientY: place.y + 150, pointerId: 1 }));
+    canvas.setPointerCapture = () => {};
+    send("pointerdown");
+    const down = performance.now();
+    while (performance.now() - down < 300) await frame();
+    const rested = times.length;
+    // The page has just said where the pointer rests.
+    const init = { clientX: place.x + 310, clientY: place.y + 150, pointerId: 1 };
+    const made = new PointerEvent("pointermove", init);
+    Object.defineProperty(made, "timeStamp", { value: performance.now() - 40 });
+    const late = new PointerEvent("pointermove", { ...init, coalescedEvents: [made] });
+    send("pointermove", late);
+    send("pointerup");
+    delete connection.state;
+    delete canvas.setPointerCapture;
+    return { rested, later: times.every((time, k) => k === 0 || time >= times[k - 1]) };
+  });
+
 async function settled(page) {
   await page.waitForFunction(() => window.paintcopter.connection.waiting < 5, null, { timeout: 20000 });
   await page.waitForTimeout(400);
@@ -121,6 +152,8 @@ async function mouse(browser) {
   const left = await colour(page, 260, 200);
   assert.ok(left[0] > left[1] + 40, `red paint: ${left}`);
   assert.ok(difference(await colour(page, 370, 200), await colour(page, 370, 150)) < 40, "the eraser has erased");
+  const late = await comesLate(page);
+  assert.ok(late.rested > 2 && late.later, `a hand at rest does not overtake its own movements: ${JSON.stringify(late)}`);
   await page.click("#fly");
   await settled(page);
   await end(page, server);
