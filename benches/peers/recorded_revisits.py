@@ -1,10 +1,9 @@
 #!/usr/bin/env python3
-"""Which frames of a second recording, in the 7-Scenes layout and the world of a first one, `scan --relocalise` has placed, by how much of
-what they see was mapped. Needs numpy and pillow.
+"""Which frames of a second recording, in the 7-Scenes layout and the world of a first one, `scan --relocalise` places, each for itself, by
+how much of what they see was mapped. Needs numpy and pillow.
 
     scan --sequence KITCHEN --frames 0..200:2 --poses given --voxel 0.02 --out map
-    scan --sequence SPARSE --relocalise map/map.tsdf --out out
-    python3 recorded_revisits.py KITCHEN SPARSE out/trajectory.tum
+    python3 recorded_revisits.py KITCHEN SPARSE map/map.tsdf --scan PROGRAM
 
 A measured point counts as mapped where every tenth frame of the first recording has one within the same cell of 5 cm or beside it.
 `wrong` are placed frames that lie more than 5 cm or 5 degrees from the given pose (the bound that is usual for 7-Scenes).
@@ -13,6 +12,8 @@ A measured point counts as mapped where every tenth frame of the first recording
 import argparse
 import glob
 import os
+import subprocess
+import tempfile
 
 import numpy as np
 from PIL import Image
@@ -54,19 +55,32 @@ def rotation(q):
     )
 
 
+def alone(a, index):
+    """Where `scan` places one frame, by its number; empty if it does not."""
+    with tempfile.TemporaryDirectory() as out:
+        frames = f"{index}..{index + 1}"
+        subprocess.run([a.scan, "--sequence", a.revisits, "--frames", frames, "--relocalise", a.map, "--out", out, "--quiet"], stderr=subprocess.DEVNULL)
+        try:
+            rows = np.loadtxt(os.path.join(out, "trajectory.tum"), ndmin=2)
+        except OSError:
+            return {}
+    return {round(row[0] * RATE): row[1:] for row in rows}
+
+
 def main():
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("mapped")
     p.add_argument("revisits")
-    p.add_argument("trajectory")
+    p.add_argument("map")
+    p.add_argument("--scan", default="scan", help="the program `scan`")
     a = p.parse_args()
     k = np.loadtxt(a.mapped + "/camera-intrinsics.txt")
     seen = np.unique(np.concatenate([cells(points(n, k)) for n in sorted(glob.glob(a.mapped + "/*.depth.png"))[::10]]), axis=0)
     around = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3), -1).reshape(-1, 3)
     near = np.unique(np.concatenate([code(seen + d) for d in around]))
-    placed = {round(row[0] * RATE): row[1:] for row in np.loadtxt(a.trajectory, ndmin=2)}
     rows = []
-    for name in sorted(glob.glob(a.revisits + "/*.depth.png")):
+    for index, name in enumerate(sorted(glob.glob(a.revisits + "/*.depth.png"))):
+        placed = alone(a, index)
         number = int(os.path.basename(name).split("-")[1].split(".")[0])
         share = np.isin(code(np.floor(points(name, k) / CELL).astype(np.int64)), near).mean()
         found, wrong = number in placed, False

@@ -13,7 +13,7 @@ use crate::keyframes::small_image::{Likeness, SmallImage};
 use crate::map::Map;
 use crate::place_recognition::alignment::align;
 use crate::place_recognition::descriptor::Descriptor;
-use crate::place_recognition::features::features;
+use crate::place_recognition::features::{Feature, features};
 use crate::place_recognition::inverse_index::{InverseIndex, words};
 use crate::place_recognition::vocabulary::Vocabulary;
 use crate::settings::Settings;
@@ -194,20 +194,28 @@ impl KeyframeIndex {
         count: usize,
         wanted: impl Fn(usize) -> bool,
     ) -> Result<Vec<RecognisedPlace>, Error> {
-        check(depth, colour)?;
-        let seen = features(&reduced_to(FRAME_WIDTH, depth, colour));
-        let alike = self.words.query(&words(&self.vocabulary, &seen), count, wanted);
+        Ok(self.recognise_features(&features_of(depth, colour)?, count, wanted))
+    }
+
+    /// The same by the features of the frame.
+    pub(crate) fn recognise_features(
+        &self,
+        seen: &[Feature],
+        count: usize,
+        wanted: impl Fn(usize) -> bool,
+    ) -> Vec<RecognisedPlace> {
+        let alike = self.words.query(&words(&self.vocabulary, seen), count, wanted);
         let mut places: Vec<RecognisedPlace> = alike
             .into_iter()
             .filter_map(|keyframe| {
                 let there = &self.keyframes[keyframe];
-                let found = align(&seen, &there.features)?;
+                let found = align(seen, &there.features)?;
                 let world_from_camera = there.world_from_camera * found.keyframe_from_frame;
                 Some(RecognisedPlace { keyframe, world_from_camera, agreeing: found.agreeing })
             })
             .collect();
         places.sort_by_key(|place| (std::cmp::Reverse(place.agreeing), place.keyframe));
-        Ok(places)
+        places
     }
 
     /// The keyframes most like a frame, the likest first: at most `count`. Only those that `wanted` says are looked at.
@@ -326,6 +334,12 @@ impl KeyframeIndex {
 fn check(depth: &DepthView, colour: Option<&ColourView>) -> Result<(), Error> {
     depth.check()?;
     colour.map_or(Ok(()), ColourView::check)
+}
+
+/// The features of a frame as keyframes keep them; none without colour.
+pub(crate) fn features_of(depth: &DepthView, colour: Option<&ColourView>) -> Result<Vec<Feature>, Error> {
+    check(depth, colour)?;
+    Ok(features(&reduced_to(FRAME_WIDTH, depth, colour)))
 }
 
 fn small_image(depth: &DepthView, colour: Option<&ColourView>) -> Result<SmallImage, Error> {

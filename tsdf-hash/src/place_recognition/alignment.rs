@@ -64,35 +64,46 @@ pub(crate) fn align(frame: &[Feature], keyframe: &[Feature]) -> Option<Alignment
 fn pairs(frame: &[Feature], keyframe: &[Feature]) -> Vec<Pair> {
     let mut best_of_keyframe = vec![(u32::MAX, 0); keyframe.len()];
     let mut best_of_frame = Vec::with_capacity(frame.len());
+    let mut off = vec![0; keyframe.len()];
     for (i, feature) in frame.iter().enumerate() {
-        let mut nearest = [(u32::MAX, 0), (u32::MAX, 0)];
-        for (j, other) in keyframe.iter().enumerate() {
-            let off = (feature.descriptor.distance(&other.descriptor), j);
-            if off.0 < nearest[1].0 {
-                nearest[1] = off;
-                nearest.sort_unstable();
-            }
-            best_of_keyframe[j] = best_of_keyframe[j].min((off.0, i));
+        for ((off, best), other) in off.iter_mut().zip(&mut best_of_keyframe).zip(keyframe) {
+            *off = feature.descriptor.distance(&other.descriptor);
+            *best = (*best).min((*off, i));
         }
-        best_of_frame.push(nearest);
+        let Some(nearest) = (0..keyframe.len()).min_by_key(|j| off[*j]) else { continue };
+        let least = off[nearest];
+        // The same corner in another of the smaller images is no rival.
+        let is_rival = |j: usize| {
+            least as f32 > RATIO * off[j] as f32
+                && (vector(&keyframe[j]) - vector(&keyframe[nearest])).norm()
+                    > 2.0 * tolerance(keyframe[j].point[2].into())
+        };
+        if least <= MOST_BITS && !(0..keyframe.len()).any(|j| j != nearest && is_rival(j)) {
+            best_of_frame.push((i, nearest));
+        }
     }
-    let vector = |feature: &Feature| Vector3::from(feature.point.map(f64::from));
-    let mutual = best_of_frame.iter().enumerate().filter(|(i, [(off, j), (second, _)])| {
-        *off <= MOST_BITS && *off as f32 <= RATIO * *second as f32 && best_of_keyframe[*j].1 == *i
-    });
-    mutual.map(|(i, [(_, j), _])| [vector(&frame[i]), vector(&keyframe[*j])]).collect()
+    best_of_frame.retain(|(i, j)| best_of_keyframe[*j].1 == *i);
+    best_of_frame.into_iter().map(|(i, j)| [vector(&frame[i]), vector(&keyframe[j])]).collect()
 }
 
-/// How far two points of one place may be apart.
-fn tolerance(pair: &Pair) -> f64 {
-    TOLERANCE[0] + TOLERANCE[1] * pair[0].z.max(pair[1].z)
+fn vector(feature: &Feature) -> Vector3<f64> {
+    Vector3::from(feature.point.map(f64::from))
+}
+
+/// How far two points of one place may be apart, at a depth.
+fn tolerance(depth: f64) -> f64 {
+    TOLERANCE[0] + TOLERANCE[1] * depth
+}
+
+fn tolerance_of(pair: &Pair) -> f64 {
+    tolerance(pair[0].z.max(pair[1].z))
 }
 
 /// Whether three pairs are as far apart here as there, and far enough to fix a pose.
 fn is_rigid(three: &[Pair; 3]) -> bool {
     [(0, 1), (1, 2), (2, 0)].into_iter().all(|(i, j)| {
         let [here, there] = [0, 1].map(|k| (three[i][k] - three[j][k]).norm());
-        let most = tolerance(&three[i]) + tolerance(&three[j]);
+        let most = tolerance_of(&three[i]) + tolerance_of(&three[j]);
         here > 4.0 * most && (here - there).abs() < most
     })
 }
@@ -100,7 +111,7 @@ fn is_rigid(three: &[Pair; 3]) -> bool {
 /// Of the pairs, those whose points a pose brings together.
 fn agreeing(pairs: &[Pair], pose: &Isometry3<f64>) -> Vec<usize> {
     let off = |pair: &Pair| (pose.rotation * pair[0] + pose.translation.vector - pair[1]).norm();
-    (0..pairs.len()).filter(|k| off(&pairs[*k]) < tolerance(&pairs[*k])).collect()
+    (0..pairs.len()).filter(|k| off(&pairs[*k]) < tolerance_of(&pairs[*k])).collect()
 }
 
 /// The least-squares motion (Kabsch 1976); `None` if the points lie on a line.

@@ -6,7 +6,7 @@ use crate::place_recognition::grey_image::GreyImage;
 use crate::tracking::image_level::ImageLevel;
 
 /// Corners of the image and of three smaller ones, each 5/7 of the one before: as many per area.
-const COUNTS: [usize; 4] = [160, 80, 40, 20];
+const COUNTS: [usize; 4] = [480, 240, 120, 60];
 /// How much larger a pixel is from image to image.
 const RATIO: f32 = 7.0 / 5.0;
 
@@ -18,7 +18,7 @@ pub(crate) struct Feature {
     pub(crate) descriptor: Descriptor,
 }
 
-/// At most 300 features of a frame, of its intensities. What has no depth is left out.
+/// At most 900 features of a frame, of its intensities. What has no depth is left out.
 pub(crate) fn features(level: &ImageLevel) -> Vec<Feature> {
     let mut out = Vec::new();
     let Some(mut image) = GreyImage::of_intensity(level) else { return out };

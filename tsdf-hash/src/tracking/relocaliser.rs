@@ -6,7 +6,7 @@ use crate::dense_map::DenseMap;
 use crate::error::Error;
 use crate::global_registration::{GlobalRegistration, LocalCloud};
 use crate::images::{ColourView, DepthView};
-use crate::keyframes::index::KeyframeIndex;
+use crate::keyframes::index::{KeyframeIndex, RecognisedPlace, features_of};
 use crate::map::Map;
 use crate::settings::{MemoryLimits, Settings};
 use crate::tracking::outcome::{PosePrior, TrackingOutcome};
@@ -14,11 +14,17 @@ use crate::tracking::pose::within;
 use crate::tracking::settings::TrackingSettings;
 use crate::tracking::tracker::{FROM_AFAR, FROM_NEAR, Tracker};
 
-/// Keyframes that a frame is tracked from because it looks like them, where features have not found it (ours).
-const CANDIDATES: usize = 8;
+/// Keyframes that a frame is tracked from because it looks like them, where features have not found it; of a frame with plenty of features,
+/// which would have (ours).
+const CANDIDATES: [usize; 2] = [8, 2];
+const PLENTY: usize = 200;
 /// Keyframes of the most common words that a frame is compared with, feature by feature (ours).
-const RECOGNISED: usize = 5;
-/// Frames that must agree about a place (ours).
+const RECOGNISED: usize = 8;
+/// Features that make a frame enough (ours): frames of other rooms than the mapped one have none of twelve that agree.
+const ENOUGH: usize = 20;
+/// Another place that looks the same is looked for among keyframes at least so far from the found pose: radians, metres (ours).
+const ELSEWHERE: [f64; 2] = [0.7, 1.0];
+/// Frames that must agree about a place that features have not shown (ours).
 const FRAMES: usize = 3;
 /// The reserve map begins anew after so many frames: what it drifts must not matter.
 const LONGEST: usize = 60;
@@ -33,7 +39,10 @@ const ANOTHER: [f64; 2] = [0.02, 0.02];
 
 /// Finds a lost camera in a map.
 ///
-/// One frame is not enough: a corner of a room looks like another corner. So the frames since the camera was lost are tracked in a
+/// In colour one frame is enough where twenty of its features and the surface agree about a place, and no keyframe elsewhere knows one like it.
+/// A room that was not mapped and looks the same is taken for the mapped one.
+///
+/// Otherwise a corner of a room looks like another corner. So the frames since the camera was lost are tracked in a
 /// reserve map of their own, which says how they are placed to each other. Where a frame is found in the old map, by the features that it
 /// has in common with keyframes or near those that look most like it, the frames after it must be found where the reserve map has them,
 /// or the place is dropped. It is believed when three frames agree and no other place is left; without colour these must have been taken from different poses.
@@ -89,6 +98,8 @@ struct Place {
     agreeing: Vec<usize>,
     /// The latest frame, if it agrees.
     latest: Option<TrackingOutcome>,
+    /// Whether features and surface of one frame were enough.
+    recognised: bool,
 }
 
 impl Relocaliser {
@@ -151,7 +162,8 @@ impl Relocaliser {
         } else {
             different(place.agreeing.iter().map(|k| &reserve.poses[*k]))
         };
-        let (true, Some(outcome)) = (agreeing >= FRAMES, place.latest.take()) else { return Ok(None) };
+        let is_enough = agreeing >= FRAMES || place.recognised;
+        let (true, Some(outcome)) = (is_enough, place.latest.take()) else { return Ok(None) };
         let world_from_reserve = outcome.world_from_camera * present.inverse();
         let before = &reserve.poses[..reserve.poses.len() - 1];
         let earlier = before.iter().map(|pose| world_from_reserve * pose).collect();
@@ -221,26 +233,52 @@ impl Relocaliser {
         keyframes: &KeyframeIndex,
         present: &Isometry3<f64>,
     ) -> Result<(), Error> {
-        let mut tried: Vec<Isometry3<f64>> = Vec::new();
-        for start in keyframes.recognise(depth, colour, RECOGNISED, |_| true)? {
-            let start = start.world_from_camera;
-            // Neighbouring keyframes say the same.
-            if !tried.iter().any(|other| within(other, &start, ONE_START)) {
-                if let Some(found) = self.tracker.settle(map, depth, colour, &start, FROM_NEAR)? {
-                    self.suspect(found, present);
-                }
-                tried.push(start);
-            }
+        let seen = features_of(depth, colour)?;
+        let likest = keyframes.recognise_features(&seen, RECOGNISED, |_| true);
+        self.search_by_features(map, depth, colour, &likest, present)?;
+        // No place is enough by itself before others like it have been looked for.
+        let enough = self.places.iter().filter(|place| place.recognised).find_map(|place| place.latest.as_ref());
+        if let Some(here) = enough.map(|found| found.world_from_camera) {
+            let elsewhere = |k: usize| keyframes.pose(k).is_some_and(|pose| !within(pose, &here, ELSEWHERE));
+            let others = keyframes.recognise_features(&seen, RECOGNISED, elsewhere);
+            self.search_by_features(map, depth, colour, &others, present)?;
         }
         if !self.places.is_empty() {
             return Ok(());
         }
-        for start in keyframes.candidates(depth, colour, CANDIDATES, |_| true)? {
+        let candidates = CANDIDATES[usize::from(seen.len() >= PLENTY)];
+        for start in keyframes.candidates(depth, colour, candidates, |_| true)? {
             if let Some(found) = self.tracker.settle(map, depth, colour, &start.world_from_camera, &FROM_AFAR)? {
-                self.suspect(found, present);
+                self.suspect(found, present, false);
             }
         }
         if self.places.is_empty() { self.search_by_shape(map, depth, colour, present) } else { Ok(()) }
+    }
+
+    /// Looks for the frame where its features place it.
+    fn search_by_features(
+        &mut self,
+        map: &mut dyn DenseMap,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        recognised: &[RecognisedPlace],
+        present: &Isometry3<f64>,
+    ) -> Result<(), Error> {
+        let mut tried: Vec<Isometry3<f64>> = Vec::new();
+        for start in recognised {
+            let (start, many) = (start.world_from_camera, start.agreeing >= ENOUGH);
+            // Neighbouring keyframes say the same.
+            if !tried.iter().any(|other| within(other, &start, ONE_START)) {
+                if let Some(found) = self.tracker.converge(map, depth, colour, &start, FROM_NEAR)? {
+                    let is_enough = many && self.tracker.confirms(&found);
+                    if is_enough || self.tracker.is_sure(&found) {
+                        self.suspect(found, present, is_enough);
+                    }
+                }
+                tried.push(start);
+            }
+        }
+        Ok(())
     }
 
     /// Looks for all that was seen on the surface, once for every view from another pose.
@@ -262,18 +300,22 @@ impl Relocaliser {
         for place in found {
             let start = place.world_from_local * present;
             if let Some(found) = self.tracker.settle(map, depth, colour, &start, FROM_NEAR)? {
-                self.suspect(found, present);
+                self.suspect(found, present, false);
             }
         }
         Ok(())
     }
 
     /// The present frame is seen from here, as well.
-    fn suspect(&mut self, found: TrackingOutcome, present: &Isometry3<f64>) {
+    fn suspect(&mut self, found: TrackingOutcome, present: &Isometry3<f64>, recognised: bool) {
         let frame = self.reserve.as_ref().map_or(0, |reserve| reserve.poses.len() - 1);
         let world_from_reserve = found.world_from_camera * present.inverse();
-        if !self.places.iter().any(|place| is_same(&place.world_from_reserve, &world_from_reserve)) {
-            self.places.push(Place { world_from_reserve, agreeing: vec![frame], latest: Some(found) });
+        match self.places.iter_mut().find(|place| is_same(&place.world_from_reserve, &world_from_reserve)) {
+            Some(place) if recognised => (place.recognised, place.latest) = (true, Some(found)),
+            Some(_) => {}
+            None => {
+                self.places.push(Place { world_from_reserve, agreeing: vec![frame], latest: Some(found), recognised });
+            }
         }
     }
 }
@@ -323,9 +365,35 @@ fn different<'a>(poses: impl Iterator<Item = &'a Isometry3<f64>>) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{UnitQuaternion, Vector3};
+    use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 
     use super::*;
+    use crate::tracking::outcome::TrackingStatus;
+
+    /// A place that was suspected before, and that the frame did not confirm by itself, is where features find it.
+    #[test]
+    fn a_suspected_place_is_recognised_later() {
+        let found = TrackingOutcome {
+            status: TrackingStatus::Tracked,
+            world_from_camera: Isometry3::translation(3.0, -2.0, 1.0),
+            covariance: Matrix6::identity(),
+            degenerate: Vec::new(),
+            overlap: 0.9,
+            coverage: 0.9,
+            agreement: 0.9,
+            depth_scale: 1.0,
+            intensity_scale: 0.0,
+            likeness: Some(0.9),
+            iterations: 1,
+        };
+        let mut relocaliser = Relocaliser::new(TrackingSettings::default()).unwrap();
+        relocaliser.suspect(found.clone(), &Isometry3::identity(), false);
+        assert!(!relocaliser.places[0].recognised);
+        relocaliser.places[0].latest = None;
+        relocaliser.suspect(found, &Isometry3::identity(), true);
+        let [place] = &relocaliser.places[..] else { panic!("{} places", relocaliser.places.len()) };
+        assert!(place.recognised && place.latest.is_some());
+    }
 
     /// The next shelf is 10 cm on: another place. What two tracked frames differ by is the same one, wherever it is and looks.
     #[test]

@@ -35,6 +35,9 @@ const FINE_STRIDE: usize = 2;
 const LEAST_COVERAGE: f64 = 0.5;
 /// Least correlation of its intensities with those of the map, where both have colour (ours).
 pub(crate) const LEAST_LIKENESS: f64 = 0.75;
+/// The same of a place that features have recognised, and how much less of the frame must agree (ours).
+const CONFIRMING_LIKENESS: f64 = 0.65;
+const LESS_AGREEMENT: f64 = 0.05;
 /// Searches from a pose that may be off by half a metre: largest distances of partners, one search after the other, as multiples of the
 /// setting, and the least agreement after each of them: what is below leads nowhere (ours).
 pub(crate) const FROM_AFAR: [(f64, f64); 10] = [
@@ -126,6 +129,18 @@ impl Tracker {
         start: &Isometry3<f64>,
         reaches: &[(f64, f64)],
     ) -> Result<Option<TrackingOutcome>, Error> {
+        Ok(self.converge(map, depth, colour, start, reaches)?.filter(|outcome| self.is_sure(outcome)))
+    }
+
+    /// Where that leads, sure or not.
+    pub(crate) fn converge(
+        &mut self,
+        map: &mut dyn DenseMap,
+        depth: &DepthView,
+        colour: Option<&ColourView>,
+        start: &Isometry3<f64>,
+        reaches: &[(f64, f64)],
+    ) -> Result<Option<TrackingOutcome>, Error> {
         let (near, least) = (self.settings.max_distance, self.settings.min_agreement);
         let mut pose = *start;
         let mut last = None;
@@ -149,16 +164,19 @@ impl Tracker {
                 break;
             }
         }
-        Ok(last.filter(|outcome| self.is_sure(outcome)))
+        Ok(last)
     }
 
     /// Whether an outcome is believed where nothing was known before.
     pub(crate) fn is_sure(&self, outcome: &TrackingOutcome) -> bool {
-        outcome.is_tracked()
-            && outcome.agreement >= self.settings.relocalise_agreement
-            && outcome.coverage >= LEAST_COVERAGE
-            && outcome.likeness.is_none_or(|likeness| likeness >= LEAST_LIKENESS)
-            && outcome.degenerate.is_empty()
+        is_found(outcome) && self.convinces(outcome)
+    }
+
+    /// Whether it is where features have said so before: of what is seen from another side less agrees, and light has changed.
+    pub(crate) fn confirms(&self, outcome: &TrackingOutcome) -> bool {
+        is_found(outcome)
+            && outcome.agreement >= self.settings.relocalise_agreement - LESS_AGREEMENT
+            && outcome.likeness.is_some_and(|likeness| likeness >= CONFIRMING_LIKENESS)
     }
 
     /// Whether map and frame agree, in depth and in intensity, as they do at the right pose.
@@ -375,4 +393,9 @@ fn lost(prior: &PosePrior, status: TrackingStatus) -> TrackingOutcome {
         likeness: None,
         iterations: 0,
     }
+}
+
+/// Whether a frame is tracked, half of it, and fixed in all directions.
+fn is_found(outcome: &TrackingOutcome) -> bool {
+    outcome.is_tracked() && outcome.coverage >= LEAST_COVERAGE && outcome.degenerate.is_empty()
 }

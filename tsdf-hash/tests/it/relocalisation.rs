@@ -37,12 +37,21 @@ fn lit(shot: Shot, light: bool, seed: f64) -> Shot {
 
 /// The map of a tour with noisy depth, and its keyframes.
 fn mapped(random: &mut Random, light: bool) -> (Map, KeyframeIndex) {
+    rooms(1, random, light)
+}
+
+/// The same of so many rooms in a row that look the same.
+fn rooms(count: usize, random: &mut Random, light: bool) -> (Map, KeyframeIndex) {
     let settings = Settings { voxel_size: 0.02, threads: 2, ..Settings::default() };
     let (mut map, mut keyframes) = (Map::new(settings).unwrap(), KeyframeIndex::new());
-    for k in 0..120 {
-        let shot = lit(seen(room::pose(k, 120), random), light, 0.0);
-        map.integrate(&shot.view(), shot.colour().as_ref(), &shot.world_from_camera).unwrap();
-        keyframes.add(&shot.view(), shot.colour().as_ref(), &shot.world_from_camera).unwrap();
+    for room in 0..count {
+        let there = Isometry3::translation(10.0 * room as f64, 0.0, 0.0);
+        for k in 0..120 {
+            let shot = lit(seen(room::pose(k, 120), random), light, 0.0);
+            let pose = there * shot.world_from_camera;
+            map.integrate(&shot.view(), shot.colour().as_ref(), &pose).unwrap();
+            keyframes.add(&shot.view(), shot.colour().as_ref(), &pose).unwrap();
+        }
     }
     (map, keyframes)
 }
@@ -127,17 +136,44 @@ fn relocalisation_figures() {
     }
 }
 
+/// In colour one frame says where it was taken, but not where there are two places that look the same.
+#[test]
+fn one_frame_is_enough_unless_two_places_look_the_same() {
+    let mut random = Random::new(12);
+    let truths: Vec<Isometry3<f64>> =
+        (0..6).map(|k| room::pose(90 + 117 * k, 720) * Isometry3::translation(0.03, -0.04, 0.02)).collect();
+    for count in [1, 2] {
+        let (mut map, mut keyframes) = rooms(count, &mut random, true);
+        // The likest keyframes are all of the first room.
+        for k in 0..10 * truths.len() {
+            let pose = truths[k / 10] * Isometry3::translation(0.002 * (k % 10) as f64, 0.0, 0.0);
+            let shot = lit(seen(pose, &mut random), true, 0.0);
+            keyframes.push(&shot.view(), shot.colour().as_ref(), &pose).unwrap();
+        }
+        for truth in &truths {
+            let mut relocaliser = Relocaliser::new(TrackingSettings::default()).unwrap();
+            let shot = lit(seen(*truth, &mut random), true, 0.0);
+            let found = relocaliser.add(&mut map, &shot.view(), shot.colour().as_ref(), &keyframes).unwrap();
+            if count == 1 {
+                let (metres, radians) = apart(&found.unwrap().outcome.world_from_camera, truth);
+                assert!(metres < RIGHT[0] && radians < RIGHT[1], "{metres} m, {radians} rad");
+            } else {
+                assert!(found.is_none() && relocaliser.places() == 2, "{} places", relocaliser.places());
+            }
+        }
+    }
+}
+
 /// The frames before the one that settled it stand where they were taken.
 #[test]
 fn earlier_frames_are_placed_too() {
     let mut random = Random::new(5);
-    let (mut map, keyframes) = mapped(&mut random, true);
+    let (mut map, keyframes) = mapped(&mut random, false);
     let mut relocaliser = Relocaliser::new(TrackingSettings::default()).unwrap();
     let mut truths = Vec::new();
     for k in 0..FRAMES {
         let truth = room::pose(100 + 5 * k, 720) * Isometry3::translation(0.02, 0.03, 0.0);
-        let shot = lit(seen(truth, &mut random), true, 0.0);
-        let found = relocaliser.add(&mut map, &shot.view(), shot.colour().as_ref(), &keyframes).unwrap();
+        let found = relocaliser.add(&mut map, &seen(truth, &mut random).view(), None, &keyframes).unwrap();
         if let Some(found) = found {
             assert!(found.earlier.len() == truths.len() && truths.len() >= 2, "{}", found.earlier.len());
             for (pose, truth) in found.earlier.iter().zip(&truths) {
