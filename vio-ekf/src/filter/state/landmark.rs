@@ -26,6 +26,12 @@ impl Landmark {
         Self { bearing, inverse_distance, warp, slope: Vector2::zeros(), by_distance: Vector3::z() }
     }
 
+    /// The same surface with a patch that is extracted now; `warp` is tangent coordinates by its pixels.
+    pub(crate) fn extracted_again(&self, warp: Matrix2<f64>) -> Option<Self> {
+        let old_by_new = self.warp.try_inverse()? * warp;
+        Some(Self { warp, slope: old_by_new.tr_mul(&self.slope), by_distance: Vector3::z(), ..*self })
+    }
+
     /// Changes the slope that the patch had when it was extracted.
     pub(crate) fn tilt(&mut self, change: &Vector2<f64>) {
         self.warp += self.by_distance.xy() * change.transpose();

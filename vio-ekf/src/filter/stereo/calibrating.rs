@@ -52,11 +52,8 @@ fn measure(
     let row = estimator.state.landmark_row(slot) + 2;
     let (pixel, by_bearing) = project(&lens, &landmark.bearing)?;
     let patch = Patch::extract(first, &pixel)?;
-    let warp = by_bearing.try_inverse()?;
-    let at = |value: f64| {
-        let inverse_distance = InverseDistance::new(value);
-        rig.project(&Landmark::new(landmark.bearing, inverse_distance, warp))
-    };
+    let there = landmark.extracted_again(by_bearing.try_inverse()?)?;
+    let at = |value: f64| rig.project(&Landmark { inverse_distance: InverseDistance::new(value), ..there });
     let jacobian = |value: f64| {
         let projection = at(value)?;
         let direction = landmark.bearing.direction();

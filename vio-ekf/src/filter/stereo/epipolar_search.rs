@@ -1,12 +1,9 @@
 //! Inverse distance of a patch by search along the epipolar line and photometric refinement.
 
-use nalgebra::Matrix2;
-
 use super::rig::{StereoProjection, StereoRig};
 use crate::filter::frontend::patch::{Comparison, Patch};
 use crate::filter::frontend::pyramid::Pyramid;
 use crate::filter::settings::Settings;
-use crate::filter::state::bearing::Bearing;
 use crate::filter::state::inverse_distance::InverseDistance;
 use crate::filter::state::landmark::Landmark;
 
@@ -38,19 +35,14 @@ pub(crate) struct EpipolarSearch<'a> {
 
 impl EpipolarSearch<'_> {
     /// Measures the inverse distance of a patch, within a range. The patch is extracted from the first camera's image of the same
-    /// moment around a bearing; `warp` is tangent coordinates by pixels of the patch.
+    /// moment around the bearing of `there`, which knows how its surface is turned.
     ///
     /// Because the patch is of this moment and from exactly that bearing, neither the error of the bearing nor that of the
     /// time offset matters: what is measured is the distance alone.
-    pub(crate) fn measure(
-        &self,
-        patch: &Patch,
-        (bearing, warp): (&Bearing, &Matrix2<f64>),
-        range: (f64, f64),
-    ) -> Option<StereoDepth> {
+    pub(crate) fn measure(&self, patch: &Patch, there: &Landmark, range: (f64, f64)) -> Option<StereoDepth> {
         let project = |inverse_distance| {
             let inverse_distance = InverseDistance::new(inverse_distance);
-            self.rig.project(&Landmark::new(*bearing, inverse_distance, *warp))
+            self.rig.project(&Landmark { inverse_distance, ..*there })
         };
         let first = self.search(patch, &project, range)?;
         let mut inverse_distance = first;

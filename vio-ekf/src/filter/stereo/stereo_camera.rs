@@ -19,7 +19,8 @@ use crate::filter::measurements::update::gated_update;
 use crate::filter::point_observation::PointObservation;
 use crate::filter::settings::{PatchSettings, Settings};
 use crate::filter::state::bearing::Bearing;
-use crate::filter::state::landmark::project;
+use crate::filter::state::inverse_distance::InverseDistance;
+use crate::filter::state::landmark::{Landmark, project};
 use crate::samples::ImageView;
 
 /// Two cameras that are nearer to each other, m, are one.
@@ -71,7 +72,8 @@ impl StereoCamera {
         bearing: (&Bearing, &Matrix2<f64>),
         settings: &Settings,
     ) -> Option<(f64, f64)> {
-        let depth = self.measure(patch, bearing, (0.0, 1.0 / settings.stereo.min_distance_m), settings)?;
+        let there = Landmark::new(*bearing.0, InverseDistance::new(1.0), *bearing.1);
+        let depth = self.measure(patch, &there, (0.0, 1.0 / settings.stereo.min_distance_m), settings)?;
         // Negative by noise alone: half a deviation, which cannot be told from infinity.
         Some((depth.inverse_distance.max(0.5 * depth.variance.sqrt()), depth.variance))
     }
@@ -98,7 +100,8 @@ impl StereoCamera {
             let (Some(patch), Some(warp)) = (Patch::extract(first, &pixel), by_bearing.try_inverse()) else { continue };
             let middle = landmark.inverse_distance.value;
             let range = (middle - SEARCH_DEVIATIONS * deviation, middle + SEARCH_DEVIATIONS * deviation);
-            let Some(depth) = self.measure(&patch, (&landmark.bearing, &warp), range, settings) else { continue };
+            let Some(there) = landmark.extracted_again(warp) else { continue };
+            let Some(depth) = self.measure(&patch, &there, range, settings) else { continue };
             let measurement = InverseDistanceMeasurement {
                 row,
                 predicted: middle,
@@ -114,12 +117,12 @@ impl StereoCamera {
     pub(crate) fn measure(
         &self,
         patch: &Patch,
-        bearing: (&Bearing, &Matrix2<f64>),
+        there: &Landmark,
         range: (f64, f64),
         settings: &Settings,
     ) -> Option<StereoDepth> {
         let search = EpipolarSearch { rig: &self.rig, pyramid: &self.pyramid, settings };
-        self.has_image.then(|| search.measure(patch, bearing, range))?
+        self.has_image.then(|| search.measure(patch, there, range))?
     }
 
     #[cfg(test)]

@@ -92,7 +92,8 @@ fn measured(
             let bearing = Bearing::new(&camera.bearing(&pixel).unwrap());
             let warp = project(&camera, &bearing).unwrap().1.try_inverse().unwrap();
             let truth = bearing.direction().z / AWAY;
-            found.push((second.measure(&patch, (&bearing, &warp), range(truth), settings), truth));
+            let there = Landmark::new(bearing, InverseDistance::new(1.0), warp);
+            found.push((second.measure(&patch, &there, range(truth), settings), truth));
         }
     }
     found
@@ -138,6 +139,26 @@ fn a_landmark_is_where_the_other_camera_sees_its_point() {
             assert!(((one - two) / (2.0 * h) - place.warp.column(axis)).norm() < 1e-4 * place.warp.norm());
         }
     }
+}
+
+/// Whatever pixels a patch of it has: the other camera sees the same plane.
+#[test]
+fn a_surface_stays_turned_when_its_patch_is_extracted_again() {
+    let [first, other] = [Camera::euroc(), Camera::euroc_right()];
+    let rig = StereoRig::new(&first, Arc::new(other));
+    let mut landmark = Landmark::new(
+        Bearing::new(&first.bearing(&Vector2::new(300.0, 190.0)).unwrap()),
+        InverseDistance::new(0.6),
+        Matrix2::new(1.1, 0.2, -0.3, 0.9) / 458.0,
+    );
+    landmark.slope = Vector2::new(9e-4, -4e-4);
+    let warp = Matrix2::new(0.8, -0.4, 0.1, 1.2) / 458.0;
+    let again = landmark.extracted_again(warp).unwrap();
+    let new_by_old = warp.try_inverse().unwrap() * landmark.warp;
+    let [old, new] = [landmark, again].map(|landmark| rig.project(&landmark).unwrap().warp);
+    assert!((old - new * new_by_old).norm() < 1e-12 * old.norm(), "{old} {new}");
+    let facing = rig.project(&Landmark { slope: Vector2::zeros(), ..again }).unwrap().warp;
+    assert!((facing - new).norm() > 1e-2 * new.norm(), "the slope shows");
 }
 
 #[test]
@@ -201,7 +222,8 @@ fn nothing_is_found_where_it_is_not() {
     let bearing = Bearing::new(&camera.bearing(&pixel).unwrap());
     let warp = project(&camera, &bearing).unwrap().1.try_inverse().unwrap();
     let patch = Patch::extract(&first, &pixel).unwrap();
-    assert!(second.measure(&patch, (&bearing, &warp), wide(0.0), &settings).is_none());
+    let there = Landmark::new(bearing, InverseDistance::new(1.0), warp);
+    assert!(second.measure(&patch, &there, wide(0.0), &settings).is_none());
 }
 
 #[test]
