@@ -113,12 +113,8 @@ impl TsdfLayer for Map {
 
     fn changes_since(&self, before: Option<MapVersion>) -> BlockChanges {
         let storage = &self.storage;
-        let since = |stamp: Option<u64>| match stamp {
-            Some(stamp) => storage.changed_since(stamp),
-            None => storage.sorted_keys(),
-        };
-        let blocks = |keys: Vec<BlockKey>| keys.into_iter().map(BlockKey::block).collect();
-        BlockChanges::new(storage.active.clock.version(), before, |stamp| blocks(since(stamp)))
+        let since = |stamp| storage.changed_since(stamp).into_iter().map(BlockKey::block).collect();
+        BlockChanges::new(storage.active.clock.version(), before, since)
     }
 
     fn contains_block(&self, block: [i32; 3]) -> bool {

@@ -7,6 +7,7 @@ use crate::gpu::gpu_map::GpuMap;
 #[cfg(feature = "gpu")]
 use crate::gpu::options::GpuOptions;
 use crate::map::Map;
+use crate::report::MemoryUsage;
 
 /// Which device keeps a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -31,11 +32,10 @@ pub enum DeviceMap {
 }
 
 impl DeviceMap {
-    /// The map on a device, evicted blocks included; and why it is on the processor, if a GPU was to be taken where there is one.
+    /// The map on a device; and why it is on the processor, if a GPU was to be taken where there is one.
     ///
     /// # Errors
-    /// With [`Device::Gpu`]: [`Error::NoAdapter`], without the feature, too, and [`Error::Device`](crate::Error). In any case [`Error::OutOfBudget`], and those of
-    /// evicted blocks.
+    /// With [`Device::Gpu`], those of `GpuMap::from_map`; without the feature `gpu`, [`Error::NoAdapter`].
     pub fn open(map: Map, device: Device) -> Result<(Self, Option<Error>), Error> {
         match device {
             Device::Cpu => Ok((Self::Cpu(Box::new(map)), None)),
@@ -43,22 +43,21 @@ impl DeviceMap {
         }
     }
 
-    /// The map on the GPU that the options choose, or on the processor where that one is not there or does not work; then with the reason.
-    ///
-    /// # Errors
-    /// [`Error::OutOfBudget`], and those of evicted blocks.
+    /// The map on the GPU that the options choose, or on the processor where that does not work; then with the reason.
     #[cfg(feature = "gpu")]
-    pub fn on_adapter(map: Map, options: &GpuOptions) -> Result<(Self, Option<Error>), Error> {
-        match GpuMap::from_map(&map, options) {
-            Ok(on_gpu) => Ok((Self::Gpu(Box::new(on_gpu)), None)),
-            Err(why @ (Error::NoAdapter { .. } | Error::Device { .. })) => Ok((Self::Cpu(Box::new(map)), Some(why))),
-            Err(error) => Err(error),
+    pub fn on_adapter(map: Map, options: &GpuOptions) -> (Self, Option<Error>) {
+        match GpuMap::from_map(map, options) {
+            Ok(on_gpu) => (Self::Gpu(Box::new(on_gpu)), None),
+            Err(refused) => {
+                let (map, why) = *refused;
+                (Self::Cpu(Box::new(map)), Some(why))
+            }
         }
     }
 
     #[cfg(feature = "gpu")]
     fn on_gpu(map: Map, demanded: bool) -> Result<(Self, Option<Error>), Error> {
-        match Self::on_adapter(map, &GpuOptions { software: demanded, ..GpuOptions::default() })? {
+        match Self::on_adapter(map, &GpuOptions { software: demanded, ..GpuOptions::default() }) {
             (Self::Cpu(_), Some(why)) if demanded => Err(why),
             opened => Ok(opened),
         }
@@ -98,6 +97,15 @@ impl DeviceMap {
         }
     }
 
+    /// Where the blocks are, and the bytes they take.
+    pub fn memory(&self) -> MemoryUsage {
+        match self {
+            Self::Cpu(map) => map.memory(),
+            #[cfg(feature = "gpu")]
+            Self::Gpu(map) => map.memory(),
+        }
+    }
+
     /// Name, interface and driver of the GPU, or `cpu`.
     pub fn device(&self) -> &str {
         match self {
@@ -119,16 +127,16 @@ impl DeviceMap {
         }
     }
 
-    /// The map in the processor's memory; that of a GPU without a cap in bytes.
+    /// The map on the processor; one of a GPU as `GpuMap::into_map` says.
     ///
     /// # Errors
-    /// [`Error::Device`](crate::Error).
+    /// [`Error::Device`](crate::Error), and those of evicted blocks.
     #[cfg_attr(not(feature = "gpu"), allow(clippy::unnecessary_wraps, reason = "a map on a GPU must be fetched"))]
     pub fn into_map(self) -> Result<Map, Error> {
         match self {
             Self::Cpu(map) => Ok(*map),
             #[cfg(feature = "gpu")]
-            Self::Gpu(map) => map.to_map(usize::MAX),
+            Self::Gpu(map) => map.into_map(),
         }
     }
 }

@@ -12,6 +12,7 @@ mod split;
 mod stream;
 #[cfg(test)]
 mod test_adapter;
+mod tiers;
 
 pub use gpu_map::GpuMap;
 pub use options::GpuOptions;

@@ -188,6 +188,7 @@ impl Map {
         let frame = Frame::read(&mut self.plane_image, depth, colour, world_from_camera, &self.settings)?;
         let camera = world_from_camera.translation.vector / self.settings.block_size();
         let job = FrameJob { frame: &frame, operation, time, camera: camera.into(), threads: self.settings.threads };
+        self.storage.begin_call();
         let change = apply_frame(&mut self.storage, job, &frame.plane_image.keys)?;
         let transfers = match operation {
             Operation::Integrate => self.storage.transfer(&change.touched, time),

@@ -10,6 +10,7 @@ pub(crate) mod reloaded;
 mod sorted_pages;
 pub(crate) mod summary;
 pub(crate) mod swap_file;
+pub(crate) mod victims;
 
 pub use crate::file::map_file::MapFile;
 pub use crate::report::MemoryUsage;

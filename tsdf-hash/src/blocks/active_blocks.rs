@@ -38,6 +38,21 @@ impl ActiveBlocks {
         Ok(blocks)
     }
 
+    /// Changes the cap, whatever is here, and gives back the memory of blocks that have gone.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn resize(&mut self, max_bytes: usize) -> Result<(), Error> {
+        let mut resized = Self::new(max_bytes)?;
+        std::mem::swap(&mut resized.clock, &mut self.clock);
+        resized.set_aside = self.set_aside;
+        for key in self.keys().to_vec() {
+            if let Some(slot) = self.slots.remove(key) {
+                resized.slots.insert(key, slot);
+            }
+        }
+        *self = resized;
+        Ok(())
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.slots.len()
     }

@@ -6,6 +6,7 @@
 
 use nalgebra::Isometry3;
 
+use crate::blocks::block_history::BlockHistory;
 use crate::blocks::block_key::BlockKey;
 use crate::blocks::block_table::BlockTable;
 use crate::blocks::voxel_block::VoxelBlock;
@@ -17,10 +18,9 @@ use crate::gpu::cast::Caster;
 use crate::gpu::device::Device;
 use crate::gpu::fuse::{Fuser, Mode, Pass};
 use crate::gpu::options::GpuOptions;
-use crate::gpu::pool::Pool;
 use crate::gpu::probe;
-use crate::gpu::split::{Split, admit, mode, touched};
-use crate::gpu::stream::{Stream, upload};
+use crate::gpu::split::{Split, mode, touched};
+use crate::gpu::tiers::Tiers;
 use crate::images::{ColourView, DepthView, Intrinsics};
 use crate::integration::integrator::{Frame, Operation};
 use crate::integration::plane_image::PlaneImage;
@@ -29,117 +29,95 @@ use crate::map::Map;
 use crate::ray_cast::camera::Camera;
 use crate::ray_cast::settings::RayCastSettings;
 use crate::ray_cast::view::View;
-use crate::report::FrameReport;
+use crate::report::{FrameReport, MemoryUsage};
 use crate::settings::{MemoryLimits, Settings};
-use crate::storage::block_storage::hash_block;
+use crate::storage::block_storage::BlockStorage;
+use crate::storage::frame_update::FrameJob;
 
 /// A map whose blocks lie on a GPU. It equals, to the bit, a [`Map`] that was given the same frames.
 ///
 /// [`Settings::max_bytes`] caps the blocks on the device and their index on the processor; buffers for one frame (16 bytes
-/// per pixel, the colour image) and for blocks on their way (3.5 MiB) come on top. [`Settings::memory`] plays no part: see
-/// [`drain_into`](Self::drain_into).
+/// per pixel, the colour image) and for blocks on their way (3.5 MiB) come on top. Behind the device stands a [`Map`] on the processor with
+/// the [`MemoryLimits`](crate::storage::MemoryLimits) of the settings, whose own active memory is 1 MiB to work with: as a map on the
+/// processor evicts blocks from its active memory and reloads them, so does this one from the device's (thesis Paper I, section 4.3). What
+/// of a frame meets blocks that are evicted, or finds no room on the device, is fused on the processor.
 ///
 /// Open and close maps of a process one after another: NVIDIA's Vulkan driver 580 now and then hangs or crashes where several threads do so
 /// side by side.
 pub struct GpuMap {
-    settings: Settings,
-    device: Device,
-    pool: Pool,
+    tiers: Tiers,
     fuser: Fuser,
     caster: Caster,
-    stream: Stream,
     plane_image: PlaneImage,
-    clock: FrameClock,
 }
 
 impl GpuMap {
     /// An empty map.
     ///
     /// # Errors
-    /// [`Error::InvalidSetting`]; [`Error::NoAdapter`] where there is no GPU; [`Error::Device`] if it does not compute as
-    /// IEEE 754 says or refuses its buffers.
+    /// As [`Map::new`] and [`from_map`](Self::from_map).
     pub fn new(settings: Settings, options: &GpuOptions) -> Result<Self, Error> {
-        settings.check()?;
+        Self::from_map(Map::new(settings)?, options).map_err(|refused| refused.1)
+    }
+
+    /// A map that goes on from `map`, with its settings, its swap file, and its evicted blocks, which stay where they are.
+    ///
+    /// # Errors
+    /// With the map: [`Error::NoAdapter`] where there is no GPU; [`Error::Device`] if it does not compute as IEEE 754 says or refuses its
+    /// buffers; [`Error::InvalidSetting`] with a [`merge_timeout`](crate::storage::MemoryLimits::merge_timeout), because a block has one
+    /// copy here; [`Error::OutOfBudget`] if the device has no room for the active blocks and none can be evicted.
+    pub fn from_map(map: Map, options: &GpuOptions) -> Result<Self, Box<(Map, Error)>> {
+        let opened = match Self::open(map.settings(), options) {
+            Ok(opened) => opened,
+            Err(error) => return Err(Box::new((map, error))),
+        };
+        let (device, fuser, caster) = opened;
+        Ok(Self { tiers: Tiers::new(map, device)?, fuser, caster, plane_image: PlaneImage::default() })
+    }
+
+    fn open(settings: &Settings, options: &GpuOptions) -> Result<(Device, Fuser, Caster), Error> {
+        let value = settings.memory.merge_timeout;
+        if value > 0.0 {
+            let requirement = "0 on a GPU, where what is reloaded is merged at once: use a map on the processor";
+            return Err(Error::InvalidSetting { name: "memory.merge_timeout", value, requirement });
+        }
         let device = Device::open(options)?;
         probe::check(&device)?;
-        let pool = Pool::new(&device, settings.max_bytes)?;
-        let (fuser, caster, stream) = (Fuser::new(&device)?, Caster::new(&device)?, Stream::new(&device)?);
-        Ok(Self {
-            settings,
-            device,
-            pool,
-            fuser,
-            caster,
-            stream,
-            plane_image: PlaneImage::default(),
-            clock: FrameClock::default(),
-        })
+        let (fuser, caster) = (Fuser::new(&device)?, Caster::new(&device)?);
+        Ok((device, fuser, caster))
     }
 
     /// The settings given to [`new`](Self::new).
     pub fn settings(&self) -> &Settings {
-        &self.settings
+        self.tiers.host.settings()
     }
 
     /// Name, interface and driver of the device.
     pub fn adapter(&self) -> &str {
-        &self.device.name
+        &self.tiers.device.name
     }
 
-    /// A map that goes on from `map`, evicted blocks included, with its settings.
-    ///
-    /// # Errors
-    /// As [`new`](Self::new), [`Error::OutOfBudget`], and those of the map's evicted blocks.
-    pub fn from_map(map: &Map, options: &GpuOptions) -> Result<Self, Error> {
-        let mut gpu = Self::new(*map.settings(), options)?;
-        let keys = map.storage.sorted_keys();
-        if keys.len() > gpu.pool.room() {
-            return Err(gpu.pool.out_of_budget());
-        }
-        gpu.pool.reserve(&gpu.device, keys.len())?;
-        let mut sum = Box::new(VoxelBlock::ZERO);
-        for key in keys {
-            map.storage.total(key, &mut sum)?;
-            upload(&gpu.device, &mut gpu.pool, key, &sum)?;
-        }
-        Ok(gpu)
+    /// Where the blocks are, and the bytes they take: active ones are those on the device.
+    pub fn memory(&self) -> MemoryUsage {
+        let (active_bytes, active_blocks) = (self.tiers.pool.bytes(), self.tiers.pool.len());
+        MemoryUsage { active_bytes, active_blocks, ..self.tiers.host.memory() }
     }
 
     /// A copy in active memory of at most `max_bytes`, to mesh, to query or to store.
     ///
     /// # Errors
-    /// [`Error::InvalidSetting`], [`Error::OutOfBudget`], [`Error::Device`].
+    /// [`Error::InvalidSetting`], [`Error::OutOfBudget`], [`Error::Device`], and those of evicted blocks.
     pub fn to_map(&self, max_bytes: usize) -> Result<Map, Error> {
-        let mut map = Map::new(Settings { max_bytes, memory: MemoryLimits::default(), ..self.settings })?;
-        let keys = self.pool.sorted_keys();
-        self.stream.download(&self.device, &self.pool, &keys, |key, block| map.storage.add_block(key, block))?;
-        Ok(map)
+        self.tiers.copy(Settings { max_bytes, memory: MemoryLimits::default(), ..*self.settings() })
     }
 
-    /// Moves all blocks into `map`, where they are added to its own, and leaves none on the device. So a map that outgrows
-    /// the device goes on: the sums of both are the sums of all frames at any time. Frames that were moved are taken out of
-    /// `map`.
+    /// The map on the processor, evicted blocks where they are. Where its active memory has no room for what was on the device, and nothing
+    /// can be evicted, it has no cap.
     ///
     /// # Errors
-    /// [`Error::InvalidSetting`] if the maps differ in more than memory and threads, [`Error::Saturated`],
-    /// [`Error::OutOfBudget`], those of its evicted memory, [`Error::Device`]. What has not been moved is then still here.
-    pub fn drain_into(&mut self, map: &mut Map) -> Result<(), Error> {
-        let Settings { max_bytes, threads, memory, .. } = self.settings;
-        if (Settings { max_bytes, threads, memory, ..*map.settings() }) != self.settings {
-            let requirement = "that of the map on the device, and so must be all settings but memory and threads";
-            return Err(Error::InvalidSetting { name: "voxel_size", value: map.settings().voxel_size, requirement });
-        }
-        let mut moved = Vec::new();
-        let keys = self.pool.sorted_keys();
-        let outcome = self.stream.download(&self.device, &self.pool, &keys, |key, block| {
-            map.storage.add_block(key, block)?;
-            moved.push(key);
-            Ok(())
-        });
-        for key in moved {
-            self.pool.remove(key);
-        }
-        outcome
+    /// [`Error::Device`], and those of evicted blocks.
+    pub fn into_map(self) -> Result<Map, Error> {
+        self.tiers.into_map()
     }
 
     fn integrate_then(
@@ -149,8 +127,8 @@ impl GpuMap {
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
     ) -> Result<FrameReport, Error> {
-        let report = self.apply(Operation::Integrate, depth, colour, world_from_camera)?;
-        self.clock = clock;
+        let report = self.apply(Operation::Integrate, depth, colour, world_from_camera, clock.time())?;
+        self.tiers.host.clock = clock;
         Ok(report)
     }
 
@@ -160,72 +138,88 @@ impl GpuMap {
         depth: &DepthView,
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
+        time: f64,
     ) -> Result<FrameReport, Error> {
-        let frame = Frame::read(&mut self.plane_image, depth, colour, world_from_camera, &self.settings)?;
-        let split = Split::new(&self.pool, &frame.plane_image.keys);
-        self.fuser.load(&self.device, &frame)?;
-        // One submission counts in the blocks that do not exist and changes those that do: waiting costs more than undoing.
+        let Self { tiers, fuser, plane_image, .. } = self;
+        let settings = *tiers.host.settings();
+        let frame = Frame::read(plane_image, depth, colour, world_from_camera, &settings)?;
+        let camera = world_from_camera.translation.vector / settings.block_size();
+        let job = FrameJob { frame: &frame, operation, time, camera: camera.into(), threads: settings.threads };
+        tiers.host.storage.begin_call();
+        let split = Split::new(&tiers.pool, &frame.plane_image.keys);
+        fuser.load(&tiers.device, &frame)?;
+        // One submission counts in the blocks that are not here and changes those that are: waiting costs more than undoing.
         let (absent, present) = (split.count(), split.update(mode(operation)));
         let passes: Vec<Pass> = std::iter::once(absent).chain(present).collect();
-        let counts = self.fuser.run(&self.device, &self.pool, &frame, &passes)?;
+        let counts = fuser.run(&tiers.device, &tiers.pool, &frame, &passes)?;
         let (counted, updated) = counts.split_at(split.absent.len());
         let needed = touched(split.absent.iter(), counted);
         let changed = touched(split.present.iter().flatten(), updated);
-        if let Err(refusal) = admit(&mut self.pool, &self.device, operation, &needed, &changed) {
-            // Wrapping sums form a group: the opposite update restores every bit.
-            let passes: Vec<Pass> = split.update(mode(operation.opposite())).collect();
-            let undone = self.fuser.submit(&self.device, &self.pool, &frame, &passes);
-            undone.map_err(|error| self.device.lose(error))?;
-            return Err(refusal);
-        }
-        let added = Split::added(&mut self.pool, &needed);
+        let elsewhere = match tiers.admit(job, &changed, &needed) {
+            Ok(elsewhere) => elsewhere,
+            Err(refusal) => {
+                // Wrapping sums form a group: the opposite update restores every bit. What was evicted to make room was not touched.
+                let passes: Vec<Pass> = split.update(mode(operation.opposite())).collect();
+                let undone = fuser.submit(&tiers.device, &tiers.pool, &frame, &passes);
+                undone.map_err(|error| tiers.device.lose(error))?;
+                return Err(refusal);
+            }
+        };
+        let history = tiers.host.storage.new_history(time);
+        let added = Split::added(&mut tiers.pool, &elsewhere.fresh, history);
         let passes: Vec<Pass> = added.update(Mode::Integrate).collect();
-        let done = self.fuser.submit(&self.device, &self.pool, &frame, &passes);
-        done.map_err(|error| self.device.lose(error))?;
-        for work in &changed {
-            self.pool.mark_changed(work.0);
-        }
-        let emptied: Vec<BlockKey> = changed.iter().filter(|work| !work.1.observed()).map(|work| work.0).collect();
-        for &key in &emptied {
-            self.pool.remove(key);
-        }
+        let done = fuser.submit(&tiers.device, &tiers.pool, &frame, &passes);
+        done.map_err(|error| tiers.device.lose(error))?;
+        let removed = elsewhere.removed + tiers.count(job, &changed);
+        let [blocks_reloaded, blocks_evicted] = match operation {
+            Operation::Integrate => tiers.transfer(&elsewhere.on_host, job),
+            Operation::Deintegrate => [0, 0],
+        };
         Ok(FrameReport {
             valid_pixels: frame.plane_image.valid,
             fused_pixels: frame.plane_image.fused,
             filled_pixels: frame.plane_image.filled,
             voxels: needed.iter().chain(&changed).map(|work| work.1.voxels()).sum(),
             blocks: needed.len() + changed.len(),
-            blocks_added: needed.len(),
-            blocks_removed: emptied.len(),
-            blocks_evicted: 0,
-            blocks_reloaded: 0,
+            blocks_added: elsewhere.added,
+            blocks_removed: removed,
+            blocks_evicted,
+            blocks_reloaded,
             blocks_timed_out: 0,
         })
     }
 }
 
-/// Blocks that were fetched from the device.
-struct FetchedBlocks(BlockTable<Box<VoxelBlock>>);
+/// Blocks that were fetched from the device, and those that are not there.
+struct FetchedBlocks<'a> {
+    fetched: BlockTable<Box<VoxelBlock>>,
+    host: &'a BlockStorage,
+}
 
-impl BlockReader for FetchedBlocks {
-    fn block<'a>(&'a self, block: [i32; 3], _: &'a mut VoxelBlock) -> Result<Option<&'a VoxelBlock>, Error> {
-        Ok(BlockKey::new(block).and_then(|key| self.0.get(key)).map(|block| &**block))
+impl BlockReader for FetchedBlocks<'_> {
+    fn block<'a>(&'a self, block: [i32; 3], scratch: &'a mut VoxelBlock) -> Result<Option<&'a VoxelBlock>, Error> {
+        let Some(key) = BlockKey::new(block) else { return Ok(None) };
+        self.fetched.get(key).map_or_else(|| self.host.sum(key, scratch), |block| Ok(Some(block)))
     }
 }
 
 impl TsdfLayer for GpuMap {
     fn settings(&self) -> &Settings {
-        &self.settings
+        GpuMap::settings(self)
     }
 
     fn changes_since(&self, before: Option<MapVersion>) -> BlockChanges {
-        BlockChanges::new(self.pool.clock.version(), before, |stamp| {
-            self.pool.changed_since(stamp.unwrap_or(0)).map(BlockKey::block).collect()
+        let Tiers { pool, host, .. } = &self.tiers;
+        BlockChanges::new(host.storage.active.clock.version(), before, |stamp| {
+            let later = |&(_, history): &(BlockKey, BlockHistory)| stamp.is_none_or(|stamp| history.stamp > stamp);
+            let here = pool.histories().filter(later).map(|(key, _)| key);
+            here.chain(host.storage.changed_since(stamp)).map(BlockKey::block).collect()
         })
     }
 
     fn contains_block(&self, block: [i32; 3]) -> bool {
-        BlockKey::new(block).is_some_and(|key| self.pool.get(key).is_some())
+        let Tiers { pool, host, .. } = &self.tiers;
+        BlockKey::new(block).is_some_and(|key| pool.get(key).is_some() || host.storage.contains(key))
     }
 
     fn read_blocks<'a>(
@@ -236,15 +230,15 @@ impl TsdfLayer for GpuMap {
         keys.sort_unstable();
         keys.dedup();
         let mut fetched = BlockTable::new();
-        self.stream.download(&self.device, &self.pool, &keys, |key, block| {
+        self.tiers.download(&keys, |key, block| {
             fetched.insert(key, Box::new(block.clone()));
             Ok(())
         })?;
-        Ok(Box::new(FetchedBlocks(fetched)))
+        Ok(Box::new(FetchedBlocks { fetched, host: &self.tiers.host.storage }))
     }
 }
 
-/// Each as the method of [`Map`] says, of blocks on the device. After an [`Error::Device`] the map is as it was, unless the
+/// Each as the method of [`Map`] says; active memory is that of the device. After an [`Error::Device`] the map is as it was, unless the
 /// device is lost, which every later call reports too.
 impl DenseMap for GpuMap {
     fn integrate(
@@ -253,7 +247,7 @@ impl DenseMap for GpuMap {
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
     ) -> Result<FrameReport, Error> {
-        self.integrate_then(self.clock.next(), depth, colour, world_from_camera)
+        self.integrate_then(self.tiers.host.clock.next(), depth, colour, world_from_camera)
     }
 
     fn integrate_at(
@@ -263,7 +257,7 @@ impl DenseMap for GpuMap {
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
     ) -> Result<FrameReport, Error> {
-        self.integrate_then(self.clock.at(time)?, depth, colour, world_from_camera)
+        self.integrate_then(self.tiers.host.clock.at(time)?, depth, colour, world_from_camera)
     }
 
     fn deintegrate(
@@ -272,7 +266,7 @@ impl DenseMap for GpuMap {
         colour: Option<&ColourView>,
         world_from_camera: &Isometry3<f64>,
     ) -> Result<FrameReport, Error> {
-        self.apply(Operation::Deintegrate, depth, colour, world_from_camera)
+        self.apply(Operation::Deintegrate, depth, colour, world_from_camera, self.tiers.host.clock.time())
     }
 
     fn ray_cast(
@@ -283,27 +277,22 @@ impl DenseMap for GpuMap {
         world_from_camera: &Isometry3<f64>,
         settings: &RayCastSettings,
     ) -> Result<View, Error> {
-        let camera = Camera::new(intrinsics, (width, height), world_from_camera, &self.settings, settings)?;
+        let camera = Camera::new(intrinsics, (width, height), world_from_camera, GpuMap::settings(self), settings)?;
         let mut view = View::new();
         view.resize(intrinsics, (width, height), world_from_camera);
-        self.caster.fill(&self.device, &self.pool, &camera, settings.colour, &mut view)?;
+        self.caster.fill(&self.tiers.device, &self.tiers.pool, &camera, settings.colour, &mut view)?;
         Ok(view)
     }
 
     fn bytes(&self) -> usize {
-        self.pool.bytes()
+        self.tiers.pool.bytes()
     }
 
     fn blocks(&self) -> usize {
-        self.pool.len()
+        self.tiers.pool.len() + self.tiers.host.blocks()
     }
 
     fn hash(&self) -> Result<u64, Error> {
-        let mut hash = 0;
-        self.stream.download(&self.device, &self.pool, &self.pool.sorted_keys(), |key, block| {
-            hash = hash_block(hash, key, block.fingerprint());
-            Ok(())
-        })?;
-        Ok(hash)
+        self.tiers.hash()
     }
 }

@@ -3,10 +3,10 @@
 use wgpu::{Buffer, BufferUsages};
 
 use crate::blocks::active_blocks::MAX_BLOCKS;
+use crate::blocks::block_history::BlockHistory;
 use crate::blocks::block_key::BlockKey;
 use crate::blocks::hash_table::HashTable;
 use crate::blocks::voxel_block::VoxelBlock;
-use crate::changes::ChangeClock;
 use crate::error::Error;
 use crate::gpu::device::Device;
 
@@ -15,8 +15,8 @@ pub(super) const BLOCK_BYTES: usize = size_of::<VoxelBlock>();
 pub(super) const MAX_PAGES: usize = 4;
 /// Storage buffers of a program beside the pages.
 pub(super) const OTHER_BINDINGS: usize = 2;
-/// Bytes on the processor for each slot: its key, its stamp, and its place in the list of free ones.
-const SLOT_BYTES: usize = size_of::<BlockKey>() + size_of::<u64>() + size_of::<u32>();
+/// Bytes on the processor for each slot: its key, its history, and its place in the list of free ones.
+const SLOT_BYTES: usize = size_of::<BlockKey>() + size_of::<BlockHistory>() + size_of::<u32>();
 const VACANT: BlockKey = BlockKey(u64::MAX);
 
 /// The memory of a block.
@@ -33,7 +33,7 @@ impl Place {
     }
 }
 
-/// All blocks of a map. Everything on the processor is allocated at once, pages one by one when they are needed.
+/// The blocks on the device. Everything on the processor is allocated at once, pages one by one when they are needed.
 pub(super) struct Pool {
     pub(super) pages: Vec<Buffer>,
     page_blocks: usize,
@@ -42,10 +42,9 @@ pub(super) struct Pool {
     table: HashTable,
     /// The key in each slot used so far.
     keys: Vec<BlockKey>,
-    /// When the block in each slot last changed, on the clock.
-    stamps: Vec<u64>,
+    /// The history of the block in each slot.
+    histories: Vec<BlockHistory>,
     free: Vec<u32>,
-    pub(super) clock: ChangeClock,
 }
 
 impl Pool {
@@ -65,9 +64,9 @@ impl Pool {
         let capacity = most * page_blocks;
         let mut table = HashTable::new();
         table.reserve(capacity);
-        let (keys, stamps) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
-        let (free, clock) = (Vec::with_capacity(capacity), ChangeClock::new());
-        let mut pool = Self { pages: Vec::new(), page_blocks, capacity, max_bytes, table, keys, stamps, free, clock };
+        let (keys, histories) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
+        let free = Vec::with_capacity(capacity);
+        let mut pool = Self { pages: Vec::new(), page_blocks, capacity, max_bytes, table, keys, histories, free };
         pool.reserve(device, 1)?;
         Ok(pool)
     }
@@ -108,12 +107,12 @@ impl Pool {
     }
 
     /// Gives a new key a slot, whose memory holds anything; the caller has [reserved](Self::reserve) it.
-    pub(super) fn insert(&mut self, key: BlockKey) -> Place {
+    pub(super) fn insert(&mut self, key: BlockKey, history: BlockHistory) -> Place {
         let slot = self.free.pop().unwrap_or(self.keys.len() as u32);
         self.keys.resize(self.keys.len().max(slot as usize + 1), VACANT);
         self.keys[slot as usize] = key;
-        self.stamps.resize(self.keys.len(), 0);
-        self.stamps[slot as usize] = self.clock.tick();
+        self.histories.resize(self.keys.len(), BlockHistory::default());
+        self.histories[slot as usize] = history;
         self.table.set(key, slot);
         self.place(slot as usize)
     }
@@ -123,26 +122,26 @@ impl Pool {
             self.table.remove(key);
             self.keys[slot] = VACANT;
             self.free.push(slot as u32);
-            self.clock.count_removed(1);
         }
     }
 
-    /// Notes that a block has changed.
-    pub(super) fn mark_changed(&mut self, key: BlockKey) {
-        if let Some(slot) = self.table.get(key) {
-            self.stamps[slot] = self.clock.tick();
-        }
+    pub(super) fn history(&self, key: BlockKey) -> Option<BlockHistory> {
+        self.table.get(key).map(|slot| self.histories[slot])
     }
 
-    /// The blocks that have changed since the clock stood at `stamp`.
-    pub(super) fn changed_since(&self, stamp: u64) -> impl Iterator<Item = BlockKey> {
-        let later = move |(key, at): (&BlockKey, &u64)| (*key != VACANT && *at > stamp).then_some(*key);
-        self.keys.iter().zip(&self.stamps).filter_map(later)
+    pub(super) fn history_mut(&mut self, key: BlockKey) -> Option<&mut BlockHistory> {
+        self.table.get(key).map(|slot| &mut self.histories[slot])
+    }
+
+    /// Keys and histories, in the order of their slots.
+    pub(super) fn histories(&self) -> impl Iterator<Item = (BlockKey, BlockHistory)> {
+        let all = self.keys.iter().copied().zip(self.histories.iter().copied());
+        all.filter(|&(key, _)| key != VACANT)
     }
 
     /// All keys, in the order of their slots.
     pub(super) fn keys(&self) -> impl Iterator<Item = BlockKey> {
-        self.keys.iter().copied().filter(|&key| key != VACANT)
+        self.histories().map(|(key, _)| key)
     }
 
     /// All keys, ascending.

@@ -1,8 +1,7 @@
-//! Which blocks of a frame are where, and whether what it did to them may stay.
+//! Which blocks of a frame are where on the device.
 
+use crate::blocks::block_history::BlockHistory;
 use crate::blocks::block_key::BlockKey;
-use crate::error::Error;
-use crate::gpu::device::Device;
 use crate::gpu::fuse::{Mode, Pass, UpdateCount, fresh};
 use crate::gpu::pool::Pool;
 use crate::integration::integrator::Operation;
@@ -18,27 +17,6 @@ pub(super) fn touched<'a>(
     counts: &[UpdateCount],
 ) -> Vec<(BlockKey, UpdateCount)> {
     blocks.zip(counts).map(|((key, _), count)| (*key, *count)).filter(|(_, count)| count.voxels() > 0).collect()
-}
-
-/// Whether a frame may stay that needs some new blocks and has changed others; if so, there is memory for the new ones.
-pub(super) fn admit(
-    pool: &mut Pool,
-    device: &Device,
-    operation: Operation,
-    needed: &[(BlockKey, UpdateCount)],
-    changed: &[(BlockKey, UpdateCount)],
-) -> Result<(), Error> {
-    match (operation, needed.first()) {
-        (Operation::Deintegrate, Some((key, _))) => return Err(Error::NotIntegrated { block: key.block() }),
-        (Operation::Integrate, _) if needed.len() > pool.room() => return Err(pool.out_of_budget()),
-        _ => {}
-    }
-    // The pages mix the keys, and the first of them is named.
-    match changed.iter().filter(|work| work.1.overflow()).map(|work| work.0).min() {
-        Some(key) if operation == Operation::Integrate => Err(Error::Saturated { block: key.block() }),
-        Some(key) => Err(Error::NotIntegrated { block: key.block() }),
-        None => pool.reserve(device, needed.len()),
-    }
 }
 
 /// Blocks of a frame, with their slots.
@@ -60,11 +38,11 @@ impl Split {
         split
     }
 
-    /// Blocks that get slots now.
-    pub(super) fn added(pool: &mut Pool, keys: &[(BlockKey, UpdateCount)]) -> Self {
+    /// Blocks that get slots now, with this history.
+    pub(super) fn added(pool: &mut Pool, keys: &[BlockKey], history: BlockHistory) -> Self {
         let mut split = Self { absent: Vec::new(), present: vec![Vec::new(); pool.pages.len()] };
-        for &(key, _) in keys {
-            let place = pool.insert(key);
+        for &key in keys {
+            let place = pool.insert(key, history);
             split.present[place.page].push((key, fresh(place.slot)));
         }
         split

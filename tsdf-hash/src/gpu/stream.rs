@@ -2,6 +2,7 @@
 
 use wgpu::{Buffer, BufferUsages};
 
+use crate::blocks::block_history::BlockHistory;
 use crate::blocks::block_key::BlockKey;
 use crate::blocks::voxel_block::{VOXELS, VoxelBlock};
 use crate::error::Error;
@@ -29,20 +30,21 @@ impl Stream {
         device: &Device,
         pool: &Pool,
         keys: &[BlockKey],
-        mut each: impl FnMut(BlockKey, &VoxelBlock) -> Result<(), Error>,
+        mut each: impl FnMut(BlockKey, &VoxelBlock, BlockHistory) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let mut block = Box::new(VoxelBlock::ZERO);
         for batch in keys.chunks(BATCH) {
-            let places: Vec<_> = batch.iter().filter_map(|&key| Some((key, pool.get(key)?))).collect();
+            let found = |&key: &BlockKey| pool.get(key).zip(pool.history(key)).map(|found| (key, found));
+            let places: Vec<_> = batch.iter().filter_map(found).collect();
             let mut commands = device.commands();
-            for (k, (_, place)) in places.iter().enumerate() {
+            for (k, (_, (place, _))) in places.iter().enumerate() {
                 let (from, to) = (place.offset() as u64, (k * BLOCK_BYTES) as u64);
                 commands.copy_buffer_to_buffer(&pool.pages[place.page], from, &self.staging, to, BLOCK_BYTES as u64);
             }
             device.run_and_read(commands, &self.staging, places.len() * BLOCK_BYTES, |words| {
-                for ((key, _), words) in places.iter().zip(words.chunks_exact(BLOCK_WORDS)) {
+                for ((key, (_, history)), words) in places.iter().zip(words.chunks_exact(BLOCK_WORDS)) {
                     unpack(words, &mut block);
-                    each(*key, &block)?;
+                    each(*key, &block, *history)?;
                 }
                 Ok::<(), Error>(())
             })??;
@@ -51,10 +53,18 @@ impl Stream {
     }
 }
 
-/// Stores a block under a key that is new and that the caller has reserved a slot for. The driver stages it.
-pub(super) fn upload(device: &Device, pool: &mut Pool, key: BlockKey, block: &VoxelBlock) -> Result<(), Error> {
-    let place = pool.insert(key);
-    device.write(&pool.pages[place.page], place.offset(), pack(block).into_iter())
+/// Stores a block under a key that is new and that the caller has reserved a slot for. The driver stages it. After an error it
+/// is not there.
+pub(super) fn upload(
+    device: &Device,
+    pool: &mut Pool,
+    key: BlockKey,
+    block: &VoxelBlock,
+    history: BlockHistory,
+) -> Result<(), Error> {
+    let place = pool.insert(key, history);
+    let written = device.write(&pool.pages[place.page], place.offset(), pack(block).into_iter());
+    written.inspect_err(|_| pool.remove(key))
 }
 
 /// The words of a block as the programs see it: distances, weights two to a word, colours.

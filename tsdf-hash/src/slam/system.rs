@@ -337,10 +337,9 @@ impl<S: FrameSource> Slam<S> {
 
     fn count_bytes(&mut self) {
         let statistics = &mut self.statistics;
-        statistics.active_bytes_peak = statistics.active_bytes_peak.max(self.map.dense().bytes());
-        if let Some(map) = self.map.cpu() {
-            statistics.host_bytes_peak = statistics.host_bytes_peak.max(map.memory().host_bytes);
-        }
+        let memory = self.map.memory();
+        statistics.active_bytes_peak = statistics.active_bytes_peak.max(memory.active_bytes);
+        statistics.host_bytes_peak = statistics.host_bytes_peak.max(memory.host_bytes);
     }
 
     /// Moves the frames to their corrected poses; the map follows with the next frames.

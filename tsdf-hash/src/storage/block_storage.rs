@@ -8,7 +8,6 @@ use crate::blocks::active_blocks::ActiveBlocks;
 use crate::blocks::block_history::BlockHistory;
 use crate::blocks::block_key::BlockKey;
 use crate::blocks::block_table::BlockTable;
-use crate::blocks::total_order::TotalOrder;
 use crate::blocks::voxel_block::{MAX_COLOURS, VoxelBlock};
 use crate::error::Error;
 use crate::hashing::mix64;
@@ -17,6 +16,7 @@ use crate::storage::block_file::{BlockFile, StoredBlock};
 use crate::storage::evicted_blocks::EvictedBlocks;
 use crate::storage::reloaded::ReloadedBlock;
 use crate::storage::swap_file::SwapFile;
+use crate::storage::victims;
 
 /// How many blocks a frame has moved.
 #[derive(Clone, Copy, Default)]
@@ -41,6 +41,11 @@ impl BlockStorage {
     pub(crate) fn new(max_bytes: usize, limits: MemoryLimits, swap: Option<SwapFile>) -> Result<Self, Error> {
         let (active, reloaded) = (ActiveBlocks::new(max_bytes)?, BlockTable::new());
         Ok(Self { active, reloaded, evicted: EvictedBlocks::new(limits.host_bytes, swap), limits, call: 0 })
+    }
+
+    /// Begins a call: what it does not touch can be evicted to make room.
+    pub(crate) fn begin_call(&mut self) {
+        self.call = self.call.wrapping_add(1);
     }
 
     /// Takes in the blocks of a file: as evicted ones, or at once where blocks cannot be evicted.
@@ -98,9 +103,10 @@ impl BlockStorage {
         self.active.slot(key).is_some() || self.reloaded.get(key).is_some() || self.evicted.contains(key)
     }
 
-    /// The blocks, once each, whose sum has changed since the change clock stood at `stamp`; some that have only been moved
-    /// may be among them.
-    pub(crate) fn changed_since(&self, stamp: u64) -> Vec<BlockKey> {
+    /// The blocks, once each, whose sum has changed since the change clock stood at `stamp`, all of them for `None`; some that have
+    /// only been moved may be among them.
+    pub(crate) fn changed_since(&self, stamp: Option<u64>) -> Vec<BlockKey> {
+        let Some(stamp) = stamp else { return self.sorted_keys() };
         let later = |&(_, history): &(BlockKey, BlockHistory)| history.stamp > stamp;
         let mut changed: Vec<BlockKey> = self.active.histories().filter(later).map(|(key, _)| key).collect();
         if self.evicted.latest_stamp() > stamp {
@@ -142,16 +148,21 @@ impl BlockStorage {
         Ok(history)
     }
 
-    /// A hash of the sums of all copies, in the order of the keys.
-    pub(crate) fn hash(&self) -> u64 {
-        self.sorted_keys().into_iter().fold(0, |hash, key| {
+    /// The fingerprints of the sums of all copies, in the order of the keys.
+    pub(crate) fn fingerprints(&self) -> impl Iterator<Item = (BlockKey, u64)> {
+        self.sorted_keys().into_iter().map(|key| {
             let copies = [
                 self.active.get(key).map(VoxelBlock::fingerprint),
                 self.reloaded.get(key).map(|reloaded| reloaded.block.fingerprint()),
                 self.evicted.summary(key).map(|summary| summary.fingerprint),
             ];
-            hash_block(hash, key, copies.into_iter().flatten().fold(0, u64::wrapping_add))
+            (key, copies.into_iter().flatten().fold(0, u64::wrapping_add))
         })
+    }
+
+    /// A hash of the sums of all copies.
+    pub(crate) fn hash(&self) -> u64 {
+        hash_blocks(self.fingerprints())
     }
 
     /// Whether a block can be added to the other copies without running over.
@@ -173,36 +184,33 @@ impl BlockStorage {
         Ok(!(all.add(block) || overflow))
     }
 
-    /// Adds a block of another map: into the active copy if there is one, or else where there is room. After an error
-    /// nothing has changed.
+    /// Takes in a block that another memory has held and that has no copy here, where there is room. After an error nothing has
+    /// changed.
     #[cfg(feature = "gpu")]
-    pub(crate) fn add_block(&mut self, key: BlockKey, block: &VoxelBlock) -> Result<(), Error> {
-        let saturated = Error::Saturated { block: key.block() };
-        if let Some(own) = self.active.get(key) {
-            let mut sum = Box::new(own.clone());
-            if sum.add(block) || !self.fits(key, &sum)? {
-                return Err(saturated);
-            }
-            if let Some((own, _)) = self.active.get_mut(key) {
-                *own = *sum;
-            }
-            return Ok(());
-        }
-        if !self.fits(key, block)? {
-            return Err(saturated);
-        }
+    pub(crate) fn add_block(&mut self, key: BlockKey, block: &VoxelBlock, history: BlockHistory) -> Result<(), Error> {
         if self.active.room() == 0 {
             self.make_room(1, [0.0; 3])?;
         }
-        // Another map does not say when it updated the block: it counts as old.
-        let stamp = self.active.clock.tick();
-        let history = BlockHistory { last_update: f64::MIN, frames: 1, call: self.call, stamp };
         if self.active.room() > 0 {
             self.active.insert(key, Box::new(block.clone()), history);
             return Ok(());
         }
         let put = self.evicted.put(key, Box::new(block.clone()), history);
         put.map_err(|(_, error)| self.storage_error(error))
+    }
+
+    /// Removes all copies of a block; no change of the map, because another memory holds it.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn forget(&mut self, key: BlockKey) {
+        self.active.remove(key);
+        self.evicted.remove(key);
+        self.reloaded.remove(key);
+    }
+
+    /// Of a block that begins with a frame of the current call.
+    pub(crate) fn new_history(&mut self, time: f64) -> BlockHistory {
+        let stamp = self.active.clock.tick();
+        BlockHistory { last_update: time, frames: 1, call: self.call, stamp }
     }
 
     /// Where blocks cannot be evicted it is active memory that is full.
@@ -223,18 +231,8 @@ impl BlockStorage {
         if !self.evicted.is_enabled() {
             return 0;
         }
-        let mut old: Vec<_> = self
-            .active
-            .histories()
-            .filter(|(_, history)| time - history.last_update > self.limits.max_age)
-            .map(|(key, history)| (TotalOrder(history.last_update), key))
-            .collect();
-        if old.len() > self.limits.max_transfers {
-            old.select_nth_unstable(self.limits.max_transfers);
-            old.truncate(self.limits.max_transfers);
-        }
-        old.sort_unstable();
-        old.into_iter().take_while(|&(_, key)| self.evict(key).is_ok()).count()
+        let old = victims::aged(self.active.histories(), time, &self.limits);
+        old.into_iter().take_while(|&key| self.evict(key).is_ok()).count()
     }
 
     /// Steps (c) and (d): evicted copies of what the frame touched are reloaded.
@@ -320,18 +318,8 @@ impl BlockStorage {
         if !self.evicted.is_enabled() {
             return Ok(());
         }
-        let mut victims: Vec<_> = self
-            .active
-            .histories()
-            .filter(|(_, history)| history.call != self.call)
-            .map(|(key, history)| (TotalOrder(history.last_update), TotalOrder(-distance(key, camera)), key))
-            .collect();
-        if victims.len() > count {
-            victims.select_nth_unstable(count);
-            victims.truncate(count);
-        }
-        victims.sort_unstable();
-        for &(_, _, key) in &victims {
+        let victims = victims::untouched(self.active.histories(), self.call, count, camera);
+        for &key in &victims {
             self.evict(key)?;
         }
         let mut reloaded = self.reloaded.keys().to_vec();
@@ -362,12 +350,7 @@ impl BlockStorage {
     }
 }
 
-/// Squared distance of a block from the camera, in blocks.
-fn distance(key: BlockKey, camera: [f64; 3]) -> f64 {
-    key.block().iter().zip(camera).map(|(&c, e)| (f64::from(c) + 0.5 - e).powi(2)).sum()
-}
-
-/// Folds a block, by its fingerprint, into the hash of a map.
-pub(crate) fn hash_block(hash: u64, key: BlockKey, fingerprint: u64) -> u64 {
-    mix64(mix64(hash ^ key.0).wrapping_add(fingerprint))
+/// The hash of a map from the fingerprints of its blocks, in the order of their keys.
+pub(crate) fn hash_blocks(fingerprints: impl Iterator<Item = (BlockKey, u64)>) -> u64 {
+    fingerprints.fold(0, |hash, (key, fingerprint)| mix64(mix64(hash ^ key.0).wrapping_add(fingerprint)))
 }

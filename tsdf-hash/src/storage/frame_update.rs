@@ -54,9 +54,9 @@ struct FrameUpdate<'a> {
     change: FrameChange,
 }
 
-/// Applies a frame to the blocks near it. After an error the sums are as they were.
+/// Applies a frame to those of the blocks near it that have these keys, in a [call](BlockStorage::begin_call). After an error the sums
+/// are as they were.
 pub(crate) fn apply_frame(storage: &mut BlockStorage, job: FrameJob, keys: &[BlockKey]) -> Result<FrameChange, Error> {
-    storage.call = storage.call.wrapping_add(1);
     let mut update = FrameUpdate { storage, job, change: FrameChange::default() };
     update.run(keys)?;
     Ok(update.change)
@@ -222,7 +222,7 @@ impl FrameUpdate<'_> {
                 room -= 1;
                 kept.push(partial);
             } else {
-                let history = self.new_history();
+                let history = self.storage.new_history(self.job.time);
                 let staged = self.storage.evicted.stage(partial.key, partial.block, history);
                 staged.map_err(|error| self.storage.storage_error(error))?;
             }
@@ -255,11 +255,6 @@ impl FrameUpdate<'_> {
             }
         }
         outcome
-    }
-
-    fn new_history(&mut self) -> BlockHistory {
-        let stamp = self.storage.active.clock.tick();
-        BlockHistory { last_update: self.job.time, frames: 1, call: self.storage.call, stamp }
     }
 
     fn is_new(&self, key: BlockKey) -> bool {
@@ -309,7 +304,7 @@ impl FrameUpdate<'_> {
         }
         for partial in partials {
             self.change.touched.push(partial.key);
-            let history = self.new_history();
+            let history = self.storage.new_history(self.job.time);
             self.storage.active.insert(partial.key, partial.block, history);
         }
     }
@@ -324,7 +319,8 @@ impl FrameJob<'_> {
         });
     }
 
-    fn count(&self, history: &mut BlockHistory) {
+    /// Notes the frame in the history of a block.
+    pub(crate) fn count(&self, history: &mut BlockHistory) {
         match self.operation {
             Operation::Integrate => history.integrated(self.time),
             Operation::Deintegrate => history.deintegrated(),
@@ -332,7 +328,8 @@ impl FrameJob<'_> {
     }
 }
 
-fn refused(operation: Operation, key: BlockKey) -> Error {
+/// Why a frame is refused whose part in a block does not fit the counters.
+pub(crate) fn refused(operation: Operation, key: BlockKey) -> Error {
     match operation {
         Operation::Integrate => Error::Saturated { block: key.block() },
         Operation::Deintegrate => Error::NotIntegrated { block: key.block() },
