@@ -280,6 +280,8 @@ impl<'a> Run<'a> {
 
 /// The path grows or shrinks by so much, or the depth scale is not doubted (ours).
 const LEAST_RATIO: f64 = 1.1;
+/// And the tracked poses are off by more than recorded ones often are themselves, metres (ours).
+const LEAST_ERROR: f64 = 0.02;
 
 /// Of the frames that have a recorded pose, the error after rigid alignment, and what the recorded path is longer by if that explains most of
 /// it; `None` where these do not fix an alignment: below three, or on one line.
@@ -289,6 +291,24 @@ fn tracked_error(sequence: &Sequence, fused: &[(usize, Isometry3<f64>)]) -> Opti
     let [rigid, scaled] = [Alignment::Se3, Alignment::Sim3].map(|mode| ate(&given, &tracked, mode).ok());
     let (rigid, scaled) = (rigid?.position.rmse, scaled?);
     let ratio = scaled.reference_from_estimate.scaling();
-    let explains = 2.0 * scaled.position.rmse < rigid && ratio.max(1.0 / ratio) > LEAST_RATIO;
-    Some((rigid, explains.then_some(ratio)))
+    Some((rigid, is_wrong_scale(rigid, scaled.position.rmse, ratio).then_some(ratio)))
+}
+
+/// Whether another scale explains the error of the tracked poses: root mean squares as they are and with the scale, metres.
+fn is_wrong_scale(rigid: f64, scaled: f64, ratio: f64) -> bool {
+    rigid > LEAST_ERROR && 2.0 * scaled < rigid && ratio.max(1.0 / ratio) > LEAST_RATIO
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_wrong_scale;
+
+    #[test]
+    fn recorded_poses_that_are_a_centimetre_off_say_nothing_of_the_scale() {
+        // A handful of frames with the right scale, and the same camera for seconds with a wrong one.
+        assert!(!is_wrong_scale(0.009, 0.004, 0.79));
+        assert!(is_wrong_scale(0.153, 0.008, 4.7) && is_wrong_scale(0.03, 0.008, 0.88));
+        // Other errors.
+        assert!(!is_wrong_scale(0.153, 0.1, 1.3) && !is_wrong_scale(0.03, 0.01, 1.05));
+    }
 }
