@@ -85,6 +85,21 @@ pub trait DenseMap: TsdfLayer {
         settings: &RayCastSettings,
     ) -> Result<View, Error>;
 
+    /// Brings evicted blocks that a camera would see back into active memory, as [`Map::reload_view`]; none unless a map evicts any.
+    ///
+    /// # Errors
+    /// As [`Map::reload_view`].
+    fn reload_view(
+        &mut self,
+        _intrinsics: &Intrinsics,
+        _width: usize,
+        _height: usize,
+        _world_from_camera: &Isometry3<f64>,
+        _settings: &RayCastSettings,
+    ) -> Result<usize, Error> {
+        Ok(0)
+    }
+
     /// The surface of the whole map, evicted blocks included.
     ///
     /// # Errors
@@ -185,6 +200,17 @@ impl DenseMap for Map {
         settings: &RayCastSettings,
     ) -> Result<View, Error> {
         Map::ray_cast(self, intrinsics, width, height, world_from_camera, settings)
+    }
+
+    fn reload_view(
+        &mut self,
+        intrinsics: &Intrinsics,
+        width: usize,
+        height: usize,
+        world_from_camera: &Isometry3<f64>,
+        settings: &RayCastSettings,
+    ) -> Result<usize, Error> {
+        Map::reload_view(self, intrinsics, width, height, world_from_camera, settings)
     }
 
     fn mesh(&self) -> Result<Mesh, Error> {

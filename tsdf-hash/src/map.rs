@@ -21,6 +21,7 @@ use crate::ray_cast::camera::Camera;
 use crate::ray_cast::caster;
 use crate::ray_cast::settings::RayCastSettings;
 use crate::ray_cast::single_ray::{self, SurfaceHit};
+use crate::ray_cast::unpacked::in_view;
 use crate::ray_cast::view::View;
 use crate::report::{FrameReport, MemoryUsage};
 use crate::settings::{MemoryLimits, Settings};
@@ -321,6 +322,31 @@ impl Map {
         view.resize(intrinsics, (width, height), world_from_camera);
         caster::fill(&self.storage.active, &camera, settings, view);
         Ok(())
+    }
+
+    /// Brings evicted blocks that a camera at `world_from_camera` would see, or would if nothing stood before them, back into active
+    /// memory, the nearest first, as far as there is room once blocks out of its view have left: before a place is
+    /// [looked at](Self::ray_cast) that no frame has touched for long, as a lost camera must. [`MemoryLimits::max_transfers`] does not
+    /// bound it. No sum changes. Returns how many.
+    ///
+    /// # Errors
+    /// As [`ray_cast`](Self::ray_cast), and those of evicted blocks.
+    pub fn reload_view(
+        &mut self,
+        intrinsics: &Intrinsics,
+        width: usize,
+        height: usize,
+        world_from_camera: &Isometry3<f64>,
+        settings: &RayCastSettings,
+    ) -> Result<usize, Error> {
+        if self.storage.evicted.is_empty() {
+            return Ok(0);
+        }
+        let camera = Camera::new(intrinsics, (width, height), world_from_camera, &self.settings, settings)?;
+        let wanted = in_view(self.storage.evicted.keys(), &camera);
+        let in_use = in_view(self.storage.active.keys().iter().copied(), &camera);
+        let from = world_from_camera.translation.vector / self.settings.block_size();
+        self.storage.reload_all(&wanted, &in_use, from.into())
     }
 
     /// The zero level of the field by marching cubes, where all eight voxels of a cell have been observed and the distance

@@ -127,6 +127,13 @@ impl ActiveBlocks {
         (history.stamp, history.call) = (stamp, call);
     }
 
+    /// Notes that a call needs a block, if it is here.
+    pub(crate) fn mark_used(&mut self, key: BlockKey, call: u32) {
+        if let Some(slot) = self.slots.get_mut(key) {
+            slot.history.call = call;
+        }
+    }
+
     /// Adds a block under a new key; the caller has seen that there is [`room`](Self::room).
     pub(crate) fn insert(&mut self, key: BlockKey, block: Box<VoxelBlock>, history: BlockHistory) {
         let history = BlockHistory { stamp: self.clock.tick(), ..history };

@@ -284,6 +284,19 @@ impl DenseMap for GpuMap {
         Ok(view)
     }
 
+    fn reload_view(
+        &mut self,
+        intrinsics: &Intrinsics,
+        width: usize,
+        height: usize,
+        world_from_camera: &Isometry3<f64>,
+        settings: &RayCastSettings,
+    ) -> Result<usize, Error> {
+        let camera = Camera::new(intrinsics, (width, height), world_from_camera, GpuMap::settings(self), settings)?;
+        let from = world_from_camera.translation.vector / GpuMap::settings(self).block_size();
+        Ok(self.tiers.reload_view(&camera, from.into()))
+    }
+
     fn bytes(&self) -> usize {
         self.tiers.pool.bytes()
     }

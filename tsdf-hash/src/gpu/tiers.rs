@@ -12,6 +12,8 @@ use crate::gpu::pool::Pool;
 use crate::gpu::stream::{Stream, upload};
 use crate::integration::integrator::Operation;
 use crate::map::Map;
+use crate::ray_cast::camera::Camera;
+use crate::ray_cast::unpacked::in_view;
 use crate::settings::Settings;
 use crate::storage::block_storage::hash_blocks;
 use crate::storage::frame_update::{FrameJob, apply_frame, refused};
@@ -140,12 +142,7 @@ impl Tiers {
         if let Some(key) = changed.iter().filter(|work| work.1.overflow()).map(|work| work.0).min() {
             return Err(refused(job.operation, key));
         }
-        let call = self.host.storage.call;
-        for (key, _) in changed {
-            if let Some(history) = self.pool.history_mut(*key) {
-                history.call = call;
-            }
-        }
+        self.touch(changed.iter().map(|work| work.0));
         let needed = needed.iter().map(|work| work.0);
         let (mut on_host, mut fresh): (Vec<_>, Vec<_>) = needed.partition(|&key| self.host.storage.contains(key));
         if let (Operation::Deintegrate, Some(&key)) = (job.operation, fresh.first()) {
@@ -186,6 +183,27 @@ impl Tiers {
         let reloaded = self.reload(seen, job.camera);
         let aged = victims::aged(self.pool.histories(), job.time, &limits);
         [reloaded, if self.host.storage.evicted.is_enabled() { self.evict(&aged).0 } else { 0 }]
+    }
+
+    /// Brings blocks in view to the device, the nearest first, as far as there is room once those out of view have left: how many.
+    pub(super) fn reload_view(&mut self, camera: &Camera, from: [f64; 3]) -> usize {
+        let wanted = in_view(self.host.storage.sorted_keys().into_iter(), camera);
+        if wanted.is_empty() {
+            return 0;
+        }
+        self.host.storage.begin_call();
+        self.touch(in_view(self.pool.keys(), camera));
+        self.reload(&wanted, from)
+    }
+
+    /// Notes that the current call needs blocks on the device.
+    fn touch(&mut self, keys: impl IntoIterator<Item = BlockKey>) {
+        let call = self.host.storage.call;
+        for key in keys {
+            if let Some(history) = self.pool.history_mut(key) {
+                history.call = call;
+            }
+        }
     }
 
     /// Brings blocks to the device as far as there is room once others have left: how many.

@@ -66,6 +66,8 @@ pub struct Frontend {
     relocalise_first: bool,
     /// Nothing is fused.
     fixed_map: bool,
+    /// No frame has been tracked since a stored pose: what the camera sees may be evicted.
+    resumed: bool,
 }
 
 impl Frontend {
@@ -91,12 +93,14 @@ impl Frontend {
             usual: UsualAgreement::default(),
             relocalise_first: settings.relocalise_first,
             fixed_map,
+            resumed: false,
         })
     }
 
     /// Goes on from a pose.
     pub fn start(&mut self, pose: Isometry3<f64>) {
         self.motion.start(pose, None);
+        self.resumed = true;
     }
 
     /// What looks for a lost camera.
@@ -192,6 +196,7 @@ impl Frontend {
             _ => {}
         }
         if let Some(outcome) = followed {
+            self.resumed = false;
             if outcome.is_tracked() {
                 self.usual.learn(outcome);
                 located.world_from_camera = Some(outcome.world_from_camera);
@@ -300,6 +305,10 @@ impl Frontend {
         let local = self.local_map.as_mut().and_then(LocalMap::older);
         let (map, world_from_map) = local.unwrap_or_else(|| (map, Isometry3::identity()));
         let there = prior.seen_from(&world_from_map.inverse());
+        // No frame touches what a camera sees that was lost, or whose frames are not fused.
+        if is_guess || self.fixed_map || self.resumed {
+            self.tracker.reload_view(map, depth, &there.world_from_camera)?;
+        }
         let mut outcome = self.tracker.track(map, depth, colour, &there)?.seen_from(&world_from_map);
         // A map that does not grow is left sooner or later: what little of it is in view then leads anywhere.
         if self.fixed_map && (outcome.coverage < LEAST_COVERAGE || !outcome.degenerate.is_empty()) {

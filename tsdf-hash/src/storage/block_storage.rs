@@ -252,9 +252,14 @@ impl BlockStorage {
         reloaded
     }
 
+    /// Whether reloaded blocks wait for no decision.
+    pub(crate) fn merges_at_once(&self) -> bool {
+        self.limits.merge_timeout == 0.0
+    }
+
     /// Brings an evicted copy into active memory, or to the reloaded blocks; `false` if there is no room for it there.
-    fn reload(&mut self, key: BlockKey, time: f64) -> Result<bool, Error> {
-        let (block, history) = if self.limits.merge_timeout == 0.0 {
+    pub(crate) fn reload(&mut self, key: BlockKey, time: f64) -> Result<bool, Error> {
+        let (block, history) = if self.merges_at_once() {
             let Some(copy) = self.active.get_mut(key) else { return Ok(false) };
             copy
         } else {

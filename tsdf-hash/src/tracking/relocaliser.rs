@@ -207,6 +207,7 @@ impl Relocaliser {
         for mut place in std::mem::take(&mut self.places) {
             let expected = place.world_from_reserve * present;
             let prior = PosePrior { world_from_camera: expected, covariance: None };
+            self.tracker.reload_view(map, depth, &expected)?;
             let outcome = self.tracker.track(map, depth, colour, &prior)?;
             let agrees = self.tracker.is_sure(&outcome) && is_same(&expected, &outcome.world_from_camera);
             place.latest = agrees.then(|| outcome.clone());

@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Matrix6};
 use crate::blocks::voxel_block::MAX_WEIGHT;
 use crate::dense_map::DenseMap;
 use crate::error::Error;
-use crate::images::{ColourView, DepthView, check_pose};
+use crate::images::{ColourView, DepthView, Intrinsics, check_pose};
 use crate::ray_cast::settings::RayCastSettings;
 use crate::ray_cast::view::View;
 use crate::trace::{event, span};
@@ -142,6 +142,7 @@ impl Tracker {
         reaches: &[(f64, f64)],
     ) -> Result<Option<TrackingOutcome>, Error> {
         let (near, least) = (self.settings.max_distance, self.settings.min_agreement);
+        self.reload_view(map, depth, start)?;
         let mut pose = *start;
         let mut last = None;
         for &(reach, progress) in reaches {
@@ -204,11 +205,31 @@ impl Tracker {
         colour: bool,
         world_from_camera: &Isometry3<f64>,
     ) -> Result<View, Error> {
+        let (camera, [width, height], cast) = self.camera(map, depth, colour);
+        map.ray_cast(&camera, width, height, world_from_camera, &cast)
+    }
+
+    /// Brings what is evicted of the map and would be seen from a pose back into active memory: of a place that no frame has touched for
+    /// long there is nothing to track against.
+    ///
+    /// # Errors
+    /// As [`DenseMap::reload_view`].
+    pub(crate) fn reload_view(
+        &self,
+        map: &mut dyn DenseMap,
+        depth: &DepthView,
+        world_from_camera: &Isometry3<f64>,
+    ) -> Result<usize, Error> {
+        let (camera, [width, height], cast) = self.camera(map, depth, false);
+        map.reload_view(&camera, width, height, world_from_camera, &cast)
+    }
+
+    /// How the map is looked at.
+    fn camera(&self, map: &dyn DenseMap, depth: &DepthView, colour: bool) -> (Intrinsics, [usize; 2], RayCastSettings) {
         let factor = self.settings.reduction(depth.width);
         let &crate::Settings { min_depth, max_depth, .. } = map.settings();
         let cast = RayCastSettings { min_depth, max_depth, colour, threads: self.settings.threads };
-        let camera = reduced(&depth.intrinsics, factor);
-        map.ray_cast(&camera, (depth.width / factor).max(1), (depth.height / factor).max(1), world_from_camera, &cast)
+        (reduced(&depth.intrinsics, factor), [depth.width, depth.height].map(|side| (side / factor).max(1)), cast)
     }
 
     /// [`track`](Self::track) against a view of the map from near the prior, of voxels of `voxel_size` metres: that of

@@ -13,6 +13,7 @@ use tsdf_hash::{
     ColourData, ColourView, DenseMap, DepthData, DepthView, Error, FrameReport, Intrinsics, Map, Settings,
 };
 
+use crate::evicted_views::evicted_views_come_back;
 use crate::eviction::{limits, make};
 use crate::random::Random;
 use crate::scene::{Shot, look_at, room};
@@ -296,9 +297,17 @@ fn what_is_seen_again_is_cast_again() {
     // The same once more: weights of two frames show that the old blocks came back.
     add(&mut gpu, &frames[0]);
     let again = look(&mut gpu);
-    let both = |k: &usize| first.depth[*k].is_finite() && again.depth[*k].is_finite();
+    let both = |k: &usize| first.depth[*k] > 0.0 && again.depth[*k] > 0.0;
     let twice = (0..first.depth.len()).filter(both).filter(|&k| again.weights[k] >= 2 * first.weights[k]).count();
     assert!(twice > first.hits() * 9 / 10, "{twice} of {}", first.hits());
+}
+
+#[test]
+fn evicted_views_come_back_on_the_device() {
+    let settings =
+        Settings { voxel_size: 0.02, max_bytes: 6 << 20, memory: limits(16 << 20, 0), ..Settings::default() };
+    let Some(mut gpu) = open(settings, &options()) else { return };
+    evicted_views_come_back(&mut gpu, settings);
 }
 
 #[test]

@@ -11,6 +11,7 @@ mod consistency;
 mod degenerate;
 mod distance_field;
 mod errors;
+mod evicted_views;
 mod eviction;
 mod examples;
 mod global_registration;

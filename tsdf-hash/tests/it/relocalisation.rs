@@ -36,7 +36,7 @@ fn lit(shot: Shot, light: bool, seed: f64) -> Shot {
 }
 
 /// The map of a tour with noisy depth, and its keyframes.
-fn mapped(random: &mut Random, light: bool) -> (Map, KeyframeIndex) {
+pub(crate) fn mapped(random: &mut Random, light: bool) -> (Map, KeyframeIndex) {
     rooms(1, random, light)
 }
 
