@@ -9,6 +9,7 @@ mod correction;
 mod frame_memory;
 mod frame_source;
 mod frontend;
+mod frontend_state;
 mod gyroscope;
 mod local_map;
 #[cfg(feature = "pose-graph")]
@@ -29,6 +30,7 @@ pub use correction::Correction;
 pub use frame_memory::FrameMemory;
 pub use frame_source::{ColourImage, ColourPixels, DepthPixels, FrameImages, FrameSource};
 pub use frontend::{Frontend, Located};
+pub use frontend_state::FrontendState;
 pub use gyroscope::Gyroscope;
 pub use local_map::LocalMap;
 pub use motion_model::{MotionModel, OdometryError, StampedPose};

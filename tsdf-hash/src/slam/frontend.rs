@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::images::{ColourView, DepthView};
 use crate::keyframes::index::KeyframeIndex;
 use crate::settings::Settings;
+use crate::slam::frontend_state::{FrontendState, Last};
 use crate::slam::gyroscope::Gyroscope;
 use crate::slam::local_map::LocalMap;
 use crate::slam::motion_model::{MotionModel, StampedPose};
@@ -42,15 +43,6 @@ pub struct Located {
     pub tracking: Option<TrackingOutcome>,
     /// Lost, found, relocalised, degenerate.
     pub events: Vec<Event>,
-}
-
-/// What is known of the last pose.
-#[derive(Clone, Copy, PartialEq)]
-enum Last {
-    Tracked,
-    /// Along some directions the motion before goes on.
-    Guessed,
-    Lost,
 }
 
 /// Tracks a camera, and finds it again when it is lost.
@@ -101,6 +93,30 @@ impl Frontend {
     pub fn start(&mut self, pose: Isometry3<f64>) {
         self.motion.start(pose, None);
         self.resumed = true;
+    }
+
+    /// Goes on as a run that was interrupted; one that had lost the camera forgets the frames since.
+    pub fn restore(&mut self, state: &FrontendState) {
+        let motion = &mut self.motion;
+        (motion.last, motion.then, motion.before) = (state.pose, state.frame, state.before);
+        motion.gyroscope.restore(state.bias, state.learned);
+        (self.last, self.usual) = (state.last, UsualAgreement { usual: state.usual });
+        self.resumed = true;
+    }
+
+    /// What [`restore`](Self::restore) takes.
+    pub fn state(&self) -> FrontendState {
+        let motion = &self.motion;
+        let (bias, learned) = motion.gyroscope.learned();
+        FrontendState {
+            last: self.last,
+            pose: motion.last,
+            frame: motion.then,
+            before: motion.before,
+            usual: self.usual.usual,
+            bias,
+            learned,
+        }
     }
 
     /// What looks for a lost camera.

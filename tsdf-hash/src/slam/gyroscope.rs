@@ -52,6 +52,16 @@ impl Gyroscope {
         }
     }
 
+    /// The bias, and the motions that it was learned from.
+    pub(crate) fn learned(&self) -> (Vector3<f64>, usize) {
+        (self.bias, self.learned)
+    }
+
+    /// Takes the bias of an earlier run.
+    pub(crate) fn restore(&mut self, bias: Vector3<f64>, learned: usize) {
+        (self.bias, self.learned) = (bias, learned);
+    }
+
     /// What is taken for bias, rad/s.
     pub fn bias(&self) -> &Vector3<f64> {
         &self.bias

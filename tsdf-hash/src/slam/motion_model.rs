@@ -44,11 +44,11 @@ pub struct MotionModel {
     pub(crate) gyroscope: Gyroscope,
     /// Seconds from frame to frame.
     interval: f64,
-    last: Option<PosePrior>,
+    pub(crate) last: Option<PosePrior>,
     /// The frame that `last` belongs to.
-    then: Option<StampedPose>,
+    pub(crate) then: Option<StampedPose>,
     /// The pose before the last one; `None` where the last one was not found.
-    before: Option<Isometry3<f64>>,
+    pub(crate) before: Option<Isometry3<f64>>,
 }
 
 impl MotionModel {

@@ -11,10 +11,12 @@ use crate::keyframes::index::KeyframeIndex;
 use crate::map::Map;
 use crate::mesh::triangle_mesh::Mesh;
 use crate::settings::Settings;
+use crate::slam::frontend_state::FrontendState;
 use crate::slam::trajectory_text::{trajectory_from_tum, trajectory_to_tum};
 
-/// Names of the metadata in a map's file: last stamp, trajectory and keyframes.
+/// Names of the metadata in a map's file: last stamp, trajectory and keyframes, and where they were tracked, the tracked camera.
 const KEYS: [&str; 3] = ["scan.last_stamp", "scan.trajectory", "scan.keyframes"];
+const FRONTEND: &str = "scan.frontend";
 
 /// A map with what localises a camera in it, and what a run has done so far.
 pub struct SlamState {
@@ -28,13 +30,16 @@ pub struct SlamState {
     pub last_stamp: f64,
     /// Number of the next frame: those of the frames so far are not stored with a map, only their poses.
     pub next_frame: usize,
+    /// How the camera moved and what its frames were like, if it was tracked: with it, a run goes on as if it had not been interrupted
+    /// (but with loops, whose search begins anew).
+    pub frontend: Option<FrontendState>,
 }
 
 impl SlamState {
     /// Nothing but a map.
     pub fn new(map: Map) -> Self {
         let (keyframes, trajectory) = (KeyframeIndex::new(), Vec::new());
-        Self { map, keyframes, trajectory, last_stamp: f64::NEG_INFINITY, next_frame: 0 }
+        Self { map, keyframes, trajectory, last_stamp: f64::NEG_INFINITY, next_frame: 0, frontend: None }
     }
 
     /// Reads what [`Slam::save`](crate::slam::Slam::save) wrote; of a map that was saved alone, the map. Memory and threads are those of
@@ -52,6 +57,10 @@ impl SlamState {
         let trajectory =
             text(1).map(|text| trajectory_from_tum(&text).map_err(|why| Error::InvalidMetadata { key: KEYS[1], why }));
         let keyframes = metadata.get(KEYS[2]).map(|bytes| KeyframeIndex::from_bytes(bytes));
+        let frontend = metadata.get(FRONTEND).map(|bytes| {
+            let read = FrontendState::from_text(&String::from_utf8_lossy(bytes));
+            read.map_err(|why| Error::InvalidMetadata { key: FRONTEND, why })
+        });
         let &Settings { max_bytes, threads, memory, .. } = settings;
         let continued = Settings { max_bytes, threads, memory, ..*file.settings() };
         Ok(Self {
@@ -60,6 +69,7 @@ impl SlamState {
             trajectory: trajectory.transpose()?.unwrap_or_default(),
             last_stamp: last_stamp.transpose()?.unwrap_or(f64::NEG_INFINITY),
             next_frame: 0,
+            frontend: frontend.transpose()?,
         })
     }
 
@@ -74,7 +84,9 @@ impl SlamState {
     /// # Errors
     /// As [`Map::save`].
     pub fn save(&self, path: &Path, mesh: Option<&Mesh>, metadata: BTreeMap<String, Vec<u8>>) -> Result<(), Error> {
-        self.map.save(path, mesh, &with_metadata(metadata, self.last_stamp, &self.trajectory, &self.keyframes))
+        let Self { last_stamp, trajectory, keyframes, frontend, .. } = self;
+        let metadata = with_metadata(metadata, *last_stamp, trajectory, keyframes, frontend.as_ref());
+        self.map.save(path, mesh, &metadata)
     }
 }
 
@@ -84,9 +96,11 @@ pub(crate) fn with_metadata(
     last_stamp: f64,
     trajectory: &[(f64, Isometry3<f64>)],
     keyframes: &KeyframeIndex,
+    frontend: Option<&FrontendState>,
 ) -> BTreeMap<String, Vec<u8>> {
     let values =
         [last_stamp.to_string().into_bytes(), trajectory_to_tum(trajectory).into_bytes(), keyframes.to_bytes()];
     metadata.extend(KEYS.map(String::from).into_iter().zip(values));
+    metadata.extend(frontend.map(|frontend| (FRONTEND.into(), frontend.to_text().into_bytes())));
     metadata
 }

@@ -93,14 +93,16 @@ impl<S: FrameSource> Slam<S> {
     /// As [`Slam::new`].
     pub fn with_source(settings: SlamSettings, state: SlamState, source: S) -> Result<Self, Error> {
         settings.check()?;
-        let SlamState { map, keyframes, trajectory, last_stamp, next_frame } = state;
+        let SlamState { map, keyframes, trajectory, last_stamp, next_frame, frontend: stored } = state;
         let map_settings = *map.settings();
         let mut frontend = match settings.poses {
             PoseSource::Given => None,
             PoseSource::Tracked | PoseSource::Odometry(_) => Some(Frontend::new(&settings, &map_settings)?),
         };
-        if let (Some(frontend), Some((_, last))) = (&mut frontend, trajectory.last()) {
-            frontend.start(*last);
+        match (&mut frontend, stored, trajectory.last()) {
+            (Some(frontend), Some(stored), _) => frontend.restore(&stored),
+            (Some(frontend), None, Some((_, last))) => frontend.start(*last),
+            _ => {}
         }
         let (map, fallback) = DeviceMap::open(map, settings.device)?;
         let backend = match () {

@@ -18,7 +18,7 @@ const UNLIKE: f64 = 0.5;
 #[derive(Debug, Default)]
 pub(crate) struct UsualAgreement {
     /// Agreement and likeness of the frames lately; `None` before the first one.
-    usual: Option<[f64; 2]>,
+    pub(crate) usual: Option<[f64; 2]>,
 }
 
 impl UsualAgreement {

@@ -141,7 +141,7 @@ fn a_run_goes_on_where_everything_is_evicted() {
     for fuse in [true, false] {
         let map = reopened(&state.map, &format!("on-{fuse}"), 16 << 20);
         let (keyframes, trajectory) = (KeyframeIndex::new(), state.trajectory[..12].to_vec());
-        let state = SlamState { map, keyframes, trajectory, last_stamp: 0.0, next_frame: 12 };
+        let state = SlamState { map, keyframes, trajectory, last_stamp: 0.0, next_frame: 12, frontend: None };
         let settings = SlamSettings { fuse, ..settings.clone() };
         let mut slam = Slam::with_source(settings, state, FrameMemory::new()).unwrap();
         for k in 12..70 {

@@ -34,6 +34,7 @@ mod random;
 mod recognition;
 mod recorded;
 mod relocalisation;
+mod resumed;
 mod reversible;
 mod scene;
 mod strange_motion;

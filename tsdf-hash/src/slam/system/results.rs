@@ -13,6 +13,8 @@ use crate::mesh::incremental::IncrementalMesher;
 use crate::mesh::triangle_mesh::Mesh;
 use crate::slam::camera_check::CameraDoubt;
 use crate::slam::frame_source::FrameSource;
+use crate::slam::frontend::Frontend;
+use crate::slam::frontend_state::FrontendState;
 use crate::slam::outcome::SlamStatistics;
 use crate::slam::quality::Quality;
 use crate::slam::state::{SlamState, with_metadata};
@@ -85,7 +87,13 @@ impl<S: FrameSource> Slam<S> {
     /// # Errors
     /// As [`Map::save`](crate::Map::save); a map on a GPU is fetched first.
     pub fn save(&self, path: &Path, mesh: Option<&Mesh>, metadata: BTreeMap<String, Vec<u8>>) -> Result<(), Error> {
-        let metadata = with_metadata(metadata, self.last_stamp, &self.trajectory, self.keyframes());
+        let metadata = with_metadata(
+            metadata,
+            self.last_stamp,
+            &self.trajectory,
+            self.keyframes(),
+            self.frontend_state().as_ref(),
+        );
         self.map.with_map(|map| map.save(path, mesh, &metadata))
     }
 
@@ -95,8 +103,13 @@ impl<S: FrameSource> Slam<S> {
     /// As [`reintegrate`](Self::reintegrate), and those of a GPU.
     pub fn finish(mut self) -> Result<SlamState, Error> {
         self.reintegrate(usize::MAX)?;
+        let frontend = self.frontend_state();
         let Self { map, backend, trajectory, last_stamp, next_frame, .. } = self;
         let keyframes = backend.keyframes().clone();
-        Ok(SlamState { map: map.into_map()?, keyframes, trajectory, last_stamp, next_frame })
+        Ok(SlamState { map: map.into_map()?, keyframes, trajectory, last_stamp, next_frame, frontend })
+    }
+
+    fn frontend_state(&self) -> Option<FrontendState> {
+        self.frontend.as_ref().map(Frontend::state)
     }
 }
