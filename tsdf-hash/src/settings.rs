@@ -33,7 +33,8 @@ impl Default for NoiseModel {
 /// Where blocks are evicted to that active memory has no room for, or that have not been updated for long (thesis Paper I,
 /// section 4.3).
 ///
-/// RAM and disk have hard caps in bytes. By default nothing is evicted, and a map that outgrows [`Settings::max_bytes`]
+/// RAM and disk have hard caps in bytes. A lost camera has a map of its own for some frames, and the search for loops two: each has caps of
+/// the same size, without disk. By default nothing is evicted, and a map that outgrows [`Settings::max_bytes`]
 /// refuses frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields, default))]
@@ -104,6 +105,13 @@ impl Settings {
     /// Truncation distance `μ`, metres.
     pub fn truncation(&self) -> f64 {
         self.truncation_voxels * self.voxel_size
+    }
+
+    /// Of a small map beside one of these settings, with caps of the same size: it evicts where that one does, to RAM only, and what comes
+    /// back is merged at once.
+    pub(crate) fn beside(&self) -> Self {
+        let memory = MemoryLimits { disk_bytes: 0, merge_timeout: 0.0, ..self.memory };
+        Self { memory, ..*self }
     }
 
     /// How far in front of a measured depth voxels are touched, metres.

@@ -9,7 +9,7 @@ use crate::dense_map::DenseMap;
 use crate::error::Error;
 use crate::images::{ColourView, DepthView};
 use crate::map::Map;
-use crate::settings::{MemoryLimits, Settings};
+use crate::settings::Settings;
 
 /// Keyframes that a map takes before another one is begun, which replaces it after as many again: it holds 8 to 16, and the search for
 /// loops takes those ten or more before the present one for old.
@@ -27,10 +27,9 @@ pub struct LocalMap {
 }
 
 impl LocalMap {
-    /// Empty; with the settings of the whole map, but nothing is evicted.
+    /// Empty; with the settings of the whole map, but no disk.
     pub fn new(settings: &Settings) -> Self {
-        let settings = Settings { memory: MemoryLimits::default(), ..*settings };
-        Self { settings, maps: Vec::new(), begun: 0, world_from_maps: Isometry3::identity() }
+        Self { settings: settings.beside(), maps: Vec::new(), begun: 0, world_from_maps: Isometry3::identity() }
     }
 
     /// The map to track against, and where its world is; `None` before the first frame.

@@ -8,7 +8,7 @@ use crate::global_registration::{GlobalRegistration, LocalCloud};
 use crate::images::{ColourView, DepthView};
 use crate::keyframes::index::{KeyframeIndex, RecognisedPlace, features_of};
 use crate::map::Map;
-use crate::settings::{MemoryLimits, Settings};
+use crate::settings::Settings;
 use crate::tracking::outcome::{PosePrior, TrackingOutcome};
 use crate::tracking::pose::within;
 use crate::tracking::settings::TrackingSettings;
@@ -184,7 +184,7 @@ impl Relocaliser {
             return Ok(pose);
         }
         self.places.clear();
-        let mut map = Map::new(Settings { memory: MemoryLimits::default(), ..*settings })?;
+        let mut map = Map::new(settings.beside())?;
         let first = Isometry3::identity();
         map.integrate(depth, colour, &first)?;
         let spacing = self.surface.as_ref().map_or(1.0, |surface| surface.settings().spacing);

@@ -106,7 +106,8 @@ fn reopened(map: &Map, name: &str, max_bytes: usize) -> Map {
 fn a_lost_camera_is_found_where_everything_is_evicted() {
     let mut random = Random::new(5);
     let (map, keyframes) = mapped(&mut random, true);
-    let mut map = reopened(&map, "lost", 16 << 20);
+    // The room of one view: the map of the lost camera itself must evict, too.
+    let mut map = reopened(&map, "lost", 3 << 20);
     let mut relocaliser = Relocaliser::new(TrackingSettings::default()).unwrap();
     for k in [3, 50, 97] {
         let truth = room::pose(k, 120) * Isometry3::translation(0.02, 0.03, 0.0);
@@ -118,18 +119,20 @@ fn a_lost_camera_is_found_where_everything_is_evicted() {
     }
 }
 
+/// An image of a camera that turns by nearly a degree from one to the next.
+fn painted(k: usize) -> Shot {
+    let pose = room::pose(k, 400);
+    Shot::take((160, 120), [131.25; 2], pose, |o, d| Some(room::hit(o, d))).painted(|p| room::colour(p, 0.0))
+}
+
 /// A run goes on in a stored map from where it stood, without keyframes that would find a lost camera; with and without fusing.
 #[test]
 fn a_run_goes_on_where_everything_is_evicted() {
-    let shot = |k: usize| {
-        let pose = room::pose(k, 400);
-        Shot::take((160, 120), [131.25; 2], pose, |o, d| Some(room::hit(o, d))).painted(|p| room::colour(p, 0.0))
-    };
     let map = Settings { voxel_size: 0.02, ..Settings::default() };
     let settings = SlamSettings { map, poses: PoseSource::Tracked, ..SlamSettings::default() };
     let mut slam = Slam::new(settings.clone()).unwrap();
     let step = |slam: &mut Slam, k: usize| {
-        let shot = shot(k);
+        let shot = painted(k);
         let first = Some(&shot.world_from_camera).filter(|_| k == 0);
         let outcome = slam.frame(k as f64 / 30.0, &shot.view(), shot.colour().as_ref(), first).unwrap();
         outcome.world_from_camera.map(|pose| apart(&pose, &shot.world_from_camera))
@@ -149,4 +152,23 @@ fn a_run_goes_on_where_everything_is_evicted() {
             assert!(metres < 5e-3 && radians < 5e-3, "frame {k}, fused: {fuse}: {metres} m, {radians} rad");
         }
     }
+}
+
+/// Beside the whole map the search for loops keeps two small ones: what they have no room for leaves them, too.
+#[cfg(feature = "pose-graph")]
+#[test]
+fn loops_are_looked_for_in_little_memory() {
+    let map = Settings { max_bytes: 3 << 19, memory: limits(16 << 20, 16 << 20), ..FREE };
+    let loops = Some(tsdf_hash::loop_closure::LoopSettings::default());
+    let settings = SlamSettings { map, loops, ..SlamSettings::default() };
+    let mut slam = Slam::with_source(settings, SlamState::new(make(map, "loops")), FrameMemory::new()).unwrap();
+    for k in 0..60 {
+        let shot = painted(k);
+        let first = Some(&shot.world_from_camera).filter(|_| k == 0);
+        let outcome = slam.frame(f64::from(k as u32) / 30.0, &shot.view(), shot.colour().as_ref(), first).unwrap();
+        let pose = outcome.world_from_camera.unwrap_or_else(|| panic!("{k}: {:?}", outcome.events));
+        let (metres, radians) = apart(&pose, &shot.world_from_camera);
+        assert!(metres < 0.02 && radians < 0.02, "frame {k}: {metres} m, {radians} rad");
+    }
+    assert!(slam.map().memory().host_blocks > 100);
 }

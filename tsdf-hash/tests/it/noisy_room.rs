@@ -28,6 +28,7 @@ pub(crate) fn seen(pose: Isometry3<f64>, random: &mut Random) -> Shot {
 }
 
 /// What takes poses to where they lie best over the true ones.
+#[cfg(feature = "pose-graph")]
 pub(crate) fn alignment(poses: &[Isometry3<f64>], truth: &[Isometry3<f64>]) -> Isometry3<f64> {
     let mut found = Isometry3::identity();
     // About the origin turns and shifts are not independent: again until nothing is left.
