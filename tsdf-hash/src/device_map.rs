@@ -1,5 +1,8 @@
 //! A map on the processor or on a GPU, by one constructor.
 
+use std::collections::BTreeMap;
+use std::path::Path;
+
 use crate::dense_map::DenseMap;
 use crate::error::Error;
 #[cfg(feature = "gpu")]
@@ -7,6 +10,7 @@ use crate::gpu::gpu_map::GpuMap;
 #[cfg(feature = "gpu")]
 use crate::gpu::options::GpuOptions;
 use crate::map::Map;
+use crate::mesh::triangle_mesh::Mesh;
 use crate::report::MemoryUsage;
 
 /// Which device keeps a map.
@@ -115,15 +119,15 @@ impl DeviceMap {
         }
     }
 
-    /// Shows the map to a function; that of a GPU as a copy.
+    /// Writes the whole map to a file, as [`Map::save`].
     ///
     /// # Errors
-    /// Those of the function, and [`Error::Device`](crate::Error).
-    pub fn with_map<T>(&self, show: impl FnOnce(&Map) -> Result<T, Error>) -> Result<T, Error> {
+    /// As [`Map::save`], and [`Error::Device`](crate::Error).
+    pub fn save(&self, path: &Path, mesh: Option<&Mesh>, metadata: &BTreeMap<String, Vec<u8>>) -> Result<(), Error> {
         match self {
-            Self::Cpu(map) => show(map),
+            Self::Cpu(map) => map.save(path, mesh, metadata),
             #[cfg(feature = "gpu")]
-            Self::Gpu(map) => show(&map.to_map(usize::MAX)?),
+            Self::Gpu(map) => map.save(path, mesh, metadata),
         }
     }
 

@@ -45,12 +45,9 @@ impl Checkpoints {
         Self { settings, next: Instant::now() + interval }
     }
 
-    /// Saves if it is time to; a map on a GPU is not saved before the end.
+    /// Saves if it is time to.
     pub(super) fn save(&mut self, slam: &mut Slam<impl FrameSource>, sequence: &Path) -> Result<(), ScanError> {
         let Some(settings) = self.settings.as_ref().filter(|_| Instant::now() >= self.next) else { return Ok(()) };
-        if slam.map().cpu().is_none() {
-            return Ok(());
-        }
         // A stored map must fit the poses that are stored with it.
         slam.reintegrate(usize::MAX)?;
         let start = Instant::now();

@@ -5,6 +5,8 @@ use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use crate::blocks::block_history::BlockHistory;
+use crate::blocks::block_key::BlockKey;
 use crate::blocks::voxel_block::VoxelBlock;
 use crate::codec::encode;
 use crate::error::Error;
@@ -17,15 +19,23 @@ use crate::frame_clock::FrameClock;
 use crate::mesh::triangle_mesh::Mesh;
 use crate::settings::Settings;
 use crate::storage::block_file::StoredBlock;
-use crate::storage::block_storage::BlockStorage;
 use crate::storage::summary::BlockSummary;
+
+/// Is given blocks with their sums, one after the other.
+pub(crate) type Visit<'a> = dyn FnMut(BlockKey, &VoxelBlock, BlockHistory) -> Result<(), Error> + 'a;
+
+/// Whoever holds the blocks of a map.
+pub(crate) trait Blocks {
+    /// Shows all blocks, in the order of their keys, until a visit fails.
+    fn visit(&self, visit: &mut Visit) -> Result<(), Error>;
+}
 
 /// Writes a map beside its file and moves it to its place.
 pub(crate) fn save(
     path: &Path,
     settings: &Settings,
     clock: FrameClock,
-    storage: &BlockStorage,
+    blocks: &dyn Blocks,
     mesh: Option<&Mesh>,
     metadata: &BTreeMap<String, Vec<u8>>,
 ) -> Result<(), Error> {
@@ -33,7 +43,7 @@ pub(crate) fn save(
     name.push(format!(".{}.part", std::process::id()));
     let beside = path.with_file_name(name);
     let settings = write_settings(settings, clock);
-    let written = write(&beside, &settings, storage, mesh, metadata).and_then(|()| replace(&beside, path));
+    let written = write(&beside, &settings, blocks, mesh, metadata).and_then(|()| replace(&beside, path));
     if written.is_err() {
         // Best effort: the first error is the one to tell.
         let _ = std::fs::remove_file(&beside);
@@ -44,14 +54,14 @@ pub(crate) fn save(
 fn write(
     path: &Path,
     settings: &[u8],
-    storage: &BlockStorage,
+    blocks: &dyn Blocks,
     mesh: Option<&Mesh>,
     metadata: &BTreeMap<String, Vec<u8>>,
 ) -> Result<(), Error> {
     let mut out = Output { file: BufWriter::new(File::create(path).map_err(failed)?), at: HEADER_BYTES as u64 };
     out.file.write_all(&[0; HEADER_BYTES]).map_err(failed)?;
     let settings = out.section(settings)?;
-    let (blocks, index) = out.blocks(storage)?;
+    let (blocks, index) = out.blocks(blocks)?;
     let index = out.section(&index)?;
     let mesh = out.section(&mesh.map(write_mesh).unwrap_or_default())?;
     let metadata = out.section(&write_metadata(metadata))?;
@@ -85,21 +95,21 @@ impl Output {
         Ok(section)
     }
 
-    /// Writes the sums of all copies; returns their index, too.
-    fn blocks(&mut self, storage: &BlockStorage) -> Result<(Section, Vec<u8>), Error> {
+    /// Writes the blocks; returns their index, too.
+    fn blocks(&mut self, blocks: &dyn Blocks) -> Result<(Section, Vec<u8>), Error> {
         let (start, mut checksum) = (self.at, Checksum::new());
-        let (mut index, mut bytes, mut sum) = (Vec::new(), Vec::new(), Box::new(VoxelBlock::ZERO));
-        for key in storage.sorted_keys() {
-            let history = storage.total(key, &mut sum)?;
+        let (mut index, mut bytes) = (Vec::new(), Vec::new());
+        blocks.visit(&mut |key, sum, history| {
             bytes.clear();
-            encode(&sum, &mut bytes);
-            let (last_update, frames, summary) = (history.last_update, history.frames, BlockSummary::of(&sum));
+            encode(sum, &mut bytes);
+            let (last_update, frames, summary) = (history.last_update, history.frames, BlockSummary::of(sum));
             let stored = StoredBlock { key, at: self.at, len: bytes.len() as u16, last_update, frames, summary };
             write_entry(&stored, &mut index);
             checksum.add(&bytes);
             self.file.write_all(&bytes).map_err(failed)?;
             self.at += bytes.len() as u64;
-        }
+            Ok(())
+        })?;
         Ok((Section { at: start, length: self.at - start, checksum: checksum.value() }, index))
     }
 }

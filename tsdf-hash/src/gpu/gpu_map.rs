@@ -4,6 +4,9 @@
 //! a frame touches and updates them. Every operation of the update is done as IEEE 754 says, whatever the device's compiler
 //! would like to do (`exact.wgsl`), and a device is asked whether it does before it is used (`probe.rs`).
 
+use std::collections::BTreeMap;
+use std::path::Path;
+
 use nalgebra::Isometry3;
 
 use crate::blocks::block_history::BlockHistory;
@@ -13,6 +16,7 @@ use crate::blocks::voxel_block::VoxelBlock;
 use crate::changes::{BlockChanges, MapVersion};
 use crate::dense_map::DenseMap;
 use crate::error::Error;
+use crate::file::writer;
 use crate::frame_clock::FrameClock;
 use crate::gpu::cast::Caster;
 use crate::gpu::device::Device;
@@ -26,6 +30,7 @@ use crate::integration::integrator::{Frame, Operation};
 use crate::integration::plane_image::PlaneImage;
 use crate::layer::{BlockReader, TsdfLayer};
 use crate::map::Map;
+use crate::mesh::triangle_mesh::Mesh;
 use crate::ray_cast::camera::Camera;
 use crate::ray_cast::settings::RayCastSettings;
 use crate::ray_cast::view::View;
@@ -101,6 +106,14 @@ impl GpuMap {
     pub fn memory(&self) -> MemoryUsage {
         let (active_bytes, active_blocks) = (self.tiers.pool.bytes(), self.tiers.pool.len());
         MemoryUsage { active_bytes, active_blocks, ..self.tiers.host.memory() }
+    }
+
+    /// Writes the whole map to a file, as [`Map::save`]; blocks of the device pass through the staging buffer.
+    ///
+    /// # Errors
+    /// As [`Map::save`], and [`Error::Device`].
+    pub fn save(&self, path: &Path, mesh: Option<&Mesh>, metadata: &BTreeMap<String, Vec<u8>>) -> Result<(), Error> {
+        writer::save(path, self.settings(), self.tiers.host.clock, &self.tiers, mesh, metadata)
     }
 
     /// A copy in active memory of at most `max_bytes`, to mesh, to query or to store.

@@ -6,6 +6,7 @@
 use crate::blocks::block_key::BlockKey;
 use crate::blocks::voxel_block::VoxelBlock;
 use crate::error::Error;
+use crate::file::writer::{Blocks, Visit};
 use crate::gpu::device::Device;
 use crate::gpu::fuse::UpdateCount;
 use crate::gpu::pool::Pool;
@@ -99,14 +100,7 @@ impl Tiers {
     pub(super) fn copy(&self, settings: Settings) -> Result<Map, Error> {
         let mut map = Map::new(settings)?;
         map.clock = self.host.clock;
-        let mut sum = Box::new(VoxelBlock::ZERO);
-        for key in self.host.storage.sorted_keys() {
-            let history = self.host.storage.total(key, &mut sum)?;
-            map.storage.add_block(key, &sum, history)?;
-        }
-        self.download(&self.pool.sorted_keys(), |key, block| {
-            map.storage.add_block(key, block, self.pool.history(key).unwrap_or_default())
-        })?;
+        self.visit(&mut |key, block, history| map.storage.add_block(key, block, history))?;
         Ok(map)
     }
 
@@ -246,5 +240,25 @@ impl Tiers {
             self.pool.remove(key);
         }
         (moved, outcome)
+    }
+}
+
+impl Blocks for Tiers {
+    /// Those of the device pass through the staging buffer; those on the processor go between.
+    fn visit(&self, visit: &mut Visit) -> Result<(), Error> {
+        let (storage, mut sum) = (&self.host.storage, Box::new(VoxelBlock::ZERO));
+        let mut on_host = storage.sorted_keys().into_iter().peekable();
+        let mut up_to = |end: Option<BlockKey>, visit: &mut Visit| {
+            while let Some(key) = on_host.next_if(|key| end.is_none_or(|end| *key < end)) {
+                let history = storage.total(key, &mut sum)?;
+                visit(key, &sum, history)?;
+            }
+            Ok(())
+        };
+        self.stream.download(&self.device, &self.pool, &self.pool.sorted_keys(), |key, block, history| {
+            up_to(Some(key), visit)?;
+            visit(key, block, history)
+        })?;
+        up_to(None, visit)
     }
 }

@@ -10,6 +10,7 @@ use crate::blocks::block_key::BlockKey;
 use crate::blocks::block_table::BlockTable;
 use crate::blocks::voxel_block::{MAX_COLOURS, VoxelBlock};
 use crate::error::Error;
+use crate::file::writer::{Blocks, Visit};
 use crate::hashing::mix64;
 use crate::settings::MemoryLimits;
 use crate::storage::block_file::{BlockFile, StoredBlock};
@@ -352,6 +353,17 @@ impl BlockStorage {
             return 0;
         }
         self.active.histories().filter(|(_, history)| history.call != self.call).count() + self.reloaded.len()
+    }
+}
+
+impl Blocks for BlockStorage {
+    fn visit(&self, visit: &mut Visit) -> Result<(), Error> {
+        let mut sum = Box::new(VoxelBlock::ZERO);
+        for key in self.sorted_keys() {
+            let history = self.total(key, &mut sum)?;
+            visit(key, &sum, history)?;
+        }
+        Ok(())
     }
 }
 

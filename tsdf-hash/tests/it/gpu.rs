@@ -1,6 +1,8 @@
 //! The map on a GPU is the map on the processor, to the bit. Skipped where there is no adapter, unless
 //! `PAINTCOPTER_REQUIRE_GPU=1` demands one.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Isometry3, Point3, Vector3};
 use tsdf_hash::distance_field::{DistanceField, DistanceSettings};
 use tsdf_hash::gpu::{GpuMap, GpuOptions};
@@ -8,13 +10,13 @@ use tsdf_hash::layer::TsdfLayer;
 use tsdf_hash::mesh::IncrementalMesher;
 use tsdf_hash::ray_cast::RayCastSettings;
 use tsdf_hash::slam::DeviceMap;
-use tsdf_hash::storage::{MemoryLimits, MemoryUsage};
+use tsdf_hash::storage::{MapFile, MemoryLimits, MemoryUsage};
 use tsdf_hash::{
     ColourData, ColourView, DenseMap, DepthData, DepthView, Error, FrameReport, Intrinsics, Map, Settings,
 };
 
 use crate::evicted_views::evicted_views_come_back;
-use crate::eviction::{limits, make};
+use crate::eviction::{limits, make, scratch};
 use crate::random::Random;
 use crate::scene::{Shot, look_at, room};
 
@@ -85,6 +87,11 @@ fn the_gpu_makes_the_bytes_of_the_processor() {
         assert_eq!((gpu.hash().unwrap(), gpu.blocks()), (map.hash(), map.blocks()));
         assert_eq!(small.hash().unwrap(), map.hash());
     }
+    let files = [scratch("file-cpu"), scratch("file-gpu")];
+    map.save(&files[0], Some(&map.mesh()), &BTreeMap::new()).unwrap();
+    gpu.save(&files[1], Some(&map.mesh()), &BTreeMap::new()).unwrap();
+    let [expected, found] = files.map(|path| (std::fs::read(&path).unwrap(), std::fs::remove_file(&path).unwrap()).0);
+    assert!(found == expected, "the files differ");
     // Out again, from the last to the first: each map of the way back is one of the way there.
     for (frame, hash) in frames.iter().zip(&hashes).rev() {
         let (view, pose) = (frame.shot.view(), frame.shot.world_from_camera);
@@ -337,6 +344,11 @@ fn a_map_moves_to_the_device_and_back_with_all_its_memory() {
         assert!(matches!(copy.integrate_at(0.0, &view, None, &pose), Err(Error::InvalidTime { .. })));
         assert_eq!((copy.hash(), copy.mesh()), (free.hash(), free.mesh()));
         assert!(matches!(gpu.to_map(1 << 20), Err(Error::OutOfBudget { .. })));
+        let path = scratch("of-both");
+        gpu.save(&path, None, &BTreeMap::new()).unwrap();
+        let stored = MapFile::open(&path).unwrap().into_map(free.settings().to_owned(), None).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!((stored.hash(), stored.mesh()), (free.hash(), free.mesh()));
         map = gpu.into_map().unwrap();
         assert_eq!((map.hash(), map.blocks(), *map.settings()), (free.hash(), free.blocks(), settings));
         assert_capped(&map.memory(), &settings);

@@ -85,7 +85,7 @@ impl<S: FrameSource> Slam<S> {
     /// [`SlamState::read`] reads it. Let the map follow first ([`reintegrate`](Self::reintegrate)): it must fit the poses.
     ///
     /// # Errors
-    /// As [`Map::save`](crate::Map::save); a map on a GPU is fetched first.
+    /// As [`DeviceMap::save`].
     pub fn save(&self, path: &Path, mesh: Option<&Mesh>, metadata: BTreeMap<String, Vec<u8>>) -> Result<(), Error> {
         let metadata = with_metadata(
             metadata,
@@ -94,7 +94,7 @@ impl<S: FrameSource> Slam<S> {
             self.keyframes(),
             self.frontend_state().as_ref(),
         );
-        self.map.with_map(|map| map.save(path, mesh, &metadata))
+        self.map.save(path, mesh, &metadata)
     }
 
     /// Lets the map follow all corrections, and hands over what the run has made.
