@@ -17,6 +17,8 @@ mod examples;
 mod global_registration;
 #[cfg(feature = "gpu")]
 mod gpu;
+#[cfg(feature = "gpu")]
+mod gpu_memory;
 mod holes;
 mod incremental;
 #[cfg(feature = "pose-graph")]
