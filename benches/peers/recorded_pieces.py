@@ -17,8 +17,9 @@ PIECES = [(5, 1), (12, 1), (20, 1), (30, 1), (45, 1), (60, 2), (80, 4), (120, 3)
 
 def refusal(program, sequence, frames, more):
     with tempfile.TemporaryDirectory() as out:
-        command = [program, "--sequence", sequence, "--poses", "tracked", "--voxel", "0.02", "--frames", frames, "--out", out]
-        run = subprocess.run([*command, *more], capture_output=True, text=True, check=False)
+        command = [program, "--sequence", sequence, "--poses", "tracked", "--voxel", "0.02"]
+        command += ["--frames", frames, "--out", out, *more]
+        run = subprocess.run(command, capture_output=True, text=True, check=False)
     return run.stderr.strip().splitlines()[-1] if run.returncode else None
 
 

@@ -11,7 +11,7 @@ mod sorted_pages;
 pub(crate) mod summary;
 pub(crate) mod swap_file;
 pub(crate) mod victims;
-mod view_reload;
+pub(crate) mod view_reload;
 
 pub use crate::file::map_file::MapFile;
 pub use crate::report::MemoryUsage;

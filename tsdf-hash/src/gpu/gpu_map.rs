@@ -307,7 +307,7 @@ impl DenseMap for GpuMap {
     ) -> Result<usize, Error> {
         let camera = Camera::new(intrinsics, (width, height), world_from_camera, GpuMap::settings(self), settings)?;
         let from = world_from_camera.translation.vector / GpuMap::settings(self).block_size();
-        Ok(self.tiers.reload_view(&camera, from.into()))
+        self.tiers.reload_view(&camera, from.into())
     }
 
     fn bytes(&self) -> usize {

@@ -19,6 +19,7 @@ use crate::settings::Settings;
 use crate::storage::block_storage::hash_blocks;
 use crate::storage::frame_update::{FrameJob, apply_frame, refused};
 use crate::storage::victims;
+use crate::storage::view_reload::room_if_any;
 
 /// Cap of the active memory of the map on the processor: what it works with.
 const WORK_BYTES: usize = 1 << 20;
@@ -174,16 +175,16 @@ impl Tiers {
     pub(super) fn transfer(&mut self, on_host: &[BlockKey], job: FrameJob) -> [usize; 2] {
         let limits = self.host.settings().memory;
         let seen = &on_host[..on_host.len().min(limits.max_transfers)];
-        let reloaded = self.reload(seen, job.camera);
+        let reloaded = self.reload(seen, job.camera).unwrap_or_default();
         let aged = victims::aged(self.pool.histories(), job.time, &limits);
         [reloaded, if self.host.storage.evicted.is_enabled() { self.evict(&aged).0 } else { 0 }]
     }
 
     /// Brings blocks in view to the device, the nearest first, as far as there is room once those out of view have left: how many.
-    pub(super) fn reload_view(&mut self, camera: &Camera, from: [f64; 3]) -> usize {
+    pub(super) fn reload_view(&mut self, camera: &Camera, from: [f64; 3]) -> Result<usize, Error> {
         let wanted = in_view(self.host.storage.sorted_keys().into_iter(), camera);
         if wanted.is_empty() {
-            return 0;
+            return Ok(0);
         }
         self.host.storage.begin_call();
         self.touch(in_view(self.pool.keys(), camera));
@@ -201,20 +202,17 @@ impl Tiers {
     }
 
     /// Brings blocks to the device as far as there is room once others have left: how many.
-    fn reload(&mut self, keys: &[BlockKey], camera: [f64; 3]) -> usize {
-        let found_room = self.make_room(keys.len(), camera);
+    fn reload(&mut self, keys: &[BlockKey], camera: [f64; 3]) -> Result<usize, Error> {
+        room_if_any(self.make_room(keys.len(), camera))?;
         let count = keys.len().min(self.pool.room());
-        if found_room.and_then(|()| self.pool.reserve(&self.device, count)).is_err() {
-            return 0;
-        }
+        self.pool.reserve(&self.device, count)?;
         let mut sum = Box::new(VoxelBlock::ZERO);
-        let mut reload = |&key: &BlockKey| {
+        for &key in &keys[..count] {
             let history = self.host.storage.total(key, &mut sum)?;
             upload(&self.device, &mut self.pool, key, &sum, history)?;
             self.host.storage.forget(key);
-            Ok::<(), Error>(())
-        };
-        keys[..count].iter().take_while(|key| reload(key).is_ok()).count()
+        }
+        Ok(count)
     }
 
     /// Evicts blocks that the current call has not touched until there is room for `count`, if there are enough of them.

@@ -20,7 +20,7 @@ impl BlockStorage {
         }
         let lacking = keys.len().saturating_sub(self.active.room());
         if lacking > 0 {
-            self.make_room(lacking, camera)?;
+            room_if_any(self.make_room(lacking, camera))?;
         }
         let mut reloaded = 0;
         for &key in keys {
@@ -36,5 +36,13 @@ impl BlockStorage {
             }
         }
         Ok(reloaded)
+    }
+}
+
+/// What has no room elsewhere stays, and what there is room for comes back all the same.
+pub(crate) fn room_if_any(made: Result<(), Error>) -> Result<(), Error> {
+    match made {
+        Err(Error::StorageFull { .. }) => Ok(()),
+        made => made,
     }
 }
