@@ -10,5 +10,5 @@ mod sample;
 mod thesis;
 
 pub use feedback::{TrainProgress, TrainSettings, Trainer};
-pub use patch::thesis_patch;
+pub use patch::{thesis_patch, thesis_patch_of};
 pub use thesis::{ThesisLoss, ThesisSettings, ThesisTrainer};

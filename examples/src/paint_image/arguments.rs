@@ -100,7 +100,7 @@ pub(super) enum Command {
         /// Folder or picture [default: five built-in textures of 128 x 128 pixels]
         pictures: Option<PathBuf>,
     },
-    /// Trains a network: the feedback painter's, or the thesis' on digits or on procedural patches
+    /// Trains a network: the feedback painter's, or the thesis' on digits or on patches
     Train(Training),
 }
 
@@ -109,7 +109,7 @@ pub(super) struct Training {
     /// What to train
     #[arg(long, default_value = "painter")]
     pub(super) preset: Preset,
-    /// Folder with the pictures of MNIST, or the file; for thesis-mnist
+    /// For thesis-mnist: folder with the pictures of MNIST, or the file. For thesis-paint: folder of photographs [default: procedural scenes]
     #[arg(long, value_name = "PATH", required_if_eq("preset", "thesis-mnist"))]
     pub(super) data: Option<PathBuf>,
     /// Seed of the first weights and of all pictures
@@ -136,6 +136,12 @@ pub(super) struct Training {
     /// Weight of the divergence of the latent code, for the thesis' presets; less pays for more detail [default: the thesis']
     #[arg(long)]
     pub(super) latent_weight: Option<f64>,
+    /// Weight of the change of volume from one spray to the next, for the thesis' presets [default: 0.1]
+    #[arg(long)]
+    pub(super) variation_weight: Option<f64>,
+    /// Train the thesis' network without its stop, as for its figure 8.4: it takes all of its steps, and nothing scales the volume
+    #[arg(long, conflicts_with = "as_printed")]
+    pub(super) never_stops: bool,
     /// Worker threads [default: all cores]; the weights do not depend on it
     #[arg(long, value_parser = worker_threads::parse)]
     pub(super) threads: Option<usize>,

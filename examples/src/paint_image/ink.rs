@@ -10,8 +10,21 @@ use crate::pictures::Rgb;
 
 /// Reads a picture of any size and depth as ink: dark is paint, transparency shows the white wall.
 pub fn read_ink(path: &Path) -> Result<Image, PaintImageError> {
+    read_small_ink(path, u32::MAX)
+}
+
+/// The same of a picture whose shorter side is shrunk to `shortest` pixels if it has more.
+pub(super) fn read_small_ink(path: &Path, shortest: u32) -> Result<Image, PaintImageError> {
     let unreadable = |why: String| PaintImageError::Unreadable { path: path.display().to_string(), why };
     let picture = open_upright(path).map_err(|e| unreadable(format!("cannot be read as a picture ({e})")))?;
+    let [width, height] = [picture.width(), picture.height()];
+    let picture = if width.min(height) > shortest {
+        let share = f64::from(shortest) / f64::from(width.min(height));
+        let [width, height] = [width, height].map(|side| (f64::from(side) * share).round() as u32);
+        picture.thumbnail_exact(width, height)
+    } else {
+        picture
+    };
     let rgba = picture.to_rgba32f();
     let ink = rgba.pixels().map(|p| {
         let [r, g, b, a] = p.0.map(f64::from);
@@ -61,4 +74,22 @@ pub(super) fn error_map(ink: &Image, wanted: &Image) -> Rgb {
         if error < 0.0 { [255, fade, fade] } else { [fade, fade, 255] }
     };
     Rgb::from_pixels(ink.width(), ink.height(), ink.data().iter().zip(wanted.data()).map(colour))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A portrait of 40 x 80 pixels, its upper half black: smaller in proportion, as it is where it is small enough.
+    #[test]
+    fn large_pictures_are_shrunk_to_their_shorter_side() {
+        let path = std::env::temp_dir().join(format!("paintcopter-small-ink-{}.png", std::process::id()));
+        let half = |_, y: u32| image::Luma([if y < 40 { 0 } else { 255 }]);
+        image::GrayImage::from_fn(40, 80, half).save(&path).unwrap();
+        let [whole, small] = [40, 10].map(|shortest| read_small_ink(&path, shortest).unwrap());
+        std::fs::remove_file(&path).unwrap();
+        let size = |image: &Image| (image.width(), image.height());
+        assert_eq!((size(&whole), size(&small)), ((40, 80), (10, 20)));
+        assert_eq!((small.at(9, 9), small.at(0, 10)), (1.0, 0.0));
+    }
 }

@@ -85,8 +85,8 @@ fn pictures_or_textures(pictures: Option<PathBuf>) -> Result<Vec<Image>, PaintIm
 }
 
 fn run_training(training: Training) -> Result<(), PaintImageError> {
-    let Training { preset, data, seed, steps, until, batch, rate, last_rate, as_printed, latent_weight, .. } = training;
-    let Training { threads, resume, out, .. } = training;
+    let Training { preset, data, seed, steps, until, batch, rate, last_rate, as_printed, never_stops, .. } = training;
+    let Training { latent_weight, variation_weight, threads, resume, out, .. } = training;
     create(&out, "paint-image-train")?;
     let threads = worker_threads(threads);
     let (architecture, pictures) = match preset {
@@ -106,9 +106,12 @@ fn run_training(training: Training) -> Result<(), PaintImageError> {
         }
         // The command line requires the data.
         Preset::ThesisMnist => (Architecture::MNIST, TrainingImages::Digits(data.unwrap_or_default())),
-        Preset::ThesisPaint => (Architecture::PAINT, TrainingImages::Patches),
+        Preset::ThesisPaint => (Architecture::PAINT, data.map_or(TrainingImages::Patches, TrainingImages::Photographs)),
     };
     let preset = ThesisSettings::default();
+    // `S_stop` grows by less than 1 a step.
+    let stop = if never_stops { architecture.steps as f64 } else { architecture.stop };
+    let architecture = Architecture { stop, ..architecture };
     let settings = ThesisSettings {
         seed,
         architecture,
@@ -118,8 +121,10 @@ fn run_training(training: Training) -> Result<(), PaintImageError> {
         learning_rate: rate.unwrap_or(preset.learning_rate),
         last_learning_rate: last_rate.unwrap_or(preset.last_learning_rate),
         objective: Objective {
-            gated: !as_printed,
+            gated: !as_printed && !never_stops,
             latent: latent_weight.unwrap_or(preset.objective.latent),
+            variation: variation_weight.unwrap_or(preset.objective.variation),
+            stop: if never_stops { 0.0 } else { preset.objective.stop },
             ..preset.objective
         },
         ..preset

@@ -1,6 +1,7 @@
 //! Training of the networks.
 
 mod digits;
+mod held_out;
 mod painter;
 mod rollout;
 mod thesis;

@@ -416,6 +416,14 @@ fn absurd_settings_are_named() {
         assert_refused(&["--image", &image, "--palette", "cmy", setting, "--out", &out], &["--palette", name]);
     }
     assert_refused(&["--image", &image, "--painter", "thesis", "--out", &out], &["--weights"]);
+    let folder = scratch.path("alone");
+    std::fs::create_dir(&folder).unwrap();
+    for (pictures, word) in [(0, "no PNG or JPEG"), (1, "give two or more")] {
+        if pictures == 1 {
+            std::fs::copy(&image, format!("{folder}/one.png")).unwrap();
+        }
+        assert_refused(&["train", "--preset", "thesis-paint", "--data", &folder, "--out", &out], &["alone", word]);
+    }
     for (setting, word) in [("--steps=0", "`steps`"), ("--batch=0", "`batch`"), ("--rate=nan", "`learning_rate`")] {
         for preset in ["painter", "thesis-paint"] {
             assert_refused(&["train", "--preset", preset, setting, "--out", &out], &[word]);

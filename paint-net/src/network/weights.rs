@@ -3,7 +3,7 @@
 use super::architecture::{Architecture, INPUTS};
 use super::layout;
 use super::pass::PackedNetwork;
-use super::safetensors::{self, Tensor};
+use super::safetensors::{self, Storage, Tensor};
 use crate::error::Error;
 use crate::procedural::lattice;
 
@@ -65,7 +65,7 @@ impl Network {
 
     /// The bytes of a safetensors file, with notes for whoever reads it.
     pub fn to_safetensors(&self, notes: &[(&str, String)]) -> Vec<u8> {
-        safetensors::write(&self.tensors(), notes)
+        safetensors::write(&self.tensors(), notes, Storage::Whole)
     }
 
     pub(crate) fn tensors(&self) -> Vec<Tensor> {

@@ -2,7 +2,7 @@
 
 use super::adam::Adam;
 use crate::error::Error;
-use crate::network::safetensors::{self, Tensor};
+use crate::network::safetensors::{self, Storage, Tensor};
 
 /// Names of what a checkpoint holds beside the network.
 const MEAN: &str = "adam.mean";
@@ -23,7 +23,7 @@ impl State {
             self.tensors.push(Tensor { name: name.to_string(), shape: vec![values.len()], values: values.to_vec() });
         }
         let notes = [("settings", fingerprint), ("step", self.steps.to_string()), ("updates", updates.to_string())];
-        safetensors::write(&self.tensors, &notes)
+        safetensors::write(&self.tensors, &notes, Storage::Whole)
     }
 
     /// Refuses the state of another network, or of a training with other settings.

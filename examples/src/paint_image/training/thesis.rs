@@ -1,18 +1,20 @@
-//! Training of the thesis' network: digits as in its table's first row, procedural patches as in its second.
+//! Training of the thesis' network: digits as in its table's first row, patches of procedural scenes or of photographs as in its second.
 
 use std::path::{Path, PathBuf};
 
 use paint_net::procedural::lattice;
 use paint_net::thesis::Network;
-use paint_net::train::{ThesisLoss, ThesisSettings, ThesisTrainer, thesis_patch};
-use paint_net::{Error, Image, metrics};
+use paint_net::train::{ThesisLoss, ThesisSettings, ThesisTrainer, thesis_patch, thesis_patch_of};
+use paint_net::{Error, Image};
 use serde::Serialize;
 
 use super::digits;
-use super::rollout::{rollout_picture, stamp};
+use super::held_out::{Painted, volume_picture};
+use super::rollout::rollout_picture;
 use crate::interruption::{self, Finishing};
 use crate::paint_image::error::PaintImageError;
-use crate::paint_image::files::write_json;
+use crate::paint_image::files::{pictures_in, write_json};
+use crate::paint_image::ink::read_small_ink;
 use crate::pictures::{Panel, save_curves};
 use crate::progress::Stage;
 use crate::report::check_finite;
@@ -23,6 +25,8 @@ const TRAINED: usize = 7000;
 /// Patches that are held out, and their numbers, which no training reaches.
 const HELD: u64 = 200;
 const FIRST_HELD: u64 = 1 << 40;
+/// One photograph of so many is held out.
+const TESTED: usize = 10;
 /// Pictures in the rollout picture.
 const SHOWN: usize = 10;
 
@@ -33,6 +37,34 @@ pub enum TrainingImages {
     Digits(PathBuf),
     /// Patches of procedural scenes.
     Patches,
+    /// Patches of the photographs in a folder: every tenth of them, by name, to test.
+    Photographs(PathBuf),
+}
+
+/// The pictures to train on as they are.
+enum Samples {
+    Digits(Vec<Image>),
+    Patches,
+    Photographs(Vec<Image>),
+}
+
+impl Samples {
+    /// The `n`th sample.
+    fn sample(&self, settings: &ThesisSettings, n: u64) -> Result<Image, Error> {
+        match self {
+            Self::Digits(all) => Ok(all[(lattice(settings.seed, n as i64, -13) * all.len() as f64) as usize].clone()),
+            Self::Patches => thesis_patch(settings.seed, n, &settings.architecture),
+            Self::Photographs(all) => thesis_patch_of(all, settings.seed, n, &settings.architecture),
+        }
+    }
+
+    /// How many there are, where they are not made on the way.
+    fn count(&self) -> Option<usize> {
+        match self {
+            Self::Digits(all) | Self::Photographs(all) => Some(all.len()),
+            Self::Patches => None,
+        }
+    }
 }
 
 /// A training of the thesis' network.
@@ -62,19 +94,25 @@ struct Outcome {
     kl_latent_nats_per_picture: f64,
     steps_used_mean: f64,
     steps_used_share: f64,
+    volume_variation: f64,
     /// Without noise, as the painter paints.
     painted_bce_nats_per_px: f64,
     painted_psnr_db: f64,
     painted_steps_mean: f64,
+    /// Share of the sprayed volume that lands where the ink had reached what is wanted.
+    painted_over_share: f64,
+    /// By the weights rounded to bytes.
+    small_painted_psnr_db: f64,
     wall_s: f64,
     threads: usize,
 }
 
-/// Trains, and writes `thesis.safetensors`, `checkpoint.safetensors`, `curve.csv`, `curve.png`, `rollout.png` and `report.json`.
+/// Trains, and writes `thesis.safetensors`, the same with its matrices as bytes in `thesis-small.safetensors`, `checkpoint.safetensors`,
+/// `curve.csv`, `curve.png`, `rollout.png`, `volumes.png` and `report.json`.
 pub fn train_thesis(run: &ThesisTrainingRun, folder: &Path) -> Result<(), PaintImageError> {
     let started = std::time::Instant::now();
     let settings = &run.settings;
-    let (shown, held) = pictures(run)?;
+    let (samples, held) = pictures(run)?;
     let mut trainer = match &run.resume {
         None => ThesisTrainer::new(settings.clone())?,
         Some(path) => {
@@ -87,10 +125,7 @@ pub fn train_thesis(run: &ThesisTrainingRun, folder: &Path) -> Result<(), PaintI
         whole_file::write(&path, bytes).map_err(|e| file_error(&path, e.to_string()))
     };
     let mut curve = Curve::before(run.resume.as_deref(), trainer.steps_done());
-    let picture = |n: u64| match &shown {
-        Some(digits) => Ok(digits[(lattice(settings.seed, n as i64, -13) * digits.len() as f64) as usize].clone()),
-        None => thesis_patch(settings.seed, n, &settings.architecture),
-    };
+    let picture = |n: u64| samples.sample(settings, n);
     let mut last = run.until.unwrap_or(settings.steps).min(settings.steps);
     let stage = Stage::start("train");
     let _finishing = Finishing::begin();
@@ -111,25 +146,30 @@ pub fn train_thesis(run: &ThesisTrainingRun, folder: &Path) -> Result<(), PaintI
     let network = trainer.network();
     let notes =
         [("seed", settings.seed.to_string()), ("step", format!("{} of {}", trainer.steps_done(), settings.steps))];
+    let small = network.to_small_safetensors(&notes);
     save("thesis.safetensors", &network.to_safetensors(&notes))?;
+    save("thesis-small.safetensors", &small)?;
     curve.draw(&folder.join("curve.png"))?;
     let bright = matches!(run.pictures, TrainingImages::Digits(_));
     rollout_picture(&network, &held[..SHOWN.min(held.len())], bright)?.save(&folder.join("rollout.png"))?;
-    let loss = trainer.validate(&held)?;
-    let painted = evaluate(&network, &held)?;
+    volume_picture(&network, &held)?.save(&folder.join("volumes.png"))?;
+    let (loss, painted) = (trainer.validate(&held)?, Painted::by(&network, &held)?);
     let outcome = Outcome {
         seed: settings.seed,
         steps: trainer.steps_done(),
         parameters: network.parameters(),
-        trained_pictures: shown.as_ref().map_or(trainer.steps_done() * settings.batch, Vec::len),
+        trained_pictures: samples.count().unwrap_or(trainer.steps_done() * settings.batch),
         held_pictures: held.len(),
         bce_nats_per_picture: loss.cross_entropy,
         kl_latent_nats_per_picture: loss.latent,
         steps_used_mean: loss.steps,
         steps_used_share: loss.steps / settings.architecture.steps as f64,
-        painted_bce_nats_per_px: painted[0],
-        painted_psnr_db: painted[1],
-        painted_steps_mean: painted[2],
+        volume_variation: loss.variation,
+        painted_bce_nats_per_px: painted.bce_nats_per_px,
+        painted_psnr_db: painted.psnr_db,
+        painted_steps_mean: painted.steps_mean,
+        painted_over_share: painted.over_share,
+        small_painted_psnr_db: Painted::by(&Network::from_safetensors(&small)?, &held)?.psnr_db,
         wall_s: started.elapsed().as_secs_f64(),
         threads: settings.threads,
     };
@@ -142,9 +182,10 @@ pub fn train_thesis(run: &ThesisTrainingRun, folder: &Path) -> Result<(), PaintI
     Ok(())
 }
 
-/// Digits to train on, if they are not made on the way, and held-out pictures to test.
-fn pictures(run: &ThesisTrainingRun) -> Result<(Option<Vec<Image>>, Vec<Image>), PaintImageError> {
-    let architecture = &run.settings.architecture;
+/// Pictures to train on, and held-out ones to test.
+fn pictures(run: &ThesisTrainingRun) -> Result<(Samples, Vec<Image>), PaintImageError> {
+    let ThesisSettings { seed, architecture, .. } = &run.settings;
+    let numbers = (0..HELD).map(|k| FIRST_HELD + k);
     match &run.pictures {
         TrainingImages::Digits(path) => {
             let mut all = digits::read(path, architecture.side)?;
@@ -152,33 +193,27 @@ fn pictures(run: &ThesisTrainingRun) -> Result<(Option<Vec<Image>>, Vec<Image>),
                 return Err(file_error(path, format!("holds {} pictures: give more than {TRAINED}", all.len())));
             }
             let held = all.split_off(TRAINED);
-            Ok((Some(all), held))
+            Ok((Samples::Digits(all), held))
         }
         TrainingImages::Patches => {
-            let held = (0..HELD).map(|k| thesis_patch(run.settings.seed, FIRST_HELD + k, architecture));
-            Ok((None, held.collect::<Result<_, _>>()?))
+            let held = numbers.map(|n| thesis_patch(*seed, n, architecture));
+            Ok((Samples::Patches, held.collect::<Result<_, _>>()?))
         }
-    }
-}
-
-/// Means over the pictures as they are painted without noise: cross-entropy per pixel, PSNR, steps.
-fn evaluate(network: &Network, pictures: &[Image]) -> Result<[f64; 3], Error> {
-    let mut sums = [0.0; 3];
-    for some in pictures.chunks(50) {
-        let tasks: Vec<(Image, Option<Image>)> = some.iter().map(|p| (p.clone(), None)).collect();
-        for (picture, steps) in some.iter().zip(network.paint(&tasks)?) {
-            let mut canvas = picture.map(|_| 0.0);
-            for step in &steps {
-                stamp(step, &mut canvas)?;
+        TrainingImages::Photographs(folder) => {
+            let files = pictures_in(folder)?;
+            if files.len() < 2 {
+                return Err(file_error(folder, "holds one picture: give two or more, one of them to test".into()));
             }
-            let ink = canvas.map(f64::tanh);
-            sums[0] += metrics::binary_cross_entropy(&ink, picture)?;
-            // An empty picture that stays empty would count 200 dB.
-            sums[1] += metrics::psnr(&ink, picture, None)?.min(60.0);
-            sums[2] += steps.len() as f64;
+            // No square is smaller than a quarter of the shorter side, nor needs more pixels than the network sees.
+            let shortest = 4 * architecture.side as u32;
+            let (mut trained, mut tested) = (Vec::new(), Vec::new());
+            for (k, file) in files.iter().enumerate() {
+                if k % TESTED == 0 { &mut tested } else { &mut trained }.push(read_small_ink(file, shortest)?);
+            }
+            let held = numbers.map(|n| thesis_patch_of(&tested, *seed, n, architecture));
+            Ok((Samples::Photographs(trained), held.collect::<Result<_, _>>()?))
         }
     }
-    Ok(sums.map(|sum| sum / pictures.len() as f64))
 }
 
 fn file_error(path: &Path, why: String) -> PaintImageError {
