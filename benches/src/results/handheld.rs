@@ -11,7 +11,7 @@ use super::extent::Extent;
 use super::table::{Table, number};
 
 /// Runs `handheld` and returns its report, that of a painting that was not finished included.
-fn report(scratch: &Path, name: &str, options: &[&str]) -> Result<Value, Box<dyn Error>> {
+pub(super) fn report(scratch: &Path, name: &str, options: &[&str]) -> Result<Value, Box<dyn Error>> {
     let folder = scratch.join(name);
     let out = format!("--out={}", folder.display());
     let line = ["handheld".into(), out].into_iter().chain(options.iter().map(ToString::to_string));
@@ -22,7 +22,7 @@ fn report(scratch: &Path, name: &str, options: &[&str]) -> Result<Value, Box<dyn
     Ok(serde_json::from_str(&std::fs::read_to_string(folder.join("report.json"))?)?)
 }
 
-fn figure(report: &Value, name: &str) -> Result<f64, Box<dyn Error>> {
+pub(super) fn figure(report: &Value, name: &str) -> Result<f64, Box<dyn Error>> {
     report[name].as_f64().ok_or_else(|| format!("report.json of handheld lacks {name}").into())
 }
 

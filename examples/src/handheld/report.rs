@@ -67,6 +67,8 @@ pub struct HandheldReport {
     pub believed_inside_fraction: f64,
     /// As the robot believes it to be.
     pub believed_outside_fraction: f64,
+    /// Root mean square of what the robot's books are off by where a full coat is wanted, in coats.
+    pub believed_thickness_error_fraction: f64,
     /// Paint that left the nozzle.
     pub emitted_m3: f64,
     /// Decisions of the painting.
@@ -124,6 +126,7 @@ impl HandheldReport {
         self.overdosed_bare_texels_fraction = truth.overdosed_bare;
         self.believed_inside_fraction = belief.inside;
         self.believed_outside_fraction = belief.outside;
+        self.believed_thickness_error_fraction = log.truth.difference(&log.belief);
         self.emitted_m3 = log.emitted;
         self.decisions = log.decision_ms.len();
         self.idle_decisions = log.idle_decisions;

@@ -122,6 +122,22 @@ impl Coverage {
         self.full
     }
 
+    /// Root mean square of the difference of two thicknesses of the same surface where a full coat is wanted, in such coats: how far
+    /// books that were kept of a painting are off.
+    pub fn difference(&self, other: &Self) -> f64 {
+        let pairs = self.current.iter().zip(&other.current).zip(&self.target).zip(&self.thickness);
+        // A texel's target is rounded to whole femtolitres.
+        let full = |&(((_, _), &target), &per): &(((_, _), &u64), &f32)| {
+            target as f64 * f64::from(per) > (1.0 - 1e-3) * self.full && target > 0
+        };
+        let squares = pairs.filter(full).map(|(((&one, &two), &target), _)| {
+            let off = (one as f64 - two as f64) / target as f64;
+            off * off
+        });
+        let (count, sum) = squares.fold((0_u32, 0.0), |(count, sum), square| (count + 1, sum + square));
+        (sum / f64::from(count.max(1))).sqrt()
+    }
+
     /// How the painting stands.
     pub fn figures(&self) -> CoverageFigures {
         let (mut wanted, mut inside, mut outside, mut above) = (0, 0, 0, 0);

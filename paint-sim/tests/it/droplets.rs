@@ -291,6 +291,21 @@ fn figures_count_paint_inside_outside_and_above() {
     assert_eq!((figures.overdosed_wanted, figures.overdosed_bare, figures.overdosed()), (one, 2.0 * one, 3.0 * one));
 }
 
+/// Only texels that want a full coat count: half a coat more on one of two, nothing of what differs elsewhere.
+#[test]
+fn the_difference_of_two_paintings_is_told_where_a_full_coat_is_wanted() {
+    let wall = surface(&wall_at(0.06));
+    let mut thickness = vec![0.0; SIDE * SIDE];
+    (thickness[0], thickness[1], thickness[2]) = (10e-6, 10e-6, 5e-6);
+    let mut one = Coverage::new(&wall, &thickness).unwrap();
+    let mut other = one.clone();
+    one.add(0, 5_000_000);
+    other.add(2, 5_000_000);
+    other.add(9, 5_000_000);
+    assert!((one.difference(&other) - 0.125_f64.sqrt()).abs() < 1e-9);
+    assert_eq!((one.difference(&other), one.difference(&one)), (other.difference(&one), 0.0));
+}
+
 /// Texels of the page that are no surface, and those beyond it.
 #[test]
 fn paint_beside_the_surface_is_not_booked() {
