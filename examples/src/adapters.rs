@@ -19,6 +19,9 @@ use ptu_kinematics::{CollisionBody, Hover, Joints, KinematicChain, Ptu, Servo};
 /// The simulator's mesh as the planner's surface.
 pub struct MeshSurface<'a>(pub &'a TriangleSurface);
 
+/// Targets are points of the surface but for rounding in single precision, m.
+const ON_SURFACE: f64 = 1e-3;
+
 impl paint_planner::Surface for MeshSurface<'_> {
     fn cast(
         &self,
@@ -33,6 +36,10 @@ impl paint_planner::Surface for MeshSurface<'_> {
 
     fn distance(&self, point: &Point3<f64>, max: f64) -> f64 {
         paint_sim::Surface::distance(self.0, point, max)
+    }
+
+    fn facet(&self, point: &Point3<f64>) -> Option<[Point3<f64>; 3]> {
+        self.0.nearest_triangle(point, ON_SURFACE)
     }
 }
 

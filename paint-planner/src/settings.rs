@@ -64,7 +64,7 @@ pub struct NozzleSettings {
     /// Jacobi iterations in paper-exact mode (default 40).
     pub iterations: usize,
     /// Inradius of the triangle around a target whose edges carry the three planes of the paper-exact mode, m (default
-    /// 0.01).
+    /// 0.01); where the surface has triangles, they are its own ([`Surface::facet`](crate::Surface::facet)).
     pub facet: f64,
 }
 

@@ -24,6 +24,13 @@ pub trait Surface: Sync {
     /// Must not change faster than the point moves (as every true distance does): the collision checks skip queries on
     /// the strength of that.
     fn distance(&self, point: &Point3<f64>, max: f64) -> f64;
+
+    /// Corners of the mesh's triangle under a point of the surface, counter-clockwise as seen from outside, m: the paper-exact mode puts its
+    /// planes on their edges. `None`, as it is here, for a surface that is not made of triangles.
+    fn facet(&self, point: &Point3<f64>) -> Option<[Point3<f64>; 3]> {
+        let _ = point;
+        None
+    }
 }
 
 /// Pose of the vehicle in hover and of its pan-tilt unit.

@@ -91,6 +91,10 @@ impl Surface for WithKeepOut<'_> {
     fn distance(&self, point: &Point3<f64>, max: f64) -> f64 {
         self.volumes.iter().fold(self.surface.distance(point, max), |least, volume| least.min(volume.distance(point)))
     }
+
+    fn facet(&self, point: &Point3<f64>) -> Option<[Point3<f64>; 3]> {
+        self.surface.facet(point)
+    }
 }
 
 #[cfg(test)]

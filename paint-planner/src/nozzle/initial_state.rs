@@ -2,7 +2,7 @@
 
 use crate::settings::NozzleSettings;
 use crate::target::{NozzleState, Target};
-use nalgebra::{UnitVector3, Vector3};
+use nalgebra::{Point3, UnitVector3, Vector3};
 
 /// Room kept between a start and the hard rows of the program, rad: interior-point methods need an inside.
 const MARGIN: f64 = 0.5 * std::f64::consts::PI / 180.0;
@@ -18,6 +18,8 @@ pub(crate) struct InitialState {
     pub(crate) tangents: [Vector3<f64>; 2],
     /// Greatest normal deviation, m; `None` where the spray must lean so far that only the incidence bounds it.
     pub(crate) deviation: Option<f64>,
+    /// Corners of the mesh's triangle at the target, where it is asked for and known.
+    pub(crate) facet: Option<[Point3<f64>; 3]>,
 }
 
 /// Eq. (1) with the spray axis clamped into the elevations the tilt joint has. `None` where that asks for more than the
@@ -48,7 +50,7 @@ fn start(target: &Target, settings: &NozzleSettings) -> Option<InitialState> {
     // A cylinder about the normal that lies inside the cone of the incidence down to the least distance.
     let deviation = settings.deviation.min(settings.min * settings.incidence.tan());
     let deviation = (settings.stand_off * tilted.tan() < INSIDE * deviation).then_some(deviation);
-    Some(InitialState { state, tangents: tangents(&n, &Vector3::z()), deviation })
+    Some(InitialState { state, tangents: tangents(&n, &Vector3::z()), deviation, facet: None })
 }
 
 /// An orthonormal pair perpendicular to `axis`; the first is the part of `up` that is.
@@ -67,7 +69,6 @@ pub(crate) fn tangents(axis: &Vector3<f64>, up: &Vector3<f64>) -> [Vector3<f64>;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Point3;
 
     fn facing(elevation_degrees: f64) -> Target {
         let e = elevation_degrees.to_radians();

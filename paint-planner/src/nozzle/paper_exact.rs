@@ -1,7 +1,7 @@
 //! Stage 1 in the printed variables: position, azimuth and polar angle, nine rows per state, Jacobi iterations
 //! (VR paper, Eqs. (1)-(6)).
 //!
-//! Kept for comparison, and not quite the print: targets have no triangles of a mesh, so an equilateral one of
+//! Kept for comparison, and not quite the print: where the surface has no triangles, an equilateral one of
 //! [`NozzleSettings::facet`] stands for theirs in Eq. (2); azimuths are unwrapped along the path before their differences are
 //! squared; and the heading rows are soft, because Eq. (5) rejects even the initial state where `sin psi1` vanishes.
 
@@ -14,7 +14,7 @@ use crate::error::Error;
 use crate::not_served::NotServed;
 use crate::settings::NozzleSettings;
 use crate::target::{NozzleState, Target};
-use nalgebra::{Matrix3, UnitVector3, Vector2, Vector3, Vector5};
+use nalgebra::{Matrix3, Point3, UnitVector3, Vector2, Vector3, Vector5};
 use std::f64::consts::{FRAC_PI_3, TAU};
 
 const HARD_ROWS: usize = 5;
@@ -29,11 +29,13 @@ pub(super) fn optimise(
     settings: &NozzleSettings,
 ) -> Result<Nozzles, Error> {
     let indices: Vec<usize> = (0..targets.len()).filter(|&i| initial_states[i].is_some()).collect();
-    let chosen: Vec<(Target, [Vector3<f64>; 2])> =
-        initial_states.iter().zip(targets).filter_map(|(s, t)| s.map(|s| (*t, s.tangents))).collect();
+    let place = |(s, t): (&Option<InitialState>, &Target)| {
+        s.map(|s| Place { target: *t, facet: s.facet.unwrap_or_else(|| equilateral(t, &s.tangents, settings.facet)) })
+    };
+    let chosen: Vec<Place> = initial_states.iter().zip(targets).filter_map(place).collect();
     let stroke_links: Vec<bool> = indices.windows(2).map(|pair| pair[1] == pair[0] + 1 && linked[pair[0]]).collect();
     let mut states: Vec<Vector5<f64>> = Vec::with_capacity(chosen.len());
-    for (target, _) in &chosen {
+    for Place { target, .. } in &chosen {
         let mut state = initial(target, settings.stand_off);
         if let Some(before) = states.last() {
             state[3] = nearest_equivalent(state[3], before[3]);
@@ -52,7 +54,7 @@ pub(super) fn optimise(
     }
     for (&index, s) in indices.iter().zip(&states) {
         let direction = Vector3::new(s[4].sin() * s[3].cos(), s[4].sin() * s[3].sin(), s[4].cos());
-        let position = nalgebra::Point3::new(s[0], s[1], s[2]);
+        let position = Point3::new(s[0], s[1], s[2]);
         result.states[index] = Ok(NozzleState { position, direction: UnitVector3::new_normalize(direction) });
     }
     Ok(result)
@@ -73,21 +75,24 @@ pub fn state_programs(
     settings: &NozzleSettings,
 ) -> (QuadraticProgram, Vec<Vector5<f64>>) {
     let count = targets.len().min(states.len());
-    let chosen: Vec<(Target, [Vector3<f64>; 2])> =
-        targets[..count].iter().map(|target| (*target, tangents(&target.normal, &Vector3::z()))).collect();
+    let place = |target: &Target| Place {
+        target: *target,
+        facet: equilateral(target, &tangents(&target.normal, &Vector3::z()), settings.facet),
+    };
+    let chosen: Vec<Place> = targets[..count].iter().map(place).collect();
     let program = build(&chosen, &states[..count], &vec![true; count.saturating_sub(1)], settings);
     (program, states[..count].to_vec())
 }
 
 fn build(
-    chosen: &[(Target, [Vector3<f64>; 2])],
+    chosen: &[Place],
     states: &[Vector5<f64>],
     stroke_links: &[bool],
     settings: &NozzleSettings,
 ) -> QuadraticProgram {
     let mut program = QuadraticProgram::new(chosen.len(), HARD_ROWS, SOFT_ROWS, PENALTY);
     let weights = Vector5::new(settings.ca, settings.ca, settings.ca, settings.cb, settings.cb);
-    for (i, ((target, tangents), s)) in chosen.iter().zip(states).enumerate() {
+    for (i, (Place { target, facet }, s)) in chosen.iter().zip(states).enumerate() {
         let n = target.normal.into_inner();
         // Eq. (6).
         let mut diagonal = Vector5::repeat(settings.cc);
@@ -109,28 +114,38 @@ fn build(
             pull[k] += anchored[k];
         }
         program.gradient[i] = pull * -2.0;
-        push_planes(&mut program, target, tangents, settings);
+        push_planes(&mut program, target, facet, settings);
         push_headings(&mut program, i, target, s, settings);
     }
     program
 }
 
-/// Eq. (2) with `n_i = m_i cos(th) + n sin(th)` on the edges of an equilateral triangle.
-fn push_planes(
-    program: &mut QuadraticProgram,
-    target: &Target,
-    tangents: &[Vector3<f64>; 2],
-    settings: &NozzleSettings,
-) {
+/// A target with the corners of its triangle, counter-clockwise as seen from outside.
+struct Place {
+    target: Target,
+    facet: [Point3<f64>; 3],
+}
+
+/// The triangle around a target whose edges are `inradius` away.
+fn equilateral(target: &Target, tangents: &[Vector3<f64>; 2], inradius: f64) -> [Point3<f64>; 3] {
+    [0.0, 1.0, 2.0].map(|k| {
+        let (sin, cos) = (k * 2.0 * FRAC_PI_3).sin_cos();
+        target.point + (tangents[0] * cos + tangents[1] * sin) * (2.0 * inradius)
+    })
+}
+
+/// Eq. (2) with `n_i = m_i cos(th) + n sin(th)` on the edges of the triangle, `m_i` inward.
+fn push_planes(program: &mut QuadraticProgram, target: &Target, facet: &[Point3<f64>; 3], settings: &NozzleSettings) {
     let n = target.normal.into_inner();
     let t = target.point.coords;
     program.push_hard(-n, -(settings.min + n.dot(&t)));
     program.push_hard(n, settings.max + n.dot(&t));
     for k in 0..3 {
-        let (sin, cos) = (f64::from(k) * 2.0 * FRAC_PI_3).sin_cos();
-        let inward = tangents[0] * cos + tangents[1] * sin;
+        let (from, to) = (facet[k], facet[(k + 1) % 3]);
+        // An edge of no length bounds nothing.
+        let inward = n.cross(&(to - from)).try_normalize(1e-12).unwrap_or_else(Vector3::zeros);
         let plane = inward * settings.incidence.cos() + n * settings.incidence.sin();
-        program.push_hard(-plane, -plane.dot(&(t - inward * settings.facet)));
+        program.push_hard(-plane, -plane.dot(&from.coords));
     }
 }
 

@@ -56,7 +56,14 @@ impl Planner for OptimalPlanner<'_> {
             return Err(Error::Target { index, what: "needs a clearance of its own that is not negative" });
         }
         let linked = stroke_links(targets, settings.break_length);
-        let initial_states = initial_states(targets, &settings.nozzle);
+        let mut initial_states = initial_states(targets, &settings.nozzle);
+        if self.mode == Mode::PaperExact {
+            for (start, target) in initial_states.iter_mut().zip(targets) {
+                if let Some(start) = start {
+                    start.facet = surface.facet(&target.point);
+                }
+            }
+        }
         let mut nozzles = optimise(targets, &initial_states, &linked, self.mode, self.solver, &settings.nozzle)?;
         drop_hidden(targets, &mut nozzles.states, surface)?;
         event!(

@@ -12,6 +12,7 @@ mod own_rehearsal;
 mod own_surface;
 mod own_tool;
 mod own_vehicle;
+mod paper_exact;
 mod plans;
 mod readme;
 mod teleop;

@@ -1,8 +1,7 @@
 //! What every plan has to keep.
 
 use crate::walls::{Arm, Wall};
-use paint_planner::nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
-use paint_planner::nozzle::Mode;
+use paint_planner::nalgebra::{Point3, UnitQuaternion, UnitVector3, Vector3};
 use paint_planner::plan::{NotServed, SmoothingPlanner};
 use paint_planner::timing::TimingPolicy;
 use paint_planner::{
@@ -272,29 +271,6 @@ fn bad_input_is_named() {
     // Targets on one spot are no reason to fail.
     let plan = optimal(&vec![good[0]; 4], &wall, &settings).unwrap();
     assert!(plan.trajectory.duration().is_finite() && plan.report.normal_deviation_max < 1e-6);
-}
-
-#[test]
-fn paper_exact_mode_depends_on_the_world_frame_and_the_sequential_mode_does_not() {
-    let plan = |mode: Mode, turn: f64| {
-        let wall = Wall { turn, ..Wall::bumpy(0.1) };
-        let targets = wall.rows(1.0, 1, 0.2);
-        let plan = OptimalPlanner { mode, ..OptimalPlanner::default() }
-            .plan(&targets, &wall, &Arm::default(), &Settings::default())
-            .unwrap();
-        let back =
-            Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -turn));
-        let deviations = plan.nozzle.iter().zip(&targets).map(|(n, t)| t.normal_deviation(&n.position));
-        assert!(deviations.fold(0.0, f64::max) < 0.02);
-        plan.nozzle.iter().map(|n| back * n.position).collect::<Vec<Point3<f64>>>()
-    };
-    let spread = |mode: Mode| {
-        let (a, b) = (plan(mode, 0.0), plan(mode, 0.9));
-        a.iter().zip(&b).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max)
-    };
-    // Eqs. (4)-(5) compare world x with the azimuth: at 0.9 rad the rows bind differently.
-    assert!(spread(Mode::PaperExact) > 1e-4);
-    assert!(spread(Mode::Sequential) < 1e-9);
 }
 
 #[test]

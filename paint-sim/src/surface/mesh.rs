@@ -71,6 +71,26 @@ impl TriangleSurface {
         Some((a * (1.0 - v - w) + b * v + c * w).into())
     }
 
+    /// Corners of the triangle next to a point, m, in the order of its face; `None` if all are farther than `max`.
+    pub fn nearest_triangle(&self, point: &Point3<f64>, max: f64) -> Option<[Point3<f64>; 3]> {
+        let (leaf, _) = self.nearest(point, max)?;
+        Some(self.corners[leaf as usize].map(Point3::from))
+    }
+
+    /// The triangle next to a point, and how far it is.
+    fn nearest(&self, point: &Point3<f64>, max: f64) -> Option<(u32, f64)> {
+        let query = vector(&point.coords);
+        self.tree.find_best(
+            max,
+            |node, _| node.aabb().distance_to_local_point(query, true),
+            |leaf, _| {
+                let [a, b, c] = &self.corners[leaf as usize];
+                let triangle = Triangle::new(vector(a), vector(b), vector(c));
+                Some((triangle.project_local_point(query, true).point - query).length())
+            },
+        )
+    }
+
     /// Least and largest coordinate along an axis, m.
     pub fn extent(&self, axis: &Vector3<f64>) -> (f64, f64) {
         let along = self.corners.iter().flatten().map(|corner| corner.dot(axis));
@@ -104,17 +124,7 @@ impl Surface for TriangleSurface {
     }
 
     fn distance(&self, point: &Point3<f64>, max: f64) -> f64 {
-        let query = vector(&point.coords);
-        let closest = self.tree.find_best(
-            max,
-            |node, _| node.aabb().distance_to_local_point(query, true),
-            |leaf, _| {
-                let [a, b, c] = &self.corners[leaf as usize];
-                let triangle = Triangle::new(vector(a), vector(b), vector(c));
-                Some((triangle.project_local_point(query, true).point - query).length())
-            },
-        );
-        closest.map_or(max, |(_, distance)| distance.min(max))
+        self.nearest(point, max).map_or(max, |(_, distance)| distance.min(max))
     }
 }
 

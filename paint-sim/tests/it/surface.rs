@@ -93,6 +93,14 @@ fn the_closest_hit_and_the_distance_are_those_of_brute_force() {
         let distance = surface.distance(&origin, 10.0);
         assert!((distance - gap).abs() < 0.06, "{distance} instead of {gap}");
         assert_eq!(surface.distance(&origin, 0.5 * distance), 0.5 * distance);
+        // A point of a triangle, off its edges, is next to that triangle.
+        let [a, b, c] = faces[((uniform() + 0.5) * faces.len() as f64) as usize]
+            .map(|v| Point3::from(positions[v as usize].map(f64::from)));
+        if (b - a).cross(&(c - a)).norm() > 1e-6 {
+            let inside = Point3::from(0.2 * a.coords + 0.3 * b.coords + 0.5 * c.coords);
+            assert_eq!(surface.nearest_triangle(&inside, 1e-6), Some([a, b, c]));
+            assert_eq!(surface.nearest_triangle(&(inside + inside.coords), 0.5), None);
+        }
     }
 }
 
