@@ -73,6 +73,7 @@ def main():
     a.add_argument("--gutter", type=int, default=2)
     a.add_argument("--page", type=int, default=1024)
     a.add_argument("--utilisation", help="that of `unwrap`: charts are cut until they fill this share of the page")
+    a.add_argument("--max-stretch", help="that of `unwrap` (default: its own, which it relaxes)")
     a.add_argument("--without-peers", action="store_true")
     o = a.parse_args()
     unwrap = o.unwrap
@@ -86,7 +87,9 @@ def main():
             out = os.path.join(folder, stem)
             texel = math.sqrt(1.5 * area_of(path)) / o.page
             command = [unwrap, "--mesh", path, "--scale", "1", "--texel", f"{texel:.6g}", "--gutter", str(o.gutter), "--out", out]
-            _, error, code = run(command + (["--utilisation", o.utilisation] if o.utilisation else []))
+            for option, value in (("--utilisation", o.utilisation), ("--max-stretch", o.max_stretch)):
+                command += [option, value] if value else []
+            _, error, code = run(command)
             if code:
                 print(f"{stem}: unwrap: {error}", file=sys.stderr)
             else:

@@ -6,7 +6,9 @@ mod excerpt;
 mod extent;
 pub mod handheld;
 pub mod latency;
+pub mod overdose;
 pub mod papers;
+pub mod peers;
 pub mod planners;
 pub mod table;
 pub mod time_allocation;
@@ -22,7 +24,7 @@ pub type Rerun = fn(Extent, &Path) -> Result<Vec<Table>, Box<dyn Error>>;
 
 /// Reruns in the order of the papers, each with its name; what it needs on the way lies in the folder that it is given. Its first table is
 /// shown as such, the others are drawn by `docs/plots/plots.py`.
-pub const PARTS: [(&str, Rerun); 7] = [
+pub const PARTS: [(&str, Rerun); 9] = [
     ("papers", |_, _| Ok(vec![papers::table()])),
     ("flown_baselines", |extent, _| baselines::tables(extent)),
     ("paper_ii_ablations", |_, _| ablations::tables()),
@@ -30,6 +32,8 @@ pub const PARTS: [(&str, Rerun); 7] = [
     ("time_allocation", |_, _| time_allocation::tables()),
     ("latency", latency::tables),
     ("handheld", handheld::tables),
+    ("overdose", overdose::tables),
+    ("peers", peers::tables),
 ];
 
 /// Writes what a part found: the data of all tables, and the page's piece of the first.
