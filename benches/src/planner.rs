@@ -56,7 +56,7 @@ fn targets(count: usize) -> Vec<Target> {
         let s = SPACING * k as f64;
         let point = Point3::new(0.05 * (TAU * s / 1.6).sin(), s, 2.0 + 0.2 * (TAU * s / 2.3).cos());
         let normal = UnitVector3::new_normalize(Vector3::new(-1.0, noise(), noise()));
-        Target { point, normal, dose: 2e-6, time: None }
+        Target { point, normal, dose: 2e-6, time: None, stand_off: None }
     };
     (0..count).map(&mut target).collect()
 }
@@ -227,6 +227,7 @@ fn stroke_orders() -> Result<(), AnyError> {
             normal: -Vector3::x_axis(),
             dose: 0.0,
             time: None,
+            stand_off: None,
         };
         let stroke = |_| {
             let (y, z) = (rng.between(0.0, 5.0), rng.between(0.0, 5.0));
@@ -336,6 +337,7 @@ fn random_paths() -> Result<(), AnyError> {
                 normal,
                 dose: rock::DOSE,
                 time: None,
+                stand_off: None,
             }));
             course += rng.between(-0.6, 0.6);
             at = [at[0] + 2.0 * course.cos(), at[1] + 2.0 * course.sin()];

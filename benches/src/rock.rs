@@ -34,7 +34,7 @@ pub fn stroke(surface: &PaintSurface, count: usize) -> Vec<Target> {
     });
     let target = |(x, y): (usize, usize)| {
         let (point, normal) = surface.lift(x as f64, y as f64)?;
-        Some(Target { point, normal, dose: DOSE, time: None })
+        Some(Target { point, normal, dose: DOSE, time: None, stand_off: None })
     };
     places.filter_map(target).take(count).collect()
 }

@@ -45,7 +45,7 @@ fn programs() -> (QuadraticProgram, Vec<Vector5<f64>>) {
             (-n.y).atan2(-n.x) + 0.1 * normal(),
             (-n.z).acos() + 0.1 * normal(),
         ));
-        targets.push(Target { point, normal: n, dose: 2e-6, time: None });
+        targets.push(Target { point, normal: n, dose: 2e-6, time: None, stand_off: None });
     }
     state_programs(&targets, &states, &settings)
 }

@@ -78,6 +78,7 @@ fn ends_of(stroke: &[(f64, f64)]) -> StrokeEnds {
         normal: -Vector3::x_axis(),
         dose: 0.0,
         time: None,
+        stand_off: None,
     };
     StrokeEnds { first: target(&stroke[0]), last: target(&stroke[stroke.len() - 1]) }
 }

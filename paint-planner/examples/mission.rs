@@ -34,7 +34,7 @@ impl Tool for Boom {
 fn main() -> Result<(), Error> {
     let target = |turn: f64, z: f64| {
         let normal = UnitVector3::new_normalize(Vector3::new(turn.cos(), turn.sin(), 0.0));
-        Target { point: Point3::new(normal.x, normal.y, z), normal, dose: 2e-6, time: None }
+        Target { point: Point3::new(normal.x, normal.y, z), normal, dose: 2e-6, time: None, stand_off: None }
     };
     let strokes = [1.0, 1.2, 1.4].map(|z| (0..60).map(|k| target(0.025 * f64::from(k), z)).collect());
     let rehearsal = MarginRehearsal { surface: &Column, tool: &Boom, margin: 0.1 };

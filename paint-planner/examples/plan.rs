@@ -39,7 +39,7 @@ fn main() -> Result<(), Error> {
     let down = UnitVector3::new_normalize(Vector3::new(0.4, 0.0, -1.0));
     let point =
         |k: usize| Point3::from(down.into_inner() * (0.025 * k as f64)) + Vector3::y() * (0.1 * k as f64).sin() * 0.1;
-    let target = |k| Target { point: point(k), normal: wall.normal, dose: 2e-6, time: None };
+    let target = |k| Target { point: point(k), normal: wall.normal, dose: 2e-6, time: None, stand_off: None };
     let plan = plan(&(0..60).map(target).collect::<Vec<_>>(), &wall, &Gimbal, &Settings::default())?;
     println!("time, s   nozzle, m                tilt, degrees   flow, ml/s");
     for (time, s) in plan.setpoints(1.0) {

@@ -5,8 +5,13 @@ use paint_planner::stroke_order::{StrokeEnds, order_strokes, transit_lower_bound
 use paint_planner::{Error, Settings, Target};
 
 fn main() -> Result<(), Error> {
-    let target =
-        |y: f64, z: f64| Target { point: Point3::new(0.0, y, z), normal: -Vector3::x_axis(), dose: 0.0, time: None };
+    let target = |y: f64, z: f64| Target {
+        point: Point3::new(0.0, y, z),
+        normal: -Vector3::x_axis(),
+        dose: 0.0,
+        time: None,
+        stand_off: None,
+    };
     // Rows of a picture, each broken in two where nothing is painted; all drawn from left to right.
     let stroke = |row: f64, from: f64, to: f64| StrokeEnds { first: target(from, row), last: target(to, row) };
     let rows = (0..12).map(|k| (0.1 * f64::from(k), 0.6 + 0.3 * f64::from(k).sin()));

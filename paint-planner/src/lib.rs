@@ -39,7 +39,7 @@
 //! }
 //!
 //! let point = |i: usize| Point3::new(0.0, 0.025 * i as f64, 1.0);
-//! let target = |i| Target { point: point(i), normal: -Vector3::x_axis(), dose: 2e-6, time: None };
+//! let target = |i| Target { point: point(i), normal: -Vector3::x_axis(), dose: 2e-6, time: None, stand_off: None };
 //! let targets: Vec<Target> = (0..40).map(target).collect();
 //! let plan = plan(&targets, &Wall, &Gimbal, &Settings::default())?;
 //! assert!(plan.report.normal_deviation_max < 0.01 && plan.report.extrema.acceleration <= 1.0);

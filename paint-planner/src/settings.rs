@@ -202,6 +202,13 @@ impl Default for LowessSettings {
     }
 }
 
+impl NozzleSettings {
+    /// Least and greatest distance, m.
+    pub(crate) fn distances(&self) -> [f64; 2] {
+        [self.min, self.max]
+    }
+}
+
 impl Settings {
     /// Refuses values outside their ranges.
     pub fn check(&self) -> Result<(), Error> {

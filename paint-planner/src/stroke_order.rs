@@ -56,13 +56,13 @@ pub fn transit_lower_bound(
 fn transit_cost(strokes: &[StrokeEnds], from: Option<&Target>, settings: &Settings) -> Result<TransitCost, Error> {
     settings.check()?;
     for (index, stroke) in strokes.iter().enumerate() {
-        check_each(&[stroke.first, stroke.last]).map_err(|error| match error {
+        check_each(&[stroke.first, stroke.last], settings.nozzle.distances()).map_err(|error| match error {
             Error::Target { what, .. } => Error::Target { index, what },
             other => other,
         })?;
     }
     if let Some(from) = from {
-        check_each(&[*from])?;
+        check_each(&[*from], settings.nozzle.distances())?;
     }
     Ok(TransitCost::new(strokes, from, settings))
 }

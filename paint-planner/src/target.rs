@@ -16,6 +16,9 @@ pub struct Target {
     /// Time stamp of the person who drew the stroke, s; needed by
     /// [`TimingPolicy::GradientPreserving`](crate::timing::TimingPolicy::GradientPreserving) only.
     pub time: Option<f64>,
+    /// Distance that the nozzle shall keep here, m: farther off, its spot is wider. [`NozzleSettings::stand_off`](crate::nozzle::NozzleSettings::stand_off)
+    /// where there is none. The paper-exact mode starts there, and only bounds distances.
+    pub stand_off: Option<f64>,
 }
 
 /// Where the nozzle is and where it sprays.
@@ -33,24 +36,30 @@ impl Target {
     ///
     /// ```
     /// # use paint_planner::{Target, nalgebra::{Point3, Vector3}};
-    /// let target = Target { point: Point3::origin(), normal: Vector3::z_axis(), dose: 0.0, time: None };
+    /// let target = Target { point: Point3::origin(), normal: Vector3::z_axis(), dose: 0.0, time: None, stand_off: None };
     /// assert_eq!(target.normal_deviation(&Point3::new(0.03, 0.04, 0.1)), 0.05);
     /// ```
     pub fn normal_deviation(&self, nozzle_position: &Point3<f64>) -> f64 {
         self.normal.cross(&(nozzle_position - self.point)).norm()
     }
+
+    /// The distance that is asked of the nozzle, m: its own, else the usual one.
+    pub(crate) fn stand_off_or(&self, usual: f64) -> f64 {
+        self.stand_off.unwrap_or(usual)
+    }
 }
 
 /// Refuses paths that no planner can read.
-pub(crate) fn check(targets: &[Target]) -> Result<(), Error> {
+pub(crate) fn check(targets: &[Target], distances: [f64; 2]) -> Result<(), Error> {
     if targets.len() < 2 {
         return Err(Error::TooFewTargets { count: targets.len() });
     }
-    check_each(targets)
+    check_each(targets, distances)
 }
 
-/// Refuses targets that are no points of a surface.
-pub(crate) fn check_each(targets: &[Target]) -> Result<(), Error> {
+/// Refuses targets that are no points of a surface, and distances that the nozzle may not keep.
+pub(crate) fn check_each(targets: &[Target], distances: [f64; 2]) -> Result<(), Error> {
+    let [least, most] = distances;
     for (index, target) in targets.iter().enumerate() {
         let refuse = |what| Err(Error::Target { index, what });
         if !target.point.iter().all(|c| c.is_finite() && c.abs() < 1e6) {
@@ -65,6 +74,9 @@ pub(crate) fn check_each(targets: &[Target]) -> Result<(), Error> {
         }
         if target.time.is_some_and(|time| !time.is_finite()) {
             return refuse("the time stamp must be finite");
+        }
+        if !target.stand_off.is_none_or(|distance| least < distance && distance < most) {
+            return refuse("the stand-off must lie between nozzle.min and nozzle.max");
         }
     }
     Ok(())

@@ -110,7 +110,8 @@ mod tests {
     /// Whether targets at these places, each sprayed at from the front, are refused.
     fn refused(places: &[f64]) -> bool {
         let normal = -Vector3::x_axis();
-        let target = |&y: &f64| Target { point: Point3::new(0.0, y, 0.0), normal, dose: 1e-6, time: None };
+        let target =
+            |&y: &f64| Target { point: Point3::new(0.0, y, 0.0), normal, dose: 1e-6, time: None, stand_off: None };
         let targets: Vec<Target> = places.iter().map(target).collect();
         let from = |t: &Target| NozzleState { position: t.point - Vector3::x() * 0.3, direction: Vector3::x_axis() };
         let mut states: Vec<_> = targets.iter().map(|t| Ok(from(t))).collect();

@@ -61,7 +61,7 @@ pub(super) fn segments(length: f64) -> Result<(), Box<dyn Error>> {
             let (y, z) = (y + SPACING * k as f64 * cos, z + SPACING * k as f64 * sin);
             let slope = |h: [f64; 2]| (bump(y + h[0], z + h[1]) - bump(y - h[0], z - h[1])) / 2e-5;
             let normal = UnitVector3::new_normalize(Vector3::new(-1.0, slope([1e-5, 0.0]), slope([0.0, 1e-5])));
-            Target { point: Point3::new(bump(y, z), y, z), normal, dose: rock::DOSE, time: None }
+            Target { point: Point3::new(bump(y, z), y, z), normal, dose: rock::DOSE, time: None, stand_off: None }
         };
         let targets: Vec<Target> = (0..=(length / SPACING).round() as usize).map(target).collect();
         let (plan, time) = seconds(|| OptimalPlanner::default().plan(&targets, &wall, &robot, &settings));

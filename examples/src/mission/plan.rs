@@ -216,6 +216,6 @@ pub(super) fn layer_route(
         &layer.strokes
     };
     let kernel = kernel(settings)?;
-    let strokes: Vec<Vec<Spray>> = strokes.iter().map(|stroke| sprays(stroke, &kernel, settings.texel)).collect();
+    let strokes: Vec<Vec<Spray>> = strokes.iter().map(|stroke| sprays(stroke, &kernel, settings)).collect();
     Ok(Route::lifted(surface, &strokes, settings.limits.spray_spacing as f64, from, &settings.planner)?)
 }

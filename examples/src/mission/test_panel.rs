@@ -30,7 +30,7 @@ pub(super) fn targets() -> Vec<Target> {
         let s = 0.025 * f64::from(i);
         let normal = Vector3::new(-1.0, 0.4 * (5.0 * s).sin(), 0.3 * (4.0 * s).cos());
         let point = Point3::new(0.0, 0.5 - s, 2.0 + 0.1 * (3.0 * s).sin());
-        Target { point, normal: UnitVector3::new_normalize(normal), dose: 1e-6, time: None }
+        Target { point, normal: UnitVector3::new_normalize(normal), dose: 1e-6, time: None, stand_off: None }
     };
     (0..40).map(target).collect()
 }

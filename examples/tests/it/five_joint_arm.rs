@@ -34,7 +34,13 @@ fn targets() -> Vec<Target> {
             let s = 0.025 * f64::from(i);
             let normal = Vector3::new(-1.0, 0.3 * (3.0 * s).sin(), 0.4 * (2.0 * s).cos());
             let point = Point3::new(0.0, s, 2.0 + 0.2 * (2.0 * s).sin());
-            Target { point, normal: nalgebra::UnitVector3::new_normalize(normal), dose: 1e-6, time: None }
+            Target {
+                point,
+                normal: nalgebra::UnitVector3::new_normalize(normal),
+                dose: 1e-6,
+                time: None,
+                stand_off: None,
+            }
         })
         .collect()
 }

@@ -116,7 +116,7 @@ fn underside() -> Vec<Target> {
     let normal = UnitVector3::new_normalize(Vector3::new(-sin, 0.0, -cos));
     let target = |k: i32| {
         let point = Point3::new(-cos, -0.5 + 0.025 * f64::from(k), 3.0 + sin);
-        Target { point, normal, dose: 1e-6, time: None }
+        Target { point, normal, dose: 1e-6, time: None, stand_off: None }
     };
     (0..40).map(target).collect()
 }

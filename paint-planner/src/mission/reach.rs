@@ -25,7 +25,7 @@ pub fn reachable_targets(
     settings: &Settings,
 ) -> Result<Vec<bool>, Error> {
     settings.check()?;
-    check_each(targets)?;
+    check_each(targets, settings.nozzle.distances())?;
     let starts = initial_states(targets, &settings.nozzle);
     let nozzle = |start: Option<InitialState>| start.map(|start| start.state).ok_or(NotServed::OutOfReach);
     let mut nozzles: Vec<Result<NozzleState, NotServed>> = starts.into_iter().map(nozzle).collect();

@@ -86,7 +86,8 @@ mod tests {
     #[test]
     fn what_a_plan_gives_up_becomes_strokes_of_their_own() {
         let (point, normal) = (|k: usize| Point3::new(0.0, 0.025 * k as f64, 1.0), -Vector3::x_axis());
-        let stroke: Vec<Target> = (0..40).map(|k| Target { point: point(k), normal, dose: 1e-6, time: None }).collect();
+        let stroke: Vec<Target> =
+            (0..40).map(|k| Target { point: point(k), normal, dose: 1e-6, time: None, stand_off: None }).collect();
         let (mut targets, settings) = (stroke.clone(), Settings::default());
         let mut plan = plan(&targets, &Plane, &Gimbal, &settings).unwrap();
         let take = |targets: &mut [Target], plan: &Plan| {

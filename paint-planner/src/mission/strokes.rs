@@ -27,6 +27,8 @@ pub struct Spray {
     pub place: [f64; 2],
     /// Paint, m³.
     pub volume: f64,
+    /// As [`Target::stand_off`], m.
+    pub stand_off: Option<f64>,
 }
 
 /// Targets of strokes, joined by flights with the valve shut.
@@ -102,7 +104,12 @@ fn lift(chart: &dyn Chart, stroke: &[Spray], spacing: f64, lost: &mut f64) -> Ve
         let dose = spray.volume / (end.point - start.point).norm();
         // Neighbouring sprays share a border; across a gap the stroke goes on with the valve shut.
         match targets.last_mut() {
-            Some(last) if (last.point - start.point).norm() < 1e-3 => last.dose = dose,
+            Some(last) if (last.point - start.point).norm() < 1e-3 => {
+                last.dose = dose;
+                // On the border of two cells the nozzle is half way between their distances.
+                let half_way = last.stand_off.zip(start.stand_off).map(|(one, other)| 0.5 * (one + other));
+                last.stand_off = half_way.or(last.stand_off).or(start.stand_off);
+            }
             _ => {
                 if k > 0 {
                     let [_, left] = half_cell(stroke, k - 1, spacing);
@@ -126,7 +133,9 @@ fn added([x, y]: [f64; 2], [dx, dy]: [f64; 2]) -> [f64; 2] {
 /// Sprays lie `spacing` apart.
 pub fn spray_cell(chart: &dyn Chart, stroke: &[Spray], k: usize, spacing: f64) -> Option<[Target; 2]> {
     let [start, end] = half_cell(stroke, k, spacing).map(|offset| border(chart, stroke[k].place, offset));
-    start.zip(end).filter(|(start, end)| (end.point - start.point).norm() >= 1e-6).map(|(start, end)| [start, end])
+    let stand_off = stroke[k].stand_off;
+    let ends = start.zip(end).filter(|(start, end)| (end.point - start.point).norm() >= 1e-6);
+    ends.map(|(start, end)| [start, end].map(|target| Target { stand_off, ..target }))
 }
 
 /// From a spray to the borders of its cell, backwards and forwards: half the way to a neighbour that is no farther than
@@ -154,10 +163,17 @@ fn reversed(stroke: &[Target]) -> Vec<Target> {
 
 /// Targets with the valve shut between two places of a stroke, no farther apart than the others: a planner weighs steps.
 fn bridge(chart: &dyn Chart, from: [f64; 2], to: [f64; 2], along: f64, targets: &mut Vec<Target>) {
+    let stand_off = targets.last().and_then(|last| last.stand_off);
     let steps = ((to[0] - from[0]).hypot(to[1] - from[1]) / along).ceil() as usize;
     for k in 1..steps {
         let place = [0, 1].map(|c| from[c] + (to[c] - from[c]) * k as f64 / steps as f64);
-        targets.extend(chart.lift(place).map(|(point, normal)| Target { point, normal, dose: 0.0, time: None }));
+        targets.extend(chart.lift(place).map(|(point, normal)| Target {
+            point,
+            normal,
+            dose: 0.0,
+            time: None,
+            stand_off,
+        }));
     }
 }
 
@@ -166,7 +182,7 @@ fn border(chart: &dyn Chart, place: [f64; 2], offset: [f64; 2]) -> Option<Target
     [1.0, 0.75, 0.5, 0.25, 0.0].iter().find_map(|share| {
         let offset = offset.map(|o| share * o);
         let (point, normal) = chart.lift(added(place, offset)).or_else(|| chart.lift_from(place, offset))?;
-        Some(Target { point, normal, dose: 0.0, time: None })
+        Some(Target { point, normal, dose: 0.0, time: None, stand_off: None })
     })
 }
 
@@ -182,6 +198,7 @@ mod tests {
             normal: -Vector3::x_axis(),
             dose,
             time: None,
+            stand_off: None,
         };
         let stroke = [target(0.0, 1.0), target(0.1, 0.0), target(0.3, 3.0), target(0.6, 0.0)];
         let back = reversed(&stroke);
@@ -202,7 +219,7 @@ mod tests {
     /// A spray by itself paints half a spacing to either side; one at an end goes on as its stroke does.
     #[test]
     fn a_spray_paints_half_a_spacing_to_either_side() {
-        let spray = |x: f64, y: f64| Spray { place: [x, y], volume: 1e-9 };
+        let spray = |x: f64, y: f64| Spray { place: [x, y], volume: 1e-9, stand_off: None };
         let cell =
             |stroke: &[Spray], k: usize| spray_cell(&Wall, stroke, k, 0.04).unwrap().map(|t| [t.point.y, t.point.z]);
         let near = |found: [[f64; 2]; 2], expected: [[f64; 2]; 2]| {
@@ -214,5 +231,21 @@ mod tests {
         near(cell(&upwards, 0), [[1.0, 1.975], [1.0, 2.025]]);
         near(cell(&upwards, 1), [[1.0, 2.025], [1.0, 2.075]]);
         near(cell(&upwards, 2), [[1.0, 2.98], [1.0, 3.02]]);
+    }
+
+    /// Each spray's own distance in its cell, half way between two on their border, the last one's across a gap, nobody's where nobody asks.
+    #[test]
+    fn targets_ask_for_the_distances_of_their_sprays() {
+        let spray = |x: f64, stand_off| Spray { place: [x, 0.0], volume: 1e-9, stand_off };
+        let lifted = |stroke: &[Spray]| {
+            let targets = lift(&Wall, stroke, 0.04, &mut 0.0);
+            targets.iter().map(|target| target.stand_off).collect::<Vec<_>>()
+        };
+        let near = [spray(0.0, Some(0.06)), spray(0.04, Some(0.12)), spray(0.08, None)];
+        assert_eq!(lifted(&near), [Some(0.06), Some(0.5 * (0.06 + 0.12)), Some(0.12), None]);
+        let apart = lifted(&[spray(0.0, Some(0.06)), spray(0.2, Some(0.12))]);
+        assert_eq!(apart[..apart.len() - 2], vec![Some(0.06); apart.len() - 2]);
+        assert_eq!((apart.len() > 4, &apart[apart.len() - 2..]), (true, &[Some(0.12); 2][..]));
+        assert!(lifted(&[spray(0.0, None), spray(0.04, None)]).iter().all(Option::is_none));
     }
 }

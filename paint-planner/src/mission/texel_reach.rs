@@ -35,7 +35,7 @@ pub fn reachable_texels(
     let ask = |texels: &[usize]| -> Result<Vec<Option<bool>>, Error> {
         let target = |texel: &usize| {
             let (point, normal) = chart.lift([(texel % width) as f64, (texel / width) as f64])?;
-            Some(Target { point, normal, dose: 0.0, time: None })
+            Some(Target { point, normal, dose: 0.0, time: None, stand_off: None })
         };
         let targets: Vec<Option<Target>> = texels.iter().map(target).collect();
         let asked: Vec<Target> = targets.iter().flatten().copied().collect();

@@ -29,7 +29,7 @@ pub(crate) fn initial_states(targets: &[Target], settings: &NozzleSettings) -> V
 }
 
 fn start(target: &Target, settings: &NozzleSettings) -> Option<InitialState> {
-    let n = target.normal.into_inner();
+    let (n, stand_off) = (target.normal.into_inner(), target.stand_off_or(settings.stand_off));
     let ideal = -n;
     let elevation = ideal.z.clamp(-1.0, 1.0).asin();
     let limit = settings.max_elevation - MARGIN;
@@ -45,11 +45,11 @@ fn start(target: &Target, settings: &NozzleSettings) -> Option<InitialState> {
         flat.try_normalize(1e-9).unwrap_or_else(Vector3::x) * limit.cos()
             + Vector3::z() * limit.sin().copysign(elevation)
     };
-    let position = target.point - direction * (settings.stand_off / tilted.cos());
+    let position = target.point - direction * (stand_off / tilted.cos());
     let state = NozzleState { position, direction: UnitVector3::new_normalize(direction) };
     // A cylinder about the normal that lies inside the cone of the incidence down to the least distance.
     let deviation = settings.deviation.min(settings.min * settings.incidence.tan());
-    let deviation = (settings.stand_off * tilted.tan() < INSIDE * deviation).then_some(deviation);
+    let deviation = (stand_off * tilted.tan() < INSIDE * deviation).then_some(deviation);
     Some(InitialState { state, tangents: tangents(&n, &Vector3::z()), deviation, facet: None })
 }
 
@@ -73,7 +73,7 @@ mod tests {
     fn facing(elevation_degrees: f64) -> Target {
         let e = elevation_degrees.to_radians();
         let normal = UnitVector3::new_normalize(Vector3::new(-e.cos(), 0.0, -e.sin()));
-        Target { point: Point3::new(1.0, 2.0, 3.0), normal, dose: 1e-6, time: None }
+        Target { point: Point3::new(1.0, 2.0, 3.0), normal, dose: 1e-6, time: None, stand_off: None }
     }
 
     #[test]

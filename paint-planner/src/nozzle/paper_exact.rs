@@ -36,7 +36,7 @@ pub(super) fn optimise(
     let stroke_links: Vec<bool> = indices.windows(2).map(|pair| pair[1] == pair[0] + 1 && linked[pair[0]]).collect();
     let mut states: Vec<Vector5<f64>> = Vec::with_capacity(chosen.len());
     for Place { target, .. } in &chosen {
-        let mut state = initial(target, settings.stand_off);
+        let mut state = initial(target, target.stand_off_or(settings.stand_off));
         if let Some(before) = states.last() {
             state[3] = nearest_equivalent(state[3], before[3]);
         }

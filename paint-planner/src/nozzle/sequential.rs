@@ -142,8 +142,8 @@ fn build(points: &[Linearisation], stroke_links: &[bool], settings: &NozzleSetti
         block[(4, 4)] = block[(3, 3)];
         *block += soft_map.transpose() * soft_map * settings.aim;
         *block *= 2.0;
-        let pull =
-            across * t * settings.cd + n * (settings.distance * (n.dot(&t) + settings.stand_off)) + p * settings.cc;
+        let height = n.dot(&t) + c.target.stand_off_or(settings.stand_off);
+        let pull = across * t * settings.cd + n * (settings.distance * height) + p * settings.cc;
         let gradient = &mut program.gradient[i];
         for k in 0..3 {
             gradient[k] -= 2.0 * pull[k];

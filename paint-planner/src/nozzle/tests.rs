@@ -81,6 +81,7 @@ fn the_rows_that_bind_on_a_rough_stroke_are_found_at_once() {
             normal,
             dose: 0.0,
             time: None,
+            stand_off: None,
         }
     };
     let targets: Vec<Target> = (0..300).map(&mut target).collect();
@@ -144,7 +145,13 @@ fn state_after_state_agrees_with_clarabel() {
 /// The wall x = 0 seen from smaller x; `normal_z` tilts the normal in the xz plane.
 fn target(z: f64, normal_z: f64) -> Target {
     let normal = Vector3::new(-(1.0 - normal_z * normal_z).sqrt(), 0.0, normal_z);
-    Target { point: Point3::new(0.0, 0.0, z), normal: UnitVector3::new_normalize(normal), dose: 0.0, time: None }
+    Target {
+        point: Point3::new(0.0, 0.0, z),
+        normal: UnitVector3::new_normalize(normal),
+        dose: 0.0,
+        time: None,
+        stand_off: None,
+    }
 }
 
 #[test]
@@ -247,7 +254,7 @@ fn programs_without_a_point_are_refused_by_all_solvers() {
 fn the_aim_may_leave_the_target_by_half_the_cone() {
     let settings = NozzleSettings::default();
     let normal = UnitVector3::new_normalize(Vector3::new(-1.0, 0.2, 0.1));
-    let targets = [Target { point: Point3::new(2.0, 1.0, 1.5), normal, dose: 0.0, time: None }];
+    let targets = [Target { point: Point3::new(2.0, 1.0, 1.5), normal, dose: 0.0, time: None, stand_off: None }];
     let (program, start) = stroke_program(&targets, &settings);
     let rows = &program.rows[program.rows.len() - program.soft_rows..];
     let aimed = program.soft_map[0] * start[0];

@@ -60,7 +60,7 @@ pub(crate) fn assemble_plan(
     }
     let reachable: Vec<bool> = untimed.vehicle.iter().map(Result::is_ok).collect();
     let ideal = |target: &Target| NozzleState {
-        position: target.point + target.normal.into_inner() * settings.nozzle.stand_off,
+        position: target.point + target.normal.into_inner() * target.stand_off_or(settings.nozzle.stand_off),
         direction: -target.normal,
     };
     let nozzle: Vec<NozzleState> = untimed

@@ -50,7 +50,7 @@ impl Planner for OptimalPlanner<'_> {
     ) -> Result<Plan, Error> {
         span!("plan");
         settings.check()?;
-        check(targets)?;
+        check(targets, settings.nozzle.distances())?;
         let usable = |index: &usize| clearance.get(*index).is_some_and(|c| c.is_none_or(|c| c >= 0.0));
         if let Some(index) = (0..targets.len()).find(|index| !usable(index)) {
             return Err(Error::Target { index, what: "needs a clearance of its own that is not negative" });

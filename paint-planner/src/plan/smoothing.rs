@@ -34,7 +34,7 @@ impl Planner for SmoothingPlanner {
         settings: &Settings,
     ) -> Result<Plan, Error> {
         settings.check()?;
-        check(targets)?;
+        check(targets, settings.nozzle.distances())?;
         let linked = stroke_links(targets, settings.break_length);
         let nozzles = smooth(targets, &linked, settings);
         let mut vehicle: Vec<Result<VehicleState, NotServed>> = nozzles
@@ -69,7 +69,7 @@ fn smooth(targets: &[Target], linked: &[bool], settings: &Settings) -> Vec<Nozzl
         if i > 0 {
             arc_length += (target.point - targets[i - 1].point).norm();
         }
-        let p = target.point + facing * settings.nozzle.stand_off;
+        let p = target.point + facing * target.stand_off_or(settings.nozzle.stand_off);
         x.push(arc_length);
         raw.push([p.x, p.y, p.z, -facing.x, -facing.y]);
     }

@@ -266,7 +266,7 @@ mod tests {
         let strokes: Vec<StrokeEnds> = (0..5)
             .map(|k| {
                 let point = Point3::new(0.0, 0.01 * f64::from(k), 1.0);
-                let target = Target { point, normal: -Vector3::x_axis(), dose: 0.0, time: None };
+                let target = Target { point, normal: -Vector3::x_axis(), dose: 0.0, time: None, stand_off: None };
                 StrokeEnds { first: target, last: target }
             })
             .collect();

@@ -12,7 +12,7 @@ fn uniform(seed: u64) -> impl FnMut() -> f64 {
 }
 
 fn target(y: f64, z: f64) -> Target {
-    Target { point: Point3::new(0.0, y, z), normal: -Vector3::x_axis(), dose: 0.0, time: None }
+    Target { point: Point3::new(0.0, y, z), normal: -Vector3::x_axis(), dose: 0.0, time: None, stand_off: None }
 }
 
 /// Strokes of up to `length` metres at random on a wall of `size` metres.
@@ -114,6 +114,7 @@ fn strokes_that_face_another_way_wait() {
             normal: nalgebra::UnitVector3::new_normalize(normal),
             dose: 0.0,
             time: None,
+            stand_off: None,
         };
         StrokeEnds { first: at(0.0), last: at(0.01) }
     };

@@ -39,7 +39,7 @@ impl TransitCost {
         let place = |target: &Target| {
             let level = target.normal.xy();
             Place {
-                nozzle: target.point + target.normal.into_inner() * settings.nozzle.stand_off,
+                nozzle: target.point + target.normal.into_inner() * target.stand_off_or(settings.nozzle.stand_off),
                 facing: (level.norm() > MIN_LEVEL_NORMAL).then(|| level.y.atan2(level.x)),
             }
         };

@@ -96,7 +96,7 @@ fn seen(from: &Point3<f64>, along: &UnitVector3<f64>, scene: &TeleopScene) -> Op
 
 /// A target that is not painted.
 fn shut(point: Point3<f64>, normal: UnitVector3<f64>) -> Target {
-    Target { point, normal, dose: 0.0, time: None }
+    Target { point, normal, dose: 0.0, time: None, stand_off: None }
 }
 
 /// A planner needs a way: one place becomes two beside each other.
@@ -129,8 +129,13 @@ mod tests {
     #[test]
     fn a_levelled_segment_takes_the_paint_that_it_took_before() {
         // 1 m of 3 and 3 m of 7, in any unit of paint: 24 over 4 m.
-        let at =
-            |x: f64, dose: f64| Target { point: Point3::new(x, 0.0, 0.0), normal: Vector3::y_axis(), dose, time: None };
+        let at = |x: f64, dose: f64| Target {
+            point: Point3::new(x, 0.0, 0.0),
+            normal: Vector3::y_axis(),
+            dose,
+            time: None,
+            stand_off: None,
+        };
         let mut targets = [at(0.0, 3.0), at(1.0, 7.0), at(4.0, 0.0)];
         level(&mut targets);
         assert_eq!(targets.map(|target| target.dose), [6.0, 6.0, 0.0]);

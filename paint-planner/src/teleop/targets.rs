@@ -50,6 +50,7 @@ pub fn targets(segment: &Segment, surface: &dyn Surface, settings: &TargetSettin
         normal: footprint_normal(&place.hit, surface, settings.footprint),
         dose: dose(k).max(0.0),
         time: Some(place.time),
+        stand_off: None,
     };
     samples.iter().enumerate().map(target).collect()
 }

@@ -219,8 +219,9 @@ mod tests {
     /// A metre of straight stroke in steps of 0.1 m that turns by `turn` radians per step.
     fn stroke(turn: f64, dose: f64) -> (Vec<RoutePoint>, Vec<Target>) {
         let point = |i: usize| Point3::new(0.0, 0.1 * i as f64, 1.0);
-        let targets =
-            (0..=10).map(|i| Target { point: point(i), normal: -Vector3::x_axis(), dose, time: None }).collect();
+        let targets = (0..=10)
+            .map(|i| Target { point: point(i), normal: -Vector3::x_axis(), dose, time: None, stand_off: None })
+            .collect();
         let state = |i: usize| VehicleState { position: point(i), heading: turn * i as f64, pan: 0.0, tilt: 0.0 };
         let route = (0..=10).map(|i| RoutePoint { state: state(i), target: Some(i), rest: false }).collect();
         (route, targets)

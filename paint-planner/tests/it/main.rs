@@ -15,6 +15,7 @@ mod own_vehicle;
 mod paper_exact;
 mod plans;
 mod readme;
+mod stand_off;
 mod teleop;
 mod teleop_states;
 mod told_of_plans;

@@ -35,7 +35,7 @@ impl Chart for Picture {
 
 /// Sprays at these places along a row, each of a microlitre.
 fn row(places: impl IntoIterator<Item = f64>) -> Vec<Spray> {
-    places.into_iter().map(|x| Spray { place: [x, 0.0], volume: 1e-9 }).collect()
+    places.into_iter().map(|x| Spray { place: [x, 0.0], volume: 1e-9, stand_off: None }).collect()
 }
 
 fn lifted(chart: &Picture, strokes: &[Vec<Spray>]) -> Route {
@@ -101,7 +101,7 @@ fn texels_are_reached_as_if_each_were_asked_about() {
         let reached = reachable_texels(&occupied, width, &chart, &Wall::flat(), &Arm::default(), &settings).unwrap();
         let target = |texel: usize| {
             let (point, normal) = chart.lift([(texel % width) as f64, (texel / width) as f64]).unwrap();
-            Target { point, normal, dose: 0.0, time: None }
+            Target { point, normal, dose: 0.0, time: None, stand_off: None }
         };
         let targets: Vec<Target> = (0..reached.len()).map(target).collect();
         let alone = reachable_targets(&targets, &Wall::flat(), &Arm::default(), &settings).unwrap();

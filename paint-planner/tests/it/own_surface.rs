@@ -30,7 +30,7 @@ fn parallel(latitude: f64) -> Vec<Target> {
     let target = |k: u32| {
         let ((sin, cos), (north, level)) = ((0.02 * f64::from(k)).sin_cos(), latitude.sin_cos());
         let normal = UnitVector3::new_normalize(Vector3::new(cos * level, sin * level, north));
-        Target { point: Point3::from(normal.into_inner() * 1.5), normal, dose: 1e-6, time: None }
+        Target { point: Point3::from(normal.into_inner() * 1.5), normal, dose: 1e-6, time: None, stand_off: None }
     };
     (0..80).map(target).collect()
 }

@@ -41,6 +41,7 @@ fn stroke(side: f64) -> impl Iterator<Item = Target> {
         normal,
         dose: if k == 12 { 0.0 } else { 2e-6 },
         time: None,
+        stand_off: None,
     })
 }
 

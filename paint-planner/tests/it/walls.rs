@@ -38,7 +38,7 @@ impl Wall {
         let (dy, dz) = self.slope(y, z);
         let point = self.rotation() * Point3::new(self.depth(y, z), y, z);
         let normal = UnitVector3::new_normalize(self.rotation() * Vector3::new(-1.0, dy, dz));
-        Target { point, normal, dose, time: None }
+        Target { point, normal, dose, time: None, stand_off: None }
     }
 
     /// Rows of `width` metres, `spacing` apart, joined at alternating ends, targets 2.5 cm apart.
