@@ -36,6 +36,7 @@
 //! | Paper IV, 3.3: the network with READ, PAINT and a learned stop | [`thesis::ThesisPainter`], [`thesis::Network`] |
 //! | non-negative deconvolution by projected L-BFGS | [`Deconvolution`] |
 //! | the same with strokes along lines (thinning: Zhang and Suen 1984) | [`painters::Centrelines`] |
+//! | rows whose width and direction follow the picture; ours | [`painters::AdaptiveRows`] |
 //! | matching pursuit (Mallat and Zhang 1993) | [`painters::MatchingPursuit`] |
 //! | few sprays at free positions, of free spreads | [`painters::FreeSprays`] |
 //! | a feedback network (as Zamir et al. 2017), convolutional; ours: Paper IV paints one spray per step | [`Feedback`], [`network::Network`] |
@@ -45,7 +46,7 @@
 //! | a valve of limited slew rate (augmented Lagrangian), on a context-based path (Dafner et al. 2000) | [`painters::SlewLimited`], [`path::ScanOrder`] |
 //! | several paints that mix (Kubelka and Munk 1931) | [`colour::Palette`], [`colour::ColourSeparation`] |
 //! | separation by any mixing model, paints chosen and ordered, all sprays at once; ours | [`colour::TexelSeparation`], [`colour::choose_paints`], [`colour::ColourFit`] |
-//! | strokes a robot can fly | [`path::boustrophedon`] |
+//! | strokes a robot can fly | [`path::boustrophedon`], [`path::in_order`] |
 //!
 //! Pixels: centres at integers, `x` = column, `y` = row, row 0 at the top. Lengths are in pixels, depths in the unit of the
 //! saturation curve. Every result is the same bytes for the same input.

@@ -55,6 +55,15 @@ pub fn ssim_gaussian(picture: &Image, reference: &Image, weight: Option<&Image>)
     windowed_ssim(picture, reference, weight, None, &taps, 1.0)
 }
 
+/// The windows of [`ssim`]: the pixel in the middle of each, and the similarity there.
+pub(crate) fn ssim_windows(
+    picture: &Image,
+    reference: &Image,
+    weight: Option<&Image>,
+) -> Result<Vec<(usize, f64)>, Error> {
+    windows(picture, reference, weight, &[1.0 / 7.0; 7], 49.0 / 48.0)
+}
+
 fn windowed_ssim(
     picture: &Image,
     reference: &Image,
@@ -68,6 +77,24 @@ fn windowed_ssim(
     if let Some(centres) = centres.filter(|centres| centres.len() != width * height) {
         return Err(Error::Mismatch { what: "centres", found: (centres.len(), 1), expected: (width, height) });
     }
+    let mut all = windows(picture, reference, weight, taps, covariance_scale)?;
+    all.retain(|(centre, _)| centres.is_none_or(|centres| centres[*centre]));
+    if all.is_empty() {
+        return Err(Error::EmptyProblem("no window of the similarity lies wholly on weighted pixels"));
+    }
+    Ok(all.iter().map(|(_, similarity)| similarity).sum::<f64>() / all.len() as f64)
+}
+
+/// Windows of which no pixel is left out, each with its middle.
+fn windows(
+    picture: &Image,
+    reference: &Image,
+    weight: Option<&Image>,
+    taps: &[f64],
+    covariance_scale: f64,
+) -> Result<Vec<(usize, f64)>, Error> {
+    check(picture, reference, weight)?;
+    let (width, height) = picture.size();
     let n = taps.len();
     if width < n || height < n {
         return Err(Error::Mismatch {
@@ -101,26 +128,18 @@ fn windowed_ssim(
     let xx = local(&|k| x.data()[k] * x.data()[k]);
     let yy = local(&|k| y.data()[k] * y.data()[k]);
     let xy = local(&|k| x.data()[k] * y.data()[k]);
-    // A window counts when no pixel of it is left out.
     let left_out = weight.map(|w| local(&|k| f64::from(u8::from(w.data()[k] <= 0.0))));
     let (c1, c2) = (0.01_f64.powi(2), 0.03_f64.powi(2));
-    let (mut sum, mut count) = (0.0, 0.0);
-    for k in 0..mean_x.len() {
-        let columns = width - n + 1;
-        let centre = (k / columns + n / 2) * width + k % columns + n / 2;
-        if left_out.as_ref().is_some_and(|l| l[k] > 1e-12) || centres.is_some_and(|centres| !centres[centre]) {
-            continue;
-        }
+    let columns = width - n + 1;
+    let similarity = |k: usize| {
         let (mx, my) = (mean_x[k], mean_y[k]);
         let (vx, vy) = (covariance_scale * (xx[k] - mx * mx), covariance_scale * (yy[k] - my * my));
         let vxy = covariance_scale * (xy[k] - mx * my);
-        sum += (2.0 * mx * my + c1) * (2.0 * vxy + c2) / ((mx * mx + my * my + c1) * (vx + vy + c2));
-        count += 1.0;
-    }
-    if count == 0.0 {
-        return Err(Error::EmptyProblem("no window of the similarity lies wholly on weighted pixels"));
-    }
-    Ok(sum / count)
+        (2.0 * mx * my + c1) * (2.0 * vxy + c2) / ((mx * mx + my * my + c1) * (vx + vy + c2))
+    };
+    let counts = |k: &usize| left_out.as_ref().is_none_or(|left_out| left_out[*k] <= 1e-12);
+    let middle = |k: usize| (k / columns + n / 2) * width + k % columns + n / 2;
+    Ok((0..mean_x.len()).filter(counts).map(|k| (middle(k), similarity(k))).collect())
 }
 
 fn check(picture: &Image, reference: &Image, weight: Option<&Image>) -> Result<(), Error> {

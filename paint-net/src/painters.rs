@@ -1,6 +1,7 @@
-//! The painters: three that plan on a grid of cells, one that follows lines, one that fills regions, one network, one of free sprays, and four that
-//! wrap others.
+//! The painters: three that plan on a grid of cells, one that follows lines, two of rows that fill regions or follow the picture, one network, one
+//! of free sprays, and four that wrap others.
 
+mod adaptive_rows;
 mod area_fill;
 mod centrelines;
 mod centring;
@@ -23,6 +24,7 @@ mod thinning;
 mod trace;
 mod volume_fit;
 
+pub use adaptive_rows::{AdaptiveRows, RowWidth};
 pub use area_fill::AreaFill;
 pub use centrelines::Centrelines;
 pub use closed_loop::ClosedLoopPainter;

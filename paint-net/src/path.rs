@@ -4,4 +4,4 @@ mod scan_order;
 mod strokes;
 
 pub use scan_order::ScanOrder;
-pub use strokes::{Stroke, StrokeSettings, boustrophedon};
+pub use strokes::{Stroke, StrokeSettings, boustrophedon, in_order};

@@ -1,11 +1,11 @@
 //! Strokes along the lines of line art, rows for the rest.
 
 use super::drawn_lines::DrawnLines;
-use super::fitting::{ink_cost, prune_with, uniform_volume};
+use super::fitting::{prune_with, uniform_volume};
 use super::placed_sprays::PlacedSprays;
 use super::trace::{Line, trace};
 use crate::error::{Error, require};
-use crate::optimise::{StoppingRule, minimise};
+use crate::optimise::StoppingRule;
 use crate::painter::{Observer, Painter};
 use crate::painting::Painting;
 use crate::path::{Stroke, StrokeSettings, boustrophedon};
@@ -55,6 +55,7 @@ impl Painter for Centrelines {
         let smoothness = self.smoothness;
         require("smoothness", smoothness, (0.0..=1e6).contains(&smoothness), "it must lie in [0, 1000000]")?;
         require("tolerance", self.tolerance, self.tolerance >= 0.0, "it must be 0 or more")?;
+        let stop = StoppingRule { iterations: self.iterations, relative_decrease: self.tolerance };
         let grid = PaintGrid::new(problem)?;
         let reach = self.max_half_width * problem.kernel.sigma();
         let drawn = DrawnLines::find(problem, &grid, reach);
@@ -68,7 +69,7 @@ impl Painter for Centrelines {
             let mut told = |part: f64| observer.progress(share + part / f64::from(ROUNDS));
             let heeding = problem.with_missing_weight(&weight);
             let upper_bounds = placed.upper_bounds(problem.limits.max_volume);
-            let canvas = self.fit(&heeding, &grid, &placed, &upper_bounds, &mut volumes, &mut told);
+            let canvas = placed.fit(&heeding, smoothness, &upper_bounds, &mut volumes, &stop, &mut told);
             let bare = drawn.bare(problem, &canvas);
             if round + 1 == ROUNDS || !bare.contains(&true) {
                 break;
@@ -87,7 +88,7 @@ impl Painter for Centrelines {
         let problem = problem.with_missing_weight(&weight);
         let upper_bounds = placed.upper_bounds(problem.limits.max_volume);
         prune_with(&upper_bounds, problem.limits, &mut volumes, &mut |upper_bounds, volumes| {
-            self.fit(&problem, &grid, &placed, upper_bounds, volumes, &mut |_| ());
+            placed.fit(&problem, smoothness, upper_bounds, volumes, &stop, &mut |_| ());
         });
         observer.progress(1.0);
 
@@ -98,39 +99,6 @@ impl Painter for Centrelines {
         let sprays = strokes.iter().flat_map(|stroke| stroke.sprays.iter().copied()).collect();
         let painting = Painting::render(&problem, sprays);
         Ok(Painting { strokes, missing_weight: (!drawn.lines.is_empty()).then_some(weight), ..painting })
-    }
-}
-
-impl Centrelines {
-    /// Fits the volumes; the canvas that they give.
-    fn fit(
-        &self,
-        problem: &PaintProblem,
-        grid: &PaintGrid,
-        placed: &PlacedSprays,
-        upper_bounds: &[f64],
-        volumes: &mut Vec<f64>,
-        progress: &mut dyn FnMut(f64),
-    ) -> Vec<f64> {
-        // In units of what the square of a volume costs on white paper.
-        let stiffness = self.smoothness * std::f64::consts::PI * problem.kernel.sigma().powi(2);
-        let stop = StoppingRule { iterations: self.iterations, relative_decrease: self.tolerance };
-        let show = |v: &[f64], canvas: &mut [f64]| {
-            canvas.copy_from_slice(grid.initial.data());
-            placed.deposit(v, canvas);
-            problem.settle(grid.initial.data(), canvas);
-        };
-        let mut canvas = grid.initial.data().to_vec();
-        let mut cost = |v: &[f64], gradient: &mut [f64]| {
-            show(v, &mut canvas);
-            let value = ink_cost(problem, problem.saturation, &mut canvas);
-            problem.settle_adjoint(&mut canvas);
-            placed.adjoint(&canvas, gradient);
-            value + placed.roughness(v, stiffness, gradient)
-        };
-        minimise(volumes, upper_bounds, &stop, &mut cost, progress);
-        show(volumes, &mut canvas);
-        canvas
     }
 }
 

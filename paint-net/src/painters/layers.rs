@@ -5,6 +5,7 @@ use crate::image::Image;
 use crate::model::Spray;
 use crate::painter::{Observer, Painter, PartialProgress};
 use crate::painting::Painting;
+use crate::path::Stroke;
 use crate::problem::PaintProblem;
 
 /// How the thresholds after the base are spaced. The print, "intervals of multiples of 50", allows both.
@@ -140,15 +141,14 @@ fn split_at_thresholds(whole: &Painting, thresholds: &[f64], problem: &PaintProb
     for (k, &top) in thresholds.iter().enumerate() {
         let last = k + 1 == thresholds.len();
         let upper = if last { f64::INFINITY } else { saturation.inverse(top) };
-        let mut sprays = Vec::new();
-        for spray in &whole.sprays {
+        let part = |spray: &Spray| {
             let depth = depth_at(&whole.canvas, spray);
             let share = (depth.min(upper) - depth.min(lower)) / depth;
-            if share > 0.0 {
-                let spray = Spray { volume: spray.volume * share, ..*spray };
-                problem.kernel.stamp(&spray, &mut canvas);
-                sprays.push(spray);
-            }
+            (share > 0.0).then_some(Spray { volume: spray.volume * share, ..*spray })
+        };
+        let sprays: Vec<Spray> = whole.sprays.iter().filter_map(part).collect();
+        for spray in &sprays {
+            problem.kernel.stamp(spray, &mut canvas);
         }
         let so_far = if last {
             // All together are the whole plan, whose painter knows its canvas best.
@@ -158,10 +158,18 @@ fn split_at_thresholds(whole: &Painting, thresholds: &[f64], problem: &PaintProb
             problem.settle(initial.data(), so_far.data_mut());
             so_far
         };
-        layers.push(Painting::new(sprays, so_far, saturation));
+        let strokes = whole.strokes.iter().flat_map(|stroke| runs(stroke, &part)).collect();
+        layers.push(Painting { strokes, ..Painting::new(sprays, so_far, saturation) });
         lower = upper;
     }
     layers
+}
+
+/// The parts of a stroke that have paint in a layer: it ends where one has none.
+fn runs(stroke: &Stroke, part: &dyn Fn(&Spray) -> Option<Spray>) -> Vec<Stroke> {
+    let parts: Vec<Option<Spray>> = stroke.sprays.iter().map(part).collect();
+    let runs = parts.split(Option::is_none).map(|run| Stroke { sprays: run.iter().copied().flatten().collect() });
+    runs.filter(|stroke| !stroke.sprays.is_empty()).collect()
 }
 
 /// Depth at the pixel nearest to a spray.

@@ -1,6 +1,8 @@
 //! Sprays at given places: along lines, and on the cells of the grid that are left.
 
+use super::fitting::ink_cost;
 use crate::model::{Spray, SprayKernel};
+use crate::optimise::{StoppingRule, minimise};
 use crate::problem::{PaintGrid, PaintProblem};
 
 /// Sprays whose places are given and whose volumes are sought: those along the lines first, then cells of the grid.
@@ -21,31 +23,79 @@ struct Footprint {
 }
 
 impl Footprint {
-    fn new(kernel: &SprayKernel, [x, y]: [f64; 2], (width, height): (usize, usize), allowed: bool) -> Self {
-        let sigma = kernel.sigma();
+    fn new(kernel: &SprayKernel, spray: Spray, (width, height): (usize, usize), allowed: bool) -> Self {
+        let Spray { x, y, sigma, .. } = spray;
         let (left, across) = kernel.profile(x, sigma, width);
         let (top, down) = kernel.profile(y, sigma, height);
-        Self { spray: Spray { x, y, volume: 1.0, sigma }, allowed, corner: [left, top], across, down }
+        Self { spray: Spray { volume: 1.0, ..spray }, allowed, corner: [left, top], across, down }
     }
+}
+
+/// What a nozzle may spray on, and whether anybody asks for paint there.
+fn may(problem: &PaintProblem, [x, y]: [f64; 2]) -> bool {
+    let (width, height) = problem.reference.size();
+    let nearest = |at: f64, extent: usize| (at.round().max(0.0) as usize).min(extent - 1);
+    let pixel = nearest(y, height) * width + nearest(x, width);
+    problem.paintable.is_none_or(|mask| mask[pixel]) && problem.weight(pixel) > 0.0
 }
 
 impl PlacedSprays {
     /// Sprays at the places along lines, and on the cells of the grid where `rest` says so.
     pub(super) fn new(problem: &PaintProblem, grid: &PaintGrid, lines: &[Vec<[f64; 2]>], rest: &[bool]) -> Self {
-        let (width, size) = (problem.reference.width(), problem.reference.size());
-        let pixel = |[x, y]: [f64; 2]| y.round() as usize * width + x.round() as usize;
-        let may =
-            |at: [f64; 2]| problem.paintable.is_none_or(|mask| mask[pixel(at)]) && problem.weight(pixel(at)) > 0.0;
-        let footprint = |at: [f64; 2], allowed: bool| Footprint::new(problem.kernel, at, size, allowed);
-        let mut footprints: Vec<Footprint> = lines.iter().flatten().map(|&at| footprint(at, may(at))).collect();
+        let (width, size, sigma) = (problem.reference.width(), problem.reference.size(), problem.kernel.sigma());
+        let footprint = |[x, y]: [f64; 2], allowed: bool| {
+            Footprint::new(problem.kernel, Spray { x, y, volume: 1.0, sigma }, size, allowed)
+        };
+        let mut footprints: Vec<Footprint> =
+            lines.iter().flatten().map(|&at| footprint(at, may(problem, at))).collect();
         for (cell, &upper) in grid.upper_bounds.iter().enumerate() {
             let spray = grid.spray(cell, 1.0);
             let at = [spray.x, spray.y];
-            if upper > 0.0 && rest[pixel(at)] {
+            if upper > 0.0 && rest[spray.y as usize * width + spray.x as usize] {
                 footprints.push(footprint(at, true));
             }
         }
         Self { footprints, along: lines.iter().map(Vec::len).collect(), width }
+    }
+
+    /// Sprays of any spread along strokes.
+    pub(super) fn along(problem: &PaintProblem, strokes: &[Vec<Spray>]) -> Self {
+        let (width, size) = (problem.reference.width(), problem.reference.size());
+        let footprint = |spray: &Spray| Footprint::new(problem.kernel, *spray, size, may(problem, [spray.x, spray.y]));
+        let footprints = strokes.iter().flatten().map(footprint).collect();
+        Self { footprints, along: strokes.iter().map(Vec::len).collect(), width }
+    }
+
+    /// Fits the volumes under their upper bounds so that the ink comes as near the reference as it can, with `smoothness` as the weight of
+    /// differences between neighbours on a line; the canvas that they give.
+    pub(super) fn fit(
+        &self,
+        problem: &PaintProblem,
+        smoothness: f64,
+        upper_bounds: &[f64],
+        volumes: &mut Vec<f64>,
+        stop: &StoppingRule,
+        progress: &mut dyn FnMut(f64),
+    ) -> Vec<f64> {
+        // In units of what the square of a volume costs on white paper.
+        let stiffness = smoothness * std::f64::consts::PI * problem.kernel.sigma().powi(2);
+        let initial = problem.initial_canvas();
+        let show = |v: &[f64], canvas: &mut [f64]| {
+            canvas.copy_from_slice(initial.data());
+            self.deposit(v, canvas);
+            problem.settle(initial.data(), canvas);
+        };
+        let mut canvas = initial.data().to_vec();
+        let mut cost = |v: &[f64], gradient: &mut [f64]| {
+            show(v, &mut canvas);
+            let value = ink_cost(problem, problem.saturation, &mut canvas);
+            problem.settle_adjoint(&mut canvas);
+            self.adjoint(&canvas, gradient);
+            value + self.roughness(v, stiffness, gradient)
+        };
+        minimise(volumes, upper_bounds, stop, &mut cost, progress);
+        show(volumes, &mut canvas);
+        canvas
     }
 
     /// How many there are.

@@ -1,6 +1,7 @@
 //! What the crate promises, seen from outside. `own_*`: what each trait asks of whoever brings his own.
 #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
 
+mod adaptive_rows;
 mod colour;
 mod doses;
 mod examples;

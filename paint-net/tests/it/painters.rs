@@ -5,12 +5,14 @@ mod ghost_pixels;
 
 use paint_net::model::MonotoneCurve;
 use paint_net::painters::{
-    AreaFill, Centrelines, ClosedLoopPainter, FreeSprays, LayerPlanning, Layered, MatchingPursuit, ThresholdSpacing,
+    AdaptiveRows, AreaFill, Centrelines, ClosedLoopPainter, FreeSprays, LayerPlanning, Layered, MatchingPursuit,
+    ThresholdSpacing,
 };
 use paint_net::path::{StrokeSettings, boustrophedon};
 use paint_net::procedural::{Texture, lattice};
 use paint_net::{
-    Deconvolution, Error, Feedback, Image, Limits, PaintProblem, Painter, Painting, Saturation, SprayKernel, metrics,
+    Deconvolution, Error, Feedback, Image, Limits, PaintProblem, Painter, Painting, Saturation, Spray, SprayKernel,
+    metrics,
 };
 
 fn kernel() -> SprayKernel {
@@ -22,6 +24,7 @@ fn painters() -> Vec<Box<dyn Painter>> {
         Box::new(Deconvolution::default()),
         Box::new(Centrelines::default()),
         Box::new(AreaFill::default()),
+        Box::new(AdaptiveRows::default()),
         Box::new(MatchingPursuit::default()),
         Box::new(Feedback::shipped().unwrap()),
         Box::new(FreeSprays { sprays: 100, ..FreeSprays::default() }),
@@ -205,6 +208,31 @@ fn layers_climb_and_cost_little() {
         }
         let reached = psnr(&layers[layers.len() - 1]);
         assert!(reached >= direct - loss, "{planning:?}: {reached} against {direct}");
+    }
+}
+
+/// Layers of a painting along lines are flown along them, too.
+#[test]
+fn a_layer_keeps_the_strokes_of_the_plan() {
+    // A bow that grows darker, thin enough to be a line.
+    let wanted = Image::from_fn(90, 60, |x, y| {
+        let away = ((x as f64 - 45.0).hypot(y as f64 - 70.0) - 50.0).abs();
+        (0.3 + 0.6 * x as f64 / 90.0) * f64::from(u8::from(away < 2.0))
+    });
+    let kernel = SprayKernel::new(2.0, 3.5).unwrap();
+    let layered = Layered::new(Centrelines::default());
+    let painting = layered.paint(&PaintProblem::new(&wanted).with_kernel(&kernel)).unwrap();
+    assert!(painting.layers.len() >= 3);
+    for layer in &painting.layers {
+        let of = |sprays: &mut dyn Iterator<Item = Spray>| {
+            let mut all: Vec<[u64; 3]> = sprays.map(|s| [s.x, s.y, s.volume].map(f64::to_bits)).collect();
+            all.sort_unstable();
+            all
+        };
+        let along = layer.strokes.iter().flat_map(|stroke| stroke.sprays.iter().copied());
+        assert_eq!(of(&mut { along }), of(&mut layer.sprays.iter().copied()));
+        assert!(3 * layer.strokes.len() <= layer.sprays.len(), "{} of {}", layer.strokes.len(), layer.sprays.len());
+        assert!(layer.strokes.iter().all(|stroke| !stroke.sprays.is_empty()));
     }
 }
 
