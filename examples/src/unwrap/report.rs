@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use uv_param::Atlas;
-use uv_param::atlas::{AtlasQuality, AtlasUpdate};
+use uv_param::atlas::{AtlasQuality, AtlasUpdate, ChartSettings};
 
 /// What `report.json` of `unwrap` holds. Flat, SI units in the names; every number is finite.
 #[derive(Debug, Clone, Serialize)]
@@ -23,6 +23,8 @@ pub struct UnwrapReport {
     pub seam_relative: f64,
     /// 99th percentile over the faces of the stretch `max(s1, 1 / s2)`.
     pub stretch_p99: f64,
+    /// Whether that is more than the usual bound, relaxed to save seams.
+    pub stretch_relaxed: bool,
     /// Largest stretch.
     pub stretch_max: f64,
     /// Area-weighted mean of the symmetric Dirichlet energy over its minimum: 1 is an isometry.
@@ -80,7 +82,13 @@ pub struct UnwrapReport {
 }
 
 impl UnwrapReport {
-    pub(super) fn new(atlas: &Atlas, update: Option<AtlasUpdate>, wall_s: f64, cpu_s: f64) -> Self {
+    pub(super) fn new(
+        atlas: &Atlas,
+        charts: &ChartSettings,
+        update: Option<AtlasUpdate>,
+        wall_s: f64,
+        cpu_s: f64,
+    ) -> Self {
         let (quality, repairs) = (AtlasQuality::of(atlas), atlas.report());
         let [page_width_px, page_height_px] = atlas.pages()[0];
         Self {
@@ -92,6 +100,7 @@ impl UnwrapReport {
             seam_length_m: quality.seam_length_m,
             seam_relative: quality.seam_relative,
             stretch_p99: quality.stretch_p99,
+            stretch_relaxed: charts.relaxed_stretch.is_some() && quality.stretch_p99 > charts.max_stretch,
             stretch_max: quality.stretch_max,
             symmetric_dirichlet: quality.symmetric_dirichlet,
             flips: quality.flips,

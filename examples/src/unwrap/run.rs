@@ -66,8 +66,17 @@ pub fn run(arguments: &Arguments) -> Result<(), UnwrapError> {
     }
     save(&atlas, &mesh, frame, &textures, folder)?;
     previous::write(&atlas.layout(), folder)?;
-    let report = UnwrapReport::new(&atlas, update, wall.elapsed().as_secs_f64(), cpu_s);
+    let report = UnwrapReport::new(&atlas, &charts, update, wall.elapsed().as_secs_f64(), cpu_s);
     save_figures(&report, folder)?;
+    if report.stretch_relaxed {
+        let usual = charts.max_stretch;
+        eprintln!(
+            "{}: lengths on the pages are off by {:.0} % in the mean: to save seams the bound {usual} of the stretch was relaxed; \
+             --max-stretch {usual} keeps it",
+            arguments.mesh.display(),
+            100.0 * report.length_error_mean
+        );
+    }
     stage.done(&format!("{} page(s) of {} x {} texels", report.pages, report.page_width_px, report.page_height_px));
     result!("{}", folder.join("atlas.obj").display());
     if report.flips + report.flips_f32 + report.overlaps > 0 {

@@ -1,5 +1,6 @@
 //! `unwrap` from outside: what it writes can be read back and is what it says.
 
+use std::f64::consts::{FRAC_PI_2, TAU};
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
@@ -28,6 +29,42 @@ fn write(scratch: &Scratch, name: &str, text: &str) -> PathBuf {
 
 fn figures(out: &Path) -> serde_json::Value {
     serde_json::from_str(&std::fs::read_to_string(out.join("report.json")).unwrap()).unwrap()
+}
+
+/// Half a sphere becomes one disk, which no bound but a relaxed one allows.
+#[test]
+fn a_relaxed_bound_is_said() {
+    let scratch = Scratch::new("unwrap-relaxed");
+    let (rings, sides) = (12, 24);
+    let mut lines = vec!["v 0 0 1".to_owned()];
+    for ring in 1..=rings {
+        for side in 0..sides {
+            let (polar, around) =
+                (FRAC_PI_2 * f64::from(ring) / f64::from(rings), TAU * f64::from(side) / f64::from(sides));
+            let [x, y, z] = [polar.sin() * around.cos(), polar.sin() * around.sin(), polar.cos()];
+            lines.push(format!("v {x} {y} {z}"));
+        }
+    }
+    let vertex = |ring: i32, side: i32| if ring == 0 { 1 } else { 2 + (ring - 1) * sides + side % sides };
+    for ring in 0..rings {
+        for side in 0..sides {
+            let [a, b] = [side, side + 1].map(|side| vertex(ring, side));
+            let [c, d] = [side, side + 1].map(|side| vertex(ring + 1, side));
+            lines.push(format!("f {a} {c} {d}"));
+            lines.extend((ring > 0).then(|| format!("f {a} {d} {b}")));
+        }
+    }
+    let mesh = write(&scratch, "half.obj", &lines.join("\n"));
+    let report = |more: &[&str]| {
+        let out = scratch.0.join("atlas");
+        run(&arguments(&mesh, &out, &[&["--texel", "0.02"], more].concat())).unwrap();
+        figures(&out)
+    };
+    let (relaxed, kept) = (report(&[]), report(&["--max-stretch", "1.15"]));
+    let stretch = |report: &serde_json::Value| report["stretch_p99"].as_f64().unwrap();
+    assert!(relaxed["charts"] == 1 && stretch(&relaxed) > 1.3, "{relaxed}");
+    assert!(kept["charts"].as_u64() > Some(1) && stretch(&kept) <= 1.15, "{kept}");
+    assert!(relaxed["stretch_relaxed"] == true && kept["stretch_relaxed"] == false);
 }
 
 #[test]
