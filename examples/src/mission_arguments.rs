@@ -208,6 +208,10 @@ enum PainterName {
     Fill,
     /// One spray after the other
     Pursuit,
+    /// The thesis' network: every spray with a spread, and so a distance, of its own
+    Thesis,
+    /// Rows as wide as the picture allows, from farther off, in the direction that crosses its lines: fewer metres
+    AdaptiveRows,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -235,6 +239,8 @@ impl From<PainterName> for PainterChoice {
             PainterName::Centrelines => Self::Centrelines,
             PainterName::Fill => Self::Fill,
             PainterName::Pursuit => Self::Pursuit,
+            PainterName::Thesis => Self::Thesis,
+            PainterName::AdaptiveRows => Self::AdaptiveRows,
         }
     }
 }

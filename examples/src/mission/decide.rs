@@ -1,8 +1,9 @@
 //! What to spray: the wanted picture into layers.
 
-use paint_net::painters::{AreaFill, Centrelines, LayerPlanning, Layered, MatchingPursuit};
-use paint_net::path::Stroke;
+use paint_net::painters::{AdaptiveRows, AreaFill, Centrelines, LayerPlanning, Layered, MatchingPursuit};
+use paint_net::path::{Stroke, StrokeSettings};
 use paint_net::problem::ink_ceiling;
+use paint_net::thesis::ThesisPainter;
 use paint_net::{Deconvolution, Feedback, Image, Observer, OnSurface, PaintProblem, Painter, Painting};
 
 use super::error::MissionError;
@@ -45,6 +46,10 @@ pub(super) fn decide(
         PainterChoice::Centrelines => Box::new(Centrelines::default()),
         PainterChoice::Fill => Box::new(AreaFill::default()),
         PainterChoice::Pursuit => Box::new(MatchingPursuit::default()),
+        PainterChoice::AdaptiveRows => Box::new(AdaptiveRows::default()),
+        PainterChoice::Thesis => {
+            Box::new(ThesisPainter { strokes: Some(StrokeSettings::default()), ..ThesisPainter::shipped()? })
+        }
     };
     let footprints = Footprints::new(surface, settings)?;
     let on_surface = |strokes: &[Stroke]| footprints.of(strokes);

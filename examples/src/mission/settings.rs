@@ -144,6 +144,10 @@ pub enum PainterChoice {
     Fill,
     /// One spray after the other.
     Pursuit,
+    /// The thesis' network: each spray with a spread, and so a distance, of its own.
+    Thesis,
+    /// Rows as wide as the picture allows, in the direction that crosses its lines.
+    AdaptiveRows,
 }
 
 impl Default for MissionSettings {

@@ -72,7 +72,7 @@ pub(super) struct Nozzle {
     /// Worker threads [default: all cores]; results do not depend on it
     #[arg(long, value_parser = worker_threads::parse)]
     pub(super) threads: Option<usize>,
-    /// Weights of the thesis' network: thesis.safetensors of a training with --preset thesis-paint
+    /// Weights of the thesis' network: thesis.safetensors of a training with --preset thesis-paint [default: those shipped]
     #[arg(long, value_name = "FILE")]
     pub(super) weights: Option<PathBuf>,
 }
@@ -92,11 +92,11 @@ pub(super) enum Command {
         #[command(flatten)]
         nozzle: Nozzle,
     },
-    /// Compares a trained thesis' network with other painters at its number of sprays
+    /// Compares the thesis' network with other painters at its number of sprays
     EqualSprays {
-        /// Weights: thesis.safetensors of a training with --preset thesis-paint
+        /// Weights: thesis.safetensors of a training with --preset thesis-paint [default: those shipped]
         #[arg(long, value_name = "FILE")]
-        weights: PathBuf,
+        weights: Option<PathBuf>,
         /// Folder or picture [default: five built-in textures of 128 x 128 pixels]
         pictures: Option<PathBuf>,
     },

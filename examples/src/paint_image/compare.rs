@@ -33,17 +33,14 @@ pub struct Row {
     pub cpu_ms: f64,
 }
 
-/// Paints every picture with every painter, the thesis' network among them if the job has one, in turn, `runs` times; writes `compare.md` and, with the wanted pictures and all
+/// Paints every picture with every painter, in turn, `runs` times; writes `compare.md` and, with the wanted pictures and all
 /// canvases side by side, `compare.png`.
 pub fn compare(job: &Job, pictures: &[Image], runs: usize, folder: &Path) -> Result<Vec<Row>, PaintImageError> {
     let wanted = |picture| vec![Tile { caption: "wanted".to_string(), picture: grey(picture) }];
     let mut sheet: Vec<Vec<Tile>> = pictures.iter().take(SHOWN).map(wanted).collect();
-    let mut jobs: Vec<Job> = PainterKind::WITHOUT_WEIGHTS.map(|painter| Job { painter, ..job.clone() }).to_vec();
-    if job.thesis.is_some() {
-        // As the thesis has it: in layers, each planned by itself; and the whole picture at once.
-        let layers = [None, Some(LayerPlanning::Sequential)];
-        jobs.extend(layers.map(|layers| Job { painter: PainterKind::Thesis, layers, ..job.clone() }));
-    }
+    let mut jobs: Vec<Job> = PainterKind::FOR_ANY.map(|painter| Job { painter, ..job.clone() }).to_vec();
+    // As the thesis has it: in layers, each planned by itself.
+    jobs.push(Job { painter: PainterKind::Thesis, layers: Some(LayerPlanning::Sequential), ..job.clone() });
     let mut rows = Vec::with_capacity(jobs.len());
     for job in jobs {
         let mut all: Vec<Figures> = Vec::with_capacity(pictures.len());

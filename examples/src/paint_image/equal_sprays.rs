@@ -22,10 +22,13 @@ pub struct EqualSprays {
     pub free_sprays_db: f64,
 }
 
-/// Paints every picture with the network of a file, and with the others at its number of sprays. All have one nozzle: σ = 2 px,
+/// Paints every picture with the network of a file, or the shipped one, and with the others at its number of sprays. All have one nozzle: σ = 2 px,
 /// cut at 4 σ; the thesis' network chooses its spreads itself.
-pub fn equal_sprays(weights: &Path, pictures: &[Image]) -> Result<Vec<EqualSprays>, PaintImageError> {
-    let thesis = ThesisPainter { network: read_network(weights)? };
+pub fn equal_sprays(weights: Option<&Path>, pictures: &[Image]) -> Result<Vec<EqualSprays>, PaintImageError> {
+    let thesis = match weights {
+        Some(file) => ThesisPainter::new(read_network(file)?),
+        None => ThesisPainter::shipped()?,
+    };
     let (feedback, free_sprays) = (Feedback::shipped()?, FreeSprays { sprays: 1_000_000, ..FreeSprays::default() });
     let kernel = SprayKernel::new(2.0, 4.0)?;
     pictures

@@ -34,14 +34,14 @@ pub enum PainterKind {
     Pursuit,
     /// Few sprays at free places, of free spreads.
     FreeSprays,
-    /// The thesis' network; needs weights.
+    /// The thesis' network.
     Thesis,
 }
 
 impl PainterKind {
-    /// Those for any picture that need no weights.
-    pub const WITHOUT_WEIGHTS: [Self; 5] =
-        [Self::Feedback, Self::ClosedLoop, Self::Deconvolution, Self::Pursuit, Self::FreeSprays];
+    /// Those for any picture.
+    pub const FOR_ANY: [Self; 6] =
+        [Self::Feedback, Self::ClosedLoop, Self::Deconvolution, Self::Pursuit, Self::FreeSprays, Self::Thesis];
 
     fn name(self) -> &'static str {
         match self {
@@ -75,7 +75,7 @@ pub struct Job {
     pub layers: Option<LayerPlanning>,
     /// Threads of the network.
     pub threads: usize,
-    /// The thesis' network, if there is one.
+    /// The thesis' network; `None`: the shipped one.
     pub thesis: Option<Network>,
 }
 
@@ -130,11 +130,10 @@ impl Job {
                 sprays: self.limits.max_sprays.unwrap_or(FreeSprays::default().sprays),
                 ..FreeSprays::default()
             }),
-            PainterKind::Thesis => {
-                let none =
-                    || PaintImageError::Settings("the painter thesis needs a network: give --weights".to_string());
-                Box::new(ThesisPainter { network: self.thesis.clone().ok_or_else(none)? })
-            }
+            PainterKind::Thesis => Box::new(match &self.thesis {
+                Some(network) => ThesisPainter::new(network.clone()),
+                None => ThesisPainter::shipped()?,
+            }),
         };
         Ok(match self.layers {
             Some(planning) => Box::new(Layered { planning, ..Layered::new(painter) }),

@@ -51,7 +51,10 @@ pub fn run(arguments: &Arguments) -> Result<(), PaintImageError> {
             Ok(())
         }
         Some(Command::EqualSprays { weights, pictures }) => {
-            print!("{}", print_equal_sprays(&equal_sprays(weights, &pictures_or_textures(pictures.clone())?)?));
+            print!(
+                "{}",
+                print_equal_sprays(&equal_sprays(weights.as_deref(), &pictures_or_textures(pictures.clone())?)?)
+            );
             Ok(())
         }
         Some(Command::Train(training)) => run_training(training.clone()),

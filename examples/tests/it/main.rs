@@ -39,6 +39,7 @@ mod odometry_prior;
 #[cfg(all(feature = "robot", unix))]
 mod on_board;
 mod onboard;
+mod own_distances;
 #[cfg(feature = "paint-image")]
 mod paint_image;
 #[cfg(all(feature = "robot", unix))]

@@ -49,6 +49,11 @@ impl Network {
         Ok(Self { architecture, parameters, gated: true })
     }
 
+    /// The weights that come with the crate, for [`Architecture::PAINT`]: seed and schedule are in the file's notes, the command in the book.
+    pub fn shipped() -> Result<Self, Error> {
+        Self::from_safetensors(include_bytes!("../../weights/thesis.safetensors"))
+    }
+
     /// From the bytes of a safetensors file.
     pub fn from_safetensors(bytes: &[u8]) -> Result<Self, Error> {
         Self::from_tensors(&safetensors::read(bytes)?.0)

@@ -7,6 +7,7 @@ use crate::image::Image;
 use crate::model::{Spray, SprayKernel};
 use crate::painter::{Observer, Painter};
 use crate::painting::Painting;
+use crate::path::{Stroke, StrokeSettings, in_order};
 use crate::problem::PaintProblem;
 
 /// The thesis' painter: pictures larger than its network are painted tile by tile.
@@ -17,8 +18,32 @@ use crate::problem::PaintProblem;
 /// spray's own spread), of the problem's weights nothing. Deterministic: the network paints its mean.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ThesisPainter {
-    /// The weights; there are none in the crate, as they are too large.
+    /// The weights.
     pub network: Network,
+    /// How the sprays of a tile are joined to the strokes of [`Painting::strokes`], in the network's order. Default `None`: every spray is as
+    /// the network sets it, and there are no strokes.
+    pub strokes: Option<StrokeSettings>,
+}
+
+impl ThesisPainter {
+    /// A painter with a network of one's own.
+    pub fn new(network: Network) -> Self {
+        Self { network, strokes: None }
+    }
+
+    /// A painter with the weights that come with the crate.
+    pub fn shipped() -> Result<Self, Error> {
+        Network::shipped().map(Self::new)
+    }
+
+    /// The sprays of a tile, in one piece where nobody asks for strokes.
+    fn joined(&self, sprays: Vec<Spray>, max_volume: f64) -> Result<Vec<Stroke>, Error> {
+        let Some(settings) = &self.strokes else { return Ok(vec![Stroke { sprays }]) };
+        let mut strokes = in_order(&sprays, settings)?;
+        let all = strokes.iter_mut().flat_map(|stroke| &mut stroke.sprays);
+        all.for_each(|spray| spray.volume = spray.volume.min(max_volume));
+        Ok(strokes)
+    }
 }
 
 impl Painter for ThesisPainter {
@@ -36,7 +61,7 @@ impl Painter for ThesisPainter {
         let tiles = |extent: usize| extent.div_ceil(side);
         let (columns, rows) = (tiles(wanted.width()), tiles(wanted.height()));
         let mut canvas = initial.clone();
-        let mut sprays = Vec::new();
+        let mut strokes = Vec::new();
         for (round, (right, down)) in [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().enumerate() {
             observer.progress(round as f64 / 4.0);
             let corners =
@@ -45,16 +70,19 @@ impl Painter for ThesisPainter {
             let pictures: Vec<_> =
                 corners.iter().map(|&at| (part(&wanted, at, side), Some(part(&canvas, at, side)))).collect();
             for (corner, steps) in corners.iter().zip(self.network.paint(&pictures)?) {
-                sprays.extend(steps.iter().filter_map(|step| spray(step, *corner, problem)));
+                let sprays: Vec<Spray> = steps.iter().filter_map(|step| spray(step, *corner, problem)).collect();
+                strokes.extend(self.joined(sprays, limits.max_volume)?);
             }
-            canvas = painted(&initial, &sprays, kernel);
+            canvas = painted(&initial, &strokes, kernel);
         }
-        if limits.max_sprays.is_some_and(|most| most < sprays.len()) {
-            keep_largest(&mut sprays, limits.max_sprays.unwrap_or_default());
-            canvas = painted(&initial, &sprays, kernel);
+        if let Some(most) = limits.max_sprays {
+            keep_largest(&mut strokes, most);
+            canvas = painted(&initial, &strokes, kernel);
         }
         observer.progress(1.0);
-        Ok(Painting::new(sprays, canvas, saturation))
+        let sprays = strokes.iter().flat_map(|stroke| stroke.sprays.iter().copied()).collect();
+        let strokes = if self.strokes.is_some() { strokes } else { Vec::new() };
+        Ok(Painting { strokes, ..Painting::new(sprays, canvas, saturation) })
     }
 }
 
@@ -84,17 +112,22 @@ fn spray(step: &Step, (left, top): (usize, usize), problem: &PaintProblem) -> Op
 }
 
 /// The earliest of equal volumes stay; the order remains.
-fn keep_largest(sprays: &mut Vec<Spray>, most: usize) {
-    let mut order: Vec<usize> = (0..sprays.len()).collect();
-    order.sort_by(|&a, &b| sprays[b].volume.total_cmp(&sprays[a].volume));
-    order.truncate(most);
-    order.sort_unstable();
-    *sprays = order.into_iter().map(|k| sprays[k]).collect();
+fn keep_largest(strokes: &mut Vec<Stroke>, most: usize) {
+    let volumes: Vec<f64> = strokes.iter().flat_map(|stroke| &stroke.sprays).map(|spray| spray.volume).collect();
+    let mut order: Vec<usize> = (0..volumes.len()).collect();
+    order.sort_by(|&a, &b| volumes[b].total_cmp(&volumes[a]));
+    let mut kept = vec![false; volumes.len()];
+    order.iter().take(most).for_each(|&k| kept[k] = true);
+    let mut kept = kept.into_iter();
+    for stroke in strokes.iter_mut() {
+        stroke.sprays.retain(|_| kept.next() == Some(true));
+    }
+    strokes.retain(|stroke| !stroke.sprays.is_empty());
 }
 
-fn painted(initial: &Image, sprays: &[Spray], kernel: &SprayKernel) -> Image {
+fn painted(initial: &Image, strokes: &[Stroke], kernel: &SprayKernel) -> Image {
     let mut canvas = initial.clone();
-    for spray in sprays {
+    for spray in strokes.iter().flat_map(|stroke| &stroke.sprays) {
         kernel.stamp(spray, &mut canvas);
     }
     canvas

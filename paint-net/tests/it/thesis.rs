@@ -1,8 +1,10 @@
 //! The thesis' network as its users see it: one seed, one network; checkpoints; what it paints; what it refuses.
 
+use paint_net::path::{StrokeSettings, in_order};
+use paint_net::procedural::Texture;
 use paint_net::thesis::{Architecture, Network, Objective, ThesisPainter};
 use paint_net::train::{ThesisSettings, ThesisTrainer, thesis_patch};
-use paint_net::{Error, Image, Limits, PaintProblem, Painter, Painting, SprayKernel, metrics};
+use paint_net::{Error, Image, Limits, PaintProblem, Painter, Painting, Spray, SprayKernel, metrics};
 
 const SMALL: Architecture =
     Architecture { side: 12, steps: 10, latent: 4, hidden: 12, read: 3, radius: 4.0, stop: 4.0, paint: 8 };
@@ -24,7 +26,7 @@ fn trained(mut trainer: ThesisTrainer, steps: usize) -> ThesisTrainer {
 
 fn paint(network: Network, problem: &PaintProblem, limits: &Limits) -> Painting {
     let kernel = SprayKernel::new(2.0, 4.0).unwrap();
-    ThesisPainter { network }.paint(&problem.with_kernel(&kernel).with_limits(limits)).unwrap()
+    ThesisPainter::new(network).paint(&problem.with_kernel(&kernel).with_limits(limits)).unwrap()
 }
 
 #[test]
@@ -125,6 +127,47 @@ fn the_painter_paints_what_its_network_says_and_obeys_limits() {
     let left: Vec<bool> = (0..29 * 17).map(|k| k % 29 < 10).collect();
     let masked = paint(network, &PaintProblem { paintable: Some(&left), ..problem }, &Limits::default());
     assert!(masked.sprays.iter().all(|s| s.x < 9.5 + 1e-9));
+}
+
+/// Joined sprays keep their paint, `2 π σ² v` each, and lie in strokes; what the canvas shows is what they leave.
+#[test]
+fn strokes_are_made_of_the_sprays_of_a_tile_in_their_order() {
+    let network = trained(ThesisTrainer::new(settings()).unwrap(), 20).network();
+    let wanted = Image::from_fn(29, 17, |x, y| 0.6 * f64::from(u8::from((x / 5 + y / 4) % 2 == 0)));
+    let kernel = SprayKernel::new(2.0, 4.0).unwrap();
+    let problem = PaintProblem::new(&wanted).with_kernel(&kernel);
+    let one_tile = Image::from_fn(12, 12, |x, y| wanted.at(x, y));
+    let tile = PaintProblem::new(&one_tile).with_kernel(&kernel);
+    let free = ThesisPainter::new(network.clone());
+    let joined = ThesisPainter { strokes: Some(StrokeSettings::default()), ..free.clone() };
+    // Of one tile: what neighbours leave in the canvas of the next tile differs a little.
+    let (alone, strokes) = (free.paint(&tile).unwrap(), joined.paint(&tile).unwrap());
+    assert!(alone.strokes.is_empty() && !strokes.strokes.is_empty());
+    let paint = |painting: &Painting| painting.sprays.iter().map(|s| s.volume * s.sigma * s.sigma).sum::<f64>();
+    assert!((paint(&strokes) / paint(&alone) - 1.0).abs() < 1e-12 && strokes.sprays.len() <= alone.sprays.len());
+    assert_eq!(in_order(&alone.sprays, &StrokeSettings::default()).unwrap(), strokes.strokes);
+
+    for max_sprays in [None, Some(2)] {
+        let limits = Limits { max_sprays, ..Limits::default() };
+        let painting = joined.paint(&problem.with_limits(&limits)).unwrap();
+        let along: Vec<Spray> = painting.strokes.iter().flat_map(|stroke| stroke.sprays.clone()).collect();
+        assert!(along == painting.sprays && max_sprays.is_none_or(|most| most == along.len()));
+        let rendered = Painting::render(&problem, along);
+        assert!(metrics::psnr(&painting.ink, &rendered.ink, None).unwrap() > 150.0);
+    }
+}
+
+/// What is shipped is a network for patches: it paints tiles that it has never seen.
+#[test]
+fn the_shipped_network_paints() {
+    let painter = ThesisPainter::shipped().unwrap();
+    assert_eq!(painter.network.architecture(), Architecture::PAINT);
+    let wanted = Texture::Worley.image(77, 64);
+    let kernel = SprayKernel::new(2.0, 4.0).unwrap();
+    let painting = painter.paint(&PaintProblem::new(&wanted).with_kernel(&kernel)).unwrap();
+    let mean = wanted.data().iter().sum::<f64>() / wanted.data().len() as f64;
+    let [psnr, flat] = [painting.ink, wanted.map(|_| mean)].map(|ink| metrics::psnr(&ink, &wanted, None).unwrap());
+    assert!(psnr > flat + 3.0, "{psnr} dB, one grey {flat} dB");
 }
 
 #[test]
