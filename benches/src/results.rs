@@ -11,6 +11,7 @@ pub mod papers;
 pub mod peers;
 pub mod planners;
 pub mod table;
+pub mod thesis_network;
 pub mod time_allocation;
 
 use std::error::Error;
@@ -24,13 +25,14 @@ pub type Rerun = fn(Extent, &Path) -> Result<Vec<Table>, Box<dyn Error>>;
 
 /// Reruns in the order of the papers, each with its name; what it needs on the way lies in the folder that it is given. Its first table is
 /// shown as such, the others are drawn by `docs/plots/plots.py`.
-pub const PARTS: [(&str, Rerun); 9] = [
+pub const PARTS: [(&str, Rerun); 10] = [
     ("papers", |_, _| Ok(vec![papers::table()])),
     ("flown_baselines", |extent, _| baselines::tables(extent)),
     ("paper_ii_ablations", |_, _| ablations::tables()),
     ("planners", |extent, _| planners::tables(extent)),
     ("time_allocation", |_, _| time_allocation::tables()),
     ("latency", latency::tables),
+    ("thesis_network", |extent, _| thesis_network::tables(extent)),
     ("handheld", handheld::tables),
     ("overdose", overdose::tables),
     ("peers", peers::tables),

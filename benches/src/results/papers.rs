@@ -5,7 +5,6 @@ use super::table::Table;
 /// What is not repeated, and why.
 const PHOTO: &str = "no row: a photograph of the robot or its work";
 const DESIGN: &str = "no row: a drawing of the system; the chapters have their own";
-const NETWORK: &str = "no row yet: needs the network after all of its epochs";
 
 /// The table, in the order of the papers.
 pub fn table() -> Table {
@@ -67,11 +66,12 @@ const PAPERS: &[(&str, Parts)] = &[
         &[
             ["Figs. 8.1; 8.2", DESIGN],
             ["Eq. (8.1)", "[nozzle of a texel](uv-param.md#equation-to-item)"],
-            ["Fig. 8.3", NETWORK],
-            ["Fig. 8.4", NETWORK],
+            ["Fig. 8.3", "[in layers](thesis-network.md#comparison-with-the-feedback-network)"],
+            ["Fig. 8.4", "[without a stop](results.md#thesis-network)"],
             ["Fig. 8.5; Table 8.1; Algorithm 3", "[the network](thesis-network.md)"],
-            ["Figs. 8.6; 8.8; 8.9", NETWORK],
-            ["Fig. 8.7", "[short trainings](results.md#thesis-network)"],
+            ["Figs. 8.6; 8.8", "[films](thesis-network.md#training)"],
+            ["Fig. 8.7", "[trainings; volumes](results.md#thesis-network)"],
+            ["Fig. 8.9", "[on a wall](thesis-network.md#in-missions)"],
         ],
     ),
     (
