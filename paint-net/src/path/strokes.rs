@@ -35,10 +35,6 @@ impl Default for StrokeSettings {
 impl StrokeSettings {
     fn check(&self, sprays: &[Spray]) -> Result<(), Error> {
         require("max_gap", self.max_gap, self.max_gap > 0.0, "it must be positive")?;
-        let (least, most) = (self.min_gap, self.max_gap);
-        require("min_gap", least, (0.0..most).contains(&least), "it must be 0 or more, and less than max_gap")?;
-        let turn = self.max_turn;
-        require("max_turn", turn, (0.0..=PI).contains(&turn), "it must lie in [0, π]")?;
         let broken = |s: &Spray| ![s.x, s.y, s.volume, s.sigma].iter().all(|v| v.is_finite());
         let Some(x) = sprays.iter().position(broken) else { return Ok(()) };
         let (what, range) = ("spray list", "finite x, y, volume and sigma");
@@ -69,6 +65,9 @@ pub fn boustrophedon(sprays: &[Spray], settings: &StrokeSettings) -> Result<Vec<
 /// paint, the centre and the second moment of both, each the paint `2 π σ² v` of a round spot.
 pub fn in_order(sprays: &[Spray], settings: &StrokeSettings) -> Result<Vec<Stroke>, Error> {
     settings.check(sprays)?;
+    let StrokeSettings { max_gap, min_gap, max_turn } = *settings;
+    require("min_gap", min_gap, (0.0..max_gap).contains(&min_gap), "it must be 0 or more, and less than max_gap")?;
+    require("max_turn", max_turn, (0.0..=PI).contains(&max_turn), "it must lie in [0, π]")?;
     let mut strokes: Vec<Stroke> = Vec::new();
     for spray in sprays {
         let Some(stroke) = strokes.last_mut() else {
@@ -77,9 +76,9 @@ pub fn in_order(sprays: &[Spray], settings: &StrokeSettings) -> Result<Vec<Strok
         };
         let last = stroke.sprays.len() - 1;
         let way = distance(&stroke.sprays[last], spray);
-        if way < settings.min_gap {
+        if way < min_gap {
             stroke.sprays[last] = as_one(&stroke.sprays[last], spray);
-        } else if way > settings.max_gap || turn(&stroke.sprays, spray) > settings.max_turn {
+        } else if way > max_gap || turn(&stroke.sprays, spray) > max_turn {
             strokes.push(Stroke { sprays: vec![*spray] });
         } else {
             stroke.sprays.push(*spray);
@@ -170,6 +169,8 @@ mod tests {
     fn gaps_that_contradict_each_other_and_sprays_that_are_none_are_refused() {
         let settings = StrokeSettings { max_gap: 2.0, min_gap: 2.0, ..StrokeSettings::default() };
         assert!(in_order(&[], &settings).unwrap_err().to_string().contains("min_gap"));
+        // Rows join nothing and turn nowhere.
+        assert!(boustrophedon(&[], &settings).is_ok());
         let broken = [spray(0.0, 0.0, 0.1, 1.0), spray(1.0, 0.0, 0.1, f64::NAN)];
         assert!(in_order(&broken, &StrokeSettings::default()).unwrap_err().to_string().contains("(1, 0)"));
     }
