@@ -3,6 +3,7 @@
 mod coats;
 mod coats_output;
 mod colour_doses;
+mod colour_rows;
 mod darker_than_wanted;
 mod decide;
 mod decide_colours;

@@ -77,7 +77,7 @@ pub struct MissionArguments {
     /// Fly along the painted surface, look at it, and paint again what is missing
     #[arg(long)]
     look: bool,
-    /// Who decides the sprays [default: feedback; fill with --fill]
+    /// Who decides the sprays; with --palette all paints together, adaptive-rows if wanted [default: feedback; fill with --fill]
     #[arg(long)]
     painter: Option<PainterName>,
     /// Who plans the flights [default: optimal]
@@ -264,8 +264,9 @@ impl MissionArguments {
         mission.palette = self.colours.palette.clone().or(mission.palette.take());
         mission.available = self.colours.available.clone().or(mission.available.take());
         mission.wall = self.colours.wall.or(mission.wall);
-        if mission.palette.is_some() && self.painter.is_some() {
-            return Err("--painter: the paints of a palette are decided together: leave it out".into());
+        let alone = self.painter.is_some_and(|painter| !matches!(painter, PainterName::AdaptiveRows));
+        if mission.palette.is_some() && alone {
+            return Err("--painter: paints of a palette are decided together: adaptive-rows, or leave it out".into());
         }
         let settings = &mut mission.settings;
         settings.seed = self.seed.unwrap_or(settings.seed);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use paint_sim::colour::{BANDS, encode_srgb8, spectrum_linear_srgb};
 use paint_sim::paint::PIGMENTS;
 use paint_sim::{Paint, Substrate, km};
-use paintcopter::mission::{Coats, CoatsFigures, save_coats};
+use paintcopter::mission::{Coats, CoatsFigures, PainterChoice, save_coats};
 use paintcopter::mission_file::MissionFile;
 use paintcopter::paint_set::read_paints;
 use paintcopter::palette_choice::PaletteChoice;
@@ -75,6 +75,22 @@ fn fly(mission: &MissionFile, folder: &Path) -> CoatsFigures {
     mission.begin_run(folder, "test").unwrap();
     let coats = Coats::run(mission.decide_coats(folder).unwrap()).unwrap();
     save_coats(&coats, folder).unwrap()
+}
+
+/// The picture of films is smooth: wide rows need fewer metres for it, and each paint has rows of its own.
+#[test]
+fn wide_rows_paint_a_smooth_picture_in_less_time_as_well() {
+    let s = Scratch::new("wide_rows");
+    let mut mission = mission(&s, two_paints(&s).to_str().unwrap());
+    mission.settings.threads = 2;
+    let equal = fly(&mission, &s.0.join("equal"));
+    mission.settings.painter = PainterChoice::AdaptiveRows;
+    let wide = fly(&mission, &s.0.join("wide"));
+    let [equal_picture, wide_picture] = [&equal, &wide].map(|found| found.picture.clone().unwrap());
+    let said = format!("{} s, {equal_picture:?}; {} s, {wide_picture:?}", equal.flight_time_s, wide.flight_time_s);
+    assert!(wide.flight_time_s < 0.8 * equal.flight_time_s, "{said}");
+    assert!(wide_picture.ciede2000_in_gamut_mean < equal_picture.ciede2000_in_gamut_mean + 0.2, "{said}");
+    assert_eq!((wide.paints.len(), wide.collisions), (2, 0));
 }
 
 /// What films have made, films can make again: the picture lies inside the gamut, and what is flown is near it.

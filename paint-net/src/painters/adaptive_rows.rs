@@ -56,12 +56,8 @@ impl Painter for AdaptiveRows {
     }
 
     fn paint_observed(&self, problem: &PaintProblem, observer: &mut dyn Observer) -> Result<Painting, Error> {
-        self.check()?;
-        problem.check()?;
-        let mut part = PartialProgress { observer, from: 0.0, share: TRIALS };
-        let trials = trials(&self.widths, self.iterations.div_ceil(2), problem, &mut part)?;
-        let prices = Prices { tolerance: self.tolerance, turn: self.turn };
-        let rows = Blocks::new(problem, &trials, prices).rows(problem, &trials);
+        let rows = self.rows(problem, &mut PartialProgress { observer, from: 0.0, share: TRIALS })?;
+        let rows: Vec<Vec<Spray>> = rows.into_iter().map(|row| row.sprays).collect();
         let placed = PlacedSprays::along(problem, &rows);
         let stop = StoppingRule { iterations: self.iterations, relative_decrease: CONVERGED };
         let upper_bounds = placed.upper_bounds(problem.limits.max_volume);
@@ -81,6 +77,20 @@ impl Painter for AdaptiveRows {
 }
 
 impl AdaptiveRows {
+    /// The rows alone, each spray with the volume that its kind of rows would have there by itself: for paints whose volumes are fitted together
+    /// with those of others.
+    ///
+    /// # Errors
+    /// Settings or a problem out of range.
+    pub fn rows(&self, problem: &PaintProblem, observer: &mut dyn Observer) -> Result<Vec<Stroke>, Error> {
+        self.check()?;
+        problem.check()?;
+        let trials = trials(&self.widths, self.iterations.div_ceil(2), problem, observer)?;
+        let prices = Prices { tolerance: self.tolerance, turn: self.turn };
+        let rows = Blocks::new(problem, &trials, prices).rows(problem, &trials);
+        Ok(rows.into_iter().map(|sprays| Stroke { sprays }).collect())
+    }
+
     fn check(&self) -> Result<(), Error> {
         let Self { tolerance, turn, .. } = *self;
         require("widths", self.widths.len() as f64, (1..=16).contains(&self.widths.len()), "there must be 1 to 16")?;
