@@ -5,18 +5,13 @@ use std::error::Error;
 use paint_net::Image;
 use paint_net::procedural::Texture;
 use paint_net::thesis::Architecture;
-use paint_net::train::thesis_patch;
-use paintcopter::paint_image::{EqualSprays, equal_sprays};
+use paintcopter::paint_image::{EqualSprays, equal_sprays, held_out_patch, texture_picture};
 
 use super::Extent;
 use super::table::{Table, number};
 
-/// Patches that its training never reaches, as `paint-image train` holds them out.
+/// Seed of its training.
 const SEED: u64 = 1;
-const FIRST_HELD: u64 = 1 << 40;
-/// Side and seed of the textures, as of `paint-image equal-sprays`.
-const SIDE: usize = 128;
-const TEXTURE_SEED: u64 = 1000;
 /// What an empty picture that stays empty counts, dB.
 const MOST: f64 = 60.0;
 
@@ -29,9 +24,9 @@ pub fn tables(extent: Extent) -> Result<Vec<Table>, Box<dyn Error>> {
         Extent::Whole => (200, &Texture::ALL[..]),
         Extent::Quick => (5, &Texture::ALL[..1]),
     };
-    let held = (0..count).map(|k| thesis_patch(SEED, FIRST_HELD + k, &Architecture::PAINT));
+    let held = (0..count).map(|k| held_out_patch(SEED, k, &Architecture::PAINT));
     let patches = equal_sprays(None, &held.collect::<Result<Vec<Image>, _>>()?)?;
-    let pictures: Vec<Image> = textures.iter().map(|texture| texture.image(TEXTURE_SEED, SIDE)).collect();
+    let pictures: Vec<Image> = textures.iter().copied().map(texture_picture).collect();
     let painted = equal_sprays(None, &pictures)?;
 
     let head = ["pictures", "sprays", "thesis network; dB", "feedback network; dB", "free sprays; dB"];

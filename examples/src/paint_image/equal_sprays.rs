@@ -3,11 +3,16 @@
 use std::path::Path;
 
 use paint_net::painters::FreeSprays;
+use paint_net::procedural::Texture;
 use paint_net::thesis::ThesisPainter;
 use paint_net::{Feedback, Image, Limits, PaintProblem, Painter, SprayKernel, metrics};
 
 use super::error::PaintImageError;
 use super::files::read_network;
+
+/// Side of the built-in textures, pixels, and their seed.
+const SIDE: usize = 128;
+const TEXTURE_SEED: u64 = 1000;
 
 /// Two painters beside the thesis' network, on one picture, none with more sprays than that.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,6 +25,11 @@ pub struct EqualSprays {
     pub feedback_db: f64,
     /// PSNR of free sprays, dB.
     pub free_sprays_db: f64,
+}
+
+/// A built-in texture, as the painters are compared on it.
+pub fn texture_picture(texture: Texture) -> Image {
+    texture.image(TEXTURE_SEED, SIDE)
 }
 
 /// Paints every picture with the network of a file, or the shipped one, and with the others at its number of sprays. All have one nozzle: σ = 2 px,

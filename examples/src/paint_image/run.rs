@@ -12,7 +12,7 @@ use paint_net::{Image, Limits, SprayKernel};
 use super::arguments::{Arguments, Command, Nozzle, Preset, ScanOrderName, SharingName, Training};
 use super::colour::{Glazes, paint_colours, read_picture, save_colours};
 use super::compare::{compare, table};
-use super::equal_sprays::{equal_sprays, print_equal_sprays};
+use super::equal_sprays::{equal_sprays, print_equal_sprays, texture_picture};
 use super::error::PaintImageError;
 use super::files::{check_memory, pictures_in, read_network};
 use super::ink::read_ink;
@@ -83,7 +83,7 @@ fn only_for_one_paint(painter: Option<PainterKind>, nozzle: &Nozzle) -> Result<(
 fn pictures_or_textures(pictures: Option<PathBuf>) -> Result<Vec<Image>, PaintImageError> {
     Ok(match pictures {
         Some(path) => pictures_in(&path)?.iter().map(|p| read_ink(p)).collect::<Result<_, _>>()?,
-        None => Texture::ALL.map(|t| t.image(1000, 128)).to_vec(),
+        None => Texture::ALL.map(texture_picture).to_vec(),
     })
 }
 

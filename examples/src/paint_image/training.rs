@@ -7,4 +7,4 @@ mod rollout;
 mod thesis;
 
 pub use painter::{TrainingRun, train_painter};
-pub use thesis::{ThesisTrainingRun, TrainingImages, train_thesis};
+pub use thesis::{ThesisTrainingRun, TrainingImages, held_out_patch, train_thesis};

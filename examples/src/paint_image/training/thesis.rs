@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use paint_net::procedural::lattice;
-use paint_net::thesis::Network;
+use paint_net::thesis::{Architecture, Network};
 use paint_net::train::{ThesisLoss, ThesisSettings, ThesisTrainer, thesis_patch, thesis_patch_of};
 use paint_net::{Error, Image};
 use serde::Serialize;
@@ -182,10 +182,17 @@ pub fn train_thesis(run: &ThesisTrainingRun, folder: &Path) -> Result<(), PaintI
     Ok(())
 }
 
+/// Procedural patch `number` of those that a training with this seed holds out.
+///
+/// # Errors
+/// An architecture that has no patches.
+pub fn held_out_patch(seed: u64, number: u64, architecture: &Architecture) -> Result<Image, Error> {
+    thesis_patch(seed, FIRST_HELD + number, architecture)
+}
+
 /// Pictures to train on, and held-out ones to test.
 fn pictures(run: &ThesisTrainingRun) -> Result<(Samples, Vec<Image>), PaintImageError> {
     let ThesisSettings { seed, architecture, .. } = &run.settings;
-    let numbers = (0..HELD).map(|k| FIRST_HELD + k);
     match &run.pictures {
         TrainingImages::Digits(path) => {
             let mut all = digits::read(path, architecture.side)?;
@@ -196,7 +203,7 @@ fn pictures(run: &ThesisTrainingRun) -> Result<(Samples, Vec<Image>), PaintImage
             Ok((Samples::Digits(all), held))
         }
         TrainingImages::Patches => {
-            let held = numbers.map(|n| thesis_patch(*seed, n, architecture));
+            let held = (0..HELD).map(|k| held_out_patch(*seed, k, architecture));
             Ok((Samples::Patches, held.collect::<Result<_, _>>()?))
         }
         TrainingImages::Photographs(folder) => {
@@ -210,7 +217,7 @@ fn pictures(run: &ThesisTrainingRun) -> Result<(Samples, Vec<Image>), PaintImage
             for (k, file) in files.iter().enumerate() {
                 if k % TESTED == 0 { &mut tested } else { &mut trained }.push(read_small_ink(file, shortest)?);
             }
-            let held = numbers.map(|n| thesis_patch_of(&tested, *seed, n, architecture));
+            let held = (0..HELD).map(|k| thesis_patch_of(&tested, *seed, FIRST_HELD + k, architecture));
             Ok((Samples::Photographs(trained), held.collect::<Result<_, _>>()?))
         }
     }
