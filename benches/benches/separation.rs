@@ -47,6 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         min_volume: 0.0,
         max_volume: 4.0,
         paint_weight: 0.3,
+        prices: &[],
         iterations: 80,
         tolerance: 3e-4,
         threads: 1,

@@ -12,6 +12,7 @@ mod paint_choice;
 mod palette;
 mod pixel_fit;
 mod separation;
+mod sparse_colour_fit;
 mod texel_separation;
 mod unmix;
 
@@ -23,4 +24,5 @@ pub use mixing_model::{MOST_PAINTS, MixingModel};
 pub use paint_choice::{best_order, choose_paints};
 pub use palette::{MAX_PAINTS, Paint, Palette};
 pub use separation::{ColourPainting, ColourSeparation};
+pub use sparse_colour_fit::SparseColourFit;
 pub use texel_separation::{Separated, TexelSeparation};

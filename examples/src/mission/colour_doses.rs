@@ -52,6 +52,7 @@ pub(super) fn correct_colours(
         min_volume: LEAST_VOLUME,
         max_volume: settings.limits.max_volume,
         paint_weight: PAINT_WEIGHT,
+        prices: &[],
         iterations: ITERATIONS,
         tolerance: TOLERANCE,
         threads: settings.threads,

@@ -1,7 +1,7 @@
 //! Rows of sprays for the paints of a picture.
 
 use paint_net::model::{MonotoneCurve, Saturation};
-use paint_net::painters::AdaptiveRows;
+use paint_net::painters::{AdaptiveRows, SurfaceFootprint};
 use paint_net::path::{Stroke, StrokeSettings, in_order};
 use paint_net::{Image, PaintProblem, Spray};
 use paint_sim::Substrate;
@@ -9,6 +9,7 @@ use paint_sim::colour::BANDS;
 
 use super::decide;
 use super::error::MissionError;
+use super::footprints::Footprints;
 use super::nozzle::kernel;
 use super::painting_task::PaintingTask;
 use super::picture_task::PictureTask;
@@ -24,8 +25,59 @@ const KNOTS: u32 = 64;
 /// Turn at which a row ends and another begins, radians.
 const BESIDE: f64 = 0.1;
 
+/// The rows over which the nozzle may spray one paint.
+pub(super) struct PaintRows {
+    rows: Vec<Stroke>,
+    /// What a unit of each spray leaves on the texels of the film.
+    pub(super) footprints: Vec<SurfaceFootprint>,
+    /// Whether the rows are flown as they are, or anew by what is left of their sprays.
+    own_strokes: bool,
+}
+
+impl PaintRows {
+    /// Equal rows, those of the settings.
+    pub(super) fn equal(task: &PaintingTask) -> Result<Self, MissionError> {
+        let rows = rows_of_cells(task);
+        Ok(Self { footprints: on_texels(task, &rows)?, rows, own_strokes: false })
+    }
+
+    /// Rows as wide as the part of the picture allows that this paint shows.
+    pub(super) fn adaptive(
+        task: &PaintingTask,
+        picture: &PictureTask,
+        paint: usize,
+        progress: &dyn Fn(f64),
+    ) -> Result<Self, MissionError> {
+        let rows = adaptive_rows(task, picture, paint, progress)?;
+        Ok(Self { footprints: on_texels(task, &rows)?, rows, own_strokes: true })
+    }
+
+    pub(super) fn rows(&self) -> &[Stroke] {
+        &self.rows
+    }
+
+    pub(super) fn sprays(&self) -> impl Iterator<Item = &Spray> {
+        self.rows.iter().flat_map(|row| &row.sprays)
+    }
+
+    /// The strokes of what is left of the sprays; none where they are joined by their places.
+    pub(super) fn strokes(&self, sprays: &[Spray]) -> Result<Vec<Stroke>, paint_net::Error> {
+        if !self.own_strokes {
+            return Ok(Vec::new());
+        }
+        in_order(sprays, &StrokeSettings { min_gap: 0.0, max_turn: BESIDE, ..StrokeSettings::default() })
+    }
+}
+
+/// What sprays leave on the texels of the film.
+fn on_texels(task: &PaintingTask, rows: &[Stroke]) -> Result<Vec<SurfaceFootprint>, MissionError> {
+    let footprints = Footprints::new(&task.surface, &task.settings)?;
+    let found = footprints.on_texels(rows);
+    footprints.checked(Ok(found))
+}
+
 /// The cells over which the nozzle may spray, as runs along the rows.
-pub(super) fn rows_of_cells(task: &PaintingTask) -> Vec<Stroke> {
+fn rows_of_cells(task: &PaintingTask) -> Vec<Stroke> {
     let (width, height) = (task.surface.width(), task.surface.height());
     let MissionSettings { limits, spot, texel, .. } = &task.settings;
     let first = |stride: usize| (stride - 1) / 2;
@@ -42,8 +94,7 @@ pub(super) fn rows_of_cells(task: &PaintingTask) -> Vec<Stroke> {
     strokes
 }
 
-/// Rows for one paint, each as wide as the part of the picture allows that this paint shows.
-pub(super) fn adaptive_rows(
+fn adaptive_rows(
     task: &PaintingTask,
     picture: &PictureTask,
     paint: usize,
@@ -91,11 +142,6 @@ fn visible(below: &[Appearance]) -> Result<Saturation, paint_net::Error> {
     let scale = 1.0 / farthest.max(1.0);
     let knots: Vec<(f64, f64)> = knots.into_iter().map(|(depth, shown)| (depth, scale * shown)).collect();
     Ok(Saturation::Curve(MonotoneCurve::new(&knots)?))
-}
-
-/// The rows as strokes, cut where sprays were left out.
-pub(super) fn strokes_of_rows(sprays: &[Spray]) -> Result<Vec<Stroke>, paint_net::Error> {
-    in_order(sprays, &StrokeSettings { min_gap: 0.0, max_turn: BESIDE, ..StrokeSettings::default() })
 }
 
 /// Values of texels on the page, 0 beside them.

@@ -1,14 +1,15 @@
 //! What to spray of each paint of a picture: all of them at once.
 
-use paint_net::colour::ColourFit;
+use std::sync::Arc;
+
+use paint_net::colour::{ColourFit, SparseColourFit};
 use paint_net::painters::SurfaceFootprint;
 use paint_net::path::Stroke;
 use paint_net::{Painting, Spray};
 
-use super::colour_rows::{adaptive_rows, on_page, rows_of_cells, strokes_of_rows};
+use super::colour_rows::{PaintRows, on_page};
 use super::decide::UNPAINTABLE_WEIGHT;
 use super::error::MissionError;
-use super::footprints::Footprints;
 use super::painting_task::PaintingTask;
 use super::picture_task::PictureTask;
 use super::settings::{MissionSettings, PainterChoice};
@@ -18,57 +19,59 @@ use crate::progress::Stage;
 pub(super) const PAINT_WEIGHT: f64 = 0.3;
 /// Least volume of a spray: strong paints show at a hundredth of the depth that hides a wall.
 pub(super) const LEAST_VOLUME: f64 = 0.0025;
+/// What a pixel of way costs beside half the square of a colour difference on a texel.
+const WAY_PRICE: f64 = 1.0;
+/// Edge of the blocks in which a paint is kept or left out, pixels.
+const BLOCK: f64 = 16.0;
 const ITERATIONS: usize = 80;
 const TOLERANCE: f64 = 3e-4;
 
-/// Decides the sprays of every paint of a picture, in the rows of the settings or by [`PainterChoice::AdaptiveRows`] in rows of its own; the best
-/// colours that they leave are kept with the picture.
+/// Decides the sprays of every paint of a picture, in the rows of the settings or by [`PainterChoice::AdaptiveRows`] in rows of its own, each paint
+/// where the others do not show the picture as well; the best colours that they leave are kept with the picture.
 pub(super) fn decide_colours(task: &PaintingTask, picture: &mut PictureTask) -> Result<Vec<Painting>, MissionError> {
     let stage = Stage::start("decide");
     let settings = &task.settings;
     let paints = picture.paints.len();
-    let adaptive = settings.painter == PainterChoice::AdaptiveRows;
-    let rows = if adaptive {
-        let seen = |k: usize, share: f64| stage.share(0.5 * (k as f64 + share) / paints as f64);
-        (0..paints).map(|k| adaptive_rows(task, picture, k, &|share| seen(k, share))).collect::<Result<_, _>>()?
+    let (rows, mut volumes): (Vec<Arc<PaintRows>>, Vec<Vec<f64>>) = if settings.painter == PainterChoice::AdaptiveRows {
+        let seen = |k: usize, share: f64| stage.share(0.3 * (k as f64 + share) / paints as f64);
+        let of_paint = |k: usize| {
+            let rows = PaintRows::adaptive(task, picture, k, &|share| seen(k, share))?;
+            let volumes = rows.sprays().map(|spray| spray.volume).collect();
+            Ok((Arc::new(rows), volumes))
+        };
+        (0..paints).map(of_paint).collect::<Result<Vec<_>, MissionError>>()?.into_iter().unzip()
     } else {
-        vec![rows_of_cells(task)]
+        let rows = Arc::new(PaintRows::equal(task)?);
+        let of_paint = |depths: &Vec<f64>| (Arc::clone(&rows), means(&rows.footprints, depths, settings));
+        picture.separated.iter().map(of_paint).unzip()
     };
-    let of_rows = rows.iter().map(|rows| on_texels(task, rows)).collect::<Result<Vec<_>, _>>()?;
-    // Equal rows are those of every paint.
-    let rows_of = |k: usize| if adaptive { k } else { 0 };
-    let start = |(k, depths): (usize, &Vec<f64>)| -> Vec<f64> {
-        let sprays = rows[rows_of(k)].iter().flat_map(|row| &row.sprays);
-        if adaptive { sprays.map(|spray| spray.volume).collect() } else { means(&of_rows[0], depths, settings) }
-    };
-    let mut volumes: Vec<Vec<f64>> = picture.separated.iter().enumerate().map(start).collect();
     let model = picture.model();
     let fit = ColourFit {
         wanted: &picture.aims(),
         weight: &weights(task, picture),
         model: &model,
-        footprints: &(0..paints).map(|k| of_rows[rows_of(k)].as_slice()).collect::<Vec<_>>(),
+        footprints: &rows.iter().map(|rows| rows.footprints.as_slice()).collect::<Vec<_>>(),
         min_volume: 0.0,
         max_volume: settings.limits.max_volume,
         paint_weight: PAINT_WEIGHT,
+        prices: &[],
         iterations: ITERATIONS,
         tolerance: TOLERANCE,
         threads: settings.threads,
     };
-    let from = if adaptive { 0.5 } else { 0.0 };
-    let depths = fit.solve(&mut volumes, &mut |share| stage.share(from + (1.0 - from) * share))?;
+    let strokes: Vec<&[Stroke]> = rows.iter().map(|rows| rows.rows()).collect();
+    let sparse = SparseColourFit { fit, rows: &strokes, block: BLOCK, price: WAY_PRICE };
+    let depths = sparse.solve(&mut volumes, &mut |share| stage.share(0.3 + 0.7 * share))?;
     let optimum = looks(picture, &depths);
     let blank = task.coverage.map(|_| 0.0);
-    let painting = |(k, (volumes, depths)): (usize, (&Vec<f64>, &Vec<f64>))| {
-        let cells = rows[rows_of(k)].iter().flat_map(|row| &row.sprays);
-        let worth = cells.zip(volumes).filter(|(_, volume)| **volume >= LEAST_VOLUME);
+    let painting = |(rows, (volumes, depths)): (&Arc<PaintRows>, (&Vec<f64>, &Vec<f64>))| {
+        let worth = rows.sprays().zip(volumes).filter(|(_, volume)| **volume >= LEAST_VOLUME);
         let sprays: Vec<Spray> = worth.map(|(cell, &volume)| Spray { volume, ..*cell }).collect();
-        let strokes = if adaptive { strokes_of_rows(&sprays)? } else { Vec::new() };
         let painted = on_page(&blank, &picture.pixels, depths);
-        Ok(Painting { strokes, ..Painting::new(sprays, painted, task.appearance.ink()) })
+        Ok(Painting { strokes: rows.strokes(&sprays)?, ..Painting::new(sprays, painted, task.appearance.ink()) })
     };
     let paintings: Vec<Painting> =
-        volumes.iter().zip(&depths).enumerate().map(painting).collect::<Result<_, paint_net::Error>>()?;
+        rows.iter().zip(volumes.iter().zip(&depths)).map(painting).collect::<Result<_, paint_net::Error>>()?;
     picture.optimum = optimum;
     let sprays: usize = paintings.iter().map(|painting| painting.sprays.len()).sum();
     if sprays == 0 {
@@ -76,13 +79,6 @@ pub(super) fn decide_colours(task: &PaintingTask, picture: &mut PictureTask) -> 
     }
     stage.done(&format!("{} paints, {sprays} sprays", paintings.len()));
     Ok(paintings)
-}
-
-/// What sprays leave on the texels of the film.
-fn on_texels(task: &PaintingTask, rows: &[Stroke]) -> Result<Vec<SurfaceFootprint>, MissionError> {
-    let footprints = Footprints::new(&task.surface, &task.settings)?;
-    let found = footprints.on_texels(rows);
-    footprints.checked(Ok(found))
 }
 
 /// How much each texel matters.

@@ -94,6 +94,22 @@ fn wide_rows_paint_a_smooth_picture_in_less_time_as_well() {
     assert_eq!((wide.paints.len(), wide.collisions), (2, 0));
 }
 
+/// Six paints can make any grey in many ways: each lies where it is needed, not all of them everywhere.
+#[test]
+fn a_grey_picture_does_not_take_all_paints_everywhere() {
+    let s = Scratch::new("grey");
+    let mut mission = mission(&s, "six");
+    let grey = |x: u32, _: u32| image::Luma([40 + 2 * (x as u8)]);
+    image::GrayImage::from_fn(80, 50, grey).save(s.path("grey.png")).unwrap();
+    mission.design = Some(s.path("grey.png"));
+    mission.settings.threads = 2;
+    let found = fly(&mission, &s.0.join("out"));
+    let picture = found.picture.clone().unwrap();
+    let longest = found.flight_time_s_by_paint.iter().copied().fold(0.0, f64::max);
+    let paints = found.flight_time_s / longest;
+    assert!(paints < 3.5 && picture.ciede2000_in_gamut_mean < 3.0, "{found:?} {picture:?}");
+}
+
 /// What films have made, films can make again: the picture lies inside the gamut, and what is flown is near it.
 #[test]
 fn a_picture_made_of_films_is_painted_in_them() {

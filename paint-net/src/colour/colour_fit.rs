@@ -17,7 +17,7 @@ const FLOOR: f64 = 0.03;
 /// A fit of the volumes of all paints to wanted colours:
 ///
 /// ```text
-/// ½ Σ w |B (Lab(d) - T)|² + λ Σ w d    with  d_p = S_p v_p    subject to  v_min ≤ v ≤ v_max
+/// ½ Σ w |B (Lab(d) - T)|² + λ Σ w d + Σ c v    with  d_p = S_p v_p    subject to  v_min ≤ v ≤ v_max
 /// ```
 ///
 /// with footprints as columns of `S_p` and the rows `B` of CIEDE2000 at the wanted colour `T`. Each volume is scaled by the root of its
@@ -38,6 +38,8 @@ pub struct ColourFit<'a> {
     pub max_volume: f64,
     /// `λ`, per unit of depth.
     pub paint_weight: f64,
+    /// `c`: what a unit of each volume costs besides, paint after paint, 0 or more. Infinity leaves a spray out: its volume becomes 0. Empty: nothing.
+    pub prices: &'a [Vec<f64>],
     /// Largest number of iterations.
     pub iterations: usize,
     /// Stop when the cost falls by less than this share per iteration, three times in a row.
@@ -54,22 +56,29 @@ impl ColourFit<'_> {
     pub fn solve(&self, volumes: &mut [Vec<f64>], progress: &mut dyn FnMut(f64)) -> Result<Vec<Vec<f64>>, Error> {
         span!("fit_colours");
         self.check(volumes)?;
-        let least = |f: &SurfaceFootprint| if f.is_empty() { 0.0 } else { self.min_volume };
-        let room = |f: &SurfaceFootprint| if f.is_empty() { 0.0 } else { self.max_volume - self.min_volume };
-        let least: Vec<Vec<f64>> =
-            self.footprints.iter().map(|of_paint| of_paint.iter().map(least).collect()).collect();
+        let used = |p: usize, k: usize, f: &SurfaceFootprint| {
+            !f.is_empty() && self.prices.get(p).is_none_or(|prices| prices[k].is_finite())
+        };
+        let of_used = |value: f64| -> Vec<Vec<f64>> {
+            let paints = self.footprints.iter().enumerate();
+            let of_paint = |(p, footprints): (usize, &&[SurfaceFootprint])| {
+                footprints.iter().enumerate().map(|(k, f)| if used(p, k, f) { value } else { 0.0 }).collect()
+            };
+            paints.map(of_paint).collect()
+        };
+        let least = of_used(self.min_volume);
+        let room = of_used(self.max_volume - self.min_volume);
         let mut planes = Planes::new(self, least);
         let start: Vec<Vec<f64>> = volumes
             .iter()
-            .zip(&planes.least)
-            .map(|(volumes, least)| {
-                volumes.iter().zip(least).map(|(v, l)| (v - l).clamp(0.0, self.max_volume)).collect()
+            .zip(planes.least.iter().zip(&room))
+            .map(|(volumes, (least, room))| {
+                volumes.iter().zip(least.iter().zip(room)).map(|(v, (l, room))| (v - l).clamp(0.0, *room)).collect()
             })
             .collect();
         let unit = planes.units(&start);
         let mut values: Vec<f64> = start.iter().flatten().zip(&unit).map(|(v, unit)| v / unit).collect();
-        let most = self.footprints.iter().flat_map(|of_paint| of_paint.iter().map(room));
-        let upper: Vec<f64> = most.zip(&unit).map(|(most, unit)| most / unit).collect();
+        let upper: Vec<f64> = room.iter().flatten().zip(&unit).map(|(room, unit)| room / unit).collect();
         let stop = StoppingRule { iterations: self.iterations, relative_decrease: self.tolerance };
         minimise(&mut values, &upper, &stop, &mut |values, gradient| planes.cost(values, &unit, gradient), progress);
         let mut k = 0;
@@ -95,6 +104,9 @@ impl ColourFit<'_> {
         let sizes = [("weight", self.weight.len(), pixels), ("list of paints", self.footprints.len(), n)];
         let of_paints = volumes.iter().zip(self.footprints).map(|(v, f)| ("list of footprints", f.len(), v.len()));
         let sizes = sizes.into_iter().chain([("volumes", volumes.len(), n)]).chain(of_paints);
+        let of_prices = self.prices.iter().zip(self.footprints).map(|(c, f)| ("list of prices", c.len(), f.len()));
+        let priced = if self.prices.is_empty() { n } else { self.prices.len() };
+        let sizes = sizes.chain([("prices", priced, n)]).chain(of_prices);
         if let Some((what, found, expected)) = sizes.into_iter().find(|(_, found, expected)| found != expected) {
             return Err(Error::Mismatch { what, found: (found, 1), expected: (expected, 1) });
         }
@@ -104,6 +116,8 @@ impl ColourFit<'_> {
                 return Err(Error::Pixel { what: "footprint", x: k as usize, y: 0, value: f64::from(depth), range });
             }
         }
+        let least = self.prices.iter().flatten().copied().find(|price| price.is_nan() || *price < 0.0).unwrap_or(0.0);
+        require("prices", least, least >= 0.0, "they must be 0 or more")?;
         let finite = self.wanted.iter().flatten().chain(self.weight).find(|v| !v.is_finite());
         match finite {
             Some(&value) => Err(Error::Pixel { what: "wanted colour", x: 0, y: 0, value, range: "finite" }),
@@ -213,7 +227,7 @@ impl<'a> Planes<'a> {
         };
         let blocks: Vec<&[Pixel]> = self.counted.chunks(BLOCK).collect();
         let pulled = in_parallel(&blocks, self.fit.threads, &pull);
-        let cost = pulled.iter().map(|(_, cost)| cost).sum();
+        let colours: f64 = pulled.iter().map(|(_, cost)| cost).sum();
         let mut fields = vec![vec![0.0; wanted.len()]; n];
         for (block, (pulls, _)) in blocks.iter().zip(&pulled) {
             for (pixel, pulls) in block.iter().zip(pulls) {
@@ -228,6 +242,11 @@ impl<'a> Planes<'a> {
         for ((slot, pull), unit) in gradient.iter_mut().zip(gathered.into_iter().flatten()).zip(unit) {
             *slot = pull * unit;
         }
-        cost
+        let mut ways = 0.0;
+        for (k, price) in self.fit.prices.iter().flatten().enumerate().filter(|(_, price)| price.is_finite()) {
+            ways += price * values[k] * unit[k];
+            gradient[k] += price * unit[k];
+        }
+        colours + ways
     }
 }

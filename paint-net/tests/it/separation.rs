@@ -2,10 +2,13 @@
 
 use std::convert::Infallible;
 
-use paint_net::Error;
-use paint_net::colour::{ColourFit, MixingModel, Separated, TexelSeparation, best_order, choose_paints};
+use paint_net::colour::{
+    ColourFit, MixingModel, Separated, SparseColourFit, TexelSeparation, best_order, choose_paints,
+};
 use paint_net::painters::SurfaceFootprint;
+use paint_net::path::Stroke;
 use paint_net::procedural::lattice;
+use paint_net::{Error, Spray};
 
 /// Glazes by Beer and Lambert: `Lab = base · exp(-K d)`, band by band.
 struct Glazes {
@@ -148,6 +151,7 @@ fn fit<'a>(
         min_volume: 0.0,
         max_volume: 2.0,
         paint_weight: 0.0,
+        prices: &[],
         iterations: 400,
         tolerance: 1e-9,
         threads: 1,
@@ -205,4 +209,90 @@ fn bounds_hold_and_what_does_not_count_pulls_at_nothing() {
     assert_eq!(volumes, vec![vec![1.0; 10]; 3]);
     let short = fit(&model, &wanted, &[1.0; 19], &footprints).solve(&mut volumes, &mut |_| ());
     assert!(matches!(short, Err(Error::Mismatch { what: "weight", .. })), "{short:?}");
+}
+
+/// A dearer spray leaves less: near the aim, where the cost is a parabola, in proportion to the price. An infinite price leaves a spray out, whatever the least volume is.
+#[test]
+fn prices_of_volumes_count_beside_the_colours() {
+    let model = Glazes { base: [90.0, 40.0, 50.0], absorption: vec![[1.0, 0.1, 0.2]] };
+    let wanted = [model.lab(0, &[0.8], &mut [])];
+    let spot: Vec<SurfaceFootprint> = vec![vec![(0, 1.0)]];
+    let footprints = [spot.as_slice()];
+    let solved = |price: f64, min_volume: f64| {
+        let prices = [vec![price]];
+        let mut volumes = vec![vec![0.3]];
+        let fit = ColourFit { prices: &prices, min_volume, ..fit(&model, &wanted, &[1.0], &footprints) };
+        fit.solve(&mut volumes, &mut |_| ()).map(|_| volumes[0][0])
+    };
+    let free = solved(0.0, 0.0).unwrap();
+    assert!((free - 0.8).abs() < 1e-3, "{free}");
+    let falls: Vec<f64> = [1.0, 4.0, 16.0, 64.0].map(|price| solved(price, 0.0).unwrap()).to_vec();
+    assert!(falls.windows(2).all(|pair| pair[1] < pair[0]) && falls[0] < free, "{falls:?}");
+    let [by_one, by_four] = [1.0, 4.0].map(|price| free - solved(0.1 * price, 0.0).unwrap());
+    assert!((by_four / by_one - 4.0).abs() < 0.1, "{by_one} {by_four}");
+    assert_eq!(solved(f64::INFINITY, 0.25).unwrap(), 0.0);
+    for price in [-1.0, f64::NAN] {
+        assert!(matches!(solved(price, 0.0), Err(Error::InvalidSetting { name: "prices", .. })));
+    }
+}
+
+/// A row of sprays, one for each of the spots.
+fn row(count: usize) -> Vec<Stroke> {
+    let spray = |k: usize| Spray { x: 2.0 * k as f64, y: 0.0, volume: 0.3, sigma: 2.0 };
+    vec![Stroke { sprays: (0..count).map(spray).collect() }]
+}
+
+/// Two paints that look alike: in each block the one of which more lies there at first is kept, and the colour stays.
+#[test]
+fn of_paints_that_look_alike_one_is_left_out() {
+    let model = Glazes { base: [90.0, 40.0, 50.0], absorption: vec![[1.0, 0.1, 0.2]; 2] };
+    let (spots, rows) = (spots(40), row(40));
+    let wanted = [model.lab(0, &[0.8, 0.0], &mut []); 80];
+    let (weight, footprints, rows) = ([1.0; 80], [spots.as_slice(); 2], [rows.as_slice(); 2]);
+    let start =
+        |p: usize| (0..40).map(|k| if (k / 10 + p).is_multiple_of(2) { 0.2 } else { 0.1 }).collect::<Vec<f64>>();
+    let fit = fit(&model, &wanted, &weight, &footprints);
+    let sparse = SparseColourFit { fit, rows: &rows, block: 20.0, price: 1.0 };
+    let mut volumes = vec![start(0), start(1)];
+    let depths = sparse.solve(&mut volumes, &mut |_| ()).unwrap();
+    for block in 0..4 {
+        let [kept, left_out] = [block % 2, 1 - block % 2].map(|p| &volumes[p][10 * block..10 * (block + 1)]);
+        assert!(
+            kept.iter().sum::<f64>() > 1.0 && left_out.iter().all(|volume| *volume == 0.0),
+            "{kept:?} {left_out:?}"
+        );
+    }
+    let both = depths[0].iter().zip(&depths[1]).map(|(a, b)| a + b);
+    assert!(both.skip(8).take(64).all(|depth| (depth - 0.8).abs() < 0.02), "{depths:?}");
+    // Without a price it is the fit alone.
+    let [mut free, mut alone] = [vec![start(0), start(1)], vec![start(0), start(1)]];
+    SparseColourFit { price: 0.0, ..sparse }.solve(&mut free, &mut |_| ()).unwrap();
+    fit.solve(&mut alone, &mut |_| ()).unwrap();
+    assert_eq!(free, alone);
+    assert!((0..4).all(|block| free.iter().all(|of| of[10 * block..10 * (block + 1)].iter().sum::<f64>() > 0.1)));
+    let short = SparseColourFit { rows: &rows[..1], ..sparse }.solve(&mut volumes, &mut |_| ());
+    assert!(matches!(short, Err(Error::Mismatch { what: "list of rows", .. })), "{short:?}");
+    for (price, block) in [(-1.0, 20.0), (f64::NAN, 20.0), (1.0, 0.0), (1.0, f64::INFINITY)] {
+        assert!(SparseColourFit { price, block, ..sparse }.solve(&mut volumes, &mut |_| ()).is_err());
+    }
+}
+
+/// What hardly shows is not worth its way; what shows well is, and so is what hardly shows where way is cheap.
+#[test]
+fn a_paint_goes_where_it_is_worth_its_way() {
+    let model = three();
+    let (spots, rows) = (spots(40), row(40));
+    let (weight, footprints, rows) = ([1.0; 80], [spots.as_slice(); 3], [rows.as_slice(); 3]);
+    let used = |depth: f64, price: f64| {
+        // The second paint in the middle alone, over one of the first everywhere.
+        let of = |x: usize| if (32..48).contains(&x) { depth } else { 0.0 };
+        let wanted: Vec<[f64; 3]> = (0..80).map(|x| model.lab(0, &[0.5, of(x), 0.0], &mut [])).collect();
+        let fit = fit(&model, &wanted, &weight, &footprints);
+        let sparse = SparseColourFit { fit, rows: &rows, block: 16.0, price };
+        let mut volumes = vec![vec![0.1; 40]; 3];
+        sparse.solve(&mut volumes, &mut |_| ()).unwrap();
+        assert!(volumes[0].chunks(8).all(|of_block| of_block.iter().sum::<f64>() > 0.3), "{volumes:?}");
+        volumes[1][16..24].iter().filter(|volume| **volume > 0.0).count()
+    };
+    assert_eq!([used(0.5, 1.0), used(0.01, 1.0), used(0.01, 1e-6)].map(|count| count > 0), [true, false, true]);
 }
