@@ -29,7 +29,7 @@ use trials::{CONVERGED, trials};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct AdaptiveRows {
     /// Kinds of rows: distance of the rows in [`row_spacing`](crate::Limits::row_spacing), rounded to pixels, and spread of their sprays in
-    /// deviations of the nozzle. Default (1, 0.75), (1, 1), (4/3, 1.15) and (2, 1.45), ours: the last is the thesis' nozzle at 14.5 of its 15 cm.
+    /// deviations of the nozzle. Default (1, 0.75), (5/4, 1), (5/4, 1.2) and (2, 1.45), ours: the last is the thesis' nozzle at 14.5 of its 15 cm.
     pub widths: Vec<RowWidth>,
     /// Structural similarity that a block may lose to save all of the way over it with rows of the limits. Default 0.15, ours.
     pub tolerance: f64,
@@ -41,8 +41,8 @@ pub struct AdaptiveRows {
 
 impl Default for AdaptiveRows {
     fn default() -> Self {
-        let widths = [(1.0, 0.75), (1.0, 1.0), (4.0 / 3.0, 1.15), (2.0, 1.45)]
-            .map(|(spacing, spread)| RowWidth { spacing, spread });
+        let widths =
+            [(1.0, 0.75), (1.25, 1.0), (1.25, 1.2), (2.0, 1.45)].map(|(spacing, spread)| RowWidth { spacing, spread });
         Self { widths: widths.to_vec(), tolerance: 0.15, turn: 16.0, iterations: 120 }
     }
 }

@@ -52,7 +52,7 @@ fn bands_are_crossed_by_wide_rows() {
 #[test]
 fn detail_in_both_directions_keeps_the_rows_of_the_limits() {
     let checks = Image::from_fn(108, 108, |x, y| {
-        let wave = |at: usize| (TAU * at as f64 / 11.0).sin();
+        let wave = |at: usize| (TAU * at as f64 / 9.0).sin();
         0.5 + 0.2 * wave(x) * wave(y)
     });
     let (length, [ssim, usual], painting) = against_equal_rows(&checks);
@@ -64,7 +64,7 @@ fn detail_in_both_directions_keeps_the_rows_of_the_limits() {
 #[test]
 fn a_smooth_part_has_wide_rows_beside_a_part_with_detail() {
     let wanted = Image::from_fn(216, 108, |x, y| {
-        let detail = (TAU * x as f64 / 11.0).sin() * (TAU * y as f64 / 11.0).sin();
+        let detail = (TAU * x as f64 / 9.0).sin() * (TAU * y as f64 / 9.0).sin();
         0.5 + if x < 108 { 0.0 } else { 0.2 * detail }
     });
     let (length, [ssim, usual], painting) = against_equal_rows(&wanted);
