@@ -32,7 +32,7 @@
 //! | Paper IV, 3.1: reference, canvas, sprays | [`PaintProblem`], [`Painting`], [`Spray`] |
 //! | Paper IV, 3.2: layers by intensity | [`painters::Layered`] |
 //! | Paper IV, 3.3: spray footprint, ink `tanh c` | [`SprayKernel`], [`Saturation`] |
-//! | Paper IV, 3.3: the "ideal", a Gaussian of the reference | [`ideal`] |
+//! | Paper IV, 3.2: the "ideal", a Gaussian of the reference | [`ideal`] |
 //! | Paper IV, 3.3: the network with READ, PAINT and a learned stop | [`thesis::ThesisPainter`], [`thesis::Network`] |
 //! | non-negative deconvolution by projected L-BFGS | [`Deconvolution`] |
 //! | the same with strokes along lines (thinning: Zhang and Suen 1984) | [`painters::Centrelines`] |

@@ -21,12 +21,13 @@ pub fn table() -> Table {
 type Parts = &'static [[&'static str; 2]];
 
 const PAPERS: &[(&str, Parts)] = &[
-    ("thesis", &[["Fig. 1.1", PHOTO]]),
+    ("thesis", &[["Fig. 1.1", "no row: people at work"]]),
     (
         "Paper I (chapter 5)",
         &[
             ["Figs. 5.1; 5.6", PHOTO],
-            ["Figs. 5.2; 5.3", "[regions and levels](tsdf-hash.md#memory-hierarchy)"],
+            ["Fig. 5.2", DESIGN],
+            ["Fig. 5.3", "[regions and levels](tsdf-hash.md#memory-hierarchy)"],
             ["Eqs. (5.1) to (5.3)", "[tracker](tsdf-hash.md#tracking)"],
             ["Fig. 5.4; Eqs. (5.4) to (5.6)", "[incremental ray cast; corrected](tsdf-hash.md#incremental-ray-cast)"],
             ["Fig. 5.5", "[loops](results.md#loops-and-relocalisation)"],
@@ -64,7 +65,8 @@ const PAPERS: &[(&str, Parts)] = &[
     (
         "Paper IV (chapter 8)",
         &[
-            ["Figs. 8.1; 8.2", DESIGN],
+            ["Fig. 8.1", DESIGN],
+            ["Fig. 8.2", "no row: its models and textures; ours are built in"],
             ["Eq. (8.1)", "[nozzle of a texel](uv-param.md#equation-to-item)"],
             ["Fig. 8.3", "[in layers](thesis-network.md#comparison-with-the-feedback-network)"],
             ["Fig. 8.4", "[without a stop](results.md#thesis-network)"],

@@ -25,7 +25,7 @@ fn part_of(picture: &Image, seed: u64, n: u64, architecture: &Architecture) -> R
 }
 
 /// The same of one of these photographs (ink in `[0, 1]`, of any size): a square of it, shrunk to `side` x `side` pixels and turned one of four
-/// ways, is treated as a scene by [`thesis_patch`]. The thesis shrinks 12,837 photographs whole; of few, squares of any size and place tell more
+/// ways, is treated as a scene by [`thesis_patch`]. The thesis shrinks its photographs whole; of few, squares of any size and place tell more
 /// (ours): the shorter side is one to four of them.
 pub fn thesis_patch_of(photographs: &[Image], seed: u64, n: u64, architecture: &Architecture) -> Result<Image, Error> {
     let draw = |k: i64| lattice(seed ^ 0xF0706, n as i64, k);
