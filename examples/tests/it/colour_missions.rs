@@ -48,12 +48,17 @@ fn two_paints(scratch: &Scratch) -> PathBuf {
 
 /// A picture whose colours are films of blue under yellow on a white wall: more blue to the right, more yellow to the top.
 fn picture_of_films(scratch: &Scratch) -> String {
+    films(scratch, &|u, v| [0.5 * u, 0.6 * (1.0 - v)])
+}
+
+/// The same with these depths of blue and yellow.
+fn films(scratch: &Scratch, depths: &dyn Fn(f64, f64) -> [f64; 2]) -> String {
     let (yellow, blue) = (pigment("hansa yellow"), pigment("phthalo blue"));
     let ground = Wall::White.substrate().unwrap();
     let colour = |x: u32, y: u32| {
-        let (u, v) = (f64::from(x) / 79.0, f64::from(y) / 49.0);
-        let below = blue.over(0.5 * u * UNIT, &ground).unwrap();
-        let wall: Substrate = yellow.over(0.6 * (1.0 - v) * UNIT, &below).unwrap();
+        let [below, above] = depths(f64::from(x) / 79.0, f64::from(y) / 49.0);
+        let below = blue.over(below * UNIT, &ground).unwrap();
+        let wall: Substrate = yellow.over(above * UNIT, &below).unwrap();
         image::Rgb(spectrum_linear_srgb(wall.reflectance()).map(|c| encode_srgb8(c).0))
     };
     let path = scratch.path("films.png");
@@ -92,6 +97,19 @@ fn wide_rows_paint_a_smooth_picture_in_less_time_as_well() {
     assert!(times.all(|(wide, equal)| wide < equal) && wide.flight_time_s < 0.8 * equal.flight_time_s, "{said}");
     assert!(wide_picture.ciede2000_in_gamut_mean < equal_picture.ciede2000_in_gamut_mean + 0.2, "{said}");
     assert_eq!((wide.paints.len(), wide.collisions), (2, 0));
+}
+
+/// Blue has detail in both directions, yellow is even: only yellow's rows are wide.
+#[test]
+fn each_paint_has_rows_of_its_own() {
+    let s = Scratch::new("own_rows");
+    let mut mission = mission(&s, two_paints(&s).to_str().unwrap());
+    let wave = |at: f64, waves: f64| (std::f64::consts::TAU * waves * at).sin();
+    mission.design = Some(films(&s, &|u, v| [0.3 + 0.25 * wave(u, 7.0) * wave(v, 4.4), 0.5]));
+    (mission.settings.threads, mission.settings.painter) = (2, PainterChoice::AdaptiveRows);
+    let found = fly(&mission, &s.0.join("out"));
+    let time = |name: &str| found.flight_time_s_by_paint[found.paints.iter().position(|p| p == name).unwrap()];
+    assert!(time("yellow") < 0.75 * time("blue"), "{found:?}");
 }
 
 /// Six paints can make any grey in many ways: each lies where it is needed, not all of them everywhere.
