@@ -2,6 +2,7 @@
 
 pub mod ablations;
 pub mod baselines;
+pub mod drift;
 mod excerpt;
 mod extent;
 pub mod handheld;
@@ -25,8 +26,9 @@ pub type Rerun = fn(Extent, &Path) -> Result<Vec<Table>, Box<dyn Error>>;
 
 /// Reruns in the order of the papers, each with its name; what it needs on the way lies in the folder that it is given. Its first table is
 /// shown as such, the others are drawn by `docs/plots/plots.py`.
-pub const PARTS: [(&str, Rerun); 10] = [
+pub const PARTS: [(&str, Rerun); 11] = [
     ("papers", |_, _| Ok(vec![papers::table()])),
+    ("drift", |extent, _| drift::tables(extent)),
     ("flown_baselines", |extent, _| baselines::tables(extent)),
     ("paper_ii_ablations", |_, _| ablations::tables()),
     ("planners", |extent, _| planners::tables(extent)),

@@ -269,6 +269,17 @@ def fig_7_6():
     return figure
 
 
+def fig_5_5():
+    rows = table("fig_5_5", GENERATED)
+    figure, axes = plt.subplots(figsize=(7.6, 2.6))
+    for column, label, colour in [("before_mm", "by odometry", OTHER), ("after_mm", "loops closed", OURS)]:
+        axes.plot(numbers(rows, "image"), numbers(rows, column), color=colour, label=label)
+    axes.axvline(72, color=PALE, linewidth=1)
+    axes.set(xlabel="image; from 72 on the camera sees the beginning again", ylabel="position error, mm", ylim=(0, None))
+    axes.legend(loc="upper left")
+    return figure
+
+
 def fig_7_7():
     rows = table("fig_7_7", GENERATED)
     figure, panels = plt.subplots(2, 1, figsize=(7.6, 3.8), sharex=True, sharey=True)
@@ -297,7 +308,7 @@ def digest(text):
     return f"fnv1a:{value:016x}"
 
 
-FROM_GENERATED = [fig_6_9, fig_7_4, fig_7_6, fig_7_7, equal_sprays, handheld_fig_5]
+FROM_GENERATED = [fig_5_5, fig_6_9, fig_7_4, fig_7_6, fig_7_7, equal_sprays, handheld_fig_5]
 PLOTS = [missions, quadratic_programs, atlases, painters, integration, odometry, landmarks, cascade, pigments]
 
 

@@ -30,7 +30,7 @@ const PAPERS: &[(&str, Parts)] = &[
             ["Fig. 5.3", "[regions and levels](tsdf-hash.md#memory-hierarchy)"],
             ["Eqs. (5.1) to (5.3)", "[tracker](tsdf-hash.md#tracking)"],
             ["Fig. 5.4; Eqs. (5.4) to (5.6)", "[incremental ray cast; corrected](tsdf-hash.md#incremental-ray-cast)"],
-            ["Fig. 5.5", "[loops](results.md#loops-and-relocalisation)"],
+            ["Fig. 5.5", "[drift before and after](results.md#loops-and-relocalisation)"],
             ["Table 5.1", "no row: its recordings are not published; ours are named with each figure"],
             ["Fig. 5.7; Fig. 5.8", "[active memory and times of ours](results.md#tsdf-hash); not its GPU"],
             ["Fig. 5.9; Table 5.2", "[tracking](results.md#tracking) of other recordings"],

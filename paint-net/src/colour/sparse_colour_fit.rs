@@ -7,7 +7,7 @@ use crate::error::{Error, require};
 use crate::model::Spray;
 use crate::path::Stroke;
 
-/// Fits at rising sparsity. Three more leave out hardly more (ours).
+/// Fits with prices. The last leaves out hardly more than the one before it (ours).
 const ROUNDS: usize = 4;
 /// Share of a paint's mean over all blocks below which what lies in one does not count, as the price of its way sees it.
 const SOFTENING: f64 = 0.05;
