@@ -10,7 +10,7 @@ mod error;
 mod files;
 mod ink;
 mod job;
-mod progress_strip;
+mod progress_sheet;
 mod run;
 mod training;
 

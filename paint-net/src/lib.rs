@@ -29,7 +29,7 @@
 //!
 //! | source | item |
 //! |---|---|
-//! | Paper IV, 3.1: reference, canvas, sprays | [`PaintProblem`], [`Painting`], [`Spray`] |
+//! | Paper IV, 3: reference, canvas, sprays | [`PaintProblem`], [`Painting`], [`Spray`] |
 //! | Paper IV, 3.2: layers by intensity | [`painters::Layered`] |
 //! | Paper IV, 3.3: spray footprint, ink `tanh c` | [`SprayKernel`], [`Saturation`] |
 //! | Paper IV, 3.2: the "ideal", a Gaussian of the reference | [`ideal`] |
@@ -46,6 +46,7 @@
 //! | a valve of limited slew rate (augmented Lagrangian), on a context-based path (Dafner et al. 2000) | [`painters::SlewLimited`], [`path::ScanOrder`] |
 //! | several paints that mix (Kubelka and Munk 1931) | [`colour::Palette`], [`colour::ColourSeparation`] |
 //! | separation by any mixing model, paints chosen and ordered, all sprays at once; ours | [`colour::TexelSeparation`], [`colour::choose_paints`], [`colour::ColourFit`] |
+//! | each paint only where it is needed (reweighted ℓ1 for groups: Candès, Wakin, Boyd 2008) | [`colour::SparseColourFit`] |
 //! | strokes a robot can fly | [`path::boustrophedon`], [`path::in_order`] |
 //!
 //! Pixels: centres at integers, `x` = column, `y` = row, row 0 at the top. Lengths are in pixels, depths in the unit of the

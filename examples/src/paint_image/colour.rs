@@ -14,7 +14,7 @@ use super::error::PaintImageError;
 use super::files::write_json;
 use super::ink::{ink_of, ssim};
 use super::job::Job;
-use super::progress_strip::save_progress_strip;
+use super::progress_sheet::save_progress_sheet;
 use crate::picture_file::open_upright;
 use crate::pictures::{COLOUR_DIFFERENCE, Rgb, save_error_map};
 use crate::report::check_finite;
@@ -195,7 +195,7 @@ pub fn save_colours(
     save_error_map(&folder.join("error.png"), figures.width, &map, (1.0, "px"), &COLOUR_DIFFERENCE)?;
     let paints: Vec<&[Spray]> = painting.sprays.iter().map(Vec::as_slice).collect();
     let show = |depths: &[f64]| palette.colour(depths).map(byte);
-    save_progress_strip(&folder.join("progress.png"), rgb(wanted), &paints, &job.kernel, &show)
+    save_progress_sheet(&folder.join("progress.png"), rgb(wanted), &paints, &job.kernel, &show)
 }
 
 #[cfg(test)]

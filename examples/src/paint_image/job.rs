@@ -16,7 +16,7 @@ use super::cpu_timer::CpuTimer;
 use super::error::PaintImageError;
 use super::files::write_json;
 use super::ink::{colour_difference, error_map, grey, level, ssim};
-use super::progress_strip::save_progress_strip;
+use super::progress_sheet::save_progress_sheet;
 use crate::report::check_finite;
 
 /// Who decides the sprays.
@@ -208,6 +208,6 @@ impl Job {
         grey(&painting.ink).save(&folder.join("rendered.png"))?;
         error_map(&painting.ink, wanted).save(&folder.join("error.png"))?;
         let show = |depths: &[f64]| [level(depths[0].tanh()); 3];
-        save_progress_strip(&folder.join("progress.png"), grey(wanted), &[&painting.sprays], &self.kernel, &show)
+        save_progress_sheet(&folder.join("progress.png"), grey(wanted), &[&painting.sprays], &self.kernel, &show)
     }
 }

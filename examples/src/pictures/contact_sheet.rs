@@ -25,24 +25,32 @@ const CAPTION: u32 = 26;
 /// Draws pictures side by side, one row after the other, and saves the sheet.
 pub fn save_contact_sheet(path: &Path, rows: &[Vec<Tile>]) -> Result<(), PictureError> {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0) as u32;
-    let (across, down) = (SIDE + GAP, SIDE + GAP + CAPTION);
-    let sheet = draw(columns * across + GAP, rows.len() as u32 * down + GAP, |area| {
-        for (row, tiles) in (0..).zip(rows) {
-            for (column, tile) in (0..).zip(tiles) {
-                let (left, top) = ((GAP + column * across) as i32, (GAP + row * down) as i32);
+    let pictures: Vec<Vec<_>> =
+        rows.iter().map(|tiles| tiles.iter().map(|tile| fitted(&tile.picture)).collect()).collect();
+    let height = |pictures: &[Fitted]| CAPTION + GAP + pictures.iter().map(|(size, _)| size.1).max().unwrap_or(0);
+    let all: u32 = pictures.iter().map(|pictures| height(pictures)).sum();
+    let sheet = draw(columns * (SIDE + GAP) + GAP, all + GAP, |area| {
+        let mut top = GAP as i32;
+        for (tiles, pictures) in rows.iter().zip(pictures) {
+            let below = top + height(&pictures) as i32;
+            for (column, (tile, (size, data))) in (0..).zip(tiles.iter().zip(pictures)) {
+                let left = (GAP + column * (SIDE + GAP)) as i32;
                 area.draw(&Text::new(tile.caption.as_str(), (left, top), ("sans-serif", 20)))?;
-                let (size, data) = fitted(&tile.picture);
                 let element = BitMapElement::with_owned_buffer((left, top + CAPTION as i32), size, data);
                 area.draw(&element.ok_or("a picture with fewer pixels than it says")?)?;
             }
+            top = below;
         }
         Ok(())
     })?;
     sheet.save(path)
 }
 
+/// Size and pixels.
+type Fitted = ((u32, u32), Vec<u8>);
+
 /// Size and pixels with the longer side `SIDE`: averaged when made smaller; square pixels stay visible when made larger.
-fn fitted(picture: &Rgb) -> ((u32, u32), Vec<u8>) {
+fn fitted(picture: &Rgb) -> Fitted {
     let longer = picture.width.max(picture.height).max(1);
     let scaled = |side: u32| ((f64::from(side) * f64::from(SIDE) / f64::from(longer)).round() as u32).max(1);
     let (width, height) = (scaled(picture.width), scaled(picture.height));

@@ -117,7 +117,7 @@ fn painters_are_compared_in_a_table_and_side_by_side() {
     assert_eq!(rows[2][2], format!("{mean:.2}"));
     // Tiles of 256 pixels, 12 apart, 26 for the caption: eight columns, two rows.
     let sheet = image::open(format!("{out}/compare.png")).unwrap().to_luma8();
-    assert_eq!(sheet.dimensions(), (12 + 8 * 268, 12 + 2 * 294));
+    assert_eq!(sheet.dimensions(), (12 + 8 * 268, 12 + 166 + 294));
     // The last two are the thesis' network, which knows no such picture.
     for column in 0..6 {
         let left = 12 + 268 * column;
@@ -126,7 +126,7 @@ fn painters_are_compared_in_a_table_and_side_by_side() {
         let middle = image::imageops::crop_imm(&sheet, left + 96, 12 + 26 + 32, 64, 64).to_image();
         let mean = middle.pixels().map(|p| f64::from(p.0[0])).sum::<f64>() / (64.0 * 64.0);
         assert!((mean - 80.0).abs() < 5.0, "column {column}: {mean}");
-        assert_eq!(sheet.get_pixel(left + 100, 12 + 294 + 26 + 128).0[0], 255, "column {column}");
+        assert_eq!(sheet.get_pixel(left + 100, 12 + 166 + 26 + 128).0[0], 255, "column {column}");
     }
 }
 
@@ -290,10 +290,11 @@ fn every_picture_of_a_folder_is_painted_and_filmed() {
         for name in ["a.png", "a.jpg"] {
             let file = |name_of: &str| image::open(format!("{out}/{name}/{name_of}")).unwrap().to_rgb8();
             assert!(Path::new(&format!("{out}/{name}/report.json")).exists());
-            // What is wanted and eight moments, in tiles of 256 pixels, 12 apart, below a caption of 26.
-            let (strip, rendered) = (file("progress.png"), file("rendered.png"));
-            assert_eq!(strip.dimensions(), (12 + 9 * 268, 12 + 294));
-            let tile = |k: u32| image::imageops::crop_imm(&strip, 12 + k * 268, 38, 256, 256).to_image();
+            // What is wanted and eight moments, three in a row, in tiles of 256 pixels, 12 apart, below a caption of 26.
+            let (sheet, rendered) = (file("progress.png"), file("rendered.png"));
+            assert_eq!(sheet.dimensions(), (12 + 3 * 268, 12 + 3 * 294));
+            let corner = |k: u32| (12 + k % 3 * 268, 38 + k / 3 * 294);
+            let tile = |k: u32| image::imageops::crop_imm(&sheet, corner(k).0, corner(k).1, 256, 256).to_image();
             let difference = |k: u32| {
                 let tile = tile(k);
                 let pairs = tile.enumerate_pixels().map(|(x, y, p)| (p, rendered.get_pixel(x / 4, y / 4)));

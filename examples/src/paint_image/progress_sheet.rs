@@ -9,10 +9,11 @@ use crate::pictures::{Rgb, Tile, save_contact_sheet};
 
 /// Moments that are shown, beside the wanted picture.
 const MOMENTS: usize = 8;
+const ROWS: usize = 3;
 
 /// How the wall comes to look like the picture: what is wanted, and the wall after every eighth of the sprays, paint after
 /// paint. `show`: sRGB of the depths of all paints.
-pub(super) fn save_progress_strip(
+pub(super) fn save_progress_sheet(
     path: &Path,
     wanted: Rgb,
     paints: &[&[Spray]],
@@ -39,5 +40,8 @@ pub(super) fn save_progress_strip(
         });
         tiles.push(Tile { caption: format!("{done} sprays"), picture: Rgb::from_pixels(width, height, pixels) });
     }
-    Ok(save_contact_sheet(path, &[tiles])?)
+    let mut tiles = tiles.into_iter();
+    let row = |_| tiles.by_ref().take((MOMENTS + 1).div_ceil(ROWS)).collect::<Vec<Tile>>();
+    let rows: Vec<Vec<Tile>> = (0..ROWS).map(row).filter(|row| !row.is_empty()).collect();
+    Ok(save_contact_sheet(path, &rows)?)
 }
