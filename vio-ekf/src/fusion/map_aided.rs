@@ -20,7 +20,7 @@ use crate::stamp::Stamp;
 /// Settings of [`MapAidedVio`]. Ours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapAidedSettings {
-    /// The estimator; its frame of poses is the map. Two inertial sensors are joined before anything else is asked of them.
+    /// The estimator; its frame of poses is the map. Two inertial sensors are joined once each of them is sound.
     pub unified: UnifiedSettings,
     /// Seconds from one pose in the map to the next; 0.1.
     pub pose_interval_s: f64,
@@ -91,7 +91,9 @@ pub struct MapAidedVio {
     vio: UnifiedVio,
     settings: MapAidedSettings,
     pair: Option<ImuPair>,
+    /// Of each sensor by itself: joined, the noise of one would hide that the other stands still.
     imu: InertialCheck,
+    second_imu: InertialCheck,
     /// The latest inertial samples, as far back as they can be believed.
     recent: VecDeque<Imu>,
     gravity: f64,
@@ -118,6 +120,7 @@ impl MapAidedVio {
             settings,
             pair,
             imu: InertialCheck::default(),
+            second_imu: InertialCheck::default(),
             recent: VecDeque::new(),
             gravity: vio.gravity,
             confirmed: None,
@@ -150,42 +153,50 @@ impl MapAidedVio {
     /// # Errors
     /// As [`UnifiedVio::imu`].
     pub fn imu(&mut self, sample: &Imu) -> Result<(), Error> {
-        let Some(pair) = &mut self.pair else { return self.joined_imu(sample) };
-        pair.first(sample)?;
-        self.drain_pair()
-    }
-
-    /// Takes a sample of the second inertial sensor, in its own axes.
-    ///
-    /// # Errors
-    /// As [`UnifiedVio::second_imu`].
-    pub fn second_imu(&mut self, sample: &Imu) -> Result<(), Error> {
-        let none = Error::NoSuch { what: "inertial sensor", index: 1, count: 1 };
-        self.pair.as_mut().ok_or(none)?.second(sample)?;
-        self.drain_pair()
-    }
-
-    fn drain_pair(&mut self) -> Result<(), Error> {
-        while let Some(sample) = self.pair.as_mut().and_then(ImuPair::read) {
-            self.joined_imu(&sample)?;
+        if let Some(pair) = &mut self.pair {
+            pair.first(sample)?;
+        } else {
+            self.vio.imu(sample)?;
         }
-        Ok(())
-    }
-
-    fn joined_imu(&mut self, sample: &Imu) -> Result<(), Error> {
-        self.vio.imu(sample)?;
         if !self.imu.is_sound(sample, self.settings.longest_gap_s) {
             self.recent.clear();
             if self.recovering.is_none() {
                 self.give_up();
             }
         }
+        if self.pair.is_none() {
+            self.keep(sample);
+        }
+        self.drain_pair()
+    }
+
+    /// Takes a sample of the second inertial sensor, in its own axes; left out while an axis of it stands still.
+    ///
+    /// # Errors
+    /// As [`UnifiedVio::second_imu`].
+    pub fn second_imu(&mut self, sample: &Imu) -> Result<(), Error> {
+        let none = Error::NoSuch { what: "inertial sensor", index: 1, count: 1 };
+        let pair = self.pair.as_mut().ok_or(none)?;
+        if self.second_imu.is_sound(sample, f64::INFINITY) {
+            pair.second(sample)?;
+        }
+        self.drain_pair()
+    }
+
+    fn drain_pair(&mut self) -> Result<(), Error> {
+        while let Some(sample) = self.pair.as_mut().and_then(ImuPair::read) {
+            self.vio.imu(&sample)?;
+            self.keep(&sample);
+        }
+        Ok(())
+    }
+
+    fn keep(&mut self, sample: &Imu) {
         self.recent.push_back(*sample);
         // One is kept that is older.
         while self.recent.get(1).is_some_and(|second| sample.stamp.secs_since(second.stamp) > KEPT) {
             self.recent.pop_front();
         }
-        Ok(())
     }
 
     /// Takes an image; see [`UnifiedVio::image`].
