@@ -32,6 +32,7 @@ mod planned_mission;
 mod planned_robot;
 mod planner_choice;
 mod preview;
+mod progress_views;
 mod reach;
 mod reach_needs;
 mod rehearsal;

@@ -16,7 +16,7 @@ use plotters::style::{FontStyle, register_font};
 
 use crate::whole_file::WholeFile;
 
-pub use contact_sheet::{Tile, save_contact_sheet};
+pub use contact_sheet::{TILE_SIDE, Tile, save_contact_sheet};
 pub use curves::{Panel, save_curves};
 pub use density::{DensityPicture, save_density};
 pub use error_map::{COLOUR_DIFFERENCE, ErrorScale, save_error_map};

@@ -4,6 +4,6 @@ mod camera;
 mod fault;
 mod painted_front;
 
-pub use camera::{FRAMES_PER_SECOND, RgbdViews, SimulatedCamera, SimulatedImage};
+pub use camera::{FRAMES_PER_SECOND, HALF_VIEW, RgbdViews, SimulatedCamera, SimulatedImage};
 pub use fault::{FaultInterval, SensorFault};
 pub use painted_front::{PaintedFront, SEEN, SHOT_STEP};

@@ -205,6 +205,14 @@ impl PaintSurface {
         self.disk().positions().iter().map(|p| p.map(|c| c as f32)).collect()
     }
 
+    /// Least and largest coordinates of its vertices, m.
+    pub fn corners(&self) -> [Point3<f64>; 2] {
+        let positions = self.disk().positions().iter().map(|p| Point3::from(*p));
+        positions.fold([Point3::from([f64::MAX; 3]), Point3::from([f64::MIN; 3])], |[low, high], p| {
+            [low.inf(&p), high.sup(&p)]
+        })
+    }
+
     /// Mean normal over the chart: the side from which a picture of it is taken. Short for surfaces that close in.
     pub fn facing(&self) -> Vector3<f64> {
         let normals = self

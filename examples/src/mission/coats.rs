@@ -159,18 +159,44 @@ pub(super) fn looks(
     coverage: &Image,
     picture: Option<&PictureTask>,
 ) -> Result<Vec<Option<Look>>, MissionError> {
-    let mut grounds = vec![Substrate::sandstone(); coverage.data().len()];
-    if let Some(picture) = picture {
-        for (place, &pixel) in picture.pixels.iter().enumerate() {
-            grounds[pixel] = Substrate::new(*picture.wall.at(place))?;
-        }
+    let mut wall = Wall::bare(coverage, picture)?;
+    for (paint, depth) in layers {
+        wall.paint(paint, depth)?;
     }
-    let look = |(k, covered): (usize, &f64)| {
-        let films = layers.iter().map(|(paint, depth)| (*paint, depth.data()[k] * UNIT_THICKNESS));
-        let wall = (*covered > 0.0).then(|| over_each_other(films, &grounds[k])).transpose()?;
-        Ok(wall.as_ref().map(Look::of))
-    };
-    coverage.data().iter().enumerate().map(look).collect::<Result<_, paint_sim::Error>>().map_err(MissionError::from)
+    Ok(wall.looks())
+}
+
+/// What lies uppermost on every pixel, `None` beside the surface.
+pub(super) struct Wall(Vec<Option<Substrate>>);
+
+impl Wall {
+    /// Before any paint: as the picture's task knows it, or sandstone.
+    pub(super) fn bare(coverage: &Image, picture: Option<&PictureTask>) -> Result<Self, MissionError> {
+        let bare = |covered: &f64| (*covered > 0.0).then(Substrate::sandstone);
+        let mut wall: Vec<Option<Substrate>> = coverage.data().iter().map(bare).collect();
+        if let Some(picture) = picture {
+            for (place, &pixel) in picture.pixels.iter().enumerate() {
+                if let Some(ground) = &mut wall[pixel] {
+                    *ground = Substrate::new(*picture.wall.at(place))?;
+                }
+            }
+        }
+        Ok(Self(wall))
+    }
+
+    /// Another film, over one that is dry: what was there is its ground (Kubelka-Munk).
+    pub(super) fn paint(&mut self, paint: &Paint, depth: &Image) -> Result<(), MissionError> {
+        for (ground, depth) in self.0.iter_mut().zip(depth.data()) {
+            if let Some(ground) = ground {
+                *ground = paint.over(depth * UNIT_THICKNESS, ground)?;
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn looks(&self) -> Vec<Option<Look>> {
+        self.0.iter().map(|ground| ground.as_ref().map(Look::of)).collect()
+    }
 }
 
 /// Times that the tank is changed between flights of these durations, seconds, and how long all takes: while one film dries, another tank is mounted.
@@ -189,14 +215,6 @@ pub(super) fn linear(looks: &[Option<Look>], width: usize, height: usize) -> Res
     Ok([channel(0)?, channel(1)?, channel(2)?])
 }
 
-/// Films in metres over a ground, each dry before the next (Kubelka-Munk: each film with its ground is the ground of the next).
-fn over_each_other<'a>(
-    films: impl IntoIterator<Item = (&'a Paint, f64)>,
-    ground: &Substrate,
-) -> Result<Substrate, paint_sim::Error> {
-    films.into_iter().try_fold(*ground, |below, (paint, thickness)| paint.over(thickness, &below))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -205,9 +223,12 @@ mod tests {
     #[test]
     fn the_upper_film_hides_the_lower_one() {
         let [charcoal, white] = [PaintName::Charcoal, PaintName::White].map(|name| name.paint(UNIT_THICKNESS).unwrap());
-        let (ground, thick) = (paint_sim::Substrate::sandstone(), 40.0 * UNIT_THICKNESS);
-        let lightness =
-            |films: [(&Paint, f64); 2]| spectrum_lab(over_each_other(films, &ground).unwrap().reflectance())[0];
+        let coverage = Image::filled(2, 1, 1.0);
+        let lightness = |films: [(&Paint, f64); 2]| {
+            let layers = films.map(|(paint, depth)| (paint, Image::filled(2, 1, depth)));
+            looks(&layers, &coverage, None).unwrap()[1].unwrap().lab[0]
+        };
+        let thick = 40.0;
         let (white_above, white_below) =
             (lightness([(&charcoal, thick), (&white, thick)]), lightness([(&white, thick), (&charcoal, thick)]));
         let alone = |paint: &Paint| lightness([(paint, thick), (paint, 0.0)]);

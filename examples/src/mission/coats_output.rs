@@ -9,12 +9,13 @@ use paint_sim::colour::ciede2000;
 use paint_sim::surface::Hit;
 use serde::Serialize;
 
-use super::coats::{Coats, Look, linear, time_of_coats};
+use super::coats::{Coats, Look, Wall, linear, time_of_coats};
 use super::error::MissionError;
 use super::figures::mean;
 use super::mission_output::{save, save_flights, save_flown_path};
 use super::painted_mesh::save_painted_mesh;
 use super::picture_figures::{PictureFigures, save_out_of_gamut, wanted_looks};
+use super::progress_views::ProgressViews;
 use super::run::Mission;
 use super::shading::shading_of_colours;
 use super::view::{camera, picture_of, view};
@@ -164,12 +165,31 @@ fn save_pictures(
     let frame = view(task, &camera(task, &corners)?, &shade)?;
     picture_of(&frame).save(&folder.join("painted_view.png"))?;
     save_flown_path(mission, &shade, folder)?;
+    save_progress(coats, &folder.join("progress.png"))?;
     let texel = (task.settings.texel, "m");
     save_error_map(&folder.join("error.png"), width, &differences(wanted, painted), texel, &COLOUR_DIFFERENCE)?;
     let page: Vec<_> = painted.iter().map(|look| look.as_ref().map(Look::srgb8)).collect();
     let vertices = save_painted_mesh(task, &page, folder)?;
     let missions: Vec<&Mission> = coats.missions().map(|(_, mission)| mission).collect();
     save_flights(&missions, &vertices, folder)
+}
+
+/// The bare surface, and after each paint.
+fn save_progress(coats: &Coats, path: &Path) -> Result<(), MissionError> {
+    let Some((_, first)) = coats.missions().next() else { return Ok(()) };
+    let task = &first.task;
+    let mut wall = Wall::bare(&task.coverage, coats.picture.as_ref())?;
+    let mut views = ProgressViews::new(task)?;
+    let mut show = |caption: &str, wall: &Wall| {
+        let colours = linear(&wall.looks(), task.wanted.width(), task.wanted.height())?;
+        views.show(caption.to_string(), &|hit: &Hit| shading_of_colours(task, &colours, hit))
+    };
+    show("bare", &wall)?;
+    for (_, mission) in coats.missions() {
+        wall.paint(&mission.task.paint.paint, &mission.painted_depth())?;
+        show(&mission.task.paint.name, &wall)?;
+    }
+    views.save(path)
 }
 
 /// CIEDE2000 per pixel, `None` beside the surface.

@@ -1,5 +1,6 @@
 //! Flying it, and what the paint does meanwhile.
 
+use paint_net::Image;
 use paint_planner::Plan;
 use paint_planner::mission::Route;
 use paint_planner::onboard::sorties;
@@ -13,12 +14,14 @@ use super::nozzle::spray_model;
 use super::painting_task::PaintingTask;
 use super::plan::Planned;
 use super::settings::{LocalisationChoice, MissionSettings};
-use super::simulated_flight::{flight_settings, fly_plan};
+use super::simulated_flight::{OwnSenses, flight_settings, fly_plan};
 use crate::adapters::Robot;
 use crate::onboard::{LocalisationFigures, LocalisedFlight};
 use crate::progress::Stage;
 use crate::simulated_sensors::SHOT_STEP;
 
+/// Parts of the spraying after which the surface is shown.
+const PARTS: usize = 3;
 /// Flights of other sorties have seeds so far apart.
 const SORTIE: u64 = 0x1_0000;
 
@@ -100,7 +103,8 @@ fn fly_sorties(
             ..usual
         };
         let mut onboard = onboard(task, before.iter().copied().chain(&whole))?;
-        let source = onboard.as_mut().map(|onboard| onboard as &mut dyn PoseSource);
+        let surface = task.surface.corners();
+        let source = onboard.as_mut().map(|onboard| OwnSenses { poses: onboard as &mut dyn PoseSource, surface });
         let part = fly_plan(plan, *piece, task.met(), &task.robot, settings, &flight, source)?;
         let told = onboard.map(|onboard| onboard.figures());
         figures = told.map(|told| figures.map_or(told, |before: LocalisationFigures| before.and(told)));
@@ -124,22 +128,39 @@ pub(super) fn onboard<'a, 'b>(
     localised_flight(task, camera_before(task, before)?, 0).map(Some)
 }
 
-/// Puts the paint of flights onto the texels; returns the film and the pixel of each of its texels.
+/// Flights' paint on a surface.
+pub(super) struct Sprayed {
+    /// The paint.
+    pub(super) film: Film,
+    /// Pixel of every texel of the film.
+    pub(super) pixels: Vec<usize>,
+    /// Depth per pixel after each of equal parts of the spraying but the last.
+    pub(super) before: Vec<Image>,
+}
+
+/// Puts the paint of flights onto the texels.
 pub(super) fn spray<'a>(
     flights: impl Iterator<Item = &'a FlightLog>,
     task: &PaintingTask,
-) -> Result<(Film, Vec<usize>), MissionError> {
+) -> Result<Sprayed, MissionError> {
     let stage = Stage::start("spray");
     let (texels, pixels) = task.film_texels();
     let mut film = Film::new(texels)?;
     let shots: Vec<_> = flights.flat_map(|flight| flight.shots(SHOT_STEP)).collect();
-    film.deposit(&shots, &spray_model(&task.settings), task.met(), task.settings.threads, &mut |done, total| {
-        stage.share(done as f64 / total as f64);
-    })?;
+    let (mut before, mut sprayed) = (Vec::new(), 0);
+    for part in shots.chunks(shots.len().div_ceil(PARTS).max(1)) {
+        if sprayed > 0 {
+            before.push(task.depth_of(&film, &pixels));
+        }
+        film.deposit(part, &spray_model(&task.settings), task.met(), task.settings.threads, &mut |done, _| {
+            stage.share((sprayed + done) as f64 / shots.len() as f64);
+        })?;
+        sprayed += part.len();
+    }
     let balance = film.mass_balance();
     let share = 100.0 * balance.deposited as f64 / balance.emitted.max(1) as f64;
     stage.done(&format!("{share:.1} % of the paint on the surface"));
-    Ok((film, pixels))
+    Ok(Sprayed { film, pixels, before })
 }
 
 /// The noise of the localisation that was chosen, where it is a model of noise.
@@ -226,10 +247,12 @@ pub(super) fn fly_three(
 mod tests {
     use paint_planner::onboard::Endurance;
     use paint_planner::timing::TimingPolicy;
+    use paint_sim::Shot;
     use ptu_kinematics::Ptu;
 
     use super::super::test_panel;
     use super::*;
+    use crate::region::Scene;
 
     #[test]
     fn the_seed_and_the_layer_change_wind_and_localisation() {
@@ -246,6 +269,29 @@ mod tests {
             assert_eq!(usual[k], again[k]);
             assert_ne!(usual[k], other[k], "flight {k} ignores the seed");
             assert_ne!(usual[k], next[k], "flight {k} is the same in every layer");
+        }
+    }
+
+    /// After each third of the shots their paint lies there, and in the end what one call would have sprayed.
+    #[test]
+    fn the_paint_grows_by_thirds() {
+        let settings = MissionSettings { threads: 1, ..MissionSettings::default() };
+        let log = test_panel::flown(&settings).1;
+        let task = PaintingTask::undecided("wall", &Scene::whole(test_panel::mesh()), settings.clone()).unwrap();
+        let Sprayed { film, pixels, before } = spray(std::iter::once(&log), &task).unwrap();
+        let mut at_once = Film::new(task.film_texels().0).unwrap();
+        let shots = log.shots(SHOT_STEP);
+        at_once.deposit(&shots, &spray_model(&settings), task.met(), 1, &mut |_, _| ()).unwrap();
+        assert_eq!(film.mass_balance(), at_once.mass_balance());
+        let painted = task.depth_of(&film, &pixels);
+        assert_eq!(painted, task.depth_of(&at_once, &pixels));
+        let sum = |depth: &Image| depth.data().iter().sum::<f64>();
+        assert_eq!(before.len(), 2);
+        for (part, depth) in before.iter().enumerate() {
+            let sprayed = |shots: &[Shot]| shots.iter().map(|shot| shot.volume).sum::<f64>();
+            let share = sprayed(&shots[..(part + 1) * shots.len().div_ceil(3)]) / sprayed(&shots);
+            assert!((sum(depth) / sum(&painted) - share).abs() < 0.01, "{share} after part {part}");
+            assert!(depth.data().iter().zip(painted.data()).all(|(then, end)| then <= end));
         }
     }
 

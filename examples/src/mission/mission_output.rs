@@ -15,6 +15,7 @@ use super::inspect::inspect;
 use super::painted_mesh::save_painted_mesh;
 use super::painting_task::PaintingTask;
 use super::path_view::save_path;
+use super::progress_views::save_progress;
 use super::run::Mission;
 use super::settings::PainterChoice;
 use super::shading::shading;
@@ -55,6 +56,7 @@ pub fn save(mission: &Mission, folder: &Path) -> Result<crate::report::Report, M
         let painted = mission.painted_depth();
         painted_view(&mission.task, &painted)?.save(&folder.join("painted_view.png"))?;
         let shade = |hit: &Hit| shading(&mission.task, &painted, hit);
+        save_progress(mission, &folder.join("progress.png"))?;
         save_flown_path(mission, &shade, folder)?;
         stage.share(0.8);
         save_flights(&[mission], &colours, folder)?;

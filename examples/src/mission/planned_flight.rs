@@ -9,7 +9,7 @@ use paint_sim::{FlightSettings, TriangleSurface};
 
 use super::error::MissionError;
 use super::figures::{collisions, limit_violations};
-use super::fly::{counted_flight, spray};
+use super::fly::{Sprayed, counted_flight, spray};
 use super::mission_output::{painted_view, texture};
 use super::painting_task::PaintingTask;
 use super::planned_mission::PlannedMission;
@@ -76,7 +76,7 @@ impl<'a> PlannedFlight<'a> {
     /// Puts the paint of a flight onto the surface, writes `painted.png` and `painted_view.png`, and counts. `ways`: samples without paint.
     pub fn save(&self, log: &FlightLog, ways: &FlightLog, folder: &Path) -> Result<FlownFigures, MissionError> {
         let task = self.task;
-        let (film, pixels) = spray(std::iter::once(log), task)?;
+        let Sprayed { film, pixels, .. } = spray(std::iter::once(log), task)?;
         let depth = task.depth_of(&film, &pixels);
         texture(task, &depth).save(&folder.join("painted.png"))?;
         painted_view(task, &depth)?.save(&folder.join("painted_view.png"))?;

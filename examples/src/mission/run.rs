@@ -8,7 +8,7 @@ use paint_sim::flight::FlightSample;
 use ptu_kinematics::Joints;
 
 use super::error::MissionError;
-use super::fly::{LayerFlight, fly, spray};
+use super::fly::{LayerFlight, Sprayed, fly, spray};
 use super::identify::{Identified, identify};
 use super::painting_task::PaintingTask;
 use super::planned_mission::{PlannedMission, share_out_of_reach};
@@ -25,6 +25,8 @@ pub struct Mission {
     pub(super) film: Film,
     /// Pixel of every texel of the film.
     pub(super) pixels: Vec<usize>,
+    /// Depth per pixel after each of equal parts of the spraying but the last.
+    pub(super) partly_painted: Vec<Image>,
     pub(super) planning: f64,
     /// Paint of layers that no pose of the robot can spray at all, m³.
     pub(super) unreachable_paint: f64,
@@ -53,13 +55,13 @@ impl Mission {
         let (kept_off, left_bare, outcomes) = (planned.kept_off, planned.left_bare, planned.outcomes);
         let identified = identify(&mut task, &planned)?;
         let mut flights = fly(planned, &task, &[])?;
-        let (mut film, pixels) = spray(flights.iter().map(|f| &f.flight), &task)?;
+        let Sprayed { mut film, pixels, before: mut partly_painted } = spray(flights.iter().map(|f| &f.flight), &task)?;
         let mut looked = None;
         if task.settings.look {
             let (again, figures) = touch_up(&mut task, &flights, &film, &pixels)?;
             flights.extend(again);
             // From the beginning, as the shots of one flight are batched.
-            (film, _) = spray(flights.iter().map(|f| &f.flight), &task)?;
+            Sprayed { film, before: partly_painted, .. } = spray(flights.iter().map(|f| &f.flight), &task)?;
             looked = Some(figures);
         }
         Ok(Self {
@@ -67,6 +69,7 @@ impl Mission {
             flights,
             film,
             pixels,
+            partly_painted,
             planning,
             unreachable_paint,
             kept_off,

@@ -214,6 +214,7 @@ mod tests {
                 flights,
                 film,
                 pixels,
+                partly_painted: Vec::new(),
                 planning,
                 unreachable_paint,
                 kept_off,

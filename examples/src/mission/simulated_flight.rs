@@ -27,6 +27,13 @@ pub(super) fn reference<'a>(plan: &'a Plan, robot: &'a Robot, settings: &Mission
     PlanReference { plan, chain: &robot.chain, gun_length, stand_off: settings.planner.nozzle.stand_off }
 }
 
+/// The robot's own localisation.
+pub(super) struct OwnSenses<'a> {
+    pub(super) poses: &'a mut dyn PoseSource,
+    /// Corners of the surface in whose map it finds itself.
+    pub(super) surface: [Point3<f64>; 2],
+}
+
 /// Flies a piece of a plan, or all of it, with the robot's own servos and the controller that was chosen, by a source of poses or by the noise
 /// of `flight`.
 pub(super) fn fly_plan(
@@ -36,7 +43,7 @@ pub(super) fn fly_plan(
     robot: &Robot,
     settings: &MissionSettings,
     flight: &FlightSettings,
-    localisation: Option<&mut dyn PoseSource>,
+    localisation: Option<OwnSenses>,
 ) -> Result<FlightLog, MissionError> {
     let whole = reference(plan, robot, settings);
     let piece = piece.map(|sortie| Piece::of(&whole, sortie));
@@ -48,8 +55,8 @@ pub(super) fn fly_plan(
     };
     let log = match localisation {
         Some(source) => {
-            let approach = Approach::to(reference);
-            Approach::cut(fly_localised(&approach, controller.as_mut(), &mut gun, world, source, flight)?)
+            let approach = Approach::before(reference, source.surface);
+            approach.cut(fly_localised(&approach, controller.as_mut(), &mut gun, world, source.poses, flight)?)
         }
         None => fly_with(reference, controller.as_mut(), &mut gun, world, flight)?,
     };

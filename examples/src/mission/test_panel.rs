@@ -13,6 +13,11 @@ use crate::surface::PaintSurface;
 
 /// A wall in the plane x = 0, two metres wide, from one to three metres up, painted from smaller x.
 pub(super) fn surface() -> PaintSurface {
+    PaintSurface::new(&mesh(), 0.0125, &|_| ()).unwrap()
+}
+
+/// The same as a mesh.
+pub(super) fn mesh() -> TriangleMesh {
     let corner = |k: u32| [0.0, 1.0 - 0.25 * (k % 9) as f32, 1.0 + 0.25 * (k / 9) as f32];
     let mut mesh = TriangleMesh { positions: (0..81).map(corner).collect(), ..TriangleMesh::default() };
     for row in 0..8 {
@@ -21,7 +26,7 @@ pub(super) fn surface() -> PaintSurface {
             mesh.faces.extend([[a, a + 1, a + 10], [a, a + 10, a + 9]]);
         }
     }
-    PaintSurface::new(&mesh, 0.0125, &|_| ()).unwrap()
+    mesh
 }
 
 /// A wave of one metre, its normals tilted to both sides.

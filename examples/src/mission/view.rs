@@ -136,6 +136,21 @@ fn fitted(points: &[Point3<f64>], centre: Vector3<f64>, direction: Vector3<f64>)
     Ok(camera)
 }
 
+/// The same camera with so many pixels on its longer side.
+pub(super) fn smaller(camera: &Camera, side: u32) -> Camera {
+    let scale = f64::from(side) / f64::from(camera.width.max(camera.height));
+    let pixels = |count: u32| (scale * f64::from(count)).round() as u32;
+    Camera {
+        fx: scale * camera.fx,
+        fy: scale * camera.fy,
+        cx: scale * camera.cx,
+        cy: scale * camera.cy,
+        width: pixels(camera.width),
+        height: pixels(camera.height),
+        world_from_camera: camera.world_from_camera,
+    }
+}
+
 pub(super) fn picture_of(frame: &Frame) -> Rgb {
     Rgb::from_pixels(frame.width as usize, frame.height as usize, frame.colour.iter().copied())
 }

@@ -97,7 +97,7 @@ impl OnboardLocalisation {
     }
 
     /// A depth image of a robot that does not know where it is. Once it has been found and stands still, the odometry starts there; the pose of
-    /// the body. Where no keyframe shows it, it must sway to be found.
+    /// the body. Where no keyframe shows it, it must sway to be found. Without colour shape alone is compared: paint changes how a surface looks.
     ///
     /// # Errors
     /// What map and odometry refuse.
@@ -105,11 +105,11 @@ impl OnboardLocalisation {
         &mut self,
         stamp: Stamp,
         depth: &DepthView,
-        colour: &ColourView,
+        colour: Option<&ColourView>,
         stands: bool,
     ) -> Result<Option<Isometry3<f64>>, LocalisationError> {
         self.slam.set_vertical(self.body_from_camera.inverse_transform_vector(&self.up_in_body));
-        let outcome = self.slam.frame(seconds(stamp), depth, Some(colour), None)?;
+        let outcome = self.slam.frame(seconds(stamp), depth, colour, None)?;
         let found = outcome.tracking.filter(|_| stands && outcome.world_from_camera.is_some());
         let Some(measured) = found.and_then(|tracking| measurement(stamp, &tracking)) else { return Ok(None) };
         Ok(Some(self.aided.start(&measured)?))

@@ -13,7 +13,7 @@ use vio_ekf::Stamp;
 use vio_ekf::fusion::{AidedPose, ImuPairSettings, MapAidedSettings, UnifiedSettings};
 
 use super::localisation::{LocalisationError, OnboardLocalisation};
-use super::sway::{SWAY_MS, in_its_place, sway};
+use super::sway::{FIRST_MS, SWAY_MS, in_its_place, sway};
 use crate::simulated_sensors::{
     FRAMES_PER_SECOND, FaultInterval, PaintedFront, SensorFault, SimulatedCamera, SimulatedImage,
 };
@@ -186,7 +186,9 @@ impl<'a> LocalisedFlight<'a> {
             let image = self.capture(truth)?;
             let views = self.camera.views(&image);
             let cpu = ThreadTime::now();
-            let pose = self.onboard.relocalise(stamp(ms), &views.depth(), &views.colour(), stands);
+            // What does not look as it did may have been painted since.
+            let colour = (ms <= FIRST_MS).then(|| views.colour());
+            let pose = self.onboard.relocalise(stamp(ms), &views.depth(), colour.as_ref(), stands);
             self.figures.cpu += cpu.elapsed();
             if let Some(world_from_body) = pose? {
                 self.figures.relocalised_after_s = 1e-3 * ms as f64;

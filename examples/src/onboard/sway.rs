@@ -5,7 +5,7 @@ use paint_planner::onboard::minimum_jerk;
 use paint_sim::flight::Vehicle;
 
 /// It stands for so long at first, and at every place of its sway, and moves from one to the next, milliseconds.
-const FIRST_MS: i64 = 1000;
+pub(super) const FIRST_MS: i64 = 1000;
 const REST_MS: i64 = 200;
 const LEG_MS: i64 = 600;
 /// Places beside the first: to the left and up, m, with a heading, rad. The last is the first.

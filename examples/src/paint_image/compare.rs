@@ -11,7 +11,7 @@ use super::error::PaintImageError;
 use super::files::write_text;
 use super::ink::grey;
 use super::job::{Figures, Job, PainterKind};
-use crate::pictures::{Tile, save_contact_sheet};
+use crate::pictures::{TILE_SIDE, Tile, save_contact_sheet};
 
 /// Pictures on the sheet: the first ones.
 const SHOWN: usize = 8;
@@ -63,7 +63,7 @@ pub fn compare(job: &Job, pictures: &[Image], runs: usize, folder: &Path) -> Res
         });
     }
     write_text(&folder.join("compare.md"), &table(&rows))?;
-    save_contact_sheet(&folder.join("compare.png"), &sheet)?;
+    save_contact_sheet(&folder.join("compare.png"), &sheet, TILE_SIDE)?;
     Ok(rows)
 }
 

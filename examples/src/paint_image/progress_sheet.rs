@@ -5,7 +5,7 @@ use std::path::Path;
 use paint_net::{Image, Spray, SprayKernel};
 
 use super::error::PaintImageError;
-use crate::pictures::{Rgb, Tile, save_contact_sheet};
+use crate::pictures::{Rgb, TILE_SIDE, Tile, save_contact_sheet};
 
 /// Moments that are shown, beside the wanted picture.
 const MOMENTS: usize = 8;
@@ -43,5 +43,5 @@ pub(super) fn save_progress_sheet(
     let mut tiles = tiles.into_iter();
     let row = |_| tiles.by_ref().take((MOMENTS + 1).div_ceil(ROWS)).collect::<Vec<Tile>>();
     let rows: Vec<Vec<Tile>> = (0..ROWS).map(row).filter(|row| !row.is_empty()).collect();
-    Ok(save_contact_sheet(path, &rows)?)
+    Ok(save_contact_sheet(path, &rows, TILE_SIDE)?)
 }

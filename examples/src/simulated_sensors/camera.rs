@@ -16,6 +16,8 @@ use super::painted_front::PaintedFront;
 pub const FRAMES_PER_SECOND: f64 = 20.0;
 /// Size of an image and its focal length, pixels: half of the EuRoC vehicle's.
 const IMAGE: (usize, usize, f64) = (376, 240, 229.0);
+/// Tangents of half of the angles of view, to the side and up.
+pub const HALF_VIEW: [f64; 2] = [IMAGE.0 as f64 / (2.0 * IMAGE.2), IMAGE.1 as f64 / (2.0 * IMAGE.2)];
 /// Standard deviation of a pixel's noise, grey levels.
 const GREY_NOISE: f64 = 2.0;
 /// Standard deviation of a depth at distance z: `a + b (z - 0.4)²`, metres (Nguyen, Izadi, Lovell 2012).

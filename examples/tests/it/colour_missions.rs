@@ -147,6 +147,13 @@ fn a_picture_made_of_films_is_painted_in_them() {
     for file in ["wanted.png", "painted.png", "painted_view.png", "out_of_gamut.png", "report.json", "mission.toml"] {
         assert!(s.0.join("out").join(file).exists(), "{file} is missing");
     }
+    // The bare wall and one picture for each paint, no two of them alike: two rows of two.
+    let sheet = image::open(s.path("out/progress.png")).unwrap().to_rgb8();
+    let (width, height) = (sheet.width() / 2, sheet.height() / 2);
+    let tile =
+        |k: u32| image::imageops::crop_imm(&sheet, k % 2 * width, 40 + k / 2 * height, width, height - 60).to_image();
+    assert!(tile(0) != tile(1) && tile(1) != tile(2) && tile(0) != tile(2));
+    assert!(tile(3).pixels().all(|pixel| pixel.0 == [255; 3]));
     // Again from the file that it left, on one thread.
     let mut again = MissionFile::read(&s.0.join("out/mission.toml")).unwrap();
     again.settings.threads = 1;

@@ -57,11 +57,12 @@ struct Painted {
 }
 
 /// Files that a mission leaves, without those that hold times.
-const FILES: [&str; 12] = [
+const FILES: [&str; 13] = [
     "trajectory.csv",
     "wanted.png",
     "painted.png",
     "painted_view.png",
+    "progress.png",
     "error.png",
     "path.png",
     "angles.png",
