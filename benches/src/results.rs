@@ -2,11 +2,14 @@
 
 pub mod ablations;
 pub mod baselines;
+pub mod contour;
+pub mod digits;
 pub mod drift;
 mod excerpt;
 mod extent;
 pub mod handheld;
 pub mod latency;
+pub mod layers;
 pub mod overdose;
 pub mod papers;
 pub mod peers;
@@ -14,6 +17,7 @@ pub mod planners;
 pub mod table;
 pub mod thesis_network;
 pub mod time_allocation;
+pub mod wall;
 
 use std::error::Error;
 use std::path::Path;
@@ -26,15 +30,19 @@ pub type Rerun = fn(Extent, &Path) -> Result<Vec<Table>, Box<dyn Error>>;
 
 /// Reruns in the order of the papers, each with its name; what it needs on the way lies in the folder that it is given. Its first table is
 /// shown as such, the others are drawn by `docs/plots/plots.py`.
-pub const PARTS: [(&str, Rerun); 11] = [
+pub const PARTS: [(&str, Rerun); 15] = [
     ("papers", |_, _| Ok(vec![papers::table()])),
     ("drift", |extent, _| drift::tables(extent)),
     ("flown_baselines", |extent, _| baselines::tables(extent)),
     ("paper_ii_ablations", |_, _| ablations::tables()),
     ("planners", |extent, _| planners::tables(extent)),
     ("time_allocation", |_, _| time_allocation::tables()),
+    ("contour", |_, scratch| contour::tables(scratch)),
     ("latency", latency::tables),
+    ("layers", layers::tables),
+    ("digits", digits::tables),
     ("thesis_network", |extent, _| thesis_network::tables(extent)),
+    ("wall", |extent, _| wall::tables(extent)),
     ("handheld", handheld::tables),
     ("overdose", overdose::tables),
     ("peers", peers::tables),

@@ -59,7 +59,7 @@ const PAPERS: &[(&str, Parts)] = &[
             ["Fig. 7.4", "[time allocation](results.md#paint-planner)"],
             ["Fig. 7.5", "[contour](results.md#painting-by-hand-the-vr-interface)"],
             ["Fig. 7.6", "[latency](results.md#painting-by-hand-the-vr-interface)"],
-            ["Fig. 7.8", "[layers](vr.md#layers-of-paint) of published pigments; no printer"],
+            ["Fig. 7.8", "[layers](results.md#painting-by-hand-the-vr-interface) of published pigments; no printer"],
         ],
     ),
     (
@@ -73,7 +73,7 @@ const PAPERS: &[(&str, Parts)] = &[
             ["Fig. 8.5; Table 8.1; Algorithm 3", "[the network](thesis-network.md)"],
             ["Figs. 8.6; 8.8", "[films](thesis-network.md#training)"],
             ["Fig. 8.7", "[trainings; volumes](results.md#thesis-network)"],
-            ["Fig. 8.9", "[on a wall](thesis-network.md#in-missions)"],
+            ["Fig. 8.9", "[on a wall](thesis-network.md#in-missions); [figures](results.md#one-flight-or-layers)"],
         ],
     ),
     (
