@@ -134,7 +134,7 @@ pub(super) struct Sprayed {
     pub(super) film: Film,
     /// Pixel of every texel of the film.
     pub(super) pixels: Vec<usize>,
-    /// Depth per pixel after each of equal parts of the spraying but the last.
+    /// Depth per pixel after each of equal parts of the spraying but the last; none of a picture's paint.
     pub(super) before: Vec<Image>,
 }
 
@@ -149,7 +149,8 @@ pub(super) fn spray<'a>(
     let shots: Vec<_> = flights.flat_map(|flight| flight.shots(SHOT_STEP)).collect();
     let (mut before, mut sprayed) = (Vec::new(), 0);
     for part in shots.chunks(shots.len().div_ceil(PARTS).max(1)) {
-        if sprayed > 0 {
+        // A picture's paints are shown together.
+        if sprayed > 0 && !task.of_picture {
             before.push(task.depth_of(&film, &pixels));
         }
         film.deposit(part, &spray_model(&task.settings), task.met(), task.settings.threads, &mut |done, _| {

@@ -25,7 +25,7 @@ pub struct Mission {
     pub(super) film: Film,
     /// Pixel of every texel of the film.
     pub(super) pixels: Vec<usize>,
-    /// Depth per pixel after each of equal parts of the spraying but the last.
+    /// Depth per pixel after each of equal parts of the spraying but the last; none of a picture's paint.
     pub(super) partly_painted: Vec<Image>,
     pub(super) planning: f64,
     /// Paint of layers that no pose of the robot can spray at all, m³.

@@ -28,8 +28,8 @@ impl<'a> Approach<'a> {
         Self { plan, legs: vec![leg([back, first.position], [first.heading; 2])] }
     }
 
-    /// The same by way of a place whence the camera sees as much as it can of a surface within two corners that faces smaller x: who begins at its
-    /// rim would see half of it, and might not find himself.
+    /// The same by way of a place from which the camera sees as much as it can of a surface that faces smaller x, within two corners: at its rim
+    /// the robot would see half of it, and might not find itself.
     pub fn before(plan: &'a dyn Reference, [low, high]: [Point3<f64>; 2]) -> Self {
         let first = plan.at(0.0);
         let back = behind(&first);
