@@ -14,6 +14,7 @@ pub mod overdose;
 pub mod papers;
 pub mod peers;
 pub mod planners;
+mod program_report;
 pub mod table;
 pub mod thesis_network;
 pub mod time_allocation;

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use clap::Parser as _;
 use paintcopter::vr::{Arguments, run};
-use serde_json::Value;
 
+use super::program_report::ProgramReport;
 use super::table::{Table, number};
 
 /// The table.
@@ -17,8 +17,8 @@ pub fn tables(scratch: &Path) -> Result<Vec<Table>, Box<dyn Error>> {
     let folder = scratch.join("contour");
     let out = format!("--out={}", folder.display());
     run(&Arguments::try_parse_from(["vr", "--experiment=contour", &out])?)?;
-    let report: Value = serde_json::from_str(&std::fs::read_to_string(folder.join("contour/report.json"))?)?;
-    let figure = |name: &str| report[name].as_f64().ok_or_else(|| format!("report.json of vr lacks {name}"));
+    let report = ProgramReport::read(&folder.join("contour"))?;
+    let figure = |name: &str| report.figure(name);
     let mut table = Table::new("contour", &["figure", "letter", "asked", "here"]);
     let length = number(figure("contour_length_m")?, 2);
     table.row(["length of the contour; m".into(), "-".into(), "-".into(), length]);

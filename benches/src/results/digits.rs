@@ -5,9 +5,9 @@ use std::path::Path;
 
 use clap::Parser as _;
 use paintcopter::paint_image::{Arguments, run};
-use serde_json::Value;
 
 use super::extent::Extent;
+use super::program_report::ProgramReport;
 use super::table::{Table, number};
 
 /// Names the folder with MNIST's file of images.
@@ -29,7 +29,7 @@ const TRAININGS: [(&str, &[&str]); 4] = [
 /// Those of `paint-image`, and a report without what is shown.
 pub fn tables(extent: Extent, scratch: &Path) -> Result<Vec<Table>, Box<dyn Error>> {
     let (Extent::Whole, Some(data)) = (extent, std::env::var_os(DATA)) else {
-        println!("digits: left out: {DATA} names a folder with MNIST's images, and nothing is quick");
+        println!("digits: left out: {DATA} names the folder with MNIST's images, and a quick rerun trains nothing");
         return Ok(Vec::new());
     };
     let data = format!("--data={}", Path::new(&data).display());
@@ -42,9 +42,8 @@ pub fn tables(extent: Extent, scratch: &Path) -> Result<Vec<Table>, Box<dyn Erro
         let out = format!("--out={}", folder.display());
         let options = SHORT.iter().chain(*options).map(|option| (*option).to_string());
         run(&Arguments::try_parse_from(usual.into_iter().chain(options).chain([out]))?)?;
-        let report: Value = serde_json::from_str(&std::fs::read_to_string(folder.join("report.json"))?)?;
-        let figure =
-            |name: &str| report[name].as_f64().ok_or_else(|| format!("report.json of paint-image lacks {name}"));
+        let report = ProgramReport::read(&folder)?;
+        let figure = |name: &str| report.figure(name);
         table.row([
             (*name).into(),
             number(figure("bce_nats_per_picture")?, 1),

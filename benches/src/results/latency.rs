@@ -5,9 +5,9 @@ use std::path::Path;
 
 use clap::Parser as _;
 use paintcopter::vr::{Arguments, run};
-use serde_json::Value;
 
 use super::extent::Extent;
+use super::program_report::ProgramReport;
 use super::table::{Table, number};
 
 /// Length of the segments, speed of hand and robot (m, m/s), and the printed latencies: the letter's two, then ours.
@@ -63,8 +63,7 @@ pub fn tables(extent: Extent, scratch: &Path) -> Result<Vec<Table>, Box<dyn Erro
         let out = format!("--out={}", folder.display());
         let line = fixed.into_iter().chain([out]).chain(of.options.iter().map(ToString::to_string));
         run(&Arguments::try_parse_from(line)?)?;
-        let report: Value = serde_json::from_str(&std::fs::read_to_string(folder.join("report.json"))?)?;
-        let figure = |name: &str| report[name].as_f64().ok_or_else(|| format!("report.json of vr lacks {name}"));
+        let report = ProgramReport::read(&folder)?;
         let latencies = std::fs::read_to_string(folder.join("latency.csv"))?;
         let mut ranges = Vec::new();
         for (curve, digits) in [("time_s", 1), ("distance_m", 2)] {
@@ -82,8 +81,8 @@ pub fn tables(extent: Extent, scratch: &Path) -> Result<Vec<Table>, Box<dyn Erro
         }
         let [time, distance, planning] = of.printed.map(String::from);
         let [in_time, in_distance] = [ranges[0].clone(), ranges[1].clone()];
-        let planned = number(figure("planning_median_ms")?, 1);
-        let plans = number(figure("paint_tasks")?, 0);
+        let planned = number(report.figure("planning_median_ms")?, 1);
+        let plans = number(report.figure("paint_tasks")?, 0);
         table.row([of.name.into(), time, in_time, distance, in_distance, planning, planned, plans]);
     }
     Ok(vec![table, curves])

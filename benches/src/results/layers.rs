@@ -6,9 +6,9 @@ use std::path::Path;
 
 use clap::Parser as _;
 use paintcopter::vr::{Arguments, run};
-use serde_json::Value;
 
 use super::extent::Extent;
+use super::program_report::ProgramReport;
 use super::table::{Table, number};
 
 /// Names the folder with the measured pigments.
@@ -26,8 +26,8 @@ pub fn tables(extent: Extent, scratch: &Path) -> Result<Vec<Table>, Box<dyn Erro
     let folder = scratch.join("layers");
     let [data, out] = [("pigments", Path::new(&data)), ("out", &folder)].map(|(k, v)| format!("--{k}={}", v.display()));
     run(&Arguments::try_parse_from(["vr", "--experiment=layers", &data, &out])?)?;
-    let report: Value = serde_json::from_str(&std::fs::read_to_string(folder.join("report.json"))?)?;
-    let figure = |name: &str| report[name].as_f64().ok_or_else(|| format!("report.json of vr lacks {name}"));
+    let report = ProgramReport::read(&folder)?;
+    let figure = |name: &str| report.figure(name);
 
     let mut table = Table::new("layers", &["figure", "asked", "here"]);
     let (count, within) = (number(figure("pigments")?, 0), number(figure("pigments_within")?, 0));
