@@ -147,6 +147,9 @@ pub struct Report {
     /// Flights that tank or battery have cut the plans into.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sorties: Option<usize>,
+    /// Time of the plans that was not flown, as the robot could not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub not_flown_s: Option<f64>,
     /// Error of the film's thickness as the robot saw it over that thickness (both RMS), where it is a tenth of a unit or more and not opaque.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub film_estimate_error_share: Option<f64>,
@@ -338,6 +341,7 @@ impl Report {
             self.seed,
             self.version
         );
+        text += &not_flown(self.not_flown_s);
         for (file, caption) in [
             ("painted_view.png", "The painted surface as a camera sees it"),
             ("wanted.png", "Wanted"),
@@ -365,6 +369,11 @@ impl Report {
         }
         text
     }
+}
+
+/// What a report says first where some of the plans was not flown, s.
+pub(crate) fn not_flown(left_s: Option<f64>) -> String {
+    left_s.map_or_else(String::new, |left| format!("**Not all is flown: {left:.0} s of the plans are left.**\n\n"))
 }
 
 /// Refuses figures of which one is NaN or infinite.

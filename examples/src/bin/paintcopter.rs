@@ -61,5 +61,5 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     };
     say!("{summary}");
     result!("{}", folder.join("report.md").display());
-    Ok(())
+    coats.grounded().cloned().map_or(Ok(()), |grounded| Err(grounded.into()))
 }

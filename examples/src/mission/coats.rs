@@ -1,5 +1,6 @@
 //! Several paints: a mission for each, flown one after another, their films over each other.
 
+use std::borrow::Borrow;
 use std::path::PathBuf;
 use std::thread;
 
@@ -9,6 +10,7 @@ use paint_sim::{Paint, Substrate};
 
 use super::colour_doses::correct_colours;
 use super::error::MissionError;
+use super::grounded::Grounded;
 use super::painting_task::PaintingTask;
 use super::picture_task::PictureTask;
 use super::plan::{Draft, draft, finish, replan};
@@ -46,7 +48,10 @@ pub struct PlannedCoats {
 /// The missions of all paints, flown. Each is complete in itself; its pictures show its paint alone.
 pub struct Coats {
     pub(super) missions: Vec<(PathBuf, Mission)>,
+    /// What is wanted of every paint, depth per pixel, also of those that were not flown.
+    pub(super) wanted: Vec<(Paint, Image)>,
     pub(super) picture: Option<PictureTask>,
+    grounded: Option<Grounded>,
 }
 
 /// How a place of the painted wall looks.
@@ -130,13 +135,36 @@ impl Coats {
         PlannedCoats::new(tasks).and_then(Self::fly)
     }
 
-    /// Flies the paints in their order.
+    /// Flies the paints in their order. What was flown before a flight that could not be is kept, and [`grounded`](Self::grounded) says so.
     ///
     /// # Errors
-    /// As [`Mission::fly`].
-    pub fn fly(PlannedCoats { missions, picture }: PlannedCoats) -> Result<Self, MissionError> {
-        let fly = |(folder, planned)| Ok((folder, Mission::fly(planned)?));
-        Ok(Self { missions: missions.into_iter().map(fly).collect::<Result<_, MissionError>>()?, picture })
+    /// As [`Mission::fly`], of the first.
+    pub fn fly(PlannedCoats { missions: planned, picture }: PlannedCoats) -> Result<Self, MissionError> {
+        let wanted = planned.iter().map(|(_, mission)| (mission.task.paint.paint, mission.task.wanted_depth()));
+        let wanted = wanted.collect();
+        let (mut missions, mut grounded) = (Vec::new(), None::<Grounded>);
+        for (folder, planned) in planned {
+            let duration = planned.duration();
+            if let Some(grounded) = &mut grounded {
+                grounded.left_s += duration;
+                continue;
+            }
+            let paint = planned.task.paint.name.clone();
+            match Mission::fly(planned) {
+                Ok(mission) => {
+                    grounded.clone_from(&mission.grounded);
+                    missions.push((folder, mission));
+                }
+                Err(error) if missions.is_empty() => return Err(error),
+                Err(error) => grounded = Some(Grounded::by(&error.in_paint(&paint), duration)),
+            }
+        }
+        Ok(Self { missions, wanted, picture, grounded })
+    }
+
+    /// Why the rest was not flown, if it was not.
+    pub fn grounded(&self) -> Option<&Grounded> {
+        self.grounded.as_ref()
     }
 
     /// The missions in flying order, each with the folder of its results.
@@ -144,24 +172,34 @@ impl Coats {
         self.missions.iter().map(|(folder, mission)| (folder, mission))
     }
 
-    /// The wall on every pixel under the depths that a mission stands for, the first paint lowest; `None` beside the surface.
-    pub(super) fn looks(&self, depth: impl Fn(&Mission) -> Image) -> Result<Vec<Option<Look>>, MissionError> {
+    /// The wall on every pixel as it came out; `None` beside the surface.
+    pub(super) fn painted(&self) -> Result<Vec<Option<Look>>, MissionError> {
+        self.looks(self.missions().map(|(_, mission)| (&mission.task.paint.paint, mission.painted_depth())))
+    }
+
+    /// The same as it is wanted.
+    pub(super) fn wanted(&self) -> Result<Vec<Option<Look>>, MissionError> {
+        self.looks(self.wanted.iter().map(|(paint, depth)| (paint, depth)))
+    }
+
+    fn looks<'a, D: Borrow<Image>>(
+        &self,
+        layers: impl Iterator<Item = (&'a Paint, D)>,
+    ) -> Result<Vec<Option<Look>>, MissionError> {
         let Some((_, first)) = self.missions.first() else { return Ok(Vec::new()) };
-        let layers: Vec<(&Paint, Image)> =
-            self.missions.iter().map(|(_, mission)| (&mission.task.paint.paint, depth(mission))).collect();
-        looks(&layers, &first.task.coverage, self.picture.as_ref())
+        looks(layers, &first.task.coverage, self.picture.as_ref())
     }
 }
 
 /// The wall on every pixel under some depths of paints, the first lowest; `None` beside the surface.
-pub(super) fn looks(
-    layers: &[(&Paint, Image)],
+pub(super) fn looks<'a, D: Borrow<Image>>(
+    layers: impl Iterator<Item = (&'a Paint, D)>,
     coverage: &Image,
     picture: Option<&PictureTask>,
 ) -> Result<Vec<Option<Look>>, MissionError> {
     let mut wall = Wall::bare(coverage, picture)?;
     for (paint, depth) in layers {
-        wall.paint(paint, depth)?;
+        wall.paint(paint, depth.borrow())?;
     }
     Ok(wall.looks())
 }
@@ -217,7 +255,11 @@ pub(super) fn linear(looks: &[Option<Look>], width: usize, height: usize) -> Res
 
 #[cfg(test)]
 mod tests {
+    use super::super::settings::{LocalisationChoice, MissionSettings};
+    use super::super::test_panel;
     use super::*;
+    use crate::design::Design;
+    use crate::region::Scene;
     use paint_sim::paint::PaintName;
 
     #[test]
@@ -226,7 +268,7 @@ mod tests {
         let coverage = Image::filled(2, 1, 1.0);
         let lightness = |films: [(&Paint, f64); 2]| {
             let layers = films.map(|(paint, depth)| (paint, Image::filled(2, 1, depth)));
-            looks(&layers, &coverage, None).unwrap()[1].unwrap().lab[0]
+            looks(layers.into_iter(), &coverage, None).unwrap()[1].unwrap().lab[0]
         };
         let thick = 40.0;
         let (white_above, white_below) =
@@ -234,5 +276,26 @@ mod tests {
         let alone = |paint: &Paint| lightness([(paint, thick), (paint, 0.0)]);
         assert!((white_above - alone(&white)).abs() < 0.5, "{white_above}");
         assert!((white_below - alone(&charcoal)).abs() < 0.5 && white_below < 40.0, "{white_below}");
+    }
+
+    /// The second of three paints cannot be flown, as its localisation has no map: the first is there, and what was wanted of all.
+    #[test]
+    fn a_paint_that_cannot_be_flown_takes_nothing_from_those_before_it() {
+        let coat = |localisation| {
+            let settings = MissionSettings { localisation, threads: 1, ..MissionSettings::default() };
+            let scene = Scene::whole(test_panel::mesh());
+            let task = PaintingTask::new("panel", &scene, &Design::Gradient, settings).unwrap();
+            Coat { folder: PathBuf::new(), task }
+        };
+        let coats = [LocalisationChoice::MotionCapture, LocalisationChoice::Slam, LocalisationChoice::MotionCapture];
+        let tasks = CoatTasks { coats: coats.map(coat).into(), picture: None };
+        let flown = Coats::run(tasks).unwrap();
+        assert_eq!((flown.missions.len(), flown.wanted.len()), (1, 3));
+        let duration = flown.missions[0].1.flights()[0].plan.trajectory.duration();
+        let Grounded { left_s, why } = flown.grounded().unwrap();
+        assert!((left_s - 2.0 * duration).abs() < 1e-9, "{left_s} s of {duration} s each");
+        assert!(why.contains("--scan"), "{why}");
+        let first = CoatTasks { coats: vec![coat(LocalisationChoice::Slam)], picture: None };
+        assert!(matches!(Coats::run(first), Err(MissionError::NoMap)));
     }
 }

@@ -22,7 +22,7 @@ use super::view::{camera, picture_of, view};
 use super::written_file::{unwritable, write};
 use crate::pictures::{COLOUR_DIFFERENCE, Rgb, save_error_map};
 use crate::progress::Stage;
-use crate::report::{Report, save_figures};
+use crate::report::{Report, not_flown, save_figures};
 
 /// Depth from which a paint counts as wanted.
 const WANTED: f64 = 0.05;
@@ -54,6 +54,9 @@ pub struct CoatsFigures {
     pub tool_changes: usize,
     /// From the first start to the last landing: in the air, and on the ground while a film dries and the tank is changed.
     pub mission_time_s: f64,
+    /// Time of the plans that was not flown, as the robot could not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub not_flown_s: Option<f64>,
     /// Length of the vehicle's paths.
     pub path_length_m: f64,
     /// Paint that stayed on the surface.
@@ -99,11 +102,12 @@ impl CoatsFigures {
 
     fn markdown(&self) -> String {
         let mut text = format!(
-            "# {} painted in {} paints\n\n![The painted surface](painted_view.png)\n\n**Wanted**\n\n![Wanted](wanted.png)\n\n**Painted**\n\n\
+            "# {} painted in {} paints\n\n{}![The painted surface](painted_view.png)\n\n**Wanted**\n\n![Wanted](wanted.png)\n\n**Painted**\n\n\
              ![Painted](painted.png)\n\nMean CIEDE2000 {:.2}, {:.2} where paint is wanted; {} collisions, {} limit violations.\n\n{}\
              | paint | results | minutes | kg | not planned | SSIM |\n|---|---|---|---|---|---|\n",
             self.surface,
             self.paints.len(),
+            not_flown(self.not_flown_s),
             self.ciede2000_mean,
             self.ciede2000_mean_where_wanted,
             self.collisions,
@@ -130,10 +134,10 @@ pub fn save_coats(coats: &Coats, folder: &Path) -> Result<CoatsFigures, MissionE
         reports.push(save(mission, folder)?);
     }
     let stage = Stage::start("all paints");
-    let painted = coats.looks(Mission::painted_depth)?;
+    let painted = coats.painted()?;
     let wanted = match &coats.picture {
         Some(picture) => wanted_looks(picture, painted.len()),
-        None => coats.looks(Mission::wanted_depth)?,
+        None => coats.wanted()?,
     };
     save_pictures(coats, &wanted, &painted, folder)?;
     let figures = figures(coats, &reports, &wanted, &painted);
@@ -202,8 +206,7 @@ fn differences(wanted: &[Option<Look>], painted: &[Option<Look>]) -> Vec<Option<
 fn figures(coats: &Coats, reports: &[Report], wanted: &[Option<Look>], painted: &[Option<Look>]) -> CoatsFigures {
     let of = |value: fn(&Report) -> f64| reports.iter().map(value).collect::<Vec<f64>>();
     let sum = |value: fn(&Report) -> f64| reports.iter().map(value).sum::<f64>();
-    let depths: Vec<Image> = coats.missions().map(|(_, mission)| mission.wanted_depth()).collect();
-    let is_wanted = |k: usize| depths.iter().any(|depth| depth.data()[k] > WANTED);
+    let is_wanted = |k: usize| coats.wanted.iter().any(|(_, depth)| depth.data()[k] > WANTED);
     let differences = differences(wanted, painted);
     let difference = |k: usize| differences[k];
     let flight_times = of(|r| r.flight_time_s);
@@ -222,6 +225,7 @@ fn figures(coats: &Coats, reports: &[Report], wanted: &[Option<Look>], painted: 
         flight_time_s: sum(|r| r.flight_time_s),
         tool_changes,
         mission_time_s,
+        not_flown_s: coats.grounded().map(|grounded| grounded.left_s),
         path_length_m: sum(|r| r.path_length_m),
         paint_deposited_kg: sum(|r| r.paint_deposited_kg),
         strokes: reports.iter().map(|r| r.strokes).sum(),

@@ -29,7 +29,8 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
     let slam = statistics(&mission.flights, |f| &f.slam);
     let locked = statistics(&mission.flights, |f| &f.locked);
     let own = mission.flights.iter().filter_map(|f| f.localisation).reduce(LocalisationFigures::and);
-    let flight_time: f64 = mission.flights.iter().map(|f| f.plan.trajectory.duration()).sum();
+    let planned_time: f64 = mission.flights.iter().map(|f| f.plan.trajectory.duration()).sum();
+    let flight_time: f64 = mission.flights.iter().map(LayerFlight::duration).sum();
     let path: f64 = mission.flights.iter().map(|f| f.plan.path_length()).sum();
 
     let balance = mission.film.mass_balance();
@@ -75,11 +76,11 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         pan_error_rms_rad: flown.pan_error_rms,
         tilt_error_rms_rad: flown.tilt_error_rms,
         planning_s_per_m: mission.planning / path,
-        planning_per_flight_time: mission.planning / flight_time,
+        planning_per_flight_time: mission.planning / planned_time,
         path_length_m: path,
         flight_time_s: flight_time,
         times: TimeFigures::of(mission.flights.iter().map(|f| &f.plan), &mission.task.settings.planner.timing),
-        valve_open_share: mission.flights.iter().map(|f| f.plan.open_time()).sum::<f64>() / flight_time,
+        valve_open_share: mission.flights.iter().map(|f| f.plan.open_time()).sum::<f64>() / planned_time,
         valve_held_share: share_held(mission),
         transit_s: mission.flights.iter().map(|f| f.route.transit_time).sum(),
         paint_emitted_kg: kilograms(balance.emitted),
@@ -110,6 +111,7 @@ pub fn report(mission: &Mission, inspection: &Inspection) -> Result<Report, Miss
         fill_mean_ratio: fill.as_ref().map(|f| f.mean),
         localisation: own.map(|own| LocalisationReport::of(&own, flight_time)),
         sorties: mission.sorties(),
+        not_flown_s: mission.grounded.as_ref().map(|grounded| grounded.left_s),
         film_estimate_error_share: mission.looked.map(|looked| looked.film_error),
         film_estimate_seen_share: mission.looked.map(|looked| looked.film_seen),
         paint_missing_kg: mission.looked.map(|looked| looked.missing * mission.task.paint.density),

@@ -10,11 +10,13 @@ use paint_sim::{Film, FlightSettings, TriangleSurface};
 
 use super::error::MissionError;
 use super::flight_sensors::{camera_before, localised_flight};
+use super::grounded::Grounded;
 use super::nozzle::spray_model;
 use super::painting_task::PaintingTask;
 use super::plan::Planned;
 use super::settings::{LocalisationChoice, MissionSettings};
 use super::simulated_flight::{OwnSenses, flight_settings, fly_plan};
+use super::sorties::{Sorties, in_pieces};
 use crate::adapters::Robot;
 use crate::onboard::{LocalisationFigures, LocalisedFlight};
 use crate::progress::Stage;
@@ -39,43 +41,79 @@ pub struct LayerFlight {
     pub(super) localisation: Option<LocalisationFigures>,
     /// Pieces that tank or battery have cut it into.
     pub(super) sorties: usize,
+    /// Time of the plan that was not flown, s: a later sortie could not be.
+    pub(super) left_s: f64,
     /// Flown with a localisation that errs by 7 cm.
     pub slam: FlightLog,
     /// The baseline's plan flown with pan and tilt at zero (Paper II, section 7.2).
     pub locked: FlightLog,
 }
 
-/// Flies every layer three times, after others whose paint is on the surface.
-pub(super) fn fly(
-    planned: Planned,
-    task: &PaintingTask,
-    before: &[LayerFlight],
-) -> Result<Vec<LayerFlight>, MissionError> {
+impl LayerFlight {
+    /// Time of the plan that was flown, s.
+    pub(super) fn duration(&self) -> f64 {
+        self.plan.trajectory.duration() - self.left_s
+    }
+}
+
+/// What was flown of a plan.
+#[derive(Default)]
+pub(super) struct Flown {
+    /// Its layers in their order.
+    pub(super) layers: Vec<LayerFlight>,
+    /// Why they are not all, or not whole.
+    pub(super) grounded: Option<Grounded>,
+}
+
+/// Flies every layer three times, after others whose paint is on the surface. The first flight of all that cannot be flown is an error, a later
+/// one the end of it.
+pub(super) fn fly(planned: Planned, task: &PaintingTask, before: &[LayerFlight]) -> Result<Flown, MissionError> {
     let stage = Stage::start("fly");
     let count = planned.layers.len();
     let mut flights = Vec::with_capacity(count);
+    let mut grounded: Option<Grounded> = None;
     let mut faulty = task.settings.clone();
     for (k, (route, plan, smoothing)) in planned.layers.into_iter().enumerate() {
+        if let Some(grounded) = &mut grounded {
+            grounded.left_s += plan.trajectory.duration();
+            continue;
+        }
         stage.share(k as f64 / count as f64);
         let layer = before.len() + k;
         if layer > 0 {
             faulty.faults = Faults::default();
         }
-        let mut told = (None, 0);
+        let mut told = Sorties::default();
         let logs: Vec<&FlightLog> = before.iter().chain(&flights).map(|layer| &layer.flight).collect();
         let counted = || {
-            let (flight, localisation, sorties) = fly_sorties(&plan, task, &faulty, layer as u64, &logs)?;
-            told = (localisation, sorties);
+            let (flight, sorties) = fly_sorties(&plan, task, &faulty, layer as u64, &logs)?;
+            told = sorties;
             Ok(flight)
         };
-        let [flight, slam, locked] =
-            fly_beside([&plan, &smoothing], task.met(), &task.robot, &faulty, layer as u64, counted)?;
-        let (localisation, sorties) = told;
-        flights.push(LayerFlight { route, plan, smoothing, flight, localisation, sorties, slam, locked });
+        match fly_beside([&plan, &smoothing], task.met(), &task.robot, &faulty, layer as u64, counted) {
+            Ok([flight, slam, locked]) => {
+                let Sorties { localisation, count: sorties, ended } = told;
+                let left_s = ended.as_ref().map_or(0.0, |ended| ended.left_s);
+                grounded = ended;
+                flights.push(LayerFlight {
+                    route,
+                    plan,
+                    smoothing,
+                    flight,
+                    localisation,
+                    sorties,
+                    left_s,
+                    slam,
+                    locked,
+                });
+            }
+            Err(error) if layer > 0 => grounded = Some(Grounded::by(&error, plan.trajectory.duration())),
+            Err(error) => return Err(error),
+        }
     }
-    let seconds: f64 = flights.iter().map(|f| f.plan.trajectory.duration()).sum();
+    let seconds: f64 = flights.iter().map(LayerFlight::duration).sum();
     stage.done(&format!("{:.0} min in the air, three times", seconds / 60.0));
-    Ok(flights)
+    Ok(Flown { layers: flights, grounded })
 }
 
 /// The flight whose paint counts, in as many sorties as tank and battery ask for; each has wind of its own, and finds itself anew before the
@@ -86,34 +124,27 @@ fn fly_sorties(
     settings: &MissionSettings,
     layer: u64,
     before: &[&FlightLog],
-) -> Result<(FlightLog, Option<LocalisationFigures>, usize), MissionError> {
-    let endurance = &settings.endurance;
+) -> Result<(FlightLog, Sorties), MissionError> {
     let flow = |time: f64| plan.setpoint(time).flow;
-    let pieces = if endurance.is_endless() {
+    let duration = plan.trajectory.duration();
+    let pieces = if settings.endurance.is_endless() {
         vec![None]
     } else {
-        sorties(plan.trajectory.duration(), &flow, endurance)?.into_iter().map(Some).collect()
+        sorties(duration, &flow, &settings.endurance)?.into_iter().map(Some).collect()
     };
-    let (mut whole, mut figures): (Option<FlightLog>, _) = (None, None);
-    for (k, piece) in pieces.iter().enumerate() {
-        let usual = counted_flight(plan, &task.robot, settings, layer);
+    let usual = counted_flight(plan, &task.robot, settings, layer);
+    in_pieces(&pieces, duration, &mut |k, piece, flown| {
         let flight = FlightSettings {
             seed: usual.seed.wrapping_add(SORTIE * k as u64),
             faults: if k == 0 { usual.faults } else { Faults::default() },
             ..usual
         };
-        let mut onboard = onboard(task, before.iter().copied().chain(&whole))?;
+        let mut onboard = onboard(task, before.iter().copied().chain(flown))?;
         let surface = task.surface.corners();
         let source = onboard.as_mut().map(|onboard| OwnSenses { poses: onboard as &mut dyn PoseSource, surface });
-        let part = fly_plan(plan, *piece, task.met(), &task.robot, settings, &flight, source)?;
-        let told = onboard.map(|onboard| onboard.figures());
-        figures = told.map(|told| figures.map_or(told, |before: LocalisationFigures| before.and(told)));
-        match &mut whole {
-            Some(whole) => whole.samples.extend(part.samples),
-            None => whole = Some(part),
-        }
-    }
-    whole.map(|whole| (whole, figures, pieces.len())).ok_or(MissionError::NothingToPaint("the plan has no pieces"))
+        let flown = fly_plan(plan, piece, task.met(), &task.robot, settings, &flight, source)?;
+        Ok((flown, onboard.map(|onboard| onboard.figures())))
+    })
 }
 
 /// The robot's own localisation, if it is to fly by that, before a surface with the paint of earlier flights. It finds itself anew before

@@ -193,6 +193,11 @@ impl PaintingTask {
         depth
     }
 
+    /// Paint depth per pixel as it is wanted.
+    pub(super) fn wanted_depth(&self) -> Image {
+        self.wanted.map(|ink| self.appearance.ink().inverse(ink))
+    }
+
     /// The texels that paint falls on, with the pixel of each.
     pub(super) fn film_texels(&self) -> (Vec<Texel>, Vec<usize>) {
         let (texels, pixels) = self.surface.film_texels();

@@ -69,8 +69,8 @@ pub fn preview_picture(tasks: &CoatTasks, folder: &Path) -> Result<Option<Pictur
     let canvas = |task: &super::painting_task::PaintingTask| {
         task.layers.last().map_or_else(|| task.coverage.map(|_| 0.0), |layer| layer.canvas.clone())
     };
-    let layers: Vec<_> = tasks.coats.iter().map(|coat| (&coat.task.paint.paint, canvas(&coat.task))).collect();
-    let expected = looks(&layers, &task.coverage, Some(picture))?;
+    let layers = tasks.coats.iter().map(|coat| (&coat.task.paint.paint, canvas(&coat.task)));
+    let expected = looks(layers, &task.coverage, Some(picture))?;
     let wanted = wanted_looks(picture, expected.len());
     let (width, height) = (task.surface.width(), task.surface.height());
     for (looks, name) in [(&wanted, "wanted.png"), (&expected, "expected.png")] {

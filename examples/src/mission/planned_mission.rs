@@ -33,6 +33,11 @@ impl PlannedMission {
         Ok(mission)
     }
 
+    /// Time in the air, s.
+    pub(super) fn duration(&self) -> f64 {
+        self.layers().map(|(_, plan)| plan.trajectory.duration()).sum()
+    }
+
     /// Route and plan of every layer, in flying order.
     pub fn layers(&self) -> impl Iterator<Item = (&Route, &Plan)> {
         self.planned.layers.iter().map(|(route, plan, _)| (route, plan))

@@ -8,7 +8,8 @@ use paint_sim::flight::FlightSample;
 use ptu_kinematics::Joints;
 
 use super::error::MissionError;
-use super::fly::{LayerFlight, Sprayed, fly, spray};
+use super::fly::{Flown, LayerFlight, Sprayed, fly, spray};
+use super::grounded::Grounded;
 use super::identify::{Identified, identify};
 use super::painting_task::PaintingTask;
 use super::planned_mission::{PlannedMission, share_out_of_reach};
@@ -39,6 +40,8 @@ pub struct Mission {
     pub(super) looked: Option<TouchUpFigures>,
     /// What an excitation flight told, if one was flown.
     pub(super) identified: Option<Identified>,
+    /// Why the rest was not flown, if it was not.
+    pub(super) grounded: Option<Grounded>,
 }
 
 impl Mission {
@@ -47,22 +50,29 @@ impl Mission {
         PlannedMission::new(task).and_then(Self::fly)
     }
 
-    /// Flies what is planned, and sprays it onto the film.
+    /// Flies what is planned, and sprays it onto the film. What was flown before a flight that could not be is kept, and the
+    /// report says so.
     pub fn fly(mission: PlannedMission) -> Result<Self, MissionError> {
         let PlannedMission { mut task, planned } = mission;
         task.settings.check_simulated()?;
         let (planning, unreachable_paint) = (planned.seconds, planned.unreachable_paint);
         let (kept_off, left_bare, outcomes) = (planned.kept_off, planned.left_bare, planned.outcomes);
         let identified = identify(&mut task, &planned)?;
-        let mut flights = fly(planned, &task, &[])?;
+        let Flown { layers: mut flights, mut grounded } = fly(planned, &task, &[])?;
         let Sprayed { mut film, pixels, before: mut partly_painted } = spray(flights.iter().map(|f| &f.flight), &task)?;
         let mut looked = None;
-        if task.settings.look {
-            let (again, figures) = touch_up(&mut task, &flights, &film, &pixels)?;
-            flights.extend(again);
-            // From the beginning, as the shots of one flight are batched.
-            Sprayed { film, before: partly_painted, .. } = spray(flights.iter().map(|f| &f.flight), &task)?;
-            looked = Some(figures);
+        if task.settings.look && grounded.is_none() {
+            match touch_up(&mut task, &flights, &film, &pixels) {
+                Ok((again, figures)) => {
+                    flights.extend(again.layers);
+                    grounded = again.grounded;
+                    // From the beginning, as the shots of one flight are batched.
+                    Sprayed { film, before: partly_painted, .. } = spray(flights.iter().map(|f| &f.flight), &task)?;
+                    looked = Some(figures);
+                }
+                // How long painting again would have taken is not known.
+                Err(error) => grounded = Some(Grounded::by(&error, 0.0)),
+            }
         }
         Ok(Self {
             task,
@@ -77,6 +87,7 @@ impl Mission {
             outcomes,
             looked,
             identified,
+            grounded,
         })
     }
 
@@ -98,7 +109,7 @@ impl Mission {
 
     /// Paint depth per pixel as it is wanted.
     pub(super) fn wanted_depth(&self) -> Image {
-        self.task.wanted.map(|ink| self.task.appearance.ink().inverse(ink))
+        self.task.wanted_depth()
     }
 
     pub(super) fn painted_ink(&self) -> Image {

@@ -222,6 +222,7 @@ mod tests {
                 outcomes,
                 looked,
                 identified: None,
+                grounded: None,
             };
             likeness(&mission).unwrap().unwrap()
         };

@@ -6,7 +6,7 @@ use paint_sim::film::inspection::FilmEstimate;
 
 use super::decide::decide;
 use super::error::MissionError;
-use super::fly::{LayerFlight, fly};
+use super::fly::{Flown, LayerFlight, fly};
 use super::look::look;
 use super::painting_task::PaintingTask;
 use super::plan::plan;
@@ -40,7 +40,7 @@ pub(super) fn touch_up(
     flights: &[LayerFlight],
     film: &Film,
     pixels: &[usize],
-) -> Result<(Vec<LayerFlight>, TouchUpFigures), MissionError> {
+) -> Result<(Flown, TouchUpFigures), MissionError> {
     let expected = expected_depth(task);
     let bare: Vec<bool> = pixels.iter().map(|&pixel| expected.data()[pixel] < NONE).collect();
     let told = look(task, flights, &bare)?;
@@ -58,12 +58,12 @@ pub(super) fn touch_up(
     let truth: Vec<f64> = (0..told.len()).map(|k| film.thickness(k)).collect();
     let figures = figures(&truth, &told, lacking * UNIT_THICKNESS);
     if lacking < WORTH * all {
-        return Ok((Vec::new(), figures));
+        return Ok((Flown::default(), figures));
     }
     let wanted = missing.map(|depth| task.appearance.ink().forward(depth));
     let decided = decide(&wanted, &task.coverage, &task.surface, &task.in_reach, &task.appearance, &task.settings);
     let layers = match decided {
-        Err(MissionError::NothingToPaint(_)) => return Ok((Vec::new(), figures)),
+        Err(MissionError::NothingToPaint(_)) => return Ok((Flown::default(), figures)),
         other => other?,
     };
     // Doses are fitted to what is wanted of these flights.
