@@ -34,13 +34,15 @@ pub struct MapAidedSettings {
     pub trusted_age_s: f64,
     /// Nor, after a start in motion, is one that the map has not confirmed so many times in a row; 10.
     pub trusted_confirmations: usize,
-    /// A pose in the map that is off the expected one by more than this, m and rad, and by more than three deviations, contradicts it; 0.02, 0.02.
+    /// A pose in the map that is off the expected one by more than this, m and rad, and by more than three deviations of both, contradicts it;
+    /// 0.02, 0.02.
     pub contradiction: [f64; 2],
     /// Poses in the map follow from each other if they depart from constant velocity by no more than this, m and rad; 0.1, 0.1.
     pub jump: [f64; 2],
     /// Inertial samples farther apart than this, s, end the odometry, and without one for so long it says nothing; 0.02.
     pub longest_gap_s: f64,
-    /// Poses in the map in a row that must follow from each other before the odometry starts again; 2.
+    /// Poses in the map in a row that must follow from each other before the odometry starts again, and, after one that contradicted it alone,
+    /// that must confirm it before it is trusted; 2.
     pub confirmations: usize,
 }
 
@@ -83,8 +85,9 @@ const MOVING: f64 = 0.1;
 /// Inertial samples are kept for so long, s: a pose in the map comes no later than this, and the one before it is no older.
 const KEPT: f64 = 0.5;
 
-/// [`UnifiedVio`] in a stored map, with tests of what it is given: inertial samples that stand still or have gaps, and poses in the map that
-/// contradict the expected ones, end the odometry at once. The map's poses, moved on, stand in for it, not to be trusted, until enough of
+/// [`UnifiedVio`] in a stored map, with tests of what it is given: inertial samples that stand still or have gaps end the odometry at once. So
+/// do two poses in the map that follow from each other and contradict the expected ones; after the first the odometry is not trusted, but where
+/// little of the map is in view the map may be the one that errs. The map's poses, moved on, stand in for it, not to be trusted, until enough of
 /// them follow from each other; the odometry then starts anew.
 #[derive(Debug, Clone)]
 pub struct MapAidedVio {
@@ -100,6 +103,8 @@ pub struct MapAidedVio {
     /// When the map confirmed the odometry last, and how many times it has to before that is trusted.
     confirmed: Option<Stamp>,
     to_confirm: usize,
+    /// The last pose in the map contradicted the odometry.
+    contradicted: bool,
     last: Option<MapPose>,
     /// Poses in the map that have followed from each other since the odometry was given up; `None` while it goes on.
     recovering: Option<usize>,
@@ -125,6 +130,7 @@ impl MapAidedVio {
             gravity: vio.gravity,
             confirmed: None,
             to_confirm: 0,
+            contradicted: false,
             last: None,
             recovering: None,
             source: 0,
@@ -238,15 +244,17 @@ impl MapAidedVio {
         }
         // What was expected of another source says nothing.
         let expected = expected.filter(|expected| expected.source == self.source);
+        let [position, attitude] = self.spread(found)?;
         let agrees = |expected: &AidedPose| {
             let [shift, turn] = self.settings.contradiction;
-            let within = [shift.max(3.0 * expected.position_sigma_m), turn];
+            let within = [shift.max(3.0 * expected.position_sigma_m.hypot(position)), turn.max(3.0 * attitude)];
             agree(&expected.world_from_body, &pose.world_from_body, within)
         };
         if !expected.is_none_or(agrees) {
-            self.give_up();
+            self.contradict(follows);
             return Ok(false);
         }
+        self.contradicted = false;
         if expected.is_some() {
             self.confirmed = Some(pose.stamp);
             self.to_confirm = self.to_confirm.saturating_sub(1);
@@ -294,9 +302,19 @@ impl MapAidedVio {
         Some(AidedPose { world_from_body, position_sigma_m, from_map: false, trusted, source: *source })
     }
 
+    /// Odometry and map contradict each other. Which of them errs says the next pose in the map: if it follows from this one, it is the odometry.
+    fn contradict(&mut self, follows: bool) {
+        if self.contradicted && follows {
+            self.give_up();
+        } else {
+            (self.contradicted, self.confirmed) = (true, None);
+            self.to_confirm = self.to_confirm.max(self.settings.confirmations);
+        }
+    }
+
     /// Nothing that the odometry says is believed until it starts again.
     fn give_up(&mut self) {
-        (self.confirmed, self.recovering) = (None, Some(0));
+        (self.confirmed, self.recovering, self.contradicted) = (None, Some(0), false);
         self.source += 1;
     }
 

@@ -100,17 +100,20 @@ fn what_the_map_shows_without_fixing_it_is_trusted_as_long_as_the_odometry_knows
     }
     assert!((2..90).contains(&trusted), "{trusted}");
     // What was expected of another source says nothing.
-    assert!(!scene.map(0.05), "5 cm off");
+    assert!(!scene.map(0.05) && !scene.map(0.05), "5 cm off");
     let held = scene.vio.pose(at(scene.now));
     assert!(!scene.vio.seen(at(scene.now), held.as_ref()));
 }
 
 #[test]
-fn a_contradiction_ends_the_odometry_which_is_trusted_again_after_ten_confirmations() {
+fn two_contradictions_end_the_odometry_which_is_trusted_again_after_ten_confirmations() {
     let mut scene = Scene::started();
     assert!(scene.map(0.0) && scene.map(0.0));
     let source = scene.pose().source;
     assert!(!scene.map(0.05), "5 cm off");
+    let doubted = scene.pose();
+    assert!(!doubted.from_map && !doubted.trusted && doubted.source == source);
+    assert!(!scene.map(0.05), "and again");
     let held = scene.pose();
     assert!(held.from_map && !held.trusted && held.source > source);
     assert!((held.world_from_body.translation.x - 0.05).abs() < 1e-9);
@@ -149,6 +152,45 @@ fn without_samples_the_map_stands_in_and_a_stuck_axis_is_no_sample() {
     assert!(scene.vio.pose(at(scene.now)).is_none(), "and nothing recent says where the body is");
 }
 
+/// At the rim of a map, say: one pose is off, and then there is none for a while.
+#[test]
+fn a_pose_in_the_map_that_errs_alone_does_not_end_the_odometry() {
+    let mut scene = Scene::started();
+    assert!(scene.map(0.0) && scene.map(0.0) && scene.pose().trusted);
+    let source = scene.pose().source;
+    assert!(!scene.map(0.05), "5 cm off");
+    for _ in 0..2 {
+        scene.sense(POSE, true);
+        let expected = scene.vio.pose(at(scene.now));
+        assert!(!scene.vio.map(None, expected.as_ref()).unwrap());
+        let AidedPose { trusted, from_map, world_from_body, .. } = scene.pose();
+        assert!(!trusted && !from_map);
+        assert!((world_from_body.translation.vector - Vector3::z()).norm() < 5e-3, "{world_from_body}");
+    }
+    for _ in 0..5 {
+        assert!(scene.map(0.0));
+    }
+    assert!(scene.pose().trusted && !scene.map(0.05));
+    assert!(scene.map(0.0) && !scene.pose().trusted, "one is not enough");
+    assert!(scene.map(0.0) && scene.pose().trusted && scene.pose().source == source);
+    // Nor do two that do not follow from each other.
+    assert!(!scene.map(0.05) && !scene.map(-0.5) && scene.pose().source == source);
+}
+
+/// Turned by 1.7 degrees, which contradicts unless the map knows no better.
+#[test]
+fn a_pose_in_the_map_contradicts_only_as_far_as_it_is_known() {
+    for (attitude_sigma, confirms) in [(2e-2, true), (1e-3, false)] {
+        let mut scene = Scene::started();
+        assert!(scene.map(0.0) && scene.map(0.0));
+        scene.sense(POSE, true);
+        let expected = scene.vio.pose(at(scene.now));
+        let turned = Isometry3::new(Vector3::z(), Vector3::new(0.0, 0.0, 0.03));
+        let found = PoseMeasurement::isotropic(0, at(scene.now), turned, 1e-3, attitude_sigma);
+        assert_eq!(scene.vio.map(Some(&found), expected.as_ref()).unwrap(), confirms, "{attitude_sigma} rad");
+    }
+}
+
 /// Poses come 60 ms late, from a body that swings by half a metre with up to 2 m/s².
 #[test]
 fn in_motion_it_starts_again_with_the_velocity_of_the_moment() {
@@ -167,8 +209,8 @@ fn in_motion_it_starts_again_with_the_velocity_of_the_moment() {
             taken = Some((scene.now, scene.vio.pose(at(scene.now))));
         }
         if let Some((then, expected)) = taken.filter(|(then, _)| scene.now - then == 60) {
-            // The first one contradicts what is expected.
-            let wrong = if k < 40 { 0.05 } else { 0.0 };
+            // The first two contradict what is expected.
+            let wrong = if k < 60 { 0.05 } else { 0.0 };
             let pose = Isometry3::translation(place(then) + wrong, 0.0, 1.0);
             let found = PoseMeasurement::isotropic(0, at(then), pose, 1e-3, 1e-3);
             scene.vio.map(Some(&found), expected.as_ref()).unwrap();
