@@ -18,6 +18,7 @@ pub use identified::IdentifiedFigures;
 pub use localisation::LocalisationReport;
 pub use reach::ReachNeeds;
 pub use times::TimeFigures;
+pub(crate) use times::not_flown;
 
 /// The figures of one mission. Flat, SI units in the names; every number is finite.
 #[derive(Debug, Clone, Serialize)]
@@ -369,11 +370,6 @@ impl Report {
         }
         text
     }
-}
-
-/// What a report says first where some of the plans was not flown, s.
-pub(crate) fn not_flown(left_s: Option<f64>) -> String {
-    left_s.map_or_else(String::new, |left| format!("**Not all is flown: {left:.0} s of the plans are left.**\n\n"))
 }
 
 /// Refuses figures of which one is NaN or infinite.

@@ -61,3 +61,8 @@ impl TimeFigures {
         ]
     }
 }
+
+/// What a report says first where some of the plans was not flown, s.
+pub(crate) fn not_flown(left_s: Option<f64>) -> String {
+    left_s.map_or_else(String::new, |left| format!("**Not all is flown: {left:.0} s of the plans are left.**\n\n"))
+}
