@@ -17,6 +17,7 @@ mod recorder;
 mod report;
 mod run;
 mod simulated_robot;
+mod simulation;
 mod udp;
 
 pub use arguments::{Arguments, AutopilotChoice};

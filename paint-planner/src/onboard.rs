@@ -4,11 +4,13 @@
 mod failsafe;
 mod guidance;
 mod phase;
+mod phases;
 mod sorties;
 mod straight_way;
 
 pub use failsafe::{Cause, FailsafeSettings, Watched, WatchedPose};
 pub use guidance::{FlightPlan, Guidance, Guided};
-pub use phase::{Phase, Phases, Request, Situation};
+pub use phase::{Phase, Request, Situation};
+pub use phases::Phases;
 pub use sorties::{Endurance, Sortie, sorties};
 pub use straight_way::{StraightWay, minimum_jerk};

@@ -12,7 +12,7 @@ pub struct Odometry {
     pub world_from_body: Isometry3<f64>,
     /// Velocity, world frame, m/s; `None` where only poses are known.
     pub velocity: Option<Vector3<f64>>,
-    /// Covariance of the position, world frame, m^2.
+    /// Covariance of the position, world frame, m^2; infinite where it is not known.
     pub position_covariance: Matrix3<f64>,
     /// Covariance of the attitude about the body's axes, rad^2.
     pub attitude_covariance: Matrix3<f64>,
@@ -38,6 +38,11 @@ impl Odometry {
         let position = turned(&self.position_covariance, &frames::world);
         let attitude = turned(&self.attitude_covariance, &frames::body);
         let velocity = turned(&self.velocity_covariance, &in_body);
+        let mut pose_covariance = upper_triangle(&position, &attitude);
+        if !position[(0, 0)].is_finite() {
+            // Unknown.
+            pose_covariance[0] = f32::NAN;
+        }
         let mut velocity_covariance = upper_triangle(&velocity, &Matrix3::zeros());
         if self.velocity.is_none() {
             // Unknown.
@@ -55,7 +60,7 @@ impl Odometry {
             rollspeed: f32::NAN,
             pitchspeed: f32::NAN,
             yawspeed: f32::NAN,
-            pose_covariance: upper_triangle(&position, &attitude),
+            pose_covariance,
             velocity_covariance,
             frame_id: if self.north { MavFrame::MAV_FRAME_LOCAL_NED } else { MavFrame::MAV_FRAME_LOCAL_FRD },
             child_frame_id: MavFrame::MAV_FRAME_BODY_FRD,
@@ -107,6 +112,10 @@ mod tests {
         // The body's x is the world's y.
         assert!((v[0] - 0.02).abs() < 1e-6 && (v[6] - 0.01).abs() < 1e-6 && (v[11] - 0.03).abs() < 1e-6);
         assert_eq!((message.time_usec, message.reset_counter), (250_000, 3));
+        // What is not known is said by its first number.
+        let unknown = Odometry { position_covariance: Matrix3::from_diagonal_element(f64::INFINITY), ..sent };
+        let MavMessage::ODOMETRY(message) = unknown.message(0.25) else { panic!("another message") };
+        assert!(message.pose_covariance[0].is_nan() && message.x == 0.0 && message.y == 2.0);
         assert_eq!((message.frame_id as u32, message.child_frame_id as u32), (20, 12));
         let MavMessage::ODOMETRY(poses) = Odometry { velocity: None, ..sent }.message(0.0) else { panic!("another") };
         assert!(poses.vx.is_nan() && poses.velocity_covariance[0].is_nan());

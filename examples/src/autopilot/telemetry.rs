@@ -224,7 +224,8 @@ mod tests {
             ..Telemetry::default()
         };
         let ours = Isometry3::new(Vector3::new(1.0, 2.3, 2.6), Vector3::z() * 0.25);
-        let watched = telemetry.watched(Some(&LocalisedPose { world_from_body: ours, trusted: false }));
+        let watched =
+            telemetry.watched(Some(&LocalisedPose { world_from_body: ours, trusted: false, sigma: [0.0; 2] }));
         let WatchedPose { trusted, apart: [distance, angle] } = watched.pose.unwrap();
         assert!(!trusted && (distance - 0.5).abs() < 1e-12 && (angle - 0.25).abs() < 1e-12, "{watched:?}");
         assert!(!watched.follows && telemetry.watched(None).pose.is_none());
@@ -277,7 +278,8 @@ mod tests {
             }
             // Facing north.
             let world_from_body = Isometry3::rotation(Vector3::z() * std::f64::consts::FRAC_PI_2);
-            let watched = link.telemetry().watched(Some(&LocalisedPose { world_from_body, trusted: true }));
+            let watched =
+                link.telemetry().watched(Some(&LocalisedPose { world_from_body, trusted: true, sigma: [0.0; 2] }));
             FailsafeSettings::default().cause(now, &watched)
         };
         assert_eq!(feed(40.0, 40.0), None);

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use nalgebra::Point3;
 use paint_planner::Plan;
 use paint_sim::flight::FlightLog;
 use paint_sim::spray::QUANTUM;
@@ -9,7 +10,7 @@ use paint_sim::{FlightSettings, TriangleSurface};
 
 use super::error::MissionError;
 use super::figures::{collisions, limit_violations};
-use super::fly::{Sprayed, counted_flight, spray};
+use super::fly::{Sprayed, counted_flight, onboard, spray};
 use super::mission_output::{painted_view, texture};
 use super::painting_task::PaintingTask;
 use super::planned_mission::PlannedMission;
@@ -17,6 +18,7 @@ use super::settings::MissionSettings;
 use super::simulated_flight::reference;
 use crate::adapters::{MeshSurface, PlanReference, ServoPanTilt};
 use crate::appearance::DENSITY;
+use crate::onboard::LocalisedFlight;
 
 /// A layer of a mission that is planned and not flown.
 #[derive(Clone, Copy)]
@@ -71,6 +73,16 @@ impl<'a> PlannedFlight<'a> {
     /// Wind, hose, localisation and valve as the built-in simulation flies it.
     pub fn conditions(&self) -> FlightSettings {
         counted_flight(self.plan, &self.task.robot, &self.task.settings, self.layer)
+    }
+
+    /// The robot's own localisation before the bare surface, if it is to fly by that.
+    pub fn own_senses(&self) -> Result<Option<LocalisedFlight<'a>>, MissionError> {
+        onboard(self.task, std::iter::empty())
+    }
+
+    /// Least and largest coordinates of the surface that is painted.
+    pub fn corners(&self) -> [Point3<f64>; 2] {
+        self.task.surface.corners()
     }
 
     /// Puts the paint of a flight onto the surface, writes `painted.png` and `painted_view.png`, and counts. `ways`: samples without paint.

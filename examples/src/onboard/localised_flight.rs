@@ -172,35 +172,47 @@ impl<'a> LocalisedFlight<'a> {
         let mut found = false;
         for ms in 1..=SWAY_MS {
             let (truth, stands) = sway(truth, ms);
-            let truth = &truth;
             if found {
-                self.sense(ms, truth)?;
+                self.sense(ms, &truth)?;
                 continue;
             }
-            if ms % INERTIAL_MS == 0 {
-                self.sense_motion(ms, truth)?;
-            }
-            if ms % DEPTH_MS != 0 {
-                continue;
-            }
-            let image = self.capture(truth)?;
-            let views = self.camera.views(&image);
-            let cpu = ThreadTime::now();
-            // What does not look as it did may have been painted since.
-            let colour = (ms <= FIRST_MS).then(|| views.colour());
-            let pose = self.onboard.relocalise(stamp(ms), &views.depth(), colour.as_ref(), stands);
-            self.figures.cpu += cpu.elapsed();
-            if let Some(world_from_body) = pose? {
-                self.figures.relocalised_after_s = 1e-3 * ms as f64;
-                let error = world_from_body.translation.vector - truth.position.coords;
-                self.figures.relocalisation_error_m = error.norm();
-                if in_its_place(ms) {
-                    return Ok(ms);
-                }
-                found = true;
+            found = self.look(ms, &truth, stands)?;
+            if found && in_its_place(ms) {
+                return Ok(ms);
             }
         }
         if found { Ok(SWAY_MS) } else { Err(LocalisationError::NotHere { seconds: 1e-3 * SWAY_MS as f64 }) }
+    }
+
+    /// A millisecond of looking for its place. Returns whether it has been found: then the odometry starts there.
+    pub(super) fn look(&mut self, ms: i64, truth: &Vehicle, stands: bool) -> Result<bool, LocalisationError> {
+        if ms % INERTIAL_MS == 0 {
+            self.sense_motion(ms, truth)?;
+        }
+        if ms % DEPTH_MS != 0 {
+            return Ok(false);
+        }
+        let image = self.capture(truth)?;
+        let views = self.camera.views(&image);
+        let cpu = ThreadTime::now();
+        // What does not look as it did may have been painted since.
+        let colour = (ms <= FIRST_MS).then(|| views.colour());
+        let pose = self.onboard.relocalise(stamp(ms), &views.depth(), colour.as_ref(), stands);
+        self.figures.cpu += cpu.elapsed();
+        let Some(world_from_body) = pose? else { return Ok(false) };
+        self.figures.relocalised_after_s = 1e-3 * ms as f64;
+        self.figures.relocalisation_error_m = (world_from_body.translation.vector - truth.position.coords).norm();
+        Ok(true)
+    }
+
+    /// What it was told by, and what it says, have the clock of the flight, as it was found while that ran.
+    pub(super) fn found(&mut self) {
+        self.offset = Some(0);
+    }
+
+    /// Whether it knows where it is.
+    pub(super) fn is_found(&self) -> bool {
+        self.offset.is_some()
     }
 
     fn sense_motion(&mut self, ms: i64, truth: &Vehicle) -> Result<(), LocalisationError> {
@@ -298,10 +310,12 @@ impl PoseSource for LocalisedFlight<'_> {
             Bridging::Odometry => self.moved_on(now).or_else(|| self.onboard.pose(stamp(now))),
             Bridging::CameraImu | Bridging::BothImus => self.onboard.pose(stamp(now)),
         };
-        let Some(AidedPose { world_from_body, trusted, .. }) = pose else { return Ok(None) };
+        let Some(AidedPose { world_from_body, trusted, position_sigma_m, attitude_sigma_rad, .. }) = pose else {
+            return Ok(None);
+        };
         self.figures.steps += 1;
         self.figures.squares += (world_from_body.translation.vector - truth.position.coords).norm_squared();
-        Ok(Some(LocalisedPose { world_from_body, trusted }))
+        Ok(Some(LocalisedPose { world_from_body, trusted, sigma: [position_sigma_m, attitude_sigma_rad] }))
     }
 }
 
@@ -312,7 +326,7 @@ struct Arriving<T> {
     what: T,
 }
 
-fn milliseconds(time: f64) -> i64 {
+pub(super) fn milliseconds(time: f64) -> i64 {
     (1e3 * time).round() as i64
 }
 

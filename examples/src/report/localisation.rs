@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::onboard::LocalisationFigures;
 
 /// Over all flights that paint.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LocalisationReport {
     /// Position error, root mean square.
     pub position_error_rms_m: f64,

@@ -29,12 +29,6 @@ pub enum RobotError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// Its own localisation does not yet see the map from the ground, and what it says of fast motion is not smooth enough for the
-    /// autopilot's estimator.
-    #[error(
-        "--localisation slam does not hold on an autopilot yet: fly with motion-capture or noise, or without an autopilot by `paintcopter`"
-    )]
-    OwnSenses,
     /// An option of the built-in simulation alone.
     #[error("{option} is for the built-in simulation of `paintcopter`: leave it out with --autopilot")]
     BuiltInOnly {

@@ -86,10 +86,10 @@ pub fn fly_px4(
     })
 }
 
-struct Px4Flight<'a, 'b> {
+struct Px4Flight<'a, 'b, 'c> {
     launch: &'a dyn Fn() -> Result<Px4, AutopilotError>,
-    robot: &'a mut SimulatedRobot,
-    on_board: &'a mut OnBoard<'b>,
+    robot: &'a mut SimulatedRobot<'b>,
+    on_board: &'a mut OnBoard<'c>,
     faults: &'a [Fault],
     px4: Px4,
     motors: Vec<f64>,
@@ -101,7 +101,7 @@ struct Px4Flight<'a, 'b> {
     past_cpu: Option<f64>,
 }
 
-impl Px4Flight<'_, '_> {
+impl Px4Flight<'_, '_, '_> {
     /// Time since the first paint phase began, s; below zero before.
     fn since_paint(&self) -> f64 {
         self.first_paint.map_or(-1.0, |since| self.robot.time() - since)
@@ -119,9 +119,10 @@ impl Px4Flight<'_, '_> {
     fn control_step(&mut self) -> Result<End, RobotError> {
         let now = self.robot.time();
         let vehicle = self.robot.body().as_vehicle();
-        let pose = self.robot.pose();
+        let pose = self.robot.pose()?;
         if let Some(program) = self.failing(FaultKind::Program).map(|fault| fault.at) {
-            self.recorder.line(now, &vehicle, &"no on-board program");
+            let estimated = self.on_board.estimated_position().unwrap_or(vehicle.position);
+            self.recorder.line(now, &vehicle, &estimated, &"no on-board program");
             let down = self.motors.iter().all(|motor| *motor == 0.0);
             return Ok(match self.hard_landing() {
                 Some(failed) => failed,
@@ -141,7 +142,7 @@ impl Px4Flight<'_, '_> {
                 self.on_board.link().receive(now, &header, &message);
             }
         }
-        let pose = Some(pose).filter(|_| !self.fails(FaultKind::Pose));
+        let pose = pose.filter(|_| !self.fails(FaultKind::Pose));
         let commanded = self.on_board.step(now, pose.as_ref(), self.robot.pan_tilt());
         self.px4.send(if cut { &[] } else { &commanded.messages })?;
         if self.fails(FaultKind::Mode) {
@@ -158,7 +159,9 @@ impl Px4Flight<'_, '_> {
             pan_tilt: self.robot.pan_tilt(),
             flow: self.robot.flow(),
         };
-        self.recorder.note(now, self.on_board, &seen)?;
+        if let Some(sample) = self.recorder.note(now, self.on_board, &seen)? {
+            self.robot.sprayed(&sample, CONTROL_STEP);
+        }
         match self.hard_landing() {
             Some(failed) => Ok(failed),
             None => over(self.on_board, now),

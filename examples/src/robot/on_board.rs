@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use paint_planner::onboard::{Cause, FailsafeSettings, Phase, Phases, Situation};
 use paint_sim::flight::{
     Airframe, CascadedController, Command, Controller as _, ControllerSettings, Estimator, GRAVITY, InterlockInput,
-    InterlockState, Localisation, LocalisedPose, ObserverSettings, PanTilt, Reference, ReferenceState, Valve,
+    InterlockState, LocalisedPose, ObserverSettings, PanTilt, Reference, ReferenceState, Valve,
 };
 
 use super::guided_reference::{GuidedReference, ReferencePlan};
@@ -51,8 +51,6 @@ pub struct OnBoardSettings {
     pub airframe: Airframe,
     /// Share of the full thrust that carries the weight.
     pub hover_thrust: f64,
-    /// Errors of the poses, for the covariance that the autopilot is told.
-    pub localisation: Localisation,
     /// Whether poses go to the autopilot as odometry; no if they come from it.
     pub sends_odometry: bool,
     /// The valve and its interlock.
@@ -187,7 +185,7 @@ impl<'a> OnBoard<'a> {
             self.link.request(self.phases.request(self.settings.arms));
         }
         let setpoint = self.setpoint(now);
-        let odometry = pose.filter(|_| self.settings.sends_odometry).map(|pose| self.odometry(&pose));
+        let odometry = pose.filter(|_| self.settings.sends_odometry).map(|pose| odometry(&pose, self.resets));
         let messages = self.link.transmit(now, setpoint.as_ref(), odometry.as_ref());
         let (pan_tilt, permitted) = self.aim(now, angles, trusted);
         let flow = if permitted && cause.is_none() { self.wanted_flow(now) } else { 0.0 };
@@ -248,20 +246,6 @@ impl<'a> OnBoard<'a> {
         Some(setpoint)
     }
 
-    fn odometry(&self, pose: &LocalisedPose) -> Odometry {
-        let Localisation { position_noise, position_drift, attitude_noise, attitude_drift, .. } =
-            self.settings.localisation;
-        Odometry {
-            world_from_body: pose.world_from_body,
-            velocity: None,
-            position_covariance: Matrix3::from_diagonal_element(position_noise.powi(2) + position_drift.powi(2)),
-            attitude_covariance: Matrix3::from_diagonal_element(attitude_noise.powi(2) + attitude_drift.powi(2)),
-            velocity_covariance: Matrix3::zeros(),
-            north: true,
-            resets: self.resets,
-        }
-    }
-
     /// Where the joints shall be, and whether the interlock permits paint.
     fn aim(&mut self, now: f64, angles: [f64; 2], trusted: bool) -> ([f64; 2], bool) {
         let Some(estimator) = &self.estimator else { return ([0.0; 2], false) };
@@ -284,5 +268,19 @@ impl<'a> OnBoard<'a> {
     fn wanted_flow(&self, now: f64) -> f64 {
         let Some(time) = self.plan_time(now).map(|time| time + self.settings.valve.lead) else { return 0.0 };
         if self.phases.unpainted().contains(&time) { self.plan.at(time).flow.max(0.0) } else { 0.0 }
+    }
+}
+
+/// A pose for the autopilot, after so many jumps.
+fn odometry(pose: &LocalisedPose, resets: u8) -> Odometry {
+    let [position, attitude] = pose.sigma.map(|sigma| sigma * sigma);
+    Odometry {
+        world_from_body: pose.world_from_body,
+        velocity: None,
+        position_covariance: Matrix3::from_diagonal_element(position),
+        attitude_covariance: Matrix3::from_diagonal_element(attitude),
+        velocity_covariance: Matrix3::zeros(),
+        north: true,
+        resets,
     }
 }

@@ -37,32 +37,42 @@ pub(super) struct Recorder<'a> {
 impl<'a> Recorder<'a> {
     /// For a plan before what the spray meets.
     pub(super) fn new(plan: &'a dyn Reference, surface: &'a dyn Surface) -> Self {
-        let track =
-            String::from("time_s,x_m,y_m,z_m,vx_m_per_s,vy_m_per_s,vz_m_per_s,roll_rad,pitch_rad,yaw_rad,phase\n");
+        let track = String::from(
+            "time_s,x_m,y_m,z_m,vx_m_per_s,vy_m_per_s,vz_m_per_s,roll_rad,pitch_rad,yaw_rad,estimated_x_m,estimated_y_m,estimated_z_m,phase\n",
+        );
         Self { plan, surface, painting: Vec::new(), ways: Vec::new(), track, steps: 0 }
     }
 
-    /// A control step of the on-board program.
-    pub(super) fn note(&mut self, now: f64, on_board: &OnBoard, seen: &Seen) -> Result<(), RobotError> {
+    /// A control step of the on-board program. Returns the sample of one on the plan.
+    pub(super) fn note(
+        &mut self,
+        now: f64,
+        on_board: &OnBoard,
+        seen: &Seen,
+    ) -> Result<Option<FlightSample>, RobotError> {
         let Seen { vehicle, estimated, ptu, pan_tilt, flow } = seen;
         let measured =
             |time, wanted| FlightSample::measured(time, vehicle, *estimated, *pan_tilt, wanted, *ptu, self.surface);
+        let mut painted = None;
         if let Some(time) = on_board.plan_time(now) {
             let wanted = self.plan.at(time);
             let held = *flow == 0.0 && wanted.flow > 0.0;
-            self.painting.push(FlightSample { flow: *flow, held, ..measured(time, &wanted)? });
+            let sample = FlightSample { flow: *flow, held, ..measured(time, &wanted)? };
+            self.painting.push(sample);
+            painted = Some(sample);
         } else if let Some(wanted) = on_board.wanted(now).filter(|_| on_board.phase().is_guarded()) {
             self.ways.push(measured(now, &wanted)?);
         }
-        self.line(now, vehicle, &on_board.phase());
-        Ok(())
+        self.line(now, vehicle, estimated, &on_board.phase());
+        Ok(painted)
     }
 
     /// A control step in the track alone.
-    pub(super) fn line(&mut self, now: f64, vehicle: &Vehicle, phase: &dyn Display) {
+    pub(super) fn line(&mut self, now: f64, vehicle: &Vehicle, estimated: &Point3<f64>, phase: &dyn Display) {
         if self.steps.is_multiple_of(TRACK_STEPS) {
-            let (p, v, [roll, pitch, yaw]) = (vehicle.position, vehicle.velocity, vehicle.attitude);
-            let numbers = [now, p.x, p.y, p.z, v.x, v.y, v.z, roll, pitch, yaw].map(|value| format!("{value:.6}"));
+            let (p, v, e, [roll, pitch, yaw]) = (vehicle.position, vehicle.velocity, estimated, vehicle.attitude);
+            let numbers = [now, p.x, p.y, p.z, v.x, v.y, v.z, roll, pitch, yaw, e.x, e.y, e.z];
+            let numbers = numbers.map(|value| format!("{value:.6}"));
             // Writing to a string cannot fail.
             let _ = writeln!(self.track, "{},{phase}", numbers.join(","));
         }
@@ -82,7 +92,7 @@ pub struct Record {
     pub painting: FlightLog,
     /// Samples of the ways there and back and of holds, by the flight's time.
     pub ways: FlightLog,
-    /// Time, position, velocity, attitude, phase of the whole flight, 20 rows a second, as a table (CSV).
+    /// Time, position, velocity, attitude, estimated position and phase of the whole flight, 20 rows a second, as a table (CSV).
     pub track: String,
     /// When each phase began.
     pub events: Vec<(f64, Phase)>,

@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::report::LocalisationReport;
+
 /// What `report.json` of `robot` holds; SI units. The figures of the machine stand at its end, all others are the same in every run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RobotReport {
@@ -49,6 +51,9 @@ pub struct RobotReport {
     pub autopilot_cpu_s_per_s: f64,
     /// Processor time of this program per simulated second.
     pub robot_cpu_s_per_s: f64,
+    /// What the robot's own localisation was worth, if it flew by that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub localisation: Option<LocalisationReport>,
 }
 
 impl RobotReport {

@@ -6,22 +6,22 @@ use std::time::Instant;
 use cpu_time::ProcessTime;
 use paint_planner::onboard::{FailsafeSettings, Phase};
 use paint_sim::FlightSettings;
-use paint_sim::flight::multirotor::MultirotorSettings;
 use paint_sim::flight::{Airframe, Reference};
 
 use super::arguments::{Arguments, AutopilotChoice};
 use super::error::RobotError;
-use super::flight::{Flown, Scene, fly_px4};
-use super::on_board::{OnBoard, OnBoardSettings, SetpointKind};
+use super::flight::Flown;
+use super::on_board::{OnBoardSettings, SetpointKind};
 use super::recorder::Record;
 use super::report::RobotReport;
-use super::simulated_robot::{SimulatedRobot, station};
+use super::simulation::fly_simulated;
 use super::udp::fly_udp;
 use crate::autopilot::{OffboardSettings, Px4, Px4Vehicle};
 use crate::interruption::Finishing;
 use crate::mission::{LocalisationChoice, PlannedFlight, PlannedMission, PlannerChoice};
+use crate::onboard::LocalisationFigures;
 use crate::progress::Stage;
-use crate::report::save_figures;
+use crate::report::{LocalisationReport, save_figures};
 use crate::whole_file;
 use crate::{result, say};
 
@@ -32,9 +32,6 @@ const PX4_RESPONSE: f64 = 0.18;
 pub fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let folder = &arguments.out;
     let mission_file = arguments.mission.mission_file()?;
-    if mission_file.settings.localisation == LocalisationChoice::Slam {
-        return Err(RobotError::OwnSenses.into());
-    }
     let settings = &mission_file.settings;
     for (option, given) in [
         ("--tank and --battery", !settings.endurance.is_endless()),
@@ -53,12 +50,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let clock = (Instant::now(), ProcessTime::now());
     let _finishing = Finishing::begin();
     let stage = Stage::start("fly");
-    let flown = fly(arguments, &flight, folder, &mut |painted| {
+    let (flown, localisation) = fly(arguments, &flight, folder, &mut |painted| {
         stage.share(painted / arguments.seconds.min(flight.reference().duration()));
     })?;
     stage.done(&format!("{:.0} s", flown.seconds));
     let (wall, cpu) = (clock.0.elapsed().as_secs_f64(), clock.1.elapsed().as_secs_f64());
-    let report = save(arguments, &flight, &flown, [wall, cpu], folder)?;
+    let report = save(arguments, &flight, (&flown, localisation), [wall, cpu], folder)?;
     say!("{}", report.summary());
     result!("{}", folder.join("report.json").display());
     let mostly_shut = || format!("the valve was kept shut for {:.0} % of the paint", 100.0 * report.valve_held_share);
@@ -73,25 +70,13 @@ fn fly(
     flight: &PlannedFlight,
     folder: &Path,
     progress: &mut dyn FnMut(f64),
-) -> Result<Flown, RobotError> {
+) -> Result<(Flown, Option<LocalisationFigures>), RobotError> {
     let conditions = flight.conditions();
-    let reference = flight.reference();
     match &arguments.autopilot {
         AutopilotChoice::Px4(source) => {
-            let start = reference.at(0.0);
-            let vehicle = MultirotorSettings::default();
-            let station = station(&start.position, start.heading);
-            let mut robot = SimulatedRobot::new(vehicle, &station, flight.pan_tilt()?, &conditions)?;
-            let settings = on_board_settings(arguments, &conditions, robot.body().hover_command());
-            let mut on_board = OnBoard::new(&reference, flight.pan_tilt()?, settings);
-            let vehicle = Px4Vehicle {
-                hover_thrust: settings.hover_thrust,
-                max_speed: flight.settings().planner.timing.max_speed,
-                max_tilt: settings.airframe.tilt_limit,
-            };
-            let launch = || Px4::start(source, &folder.join("px4"), &vehicle);
-            let scene = Scene { plan: &reference, surface: flight.surface(), faults: &arguments.fault };
-            fly_px4(&launch, &mut robot, &mut on_board, &scene, progress)
+            let settings = |hover_thrust| on_board_settings(arguments, &conditions, hover_thrust);
+            let launch = |vehicle: &Px4Vehicle| Px4::start(source, &folder.join("px4"), vehicle);
+            fly_simulated(flight, &settings, &launch, &arguments.fault, progress)
         }
         AutopilotChoice::Udp(address) => {
             let only = |option, why| Err(RobotError::SimulationOnly { option, why });
@@ -105,7 +90,8 @@ fn fly(
                 return only("--fault", "nothing is made to fail on a vehicle");
             }
             // Trajectories hold no thrust.
-            fly_udp(*address, flight, on_board_settings(arguments, &conditions, 0.0), progress)
+            let flown = fly_udp(*address, flight, on_board_settings(arguments, &conditions, 0.0), progress)?;
+            Ok((flown, None))
         }
     }
 }
@@ -123,7 +109,6 @@ fn on_board_settings(arguments: &Arguments, conditions: &FlightSettings, hover_t
         arms: matches!(arguments.autopilot, AutopilotChoice::Px4(_)),
         airframe,
         hover_thrust,
-        localisation: conditions.localisation,
         sends_odometry: true,
         valve: conditions.valve,
         failsafe: FailsafeSettings::default(),
@@ -135,7 +120,7 @@ fn on_board_settings(arguments: &Arguments, conditions: &FlightSettings, hover_t
 fn save(
     arguments: &Arguments,
     flight: &PlannedFlight,
-    flown: &Flown,
+    (flown, localisation): (&Flown, Option<LocalisationFigures>),
     [wall, cpu]: [f64; 2],
     folder: &Path,
 ) -> Result<RobotReport, RobotError> {
@@ -169,6 +154,7 @@ fn save(
         simulated_over_wall_time: flown.seconds / wall,
         autopilot_cpu_s_per_s: flown.px4_cpu / flown.seconds,
         robot_cpu_s_per_s: cpu / flown.seconds,
+        localisation: localisation.map(|own| LocalisationReport::of(&own, flown.seconds)),
     };
     save_figures(&report, folder)?;
     Ok(report)

@@ -8,7 +8,7 @@ use paint_sim::flight::multirotor::{
     Barometer, BarometerSettings, Imu, ImuSettings, Load, Magnetometer, MagnetometerSettings, Multirotor,
     MultirotorSettings, Surroundings,
 };
-use paint_sim::flight::{HoseModel, LocalisedPose, PanTilt, PoseSensor, WindModel};
+use paint_sim::flight::{FlightSample, HoseModel, LocalisedPose, PanTilt, PoseSource, WindModel};
 
 use crate::adapters::ServoPanTilt;
 use crate::appearance::DENSITY;
@@ -26,16 +26,19 @@ const LEGS: f64 = 0.3;
 const EXIT_SPEED: f64 = 40.0;
 /// The station is so far behind the place where the plan starts, m.
 const STATION_DISTANCE: f64 = 1.5;
+/// Half the width of the stand under a station above the ground, m.
+const STAND: f64 = 0.3;
 
 /// The vehicle and all that it carries.
-pub struct SimulatedRobot {
+pub struct SimulatedRobot<'a> {
     body: Multirotor,
     ptu: ServoPanTilt,
     pan_tilt: [f64; 2],
     wind: WindModel,
     hose: Option<HoseModel>,
     hose_force: Vector3<f64>,
-    localisation: PoseSensor,
+    localisation: &'a mut dyn PoseSource,
+    station: Point3<f64>,
     imu: Imu,
     barometer: Barometer,
     magnetometer: Magnetometer,
@@ -49,12 +52,13 @@ pub struct SimulatedRobot {
     steps: u64,
 }
 
-impl SimulatedRobot {
-    /// At rest at a place. `conditions` hold wind, hose, localisation, valve and seed.
+impl<'a> SimulatedRobot<'a> {
+    /// At rest at a place, on a stand if that is above the ground. `conditions` hold wind, hose, valve and seed.
     pub fn new(
         settings: MultirotorSettings,
         station: &Isometry3<f64>,
         ptu: ServoPanTilt,
+        localisation: &'a mut dyn PoseSource,
         conditions: &FlightSettings,
     ) -> Result<Self, paint_sim::Error> {
         let seed = conditions.seed;
@@ -68,7 +72,8 @@ impl SimulatedRobot {
             wind: WindModel::new(&conditions.wind, STEP, seed),
             hose: conditions.hose,
             hose_force: Vector3::zeros(),
-            localisation: PoseSensor::new(conditions.localisation, CONTROL_STEPS as f64 * STEP, seed),
+            localisation,
+            station: place.into(),
             imu: Imu::new(ImuSettings::default(), seed)?,
             barometer: Barometer::new(BarometerSettings::default(), seed)?,
             magnetometer: Magnetometer::new(MagnetometerSettings::default(), seed)?,
@@ -125,8 +130,22 @@ impl SimulatedRobot {
     }
 
     /// What the localisation reports; asked once for every control step.
-    pub fn pose(&mut self) -> LocalisedPose {
-        LocalisedPose { world_from_body: self.localisation.measure(&self.body.as_vehicle()), trusted: true }
+    ///
+    /// # Errors
+    /// Of the localisation.
+    pub fn pose(&mut self) -> Result<Option<LocalisedPose>, paint_sim::Error> {
+        self.localisation.pose(self.time(), &self.body.as_vehicle())
+    }
+
+    /// A sample of paint as it lands, for cameras that see it; `interval` seconds before the next.
+    pub fn sprayed(&mut self, sample: &FlightSample, interval: f64) {
+        self.localisation.sprayed(sample, interval);
+    }
+
+    /// Height at which the body's centre rests where it is.
+    fn ground(&self) -> f64 {
+        let off = self.body.position() - self.station;
+        if off.x.abs().max(off.y.abs()) < STAND { self.station.z } else { LEGS }
     }
 
     /// Commands of a control step: joints (rad), and flow, which follows after the valve's dead time. The joints keep theirs until the
@@ -154,10 +173,10 @@ impl SimulatedRobot {
             Load::recoil(self.flow * DENSITY, EXIT_SPEED, &axis, nozzle),
         ];
         let outflow = self.flow * DENSITY;
-        self.body.step(motors, &Surroundings { wind, loads: &loads, outflow, ground: Some(LEGS) }, STEP)?;
+        self.body.step(motors, &Surroundings { wind, loads: &loads, outflow, ground: Some(self.ground()) }, STEP)?;
         self.pan_tilt = self.ptu.step(self.aim, STEP);
         self.steps += 1;
-        Ok(())
+        self.localisation.moved(self.time(), &self.body.as_vehicle())
     }
 }
 
@@ -169,6 +188,7 @@ pub(super) fn station(start: &Point3<f64>, heading: f64) -> Isometry3<f64> {
 
 #[cfg(test)]
 mod tests {
+    use paint_sim::flight::PoseSensor;
     use ptu_kinematics::{Ptu, PtuSettings, ServoSettings};
 
     use super::*;
@@ -180,7 +200,8 @@ mod tests {
         let ptu = ServoPanTilt::new(Ptu::new(PtuSettings::default()).unwrap(), ServoSettings::default()).unwrap();
         let start = station(&Point3::new(0.0, 0.0, 2.0), 0.0);
         let settings = MultirotorSettings::default();
-        let mut robot = SimulatedRobot::new(settings, &start, ptu, &conditions).unwrap();
+        let mut senses = PoseSensor::new(conditions.localisation, 0.01, 1);
+        let mut robot = SimulatedRobot::new(settings, &start, ptu, &mut senses, &conditions).unwrap();
         let rotors = robot.body().motors().len();
         let mut step = |command: Option<f64>| {
             if let Some(flow) = command {

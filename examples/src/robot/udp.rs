@@ -21,6 +21,8 @@ use crate::mission::PlannedFlight;
 /// Telemetry that is asked for, per second, and its longest silence, s: radios are slower than a simulation.
 const TELEMETRY_RATE: f64 = 50.0;
 const SILENCE: f64 = 0.2;
+/// How well the vehicle knows its place it does not say.
+const UNKNOWN: [f64; 2] = [f64::INFINITY; 2];
 /// A vehicle is waited for so long.
 const LONGEST_WAIT: Duration = Duration::from_secs(10);
 
@@ -83,7 +85,7 @@ pub(super) fn fly_udp(
             on_board.link().receive(now, &header, &message);
         }
         let pose = pose(on_board.link().telemetry());
-        let localised = pose.map(|world_from_body| LocalisedPose { world_from_body, trusted: true });
+        let localised = pose.map(|world_from_body| LocalisedPose { world_from_body, trusted: true, sigma: UNKNOWN });
         if interruption::is_requested() {
             on_board.interrupt();
         }

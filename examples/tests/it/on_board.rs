@@ -7,7 +7,7 @@ use mavlink::dialects::common::{
 use mavlink::{MavHeader, MavlinkVersion, Message};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use paint_planner::onboard::{Cause, FailsafeSettings, Phase};
-use paint_sim::flight::{Airframe, Localisation, LocalisedPose, Reference, ReferenceState, Valve};
+use paint_sim::flight::{Airframe, LocalisedPose, Reference, ReferenceState, Valve};
 use paintcopter::adapters::ServoPanTilt;
 use paintcopter::autopilot::OffboardSettings;
 use paintcopter::robot::{Commanded, OnBoard, OnBoardSettings, SetpointKind};
@@ -71,7 +71,6 @@ impl Flight {
             arms: true,
             airframe: Airframe::default(),
             hover_thrust: 0.5,
-            localisation: Localisation::mocap(),
             sends_odometry: true,
             valve: Valve::default(),
             failsafe: FailsafeSettings::default(),
@@ -101,7 +100,7 @@ impl Flight {
     fn stand(&mut self) {
         let [north, east, down] = self.place.map(f64::from);
         let world_from_body = Isometry3::translation(east, north, -down);
-        self.pose = Some(LocalisedPose { world_from_body, trusted: true });
+        self.pose = Some(LocalisedPose { world_from_body, trusted: true, sigma: [1e-3; 2] });
     }
 
     fn telemetry(&self) -> [MavMessage; 5] {

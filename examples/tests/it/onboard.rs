@@ -6,15 +6,16 @@ use std::sync::OnceLock;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use paint_sim::flight::{
-    CascadedController, ControllerSettings, FlightLog, FlightSettings, IdealPanTilt, Interlock, PoseSource, Reference,
-    ReferenceState, Valve, Vehicle, fly_localised,
+    CascadedController, ControllerSettings, FlightLog, FlightSettings, IdealPanTilt, Interlock, LocalisedPose,
+    PoseSource, Reference, ReferenceState, Valve, Vehicle, fly_localised,
 };
 use paint_sim::paint::PaintName;
 use paint_sim::{Error, Shot, SprayModel, Surface, TriangleSurface};
 use paintcopter::appearance::UNIT_THICKNESS;
 use paintcopter::mesh_io::TriangleMesh;
 use paintcopter::onboard::{
-    Approach, Bridging, LocalisationFigures, LocalisedFlight, OnboardLocalisation, read_map, surveyed_map,
+    Approach, Bridging, LocalisationFigures, LocalisedFlight, OnboardLocalisation, StandingStart, read_map,
+    surveyed_map,
 };
 use paintcopter::scan_flight::{MAP_FILE, ScanFlight, save};
 use paintcopter::simulated_sensors::{FaultInterval, PaintedFront, SensorFault, SimulatedCamera, SimulatedImage};
@@ -196,6 +197,34 @@ fn it_finds_itself_by_shape_before_a_wall_that_is_painted_all_over() {
         pose.is_some() && figures.relocalised_after_s > 1.0 && figures.relocalisation_error_m < 0.01,
         "{figures:?}"
     );
+}
+
+/// Milliseconds until a robot that stands before a wall has its first pose, and that pose.
+fn standing(mesh: &TriangleMesh, stood: &Vehicle) -> Result<(i64, LocalisedPose), Error> {
+    let surface = TriangleSurface::new(&mesh.positions, &mesh.faces).unwrap();
+    let camera = SimulatedCamera::new(&surface, Vector3::x(), 1, 1);
+    let mut flight = LocalisedFlight::new(camera, read_map(map()).unwrap(), 9).unwrap();
+    let mut standing = StandingStart(&mut flight);
+    for ms in 1..20_000 {
+        if let Some(pose) = standing.pose(1e-3 * (ms - 1) as f64, stood)? {
+            return Ok((ms - 1, pose));
+        }
+        standing.moved(1e-3 * ms as f64, stood)?;
+    }
+    panic!("it looks for ever")
+}
+
+#[test]
+fn it_finds_itself_where_it_stands_before_it_takes_off() {
+    let stood = Vehicle::at_rest(Point3::new(-1.2, 0.1, CENTRE), 0.1);
+    let (ms, pose) = standing(&wall(1), &stood).unwrap();
+    let error = (pose.world_from_body.translation.vector - stood.position.coords).norm();
+    println!("{ms} ms, {error} m, {:?}", pose.sigma);
+    assert!((100..=1000).contains(&ms) && error < 0.01, "{ms} ms, {error} m");
+    // What it takes its error for is of the size of the map's own.
+    assert!((1e-3..0.02).contains(&pose.sigma[0]) && (3e-4..0.02).contains(&pose.sigma[1]), "{:?}", pose.sigma);
+    let error = standing(&wall(2), &stood).unwrap_err();
+    assert!(error.to_string().contains("within 10 s: it does not take off"), "{error}");
 }
 
 #[test]

@@ -82,7 +82,9 @@ impl PoseSensor {
 
 impl PoseSource for PoseSensor {
     fn pose(&mut self, _time: f64, truth: &Vehicle) -> Result<Option<LocalisedPose>, Error> {
-        Ok(Some(LocalisedPose { world_from_body: self.measure(truth), trusted: true }))
+        let Localisation { position_noise, position_drift, attitude_noise, attitude_drift, .. } = self.settings;
+        let sigma = [position_noise.hypot(position_drift), attitude_noise.hypot(attitude_drift)];
+        Ok(Some(LocalisedPose { world_from_body: self.measure(truth), trusted: true, sigma }))
     }
 }
 

@@ -13,6 +13,9 @@ pub struct LocalisedPose {
     pub world_from_body: Isometry3<f64>,
     /// Whether it is known well enough to paint by: otherwise the [`Interlock`](super::Interlock) shuts the valve.
     pub trusted: bool,
+    /// Standard deviations of position (m) and attitude (rad) along the axes where they are known least, as they are told to an autopilot;
+    /// infinite where that is not known.
+    pub sigma: [f64; 2],
 }
 
 /// What tells controller, pan-tilt unit and interlock where the vehicle is: motion capture, a noise model, or estimators on simulated sensors.

@@ -71,6 +71,8 @@ pub struct AidedPose {
     pub world_from_body: Isometry3<f64>,
     /// Standard deviation of the position along the axis where it is known least, m; infinite where it is from the map.
     pub position_sigma_m: f64,
+    /// The same of the attitude, rad.
+    pub attitude_sigma_rad: f64,
     /// Whether the map stands in for the odometry: the last pose in it, moved on.
     pub from_map: bool,
     /// Whether something may be done that must not miss.
@@ -289,17 +291,20 @@ impl MapAidedVio {
             return Some(AidedPose {
                 world_from_body,
                 position_sigma_m: f64::INFINITY,
+                attitude_sigma_rad: f64::INFINITY,
                 from_map: true,
                 trusted: false,
                 source: *source,
             });
         }
         let Odometry { stamp, world_from_body, covariance, .. } = self.vio.output()?;
-        let position_sigma_m = largest_deviation(&covariance.fixed_view::<3, 3>(0, 0).into_owned());
+        let deviation = |first| largest_deviation(&covariance.fixed_view::<3, 3>(first, first).into_owned());
+        let [position_sigma_m, attitude_sigma_rad] = [0, 6].map(deviation);
         let age = self.confirmed.map_or(f64::INFINITY, |confirmed| stamp.secs_since(confirmed));
         let confirmed = self.to_confirm == 0 && age <= settings.trusted_age_s;
         let trusted = confirmed && position_sigma_m <= settings.trusted_sigma_m;
-        Some(AidedPose { world_from_body, position_sigma_m, from_map: false, trusted, source: *source })
+        let (from_map, source) = (false, *source);
+        Some(AidedPose { world_from_body, position_sigma_m, attitude_sigma_rad, from_map, trusted, source })
     }
 
     /// Odometry and map contradict each other. Which of them errs says the next pose in the map: if it follows from this one, it is the odometry.
