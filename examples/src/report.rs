@@ -145,7 +145,7 @@ pub struct Report {
     /// What the robot's own localisation was worth.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub localisation: Option<LocalisationReport>,
-    /// Flights that tank or battery have cut the plans into.
+    /// Flights that tank, battery, or what ended one in the air have cut the plans into.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sorties: Option<usize>,
     /// Time of the plans that was not flown, as the robot could not.
@@ -342,7 +342,7 @@ impl Report {
             self.seed,
             self.version
         );
-        text += &not_flown(self.not_flown_s);
+        text += &(times::in_sorties(self.sorties) + &not_flown(self.not_flown_s));
         for (file, caption) in [
             ("painted_view.png", "The painted surface as a camera sees it"),
             ("wanted.png", "Wanted"),

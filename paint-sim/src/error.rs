@@ -74,7 +74,7 @@ pub enum Error {
         texel: u32,
     },
     /// The hose cannot reach the vehicle.
-    #[error("a hose of {length} m cannot span {distance} m: lengthen it or move its base")]
+    #[error("a hose of {length:.3} m cannot span {distance:.3} m: lengthen it or move its base")]
     HoseTooShort {
         /// Length of the hose, m.
         length: f64,

@@ -98,7 +98,26 @@ pub fn fly_localised(
     localisation: &mut dyn PoseSource,
     settings: &FlightSettings,
 ) -> Result<FlightLog, Error> {
+    let mut log = FlightLog::default();
+    fly_recorded(reference, controller, ptu, surface, localisation, settings, &mut log)?;
+    Ok(log)
+}
+
+/// As [`fly_localised`], with what was flown in `log`, whatever ends it: paint that is on the surface stays there.
+///
+/// # Errors
+/// As [`fly_localised`].
+pub fn fly_recorded(
+    reference: &dyn Reference,
+    controller: &mut dyn Controller,
+    ptu: &mut dyn PanTilt,
+    surface: &dyn Surface,
+    localisation: &mut dyn PoseSource,
+    settings: &FlightSettings,
+    log: &mut FlightLog,
+) -> Result<(), Error> {
     span!("fly");
+    log.samples.clear();
     settings.check()?;
     let duration = reference.duration();
     check_range("duration of the reference", duration, 0.0, MAX_DURATION, "between 0 and a day")?;
@@ -130,8 +149,8 @@ pub fn fly_localised(
     let log_steps = i64::from(RATE / settings.log_rate);
     // A hair of tolerance, or rounding would drop the last sample of a duration such as 0.3 s.
     let last = (duration / STEP + 1e-6).floor() as i64;
-    let interval = log_steps as f64 * STEP;
-    let mut samples = Vec::with_capacity((last / log_steps + 1) as usize);
+    log.interval = log_steps as f64 * STEP;
+    log.samples.reserve((last / log_steps + 1) as usize);
     let mut trusted = !settings.faults.pose_lost(begin);
     for step in first..=last {
         let time = step as f64 * STEP;
@@ -180,8 +199,8 @@ pub fn fly_localised(
             let given = step - (settings.valve.dead_time / STEP).round() as i64;
             let open = interlock.open((given - first).div_euclid(CONTROL_STEPS));
             let sample = scene.sample(time, &vehicle, pan_tilt, estimator.estimate(), open)?;
-            localisation.sprayed(&sample, interval);
-            samples.push(sample);
+            localisation.sprayed(&sample, log.interval);
+            log.samples.push(sample);
         }
         let air = wind.step() + settings.faults.gust(time);
         vehicle.step(&settings.airframe, &command, &air, &hose_force, STEP);
@@ -193,7 +212,7 @@ pub fn fly_localised(
             return Err(Error::BadCallback { who: "the pan-tilt unit", time });
         }
     }
-    Ok(FlightLog { samples, interval })
+    Ok(())
 }
 
 /// The reference, standing still at its first state before time zero.

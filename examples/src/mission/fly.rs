@@ -15,8 +15,8 @@ use super::nozzle::spray_model;
 use super::painting_task::PaintingTask;
 use super::plan::Planned;
 use super::settings::{LocalisationChoice, MissionSettings};
-use super::simulated_flight::{OwnSenses, flight_settings, fly_plan};
-use super::sorties::{Sorties, in_pieces};
+use super::simulated_flight::{OwnSenses, flight_settings, fly_piece, fly_plan};
+use super::sorties::{FlownPiece, Sorties, in_pieces};
 use crate::adapters::Robot;
 use crate::onboard::{LocalisationFigures, LocalisedFlight};
 use crate::progress::Stage;
@@ -39,7 +39,7 @@ pub struct LayerFlight {
     pub flight: FlightLog,
     /// What its localisation was worth, if that was the robot's own.
     pub(super) localisation: Option<LocalisationFigures>,
-    /// Pieces that tank or battery have cut it into.
+    /// Pieces that tank, battery, or what ended one in the air have cut it into.
     pub(super) sorties: usize,
     /// Time of the plan that was not flown, s: a later sortie could not be.
     pub(super) left_s: f64,
@@ -142,8 +142,8 @@ fn fly_sorties(
         let mut onboard = onboard(task, before.iter().copied().chain(flown))?;
         let surface = task.surface.corners();
         let source = onboard.as_mut().map(|onboard| OwnSenses { poses: onboard as &mut dyn PoseSource, surface });
-        let flown = fly_plan(plan, piece, task.met(), &task.robot, settings, &flight, source)?;
-        Ok((flown, onboard.map(|onboard| onboard.figures())))
+        let (log, ended) = fly_piece(plan, piece, task.met(), &task.robot, settings, &flight, source)?;
+        Ok(FlownPiece { log, localisation: onboard.map(|onboard| onboard.figures()), ended })
     })
 }
 
@@ -248,7 +248,7 @@ fn fly_beside(
         ),
         (smoothing, FlightSettings { ptu_locked: true, ..usual_flight(smoothing, robot, settings, layer) }),
     ];
-    let one = |(plan, flight): &(&Plan, FlightSettings)| fly_plan(plan, None, world, robot, settings, flight, None);
+    let one = |(plan, flight): &(&Plan, FlightSettings)| fly_plan(plan, world, robot, settings, flight);
     if settings.threads < 2 {
         let (a, [b, c]) = (counted(), others.each_ref().map(one));
         return Ok([a?, b?, c?]);
@@ -271,7 +271,7 @@ pub(super) fn fly_three(
     layer: u64,
 ) -> Result<[FlightLog; 3], MissionError> {
     let first = counted_flight(plan, robot, settings, layer);
-    let counted = || fly_plan(plan, None, world, robot, settings, &first, None);
+    let counted = || fly_plan(plan, world, robot, settings, &first);
     fly_beside([plan, plan], world, robot, settings, layer, counted)
 }
 
@@ -337,7 +337,7 @@ mod tests {
         let plan = test_panel::plan(&surface, &robot, &settings);
         let flown = |piece, seed| {
             let flight = FlightSettings { seed, ..counted_flight(&plan, &robot, &settings, 0) };
-            fly_plan(&plan, piece, &surface.world, &robot, &settings, &flight, None).unwrap()
+            fly_piece(&plan, piece, &surface.world, &robot, &settings, &flight, None).unwrap().0
         };
         let endurance = Endurance { battery: Some(47.0), ..Endurance::default() };
         let pieces = sorties(plan.trajectory.duration(), &|t| plan.setpoint(t).flow, &endurance).unwrap();

@@ -194,7 +194,7 @@ mod tests {
             assert!(excursion < 0.6, "{excursion} m");
             let learnt = FlightSettings { model: Some(model), ..believed };
             let hits = [believed, learnt].map(|flight| {
-                let log = fly_plan(&plan, None, &surface.world, &robot, &settings, &flight, None).unwrap();
+                let log = fly_plan(&plan, &surface.world, &robot, &settings, &flight).unwrap();
                 log.statistics().hit_error_rms
             });
             println!("vehicle {seed}: {:.4} m by what was believed, {:.4} m by what is identified", hits[0], hits[1]);

@@ -67,7 +67,7 @@ mod tests {
             let mesh = MeshSurface(&surface.world);
             let plan = path_planner.planner().plan(&test_panel::targets(), &mesh, &robot, &settings.planner).unwrap();
             let conditions = counted_flight(&plan, &robot, &settings, 0);
-            let log = fly_plan(&plan, None, &surface.world, &robot, &settings, &conditions, None).unwrap();
+            let log = fly_plan(&plan, &surface.world, &robot, &settings, &conditions).unwrap();
             (plan, log)
         };
         let [(optimal, _), (smoothing, turning), (same, locked)] =

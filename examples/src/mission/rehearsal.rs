@@ -41,15 +41,8 @@ impl Rehearsal for WindRehearsal<'_> {
         let mut near_misses = Vec::new();
         for wind in 0..WINDS {
             let seed = settings.seed ^ SALT.wrapping_add(wind);
-            let log = fly_plan(
-                plan,
-                None,
-                &surface.world,
-                robot,
-                settings,
-                &flight_settings(plan, robot.tether, seed),
-                None,
-            )?;
+            let flight = flight_settings(plan, robot.tether, seed);
+            let log = fly_plan(plan, &surface.world, robot, settings, &flight)?;
             let missing = |sample: &FlightSample| NearMiss {
                 time: sample.time,
                 missing: MARGIN - gap_at(robot, &obstacles, sample, MARGIN),

@@ -96,10 +96,11 @@ impl Mission {
         &self.flights
     }
 
-    /// Flights that tank or battery have cut the plans into, if they have.
+    /// Flights that tank, battery, or what ended one in the air have cut the plans into, if they have.
     pub(super) fn sorties(&self) -> Option<usize> {
-        let cut = !self.task.settings.endurance.is_endless();
-        cut.then(|| self.flights.iter().map(|flight| flight.sorties).sum())
+        let count = self.flights.iter().map(|flight| flight.sorties).sum();
+        let cut = !self.task.settings.endurance.is_endless() || count > self.flights.len();
+        cut.then_some(count)
     }
 
     /// Paint depth per pixel as it came out, 0 beside the surface.

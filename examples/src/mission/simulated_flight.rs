@@ -7,14 +7,18 @@ use paint_planner::control::MpcSettings;
 use paint_planner::onboard::Sortie;
 use paint_sim::flight::FlightLog;
 use paint_sim::flight::{
-    CascadedController, Controller, ControllerSettings, HoseModel, PoseSource, Reference, fly_localised, fly_with,
+    CascadedController, Controller, ControllerSettings, HoseModel, PoseSensor, PoseSource, Reference, fly_recorded,
 };
 use paint_sim::{FlightSettings, TriangleSurface};
 
 use super::error::MissionError;
+use super::patient::Patient;
 use super::settings::{ControllerChoice, MissionSettings};
 use crate::adapters::{MpcController, PlanReference, Robot, ServoPanTilt};
 use crate::onboard::{Approach, Piece};
+
+/// Time from one pose to the next, s: a control step of the simulation.
+const CONTROL_STEP: f64 = 0.01;
 
 /// The usual wind, hose and localisation.
 pub(super) fn flight_settings(plan: &Plan, tether: Option<Tether>, seed: u64) -> FlightSettings {
@@ -34,9 +38,21 @@ pub(super) struct OwnSenses<'a> {
     pub(super) surface: [Point3<f64>; 2],
 }
 
-/// Flies a piece of a plan, or all of it, with the robot's own servos and the controller that was chosen, by a source of poses or by the noise
-/// of `flight`.
+/// Flies a plan by the noise of `flight`, see [`fly_piece`].
 pub(super) fn fly_plan(
+    plan: &Plan,
+    world: &TriangleSurface,
+    robot: &Robot,
+    settings: &MissionSettings,
+    flight: &FlightSettings,
+) -> Result<FlightLog, MissionError> {
+    let (log, ended) = fly_piece(plan, None, world, robot, settings, flight, None)?;
+    ended.map_or(Ok(log), Err)
+}
+
+/// Flies a piece of a plan, or all of it, with the robot's own servos and the controller that was chosen, by a source of poses or by the noise
+/// of `flight`. Returns what was flown, and why it is not all. The error is of a flight that does not come to the plan.
+pub(super) fn fly_piece(
     plan: &Plan,
     piece: Option<Sortie>,
     world: &TriangleSurface,
@@ -44,7 +60,7 @@ pub(super) fn fly_plan(
     settings: &MissionSettings,
     flight: &FlightSettings,
     localisation: Option<OwnSenses>,
-) -> Result<FlightLog, MissionError> {
+) -> Result<(FlightLog, Option<MissionError>), MissionError> {
     let whole = reference(plan, robot, settings);
     let piece = piece.map(|sortie| Piece::of(&whole, sortie));
     let reference: &dyn Reference = piece.as_ref().map_or(&whole, |piece| piece);
@@ -53,17 +69,26 @@ pub(super) fn fly_plan(
         ControllerChoice::Cascade => Box::new(CascadedController::new(flight.model(), ControllerSettings::default())),
         ControllerChoice::Mpc => Box::new(MpcController::new(&flight.model(), MpcSettings::default())?),
     };
-    let log = match localisation {
+    let mut log = FlightLog::default();
+    let mut record = |reference: &dyn Reference, poses: &mut dyn PoseSource| {
+        fly_recorded(reference, controller.as_mut(), &mut gun, world, poses, flight, &mut log).err()
+    };
+    let (ended, log) = match localisation {
         Some(source) => {
             let approach = Approach::before(reference, source.surface);
-            approach.cut(fly_localised(&approach, controller.as_mut(), &mut gun, world, source.poses, flight)?)
+            let ended = record(&approach, &mut Patient::with(source.poses));
+            (ended, approach.cut(log))
         }
-        None => fly_with(reference, controller.as_mut(), &mut gun, world, flight)?,
+        None => (record(reference, &mut PoseSensor::new(flight.localisation, CONTROL_STEP, flight.seed)), log),
     };
-    Ok(match &piece {
+    let log = match &piece {
         Some(piece) => piece.cut(log),
         None => log,
-    })
+    };
+    match ended {
+        Some(error) if log.samples.is_empty() => Err(error.into()),
+        ended => Ok((log, ended.map(MissionError::from))),
+    }
 }
 
 /// The paint hose: from its anchor, or from the ground behind the middle of the flight, long enough for all of it.
@@ -85,11 +110,35 @@ fn hose(plan: &Plan, tether: Option<Tether>) -> HoseModel {
 
 #[cfg(test)]
 mod tests {
-    use paint_sim::flight::Wind;
+    use paint_planner::timing::TimingPolicy;
+    use paint_sim::flight::{Faults, Gust, Interlock, Valve, Wind};
     use ptu_kinematics::Ptu;
 
     use super::super::test_panel;
     use super::*;
+
+    /// Nothing says where it is when the gust comes: it is blown away until the hose is taut. What it has painted before is in the log.
+    #[test]
+    fn a_flight_that_ends_in_the_air_leaves_what_was_flown() {
+        let mut settings = MissionSettings { threads: 1, ..MissionSettings::default() };
+        settings.planner.timing.policy = TimingPolicy::Uniform { speed: 0.05 };
+        let surface = test_panel::surface();
+        let robot = Robot::new(Ptu::new(settings.ptu).unwrap());
+        let plan = test_panel::plan(&surface, &robot, &settings);
+        let usual = flight_settings(&plan, None, 1);
+        let gust = Some(Gust { time: 8.0, velocity: Vector3::new(-15.0, 0.0, 0.0) });
+        let faults = Faults { pose_lost: Some(8.0), gust, ..Faults::default() };
+        let valve = Valve { interlock: Some(Interlock::default()), ..usual.valve };
+        let flight = FlightSettings { faults, valve, ..usual };
+        let (log, ended) = fly_piece(&plan, None, &surface.world, &robot, &settings, &flight, None).unwrap();
+        let last = log.samples.last().unwrap().time;
+        assert!(ended.is_some() && (8.5..plan.trajectory.duration() - 1.0).contains(&last), "{ended:?} {last}");
+        let whole = fly_plan(&plan, &surface.world, &robot, &settings, &FlightSettings { valve, ..usual }).unwrap();
+        for (k, (sample, same)) in log.samples.iter().zip(&whole.samples).enumerate() {
+            assert!(sample == same || sample.time > 7.999, "{k}");
+            assert!(sample.flow == 0.0 || sample.time < 8.1, "{k}");
+        }
+    }
 
     #[test]
     fn in_strong_gusts_the_predictive_controller_keeps_the_distance_better() {
@@ -102,7 +151,7 @@ mod tests {
             let wind = Wind { mean: Vector3::zeros(), gust_sigma: 3.0, ..Wind::default() };
             let spread = (0..12).map(|seed| {
                 let flight = FlightSettings { wind, ..flight_settings(&plan, None, seed) };
-                let log = fly_plan(&plan, None, &surface.world, &robot, &settings, &flight, None).unwrap();
+                let log = fly_plan(&plan, &surface.world, &robot, &settings, &flight).unwrap();
                 log.statistics().nozzle_distance_std.powi(2)
             });
             (spread.sum::<f64>() / 12.0).sqrt()

@@ -62,6 +62,11 @@ impl TimeFigures {
     }
 }
 
+/// What a report says of flights in several sorties.
+pub(super) fn in_sorties(sorties: Option<usize>) -> String {
+    sorties.map_or_else(String::new, |count| format!("Flown in {count} sorties.\n\n"))
+}
+
 /// What a report says first where some of the plans was not flown, s.
 pub(crate) fn not_flown(left_s: Option<f64>) -> String {
     left_s.map_or_else(String::new, |left| format!("**Not all is flown: {left:.0} s of the plans are left.**\n\n"))

@@ -7,7 +7,7 @@ use super::statistics::FlightStatistics;
 use crate::spray::Shot;
 
 /// A simulated flight.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct FlightLog {
     /// One sample every `interval` seconds from 0 to the end of the reference.
     pub samples: Vec<FlightSample>,
