@@ -38,7 +38,7 @@ type FlyPiece<'a> = dyn FnMut(usize, Option<Sortie>, Option<&FlightLog>) -> Resu
 const WORTHWHILE: f64 = 5.0;
 
 /// Flies the pieces of a plan of a duration (s) one after another. What is left of one that ends in the air is flown as another. Where one cannot
-/// be flown, those before it are the flight; the error of the first is that of all.
+/// be flown, those before it are the flight; the error before any paint is that of all.
 pub(super) fn in_pieces(
     pieces: &[Option<Sortie>],
     duration: f64,
@@ -61,6 +61,9 @@ pub(super) fn in_pieces(
         told.localisation = told.localisation.into_iter().chain(localisation).reduce(LocalisationFigures::and);
         if let Some(error) = ended {
             let painted = painted_until(&mut log, from);
+            if whole.is_none() && log.samples.is_empty() {
+                return Err(error);
+            }
             say!("at {painted:.0} s of the plan a flight has ended: {error}");
             if painted - from < WORTHWHILE {
                 told.ended = Some(Grounded::by(&error, duration - painted));
@@ -137,6 +140,9 @@ mod tests {
         .unwrap();
         assert_eq!(told.count, 2);
         assert!((told.ended.unwrap().left_s - (duration - 12.0)).abs() < 0.2);
+        // Before any paint it is an error.
+        let none = in_pieces(&[None], duration, &mut |_, _, _| Ok(ending(0.0, -1.0)));
+        assert!(matches!(none, Err(MissionError::NoMap)));
     }
 
     /// Three pieces of 7 s, of which the second cannot be flown: the first is kept, the third not tried.

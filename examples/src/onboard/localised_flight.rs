@@ -205,7 +205,7 @@ impl<'a> LocalisedFlight<'a> {
         Ok(true)
     }
 
-    /// What it was told by, and what it says, have the clock of the flight, as it was found while that ran.
+    /// It was found while the flight's clock ran: that is the clock of its sensors too.
     pub(super) fn found(&mut self) {
         self.offset = Some(0);
     }
