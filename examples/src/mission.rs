@@ -23,7 +23,6 @@ mod nozzle;
 mod painted_mesh;
 mod painting_task;
 mod path_view;
-mod patient;
 mod picture_figures;
 mod picture_preview;
 mod picture_task;

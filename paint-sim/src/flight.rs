@@ -44,7 +44,8 @@ const RATE: u32 = 1000;
 const STEP: f64 = 1.0 / RATE as f64;
 /// Steps of the physics per step of localisation, controller and pan-tilt command.
 const CONTROL_STEPS: i64 = 10;
-const CONTROL_STEP: f64 = CONTROL_STEPS as f64 * STEP;
+/// Time of a control step, s: from one pose, and from one command, to the next.
+pub const CONTROL_STEP: f64 = CONTROL_STEPS as f64 * STEP;
 /// A vehicle farther than this from its reference is lost, m.
 const DIVERGENCE_DISTANCE: f64 = 20.0;
 /// Longest flight, s: a reference that asks for more has a wrong unit.
@@ -73,7 +74,7 @@ pub fn fly(
 ///
 /// # Errors
 /// Settings out of range, values that are not finite from the reference, the controller or the pan-tilt unit, a hose
-/// that is too short, or a vehicle more than 20 m away from its reference.
+/// that is too short, no pose for longer than the settings allow, or a vehicle more than 20 m away from its reference.
 pub fn fly_with(
     reference: &dyn Reference,
     controller: &mut dyn Controller,
@@ -152,6 +153,7 @@ pub fn fly_recorded(
     log.interval = log_steps as f64 * STEP;
     log.samples.reserve((last / log_steps + 1) as usize);
     let mut trusted = !settings.faults.pose_lost(begin);
+    let mut known = begin;
     for step in first..=last {
         let time = step as f64 * STEP;
         if step % CONTROL_STEPS == 0 {
@@ -170,6 +172,9 @@ pub fn fly_recorded(
                 if let Some(pose) = &pose {
                     controller.reported(time, pose);
                     estimator.update(&pose.world_from_body, CONTROL_STEP);
+                    known = time;
+                } else if let Some(longest) = settings.longest_without_pose.filter(|longest| time - known > *longest) {
+                    return Err(Error::Localisation { time, why: format!("no pose for {longest} s") });
                 } else {
                     estimator.coast(CONTROL_STEP);
                 }

@@ -24,6 +24,8 @@ use crate::simulated_sensors::SHOT_STEP;
 
 /// Parts of the spraying after which the surface is shown.
 const PARTS: usize = 3;
+/// Without a pose for longer than this, s, the robot lands, and flies the rest as another sortie.
+const LONGEST_WITHOUT_POSE: f64 = 5.0;
 /// Flights of other sorties have seeds so far apart.
 const SORTIE: u64 = 0x1_0000;
 
@@ -214,6 +216,7 @@ pub(super) fn counted_flight(plan: &Plan, robot: &Robot, settings: &MissionSetti
         valve: Valve { interlock: Some(interlock), ..usual.valve },
         faults: settings.faults,
         ptu_locked: settings.path_planner.locks_gun(),
+        longest_without_pose: Some(LONGEST_WITHOUT_POSE),
         ..usual
     }
 }

@@ -7,18 +7,15 @@ use paint_planner::control::MpcSettings;
 use paint_planner::onboard::Sortie;
 use paint_sim::flight::FlightLog;
 use paint_sim::flight::{
-    CascadedController, Controller, ControllerSettings, HoseModel, PoseSensor, PoseSource, Reference, fly_recorded,
+    CONTROL_STEP, CascadedController, Controller, ControllerSettings, HoseModel, PoseSensor, PoseSource, Reference,
+    fly_recorded,
 };
 use paint_sim::{FlightSettings, TriangleSurface};
 
 use super::error::MissionError;
-use super::patient::Patient;
 use super::settings::{ControllerChoice, MissionSettings};
 use crate::adapters::{MpcController, PlanReference, Robot, ServoPanTilt};
 use crate::onboard::{Approach, Piece};
-
-/// Time from one pose to the next, s: a control step of the simulation.
-const CONTROL_STEP: f64 = 0.01;
 
 /// The usual wind, hose and localisation.
 pub(super) fn flight_settings(plan: &Plan, tether: Option<Tether>, seed: u64) -> FlightSettings {
@@ -76,7 +73,7 @@ pub(super) fn fly_piece(
     let (ended, log) = match localisation {
         Some(source) => {
             let approach = Approach::before(reference, source.surface);
-            let ended = record(&approach, &mut Patient::with(source.poses));
+            let ended = record(&approach, source.poses);
             (ended, approach.cut(log))
         }
         None => (record(reference, &mut PoseSensor::new(flight.localisation, CONTROL_STEP, flight.seed)), log),

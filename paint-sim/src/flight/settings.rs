@@ -123,6 +123,8 @@ pub struct FlightSettings {
     pub faults: Faults,
     /// Keeps pan and tilt at zero. Default false.
     pub ptu_locked: bool,
+    /// Without a pose for longer than this, s, the flight ends: by its model alone the vehicle drifts. Default `None`: it flies on.
+    pub longest_without_pose: Option<f64>,
     /// Hover at the start before the reference begins, s; the observer learns wind and hose. Default 5.
     pub settle: f64,
     /// Samples per second of the log; a divisor of 1000. Default 100 Hz.
@@ -142,6 +144,7 @@ impl Default for FlightSettings {
             valve: Valve::default(),
             faults: Faults::default(),
             ptu_locked: false,
+            longest_without_pose: None,
             settle: 5.0,
             log_rate: 100,
             seed: 0,
@@ -171,6 +174,7 @@ impl FlightSettings {
             ("localisation.attitude_drift", self.localisation.attitude_drift),
             ("valve.dead_time", self.valve.dead_time),
             ("valve.lead", self.valve.lead),
+            ("longest_without_pose", self.longest_without_pose.unwrap_or_default()),
         ] {
             check_not_negative(what, value)?;
         }

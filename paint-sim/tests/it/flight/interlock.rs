@@ -59,6 +59,29 @@ fn without_a_pose_the_valve_is_shut() {
     assert!((last - 3.04).abs() < 1e-9, "{last}");
 }
 
+/// The pose is lost at 3 s, and 2 s later the flight ends with what was flown in its log.
+#[test]
+fn a_flight_without_a_pose_ends_and_keeps_its_log() {
+    let reference = Ellipse { duration: 8.0 };
+    let faults = Faults { pose_lost: Some(3.0), ..Faults::default() };
+    let endless = interlocked(1, faults);
+    let settings = FlightSettings { longest_without_pose: Some(2.0), ..endless };
+    let mut sensor = PoseSensor::new(settings.localisation, CONTROL_STEP, settings.seed);
+    let mut controller = CascadedController::new(settings.airframe, ControllerSettings::default());
+    let mut log = FlightLog::default();
+    let (mut gun, wall) = (arm(), wall());
+    let ended = fly_recorded(&reference, &mut controller, &mut gun, &wall, &mut sensor, &settings, &mut log);
+    assert!(matches!(ended, Err(Error::Localisation { time, .. }) if (time - 5.0).abs() < 0.011), "{ended:?}");
+    let whole = fly(&reference, &mut arm(), &wall, &endless).unwrap();
+    assert!((log.samples.len() as i64 - 500).abs() <= 1 && whole.samples.starts_with(&log.samples));
+    assert!(fly(&reference, &mut arm(), &wall, &settings).is_err());
+    let never = FlightSettings { longest_without_pose: Some(f64::NAN), ..settings };
+    assert!(matches!(
+        fly(&reference, &mut arm(), &wall, &never),
+        Err(Error::OutOfRange { .. } | Error::NotFinite { .. })
+    ));
+}
+
 /// A gun that does not turn misses with every gust, and its paint is held back as any other's.
 #[test]
 fn a_locked_gun_paints_only_where_it_happens_to_aim() {
