@@ -101,7 +101,7 @@ impl Flight {
         let points = points(&spline, &mut rng)?;
         for stamp in stamps(begin, end, IMAGES[0]) {
             let pose = spline.sample(stamp)?.world_from_body;
-            let noise = || Vector2::new(normal(&mut rng), normal(&mut rng)) * PIXEL_SIGMA;
+            let noise = || Vector2::new(rng.normal(), rng.normal()) * PIXEL_SIGMA;
             let seen = observe_points(&points, &camera, &pose, 0.0, noise);
             timed.push((stamp.nanos() + IMAGES[1], Arrival::Points(stamp, seen)));
         }
@@ -132,14 +132,9 @@ fn stamps(begin: Stamp, end: Stamp, step: i64) -> impl Iterator<Item = Stamp> {
     (1..).map(move |k| Stamp::from_nanos(begin.nanos() + k * step)).take_while(move |stamp| *stamp < end)
 }
 
-/// Three normal numbers (Box and Muller 1958).
+/// Three normal numbers.
 pub fn normals(rng: &mut Rng) -> Vector3<f64> {
-    Vector3::from_fn(|_, _| normal(rng))
-}
-
-fn normal(rng: &mut Rng) -> f64 {
-    let (u, v) = (rng.unit(), rng.unit());
-    (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+    Vector3::from_fn(|_, _| rng.normal())
 }
 
 /// Sways and turns through about 8 m, never twice the same way.

@@ -198,9 +198,8 @@ impl NoisyWall<'_> {
     fn deposit(&mut self, sprays: &[Spray]) {
         for s in sprays {
             let rng = &mut self.rng;
-            let mut normal = || (-2.0 * (1.0 - rng.unit()).ln()).sqrt() * (std::f64::consts::TAU * rng.unit()).cos();
-            let (x, y) = (s.x + AIM_NOISE * normal(), s.y + AIM_NOISE * normal());
-            let volume = self.gain * s.volume * (1.0 + VOLUME_NOISE * normal()).max(0.0);
+            let (x, y) = (s.x + AIM_NOISE * rng.normal(), s.y + AIM_NOISE * rng.normal());
+            let volume = self.gain * s.volume * (1.0 + VOLUME_NOISE * rng.normal()).max(0.0);
             let (width, height, reach) = (self.canvas.width(), self.canvas.height(), self.kernel.radius());
             let range = |centre: f64, end: usize| {
                 (centre as usize).saturating_sub(reach)..(centre as usize + reach + 1).min(end)

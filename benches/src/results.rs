@@ -10,6 +10,7 @@ mod extent;
 pub mod handheld;
 pub mod latency;
 pub mod layers;
+pub mod meshes;
 pub mod overdose;
 pub mod papers;
 pub mod peers;
@@ -31,7 +32,7 @@ pub type Rerun = fn(Extent, &Path) -> Result<Vec<Table>, Box<dyn Error>>;
 
 /// Reruns in the order of the papers, each with its name; what it needs on the way lies in the folder that it is given. Its first table is
 /// shown as such, the others are drawn by `docs/plots/plots.py`.
-pub const PARTS: [(&str, Rerun); 15] = [
+pub const PARTS: [(&str, Rerun); 16] = [
     ("papers", |_, _| Ok(vec![papers::table()])),
     ("drift", |extent, _| drift::tables(extent)),
     ("flown_baselines", |extent, _| baselines::tables(extent)),
@@ -44,6 +45,7 @@ pub const PARTS: [(&str, Rerun); 15] = [
     ("digits", digits::tables),
     ("thesis_network", |extent, _| thesis_network::tables(extent)),
     ("wall", |extent, _| wall::tables(extent)),
+    ("meshes", meshes::tables),
     ("handheld", handheld::tables),
     ("overdose", overdose::tables),
     ("peers", peers::tables),
