@@ -1,6 +1,6 @@
-"""A vehicle played by pymavlink: it flies where `robot --autopilot udp:...` tells it, and checks each message by an outside decoder.
+"""A vehicle played by pymavlink: it flies where `robot --autopilot udp:...` or `serial:...` tells it, and checks each message by an outside decoder.
 
-    python3 benches/peers/mavlink_vehicle.py ROBOT [SECONDS]     # ROBOT: the program; paints SECONDS of a small panel (5)
+    python3 benches/peers/mavlink_vehicle.py ROBOT [SECONDS [serial]]     # ROBOT: the program; paints SECONDS of a small panel (5)
 
 The vehicle is a point that follows its set-points; its pilot arms it and hands over control after two seconds. Checked are frames, masks,
 units, targets, and that what is decoded brings it where the plan is. Exit code 1 with what is wrong. Needs pymavlink.
@@ -13,12 +13,35 @@ import subprocess
 import sys
 import tempfile
 import time
+import tty
 
 os.environ["MAVLINK20"] = "1"
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import common as mav
 
 PORT = 14777
+
+
+class Line(mavutil.mavfile):
+    """The far end of a serial line: a pseudo-terminal."""
+
+    def __init__(self):
+        master, self.near = os.openpty()
+        tty.setraw(self.near)
+        os.set_blocking(master, False)
+        super().__init__(master, os.ttyname(self.near), source_system=7, source_component=1)
+
+    def recv(self, n=None):
+        try:
+            return os.read(self.fd, n or 4096)
+        except BlockingIOError:
+            return b""
+
+    def write(self, buf):
+        try:
+            os.write(self.fd, buf)
+        except BlockingIOError:
+            pass
 
 
 def panel(path):
@@ -35,10 +58,12 @@ def main():
     robot, seconds = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else "5"
     folder = pathlib.Path(tempfile.mkdtemp())
     panel(folder / "panel.obj")
-    command = [robot, "--autopilot", f"udp:127.0.0.1:{PORT}", "--mesh", folder / "panel.obj", "--scale", "1", "--up", "z"]
+    serial = sys.argv[3:] == ["serial"]
+    link = Line() if serial else mavutil.mavlink_connection(f"udpout:127.0.0.1:{PORT}", source_system=7, source_component=1)
+    address = f"serial:{link.address},115200" if serial else f"udp:127.0.0.1:{PORT}"
+    command = [robot, "--autopilot", address, "--mesh", folder / "panel.obj", "--scale", "1", "--up", "z"]
     command += ["--design", "stripes", "--seconds", seconds, "--out", folder / "out"]
     running = subprocess.Popen(command, stdin=subprocess.DEVNULL)
-    link = mavutil.mavlink_connection(f"udpout:127.0.0.1:{PORT}", source_system=7, source_component=1)
     # North, east, down and heading; it starts somewhere else than the plan.
     place, velocity, yaw = [3.0, -2.0, 0.0], [0.0] * 3, 0.4
     counts, wrong, landing, armed, start, farthest = {}, [], False, False, time.time(), 0.0

@@ -4,8 +4,8 @@
 //! |---|---|---|
 //! | physics: rigid body, motors, wind, hose, servos, valve | 1 kHz | [`SimulatedRobot`] |
 //! | autopilot's sensors and motor commands | 250 Hz | [`SimulatedRobot`], [`autopilot`](crate::autopilot) |
-//! | on-board program: phases, control, aim, valve | 100 Hz | [`OnBoard`] |
-//! | set-points and odometry for the autopilot | 50 Hz | [`OffboardLink`](crate::autopilot::OffboardLink) |
+//! | on-board program: phases, set-points, aim, valve | 100 Hz | [`OnBoard`] |
+//! | odometry for the autopilot | 50 Hz | [`OffboardLink`](crate::autopilot::OffboardLink) |
 
 mod arguments;
 mod error;
@@ -18,7 +18,7 @@ mod report;
 mod run;
 mod simulated_robot;
 mod simulation;
-mod udp;
+mod vehicle;
 
 pub use arguments::{Arguments, AutopilotChoice};
 pub use error::RobotError;

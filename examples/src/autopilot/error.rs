@@ -33,6 +33,18 @@ pub enum AutopilotError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// A serial port that is not to be had.
+    #[error(
+        "serial port {device} at {baud} baud: {source}: is it there, free, and yours to open (on Linux by the group dialout)?"
+    )]
+    Serial {
+        /// Its name.
+        device: PathBuf,
+        /// Its rate, bit/s.
+        baud: u32,
+        /// What the system said.
+        source: std::io::Error,
+    },
     /// PX4 ended.
     #[error("PX4 ended ({status}); its log {log} says why")]
     Ended {

@@ -13,7 +13,8 @@ use mavlink::dialects::common::{HIL_ACTUATOR_CONTROLS_DATA, MavMessage};
 use super::error::AutopilotError;
 use super::lockstep::{Threads, tied};
 use super::px4_folder::{Px4Vehicle, file_error, prepare};
-use super::sockets::{SimulatorSocket, UdpLink};
+use super::simulator_socket::SimulatorSocket;
+use super::vehicle_link::VehicleLink;
 
 /// Wall clock: a running PX4 answers each sample.
 const ANSWER: Duration = Duration::from_secs(10);
@@ -25,7 +26,7 @@ pub struct Px4 {
     child: Child,
     threads: Threads,
     simulator: SimulatorSocket,
-    offboard: UdpLink,
+    offboard: VehicleLink,
     log: PathBuf,
     controls: Option<HIL_ACTUATOR_CONTROLS_DATA>,
 }
@@ -170,7 +171,7 @@ fn end(child: &mut Child) {
 }
 
 /// The first instance that does not run, as its lock says, and whose ports are free: the simulator's, and ours of the off-board link.
-fn ports() -> Result<(u16, TcpListener, UdpLink), AutopilotError> {
+fn ports() -> Result<(u16, TcpListener, VehicleLink), AutopilotError> {
     let local = |port: u16| SocketAddr::from((Ipv4Addr::LOCALHOST, port));
     let mut last = None;
     let runs = |instance: &u16| {
@@ -179,7 +180,7 @@ fn ports() -> Result<(u16, TcpListener, UdpLink), AutopilotError> {
     };
     for instance in (0..INSTANCES).filter(|instance| !runs(instance)) {
         let listener = TcpListener::bind(local(4560 + instance));
-        let offboard = UdpLink::open(local(14540 + instance), Some(local(14580 + instance)));
+        let offboard = VehicleLink::udp(local(14540 + instance), Some(local(14580 + instance)));
         match (listener, offboard) {
             (Ok(listener), Ok(offboard)) => return Ok((instance, listener, offboard)),
             (Err(source), _) => last = Some(AutopilotError::Socket { what: "TCP ports 4560 to 4569".into(), source }),

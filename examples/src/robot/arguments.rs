@@ -1,6 +1,5 @@
 //! The command line of `robot`.
 
-use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -8,22 +7,22 @@ use clap::Parser;
 
 use super::fault::Fault;
 use super::on_board::SetpointKind;
+use crate::autopilot::LinkAddress;
 use crate::mission_arguments::MissionArguments;
-use crate::socket_address;
 
 /// Flies the first minutes of a painting mission on an autopilot that speaks MAVLink: PX4 as a program in lockstep with the simulated
-/// vehicle, or a multirotor with PX4 over UDP. Without other arguments it paints the built-in rock wall.
+/// vehicle, or a multirotor with PX4 over UDP or a serial line. Without other arguments it paints the built-in rock wall.
 #[derive(Parser)]
 #[command(
     name = "robot",
     version,
-    after_help = "Example:\n  robot --autopilot px4:px4 --seconds 60 --out out/px4\n  robot --autopilot udp:127.0.0.1:14540"
+    after_help = "Example:\n  robot --autopilot px4:px4 --seconds 60 --out out/px4\n  robot --autopilot udp:127.0.0.1:14540\n  robot --autopilot serial:/dev/ttyUSB0,921600"
 )]
 pub struct Arguments {
     #[command(flatten)]
     pub(super) mission: MissionArguments,
-    /// Who flies: px4:FOLDER (px4, px4-alias.sh and etc/ of a PX4 built for simulation), or udp:ADDRESS:PORT where a vehicle sends to
-    #[arg(long, value_name = "px4:FOLDER|udp:ADDRESS:PORT")]
+    /// Who flies: px4:FOLDER (px4, px4-alias.sh and etc/ of a PX4 built for simulation), udp:ADDRESS:PORT where a vehicle sends to, or serial:DEVICE,BAUD
+    #[arg(long, value_name = "px4:FOLDER|udp:ADDRESS:PORT|serial:DEVICE,BAUD")]
     pub(super) autopilot: AutopilotChoice,
     /// How much of the plan is painted, seconds
     #[arg(long, value_name = "SECONDS", default_value_t = 300.0, value_parser = seconds)]
@@ -44,8 +43,8 @@ pub struct Arguments {
 pub enum AutopilotChoice {
     /// PX4 as a program, in lockstep.
     Px4(PathBuf),
-    /// A vehicle that sends to this address of ours, on the wall clock.
-    Udp(SocketAddr),
+    /// A vehicle, on the wall clock.
+    Vehicle(LinkAddress),
 }
 
 impl FromStr for AutopilotChoice {
@@ -54,11 +53,8 @@ impl FromStr for AutopilotChoice {
     fn from_str(text: &str) -> Result<Self, String> {
         match text.split_once(':') {
             Some(("px4", folder)) if !folder.is_empty() => Ok(Self::Px4(folder.into())),
-            Some(("udp", address)) => socket_address::parse(address).map(Self::Udp),
-            Some(("serial", _)) => {
-                Err("serial lines are not built in: let a router such as mavlink-router carry them to UDP".into())
-            }
-            _ => Err("give px4:FOLDER or udp:ADDRESS:PORT".into()),
+            Some(("udp" | "serial", _)) => text.parse().map(Self::Vehicle),
+            _ => Err("give px4:FOLDER, udp:ADDRESS:PORT or serial:DEVICE,BAUD".into()),
         }
     }
 }
@@ -75,9 +71,11 @@ mod tests {
     #[test]
     fn autopilots_are_read_and_bad_ones_are_refused() {
         assert_eq!("px4:a/b".parse(), Ok(AutopilotChoice::Px4("a/b".into())));
-        assert_eq!("udp:127.0.0.1:14540".parse(), Ok(AutopilotChoice::Udp(([127, 0, 0, 1], 14540).into())));
-        for bad in ["px4:", "px4", "udp:", "udp:127.0.0.1", "tcp:127.0.0.1:1", "serial:/dev/ttyUSB0,57600"] {
-            assert!(bad.parse::<AutopilotChoice>().is_err(), "{bad}");
+        let vehicle = LinkAddress::Serial { device: "COM3".into(), baud: 921_600 };
+        assert_eq!("serial:COM3,921600".parse(), Ok(AutopilotChoice::Vehicle(vehicle)));
+        for bad in ["px4:", "px4", "tcp:127.0.0.1:1"] {
+            assert!(bad.parse::<AutopilotChoice>().unwrap_err().starts_with("give px4:"), "{bad}");
         }
+        assert!("serial:COM3".parse::<AutopilotChoice>().unwrap_err().starts_with("give serial:"));
     }
 }

@@ -35,8 +35,8 @@ pub enum RobotError {
         /// The option.
         option: &'static str,
     },
-    /// An option that says nothing about a vehicle over UDP.
-    #[error("{option} is for the simulated vehicle on PX4: leave it out with --autopilot udp:ADDRESS:PORT ({why})")]
+    /// An option that says nothing about a vehicle that is not simulated.
+    #[error("{option} is for the simulated vehicle on PX4: leave it out with --autopilot udp: and serial: ({why})")]
     SimulationOnly {
         /// The option.
         option: &'static str,

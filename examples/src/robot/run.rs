@@ -15,8 +15,8 @@ use super::on_board::{OnBoardSettings, SetpointKind};
 use super::recorder::Record;
 use super::report::RobotReport;
 use super::simulation::fly_simulated;
-use super::udp::fly_udp;
-use crate::autopilot::{OffboardSettings, Px4, Px4Vehicle};
+use super::vehicle::fly_vehicle;
+use crate::autopilot::{OffboardSettings, Px4, Px4Vehicle, VehicleLink};
 use crate::interruption::Finishing;
 use crate::mission::{LocalisationChoice, PlannedFlight, PlannedMission, PlannerChoice};
 use crate::onboard::LocalisationFigures;
@@ -78,7 +78,7 @@ fn fly(
             let launch = |vehicle: &Px4Vehicle| Px4::start(source, &folder.join("px4"), vehicle);
             fly_simulated(flight, &settings, &launch, &arguments.fault, progress)
         }
-        AutopilotChoice::Udp(address) => {
+        AutopilotChoice::Vehicle(address) => {
             let only = |option, why| Err(RobotError::SimulationOnly { option, why });
             if flight.settings().localisation != LocalisationChoice::MotionCapture {
                 return only("--localisation", "it says itself where it is");
@@ -89,8 +89,9 @@ fn fly(
             if !arguments.fault.is_empty() {
                 return only("--fault", "nothing is made to fail on a vehicle");
             }
+            let link = VehicleLink::open(address)?;
             // Trajectories hold no thrust.
-            let flown = fly_udp(*address, flight, on_board_settings(arguments, &conditions, 0.0), progress)?;
+            let flown = fly_vehicle(link, flight, on_board_settings(arguments, &conditions, 0.0), progress)?;
             Ok((flown, None))
         }
     }

@@ -1,6 +1,7 @@
 //! `robot`: a short flight on PX4 where there is one, and what is no autopilot.
 
 use std::net::{Ipv4Addr, UdpSocket};
+use std::os::fd::AsRawFd;
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -9,6 +10,7 @@ use mavlink::dialects::common::{HEARTBEAT_DATA, MavAutopilot, MavMessage, MavTyp
 use paintcopter::autopilot::Encoder;
 use paintcopter::mesh_io::TriangleMesh;
 use paintcopter::world::{CENTRE, rock_wall};
+use serial2::SerialPort;
 
 use crate::scratch::Scratch;
 
@@ -215,8 +217,9 @@ fn what_is_no_autopilot_is_refused() {
     let program = s.0.join("other/px4");
     std::fs::set_permissions(&program, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
     refused(&run(&other), &["PX4 ended", "exit status: 3", "px4.log"]);
-    refused(&run("serial:/dev/ttyUSB0,57600"), &["serial lines are not built in"]);
-    refused(&run("tcp:127.0.0.1:5760"), &["px4:FOLDER or udp:ADDRESS:PORT"]);
+    refused(&run("serial:/dev/no_port,115200"), &["/dev/no_port at 115200 baud", "dialout"]);
+    refused(&run("serial:/dev/no_port,300"), &["at least 115200"]);
+    refused(&run("tcp:127.0.0.1:5760"), &["px4:FOLDER, udp:ADDRESS:PORT or serial:DEVICE,BAUD"]);
 }
 
 #[test]
@@ -238,14 +241,18 @@ fn silence_and_nonsense_end_the_wait() {
     let s = Scratch::new("nonsense");
     let free = || UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap().local_addr().unwrap();
     let (silent, noisy, plane) = (free(), free(), free());
-    let out = [s.path("silent"), s.path("noisy"), s.path("plane")];
-    let start = |address, out: &str| {
-        robot(&s, &format!("udp:{address}"), &["--out", out]).stderr(Stdio::piped()).spawn().unwrap()
+    // A line whose rate is another one.
+    let (line, near) = SerialPort::pair().unwrap();
+    let device = std::fs::read_link(format!("/proc/self/fd/{}", near.as_raw_fd())).unwrap();
+    let start = |address: String| {
+        let out = s.path(&address.replace(['/', ':'], "_"));
+        robot(&s, &address, &["--out", &out]).stderr(Stdio::piped()).spawn().unwrap()
     };
     let begun = Instant::now();
-    let waiting = start(silent, &out[0]);
-    let mut fed = start(noisy, &out[1]);
-    let on_plane = start(plane, &out[2]);
+    let waiting = start(format!("udp:{silent}"));
+    let mut fed = start(format!("udp:{noisy}"));
+    let on_plane = start(format!("udp:{plane}"));
+    let on_line = start(format!("serial:{},115200", device.display()));
     let heartbeat = MavMessage::HEARTBEAT(HEARTBEAT_DATA {
         mavtype: MavType::MAV_TYPE_FIXED_WING,
         autopilot: MavAutopilot::MAV_AUTOPILOT_PX4,
@@ -263,10 +270,13 @@ fn silence_and_nonsense_end_the_wait() {
             })
             .collect();
         let _ = socket.send_to(&rubbish, noisy);
+        let _ = line.write(&rubbish);
         let _ = socket.send_to(&frame, plane);
         std::thread::sleep(Duration::from_millis(5));
     }
     refused(&fed.wait_with_output().unwrap(), &["no heartbeat of an autopilot", "is it MAVLink"]);
+    let on_line = on_line.wait_with_output().unwrap();
+    refused(&on_line, &["115200 baud sends", "no heartbeat of an autopilot", "at this address and rate"]);
     refused(&on_plane.wait_with_output().unwrap(), &["FIXED_WING", "a multirotor on PX4"]);
     refused(&waiting.wait_with_output().unwrap(), &["said nothing for 10 s", "let the vehicle send MAVLink there"]);
 }

@@ -1,7 +1,6 @@
 //! The flight of a vehicle that is not ours: on the wall clock, at the place that it says itself, before a surface that is imagined
 //! where it started. Its pilot arms it and hands over control.
 
-use std::net::SocketAddr;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -14,7 +13,7 @@ use super::flight::{End, Flown, over};
 use super::on_board::{CONTROL_STEP, OnBoard, OnBoardSettings};
 use super::recorder::{Recorder, Seen};
 use super::simulated_robot::{STEP, station};
-use crate::autopilot::{AutopilotError, OffboardLink, OffboardSettings, Telemetry, UdpLink};
+use crate::autopilot::{AutopilotError, OffboardLink, OffboardSettings, Telemetry, VehicleLink};
 use crate::interruption;
 use crate::mission::PlannedFlight;
 
@@ -52,18 +51,17 @@ impl Reference for Moved<'_> {
     }
 }
 
-/// Flies a plan on the vehicle that sends to `address`, until it has landed or is given up.
-pub(super) fn fly_udp(
-    address: SocketAddr,
+/// Flies a plan on the vehicle at the other end of a link, until it has landed or is given up.
+pub(super) fn fly_vehicle(
+    mut link: VehicleLink,
     flight: &PlannedFlight,
     settings: OnBoardSettings,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Flown, RobotError> {
-    let mut link = UdpLink::open(address, None)?;
     let clock = Instant::now();
     let plan = flight.reference();
     let start = plan.at(0.0);
-    let vehicle_from_station = first_pose(&mut link, address, &clock)?;
+    let vehicle_from_station = first_pose(&mut link, &clock)?;
     let world_from_station = station(&start.position, start.heading);
     let vehicle_from_world = vehicle_from_station * world_from_station.inverse();
     let world_from_vehicle = vehicle_from_world.inverse();
@@ -123,7 +121,7 @@ pub(super) fn fly_udp(
 }
 
 /// Where the vehicle stands when it is first heard, level.
-fn first_pose(link: &mut UdpLink, address: SocketAddr, clock: &Instant) -> Result<Isometry3<f64>, AutopilotError> {
+fn first_pose(link: &mut VehicleLink, clock: &Instant) -> Result<Isometry3<f64>, AutopilotError> {
     let wait = LONGEST_WAIT;
     let mut on_board =
         OffboardLink::new(OffboardSettings { telemetry_rate: TELEMETRY_RATE, ..OffboardSettings::default() });
@@ -144,7 +142,7 @@ fn first_pose(link: &mut UdpLink, address: SocketAddr, clock: &Instant) -> Resul
         }
         sleep(Duration::from_millis(10));
     }
-    let what = format!("UDP {address}");
+    let what = link.to_string();
     let (bytes, _) = link.counts();
     Err(if on_board.telemetry().identity.is_some() {
         AutopilotError::silent(

@@ -1,10 +1,9 @@
-//! The sockets of both links; everything else of this module knows none.
+//! The simulator's end of the link to PX4: TCP.
 
 use std::io::{self, ErrorKind, Read, Write};
-use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
+use std::net::{TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 
-use mavlink::MavHeader;
 use mavlink::dialects::common::MavMessage;
 
 use super::codec::{Decoder, Encoder};
@@ -72,52 +71,6 @@ impl SimulatorSocket {
                 Err(error) => return Err(failed(error)),
             }
         }
-    }
-}
-
-/// A MAVLink peer over UDP.
-pub struct UdpLink {
-    socket: UdpSocket,
-    peer: Option<SocketAddr>,
-    encoder: Encoder,
-    decoder: Decoder,
-}
-
-impl UdpLink {
-    /// Listens at `local` and speaks to `peer`, or to whoever speaks first.
-    pub fn open(local: SocketAddr, peer: Option<SocketAddr>) -> Result<Self, AutopilotError> {
-        let failed = |source| AutopilotError::Socket { what: format!("UDP {local}"), source };
-        let socket = UdpSocket::bind(local).map_err(failed)?;
-        socket.set_nonblocking(true).map_err(failed)?;
-        Ok(Self { socket, peer, encoder: Encoder::new(1, 191), decoder: Decoder::default() })
-    }
-
-    /// Sends a message; lost like any datagram where nobody listens.
-    pub fn send(&mut self, message: &MavMessage) {
-        let frame = self.encoder.frame(message);
-        if let Some(peer) = self.peer {
-            // A refused datagram is a link that is silent, which is noticed where it matters.
-            let _ = self.socket.send_to(&frame, peer);
-        }
-    }
-
-    /// What has come; never waits.
-    pub fn receive(&mut self) -> Vec<(MavHeader, MavMessage)> {
-        let mut buffer = [0; 2048];
-        loop {
-            match self.socket.recv_from(&mut buffer) {
-                Ok((count, from)) if *self.peer.get_or_insert(from) == from => self.decoder.push(&buffer[..count]),
-                Ok(_) => {}
-                Err(error) if error.kind() == ErrorKind::ConnectionRefused => {}
-                Err(_) => break,
-            }
-        }
-        std::iter::from_fn(|| self.decoder.next_message()).collect()
-    }
-
-    /// Bytes that have come, and messages in them.
-    pub fn counts(&self) -> (usize, usize) {
-        self.decoder.counts()
     }
 }
 
