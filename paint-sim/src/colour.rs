@@ -2,9 +2,13 @@
 
 mod ciede2000;
 mod spectrum;
+mod srgb8;
 mod tables;
 mod upsampling;
 
+use std::sync::LazyLock;
+
+use self::srgb8::Srgb8Steps;
 pub use ciede2000::ciede2000;
 pub use spectrum::{BANDS, Spectrum, wavelength};
 pub use upsampling::spectrum_of_linear_srgb;
@@ -69,8 +73,9 @@ pub fn encode_srgb(linear: f64) -> f64 {
 
 /// [`encode_srgb`] to 0..=255, and whether the component had to be clipped.
 pub fn encode_srgb8(linear: f64) -> (u8, bool) {
+    static STEPS: LazyLock<Srgb8Steps> = LazyLock::new(Srgb8Steps::new);
     let clipped = !(0.0..=1.0).contains(&linear);
-    ((encode_srgb(linear.clamp(0.0, 1.0)) * 255.0).round() as u8, clipped)
+    (STEPS.encode(linear.clamp(0.0, 1.0)), clipped)
 }
 
 /// The inverse of [`encode_srgb`].

@@ -1,14 +1,13 @@
 //! A small ray caster: colour, depth, face ids and normals of a painted surface from any pinhole camera.
 
+mod band;
+
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 
-use crate::colour::encode_srgb8;
+use self::band::{Band, BandRenderer};
 use crate::error::{Error, check_positive, check_range};
 use crate::surface::{Hit, Surface};
 use crate::trace::span;
-
-/// Rays end here, m: beyond it there is only background.
-const MAX_RAY_LENGTH: f64 = 1e4;
 
 /// A pinhole camera with `OpenCV` axes: x right, y down, z forward. The centre of pixel (0, 0) has the image
 /// coordinates (0, 0), so that a camera in the middle has `cx = (width - 1) / 2`.
@@ -149,8 +148,9 @@ pub fn render(
     if !(light.into_iter().all(|v| v.is_finite()) && lights.towards_sun.iter().all(|v| v.is_finite())) {
         return Err(Error::NotFinite { what: "light", index: 0 });
     }
-    let renderer = RowRenderer { surface, camera, shade, lights, supersampling };
-    let pixels = camera.width as usize * camera.height as usize;
+    let renderer = BandRenderer { surface, camera, shade, lights, supersampling };
+    let (width, height) = (camera.width as usize, camera.height as usize);
+    let pixels = width * height;
     let mut frame = Frame {
         width: camera.width,
         height: camera.height,
@@ -159,100 +159,26 @@ pub fn render(
         faces: vec![u32::MAX; pixels],
         normals: vec![[0.0; 3]; pixels],
     };
-    let width = camera.width as usize;
-    let mut rows: Vec<Row> = (0..camera.height)
-        .zip(frame.colour.chunks_mut(width))
-        .zip(frame.depth.chunks_mut(width))
-        .zip(frame.faces.chunks_mut(width))
-        .zip(frame.normals.chunks_mut(width))
-        .map(|((((v, colour), depth), faces), normals)| Row { v, colour, depth, faces, normals })
+    let edge = renderer.tile_edge();
+    let mut bands: Vec<Band> = (0..height)
+        .step_by(edge)
+        .zip(frame.colour.chunks_mut(edge * width))
+        .zip(frame.depth.chunks_mut(edge * width))
+        .zip(frame.faces.chunks_mut(edge * width))
+        .zip(frame.normals.chunks_mut(edge * width))
+        .map(|((((top, colour), depth), faces), normals)| Band { top, width, colour, depth, faces, normals })
         .collect();
     if threads == 1 {
-        for row in &mut rows {
-            renderer.fill(row);
+        for band in &mut bands {
+            renderer.fill(band);
         }
     } else {
-        let share = rows.len().div_ceil(threads);
+        let share = bands.len().div_ceil(threads);
         std::thread::scope(|scope| {
-            for chunk in rows.chunks_mut(share) {
-                scope.spawn(|| chunk.iter_mut().for_each(|row| renderer.fill(row)));
+            for chunk in bands.chunks_mut(share) {
+                scope.spawn(|| chunk.iter_mut().for_each(|band| renderer.fill(band)));
             }
         });
     }
     Ok(frame)
-}
-
-/// One row of the frame, so that threads can own what they write.
-struct Row<'a> {
-    v: u32,
-    colour: &'a mut [[u8; 3]],
-    depth: &'a mut [f32],
-    faces: &'a mut [u32],
-    normals: &'a mut [[f32; 3]],
-}
-
-struct RowRenderer<'a> {
-    surface: &'a dyn Surface,
-    camera: &'a Camera,
-    shade: &'a (dyn Fn(&Hit) -> Shading + Sync),
-    lights: &'a Lights,
-    supersampling: u32,
-}
-
-impl RowRenderer<'_> {
-    fn fill(&self, row: &mut Row) {
-        for column in 0..row.colour.len() {
-            let (u, v) = (column as f64, f64::from(row.v));
-            let (direction, cosine) = self.camera.ray(u, v);
-            let hit = self.cast(&direction);
-            if let Some(hit) = &hit {
-                row.depth[column] = (hit.distance * cosine) as f32;
-                row.faces[column] = hit.face;
-                row.normals[column] = facing(hit, &direction).map(|v| v as f32).into();
-            }
-            let linear = if self.supersampling == 1 { self.light(hit.as_ref(), &direction) } else { self.mean(u, v) };
-            row.colour[column] = linear.map(|v| encode_srgb8(f64::from(v)).0);
-        }
-    }
-
-    fn cast(&self, direction: &Vector3<f64>) -> Option<Hit> {
-        let eye = Point3::from(self.camera.world_from_camera.translation.vector);
-        self.surface.cast(&eye, direction, MAX_RAY_LENGTH)
-    }
-
-    /// Mean light over a regular grid of rays inside the pixel.
-    fn mean(&self, u: f64, v: f64) -> [f32; 3] {
-        let n = self.supersampling;
-        let offset = |i: u32| (f64::from(i) + 0.5) / f64::from(n) - 0.5;
-        let mut sum = [0.0_f32; 3];
-        for i in 0..n * n {
-            let (direction, _) = self.camera.ray(u + offset(i % n), v + offset(i / n));
-            let light = self.light(self.cast(&direction).as_ref(), &direction);
-            sum = std::array::from_fn(|c| sum[c] + light[c]);
-        }
-        sum.map(|total| total / (n * n) as f32)
-    }
-
-    fn light(&self, hit: Option<&Hit>, direction: &Vector3<f64>) -> [f32; 3] {
-        let Some(hit) = hit else { return self.lights.background };
-        let Shading { albedo, normal: shading } = (self.shade)(hit);
-        let normal = facing(hit, direction);
-        let towards_sun = self.lights.towards_sun.as_ref();
-        let lit_side = if shading.dot(&normal) < 0.0 { -shading } else { shading };
-        let mut cosine = lit_side.dot(towards_sun).max(0.0) as f32;
-        if cosine > 0.0 {
-            let eye = self.camera.world_from_camera.translation.vector;
-            // Off the surface by more than the rounding of the hit, or it would shade itself.
-            let start = Point3::from(eye + direction * hit.distance + normal * (1e-6 * (1.0 + hit.distance)));
-            if self.surface.occluded(&start, towards_sun, MAX_RAY_LENGTH) {
-                cosine = 0.0;
-            }
-        }
-        std::array::from_fn(|c| albedo[c] * (self.lights.sun[c] * cosine + self.lights.ambient[c]))
-    }
-}
-
-/// The normal of the hit on the side from which the ray came.
-fn facing(hit: &Hit, direction: &Vector3<f64>) -> Vector3<f64> {
-    if hit.normal.dot(direction) > 0.0 { -hit.normal } else { hit.normal }
 }

@@ -3,17 +3,18 @@
 use glam::DVec3;
 use nalgebra::{Point3, Vector3};
 use parry3d_f64::bounding_volume::Aabb;
-use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode, TraversalAction};
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, TraversalAction};
 use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::Triangle;
 
+use super::beam::{Beam, Candidate};
 use super::ray_query::{Hit, Surface};
+use super::sheared_ray::ShearedRay;
 use crate::error::Error;
 
 /// A triangle soup: open, unequal, duplicate and zero-area triangles are fine (the last are never hit).
 ///
-/// Rays use the watertight test of Woop, Benthin and Wald (2013) in f64, so that none slips through an edge that two
-/// triangles share.
+/// No ray slips through an edge that two triangles share.
 #[derive(Debug, Clone)]
 pub struct TriangleSurface {
     /// Corners of the triangles that have an area; the leaves of the tree count these.
@@ -66,7 +67,12 @@ impl TriangleSurface {
 
     /// Where a hit lies, m, world frame; `None` of a hit on another surface.
     pub fn point(&self, hit: &Hit) -> Option<Point3<f64>> {
-        let [a, b, c] = &self.corners[self.faces.binary_search(&hit.face).ok()?];
+        let leaf = match self.faces.get(hit.face as usize) {
+            // No triangle without an area is before it.
+            Some(face) if *face == hit.face => hit.face as usize,
+            _ => self.faces.binary_search(&hit.face).ok()?,
+        };
+        let [a, b, c] = &self.corners[leaf];
         let [v, w] = hit.barycentric;
         Some((a * (1.0 - v - w) + b * v + c * w).into())
     }
@@ -91,6 +97,11 @@ impl TriangleSurface {
         )
     }
 
+    fn hit(&self, leaf: u32, distance: f64, barycentric: [f64; 2]) -> Hit {
+        let normal = scaled_normal(&self.corners[leaf as usize]).normalize();
+        Hit { distance, face: self.faces[leaf as usize], barycentric, normal }
+    }
+
     /// Least and largest coordinate along an axis, m.
     pub fn extent(&self, axis: &Vector3<f64>) -> (f64, f64) {
         let along = self.corners.iter().flatten().map(|corner| corner.dot(axis));
@@ -106,8 +117,40 @@ impl Surface for TriangleSurface {
             |node, best| ray.entry_distance(node, best).unwrap_or(f64::MAX),
             |leaf, best| ray.intersect(&self.corners[leaf as usize], best),
         )?;
-        let normal = scaled_normal(&self.corners[leaf as usize]).normalize();
-        Some(Hit { distance, face: self.faces[leaf as usize], barycentric, normal })
+        Some(self.hit(leaf, distance, barycentric))
+    }
+
+    fn cast_beam(
+        &self,
+        origin: &Point3<f64>,
+        directions: &[Vector3<f64>],
+        max: f64,
+        hit: &mut dyn FnMut(usize, Option<Hit>),
+    ) {
+        let beam = Beam::around(origin, directions);
+        let Some(leaves) = beam.as_ref().and_then(|beam| beam.leaves(&self.tree)) else {
+            // Rays that diverge, or among many small triangles, are better searched for one by one.
+            for (k, direction) in directions.iter().enumerate() {
+                hit(k, self.cast(origin, direction, max));
+            }
+            return;
+        };
+        let candidates: Vec<Candidate> =
+            leaves.iter().map(|leaf| Candidate::new(*leaf, &self.corners[*leaf as usize], origin)).collect();
+        for (k, direction) in directions.iter().enumerate() {
+            let mut first = None;
+            if let Some(ray) = ShearedRay::new(origin, direction) {
+                let mut nearest = max;
+                for candidate in candidates.iter().filter(|candidate| candidate.may_be_hit(direction)) {
+                    let found = ray.intersect(&self.corners[candidate.leaf as usize], nearest);
+                    if let Some((distance, barycentric)) = found.filter(|(distance, _)| *distance < nearest) {
+                        nearest = distance;
+                        first = Some((candidate.leaf, distance, barycentric));
+                    }
+                }
+            }
+            hit(k, first.map(|(leaf, distance, barycentric)| self.hit(leaf, distance, barycentric)));
+        }
     }
 
     fn occluded(&self, origin: &Point3<f64>, direction: &Vector3<f64>, max: f64) -> bool {
@@ -135,61 +178,4 @@ fn scaled_normal([a, b, c]: &[Vector3<f64>; 3]) -> Vector3<f64> {
 
 fn vector(v: &Vector3<f64>) -> DVec3 {
     DVec3::new(v.x, v.y, v.z)
-}
-
-/// A ray in coordinates where it runs along the third axis: edge tests become 2D and exactly antisymmetric.
-struct ShearedRay {
-    origin: Vector3<f64>,
-    axes: [usize; 3],
-    shear: Vector3<f64>,
-    /// One over the direction; huge instead of infinite, since zero times it must stay a number.
-    inverse: Vector3<f64>,
-}
-
-impl ShearedRay {
-    fn new(origin: &Point3<f64>, direction: &Vector3<f64>) -> Option<Self> {
-        let main = direction.iamax();
-        let along = direction[main];
-        if !(along.abs() > 0.0 && along.is_finite()) {
-            return None;
-        }
-        let axes = [(main + 1) % 3, (main + 2) % 3, main];
-        let shear = Vector3::new(direction[axes[0]] / along, direction[axes[1]] / along, 1.0 / along);
-        let inverse = direction.map(|d| 1.0 / if d.abs() > 1e-300 { d } else { 1e-300 });
-        Some(Self { origin: origin.coords, axes, shear, inverse })
-    }
-
-    /// Distance at which the ray enters a box, where it does so before `max`.
-    fn entry_distance(&self, node: &BvhNode, max: f64) -> Option<f64> {
-        let (low, high) = (node.mins(), node.maxs());
-        let between = |low: f64, high: f64, i: usize| {
-            let (a, b) = ((low - self.origin[i]) * self.inverse[i], (high - self.origin[i]) * self.inverse[i]);
-            (a.min(b), a.max(b))
-        };
-        let (x, y, z) = (between(low.x, high.x, 0), between(low.y, high.y, 1), between(low.z, high.z, 2));
-        let first = x.0.max(y.0).max(z.0).max(0.0);
-        let last = x.1.min(y.1).min(z.1).min(max);
-        (first <= last).then_some(first)
-    }
-
-    /// Distance and barycentric weights of the second and third corner, where the ray meets the triangle before `max`.
-    fn intersect(&self, triangle: &[Vector3<f64>; 3], max: f64) -> Option<(f64, [f64; 2])> {
-        let [kx, ky, kz] = self.axes;
-        let [a, b, c] = triangle.map(|corner| {
-            let p = corner - self.origin;
-            Vector3::new(p[kx] - self.shear.x * p[kz], p[ky] - self.shear.y * p[kz], self.shear.z * p[kz])
-        });
-        let u = c.x * b.y - c.y * b.x;
-        let v = a.x * c.y - a.y * c.x;
-        let w = b.x * a.y - b.y * a.x;
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
-            return None;
-        }
-        let determinant = u + v + w;
-        if determinant == 0.0 {
-            return None;
-        }
-        let distance = (u * a.z + v * b.z + w * c.z) / determinant;
-        (distance >= 0.0 && distance <= max).then(|| (distance, [v / determinant, w / determinant]))
-    }
 }

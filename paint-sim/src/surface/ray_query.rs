@@ -20,6 +20,20 @@ pub trait Surface: Sync {
     /// The first hit of the ray within `max` metres, from either side of the surface. `direction` has unit length.
     fn cast(&self, origin: &Point3<f64>, direction: &Vector3<f64>, max: f64) -> Option<Hit>;
 
+    /// [`cast`](Self::cast) of rays that leave one point in nearly one direction, as those through neighbouring pixels do; `hit` is told
+    /// the index of each and what it hits, in their order. Override it where such rays can share their search.
+    fn cast_beam(
+        &self,
+        origin: &Point3<f64>,
+        directions: &[Vector3<f64>],
+        max: f64,
+        hit: &mut dyn FnMut(usize, Option<Hit>),
+    ) {
+        for (k, direction) in directions.iter().enumerate() {
+            hit(k, self.cast(origin, direction, max));
+        }
+    }
+
     /// Whether anything lies on the ray before `max` metres. Override it where any hit is cheaper than the first one.
     fn occluded(&self, origin: &Point3<f64>, direction: &Vector3<f64>, max: f64) -> bool {
         self.cast(origin, direction, max).is_some()

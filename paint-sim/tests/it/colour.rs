@@ -2,7 +2,7 @@
 
 use paint_sim::colour::ciede2000;
 use paint_sim::colour::{
-    BANDS, band_white, decode_srgb8, encode_srgb8, spectrum_lab, spectrum_linear_srgb, spectrum_srgb8, xyz,
+    BANDS, band_white, decode_srgb8, encode_srgb, encode_srgb8, spectrum_lab, spectrum_linear_srgb, spectrum_srgb8, xyz,
 };
 use paint_sim::paint::{Appearance, PaintName, ink_curve};
 use paint_sim::{Error, Paint, Substrate};
@@ -176,6 +176,29 @@ fn srgb_codes_survive_decoding() {
     }
     // IEC 61966-2-1: half the code range is 21.4 % of the light.
     assert!((decode_srgb8(128) - 0.21586).abs() < 1e-5);
+    // Next to each step and between them it is the curve, rounded.
+    let rounded = |linear: f64| (encode_srgb(linear) * 255.0).round() as u8;
+    let mut codes = 0;
+    for k in 0..=300_000 {
+        let linear = f64::from(k) / 300_000.0;
+        let float = f64::from(linear as f32);
+        assert_eq!(
+            [encode_srgb8(linear), encode_srgb8(float)],
+            [linear, float].map(|l| (rounded(l), false)),
+            "{linear}"
+        );
+        if k > 0 && rounded(linear) > rounded(linear - 1.0 / 300_000.0) {
+            codes += 1;
+            let (mut low, mut high) = (linear - 1.0 / 300_000.0, linear);
+            while low.next_up() < high {
+                let middle = f64::midpoint(low, high);
+                if rounded(middle) < rounded(high) { low = middle } else { high = middle }
+            }
+            assert_eq!([low, high].map(|l| encode_srgb8(l).0), [low, high].map(rounded));
+        }
+    }
+    assert_eq!(codes, 255);
+    assert_eq!(encode_srgb8(f64::NAN), (0, true));
     assert_eq!(encode_srgb8(1.052), (255, true));
     assert_eq!(encode_srgb8(-0.042), (0, true));
 }

@@ -122,3 +122,49 @@ fn soups_are_welcome_and_nonsense_is_not() {
     let broken = [[0.0, 0.0, f32::NAN], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     assert!(matches!(TriangleSurface::new(&broken, &[[0, 1, 2]]), Err(Error::NotFinite { index: 0, .. })));
 }
+
+/// Beams of every width before meshes coarse and fine, from outside, inside and from a corner: each ray hits what it hits alone.
+#[test]
+fn rays_of_a_beam_hit_what_each_hits_alone() {
+    let mut state = 9_u64;
+    let mut random = move |low: f64, high: f64| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let mut hits = 0;
+    for (rings, sectors) in [(4, 6), (24, 48), (160, 320)] {
+        let (mut positions, faces) = sphere(rings, sectors);
+        // Dents, so that a ray may meet several sheets.
+        for p in &mut positions {
+            *p = p.map(|v| v * (1.0 + 0.2 * (9.0 * p[0] * p[1] + 5.0 * p[2]).sin()));
+        }
+        let surface = TriangleSurface::new(&positions, &faces).unwrap();
+        for k in 0..300 {
+            let corner = positions[k * 7 % positions.len()].map(f64::from);
+            let origin = match k % 4 {
+                0 => Point3::origin(),
+                1 => Point3::from(corner),
+                _ => Point3::new(random(-3.0, 3.0), random(-3.0, 3.0), random(-3.0, 3.0)),
+            };
+            let towards =
+                Vector3::from_fn(|_, _| random(-1.0, 1.0)) - if k % 4 > 1 { origin.coords } else { Vector3::zeros() };
+            let side = towards.cross(&Vector3::new(0.3, -0.5, 0.8)).normalize();
+            let up = towards.normalize().cross(&side);
+            let step = 10_f64.powf(random(-4.0, -0.5));
+            let directions: Vec<Vector3<f64>> = (0..64)
+                .map(|i| {
+                    let (x, y) = (f64::from(i % 8) * step, f64::from(i / 8) * step);
+                    (towards.normalize() + side * x + up * y).normalize()
+                })
+                .collect();
+            let mut told = Vec::new();
+            surface.cast_beam(&origin, &directions, 9.0, &mut |k, hit| told.push((k, hit)));
+            for (k, direction) in directions.iter().enumerate() {
+                let alone = surface.cast(&origin, direction, 9.0);
+                hits += usize::from(alone.is_some());
+                assert_eq!(told[k], (k, alone), "{rings} rings, from {origin} to {direction}");
+            }
+        }
+    }
+    assert!(hits > 20_000, "{hits}");
+}

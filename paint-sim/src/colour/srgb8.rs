@@ -1,0 +1,38 @@
+//! The sRGB curve, rounded to 0..=255, without a power.
+
+use super::encode_srgb;
+
+/// Where the rounded curve steps: a picture asks for it once per channel of each pixel, and a power costs more than a look.
+pub(super) struct Srgb8Steps {
+    /// Least number from 0 to 1 with a code of at least so much.
+    least: [f64; 256],
+    /// Code at the low end of each of equal parts of 0 to 1.
+    start: [u8; Self::PARTS + 1],
+}
+
+impl Srgb8Steps {
+    /// So many that at most two codes step within one.
+    const PARTS: usize = 4096;
+
+    pub(super) fn new() -> Self {
+        let code = |linear: f64| (encode_srgb(linear) * 255.0).round() as u8;
+        let least = std::array::from_fn(|wanted| {
+            // Positive numbers are in the order of their bits.
+            let (mut low, mut high) = (0_u64, 1.0_f64.to_bits());
+            while low < high {
+                let middle = low + (high - low) / 2;
+                if usize::from(code(f64::from_bits(middle))) < wanted { low = middle + 1 } else { high = middle }
+            }
+            f64::from_bits(low)
+        });
+        Self { least, start: std::array::from_fn(|part| code(part as f64 / Self::PARTS as f64)) }
+    }
+
+    pub(super) fn encode(&self, linear: f64) -> u8 {
+        let mut code = self.start[(linear * Self::PARTS as f64) as usize];
+        while code < u8::MAX && linear >= self.least[usize::from(code) + 1] {
+            code += 1;
+        }
+        code
+    }
+}
