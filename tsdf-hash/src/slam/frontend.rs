@@ -181,7 +181,7 @@ impl Frontend {
             return Ok(located);
         }
         located.tracking = match self.follow(map, keyframes, frame, depth, colour)? {
-            Some(outcome) if outcome.is_on_the_map() => {
+            Some(outcome) if outcome.is_on_the_map() || self.is_expected_here(&outcome, frame) => {
                 self.relocaliser.reset();
                 Some(outcome)
             }
@@ -277,6 +277,16 @@ impl Frontend {
         Ok(Some(best))
     }
 
+    /// Whether odometry leads, and all that a frame shows of a map that stays as it is agrees there, only not enough to fix its pose: neither
+    /// would it elsewhere.
+    fn is_expected_here(&self, outcome: &TrackingOutcome, frame: &StampedPose) -> bool {
+        self.fixed_map
+            && self.motion.is_led(frame)
+            && !outcome.degenerate.is_empty()
+            && outcome.coverage >= LEAST_COVERAGE
+            && self.tracker.convinces(outcome)
+    }
+
     /// Tracks a frame from where keyframes near the last pose place it, by their features or by how they look, if that is better than what
     /// was found.
     fn recognise(
@@ -344,4 +354,43 @@ impl Frontend {
 /// Whether a pose goes on by the motion before along some directions, because nothing fixes them.
 fn is_guess(outcome: &TrackingOutcome) -> bool {
     outcome.status == TrackingStatus::Degenerate
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::images::{DepthData, Intrinsics};
+    use crate::map::Map;
+    use crate::slam::motion_model::OdometryError;
+
+    const SIZE: (usize, usize) = (80, 60);
+    const INTRINSICS: Intrinsics = Intrinsics { fx: 70.0, fy: 70.0, cx: 39.5, cy: 29.5 };
+
+    fn wall(data: &[f32]) -> DepthView<'_> {
+        DepthView { width: SIZE.0, height: SIZE.1, data: DepthData::F32 { data }, intrinsics: INTRINSICS }
+    }
+
+    /// Before a flat wall a frame fixes no shift along it, here or anywhere else; a wall where none should be is looked for.
+    #[test]
+    fn a_frame_that_agrees_where_odometry_leads_is_not_looked_for_elsewhere() {
+        let settings = Settings { voxel_size: 0.04, ..Settings::default() };
+        let mut map = Map::new(settings).unwrap();
+        let [there, nearer] = [1.5_f32, 1.1].map(|z| vec![z; SIZE.0 * SIZE.1]);
+        for _ in 0..5 {
+            map.integrate(&wall(&there), None, &Isometry3::identity()).unwrap();
+        }
+        let poses = PoseSource::Odometry(OdometryError::default());
+        let slam = SlamSettings { poses, fuse: false, ..SlamSettings::default() };
+        let mut frontend = Frontend::new(&slam, &settings).unwrap();
+        let keyframes = KeyframeIndex::new();
+        let mut seen = Vec::new();
+        for (k, depth) in [&there, &there, &there, &nearer].into_iter().enumerate() {
+            let led = Isometry3::translation(0.01 * k as f64, 0.0, 0.0);
+            let frame = StampedPose { stamp: 0.1 * k as f64, world_from_camera: Some(led) };
+            let located = frontend.locate(&mut map, &keyframes, &frame, &wall(depth), None).unwrap();
+            let open = located.tracking.is_some_and(|tracking| !tracking.degenerate.is_empty());
+            seen.push((open, frontend.remembered()));
+        }
+        assert_eq!(seen, [(false, 0), (true, 0), (true, 0), (false, 1)]);
+    }
 }
