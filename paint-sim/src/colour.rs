@@ -11,6 +11,7 @@ use std::sync::LazyLock;
 use self::srgb8::Srgb8Steps;
 pub use ciede2000::ciede2000;
 pub use spectrum::{BANDS, Spectrum, wavelength};
+pub use srgb8::encode_srgb;
 pub use upsampling::spectrum_of_linear_srgb;
 
 /// Tristimulus values of the D65 white that sRGB is defined for (IEC 61966-2-1).
@@ -64,11 +65,6 @@ pub fn linear_srgb(xyz: [f64; 3]) -> [f64; 3] {
 pub fn spectrum_linear_srgb(reflectance: &Spectrum) -> [f64; 3] {
     let (values, white) = (xyz(reflectance), band_white());
     linear_srgb(std::array::from_fn(|i| values[i] / white[i] * WHITE[i]))
-}
-
-/// The transfer curve of IEC 61966-2-1, from linear to encoded; neither is clipped.
-pub fn encode_srgb(linear: f64) -> f64 {
-    if linear <= 0.0031308 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
 /// [`encode_srgb`] to 0..=255, and whether the component had to be clipped.

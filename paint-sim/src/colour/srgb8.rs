@@ -1,6 +1,9 @@
-//! The sRGB curve, rounded to 0..=255, without a power.
+//! The sRGB curve, and its bytes without a power.
 
-use super::encode_srgb;
+/// The transfer curve of IEC 61966-2-1, from linear to encoded; neither is clipped.
+pub fn encode_srgb(linear: f64) -> f64 {
+    if linear <= 0.0031308 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
 
 /// Where the rounded curve steps: a picture asks for it once per channel of each pixel, and a power costs more than a look.
 pub(super) struct Srgb8Steps {

@@ -2,7 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::{Camera, Lights, Shading};
+use super::camera::Camera;
+use super::lights::{Lights, Shading};
 use crate::colour::encode_srgb8;
 use crate::surface::{Hit, Surface};
 
