@@ -69,7 +69,7 @@ pub struct MissionArguments {
     #[arg(long, conflicts_with = "texture")]
     scan: bool,
     /// What tells the painting flight where the robot is: motion capture, a model of noise of 7 cm, or the robot's own camera, depth camera and
-    /// inertial sensors in the map of its --scan, else in the shape of the surface [default: motion-capture]
+    /// inertial sensors in the map of its --scan, else in the shape of the surface [default: slam with --scan, else motion-capture]
     #[arg(long, value_enum)]
     localisation: Option<LocalisationName>,
     #[command(flatten)]
@@ -275,7 +275,7 @@ impl MissionArguments {
         settings.layered = self.layers.map(LayersName::planning).or(settings.layered);
         settings.look |= self.look;
         self.vehicle.apply(settings);
-        settings.localisation = self.localisation.map_or(settings.localisation, LocalisationChoice::from);
+        settings.localisation = self.localisation.map(LocalisationChoice::from).or(settings.localisation);
         settings.path_planner = self.planner.unwrap_or(settings.path_planner);
         settings.painter = self.painter.map_or(settings.painter, PainterChoice::from);
         settings.viewpoint = self.placement.project.or(settings.viewpoint);

@@ -261,7 +261,7 @@ impl MissionFile {
     fn place(&self, folder: &Path) -> Result<Place, MissionFileError> {
         let (name, scene) = self.read_surface()?;
         if !self.scan {
-            let finds_itself = self.settings.localisation == LocalisationChoice::Slam;
+            let finds_itself = self.settings.localisation == Some(LocalisationChoice::Slam);
             let map = finds_itself.then(|| self.survey(&scene, folder)).transpose()?;
             return Ok(Place { name, scene, truth: None, map });
         }

@@ -282,7 +282,8 @@ mod tests {
     #[test]
     fn a_paint_that_cannot_be_flown_takes_nothing_from_those_before_it() {
         let coat = |localisation| {
-            let settings = MissionSettings { localisation, threads: 1, ..MissionSettings::default() };
+            let settings =
+                MissionSettings { localisation: Some(localisation), threads: 1, ..MissionSettings::default() };
             let scene = Scene::whole(test_panel::mesh());
             let task = PaintingTask::new("panel", &scene, &Design::Gradient, settings).unwrap();
             Coat { folder: PathBuf::new(), task }

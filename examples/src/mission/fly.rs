@@ -155,7 +155,7 @@ pub(super) fn onboard<'a, 'b>(
     task: &'a PaintingTask,
     before: impl Iterator<Item = &'b FlightLog>,
 ) -> Result<Option<LocalisedFlight<'a>>, MissionError> {
-    if task.settings.localisation != LocalisationChoice::Slam {
+    if task.settings.localisation != Some(LocalisationChoice::Slam) {
         return Ok(None);
     }
     localised_flight(task, camera_before(task, before)?, 0).map(Some)
@@ -199,7 +199,7 @@ pub(super) fn spray<'a>(
 
 /// The noise of the localisation that was chosen, where it is a model of noise.
 pub(super) fn localisation_noise(settings: &MissionSettings, usual: Localisation) -> Localisation {
-    match settings.localisation {
+    match settings.localisation.unwrap_or_default() {
         LocalisationChoice::Noise => Localisation::slam_7cm(),
         LocalisationChoice::MotionCapture | LocalisationChoice::Slam => usual,
     }

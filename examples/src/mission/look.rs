@@ -55,7 +55,7 @@ fn photograph(task: &PaintingTask, camera: SimulatedCamera, flight: u64) -> Resu
     let usual =
         FlightSettings { airframe: settings.airframe, model: Some(settings.model), seed, ..FlightSettings::default() };
     let mut sensor = PoseSensor::new(localisation_noise(settings, usual.localisation), 0.01, seed);
-    let mut onboard = match settings.localisation {
+    let mut onboard = match settings.localisation.unwrap_or_default() {
         LocalisationChoice::Slam => Some(localised_flight(task, camera.clone(), flight)?),
         LocalisationChoice::MotionCapture | LocalisationChoice::Noise => None,
     };

@@ -14,7 +14,7 @@ use super::error::MissionError;
 use super::planned_robot::PlannedRobot;
 use super::reach::{texels_in_reach, texels_lost_to_constraints};
 use super::reach_needs::reach_needs;
-use super::settings::MissionSettings;
+use super::settings::{LocalisationChoice, MissionSettings};
 use super::true_surface::moved_onto;
 use crate::adapters::Robot;
 use crate::appearance::{Appearance, UNIT_THICKNESS};
@@ -168,9 +168,10 @@ impl PaintingTask {
         Ok(Self { truth: Some(Arc::new(truth)), ..self })
     }
 
-    /// With the file of a map and its keyframes, in which the robot may find itself.
+    /// With the file of a map and its keyframes, in which the robot finds itself if nothing else is chosen.
     #[must_use]
-    pub fn in_map(self, map: PathBuf) -> Self {
+    pub fn in_map(mut self, map: PathBuf) -> Self {
+        self.settings.localisation.get_or_insert(LocalisationChoice::Slam);
         Self { map: Some(map), ..self }
     }
 
@@ -308,5 +309,21 @@ mod tests {
             let texel = coarser * USUAL_TEXEL;
             assert!(fits(texel, 1.01 * share) && !fits(texel, 0.99 * share), "{coarser}");
         }
+    }
+    #[test]
+    fn in_a_map_of_its_own_the_robot_finds_itself_if_nothing_else_is_chosen() {
+        let wall = TriangleMesh {
+            positions: vec![[0.0, 0.5, 1.0], [0.0, -0.5, 1.0], [0.0, -0.5, 2.0], [0.0, 0.5, 2.0]],
+            faces: vec![[0, 1, 2], [0, 2, 3]],
+            ..TriangleMesh::default()
+        };
+        let localised = |localisation| {
+            let settings = MissionSettings { localisation, texel: 0.05, threads: 1, ..MissionSettings::default() };
+            let task = PaintingTask::new("wall", &Scene::whole(wall.clone()), &Design::Stripes, settings).unwrap();
+            [task.settings.localisation, task.in_map("map".into()).settings.localisation]
+        };
+        assert_eq!(localised(None), [None, Some(LocalisationChoice::Slam)]);
+        let chosen = Some(LocalisationChoice::MotionCapture);
+        assert_eq!(localised(chosen), [chosen, chosen]);
     }
 }

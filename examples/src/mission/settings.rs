@@ -68,9 +68,9 @@ pub struct MissionSettings {
     /// Identify that in an excitation flight before the first that paints.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub identify: bool,
-    /// How it knows where it is.
-    #[serde(skip_serializing_if = "LocalisationChoice::is_default")]
-    pub localisation: LocalisationChoice,
+    /// How it knows where it is; if nothing is said motion capture, and in a mission that scans the surface first the robot's own senses.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub localisation: Option<LocalisationChoice>,
     /// How long tank and battery last; without them all comes through the tether.
     #[serde(skip_serializing_if = "Endurance::is_endless")]
     pub endurance: Endurance,
@@ -108,13 +108,6 @@ pub enum LocalisationChoice {
     Noise,
     /// The robot's own camera, depth camera and inertial sensor, in the map of its scan.
     Slam,
-}
-
-impl LocalisationChoice {
-    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]
-    fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]
@@ -173,7 +166,7 @@ impl Default for MissionSettings {
             airframe: Airframe::default(),
             model: Airframe::default(),
             identify: false,
-            localisation: LocalisationChoice::default(),
+            localisation: None,
             endurance: Endurance::default(),
             look: false,
             faults: Faults::default(),

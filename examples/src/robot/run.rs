@@ -18,7 +18,7 @@ use super::simulation::fly_simulated;
 use super::vehicle::fly_vehicle;
 use crate::autopilot::{OffboardSettings, Px4, Px4Vehicle, VehicleLink};
 use crate::interruption::Finishing;
-use crate::mission::{LocalisationChoice, PlannedFlight, PlannedMission, PlannerChoice};
+use crate::mission::{LocalisationChoice, MissionSettings, PlannedFlight, PlannedMission, PlannerChoice};
 use crate::onboard::LocalisationFigures;
 use crate::progress::Stage;
 use crate::report::{LocalisationReport, save_figures};
@@ -41,6 +41,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
         if given {
             return Err(RobotError::BuiltInOnly { option }.into());
         }
+    }
+    if matches!(arguments.autopilot, AutopilotChoice::Vehicle(_)) {
+        check_not_simulated(arguments, settings)?;
     }
     settings.check_simulated()?;
     mission_file.begin_run(folder, "robot")?;
@@ -65,6 +68,21 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     }
 }
 
+/// What says nothing about a vehicle that is not simulated is refused.
+fn check_not_simulated(arguments: &Arguments, settings: &MissionSettings) -> Result<(), RobotError> {
+    let own = settings.localisation.is_some_and(|chosen| chosen != LocalisationChoice::MotionCapture);
+    for (option, given, why) in [
+        ("--localisation", own, "it says itself where it is"),
+        ("--setpoints attitude", arguments.setpoints == SetpointKind::Attitude, "which thrust carries it is not known"),
+        ("--fault", !arguments.fault.is_empty(), "nothing is made to fail on a vehicle"),
+    ] {
+        if given {
+            return Err(RobotError::SimulationOnly { option, why });
+        }
+    }
+    Ok(())
+}
+
 fn fly(
     arguments: &Arguments,
     flight: &PlannedFlight,
@@ -79,16 +97,6 @@ fn fly(
             fly_simulated(flight, &settings, &launch, &arguments.fault, progress)
         }
         AutopilotChoice::Vehicle(address) => {
-            let only = |option, why| Err(RobotError::SimulationOnly { option, why });
-            if flight.settings().localisation != LocalisationChoice::MotionCapture {
-                return only("--localisation", "it says itself where it is");
-            }
-            if arguments.setpoints == SetpointKind::Attitude {
-                return only("--setpoints attitude", "which thrust carries it is not known");
-            }
-            if !arguments.fault.is_empty() {
-                return only("--fault", "nothing is made to fail on a vehicle");
-            }
             let link = VehicleLink::open(address)?;
             // Trajectories hold no thrust.
             let flown = fly_vehicle(link, flight, on_board_settings(arguments, &conditions, 0.0), progress)?;
