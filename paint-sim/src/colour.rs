@@ -2,16 +2,13 @@
 
 mod ciede2000;
 mod spectrum;
-mod srgb8;
+mod srgb;
 mod tables;
 mod upsampling;
 
-use std::sync::LazyLock;
-
-use self::srgb8::Srgb8Steps;
 pub use ciede2000::ciede2000;
 pub use spectrum::{BANDS, Spectrum, wavelength};
-pub use srgb8::encode_srgb;
+pub use srgb::{decode_srgb, decode_srgb8, encode_srgb, encode_srgb8};
 pub use upsampling::spectrum_of_linear_srgb;
 
 /// Tristimulus values of the D65 white that sRGB is defined for (IEC 61966-2-1).
@@ -65,23 +62,6 @@ pub fn linear_srgb(xyz: [f64; 3]) -> [f64; 3] {
 pub fn spectrum_linear_srgb(reflectance: &Spectrum) -> [f64; 3] {
     let (values, white) = (xyz(reflectance), band_white());
     linear_srgb(std::array::from_fn(|i| values[i] / white[i] * WHITE[i]))
-}
-
-/// [`encode_srgb`] to 0..=255, and whether the component had to be clipped.
-pub fn encode_srgb8(linear: f64) -> (u8, bool) {
-    static STEPS: LazyLock<Srgb8Steps> = LazyLock::new(Srgb8Steps::new);
-    let clipped = !(0.0..=1.0).contains(&linear);
-    (STEPS.encode(linear.clamp(0.0, 1.0)), clipped)
-}
-
-/// The inverse of [`encode_srgb`].
-pub fn decode_srgb(encoded: f64) -> f64 {
-    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
-}
-
-/// The inverse of [`encode_srgb8`]: a component 0..=255 to linear 0..=1.
-pub fn decode_srgb8(encoded: u8) -> f64 {
-    decode_srgb(f64::from(encoded) / 255.0)
 }
 
 /// CIELAB against [`WHITE`] of linear sRGB (IEC 61966-2-1).

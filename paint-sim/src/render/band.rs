@@ -83,9 +83,7 @@ impl BandRenderer<'_> {
 
     fn cast(&self, rays: &mut Rays) {
         let eye = Point3::from(self.camera.world_from_camera.translation.vector);
-        let Rays { directions, hits } = rays;
-        hits.clear();
-        self.surface.cast_beam(&eye, directions, MAX_RAY_LENGTH, &mut |_, hit| hits.push(hit));
+        rays.hits = self.surface.cast_beam(&eye, &rays.directions, MAX_RAY_LENGTH);
     }
 
     /// Places of a regular grid of rays inside a pixel, from its centre.

@@ -3,8 +3,8 @@
 use nalgebra::{Point3, Vector3};
 use parry3d_f64::partitioning::{Bvh, TraversalAction};
 
-/// Rays that diverge more, as the cosine of the angle with their mean, share too little.
-const NARROWEST: f64 = 0.9;
+/// Rays whose angle with their mean has a smaller cosine share too little.
+const LEAST_COSINE: f64 = 0.9;
 /// With more triangles than this a search for each ray costs less than a test of each ray with each of them.
 const MOST_LEAVES: usize = 64;
 /// Of slopes, and of edge tests relative to the square of the distance: more than their rounding, so that no hit is lost.
@@ -29,7 +29,7 @@ impl Beam {
         let [mut low, mut high] = [[f64::MAX; 2], [f64::MIN; 2]];
         for direction in directions {
             let along = direction.dot(&axis);
-            if along.is_nan() || along < NARROWEST {
+            if along.is_nan() || along < LEAST_COSINE {
                 return None;
             }
             for (k, across) in [side, up].iter().enumerate() {

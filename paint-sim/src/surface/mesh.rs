@@ -8,7 +8,7 @@ use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::Triangle;
 
 use super::beam::{Beam, Candidate};
-use super::ray_query::{Hit, Surface};
+use super::ray_query::{Hit, Surface, cast_each};
 use super::sheared_ray::ShearedRay;
 use crate::error::Error;
 
@@ -120,37 +120,27 @@ impl Surface for TriangleSurface {
         Some(self.hit(leaf, distance, barycentric))
     }
 
-    fn cast_beam(
-        &self,
-        origin: &Point3<f64>,
-        directions: &[Vector3<f64>],
-        max: f64,
-        hit: &mut dyn FnMut(usize, Option<Hit>),
-    ) {
+    fn cast_beam(&self, origin: &Point3<f64>, directions: &[Vector3<f64>], max: f64) -> Vec<Option<Hit>> {
         let beam = Beam::around(origin, directions);
         let Some(leaves) = beam.as_ref().and_then(|beam| beam.leaves(&self.tree)) else {
             // Rays that diverge, or among many small triangles, are better searched for one by one.
-            for (k, direction) in directions.iter().enumerate() {
-                hit(k, self.cast(origin, direction, max));
-            }
-            return;
+            return cast_each(self, origin, directions, max);
         };
         let candidates: Vec<Candidate> =
             leaves.iter().map(|leaf| Candidate::new(*leaf, &self.corners[*leaf as usize], origin)).collect();
-        for (k, direction) in directions.iter().enumerate() {
-            let mut first = None;
-            if let Some(ray) = ShearedRay::new(origin, direction) {
-                let mut nearest = max;
-                for candidate in candidates.iter().filter(|candidate| candidate.may_be_hit(direction)) {
-                    let found = ray.intersect(&self.corners[candidate.leaf as usize], nearest);
-                    if let Some((distance, barycentric)) = found.filter(|(distance, _)| *distance < nearest) {
-                        nearest = distance;
-                        first = Some((candidate.leaf, distance, barycentric));
-                    }
+        let first = |direction: &Vector3<f64>| {
+            let ray = ShearedRay::new(origin, direction)?;
+            let (mut nearest, mut first) = (max, None);
+            for candidate in candidates.iter().filter(|candidate| candidate.may_be_hit(direction)) {
+                let found = ray.intersect(&self.corners[candidate.leaf as usize], nearest);
+                if let Some((distance, barycentric)) = found.filter(|(distance, _)| *distance < nearest) {
+                    nearest = distance;
+                    first = Some((candidate.leaf, barycentric));
                 }
             }
-            hit(k, first.map(|(leaf, distance, barycentric)| self.hit(leaf, distance, barycentric)));
-        }
+            first.map(|(leaf, barycentric)| self.hit(leaf, nearest, barycentric))
+        };
+        directions.iter().map(first).collect()
     }
 
     fn occluded(&self, origin: &Point3<f64>, direction: &Vector3<f64>, max: f64) -> bool {

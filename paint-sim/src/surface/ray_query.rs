@@ -20,18 +20,10 @@ pub trait Surface: Sync {
     /// The first hit of the ray within `max` metres, from either side of the surface. `direction` has unit length.
     fn cast(&self, origin: &Point3<f64>, direction: &Vector3<f64>, max: f64) -> Option<Hit>;
 
-    /// [`cast`](Self::cast) of rays that leave one point in nearly one direction, as those through neighbouring pixels do; `hit` is told
-    /// the index of each and what it hits, in their order. Override it where such rays can share their search.
-    fn cast_beam(
-        &self,
-        origin: &Point3<f64>,
-        directions: &[Vector3<f64>],
-        max: f64,
-        hit: &mut dyn FnMut(usize, Option<Hit>),
-    ) {
-        for (k, direction) in directions.iter().enumerate() {
-            hit(k, self.cast(origin, direction, max));
-        }
+    /// [`cast`](Self::cast) of rays that leave one point in nearly one direction, as those through neighbouring pixels do. Override it where
+    /// such rays can share their search.
+    fn cast_beam(&self, origin: &Point3<f64>, directions: &[Vector3<f64>], max: f64) -> Vec<Option<Hit>> {
+        cast_each(self, origin, directions, max)
     }
 
     /// Whether anything lies on the ray before `max` metres. Override it where any hit is cheaper than the first one.
@@ -41,4 +33,14 @@ pub trait Surface: Sync {
 
     /// Distance from `point` to the closest point of the surface, at most `max` (also returned when it is farther), m.
     fn distance(&self, point: &Point3<f64>, max: f64) -> f64;
+}
+
+/// One search for each ray.
+pub(super) fn cast_each<S: Surface + ?Sized>(
+    surface: &S,
+    origin: &Point3<f64>,
+    directions: &[Vector3<f64>],
+    max: f64,
+) -> Vec<Option<Hit>> {
+    directions.iter().map(|direction| surface.cast(origin, direction, max)).collect()
 }

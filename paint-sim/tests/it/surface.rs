@@ -157,12 +157,12 @@ fn rays_of_a_beam_hit_what_each_hits_alone() {
                     (towards.normalize() + side * x + up * y).normalize()
                 })
                 .collect();
-            let mut told = Vec::new();
-            surface.cast_beam(&origin, &directions, 9.0, &mut |k, hit| told.push((k, hit)));
-            for (k, direction) in directions.iter().enumerate() {
+            let together = surface.cast_beam(&origin, &directions, 9.0);
+            assert_eq!(together.len(), directions.len());
+            for (direction, hit) in directions.iter().zip(together) {
                 let alone = surface.cast(&origin, direction, 9.0);
                 hits += usize::from(alone.is_some());
-                assert_eq!(told[k], (k, alone), "{rings} rings, from {origin} to {direction}");
+                assert_eq!(hit, alone, "{rings} rings, from {origin} to {direction}");
             }
         }
     }

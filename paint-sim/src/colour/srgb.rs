@@ -1,12 +1,31 @@
-//! The sRGB curve, and its bytes without a power.
+//! The transfer curve of sRGB, and its bytes.
+
+use std::sync::LazyLock;
 
 /// The transfer curve of IEC 61966-2-1, from linear to encoded; neither is clipped.
 pub fn encode_srgb(linear: f64) -> f64 {
     if linear <= 0.0031308 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
+/// [`encode_srgb`] to 0..=255, and whether the component had to be clipped.
+pub fn encode_srgb8(linear: f64) -> (u8, bool) {
+    static STEPS: LazyLock<Srgb8Steps> = LazyLock::new(Srgb8Steps::new);
+    let clipped = !(0.0..=1.0).contains(&linear);
+    (STEPS.encode(linear.clamp(0.0, 1.0)), clipped)
+}
+
+/// The inverse of [`encode_srgb`].
+pub fn decode_srgb(encoded: f64) -> f64 {
+    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
+/// The inverse of [`encode_srgb8`]: a component 0..=255 to linear 0..=1.
+pub fn decode_srgb8(encoded: u8) -> f64 {
+    decode_srgb(f64::from(encoded) / 255.0)
+}
+
 /// Where the rounded curve steps: a picture asks for it once per channel of each pixel, and a power costs more than a look.
-pub(super) struct Srgb8Steps {
+struct Srgb8Steps {
     /// Least number from 0 to 1 with a code of at least so much.
     least: [f64; 256],
     /// Code at the low end of each of equal parts of 0 to 1.
@@ -17,7 +36,7 @@ impl Srgb8Steps {
     /// So many that at most two codes step within one.
     const PARTS: usize = 4096;
 
-    pub(super) fn new() -> Self {
+    fn new() -> Self {
         let code = |linear: f64| (encode_srgb(linear) * 255.0).round() as u8;
         let least = std::array::from_fn(|wanted| {
             // Positive numbers are in the order of their bits.
@@ -31,7 +50,7 @@ impl Srgb8Steps {
         Self { least, start: std::array::from_fn(|part| code(part as f64 / Self::PARTS as f64)) }
     }
 
-    pub(super) fn encode(&self, linear: f64) -> u8 {
+    fn encode(&self, linear: f64) -> u8 {
         let mut code = self.start[(linear * Self::PARTS as f64) as usize];
         while code < u8::MAX && linear >= self.least[usize::from(code) + 1] {
             code += 1;
