@@ -50,6 +50,7 @@ mod touch_up;
 mod trajectory_table;
 mod true_surface;
 mod view;
+mod watched_poses;
 mod written_file;
 
 pub use coats::{Coat, CoatTasks, Coats, PlannedCoats};

@@ -5,7 +5,7 @@ use paint_planner::Plan;
 use paint_planner::mission::Route;
 use paint_planner::onboard::sorties;
 use paint_sim::flight::FlightLog;
-use paint_sim::flight::{Faults, Interlock, Localisation, PoseSource, Valve};
+use paint_sim::flight::{Faults, Interlock, Localisation, Valve};
 use paint_sim::{Film, FlightSettings, TriangleSurface};
 
 use super::error::MissionError;
@@ -17,6 +17,7 @@ use super::plan::Planned;
 use super::settings::{LocalisationChoice, MissionSettings};
 use super::simulated_flight::{OwnSenses, flight_settings, fly_piece, fly_plan};
 use super::sorties::{FlownPiece, Sorties, in_pieces};
+use super::watched_poses::WatchedPoses;
 use crate::adapters::Robot;
 use crate::onboard::{LocalisationFigures, LocalisedFlight};
 use crate::progress::Stage;
@@ -80,7 +81,7 @@ pub(super) fn fly(planned: Planned, task: &PaintingTask, before: &[LayerFlight])
             grounded.left_s += plan.trajectory.duration();
             continue;
         }
-        stage.share(k as f64 / count as f64);
+        let share = |part: f64| stage.share((k as f64 + part) / count as f64);
         let layer = before.len() + k;
         if layer > 0 {
             faulty.faults = Faults::default();
@@ -88,7 +89,7 @@ pub(super) fn fly(planned: Planned, task: &PaintingTask, before: &[LayerFlight])
         let mut told = Sorties::default();
         let logs: Vec<&FlightLog> = before.iter().chain(&flights).map(|layer| &layer.flight).collect();
         let counted = || {
-            let (flight, sorties) = fly_sorties(&plan, task, &faulty, layer as u64, &logs)?;
+            let (flight, sorties) = fly_sorties(&plan, task, &faulty, layer as u64, &logs, &share)?;
             told = sorties;
             Ok(flight)
         };
@@ -119,13 +120,14 @@ pub(super) fn fly(planned: Planned, task: &PaintingTask, before: &[LayerFlight])
 }
 
 /// The flight whose paint counts, in as many sorties as tank and battery ask for; each has wind of its own, and finds itself anew before the
-/// paint that is there by then.
+/// paint that is there by then. `share` hears how much of the plan is flown.
 fn fly_sorties(
     plan: &Plan,
     task: &PaintingTask,
     settings: &MissionSettings,
     layer: u64,
     before: &[&FlightLog],
+    share: &dyn Fn(f64),
 ) -> Result<(FlightLog, Sorties), MissionError> {
     let flow = |time: f64| plan.setpoint(time).flow;
     let duration = plan.trajectory.duration();
@@ -143,7 +145,11 @@ fn fly_sorties(
         };
         let mut onboard = onboard(task, before.iter().copied().chain(flown))?;
         let surface = task.surface.corners();
-        let source = onboard.as_mut().map(|onboard| OwnSenses { poses: onboard as &mut dyn PoseSource, surface });
+        let from = piece.map_or(0.0, |piece| piece.from);
+        let tell = |time: f64| share((from + time) / duration);
+        // Only these flights take long.
+        let mut watched = onboard.as_mut().map(|poses| WatchedPoses { poses, tell: &tell });
+        let source = watched.as_mut().map(|poses| OwnSenses { poses, surface });
         let (log, ended) = fly_piece(plan, piece, task.met(), &task.robot, settings, &flight, source)?;
         Ok(FlownPiece { log, localisation: onboard.map(|onboard| onboard.figures()), ended })
     })
