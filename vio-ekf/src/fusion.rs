@@ -1,6 +1,7 @@
 //! Fusion of inertial sensors and of poses that others have measured: loosely coupled, with the odometry in one estimator, and in a
 //! stored map.
 
+mod contradiction;
 mod filter_state;
 mod imu_pair;
 mod inertial_check;

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use nalgebra::{Isometry3, Matrix6, Vector3};
 
+use super::contradiction::{Contradiction, Verdict};
 use super::imu_pair::ImuPair;
 use super::inertial_check::InertialCheck;
 use super::map_pose::MapPose;
@@ -37,10 +38,16 @@ pub struct MapAidedSettings {
     /// A pose in the map that is off the expected one by more than this, m and rad, and by more than three deviations of both, contradicts it;
     /// 0.02, 0.02.
     pub contradiction: [f64; 2],
-    /// Poses in the map follow from each other if they depart from constant velocity by no more than this, m and rad; 0.1, 0.1.
+    /// Poses in the map follow from each other if they are off by no more than this, by the inertial samples between them or at constant
+    /// velocity where those have a gap, m and rad; 0.1, 0.1.
     pub jump: [f64; 2],
     /// Inertial samples farther apart than this, s, end the odometry, and without one for so long it says nothing; 0.02.
     pub longest_gap_s: f64,
+    /// A map that has jumped off an odometry and stays as far off it is believed after so long, s: until then it may be a place that looks like
+    /// another; 6.
+    pub longest_jump_s: f64,
+    /// Without an inertial sample for so long, s, the odometry's last pose is moved on, not to be trusted, and then the map's; 0.1.
+    pub coast_s: f64,
     /// Poses in the map in a row that must follow from each other before the odometry starts again, and, after one that contradicted it alone,
     /// that must confirm it before it is trusted; 2.
     pub confirmations: usize,
@@ -59,6 +66,8 @@ impl Default for MapAidedSettings {
             contradiction: [0.02, 0.02],
             jump: [0.1, 0.1],
             longest_gap_s: 0.02,
+            longest_jump_s: 6.0,
+            coast_s: 0.1,
             confirmations: 2,
         }
     }
@@ -88,9 +97,9 @@ const MOVING: f64 = 0.1;
 const KEPT: f64 = 0.5;
 
 /// [`UnifiedVio`] in a stored map, with tests of what it is given: inertial samples that stand still or have gaps end the odometry at once. So
-/// do two poses in the map that follow from each other and contradict the expected ones; after the first the odometry is not trusted, but where
-/// little of the map is in view the map may be the one that errs. The map's poses, moved on, stand in for it, not to be trusted, until enough of
-/// them follow from each other; the odometry then starts anew.
+/// do two poses in the map that follow from each other and contradict the expected ones, farther the second time; after the first the odometry is
+/// not trusted, but where little of the map is in view, or a place looks like another, the map may be the one that errs. The map's poses, moved
+/// on, stand in for an odometry that has ended, not to be trusted, until enough of them follow from each other; the odometry then starts anew.
 #[derive(Debug, Clone)]
 pub struct MapAidedVio {
     vio: UnifiedVio,
@@ -105,8 +114,7 @@ pub struct MapAidedVio {
     /// When the map confirmed the odometry last, and how many times it has to before that is trusted.
     confirmed: Option<Stamp>,
     to_confirm: usize,
-    /// The last pose in the map contradicted the odometry.
-    contradicted: bool,
+    contradiction: Contradiction,
     last: Option<MapPose>,
     /// Poses in the map that have followed from each other since the odometry was given up; `None` while it goes on.
     recovering: Option<usize>,
@@ -132,7 +140,11 @@ impl MapAidedVio {
             gravity: vio.gravity,
             confirmed: None,
             to_confirm: 0,
-            contradicted: false,
+            contradiction: Contradiction::new(
+                settings.contradiction.map(|bound| 0.5 * bound),
+                settings.trusted_age_s,
+                settings.longest_jump_s,
+            ),
             last: None,
             recovering: None,
             source: 0,
@@ -226,8 +238,10 @@ impl MapAidedVio {
             return Ok(false);
         };
         let pose = self.map_pose(self.last, found);
-        let follows =
-            self.last.is_some_and(|last| agree(&last.after(pose.stamp), &pose.world_from_body, self.settings.jump));
+        let follows = self.last.is_some_and(|last| {
+            let expected = last.later_by(pose.stamp, &self.recent, self.gravity);
+            agree(&expected, &pose.world_from_body, self.settings.jump)
+        });
         self.last = Some(pose);
         if self.vio.output().is_none() && self.recovering.is_none() {
             self.give_up();
@@ -238,7 +252,7 @@ impl MapAidedVio {
             let covered = self.recent.front().is_some_and(|first| first.stamp <= pose.since);
             if covered && count >= self.settings.confirmations {
                 let [position, attitude] = self.spread(found)?;
-                let pose = pose.with_velocity_by(self.recent.make_contiguous(), self.gravity);
+                let pose = pose.with_velocity_by(&self.recent, self.gravity);
                 self.initialize(&pose, [position, attitude, MOVING])?;
                 self.to_confirm = self.settings.trusted_confirmations;
             }
@@ -252,12 +266,20 @@ impl MapAidedVio {
             let within = [shift.max(3.0 * expected.position_sigma_m.hypot(position)), turn.max(3.0 * attitude)];
             agree(&expected.world_from_body, &pose.world_from_body, within)
         };
-        if !expected.is_none_or(agrees) {
-            self.contradict(follows);
-            return Ok(false);
-        }
-        self.contradicted = false;
-        if expected.is_some() {
+        if let Some(expected) = expected {
+            let poses = [&expected.world_from_body, &pose.world_from_body];
+            match self.contradiction.weigh(pose.stamp, poses, (agrees(expected), follows)) {
+                Verdict::Confirmed => {}
+                Verdict::Doubted => {
+                    self.confirmed = None;
+                    self.to_confirm = self.to_confirm.max(self.settings.confirmations);
+                    return Ok(false);
+                }
+                Verdict::OdometryErrs => {
+                    self.give_up();
+                    return Ok(false);
+                }
+            }
             self.confirmed = Some(pose.stamp);
             self.to_confirm = self.to_confirm.saturating_sub(1);
         }
@@ -284,10 +306,10 @@ impl MapAidedVio {
     /// Where the body is now; `None` before the start, and where nothing recent says so.
     pub fn pose(&self, now: Stamp) -> Option<AidedPose> {
         let Self { settings, source, .. } = self;
-        let silent = self.imu.last().is_none_or(|last| now.secs_since(last) > settings.longest_gap_s);
-        if silent || self.recovering.is_some() {
+        let silence = self.imu.last().map_or(f64::INFINITY, |last| now.secs_since(last));
+        if silence > settings.coast_s || self.recovering.is_some() {
             let last = self.last.filter(|last| now.secs_since(last.stamp) <= settings.trusted_age_s)?;
-            let world_from_body = last.after(now);
+            let world_from_body = last.later_by(now, &self.recent, self.gravity);
             return Some(AidedPose {
                 world_from_body,
                 position_sigma_m: f64::INFINITY,
@@ -297,29 +319,23 @@ impl MapAidedVio {
                 source: *source,
             });
         }
-        let Odometry { stamp, world_from_body, covariance, .. } = self.vio.output()?;
+        let odometry = self.vio.output()?;
+        let Odometry { stamp, covariance, .. } = odometry;
+        let silent = silence > settings.longest_gap_s;
+        let world_from_body = if silent { odometry.moved_on(now) } else { odometry.world_from_body };
         let deviation = |first| largest_deviation(&covariance.fixed_view::<3, 3>(first, first).into_owned());
         let [position_sigma_m, attitude_sigma_rad] = [0, 6].map(deviation);
         let age = self.confirmed.map_or(f64::INFINITY, |confirmed| stamp.secs_since(confirmed));
-        let confirmed = self.to_confirm == 0 && age <= settings.trusted_age_s;
+        let confirmed = !silent && self.to_confirm == 0 && age <= settings.trusted_age_s;
         let trusted = confirmed && position_sigma_m <= settings.trusted_sigma_m;
         let (from_map, source) = (false, *source);
         Some(AidedPose { world_from_body, position_sigma_m, attitude_sigma_rad, from_map, trusted, source })
     }
 
-    /// Odometry and map contradict each other. Which of them errs says the next pose in the map: if it follows from this one, it is the odometry.
-    fn contradict(&mut self, follows: bool) {
-        if self.contradicted && follows {
-            self.give_up();
-        } else {
-            (self.contradicted, self.confirmed) = (true, None);
-            self.to_confirm = self.to_confirm.max(self.settings.confirmations);
-        }
-    }
-
     /// Nothing that the odometry says is believed until it starts again.
     fn give_up(&mut self) {
-        (self.confirmed, self.recovering, self.contradicted) = (None, Some(0), false);
+        (self.confirmed, self.recovering) = (None, Some(0));
+        self.contradiction.forget();
         self.source += 1;
     }
 

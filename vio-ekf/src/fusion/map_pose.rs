@@ -1,5 +1,7 @@
 //! A pose in a map, and where it leads.
 
+use std::collections::VecDeque;
+
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use crate::samples::Imu;
@@ -32,16 +34,40 @@ impl MapPose {
 
     /// The same with the velocity at its own time in place of the mean since the pose before, by the inertial samples between (ours): the
     /// mean of `v(t1) - v(s)` over `s` in `t0..t1` is the integral of `(s - t0) a(s) / (t1 - t0)`.
-    pub(super) fn with_velocity_by(self, samples: &[Imu], gravity: f64) -> Self {
+    pub(super) fn with_velocity_by(self, samples: &VecDeque<Imu>, gravity: f64) -> Self {
         let duration = self.stamp.secs_since(self.since);
-        let within = |pair: &&[Imu]| pair[0].stamp >= self.since && pair[1].stamp <= self.stamp;
-        let gain = samples.windows(2).filter(within).map(|pair| {
-            let sample = &pair[1];
+        let within = |pair: &(&Imu, &Imu)| pair.0.stamp >= self.since && pair.1.stamp <= self.stamp;
+        let gain = samples.iter().zip(samples.iter().skip(1)).filter(within).map(|(before, sample)| {
             let acceleration = self.after(sample.stamp).rotation * sample.accel - Vector3::z() * gravity;
-            let [since, step] = [self.since, pair[0].stamp].map(|stamp| sample.stamp.secs_since(stamp));
+            let [since, step] = [self.since, before.stamp].map(|stamp| sample.stamp.secs_since(stamp));
             acceleration * ((since - 0.5 * step) / duration * step)
         });
         Self { velocity: self.velocity + gain.sum::<Vector3<f64>>(), ..self }
+    }
+
+    /// The pose at a later time by the inertial samples since the one before it; at constant velocities where they do not reach back so far. Between
+    /// two poses of the map a body may start to turn: a controller that is told otherwise swings.
+    pub(super) fn later_by(&self, stamp: Stamp, samples: &VecDeque<Imu>, gravity: f64) -> Isometry3<f64> {
+        let covered = samples.front().is_some_and(|first| first.stamp <= self.since);
+        if !covered || self.since == self.stamp || stamp <= self.stamp {
+            return self.after(stamp);
+        }
+        let Isometry3 { mut rotation, translation } = self.world_from_body;
+        let (mut velocity, mut position) = (self.with_velocity_by(samples, gravity).velocity, translation.vector);
+        let mut now = self.stamp;
+        let next = samples.iter().filter(|sample| sample.stamp > self.stamp && sample.stamp <= stamp);
+        // The last one holds until the end.
+        let ends = next.clone().skip(1).map(|sample| sample.stamp).chain([stamp]);
+        for (sample, until) in next.zip(ends) {
+            let dt = until.secs_since(now);
+            let acceleration = rotation * sample.accel - Vector3::z() * gravity;
+            position += velocity * dt + acceleration * (0.5 * dt * dt);
+            velocity += acceleration * dt;
+            rotation *= UnitQuaternion::from_scaled_axis(sample.gyro * dt);
+            now = until;
+        }
+        position += velocity * stamp.secs_since(now);
+        Isometry3::from_parts(position.into(), rotation)
     }
 
     /// The pose at another time, at constant velocities.
@@ -68,10 +94,17 @@ mod tests {
             let accel = pose(t).rotation.inverse() * force;
             Imu { stamp: at(millis), gyro: Vector3::new(0.0, 0.0, 2.0), accel }
         };
-        let samples: Vec<Imu> = (800..1100).step_by(2).map(sample).collect();
+        let samples: VecDeque<Imu> = (800..1100).step_by(2).map(sample).collect();
         let mean = MapPose::next(Some(before), at(1000), pose(1.0));
         let now = mean.with_velocity_by(&samples, 9.81);
         assert!((mean.velocity.x - 1.084).abs() < 1e-9, "{}", mean.velocity);
         assert!((now.velocity - Vector3::new(1.2, 0.0, 0.0)).norm() < 4e-3, "{}", now.velocity);
+        // A tenth of a second later, by the samples and not by the mean velocities.
+        let [by_samples, straight] = [mean.later_by(at(1098), &samples, 9.81), mean.after(at(1098))];
+        let off = |found: &Isometry3<f64>| (found.translation.vector - pose(1.098).translation.vector).norm();
+        assert!(off(&by_samples) < 1.5e-3 && off(&straight) > 0.01, "{} {}", off(&by_samples), off(&straight));
+        assert!(by_samples.rotation.angle_to(&pose(1.098).rotation) < 5e-3);
+        let short: VecDeque<Imu> = samples.iter().copied().filter(|sample| sample.stamp > at(950)).collect();
+        assert_eq!(mean.later_by(at(1098), &short, 9.81), straight);
     }
 }

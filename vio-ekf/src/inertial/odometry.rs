@@ -1,6 +1,6 @@
 //! The output of a filter: the core state now, with its covariance.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::core_state::{CoreCovariance, CoreState};
 use super::imu_buffer::ImuBuffer;
@@ -29,6 +29,15 @@ pub struct Odometry {
 }
 
 impl Odometry {
+    /// The pose at another time, at constant velocities.
+    pub(crate) fn moved_on(&self, to: Stamp) -> Isometry3<f64> {
+        let dt = to.secs_since(self.stamp);
+        let Isometry3 { rotation, translation } = self.world_from_body;
+        let shift = rotation * self.velocity_in_body * dt;
+        let turn = UnitQuaternion::from_scaled_axis(self.rate_in_body * dt);
+        Isometry3::from_parts((translation.vector + shift).into(), rotation * turn)
+    }
+
     /// The estimate at the time of the latest sample: the state carried forward by the preintegration since its time.
     pub(crate) fn predict(
         core: &CoreState,
