@@ -44,6 +44,8 @@ pub struct Estimator {
     settings: ObserverSettings,
     estimate: Estimate,
     command: Command,
+    /// See [`Estimator::innovation`].
+    innovation: f64,
 }
 
 impl Estimator {
@@ -63,12 +65,19 @@ impl Estimator {
             settings,
             estimate,
             command: Command { thrust: airframe.mass * GRAVITY, ..Command::default() },
+            innovation: 0.0,
         }
     }
 
     /// The current estimate.
     pub fn estimate(&self) -> &Estimate {
         &self.estimate
+    }
+
+    /// Largest distance of a measured position from the expected one, m, forgotten as fast as the estimate forgets it: after a jump of the
+    /// localisation velocity and disturbance are not what they seem.
+    pub fn innovation(&self) -> f64 {
+        self.innovation
     }
 
     /// The command that the vehicle follows from now on.
@@ -82,6 +91,7 @@ impl Estimator {
         // Discrete gains of the pole exp(-w dt), repeated: exact for the model position-velocity-disturbance.
         let z = (-self.settings.translation * dt).exp();
         let innovation = Point3::from(measured.translation.vector) - next.position;
+        self.innovation = innovation.norm().max(z * self.innovation);
         next.position += (1.0 - z * z * z) * innovation;
         next.velocity += 1.5 * (1.0 - z) * (1.0 - z) * (1.0 + z) / dt * innovation;
         next.disturbance += (1.0 - z).powi(3) / (dt * dt) * innovation;

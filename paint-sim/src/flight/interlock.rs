@@ -18,6 +18,9 @@ pub struct Interlock {
     pub distance: f64,
 }
 
+/// An estimate whose poses have jumped by more than this share of the largest miss has to settle first (ours).
+const UNSETTLED: f64 = 0.5;
+
 impl Default for Interlock {
     fn default() -> Self {
         Self { miss: 0.015, distance: 0.05 }
@@ -92,7 +95,8 @@ impl InterlockState {
         let (now, later) = (commanded(joints), commanded(joints.saturating_sub(valve)));
         let expected = [0, 1].map(|k| later[k] + known.angles[k] - now[k]);
         let permits = |interlock: &Interlock, estimator: &Estimator| {
-            interlock.permits(ptu, &estimator.predict(0.0), known.angles, known.now)
+            estimator.innovation() <= UNSETTLED * interlock.miss
+                && interlock.permits(ptu, &estimator.predict(0.0), known.angles, known.now)
                 && interlock.permits(ptu, &estimator.predict(known.ahead), expected, known.later)
         };
         self.open.push(match (&self.settings, known.estimator) {

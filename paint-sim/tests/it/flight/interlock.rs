@@ -59,6 +59,24 @@ fn without_a_pose_the_valve_is_shut() {
     assert!((last - 3.04).abs() < 1e-9, "{last}");
 }
 
+/// At 3 s the localisation takes the robot to be 4 cm farther to a side: the valve is shut until the observer has forgotten that.
+#[test]
+fn after_a_jump_of_the_localisation_the_estimate_has_to_settle() {
+    let shift = Vector3::new(0.0, 0.04, 0.0);
+    let faults = Faults { mislocalised: Some(Mislocalised { from: 3.0, until: 9.0, shift }), ..Faults::default() };
+    let reference = Ellipse { duration: 5.0 };
+    let log = fly(&reference, &mut arm(), &wall(), &interlocked(1, faults)).unwrap();
+    // exp(-16 t) of 4 cm is half of the miss of 1.5 cm after 0.105 s.
+    let held = |from: f64, until: f64| {
+        let within = log.samples.iter().filter(|s| s.time > from && s.time < until);
+        (within.clone().filter(|s| s.held).count(), within.count())
+    };
+    assert_eq!(held(0.0, 2.995).0, 0);
+    let (shut, all) = held(3.005, 3.095);
+    assert!(shut == all && all >= 8, "{shut} of {all}");
+    assert_eq!(held(3.5, 5.0).0, 0);
+}
+
 /// The pose is lost at 3 s, and 2 s later the flight ends with what was flown in its log.
 #[test]
 fn a_flight_without_a_pose_ends_and_keeps_its_log() {
