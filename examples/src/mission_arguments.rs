@@ -256,6 +256,11 @@ impl From<LocalisationName> for LocalisationChoice {
 }
 
 impl MissionArguments {
+    /// Whether they name a mission or a surface, or a part of one.
+    pub fn names_surface(&self) -> bool {
+        self.mission.is_some() || self.mesh.is_some() || self.region.is_some()
+    }
+
     /// The mission of `--mission`, or that of the defaults, with what the options say.
     pub fn mission_file(&self) -> Result<MissionFile, AnyError> {
         let mut mission = self.mission.as_deref().map(MissionFile::read).transpose()?.unwrap_or_default();

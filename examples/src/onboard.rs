@@ -4,7 +4,6 @@ mod approach;
 mod localisation;
 mod localised_flight;
 mod piece;
-mod standing_start;
 mod surveyed_map;
 mod sway;
 
@@ -12,5 +11,4 @@ pub use approach::Approach;
 pub use localisation::{LocalisationError, MapUpdate, OnboardLocalisation, read_map};
 pub use localised_flight::{Bridging, LocalisationFigures, LocalisedFlight};
 pub use piece::Piece;
-pub use standing_start::StandingStart;
 pub use surveyed_map::surveyed_map;

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use paintcopter::exit::run_program;
 use paintcopter::interruption::Finishing;
-use paintcopter::mission::{Coats, preview, preview_picture, save, save_coats};
+use paintcopter::mission::{Coats, preview, preview_picture, save_flown};
 use paintcopter::mission_arguments::MissionArguments;
 use paintcopter::{result, say};
 
@@ -51,15 +51,10 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
         }
         return Ok(());
     }
-    let alone = mission_file.paints.is_empty() && mission_file.palette.is_none();
     let coats = Coats::run(coats).map_err(|error| mission_file.in_mesh(error))?;
     // What is flown is not lost.
     let _finishing = Finishing::begin();
-    let summary = match coats.missions().next() {
-        Some((_, mission)) if alone => save(mission, folder)?.summary(),
-        _ => save_coats(&coats, folder)?.summary(),
-    };
-    say!("{summary}");
+    say!("{}", save_flown(&coats, folder)?.summary());
     result!("{}", folder.join("report.md").display());
     coats.grounded().cloned().map_or(Ok(()), |grounded| Err(grounded.into()))
 }

@@ -8,8 +8,10 @@ use paint_net::Image;
 use paint_sim::colour::{encode_srgb8, spectrum_lab, spectrum_linear_srgb};
 use paint_sim::{Paint, Substrate};
 
+use super::built_in_flyer::BuiltInFlyer;
 use super::colour_doses::correct_colours;
 use super::error::MissionError;
+use super::flyer::Flyer;
 use super::grounded::Grounded;
 use super::painting_task::PaintingTask;
 use super::picture_task::PictureTask;
@@ -126,20 +128,23 @@ fn each<T: Send, R: Send>(
 }
 
 impl Coats {
-    /// Plans all paints, then flies them in their order.
+    /// Plans all paints, then flies them in their order in the built-in simulation.
     ///
     /// # Errors
     /// As [`PlannedCoats::new`] and [`Mission::fly`].
     pub fn run(tasks: CoatTasks) -> Result<Self, MissionError> {
         // What cannot be planned is known before anything is flown.
-        PlannedCoats::new(tasks).and_then(Self::fly)
+        PlannedCoats::new(tasks).and_then(|planned| Self::fly(planned, &mut BuiltInFlyer))
     }
 
     /// Flies the paints in their order. What was flown before a flight that could not be is kept, and [`grounded`](Self::grounded) says so.
     ///
     /// # Errors
     /// As [`Mission::fly`], of the first.
-    pub fn fly(PlannedCoats { missions: planned, picture }: PlannedCoats) -> Result<Self, MissionError> {
+    pub fn fly(
+        PlannedCoats { missions: planned, picture }: PlannedCoats,
+        flyer: &mut dyn Flyer,
+    ) -> Result<Self, MissionError> {
         let wanted = planned.iter().map(|(_, mission)| (mission.task.paint.paint, mission.task.wanted_depth()));
         let wanted = wanted.collect();
         let (mut missions, mut grounded) = (Vec::new(), None::<Grounded>);
@@ -150,7 +155,7 @@ impl Coats {
                 continue;
             }
             let paint = planned.task.paint.name.clone();
-            match Mission::fly(planned) {
+            match Mission::fly(planned, flyer) {
                 Ok(mission) => {
                     grounded.clone_from(&mission.grounded);
                     missions.push((folder, mission));

@@ -69,6 +69,9 @@ pub enum MissionError {
     /// The simulation refused.
     #[error("simulation: {0}")]
     Simulation(#[from] paint_sim::Error),
+    /// Whoever flies gives up, or does not begin.
+    #[error(transparent)]
+    Flyer(Box<dyn std::error::Error + Send + Sync>),
     /// The robot shall find itself in a map, and there is none.
     #[error("localisation by slam needs a map of the surface: let the robot scan it first (--scan)")]
     NoMap,

@@ -1,20 +1,20 @@
 //! The figures of a mission.
 
 use paint_net::{ideal, metrics};
-use paint_planner::{Plan, Surface};
+use paint_planner::Plan;
 use paint_sim::flight::FlightLog;
 use paint_sim::flight::{FlightSample, FlightStatistics};
 use paint_sim::spray::QUANTUM;
 
+use super::collisions::collisions;
 use super::darker_than_wanted;
 use super::error::MissionError;
 use super::fly::LayerFlight;
 use super::inspect::Inspection;
-use super::rehearsal::{GAP_STRIDE, gap_at};
 use super::run::Mission;
 use super::seams::likeness;
 use super::settings::{MissionSettings, PainterChoice};
-use crate::adapters::{MeshSurface, Robot};
+use crate::adapters::MeshSurface;
 use crate::onboard::LocalisationFigures;
 use crate::report::{LocalisationReport, Report, TimeFigures, peak_resident_bytes};
 
@@ -191,11 +191,6 @@ fn share_held(mission: &Mission) -> f64 {
     held as f64 / samples().filter(|s| s.held || s.flow > 0.0).count().max(1) as f64
 }
 
-/// Moments of a flight at which the robot overlaps the surface or is in a keep-out volume.
-pub(super) fn collisions(robot: &Robot, obstacles: &dyn Surface, log: &FlightLog) -> usize {
-    log.samples.iter().step_by(GAP_STRIDE).filter(|sample| gap_at(robot, obstacles, sample, 0.0) < 0.0).count()
-}
-
 /// Moments at which the plan exceeds a limit of speed, acceleration, heading rate or joint rate, or the flown gun its joint limits.
 pub(super) fn limit_violations(plan: &Plan, flight: &FlightLog, settings: &MissionSettings) -> usize {
     let planned = plan.limit_violations(&settings.planner.timing, LIMIT_STEP);
@@ -232,24 +227,9 @@ pub(super) fn mean(values: impl Iterator<Item = f64>) -> f64 {
 mod tests {
     use super::super::test_panel;
     use super::*;
-    use ptu_kinematics::{CollisionBody, Ptu, PtuSettings, Range};
+    use ptu_kinematics::{PtuSettings, Range};
 
     /// None where the planner kept clear, all of them for a robot that is larger than its distance from the wall.
-    #[test]
-    fn collisions_are_counted() {
-        let settings = MissionSettings::default();
-        let (_, flight) = test_panel::flown(&settings);
-        let surface = test_panel::surface();
-        let world = &MeshSurface(&surface.world);
-        let robot = Robot::new(Ptu::new(settings.ptu).unwrap());
-        assert_eq!(collisions(&robot, world, &flight), 0);
-        let checked = flight.samples.len().div_ceil(GAP_STRIDE);
-        assert_eq!(
-            collisions(&Robot { body: CollisionBody { vehicle_radius: 3.0, ..robot.body }, ..robot }, world, &flight),
-            checked
-        );
-    }
-
     #[test]
     fn limit_violations_are_counted() {
         let settings = MissionSettings::default();

@@ -5,28 +5,27 @@ use paint_planner::Plan;
 use paint_planner::mission::Route;
 use paint_planner::onboard::sorties;
 use paint_sim::flight::FlightLog;
-use paint_sim::flight::{Faults, Interlock, Localisation, Valve};
+use paint_sim::flight::{Faults, Localisation, Reference};
 use paint_sim::{Film, FlightSettings, TriangleSurface};
 
 use super::error::MissionError;
-use super::flight_sensors::{camera_before, localised_flight};
+use super::flight_conditions::{counted_flight, usual_flight};
+use super::flight_sensors::{Poses, camera_before};
+use super::flyer::{Flight, Flyer, Purpose};
 use super::grounded::Grounded;
 use super::nozzle::spray_model;
 use super::painting_task::PaintingTask;
 use super::plan::Planned;
-use super::settings::{LocalisationChoice, MissionSettings};
-use super::simulated_flight::{OwnSenses, flight_settings, fly_piece, fly_plan};
+use super::settings::MissionSettings;
+use super::simulated_flight::{fly_plan, reference};
 use super::sorties::{FlownPiece, Sorties, in_pieces};
-use super::watched_poses::WatchedPoses;
 use crate::adapters::Robot;
-use crate::onboard::{LocalisationFigures, LocalisedFlight};
+use crate::onboard::{LocalisationFigures, Piece};
 use crate::progress::Stage;
 use crate::simulated_sensors::SHOT_STEP;
 
 /// Parts of the spraying after which the surface is shown.
 const PARTS: usize = 3;
-/// Without a pose for longer than this, s, the robot lands, and flies the rest as another sortie.
-const LONGEST_WITHOUT_POSE: f64 = 5.0;
 /// Flights of other sorties have seeds so far apart.
 const SORTIE: u64 = 0x1_0000;
 
@@ -70,7 +69,12 @@ pub(super) struct Flown {
 
 /// Flies every layer three times, after others whose paint is on the surface. The first flight of all that cannot be flown is an error, a later
 /// one the end of it.
-pub(super) fn fly(planned: Planned, task: &PaintingTask, before: &[LayerFlight]) -> Result<Flown, MissionError> {
+pub(super) fn fly(
+    planned: Planned,
+    task: &PaintingTask,
+    before: &[LayerFlight],
+    flyer: &mut dyn Flyer,
+) -> Result<Flown, MissionError> {
     let stage = Stage::start("fly");
     let count = planned.layers.len();
     let mut flights = Vec::with_capacity(count);
@@ -89,7 +93,7 @@ pub(super) fn fly(planned: Planned, task: &PaintingTask, before: &[LayerFlight])
         let mut told = Sorties::default();
         let logs: Vec<&FlightLog> = before.iter().chain(&flights).map(|layer| &layer.flight).collect();
         let counted = || {
-            let (flight, sorties) = fly_sorties(&plan, task, &faulty, layer as u64, &logs, &share)?;
+            let (flight, sorties) = fly_sorties(&plan, task, &faulty, layer as u64, &logs, flyer, &share)?;
             told = sorties;
             Ok(flight)
         };
@@ -127,6 +131,7 @@ fn fly_sorties(
     settings: &MissionSettings,
     layer: u64,
     before: &[&FlightLog],
+    flyer: &mut dyn Flyer,
     share: &dyn Fn(f64),
 ) -> Result<(FlightLog, Sorties), MissionError> {
     let flow = |time: f64| plan.setpoint(time).flow;
@@ -137,34 +142,23 @@ fn fly_sorties(
         sorties(duration, &flow, &settings.endurance)?.into_iter().map(Some).collect()
     };
     let usual = counted_flight(plan, &task.robot, settings, layer);
+    let whole = reference(plan, &task.robot, settings);
     in_pieces(&pieces, duration, &mut |k, piece, flown| {
-        let flight = FlightSettings {
+        let conditions = FlightSettings {
             seed: usual.seed.wrapping_add(SORTIE * k as u64),
             faults: if k == 0 { usual.faults } else { Faults::default() },
             ..usual
         };
-        let mut onboard = onboard(task, before.iter().copied().chain(flown))?;
-        let surface = task.surface.corners();
         let from = piece.map_or(0.0, |piece| piece.from);
-        let tell = |time: f64| share((from + time) / duration);
-        // Only these flights take long.
-        let mut watched = onboard.as_mut().map(|poses| WatchedPoses { poses, tell: &tell });
-        let source = watched.as_mut().map(|poses| OwnSenses { poses, surface });
-        let (log, ended) = fly_piece(plan, piece, task.met(), &task.robot, settings, &flight, source)?;
-        Ok(FlownPiece { log, localisation: onboard.map(|onboard| onboard.figures()), ended })
+        let piece = piece.map(|sortie| Piece::of(&whole, sortie));
+        let reference: &dyn Reference = piece.as_ref().map_or(&whole, |piece| piece);
+        let camera = || camera_before(task, before.iter().copied().chain(flown));
+        let mut poses = Poses::of(task, camera, 0, &conditions)?;
+        let flight = Flight { task, purpose: Purpose::Paint, reference, conditions };
+        let (log, ended) = flyer.fly(&flight, poses.source(), &|time| share((from + time) / duration))?;
+        let log = piece.iter().fold(log, |log, piece| piece.cut(log));
+        Ok(FlownPiece { log, localisation: poses.figures(), ended })
     })
-}
-
-/// The robot's own localisation, if it is to fly by that, before a surface with the paint of earlier flights. It finds itself anew before
-/// every flight.
-pub(super) fn onboard<'a, 'b>(
-    task: &'a PaintingTask,
-    before: impl Iterator<Item = &'b FlightLog>,
-) -> Result<Option<LocalisedFlight<'a>>, MissionError> {
-    if task.settings.localisation != Some(LocalisationChoice::Slam) {
-        return Ok(None);
-    }
-    localised_flight(task, camera_before(task, before)?, 0).map(Some)
 }
 
 /// Flights' paint on a surface.
@@ -201,39 +195,6 @@ pub(super) fn spray<'a>(
     let share = 100.0 * balance.deposited as f64 / balance.emitted.max(1) as f64;
     stage.done(&format!("{share:.1} % of the paint on the surface"));
     Ok(Sprayed { film, pixels, before })
-}
-
-/// The noise of the localisation that was chosen, where it is a model of noise.
-pub(super) fn localisation_noise(settings: &MissionSettings, usual: Localisation) -> Localisation {
-    match settings.localisation.unwrap_or_default() {
-        LocalisationChoice::Noise => Localisation::slam_7cm(),
-        LocalisationChoice::MotionCapture | LocalisationChoice::Slam => usual,
-    }
-}
-
-/// The flight whose paint counts: with the localisation that was chosen, as far as that is a noise, with an interlock, and with faults.
-pub(super) fn counted_flight(plan: &Plan, robot: &Robot, settings: &MissionSettings, layer: u64) -> FlightSettings {
-    let usual = usual_flight(plan, robot, settings, layer);
-    // Paint that misses by less than the spot is wide is better than none. The flights beside it are flown to see what they miss by, so
-    // nothing shuts their valve.
-    let interlock = Interlock { miss: settings.spot, ..Interlock::default() };
-    FlightSettings {
-        localisation: localisation_noise(settings, usual.localisation),
-        valve: Valve { interlock: Some(interlock), ..usual.valve },
-        faults: settings.faults,
-        ptu_locked: settings.path_planner.locks_gun(),
-        longest_without_pose: Some(LONGEST_WITHOUT_POSE),
-        ..usual
-    }
-}
-
-/// Wind, hose and vehicle of a flight.
-pub(super) fn usual_flight(plan: &Plan, robot: &Robot, settings: &MissionSettings, layer: u64) -> FlightSettings {
-    FlightSettings {
-        airframe: settings.airframe,
-        model: Some(settings.model),
-        ..flight_settings(plan, robot.tether, settings.seed.wrapping_mul(0x9E37_79B9).wrapping_add(layer))
-    }
 }
 
 /// The flight whose paint counts, as it is `counted`, the same plan with a drifting localisation, and the smoothing plan with the gun locked.
@@ -291,6 +252,7 @@ mod tests {
     use paint_sim::Shot;
     use ptu_kinematics::Ptu;
 
+    use super::super::simulated_flight::{fly_reference, noise};
     use super::super::test_panel;
     use super::*;
     use crate::region::Scene;
@@ -344,15 +306,20 @@ mod tests {
         let surface = test_panel::surface();
         let robot = Robot::new(Ptu::new(settings.ptu).unwrap());
         let plan = test_panel::plan(&surface, &robot, &settings);
-        let flown = |piece, seed| {
+        let all = reference(&plan, &robot, &settings);
+        let fly = |reference: &dyn Reference, seed| {
             let flight = FlightSettings { seed, ..counted_flight(&plan, &robot, &settings, 0) };
-            fly_piece(&plan, piece, &surface.world, &robot, &settings, &flight, None).unwrap().0
+            fly_reference(reference, &surface.world, &robot, &settings, &flight, &mut noise(&flight)).unwrap().0
+        };
+        let part = |sortie, seed| {
+            let piece = Piece::of(&all, sortie);
+            piece.cut(fly(&piece, seed))
         };
         let endurance = Endurance { battery: Some(47.0), ..Endurance::default() };
         let pieces = sorties(plan.trajectory.duration(), &|t| plan.setpoint(t).flow, &endurance).unwrap();
         assert!(pieces.len() >= 3, "{pieces:?}");
-        let logs: Vec<FlightLog> = pieces.iter().zip(1..).map(|(piece, seed)| flown(Some(*piece), seed)).collect();
-        let whole = flown(None, 1);
+        let logs: Vec<FlightLog> = pieces.iter().zip(1..).map(|(piece, seed)| part(*piece, seed)).collect();
+        let whole = fly(&all, 1);
         let joined: Vec<_> = logs.iter().flat_map(|log| log.samples.iter().copied()).collect();
         assert_eq!(joined.len(), whole.samples.len());
         for (joined, whole) in joined.iter().zip(&whole.samples) {

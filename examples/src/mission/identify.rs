@@ -6,11 +6,12 @@ use paint_planner::onboard::StraightWay;
 use paint_sim::Surface;
 use paint_sim::flight::{
     Airframe, CascadedController, Command, Controller, ControllerSettings, Estimate, FlightLog, FlightSettings,
-    IdealPanTilt, LocalisedPose, PoseSource, Reference, ReferenceState, fly_localised, fly_with,
+    IdealPanTilt, LocalisedPose, PoseSource, Reference, ReferenceState, fly_localised,
 };
 
 use super::error::MissionError;
-use super::fly::{localisation_noise, onboard, usual_flight};
+use super::flight_conditions::{localisation_noise, usual_flight};
+use super::flight_sensors::{Poses, camera_before};
 use super::painting_task::PaintingTask;
 use super::plan::Planned;
 use crate::adapters::reference_state;
@@ -50,10 +51,9 @@ pub(super) fn identify(task: &mut PaintingTask, planned: &Planned) -> Result<Opt
     let stage = Stage::start("identify");
     let usual = usual_flight(plan, &task.robot, &task.settings, FLIGHT);
     let conditions = FlightSettings { localisation: localisation_noise(&task.settings, usual.localisation), ..usual };
-    let mut onboard = onboard(task, std::iter::empty())?;
-    let source = onboard.as_mut().map(|onboard| onboard as &mut dyn PoseSource);
+    let mut poses = Poses::of(task, || camera_before(task, std::iter::empty()), 0, &conditions)?;
     let start = plan.setpoint(0.0).sample;
-    let (_, identified) = excite(&start.position, start.heading, task.met(), &conditions, source)?;
+    let (_, identified) = excite(&start.position, start.heading, task.met(), &conditions, poses.source())?;
     task.settings.model = identified.model;
     let describe = |fit: &AttitudeFit| format!("{:.3} in {:.3} s", fit.response.gain, lag(fit));
     let [roll, pitch] = &identified.attitude.first_order;
@@ -67,7 +67,7 @@ fn excite(
     heading: f64,
     world: &dyn Surface,
     conditions: &FlightSettings,
-    source: Option<&mut dyn PoseSource>,
+    poses: &mut dyn PoseSource,
 ) -> Result<(FlightLog, Identified), MissionError> {
     let model = conditions.model();
     let excitation = Excitation { tilt_limit: model.tilt_limit, ..Excitation::default() };
@@ -81,10 +81,7 @@ fn excite(
     let mut gun = IdealPanTilt::new(Point3::origin(), GUN, [0.8; 2])?;
     // The gun does nothing.
     let conditions = FlightSettings { ptu_locked: true, ..*conditions };
-    let log = match source {
-        Some(source) => fly_localised(&hover, &mut controller, &mut gun, world, source, &conditions)?,
-        None => fly_with(&hover, &mut controller, &mut gun, world, &conditions)?,
-    };
+    let log = fly_localised(&hover, &mut controller, &mut gun, world, poses, &conditions)?;
     let attitude = controller.identification.finish()?;
     let [roll, pitch] = &attitude.first_order;
     let model = Airframe {
@@ -146,7 +143,7 @@ mod tests {
     use ptu_kinematics::Ptu;
 
     use super::super::settings::MissionSettings;
-    use super::super::simulated_flight::{flight_settings, fly_plan};
+    use super::super::simulated_flight::{flight_settings, fly_plan, noise};
     use super::super::test_panel;
     use super::*;
     use crate::adapters::Robot;
@@ -178,7 +175,9 @@ mod tests {
             let airframe = off(std::array::from_fn(|k| if signs >> k & 1 == 0 { -0.3 } else { 0.3 }));
             let believed =
                 FlightSettings { airframe, model: Some(Airframe::default()), ..flight_settings(&plan, None, seed) };
-            let (log, identified) = excite(&start.position, start.heading, &surface.world, &believed, None).unwrap();
+            let mut poses = noise(&believed);
+            let (log, identified) =
+                excite(&start.position, start.heading, &surface.world, &believed, &mut poses).unwrap();
             let model = identified.model;
             for (found, truth) in [
                 (model.roll_gain, airframe.roll_gain),

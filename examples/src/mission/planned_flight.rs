@@ -2,23 +2,23 @@
 
 use std::path::Path;
 
-use nalgebra::Point3;
 use paint_planner::Plan;
-use paint_sim::flight::FlightLog;
+use paint_sim::flight::{FlightLog, Reference};
 use paint_sim::spray::QUANTUM;
-use paint_sim::{FlightSettings, TriangleSurface};
+use serde::Serialize;
 
 use super::error::MissionError;
-use super::figures::{collisions, limit_violations};
-use super::fly::{Sprayed, counted_flight, onboard, spray};
+use super::figures::limit_violations;
+use super::flight_conditions::counted_flight;
+use super::flight_sensors::{Poses, camera_before};
+use super::fly::{Sprayed, spray};
+use super::flyer::{Flight, Purpose};
 use super::mission_output::{painted_view, texture};
 use super::painting_task::PaintingTask;
 use super::planned_mission::PlannedMission;
-use super::settings::MissionSettings;
 use super::simulated_flight::reference;
-use crate::adapters::{MeshSurface, PlanReference, ServoPanTilt};
+use crate::adapters::PlanReference;
 use crate::appearance::DENSITY;
-use crate::onboard::LocalisedFlight;
 
 /// A layer of a mission that is planned and not flown.
 #[derive(Clone, Copy)]
@@ -29,16 +29,14 @@ pub struct PlannedFlight<'a> {
 }
 
 /// What a flight is worth beside the errors of [`FlightLog::statistics`].
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FlownFigures {
-    /// Moments at which the robot touched the surface.
-    pub collisions: usize,
     /// Moments at which the plan exceeds a limit or the flown gun its joint limits.
     pub limit_violations: usize,
     /// Paint that left the nozzle, kg.
-    pub emitted: f64,
+    pub paint_emitted_kg: f64,
     /// Paint on the surface, kg.
-    pub deposited: f64,
+    pub paint_deposited_kg: f64,
 }
 
 impl PlannedMission {
@@ -55,51 +53,32 @@ impl<'a> PlannedFlight<'a> {
         reference(self.plan, &self.task.robot, &self.task.settings)
     }
 
-    /// The pan-tilt unit on its servos, at rest.
-    pub fn pan_tilt(&self) -> Result<ServoPanTilt, MissionError> {
-        Ok(ServoPanTilt::new(self.task.robot.chain.clone(), self.task.settings.servo)?)
+    /// The flight itself, of its reference.
+    pub fn flight<'b>(&self, reference: &'b dyn Reference) -> Flight<'b>
+    where
+        'a: 'b,
+    {
+        let conditions = counted_flight(self.plan, &self.task.robot, &self.task.settings, self.layer);
+        Flight { task: self.task, purpose: Purpose::Paint, reference, conditions }
     }
 
-    /// The surface that the spray meets.
-    pub fn surface(&self) -> &'a TriangleSurface {
-        self.task.met()
+    /// What says where the robot is, before the bare surface.
+    pub fn poses(&self, flight: &Flight) -> Result<Poses<'a>, MissionError> {
+        Poses::of(self.task, || camera_before(self.task, std::iter::empty()), 0, &flight.conditions)
     }
 
-    /// What the mission was told.
-    pub fn settings(&self) -> &'a MissionSettings {
-        &self.task.settings
-    }
-
-    /// Wind, hose, localisation and valve as the built-in simulation flies it.
-    pub fn conditions(&self) -> FlightSettings {
-        counted_flight(self.plan, &self.task.robot, &self.task.settings, self.layer)
-    }
-
-    /// The robot's own localisation before the bare surface, if it is to fly by that.
-    pub fn own_senses(&self) -> Result<Option<LocalisedFlight<'a>>, MissionError> {
-        onboard(self.task, std::iter::empty())
-    }
-
-    /// Least and largest coordinates of the surface that is painted.
-    pub fn corners(&self) -> [Point3<f64>; 2] {
-        self.task.surface.corners()
-    }
-
-    /// Puts the paint of a flight onto the surface, writes `painted.png` and `painted_view.png`, and counts. `ways`: samples without paint.
-    pub fn save(&self, log: &FlightLog, ways: &FlightLog, folder: &Path) -> Result<FlownFigures, MissionError> {
+    /// Puts the paint of a flight onto the surface, writes `painted.png` and `painted_view.png`, and counts.
+    pub fn save(&self, log: &FlightLog, folder: &Path) -> Result<FlownFigures, MissionError> {
         let task = self.task;
         let Sprayed { film, pixels, .. } = spray(std::iter::once(log), task)?;
         let depth = task.depth_of(&film, &pixels);
         texture(task, &depth).save(&folder.join("painted.png"))?;
         painted_view(task, &depth)?.save(&folder.join("painted_view.png"))?;
-        let met = MeshSurface(task.met());
         let kilograms = |quanta: u64| quanta as f64 * QUANTUM * DENSITY;
-        let collisions = |log| collisions(&task.robot, &task.settings.constraints.around(&met), log);
         Ok(FlownFigures {
-            collisions: collisions(log) + collisions(ways),
             limit_violations: limit_violations(self.plan, log, &task.settings),
-            emitted: kilograms(film.mass_balance().emitted),
-            deposited: kilograms(film.mass_balance().deposited),
+            paint_emitted_kg: kilograms(film.mass_balance().emitted),
+            paint_deposited_kg: kilograms(film.mass_balance().deposited),
         })
     }
 }

@@ -48,7 +48,7 @@ mod tests {
     use paint_planner::mission::Rehearsal as _;
     use ptu_kinematics::Ptu;
 
-    use super::super::fly::counted_flight;
+    use super::super::flight_conditions::counted_flight;
     use super::super::rehearsal::WindRehearsal;
     use super::super::settings::MissionSettings;
     use super::super::simulated_flight::fly_plan;

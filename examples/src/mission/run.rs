@@ -7,8 +7,10 @@ use paint_sim::Film;
 use paint_sim::flight::FlightSample;
 use ptu_kinematics::Joints;
 
+use super::built_in_flyer::BuiltInFlyer;
 use super::error::MissionError;
 use super::fly::{Flown, LayerFlight, Sprayed, fly, spray};
+use super::flyer::Flyer;
 use super::grounded::Grounded;
 use super::identify::{Identified, identify};
 use super::painting_task::PaintingTask;
@@ -45,24 +47,24 @@ pub struct Mission {
 }
 
 impl Mission {
-    /// Plans and flies what was decided, and sprays it onto the film.
+    /// Plans and flies what was decided in the built-in simulation, and sprays it onto the film.
     pub fn run(task: PaintingTask) -> Result<Self, MissionError> {
-        PlannedMission::new(task).and_then(Self::fly)
+        PlannedMission::new(task).and_then(|mission| Self::fly(mission, &mut BuiltInFlyer))
     }
 
     /// Flies what is planned, and sprays it onto the film. What was flown before a flight that could not be is kept, and the
     /// report says so.
-    pub fn fly(mission: PlannedMission) -> Result<Self, MissionError> {
+    pub fn fly(mission: PlannedMission, flyer: &mut dyn Flyer) -> Result<Self, MissionError> {
         let PlannedMission { mut task, planned } = mission;
         task.settings.check_simulated()?;
         let (planning, unreachable_paint) = (planned.seconds, planned.unreachable_paint);
         let (kept_off, left_bare, outcomes) = (planned.kept_off, planned.left_bare, planned.outcomes);
         let identified = identify(&mut task, &planned)?;
-        let Flown { layers: mut flights, mut grounded } = fly(planned, &task, &[])?;
+        let Flown { layers: mut flights, mut grounded } = fly(planned, &task, &[], flyer)?;
         let Sprayed { mut film, pixels, before: mut partly_painted } = spray(flights.iter().map(|f| &f.flight), &task)?;
         let mut looked = None;
         if task.settings.look && grounded.is_none() {
-            match touch_up(&mut task, &flights, &film, &pixels) {
+            match touch_up(&mut task, &flights, &film, &pixels, flyer) {
                 Ok((again, figures)) => {
                     flights.extend(again.layers);
                     grounded = again.grounded;

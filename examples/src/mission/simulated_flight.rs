@@ -4,7 +4,6 @@ use nalgebra::{Point3, Vector3};
 use paint_planner::Plan;
 use paint_planner::constraints::Tether;
 use paint_planner::control::MpcSettings;
-use paint_planner::onboard::Sortie;
 use paint_sim::flight::FlightLog;
 use paint_sim::flight::{
     CONTROL_STEP, CascadedController, Controller, ControllerSettings, HoseModel, PoseSensor, PoseSource, Reference,
@@ -15,7 +14,6 @@ use paint_sim::{FlightSettings, TriangleSurface};
 use super::error::MissionError;
 use super::settings::{ControllerChoice, MissionSettings};
 use crate::adapters::{MpcController, PlanReference, Robot, ServoPanTilt};
-use crate::onboard::{Approach, Piece};
 
 /// The usual wind, hose and localisation.
 pub(super) fn flight_settings(plan: &Plan, tether: Option<Tether>, seed: u64) -> FlightSettings {
@@ -28,14 +26,7 @@ pub(super) fn reference<'a>(plan: &'a Plan, robot: &'a Robot, settings: &Mission
     PlanReference { plan, chain: &robot.chain, gun_length, stand_off: settings.planner.nozzle.stand_off }
 }
 
-/// The robot's own localisation.
-pub(super) struct OwnSenses<'a> {
-    pub(super) poses: &'a mut dyn PoseSource,
-    /// Corners of the surface in whose map it finds itself.
-    pub(super) surface: [Point3<f64>; 2],
-}
-
-/// Flies a plan by the noise of `flight`, see [`fly_piece`].
+/// Flies a plan by the noise of `flight`, see [`fly_reference`].
 pub(super) fn fly_plan(
     plan: &Plan,
     world: &TriangleSurface,
@@ -43,48 +34,35 @@ pub(super) fn fly_plan(
     settings: &MissionSettings,
     flight: &FlightSettings,
 ) -> Result<FlightLog, MissionError> {
-    let (log, ended) = fly_piece(plan, None, world, robot, settings, flight, None)?;
+    let mut noise = noise(flight);
+    let (log, ended) = fly_reference(&reference(plan, robot, settings), world, robot, settings, flight, &mut noise)?;
     ended.map_or(Ok(log), Err)
 }
 
-/// Flies a piece of a plan, or all of it, with the robot's own servos and the controller that was chosen, by a source of poses or by the noise
-/// of `flight`. Returns what was flown, and why it is not all. The error is of a flight that does not come to the plan.
-pub(super) fn fly_piece(
-    plan: &Plan,
-    piece: Option<Sortie>,
+/// Poses with the noise of a flight.
+pub(super) fn noise(flight: &FlightSettings) -> PoseSensor {
+    PoseSensor::new(flight.localisation, CONTROL_STEP, flight.seed)
+}
+
+/// Flies a reference with the robot's own servos and the controller that was chosen, by a source of poses. Returns what was flown, and why it is
+/// not all. The error is of a flight that does not begin.
+pub(super) fn fly_reference(
+    reference: &dyn Reference,
     world: &TriangleSurface,
     robot: &Robot,
     settings: &MissionSettings,
     flight: &FlightSettings,
-    localisation: Option<OwnSenses>,
+    poses: &mut dyn PoseSource,
 ) -> Result<(FlightLog, Option<MissionError>), MissionError> {
-    let whole = reference(plan, robot, settings);
-    let piece = piece.map(|sortie| Piece::of(&whole, sortie));
-    let reference: &dyn Reference = piece.as_ref().map_or(&whole, |piece| piece);
     let mut gun = ServoPanTilt::new(robot.chain.clone(), settings.servo)?;
     let mut controller: Box<dyn Controller> = match settings.controller {
         ControllerChoice::Cascade => Box::new(CascadedController::new(flight.model(), ControllerSettings::default())),
         ControllerChoice::Mpc => Box::new(MpcController::new(&flight.model(), MpcSettings::default())?),
     };
     let mut log = FlightLog::default();
-    let mut record = |reference: &dyn Reference, poses: &mut dyn PoseSource| {
-        fly_recorded(reference, controller.as_mut(), &mut gun, world, poses, flight, &mut log).err()
-    };
-    let (ended, log) = match localisation {
-        Some(source) => {
-            let approach = Approach::before(reference, source.surface);
-            let ended = record(&approach, source.poses);
-            (ended, approach.cut(log))
-        }
-        None => (record(reference, &mut PoseSensor::new(flight.localisation, CONTROL_STEP, flight.seed)), log),
-    };
-    let log = match &piece {
-        Some(piece) => piece.cut(log),
-        None => log,
-    };
-    match ended {
-        Some(error) if log.samples.is_empty() => Err(error.into()),
-        ended => Ok((log, ended.map(MissionError::from))),
+    match fly_recorded(reference, controller.as_mut(), &mut gun, world, poses, flight, &mut log) {
+        Err(error) if log.samples.is_empty() => Err(error.into()),
+        ended => Ok((log, ended.err().map(MissionError::from))),
     }
 }
 
@@ -127,7 +105,9 @@ mod tests {
         let faults = Faults { pose_lost: Some(8.0), gust, ..Faults::default() };
         let valve = Valve { interlock: Some(Interlock::default()), ..usual.valve };
         let flight = FlightSettings { faults, valve, ..usual };
-        let (log, ended) = fly_piece(&plan, None, &surface.world, &robot, &settings, &flight, None).unwrap();
+        let reference = reference(&plan, &robot, &settings);
+        let mut poses = noise(&flight);
+        let (log, ended) = fly_reference(&reference, &surface.world, &robot, &settings, &flight, &mut poses).unwrap();
         let last = log.samples.last().unwrap().time;
         assert!(ended.is_some() && (8.5..plan.trajectory.duration() - 1.0).contains(&last), "{ended:?} {last}");
         let whole = fly_plan(&plan, &surface.world, &robot, &settings, &FlightSettings { valve, ..usual }).unwrap();

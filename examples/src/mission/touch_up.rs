@@ -7,6 +7,7 @@ use paint_sim::film::inspection::FilmEstimate;
 use super::decide::decide;
 use super::error::MissionError;
 use super::fly::{Flown, LayerFlight, fly};
+use super::flyer::Flyer;
 use super::look::look;
 use super::painting_task::PaintingTask;
 use super::plan::plan;
@@ -40,10 +41,11 @@ pub(super) fn touch_up(
     flights: &[LayerFlight],
     film: &Film,
     pixels: &[usize],
+    flyer: &mut dyn Flyer,
 ) -> Result<(Flown, TouchUpFigures), MissionError> {
     let expected = expected_depth(task);
     let bare: Vec<bool> = pixels.iter().map(|&pixel| expected.data()[pixel] < NONE).collect();
-    let told = look(task, flights, &bare)?;
+    let told = look(task, flights, &bare, flyer)?;
     let mut missing = expected.map(|_| 0.0);
     let (mut lacking, mut all) = (0.0, 0.0);
     for ((told, &pixel), texel) in told.iter().zip(pixels).zip(film.texels()) {
@@ -69,7 +71,7 @@ pub(super) fn touch_up(
     // Doses are fitted to what is wanted of these flights.
     let first = std::mem::replace(&mut task.layers, layers);
     let whole = std::mem::replace(&mut task.wanted, wanted);
-    let flown = plan(task).and_then(|planned| fly(planned, task, flights));
+    let flown = plan(task).and_then(|planned| fly(planned, task, flights, flyer));
     (task.layers, task.wanted) = (first, whole);
     Ok((flown?, figures))
 }
@@ -109,8 +111,11 @@ fn figures(truth: &[f64], told: &[Option<FilmEstimate>], missing: f64) -> TouchU
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
-    use paint_sim::flight::{Clog, Faults, Mislocalised};
+    use paint_sim::flight::{Clog, Faults, FlightLog, Mislocalised, PoseSource};
 
+    use super::super::built_in_flyer::BuiltInFlyer;
+    use super::super::flyer::{Flight, Purpose};
+    use super::super::planned_mission::PlannedMission;
     use super::super::run::Mission;
     use super::super::settings::MissionSettings;
     use super::*;
@@ -120,12 +125,33 @@ mod tests {
 
     /// A rough wall of 1.6 m by 0.8 m with a gradient, flown with faults.
     fn flown(faults: Faults, look: bool) -> Mission {
+        flown_by(&mut Noting::default(), faults, look)
+    }
+
+    fn flown_by(flyer: &mut dyn Flyer, faults: Faults, look: bool) -> Mission {
         let mut mesh = rock_wall(1);
         for [x, y, z] in &mut mesh.positions {
             (*x, *y, *z) = (0.35 * *x, 0.35 * *y, (CENTRE + 0.35 * (f64::from(*z) - CENTRE)) as f32);
         }
         let settings = MissionSettings { look, faults, ..MissionSettings::default() };
-        PaintingTask::new("wall", &Scene::whole(mesh), &Design::Gradient, settings).and_then(Mission::run).unwrap()
+        let task = PaintingTask::new("wall", &Scene::whole(mesh), &Design::Gradient, settings).unwrap();
+        PlannedMission::new(task).and_then(|mission| Mission::fly(mission, flyer)).unwrap()
+    }
+
+    /// The built-in flyer, and what it flew for.
+    #[derive(Default)]
+    struct Noting(Vec<Purpose>);
+
+    impl Flyer for Noting {
+        fn fly(
+            &mut self,
+            flight: &Flight,
+            poses: &mut dyn PoseSource,
+            tell: &dyn Fn(f64),
+        ) -> Result<(FlightLog, Option<MissionError>), MissionError> {
+            self.0.push(flight.purpose);
+            BuiltInFlyer.fly(flight, poses, tell)
+        }
     }
 
     /// Texels where a quarter of what should be there is missing, and the mean of differences in colour there.
@@ -194,7 +220,11 @@ mod tests {
         let duration: f64 = sound.flights[0].plan.trajectory.duration();
         let clog = Clog { from: 0.4 * duration, until: 0.4 * duration + 60.0, flow: 0.6 };
         let faults = Faults { clogged: Some(clog), ..Faults::default() };
-        let [damaged, repaired] = [false, true].map(|look| flown(faults, look));
+        let damaged = flown(faults, false);
+        let mut flyer = Noting::default();
+        let repaired = flown_by(&mut flyer, faults, true);
+        // What another gave up is a flight of its own.
+        assert_eq!(flyer.0, [Purpose::Paint, Purpose::Paint, Purpose::Look, Purpose::Look, Purpose::Paint]);
         let looked = repaired.looked.unwrap();
         let [whole, left, again] = [&sound, &damaged, &repaired].map(Mission::painted_depth);
         let (before, after) = (damaged.colour_difference(), repaired.colour_difference());

@@ -7,8 +7,6 @@ use paint_sim::flight::{FlightLog, Reference, ReferenceState};
 use crate::adapters::reference_state;
 use crate::simulated_sensors::HALF_VIEW;
 
-/// The robot stands back by so much, m: about as far as it was from the surface when it scanned it, so that the keyframes show what it sees.
-const BACK: f64 = 0.9;
 /// Seconds for a metre: 0.4 m/s at most.
 const PACE: f64 = 5.0;
 /// Time that a leg takes at least, s.
@@ -21,27 +19,27 @@ pub struct Approach<'a> {
 }
 
 impl<'a> Approach<'a> {
-    /// Before a plan, from straight behind its beginning.
-    pub fn to(plan: &'a dyn Reference) -> Self {
+    /// Before a plan, from so far straight behind its beginning, m.
+    pub fn to(plan: &'a dyn Reference, stands_back: f64) -> Self {
         let first = plan.at(0.0);
-        let back = behind(&first);
+        let back = behind(&first, stands_back);
         Self { plan, legs: vec![leg([back, first.position], [first.heading; 2])] }
     }
 
     /// The same by way of a place from which the camera sees as much as it can of a surface that faces smaller x, within two corners: at its rim
     /// the robot would see half of it, and might not find itself.
-    pub fn before(plan: &'a dyn Reference, [low, high]: [Point3<f64>; 2]) -> Self {
+    pub fn before(plan: &'a dyn Reference, stands_back: f64, [low, high]: [Point3<f64>; 2]) -> Self {
         let first = plan.at(0.0);
-        let back = behind(&first);
+        let back = behind(&first, stands_back);
         // As far off as it will be, and from everything.
-        let x = back.x.min(low.x - BACK);
+        let x = back.x.min(low.x - stands_back);
         let distance = f64::midpoint(low.x, high.x) - x;
         let within = |axis: usize, half_view: f64| {
             let [low, high] = [low[axis] + half_view * distance, high[axis] - half_view * distance];
             if low < high { back[axis].clamp(low, high) } else { f64::midpoint(low, high) }
         };
         let place = Point3::new(x, within(1, HALF_VIEW[0]), within(2, HALF_VIEW[1]));
-        let mut approach = Self::to(plan);
+        let mut approach = Self::to(plan, stands_back);
         approach.legs.insert(0, leg([place, back], [0.0, first.heading]));
         approach
     }
@@ -63,9 +61,9 @@ impl<'a> Approach<'a> {
     }
 }
 
-/// Straight behind where a plan begins.
-fn behind(first: &ReferenceState) -> Point3<f64> {
-    first.position - Vector3::new(first.heading.cos(), first.heading.sin(), 0.0) * BACK
+/// So far straight behind where a plan begins, m.
+fn behind(first: &ReferenceState, back: f64) -> Point3<f64> {
+    first.position - Vector3::new(first.heading.cos(), first.heading.sin(), 0.0) * back
 }
 
 fn leg(ends: [Point3<f64>; 2], heading: [f64; 2]) -> StraightWay {
@@ -122,11 +120,11 @@ mod tests {
 
     #[test]
     fn it_comes_straight_from_behind_without_paint_and_then_follows_the_plan() {
-        let approach = Approach::to(&Line);
+        let approach = Approach::to(&Line, 0.9);
         assert_eq!(approach.time(), 4.5);
         let begin = approach.at(0.0);
         let back = Line.at(0.0).position - begin.position;
-        assert!((back - BACK * Vector3::new(0.5_f64.cos(), 0.5_f64.sin(), 0.0)).norm() < 1e-12, "{back}");
+        assert!((back - 0.9 * Vector3::new(0.5_f64.cos(), 0.5_f64.sin(), 0.0)).norm() < 1e-12, "{back}");
         assert_eq!(begin.velocity, Vector3::zeros());
         for k in 1..450 {
             let t = 0.01 * f64::from(k);
@@ -147,9 +145,9 @@ mod tests {
     #[test]
     fn it_begins_where_the_camera_sees_the_surface_and_is_never_nearer() {
         let corners = [Point3::new(1.9, -6.0, 2.0), Point3::new(2.5, 0.0, 5.0)];
-        let approach = Approach::before(&Line, corners);
+        let approach = Approach::before(&Line, 0.9, corners);
         let begin = approach.at(0.0);
-        let back = behind(&Line.at(0.0));
+        let back = behind(&Line.at(0.0), 0.9);
         assert!((begin.position.x - back.x).abs() < 1e-12 && begin.heading == 0.0);
         let distance = 2.2 - begin.position.x;
         // Nothing beside the wall is in view.
@@ -169,7 +167,8 @@ mod tests {
         assert!(fastest < 0.4, "{fastest}");
         assert_eq!(approach.at(0.01 * f64::from(steps) + 1e-9).flow, 1e-6);
         // Of a small surface the middle.
-        let small = Approach::before(&Line, [Point3::new(2.0, -0.5, 2.0), Point3::new(2.2, 0.1, 2.6)]).at(0.0).position;
+        let small =
+            Approach::before(&Line, 0.9, [Point3::new(2.0, -0.5, 2.0), Point3::new(2.2, 0.1, 2.6)]).at(0.0).position;
         assert!((small.y + 0.2).abs() < 1e-12 && (small.z - 2.3).abs() < 1e-12);
     }
 }

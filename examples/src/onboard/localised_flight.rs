@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use cpu_time::ThreadTime;
-use nalgebra::{Isometry3, UnitQuaternion};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use paint_sim::Error;
 use paint_sim::flight::multirotor::{Imu, ImuReading, ImuSettings};
 use paint_sim::flight::{FlightSample, GRAVITY, LocalisedPose, PoseSource, Vehicle};
@@ -98,7 +98,9 @@ pub struct LocalisedFlight<'a> {
     /// From milliseconds of the reference to those of the sensors' clock; `None` before the robot has found itself.
     offset: Option<i64>,
     captured: usize,
-    fault: Option<FaultInterval>,
+    faults: Vec<FaultInterval>,
+    /// Inertial samples that are late.
+    late: VecDeque<Arriving<vio_ekf::Imu>>,
     figures: LocalisationFigures,
 }
 
@@ -136,19 +138,20 @@ impl<'a> LocalisedFlight<'a> {
             depths: VecDeque::new(),
             offset: None,
             captured: 0,
-            fault: None,
+            faults: Vec::new(),
+            late: VecDeque::new(),
             figures: LocalisationFigures::default(),
         })
     }
 
-    /// With a fault of its sensors.
+    /// With faults of its sensors, one at a time.
     #[must_use]
-    pub fn with_fault(self, fault: FaultInterval) -> Self {
-        Self { fault: Some(fault), ..self }
+    pub fn with_faults(self, faults: Vec<FaultInterval>) -> Self {
+        Self { faults, ..self }
     }
 
     fn fault(&self, ms: i64) -> Option<SensorFault> {
-        self.fault.as_ref().filter(|fault| fault.when.contains(&ms)).map(|fault| fault.fault)
+        self.faults.iter().find(|fault| fault.when.contains(&ms)).map(|fault| fault.fault)
     }
 
     /// The paint that is on the surface, where the camera sees it.
@@ -167,7 +170,7 @@ impl<'a> LocalisedFlight<'a> {
         Ok(self.camera.capture(self.captured, &world_from_camera)?)
     }
 
-    /// Looks for its place before the flight, at the pose where it stands and then swaying about it. Returns the milliseconds that takes.
+    /// Looks for its place before the flight, at the pose where it stands and then swaying about it (in the air, or in its operator's hand). Returns the milliseconds that takes.
     fn search(&mut self, truth: &Vehicle) -> Result<i64, LocalisationError> {
         let mut found = false;
         for ms in 1..=SWAY_MS {
@@ -185,7 +188,7 @@ impl<'a> LocalisedFlight<'a> {
     }
 
     /// A millisecond of looking for its place. Returns whether it has been found: then the odometry starts there.
-    pub(super) fn look(&mut self, ms: i64, truth: &Vehicle, stands: bool) -> Result<bool, LocalisationError> {
+    fn look(&mut self, ms: i64, truth: &Vehicle, stands: bool) -> Result<bool, LocalisationError> {
         if ms % INERTIAL_MS == 0 {
             self.sense_motion(ms, truth)?;
         }
@@ -205,16 +208,6 @@ impl<'a> LocalisedFlight<'a> {
         Ok(true)
     }
 
-    /// It was found while the flight's clock ran: that is the clock of its sensors too.
-    pub(super) fn found(&mut self) {
-        self.offset = Some(0);
-    }
-
-    /// Whether it knows where it is.
-    pub(super) fn is_found(&self) -> bool {
-        self.offset.is_some()
-    }
-
     fn sense_motion(&mut self, ms: i64, truth: &Vehicle) -> Result<(), LocalisationError> {
         let reading = self.imu.measure(&truth.velocity, &truth.rotation(), 1e-3 * INERTIAL_MS as f64);
         let of_vehicle = self.vehicle_imu.measure(&truth.velocity, &truth.rotation(), 1e-3 * INERTIAL_MS as f64);
@@ -224,9 +217,18 @@ impl<'a> LocalisedFlight<'a> {
             accel: reading.specific_force,
         };
         // Faults are those of the camera's.
-        let first = self.fault(ms).map_or(Some(sample(reading)), |fault| fault.inertial(sample(reading)));
+        let fault = self.fault(ms);
+        let first = fault.map_or(Some(sample(reading)), |fault| fault.inertial(sample(reading)));
+        let delay = if let Some(SensorFault::LateMotion(delay)) = fault { delay } else { 0 };
+        if delay == 0 {
+            self.late.iter_mut().for_each(|late| late.at = ms);
+        }
+        self.late.extend(first.map(|what| Arriving { at: ms + delay, taken: ms, what }));
         let cpu = ThreadTime::now();
-        let mut done = first.map_or(Ok(()), |first| self.onboard.imu(&first));
+        let mut done = Ok(());
+        while let Some(Arriving { what, .. }) = self.late.pop_front_if(|late| late.at <= ms) {
+            done = done.and_then(|()| self.onboard.imu(&what));
+        }
         if self.bridging == Bridging::BothImus {
             done = done.and_then(|()| self.onboard.second_imu(&sample(of_vehicle)));
         }
@@ -268,8 +270,12 @@ impl<'a> LocalisedFlight<'a> {
                 image.darken();
             }
             if ms % DEPTH_MS == 0 && !matches!(fault, Some(SensorFault::NoDepth | SensorFault::NoImages)) {
+                let depth = match fault {
+                    Some(SensorFault::DepthOfElsewhere(off)) => self.capture(&beside(truth, off))?,
+                    _ => image.clone(),
+                };
                 let pose = self.onboard.pose(stamp(ms));
-                self.depths.push_back(Arriving { at: ms + DEPTH_LATENCY_MS, taken: ms, what: (image.clone(), pose) });
+                self.depths.push_back(Arriving { at: ms + DEPTH_LATENCY_MS, taken: ms, what: (depth, pose) });
             }
             if fault != Some(SensorFault::NoImages) {
                 self.images.push_back(Arriving { at: ms + IMAGE_LATENCY_MS, taken: ms, what: image });
@@ -326,7 +332,12 @@ struct Arriving<T> {
     what: T,
 }
 
-pub(super) fn milliseconds(time: f64) -> i64 {
+/// The same so far to its left, m.
+fn beside(truth: &Vehicle, off: f64) -> Vehicle {
+    Vehicle { position: truth.position + truth.rotation() * Vector3::y() * off, ..*truth }
+}
+
+fn milliseconds(time: f64) -> i64 {
     (1e3 * time).round() as i64
 }
 

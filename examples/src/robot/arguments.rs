@@ -10,28 +10,29 @@ use super::on_board::SetpointKind;
 use crate::autopilot::LinkAddress;
 use crate::mission_arguments::MissionArguments;
 
-/// Flies the first minutes of a painting mission on an autopilot that speaks MAVLink: PX4 as a program in lockstep with the simulated
-/// vehicle, or a multirotor with PX4 over UDP or a serial line. Without other arguments it paints the built-in rock wall.
+/// The robot's own program: it scans the built-in rock wall, or flies the mission that is named, in simulation or on an autopilot that speaks
+/// MAVLink. Without a mission it finds itself in its map by its own senses, paints, looks, and paints again what is missing.
 #[derive(Parser)]
 #[command(
     name = "robot",
     version,
-    after_help = "Example:\n  robot --autopilot px4:px4 --seconds 60 --out out/px4\n  robot --autopilot udp:127.0.0.1:14540\n  robot --autopilot serial:/dev/ttyUSB0,921600"
+    after_help = "Example:\n  robot\n  robot --autopilot px4:px4 --seconds 60 --out out/px4\n  robot --autopilot udp:127.0.0.1:14540\n  robot --autopilot serial:/dev/ttyUSB0,921600"
 )]
 pub struct Arguments {
     #[command(flatten)]
     pub(super) mission: MissionArguments,
-    /// Who flies: px4:FOLDER (px4, px4-alias.sh and etc/ of a PX4 built for simulation), udp:ADDRESS:PORT where a vehicle sends to, or serial:DEVICE,BAUD
+    /// Who flies: px4:FOLDER (px4, px4-alias.sh and etc/ of a PX4 built for simulation; in lockstep with the simulated vehicle), or a multirotor on
+    /// PX4, which flies the first flight: udp:ADDRESS:PORT where it sends to, or serial:DEVICE,BAUD [default: the built-in simulation]
     #[arg(long, value_name = "px4:FOLDER|udp:ADDRESS:PORT|serial:DEVICE,BAUD")]
-    pub(super) autopilot: AutopilotChoice,
-    /// How much of the plan is painted, seconds
-    #[arg(long, value_name = "SECONDS", default_value_t = 300.0, value_parser = seconds)]
-    pub(super) seconds: f64,
+    pub(super) autopilot: Option<AutopilotChoice>,
+    /// Paint no more than so much of the first flight's plan, seconds
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, requires = "autopilot")]
+    pub(super) seconds: Option<f64>,
     /// Set-points for the autopilot
-    #[arg(long, value_enum, default_value_t = SetpointKind::Trajectory)]
+    #[arg(long, value_enum, default_value_t = SetpointKind::Trajectory, requires = "autopilot")]
     pub(super) setpoints: SetpointKind,
-    /// Lets something fail after the paint begins: link, pose, clock, estimate or mode @SECONDS+DURATION; battery, restart or program @SECONDS
-    #[arg(long, value_name = "KIND@SECONDS+DURATION")]
+    /// Lets something fail after the paint of the first flight begins: link, pose, clock, estimate or mode @SECONDS+DURATION; battery, restart or program @SECONDS
+    #[arg(long, value_name = "KIND@SECONDS+DURATION", requires = "autopilot")]
     pub(super) fault: Vec<Fault>,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/robot")]

@@ -35,6 +35,23 @@ pub enum RobotError {
         /// The option.
         option: &'static str,
     },
+    /// An option of several flights.
+    #[error(
+        "{option} is for a whole mission on PX4: leave it out with --seconds and with --autopilot udp: and serial:"
+    )]
+    WholeMissionOnly {
+        /// The option.
+        option: &'static str,
+    },
+    /// A flight that is not begun.
+    #[error("interrupted before it took off")]
+    Interrupted,
+    /// There is nothing left to fly with.
+    #[error("flight {flight} has broken the vehicle")]
+    Broken {
+        /// The flight, from 1 on.
+        flight: usize,
+    },
     /// An option that says nothing about a vehicle that is not simulated.
     #[error("{option} is for the simulated vehicle on PX4: leave it out with --autopilot udp: and serial: ({why})")]
     SimulationOnly {

@@ -31,6 +31,8 @@ pub struct Flown {
     pub px4_cpu: f64,
     /// What ended it before its time.
     pub failed: Option<String>,
+    /// Whether that has broken the vehicle.
+    pub broken: bool,
 }
 
 /// What is flown before what.
@@ -77,11 +79,13 @@ pub fn fly_px4(
             Err(error) => break Some(format!("{error} ({})", flight.on_board.phase())),
         }
     };
+    let broken = flight.is_broken();
     Ok(Flown {
         record: flight.recorder.finish(flight.on_board.events()),
         valve_open_late: flight.late,
         seconds: flight.robot.steps() as f64 * STEP,
         px4_cpu: flight.past_cpu.unwrap_or(0.0) + flight.px4.cpu_seconds(),
+        broken,
         failed,
     })
 }
@@ -168,11 +172,15 @@ impl Px4Flight<'_, '_, '_> {
         }
     }
 
+    fn is_broken(&self) -> bool {
+        self.robot.body().impact_speed() > HARD_LANDING
+    }
+
     fn hard_landing(&self) -> Option<End> {
         let speed = self.robot.body().impact_speed();
         let failed =
             || End::Failed(format!("the vehicle hit the ground at {speed:.1} m/s ({})", self.on_board.phase()));
-        (speed > HARD_LANDING).then(failed)
+        self.is_broken().then(failed)
     }
 
     /// The physics and the autopilot until the next control step.

@@ -40,6 +40,13 @@ pub enum SetpointKind {
     Trajectory,
 }
 
+impl SetpointKind {
+    /// As on the command line.
+    pub fn name(self) -> String {
+        format!("{self:?}").to_lowercase()
+    }
+}
+
 /// What the on-board program is told.
 #[derive(Debug, Clone, Copy)]
 pub struct OnBoardSettings {

@@ -15,7 +15,7 @@ use super::recorder::{Recorder, Seen};
 use super::simulated_robot::{STEP, station};
 use crate::autopilot::{AutopilotError, OffboardLink, OffboardSettings, Telemetry, VehicleLink};
 use crate::interruption;
-use crate::mission::PlannedFlight;
+use crate::mission::Flight;
 
 /// Telemetry that is asked for, per second, and its longest silence, s: radios are slower than a simulation.
 const TELEMETRY_RATE: f64 = 50.0;
@@ -54,18 +54,18 @@ impl Reference for Moved<'_> {
 /// Flies a plan on the vehicle at the other end of a link, until it has landed or is given up.
 pub(super) fn fly_vehicle(
     mut link: VehicleLink,
-    flight: &PlannedFlight,
+    flight: &Flight,
     settings: OnBoardSettings,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Flown, RobotError> {
     let clock = Instant::now();
-    let plan = flight.reference();
+    let plan = flight.reference;
     let start = plan.at(0.0);
     let vehicle_from_station = first_pose(&mut link, &clock)?;
     let world_from_station = station(&start.position, start.heading);
     let vehicle_from_world = vehicle_from_station * world_from_station.inverse();
     let world_from_vehicle = vehicle_from_world.inverse();
-    let reference = Moved { plan: &plan, vehicle_from_world };
+    let reference = Moved { plan, vehicle_from_world };
     let settings = OnBoardSettings {
         arms: false,
         sends_odometry: false,
@@ -75,7 +75,7 @@ pub(super) fn fly_vehicle(
     };
     let mut on_board = OnBoard::new(&reference, flight.pan_tilt()?, settings);
     let mut ptu = flight.pan_tilt()?;
-    let mut recorder = Recorder::new(&plan, flight.surface());
+    let mut recorder = Recorder::new(plan, flight.surface());
     let mut pan_tilt = [0.0; 2];
     let failed = loop {
         let now = clock.elapsed().as_secs_f64();
@@ -117,6 +117,7 @@ pub(super) fn fly_vehicle(
         seconds: clock.elapsed().as_secs_f64(),
         px4_cpu: 0.0,
         failed,
+        broken: false,
     })
 }
 

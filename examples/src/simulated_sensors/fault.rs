@@ -11,8 +11,12 @@ pub enum SensorFault {
     NoDepth,
     /// Neither arrives.
     NoImages,
+    /// Depth is that of a place so far to the side, m: what tracking makes of it is a wrong pose that agrees with the map.
+    DepthOfElsewhere(f64),
     /// No inertial sample arrives.
     NoMotion,
+    /// Inertial samples arrive so many milliseconds late; in the end all that wait arrive at once.
+    LateMotion(i64),
     /// The accelerometer reads at most so much on each axis, m/s².
     Clipped(f64),
     /// The gyroscope's x and y are swapped.
@@ -27,7 +31,7 @@ impl SensorFault {
             Self::NoMotion => return None,
             Self::Clipped(most) => sample.accel = sample.accel.map(|a| a.clamp(-most, most)),
             Self::Swapped => sample.gyro.swap_rows(0, 1),
-            Self::CameraBlack | Self::NoDepth | Self::NoImages => {}
+            Self::CameraBlack | Self::NoDepth | Self::NoImages | Self::DepthOfElsewhere(_) | Self::LateMotion(_) => {}
         }
         Some(sample)
     }

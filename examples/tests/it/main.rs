@@ -52,6 +52,7 @@ mod robot;
 mod scan_flight;
 mod scratch;
 mod seams;
+mod sensor_faults;
 #[cfg(feature = "scan")]
 mod sequences;
 #[cfg(feature = "spray")]

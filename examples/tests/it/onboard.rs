@@ -6,16 +6,15 @@ use std::sync::OnceLock;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use paint_sim::flight::{
-    CascadedController, ControllerSettings, FlightLog, FlightSettings, IdealPanTilt, Interlock, LocalisedPose,
-    PoseSource, Reference, ReferenceState, Valve, Vehicle, fly_localised,
+    CascadedController, ControllerSettings, FlightLog, FlightSettings, IdealPanTilt, Interlock, PoseSource, Reference,
+    ReferenceState, Valve, Vehicle, fly_localised,
 };
 use paint_sim::paint::PaintName;
 use paint_sim::{Error, Shot, SprayModel, Surface, TriangleSurface};
 use paintcopter::appearance::UNIT_THICKNESS;
 use paintcopter::mesh_io::TriangleMesh;
 use paintcopter::onboard::{
-    Approach, Bridging, LocalisationFigures, LocalisedFlight, OnboardLocalisation, StandingStart, read_map,
-    surveyed_map,
+    Approach, Bridging, LocalisationFigures, LocalisedFlight, OnboardLocalisation, read_map, surveyed_map,
 };
 use paintcopter::scan_flight::{MAP_FILE, ScanFlight, save};
 use paintcopter::simulated_sensors::{FaultInterval, PaintedFront, SensorFault, SimulatedCamera, SimulatedImage};
@@ -27,10 +26,10 @@ use vio_ekf::{Imu, Stamp};
 /// Deviation of a spot, m.
 const SPOT: f64 = 0.025;
 /// The stroke begins so many milliseconds after the robot hovers.
-const BEFORE: i64 = 1000 + 4500;
+pub(crate) const BEFORE: i64 = 1000 + 4500;
 
 /// 1.6 m by 0.8 m, as high above the ground as the whole wall.
-fn wall(seed: u64) -> TriangleMesh {
+pub(crate) fn wall(seed: u64) -> TriangleMesh {
     let mut mesh = rock_wall(seed);
     for [x, y, z] in &mut mesh.positions {
         (*x, *y, *z) = (0.35 * *x, 0.35 * *y, (CENTRE + 0.35 * (f64::from(*z) - CENTRE)) as f32);
@@ -76,13 +75,16 @@ impl Reference for Stroke<'_> {
 }
 
 /// Flies the stroke before a wall in the map of the first one; the camera sees the paint.
-fn fly(mesh: &TriangleMesh, fault: Option<(SensorFault, i64)>) -> Result<(FlightLog, LocalisationFigures), Error> {
+pub(crate) fn fly(
+    mesh: &TriangleMesh,
+    fault: Option<(SensorFault, i64)>,
+) -> Result<(FlightLog, LocalisationFigures), Error> {
     let surface = TriangleSurface::new(&mesh.positions, &mesh.faces).unwrap();
     fly_again(&surface, fault, bare(&surface)).map(|(log, figures, _)| (log, figures))
 }
 
 /// A wall without paint on it, for the nozzle of the stroke.
-fn bare(surface: &TriangleSurface) -> PaintedFront {
+pub(crate) fn bare(surface: &TriangleSurface) -> PaintedFront {
     let spray = SprayModel { sigma: (SPOT / 0.5).atan(), ..SprayModel::default() };
     let charcoal = PaintName::Charcoal.paint(UNIT_THICKNESS).unwrap();
     PaintedFront::new(surface, &Vector3::x_axis(), spray, &charcoal).unwrap()
@@ -105,25 +107,35 @@ fn fly_bridged(
     bridging: Bridging,
     seed: u64,
 ) -> Result<(FlightLog, LocalisationFigures, PaintedFront), Error> {
+    let from = BEFORE + 1500;
+    let fault = fault.map(|(fault, duration)| FaultInterval { fault, when: from..from + duration });
+    fly_faulty(&Stroke(surface), surface, fault.into_iter().collect(), paint, bridging, seed)
+}
+
+/// A stroke of any kind before a wall with paint on it, with faults.
+pub(crate) fn fly_faulty(
+    stroke: &dyn Reference,
+    surface: &TriangleSurface,
+    faults: Vec<FaultInterval>,
+    paint: PaintedFront,
+    bridging: Bridging,
+    seed: u64,
+) -> Result<(FlightLog, LocalisationFigures, PaintedFront), Error> {
     // The same stone as in the scan, which has seed 1.
     let camera = SimulatedCamera::new(surface, Vector3::x(), 1, 1).before(paint);
-    let mut onboard = LocalisedFlight::bridged(camera, read_map(map()).unwrap(), seed + 4, bridging).unwrap();
-    if let Some((fault, duration)) = fault {
-        let from = BEFORE + 1500;
-        onboard = onboard.with_fault(FaultInterval { fault, when: from..from + duration });
-    }
+    let onboard = LocalisedFlight::bridged(camera, read_map(map()).unwrap(), seed + 4, bridging).unwrap();
+    let mut onboard = onboard.with_faults(faults);
     let valve = Valve { interlock: Some(Interlock { miss: SPOT, ..Interlock::default() }), ..Valve::default() };
     let settings = FlightSettings { valve, settle: 1.0, seed, ..FlightSettings::default() };
     let mut controller = CascadedController::new(settings.airframe, ControllerSettings::default());
     let mut gun = IdealPanTilt::new(Point3::new(0.2, 0.0, 0.0), 0.3, [0.8; 2]).unwrap();
-    let stroke = Stroke(surface);
-    let approach = Approach::to(&stroke);
+    let approach = Approach::to(stroke, 0.9);
     let log = fly_localised(&approach, &mut controller, &mut gun, surface, &mut onboard, &settings)?;
     Ok((approach.cut(log), onboard.figures(), onboard.into_paint().unwrap()))
 }
 
 /// Samples with paint that leaves more than a spot beside its aim, and with paint at all.
-fn astray(log: &FlightLog) -> (usize, usize) {
+pub(crate) fn astray(log: &FlightLog) -> (usize, usize) {
     let sprays = || log.samples.iter().filter(|sample| sample.flow > 0.0);
     let off = |sample: &&paint_sim::flight::FlightSample| {
         let (Some(hit), Some(aim)) = (sample.hit, sample.aim) else { return true };
@@ -197,34 +209,9 @@ fn it_finds_itself_by_shape_before_a_wall_that_is_painted_all_over() {
         pose.is_some() && figures.relocalised_after_s > 1.0 && figures.relocalisation_error_m < 0.01,
         "{figures:?}"
     );
-}
-
-/// Milliseconds until a robot that stands before a wall has its first pose, and that pose.
-fn standing(mesh: &TriangleMesh, stood: &Vehicle) -> Result<(i64, LocalisedPose), Error> {
-    let surface = TriangleSurface::new(&mesh.positions, &mesh.faces).unwrap();
-    let camera = SimulatedCamera::new(&surface, Vector3::x(), 1, 1);
-    let mut flight = LocalisedFlight::new(camera, read_map(map()).unwrap(), 9).unwrap();
-    let mut standing = StandingStart(&mut flight);
-    for ms in 1..20_000 {
-        if let Some(pose) = standing.pose(1e-3 * (ms - 1) as f64, stood)? {
-            return Ok((ms - 1, pose));
-        }
-        standing.moved(1e-3 * ms as f64, stood)?;
-    }
-    panic!("it looks for ever")
-}
-
-#[test]
-fn it_finds_itself_where_it_stands_before_it_takes_off() {
-    let stood = Vehicle::at_rest(Point3::new(-1.2, 0.1, CENTRE), 0.1);
-    let (ms, pose) = standing(&wall(1), &stood).unwrap();
-    let error = (pose.world_from_body.translation.vector - stood.position.coords).norm();
-    println!("{ms} ms, {error} m, {:?}", pose.sigma);
-    assert!((100..=1000).contains(&ms) && error < 0.01, "{ms} ms, {error} m");
     // What it takes its error for is of the size of the map's own.
-    assert!((1e-3..0.02).contains(&pose.sigma[0]) && (3e-4..0.02).contains(&pose.sigma[1]), "{:?}", pose.sigma);
-    let error = standing(&wall(2), &stood).unwrap_err();
-    assert!(error.to_string().contains("within 10 s: it does not take off"), "{error}");
+    let [position, attitude] = pose.unwrap().sigma;
+    assert!((1e-3..0.02).contains(&position) && (3e-4..0.02).contains(&attitude), "{position} m, {attitude} rad");
 }
 
 #[test]
@@ -360,35 +347,6 @@ fn found_by_the_mesh_alone() {
         assert!(wall != 1 || right >= 16 / every, "{right} right");
     }
     assert_eq!(false_, 0);
-}
-
-/// `cargo test --release -p paintcopter --all-features --test it -- --ignored --nocapture faults_of_sensors`
-#[test]
-#[ignore = "some minutes; reprints the table of the chapter"]
-fn faults_of_sensors() {
-    let faults = [
-        SensorFault::CameraBlack,
-        SensorFault::NoDepth,
-        SensorFault::NoImages,
-        SensorFault::NoMotion,
-        SensorFault::Clipped(9.0),
-        SensorFault::Swapped,
-    ];
-    let mut all = 0;
-    for fault in faults {
-        for duration in [200, 600, 2000] {
-            match fly(&wall(1), Some((fault, duration))) {
-                Ok((log, figures)) => {
-                    let (astray, sprayed) = astray(&log);
-                    let error = figures.position_error_rms_m();
-                    all += astray;
-                    println!("{fault:?} {duration} ms: {astray} astray, {sprayed} sprayed, error {error:.4} m");
-                }
-                Err(error) => println!("{fault:?} {duration} ms: {error}"),
-            }
-        }
-    }
-    assert_eq!(all, 0);
 }
 
 /// The hit error by the odometry's own poses, by those moved on with the camera's inertial sensor, and with the vehicle's as well.

@@ -44,9 +44,8 @@ fn text(output: &Output) -> String {
 }
 
 fn figure(scratch: &Scratch, folder: &str, name: &str) -> f64 {
-    let json = std::fs::read_to_string(scratch.0.join(folder).join("report.json")).unwrap();
-    let report: serde_json::Value = serde_json::from_str(&json).unwrap();
-    report[name].as_f64().unwrap_or_else(|| panic!("{name} in {json}"))
+    let report = report(scratch, folder);
+    report[name].as_f64().unwrap_or_else(|| panic!("{name} in {report}"))
 }
 
 /// Flies the panel for some seconds of paint and returns what it said, with its exit code.
@@ -73,6 +72,49 @@ fn px4_flies_the_plan_and_every_run_is_the_same() {
         let [first, second] = ["first", "second"].map(|folder| std::fs::read(s.0.join(folder).join(file)).unwrap());
         assert!(first == second, "{file} differs between two runs");
     }
+}
+
+fn report(scratch: &Scratch, folder: &str) -> serde_json::Value {
+    let json = std::fs::read_to_string(scratch.0.join(folder).join("report.json")).unwrap();
+    serde_json::from_str(&json).unwrap()
+}
+
+/// A panel whose stripes it looks at afterwards, to paint again what is missing.
+#[test]
+fn px4_flies_all_flights_of_a_mission() {
+    let Some(px4) = px4() else { return };
+    let s = Scratch::new("px4-mission");
+    let (code, said) = fly(&s, &px4, "out", &["--look"]);
+    assert_eq!(code, Some(0), "{said}");
+    let report = report(&s, "out");
+    let flights = report["flights"].as_array().unwrap();
+    let purposes: Vec<_> = flights.iter().map(|flight| flight["purpose"].as_str().unwrap()).collect();
+    assert_eq!(purposes, ["paint", "look", "look", "paint"], "{said}");
+    for (number, flight) in (1..).zip(flights) {
+        assert_eq!(flight["ended"], "landed", "{flight}");
+        assert!(flight["hit_error_rms_m"].as_f64().unwrap() < 0.02, "{flight}");
+        for none in ["collisions", "valve_open_late_count", "holds"] {
+            assert_eq!(flight[none], 0, "{none} of {flight}");
+        }
+        assert!(s.0.join(format!("out/flights/{number}/track.csv")).exists());
+    }
+    // What the mission says of itself is what PX4 has flown.
+    let hit_error = report["hit_error_rms_m"].as_f64().unwrap();
+    assert!((0.001..0.02).contains(&hit_error), "{hit_error}");
+    assert_eq!((&report["collisions"], &report["limit_violations"]), (&0.into(), &0.into()));
+}
+
+/// PX4 is started anew in the air, and the vehicle falls: what is painted is there, and nothing more is flown.
+#[test]
+fn a_broken_vehicle_does_not_fly_on() {
+    let Some(px4) = px4() else { return };
+    let s = Scratch::new("px4-broken");
+    let (code, said) = fly(&s, &px4, "out", &["--look", "--fault", "restart@6"]);
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("hit the ground") && said.contains("flight 1 has broken the vehicle"), "{said}");
+    let report = report(&s, "out");
+    assert_eq!(report["flights"].as_array().map(Vec::len), Some(1));
+    assert!(report["not_flown_s"].as_f64().unwrap() > 30.0 && s.0.join("out/painted_view.png").exists(), "{said}");
 }
 
 /// A piece of rock of 1.6 m by 0.8 m, scanned; from its stand the robot sees it, and PX4 flies by what its camera and inertial sensors say.
@@ -149,7 +191,7 @@ fn a_thousand_faults_find_the_valve_shut() {
         command.args(["--autopilot", &format!("px4:{}", px4.display()), "--seed", &seed, "--out", &out]);
         let setpoints = if seed.len() == 1 { "trajectory" } else { "attitude" };
         command
-            .args(["--setpoints", setpoints])
+            .args(["--setpoints", setpoints, "--seconds", "300"])
             .args(faults.iter().flat_map(|fault| ["--fault", fault]))
             .stdin(Stdio::null());
         let output = command.output().unwrap();
