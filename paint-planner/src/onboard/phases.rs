@@ -144,6 +144,8 @@ impl<P: FlightPlan + Copy> Phases<P> {
     pub fn advance(&mut self, situation: &Situation) {
         let Situation { now, cause, position, heading, ready, armed } = *situation;
         let (station, station_heading) = *self.station.get_or_insert((position, heading));
+        // A pose that is not good enough to paint by is good enough to fly home by.
+        let cause = cause.filter(|cause| !(self.phase == Phase::Return && *cause == Cause::PoseUncertain));
         if let Some(cause) = cause.or(self.astray(situation)).filter(|_| self.phase.is_guarded()) {
             self.good_since = None;
             return self.fail(cause, situation);
@@ -364,6 +366,17 @@ mod tests {
         // One metre at the middle, one tenth of the way of 3 m and 2.5 m down less.
         assert!((0.7..=1.0).contains(&lowest), "{lowest}");
         assert!((phases.painted() - Line.duration()).abs() < 1e-9);
+    }
+
+    /// Above a small wall, where nothing of the map is in view, say.
+    #[test]
+    fn it_flies_home_by_an_uncertain_pose_but_not_without_one() {
+        for (cause, next) in [(Cause::PoseUncertain, Phase::Land), (Cause::PoseLost, Phase::Hold(Cause::PoseLost))] {
+            let (mut phases, mut clock) = (Phases::new(Line, 20.0, 0.0), 0.0);
+            until(&mut phases, &mut clock, None, |phase| phase == Phase::Return);
+            until(&mut phases, &mut clock, Some(cause), |phase| phase != Phase::Return);
+            assert_eq!((phases.phase(), phases.ended_early()), (next, None));
+        }
     }
 
     #[test]
