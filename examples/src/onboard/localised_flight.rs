@@ -170,7 +170,8 @@ impl<'a> LocalisedFlight<'a> {
         Ok(self.camera.capture(self.captured, &world_from_camera)?)
     }
 
-    /// Looks for its place before the flight, at the pose where it stands and then swaying about it (in the air, or in its operator's hand). Returns the milliseconds that takes.
+    /// Looks for its place before the flight, at the pose where it stands and then swaying about it, in the air or in its operator's hand. Returns
+    /// the milliseconds that takes.
     fn search(&mut self, truth: &Vehicle) -> Result<i64, LocalisationError> {
         let mut found = false;
         for ms in 1..=SWAY_MS {
