@@ -2,6 +2,7 @@
 //! stored map.
 
 mod contradiction;
+mod fault_isolation;
 mod filter_state;
 mod imu_pair;
 mod inertial_check;

@@ -10,7 +10,7 @@ use crate::trajectory::is_finite;
 /// Samples of each sensor that wait for the other at most.
 const MAX_PENDING: usize = 64;
 
-/// How two inertial sensors on one body are fuse.
+/// How two inertial sensors on one body are joined.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct ImuPairSettings {
@@ -24,7 +24,7 @@ pub struct ImuPairSettings {
     pub gyro_bias_sigma: f64,
     /// Standard deviation of the difference of the accelerometers' biases at the start, m/s² per axis; ours: 0.2.
     pub accel_bias_sigma: f64,
-    /// A second sensor that is this late, or silent for so long, is left out, s; ours: 0.02.
+    /// A sensor that is this much later than the other, or silent for so long, is done without, s; ours: 0.02.
     pub timeout_s: f64,
 }
 
@@ -54,7 +54,8 @@ impl Default for ImuPairSettings {
 /// with densities σ of the white noise and q of the walks. These weights make the noise of `y` independent of what `d` is
 /// measured with, and the walk of its bias `b₁ − κ d` independent of that of `d`: nothing is left in the difference that an
 /// estimator with both biases in its state could still use. White noise and walk of the pair are `σ₁σ₂/√(σ₁² + σ₂²)` and
-/// `q₁q₂/√(q₁² + q₂²)`, see [`noise`](Self::noise). The bias of the pair stays the same when the second sensor falls silent.
+/// `q₁q₂/√(q₁² + q₂²)`, see [`noise`](Self::noise). The bias of the pair stays the same when either sensor falls silent: the other goes on alone,
+/// the second at its own times.
 ///
 /// The force at a lever arm r is moved to the body: `f₁ = f₂ − α × r − ω × (ω × r)`, with α from the last two samples. Their
 /// noise enters as its difference, which integrates to nothing. Both sensors must be on one clock.
@@ -68,6 +69,8 @@ pub struct ImuPair {
     second: Vec<Imu>,
     /// The last sample read.
     last: Option<Imu>,
+    /// The latest sample of the first sensor.
+    newest: Option<Imu>,
 }
 
 /// One kind of sensor: the difference of the biases, and the weights.
@@ -108,13 +111,14 @@ impl BiasDifference {
         }
     }
 
-    /// What the pair reads; of the first sensor only, with the pair's bias, if the second is silent.
-    fn fuse(&self, first: Vector3<f64>, second: Option<Vector3<f64>>) -> Vector3<f64> {
-        let first = first - self.mean * self.share;
-        second.map_or(first, |second| {
-            let second = second + self.mean * (1.0 - self.share);
-            first + (second - first) * self.weight
-        })
+    /// What the pair reads; of one sensor only, with the pair's bias, if the other is silent.
+    fn fuse(&self, [first, second]: [Option<Vector3<f64>>; 2]) -> Vector3<f64> {
+        let first = first.map(|first| first - self.mean * self.share);
+        let second = second.map(|second| second + self.mean * (1.0 - self.share));
+        match (first, second) {
+            (Some(first), Some(second)) => first + (second - first) * self.weight,
+            (one, other) => one.or(other).unwrap_or_default(),
+        }
     }
 }
 
@@ -149,6 +153,7 @@ impl ImuPair {
             pending: Vec::with_capacity(MAX_PENDING + 1),
             second: Vec::with_capacity(MAX_PENDING + 1),
             last: None,
+            newest: None,
         })
     }
 
@@ -170,14 +175,16 @@ impl ImuPair {
         [self.gyro.share, self.accel.share]
     }
 
-    /// Takes a sample of the first sensor; stamps must increase.
+    /// Takes a sample of the first sensor; stamps must increase. One for which the second has stood in is left out.
     pub fn first(&mut self, sample: &Imu) -> Result<(), Error> {
-        let last = self.pending.last().or(self.last.as_ref());
-        sample.check_after(last)?;
+        sample.check_after(self.newest.as_ref())?;
         if self.pending.len() >= MAX_PENDING {
             return Err(Error::TooFew { what: "samples read from the pair while new ones came", got: 0, need: 1 });
         }
-        self.pending.push(*sample);
+        self.newest = Some(*sample);
+        if self.last.is_none_or(|last| sample.stamp > last.stamp) {
+            self.pending.push(*sample);
+        }
         Ok(())
     }
 
@@ -192,41 +199,63 @@ impl ImuPair {
         Ok(())
     }
 
-    /// The next sample of the pair, at the time of one of the first sensor and in its axes, if the second has got there or has
-    /// been waited for long enough.
+    /// The next sample of the pair in the axes of the first sensor: at the time of one of its samples, if the second has got there or has been
+    /// waited for long enough, and at that of one of the second while the first is late.
     pub fn read(&mut self) -> Option<Imu> {
-        let sample = *self.pending.first()?;
-        let newest = self.pending[self.pending.len() - 1].stamp;
-        let other = self.second_at(&sample);
-        let late = newest.secs_since(sample.stamp) >= self.settings.timeout_s;
-        if other.is_none() && !late {
-            return None;
-        }
-        self.pending.remove(0);
-        let dt = self.last.map_or(0.0, |last| sample.stamp.secs_since(last.stamp));
+        let (first, second) = self.due()?;
+        let stamp = first.or(second)?.stamp;
+        let dt = self.last.map_or(0.0, |last| stamp.secs_since(last.stamp));
         let rotation = self.settings.body_from_second.rotation;
-        let rate_2 = other.map(|other| rotation * other.gyro);
-        if let Some(rate_2) = &rate_2
+        let rates = [first.map(|first| first.gyro), second.map(|other| rotation * other.gyro)];
+        if let [Some(rate_1), Some(rate_2)] = &rates
             && dt > 0.0
         {
-            self.gyro.update(&sample.gyro, rate_2, dt);
+            self.gyro.update(rate_1, rate_2, dt);
         }
-        let gyro = self.gyro.fuse(sample.gyro, rate_2);
+        let gyro = self.gyro.fuse(rates);
         let angular = self.last.map_or(Vector3::zeros(), |last| (gyro - last.gyro) / dt);
         let lever = self.settings.body_from_second.translation.vector;
         let moved = angular.cross(&lever) + gyro.cross(&gyro.cross(&lever));
-        let force_2 = other.map(|other| rotation * other.accel - moved);
-        if let Some(force_2) = &force_2
+        let forces = [first.map(|first| first.accel), second.map(|other| rotation * other.accel - moved)];
+        if let [Some(force_1), Some(force_2)] = &forces
             && dt > 0.0
         {
-            self.accel.update(&sample.accel, force_2, dt);
+            self.accel.update(force_1, force_2, dt);
         }
-        let accel = self.accel.fuse(sample.accel, force_2);
-        let read = Imu { stamp: sample.stamp, gyro, accel };
+        let accel = self.accel.fuse(forces);
+        let read = Imu { stamp, gyro, accel };
         self.last = Some(read);
-        let used = self.second.partition_point(|other| other.stamp <= sample.stamp).saturating_sub(1);
+        let used = self.second.partition_point(|other| other.stamp <= stamp).saturating_sub(1);
         self.second.drain(..used);
         Some(read)
+    }
+
+    /// What both sensors read next, at the same time: one of them at least.
+    fn due(&mut self) -> Option<(Option<Imu>, Option<Imu>)> {
+        let Some(sample) = self.pending.first().copied() else {
+            return self.stand_in().map(|other| (None, Some(other)));
+        };
+        let other = self.second_at(&sample);
+        if other.is_none() && !self.is_done_without(&sample) {
+            return None;
+        }
+        self.pending.remove(0);
+        Some((Some(sample), other))
+    }
+
+    /// Whether the second sensor is not waited for at a sample of the first: long enough it was, or it has been silent before.
+    fn is_done_without(&self, sample: &Imu) -> bool {
+        let silent = |since: &Imu| {
+            self.newest.is_some_and(|newest| newest.stamp.secs_since(since.stamp) >= self.settings.timeout_s)
+        };
+        silent(sample) || self.second.last().is_some_and(silent)
+    }
+
+    /// The next sample of the second sensor, if the first is so late that it is not waited for.
+    fn stand_in(&self) -> Option<Imu> {
+        let late = self.second.last()?.stamp.secs_since(self.newest?.stamp) >= self.settings.timeout_s;
+        let last = self.last?.stamp;
+        self.second.iter().find(|other| late && other.stamp > last).copied()
     }
 
     /// What the second sensor reads at the time of a sample, if it has got there and was not silent before.

@@ -2,11 +2,11 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::{Isometry3, Matrix6, Vector3};
+use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3};
 
 use super::contradiction::{Contradiction, Verdict};
+use super::fault_isolation::FaultIsolation;
 use super::imu_pair::ImuPair;
-use super::inertial_check::InertialCheck;
 use super::map_pose::MapPose;
 use super::pose_measurement::PoseMeasurement;
 use super::unified::{UnifiedSettings, UnifiedVio};
@@ -41,8 +41,10 @@ pub struct MapAidedSettings {
     /// Poses in the map follow from each other if they are off by no more than this, by the inertial samples between them or at constant
     /// velocity where those have a gap, m and rad; 0.1, 0.1.
     pub jump: [f64; 2],
-    /// Inertial samples farther apart than this, s, end the odometry, and without one for so long it says nothing; 0.02.
+    /// Inertial samples farther apart than this, s, end the odometry, and without one for so long it is not trusted; 0.02.
     pub longest_gap_s: f64,
+    /// Two gyroscopes that differ by more than this in a tenth of a second, rad/s, contradict each other; 0.05.
+    pub gyro_difference: f64,
     /// A map that has jumped off an odometry and stays as far off it is believed after so long, s: until then it may be a place that looks like
     /// another; 6.
     pub longest_jump_s: f64,
@@ -66,6 +68,7 @@ impl Default for MapAidedSettings {
             contradiction: [0.02, 0.02],
             jump: [0.1, 0.1],
             longest_gap_s: 0.02,
+            gyro_difference: 0.05,
             longest_jump_s: 6.0,
             coast_s: 0.1,
             confirmations: 2,
@@ -96,8 +99,9 @@ const MOVING: f64 = 0.1;
 /// Inertial samples are kept for so long, s: a pose in the map comes no later than this, and the one before it is no older.
 const KEPT: f64 = 0.5;
 
-/// [`UnifiedVio`] in a stored map, with tests of what it is given: inertial samples that stand still or have gaps end the odometry at once. So
-/// do two poses in the map that follow from each other and contradict the expected ones, farther the second time; after the first the odometry is
+/// [`UnifiedVio`] in a stored map, with tests of what it is given. Inertial samples that stand still or have gaps end the odometry at once, and so
+/// do two gyroscopes that contradict each other; of two sensors, the sound one, or the one whose turns are the map's, then goes on alone. So do
+/// two poses in the map that follow from each other and contradict the expected ones, farther the second time; after the first the odometry is
 /// not trusted, but where little of the map is in view, or a place looks like another, the map may be the one that errs. The map's poses, moved
 /// on, stand in for an odometry that has ended, not to be trusted, until enough of them follow from each other; the odometry then starts anew.
 #[derive(Debug, Clone)]
@@ -106,10 +110,10 @@ pub struct MapAidedVio {
     settings: MapAidedSettings,
     pair: Option<ImuPair>,
     /// Of each sensor by itself: joined, the noise of one would hide that the other stands still.
-    imu: InertialCheck,
-    second_imu: InertialCheck,
-    /// The latest inertial samples, as far back as they can be believed.
+    isolation: FaultIsolation,
+    /// The latest inertial samples, of both sensors where there are two, as far back as they can be believed, and the time of the last one.
     recent: VecDeque<Imu>,
+    newest: Option<Stamp>,
     gravity: f64,
     /// When the map confirmed the odometry last, and how many times it has to before that is trusted.
     confirmed: Option<Stamp>,
@@ -129,14 +133,16 @@ impl MapAidedVio {
     pub fn new(camera: impl CameraModel + 'static, vio: Settings, settings: MapAidedSettings) -> Result<Self, Error> {
         let pair = settings.unified.imu_pair.map(ImuPair::new).transpose()?;
         let noise = pair.as_ref().map_or(settings.unified.imu, ImuPair::noise);
+        let second =
+            settings.unified.imu_pair.map_or_else(UnitQuaternion::identity, |pair| pair.body_from_second.rotation);
         let unified = UnifiedSettings { imu: noise, imu_pair: None, ..settings.unified };
         Ok(Self {
             vio: UnifiedVio::new(camera, vio, unified)?,
             settings,
             pair,
-            imu: InertialCheck::default(),
-            second_imu: InertialCheck::default(),
+            isolation: FaultIsolation::new(second, settings.gyro_difference),
             recent: VecDeque::new(),
+            newest: None,
             gravity: vio.gravity,
             confirmed: None,
             to_confirm: 0,
@@ -173,49 +179,79 @@ impl MapAidedVio {
     /// # Errors
     /// As [`UnifiedVio::imu`].
     pub fn imu(&mut self, sample: &Imu) -> Result<(), Error> {
-        if let Some(pair) = &mut self.pair {
-            pair.first(sample)?;
-        } else {
-            self.vio.imu(sample)?;
-        }
-        if !self.imu.is_sound(sample, self.settings.longest_gap_s) {
-            self.recent.clear();
-            if self.recovering.is_none() {
-                self.give_up();
+        let believed = self.check(0, sample);
+        let Some(pair) = &mut self.pair else {
+            self.take(sample)?;
+            // It is all there is.
+            if !believed {
+                self.forget_samples();
             }
-        }
-        if self.pair.is_none() {
-            self.keep(sample);
+            return Ok(());
+        };
+        if believed {
+            pair.first(sample)?;
         }
         self.drain_pair()
     }
 
-    /// Takes a sample of the second inertial sensor, in its own axes; left out while an axis of it stands still.
+    /// Takes a sample of the second inertial sensor, in its own axes.
     ///
     /// # Errors
     /// As [`UnifiedVio::second_imu`].
     pub fn second_imu(&mut self, sample: &Imu) -> Result<(), Error> {
-        let none = Error::NoSuch { what: "inertial sensor", index: 1, count: 1 };
-        let pair = self.pair.as_mut().ok_or(none)?;
-        if self.second_imu.is_sound(sample, f64::INFINITY) {
+        if self.pair.is_none() {
+            return Err(Error::NoSuch { what: "inertial sensor", index: 1, count: 1 });
+        }
+        if self.check(1, sample)
+            && let Some(pair) = &mut self.pair
+        {
             pair.second(sample)?;
         }
         self.drain_pair()
     }
 
+    /// Whether a sample of a sensor is believed.
+    fn check(&mut self, which: usize, sample: &Imu) -> bool {
+        let before = self.isolation.believed();
+        self.isolation.take(which, sample, KEPT);
+        self.isolate(before)[which]
+    }
+
+    /// Which sensors are believed. Where one no longer is, what the odometry has read of it lately is not either.
+    fn isolate(&mut self, before: [bool; 2]) -> [bool; 2] {
+        let believed = self.isolation.believed();
+        if (0..2).any(|k| before[k] && !believed[k]) {
+            self.forget_samples();
+        }
+        believed
+    }
+
     fn drain_pair(&mut self) -> Result<(), Error> {
         while let Some(sample) = self.pair.as_mut().and_then(ImuPair::read) {
-            self.vio.imu(&sample)?;
-            self.keep(&sample);
+            self.take(&sample)?;
         }
         Ok(())
     }
 
-    fn keep(&mut self, sample: &Imu) {
+    fn take(&mut self, sample: &Imu) -> Result<(), Error> {
+        self.vio.imu(sample)?;
+        let gap = self.newest.replace(sample.stamp).map_or(0.0, |newest| sample.stamp.secs_since(newest));
+        if gap > self.settings.longest_gap_s {
+            self.forget_samples();
+        }
         self.recent.push_back(*sample);
         // One is kept that is older.
         while self.recent.get(1).is_some_and(|second| sample.stamp.secs_since(second.stamp) > KEPT) {
             self.recent.pop_front();
+        }
+        Ok(())
+    }
+
+    /// What has come lately is not believed.
+    fn forget_samples(&mut self) {
+        self.recent.clear();
+        if self.recovering.is_none() {
+            self.give_up();
         }
     }
 
@@ -238,6 +274,12 @@ impl MapAidedVio {
             return Ok(false);
         };
         let pose = self.map_pose(self.last, found);
+        if let Some(last) = self.last {
+            let before = self.isolation.believed();
+            let turn = last.world_from_body.rotation.inverse() * pose.world_from_body.rotation;
+            self.isolation.map_turn([last.stamp, pose.stamp], &turn);
+            self.isolate(before);
+        }
         let follows = self.last.is_some_and(|last| {
             let expected = last.later_by(pose.stamp, &self.recent, self.gravity);
             agree(&expected, &pose.world_from_body, self.settings.jump)
@@ -306,7 +348,7 @@ impl MapAidedVio {
     /// Where the body is now; `None` before the start, and where nothing recent says so.
     pub fn pose(&self, now: Stamp) -> Option<AidedPose> {
         let Self { settings, source, .. } = self;
-        let silence = self.imu.last().map_or(f64::INFINITY, |last| now.secs_since(last));
+        let silence = self.newest.map_or(f64::INFINITY, |newest| now.secs_since(newest));
         if silence > settings.coast_s || self.recovering.is_some() {
             let last = self.last.filter(|last| now.secs_since(last.stamp) <= settings.trusted_age_s)?;
             let world_from_body = last.later_by(now, &self.recent, self.gravity);
@@ -322,7 +364,7 @@ impl MapAidedVio {
         let odometry = self.vio.output()?;
         let Odometry { stamp, covariance, .. } = odometry;
         let silent = silence > settings.longest_gap_s;
-        let world_from_body = if silent { odometry.moved_on(now) } else { odometry.world_from_body };
+        let world_from_body = odometry.moved_on(now);
         let deviation = |first| largest_deviation(&covariance.fixed_view::<3, 3>(first, first).into_owned());
         let [position_sigma_m, attitude_sigma_rad] = [0, 6].map(deviation);
         let age = self.confirmed.map_or(f64::INFINITY, |confirmed| stamp.secs_since(confirmed));

@@ -154,4 +154,57 @@ fn a_second_sensor_is_silent_after_its_time_and_not_before() {
     };
     assert!(read(0.5) > 0.1, "{}", read(0.5));
     assert_eq!(read(0.501), 0.0);
+    // One that has been silent for so long already is not waited for.
+    let settings = ImuPairSettings { timeout_s: 0.01, ..ImuPairSettings::default() };
+    let mut pair = ImuPair::new(settings).unwrap();
+    let at = |millis: i64| Imu {
+        stamp: Stamp::from_nanos(1_000_000 * millis),
+        gyro: Vector3::zeros(),
+        accel: Vector3::new(0.0, 0.0, 9.81),
+    };
+    pair.second(&at(0)).unwrap();
+    for (millis, waits) in [(5, true), (10, false), (15, false)] {
+        pair.first(&at(millis)).unwrap();
+        assert_eq!(pair.read().is_none(), waits, "{millis}");
+        while pair.read().is_some() {}
+    }
+}
+
+/// Of a body that turns; the first sensor is silent for a second, and what it says late of it is left out.
+#[test]
+fn the_second_sensor_stands_in_for_a_silent_first() {
+    let models = models();
+    let flight = Flight::new(3, 20.0);
+    let recordings = [0, 1].map(|k| models[k].record(&flight.spline, GRAVITY, 3 + k as u64).unwrap());
+    let [first, second] = &recordings;
+    let mut pair = ImuPair::new(settings(&models)).unwrap();
+    let shares = pair.bias_shares();
+    let [from, until] = [2000, 2200].map(|k| first.samples[k].stamp);
+    let mut others = second.samples.iter().peekable();
+    let mut read: Vec<Imu> = vec![];
+    for (k, sample) in first.samples.iter().enumerate().take(4000) {
+        match k {
+            2000..2200 => {}
+            // All at once.
+            2200 => first.samples[2000..=2200].iter().for_each(|late| pair.first(late).unwrap()),
+            _ => pair.first(sample).unwrap(),
+        }
+        while let Some(other) = others.next_if(|other| other.stamp <= sample.stamp) {
+            pair.second(other).unwrap();
+            read.extend(std::iter::from_fn(|| pair.read()));
+        }
+    }
+    assert!(read.windows(2).all(|two| two[1].stamp > two[0].stamp && two[1].stamp.secs_since(two[0].stamp) < 0.011));
+    let within: Vec<&Imu> = read.iter().filter(|sample| sample.stamp > from && sample.stamp < until).collect();
+    assert!(within.len() > 150, "{}", within.len());
+    // The same bias as before, with the second's noise: over a second that leaves 2e-4 rad/s and 2e-3 m/s².
+    let turn = models[1].body_from_imu.rotation;
+    let off = |sample: &&Imu| {
+        let motion = flight.spline.sample(sample.stamp).unwrap();
+        let bias = bias(&recordings, &turn, shares, sample.stamp);
+        [sample.gyro - motion.rate_in_body - bias[0], sample.accel - motion.specific_force(GRAVITY) - bias[1]]
+    };
+    let mean = |k: usize| within.iter().map(|sample| off(sample)[k]).sum::<Vector3<f64>>() / within.len() as f64;
+    let [gyro, accel] = [0, 1].map(|k| mean(k).amax());
+    assert!(gyro < 8e-4 && accel < 0.02, "{gyro} {accel}");
 }

@@ -269,37 +269,92 @@ fn in_motion_it_starts_again_with_the_velocity_of_the_moment() {
     assert!(most < 0.01, "{most} m");
 }
 
-/// The first of two sensors at the end of its range ends the odometry, however the second hums; the second is done without.
-#[test]
-fn an_axis_of_one_of_two_sensors_that_stands_still_is_seen() {
+/// A body that stands, with two sensors of which `sample` gives what each reads at a millisecond, `None` where it is silent. What is known at each
+/// sample from the start on; with `map`, every tenth of a second a pose in the map says that it has not moved.
+fn two_sensors(millis: i64, map: bool, sample: impl Fn(i64, usize) -> Option<Imu>) -> Vec<Option<AidedPose>> {
     let camera = Camera { width: SIZE.0, height: SIZE.1, fx: 100.0, fy: 100.0, cx: 80.0, cy: 60.0, ..Camera::euroc() };
     let pair = ImuPairSettings { timeout_s: 0.01, ..ImuPairSettings::default() };
-    let fly = |clipped: [bool; 2]| {
-        let unified = UnifiedSettings { imu_pair: Some(pair), ..UnifiedSettings::default() };
-        let settings = MapAidedSettings { unified, ..MapAidedSettings::default() };
-        let mut vio = MapAidedVio::new(camera, Settings::default(), settings).unwrap();
-        let sample = |millis: i64, which: usize| {
-            let hum = 1e-4 * ((0.7 + which as f64) * millis as f64).sin();
-            let z = if clipped[which] && millis > 400 { 9.0 } else { 9.81 + hum };
-            Imu { stamp: at(millis), gyro: Vector3::repeat(hum), accel: Vector3::new(hum, -hum, z) }
-        };
-        for millis in (5..=700).step_by(5) {
-            vio.imu(&sample(millis, 0)).unwrap();
-            vio.second_imu(&sample(millis, 1)).unwrap();
-            if millis == 100 {
-                let found = PoseMeasurement::isotropic(0, at(millis), Isometry3::identity(), 1e-3, 1e-3);
-                vio.start(&found).unwrap();
-            }
-            // Three equal readings are one too many; the sample before says nothing yet.
-            let lost = vio.pose(at(millis)).is_none_or(|pose| pose.from_map);
-            assert!(millis <= 100 || lost == (clipped[0] && millis > 415), "{clipped:?}: {millis}");
+    let unified = UnifiedSettings { imu_pair: Some(pair), ..UnifiedSettings::default() };
+    let settings = MapAidedSettings { unified, ..MapAidedSettings::default() };
+    let mut vio = MapAidedVio::new(camera, Settings::default(), settings).unwrap();
+    let mut known = Vec::new();
+    for now in (SAMPLE..=millis).step_by(SAMPLE as usize) {
+        if let Some(first) = sample(now, 0) {
+            vio.imu(&first).unwrap();
         }
-        vio.pose(at(700)).map(|pose| pose.world_from_body.translation.vector)
-    };
-    fly([true, false]);
-    // Two samples of 0.8 m/s², halved, are 4 mm/s.
-    for clipped in [[false, true], [false, false]] {
-        assert!(fly(clipped).unwrap().norm() < 4e-3, "{clipped:?}");
+        if let Some(second) = sample(now, 1) {
+            vio.second_imu(&second).unwrap();
+        }
+        let found = PoseMeasurement::isotropic(0, at(now), Isometry3::identity(), 1e-3, 1e-3);
+        if now == 100 {
+            vio.start(&found).unwrap();
+        } else if map && now % POSE == 0 {
+            let expected = vio.pose(at(now));
+            vio.map(Some(&found), expected.as_ref()).unwrap();
+        }
+        if now >= 100 {
+            known.push(vio.pose(at(now)));
+        }
+    }
+    known
+}
+
+/// No two samples are the same, nor are the two sensors.
+fn standing(millis: i64, which: usize) -> Imu {
+    let hum = 1e-4 * ((0.7 + which as f64) * millis as f64).sin();
+    Imu { stamp: at(millis), gyro: Vector3::repeat(hum), accel: Vector3::new(hum, -hum, 9.81 + hum) }
+}
+
+/// At the end of its range it ends the odometry, however the other hums: what was read of it until then is wrong. The other goes on alone.
+#[test]
+fn an_axis_of_one_of_two_sensors_that_stands_still_is_seen() {
+    for clipped in [0, 1] {
+        let known = two_sensors(3000, true, |millis, which| {
+            let mut sample = standing(millis, which);
+            if which == clipped && millis > 400 {
+                sample.accel.z = 9.0;
+            }
+            Some(sample)
+        });
+        let from_map = |millis: i64| known[((millis - 100) / SAMPLE) as usize].unwrap().from_map;
+        // Three equal readings are one too many; two poses in the map with all samples between start it again.
+        assert!((105..3000).step_by(5).all(|millis| from_map(millis) == (420..600).contains(&millis)), "{clipped}");
+        let AidedPose { trusted, world_from_body, .. } = known.last().unwrap().unwrap();
+        assert!(trusted && world_from_body.translation.vector.norm() < 2e-3, "{clipped}: {world_from_body}");
+    }
+}
+
+/// Samples that are missing, or late for half a second and then come all at once.
+#[test]
+fn one_of_two_sensors_is_done_without() {
+    for silent in [0, 1] {
+        let known = two_sensors(2000, true, |millis, which| {
+            (which != silent || !(400..1500).contains(&millis)).then(|| standing(millis, which))
+        });
+        let odometry = |pose: &Option<AidedPose>| pose.is_some_and(|pose| !pose.from_map && pose.source == 1);
+        assert!(known.iter().all(odometry), "{silent}");
+        assert!(known.last().unwrap().unwrap().trusted);
+    }
+}
+
+/// A gyroscope that reads another axis' rate: the body stands, and the map says which of them is right.
+#[test]
+fn of_two_gyroscopes_that_contradict_each_other_one_is_believed() {
+    for wrong in [0, 1] {
+        let known = two_sensors(4000, true, |millis, which| {
+            let mut sample = standing(millis, which);
+            if which == wrong && (1000..2000).contains(&millis) {
+                sample.gyro.x += 0.3;
+            }
+            Some(sample)
+        });
+        let at = |millis: i64| known[((millis - 100) / SAMPLE) as usize].unwrap();
+        assert!(at(1000).trusted);
+        let most =
+            known.iter().flatten().map(|pose| pose.world_from_body.translation.vector.norm()).fold(0.0, f64::max);
+        let turn = known.iter().flatten().map(|pose| pose.world_from_body.rotation.angle()).fold(0.0, f64::max);
+        assert!(most < 0.01 && turn < 0.05, "{wrong}: {most} m, {turn} rad");
+        assert!(!at(1990).from_map && at(3500).trusted, "{wrong}");
     }
 }
 
