@@ -24,10 +24,9 @@ pub(super) fn counted_flight(plan: &Plan, robot: &Robot, settings: &MissionSetti
     let usual = usual_flight(plan, robot, settings, layer);
     // Paint that misses by less than the spot is wide is better than none. The flights beside it are flown to see what they miss by, so
     // nothing shuts their valve.
-    let interlock = Interlock { miss: settings.spot, ..Interlock::default() };
     FlightSettings {
         localisation: localisation_noise(settings, usual.localisation),
-        valve: Valve { interlock: Some(interlock), ..usual.valve },
+        valve: Valve { interlock: Some(Interlock::within(settings.spot)), ..usual.valve },
         faults: settings.faults,
         ptu_locked: settings.path_planner.locks_gun(),
         longest_without_pose: Some(LONGEST_WITHOUT_POSE),

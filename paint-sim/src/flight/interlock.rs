@@ -27,7 +27,16 @@ impl Default for Interlock {
     }
 }
 
+/// Share of a spot that is left for what the prediction errs between a decision and its effect (ours).
+const PREDICTED: f64 = 0.2;
+
 impl Interlock {
+    /// So that no paint leaves more than a spot's deviation, m, beside its aim.
+    #[must_use]
+    pub fn within(spot: f64) -> Self {
+        Self { miss: (1.0 - PREDICTED) * spot, ..Self::default() }
+    }
+
     pub(super) fn check(&self) -> Result<(), Error> {
         check_positive("valve.interlock.miss", self.miss)?;
         check_positive("valve.interlock.distance", self.distance)

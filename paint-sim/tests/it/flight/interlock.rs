@@ -114,6 +114,20 @@ fn a_locked_gun_paints_only_where_it_happens_to_aim() {
     assert!(log.samples.iter().any(|s| beyond(s) && s.flow > 0.0), "nothing to prevent");
 }
 
+/// The same with a valve that is late: what is left for the prediction is enough.
+#[test]
+fn no_paint_leaves_more_than_a_spot_beside_its_aim() {
+    let reference = Ellipse { duration: 20.0 };
+    let (spot, valve) = (0.035, Valve { interlock: Some(Interlock::within(0.035)), ..Valve::default() });
+    for seed in 0..10 {
+        let locked = FlightSettings { ptu_locked: true, valve, ..outdoors(seed) };
+        let log = fly(&reference, &mut arm(), &wall(), &locked).unwrap();
+        let miss = |s: &FlightSample| (s.aim.unwrap() - s.nozzle).cross(&s.axis).norm();
+        let most = log.samples.iter().filter(|s| s.flow > 0.0).map(miss).fold(0.0, f64::max);
+        assert!(most > 0.5 * spot && most <= spot, "{seed}: {most} m");
+    }
+}
+
 #[test]
 fn stuck_servos_and_gusts_beyond_the_limits_shut_the_valve() {
     let gust = Gust { time: 3.0, velocity: Vector3::new(3.0, -18.0, 0.0) };
