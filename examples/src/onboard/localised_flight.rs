@@ -6,7 +6,7 @@ use std::time::Duration;
 use cpu_time::ThreadTime;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use paint_sim::Error;
-use paint_sim::flight::multirotor::{Imu, ImuReading, ImuSettings};
+use paint_sim::flight::multirotor::{Imu, ImuSettings};
 use paint_sim::flight::{FlightSample, GRAVITY, LocalisedPose, PoseSource, Vehicle};
 use tsdf_hash::slam::SlamState;
 use vio_ekf::Stamp;
@@ -99,8 +99,8 @@ pub struct LocalisedFlight<'a> {
     offset: Option<i64>,
     captured: usize,
     faults: Vec<FaultInterval>,
-    /// Inertial samples that are late.
-    late: VecDeque<Arriving<vio_ekf::Imu>>,
+    /// Inertial samples that are late, of the camera's sensor and of the vehicle's.
+    late: [VecDeque<Arriving<vio_ekf::Imu>>; 2],
     figures: LocalisationFigures,
 }
 
@@ -139,7 +139,7 @@ impl<'a> LocalisedFlight<'a> {
             offset: None,
             captured: 0,
             faults: Vec::new(),
-            late: VecDeque::new(),
+            late: Default::default(),
             figures: LocalisationFigures::default(),
         })
     }
@@ -212,26 +212,24 @@ impl<'a> LocalisedFlight<'a> {
     fn sense_motion(&mut self, ms: i64, truth: &Vehicle) -> Result<(), LocalisationError> {
         let reading = self.imu.measure(&truth.velocity, &truth.rotation(), 1e-3 * INERTIAL_MS as f64);
         let of_vehicle = self.vehicle_imu.measure(&truth.velocity, &truth.rotation(), 1e-3 * INERTIAL_MS as f64);
-        let sample = |reading: ImuReading| vio_ekf::Imu {
-            stamp: stamp(ms),
-            gyro: reading.angular_velocity,
-            accel: reading.specific_force,
-        };
-        // Faults are those of the camera's.
-        let fault = self.fault(ms);
-        let first = fault.map_or(Some(sample(reading)), |fault| fault.inertial(sample(reading)));
-        let delay = if let Some(SensorFault::LateMotion(delay)) = fault { delay } else { 0 };
-        if delay == 0 {
-            self.late.iter_mut().for_each(|late| late.at = ms);
-        }
-        self.late.extend(first.map(|what| Arriving { at: ms + delay, taken: ms, what }));
         let cpu = ThreadTime::now();
         let mut done = Ok(());
-        while let Some(Arriving { what, .. }) = self.late.pop_front_if(|late| late.at <= ms) {
-            done = done.and_then(|()| self.onboard.imu(&what));
-        }
-        if self.bridging == Bridging::BothImus {
-            done = done.and_then(|()| self.onboard.second_imu(&sample(of_vehicle)));
+        for (which, reading) in [reading, of_vehicle].into_iter().enumerate() {
+            let sample =
+                vio_ekf::Imu { stamp: stamp(ms), gyro: reading.angular_velocity, accel: reading.specific_force };
+            let interval = self.faults.iter().find(|fault| fault.when.contains(&ms));
+            let fault = interval.filter(|fault| fault.of_vehicle == (which == 1)).map(|fault| fault.fault);
+            let late = &mut self.late[which];
+            let delay = if let Some(SensorFault::LateMotion(delay)) = fault { delay } else { 0 };
+            let sample = fault.map_or(Some(sample), |fault| fault.inertial(sample));
+            late.extend(sample.map(|what| Arriving { at: ms + delay, taken: ms, what }));
+            while let Some(Arriving { what, .. }) = late.pop_front_if(|late| delay == 0 || late.at <= ms) {
+                if which == 0 {
+                    done = done.and_then(|()| self.onboard.imu(&what));
+                } else if self.bridging == Bridging::BothImus {
+                    done = done.and_then(|()| self.onboard.second_imu(&what));
+                }
+            }
         }
         self.figures.cpu += cpu.elapsed();
         done

@@ -42,6 +42,8 @@ impl SensorFault {
 pub struct FaultInterval {
     /// What.
     pub fault: SensorFault,
+    /// One of inertial samples is that of the vehicle's own sensor instead of the camera's.
+    pub of_vehicle: bool,
     /// When.
     pub when: std::ops::Range<i64>,
 }

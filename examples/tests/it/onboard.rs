@@ -108,7 +108,7 @@ fn fly_bridged(
     seed: u64,
 ) -> Result<(FlightLog, LocalisationFigures, PaintedFront), Error> {
     let from = BEFORE + 1500;
-    let fault = fault.map(|(fault, duration)| FaultInterval { fault, when: from..from + duration });
+    let fault = fault.map(|(fault, duration)| FaultInterval { fault, of_vehicle: false, when: from..from + duration });
     fly_faulty(&Stroke(surface), surface, fault.into_iter().collect(), paint, bridging, seed)
 }
 
@@ -125,7 +125,7 @@ pub(crate) fn fly_faulty(
     let camera = SimulatedCamera::new(surface, Vector3::x(), 1, 1).before(paint);
     let onboard = LocalisedFlight::bridged(camera, read_map(map()).unwrap(), seed + 4, bridging).unwrap();
     let mut onboard = onboard.with_faults(faults);
-    let valve = Valve { interlock: Some(Interlock { miss: SPOT, ..Interlock::default() }), ..Valve::default() };
+    let valve = Valve { interlock: Some(Interlock::within(SPOT)), ..Valve::default() };
     let settings = FlightSettings { valve, settle: 1.0, seed, ..FlightSettings::default() };
     let mut controller = CascadedController::new(settings.airframe, ControllerSettings::default());
     let mut gun = IdealPanTilt::new(Point3::new(0.2, 0.0, 0.0), 0.3, [0.8; 2]).unwrap();
@@ -134,14 +134,15 @@ pub(crate) fn fly_faulty(
     Ok((approach.cut(log), onboard.figures(), onboard.into_paint().unwrap()))
 }
 
+/// By how much paint misses its aim, m, at each sample with paint; infinite where it meets nothing.
+pub(crate) fn misses(log: &FlightLog) -> impl Iterator<Item = f64> {
+    let sprays = log.samples.iter().filter(|sample| sample.flow > 0.0);
+    sprays.map(|sample| sample.hit.zip(sample.aim).map_or(f64::INFINITY, |(hit, aim)| (hit - aim).norm()))
+}
+
 /// Samples with paint that leaves more than a spot beside its aim, and with paint at all.
 pub(crate) fn astray(log: &FlightLog) -> (usize, usize) {
-    let sprays = || log.samples.iter().filter(|sample| sample.flow > 0.0);
-    let off = |sample: &&paint_sim::flight::FlightSample| {
-        let (Some(hit), Some(aim)) = (sample.hit, sample.aim) else { return true };
-        (hit - aim).norm() > SPOT
-    };
-    (sprays().filter(off).count(), sprays().count())
+    (misses(log).filter(|miss| *miss > SPOT).count(), misses(log).count())
 }
 
 /// The bounds are the goal of a painting flight; motion capture errs by about a millimetre.

@@ -7,7 +7,7 @@ use paintcopter::onboard::Bridging;
 use paintcopter::simulated_sensors::{FaultInterval, SensorFault};
 use paintcopter::world::CENTRE;
 
-use crate::onboard::{BEFORE, astray, bare, fly, fly_faulty, wall};
+use crate::onboard::{BEFORE, astray, bare, fly, fly_faulty, misses, wall};
 
 /// `cargo test --release -p paintcopter --all-features --test it -- --ignored --nocapture faults_of_sensors`
 #[test]
@@ -71,7 +71,7 @@ impl Reference for BackAndForth<'_> {
     }
 }
 
-/// Faults of random kinds, from .2 to 5 s long, two to a flight of 16 s; `FLIGHTS` of them (100), from `SEED` (1) on.
+/// Faults of random kinds, from .2 to 5 s long, those of inertial samples of either sensor, two to a flight of 16 s; `FLIGHTS` of them (100), from `SEED` (1) on.
 ///
 /// `FLIGHTS=100 cargo test --release -p paintcopter --all-features --test it -- --ignored --nocapture hundreds_of_sensor_faults`
 #[test]
@@ -96,7 +96,8 @@ fn hundreds_of_sensor_faults() {
             ];
             let from = BEFORE + 8000 * k + (3000.0 * random(40 + k)) as i64;
             let fault = kinds[(8.0 * random(50 + k)) as usize];
-            FaultInterval { fault, when: from..from + (200.0 * 25.0_f64.powf(random(60 + k))) as i64 }
+            let of_vehicle = random(70 + k) < 0.5;
+            FaultInterval { fault, of_vehicle, when: from..from + (200.0 * 25.0_f64.powf(random(60 + k))) as i64 }
         };
         let faults: Vec<_> = [0, 1].map(fault).into();
         let stroke = BackAndForth(&surface);
@@ -105,7 +106,9 @@ fn hundreds_of_sensor_faults() {
             Ok((log, figures, _)) => {
                 let (astray, sprayed) = astray(log);
                 let share = sprayed as f64 / log.samples.len() as f64;
-                (astray, format!("{share:.2} sprayed, error {:.4} m", figures.position_error_rms_m()))
+                let error = figures.position_error_rms_m();
+                let most = misses(log).fold(0.0, f64::max);
+                (astray, format!("at most {most:.3} m, {share:.2} sprayed, position error {error:.4} m"))
             }
             Err(error) => (0, format!("{error}")),
         };
