@@ -32,5 +32,5 @@ pub use px4::Px4;
 pub use px4_folder::Px4Vehicle;
 pub use setpoint::Setpoint;
 pub use simulator_socket::SimulatorSocket;
-pub use telemetry::{Identity, Mode, Telemetry};
+pub use telemetry::{AttitudeTarget, Identity, Mode, Telemetry};
 pub use vehicle_link::VehicleLink;

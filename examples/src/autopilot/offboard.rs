@@ -131,6 +131,7 @@ impl OffboardLink {
         let fast = self.settings.telemetry_rate;
         let wanted = [
             (mavlink::dialects::common::ATTITUDE_QUATERNION_DATA::ID, fast),
+            (mavlink::dialects::common::ATTITUDE_TARGET_DATA::ID, self.settings.setpoint_rate),
             (mavlink::dialects::common::LOCAL_POSITION_NED_DATA::ID, 50.0),
             (mavlink::dialects::common::ESTIMATOR_STATUS_DATA::ID, fast),
             (mavlink::dialects::common::EXTENDED_SYS_STATE_DATA::ID, 5.0),

@@ -53,11 +53,11 @@ impl Px4Vehicle {
             ("MPC_THR_HOVER", self.hover_thrust),
             ("MPC_XY_VEL_MAX", 2.0 * self.max_speed),
             ("MPC_TILTMAX_AIR", tilt),
-            ("MPC_XY_P", 2.0),
+            ("MPC_XY_P", 3.0),
             ("MPC_XY_VEL_P_ACC", 4.0),
             ("MPC_XY_VEL_I_ACC", 1.5),
             ("MPC_XY_VEL_D_ACC", 0.3),
-            ("MPC_Z_P", 2.0),
+            ("MPC_Z_P", 3.0),
             ("MPC_Z_VEL_P_ACC", 6.0),
             ("MPC_TKO_SPEED", 0.7),
         ];

@@ -77,6 +77,17 @@ impl Mode {
     }
 }
 
+/// What an autopilot's position controller asks of its attitude controller.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AttitudeTarget {
+    /// When it has come, our clock, s.
+    pub at: f64,
+    /// Our frames.
+    pub attitude: UnitQuaternion<f64>,
+    /// Thrust, 0 to 1 of what the rotors can give.
+    pub thrust: f64,
+}
+
 /// What the autopilot takes for its state, and when it was heard.
 #[derive(Debug, Clone, Default)]
 pub struct Telemetry {
@@ -92,6 +103,8 @@ pub struct Telemetry {
     pub heartbeat: Option<f64>,
     /// Its attitude, our frames.
     pub attitude: Option<UnitQuaternion<f64>>,
+    /// The attitude that it aims for.
+    pub attitude_target: Option<AttitudeTarget>,
     /// Its position, our frames, m.
     pub position: Option<Point3<f64>>,
     /// Its velocity, our frames, m/s.
@@ -127,10 +140,14 @@ impl Telemetry {
         match message {
             MavMessage::ATTITUDE_QUATERNION(m) => {
                 self.stamp(now, f64::from(m.time_boot_ms) * 1e-3);
-                let q = Quaternion::new(m.q1, m.q2, m.q3, m.q4).cast::<f64>();
-                // Anything far from unit length, NaN too, is none.
-                if (q.norm() - 1.0).abs() < 0.1 {
-                    self.attitude = Some(frames::attitude(&UnitQuaternion::from_quaternion(q)));
+                if let Some(attitude) = attitude([m.q1, m.q2, m.q3, m.q4]) {
+                    self.attitude = Some(attitude);
+                }
+            }
+            MavMessage::ATTITUDE_TARGET(m) => {
+                let thrust = f64::from(m.thrust);
+                if let Some(attitude) = attitude(m.q).filter(|_| (0.0..=1.0).contains(&thrust)) {
+                    self.attitude_target = Some(AttitudeTarget { at: now, attitude, thrust });
                 }
             }
             MavMessage::LOCAL_POSITION_NED(m) => {
@@ -207,12 +224,18 @@ impl Telemetry {
     }
 }
 
+/// From a quaternion of MAVLink, w first; anything far from unit length, NaN too, is none.
+fn attitude([w, x, y, z]: [f32; 4]) -> Option<UnitQuaternion<f64>> {
+    let q = Quaternion::new(w, x, y, z).cast::<f64>();
+    ((q.norm() - 1.0).abs() < 0.1).then(|| frames::attitude(&UnitQuaternion::from_quaternion(q)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::codec::{Decoder, Encoder};
     use super::super::offboard::{OffboardLink, OffboardSettings};
     use super::*;
-    use mavlink::dialects::common::{ATTITUDE_QUATERNION_DATA, ESTIMATOR_STATUS_DATA};
+    use mavlink::dialects::common::{ATTITUDE_QUATERNION_DATA, ATTITUDE_TARGET_DATA, ESTIMATOR_STATUS_DATA};
     use paint_planner::onboard::{Cause, FailsafeSettings};
 
     #[test]
@@ -254,6 +277,30 @@ mod tests {
         };
         assert_eq!(told(all), Some(true));
         assert!(parts.iter().all(|part| told(all - *part) == Some(false)));
+    }
+
+    #[test]
+    fn what_the_autopilot_aims_for_is_taken_in_our_frames_or_not_at_all() {
+        let told = |q: [f32; 4], thrust: f32| {
+            let (mut telemetry, header) =
+                (Telemetry::default(), MavHeader { system_id: 1, component_id: 1, sequence: 0 });
+            let autopilot = HEARTBEAT_DATA { autopilot: MavAutopilot::MAV_AUTOPILOT_PX4, ..HEARTBEAT_DATA::default() };
+            let target = ATTITUDE_TARGET_DATA { q, thrust, ..ATTITUDE_TARGET_DATA::default() };
+            for message in [MavMessage::HEARTBEAT(autopilot), MavMessage::ATTITUDE_TARGET(target)] {
+                telemetry.receive(1.5, &header, &message);
+            }
+            telemetry.attitude_target
+        };
+        // Facing north, nose down by 20 degrees: positive pitch here, negative there.
+        let half = 10.0_f32.to_radians();
+        let AttitudeTarget { at, attitude, thrust } = told([half.cos(), 0.0, -half.sin(), 0.0], 0.625).unwrap();
+        let (roll, pitch, yaw) = attitude.euler_angles();
+        assert!(at == 1.5 && thrust == 0.625);
+        assert!(roll.abs() < 1e-6 && (pitch - 20.0_f64.to_radians()).abs() < 1e-6, "{roll} {pitch}");
+        assert!((yaw - std::f64::consts::FRAC_PI_2).abs() < 1e-6, "{yaw}");
+        for (q, thrust) in [([0.0; 4], 0.5), ([f32::NAN, 0.0, 0.0, 0.0], 0.5), ([1.0, 0.0, 0.0, 0.0], f32::NAN)] {
+            assert_eq!(told(q, thrust), None);
+        }
     }
 
     /// Restart and jump, from the messages themselves.

@@ -126,7 +126,7 @@ impl Px4Flight<'_, '_, '_> {
         let pose = self.robot.pose()?;
         if let Some(program) = self.failing(FaultKind::Program).map(|fault| fault.at) {
             let estimated = self.on_board.estimated_position().unwrap_or(vehicle.position);
-            self.recorder.line(now, &vehicle, &estimated, &"no on-board program");
+            self.recorder.line(now, &vehicle, [Some(estimated), None], &"no on-board program");
             let down = self.motors.iter().all(|motor| *motor == 0.0);
             return Ok(match self.hard_landing() {
                 Some(failed) => failed,

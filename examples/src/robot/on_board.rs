@@ -4,8 +4,8 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 use paint_planner::onboard::{Cause, FailsafeSettings, Phase, Phases, Situation};
 use paint_sim::flight::{
-    Airframe, CascadedController, Command, Controller as _, ControllerSettings, Estimator, GRAVITY, InterlockInput,
-    InterlockState, LocalisedPose, ObserverSettings, PanTilt, Reference, ReferenceState, Valve,
+    Airframe, CascadedController, Command, Controller as _, ControllerSettings, Estimate, Estimator, GRAVITY,
+    InterlockInput, InterlockState, LocalisedPose, ObserverSettings, PanTilt, Reference, ReferenceState, Valve,
 };
 
 use super::guided_reference::{GuidedReference, ReferencePlan};
@@ -14,9 +14,13 @@ use crate::autopilot::{MavMessage, Odometry, OffboardLink, OffboardSettings, Set
 
 /// Time of a control step, s.
 pub(super) const CONTROL_STEP: f64 = 0.01;
+/// What the autopilot aimed for longer ago than this, s, it no longer aims for.
+const LONGEST_SILENCE: f64 = 0.1;
 /// A pose that is farther from the one before than the fastest robot flies has jumped: m, and m/s.
 const JUMP: f64 = 0.05;
 const FASTEST: f64 = 3.0;
+/// The autopilot is told of no more than this, m/s^2: a stronger one is a jump of the localisation.
+const STRONGEST: f64 = 2.0;
 
 /// Gains on an autopilot whose attitude loop is slower and of higher order than the controller's model: a third of its bandwidth.
 const CONTROLLER: ControllerSettings =
@@ -223,8 +227,7 @@ impl<'a> OnBoard<'a> {
                 },
             });
         };
-        let estimator = self.estimator.as_mut()?;
-        let estimate = *estimator.estimate();
+        let estimate = *self.estimator.as_ref()?.estimate();
         let wanted = guided.at(now);
         let (setpoint, command) = match self.settings.setpoints {
             SetpointKind::Attitude => {
@@ -234,23 +237,38 @@ impl<'a> OnBoard<'a> {
                 (Setpoint::leaning(command.roll, command.pitch, yaw, wanted.heading, thrust), command)
             }
             SetpointKind::Trajectory => {
+                // The autopilot knows of wind and hose only what its own error tells.
+                let disturbance = estimate.disturbance.cap_magnitude(STRONGEST);
                 let setpoint = Setpoint::Trajectory {
                     position: wanted.position,
                     velocity: wanted.velocity,
-                    acceleration: wanted.acceleration,
+                    acceleration: wanted.acceleration - disturbance,
                     heading: wanted.heading,
                 };
-                // What the autopilot commands is not known: the observer takes it to keep the attitude.
-                let [roll, pitch, _] = estimate.attitude;
-                let Airframe { mass, roll_gain, pitch_gain, .. } = self.settings.airframe;
-                let thrust = mass * GRAVITY / (roll.cos() * pitch.cos()).max(0.5);
-                let command =
-                    Command { roll: roll / roll_gain, pitch: pitch / pitch_gain, yaw_rate: estimate.yaw_rate, thrust };
+                let command = self.autopilots_command(now, &estimate);
                 (setpoint, command)
             }
         };
-        estimator.set_command(command);
+        self.estimator.as_mut()?.set_command(command);
         Some(setpoint)
+    }
+
+    /// What the autopilot's position controller commands, by what it says or, where it says nothing, by the attitude that it keeps.
+    fn autopilots_command(&self, now: f64, estimate: &Estimate) -> Command {
+        let Airframe { mass, roll_gain, pitch_gain, .. } = self.settings.airframe;
+        let weight = mass * GRAVITY;
+        let told = self.link.telemetry().attitude_target.filter(|target| now - target.at <= LONGEST_SILENCE);
+        let [roll, pitch, thrust] = told.map_or_else(
+            || {
+                let [roll, pitch, _] = estimate.attitude;
+                [roll / roll_gain, pitch / pitch_gain, weight / (roll.cos() * pitch.cos()).max(0.5)]
+            },
+            |target| {
+                let (roll, pitch, _) = target.attitude.euler_angles();
+                [roll, pitch, target.thrust / self.settings.hover_thrust * weight]
+            },
+        );
+        Command { roll, pitch, yaw_rate: estimate.yaw_rate, thrust }
     }
 
     /// Where the joints shall be, and whether the interlock permits paint.

@@ -38,7 +38,7 @@ impl<'a> Recorder<'a> {
     /// For a plan before what the spray meets.
     pub(super) fn new(plan: &'a dyn Reference, surface: &'a dyn Surface) -> Self {
         let track = String::from(
-            "time_s,x_m,y_m,z_m,vx_m_per_s,vy_m_per_s,vz_m_per_s,roll_rad,pitch_rad,yaw_rad,estimated_x_m,estimated_y_m,estimated_z_m,phase\n",
+            "time_s,x_m,y_m,z_m,vx_m_per_s,vy_m_per_s,vz_m_per_s,roll_rad,pitch_rad,yaw_rad,estimated_x_m,estimated_y_m,estimated_z_m,wanted_x_m,wanted_y_m,wanted_z_m,phase\n",
         );
         Self { plan, surface, painting: Vec::new(), ways: Vec::new(), track, steps: 0 }
     }
@@ -63,18 +63,21 @@ impl<'a> Recorder<'a> {
         } else if let Some(wanted) = on_board.wanted(now).filter(|_| on_board.phase().is_guarded()) {
             self.ways.push(measured(now, &wanted)?);
         }
-        self.line(now, vehicle, estimated, &on_board.phase());
+        let wanted = on_board.wanted(now).map(|wanted| wanted.position);
+        self.line(now, vehicle, [Some(*estimated), wanted], &on_board.phase());
         Ok(painted)
     }
 
-    /// A control step in the track alone.
-    pub(super) fn line(&mut self, now: f64, vehicle: &Vehicle, estimated: &Point3<f64>, phase: &dyn Display) {
+    /// A control step in the track alone, with where the vehicle takes itself to be and where it shall be, as far as there is such a place.
+    pub(super) fn line(&mut self, now: f64, vehicle: &Vehicle, places: [Option<Point3<f64>>; 2], phase: &dyn Display) {
         if self.steps.is_multiple_of(TRACK_STEPS) {
-            let (p, v, e, [roll, pitch, yaw]) = (vehicle.position, vehicle.velocity, estimated, vehicle.attitude);
-            let numbers = [now, p.x, p.y, p.z, v.x, v.y, v.z, roll, pitch, yaw, e.x, e.y, e.z];
-            let numbers = numbers.map(|value| format!("{value:.6}"));
+            let (p, v, [roll, pitch, yaw]) = (vehicle.position, vehicle.velocity, vehicle.attitude);
+            let numbers = [now, p.x, p.y, p.z, v.x, v.y, v.z, roll, pitch, yaw].map(|value| format!("{value:.6}"));
+            let place = |place: Option<Point3<f64>>| {
+                place.map_or_else(|| ",,".into(), |p| format!("{:.6},{:.6},{:.6}", p.x, p.y, p.z))
+            };
             // Writing to a string cannot fail.
-            let _ = writeln!(self.track, "{},{phase}", numbers.join(","));
+            let _ = writeln!(self.track, "{},{},{phase}", numbers.join(","), places.map(place).join(","));
         }
         self.steps += 1;
     }
@@ -92,7 +95,7 @@ pub struct Record {
     pub painting: FlightLog,
     /// Samples of the ways there and back and of holds, by the flight's time.
     pub ways: FlightLog,
-    /// Time, position, velocity, attitude, estimated position and phase of the whole flight, 20 rows a second, as a table (CSV).
+    /// Time, position, velocity, attitude, estimated and wanted position and phase of the whole flight, 20 rows a second, as a table (CSV).
     pub track: String,
     /// When each phase began.
     pub events: Vec<(f64, Phase)>,
