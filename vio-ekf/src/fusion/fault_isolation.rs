@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use nalgebra::UnitQuaternion;
 
 use super::inertial_check::InertialCheck;
+use crate::error::Error;
 use crate::samples::Imu;
 use crate::stamp::Stamp;
 
@@ -85,10 +86,13 @@ impl FaultIsolation {
         Self { sensors, body_from_second, difference, compared: None, contradicted: None, chosen: 1 }
     }
 
-    /// Takes a sample of a sensor in its own axes, to be kept for so long, s.
-    pub(super) fn take(&mut self, which: usize, sample: &Imu, kept_s: f64) {
-        self.sensors[which].take(sample, kept_s);
+    /// Takes a sample of a sensor in its own axes, to be kept for so long, s; refuses one that is not finite or not after the one before.
+    pub(super) fn take(&mut self, which: usize, sample: &Imu, kept_s: f64) -> Result<(), Error> {
+        let sensor = &mut self.sensors[which];
+        sample.check_after(sensor.recent.back())?;
+        sensor.take(sample, kept_s);
         self.compare();
+        Ok(())
     }
 
     /// Which sensors are believed: one that has failed not before it has been sound for a while, unless there is no other.
@@ -168,7 +172,11 @@ mod tests {
                     gyro.swap_rows(0, 1);
                 }
                 let accel = Vector3::new(hum, -hum, 9.81 + hum);
-                isolation.take(which, &Imu { stamp: at(millis), gyro, accel }, 0.5);
+                let sample = Imu { stamp: at(millis), gyro, accel };
+                isolation.take(which, &sample, 0.5).unwrap();
+                // What cannot be leaves no trace.
+                let none = Imu { stamp: at(millis + 1), gyro: Vector3::repeat(f64::NAN), accel };
+                assert!(isolation.take(which, &none, 0.5).is_err() && isolation.take(which, &sample, 0.5).is_err());
             }
             // Poses in the map are 60 ms late.
             if with_map && millis > 160 && (millis - 60) % 100 == 0 {

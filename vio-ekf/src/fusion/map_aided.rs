@@ -179,7 +179,7 @@ impl MapAidedVio {
     /// # Errors
     /// As [`UnifiedVio::imu`].
     pub fn imu(&mut self, sample: &Imu) -> Result<(), Error> {
-        let believed = self.check(0, sample);
+        let believed = self.check(0, sample)?;
         let Some(pair) = &mut self.pair else {
             self.take(sample)?;
             // It is all there is.
@@ -202,7 +202,7 @@ impl MapAidedVio {
         if self.pair.is_none() {
             return Err(Error::NoSuch { what: "inertial sensor", index: 1, count: 1 });
         }
-        if self.check(1, sample)
+        if self.check(1, sample)?
             && let Some(pair) = &mut self.pair
         {
             pair.second(sample)?;
@@ -211,10 +211,10 @@ impl MapAidedVio {
     }
 
     /// Whether a sample of a sensor is believed.
-    fn check(&mut self, which: usize, sample: &Imu) -> bool {
+    fn check(&mut self, which: usize, sample: &Imu) -> Result<bool, Error> {
         let before = self.isolation.believed();
-        self.isolation.take(which, sample, KEPT);
-        self.isolate(before)[which]
+        self.isolation.take(which, sample, KEPT)?;
+        Ok(self.isolate(before)[which])
     }
 
     /// Which sensors are believed. Where one no longer is, what the odometry has read of it lately is not either.
