@@ -62,7 +62,8 @@ fn px4_flies_the_plan_and_every_run_is_the_same() {
     for (folder, more) in [("first", ["--seconds", "4"]), ("second", ["--seconds", "4"])] {
         let (code, said) = fly(&s, &px4, folder, &more);
         assert_eq!(code, Some(0), "{said}");
-        assert!(figure(&s, folder, "hit_error_rms_m") < 0.02, "{folder}");
+        // An aim that does not know what PX4 is about to do misses by 6 mm.
+        assert!(figure(&s, folder, "hit_error_rms_m") < 0.0045, "{folder}");
         assert!(figure(&s, folder, "painted_s") > 3.9, "{folder}");
         for none in ["limit_violations", "collisions", "valve_open_late_count", "holds"] {
             assert_eq!(figure(&s, folder, none), 0.0, "{none} of {folder}");
