@@ -51,6 +51,24 @@ pub struct DepthView<'a> {
     pub intrinsics: Intrinsics,
 }
 
+impl DepthView<'_> {
+    /// The middle one of all depths, m; `None` of an image without any.
+    pub fn median(&self) -> Option<f64> {
+        let mut depths: Vec<f64> = match self.data {
+            DepthData::U16 { data, scale } => data
+                .iter()
+                .filter(|&&units| !matches!(units, 0 | u16::MAX))
+                .map(|&units| f64::from(units) / scale)
+                .collect(),
+            DepthData::F32 { data } => {
+                data.iter().filter(|depth| depth.is_finite() && **depth > 0.0).map(|&depth| f64::from(depth)).collect()
+            }
+        };
+        let middle = depths.len() / 2;
+        (!depths.is_empty()).then(|| *depths.select_nth_unstable_by(middle, f64::total_cmp).1)
+    }
+}
+
 /// Colour pixels, row-major, R G B.
 #[derive(Clone, Copy, Debug)]
 pub enum ColourData<'a> {
@@ -137,4 +155,18 @@ pub(crate) fn check_pose(world_from_camera: &Isometry3<f64>) -> Result<(), Error
         return Err(Error::InvalidPose { what: "its quaternion is not of unit length" });
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_is_of_what_has_a_depth() {
+        let intrinsics = Intrinsics { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0 };
+        let median = |data: DepthData| DepthView { width: 5, height: 1, data, intrinsics }.median();
+        assert_eq!(median(DepthData::U16 { data: &[0, 3000, 1000, 2000, u16::MAX], scale: 1000.0 }), Some(2.0));
+        assert_eq!(median(DepthData::F32 { data: &[f32::NAN, 0.5, 4.0, -1.0, 0.25] }), Some(0.5));
+        assert_eq!(median(DepthData::F32 { data: &[f32::NAN, 0.0, -1.0, f32::INFINITY, 0.0] }), None);
+    }
 }

@@ -64,7 +64,7 @@ impl ScanFlight {
             // The odometry does not read depth, but need not guess how far away the surface is at first.
             let before = sensor.capture(0, &(simulation.motion(first)?.world_from_body * camera.body_from_camera))?;
             let mut settings = vio_ekf::Settings::default();
-            if let Some(distance) = before.distance() {
+            if let Some(distance) = sensor.views(&before).depth().median() {
                 (settings.landmarks.inverse_distance, settings.landmarks.shared_sigma) = (1.0 / distance, 0.1);
             }
             Vio::new(camera, ImuNoise::default(), settings)?
@@ -84,9 +84,9 @@ impl ScanFlight {
             // The odometry takes gravity for the vertical, as wrong as its accelerometer is at rest; the station stands as it stands.
             let correction = correction.get_or_insert_with(|| truth * by_odometry.inverse());
             // Past the edge of the surface there is nothing to see.
-            if image.distance().is_some() {
-                let views = sensor.views(&image);
-                let (depth, colour) = (views.depth(), views.colour());
+            let views = sensor.views(&image);
+            let (depth, colour) = (views.depth(), views.colour());
+            if depth.median().is_some() {
                 let by_odometry = by_odometry * camera.body_from_camera;
                 let start = *correction * by_odometry;
                 let world_from_camera = localiser.place(&mut map, &depth, &colour, &by_odometry, &start)?;

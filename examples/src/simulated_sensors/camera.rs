@@ -55,13 +55,6 @@ impl SimulatedImage {
     pub fn grey(&self) -> ImageView<'_> {
         ImageView { width: IMAGE.0, height: IMAGE.1, data: &self.grey }
     }
-
-    /// The middle one of all depths, metres; `None` of nothing but sky.
-    pub fn distance(&self) -> Option<f64> {
-        let mut depths: Vec<f32> = self.depth.iter().copied().filter(|depth| *depth > 0.0).collect();
-        let middle = depths.len() / 2;
-        (!depths.is_empty()).then(|| f64::from(*depths.select_nth_unstable_by(middle, f32::total_cmp).1))
-    }
 }
 
 /// Depth and colour as the map takes them.
@@ -194,13 +187,6 @@ mod tests {
     use nalgebra::{Point3, Vector2};
 
     use super::*;
-
-    #[test]
-    fn the_distance_is_the_middle_one_of_what_is_there() {
-        let distance = |depth: &[f32]| SimulatedImage { grey: Vec::new(), depth: depth.to_vec() }.distance();
-        assert_eq!(distance(&[0.0, 3.0, 0.0, 1.5, 9.0]), Some(3.0));
-        assert_eq!(distance(&[0.0, 0.0]), None);
-    }
 
     #[test]
     fn the_camera_looks_ahead_with_the_sky_above() {

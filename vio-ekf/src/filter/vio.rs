@@ -164,6 +164,19 @@ impl Vio {
         Ok(())
     }
 
+    /// How far away, m, and within which share of it, the camera sees things where the filter starts from here on:
+    /// [`inverse_distance`](crate::filter::LandmarkSettings::inverse_distance) and `shared_sigma` of the settings.
+    ///
+    /// # Errors
+    /// What is not positive.
+    pub fn expect_distance(&mut self, distance: f64, share: f64) -> Result<(), Error> {
+        let mut settings = self.sensors.settings;
+        (settings.landmarks.inverse_distance, settings.landmarks.shared_sigma) = (1.0 / distance, share);
+        settings.check()?;
+        self.sensors.settings = settings;
+        Ok(())
+    }
+
     /// Drops the estimate. The filter tries to initialise itself from here on.
     pub fn reset(&mut self) {
         self.state = State::new(&self.sensors.settings);

@@ -15,6 +15,9 @@ pub(super) enum Verdict {
     OdometryErrs,
 }
 
+/// What has jumped is about as far off as it was within this share.
+const ABOUT: f64 = 0.3;
+
 /// By how much a pose in the map was off the expected one: m and rad, along the world's axes.
 #[derive(Debug, Clone, Copy)]
 struct Offset {
@@ -26,7 +29,7 @@ struct Offset {
 /// Poses in the map beside what was expected of them, one after another.
 ///
 /// An odometry that errs drifts: its distance from the map grows. A map that errs, at a place that looks like another, say, jumps, and then stays
-/// as far off a sound odometry as it was.
+/// about as far off a sound odometry as it was: before a rim, where less fixes it, it wobbles.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Contradiction {
     /// More than these between two poses, m and rad, are a step.
@@ -38,19 +41,19 @@ pub(super) struct Contradiction {
     last: Option<Offset>,
     /// When the poses that contradict began.
     since: Option<Stamp>,
-    /// They began with a jump, and have been as far off since.
-    jumped: bool,
+    /// They began with a jump to there, and have been about as far off since.
+    jumped: Option<Offset>,
 }
 
 impl Contradiction {
     /// Nothing weighed yet.
     pub(super) fn new(steady: [f64; 2], memory_s: f64, longest_jump_s: f64) -> Self {
-        Self { steady, memory_s, longest_jump_s, last: None, since: None, jumped: false }
+        Self { steady, memory_s, longest_jump_s, last: None, since: None, jumped: None }
     }
 
     /// What was weighed was of another odometry.
     pub(super) fn forget(&mut self) {
-        (self.last, self.since, self.jumped) = (None, None, false);
+        (self.last, self.since, self.jumped) = (None, None, None);
     }
 
     /// Takes a pose in the map beside the one that was expected; `follows`: it follows from the one before.
@@ -71,15 +74,21 @@ impl Contradiction {
         let steps =
             |last: &Offset| (offset.shift - last.shift).norm() > shift || (offset.turn - last.turn).norm() > turn;
         if agrees {
-            (self.since, self.jumped) = (None, false);
+            (self.since, self.jumped) = (None, None);
             return Verdict::Confirmed;
         }
         let Some(since) = self.since else {
-            (self.since, self.jumped) = (Some(stamp), before.as_ref().is_some_and(steps));
+            (self.since, self.jumped) = (Some(stamp), before.as_ref().is_some_and(steps).then_some(offset));
             return Verdict::Doubted;
         };
-        self.jumped &= !before.as_ref().is_none_or(steps);
-        let believed = if self.jumped { stamp.secs_since(since) > self.longest_jump_s } else { follows };
+        let stays = |jump: &Offset| {
+            let about = |now: Vector3<f64>, then: Vector3<f64>, least: f64| {
+                (now - then).norm() <= (ABOUT * then.norm()).max(least)
+            };
+            about(offset.shift, jump.shift, shift) && about(offset.turn, jump.turn, turn)
+        };
+        self.jumped = self.jumped.filter(|jump| before.is_some() && stays(jump));
+        let believed = if self.jumped.is_some() { stamp.secs_since(since) > self.longest_jump_s } else { follows };
         if believed { Verdict::OdometryErrs } else { Verdict::Doubted }
     }
 }

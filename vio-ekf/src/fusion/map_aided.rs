@@ -174,6 +174,15 @@ impl MapAidedVio {
         Ok(pose.world_from_body)
     }
 
+    /// How far away things are now, as a depth image says: near a surface an odometry that starts again with the usual distance takes what passes
+    /// by for a speed that it does not have. See [`Vio::expect_distance`](crate::Vio::expect_distance).
+    ///
+    /// # Errors
+    /// As there.
+    pub fn expect_distance(&mut self, distance: f64, share: f64) -> Result<(), Error> {
+        self.vio.expect_distance(distance, share)
+    }
+
     /// Takes a sample of the inertial sensor.
     ///
     /// # Errors
@@ -409,10 +418,14 @@ impl MapAidedVio {
         Ok(own + Matrix6::from_diagonal(&[shift, shift, shift, turn, turn, turn].into()))
     }
 
-    /// Deviations of position and attitude along the axes where they are known least.
+    /// Deviations of position and attitude along the axes where they are known least. A registration may call metres unknown that it has found to
+    /// a millimetre (before a nearly smooth wall without a prior, say): no filter starts with those, and no pose confirms what it is that far
+    /// off. So they are taken for no more than poses may differ by that do not contradict each other.
     fn spread(&self, found: &PoseMeasurement) -> Result<[f64; 2], Error> {
         let covariance = self.covariance(found)?;
-        Ok([0, 3].map(|first| largest_deviation(&covariance.fixed_view::<3, 3>(first, first).into_owned())))
+        let deviation = |first| largest_deviation(&covariance.fixed_view::<3, 3>(first, first).into_owned());
+        let [position, attitude] = self.settings.contradiction;
+        Ok([deviation(0).min(position), deviation(3).min(attitude)])
     }
 }
 

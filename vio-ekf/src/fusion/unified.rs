@@ -168,6 +168,11 @@ impl UnifiedVio {
         self.vio.initialize_past(initial, samples)
     }
 
+    /// How far away things are where it starts from here on; see [`Vio::expect_distance`].
+    pub fn expect_distance(&mut self, distance: f64, share: f64) -> Result<(), Error> {
+        self.vio.expect_distance(distance, share)
+    }
+
     /// Takes a sample of the body's own inertial sensor, and uses the measurements that have become old enough.
     pub fn imu(&mut self, sample: &Imu) -> Result<Status, Error> {
         match &mut self.pair {
