@@ -132,6 +132,12 @@ pub enum MissionFileError {
     /// A region of what is not known yet.
     #[error("region: a surface that the robot scans first has no coordinates yet; leave out the region or the scan")]
     RegionBeforeScan,
+    /// Faults of sensors that are not there.
+    #[error(
+        "faults of sensors (settings.sensor_faults; `robot --fault camera` and the like) are for a robot that flies by its own senses: add \
+         --localisation slam"
+    )]
+    NoSensors,
     /// The mesh lacks what the mission asks of it.
     #[error("{path}: has no texture coordinates for --texture; leave it out or use --design")]
     NoTextureCoordinates {
@@ -259,10 +265,16 @@ impl MissionFile {
 
     /// Reads the surface and scans it if asked to.
     fn place(&self, folder: &Path) -> Result<Place, MissionFileError> {
+        let own_senses = match self.settings.localisation {
+            None => self.scan,
+            Some(chosen) => chosen == LocalisationChoice::Slam,
+        };
+        if !self.settings.sensor_faults.is_empty() && !own_senses {
+            return Err(MissionFileError::NoSensors);
+        }
         let (name, scene) = self.read_surface()?;
         if !self.scan {
-            let finds_itself = self.settings.localisation == Some(LocalisationChoice::Slam);
-            let map = finds_itself.then(|| self.survey(&scene, folder)).transpose()?;
+            let map = own_senses.then(|| self.survey(&scene, folder)).transpose()?;
             return Ok(Place { name, scene, truth: None, map });
         }
         if self.region.is_some() {

@@ -18,6 +18,15 @@ pub enum MissionError {
     /// A flight to look from that nothing plans around obstacles.
     #[error("look: the flight along the surface does not know of keep-out volumes and tethers: leave out one of them")]
     LookConstrained,
+    /// A fault of a sensor at no time, or of no size.
+    #[error(
+        "setting sensor_faults, number {number}: `from` must be 0 or more and `until` not before it (s after the first paint), and a size of \
+         the fault finite and, of late and of clipped samples, not negative"
+    )]
+    SensorFault {
+        /// Which, from 1 on.
+        number: usize,
+    },
     /// A size that is none.
     #[error("setting {name} = {value}: it must be a positive number")]
     Setting {

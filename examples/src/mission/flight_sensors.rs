@@ -10,7 +10,7 @@ use super::painting_task::PaintingTask;
 use super::settings::LocalisationChoice;
 use super::simulated_flight::noise;
 use crate::onboard::{LocalisationFigures, LocalisedFlight, read_map};
-use crate::simulated_sensors::{PaintedFront, SHOT_STEP, SimulatedCamera};
+use crate::simulated_sensors::{FaultInterval, PaintedFront, SHOT_STEP, SimulatedCamera};
 
 /// The camera before the true surface with the paint of flights on it. Surfaces are turned so that they face the robot, which is at smaller x.
 pub(super) fn camera_before<'a, 'b>(
@@ -46,6 +46,15 @@ impl<'a> Poses<'a> {
             return Ok(Self::Noise(noise(conditions)));
         }
         Ok(Self::Own(Box::new(localised_flight(task, camera()?, flight)?)))
+    }
+
+    /// With faults of the robot's own senses.
+    #[must_use]
+    pub(super) fn with_faults(self, faults: &[FaultInterval]) -> Self {
+        match self {
+            Self::Noise(_) => self,
+            Self::Own(own) => Self::Own(Box::new(own.with_faults(faults.to_vec()))),
+        }
     }
 
     /// As the flight asks for them.

@@ -89,6 +89,7 @@ pub(super) fn fly(
         let layer = before.len() + k;
         if layer > 0 {
             faulty.faults = Faults::default();
+            faulty.sensor_faults.clear();
         }
         let mut told = Sorties::default();
         let logs: Vec<&FlightLog> = before.iter().chain(&flights).map(|layer| &layer.flight).collect();
@@ -153,7 +154,8 @@ fn fly_sorties(
         let piece = piece.map(|sortie| Piece::of(&whole, sortie));
         let reference: &dyn Reference = piece.as_ref().map_or(&whole, |piece| piece);
         let camera = || camera_before(task, before.iter().copied().chain(flown));
-        let mut poses = Poses::of(task, camera, 0, &conditions)?;
+        let faults = if k == 0 { &settings.sensor_faults[..] } else { &[] };
+        let mut poses = Poses::of(task, camera, 0, &conditions)?.with_faults(faults);
         let flight = Flight { task, purpose: Purpose::Paint, reference, conditions };
         let (log, ended) = flyer.fly(&flight, poses.source(), &|time| share((from + time) / duration))?;
         let log = piece.iter().fold(log, |log, piece| piece.cut(log));

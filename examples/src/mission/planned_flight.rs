@@ -64,7 +64,8 @@ impl<'a> PlannedFlight<'a> {
 
     /// What says where the robot is, before the bare surface.
     pub fn poses(&self, flight: &Flight) -> Result<Poses<'a>, MissionError> {
-        Poses::of(self.task, || camera_before(self.task, std::iter::empty()), 0, &flight.conditions)
+        let poses = Poses::of(self.task, || camera_before(self.task, std::iter::empty()), 0, &flight.conditions)?;
+        Ok(poses.with_faults(&self.task.settings.sensor_faults))
     }
 
     /// Puts the paint of a flight onto the surface, writes `painted.png` and `painted_view.png`, and counts.

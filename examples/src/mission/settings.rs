@@ -14,6 +14,7 @@ use super::error::MissionError;
 use super::planner_choice::PlannerChoice;
 use crate::picture_placement::PicturePlacement;
 use crate::projection::Viewpoint;
+use crate::simulated_sensors::FaultInterval;
 use paint_sim::flight::{Airframe, Faults};
 use paint_sim::paint::PaintName;
 
@@ -80,6 +81,9 @@ pub struct MissionSettings {
     /// What goes wrong in the first flight.
     #[serde(skip_serializing_if = "no_faults")]
     pub faults: Faults,
+    /// What goes wrong with the sensors of a robot that flies by its own senses, in its first flight.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sensor_faults: Vec<FaultInterval>,
     /// Where it may not fly, and where its hose hangs, in the world of `plan.csv`; the simulated hose of a robot without a tether comes from
     /// behind the middle of the flight.
     #[serde(skip_serializing_if = "FlightConstraints::is_empty")]
@@ -170,6 +174,7 @@ impl Default for MissionSettings {
             endurance: Endurance::default(),
             look: false,
             faults: Faults::default(),
+            sensor_faults: Vec::new(),
             constraints: FlightConstraints::default(),
         }
     }
@@ -190,6 +195,9 @@ impl MissionSettings {
         let (planned, servo) = (self.planner.timing.max_joint_rate, self.servo.max_rate);
         if planned > servo {
             return Err(MissionError::JointRate { planned, servo });
+        }
+        if let Some(number) = self.sensor_faults.iter().position(|fault| !fault.is_sound()) {
+            return Err(MissionError::SensorFault { number: number + 1 });
         }
         if self.look && !self.constraints.is_empty() {
             return Err(MissionError::LookConstrained);
@@ -224,6 +232,7 @@ mod tests {
     use super::super::test_panel;
     use super::*;
     use crate::adapters::{MeshSurface, Robot};
+    use crate::simulated_sensors::SensorFault;
     use nalgebra::{UnitVector3, Vector3};
     use ptu_kinematics::Ptu;
 
@@ -233,6 +242,24 @@ mod tests {
         settings.check().unwrap();
         settings.servo.max_rate = 0.9 * settings.planner.timing.max_joint_rate;
         assert!(matches!(settings.check(), Err(MissionError::JointRate { .. })));
+    }
+
+    /// Nothing is a fault at no time, or of a size that is not a number.
+    #[test]
+    fn sensor_faults_that_make_no_sense_are_refused_by_number() {
+        let sound = FaultInterval { fault: SensorFault::Clipped(9.0), of_vehicle: true, from: 2.0, until: 3.0 };
+        let check = |fault| MissionSettings { sensor_faults: vec![sound, fault], ..MissionSettings::default() }.check();
+        check(FaultInterval { until: f64::INFINITY, ..sound }).unwrap();
+        for bad in [
+            FaultInterval { from: -1.0, ..sound },
+            FaultInterval { from: f64::NAN, ..sound },
+            FaultInterval { until: 1.0, ..sound },
+            FaultInterval { fault: SensorFault::Clipped(-9.0), ..sound },
+            FaultInterval { fault: SensorFault::LateMotion(-1), ..sound },
+            FaultInterval { fault: SensorFault::DepthOfElsewhere(f64::NAN), ..sound },
+        ] {
+            assert!(matches!(check(bad), Err(MissionError::SensorFault { number: 2 })), "{bad:?}");
+        }
     }
 
     #[test]

@@ -16,6 +16,8 @@ use vio_ekf::{Camera, ImageView, Imu, Stamp};
 /// within so many metres of what is expected.
 const SHOWN: f64 = 0.9;
 const NEAR: f64 = 0.02;
+/// What the odometry sees is about as far away as the middle of the latest depth image, within this share.
+const DISTANCE_SHARE: f64 = 0.1;
 
 /// Why the robot does not know where it is.
 #[derive(Debug, thiserror::Error)]
@@ -110,6 +112,7 @@ impl OnboardLocalisation {
     ) -> Result<Option<Isometry3<f64>>, LocalisationError> {
         self.slam.set_vertical(self.body_from_camera.inverse_transform_vector(&self.up_in_body));
         let outcome = self.slam.frame(seconds(stamp), depth, colour, None)?;
+        self.expect_distance(depth)?;
         let found = outcome.tracking.filter(|_| stands && outcome.world_from_camera.is_some());
         let Some(measured) = found.and_then(|tracking| measurement(stamp, &tracking)) else { return Ok(None) };
         Ok(Some(self.aided.start(&measured)?))
@@ -157,6 +160,7 @@ impl OnboardLocalisation {
         let odometry = expected.filter(|expected| !expected.from_map);
         let prior = odometry.map(|expected| expected.world_from_body * self.body_from_camera);
         let outcome = self.slam.frame(seconds(stamp), depth, None, prior.as_ref())?;
+        self.expect_distance(depth)?;
         let shown = |tracking: &TrackingOutcome| {
             let off = prior.map_or(f64::INFINITY, |prior| {
                 (tracking.world_from_camera.translation.vector - prior.translation.vector).norm()
@@ -171,6 +175,10 @@ impl OnboardLocalisation {
             self.aided.map(measured.as_ref(), expected)?
         };
         Ok(MapUpdate { confirmed, events: outcome.events })
+    }
+
+    fn expect_distance(&mut self, depth: &DepthView) -> Result<(), LocalisationError> {
+        depth.median().map_or(Ok(()), |distance| Ok(self.aided.expect_distance(distance, DISTANCE_SHARE)?))
     }
 
     /// Where the robot is now; `None` before it has been found, and where nothing recent says so.

@@ -98,6 +98,9 @@ pub struct LocalisedFlight<'a> {
     /// From milliseconds of the reference to those of the sensors' clock; `None` before the robot has found itself.
     offset: Option<i64>,
     captured: usize,
+    /// Milliseconds of the sensors' clock now, and when the first paint left the nozzle.
+    now: i64,
+    painting_since: Option<i64>,
     faults: Vec<FaultInterval>,
     /// Inertial samples that are late, of the camera's sensor and of the vehicle's.
     late: [VecDeque<Arriving<vio_ekf::Imu>>; 2],
@@ -138,6 +141,8 @@ impl<'a> LocalisedFlight<'a> {
             depths: VecDeque::new(),
             offset: None,
             captured: 0,
+            now: 0,
+            painting_since: None,
             faults: Vec::new(),
             late: Default::default(),
             figures: LocalisationFigures::default(),
@@ -150,8 +155,10 @@ impl<'a> LocalisedFlight<'a> {
         Self { faults, ..self }
     }
 
-    fn fault(&self, ms: i64) -> Option<SensorFault> {
-        self.faults.iter().find(|fault| fault.when.contains(&ms)).map(|fault| fault.fault)
+    /// What is wrong now.
+    fn fault(&self) -> Option<FaultInterval> {
+        let painting = 1e-3 * (self.now - self.painting_since?) as f64;
+        self.faults.iter().copied().find(|fault| fault.contains(painting))
     }
 
     /// The paint that is on the surface, where the camera sees it.
@@ -212,13 +219,13 @@ impl<'a> LocalisedFlight<'a> {
     fn sense_motion(&mut self, ms: i64, truth: &Vehicle) -> Result<(), LocalisationError> {
         let reading = self.imu.measure(&truth.velocity, &truth.rotation(), 1e-3 * INERTIAL_MS as f64);
         let of_vehicle = self.vehicle_imu.measure(&truth.velocity, &truth.rotation(), 1e-3 * INERTIAL_MS as f64);
+        let failing = self.fault();
         let cpu = ThreadTime::now();
         let mut done = Ok(());
         for (which, reading) in [reading, of_vehicle].into_iter().enumerate() {
             let sample =
                 vio_ekf::Imu { stamp: stamp(ms), gyro: reading.angular_velocity, accel: reading.specific_force };
-            let interval = self.faults.iter().find(|fault| fault.when.contains(&ms));
-            let fault = interval.filter(|fault| fault.of_vehicle == (which == 1)).map(|fault| fault.fault);
+            let fault = failing.filter(|fault| fault.of_vehicle == (which == 1)).map(|fault| fault.fault);
             let late = &mut self.late[which];
             let delay = if let Some(SensorFault::LateMotion(delay)) = fault { delay } else { 0 };
             let sample = fault.map_or(Some(sample), |fault| fault.inertial(sample));
@@ -255,12 +262,13 @@ impl<'a> LocalisedFlight<'a> {
 
     /// What the sensors give at a millisecond of their clock, and what the programs are through with.
     fn sense(&mut self, ms: i64, truth: &Vehicle) -> Result<(), LocalisationError> {
+        self.now = ms;
         if ms % INERTIAL_MS == 0 {
             self.sense_motion(ms, truth)?;
         }
         if ms % IMAGE_MS == 0 {
             let mut image = self.capture(truth)?;
-            let fault = self.fault(ms);
+            let fault = self.fault().map(|fault| fault.fault);
             if self.bridging == Bridging::Odometry {
                 let what = self.onboard.pose(stamp(ms));
                 self.said.push_back(Arriving { at: ms + IMAGE_LATENCY_MS, taken: ms, what });
@@ -302,6 +310,9 @@ impl PoseSource for LocalisedFlight<'_> {
     }
 
     fn sprayed(&mut self, sample: &FlightSample, interval: f64) {
+        if sample.flow > 0.0 {
+            self.painting_since.get_or_insert(self.now);
+        }
         self.camera.spray(sample, interval);
     }
 

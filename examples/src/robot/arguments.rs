@@ -31,7 +31,7 @@ pub struct Arguments {
     /// Set-points for the autopilot
     #[arg(long, value_enum, default_value_t = SetpointKind::Trajectory, requires = "autopilot")]
     pub(super) setpoints: SetpointKind,
-    /// Lets something fail after the paint of the first flight begins: link, pose, clock, estimate or mode @SECONDS+DURATION; battery, restart or program @SECONDS
+    /// Lets something fail after the paint of the first flight begins: link, pose, clock, estimate, mode or servo @SECONDS+DURATION; battery, restart or program @SECONDS; of a robot that flies by its own senses camera, depth, images, elsewhere, imu, late, clipped or swapped @SECONDS+DURATION
     #[arg(long, value_name = "KIND@SECONDS+DURATION", requires = "autopilot")]
     pub(super) fault: Vec<Fault>,
     /// Folder for the results

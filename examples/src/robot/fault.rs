@@ -4,6 +4,8 @@ use std::str::FromStr;
 
 use mavlink::dialects::common::{EstimatorStatusFlags, MavMessage};
 
+use crate::simulated_sensors::{FaultInterval, SensorFault};
+
 /// The autopilot says what has changed in it within this time, s: it obeys its pilot after 8 to 12 ms, and its messages are as far apart.
 const REPORT: f64 = 0.02;
 
@@ -26,6 +28,24 @@ pub enum FaultKind {
     Restart,
     /// The on-board program is ended.
     Program,
+    /// Pan and tilt stay where they are.
+    Servo,
+    /// The camera's images are black.
+    Camera,
+    /// No depth image arrives.
+    Depth,
+    /// Neither image arrives.
+    Images,
+    /// Depth is that of a place 10 cm to the side: tracking offers a wrong pose.
+    Elsewhere,
+    /// No sample of the camera's inertial sensor arrives.
+    Imu,
+    /// Its samples are 100 ms late.
+    Late,
+    /// Its accelerometer reads at most 9 m/s² on an axis.
+    Clipped,
+    /// Its gyroscope's x and y are swapped.
+    Swapped,
 }
 
 /// A fault in a time of the flight.
@@ -51,8 +71,26 @@ impl Fault {
         let said = match self.kind {
             FaultKind::Link | FaultKind::Pose | FaultKind::Restart | FaultKind::Program => 0.0,
             FaultKind::Clock | FaultKind::Estimate | FaultKind::Battery | FaultKind::Mode => REPORT,
+            // The robot may go on for as long as its paint meets its aim.
+            _ => return false,
         };
         (self.at + said + control_step - 1e-9..self.at + self.duration).contains(&time)
+    }
+
+    /// That of a sensor by which the robot localises itself, as its senses are told.
+    pub(super) fn of_sensors(&self) -> Option<FaultInterval> {
+        let fault = match self.kind {
+            FaultKind::Camera => SensorFault::CameraBlack,
+            FaultKind::Depth => SensorFault::NoDepth,
+            FaultKind::Images => SensorFault::NoImages,
+            FaultKind::Elsewhere => SensorFault::DepthOfElsewhere(0.1),
+            FaultKind::Imu => SensorFault::NoMotion,
+            FaultKind::Late => SensorFault::LateMotion(100),
+            FaultKind::Clipped => SensorFault::Clipped(9.0),
+            FaultKind::Swapped => SensorFault::Swapped,
+            _ => return None,
+        };
+        Some(FaultInterval { fault, of_vehicle: false, from: self.at, until: self.at + self.duration })
     }
 }
 
@@ -76,8 +114,8 @@ impl FromStr for Fault {
     fn from_str(text: &str) -> Result<Self, String> {
         let usage = || {
             format!(
-                "{text}: give KIND@SECONDS+DURATION with link, pose, clock, estimate or mode for KIND, or KIND@SECONDS with battery, restart \
-                 or program"
+                "{text}: give KIND@SECONDS+DURATION with link, pose, clock, estimate, mode, servo, camera, depth, images, elsewhere, imu, late, \
+                 clipped or swapped for KIND, or KIND@SECONDS with battery, restart or program"
             )
         };
         let seconds = |text: &str| text.parse::<f64>().ok().filter(|v| v.is_finite() && *v >= 0.0).ok_or_else(usage);

@@ -152,6 +152,7 @@ impl Px4Flight<'_, '_, '_> {
         if self.fails(FaultKind::Mode) {
             self.px4.send(&self.on_board.link().commands(Request::Land))?;
         }
+        self.robot.stick(self.fails(FaultKind::Servo));
         self.robot.command(commanded.pan_tilt, commanded.flow);
         if self.on_board.phase() == Phase::Paint {
             self.first_paint.get_or_insert(now);

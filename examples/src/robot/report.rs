@@ -24,6 +24,8 @@ pub struct FlightReport {
     pub hit_error_rms_m: f64,
     /// The hit error that 95 % of the samples do not exceed.
     pub hit_error_p95_m: f64,
+    /// The largest hit error.
+    pub hit_error_max_m: f64,
     /// True position against the plan's while painting, root mean square.
     pub position_error_rms_m: f64,
     /// Estimated against true position while it paints or looks, root mean square.
@@ -61,6 +63,7 @@ impl FlightReport {
             flight_s: flown.seconds,
             hit_error_rms_m: statistics.hit_error_rms,
             hit_error_p95_m: statistics.hit_error_p95,
+            hit_error_max_m: statistics.hit_error_max,
             position_error_rms_m: statistics.position_error_rms,
             localisation_error_rms_m: match flight.purpose {
                 Purpose::Paint => statistics.localisation_error_rms,

@@ -2,8 +2,11 @@
 
 use std::path::Path;
 
+use paint_sim::flight::Faults;
+
 use super::arguments::{Arguments, AutopilotChoice};
 use super::error::RobotError;
+use super::fault::Fault;
 use super::on_board::SetpointKind;
 use super::px4_flyer::Px4Flyer;
 use super::report::{FlightReport, RobotReport};
@@ -29,6 +32,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     if first_alone.is_none() && !arguments.mission.names_surface() {
         mission_file = own_job(mission_file);
     }
+    mission_file.settings.sensor_faults.extend(arguments.fault.iter().filter_map(Fault::of_sensors));
     mission_file.settings.check_simulated()?;
     mission_file.begin_run(folder, "robot")?;
     let tasks = mission_file.decide_coats(folder)?;
@@ -50,6 +54,7 @@ fn check(arguments: &Arguments, first_alone: bool, settings: &MissionSettings) -
     let Some(autopilot) = &arguments.autopilot else { return Ok(()) };
     for (option, given) in [
         ("--identify", settings.identify),
+        ("[settings.faults] of a mission", settings.faults != Faults::default()),
         ("--planner smoothing and smoothing-locked", settings.path_planner != PlannerChoice::Optimal),
     ] {
         if given {

@@ -46,6 +46,8 @@ pub struct SimulatedRobot<'a> {
     /// The flow that is commanded for the control step that begins.
     commanded: Option<f64>,
     last_command: f64,
+    /// Whether pan and tilt stay where they are.
+    stuck: bool,
     /// Flows that were commanded and have not reached the nozzle yet.
     valve: VecDeque<f64>,
     flow: f64,
@@ -80,6 +82,7 @@ impl<'a> SimulatedRobot<'a> {
             aim: [0.0; 2],
             commanded: None,
             last_command: 0.0,
+            stuck: false,
             valve: std::iter::repeat_n(0.0, delay).collect(),
             flow: 0.0,
             steps: 0,
@@ -154,6 +157,11 @@ impl<'a> SimulatedRobot<'a> {
         (self.aim, self.commanded) = (aim, Some(flow));
     }
 
+    /// Lets pan and tilt stay where they are, or go on.
+    pub fn stick(&mut self, stuck: bool) {
+        self.stuck = stuck;
+    }
+
     /// Lets a step pass.
     pub fn step(&mut self, motors: &[f64]) -> Result<(), paint_sim::Error> {
         if self.steps.is_multiple_of(CONTROL_STEPS) {
@@ -174,7 +182,9 @@ impl<'a> SimulatedRobot<'a> {
         ];
         let outflow = self.flow * DENSITY;
         self.body.step(motors, &Surroundings { wind, loads: &loads, outflow, ground: Some(self.ground()) }, STEP)?;
-        self.pan_tilt = self.ptu.step(self.aim, STEP);
+        if !self.stuck {
+            self.pan_tilt = self.ptu.step(self.aim, STEP);
+        }
         self.steps += 1;
         self.localisation.moved(self.time(), &self.body.as_vehicle())
     }
@@ -193,15 +203,39 @@ mod tests {
 
     use super::*;
 
+    fn robot(senses: &mut PoseSensor) -> SimulatedRobot<'_> {
+        let ptu = ServoPanTilt::new(Ptu::new(PtuSettings::default()).unwrap(), ServoSettings::default()).unwrap();
+        let start = station(&Point3::new(0.0, 0.0, 2.0), 0.0);
+        SimulatedRobot::new(MultirotorSettings::default(), &start, ptu, senses, &FlightSettings::default()).unwrap()
+    }
+
+    /// It stays where it is, and goes on from there.
+    #[test]
+    fn a_stuck_servo_does_not_move() {
+        let mut senses = PoseSensor::new(FlightSettings::default().localisation, 0.01, 1);
+        let mut robot = robot(&mut senses);
+        let rotors = vec![0.0; robot.body().motors().len()];
+        let mut after = |stuck: bool, steps: u64| {
+            robot.stick(stuck);
+            robot.command([0.3, -0.2], 0.0);
+            for _ in 0..steps {
+                robot.step(&rotors).unwrap();
+            }
+            robot.pan_tilt()
+        };
+        let begun = after(false, 60);
+        assert!(begun[0] > 0.01 && begun[0] < 0.29, "{begun:?}");
+        assert_eq!(after(true, 500), begun);
+        let [pan, tilt] = after(false, 500);
+        assert!((pan - 0.3).abs() < 0.01 && (tilt + 0.2).abs() < 0.01, "{pan} {tilt}");
+    }
+
     /// The program that commands it may end at any time.
     #[test]
     fn a_valve_that_is_not_commanded_shuts() {
         let conditions = FlightSettings::default();
-        let ptu = ServoPanTilt::new(Ptu::new(PtuSettings::default()).unwrap(), ServoSettings::default()).unwrap();
-        let start = station(&Point3::new(0.0, 0.0, 2.0), 0.0);
-        let settings = MultirotorSettings::default();
         let mut senses = PoseSensor::new(conditions.localisation, 0.01, 1);
-        let mut robot = SimulatedRobot::new(settings, &start, ptu, &mut senses, &conditions).unwrap();
+        let mut robot = robot(&mut senses);
         let rotors = robot.body().motors().len();
         let mut step = |command: Option<f64>| {
             if let Some(flow) = command {

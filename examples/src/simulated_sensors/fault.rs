@@ -1,9 +1,11 @@
 //! What goes wrong with a simulated robot's sensors.
 
+use serde::{Deserialize, Serialize};
 use vio_ekf::Imu;
 
 /// A fault of a sensor.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum SensorFault {
     /// Images are black; depth is as it is.
     CameraBlack,
@@ -37,13 +39,35 @@ impl SensorFault {
     }
 }
 
-/// A fault with the time in which it is there, milliseconds of the sensors' clock.
-#[derive(Debug, Clone, PartialEq)]
+/// A fault with the time in which it is there.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct FaultInterval {
     /// What.
     pub fault: SensorFault,
     /// One of inertial samples is that of the vehicle's own sensor instead of the camera's.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub of_vehicle: bool,
-    /// When.
-    pub when: std::ops::Range<i64>,
+    /// Since when, s after the flight's first paint.
+    pub from: f64,
+    /// Until when, s.
+    pub until: f64,
+}
+
+impl FaultInterval {
+    /// Whether it is there so many seconds after the first paint.
+    pub fn contains(&self, time: f64) -> bool {
+        (self.from..self.until).contains(&time)
+    }
+
+    /// Whether times and sizes are numbers that something can be done with.
+    pub fn is_sound(&self) -> bool {
+        let sound = match self.fault {
+            SensorFault::DepthOfElsewhere(off) => off.is_finite(),
+            SensorFault::LateMotion(ms) => ms >= 0,
+            SensorFault::Clipped(most) => most.is_finite() && most >= 0.0,
+            _ => true,
+        };
+        sound && self.from >= 0.0 && self.until >= self.from
+    }
 }

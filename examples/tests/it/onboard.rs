@@ -25,8 +25,6 @@ use vio_ekf::{Imu, Stamp};
 
 /// Deviation of a spot, m.
 const SPOT: f64 = 0.025;
-/// The stroke begins so many milliseconds after the robot hovers.
-pub(crate) const BEFORE: i64 = 1000 + 4500;
 
 /// 1.6 m by 0.8 m, as high above the ground as the whole wall.
 pub(crate) fn wall(seed: u64) -> TriangleMesh {
@@ -38,13 +36,25 @@ pub(crate) fn wall(seed: u64) -> TriangleMesh {
 }
 
 /// The file of the first wall's map.
-fn map() -> &'static Path {
+pub(crate) fn map() -> &'static Path {
     static MAP: OnceLock<PathBuf> = OnceLock::new();
     MAP.get_or_init(|| {
         let folder = std::env::temp_dir().join(format!("paintcopter-onboard-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         save(&ScanFlight::fly(&wall(1), 1, 2).unwrap(), &folder).unwrap();
         folder.join(MAP_FILE)
+    })
+}
+
+/// That of its mesh alone, without keyframes.
+pub(crate) fn surveyed() -> &'static Path {
+    static MAP: OnceLock<PathBuf> = OnceLock::new();
+    MAP.get_or_init(|| {
+        let mesh = wall(1);
+        let surface = TriangleSurface::new(&mesh.positions, &mesh.faces).unwrap();
+        let file = std::env::temp_dir().join(format!("paintcopter-onboard-surveyed-{}.tsdf", std::process::id()));
+        surveyed_map(&surface, &-Vector3::x(), 2).unwrap().save(&file, None, BTreeMap::new()).unwrap();
+        file
     })
 }
 
@@ -107,15 +117,17 @@ fn fly_bridged(
     bridging: Bridging,
     seed: u64,
 ) -> Result<(FlightLog, LocalisationFigures, PaintedFront), Error> {
-    let from = BEFORE + 1500;
-    let fault = fault.map(|(fault, duration)| FaultInterval { fault, of_vehicle: false, when: from..from + duration });
-    fly_faulty(&Stroke(surface), surface, fault.into_iter().collect(), paint, bridging, seed)
+    let from = 1.5;
+    let until = |duration| from + 1e-3 * duration as f64;
+    let fault = fault.map(|(fault, duration)| FaultInterval { fault, of_vehicle: false, from, until: until(duration) });
+    fly_faulty(&Stroke(surface), surface, map(), fault.into_iter().collect(), paint, bridging, seed)
 }
 
-/// A stroke of any kind before a wall with paint on it, with faults.
+/// A stroke of any kind before a wall with paint on it, in the map of a file, with faults.
 pub(crate) fn fly_faulty(
     stroke: &dyn Reference,
     surface: &TriangleSurface,
+    map: &Path,
     faults: Vec<FaultInterval>,
     paint: PaintedFront,
     bridging: Bridging,
@@ -123,7 +135,7 @@ pub(crate) fn fly_faulty(
 ) -> Result<(FlightLog, LocalisationFigures, PaintedFront), Error> {
     // The same stone as in the scan, which has seed 1.
     let camera = SimulatedCamera::new(surface, Vector3::x(), 1, 1).before(paint);
-    let onboard = LocalisedFlight::bridged(camera, read_map(map()).unwrap(), seed + 4, bridging).unwrap();
+    let onboard = LocalisedFlight::bridged(camera, read_map(map).unwrap(), seed + 4, bridging).unwrap();
     let mut onboard = onboard.with_faults(faults);
     let valve = Valve { interlock: Some(Interlock::within(SPOT)), ..Valve::default() };
     let settings = FlightSettings { valve, settle: 1.0, seed, ..FlightSettings::default() };

@@ -7,7 +7,7 @@ use paintcopter::onboard::Bridging;
 use paintcopter::simulated_sensors::{FaultInterval, SensorFault};
 use paintcopter::world::CENTRE;
 
-use crate::onboard::{BEFORE, astray, bare, fly, fly_faulty, misses, wall};
+use crate::onboard::{astray, bare, fly, fly_faulty, map, misses, surveyed, wall};
 
 /// `cargo test --release -p paintcopter --all-features --test it -- --ignored --nocapture faults_of_sensors`
 #[test]
@@ -44,7 +44,11 @@ fn faults_of_sensors() {
 const DURATION: f64 = 16.0;
 
 /// A stroke of 60 cm over the wall and back, twice, painted all the way.
-struct BackAndForth<'a>(&'a TriangleSurface);
+struct BackAndForth<'a> {
+    surface: &'a TriangleSurface,
+    /// Its middle beside and above that of the wall, m.
+    middle: [f64; 2],
+}
 
 impl Reference for BackAndForth<'_> {
     fn duration(&self) -> f64 {
@@ -54,8 +58,9 @@ impl Reference for BackAndForth<'_> {
     fn at(&self, t: f64) -> ReferenceState {
         let turning = std::f64::consts::TAU / 8.0;
         let (sin, cos) = (turning * t.clamp(0.0, DURATION)).sin_cos();
-        let position = Point3::new(-0.6, -0.3 * cos, CENTRE);
-        let hit = self.0.cast(&position, &Vector3::x_axis(), 5.0).unwrap();
+        let [beside, above] = self.middle;
+        let position = Point3::new(-0.6, beside - 0.3 * cos, CENTRE + above);
+        let hit = self.surface.cast(&position, &Vector3::x_axis(), 5.0).unwrap();
         let along = |value: f64| Vector3::new(0.0, value, 0.0);
         ReferenceState {
             position,
@@ -71,7 +76,8 @@ impl Reference for BackAndForth<'_> {
     }
 }
 
-/// Faults of random kinds, from .2 to 5 s long, those of inertial samples of either sensor, two to a flight of 16 s; `FLIGHTS` of them (100), from `SEED` (1) on.
+/// Faults of random kinds, from .2 to 5 s long, those of inertial samples of either sensor, two to a flight of 16 s anywhere on the wall, its rims
+/// included, in a map that was scanned or surveyed; `FLIGHTS` of them (100), from `SEED` (1) on.
 ///
 /// `FLIGHTS=100 cargo test --release -p paintcopter --all-features --test it -- --ignored --nocapture hundreds_of_sensor_faults`
 #[test]
@@ -94,14 +100,16 @@ fn hundreds_of_sensor_faults() {
                 SensorFault::Clipped(8.0 + 1.8 * random(30 + k)),
                 SensorFault::Swapped,
             ];
-            let from = BEFORE + 8000 * k + (3000.0 * random(40 + k)) as i64;
+            let from = 8.0 * k as f64 + 3.0 * random(40 + k);
             let fault = kinds[(8.0 * random(50 + k)) as usize];
             let of_vehicle = random(70 + k) < 0.5;
-            FaultInterval { fault, of_vehicle, when: from..from + (200.0 * 25.0_f64.powf(random(60 + k))) as i64 }
+            FaultInterval { fault, of_vehicle, from, until: from + 0.2 * 25.0_f64.powf(random(60 + k)) }
         };
         let faults: Vec<_> = [0, 1].map(fault).into();
-        let stroke = BackAndForth(&surface);
-        let flown = fly_faulty(&stroke, &surface, faults.clone(), bare(&surface), Bridging::default(), seed);
+        let middle = [0.4 * (2.0 * random(80) - 1.0), 0.35 * (2.0 * random(81) - 1.0)];
+        let stroke = BackAndForth { surface: &surface, middle };
+        let (kind, map) = if seed.is_multiple_of(2) { ("scanned", map()) } else { ("surveyed", surveyed()) };
+        let flown = fly_faulty(&stroke, &surface, map, faults.clone(), bare(&surface), Bridging::default(), seed);
         let (astray, said) = match &flown {
             Ok((log, figures, _)) => {
                 let (astray, sprayed) = astray(log);
@@ -112,7 +120,7 @@ fn hundreds_of_sensor_faults() {
             }
             Err(error) => (0, format!("{error}")),
         };
-        println!("{seed}: {faults:?}: {astray} astray, {said}");
+        println!("{seed}: {faults:?} at {middle:.2?}, {kind}: {astray} astray, {said}");
         (astray, flown.is_ok())
     };
     let half = |from: u64| (first + from..first + count).step_by(2).map(one).collect::<Vec<_>>();
