@@ -118,14 +118,17 @@ fn a_broken_vehicle_does_not_fly_on() {
     assert!(report["not_flown_s"].as_f64().unwrap() > 30.0 && s.0.join("out/painted_view.png").exists(), "{said}");
 }
 
-/// The file of a piece of rock of 1.6 m by 0.8 m.
-fn small_rock(s: &Scratch) -> String {
+/// Paints a piece of rock of 1.6 m by 0.8 m by the robot's own senses.
+fn fly_small_rock(s: &Scratch, px4: &std::path::Path, more: &[&str]) -> Output {
     let mut rock = rock_wall(1);
     for [x, y, z] in &mut rock.positions {
         (*x, *y, *z) = (0.35 * *x, 0.35 * *y, (CENTRE + 0.35 * (f64::from(*z) - CENTRE)) as f32);
     }
     s.write("rock.obj", as_obj(&rock));
-    s.path("rock.obj")
+    let mut command = Command::new(env!("CARGO_BIN_EXE_robot"));
+    command.args(["--autopilot", &format!("px4:{}", px4.display()), "--mesh", &s.path("rock.obj"), "--scale", "1"]);
+    command.args(["--up", "z", "--localisation", "slam", "--design", "stripes", "--texel", "0.02"]);
+    command.args(more).args(["--out", &s.path("out")]).stdin(Stdio::null()).output().unwrap()
 }
 
 /// It is scanned; from its stand the robot sees it, and PX4 flies by what its camera and inertial sensors say.
@@ -133,11 +136,7 @@ fn small_rock(s: &Scratch) -> String {
 fn px4_flies_by_the_robots_own_senses() {
     let Some(px4) = px4() else { return };
     let s = Scratch::new("px4-senses");
-    let (rock, out) = (small_rock(&s), s.path("out"));
-    let mut command = Command::new(env!("CARGO_BIN_EXE_robot"));
-    command.args(["--autopilot", &format!("px4:{}", px4.display()), "--mesh", &rock, "--scale", "1", "--up", "z"]);
-    command.args(["--scan", "--localisation", "slam", "--design", "stripes", "--texel", "0.02", "--seconds", "2"]);
-    let output = command.args(["--out", &out]).stdin(Stdio::null()).output().unwrap();
+    let output = fly_small_rock(&s, &px4, &["--scan", "--seconds", "2"]);
     assert!(output.status.success(), "{}", text(&output));
     assert!(figure(&s, "out", "hit_error_rms_m") < 0.015 && figure(&s, "out", "localisation_error_rms_m") < 0.01);
     for none in ["holds", "collisions", "valve_open_late_count"] {
@@ -150,12 +149,8 @@ fn px4_flies_by_the_robots_own_senses() {
 fn px4_flies_on_where_the_robots_senses_fail() {
     let Some(px4) = px4() else { return };
     let s = Scratch::new("px4-senses-fail");
-    let (rock, out) = (small_rock(&s), s.path("out"));
-    let mut command = Command::new(env!("CARGO_BIN_EXE_robot"));
-    command.args(["--autopilot", &format!("px4:{}", px4.display()), "--mesh", &rock, "--scale", "1", "--up", "z"]);
-    command.args(["--localisation", "slam", "--design", "stripes", "--texel", "0.02", "--seconds", "6"]);
-    command.args(["--fault", "clipped@1+0.6", "--fault", "elsewhere@3+0.6", "--fault", "servo@5+0.3"]);
-    let output = command.args(["--out", &out]).stdin(Stdio::null()).output().unwrap();
+    let faults = ["clipped@1+0.6", "elsewhere@3+0.6", "servo@5+0.3"].map(|fault| ["--fault", fault]);
+    let output = fly_small_rock(&s, &px4, &[&["--seconds", "6"], faults.as_flattened()].concat());
     assert!(output.status.success(), "{}", text(&output));
     let [error, holds, sprayed] = ["hit_error_max_m", "holds", "painted_s"].map(|name| figure(&s, "out", name));
     assert!(error < 0.025 && holds >= 2.0 && sprayed > 5.9, "{}", text(&output));

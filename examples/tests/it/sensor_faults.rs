@@ -11,7 +11,7 @@ use crate::onboard::{astray, bare, fly, fly_faulty, map, misses, surveyed, wall}
 
 /// `cargo test --release -p paintcopter --all-features --test it -- --ignored --nocapture faults_of_sensors`
 #[test]
-#[ignore = "some minutes; reprints the table of the chapter"]
+#[ignore = "some minutes: every kind of fault, for three durations"]
 fn faults_of_sensors() {
     let faults = [
         SensorFault::CameraBlack,
